@@ -1,0 +1,68 @@
+# Libraries, programs, tests and benchmarks. Sources are found by folder: a file belongs to the stage it lies in.
+
+function(lamina_sources result)
+  set(found)
+  foreach(pattern ${ARGN})
+    file(GLOB_RECURSE files CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/${pattern})
+    list(APPEND found ${files})
+  endforeach()
+  set(${result} ${found} PARENT_SCOPE)
+endfunction()
+
+include(GNUInstallDirs)
+
+# --- stages: what is done
+lamina_sources(stage_sources "stages/*.cpp")
+list(FILTER stage_sources EXCLUDE REGEX "/stages/write/picture/")
+add_library(lamina_stages STATIC ${stage_sources})
+add_library(lamina::stages ALIAS lamina_stages)
+target_include_directories(lamina_stages PUBLIC $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}>
+                                                $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}/lamina>)
+target_link_libraries(lamina_stages PUBLIC TBB::tbb Eigen3::Eigen fmt::fmt embree
+                      PRIVATE TIFF::TIFF PNG::PNG ZLIB::ZLIB libzip::zip PkgConfig::LIB3MF)
+
+# --- pipeline: how work moves
+lamina_sources(pipeline_sources "pipeline/*.cpp")
+list(FILTER pipeline_sources EXCLUDE REGEX "/pipeline/(main|preview_main)\\.cpp$")
+add_library(lamina_pipeline STATIC ${pipeline_sources})
+add_library(lamina::pipeline ALIAS lamina_pipeline)
+target_compile_definitions(lamina_pipeline PRIVATE LAMINA_VERSION="${PROJECT_VERSION}")
+target_link_libraries(lamina_pipeline PUBLIC lamina::stages
+                      PRIVATE nlohmann_json::nlohmann_json tomlplusplus::tomlplusplus PkgConfig::XXHASH)
+
+add_executable(lamina pipeline/main.cpp)
+target_link_libraries(lamina PRIVATE lamina::pipeline)
+
+# Pictures need OpenImageIO, which brings some 260 shared libraries and a tenth of a second of start-up: a program of
+# its own that `lamina preview` hands over to, so that no job pays for it.
+find_package(OpenImageIO REQUIRED)
+lamina_sources(picture_sources "stages/write/picture/*.cpp")
+add_executable(lamina-preview pipeline/preview_main.cpp ${picture_sources})
+target_link_libraries(lamina-preview PRIVATE lamina::pipeline OpenImageIO::OpenImageIO nlohmann_json::nlohmann_json)
+
+if(LAMINA_TESTS)
+  enable_testing()
+  find_package(GTest REQUIRED)
+  include(GoogleTest)
+  foreach(folder data load heights raster write pipeline)
+    lamina_sources(test_sources "tests/${folder}/*.cpp")
+    if(test_sources)
+      add_executable(test_${folder} ${test_sources})
+      target_link_libraries(test_${folder} PRIVATE lamina::pipeline GTest::gtest GTest::gtest_main TIFF::TIFF PNG::PNG
+                            ZLIB::ZLIB nlohmann_json::nlohmann_json PkgConfig::XXHASH)
+      target_compile_definitions(test_${folder} PRIVATE LAMINA_TEST_DIR="${PROJECT_SOURCE_DIR}/tests"
+                                 LAMINA_PROGRAM="$<TARGET_FILE:lamina>")
+      add_dependencies(test_${folder} lamina lamina-preview)
+      gtest_discover_tests(test_${folder} DISCOVERY_TIMEOUT 120 PROPERTIES TIMEOUT 900)
+    endif()
+  endforeach()
+endif()
+
+if(LAMINA_BENCH)
+  find_package(benchmark REQUIRED)
+  lamina_sources(bench_sources "bench/*.cpp")
+  if(bench_sources)
+    add_executable(lamina_bench ${bench_sources})
+    target_link_libraries(lamina_bench PRIVATE lamina::pipeline benchmark::benchmark)
+  endif()
+endif()

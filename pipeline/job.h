@@ -1,0 +1,58 @@
+// pipeline/job.h: what was asked for. A job is fully resolved before work starts, and is what the manifest records.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "stages/data/status.h"
+
+namespace lamina::pipeline {
+
+/// One [[part]] of a job.
+struct PartRequest {
+  std::string path;
+  std::string unit = "mm";  // mm, cm, m, um, inch, foot: of STL and OBJ, which carry none
+  std::uint32_t copies = 1;
+  std::optional<std::array<double, 2>> at_mm;  // where the part's box starts on the bed; arranged if absent
+  double bottom_mm = 0;                        // height of the part's lowest point above the bed
+  std::array<double, 3> scale{1, 1, 1};
+  std::array<double, 3> rotate_deg{0, 0, 0};
+  std::array<double, 3> shrink{1, 1, 1};  // compensation factors per axis of the bed, applied last
+};
+
+enum class FillRule { kNonzero, kPositive, kEvenOdd };
+enum class Engine { kRays, kContours, kBoth };
+enum class Mirror { kNone, kX, kY, kXY };
+
+/// Everything that decides the bytes of the output, then everything that does not.
+struct JetJob {
+  std::vector<PartRequest> parts;
+  std::array<double, 2> bed_mm{490, 380};
+  std::array<std::int64_t, 2> dpi{1200, 1200};
+  double layer_mm = 0.05;
+  double gap_mm = 5;  // between parts that are arranged by the planner
+  FillRule fill_rule = FillRule::kNonzero;
+  Mirror mirror = Mirror::kNone;
+  std::string format = "tiff-g4";
+  bool repair = true;
+  bool drop_bad = false;
+  double weld_um = 5;
+
+  // --- no effect on the bytes of any layer
+  std::string output;                                        // directory
+  Engine engine = Engine::kRays;
+  std::uint32_t threads = 0;                                 // 0: all that the machine has
+  std::uint64_t memory_bytes = 1ull << 30;                   // what layers in flight may hold
+  std::optional<std::array<std::uint32_t, 2>> layers;        // [first, last) only
+  std::optional<std::array<std::uint32_t, 2>> shard;         // i of n, i from 0
+  bool resume = false;
+  bool overwrite = false;  // allow a directory that holds another job's output
+  bool dry_run = false;
+  bool json = false;
+  bool quiet = false;
+};
+
+}  // namespace lamina::pipeline

@@ -1,0 +1,88 @@
+// pipeline/manifest.h: what a finished directory says of itself.
+//
+// manifest.json is JSON with one line a layer, in layer order. It holds nothing that differs between two runs of the
+// same job: no times, no thread counts, no engine, no host. While a job runs it grows as manifest.json.part, so that an
+// interrupted job can be resumed from the lines that are whole; it gets its final name when the last layer is in.
+#pragma once
+
+#include <cstdint>
+#include <cstdio>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "pipeline/job.h"
+#include "pipeline/scene.h"
+#include "stages/data/grid.h"
+#include "stages/data/layer.h"
+#include "stages/data/status.h"
+
+namespace lamina::pipeline {
+
+/// XXH3-128 of a file.
+struct Hash128 {
+  std::uint64_t high = 0, low = 0;
+  friend bool operator==(const Hash128&, const Hash128&) = default;
+};
+
+/// One line of the manifest.
+struct LayerRecord {
+  Layer layer;
+  std::uint64_t bytes = 0;          // of the file; 0 for the null format
+  std::uint64_t set_pixels = 0;
+  std::uint32_t capped_rows = 0;    // rows that are closed only thanks to repair (load/repair.h)
+  Hash128 hash;                     // of the file
+};
+
+/// The head of the manifest: the job as resolved and all that decides bytes.
+struct ManifestHead {
+  std::string version;      // of lamina
+  std::string job_toml;     // the resolved job, only keys that decide bytes
+  std::string format;       // id of the image format
+  std::string extension;
+  PixelGrid grid;
+  std::uint32_t layer_count = 0;               // of the whole job
+  std::uint32_t first_layer = 0, last_layer = 0;  // the range [first, last) that this manifest covers
+  std::vector<PartSummary> parts;
+  /// Hash of all of the above but the range: two directories with the same id belong to the same job.
+  Hash128 id() const;
+};
+
+struct Manifest {
+  ManifestHead head;
+  std::vector<LayerRecord> layers;  // in layer order
+  bool complete = false;            // read from a .json that was closed, not from a .part
+};
+
+/// Name of the manifest in a job's directory: manifest.json, or manifest-<i>-of-<n>.json for a shard.
+std::string manifest_name(const JetJob& job);
+/// layers/000042.tif
+std::string layer_file_name(std::uint32_t index, std::string_view extension);
+
+/// Reads a manifest, or as many whole lines as a .part holds. errors: kVerification with file and line
+Result<Manifest> read_manifest(const std::string& path);
+
+/// Appends layers in order; thread-compatible (the graph's ordered writer is serial).
+class ManifestWriter {
+ public:
+  /// Starts `path`.part with the head and the records that a resumed job keeps from its start.
+  static Result<ManifestWriter> open(const std::string& path, const ManifestHead& head,
+                                     std::vector<LayerRecord> kept_prefix);
+  ManifestWriter(ManifestWriter&&) noexcept;
+  ManifestWriter& operator=(ManifestWriter&&) noexcept;
+  ~ManifestWriter();
+
+  /// Buffers the line; the file gets it within a second or 64 lines, whichever is first.
+  Status append(const LayerRecord& record);
+  /// Writes out what is buffered: for an interrupted job.
+  Status flush();
+  /// Closes the JSON and gives it its final name.
+  Status finish();
+
+ private:
+  ManifestWriter() = default;
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
+}  // namespace lamina::pipeline

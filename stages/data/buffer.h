@@ -1,0 +1,40 @@
+// stages/data/buffer.h: a growable flat array that does not touch memory it is not told to write.
+#pragma once
+
+#include <cstddef>
+#include <memory>
+#include <type_traits>
+#include <utility>
+#include <vector>
+
+namespace lamina {
+
+/// Leaves new elements of trivial types unset, so that a buffer of a gigabyte can be filled by many threads
+/// without one of them zeroing it first.
+template <class T>
+struct UnsetAllocator : std::allocator<T> {
+  template <class U>
+  struct rebind {
+    using other = UnsetAllocator<U>;
+  };
+  template <class U>
+  void construct(U* place) noexcept(std::is_nothrow_default_constructible_v<U>) {
+    ::new (static_cast<void*>(place)) U;
+  }
+  template <class U, class... Arguments>
+  void construct(U* place, Arguments&&... arguments) {
+    ::new (static_cast<void*>(place)) U(std::forward<Arguments>(arguments)...);
+  }
+};
+
+/// std::vector whose resize() leaves trivial elements unset. Scratch buffers keep their capacity from layer to layer.
+template <class T>
+using Buffer = std::vector<T, UnsetAllocator<T>>;
+
+/// Bytes that a buffer holds on to.
+template <class T>
+std::size_t bytes_held(const Buffer<T>& buffer) {
+  return buffer.capacity() * sizeof(T);
+}
+
+}  // namespace lamina

@@ -1,0 +1,78 @@
+// stages/data/mesh.h: triangles in integer nanometres, as the loader hands them to every later stage.
+#pragma once
+
+#include <algorithm>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "stages/data/buffer.h"
+#include "stages/data/units.h"
+
+namespace lamina {
+
+struct Point3 {
+  Nm x, y, z;
+  friend bool operator==(const Point3&, const Point3&) = default;
+  friend auto operator<=>(const Point3&, const Point3&) = default;
+};
+
+/// Corners in counter-clockwise order seen from outside. 36 bytes; corners are stored, not indexed, because only
+/// diagnosis asks for topology and everything else streams triangles.
+struct Triangle {
+  Point3 a, b, c;
+  friend bool operator==(const Triangle&, const Triangle&) = default;
+};
+static_assert(sizeof(Triangle) == 36);
+
+/// Closed axis-parallel box. The empty box has lo > hi and grows to whatever is put into it.
+struct Box {
+  Point3 lo{INT32_MAX, INT32_MAX, INT32_MAX};
+  Point3 hi{INT32_MIN, INT32_MIN, INT32_MIN};
+
+  bool empty() const { return lo.x > hi.x; }
+  void add(const Point3& p) {
+    lo = {std::min(lo.x, p.x), std::min(lo.y, p.y), std::min(lo.z, p.z)};
+    hi = {std::max(hi.x, p.x), std::max(hi.y, p.y), std::max(hi.z, p.z)};
+  }
+  void add(const Box& other) {
+    if (other.empty()) return;
+    add(other.lo);
+    add(other.hi);
+  }
+  std::int64_t width() const { return std::int64_t{hi.x} - lo.x; }
+  std::int64_t depth() const { return std::int64_t{hi.y} - lo.y; }
+  std::int64_t height() const { return std::int64_t{hi.z} - lo.z; }
+};
+
+/// One solid. Triangles T from `repaired_from` on were added by repair (caps over openings).
+struct Mesh {
+  std::string name;  // file, and the object in it where a file holds several
+  Buffer<Triangle> triangles;
+  std::uint32_t repaired_from = 0;  // == triangles.size() when nothing was added
+  Box bounds;
+  std::uint64_t fingerprint = 0;  // of the triangles in any order (load/diagnose.h)
+};
+
+/// A mesh put somewhere by an integer translation: what copies share.
+struct Instance {
+  std::uint32_t mesh;  // index into Part::meshes
+  Point3 offset;       // nm, added to every vertex
+};
+
+/// What was noticed while a file was read and what was done about it; one line each, for a person.
+struct Note {
+  bool repair = false;  // geometry was changed or guessed, not only remarked on
+  std::string text;
+};
+
+/// A file as loaded: its meshes, where it puts them relative to each other, and the box around all.
+struct Part {
+  std::string path;
+  std::vector<Mesh> meshes;
+  std::vector<Instance> instances;
+  Box bounds;
+  std::vector<Note> notes;
+};
+
+}  // namespace lamina

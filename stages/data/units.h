@@ -1,0 +1,32 @@
+// stages/data/units.h: lengths are integer nanometres everywhere after a file is read.
+#pragma once
+
+#include <cstdint>
+
+namespace lamina {
+
+/// A coordinate, height or distance in nanometres. The reach is +-2.147 m; a vertex beyond it is an input error.
+using Nm = std::int32_t;
+
+inline constexpr std::int64_t kNmPerMm = 1'000'000;
+inline constexpr std::int64_t kNmPerInch = 25'400'000;
+inline constexpr std::int64_t kNmReach = 2'147'483'647;
+
+/// Millimetres of a length in nanometres; for reports, never for decisions.
+constexpr double mm(std::int64_t nm) { return static_cast<double>(nm) / kNmPerMm; }
+
+/// Quotient rounded towards minus infinity. `divisor` > 0.
+template <class Integer>
+constexpr Integer floor_div(Integer dividend, Integer divisor) {
+  const Integer quotient = dividend / divisor;
+  return quotient - (dividend % divisor < 0 ? 1 : 0);
+}
+
+/// Quotient rounded towards plus infinity. `divisor` > 0.
+template <class Integer>
+constexpr Integer ceil_div(Integer dividend, Integer divisor) {
+  const Integer quotient = dividend / divisor;
+  return quotient + (dividend % divisor > 0 ? 1 : 0);
+}
+
+}  // namespace lamina

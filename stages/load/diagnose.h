@@ -1,0 +1,53 @@
+// stages/load/diagnose.h: is a mesh closed, and where is it not.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "stages/data/mesh.h"
+
+namespace lamina::load {
+
+/// What was found; counts, and the first places in file order (at most `places` of each kind).
+struct Diagnosis {
+  struct Place {
+    std::uint32_t triangle;  // index in the mesh
+    Point3 at;               // nm, middle of the edge or first corner of the facet
+  };
+  struct Finding {
+    std::uint64_t count = 0;
+    std::vector<Place> first;
+  };
+  std::uint64_t triangles = 0, vertices = 0, edges = 0;
+  std::uint32_t shells = 0;           // components connected over vertices' edges
+  std::uint32_t inverted_shells = 0;  // closed shells with negative volume
+  Box bounds;
+  double volume_mm3 = 0;              // signed, exact sum rounded once
+  Finding open_edges;                 // used by one facet only
+  Finding non_manifold_edges;         // used by more than two facets
+  Finding misoriented_edges;          // two facets, both in the same direction
+  Finding degenerate_facets;          // zero area after snapping
+  Finding duplicate_facets;           // same three corners as an earlier facet, in any rotation, same orientation
+  /// Every edge is walked as often one way as the other: the winding number is defined everywhere. This, not
+  /// manifoldness, is what planning needs.
+  bool balanced = false;
+};
+
+/// cost: merges equal vertices by sorting, O(T log T), about 60 bytes a triangle.
+Diagnosis diagnose(const Mesh& mesh, std::size_t places = 3);
+
+/// What every job pays for, in one pass.
+struct Census {
+  /// Every edge is walked as often one way as the other, up to a chance of 2^-64 that is the same on every machine:
+  /// the sum over all facets of a hash of their directed edges that changes sign with direction is zero.
+  bool balanced = false;
+  /// Sum over all facets of a hash of their corners, the same for any order of the facets and any first corner.
+  /// Tells `--resume` that a part is still the part it was.
+  std::uint64_t fingerprint = 0;
+};
+
+/// cost: O(T), parallel, no memory.
+Census census(std::span<const Triangle> triangles);
+
+}  // namespace lamina::load

@@ -1,0 +1,45 @@
+// stages/load/load.h: part files become meshes in integer nanometres.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <string>
+
+#include "stages/data/mesh.h"
+#include "stages/data/status.h"
+
+namespace lamina::load {
+
+/// Where a part file's numbers are turned into nanometres, before snapping and in double precision:
+/// point_nm = llround(1e6 * (linear * point + translation)), applied per coordinate.
+struct Transform {
+  std::array<double, 9> linear{1, 0, 0, 0, 1, 0, 0, 0, 1};  // row-major
+  std::array<double, 3> translation{0, 0, 0};               // mm
+  bool mirrors() const;                                     // negative determinant: facets must be turned over
+};
+
+/// scale (per axis), then rotation about x, y, z in that order (degrees), then shrink factors (per axis of the bed).
+/// Rotations by multiples of 90 degrees are exact.
+Transform make_transform(const std::array<double, 3>& scale, const std::array<double, 3>& rotate_deg,
+                         const std::array<double, 3>& shrink);
+
+struct LoadOptions {
+  Transform transform;
+  double unit_mm = 1.0;      // mm per unit of files that carry none (STL, OBJ); 3MF states its own
+  bool drop_bad = false;     // drop facets with coordinates that are not finite instead of refusing the file
+  bool repair = true;        // orient, remove duplicates, weld and cap a mesh that is not closed (repair.h)
+  std::int64_t weld_nm = 5'000;               // repair joins vertices at open edges that are at most this far apart
+  std::uint64_t triangle_limit = 1ull << 30;  // refused above; a header can lie, so sizes are checked against the file first
+  std::uint64_t expanded_limit = 8ull << 30;  // bytes a compressed file may expand to
+};
+
+/// Reads a part file; the format follows from its content first, then from its name: STL (binary, ASCII), OBJ, 3MF,
+/// and gzip of STL or OBJ.
+///
+/// returns  meshes with repaired, closed triangle lists (unless options.repair is off), one instance per build item
+///          (a single one for STL and OBJ); coordinates as in the file after the transform, not yet placed on a bed
+/// errors   kInput, one line: the file, the place in it (facet and byte, or line), what to do
+/// cost     two passes over the file's bytes, parallel; 36 bytes a triangle, twice that while a mesh is repaired
+Result<Part> load(const std::string& path, const LoadOptions& options);
+
+}  // namespace lamina::load

@@ -1,0 +1,38 @@
+// stages/load/repair.h: makes the winding number of an open mesh defined everywhere, and says how.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "stages/data/mesh.h"
+
+namespace lamina::load {
+
+struct RepairReport {
+  std::uint64_t duplicates_dropped = 0;
+  std::uint64_t facets_turned = 0;
+  std::uint64_t vertices_welded = 0;
+  std::uint64_t openings_capped = 0;  // loops of unmatched edges
+  std::uint64_t cap_triangles = 0;
+  Box capped;                         // around all caps
+  double largest_opening_mm = 0;      // largest box diagonal of one loop
+  bool changed() const { return duplicates_dropped + facets_turned + vertices_welded + openings_capped > 0; }
+};
+
+/// Repairs a mesh that is not balanced (diagnose.h), in this order, each step only while the mesh is unbalanced:
+///  1. a facet that repeats an earlier one (same corners, same orientation) is dropped;
+///  2. vertices on unmatched edges that are at most weld_nm apart become one (the lexicographically smallest of them);
+///  3. facets are turned over so that neighbours across two-facet edges agree; per connected component the
+///     orientation of the larger area wins;
+///  4. the edges that are still unmatched are walked into loops, smallest first come, and each loop is capped with a
+///     fan of triangles from its smallest vertex.
+/// After step 4 every edge is balanced, whatever the input: the boundary of a chain of triangles is a set of cycles,
+/// and a fan over a cycle has exactly that cycle, reversed, as its boundary. So no row of any layer can stay open.
+/// A missing triangle is restored exactly, a planar hole is filled exactly. Caps are appended after the mesh's own
+/// triangles (Mesh::repaired_from), so that later stages can report the rows that they decide.
+///
+/// The result does not depend on threads. A balanced mesh is returned untouched.
+RepairReport repair(Mesh& mesh, std::int64_t weld_nm);
+
+}  // namespace lamina::load

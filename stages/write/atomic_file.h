@@ -1,0 +1,17 @@
+// stages/write/atomic_file.h: a file appears under its final name only when it is whole.
+#pragma once
+
+#include <cstddef>
+#include <span>
+#include <string>
+
+#include "stages/data/status.h"
+
+namespace lamina::write {
+
+/// Writes `bytes` under a temporary name beside `path` (path + ".part"), then renames it.
+/// errors  kOutput, one line with the path and the system's reason (no space, no permission, ...); the temporary file
+///         is removed again, and an older file of that name stays as it was.
+Status write_file(const std::string& path, std::span<const std::byte> bytes);
+
+}  // namespace lamina::write

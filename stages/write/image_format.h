@@ -1,0 +1,44 @@
+// stages/write/image_format.h: the per-layer image formats, and how a layer's runs become a file's bytes.
+#pragma once
+
+#include <cstddef>
+#include <memory>
+#include <span>
+#include <string_view>
+
+#include "stages/data/buffer.h"
+#include "stages/data/grid.h"
+#include "stages/data/runs.h"
+#include "stages/data/status.h"
+
+namespace lamina::write {
+
+using Bytes = Buffer<std::byte>;
+
+/// Encodes layers one after another and keeps its scratch memory between them. One encoder per thread at a time.
+class ImageEncoder {
+ public:
+  virtual ~ImageEncoder() = default;
+
+  /// The whole file of one layer, into `file` (its capacity is reused).
+  /// dpi_x, dpi_y  written into the file's resolution tags
+  /// errors        kOutput if the format cannot hold the image (its limits are named in the message)
+  /// Set pixels are printed as 1 = jet: min-is-white in TIFF, black in PBM, 1 in PNG's palette (see the format's README).
+  virtual Status encode(const RunsView& runs, std::int64_t dpi_x, std::int64_t dpi_y, Bytes& file) = 0;
+};
+
+/// One row of the registry.
+struct ImageFormat {
+  std::string_view id;           // as on the command line: tiff-g4, tiff-packbits, tiff-none, png, pbm, null
+  std::string_view extension;    // with the dot; empty for null
+  std::string_view description;  // for --help
+  std::unique_ptr<ImageEncoder> (*make_encoder)();
+};
+
+/// All formats, the default first.
+std::span<const ImageFormat> image_formats();
+
+/// The format with this id, or nullptr.
+const ImageFormat* find_image_format(std::string_view id);
+
+}  // namespace lamina::write

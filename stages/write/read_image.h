@@ -1,0 +1,23 @@
+// stages/write/read_image.h: layer images back into runs, through libtiff, libpng and a PBM reader.
+#pragma once
+
+#include <cstddef>
+#include <span>
+#include <string>
+
+#include "stages/data/runs.h"
+#include "stages/data/status.h"
+
+namespace lamina::write {
+
+struct LayerImage {
+  Runs runs;
+  double dpi_x = 0, dpi_y = 0;  // 0 where the file does not say
+};
+
+/// Decodes a 1-bit image as the writers make them (TIFF of any 1-bit compression, PNG, PBM), row by row: memory is
+/// the runs plus one row or strip of bits.
+/// errors  kVerification with the file's name: truncated, not 1 bit, not readable
+Result<LayerImage> read_image(const std::string& path);
+
+}  // namespace lamina::write
