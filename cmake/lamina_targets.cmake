@@ -19,7 +19,7 @@ add_library(lamina::stages ALIAS lamina_stages)
 target_include_directories(lamina_stages PUBLIC $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}>
                                                 $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}/lamina>)
 target_link_libraries(lamina_stages PUBLIC TBB::tbb Eigen3::Eigen fmt::fmt embree
-                      PRIVATE TIFF::TIFF PNG::PNG ZLIB::ZLIB libzip::zip PkgConfig::LIB3MF)
+                      PRIVATE TIFF::TIFF PNG::PNG ZLIB::ZLIB PkgConfig::LIBZIP PkgConfig::LIB3MF)
 
 # --- pipeline: how work moves
 lamina_sources(pipeline_sources "pipeline/*.cpp")
@@ -35,10 +35,9 @@ target_link_libraries(lamina PRIVATE lamina::pipeline)
 
 # Pictures need OpenImageIO, which brings some 260 shared libraries and a tenth of a second of start-up: a program of
 # its own that `lamina preview` hands over to, so that no job pays for it.
-find_package(OpenImageIO REQUIRED)
 lamina_sources(picture_sources "stages/write/picture/*.cpp")
 add_executable(lamina-preview pipeline/preview_main.cpp ${picture_sources})
-target_link_libraries(lamina-preview PRIVATE lamina::pipeline OpenImageIO::OpenImageIO nlohmann_json::nlohmann_json)
+target_link_libraries(lamina-preview PRIVATE lamina::pipeline PkgConfig::OPENIMAGEIO nlohmann_json::nlohmann_json)
 
 if(LAMINA_TESTS)
   enable_testing()
