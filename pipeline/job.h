@@ -2,12 +2,16 @@
 #pragma once
 
 #include <array>
+#include <cmath>
 #include <cstdint>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "stages/data/fill_rule.h"
+#include "stages/data/grid.h"
 #include "stages/data/status.h"
+#include "stages/data/units.h"
 
 namespace lamina::pipeline {
 
@@ -23,7 +27,6 @@ struct PartRequest {
   std::array<double, 3> shrink{1, 1, 1};  // compensation factors per axis of the bed, applied last
 };
 
-enum class FillRule { kNonzero, kPositive, kEvenOdd };
 enum class Engine { kRays, kContours, kBoth };
 enum class Mirror { kNone, kX, kY, kXY };
 
@@ -54,5 +57,20 @@ struct JetJob {
   bool json = false;
   bool quiet = false;
 };
+
+/// Millimetres of a job in nanometres, rounded to the nearest.
+inline std::int64_t nm_of(double millimetres) { return std::llround(millimetres * static_cast<double>(kNmPerMm)); }
+
+/// The pixels of a job's bed. Only for a checked job.
+PixelGrid grid_of(const JetJob& job);
+
+/// Whether every value of a job is within what can be planned, and agrees with the others; for jobs from anywhere.
+/// errors  kUsage, one line that begins with the key
+Status check_job(const JetJob& job);
+
+/// The layers [first, last) that a job plans of all that its parts need: all, job.layers, or its shard. Shards are
+/// the equal shares floor(count * i / n); an end of job.layers beyond the last layer is the last layer.
+/// errors  kUsage if job.layers begins beyond the last layer
+Result<std::array<std::uint32_t, 2>> layer_range(const JetJob& job, std::uint32_t layer_count);
 
 }  // namespace lamina::pipeline

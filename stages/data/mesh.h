@@ -49,7 +49,7 @@ struct Box {
 struct Mesh {
   std::string name;  // file, and the object in it where a file holds several
   Buffer<Triangle> triangles;
-  std::uint32_t repaired_from = 0;  // == triangles.size() when nothing was added
+  std::uint32_t repaired_from = UINT32_MAX;  // >= triangles.size() when nothing was added
   Box bounds;
   std::uint64_t fingerprint = 0;  // of the triangles in any order (load/diagnose.h)
 };

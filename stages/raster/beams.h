@@ -1,0 +1,47 @@
+// stages/raster/beams.h: engine `rays`: Embree finds the clusters that a band of rows can meet.
+//
+// One ray a band runs along the middle of its rows, in the plane of the layer, towards +x. Each cluster of 16 triangles
+// is one user primitive whose box is grown by half a band in y, and by more than float rounding everywhere. So the ray
+// passes the box of every cluster that any row of the band could cross: nothing is lost to rounding. A cluster that
+// is met without need is only looked at in vain: whether, in which rows and where a triangle is crossed is decided in
+// integers from its corners (segment.h). And a traversal reports a primitive once, so nothing is counted twice.
+//
+// Source: I. Wald, S. Woop, C. Benthin, G. S. Johnson, M. Ernst, "Embree: A Kernel Framework for Efficient CPU Ray
+// Tracing", ACM Transactions on Graphics 33(4), 2014, for the tree; growing boxes in place of rays is ours.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <span>
+
+#include "stages/data/status.h"
+#include "stages/raster/scan.h"
+
+namespace lamina::raster {
+
+class BeamIndex {
+ public:
+  /// Rows that one ray answers for.
+  static constexpr std::uint32_t kBandRows = 256;
+
+  /// placed  outlives the index
+  static Result<BeamIndex> build(std::span<const PlacedMesh> placed, const PixelGrid& grid);
+  BeamIndex(BeamIndex&&) noexcept;
+  BeamIndex& operator=(BeamIndex&&) noexcept;
+  ~BeamIndex();
+
+  /// Appends the segments of all triangles that the plane cuts within geometry rows [first_row, last_row), at most
+  /// kBandRows of them.
+  void append_band(const PixelSampling& sampling, Nm plane, std::uint32_t first_row, std::uint32_t last_row,
+                   Segments& out) const;
+
+  /// What Embree allocated.
+  std::uint64_t bytes() const;
+
+ private:
+  BeamIndex() = default;
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
+}  // namespace lamina::raster

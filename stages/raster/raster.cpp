@@ -1,0 +1,127 @@
+#include "stages/raster/raster.h"
+
+#include <algorithm>
+#include <vector>
+
+#include "stages/raster/beams.h"
+#include "stages/raster/clusters.h"
+#include "stages/raster/height_buckets.h"
+#include "stages/raster/layer_bound.h"
+
+namespace lamina::raster {
+
+struct Rasterizer::State {
+  PixelGrid grid;
+  PixelSampling sampling;
+  FillRule rule;
+  std::vector<ClusteredMesh> meshes;
+  std::vector<PlacedMesh> placed;
+  std::uint32_t first_row = 0, last_row = 0;  // geometry rows that any part can reach
+  std::vector<BeamIndex> beams;               // one, or none
+  std::vector<HeightBuckets> buckets;         // one a mesh, or none
+  std::vector<LayerBound> bound;              // one
+
+  State(const PixelGrid& pixel_grid, FillRule fill_rule) : grid(pixel_grid), sampling(pixel_grid), rule(fill_rule) {}
+};
+
+Rasterizer::Rasterizer(Rasterizer&&) noexcept = default;
+Rasterizer& Rasterizer::operator=(Rasterizer&&) noexcept = default;
+Rasterizer::~Rasterizer() = default;
+
+Result<Rasterizer> Rasterizer::build(std::span<Mesh> meshes, std::span<const Instance> instances,
+                                     const PixelGrid& grid, FillRule rule, bool rays, bool contours) {
+  Rasterizer rasterizer;
+  rasterizer.state_ = std::make_unique<State>(grid, rule);
+  State& state = *rasterizer.state_;
+  std::int64_t lowest = grid.y.length, highest = 0;
+  for (const Instance& instance : instances) {
+    const Box& box = meshes[instance.mesh].bounds;
+    lowest = std::min(lowest, std::int64_t{box.lo.y} + instance.offset.y);
+    highest = std::max(highest, std::int64_t{box.hi.y} + instance.offset.y);
+  }
+  const auto row_at = [&](std::int64_t y) {
+    return static_cast<std::uint32_t>(std::clamp<std::int64_t>(grid.y.first_at_or_beyond(y), 0, grid.rows()));
+  };
+  state.first_row = row_at(lowest);
+  state.last_row = std::max(state.first_row, row_at(highest));
+
+  for (Mesh& mesh : meshes) state.meshes.push_back(make_clusters(mesh));
+  for (const Instance& instance : instances) {
+    state.placed.push_back({&state.meshes[instance.mesh], instance.offset});
+  }
+  state.bound.emplace_back(state.placed, grid);
+  if (contours) {
+    for (const ClusteredMesh& mesh : state.meshes) state.buckets.emplace_back(mesh);
+  }
+  if (rays) {
+    auto beams = BeamIndex::build(state.placed, grid);
+    if (!beams) return beams.error();
+    state.beams.push_back(std::move(*beams));
+  }
+  return rasterizer;
+}
+
+LayerReport Rasterizer::layer(Engine engine, Nm plane, LayerScratch& scratch, Runs& out) const {
+  const State& state = *state_;
+  LayerReport report;
+  out.columns = state.grid.columns();
+  out.change.clear();
+  out.row_offset.clear();
+  out.row_offset.push_back(0);
+  const std::uint32_t rows = state.grid.rows();
+  out.row_offset.reserve(std::size_t{rows} + 1);
+  out.row_offset.resize(std::size_t{rows - state.last_row} + 1, 0);
+
+  const auto append = [&](std::uint32_t first_row, std::uint32_t last_row) {
+    scratch.scan.append_rows(state.sampling, scratch.segments, state.placed, plane, state.rule, first_row, last_row,
+                             out, report);
+  };
+  if (engine == Engine::kRays) {
+    // Bands from the back of the bed to its front, the order of the image's rows.
+    for (std::uint32_t last = state.last_row; last > state.first_row;) {
+      const std::uint32_t first = std::max(state.first_row, last - std::min(last, BeamIndex::kBandRows));
+      scratch.segments.clear();
+      state.beams.front().append_band(state.sampling, plane, first, last, scratch.segments);
+      append(first, last);
+      last = first;
+    }
+  } else {
+    scratch.segments.clear();
+    for (std::uint32_t i = 0; i < state.placed.size(); ++i) {
+      const PlacedMesh& placed = state.placed[i];
+      state.buckets[static_cast<std::size_t>(placed.mesh - state.meshes.data())].append_layer(
+          state.sampling, placed, i, plane, scratch.segments);
+    }
+    append(state.first_row, state.last_row);
+  }
+  out.row_offset.resize(std::size_t{rows} + 1, static_cast<std::uint32_t>(out.change.size()));
+  report.scratch_bytes = scratch.bytes();
+  return report;
+}
+
+std::uint64_t Rasterizer::layer_bytes_bound(Nm plane) const {
+  const LayerBound::Count count = state_->bound.front().at(plane);
+  const std::uint64_t rows = state_->grid.rows();
+  // Buffers may hold up to twice what they need, crossings and changes take 4 bytes each.
+  return 2 * count.segments * sizeof(Segment) + 2 * (count.crossings + rows) * 4 * 2 + rows * 8;
+}
+
+std::uint64_t Rasterizer::crossings_bound(Nm plane) const { return state_->bound.front().at(plane).crossings; }
+
+std::uint64_t Rasterizer::mesh_bytes() const {
+  std::uint64_t total = 0;
+  for (const ClusteredMesh& mesh : state_->meshes) total += bytes_held(mesh.clusters);
+  return total;
+}
+
+std::uint64_t Rasterizer::index_bytes() const {
+  std::uint64_t total = bytes_held(state_->sampling.row_centre);
+  for (const ClusteredMesh& mesh : state_->meshes) total += bytes_held(mesh.bounds);
+  for (const HeightBuckets& buckets : state_->buckets) total += buckets.bytes();
+  for (const BeamIndex& beams : state_->beams) total += beams.bytes();
+  return total;
+}
+
+const PixelGrid& Rasterizer::grid() const { return state_->grid; }
+
+}  // namespace lamina::raster

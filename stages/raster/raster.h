@@ -1,0 +1,64 @@
+// stages/raster/raster.h: meshes on a bed and a plane become the runs of a layer image.
+//
+// A pixel is set if and only if the winding number of all facets together about its centre, in the plane of the layer,
+// satisfies the fill rule. That is decided exactly (segment.h), so the two engines, which only find the facets that a
+// plane cuts, give the same bits: `rays` walks an Embree tree with one ray a band of rows, `contours` looks facets up
+// by height and needs no tree.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <span>
+
+#include "stages/data/fill_rule.h"
+#include "stages/data/grid.h"
+#include "stages/data/mesh.h"
+#include "stages/data/runs.h"
+#include "stages/data/status.h"
+#include "stages/raster/scan.h"
+
+namespace lamina::raster {
+
+enum class Engine : std::uint8_t { kRays, kContours };
+
+/// Scratch memory of one layer in flight; any layer may follow any other in it.
+struct LayerScratch {
+  Segments segments;
+  ScanConverter scan;
+  std::uint64_t bytes() const { return bytes_held(segments) + scan.bytes(); }
+};
+
+/// Immutable once built; layers may be asked for from any number of threads.
+class Rasterizer {
+ public:
+  /// meshes     triangles are moved out of them: 36 bytes a triangle before and after
+  /// instances  where copies stand; every corner within the grid's bed (0 <= x <= length) and below kNmReach
+  /// rays, contours  which indices to build; an engine that was not built must not be asked for
+  /// errors     kInternal if Embree fails
+  /// cost       O(T); Embree's tree is one primitive a cluster of 16 triangles, copies share it
+  static Result<Rasterizer> build(std::span<Mesh> meshes, std::span<const Instance> instances, const PixelGrid& grid,
+                                  FillRule rule, bool rays, bool contours);
+  Rasterizer(Rasterizer&&) noexcept;
+  Rasterizer& operator=(Rasterizer&&) noexcept;
+  ~Rasterizer();
+
+  /// The runs of the layer at height `plane` (nm), into `out` (its capacity is reused).
+  /// cost  O(facets near the plane + crossings log(crossings of a row)); no allocation once the scratch is warm
+  LayerReport layer(Engine engine, Nm plane, LayerScratch& scratch, Runs& out) const;
+
+  /// Bytes that the layer at `plane` may need at most: scratch and runs. From a table of 1024 heights, made once.
+  std::uint64_t layer_bytes_bound(Nm plane) const;
+  /// Crossings that the layer at `plane` may have at most.
+  std::uint64_t crossings_bound(Nm plane) const;
+
+  std::uint64_t mesh_bytes() const;
+  std::uint64_t index_bytes() const;  // trees, boxes and buckets
+  const PixelGrid& grid() const;
+
+ private:
+  Rasterizer() = default;
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
+}  // namespace lamina::raster

@@ -1,0 +1,171 @@
+#include "stages/raster/scan.h"
+
+#include <algorithm>
+#include <cstring>
+
+namespace lamina::raster {
+namespace {
+
+/// Rows hold few crossings, and engines find them nearly in order, so insertion is quick; a row that turns out to be
+/// in disorder is handed to the standard sort.
+void sort_row(std::uint32_t* begin, std::uint32_t* end) {
+  std::ptrdiff_t patience = 64 + 8 * (end - begin);
+  for (std::uint32_t* i = begin + 1; i < end; ++i) {
+    const std::uint32_t value = *i;
+    std::uint32_t* hole = i;
+    while (hole != begin && hole[-1] > value) {
+      *hole = hole[-1];
+      --hole;
+    }
+    *hole = value;
+    patience -= i - hole;
+    if (patience < 0) {
+      std::sort(begin, end);
+      return;
+    }
+  }
+}
+
+/// Writes the changes of one sorted row behind `change`, returns their end. The winding number starts at 0 on the left;
+/// where two crossings meet in one column, what is between them is empty and leaves no change.
+template <FillRule kRule>
+std::uint32_t* write_changes(const std::uint32_t* crossing, const std::uint32_t* end, std::uint32_t* change,
+                             std::int32_t& winding) {
+  const std::uint32_t* const row_begin = change;
+  bool solid = false;
+  for (; crossing != end; ++crossing) {
+    winding += (*crossing & 1) != 0 ? 1 : -1;
+    if (is_solid(kRule, winding) == solid) continue;
+    solid = !solid;
+    const std::uint32_t column = *crossing >> 1;
+    if (change != row_begin && change[-1] == column) {
+      --change;
+    } else {
+      *change++ = column;
+    }
+  }
+  return change;
+}
+
+}  // namespace
+
+void ScanConverter::place_segments(std::span<const Segment> segments, std::uint32_t first_row, std::uint32_t rows) {
+  place_.assign(std::size_t{rows} + 1, 0);
+  for (const Segment& segment : segments) {
+    ++place_[segment.first_row - first_row];
+    --place_[segment.last_row - first_row];
+  }
+  std::uint32_t in_row = 0, total = 0;
+  for (std::uint32_t row = 0; row < rows; ++row) {
+    in_row += place_[row];
+    place_[row] = total;
+    total += in_row;
+  }
+  place_[rows] = total;
+  crossing_.resize(total);
+}
+
+void ScanConverter::fill_crossings(const PixelSampling& sampling, const Segment& segment,
+                                   std::span<const PlacedMesh> placed, Nm plane, std::uint32_t first_row) {
+  std::uint32_t* const place = place_.data();
+  std::uint32_t* const crossing = crossing_.data();
+  const Nm* const centre = sampling.row_centre.data();
+  const std::uint32_t enters = (segment.flags & Segment::kEnters) != 0 ? 1 : 0;
+  const auto exact = [&](std::uint32_t row) {
+    const PlacedMesh& source = placed[segment.instance];
+    const ExactTriangle triangle(source.mesh->clusters[segment.cluster], segment.flags & Segment::kLane,
+                                 source.offset);
+    return static_cast<std::uint32_t>(exact_column(sampling.x, triangle, centre[row], plane));
+  };
+  const auto put = [&](std::uint32_t row, std::uint32_t column) {
+    crossing[place[row - first_row]++] = column * 2 + enters;
+  };
+
+  if ((segment.flags & Segment::kUpright) != 0) {
+    const std::uint32_t column = exact(segment.first_row);
+    for (std::uint32_t row = segment.first_row; row < segment.last_row; ++row) put(row, column);
+    return;
+  }
+  if ((segment.flags & Segment::kExact) != 0) {
+    for (std::uint32_t row = segment.first_row; row < segment.last_row; ++row) put(row, exact(row));
+    return;
+  }
+  const double undecided = 2 * sampling.near_x;
+  const double y = centre[segment.first_row];
+  for (std::uint32_t row = segment.first_row; row < segment.last_row; ++row) {
+    const double guess = segment.column + segment.columns_per_nm * (centre[row] - y);
+    auto column = static_cast<std::uint32_t>(static_cast<std::int32_t>(guess));
+    if (guess - static_cast<std::int32_t>(column) < undecided) [[unlikely]] column = exact(row);
+    put(row, column);
+  }
+}
+
+void ScanConverter::append_rows(const PixelSampling& sampling, std::span<const Segment> segments,
+                                std::span<const PlacedMesh> placed, Nm plane, FillRule rule, std::uint32_t first_row,
+                                std::uint32_t last_row, Runs& out, LayerReport& report) {
+  const std::uint32_t rows = last_row - first_row;
+  const std::size_t out_rows = out.row_offset.size();
+  const auto out_changes = static_cast<std::uint32_t>(out.change.size());
+  out.row_offset.resize(out_rows + rows);
+  std::uint32_t* row_end = out.row_offset.data() + out_rows;
+  if (segments.empty()) {
+    std::fill_n(row_end, rows, out_changes);
+    return;
+  }
+
+  place_segments(segments, first_row, rows);
+  bool any_cap = false;
+  for (const Segment& segment : segments) {
+    fill_crossings(sampling, segment, placed, plane, first_row);
+    any_cap |= (segment.flags & Segment::kCap) != 0;
+  }
+  report.segments += static_cast<std::uint32_t>(segments.size());
+  report.crossings += crossing_.size();
+  if (any_cap) {
+    capped_.assign(rows, 0);
+    for (const Segment& segment : segments) {
+      if ((segment.flags & Segment::kCap) == 0) continue;
+      std::memset(capped_.data() + (segment.first_row - first_row), 1, segment.last_row - segment.first_row);
+    }
+    for (std::uint32_t row = rows; row-- > 0;) {
+      if (capped_[row] == 0) continue;
+      ++report.capped_rows;
+      report.first_capped_row = first_row + row;
+    }
+  }
+
+  // A change has a crossing of its own, but for the closing one of an open row.
+  out.change.resize(out_changes + crossing_.size() + rows);
+  std::uint32_t* const changes = out.change.data();
+  std::uint32_t* change = changes + out_changes;
+  for (std::uint32_t row = rows; row-- > 0;) {
+    std::uint32_t* const begin = crossing_.data() + (row == 0 ? 0 : place_[row - 1]);
+    std::uint32_t* const end = crossing_.data() + place_[row];
+    if (begin != end) {
+      sort_row(begin, end);
+      const std::uint32_t* const row_begin = change;
+      std::int32_t winding = 0;
+      switch (rule) {
+        case FillRule::kNonzero: change = write_changes<FillRule::kNonzero>(begin, end, change, winding); break;
+        case FillRule::kPositive: change = write_changes<FillRule::kPositive>(begin, end, change, winding); break;
+        case FillRule::kEvenOdd: change = write_changes<FillRule::kEvenOdd>(begin, end, change, winding); break;
+      }
+      if (winding != 0) [[unlikely]] {
+        ++report.open_rows;
+        report.first_open_row = first_row + row;
+        if (((change - row_begin) & 1) != 0) {  // still solid: ends at the last crossing
+          const std::uint32_t last = end[-1] >> 1;
+          if (change[-1] == last) {
+            --change;
+          } else {
+            *change++ = last;
+          }
+        }
+      }
+    }
+    *row_end++ = static_cast<std::uint32_t>(change - changes);
+  }
+  out.change.resize(static_cast<std::size_t>(change - changes));
+}
+
+}  // namespace lamina::raster

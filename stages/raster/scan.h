@@ -1,0 +1,54 @@
+// stages/raster/scan.h: segments of a layer become runs.
+#pragma once
+
+#include <cstdint>
+#include <span>
+
+#include "stages/data/buffer.h"
+#include "stages/data/fill_rule.h"
+#include "stages/data/runs.h"
+#include "stages/raster/clusters.h"
+#include "stages/raster/segment.h"
+
+namespace lamina::raster {
+
+/// A mesh on the bed, as far as exact columns need it.
+struct PlacedMesh {
+  const ClusteredMesh* mesh;
+  Point3 offset;  // nm
+};
+
+/// What a layer told besides its runs.
+struct LayerReport {
+  std::uint32_t segments = 0;
+  std::uint64_t crossings = 0;
+  std::uint32_t capped_rows = 0;  // rows in which a facet that repair added is crossed
+  std::uint32_t open_rows = 0;    // rows whose crossings do not add up to zero: the mesh is open and was not repaired
+  std::uint32_t first_capped_row = 0, first_open_row = 0;  // geometry rows; the lowest, if there is any
+  std::uint64_t scratch_bytes = 0;
+};
+
+/// Scan conversion of one band of rows at a time: count (by differences, a segment costs two additions), scan, fill,
+/// then each row is sorted and the fill rule decides where it changes. Keeps its buffers from band to band.
+///
+/// A row whose crossings do not add up to zero is drawn up to its last crossing and no further.
+class ScanConverter {
+ public:
+  /// Appends rows last_row - 1 down to first_row (image order) to `out`; `segments` lie within these rows.
+  void append_rows(const PixelSampling& sampling, std::span<const Segment> segments,
+                   std::span<const PlacedMesh> placed, Nm plane, FillRule rule, std::uint32_t first_row,
+                   std::uint32_t last_row, Runs& out, LayerReport& report);
+
+  std::uint64_t bytes() const { return bytes_held(place_) + bytes_held(crossing_) + bytes_held(capped_); }
+
+ private:
+  void place_segments(std::span<const Segment> segments, std::uint32_t first_row, std::uint32_t rows);
+  void fill_crossings(const PixelSampling& sampling, const Segment& segment, std::span<const PlacedMesh> placed,
+                      Nm plane, std::uint32_t first_row);
+
+  Buffer<std::uint32_t> place_;     // per geometry row of the band: where its next crossing goes
+  Buffer<std::uint32_t> crossing_;  // column * 2 + (1 if it enters), row by row
+  Buffer<std::uint8_t> capped_;     // per geometry row of the band
+};
+
+}  // namespace lamina::raster
