@@ -100,6 +100,21 @@ void ScanConverter::fill_crossings(const PixelSampling& sampling, const Segment&
   }
 }
 
+void ScanConverter::report_caps(std::span<const Segment> segments, std::uint32_t first_row, std::uint32_t rows,
+                                LayerReport& report) {
+  capped_.assign(rows, 0);
+  report.first_capped_row = first_row + rows;  // bands come from the back, so any row of this one is lower
+  for (const Segment& segment : segments) {
+    if ((segment.flags & Segment::kCap) == 0) continue;
+    std::memset(capped_.data() + (segment.first_row - first_row), 1, segment.last_row - segment.first_row);
+    if (segment.first_row < report.first_capped_row) {
+      report.first_capped_row = segment.first_row;
+      report.first_capped_instance = segment.instance;
+    }
+  }
+  report.capped_rows += static_cast<std::uint32_t>(std::ranges::count(capped_, 1));
+}
+
 void ScanConverter::append_rows(const PixelSampling& sampling, std::span<const Segment> segments,
                                 std::span<const PlacedMesh> placed, Nm plane, FillRule rule, std::uint32_t first_row,
                                 std::uint32_t last_row, Runs& out, LayerReport& report) {
@@ -121,18 +136,7 @@ void ScanConverter::append_rows(const PixelSampling& sampling, std::span<const S
   }
   report.segments += static_cast<std::uint32_t>(segments.size());
   report.crossings += crossing_.size();
-  if (any_cap) {
-    capped_.assign(rows, 0);
-    for (const Segment& segment : segments) {
-      if ((segment.flags & Segment::kCap) == 0) continue;
-      std::memset(capped_.data() + (segment.first_row - first_row), 1, segment.last_row - segment.first_row);
-    }
-    for (std::uint32_t row = rows; row-- > 0;) {
-      if (capped_[row] == 0) continue;
-      ++report.capped_rows;
-      report.first_capped_row = first_row + row;
-    }
-  }
+  if (any_cap) report_caps(segments, first_row, rows, report);
 
   // A change has a crossing of its own, but for the closing one of an open row.
   out.change.resize(out_changes + crossing_.size() + rows);

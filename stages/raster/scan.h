@@ -25,6 +25,7 @@ struct LayerReport {
   std::uint32_t capped_rows = 0;  // rows in which a facet that repair added is crossed
   std::uint32_t open_rows = 0;    // rows whose crossings do not add up to zero: the mesh is open and was not repaired
   std::uint32_t first_capped_row = 0, first_open_row = 0;  // geometry rows; the lowest, if there is any
+  std::uint32_t first_capped_instance = 0;                 // of the facet that closes that row
   std::uint64_t scratch_bytes = 0;
 };
 
@@ -45,6 +46,8 @@ class ScanConverter {
   void place_segments(std::span<const Segment> segments, std::uint32_t first_row, std::uint32_t rows);
   void fill_crossings(const PixelSampling& sampling, const Segment& segment, std::span<const PlacedMesh> placed,
                       Nm plane, std::uint32_t first_row);
+  void report_caps(std::span<const Segment> segments, std::uint32_t first_row, std::uint32_t rows,
+                   LayerReport& report);
 
   Buffer<std::uint32_t> place_;     // per geometry row of the band: where its next crossing goes
   Buffer<std::uint32_t> crossing_;  // column * 2 + (1 if it enters), row by row

@@ -1,0 +1,68 @@
+// pipeline/graph.h: how layers move: the flow graph and its memory budget.
+//
+//      admit ──> raster ──> encode ──> store ──> in order ──> record
+//        ^                               │
+//        └───── credits in bytes ────────┘
+//
+// Layers are admitted in order, as long as the bytes that they may need fit into the budget; a layer that alone exceeds
+// it runs alone. raster, encode and store run for many layers at once; record sees every layer once, in order, and so
+// decides which failure is the first, whatever the threads do.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <span>
+
+#include "pipeline/manifest.h"
+#include "stages/data/layer.h"
+#include "stages/data/runs.h"
+#include "stages/data/status.h"
+#include "stages/raster/raster.h"
+#include "stages/write/image_format.h"
+
+namespace lamina::pipeline {
+
+/// What a layer occupies while it is in flight; reused by later layers.
+struct LayerWork {
+  raster::LayerScratch scratch;
+  Runs runs;
+  Runs second;  // of the other engine, or mirrored
+  std::unique_ptr<write::ImageEncoder> encoder;
+  write::Bytes file;
+};
+
+/// What is left of a layer when its file is written.
+struct LayerOutcome {
+  LayerRecord record;
+  raster::LayerReport report;
+  Status status;
+};
+
+/// What is done with a layer; each is called once a layer, in this order. The first three from many threads at once,
+/// and not after one of them has failed for that layer; `record` from one thread at a time, in layer order.
+struct LayerStages {
+  std::function<Status(LayerWork&, LayerOutcome&)> raster, encode, store;
+  std::function<Status(const LayerOutcome&)> record;  // an error ends the job
+};
+
+struct GraphLimits {
+  std::uint64_t budget_bytes = 1ull << 30;
+  std::uint32_t most_in_flight = 1;                             // layers; bounds the work lost by an interruption
+  std::function<std::uint64_t(const Layer&)> bytes_of_layer;    // at most; scratch, runs and file
+};
+
+struct GraphReport {
+  std::uint32_t most_in_flight = 0;
+  std::uint64_t most_bytes = 0;  // of credits given out at once
+};
+
+/// Runs all layers through the stages.
+/// layers  in increasing order
+/// cancel  looked at before each admission: layers in flight are finished and recorded, then the error is kInterrupted
+/// errors  the first failing layer's (in layer order), or kInterrupted
+Status run_layers(std::span<const Layer> layers, const LayerStages& stages, const GraphLimits& limits,
+                  const std::atomic<bool>& cancel, GraphReport& report);
+
+}  // namespace lamina::pipeline

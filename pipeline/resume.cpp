@@ -1,0 +1,44 @@
+#include "pipeline/resume.h"
+
+#include <fmt/core.h>
+#include <tbb/parallel_for.h>
+#include <unistd.h>
+
+#include "pipeline/hash.h"
+
+namespace lamina::pipeline {
+
+Result<std::vector<LayerRecord>> layers_that_hold(const std::string& directory, const std::string& manifest_name,
+                                                  const ManifestHead& head) {
+  std::string path = directory + "/" + manifest_name;
+  if (::access(path.c_str(), F_OK) != 0) path += ".part";
+  if (::access(path.c_str(), F_OK) != 0) return std::vector<LayerRecord>{};
+
+  auto manifest = read_manifest(path);
+  if (!manifest) return manifest.error();
+  if (manifest->head.id() != head.id()) {
+    const std::string what = difference(head, manifest->head);
+    return Error{Fault::kUsage, fmt::format("{}: belongs to another job ({}); choose another directory, or --overwrite",
+                                            path, what.empty() ? "its parts or keys differ" : what)};
+  }
+  const std::vector<LayerRecord>& recorded = manifest->layers;
+  std::vector<char> holds(recorded.size(), 1);
+  tbb::parallel_for(std::size_t{0}, recorded.size(), [&](std::size_t i) {
+    const LayerRecord& record = recorded[i];
+    if (record.layer.index < head.first_layer || record.layer.index >= head.last_layer) {
+      holds[i] = 0;
+      return;
+    }
+    const std::string name = layer_file_name(record.layer.index, head.extension);
+    if (name.empty()) return;  // a format without files
+    const auto digest = digest_file(directory + "/" + name);
+    holds[i] = digest.ok() && digest->bytes == record.bytes && digest->hash == record.hash;
+  });
+  std::vector<LayerRecord> kept;
+  for (std::size_t i = 0; i < recorded.size(); ++i) {
+    if (holds[i] != 0) kept.push_back(recorded[i]);
+  }
+  return kept;
+}
+
+}  // namespace lamina::pipeline
