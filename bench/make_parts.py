@@ -1,0 +1,153 @@
+#!/usr/bin/env python3
+"""Makes the parts of scripts/bench from the models folder. Python's standard library only; the same bytes every time.
+
+    bench/make_parts.py MODELS CACHE [--large]
+
+A part that is in the cache already is not made again. Every part is a closed mesh in an uncompressed binary STL:
+
+    terrain.stl       St. Helens scaled to fit 100 x 100 mm: 645,364 triangles, 192 layers of 0.1 mm
+    benchy15.stl      3DBenchy at 1.5 times its size: 225,154 triangles, 720 layers of 0.1 mm
+    crown.stl         a dental crown made 27.8 x 29.6 x 9.57 mm: 3,878 triangles, 96 layers of 0.1 mm, 20 of 0.5 mm
+    crowns96.stl      96 of them in one mesh, 12 x 8 on 400 x 400 mm
+    benchies72.stl    72 Benchies in one mesh, 6 x 12 on 400 x 400 mm: 811 MB, 480 layers of 0.1 mm (--large)
+"""
+import argparse
+import array
+import gzip
+import os
+import struct
+import sys
+import zipfile
+import xml.etree.ElementTree as xml
+
+RECORD = 50  # bytes of a facet: normal, three corners (12 floats), attribute word
+HEADER = b"binary STL made by bench/make_parts.py".ljust(80, b" ")
+
+
+def read_stl(path):
+    """Corner coordinates of a binary STL: [x, y, z], one array of doubles each, three entries a facet."""
+    with (gzip.open if path.endswith(".gz") else open)(path, "rb") as file:
+        data = file.read()
+    count = struct.unpack_from("<I", data, 80)[0]
+    body = memoryview(data)[84:84 + RECORD * count]
+    axes = [array.array("d") for _ in range(3)]
+    for record in struct.iter_unpack("<12fH", body):
+        for axis in range(3):
+            axes[axis].extend((record[3 + axis], record[6 + axis], record[9 + axis]))
+    return axes
+
+
+def read_3mf(path):
+    """The same of a 3MF that holds one object in one untransformed item."""
+    name = "{http://schemas.microsoft.com/3dmanufacturing/core/2015/02}"
+    vertices, axes = [], [array.array("d") for _ in range(3)]
+    with zipfile.ZipFile(path) as archive, archive.open("3D/3dmodel.model") as model:
+        for _, element in xml.iterparse(model):
+            if element.tag == name + "vertex":
+                vertices.append(tuple(float(element.get(axis)) for axis in "xyz"))
+                element.clear()
+            elif element.tag == name + "triangle":
+                for corner in ("v1", "v2", "v3"):
+                    point = vertices[int(element.get(corner))]
+                    for axis in range(3):
+                        axes[axis].append(point[axis])
+                element.clear()
+            elif element.tag == name + "item" and element.get("transform"):
+                numbers = [float(number) for number in element.get("transform").split()]
+                if numbers[:9] != [1, 0, 0, 0, 1, 0, 0, 0, 1]:
+                    sys.exit(f"{path}: its item is turned or scaled; not understood here")
+    return axes
+
+
+def placed(axes, factors):
+    """Scaled per axis, with the lowest corner of the box at the origin."""
+    result = []
+    for axis, factor in zip(axes, factors):
+        low = min(axis) * factor
+        result.append(array.array("d", [value * factor - low for value in axis]))
+    return result
+
+
+def write_stl(path, axes, offsets=((0.0, 0.0),)):
+    """One binary STL with a copy of the part at every (x, y) of `offsets`."""
+    facets = len(axes[0]) // 3
+    records = bytearray(RECORD * facets)  # normals and attributes stay zero
+
+    def put(axis, shift):
+        values = array.array("f", [value + shift for value in axes[axis]] if shift else axes[axis])
+        if sys.byteorder == "big":
+            values.byteswap()
+        raw = values.tobytes()
+        for corner in range(3):
+            for byte in range(4):
+                records[12 + 12 * corner + 4 * axis + byte::RECORD] = raw[4 * corner + byte::12]
+
+    put(2, 0.0)
+    with open(path + ".part", "wb") as file:
+        file.write(HEADER + struct.pack("<I", facets * len(offsets)))
+        last = (None, None)
+        for offset in offsets:
+            for axis in range(2):
+                if offset[axis] != last[axis]:
+                    put(axis, offset[axis])
+            last = offset
+            file.write(records)
+    os.replace(path + ".part", path)
+    print(f"{path}: {facets * len(offsets)} triangles, {os.path.getsize(path)} bytes", flush=True)
+
+
+def grid(axes, columns, rows, side):
+    """Offsets of columns x rows copies, spread evenly and centred on a square bed."""
+    width, depth = max(axes[0]), max(axes[1])
+    step_x = (side - columns * width) / columns + width
+    step_y = (side - rows * depth) / rows + depth
+    if step_x <= width or step_y <= depth:
+        sys.exit(f"{columns} x {rows} copies of {width:.1f} x {depth:.1f} mm do not fit {side} mm")
+    return [(column * step_x + (step_x - width) / 2, row * step_y + (step_y - depth) / 2)
+            for row in range(rows) for column in range(columns)]
+
+
+def main():
+    parser = argparse.ArgumentParser()
+    parser.add_argument("models")
+    parser.add_argument("cache")
+    parser.add_argument("--large", action="store_true")
+    options = parser.parse_args()
+    os.makedirs(options.cache, exist_ok=True)
+    read = {}
+
+    def model(name):
+        if name not in read:
+            path = os.path.join(options.models, name)
+            read[name] = read_3mf(path) if name.endswith(".3mf") else read_stl(path)
+        return read[name]
+
+    def make(name, recipe):
+        path = os.path.join(options.cache, name)
+        if not os.path.exists(path):
+            recipe(path)
+
+    def many(path, axes, columns, rows):
+        write_stl(path, axes, grid(axes, columns, rows, 400.0))
+
+    def terrain():
+        axes = model("st_helens_terrain_645k.stl.gz")
+        factor = 0.588  # 158 x 169.5 mm become 92.9 x 99.7 mm
+        return placed(axes, (factor, factor, factor))
+
+    def crown():
+        return placed(model("dental_crown.stl"), (2.6, 2.6, 1.0))
+
+    def benchy(factor):
+        return placed(model("3DBenchy.3mf"), (factor, factor, factor))
+
+    make("terrain.stl", lambda path: write_stl(path, terrain()))
+    make("benchy15.stl", lambda path: write_stl(path, benchy(1.5)))
+    make("crown.stl", lambda path: write_stl(path, crown()))
+    make("crowns96.stl", lambda path: many(path, crown(), 12, 8))
+    if options.large:
+        make("benchies72.stl", lambda path: many(path, benchy(1.0), 6, 12))
+
+
+if __name__ == "__main__":
+    main()
