@@ -102,7 +102,8 @@ BeamIndex::BeamIndex(BeamIndex&&) noexcept = default;
 BeamIndex& BeamIndex::operator=(BeamIndex&&) noexcept = default;
 BeamIndex::~BeamIndex() = default;
 
-Result<BeamIndex> BeamIndex::build(std::span<const PlacedMesh> placed, const PixelGrid& grid) {
+Result<BeamIndex> BeamIndex::build(std::span<const PlacedMesh> placed, const PixelGrid& grid,
+                                   std::uint32_t band_rows) {
   BeamIndex index;
   index.state_ = std::make_unique<State>();
   State& state = *index.state_;
@@ -129,8 +130,8 @@ Result<BeamIndex> BeamIndex::build(std::span<const PlacedMesh> placed, const Pix
   state.scene = rtcNewScene(state.device);
   rtcSetSceneFlags(state.scene, RTC_SCENE_FLAG_ROBUST | RTC_SCENE_FLAG_COMPACT);
 
-  const std::int64_t last_band_row = std::min<std::int64_t>(kBandRows, grid.rows()) - 1;
-  const auto half_band = static_cast<float>((grid.y.centre(last_band_row) - grid.y.centre(0)) / 2 + 2);
+  const auto half_band =
+      static_cast<float>((grid.y.centre(std::int64_t{band_rows} - 1) - grid.y.centre(0)) / 2 + 2);
 
   // Instances of one mesh follow each other here; a mesh that stands once needs no level of its own.
   std::vector<std::uint32_t> order(placed.size());

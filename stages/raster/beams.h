@@ -21,17 +21,16 @@ namespace lamina::raster {
 
 class BeamIndex {
  public:
-  /// Rows that one ray answers for.
-  static constexpr std::uint32_t kBandRows = 256;
-
-  /// placed  outlives the index
-  static Result<BeamIndex> build(std::span<const PlacedMesh> placed, const PixelGrid& grid);
+  /// placed     outlives the index
+  /// band_rows  most rows that one ray answers for: few, and clusters are met again by the next ray; many, and the
+  ///            crossings of a band no longer fit the processor's cache
+  static Result<BeamIndex> build(std::span<const PlacedMesh> placed, const PixelGrid& grid, std::uint32_t band_rows);
   BeamIndex(BeamIndex&&) noexcept;
   BeamIndex& operator=(BeamIndex&&) noexcept;
   ~BeamIndex();
 
   /// Appends the segments of all triangles that the plane cuts within geometry rows [first_row, last_row), at most
-  /// kBandRows of them.
+  /// band_rows of them.
   void append_band(const PixelSampling& sampling, Nm plane, std::uint32_t first_row, std::uint32_t last_row,
                    Segments& out) const;
 

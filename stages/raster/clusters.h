@@ -16,8 +16,6 @@ struct alignas(64) Cluster {
   Nm z[3][kClusterSize];
   Nm y[3][kClusterSize];
   Nm x[3][kClusterSize];
-
-  Point3 corner(std::uint32_t k, std::uint32_t lane) const { return {x[k][lane], y[k][lane], z[k][lane]}; }
 };
 static_assert(sizeof(Cluster) == 576);
 

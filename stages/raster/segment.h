@@ -51,22 +51,23 @@ struct PixelSampling {
   explicit PixelSampling(const PixelGrid& grid);
 };
 
-/// The three corners of a triangle on the bed, and the doubled area normal (exact: corners differ by less than 2^31).
+/// Three corners in the order of the facet, and the doubled area normal (exact: corners differ by less than 2^31).
 struct ExactTriangle {
   Point3 a, b, c;
   std::int64_t nx, ny, nz;
-  ExactTriangle(const Cluster& cluster, std::uint32_t lane, const Point3& offset)
-      : a(moved(cluster.corner(0, lane), offset)),
-        b(moved(cluster.corner(1, lane), offset)),
-        c(moved(cluster.corner(2, lane), offset)) {
+  ExactTriangle(const Point3& first, const Point3& second, const Point3& third) : a(first), b(second), c(third) {
     const std::int64_t ux = std::int64_t{b.x} - a.x, uy = std::int64_t{b.y} - a.y, uz = std::int64_t{b.z} - a.z;
     const std::int64_t vx = std::int64_t{c.x} - a.x, vy = std::int64_t{c.y} - a.y, vz = std::int64_t{c.z} - a.z;
     nx = uy * vz - uz * vy;
     ny = uz * vx - ux * vz;
     nz = ux * vy - uy * vx;
   }
-  static Point3 moved(Point3 p, const Point3& d) { return {p.x + d.x, p.y + d.y, p.z + d.z}; }
 };
+
+/// A corner on the bed.
+inline Point3 corner_on_bed(const Cluster& cluster, std::uint32_t corner, std::uint32_t lane, const Point3& offset) {
+  return {cluster.x[corner][lane] + offset.x, cluster.y[corner][lane] + offset.y, cluster.z[corner][lane] + offset.z};
+}
 
 /// The first column whose centre is at or beyond the crossing of the triangle's plane with row centre y at height z.
 /// Needs nx != 0. Integers only: the crossing is a.x - (ny (y - a.y) + nz (z - a.z)) / nx, and a whole-numbered
@@ -77,10 +78,7 @@ std::int64_t exact_column(const PixelAxis& axis, const ExactTriangle& triangle, 
 /// cross z: exactly one of its ends has z' <= z.
 std::int64_t exact_row(const PixelAxis& axis, const Point3& from, const Point3& to, Nm z);
 
-/// Which of the 16 triangles the plane z cuts, a bit each.
-std::uint32_t crossed_lanes(const Cluster& cluster, Nm z);
-
-/// Appends the segment of one crossed triangle, restricted to geometry rows [row_begin, row_end), if it has any row.
+/// A cluster as it stands on the bed.
 struct SegmentSource {
   const Cluster* cluster;
   std::uint32_t cluster_index;
@@ -88,6 +86,9 @@ struct SegmentSource {
   Point3 offset;  // of the instance
   bool cap;
 };
+
+/// Appends the segments of the cluster's triangles that the plane cuts, restricted to geometry rows
+/// [row_begin, row_end); a triangle cut in none of these rows leaves none.
 void append_segments(const PixelSampling& sampling, const SegmentSource& source, Nm plane, std::uint32_t row_begin,
                      std::uint32_t row_end, Segments& out);
 
