@@ -1,0 +1,55 @@
+#include "stages/write/read_image.h"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstring>
+#include <new>
+
+#include "stages/write/pbm/pbm.h"
+#include "stages/write/png/png_format.h"
+#include "stages/write/tiff/tiff.h"
+
+namespace lamina::write {
+namespace {
+
+struct Descriptor {
+  int file;
+  ~Descriptor() {
+    if (file >= 0) ::close(file);
+  }
+};
+
+/// By the first bytes, whatever the name says.
+Result<LayerImage> read_by_magic(int file, std::uint64_t bytes, const std::string& path) {
+  unsigned char magic[8] = {};
+  if (::pread(file, magic, sizeof magic, 0) < 0) {
+    return Error{Fault::kVerification, fmt::format("{}: cannot read: {}", path, std::strerror(errno))};
+  }
+  const auto begins = [&](const char* text, std::size_t length) { return std::memcmp(magic, text, length) == 0; };
+  if (begins("II", 2) || begins("MM", 2)) return tiff::read(file, bytes, path);
+  if (begins("\x89PNG\r\n\x1a\n", 8)) return png::read(file, bytes, path);
+  if (begins("P4", 2)) return pbm::read(file, bytes, path);
+  return Error{Fault::kVerification, fmt::format("{}: neither TIFF nor PNG nor PBM (P4); plan the layer again", path)};
+}
+
+}  // namespace
+
+Result<LayerImage> read_image(const std::string& path) {
+  const Descriptor descriptor{::open(path.c_str(), O_RDONLY | O_CLOEXEC)};
+  struct stat state;
+  if (descriptor.file < 0 || ::fstat(descriptor.file, &state) != 0) {
+    return Error{Fault::kVerification, fmt::format("{}: cannot open: {}", path, std::strerror(errno))};
+  }
+  if (!S_ISREG(state.st_mode)) return Error{Fault::kVerification, fmt::format("{}: not a file", path)};
+  try {
+    return read_by_magic(descriptor.file, static_cast<std::uint64_t>(state.st_size), path);
+  } catch (const std::bad_alloc&) {
+    return Error{Fault::kVerification, fmt::format("{}: too many runs for the memory", path)};
+  }
+}
+
+}  // namespace lamina::write

@@ -1,0 +1,111 @@
+#include <fmt/format.h>
+#include <tiffio.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cstdint>
+#include <string>
+
+#include "stages/write/bits.h"
+#include "stages/write/limits.h"
+#include "stages/write/tiff/memory_file.h"
+#include "stages/write/tiff/tiff.h"
+
+namespace lamina::write::tiff {
+namespace {
+
+/// Rows of `stride` bytes that `bytes` of this compression can hold at most; a header that promises more lies.
+std::uint64_t most_rows(std::uint16_t compression, std::uint64_t bytes, std::uint64_t stride) {
+  switch (compression) {
+    case COMPRESSION_NONE:
+      return bytes / stride;
+    case COMPRESSION_PACKBITS:
+      return bytes * 64 / stride;  // two bytes make 128
+    case COMPRESSION_CCITTFAX4:
+    case COMPRESSION_CCITTFAX3:
+    case COMPRESSION_CCITTRLE:
+      return bytes * 8;  // a row takes a bit
+    default:
+      return bytes * 2048 / stride + 1;  // deflate 1032, LZW about 1400
+  }
+}
+
+/// Why the strips cannot hold the rows, or nothing if they can.
+std::string check_strips(TIFF* tiff, std::uint64_t file_bytes, std::uint16_t compression, std::uint32_t rows,
+                         std::uint64_t stride) {
+  std::uint32_t rows_per_strip = rows;
+  TIFFGetFieldDefaulted(tiff, TIFFTAG_ROWSPERSTRIP, &rows_per_strip);
+  rows_per_strip = std::min(rows_per_strip, rows);
+  if (rows_per_strip == 0) return "strips of no rows";
+  const std::uint32_t strips = TIFFNumberOfStrips(tiff);
+  if (strips != (rows + rows_per_strip - 1) / rows_per_strip) return "its number of strips does not fit its rows";
+  for (std::uint32_t strip = 0; strip < strips; ++strip) {
+    const std::uint64_t offset = TIFFGetStrileOffset(tiff, strip), bytes = TIFFGetStrileByteCount(tiff, strip);
+    if (offset < 8 || bytes == 0 || offset > file_bytes || bytes > file_bytes - offset) {
+      return fmt::format("strip {} is not within the file", strip);
+    }
+    const std::uint32_t strip_rows = std::min(rows_per_strip, rows - strip * rows_per_strip);
+    if (most_rows(compression, bytes, stride) < strip_rows) return fmt::format("strip {} is too short", strip);
+  }
+  return {};
+}
+
+}  // namespace
+
+Result<LayerImage> read(int file, std::uint64_t bytes, const std::string& path) {
+  std::string message;  // of libtiff, outlives the handle
+  const auto failure = [&](std::string_view why) {
+    return Error{Fault::kVerification, fmt::format("{}: not a whole 1-bit TIFF: {}; plan the layer again", path, why)};
+  };
+  const auto options = strict_options(message);
+  const int own_file = ::dup(file);
+  if (options == nullptr || own_file < 0) return failure("out of memory or files");
+  TIFFOpenOptionsSetMaxSingleMemAlloc(options.get(), 64 << 20);
+  const TiffHandle tiff(TIFFFdOpenExt(own_file, path.c_str(), "rC", options.get()));
+  if (tiff == nullptr) {
+    ::close(own_file);
+    return failure(message.empty() ? "no directory" : message);
+  }
+  if (!message.empty()) return failure(message);
+  std::uint32_t columns = 0, rows = 0;
+  std::uint16_t bits = 1, samples = 1, photometric = 0, compression = COMPRESSION_NONE, unit = RESUNIT_INCH;
+  TIFFGetField(tiff.get(), TIFFTAG_IMAGEWIDTH, &columns);
+  TIFFGetField(tiff.get(), TIFFTAG_IMAGELENGTH, &rows);
+  TIFFGetFieldDefaulted(tiff.get(), TIFFTAG_BITSPERSAMPLE, &bits);
+  TIFFGetFieldDefaulted(tiff.get(), TIFFTAG_SAMPLESPERPIXEL, &samples);
+  TIFFGetFieldDefaulted(tiff.get(), TIFFTAG_COMPRESSION, &compression);
+  TIFFGetFieldDefaulted(tiff.get(), TIFFTAG_RESOLUTIONUNIT, &unit);
+  if (TIFFGetField(tiff.get(), TIFFTAG_PHOTOMETRIC, &photometric) == 0 || photometric > PHOTOMETRIC_MINISBLACK ||
+      bits != 1 || samples != 1) {
+    return failure("not a 1-bit image");
+  }
+  if (TIFFIsTiled(tiff.get()) != 0) return failure("tiles are not supported");
+  if (columns == 0 || rows == 0 || columns > kMostPixelsASide || rows > kMostPixelsASide) {
+    return failure(fmt::format("{} x {} pixels", columns, rows));
+  }
+  const std::size_t stride = row_bytes(columns);
+  const std::string wrong = check_strips(tiff.get(), bytes, compression, rows, stride);
+  if (!wrong.empty()) return failure(wrong);
+  if (TIFFScanlineSize(tiff.get()) != static_cast<tmsize_t>(stride)) return failure("rows of an unexpected length");
+
+  LayerImage image;
+  float resolution_x = 0, resolution_y = 0;
+  if (TIFFGetField(tiff.get(), TIFFTAG_XRESOLUTION, &resolution_x) != 0 &&
+      TIFFGetField(tiff.get(), TIFFTAG_YRESOLUTION, &resolution_y) != 0 && unit != RESUNIT_NONE) {
+    const double to_inch = unit == RESUNIT_CENTIMETER ? 2.54 : 1;
+    image.dpi_x = double{resolution_x} * to_inch;
+    image.dpi_y = double{resolution_y} * to_inch;
+  }
+  RunsBuilder builder(columns);
+  Buffer<std::byte> row(stride);
+  for (std::uint32_t r = 0; r < rows; ++r) {
+    if (TIFFReadScanline(tiff.get(), row.data(), r, 0) < 0 || !message.empty()) {
+      return failure(fmt::format("row {}: {}", r, message.empty() ? "cannot be decoded" : message));
+    }
+    if (!builder.add_row(row, photometric == PHOTOMETRIC_MINISBLACK)) return failure("too many runs");
+  }
+  image.runs = builder.finish();
+  return image;
+}
+
+}  // namespace lamina::write::tiff
