@@ -3,17 +3,20 @@
 
     bench/make_parts.py MODELS CACHE [--large]
 
-A part that is in the cache already is not made again. Every part is a closed mesh in an uncompressed binary STL:
+A part that is in the cache already is not made again. Every part is a closed mesh in an uncompressed binary STL, where it
+shall stand on the bed; parts.json says where that is, in nanometres:
 
     terrain.stl       St. Helens scaled to fit 100 x 100 mm: 645,364 triangles, 192 layers of 0.1 mm
     benchy15.stl      3DBenchy at 1.5 times its size: 225,154 triangles, 720 layers of 0.1 mm
-    crown.stl         a dental crown made 27.8 x 29.6 x 9.57 mm: 3,878 triangles, 96 layers of 0.1 mm, 20 of 0.5 mm
+    crown.stl         a dental crown made 27.8 x 29.6 x 9.57 mm: 3,878 triangles, 96 layers of 0.1 mm, 20 of 0.48 mm
+    gyroid.stl        a gyroid sheet of 24 mm: 246,820 triangles, for the runs that measure memory
     crowns96.stl      96 of them in one mesh, 12 x 8 on 400 x 400 mm
     benchies72.stl    72 Benchies in one mesh, 6 x 12 on 400 x 400 mm: 811 MB, 480 layers of 0.1 mm (--large)
 """
 import argparse
 import array
 import gzip
+import json
 import os
 import struct
 import sys
@@ -103,7 +106,7 @@ def grid(axes, columns, rows, side):
     step_y = (side - rows * depth) / rows + depth
     if step_x <= width or step_y <= depth:
         sys.exit(f"{columns} x {rows} copies of {width:.1f} x {depth:.1f} mm do not fit {side} mm")
-    return [(column * step_x + (step_x - width) / 2, row * step_y + (step_y - depth) / 2)
+    return [(round(column * step_x + (step_x - width) / 2, 2), round(row * step_y + (step_y - depth) / 2, 2))
             for row in range(rows) for column in range(columns)]
 
 
@@ -114,6 +117,11 @@ def main():
     parser.add_argument("--large", action="store_true")
     options = parser.parse_args()
     os.makedirs(options.cache, exist_ok=True)
+    index = os.path.join(options.cache, "parts.json")
+    parts = {}
+    if os.path.exists(index):
+        with open(index, encoding="utf-8") as file:
+            parts = json.load(file)
     read = {}
 
     def model(name):
@@ -123,17 +131,29 @@ def main():
         return read[name]
 
     def make(name, recipe):
+        """recipe() gives a part with its corner at the origin and the places of its copies."""
         path = os.path.join(options.cache, name)
-        if not os.path.exists(path):
-            recipe(path)
+        if name in parts and os.path.exists(path):
+            return
+        axes, offsets = recipe()
+        write_stl(path, axes, offsets)
+        corner = [struct.unpack("<f", struct.pack("<f", min(offset[axis] for offset in offsets)))[0]
+                  for axis in range(2)]
+        parts[name] = {"at_nm": [round(value * 1e6) for value in corner],
+                       "height_mm": max(axes[2]), "triangles": len(axes[0]) // 3 * len(offsets)}
+        with open(index + ".part", "w", encoding="utf-8") as file:
+            json.dump(parts, file, indent=2)
+        os.replace(index + ".part", index)
 
-    def many(path, axes, columns, rows):
-        write_stl(path, axes, grid(axes, columns, rows, 400.0))
+    def one(axes, side=100.0):
+        return axes, [tuple(round((side - max(axes[axis])) / 2, 2) for axis in range(2))]
+
+    def many(axes, columns, rows):
+        return axes, grid(axes, columns, rows, 400.0)
 
     def terrain():
         axes = model("st_helens_terrain_645k.stl.gz")
-        factor = 0.588  # 158 x 169.5 mm become 92.9 x 99.7 mm
-        return placed(axes, (factor, factor, factor))
+        return placed(axes, (0.588, 0.588, 0.5868))  # 158 x 169.5 x 32.7 mm become 92.9 x 99.7 x 19.19 mm
 
     def crown():
         return placed(model("dental_crown.stl"), (2.6, 2.6, 1.0))
@@ -141,12 +161,13 @@ def main():
     def benchy(factor):
         return placed(model("3DBenchy.3mf"), (factor, factor, factor))
 
-    make("terrain.stl", lambda path: write_stl(path, terrain()))
-    make("benchy15.stl", lambda path: write_stl(path, benchy(1.5)))
-    make("crown.stl", lambda path: write_stl(path, crown()))
-    make("crowns96.stl", lambda path: many(path, crown(), 12, 8))
+    make("terrain.stl", lambda: one(terrain()))
+    make("benchy15.stl", lambda: one(benchy(1.5)))
+    make("crown.stl", lambda: one(crown()))
+    make("gyroid.stl", lambda: one(placed(model("gyroid_sheet_cyl_247k.stl.gz"), (1, 1, 1)), 30.0))
+    make("crowns96.stl", lambda: many(crown(), 12, 8))
     if options.large:
-        make("benchies72.stl", lambda path: many(path, benchy(1.0), 6, 12))
+        make("benchies72.stl", lambda: many(benchy(1.0), 6, 12))
 
 
 if __name__ == "__main__":

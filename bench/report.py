@@ -1,0 +1,219 @@
+"""bench/report.py: results of scripts/bench as JSON files and as bench/README.md. A number without its commit is not printed."""
+import json
+import os
+import platform
+import re
+import subprocess
+
+
+def commit(root):
+    """Short name of the commit, with + where sources differ from it."""
+    name = subprocess.run(["git", "-C", root, "rev-parse", "--short=10", "HEAD"], check=True, text=True,
+                          stdout=subprocess.PIPE).stdout.strip()
+    changed = subprocess.run(["git", "-C", root, "status", "--porcelain", "--", "stages", "pipeline", "cmake",
+                              "CMakeLists.txt"], check=True, text=True, stdout=subprocess.PIPE).stdout
+    return name + ("+" if changed.strip() else "")
+
+
+def machine():
+    def first(path, pattern):
+        try:
+            with open(path, encoding="utf-8") as file:
+                return re.search(pattern, file.read())[1].strip()
+        except (OSError, TypeError):
+            return "?"
+
+    memory = first("/proc/meminfo", r"MemTotal:\s+(\d+)")
+    return {"processor": first("/proc/cpuinfo", r"model name\s*:\s*(.*)"), "cores": len(os.sched_getaffinity(0)),
+            "memory_gib": round(int(memory) / 2**20, 1) if memory != "?" else 0,
+            "system": first("/etc/os-release", r'PRETTY_NAME="(.*)"'), "kernel": platform.release().split("-")[0],
+            "compiler": subprocess.run(["g++", "-dumpfullversion"], text=True, stdout=subprocess.PIPE).stdout.strip()}
+
+
+def folder(root):
+    return os.path.join(root, "bench", "results")
+
+
+def save(root, name, result):
+    os.makedirs(folder(root), exist_ok=True)
+    with open(os.path.join(folder(root), name + ".json"), "w", encoding="utf-8") as file:
+        json.dump(result, file, indent=1, sort_keys=True)
+        file.write("\n")
+
+
+def load(root, name):
+    try:
+        with open(os.path.join(folder(root), name + ".json"), encoding="utf-8") as file:
+            return json.load(file)
+    except FileNotFoundError:
+        return None
+
+
+def table(head, rows):
+    yield "| " + " | ".join(head) + " |"
+    yield "|" + "---|" * len(head)
+    for row in rows:
+        yield "| " + " | ".join(row) + " |"
+    yield ""
+
+
+def seconds(value):
+    return f"{value:.0f}" if value >= 100 else f"{value:.1f}" if value >= 10 else f"{value:.2f}" if value >= 1 else f"{value:.3f}"
+
+
+def spread(entry):
+    return f"{seconds(entry['wall'])} s ({seconds(entry['fastest'])} to {seconds(entry['slowest'])})"
+
+
+DESCRIPTION = {
+    "terrain": "Mount St. Helens as a closed terrain, 645,364 triangles",
+    "benchy": "3DBenchy at 1.5 times its size, 225,154 triangles",
+    "crowns-20": "96 dental crowns as one mesh of 372,288 triangles",
+    "crowns-96": "the same, thinner layers",
+    "copies-20": "one crown of 3,878 triangles, `--copies 96`",
+    "copies-96": "the same, thinner layers",
+    "benchies": "72 Benchies as one mesh of 16.2 million triangles (811 MB)",
+}
+
+
+def time_rows(root, results):
+    for name, result in results:
+        rays, contours = result["lamina"]["rays-tiff-g4"], result["lamina"]["contours-tiff-g4"]
+        peer = result.get("prusa")
+        pixels = result["layers"] * result["columns"] * result["rows"]
+        yield [f"`{name}`: {DESCRIPTION[name]}", f"{result['layers']} of {result['columns']} x {result['rows']}",
+               spread(peer) if peer else "-", spread(rays), f"{peer['wall'] / rays['wall']:.1f}" if peer else "-",
+               spread(contours), f"{peer['wall'] / contours['wall']:.1f}" if peer else "-", str(result["target"]),
+               f"{pixels / rays['wall'] / 1e9:.1f}"]
+
+
+def memory_rows(results):
+    for name, result in results:
+        rays, peer = result["lamina"]["rays-tiff-g4"], result.get("prusa")
+        yield [f"`{name}`", f"{peer['peak_mib']:.0f} MiB" if peer else "-", f"{rays['peak_mib']:.0f} MiB",
+               f"{rays['peak_mib'] / peer['peak_mib']:.2f}" if peer else "-",
+               f"{peer['processor'] / rays['processor']:.1f}" if peer else "-"]
+
+
+def stage_rows(results):
+    for name, result in results:
+        for variant in ("rays-tiff-g4", "rays-null", "contours-tiff-g4", "contours-null"):
+            part = result["summary"].get(variant, {}).get("seconds", {})
+            if not part:
+                continue
+            yield [f"`{name}`", variant.replace("-", ", ", 1), seconds(result["lamina"][variant]["wall"])] + [
+                f"{1000 * part.get(key, 0):.0f}" for key in ("load", "index", "layers", "raster_threads", "encode_threads", "write_threads")]
+
+
+def limit_rows(root, results):
+    touched = {entry["name"].split("/")[1]: entry for entry in (load(root, "limits") or {}).get("benchmarks", [])}
+    for name, result in results:
+        limit = result["limits"]
+        case = touched.get(name)
+        yield [f"`{name}`", f"{limit['read_bytes'] / 1e6:.1f} MB in {1000 * limit['read']:.0f} ms",
+               f"{limit['write_files']} files, {limit['write_bytes'] / 1e6:.1f} MB in {1000 * limit['write']:.0f} ms",
+               f"{case['crossings'] / 1e6:.1f} million in {case['real_time']:.1f} {case['time_unit']}" if case else "-",
+               seconds(result["lamina"]["rays-tiff-g4"]["wall"]) + " s"]
+
+
+def pixel_rows(results):
+    for name, result in results:
+        peer = result.get("prusa")
+        if not peer or not peer.get("images_compared"):
+            continue
+        yield [f"`{name}`", f"{result['layers']} and {peer['layers']}", str(peer["images_compared"]),
+               str(peer["pixels_different"]), str(peer["pixels_different_most"]),
+               f"{result['columns'] * result['rows'] / 1e6:.1f} million"]
+
+
+def memory_text(root):
+    memory = load(root, "memory")
+    if not memory:
+        return
+    yield "## Memory"
+    yield ""
+    few, many = memory["layers"]
+    yield (f"Peak resident memory of one part (a gyroid of 246,820 triangles) in {few['layers']} layers: "
+           f"{few['peak_mib']:.1f} MiB; in {many['layers']} layers: {many['peak_mib']:.1f} MiB "
+           f"({100 * (many['peak_mib'] / few['peak_mib'] - 1):+.1f} %). Commit {memory['commit']}, {memory['date']}.")
+    yield ""
+    yield "`crowns-96` (357 million pixels a layer) under a budget for the layers in flight; the bytes written are the same:"
+    yield ""
+    rows = []
+    for entry in memory["budget"]:
+        summary = entry["summary"]
+        own = sum(summary.get(key, 0) for key in ("mesh_bytes", "index_bytes")) / 2**20
+        rows.append([f"`--memory {entry['memory']}`", f"{entry['peak_mib']:.1f} MiB", f"{own:.1f} MiB",
+                     f"{summary.get('peak_layer_bytes', 0) / 2**20:.1f} MiB", str(summary.get("most_layers_in_flight", "?")),
+                     f"{entry['wall']:.2f} s"])
+    yield from table(["budget", "peak resident", "mesh + index", "layers in flight, bytes", "layers in flight", "time"], rows)
+
+
+def lines(root, cases):
+    results = [(name, load(root, name)) for name in cases]
+    results = [(name, result) for name, result in results if result]
+    yield "# Measured"
+    yield ""
+    yield "Written by `scripts/bench`; edits are lost. Raw figures: `bench/results/*.json`."
+    yield ""
+    if not results:
+        yield "Nothing has been measured yet."
+        return
+    first = results[0][1]
+    about = first["machine"]
+    yield (f"{about['processor']}, {about['cores']} cores, {about['memory_gib']} GiB; {about['system']}, kernel "
+           f"{about['kernel']}, g++ {about['compiler']}, release build.")
+    stamps = sorted({(result["commit"], result["date"]) for _, result in results})
+    yield "Commit " + "; ".join(f"{name} on {date}" for name, date in stamps) + ". A + means that sources were changed."
+    version = next((result["prusa"]["version"] for _, result in results if "prusa" in result), None)
+    yield ""
+    yield ("Whole processes, mesh on disk (in the page cache) to layer files on disk, run in turn; medians, and the fastest "
+           "and slowest run. Absolute times move with the machine, ratios much less. The peer is Debian's PrusaSlicer "
+           f"{version or ''} `--export-sla` with supports, pad, grey levels and every compensation off (`bench/prusa.py`); "
+           "it plans the copies as the one mesh that they make. Every run of ours, whichever engine, gave the same "
+           "manifest, which holds a hash of each layer file.")
+    yield ""
+    yield "## Time"
+    yield ""
+    yield from table(["job", "layers", "PrusaSlicer", "lamina, rays", "times as fast", "lamina, contours", "times as fast",
+                      "meant", "Gpx/s, rays"], time_rows(root, results))
+    yield "## Peak resident memory and processor time"
+    yield ""
+    yield from table(["job", "PrusaSlicer", "lamina, rays", "part of it", "processor time, PrusaSlicer / lamina"],
+                     memory_rows(results))
+    rows = list(pixel_rows(results))
+    if rows:
+        yield "## Pixels"
+        yield ""
+        yield ("Layers of both programs, decoded and compared. Ours are exact (see the tests); PrusaSlicer's vertices are "
+               "rounded on the way, so single pixels at edges differ.")
+        yield ""
+        yield from table(["job", "layers", "compared", "pixels that differ, all", "in the worst layer", "pixels a layer"], rows)
+    yield "## Where the time goes"
+    yield ""
+    yield ("Wall time of the process; then milliseconds from the last run's summary: load, index and layers follow each "
+           "other, the last three columns happen within layers and are summed over threads.")
+    yield ""
+    yield from table(["job", "engine, format", "process, s", "load", "index", "layers", "raster", "encode", "write"],
+                     stage_rows(results))
+    yield "## What no program can be faster than"
+    yield ""
+    yield ("Measured in the same run, on one thread: reading the part's file, writing files of the same sizes (temporary "
+           "name, rename), and touching each crossing of a row with the part's surface once, in memory.")
+    yield ""
+    yield from table(["job", "read", "write", "touch each crossing", "the whole job, rays"], limit_rows(root, results))
+    yield from memory_text(root)
+    yield "## Again"
+    yield ""
+    yield "    scripts/bench             # an hour on two slow cores; nearly all of it is the peer's"
+    yield "    scripts/bench --large     # and the 811 MB plate"
+    yield "    scripts/bench --alone     # ours only, a few minutes"
+    yield ""
+    yield ("The parts are made by `bench/make_parts.py` from the models folder (`LAMINA_MODELS`). Single stages are timed by "
+           "Google Benchmark: `LAMINA_MODELS=... build/release/lamina_bench`.")
+
+
+def write_readme(root, cases):
+    text = "\n".join(lines(root, cases)).rstrip() + "\n"
+    with open(os.path.join(root, "bench", "README.md"), "w", encoding="utf-8") as file:
+        file.write(text)
