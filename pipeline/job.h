@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "stages/data/fill_rule.h"
+#include "stages/data/fill_rule.h"
 #include "stages/data/grid.h"
 #include "stages/data/status.h"
 #include "stages/data/units.h"

@@ -9,8 +9,10 @@
 #include <cstdio>
 #include <memory>
 #include <string>
+#include <string_view>
 #include <vector>
 
+#include "pipeline/hash.h"
 #include "pipeline/job.h"
 #include "pipeline/scene.h"
 #include "stages/data/grid.h"
@@ -18,12 +20,6 @@
 #include "stages/data/status.h"
 
 namespace lamina::pipeline {
-
-/// XXH3-128 of a file.
-struct Hash128 {
-  std::uint64_t high = 0, low = 0;
-  friend bool operator==(const Hash128&, const Hash128&) = default;
-};
 
 /// One line of the manifest.
 struct LayerRecord {
@@ -39,7 +35,8 @@ struct ManifestHead {
   std::string version;      // of lamina
   std::string job_toml;     // the resolved job, only keys that decide bytes
   std::string format;       // id of the image format
-  std::string extension;
+  std::string extension;    // of its files, with the dot
+  std::string fill_rule, mirror;
   PixelGrid grid;
   std::uint32_t layer_count = 0;               // of the whole job
   std::uint32_t first_layer = 0, last_layer = 0;  // the range [first, last) that this manifest covers
@@ -47,6 +44,13 @@ struct ManifestHead {
   /// Hash of all of the above but the range: two directories with the same id belong to the same job.
   Hash128 id() const;
 };
+
+/// The head of a job whose parts are loaded. `layers` [first, last) as layer_range() gives it.
+ManifestHead make_head(const JetJob& job, const std::vector<PartSummary>& parts, std::uint32_t layer_count,
+                       std::array<std::uint32_t, 2> layers);
+
+/// What keeps two heads from belonging to the same job, as "bed.dpi is [600, 600], was [1200, 1200]"; empty if nothing.
+std::string difference(const ManifestHead& now, const ManifestHead& earlier);
 
 struct Manifest {
   ManifestHead head;
@@ -56,7 +60,7 @@ struct Manifest {
 
 /// Name of the manifest in a job's directory: manifest.json, or manifest-<i>-of-<n>.json for a shard.
 std::string manifest_name(const JetJob& job);
-/// layers/000042.tif
+/// The name of a layer's file in the job's directory, layers/000042.tif; empty for a format without files.
 std::string layer_file_name(std::uint32_t index, std::string_view extension);
 
 /// Reads a manifest, or as many whole lines as a .part holds. errors: kVerification with file and line
@@ -65,7 +69,9 @@ Result<Manifest> read_manifest(const std::string& path);
 /// Appends layers in order; thread-compatible (the graph's ordered writer is serial).
 class ManifestWriter {
  public:
-  /// Starts `path`.part with the head and the records that a resumed job keeps from its start.
+  /// Starts `path`.part with the head and the records that a resumed job keeps from its start. An earlier .part is
+  /// replaced at once, so that a kill at any moment loses no record that is kept.
+  /// errors  kOutput: cannot be written, or another run is writing it right now
   static Result<ManifestWriter> open(const std::string& path, const ManifestHead& head,
                                      std::vector<LayerRecord> kept_prefix);
   ManifestWriter(ManifestWriter&&) noexcept;
@@ -80,7 +86,7 @@ class ManifestWriter {
   Status finish();
 
  private:
-  ManifestWriter() = default;
+  ManifestWriter();
   struct State;
   std::unique_ptr<State> state_;
 };

@@ -1,0 +1,156 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "pipeline/command_line.h"
+#include "pipeline/console.h"
+#include "pipeline/interrupt.h"
+#include "pipeline/jet.h"
+#include "pipeline/job_keys.h"
+#include "pipeline/job_toml.h"
+#include "pipeline/output_directory.h"
+#include "pipeline/progress.h"
+#include "pipeline/summary.h"
+#include "stages/write/image_format.h"
+
+namespace lamina::pipeline {
+namespace {
+
+template <class Target>
+void add_options(std::span<const Key<Target>> keys, const Target& presets, CommandSpec& spec) {
+  for (const Key<Target>& key : keys) {
+    if (key.flag.empty()) continue;
+    std::string preset = key.value.empty() ? std::string() : key.write(presets);
+    if (key.section == "bed") std::ranges::replace(preset, ',', 'x');
+    const std::string_view group = key.section == "part" || key.section == "place" ? "Parts"
+                                   : key.section == "load"                         ? "Repair"
+                                   : key.section == "run"                          ? "Run"
+                                                                                   : "Bed and layers";
+    spec.options.push_back({std::string(key.flag), std::string(key.value), std::string(key.meaning), preset,
+                            std::string(group)});
+  }
+}
+
+CommandSpec jet_spec() {
+  CommandSpec spec;
+  spec.name = "jet";
+  spec.summary =
+      "Plans a binder-jet job: the exact 1-bit image of every layer of the bed, layers/000000.tif and up from the\n"
+      "bottom, and a manifest.json. The same parts and options give the same bytes on every machine.";
+  spec.operand = "PART";
+  spec.operand_meaning = "STL, OBJ or 3MF files, STL and OBJ gzipped too; they replace the parts of --job";
+  spec.options = {{"--job", "FILE", "a TOML job; options override what it says", "", "Job"},
+                  {"--save-job", "FILE", "write the job as resolved, to be run again with --job", "", "Job"},
+                  {"--set", "KEY=VALUE", "set any key of the job, as in --set bed.dpi=600; part.2.copies is of part 2", "",
+                   "Job"}};
+  add_options<JetJob>(job_keys(), JetJob(), spec);
+  add_options<PartRequest>(part_keys(), PartRequest(), spec);
+  for (const auto& [flag, meaning] :
+       {std::pair{"--resume", "go on with an interrupted job; finished layers whose hash holds are kept"},
+        {"--overwrite", "replace an earlier job in the directory"},
+        {"--dry-run", "load, place and index, tell what it would take, write nothing"},
+        {"--json", "print the summary as one JSON object on stdout"},
+        {"--quiet", "say nothing but errors"}}) {
+    spec.options.push_back({flag, "", meaning, "", "Run"});
+  }
+  spec.closing = "Formats:\n";
+  for (const auto& format : write::image_formats()) {
+    spec.closing += fmt::format("  {:<16}{}\n", format.id, format.description);
+  }
+  spec.closing +=
+      "\nLengths are mm, angles degrees. Part options hold for every part; a job file sets them for each.\n\n"
+      "Examples:\n"
+      "  lamina jet bracket.stl -o out                                  a part in the middle of the bed\n"
+      "  lamina jet a.stl b.3mf --bed 400x400 --dpi 600 --copies 12 -o out\n"
+      "  lamina jet part.obj --unit inch --rotate 0,0,90 --shrink 1.02,1.02,1.025 -o out\n"
+      "  lamina jet part.stl --layers 100:110 --format png -o look      ten layers only\n"
+      "  lamina jet part.stl --shard 1/4 -o out                         a quarter; then lamina merge out -o out\n"
+      "  lamina jet part.stl --dpi 600 --save-job job.toml --dry-run    write the job, plan nothing\n"
+      "  lamina jet --job job.toml -o out --resume";
+  return spec;
+}
+
+Error at_option(std::string_view flag, const std::string& what) {
+  return {Fault::kUsage, fmt::format("{}: {}", flag.substr(flag.rfind(',') + 1), what)};
+}
+
+Result<JetJob> resolve(const Arguments& arguments) {
+  JetJob job;
+  if (arguments.has("--job")) {
+    if (Status status = read_job(arguments.text("--job"), job); !status) return status.error();
+  }
+  if (!arguments.operands.empty()) {
+    job.parts.clear();
+    for (const std::string& path : arguments.operands) {
+      job.parts.emplace_back();
+      job.parts.back().path = path;
+    }
+  }
+  for (const std::string& assignment : arguments.all("--set")) {
+    if (Status status = set_key(job, assignment); !status) return status.error();
+  }
+  for (const JobKey& key : job_keys()) {
+    if (key.flag.empty() || !arguments.has(key.flag)) continue;
+    const std::string text = key.value.empty() ? std::string(key.switch_text) : arguments.text(key.flag);
+    if (const std::string wrong = key.read(text, job); !wrong.empty()) return at_option(key.flag, wrong);
+  }
+  for (const PartKey& key : part_keys()) {
+    if (key.flag.empty() || !arguments.has(key.flag)) continue;
+    if (key.flag == "--at" && job.parts.size() > 1) {
+      return at_option(key.flag, fmt::format("is for a single part, here are {}; set at_mm of each [[part]] in a job file",
+                                             job.parts.size()));
+    }
+    PartRequest unused;
+    if (const std::string wrong = key.read(arguments.text(key.flag), unused); !wrong.empty()) {
+      return at_option(key.flag, wrong);
+    }
+    for (PartRequest& part : job.parts) key.read(arguments.text(key.flag), part);
+  }
+  job.resume = arguments.has("--resume");
+  job.overwrite = arguments.has("--overwrite");
+  job.dry_run = arguments.has("--dry-run");
+  job.json = arguments.has("--json");
+  job.quiet = arguments.has("--quiet");
+  if (Status status = check_job(job); !status) return status.error();
+  return job;
+}
+
+Error interrupted(const JetJob& job) {
+  const bool begun = !job.output.empty() && !find_manifests(job.output).empty();
+  return {Fault::kInterrupted, begun ? fmt::format("interrupted; finished layers are kept in {}, go on with the same "
+                                                   "command and --resume instead of --overwrite", job.output)
+                                     : "interrupted before the first layer; nothing was written"};
+}
+
+}  // namespace
+
+int run_jet_command(const std::vector<std::string>& texts) {
+  const Result<Arguments> arguments = read_arguments(jet_spec(), texts);
+  if (!arguments) return fail(arguments.error());
+  if (arguments->help) {
+    const Status status = print(*arguments->help);
+    return status ? 0 : fail(status.error());
+  }
+  const Result<JetJob> job = resolve(*arguments);
+  if (!job) return fail(job.error());
+  if (arguments->has("--save-job")) {
+    if (Status status = save_job(arguments->text("--save-job"), *job); !status) return fail(status.error());
+  }
+  if (!job->dry_run) {
+    if (Status status = check_output(*job); !status) return fail(status.error());
+  }
+  const std::atomic<bool>& cancel = watch_for_interrupts();
+  Progress progress(job->quiet     ? Progress::Style::kSilent
+                    : is_terminal() ? Progress::Style::kBar
+                                    : Progress::Style::kLines);
+  const Result<JetSummary> summary = run_jet(*job, [&](const ProgressEvent& event) { progress(event); }, cancel);
+  progress.clear();
+  if (!summary) return fail(summary.error().fault == Fault::kInterrupted ? interrupted(*job) : summary.error());
+  if (!job->quiet) say_text(summary_text(*job, *summary));
+  if (job->json) {
+    if (Status status = print(summary_json(*job, *summary)); !status) return fail(status.error());
+  }
+  return 0;
+}
+
+}  // namespace lamina::pipeline

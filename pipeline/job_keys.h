@@ -1,0 +1,42 @@
+// pipeline/job_keys.h: every key of a job file, once: its name, its flag, how it is read and how it is written.
+//
+// Options, job files, --set, --save-job, the manifest and the help are made from these two tables.
+#pragma once
+
+#include <span>
+#include <string>
+#include <string_view>
+
+#include "pipeline/job.h"
+
+namespace lamina::pipeline {
+
+/// How the text of a value looks in TOML.
+enum class KeyForm { kBare, kString, kList };
+
+/// One key of a job (Target is JetJob) or of each [[part]] of it (Target is PartRequest).
+template <class Target>
+struct Key {
+  std::string_view section;  // table in the job file; "part" for keys of [[part]]
+  std::string_view name;
+  std::string_view flag;     // option with the same meaning; empty if there is none
+  std::string_view value;    // what stands behind the option: "MM", "WIDTHxDEPTH"; empty for a switch
+  std::string_view meaning;  // for the help, one line
+  bool decides_bytes;        // goes into the manifest: two jobs that differ here are different jobs
+
+  /// Reads the value from text; lists are separated by commas. returns "" or what is wrong; the target is then as it was
+  std::string (*read)(std::string_view text, Target& target);
+  /// The value as read() takes it; "" if it is not set.
+  std::string (*write)(const Target& target);
+  KeyForm form;
+  /// What a flag without a value means, as in --no-repair: "false".
+  std::string_view switch_text = {};
+};
+
+using JobKey = Key<JetJob>;
+using PartKey = Key<PartRequest>;
+
+std::span<const JobKey> job_keys();
+std::span<const PartKey> part_keys();
+
+}  // namespace lamina::pipeline

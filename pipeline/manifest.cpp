@@ -1,0 +1,266 @@
+// Everything of the manifest but reading: its text, and the file that grows while a job runs.
+#include "pipeline/manifest.h"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <sys/file.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <chrono>
+#include <cstring>
+#include <filesystem>
+#include <iterator>
+
+#include "pipeline/job_keys.h"
+#include "pipeline/job_toml.h"
+#include "pipeline/json_text.h"
+#include "pipeline/manifest_text.h"
+#include "pipeline/number_text.h"
+#include "stages/write/image_format.h"
+
+namespace lamina::pipeline {
+namespace {
+
+// Whole nanometres as mm with all their digits, so that reading them back loses nothing.
+std::string exact_mm(std::int64_t nm) {
+  const std::int64_t size = nm < 0 ? -nm : nm;
+  return fmt::format("{}{}.{:06}", nm < 0 ? "-" : "", size / kNmPerMm, size % kNmPerMm);
+}
+
+std::string point_text(const Point3& p) {
+  return fmt::format("[{}, {}, {}]", exact_mm(p.x), exact_mm(p.y), exact_mm(p.z));
+}
+
+std::string part_text(const PartSummary& part) {
+  std::string notes;
+  for (const Note& note : part.notes) {
+    notes += fmt::format("{}{{\"repair\": {}, \"text\": {}}}", notes.empty() ? "" : ", ", note.repair, json_string(note.text));
+  }
+  return fmt::format(
+      "{{\"path\": {}, \"copies\": {}, \"triangles\": {}, \"fingerprint\": \"{:016x}\", \"bounds_mm\": [{}, {}], "
+      "\"notes\": [{}]}}",
+      json_string(std::filesystem::path(part.path).filename().string()), part.copies, part.triangles, part.fingerprint,
+      point_text(part.bounds.lo), point_text(part.bounds.hi), notes);
+}
+
+// The head without what differs between shards of one job.
+std::string lasting_text(const ManifestHead& head) {
+  std::string parts;
+  for (const PartSummary& part : head.parts) parts += (parts.empty() ? "" : ",\n") + part_text(part);
+  return fmt::format(
+      "\"lamina\": {},\n\"job\": {},\n\"bed_mm\": [{}, {}],\n\"dpi\": [{}, {}],\n\"columns\": {},\n\"rows\": {},\n"
+      "\"format\": {},\n\"extension\": {},\n\"fill_rule\": {},\n\"mirror\": {},\n\"layer_count\": {},\n\"parts\": [\n{}\n],\n",
+      json_string(head.version), json_string(head.job_toml), exact_mm(head.grid.x.length), exact_mm(head.grid.y.length),
+      head.grid.x.dpi, head.grid.y.dpi, head.grid.columns(), head.grid.rows(), json_string(head.format),
+      json_string(head.extension), json_string(head.fill_rule), json_string(head.mirror), head.layer_count, parts);
+}
+
+std::string key_text(std::string_view section, std::string_view name, const JetJob& job) {
+  for (const JobKey& key : job_keys()) {
+    if (key.section == section && key.name == name) return key.write(job);
+  }
+  return {};
+}
+
+}  // namespace
+
+std::string_view reason_name(LayerReason) { return "uniform"; }
+
+bool read_reason(std::string_view name, LayerReason& reason) {
+  reason = LayerReason::kUniform;
+  return name == "uniform";
+}
+
+std::string head_text(const ManifestHead& head) {
+  return fmt::format("{{\n\"id\": \"{}\",\n{}\"range\": [{}, {}],\n\"layers\": [", hex(head.id()), lasting_text(head),
+                     head.first_layer, head.last_layer);
+}
+
+void add_record_text(const LayerRecord& record, std::string_view extension, std::string& text) {
+  fmt::format_to(std::back_inserter(text),
+                 "{{\"index\": {}, \"file\": {}, \"bottom_nm\": {}, \"thickness_nm\": {}, \"reason\": \"{}\", "
+                 "\"bytes\": {}, \"set_pixels\": {}, \"capped_rows\": {}, \"xxh3_128\": \"{:016x}{:016x}\"}}",
+                 record.layer.index, json_string(layer_file_name(record.layer.index, extension)), record.layer.bottom,
+                 record.layer.thickness, reason_name(record.layer.reason), record.bytes, record.set_pixels,
+                 record.capped_rows, record.hash.high, record.hash.low);
+}
+
+Hash128 ManifestHead::id() const {
+  const std::string text = lasting_text(*this);
+  return hash_bytes(std::as_bytes(std::span(text)));
+}
+
+ManifestHead make_head(const JetJob& job, const std::vector<PartSummary>& parts, std::uint32_t layer_count,
+                       std::array<std::uint32_t, 2> layers) {
+  ManifestHead head;
+  head.version = LAMINA_VERSION;
+  head.job_toml = canonical_job_text(job);
+  head.format = job.format;
+  if (const auto* format = write::find_image_format(job.format)) head.extension = format->extension;
+  head.fill_rule = key_text("image", "fill", job);
+  head.mirror = key_text("image", "mirror", job);
+  head.grid = grid_of(job);
+  head.layer_count = layer_count;
+  head.first_layer = layers[0];
+  head.last_layer = layers[1];
+  head.parts = parts;
+  for (PartSummary& part : head.parts) part.path = std::filesystem::path(part.path).filename().string();
+  return head;
+}
+
+std::string difference(const ManifestHead& now, const ManifestHead& earlier) {
+  if (now.id() == earlier.id()) return {};
+  if (now.version != earlier.version) return fmt::format("lamina is {}, was {}", now.version, earlier.version);
+  const auto lines = split(now.job_toml, "\n"), lines_before = split(earlier.job_toml, "\n");
+  std::string_view section;
+  for (std::size_t i = 0; i < std::max(lines.size(), lines_before.size()); ++i) {
+    const std::string_view line = i < lines.size() ? lines[i] : "";
+    const std::string_view before = i < lines_before.size() ? lines_before[i] : "";
+    if (line == before) {
+      if (line.starts_with('[')) section = line;
+      continue;
+    }
+    const std::size_t name_end = line.find(" = "), name_end_before = before.find(" = ");
+    if (name_end == std::string_view::npos || line.substr(0, name_end) != before.substr(0, name_end_before)) {
+      return "the parts, or which of their keys are set, are others";
+    }
+    section = section.substr(section.find_first_not_of('['));
+    return fmt::format("{}.{}, was {}", section.substr(0, section.find(']')), line, before.substr(name_end_before + 3));
+  }
+  for (std::size_t i = 0; i < std::min(now.parts.size(), earlier.parts.size()); ++i) {
+    if (now.parts[i].fingerprint != earlier.parts[i].fingerprint) {
+      return fmt::format("the geometry of {} has changed", now.parts[i].path);
+    }
+  }
+  return "the parts have changed";
+}
+
+std::string manifest_name(const JetJob& job) {
+  if (!job.shard) return "manifest.json";
+  return fmt::format("manifest-{}-of-{}.json", (*job.shard)[0] + 1, (*job.shard)[1]);
+}
+
+std::string layer_file_name(std::uint32_t index, std::string_view extension) {
+  return extension.empty() ? std::string() : fmt::format("layers/{:06}{}", index, extension);
+}
+
+struct ManifestWriter::State {
+  static constexpr std::uint32_t kLines = 64;
+  static constexpr std::chrono::seconds kPatience{1};
+
+  int file = -1;
+  std::string path, extension, buffer;
+  std::uint32_t next_layer = 0, last_layer = 0, lines_buffered = 0;
+  bool first_line = true;
+  std::chrono::steady_clock::time_point written = std::chrono::steady_clock::now();
+
+  ~State() {
+    if (file >= 0) ::close(file);
+  }
+
+  Error failed(int reason) const {
+    return Error{Fault::kOutput, fmt::format("{}.part: {}", path, std::strerror(reason))};
+  }
+
+  void add(const LayerRecord& record) {
+    buffer += first_line ? "\n" : ",\n";
+    first_line = false;
+    add_record_text(record, extension, buffer);
+    ++next_layer;
+    ++lines_buffered;
+  }
+
+  Status flush() {
+    std::string_view rest = buffer;
+    while (!rest.empty()) {
+      const ssize_t wrote = ::write(file, rest.data(), rest.size());
+      if (wrote < 0 && errno == EINTR) continue;
+      if (wrote < 0) return failed(errno);
+      rest.remove_prefix(static_cast<std::size_t>(wrote));
+    }
+    buffer.clear();
+    lines_buffered = 0;
+    written = std::chrono::steady_clock::now();
+    return {};
+  }
+};
+
+ManifestWriter::ManifestWriter() : state_(std::make_unique<State>()) {}
+ManifestWriter::ManifestWriter(ManifestWriter&&) noexcept = default;
+ManifestWriter& ManifestWriter::operator=(ManifestWriter&&) noexcept = default;
+ManifestWriter::~ManifestWriter() = default;
+
+Result<ManifestWriter> ManifestWriter::open(const std::string& path, const ManifestHead& head,
+                                            std::vector<LayerRecord> kept_prefix) {
+  ManifestWriter writer;
+  State& state = *writer.state_;
+  state.path = path;
+  state.extension = head.extension;
+  state.next_layer = head.first_layer;
+  state.last_layer = head.last_layer;
+  const std::string partial = path + ".part", fresh = partial + ".new";
+
+  // The lock lives as long as the writer: two runs in one directory would tear each other's files.
+  const auto locked_by_another = [&](int file) { return ::flock(file, LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK; };
+  const Error busy{Fault::kOutput, fmt::format("{}: another run is writing here right now; wait for it or choose another "
+                                               "directory", partial)};
+  if (const int earlier = ::open(partial.c_str(), O_RDWR | O_CLOEXEC); earlier >= 0) {
+    const bool taken = locked_by_another(earlier);
+    ::close(earlier);
+    if (taken) return busy;
+  }
+  state.file = ::open(fresh.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC, 0666);
+  if (state.file < 0) return state.failed(errno);
+  if (locked_by_another(state.file)) return busy;
+  const auto give_up = [&](Error error) {
+    ::unlink(fresh.c_str());
+    return error;
+  };
+  if (::ftruncate(state.file, 0) != 0) return give_up(state.failed(errno));
+  state.buffer = head_text(head);
+  for (const LayerRecord& record : kept_prefix) {
+    if (record.layer.index != state.next_layer) {
+      return give_up({Fault::kInternal, fmt::format("manifest: layer {} kept where {} is next", record.layer.index,
+                                                    state.next_layer)});
+    }
+    state.add(record);
+    if (state.lines_buffered == State::kLines) {
+      if (Status status = state.flush(); !status) return give_up(status.error());
+    }
+  }
+  if (Status status = state.flush(); !status) return give_up(status.error());
+  if (std::rename(fresh.c_str(), partial.c_str()) != 0) return give_up(state.failed(errno));
+  return writer;
+}
+
+Status ManifestWriter::append(const LayerRecord& record) {
+  State& state = *state_;
+  if (record.layer.index != state.next_layer || record.layer.index >= state.last_layer) {
+    return Error{Fault::kInternal, fmt::format("manifest: layer {} appended where {} of {} is next", record.layer.index,
+                                               state.next_layer, state.last_layer)};
+  }
+  state.add(record);
+  const bool due = state.lines_buffered >= State::kLines ||
+                   std::chrono::steady_clock::now() - state.written >= State::kPatience;
+  return due ? state.flush() : Status();
+}
+
+Status ManifestWriter::flush() { return state_->flush(); }
+
+Status ManifestWriter::finish() {
+  State& state = *state_;
+  if (state.next_layer != state.last_layer) {
+    return Error{Fault::kInternal,
+                 fmt::format("manifest: closed at layer {} of {}", state.next_layer, state.last_layer)};
+  }
+  state.buffer += "\n]\n}\n";
+  if (Status status = state.flush(); !status) return status;
+  const std::string partial = state.path + ".part";
+  if (std::rename(partial.c_str(), state.path.c_str()) != 0) return state.failed(errno);
+  const int file = std::exchange(state.file, -1);
+  if (::close(file) != 0) return Error{Fault::kOutput, fmt::format("{}: {}", state.path, std::strerror(errno))};
+  return {};
+}
+
+}  // namespace lamina::pipeline

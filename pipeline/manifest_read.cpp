@@ -1,0 +1,134 @@
+// Reads manifests, line by line: a hundred thousand layers cost their records and no document tree.
+#include <fmt/format.h>
+
+#include <cmath>
+#include <fstream>
+#include <nlohmann/json.hpp>
+
+#include "pipeline/json_text.h"
+#include "pipeline/manifest.h"
+#include "pipeline/manifest_text.h"
+
+namespace lamina::pipeline {
+namespace {
+
+using nlohmann::json;
+
+std::int64_t nm_from_json(const json& millimetres) { return nm_of(millimetres.get<double>()); }
+
+Point3 point_from(const json& coordinates) {
+  const auto nm = [&](std::size_t i) { return static_cast<Nm>(nm_from_json(coordinates.at(i))); };
+  return {nm(0), nm(1), nm(2)};
+}
+
+// Throws json::exception where something is missing or of another type.
+ManifestHead head_from(const json& text) {
+  ManifestHead head;
+  head.version = text.at("lamina");
+  head.job_toml = text.at("job");
+  head.format = text.at("format");
+  head.extension = text.at("extension");
+  head.fill_rule = text.at("fill_rule");
+  head.mirror = text.at("mirror");
+  head.grid.x = PixelAxis(text.at("dpi").at(0).get<std::int64_t>(), nm_from_json(text.at("bed_mm").at(0)));
+  head.grid.y = PixelAxis(text.at("dpi").at(1).get<std::int64_t>(), nm_from_json(text.at("bed_mm").at(1)));
+  head.layer_count = text.at("layer_count");
+  head.first_layer = text.at("range").at(0);
+  head.last_layer = text.at("range").at(1);
+  for (const json& entry : text.at("parts")) {
+    PartSummary part;
+    part.path = entry.at("path");
+    part.copies = entry.at("copies");
+    part.triangles = entry.at("triangles");
+    part.fingerprint = std::stoull(entry.at("fingerprint").get<std::string>(), nullptr, 16);
+    part.bounds = {point_from(entry.at("bounds_mm").at(0)), point_from(entry.at("bounds_mm").at(1))};
+    for (const json& note : entry.at("notes")) part.notes.push_back({note.at("repair"), note.at("text")});
+    head.parts.push_back(std::move(part));
+  }
+  return head;
+}
+
+// Empty, or what is wrong with the line.
+std::string record_from(const std::string& line, const ManifestHead& head, std::uint32_t index, LayerRecord& record) {
+  const json text = json::parse(line, nullptr, false);
+  if (text.is_discarded()) return "is not JSON";
+  record.layer.index = text.at("index");
+  if (record.layer.index != index) return fmt::format("layer {} stands where {} is next", record.layer.index, index);
+  if (text.at("file").get_ref<const std::string&>() != layer_file_name(index, head.extension)) {
+    return fmt::format("layer {} names another file", index);
+  }
+  record.layer.bottom = text.at("bottom_nm");
+  record.layer.thickness = text.at("thickness_nm");
+  if (!read_reason(text.at("reason").get_ref<const std::string&>(), record.layer.reason)) return "unknown reason";
+  record.bytes = text.at("bytes");
+  record.set_pixels = text.at("set_pixels");
+  record.capped_rows = text.at("capped_rows");
+  if (!read_hex(text.at("xxh3_128").get_ref<const std::string&>(), record.hash)) return "the hash is no hash";
+  return {};
+}
+
+}  // namespace
+
+Result<Manifest> read_manifest(const std::string& path) {
+  const bool partial = path.ends_with(".part");
+  std::uint64_t line_number = 0;
+  const auto wrong = [&](const std::string& what) {
+    return Error{Fault::kVerification, fmt::format("{}:{}: {}", path, line_number, one_line(what))};
+  };
+  std::ifstream file(path, std::ios::binary);
+  if (!file) return Error{Fault::kVerification, fmt::format("{}: cannot be opened", path)};
+
+  Manifest manifest;
+  std::string line, head;
+  try {
+    constexpr std::size_t kHeadLimit = 256u << 20;
+    while (std::getline(file, line)) {
+      ++line_number;
+      head += line;
+      if (line == "\"layers\": [") break;
+      if (line_number == 1 && line != "{") return wrong("is no manifest of lamina");
+      if (head.size() > kHeadLimit) return wrong("the head does not end");
+    }
+    if (line != "\"layers\": [") return wrong("the manifest ends before its first layer");
+    const json document = json::parse(head + "]}");
+    manifest.head = head_from(document);
+    Hash128 id;
+    if (!read_hex(document.at("id").get_ref<const std::string&>(), id) || id != manifest.head.id()) {
+      return wrong("the head does not match its id; it was changed, or is of another version of lamina");
+    }
+    const ManifestHead& range = manifest.head;
+    if (range.first_layer > range.last_layer || range.last_layer > range.layer_count) return wrong("the range is no range");
+
+    bool closed = false;
+    while (std::getline(file, line)) {
+      ++line_number;
+      if (line == "]") {
+        closed = std::getline(file, line) && line == "}";
+        break;
+      }
+      if (line.ends_with(',')) line.pop_back();
+      const auto index = range.first_layer + static_cast<std::uint32_t>(manifest.layers.size());
+      LayerRecord record;
+      std::string what;
+      try {
+        what = index >= range.last_layer ? "a layer beyond the range" : record_from(line, range, index, record);
+      } catch (const json::exception& error) {
+        what = error.what();
+      }
+      // What a killed run left at the end of its .part is not worth more than its whole lines.
+      if (!what.empty() && partial) return manifest;
+      if (!what.empty()) return wrong(what);
+      manifest.layers.push_back(record);
+    }
+    if (!partial && (!closed || manifest.layers.size() != range.last_layer - range.first_layer)) {
+      return wrong(fmt::format("the manifest ends after {} of {} layers", manifest.layers.size(),
+                               range.last_layer - range.first_layer));
+    }
+    manifest.complete = closed && !partial;
+  } catch (const std::exception& error) {
+    return wrong(error.what());
+  }
+  return manifest;
+}
+
+}  // namespace lamina::pipeline

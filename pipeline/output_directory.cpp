@@ -1,0 +1,170 @@
+#include "pipeline/output_directory.h"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <charconv>
+#include <cstring>
+#include <filesystem>
+#include <tuple>
+
+#include "pipeline/manifest.h"
+#include "pipeline/number_text.h"
+#include "stages/write/image_format.h"
+
+namespace lamina::pipeline {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::string_view kPartial = ".part";
+
+bool take_end(std::string_view& text, std::string_view end) {
+  if (!text.ends_with(end)) return false;
+  text.remove_suffix(end.size());
+  return true;
+}
+
+bool is_manifest(std::string_view name, ManifestFile& file) {
+  file = {};
+  file.name = name;
+  file.partial = take_end(name, kPartial);
+  if (name == "manifest.json") return true;
+  if (!name.starts_with("manifest-") || !take_end(name, ".json")) return false;
+  name.remove_prefix(std::string_view("manifest-").size());
+  const std::size_t of = name.find("-of-");
+  if (of == std::string_view::npos) return false;
+  std::array<std::uint32_t, 2> shard{};
+  if (!read_shard(fmt::format("{}/{}", name.substr(0, of), name.substr(of + 4)), shard).empty()) return false;
+  file.shard = shard;
+  return true;
+}
+
+template <class Visit>
+void for_each_entry(const fs::path& directory, Visit visit) {
+  std::error_code error;
+  for (fs::directory_iterator entry(directory, error), end; !error && entry != end; entry.increment(error)) visit(*entry);
+}
+
+// Layers' files of any earlier job, half-written ones too.
+std::vector<fs::path> layer_files(const std::string& directory) {
+  std::vector<fs::path> found;
+  for_each_entry(fs::path(directory) / "layers", [&](const fs::directory_entry& entry) {
+    std::uint32_t index = 0;
+    bool partial = false;
+    if (read_layer_file_name(entry.path().filename().string(), index, partial)) found.push_back(entry.path());
+  });
+  return found;
+}
+
+Error cannot(const fs::path& path, int reason) {
+  return {Fault::kOutput, fmt::format("{}: {}", path.string(), std::strerror(reason))};
+}
+
+// A shard beside shards of the same split: they share the directory.
+bool joins(const JetJob& job, const ManifestFile& file) {
+  return job.shard && file.shard && (*job.shard)[1] == (*file.shard)[1] && (*job.shard)[0] != (*file.shard)[0];
+}
+
+}  // namespace
+
+std::vector<ManifestFile> find_manifests(const std::string& directory) {
+  std::vector<ManifestFile> found;
+  for_each_entry(directory, [&](const fs::directory_entry& entry) {
+    ManifestFile file;
+    if (is_manifest(entry.path().filename().string(), file)) found.push_back(std::move(file));
+  });
+  constexpr std::array<std::uint32_t, 2> kWhole{};
+  std::sort(found.begin(), found.end(), [&](const ManifestFile& a, const ManifestFile& b) {
+    const auto [a_index, a_count] = a.shard.value_or(kWhole);
+    const auto [b_index, b_count] = b.shard.value_or(kWhole);
+    return std::tie(a_count, a_index, a.partial) < std::tie(b_count, b_index, b.partial);
+  });
+  return found;
+}
+
+bool read_layer_file_name(std::string_view name, std::uint32_t& index, bool& partial) {
+  partial = take_end(name, kPartial);
+  const std::size_t digits = std::min(name.find_first_not_of("0123456789"), name.size());
+  if (digits < 6) return false;
+  const auto [stop, error] = std::from_chars(name.data(), name.data() + digits, index);
+  if (error != std::errc()) return false;
+  const std::string_view extension = name.substr(digits);
+  return std::ranges::any_of(write::image_formats(), [&](const write::ImageFormat& format) {
+    return !extension.empty() && extension == format.extension;
+  });
+}
+
+Status check_output(const JetJob& job) {
+  std::error_code error;
+  const fs::file_status status = fs::status(job.output, error);
+  if (!fs::exists(status)) return {};
+  if (!fs::is_directory(status)) {
+    return Error{Fault::kOutput, fmt::format("{}: is a file, not a directory; name another one with -o", job.output)};
+  }
+  const std::string own = manifest_name(job);
+  bool shared = false;
+  for (const ManifestFile& file : find_manifests(job.output)) {
+    const bool is_own = file.name == own || file.name == own + std::string(kPartial);
+    const auto refuse = [&](std::string_view what, std::string_view advice) {
+      return Error{Fault::kUsage, fmt::format("{}/{}: {}; {}", job.output, file.name, what, advice)};
+    };
+    if (joins(job, file)) {
+      shared = true;
+    } else if (is_own && !job.resume && !job.overwrite) {
+      if (file.partial) return refuse("an interrupted job", "go on with --resume, or start over with --overwrite");
+      return refuse("a finished job", "replace it with --overwrite, check and keep it with --resume, or name another "
+                                      "directory");
+    } else if (!is_own && (job.shard || !job.overwrite)) {
+      return refuse("a job that was split otherwise", job.shard ? "name another directory"
+                                                                : "replace it with --overwrite, or name another directory");
+    }
+  }
+  if (!job.resume && !job.overwrite && !shared && !layer_files(job.output).empty()) {
+    return Error{Fault::kUsage, fmt::format("{}/layers: holds layers without a manifest; replace them with --overwrite, "
+                                            "or name another directory", job.output)};
+  }
+  return {};
+}
+
+Status prepare_output(const JetJob& job) {
+  if (Status status = check_output(job); !status) return status;
+  const fs::path directory = job.output, layers = directory / "layers";
+  std::error_code error;
+  fs::create_directories(layers, error);
+  if (error) return cannot(layers, error.value());
+  if (!fs::is_directory(layers)) {
+    return Error{Fault::kOutput, fmt::format("{}: is a file, not a directory; remove it", layers.string())};
+  }
+  for (const fs::path& place : {directory, layers}) {
+    if (::access(place.c_str(), W_OK | X_OK) != 0) return cannot(place, errno);
+  }
+  if (!job.overwrite) {
+    if (!job.shard) sweep_partial_files(job.output);
+    return {};
+  }
+  for (const ManifestFile& file : find_manifests(job.output)) {
+    if (!joins(job, file)) fs::remove(directory / file.name, error);
+    if (error) return cannot(directory / file.name, error.value());
+  }
+  if (job.shard) return {};
+  for (const fs::path& file : layer_files(job.output)) {
+    fs::remove(file, error);
+    if (error) return cannot(file, error.value());
+  }
+  return {};
+}
+
+void sweep_partial_files(const std::string& directory, std::uint32_t first, std::uint32_t last) {
+  for (const fs::path& file : layer_files(directory)) {
+    std::uint32_t index = 0;
+    bool partial = false;
+    read_layer_file_name(file.filename().string(), index, partial);
+    std::error_code ignored;
+    if (partial && index >= first && index < last) fs::remove(file, ignored);
+  }
+}
+
+}  // namespace lamina::pipeline

@@ -1,0 +1,16 @@
+// pipeline/summary.h: what a job did, for a person and for a script.
+#pragma once
+
+#include <string>
+
+#include "pipeline/jet.h"
+
+namespace lamina::pipeline {
+
+/// Aligned lines with units; ends with one line a warning.
+std::string summary_text(const JetJob& job, const JetSummary& summary);
+
+/// One JSON object on one line. Lengths in mm or nm, times in seconds and sizes in bytes, as the keys say.
+std::string summary_json(const JetJob& job, const JetSummary& summary);
+
+}  // namespace lamina::pipeline

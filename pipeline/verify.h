@@ -1,0 +1,34 @@
+// pipeline/verify.h: is a directory what its manifest says.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "stages/data/status.h"
+
+namespace lamina::pipeline {
+
+struct VerifyOptions {
+  bool quick = false;  // sizes and hashes only; images are not decoded
+};
+
+struct VerifyReport {
+  std::string directory;
+  std::uint64_t layers = 0;       // that the manifests name
+  std::uint64_t bytes = 0;        // of their files, as recorded
+  std::uint64_t fault_count = 0;
+  std::vector<std::string> faults;  // the first 20, in layer order, then stray files; each begins with a file's name
+  bool ok() const { return fault_count == 0; }
+};
+
+/// Compares every file with the manifest (of the whole job, or of all shards that are there): present, of the recorded
+/// size and hash, and, unless quick, an image of the recorded columns, rows, resolution and number of set pixels. Files
+/// in layers/ that no manifest names are faults, and so is a job that was interrupted.
+///
+/// errors  kVerification if there is no manifest to compare with, or none that can be read; kUsage if the directory
+///         does not exist
+/// cost    reads every file once, and once more to decode it; parallel over layers; memory of a few layers' runs
+Result<VerifyReport> verify(const std::string& directory, const VerifyOptions& options);
+
+}  // namespace lamina::pipeline
