@@ -1,0 +1,196 @@
+// stages/load/load.cpp: a file goes to the reader of its format, and its meshes are checked, closed and described.
+#include "stages/load/load.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <exception>
+
+#include "stages/load/diagnose.h"
+#include "stages/load/geometry.h"
+#include "stages/load/reader.h"
+#include "stages/load/repair.h"
+
+namespace lamina::load {
+namespace {
+
+/// Opens a file and inflates it if need be.
+Result<Source> open_plain(const std::string& path, const LoadOptions& options, Format& format, bool& was_gzip) {
+  Result<Source> source = Source::open(path);
+  if (!source) return source;
+  Result<Format> found = detect(*source);
+  if (!found) return found.error();
+  was_gzip = *found == Format::kGzip;
+  if (was_gzip) {
+    source = inflate_gzip(*source, options.expanded_limit);
+    if (!source) return source;
+    found = detect(*source);
+    if (!found) return found.error();
+    if (*found == Format::kGzip || *found == Format::k3mf)
+      return source->error("is a compressed file within a gzip file; inflate it once");
+  }
+  format = *found;
+  return source;
+}
+
+Result<Facets> read_facets(const Source& source, Format format, const LoadOptions& options) {
+  const Snapper snapper(options.transform, options.unit_mm);
+  switch (format) {
+    case Format::kBinaryStl: return read_binary_stl(source, snapper, options);
+    case Format::kAsciiStl: return read_ascii_stl(source, snapper, options);
+    default: return read_obj(source, snapper, options);
+  }
+}
+
+std::string plural(std::uint64_t count, const char* what) {
+  return fmt::format("{} {}{}", count, what, count == 1 ? "" : "s");
+}
+
+std::string place(const Box& box) {
+  const auto middle = [](Nm lo, Nm hi) { return mm((std::int64_t{lo} + hi) / 2); };
+  return fmt::format("({:.3f}, {:.3f}, {:.3f}) mm", middle(box.lo.x, box.hi.x), middle(box.lo.y, box.hi.y),
+                     middle(box.lo.z, box.hi.z));
+}
+
+/// Repair notes end with the places of the file's own coordinates, so that they can be found in a modeller.
+void describe_repair(const RepairReport& report, const std::string& prefix, std::vector<Note>& notes) {
+  const auto note = [&](const std::string& text) { notes.push_back({true, prefix + text}); };
+  if (report.duplicates_dropped > 0) note(plural(report.duplicates_dropped, "duplicate facet") + " dropped");
+  if (report.vertices_welded > 0)
+    note(fmt::format("{} {} at open edges welded to a neighbour", report.vertices_welded,
+                     report.vertices_welded == 1 ? "vertex" : "vertices"));
+  if (report.facets_turned > 0) note(plural(report.facets_turned, "facet") + " turned over to agree with the neighbours");
+  if (report.openings_capped > 0)
+    note(fmt::format("{} capped with {}, the largest {:.3g} mm wide near {}", plural(report.openings_capped, "opening"),
+                     plural(report.cap_triangles, "triangle"), report.largest_opening_mm, place(report.largest_opening)));
+}
+
+/// Facets of a file become a mesh that later stages can trust.
+Result<Mesh> finish(const Source& source, const std::string& name, const std::string& prefix, Facets facets,
+                    const LoadOptions& options, std::vector<Note>& notes) {
+  Mesh mesh;
+  mesh.name = name;
+  mesh.triangles = std::move(facets.triangles);
+  mesh.bounds = facets.bounds;
+  mesh.repaired_from = static_cast<std::uint32_t>(mesh.triangles.size());
+  for (Note& note : facets.notes) notes.push_back({note.repair, prefix + note.text});
+  Census found = census(mesh.triangles);
+  if (facets.doubt) {
+    if (!found.balanced) return source.error(facets.doubt->error);
+    notes.push_back({false, prefix + facets.doubt->note});
+  }
+  if (!found.balanced && options.repair) {
+    describe_repair(repair(mesh, options.weld_nm), prefix, notes);
+    found = census(mesh.triangles);
+    if (!found.balanced) return Error{Fault::kInternal, source.path() + ": repair left the mesh open; please report it"};
+  } else if (!found.balanced) {
+    notes.push_back({false, prefix + "the mesh is not closed and repair is off: rows may stay open"});
+  }
+  mesh.fingerprint = found.fingerprint;
+  return mesh;
+}
+
+/// Refuses what cannot leave a single pixel.
+Status check_extent(const Source& source, const Part& part) {
+  const bool any_area = std::any_of(part.meshes.begin(), part.meshes.end(), [](const Mesh& mesh) {
+    return std::any_of(mesh.triangles.begin(), mesh.triangles.end(), has_area);
+  });
+  if (part.bounds.empty()) return source.error("holds no facets");
+  if (part.bounds.height() == 0)
+    return source.error(fmt::format("has no height: nothing to print (all of it lies at z = {:.6g} mm)", mm(part.bounds.lo.z)));
+  if (part.bounds.width() == 0 || part.bounds.depth() == 0)
+    return source.error(fmt::format("has no {}: nothing to print", part.bounds.width() == 0 ? "width" : "depth"));
+  if (!any_area) return source.error("all facets are degenerate: nothing to print");
+  return {};
+}
+
+/// STL and OBJ carry no unit; a part smaller than a thumbnail was often drawn in another one.
+void hint_at_unit(Part& part) {
+  const double largest = mm(std::max({part.bounds.width(), part.bounds.depth(), part.bounds.height()}));
+  if (largest >= 10) return;
+  part.notes.push_back(
+      {false, fmt::format("the largest side is {:.4g} mm{}", largest,
+                          largest < 1 ? "; is the unit right? The file carries none: try --unit inch, cm or m"
+                                      : "; if the file was drawn in inches, say --unit inch")});
+}
+
+Status add_bounds(const Source& source, Part& part) {
+  for (const Instance& instance : part.instances) {
+    const Box& box = part.meshes[instance.mesh].bounds;
+    if (box.empty()) continue;
+    for (const Point3& corner : {box.lo, box.hi}) {
+      const std::int64_t x = std::int64_t{corner.x} + instance.offset.x, y = std::int64_t{corner.y} + instance.offset.y,
+                         z = std::int64_t{corner.z} + instance.offset.z;
+      if (std::max({std::abs(x), std::abs(y), std::abs(z)}) > kNmReach) return source.error(what_is_wrong(Snapped::kBeyondReach));
+      part.bounds.add(Point3{static_cast<Nm>(x), static_cast<Nm>(y), static_cast<Nm>(z)});
+    }
+  }
+  return {};
+}
+
+Result<Part> load_unguarded(const std::string& path, const LoadOptions& options) {
+  Part part;
+  part.path = path;
+  Format format{};
+  bool was_gzip = false;
+  const Result<Source> source = open_plain(path, options, format, was_gzip);
+  if (!source) return source.error();
+  if (format == Format::k3mf) {
+    Result<Package> package = read_3mf(*source, options);
+    if (!package) return package.error();
+    part.notes = std::move(package->notes);
+    for (PlacedObject& object : package->objects) {
+      const std::string prefix = package->objects.size() > 1 ? object.name + ": " : "";
+      Result<Mesh> mesh = finish(*source, path + ": " + object.name, prefix, std::move(object.facets), options, part.notes);
+      if (!mesh) return mesh.error();
+      for (const Point3& offset : object.offsets)
+        part.instances.push_back({static_cast<std::uint32_t>(part.meshes.size()), offset});
+      part.meshes.push_back(std::move(*mesh));
+    }
+  } else {
+    Result<Facets> facets = read_facets(*source, format, options);
+    if (!facets) return facets.error();
+    Result<Mesh> mesh = finish(*source, path, "", std::move(*facets), options, part.notes);
+    if (!mesh) return mesh.error();
+    part.meshes.push_back(std::move(*mesh));
+    part.instances.push_back({0, {0, 0, 0}});
+  }
+  if (const Status within = add_bounds(*source, part); !within) return within.error();
+  if (const Status extent = check_extent(*source, part); !extent) return extent.error();
+  if (format != Format::k3mf) hint_at_unit(part);
+  return part;
+}
+
+/// Libraries and memory may throw; nothing leaves this stage that way.
+template <class Work>
+auto guarded(const std::string& path, const Work& work) -> decltype(work()) {
+  try {
+    return work();
+  } catch (const std::bad_alloc&) {
+    return Error{Fault::kInput, path + ": does not fit into this machine's memory"};
+  } catch (const std::exception& problem) {
+    return Error{Fault::kInternal, path + ": " + problem.what()};
+  }
+}
+
+}  // namespace
+
+Result<Part> load(const std::string& path, const LoadOptions& options) {
+  return guarded(path, [&] { return load_unguarded(path, options); });
+}
+
+Result<std::string> format_of(const std::string& path, const LoadOptions& options) {
+  return guarded(path, [&]() -> Result<std::string> {
+    Format format{};
+    bool was_gzip = false;
+    const Result<Source> source = open_plain(path, options, format, was_gzip);
+    if (!source) return source.error();
+    const char* const name = format == Format::kBinaryStl  ? "binary STL"
+                             : format == Format::kAsciiStl ? "ASCII STL"
+                             : format == Format::kObj      ? "OBJ"
+                                                           : "3MF";
+    return std::string(name) + (was_gzip ? ", gzip" : "");
+  });
+}
+
+}  // namespace lamina::load

@@ -1,0 +1,70 @@
+// stages/load/reader.h: what each format's reader gives back; internal to load.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "stages/data/mesh.h"
+#include "stages/data/status.h"
+#include "stages/load/load.h"
+#include "stages/load/snap.h"
+#include "stages/load/source.h"
+
+namespace lamina::load {
+
+/// The file's length contradicts what it says about itself. If its facets close, the statement was wrong and the
+/// facets are right; if not, some of them are missing.
+struct Doubt {
+  std::string note;   // if the mesh is balanced
+  std::string error;  // if it is not
+};
+
+/// The triangles of a file in its order, turned over if the transform mirrors.
+struct Facets {
+  Buffer<Triangle> triangles;
+  Box bounds;
+  std::vector<Note> notes;
+  std::optional<Doubt> doubt;
+};
+
+enum class Format { kBinaryStl, kAsciiStl, kObj, k3mf, kGzip };
+
+/// Tells the format from the content, and from the name where the content is text that could be anything.
+/// errors  kInput: empty, or nothing that is known
+Result<Format> detect(const Source& source);
+
+/// Facets of 50 bytes behind a header of 84: normal (12), three corners of three floats (36), attributes (2).
+/// cost    one pass, parallel; 256 KiB a thread besides the triangles
+/// source  3D Systems, "StereoLithography Interface Specification" (1989)
+Result<Facets> read_binary_stl(const Source& source, const Snapper& snapper, const LoadOptions& options);
+
+/// Text, a word after the other; see stl_ascii.cpp for what is tolerated.
+/// cost    one pass, parallel over blocks of 1 MiB; 32 MiB of text at a time
+Result<Facets> read_ascii_stl(const Source& source, const Snapper& snapper, const LoadOptions& options);
+
+/// Vertices and polygons; see obj.cpp for what is understood.
+/// cost    one pass; 12 bytes a vertex and a corner besides the triangles
+Result<Facets> read_obj(const Source& source, const Snapper& snapper, const LoadOptions& options);
+
+/// A mesh of a 3MF file with one transform, before census and repair.
+struct PlacedObject {
+  std::string name;  // in the file, for notes
+  Facets facets;
+  std::vector<Point3> offsets;  // where it stands, at least once
+};
+struct Package {
+  std::vector<PlacedObject> objects;
+  std::vector<Note> notes;
+};
+
+/// 3MF core specification 1.2 through lib3mf, which keeps coordinates and transforms as floats: places of a
+/// coordinate beyond the seventh are lost before we see them. The unit is the file's own.
+/// cost    about 150 bytes a triangle while lib3mf holds the model
+Result<Package> read_3mf(const Source& source, const LoadOptions& options);
+
+/// Inflates every entry of a zip file once without keeping anything.
+/// errors  kInput: not a zip, cut short, damaged, encrypted, more than `limit` bytes in all, or a bomb
+Status check_zip(const Source& source, std::uint64_t limit);
+
+}  // namespace lamina::load

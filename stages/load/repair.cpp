@@ -1,0 +1,185 @@
+// stages/load/repair.cpp: the four steps, over one indexed mesh.
+#include "stages/load/repair.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "stages/load/diagnose.h"
+#include "stages/load/geometry.h"
+#include "stages/load/loops.h"
+#include "stages/load/topology.h"
+#include "stages/load/weld.h"
+
+namespace lamina::load {
+namespace {
+
+using Facet = Indexed::Facet;
+
+/// Sum over all edges of how much more often they are walked one way than the other; 0 is balanced.
+std::uint64_t imbalance(std::span<const Side> sides) {
+  std::uint64_t sum = 0;
+  for_each_edge(sides, [&](const Side* begin, const Side* end) {
+    sum += static_cast<std::uint64_t>(std::abs(surplus(begin, end)));
+  });
+  return sum;
+}
+
+/// The mesh under repair: triangles and facets are two views of the same list.
+struct Work {
+  Mesh& mesh;
+  Indexed indexed;
+  Buffer<Side> sides;
+  std::uint64_t unmatched = 0;
+
+  explicit Work(Mesh& to_repair) : mesh(to_repair), indexed(index_mesh(to_repair.triangles)) { refresh(); }
+  void refresh() {
+    sides = {};
+    sides = sorted_sides(indexed.facet);
+    unmatched = imbalance(sides);
+  }
+};
+
+std::uint64_t drop_duplicates(Work& work) {
+  const Buffer<std::uint8_t> repeated = repeats(work.indexed.facet);
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < repeated.size(); ++i) {
+    if (repeated[i]) continue;
+    work.indexed.facet[kept] = work.indexed.facet[i];
+    work.mesh.triangles[kept++] = work.mesh.triangles[i];
+  }
+  const std::size_t dropped = repeated.size() - kept;
+  if (dropped == 0) return 0;
+  work.indexed.facet.resize(kept);
+  work.mesh.triangles.resize(kept);
+  work.refresh();
+  return dropped;
+}
+
+/// Welding is undone if it does not leave fewer edges open.
+std::uint64_t weld(Work& work, std::int64_t weld_nm) {
+  const Welding welding = find_welding(work.indexed, work.sides, weld_nm);
+  if (welding.moved == 0) return 0;
+  const auto odd_edges = [](std::span<const Side> sides) {
+    std::uint64_t count = 0;
+    for_each_edge(sides, [&](const Side* begin, const Side* end) { count += (end - begin) % 2; });
+    return count;
+  };
+  const Buffer<Facet> before = work.indexed.facet;
+  for (Facet& facet : work.indexed.facet)
+    for (std::uint32_t& corner : facet) corner = welding.target[corner];
+  Buffer<Side> sides = sorted_sides(work.indexed.facet);
+  if (odd_edges(sides) >= odd_edges(work.sides)) {
+    work.indexed.facet = before;
+    return 0;
+  }
+  work.sides = std::move(sides);
+  work.unmatched = imbalance(work.sides);
+  work.mesh.bounds = {};
+  for (std::size_t i = 0; i < before.size(); ++i) {
+    const Facet& facet = work.indexed.facet[i];
+    Triangle& t = work.mesh.triangles[i];
+    t = {work.indexed.vertex[facet[0]], work.indexed.vertex[facet[1]], work.indexed.vertex[facet[2]]};
+    for (const Point3& corner : {t.a, t.b, t.c}) work.mesh.bounds.add(corner);
+  }
+  return welding.moved;
+}
+
+/// Which facets to turn over so that neighbours agree. Neighbours are the two facets of an edge that has two.
+Buffer<std::uint8_t> find_orientation(const Work& work) {
+  const std::size_t count = work.indexed.facet.size();
+  struct Neighbour {
+    std::uint32_t facet = UINT32_MAX;
+    bool agrees = true;
+  };
+  Buffer<std::array<Neighbour, 3>> neighbours(count);
+  Buffer<std::uint8_t> used(count), turn(count), seen(count);
+  std::fill(used.begin(), used.end(), std::uint8_t{0});
+  std::fill(turn.begin(), turn.end(), std::uint8_t{0});
+  std::fill(seen.begin(), seen.end(), std::uint8_t{0});
+  for_each_edge(work.sides, [&](const Side* begin, const Side* end) {
+    if (end - begin != 2 || begin[0].facet == begin[1].facet) return;
+    const bool agrees = begin[0].forward != begin[1].forward;
+    neighbours[begin[0].facet][used[begin[0].facet]++] = {begin[1].facet, agrees};
+    neighbours[begin[1].facet][used[begin[1].facet]++] = {begin[0].facet, agrees};
+  });
+  Buffer<std::uint32_t> component;
+  for (std::uint32_t start = 0; start < count; ++start) {
+    if (seen[start]) continue;
+    component.clear();
+    component.push_back(start);
+    seen[start] = 1;
+    double kept_area = 0, turned_area = 0;
+    bool any_turned = false;
+    for (std::size_t i = 0; i < component.size(); ++i) {
+      const std::uint32_t facet = component[i];
+      (turn[facet] ? turned_area : kept_area) += doubled_area_length(work.mesh.triangles[facet]);
+      any_turned = any_turned || turn[facet];
+      for (std::size_t k = 0; k < used[facet]; ++k) {
+        const Neighbour& next = neighbours[facet][k];
+        if (seen[next.facet]) continue;
+        seen[next.facet] = 1;
+        turn[next.facet] = next.agrees ? turn[facet] : static_cast<std::uint8_t>(!turn[facet]);
+        component.push_back(next.facet);
+      }
+    }
+    if (any_turned && turned_area > kept_area)
+      for (const std::uint32_t facet : component) turn[facet] = !turn[facet];
+  }
+  return turn;
+}
+
+/// Turning is undone if it leaves more unmatched than there was (surfaces with one side, crossings of many sheets).
+std::uint64_t orient(Work& work) {
+  const Buffer<std::uint8_t> turn = find_orientation(work);
+  const auto turned = static_cast<std::uint64_t>(std::count(turn.begin(), turn.end(), std::uint8_t{1}));
+  if (turned == 0) return 0;
+  const auto apply = [&] {
+    for (std::size_t i = 0; i < turn.size(); ++i) {
+      if (!turn[i]) continue;
+      std::swap(work.indexed.facet[i][1], work.indexed.facet[i][2]);
+      std::swap(work.mesh.triangles[i].b, work.mesh.triangles[i].c);
+    }
+    work.refresh();
+  };
+  const std::uint64_t unmatched = work.unmatched;
+  apply();
+  if (work.unmatched <= unmatched) return turned;
+  apply();
+  return 0;
+}
+
+void cap(Work& work, RepairReport& report) {
+  const auto& vertex = work.indexed.vertex;
+  for_each_loop(work.sides, [&](std::span<const std::uint32_t> loop) {
+    Box box;
+    for (const std::uint32_t v : loop) box.add(vertex[v]);
+    report.capped.add(box);
+    const double width = mm(box.width()), depth = mm(box.depth()), height = mm(box.height());
+    const double diagonal = std::sqrt(width * width + depth * depth + height * height);
+    if (diagonal > report.largest_opening_mm) {
+      report.largest_opening_mm = diagonal;
+      report.largest_opening = box;
+    }
+    for (std::size_t i = 2; i < loop.size(); ++i)
+      work.mesh.triangles.push_back({vertex[loop[0]], vertex[loop[i - 1]], vertex[loop[i]]});
+    ++report.openings_capped;
+    report.cap_triangles += loop.size() - 2;
+  });
+}
+
+}  // namespace
+
+RepairReport repair(Mesh& mesh, std::int64_t weld_nm) {
+  RepairReport report;
+  mesh.repaired_from = static_cast<std::uint32_t>(mesh.triangles.size());
+  if (census(mesh.triangles).balanced) return report;
+  Work work(mesh);
+  if (work.unmatched > 0) report.duplicates_dropped = drop_duplicates(work);
+  if (work.unmatched > 0 && weld_nm > 0) report.vertices_welded = weld(work, weld_nm);
+  if (work.unmatched > 0) report.facets_turned = orient(work);
+  mesh.repaired_from = static_cast<std::uint32_t>(mesh.triangles.size());
+  if (work.unmatched > 0) cap(work, report);
+  return report;
+}
+
+}  // namespace lamina::load
