@@ -26,9 +26,10 @@ lamina_sources(pipeline_sources "pipeline/*.cpp")
 list(FILTER pipeline_sources EXCLUDE REGEX "/pipeline/(main|preview_main)\\.cpp$")
 add_library(lamina_pipeline STATIC ${pipeline_sources})
 add_library(lamina::pipeline ALIAS lamina_pipeline)
+# toml++ is used as headers: job_toml.cpp wants errors as values, and Debian's library was built with exceptions.
 target_compile_definitions(lamina_pipeline PRIVATE LAMINA_VERSION="${PROJECT_VERSION}")
 target_link_libraries(lamina_pipeline PUBLIC lamina::stages
-                      PRIVATE nlohmann_json::nlohmann_json tomlplusplus::tomlplusplus PkgConfig::XXHASH)
+                      PRIVATE nlohmann_json::nlohmann_json PkgConfig::XXHASH)
 
 add_executable(lamina pipeline/main.cpp)
 target_link_libraries(lamina PRIVATE lamina::pipeline)
