@@ -16,7 +16,8 @@ constexpr std::int64_t kDpi = 1200;
 /// Empty if the file that an encoder made gives the runs back.
 std::string wrong_with(const write::Bytes& file, const write::ImageFormat& format, const Runs& runs) {
   if (format.extension.empty()) return {};
-  const auto path = (std::filesystem::temp_directory_path() / "lamina-bench-layer").string() + std::string(format.extension);
+  const auto path =
+      (std::filesystem::temp_directory_path() / "lamina-bench-layer").string() + std::string(format.extension);
   if (auto written = write::write_file(path, file); !written) return written.error().message;
   const auto image = write::read_image(path);
   std::filesystem::remove(path);
@@ -28,8 +29,7 @@ void encode(benchmark::State& state, const write::ImageFormat& format, const std
   Part part;
   if (!load_on_bed(state, path, kNmPerMm, kNmPerMm, part)) return;
   const PixelGrid grid = snug_grid(part, kDpi);
-  auto rasterizer =
-      raster::Rasterizer::build(part.meshes, part.instances, grid, FillRule::kNonzero, false, true);
+  auto rasterizer = raster::Rasterizer::build(part.meshes, part.instances, grid, FillRule::kNonzero, false, true);
   if (!rasterizer) return state.SkipWithError(rasterizer.error().message.c_str());
   raster::LayerScratch scratch;
   Runs runs;

@@ -70,9 +70,9 @@ void census_of_part(benchmark::State& state, const NamedPart& named, const std::
     auto census = load::census(triangles);
     benchmark::DoNotOptimize(census);
   }
-  state.counters["triangles/s"] = benchmark::Counter(static_cast<double>(triangles.size()),
-                                                     benchmark::Counter::kIsIterationInvariantRate,
-                                                     benchmark::Counter::kIs1000);
+  state.counters["triangles/s"] =
+      benchmark::Counter(static_cast<double>(triangles.size()), benchmark::Counter::kIsIterationInvariantRate,
+                         benchmark::Counter::kIs1000);
   (void)named;
 }
 

@@ -6,9 +6,9 @@
 A part that is in the cache already is not made again. Every part is a closed mesh in an uncompressed binary STL, where it
 shall stand on the bed; parts.json says where that is, in nanometres:
 
-    terrain.stl       St. Helens scaled to fit 100 x 100 mm: 645,364 triangles, 192 layers of 0.1 mm
+    terrain.stl       St. Helens scaled to fit 100 x 100 mm: 645,364 triangles, 191 layers of 0.1 mm
     benchy15.stl      3DBenchy at 1.5 times its size: 225,154 triangles, 720 layers of 0.1 mm
-    crown.stl         a dental crown made 27.8 x 29.6 x 9.57 mm: 3,878 triangles, 96 layers of 0.1 mm, 20 of 0.48 mm
+    crown.stl         a dental crown made 27.8 x 29.6 x 9.6 mm: 3,878 triangles, 96 layers of 0.1 mm, 20 of 0.48 mm
     gyroid.stl        a gyroid sheet of 24 mm: 246,820 triangles, for the runs that measure memory
     crowns96.stl      96 of them in one mesh, 12 x 8 on 400 x 400 mm
     benchies72.stl    72 Benchies in one mesh, 6 x 12 on 400 x 400 mm: 811 MB, 480 layers of 0.1 mm (--large)
@@ -60,6 +60,12 @@ def read_3mf(path):
                 if numbers[:9] != [1, 0, 0, 0, 1, 0, 0, 0, 1]:
                     sys.exit(f"{path}: its item is turned or scaled; not understood here")
     return axes
+
+
+def tall(axes, height):
+    """The factor that gives a part this height. A whole number of layers keeps both programs at the same count, if the
+    height as a float is not below it: PrusaSlicer drops a last layer that is not full, lamina plans it."""
+    return height / (max(axes[2]) - min(axes[2]))
 
 
 def placed(axes, factors):
@@ -153,10 +159,11 @@ def main():
 
     def terrain():
         axes = model("st_helens_terrain_645k.stl.gz")
-        return placed(axes, (0.588, 0.588, 0.5868))  # 158 x 169.5 x 32.7 mm become 92.9 x 99.7 x 19.19 mm
+        return placed(axes, (0.588, 0.588, tall(axes, 19.1)))  # 158 x 169.5 mm become 92.9 x 99.7
 
     def crown():
-        return placed(model("dental_crown.stl"), (2.6, 2.6, 1.0))
+        axes = model("dental_crown.stl")
+        return placed(axes, (2.6, 2.6, tall(axes, 9.6)))
 
     def benchy(factor):
         return placed(model("3DBenchy.3mf"), (factor, factor, factor))
