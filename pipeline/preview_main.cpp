@@ -1,0 +1,175 @@
+// pipeline/preview_main.cpp: the program lamina-preview, which `lamina preview` hands over to.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <charconv>
+#include <csignal>
+#include <filesystem>
+#include <optional>
+
+#include "pipeline/command_line.h"
+#include "pipeline/console.h"
+#include "pipeline/manifest.h"
+#include "stages/write/atomic_file.h"
+#include "stages/write/picture/canvas.h"
+#include "stages/write/picture/contact_sheet.h"
+
+namespace lamina::pipeline {
+namespace {
+
+constexpr std::uint32_t kMostCells = 400;
+
+CommandSpec preview_spec() {
+  CommandSpec spec;
+  spec.name = "preview";
+  spec.summary = "Draws layers of a job as one picture (PNG), each pixel as dark as the share of its area that is set.";
+  spec.operand = "DIR";
+  spec.operand_meaning = "directory that lamina jet wrote";
+  spec.options = {{"-o,--output", "PNG", "the picture", "", ""},
+                  {"--count", "N", "so many layers, spread over the height", "12", ""},
+                  {"--every", "N", "every N-th layer, from the first", "", ""},
+                  {"--layer", "K", "only layer K, counted from 0 at the bottom", "", ""},
+                  {"--width", "PIXELS", "width of the picture, 200 to 20000", "2400", ""},
+                  {"--whole-bed", "", "show all of the bed, not only where the layers have something", "", ""},
+                  {"--quiet", "", "say nothing but errors", "", ""}};
+  spec.closing =
+      "Examples:\n"
+      "  lamina preview out -o sheet.png\n"
+      "  lamina preview out -o layer.png --layer 120 --whole-bed";
+  return spec;
+}
+
+/// The number behind a flag; nothing if the flag is absent.
+Result<std::optional<std::uint32_t>> number(const Arguments& arguments, std::string_view flag, std::uint32_t least,
+                                            std::uint32_t most) {
+  if (!arguments.has(flag)) return std::optional<std::uint32_t>();
+  const std::string text = arguments.text(flag);
+  std::uint32_t value = 0;
+  const auto [end, code] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (code != std::errc() || end != text.data() + text.size() || value < least || value > most) {
+    return Error{Fault::kUsage, fmt::format("{} {}: give a whole number from {} to {}", flag, text, least, most)};
+  }
+  return std::optional<std::uint32_t>(value);
+}
+
+Result<Manifest> manifest_of(const std::string& directory) {
+  std::error_code ignored;
+  const std::string whole = directory + "/manifest.json", part = whole + ".part";
+  if (!std::filesystem::exists(whole, ignored) && std::filesystem::exists(part, ignored)) return read_manifest(part);
+  if (!std::filesystem::exists(whole, ignored)) {
+    return Error{Fault::kVerification,
+                 fmt::format("{}: no manifest.json; name a directory that lamina jet wrote (shards: run lamina merge "
+                             "first)",
+                             directory)};
+  }
+  return read_manifest(whole);
+}
+
+/// Which of the manifest's layers are drawn.
+Result<std::vector<std::size_t>> chosen_layers(const Arguments& arguments, const Manifest& manifest) {
+  const auto layer_read = number(arguments, "--layer", 0, UINT32_MAX);
+  const auto every_read = number(arguments, "--every", 1, UINT32_MAX);
+  const auto count_read = number(arguments, "--count", 1, kMostCells);
+  for (const auto* option : {&layer_read, &every_read, &count_read}) {
+    if (!*option) return option->error();
+  }
+  const std::optional<std::uint32_t> layer = *layer_read, every = *every_read, count = *count_read;
+  if (layer.has_value() + every.has_value() + count.has_value() > 1) {
+    return Error{Fault::kUsage, "--layer, --every and --count exclude each other; give one of them"};
+  }
+  const std::vector<LayerRecord>& layers = manifest.layers;
+  std::vector<std::size_t> chosen;
+  if (layer) {
+    for (std::size_t i = 0; i < layers.size(); ++i) {
+      if (layers[i].layer.index == *layer) return std::vector<std::size_t>{i};
+    }
+    return Error{Fault::kUsage, fmt::format("--layer {}: the job has layers {} to {}", *layer,
+                                            layers.front().layer.index, layers.back().layer.index)};
+  }
+  if (every) {
+    const std::size_t cells = (layers.size() + *every - 1) / *every;
+    if (cells > kMostCells) {
+      return Error{Fault::kUsage, fmt::format("--every {}: {} layers are too many for a picture; give {} or more",
+                                              *every, cells, (layers.size() + kMostCells - 1) / kMostCells)};
+    }
+    for (std::size_t i = 0; i < layers.size(); i += *every) chosen.push_back(i);
+    return chosen;
+  }
+  // The middle one of each of `cells` equal stretches of the height.
+  const std::size_t cells = std::min<std::size_t>(count.value_or(12), layers.size());
+  for (std::size_t cell = 0; cell < cells; ++cell) chosen.push_back((2 * cell + 1) * layers.size() / (2 * cells));
+  return chosen;
+}
+
+std::string title_of(const ManifestHead& head) {
+  std::string title;
+  if (!head.parts.empty()) {
+    title = std::filesystem::path(head.parts.front().path).filename().string();
+    if (head.parts.size() > 1) title += fmt::format(" and {} more", head.parts.size() - 1);
+    title += "   |   ";
+  }
+  return title + fmt::format("{} layers   |   {} x {} dpi   |   bed {:g} x {:g} mm", head.layer_count, head.grid.x.dpi,
+                             head.grid.y.dpi, mm(head.grid.x.length), mm(head.grid.y.length));
+}
+
+int run_preview(const std::vector<std::string>& texts) {
+  const Result<Arguments> arguments = read_arguments(preview_spec(), texts);
+  if (!arguments) return fail(arguments.error());
+  if (arguments->help) {
+    const Status status = print(*arguments->help);
+    return status ? 0 : fail(status.error());
+  }
+  if (arguments->operands.size() != 1) return fail({Fault::kUsage, "name one directory that lamina jet wrote"});
+  const std::string directory = arguments->operands.front(), output = arguments->text("-o,--output");
+  if (output.empty()) return fail({Fault::kUsage, "-o PNG is missing; name the picture"});
+  if (std::filesystem::path(output).extension() != ".png") {
+    return fail({Fault::kUsage, fmt::format("-o {}: pictures are PNG; end the name with .png", output)});
+  }
+  const auto width = number(*arguments, "--width", 200, 20'000);
+  if (!width) return fail(width.error());
+  const Result<Manifest> manifest = manifest_of(directory);
+  if (!manifest) return fail(manifest.error());
+  if (manifest->layers.empty()) return fail({Fault::kVerification, directory + ": the manifest has no layers yet"});
+  if (manifest->head.extension.empty()) {
+    return fail({Fault::kVerification,
+                 fmt::format("{}: the job wrote no images (format {}); plan it with another format, as tiff-g4",
+                             directory, manifest->head.format)});
+  }
+  const Result<std::vector<std::size_t>> chosen = chosen_layers(*arguments, *manifest);
+  if (!chosen) return fail(chosen.error());
+
+  write::picture::SheetRequest request;
+  request.title = title_of(manifest->head);
+  request.grid = manifest->head.grid;
+  request.whole_bed = arguments->has("--whole-bed");
+  request.width = (*width).value_or(2400);
+  for (const std::size_t index : *chosen) {
+    const LayerRecord& record = manifest->layers[index];
+    request.layers.push_back(
+        {(std::filesystem::path(directory) / layer_file_name(record.layer.index, manifest->head.extension)).string(),
+         fmt::format("layer {}", record.layer.index), fmt::format("z {:.3f} mm", mm(record.layer.plane()))});
+  }
+  const Result<Buffer<std::byte>> picture = write::picture::contact_sheet(request);
+  if (!picture) return fail(picture.error());
+  if (const Status status = write::write_file(output, *picture); !status) return fail(status.error());
+  if (!arguments->has("--quiet")) {
+    if (!write::picture::have_font()) say("lamina: no captions: no font; install fonts-dejavu-core");
+    say(fmt::format("{}: {} of {} layers, {}", output, request.layers.size(), manifest->head.layer_count,
+                    readable_bytes(picture->size())));
+  }
+  return 0;
+}
+
+}  // namespace
+}  // namespace lamina::pipeline
+
+int main(int argc, char** argv) {
+  // A full disk and a closed pipe are reported by the calls that meet them.
+  std::signal(SIGPIPE, SIG_IGN);
+  std::signal(SIGXFSZ, SIG_IGN);
+  try {
+    return lamina::pipeline::run_preview({argv + 1, argv + argc});
+  } catch (const std::exception& exception) {
+    return lamina::pipeline::fail({lamina::Fault::kInternal, exception.what()});
+  }
+}

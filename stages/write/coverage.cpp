@@ -1,0 +1,98 @@
+#include "stages/write/coverage.h"
+
+#include <algorithm>
+#include <vector>
+
+namespace lamina::write {
+
+PixelWindow window_of(const RunsView& runs) {
+  PixelWindow window{UINT32_MAX, 0, UINT32_MAX, 0};
+  for (std::uint32_t r = 0; r < runs.rows(); ++r) {
+    const auto row = runs.row(r);
+    if (row.empty()) continue;
+    window.left = std::min(window.left, row.front());
+    window.right = std::max(window.right, row.back());
+    window.top = std::min(window.top, r);
+    window.bottom = r + 1;
+  }
+  return window.right == 0 ? PixelWindow{} : window;
+}
+
+PixelWindow joined(const PixelWindow& one, const PixelWindow& other) {
+  if (one.empty()) return other;
+  if (other.empty()) return one;
+  return {std::min(one.left, other.left), std::max(one.right, other.right), std::min(one.top, other.top),
+          std::max(one.bottom, other.bottom)};
+}
+
+namespace {
+
+/// One row of results. Lengths along x are in units of 1 / columns of a pixel, so that a pixel is `columns` units and a
+/// part is `window.width()` units, whole numbers both.
+class PartRow {
+ public:
+  PartRow(const PixelWindow& window, std::uint32_t columns)
+      : left_(window.left),
+        right_(window.right),
+        pixel_(columns),
+        part_(window.width()),
+        edge_(columns + 1, 0),
+        inside_(columns + 1, 0) {}
+
+  /// Adds a row of pixels, of which `weight` units of height lie in this row of parts.
+  void add(std::span<const std::uint32_t> row, std::uint64_t weight) {
+    for (std::size_t i = 0; i < row.size(); i += 2) {
+      if (row[i + 1] <= left_) continue;
+      if (row[i] >= right_) break;
+      const std::uint64_t begin = std::uint64_t{std::max(row[i], left_) - left_} * pixel_;
+      const std::uint64_t end = std::uint64_t{std::min(row[i + 1], right_) - left_} * pixel_;
+      const std::uint64_t first = begin / part_, last = end / part_;
+      if (first == last) {
+        edge_[first] += (end - begin) * weight;
+        continue;
+      }
+      // Part of the first one, part of the last one (nothing if the run ends where it begins), and all between.
+      edge_[first] += ((first + 1) * part_ - begin) * weight;
+      edge_[last] += (end - last * part_) * weight;
+      inside_[first + 1] += static_cast<std::int64_t>(part_ * weight);
+      inside_[last] -= static_cast<std::int64_t>(part_ * weight);
+    }
+  }
+
+  /// Gives the shares of parts of `height` units and starts anew.
+  void take(std::uint64_t height, std::span<std::uint8_t> shares) {
+    const std::uint64_t whole = part_ * height;
+    std::int64_t through = 0;
+    for (std::size_t i = 0; i < shares.size(); ++i) {
+      through += inside_[i];
+      const std::uint64_t area = edge_[i] + static_cast<std::uint64_t>(through);
+      shares[i] = static_cast<std::uint8_t>((area * 255 + whole / 2) / whole);
+    }
+    std::fill(edge_.begin(), edge_.end(), 0);
+    std::fill(inside_.begin(), inside_.end(), 0);
+  }
+
+ private:
+  std::uint32_t left_, right_;
+  std::uint64_t pixel_, part_;        // units
+  std::vector<std::uint64_t> edge_;   // area of runs that begin or end within a part
+  std::vector<std::int64_t> inside_;  // change of the area that runs cover from one part to the next
+};
+
+}  // namespace
+
+void coverage(const RunsView& runs, const PixelWindow& window, std::uint32_t columns, std::span<std::uint8_t> result) {
+  const std::uint64_t part_rows = result.size() / columns, pixel_rows = window.height();
+  PartRow part_row(window, columns);
+  for (std::uint64_t part = 0; part < part_rows; ++part) {
+    // In units of 1 / part_rows of a pixel's height.
+    const std::uint64_t top = part * pixel_rows, bottom = top + pixel_rows;
+    for (std::uint64_t r = top / part_rows; r * part_rows < bottom; ++r) {
+      const std::uint64_t weight = std::min((r + 1) * part_rows, bottom) - std::max(r * part_rows, top);
+      part_row.add(runs.row(window.top + static_cast<std::uint32_t>(r)), weight);
+    }
+    part_row.take(pixel_rows, result.subspan(static_cast<std::size_t>(part) * columns, columns));
+  }
+}
+
+}  // namespace lamina::write

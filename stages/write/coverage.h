@@ -1,0 +1,34 @@
+// stages/write/coverage.h: runs made smaller for the eye.
+#pragma once
+
+#include <cstdint>
+#include <span>
+
+#include "stages/data/runs.h"
+
+namespace lamina::write {
+
+/// Columns [left, right) and rows [top, bottom) of an image; empty if left == right.
+struct PixelWindow {
+  std::uint32_t left = 0, right = 0, top = 0, bottom = 0;
+
+  std::uint32_t width() const { return right - left; }
+  std::uint32_t height() const { return bottom - top; }
+  bool empty() const { return left >= right || top >= bottom; }
+};
+
+/// The smallest window that holds all set pixels; empty if there is none. Cost: the first and last change of each row.
+PixelWindow window_of(const RunsView& runs);
+
+/// The smallest window that holds both.
+PixelWindow joined(const PixelWindow& one, const PixelWindow& other);
+
+/// How much of each of columns x rows equal parts of the window is set: 0 none ... 255 all, to the nearest.
+/// The share is that of the area (a box filter), found from the runs in integers: no pixel of the full size is looked
+/// at. Parts may be smaller than pixels.
+/// window   not empty, within the image
+/// columns  1 .. 65535; result  columns x rows values, the top row first
+/// cost     a few operations a run and result row that it touches, and one a result value
+void coverage(const RunsView& runs, const PixelWindow& window, std::uint32_t columns, std::span<std::uint8_t> result);
+
+}  // namespace lamina::write

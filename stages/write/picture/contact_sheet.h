@@ -1,0 +1,34 @@
+// stages/write/picture/contact_sheet.h: layers side by side, for people.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "stages/data/buffer.h"
+#include "stages/data/grid.h"
+#include "stages/data/status.h"
+
+namespace lamina::write::picture {
+
+struct SheetLayer {
+  std::string path;          // of the image
+  std::string name, remark;  // below the cell, on the left and on the right
+};
+
+struct SheetRequest {
+  std::string title;               // above all
+  std::vector<SheetLayer> layers;  // one or more, in the order of the sheet
+  PixelGrid grid;                  // of the bed; all images are of its size
+  bool whole_bed = false;          // else the part of it that holds what is set in any of the layers, and a margin
+  std::uint32_t width = 2400;      // pixels of the sheet; a single layer is never made larger than its pixels
+};
+
+/// A PNG of the layers. All cells show the same part of the bed at the same scale; each of its pixels is as dark as
+/// the share of its area that is set. The bytes depend on the images, the request and the versions of OpenImageIO and
+/// of the font alone.
+/// errors  those of read_image; kVerification if an image is not of the bed's size
+/// cost    two readings of each image, on all processors; memory is the picture and the runs of the images being read
+Result<Buffer<std::byte>> contact_sheet(const SheetRequest& request);
+
+}  // namespace lamina::write::picture
