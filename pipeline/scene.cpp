@@ -66,13 +66,7 @@ Point3 rebase(Mesh& mesh) {
 bool fits(std::int64_t nm) { return nm >= INT32_MIN && nm <= INT32_MAX; }
 
 Result<Loaded> load_part(const JetJob& job, const PartRequest& request, Scene& scene) {
-  load::LoadOptions options;
-  options.transform = load::make_transform(request.scale, request.rotate_deg, request.shrink);
-  options.unit_mm = millimetres_of(request.unit);
-  options.drop_bad = job.drop_bad;
-  options.repair = job.repair;
-  options.weld_nm = nm_of(job.weld_um / 1000);
-  Result<Part> part = load::load(request.path, options);
+  Result<Part> part = load::load(request.path, load_options(job, request));
   if (!part) return part.error();
   if (part->bounds.empty() || part->instances.empty()) {
     return Error{Fault::kInput, fmt::format("{}: holds no triangles; nothing to plan", request.path)};
@@ -122,6 +116,16 @@ void note_overlaps(const JetJob& job, Scene& scene, const std::vector<std::pair<
 }
 
 }  // namespace
+
+load::LoadOptions load_options(const JetJob& job, const PartRequest& request) {
+  load::LoadOptions options;
+  options.transform = load::make_transform(request.scale, request.rotate_deg, request.shrink);
+  options.unit_mm = millimetres_of(request.unit);
+  options.drop_bad = job.drop_bad;
+  options.repair = job.repair;
+  options.weld_nm = nm_of(job.weld_um / 1000);
+  return options;
+}
 
 Result<Scene> load_scene(const JetJob& job) {
   Scene scene;

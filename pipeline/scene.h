@@ -8,6 +8,7 @@
 #include "pipeline/job.h"
 #include "stages/data/mesh.h"
 #include "stages/data/status.h"
+#include "stages/load/load.h"
 
 namespace lamina::pipeline {
 
@@ -30,6 +31,9 @@ struct Scene {
   std::vector<std::uint32_t> part_of_instance;  // index into parts
   std::int64_t height = 0;                      // nm, highest point of all; > 0
 };
+
+/// How a part of a job is to be read.
+load::LoadOptions load_options(const JetJob& job, const PartRequest& request);
 
 /// Loads the parts of a job (equal files with equal transforms once) and places them.
 ///

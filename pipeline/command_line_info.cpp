@@ -1,0 +1,72 @@
+#include <algorithm>
+
+#include "pipeline/command_line.h"
+#include "pipeline/console.h"
+#include "pipeline/info.h"
+#include "pipeline/job_toml.h"
+#include "pipeline/scene.h"
+
+namespace lamina::pipeline {
+namespace {
+
+CommandSpec info_spec() {
+  CommandSpec spec;
+  spec.name = "info";
+  spec.summary =
+      "Says what is in a part file: triangles, shells, size, volume, whether it is closed and where it is not, and what\n"
+      "lamina jet will do about that. Nothing is written.";
+  spec.operand = "PART";
+  spec.operand_meaning = "STL, OBJ or 3MF file, also gzipped STL and OBJ; as many as you like";
+  spec.options = {{"--unit", "UNIT", "of STL and OBJ, which carry none: mm, cm, m, um, inch, foot", "mm", ""},
+                  {"--scale", "S|X,Y,Z", "factors per axis of the file", "1", ""},
+                  {"--rotate", "X,Y,Z", "degrees about x, then y, then z", "0,0,0", ""},
+                  {"--drop-bad", "", "drop facets with coordinates that are no numbers", "", ""},
+                  {"--weld", "UM", "repair joins open edges that are at most this far apart, in micrometres", "5", ""},
+                  {"--json", "", "print one JSON object for each part on stdout", "", ""}};
+  spec.closing =
+      "Examples:\n"
+      "  lamina info bracket.stl\n"
+      "  lamina info --unit inch housing.stl\n"
+      "  lamina info --json *.stl | jq -r 'select(.closed | not) | .path'";
+  return spec;
+}
+
+/// The keys of a job that the options stand for.
+Status set_keys(const Arguments& arguments, JetJob& job) {
+  for (const auto& [flag, key] : {std::pair{"--unit", "part.unit"}, {"--scale", "part.scale"},
+                                  {"--rotate", "part.rotate_deg"}, {"--weld", "load.weld_um"}}) {
+    if (!arguments.has(flag)) continue;
+    if (Status status = set_key(job, std::string(key) + "=" + arguments.text(flag)); !status) return status;
+  }
+  job.drop_bad = arguments.has("--drop-bad");
+  return {};
+}
+
+}  // namespace
+
+int run_info_command(const std::vector<std::string>& texts) {
+  const Result<Arguments> arguments = read_arguments(info_spec(), texts);
+  if (!arguments) return fail(arguments.error());
+  if (arguments->help) {
+    const Status status = print(*arguments->help);
+    return status ? 0 : fail(status.error());
+  }
+  if (arguments->operands.empty()) return fail({Fault::kUsage, "no part to look at; name an STL, OBJ or 3MF file"});
+  int code = 0;
+  for (const std::string& path : arguments->operands) {
+    JetJob job;
+    job.parts.emplace_back().path = path;
+    if (Status status = set_keys(*arguments, job); !status) return fail(status.error());
+    const load::LoadOptions options = load_options(job, job.parts.front());
+    const Result<std::string> page =
+        arguments->has("--json") ? describe_part_json(path, options) : describe_part_text(path, options);
+    if (!page) {
+      code = std::max(code, fail(page.error()));
+      continue;
+    }
+    if (Status status = print(*page); !status) return fail(status.error());
+  }
+  return code;
+}
+
+}  // namespace lamina::pipeline
