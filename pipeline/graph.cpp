@@ -64,7 +64,8 @@ Status run_layers(std::span<const Layer> layers, const LayerStages& stages, cons
   flow::graph graph;
   Budget budget(limits);
   std::mutex admission;
-  std::uint32_t next = 0;  // position of the next layer to admit
+  std::uint32_t next = 0;      // position of the next layer to admit
+  std::uint32_t recorded = 0;  // layers that `record` has seen
   bool stopped = false;    // no further admissions
   Status result;           // written by `record` only
 
@@ -83,7 +84,7 @@ Status run_layers(std::span<const Layer> layers, const LayerStages& stages, cons
       {
         const std::lock_guard lock(admission);
         if (cancel.load(std::memory_order_relaxed)) stopped = true;
-        if (stopped || next == layers.size()) return;
+        if (stopped || next == layers.size() || next - recorded >= limits.most_unrecorded) return;
         ticket.credits = limits.bytes_of_layer(layers[next]);
         ticket.work = budget.take(ticket.credits);
         if (ticket.work == nullptr) return;
@@ -106,12 +107,15 @@ Status run_layers(std::span<const Layer> layers, const LayerStages& stages, cons
   });
   flow::sequencer_node<Ticket> in_order(graph, [](const Ticket& ticket) -> std::size_t { return ticket.position; });
   flow::function_node<Ticket, flow::continue_msg> record(graph, flow::serial, [&](const Ticket& ticket) {
-    if (!result) return flow::continue_msg();  // a lower layer failed: this one is not recorded
-    result = ticket.outcome->status ? stages.record(*ticket.outcome) : ticket.outcome->status;
-    if (!result) {
-      const std::lock_guard lock(admission);
-      stopped = true;
+    if (result) {  // else a lower layer failed, and this one is not recorded
+      result = ticket.outcome->status ? stages.record(*ticket.outcome) : ticket.outcome->status;
     }
+    {
+      const std::lock_guard lock(admission);
+      ++recorded;
+      stopped |= !result;
+    }
+    admit();
     return flow::continue_msg();
   });
 

@@ -50,6 +50,7 @@ struct LayerStages {
 struct GraphLimits {
   std::uint64_t budget_bytes = 1ull << 30;
   std::uint32_t most_in_flight = 1;                             // layers; bounds the work lost by an interruption
+  std::uint32_t most_unrecorded = 256;                          // layers that may be ahead of a slow lower one
   std::function<std::uint64_t(const Layer&)> bytes_of_layer;    // at most; scratch, runs and file
 };
 
