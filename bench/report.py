@@ -165,6 +165,9 @@ def lines(root, cases):
            f"{about['kernel']}, g++ {about['compiler']}, release build.")
     stamps = sorted({(result["commit"], result["date"]) for _, result in results})
     yield "Commit " + "; ".join(f"{name} on {date}" for name, date in stamps) + ". A + means that sources were changed."
+    others = max(entry.get("others", 0) for _, result in results
+                 for entry in [result.get("prusa", {}), *result["lamina"].values()])
+    yield f"Other programs used at most {100 * others:.0f} % of the processors during the runs of one kind."
     version = next((result["prusa"]["version"] for _, result in results if "prusa" in result), None)
     yield ""
     yield ("Whole processes, mesh on disk (in the page cache) to layer files on disk, run in turn; medians, and the fastest "
