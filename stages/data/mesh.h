@@ -45,6 +45,9 @@ struct Box {
   std::int64_t height() const { return std::int64_t{hi.z} - lo.z; }
 };
 
+/// Room that a loader leaves behind a list of triangles, so that later stages can pad it without moving it.
+inline constexpr std::size_t kTriangleSlack = 32;
+
 /// One solid. Triangles T from `repaired_from` on were added by repair (caps over openings).
 struct Mesh {
   std::string name;  // file, and the object in it where a file holds several

@@ -25,12 +25,8 @@ struct Source {
 /// The context that a ray carries through the tree.
 struct Beam {
   RTCIntersectContext context;
-  const PixelSampling* sampling;
   const std::uint32_t* instance_of_geometry;
-  std::span<const PlacedMesh> placed;
-  Nm plane;
-  std::uint32_t first_row, last_row;
-  Segments* out;
+  ClusterVisits* visits;
 };
 
 void cluster_bounds(const RTCBoundsFunctionArguments* arguments) {
@@ -47,18 +43,13 @@ void cluster_bounds(const RTCBoundsFunctionArguments* arguments) {
   bounds.upper_z = at(box.hi.z, move.z) + kRoundingRoom;
 }
 
-/// Takes what the beam needs from a cluster and never reports a hit, so that the traversal goes on.
+/// Notes the cluster and never reports a hit, so that the traversal goes on.
 void visit_cluster(const RTCIntersectFunctionNArguments* arguments) {
   if (arguments->valid[0] == 0) return;
   const auto& source = *static_cast<const Source*>(arguments->geometryUserPtr);
   auto& beam = *reinterpret_cast<Beam*>(arguments->context);
-  const std::uint32_t instance =
-      source.shared ? beam.instance_of_geometry[arguments->context->instID[0]] : source.instance;
-  const PlacedMesh& placed = beam.placed[instance];
-  const std::uint32_t cluster = arguments->primID;
-  append_segments(*beam.sampling,
-                  {&placed.mesh->clusters[cluster], cluster, instance, placed.offset, cluster >= placed.mesh->first_cap},
-                  beam.plane, beam.first_row, beam.last_row, *beam.out);
+  beam.visits->push_back(
+      {arguments->primID, source.shared ? beam.instance_of_geometry[arguments->context->instID[0]] : source.instance});
 }
 
 }  // namespace
@@ -169,17 +160,12 @@ Result<BeamIndex> BeamIndex::build(std::span<const PlacedMesh> placed, const Pix
   return index;
 }
 
-void BeamIndex::append_band(const PixelSampling& sampling, Nm plane, std::uint32_t first_row, std::uint32_t last_row,
-                            Segments& out) const {
+void BeamIndex::find_clusters(const PixelSampling& sampling, Nm plane, std::uint32_t first_row, std::uint32_t last_row,
+                              ClusterVisits& out) const {
   Beam beam;
   rtcInitIntersectContext(&beam.context);
-  beam.sampling = &sampling;
   beam.instance_of_geometry = state_->instance_of_geometry.data();
-  beam.placed = state_->placed;
-  beam.plane = plane;
-  beam.first_row = first_row;
-  beam.last_row = last_row;
-  beam.out = &out;
+  beam.visits = &out;
 
   RTCRayHit ray;
   std::memset(&ray, 0, sizeof ray);

@@ -29,10 +29,10 @@ class BeamIndex {
   BeamIndex& operator=(BeamIndex&&) noexcept;
   ~BeamIndex();
 
-  /// Appends the segments of all triangles that the plane cuts within geometry rows [first_row, last_row), at most
-  /// band_rows of them.
-  void append_band(const PixelSampling& sampling, Nm plane, std::uint32_t first_row, std::uint32_t last_row,
-                   Segments& out) const;
+  /// Appends every cluster that the plane may cut within geometry rows [first_row, last_row), at most band_rows of
+  /// them; each once.
+  void find_clusters(const PixelSampling& sampling, Nm plane, std::uint32_t first_row, std::uint32_t last_row,
+                     ClusterVisits& out) const;
 
   /// What Embree allocated.
   std::uint64_t bytes() const;

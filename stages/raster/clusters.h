@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 
 #include "stages/data/buffer.h"
 #include "stages/data/mesh.h"
@@ -12,25 +13,32 @@ inline constexpr std::uint32_t kClusterSize = 16;
 
 /// 16 triangles, coordinate by coordinate, so that one plane is compared with 16 facets at a time. Corner k of
 /// triangle i is (x[k][i], y[k][i], z[k][i]), nm, frame of the mesh. Unused lanes hold a point, which no plane crosses.
-struct alignas(64) Cluster {
+struct alignas(16) Cluster {
   Nm z[3][kClusterSize];
   Nm y[3][kClusterSize];
   Nm x[3][kClusterSize];
-};
-static_assert(sizeof(Cluster) == 576);
 
-/// A mesh in clusters: 36 bytes a triangle, like the list it was made from.
+  Triangle triangle(std::uint32_t lane) const {
+    return {{x[0][lane], y[0][lane], z[0][lane]}, {x[1][lane], y[1][lane], z[1][lane]}, {x[2][lane], y[2][lane], z[2][lane]}};
+  }
+};
+static_assert(sizeof(Cluster) == kClusterSize * sizeof(Triangle));
+
+/// A mesh in clusters: 36 bytes a triangle, in the memory of the list that it was made from.
 struct ClusteredMesh {
-  Buffer<Cluster> clusters;
+  Buffer<Triangle> storage;      // whose bytes are the clusters; moves with its heap block, so `clusters` stays valid
+  std::span<const Cluster> clusters;
   Buffer<Box> bounds;            // nm, of each cluster
   std::uint32_t first_cap = 0;   // clusters from here on hold only triangles that repair added
 };
 
-/// Groups the triangles of a mesh into clusters and frees them there.
+/// Groups the triangles of a mesh into clusters, in place, and takes them out of the mesh.
 ///
-/// Triangles are ordered along a Morton curve of their middles (G. M. Morton 1966), unless the file's own order
-/// already gives clusters nearly as small, which many exporters' does. The order has no influence on any image.
-/// cost: O(T), parallel; 16 bytes a triangle for sorting on top of the mesh and its clusters.
+/// Triangles are ordered along a Morton curve (G. M. Morton 1966) within blocks of 4096 of the file's order, each in a
+/// core's cache. Most exporters write neighbours near each other, so that is enough; where the clusters come out much
+/// larger than 16 triangles side by side would be, the whole mesh is ordered along one curve, in new memory. The order
+/// has no influence on any image.
+/// cost: O(T), parallel; no memory besides the clusters' boxes, but for a mesh in disorder 52 bytes a triangle
 ClusteredMesh make_clusters(Mesh& mesh);
 
 }  // namespace lamina::raster

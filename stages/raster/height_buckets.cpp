@@ -55,21 +55,15 @@ HeightBuckets::HeightBuckets(const ClusteredMesh& mesh) {
   }
 }
 
-void HeightBuckets::append_layer(const PixelSampling& sampling, const PlacedMesh& placed, std::uint32_t instance,
-                                 Nm plane, Segments& out) const {
-  const std::int64_t z = std::int64_t{plane} - placed.offset.z;
+void HeightBuckets::find_clusters(std::int64_t plane, std::uint32_t instance, ClusterVisits& out) const {
   for (const Level& level : levels_) {
     const std::int64_t buckets = static_cast<std::int64_t>(level.offset.size()) - 1;
-    const std::int64_t own = (z >> level.shift) - level.first_bucket;
+    const std::int64_t own = (plane >> level.shift) - level.first_bucket;
     const std::int64_t begin = std::clamp<std::int64_t>(own - 1, 0, buckets);
     const std::int64_t end = std::clamp<std::int64_t>(own + 1, 0, buckets);
     for (std::uint32_t i = level.offset[begin]; i < level.offset[end]; ++i) {
       const Entry& entry = level.entry[i];
-      if (entry.lo > z || entry.hi <= z) continue;
-      append_segments(sampling,
-                      {&placed.mesh->clusters[entry.cluster], entry.cluster, instance, placed.offset,
-                       entry.cluster >= placed.mesh->first_cap},
-                      plane, 0, sampling.y.count, out);
+      if (entry.lo <= plane && entry.hi > plane) out.push_back({entry.cluster, instance});
     }
   }
 }

@@ -19,9 +19,8 @@ class HeightBuckets {
   /// count, scan, fill; O(clusters)
   explicit HeightBuckets(const ClusteredMesh& mesh);
 
-  /// Appends the segments of all triangles that the plane cuts within the rows of the grid.
-  void append_layer(const PixelSampling& sampling, const PlacedMesh& placed, std::uint32_t instance, Nm plane,
-                    Segments& out) const;
+  /// Appends every cluster that the plane (nm, in the frame of the mesh) may cut; each once.
+  void find_clusters(std::int64_t plane, std::uint32_t instance, ClusterVisits& out) const;
 
   std::uint64_t bytes() const;
 

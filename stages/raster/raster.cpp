@@ -15,6 +15,25 @@ namespace {
 /// bands. Measured from 256 to 4096 on a boat, a terrain and a bed of 96 parts: 1024 is the best or next to it.
 constexpr std::uint32_t kMostBandRows = 1024;
 
+/// Segments of all clusters that an engine found. A mesh is larger than the caches, so what comes next is fetched early.
+void cut_clusters(const PixelSampling& sampling, std::span<const PlacedMesh> placed,
+                  std::span<const ClusterVisit> visits, Nm plane, std::uint32_t first_row, std::uint32_t last_row,
+                  Segments& out) {
+  constexpr std::size_t kAhead = 4, kLine = 64;
+  for (std::size_t i = 0; i < visits.size(); ++i) {
+    if (i + kAhead < visits.size()) {
+      const ClusterVisit& later = visits[i + kAhead];
+      const char* bytes = reinterpret_cast<const char*>(&placed[later.instance].mesh->clusters[later.cluster]);
+      for (std::size_t line = 0; line < sizeof(Cluster); line += kLine) __builtin_prefetch(bytes + line);
+    }
+    const auto [cluster, instance] = visits[i];
+    const PlacedMesh& source = placed[instance];
+    append_segments(sampling,
+                    {&source.mesh->clusters[cluster], cluster, instance, source.offset, cluster >= source.mesh->first_cap},
+                    plane, first_row, last_row, out);
+  }
+}
+
 }  // namespace
 
 struct Rasterizer::State {
@@ -84,6 +103,8 @@ LayerReport Rasterizer::layer(Engine engine, Nm plane, LayerScratch& scratch, Ru
   out.row_offset.resize(std::size_t{rows - state.last_row} + 1, 0);
 
   const auto append = [&](std::uint32_t first_row, std::uint32_t last_row) {
+    scratch.segments.clear();
+    cut_clusters(state.sampling, state.placed, scratch.visits, plane, first_row, last_row, scratch.segments);
     scratch.scan.append_rows(state.sampling, scratch.segments, state.placed, plane, state.rule, first_row, last_row,
                              out, report);
   };
@@ -91,17 +112,17 @@ LayerReport Rasterizer::layer(Engine engine, Nm plane, LayerScratch& scratch, Ru
     // Bands from the back of the bed to its front, the order of the image's rows.
     for (std::uint32_t last = state.last_row; last > state.first_row;) {
       const std::uint32_t first = std::max(state.first_row, last - std::min(last, state.band_rows));
-      scratch.segments.clear();
-      state.beams.front().append_band(state.sampling, plane, first, last, scratch.segments);
+      scratch.visits.clear();
+      state.beams.front().find_clusters(state.sampling, plane, first, last, scratch.visits);
       append(first, last);
       last = first;
     }
   } else {
-    scratch.segments.clear();
+    scratch.visits.clear();
     for (std::uint32_t i = 0; i < state.placed.size(); ++i) {
       const PlacedMesh& placed = state.placed[i];
-      state.buckets[static_cast<std::size_t>(placed.mesh - state.meshes.data())].append_layer(
-          state.sampling, placed, i, plane, scratch.segments);
+      state.buckets[static_cast<std::size_t>(placed.mesh - state.meshes.data())].find_clusters(
+          std::int64_t{plane} - placed.offset.z, i, scratch.visits);
     }
     append(state.first_row, state.last_row);
   }
@@ -114,14 +135,14 @@ std::uint64_t Rasterizer::layer_bytes_bound(Nm plane) const {
   const LayerBound::Count count = state_->bound.front().at(plane);
   const std::uint64_t rows = state_->grid.rows();
   // Buffers may hold up to twice what they need, crossings and changes take 4 bytes each.
-  return 2 * count.segments * sizeof(Segment) + 2 * (count.crossings + rows) * 4 * 2 + rows * 8;
+  return 2 * count.segments * (sizeof(Segment) + sizeof(ClusterVisit)) + 2 * (count.crossings + rows) * 4 * 2 + rows * 8;
 }
 
 std::uint64_t Rasterizer::crossings_bound(Nm plane) const { return state_->bound.front().at(plane).crossings; }
 
 std::uint64_t Rasterizer::mesh_bytes() const {
   std::uint64_t total = 0;
-  for (const ClusteredMesh& mesh : state_->meshes) total += bytes_held(mesh.clusters);
+  for (const ClusteredMesh& mesh : state_->meshes) total += bytes_held(mesh.storage);
   return total;
 }
 

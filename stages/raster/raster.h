@@ -23,9 +23,10 @@ enum class Engine : std::uint8_t { kRays, kContours };
 
 /// Scratch memory of one layer in flight; any layer may follow any other in it.
 struct LayerScratch {
+  ClusterVisits visits;
   Segments segments;
   ScanConverter scan;
-  std::uint64_t bytes() const { return bytes_held(segments) + scan.bytes(); }
+  std::uint64_t bytes() const { return bytes_held(visits) + bytes_held(segments) + scan.bytes(); }
 };
 
 /// Immutable once built; layers may be asked for from any number of threads.
