@@ -21,7 +21,7 @@ struct PartRequest {
   std::string path;
   std::string unit = "mm";  // mm, cm, m, um, inch, foot: of STL and OBJ, which carry none
   std::uint32_t copies = 1;
-  std::optional<std::array<double, 2>> at_mm;  // where the part's box starts on the bed; arranged if absent
+  std::optional<std::array<double, 2>> at_mm = {};  // where the part's box starts on the bed; arranged if absent
   double bottom_mm = 0;                        // height of the part's lowest point above the bed
   std::array<double, 3> scale{1, 1, 1};
   std::array<double, 3> rotate_deg{0, 0, 0};

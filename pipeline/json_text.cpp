@@ -31,7 +31,7 @@ std::string json_string(std::string_view text) {
     const std::size_t length = character_bytes(text);
     const char c = text.front();
     if (length == 0) {
-      out += "\\ufffd";
+      out += "\xef\xbf\xbd";  // U+FFFD, so that what is read back is written the same
     } else if (c == '"' || c == '\\') {
       out += '\\';
       out += c;

@@ -86,15 +86,16 @@ Result<Manifest> read_manifest(const std::string& path) {
       ++line_number;
       head += line;
       if (line == "\"layers\": [") break;
+      head += '\n';
       if (line_number == 1 && line != "{") return wrong("is no manifest of lamina");
       if (head.size() > kHeadLimit) return wrong("the head does not end");
     }
     if (line != "\"layers\": [") return wrong("the manifest ends before its first layer");
     const json document = json::parse(head + "]}");
     manifest.head = head_from(document);
-    Hash128 id;
-    if (!read_hex(document.at("id").get_ref<const std::string&>(), id) || id != manifest.head.id()) {
-      return wrong("the head does not match its id; it was changed, or is of another version of lamina");
+    // Written again it has to be the same text: then nothing in it was changed, its id holds, and all of it was read.
+    if (head_text(manifest.head) != head) {
+      return wrong("the head is not what was written; it was changed, or is of another version of lamina");
     }
     const ManifestHead& range = manifest.head;
     if (range.first_layer > range.last_layer || range.last_layer > range.layer_count) return wrong("the range is no range");

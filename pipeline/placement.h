@@ -15,8 +15,8 @@ namespace lamina::pipeline {
 struct BoxRequest {
   std::int64_t width = 0, depth = 0;        // nm
   std::uint32_t copies = 1;
-  std::optional<std::int64_t> at_x, at_y;   // nm; both or none
-  std::string name;                         // for messages
+  std::optional<std::int64_t> at_x = {}, at_y = {};  // nm; both or none
+  std::string name = {};                     // for messages
 };
 
 /// The front left corner of one copy.

@@ -1,0 +1,102 @@
+#include "program.h"
+
+#include <fcntl.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cstdint>
+#include <cstdlib>
+#include <cstring>
+#include <fstream>
+#include <stdexcept>
+
+namespace lamina::test {
+
+namespace fs = std::filesystem;
+
+Directory::Directory() {
+  std::string name = (fs::temp_directory_path() / "lamina-test-XXXXXX").string();
+  if (::mkdtemp(name.data()) == nullptr) throw std::runtime_error("no temporary directory");
+  path_ = name;
+}
+
+Directory::~Directory() {
+  std::error_code ignored;
+  fs::remove_all(path_, ignored);
+}
+
+std::size_t Outcome::error_lines() const { return static_cast<std::size_t>(std::ranges::count(err, '\n')); }
+
+Outcome run_lamina(const std::vector<std::string>& arguments, const fs::path& directory,
+                   const std::function<void(int)>& watch) {
+  const Directory streams;
+  const std::string out = streams / "out", err = streams / "err";
+  std::vector<std::string> texts = {LAMINA_PROGRAM};
+  texts.insert(texts.end(), arguments.begin(), arguments.end());
+  std::vector<char*> pointers;
+  for (std::string& text : texts) pointers.push_back(text.data());
+  pointers.push_back(nullptr);
+
+  const pid_t child = ::fork();
+  if (child == 0) {
+    const int out_file = ::open(out.c_str(), O_WRONLY | O_CREAT, 0600), err_file = ::open(err.c_str(), O_WRONLY | O_CREAT, 0600);
+    ::dup2(out_file, 1);
+    ::dup2(err_file, 2);
+    if (::chdir(directory.c_str()) == 0) ::execv(pointers[0], pointers.data());
+    ::_exit(127);
+  }
+  if (watch) watch(child);
+  int status = 0;
+  ::waitpid(child, &status, 0);
+  Outcome outcome;
+  outcome.code = WIFSIGNALED(status) ? 128 + WTERMSIG(status) : WEXITSTATUS(status);
+  outcome.out = read_text(out);
+  outcome.err = read_text(err);
+  return outcome;
+}
+
+std::string read_text(const fs::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(file), {}};
+}
+
+void write_text(const fs::path& path, std::string_view text) {
+  std::ofstream(path, std::ios::binary) << text;
+}
+
+void write_box(const fs::path& path, const std::array<float, 3>& lo, const std::array<float, 3>& hi) {
+  // Corner i has bit 0 for x, bit 1 for y, bit 2 for z.
+  constexpr int kFaces[12][3] = {{0, 2, 3}, {0, 3, 1}, {4, 5, 7}, {4, 7, 6}, {0, 1, 5}, {0, 5, 4},
+                                 {2, 6, 7}, {2, 7, 3}, {0, 4, 6}, {0, 6, 2}, {1, 3, 7}, {1, 7, 5}};
+  std::string bytes(80, ' ');
+  const std::uint32_t count = 12;
+  bytes.append(reinterpret_cast<const char*>(&count), 4);
+  for (const auto& face : kFaces) {
+    float numbers[12] = {};
+    for (int k = 0; k < 3; ++k) {
+      for (int axis = 0; axis < 3; ++axis) numbers[3 + 3 * k + axis] = (face[k] >> axis & 1 ? hi : lo)[axis];
+    }
+    bytes.append(reinterpret_cast<const char*>(numbers), sizeof numbers);
+    bytes.append(2, '\0');
+  }
+  write_text(path, bytes);
+}
+
+std::vector<std::string> files_below(const fs::path& directory) {
+  std::vector<std::string> names;
+  std::error_code error;
+  for (fs::recursive_directory_iterator entry(directory, error), end; !error && entry != end; entry.increment(error)) {
+    if (entry->is_regular_file()) names.push_back(entry->path().lexically_relative(directory).string());
+  }
+  std::ranges::sort(names);
+  return names;
+}
+
+std::string tree_text(const fs::path& directory) {
+  std::string text;
+  for (const std::string& name : files_below(directory)) text += name + "\n" + read_text(directory / name) + "\n";
+  return text;
+}
+
+}  // namespace lamina::test
