@@ -1,6 +1,6 @@
 // stages/write/g4/codes.h: the code words of CCITT T.4 and T.6, as numbers and lengths.
 //
-// Source: ITU-T T.6 (11/88): table 1 (modes), table 2 (terminating codes), table 3 (make-up codes), 2.4.1.1 (EOFB).
+// Source: ITU-T T.6 (11/88): table 1 (modes), table 2 (terminating codes), table 3 (make-up codes), and its EOFB.
 // The words stand here as the Recommendation prints them, and become numbers when this is compiled.
 #pragma once
 
