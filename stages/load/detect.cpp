@@ -14,10 +14,12 @@ bool ends_with(std::string_view path, std::string_view lower_case) {
   return path.size() >= lower_case.size() && is_word(path.substr(path.size() - lower_case.size()), lower_case);
 }
 
-/// Binary STL has zero bytes in its first facets; text, in whatever encoding, has none, nor other control characters.
+/// Binary STL has zero bytes in its first facets; text, in whatever encoding, has none (but for padding at its end),
+/// nor other control characters.
 bool is_text(std::string_view head) {
-  return std::none_of(head.begin(), head.end(), [](char c) { return c >= 0 && c < 32 && !is_space(c); }) &&
-         head.find('\0') == head.npos;
+  head = head.substr(0, head.find_last_not_of('\0') + 1);
+  return std::none_of(head.begin(), head.end(),
+                      [](char c) { return c == '\0' || (c > 0 && c < 32 && !is_space(c)) || c == 127; });
 }
 
 /// First words of lines decide between the text formats.

@@ -23,12 +23,12 @@ struct Diagnosis {
   std::uint32_t shells = 0;           // components connected over vertices' edges
   std::uint32_t inverted_shells = 0;  // closed shells with negative volume
   Box bounds;
-  double volume_mm3 = 0;              // signed, exact sum rounded once
-  Finding open_edges;                 // used by one facet only
-  Finding non_manifold_edges;         // used by more than two facets
-  Finding misoriented_edges;          // two facets, both in the same direction
-  Finding degenerate_facets;          // zero area after snapping
-  Finding duplicate_facets;           // same three corners as an earlier facet, in any rotation, same orientation
+  double volume_mm3 = 0;       // signed, exact sum rounded once
+  Finding open_edges;          // used by one facet only
+  Finding non_manifold_edges;  // used by more than two facets
+  Finding misoriented_edges;   // two facets, both in the same direction
+  Finding degenerate_facets;   // zero area after snapping
+  Finding duplicate_facets;    // same three corners as an earlier facet, in any rotation, same orientation
   /// Every edge is walked as often one way as the other: the winding number is defined everywhere. This, not
   /// manifoldness, is what planning needs.
   bool balanced = false;

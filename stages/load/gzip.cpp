@@ -63,7 +63,8 @@ Result<Source> inflate_gzip(const Source& compressed, std::uint64_t limit) {
                                           read - stream.avail_in, stream.msg ? stream.msg : "unknown error"));
     }
     if (written > limit)
-      return compressed.error(fmt::format("expands to more than the limit of {} bytes; inflate it to see what it is", limit));
+      return compressed.error(
+          fmt::format("expands to more than the limit of {} bytes; inflate it to see what it is", limit));
     if (expansion_is_absurd(read - stream.avail_in, written))
       return compressed.error("expands more than 200-fold, as no part does; inflate it to see what it is");
   }

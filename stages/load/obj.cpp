@@ -76,8 +76,8 @@ class ObjParser {
     if (short_faces_ > 0)
       facets.notes.push_back({false, fmt::format("{} faces with less than three corners are left out", short_faces_)});
     if (remarks_ > 0)
-      facets.notes.push_back({false, fmt::format("{} lines are not understood and left out, the first is line {}", remarks_,
-                                                 line_of(source_, remark_offset_))});
+      facets.notes.push_back({false, fmt::format("{} lines are not understood and left out, the first is line {}",
+                                                 remarks_, line_of(source_, remark_offset_))});
     return facets;
   }
 
@@ -187,7 +187,8 @@ class ObjParser {
       if (!bad_[a] && !bad_[b] && !bad_[c]) facets.triangles[kept++] = facets.triangles[i];
     }
     if (kept < corners_.size())
-      facets.notes.push_back({true, fmt::format("{} facets with coordinates that are not finite dropped", corners_.size() - kept)});
+      facets.notes.push_back(
+          {true, fmt::format("{} facets with coordinates that are not finite dropped", corners_.size() - kept)});
     facets.triangles.resize(kept);
   }
 
@@ -207,9 +208,9 @@ class ObjParser {
 
 Result<Facets> read_obj(const Source& source, const Snapper& snapper, const LoadOptions& options) {
   ObjParser parser(source, snapper, options);
-  const Status read = for_each_window(source, kWindow, behind_last_line, [&](const char* begin, const char* end, std::uint64_t offset) {
-    return parser.parse(begin, end, offset);
-  });
+  const Status read = for_each_window(
+      source, kWindow, behind_last_line,
+      [&](const char* begin, const char* end, std::uint64_t offset) { return parser.parse(begin, end, offset); });
   if (!read) return read.error();
   return parser.finish();
 }

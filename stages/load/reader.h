@@ -58,13 +58,16 @@ struct Package {
   std::vector<Note> notes;
 };
 
-/// 3MF core specification 1.2 through lib3mf, which keeps coordinates and transforms as floats: places of a
-/// coordinate beyond the seventh are lost before we see them. The unit is the file's own.
-/// cost    about 150 bytes a triangle while lib3mf holds the model
+/// 3MF core specification 1.2 through lib3mf, which keeps coordinates and transforms as floats. Each is taken for the
+/// shortest decimal number that makes this float: what the file says, if it says it in up to seven places; places
+/// beyond are lost before we see them. The unit is the file's own. cost    about 150 bytes a triangle while lib3mf
+/// holds the model
 Result<Package> read_3mf(const Source& source, const LoadOptions& options);
 
-/// Inflates every entry of a zip file once without keeping anything.
-/// errors  kInput: not a zip, cut short, damaged, encrypted, more than `limit` bytes in all, or a bomb
-Status check_zip(const Source& source, std::uint64_t limit);
+/// Inflates every entry of a zip file once without keeping anything, and counts what its models expand to.
+/// errors  kInput: not a zip, cut short, damaged, encrypted, too large by options.expanded_limit or triangle_limit, or
+/// a
+///         bomb (expansion_is_absurd, ComponentScan)
+Status check_package(const Source& source, const LoadOptions& options);
 
 }  // namespace lamina::load

@@ -1,4 +1,4 @@
-// stages/load/repair.cpp: the four steps, over one indexed mesh.
+// stages/load/repair.cpp: the steps, over one indexed mesh.
 #include "stages/load/repair.h"
 
 #include <algorithm>
@@ -7,6 +7,7 @@
 #include "stages/load/diagnose.h"
 #include "stages/load/geometry.h"
 #include "stages/load/loops.h"
+#include "stages/load/sheets.h"
 #include "stages/load/topology.h"
 #include "stages/load/weld.h"
 
@@ -39,15 +40,14 @@ struct Work {
   }
 };
 
-std::uint64_t drop_duplicates(Work& work) {
-  const Buffer<std::uint8_t> repeated = repeats(work.indexed.facet);
+std::uint64_t drop(Work& work, std::span<const std::uint8_t> unwanted) {
   std::size_t kept = 0;
-  for (std::size_t i = 0; i < repeated.size(); ++i) {
-    if (repeated[i]) continue;
+  for (std::size_t i = 0; i < unwanted.size(); ++i) {
+    if (unwanted[i]) continue;
     work.indexed.facet[kept] = work.indexed.facet[i];
     work.mesh.triangles[kept++] = work.mesh.triangles[i];
   }
-  const std::size_t dropped = repeated.size() - kept;
+  const std::size_t dropped = unwanted.size() - kept;
   if (dropped == 0) return 0;
   work.indexed.facet.resize(kept);
   work.mesh.triangles.resize(kept);
@@ -74,12 +74,10 @@ std::uint64_t weld(Work& work, std::int64_t weld_nm) {
   }
   work.sides = std::move(sides);
   work.unmatched = imbalance(work.sides);
-  work.mesh.bounds = {};
   for (std::size_t i = 0; i < before.size(); ++i) {
     const Facet& facet = work.indexed.facet[i];
-    Triangle& t = work.mesh.triangles[i];
-    t = {work.indexed.vertex[facet[0]], work.indexed.vertex[facet[1]], work.indexed.vertex[facet[2]]};
-    for (const Point3& corner : {t.a, t.b, t.c}) work.mesh.bounds.add(corner);
+    work.mesh.triangles[i] = {work.indexed.vertex[facet[0]], work.indexed.vertex[facet[1]],
+                              work.indexed.vertex[facet[2]]};
   }
   return welding.moved;
 }
@@ -174,9 +172,18 @@ RepairReport repair(Mesh& mesh, std::int64_t weld_nm) {
   mesh.repaired_from = static_cast<std::uint32_t>(mesh.triangles.size());
   if (census(mesh.triangles).balanced) return report;
   Work work(mesh);
-  if (work.unmatched > 0) report.duplicates_dropped = drop_duplicates(work);
+  if (work.unmatched > 0) report.duplicates_dropped = drop(work, repeats(work.indexed.facet));
   if (work.unmatched > 0 && weld_nm > 0) report.vertices_welded = weld(work, weld_nm);
   if (work.unmatched > 0) report.facets_turned = orient(work);
+  if (work.unmatched > 0) {
+    const StraySheets stray = find_stray_sheets(work.indexed.facet.size(), work.sides);
+    report.sheets_dropped = stray.sheets;
+    report.sheet_facets_dropped = drop(work, stray.drop);
+  }
+  if (report.sheets_dropped > 0 || report.vertices_welded > 0) {
+    mesh.bounds = {};
+    for (const Triangle& t : mesh.triangles) mesh.bounds.add(t.a), mesh.bounds.add(t.b), mesh.bounds.add(t.c);
+  }
   mesh.repaired_from = static_cast<std::uint32_t>(mesh.triangles.size());
   if (work.unmatched > 0) cap(work, report);
   return report;

@@ -13,12 +13,16 @@ struct RepairReport {
   std::uint64_t duplicates_dropped = 0;
   std::uint64_t facets_turned = 0;
   std::uint64_t vertices_welded = 0;
+  std::uint64_t sheets_dropped = 0;  // surfaces that hung on a solid and enclosed nothing
+  std::uint64_t sheet_facets_dropped = 0;
   std::uint64_t openings_capped = 0;  // loops of unmatched edges
   std::uint64_t cap_triangles = 0;
-  Box capped;                         // around all caps
-  double largest_opening_mm = 0;      // largest box diagonal of one loop
-  Box largest_opening;                // around that loop
-  bool changed() const { return duplicates_dropped + facets_turned + vertices_welded + openings_capped > 0; }
+  Box capped;                     // around all caps
+  double largest_opening_mm = 0;  // largest box diagonal of one loop
+  Box largest_opening;            // around that loop
+  bool changed() const {
+    return duplicates_dropped + facets_turned + vertices_welded + sheets_dropped + openings_capped > 0;
+  }
 };
 
 /// Repairs a mesh that is not balanced (diagnose.h), in this order, each step only while the mesh is unbalanced:
@@ -27,9 +31,10 @@ struct RepairReport {
 ///     smallest of them; weld.h has the rule), unless that would leave as many such edges as before;
 ///  3. facets are turned over so that neighbours across two-facet edges agree; per connected component the
 ///     orientation of the larger area wins; undone if it would leave more unmatched than before;
-///  4. the edges that are still unmatched are walked into loops, smallest first come, and each loop is capped with a
+///  4. stray sheets, which hang on a solid with a rim that is open, are dropped (sheets.h has the rule);
+///  5. the edges that are still unmatched are walked into loops, smallest first come, and each loop is capped with a
 ///     fan of triangles from its smallest vertex.
-/// After step 4 every edge is balanced, whatever the input: the boundary of a chain of triangles is a set of cycles,
+/// After step 5 every edge is balanced, whatever the input: the boundary of a chain of triangles is a set of cycles,
 /// and a fan over a cycle has exactly that cycle, reversed, as its boundary. So no row of any layer can stay open.
 /// A missing triangle is restored exactly, a planar hole is filled exactly. Caps are appended after the mesh's own
 /// triangles (Mesh::repaired_from), so that later stages can report the rows that they decide.

@@ -58,7 +58,8 @@ class Snapper {
 inline const char* what_is_wrong(Snapped snapped) {
   return snapped == Snapped::kNotFinite
              ? "a coordinate is not finite; export the part again, or drop such facets with --drop-bad"
-             : "a coordinate is beyond the reach of +-2147 mm; move the part to the origin, or check its unit and scale";
+             : "a coordinate is beyond the reach of +-2147 mm; move the part to the origin, or check its unit and "
+               "scale";
 }
 
 }  // namespace lamina::load

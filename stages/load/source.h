@@ -9,8 +9,8 @@
 
 namespace lamina::load {
 
-/// Random access to bytes, from any thread. Files are read, not mapped: mapped pages would count as resident, and a file that is cut short
-/// while it is read would end the program.
+/// Random access to bytes, from any thread. Files are read, not mapped: mapped pages would count as resident, and a
+/// file that is cut short while it is read would end the program.
 class Source {
  public:
   Source() = default;

@@ -59,7 +59,8 @@ class BlockParser {
 
   void fail(std::string_view at, std::string message) {
     block_.error_at = at.empty() ? end_ : at.data();
-    block_.error = at.empty() ? "is cut short: the text ends within a facet; copy or export it again" : std::move(message);
+    block_.error =
+        at.empty() ? "is cut short: the text ends within a facet; copy or export it again" : std::move(message);
   }
 
   bool expect(std::string_view lower_case) {
@@ -162,9 +163,8 @@ Result<Facets> read_ascii_stl(const Source& source, const Snapper& snapper, cons
     });
     for (Block& block : blocks) {
       if (block.error_at != nullptr)
-        return source.error(fmt::format("line {}: {}",
-                                        line_of(source, offset + static_cast<std::uint64_t>(block.error_at - begin)),
-                                        block.error));
+        return source.error(fmt::format(
+            "line {}: {}", line_of(source, offset + static_cast<std::uint64_t>(block.error_at - begin)), block.error));
       if (facets.triangles.size() + block.triangles.size() > options.triangle_limit)
         return source.error(fmt::format("more than the limit of {} facets", options.triangle_limit));
       facets.triangles.insert(facets.triangles.end(), block.triangles.begin(), block.triangles.end());
@@ -181,8 +181,9 @@ Result<Facets> read_ascii_stl(const Source& source, const Snapper& snapper, cons
                                               dropped == 1 ? "" : "s")});
   if (solids > 1) facets.notes.push_back({false, fmt::format("{} solids are planned as one part", solids)});
   if (ends < solids)
-    facets.doubt = Doubt{"the last solid has no 'endsolid', but its facets close",
-                         "is cut short: the last solid has no 'endsolid' and its facets do not close; copy or export it again"};
+    facets.doubt =
+        Doubt{"the last solid has no 'endsolid', but its facets close",
+              "is cut short: the last solid has no 'endsolid' and its facets do not close; copy or export it again"};
   return facets;
 }
 

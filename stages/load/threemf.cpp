@@ -10,44 +10,6 @@
 namespace lamina::load {
 namespace {
 
-constexpr std::uint64_t kTooMany = std::uint64_t{1} << 62;
-
-/// Counts what each object expands to, once: triangles, and one for each mesh so that empty ones count too.
-class Counter {
- public:
-  explicit Counter(const ModelFile& model) : model_(model), known_(model.objects.size()) {}
-
-  /// 0 if the object contains itself, or nests too deep to be followed by recursion.
-  std::uint64_t count(std::uint32_t object) { return visit(object, 0) ? known_[object].size : 0; }
-
- private:
-  static constexpr std::uint32_t kDeepest = 1000;
-  struct Known {
-    std::uint64_t size = 0;
-    std::uint32_t height = 0;
-    bool open = false;
-  };
-
-  bool visit(std::uint32_t object, std::uint32_t depth) {
-    if (known_[object].size > 0) return true;
-    if (known_[object].open || depth > kDeepest) return false;
-    known_[object].open = true;
-    const ModelObject& it = model_.objects[object];
-    std::uint64_t size = 1 + it.triangles.size();
-    std::uint32_t height = 0;
-    for (const auto& component : it.components) {
-      if (!visit(component.object, depth + 1)) return false;
-      size = std::min(size + known_[component.object].size, kTooMany);
-      height = std::max(height, known_[component.object].height + 1);
-    }
-    known_[object] = {size, height, false};
-    return height <= kDeepest;
-  }
-
-  const ModelFile& model_;
-  std::vector<Known> known_;
-};
-
 struct Expansion {
   const ModelFile& model;
   std::vector<Leaf> leaves;
@@ -90,8 +52,7 @@ Result<Facets> snap_leaf(const Source& source, const ModelObject& object, const 
     for (std::size_t k = 0; k < 3; ++k) {
       if (corner[k] >= object.vertices.size()) return Snapped::kNotFinite;
       const auto& v = object.vertices[corner[k]];
-      const Snapped snapped =
-          snapper.snap(static_cast<double>(v[0]), static_cast<double>(v[1]), static_cast<double>(v[2]), *point[k]);
+      const Snapped snapped = snapper.snap(v[0], v[1], v[2], *point[k]);
       if (snapped != Snapped::kYes) return snapped;
     }
     return Snapped::kYes;
@@ -127,7 +88,8 @@ Result<Facets> snap_leaf(const Source& source, const ModelObject& object, const 
     }
   }
   facets.triangles.resize(kept);
-  facets.notes.push_back({true, fmt::format("{} triangles with coordinates that are not finite dropped", count - kept)});
+  facets.notes.push_back(
+      {true, fmt::format("{} triangles with coordinates that are not finite dropped", count - kept)});
   return facets;
 }
 
@@ -140,28 +102,17 @@ bool is_moved_copy(const Facets& original, const Facets& copy, Point3& offset) {
                      z = std::int64_t{copy.bounds.lo.z} - original.bounds.lo.z;
   if (std::max({std::abs(x), std::abs(y), std::abs(z)}) > kNmReach) return false;
   offset = {static_cast<Nm>(x), static_cast<Nm>(y), static_cast<Nm>(z)};
-  const auto moved = [&](const Point3& p, const Point3& q) { return p.x + x == q.x && p.y + y == q.y && p.z + z == q.z; };
-  return std::equal(original.triangles.begin(), original.triangles.end(), copy.triangles.begin(),
-                    [&](const Triangle& p, const Triangle& q) {
-                      return moved(p.a, q.a) && moved(p.b, q.b) && moved(p.c, q.c);
-                    });
+  const auto moved = [&](const Point3& p, const Point3& q) {
+    return p.x + x == q.x && p.y + y == q.y && p.z + z == q.z;
+  };
+  return std::equal(
+      original.triangles.begin(), original.triangles.end(), copy.triangles.begin(),
+      [&](const Triangle& p, const Triangle& q) { return moved(p.a, q.a) && moved(p.b, q.b) && moved(p.c, q.c); });
 }
 
 }  // namespace
 
-Result<std::vector<Leaf>> expand(const Source& source, const ModelFile& model, const LoadOptions& options,
-                                 std::vector<Note>& notes) {
-  Counter counter(model);
-  std::uint64_t total = 0;
-  for (const auto& item : model.items) {
-    const std::uint64_t count = counter.count(item.object);
-    if (count == 0)
-      return source.error(fmt::format("object {} contains itself, or components nested more than 1000 deep; export it again",
-                                      model.objects[item.object].id));
-    total = std::min(total + count, kTooMany);
-  }
-  if (total > options.triangle_limit)
-    return source.error(fmt::format("its components expand to more triangles than the limit of {}", options.triangle_limit));
+std::vector<Leaf> expand(const ModelFile& model, std::vector<Note>& notes) {
   Expansion expansion{model, {}, 0};
   std::uint64_t other = 0;
   for (std::uint32_t i = 0; i < model.items.size(); ++i) {
@@ -173,25 +124,26 @@ Result<std::vector<Leaf>> expand(const Source& source, const ModelFile& model, c
     expansion.add(item.object, item.transform, i);
   }
   if (expansion.supports > 0)
-    notes.push_back({false, fmt::format("{} objects are supports or surfaces and are not planned", expansion.supports)});
-  if (other > 0) notes.push_back({false, fmt::format("{} build items are of type \"other\" and are not planned", other)});
+    notes.push_back(
+        {false, fmt::format("{} objects are supports or surfaces and are not planned", expansion.supports)});
+  if (other > 0)
+    notes.push_back({false, fmt::format("{} build items are of type \"other\" and are not planned", other)});
   return std::move(expansion.leaves);
 }
 
 Result<Package> read_3mf(const Source& source, const LoadOptions& options) {
-  if (const Status whole = check_zip(source, options.expanded_limit); !whole) return whole.error();
+  if (const Status whole = check_package(source, options); !whole) return whole.error();
   const Result<ModelFile> model = read_model(source);
   if (!model) return model.error();
   Package package;
   for (const std::string& warning : model->warnings) package.notes.push_back({false, "lib3mf warns: " + warning});
   if (model->items.empty()) return source.error("has no build items: nothing is to be printed; export it again");
-  const Result<std::vector<Leaf>> leaves = expand(source, *model, options, package.notes);
-  if (!leaves) return leaves.error();
-  if (leaves->empty()) return source.error("its build items hold no triangles to print");
+  const std::vector<Leaf> leaves = expand(*model, package.notes);
+  if (leaves.empty()) return source.error("its build items hold no triangles to print");
 
   std::vector<std::size_t> first_of_object(model->objects.size(), SIZE_MAX);  // index in package.objects
   std::vector<const Leaf*> leaf_of_package;
-  for (const Leaf& leaf : *leaves) {
+  for (const Leaf& leaf : leaves) {
     const ModelObject& object = model->objects[leaf.object];
     std::size_t& first = first_of_object[leaf.object];
     const bool shares_turn = first != SIZE_MAX && leaf_of_package[first]->transform.linear == leaf.transform.linear;

@@ -3,7 +3,14 @@
 
 #include <Model/COM/NMR_DLLInterfaces.h>
 
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+
+#include <array>
+#include <charconv>
+#include <cmath>
 #include <map>
+#include <utility>
 
 #include "stages/load/threemf_model.h"
 
@@ -36,25 +43,42 @@ std::string last_error(const Handle& handle) {
   return message;
 }
 
+/// The shortest decimal number that makes this float. lib3mf reads 0.1 into a float; this gives 0.1 back in double
+/// precision, so that a number of up to seven places means the same in 3MF as in OBJ or ASCII STL.
+double decimal_of(float number) {
+  if (!std::isfinite(number)) return static_cast<double>(number);
+  std::array<char, 32> text;
+  const auto written = std::to_chars(text.data(), text.data() + text.size(), number);
+  double value = 0;
+  std::from_chars(text.data(), written.ptr, value);
+  return value;
+}
+
 /// lib3mf keeps 3 rows of 4, the last column being the translation.
 Transform transform_of(const NMR::MODELTRANSFORM& matrix) {
   Transform transform;
   for (std::size_t row = 0; row < 3; ++row) {
     for (std::size_t column = 0; column < 3; ++column)
-      transform.linear[3 * row + column] = static_cast<double>(matrix.m_fFields[row][column]);
-    transform.translation[row] = static_cast<double>(matrix.m_fFields[row][3]);
+      transform.linear[3 * row + column] = decimal_of(matrix.m_fFields[row][column]);
+    transform.translation[row] = decimal_of(matrix.m_fFields[row][3]);
   }
   return transform;
 }
 
 double unit_in_mm(DWORD unit) {
   switch (unit) {
-    case NMR::MODELUNIT_MICROMETER: return 0.001;
-    case NMR::MODELUNIT_CENTIMETER: return 10;
-    case NMR::MODELUNIT_INCH: return 25.4;
-    case NMR::MODELUNIT_FOOT: return 304.8;
-    case NMR::MODELUNIT_METER: return 1000;
-    default: return 1;
+    case NMR::MODELUNIT_MICROMETER:
+      return 0.001;
+    case NMR::MODELUNIT_CENTIMETER:
+      return 10;
+    case NMR::MODELUNIT_INCH:
+      return 25.4;
+    case NMR::MODELUNIT_FOOT:
+      return 304.8;
+    case NMR::MODELUNIT_METER:
+      return 1000;
+    default:
+      return 1;
   }
 }
 
@@ -63,13 +87,17 @@ bool read_mesh(const Handle& handle, ModelObject& object) {
   if (!done(NMR::lib3mf_meshobject_getvertexcount(handle.get(), &vertices)) ||
       !done(NMR::lib3mf_meshobject_gettrianglecount(handle.get(), &triangles)))
     return false;
-  static_assert(sizeof(NMR::MODELMESHVERTEX) == 12 && sizeof(NMR::MODELMESHTRIANGLE) == 12);
-  object.vertices.resize(vertices);
+  static_assert(sizeof(NMR::MODELMESHTRIANGLE) == 12);
+  Buffer<NMR::MODELMESHVERTEX> floats(vertices);
   object.triangles.resize(triangles);
-  if (vertices > 0 && (!done(NMR::lib3mf_meshobject_getvertices(
-                           handle.get(), reinterpret_cast<NMR::MODELMESHVERTEX*>(object.vertices.data()), vertices, &got)) ||
-                       got != vertices))
+  if (vertices > 0 &&
+      (!done(NMR::lib3mf_meshobject_getvertices(handle.get(), floats.data(), vertices, &got)) || got != vertices))
     return false;
+  object.vertices.resize(vertices);
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, vertices, 4096), [&](const auto& range) {
+    for (std::size_t i = range.begin(); i != range.end(); ++i)
+      for (std::size_t axis = 0; axis < 3; ++axis) object.vertices[i][axis] = decimal_of(floats[i].m_fPosition[axis]);
+  });
   return triangles == 0 ||
          (done(NMR::lib3mf_meshobject_gettriangleindices(
               handle.get(), reinterpret_cast<NMR::MODELMESHTRIANGLE*>(object.triangles.data()), triangles, &got)) &&
@@ -97,7 +125,8 @@ std::string name_of(const Handle& handle) {
   ULONG needed = 0;
   if (!done(NMR::lib3mf_object_getnameutf8(handle.get(), nullptr, 0, &needed)) || needed == 0) return {};
   std::string name(needed + 1, '\0');
-  if (!done(NMR::lib3mf_object_getnameutf8(handle.get(), name.data(), static_cast<ULONG>(name.size()), &needed))) return {};
+  if (!done(NMR::lib3mf_object_getnameutf8(handle.get(), name.data(), static_cast<ULONG>(name.size()), &needed)))
+    return {};
   name.resize(name.find('\0') == name.npos ? name.size() : name.find('\0'));
   return name;
 }
@@ -124,7 +153,8 @@ bool read_objects(const Handle& model, ModelFile& file) {
   for (BOOL more = 0; done(NMR::lib3mf_resourceiterator_movenext(iterator.get(), &more)) && more;) {
     Handle resource;
     ModelObject object;
-    if (!done(NMR::lib3mf_resourceiterator_getcurrent(iterator.get(), resource.out())) || !read_object(resource, object))
+    if (!done(NMR::lib3mf_resourceiterator_getcurrent(iterator.get(), resource.out())) ||
+        !read_object(resource, object))
       return false;
     file.objects.push_back(std::move(object));
   }
@@ -172,7 +202,8 @@ void read_warnings(const Handle& reader, ModelFile& file) {
 
 Result<ModelFile> read_model(const Source& source) {
   Handle model, reader;
-  if (!done(NMR::lib3mf_createmodel(model.out())) || !done(NMR::lib3mf_model_queryreader(model.get(), "3mf", reader.out())))
+  if (!done(NMR::lib3mf_createmodel(model.out())) ||
+      !done(NMR::lib3mf_model_queryreader(model.get(), "3mf", reader.out())))
     return Error{Fault::kInternal, "lib3mf cannot be started"};
   if (!done(NMR::lib3mf_reader_readfromfileutf8(reader.get(), source.path().c_str())))
     return source.error(fmt::format("is not a valid 3MF file ({}); export it again", last_error(reader)));

@@ -17,10 +17,10 @@ struct ModelObject {
     std::uint32_t object;  // index in ModelFile::objects
     Transform transform;   // in the file's unit
   };
-  std::uint32_t id = 0;
+  std::uint32_t id = 0;  // counted by lib3mf in the order of the file, which need not be its own number
   std::string name;
   Type type = Type::kModel;
-  Buffer<std::array<float, 3>> vertices;
+  Buffer<std::array<double, 3>> vertices;  // decimal_of() what lib3mf has
   Buffer<std::array<std::uint32_t, 3>> triangles;
   std::vector<Component> components;
 };
@@ -32,7 +32,7 @@ struct ModelFile {
   std::vector<std::string> warnings;
 };
 
-/// Reads a file that check_zip() has passed.
+/// Reads a file that check_package() has passed.
 /// errors  kInput with lib3mf's words
 Result<ModelFile> read_model(const Source& source);
 
@@ -43,9 +43,7 @@ struct Leaf {
   std::uint32_t item;  // from 0
 };
 
-/// Follows components down to meshes.
-/// errors  kInput: an object that contains itself; more triangles than the limit, counted before anything is expanded
-Result<std::vector<Leaf>> expand(const Source& source, const ModelFile& model, const LoadOptions& options,
-                                 std::vector<Note>& notes);
+/// Follows components down to meshes; what a file may contain was checked before (component_scan.h).
+std::vector<Leaf> expand(const ModelFile& model, std::vector<Note>& notes);
 
 }  // namespace lamina::load

@@ -24,7 +24,7 @@ Indexed index_mesh(std::span<const Triangle> triangles);
 struct Side {
   std::uint32_t low, high;  // vertices of the edge, low < high
   std::uint32_t facet;
-  bool forward;             // walked from low to high
+  bool forward;  // walked from low to high
 };
 
 /// All sides, by edge and then by facet; sides of facets that use a vertex twice are left out, because they cancel out.

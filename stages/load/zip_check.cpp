@@ -4,6 +4,7 @@
 
 #include <memory>
 
+#include "stages/load/component_scan.h"
 #include "stages/load/reader.h"
 
 namespace lamina::load {
@@ -17,7 +18,7 @@ struct Discard {
 
 }  // namespace
 
-Status check_zip(const Source& source, std::uint64_t limit) {
+Status check_package(const Source& source, const LoadOptions& options) {
   int code = 0;
   const std::unique_ptr<zip_t, Discard> archive(zip_open(source.path().c_str(), ZIP_RDONLY, &code));
   if (archive == nullptr) {
@@ -29,11 +30,13 @@ Status check_zip(const Source& source, std::uint64_t limit) {
   }
   Buffer<char> block(std::size_t{1} << 18);
   std::uint64_t total = 0;
+  ComponentScan scan;
   const zip_int64_t entries = zip_get_num_entries(archive.get(), 0);
   for (zip_int64_t i = 0; i < entries; ++i) {
     zip_stat_t entry;
     zip_stat_init(&entry);
-    if (zip_stat_index(archive.get(), static_cast<zip_uint64_t>(i), 0, &entry) != 0 || (entry.valid & ZIP_STAT_NAME) == 0)
+    if (zip_stat_index(archive.get(), static_cast<zip_uint64_t>(i), 0, &entry) != 0 ||
+        (entry.valid & ZIP_STAT_NAME) == 0)
       return source.error(fmt::format("zip entry {} is damaged; copy or export the file again", i + 1));
     if ((entry.valid & ZIP_STAT_ENCRYPTION_METHOD) != 0 && entry.encryption_method != ZIP_EM_NONE)
       return source.error("is encrypted; save it without a password");
@@ -42,6 +45,8 @@ Status check_zip(const Source& source, std::uint64_t limit) {
       return source.error(fmt::format("zip entry {} cannot be opened ({}); copy or export the file again", i + 1,
                                       zip_strerror(archive.get())));
     std::uint64_t expanded = 0;
+    const bool is_model = std::string_view(entry.name).ends_with(".model");
+    if (is_model) scan.begin_file(entry.name);
     while (true) {
       const zip_int64_t got = zip_fread(file.get(), block.data(), block.size());
       if (got < 0)
@@ -50,13 +55,15 @@ Status check_zip(const Source& source, std::uint64_t limit) {
       if (got == 0) break;
       expanded += static_cast<std::uint64_t>(got);
       total += static_cast<std::uint64_t>(got);
-      if (total > limit) return source.error(fmt::format("expands to more than the limit of {} bytes", limit));
+      if (total > options.expanded_limit)
+        return source.error(fmt::format("expands to more than the limit of {} bytes", options.expanded_limit));
       if (expansion_is_absurd((entry.valid & ZIP_STAT_COMP_SIZE) != 0 ? entry.comp_size : source.size(), expanded) ||
           expansion_is_absurd(source.size(), total))
         return source.error("expands more than 200-fold, as no part does; unzip it to see what it is");
+      if (is_model) scan.feed(block.data(), static_cast<std::size_t>(got));
     }
   }
-  return {};
+  return scan.check(source, options.triangle_limit);
 }
 
 }  // namespace lamina::load

@@ -1,0 +1,23 @@
+// stages/load/sheets.h: surfaces that hang on a solid without enclosing anything; internal to load.
+#pragma once
+
+#include <cstdint>
+#include <span>
+
+#include "stages/load/topology.h"
+
+namespace lamina::load {
+
+struct StraySheets {
+  Buffer<std::uint8_t> drop;  // for each facet whether it belongs to one
+  std::uint64_t sheets = 0, facets = 0;
+};
+
+/// A patch is what hangs together over edges with two facets. A stray sheet is a patch with an open rim that meets
+/// other facets only along edges which are unmatched with it and balanced without it: a fin that was left on a solid.
+/// Capping its rim would invent a body as wide as the fin. An open shell that merely touches another one is none: it
+/// leaves the edges where they touch as balanced as they are. Where two such patches meet, neither is dropped.
+/// cost  O(T) after sorting
+StraySheets find_stray_sheets(std::size_t facet_count, std::span<const Side> sides);
+
+}  // namespace lamina::load
