@@ -109,7 +109,7 @@ class LayerWorkshop {
     const std::uint64_t crossings = rasterizer_.crossings_bound(layer.plane());
     const bool second = job_.engine == Engine::kBoth || job_.mirror != Mirror::kNone;
     const std::uint64_t second_image = second ? 8 * crossings + 4 * rows : 0;
-    const std::uint64_t file = 4 * crossings + rows;  // a change costs a few bits; strips of other formats are small
+    const std::uint64_t file = format_.most_bytes(rasterizer_.grid().columns(), rows, crossings);
     return rasterizer_.layer_bytes_bound(layer.plane()) + second_image + file;
   }
 

@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <array>
+#include <cstdint>
 
 #include "stages/write/image_format.h"
 #include "stages/write/null/null.h"
@@ -10,13 +11,31 @@
 namespace lamina::write {
 namespace {
 
+using Count = std::uint64_t;
+
+constexpr Count kFileRoom = 4096;  // header, directory, checks
+
+/// A row costs a bit, and a change at most two bits more than half of a horizontal code word of 28 bits each.
+constexpr Count most_g4(Count, Count rows, Count changes) { return kFileRoom + rows + 4 * changes; }
+/// Every pixel a bit, rows in whole bytes.
+constexpr Count most_bits(Count columns, Count rows, Count) { return kFileRoom + (columns + 7) / 8 * rows; }
+/// A packet of two bytes for each 128 equal ones; around a change up to two bytes more.
+constexpr Count most_packbits(Count columns, Count rows, Count changes) {
+  return std::min((columns / 512 + 3) * rows + 4 * changes, (columns / 8 + columns / 1024 + 2) * rows) + kFileRoom;
+}
+/// Deflate never adds more than a thousandth to what it cannot compress; a row's filter is a byte.
+constexpr Count most_png(Count columns, Count rows, Count changes) {
+  return most_bits(columns, rows, changes) / 1000 * 1001 + 2 * rows + kFileRoom;
+}
+constexpr Count most_null(Count, Count, Count) { return 0; }
+
 constexpr std::array<ImageFormat, 6> kFormats = {{
-    {"tiff-g4", ".tif", "TIFF, CCITT Group 4: small and fast, read by every RIP", tiff::make_g4_encoder},
-    {"tiff-packbits", ".tif", "TIFF, PackBits: for readers without CCITT", tiff::make_packbits_encoder},
-    {"tiff-none", ".tif", "TIFF, uncompressed", tiff::make_uncompressed_encoder},
-    {"png", ".png", "PNG, 1 bit", png::make_encoder},
-    {"pbm", ".pbm", "portable bitmap, uncompressed", pbm::make_encoder},
-    {"null", "", "no image files: for timing", null::make_encoder},
+    {"tiff-g4", ".tif", "TIFF, CCITT Group 4: small and fast, read by every RIP", tiff::make_g4_encoder, most_g4},
+    {"tiff-packbits", ".tif", "TIFF, PackBits: for readers without CCITT", tiff::make_packbits_encoder, most_packbits},
+    {"tiff-none", ".tif", "TIFF, uncompressed", tiff::make_uncompressed_encoder, most_bits},
+    {"png", ".png", "PNG, 1 bit", png::make_encoder, most_png},
+    {"pbm", ".pbm", "portable bitmap, uncompressed", pbm::make_encoder, most_bits},
+    {"null", "", "no image files: for timing", null::make_encoder, most_null},
 }};
 
 }  // namespace

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <memory>
 #include <span>
 #include <string_view>
@@ -33,6 +34,8 @@ struct ImageFormat {
   std::string_view extension;    // with the dot; empty for null
   std::string_view description;  // for --help
   std::unique_ptr<ImageEncoder> (*make_encoder)();
+  /// Bytes that the file of a layer may have at most, and so what an encoder may hold for it.
+  std::uint64_t (*most_bytes)(std::uint64_t columns, std::uint64_t rows, std::uint64_t changes);
 };
 
 /// All formats, the default first.
