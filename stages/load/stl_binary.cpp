@@ -212,6 +212,7 @@ Result<Facets> read_binary_stl(const Source& source, const Snapper& snapper, con
   const Result<std::uint64_t> counted = count_facets(source, options, facets);
   if (!counted) return counted.error();
   const std::uint64_t count = *counted;
+  facets.triangles.reserve(count + kTriangleSlack);
   facets.triangles.resize(count);
   prefer_large_pages(facets.triangles);
   Triangle* const out = facets.triangles.data();

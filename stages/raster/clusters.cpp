@@ -115,7 +115,8 @@ ClusteredMesh make_clusters(Mesh& mesh) {
 
   out.storage = std::move(mesh.triangles);
   mesh.triangles = {};
-  out.storage.resize(std::size_t{clusters} * kClusterSize);  // within kTriangleSlack
+  out.storage.reserve(std::size_t{clusters} * kClusterSize);  // nothing moves if the loader left kTriangleSlack
+  out.storage.resize(std::size_t{clusters} * kClusterSize);
   std::copy_backward(out.storage.begin() + own, out.storage.begin() + total,
                      out.storage.begin() + first_cap_at + caps);
   out.bounds.resize(clusters);
