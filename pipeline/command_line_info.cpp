@@ -1,9 +1,11 @@
+#include <fmt/format.h>
+
 #include <algorithm>
 
 #include "pipeline/command_line.h"
 #include "pipeline/console.h"
 #include "pipeline/info.h"
-#include "pipeline/job_toml.h"
+#include "pipeline/job_keys.h"
 #include "pipeline/scene.h"
 
 namespace lamina::pipeline {
@@ -31,14 +33,21 @@ CommandSpec info_spec() {
   return spec;
 }
 
-/// The keys of a job that the options stand for.
+/// The keys of a job that the options stand for, read as lamina jet reads them.
 Status set_keys(const Arguments& arguments, JetJob& job) {
-  for (const auto& [flag, key] : {std::pair{"--unit", "part.unit"}, {"--scale", "part.scale"},
-                                  {"--rotate", "part.rotate_deg"}, {"--weld", "load.weld_um"}}) {
-    if (!arguments.has(flag)) continue;
-    if (Status status = set_key(job, std::string(key) + "=" + arguments.text(flag)); !status) return status;
+  const auto refused = [](std::string_view flag, const std::string& wrong) {
+    return Error{Fault::kUsage, fmt::format("{}: {}", flag, wrong)};
+  };
+  for (const PartKey& key : part_keys()) {
+    if (key.flag.empty() || !arguments.has(key.flag)) continue;
+    const std::string wrong = key.read(arguments.text(key.flag), job.parts.front());
+    if (!wrong.empty()) return refused(key.flag, wrong);
   }
-  job.drop_bad = arguments.has("--drop-bad");
+  for (const JobKey& key : job_keys()) {
+    if (key.flag.empty() || !arguments.has(key.flag)) continue;
+    const std::string wrong = key.read(key.value.empty() ? key.switch_text : arguments.text(key.flag), job);
+    if (!wrong.empty()) return refused(key.flag, wrong);
+  }
   return {};
 }
 

@@ -1,7 +1,7 @@
 // Reads manifests, line by line: a hundred thousand layers cost their records and no document tree.
 #include <fmt/format.h>
 
-#include <cmath>
+#include <charconv>
 #include <fstream>
 #include <nlohmann/json.hpp>
 
@@ -48,22 +48,56 @@ ManifestHead head_from(const json& text) {
   return head;
 }
 
-// Empty, or what is wrong with the line.
-std::string record_from(const std::string& line, const ManifestHead& head, std::uint32_t index, LayerRecord& record) {
-  const json text = json::parse(line, nullptr, false);
-  if (text.is_discarded()) return "is not JSON";
-  record.layer.index = text.at("index");
-  if (record.layer.index != index) return fmt::format("layer {} stands where {} is next", record.layer.index, index);
-  if (text.at("file").get_ref<const std::string&>() != layer_file_name(index, head.extension)) {
-    return fmt::format("layer {} names another file", index);
+// A line of one layer, read exactly as add_record_text writes it: a hundred thousand of them in a few hundredths of a
+// second, and no spelling that nobody wrote is accepted.
+class RecordLine {
+ public:
+  explicit RecordLine(std::string_view line) : rest_(line) {}
+
+  RecordLine& text(std::string_view expected) {
+    good_ = good_ && rest_.starts_with(expected);
+    if (good_) rest_.remove_prefix(expected.size());
+    return *this;
   }
-  record.layer.bottom = text.at("bottom_nm");
-  record.layer.thickness = text.at("thickness_nm");
-  if (!read_reason(text.at("reason").get_ref<const std::string&>(), record.layer.reason)) return "unknown reason";
-  record.bytes = text.at("bytes");
-  record.set_pixels = text.at("set_pixels");
-  record.capped_rows = text.at("capped_rows");
-  if (!read_hex(text.at("xxh3_128").get_ref<const std::string&>(), record.hash)) return "the hash is no hash";
+  template <class Integer>
+  RecordLine& number(Integer& value) {
+    const auto [stop, error] = std::from_chars(rest_.data(), rest_.data() + rest_.size(), value);
+    good_ = good_ && error == std::errc();
+    if (good_) rest_.remove_prefix(static_cast<std::size_t>(stop - rest_.data()));
+    return *this;
+  }
+  /// All up to the next quotation mark.
+  RecordLine& word(std::string_view& value) {
+    value = rest_.substr(0, rest_.find('"'));
+    rest_.remove_prefix(value.size());
+    return *this;
+  }
+  bool ended() const { return good_ && rest_.empty(); }
+
+ private:
+  std::string_view rest_;
+  bool good_ = true;
+};
+
+// Empty, or what is wrong with the line.
+std::string record_from(std::string_view line, const ManifestHead& head, std::uint32_t index, LayerRecord& record) {
+  std::string_view file, reason, hash;
+  const bool ended = RecordLine(line)
+                         .text("{\"index\": ").number(record.layer.index)
+                         .text(", \"file\": \"").word(file)
+                         .text("\", \"bottom_nm\": ").number(record.layer.bottom)
+                         .text(", \"thickness_nm\": ").number(record.layer.thickness)
+                         .text(", \"reason\": \"").word(reason)
+                         .text("\", \"bytes\": ").number(record.bytes)
+                         .text(", \"set_pixels\": ").number(record.set_pixels)
+                         .text(", \"capped_rows\": ").number(record.capped_rows)
+                         .text(", \"xxh3_128\": \"").word(hash)
+                         .text("\"}").ended();
+  if (!ended) return "is not the line of a layer";
+  if (record.layer.index != index) return fmt::format("layer {} stands where {} is next", record.layer.index, index);
+  if (file != layer_file_name(index, head.extension)) return fmt::format("layer {} names another file", index);
+  if (!read_reason(reason, record.layer.reason)) return fmt::format("layer {} has a reason that is none", index);
+  if (!read_hex(hash, record.hash)) return fmt::format("layer {} has a hash that is none", index);
   return {};
 }
 
@@ -110,12 +144,8 @@ Result<Manifest> read_manifest(const std::string& path) {
       if (line.ends_with(',')) line.pop_back();
       const auto index = range.first_layer + static_cast<std::uint32_t>(manifest.layers.size());
       LayerRecord record;
-      std::string what;
-      try {
-        what = index >= range.last_layer ? "a layer beyond the range" : record_from(line, range, index, record);
-      } catch (const json::exception& error) {
-        what = error.what();
-      }
+      const std::string what =
+          index >= range.last_layer ? "a layer beyond the range" : record_from(line, range, index, record);
       // What a killed run left at the end of its .part is not worth more than its whole lines.
       if (!what.empty() && partial) return manifest;
       if (!what.empty()) return wrong(what);

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <iterator>
+#include <vector>
 
 #include "pipeline/console.h"
 #include "pipeline/json_text.h"
@@ -77,9 +78,9 @@ std::string summary_text(const JetJob& job, const JetSummary& s) {
 }
 
 std::string summary_json(const JetJob& job, const JetSummary& s) {
-  std::string parts, warnings;
-  for (const PartSummary& part : s.parts) parts += (parts.empty() ? "" : ",") + part_json(part);
-  for (const std::string& warning : s.warnings) warnings += (warnings.empty() ? "" : ",") + json_string(warning);
+  std::vector<std::string> parts, warnings;
+  for (const PartSummary& part : s.parts) parts.push_back(part_json(part));
+  for (const std::string& warning : s.warnings) warnings.push_back(json_string(warning));
   std::string text = fmt::format(
       "{{\"command\":\"jet\",\"dry_run\":{},\"directory\":{},\"format\":{},\"columns\":{},\"rows\":{},\"dpi\":[{},{}],"
       "\"layers_total\":{},\"layers_planned\":{},\"layers_kept\":{},\"triangles\":{},\"set_pixels\":{},"
@@ -96,7 +97,7 @@ std::string summary_json(const JetJob& job, const JetSummary& s) {
       "\"mesh_bytes\":{},\"index_bytes\":{},\"peak_layer_bytes\":{},\"memory_budget_bytes\":{},\"peak_resident_bytes\":{},"
       "\"most_layers_in_flight\":{},\"parts\":[{}],\"warnings\":[{}]}}\n",
       s.mesh_bytes, s.index_bytes, s.peak_layer_bytes, job.memory_bytes, s.peak_resident_bytes, s.most_layers_in_flight,
-      parts, warnings);
+      fmt::join(parts, ","), fmt::join(warnings, ","));
   return text;
 }
 

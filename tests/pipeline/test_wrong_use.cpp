@@ -12,6 +12,59 @@
 namespace lamina::test {
 namespace {
 
+void append(std::string& bytes, std::uint32_t value, int count) {
+  for (int i = 0; i < count; ++i) bytes += static_cast<char>(value >> (8 * i) & 0xff);
+}
+
+// A zip with one deflated entry, as small as it gets.
+std::string zip_of(const std::string& name, const std::string& content) {
+  std::string packed(compressBound(content.size()), '\0');
+  z_stream stream{};
+  deflateInit2(&stream, 9, Z_DEFLATED, -15, 9, Z_DEFAULT_STRATEGY);
+  stream.next_in = reinterpret_cast<Bytef*>(const_cast<char*>(content.data()));
+  stream.avail_in = static_cast<uInt>(content.size());
+  stream.next_out = reinterpret_cast<Bytef*>(packed.data());
+  stream.avail_out = static_cast<uInt>(packed.size());
+  deflate(&stream, Z_FINISH);
+  packed.resize(stream.total_out);
+  deflateEnd(&stream);
+  const auto crc = static_cast<std::uint32_t>(
+      crc32(0, reinterpret_cast<const Bytef*>(content.data()), static_cast<uInt>(content.size())));
+  const auto entry = [&](std::string& bytes) {
+    append(bytes, 20, 2);  // version
+    append(bytes, 0, 2);   // flags
+    append(bytes, 8, 2);   // deflate
+    append(bytes, 0x21, 4);
+    append(bytes, crc, 4);
+    append(bytes, static_cast<std::uint32_t>(packed.size()), 4);
+    append(bytes, static_cast<std::uint32_t>(content.size()), 4);
+    append(bytes, static_cast<std::uint32_t>(name.size()), 2);
+    append(bytes, 0, 2);  // extra
+  };
+  std::string bytes, directory;
+  append(bytes, 0x04034b50, 4);
+  entry(bytes);
+  bytes += name + packed;
+  append(directory, 0x02014b50, 4);
+  append(directory, 20, 2);
+  entry(directory);
+  append(directory, 0, 4);  // comment, disk
+  append(directory, 0, 2);  // attributes
+  append(directory, 0, 4);
+  append(directory, 0, 4);  // offset
+  directory += name;
+  const auto start = static_cast<std::uint32_t>(bytes.size());
+  bytes += directory;
+  append(bytes, 0x06054b50, 4);
+  append(bytes, 0, 4);
+  append(bytes, 1, 2);
+  append(bytes, 1, 2);
+  append(bytes, static_cast<std::uint32_t>(directory.size()), 4);
+  append(bytes, start, 4);
+  append(bytes, 0, 2);
+  return bytes;
+}
+
 class WrongUse : public ::testing::Test {
  protected:
   WrongUse() { write_box(directory_ / "part.stl", {0, 0, 0}, {20, 10, 5}); }
@@ -132,6 +185,21 @@ TEST_F(WrongUse, DirectoriesOfOtherJobsAreLeftAlone) {
   ASSERT_EQ(run_lamina(jet({"--dpi", "70", "--format", "png", "--overwrite", "--layers", "0:3"}), directory_.path()).code, 0);
   EXPECT_EQ(files_below(directory_ / "out"), (std::vector<std::string>{"layers/000000.png", "layers/000001.png",
                                                                        "layers/000002.png", "manifest.json"}));
+}
+
+TEST_F(WrongUse, ZipBombIsRefusedAsInputBeforeItExpands) {
+  write_text(directory_ / "bomb.3mf", zip_of("3D/3dmodel.model", std::string(150u << 20, ' ')));
+  ASSERT_LT(std::filesystem::file_size(directory_ / "bomb.3mf"), 1u << 20);
+  refused(3, {"jet", "bomb.3mf", "-o", "out", "--quiet"}, {"bomb.3mf", "expands"});
+  refused(3, {"info", "bomb.3mf"}, {"bomb.3mf", "expands"});
+}
+
+TEST_F(WrongUse, InfoNamesItsOptionsAndFiles) {
+  refused(2, {"info"}, {"part"});
+  refused(2, {"info", "part.stl", "--unit", "parsec"}, {"--unit: 'parsec'"});
+  refused(2, {"info", "part.stl", "--scale", "0"}, {"--scale: 0"});
+  refused(2, {"info", "part.stl", "--jsno"}, {"--jsno", "'--json'"});
+  refused(3, {"info", "absent.stl"}, {"absent.stl"});
 }
 
 TEST_F(WrongUse, FullDiskLeavesNothingHalfUnderAFinalName) {
