@@ -57,7 +57,8 @@ TEST(ReadBinaryStl, BoundsAreExactForEveryNumberOfFacets) {
   std::mt19937 random(2);
   for (int i = 0; i < 530; ++i) {
     FloatTriangle facet;
-    for (float& number : facet) number = std::uniform_real_distribution<float>(1, 100)(random);
+    for (std::size_t k = 0; k < 9; ++k)  // axes that cannot be mistaken for each other
+      facet[k] = std::uniform_real_distribution<float>(1, 9)(random) * std::array{1.0f, 10.0f, -100.0f}[k % 3];
     facets.push_back(facet);
   }
   load::LoadOptions options;
