@@ -15,7 +15,8 @@ def commit(root):
     return name + ("+" if changed.strip() else "")
 
 
-def machine():
+def machine(cache):
+    """What ran it; `cache` is the folder of parts and outputs, whose file system writing depends on."""
     def first(path, pattern):
         try:
             with open(path, encoding="utf-8") as file:
@@ -27,6 +28,8 @@ def machine():
     return {"processor": first("/proc/cpuinfo", r"model name\s*:\s*(.*)"), "cores": len(os.sched_getaffinity(0)),
             "memory_gib": round(int(memory) / 2**20, 1) if memory != "?" else 0,
             "system": first("/etc/os-release", r'PRETTY_NAME="(.*)"'), "kernel": platform.release().split("-")[0],
+            "files_on": subprocess.run(["stat", "--file-system", "--format=%T", cache], text=True,
+                                       stdout=subprocess.PIPE).stdout.strip(),
             "compiler": subprocess.run(["g++", "-dumpfullversion"], text=True, stdout=subprocess.PIPE).stdout.strip()}
 
 
@@ -162,7 +165,8 @@ def lines(root, cases):
     first = results[0][1]
     about = first["machine"]
     yield (f"{about['processor']}, {about['cores']} cores, {about['memory_gib']} GiB; {about['system']}, kernel "
-           f"{about['kernel']}, g++ {about['compiler']}, release build.")
+           f"{about['kernel']}, g++ {about['compiler']}, release build; parts and outputs "
+           f"on {about['files_on']}.")
     stamps = sorted({(result["commit"], result["date"]) for _, result in results})
     yield "Commit " + "; ".join(f"{name} on {date}" for name, date in stamps) + ". A + means that sources were changed."
     others = max(entry.get("others", 0) for _, result in results
