@@ -253,6 +253,19 @@ TEST(Repair, AFinOnASolidIsDroppedAndAnOpenBoxBesideItIsCapped) {
   EXPECT_EQ(canonical(open.triangles), canonical(both.triangles));
 }
 
+TEST(Repair, CapsAreFansFromTheSmallestVertex) {
+  std::vector<FloatTriangle> facets = unit_box();
+  facets.resize(10);  // without the face at x = 10
+  Mesh mesh = mesh_of(facets);
+  const load::RepairReport report = load::repair(mesh, 5000);
+  EXPECT_EQ(report.openings_capped, 1u);
+  ASSERT_EQ(mesh.triangles.size(), 12u);
+  const Point3 smallest{10'000'000, 0, 0};
+  EXPECT_EQ(mesh.triangles[10].a, smallest);
+  EXPECT_EQ(mesh.triangles[11].a, smallest);
+  EXPECT_EQ(load::diagnose(mesh).volume_mm3, 6000);
+}
+
 TEST(Repair, OpeningsThatTouchInAVertexStayApart) {
   std::vector<FloatTriangle> facets = unit_box();
   // Two facets on opposite sides of a corner: loops of three, not one of six.

@@ -97,6 +97,17 @@ TEST(Read3mf, SharedMeshesEqualSnappingEachVertexWhereItStands) {
   EXPECT_EQ(placed(part), canonical(all));
 }
 
+TEST(Read3mf, ACopyThatSnapsDifferentlyHasItsOwnMesh) {
+  std::string resources = box_object(1, 10, 20, 30);
+  const std::size_t vertex = resources.find("<vertex x=\"0\" y=\"20\" z=\"30\"/>");
+  ASSERT_NE(vertex, resources.npos);
+  resources.replace(vertex, 13, "<vertex x=\"0.0000004\"");
+  const Part part = loaded(write_3mf(resources, item(1) + item(1, "1 0 0 0 1 0 0 0 1 0.0000003 0 0")));
+  ASSERT_EQ(part.meshes.size(), 2u) << "0.4 nm + 0.3 nm is 1 nm, though each alone is 0";
+  EXPECT_NE(part.meshes[0].fingerprint, part.meshes[1].fingerprint);
+  EXPECT_EQ(part.meshes[0].bounds.lo, part.meshes[1].bounds.lo);
+}
+
 TEST(Read3mf, ComponentsNestAndMultiplyTheirTransforms) {
   const std::string resources = box_object(1, 10, 20, 30) +
                                 components(2, component(1) + component(1, "1 0 0 0 1 0 0 0 1 20 0 0")) +
