@@ -117,8 +117,10 @@ ClusteredMesh make_clusters(Mesh& mesh) {
   mesh.triangles = {};
   out.storage.reserve(std::size_t{clusters} * kClusterSize);  // nothing moves if the loader left kTriangleSlack
   out.storage.resize(std::size_t{clusters} * kClusterSize);
-  std::copy_backward(out.storage.begin() + own, out.storage.begin() + total,
-                     out.storage.begin() + first_cap_at + caps);
+  if (first_cap_at != own) {
+    std::copy_backward(out.storage.begin() + own, out.storage.begin() + total,
+                       out.storage.begin() + first_cap_at + caps);
+  }
   out.bounds.resize(clusters);
   const Spread spread = cluster_in_place(out.storage.data(), own, out.bounds.data(), false);
   cluster_in_place(out.storage.data() + first_cap_at, caps, out.bounds.data() + out.first_cap, true);
