@@ -19,7 +19,8 @@ add_library(lamina::stages ALIAS lamina_stages)
 target_include_directories(lamina_stages PUBLIC $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}>
                                                 $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}/lamina>)
 target_link_libraries(lamina_stages PUBLIC TBB::tbb Eigen3::Eigen fmt::fmt embree
-                      PRIVATE TIFF::TIFF PNG::PNG ZLIB::ZLIB PkgConfig::LIBZIP PkgConfig::LIB3MF)
+                      PRIVATE TIFF::TIFF PNG::PNG ZLIB::ZLIB PkgConfig::LIBZIP PkgConfig::LIB3MF
+                              PkgConfig::POLYCLIPPING)
 
 # --- pipeline: how work moves
 lamina_sources(pipeline_sources "pipeline/*.cpp")
@@ -44,7 +45,7 @@ if(LAMINA_TESTS)
   enable_testing()
   find_package(GTest REQUIRED)
   include(GoogleTest)
-  foreach(folder data load heights raster write pipeline)
+  foreach(folder data load heights slice infill segment raster program write pipeline)
     lamina_sources(test_sources "tests/${folder}/*.cpp")
     if(test_sources)
       add_executable(test_${folder} ${test_sources})

@@ -34,7 +34,7 @@ CommandSpec info_spec() {
 }
 
 /// The keys of a job that the options stand for, read as lamina jet reads them.
-Status set_keys(const Arguments& arguments, JetJob& job) {
+Status set_keys(const Arguments& arguments, Job& job) {
   const auto refused = [](std::string_view flag, const std::string& wrong) {
     return Error{Fault::kUsage, fmt::format("{}: {}", flag, wrong)};
   };
@@ -63,7 +63,7 @@ int run_info_command(const std::vector<std::string>& texts) {
   if (arguments->operands.empty()) return fail({Fault::kUsage, "no part to look at; name an STL, OBJ or 3MF file"});
   int code = 0;
   for (const std::string& path : arguments->operands) {
-    JetJob job;
+    Job job;
     job.parts.emplace_back().path = path;
     if (Status status = set_keys(*arguments, job); !status) return fail(status.error());
     const load::LoadOptions options = load_options(job, job.parts.front());

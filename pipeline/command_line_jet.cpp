@@ -43,7 +43,7 @@ CommandSpec jet_spec() {
                   {"--save-job", "FILE", "write the job as resolved, to be run again with --job", "", "Job"},
                   {"--set", "KEY=VALUE", "set any key of the job, as in --set bed.dpi=600; part.2.copies is of part 2", "",
                    "Job"}};
-  add_options<JetJob>(job_keys(), JetJob(), spec);
+  add_options<Job>(job_keys(), Job(), spec);
   add_options<PartRequest>(part_keys(), PartRequest(), spec);
   for (const auto& [flag, meaning] :
        {std::pair{"--resume", "go on with an interrupted job; finished layers whose hash holds are kept"},
@@ -74,8 +74,8 @@ Error at_option(std::string_view flag, const std::string& what) {
   return {Fault::kUsage, fmt::format("{}: {}", flag.substr(flag.rfind(',') + 1), what)};
 }
 
-Result<JetJob> resolve(const Arguments& arguments) {
-  JetJob job;
+Result<Job> resolve(const Arguments& arguments) {
+  Job job;
   if (arguments.has("--job")) {
     if (Status status = read_job(arguments.text("--job"), job); !status) return status.error();
   }
@@ -115,7 +115,7 @@ Result<JetJob> resolve(const Arguments& arguments) {
   return job;
 }
 
-Error interrupted(const JetJob& job) {
+Error interrupted(const Job& job) {
   const bool begun = !job.output.empty() && !find_manifests(job.output).empty();
   return {Fault::kInterrupted, begun ? fmt::format("interrupted; finished layers are kept in {}, go on with the same "
                                                    "command and --resume instead of --overwrite", job.output)
@@ -131,7 +131,7 @@ int run_jet_command(const std::vector<std::string>& texts) {
     const Status status = print(*arguments->help);
     return status ? 0 : fail(status.error());
   }
-  const Result<JetJob> job = resolve(*arguments);
+  const Result<Job> job = resolve(*arguments);
   if (!job) return fail(job.error());
   if (arguments->has("--save-job")) {
     if (Status status = save_job(arguments->text("--save-job"), *job); !status) return fail(status.error());

@@ -60,7 +60,7 @@ Error disagreement(const Layer& layer, const PixelGrid& grid, const RunsView& ra
 /// One job while its layers are in flight: what the graph calls for each of them.
 class LayerWorkshop {
  public:
-  LayerWorkshop(const JetJob& job, const raster::Rasterizer& rasterizer, const write::ImageFormat& format)
+  LayerWorkshop(const Job& job, const raster::Rasterizer& rasterizer, const write::ImageFormat& format)
       : job_(job), rasterizer_(rasterizer), format_(format) {}
 
   Status raster(LayerWork& work, LayerOutcome& outcome) {
@@ -116,7 +116,7 @@ class LayerWorkshop {
   StageSums sums;
 
  private:
-  const JetJob& job_;
+  const Job& job_;
   const raster::Rasterizer& rasterizer_;
   const write::ImageFormat& format_;
 };
@@ -178,7 +178,7 @@ struct LayerPlan {
   std::vector<LayerRecord> kept;
 };
 
-Result<LayerPlan> plan_layers(const JetJob& job, const ManifestHead& head, const heights::UniformTable& table) {
+Result<LayerPlan> plan_layers(const Job& job, const ManifestHead& head, const heights::UniformTable& table) {
   LayerPlan plan;
   if (job.resume) {
     auto kept = layers_that_hold(job.output, manifest_name(job), head);
@@ -198,7 +198,7 @@ Result<LayerPlan> plan_layers(const JetJob& job, const ManifestHead& head, const
 
 }  // namespace
 
-Result<JetSummary> run_jet(const JetJob& job, const ProgressCallback& progress, const std::atomic<bool>& cancel) {
+Result<JetSummary> run_jet(const Job& job, const ProgressCallback& progress, const std::atomic<bool>& cancel) {
   std::optional<tbb::global_control> threads;
   if (job.threads > 0) threads.emplace(tbb::global_control::max_allowed_parallelism, job.threads);
   JetSummary summary;

@@ -8,14 +8,14 @@
 
 namespace lamina::pipeline {
 
-PixelGrid grid_of(const JetJob& job) {
+PixelGrid grid_of(const Job& job) {
   return {PixelAxis(job.dpi[0], nm_of(job.bed_mm[0])), PixelAxis(job.dpi[1], nm_of(job.bed_mm[1]))};
 }
 
-Status check_job(const JetJob& job) {
+Status check_job(const Job& job) {
   if (job.parts.empty()) return Error{Fault::kUsage, "no part to plan; name one or more STL, OBJ or 3MF files"};
   // A value is right if what it is written as can be read back.
-  JetJob copy;
+  Job copy;
   for (const JobKey& key : job_keys()) {
     const std::string text = key.write(job);
     if (text.empty()) continue;
@@ -45,7 +45,7 @@ Status check_job(const JetJob& job) {
   return {};
 }
 
-Result<std::array<std::uint32_t, 2>> layer_range(const JetJob& job, std::uint32_t layer_count) {
+Result<std::array<std::uint32_t, 2>> layer_range(const Job& job, std::uint32_t layer_count) {
   if (job.shard) {
     const auto [index, shards] = *job.shard;
     const auto share = [&](std::uint64_t i) { return static_cast<std::uint32_t>(layer_count * i / shards); };

@@ -9,7 +9,6 @@
 #include <vector>
 
 #include "stages/data/fill_rule.h"
-#include "stages/data/fill_rule.h"
 #include "stages/data/grid.h"
 #include "stages/data/status.h"
 #include "stages/data/units.h"
@@ -32,7 +31,7 @@ enum class Engine { kRays, kContours, kBoth };
 enum class Mirror { kNone, kX, kY, kXY };
 
 /// Everything that decides the bytes of the output, then everything that does not.
-struct JetJob {
+struct Job {
   std::vector<PartRequest> parts;
   std::array<double, 2> bed_mm{490, 380};
   std::array<std::int64_t, 2> dpi{1200, 1200};
@@ -63,15 +62,15 @@ struct JetJob {
 inline std::int64_t nm_of(double millimetres) { return std::llround(millimetres * static_cast<double>(kNmPerMm)); }
 
 /// The pixels of a job's bed. Only for a checked job.
-PixelGrid grid_of(const JetJob& job);
+PixelGrid grid_of(const Job& job);
 
 /// Whether every value of a job is within what can be planned, and agrees with the others; for jobs from anywhere.
 /// errors  kUsage, one line that begins with the key
-Status check_job(const JetJob& job);
+Status check_job(const Job& job);
 
 /// The layers [first, last) that a job plans of all that its parts need: all, job.layers, or its shard. Shards are
 /// the equal shares floor(count * i / n); an end of job.layers beyond the last layer is the last layer.
 /// errors  kUsage if job.layers begins beyond the last layer
-Result<std::array<std::uint32_t, 2>> layer_range(const JetJob& job, std::uint32_t layer_count);
+Result<std::array<std::uint32_t, 2>> layer_range(const Job& job, std::uint32_t layer_count);
 
 }  // namespace lamina::pipeline

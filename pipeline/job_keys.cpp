@@ -63,7 +63,7 @@ std::string write_list(const std::array<double, N>& values) {
   return fmt::format("{}", fmt::join(texts, ","));
 }
 
-std::string read_dpi(std::string_view text, JetJob& job) {
+std::string read_dpi(std::string_view text, Job& job) {
   const auto pieces = split(text, ",x");
   if (pieces.size() > 2) return fmt::format("'{}' is not one or two numbers; write 1200 or 1200x600", text);
   std::array<std::int64_t, 2> dpi{};
@@ -74,7 +74,7 @@ std::string read_dpi(std::string_view text, JetJob& job) {
   return {};
 }
 
-std::string read_format(std::string_view text, JetJob& job) {
+std::string read_format(std::string_view text, Job& job) {
   if (write::find_image_format(text) == nullptr) {
     std::vector<std::string_view> ids;
     for (const auto& format : write::image_formats()) ids.push_back(format.id);
@@ -111,50 +111,50 @@ using Text = std::string_view;
 
 const JobKey kJobKeys[] = {
     {"bed", "size_mm", "--bed", "WIDTHxDEPTH", "size of the bed in mm; the image covers all of it", true,
-     [](Text t, JetJob& j) { return read_pair(t, kLeastMm, kMostMm, " mm", j.bed_mm); },
-     [](const JetJob& j) { return write_list(j.bed_mm); }, Form::kList},
+     [](Text t, Job& j) { return read_pair(t, kLeastMm, kMostMm, " mm", j.bed_mm); },
+     [](const Job& j) { return write_list(j.bed_mm); }, Form::kList},
     {"bed", "dpi", "--dpi", "DPI|XxY", "pixels per inch along x and y, each 1 to 25400", true, read_dpi,
-     [](const JetJob& j) { return fmt::format("{},{}", j.dpi[0], j.dpi[1]); }, Form::kList},
+     [](const Job& j) { return fmt::format("{},{}", j.dpi[0], j.dpi[1]); }, Form::kList},
     {"layers", "thickness_mm", "--layer", "MM", "thickness of a layer in mm", true,
-     [](Text t, JetJob& j) { return read_number(t, kLeastMm, kMostMm, " mm", j.layer_mm); },
-     [](const JetJob& j) { return number_text(j.layer_mm); }, Form::kBare},
+     [](Text t, Job& j) { return read_number(t, kLeastMm, kMostMm, " mm", j.layer_mm); },
+     [](const Job& j) { return number_text(j.layer_mm); }, Form::kBare},
     {"place", "gap_mm", "--gap", "MM", "between parts and copies that are arranged, in mm", true,
-     [](Text t, JetJob& j) { return read_number(t, 0, kMostMm, " mm", j.gap_mm); },
-     [](const JetJob& j) { return number_text(j.gap_mm); }, Form::kBare},
+     [](Text t, Job& j) { return read_number(t, 0, kMostMm, " mm", j.gap_mm); },
+     [](const Job& j) { return number_text(j.gap_mm); }, Form::kBare},
     {"image", "format", "--format", "FORMAT", "of the layer files", true, read_format,
-     [](const JetJob& j) { return j.format; }, Form::kString},
+     [](const Job& j) { return j.format; }, Form::kString},
     {"image", "fill", "--fill", "RULE",
      "what is solid where shells overlap: nonzero (any), positive (drops shells turned inside out), evenodd", true,
-     [](Text t, JetJob& j) { return read_word(kFillRules, t, j.fill_rule); },
-     [](const JetJob& j) { return write_word(kFillRules, j.fill_rule); }, Form::kString},
+     [](Text t, Job& j) { return read_word(kFillRules, t, j.fill_rule); },
+     [](const Job& j) { return write_word(kFillRules, j.fill_rule); }, Form::kString},
     {"image", "mirror", "--mirror", "x|y|xy|none", "turn the image over: x swaps left and right, y back and front", true,
-     [](Text t, JetJob& j) { return read_word(kMirrors, t, j.mirror); },
-     [](const JetJob& j) { return write_word(kMirrors, j.mirror); }, Form::kString},
+     [](Text t, Job& j) { return read_word(kMirrors, t, j.mirror); },
+     [](const Job& j) { return write_word(kMirrors, j.mirror); }, Form::kString},
     {"load", "repair", "--no-repair", "", "plan open meshes as they are instead of closing them", true,
-     [](Text t, JetJob& j) { return read_switch(t, j.repair); },
-     [](const JetJob& j) { return write_switch(j.repair); }, Form::kBare, "false"},
+     [](Text t, Job& j) { return read_switch(t, j.repair); },
+     [](const Job& j) { return write_switch(j.repair); }, Form::kBare, "false"},
     {"load", "drop_bad", "--drop-bad", "", "drop facets with coordinates that are no numbers instead of refusing the file",
-     true, [](Text t, JetJob& j) { return read_switch(t, j.drop_bad); },
-     [](const JetJob& j) { return write_switch(j.drop_bad); }, Form::kBare, "true"},
+     true, [](Text t, Job& j) { return read_switch(t, j.drop_bad); },
+     [](const Job& j) { return write_switch(j.drop_bad); }, Form::kBare, "true"},
     {"load", "weld_um", "--weld", "UM", "repair joins open edges that are at most this far apart, in micrometres", true,
-     [](Text t, JetJob& j) { return read_number(t, 0, 1e6, " um", j.weld_um); },
-     [](const JetJob& j) { return number_text(j.weld_um); }, Form::kBare},
+     [](Text t, Job& j) { return read_number(t, 0, 1e6, " um", j.weld_um); },
+     [](const Job& j) { return number_text(j.weld_um); }, Form::kBare},
     {"run", "output", "-o,--output", "DIR", "directory for the layers and the manifest", false,
-     [](Text t, JetJob& j) { return read_path(t, j.output); }, [](const JetJob& j) { return j.output; }, Form::kString},
+     [](Text t, Job& j) { return read_path(t, j.output); }, [](const Job& j) { return j.output; }, Form::kString},
     {"run", "engine", "--engine", "ENGINE", "rays, contours, or both to compare them; all give the same bytes", false,
-     [](Text t, JetJob& j) { return read_word(kEngines, t, j.engine); },
-     [](const JetJob& j) { return write_word(kEngines, j.engine); }, Form::kString},
+     [](Text t, Job& j) { return read_word(kEngines, t, j.engine); },
+     [](const Job& j) { return write_word(kEngines, j.engine); }, Form::kString},
     {"run", "threads", "--threads", "N", "0 for all that the machine has", false,
-     [](Text t, JetJob& j) {
+     [](Text t, Job& j) {
        std::int64_t threads = 0;
        auto wrong = read_whole(t, 0, 4096, threads);
        if (wrong.empty()) j.threads = static_cast<std::uint32_t>(threads);
        return wrong;
      },
-     [](const JetJob& j) { return fmt::format("{}", j.threads); }, Form::kBare},
+     [](const Job& j) { return fmt::format("{}", j.threads); }, Form::kBare},
     {"run", "memory", "--memory", "SIZE", "what the layers in flight may hold beside the mesh: 256M, 1G", false,
-     [](Text t, JetJob& j) { return read_bytes(t, j.memory_bytes); },
-     [](const JetJob& j) {
+     [](Text t, Job& j) { return read_bytes(t, j.memory_bytes); },
+     [](const Job& j) {
        for (const auto& [letter, shift] : {std::pair{"G", 30}, {"M", 20}, {"K", 10}}) {
          if (j.memory_bytes % (1ull << shift) == 0) return fmt::format("{}{}", j.memory_bytes >> shift, letter);
        }
@@ -162,26 +162,26 @@ const JobKey kJobKeys[] = {
      },
      Form::kString},
     {"run", "layers", "--layers", "A:B", "only layers A to B - 1, counted from 0 at the bottom; A: and :B are open", false,
-     [](Text t, JetJob& j) {
+     [](Text t, Job& j) {
        std::array<std::uint32_t, 2> range{};
        auto wrong = read_layer_range(t, range);
        if (wrong.empty()) j.layers = range;
        return wrong;
      },
-     [](const JetJob& j) {
+     [](const Job& j) {
        if (!j.layers) return std::string();
        const auto [first, last] = *j.layers;
        return last == UINT32_MAX ? fmt::format("{}:", first) : fmt::format("{}:{}", first, last);
      },
      Form::kString},
     {"run", "shard", "--shard", "I/N", "only the I-th of N equal shares of the layers, I from 1; see lamina merge", false,
-     [](Text t, JetJob& j) {
+     [](Text t, Job& j) {
        std::array<std::uint32_t, 2> shard{};
        auto wrong = read_shard(t, shard);
        if (wrong.empty()) j.shard = shard;
        return wrong;
      },
-     [](const JetJob& j) {
+     [](const Job& j) {
        return j.shard ? fmt::format("{}/{}", (*j.shard)[0] + 1, (*j.shard)[1]) : std::string();
      },
      Form::kString},

@@ -14,7 +14,7 @@ namespace lamina::pipeline {
 /// How the text of a value looks in TOML.
 enum class KeyForm { kBare, kString, kList };
 
-/// One key of a job (Target is JetJob) or of each [[part]] of it (Target is PartRequest).
+/// One key of a job (Target is Job) or of each [[part]] of it (Target is PartRequest).
 template <class Target>
 struct Key {
   std::string_view section;  // table in the job file; "part" for keys of [[part]]
@@ -33,7 +33,7 @@ struct Key {
   std::string_view switch_text = {};
 };
 
-using JobKey = Key<JetJob>;
+using JobKey = Key<Job>;
 using PartKey = Key<PartRequest>;
 
 std::span<const JobKey> job_keys();

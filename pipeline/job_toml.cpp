@@ -22,7 +22,7 @@ namespace fs = std::filesystem;
 template <class Target>
 std::span<const Key<Target>> keys_of();
 template <>
-std::span<const JobKey> keys_of<JetJob>() { return job_keys(); }
+std::span<const JobKey> keys_of<Job>() { return job_keys(); }
 template <>
 std::span<const PartKey> keys_of<PartRequest>() { return part_keys(); }
 
@@ -102,7 +102,7 @@ Status read_table(const std::string& path, const toml::table& table, std::string
   return {};
 }
 
-Status read_parts(const std::string& path, const toml::node& node, JetJob& job) {
+Status read_parts(const std::string& path, const toml::node& node, Job& job) {
   const toml::array* parts = node.as_array();
   if (parts == nullptr || parts->empty() || !parts->is_homogeneous(toml::node_type::table)) {
     return Error{Fault::kUsage, fmt::format("{}: part: write one [[part]] table for each part", place(path, node))};
@@ -129,7 +129,7 @@ std::string toml_value(KeyForm form, const std::string& text) {
   return fmt::format("[{}]", fmt::join(split(text, ","), ", "));
 }
 
-std::string all_text(const JetJob& job, bool only_bytes) {
+std::string all_text(const Job& job, bool only_bytes) {
   std::string text;
   std::string_view section;
   for (const JobKey& key : job_keys()) {
@@ -161,7 +161,7 @@ Status set_in(std::string_view assignment, std::string_view section, std::string
 
 }  // namespace
 
-Status read_job(const std::string& path, JetJob& job) {
+Status read_job(const std::string& path, Job& job) {
   std::error_code error;
   if (!fs::is_regular_file(path, error)) {
     return Error{Fault::kUsage, fmt::format("{}: no such job file", path)};
@@ -199,7 +199,7 @@ Status read_job(const std::string& path, JetJob& job) {
   return {};
 }
 
-Status set_key(JetJob& job, std::string_view assignment) {
+Status set_key(Job& job, std::string_view assignment) {
   const std::size_t equals = assignment.find('=');
   const auto wrong = [&](const std::string& what) {
     return Error{Fault::kUsage, fmt::format("--set {}: {}", assignment, what)};
@@ -236,8 +236,8 @@ Status set_key(JetJob& job, std::string_view assignment) {
   return set_in(assignment, names[0], names[1], value, job);
 }
 
-std::string job_text(const JetJob& job, const std::string& directory) {
-  JetJob named = job;
+std::string job_text(const Job& job, const std::string& directory) {
+  Job named = job;
   if (!directory.empty()) {
     const auto relative = [&](const std::string& path) {
       if (path.empty()) return path;
@@ -251,13 +251,13 @@ std::string job_text(const JetJob& job, const std::string& directory) {
   return all_text(named, false);
 }
 
-std::string canonical_job_text(const JetJob& job) {
-  JetJob named = job;
+std::string canonical_job_text(const Job& job) {
+  Job named = job;
   for (PartRequest& part : named.parts) part.path = fs::path(part.path).filename().string();
   return all_text(named, true);
 }
 
-Status save_job(const std::string& path, const JetJob& job) {
+Status save_job(const std::string& path, const Job& job) {
   for (const PartRequest& part : job.parts) {
     if (!is_utf8(part.path)) {
       return Error{Fault::kUsage, fmt::format("{}: a job file cannot name it, it is not UTF-8; rename it", part.path)};

@@ -56,7 +56,15 @@ std::string lasting_text(const ManifestHead& head) {
       json_string(head.extension), json_string(head.fill_rule), json_string(head.mirror), head.layer_count, parts);
 }
 
-std::string key_text(std::string_view section, std::string_view name, const JetJob& job) {
+// A writer holds its lock as long as it lives; the lock of a killed run is gone with it.
+bool locked_by_another(int file) { return ::flock(file, LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK; }
+
+Error busy(const std::string& partial) {
+  return {Fault::kOutput,
+          fmt::format("{}: another run is writing here right now; wait for it or name another directory", partial)};
+}
+
+std::string key_text(std::string_view section, std::string_view name, const Job& job) {
   for (const JobKey& key : job_keys()) {
     if (key.section == section && key.name == name) return key.write(job);
   }
@@ -91,7 +99,7 @@ Hash128 ManifestHead::id() const {
   return hash_bytes(std::as_bytes(std::span(text)));
 }
 
-ManifestHead make_head(const JetJob& job, const std::vector<PartSummary>& parts, std::uint32_t layer_count,
+ManifestHead make_head(const Job& job, const std::vector<PartSummary>& parts, std::uint32_t layer_count,
                        std::array<std::uint32_t, 2> layers) {
   ManifestHead head;
   head.version = LAMINA_VERSION;
@@ -136,13 +144,22 @@ std::string difference(const ManifestHead& now, const ManifestHead& earlier) {
   return "the parts have changed";
 }
 
-std::string manifest_name(const JetJob& job) {
+std::string manifest_name(const Job& job) {
   if (!job.shard) return "manifest.json";
   return fmt::format("manifest-{}-of-{}.json", (*job.shard)[0] + 1, (*job.shard)[1]);
 }
 
 std::string layer_file_name(std::uint32_t index, std::string_view extension) {
   return extension.empty() ? std::string() : fmt::format("layers/{:06}{}", index, extension);
+}
+
+Status check_not_being_written(const std::string& path) {
+  const std::string partial = path + ".part";
+  const int file = ::open(partial.c_str(), O_RDWR | O_CLOEXEC);
+  if (file < 0) return {};
+  const bool taken = locked_by_another(file);
+  ::close(file);
+  return taken ? Status(busy(partial)) : Status();
 }
 
 struct ManifestWriter::State {
@@ -201,18 +218,10 @@ Result<ManifestWriter> ManifestWriter::open(const std::string& path, const Manif
   state.last_layer = head.last_layer;
   const std::string partial = path + ".part", fresh = partial + ".new";
 
-  // The lock lives as long as the writer: two runs in one directory would tear each other's files.
-  const auto locked_by_another = [&](int file) { return ::flock(file, LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK; };
-  const Error busy{Fault::kOutput, fmt::format("{}: another run is writing here right now; wait for it or choose another "
-                                               "directory", partial)};
-  if (const int earlier = ::open(partial.c_str(), O_RDWR | O_CLOEXEC); earlier >= 0) {
-    const bool taken = locked_by_another(earlier);
-    ::close(earlier);
-    if (taken) return busy;
-  }
+  if (Status status = check_not_being_written(path); !status) return status.error();
   state.file = ::open(fresh.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC, 0666);
   if (state.file < 0) return state.failed(errno);
-  if (locked_by_another(state.file)) return busy;
+  if (locked_by_another(state.file)) return busy(partial);
   const auto give_up = [&](Error error) {
     ::unlink(fresh.c_str());
     return error;

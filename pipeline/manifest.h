@@ -46,7 +46,7 @@ struct ManifestHead {
 };
 
 /// The head of a job whose parts are loaded. `layers` [first, last) as layer_range() gives it.
-ManifestHead make_head(const JetJob& job, const std::vector<PartSummary>& parts, std::uint32_t layer_count,
+ManifestHead make_head(const Job& job, const std::vector<PartSummary>& parts, std::uint32_t layer_count,
                        std::array<std::uint32_t, 2> layers);
 
 /// What keeps two heads from belonging to the same job, as "bed.dpi is [600, 600], was [1200, 1200]"; empty if nothing.
@@ -59,12 +59,16 @@ struct Manifest {
 };
 
 /// Name of the manifest in a job's directory: manifest.json, or manifest-<i>-of-<n>.json for a shard.
-std::string manifest_name(const JetJob& job);
+std::string manifest_name(const Job& job);
 /// The name of a layer's file in the job's directory, layers/000042.tif; empty for a format without files.
 std::string layer_file_name(std::uint32_t index, std::string_view extension);
 
 /// Reads a manifest, or as many whole lines as a .part holds. errors: kVerification with file and line
 Result<Manifest> read_manifest(const std::string& path);
+
+/// Refuses a manifest that another run is writing right now: two runs in one directory would tear each other's files.
+/// errors  kOutput
+Status check_not_being_written(const std::string& path);
 
 /// Appends layers in order; thread-compatible (the graph's ordered writer is serial).
 class ManifestWriter {

@@ -64,7 +64,7 @@ Error cannot(const fs::path& path, int reason) {
 }
 
 // A shard beside shards of the same split: they share the directory.
-bool joins(const JetJob& job, const ManifestFile& file) {
+bool joins(const Job& job, const ManifestFile& file) {
   return job.shard && file.shard && (*job.shard)[1] == (*file.shard)[1] && (*job.shard)[0] != (*file.shard)[0];
 }
 
@@ -97,7 +97,7 @@ bool read_layer_file_name(std::string_view name, std::uint32_t& index, bool& par
   });
 }
 
-Status check_output(const JetJob& job) {
+Status check_output(const Job& job) {
   std::error_code error;
   const fs::file_status status = fs::status(job.output, error);
   if (!fs::exists(status)) return {};
@@ -111,6 +111,10 @@ Status check_output(const JetJob& job) {
     const auto refuse = [&](std::string_view what, std::string_view advice) {
       return Error{Fault::kUsage, fmt::format("{}/{}: {}; {}", job.output, file.name, what, advice)};
     };
+    if (file.partial && !joins(job, file)) {
+      const std::string path = fmt::format("{}/{}", job.output, file.name.substr(0, file.name.size() - kPartial.size()));
+      if (Status busy = check_not_being_written(path); !busy) return busy;
+    }
     if (joins(job, file)) {
       shared = true;
     } else if (is_own && !job.resume && !job.overwrite) {
@@ -129,7 +133,7 @@ Status check_output(const JetJob& job) {
   return {};
 }
 
-Status prepare_output(const JetJob& job) {
+Status prepare_output(const Job& job) {
   if (Status status = check_output(job); !status) return status;
   const fs::path directory = job.output, layers = directory / "layers";
   std::error_code error;

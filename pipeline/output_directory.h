@@ -29,13 +29,14 @@ bool read_layer_file_name(std::string_view name, std::uint32_t& index, bool& par
 /// Whether a job may write into its directory: nothing is touched, so that a refusal comes before parts are loaded.
 ///
 /// errors  kUsage if layers of an earlier run are there and neither --resume nor --overwrite is asked for; a shard may
-///         join the other shards of the same split. kOutput if a file stands in place of the directory
-Status check_output(const JetJob& job);
+///         join the other shards of the same split. kOutput if a file stands in place of the directory, or
+///         another run writes into it right now
+Status check_output(const Job& job);
 
 /// check_output, then creates the directory and its layers/, and clears it: with --overwrite of all that an earlier
 /// job left (a shard: of its own manifest), else of files that an interrupted run left half written.
 /// errors  those of check_output; kOutput with the system's reason
-Status prepare_output(const JetJob& job);
+Status prepare_output(const Job& job);
 
 /// Removes half-written files of the layers [first, last) from directory/layers: what a killed run leaves behind.
 void sweep_partial_files(const std::string& directory, std::uint32_t first = 0, std::uint32_t last = UINT32_MAX);

@@ -65,7 +65,7 @@ Point3 rebase(Mesh& mesh) {
 
 bool fits(std::int64_t nm) { return nm >= INT32_MIN && nm <= INT32_MAX; }
 
-Result<Loaded> load_part(const JetJob& job, const PartRequest& request, Scene& scene) {
+Result<Loaded> load_part(const Job& job, const PartRequest& request, Scene& scene) {
   Result<Part> part = load::load(request.path, load_options(job, request));
   if (!part) return part.error();
   if (part->bounds.empty() || part->instances.empty()) {
@@ -90,7 +90,7 @@ Result<Loaded> load_part(const JetJob& job, const PartRequest& request, Scene& s
 }
 
 // Overlaps matter only where somebody asked for positions: arranged boxes cannot overlap each other.
-void note_overlaps(const JetJob& job, Scene& scene, const std::vector<std::pair<std::uint32_t, Box>>& boxes) {
+void note_overlaps(const Job& job, Scene& scene, const std::vector<std::pair<std::uint32_t, Box>>& boxes) {
   std::vector<std::uint32_t> order(boxes.size());
   for (std::uint32_t i = 0; i < order.size(); ++i) order[i] = i;
   std::sort(order.begin(), order.end(), [&](std::uint32_t a, std::uint32_t b) {
@@ -117,7 +117,7 @@ void note_overlaps(const JetJob& job, Scene& scene, const std::vector<std::pair<
 
 }  // namespace
 
-load::LoadOptions load_options(const JetJob& job, const PartRequest& request) {
+load::LoadOptions load_options(const Job& job, const PartRequest& request) {
   load::LoadOptions options;
   options.transform = load::make_transform(request.scale, request.rotate_deg, request.shrink);
   options.unit_mm = millimetres_of(request.unit);
@@ -127,7 +127,7 @@ load::LoadOptions load_options(const JetJob& job, const PartRequest& request) {
   return options;
 }
 
-Result<Scene> load_scene(const JetJob& job) {
+Result<Scene> load_scene(const Job& job) {
   Scene scene;
   std::map<LoadKey, Loaded> files;
   std::vector<const Loaded*> loaded;  // by [[part]]; a map's values stay where they are

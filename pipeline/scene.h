@@ -33,7 +33,7 @@ struct Scene {
 };
 
 /// How a part of a job is to be read.
-load::LoadOptions load_options(const JetJob& job, const PartRequest& request);
+load::LoadOptions load_options(const Job& job, const PartRequest& request);
 
 /// Loads the parts of a job (equal files with equal transforms once) and places them.
 ///
@@ -41,6 +41,6 @@ load::LoadOptions load_options(const JetJob& job, const PartRequest& request);
 /// The others are arranged in rows from the front left, in the order of the job and gap_mm apart, and that block is
 /// centred on the bed, all in whole nm.
 /// errors  kUsage if a part does not fit the bed (by how much, and what would help); kInput from load
-Result<Scene> load_scene(const JetJob& job);
+Result<Scene> load_scene(const Job& job);
 
 }  // namespace lamina::pipeline

@@ -31,7 +31,7 @@ std::string part_json(const PartSummary& part) {
 
 }  // namespace
 
-std::string summary_text(const JetJob& job, const JetSummary& s) {
+std::string summary_text(const Job& job, const JetSummary& s) {
   std::string text;
   const auto line = [&](std::string_view name, const std::string& value) {
     fmt::format_to(std::back_inserter(text), "{:<10}{}\n", name, value);
@@ -77,7 +77,7 @@ std::string summary_text(const JetJob& job, const JetSummary& s) {
   return text;
 }
 
-std::string summary_json(const JetJob& job, const JetSummary& s) {
+std::string summary_json(const Job& job, const JetSummary& s) {
   std::vector<std::string> parts, warnings;
   for (const PartSummary& part : s.parts) parts.push_back(part_json(part));
   for (const std::string& warning : s.warnings) warnings.push_back(json_string(warning));

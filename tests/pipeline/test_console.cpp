@@ -65,7 +65,7 @@ TEST(Progress, MillionEventsCostNoMillionWrites) {
 }
 
 TEST(Summary, JsonHoldsWhatTheTextTells) {
-  JetJob job;
+  Job job;
   JetSummary summary;
   summary.directory = "a \"b\"";
   summary.columns = 10;
@@ -119,14 +119,6 @@ TEST(Preview, HandsAllArgumentsAndTheExitCodeToTheProgramBesideIt) {
       "'" + (directory / "lamina") + "' preview out 'a b' --layers 1:2 > '" + (directory / "told") + "'; exit $?";
   EXPECT_EQ(WEXITSTATUS(std::system(command.c_str())), 7);
   EXPECT_EQ(test::read_text(directory / "told"), "out|a b|--layers|1:2|");
-}
-
-TEST(Quiet, JobThatSucceedsSaysNothing) {
-  const Directory directory;
-  test::write_box(directory / "part.stl", {0, 0, 0}, {20, 10, 5});
-  const Outcome outcome = run_lamina({"jet", "part.stl", "-o", "out", "--dpi", "60", "--quiet"}, directory.path());
-  EXPECT_EQ(outcome.code, 0);
-  EXPECT_EQ(outcome.out + outcome.err, "");
 }
 
 }  // namespace

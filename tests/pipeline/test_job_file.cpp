@@ -10,8 +10,8 @@ namespace {
 using test::Directory;
 
 // A job in which every key differs from its default.
-JetJob unusual_job(const Directory& directory) {
-  JetJob job;
+Job unusual_job(const Directory& directory) {
+  Job job;
   job.bed_mm = {123.4567, 0.1 + 0.2};
   job.dpi = {600, 300};
   job.layer_mm = 1e-6;
@@ -40,13 +40,13 @@ JetJob unusual_job(const Directory& directory) {
   return job;
 }
 
-std::string all_of(const JetJob& job) { return job_text(job, ""); }
+std::string all_of(const Job& job) { return job_text(job, ""); }
 
 TEST(JobFile, SavedJobReadsBackAsTheSameJob) {
   const Directory directory;
-  const JetJob job = unusual_job(directory);
+  const Job job = unusual_job(directory);
   ASSERT_TRUE(save_job(directory / "job.toml", job).ok());
-  JetJob back;
+  Job back;
   const Status status = read_job(directory / "job.toml", back);
   ASSERT_TRUE(status.ok()) << status.error().message;
   EXPECT_EQ(all_of(back), all_of(job));
@@ -59,10 +59,10 @@ TEST(JobFile, SavedJobReadsBackAsTheSameJob) {
 
 TEST(JobFile, ShardIsKept) {
   const Directory directory;
-  JetJob job;
+  Job job;
   job.shard = {1, 4};
   ASSERT_TRUE(save_job(directory / "job.toml", job).ok());
-  JetJob back;
+  Job back;
   ASSERT_TRUE(read_job(directory / "job.toml", back).ok());
   EXPECT_EQ(back.shard, job.shard);
 }
@@ -72,7 +72,7 @@ TEST(JobFile, PathsAreRelativeToTheFile) {
   std::filesystem::create_directory(directory / "sub");
   test::write_text(directory / "sub/job.toml",
                    "[run]\noutput = 'out'\n[[part]]\npath = 'a.stl'\n[[part]]\npath = '../b.stl'\n[[part]]\npath = '/c.stl'\n");
-  JetJob job;
+  Job job;
   ASSERT_TRUE(read_job(directory / "sub/job.toml", job).ok());
   EXPECT_EQ(job.parts[0].path, directory / "sub/a.stl");
   EXPECT_EQ(job.parts[1].path, directory / "b.stl");
@@ -82,7 +82,7 @@ TEST(JobFile, PathsAreRelativeToTheFile) {
 
 TEST(JobFile, CanonicalTextHasNoPathsAndNothingThatLeavesBytesAlone) {
   const Directory directory;
-  JetJob job = unusual_job(directory);
+  Job job = unusual_job(directory);
   const std::string text = canonical_job_text(job);
   EXPECT_EQ(text.find(directory.path().string()), std::string::npos);
   job.output = "elsewhere";
@@ -98,17 +98,17 @@ TEST(JobFile, CanonicalTextHasNoPathsAndNothingThatLeavesBytesAlone) {
 
 TEST(JobFile, EveryKeyThatDecidesBytesChangesTheCanonicalText) {
   const Directory directory;
-  const JetJob usual, unusual = unusual_job(directory);
+  const Job usual, unusual = unusual_job(directory);
   for (const JobKey& key : job_keys()) {
     if (!key.decides_bytes) continue;
-    JetJob job = usual;
+    Job job = usual;
     ASSERT_EQ(key.read(key.write(unusual), job), "") << key.name;
     EXPECT_NE(canonical_job_text(job), canonical_job_text(usual)) << key.name;
   }
-  JetJob plain;
+  Job plain;
   plain.parts.emplace_back();
   for (const PartKey& key : part_keys()) {
-    JetJob job = plain;
+    Job job = plain;
     ASSERT_EQ(key.read(key.write(unusual.parts[0]), job.parts[0]), "") << key.name;
     EXPECT_NE(canonical_job_text(job), canonical_job_text(plain)) << key.name;
   }
@@ -153,7 +153,7 @@ TEST(JobFile, WrongKeysAndValuesNameFileLineAndKey) {
   };
   for (const auto& [text, told] : jobs) {
     test::write_text(directory / "job.toml", text);
-    JetJob job;
+    Job job;
     const Status status = read_job(directory / "job.toml", job);
     ASSERT_FALSE(status.ok()) << text;
     EXPECT_EQ(status.error().fault, Fault::kUsage) << text;
@@ -163,7 +163,7 @@ TEST(JobFile, WrongKeysAndValuesNameFileLineAndKey) {
 }
 
 TEST(JobFile, SetTakesValuesAsFilesAndOptionsDo) {
-  JetJob job;
+  Job job;
   job.parts.resize(2);
   for (const char* assignment : {"bed.dpi=1200x600", "bed.size_mm=[100, 50]", "image.format=\"png\"", "part.copies=3",
                                  "part.2.scale=2", "run.memory=64M"}) {
@@ -189,7 +189,7 @@ TEST(Job, LayersAreSharedOutWithoutGapOrOverlap) {
     for (const std::uint32_t shards : {1u, 2u, 7u, 150u}) {
       std::uint32_t next = 0;
       for (std::uint32_t i = 0; i < shards; ++i) {
-        JetJob job;
+        Job job;
         job.shard = {i, shards};
         const auto range = layer_range(job, count);
         ASSERT_TRUE(range.ok());
@@ -200,34 +200,34 @@ TEST(Job, LayersAreSharedOutWithoutGapOrOverlap) {
       EXPECT_EQ(next, count);
     }
   }
-  JetJob job;
+  Job job;
   job.layers = {3, UINT32_MAX};
   EXPECT_EQ(*layer_range(job, 10), (std::array<std::uint32_t, 2>{3, 10}));
   EXPECT_EQ(layer_range(job, 3).error().fault, Fault::kUsage);
 }
 
 TEST(Job, ValuesThatCameFromElsewhereAreChecked) {
-  JetJob job;
+  Job job;
   job.parts.resize(1);
   job.parts[0].path = "a";
   job.output = "out";
   EXPECT_TRUE(check_job(job).ok());
   const auto refused = [&](const auto& change) {
-    JetJob bad = job;
+    Job bad = job;
     change(bad);
     const Status status = check_job(bad);
     return !status.ok() && status.error().fault == Fault::kUsage;
   };
-  EXPECT_TRUE(refused([](JetJob& j) { j.dpi[1] = 0; }));
-  EXPECT_TRUE(refused([](JetJob& j) { j.layer_mm = std::numeric_limits<double>::quiet_NaN(); }));
-  EXPECT_TRUE(refused([](JetJob& j) { j.bed_mm[0] = 1e9; }));
-  EXPECT_TRUE(refused([](JetJob& j) { j.parts[0].scale[2] = 0; }));
-  EXPECT_TRUE(refused([](JetJob& j) { j.parts[0].at_mm = {-1.0, 0.0}; }));
-  EXPECT_TRUE(refused([](JetJob& j) { j.parts.clear(); }));
-  EXPECT_TRUE(refused([](JetJob& j) { j.output.clear(); }));
-  EXPECT_TRUE(refused([](JetJob& j) { j.format = "jpeg"; }));
-  EXPECT_TRUE(refused([](JetJob& j) { j.layers = {0, 1}, j.shard = {0, 2}; }));
-  EXPECT_TRUE(refused([](JetJob& j) { j.resume = j.overwrite = true; }));
+  EXPECT_TRUE(refused([](Job& j) { j.dpi[1] = 0; }));
+  EXPECT_TRUE(refused([](Job& j) { j.layer_mm = std::numeric_limits<double>::quiet_NaN(); }));
+  EXPECT_TRUE(refused([](Job& j) { j.bed_mm[0] = 1e9; }));
+  EXPECT_TRUE(refused([](Job& j) { j.parts[0].scale[2] = 0; }));
+  EXPECT_TRUE(refused([](Job& j) { j.parts[0].at_mm = {-1.0, 0.0}; }));
+  EXPECT_TRUE(refused([](Job& j) { j.parts.clear(); }));
+  EXPECT_TRUE(refused([](Job& j) { j.output.clear(); }));
+  EXPECT_TRUE(refused([](Job& j) { j.format = "jpeg"; }));
+  EXPECT_TRUE(refused([](Job& j) { j.layers = {0, 1}, j.shard = {0, 2}; }));
+  EXPECT_TRUE(refused([](Job& j) { j.resume = j.overwrite = true; }));
 }
 
 }  // namespace

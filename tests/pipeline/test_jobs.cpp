@@ -57,6 +57,12 @@ TEST_F(Jobs, JsonIsOneObjectOnStandardOutput) {
   EXPECT_EQ(nlohmann::json::parse(verified.out)["layers"], 50);
 }
 
+TEST_F(Jobs, QuietJobThatSucceedsSaysNothing) {
+  const Outcome outcome = jet("out");
+  EXPECT_EQ(outcome.code, 0);
+  EXPECT_EQ(outcome.out + outcome.err, "");
+}
+
 TEST_F(Jobs, DryRunWritesNothing) {
   const Outcome outcome = lamina({"jet", "part.stl", "--dry-run", "-o", "out"});
   EXPECT_EQ(outcome.code, 0) << outcome.err;
@@ -235,6 +241,26 @@ TEST_F(Interrupted, KilledJobsResumeToTheSameBytes) {
     ASSERT_EQ(resumed.code, 0) << resumed.err;
     EXPECT_EQ(tree("out") == right, true) << "killed after " << layers << " layers";
   }
+}
+
+TEST_F(Interrupted, SecondRunInTheSameDirectoryIsRefusedAndHarmsNothing) {
+  const std::vector<std::string> job = long_job("out");
+  const Outcome first = run_lamina(job, directory_.path(), [&](int) {
+    const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(60);
+    while (std::chrono::steady_clock::now() < deadline && files_below(directory_ / "out/layers").size() < 5) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    }
+    for (const char* how : {"--resume", "--overwrite"}) {
+      std::vector<std::string> second = job;
+      second.push_back(how);
+      const Outcome refused = lamina(second);
+      EXPECT_EQ(refused.code, 4) << refused.err;
+      EXPECT_NE(refused.err.find("another run"), std::string::npos) << refused.err;
+      EXPECT_EQ(refused.error_lines(), 1u) << refused.err;
+    }
+  });
+  EXPECT_EQ(first.code, 0) << first.err;
+  EXPECT_EQ(lamina({"verify", "out"}).code, 0);
 }
 
 TEST_F(Interrupted, TerminationIsAnInterruptionToo) {

@@ -14,7 +14,7 @@ using test::Directory;
 constexpr std::uint32_t kLayers = 150;
 
 ManifestHead some_head(std::uint32_t first = 0, std::uint32_t last = kLayers) {
-  JetJob job;
+  Job job;
   job.parts.push_back({.path = "/far/away/bracket \"x\" \\ \xff.stl"});
   PartSummary part;
   part.path = job.parts[0].path;
@@ -100,7 +100,7 @@ TEST(Manifest, IdIsTheSameForEveryRangeAndAnotherForEveryOtherJob) {
   head.parts[0].fingerprint ^= 1;
   EXPECT_NE(head.id(), some_head().id());
   EXPECT_NE(difference(head, some_head()).find("geometry of bracket"), std::string::npos);
-  JetJob job;
+  Job job;
   job.layer_mm = 0.1;
   job.parts.resize(1);
   head = make_head(job, {}, 1, {0, 1});

@@ -94,7 +94,7 @@ Box box_of(const Scene& scene, std::size_t instance) {
   return box;
 }
 
-Scene loaded(const JetJob& job) {
+Scene loaded(const Job& job) {
   auto scene = load_scene(job);
   EXPECT_TRUE(scene.ok()) << scene.error().message;
   return scene.ok() ? std::move(*scene) : Scene{};
@@ -103,7 +103,7 @@ Scene loaded(const JetJob& job) {
 TEST(Scene, EqualFilesWithEqualTransformsAreLoadedOnce) {
   const Directory directory;
   test::write_box(directory / "a.stl", {0, 0, 0}, {10, 20, 5});
-  JetJob job;
+  Job job;
   job.parts = {{.path = directory / "a.stl", .copies = 3}, {.path = directory / "./a.stl"}, {.path = directory / "a.stl", .scale = {2, 2, 2}}};
   const Scene scene = loaded(job);
   EXPECT_EQ(scene.meshes.size(), 2u);
@@ -119,7 +119,7 @@ TEST(Scene, PartsStandWhereAskedWhereverTheirFilePutsThem) {
   const Directory directory;
   for (const float origin : {0.f, -300.f, 1500.f, -2000.f, 2000.f}) {
     test::write_box(directory / "a.stl", {origin, -origin, origin}, {origin + 8, -origin + 16, origin + 4});
-    JetJob job;
+    Job job;
     job.parts = {{.path = directory / "a.stl", .copies = 2, .at_mm = {{7, 9}}, .bottom_mm = 3}};
     job.bed_mm = {2147, 2147};
     const Scene scene = loaded(job);
@@ -136,7 +136,7 @@ TEST(Scene, FarAwayPartReachesTheFarCornerWithoutOverflow) {
   // The way from -2000 mm to +2140 mm does not fit into 32 bits of nanometres.
   const Directory directory;
   test::write_box(directory / "a.stl", {-2000, -2000, -2000}, {-1999, -1999, -1999});
-  JetJob job;
+  Job job;
   job.bed_mm = {2147, 2147};
   job.gap_mm = 0;
   job.parts = {{.path = directory / "a.stl", .at_mm = {{100, 100}}},
@@ -151,7 +151,7 @@ TEST(Scene, FarAwayPartReachesTheFarCornerWithoutOverflow) {
 TEST(Scene, OverlapsOfAskedPositionsAreNoted) {
   const Directory directory;
   test::write_box(directory / "a.stl", {0, 0, 0}, {10, 10, 10});
-  JetJob job;
+  Job job;
   job.parts = {{.path = directory / "a.stl", .at_mm = {{0, 0}}}, {.path = directory / "a.stl", .at_mm = {{9, 9}}}};
   Scene scene = loaded(job);
   ASSERT_EQ(scene.parts[1].notes.size(), 1u);
@@ -166,7 +166,7 @@ TEST(Scene, OverlapsOfAskedPositionsAreNoted) {
 TEST(Scene, FlatPartIsRefusedAsInput) {
   const Directory directory;
   test::write_box(directory / "flat.stl", {0, 0, 1}, {10, 10, 1});
-  JetJob job;
+  Job job;
   job.parts = {{.path = directory / "flat.stl"}};
   const auto scene = load_scene(job);
   ASSERT_FALSE(scene.ok());
@@ -176,7 +176,7 @@ TEST(Scene, FlatPartIsRefusedAsInput) {
 TEST(Scene, PartHigherThanTheReachIsRefused) {
   const Directory directory;
   test::write_box(directory / "a.stl", {0, 0, 0}, {1, 1, 10});
-  JetJob job;
+  Job job;
   job.parts = {{.path = directory / "a.stl", .bottom_mm = 2140}};
   const auto scene = load_scene(job);
   ASSERT_FALSE(scene.ok());
