@@ -1,0 +1,82 @@
+// stages/data/toolpaths.h: where a bead is laid in one layer, in the order in which it is laid.
+#pragma once
+
+#include <cstdint>
+#include <span>
+
+#include "stages/data/buffer.h"
+#include "stages/data/contours.h"  // Point2
+#include "stages/data/units.h"
+
+namespace lamina {
+
+/// What a stretch of bead is for.
+enum class PathKind : std::uint8_t {
+  kOuter,    // wall along the surface of the part, of outer contours and of holes alike
+  kInner,    // further walls inside it
+  kRaster,   // a line of a raster, or of another pattern of open lines
+  kContour,  // a closed curve that fills: concentric offsets
+  kLink      // short way from the end of one raster line to the start of the next, along the edge of the filled region
+};
+
+/// Line number of stretches that are no raster lines.
+inline constexpr std::int32_t kNoLine = INT32_MIN;
+
+/// Borrowed toolpaths of one layer. A path is laid without a stop; from the end of one to the start of the next the
+/// nozzle travels.
+///
+/// offset  paths + 1 entries, first 0, last point.size(); path p owns point[offset[p] .. offset[p + 1]), two or more
+/// point   nm on the bed. A closed path ends with its first point repeated.
+/// kind, width, line   one entry a point: they belong to the stretch from that point to the next one of its path. The
+///         last point of a path starts no stretch and repeats the entries before it.
+/// width   nm of bead, > 0
+/// line    number of the raster line in its layer, counted across the lines over the whole part and the same in every
+///         layer with the same angle (negative before the first line); kNoLine for all that is no raster line. The
+///         pieces into which holes cut a line share its number. Even lines are laid along the raster's direction, odd
+///         lines against it.
+struct ToolpathsView {
+  std::span<const std::uint32_t> offset;
+  std::span<const Point2> point;
+  std::span<const PathKind> kind;
+  std::span<const Nm> width;
+  std::span<const std::int32_t> line;
+
+  std::uint32_t size() const { return offset.empty() ? 0 : static_cast<std::uint32_t>(offset.size() - 1); }
+  std::span<const Point2> operator[](std::uint32_t p) const {
+    return point.subspan(offset[p], offset[p + 1] - offset[p]);
+  }
+  bool is_closed(std::uint32_t p) const {
+    return offset[p + 1] - offset[p] > 3 && point[offset[p]] == point[offset[p + 1] - 1];
+  }
+};
+
+/// Owned toolpaths; 17 bytes a point.
+struct Toolpaths {
+  Buffer<std::uint32_t> offset{0};
+  Buffer<Point2> point;
+  Buffer<PathKind> kind;
+  Buffer<Nm> width;
+  Buffer<std::int32_t> line;
+
+  std::uint32_t size() const { return static_cast<std::uint32_t>(offset.size() - 1); }
+  ToolpathsView view() const { return {offset, point, kind, width, line}; }
+  operator ToolpathsView() const { return view(); }
+
+  void clear() {
+    offset.assign(1, 0);
+    point.clear();
+    kind.clear();
+    width.clear();
+    line.clear();
+  }
+  void add(Point2 at, PathKind of, Nm bead_width, std::int32_t line_number = kNoLine) {
+    point.push_back(at);
+    kind.push_back(of);
+    width.push_back(bead_width);
+    line.push_back(line_number);
+  }
+  /// Ends the path whose points were added.
+  void close() { offset.push_back(static_cast<std::uint32_t>(point.size())); }
+};
+
+}  // namespace lamina
