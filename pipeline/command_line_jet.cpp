@@ -1,12 +1,10 @@
 #include <fmt/format.h>
 
-#include <algorithm>
-
+#include "pipeline/command_keys.h"
 #include "pipeline/command_line.h"
 #include "pipeline/console.h"
 #include "pipeline/interrupt.h"
 #include "pipeline/jet.h"
-#include "pipeline/job_keys.h"
 #include "pipeline/job_toml.h"
 #include "pipeline/output_directory.h"
 #include "pipeline/progress.h"
@@ -16,20 +14,7 @@
 namespace lamina::pipeline {
 namespace {
 
-template <class Target>
-void add_options(std::span<const Key<Target>> keys, const Target& presets, CommandSpec& spec) {
-  for (const Key<Target>& key : keys) {
-    if (key.flag.empty()) continue;
-    std::string preset = key.value.empty() ? std::string() : key.write(presets);
-    if (key.section == "bed") std::ranges::replace(preset, ',', 'x');
-    const std::string_view group = key.section == "part" || key.section == "place" ? "Parts"
-                                   : key.section == "load"                         ? "Repair"
-                                   : key.section == "run"                          ? "Run"
-                                                                                   : "Bed and layers";
-    spec.options.push_back({std::string(key.flag), std::string(key.value), std::string(key.meaning), preset,
-                            std::string(group)});
-  }
-}
+const KeyChoice kJetKeys = {"bed", "layers", "place", "image", "load", "run", "part"};
 
 CommandSpec jet_spec() {
   CommandSpec spec;
@@ -39,12 +24,7 @@ CommandSpec jet_spec() {
       "bottom, and a manifest.json. The same parts and options give the same bytes on every machine.";
   spec.operand = "PART";
   spec.operand_meaning = "STL, OBJ or 3MF files, STL and OBJ gzipped too; they replace the parts of --job";
-  spec.options = {{"--job", "FILE", "a TOML job; options override what it says", "", "Job"},
-                  {"--save-job", "FILE", "write the job as resolved, to be run again with --job", "", "Job"},
-                  {"--set", "KEY=VALUE", "set any key of the job, as in --set bed.dpi=600; part.2.copies is of part 2", "",
-                   "Job"}};
-  add_options<Job>(job_keys(), Job(), spec);
-  add_options<PartRequest>(part_keys(), PartRequest(), spec);
+  add_key_options(kJetKeys, spec);
   for (const auto& [flag, meaning] :
        {std::pair{"--resume", "go on with an interrupted job; finished layers whose hash holds are kept"},
         {"--overwrite", "replace an earlier job in the directory"},
@@ -70,49 +50,17 @@ CommandSpec jet_spec() {
   return spec;
 }
 
-Error at_option(std::string_view flag, const std::string& what) {
-  return {Fault::kUsage, fmt::format("{}: {}", flag.substr(flag.rfind(',') + 1), what)};
-}
-
 Result<Job> resolve(const Arguments& arguments) {
-  Job job;
-  if (arguments.has("--job")) {
-    if (Status status = read_job(arguments.text("--job"), job); !status) return status.error();
-  }
-  if (!arguments.operands.empty()) {
-    job.parts.clear();
-    for (const std::string& path : arguments.operands) {
-      job.parts.emplace_back();
-      job.parts.back().path = path;
-    }
-  }
-  for (const std::string& assignment : arguments.all("--set")) {
-    if (Status status = set_key(job, assignment); !status) return status.error();
-  }
-  for (const JobKey& key : job_keys()) {
-    if (key.flag.empty() || !arguments.has(key.flag)) continue;
-    const std::string text = key.value.empty() ? std::string(key.switch_text) : arguments.text(key.flag);
-    if (const std::string wrong = key.read(text, job); !wrong.empty()) return at_option(key.flag, wrong);
-  }
-  for (const PartKey& key : part_keys()) {
-    if (key.flag.empty() || !arguments.has(key.flag)) continue;
-    if (key.flag == "--at" && job.parts.size() > 1) {
-      return at_option(key.flag, fmt::format("is for a single part, here are {}; set at_mm of each [[part]] in a job file",
-                                             job.parts.size()));
-    }
-    PartRequest unused;
-    if (const std::string wrong = key.read(arguments.text(key.flag), unused); !wrong.empty()) {
-      return at_option(key.flag, wrong);
-    }
-    for (PartRequest& part : job.parts) key.read(arguments.text(key.flag), part);
-  }
+  Result<Job> read = read_job_options(kJetKeys, arguments);
+  if (!read) return read;
+  Job& job = *read;
   job.resume = arguments.has("--resume");
   job.overwrite = arguments.has("--overwrite");
   job.dry_run = arguments.has("--dry-run");
   job.json = arguments.has("--json");
   job.quiet = arguments.has("--quiet");
   if (Status status = check_job(job); !status) return status.error();
-  return job;
+  return read;
 }
 
 Error interrupted(const Job& job) {

@@ -1,11 +1,12 @@
 // pipeline/job_keys.h: every key of a job file, once: its name, its flag, how it is read and how it is written.
 //
-// Options, job files, --set, --save-job, the manifest and the help are made from these two tables.
+// Options (command_keys.h), job files, --set, --save-job, the manifest and the help are made from these two tables.
 #pragma once
 
 #include <span>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "pipeline/job.h"
 
@@ -36,7 +37,15 @@ struct Key {
 using JobKey = Key<Job>;
 using PartKey = Key<PartRequest>;
 
+/// All keys of a job, the groups below one after the other; keys of a section stand together.
 std::span<const JobKey> job_keys();
 std::span<const PartKey> part_keys();
+
+// --- the groups, one file each: job_keys_<group>.cpp
+std::span<const JobKey> bed_keys();
+std::span<const JobKey> place_keys();
+std::span<const JobKey> image_keys();
+std::span<const JobKey> load_keys();
+std::span<const JobKey> run_keys();
 
 }  // namespace lamina::pipeline

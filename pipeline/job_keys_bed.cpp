@@ -1,0 +1,43 @@
+#include "pipeline/job_keys.h"
+#include "pipeline/key_text.h"
+
+namespace lamina::pipeline {
+namespace {
+
+using Form = KeyForm;
+using Text = std::string_view;
+
+std::string read_dpi(std::string_view text, Job& job) {
+  const auto pieces = split(text, ",x");
+  if (pieces.size() > 2) return fmt::format("'{}' is not one or two numbers; write 1200 or 1200x600", text);
+  std::array<std::int64_t, 2> dpi{};
+  for (std::size_t i = 0; i < 2; ++i) {
+    if (auto wrong = read_whole(pieces[std::min(i, pieces.size() - 1)], 1, 25400, dpi[i]); !wrong.empty()) return wrong;
+  }
+  job.dpi = dpi;
+  return {};
+}
+
+const JobKey kBedKeys[] = {
+    {"bed", "size_mm", "--bed", "WIDTHxDEPTH", "size of the bed in mm; the image covers all of it", true,
+     [](Text t, Job& j) { return read_pair(t, kLeastMm, kMostMm, " mm", j.bed_mm); },
+     [](const Job& j) { return write_list(j.bed_mm); }, Form::kList},
+    {"bed", "dpi", "--dpi", "DPI|XxY", "pixels per inch along x and y, each 1 to 25400", true, read_dpi,
+     [](const Job& j) { return fmt::format("{},{}", j.dpi[0], j.dpi[1]); }, Form::kList},
+    {"layers", "thickness_mm", "--layer", "MM", "thickness of a layer in mm", true,
+     [](Text t, Job& j) { return read_number(t, kLeastMm, kMostMm, " mm", j.layer_mm); },
+     [](const Job& j) { return number_text(j.layer_mm); }, Form::kBare},
+};
+
+const JobKey kPlaceKeys[] = {
+    {"place", "gap_mm", "--gap", "MM", "between parts and copies that are arranged, in mm", true,
+     [](Text t, Job& j) { return read_number(t, 0, kMostMm, " mm", j.gap_mm); },
+     [](const Job& j) { return number_text(j.gap_mm); }, Form::kBare},
+};
+
+}  // namespace
+
+std::span<const JobKey> bed_keys() { return kBedKeys; }
+std::span<const JobKey> place_keys() { return kPlaceKeys; }
+
+}  // namespace lamina::pipeline
