@@ -88,7 +88,7 @@ class LayerWorkshop {
     const StageTimer timer(sums.encode);
     if (!work.encoder) work.encoder = format_.make_encoder();
     work.file.clear();
-    if (auto status = work.encoder->encode(work.runs, job_.dpi[0], job_.dpi[1], work.file); !status) {
+    if (auto status = work.encoder->encode(work.runs, rasterizer_.grid().x.dpi(), rasterizer_.grid().y.dpi(), work.file); !status) {
       return Error{status.error().fault, fmt::format("layer {}: {}", outcome.record.layer.index, status.error().message)};
     }
     outcome.record.bytes = work.file.size();
@@ -263,7 +263,7 @@ Result<JetSummary> run_jet(const Job& job, const ProgressCallback& progress, con
   auto manifest = ManifestWriter::open(job.output + "/" + manifest_name(job), head,
                                        std::vector<LayerRecord>(kept, prefix_end));
   if (!manifest) return manifest.error();
-  const double pixel_mm2 = 25.4 * 25.4 / static_cast<double>(job.dpi[0] * job.dpi[1]);
+  const double pixel_mm2 = 25.4 * 25.4 / (grid.x.dpi() * grid.y.dpi());
   const auto count = [&](const LayerRecord& record) {
     summary.set_pixels += record.set_pixels;
     summary.set_volume_mm3 += static_cast<double>(record.set_pixels) * pixel_mm2 * mm(record.layer.thickness);

@@ -44,6 +44,12 @@ std::string part_text(const PartSummary& part) {
       point_text(part.bounds.lo), point_text(part.bounds.hi), notes);
 }
 
+// Whole dpi as a number; another grid as the dots that a span of nm holds.
+std::string axis_text(const PixelAxis& axis) {
+  if (axis.span == kNmPerInch) return fmt::format("{}", axis.dots);
+  return fmt::format("\"{} in {} nm\"", axis.dots, axis.span);
+}
+
 // The head without what differs between shards of one job.
 std::string lasting_text(const ManifestHead& head) {
   std::string parts;
@@ -52,7 +58,7 @@ std::string lasting_text(const ManifestHead& head) {
       "\"lamina\": {},\n\"job\": {},\n\"bed_mm\": [{}, {}],\n\"dpi\": [{}, {}],\n\"columns\": {},\n\"rows\": {},\n"
       "\"format\": {},\n\"extension\": {},\n\"fill_rule\": {},\n\"mirror\": {},\n\"layer_count\": {},\n\"parts\": [\n{}\n],\n",
       json_string(head.version), json_string(head.job_toml), exact_mm(head.grid.x.length), exact_mm(head.grid.y.length),
-      head.grid.x.dpi, head.grid.y.dpi, head.grid.columns(), head.grid.rows(), json_string(head.format),
+      axis_text(head.grid.x), axis_text(head.grid.y), head.grid.columns(), head.grid.rows(), json_string(head.format),
       json_string(head.extension), json_string(head.fill_rule), json_string(head.mirror), head.layer_count, parts);
 }
 

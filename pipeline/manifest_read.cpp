@@ -1,7 +1,9 @@
 // Reads manifests, line by line: a hundred thousand layers cost their records and no document tree.
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <charconv>
+#include <cstdio>
 #include <fstream>
 #include <nlohmann/json.hpp>
 
@@ -21,6 +23,15 @@ Point3 point_from(const json& coordinates) {
   return {nm(0), nm(1), nm(2)};
 }
 
+PixelAxis axis_from(const json& dots, const json& millimetres) {
+  const std::int64_t length = nm_from_json(millimetres);
+  if (!dots.is_string()) return PixelAxis(dots.get<std::int64_t>(), length);
+  long long in_span = 1, span = kNmPerInch;
+  const std::string text = dots;
+  std::sscanf(text.c_str(), "%lld in %lld nm", &in_span, &span);
+  return PixelAxis(std::max(1LL, in_span), length, std::max(1LL, span));
+}
+
 // Throws json::exception where something is missing or of another type.
 ManifestHead head_from(const json& text) {
   ManifestHead head;
@@ -30,8 +41,8 @@ ManifestHead head_from(const json& text) {
   head.extension = text.at("extension");
   head.fill_rule = text.at("fill_rule");
   head.mirror = text.at("mirror");
-  head.grid.x = PixelAxis(text.at("dpi").at(0).get<std::int64_t>(), nm_from_json(text.at("bed_mm").at(0)));
-  head.grid.y = PixelAxis(text.at("dpi").at(1).get<std::int64_t>(), nm_from_json(text.at("bed_mm").at(1)));
+  head.grid.x = axis_from(text.at("dpi").at(0), text.at("bed_mm").at(0));
+  head.grid.y = axis_from(text.at("dpi").at(1), text.at("bed_mm").at(1));
   head.layer_count = text.at("layer_count");
   head.first_layer = text.at("range").at(0);
   head.last_layer = text.at("range").at(1);

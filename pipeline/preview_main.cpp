@@ -108,8 +108,8 @@ std::string title_of(const ManifestHead& head) {
     if (head.parts.size() > 1) title += fmt::format(" and {} more", head.parts.size() - 1);
     title += "   |   ";
   }
-  return title + fmt::format("{} layers   |   {} x {} dpi   |   bed {:g} x {:g} mm", head.layer_count, head.grid.x.dpi,
-                             head.grid.y.dpi, mm(head.grid.x.length), mm(head.grid.y.length));
+  return title + fmt::format("{} layers   |   {:g} x {:g} dpi   |   bed {:g} x {:g} mm", head.layer_count,
+                             head.grid.x.dpi(), head.grid.y.dpi(), mm(head.grid.x.length), mm(head.grid.y.length));
 }
 
 int run_preview(const std::vector<std::string>& texts) {

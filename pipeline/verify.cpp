@@ -34,13 +34,13 @@ std::string fault_of_image(const std::string& path, const std::string& name, con
     return fmt::format("{}: {} x {} pixels, the manifest says {} x {}", name, columns, rows, head.grid.columns(),
                        head.grid.rows());
   }
-  const auto dpi_differs = [](double dpi, std::int64_t recorded) {
+  const auto dpi_differs = [](double dpi, double recorded) {
     // PNG stores whole pixels a metre, so that 600 dpi reads as 599.999.
-    return dpi != 0 && std::abs(dpi - static_cast<double>(recorded)) > 0.02;
+    return dpi != 0 && std::abs(dpi - recorded) > 0.02;
   };
-  if (dpi_differs(image->dpi_x, head.grid.x.dpi) || dpi_differs(image->dpi_y, head.grid.y.dpi)) {
-    return fmt::format("{}: {} x {} dpi, the manifest says {} x {}", name, image->dpi_x, image->dpi_y, head.grid.x.dpi,
-                       head.grid.y.dpi);
+  if (dpi_differs(image->dpi_x, head.grid.x.dpi()) || dpi_differs(image->dpi_y, head.grid.y.dpi())) {
+    return fmt::format("{}: {} x {} dpi, the manifest says {} x {}", name, image->dpi_x, image->dpi_y, head.grid.x.dpi(),
+                       head.grid.y.dpi());
   }
   const std::uint64_t set = set_pixels(image->runs);
   if (set != record.set_pixels) {

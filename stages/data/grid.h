@@ -7,26 +7,33 @@
 
 namespace lamina {
 
-/// Pixel centres along one side of the bed. Centre i lies at floor((2 i + 1) * 25400000 / (2 dpi)) nm from the
-/// origin of the bed; the last pixel may reach past the bed's edge.
+/// Pixel centres along one side of the bed. Centre i lies at floor((2 i + 1) * span / (2 dots)) nm from the origin of
+/// the bed; the last pixel may reach past the bed's edge. Whole dpi are dots in the span of an inch; the grid of a
+/// tilted head, which is no whole dpi, is 1000 dots in a span of 1000 pixels (so that its pitch is whole picometres).
 struct PixelAxis {
-  std::int64_t dpi = 0;      // 1 .. 25400
-  std::int64_t length = 0;   // nm, bed side, 1 .. kNmReach
-  std::uint32_t count = 0;   // ceil(length * dpi / 25400000)
+  std::int64_t dots = 0;           // 1 .. 25400
+  std::int64_t length = 0;         // nm, bed side, 1 .. kNmReach
+  std::int64_t span = kNmPerInch;  // nm that hold `dots` pixels, 1 .. 10^12; a pixel is at least 1000 nm
+  std::uint32_t count = 0;         // ceil(length * dots / span)
 
   PixelAxis() = default;
-  PixelAxis(std::int64_t dots_per_inch, std::int64_t length_nm)
-      : dpi(dots_per_inch),
+  PixelAxis(std::int64_t dots_in_span, std::int64_t length_nm, std::int64_t span_nm = kNmPerInch)
+      : dots(dots_in_span),
         length(length_nm),
-        count(static_cast<std::uint32_t>(ceil_div(length_nm * dots_per_inch, kNmPerInch))) {}
+        span(span_nm),
+        count(static_cast<std::uint32_t>(ceil_div(length_nm * dots_in_span, span_nm))) {}
+
+  /// For reports, tags and first guesses; whole where the span is an inch.
+  constexpr double dpi() const { return static_cast<double>(dots) * kNmPerInch / static_cast<double>(span); }
+  constexpr double pixels_per_nm() const { return static_cast<double>(dots) / static_cast<double>(span); }
 
   /// nm of the centre of pixel i.
-  constexpr std::int64_t centre(std::int64_t i) const { return (2 * i + 1) * kNmPerInch / (2 * dpi); }
+  constexpr std::int64_t centre(std::int64_t i) const { return (2 * i + 1) * span / (2 * dots); }
 
   /// The first pixel whose centre is at or beyond `nm` (not clamped to 0 .. count).
   /// floor(q) >= nm is q >= nm for a whole nm, so no rounding enters.
   constexpr std::int64_t first_at_or_beyond(std::int64_t nm) const {
-    return ceil_div(nm * 2 * dpi - kNmPerInch, 2 * kNmPerInch);
+    return ceil_div(nm * 2 * dots - span, 2 * span);
   }
 };
 

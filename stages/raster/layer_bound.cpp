@@ -20,7 +20,7 @@ LayerBound::LayerBound(std::span<const PlacedMesh> placed, const PixelGrid& grid
   slab_height_ = top / kSlabs + 1;
 
   using Differences = std::vector<std::array<std::int64_t, 2>>;  // segments, crossings
-  const double rows_per_nm = static_cast<double>(grid.y.dpi) / kNmPerInch;
+  const double rows_per_nm = grid.y.pixels_per_nm();
   const double slabs_per_nm = 1.0 / static_cast<double>(slab_height_);
   for (const auto& [key, count] : copies) {
     const ClusteredMesh& mesh = *key.first;

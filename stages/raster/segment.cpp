@@ -67,8 +67,8 @@ Above corners_above(const Cluster& cluster, Nm z) {
 PixelSampling::PixelSampling(const PixelGrid& grid)
     : x(grid.x),
       y(grid.y),
-      columns_per_nm(static_cast<double>(grid.x.dpi) / kNmPerInch),
-      rows_per_nm(static_cast<double>(grid.y.dpi) / kNmPerInch),
+      columns_per_nm(grid.x.pixels_per_nm()),
+      rows_per_nm(grid.y.pixels_per_nm()),
       near_x(kNearNm * columns_per_nm),
       near_y(kNearNm * rows_per_nm),
       row_centre(std::size_t{grid.rows()} + 1) {

@@ -25,7 +25,7 @@ class ImageEncoder {
   /// dpi_x, dpi_y  written into the file's resolution tags
   /// errors        kOutput if the format cannot hold the image (its limits are named in the message)
   /// Set pixels are printed as 1 = jet: min-is-white in TIFF, black in PBM, 1 in PNG's palette (see the format's README).
-  virtual Status encode(const RunsView& runs, std::int64_t dpi_x, std::int64_t dpi_y, Bytes& file) = 0;
+  virtual Status encode(const RunsView& runs, double dpi_x, double dpi_y, Bytes& file) = 0;
 };
 
 /// One row of the registry.

@@ -28,7 +28,7 @@ Int128 plane_side(const Triangle& t, Int128 x, Int128 y, Int128 z) {
 Runs reference_layer(std::span<const Triangle> triangles, const PixelGrid& grid, Nm plane, FillRule rule) {
   const std::int64_t columns = grid.columns(), rows = grid.rows();
   const auto centre = [](const PixelAxis& axis, std::int64_t i) {
-    return ((2 * i + 1) * 25400000) / (2 * axis.dpi);
+    return ((2 * i + 1) * axis.span) / (2 * axis.dots);
   };
   std::vector<std::map<std::int64_t, int>> steps(static_cast<std::size_t>(rows));  // column -> change of winding
   for (const Triangle& t : triangles) {
@@ -41,8 +41,8 @@ Runs reference_layer(std::span<const Triangle> triangles, const PixelGrid& grid,
     if (cut.empty()) continue;
     const std::int64_t lo = std::min({t.a.y, t.b.y, t.c.y}), hi = std::max({t.a.y, t.b.y, t.c.y});
     // Rows outside of the facet's own box cannot be crossed; estimated generously.
-    const std::int64_t first = std::max<std::int64_t>(0, lo * grid.y.dpi / 25400000 - 3);
-    const std::int64_t last = std::min<std::int64_t>(rows, hi * grid.y.dpi / 25400000 + 3);
+    const std::int64_t first = std::max<std::int64_t>(0, lo * grid.y.dots / grid.y.span - 3);
+    const std::int64_t last = std::min<std::int64_t>(rows, hi * grid.y.dots / grid.y.span + 3);
     for (std::int64_t row = first; row < last; ++row) {
       const std::int64_t y = centre(grid.y, row);
       if (end_is_at_or_before(cut[0].first, cut[0].second, plane, y) ==

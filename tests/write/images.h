@@ -125,8 +125,8 @@ inline std::string load(const std::string& path) {
 }
 
 /// The file of an image, or no bytes if the encoder refuses.
-inline Bytes encoded(const ImageFormat& format, const RunsView& runs, std::int64_t dpi_x = 1200,
-                     std::int64_t dpi_y = 600) {
+inline Bytes encoded(const ImageFormat& format, const RunsView& runs, double dpi_x = 1200,
+                     double dpi_y = 600) {
   Bytes file;
   if (!format.make_encoder()->encode(runs, dpi_x, dpi_y, file)) file.clear();
   return file;

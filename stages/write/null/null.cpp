@@ -5,7 +5,7 @@ namespace {
 
 class NullEncoder : public ImageEncoder {
  public:
-  Status encode(const RunsView&, std::int64_t, std::int64_t, Bytes& file) override {
+  Status encode(const RunsView&, double, double, Bytes& file) override {
     file.clear();
     return {};
   }

@@ -11,8 +11,8 @@ namespace {
 
 class PbmEncoder : public ImageEncoder {
  public:
-  Status encode(const RunsView& runs, std::int64_t dpi_x, std::int64_t dpi_y, Bytes& file) override {
-    const std::string head = fmt::format("P4\n# lamina dpi {} {}\n{} {}\n", dpi_x, dpi_y, runs.columns, runs.rows());
+  Status encode(const RunsView& runs, double dpi_x, double dpi_y, Bytes& file) override {
+    const std::string head = fmt::format("P4\n# lamina dpi {:.10g} {:.10g}\n{} {}\n", dpi_x, dpi_y, runs.columns, runs.rows());
     const std::size_t stride = row_bytes(runs.columns);
     file.resize(head.size() + stride * runs.rows());
     std::memcpy(file.data(), head.data(), head.size());

@@ -61,8 +61,8 @@ Result<PixelWindow> shown_window(const SheetRequest& request) {
 }
 
 std::string shown_size(const PixelWindow& window, const PixelGrid& grid) {
-  const auto size = [](double pixels, std::int64_t dpi) { return pixels * 25.4 / static_cast<double>(dpi); };
-  return fmt::format("{:.1f} x {:.1f} mm", size(window.width(), grid.x.dpi), size(window.height(), grid.y.dpi));
+  const auto size = [](double pixels, double dpi) { return pixels * 25.4 / dpi; };
+  return fmt::format("{:.1f} x {:.1f} mm", size(window.width(), grid.x.dpi()), size(window.height(), grid.y.dpi()));
 }
 
 /// The longest beginning of `line` that fits, with dots if it is cut.

@@ -51,18 +51,18 @@ PixelWindow with_margin(const PixelWindow& window, const PixelGrid& grid) {
   const PixelWindow bed{0, grid.columns(), 0, grid.rows()};
   if (window.empty()) return bed;
   // 4 % of the longer side in mm, at least 3 pixels.
-  const double side = std::max(static_cast<double>(window.width()) / static_cast<double>(grid.x.dpi),
-                               static_cast<double>(window.height()) / static_cast<double>(grid.y.dpi));
-  const auto x = static_cast<std::uint32_t>(std::max(3.0, side * 0.04 * static_cast<double>(grid.x.dpi)));
-  const auto y = static_cast<std::uint32_t>(std::max(3.0, side * 0.04 * static_cast<double>(grid.y.dpi)));
+  const double side = std::max(static_cast<double>(window.width()) / grid.x.dpi(),
+                               static_cast<double>(window.height()) / grid.y.dpi());
+  const auto x = static_cast<std::uint32_t>(std::max(3.0, side * 0.04 * grid.x.dpi()));
+  const auto y = static_cast<std::uint32_t>(std::max(3.0, side * 0.04 * grid.y.dpi()));
   return {window.left - std::min(window.left, x), std::min(bed.right, window.right + x),
           window.top - std::min(window.top, y), std::min(bed.bottom, window.bottom + y)};
 }
 
 SheetLayout lay_out(int cells, const PixelWindow& window, const PixelGrid& grid, int width) {
   const double scale = std::clamp(width / kDesignWidth, kLeastScale, kMostScale);
-  const double proportion = static_cast<double>(window.height()) / static_cast<double>(grid.y.dpi) *
-                            static_cast<double>(grid.x.dpi) / static_cast<double>(window.width());
+  const double proportion = static_cast<double>(window.height()) / grid.y.dpi() *
+                            grid.x.dpi() / static_cast<double>(window.width());
   if (cells == 1) {
     const SheetLayout frame = with_columns(1, 1, proportion, width, scale);
     // A layer alone is not made larger than its pixels, but its caption needs some room.

@@ -48,7 +48,7 @@ void append(png_structp png, png_bytep data, png_size_t length) {
 void flush_nothing(png_structp) {}
 
 /// Pixels a metre, as pHYs has them, rounded to the nearest.
-std::uint32_t per_metre(std::int64_t dpi) { return static_cast<std::uint32_t>((dpi * 10'000 + 127) / 254); }
+std::uint32_t per_metre(double dpi) { return static_cast<std::uint32_t>((dpi * 10'000 + 127) / 254); }
 
 /// No object of this frame needs its destructor run when libpng jumps out.
 bool write_image(png_structp png, png_infop info, const RunsView& runs, std::uint32_t per_metre_x,
@@ -75,7 +75,7 @@ bool write_image(png_structp png, png_infop info, const RunsView& runs, std::uin
 
 class PngEncoder : public ImageEncoder {
  public:
-  Status encode(const RunsView& runs, std::int64_t dpi_x, std::int64_t dpi_y, Bytes& file) override {
+  Status encode(const RunsView& runs, double dpi_x, double dpi_y, Bytes& file) override {
     const auto failure = [&](std::string_view why) {
       return Error{Fault::kOutput,
                    fmt::format("PNG cannot hold a layer of {} x {} pixels: {}", runs.columns, runs.rows(), why)};

@@ -36,7 +36,7 @@ Status check_size(const RunsView& runs) {
   return {};
 }
 
-void set_tags(TIFF* tiff, const RunsView& runs, std::int64_t dpi_x, std::int64_t dpi_y, std::uint16_t compression,
+void set_tags(TIFF* tiff, const RunsView& runs, double dpi_x, double dpi_y, std::uint16_t compression,
               std::uint32_t rows_per_strip) {
   TIFFSetField(tiff, TIFFTAG_IMAGEWIDTH, runs.columns);
   TIFFSetField(tiff, TIFFTAG_IMAGELENGTH, runs.rows());
@@ -47,8 +47,8 @@ void set_tags(TIFF* tiff, const RunsView& runs, std::int64_t dpi_x, std::int64_t
   TIFFSetField(tiff, TIFFTAG_ORIENTATION, ORIENTATION_TOPLEFT);
   TIFFSetField(tiff, TIFFTAG_SAMPLESPERPIXEL, 1);
   TIFFSetField(tiff, TIFFTAG_ROWSPERSTRIP, rows_per_strip);
-  TIFFSetField(tiff, TIFFTAG_XRESOLUTION, static_cast<double>(dpi_x));
-  TIFFSetField(tiff, TIFFTAG_YRESOLUTION, static_cast<double>(dpi_y));
+  TIFFSetField(tiff, TIFFTAG_XRESOLUTION, dpi_x);
+  TIFFSetField(tiff, TIFFTAG_YRESOLUTION, dpi_y);
   TIFFSetField(tiff, TIFFTAG_PLANARCONFIG, PLANARCONFIG_CONTIG);
   TIFFSetField(tiff, TIFFTAG_RESOLUTIONUNIT, RESUNIT_INCH);
   TIFFSetField(tiff, TIFFTAG_SOFTWARE, "lamina");  // without a version: releases do not change the bytes of layers
@@ -71,7 +71,7 @@ Status finish(TiffHandle tiff, bool strips_written, MemoryFile& memory, const Ru
 
 class G4Encoder : public ImageEncoder {
  public:
-  Status encode(const RunsView& runs, std::int64_t dpi_x, std::int64_t dpi_y, Bytes& file) override {
+  Status encode(const RunsView& runs, double dpi_x, double dpi_y, Bytes& file) override {
     if (Status status = check_size(runs); !status) return status;
     file.resize(file.capacity());
     const std::size_t end = encoder_.encode(runs, file, kHeaderBytes);
@@ -96,7 +96,7 @@ class StripEncoder : public ImageEncoder {
  public:
   explicit StripEncoder(std::uint16_t compression) : compression_(compression) {}
 
-  Status encode(const RunsView& runs, std::int64_t dpi_x, std::int64_t dpi_y, Bytes& file) override {
+  Status encode(const RunsView& runs, double dpi_x, double dpi_y, Bytes& file) override {
     if (Status status = check_size(runs); !status) return status;
     const std::size_t stride = row_bytes(runs.columns);
     if (compression_ == COMPRESSION_NONE && stride * runs.rows() > kMostClassicBytes - kStripBytes) {
