@@ -1,0 +1,30 @@
+// stages/data/clipping.h: unions and offsets of contours, on Clipper's integers.
+//
+// The library is A. Johnson's Clipper 6.4.2 (Debian's polyclipping), which works on whole numbers: corners of the
+// operands stay where they are, new corners are rounded to the nearest nm.
+#pragma once
+
+#include "stages/data/contours.h"
+#include "stages/data/fill_rule.h"
+#include "stages/data/status.h"
+
+namespace lamina {
+
+/// How the corners of an offset that open outwards are made.
+enum class OffsetJoin : std::uint8_t {
+  kMiter,  // sharp, up to twice the distance from the corner, then cut off
+  kRound   // an arc, off by at most 1 micrometre
+};
+
+/// The region that `contours`, of any orientation and overlap, mean by `rule`, as clean contours, outer ones before
+/// the holes in them.
+/// errors  kInternal if Clipper refuses the contours
+/// cost    O((P + X) log P) for P points and X crossings
+Result<Contours> unite_contours(const ContoursView& contours, FillRule rule);
+
+/// The region of clean contours grown by `distance` nm, shrunk where it is negative, as clean contours; pieces that
+/// shrink away are gone. Contours keep their distance to within 1 nm of rounding where they are straight.
+/// errors  kInternal if Clipper refuses the contours
+Result<Contours> offset_contours(const ContoursView& contours, std::int64_t distance, OffsetJoin join = OffsetJoin::kMiter);
+
+}  // namespace lamina

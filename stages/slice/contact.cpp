@@ -1,0 +1,126 @@
+#include "stages/slice/contact.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+namespace lamina::slice {
+namespace {
+
+int side(Point2 a, Point2 b, Point2 p) {
+  // Coordinates of a bed differ by less than 2^31, so nothing overflows.
+  const std::int64_t area = (std::int64_t{b.x} - a.x) * (std::int64_t{p.y} - a.y) -
+                            (std::int64_t{b.y} - a.y) * (std::int64_t{p.x} - a.x);
+  return area > 0 ? 1 : area < 0 ? -1 : 0;
+}
+
+/// Whether stretches ab and cd share a point, ends included.
+bool meet(Point2 a, Point2 b, Point2 c, Point2 d) {
+  if (std::max(a.x, b.x) < std::min(c.x, d.x) || std::max(c.x, d.x) < std::min(a.x, b.x) ||
+      std::max(a.y, b.y) < std::min(c.y, d.y) || std::max(c.y, d.y) < std::min(a.y, b.y)) {
+    return false;
+  }
+  // Boxes meet, so collinear stretches do.
+  return side(a, b, c) * side(a, b, d) <= 0 && side(c, d, a) * side(c, d, b) <= 0;
+}
+
+/// Square cells of 2^shift nm over the box of all points.
+struct Grid {
+  std::int64_t x0, y0;
+  std::uint32_t shift;
+  std::uint32_t columns, rows;
+
+  std::int64_t column(std::int64_t x) const { return (x - x0) >> shift; }
+  std::int64_t row(std::int64_t y) const { return (y - y0) >> shift; }
+
+  /// Calls act(cell) for every cell that the stretch ab touches, and at most a few more.
+  template <class Act>
+  void for_each_cell(Point2 a, Point2 b, Act&& act) const {
+    if (a.y > b.y) std::swap(a, b);
+    const std::int64_t first = row(a.y), last = row(b.y);
+    const auto put = [&](std::int64_t r, std::int64_t from, std::int64_t to) {
+      for (std::int64_t c = from; c <= to; ++c) act(static_cast<std::size_t>(r * columns + c));
+    };
+    const std::int64_t low = std::min(column(a.x), column(b.x)), high = std::max(column(a.x), column(b.x));
+    if (first == last || low == high) {
+      for (std::int64_t r = first; r <= last; ++r) put(r, low, high);
+      return;
+    }
+    const double slope = (static_cast<double>(b.x) - a.x) / (static_cast<double>(b.y) - a.y);
+    for (std::int64_t r = first; r <= last; ++r) {
+      // Where the stretch is while in this row, and 2 nm more than rounding can move it.
+      const double from_y = static_cast<double>(std::max<std::int64_t>(y0 + (r << shift), a.y) - a.y);
+      const double to_y = static_cast<double>(std::min<std::int64_t>(y0 + ((r + 1) << shift), b.y) - a.y);
+      double from_x = a.x + slope * from_y, to_x = a.x + slope * to_y;
+      if (from_x > to_x) std::swap(from_x, to_x);
+      put(r, std::max(low, column(static_cast<std::int64_t>(from_x) - 2)),
+          std::min(high, column(static_cast<std::int64_t>(to_x) + 2)));
+    }
+  }
+};
+
+Grid make_grid(const ContoursView& contours) {
+  Point2 lo = contours.point[0], hi = lo;
+  double length = 0;
+  for (std::uint32_t c = 0; c < contours.size(); ++c) {
+    Point2 before = contours[c].back();
+    for (const Point2 p : contours[c]) {
+      lo = {std::min(lo.x, p.x), std::min(lo.y, p.y)};
+      hi = {std::max(hi.x, p.x), std::max(hi.y, p.y)};
+      length += std::abs(static_cast<double>(p.x) - before.x) + std::abs(static_cast<double>(p.y) - before.y);
+      before = p;
+    }
+  }
+  Grid grid{lo.x, lo.y, 0, 0, 0};
+  const auto edges = static_cast<double>(contours.point.size());
+  const auto width = static_cast<double>(std::int64_t{hi.x} - lo.x), height = static_cast<double>(std::int64_t{hi.y} - lo.y);
+  // As long as an edge on average, but no more than two cells an edge.
+  double cell = std::max(length / edges, std::sqrt(width * height / (2 * edges)));
+  while (static_cast<double>(1ull << grid.shift) < cell && grid.shift < 31) ++grid.shift;
+  grid.columns = static_cast<std::uint32_t>(grid.column(hi.x)) + 1;
+  grid.rows = static_cast<std::uint32_t>(grid.row(hi.y)) + 1;
+  return grid;
+}
+
+}  // namespace
+
+bool have_contact(const ContoursView& contours, ContactScratch& scratch) {
+  if (contours.size() == 0) return false;
+  const std::span<const Point2> point = contours.point;
+  scratch.next.resize(point.size());
+  for (std::uint32_t c = 0; c < contours.size(); ++c) {
+    for (std::uint32_t i = contours.offset[c]; i + 1 < contours.offset[c + 1]; ++i) scratch.next[i] = i + 1;
+    scratch.next[contours.offset[c + 1] - 1] = contours.offset[c];
+  }
+  const Grid grid = make_grid(contours);
+  const std::size_t cells = std::size_t{grid.columns} * grid.rows;
+  scratch.offset.assign(cells + 1, 0);
+  for (std::uint32_t i = 0; i < point.size(); ++i) {
+    grid.for_each_cell(point[i], point[scratch.next[i]], [&](std::size_t cell) { ++scratch.offset[cell]; });
+  }
+  std::uint32_t total = 0;
+  for (std::uint32_t& offset : scratch.offset) total += std::exchange(offset, total);
+  scratch.edge.resize(total);
+  // An edge is compared with those that came into its cells before it.
+  Buffer<std::uint32_t>& place = scratch.offset;
+  const auto begin_of = [&](std::size_t cell) { return cell == 0 ? 0u : place[cell - 1]; };
+  for (std::uint32_t i = 0; i < point.size(); ++i) {
+    const Point2 a = point[i], b = point[scratch.next[i]];
+    grid.for_each_cell(a, b, [&](std::size_t cell) { scratch.edge[place[cell]++] = i; });
+  }
+  for (std::size_t cell = 0; cell < cells; ++cell) {
+    const std::uint32_t end = place[cell];
+    for (std::uint32_t k = begin_of(cell); k + 1 < end; ++k) {
+      const std::uint32_t i = scratch.edge[k], after = scratch.next[i];
+      const Point2 a = point[i], b = point[after];
+      for (std::uint32_t m = k + 1; m < end; ++m) {
+        const std::uint32_t j = scratch.edge[m];
+        if (j == after || scratch.next[j] == i || j == i) continue;
+        if (meet(a, b, point[j], point[scratch.next[j]])) return true;
+      }
+    }
+  }
+  return false;
+}
+
+}  // namespace lamina::slice
