@@ -1,0 +1,89 @@
+// stages/data/machine.h: a powder printer as its profile describes it. Plain values, units in the names.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+namespace lamina {
+
+enum class BedShape : std::uint8_t { kRectangle, kRound };
+enum class ScanAxis : std::uint8_t { kX, kY };
+/// A side of the bed as seen from above: x grows to the right, y to the back.
+enum class Side : std::uint8_t { kLeft, kRight, kFront, kBack };
+/// What becomes of the pixels of a nozzle that does not fire.
+enum class BlockedRule : std::uint8_t {
+  kReport,     // they are left out and counted
+  kNeighbour,  // they go to the same column of the next nozzle on either side, where that pixel is free
+  kSecondPass  // a further sweep, shifted by whole nozzles, fires them: the layer stays exact
+};
+/// Where a nozzle's firing is aimed at along the scan.
+enum class LagUnit : std::uint8_t { kPixel, kTick };
+/// Where the first swath of a layer begins.
+enum class FirstSwath : std::uint8_t { kBed, kLayer };
+/// Which vat feeds a layer that holds both materials.
+enum class VatRule : std::uint8_t { kFirst, kSecond, kMajority, kBoth };
+
+/// Everything that a profile says. Checked by program::make_head_grid and program::check_machine.
+struct Machine {
+  std::string name, description;
+  std::string dialect = "nuferbj";
+
+  struct Bed {
+    BedShape shape = BedShape::kRectangle;
+    std::array<double, 2> size_mm{100, 100};  // of a round bed: its diameter, twice
+    double build_height_mm = 100;
+  } bed;
+
+  struct Head {
+    std::uint32_t nozzles = 128;
+    double pitch_um = 137.1;               // between neighbouring nozzles, along the row
+    std::vector<double> row_offset_um{0};  // nozzle i lies in row i mod rows, so far behind the first row
+    double highest_frequency_hz = 5000;    // of one nozzle
+    double drop_pl = 50;
+    std::vector<std::uint32_t> blocked;    // numbers from 0
+    BlockedRule blocked_rule = BlockedRule::kReport;
+  } head;
+
+  struct Mounting {
+    double tilt_deg = 90;    // of the row of nozzles against the X axis; not used if dpi is set
+    double dpi = 0;          // across the scan: the tilt follows from it; 0: the dpi follow from the tilt
+    double along_dpi = 0;    // along the scan; 0: as across, or ticks_per_pixel
+    ScanAxis scan_axis = ScanAxis::kX;
+    Side scan_from = Side::kLeft;  // where a forward sweep begins: left or right for x, front or back for y
+    Side nozzle_0 = Side::kBack;   // where nozzle 0 lies: back or front for x, left or right for y
+    bool first_leads = true;       // nozzle 0 goes ahead on a forward sweep, else the last nozzle
+    std::uint32_t passes = 1;         // interlaced sweeps a swath: dpi across is so many times that of the head
+    std::uint32_t overlap_lines = 0;  // that neighbouring swaths share
+    FirstSwath first_swath = FirstSwath::kBed;
+    std::array<double, 2> offset_mm{0, 0};  // carriage position minus bed position of nozzle 0
+  } mounting;
+
+  struct Motion {
+    double encoder_um = 0;              // a tick along the scan; 0: none, sweeps step by pixels
+    std::uint32_t ticks_per_pixel = 0;  // whole ticks; 0: pixels are not tied to ticks
+    LagUnit lag_unit = LagUnit::kPixel;
+    bool both_directions = false;       // every other sweep runs backwards
+    double scan_speed_mm_s = 100, travel_speed_mm_s = 200;
+    double ramp_mm = 5;                 // before the first and behind the last step of a sweep
+    double layer_step_um = 1;           // of the build vat
+    std::array<double, 2> safe_mm{0, 0};
+    std::string x_axis = "X", y_axis = "Y";
+  } motion;
+
+  struct Powder {
+    std::uint32_t vats = 1;
+    VatRule vat_rule = VatRule::kMajority;
+    std::string build_axis = "Z";
+    std::vector<std::string> feed_axes{"A", "B"};
+    std::string roller_axis = "U";
+    double build_sign = 1, feed_sign = 1;  // of the axis when the build vat goes down, when a feed vat goes up
+    double dose = 1.2;                     // height fed / height of the layer
+    std::array<double, 2> roller_mm{0, 200};  // home and far end
+    double roller_speed_mm_s = 50, vat_speed_mm_s = 5;
+    double binder_share = 0.6;  // packing of the powder bed, for the report
+  } powder;
+};
+
+}  // namespace lamina

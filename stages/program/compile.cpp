@@ -1,0 +1,183 @@
+#include "stages/program/compile.h"
+
+#include <algorithm>
+
+#include "stages/program/line_sets.h"
+
+namespace lamina::program {
+namespace {
+
+/// One layer while it is compiled.
+class Layer {
+ public:
+  Layer(const HeadGrid& grid, const RunsView& image, CompileScratch& scratch, const EmitSweep& emit)
+      : grid_(grid), scratch_(scratch), emit_(emit), blocked_(grid.nozzles, false) {
+    for (const std::uint32_t nozzle : grid.blocked) blocked_[nozzle] = true;
+    scratch.made_used = 0;
+    const RunsView frame = to_scan_frame(grid, image, scratch.scan);
+    scratch.line.resize(grid.lines);
+    for (std::uint32_t l = 0; l < grid.lines; ++l) scratch.line[l] = frame.row(l);
+    scratch.nozzle.assign(grid.nozzles, Line());
+    if (grid.first_swath == FirstSwath::kLayer) {
+      while (first_ + 1 < grid.lines && scratch.line[first_].empty()) ++first_;
+    }
+    stride_ = grid.swath_lines() - grid.overlap;
+    swaths_ = grid.swaths(first_);
+  }
+
+  Result<ProgramCount> run() {
+    if (!grid_.blocked.empty() && grid_.blocked_rule != BlockedRule::kSecondPass) settle_dead_lines();
+    settled_ = scratch_.made_used;
+    const std::uint32_t regular = swaths_ * grid_.passes;
+    further_ = regular;
+    for (std::uint32_t swath = 0; swath < swaths_; ++swath) {
+      for (std::uint32_t pass = 0; pass < grid_.passes; ++pass) {
+        scratch_.made_used = settled_;
+        Sweep sweep{swath * grid_.passes + pass, regular, swath, pass, false, first_line(swath, pass)};
+        for (std::uint32_t i = 0; i < grid_.nozzles; ++i) scratch_.nozzle[i] = under(swath, pass, i);
+        if (Status status = make(sweep); !status) return status.error();
+      }
+      if (grid_.blocked_rule == BlockedRule::kSecondPass && !grid_.blocked.empty()) {
+        if (Status status = further_sweeps(swath); !status) return status.error();
+      }
+    }
+    return count_;
+  }
+
+ private:
+  std::int64_t first_line(std::uint32_t swath, std::uint32_t pass) const {
+    return std::int64_t{first_} + std::int64_t{swath} * stride_ + pass;
+  }
+
+  /// Another line, in a buffer that lives as long as the layer.
+  Buffer<std::uint32_t>& new_line() {
+    if (scratch_.made_used == scratch_.made.size()) scratch_.made.emplace_back();
+    Buffer<std::uint32_t>& line = scratch_.made[scratch_.made_used++];
+    line.clear();
+    return line;
+  }
+
+  bool nozzle_blocked(std::uint32_t line_in_swath) const { return blocked_[line_in_swath / grid_.passes]; }
+
+  /// Whether no swath can fire a line.
+  bool dead(std::uint32_t line) const {
+    const std::uint32_t from_first = line - first_;
+    const std::uint32_t swath = std::min(from_first / stride_, swaths_ - 1);
+    const std::uint32_t own = from_first - swath * stride_;
+    if (!nozzle_blocked(own)) return false;
+    return swath == 0 || own >= grid_.overlap || nozzle_blocked(own + stride_);
+  }
+
+  /// What nozzle i of a sweep has to fire.
+  Line under(std::uint32_t swath, std::uint32_t pass, std::uint32_t i) {
+    const std::uint32_t own = pass + i * grid_.passes;  // line in the swath
+    const std::int64_t line = first_line(swath, pass) + std::int64_t{i} * grid_.passes;
+    if (line >= grid_.lines || blocked_[i]) return {};
+    const auto number = static_cast<std::uint32_t>(line);
+    const Line whole = scratch_.line[number];
+    const bool lower = swath > 0 && own < grid_.overlap, upper = swath + 1 < swaths_ && own >= stride_;
+    if (whole.empty() || (!lower && !upper)) return whole;
+    if (nozzle_blocked(lower ? own + stride_ : own - stride_)) return whole;  // the other swath cannot
+    const std::uint32_t place = lower ? own : own - stride_;
+    const std::uint32_t share = (grid_.overlap - place) * 64 / (grid_.overlap + 1);
+    Buffer<std::uint32_t>& part = new_line();
+    divide(whole, number, share, upper, part);
+    return part;
+  }
+
+  Status make(Sweep& sweep) {
+    ++count_.sweeps;
+    if (!fire(grid_, scratch_.nozzle, scratch_.fire, scratch_.vectors)) {
+      ++count_.skipped;
+      return {};
+    }
+    sweep.backward = grid_.both_directions && backward_;
+    backward_ = !backward_;
+    for (const Line line : scratch_.nozzle) count_.drops += pixels_of(line);
+    const SweepVectors& vectors = scratch_.vectors;
+    const std::uint64_t* word = vectors.bits.data();
+    for (std::uint32_t s = 0; s < vectors.steps; ++s) {
+      std::uint64_t any = 0;
+      for (std::uint32_t w = 0; w < vectors.words; ++w) any |= *word++;
+      count_.vectors += any != 0;
+    }
+    return emit_(sweep, vectors);
+  }
+
+  // Left out, or moved to the line of the next nozzle where that is free.
+  void settle_dead_lines() {
+    const std::int64_t next = grid_.passes;
+    for (std::uint32_t l = first_; l < grid_.lines; ++l) {
+      if (scratch_.line[l].empty() || !dead(l)) continue;
+      Line left = scratch_.line[l];
+      scratch_.line[l] = {};
+      for (const std::int64_t neighbour : {l - next, l + next}) {
+        if (grid_.blocked_rule != BlockedRule::kNeighbour || left.empty()) break;
+        if (neighbour < first_ || neighbour >= grid_.lines || dead(static_cast<std::uint32_t>(neighbour))) continue;
+        Line& target = scratch_.line[static_cast<std::size_t>(neighbour)];
+        Buffer<std::uint32_t>& both = new_line();
+        combine(target, left, LineOperation::kUnion, both);
+        Buffer<std::uint32_t>& added = new_line();
+        combine(left, target, LineOperation::kDifference, added);
+        Buffer<std::uint32_t>& rest = new_line();  // was set in both
+        combine(left, added, LineOperation::kDifference, rest);
+        count_.moved += pixels_of(added);
+        target = both;
+        left = rest;
+      }
+      count_.lost += pixels_of(left);
+    }
+  }
+
+  // The head shifted by d nozzles: nozzle j + d is where nozzle j was.
+  Status further_sweeps(std::uint32_t swath) {
+    std::uint32_t further_pass = grid_.passes;
+    for (std::uint32_t pass = 0; pass < grid_.passes; ++pass) {
+      std::vector<std::uint32_t> waiting;
+      for (const std::uint32_t j : grid_.blocked) {
+        const std::int64_t line = first_line(swath, pass) + std::int64_t{j} * grid_.passes;
+        if (line < grid_.lines && !scratch_.line[line].empty() && dead(static_cast<std::uint32_t>(line)) &&
+            owns(swath, pass + j * grid_.passes)) {
+          waiting.push_back(j);
+        }
+      }
+      for (std::int64_t d = 1; !waiting.empty(); d = d > 0 ? -d : 1 - d) {
+        std::fill(scratch_.nozzle.begin(), scratch_.nozzle.end(), Line());
+        const std::size_t before = waiting.size();
+        std::erase_if(waiting, [&](std::uint32_t j) {
+          const std::int64_t other = j + d;
+          if (other < 0 || other >= grid_.nozzles || blocked_[static_cast<std::size_t>(other)]) return false;
+          scratch_.nozzle[static_cast<std::size_t>(other)] =
+              scratch_.line[first_line(swath, pass) + std::int64_t{j} * grid_.passes];
+          return true;
+        });
+        if (waiting.size() == before) continue;
+        Sweep sweep{further_++, swaths_ * grid_.passes, swath, further_pass++, false,
+                    first_line(swath, pass) - d * grid_.passes};
+        if (Status status = make(sweep); !status) return status;
+      }
+    }
+    return {};
+  }
+
+  /// Of two swaths that share a line that neither can fire, the lower one sees to it.
+  bool owns(std::uint32_t swath, std::uint32_t own) const { return swath + 1 == swaths_ || own < stride_; }
+
+  const HeadGrid& grid_;
+  CompileScratch& scratch_;
+  const EmitSweep& emit_;
+  std::vector<bool> blocked_;
+  std::uint32_t first_ = 0, stride_ = 0, swaths_ = 0, further_ = 0;
+  std::size_t settled_ = 0;  // made lines that are needed to the end of the layer
+  bool backward_ = false;
+  ProgramCount count_;
+};
+
+}  // namespace
+
+Result<ProgramCount> compile(const HeadGrid& grid, const RunsView& image, CompileScratch& scratch,
+                             const EmitSweep& emit) {
+  return Layer(grid, image, scratch, emit).run();
+}
+
+}  // namespace lamina::program

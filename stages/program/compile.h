@@ -1,0 +1,46 @@
+// stages/program/compile.h: one layer's image becomes the sweeps that jet it.
+#pragma once
+
+#include <deque>
+#include <functional>
+#include <vector>
+
+#include "stages/data/program.h"
+#include "stages/data/runs.h"
+#include "stages/data/status.h"
+#include "stages/program/fire.h"
+#include "stages/program/scan_frame.h"
+
+namespace lamina::program {
+
+/// Kept from layer to layer.
+struct CompileScratch {
+  ScanScratch scan;
+  FireScratch fire;
+  SweepVectors vectors;
+  Buffer<Line> line;                        // every line of the layer
+  std::vector<Line> nozzle;                 // what is under each nozzle of a sweep
+  std::deque<Buffer<std::uint32_t>> made;   // lines that are not those of the image: shared or moved ones
+  std::size_t made_used = 0;
+};
+
+/// Called for every sweep that fires, in the order in which the machine makes them.
+using EmitSweep = std::function<Status(const Sweep&, const SweepVectors&)>;
+
+/// Compiles a layer. Every set pixel fires exactly once and no other one, whatever the angle, passes and overlap; with
+/// blocked nozzles the difference is `lost` and `moved` of the result, by the rule of the grid.
+///
+/// image     of grid.image's size
+/// swaths    from the first line of the bed or of the layer, each as many lines as the head has nozzles (times passes),
+///           neighbours sharing `overlap` lines. A line that two swaths share is divided between them by an ordered
+///           pattern of 64 places that turns from line to line, whose share goes from all to none over the overlap.
+///           Sweeps that would fire nothing are skipped; with both directions every other sweep that is left runs back.
+/// blocked   lines that no nozzle of any swath can fire, by rule: left out; moved pixel by pixel to the line of the next
+///           nozzle before or else behind it, where that pixel is free; or fired by further sweeps of the same swath with
+///           the head shifted by whole nozzles, the shortest shift first.
+/// errors    those of `emit`, which end the layer
+/// cost      of fire() for each sweep; memory is one sweep's vectors
+Result<ProgramCount> compile(const HeadGrid& grid, const RunsView& image, CompileScratch& scratch,
+                             const EmitSweep& emit);
+
+}  // namespace lamina::program

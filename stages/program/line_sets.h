@@ -1,0 +1,30 @@
+// stages/program/line_sets.h: unions and differences of lines, and the pattern that divides a line between two swaths.
+#pragma once
+
+#include <cstdint>
+
+#include "stages/data/buffer.h"
+#include "stages/program/fire.h"
+
+namespace lamina::program {
+
+enum class LineOperation : std::uint8_t { kUnion, kDifference };
+
+/// Appends what is set in either line, or in `one` and not in `other`. cost  linear
+void combine(Line one, Line other, LineOperation operation, Buffer<std::uint32_t>& result);
+
+std::uint64_t pixels_of(Line line);
+
+/// Whether the upper of two swaths fires a place of a line that they share. `share` of 64 places, evenly spread.
+constexpr bool upper_fires(std::uint64_t line, std::uint32_t place, std::uint32_t share) {
+  const std::uint32_t turned = (place + static_cast<std::uint32_t>(line) * 23) & 63;
+  // The order 0, 32, 16, 48, ... puts each further place into the largest gap.
+  const std::uint32_t order = ((turned & 1) << 5) | ((turned & 2) << 3) | ((turned & 4) << 1) | ((turned & 8) >> 1) |
+                              ((turned & 16) >> 3) | ((turned & 32) >> 5);
+  return order < share;
+}
+
+/// Appends the places of a line that the upper (or the lower) swath fires.
+void divide(Line line, std::uint64_t number, std::uint32_t share, bool upper, Buffer<std::uint32_t>& result);
+
+}  // namespace lamina::program

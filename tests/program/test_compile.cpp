@@ -1,0 +1,282 @@
+#include "stages/program/compile.h"
+
+#include <gtest/gtest.h>
+
+#include <fstream>
+#include <map>
+#include <sstream>
+
+#include "tests/program/machines.h"
+
+namespace lamina::program {
+namespace {
+
+using testing::Image;
+using testing::random_image;
+using testing::runs_of;
+using testing::small_machine;
+using testing::SlowHead;
+
+const Image kFigure = {{1, 0, 0, 1}, {0, 1, 0, 1}, {1, 1, 0, 0}, {0, 0, 1, 0}};
+
+struct Fired {
+  Sweep sweep;
+  std::uint32_t step;
+  std::string bits;
+};
+
+std::vector<Fired> vectors_of(const HeadGrid& grid, const Image& image, ProgramCount* count = nullptr) {
+  std::vector<Fired> all;
+  CompileScratch scratch;
+  const Runs runs = runs_of(image);
+  const auto result = compile(grid, runs, scratch, [&](const Sweep& sweep, const SweepVectors& vectors) -> Status {
+    for (std::uint32_t s = 0; s < vectors.steps; ++s) {
+      std::string bits;
+      for (std::uint32_t i = 0; i < grid.nozzles; ++i) bits += '0' + int(vectors.bits[s * vectors.words + i / 64] >> i % 64 & 1);
+      all.push_back({sweep, vectors.first_step + s, bits});
+    }
+    return {};
+  });
+  EXPECT_TRUE(result.ok());
+  if (count != nullptr) *count = *result;
+  return all;
+}
+
+HeadGrid grid_of(const Machine& machine) {
+  const auto grid = make_head_grid(machine);
+  EXPECT_TRUE(grid.ok()) << (grid.ok() ? "" : grid.error().message);
+  return *grid;
+}
+
+TEST(TiltedHead, FourNozzlesAtFortyFiveDegreesGiveTheVectorsOfTheArticle) {
+  const HeadGrid grid = grid_of(small_machine(4, 45, 4, 4));
+  ASSERT_EQ(grid.places, 4u);
+  ASSERT_EQ(grid.lines, 4u);
+  EXPECT_EQ(grid.lag, (std::vector<std::uint32_t>{0, 1, 2, 3}));
+  EXPECT_EQ(grid.steps(), 7u);
+  std::map<std::uint32_t, std::string> fired;
+  for (const Fired& one : vectors_of(grid, kFigure)) fired[one.step] = one.bits;
+  std::ifstream file(std::string(LAMINA_TEST_DIR) + "/reference/puppi2021/vectors_4x4.tsv");
+  ASSERT_TRUE(file);
+  std::string line;
+  int rows = 0;
+  while (std::getline(file, line)) {
+    if (line.empty() || line[0] == '#' || line[0] == 's') continue;
+    std::istringstream fields(line);
+    std::int64_t step = 0, control[4];
+    int bit[4];
+    fields >> step;
+    for (auto& c : control) fields >> c;
+    for (auto& b : bit) fields >> b;
+    ASSERT_FALSE(fields.fail());
+    const auto s = static_cast<std::uint32_t>(step);
+    std::string expected;
+    for (const int b : bit) expected += static_cast<char>('0' + b);
+    EXPECT_EQ(fired.contains(s) ? fired[s] : "0000", expected) << "step " << step;
+    for (std::uint32_t i = 0; i < 4; ++i) EXPECT_EQ(step - std::int64_t{grid.lag[i]}, control[i]);
+    ++rows;
+  }
+  EXPECT_EQ(rows, 7);
+}
+
+TEST(TiltedHead, ASecondBandUsesOnlyTheNozzlesThatAreOverTheImage) {
+  Image tall = kFigure;
+  tall.push_back({1, 1, 1, 1});
+  tall.push_back({0, 1, 1, 0});
+  const HeadGrid grid = grid_of(small_machine(4, 45, 4, 6));
+  EXPECT_EQ(grid.swaths(0), 2u);
+  std::vector<std::string> second;
+  for (const Fired& one : vectors_of(grid, tall)) {
+    if (one.sweep.swath == 1) second.push_back(one.bits);
+  }
+  EXPECT_EQ(second, (std::vector<std::string>{"1000", "1000", "1100", "1100"}));  // steps 0 to 3; step 4 is zero
+}
+
+TEST(TiltedHead, EquationOneAtThirtyOneDegreesScansColumnsFromTheFront) {
+  Machine machine = small_machine(4, 31, 1, 1);
+  machine.mounting.scan_axis = ScanAxis::kY;
+  machine.mounting.scan_from = Side::kFront;
+  machine.mounting.nozzle_0 = Side::kLeft;
+  const double pixel = 137.1e-3 * std::cos(31 * 3.14159265358979 / 180);
+  machine.bed.size_mm = {4 * pixel - 1e-4, 4 * pixel - 1e-4};
+  const HeadGrid grid = grid_of(machine);
+  EXPECT_EQ(grid.lag, (std::vector<std::uint32_t>{0, 1, 1, 2}));
+  // Row 0 of the model is the lowest, so it is the last row here.
+  const Image image = {kFigure[3], kFigure[2], kFigure[1], kFigure[0]};
+  std::map<std::uint32_t, std::string> fired;
+  for (const Fired& one : vectors_of(grid, image)) fired[one.step] = one.bits;
+  const std::vector<std::string> model = {"1000", "0000", "1101", "0101", "0010", "0000"};
+  for (std::uint32_t b = 0; b < model.size(); ++b) {
+    EXPECT_EQ(fired.contains(b) ? fired[b] : "0000", model[b]) << "b " << b;
+  }
+  machine.head.nozzles = 128;
+  EXPECT_EQ(grid_of(machine).most_lag, 76u);
+  EXPECT_NEAR(grid_of(machine).lag_pixels, std::tan(31 * 3.14159265358979 / 180), 1e-6);
+}
+
+TEST(TiltedHead, ThirtyOneDegreesAgainstTheScanIsThreeHundredAndSixtyDpi) {
+  Machine machine = small_machine(128, 31, 100, 100);
+  const HeadGrid grid = grid_of(machine);
+  EXPECT_NEAR(25.4e6 / grid.line_nm, 359.7, 0.05);
+  EXPECT_NEAR(grid.lag_pixels, 1.664, 0.0005);
+  const std::vector<std::uint32_t> first(grid.lag.begin(), grid.lag.begin() + 6);
+  EXPECT_EQ(first, (std::vector<std::uint32_t>{0, 2, 3, 5, 7, 8}));
+  machine.mounting.dpi = 360;
+  EXPECT_NEAR(grid_of(machine).angle_deg, 30.97, 0.01);
+  EXPECT_NEAR(grid_of(machine).lag_pixels, 5.0 / 3, 0.002);
+}
+
+TEST(TiltedHead, FortyFiveDegreesByTheGeneralRuleIsTheSpecialCaseForAllNozzles) {
+  for (const auto axis : {ScanAxis::kX, ScanAxis::kY}) {
+    Machine machine = small_machine(128, 45, 300, 300);
+    machine.mounting.scan_axis = axis;
+    machine.mounting.scan_from = axis == ScanAxis::kX ? Side::kLeft : Side::kFront;
+    machine.mounting.nozzle_0 = axis == ScanAxis::kX ? Side::kBack : Side::kLeft;
+    const HeadGrid grid = grid_of(machine);
+    for (std::uint32_t i = 0; i < 128; ++i) EXPECT_EQ(grid.lag[i], i);
+    EXPECT_EQ(grid.steps(), grid.places + 127u);
+    EXPECT_NEAR(25.4e6 / grid.line_nm, 262.0, 0.05);
+  }
+}
+
+/// Random mountings, images, overlaps, passes and blocked nozzles, fired drop by drop.
+class RandomMachine {
+ public:
+  explicit RandomMachine(std::uint32_t seed) : random(seed) {
+    const double tilts[] = {90, 45, 31, 59, 75.5, 120, 150, 90};
+    const std::uint32_t nozzles = 1 + random() % 150;
+    machine = small_machine(nozzles, 90, 20 + random() % 300, 10 + random() % 300);
+    machine.mounting.tilt_deg = tilts[random() % 8];
+    machine.mounting.scan_axis = random() % 2 ? ScanAxis::kX : ScanAxis::kY;
+    const bool x = machine.mounting.scan_axis == ScanAxis::kX;
+    if (!x) machine.mounting.tilt_deg = 90 - machine.mounting.tilt_deg;
+    machine.mounting.scan_from = x ? (random() % 2 ? Side::kLeft : Side::kRight) : (random() % 2 ? Side::kFront : Side::kBack);
+    machine.mounting.nozzle_0 = x ? (random() % 2 ? Side::kBack : Side::kFront) : (random() % 2 ? Side::kLeft : Side::kRight);
+    machine.mounting.first_leads = random() % 2;
+    machine.mounting.passes = 1 + random() % 3;
+    machine.mounting.overlap_lines = random() % 2 ? random() % (nozzles * machine.mounting.passes / 2 + 1) : 0;
+    machine.mounting.first_swath = random() % 2 ? FirstSwath::kBed : FirstSwath::kLayer;
+    machine.motion.both_directions = random() % 2;
+    if (random() % 3 == 0) {
+      machine.motion.encoder_um = 17.3;
+      machine.motion.ticks_per_pixel = 1 + random() % 5;
+      machine.motion.lag_unit = random() % 2 ? LagUnit::kTick : LagUnit::kPixel;
+    }
+    if (random() % 3 == 0 && machine.mounting.tilt_deg == 90 && x) machine.head.row_offset_um = {0, 400.5, 137};
+  }
+  testing::Random random;
+  Machine machine;
+};
+
+TEST(Compile, EverySetPixelIsFiredOnceAndNoOtherWhateverTheMounting) {
+  for (std::uint32_t seed = 0; seed < 300; ++seed) {
+    RandomMachine setup(seed);
+    const HeadGrid grid = grid_of(setup.machine);
+    const Image image = random_image(setup.random, grid.image.columns(), grid.image.rows());
+    const Runs runs = runs_of(image);
+    SlowHead head(setup.machine, grid);
+    CompileScratch scratch;
+    std::uint32_t emitted = 0;
+    const auto count = compile(grid, runs, scratch, [&](const Sweep& sweep, const SweepVectors& vectors) -> Status {
+      ++emitted;
+      EXPECT_EQ(sweep.of, grid.swaths(setup.machine.mounting.first_swath == FirstSwath::kBed
+                                          ? 0 : static_cast<std::uint32_t>(sweep.first_line - sweep.pass -
+                                                sweep.swath * (grid.swath_lines() - grid.overlap))) * grid.passes);
+      head.sweep(sweep, vectors);
+      return {};
+    });
+    ASSERT_TRUE(count.ok());
+    ASSERT_EQ(head.fired, image) << "seed " << seed;
+    EXPECT_EQ(head.outside, 0u);
+    EXPECT_EQ(head.drops, set_pixels(runs));
+    EXPECT_EQ(count->drops, head.drops);
+    EXPECT_EQ(count->sweeps - count->skipped, emitted);
+    EXPECT_EQ(count->moved + count->lost, 0u);
+  }
+}
+
+TEST(Compile, BothWaysToVectorsGiveTheSameBits) {
+  for (std::uint32_t seed = 0; seed < 200; ++seed) {
+    RandomMachine setup(seed);
+    const HeadGrid grid = grid_of(setup.machine);
+    FireScratch scratch;
+    std::vector<Buffer<std::uint32_t>> places(grid.nozzles);
+    std::vector<Line> lines;
+    for (auto& line : places) {
+      const unsigned rarity = 1 + setup.random() % 40;
+      for (std::uint32_t p = 0; p <= grid.places; ++p) {
+        if (setup.random() % rarity == 0) line.push_back(p);
+      }
+      if (line.size() % 2) line.pop_back();
+      if (setup.random() % 4 == 0) line.clear();
+      lines.emplace_back(line);
+    }
+    SweepVectors changes, blocks;
+    ASSERT_EQ(fire(grid, lines, scratch, changes, FireWay::kChanges), fire(grid, lines, scratch, blocks, FireWay::kBlocks));
+    ASSERT_EQ(changes.first_step, blocks.first_step);
+    ASSERT_EQ(changes.bits, blocks.bits) << "seed " << seed;
+  }
+}
+
+TEST(Compile, WithBlockedNozzlesTheDifferenceIsExactlyWhatIsReported) {
+  for (std::uint32_t seed = 0; seed < 300; ++seed) {
+    RandomMachine setup(1000 + seed);
+    auto& head_profile = setup.machine.head;
+    if (head_profile.nozzles < 2) continue;
+    for (unsigned i = 0; i < 1 + setup.random() % 6 && head_profile.blocked.size() + 1 < head_profile.nozzles; ++i) {
+      head_profile.blocked.push_back(setup.random() % head_profile.nozzles);
+    }
+    const auto rule = static_cast<BlockedRule>(seed % 3);
+    head_profile.blocked_rule = rule;
+    const HeadGrid grid = grid_of(setup.machine);
+    const Image image = random_image(setup.random, grid.image.columns(), grid.image.rows());
+    const Runs runs = runs_of(image);
+    SlowHead head(setup.machine, grid);
+    CompileScratch scratch;
+    const auto count = compile(grid, runs, scratch, [&](const Sweep& sweep, const SweepVectors& vectors) -> Status {
+      head.sweep(sweep, vectors);
+      return {};
+    });
+    ASSERT_TRUE(count.ok());
+    std::uint64_t missing = 0, added = 0, twice = 0;
+    for (std::size_t r = 0; r < image.size(); ++r) {
+      for (std::size_t c = 0; c < image[r].size(); ++c) {
+        missing += image[r][c] > head.fired[r][c];
+        added += head.fired[r][c] == 1 && image[r][c] == 0;
+        twice += head.fired[r][c] > 1;
+      }
+    }
+    EXPECT_EQ(head.blocked_drops, 0u) << "seed " << seed;
+    EXPECT_EQ(twice, 0u) << "seed " << seed;
+    EXPECT_EQ(head.outside, 0u);
+    EXPECT_EQ(added, count->moved) << "seed " << seed;
+    EXPECT_EQ(missing, count->moved + count->lost) << "seed " << seed;
+    if (rule == BlockedRule::kReport) { EXPECT_EQ(added, 0u); }
+    if (rule == BlockedRule::kSecondPass) { EXPECT_EQ(missing, 0u) << "seed " << seed; }
+  }
+}
+
+TEST(HeadGrid, WhatCannotBePrintedIsOneLineThatNamesTheKey) {
+  const auto refused = [](auto change, const std::string& what) {
+    Machine machine = small_machine(128, 45, 100, 100);
+    change(machine);
+    const auto grid = make_head_grid(machine);
+    ASSERT_FALSE(grid.ok()) << what;
+    EXPECT_EQ(grid.error().fault, Fault::kUsage);
+    EXPECT_NE(grid.error().message.find(what), std::string::npos) << grid.error().message;
+    EXPECT_EQ(grid.error().message.find('\n'), std::string::npos);
+  };
+  refused([](Machine& m) { m.mounting.tilt_deg = 0; }, "mounting.tilt_deg: 0 degrees");
+  refused([](Machine& m) { m.mounting.tilt_deg = 180; }, "mounting.tilt_deg: 180 degrees");
+  refused([](Machine& m) { m.head.pitch_um = 0; }, "head.pitch_um");
+  refused([](Machine& m) { m.head.blocked.assign(129, 0); }, "head.blocked: 129 blocked nozzles of 128");
+  refused([](Machine& m) { m.head.blocked = {128}; }, "there is no nozzle 128");
+  refused([](Machine& m) { m.mounting.dpi = 100; }, "100 dpi across the scan cannot be reached");
+  refused([](Machine& m) { m.motion.scan_speed_mm_s = 1000; }, "motion.scan_speed_mm_s");
+  refused([](Machine& m) { m.mounting.overlap_lines = 65; }, "mounting.overlap_lines");
+  refused([](Machine& m) { m.mounting.scan_from = Side::kFront; }, "mounting.scan_from");
+  refused([](Machine& m) { m.head.row_offset_um = {0, 500}; }, "beside its line");
+}
+
+}  // namespace
+}  // namespace lamina::program
