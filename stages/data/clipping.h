@@ -27,4 +27,9 @@ Result<Contours> unite_contours(const ContoursView& contours, FillRule rule);
 /// errors  kInternal if Clipper refuses the contours
 Result<Contours> offset_contours(const ContoursView& contours, std::int64_t distance, OffsetJoin join = OffsetJoin::kMiter);
 
+/// The pieces of open lines that lie within clean contours, in any order and direction.
+/// lines   each of two points or more; not closed
+/// errors  kInternal if Clipper refuses them
+Result<Contours> clip_lines(const ContoursView& lines, const ContoursView& region);
+
 }  // namespace lamina

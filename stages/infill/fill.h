@@ -1,0 +1,30 @@
+// stages/infill/fill.h: contours of one body in one layer -> the beads that fill it.
+//
+//   contours ─> walls ─> region of bead centres ─> raster | closed curves | waves ─> toolpaths
+//
+// A pure function of its arguments: nothing is kept from layer to layer, so layers can be filled in any order and by
+// any number of threads.
+#pragma once
+
+#include "stages/data/contours.h"
+#include "stages/data/status.h"
+#include "stages/data/toolpaths.h"
+#include "stages/infill/parameters.h"
+
+namespace lamina::infill {
+
+/// Whether the parameters can fill anything at all; what one layer's heights make of them is checked there.
+/// errors  kUsage, one line that names what is wrong
+Status check(const FillParameters& parameters);
+
+/// Appends walls, then the filling.
+/// contours  clean, of one body
+/// errors    kUsage: a distance between lines that is not positive, a formula that fails; kInternal of Clipper
+Status append_fill(const ContoursView& contours, const FillContext& context, const FillParameters& parameters,
+                   Toolpaths& out);
+
+/// Where the centres of filling beads may lie: the contours moved inwards past the walls.
+/// errors  as append_fill
+Result<Contours> fill_region(const ContoursView& contours, const FillContext& context, const FillParameters& parameters);
+
+}  // namespace lamina::infill

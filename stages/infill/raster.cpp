@@ -1,0 +1,215 @@
+#include "stages/infill/raster.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+namespace lamina::infill {
+namespace {
+
+constexpr std::uint32_t kNone = UINT32_MAX;
+
+/// Where a line crosses an edge. The edge runs from point `edge` to the next one of its contour.
+struct Crossing {
+  double u;            // for ordering; off by less than 2^-20 nm
+  std::uint32_t edge;
+  bool enters;         // going towards +u
+};
+
+/// A stretch of a line inside the region.
+struct Stretch {
+  Nm begin, end;                       // u, nm, begin < end
+  std::uint32_t begin_edge, end_edge;  // that they lie on
+  bool laid = false;
+};
+
+class Scan {
+ public:
+  Scan(const ContoursView& region, const LinePlaces& places) : region_(region), point_(region.point), at_(places.at) {
+    next_.resize(point_.size());
+    previous_.resize(point_.size());
+    for (std::uint32_t c = 0; c < region.size(); ++c) {
+      const std::uint32_t begin = region.offset[c], end = region.offset[c + 1];
+      for (std::uint32_t i = begin; i < end; ++i) {
+        next_[i] = i + 1 == end ? begin : i + 1;
+        previous_[next_[i]] = i;
+      }
+    }
+    find_crossings();
+    find_stretches();
+  }
+
+  std::uint32_t lines() const { return static_cast<std::uint32_t>(at_.size()); }
+  std::uint32_t begin_of(std::uint32_t line) const { return offset_[line]; }
+  std::uint32_t end_of(std::uint32_t line) const { return offset_[line + 1]; }
+  Stretch& stretch(std::uint32_t i) { return stretch_[i]; }
+
+  /// Walks from the crossing of `line` with `edge` along the contour towards the next line. Returns the stretch of
+  /// that line which begins (or ends) where the walk arrives, and the contour's points on the way; kNone if there is
+  /// none, or if it is longer than `longest`.
+  std::uint32_t walk(std::uint32_t line, std::uint32_t edge, bool at_end, Point2 from, std::int64_t longest,
+                     Buffer<Point2>& way) {
+    way.clear();
+    if (line + 1 >= lines()) return kNone;
+    const std::int64_t here = at_[line], there = at_[line + 1];
+    double length = 0;
+    Point2 last = from;
+    // The end of a stretch lies on an edge that goes up, its begin on one that goes down: that one is walked back.
+    for (std::uint32_t e = edge;;) {
+      const std::uint32_t ahead = at_end ? next_[e] : e;  // the point that is walked to
+      const Point2 p = point_[ahead];
+      if (p.y > there) {  // crosses the next line
+        const std::uint32_t found = stretch_at(line + 1, e, at_end);
+        if (found == kNone) return kNone;
+        const Nm u = at_end ? stretch_[found].end : stretch_[found].begin;
+        length += std::hypot(static_cast<double>(u) - last.x, static_cast<double>(there) - last.y);
+        return length <= static_cast<double>(longest) ? found : kNone;
+      }
+      if (p.y <= here) return kNone;
+      length += std::hypot(static_cast<double>(p.x) - last.x, static_cast<double>(p.y) - last.y);
+      if (length > static_cast<double>(longest)) return kNone;
+      if (p != last) way.push_back(p);
+      last = p;
+      e = at_end ? next_[e] : previous_[e];
+    }
+  }
+
+ private:
+  std::uint32_t first_line_at_or_above(std::int64_t v) const {
+    return static_cast<std::uint32_t>(std::lower_bound(at_.begin(), at_.end(), v) - at_.begin());
+  }
+
+  /// count, scan, fill
+  void find_crossings() {
+    const auto for_each = [&](auto&& act) {
+      for (std::uint32_t e = 0; e < point_.size(); ++e) {
+        const Point2 a = point_[e], b = point_[next_[e]];
+        if (a.y == b.y) continue;
+        // A line at v is crossed if low <= v < high: an end on the line is below it.
+        const std::uint32_t first = first_line_at_or_above(std::min(a.y, b.y));
+        const std::uint32_t last = first_line_at_or_above(std::max(a.y, b.y));
+        for (std::uint32_t line = first; line < last; ++line) act(line, e, a, b);
+      }
+    };
+    crossing_offset_.assign(at_.size() + 1, 0);
+    for_each([&](std::uint32_t line, std::uint32_t, Point2, Point2) { ++crossing_offset_[line]; });
+    std::uint32_t total = 0;
+    for (std::uint32_t& offset : crossing_offset_) total += std::exchange(offset, total);
+    crossing_.resize(total);
+    Buffer<std::uint32_t> place(crossing_offset_.begin(), crossing_offset_.end());
+    for_each([&](std::uint32_t line, std::uint32_t e, Point2 a, Point2 b) {
+      const double share = static_cast<double>(at_[line] - a.y) / static_cast<double>(std::int64_t{b.y} - a.y);
+      const double u = a.x + share * static_cast<double>(std::int64_t{b.x} - a.x);
+      crossing_[place[line]++] = {u, e, b.y < a.y};
+    });
+    for (std::uint32_t line = 0; line < at_.size(); ++line) {
+      std::sort(crossing_.begin() + crossing_offset_[line], crossing_.begin() + crossing_offset_[line + 1],
+                [&](const Crossing& a, const Crossing& b) { return is_before(a, b, at_[line]); });
+    }
+  }
+
+  /// Crossing of an edge with a line as a fraction: numerator / denominator, denominator > 0.
+  std::pair<__int128, std::int64_t> exact(std::uint32_t e, std::int64_t v) const {
+    const Point2 a = point_[e], b = point_[next_[e]];
+    std::int64_t denominator = std::int64_t{b.y} - a.y;
+    __int128 numerator = static_cast<__int128>(std::int64_t{b.x} - a.x) * (v - a.y) +
+                         static_cast<__int128>(a.x) * denominator;
+    if (denominator < 0) {
+      denominator = -denominator;
+      numerator = -numerator;
+    }
+    return {numerator, denominator};
+  }
+
+  bool is_before(const Crossing& a, const Crossing& b, std::int64_t v) const {
+    if (std::abs(a.u - b.u) > 1e-3) [[likely]] return a.u < b.u;
+    const auto [na, da] = exact(a.edge, v);
+    const auto [nb, db] = exact(b.edge, v);
+    const __int128 left = na * db, right = nb * da;  // below 2^97
+    if (left != right) return left < right;
+    // Where the region touches itself the stretch goes on.
+    if (a.enters != b.enters) return a.enters;
+    return a.edge < b.edge;
+  }
+
+  /// The line's crossing rounded into the region.
+  Nm end_inside(const Crossing& crossing, std::int64_t v) const {
+    const auto [numerator, denominator] = exact(crossing.edge, v);
+    const __int128 d = denominator;
+    return static_cast<Nm>(crossing.enters ? ceil_div<__int128>(numerator, d) : floor_div<__int128>(numerator, d));
+  }
+
+  void find_stretches() {
+    offset_.assign(1, 0);
+    for (std::uint32_t line = 0; line < at_.size(); ++line) {
+      std::int32_t winding = 0;
+      Crossing begin{};
+      for (std::uint32_t i = crossing_offset_[line]; i < crossing_offset_[line + 1]; ++i) {
+        const Crossing& crossing = crossing_[i];
+        if (winding == 0) begin = crossing;
+        winding += crossing.enters ? 1 : -1;
+        if (winding != 0) continue;
+        const Nm from = end_inside(begin, at_[line]), to = end_inside(crossing, at_[line]);
+        if (from < to) stretch_.push_back({from, to, begin.edge, crossing.edge});
+      }
+      offset_.push_back(static_cast<std::uint32_t>(stretch_.size()));
+    }
+  }
+
+  std::uint32_t stretch_at(std::uint32_t line, std::uint32_t edge, bool at_end) const {
+    for (std::uint32_t i = offset_[line]; i < offset_[line + 1]; ++i) {
+      if ((at_end ? stretch_[i].end_edge : stretch_[i].begin_edge) == edge) return i;
+    }
+    return kNone;
+  }
+
+  const ContoursView& region_;
+  std::span<const Point2> point_;
+  const Buffer<std::int64_t>& at_;
+  Buffer<std::uint32_t> next_, previous_;
+  Buffer<std::uint32_t> crossing_offset_;
+  Buffer<Crossing> crossing_;
+  Buffer<std::uint32_t> offset_;  // lines + 1, into stretch_
+  Buffer<Stretch> stretch_;
+};
+
+}  // namespace
+
+void append_raster(const ContoursView& region, const LinePlaces& places, const Frame& frame,
+                   const RasterOptions& options, Toolpaths& out) {
+  if (region.size() == 0 || places.at.empty()) return;
+  Scan scan(region, places);
+  Buffer<Point2> way;
+  for (std::uint32_t first = 0; first < scan.lines(); ++first) {
+    for (std::uint32_t start = scan.begin_of(first); start < scan.end_of(first); ++start) {
+      if (scan.stretch(start).laid) continue;
+      std::uint32_t line = first, current = start;
+      const std::size_t points_before = out.point.size();
+      for (;;) {
+        Stretch& stretch = scan.stretch(current);
+        stretch.laid = true;
+        if (std::int64_t{stretch.end} - stretch.begin < options.shortest_line) break;
+        const std::int32_t number = places.first_number + static_cast<std::int32_t>(line);
+        const bool forwards = (number % 2 == 0) != frame.reversed();
+        const auto v = static_cast<Nm>(places.at[line]);
+        const Point2 from{forwards ? stretch.begin : stretch.end, v}, to{forwards ? stretch.end : stretch.begin, v};
+        out.add(frame.from(from), PathKind::kRaster, options.width, number);
+        const std::uint32_t found =
+            scan.walk(line, forwards ? stretch.end_edge : stretch.begin_edge, forwards, to, options.longest_link, way);
+        const bool links = found != kNone && !scan.stretch(found).laid &&
+                           std::int64_t{scan.stretch(found).end} - scan.stretch(found).begin >= options.shortest_line;
+        if (!links) {
+          out.add(frame.from(to), PathKind::kRaster, options.width, number);
+          break;
+        }
+        out.add(frame.from(to), PathKind::kLink, options.width);
+        for (const Point2 p : way) out.add(frame.from(p), PathKind::kLink, options.width);
+        current = found;
+        ++line;
+      }
+      if (out.point.size() > points_before) out.close();
+    }
+  }
+}
+
+}  // namespace lamina::infill

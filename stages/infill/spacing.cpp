@@ -1,0 +1,166 @@
+#include "stages/infill/spacing.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+#include "stages/infill/expression.h"
+
+namespace lamina::infill {
+namespace {
+
+constexpr std::int64_t kMostLines = 10'000'000;
+
+std::int64_t wrapped(std::int64_t i, std::int64_t size) { return ((i % size) + size) % size; }
+
+/// Gap of a height by the table, in proportion between its entries.
+std::int64_t by_table(const std::vector<std::pair<std::int64_t, Nm>>& table, std::int64_t z) {
+  const auto after = std::ranges::upper_bound(table, z, {}, &std::pair<std::int64_t, Nm>::first);
+  if (after == table.begin()) return table.front().second;
+  if (after == table.end()) return table.back().second;
+  const auto& [z0, g0] = *(after - 1);
+  const auto& [z1, g1] = *after;
+  return g0 + floor_div<std::int64_t>((std::int64_t{g1} - g0) * 2 * (z - z0) + (z1 - z0), 2 * (z1 - z0));
+}
+
+/// The distances from one line to the next.
+class Distances {
+ public:
+  static Result<Distances> make(const FillParameters& parameters, const FillContext& context, const Extent& extent) {
+    Distances distances(parameters, context, extent);
+    if (!parameters.gap_expression.empty() && parameters.distances.empty()) {
+      auto parsed = Expression::parse(parameters.gap_expression);
+      if (!parsed) return parsed.error();
+      distances.expression_.emplace(std::move(*parsed));
+    }
+    return distances;
+  }
+
+  /// From line i, which lies `place` nm from the part's side, to line i + 1. nm, > 0
+  Result<std::int64_t> operator()(std::int64_t i, std::int64_t place) {
+    std::int64_t distance = 0;
+    if (!parameters_.distances.empty()) {
+      const auto size = static_cast<std::int64_t>(parameters_.distances.size());
+      distance = parameters_.distances[static_cast<std::size_t>(wrapped(i, size))];
+    } else {
+      const auto gap = gap_after(i, place);
+      if (!gap) return gap;
+      distance = parameters_.width + *gap;
+    }
+    if (distance <= 0) {
+      return Error{Fault::kUsage,
+                   fmt::format("layer {}: line {} would lie {} mm from line {}, centre to centre; bead width plus gap has "
+                               "to be above 0", context_.layer.index, i + 1, mm(distance), i)};
+    }
+    return distance;
+  }
+
+ private:
+  Distances(const FillParameters& parameters, const FillContext& context, const Extent& extent)
+      : parameters_(parameters), context_(context), extent_(extent) {}
+
+  Result<std::int64_t> gap_after(std::int64_t i, std::int64_t place) {
+    const auto group = static_cast<std::int64_t>(parameters_.group);
+    if (wrapped(i + 1, group) != 0) return std::int64_t{0};
+    const std::int64_t z = std::int64_t{context_.layer.plane()} - context_.part.lo.z;
+    if (expression_) {
+      const auto height = static_cast<double>(context_.part.height()), length = static_cast<double>(extent_.length);
+      Expression::Variables variables;
+      variables.z = mm(z);
+      variables.h = height > 0 ? static_cast<double>(z) / height : 0;
+      variables.n = context_.layer.index + 1.0;
+      variables.a = static_cast<double>(layer_angle(parameters_, context_.layer.index)) * 1e-6;
+      variables.i = static_cast<double>(i);
+      variables.s = mm(place);
+      variables.u = length > 0 ? static_cast<double>(place) / length : 0;
+      const auto value = (*expression_)(variables);
+      if (!value) return value.error();
+      if (std::abs(*value) > mm(kNmReach)) {
+        return Error{Fault::kUsage, fmt::format("'{}': is {} mm in layer {}; gaps end at {} mm",
+                                                parameters_.gap_expression, *value, context_.layer.index, mm(kNmReach))};
+      }
+      return static_cast<std::int64_t>(std::llround(*value * static_cast<double>(kNmPerMm)));
+    }
+    if (!parameters_.gap_table.empty()) return by_table(parameters_.gap_table, z);
+    const std::int64_t turn = floor_div(i, group);
+    return std::int64_t{parameters_.gaps[static_cast<std::size_t>(
+        wrapped(turn, static_cast<std::int64_t>(parameters_.gaps.size())))]};
+  }
+
+  const FillParameters& parameters_;
+  const FillContext& context_;
+  const Extent& extent_;
+  std::optional<Expression> expression_;
+};
+
+/// Of the centre of the innermost wall from the surface; without walls as if there were one before the surface.
+std::int64_t wall_centre(const FillParameters& parameters) {
+  if (parameters.walls == 0) return -std::int64_t{parameters.width} / 2;
+  return (2 * std::int64_t{parameters.walls} - 1) * parameters.wall_width / 2;
+}
+
+}  // namespace
+
+Result<std::int64_t> first_place(const FillParameters& parameters, const FillContext& context, const Extent& extent) {
+  if (parameters.first_line) return std::int64_t{*parameters.first_line};
+  auto distances = Distances::make(parameters, context, extent);
+  if (!distances) return distances.error();
+  // As far from the wall as the line after a gap is from the one before it.
+  const std::int64_t before = parameters.distances.empty() ? std::int64_t{parameters.group} - 1 : -1;
+  const auto distance = (*distances)(before, wall_centre(parameters));
+  if (!distance) return distance;
+  return wall_centre(parameters) + *distance;
+}
+
+Result<LinePlaces> place_lines(const FillParameters& parameters, const FillContext& context, const Extent& extent) {
+  const auto first = first_place(parameters, context, extent);
+  if (!first) return first.error();
+  auto distances = Distances::make(parameters, context, extent);
+  if (!distances) return distances.error();
+  const std::int64_t shift = layer_stagger(parameters, context.layer.index);
+  // Places count from the part's side and without the stagger while lines are laid out.
+  const std::int64_t low = extent.low - extent.side - shift, high = extent.high - extent.side - shift;
+  const std::int64_t lowest = parameters.first_line ? std::max(low, *first - shift) : low;
+
+  const auto too_many = [&] {
+    return Error{Fault::kUsage, fmt::format("layer {}: more than {} lines; give wider beads or gaps",
+                                            context.layer.index, kMostLines)};
+  };
+  LinePlaces places;
+  Buffer<std::int64_t> before;
+  std::int64_t place = *first;
+  for (std::int64_t i = -1; place > lowest; --i) {
+    // Backwards: the distance is that of line i, asked where it would be if its gap were that of line i + 1.
+    const auto distance = (*distances)(i, place);
+    if (!distance) return distance.error();
+    place -= *distance;
+    if (place < lowest) break;
+    before.push_back(place);
+    if (static_cast<std::int64_t>(before.size()) > kMostLines) return too_many();
+  }
+  std::reverse(before.begin(), before.end());
+  std::int32_t number = -static_cast<std::int32_t>(before.size());
+  bool begun = false;
+  const auto add = [&](std::int64_t at) {
+    if (at >= lowest && at <= high) {
+      if (!begun) places.first_number = number;
+      begun = true;
+      places.at.push_back(at + extent.side + shift);
+    }
+    ++number;
+  };
+  for (const std::int64_t at : before) add(at);
+  place = *first;
+  for (std::int64_t i = 0; place <= high; ++i) {
+    add(place);
+    if (i > kMostLines) return too_many();
+    const auto distance = (*distances)(i, place);
+    if (!distance) return distance.error();
+    place += *distance;
+  }
+  return places;
+}
+
+}  // namespace lamina::infill

@@ -1,0 +1,34 @@
+// stages/infill/spacing.h: where the lines of a layer lie, across their direction.
+#pragma once
+
+#include <cstdint>
+
+#include "stages/data/buffer.h"
+#include "stages/data/status.h"
+#include "stages/infill/parameters.h"
+
+namespace lamina::infill {
+
+/// Lines first_number, first_number + 1, ... at these places, nm, strictly increasing.
+struct LinePlaces {
+  std::int32_t first_number = 0;
+  Buffer<std::int64_t> at;
+};
+
+/// What the distances are measured against, nm across the lines.
+struct Extent {
+  std::int64_t side;    // of the part, where line numbers begin
+  std::int64_t length;  // of the part
+  std::int64_t low, high;  // of what is filled: only lines within are wanted
+};
+
+/// Lines of a layer by the gaps or distances of the parameters.
+/// errors  kUsage: a distance that is not positive, with the line after which it would be; an expression that fails
+/// cost    O(lines from the part's side to the far end of what is filled)
+Result<LinePlaces> place_lines(const FillParameters& parameters, const FillContext& context, const Extent& extent);
+
+/// Where line 0 lies from the part's side, before the stagger: first_line, or its default.
+/// errors  as place_lines
+Result<std::int64_t> first_place(const FillParameters& parameters, const FillContext& context, const Extent& extent);
+
+}  // namespace lamina::infill

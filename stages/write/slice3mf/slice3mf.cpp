@@ -1,0 +1,148 @@
+#include "stages/write/slice3mf/slice3mf.h"
+
+#include <fmt/format.h>
+#include <Model/COM/NMR_DLLInterfaces.h>
+
+#include <array>
+#include <cerrno>
+#include <cstdio>
+#include <cstring>
+#include <utility>
+
+namespace lamina::write {
+namespace {
+
+class Handle {
+ public:
+  Handle() = default;
+  Handle(Handle&& other) noexcept : pointer_(std::exchange(other.pointer_, nullptr)) {}
+  Handle& operator=(Handle&&) = delete;
+  ~Handle() {
+    if (pointer_ != nullptr) NMR::lib3mf_release(pointer_);
+  }
+  NMR::PLib3MFBase* get() const { return pointer_; }
+  NMR::PLib3MFBase** out() { return &pointer_; }
+
+ private:
+  NMR::PLib3MFBase* pointer_ = nullptr;
+};
+
+Error refused(std::string_view what, const Handle& handle) {
+  DWORD code = 0;
+  LPCSTR message = nullptr;
+  const bool known = handle.get() != nullptr && NMR::lib3mf_getlasterror(handle.get(), &code, &message) == LIB3MF_OK;
+  return {Fault::kOutput,
+          fmt::format("3MF: {} failed: {}", what, known && message != nullptr ? message : "the library gives no reason")};
+}
+
+/// The library would draw random ones; the same slices shall give the same bytes. Version 8: of our own making (RFC 9562).
+std::string uuid(std::uint32_t kind, std::size_t number) {
+  return fmt::format("6c616d69-6e61-8000-8000-{:04x}{:08x}", kind, number);
+}
+
+float float_mm(std::int64_t nm) { return static_cast<float>(mm(nm)); }
+
+/// The box that stands for a body where slices say what it is (mesh resolution "lowres").
+Status set_box(const Handle& object, const Box& box) {
+  std::array<NMR::MODELMESHVERTEX, 8> vertices{};
+  for (std::size_t i = 0; i < 8; ++i) {
+    vertices[i].m_fPosition[0] = float_mm((i & 1) != 0 ? box.hi.x : box.lo.x);
+    vertices[i].m_fPosition[1] = float_mm((i & 2) != 0 ? box.hi.y : box.lo.y);
+    vertices[i].m_fPosition[2] = float_mm((i & 4) != 0 ? box.hi.z : box.lo.z);
+  }
+  constexpr DWORD kFaces[12][3] = {{0, 2, 3}, {0, 3, 1}, {4, 5, 7}, {4, 7, 6}, {0, 1, 5}, {0, 5, 4},
+                                   {2, 6, 7}, {2, 7, 3}, {0, 4, 6}, {0, 6, 2}, {1, 3, 7}, {1, 7, 5}};
+  std::array<NMR::MODELMESHTRIANGLE, 12> triangles{};
+  for (std::size_t i = 0; i < 12; ++i) std::copy(std::begin(kFaces[i]), std::end(kFaces[i]), triangles[i].m_nIndices);
+  if (NMR::lib3mf_meshobject_setgeometry(object.get(), vertices.data(), 8, triangles.data(), 12) != LIB3MF_OK) {
+    return refused("a mesh", object);
+  }
+  return {};
+}
+
+}  // namespace
+
+struct Slice3mfWriter::State {
+  Handle model;
+  std::vector<Handle> stacks;  // one for each body
+};
+
+Slice3mfWriter::Slice3mfWriter() : state_(std::make_unique<State>()) {}
+Slice3mfWriter::Slice3mfWriter(Slice3mfWriter&&) noexcept = default;
+Slice3mfWriter::~Slice3mfWriter() = default;
+
+Result<Slice3mfWriter> Slice3mfWriter::make(const SliceHead& head) {
+  Slice3mfWriter writer;
+  Handle& model = writer.state_->model;
+  if (NMR::lib3mf_createmodel(model.out()) != LIB3MF_OK) return refused("a model", model);
+  if (NMR::lib3mf_model_setunit(model.get(), NMR::MODELUNIT_MILLIMETER) != LIB3MF_OK) return refused("the unit", model);
+  if (NMR::lib3mf_model_setbuilduuidutf8(model.get(), uuid(0, 0).c_str()) != LIB3MF_OK) return refused("a UUID", model);
+  std::size_t number = 0;
+  for (const std::string& name : head.parts) {
+    ++number;
+    Handle stack, object, item;
+    if (NMR::lib3mf_model_addslicestack(model.get(), float_mm(head.first_bottom), stack.out()) != LIB3MF_OK) {
+      return refused("a slice stack", model);
+    }
+    if (NMR::lib3mf_model_addmeshobject(model.get(), object.out()) != LIB3MF_OK) return refused("an object", model);
+    if (auto status = set_box(object, head.bounds); !status) return status.error();
+    if (NMR::lib3mf_object_setnameutf8(object.get(), name.c_str()) != LIB3MF_OK) return refused("a name", object);
+    if (NMR::lib3mf_object_setuuidutf8(object.get(), uuid(1, number).c_str()) != LIB3MF_OK) return refused("a UUID", object);
+    if (NMR::lib3mf_meshobject_setslicestack(object.get(), stack.get()) != LIB3MF_OK) return refused("a stack", object);
+    if (NMR::lib3mf_meshobject_setslicesmeshresolution(object.get(), NMR::MODELSLICESMESHRESOLUTION_LOW) != LIB3MF_OK) {
+      return refused("the mesh resolution", object);
+    }
+    if (NMR::lib3mf_model_addbuilditem(model.get(), object.get(), nullptr, item.out()) != LIB3MF_OK) {
+      return refused("a build item", model);
+    }
+    if (NMR::lib3mf_builditem_setuuidutf8(item.get(), uuid(2, number).c_str()) != LIB3MF_OK) return refused("a UUID", item);
+    writer.state_->stacks.push_back(std::move(stack));
+  }
+  return writer;
+}
+
+Status Slice3mfWriter::add(const SliceLayer& layer) {
+  std::vector<NMR::MODELSLICEVERTEX> vertices;
+  std::vector<DWORD> indices;
+  for (std::size_t b = 0; b < state_->stacks.size(); ++b) {
+    const Handle& stack = state_->stacks[b];
+    Handle slice;
+    const float top = float_mm(std::int64_t{layer.layer.bottom} + layer.layer.thickness);
+    if (NMR::lib3mf_slicestack_addslice(stack.get(), top, slice.out()) != LIB3MF_OK) return refused("a slice", stack);
+    for (std::uint32_t c = layer.body[b]; c < layer.body[b + 1]; ++c) {
+      vertices.clear();
+      for (const Point2 p : layer.contours[c]) vertices.push_back({{float_mm(p.x), float_mm(p.y)}});
+      DWORD first = 0, polygon = 0;
+      const auto count = static_cast<DWORD>(vertices.size());
+      if (NMR::lib3mf_slice_addvertices(slice.get(), vertices.data(), count, &first) != LIB3MF_OK) {
+        return refused("vertices", slice);
+      }
+      indices.clear();
+      for (DWORD i = 0; i < count; ++i) indices.push_back(first + i);
+      indices.push_back(first);  // closed
+      if (NMR::lib3mf_slice_addpolygon(slice.get(), indices.data(), count + 1, &polygon) != LIB3MF_OK) {
+        return refused("a polygon", slice);
+      }
+    }
+  }
+  return {};
+}
+
+Status Slice3mfWriter::finish(const std::string& path) {
+  Handle writer;
+  if (NMR::lib3mf_model_querywriter(state_->model.get(), "3mf", writer.out()) != LIB3MF_OK) {
+    return refused("a writer", state_->model);
+  }
+  const std::string part = path + ".part";
+  if (NMR::lib3mf_writer_writetofileutf8(writer.get(), part.c_str()) != LIB3MF_OK) {
+    const Error error = refused("writing", writer);
+    std::remove(part.c_str());
+    return Error{Fault::kOutput, fmt::format("{}: {}", path, error.message)};
+  }
+  if (std::rename(part.c_str(), path.c_str()) != 0) {
+    return Error{Fault::kOutput, fmt::format("{}: cannot write: {}", path, std::strerror(errno))};
+  }
+  return {};
+}
+
+}  // namespace lamina::write
