@@ -1,0 +1,58 @@
+// Files of every format as OpenImageIO reads them: a reader with decoders of its own for PNM, and with its own idea of
+// what bilevel TIFF and palette PNG mean.
+#include <OpenImageIO/imageio.h>
+#include <gtest/gtest.h>
+
+#include "tests/write/images.h"
+
+namespace lamina::write {
+namespace {
+
+/// One grey byte a pixel, black 0; the file's resolution in dpi goes to `dpi`.
+std::vector<std::uint8_t> pixels_by_openimageio(const std::string& path, const RunsView& runs, double dpi[2]) {
+  const auto input = OIIO::ImageInput::open(path);
+  if (!input) {
+    ADD_FAILURE() << OIIO::geterror();
+    return {};
+  }
+  const OIIO::ImageSpec& spec = input->spec();
+  EXPECT_EQ(static_cast<std::uint32_t>(spec.width), runs.columns);
+  EXPECT_EQ(static_cast<std::uint32_t>(spec.height), runs.rows());
+  const double unit = spec.get_string_attribute("ResolutionUnit") == "m" ? 0.0254
+                      : spec.get_string_attribute("ResolutionUnit") == "cm" ? 2.54 : 1;
+  dpi[0] = spec.get_float_attribute("XResolution") * unit;
+  dpi[1] = spec.get_float_attribute("YResolution") * unit;
+  const auto channels = static_cast<std::size_t>(spec.nchannels);
+  std::vector<std::uint8_t> samples(spec.image_pixels() * channels), grey(spec.image_pixels());
+  EXPECT_TRUE(input->read_image(0, 0, 0, spec.nchannels, OIIO::TypeDesc::UINT8, samples.data())) << input->geterror();
+  for (std::size_t i = 0; i < grey.size(); ++i) grey[i] = samples[i * channels];
+  return grey;
+}
+
+TEST(OpenImageIO, SeesBlackExactlyWhereRunsAreInEveryFormat) {
+  const testing::Folder folder;
+  for (const std::uint32_t columns : {1u, 7u, 64u, 65u, 1000u, 2561u}) {
+    const Runs runs = testing::random_image(columns, columns, 60);
+    std::vector<std::uint8_t> expected(std::size_t{columns} * runs.view().rows(), 255);
+    for (std::uint32_t r = 0; r < runs.view().rows(); ++r) {
+      const auto row = runs.view().row(r);
+      for (std::size_t i = 0; i < row.size(); i += 2) {
+        const auto start = expected.begin() + static_cast<std::ptrdiff_t>(std::size_t{r} * columns);
+        std::fill(start + row[i], start + row[i + 1], std::uint8_t{0});
+      }
+    }
+    for (const ImageFormat* format : testing::file_formats()) {
+      SCOPED_TRACE(std::string(format->id) + ", " + std::to_string(columns) + " columns");
+      const std::string path = folder / ("image" + std::string(format->extension));
+      testing::save(path, testing::encoded(*format, runs, 1200, 600));
+      double dpi[2] = {};
+      ASSERT_EQ(pixels_by_openimageio(path, runs, dpi), expected);
+      if (format->extension == ".pbm") continue;  // has no place for it but a comment
+      EXPECT_NEAR(dpi[0], 1200, 0.02);
+      EXPECT_NEAR(dpi[1], 600, 0.02);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace lamina::write
