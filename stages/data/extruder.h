@@ -1,0 +1,69 @@
+// stages/data/extruder.h: a material extrusion printer as its profile describes it. Plain values, units in the names.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+namespace lamina {
+
+/// Everything that a profile says; what a job may change is changed here before anything is planned.
+struct Extruder {
+  std::string name, description;
+  std::string format = "gcode";  // "gcode" or "sml"
+
+  struct Bed {
+    std::array<double, 2> size_mm{220, 220};
+    double build_height_mm = 250;
+    std::array<double, 2> corner_mm{0, 0};  // machine coordinates of its front left corner
+  } bed;
+
+  struct Material {
+    double nozzle_mm = 0.4;
+    double filament_mm = 1.75;
+    double density_g_cm3 = 1.24;
+    double flow = 1;  // factor on all that is extruded, found by measuring walls
+    double nozzle_degc = 200, bed_degc = 60;
+    double first_nozzle_degc = 200, first_bed_degc = 60;  // while the first layer is laid
+  } material;
+
+  struct Speed {
+    double print_mm_s = 40;       // raster and closed curves that fill: the reference of segmented lines
+    double wall_mm_s = 30, inner_wall_mm_s = 40;
+    double first_layer_mm_s = 15;  // nothing of the first layer is laid faster
+    double travel_mm_s = 120, lift_mm_s = 10;
+    double acceleration_mm_s2 = 1000;  // for the estimate of time
+    double corner_mm_s = 8;            // change of speed that the machine makes at once
+  } speed;
+
+  struct Retraction {
+    double length_mm = 1, speed_mm_s = 35, lift_mm = 0;
+    double least_travel_mm = 1.5;  // shorter travels are made without it
+  } retraction;
+
+  struct Fan {
+    double percent = 100;
+    std::uint32_t from_layer = 1;  // counted from 0
+  } fan;
+
+  struct Code {
+    bool relative_extrusion = true;
+    // In start, end and layer: {nozzle_degc} {bed_degc} {first_nozzle_degc} {first_bed_degc} {layer} {z} {layers}
+    std::string start, end, layer;
+    std::string plain_pressure;  // switches pressure advance off: what segmented lines need, they live from its delay
+  } code;
+
+  struct Sml {
+    /// One line of the machine's table: the PD command for layers of a thickness.
+    struct Pd {
+      double thickness_mm;
+      std::string use;  // "raster", "contour" or "support"
+      std::string line;
+    };
+    std::vector<Pd> pd;
+    std::string header, footer, height = "PZ{z};", travel = "PU{x},{y};", draw = "PA{x},{y};";  // 1/1000 inch
+  } sml;
+};
+
+}  // namespace lamina

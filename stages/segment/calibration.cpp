@@ -1,0 +1,154 @@
+#include "stages/segment/calibration.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <span>
+
+namespace lamina::segment {
+namespace {
+
+struct Mark {
+  double x, y;
+};
+
+/// Marks in increasing x.
+Reading interpolate(std::span<const Mark> marks, double x) {
+  if (marks.empty()) return {0, false};
+  if (x < marks.front().x) return {marks.front().y, false};
+  for (std::size_t i = 1; i < marks.size(); ++i) {
+    if (x > marks[i].x) continue;
+    const double share = (x - marks[i - 1].x) / (marks[i].x - marks[i - 1].x);
+    return {marks[i - 1].y + share * (marks[i].y - marks[i - 1].y), true};
+  }
+  return {marks.back().y, x <= marks.back().x};
+}
+
+/// The first x, from the front, where y reaches `goal`; measured widths need not be monotonic.
+Reading first_reach(std::span<const Mark> marks, double goal) {
+  if (marks.empty()) return {0, false};
+  for (std::size_t i = 1; i < marks.size(); ++i) {
+    const double a = marks[i - 1].y, b = marks[i].y;
+    if ((a - goal) * (b - goal) > 0 || a == b) continue;
+    return {marks[i - 1].x + (goal - a) / (b - a) * (marks[i].x - marks[i - 1].x), true};
+  }
+  const auto nearest = std::ranges::min_element(marks, {}, [&](const Mark& m) { return std::abs(m.y - goal); });
+  return {nearest->x, nearest->y == goal};
+}
+
+std::vector<Mark> thin_by_speed(const Calibration& calibration) {
+  std::vector<Mark> marks{{100, calibration.width_mm}};
+  for (const auto& row : calibration.by_speed) marks.push_back({row.percent, row.thin_mm});
+  return marks;
+}
+
+std::vector<Mark> thin_by_extrusion(const Calibration& calibration) {
+  std::vector<Mark> marks;
+  for (const auto& row : calibration.by_extrusion) marks.insert(marks.begin(), {row.percent, row.thin_mm});
+  marks.push_back({100, calibration.width_mm});
+  return marks;
+}
+
+template <class Member>
+std::vector<Mark> of_repeated(const Calibration& calibration, Member member) {
+  std::vector<Mark> marks;
+  for (const auto& row : calibration.repeated) marks.push_back({row.extrusion_percent, row.*member});
+  return marks;
+}
+
+}  // namespace
+
+const Calibration& anet_a8_calibration() {
+  static const Calibration calibration{
+      "Di Nisio 2022, Tables 6, 7 and 11 to 15: Anet A8, PLA, nozzle 0.4 mm",
+      0.4, 0.3, 15,
+      {{125, 0.31, 1.05, 0.45}, {150, 0.27, 2.25, 0.50}, {175, 0.26, 3.50, 0.53}, {200, 0.21, 4.45, 0.57},
+       {225, 0.19, 5.20, 0.60}, {250, 0.17, 5.75, 0.64}, {275, 0.17, 6.95, 0.66}, {300, 0.15, 7.45, 0.70},
+       {325, 0.17, 8.02, 0.74}, {350, 0.16, 8.80, 0.76}, {375, 0.16, 9.40, 0.76}, {400, 0.12, 9.80, 0.79}},
+      {{90, 0.37}, {80, 0.33}, {70, 0.31}, {60, 0.29}, {50, 0.27}, {40, 0.24}, {30, 0.21}, {20, 0.19}, {10, 0.16}},
+      {{75, 200, 100, (0.38 + 0.39 + 0.39) / 3, (0.28 + 0.28 + 0.29) / 3, 0.40},
+       {100, 200, 75, (0.45 + 0.45 + 0.44) / 3, (0.31 + 0.32 + 0.31) / 3, (0.39 + 0.39 + 0.40) / 3},
+       {125, 200, 50, (0.59 + 0.58 + 0.58) / 3, (0.32 + 0.32 + 0.31) / 3, (0.40 + 0.39 + 0.39) / 3}}};
+  return calibration;
+}
+
+Status check(const Calibration& calibration) {
+  const auto wrong = [](std::string_view table, std::size_t row, std::string_view what) {
+    return Error{Fault::kUsage, fmt::format("{}: row {}: {}", table, row + 1, what)};
+  };
+  if (!(calibration.width_mm > 0) || !(calibration.height_mm > 0) || !(calibration.speed_mm_s > 0)) {
+    return Error{Fault::kUsage, "calibration: width, height and speed have to be above 0"};
+  }
+  for (std::size_t i = 0; i < calibration.by_speed.size(); ++i) {
+    const auto& row = calibration.by_speed[i];
+    if (!(row.percent > (i == 0 ? 100 : calibration.by_speed[i - 1].percent))) {
+      return wrong("by_speed", i, "speeds have to be above 100 % and to increase");
+    }
+    if (!(row.thin_mm > 0) || !(row.stable_mm > 0) || !(row.swell_mm > 0)) return wrong("by_speed", i, "lengths have to be above 0");
+  }
+  for (std::size_t i = 0; i < calibration.by_extrusion.size(); ++i) {
+    const auto& row = calibration.by_extrusion[i];
+    if (!(row.percent < (i == 0 ? 100 : calibration.by_extrusion[i - 1].percent)) || !(row.percent > 0)) {
+      return wrong("by_extrusion", i, "extrusions have to be below 100 % and to decrease");
+    }
+    if (!(row.thin_mm > 0)) return wrong("by_extrusion", i, "widths have to be above 0");
+  }
+  for (std::size_t i = 0; i < calibration.repeated.size(); ++i) {
+    const auto& row = calibration.repeated[i];
+    if (!(row.extrusion_percent > (i == 0 ? 0 : calibration.repeated[i - 1].extrusion_percent))) {
+      return wrong("repeated", i, "extrusions have to be above 0 and to increase");
+    }
+    if (!(row.thin_speed_percent > 0) || !(row.thick_speed_percent > 0) || !(row.thick_mm > 0) || !(row.thin_mm > 0) ||
+        !(row.continuous_mm > 0)) {
+      return wrong("repeated", i, "speeds and widths have to be above 0");
+    }
+  }
+  return {};
+}
+
+Reading thin_width_at_speed(const Calibration& calibration, double percent) {
+  return interpolate(thin_by_speed(calibration), percent);
+}
+
+Reading stable_distance(const Calibration& calibration, double percent) {
+  std::vector<Mark> marks{{100, 0}};
+  for (const auto& row : calibration.by_speed) marks.push_back({row.percent, row.stable_mm});
+  return interpolate(marks, percent);
+}
+
+Reading thin_width_at_extrusion(const Calibration& calibration, double percent) {
+  return interpolate(thin_by_extrusion(calibration), percent);
+}
+
+Reading speed_for_thin_width(const Calibration& calibration, double width_mm) {
+  return first_reach(thin_by_speed(calibration), width_mm);
+}
+
+Reading extrusion_for_thin_width(const Calibration& calibration, double width_mm) {
+  auto marks = thin_by_extrusion(calibration);
+  std::ranges::reverse(marks);
+  return first_reach(marks, width_mm);
+}
+
+RepeatedReading repeated_at(const Calibration& calibration, double extrusion_percent) {
+  using Row = Calibration::Repeated;
+  const auto at = [&](double Row::* member) { return interpolate(of_repeated(calibration, member), extrusion_percent); };
+  const Reading speed = at(&Row::thick_speed_percent);
+  return {speed.value, at(&Row::thick_mm).value, at(&Row::thin_mm).value, at(&Row::continuous_mm).value, speed.inside};
+}
+
+Reading extrusion_for_thick_width(const Calibration& calibration, double width_mm) {
+  return first_reach(of_repeated(calibration, &Calibration::Repeated::thick_mm), width_mm);
+}
+
+Spacing spacing_for(double thick_mm, double continuous_mm, double gap_mm) {
+  return {(thick_mm + continuous_mm) / 2 + gap_mm, continuous_mm + gap_mm};
+}
+
+double published_spacing(double thick_mm, double set_width_mm) {
+  const auto half_up = [](double value) { return std::floor(value * 100 + 0.5 + 1e-9) / 100; };
+  return half_up((half_up(thick_mm) + set_width_mm) / 2);
+}
+
+}  // namespace lamina::segment

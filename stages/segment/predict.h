@@ -1,0 +1,49 @@
+// stages/segment/predict.h: what a segmented filling will be, before anything is printed.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "stages/data/status.h"
+#include "stages/segment/bead.h"
+#include "stages/segment/calibration.h"
+#include "stages/segment/cut.h"
+
+namespace lamina::segment {
+
+/// How segmented lines are laid: the parameters of Di Nisio 2022, Table 1, in mm and %.
+struct Segmentation {
+  CutRule rule = CutRule::kAligned;
+  double thick_mm = 1.5, thin_mm = 1.5;
+  double least_end_mm = 0.75;
+  std::uint32_t continuous = 1;
+  double spacing_sc_mm = 0.43, spacing_cc_mm = 0.40;  // centre to centre
+  double thick_extrusion = 100, thin_extrusion = 100;
+  double thick_speed = 75, thin_speed = 200;
+  double thick_width_mm = 0.45, thin_width_mm = 0.31, continuous_width_mm = 0.39;  // that beads will have
+};
+
+/// Whether it can be laid. errors  kUsage, one line that begins with the key's name (as in [segment])
+Status check(const Segmentation& segmentation, double bead_width_mm);
+
+/// What a user should know: a pore that closes, speeds outside of what was measured, beads that do not touch.
+std::vector<std::string> warnings(const Segmentation& segmentation, const Calibration& calibration);
+
+/// A pore beside a thin stretch. Beads are laid as by a round pen: thick stretches end in half circles that reach into
+/// the thin one, so a pore is shorter than the thin stretch by one thick width; across, it is what the spacing leaves
+/// between the thin stretch and the continuous line.
+struct Pores {
+  double length_mm, width_mm;
+  double aspect;       // width / length
+  double density_mm2;  // pores in a mm2 of a layer: two beside each thin stretch
+};
+Pores predict_pores(const Segmentation& segmentation);
+
+/// Share of a wide layer that stays empty, by three ways to know what the beads are.
+struct FillPorosity {
+  double by_extrusion;  // what is extruded, with the bead of `shape` as 100 %: material does not vanish
+  double by_widths;     // cross-sections of beads with the measured widths
+};
+FillPorosity predict_porosity(const Segmentation& segmentation, double set_width_mm, double height_mm, BeadShape shape);
+
+}  // namespace lamina::segment
