@@ -12,6 +12,8 @@ namespace {
 // The heading of the help under which the options of a section stand.
 std::string_view heading(std::string_view section) {
   if (section == "part" || section == "place") return "Parts";
+  if (section == "slice") return "Contours and files";
+  if (section == "fill") return "Filling";
   if (section == "load") return "Repair";
   if (section == "run") return "Run";
   return "Bed and layers";

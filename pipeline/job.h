@@ -8,6 +8,8 @@
 #include <string>
 #include <vector>
 
+#include "pipeline/fill_request.h"
+#include "pipeline/slice_request.h"
 #include "stages/data/fill_rule.h"
 #include "stages/data/grid.h"
 #include "stages/data/status.h"
@@ -25,6 +27,7 @@ struct PartRequest {
   std::array<double, 3> scale{1, 1, 1};
   std::array<double, 3> rotate_deg{0, 0, 0};
   std::array<double, 3> shrink{1, 1, 1};  // compensation factors per axis of the bed, applied last
+  std::string fill;  // changes to the job's filling, "pattern=contour gap_mm=0.1"
 };
 
 enum class Engine { kRays, kContours, kBoth };
@@ -40,6 +43,8 @@ struct Job {
   FillRule fill_rule = FillRule::kNonzero;
   Mirror mirror = Mirror::kNone;
   std::string format = "tiff-g4";
+  SliceRequest slice;
+  FillRequest fill;
   bool repair = true;
   bool drop_bad = false;
   double weld_um = 5;

@@ -9,11 +9,9 @@
 #include <vector>
 
 #include "pipeline/job.h"
+#include "pipeline/key_form.h"
 
 namespace lamina::pipeline {
-
-/// How the text of a value looks in TOML.
-enum class KeyForm { kBare, kString, kList };
 
 /// One key of a job (Target is Job) or of each [[part]] of it (Target is PartRequest).
 template <class Target>
@@ -45,6 +43,8 @@ std::span<const PartKey> part_keys();
 std::span<const JobKey> bed_keys();
 std::span<const JobKey> place_keys();
 std::span<const JobKey> image_keys();
+std::span<const JobKey> slice_keys();
+std::span<const JobKey> fill_keys();
 std::span<const JobKey> load_keys();
 std::span<const JobKey> run_keys();
 

@@ -65,6 +65,14 @@ const PartKey kPartKeys[] = {
     {"part", "shrink", "--shrink", "S|X,Y,Z", "factors per axis of the bed that make up for shrinkage, applied last", true,
      [](Text t, PartRequest& p) { return read_factors(t, 0.1, false, p.shrink); },
      [](const PartRequest& p) { return write_list(p.shrink); }, Form::kList},
+    {"part", "fill", "", "CHANGES", "changes to the job's filling for this part: \"pattern=contour gap_mm=0.1\"", true,
+     [](Text t, PartRequest& p) {
+       FillSettings tried;
+       auto wrong = read_fill_changes(t, tried);
+       if (wrong.empty()) p.fill = t;
+       return wrong;
+     },
+     [](const PartRequest& p) { return p.fill; }, Form::kString},
 };
 
 }  // namespace

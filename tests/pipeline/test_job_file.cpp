@@ -19,6 +19,10 @@ Job unusual_job(const Directory& directory) {
   job.fill_rule = FillRule::kEvenOdd;
   job.mirror = Mirror::kXY;
   job.format = "png";
+  job.slice = {"cli", true, true, 2.5, 0.25, -0.125};
+  job.fill.all.gap_mm = {0.1, 0.25};
+  job.fill.all.stagger_mm = {0, 0.2};
+  job.fill.by_height = "1:2 gap_mm=0";
   job.repair = false;
   job.drop_bad = true;
   job.weld_um = 0.5;
@@ -36,6 +40,7 @@ Job unusual_job(const Directory& directory) {
   part.scale = {1.0 / 3, 2, -1};
   part.rotate_deg = {-90, 0.1, 359};
   part.shrink = {1.02, 1.02, 1.025};
+  part.fill = "gap_mm=0.1 walls=2";
   job.parts = {part, PartRequest{.path = directory / "second.stl"}};
   return job;
 }

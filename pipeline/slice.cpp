@@ -1,0 +1,307 @@
+#include "pipeline/slice.h"
+
+#include <fmt/format.h>
+#include <sys/resource.h>
+#include <tbb/global_control.h>
+
+#include <chrono>
+#include <cmath>
+#include <filesystem>
+#include <optional>
+
+#include "pipeline/command_line.h"  // version
+#include "pipeline/hash.h"
+#include "pipeline/job_keys.h"
+#include "pipeline/job_toml.h"
+#include "pipeline/json_text.h"
+#include "pipeline/layer_flow.h"
+#include "pipeline/manifest.h"
+#include "pipeline/output_directory.h"
+#include "stages/write/atomic_file.h"
+#include "stages/write/growing_file.h"
+#include "stages/write/slice3mf/slice3mf.h"
+#include "stages/write/slice_format.h"
+
+namespace lamina::pipeline {
+namespace {
+
+namespace fs = std::filesystem;
+using Clock = std::chrono::steady_clock;
+double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
+
+std::string_view extension_of(std::string_view format) {
+  return format == "svg" ? ".svg" : format == "3mf" ? ".3mf" : ".cli";
+}
+
+double length_mm(const ToolpathsView& paths) {
+  double sum = 0;
+  for (std::uint32_t p = 0; p < paths.size(); ++p) {
+    for (std::uint32_t i = paths.offset[p]; i + 1 < paths.offset[p + 1]; ++i) {
+      const Point2 a = paths.point[i], b = paths.point[i + 1];
+      sum += std::hypot(static_cast<double>(b.x) - a.x, static_cast<double>(b.y) - a.y);
+    }
+  }
+  return sum * 1e-6;
+}
+
+/// The job, with the sections that contours depend on.
+std::string job_of_manifest(const Job& job) {
+  std::string text = canonical_job_text(job);
+  for (const auto& [section, keys] : {std::pair{"slice", slice_keys()}, {"fill", fill_keys()}}) {
+    text += fmt::format("\n[{}]\n", section);
+    for (const JobKey& key : keys) {
+      const std::string value = key.write(job);
+      if (!value.empty()) text += fmt::format("{} = {}\n", key.name, json_string(value));
+    }
+  }
+  return text;
+}
+
+/// manifest.json of a sliced job: one line a layer; where its bytes are, and their hash.
+class SliceManifest {
+ public:
+  static Result<SliceManifest> open(const std::string& path, const std::string& head) {
+    auto file = write::GrowingFile::open(path);
+    if (!file) return file.error();
+    if (auto status = file->append(head); !status) return status.error();
+    return SliceManifest(std::move(*file));
+  }
+  Status append(const std::string& line) {
+    const std::string text = fmt::format("{}\n    {}", first_ ? "" : ",", line);
+    first_ = false;
+    return file_.append(text);
+  }
+  Status finish() {
+    if (auto status = file_.append(std::string_view("\n  ]\n}\n")); !status) return status;
+    return file_.finish();
+  }
+
+ private:
+  explicit SliceManifest(write::GrowingFile file) : file_(std::move(file)) {}
+  write::GrowingFile file_;
+  bool first_ = true;
+};
+
+std::uint64_t peak_resident_bytes() {
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  return static_cast<std::uint64_t>(usage.ru_maxrss) * 1024;
+}
+
+std::string file_of(const Job& job) {
+  const std::string stem = fs::path(job.parts.front().path).stem().string();
+  // part.stl.gz is part
+  const std::string name = fs::path(stem).extension() == ".stl" || fs::path(stem).extension() == ".obj"
+                               ? fs::path(stem).stem().string()
+                               : stem;
+  return fmt::format("{}{}", name.empty() ? "part" : name, extension_of(job.slice.format));
+}
+
+Status prepare_directory(const Job& job) {
+  if (Status status = check_slice_output(job); !status) return status;
+  std::error_code error;
+  fs::create_directories(job.slice.file_a_layer ? fs::path(job.output) / "layers" : fs::path(job.output), error);
+  if (error) return Error{Fault::kOutput, fmt::format("{}: {}", job.output, error.message())};
+  if (!job.overwrite) return {};
+  fs::remove(fs::path(job.output) / "manifest.json", error);
+  if (job.slice.file_a_layer) {
+    for (const auto& entry : fs::directory_iterator(fs::path(job.output) / "layers", error)) {
+      const std::string name = entry.path().filename().string();
+      if (name.size() >= 10 && name.find_first_not_of("0123456789") >= 6 &&
+          entry.path().extension() == extension_of(job.slice.format)) {
+        fs::remove(entry.path(), error);
+      }
+    }
+  }
+  return {};
+}
+
+}  // namespace
+
+Status check_slice_output(const Job& job) {
+  std::error_code error;
+  const fs::file_status status = fs::status(job.output, error);
+  if (!fs::exists(status)) return {};
+  if (!fs::is_directory(status)) {
+    return Error{Fault::kOutput, fmt::format("{}: is a file, not a directory; name another one with -o", job.output)};
+  }
+  if (job.overwrite) return {};
+  if (!find_manifests(job.output).empty()) {
+    return Error{Fault::kUsage, fmt::format("{}: holds a job; replace it with --overwrite, or name another directory", job.output)};
+  }
+  const fs::path file = fs::path(job.output) / file_of(job);
+  if (!job.slice.file_a_layer && fs::exists(file, error)) {
+    return Error{Fault::kUsage, fmt::format("{}: is there already; replace it with --overwrite, or name another directory",
+                                            file.string())};
+  }
+  return {};
+}
+
+Result<SliceSummary> run_slice(const Job& job, const ProgressCallback& progress, const std::atomic<bool>& cancel) {
+  std::optional<tbb::global_control> threads;
+  if (job.threads > 0) threads.emplace(tbb::global_control::max_allowed_parallelism, job.threads);
+  if (job.slice.format == "3mf" && job.slice.file_a_layer) {
+    return Error{Fault::kUsage, "--file-a-layer: a 3MF package holds all slices; choose svg or cli, or leave it out"};
+  }
+  const auto plan = SlicePlan::make(job, progress);
+  if (!plan) return plan.error();
+  if (cancel) return Error{Fault::kInterrupted, "interrupted before the first layer; nothing was written"};
+  const auto range = layer_range(job, static_cast<std::uint32_t>(plan->layers().size()));
+  if (!range) return range.error();
+  const auto [first, last] = *range;
+
+  SliceSummary summary;
+  summary.layers_total = static_cast<std::uint32_t>(plan->layers().size());
+  summary.parts = plan->scene().parts;
+  summary.load_seconds = plan->load_seconds;
+  summary.index_seconds = plan->index_seconds;
+  summary.index_bytes = plan->slicer().index_bytes();
+  for (const Instance& instance : plan->scene().instances) {
+    summary.triangles += plan->scene().meshes[instance.mesh].triangles.size();
+  }
+  summary.output = job.slice.file_a_layer ? job.output + "/layers" : job.output + "/" + file_of(job);
+  if (job.dry_run) {
+    for (std::uint32_t i = first; i < last; ++i) {
+      summary.peak_layer_bytes = std::max(summary.peak_layer_bytes, plan->bytes_bound(i));
+    }
+    summary.peak_resident_bytes = peak_resident_bytes();
+    return summary;
+  }
+  if (Status status = prepare_directory(job); !status) return status.error();
+
+  // --- what is written
+  write::SliceHead head;
+  head.parts = plan->names();
+  head.bounds = plan->bounds();
+  head.layers = last - first;
+  head.first_bottom = first < last ? plan->layers()[first].bottom : 0;
+  head.program = fmt::format("lamina {}", version());
+  write::SliceFormatOptions format_options;
+  format_options.empty_first_layer = job.slice.empty_first_layer;
+  std::unique_ptr<write::SliceEncoder> encoder;
+  std::optional<write::Slice3mfWriter> package;
+  if (job.slice.format == "3mf") {
+    auto made = write::Slice3mfWriter::make(head);
+    if (!made) return made.error();
+    package.emplace(std::move(*made));
+  } else {
+    encoder = job.slice.format == "svg" ? write::make_svg_encoder()
+                                        : write::make_cli_encoder(job.slice.format == "cli-binary", format_options);
+  }
+  std::optional<write::GrowingFile> file;
+  if (encoder && !job.slice.file_a_layer) {
+    auto opened = write::GrowingFile::open(summary.output);
+    if (!opened) return opened.error();
+    file.emplace(std::move(*opened));
+    Buffer<char> text;
+    encoder->head(head, text);
+    if (Status status = file->append(text); !status) return status.error();
+  }
+  auto manifest = SliceManifest::open(
+      job.output + "/manifest.json",
+      fmt::format("{{\n  \"lamina\": {},\n  \"kind\": \"slice\",\n  \"job\": {},\n  \"format\": {},\n  \"file\": {},\n"
+                  "  \"layer_count\": {},\n  \"first_layer\": {},\n  \"last_layer\": {},\n  \"layers\": [",
+                  json_string(version()), json_string(job_of_manifest(job)), json_string(job.slice.format),
+                  job.slice.file_a_layer ? "null" : json_string(file_of(job)), summary.layers_total, first, last));
+  if (!manifest) return manifest.error();
+
+  // --- layers
+  std::atomic<std::int64_t> slice_ns{0}, encode_ns{0};
+  const auto timed = [](std::atomic<std::int64_t>& sum, Clock::time_point from) {
+    sum += std::chrono::duration_cast<std::chrono::nanoseconds>(Clock::now() - from).count();
+  };
+  const auto view_of = [&](std::uint32_t index, const SlicePlan::Work& work) {
+    return write::SliceLayer{plan->layers()[index], work.contours.contours, work.contours.body, work.paths, work.path_body};
+  };
+  const auto prepare = [&](std::uint32_t i, SlicePlan::Work& work) -> Status {
+    auto from = Clock::now();
+    if (Status status = plan->layer(first + i, work); !status) return status;
+    timed(slice_ns, from);
+    work.text.clear();
+    if (!encoder) return {};
+    from = Clock::now();
+    const write::SliceLayer layer = view_of(first + i, work);
+    if (job.slice.file_a_layer) {
+      write::encode_alone(*encoder, head, layer, work.text);
+    } else {
+      encoder->layer(head, layer, work.text);
+    }
+    timed(encode_ns, from);
+    if (!job.slice.file_a_layer) return {};
+    const std::string name = fmt::format("{}/layers/{:06}{}", job.output, first + i, extension_of(job.slice.format));
+    return write::write_file(name, std::as_bytes(std::span(work.text)));
+  };
+  std::string first_open;
+  std::uint32_t done = 0;
+  const auto record = [&](std::uint32_t i, SlicePlan::Work& work) -> Status {
+    const Layer& layer = plan->layers()[first + i];
+    const double area = square_mm(doubled_area(work.contours.contours));
+    std::string where;
+    if (package) {
+      if (Status status = package->add(view_of(first + i, work)); !status) return status;
+    } else {
+      where = fmt::format(",\"offset\":{},\"bytes\":{},\"xxh3_128\":\"{}\"", file ? file->size() : 0, work.text.size(),
+                          hex(hash_bytes(std::as_bytes(std::span(work.text)))));
+      summary.bytes_written += work.text.size();
+      if (file) {
+        if (Status status = file->append(work.text); !status) return status;
+      }
+    }
+    summary.cuts += work.report.cuts;
+    summary.contours += work.contours.contours.size();
+    summary.points += work.contours.contours.point.size();
+    summary.paths += work.paths.size();
+    summary.united_layers += work.report.united > 0 ? 1 : 0;
+    summary.gaps_closed += work.report.gaps.closed;
+    if (work.report.gaps.open > 0 && summary.open_chains == 0) {
+      first_open = fmt::format("in layer {} at z {:.3f} mm", layer.index, mm(layer.plane()));
+    }
+    summary.open_chains += work.report.gaps.open;
+    summary.volume_mm3 += area * mm(layer.thickness);
+    summary.bead_mm += length_mm(work.paths);
+    progress({ProgressEvent::Stage::kLayers, ++done, last - first});
+    return manifest->append(fmt::format(
+        "{{\"layer\":{},\"bottom_nm\":{},\"thickness_nm\":{},\"contours\":{},\"points\":{},\"area_mm2\":{:.9f},"
+        "\"paths\":{},\"united\":{},\"open\":{}{}}}",
+        layer.index, layer.bottom, layer.thickness, work.contours.contours.size(), work.contours.contours.point.size(),
+        area, work.paths.size(), work.report.united, work.report.gaps.open, where));
+  };
+  FlowLimits limits;
+  limits.budget_bytes = job.memory_bytes;
+  limits.most_in_flight = 4 * static_cast<std::uint32_t>(
+                                  tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism));
+  FlowReport flow;
+  const auto start = Clock::now();
+  const auto bytes_of = [&](std::uint32_t i) { return plan->bytes_bound(first + i); };
+  if (Status status = flow_layers<SlicePlan::Work>(last - first, bytes_of, prepare, record, limits, cancel, flow); !status) {
+    return status.error();
+  }
+  if (file) {
+    Buffer<char> text;
+    encoder->tail(head, text);
+    if (Status status = file->append(text); !status) return status.error();
+    summary.bytes_written = file->size();
+    if (Status status = file->finish(); !status) return status.error();
+  }
+  if (package) {
+    if (Status status = package->finish(summary.output); !status) return status.error();
+    std::error_code ignored;
+    summary.bytes_written = fs::file_size(summary.output, ignored);
+  }
+  if (Status status = manifest->finish(); !status) return status.error();
+  summary.layers = last - first;
+  summary.layer_seconds = seconds_since(start);
+  summary.slice_seconds = static_cast<double>(slice_ns) * 1e-9;
+  summary.encode_seconds = static_cast<double>(encode_ns) * 1e-9;
+  summary.most_in_flight = flow.most_in_flight;
+  summary.peak_layer_bytes = flow.most_bytes;
+  summary.peak_resident_bytes = peak_resident_bytes();
+  if (summary.open_chains > 0) {
+    summary.warnings.push_back(fmt::format(
+        "{} chains of cuts stay open, first {}: they bound nothing and are left out; leave out --no-repair to close the "
+        "parts, or give a longer --bridge", summary.open_chains, first_open));
+  }
+  return summary;
+}
+
+}  // namespace lamina::pipeline
