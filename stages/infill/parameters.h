@@ -57,9 +57,8 @@ struct FillParameters {
   std::vector<Nm> stagger{0};
   bool stagger_every_layer = false;  // the turn goes on with every layer, not with every return of the angle
 
-  std::optional<Nm> first_line;  // distance of line 0 from the part's side, across the lines; nothing is laid before
-                                 // it. Absent: one distance from the centre of the innermost wall, and lines before
-                                 // it where there is room
+  std::optional<Nm> first_line;  // distance of line 0 from the part's side, across the lines; no line of any layer is
+                                 // nearer to either side. Absent: one distance from the centre of the innermost wall
   std::optional<Nm> end_inset;   // of line ends from the centre of the innermost wall (from the surface without
                                  // walls). Absent: beads touch the wall, or overlap it as they do each other
   std::int64_t longest_link = -1;  // between two lines along the edge; -1: three distances; 0: no links

@@ -120,9 +120,10 @@ Result<LinePlaces> place_lines(const FillParameters& parameters, const FillConte
   auto distances = Distances::make(parameters, context, extent);
   if (!distances) return distances.error();
   const std::int64_t shift = layer_stagger(parameters, context.layer.index);
-  // Places count from the part's side and without the stagger while lines are laid out.
-  const std::int64_t low = extent.low - extent.side - shift, high = extent.high - extent.side - shift;
-  const std::int64_t lowest = parameters.first_line ? std::max(low, *first - shift) : low;
+  // Places count from the part's side and without the stagger while lines are laid out. No line is nearer to either
+  // side of the part than the first one.
+  const std::int64_t lowest = std::max(extent.low - extent.side, *first) - shift;
+  const std::int64_t high = std::min(extent.high - extent.side, extent.length - *first) - shift;
 
   const auto too_many = [&] {
     return Error{Fault::kUsage, fmt::format("layer {}: more than {} lines; give wider beads or gaps",
