@@ -5,7 +5,7 @@
 #include <numeric>
 
 #include "bench/named_parts.h"
-#include "stages/heights/uniform.h"
+#include "stages/heights/table.h"
 
 namespace lamina::bench {
 namespace {
@@ -32,7 +32,7 @@ void touch_crossings(benchmark::State& state, const Job& job, const std::string&
   raster::LayerScratch scratch;
   Runs runs;
   Buffer<std::uint32_t> all;
-  const heights::UniformTable table(part.bounds.height(), job.layer);
+  const heights::LayerTable table = heights::LayerTable::uniform(part.bounds.height(), job.layer);
   for (std::uint32_t i = 0; i < table.size(); ++i) {
     rasterizer->layer(raster::Engine::kContours, table[i].plane(), scratch, runs);
     all.insert(all.end(), runs.change.begin(), runs.change.end());

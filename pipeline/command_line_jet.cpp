@@ -14,7 +14,7 @@
 namespace lamina::pipeline {
 namespace {
 
-const KeyChoice kJetKeys = {"bed", "layers", "place", "image", "load", "run", "part"};
+const KeyChoice kJetKeys = {"bed", "layers", "heights", "place", "image", "load", "run", "part"};
 
 CommandSpec jet_spec() {
   CommandSpec spec;

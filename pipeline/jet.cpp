@@ -11,10 +11,10 @@
 
 #include "pipeline/graph.h"
 #include "pipeline/hash.h"
+#include "pipeline/heights_plan.h"
 #include "pipeline/manifest.h"
 #include "pipeline/output_directory.h"
 #include "pipeline/resume.h"
-#include "stages/heights/uniform.h"
 #include "stages/raster/mirror.h"
 #include "stages/raster/raster.h"
 #include "stages/write/atomic_file.h"
@@ -178,7 +178,7 @@ struct LayerPlan {
   std::vector<LayerRecord> kept;
 };
 
-Result<LayerPlan> plan_layers(const Job& job, const ManifestHead& head, const heights::UniformTable& table) {
+Result<LayerPlan> plan_layers(const Job& job, const ManifestHead& head, const heights::LayerTable& table) {
   LayerPlan plan;
   if (job.resume) {
     auto kept = layers_that_hold(job.output, manifest_name(job), head);
@@ -204,6 +204,9 @@ Result<JetSummary> run_jet(const Job& job, const ProgressCallback& progress, con
   JetSummary summary;
   summary.directory = job.output;
 
+  if (job.heights.per_part) {
+    return Error{Fault::kUsage, "--per-part: a powder bed has one table of layers for all parts; leave it out"};
+  }
   const write::ImageFormat* format = write::find_image_format(job.format);
   if (format == nullptr) return Error{Fault::kUsage, fmt::format("unknown format '{}'", job.format)};
 
@@ -216,7 +219,9 @@ Result<JetSummary> run_jet(const Job& job, const ProgressCallback& progress, con
   if (cancel) return Error{Fault::kInterrupted, "interrupted before the first layer"};
 
   const PixelGrid grid = grid_of(job);
-  const heights::UniformTable table(scene->height, static_cast<Nm>(nm_of(job.layer_mm)));
+  const Result<heights::LayerTable> decided = layer_table(job, *scene);
+  if (!decided) return decided.error();
+  const heights::LayerTable& table = *decided;
   const auto range = layer_range(job, table.size());
   if (!range) return range.error();
   const ManifestHead head = make_head(job, scene->parts, table.size(), *range);

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "pipeline/heights_plan.h"
 #include "pipeline/job_keys.h"
 
 namespace lamina::pipeline {
@@ -33,6 +34,7 @@ Status check_job(const Job& job) {
       }
     }
   }
+  if (const auto options = heights_options(job); !options) return options.error();
   if (job.layers && job.shard) {
     return Error{Fault::kUsage, "--layers and --shard exclude each other; a shard is a share of all layers"};
   }

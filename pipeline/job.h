@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "pipeline/fill_request.h"
+#include "pipeline/heights_request.h"
 #include "pipeline/slice_request.h"
 #include "stages/data/fill_rule.h"
 #include "stages/data/grid.h"
@@ -39,6 +40,7 @@ struct Job {
   std::array<double, 2> bed_mm{490, 380};
   std::array<std::int64_t, 2> dpi{1200, 1200};
   double layer_mm = 0.05;
+  HeightsRequest heights;
   double gap_mm = 5;  // between parts that are arranged by the planner
   FillRule fill_rule = FillRule::kNonzero;
   Mirror mirror = Mirror::kNone;

@@ -41,6 +41,7 @@ std::span<const PartKey> part_keys();
 
 // --- the groups, one file each: job_keys_<group>.cpp
 std::span<const JobKey> bed_keys();
+std::span<const JobKey> heights_keys();
 std::span<const JobKey> place_keys();
 std::span<const JobKey> image_keys();
 std::span<const JobKey> slice_keys();

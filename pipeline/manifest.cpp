@@ -79,11 +79,14 @@ std::string key_text(std::string_view section, std::string_view name, const Job&
 
 }  // namespace
 
-std::string_view reason_name(LayerReason) { return "uniform"; }
-
 bool read_reason(std::string_view name, LayerReason& reason) {
-  reason = LayerReason::kUniform;
-  return name == "uniform";
+  for (const LayerReason one : {LayerReason::kUniform, LayerReason::kSlope, LayerReason::kPeak, LayerReason::kCusp,
+                                LayerReason::kFlat}) {
+    if (reason_name(one) != name) continue;
+    reason = one;
+    return true;
+  }
+  return false;
 }
 
 std::string head_text(const ManifestHead& head) {

@@ -14,7 +14,6 @@ std::string head_text(const ManifestHead& head);
 /// Appends one layer's object, without comma or line end.
 void add_record_text(const LayerRecord& record, std::string_view extension, std::string& text);
 
-std::string_view reason_name(LayerReason reason);
 bool read_reason(std::string_view name, LayerReason& reason);
 
 }  // namespace lamina::pipeline

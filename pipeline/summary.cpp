@@ -1,5 +1,7 @@
 #include "pipeline/summary.h"
 
+#include "pipeline/heights_plan.h"
+
 #include <fmt/format.h>
 
 #include <iterator>
@@ -47,7 +49,7 @@ std::string summary_text(const Job& job, const JetSummary& s) {
   }
   line("image", fmt::format("{} x {} pixels of {} x {} dpi on {} x {} mm, {}", s.columns, s.rows, job.dpi[0], job.dpi[1],
                             number_text(job.bed_mm[0]), number_text(job.bed_mm[1]), job.format));
-  std::string layers = fmt::format("{} of {} mm", readable_count(s.layers_total), number_text(job.layer_mm));
+  std::string layers = fmt::format("{} {}", readable_count(s.layers_total), heights_text(job));
   if (!job.dry_run && s.layers_planned != s.layers_total) layers += fmt::format("; {} planned", readable_count(s.layers_planned));
   if (s.layers_kept > 0) layers += fmt::format(", {} kept", readable_count(s.layers_kept));
   line("layers", layers);

@@ -2,13 +2,35 @@
 #pragma once
 
 #include <cstdint>
+#include <string_view>
 
 #include "stages/data/units.h"
 
 namespace lamina {
 
 /// Why a layer has its thickness.
-enum class LayerReason : std::uint8_t { kUniform };
+enum class LayerReason : std::uint8_t {
+  kUniform,  // the thickest that there is, or the only one
+  kSlope,    // a facet is at least as flat as the angle that asks for thinner layers
+  kPeak,     // a horizontal face lies in or on top of the thicker layer
+  kCusp,     // a thicker layer would leave too high a step on a slope
+  kFlat      // so that a layer ends on a horizontal face, or at the top or bottom of a part
+};
+
+constexpr std::string_view reason_name(LayerReason reason) {
+  switch (reason) {
+    case LayerReason::kSlope: return "slope";
+    case LayerReason::kPeak: return "peak";
+    case LayerReason::kCusp: return "cusp";
+    case LayerReason::kFlat: return "flat";
+    case LayerReason::kUniform: break;
+  }
+  return "uniform";
+}
+
+/// Where the steps of the layers lie. A plane in the middle puts them across the true surface; two planes, at the
+/// bottom and at the top of the layer, give what lies inside (both) or outside (either).
+enum class Containment : std::uint8_t { kAcross, kInside, kOutside };
 
 struct Layer {
   std::uint32_t index;  // from 0 at the bottom
@@ -18,6 +40,10 @@ struct Layer {
 
   /// Height at which the part is sampled: the middle of the layer, rounded down.
   Nm plane() const { return bottom + thickness / 2; }
+  /// The planes that see the section at the layer's very bottom and at its very top. Vertices on a plane count as below
+  /// it, so the upper one lies 1 nm under the top: a face that ends the layer is still cut.
+  Nm lowest_plane() const { return bottom; }
+  Nm highest_plane() const { return bottom + thickness - 1; }
 };
 
 }  // namespace lamina

@@ -1,0 +1,50 @@
+#include "stages/heights/heights.h"
+
+#include <fmt/format.h>
+
+#include "stages/heights/greedy.h"
+#include "stages/heights/ladder.h"
+#include "stages/heights/optimal.h"
+
+namespace lamina::heights {
+
+Status check_options(const Options& options) {
+  const auto wrong = [](std::string text) { return Error{Fault::kUsage, std::move(text)}; };
+  if (options.set.values.empty()) {
+    return wrong("heights.thickness: holds no thickness; give a set as 0.178,0.254 or a range as 0.05..0.30:0.01");
+  }
+  Nm before = 0;
+  for (const Nm value : options.set.values) {
+    if (value <= before) return wrong("heights.thickness: thicknesses have to be above 0 and to differ");
+    before = value;
+  }
+  if (options.mode == Mode::kUniform && options.set.size() > 1) {
+    return wrong(fmt::format("heights.thickness: uniform layers have one thickness, here are {}; give one, or another "
+                             "--heights",
+                             options.set.size()));
+  }
+  const bool by_cusp = options.mode == Mode::kCusp || options.mode == Mode::kStepwise || options.mode == Mode::kOptimal;
+  if (by_cusp && options.cusp <= 0) {
+    return wrong("heights.cusp_mm: 0 is a limit that no slope can keep; give a height above 0, as 0.1");
+  }
+  return {};
+}
+
+Result<Plan> plan_heights(const SurfaceIndex& index, const Options& options) {
+  if (Status status = check_options(options); !status) return status.error();
+  if (options.mode == Mode::kUniform) {
+    Plan plan;
+    plan.table = LayerTable::uniform(index.top, options.set.least());
+    return plan;
+  }
+  const Result<Ladder> ladder = Ladder::reachable(options.set, std::int64_t{index.top} + options.set.most());
+  if (!ladder) return ladder.error();
+  switch (options.mode) {
+    case Mode::kAngle: return plan_by_angle(index, options, *ladder);
+    case Mode::kCusp: return plan_by_cusp(index, options, *ladder);
+    case Mode::kStepwise: return plan_stepwise(index, options, *ladder);
+    default: return plan_optimal(index, options, *ladder);
+  }
+}
+
+}  // namespace lamina::heights

@@ -1,0 +1,77 @@
+// stages/heights/heights.h: which layers a job is made of.
+//
+// Five ways to decide. All of them read the same index of the parts' surface, all heights are integer nm, and the same
+// parts and options give the same table for any number of threads.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "stages/data/status.h"
+#include "stages/heights/flats.h"
+#include "stages/heights/surface.h"
+#include "stages/heights/table.h"
+#include "stages/heights/thickness_set.h"
+
+namespace lamina::heights {
+
+enum class Mode : std::uint8_t {
+  kUniform,   // one thickness
+  kAngle,     // thinner where a facet is flatter than an angle, or to meet a horizontal face (Lima 2009)
+  kCusp,      // from the bottom up, each layer as thick as the step on the slopes allows (Dolenc and Makela 1994)
+  kStepwise,  // slabs of the greatest thickness, each divided evenly (Sabourin, Houser and Bohn 1996)
+  kOptimal    // the fewest layers, or the least time, of all tables that keep the step and end on the flats
+};
+
+/// Which slopes a layer looks at: all that reach into it, or only those that its bounding plane cuts, as the documents
+/// do. The latter can miss whatever lies between two planes.
+enum class Facets : std::uint8_t { kRange, kPlane };
+
+/// What a layer costs; with both 0 every layer costs the same.
+struct TimeModel {
+  double seconds_per_layer = 0;
+  double seconds_per_mm2 = 0;  // of the section at the layer's bottom, of all copies
+  bool on() const { return seconds_per_layer > 0 || seconds_per_mm2 > 0; }
+};
+
+struct Options {
+  Mode mode = Mode::kUniform;
+  ThicknessSet set;                  // all modes; uniform has exactly one
+  Nm cusp = 100'000;                 // nm, the highest step on a slope: cusp, stepwise, optimal
+  double adapt_angle_deg = 45;       // angle: slopes at least this flat get thinner layers
+  SurfaceOptions surface;
+  Facets facets = Facets::kRange;    // angle, cusp, stepwise
+  double least_flat_mm2 = 1;         // smaller flats are not aimed at
+  bool flats = true;                 // optimal: end layers on flats and on tops and bottoms of parts
+  TimeModel time;                    // optimal
+};
+
+/// How near a flat the nearest boundary of a table lies.
+struct FlatHit {
+  Flat flat;
+  std::int64_t miss = 0;  // nm
+};
+
+/// A table and what can be said for it.
+struct Plan {
+  LayerTable table;
+  std::vector<Steepness> looked_at;   // angle: of each layer, the flattest slope that decided; else empty
+  std::vector<bool> stepped_back;     // cusp: thinner than the slopes at its bottom ask for
+  /// optimal: no table of one layer less (or, with a time model, of less time) that ends as near to the flats and keeps
+  /// the step gets higher than this, nm; -1 if there is no such statement
+  std::int64_t one_less_reaches = -1;
+  std::int64_t largest_miss = 0;      // optimal: nm, the smallest that any table can have
+};
+
+/// Whether options make sense together. errors  kUsage, one line that begins with the key
+Status check_options(const Options& options);
+
+/// Decides all layers of the parts, standing on the bed at height 0.
+/// errors  of check_options; kUsage if the thicknesses reach too many heights
+/// cost    uniform O(1); others O(facets + height / step), optimal times the number of thicknesses
+Result<Plan> plan_heights(const SurfaceIndex& index, const Options& options);
+
+}  // namespace lamina::heights

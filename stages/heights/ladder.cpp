@@ -1,0 +1,44 @@
+#include "stages/heights/ladder.h"
+
+#include <fmt/format.h>
+
+namespace lamina::heights {
+
+Result<Ladder> Ladder::reachable(const ThicknessSet& set, std::int64_t highest) {
+  Ladder ladder;
+  const std::int64_t step = set.step(), even = ceil_div(highest, step) + 1;
+  if (even <= kMostRungs) {
+    ladder.step_ = step;
+    ladder.count_ = static_cast<std::uint32_t>(even);
+    return ladder;
+  }
+  // Sums in increasing order: the next one is the least of a known sum and one thickness more.
+  std::vector<std::int64_t>& sums = ladder.heights_;
+  std::vector<std::uint32_t> next(set.size(), 0);
+  sums.push_back(0);
+  while (sums.back() < highest) {
+    std::int64_t least = INT64_MAX;
+    for (std::uint32_t i = 0; i < set.size(); ++i) {
+      while (sums[next[i]] + set.values[i] <= sums.back()) ++next[i];
+      least = std::min(least, sums[next[i]] + set.values[i]);
+    }
+    sums.push_back(least);
+    if (sums.size() > kMostRungs) {
+      return Error{Fault::kUsage,
+                   fmt::format("heights.thickness: layers can end at more than {} heights below {} mm; give thicknesses "
+                               "that are multiples of a coarser step",
+                               kMostRungs, mm(highest))};
+    }
+  }
+  ladder.count_ = static_cast<std::uint32_t>(sums.size());
+  return ladder;
+}
+
+Ladder Ladder::listed(std::vector<std::int64_t> heights) {
+  Ladder ladder;
+  ladder.count_ = static_cast<std::uint32_t>(heights.size());
+  ladder.heights_ = std::move(heights);
+  return ladder;
+}
+
+}  // namespace lamina::heights

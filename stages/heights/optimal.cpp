@@ -1,0 +1,292 @@
+#include "stages/heights/optimal.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "stages/heights/section.h"
+#include "stages/heights/steepest.h"
+
+namespace lamina::heights {
+namespace {
+
+constexpr std::uint32_t kNone = UINT32_MAX;
+
+// What a stack has cost so far. Where every flat is hit, only layers count: 32 bits, or 64 for microseconds. Where flats
+// are missed, the upper half is the sum of their distances in nm and decides first.
+using Layers = std::int32_t;
+using Time = std::int64_t;
+using MissesThenTime = __int128;
+
+template <class Cost>
+constexpr Cost unreached() {
+  return static_cast<Cost>((static_cast<unsigned __int128>(1) << (8 * sizeof(Cost) - 1)) - 1);
+}
+
+// The highest rung to which the steps allow a layer from each rung. Both ends only move up: if a layer keeps the limit,
+// one inside of it does.
+Buffer<std::uint32_t> highest_by_cusp(const Ladder& ladder, const Buffer<Steepness>& cells, std::int64_t cusp,
+                                      std::int64_t most) {
+  Buffer<std::uint32_t> highest(ladder.rungs());
+  Buffer<std::uint32_t> window(ladder.cells());  // cells of decreasing steepness, the first is the steepest in the window
+  std::uint32_t front = 0, back = 0, end = 0;
+  for (std::uint32_t rung = 0; rung < ladder.rungs(); ++rung) {
+    const std::int64_t bottom = ladder[rung];
+    end = std::max(end, rung);
+    while (front < back && window[front] < rung) ++front;
+    while (end + 1 < ladder.rungs()) {
+      const std::int64_t thickness = ladder[end + 1] - bottom;
+      const Steepness flattest = std::max(cells[end], front < back ? cells[window[front]] : 0);
+      if (thickness > most || cusp_of(thickness, flattest) > cusp) break;
+      while (front < back && cells[window[back - 1]] <= cells[end]) --back;
+      window[back++] = end++;
+    }
+    highest[rung] = end;
+  }
+  return highest;
+}
+
+class Solver {
+ public:
+  Solver(const SurfaceIndex& index, const Options& options, const Ladder& ladder)
+      : index_(index), options_(options), ladder_(ladder), set_(options.set), tolerance_(options.surface.flat_tolerance) {
+    highest_ = highest_by_cusp(ladder, steepest_in_cells(index, index.parts, ladder), options.cusp, set_.most());
+    if (options.flats) {
+      for (const Flat& flat : find_flats(index, tolerance_, options.least_flat_mm2)) {
+        if (flat.height < index.top) flats_.push_back(flat.height);
+      }
+    }
+    if (ladder.step() > 0) {
+      for (const Nm value : set_.values) strides_.push_back(static_cast<std::uint32_t>(value / ladder.step()));
+    }
+    weigh_layers();
+  }
+
+  Plan solve() {
+    Plan plan;
+    allow(tolerance_);
+    std::vector<std::uint32_t> thicknesses = weights_.empty() ? solve<Layers>() : solve<Time>();
+    if (thicknesses.empty()) {
+      plan.largest_miss = least_largest_miss();
+      allow(plan.largest_miss);
+      thicknesses = solve<MissesThenTime>();
+    }
+    std::int64_t bottom = 0;
+    for (const std::uint32_t i : thicknesses) {
+      plan.table.add(set_.values[i], reason(bottom, i));
+      bottom += set_.values[i];
+    }
+    plan.one_less_reaches = one_less_;
+    return plan;
+  }
+
+ private:
+  // Costs of layers by the rung at their bottom, in microseconds; empty if each counts 1.
+  void weigh_layers() {
+    if (!options_.time.on()) return;
+    const Buffer<double> section = section_at_rungs(index_, ladder_, tolerance_);
+    weights_.resize(ladder_.rungs());
+    for (std::uint32_t rung = 0; rung < ladder_.rungs(); ++rung) {
+      weights_[rung] = std::max<std::int64_t>(1, std::llround(seconds_of_layer(options_.time, section[rung]) * 1e6));
+    }
+  }
+
+  bool is_end(std::uint32_t rung) const {
+    const std::int64_t height = ladder_[rung];
+    if (rung == 0) return false;
+    return options_.flats ? std::abs(height - index_.top) <= allowed_ : height >= index_.top;
+  }
+  std::int64_t counted(std::int64_t distance) const { return distance > tolerance_ ? distance : 0; }
+
+  // Calls visit(thickness index, upper rung) for every thickness from a rung, thin to thick.
+  template <class Visit>
+  void for_each_layer(std::uint32_t rung, const Visit& visit) const {
+    for (std::uint32_t i = 0; i < set_.size(); ++i) {
+      const std::uint32_t up = strides_.empty() ? ladder_.rungs_up_to(ladder_[rung] + set_.values[i]) - 1 : rung + strides_[i];
+      if (up > limit_[rung]) return;
+      visit(i, up);
+    }
+  }
+  // The rung a thickness below one, or kNone.
+  std::uint32_t rung_below(std::uint32_t rung, std::uint32_t i) const {
+    if (!strides_.empty()) return rung >= strides_[i] ? rung - strides_[i] : kNone;
+    const std::int64_t height = ladder_[rung] - set_.values[i];
+    const std::uint32_t below = ladder_.rungs_up_to(height);
+    return below > 0 && ladder_[below - 1] == height ? below - 1 : kNone;
+  }
+
+  // The highest rung that a layer from each rung may reach if every flat has to have a boundary within `distance`.
+  void allow(std::int64_t distance) {
+    allowed_ = distance;
+    limit_.resize(ladder_.rungs());
+    const std::int64_t ceiling = options_.flats ? index_.top + distance : INT64_MAX;
+    std::size_t flat = 0;
+    for (std::uint32_t rung = 0; rung < ladder_.rungs(); ++rung) {
+      const std::int64_t bottom = ladder_[rung];
+      while (flat < flats_.size() && flats_[flat] - distance <= bottom) ++flat;
+      std::int64_t most = std::min(ceiling, bottom + set_.most());
+      if (flat < flats_.size()) most = std::min(most, flats_[flat] + distance);
+      // The least thickness is allowed whatever the slopes ask for.
+      const std::uint32_t thinnest = ladder_.rungs_up_to(bottom + set_.least()) - 1;
+      limit_[rung] = std::min(ladder_.rungs_up_to(most) - 1, std::max(highest_[rung], thinnest));
+      if (bottom + set_.least() > most) limit_[rung] = rung;
+    }
+  }
+
+  // The cost of a layer. first_flat: the first one above its bottom.
+  template <class Cost>
+  Cost weight(std::uint32_t rung, std::size_t first_flat, std::uint32_t up) const {
+    Cost cost = weights_.empty() ? Cost{1} : static_cast<Cost>(weights_[rung]);
+    if constexpr (sizeof(Cost) > 8) {
+      for_each_miss(first_flat, ladder_[rung], ladder_[up], [&](std::int64_t miss) { cost += Cost{miss} << 64; });
+    }
+    return cost;
+  }
+  template <class Cost>
+  Cost end_cost(std::uint32_t rung) const {
+    if constexpr (sizeof(Cost) > 8) return Cost{counted(std::abs(ladder_[rung] - index_.top))} << 64;
+    return 0;
+  }
+  // Nothing is built upon an end, but where ends are missed the next rung may be nearer.
+  template <class Cost>
+  bool is_last(std::uint32_t rung) const {
+    return sizeof(Cost) > 8 ? ladder_[rung] >= index_.top : is_end(rung);
+  }
+
+  // The stack that the header promises, as indices of thicknesses, bottom up; empty if none keeps limit_.
+  template <class Cost>
+  std::vector<std::uint32_t> solve() {
+    Buffer<Cost> cost(ladder_.rungs(), unreached<Cost>());
+    cost[0] = 0;
+    const bool run = sizeof(Cost) <= 8 && !strides_.empty() && set_.is_contiguous() && set_.step() == ladder_.step();
+    std::uint32_t end = kNone;
+    Cost best = unreached<Cost>();
+    for (std::uint32_t rung = 0; rung < ladder_.rungs(); ++rung) {
+      if (cost[rung] == unreached<Cost>()) continue;
+      if (is_end(rung)) {
+        const Cost whole = cost[rung] + end_cost<Cost>(rung);
+        if (whole < best || (whole == best && nearer_top(rung, end))) {
+          end = rung;
+          best = whole;
+        }
+      }
+      if (is_last<Cost>(rung)) continue;
+      if (run) {
+        const Cost next = cost[rung] + weight<Cost>(rung, 0, 0);
+        Cost* to = cost.data();
+        for (std::uint32_t up = rung + strides_.front(); up <= limit_[rung]; ++up) to[up] = std::min(to[up], next);
+      } else {
+        const std::size_t flat = first_flat_above(ladder_[rung]);
+        for_each_layer(rung, [&](std::uint32_t, std::uint32_t up) {
+          cost[up] = std::min(cost[up], cost[rung] + weight<Cost>(rung, flat, up));
+        });
+      }
+    }
+    if (end == kNone) return {};
+    for (std::uint32_t rung = 0; rung < ladder_.rungs(); ++rung) {
+      if (cost[rung] < best && !is_end(rung)) one_less_ = ladder_[rung];
+    }
+    return trace(cost, end);
+  }
+
+  bool nearer_top(std::uint32_t a, std::uint32_t b) const {
+    return std::abs(ladder_[a] - index_.top) < std::abs(ladder_[b] - index_.top);
+  }
+
+  // Calls visit(miss) for each flat strictly between two heights that is missed.
+  template <class Visit>
+  void for_each_miss(std::size_t first_flat, std::int64_t bottom, std::int64_t top, const Visit& visit) const {
+    for (std::size_t i = first_flat; i < flats_.size() && flats_[i] < top; ++i) {
+      const std::int64_t miss = counted(std::min(flats_[i] - bottom, top - flats_[i]));
+      if (miss > 0) visit(miss);
+    }
+  }
+  std::size_t first_flat_above(std::int64_t height) const {
+    return static_cast<std::size_t>(std::ranges::upper_bound(flats_, height) - flats_.begin());
+  }
+
+  // The least that the largest miss of any stack can be.
+  std::int64_t least_largest_miss() {
+    allow(index_.top + set_.most());
+    Buffer<std::int64_t> worst(ladder_.rungs(), unreached<std::int64_t>());
+    worst[0] = 0;
+    std::int64_t best = unreached<std::int64_t>();
+    for (std::uint32_t rung = 0; rung < ladder_.rungs(); ++rung) {
+      if (worst[rung] == unreached<std::int64_t>()) continue;
+      const std::int64_t bottom = ladder_[rung];
+      if (rung > 0) best = std::min(best, std::max(worst[rung], counted(std::abs(bottom - index_.top))));
+      if (bottom >= index_.top) continue;
+      const std::size_t flat = first_flat_above(bottom);
+      for_each_layer(rung, [&](std::uint32_t, std::uint32_t up) {
+        std::int64_t value = worst[rung];
+        for_each_miss(flat, bottom, ladder_[up], [&](std::int64_t miss) { value = std::max(value, miss); });
+        worst[up] = std::min(worst[up], value);
+      });
+    }
+    return best;
+  }
+
+  // Of all stacks that reach `end` at its cost, the one with the least mean cusp.
+  template <class Cost>
+  std::vector<std::uint32_t> trace(const Buffer<Cost>& cost, std::uint32_t end) const {
+    const Buffer<double> below = projected_below(index_, index_.parts, ladder_, Sign::kBoth);
+    constexpr double kFar = std::numeric_limits<double>::infinity();
+    Buffer<double> steps(end + 1, kFar);  // mm2 nm, from a rung to the end
+    Buffer<std::uint32_t> via(end + 1, kNone);
+    steps[end] = 0;
+    for (std::uint32_t up = end; up > 0; --up) {
+      if (steps[up] == kFar) continue;
+      for (std::uint32_t i = 0; i < set_.size(); ++i) {
+        const std::uint32_t rung = rung_below(up, i);
+        if (rung == kNone || limit_[rung] < up || cost[rung] == unreached<Cost>() || is_last<Cost>(rung)) continue;
+        if (cost[rung] + weight<Cost>(rung, first_flat_above_if<Cost>(rung), up) != cost[up]) continue;
+        const double value = steps[up] + set_.values[i] * (below[up] - below[rung]);
+        if (value < steps[rung]) {
+          steps[rung] = value;
+          via[rung] = i;
+        }
+      }
+    }
+    std::vector<std::uint32_t> thicknesses;
+    for (std::int64_t height = 0; height < ladder_[end];) {
+      thicknesses.push_back(via[ladder_.rungs_up_to(height) - 1]);
+      height += set_.values[thicknesses.back()];
+    }
+    return thicknesses;
+  }
+  template <class Cost>
+  std::size_t first_flat_above_if(std::uint32_t rung) const {
+    return sizeof(Cost) > 8 ? first_flat_above(ladder_[rung]) : 0;
+  }
+
+  LayerReason reason(std::int64_t bottom, std::uint32_t i) const {
+    const std::int64_t top = bottom + set_.values[i];
+    if (i + 1 == set_.size()) return LayerReason::kUniform;
+    if (options_.flats) {
+      if (std::abs(top - index_.top) <= tolerance_) return LayerReason::kFlat;
+      const auto flat = std::ranges::lower_bound(flats_, top - tolerance_);
+      if (flat != flats_.end() && *flat <= top + tolerance_) return LayerReason::kFlat;
+    }
+    const bool limited = ladder_[highest_[ladder_.rungs_up_to(bottom) - 1]] < bottom + set_.values[i + 1];
+    return limited || !options_.flats ? LayerReason::kCusp : LayerReason::kFlat;
+  }
+
+  const SurfaceIndex& index_;
+  const Options& options_;
+  const Ladder& ladder_;
+  const ThicknessSet& set_;
+  const Nm tolerance_;
+  std::vector<std::int64_t> flats_;      // below the top
+  std::vector<std::uint32_t> strides_;   // thicknesses in rungs, where rungs are even
+  Buffer<std::uint32_t> highest_, limit_;
+  Buffer<std::int64_t> weights_;
+  std::int64_t allowed_ = 0, one_less_ = -1;
+};
+
+}  // namespace
+
+Plan plan_optimal(const SurfaceIndex& index, const Options& options, const Ladder& ladder) {
+  return Solver(index, options, ladder).solve();
+}
+
+}  // namespace lamina::heights

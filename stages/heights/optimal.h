@@ -1,0 +1,26 @@
+// stages/heights/optimal.h: the best of all layer tables.
+#pragma once
+
+#include "stages/heights/heights.h"
+#include "stages/heights/ladder.h"
+
+namespace lamina::heights {
+
+/// Of all stacks of the set's thicknesses in which no slope gets a step above options.cusp, except in layers of the
+/// least thickness, the one with
+///   1. the least distance from the flat that is missed most,
+///   2. the least sum of the distances of all flats that are missed,
+///   3. the fewest layers, or the least time,
+///   4. the least step on average, weighted by area.
+/// A flat is missed by its distance from the nearest boundary if that is more than options.surface.flat_tolerance. The
+/// top of the parts counts as a flat, and the stack ends there; with options.flats off there are no flats, and the stack
+/// ends at or above the top.
+///
+/// Every height that the thicknesses reach is a state; the cost of reaching it is known when all lower ones are (dynamic
+/// programming, R. Bellman 1957; for layers, each state is one height). Because the layers allowed from a state are the
+/// thinnest ones up to some limit, a state is expanded without looking at the surface again.
+///
+/// cost  O(states * thicknesses); two passes, four if flats cannot be hit
+Plan plan_optimal(const SurfaceIndex& index, const Options& options, const Ladder& ladder);
+
+}  // namespace lamina::heights

@@ -1,0 +1,122 @@
+#include "stages/heights/surface.h"
+
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <numbers>
+#include <tuple>
+
+namespace lamina::heights {
+namespace {
+
+constexpr std::size_t kBlock = 1 << 14;  // facets; fixed, so that sums do not depend on the threads
+
+struct Normal {
+  double x, y, z;  // length: twice the area, nm2
+};
+
+// Exact before the last rounding: edges below 2^30 nm (1 m) in 64 bits, longer ones in 128.
+Normal normal_of(const Triangle& t) {
+  const std::int64_t ux = std::int64_t{t.b.x} - t.a.x, uy = std::int64_t{t.b.y} - t.a.y, uz = std::int64_t{t.b.z} - t.a.z;
+  const std::int64_t vx = std::int64_t{t.c.x} - t.a.x, vy = std::int64_t{t.c.y} - t.a.y, vz = std::int64_t{t.c.z} - t.a.z;
+  constexpr std::int64_t kSmall = 1 << 30;
+  const auto small = [](std::int64_t v) { return static_cast<std::uint64_t>(v + kSmall) < 2 * kSmall; };
+  if (small(ux) && small(uy) && small(uz) && small(vx) && small(vy) && small(vz)) {
+    return {static_cast<double>(uy * vz - uz * vy), static_cast<double>(uz * vx - ux * vz),
+            static_cast<double>(ux * vy - uy * vx)};
+  }
+  using Wide = __int128;
+  return {static_cast<double>(Wide{uy} * vz - Wide{uz} * vy), static_cast<double>(Wide{uz} * vx - Wide{ux} * vz),
+          static_cast<double>(Wide{ux} * vy - Wide{uy} * vx)};
+}
+
+struct Limits {
+  double horizontal;  // |n_z| from which a facet is horizontal
+  Nm tolerance;
+  double least_mm2;
+};
+
+MeshSlopes slopes_of(const Mesh& mesh, const Limits& limits) {
+  MeshSlopes slopes;
+  const std::size_t count = mesh.triangles.size();
+  slopes.lo.resize(count);
+  slopes.hi.resize(count);
+  slopes.steepness.resize(count);
+  slopes.projected_mm2.resize(count);
+  const std::size_t blocks = (count + kBlock - 1) / kBlock;
+  std::vector<std::vector<FlatFacet>> flats(blocks);
+  std::vector<double> areas(blocks);
+  tbb::parallel_for(std::size_t{0}, blocks, [&](std::size_t block) {
+    double block_area = 0;
+    for (std::size_t i = block * kBlock; i < std::min(count, (block + 1) * kBlock); ++i) {
+      const Triangle& t = mesh.triangles[i];
+      const Normal n = normal_of(t);
+      const double length = std::sqrt(n.x * n.x + n.y * n.y + n.z * n.z);
+      const double mm2 = length * 0.5e-12, up = std::abs(n.z);
+      block_area += mm2;
+      slopes.lo[i] = slopes.hi[i] = 0;
+      slopes.steepness[i] = 0;
+      slopes.projected_mm2[i] = 0;
+      if (up == 0 || mm2 < limits.least_mm2) continue;
+      const auto [lo, hi] = std::minmax({t.a.z, t.b.z, t.c.z});
+      const double nz = up / length;
+      if (nz >= limits.horizontal && std::int64_t{hi} - lo <= limits.tolerance) {
+        flats[block].push_back({static_cast<Nm>(lo + (std::int64_t{hi} - lo) / 2), n.z > 0, mm2});
+        block_area -= mm2;
+        continue;
+      }
+      if (lo == hi) continue;  // a sliver whose corners are level but whose normal says otherwise cannot be
+      slopes.lo[i] = lo;
+      slopes.hi[i] = hi;
+      slopes.steepness[i] = std::min(kHorizontal, static_cast<Steepness>(std::ceil(nz * kHorizontal)));
+      slopes.projected_mm2[i] = static_cast<float>(n.z * 0.5e-12);
+    }
+    areas[block] = block_area;
+  });
+  for (std::size_t block = 0; block < blocks; ++block) {
+    slopes.flats.insert(slopes.flats.end(), flats[block].begin(), flats[block].end());
+    slopes.area_mm2 += areas[block];
+  }
+  return slopes;
+}
+
+}  // namespace
+
+double angle_of(Steepness steepness) {
+  return std::asin(static_cast<double>(steepness) / kHorizontal) * 180 / std::numbers::pi;
+}
+
+SurfaceIndex index_surface(std::span<const Mesh> meshes, std::span<const Instance> instances,
+                           std::span<const std::uint32_t> part_of_instance, std::uint32_t part_count,
+                           const SurfaceOptions& options) {
+  const Limits limits{std::sin(options.peak_angle_deg * std::numbers::pi / 180) - options.normal_tolerance,
+                      options.flat_tolerance, options.least_facet_mm2};
+  SurfaceIndex index;
+  index.meshes.reserve(meshes.size());
+  for (const Mesh& mesh : meshes) index.meshes.push_back(slopes_of(mesh, limits));
+
+  std::map<std::tuple<std::uint32_t, std::uint32_t, Nm>, std::uint32_t> copies;  // (part, mesh, raise)
+  for (std::size_t i = 0; i < instances.size(); ++i) {
+    ++copies[{part_of_instance[i], instances[i].mesh, instances[i].offset.z}];
+  }
+  index.parts.resize(part_count);
+  std::vector<bool> seen(part_count);
+  for (const auto& [key, count] : copies) {
+    const auto& [part, mesh, raise] = key;
+    const Box& box = meshes[mesh].bounds;
+    PartSurface& surface = index.parts[part];
+    surface.standing.push_back({mesh, raise, count});
+    const Nm bottom = box.lo.z + raise, top = box.hi.z + raise;
+    surface.bottom = seen[part] ? std::min(surface.bottom, bottom) : bottom;
+    surface.top = seen[part] ? std::max(surface.top, top) : top;
+    seen[part] = true;
+    index.top = std::max(index.top, top);
+    index.area_mm2 += index.meshes[mesh].area_mm2 * count;
+  }
+  return index;
+}
+
+}  // namespace lamina::heights

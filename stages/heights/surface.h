@@ -1,0 +1,99 @@
+// stages/heights/surface.h: what layer heights need to know of a part: its slopes and its horizontal faces by height.
+//
+// One pass over the facets of every mesh. Later questions are answered from these arrays; no layer looks at all facets.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "stages/data/buffer.h"
+#include "stages/data/mesh.h"
+
+namespace lamina::heights {
+
+/// |n_z| of a facet's unit normal in units of 2^-30, rounded up: 0 is a vertical wall, kHorizontal a horizontal face.
+/// A layer of thickness t leaves a step (cusp) of t * |n_z| on the facet (Dolenc and Makela, "Slicing procedures for
+/// layered manufacturing techniques", 1994).
+using Steepness = std::uint32_t;
+inline constexpr Steepness kHorizontal = 1u << 30;
+
+/// Elevation of the normal above the horizontal, in degrees: 0 a wall, 90 a horizontal face.
+double angle_of(Steepness steepness);
+/// Height of the step, nm, rounded up.
+constexpr std::int64_t cusp_of(std::int64_t thickness, Steepness steepness) {
+  return (thickness * steepness + kHorizontal - 1) / kHorizontal;
+}
+
+struct SurfaceOptions {
+  double peak_angle_deg = 90;        // facets at least as flat as this are horizontal
+  double normal_tolerance = 1e-3;    // of |n_z|, for all comparisons of angles
+  Nm flat_tolerance = 1000;          // nm: a horizontal facet may be that much out of level
+  double least_facet_mm2 = 0;        // smaller facets ask for nothing
+};
+
+/// One horizontal facet.
+struct FlatFacet {
+  Nm height;     // nm, the middle of its corners
+  bool up;       // its outside is above
+  double mm2;
+};
+
+/// The facets of one mesh, in its own coordinates. Entries of facets that are vertical, horizontal, degenerate or too
+/// small have lo == hi == 0 and steepness 0. 20 bytes a facet.
+struct MeshSlopes {
+  Buffer<Nm> lo, hi;               // z range, nm
+  Buffer<Steepness> steepness;
+  Buffer<float> projected_mm2;     // area times n_z: negative where the facet looks down
+  std::vector<FlatFacet> flats;    // in the order of the facets
+  double area_mm2 = 0;             // of all facets that are not horizontal
+};
+
+/// A mesh at a height; copies that stand on the same level count as one with a larger area.
+struct Standing {
+  std::uint32_t mesh;
+  Nm raise;              // nm, added to every height
+  std::uint32_t copies;
+};
+
+/// One part of the job.
+struct PartSurface {
+  std::vector<Standing> standing;
+  Nm bottom = 0, top = 0;  // nm above the bed
+};
+
+struct SurfaceIndex {
+  std::vector<MeshSlopes> meshes;
+  std::vector<PartSurface> parts;
+  double area_mm2 = 0;  // of all copies, horizontal facets left out
+  Nm top = 0;           // of all parts
+};
+
+/// Looks at every facet once, in parallel; the result does not depend on the number of threads.
+///
+/// instances, part_of_instance  of equal length; the offset's z is the height above the bed
+/// angles come from the corners of the facets, never from the normals that a file may hold
+/// cost  O(facets); 20 bytes a facet
+SurfaceIndex index_surface(std::span<const Mesh> meshes, std::span<const Instance> instances,
+                           std::span<const std::uint32_t> part_of_instance, std::uint32_t part_count,
+                           const SurfaceOptions& options);
+
+/// Calls visit(lo, hi, steepness, projected) for each sloped facet of a part: heights in nm above the bed, mm2 of all
+/// copies, negative where the facet looks down.
+template <class Visit>
+void for_each_slope(const SurfaceIndex& index, const PartSurface& part, const Visit& visit) {
+  for (const Standing& standing : part.standing) {
+    const MeshSlopes& mesh = index.meshes[standing.mesh];
+    const Nm* lo = mesh.lo.data();
+    const Nm* hi = mesh.hi.data();
+    const Steepness* steepness = mesh.steepness.data();
+    const float* projected = mesh.projected_mm2.data();
+    for (std::size_t i = 0; i < mesh.steepness.size(); ++i) {
+      if (steepness[i] == 0) continue;
+      visit(lo[i] + standing.raise, hi[i] + standing.raise, steepness[i],
+            static_cast<double>(projected[i]) * standing.copies);
+    }
+  }
+}
+
+}  // namespace lamina::heights

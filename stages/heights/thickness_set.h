@@ -1,0 +1,30 @@
+// stages/heights/thickness_set.h: the thicknesses that a process can build.
+#pragma once
+
+#include <cstdint>
+#include <numeric>
+#include <span>
+#include <vector>
+
+#include "stages/data/units.h"
+
+namespace lamina::heights {
+
+/// Thicknesses in nm, each > 0, strictly increasing, at least one.
+struct ThicknessSet {
+  std::vector<Nm> values;
+
+  Nm least() const { return values.front(); }
+  Nm most() const { return values.back(); }
+  std::uint32_t size() const { return static_cast<std::uint32_t>(values.size()); }
+  /// The length of which all of them are multiples.
+  Nm step() const {
+    Nm common = 0;
+    for (const Nm value : values) common = std::gcd(common, value);
+    return common;
+  }
+  /// Whether they are all the multiples of step() from the least to the most.
+  bool is_contiguous() const { return (most() - least()) / step() + 1 == static_cast<Nm>(values.size()); }
+};
+
+}  // namespace lamina::heights
