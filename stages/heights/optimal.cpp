@@ -50,6 +50,8 @@ class Solver {
  public:
   Solver(const SurfaceIndex& index, const Options& options, const Ladder& ladder)
       : index_(index), options_(options), ladder_(ladder), set_(options.set), tolerance_(options.surface.flat_tolerance) {
+    // Where every height is within the tolerance of a rung, the rung that is nearest has to be met.
+    hit_ = ladder.step() > 0 ? std::min<std::int64_t>(tolerance_, ladder.step() / 2) : tolerance_;
     highest_ = highest_by_cusp(ladder, steepest_in_cells(index, index.parts, ladder), options.cusp, set_.most());
     if (options.flats) {
       for (const Flat& flat : find_flats(index, tolerance_, options.least_flat_mm2)) {
@@ -64,7 +66,7 @@ class Solver {
 
   Plan solve() {
     Plan plan;
-    allow(tolerance_);
+    allow(hit_);
     std::vector<std::uint32_t> thicknesses = weights_.empty() ? solve<Layers>() : solve<Time>();
     if (thicknesses.empty()) {
       plan.largest_miss = least_largest_miss();
@@ -96,7 +98,7 @@ class Solver {
     if (rung == 0) return false;
     return options_.flats ? std::abs(height - index_.top) <= allowed_ : height >= index_.top;
   }
-  std::int64_t counted(std::int64_t distance) const { return distance > tolerance_ ? distance : 0; }
+  std::int64_t counted(std::int64_t distance) const { return distance > hit_ ? distance : 0; }
 
   // Calls visit(thickness index, upper rung) for every thickness from a rung, thin to thick.
   template <class Visit>
@@ -144,8 +146,9 @@ class Solver {
   }
   template <class Cost>
   Cost end_cost(std::uint32_t rung) const {
-    if constexpr (sizeof(Cost) > 8) return Cost{counted(std::abs(ladder_[rung] - index_.top))} << 64;
-    return 0;
+    std::int64_t missed = counted(std::abs(ladder_[rung] - index_.top));
+    for (std::size_t i = first_flat_above(ladder_[rung]); i < flats_.size(); ++i) missed += counted(flats_[i] - ladder_[rung]);
+    return static_cast<Cost>(static_cast<__int128>(missed) << 64);
   }
   // Nothing is built upon an end, but where ends are missed the next rung may be nearer.
   template <class Cost>
@@ -164,7 +167,7 @@ class Solver {
     for (std::uint32_t rung = 0; rung < ladder_.rungs(); ++rung) {
       if (cost[rung] == unreached<Cost>()) continue;
       if (is_end(rung)) {
-        const Cost whole = cost[rung] + end_cost<Cost>(rung);
+        const Cost whole = cost[rung] + (sizeof(Cost) > 8 ? end_cost<Cost>(rung) : Cost{0});
         if (whole < best || (whole == best && nearer_top(rung, end))) {
           end = rung;
           best = whole;
@@ -280,7 +283,7 @@ class Solver {
   std::vector<std::uint32_t> strides_;   // thicknesses in rungs, where rungs are even
   Buffer<std::uint32_t> highest_, limit_;
   Buffer<std::int64_t> weights_;
-  std::int64_t allowed_ = 0, one_less_ = -1;
+  std::int64_t hit_ = 0, allowed_ = 0, one_less_ = -1;
 };
 
 }  // namespace

@@ -12,9 +12,10 @@ namespace lamina::heights {
 ///   2. the least sum of the distances of all flats that are missed,
 ///   3. the fewest layers, or the least time,
 ///   4. the least step on average, weighted by area.
-/// A flat is missed by its distance from the nearest boundary if that is more than options.surface.flat_tolerance. The
-/// top of the parts counts as a flat, and the stack ends there; with options.flats off there are no flats, and the stack
-/// ends at or above the top.
+/// A flat is missed by its distance from the nearest boundary if that is more than options.surface.flat_tolerance or
+/// half the step that all thicknesses share, whichever is less: a flat that the thicknesses can meet is met. The top of
+/// the parts counts as a flat, and the stack ends there; with options.flats off there are no flats, and the stack ends
+/// at or above the top.
 ///
 /// Every height that the thicknesses reach is a state; the cost of reaching it is known when all lower ones are (dynamic
 /// programming, R. Bellman 1957; for layers, each state is one height). Because the layers allowed from a state are the
