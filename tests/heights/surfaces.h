@@ -27,15 +27,15 @@ inline ThicknessSet range_of(double low, double high, double step) {
   return set;
 }
 
-/// A profile in x and z (mm), 10 mm deep. Layers look at slopes and heights only, so it need not be closed.
+/// A profile in x and z (mm), 10 mm deep, its outside on the right of its way (x right, z up). Layers look at slopes and heights only, so it need not be closed.
 inline Mesh strip(const std::vector<std::pair<double, double>>& profile) {
   Mesh mesh;
   for (std::size_t i = 0; i + 1 < profile.size(); ++i) {
     const auto [x0, z0] = profile[i];
     const auto [x1, z1] = profile[i + 1];
     const Point3 a{nm(x0), 0, nm(z0)}, b{nm(x1), 0, nm(z1)}, c{nm(x1), nm(10), nm(z1)}, d{nm(x0), nm(10), nm(z0)};
-    mesh.triangles.push_back({a, b, c});
-    mesh.triangles.push_back({a, c, d});
+    mesh.triangles.push_back({a, c, b});
+    mesh.triangles.push_back({a, d, c});
   }
   for (const Triangle& t : mesh.triangles) {
     for (const Point3& p : {t.a, t.b, t.c}) mesh.bounds.add(p);
