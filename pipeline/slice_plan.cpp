@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <numeric>
 
+#include "pipeline/heights_plan.h"
 #include "pipeline/slice.h"
 #include "stages/infill/fill.h"
 
@@ -80,12 +81,13 @@ Result<SlicePlan> SlicePlan::make(const Job& job, const ProgressCallback& progre
 
   start = Clock::now();
   progress({ProgressEvent::Stage::kIndexing});
-  const auto thickness = static_cast<Nm>(nm_of(job.layer_mm));
-  const auto total = static_cast<std::uint32_t>(ceil_div<std::int64_t>(plan.scene_->height, thickness));
+  const Result<heights::LayerTable> table = layer_table(job, *plan.scene_);
+  if (!table) return table.error();
+  const std::uint32_t total = table->size();
   std::vector<Nm> planes(total);
   plan.layers_.reserve(total);
   for (std::uint32_t i = 0; i < total; ++i) {
-    plan.layers_.push_back({i, static_cast<Nm>(std::int64_t{i} * thickness), thickness, LayerReason::kUniform});
+    plan.layers_.push_back((*table)[i]);
     planes[i] = plan.layers_[i].plane();
   }
   std::vector<Box> boxes;

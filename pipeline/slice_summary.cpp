@@ -3,6 +3,7 @@
 #include <iterator>
 
 #include "pipeline/console.h"
+#include "pipeline/heights_plan.h"
 #include "pipeline/json_text.h"
 #include "pipeline/number_text.h"
 #include "pipeline/slice.h"
@@ -23,7 +24,7 @@ std::string slice_summary_text(const Job& job, const SliceSummary& s) {
                                             mm(box.height()), mm(box.lo.x), mm(box.lo.y)));
     for (const Note& note : part.notes) line("", fmt::format("  {}{}", note.repair ? "repair: " : "", note.text));
   }
-  line("layers", fmt::format("{} of {} mm{}", readable_count(s.layers_total), number_text(job.layer_mm),
+  line("layers", fmt::format("{} {}{}", readable_count(s.layers_total), heights_text(job),
                              !job.dry_run && s.layers != s.layers_total
                                  ? fmt::format("; {} sliced", readable_count(s.layers)) : ""));
   if (job.dry_run) {
