@@ -43,11 +43,11 @@ std::string uuid(std::uint32_t kind, std::size_t number) {
 float float_mm(std::int64_t nm) { return static_cast<float>(mm(nm)); }
 
 /// The box that stands for a body where slices say what it is (mesh resolution "lowres").
-Status set_box(const Handle& object, const Box& box) {
+Status set_box(const Handle& object, const Box& box, std::int64_t left, std::int64_t front) {
   std::array<NMR::MODELMESHVERTEX, 8> vertices{};
   for (std::size_t i = 0; i < 8; ++i) {
-    vertices[i].m_fPosition[0] = float_mm((i & 1) != 0 ? box.hi.x : box.lo.x);
-    vertices[i].m_fPosition[1] = float_mm((i & 2) != 0 ? box.hi.y : box.lo.y);
+    vertices[i].m_fPosition[0] = float_mm(((i & 1) != 0 ? box.hi.x : box.lo.x) - left);
+    vertices[i].m_fPosition[1] = float_mm(((i & 2) != 0 ? box.hi.y : box.lo.y) - front);
     vertices[i].m_fPosition[2] = float_mm((i & 4) != 0 ? box.hi.z : box.lo.z);
   }
   constexpr DWORD kFaces[12][3] = {{0, 2, 3}, {0, 3, 1}, {4, 5, 7}, {4, 7, 6}, {0, 1, 5}, {0, 5, 4},
@@ -64,6 +64,7 @@ Status set_box(const Handle& object, const Box& box) {
 
 struct Slice3mfWriter::State {
   Handle model;
+  std::int64_t left = 0, front = 0;  // nm, whole mm: where the items stand, and what their coordinates count from
   std::vector<Handle> stacks;  // one for each body
 };
 
@@ -77,6 +78,14 @@ Result<Slice3mfWriter> Slice3mfWriter::make(const SliceHead& head) {
   if (NMR::lib3mf_createmodel(model.out()) != LIB3MF_OK) return refused("a model", model);
   if (NMR::lib3mf_model_setunit(model.get(), NMR::MODELUNIT_MILLIMETER) != LIB3MF_OK) return refused("the unit", model);
   if (NMR::lib3mf_model_setbuilduuidutf8(model.get(), uuid(0, 0).c_str()) != LIB3MF_OK) return refused("a UUID", model);
+  // The library writes six significant digits: the less they have to tell, the finer they are.
+  State& state = *writer.state_;
+  state.left = floor_div<std::int64_t>(head.bounds.lo.x, kNmPerMm) * kNmPerMm;
+  state.front = floor_div<std::int64_t>(head.bounds.lo.y, kNmPerMm) * kNmPerMm;
+  NMR::MODELTRANSFORM place{};
+  for (std::size_t i = 0; i < 3; ++i) place.m_fFields[i][i] = 1;
+  place.m_fFields[0][3] = float_mm(state.left);
+  place.m_fFields[1][3] = float_mm(state.front);
   std::size_t number = 0;
   for (const std::string& name : head.parts) {
     ++number;
@@ -85,14 +94,14 @@ Result<Slice3mfWriter> Slice3mfWriter::make(const SliceHead& head) {
       return refused("a slice stack", model);
     }
     if (NMR::lib3mf_model_addmeshobject(model.get(), object.out()) != LIB3MF_OK) return refused("an object", model);
-    if (auto status = set_box(object, head.bounds); !status) return status.error();
+    if (auto status = set_box(object, head.bounds, state.left, state.front); !status) return status.error();
     if (NMR::lib3mf_object_setnameutf8(object.get(), name.c_str()) != LIB3MF_OK) return refused("a name", object);
     if (NMR::lib3mf_object_setuuidutf8(object.get(), uuid(1, number).c_str()) != LIB3MF_OK) return refused("a UUID", object);
     if (NMR::lib3mf_meshobject_setslicestack(object.get(), stack.get()) != LIB3MF_OK) return refused("a stack", object);
     if (NMR::lib3mf_meshobject_setslicesmeshresolution(object.get(), NMR::MODELSLICESMESHRESOLUTION_LOW) != LIB3MF_OK) {
       return refused("the mesh resolution", object);
     }
-    if (NMR::lib3mf_model_addbuilditem(model.get(), object.get(), nullptr, item.out()) != LIB3MF_OK) {
+    if (NMR::lib3mf_model_addbuilditem(model.get(), object.get(), &place, item.out()) != LIB3MF_OK) {
       return refused("a build item", model);
     }
     if (NMR::lib3mf_builditem_setuuidutf8(item.get(), uuid(2, number).c_str()) != LIB3MF_OK) return refused("a UUID", item);
@@ -111,7 +120,7 @@ Status Slice3mfWriter::add(const SliceLayer& layer) {
     if (NMR::lib3mf_slicestack_addslice(stack.get(), top, slice.out()) != LIB3MF_OK) return refused("a slice", stack);
     for (std::uint32_t c = layer.body[b]; c < layer.body[b + 1]; ++c) {
       vertices.clear();
-      for (const Point2 p : layer.contours[c]) vertices.push_back({{float_mm(p.x), float_mm(p.y)}});
+      for (const Point2 p : layer.contours[c]) vertices.push_back({{float_mm(p.x - state_->left), float_mm(p.y - state_->front)}});
       DWORD first = 0, polygon = 0;
       const auto count = static_cast<DWORD>(vertices.size());
       if (NMR::lib3mf_slice_addvertices(slice.get(), vertices.data(), count, &first) != LIB3MF_OK) {
