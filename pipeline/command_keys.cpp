@@ -14,6 +14,7 @@ std::string_view heading(std::string_view section) {
   if (section == "part" || section == "place") return "Parts";
   if (section == "slice") return "Contours and files";
   if (section == "fill") return "Filling";
+  if (section == "machine" || section == "dose") return "Machine and binder";
   if (section == "load") return "Repair";
   if (section == "run") return "Run";
   return "Bed and layers";

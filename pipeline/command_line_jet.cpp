@@ -5,6 +5,7 @@
 #include "pipeline/console.h"
 #include "pipeline/interrupt.h"
 #include "pipeline/jet.h"
+#include "pipeline/machine.h"
 #include "pipeline/job_toml.h"
 #include "pipeline/output_directory.h"
 #include "pipeline/progress.h"
@@ -14,7 +15,7 @@
 namespace lamina::pipeline {
 namespace {
 
-const KeyChoice kJetKeys = {"bed", "layers", "heights", "place", "image", "load", "run", "part"};
+const KeyChoice kJetKeys = {"bed", "layers", "heights", "place", "image", "machine", "dose", "load", "run", "part"};
 
 CommandSpec jet_spec() {
   CommandSpec spec;
@@ -60,6 +61,7 @@ Result<Job> resolve(const Arguments& arguments) {
   job.json = arguments.has("--json");
   job.quiet = arguments.has("--quiet");
   if (Status status = check_job(job); !status) return status.error();
+  if (Status status = resolve_machine(job); !status) return status.error();
   return read;
 }
 

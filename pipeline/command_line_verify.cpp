@@ -13,7 +13,8 @@ CommandSpec verify_spec() {
   spec.name = "verify";
   spec.summary =
       "Compares a job's directory with its manifest: every layer's file is there, of the recorded size and hash, and\n"
-      "decodes to the recorded pixels; nothing else lies in layers/. Exit code 5 if anything differs.";
+      "decodes to the recorded pixels; the print program of each layer, carried out by a virtual machine, prints exactly\n"
+      "that image; nothing else lies in layers/ and program/. Exit code 5 if anything differs.";
   spec.operand = "DIR";
   spec.operand_meaning = "directory that lamina jet wrote; several are verified one after another";
   spec.options = {{"--quick", "", "sizes and hashes only, images are not decoded", "", ""},
@@ -26,12 +27,45 @@ CommandSpec verify_spec() {
   return spec;
 }
 
+std::string replay_json(const VerifyReport& report) {
+  if (report.machine.empty()) return {};
+  const ReplayCount& replay = report.replay;
+  return fmt::format(
+      ",\"replay\":{{\"machine\":{},\"layers\":{},\"drops\":{},\"vectors\":{},\"sweeps\":{},\"moved\":{},\"lost\":{},"
+      "\"coverage\":{},\"seconds\":{},\"scan_mm\":{},\"travel_mm\":{},\"fed_mm\":[{},{}],\"binder_mm3\":{},"
+      "\"powder_mm3\":{},\"farthest_along_um\":{},\"farthest_across_um\":{}}}",
+      json_string(report.machine), report.replayed, replay.drops, replay.vectors, replay.sweeps, report.moved, report.lost,
+      report.coverage, replay.seconds, replay.scan_mm, replay.travel_mm, replay.fed_mm[0], replay.fed_mm[1],
+      report.binder_mm3, report.powder_mm3, replay.farthest_along_um, replay.farthest_across_um);
+}
+
+// What the machine does, for people.
+void say_replay(const VerifyReport& report) {
+  if (report.machine.empty() || report.replayed == 0) return;
+  const ReplayCount& replay = report.replay;
+  say(fmt::format("programs  {} layers replayed on {}: every pixel fired once, {} drops in {} sweeps, {:.3f} % of the bed",
+                  readable_count(report.replayed), report.machine, readable_count(replay.drops),
+                  readable_count(replay.sweeps), 100 * report.coverage));
+  if (report.moved + report.lost > 0) {
+    say(fmt::format("blocked   {} pixels fired by a neighbouring nozzle, {} not at all, as recorded",
+                    readable_count(report.moved), readable_count(report.lost)));
+  }
+  say(fmt::format("places    drops land up to {:.2f} um along and {:.2f} um across the scan from the centre of their pixel",
+                  replay.farthest_along_um, replay.farthest_across_um));
+  if (replay.seconds > 0) {
+    say(fmt::format("machine   {:.2f} h, {:.1f} m scanned, {:.1f} m other travel", replay.seconds / 3600,
+                    replay.scan_mm / 1000, replay.travel_mm / 1000));
+  }
+  say(fmt::format("material  {:.3f} ml of binder, {:.2f} cm3 of powder fed (solid), {:.2f} and {:.2f} mm of the vats",
+                  report.binder_mm3 / 1000, report.powder_mm3 / 1000, replay.fed_mm[0], replay.fed_mm[1]));
+}
+
 std::string report_json(const VerifyReport& report) {
   std::string faults;
   for (const std::string& fault : report.faults) faults += (faults.empty() ? "" : ",") + json_string(one_line(fault));
   return fmt::format(
-      "{{\"command\":\"verify\",\"directory\":{},\"ok\":{},\"layers\":{},\"bytes\":{},\"fault_count\":{},\"faults\":[{}]}}\n",
-      json_string(report.directory), report.ok(), report.layers, report.bytes, report.fault_count, faults);
+      "{{\"command\":\"verify\",\"directory\":{},\"ok\":{},\"layers\":{},\"bytes\":{},\"fault_count\":{},\"faults\":[{}]{}}}\n",
+      json_string(report.directory), report.ok(), report.layers, report.bytes, report.fault_count, faults, replay_json(report));
 }
 
 }  // namespace
@@ -59,6 +93,7 @@ int run_verify_command(const std::vector<std::string>& texts) {
     if (report->ok() && !arguments->has("--quiet")) {
       say(fmt::format("{}: {} layers, {}, all as the manifest says", directory, readable_count(report->layers),
                       readable_bytes(report->bytes)));
+      say_replay(*report);
     }
     if (arguments->has("--json")) {
       if (Status status = print(report_json(*report)); !status) return fail(status.error());

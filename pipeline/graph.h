@@ -16,6 +16,7 @@
 #include <span>
 
 #include "pipeline/manifest.h"
+#include "pipeline/print_program.h"
 #include "stages/data/layer.h"
 #include "stages/data/runs.h"
 #include "stages/data/status.h"
@@ -31,6 +32,7 @@ struct LayerWork {
   Runs second;  // of the other engine, or mirrored
   std::unique_ptr<write::ImageEncoder> encoder;
   write::Bytes file;
+  ProgramWork program;
 };
 
 /// What is left of a layer when its file is written.

@@ -12,8 +12,10 @@
 #include "pipeline/graph.h"
 #include "pipeline/hash.h"
 #include "pipeline/heights_plan.h"
+#include "pipeline/machine.h"
 #include "pipeline/manifest.h"
 #include "pipeline/output_directory.h"
+#include "pipeline/print_program.h"
 #include "pipeline/resume.h"
 #include "stages/raster/mirror.h"
 #include "stages/raster/raster.h"
@@ -60,8 +62,9 @@ Error disagreement(const Layer& layer, const PixelGrid& grid, const RunsView& ra
 /// One job while its layers are in flight: what the graph calls for each of them.
 class LayerWorkshop {
  public:
-  LayerWorkshop(const Job& job, const raster::Rasterizer& rasterizer, const write::ImageFormat& format)
-      : job_(job), rasterizer_(rasterizer), format_(format) {}
+  LayerWorkshop(const Job& job, const raster::Rasterizer& rasterizer, const write::ImageFormat& format,
+                const PrintProgram* program)
+      : job_(job), rasterizer_(rasterizer), format_(format), program_(program) {}
 
   Status raster(LayerWork& work, LayerOutcome& outcome) {
     const StageTimer timer(sums.raster);
@@ -99,8 +102,11 @@ class LayerWorkshop {
   Status store(LayerWork& work, LayerOutcome& outcome) {
     const StageTimer timer(sums.write);
     const std::string name = layer_file_name(outcome.record.layer.index, format_.extension);
-    if (name.empty()) return {};
-    return write::write_file(job_.output + "/" + name, work.file);
+    if (!name.empty()) {
+      if (auto status = write::write_file(job_.output + "/" + name, work.file); !status) return status;
+    }
+    if (program_ == nullptr) return {};
+    return program_->write_layer(outcome.record.layer, work.runs, work.program, outcome.record.program);
   }
 
   /// Scratch, runs and file, at most; a mirrored or second image counts as another one.
@@ -110,7 +116,8 @@ class LayerWorkshop {
     const bool second = job_.engine == Engine::kBoth || job_.mirror != Mirror::kNone;
     const std::uint64_t second_image = second ? 8 * crossings + 4 * rows : 0;
     const std::uint64_t file = format_.most_bytes(rasterizer_.grid().columns(), rows, crossings);
-    return rasterizer_.layer_bytes_bound(layer.plane()) + second_image + file;
+    const std::uint64_t program = program_ == nullptr ? 0 : program_->bytes_bound(crossings);
+    return rasterizer_.layer_bytes_bound(layer.plane()) + second_image + file + program;
   }
 
   StageSums sums;
@@ -119,6 +126,7 @@ class LayerWorkshop {
   const Job& job_;
   const raster::Rasterizer& rasterizer_;
   const write::ImageFormat& format_;
+  const PrintProgram* program_;  // or nullptr
 };
 
 /// One line about rows that only repair closes, or that stay open, and where the first of them is.
@@ -198,9 +206,11 @@ Result<LayerPlan> plan_layers(const Job& job, const ManifestHead& head, const he
 
 }  // namespace
 
-Result<JetSummary> run_jet(const Job& job, const ProgressCallback& progress, const std::atomic<bool>& cancel) {
+Result<JetSummary> run_jet(const Job& asked, const ProgressCallback& progress, const std::atomic<bool>& cancel) {
   std::optional<tbb::global_control> threads;
-  if (job.threads > 0) threads.emplace(tbb::global_control::max_allowed_parallelism, job.threads);
+  if (asked.threads > 0) threads.emplace(tbb::global_control::max_allowed_parallelism, asked.threads);
+  Job job = asked;
+  if (auto status = resolve_machine(job); !status) return status.error();
   JetSummary summary;
   summary.directory = job.output;
 
@@ -219,6 +229,7 @@ Result<JetSummary> run_jet(const Job& job, const ProgressCallback& progress, con
   if (cancel) return Error{Fault::kInterrupted, "interrupted before the first layer"};
 
   const PixelGrid grid = grid_of(job);
+  if (auto status = check_reach(job, *scene); !status) return status.error();
   const Result<heights::LayerTable> decided = layer_table(job, *scene);
   if (!decided) return decided.error();
   const heights::LayerTable& table = *decided;
@@ -248,7 +259,9 @@ Result<JetSummary> run_jet(const Job& job, const ProgressCallback& progress, con
   summary.mesh_bytes = rasterizer->mesh_bytes();
   summary.index_bytes = rasterizer->index_bytes();
 
-  LayerWorkshop workshop(job, *rasterizer, *format);
+  std::optional<PrintProgram> program;
+  if (job.machine.resolved) program.emplace(job, table.size());
+  LayerWorkshop workshop(job, *rasterizer, *format, program ? &*program : nullptr);
   if (job.dry_run) {
     for (std::uint32_t index = range->front(); index < range->back(); ++index) {
       summary.peak_layer_bytes = std::max(summary.peak_layer_bytes, workshop.bytes_of_layer(table[index]));
@@ -264,6 +277,9 @@ Result<JetSummary> run_jet(const Job& job, const ProgressCallback& progress, con
   while (prefix_end != plan->kept.end() &&
          (plan->todo.empty() || prefix_end->layer.index < plan->todo.front().index)) {
     ++prefix_end;
+  }
+  if (program) {
+    if (auto status = program->begin(); !status) return status.error();
   }
   auto manifest = ManifestWriter::open(job.output + "/" + manifest_name(job), head,
                                        std::vector<LayerRecord>(kept, prefix_end));
@@ -293,7 +309,7 @@ Result<JetSummary> run_jet(const Job& job, const ProgressCallback& progress, con
         count(outcome.record);
         warnings.add(outcome, grid, summary);
         ++summary.layers_planned;
-        summary.bytes_written += outcome.record.bytes;
+        summary.bytes_written += outcome.record.bytes + outcome.record.program.bytes;
         progress({ProgressEvent::Stage::kLayers, ++done, layers});
         return {};
       }};

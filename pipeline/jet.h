@@ -45,6 +45,6 @@ struct JetSummary {
 /// estimates. `cancel` is looked at between layers: when it is set, no new layer starts, the layers in flight are
 /// finished and kept, and the error is kInterrupted.
 /// errors  of load_scene; kOutput; kVerification if engine is kBoth and a pixel differs; the lowest failing layer decides
-Result<JetSummary> run_jet(const Job& job, const ProgressCallback& progress, const std::atomic<bool>& cancel);
+Result<JetSummary> run_jet(const Job& asked, const ProgressCallback& progress, const std::atomic<bool>& cancel);
 
 }  // namespace lamina::pipeline

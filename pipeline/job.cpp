@@ -10,6 +10,7 @@
 namespace lamina::pipeline {
 
 PixelGrid grid_of(const Job& job) {
+  if (job.machine.resolved) return job.machine.resolved->grid.image;
   return {PixelAxis(job.dpi[0], nm_of(job.bed_mm[0])), PixelAxis(job.dpi[1], nm_of(job.bed_mm[1]))};
 }
 

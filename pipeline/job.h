@@ -10,6 +10,7 @@
 
 #include "pipeline/fill_request.h"
 #include "pipeline/heights_request.h"
+#include "pipeline/machine_request.h"
 #include "pipeline/slice_request.h"
 #include "stages/data/fill_rule.h"
 #include "stages/data/grid.h"
@@ -50,6 +51,8 @@ struct Job {
   bool repair = true;
   bool drop_bad = false;
   double weld_um = 5;
+  MachineRequest machine;
+  DoseRequest dose;
 
   // --- no effect on the bytes of any layer
   std::string output;                                        // directory
@@ -68,7 +71,7 @@ struct Job {
 /// Millimetres of a job in nanometres, rounded to the nearest.
 inline std::int64_t nm_of(double millimetres) { return std::llround(millimetres * static_cast<double>(kNmPerMm)); }
 
-/// The pixels of a job's bed. Only for a checked job.
+/// The pixels of a job's bed: of its machine, once that is resolved. Only for a checked job.
 PixelGrid grid_of(const Job& job);
 
 /// Whether every value of a job is within what can be planned, and agrees with the others; for jobs from anywhere.

@@ -47,6 +47,8 @@ std::span<const JobKey> image_keys();
 std::span<const JobKey> slice_keys();
 std::span<const JobKey> fill_keys();
 std::span<const JobKey> load_keys();
+std::span<const JobKey> machine_keys();
+std::span<const JobKey> dose_keys();
 std::span<const JobKey> run_keys();
 
 }  // namespace lamina::pipeline

@@ -15,15 +15,25 @@ std::string read_dpi(std::string_view text, Job& job) {
     if (auto wrong = read_whole(pieces[std::min(i, pieces.size() - 1)], 1, 25400, dpi[i]); !wrong.empty()) return wrong;
   }
   job.dpi = dpi;
+  job.machine.dpi_given = true;
   return {};
 }
 
 const JobKey kBedKeys[] = {
     {"bed", "size_mm", "--bed", "WIDTHxDEPTH", "size of the bed in mm; the image covers all of it", true,
-     [](Text t, Job& j) { return read_pair(t, kLeastMm, kMostMm, " mm", j.bed_mm); },
-     [](const Job& j) { return write_list(j.bed_mm); }, Form::kList},
+     [](Text t, Job& j) {
+       auto wrong = read_pair(t, kLeastMm, kMostMm, " mm", j.bed_mm);
+       j.machine.bed_given = j.machine.bed_given || wrong.empty();
+       return wrong;
+     },
+     // A machine has its own bed and dpi, unless others were asked of it.
+     [](const Job& j) { return j.machine.profile.empty() || j.machine.bed_given ? write_list(j.bed_mm) : std::string(); },
+     Form::kList},
     {"bed", "dpi", "--dpi", "DPI|XxY", "pixels per inch along x and y, each 1 to 25400", true, read_dpi,
-     [](const Job& j) { return fmt::format("{},{}", j.dpi[0], j.dpi[1]); }, Form::kList},
+     [](const Job& j) {
+       return j.machine.profile.empty() || j.machine.dpi_given ? fmt::format("{},{}", j.dpi[0], j.dpi[1]) : std::string();
+     },
+     Form::kList},
     {"layers", "thickness_mm", "--layer", "MM", "thickness of a layer in mm", true,
      [](Text t, Job& j) { return read_number(t, kLeastMm, kMostMm, " mm", j.layer_mm); },
      [](const Job& j) { return number_text(j.layer_mm); }, Form::kBare},

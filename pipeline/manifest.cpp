@@ -15,9 +15,11 @@
 #include "pipeline/job_keys.h"
 #include "pipeline/job_toml.h"
 #include "pipeline/json_text.h"
+#include "pipeline/machine_profile.h"
 #include "pipeline/manifest_text.h"
 #include "pipeline/number_text.h"
 #include "stages/write/image_format.h"
+#include "stages/write/program/dialect.h"
 
 namespace lamina::pipeline {
 namespace {
@@ -44,6 +46,14 @@ std::string part_text(const PartSummary& part) {
       point_text(part.bounds.lo), point_text(part.bounds.hi), notes);
 }
 
+// The machine's line, if there is one.
+std::string machine_line(const ManifestHead& head) {
+  if (head.machine.empty()) return {};
+  return fmt::format("\"machine\": {{\"name\": {}, \"dialect\": {}, \"extension\": {}, \"profile_xxh3_128\": \"{}\"}},\n",
+                     json_string(head.machine), json_string(head.dialect), json_string(head.program_extension),
+                     hex(head.machine_profile));
+}
+
 // Whole dpi as a number; another grid as the dots that a span of nm holds.
 std::string axis_text(const PixelAxis& axis) {
   if (axis.span == kNmPerInch) return fmt::format("{}", axis.dots);
@@ -56,10 +66,11 @@ std::string lasting_text(const ManifestHead& head) {
   for (const PartSummary& part : head.parts) parts += (parts.empty() ? "" : ",\n") + part_text(part);
   return fmt::format(
       "\"lamina\": {},\n\"job\": {},\n\"bed_mm\": [{}, {}],\n\"dpi\": [{}, {}],\n\"columns\": {},\n\"rows\": {},\n"
-      "\"format\": {},\n\"extension\": {},\n\"fill_rule\": {},\n\"mirror\": {},\n\"layer_count\": {},\n\"parts\": [\n{}\n],\n",
+      "\"format\": {},\n\"extension\": {},\n\"fill_rule\": {},\n\"mirror\": {},\n\"layer_count\": {},\n\"parts\": [\n{}\n],\n{}",
       json_string(head.version), json_string(head.job_toml), exact_mm(head.grid.x.length), exact_mm(head.grid.y.length),
       axis_text(head.grid.x), axis_text(head.grid.y), head.grid.columns(), head.grid.rows(), json_string(head.format),
-      json_string(head.extension), json_string(head.fill_rule), json_string(head.mirror), head.layer_count, parts);
+      json_string(head.extension), json_string(head.fill_rule), json_string(head.mirror), head.layer_count, parts,
+      machine_line(head));
 }
 
 // A writer holds its lock as long as it lives; the lock of a killed run is gone with it.
@@ -94,6 +105,13 @@ std::string head_text(const ManifestHead& head) {
                      head.first_layer, head.last_layer);
 }
 
+void add_program_text(const ProgramRecord& record, std::string& text) {
+  fmt::format_to(std::back_inserter(text),
+                 ", \"program\": {{\"bytes\": {}, \"sweeps\": {}, \"drops\": {}, \"moved\": {}, \"lost\": {}, "
+                 "\"xxh3_128\": \"{}\"}}}}",
+                 record.bytes, record.sweeps, record.drops, record.moved, record.lost, hex(record.hash));
+}
+
 void add_record_text(const LayerRecord& record, std::string_view extension, std::string& text) {
   fmt::format_to(std::back_inserter(text),
                  "{{\"index\": {}, \"file\": {}, \"bottom_nm\": {}, \"thickness_nm\": {}, \"reason\": \"{}\", "
@@ -123,6 +141,14 @@ ManifestHead make_head(const Job& job, const std::vector<PartSummary>& parts, st
   head.last_layer = layers[1];
   head.parts = parts;
   for (PartSummary& part : head.parts) part.path = std::filesystem::path(part.path).filename().string();
+  if (job.machine.resolved) {
+    const Machine& machine = job.machine.resolved->machine;
+    head.machine = machine.name;
+    head.dialect = machine.dialect;
+    if (const auto* dialect = write::find_dialect(machine.dialect)) head.program_extension = dialect->extension;
+    const std::string profile = machine_text(machine);
+    head.machine_profile = hash_bytes(std::as_bytes(std::span(profile)));
+  }
   return head;
 }
 
@@ -150,6 +176,7 @@ std::string difference(const ManifestHead& now, const ManifestHead& earlier) {
       return fmt::format("the geometry of {} has changed", now.parts[i].path);
     }
   }
+  if (now.machine_profile != earlier.machine_profile) return "the machine, or its profile, has changed";
   return "the parts have changed";
 }
 
@@ -177,6 +204,7 @@ struct ManifestWriter::State {
 
   int file = -1;
   std::string path, extension, buffer;
+  bool programs = false;  // lines speak of print programs
   std::uint32_t next_layer = 0, last_layer = 0, lines_buffered = 0;
   bool first_line = true;
   std::chrono::steady_clock::time_point written = std::chrono::steady_clock::now();
@@ -193,6 +221,10 @@ struct ManifestWriter::State {
     buffer += first_line ? "\n" : ",\n";
     first_line = false;
     add_record_text(record, extension, buffer);
+    if (programs) {
+      buffer.pop_back();
+      add_program_text(record.program, buffer);
+    }
     ++next_layer;
     ++lines_buffered;
   }
@@ -223,6 +255,7 @@ Result<ManifestWriter> ManifestWriter::open(const std::string& path, const Manif
   State& state = *writer.state_;
   state.path = path;
   state.extension = head.extension;
+  state.programs = !head.machine.empty();
   state.next_layer = head.first_layer;
   state.last_layer = head.last_layer;
   const std::string partial = path + ".part", fresh = partial + ".new";

@@ -21,6 +21,15 @@
 
 namespace lamina::pipeline {
 
+/// What a layer's line says of its print program, for a job with a machine.
+struct ProgramRecord {
+  std::uint64_t bytes = 0;
+  Hash128 hash;
+  std::uint32_t sweeps = 0;          // that fire
+  std::uint64_t drops = 0;
+  std::uint64_t moved = 0, lost = 0;  // pixels of blocked nozzles (stages/program/compile.h)
+};
+
 /// One line of the manifest.
 struct LayerRecord {
   Layer layer;
@@ -28,6 +37,7 @@ struct LayerRecord {
   std::uint64_t set_pixels = 0;
   std::uint32_t capped_rows = 0;    // rows that are closed only thanks to repair (load/repair.h)
   Hash128 hash;                     // of the file
+  ProgramRecord program;            // zeros without a machine
 };
 
 /// The head of the manifest: the job as resolved and all that decides bytes.
@@ -41,6 +51,8 @@ struct ManifestHead {
   std::uint32_t layer_count = 0;               // of the whole job
   std::uint32_t first_layer = 0, last_layer = 0;  // the range [first, last) that this manifest covers
   std::vector<PartSummary> parts;
+  std::string machine, dialect, program_extension;  // empty without a machine
+  Hash128 machine_profile;                          // of program/machine.toml
   /// Hash of all of the above but the range: two directories with the same id belong to the same job.
   Hash128 id() const;
 };

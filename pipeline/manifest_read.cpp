@@ -56,6 +56,13 @@ ManifestHead head_from(const json& text) {
     for (const json& note : entry.at("notes")) part.notes.push_back({note.at("repair"), note.at("text")});
     head.parts.push_back(std::move(part));
   }
+  if (text.contains("machine")) {
+    const json& machine = text.at("machine");
+    head.machine = machine.at("name");
+    head.dialect = machine.at("dialect");
+    head.program_extension = machine.at("extension");
+    if (!read_hex(machine.at("profile_xxh3_128").get<std::string>(), head.machine_profile)) head.machine.clear();
+  }
   return head;
 }
 
@@ -93,8 +100,8 @@ class RecordLine {
 // Empty, or what is wrong with the line.
 std::string record_from(std::string_view line, const ManifestHead& head, std::uint32_t index, LayerRecord& record) {
   std::string_view file, reason, hash;
-  const bool ended = RecordLine(line)
-                         .text("{\"index\": ").number(record.layer.index)
+  RecordLine read(line);
+  read.text("{\"index\": ").number(record.layer.index)
                          .text(", \"file\": \"").word(file)
                          .text("\", \"bottom_nm\": ").number(record.layer.bottom)
                          .text(", \"thickness_nm\": ").number(record.layer.thickness)
@@ -103,11 +110,25 @@ std::string record_from(std::string_view line, const ManifestHead& head, std::ui
                          .text(", \"set_pixels\": ").number(record.set_pixels)
                          .text(", \"capped_rows\": ").number(record.capped_rows)
                          .text(", \"xxh3_128\": \"").word(hash)
-                         .text("\"}").ended();
+                         .text("\"");
+  std::string_view program_hash;
+  if (!head.machine.empty()) {
+    read.text(", \"program\": {\"bytes\": ").number(record.program.bytes)
+        .text(", \"sweeps\": ").number(record.program.sweeps)
+        .text(", \"drops\": ").number(record.program.drops)
+        .text(", \"moved\": ").number(record.program.moved)
+        .text(", \"lost\": ").number(record.program.lost)
+        .text(", \"xxh3_128\": \"").word(program_hash)
+        .text("\"}");
+  }
+  const bool ended = read.text("}").ended();
   if (!ended) return "is not the line of a layer";
   if (record.layer.index != index) return fmt::format("layer {} stands where {} is next", record.layer.index, index);
   if (file != layer_file_name(index, head.extension)) return fmt::format("layer {} names another file", index);
   if (!read_reason(reason, record.layer.reason)) return fmt::format("layer {} has a reason that is none", index);
+  if (!head.machine.empty() && !read_hex(program_hash, record.program.hash)) {
+    return fmt::format("layer {} has a program with a hash that is none", index);
+  }
   if (!read_hex(hash, record.hash)) return fmt::format("layer {} has a hash that is none", index);
   return {};
 }

@@ -13,6 +13,7 @@
 #include "pipeline/manifest.h"
 #include "pipeline/number_text.h"
 #include "stages/write/image_format.h"
+#include "stages/write/program/dialect.h"
 
 namespace lamina::pipeline {
 namespace {
@@ -48,9 +49,14 @@ void for_each_entry(const fs::path& directory, Visit visit) {
   for (fs::directory_iterator entry(directory, error), end; !error && entry != end; entry.increment(error)) visit(*entry);
 }
 
-// Layers' files of any earlier job, half-written ones too.
+// Layers' files of any earlier job, half-written ones too, and all that is in program/ of their print programs.
 std::vector<fs::path> layer_files(const std::string& directory) {
   std::vector<fs::path> found;
+  for_each_entry(fs::path(directory) / "program", [&](const fs::directory_entry& entry) {
+    std::uint32_t index = 0;
+    bool partial = false;
+    if (read_program_file_name(entry.path().filename().string(), index, partial)) found.push_back(entry.path());
+  });
   for_each_entry(fs::path(directory) / "layers", [&](const fs::directory_entry& entry) {
     std::uint32_t index = 0;
     bool partial = false;
@@ -97,6 +103,16 @@ bool read_layer_file_name(std::string_view name, std::uint32_t& index, bool& par
   });
 }
 
+bool read_program_file_name(std::string_view name, std::uint32_t& index, bool& partial) {
+  partial = take_end(name, kPartial);
+  const std::size_t digits = std::min(name.find_first_not_of("0123456789"), name.size());
+  if (digits < 6) return false;
+  const auto [stop, error] = std::from_chars(name.data(), name.data() + digits, index);
+  if (error != std::errc()) return false;
+  const std::string_view extension = name.substr(digits);
+  return std::ranges::any_of(write::dialects(), [&](const write::Dialect& one) { return extension == one.extension; });
+}
+
 Status check_output(const Job& job) {
   std::error_code error;
   const fs::file_status status = fs::status(job.output, error);
@@ -139,6 +155,10 @@ Status prepare_output(const Job& job) {
   std::error_code error;
   fs::create_directories(layers, error);
   if (error) return cannot(layers, error.value());
+  if (!job.machine.profile.empty()) {
+    fs::create_directories(directory / "program", error);
+    if (error) return cannot(directory / "program", error.value());
+  }
   if (!fs::is_directory(layers)) {
     return Error{Fault::kOutput, fmt::format("{}: is a file, not a directory; remove it", layers.string())};
   }
@@ -165,7 +185,9 @@ void sweep_partial_files(const std::string& directory, std::uint32_t first, std:
   for (const fs::path& file : layer_files(directory)) {
     std::uint32_t index = 0;
     bool partial = false;
-    read_layer_file_name(file.filename().string(), index, partial);
+    if (!read_layer_file_name(file.filename().string(), index, partial)) {
+      read_program_file_name(file.filename().string(), index, partial);
+    }
     std::error_code ignored;
     if (partial && index >= first && index < last) fs::remove(file, ignored);
   }

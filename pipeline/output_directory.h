@@ -25,6 +25,8 @@ std::vector<ManifestFile> find_manifests(const std::string& directory);
 
 /// Reads the name of a layer's file, 000042.tif or 000042.tif.part; false if it is none.
 bool read_layer_file_name(std::string_view name, std::uint32_t& index, bool& partial);
+/// The same for the print program of a layer, 000042.gcode.
+bool read_program_file_name(std::string_view name, std::uint32_t& index, bool& partial);
 
 /// Whether a job may write into its directory: nothing is touched, so that a refusal comes before parts are loaded.
 ///

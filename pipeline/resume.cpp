@@ -5,6 +5,7 @@
 #include <unistd.h>
 
 #include "pipeline/hash.h"
+#include "pipeline/print_program.h"
 
 namespace lamina::pipeline {
 
@@ -30,9 +31,13 @@ Result<std::vector<LayerRecord>> layers_that_hold(const std::string& directory, 
       return;
     }
     const std::string name = layer_file_name(record.layer.index, head.extension);
-    if (name.empty()) return;  // a format without files
-    const auto digest = digest_file(directory + "/" + name);
-    holds[i] = digest.ok() && digest->bytes == record.bytes && digest->hash == record.hash;
+    const auto hold = [&](const std::string& file, std::uint64_t bytes, const Hash128& hash) {
+      if (file.empty()) return true;  // a format without files, a job without a machine
+      const auto digest = digest_file(directory + "/" + file);
+      return digest.ok() && digest->bytes == bytes && digest->hash == hash;
+    };
+    holds[i] = hold(name, record.bytes, record.hash) &&
+               hold(program_file_name(record.layer.index, head.program_extension), record.program.bytes, record.program.hash);
   });
   std::vector<LayerRecord> kept;
   for (std::size_t i = 0; i < recorded.size(); ++i) {

@@ -47,7 +47,8 @@ std::string summary_text(const Job& job, const JetSummary& s) {
                                             mm(box.height()), mm(box.lo.x), mm(box.lo.y)));
     for (const Note& note : part.notes) line("", fmt::format("  {}{}", note.repair ? "repair: " : "", note.text));
   }
-  line("image", fmt::format("{} x {} pixels of {} x {} dpi on {} x {} mm, {}", s.columns, s.rows, job.dpi[0], job.dpi[1],
+  line("image", fmt::format("{} x {} pixels of {:g} x {:g} dpi on {} x {} mm, {}", s.columns, s.rows,
+                            grid_of(job).x.dpi(), grid_of(job).y.dpi(),
                             number_text(job.bed_mm[0]), number_text(job.bed_mm[1]), job.format));
   std::string layers = fmt::format("{} {}", readable_count(s.layers_total), heights_text(job));
   if (!job.dry_run && s.layers_planned != s.layers_total) layers += fmt::format("; {} planned", readable_count(s.layers_planned));
@@ -87,7 +88,8 @@ std::string summary_json(const Job& job, const JetSummary& s) {
       "{{\"command\":\"jet\",\"dry_run\":{},\"directory\":{},\"format\":{},\"columns\":{},\"rows\":{},\"dpi\":[{},{}],"
       "\"layers_total\":{},\"layers_planned\":{},\"layers_kept\":{},\"triangles\":{},\"set_pixels\":{},"
       "\"set_volume_mm3\":{},\"bytes_written\":{},\"capped_rows\":{},",
-      job.dry_run, json_string(s.directory), json_string(job.format), s.columns, s.rows, job.dpi[0], job.dpi[1],
+      job.dry_run, json_string(s.directory), json_string(job.format), s.columns, s.rows, grid_of(job).x.dpi(),
+      grid_of(job).y.dpi(),
       s.layers_total, s.layers_planned, s.layers_kept, s.triangles, s.set_pixels, s.set_volume_mm3, s.bytes_written,
       s.capped_rows);
   text += fmt::format(

@@ -6,10 +6,17 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <mutex>
+#include <optional>
 
 #include "pipeline/hash.h"
+#include "pipeline/machine_profile.h"
 #include "pipeline/manifest.h"
 #include "pipeline/output_directory.h"
+#include "pipeline/print_program.h"
+#include "pipeline/replay.h"
 #include "stages/write/read_image.h"
 
 namespace lamina::pipeline {
@@ -24,9 +31,50 @@ void add_fault(VerifyReport& report, std::string fault) {
   ++report.fault_count;
 }
 
+// What all layers of a directory are compared by.
+struct Inspection {
+  std::string directory;
+  const ManifestHead& head;
+  bool quick;
+  std::optional<VirtualMachine> machine;  // if there are programs to replay
+  std::mutex adding;
+  VerifyReport& report;
+};
+
+std::string whole_file(const std::string& path) {
+  std::ifstream file(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
+}
+
+// Empty, or what is wrong with a layer's print program. A program whose hash differs is replayed all the same, since
+// that tells where it differs.
+std::string fault_of_program(Inspection& inspection, const LayerRecord& record, const RunsView* image) {
+  const std::string name = program_file_name(record.layer.index, inspection.head.program_extension);
+  if (name.empty()) return {};
+  const std::string path = (fs::path(inspection.directory) / name).string();
+  std::error_code error;
+  if (!fs::is_regular_file(path, error)) return fmt::format("{}: is missing", name);
+  const Result<FileDigest> digest = digest_file(path);
+  if (!digest) return digest.error().message;
+  const bool same = digest->bytes == record.program.bytes && digest->hash == record.program.hash;
+  if (image != nullptr && inspection.machine) {
+    const auto replay = inspection.machine->replay(whole_file(path), record.layer.index, *image, record.program.moved,
+                                                   record.program.lost);
+    if (!replay) return fmt::format("{}: {}", name, replay.error().message);
+    if (same && replay->drops != record.program.drops) {
+      return fmt::format("{}: {} drops, the manifest says {}", name, replay->drops, record.program.drops);
+    }
+    const std::lock_guard lock(inspection.adding);
+    inspection.report.replay.add(*replay);
+    ++inspection.report.replayed;
+  }
+  return same ? std::string() : fmt::format("{}: its content is not what was written", name);
+}
+
 // Empty, or what is wrong with a layer's file.
-std::string fault_of_image(const std::string& path, const std::string& name, const ManifestHead& head,
+std::string fault_of_image(Inspection& inspection, const std::string& path, const std::string& name,
                            const LayerRecord& record) {
+  const ManifestHead& head = inspection.head;
   const Result<write::LayerImage> image = write::read_image(path);
   if (!image) return image.error().message;
   const std::uint32_t columns = image->runs.columns, rows = image->runs.view().rows();
@@ -46,13 +94,14 @@ std::string fault_of_image(const std::string& path, const std::string& name, con
   if (set != record.set_pixels) {
     return fmt::format("{}: {} set pixels, the manifest says {}", name, set, record.set_pixels);
   }
-  return {};
+  const RunsView view = image->runs;
+  return fault_of_program(inspection, record, &view);
 }
 
-std::string fault_of_layer(const std::string& directory, const ManifestHead& head, const LayerRecord& record,
-                           bool quick) {
-  const std::string name = layer_file_name(record.layer.index, head.extension);
-  if (name.empty()) return {};  // a format without files
+std::string fault_of_layer(Inspection& inspection, const LayerRecord& record) {
+  const std::string& directory = inspection.directory;
+  const std::string name = layer_file_name(record.layer.index, inspection.head.extension);
+  if (name.empty()) return fault_of_program(inspection, record, nullptr);  // a format without files
   const std::string path = (fs::path(directory) / name).string();
   std::error_code error;
   if (!fs::is_regular_file(path, error)) return fmt::format("{}: is missing", name);
@@ -62,24 +111,60 @@ std::string fault_of_layer(const std::string& directory, const ManifestHead& hea
     return fmt::format("{}: {} bytes, the manifest says {}", name, digest->bytes, record.bytes);
   }
   if (digest->hash != record.hash) return fmt::format("{}: its content is not what was written", name);
-  return quick ? std::string() : fault_of_image(path, name, head, record);
+  return inspection.quick ? fault_of_program(inspection, record, nullptr) : fault_of_image(inspection, path, name, record);
+}
+
+// Finds the machine again that the programs were written for.
+void prepare_replay(Inspection& inspection) {
+  const std::string name = "program/machine.toml", path = (fs::path(inspection.directory) / name).string();
+  std::error_code error;
+  if (!fs::is_regular_file(path, error)) return add_fault(inspection.report, name + ": is missing");
+  const std::string text = whole_file(path);
+  if (hash_bytes(std::as_bytes(std::span(text))) != inspection.head.machine_profile) {
+    return add_fault(inspection.report, name + ": its content is not what was written");
+  }
+  const Result<Machine> machine = read_machine(text, name);
+  if (!machine) return add_fault(inspection.report, machine.error().message);
+  auto built = VirtualMachine::build(*machine, inspection.head.grid.columns(), inspection.head.grid.rows());
+  if (!built) return add_fault(inspection.report, built.error().message);
+  inspection.machine = std::move(*built);
+  inspection.report.machine = machine->name;
+}
+
+// Sums that need the profile.
+void finish_replay(const Inspection& inspection) {
+  if (!inspection.machine || inspection.report.replayed == 0) return;
+  VerifyReport& report = inspection.report;
+  const Machine& machine = inspection.machine->profile();
+  const double side = machine.bed.size_mm[0] * machine.bed.size_mm[1];
+  const double area = machine.bed.shape == BedShape::kRound ? side * 3.14159265358979 / 4 : side;
+  report.binder_mm3 = static_cast<double>(report.replay.drops) * machine.head.drop_pl * 1e-6;
+  report.powder_mm3 = (report.replay.fed_mm[0] + report.replay.fed_mm[1]) * area * machine.powder.packing;
+  report.coverage = static_cast<double>(report.replay.drops) / static_cast<double>(report.replayed) /
+                    static_cast<double>(inspection.head.grid.columns()) / static_cast<double>(inspection.head.grid.rows());
 }
 
 void check_layers(const std::string& directory, const Manifest& manifest, bool quick, VerifyReport& report) {
+  Inspection inspection{directory, manifest.head, quick, std::nullopt, {}, report};
+  if (!manifest.head.machine.empty()) prepare_replay(inspection);
   // In pieces, so that messages stay in layer order and cost no string for each of a hundred thousand layers.
   constexpr std::size_t kPiece = 1024;
   std::vector<std::string> faults(std::min(kPiece, manifest.layers.size()));
   for (std::size_t first = 0; first < manifest.layers.size(); first += kPiece) {
     const std::size_t count = std::min(kPiece, manifest.layers.size() - first);
     tbb::parallel_for(std::size_t{0}, count, [&](std::size_t i) {
-      faults[i] = fault_of_layer(directory, manifest.head, manifest.layers[first + i], quick);
+      faults[i] = fault_of_layer(inspection, manifest.layers[first + i]);
     });
     for (std::size_t i = 0; i < count; ++i) {
-      report.bytes += manifest.layers[first + i].bytes;
+      const LayerRecord& record = manifest.layers[first + i];
+      report.bytes += record.bytes + record.program.bytes;
+      report.moved += record.program.moved;
+      report.lost += record.program.lost;
       if (!faults[i].empty()) add_fault(report, std::move(faults[i]));
     }
   }
   report.layers += manifest.layers.size();
+  finish_replay(inspection);
 }
 
 void check_strays(const std::string& directory, const std::vector<Manifest>& manifests, VerifyReport& report) {
@@ -99,8 +184,25 @@ void check_strays(const std::string& directory, const std::vector<Manifest>& man
     }
     if (!named) strays.push_back(name);
   }
+  for (std::string& name : strays) name = "layers/" + name;
+  for (fs::directory_iterator entry(fs::path(directory) / "program", error), end; !error && entry != end;
+       entry.increment(error)) {
+    const std::string name = entry->path().filename().string();
+    std::uint32_t index = 0;
+    bool partial = false, named = false;
+    const bool layer = read_program_file_name(name, index, partial);
+    for (const Manifest& manifest : manifests) {
+      const ManifestHead& head = manifest.head;
+      named = named || (!head.machine.empty() &&
+                        (layer ? !partial && index >= head.first_layer && index < head.first_layer + manifest.layers.size() &&
+                                     program_file_name(index, head.program_extension) == "program/" + name
+                               : name == "machine.toml" || name == "start" + head.program_extension ||
+                                     name == "end" + head.program_extension));
+    }
+    if (!named) strays.push_back("program/" + name);
+  }
   std::sort(strays.begin(), strays.end());
-  for (const std::string& name : strays) add_fault(report, fmt::format("layers/{}: no manifest names it", name));
+  for (const std::string& name : strays) add_fault(report, fmt::format("{}: no manifest names it", name));
 }
 
 }  // namespace

@@ -61,7 +61,7 @@ struct Machine {
   } mounting;
 
   struct Motion {
-    double encoder_um = 0;              // a tick along the scan; 0: none, sweeps step by pixels
+    double encoder_dpi = 0;             // ticks of the scan's encoder an inch; 0: none, sweeps step by pixels
     std::uint32_t ticks_per_pixel = 0;  // whole ticks; 0: pixels are not tied to ticks
     LagUnit lag_unit = LagUnit::kPixel;
     bool both_directions = false;       // every other sweep runs backwards
@@ -82,7 +82,7 @@ struct Machine {
     double dose = 1.2;                     // height fed / height of the layer
     std::array<double, 2> roller_mm{0, 200};  // home and far end
     double roller_speed_mm_s = 50, vat_speed_mm_s = 5;
-    double binder_share = 0.6;  // packing of the powder bed, for the report
+    double packing = 0.6;  // share of the powder bed that is solid, for the report
   } powder;
 };
 

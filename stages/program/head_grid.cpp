@@ -104,10 +104,12 @@ Result<HeadGrid> make_head_grid(const Machine& machine) {
   // --- pixels along the scan
   Pitch place = line;
   if (motion.ticks_per_pixel > 0) {
-    if (!(motion.encoder_um > 0)) {
-      return wrong(machine, "motion.ticks_per_pixel", "needs motion.encoder_um, the length of a tick");
+    if (!(motion.encoder_dpi >= 1 && motion.encoder_dpi <= 25'400)) {
+      return wrong(machine, "motion.ticks_per_pixel", "needs motion.encoder_dpi, the ticks an inch, 1 to 25400");
     }
-    place = pitch_of_nm(motion.encoder_um * kNmPerUm * motion.ticks_per_pixel);
+    if (motion.ticks_per_pixel > 1000) return wrong(machine, "motion.ticks_per_pixel", "give at most 1000");
+    place = pitch_of_dpi(motion.encoder_dpi);
+    place.span *= motion.ticks_per_pixel;
   } else if (mount.along_dpi != 0) {
     if (!(mount.along_dpi >= 1 && mount.along_dpi <= 25'400)) {
       return wrong(machine, "mounting.along_dpi", fmt::format("{:g} is out of range; give 1 to 25400", mount.along_dpi));

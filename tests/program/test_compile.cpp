@@ -158,7 +158,7 @@ class RandomMachine {
     machine.mounting.first_swath = random() % 2 ? FirstSwath::kBed : FirstSwath::kLayer;
     machine.motion.both_directions = random() % 2;
     if (random() % 3 == 0) {
-      machine.motion.encoder_um = 17.3;
+      machine.motion.encoder_dpi = 1468;
       machine.motion.ticks_per_pixel = 1 + random() % 5;
       machine.motion.lag_unit = random() % 2 ? LagUnit::kTick : LagUnit::kPixel;
     }

@@ -1,0 +1,41 @@
+#include "stages/program/reach.h"
+
+#include <cmath>
+
+namespace lamina::program {
+
+std::optional<Outside> first_outside(const Machine& machine, const Mesh& mesh, const Point3& offset) {
+  const std::int64_t top = std::llround(machine.bed.build_height_mm * kNmPerMm);
+  const std::int64_t width = std::llround(machine.bed.size_mm[0] * kNmPerMm);
+  const std::int64_t depth = std::llround(machine.bed.size_mm[1] * kNmPerMm);
+  std::optional<Outside> worst;
+  __int128 farthest = 0;
+  const auto look = [&](const Point3& vertex) {
+    const std::int64_t x = std::int64_t{vertex.x} + offset.x, y = std::int64_t{vertex.y} + offset.y;
+    const std::int64_t z = std::int64_t{vertex.z} + offset.z;
+    const Point3 place{static_cast<Nm>(x), static_cast<Nm>(y), static_cast<Nm>(z)};
+    if (z > top && (!worst || !worst->above || place.z > worst->place.z)) worst = Outside{place, true, mm(z - top)};
+    if (worst && worst->above) return;
+    if (machine.bed.shape == BedShape::kRound) {
+      const __int128 dx = 2 * x - width, dy = 2 * y - width;
+      const __int128 beyond = dx * dx + dy * dy - __int128{width} * width;
+      if (beyond <= farthest) return;
+      farthest = beyond;
+      const double radius = std::hypot(static_cast<double>(dx), static_cast<double>(dy)) / 2;
+      worst = Outside{place, false, (radius - static_cast<double>(width) / 2) / kNmPerMm};
+    } else {
+      const std::int64_t beyond = std::max(std::max(-x, x - width), std::max(-y, y - depth));
+      if (beyond <= farthest) return;
+      farthest = beyond;
+      worst = Outside{place, false, mm(beyond)};
+    }
+  };
+  for (const Triangle& triangle : mesh.triangles) {
+    look(triangle.a);
+    look(triangle.b);
+    look(triangle.c);
+  }
+  return worst;
+}
+
+}  // namespace lamina::program

@@ -1,0 +1,53 @@
+// stages/write/program/dialect.h: how the program of a layer is spelt for a machine; one folder a dialect.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string_view>
+
+#include "stages/data/buffer.h"
+#include "stages/data/machine.h"
+#include "stages/data/program.h"
+#include "stages/data/status.h"
+
+namespace lamina::write {
+
+using ProgramBytes = Buffer<std::byte>;
+
+/// Spells programs; each call appends to `out`, which the caller writes away as it likes. A layer's text depends on that
+/// layer alone, so that layers can be written in any order. The concatenation of start, layers and end is the program.
+class ProgramWriter {
+ public:
+  virtual ~ProgramWriter() = default;
+
+  virtual void start(std::uint32_t layers, ProgramBytes& out) = 0;
+  /// Everything before the head moves: build vat, feed vats, roller.
+  virtual void begin_layer(const LayerCycle& cycle, ProgramBytes& out) = 0;
+  /// Moves the head along one sweep; steps that fire nothing take no room.
+  virtual void sweep(const Sweep& sweep, const SweepVectors& vectors, ProgramBytes& out) = 0;
+  virtual void end_layer(const LayerCycle& cycle, ProgramBytes& out) = 0;
+  virtual void end(ProgramBytes& out) = 0;
+};
+
+/// One row of the registry.
+struct Dialect {
+  std::string_view id;           // as in machine.dialect
+  std::string_view extension;    // with the dot
+  std::string_view description;
+  std::uint32_t most_nozzles;
+  bool has_motion;               // the text moves axes and vats; else it is the data of the head alone
+  /// A writer for one thread. machine and grid have to live as long as it does.
+  std::unique_ptr<ProgramWriter> (*make_writer)(const Machine& machine, const HeadGrid& grid);
+};
+
+std::span<const Dialect> dialects();
+
+/// The dialect with this id, or nullptr.
+const Dialect* find_dialect(std::string_view id);
+
+/// Whether a dialect can speak to a machine. errors  kUsage: too many nozzles, ...
+Status check_dialect(const Dialect& dialect, const Machine& machine, const HeadGrid& grid);
+
+}  // namespace lamina::write

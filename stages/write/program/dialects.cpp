@@ -1,0 +1,43 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+
+#include "stages/write/program/brundlefab/brundlefab.h"
+#include "stages/write/program/dialect.h"
+#include "stages/write/program/hp45/hp45.h"
+#include "stages/write/program/m578/m578.h"
+#include "stages/write/program/nuferbj/nuferbj.h"
+#include "stages/write/program/planes/planes.h"
+#include "stages/write/program/raw/raw.h"
+
+namespace lamina::write {
+namespace {
+
+constexpr std::array<Dialect, 6> kDialects = {{
+    {"nuferbj", ".gcode", "G-code with vectors as hexadecimal words, powder cycle and counters", 65'535, true,
+     nuferbj::make_writer},
+    {"raw", ".raw", "128-bit words as a Xaar XJ128 takes them, with binary swath heads", 65'535, false, raw::make_writer},
+    {"planes", ".planes", "32-bit padded planes of a swath, as drive electronics of production heads take them", 65'535, false,
+     planes::make_writer},
+    {"hp45", ".hp45", "lines of the HP45 controller: SBR, position and 300 nozzles in base 64", 300, true, hp45::make_writer},
+    {"brundlefab", ".gcode", "BrundleFab's T1 P Q R S with up to 72 nozzles", 72, true, brundlefab::make_writer},
+    {"m578", ".gcode", "RepRapFirmware's M578, 32 nozzles a head number", 1024, true, m578::make_writer},
+}};
+
+}  // namespace
+
+std::span<const Dialect> dialects() { return kDialects; }
+
+const Dialect* find_dialect(std::string_view id) {
+  const auto found = std::find_if(kDialects.begin(), kDialects.end(), [&](const Dialect& d) { return d.id == id; });
+  return found == kDialects.end() ? nullptr : &*found;
+}
+
+Status check_dialect(const Dialect& dialect, const Machine& machine, const HeadGrid& grid) {
+  if (grid.nozzles <= dialect.most_nozzles) return {};
+  return Error{Fault::kUsage, fmt::format("{}: machine.dialect: {} speaks to at most {} nozzles, the head has {}", machine.name,
+                                          dialect.id, dialect.most_nozzles, grid.nozzles)};
+}
+
+}  // namespace lamina::write

@@ -1,0 +1,54 @@
+#include "stages/write/program/m578/m578.h"
+
+#include "stages/write/program/program_text.h"
+
+namespace lamina::write::m578 {
+namespace {
+
+class Writer final : public ProgramWriter {
+ public:
+  Writer(const Machine& machine, const HeadGrid& grid) : machine_(machine), grid_(grid), carriage_(machine, grid) {}
+
+  void start(std::uint32_t layers, ProgramBytes& out) override {
+    put(out, "; print program of {}, {} layers\nG21\nG90\n", machine_.name, layers);
+  }
+  void begin_layer(const LayerCycle& cycle, ProgramBytes& out) override {
+    put(out, "; layer {} of {}\n", cycle.layer, cycle.layers);
+    put_powder_cycle(machine_, cycle, out);
+  }
+
+  void sweep(const Sweep& sweep, const SweepVectors& vectors, ProgramBytes& out) override {
+    put(out, "; swath {} of {}\nG0 {}{} {}{} F{}\n", sweep.number, sweep.of, carriage_.scan_axis(),
+        mm_text(carriage_.begin(sweep, vectors)), carriage_.line_axis(), mm_text(carriage_.across(sweep.first_line)),
+        feed_text(machine_.motion.travel_speed_mm_s));
+    const std::string speed = feed_text(machine_.motion.scan_speed_mm_s);
+    for_each_vector(sweep, vectors, [&](std::uint32_t step, const std::uint64_t* words) {
+      put(out, "G1 {}{} F{}\n", carriage_.scan_axis(), mm_text(carriage_.along(step)), speed);
+      for (std::uint32_t head = 0; head * 32 < grid_.nozzles; ++head) {
+        const auto bits = static_cast<std::uint32_t>(words[head / 2] >> (head % 2 * 32));
+        if (bits != 0) put(out, "M578 P{} S{}\n", head, bits);
+      }
+    });
+    put(out, "G1 {}{} F{}\n", carriage_.scan_axis(), mm_text(carriage_.end(sweep, vectors)), speed);
+  }
+
+  void end_layer(const LayerCycle& cycle, ProgramBytes& out) override {
+    put(out, "G0 {}{} {}{} F{}\nM400\n; end of layer {}\n", machine_.motion.x_axis, mm_text(machine_.motion.safe_mm[0]),
+        machine_.motion.y_axis, mm_text(machine_.motion.safe_mm[1]), feed_text(machine_.motion.travel_speed_mm_s),
+        cycle.layer);
+  }
+  void end(ProgramBytes& out) override { put(out, "M400\nM0\n"); }
+
+ private:
+  const Machine& machine_;
+  const HeadGrid& grid_;
+  Carriage carriage_;
+};
+
+}  // namespace
+
+std::unique_ptr<ProgramWriter> make_writer(const Machine& machine, const HeadGrid& grid) {
+  return std::make_unique<Writer>(machine, grid);
+}
+
+}  // namespace lamina::write::m578

@@ -1,0 +1,86 @@
+#include "stages/write/program/planes/planes.h"
+
+#include <algorithm>
+
+#include "stages/write/program/binary_program.h"
+
+namespace lamina::write::planes {
+namespace {
+
+constexpr std::uint32_t kLayer = 0x4C01, kPlane = 0x4C02, kEnd = 0x4C03, kStart = 0x4C04, kDone = 0x4C05;
+constexpr std::size_t kPlaneHead = 36;
+
+class Writer final : public ProgramWriter {
+ public:
+  Writer(const Machine& machine, const HeadGrid& grid) : machine_(machine), grid_(grid), words_((grid.nozzles + 31) / 32) {}
+
+  void start(std::uint32_t layers, ProgramBytes& out) override {
+    for (const std::uint32_t value : {kStart, 7u, 1u, layers, grid_.nozzles, grid_.places, grid_.lines, grid_.steps_per_pixel, words_}) {
+      put_little<std::uint32_t>(out, value);
+    }
+  }
+  void begin_layer(const LayerCycle& cycle, ProgramBytes& out) override {
+    for (const std::int64_t value : {std::int64_t{kLayer}, std::int64_t{4}, std::int64_t{cycle.layer}, std::int64_t{cycle.layers},
+                                     cycle.bottom_nm, cycle.thickness_nm}) {
+      put_little<std::uint32_t>(out, static_cast<std::uint32_t>(value));
+    }
+  }
+
+  // Planes of one sweep, in the order of the movement; inside of a plane steps increase.
+  void sweep(const Sweep& sweep, const SweepVectors& vectors, ProgramBytes& out) override {
+    const std::size_t vector_bytes = words_ * 4;
+    const std::size_t start = out.size();
+    std::size_t all = 0;
+    for_each_segment(vectors, kPlaneHead, vector_bytes,
+                     [&](std::uint32_t, std::uint32_t count) { all += kPlaneHead + count * vector_bytes; });
+    out.resize(start + all);
+    std::size_t next = sweep.backward ? out.size() : start;
+    const std::int64_t across = across_nm(machine_, grid_, sweep.first_line);
+    for_each_segment(vectors, kPlaneHead, vector_bytes, [&](std::uint32_t begin, std::uint32_t count) {
+      const std::size_t bytes = kPlaneHead + count * vector_bytes;
+      if (sweep.backward) next -= bytes;
+      const std::uint32_t head[9] = {kPlane, static_cast<std::uint32_t>(7 + count * words_), sweep.number, sweep.of,
+                                     sweep.backward ? 1u : 0u, static_cast<std::uint32_t>(across),
+                                     vectors.first_step + begin, count, words_};
+      std::byte* to = out.data() + next;
+      std::memcpy(to, head, kPlaneHead);
+      to += kPlaneHead;
+      for (std::uint32_t k = 0; k < count; ++k) {
+        const std::uint64_t* words = vectors.bits.data() + std::size_t{begin + k} * vectors.words;
+        std::uint32_t left = words_;
+        for (std::uint32_t w = 0; w < vectors.words; ++w) {
+          const std::uint64_t turned = reversed(words[w]);
+          const auto high = static_cast<std::uint32_t>(turned >> 32), low = static_cast<std::uint32_t>(turned);
+          std::memcpy(to, &high, 4);
+          to += 4;
+          if (--left == 0) break;
+          std::memcpy(to, &low, 4);
+          to += 4;
+          --left;
+        }
+      }
+      if (!sweep.backward) next += bytes;
+    });
+  }
+
+  void end_layer(const LayerCycle& cycle, ProgramBytes& out) override {
+    for (const std::uint32_t value : {kEnd, 1u, cycle.layer}) put_little<std::uint32_t>(out, value);
+  }
+  void end(ProgramBytes& out) override {
+    for (const std::uint32_t value : {kDone, 0u}) put_little<std::uint32_t>(out, value);
+  }
+
+ private:
+  const Machine& machine_;
+  const HeadGrid& grid_;
+  std::uint32_t words_;  // of 32 bits a vector
+};
+
+}  // namespace
+
+std::unique_ptr<ProgramWriter> make_writer(const Machine& machine, const HeadGrid& grid) {
+  static_assert(std::endian::native == std::endian::little);
+  return std::make_unique<Writer>(machine, grid);
+}
+
+}  // namespace lamina::write::planes

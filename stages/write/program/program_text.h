@@ -1,0 +1,75 @@
+// stages/write/program/program_text.h: what text dialects have in common: axes, positions, numbers.
+#pragma once
+
+#include <fmt/format.h>
+
+#include <cstring>
+#include <iterator>
+#include <string_view>
+
+#include "stages/write/program/dialect.h"
+
+namespace lamina::write {
+
+/// Appends formatted text to bytes.
+template <class... Values>
+void put(ProgramBytes& out, fmt::format_string<Values...> format, Values&&... values) {
+  fmt::memory_buffer text;
+  fmt::format_to(std::back_inserter(text), format, std::forward<Values>(values)...);
+  const std::size_t at = out.size();
+  out.resize(at + text.size());
+  std::memcpy(out.data() + at, text.data(), text.size());
+}
+
+/// mm with four digits (a tenth of a micrometre), never -0.
+inline std::string mm_text(double millimetres) {
+  const double rounded = static_cast<double>(static_cast<std::int64_t>(millimetres * 1e4 + (millimetres < 0 ? -0.5 : 0.5))) / 1e4;
+  return fmt::format("{:.4f}", rounded == 0 ? 0.0 : rounded);
+}
+
+/// mm a minute, as F words have it.
+inline std::string feed_text(double mm_s) { return fmt::format("{:.0f}", mm_s * 60); }
+
+/// Positions of the carriage for sweeps, in mm.
+class Carriage {
+ public:
+  Carriage(const Machine& machine, const HeadGrid& grid) : machine_(machine), grid_(grid) {}
+
+  const std::string& scan_axis() const { return grid_.scan_axis == ScanAxis::kX ? machine_.motion.x_axis : machine_.motion.y_axis; }
+  const std::string& line_axis() const { return grid_.scan_axis == ScanAxis::kX ? machine_.motion.y_axis : machine_.motion.x_axis; }
+  double along(double step) const {
+    return grid_.step_position_nm(step) / kNmPerMm + machine_.mounting.offset_mm[grid_.scan_axis == ScanAxis::kX ? 0 : 1];
+  }
+  double across(std::int64_t line) const {
+    return grid_.line_position_nm(line) / kNmPerMm + machine_.mounting.offset_mm[grid_.scan_axis == ScanAxis::kX ? 1 : 0];
+  }
+  /// Where a sweep's movement begins and ends: the ramp before its first and behind its last step.
+  double begin(const Sweep& sweep, const SweepVectors& vectors) const { return end_of(vectors, sweep.backward); }
+  double end(const Sweep& sweep, const SweepVectors& vectors) const { return end_of(vectors, !sweep.backward); }
+
+ private:
+  double end_of(const SweepVectors& vectors, bool last) const {
+    const double ramp = machine_.motion.ramp_mm * (last == grid_.places_from_end ? -1 : 1);
+    return along(last ? vectors.first_step + vectors.steps - 1.0 : vectors.first_step) + ramp;
+  }
+  const Machine& machine_;
+  const HeadGrid& grid_;
+};
+
+/// The powder cycle before the head moves, as relative and absolute moves of G-code: the build vat goes to the depth of
+/// the layer, the vats feed dose x thickness each, the roller spreads and returns.
+void put_powder_cycle(const Machine& machine, const LayerCycle& cycle, ProgramBytes& out);
+
+/// Calls visit(step, words) for the steps that fire, in the order of the movement.
+template <class Visit>
+void for_each_vector(const Sweep& sweep, const SweepVectors& vectors, const Visit& visit) {
+  for (std::uint32_t k = 0; k < vectors.steps; ++k) {
+    const std::uint32_t place = sweep.backward ? vectors.steps - 1 - k : k;
+    const std::uint64_t* words = vectors.bits.data() + std::size_t{place} * vectors.words;
+    std::uint64_t any = 0;
+    for (std::uint32_t w = 0; w < vectors.words; ++w) any |= words[w];
+    if (any != 0) visit(vectors.first_step + place, words);
+  }
+}
+
+}  // namespace lamina::write
