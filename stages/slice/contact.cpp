@@ -84,13 +84,18 @@ Grid make_grid(const ContoursView& contours) {
 
 }  // namespace
 
-bool have_contact(const ContoursView& contours, ContactScratch& scratch) {
+bool find_contacts(const ContoursView& contours, ContactScratch& scratch, Buffer<std::uint32_t>& group) {
+  group.assign(contours.size(), kNoContact);
   if (contours.size() == 0) return false;
   const std::span<const Point2> point = contours.point;
   scratch.next.resize(point.size());
+  scratch.contour.resize(point.size());
+  scratch.root.resize(contours.size());
   for (std::uint32_t c = 0; c < contours.size(); ++c) {
     for (std::uint32_t i = contours.offset[c]; i + 1 < contours.offset[c + 1]; ++i) scratch.next[i] = i + 1;
     scratch.next[contours.offset[c + 1] - 1] = contours.offset[c];
+    std::fill(scratch.contour.begin() + contours.offset[c], scratch.contour.begin() + contours.offset[c + 1], c);
+    scratch.root[c] = c;
   }
   const Grid grid = make_grid(contours);
   const std::size_t cells = std::size_t{grid.columns} * grid.rows;
@@ -108,6 +113,11 @@ bool have_contact(const ContoursView& contours, ContactScratch& scratch) {
     const Point2 a = point[i], b = point[scratch.next[i]];
     grid.for_each_cell(a, b, [&](std::size_t cell) { scratch.edge[place[cell]++] = i; });
   }
+  const auto root_of = [&](std::uint32_t c) {
+    while (scratch.root[c] != c) c = scratch.root[c] = scratch.root[scratch.root[c]];
+    return c;
+  };
+  bool any = false;
   for (std::size_t cell = 0; cell < cells; ++cell) {
     const std::uint32_t end = place[cell];
     for (std::uint32_t k = begin_of(cell); k + 1 < end; ++k) {
@@ -116,11 +126,19 @@ bool have_contact(const ContoursView& contours, ContactScratch& scratch) {
       for (std::uint32_t m = k + 1; m < end; ++m) {
         const std::uint32_t j = scratch.edge[m];
         if (j == after || scratch.next[j] == i || j == i) continue;
-        if (meet(a, b, point[j], point[scratch.next[j]])) return true;
+        if (!meet(a, b, point[j], point[scratch.next[j]])) continue;
+        const std::uint32_t one = root_of(scratch.contour[i]), other = root_of(scratch.contour[j]);
+        scratch.root[std::max(one, other)] = std::min(one, other);
+        group[scratch.contour[i]] = group[scratch.contour[j]] = 0;  // in some group
+        any = true;
       }
     }
   }
-  return false;
+  if (!any) return false;
+  for (std::uint32_t c = 0; c < contours.size(); ++c) {
+    if (group[c] != kNoContact) group[c] = root_of(c);
+  }
+  return true;
 }
 
 }  // namespace lamina::slice

@@ -6,18 +6,29 @@
 
 namespace lamina::slice {
 
+inline constexpr std::uint32_t kNoContact = UINT32_MAX;
+
 /// Reused from layer to layer.
 struct ContactScratch {
-  Buffer<std::uint32_t> offset;  // cells + 1
-  Buffer<std::uint32_t> edge;    // of each cell: the number of an edge's first point
-  Buffer<std::uint32_t> next;    // point -> next point of its contour
+  Buffer<std::uint32_t> offset;   // cells + 1
+  Buffer<std::uint32_t> edge;     // of each cell: the number of an edge's first point
+  Buffer<std::uint32_t> next;     // point -> next point of its contour
+  Buffer<std::uint32_t> contour;  // point -> its contour
+  Buffer<std::uint32_t> root;     // contour -> another one of its group
 
-  std::uint64_t bytes() const { return bytes_held(offset) + bytes_held(edge) + bytes_held(next); }
+  std::uint64_t bytes() const {
+    return bytes_held(offset) + bytes_held(edge) + bytes_held(next) + bytes_held(contour) + bytes_held(root);
+  }
 };
 
-/// Whether two edges that are not neighbours in a contour share a point, exactly. Contours without straight or repeated
-/// points (tidy.h) for which this is false are simple and apart from each other, so they need no boolean operation.
-/// cost  O(P) as a rule: edges are compared within the cells of a grid about as fine as they are long
-bool have_contact(const ContoursView& contours, ContactScratch& scratch);
+/// Groups contours by contact: two are in contact if an edge of one shares a point with an edge of the other, exactly,
+/// and a contour is in contact with itself if two of its edges that are not neighbours share a point. Contours without
+/// straight or repeated points (tidy.h) that are in no contact are simple and apart from all others, so they need no
+/// boolean operation.
+///
+/// group    for each contour the lowest contour of its group, or kNoContact
+/// returns  whether there is any contact
+/// cost     O(P) as a rule: edges are compared within the cells of a grid about as fine as they are long
+bool find_contacts(const ContoursView& contours, ContactScratch& scratch, Buffer<std::uint32_t>& group);
 
 }  // namespace lamina::slice

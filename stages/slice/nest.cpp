@@ -1,8 +1,13 @@
 #include "stages/slice/nest.h"
 
 #include <algorithm>
+#include <cstdlib>
 #include <numeric>
+#include <utility>
 #include <vector>
+
+#include "stages/data/clipping.h"
+#include "stages/slice/contact.h"
 
 namespace lamina::slice {
 namespace {
@@ -29,65 +34,130 @@ Outline outline_of(std::span<const Point2> points) {
   return outline;
 }
 
-/// Whether p lies inside a simple contour that it is not on: crossings of the ray towards -x.
-bool is_inside(std::span<const Point2> points, Point2 p) {
-  bool inside = false;
+/// How often a contour winds about p, which is not on it: signed crossings of the ray towards -x.
+std::int32_t winding_about(std::span<const Point2> points, Point2 p) {
+  std::int32_t winding = 0;
   Point2 a = points.back();
   for (const Point2 b : points) {
     if ((a.y <= p.y) != (b.y <= p.y)) {
-      const Point2 low = a.y < b.y ? a : b, high = a.y < b.y ? b : a;
-      const std::int64_t area = (std::int64_t{high.x} - low.x) * (std::int64_t{p.y} - low.y) -
-                                (std::int64_t{high.y} - low.y) * (std::int64_t{p.x} - low.x);
-      inside ^= area < 0;  // p is right of the edge
+      const std::int64_t area = (std::int64_t{b.x} - a.x) * (std::int64_t{p.y} - a.y) -
+                                (std::int64_t{b.y} - a.y) * (std::int64_t{p.x} - a.x);
+      // p is right of an edge that goes down, or of one that goes up.
+      if (b.y < a.y && area > 0) ++winding;
+      if (b.y > a.y && area < 0) --winding;
     }
     a = b;
   }
-  return inside;
+  return winding;
+}
+
+/// For each contour how often all others wind about it, those of its own group left out.
+std::vector<std::int32_t> windings_outside(const Contours& contours, std::span<const Outline> outlines,
+                                           const Buffer<std::uint32_t>& group) {
+  const std::uint32_t count = contours.size();
+  const auto same_group = [&](std::uint32_t a, std::uint32_t b) {
+    return !group.empty() && group[a] != kNoContact && group[a] == group[b];
+  };
+  std::vector<std::uint32_t> by_left(count);
+  std::iota(by_left.begin(), by_left.end(), 0u);
+  std::ranges::sort(by_left, {}, [&](std::uint32_t c) { return std::pair(outlines[c].lo.x, c); });
+  std::vector<std::int32_t> outside(count, 0);
+  std::vector<std::uint32_t> open;  // contours whose box may still reach what comes
+  for (const std::uint32_t c : by_left) {
+    const Outline& own = outlines[c];
+    std::erase_if(open, [&](std::uint32_t other) { return outlines[other].hi.x < own.lo.x; });
+    for (const std::uint32_t other : open) {
+      const Outline& around = outlines[other];
+      if (around.lo.y < own.leftmost.y && own.leftmost.y < around.hi.y && !same_group(c, other)) {
+        outside[c] += winding_about(contours[other], own.leftmost);
+      }
+    }
+    open.push_back(c);
+  }
+  return outside;
+}
+
+void append(std::span<const Point2> points, bool reversed, Contours& out) {
+  if (reversed) {
+    out.point.insert(out.point.end(), points.rbegin(), points.rend());
+  } else {
+    out.point.insert(out.point.end(), points.begin(), points.end());
+  }
+  out.close();
+}
+
+/// Unites the contours of one group about which the others wind `outside` times. Frames around the group stand for
+/// them; what becomes of the frames is left out again.
+Status unite_group(const Contours& contours, std::uint32_t group_number, const Buffer<std::uint32_t>& group,
+                   std::int32_t outside, FillRule rule, Contours& out) {
+  constexpr std::int64_t kAway = 1'000'000;
+  Contours own;
+  Point2 lo{INT32_MAX, INT32_MAX}, hi{INT32_MIN, INT32_MIN};
+  for (std::uint32_t c = 0; c < contours.size(); ++c) {
+    if (group[c] != group_number) continue;
+    append(contours[c], false, own);
+    for (const Point2 p : contours[c]) {
+      lo = {std::min(lo.x, p.x), std::min(lo.y, p.y)};
+      hi = {std::max(hi.x, p.x), std::max(hi.y, p.y)};
+    }
+  }
+  const auto within = [](std::int64_t v) { return static_cast<Nm>(std::clamp<std::int64_t>(v, INT32_MIN, INT32_MAX)); };
+  const Point2 a{within(lo.x - kAway), within(lo.y - kAway)}, b{within(hi.x + kAway), within(hi.y + kAway)};
+  const Point2 frame[4] = {a, {b.x, a.y}, b, {a.x, b.y}};
+  for (std::int32_t i = 0; i < std::abs(outside); ++i) append(frame, outside < 0, own);
+  const auto united = unite_contours(own, rule);
+  if (!united) return united.error();
+  for (std::uint32_t c = 0; c < united->size(); ++c) {
+    const auto points = (*united)[c];
+    const bool is_frame = std::ranges::any_of(points, [&](Point2 p) { return p.x == a.x || p.x == b.x; });
+    if (!is_frame) append(points, false, out);
+  }
+  return {};
 }
 
 }  // namespace
 
-void nest(Contours& contours, FillRule rule) {
+Result<std::uint32_t> nest(Contours& contours, FillRule rule, const Buffer<std::uint32_t>& group) {
   const std::uint32_t count = contours.size();
   std::vector<Outline> outlines(count);
   for (std::uint32_t c = 0; c < count; ++c) outlines[c] = outline_of(contours[c]);
-  std::vector<std::uint32_t> by_left(count);
-  std::iota(by_left.begin(), by_left.end(), 0u);
-  std::ranges::sort(by_left, {}, [&](std::uint32_t c) { return std::pair(outlines[c].lo.x, c); });
-
-  std::vector<std::int8_t> turn(count);  // 0: drop, 1: keep, -1: keep reversed
-  std::vector<std::uint32_t> open;       // contours whose box may still reach what comes
-  for (const std::uint32_t c : by_left) {
-    const Outline& own = outlines[c];
-    std::erase_if(open, [&](std::uint32_t other) { return outlines[other].hi.x < own.lo.x; });
-    std::int32_t outside = 0;
-    for (const std::uint32_t other : open) {
-      const Outline& around = outlines[other];
-      if (around.lo.y < own.leftmost.y && own.leftmost.y < around.hi.y && own.hi.x < around.hi.x &&
-          is_inside(contours[other], own.leftmost)) {
-        outside += around.counter_clockwise ? 1 : -1;
+  const std::vector<std::int32_t> outside = windings_outside(contours, outlines, group);
+  // 0: drop, 1: keep, -1: keep reversed
+  const auto turn_of = [&](std::uint32_t c) {
+    const bool solid_outside = is_solid(rule, outside[c]);
+    const bool solid_inside = is_solid(rule, outside[c] + (outlines[c].counter_clockwise ? 1 : -1));
+    return solid_inside == solid_outside ? 0 : solid_inside == outlines[c].counter_clockwise ? 1 : -1;
+  };
+  if (!group.empty()) {
+    Contours out;
+    std::uint32_t united = 0;
+    for (std::uint32_t c = 0; c < count; ++c) {
+      if (group[c] == kNoContact) {
+        if (const int turn = turn_of(c); turn != 0) append(contours[c], turn < 0, out);
+      } else if (group[c] == c) {
+        if (Status status = unite_group(contours, c, group, outside[c], rule, out); !status) return status.error();
+        ++united;
       }
     }
-    const bool solid_outside = is_solid(rule, outside);
-    const bool solid_inside = is_solid(rule, outside + (own.counter_clockwise ? 1 : -1));
-    turn[c] = static_cast<std::int8_t>(solid_inside == solid_outside ? 0 : solid_inside == own.counter_clockwise ? 1 : -1);
-    open.push_back(c);
+    contours = std::move(out);
+    return united;
   }
-
+  // In place.
   std::uint32_t kept_points = 0, kept_contours = 0, begin = 0;
   for (std::uint32_t c = 0; c < count; ++c) {
     const std::uint32_t end = contours.offset[c + 1];
-    if (turn[c] != 0) {
+    if (const int turn = turn_of(c); turn != 0) {
       const auto first = contours.point.begin() + kept_points;
       if (kept_points != begin) std::copy(contours.point.begin() + begin, contours.point.begin() + end, first);
       kept_points += end - begin;
-      if (turn[c] < 0) std::reverse(first, contours.point.begin() + kept_points);
+      if (turn < 0) std::reverse(first, contours.point.begin() + kept_points);
       contours.offset[++kept_contours] = kept_points;
     }
     begin = end;
   }
   contours.offset.resize(kept_contours + 1);
   contours.point.resize(kept_points);
+  return 0u;
 }
 
 }  // namespace lamina::slice

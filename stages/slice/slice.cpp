@@ -88,14 +88,10 @@ void Slicer::loops_of(const Source& source, std::uint32_t plane, LayerScratch& s
 
 Status Slicer::clean(Contours& contours, LayerScratch& scratch, LayerReport& report) const {
   tidy(contours, options_.tolerance);
-  if (have_contact(contours, scratch.contact)) {
-    auto united = unite_contours(contours, options_.fill_rule);
-    if (!united) return united.error();
-    contours = std::move(*united);
-    ++report.united;
-  } else {
-    nest(contours, options_.fill_rule);
-  }
+  if (!find_contacts(contours, scratch.contact, scratch.group)) scratch.group.clear();
+  const auto united = nest(contours, options_.fill_rule, scratch.group);
+  if (!united) return united.error();
+  report.united += *united;
   if (options_.offset != 0) {
     auto moved = offset_contours(contours, options_.offset);
     if (!moved) return moved.error();

@@ -1,11 +1,11 @@
 // stages/slice/slice.h: meshes standing on the bed -> clean contours of any layer.
 //
-//   PlaneIndex ─> cut ─> chain ─> tidy ─> have_contact? ── no ──> nest ──> contours
-//                          └─> close_gaps (open meshes)  └─ yes ─> unite ──┘
+//   PlaneIndex ─> cut ─> chain ─> tidy ─> find_contacts ─> nest ─> contours
+//                          └─> close_gaps (open meshes)      └─ unite what is in contact
 //
 // The plane rule is that of the bitmaps: a corner at the plane is below it. What is solid where shells overlap is
 // decided by the same fill rule. Contours that keep clear of each other go no further than whole-number comparisons;
-// only where shells overlap, touch or cross themselves is a boolean operation made.
+// boolean operations are made only of those that overlap, touch or cross themselves.
 //
 // Exactness: a point of a contour is the exact meeting of a mesh edge and the plane, rounded to the nearest nm in x and
 // in y, so a contour lies within 0.71 nm of the true cut. Unions round their new corners once more.
@@ -44,7 +44,7 @@ struct LayerContours {
 
 struct LayerReport {
   std::uint64_t cuts = 0;      // facets that the plane crosses, with copies once
-  std::uint32_t united = 0;    // bodies that needed a boolean operation
+  std::uint32_t united = 0;    // groups of contours that needed a boolean operation
   GapReport gaps;              // sums over bodies; first_open of the first one
 };
 
@@ -54,6 +54,7 @@ struct LayerScratch {
   Cuts cuts;
   ChainScratch chain;
   ContactScratch contact;
+  Buffer<std::uint32_t> group;
   Contours closed, open;
   std::vector<Contours> of_source;  // clean contours of what copies share
   std::vector<std::uint8_t> source_done;

@@ -110,6 +110,28 @@ TEST(Slice, UnionFollowsTheFillRule) {
   EXPECT_EQ(area(joined({a, moved(a, {1000, 1000, 0})}), FillRule::kNonzero), 2e6);
 }
 
+TEST(Slice, WhatIsInContactIsUnitedWhereverItLies) {
+  // Crossing boxes within a solid, within a hole of it, and within an island in that hole; whole ones beside them.
+  const Triangles crossing = joined({box({0, 0, 0}, {100, 100, 1000}), box({50, 50, 0}, {150, 150, 1000})});
+  const Triangles holes = reversed(moved(crossing, {1300, 300, 0}));
+  const Triangles all = joined({box({0, 0, 0}, {2000, 2000, 1000}), moved(crossing, {300, 300, 0}), holes,
+                                reversed(box({400, 1000, 0}, {1600, 1900, 1000})), moved(crossing, {500, 1100, 0}),
+                                box({900, 1100, 0}, {1500, 1800, 1000}), reversed(moved(crossing, {1000, 1200, 0})),
+                                moved(box({0, 0, 0}, {50, 50, 1000}), {1700, 100, 0}),
+                                moved(box({0, 0, 0}, {50, 50, 1000}), {450, 1700, 0})});
+  const double cross = 17'500, solid = 4e6 - 1200 * 900, in_hole = cross + 600 * 700 + 2500;
+  for (const auto& [rule, area] : {std::pair{FillRule::kNonzero, solid - cross + in_hole - cross},
+                                   {FillRule::kPositive, solid - cross + in_hole - cross}}) {
+    slice::SliceOptions options;
+    options.fill_rule = rule;
+    const Sliced result = sliced(all, 500, options);
+    EXPECT_EQ(result.report.united, 4u);
+    expect_clean(result.contours.contours, "crossing boxes");
+    // The two boxes that are holes overlap in 50 x 50: there the winding number is -1, which nonzero takes for solid.
+    EXPECT_EQ(square(result), area + (rule == FillRule::kNonzero ? 2 * 2500 : 0));
+  }
+}
+
 TEST(Slice, IslandsInHolesAlternate) {
   Triangles all;
   for (int depth = 0; depth < 9; ++depth) {
@@ -213,6 +235,7 @@ TEST(Tidy, DroppedPointsLieWithinTheToleranceAndStraightOnesAlwaysGo) {
 TEST(Contact, IsFoundExactlyWhereAnyTwoEdgesMeet) {
   std::mt19937 random(17);
   slice::ContactScratch scratch;
+  Buffer<std::uint32_t> group;
   int with = 0;
   for (int i = 0; i < 3000; ++i) {
     std::uniform_int_distribution<Nm> pick(0, i % 3 == 0 ? 12 : 1'000'000);
@@ -244,7 +267,7 @@ TEST(Contact, IsFoundExactlyWhereAnyTwoEdgesMeet) {
       }
     }
     with += expected ? 1 : 0;
-    ASSERT_EQ(slice::have_contact(contours, scratch), expected) << "case " << i;
+    ASSERT_EQ(slice::find_contacts(contours, scratch, group), expected) << "case " << i;
   }
   EXPECT_GT(with, 500);
   EXPECT_LT(with, 2900);
