@@ -4,6 +4,8 @@
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <charconv>
+#include <utility>
 
 namespace lamina::load {
 namespace {
@@ -13,71 +15,228 @@ constexpr std::size_t kLongestTag = std::size_t{1} << 20;
 
 bool is_blank(char c) { return c == ' ' || c == '\t' || c == '\n' || c == '\r'; }
 
-/// The name of a tag without its namespace prefix.
-std::string_view name_of(std::string_view text) {
-  std::size_t end = 0;
-  while (end < text.size() && !is_blank(text[end]) && text[end] != '/') ++end;
-  const std::string_view name = text.substr(0, end);
-  return name.substr(name.find(':') == name.npos ? 0 : name.find(':') + 1);
+std::string_view without_prefix(std::string_view name) {
+  const std::size_t colon = name.find(':');
+  return colon == name.npos ? name : name.substr(colon + 1);
 }
 
-/// The value of an attribute, whatever its prefix; empty if there is none.
-std::string_view attribute(std::string_view text, std::string_view name) {
-  for (std::size_t at = text.find(name); at != text.npos; at = text.find(name, at + 1)) {
-    if (at == 0 || (!is_blank(text[at - 1]) && text[at - 1] != ':')) continue;
-    std::size_t value = at + name.size();
-    while (value < text.size() && is_blank(text[value])) ++value;
-    if (value >= text.size() || text[value] != '=') continue;
-    ++value;
-    while (value < text.size() && is_blank(text[value])) ++value;
-    if (value >= text.size() || (text[value] != '"' && text[value] != '\'')) continue;
-    const std::size_t end = text.find(text[value], value + 1);
-    return end == text.npos ? std::string_view() : text.substr(value + 1, end - value - 1);
+/// Takes a name from the front of a tag's text.
+std::string_view take_name(std::string_view& text) {
+  std::size_t end = 0;
+  while (end < text.size() && !is_blank(text[end]) && text[end] != '/' && text[end] != '=') ++end;
+  const std::string_view name = text.substr(0, end);
+  text.remove_prefix(end);
+  return without_prefix(name);
+}
+
+void skip_blanks(std::string_view& text) {
+  while (!text.empty() && (is_blank(text.front()) || text.front() == '/')) text.remove_prefix(1);
+}
+
+/// Character references become the characters that they stand for; those that are no ASCII do not matter here.
+std::string plain_text(std::string_view value) {
+  constexpr std::pair<std::string_view, char> kNamed[] = {
+      {"amp", '&'}, {"lt", '<'}, {"gt", '>'}, {"quot", '"'}, {"apos", '\''}};
+  std::string plain;
+  for (std::size_t at = 0; at < value.size(); ++at) {
+    const std::size_t end = value[at] == '&' ? value.find(';', at) : value.npos;
+    if (end == value.npos) {
+      plain += value[at];
+      continue;
+    }
+    std::string_view reference = value.substr(at + 1, end - at - 1);
+    if (reference.starts_with('#')) {
+      reference.remove_prefix(1);
+      const bool hexadecimal = reference.starts_with('x');
+      reference.remove_prefix(hexadecimal ? 1 : 0);
+      std::uint32_t code = 0;
+      std::from_chars(reference.data(), reference.data() + reference.size(), code, hexadecimal ? 16 : 10);
+      plain += code < 128 ? static_cast<char>(code) : '?';
+    }
+    for (const auto& [name, character] : kNamed) {
+      if (reference == name) plain += character;
+    }
+    at = end;
   }
-  return {};
+  return plain;
+}
+
+/// The names of files in a package have no case, and paths to them begin with a slash.
+std::string file_name(std::string_view text) {
+  std::string name = text.starts_with('/') ? std::string() : std::string("/");
+  for (const char c : text) name += c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
+  return name;
+}
+
+/// Ids are whole numbers; 007 is 7.
+std::uint64_t id_of(std::string_view text) {
+  while (!text.empty() && (is_blank(text.front()) || text.front() == '+')) text.remove_prefix(1);
+  std::uint64_t id = 0;
+  std::from_chars(text.data(), text.data() + text.size(), id);
+  return id;
+}
+
+/// What a tag says of an object: its own id, or the one that it refers to.
+struct Attributes {
+  std::uint64_t id = 0, object_id = 0;
+  std::string path;
+};
+
+Attributes read_attributes(std::string_view text) {
+  Attributes read;
+  for (skip_blanks(text); !text.empty(); skip_blanks(text)) {
+    const std::string_view name = take_name(text);
+    skip_blanks(text);
+    if (!text.starts_with('=')) {
+      if (name.empty() && !text.empty()) text.remove_prefix(1);
+      continue;
+    }
+    text.remove_prefix(1);
+    skip_blanks(text);
+    if (text.empty() || (text.front() != '"' && text.front() != '\'')) continue;
+    const std::size_t end = text.find(text.front(), 1);
+    const std::string_view value = text.substr(1, end == text.npos ? text.npos : end - 1);
+    text.remove_prefix(end == text.npos ? text.size() : end + 1);
+    if (name == "id") read.id = id_of(plain_text(value));
+    if (name == "objectid") read.object_id = id_of(plain_text(value));
+    if (name == "path") read.path = file_name(plain_text(value));
+  }
+  return read;
 }
 
 }  // namespace
 
 void ComponentScan::begin_file(std::string_view name) {
-  file_ = std::string(name.substr(0, 1) == "/" ? "" : "/") + std::string(name);
-  rest_.clear();
+  file_ = file_name(name);
+  place_ = Place::kStart;
+  tag_.clear();
   current_ = nullptr;
 }
 
-std::string ComponentScan::key(std::string_view path, std::string_view id) const {
-  return (path.empty() ? file_ : std::string(path)) + "#" + std::string(id);
+void ComponentScan::refuse(std::string_view why) {
+  if (refused_.empty()) refused_ = fmt::format("{} {}", file_.substr(1), why);
+  place_ = Place::kSkip;
 }
 
 void ComponentScan::feed(const char* bytes, std::size_t count) {
-  std::string_view text(bytes, count);
-  if (!rest_.empty()) {
-    rest_.append(bytes, count);
-    text = rest_;
+  const std::string_view text(bytes, count);
+  const auto is_beginning_of = [&](std::string_view whole) { return whole.starts_with(tag_); };
+  // Skips to the end mark, which may have begun in the piece before.
+  const auto skip_past = [&](std::string_view mark, std::size_t& at) {
+    for (; at < text.size(); ++at) {
+      tag_ += text[at];
+      if (tag_.size() > mark.size()) tag_.erase(0, 1);
+      if (tag_ != mark) continue;
+      tag_.clear();
+      place_ = Place::kText;
+      ++at;
+      return;
+    }
+  };
+  for (std::size_t at = 0; at < text.size() && place_ != Place::kSkip;) {
+    switch (place_) {
+      case Place::kStart:
+        tag_ += text[at++];
+        if (tag_ == "\xFE\xFF" || tag_ == "\xFF\xFE" || tag_ == std::string_view("\0<", 2) ||
+            tag_ == std::string_view("<\0", 2)) {
+          refuse("is UTF-16; save it as UTF-8");
+        } else if (tag_ == "\xEF\xBB\xBF" || is_blank(tag_.front())) {
+          tag_.clear();
+        } else if (tag_.front() == '<' && tag_.size() == 2) {
+          place_ = Place::kOpen;
+          tag_.clear();
+          --at;
+        } else if (!is_beginning_of("\xEF\xBB\xBF") && !is_beginning_of("\xFE\xFF") && !is_beginning_of("\xFF\xFE") &&
+                   !is_beginning_of("<") && !is_beginning_of(std::string_view("\0<", 2))) {
+          place_ = Place::kSkip;
+        }
+        break;
+      case Place::kText:
+        at = std::min(text.find('<', at), text.size());
+        if (at < text.size()) {
+          ++at;
+          place_ = Place::kOpen;
+        }
+        break;
+      case Place::kOpen:
+        tag_ += text[at++];
+        if (tag_ == "!--" || tag_ == "![CDATA[" || tag_ == "?") {
+          place_ = tag_ == "?" ? Place::kInstruction : tag_ == "!--" ? Place::kRemark : Place::kData;
+          tag_.clear();
+        } else if (tag_ == "!D") {
+          refuse("has a document type, which 3MF forbids; export it again");
+        } else if (!is_beginning_of("!--") && !is_beginning_of("![CDATA[") && !is_beginning_of("!D")) {
+          place_ = Place::kTag;
+          tag_.pop_back();
+          --at;
+        }
+        break;
+      case Place::kTag: {
+        const std::size_t end = std::min(text.find_first_of(">\"'", at), text.size());
+        tag_.append(text, at, end - at);
+        at = end;
+        if (end < text.size() && text[end] == '>') {
+          tag(tag_);
+          tag_.clear();
+          place_ = Place::kText;
+          ++at;
+        } else if (end < text.size()) {
+          quote_ = text[end];
+          tag_ += quote_;
+          place_ = Place::kQuote;
+          ++at;
+        }
+        break;
+      }
+      case Place::kQuote: {
+        const std::size_t end = std::min(text.find(quote_, at), text.size());
+        tag_.append(text, at, end - at);
+        at = end;
+        if (end < text.size()) {
+          tag_ += quote_;
+          place_ = Place::kTag;
+          ++at;
+        }
+        break;
+      }
+      case Place::kRemark: skip_past("-->", at); break;
+      case Place::kData: skip_past("]]>", at); break;
+      case Place::kInstruction: skip_past("?>", at); break;
+      case Place::kSkip: break;
+    }
+    if (tag_.size() > kLongestTag) refuse(fmt::format("has a tag of more than {} bytes; export it again", kLongestTag));
   }
-  std::size_t at = 0;
-  while ((at = text.find('<', at)) != text.npos) {
-    const bool remark = text.substr(at, 4) == "<!--";
-    const std::size_t end = remark ? text.find("-->", at) : text.find('>', at);
-    if (end == text.npos) break;
-    if (!remark) tag(text.substr(at + 1, end - at - 1));
-    at = end + 1;
-  }
-  std::string rest(at == text.npos || text.size() - at > kLongestTag ? std::string_view() : text.substr(at));
-  rest_ = std::move(rest);
 }
 
 void ComponentScan::tag(std::string_view text) {
-  const std::string_view name = name_of(text);
+  const std::string_view name = take_name(text);
   if (name == "triangle") {
     if (current_ != nullptr) ++current_->triangles;
-  } else if (name == "object") {
-    current_ = &objects_[key({}, attribute(text, "id"))];
-  } else if (name == "component") {
-    if (current_ != nullptr) current_->components.push_back(key(attribute(text, "path"), attribute(text, "objectid")));
-  } else if (name == "item") {
-    items_.push_back(key(attribute(text, "path"), attribute(text, "objectid")));
+    return;
   }
+  if (name != "object" && name != "component" && name != "item") return;
+  Attributes is = read_attributes(text);
+  if (name == "object") {
+    current_ = &objects_[is.id][file_];
+    return;
+  }
+  Reference reference{file_, is.path.empty() ? file_ : std::move(is.path), is.object_id};
+  if (name == "item") {
+    items_.push_back(std::move(reference));
+  } else if (current_ != nullptr) {
+    current_->components.push_back(std::move(reference));
+  }
+}
+
+/// Null where there is none: lib3mf says what is wrong with it, or does not look at the path at all.
+std::array<ComponentScan::Object*, 2> ComponentScan::find(const Reference& reference) {
+  const auto object_in = [&](const std::string& file) -> Object* {
+    const auto same_id = objects_.find(reference.id);
+    if (same_id == objects_.end()) return nullptr;
+    const auto there = same_id->second.find(file);
+    return there == same_id->second.end() ? nullptr : &there->second;
+  };
+  return {object_in(reference.path), reference.path == reference.file ? nullptr : object_in(reference.file)};
 }
 
 bool ComponentScan::expand(Object& object, std::uint32_t depth) {
@@ -85,13 +244,18 @@ bool ComponentScan::expand(Object& object, std::uint32_t depth) {
   if (object.open || depth > kDeepest) return false;
   object.open = true;
   std::uint64_t objects = 1, triangles = object.triangles;
-  for (const std::string& component : object.components) {
-    const auto found = objects_.find(component);
-    if (found == objects_.end()) continue;  // lib3mf says what is wrong with it
-    if (!expand(found->second, depth + 1)) return false;
-    objects = std::min(objects + found->second.expanded_objects, kTooMany);
-    triangles = std::min(triangles + found->second.expanded_triangles, kTooMany);
-    object.height = std::max(object.height, found->second.height + 1);
+  for (const Reference& component : object.components) {
+    std::uint64_t more_objects = 0, more_triangles = 0;
+    const auto [by_path, by_id] = find(component);
+    for (Object* const found : {by_path, by_id}) {
+      if (found == nullptr || (found == &object && by_path != nullptr && found == by_id)) continue;
+      if (!expand(*found, depth + 1)) return false;
+      more_objects = std::max(more_objects, found->expanded_objects);
+      more_triangles = std::max(more_triangles, found->expanded_triangles);
+      object.height = std::max(object.height, found->height + 1);
+    }
+    objects = std::min(objects + more_objects, kTooMany);
+    triangles = std::min(triangles + more_triangles, kTooMany);
   }
   object.open = false;
   object.expanded_objects = objects;
@@ -100,18 +264,25 @@ bool ComponentScan::expand(Object& object, std::uint32_t depth) {
 }
 
 Status ComponentScan::check(const Source& source, std::uint64_t triangle_limit) {
+  if (!refused_.empty()) return source.error(refused_);
   std::uint64_t objects = 0, triangles = 0;
-  for (auto& [name, object] : objects_) {
-    if (!expand(object, 0))
-      return source.error(fmt::format(
-          "an object contains itself, or components are nested more than {} deep; export it again", kDeepest));
-    objects = std::max(objects, object.expanded_objects);
+  for (auto& [id, same_id] : objects_) {
+    for (auto& [file, object] : same_id) {
+      if (!expand(object, 0))
+        return source.error(fmt::format(
+            "an object contains itself, or components are nested more than {} deep; export it again", kDeepest));
+      objects = std::max(objects, object.expanded_objects);
+    }
   }
-  for (const std::string& item : items_) {
-    const auto found = objects_.find(item);
-    if (found == objects_.end()) continue;
-    objects = std::min(objects + found->second.expanded_objects, kTooMany);
-    triangles = std::min(triangles + found->second.expanded_triangles, kTooMany);
+  for (const Reference& item : items_) {
+    std::uint64_t more_objects = 0, more_triangles = 0;
+    for (const Object* const found : find(item)) {
+      if (found == nullptr) continue;
+      more_objects = std::max(more_objects, found->expanded_objects);
+      more_triangles = std::max(more_triangles, found->expanded_triangles);
+    }
+    objects = std::min(objects + more_objects, kTooMany);
+    triangles = std::min(triangles + more_triangles, kTooMany);
   }
   if (triangles > triangle_limit)
     return source.error(fmt::format("its components expand to more triangles than the limit of {}", triangle_limit));

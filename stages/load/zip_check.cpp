@@ -45,8 +45,7 @@ Status check_package(const Source& source, const LoadOptions& options) {
       return source.error(fmt::format("zip entry {} cannot be opened ({}); copy or export the file again", i + 1,
                                       zip_strerror(archive.get())));
     std::uint64_t expanded = 0;
-    const bool is_model = std::string_view(entry.name).ends_with(".model");
-    if (is_model) scan.begin_file(entry.name);
+    scan.begin_file(entry.name);
     while (true) {
       const zip_int64_t got = zip_fread(file.get(), block.data(), block.size());
       if (got < 0)
@@ -60,7 +59,7 @@ Status check_package(const Source& source, const LoadOptions& options) {
       if (expansion_is_absurd((entry.valid & ZIP_STAT_COMP_SIZE) != 0 ? entry.comp_size : source.size(), expanded) ||
           expansion_is_absurd(source.size(), total))
         return source.error("expands more than 200-fold, as no part does; unzip it to see what it is");
-      if (is_model) scan.feed(block.data(), static_cast<std::size_t>(got));
+      scan.feed(block.data(), static_cast<std::size_t>(got));
     }
   }
   return scan.check(source, options.triangle_limit);

@@ -1,4 +1,6 @@
 // tests/load/threemf.cpp: 3MF packages, right and wrong.
+#include <fmt/format.h>
+
 #include <cmath>
 
 #include "test_archives.h"
@@ -130,6 +132,62 @@ TEST(Read3mf, ComponentsThatExpandToBillionsAreRefusedBeforeTheyDo) {
   std::string deep = box_object(1, 10, 20, 30);
   for (int id = 2; id < 2002; ++id) deep += components(id, component(id - 1));
   EXPECT_CONTAINS(refusal(write_3mf(deep, item(2001))), "nested more than 1000 deep");
+}
+
+TEST(Read3mf, ComponentsThatExpandToBillionsAreFoundHoweverTheyAreWritten) {
+  const auto doubled = [](const std::string& before_id, const std::string& behind_id, int levels) {
+    std::string resources = box_object(1, 10, 20, 30);
+    for (int id = 2; id < levels; ++id) {
+      const std::string part = fmt::format("<component objectid=\"{}{}\"/>", id % 2 ? "0" : "", id - 1);
+      resources += fmt::format("<object {}id=\"{}\"{} type=\"model\"><components>{}{}</components></object>", before_id,
+                               id, behind_id, part, part);
+    }
+    return resources;
+  };
+  const std::string why = "components expand to more";
+  for (const std::string& before : {std::string("name=\">\" "), std::string("name=' id=\"7\" > '\n"),
+                                    std::string("name=\"-->\" "), std::string("partnumber=\"<object id='1'>\" ")}) {
+    EXPECT_CONTAINS(refusal(write_3mf(doubled(before, "", 42), item(41))), why) << before;
+    EXPECT_CONTAINS(refusal(write_3mf(doubled("", " " + before, 42), item(41))), why) << before;
+  }
+  EXPECT_CONTAINS(refusal(write_3mf("<!-- > -->" + doubled("", "", 42), item(41))), why);
+  EXPECT_CONTAINS(refusal(write_3mf(doubled("name=\"" + std::string(2u << 20, 'x') + "\" ", "", 3), item(2))),
+                  "a tag of more than");
+  // Written as character references.
+  std::string coded = box_object(1, 10, 20, 30);
+  for (int id = 2; id < 10; ++id) coded += components(id, component(id - 1) + component(id - 1));
+  for (int id = 10; id < 50; ++id) {
+    const std::string part = fmt::format("<component objectid=\"&#{};&#x{:x};\"/>", 48 + (id - 1) / 10, 48 + (id - 1) % 10);
+    coded += components(id, id == 10 ? component(9) : part + part);
+  }
+  EXPECT_CONTAINS(refusal(write_3mf(coded, item(49))), why);
+  // The model under another name, which the relationships tell.
+  for (const std::string& name : {std::string("3D/3dmodel.MODEL"), std::string("3D/model.xml")}) {
+    auto entries = package(model(doubled("", "", 42), item(41)));
+    for (auto& [entry, text] : entries) {
+      if (entry.ends_with(".model")) entry = name;
+      for (std::size_t at; (at = text.find("3D/3dmodel.model")) != text.npos;) text.replace(at, 16, name);
+    }
+    EXPECT_CONTAINS(refusal(write_file("named.3mf", zip(entries))), why) << name;
+  }
+  // A path that leads to a small object of that id, for readers that know paths, and to a large one for others.
+  auto entries = package(model(doubled("", " ", 42), "<item objectid=\"41\" p:path=\"/3D/other.model\" "
+                                                    "xmlns:p=\"http://schemas.microsoft.com/3dmanufacturing/production/2015/06\"/>"));
+  entries.push_back({"3D/other.model", model(box_object(41, 1, 1, 1), "")});
+  EXPECT_CONTAINS(refusal(write_file("path.3mf", zip(entries))), why);
+}
+
+TEST(Read3mf, ModelsThatCannotBeScannedAreRefused) {
+  auto entries = package(model(box_object(1, 1, 1, 1), item(1)));
+  for (auto& [entry, text] : entries) {
+    if (!entry.ends_with(".model")) continue;
+    const std::string plain = text;
+    text = "<!DOCTYPE model [<!ENTITY one \"1\">]>" + plain.substr(plain.find("?>") == plain.npos ? 0 : plain.find("?>") + 2);
+    EXPECT_CONTAINS(refusal(write_file("type.3mf", zip(entries))), "has a document type");
+    text = "\xFF\xFE";
+    for (const char c : plain) text += c, text += '\0';
+    EXPECT_CONTAINS(refusal(write_file("utf16.3mf", zip(entries))), "is UTF-16");
+  }
 }
 
 TEST(Read3mf, ComponentsThatContainThemselvesAreRefused) {
