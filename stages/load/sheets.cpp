@@ -2,6 +2,7 @@
 #include "stages/load/sheets.h"
 
 #include <algorithm>
+#include <vector>
 
 namespace lamina::load {
 
@@ -16,20 +17,24 @@ StraySheets find_stray_sheets(std::size_t facet_count, std::span<const Side> sid
   };
   Buffer<Rim> rims(facet_count);
   std::fill(rims.begin(), rims.end(), Rim{});
+  struct OwnSides {
+    std::uint32_t patch;
+    std::int32_t direction;  // 1 from low to high, -1 back
+  };
+  std::vector<OwnSides> meeting;  // at one edge; a broken file may have all its facets there
   for_each_edge(sides, [&](const Side* begin, const Side* end) {
     if (end - begin == 2) return;
-    const std::int64_t all = surplus(begin, end);
+    meeting.clear();
     for (const Side* side = begin; side != end; ++side) {
-      const std::uint32_t patch = patches.find(side->facet);
+      meeting.push_back({patches.find(side->facet), side->forward ? 1 : -1});
+    }
+    std::ranges::sort(meeting, {}, &OwnSides::patch);
+    const std::int64_t all = surplus(begin, end);
+    for (auto first = meeting.begin(), last = first; first != meeting.end(); first = last) {
       std::int64_t own = 0;
-      std::ptrdiff_t own_sides = 0;
-      for (const Side* other = begin; other != end; ++other) {
-        if (patches.find(other->facet) != patch) continue;
-        own += other->forward ? 1 : -1;
-        ++own_sides;
-      }
-      Rim& rim = rims[patch];
-      if (own_sides == end - begin) {
+      for (; last != meeting.end() && last->patch == first->patch; ++last) own += last->direction;
+      Rim& rim = rims[first->patch];
+      if (last - first == end - begin) {
         rim.open = rim.open || all != 0;
       } else {
         rim.glued = true;
