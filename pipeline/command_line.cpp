@@ -20,6 +20,7 @@ struct Command {
 constexpr Command kCommands[] = {
     {"jet", "binder jetting: exact 1-bit images of every layer of the bed, and a manifest", run_jet_command},
     {"slice", "contours of every layer, and their filling: SVG, CLI, 3MF slices", run_slice_command},
+    {"heights", "the layers of a part: thicknesses that fit its slopes and flats, compared, plotted", run_heights_command},
     {"info", "what is in a part file, is it closed, and where is it not", run_info_command},
     {"verify", "is a job's directory whole and true to its manifest", run_verify_command},
     {"merge", "join the shards of a job that was divided", run_merge_command},

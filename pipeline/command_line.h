@@ -51,6 +51,7 @@ Result<Arguments> read_arguments(const CommandSpec& spec, const std::vector<std:
 // --- one file each
 int run_jet_command(const std::vector<std::string>& arguments);
 int run_slice_command(const std::vector<std::string>& arguments);
+int run_heights_command(const std::vector<std::string>& arguments);
 int run_info_command(const std::vector<std::string>& arguments);
 int run_verify_command(const std::vector<std::string>& arguments);
 int run_merge_command(const std::vector<std::string>& arguments);

@@ -5,6 +5,8 @@
 #include <charconv>
 #include <csignal>
 #include <filesystem>
+#include <fstream>
+#include <iterator>
 #include <optional>
 
 #include "pipeline/command_line.h"
@@ -13,6 +15,7 @@
 #include "stages/write/atomic_file.h"
 #include "stages/write/picture/canvas.h"
 #include "stages/write/picture/contact_sheet.h"
+#include "stages/write/picture/drawing.h"
 
 namespace lamina::pipeline {
 namespace {
@@ -31,6 +34,7 @@ CommandSpec preview_spec() {
                   {"--layer", "K", "only layer K, counted from 0 at the bottom", "", ""},
                   {"--width", "PIXELS", "width of the picture, 200 to 20000", "2400", ""},
                   {"--whole-bed", "", "show all of the bed, not only where the layers have something", "", ""},
+                  {"--drawing", "FILE", "draw what lamina heights left for it instead, and remove FILE", "", ""},
                   {"--quiet", "", "say nothing but errors", "", ""}};
   spec.closing =
       "Examples:\n"
@@ -112,6 +116,20 @@ std::string title_of(const ManifestHead& head) {
                              head.grid.x.dpi(), head.grid.y.dpi(), mm(head.grid.x.length), mm(head.grid.y.length));
 }
 
+// A plot that another command wrote down as boxes and lines of text.
+int run_drawing(const std::string& path, const std::string& output) {
+  std::ifstream file(path, std::ios::binary);
+  if (!file) return fail({Fault::kUsage, fmt::format("--drawing {}: cannot be read", path)});
+  const std::string text{std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
+  file.close();
+  std::error_code ignored;
+  std::filesystem::remove(path, ignored);
+  const Result<Buffer<std::byte>> picture = write::picture::drawing_png(text);
+  if (!picture) return fail({picture.error().fault, fmt::format("--drawing {}: {}", path, picture.error().message)});
+  const Status status = write::write_file(output, *picture);
+  return status ? 0 : fail(status.error());
+}
+
 int run_preview(const std::vector<std::string>& texts) {
   const Result<Arguments> arguments = read_arguments(preview_spec(), texts);
   if (!arguments) return fail(arguments.error());
@@ -119,6 +137,7 @@ int run_preview(const std::vector<std::string>& texts) {
     const Status status = print(*arguments->help);
     return status ? 0 : fail(status.error());
   }
+  if (arguments->has("--drawing")) return run_drawing(arguments->text("--drawing"), arguments->text("-o,--output"));
   if (arguments->operands.size() != 1) return fail({Fault::kUsage, "name one directory that lamina jet wrote"});
   const std::string directory = arguments->operands.front(), output = arguments->text("-o,--output");
   if (output.empty()) return fail({Fault::kUsage, "-o PNG is missing; name the picture"});
