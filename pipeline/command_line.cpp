@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <csignal>
 #include <exception>
 #include <new>
@@ -12,11 +13,6 @@
 namespace lamina::pipeline {
 namespace {
 
-struct Command {
-  std::string_view name, summary;
-  int (*run)(const std::vector<std::string>&);
-};
-
 constexpr Command kCommands[] = {
     {"jet", "binder jetting: exact 1-bit images of every layer of the bed, and a manifest", run_jet_command},
     {"slice", "contours of every layer, and their filling: SVG, CLI, 3MF slices", run_slice_command},
@@ -25,6 +21,7 @@ constexpr Command kCommands[] = {
     {"verify", "is a job's directory whole and true to its manifest", run_verify_command},
     {"merge", "join the shards of a job that was divided", run_merge_command},
     {"preview", "pictures of a job's layers for people", run_preview_command},
+    {"batch", "many jobs in one queue, sharing processors and memory, with one summary", run_batch_command},
 };
 
 std::string program_help() {
@@ -57,14 +54,19 @@ int run_command(int argument_count, char** arguments) {
   if (name == "-h" || name == "--help" || name == "help") return say_help(program_help());
   if (name == "--version" || name == "version") return say_help(fmt::format("lamina {}\n", version()));
   std::vector<std::string_view> names;
-  for (const Command& command : kCommands) {
-    if (command.name == name) return command.run({arguments + 2, arguments + argument_count});
-    names.push_back(command.name);
-  }
+  if (const Command* command = find_command(name)) return command->run({arguments + 2, arguments + argument_count});
+  for (const Command& command : kCommands) names.push_back(command.name);
   return fail({Fault::kUsage, fmt::format("'{}' is no command{}; lamina --help lists them", name, suggest(name, names))});
 }
 
 }  // namespace
+
+std::span<const Command> commands() { return kCommands; }
+
+const Command* find_command(std::string_view name) {
+  const auto found = std::ranges::find(kCommands, name, &Command::name);
+  return found == std::end(kCommands) ? nullptr : found;
+}
 
 std::string_view version() { return LAMINA_VERSION; }
 

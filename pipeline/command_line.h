@@ -2,6 +2,7 @@
 #pragma once
 
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -48,6 +49,22 @@ struct Arguments {
 /// value missing
 Result<Arguments> read_arguments(const CommandSpec& spec, const std::vector<std::string>& arguments);
 
+/// One command of the program. It begins by reading its arguments, so that it can be asked for its definition.
+struct Command {
+  std::string_view name, summary;
+  int (*run)(const std::vector<std::string>&);
+};
+
+/// All commands, in the order of the help.
+std::span<const Command> commands();
+
+/// The command of that name, or nullptr.
+const Command* find_command(std::string_view name);
+
+/// The definition of a command's arguments, from which help, manual pages, shell completion and the documentation's
+/// tests are made. Nothing of the command runs. Empty name: a command that is a program of its own, and does not say.
+CommandSpec spec_of(const Command& command);
+
 // --- one file each
 int run_jet_command(const std::vector<std::string>& arguments);
 int run_slice_command(const std::vector<std::string>& arguments);
@@ -56,5 +73,6 @@ int run_info_command(const std::vector<std::string>& arguments);
 int run_verify_command(const std::vector<std::string>& arguments);
 int run_merge_command(const std::vector<std::string>& arguments);
 int run_preview_command(const std::vector<std::string>& arguments);
+int run_batch_command(const std::vector<std::string>& arguments);
 
 }  // namespace lamina::pipeline

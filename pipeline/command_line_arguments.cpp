@@ -7,13 +7,35 @@
 #include <deque>
 
 #include "pipeline/command_line.h"
+#include "pipeline/console.h"
 #include "pipeline/json_text.h"
 #include "pipeline/nearest_name.h"
 #include "pipeline/number_text.h"
 
 namespace lamina::pipeline {
+namespace {
+
+thread_local CommandSpec* asked_spec = nullptr;
+
+}  // namespace
+
+CommandSpec spec_of(const Command& command) {
+  CommandSpec spec;
+  if (command.name == "preview") return spec;  // hands the process over to another program
+  asked_spec = &spec;
+  ConsoleCapture unheard;
+  command.run({"--help"});
+  asked_spec = nullptr;
+  return spec;
+}
 
 Result<Arguments> read_arguments(const CommandSpec& spec, const std::vector<std::string>& arguments) {
+  if (asked_spec != nullptr) {
+    *asked_spec = spec;
+    Arguments only_asked;
+    only_asked.help = "";
+    return only_asked;
+  }
   const auto wrong = [&](const std::string& what) {
     const std::string line = one_line(what);
     if (line.ends_with('?')) return Error{Fault::kUsage, line};

@@ -13,8 +13,14 @@
 namespace lamina::pipeline {
 namespace {
 
+thread_local ConsoleCapture* capture = nullptr;
+
 // 0 or the reason.
 int write_all(int file, std::string_view text) {
+  if (capture != nullptr) {
+    (file == STDOUT_FILENO ? capture->out : capture->err) += text;
+    return 0;
+  }
   while (!text.empty()) {
     const ssize_t wrote = ::write(file, text.data(), text.size());
     if (wrote < 0 && errno == EINTR) continue;
@@ -41,7 +47,10 @@ Status print(std::string_view text) {
   return Error{Fault::kOutput, fmt::format("standard output: {}", std::strerror(reason))};
 }
 
-bool is_terminal() { return ::isatty(STDERR_FILENO) == 1; }
+ConsoleCapture::ConsoleCapture() : outer_(capture) { capture = this; }
+ConsoleCapture::~ConsoleCapture() { capture = outer_; }
+
+bool is_terminal() { return capture == nullptr && ::isatty(STDERR_FILENO) == 1; }
 
 int terminal_columns() {
   winsize size{};

@@ -21,6 +21,20 @@ int fail(const Error& error);
 /// Results to stdout. errors  kOutput if they could not be written (a full disk); a reader that closed the pipe is none
 Status print(std::string_view text);
 
+/// What this thread says goes here instead of to stderr and stdout as long as the object lives: for a job of a batch.
+/// Other threads are not affected, and captures of one thread may be nested.
+class ConsoleCapture {
+ public:
+  ConsoleCapture();
+  ~ConsoleCapture();
+  ConsoleCapture(const ConsoleCapture&) = delete;
+  ConsoleCapture& operator=(const ConsoleCapture&) = delete;
+  std::string out, err;
+
+ private:
+  ConsoleCapture* outer_;
+};
+
 /// Whether stderr is a terminal.
 bool is_terminal();
 /// Columns of the terminal at stderr, or 80.

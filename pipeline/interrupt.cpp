@@ -14,9 +14,15 @@ void on_signal(int) {
   if (interrupted.exchange(true)) ::_exit(130);
 }
 
+thread_local const std::atomic<bool>* own_flag = nullptr;
+
 }  // namespace
 
+InterruptScope::InterruptScope(const std::atomic<bool>& flag) : outer_(own_flag) { own_flag = &flag; }
+InterruptScope::~InterruptScope() { own_flag = outer_; }
+
 const std::atomic<bool>& watch_for_interrupts() {
+  if (own_flag != nullptr) return *own_flag;
   struct sigaction action {};
   action.sa_handler = on_signal;
   action.sa_flags = SA_RESTART;

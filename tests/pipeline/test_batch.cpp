@@ -1,0 +1,297 @@
+// Many jobs in one queue: every one ends as it would alone, whatever happens to the others or to the batch.
+#include <gtest/gtest.h>
+#include <signal.h>
+#include <sys/file.h>
+#include <fcntl.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <cstdlib>
+#include <fstream>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <random>
+#include <set>
+#include <sstream>
+#include <thread>
+
+#include "pipeline/batch_list.h"
+#include "program.h"
+
+namespace lamina::test {
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::json;
+using Words = std::vector<std::string>;
+
+TEST(BatchList, WordsAreSplitAsAShellSplitsThem) {
+  const auto words = [](std::string_view line) { return *pipeline::split_words(line); };
+  EXPECT_EQ(words("jet a.stl --dpi 600"), (Words{"jet", "a.stl", "--dpi", "600"}));
+  EXPECT_EQ(words("  jet\t'my part.stl'  \"b\\\"c\" d\\ e '' # rest\r"), (Words{"jet", "my part.stl", "b\"c", "d e", ""}));
+  EXPECT_EQ(words("jet a#b 'c'\"d\"e"), (Words{"jet", "a#b", "cde"}));
+  EXPECT_EQ(words("# only a comment 'with a quote"), Words{});
+  EXPECT_EQ(words(""), Words{});
+  EXPECT_FALSE(pipeline::split_words("jet 'a.stl").ok());
+  EXPECT_FALSE(pipeline::split_words("jet \"a.stl").ok());
+}
+
+class JobsInBatch : public ::testing::Test {
+ protected:
+  Outcome lamina(const Words& arguments, const std::function<void(int)>& watch = {}) {
+    return run_lamina(arguments, directory_.path(), watch);
+  }
+
+  Json summary(const std::string& batch) { return Json::parse(read_text(directory_ / (batch + "/summary.json")), nullptr, false); }
+
+  std::vector<std::string> outcomes(const std::string& batch) {
+    std::vector<std::string> names;
+    const Json json = summary(batch);
+    for (const Json& job : json["jobs"]) names.push_back(job["outcome"]);
+    return names;
+  }
+
+  // What the jobs wrote: all but what the batch says of itself.
+  std::string tree(const std::string& batch) {
+    std::string text;
+    for (const auto& entry : fs::directory_iterator(directory_ / batch)) {
+      if (entry.is_directory()) trees_[entry.path().filename()] = tree_text(entry.path());
+    }
+    for (auto& [name, files] : trees_) text += name + "\n" + files;
+    trees_.clear();
+    return text;
+  }
+
+  void write_boxes(int count) {
+    for (int i = 0; i < count; ++i) {
+      const float side = static_cast<float>(4 + i);
+      write_box(directory_ / ("part" + std::to_string(10 + i) + ".stl"), {0, 0, 0}, {side, side, 2});
+    }
+  }
+
+  std::map<std::string, std::string> trees_;
+  Directory directory_;
+};
+
+const Words kSmall = {"--with", "jet --bed 60x60 --dpi 300 --layer 0.1", "--quiet"};
+
+Words batch_of(Words words, const Words& more = kSmall) {
+  words.insert(words.begin(), "batch");
+  words.insert(words.end(), more.begin(), more.end());
+  return words;
+}
+
+TEST_F(JobsInBatch, EveryFileOfTheCorpusEndsAsTheTableSaysAndAsItWouldAlone) {
+  const fs::path corpus = fs::path(LAMINA_TEST_DIR) / "corpus";
+  ASSERT_EQ(lamina(batch_of({corpus, "-o", "out"}, {"--with", "jet --bed 400x400 --dpi 60 --layer 1", "--quiet"})).code, 3);
+  std::map<std::string, std::string> expected;
+  std::ifstream table(corpus / "outcomes.tsv");
+  for (std::string line; std::getline(table, line);) {
+    std::istringstream cells(line);
+    std::string file, outcome, code;
+    cells >> file >> outcome >> code;
+    expected[file] = code;
+  }
+  const Json json = summary("out");
+  std::size_t done = 0;
+  for (const Json& job : json["jobs"]) {
+    const std::string file = fs::path(job["source"].get<std::string>()).lexically_relative(corpus);
+    ASSERT_TRUE(expected.contains(file)) << file;
+    EXPECT_EQ(std::to_string(job["code"].get<int>()), expected[file]) << file << ": " << job["reason"];
+    EXPECT_EQ(job["code"] == 0, job["reason"] == "") << file;
+    if (job["code"] != 0) continue;
+    EXPECT_GT(job["result"]["layers_planned"], 0);
+    if (done++ % 4 != 0) continue;
+    ASSERT_EQ(lamina({"jet", corpus / file, "--bed", "400x400", "--dpi", "60", "--layer", "1", "--quiet", "-o", "alone", "--overwrite"}).code, 0);
+    EXPECT_EQ(tree_text(directory_ / "alone"), tree_text(directory_ / ("out/" + job["output"].get<std::string>()))) << file;
+  }
+  EXPECT_EQ(json["done"], done);
+  EXPECT_EQ(json["jobs_total"], json["jobs"].size());
+  EXPECT_LT(json["peak_resident_bytes"], json["memory_budget_bytes"]);
+}
+
+TEST_F(JobsInBatch, ListsJobFilesAndDirectoriesMakeOneQueueInOrder) {
+  write_boxes(2);
+  fs::create_directories(directory_ / "more/deep");
+  write_box(directory_ / "more/deep/p.stl", {0, 0, 0}, {5, 5, 1});
+  write_box(directory_ / "more/p.STL", {0, 0, 0}, {5, 5, 1});
+  write_text(directory_ / "more/notes.txt", "no job");
+  write_text(directory_ / "job.toml", "[bed]\nsize_mm=[40,40]\ndpi=100\n[[part]]\npath='part10.stl'\n");
+  write_text(directory_ / "list.txt", "# comment\n\nlamina jet part10.stl --bed 40x40 --dpi 100 -o 'own place'\ninfo part11.stl\n"
+                                      "jet part10.stl --bed 40x40 --dpi 100\njet part10.stl --bed 40x40 --dpi 100 --dry-run\n");
+  const Outcome outcome = lamina(batch_of({"list.txt", "job.toml", "more", "part11.stl", "-o", "out"}));
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  const Json json = summary("out");
+  Words outputs;
+  for (const Json& job : json["jobs"]) outputs.push_back(job["output"]);
+  EXPECT_EQ(outputs, (Words{"own place", "", "part10", "", "job", "deep_p", "p", "part11"}));
+  EXPECT_EQ(json["jobs"][0]["source"], "list.txt:3");
+  EXPECT_TRUE(json["jobs"][1]["result"].is_object());
+  EXPECT_EQ(json["jobs"][3]["result"]["dry_run"], true);
+  for (const char* name : {"own place", "job", "deep_p"}) EXPECT_EQ(lamina({"verify", "out/" + std::string(name), "--quiet"}).code, 0) << name;
+  const std::string table = read_text(directory_ / "out/summary.tsv");
+  EXPECT_EQ(std::ranges::count(table, '\n'), 9);
+}
+
+TEST_F(JobsInBatch, WhatIsWrongWithOneJobIsOneLineAndTheRestIsUnharmed) {
+  write_boxes(1);
+  write_text(directory_ / "missing.toml", "[[part]]\npath='nowhere.stl'\n");
+  write_text(directory_ / "wrong.toml", "[bed]\ndpy=3\n");
+  write_text(directory_ / "file", "");
+  write_text(directory_ / "list.txt", "jet part10.stl --bed 60x60 --dpi 0 -o a\njott part10.stl\njet --job missing.toml -o b\n"
+                                      "jet --job wrong.toml\nbatch list.txt -o x\npreview out -o x.png\njet part10.stl --help\n"
+                                      "jet part10.stl --bed 60x60 --dpi 100 -o ../file/deeper\nverify nothing\n"
+                                      "jet part10.stl --bed 60x60 --dpi 100 -o good\n");
+  const Outcome outcome = lamina({"batch", "list.txt", "-o", "out"});
+  EXPECT_EQ(outcome.code, 2);
+  const Json json = summary("out");
+  const int codes[] = {2, 2, 3, 2, 2, 2, 2, 4, 2, 0};
+  for (std::size_t i = 0; i < 10; ++i) {
+    const std::string reason = json["jobs"][i]["reason"];
+    EXPECT_EQ(json["jobs"][i]["code"], codes[i]) << i << " " << reason;
+    EXPECT_EQ(reason.empty(), codes[i] == 0) << i;
+    EXPECT_NE(outcome.err.find(reason), std::string::npos) << reason;
+  }
+  EXPECT_EQ(lamina({"verify", "out/good"}).code, 0);
+}
+
+TEST_F(JobsInBatch, WrongBatchesAreRefusedInOneLineBeforeAnythingRuns) {
+  write_boxes(2);
+  fs::create_directories(directory_ / "empty");
+  write_text(directory_ / "empty.txt", "\n# nothing\n");
+  write_text(directory_ / "quote.txt", "jet 'part10.stl\n");
+  write_text(directory_ / "same.txt", "jet part10.stl -o a\njet part11.stl -o b/../a/\n");
+  write_text(directory_ / "nested.txt", "jet part10.stl -o a\njet part11.stl -o a-b\njet part11.stl -o a/layers/c\n");
+  write_text(directory_ / "own.txt", "jet part10.stl -o .\n");
+  const std::pair<Words, std::string> cases[] = {
+      {{"empty.txt"}, "no job in it"}, {{"empty"}, "no part"}, {{"quote.txt"}, "quote.txt:1: a ' is not closed"},
+      {{"same.txt"}, "same.txt:1 and same.txt:2: both write into"}, {{"nested.txt"}, "nested.txt:1 and nested.txt:3"},
+      {{"own.txt"}, "belongs to the batch"}, {{"gone.txt"}, "no such file"}, {{}, "no jobs"},
+      {{"part10.stl", "--memory", "x"}, "--memory"}, {{"part10.stl", "--jobs", "-1"}, "--jobs"},
+      {{"part10.stl", "--time-limit", "0"}, "--time-limit"}, {{"part10.stl", "--resume", "--overwrite"}, "exclude each other"},
+      {{"part10.stl", "--with", " "}, "--with"}};
+  for (auto [words, said] : cases) {
+    words.insert(words.end(), {"-o", "out"});
+    const Outcome outcome = lamina(batch_of(words, {}));
+    EXPECT_EQ(outcome.code, 2) << outcome.err;
+    EXPECT_EQ(outcome.error_lines(), 1u) << outcome.err;
+    EXPECT_NE(outcome.err.find(said), std::string::npos) << outcome.err;
+    EXPECT_FALSE(fs::exists(directory_ / "out"));
+  }
+  EXPECT_EQ(lamina(batch_of({"part10.stl"}, {})).code, 2);
+}
+
+TEST_F(JobsInBatch, KilledAtAnyMomentItIsResumedToTheSameBytesAndNothingIsDoneTwice) {
+  write_boxes(12);
+  const Words job = {"--with", "jet --bed 60x60 --dpi 600 --layer 0.01 --format png", "--jobs", "2", "--quiet"};
+  Words parts;
+  for (int i = 10; i < 22; ++i) parts.push_back("part" + std::to_string(i) + ".stl");
+  const auto batch = [&](const std::string& output, const Words& more) {
+    Words words = parts;
+    words.insert(words.end(), {"-o", output});
+    words.insert(words.end(), more.begin(), more.end());
+    return batch_of(words, job);
+  };
+  const auto start = std::chrono::steady_clock::now();
+  ASSERT_EQ(lamina(batch("whole", {})).code, 0);
+  const double whole = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+
+  std::mt19937 random(std::random_device{}());
+  std::map<std::string, int> times_ended;
+  std::size_t kept = 0;
+  int killed = 0;
+  for (int attempt = 0; attempt < 5; ++attempt) {
+    const auto delay = std::chrono::duration<double>(whole * std::uniform_real_distribution<>(0.02, 0.5)(random));
+    const Outcome outcome = lamina(batch("out", {"--resume"}), [&](int process) {
+      std::this_thread::sleep_for(delay);
+      ::kill(process, SIGKILL);
+    });
+    killed += outcome.code == 128 + SIGKILL;
+  }
+  ASSERT_EQ(lamina(batch("out", {"--resume"})).code, 0);
+  EXPECT_GE(killed, 1);
+  EXPECT_EQ(tree("out"), tree("whole"));
+  std::istringstream record(read_text(directory_ / "out/batch.jsonl"));
+  for (std::string line; std::getline(record, line);) {
+    const Json json = Json::parse(line, nullptr, false);
+    if (json.is_object() && json.contains("ended")) ++times_ended[json["output"]];
+  }
+  EXPECT_EQ(times_ended.size(), 12u);
+  for (const auto& [name, times] : times_ended) EXPECT_EQ(times, 1) << name;
+  for (const std::string& name : outcomes("out")) kept += name == "kept";
+  EXPECT_EQ(lamina(batch("out", {"--resume"})).code, 0);
+  EXPECT_EQ(outcomes("out"), Words(12, "kept"));
+}
+
+TEST_F(JobsInBatch, ResumeDoesAgainWhatHasChangedSince) {
+  write_boxes(4);
+  ASSERT_EQ(lamina(batch_of({"part10.stl", "part11.stl", "part12.stl", "part13.stl", "-o", "out"})).code, 0);
+  write_box(directory_ / "part11.stl", {0, 0, 0}, {9, 3, 1});        // another part
+  write_text(directory_ / "out/part12/layers/000003.tif", "damage");  // another layer
+  fs::remove(directory_ / "out/part13/layers/000000.tif");
+  const Outcome outcome = lamina(batch_of({"part10.stl", "part11.stl", "part12.stl", "part13.stl", "-o", "out", "--resume"}));
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  EXPECT_EQ(outcomes("out"), (Words{"kept", "done", "done", "done"}));
+  ASSERT_EQ(lamina(batch_of({"part10.stl", "part11.stl", "part12.stl", "part13.stl", "-o", "fresh"})).code, 0);
+  EXPECT_EQ(tree("out"), tree("fresh"));
+  EXPECT_EQ(lamina(batch_of({"part10.stl", "-o", "out"})).code, 2);  // an earlier batch
+  EXPECT_EQ(lamina(batch_of({"part10.stl", "-o", "out", "--overwrite"})).code, 0);
+}
+
+TEST_F(JobsInBatch, TwoBatchesInOneDirectoryAreRefused) {
+  write_boxes(1);
+  fs::create_directories(directory_ / "out");
+  const int file = ::open((directory_ / "out/batch.jsonl").c_str(), O_RDWR | O_CREAT, 0600);
+  ASSERT_EQ(::flock(file, LOCK_EX), 0);
+  const Outcome outcome = lamina(batch_of({"part10.stl", "-o", "out"}));
+  EXPECT_EQ(outcome.code, 4);
+  EXPECT_EQ(outcome.error_lines(), 1u);
+  EXPECT_NE(outcome.err.find("another batch is running"), std::string::npos) << outcome.err;
+  ::close(file);
+  EXPECT_EQ(lamina(batch_of({"part10.stl", "-o", "out"})).code, 0);
+}
+
+TEST_F(JobsInBatch, TimeLimitStopsOneJobAndFailFastAll) {
+  write_boxes(2);
+  write_text(directory_ / "list.txt", "jet part10.stl --bed 60x60 --dpi 100 -o a\n"
+                                      "jet part10.stl --bed 400x400 --dpi 1200 --layer 0.0002 --format tiff-none -o long\n"
+                                      "jet part11.stl --bed 60x60 --dpi 100 -o b\n");
+  EXPECT_EQ(lamina({"batch", "list.txt", "-o", "out", "--jobs", "1", "--time-limit", "0.5", "--quiet"}).code, 130);
+  EXPECT_EQ(outcomes("out"), (Words{"done", "time limit", "done"}));
+  EXPECT_NE(summary("out")["jobs"][1]["reason"].get<std::string>().find("time limit"), std::string::npos);
+  write_text(directory_ / "fast.txt", "jet part10.stl --bed 60x60 --dpi 100 -o a\njet nowhere.stl -o c\njet part11.stl -o d\n");
+  EXPECT_EQ(lamina({"batch", "fast.txt", "-o", "fast", "--jobs", "1", "--fail-fast", "--quiet"}).code, 3);
+  EXPECT_EQ(outcomes("fast"), (Words{"done", "failed", "not run"}));
+  EXPECT_FALSE(fs::exists(directory_ / "fast/d"));
+}
+
+TEST_F(JobsInBatch, JobsBeginOnlyWhenTheirNeedFitsAndALargerOneRunsAlone) {
+  write_boxes(6);
+  std::string list;
+  for (int i = 10; i < 16; ++i) {
+    list += "jet part" + std::to_string(i) + ".stl --bed 60x60 --dpi 300 --memory " + (i == 13 ? "500M" : "40M") + "\n";
+  }
+  write_text(directory_ / "list.txt", list);
+  ASSERT_EQ(lamina({"batch", "list.txt", "-o", "out", "--jobs", "6", "--memory", "120M", "--quiet"}).code, 0);
+  const Json json = summary("out");
+  EXPECT_LE(json["most_at_work"], 2);
+  EXPECT_GT(json["most_need_bytes"], 500ull << 20);
+  EXPECT_LT(json["most_need_bytes"], 530ull << 20);  // alone
+  EXPECT_LT(json["peak_resident_bytes"], 120ull << 20);
+}
+
+TEST_F(JobsInBatch, InterruptedItSaysHowToGoOn) {
+  write_boxes(1);
+  const Words words = batch_of({"part10.stl", "-o", "out", "--resume"},
+                               {"--with", "jet --bed 400x400 --dpi 1200 --layer 0.0002 --format tiff-none"});
+  const Outcome outcome = lamina(words, [&](int process) {
+    for (int i = 0; i < 2000 && !fs::exists(directory_ / "out/part10/layers/000000.tif"); ++i) std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    ::kill(process, SIGINT);
+  });
+  EXPECT_EQ(outcome.code, 130) << outcome.err;
+  EXPECT_NE(outcome.err.find("--resume"), std::string::npos) << outcome.err;
+  EXPECT_EQ(outcomes("out"), Words{"stopped"});
+}
+
+}  // namespace
+}  // namespace lamina::test
