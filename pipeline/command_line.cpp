@@ -20,6 +20,7 @@ constexpr Command kCommands[] = {
     {"info", "what is in a part file, is it closed, and where is it not", run_info_command},
     {"verify", "is a job's directory whole and true to its manifest", run_verify_command},
     {"merge", "join the shards of a job that was divided", run_merge_command},
+    {"machines", "the powder printers that lamina jet writes programs for, and what follows from a profile", run_machines_command},
     {"preview", "pictures of a job's layers for people", run_preview_command},
     {"batch", "many jobs in one queue, sharing processors and memory, with one summary", run_batch_command},
 };

@@ -72,6 +72,7 @@ int run_heights_command(const std::vector<std::string>& arguments);
 int run_info_command(const std::vector<std::string>& arguments);
 int run_verify_command(const std::vector<std::string>& arguments);
 int run_merge_command(const std::vector<std::string>& arguments);
+int run_machines_command(const std::vector<std::string>& arguments);
 int run_preview_command(const std::vector<std::string>& arguments);
 int run_batch_command(const std::vector<std::string>& arguments);
 

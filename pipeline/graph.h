@@ -29,7 +29,8 @@ namespace lamina::pipeline {
 struct LayerWork {
   raster::LayerScratch scratch;
   Runs runs;
-  Runs second;  // of the other engine, or mirrored
+  Runs second;  // of the other engine, or mirrored, or before its dose
+  Runs third;   // the core of a layer with a shell
   std::unique_ptr<write::ImageEncoder> encoder;
   write::Bytes file;
   ProgramWork program;

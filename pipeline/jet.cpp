@@ -9,6 +9,7 @@
 #include <chrono>
 #include <optional>
 
+#include "pipeline/dose_plan.h"
 #include "pipeline/graph.h"
 #include "pipeline/hash.h"
 #include "pipeline/heights_plan.h"
@@ -63,8 +64,13 @@ Error disagreement(const Layer& layer, const PixelGrid& grid, const RunsView& ra
 class LayerWorkshop {
  public:
   LayerWorkshop(const Job& job, const raster::Rasterizer& rasterizer, const write::ImageFormat& format,
-                const PrintProgram* program)
-      : job_(job), rasterizer_(rasterizer), format_(format), program_(program) {}
+                const PrintProgram* program, std::uint64_t covered_pixels)
+      : job_(job),
+        rasterizer_(rasterizer),
+        format_(format),
+        program_(program),
+        dose_(job, rasterizer.grid()),
+        covered_pixels_(covered_pixels) {}
 
   Status raster(LayerWork& work, LayerOutcome& outcome) {
     const StageTimer timer(sums.raster);
@@ -82,6 +88,7 @@ class LayerWorkshop {
       raster::mirror(work.runs, job_.mirror != Mirror::kY, job_.mirror != Mirror::kX, work.second);
       std::swap(work.runs, work.second);
     }
+    if (dose_.any()) dose_.apply(layer.index, work.runs, work.second, work.third);
     outcome.record.set_pixels = set_pixels(work.runs);
     outcome.record.capped_rows = outcome.report.capped_rows;
     return {};
@@ -112,9 +119,10 @@ class LayerWorkshop {
   /// Scratch, runs and file, at most; a mirrored or second image counts as another one.
   std::uint64_t bytes_of_layer(const Layer& layer) const {
     const std::uint64_t rows = rasterizer_.grid().rows();
-    const std::uint64_t crossings = rasterizer_.crossings_bound(layer.plane());
-    const bool second = job_.engine == Engine::kBoth || job_.mirror != Mirror::kNone;
-    const std::uint64_t second_image = second ? 8 * crossings + 4 * rows : 0;
+    const std::uint64_t crossings =
+        dose_.changes_bound(rasterizer_.crossings_bound(layer.plane()), covered_pixels_);
+    const bool second = job_.engine == Engine::kBoth || job_.mirror != Mirror::kNone || dose_.any();
+    const std::uint64_t second_image = (second ? 8 * crossings + 4 * rows : 0) * (dose_.any() ? 3 : 1);
     const std::uint64_t file = format_.most_bytes(rasterizer_.grid().columns(), rows, crossings);
     const std::uint64_t program = program_ == nullptr ? 0 : program_->bytes_bound(crossings);
     return rasterizer_.layer_bytes_bound(layer.plane()) + second_image + file + program;
@@ -127,6 +135,8 @@ class LayerWorkshop {
   const raster::Rasterizer& rasterizer_;
   const write::ImageFormat& format_;
   const PrintProgram* program_;  // or nullptr
+  DosePlan dose_;
+  std::uint64_t covered_pixels_;  // by the boxes of all parts, at most
 };
 
 /// One line about rows that only repair closes, or that stay open, and where the first of them is.
@@ -261,7 +271,14 @@ Result<JetSummary> run_jet(const Job& asked, const ProgressCallback& progress, c
 
   std::optional<PrintProgram> program;
   if (job.machine.resolved) program.emplace(job, table.size());
-  LayerWorkshop workshop(job, *rasterizer, *format, program ? &*program : nullptr);
+  double covered = 0;
+  for (const Instance& instance : scene->instances) {
+    const Box& box = scene->meshes[instance.mesh].bounds;
+    covered += (static_cast<double>(box.width()) * grid.x.pixels_per_nm() + 1) *
+               (static_cast<double>(box.depth()) * grid.y.pixels_per_nm() + 1);
+  }
+  LayerWorkshop workshop(job, *rasterizer, *format, program ? &*program : nullptr,
+                         static_cast<std::uint64_t>(std::min(covered, static_cast<double>(grid.columns()) * grid.rows())));
   if (job.dry_run) {
     for (std::uint32_t index = range->front(); index < range->back(); ++index) {
       summary.peak_layer_bytes = std::max(summary.peak_layer_bytes, workshop.bytes_of_layer(table[index]));

@@ -17,7 +17,8 @@ struct DialectReader {
   std::string_view id;
   void (*read)(std::string_view, Printing&);
 };
-constexpr DialectReader kReaders[] = {{"nuferbj", replay_nuferbj}};
+constexpr DialectReader kReaders[] = {{"nuferbj", replay_nuferbj}, {"raw", replay_raw}, {"planes", replay_planes},
+                                      {"hp45", replay_hp45}, {"brundlefab", replay_brundlefab}, {"m578", replay_m578}};
 
 }  // namespace
 
@@ -102,7 +103,11 @@ Printing::Printing(const VirtualMachine& machine, std::uint32_t layer, const Vir
 void Printing::fault(const std::string& what) const {
   std::string place = fmt::format("layer {}", layer_);
   if (sweeping_) place += fmt::format(", swath {}", sweep_);
-  if (stepped_) place += fmt::format(", step {}", step_);
+  if (reading_ != INT64_MIN) {
+    place += fmt::format(", step {}", reading_);
+  } else if (stepped_) {
+    place += fmt::format(", step {}", step_);
+  }
   throw place + ": " + what;
 }
 
@@ -151,6 +156,7 @@ std::int64_t Printing::step_at(double carriage_mm) const {
 }
 
 void Printing::at_step(std::int64_t step) {
+  reading_ = INT64_MIN;
   if (!sweeping_) fault("vectors before a swath");
   previous_step_ = step_;
   const bool moved = stepped_;
@@ -274,6 +280,7 @@ void Printing::compare(const RunsView& image, std::uint64_t moved, std::uint64_t
   }
   if (!first.empty()) throw first;
   sweeping_ = stepped_ = false;
+  reading_ = INT64_MIN;
   if (added != moved || missing != moved + lost) {
     fault(fmt::format("{} pixels are not fired and {} fired instead; the manifest says {} and {}", missing, added,
                       moved + lost, moved));

@@ -8,7 +8,7 @@ void GcodeReader::fault(const std::string& what) const {
   printing_.fault(fmt::format("line {}: {}", number_, what));
 }
 
-bool GcodeReader::next(GcodeLine& line) {
+bool GcodeReader::take(GcodeLine& line, bool all_words) {
   while (!left_.empty()) {
     const std::size_t end = left_.find('\n');
     if (end == std::string_view::npos) {
@@ -26,6 +26,7 @@ bool GcodeReader::next(GcodeLine& line) {
     line.rest = space == std::string_view::npos ? std::string_view() : now_.substr(space + 1);
     line.word.clear();
     if (line.command[0] != 'G' && line.command[0] != 'M' && line.command[0] != 'T') return true;
+    if (!all_words && line.command == "M117") return true;
     for (std::string_view rest = line.rest; !rest.empty();) {
       const std::size_t gap = std::min(rest.find(' '), rest.size());
       double value = 0;

@@ -24,12 +24,15 @@ class GcodeReader {
  public:
   GcodeReader(std::string_view text, Printing& printing) : left_(text), printing_(printing) {}
 
-  bool next(GcodeLine& line);
+  bool next(GcodeLine& line) { return take(line, true); }
+  /// The same, but words of M117, which is a text, are not read.
+  bool next_comment(GcodeLine& line) { return take(line, false); }
   double number(const GcodeLine& line, char letter) const;
   std::uint32_t count(const GcodeLine& line, char letter) const;
   [[noreturn]] void fault(const std::string& what) const;
 
  private:
+  bool take(GcodeLine& line, bool all_words);
   std::string_view left_, now_;
   Printing& printing_;
   std::size_t number_ = 0;

@@ -59,6 +59,7 @@ void replay_nuferbj(std::string_view text, Printing& printing) {
     } else if (line.command[0] == 'J') {
       if (!in_sweep) reader.fault("a vector outside of a swath");
       loaded.push_back(read_vector(line, reader, printing.nozzles()));
+      printing.reading_step(loaded.back().step);
     } else if (line.command[0] == 'R') {
       std::uint32_t repeats = 0;
       const std::string_view number = line.command.substr(1);

@@ -28,6 +28,8 @@ class Printing {
   /// Carriage position in mm of a step, and the step nearest to a position, which has to be near.
   double position_of(double step) const;
   std::int64_t step_at(double carriage_mm) const;
+  /// For messages: the step that a vector is of which is read and not fired yet.
+  void reading_step(std::int64_t step) { reading_ = step; }
   void at_step(std::int64_t step);
   void fire(std::uint32_t nozzle);
   /// All nozzles whose bits are set; bit 63 of the first word is nozzle 0.
@@ -56,6 +58,7 @@ class Printing {
   std::uint32_t layer_, row_words_;
   std::uint32_t sweep_ = 0;
   std::int64_t first_line_ = 0, step_ = 0, previous_step_ = 0;
+  std::int64_t reading_ = INT64_MIN;
   bool backward_ = false, sweeping_ = false, stepped_ = false, fired_here_ = false;
   std::vector<std::uint64_t> fired_;  // a bit a pixel, the leftmost in bit 0
   std::vector<Sweep> sweeps_;
@@ -63,5 +66,10 @@ class Printing {
 
 /// Reads the program of a layer in each dialect.
 void replay_nuferbj(std::string_view text, Printing& printing);
+void replay_raw(std::string_view text, Printing& printing);
+void replay_planes(std::string_view text, Printing& printing);
+void replay_hp45(std::string_view text, Printing& printing);
+void replay_brundlefab(std::string_view text, Printing& printing);
+void replay_m578(std::string_view text, Printing& printing);
 
 }  // namespace lamina::pipeline

@@ -1,0 +1,45 @@
+#include "stages/program/orientation_target.h"
+
+#include <array>
+#include <cstdint>
+#include <cstring>
+#include <vector>
+
+namespace lamina::program {
+namespace {
+
+using Corner = std::array<float, 3>;
+
+/// The twelve triangles of a box, counter-clockwise from outside.
+void add_box(const Corner& lo, const Corner& hi, std::vector<std::array<Corner, 3>>& triangles) {
+  const auto corner = [&](int x, int y, int z) -> Corner { return {x ? hi[0] : lo[0], y ? hi[1] : lo[1], z ? hi[2] : lo[2]}; };
+  const auto face = [&](const Corner& a, const Corner& b, const Corner& c, const Corner& d) {
+    triangles.push_back({a, b, c});
+    triangles.push_back({a, c, d});
+  };
+  face(corner(0, 0, 0), corner(0, 1, 0), corner(1, 1, 0), corner(1, 0, 0));
+  face(corner(0, 0, 1), corner(1, 0, 1), corner(1, 1, 1), corner(0, 1, 1));
+  face(corner(0, 0, 0), corner(1, 0, 0), corner(1, 0, 1), corner(0, 0, 1));
+  face(corner(0, 1, 0), corner(0, 1, 1), corner(1, 1, 1), corner(1, 1, 0));
+  face(corner(0, 0, 0), corner(0, 0, 1), corner(0, 1, 1), corner(0, 1, 0));
+  face(corner(1, 0, 0), corner(1, 1, 0), corner(1, 1, 1), corner(1, 0, 1));
+}
+
+}  // namespace
+
+Buffer<std::byte> orientation_target() {
+  std::vector<std::array<Corner, 3>> triangles;
+  add_box({0, 0, 0}, {6, 30, 2}, triangles);     // stem
+  add_box({5, 24, 0}, {20, 30, 2}, triangles);   // upper arm; boxes overlap, and what overlaps is united
+  add_box({5, 12, 0}, {14, 18, 2}, triangles);   // lower arm
+  add_box({0, 0, 1}, {6, 6, 3}, triangles);      // the step
+  Buffer<std::byte> file(84 + triangles.size() * 50);
+  std::memset(file.data(), 0, file.size());
+  std::memcpy(file.data(), "orientation target", 18);
+  const auto count = static_cast<std::uint32_t>(triangles.size());
+  std::memcpy(file.data() + 80, &count, 4);
+  for (std::size_t i = 0; i < triangles.size(); ++i) std::memcpy(file.data() + 84 + 50 * i + 12, triangles[i].data(), 36);
+  return file;
+}
+
+}  // namespace lamina::program
