@@ -7,11 +7,11 @@ namespace {
 using Form = KeyForm;
 using Text = std::string_view;
 
-constexpr Word<int> kFormats[] = {{"svg", 0}, {"cli", 1}, {"cli-binary", 2}, {"3mf", 3}};
+constexpr Word<int> kFormats[] = {{"svg", 0}, {"cli", 1}, {"cli-binary", 2}, {"3mf", 3}, {"null", 4}};
 
 // None of them decides the bytes of images, and the manifests of contours list them on their own.
 const JobKey kSliceKeys[] = {
-    {"slice", "format", "--format", "FORMAT", "svg, cli, cli-binary or 3mf", false,
+    {"slice", "format", "--format", "FORMAT", "svg, cli, cli-binary, 3mf, or null to write none", false,
      [](Text t, Job& j) {
        int ignored = 0;
        auto wrong = read_word(kFormats, t, ignored);

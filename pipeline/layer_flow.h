@@ -103,7 +103,7 @@ Status flow_layers(std::uint32_t count, const std::function<std::uint64_t(std::u
   flow::make_edge(in_order, record_node);
   admit();
   graph.wait_for_all();
-  if (result && next < count) return Error{Fault::kInterrupted, "interrupted; nothing was kept"};
+  if (result && next < count) return Error{Fault::kInterrupted, "interrupted; run it again"};
   return result;
 }
 

@@ -12,10 +12,12 @@
 #include "pipeline/command_line.h"
 #include "pipeline/console.h"
 #include "pipeline/manifest.h"
+#include "pipeline/slice_picture.h"
 #include "stages/write/atomic_file.h"
 #include "stages/write/picture/canvas.h"
 #include "stages/write/picture/contact_sheet.h"
 #include "stages/write/picture/drawing.h"
+#include "stages/write/picture/plan_view.h"
 
 namespace lamina::pipeline {
 namespace {
@@ -25,9 +27,11 @@ constexpr std::uint32_t kMostCells = 400;
 CommandSpec preview_spec() {
   CommandSpec spec;
   spec.name = "preview";
-  spec.summary = "Draws layers of a job as one picture (PNG), each pixel as dark as the share of its area that is set.";
+  spec.summary =
+      "Draws layers of a job as one picture (PNG), each pixel as dark as the share of its area that is set; or one layer of\n"
+      "a sliced job with its filling, bead widths true (PNG or SVG).";
   spec.operand = "DIR";
-  spec.operand_meaning = "directory that lamina jet wrote";
+  spec.operand_meaning = "directory that lamina jet or lamina slice wrote";
   spec.options = {{"-o,--output", "PNG", "the picture", "", ""},
                   {"--count", "N", "so many layers, spread over the height", "12", ""},
                   {"--every", "N", "every N-th layer, from the first", "", ""},
@@ -39,7 +43,8 @@ CommandSpec preview_spec() {
   spec.closing =
       "Examples:\n"
       "  lamina preview out -o sheet.png\n"
-      "  lamina preview out -o layer.png --layer 120 --whole-bed";
+      "  lamina preview out -o layer.png --layer 120 --whole-bed\n"
+      "  lamina preview sliced -o layer.svg --layer 12";
   return spec;
 }
 
@@ -116,6 +121,42 @@ std::string title_of(const ManifestHead& head) {
                              head.grid.x.dpi(), head.grid.y.dpi(), mm(head.grid.x.length), mm(head.grid.y.length));
 }
 
+/// One layer of what lamina slice wrote.
+int preview_slice(const std::string& directory, const std::string& output, const Arguments& arguments, std::uint32_t width) {
+  for (const std::string_view option : {"--count", "--every", "--whole-bed"}) {
+    if (arguments.has(option)) {
+      return fail({Fault::kUsage, fmt::format("{}: is for images; of a sliced job one layer is drawn, choose it by --layer K",
+                                              option)});
+    }
+  }
+  const auto layer = number(arguments, "--layer", 0, UINT32_MAX);
+  if (!layer) return fail(layer.error());
+  Result<LayerShapes> shapes = slice_shapes(directory, *layer);
+  if (!shapes) return fail(shapes.error());
+  Status status;
+  if (std::filesystem::path(output).extension() == ".svg") {
+    const std::string svg = shapes_svg(*shapes);
+    status = write::write_file(output, std::as_bytes(std::span(svg)));
+  } else {
+    write::picture::PlanView view;
+    view.title = shapes->title;
+    view.caption = shapes->caption;
+    view.box = shapes->box;
+    view.region = shapes->contours;
+    view.width = width;
+    constexpr write::picture::Colour kInks[] = {{176, 58, 46}, {214, 137, 16}, {36, 113, 163}, {17, 120, 100}, {142, 68, 173}};
+    for (LayerShapes::Beads& beads : shapes->beads) {
+      view.shapes.push_back({kInks[static_cast<std::size_t>(beads.kind)], beads.name, std::move(beads.outline)});
+    }
+    const auto picture = write::picture::plan_view(view);
+    if (!picture) return fail(picture.error());
+    status = write::write_file(output, *picture);
+  }
+  if (!status) return fail(status.error());
+  if (!arguments.has("--quiet")) say(fmt::format("{}: {}", output, shapes->title));
+  return 0;
+}
+
 // A plot that another command wrote down as boxes and lines of text.
 int run_drawing(const std::string& path, const std::string& output) {
   std::ifstream file(path, std::ios::binary);
@@ -141,7 +182,13 @@ int run_preview(const std::vector<std::string>& texts) {
   if (arguments->operands.size() != 1) return fail({Fault::kUsage, "name one directory that lamina jet wrote"});
   const std::string directory = arguments->operands.front(), output = arguments->text("-o,--output");
   if (output.empty()) return fail({Fault::kUsage, "-o PNG is missing; name the picture"});
-  if (std::filesystem::path(output).extension() != ".png") {
+  const auto width_of_slice = number(*arguments, "--width", 200, 20'000);
+  if (!width_of_slice) return fail(width_of_slice.error());
+  const std::string extension = std::filesystem::path(output).extension();
+  if (is_slice_directory(directory) && (extension == ".png" || extension == ".svg")) {
+    return preview_slice(directory, output, *arguments, (*width_of_slice).value_or(2400));
+  }
+  if (extension != ".png") {
     return fail({Fault::kUsage, fmt::format("-o {}: pictures are PNG; end the name with .png", output)});
   }
   const auto width = number(*arguments, "--width", 200, 20'000);

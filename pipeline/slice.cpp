@@ -159,7 +159,9 @@ Result<SliceSummary> run_slice(const Job& job, const ProgressCallback& progress,
   for (const Instance& instance : plan->scene().instances) {
     summary.triangles += plan->scene().meshes[instance.mesh].triangles.size();
   }
-  summary.output = job.slice.file_a_layer ? job.output + "/layers" : job.output + "/" + file_of(job);
+  summary.output = job.slice.format == "null" ? job.output
+                   : job.slice.file_a_layer   ? job.output + "/layers"
+                                              : job.output + "/" + file_of(job);
   if (job.dry_run) {
     for (std::uint32_t i = first; i < last; ++i) {
       summary.peak_layer_bytes = std::max(summary.peak_layer_bytes, plan->bytes_bound(i));
@@ -184,7 +186,7 @@ Result<SliceSummary> run_slice(const Job& job, const ProgressCallback& progress,
     auto made = write::Slice3mfWriter::make(head);
     if (!made) return made.error();
     package.emplace(std::move(*made));
-  } else {
+  } else if (job.slice.format != "null") {
     encoder = job.slice.format == "svg" ? write::make_svg_encoder()
                                         : write::make_cli_encoder(job.slice.format == "cli-binary", format_options);
   }
@@ -202,7 +204,7 @@ Result<SliceSummary> run_slice(const Job& job, const ProgressCallback& progress,
       fmt::format("{{\n  \"lamina\": {},\n  \"kind\": \"slice\",\n  \"job\": {},\n  \"format\": {},\n  \"file\": {},\n"
                   "  \"layer_count\": {},\n  \"first_layer\": {},\n  \"last_layer\": {},\n  \"layers\": [",
                   json_string(version()), json_string(job_of_manifest(job)), json_string(job.slice.format),
-                  job.slice.file_a_layer ? "null" : json_string(file_of(job)), summary.layers_total, first, last));
+                  job.slice.file_a_layer || job.slice.format == "null" ? "null" : json_string(file_of(job)), summary.layers_total, first, last));
   if (!manifest) return manifest.error();
 
   // --- layers
@@ -239,7 +241,7 @@ Result<SliceSummary> run_slice(const Job& job, const ProgressCallback& progress,
     std::string where;
     if (package) {
       if (Status status = package->add(view_of(first + i, work)); !status) return status;
-    } else {
+    } else if (encoder) {
       where = fmt::format(",\"offset\":{},\"bytes\":{},\"xxh3_128\":\"{}\"", file ? file->size() : 0, work.text.size(),
                           hex(hash_bytes(std::as_bytes(std::span(work.text)))));
       summary.bytes_written += work.text.size();
@@ -287,6 +289,15 @@ Result<SliceSummary> run_slice(const Job& job, const ProgressCallback& progress,
     if (Status status = package->finish(summary.output); !status) return status.error();
     std::error_code ignored;
     summary.bytes_written = fs::file_size(summary.output, ignored);
+  }
+  // For lamina preview, which plans a layer again: the job without what leaves the bytes alone. Parts whose names a job
+  // file cannot hold are sliced all the same.
+  Job kept = job;
+  kept.threads = 0;
+  kept.memory_bytes = Job().memory_bytes;
+  kept.output.clear();
+  if (Status status = save_job(job.output + "/job.toml", kept); !status && status.error().fault == Fault::kOutput) {
+    return status.error();
   }
   if (Status status = manifest->finish(); !status) return status.error();
   summary.layers = last - first;

@@ -116,4 +116,20 @@ Result<Contours> clip_lines(const ContoursView& lines, const ContoursView& regio
   return out;
 }
 
+Result<Contours> cover_lines(const ContoursView& lines, Nm width) {
+  Contours out;
+  if (lines.size() == 0) return out;
+  try {
+    const Moved moved = to_clipper(lines, middle_of(lines));
+    clip::ClipperOffset offsetter(2.0, kArcTolerance);
+    offsetter.AddPaths(moved.paths, clip::jtRound, clip::etOpenRound);
+    clip::PolyTree tree;
+    offsetter.Execute(tree, static_cast<double>(width) / 2);
+    append_tree(tree, moved.by, out);
+  } catch (const std::exception& exception) {
+    return refusal(exception.what());
+  }
+  return out;
+}
+
 }  // namespace lamina

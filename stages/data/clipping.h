@@ -32,4 +32,10 @@ Result<Contours> offset_contours(const ContoursView& contours, std::int64_t dist
 /// errors  kInternal if Clipper refuses them
 Result<Contours> clip_lines(const ContoursView& lines, const ContoursView& region);
 
+/// The area that beads along open lines cover, round at their ends and turns to within a micrometre; for pictures and
+/// for the contours of beads.
+/// width   nm of the bead
+/// errors  kInternal if Clipper refuses them
+Result<Contours> cover_lines(const ContoursView& lines, Nm width);
+
 }  // namespace lamina

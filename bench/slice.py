@@ -1,0 +1,209 @@
+#!/usr/bin/env python3
+"""bench/slice.py: contours, whole programs and stages, against Debian's Slic3r 1.3 and admesh. scripts/bench slice
+
+    scripts/bench slice [--runs N] [--models DIR] [--cache DIR]
+
+Whole programs run in turn on the same binary STL: Slic3r's --export-svg and lamina slice to SVG; admesh's load and check,
+and lamina slice on one thread with nothing written but its manifest. Before a figure is kept, the answers are compared:
+the number of layers, and the area of all contours of every layer. Stages are timed by lamina_bench (bench/slice.cpp),
+which checks its own answers. Writes bench/results/slice.json and bench/slice.md.
+"""
+import argparse
+import json
+import os
+import re
+import shutil
+import statistics
+import subprocess
+import sys
+import time
+
+ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
+sys.path.insert(0, os.path.join(ROOT, "bench"))
+import report  # noqa: E402
+
+LAYER = 0.1
+# part, how many times as fast as Slic3r we mean to be
+CASES = {"terrain": ("terrain.stl", 40), "benchy": ("benchy15.stl", 20)}
+ADMESH_SHARE = 1 / 3
+SEGMENTS = {"cut": 20e6, "cut+chain": 10e6}
+
+
+def say(text):
+    print(text, file=sys.stderr, flush=True)
+
+
+def measured(command, log):
+    """Wall and processor seconds, peak resident MiB of a whole process."""
+    with open(log, "wb") as output:
+        start = time.perf_counter()
+        code = subprocess.call(["/usr/bin/time", "-q", "-o", log + ".time", "-f", "%U %S %M"] + command,
+                               stdin=subprocess.DEVNULL, stdout=output, stderr=subprocess.STDOUT,
+                               env=dict(os.environ, LC_ALL="C"))
+        wall = time.perf_counter() - start
+    if code != 0:
+        sys.exit(f"bench: exit code {code} of: {' '.join(command)}\n" + open(log, errors="replace").read()[-2000:])
+    with open(log + ".time", encoding="ascii") as file:
+        user, system, peak = file.read().split()[-3:]
+    return {"wall": wall, "processor": float(user) + float(system), "peak_mib": int(peak) / 1024}
+
+
+def median_of(runs):
+    return {key: statistics.median(run[key] for run in runs) for key in runs[0]} | {
+        "runs": len(runs), "fastest": min(run["wall"] for run in runs), "slowest": max(run["wall"] for run in runs)}
+
+
+def area_of(numbers):
+    """Of a polygon x0 y0 x1 y1 ..., signed."""
+    points = list(zip(numbers[0::2], numbers[1::2]))
+    return sum(ax * by - bx * ay for (ax, ay), (bx, by) in zip(points, points[1:] + points[:1])) / 2
+
+
+def slic3r_areas(path):
+    """mm2 of each layer of Slic3r's SVG: its contours less its holes."""
+    areas = []
+    with open(path, encoding="utf-8") as file:
+        for line in file:
+            if "<g id=" in line:
+                areas.append(0.0)
+            found = re.search(r'slic3r:type="(\w+)" points="([^"]*)"', line)
+            if found:
+                area = abs(area_of([float(number) for number in found[2].replace(",", " ").split()]))
+                areas[-1] += area if found[1] == "contour" else -area
+    return areas
+
+
+def own_areas(path):
+    areas = []
+    with open(path, encoding="utf-8") as file:
+        for line in file:
+            if "<g id=" in line:
+                areas.append(0.0)
+            found = re.search(r'<path d="([^"]*)" style="fill: white', line)
+            if found:
+                areas[-1] += sum(area_of([float(number) for number in contour.split()[1:]])
+                                 for contour in found[1].split("z") if contour.strip())
+    return [abs(area) for area in areas]
+
+
+def compare(case, slic3r_svg, own_svg):
+    theirs, ours = slic3r_areas(slic3r_svg), own_areas(own_svg)
+    if abs(len(theirs) - len(ours)) > 1:
+        sys.exit(f"bench: {case}: Slic3r has {len(theirs)} layers, ours {len(ours)}")
+    total = sum(ours)
+    different = sum(abs(a - b) for a, b in zip(theirs, ours)) / total
+    say(f"  {len(ours)} layers, Slic3r {len(theirs)}; areas differ by {100 * different:.4f} % of {total:.0f} mm2")
+    if different > 0.01:
+        sys.exit(f"bench: {case}: the areas are not Slic3r's")
+    return {"layers": len(ours), "slic3r_layers": len(theirs), "area_difference": different}
+
+
+def run_case(case, options, lamina, parts, work):
+    part, target = CASES[case]
+    path = os.path.join(parts, part)
+    say(f"bench: {case}: {part}, layers of {LAYER} mm")
+    with open(path, "rb") as file:  # into the page cache, for all
+        while file.read(1 << 22):
+            pass
+    out, svg = os.path.join(work, case), os.path.join(work, case + ".svg")
+    runs = {"slic3r": [], "svg": [], "admesh": [], "null": []}
+    commands = {
+        "slic3r": ["slic3r", "--export-svg", "--layer-height", str(LAYER), "--first-layer-height", str(LAYER), "-o", svg, path],
+        "svg": [lamina, "slice", path, "--layer", str(LAYER), "--json", "--quiet", "-o", out],
+        "admesh": ["admesh", path],
+        "null": [lamina, "slice", path, "--layer", str(LAYER), "--format", "null", "--threads", "1", "--json", "--quiet",
+                 "-o", out + "-null"]}
+    answers = None
+    for turn in range(options.runs):
+        for name in ("slic3r", "svg", "svg", "svg", "admesh", "null", "null", "null"):
+            shutil.rmtree(out if name == "svg" else out + "-null", ignore_errors=True)
+            runs[name].append(measured(commands[name], os.path.join(work, name + ".log")))
+        say("  " + "  ".join(f"{name} {runs[name][-1]['wall']:.3f} s" for name in runs))
+        if turn == 0:
+            answers = compare(case, svg, os.path.join(out, os.path.splitext(part)[0] + ".svg"))
+    with open(os.path.join(work, "svg.log"), encoding="utf-8", errors="replace") as file:
+        text = file.read()
+    return {"part": part, "target": target, "layer_mm": LAYER, "answers": answers,
+            "summary": json.loads(text[text.index("{"):]), **{name: median_of(of) for name, of in runs.items()}}
+
+
+def stages(program, options):
+    output = subprocess.run([program, "--benchmark_filter=^slice/(terrain_gz|benchy_3mf|gyroid_gz)/", "--benchmark_format=json",
+                             "--benchmark_repetitions=3"], check=True, stdout=subprocess.PIPE,
+                            env=dict(os.environ, LAMINA_MODELS=options.models)).stdout
+    return {entry["run_name"].removeprefix("slice/"): {key: entry[key] for key in ("cpu_time", "segments", "segments/s", "triangles/s")
+                                                       if key in entry}
+            for entry in json.loads(output)["benchmarks"] if entry.get("aggregate_name") == "median"}
+
+
+def page(result):
+    machine = result["machine"]
+    lines = ["# Contours, measured", "",
+             "Written by `scripts/bench slice` from `bench/results/slice.json`; do not edit.", "",
+             f"{result['date']}, commit {result['commit']}: {machine['cores']} cores of {machine['processor']}, "
+             f"{machine['memory_gib']} GiB, {machine['system']}, g++ {machine['compiler']}. Other programs were running; wall "
+             "seconds move with them, processor seconds less.", "",
+             "## Whole programs", "",
+             "Binary STL on disk to files on disk, medians. Slic3r 1.3 `--export-svg` against `lamina slice` to SVG, both with all "
+             "cores; admesh's load and check against `lamina slice --format null --threads 1`, which loads, checks, indexes, cuts, "
+             "chains, unites and nests every layer and writes none.", "",
+             "| part | triangles | layers | Slic3r, s (cpu) | lamina, s (cpu) | times as fast, wall (cpu) | meant | areas differ by |",
+             "|---|---|---|---|---|---|---|---|"]
+    for case in result["cases"].values():
+        theirs, ours = case["slic3r"], case["svg"]
+        lines.append(f"| {case['part']} | {case['summary']['triangles']:,} | {case['answers']['layers']} | {theirs['wall']:.2f} "
+                     f"({theirs['processor']:.2f}) | {ours['wall']:.3f} ({ours['processor']:.3f}) | "
+                     f"**{theirs['wall'] / ours['wall']:.0f}** ({theirs['processor'] / ours['processor']:.0f}) | {case['target']} | "
+                     f"{100 * case['answers']['area_difference']:.4f} % |")
+    lines += ["", "| part | admesh, s (cpu) | lamina on one core, nothing written, s (cpu) | share of admesh's, wall (cpu) | meant |",
+              "|---|---|---|---|---|"]
+    for case in result["cases"].values():
+        theirs, ours = case["admesh"], case["null"]
+        lines.append(f"| {case['part']} | {theirs['wall']:.3f} ({theirs['processor']:.3f}) | {ours['wall']:.3f} ({ours['processor']:.3f}) | "
+                     f"{ours['wall'] / theirs['wall']:.2f} ({ours['processor'] / theirs['processor']:.2f}) | {ADMESH_SHARE:.2f} |")
+    lines += ["", "Peak memory: " + "; ".join(f"{case['part']}: Slic3r {case['slic3r']['peak_mib']:.0f} MiB, lamina "
+                                              f"{case['svg']['peak_mib']:.0f} MiB" for case in result["cases"].values()) + ".", "",
+              "## Stages, one core", "",
+              "Layers of 0.1 mm. *cut*: find the facets of each plane and their crossings; *cut+chain*: and assemble them to closed "
+              "chains; *contours*: and drop straight points, find contacts, unite and nest.", "",
+              "| part | stage | ms | million segments a second | meant |", "|---|---|---|---|---|"]
+    for name, entry in result["stages"].items():
+        part, stage = name.split("/")
+        rate = entry.get("segments/s")
+        lines.append(f"| {part} | {stage} | {entry['cpu_time']:.1f} | " +
+                     (f"{rate / 1e6:.1f} | " if rate else f"({entry['triangles/s'] / 1e6:.1f} million triangles a second) | ") +
+                     (f"{SEGMENTS[stage] / 1e6:.0f} |" if stage in SEGMENTS else "|"))
+    lines += ["", "For scale, by their authors: Minetto et al. 2017 assemble 2.2 to 2.6 million segments a second, da Silva et al. 2025 "
+              "slice and assemble 6 to 12 (other machines).", ""]
+    with open(os.path.join(ROOT, "bench", "slice.md"), "w", encoding="utf-8") as file:
+        file.write("\n".join(lines))
+
+
+def main(arguments):
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--runs", type=int, default=3, help="turns: Slic3r once, ours three times, admesh once, ours three times")
+    parser.add_argument("--case", action="append", choices=sorted(CASES))
+    parser.add_argument("--models", default=os.environ.get("LAMINA_MODELS", os.path.join(ROOT, "../shared/models")))
+    parser.add_argument("--cache", default=os.path.join(ROOT, "build/bench"))
+    parser.add_argument("--programs", help="folder of lamina and lamina_bench; else build/release, built first")
+    options = parser.parse_args(arguments)
+    programs = options.programs or os.path.join(ROOT, "build/release")
+    if not options.programs:
+        subprocess.run([os.path.join(ROOT, "scripts/packages"), "--bench"], check=True)
+        subprocess.run(["cmake", "--preset", "release"], cwd=ROOT, check=True, stdout=subprocess.DEVNULL)
+        subprocess.run(["cmake", "--build", "--preset", "release", "--target", "lamina", "lamina_bench"], cwd=ROOT, check=True)
+    cache = os.path.abspath(options.cache)
+    parts, work = os.path.join(cache, "parts"), os.path.join(cache, "work-slice")
+    os.makedirs(work, exist_ok=True)
+    subprocess.run([sys.executable, os.path.join(ROOT, "bench/make_parts.py"), options.models, parts], check=True)
+    result = {"date": time.strftime("%Y-%m-%d"), "commit": report.commit(ROOT), "machine": report.machine(cache), "cases": {}}
+    for case in options.case or CASES:
+        result["cases"][case] = run_case(case, options, os.path.join(programs, "lamina"), parts, work)
+    result["stages"] = stages(os.path.join(programs, "lamina_bench"), options)
+    shutil.rmtree(work)
+    report.save(ROOT, "slice", result)
+    page(result)
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])
