@@ -5,7 +5,8 @@
 Every table, the peers' too, is measured by the same code (`lamina heights --measure`): the highest step that any sloped
 facet gets, the mean step over the surface, flats of at least 5 mm2 that no layer ends on, and where the last layer ends.
 Each peer is asked for layers of 0.05 to 0.3 mm; then ours are asked for the step that the peer left. Only Python's standard
-library. CuraEngine's settings are defined in Debian's package `cura`, which is downloaded and unpacked, not installed.
+library. CuraEngine's settings are defined in Debian's package `cura`, which is downloaded and unpacked, not installed. The peers' layers are kept in the cache;
+remove it to have them sliced again.
 """
 import argparse
 import glob
@@ -13,7 +14,6 @@ import json
 import math
 import os
 import re
-import statistics
 import subprocess
 import sys
 
@@ -66,7 +66,7 @@ def write_part(name, models, folder):
     if os.path.exists(path):
         return path
     if PARTS[name] is None:
-        axes = sphere(20, 256, 512)
+        axes = sphere(20, 128, 256)
     else:
         source = os.path.join(models, PARTS[name])
         axes = make_parts.read_3mf(source) if source.endswith(".3mf") else make_parts.read_stl(source)
@@ -93,11 +93,11 @@ def tops_of(gcode, comment):
     return sorted(set(round(top, 6) for top in tops))
 
 
-def slic3r(part, folder):
+def slic3r(part, folder, first):
     settings = os.path.join(folder, "slic3r.ini")
     with open(settings, "w", encoding="ascii") as file:
         file.write(f"adaptive_slicing = 1\nadaptive_slicing_quality = 75%\nmatch_horizontal_surfaces = 1\nlayer_height = {MOST}\n"
-                   f"first_layer_height = {MOST}\nmin_layer_height = {LEAST}\nmax_layer_height = {MOST}\nnozzle_diameter = 0.4\n"
+                   f"first_layer_height = {first}\nmin_layer_height = {LEAST}\nmax_layer_height = {MOST}\nnozzle_diameter = 0.4\n"
                    "fill_density = 0\nperimeters = 1\ntop_solid_layers = 0\nbottom_solid_layers = 0\nskirts = 0\n"
                    "use_relative_e_distances = 1\nretract_length = 0\nbed_shape = 0x0,400x0,400x400,0x400\n"
                    "print_center = 200,200\n")
@@ -120,10 +120,10 @@ def cura_definitions(cache):
     return found
 
 
-def cura(part, folder, definitions):
+def cura(part, folder, first, definitions):
     out = os.path.join(folder, "cura.gcode")
     middle, variation = (LEAST + MOST) / 2, (MOST - LEAST) / 2
-    settings = {"adaptive_layer_height_enabled": "true", "layer_height": middle, "layer_height_0": MOST,
+    settings = {"adaptive_layer_height_enabled": "true", "layer_height": middle, "layer_height_0": first,
                 "adaptive_layer_height_variation": variation, "adaptive_layer_height_variation_step": 0.01,
                 "adaptive_layer_height_threshold": 0.2, "infill_line_distance": 0, "top_layers": 0, "bottom_layers": 0,
                 "wall_line_count": 1, "adhesion_type": "none", "machine_width": 400, "machine_depth": 400, "machine_height": 400,
@@ -149,11 +149,8 @@ class Ours:
     def table(self, part, way, cusp, *options):
         return self.tables(part, "--heights", way, "--thickness", f"{LEAST}..{MOST}", "--cusp", f"{cusp:.6f}", *options)[0]
 
-    def measure(self, part, tops, folder, name):
-        path = os.path.join(folder, name + ".tops")
-        with open(path, "w", encoding="ascii") as file:
-            file.write("".join(f"{top:.6f}\n" for top in tops))
-        return self.tables(part, "--layer", str(MOST), "--measure", path)[0]
+    def measure(self, part, tops):
+        return self.tables(part, "--layer", str(MOST), "--measure", tops)[0]
 
 
 def row(name, table, than=None):
@@ -167,28 +164,35 @@ def part_section(name, part, ours, folder, definitions):
     say(f"bench: {name}")
     lines = [f"## {name}", "", "| table | layers | fewer than the peer | largest step, mm | mean step, mm | flats missed | "
              "by up to, um | top off by, um |", "|---|---|---|---|---|---|---|---|"]
-    for peer, tops in (("Slic3r", slic3r(part, folder)), ("CuraEngine", cura(part, folder, definitions))):
-        theirs = ours.measure(part, tops, folder, peer.lower())
+    for peer, slicer, first in (("Slic3r", slic3r, MOST), ("Slic3r", slic3r, LEAST), ("CuraEngine", cura, MOST),
+                                ("CuraEngine", cura, LEAST)):
+        tops = os.path.join(folder, f"{os.path.basename(part)[:-4]}-{peer}-{first}.tops")
+        if not os.path.exists(tops):
+            heights = slicer(part, folder, first, *([definitions] if slicer is cura else []))
+            with open(tops + ".part", "w", encoding="ascii") as file:
+                file.write("".join(f"{height:.6f}\n" for height in heights))
+            os.replace(tops + ".part", tops)
+        theirs = ours.measure(part, tops)
         cusp = theirs["largest_cusp_mm"]
-        lines.append(row(f"**{peer}**", theirs))
+        lines.append(row(f"**{peer}**, first layer {first}", theirs))
         best = ours.table(part, "optimal", cusp)
         lines.append(row(f"`optimal`, step {cusp:.4f}", best, theirs))
         for way in ("cusp", "stepwise"):
             lines.append(row(f"`{way}`, step {cusp:.4f}", ours.table(part, way, cusp), theirs))
-        say(f"  {peer} {theirs['layers']}, step {cusp:.4f}; optimal {best['layers']}")
+        say(f"  {peer} {theirs['layers']}, first layer {first}, step {cusp:.4f}; optimal {best['layers']}")
     for table in ours.tables(part, "--thickness", f"{LEAST}..{MOST}", "--cusp", "0.1", "--compare"):
         lines.append(row(f"`{table['name']}`, step 0.1", table))
     return lines + [""]
 
 
-def times(ours, part, *options, turns=5):
-    """Medians of the wall seconds that a run tells: load, surface, layers."""
+def times(ours, part, *options, turns=7):
+    """The least wall seconds that runs tell: load, surface, layers."""
     found = []
     for _ in range(turns):
         done = subprocess.run([ours.program, "heights", part, "--format", "csv", "-o", os.devnull, *options], check=True,
                               stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
         found.append([float(value) for value in re.findall(r"([0-9.]+) s", done.stderr.decode().split("time")[-1])[:3]])
-    return [statistics.median(column) for column in zip(*found)]
+    return [min(column) for column in zip(*found)]
 
 
 def tall_part(folder, height, facets):
@@ -216,7 +220,7 @@ def tall_part(folder, height, facets):
 
 
 def time_section(ours, models, folder):
-    lines = ["## Time", "", "Wall milliseconds, medians of 5 runs: reading the file (repair of the open column included), the pass "
+    lines = ["## Time", "", "Wall milliseconds, the least of 7 runs (the machine had other work): reading the file (repair of the open column included), the pass "
              "over all facets, deciding the layers.", "",
              "| part | triangles | way | read | surface | layers |", "|---|---|---|---|---|---|"]
     terrain = os.path.join(folder, "terrain.stl")
@@ -257,14 +261,15 @@ def main(arguments):
              f"{report.machine(options.cache)}. Commit {report.commit(ROOT)}.", "",
              f"Layers of {LEAST} to {MOST} mm in steps of 0.001. Peers: Debian's Slic3r 1.3 with adaptive slicing at its quality of "
              "75 % and horizontal surfaces matched, CuraEngine 4.13 with adaptive layers around 0.175 mm, variation 0.125 mm, "
-             "steps of 0.01 mm, threshold 0.2 mm. Every table is measured by the same code. A step is thickness times |n_z| of a "
+             "steps of 0.01 mm, threshold 0.2 mm; both once with a first layer of 0.3 mm, as by default, whose step may be the highest of "
+             "all, and once with one of 0.05 mm, so that their own choice decides. Every table is measured by the same code. A step is thickness times |n_z| of a "
              f"sloped facet; flats are horizontal faces of at least {FLAT_MM2} mm2, and the top; a flat is missed if no layer ends "
              "within 1 um of it.", ""]
     for name in options.part or PARTS:
         lines += part_section(name, write_part(name, options.models, folder), ours, folder, definitions)
-    if not options.part:
-        lines += time_section(ours, options.models, folder)
-        with open(os.path.join(ROOT, "bench/heights.md"), "w", encoding="utf-8") as file:
-            file.write("\n".join(lines))
-    else:
+    if options.part:
         print("\n".join(lines))
+        return
+    lines += time_section(ours, options.models, folder)
+    with open(os.path.join(ROOT, "bench/heights.md"), "w", encoding="utf-8") as file:
+        file.write("\n".join(lines))

@@ -59,7 +59,8 @@ Result<Job> job_of(const Arguments& arguments) {
   read->bed_mm = {kMostMm, kMostMm};
   read->dry_run = true;
   // Comparing and measuring need no way of their own.
-  if ((arguments.has("--compare") || arguments.has("--measure")) && read->heights.mode == heights::Mode::kUniform &&
+  const bool own_way = arguments.has("--compare") || arguments.has("--measure") || read->heights.per_part;
+  if (own_way && read->heights.mode == heights::Mode::kUniform &&
       !read->heights.thickness_mm.empty()) {
     read->heights.mode = heights::Mode::kOptimal;
   }
@@ -95,8 +96,9 @@ int run_heights_command(const std::vector<std::string>& texts) {
   if (!scene) return fail(scene.error());
 
   std::vector<HeightsStudy> studies;
-  if (arguments->has("--compare")) {
-    Result<std::vector<HeightsStudy>> all = study_all_ways(*job, *scene);
+  if (arguments->has("--compare") || job->heights.per_part) {
+    Result<std::vector<HeightsStudy>> all =
+        arguments->has("--compare") ? study_all_ways(*job, *scene) : study_per_part(*job, *scene);
     if (!all) return fail(all.error());
     studies = std::move(*all);
   } else if (!arguments->has("--measure")) {
@@ -113,7 +115,7 @@ int run_heights_command(const std::vector<std::string>& texts) {
   const HeightsStudy& last = studies.back();
   std::string text;
   if (form == Form::kJson) text = heights_json(*job, *scene, studies);
-  else if (form == Form::kCsv) text = heights_csv(*scene, last);
+  else if (form == Form::kCsv) text = heights_csv(*scene, studies);
   else if (form == Form::kRp3) text = heights_rp3(*job, last);
   else text = studies.size() > 1 ? comparison_page(studies) : heights_page(*job, *scene, last);
   if (Status status = tell(output, text); !status) return fail(status.error());

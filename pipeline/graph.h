@@ -31,6 +31,7 @@ struct LayerWork {
   Runs runs;
   Runs second;  // of the other engine, or mirrored, or before its dose
   Runs third;   // the core of a layer with a shell
+  Runs lowest, highest;  // sections at both ends of the layer, where steps have to lie inside or outside
   std::unique_ptr<write::ImageEncoder> encoder;
   write::Bytes file;
   ProgramWork program;

@@ -4,9 +4,11 @@
 
 #include <chrono>
 #include <fstream>
+#include <utility>
 
 #include "pipeline/heights_plan.h"
 #include "pipeline/number_text.h"
+#include "stages/heights/per_part.h"
 
 namespace lamina::pipeline {
 namespace {
@@ -106,6 +108,34 @@ Result<std::vector<HeightsStudy>> study_all_ways(const Job& job, const Scene& sc
   }
   for (const Mode mode : {Mode::kAngle, Mode::kStepwise, Mode::kCusp, Mode::kOptimal}) {
     if (Status status = add(mode, asked->set); !status) return status.error();
+  }
+  return studies;
+}
+
+Result<std::vector<HeightsStudy>> study_per_part(const Job& job, const Scene& scene) {
+  Result<heights::Options> options = heights_options(job);
+  if (!options) return options.error();
+  options->mode = heights::Mode::kOptimal;
+  heights::SurfaceIndex index = index_scene(scene, *options);
+  Result<HeightsStudy> common = decide(index, *options);
+  if (!common) return common.error();
+  common->name = "all parts in one table";
+  std::vector<HeightsStudy> studies;
+  studies.push_back(std::move(*common));
+  Result<heights::PerPartPlan> plan = heights::plan_per_part(index, *options);
+  if (!plan) return plan.error();
+  const std::vector<heights::PartSurface> parts = std::exchange(index.parts, {});
+  for (std::uint32_t part = 0; part < parts.size(); ++part) {
+    index.parts = {parts[part]};
+    index.top = parts[part].top;
+    index.area_mm2 = 0;
+    for (const heights::Standing& standing : parts[part].standing) {
+      index.area_mm2 += index.meshes[standing.mesh].area_mm2 * standing.copies;
+    }
+    HeightsStudy study = study_of(index, *options, std::move(plan->parts[part]));
+    for (heights::LayerFacts& layer : study.evaluation.layers) layer.part = layer.part == heights::kNoPart ? layer.part : part;
+    study.name = fmt::format("part {}, slabs of {} mm", part + 1, number_text(mm(plan->slab)));
+    studies.push_back(std::move(study));
   }
   return studies;
 }

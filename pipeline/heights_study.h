@@ -33,8 +33,12 @@ Result<HeightsStudy> study_table(const Job& job, const Scene& scene, const std::
 /// of the greatest thickness.
 Result<std::vector<HeightsStudy>> study_all_ways(const Job& job, const Scene& scene);
 
+/// The one table of all parts, then the table that each part has of its own (heights/per_part.h).
+Result<std::vector<HeightsStudy>> study_per_part(const Job& job, const Scene& scene);
+
 std::string heights_page(const Job& job, const Scene& scene, const HeightsStudy& study);
-std::string heights_csv(const Scene& scene, const HeightsStudy& study);
+/// The layers of all studies, one after the other; the first column names the study.
+std::string heights_csv(const Scene& scene, const std::vector<HeightsStudy>& studies);
 std::string heights_json(const Job& job, const Scene& scene, const std::vector<HeightsStudy>& studies);
 std::string heights_rp3(const Job& job, const HeightsStudy& study);
 /// One line a study.

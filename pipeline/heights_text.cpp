@@ -81,14 +81,19 @@ std::string heights_page(const Job& job, const Scene& scene, const HeightsStudy&
   return text;
 }
 
-std::string heights_csv(const Scene& scene, const HeightsStudy& study) {
-  std::string text = "layer,bottom_mm,thickness_mm,reason,angle_deg,cusp_mm,hits_flat,part\n";
-  for (std::size_t i = 0; i < count(study); ++i) {
-    const heights::LayerFacts& layer = study.evaluation.layers[i];
-    std::string name = part_name(scene, layer.part);
+std::string heights_csv(const Scene& scene, const std::vector<HeightsStudy>& studies) {
+  std::string text = "table,layer,bottom_mm,thickness_mm,reason,angle_deg,cusp_mm,hits_flat,part\n";
+  const auto quoted = [](std::string name) {
     for (std::size_t at = 0; (at = name.find('"', at)) != std::string::npos; at += 2) name.insert(at, 1, '"');
-    fmt::format_to(std::back_inserter(text), "{},{:.6f},{:.6f},{},{:.2f},{:.6f},{},\"{}\"\n", i + 1, mm(study.boundaries[i]),
-                   mm(thickness(study, i)), reason(study, i), angle(study, i), mm(layer.cusp), layer.hits_flat ? 1 : 0, name);
+    return '"' + name + '"';
+  };
+  for (const HeightsStudy& study : studies) {
+    for (std::size_t i = 0; i < count(study); ++i) {
+      const heights::LayerFacts& layer = study.evaluation.layers[i];
+      fmt::format_to(std::back_inserter(text), "{},{},{:.6f},{:.6f},{},{:.2f},{:.6f},{},{}\n", quoted(study.name), i + 1,
+                     mm(study.boundaries[i]), mm(thickness(study, i)), reason(study, i), angle(study, i), mm(layer.cusp),
+                     layer.hits_flat ? 1 : 0, quoted(part_name(scene, layer.part)));
+    }
   }
   return text;
 }

@@ -18,6 +18,7 @@
 #include "pipeline/output_directory.h"
 #include "pipeline/print_program.h"
 #include "pipeline/resume.h"
+#include "stages/raster/combine.h"
 #include "stages/raster/mirror.h"
 #include "stages/raster/raster.h"
 #include "stages/write/atomic_file.h"
@@ -76,10 +77,9 @@ class LayerWorkshop {
     const StageTimer timer(sums.raster);
     const Layer& layer = outcome.record.layer;
     const bool rays = job_.engine != Engine::kContours;
-    outcome.report = rasterizer_.layer(rays ? raster::Engine::kRays : raster::Engine::kContours, layer.plane(),
-                                       work.scratch, work.runs);
+    outcome.report = section(rays ? raster::Engine::kRays : raster::Engine::kContours, layer, work, work.runs);
     if (job_.engine == Engine::kBoth) {
-      rasterizer_.layer(raster::Engine::kContours, layer.plane(), work.scratch, work.second);
+      section(raster::Engine::kContours, layer, work, work.second);
       if (work.runs.row_offset != work.second.row_offset || work.runs.change != work.second.change) {
         return disagreement(layer, rasterizer_.grid(), work.runs, work.second);
       }
@@ -92,6 +92,18 @@ class LayerWorkshop {
     outcome.record.set_pixels = set_pixels(work.runs);
     outcome.record.capped_rows = outcome.report.capped_rows;
     return {};
+  }
+
+  /// The image of a layer: its middle plane, or what its lowest and highest sections have in common or together.
+  raster::LayerReport section(raster::Engine engine, const Layer& layer, LayerWork& work, Runs& image) {
+    if (job_.heights.containment == Containment::kAcross) {
+      return rasterizer_.layer(engine, layer.plane(), work.scratch, image);
+    }
+    const raster::LayerReport low = rasterizer_.layer(engine, layer.lowest_plane(), work.scratch, work.lowest);
+    const raster::LayerReport high = rasterizer_.layer(engine, layer.highest_plane(), work.scratch, work.highest);
+    raster::combine(work.lowest, work.highest,
+                    job_.heights.containment == Containment::kInside ? raster::Combine::kBoth : raster::Combine::kEither, image);
+    return low.open_rows + low.capped_rows >= high.open_rows + high.capped_rows ? low : high;
   }
 
   Status encode(LayerWork& work, LayerOutcome& outcome) {
@@ -118,14 +130,22 @@ class LayerWorkshop {
 
   /// Scratch, runs and file, at most; a mirrored or second image counts as another one.
   std::uint64_t bytes_of_layer(const Layer& layer) const {
+    if (job_.heights.containment != Containment::kAcross) {
+      // Both sections, and an image that may have the crossings of both; twice with another engine or a mirror.
+      return 2 * (bytes_of_section(layer.lowest_plane()) + bytes_of_section(layer.highest_plane()));
+    }
+    return bytes_of_section(layer.plane());
+  }
+
+  std::uint64_t bytes_of_section(Nm plane) const {
     const std::uint64_t rows = rasterizer_.grid().rows();
     const std::uint64_t crossings =
-        dose_.changes_bound(rasterizer_.crossings_bound(layer.plane()), covered_pixels_);
+        dose_.changes_bound(rasterizer_.crossings_bound(plane), covered_pixels_);
     const bool second = job_.engine == Engine::kBoth || job_.mirror != Mirror::kNone || dose_.any();
     const std::uint64_t second_image = (second ? 8 * crossings + 4 * rows : 0) * (dose_.any() ? 3 : 1);
     const std::uint64_t file = format_.most_bytes(rasterizer_.grid().columns(), rows, crossings);
     const std::uint64_t program = program_ == nullptr ? 0 : program_->bytes_bound(crossings);
-    return rasterizer_.layer_bytes_bound(layer.plane()) + second_image + file + program;
+    return rasterizer_.layer_bytes_bound(plane) + second_image + file + program;
   }
 
   StageSums sums;

@@ -81,6 +81,12 @@ Result<SlicePlan> SlicePlan::make(const Job& job, const ProgressCallback& progre
 
   start = Clock::now();
   progress({ProgressEvent::Stage::kIndexing});
+  if (job.heights.containment != Containment::kAcross) {
+    return Error{Fault::kUsage, "--containment: contours are cut in the middle of layers; use it with lamina jet"};
+  }
+  if (job.heights.per_part) {
+    return Error{Fault::kUsage, "--per-part: a file of slices has one table of layers for all parts; leave it out"};
+  }
   const Result<heights::LayerTable> table = layer_table(job, *plan.scene_);
   if (!table) return table.error();
   const std::uint32_t total = table->size();

@@ -31,7 +31,9 @@ class Ladder {
   /// The number of rungs at or below `height`.
   std::uint32_t rungs_up_to(std::int64_t height) const {
     if (step_ > 0) {
-      return height < 0 ? 0 : static_cast<std::uint32_t>(std::min<std::int64_t>(height / step_ + 1, count_));
+      if (height < 0) return 0;
+      if (height > UINT32_MAX) return static_cast<std::uint32_t>(std::min<std::int64_t>(height / step_ + 1, count_));
+      return std::min(static_cast<std::uint32_t>(height) / static_cast<std::uint32_t>(step_) + 1, count_);  // far faster
     }
     return static_cast<std::uint32_t>(std::upper_bound(heights_.begin(), heights_.end(), height) - heights_.begin());
   }

@@ -128,6 +128,7 @@ class Solver {
       while (flat < flats_.size() && flats_[flat] - distance <= bottom) ++flat;
       std::int64_t most = std::min(ceiling, bottom + set_.most());
       if (flat < flats_.size()) most = std::min(most, flats_[flat] + distance);
+      if (options_.slab > 0) most = std::min(most, (bottom / options_.slab + 1) * options_.slab);
       // The least thickness is allowed whatever the slopes ask for.
       const std::uint32_t thinnest = ladder_.rungs_up_to(bottom + set_.least()) - 1;
       limit_[rung] = std::min(ladder_.rungs_up_to(most) - 1, std::max(highest_[rung], thinnest));

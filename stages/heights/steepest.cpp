@@ -93,9 +93,14 @@ Buffer<double> projected_below(const SurfaceIndex& index, std::span<const PartSu
   Buffer<double> within(ladder.rungs(), 0.0), slope(ladder.rungs() + 1, 0.0);
   for (const PartSurface& part : parts) {
     for_each_slope(index, part, [&](Nm lo, Nm hi, Steepness, double projected) {
-      const double density = (sign == Sign::kBoth ? std::abs(projected) : projected) / (static_cast<double>(hi) - lo);
       const auto [first, last] = ladder.cells_between(lo, hi);
       if (first >= last) return;
+      const double mm2 = sign == Sign::kBoth ? std::abs(projected) : projected;
+      if (last - first == 1 && lo >= ladder[first] && hi <= ladder[last]) {
+        within[first] += mm2;
+        return;
+      }
+      const double density = mm2 / (static_cast<double>(hi) - lo);
       const auto share = [&](std::uint32_t cell) {
         return density * static_cast<double>(std::min<std::int64_t>(hi, ladder[cell + 1]) -
                                              std::max<std::int64_t>(lo, ladder[cell]));

@@ -49,30 +49,31 @@ MeshSlopes slopes_of(const Mesh& mesh, const Limits& limits) {
   const std::size_t blocks = (count + kBlock - 1) / kBlock;
   std::vector<std::vector<FlatFacet>> flats(blocks);
   std::vector<double> areas(blocks);
+  const Triangle* triangles = mesh.triangles.data();
+  Nm *to_lo = slopes.lo.data(), *to_hi = slopes.hi.data();
+  Steepness* to_steepness = slopes.steepness.data();
+  float* to_projected = slopes.projected_mm2.data();
   tbb::parallel_for(std::size_t{0}, blocks, [&](std::size_t block) {
     double block_area = 0;
     for (std::size_t i = block * kBlock; i < std::min(count, (block + 1) * kBlock); ++i) {
-      const Triangle& t = mesh.triangles[i];
+      const Triangle& t = triangles[i];
       const Normal n = normal_of(t);
       const double length = std::sqrt(n.x * n.x + n.y * n.y + n.z * n.z);
       const double mm2 = length * 0.5e-12, up = std::abs(n.z);
-      block_area += mm2;
-      slopes.lo[i] = slopes.hi[i] = 0;
-      slopes.steepness[i] = 0;
-      slopes.projected_mm2[i] = 0;
-      if (up == 0 || mm2 < limits.least_mm2) continue;
-      const auto [lo, hi] = std::minmax({t.a.z, t.b.z, t.c.z});
-      const double nz = up / length;
-      if (nz >= limits.horizontal && std::int64_t{hi} - lo <= limits.tolerance) {
-        flats[block].push_back({static_cast<Nm>(lo + (std::int64_t{hi} - lo) / 2), n.z > 0, mm2});
-        block_area -= mm2;
-        continue;
-      }
-      if (lo == hi) continue;  // a sliver whose corners are level but whose normal says otherwise cannot be
-      slopes.lo[i] = lo;
-      slopes.hi[i] = hi;
-      slopes.steepness[i] = std::min(kHorizontal, static_cast<Steepness>(std::ceil(nz * kHorizontal)));
-      slopes.projected_mm2[i] = static_cast<float>(n.z * 0.5e-12);
+      const Nm lo = std::min(std::min(t.a.z, t.b.z), t.c.z), hi = std::max(std::max(t.a.z, t.b.z), t.c.z);
+      const double nz = up / length;  // no number for a facet without area
+      const bool counts = up > 0 && mm2 >= limits.least_mm2;
+      const bool level = counts && nz >= limits.horizontal && std::int64_t{hi} - lo <= limits.tolerance;
+      const bool slope = counts && !level;
+      if (level) flats[block].push_back({static_cast<Nm>(lo + (std::int64_t{hi} - lo) / 2), n.z > 0, mm2});
+      block_area += level ? 0 : mm2;
+      to_lo[i] = lo;
+      to_hi[i] = hi;
+      // Rounded up; the cast cuts off, and what is cut off is put back.
+      const double scaled = nz * kHorizontal;
+      const auto whole = static_cast<std::int32_t>(slope ? scaled : 0);
+      to_steepness[i] = static_cast<Steepness>(whole + (slope && whole < scaled ? 1 : 0));
+      to_projected[i] = static_cast<float>(n.z * 0.5e-12);
     }
     areas[block] = block_area;
   });

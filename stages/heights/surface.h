@@ -39,8 +39,8 @@ struct FlatFacet {
   double mm2;
 };
 
-/// The facets of one mesh, in its own coordinates. Entries of facets that are vertical, horizontal, degenerate or too
-/// small have lo == hi == 0 and steepness 0. 20 bytes a facet.
+/// The facets of one mesh, in its own coordinates. Those that are vertical, horizontal, degenerate or too small have
+/// steepness 0 and are to be passed over. 16 bytes a facet.
 struct MeshSlopes {
   Buffer<Nm> lo, hi;               // z range, nm
   Buffer<Steepness> steepness;
@@ -73,7 +73,7 @@ struct SurfaceIndex {
 ///
 /// instances, part_of_instance  of equal length; the offset's z is the height above the bed
 /// angles come from the corners of the facets, never from the normals that a file may hold
-/// cost  O(facets); 20 bytes a facet
+/// cost  O(facets); 16 bytes a facet
 SurfaceIndex index_surface(std::span<const Mesh> meshes, std::span<const Instance> instances,
                            std::span<const std::uint32_t> part_of_instance, std::uint32_t part_count,
                            const SurfaceOptions& options);

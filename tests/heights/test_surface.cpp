@@ -1,0 +1,241 @@
+// What heights are decided from, against facet-by-facet answers; and what is made of it besides tables.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <fstream>
+#include <numbers>
+#include <random>
+#include <sstream>
+
+#include "pipeline/heights_request.h"
+#include "stages/heights/ladder.h"
+#include "stages/heights/per_part.h"
+#include "stages/heights/steepest.h"
+#include "stages/raster/combine.h"
+#include "stages/write/rp3/rp3.h"
+#include "surfaces.h"
+
+namespace lamina::heights {
+namespace {
+
+using test::set_of;
+
+Mesh random_mesh(unsigned seed, int facets) {
+  std::mt19937 random(seed);
+  const auto pick = [&](Nm high) { return static_cast<Nm>(random() % static_cast<unsigned>(high)); };
+  Mesh mesh;
+  for (int i = 0; i < facets; ++i) {
+    // Small ones and ones as tall as the part; some vertical, some level.
+    const Nm z = pick(3'000'000), rise = i % 7 == 0 ? 3'000'000 - z : pick(200'000) + 1;
+    const Point3 a{pick(1'000'000), pick(1'000'000), z};
+    Point3 b{pick(1'000'000), pick(1'000'000), z + pick(rise) + 0}, c{pick(1'000'000), pick(1'000'000), z + rise};
+    if (i % 5 == 0) b = {a.x, a.y, a.z + rise / 2};
+    if (i % 11 == 0) b.z = c.z = a.z;
+    mesh.triangles.push_back({a, b, c});
+  }
+  mesh.triangles.push_back({{0, 0, 0}, {0, 1'000'000, 0}, {0, 0, 3'000'000}});
+  for (const Triangle& t : mesh.triangles) {
+    for (const Point3& p : {t.a, t.b, t.c}) mesh.bounds.add(p);
+  }
+  return mesh;
+}
+
+TEST(HeightSurface, EveryLayerSeesExactlyTheFacetsThatReachIntoIt) {
+  for (unsigned seed = 0; seed < 6; ++seed) {
+    const Mesh mesh = random_mesh(seed, 400);
+    const SurfaceIndex index = test::index_of(mesh);
+    std::mt19937 random(seed);
+    std::vector<std::int64_t> boundaries{0};
+    while (boundaries.back() < index.top) boundaries.push_back(boundaries.back() + 20'000 + random() % 300'000);
+    Options options;
+    options.set = set_of({0.1});
+    const Evaluation evaluation = evaluate(index, boundaries, options);
+    double steps = 0, area = 0;
+    std::vector<double> flattest(boundaries.size() - 1, 0.0);
+    for (const Triangle& t : mesh.triangles) {
+      const double ux = t.b.x - t.a.x, uy = t.b.y - t.a.y, uz = t.b.z - t.a.z;
+      const double vx = t.c.x - t.a.x, vy = t.c.y - t.a.y, vz = t.c.z - t.a.z;
+      const double nx = uy * vz - uz * vy, ny = uz * vx - ux * vz, nz = ux * vy - uy * vx;
+      const double length = std::sqrt(nx * nx + ny * ny + nz * nz);
+      const Nm lo = std::min({t.a.z, t.b.z, t.c.z}), hi = std::max({t.a.z, t.b.z, t.c.z});
+      if (length == 0 || (hi - lo <= options.surface.flat_tolerance && std::abs(nz) >= 0.999 * length)) continue;
+      area += length / 2;
+      for (std::size_t i = 0; i + 1 < boundaries.size(); ++i) {
+        const double shared = static_cast<double>(std::min<std::int64_t>(hi, boundaries[i + 1]) -
+                                                  std::max<std::int64_t>(lo, boundaries[i]));
+        if (shared <= 0) continue;
+        flattest[i] = std::max(flattest[i], std::abs(nz) / length);
+        steps += static_cast<double>(boundaries[i + 1] - boundaries[i]) * std::abs(nz) / 2 * shared / (double(hi) - lo);
+      }
+    }
+    for (std::size_t i = 0; i + 1 < boundaries.size(); ++i) {
+      EXPECT_NEAR(evaluation.layers[i].flattest, flattest[i] * kHorizontal, 1.5) << "layer " << i;
+    }
+    EXPECT_NEAR(evaluation.mean_cusp, steps / area, 1e-6 * evaluation.mean_cusp);
+  }
+}
+
+TEST(HeightSurface, PlanesCutWhatBeginsBelowThemAndReachesThem) {
+  const SurfaceIndex index = test::index_of(test::strip({{0, 0}, {0.5, 1}, {0.5, 2}, {3, 3}}));
+  const Result<Ladder> ladder = Ladder::reachable(set_of({0.5}), 3'000'000);
+  const Buffer<Steepness> at = steepest_at_rungs(index, index.parts, *ladder);
+  const double low = 0.5 / std::hypot(0.5, 1.0), high = 2.5 / std::hypot(2.5, 1.0);
+  const double expected[] = {0, low, low, 0, 0, high, high};
+  for (std::size_t rung = 0; rung < 7; ++rung) EXPECT_NEAR(at[rung], expected[rung] * kHorizontal, 1.5) << rung;
+}
+
+TEST(HeightSurface, AnglesComeFromTheCornersAndDownwardFacesCountAsUpwardOnes) {
+  for (const double degrees : {0.5, 15.01, 45.0, 82.12, 89.5}) {
+    const double run = std::tan(degrees * std::numbers::pi / 180);
+    for (const double side : {-1.0, 1.0}) {
+      const SurfaceIndex index = test::index_of(test::strip({{0, 0}, {side * run * 2, 2}}));
+      Options options;
+      options.set = set_of({0.1});
+      const std::int64_t boundaries[] = {0, 1'000'000, 2'000'000};
+      EXPECT_NEAR(angle_of(evaluate(index, boundaries, options).layers[1].flattest), degrees, 1e-4);
+    }
+  }
+}
+
+TEST(HeightSurface, SmallFacetsAskForNothing) {
+  Mesh mesh = test::strip({{0, 0}, {0, 3}});
+  mesh.triangles.push_back({{0, 0, 1'000'000}, {100'000, 0, 1'010'000}, {0, 100'000, 1'000'000}});  // 0.005 mm2, nearly level
+  Options options;
+  options.mode = Mode::kCusp;
+  options.set = set_of({0.1, 0.3});
+  const auto layers = [&](double least) {
+    SurfaceOptions surface;
+    surface.least_facet_mm2 = least;
+    return plan_heights(test::index_of(mesh, surface), options)->table.size();
+  };
+  EXPECT_GT(layers(0), 10u);
+  EXPECT_EQ(layers(0.01), 10u);
+}
+
+TEST(HeightSurface, PartThatIsThinnerThanTheLeastThicknessIsOneLayer) {
+  const SurfaceIndex index = test::index_of(test::strip({{0, 0}, {1, 0}, {1, 0.05}, {0, 0.05}}));
+  for (const Mode mode : {Mode::kUniform, Mode::kAngle, Mode::kCusp, Mode::kStepwise, Mode::kOptimal}) {
+    Options options;
+    options.mode = mode;
+    options.set = mode == Mode::kUniform ? set_of({0.2}) : set_of({0.2, 0.3});
+    const Result<Plan> plan = plan_heights(index, options);
+    ASSERT_TRUE(plan.ok());
+    EXPECT_EQ(plan->table.size(), 1u) << int(mode);
+    EXPECT_GE(plan->table.top(), 200'000) << int(mode);
+  }
+}
+
+TEST(PerPartHeights, EachPartHasItsOwnLayersWithinCommonSlabs) {
+  // A wall and a slope of the same height beside each other.
+  const Mesh meshes[] = {test::strip({{0, 0}, {0, 6.03}}), test::strip({{0, 0}, {20, 5}})};
+  const Instance instances[] = {{0, {0, 0, 0}}, {1, {30'000'000, 0, 0}}};
+  const std::uint32_t parts[] = {0, 1};
+  Options options;
+  options.mode = Mode::kOptimal;
+  options.set = test::range_of(0.05, 0.3, 0.001);
+  const SurfaceIndex index = index_surface(meshes, instances, parts, 2, options.surface);
+  const Result<Plan> common = plan_heights(index, options);
+  const Result<PerPartPlan> own = plan_per_part(index, options);
+  ASSERT_TRUE(own.ok());
+  EXPECT_EQ(own->slab, 300'000);
+  EXPECT_EQ(own->parts[0].table.size(), 21u);  // 20 slabs and the last 0.03 within reach of two layers
+  EXPECT_GE(own->parts[1].table.size(), 50u);  // 0.1 mm of step at most
+  EXPECT_LT(own->parts[0].table.size() + own->parts[1].table.size(), 2 * common->table.size());
+  for (const Plan& plan : own->parts) {
+    const std::vector<std::int64_t> boundaries = boundaries_of(plan.table);
+    for (std::int64_t slab = 0; slab + own->slab < plan.table.top(); slab += own->slab) {
+      EXPECT_EQ(distance_to_nearest(boundaries, slab), 0) << mm(slab);
+    }
+  }
+  EXPECT_EQ(slab_height(set_of({0.178, 0.254})), 22'606'000);
+}
+
+TEST(Rp3, RowsOfTheFirstCaseAreThoseOfAppendixB) {
+  Options options;
+  options.mode = Mode::kAngle;
+  options.set = set_of({0.178, 0.254});
+  options.facets = Facets::kPlane;
+  const Result<Plan> plan = plan_heights(test::index_of_file(test::reference("case1_plane.stl")), options);
+  std::vector<write::rp3::Layer> layers;
+  for (std::uint32_t i = 0; i < plan->table.size(); ++i) {
+    layers.push_back({mm(plan->table[i].thickness), angle_of(plan->looked_at[i])});
+  }
+  write::rp3::Settings settings;
+  settings.shrink = {1.007, 1.007, 1};
+  const std::string text = write::rp3::text_of(layers, settings);
+  // The printed file: its head, its summary, its rows; but for -0.00, which the document prints for walls.
+  std::ifstream rows(test::reference("appendix_b.rp3.tsv")), head(test::reference("appendix_b.header.txt"));
+  std::string expected, line;
+  while (std::getline(head, line)) {
+    if (line.starts_with("(")) {
+      for (std::string row; std::getline(rows, row);) {
+        if (!row.empty() && row[0] >= '0' && row[0] <= '9') expected += row + "\n";
+      }
+    } else {
+      expected += line + "\n";
+    }
+  }
+  for (std::size_t at = 0; (at = expected.find("-0.00", at)) != std::string::npos;) expected.erase(at, 1);
+  EXPECT_EQ(text, expected);
+}
+
+TEST(CombineRuns, PixelsOfEitherAndOfBothAreThoseOfTwoBitmaps) {
+  std::mt19937 random(5);
+  constexpr std::uint32_t kRows = 40, kColumns = 60;
+  const auto image = [&](std::vector<bool>& bits) {
+    Runs runs{kColumns, {0}, {}};
+    bits.assign(kRows * kColumns, false);
+    for (std::uint32_t row = 0; row < kRows; ++row) {
+      bool on = false;
+      for (std::uint32_t column = 0; column < kColumns; ++column) {
+        const bool next = random() % 5 == 0 ? !on : on;
+        if (next != on) runs.change.push_back(column);
+        bits[row * kColumns + column] = on = next;
+      }
+      if (on) runs.change.push_back(kColumns);
+      runs.row_offset.push_back(static_cast<std::uint32_t>(runs.change.size()));
+    }
+    return runs;
+  };
+  for (int round = 0; round < 50; ++round) {
+    std::vector<bool> a, b;
+    const Runs first = image(a), second = image(b);
+    for (const raster::Combine how : {raster::Combine::kEither, raster::Combine::kBoth}) {
+      Runs out;
+      raster::combine(first, second, how, out);
+      ASSERT_EQ(out.view().rows(), kRows);
+      std::vector<bool> bits(kRows * kColumns, false);
+      for (std::uint32_t row = 0; row < kRows; ++row) {
+        const auto changes = out.view().row(row);
+        ASSERT_EQ(changes.size() % 2, 0u);
+        for (std::size_t i = 0; i + 1 < changes.size(); i += 2) {
+          ASSERT_LT(changes[i], changes[i + 1]);
+          for (std::uint32_t column = changes[i]; column < changes[i + 1]; ++column) bits[row * kColumns + column] = true;
+        }
+      }
+      for (std::size_t i = 0; i < bits.size(); ++i) {
+        ASSERT_EQ(bits[i], how == raster::Combine::kEither ? a[i] || b[i] : a[i] && b[i]);
+      }
+    }
+  }
+}
+
+TEST(Thicknesses, SetsAndRangesAreReadStrictly) {
+  const auto read = [](std::string_view text) {
+    ThicknessSet set;
+    const std::string wrong = pipeline::read_thicknesses(text, set);
+    return wrong.empty() ? set.values : std::vector<Nm>{};
+  };
+  EXPECT_EQ(read("0.254,0.178"), (std::vector<Nm>{178'000, 254'000}));
+  EXPECT_EQ(read("0.05..0.2:0.05"), (std::vector<Nm>{50'000, 100'000, 150'000, 200'000}));
+  EXPECT_EQ(read("0.05..0.3").size(), 251u);
+  EXPECT_EQ(read("0.05..0.12:0.05"), (std::vector<Nm>{50'000, 100'000}));
+  EXPECT_EQ(read("0.1"), (std::vector<Nm>{100'000}));
+  for (const char* wrong : {"", ",", "0.1,", "0.1,0.1", "-0.1,0.2", "0", "nan", "0.3..0.1", "0.1..", "..0.3", "0.1..0.3:0",
+                            "0.1..0.3:-1", "0.1..0.3:x", "0.001..1000:0.000001", "0.1...0.3"}) {
+    EXPECT_TRUE(read(wrong).empty()) << wrong;
+  }
+}
+
+}  // namespace
+}  // namespace lamina::heights
