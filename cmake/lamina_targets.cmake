@@ -56,7 +56,7 @@ if(LAMINA_TESTS)
                             ZLIB::ZLIB nlohmann_json::nlohmann_json PkgConfig::XXHASH)
       # Tests are compiled to be compiled fast; what they call is optimised, and so is the slow reference of the bitmaps.
       target_compile_options(test_${folder} PRIVATE $<$<NOT:$<CONFIG:Debug>>:-O1> -fno-sanitize=undefined
-                             -Wno-array-bounds)  # g++ 12 has it wrong for std::string at -O1
+                             -Wno-array-bounds -Wno-stringop-overflow)  # g++ 12 has them wrong for std::string at -O1
       if(precompiled)
         target_precompile_headers(test_${folder} REUSE_FROM ${precompiled})
       else()
