@@ -29,7 +29,7 @@ struct PartRequest {
   std::array<double, 3> scale{1, 1, 1};
   std::array<double, 3> rotate_deg{0, 0, 0};
   std::array<double, 3> shrink{1, 1, 1};  // compensation factors per axis of the bed, applied last
-  std::string fill;  // changes to the job's filling, "pattern=contour gap_mm=0.1"
+  std::string fill = {};  // changes to the job's filling, "pattern=contour gap_mm=0.1"
 };
 
 enum class Engine { kRays, kContours, kBoth };
