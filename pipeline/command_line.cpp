@@ -22,7 +22,10 @@ constexpr Command kCommands[] = {
     {"merge", "join the shards of a job that was divided", run_merge_command},
     {"machines", "the powder printers that lamina jet writes programs for, and what follows from a profile", run_machines_command},
     {"preview", "pictures of a job's layers for people", run_preview_command},
+    {"report", "one page about a finished job: layers, plots, warnings, hashes", run_report_command},
     {"batch", "many jobs in one queue, sharing processors and memory, with one summary", run_batch_command},
+    {"completion", "makes a shell complete commands and options", run_completion_command},
+    {"manual", "manual pages", run_manual_command},
 };
 
 std::string program_help() {

@@ -75,5 +75,8 @@ int run_merge_command(const std::vector<std::string>& arguments);
 int run_machines_command(const std::vector<std::string>& arguments);
 int run_preview_command(const std::vector<std::string>& arguments);
 int run_batch_command(const std::vector<std::string>& arguments);
+int run_report_command(const std::vector<std::string>& arguments);
+int run_completion_command(const std::vector<std::string>& arguments);
+int run_manual_command(const std::vector<std::string>& arguments);
 
 }  // namespace lamina::pipeline

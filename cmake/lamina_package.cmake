@@ -1,0 +1,53 @@
+# Manual pages and shell completion, made by the program itself, and Debian packages: cpack in the build directory.
+if(NOT LAMINA_SANITIZE)
+  set(pages ${PROJECT_BINARY_DIR}/share)
+  file(MAKE_DIRECTORY ${pages}/man)
+  add_custom_command(
+    OUTPUT ${pages}/done
+    COMMAND lamina manual -o ${pages}/man
+    COMMAND sh -c "gzip -9nkf man/*.1"
+    COMMAND lamina completion bash > lamina.bash
+    COMMAND lamina completion zsh > _lamina
+    COMMAND lamina completion fish > lamina.fish
+    COMMAND ${CMAKE_COMMAND} -E touch done
+    WORKING_DIRECTORY ${pages}
+    DEPENDS lamina
+    COMMENT "Manual pages and shell completion"
+    VERBATIM)
+  add_custom_target(lamina_pages ALL DEPENDS ${pages}/done)
+  install(DIRECTORY ${pages}/man/ DESTINATION ${CMAKE_INSTALL_MANDIR}/man1 COMPONENT program FILES_MATCHING PATTERN "*.1.gz")
+  set(share ${CMAKE_INSTALL_DATADIR})
+  install(FILES ${pages}/lamina.bash DESTINATION ${share}/bash-completion/completions RENAME lamina COMPONENT program)
+  install(FILES ${pages}/_lamina DESTINATION ${share}/zsh/vendor-completions COMPONENT program)
+  install(FILES ${pages}/lamina.fish DESTINATION ${share}/fish/vendor_completions.d COMPONENT program)
+endif()
+
+# Two packages: lamina (the programs) and liblamina-dev (static libraries, headers, find_package).
+set(CPACK_GENERATOR DEB)
+set(CPACK_PACKAGE_NAME lamina)
+set(CPACK_PACKAGE_VENDOR lamina)
+set(CPACK_PACKAGE_CONTACT "The lamina maintainers <maintainers@lamina.invalid>")
+set(CPACK_PACKAGE_DESCRIPTION_SUMMARY ${PROJECT_DESCRIPTION})
+set(CPACK_PACKAGING_INSTALL_PREFIX /usr)
+set(CPACK_STRIP_FILES ON)
+set(CPACK_COMPONENTS_ALL program development)
+set(CPACK_DEB_COMPONENT_INSTALL ON)
+set(CPACK_DEBIAN_FILE_NAME DEB-DEFAULT)
+set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS ON)
+set(CPACK_DEBIAN_PROGRAM_PACKAGE_NAME lamina)
+set(CPACK_DEBIAN_PROGRAM_PACKAGE_SECTION science)
+set(CPACK_DEBIAN_PROGRAM_PACKAGE_RECOMMENDS "fonts-dejavu-core")
+set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_NAME liblamina-dev)
+set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_SECTION libdevel)
+set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_DEPENDS
+    "pkg-config, libtbb-dev, libeigen3-dev, libembree-dev, libfmt-dev, libtiff-dev, libpng-dev, zlib1g-dev, nlohmann-json3-dev, libxxhash-dev, libzip-dev, lib3mf-dev, libpolyclipping-dev, libmuparser-dev")
+set(CPACK_COMPONENT_PROGRAM_DESCRIPTION "The programs lamina and lamina-preview")
+set(CPACK_COMPONENT_DEVELOPMENT_DESCRIPTION "Static libraries and headers of lamina")
+include(CPack)
+
+# A project of its own finds the installed library, and plans a part.
+if(LAMINA_TESTS AND NOT LAMINA_SANITIZE)
+  add_test(NAME Installed.AnotherProjectFindsTheLibraryAndPlansAPart
+           COMMAND ${PROJECT_SOURCE_DIR}/tests/install/example ${PROJECT_BINARY_DIR} ${PROJECT_SOURCE_DIR})
+  set_tests_properties(Installed.AnotherProjectFindsTheLibraryAndPlansAPart PROPERTIES TIMEOUT 900)
+endif()

@@ -1,0 +1,227 @@
+#include "pipeline/report.h"
+
+#include <fmt/format.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <optional>
+#include <span>
+
+#include "pipeline/hash.h"
+#include "pipeline/json_text.h"
+#include "pipeline/manifest.h"
+#include "pipeline/report_views.h"
+#include "stages/write/read_image.h"
+#include "stages/write/report/page.h"
+#include "stages/write/report/run_code.h"
+
+namespace lamina::pipeline {
+namespace {
+
+namespace fs = std::filesystem;
+using write::report::PageData;
+
+constexpr std::uint32_t kChunk = 64;  // layers that are read together
+
+Result<Manifest> finished_manifest(const std::string& directory) {
+  std::error_code ignored;
+  const std::string path = directory + "/manifest.json";
+  if (!fs::exists(path, ignored) && fs::exists(path + ".part", ignored)) {
+    return Error{Fault::kVerification, fmt::format("{}: the job is not finished; end it with --resume, then ask for the "
+                                                   "report", directory)};
+  }
+  if (!fs::exists(path, ignored)) {
+    return Error{Fault::kVerification, fmt::format("{}: no manifest.json; name a finished directory of lamina jet (shards: "
+                                                   "run lamina merge first)", directory)};
+  }
+  Result<Manifest> manifest = read_manifest(path);
+  if (!manifest) return manifest;
+  if (manifest->head.extension.empty()) {
+    return Error{Fault::kVerification, fmt::format("{}: the job wrote no images (format {}); plan it with another format, "
+                                                   "as tiff-g4", directory, manifest->head.format)};
+  }
+  if (manifest->layers.empty()) return Error{Fault::kVerification, directory + ": the job has no layers"};
+  return manifest;
+}
+
+/// One layer's file into runs, if it is the one of the manifest.
+Result<Runs> read_layer(const std::string& directory, const ManifestHead& head, const LayerRecord& record) {
+  const std::string path = directory + "/" + layer_file_name(record.layer.index, head.extension);
+  const Result<FileDigest> digest = digest_file(path);
+  if (!digest) return digest.error();
+  const Error changed{Fault::kVerification, fmt::format("{}: is not the file of the manifest; lamina verify tells more", path)};
+  if (digest->bytes != record.bytes || digest->hash != record.hash) return changed;
+  Result<write::LayerImage> image = write::read_image(path);
+  if (!image) return image.error();
+  if (image->runs.columns != head.grid.columns() || image->runs.view().rows() != head.grid.rows()) return changed;
+  return std::move(image->runs);
+}
+
+/// The layers' codes that fit the page: when they get too many, every second one is let go.
+class HeldLayers {
+ public:
+  explicit HeldLayers(std::uint64_t limit) : limit_(limit) {}
+
+  bool wants(std::uint32_t place) const { return place % stride_ == 0; }
+  void add(std::uint32_t place, Buffer<std::byte> code) {
+    if (!wants(place)) return;
+    bytes_ += cost(code);
+    layers_.push_back({place, std::move(code)});
+    while (bytes_ > limit_ && layers_.size() > 1) {
+      stride_ *= 2;
+      std::erase_if(layers_, [&](const auto& layer) { return layer.first % stride_ != 0; });
+      bytes_ = 0;
+      for (const auto& layer : layers_) bytes_ += cost(layer.second);
+    }
+  }
+  std::uint32_t stride() const { return stride_; }
+  std::vector<std::pair<std::uint32_t, Buffer<std::byte>>>& layers() { return layers_; }
+
+ private:
+  static std::uint64_t cost(const Buffer<std::byte>& code) { return code.size() / 3 * 4 + 60; }
+  std::uint64_t limit_, bytes_ = 0;
+  std::uint32_t stride_ = 1;
+  std::vector<std::pair<std::uint32_t, Buffer<std::byte>>> layers_;
+};
+
+/// Calls `work(place, runs, slot)` for every layer on all processors, and then `gather(place, slot)` in order.
+template <class Slot, class Work, class Gather>
+Status each_layer(const std::string& directory, const Manifest& manifest, Work work, Gather gather) {
+  const auto count = static_cast<std::uint32_t>(manifest.layers.size());
+  for (std::uint32_t first = 0; first < count; first += kChunk) {
+    const std::uint32_t end = std::min(first + kChunk, count);
+    std::vector<Slot> slots(end - first);
+    std::vector<Status> states(end - first);
+    tbb::parallel_for(first, end, [&](std::uint32_t place) {
+      const Result<Runs> runs = read_layer(directory, manifest.head, manifest.layers[place]);
+      if (runs) {
+        work(place, runs->view(), slots[place - first]);
+      } else {
+        states[place - first] = runs.error();
+      }
+    });
+    for (std::uint32_t place = first; place < end; ++place) {
+      if (!states[place - first]) return states[place - first];
+      gather(place, slots[place - first]);
+    }
+  }
+  return {};
+}
+
+template <class Value>
+std::string list(const std::vector<LayerRecord>& layers, Value value) {
+  std::string text = "[";
+  for (const LayerRecord& record : layers) fmt::format_to(std::back_inserter(text), "{}{}", text.size() > 1 ? "," : "", value(record));
+  return text + "]";
+}
+
+std::string part_json(const PartSummary& part) {
+  std::string notes;
+  for (const Note& note : part.notes) {
+    notes += (notes.empty() ? "" : ",") + json_string((note.repair ? "repair: " : "") + note.text);
+  }
+  const auto point = [](const Point3& p) { return fmt::format("[{},{},{}]", mm(p.x), mm(p.y), mm(p.z)); };
+  return fmt::format("{{\"path\":{},\"copies\":{},\"triangles\":{},\"low_mm\":{},\"high_mm\":{},\"notes\":[{}]}}",
+                     json_string(part.path), part.copies, part.triangles, point(part.bounds.lo), point(part.bounds.hi), notes);
+}
+
+std::string title_of(const ManifestHead& head) {
+  if (head.parts.empty()) return "a job";
+  std::string title = fs::path(head.parts.front().path).filename().string();
+  if (head.parts.size() > 1) title += fmt::format(" and {} more", head.parts.size() - 1);
+  return title;
+}
+
+/// What the page's script reads.
+std::string head_json(const Manifest& manifest, const FileDigest& file, const write::PixelWindow& window,
+                      HeldLayers& held, const std::array<DepthView, 3>& views) {
+  const ManifestHead& head = manifest.head;
+  const std::vector<LayerRecord>& layers = manifest.layers;
+  std::string parts, places, sides;
+  for (const PartSummary& part : head.parts) parts += (parts.empty() ? "" : ",") + part_json(part);
+  for (const auto& [place, code] : held.layers()) places += fmt::format("{}{}", places.empty() ? "" : ",", place);
+  for (const DepthView& view : views) {
+    sides += fmt::format("{}\"{}\":[{},{},{},{:.6g},{:.6g}]", sides.empty() ? "" : ",", view.name, view.width, view.height,
+                         view.most, view.width_mm, view.height_mm);
+  }
+  std::string reasons;
+  for (int reason = 0; reason <= static_cast<int>(LayerReason::kFlat); ++reason) {
+    reasons += fmt::format("{}\"{}\"", reason == 0 ? "" : ",", reason_name(static_cast<LayerReason>(reason)));
+  }
+  std::string text = fmt::format(
+      "{{\"title\":{},\"version\":{},\"format\":{},\"machine\":{},\"columns\":{},\"rows\":{},\"dpi\":[{},{}],"
+      "\"pixel_mm\":[{},{}],\"window\":[{},{},{},{}],\"layer_count\":{},\"first_layer\":{},\"stride\":{},\"job\":{},"
+      "\"manifest\":{{\"bytes\":{},\"hash\":\"{}\"}},\"parts\":[{}],\"views\":{{{}}},\"reasons\":[{}],\"embedded\":[{}],",
+      json_string(title_of(head)), json_string(head.version), json_string(head.format), json_string(head.machine),
+      head.grid.columns(), head.grid.rows(), head.grid.x.dpi(), head.grid.y.dpi(), 25.4 / head.grid.x.dpi(),
+      25.4 / head.grid.y.dpi(), window.left, window.top, window.right, window.bottom, head.layer_count, head.first_layer,
+      held.stride(), json_string(head.job_toml), file.bytes, hex(file.hash), parts, sides, reasons, places);
+  text += fmt::format(
+      "\"layers\":{{\"bottom\":{},\"thickness\":{},\"reason\":{},\"set\":{},\"bytes\":{},\"capped\":{},\"hash\":{}",
+      list(layers, [](const LayerRecord& r) { return r.layer.bottom; }),
+      list(layers, [](const LayerRecord& r) { return r.layer.thickness; }),
+      list(layers, [](const LayerRecord& r) { return static_cast<int>(r.layer.reason); }),
+      list(layers, [](const LayerRecord& r) { return r.set_pixels; }), list(layers, [](const LayerRecord& r) { return r.bytes; }),
+      list(layers, [](const LayerRecord& r) { return r.capped_rows; }),
+      list(layers, [](const LayerRecord& r) { return fmt::format("\"{}\"", hex(r.hash)); }));
+  if (!head.machine.empty()) {
+    text += fmt::format(",\"sweeps\":{}", list(layers, [](const LayerRecord& r) { return r.program.sweeps; }));
+  }
+  return text + "}}";
+}
+
+}  // namespace
+
+Result<Report> make_report(const std::string& directory, const ReportOptions& options) {
+  const Result<Manifest> manifest = finished_manifest(directory);
+  if (!manifest) return manifest.error();
+  const Result<FileDigest> file = digest_file(directory + "/manifest.json");
+  if (!file) return file.error();
+  const std::vector<LayerRecord>& layers = manifest->layers;
+  const PixelGrid& grid = manifest->head.grid;
+
+  struct First {
+    write::PixelWindow window;
+    Buffer<std::byte> code;
+  };
+  // What a layer's line and the rest of the page take is not the layers' own.
+  const std::uint64_t taken = 150'000 + 140 * layers.size();
+  HeldLayers held(options.size_limit > taken ? options.size_limit - taken : 0);
+  write::PixelWindow window;
+  Status status = each_layer<First>(
+      directory, *manifest,
+      [&](std::uint32_t place, const RunsView& runs, First& first) {
+        first.window = write::window_of(runs);
+        if (held.wants(place)) first.code = write::report::pack_runs(runs);
+      },
+      [&](std::uint32_t place, First& first) {
+        window = write::joined(window, first.window);
+        held.add(place, std::move(first.code));
+      });
+  if (!status) return status.error();
+  if (window.empty()) window = {0, grid.columns(), 0, grid.rows()};
+
+  const Layer &lowest = layers.front().layer, &highest = layers.back().layer;
+  ThreeViews views(grid, window, lowest.bottom, highest.bottom + highest.thickness);
+  status = each_layer<std::vector<std::uint8_t>>(
+      directory, *manifest,
+      [&](std::uint32_t, const RunsView& runs, std::vector<std::uint8_t>& cells) { views.look(runs, cells); },
+      [&](std::uint32_t place, const std::vector<std::uint8_t>& cells) { views.add(layers[place].layer, cells); });
+  if (!status) return status.error();
+
+  std::vector<PageData> data;
+  for (const DepthView& view : views.views()) {
+    data.push_back({"v-" + view.name, write::report::deflate_bytes(std::as_bytes(std::span(view.depth)))});
+  }
+  const std::string head = head_json(*manifest, *file, window, held, views.views());
+  for (auto& [place, code] : held.layers()) data.push_back({fmt::format("r{}", place), std::move(code)});
+  Report report;
+  report.layers = static_cast<std::uint32_t>(layers.size());
+  report.held = static_cast<std::uint32_t>(held.layers().size());
+  report.stride = held.stride();
+  report.page = write::report::make_page("lamina: " + title_of(manifest->head), head, data);
+  return report;
+}
+
+}  // namespace lamina::pipeline

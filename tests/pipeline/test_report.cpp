@@ -1,0 +1,225 @@
+// The page about a job: what it shows is what the files hold, in the bytes and in a browser.
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+
+#include <array>
+#include <cstdio>
+#include <nlohmann/json.hpp>
+#include <random>
+
+#include "program.h"
+#include "stages/write/read_image.h"
+#include "stages/write/report/run_code.h"
+
+namespace lamina::test {
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::json;
+using Words = std::vector<std::string>;
+
+bool equal(const RunsView& a, const RunsView& b) {
+  return a.columns == b.columns && std::ranges::equal(a.row_offset, b.row_offset) && std::ranges::equal(a.change, b.change);
+}
+
+Runs random_runs(std::mt19937& random, std::uint32_t columns, std::uint32_t rows) {
+  Runs runs;
+  runs.columns = columns;
+  runs.row_offset.push_back(0);
+  std::vector<std::uint32_t> row;
+  for (std::uint32_t r = 0; r < rows; ++r) {
+    const auto kind = random() % 4;
+    if (kind == 0) {  // else like the row before, moved, or the same
+      row.clear();
+      for (std::uint32_t column = static_cast<std::uint32_t>(random() % columns); column < columns; column += 1 + static_cast<std::uint32_t>(random() % 50)) row.push_back(column);
+      if (row.size() % 2 != 0) row.push_back(columns);
+    } else if (kind == 1 && !row.empty() && row.front() > 0) {
+      for (std::uint32_t& column : row) --column;
+    }
+    runs.change.insert(runs.change.end(), row.begin(), row.end());
+    runs.row_offset.push_back(static_cast<std::uint32_t>(runs.change.size()));
+  }
+  return runs;
+}
+
+TEST(RunCode, GivesTheRunsBackAndRefusesWhatIsNone) {
+  std::mt19937 random(7);
+  for (int i = 0; i < 60; ++i) {
+    const auto columns = static_cast<std::uint32_t>(1 + random() % 3000), rows = static_cast<std::uint32_t>(1 + random() % 60);
+    const Runs runs = random_runs(random, columns, rows);
+    Buffer<std::byte> packed = write::report::pack_runs(runs);
+    const Result<Runs> back = write::report::unpack_runs(packed, columns, rows);
+    ASSERT_TRUE(back.ok());
+    ASSERT_TRUE(equal(runs, *back));
+    EXPECT_FALSE(write::report::unpack_runs(packed, columns, rows + 1).ok());
+    EXPECT_FALSE(write::report::unpack_runs(std::span(packed).first(packed.size() - 1), columns, rows).ok());
+    for (int k = 0; k < 20; ++k) {
+      Buffer<std::byte> code(1 + random() % 40);  // any code, within a whole zlib stream
+      for (std::byte& byte : code) byte = static_cast<std::byte>(random() % (k < 10 ? 256 : 5));
+      const Result<Runs> any = write::report::unpack_runs(write::report::deflate_bytes(code), columns, rows);
+      if (!any) continue;
+      for (const std::uint32_t change : any->change) EXPECT_LE(change, columns);
+    }
+  }
+  const Runs empty = {9, {0, 0, 0}, {}};
+  EXPECT_TRUE(equal(empty, *write::report::unpack_runs(write::report::pack_runs(empty), 9, 2)));
+}
+
+TEST(RunCode, Base64IsThatOfRfc4648) {
+  const auto text = [](std::string_view bytes) { return write::report::base64(std::as_bytes(std::span(bytes))); };
+  EXPECT_EQ(text(""), "");
+  EXPECT_EQ(text("f"), "Zg==");
+  EXPECT_EQ(text("fo"), "Zm8=");
+  EXPECT_EQ(text("foo"), "Zm9v");
+  EXPECT_EQ(text("foobar"), "Zm9vYmFy");
+}
+
+class JobsReported : public ::testing::Test {
+ protected:
+  Outcome lamina(const Words& arguments) { return run_lamina(arguments, directory_.path()); }
+
+  void jet(const std::string& part, Words more) {
+    more.insert(more.begin(), {"jet", part, "--quiet", "-o", "out"});
+    const Outcome outcome = lamina(more);
+    ASSERT_EQ(outcome.code, 0) << outcome.err;
+  }
+
+  // The data of a piece of the page; nothing if it is not there.
+  Buffer<std::byte> piece(const std::string& page, const std::string& id) {
+    const std::string begin = "<script type=\"text/plain\" id=\"" + id + "\">";
+    const std::size_t at = page.find(begin);
+    Buffer<std::byte> bytes;
+    if (at == std::string::npos) return bytes;
+    std::uint32_t group = 0, have = 0;
+    for (std::size_t i = at + begin.size(); page[i] != '<' && page[i] != '='; ++i) {
+      const std::string_view digits = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+      group = group << 6 | static_cast<std::uint32_t>(digits.find(page[i]));
+      have += 6;
+      if (have >= 8) bytes.push_back(static_cast<std::byte>(group >> (have -= 8) & 255));
+    }
+    return bytes;
+  }
+
+  Runs layer(int index) {
+    char name[32];
+    std::snprintf(name, sizeof name, "out/layers/%06d.tif", index);
+    const auto image = write::read_image(directory_ / name);
+    EXPECT_TRUE(image.ok());
+    return image->runs;
+  }
+
+  Directory directory_;
+};
+
+const fs::path kCorpus = fs::path(LAMINA_TEST_DIR) / "corpus";
+
+TEST_F(JobsReported, EveryLayerOfThePageIsItsFile) {
+  jet(kCorpus / "nist_am_test_artifact_v3b.stl", {"--bed", "200x160", "--dpi", "300x200", "--layer", "0.5"});
+  const Outcome outcome = lamina({"report", "out", "-o", "report.html"});
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  const std::string page = read_text(directory_ / "report.html");
+  for (int i = 0; i < 34; ++i) {
+    const Runs runs = layer(i);
+    const auto back = write::report::unpack_runs(piece(page, "r" + std::to_string(i)), runs.columns, runs.view().rows());
+    ASSERT_TRUE(back.ok()) << i;
+    EXPECT_TRUE(equal(runs, *back)) << i;
+  }
+  EXPECT_EQ(page.find("http://"), std::string::npos);
+  EXPECT_EQ(page.find("https://"), std::string::npos);
+  EXPECT_EQ(page.find("{{"), std::string::npos);
+  ASSERT_EQ(lamina({"report", "out", "-o", "again.html", "--quiet"}).code, 0);
+  EXPECT_EQ(page, read_text(directory_ / "again.html"));
+
+  ASSERT_EQ(lamina({"report", "out", "-o", "small.html", "--most-bytes", "165K"}).code, 0);
+  const std::string small = read_text(directory_ / "small.html");
+  EXPECT_LT(small.size(), 165u << 10);
+  EXPECT_NE(small, page);
+  EXPECT_FALSE(piece(small, "r0").empty());
+  EXPECT_TRUE(piece(small, "r1").empty());
+}
+
+TEST_F(JobsReported, WhatIsNoFinishedJobIsRefusedInOneLine) {
+  write_box(directory_ / "part.stl", {0, 0, 0}, {5, 5, 2});
+  jet("part.stl", {"--bed", "20x20", "--dpi", "100"});
+  const auto refused = [&](const std::string& directory, const std::string& said, int code) {
+    const Outcome outcome = lamina({"report", directory, "-o", "report.html"});
+    EXPECT_EQ(outcome.code, code) << outcome.err;
+    EXPECT_EQ(outcome.error_lines(), 1u) << outcome.err;
+    EXPECT_NE(outcome.err.find(said), std::string::npos) << outcome.err;
+    EXPECT_FALSE(fs::exists(directory_ / "report.html"));
+  };
+  refused("nowhere", "no manifest.json", 5);
+  fs::rename(directory_ / "out/manifest.json", directory_ / "out/manifest.json.part");
+  refused("out", "not finished", 5);
+  fs::rename(directory_ / "out/manifest.json.part", directory_ / "out/manifest.json");
+  const std::string good = read_text(directory_ / "out/layers/000007.tif");
+  write_text(directory_ / "out/layers/000007.tif", read_text(directory_ / "out/layers/000007.tif") + "x");
+  refused("out", "000007.tif: is not the file of the manifest", 5);
+  fs::remove(directory_ / "out/layers/000007.tif");
+  refused("out", "000007.tif", 5);
+  write_text(directory_ / "out/layers/000007.tif", good);
+  ASSERT_EQ(lamina({"jet", "part.stl", "--bed", "20x20", "--format", "null", "--quiet", "-o", "none"}).code, 0);
+  refused("none", "wrote no images", 5);
+  EXPECT_EQ(lamina({"report", "out", "-o", "nowhere/report.html"}).code, 4);
+  EXPECT_EQ(lamina({"report", "out"}).code, 2);
+  EXPECT_EQ(lamina({"report", "-o", "x.html"}).code, 2);
+}
+
+TEST_F(JobsReported, NamesOfPartsCannotBecomeMarkup) {
+  write_box(directory_ / "<img src=x onerror=alert(1)> & <script>.stl", {0, 0, 0}, {5, 5, 1});
+  jet("<img src=x onerror=alert(1)> & <script>.stl", {"--bed", "20x20", "--dpi", "100"});
+  ASSERT_EQ(lamina({"report", "out", "-o", "report.html", "--quiet"}).code, 0);
+  const std::string page = read_text(directory_ / "report.html");
+  EXPECT_EQ(page.find("<img"), std::string::npos);
+  EXPECT_NE(page.find("&lt;img src=x onerror=alert(1)> &amp; &lt;script>.stl"), std::string::npos);
+}
+
+// A page is used in Chromium: keys, buttons, mouse, a phone's width; its layer is the decoded TIFF.
+TEST_F(JobsReported, InABrowserItShowsTheLayersAndCanBeUsed) {
+  jet(kCorpus / "nist_part_feature_open.stl", {"--unit", "inch", "--bed", "200x100", "--dpi", "600", "--layer", "0.1"});
+  ASSERT_EQ(lamina({"report", "out", "-o", "report.html", "--quiet"}).code, 0);
+  const int index = 123;
+  const std::string command = "python3 '" + std::string(LAMINA_TEST_DIR) + "/report/browser.py' '" + directory_ / "report.html" +
+                              "' " + std::to_string(index) + " 2>/dev/null";
+  std::FILE* pipe = ::popen(command.c_str(), "r");
+  ASSERT_NE(pipe, nullptr);
+  std::string text;
+  std::array<char, 65536> piece{};
+  for (std::size_t got = 0; (got = std::fread(piece.data(), 1, piece.size(), pipe)) > 0;) text.append(piece.data(), got);
+  const int status = ::pclose(pipe);
+  if (WEXITSTATUS(status) == 77) GTEST_SKIP() << "NOT RUN: the report in a browser; install Debian's chromium";
+  ASSERT_EQ(status, 0);
+  const Json said = Json::parse(text);
+
+  const Runs runs = layer(index);
+  EXPECT_EQ(said["runs"][0], Json(std::vector<std::uint32_t>(runs.row_offset.begin(), runs.row_offset.end())));
+  EXPECT_EQ(said["runs"][1], Json(std::vector<std::uint32_t>(runs.change.begin(), runs.change.end())));
+  EXPECT_EQ(said["console"], Json::array());
+  EXPECT_EQ(said["requests"], Json::array());
+  EXPECT_GT(said["ink"], 1);
+  const Json& step = said["steps"];
+  const int layers = 350;
+  EXPECT_EQ(step["start"]["layer"], index);
+  EXPECT_EQ(step["page_up"]["layer"], index + 1);
+  EXPECT_EQ(step["page_down"]["layer"], index);
+  EXPECT_EQ(step["home"]["layer"], 0);
+  EXPECT_EQ(step["end"]["layer"], layers - 1);
+  EXPECT_EQ(step["next_at_end"]["layer"], layers - 1);
+  EXPECT_EQ(step["previous"]["layer"], layers - 2);
+  EXPECT_GT(step["closer"]["scale"], step["start"]["scale"]);
+  EXPECT_EQ(step["pixels"]["scale"], 1);
+  EXPECT_EQ(step["fit"]["scale"], step["start"]["scale"]);
+  EXPECT_GT(step["arrow_right"]["x"], step["focus"]["x"]);
+  EXPECT_GT(step["plus"]["scale"], step["arrow_right"]["scale"]);
+  EXPECT_EQ(step["zero"], step["fit"]);
+  EXPECT_LT(step["drag"]["x"], step["zero"]["x"]);
+  EXPECT_GT(step["wheel"]["scale"], step["drag"]["scale"]);
+  EXPECT_NEAR(step["plot"]["layer"].get<int>(), layers / 2, 2);
+  EXPECT_EQ(said["file_rows"], layers + 1);
+  EXPECT_NE(said["grounds"][0], said["grounds"][1]);
+  EXPECT_LE(said["phone"][0], said["phone"][1]);
+  EXPECT_NE(said["text"].get<std::string>().find("nist_part_feature_open.stl"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace lamina::test
