@@ -24,7 +24,7 @@ target_link_libraries(lamina_stages PUBLIC TBB::tbb Eigen3::Eigen fmt::fmt embre
 
 # --- pipeline: how work moves
 lamina_sources(pipeline_sources "pipeline/*.cpp")
-list(FILTER pipeline_sources EXCLUDE REGEX "/pipeline/(main|preview_main)\\.cpp$")
+list(FILTER pipeline_sources EXCLUDE REGEX "/pipeline/(main|preview_main|preview_swath)\\.cpp$")
 add_library(lamina_pipeline STATIC ${pipeline_sources})
 add_library(lamina::pipeline ALIAS lamina_pipeline)
 # toml++ is used as headers: job_toml.cpp wants errors as values, and Debian's library was built with exceptions.
@@ -38,7 +38,7 @@ target_link_libraries(lamina PRIVATE lamina::pipeline)
 # Pictures need OpenImageIO, which brings some 260 shared libraries and a tenth of a second of start-up: a program of
 # its own that `lamina preview` hands over to, so that no job pays for it.
 lamina_sources(picture_sources "stages/write/picture/*.cpp")
-add_executable(lamina-preview pipeline/preview_main.cpp ${picture_sources})
+add_executable(lamina-preview pipeline/preview_main.cpp pipeline/preview_swath.cpp ${picture_sources})
 target_link_libraries(lamina-preview PRIVATE lamina::pipeline PkgConfig::OPENIMAGEIO nlohmann_json::nlohmann_json)
 
 if(LAMINA_TESTS)

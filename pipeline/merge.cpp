@@ -7,6 +7,7 @@
 
 #include "pipeline/manifest.h"
 #include "pipeline/output_directory.h"
+#include "pipeline/print_program.h"
 
 namespace lamina::pipeline {
 namespace {
@@ -96,18 +97,28 @@ Status bring_file(const fs::path& from, const fs::path& to, MergeReport& report)
 Status bring_files(const Shard& shard, const std::string& output, MergeReport& report) {
   std::error_code error;
   const bool in_place = fs::equivalent(shard.directory, output, error);
-  for (const LayerRecord& record : shard.manifest.layers) {
-    const std::string name = layer_file_name(record.layer.index, shard.manifest.head.extension);
-    if (name.empty()) return {};
+  const ManifestHead& head = shard.manifest.head;
+  const auto bring = [&](const std::string& name, std::uint64_t bytes) -> Status {
+    if (name.empty()) return {};  // a format without files, a job without a machine
     const fs::path from = fs::path(shard.directory) / name;
     const std::uintmax_t size = fs::file_size(from, error);
     if (error) return unmatched(fmt::format("{}: is missing; run its shard again with --resume", from.string()));
-    if (size != record.bytes) {
+    if (size != bytes) {
       return unmatched(fmt::format("{}: {} bytes, the manifest says {}; run its shard again with --resume",
-                                   from.string(), size, record.bytes));
+                                   from.string(), size, bytes));
     }
-    if (in_place) continue;
-    if (Status status = bring_file(from, fs::path(output) / name, report); !status) return status;
+    return in_place ? Status() : bring_file(from, fs::path(output) / name, report);
+  };
+  for (const LayerRecord& record : shard.manifest.layers) {
+    if (Status status = bring(layer_file_name(record.layer.index, head.extension), record.bytes); !status) return status;
+    const std::string program = program_file_name(record.layer.index, head.program_extension);
+    if (Status status = bring(program, record.program.bytes); !status) return status;
+  }
+  if (head.machine.empty() || in_place) return {};
+  // What all shards write alike.
+  for (const std::string& name : {std::string("machine.toml"), "start" + head.program_extension, "end" + head.program_extension}) {
+    const fs::path from = fs::path(shard.directory) / "program" / name;
+    if (Status status = bring_file(from, fs::path(output) / "program" / name, report); !status) return status;
   }
   return {};
 }
@@ -132,6 +143,8 @@ Result<MergeReport> merge(const std::vector<std::string>& directories, const std
   std::error_code error;
   fs::create_directories(fs::path(output) / "layers", error);
   if (error) return Error{Fault::kOutput, fmt::format("{}/layers: {}", output, error.message())};
+  if (!head.machine.empty()) fs::create_directories(fs::path(output) / "program", error);
+  if (error) return Error{Fault::kOutput, fmt::format("{}/program: {}", output, error.message())};
 
   MergeReport report;
   report.output = output;

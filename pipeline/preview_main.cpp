@@ -12,6 +12,7 @@
 #include "pipeline/command_line.h"
 #include "pipeline/console.h"
 #include "pipeline/manifest.h"
+#include "pipeline/preview_swath.h"
 #include "pipeline/slice_picture.h"
 #include "stages/write/atomic_file.h"
 #include "stages/write/picture/canvas.h"
@@ -36,6 +37,8 @@ CommandSpec preview_spec() {
                   {"--count", "N", "so many layers, spread over the height", "12", ""},
                   {"--every", "N", "every N-th layer, from the first", "", ""},
                   {"--layer", "K", "only layer K, counted from 0 at the bottom", "", ""},
+                  {"--swath", "N", "layer --layer of a job with a machine while swath N of it is jetted, with the head; middle: the one in the middle", "", ""},
+                  {"--step", "N", "of the swath, else the middle one", "", ""},
                   {"--width", "PIXELS", "width of the picture, 200 to 20000", "2400", ""},
                   {"--whole-bed", "", "show all of the bed, not only where the layers have something", "", ""},
                   {"--drawing", "FILE", "draw what lamina heights left for it instead, and remove FILE", "", ""},
@@ -200,6 +203,24 @@ int run_preview(const std::vector<std::string>& texts) {
     return fail({Fault::kVerification,
                  fmt::format("{}: the job wrote no images (format {}); plan it with another format, as tiff-g4",
                              directory, manifest->head.format)});
+  }
+  if (arguments->has("--swath")) {
+    SwathChoice choice;
+    const auto layer = number(*arguments, "--layer", 0, UINT32_MAX), step = number(*arguments, "--step", 0, UINT32_MAX);
+    const bool middle = arguments->text("--swath") == "middle";
+    const auto swath = middle ? Result<std::optional<std::uint32_t>>(std::nullopt) : number(*arguments, "--swath", 0, UINT32_MAX);
+    for (const auto* option : {&layer, &step, &swath}) {
+      if (!*option) return fail(option->error());
+    }
+    choice.layer = (*layer).value_or(manifest->layers[manifest->layers.size() / 2].layer.index);
+    choice.swath = *swath;
+    choice.step = *step;
+    choice.width = (*width).value_or(1200);
+    const auto picture = draw_swath(directory, *manifest, choice);
+    if (!picture) return fail(picture.error());
+    if (const Status status = write::write_file(output, *picture); !status) return fail(status.error());
+    if (!arguments->has("--quiet")) say(fmt::format("{}: layer {}, {}", output, choice.layer, readable_bytes(picture->size())));
+    return 0;
   }
   const Result<std::vector<std::size_t>> chosen = chosen_layers(*arguments, *manifest);
   if (!chosen) return fail(chosen.error());

@@ -91,6 +91,18 @@ Result<VirtualMachine> VirtualMachine::build(const Machine& machine, std::uint32
   return made;
 }
 
+std::array<double, 2> VirtualMachine::nozzle_at(std::int64_t first_line, double step, std::uint32_t number) const {
+  const Nozzle& nozzle = nozzle_[number];
+  const double line = static_cast<double>(first_line + nozzle.line) + nozzle.across_um / line_um_;
+  const double place = (step - static_cast<double>(nozzle.step_offset)) / static_cast<double>(ticks_) + nozzle.along_um / place_um_;
+  const bool x = machine_.mounting.scan_axis == ScanAxis::kX;
+  double column = x ? place : line, row = x ? line : place;
+  const auto has = [&](Side side) { return machine_.mounting.scan_from == side || machine_.mounting.nozzle_0 == side; };
+  if (has(Side::kRight)) column = columns_ - 1 - column;
+  if (has(Side::kFront)) row = rows_ - 1 - row;
+  return {column, row};
+}
+
 // --- printing
 
 Printing::Printing(const VirtualMachine& machine, std::uint32_t layer, const VirtualMachine::Watch* watch)
@@ -197,7 +209,7 @@ void Printing::fire(std::uint32_t number) {
   ++count.drops;
   count.farthest_along_um = std::max(count.farthest_along_um, std::abs(nozzle.along_um));
   count.farthest_across_um = std::max(count.farthest_across_um, std::abs(nozzle.across_um));
-  if (watch_ != nullptr) (*watch_)({column, row, sweep_, static_cast<std::uint32_t>(step_), number});
+  if (watch_ != nullptr) (*watch_)({column, row, sweep_, static_cast<std::uint32_t>(step_), number, first_line_});
 }
 
 void Printing::fire_words(const std::vector<std::uint64_t>& words) {

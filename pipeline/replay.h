@@ -51,10 +51,14 @@ class VirtualMachine {
   /// Told of each drop in the order of the program: column and row of the image, sweep, step.
   struct Drop {
     std::uint32_t column, row, sweep, step, nozzle;
+    std::int64_t first_line;  // of nozzle 0 in this sweep
   };
   using Watch = std::function<void(const Drop&)>;
   /// Carries out a program without comparing. errors  as replay
   Result<ReplayCount> run(std::string_view program, std::uint32_t layer, const Watch& watch) const;
+
+  /// Column and row of the image, in pixels and parts of them, where a nozzle is at a step of a sweep.
+  std::array<double, 2> nozzle_at(std::int64_t first_line, double step, std::uint32_t nozzle) const;
 
  private:
   friend class Printing;

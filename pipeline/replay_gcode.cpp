@@ -50,7 +50,7 @@ double GcodeReader::number(const GcodeLine& line, char letter) const {
 
 std::uint32_t GcodeReader::count(const GcodeLine& line, char letter) const {
   const double value = number(line, letter);
-  if (!(value >= 0 && value <= 4e9) || value != std::floor(value)) fault(fmt::format("{}{:g} is no count", letter, value));
+  if (!(value >= 0 && value <= 4294967295.0) || value != std::floor(value)) fault(fmt::format("{}{:g} is no count", letter, value));
   return static_cast<std::uint32_t>(value);
 }
 

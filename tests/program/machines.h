@@ -111,8 +111,8 @@ class SlowHead {
     const double across = static_cast<double>(sweep.first_line) * grid_.line_nm +
                           across_[nozzle];
     const double place = along / grid_.place_nm, line = across / grid_.line_nm;
-    // Halves that rounding down left behind are above; what is nearest otherwise.
-    const auto p = static_cast<std::int64_t>(std::ceil(place - 0.5 - 1e-6));
+    // The nearest place; lags are rounded half down, so that a drop half way between two belongs to the farther one.
+    const auto p = static_cast<std::int64_t>(std::floor(place + 0.5 + 1e-6));
     const auto l = static_cast<std::int64_t>(std::llround(line));
     if (p < 0 || l < 0 || p >= grid_.places || l >= grid_.lines) {
       ++outside;

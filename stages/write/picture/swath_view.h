@@ -1,0 +1,37 @@
+// stages/write/picture/swath_view.h: a layer while it is jetted: its swaths, the head over it, and the drops so far.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "stages/data/buffer.h"
+#include "stages/data/grid.h"
+#include "stages/data/runs.h"
+#include "stages/data/status.h"
+
+namespace lamina::write::picture {
+
+struct SwathView {
+  std::string title, caption;
+  PixelGrid grid;
+  RunsView image;  // what is to be jetted: drawn light
+  RunsView fired;  // what is jetted so far: drawn dark
+  /// A swath's pixels [left, right) x [top, bottom); the present one is marked.
+  struct Band {
+    double left, right, top, bottom;
+    bool present;
+  };
+  std::vector<Band> bands;
+  struct Nozzle {
+    double column, row;  // of its centre, in pixels
+    bool fires;
+  };
+  std::vector<Nozzle> nozzles;
+  std::uint32_t width = 1200;  // of the picture
+};
+
+/// A PNG of the whole bed. errors  kInternal
+Result<Buffer<std::byte>> swath_picture(const SwathView& view);
+
+}  // namespace lamina::write::picture

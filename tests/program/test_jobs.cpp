@@ -1,0 +1,136 @@
+// Whole jobs with a machine: planned, replayed, resumed, sharded and merged.
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <atomic>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <map>
+
+#include "pipeline/jet.h"
+#include "pipeline/machine_profile.h"
+#include "pipeline/merge.h"
+#include "pipeline/verify.h"
+
+namespace lamina::pipeline {
+namespace {
+
+namespace fs = std::filesystem;
+
+class PrintJobs : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    std::string name = (fs::temp_directory_path() / "lamina_print_XXXXXX").string();
+    ASSERT_NE(::mkdtemp(name.data()), nullptr);
+    directory_ = name;
+  }
+  void TearDown() override { fs::remove_all(directory_); }
+
+  Job job(const std::string& part, double scale, const std::string& machine, const std::string& out) const {
+    Job made;
+    made.parts.emplace_back();
+    made.parts[0].path = std::string(LAMINA_TEST_DIR) + "/corpus/" + part;
+    made.parts[0].scale = {scale, scale, scale};
+    made.machine.profile = machine;
+    made.layer_mm = 1.5;
+    made.output = (directory_ / out).string();
+    return made;
+  }
+  static Result<JetSummary> run(const Job& job) {
+    const std::atomic<bool> cancel{false};
+    return run_jet(job, [](const ProgressEvent&) {}, cancel);
+  }
+  static std::map<std::string, std::string> tree(const fs::path& path) {
+    std::map<std::string, std::string> files;
+    for (const auto& entry : fs::recursive_directory_iterator(path)) {
+      if (!entry.is_regular_file()) continue;
+      std::ifstream file(entry.path(), std::ios::binary);
+      files[fs::relative(entry.path(), path).string()] = {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
+    }
+    return files;
+  }
+  fs::path directory_;
+};
+
+TEST_F(PrintJobs, ProgramsOfRealPartsPrintTheirImagesOnEveryShippedMachine) {
+  const std::pair<const char*, double> parts[] = {
+      {"parameter_quality_nut.stl", 1}, {"dental_crown.stl", 2}, {"quad_knot.obj", 0.3}, {"rabbit_9_overlapping_shells.obj", 1}};
+  for (const ShippedMachine& machine : shipped_machines()) {
+    for (const auto& [part, scale] : parts) {
+      Job made = job(part, scale, std::string(machine.name), std::string(machine.name) + part);
+      if (machine.name == "production-1200" || machine.name == "jet1000") made.layer_mm = 10;  // drops by the million
+      const auto summary = run(made);
+      ASSERT_TRUE(summary.ok()) << machine.name << " " << part << ": " << summary.error().message;
+      const auto report = verify(made.output, {});
+      ASSERT_TRUE(report.ok()) << report.error().message;
+      EXPECT_TRUE(report->ok()) << machine.name << " " << part << ": " << (report->faults.empty() ? "" : report->faults[0]);
+      EXPECT_EQ(report->replayed, summary->layers_total);
+      EXPECT_EQ(report->replay.drops, summary->set_pixels);
+      EXPECT_GT(report->replay.drops, 0u);
+    }
+  }
+}
+
+TEST_F(PrintJobs, BlockedNozzlesAndLessBinderAreRecordedAndReplayed) {
+  Job made = job("parameter_quality_nut.stl", 1, "nuferbj", "blocked");
+  made.machine.blocked = std::vector<std::uint32_t>{3, 60, 61, 100};
+  made.dose.bleed_um = {150, 100};
+  made.dose.shell_mm = 1;
+  made.dose.core = 0.5;
+  const auto summary = run(made);
+  ASSERT_TRUE(summary.ok()) << summary.error().message;
+  const auto report = verify(made.output, {});
+  ASSERT_TRUE(report.ok());
+  EXPECT_TRUE(report->ok()) << (report->faults.empty() ? "" : report->faults[0]);
+  EXPECT_GT(report->lost, 0u);
+  EXPECT_EQ(report->replay.drops + report->lost, summary->set_pixels);
+}
+
+TEST_F(PrintJobs, ShardsMergedAndLayersResumedGiveTheBytesOfOneRun) {
+  const Job whole = job("dental_crown.stl", 1, "nuferbj-31", "whole");
+  ASSERT_TRUE(run(whole).ok());
+  Job shard = whole;
+  shard.output = (directory_ / "shards").string();
+  for (std::uint32_t i = 0; i < 3; ++i) {
+    shard.shard = {{i, 3}};
+    ASSERT_TRUE(run(shard).ok());
+  }
+  ASSERT_TRUE(merge({shard.output}, shard.output).ok());
+  EXPECT_EQ(tree(shard.output), tree(whole.output));
+  // A layer's program that is damaged is written again.
+  const auto before = tree(whole.output);
+  fs::resize_file(fs::path(whole.output) / "program/000002.gcode", 40);
+  const auto damaged = verify(whole.output, {});
+  ASSERT_TRUE(damaged.ok());
+  ASSERT_EQ(damaged->fault_count, 1u);
+  EXPECT_NE(damaged->faults[0].find("program/000002.gcode: layer 2"), std::string::npos) << damaged->faults[0];
+  Job resumed = whole;
+  resumed.resume = true;
+  ASSERT_TRUE(run(resumed).ok());
+  EXPECT_EQ(tree(whole.output), before);
+}
+
+TEST_F(PrintJobs, WhatTheMachineCannotDoIsRefusedInOneLine) {
+  const auto refused = [&](auto change, const std::string& what) {
+    Job made = job("parameter_quality_nut.stl", 1, "nuferbj", "refused");
+    change(made);
+    const auto summary = run(made);
+    ASSERT_FALSE(summary.ok()) << what;
+    EXPECT_EQ(summary.error().fault, Fault::kUsage) << summary.error().message;
+    EXPECT_NE(summary.error().message.find(what), std::string::npos) << summary.error().message;
+    EXPECT_EQ(summary.error().message.find('\n'), std::string::npos);
+  };
+  refused([](Job& j) { j.parts[0].at_mm = {{0.0, 0.0}}; }, "outside of the bed of nuferbj");
+  refused([](Job& j) { j.parts[0].scale = {6, 6, 6}; }, "larger than the bed");
+  refused([](Job& j) { j.parts[0].bottom_mm = 90; }, "above the build height of nuferbj, 100 mm");
+  refused([](Job& j) { j.layer_mm = 0.004; }, "less than a step of nuferbj");
+  refused([](Job& j) { j.machine.scan_speed_mm_s = 500; }, "fires a nozzle");
+  refused([](Job& j) { j.machine.profile = "nuferbk"; }, "did you mean 'nuferbj'");
+  refused([](Job& j) { j.dpi = {300, 300}, j.machine.dpi_given = true; }, "300 dpi across the scan: the head of nuferbj reaches 262.01");
+  refused([](Job& j) { j.machine.blocked = std::vector<std::uint32_t>{128}; }, "there is no nozzle 128");
+}
+
+}  // namespace
+}  // namespace lamina::pipeline

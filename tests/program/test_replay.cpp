@@ -1,0 +1,177 @@
+// Programs of every shipped machine and of random ones, carried out by the virtual machine.
+#include "pipeline/replay.h"
+
+#include <gtest/gtest.h>
+
+#include "pipeline/machine.h"
+#include "pipeline/machine_profile.h"
+#include "stages/program/compile.h"
+#include "stages/write/program/dialect.h"
+#include "tests/program/machines.h"
+
+namespace lamina::pipeline {
+namespace {
+
+using program::testing::Image;
+using program::testing::Random;
+using program::testing::random_image;
+using program::testing::runs_of;
+
+struct Written {
+  std::string text;
+  ProgramCount count;
+};
+
+Written write_layer(const ResolvedMachine& resolved, const RunsView& image) {
+  const write::Dialect* dialect = write::find_dialect(resolved.machine.dialect);
+  const auto writer = dialect->make_writer(resolved.machine, resolved.grid);
+  LayerCycle cycle;
+  cycle.layer = 7;
+  cycle.layers = 9;
+  cycle.bottom_nm = 700'000;
+  cycle.thickness_nm = 100'000;
+  write::ProgramBytes bytes;
+  writer->begin_layer(cycle, bytes);
+  program::CompileScratch scratch;
+  const auto count = program::compile(resolved.grid, image, scratch,
+                                      [&](const Sweep& sweep, const SweepVectors& vectors) -> Status {
+                                        writer->sweep(sweep, vectors, bytes);
+                                        return {};
+                                      });
+  EXPECT_TRUE(count.ok());
+  writer->end_layer(cycle, bytes);
+  return {std::string(reinterpret_cast<const char*>(bytes.data()), bytes.size()), *count};
+}
+
+Result<ReplayCount> replay(const ResolvedMachine& resolved, const RunsView& image, const Written& program) {
+  const auto machine = VirtualMachine::build(resolved.machine, resolved.grid.image.columns(), resolved.grid.image.rows());
+  if (!machine) return machine.error();
+  return machine->replay(program.text, 7, image, program.count.moved, program.count.lost);
+}
+
+/// The machine with a bed of so many of its own pixels.
+ResolvedMachine shrunk(Machine machine, double columns, double rows) {
+  const auto whole = resolve_profile(machine);
+  EXPECT_TRUE(whole.ok()) << (whole.ok() ? "" : whole.error().message);
+  const PixelGrid& grid = whole->grid.image;
+  machine.bed.size_mm = {columns / grid.x.pixels_per_nm() / 1e6, rows / grid.y.pixels_per_nm() / 1e6};
+  const auto small = resolve_profile(machine);
+  EXPECT_TRUE(small.ok()) << (small.ok() ? "" : small.error().message);
+  return *small;
+}
+
+TEST(ShippedMachines, AreTheNineThatTheDocumentsNameAndTheirTextReadsBackTheSame) {
+  EXPECT_EQ(shipped_machines().size(), 9u);
+  for (const ShippedMachine& shipped : shipped_machines()) {
+    const auto machine = read_machine(shipped.text, std::string(shipped.name));
+    ASSERT_TRUE(machine.ok()) << machine.error().message;
+    EXPECT_EQ(machine->name, shipped.name);
+    const std::string text = machine_text(*machine);
+    const auto again = read_machine(text, "text");
+    ASSERT_TRUE(again.ok()) << again.error().message;
+    EXPECT_EQ(machine_text(*again), text);
+    EXPECT_TRUE(resolve_profile(*machine).ok()) << resolve_profile(*machine).error().message;
+  }
+}
+
+TEST(Replay, PrintsTheImageBitForBitOnEveryShippedMachine) {
+  Random random(11);
+  for (const ShippedMachine& shipped : shipped_machines()) {
+    const auto machine = read_machine(shipped.text, std::string(shipped.name));
+    for (int image_number = 0; image_number < 6; ++image_number) {
+      const ResolvedMachine resolved = shrunk(*machine, 130 + random() % 200, 130 + random() % 200);
+      const Image image = random_image(random, resolved.grid.image.columns(), resolved.grid.image.rows());
+      const Runs runs = runs_of(image);
+      const Written program = write_layer(resolved, runs);
+      const auto printed = replay(resolved, runs, program);
+      ASSERT_TRUE(printed.ok()) << shipped.name << ": " << printed.error().message;
+      EXPECT_EQ(printed->drops, set_pixels(runs));
+      EXPECT_EQ(printed->vectors, program.count.vectors) << shipped.name;
+      EXPECT_LE(printed->farthest_along_um, resolved.grid.step_nm() / 2000 + 1e-6);
+    }
+  }
+}
+
+TEST(Replay, EveryDialectSpeaksForAnyMountingDirectionAndBlockedNozzle) {
+  for (std::uint32_t seed = 0; seed < 120; ++seed) {
+    Random random(seed);
+    const auto dialects = write::dialects();
+    const write::Dialect& dialect = dialects[seed % dialects.size()];
+    Machine machine = program::testing::small_machine(std::min(2 + random() % 140, dialect.most_nozzles), 90, 100, 100);
+    machine.dialect = dialect.id;
+    const bool x = random() % 2 == 0;
+    machine.mounting.tilt_deg = std::array{90.0, 45.0, 31.0, 120.0}[random() % 4];
+    if (!x) machine.mounting.tilt_deg = 90 - machine.mounting.tilt_deg;
+    machine.mounting.scan_axis = x ? ScanAxis::kX : ScanAxis::kY;
+    machine.mounting.scan_from = x ? (random() % 2 ? Side::kLeft : Side::kRight) : (random() % 2 ? Side::kFront : Side::kBack);
+    machine.mounting.nozzle_0 = x ? (random() % 2 ? Side::kBack : Side::kFront) : (random() % 2 ? Side::kLeft : Side::kRight);
+    machine.mounting.first_leads = random() % 2;
+    machine.mounting.passes = 1 + random() % 2;
+    machine.mounting.first_swath = random() % 2 ? FirstSwath::kBed : FirstSwath::kLayer;
+    machine.mounting.overlap_lines = random() % (machine.head.nozzles / 2 + 1);
+    machine.mounting.offset_mm = {12.5, -3.25};
+    machine.motion.both_directions = random() % 2;
+    machine.head.blocked = {random() % machine.head.nozzles};
+    machine.head.blocked_rule = static_cast<BlockedRule>(random() % 3);
+    const ResolvedMachine resolved = shrunk(machine, 60 + random() % 100, 60 + random() % 100);
+    const Image image = random_image(random, resolved.grid.image.columns(), resolved.grid.image.rows());
+    const Runs runs = runs_of(image);
+    const Written program = write_layer(resolved, runs);
+    const auto printed = replay(resolved, runs, program);
+    ASSERT_TRUE(printed.ok()) << dialect.id << " seed " << seed << ": " << printed.error().message;
+    EXPECT_EQ(printed->drops, set_pixels(runs) - program.count.lost);
+  }
+}
+
+TEST(Replay, ATruncatedOrEditedProgramFailsWithTheLayerTheSwathAndTheStep) {
+  for (const write::Dialect& dialect : write::dialects()) {
+    Machine machine = program::testing::small_machine(12, 90, 100, 100);
+    machine.dialect = dialect.id;
+    const ResolvedMachine resolved = shrunk(machine, 80, 30);
+    Random random(5);
+    Image image(resolved.grid.image.rows(), std::vector<int>(resolved.grid.image.columns(), 0));
+    for (auto& row : image) {
+      for (std::size_t c = 5; c + 5 < row.size(); ++c) row[c] = random() % 2;
+    }
+    const Runs runs = runs_of(image);
+    const Written program = write_layer(resolved, runs);
+    ASSERT_TRUE(replay(resolved, runs, program).ok());
+    for (std::size_t length = 0; length < program.text.size(); length += 1 + program.text.size() / 97) {
+      const auto printed = replay(resolved, runs, {program.text.substr(0, length), program.count});
+      ASSERT_FALSE(printed.ok()) << dialect.id << " cut to " << length;
+      EXPECT_EQ(printed.error().fault, Fault::kVerification);
+      EXPECT_NE(printed.error().message.find("layer 7"), std::string::npos) << printed.error().message;
+    }
+    // A pixel that the program does not know of: the place where it should have fired.
+    Image other = image;
+    other[20][40] ^= 1;
+    const auto printed = replay(resolved, runs_of(other), program);
+    ASSERT_FALSE(printed.ok());
+    EXPECT_NE(printed.error().message.find("layer 7, swath 1, step 40: column 40, row 20"), std::string::npos)
+        << dialect.id << ": " << printed.error().message;
+    // Any byte of the vectors changed: never a crash, and hardly ever unnoticed.
+    std::size_t unnoticed = 0, tried = 0;
+    for (std::size_t at = program.text.size() / 4; at < program.text.size() * 3 / 4; at += 13, ++tried) {
+      Written edited = program;
+      edited.text[at] = static_cast<char>(edited.text[at] ^ 1);
+      unnoticed += replay(resolved, runs, edited).ok();
+    }
+    EXPECT_LT(unnoticed * 3, tried) << dialect.id;  // numbers of speeds and of swaths print the same
+  }
+}
+
+TEST(Reach, PartsOutsideOfTheBedOrAboveItAreRefusedWithTheirPlace) {
+  const auto nuferbj = find_machine("nuferbj");
+  ASSERT_TRUE(nuferbj.ok());
+  EXPECT_FALSE(find_machine("nuferbk").ok());
+  EXPECT_NE(find_machine("nuferbk").error().message.find("did you mean"), std::string::npos);
+  const auto wrong = read_machine("[machine]\nname = \"x\"\ndialect = \"klingon\"\n", "x.toml");
+  ASSERT_FALSE(wrong.ok());
+  EXPECT_NE(wrong.error().message.find("x.toml:3: machine.dialect: 'klingon' is none of"), std::string::npos);
+  const auto unknown = read_machine("[machine]\nname = \"x\"\n[head]\nnozzels = 3\n", "x.toml");
+  ASSERT_FALSE(unknown.ok());
+  EXPECT_NE(unknown.error().message.find("x.toml:4: head.nozzels: no such key"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace lamina::pipeline
