@@ -27,7 +27,7 @@ TEST(GcodeNumber, IsTheExactDecimalWithoutTrailingZeros) {
 
 struct Written {
   std::string text;
-  Totals totals;
+  MoveTotals totals;
   std::vector<std::vector<BeadMove>> layers;
 };
 

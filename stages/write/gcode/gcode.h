@@ -11,36 +11,17 @@
 #include "stages/data/extruder.h"
 #include "stages/data/layer.h"
 #include "stages/data/stretch.h"
+#include "stages/write/extrusion_format.h"
 
 namespace lamina::write::gcode {
 
-/// Sums over what was written; those of layers add up to those of the file.
-struct Totals {
-  std::uint64_t moves = 0, travels = 0, retractions = 0;
-  double bead_mm = 0, travel_mm = 0;
-  double volume_mm3 = 0;    // of beads, before the flow factor
-  double filament_mm = 0;   // fed, with the flow factor; retractions come back and do not count
-  double seconds = 0;       // estimated: speed changes take the profile's acceleration, corners its corner speed
-  std::int64_t lo_x = INT64_MAX, lo_y = INT64_MAX, hi_x = INT64_MIN, hi_y = INT64_MIN;  // nm, of beads' centres
-
-  void add(const Totals& other);
-};
-
-struct HeadFacts {
-  std::string program;  // "lamina 0.1.0"
-  std::string source;   // names of the parts, one line
-  std::uint32_t layers = 0;
-  bool segmented = false;
-};
-
 /// Writes one layer's moves; made anew for each layer.
-class LayerWriter {
+class LayerWriter final : public LayerMoves {
  public:
   /// out  appended to
   LayerWriter(const Extruder& machine, const Layer& layer, std::uint32_t layers, Buffer<char>& out);
-  void lay(const BeadMove& move);
-  /// Ends the layer. returns its sums
-  const Totals& finish();
+  double lay(const BeadMove& move) override;
+  const MoveTotals& finish() override;
 
  private:
   void travel(Point2 to);
@@ -50,7 +31,7 @@ class LayerWriter {
 
   const Extruder& machine_;
   Buffer<char>& out_;
-  Totals totals_;
+  MoveTotals totals_;
   std::uint32_t layer_index_;
   double feed_per_volume_;       // mm of filament a mm3 of bead
   double fed_ = 0;               // mm of filament in this layer, exact
@@ -64,8 +45,8 @@ class LayerWriter {
   double last_speed_ = 0, last_x_ = 0, last_y_ = 0;  // the end of the move before, for the estimate of time
 };
 
-void append_head(const Extruder& machine, const HeadFacts& facts, Buffer<char>& out);
-void append_tail(const Extruder& machine, const Totals& totals, std::uint32_t layers, Buffer<char>& out);
+void append_head(const Extruder& machine, const ExtrusionHead& facts, Buffer<char>& out);
+void append_tail(const Extruder& machine, const MoveTotals& totals, std::uint32_t layers, Buffer<char>& out);
 
 /// "1d 2h 3m 4s", as viewers read it.
 std::string time_text(double seconds);

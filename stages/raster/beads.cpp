@@ -1,0 +1,151 @@
+#include "stages/raster/beads.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace lamina::raster {
+namespace {
+
+__extension__ using Wide = __int128;
+
+/// A bead, asked about points near it.
+struct Bead {
+  std::int64_t ax, ay, dx, dy;  // a, b - a
+  Wide width2, length2;
+  bool square;
+
+  /// |p - a| and |p - b| below 2^32, and p no farther than 2^28 from the line: nothing overflows 127 bits.
+  bool holds(std::int64_t px, std::int64_t py) const {
+    const std::int64_t x = px - ax, y = py - ay;
+    const Wide along = static_cast<Wide>(x) * dx + static_cast<Wide>(y) * dy;
+    if (along < 0) return !square && 4 * (static_cast<Wide>(x) * x + static_cast<Wide>(y) * y) <= width2;
+    if (along > length2) {
+      const std::int64_t ex = x - dx, ey = y - dy;
+      return !square && 4 * (static_cast<Wide>(ex) * ex + static_cast<Wide>(ey) * ey) <= width2;
+    }
+    if (length2 == 0) return !square && 4 * (static_cast<Wide>(x) * x + static_cast<Wide>(y) * y) <= width2;
+    const Wide across = static_cast<Wide>(x) * dy - static_cast<Wide>(y) * dx;
+    return 4 * across * across <= width2 * length2;
+  }
+};
+
+/// About where the bead meets a row: its convex shape is the hull of two discs, or a rectangle.
+struct Interval {
+  double low = INFINITY, high = -INFINITY;
+  void add(double a, double b) {
+    low = std::min(low, a);
+    high = std::max(high, b);
+  }
+};
+
+Interval estimate(const Bead& bead, double radius, double y) {
+  Interval x;
+  const double dx = static_cast<double>(bead.dx), dy = static_cast<double>(bead.dy), length = std::hypot(dx, dy);
+  if (!bead.square) {
+    for (const double end : {0.0, 1.0}) {
+      const double rise = y - end * dy, square = radius * radius - rise * rise;
+      if (square >= 0) x.add(end * dx - std::sqrt(square), end * dx + std::sqrt(square));
+    }
+  }
+  if (length > 0) {
+    // The four corners of the rectangle; its edges cut the row.
+    const double nx = -dy / length * radius, ny = dx / length * radius;
+    const double cx[] = {nx, dx + nx, dx - nx, -nx}, cy[] = {ny, dy + ny, dy - ny, -ny};
+    for (int i = 0; i < 4; ++i) {
+      const int j = (i + 1) % 4;
+      if ((cy[i] <= y) == (cy[j] <= y)) {
+        if (cy[i] == y && cy[j] == y) x.add(std::min(cx[i], cx[j]), std::max(cx[i], cx[j]));
+        continue;
+      }
+      const double at = cx[i] + (y - cy[i]) / (cy[j] - cy[i]) * (cx[j] - cx[i]);
+      x.add(at, at);
+    }
+  }
+  return x;
+}
+
+}  // namespace
+
+void BeadRaster::add(Point2 a, Point2 b, Nm width, BeadEnds ends) {
+  Bead bead{a.x, a.y, std::int64_t{b.x} - a.x, std::int64_t{b.y} - a.y, static_cast<Wide>(width) * width, 0, ends == BeadEnds::kSquare};
+  bead.length2 = static_cast<Wide>(bead.dx) * bead.dx + static_cast<Wide>(bead.dy) * bead.dy;
+  const std::int64_t half = (std::int64_t{width} + 1) / 2;
+  const auto rows = static_cast<std::int64_t>(grid_.rows()), columns = static_cast<std::int64_t>(grid_.columns());
+  const std::int64_t first = std::max<std::int64_t>(0, grid_.y.first_at_or_beyond(std::min(a.y, b.y) - half));
+  const std::int64_t last = std::min(rows, grid_.y.first_at_or_beyond(std::max(a.y, b.y) + half + 1));
+  // A guess is wrong by the rounding of doubles, and by the nanometre that a centre is rounded down: one pixel is ample.
+  const double radius = static_cast<double>(width) / 2;
+  for (std::int64_t row = first; row < last; ++row) {
+    const std::int64_t y = grid_.y.centre(row);
+    Interval x = estimate(bead, radius, static_cast<double>(y - bead.ay));
+    if (!(x.low <= x.high)) {
+      // A row that only touches the bead's edge, as far as doubles can tell: look where it is widest.
+      const double share = bead.dy == 0 ? 0.5 : std::clamp(static_cast<double>(y - bead.ay) / static_cast<double>(bead.dy), 0.0, 1.0);
+      x.add(share * static_cast<double>(bead.dx), share * static_cast<double>(bead.dx));
+    }
+    const std::int64_t low = bead.ax + static_cast<std::int64_t>(std::floor(x.low)), high = bead.ax + static_cast<std::int64_t>(std::ceil(x.high));
+    std::int64_t begin = grid_.x.first_at_or_beyond(low) - 1, end = grid_.x.first_at_or_beyond(high + 1) + 1;
+    while (begin < end && !bead.holds(grid_.x.centre(begin), y)) ++begin;
+    while (end > begin && !bead.holds(grid_.x.centre(end - 1), y)) --end;
+    begin = std::max<std::int64_t>(begin, 0);
+    end = std::min(end, columns);
+    if (begin >= end) continue;
+    spans_.push_back({static_cast<std::uint32_t>(rows - 1 - row), static_cast<std::uint32_t>(begin), static_cast<std::uint32_t>(end)});
+  }
+}
+
+void BeadRaster::runs(Runs& out) {
+  const std::uint32_t rows = grid_.rows();
+  start_.assign(std::size_t{rows} + 1, 0);
+  for (const Span& span : spans_) ++start_[span.row + 1];
+  for (std::uint32_t r = 0; r < rows; ++r) start_[r + 1] += start_[r];
+  ordered_.resize(spans_.size());
+  for (const Span& span : spans_) ordered_[start_[span.row]++] = span;  // start_[r] becomes the end of row r
+  out.columns = grid_.columns();
+  out.row_offset.assign(1, 0);
+  out.row_offset.reserve(std::size_t{rows} + 1);
+  out.change.clear();
+  std::uint32_t begin = 0;
+  for (std::uint32_t r = 0; r < rows; ++r) {
+    const std::uint32_t end = start_[r];
+    std::sort(ordered_.begin() + begin, ordered_.begin() + end,
+              [](const Span& s, const Span& t) { return s.begin != t.begin ? s.begin < t.begin : s.end < t.end; });
+    for (std::uint32_t i = begin; i < end;) {
+      std::uint32_t reach = ordered_[i].end;
+      out.change.push_back(ordered_[i].begin);
+      for (++i; i < end && ordered_[i].begin <= reach; ++i) reach = std::max(reach, ordered_[i].end);
+      out.change.push_back(reach);
+    }
+    out.row_offset.push_back(static_cast<std::uint32_t>(out.change.size()));
+    begin = end;
+  }
+}
+
+void combine(const RunsView& a, const RunsView& b, SetOperation operation, Runs& out) {
+  out.columns = a.columns;
+  out.row_offset.assign(1, 0);
+  out.change.clear();
+  const auto wanted = [operation](bool in_a, bool in_b) {
+    switch (operation) {
+      case SetOperation::kUnion: return in_a || in_b;
+      case SetOperation::kIntersection: return in_a && in_b;
+      default: return in_a && !in_b;
+    }
+  };
+  for (std::uint32_t r = 0; r < a.rows(); ++r) {
+    const auto p = a.row(r), q = b.row(r);
+    std::size_t i = 0, j = 0;
+    bool inside = false;
+    while (i < p.size() || j < q.size()) {
+      const std::uint32_t at = std::min(i < p.size() ? p[i] : UINT32_MAX, j < q.size() ? q[j] : UINT32_MAX);
+      while (i < p.size() && p[i] == at) ++i;
+      while (j < q.size() && q[j] == at) ++j;
+      const bool now = wanted(i % 2 == 1, j % 2 == 1);
+      if (now != inside) out.change.push_back(at);
+      inside = now;
+    }
+    out.row_offset.push_back(static_cast<std::uint32_t>(out.change.size()));
+  }
+}
+
+}  // namespace lamina::raster
