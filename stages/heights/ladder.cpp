@@ -12,6 +12,15 @@ Result<Ladder> Ladder::reachable(const ThicknessSet& set, std::int64_t highest) 
     ladder.count_ = static_cast<std::uint32_t>(even);
     return ladder;
   }
+  const auto too_many = [&] {
+    return Error{Fault::kUsage,
+                 fmt::format("heights.thickness: layers can end at more than {} heights below {} mm; give thicknesses that "
+                             "are multiples of a coarser step",
+                             kMostRungs, mm(highest))};
+  };
+  // Of two lengths without a common divisor a and b, all but (a - 1) (b - 1) / 2 whole numbers are sums.
+  const std::int64_t a = set.least() / step, b = set.most() / step;
+  if (std::gcd(a, b) == 1 && even - a * b / 2 > kMostRungs) return too_many();
   // Sums in increasing order: the next one is the least of a known sum and one thickness more.
   std::vector<std::int64_t>& sums = ladder.heights_;
   std::vector<std::uint32_t> next(set.size(), 0);
@@ -23,12 +32,7 @@ Result<Ladder> Ladder::reachable(const ThicknessSet& set, std::int64_t highest) 
       least = std::min(least, sums[next[i]] + set.values[i]);
     }
     sums.push_back(least);
-    if (sums.size() > kMostRungs) {
-      return Error{Fault::kUsage,
-                   fmt::format("heights.thickness: layers can end at more than {} heights below {} mm; give thicknesses "
-                               "that are multiples of a coarser step",
-                               kMostRungs, mm(highest))};
-    }
+    if (sums.size() > kMostRungs) return too_many();
   }
   ladder.count_ = static_cast<std::uint32_t>(sums.size());
   return ladder;

@@ -1,0 +1,129 @@
+// lamina heights, and jobs whose layers fit the part.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "program.h"
+
+namespace lamina::test {
+namespace {
+
+// A box with a ledge: 12 x 10 x 2.05 mm, and 6 x 10 x 1 mm on its left.
+void write_ledge(const Directory& directory) {
+  write_box(directory / "low.stl", {0, 0, 0}, {12, 10, 2.05f});
+  write_box(directory / "high.stl", {0, 0, 0}, {6, 10, 3.05f});
+}
+
+TEST(HeightsCommand, TellsTheTableInEveryForm) {
+  const Directory directory;
+  write_ledge(directory);
+  const std::vector<std::string> call = {"heights", "low.stl", "--heights", "optimal", "--thickness", "0.1..0.3", "--quiet"};
+  const auto run = [&](std::initializer_list<std::string> more) {
+    std::vector<std::string> all = call;
+    all.insert(all.end(), more);
+    return run_lamina(all, directory.path());
+  };
+  const Outcome text = run({});
+  EXPECT_EQ(text.code, 0) << text.err;
+  EXPECT_NE(text.out.find("layers    7 of 0.1..0.3 mm, optimal"), std::string::npos) << text.out;
+  EXPECT_NE(text.out.find("flats     1 of 1 hit"), std::string::npos) << text.out;
+  EXPECT_NE(text.out.find("proof"), std::string::npos);
+  EXPECT_TRUE(text.err.empty()) << text.err;
+  const Outcome csv = run({"--format", "csv"});
+  EXPECT_EQ(std::count(csv.out.begin(), csv.out.end(), '\n'), 8) << csv.out;
+  const Outcome json = run({"--format", "json", "--compare"});
+  EXPECT_NE(json.out.find("\"name\": \"stepwise\""), std::string::npos) << json.out;
+  const Outcome rp3 = run({"--format", "rp3", "-o", "table.rp3"});
+  EXPECT_EQ(rp3.code, 0);
+  EXPECT_TRUE(rp3.out.empty());
+  EXPECT_TRUE(read_text(directory / "table.rp3").ends_with("----- fim do arquivo -----\n"));
+  EXPECT_EQ(run({"--plot", "plot.svg"}).code, 0);
+  EXPECT_TRUE(read_text(directory / "plot.svg").ends_with("</svg>\n"));
+}
+
+TEST(HeightsCommand, LayersOfOthersAreMeasuredByTheSameRules) {
+  const Directory directory;
+  write_ledge(directory);
+  write_text(directory / "tops.txt", "# tops\n0.5\n1.0 \n\n2.0\n");
+  const Outcome outcome =
+      run_lamina({"heights", "low.stl", "--measure", "tops.txt", "--layer", "0.5", "--format", "json", "--quiet"}, directory.path());
+  EXPECT_EQ(outcome.code, 0) << outcome.err;
+  EXPECT_NE(outcome.out.find("\"layers\": 3, \"top_mm\": 2.000000, \"top_miss_mm\": -0.050000"), std::string::npos) << outcome.out;
+  write_text(directory / "tops.txt", "0.5\n0.5\n");
+  const Outcome wrong = run_lamina({"heights", "low.stl", "--measure", "tops.txt"}, directory.path());
+  EXPECT_EQ(wrong.code, 3);
+  EXPECT_NE(wrong.err.find("tops.txt:2: "), std::string::npos) << wrong.err;
+}
+
+TEST(HeightsCommand, WrongUseIsOneLineThatNamesTheOption) {
+  const Directory directory;
+  write_ledge(directory);
+  const std::pair<std::vector<std::string>, const char*> calls[] = {
+      {{"--heights", "cusp"}, "--thickness"},
+      {{"--heights", "cups"}, "did you mean 'cusp'?"},
+      {{"--heights", "optimal", "--thickness", ""}, "--thickness: holds no thickness"},
+      {{"--heights", "optimal", "--thickness", "0.3..0.1"}, "--thickness: the least thickness"},
+      {{"--heights", "optimal", "--thickness", "-0.1,0.2"}, "--thickness: -0.1"},
+      {{"--heights", "optimal", "--thickness", "0.1,0.2", "--cusp", "0"}, "--cusp: 0"},
+      {{"--heights", "optimal", "--thickness", "0.1,0.2", "--time-model", "-1"}, "--time-model: -1"},
+      {{"--thickness", "0.1,0.2"}, "uniform layers have one thickness"},
+      {{"--format", "xml"}, "--format: 'xml'"},
+      {{"--plot", "plot.gif"}, "--plot plot.gif"},
+      {{"--heights", "optimal", "--thickness", "0.000002,0.000003", "--scale", "100"}, "heights.thickness"},
+  };
+  for (const auto& [options, told] : calls) {
+    std::vector<std::string> all = {"heights", "low.stl"};
+    all.insert(all.end(), options.begin(), options.end());
+    const Outcome outcome = run_lamina(all, directory.path());
+    EXPECT_EQ(outcome.code, 2) << told;
+    EXPECT_EQ(outcome.error_lines(), 1u) << outcome.err;
+    EXPECT_NE(outcome.err.find(told), std::string::npos) << outcome.err;
+  }
+  const Outcome jet = run_lamina({"jet", "low.stl", "--per-part", "-o", "out"}, directory.path());
+  EXPECT_EQ(jet.code, 2);
+  EXPECT_NE(jet.err.find("--per-part"), std::string::npos) << jet.err;
+}
+
+TEST(JetHeights, LayersOfEveryWayAreVerifiedAndRecordedWithTheirReason) {
+  const Directory directory;
+  write_ledge(directory);
+  for (const char* way : {"angle", "cusp", "stepwise", "optimal"}) {
+    const Outcome jet = run_lamina({"jet", "low.stl", "high.stl", "--bed", "40x40", "--dpi", "200", "--heights", way, "--thickness",
+                                    "0.1..0.3:0.01", "-o", way},
+                                   directory.path());
+    ASSERT_EQ(jet.code, 0) << jet.err;
+    EXPECT_EQ(run_lamina({"verify", way}, directory.path()).code, 0) << way;
+  }
+  const std::string manifest = read_text(directory / "optimal/manifest.json");
+  EXPECT_NE(manifest.find("\"reason\": \"flat\""), std::string::npos);
+  EXPECT_NE(manifest.find("\"layer_count\": 11"), std::string::npos) << manifest;  // 7 to 2.05, 4 to 3.05
+}
+
+TEST(JetHeights, StepsInsideLieWithinThoseAcrossAndTheseWithinThoseOutside) {
+  const Directory directory;
+  // A wedge: two boxes cannot show it, a tetrahedron does.
+  write_text(directory / "wedge.stl",
+             "solid w\n"
+             "facet normal 0 0 0\nouter loop\nvertex 0 0 0\nvertex 0 20 0\nvertex 20 0 0\nendloop\nendfacet\n"
+             "facet normal 0 0 0\nouter loop\nvertex 0 0 0\nvertex 20 0 0\nvertex 0 0 10\nendloop\nendfacet\n"
+             "facet normal 0 0 0\nouter loop\nvertex 0 0 0\nvertex 0 0 10\nvertex 0 20 0\nendloop\nendfacet\n"
+             "facet normal 0 0 0\nouter loop\nvertex 20 0 0\nvertex 0 20 0\nvertex 0 0 10\nendloop\nendfacet\n"
+             "endsolid w\n");
+  std::vector<long> pixels;
+  for (const char* side : {"inside", "across", "outside"}) {
+    const Outcome jet = run_lamina({"jet", "wedge.stl", "--bed", "30x30", "--dpi", "254", "--layer", "1", "--containment", side,
+                                    "--engine", "both", "--json", "--quiet", "-o", side},
+                                   directory.path());
+    ASSERT_EQ(jet.code, 0) << jet.err;
+    const std::size_t at = jet.out.find("\"set_pixels\":");
+    ASSERT_NE(at, std::string::npos) << jet.out;
+    pixels.push_back(std::stol(jet.out.substr(at + 13)));
+  }
+  // 200 x 200 / 2 pixels times (1 - z / 10) squared: at the tops, the middles, the bottoms of ten layers.
+  EXPECT_NEAR(static_cast<double>(pixels[0]), 20'000 * 2.85, 20'000 * 0.03);
+  EXPECT_NEAR(static_cast<double>(pixels[1]), 20'000 * 3.325, 20'000 * 0.03);
+  EXPECT_NEAR(static_cast<double>(pixels[2]), 20'000 * 3.85, 20'000 * 0.03);
+}
+
+}  // namespace
+}  // namespace lamina::test
