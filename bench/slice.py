@@ -129,7 +129,7 @@ def run_case(case, options, lamina, parts, work):
 
 def stages(program, options):
     output = subprocess.run([program, "--benchmark_filter=^slice/(terrain_gz|benchy_3mf|gyroid_gz)/", "--benchmark_format=json",
-                             "--benchmark_repetitions=3"], check=True, stdout=subprocess.PIPE,
+                             "--benchmark_repetitions=3", "--benchmark_min_time=0.1"], check=True, stdout=subprocess.PIPE,
                             env=dict(os.environ, LAMINA_MODELS=options.models)).stdout
     return {entry["run_name"].removeprefix("slice/"): {key: entry[key] for key in ("cpu_time", "segments", "segments/s", "triangles/s")
                                                        if key in entry}

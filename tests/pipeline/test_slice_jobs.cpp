@@ -28,7 +28,7 @@ TEST(SliceProgram, SameBytesForAnyThreadsAndMemoryInEveryFormat) {
     for (const auto& [threads, memory] : {std::pair{"1", "1G"}, {"2", "1G"}, {"5", "1M"}}) {
       const std::string out = "out" + std::to_string(j) + threads;
       std::vector<std::string> arguments = {"slice", corpus("nist_am_test_artifact_v3b.stl"), corpus("dental_crown.stl"),
-                                            "--layer", "0.9", "--quiet", "-o", out, "--threads", threads, "--memory", memory};
+                                            "--layer", "2.3", "--quiet", "-o", out, "--threads", threads, "--memory", memory};
       arguments.insert(arguments.end(), jobs[j].begin(), jobs[j].end());
       const Outcome outcome = run_lamina(arguments, directory.path());
       ASSERT_EQ(outcome.code, 0) << outcome.err;
