@@ -89,11 +89,14 @@ int run_jet_command(const std::vector<std::string>& texts) {
   if (!job->dry_run) {
     if (Status status = check_output(*job); !status) return fail(status.error());
   }
-  const std::atomic<bool>& cancel = watch_for_interrupts();
+  const std::atomic<bool>& cancel = watch_for_interrupts(false);
   Progress progress(job->quiet     ? Progress::Style::kSilent
                     : is_terminal() ? Progress::Style::kBar
                                     : Progress::Style::kLines);
-  const Result<JetSummary> summary = run_jet(*job, [&](const ProgressEvent& event) { progress(event); }, cancel);
+  const Result<JetSummary> summary = run_jet(*job, [&](const ProgressEvent& event) {
+    if (event.stage == ProgressEvent::Stage::kLayers) keep_what_is_done();
+    progress(event);
+  }, cancel);
   progress.clear();
   if (!summary) return fail(summary.error().fault == Fault::kInterrupted ? interrupted(*job) : summary.error());
   if (!job->quiet) say_text(summary_text(*job, *summary));

@@ -19,31 +19,47 @@ struct Ticket {
   std::shared_ptr<LayerOutcome> outcome;
 };
 
-/// Lends out work slots and bytes. Slots are handed out last in, first out, so that few slots grow large.
+/// Lends out work slots and bytes. Slots are handed out last in, first out, so that few slots grow large. What an idle
+/// slot holds on to counts as used; it is let go where a layer would have to wait for it.
 class Budget {
  public:
   explicit Budget(const GraphLimits& limits) : limits_(limits) {}
 
-  /// A slot for a layer that may need `bytes`, or nullptr if it has to wait.
-  LayerWork* take(std::uint64_t bytes) {
-    if (in_flight_ > 0 && (in_flight_ >= limits_.most_in_flight || used_ + bytes > limits_.budget_bytes)) return nullptr;
-    if (free_.empty()) {
+  struct Loan {
+    LayerWork* work = nullptr;  // null: the layer has to wait
+    std::uint64_t bytes = 0;
+  };
+
+  /// A slot for a layer that may need `bytes`.
+  Loan take(std::uint64_t bytes) {
+    if (in_flight_ > 0 && (in_flight_ >= limits_.most_in_flight || used_ + bytes > limits_.budget_bytes)) return {};
+    if (idle_.empty()) {
       slots_.push_back(std::make_unique<LayerWork>());
-      free_.push_back(slots_.back().get());
+      idle_.push_back({slots_.back().get(), 0});
     }
-    LayerWork* work = free_.back();
-    free_.pop_back();
+    for (Loan& slot : idle_) {  // the last one is going to be used: it is emptied last
+      if (used_ + idle_bytes_ + bytes <= limits_.budget_bytes) break;
+      if (slot.bytes == 0) continue;
+      idle_bytes_ -= slot.bytes;
+      *slot.work = LayerWork();
+      slot.bytes = 0;
+    }
+    Loan loan = idle_.back();
+    idle_.pop_back();
+    idle_bytes_ -= loan.bytes;
+    loan.bytes = std::max(loan.bytes, bytes);
     ++in_flight_;
-    used_ += bytes;
+    used_ += loan.bytes;
     report_.most_in_flight = std::max(report_.most_in_flight, in_flight_);
-    report_.most_bytes = std::max(report_.most_bytes, used_);
-    return work;
+    report_.most_bytes = std::max(report_.most_bytes, used_ + idle_bytes_);
+    return loan;
   }
 
-  void give_back(LayerWork* work, std::uint64_t bytes) {
-    free_.push_back(work);
+  void give_back(const Loan& loan) {
     --in_flight_;
-    used_ -= bytes;
+    used_ -= loan.bytes;
+    idle_.push_back({loan.work, loan.work->bytes()});
+    idle_bytes_ += idle_.back().bytes;
   }
 
   const GraphReport& report() const { return report_; }
@@ -51,9 +67,10 @@ class Budget {
  private:
   const GraphLimits& limits_;
   std::vector<std::unique_ptr<LayerWork>> slots_;
-  std::vector<LayerWork*> free_;
+  std::vector<Loan> idle_;        // with what each holds on to
   std::uint32_t in_flight_ = 0;
-  std::uint64_t used_ = 0;
+  std::uint64_t used_ = 0;        // by layers in flight
+  std::uint64_t idle_bytes_ = 0;  // of idle slots
   GraphReport report_;
 };
 
@@ -85,9 +102,10 @@ Status run_layers(std::span<const Layer> layers, const LayerStages& stages, cons
         const std::lock_guard lock(admission);
         if (cancel.load(std::memory_order_relaxed)) stopped = true;
         if (stopped || next == layers.size() || next - recorded >= limits.most_unrecorded) return;
-        ticket.credits = limits.bytes_of_layer(layers[next]);
-        ticket.work = budget.take(ticket.credits);
-        if (ticket.work == nullptr) return;
+        const Budget::Loan loan = budget.take(limits.bytes_of_layer(layers[next]));
+        if (loan.work == nullptr) return;
+        ticket.work = loan.work;
+        ticket.credits = loan.bytes;
         ticket.position = next++;
       }
       ticket.outcome = std::make_shared<LayerOutcome>();
@@ -99,7 +117,7 @@ Status run_layers(std::span<const Layer> layers, const LayerStages& stages, cons
     if (ticket.outcome->status) ticket.outcome->status = stages.store(*ticket.work, *ticket.outcome);
     {
       const std::lock_guard lock(admission);
-      budget.give_back(ticket.work, ticket.credits);
+      budget.give_back({ticket.work, ticket.credits});
     }
     ticket.work = nullptr;
     admit();

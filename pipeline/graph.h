@@ -25,8 +25,17 @@
 
 namespace lamina::pipeline {
 
-/// What a layer occupies while it is in flight; reused by later layers.
+/// What a layer occupies while it is in flight; reused by later layers, which pay for what it holds on to.
 struct LayerWork {
+  /// Of its buffers; what an encoder keeps for itself is small.
+  std::uint64_t bytes() const {
+    std::uint64_t total = scratch.bytes() + bytes_held(file) + program.bytes();
+    for (const Runs* image : {&runs, &second, &third, &lowest, &highest}) {
+      total += bytes_held(image->row_offset) + bytes_held(image->change);
+    }
+    return total;
+  }
+
   raster::LayerScratch scratch;
   Runs runs;
   Runs second;  // of the other engine, or mirrored, or before its dose

@@ -3,15 +3,20 @@
 #include <unistd.h>
 
 #include <csignal>
+#include <string_view>
 
 namespace lamina::pipeline {
 namespace {
 
-std::atomic<bool> interrupted{false};
+std::atomic<bool> interrupted{false}, keeping{true};
 static_assert(std::atomic<bool>::is_always_lock_free);  // a signal handler may touch nothing else
 
 void on_signal(int) {
-  if (interrupted.exchange(true)) ::_exit(130);
+  if (!keeping) {
+    constexpr std::string_view kLine = "lamina: interrupted before the first layer\n";
+    if (::write(STDERR_FILENO, kLine.data(), kLine.size()) < 0) ::_exit(130);
+  }
+  if (interrupted.exchange(true) || !keeping) ::_exit(130);
 }
 
 thread_local const std::atomic<bool>* own_flag = nullptr;
@@ -21,8 +26,10 @@ thread_local const std::atomic<bool>* own_flag = nullptr;
 InterruptScope::InterruptScope(const std::atomic<bool>& flag) : outer_(own_flag) { own_flag = &flag; }
 InterruptScope::~InterruptScope() { own_flag = outer_; }
 
-const std::atomic<bool>& watch_for_interrupts() {
+const std::atomic<bool>& watch_for_interrupts(bool something_to_keep) {
   if (own_flag != nullptr) return *own_flag;
+  static const bool decided = (keeping = something_to_keep, true);
+  static_cast<void>(decided);
   struct sigaction action {};
   action.sa_handler = on_signal;
   action.sa_flags = SA_RESTART;
@@ -31,5 +38,7 @@ const std::atomic<bool>& watch_for_interrupts() {
   sigaction(SIGTERM, &action, nullptr);
   return interrupted;
 }
+
+void keep_what_is_done() { keeping = true; }
 
 }  // namespace lamina::pipeline

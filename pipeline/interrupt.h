@@ -6,7 +6,12 @@
 namespace lamina::pipeline {
 
 /// From now on the first SIGINT or SIGTERM sets the flag that is returned; the next one ends the program with 130.
-const std::atomic<bool>& watch_for_interrupts();
+/// While there is nothing that would be lost, the first one ends it: reading a large part may take long, and no library
+/// that reads it looks at the flag. The first call in a program decides: a batch has results to keep from the start.
+const std::atomic<bool>& watch_for_interrupts(bool something_to_keep = true);
+
+/// There is now: the first signal asks from here on.
+void keep_what_is_done();
 
 /// While it lives, watch_for_interrupts() of this thread gives `flag` and leaves signals alone: whoever runs several
 /// jobs decides when each of them has to stop.

@@ -274,6 +274,7 @@ Result<JetSummary> run_jet(const Job& asked, const ProgressCallback& progress, c
 
   // --- output
   if (!job.dry_run) {
+    if (auto status = check_shard_replaces_itself(job, head); !status) return status.error();
     if (auto status = prepare_output(job); !status) return status.error();
   }
   auto plan = job.dry_run ? Result<LayerPlan>(LayerPlan{}) : plan_layers(job, head, table);

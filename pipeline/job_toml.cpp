@@ -259,6 +259,10 @@ std::string canonical_job_text(const Job& job) {
 
 Status save_job(const std::string& path, const Job& job) {
   for (const PartRequest& part : job.parts) {
+    std::error_code absent;
+    if (fs::equivalent(path, part.path, absent)) {
+      return Error{Fault::kUsage, fmt::format("--save-job {}: is a part of the job; name another file", path)};
+    }
     if (!is_utf8(part.path)) {
       return Error{Fault::kUsage, fmt::format("{}: a job file cannot name it, it is not UTF-8; rename it", part.path)};
     }

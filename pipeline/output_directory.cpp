@@ -121,7 +121,7 @@ Status check_output(const Job& job) {
     return Error{Fault::kOutput, fmt::format("{}: is a file, not a directory; name another one with -o", job.output)};
   }
   const std::string own = manifest_name(job);
-  bool shared = false;
+  bool shared = false, begun = false;
   for (const ManifestFile& file : find_manifests(job.output)) {
     const bool is_own = file.name == own || file.name == own + std::string(kPartial);
     const auto refuse = [&](std::string_view what, std::string_view advice) {
@@ -131,6 +131,7 @@ Status check_output(const Job& job) {
       const std::string path = fmt::format("{}/{}", job.output, file.name.substr(0, file.name.size() - kPartial.size()));
       if (Status busy = check_not_being_written(path); !busy) return busy;
     }
+    begun |= is_own;
     if (joins(job, file)) {
       shared = true;
     } else if (is_own && !job.resume && !job.overwrite) {
@@ -142,9 +143,22 @@ Status check_output(const Job& job) {
                                                                 : "replace it with --overwrite, or name another directory");
     }
   }
-  if (!job.resume && !job.overwrite && !shared && !layer_files(job.output).empty()) {
+  if (!(job.resume && begun) && !job.overwrite && !shared && !layer_files(job.output).empty()) {
     return Error{Fault::kUsage, fmt::format("{}/layers: holds layers without a manifest; replace them with --overwrite, "
                                             "or name another directory", job.output)};
+  }
+  return {};
+}
+
+Status check_shard_replaces_itself(const Job& job, const ManifestHead& head) {
+  if (!job.shard || !job.overwrite) return {};
+  for (const std::string& name : {manifest_name(job), manifest_name(job) + std::string(kPartial)}) {
+    const std::string path = job.output + "/" + name;
+    if (::access(path.c_str(), F_OK) != 0) continue;
+    const Result<Manifest> earlier = read_manifest(path);
+    if (earlier && earlier->head.id() == head.id()) continue;
+    return Error{Fault::kUsage, fmt::format("{}: is of another job, whose layers a shard cannot clear away; remove {} first, "
+                                            "or name another directory", path, job.output)};
   }
   return {};
 }

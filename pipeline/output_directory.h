@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "pipeline/job.h"
+#include "pipeline/manifest.h"
 #include "stages/data/status.h"
 
 namespace lamina::pipeline {
@@ -34,6 +35,11 @@ bool read_program_file_name(std::string_view name, std::uint32_t& index, bool& p
 ///         join the other shards of the same split. kOutput if a file stands in place of the directory, or
 ///         another run writes into it right now
 Status check_output(const Job& job);
+
+/// A shard leaves the layers of other shards alone, and cannot tell them from those of an earlier job: where its own
+/// manifest is of another job, the directory has to be cleared first.
+/// errors  kUsage
+Status check_shard_replaces_itself(const Job& job, const ManifestHead& head);
 
 /// check_output, then creates the directory and its layers/, and clears it: with --overwrite of all that an earlier
 /// job left (a shard: of its own manifest), else of files that an interrupted run left half written.

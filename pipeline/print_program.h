@@ -27,6 +27,8 @@ struct ProgramWork {
   program::CompileScratch compile;
   std::unique_ptr<write::ProgramWriter> writer;
   write::ProgramBytes text;
+
+  std::uint64_t bytes() const { return bytes_held(compile.line) + bytes_held(text); }
 };
 
 /// The file of a layer's program in a job's directory, program/000042.gcode; "" without a machine.

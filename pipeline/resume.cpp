@@ -22,14 +22,17 @@ Result<std::vector<LayerRecord>> layers_that_hold(const std::string& directory, 
     return Error{Fault::kUsage, fmt::format("{}: belongs to another job ({}); choose another directory, or --overwrite",
                                             path, what.empty() ? "its parts or keys differ" : what)};
   }
+  const ManifestHead& was = manifest->head;
+  if (was.first_layer < head.first_layer || was.last_layer > head.last_layer) {
+    return Error{Fault::kUsage,
+                 fmt::format("{}: is of layers {}:{}, which {}:{} would not keep; resume with the same --layers or more, or "
+                             "choose another directory and join them by lamina merge",
+                             path, was.first_layer, was.last_layer, head.first_layer, head.last_layer)};
+  }
   const std::vector<LayerRecord>& recorded = manifest->layers;
   std::vector<char> holds(recorded.size(), 1);
   tbb::parallel_for(std::size_t{0}, recorded.size(), [&](std::size_t i) {
     const LayerRecord& record = recorded[i];
-    if (record.layer.index < head.first_layer || record.layer.index >= head.last_layer) {
-      holds[i] = 0;
-      return;
-    }
     const std::string name = layer_file_name(record.layer.index, head.extension);
     const auto hold = [&](const std::string& file, std::uint64_t bytes, const Hash128& hash) {
       if (file.empty()) return true;  // a format without files, a job without a machine

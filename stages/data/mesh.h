@@ -53,6 +53,7 @@ struct Mesh {
   std::string name;  // file, and the object in it where a file holds several
   Buffer<Triangle> triangles;
   std::uint32_t repaired_from = UINT32_MAX;  // >= triangles.size() when nothing was added
+  bool closed = true;  // every edge is walked as often one way as the other; false only where repair was off
   Box bounds;
   std::uint64_t fingerprint = 0;  // of the triangles in any order (load/diagnose.h)
 };

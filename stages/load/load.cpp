@@ -93,7 +93,8 @@ Result<Mesh> finish(const Source& source, const std::string& name, const std::st
     if (!found.balanced)
       return Error{Fault::kInternal, source.path() + ": repair left the mesh open; please report it"};
   } else if (!found.balanced) {
-    notes.push_back({false, prefix + "the mesh is not closed and repair is off: rows may stay open"});
+    mesh.closed = false;
+    notes.push_back({false, prefix + "the mesh is not closed and repair is off: rows of it may stay open"});
   }
   mesh.fingerprint = found.fingerprint;
   return mesh;

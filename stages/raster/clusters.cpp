@@ -110,6 +110,7 @@ ClusteredMesh make_clusters(Mesh& mesh) {
   const std::uint32_t own = std::min(mesh.repaired_from, total), caps = total - own;
   ClusteredMesh out;
   out.first_cap = clusters_for(own);
+  out.closed = mesh.closed;
   const std::uint32_t clusters = out.first_cap + clusters_for(caps);
   const std::uint32_t first_cap_at = out.first_cap * kClusterSize;
 

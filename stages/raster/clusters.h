@@ -30,6 +30,7 @@ struct ClusteredMesh {
   std::span<const Cluster> clusters;
   Buffer<Box> bounds;            // nm, of each cluster
   std::uint32_t first_cap = 0;   // clusters from here on hold only triangles that repair added
+  bool closed = true;            // as Mesh::closed
 };
 
 /// Groups the triangles of a mesh into clusters, in place, and takes them out of the mesh.

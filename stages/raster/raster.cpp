@@ -134,8 +134,12 @@ LayerReport Rasterizer::layer(Engine engine, Nm plane, LayerScratch& scratch, Ru
 std::uint64_t Rasterizer::layer_bytes_bound(Nm plane) const {
   const LayerBound::Count count = state_->bound.front().at(plane);
   const std::uint64_t rows = state_->grid.rows();
+  // Segments of open parts are held twice, and close at most as many crossings as they have.
+  const bool open = !std::ranges::all_of(state_->meshes, &ClusteredMesh::closed);
+  const std::uint64_t closing = open ? 2 * count.segments * sizeof(Segment) + 3 * 8 * count.crossings : 0;
   // Buffers may hold up to twice what they need, crossings and changes take 4 bytes each.
-  return 2 * count.segments * (sizeof(Segment) + sizeof(ClusterVisit)) + 2 * (count.crossings + rows) * 4 * 2 + rows * 8;
+  return 2 * count.segments * (sizeof(Segment) + sizeof(ClusterVisit)) + 2 * (count.crossings + rows) * 4 * 2 +
+         rows * 8 + closing;
 }
 
 std::uint64_t Rasterizer::crossings_bound(Nm plane) const { return state_->bound.front().at(plane).crossings; }

@@ -1,6 +1,7 @@
 #include "stages/raster/scan.h"
 
 #include <algorithm>
+#include <cstdlib>
 #include <cstring>
 
 namespace lamina::raster {
@@ -29,9 +30,9 @@ void sort_row(std::uint32_t* begin, std::uint32_t* end) {
 /// Writes the changes of one sorted row behind `change`, returns their end. The winding number starts at 0 on the left;
 /// where two crossings meet in one column, what is between them is empty and leaves no change.
 template <FillRule kRule>
-std::uint32_t* write_changes(const std::uint32_t* crossing, const std::uint32_t* end, std::uint32_t* change,
-                             std::int32_t& winding) {
+std::uint32_t* write_changes(const std::uint32_t* crossing, const std::uint32_t* end, std::uint32_t* change) {
   const std::uint32_t* const row_begin = change;
+  std::int32_t winding = 0;
   bool solid = false;
   for (; crossing != end; ++crossing) {
     winding += (*crossing & 1) != 0 ? 1 : -1;
@@ -54,6 +55,10 @@ void ScanConverter::place_segments(std::span<const Segment> segments, std::uint3
   for (const Segment& segment : segments) {
     ++place_[segment.first_row - first_row];
     --place_[segment.last_row - first_row];
+  }
+  for (const Closing& closing : closing_) {
+    ++place_[closing.row - first_row];
+    --place_[closing.row - first_row + 1];
   }
   std::uint32_t in_row = 0, total = 0;
   for (std::uint32_t row = 0; row < rows; ++row) {
@@ -103,6 +108,43 @@ void ScanConverter::fill_crossings(const PixelSampling& sampling, const Segment&
   }
 }
 
+void ScanConverter::close_open_parts(const PixelSampling& sampling, std::span<const Segment> segments,
+                                     std::span<const PlacedMesh> placed, Nm plane, std::uint32_t first_row,
+                                     std::uint32_t rows, LayerReport& report) {
+  of_open_parts_.clear();
+  closing_.clear();
+  if (std::ranges::all_of(placed, [](const PlacedMesh& part) { return part.mesh->closed; })) return;
+  for (const Segment& segment : segments) {
+    if (!placed[segment.instance].mesh->closed) of_open_parts_.push_back(segment);
+  }
+  std::ranges::sort(of_open_parts_, {}, &Segment::instance);
+  Buffer<Closing> closings;  // closing_ stays empty while the crossings of single parts are placed
+  for (auto begin = of_open_parts_.begin(); begin != of_open_parts_.end();) {
+    const auto end = std::find_if(begin, of_open_parts_.end(),
+                                  [&](const Segment& segment) { return segment.instance != begin->instance; });
+    const std::span<const Segment> part(begin, end);
+    place_segments(part, first_row, rows);
+    for (const Segment& segment : part) fill_crossings(sampling, segment, placed, plane, first_row);
+    for (std::uint32_t row = 0; row < rows; ++row) {
+      std::int32_t winding = 0;
+      std::uint32_t last = 0;
+      for (std::uint32_t i = row == 0 ? 0 : place_[row - 1]; i < place_[row]; ++i) {
+        winding += (crossing_[i] & 1) != 0 ? 1 : -1;
+        last = std::max(last, crossing_[i] >> 1);
+      }
+      const std::uint32_t closing = last * 2 + (winding < 0 ? 1 : 0);
+      closings.insert(closings.end(), static_cast<std::size_t>(std::abs(winding)), {first_row + row, closing});
+    }
+    begin = end;
+  }
+  closing_ = std::move(closings);
+  if (closing_.empty()) return;
+  capped_.assign(rows, 0);
+  for (const Closing& closing : closing_) capped_[closing.row - first_row] = 1;
+  report.open_rows += static_cast<std::uint32_t>(std::ranges::count(capped_, 1));
+  report.first_open_row = std::ranges::min(closing_, {}, &Closing::row).row;  // bands come from the back
+}
+
 void ScanConverter::report_caps(std::span<const Segment> segments, std::uint32_t first_row, std::uint32_t rows,
                                 LayerReport& report) {
   capped_.assign(rows, 0);
@@ -131,7 +173,9 @@ void ScanConverter::append_rows(const PixelSampling& sampling, std::span<const S
     return;
   }
 
+  close_open_parts(sampling, segments, placed, plane, first_row, rows, report);
   place_segments(segments, first_row, rows);
+  for (const Closing& closing : closing_) crossing_[place_[closing.row - first_row]++] = closing.crossing;
   bool any_cap = false;
   for (const Segment& segment : segments) {
     fill_crossings(sampling, segment, placed, plane, first_row);
@@ -141,8 +185,7 @@ void ScanConverter::append_rows(const PixelSampling& sampling, std::span<const S
   report.crossings += crossing_.size();
   if (any_cap) report_caps(segments, first_row, rows, report);
 
-  // A change has a crossing of its own, but for the closing one of an open row.
-  out.change.resize(out_changes + crossing_.size() + rows);
+  out.change.resize(out_changes + crossing_.size());  // a change has a crossing of its own
   std::uint32_t* const changes = out.change.data();
   std::uint32_t* change = changes + out_changes;
   for (std::uint32_t row = rows; row-- > 0;) {
@@ -151,24 +194,12 @@ void ScanConverter::append_rows(const PixelSampling& sampling, std::span<const S
     if (begin != end) {
       sort_row(begin, end);
       const std::uint32_t* const row_begin = change;
-      std::int32_t winding = 0;
       switch (rule) {
-        case FillRule::kNonzero: change = write_changes<FillRule::kNonzero>(begin, end, change, winding); break;
-        case FillRule::kPositive: change = write_changes<FillRule::kPositive>(begin, end, change, winding); break;
-        case FillRule::kEvenOdd: change = write_changes<FillRule::kEvenOdd>(begin, end, change, winding); break;
+        case FillRule::kNonzero: change = write_changes<FillRule::kNonzero>(begin, end, change); break;
+        case FillRule::kPositive: change = write_changes<FillRule::kPositive>(begin, end, change); break;
+        case FillRule::kEvenOdd: change = write_changes<FillRule::kEvenOdd>(begin, end, change); break;
       }
-      if (winding != 0) [[unlikely]] {
-        ++report.open_rows;
-        report.first_open_row = first_row + row;
-        if (((change - row_begin) & 1) != 0) {  // still solid: ends at the last crossing
-          const std::uint32_t last = end[-1] >> 1;
-          if (change[-1] == last) {
-            --change;
-          } else {
-            *change++ = last;
-          }
-        }
-      }
+      change -= (change - row_begin) & 1;  // an open mesh that says it is closed: runs stay pairs all the same
     }
     *row_end++ = static_cast<std::uint32_t>(change - changes);
   }

@@ -30,7 +30,7 @@ struct LayerReport {
   std::uint32_t segments = 0;
   std::uint64_t crossings = 0;
   std::uint32_t capped_rows = 0;  // rows in which a facet that repair added is crossed
-  std::uint32_t open_rows = 0;    // rows whose crossings do not add up to zero: the mesh is open and was not repaired
+  std::uint32_t open_rows = 0;    // rows in which the crossings of a part do not add up to zero: it was not repaired
   std::uint32_t first_capped_row = 0, first_open_row = 0;  // geometry rows; the lowest, if there is any
   std::uint32_t first_capped_instance = 0;                 // of the facet that closes that row
   std::uint64_t scratch_bytes = 0;
@@ -39,7 +39,8 @@ struct LayerReport {
 /// Scan conversion of one band of rows at a time: count (by differences, a segment costs two additions), scan, fill,
 /// then each row is sorted and the fill rule decides where it changes. Keeps its buffers from band to band.
 ///
-/// A row whose crossings do not add up to zero is drawn up to its last crossing and no further.
+/// Where a part is open (Mesh::closed), a row whose crossings of that part do not add up to zero is closed at the last
+/// of them: whatever lies beside the part is drawn as if the part ended there.
 class ScanConverter {
  public:
   /// Appends rows last_row - 1 down to first_row (image order) to `out`; `segments` lie within these rows.
@@ -47,10 +48,22 @@ class ScanConverter {
                    std::span<const PlacedMesh> placed, Nm plane, FillRule rule, std::uint32_t first_row,
                    std::uint32_t last_row, Runs& out, LayerReport& report);
 
-  std::uint64_t bytes() const { return bytes_held(place_) + bytes_held(crossing_) + bytes_held(capped_); }
+  std::uint64_t bytes() const {
+    return bytes_held(place_) + bytes_held(crossing_) + bytes_held(capped_) + bytes_held(of_open_parts_) +
+           bytes_held(closing_);
+  }
 
  private:
+  /// What makes the crossings of an open part add up to zero in a row.
+  struct Closing {
+    std::uint32_t row;       // geometry row
+    std::uint32_t crossing;  // column * 2 + (1 if it enters)
+  };
+
   void place_segments(std::span<const Segment> segments, std::uint32_t first_row, std::uint32_t rows);
+  void close_open_parts(const PixelSampling& sampling, std::span<const Segment> segments,
+                        std::span<const PlacedMesh> placed, Nm plane, std::uint32_t first_row, std::uint32_t rows,
+                        LayerReport& report);
   void fill_crossings(const PixelSampling& sampling, const Segment& segment, std::span<const PlacedMesh> placed,
                       Nm plane, std::uint32_t first_row);
   void report_caps(std::span<const Segment> segments, std::uint32_t first_row, std::uint32_t rows,
@@ -59,6 +72,8 @@ class ScanConverter {
   Buffer<std::uint32_t> place_;     // per geometry row of the band: where its next crossing goes
   Buffer<std::uint32_t> crossing_;  // column * 2 + (1 if it enters), row by row
   Buffer<std::uint8_t> capped_;     // per geometry row of the band
+  Buffer<Segment> of_open_parts_;   // of the band, by part
+  Buffer<Closing> closing_;         // of the band
 };
 
 }  // namespace lamina::raster

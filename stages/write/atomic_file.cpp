@@ -2,12 +2,14 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <cerrno>
 #include <cstdio>
 #include <cstring>
+#include <filesystem>
 
 namespace lamina::write {
 namespace {
@@ -43,7 +45,20 @@ int write_all(int file, std::span<const std::byte> bytes) {
 
 }  // namespace
 
-Status write_file(const std::string& path, std::span<const std::byte> bytes) {
+Status write_file(const std::string& asked, std::span<const std::byte> bytes) {
+  std::string path = asked;
+  struct stat status {};
+  if (::lstat(asked.c_str(), &status) == 0 && !S_ISREG(status.st_mode)) {
+    if (S_ISLNK(status.st_mode)) {
+      std::error_code error;
+      path = std::filesystem::weakly_canonical(asked, error).string();
+      if (error) return failure(asked, error.value());
+    }
+    if (::stat(path.c_str(), &status) == 0 && !S_ISREG(status.st_mode)) {
+      return Error{Fault::kOutput, fmt::format("{}: is {}, not a file; name another one", asked,
+                                               S_ISDIR(status.st_mode) ? "a directory" : "a device or a pipe")};
+    }
+  }
   const std::string temporary = path + ".part";
   const int file = ::open(temporary.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
   if (file < 0) return failure(path, errno);

@@ -9,7 +9,8 @@
 
 namespace lamina::write {
 
-/// Writes `bytes` under a temporary name beside `path` (path + ".part"), then renames it.
+/// Writes `bytes` under a temporary name beside `path` (path + ".part"), then renames it. A symbolic link stays one, and
+/// the file that it leads to is written. A device, a pipe or a directory of that name is not replaced.
 /// errors  kOutput, one line with the path and the system's reason (no space, no permission, ...); the temporary file
 ///         is removed again, and an older file of that name stays as it was.
 Status write_file(const std::string& path, std::span<const std::byte> bytes);

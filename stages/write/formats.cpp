@@ -19,6 +19,11 @@ constexpr Count kFileRoom = 4096;  // header, directory, checks
 constexpr Count most_g4(Count, Count rows, Count changes) { return kFileRoom + rows + 4 * changes; }
 /// Every pixel a bit, rows in whole bytes.
 constexpr Count most_bits(Count columns, Count rows, Count) { return kFileRoom + (columns + 7) / 8 * rows; }
+/// The same, with the place of each strip of 256 KiB (or of a longer row), and one strip of bits beside the file.
+constexpr Count most_strips(Count columns, Count rows, Count changes) {
+  const Count bits = most_bits(columns, rows, changes);
+  return bits + bits / 16384 + 256 * 1024 + columns / 8;
+}
 /// A packet of two bytes for each 128 equal ones; around a change up to two bytes more.
 constexpr Count most_packbits(Count columns, Count rows, Count changes) {
   return std::min((columns / 512 + 3) * rows + 4 * changes, (columns / 8 + columns / 1024 + 2) * rows) + kFileRoom;
@@ -32,7 +37,7 @@ constexpr Count most_null(Count, Count, Count) { return 0; }
 constexpr std::array<ImageFormat, 6> kFormats = {{
     {"tiff-g4", ".tif", "TIFF, CCITT Group 4: small and fast, read by every RIP", tiff::make_g4_encoder, most_g4},
     {"tiff-packbits", ".tif", "TIFF, PackBits: for readers without CCITT", tiff::make_packbits_encoder, most_packbits},
-    {"tiff-none", ".tif", "TIFF, uncompressed", tiff::make_uncompressed_encoder, most_bits},
+    {"tiff-none", ".tif", "TIFF, uncompressed", tiff::make_uncompressed_encoder, most_strips},
     {"png", ".png", "PNG, 1 bit", png::make_encoder, most_png},
     {"pbm", ".pbm", "portable bitmap, uncompressed", pbm::make_encoder, most_bits},
     {"null", "", "no image files: for timing", null::make_encoder, most_null},

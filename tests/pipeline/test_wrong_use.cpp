@@ -1,6 +1,7 @@
 // Wrong use of the real program: one line, the documented exit code, and nothing half made.
 #include <gtest/gtest.h>
 #include <sys/mount.h>
+#include <sys/stat.h>
 #include <zlib.h>
 
 #include <algorithm>
@@ -150,6 +151,22 @@ TEST_F(WrongUse, DirectoryThatCannotBeWrittenIsAnOutputError) {
   refused(4, {"jet", "part.stl", "--dry-run", "--save-job", "/proc/nowhere/job.toml"}, {"/proc/nowhere/job.toml"});
 }
 
+TEST_F(WrongUse, WrittenFilesReplaceNeitherPartsNorDevices) {
+  refused(2, {"jet", "part.stl", "--dry-run", "--save-job", "part.stl"}, {"part.stl", "is a part"});
+  EXPECT_EQ(run_lamina({"info", "part.stl"}, directory_.path()).code, 0);
+  ASSERT_EQ(::mkfifo((directory_ / "pipe").c_str(), 0600), 0);
+  std::filesystem::create_symlink("pipe", directory_ / "device");
+  refused(4, {"jet", "part.stl", "--dry-run", "--save-job", "pipe"}, {"pipe", "a device or a pipe"});
+  refused(4, {"jet", "part.stl", "--dry-run", "--save-job", "device"}, {"device", "a device or a pipe"});
+  refused(4, {"jet", "part.stl", "--dry-run", "--save-job", "."}, {"a directory"});
+  // A link to a file stays one.
+  write_text(directory_ / "file.toml", "old");
+  std::filesystem::create_symlink("file.toml", directory_ / "link.toml");
+  EXPECT_EQ(run_lamina({"jet", "part.stl", "--dry-run", "--quiet", "--save-job", "link.toml"}, directory_.path()).code, 0);
+  EXPECT_TRUE(std::filesystem::is_symlink(directory_ / "link.toml"));
+  EXPECT_NE(read_text(directory_ / "file.toml").find("part.stl"), std::string::npos);
+}
+
 TEST_F(WrongUse, StandardOutputThatIsFullIsAnOutputError) {
   const std::string command = "cd '" + directory_.path().string() + "' && '" LAMINA_PROGRAM
                               "' jet part.stl --dry-run --json --quiet > /dev/full 2> err; exit $?";
@@ -182,9 +199,32 @@ TEST_F(WrongUse, DirectoriesOfOtherJobsAreLeftAlone) {
   // Layers without a manifest are somebody's.
   std::filesystem::remove(directory_ / "out/manifest.json");
   refused(2, jet({"--dpi", "60"}), {"out/layers"});
+  refused(2, jet({"--dpi", "60", "--resume"}), {"out/layers"});
   ASSERT_EQ(run_lamina(jet({"--dpi", "70", "--format", "png", "--overwrite", "--layers", "0:3"}), directory_.path()).code, 0);
   EXPECT_EQ(files_below(directory_ / "out"), (std::vector<std::string>{"layers/000000.png", "layers/000001.png",
                                                                        "layers/000002.png", "manifest.json"}));
+}
+
+TEST_F(WrongUse, NothingThatIsFinishedFallsOutOfTheManifest) {
+  const auto jet = [&](std::vector<std::string> more) {
+    more.insert(more.begin(), {"jet", "part.stl", "--dpi", "60", "--quiet"});
+    return more;
+  };
+  ASSERT_EQ(run_lamina(jet({"--layer", "0.5", "-o", "out", "--layers", "2:5"}), directory_.path()).code, 0);
+  refused(2, jet({"--layer", "0.5", "-o", "out", "--layers", "2:4", "--resume"}), {"out/manifest.json", "2:5"});
+  refused(2, jet({"--layer", "0.5", "-o", "out", "--layers", "5:8", "--resume"}), {"out/manifest.json", "2:5"});
+  ASSERT_EQ(run_lamina(jet({"--layer", "0.5", "-o", "out", "--resume"}), directory_.path()).code, 0) << "more layers";
+  EXPECT_EQ(run_lamina({"verify", "out"}, directory_.path()).code, 0);
+  ASSERT_EQ(run_lamina(jet({"--layer", "0.5", "-o", "whole"}), directory_.path()).code, 0);
+  EXPECT_EQ(tree_text(directory_.path() / "out"), tree_text(directory_.path() / "whole"));
+  // A shard of another job cannot know what to clear away.
+  for (const char* shard : {"1/2", "2/2"}) {
+    ASSERT_EQ(run_lamina(jet({"--layer", "0.5", "-o", "shards", "--shard", shard}), directory_.path()).code, 0);
+  }
+  refused(2, jet({"--layer", "1", "-o", "shards", "--shard", "1/2", "--overwrite"}), {"shards/manifest-1-of-2.json", "another job"});
+  EXPECT_EQ(run_lamina(jet({"--layer", "0.5", "-o", "shards", "--shard", "1/2", "--overwrite"}), directory_.path()).code, 0);
+  EXPECT_EQ(run_lamina({"merge", "shards", "-o", "shards"}, directory_.path()).code, 0);
+  EXPECT_EQ(run_lamina({"verify", "shards"}, directory_.path()).code, 0);
 }
 
 TEST_F(WrongUse, ZipBombIsRefusedAsInputBeforeItExpands) {

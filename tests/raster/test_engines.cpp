@@ -183,6 +183,7 @@ TEST(Scan, ARowThatStaysOpenEndsAtItsLastCrossingAndIsReported) {
   Triangles part = box({1'000'000, 1'000'000, 0}, {4'000'000, 3'000'000, 1'000'000});
   part.pop_back();  // half of the right wall
   Mesh mesh = make_mesh(part);
+  mesh.closed = false;
   const Instance instance{0, {0, 0, 0}};
   auto rasterizer = raster::Rasterizer::build({&mesh, 1}, {&instance, 1}, grid, FillRule::kNonzero, true, true);
   raster::LayerScratch scratch;
@@ -193,6 +194,39 @@ TEST(Scan, ARowThatStaysOpenEndsAtItsLastCrossingAndIsReported) {
   EXPECT_EQ(first_difference(rays, contours), "");
   for (std::uint32_t r = 0; r < rays.view().rows(); ++r) {
     for (std::uint32_t column : rays.view().row(r)) EXPECT_LE(column, 40u);
+  }
+}
+
+TEST(Scan, AnOpenPartEndsWhereItEndsWhateverStandsBesideIt) {
+  const PixelGrid grid{{254, 30'000'000}, {254, 8'000'000}};
+  const Triangles whole = box({1'000'000, 1'000'000, 0}, {4'000'000, 3'000'000, 1'000'000});
+  Triangles without_right = whole, without_left;
+  std::erase_if(without_right, [](const Triangle& t) { return std::min({t.a.x, t.b.x, t.c.x}) == 4'000'000; });
+  std::copy_if(whole.begin(), whole.end(), std::back_inserter(without_left),
+               [](const Triangle& t) { return std::max({t.a.x, t.b.x, t.c.x}) != 1'000'000; });
+  ASSERT_EQ(without_right.size() + 2, whole.size());
+  ASSERT_EQ(without_left.size() + 2, whole.size());
+  // The open ones add up to zero together, and a whole one stands behind each.
+  std::vector<Mesh> meshes{make_mesh(without_right), make_mesh(without_left), make_mesh(whole)};
+  meshes[0].closed = meshes[1].closed = false;
+  const std::vector<Instance> instances{{0, {0, 0, 0}}, {2, {6'000'000, 0, 0}}, {1, {12'000'000, 0, 0}}, {2, {18'000'000, 0, 0}}};
+  for (const FillRule rule : {FillRule::kNonzero, FillRule::kPositive, FillRule::kEvenOdd}) {
+    std::vector<Mesh> copies = meshes;
+    auto rasterizer = raster::Rasterizer::build(copies, instances, grid, rule, true, true);
+    raster::LayerScratch scratch;
+    Runs rays, contours;
+    const auto report = rasterizer->layer(Engine::kRays, 500'000, scratch, rays);
+    rasterizer->layer(Engine::kContours, 500'000, scratch, contours);
+    EXPECT_EQ(report.open_rows, 20u);
+    EXPECT_EQ(report.first_open_row, 10u);
+    EXPECT_EQ(first_difference(rays, contours), "");
+    for (std::uint32_t r = 0; r < rays.view().rows(); ++r) {
+      const auto row = rays.view().row(r);
+      if (row.empty()) continue;
+      // Each open part has one wall only, and so no width; the whole ones are there.
+      EXPECT_EQ(std::vector<std::uint32_t>(row.begin(), row.end()), (std::vector<std::uint32_t>{70, 100, 190, 220}));
+    }
+    EXPECT_EQ(set_pixels(rays), 2u * 30 * 20);
   }
 }
 

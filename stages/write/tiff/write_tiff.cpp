@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <string>
 
+#include "stages/data/units.h"
 #include "stages/write/bits.h"
 #include "stages/write/g4/encode.h"
 #include "stages/write/limits.h"
@@ -104,6 +105,11 @@ class StripEncoder : public ImageEncoder {
     }
     const auto rows_per_strip =
         static_cast<std::uint32_t>(std::clamp<std::size_t>(kStripBytes / stride, 1, runs.rows()));
+    if (compression_ == COMPRESSION_NONE) {  // its size is known: nothing has to grow, and no second copy exists meanwhile
+      const std::size_t strips = ceil_div<std::size_t>(runs.rows(), rows_per_strip);
+      file.clear();
+      file.reserve(kHeaderBytes + stride * runs.rows() + kDirectoryBytes + strips * 2 * sizeof(std::uint32_t));
+    }
     file.resize(file.capacity());
     MemoryFile memory{file};
     std::string message;
