@@ -50,4 +50,7 @@ if(LAMINA_TESTS AND NOT LAMINA_SANITIZE)
   add_test(NAME Installed.AnotherProjectFindsTheLibraryAndPlansAPart
            COMMAND ${PROJECT_SOURCE_DIR}/tests/install/example ${PROJECT_BINARY_DIR} ${PROJECT_SOURCE_DIR})
   set_tests_properties(Installed.AnotherProjectFindsTheLibraryAndPlansAPart PROPERTIES TIMEOUT 900)
+  add_test(NAME Cluster.SharesOnSlurmAreOneRunThoughAWorkerIsKilled
+           COMMAND ${PROJECT_SOURCE_DIR}/tests/cluster/slurm $<TARGET_FILE:lamina>)
+  set_tests_properties(Cluster.SharesOnSlurmAreOneRunThoughAWorkerIsKilled PROPERTIES SKIP_RETURN_CODE 77 TIMEOUT 900)
 endif()
