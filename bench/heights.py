@@ -1,6 +1,6 @@
 """scripts/bench heights: layer tables of real parts beside Debian's Slic3r 1.3 and CuraEngine 4.13; writes bench/heights.md.
 
-    scripts/bench heights [--models DIR] [--cache DIR] [--lamina PROGRAM] [--part NAME]...
+    scripts/bench heights [--models DIR] [--cache DIR] [--lamina PROGRAM] [--part NAME]... [--no-times]
 
 Every table, the peers' too, is measured by the same code (`lamina heights --measure`): the highest step that any sloped
 facet gets, the mean step over the surface, flats of at least 5 mm2 that no layer ends on, and where the last layer ends.
@@ -246,6 +246,7 @@ def main(arguments):
     parser.add_argument("--cache", default=os.path.join(ROOT, "build/bench"))
     parser.add_argument("--lamina", help="the program; without it, a release build is made")
     parser.add_argument("--part", action="append", choices=list(PARTS), help="this part only")
+    parser.add_argument("--no-times", action="store_true", help="leave the section of times out, as on a busy machine")
     options = parser.parse_args(arguments)
     if not os.path.isdir(options.models):
         sys.exit(f"bench: {options.models}: no such folder; name the folder of real parts with --models")
@@ -255,10 +256,11 @@ def main(arguments):
         subprocess.run([os.path.join(ROOT, "scripts/packages"), "--bench"], check=True)
         subprocess.run(["cmake", "--preset", "release"], cwd=ROOT, check=True, stdout=subprocess.DEVNULL)
         subprocess.run(["cmake", "--build", "--preset", "release", "--target", "lamina"], cwd=ROOT, check=True)
+    machine = report.machine(options.cache)
     ours = Ours(options.lamina or os.path.join(ROOT, "build/release/lamina"))
     definitions = cura_definitions(os.path.abspath(options.cache))
     lines = ["# Layer heights, measured", "", "Written by `scripts/bench heights`; edits are lost.", "",
-             f"{report.machine(options.cache)}. Commit {report.commit(ROOT)}.", "",
+             f"{machine['processor']}, {machine['cores']} cores; {machine['system']}. Commit {report.commit(ROOT)}.", "",
              f"Layers of {LEAST} to {MOST} mm in steps of 0.001. Peers: Debian's Slic3r 1.3 with adaptive slicing at its quality of "
              "75 % and horizontal surfaces matched, CuraEngine 4.13 with adaptive layers around 0.175 mm, variation 0.125 mm, "
              "steps of 0.01 mm, threshold 0.2 mm; both once with a first layer of 0.3 mm, as by default, whose step may be the highest of "
@@ -270,6 +272,7 @@ def main(arguments):
     if options.part:
         print("\n".join(lines))
         return
-    lines += time_section(ours, options.models, folder)
+    if not options.no_times:
+        lines += time_section(ours, options.models, folder)
     with open(os.path.join(ROOT, "bench/heights.md"), "w", encoding="utf-8") as file:
         file.write("\n".join(lines))
