@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "pipeline/extrude_request.h"
 #include "pipeline/fill_request.h"
 #include "pipeline/heights_request.h"
 #include "pipeline/machine_request.h"
@@ -48,6 +49,8 @@ struct Job {
   std::string format = "tiff-g4";
   SliceRequest slice;
   FillRequest fill;
+  SegmentRequest segment;
+  ExtrudeRequest extrude;
   bool repair = true;
   bool drop_bad = false;
   double weld_um = 5;

@@ -46,6 +46,7 @@ std::span<const JobKey> place_keys();
 std::span<const JobKey> image_keys();
 std::span<const JobKey> slice_keys();
 std::span<const JobKey> fill_keys();
+std::span<const JobKey> extrude_keys();  // [extrude] and [segment]
 std::span<const JobKey> load_keys();
 std::span<const JobKey> machine_keys();
 std::span<const JobKey> dose_keys();

@@ -41,6 +41,9 @@ class SlicePlan {
   const std::vector<std::string>& names() const { return names_; }  // of bodies
   const Box& bounds() const { return bounds_; }                      // around all, as sliced
   bool fills() const { return fills_; }
+  const Box& box_of_body(std::uint32_t body) const { return box_of_body_[body]; }
+  /// What fills a body in a layer.
+  const infill::FillParameters& filling(std::uint32_t body, const Layer& layer) const;
   std::uint64_t bytes_bound(std::uint32_t index) const;
 
   double load_seconds = 0, index_seconds = 0;

@@ -127,6 +127,10 @@ Result<SlicePlan> SlicePlan::make(const Job& job, const ProgressCallback& progre
   return plan;
 }
 
+const infill::FillParameters& SlicePlan::filling(std::uint32_t body, const Layer& layer) const {
+  return plans_[part_of_body_[body]].at(std::int64_t{layer.plane()} - box_of_body_[body].lo.z);
+}
+
 Status SlicePlan::layer(std::uint32_t index, Work& work) const {
   auto report = slicer_->layer(index, work.scratch, work.contours);
   if (!report) return report.error();
@@ -138,8 +142,7 @@ Status SlicePlan::layer(std::uint32_t index, Work& work) const {
   const Layer& layer = layers_[index];
   for (std::uint32_t b = 0; b < slicer_->bodies(); ++b) {
     const Box& box = box_of_body_[b];
-    const infill::FillParameters& parameters =
-        plans_[part_of_body_[b]].at(std::int64_t{layer.plane()} - box.lo.z);
+    const infill::FillParameters& parameters = filling(b, layer);
     const ContoursView contours = work.contours.of(b, work.rebased);
     if (Status status = infill::append_fill(contours, {layer, box}, parameters, work.paths); !status) {
       return Error{status.error().fault, fmt::format("{}: fill: {}", names_[b], status.error().message)};

@@ -1,0 +1,218 @@
+#include "pipeline/extrude.h"
+
+#include <fmt/format.h>
+#include <sys/resource.h>
+#include <tbb/global_control.h>
+
+#include <chrono>
+#include <filesystem>
+#include <numbers>
+#include <optional>
+
+#include "pipeline/command_line.h"  // version
+#include "pipeline/extrude_layer.h"
+#include "pipeline/json_text.h"
+#include "pipeline/layer_flow.h"
+#include "pipeline/number_text.h"
+#include "pipeline/slice.h"
+#include "stages/write/growing_file.h"
+
+namespace lamina::pipeline {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
+
+std::uint64_t peak_resident_bytes() {
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  return static_cast<std::uint64_t>(usage.ru_maxrss) * 1024;
+}
+
+std::string source_text(const SlicePlan& plan) {
+  std::string text;
+  for (const std::string& name : plan.names()) {
+    if (text.size() > 200) return text + ", ...";
+    text += (text.empty() ? "" : ", ") + one_line(name);
+  }
+  return text;
+}
+
+/// What a person is told of each range of heights before anything is printed.
+void predict(const SegmentPlan& segments, const segment::Calibration& calibration, ExtrudeSummary& summary) {
+  const auto one = [&](const SegmentRange& range, const std::string& heights) {
+    if (!range.settings.on) return;
+    for (const std::string& warning : segment::warnings(range.plan, calibration)) {
+      summary.warnings.push_back(heights.empty() ? warning : heights + ": " + warning);
+    }
+    summary.pores.emplace_back(heights, segment::predict_pores(range.plan));
+  };
+  one(segments.base, "");
+  for (const SegmentRange& range : segments.ranges) {
+    one(range, fmt::format("{} to {} mm", number_text(mm(range.from)), number_text(mm(range.to))));
+  }
+}
+
+struct Work {
+  SlicePlan::Work layer;
+  Buffer<char> text;
+  LayerExtrusion sums;
+};
+
+}  // namespace
+
+Result<ExtruderProfile> resolve_extruder(const Job& job) {
+  auto found = find_extruder(job.machine.profile.empty() ? "marlin" : job.machine.profile);
+  if (!found) return Error{found.error().fault, "--machine: " + found.error().message};
+  ExtruderProfile& profile = *found;
+  for (std::string_view change : split(job.extrude.set, ";")) {
+    while (change.starts_with(' ')) change.remove_prefix(1);
+    if (change.empty()) continue;
+    if (const std::string wrong = set_extruder_key(change, profile); !wrong.empty()) {
+      return Error{Fault::kUsage, fmt::format("extrude.set: {}", wrong)};
+    }
+  }
+  const ExtrudeRequest& r = job.extrude;
+  Extruder& m = profile.machine;
+  if (r.flow) m.material.flow = *r.flow;
+  if (r.nozzle_degc) m.material.nozzle_degc = m.material.first_nozzle_degc = *r.nozzle_degc;
+  if (r.bed_degc) m.material.bed_degc = m.material.first_bed_degc = *r.bed_degc;
+  if (r.print_mm_s) m.speed.print_mm_s = *r.print_mm_s;
+  if (r.wall_mm_s) m.speed.wall_mm_s = m.speed.inner_wall_mm_s = *r.wall_mm_s;
+  if (r.first_layer_mm_s) m.speed.first_layer_mm_s = *r.first_layer_mm_s;
+  if (r.travel_mm_s) m.speed.travel_mm_s = *r.travel_mm_s;
+  if (r.retraction_mm) m.retraction.length_mm = *r.retraction_mm;
+  if (r.fan_percent) m.fan.percent = *r.fan_percent;
+  if (r.relative_extrusion) m.code.relative_extrusion = *r.relative_extrusion;
+  return found;
+}
+
+Result<ExtrudeSummary> run_extrude(const Job& asked, const ProgressCallback& progress, const std::atomic<bool>& cancel) {
+  std::optional<tbb::global_control> threads;
+  if (asked.threads > 0) threads.emplace(tbb::global_control::max_allowed_parallelism, asked.threads);
+  Job job = asked;
+  const auto profile = resolve_extruder(job);
+  if (!profile) return profile.error();
+  const Extruder& machine = profile->machine;
+  job.bed_mm = machine.bed.size_mm;
+  const auto segments = plan_segments(job.segment, profile->calibration, job.fill);
+  if (!segments) return segments.error();
+
+  ExtrudeSummary summary;
+  summary.output = job.output;
+  summary.machine = machine.name;
+  const auto plan = SlicePlan::make(job, progress);
+  if (!plan) return plan.error();
+  if (cancel) return Error{Fault::kInterrupted, "interrupted before the first layer; nothing was written"};
+  const auto total = static_cast<std::uint32_t>(plan->layers().size());
+  const auto range = layer_range(job, total);
+  if (!range) return range.error();
+  const auto [first, last] = *range;
+  summary.layers = last - first;
+  summary.parts = plan->scene().parts;
+  summary.load_seconds = plan->load_seconds;
+  summary.index_seconds = plan->index_seconds;
+  for (const Instance& instance : plan->scene().instances) summary.triangles += plan->scene().meshes[instance.mesh].triangles.size();
+  const Layer& highest = plan->layers().back();
+  summary.height_mm = mm(std::int64_t{highest.bottom} + highest.thickness);
+  if (mm(plan->scene().height) > machine.bed.build_height_mm) {
+    return Error{Fault::kUsage, fmt::format("the parts are {:.3f} mm high, {} builds {:.3f} mm; lay them down or scale them",
+                                            mm(plan->scene().height), machine.name, machine.bed.build_height_mm)};
+  }
+  const auto format = machine.format == "sml" ? write::make_sml_format(machine) : write::make_gcode_format(machine);
+  for (std::uint32_t i = first; i < last; ++i) {
+    if (Status status = format->check(plan->layers()[i]); !status) return status.error();
+  }
+  if (!plan->fills()) {
+    summary.warnings.push_back("nothing is asked for: no walls and no filling; give --walls, --fill or both");
+  }
+  predict(*segments, profile->calibration, summary);
+  if (segments->any() && !profile->own_calibration && machine.name != "Anet A8") {
+    summary.warnings.push_back(fmt::format("{} has no calibration of its own; widths and limits are those measured on an Anet A8: "
+                                           "lamina calibrate makes one", machine.name));
+  }
+  if (job.dry_run) {
+    for (std::uint32_t i = first; i < last; ++i) summary.peak_layer_bytes = std::max(summary.peak_layer_bytes, plan->bytes_bound(i));
+    summary.peak_resident_bytes = peak_resident_bytes();
+    return summary;
+  }
+
+  // --- file
+  auto file = write::GrowingFile::open(job.output);
+  if (!file) return file.error();
+  Buffer<char> text;
+  format->head({fmt::format("lamina {}", version()), source_text(*plan), summary.layers, segments->any()}, text);
+  if (Status status = file->append(text); !status) return status.error();
+
+  // --- layers
+  std::atomic<std::int64_t> plan_ns{0}, write_ns{0};
+  const auto timed = [](std::atomic<std::int64_t>& sum, Clock::time_point from) {
+    sum += std::chrono::duration_cast<std::chrono::nanoseconds>(Clock::now() - from).count();
+  };
+  const auto prepare = [&](std::uint32_t i, Work& work) -> Status {
+    auto from = Clock::now();
+    if (Status status = plan->layer(first + i, work.layer); !status) return status;
+    timed(plan_ns, from);
+    from = Clock::now();
+    work.text.clear();
+    const Layer& layer = plan->layers()[first + i];
+    const auto out = format->layer(layer, summary.layers, work.text);
+    auto sums = extrude_layer(*plan, *segments, machine, layer, work.layer, *out);
+    if (!sums) return sums.error();
+    work.sums = *sums;
+    timed(write_ns, from);
+    return {};
+  };
+  LayerExtrusion sums;
+  std::uint32_t done = 0, open_layers = 0;
+  std::string first_open;
+  const auto record = [&](std::uint32_t i, Work& work) -> Status {
+    if (Status status = file->append(work.text); !status) return status;
+    if (i == 0) summary.first_layer_points = work.sums.segments.points();
+    sums.add(work.sums);
+    if (work.layer.report.gaps.open > 0 && ++open_layers == 1) {
+      first_open = fmt::format("in layer {} at z {:.3f} mm", first + i, mm(plan->layers()[first + i].plane()));
+    }
+    progress({ProgressEvent::Stage::kLayers, ++done, summary.layers});
+    return {};
+  };
+  FlowLimits limits;
+  limits.budget_bytes = job.memory_bytes;
+  limits.most_in_flight = 4 * static_cast<std::uint32_t>(
+                                  tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism));
+  FlowReport flow;
+  const auto start = Clock::now();
+  const auto bytes_of = [&](std::uint32_t i) { return plan->bytes_bound(first + i); };
+  if (Status status = flow_layers<Work>(summary.layers, bytes_of, prepare, record, limits, cancel, flow); !status) {
+    return status.error();
+  }
+  text.clear();
+  format->tail(sums.totals, summary.layers, text);
+  if (Status status = file->append(text); !status) return status.error();
+  summary.bytes_written = file->size();
+  if (Status status = file->finish(); !status) return status.error();
+
+  summary.totals = sums.totals;
+  summary.segments = sums.segments;
+  summary.porosity = sums.porosity;
+  summary.points = sums.points;
+  const double filament = machine.material.filament_mm;
+  summary.filament_cm3 = sums.totals.filament_mm * std::numbers::pi / 4 * filament * filament / 1000;
+  summary.filament_g = summary.filament_cm3 * machine.material.density_g_cm3;
+  summary.layer_seconds = seconds_since(start);
+  summary.plan_seconds = static_cast<double>(plan_ns) * 1e-9;
+  summary.write_seconds = static_cast<double>(write_ns) * 1e-9;
+  summary.most_in_flight = flow.most_in_flight;
+  summary.peak_layer_bytes = flow.most_bytes;
+  summary.peak_resident_bytes = peak_resident_bytes();
+  if (open_layers > 0) {
+    summary.warnings.push_back(fmt::format("chains of cuts stay open in {} layers, first {}: they bound nothing and are left out; "
+                                           "leave out --no-repair to close the parts", open_layers, first_open));
+  }
+  if (plan->fills() && sums.totals.moves == 0) {
+    summary.warnings.push_back("no bead fits into the parts: they are narrower than the walls and the filling ask for");
+  }
+  return summary;
+}
+
+}  // namespace lamina::pipeline

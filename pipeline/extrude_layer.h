@@ -1,0 +1,28 @@
+// pipeline/extrude_layer.h: one layer's toolpaths through the segmentation into a writer.
+#pragma once
+
+#include "pipeline/extrude.h"
+#include "pipeline/slice.h"
+
+namespace lamina::pipeline {
+
+/// What a layer contributes to the summary.
+struct LayerExtrusion {
+  write::MoveTotals totals;
+  SegmentCounts segments;
+  PlannedPorosity porosity;
+  std::uint64_t points = 0;  // of the stored toolpaths
+
+  void add(const LayerExtrusion& other);
+};
+
+/// How the lines of a body in a layer are cut.
+/// errors  of infill::first_place
+Result<segment::LayerCut> layer_cut(const SegmentRange& range, const infill::FillParameters& filling, const Layer& layer,
+                                    const Box& part);
+
+/// The stored toolpaths of a layer become moves; stretches are expanded here and nowhere kept.
+Result<LayerExtrusion> extrude_layer(const SlicePlan& plan, const SegmentPlan& segments, const Extruder& machine,
+                                     const Layer& layer, const SlicePlan::Work& work, write::LayerMoves& out);
+
+}  // namespace lamina::pipeline
