@@ -1,0 +1,211 @@
+// The whole program: parts in, G-code out, read back by a reader of its own.
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <numbers>
+
+#include "tests/segment/gcode_reader.h"
+
+namespace lamina {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct Outcome {
+  int code = -1;
+  std::string out, err;
+  nlohmann::json json() const { return nlohmann::json::parse(out, nullptr, false); }
+};
+
+class ExtrudeProgram : public testing::Test {
+ protected:
+  void SetUp() override {
+    folder = fs::temp_directory_path() / ("lamina_extrude_" + std::to_string(::getpid()) + "_" +
+                                          testing::UnitTest::GetInstance()->current_test_info()->name());
+    fs::create_directories(folder);
+  }
+  void TearDown() override { fs::remove_all(folder); }
+
+  Outcome run(const std::string& arguments) const {
+    const std::string command = std::string(LAMINA_PROGRAM) + " " + arguments + " 2>" + (folder / "err").string();
+    Outcome result;
+    FILE* pipe = popen(command.c_str(), "r");
+    char buffer[4096];
+    for (std::size_t n; (n = fread(buffer, 1, sizeof buffer, pipe)) > 0;) result.out.append(buffer, n);
+    result.code = WEXITSTATUS(pclose(pipe));
+    result.err = text_of(folder / "err");
+    return result;
+  }
+  static std::string text_of(const fs::path& path) {
+    std::ifstream file(path, std::ios::binary);
+    return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
+  }
+
+  /// A block, with a hole through its middle if the radius is above 0.
+  std::string block(double x, double y, double z, double radius) const {
+    std::vector<std::array<double, 2>> outer, inner;
+    std::vector<double> angles;
+    for (int i = 0; i < 360; ++i) angles.push_back((i + 0.5) * std::numbers::pi / 180);
+    for (const double sx : {-1.0, 1.0}) {
+      for (const double sy : {-1.0, 1.0}) angles.push_back(std::fmod(std::atan2(sy * y, sx * x) + 2 * std::numbers::pi, 2 * std::numbers::pi));
+    }
+    std::sort(angles.begin(), angles.end());
+    for (const double a : angles) {
+      const double c = std::cos(a), s = std::sin(a);
+      const double reach = std::min(std::abs(c) > 1e-12 ? x / 2 / std::abs(c) : 1e9, std::abs(s) > 1e-12 ? y / 2 / std::abs(s) : 1e9);
+      outer.push_back({reach * c, reach * s});
+      inner.push_back({radius * c, radius * s});
+    }
+    const fs::path path = folder / "block.stl";
+    std::ofstream file(path);
+    file.precision(12);
+    file << "solid block\n";
+    const auto facet = [&](std::initializer_list<std::array<double, 3>> corners) {
+      file << "facet normal 0 0 0\nouter loop\n";
+      for (const auto& p : corners) file << "vertex " << p[0] << ' ' << p[1] << ' ' << p[2] << '\n';
+      file << "endloop\nendfacet\n";
+    };
+    for (std::size_t i = 0; i < angles.size(); ++i) {
+      const std::size_t j = (i + 1) % angles.size();
+      const auto at = [&](const std::array<double, 2>& p, double height) { return std::array<double, 3>{p[0], p[1], height}; };
+      facet({at(outer[i], 0), at(outer[j], 0), at(outer[j], z)});
+      facet({at(outer[i], 0), at(outer[j], z), at(outer[i], z)});
+      facet({at(outer[i], z), at(outer[j], z), at(inner[j], z)});
+      facet({at(outer[i], 0), at(inner[j], 0), at(outer[j], 0)});
+      if (radius <= 0) continue;
+      facet({at(outer[i], z), at(inner[j], z), at(inner[i], z)});
+      facet({at(outer[i], 0), at(inner[i], 0), at(inner[j], 0)});
+      facet({at(inner[i], 0), at(inner[j], z), at(inner[j], 0)});
+      facet({at(inner[i], 0), at(inner[i], z), at(inner[j], z)});
+    }
+    file << "endsolid block\n";
+    return path.string();
+  }
+  std::string file(const std::string& name) const { return (folder / name).string(); }
+
+  fs::path folder;
+};
+
+TEST_F(ExtrudeProgram, PointsOfFukudaAre346InEachOf79Layers) {
+  const std::string part = block(74, 100, 20, 12.5);
+  const Outcome result = run("extrude " + part + " --machine marlin --layer 0.254 --walls 0 --fill segmented --segment-rule fukuda --thin 5 --thick 3 "
+                         "--bead 0.508 --bead-gap 2.4 --angle 0 --angle-step 0 --set fill.first_line_mm=0.508 --set fill.end_inset_mm=0.254 "
+                         "--quiet --json -o " + file("a.gcode"));
+  ASSERT_EQ(result.code, 0) << result.err;
+  const auto json = result.json();
+  EXPECT_EQ(json["layers"], 79);
+  EXPECT_EQ(json["segments"]["points_first_layer"], 346);
+  EXPECT_EQ(json["segments"]["points"], 27334);
+  EXPECT_EQ(json["segments"]["stretches"], 79 * 324);
+}
+
+TEST_F(ExtrudeProgram, TestPiecesOfDiNisioHaveTwelveAndNineSegmentedLines) {
+  for (const auto& [width, lines] : {std::pair{62, 12}, {48, 9}}) {
+    const Outcome result = run("extrude " + block(width, 50, 0.3, 0) + " --machine anet-a8 --layer 0.3 --walls 1 --fill segmented --segment-rule thick-ends "
+                           "--thin 30 --thick 10 --thick-speed 100 --bead-gap 2 --angle 90 --angle-step 0 --quiet --json -o " + file("a.gcode"));
+    ASSERT_EQ(result.code, 0) << result.err;
+    const auto json = result.json();
+    EXPECT_EQ(json["layers"], 1);
+    EXPECT_EQ(json["segments"]["lines"], lines);
+    EXPECT_EQ(json["segments"]["thin"], lines);
+    EXPECT_EQ(json["segments"]["stretches"], 3 * lines);
+    EXPECT_NE(json["warnings"].dump().find("at most 4.45 mm"), std::string::npos);
+    // Thick, thin, thick at 15 and 30 mm/s, all in one direction.
+    const test::GcodeFile gcode = test::read_gcode(text_of(file("a.gcode")));
+    ASSERT_EQ(gcode.error, "");
+    int fast = 0;
+    for (const auto& bead : gcode.layers[0].beads) {
+      if (bead.feed != 1800) continue;
+      ++fast;
+      EXPECT_NEAR(std::abs(bead.y1 - bead.y0), 30, 0.0011);
+      EXPECT_GT(bead.y1, bead.y0);
+    }
+    EXPECT_EQ(fast, lines);
+  }
+}
+
+TEST_F(ExtrudeProgram, VolumesPlacesAndLayersOfAFileAreThoseOfThePlan) {
+  const std::string part = block(30, 20, 2.4, 6);
+  for (const std::string machine : {"anet-a8", "marlin", "klipper", "reprapfirmware"}) {
+    const Outcome result = run("extrude " + part + " --machine " + machine + " --layer 0.3 --walls 2 --fill segmented --quiet --json -o " + file("a.gcode"));
+    ASSERT_EQ(result.code, 0) << result.err;
+    const auto json = result.json();
+    const test::GcodeFile gcode = test::read_gcode(text_of(file("a.gcode")));
+    ASSERT_EQ(gcode.error, "") << machine;
+    ASSERT_EQ(gcode.layers.size(), 8);
+    double filament = 0, last_z = 0;
+    std::size_t beads = 0;
+    for (const auto& layer : gcode.layers) {
+      EXPECT_NEAR(layer.z - last_z, 0.3, 1e-9);
+      last_z = layer.z;
+      for (const auto& bead : layer.beads) {
+        EXPECT_NEAR(bead.z, layer.z, 1e-9);
+        filament += bead.filament;
+        // Within the part, and not in its hole: centres keep half a bead from the surface.
+        for (const auto& [x, y] : {std::pair{bead.x0 - 110, bead.y0 - 110}, {bead.x1 - 110, bead.y1 - 110}}) {
+          EXPECT_LE(std::abs(x), 14.8011);
+          EXPECT_LE(std::abs(y), 9.8011);
+          EXPECT_GE(std::hypot(x, y), 6.19);
+        }
+      }
+      beads += layer.beads.size();
+    }
+    EXPECT_EQ(json["moves"], beads);
+    EXPECT_GE(gcode.lo_x, 0);
+    EXPECT_LE(gcode.hi_x, 220);
+    const double flow = machine == "anet-a8" ? 0.85 : 1;
+    const double volume = filament * std::numbers::pi / 4 * 1.75 * 1.75;
+    EXPECT_NEAR(volume / (json["volume_mm3"].get<double>() * flow), 1, 0.001);
+    EXPECT_GT(json["print_seconds"].get<double>(), 0);
+  }
+}
+
+TEST_F(ExtrudeProgram, SameBytesForAnyThreads) {
+  const std::string part = block(30, 20, 3, 6);
+  const std::string arguments = "extrude " + part + " --machine anet-a8 --layer 0.2 --fill segmented --angle 30 --angle-step 60 --quiet ";
+  ASSERT_EQ(run(arguments + "--threads 1 -o " + file("a.gcode")).code, 0);
+  ASSERT_EQ(run(arguments + "--threads 4 --memory 1M -o " + file("b.gcode")).code, 0);
+  EXPECT_EQ(text_of(file("a.gcode")), text_of(file("b.gcode")));
+}
+
+TEST_F(ExtrudeProgram, WrongInputIsOneLineAndTheCodeOfUsage) {
+  const std::string part = block(10, 10, 1, 0);
+  const auto message = [&](const std::string& arguments) {
+    const Outcome result = run("extrude " + part + " --quiet -o " + file("a.gcode") + " " + arguments);
+    EXPECT_EQ(result.code, 2) << arguments;
+    EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err;
+    EXPECT_FALSE(fs::exists(file("a.gcode")));
+    return result.err;
+  };
+  EXPECT_NE(message("--fill segmented --thin 0").find("segment.thin_mm: 0 mm; a thin stretch has to be longer than 0"), std::string::npos);
+  EXPECT_NE(message("--fill segmented --thin -2").find("segment.thin_mm: -2 mm"), std::string::npos);
+  EXPECT_NE(message("--fill segmented --thin-speed 0").find("segment.thin_speed_percent: 0 %"), std::string::npos);
+  EXPECT_NE(message("--fill segmented --spacing-sc 0.2").find("segment.spacing_sc_mm: 0.2 mm is below"), std::string::npos);
+  EXPECT_NE(message("--machine anet-a9").find("no extrusion printer 'anet-a9'; did you mean 'anet-a8'?"), std::string::npos);
+  EXPECT_NE(message("--fill segmentd").find("segmented"), std::string::npos);
+}
+
+TEST_F(ExtrudeProgram, PermeabilityOfTable18IsThatOfTable25WithAWarningAboutItsDensity) {
+  const Outcome result = run("permeability " + std::string(LAMINA_TEST_DIR) + "/reference/dinisio2022/table_18.tsv --convention dinisio2022 --json");
+  ASSERT_EQ(result.code, 0) << result.err;
+  const auto fit = result.json()["fits"][0];
+  EXPECT_NEAR(fit["k1_darcy"].get<double>(), 100.09, 0.01);
+  EXPECT_NEAR(fit["k2_m"].get<double>() * 1e3, 14.22, 0.01);
+  EXPECT_EQ(fit["points"], 90);
+  EXPECT_NE(result.err.find("density is that of water"), std::string::npos);
+  std::ofstream(file("bad.csv")) << "flow_l_min,drop_pa\n4,12\n8,much\n";
+  const Outcome bad = run("permeability " + file("bad.csv") + " --length 25 --diameter 25");
+  EXPECT_EQ(bad.code, 3);
+  EXPECT_NE(bad.err.find("bad.csv:3: drop_pa: "), std::string::npos) << bad.err;
+}
+
+}  // namespace
+}  // namespace lamina
