@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """bench/program.py: what compiling and writing print programs costs, as a difference of whole jobs.
 
-    scripts/bench program [--runs N] [--models DIR] [--out DIR]     writes bench/program.md
+    bench/program.py [--runs N] [--models DIR] [--out DIR]     writes bench/program.md
 
 Each case is planned twice with `--format null`, in turn: once with the machine, once with its bed and dpi alone. The
 difference of processor seconds is the compiling and writing of the programs. The answer is checked first: a few layers are
@@ -73,7 +73,6 @@ def main():
     cases = {
         "full bed": [box, "--layer", "0.1", "--layers", "0:10"],
         "96 crowns": [crown, "--copies", "96", "--layer", "0.1"],
-        "96 crowns, core 50 %": [crown, "--copies", "96", "--layer", "0.1", "--core", "0.5", "--shell", "0.5", "--layers", "40:50"],
     }
     bed = ["--bed", f"{BED}x{BED}", "--dpi", str(DPI)]
     machine = ["--machine", "production-1200"]
@@ -110,7 +109,7 @@ def main():
         processor = next((l.split(":")[1].strip() for l in file if l.startswith("model name")), "unknown")
     with open(os.path.join(ROOT, "bench/program.md"), "w", encoding="utf-8") as file:
         file.write("# Print programs: compiling and writing\n\n"
-                   "Written by `scripts/bench program`. Profile `production-1200`: 1000 nozzles, 1200 dpi, 18,898 x 18,898 "
+                   "Written by `bench/program.py`. Profile `production-1200`: 1000 nozzles, 1200 dpi, 18,898 x 18,898 "
                    "pixels (357 Mpx) a layer, dialect planes. Processor seconds (all threads) of whole jobs with the machine "
                    "minus those without, medians; each answer was replayed by `lamina verify` first.\n\n"
                    f"{processor}, {os.cpu_count()} processors, commit {commit}, {options.runs} runs, output in memory "
