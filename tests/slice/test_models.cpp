@@ -57,7 +57,7 @@ void compare_with_bitmap(const ContoursView& contours, const Runs& bitmap, const
     }
   }
   const double area = static_cast<double>(doubled_area(contours)) / 2;
-  EXPECT_LE(std::abs(area - static_cast<double>(set_pixels(bitmap)) * pixel * pixel), perimeter(contours) * pixel * 1.5 + 4 * pixel * pixel);
+  EXPECT_LE(std::abs(area - static_cast<double>(set_pixels(bitmap)) * pixel * pixel), perimeter(contours) * pixel + pixel * pixel);
 }
 
 /// Planes at the middle of layers, all of them inside the part.
