@@ -1,5 +1,6 @@
 // pipeline/info.cpp: a part is loaded as it is, diagnosed, and loaded again as a job would.
 #include "pipeline/info.h"
+#include "pipeline/json_text.h"
 
 #include <fmt/core.h>
 
@@ -149,7 +150,7 @@ void describe_plan(const Description& description, std::string& text) {
   std::vector<const Note*> remarks, repairs;
   for (const Note& note : description.notes) (note.repair ? repairs : remarks).push_back(&note);
   if (!remarks.empty()) text += "\n  notes\n";
-  for (const Note* note : remarks) text += "    " + note->text + "\n";
+  for (const Note* note : remarks) text += "    " + one_line(note->text) + "\n";
   text += "\n  lamina jet ";
   if (repairs.empty() && description.balanced) {
     text += "plans it as it is.\n";
@@ -158,7 +159,7 @@ void describe_plan(const Description& description, std::string& text) {
   } else {
     text += "plans it after these changes:\n";
   }
-  for (const Note* note : repairs) text += "    " + note->text + "\n";
+  for (const Note* note : repairs) text += "    " + one_line(note->text) + "\n";
 }
 
 nlohmann::ordered_json as_json(const Point3& p) { return {mm(p.x), mm(p.y), mm(p.z)}; }
@@ -189,7 +190,7 @@ Result<std::string> describe_part_text(const std::string& path, const load::Load
   const Result<Description> description = describe(path, options);
   if (!description) return description.error();
   const Description& d = *description;
-  std::string text = path + "\n";
+  std::string text = one_line(path) + "\n";
   row(text, "format", d.format);
   if (d.part.instances.size() > 1 || d.part.meshes.size() > 1)
     row(text, "meshes", fmt::format("{}, placed {} times", d.part.meshes.size(), d.part.instances.size()));

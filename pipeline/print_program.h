@@ -28,7 +28,7 @@ struct ProgramWork {
   std::unique_ptr<write::ProgramWriter> writer;
   write::ProgramBytes text;
 
-  std::uint64_t bytes() const { return bytes_held(compile.line) + bytes_held(text); }
+  std::uint64_t bytes() const { return compile.bytes() + bytes_held(text); }
 };
 
 /// The file of a layer's program in a job's directory, program/000042.gcode; "" without a machine.

@@ -42,10 +42,10 @@ std::string summary_text(const Job& job, const JetSummary& s) {
     const PartSummary& part = s.parts[i];
     const Box& box = part.bounds;
     line(i == 0 ? "parts" : "", fmt::format("{}{}: {} triangles, {:.3f} x {:.3f} x {:.3f} mm at {:.3f}, {:.3f} mm",
-                                            part.path, part.copies > 1 ? fmt::format(" x {}", part.copies) : "",
+                                            one_line(part.path), part.copies > 1 ? fmt::format(" x {}", part.copies) : "",
                                             readable_count(part.triangles), mm(box.width()), mm(box.depth()),
                                             mm(box.height()), mm(box.lo.x), mm(box.lo.y)));
-    for (const Note& note : part.notes) line("", fmt::format("  {}{}", note.repair ? "repair: " : "", note.text));
+    for (const Note& note : part.notes) line("", fmt::format("  {}{}", note.repair ? "repair: " : "", one_line(note.text)));
   }
   line("image", fmt::format("{} x {} pixels of {:g} x {:g} dpi on {} x {} mm, {}", s.columns, s.rows,
                             grid_of(job).x.dpi(), grid_of(job).y.dpi(),
@@ -62,7 +62,7 @@ std::string summary_text(const Job& job, const JetSummary& s) {
   } else {
     line("pixels", fmt::format("{} set, {:.3f} cm3 of binder-filled volume", readable_count(s.set_pixels),
                                s.set_volume_mm3 / 1000));
-    line("files", fmt::format("{} in {}", readable_bytes(s.bytes_written), s.directory));
+    line("files", fmt::format("{} in {}", readable_bytes(s.bytes_written), one_line(s.directory)));
     line("time", fmt::format("{}: load {}, index {}, layers {} (threads: raster {}, encode {}, write {})",
                              readable_seconds(s.seconds.load + s.seconds.index + s.seconds.layers),
                              readable_seconds(s.seconds.load), readable_seconds(s.seconds.index),

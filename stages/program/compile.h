@@ -22,6 +22,15 @@ struct CompileScratch {
   std::vector<Line> nozzle;                 // what is under each nozzle of a sweep
   std::deque<Buffer<std::uint32_t>> made;   // lines that are not those of the image: shared or moved ones
   std::size_t made_used = 0;
+
+  std::uint64_t bytes() const {
+    std::uint64_t total = bytes_held(scan.turned.row_offset) + bytes_held(scan.turned.change) + bytes_held(scan.next) +
+                          bytes_held(fire.event_offset) + bytes_held(fire.event_nozzle) + bytes_held(fire.rows) +
+                          bytes_held(fire.current) + bytes_held(vectors.bits) + bytes_held(line) +
+                          nozzle.capacity() * sizeof(Line);
+    for (const Buffer<std::uint32_t>& one : made) total += bytes_held(one);
+    return total;
+  }
 };
 
 /// Called for every sweep that fires, in the order in which the machine makes them.
