@@ -1,6 +1,5 @@
 // pipeline/info.cpp: a part is loaded as it is, diagnosed, and loaded again as a job would.
 #include "pipeline/info.h"
-#include "pipeline/json_text.h"
 
 #include <fmt/core.h>
 
@@ -9,6 +8,7 @@
 #include <nlohmann/json.hpp>
 #include <vector>
 
+#include "pipeline/json_text.h"
 #include "stages/load/diagnose.h"
 
 namespace lamina::pipeline {
