@@ -114,7 +114,9 @@ class Folder {
   std::filesystem::path path_;
 };
 
+/// A new file: ext4 writes one that is emptied and filled again to the disk at once, thousands of times in these tests.
 inline void save(const std::string& path, std::span<const std::byte> bytes) {
+  std::filesystem::remove(path);
   std::ofstream(path, std::ios::binary)
       .write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
 }
