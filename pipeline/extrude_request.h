@@ -56,7 +56,7 @@ std::span<const SegmentKey> segment_settings_keys();
 struct ExtrudeRequest {
   std::optional<double> flow, nozzle_degc, bed_degc, print_mm_s, wall_mm_s, first_layer_mm_s, travel_mm_s, retraction_mm, fan_percent;
   std::optional<bool> relative_extrusion;
-  std::string set;  // "retraction.lift_mm=0.2; bed.corner_mm=-110,-110": any other key of the machine's profile
+  std::string set;  // "fan.from_layer=2; bed.corner_mm=-110,-110": any other key of the machine's profile
 };
 
 /// Segmentation of a range of heights, resolved.

@@ -112,7 +112,6 @@ const ExtruderKey kKeys[] = {
     NUMBER_KEY(speed, corner_mm_s, 0.1, 1000, " mm/s"),
     NUMBER_KEY(retraction, length_mm, 0, 50, " mm"),
     NUMBER_KEY(retraction, speed_mm_s, 0.1, 1000, " mm/s"),
-    NUMBER_KEY(retraction, lift_mm, 0, 10, " mm"),
     NUMBER_KEY(retraction, least_travel_mm, 0, 1000, " mm"),
     NUMBER_KEY(fan, percent, 0, 100, " %"),
     {"fan", "from_layer", [](Text t, Profile& p) { return read_count(t, p.machine.fan.from_layer); },

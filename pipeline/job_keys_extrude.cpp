@@ -137,7 +137,7 @@ std::vector<JobKey> all_keys() {
        },
        [](const Job& j) { return j.extrude.relative_extrusion ? write_switch(*j.extrude.relative_extrusion) : std::string(); },
        Form::kBare},
-      {"extrude", "set", "--machine-set", "KEY=VALUE;...", "other keys of the machine's profile, as in retraction.lift_mm=0.2", false,
+      {"extrude", "set", "--machine-set", "KEY=VALUE;...", "other keys of the machine's profile, as in fan.from_layer=2", false,
        [](Text t, Job& j) {
          j.extrude.set = t;
          return std::string();
