@@ -97,22 +97,29 @@ std::string file_of(const Job& job) {
   return fmt::format("{}{}", name.empty() ? "part" : name, extension_of(job.slice.format));
 }
 
+/// Files of single layers, 000042.svg, that an earlier job left in any format.
+std::vector<fs::path> layer_files(const Job& job) {
+  std::vector<fs::path> files;
+  std::error_code error;
+  for (fs::directory_iterator entry(fs::path(job.output) / "layers", error), end; !error && entry != end;
+       entry.increment(error)) {
+    const std::string name = entry->path().filename().string();
+    const std::size_t digits = std::min(name.find_first_not_of("0123456789"), name.size());
+    if (digits >= 6 && (entry->path().extension() == ".svg" || entry->path().extension() == ".cli")) {
+      files.push_back(entry->path());
+    }
+  }
+  return files;
+}
+
 Status prepare_directory(const Job& job) {
   if (Status status = check_slice_output(job); !status) return status;
   std::error_code error;
   fs::create_directories(job.slice.file_a_layer ? fs::path(job.output) / "layers" : fs::path(job.output), error);
   if (error) return Error{Fault::kOutput, fmt::format("{}: {}", job.output, error.message())};
   if (!job.overwrite) return {};
-  fs::remove(fs::path(job.output) / "manifest.json", error);
-  if (job.slice.file_a_layer) {
-    for (const auto& entry : fs::directory_iterator(fs::path(job.output) / "layers", error)) {
-      const std::string name = entry.path().filename().string();
-      if (name.size() >= 10 && name.find_first_not_of("0123456789") >= 6 &&
-          entry.path().extension() == extension_of(job.slice.format)) {
-        fs::remove(entry.path(), error);
-      }
-    }
-  }
+  for (const char* name : {"manifest.json", "job.toml"}) fs::remove(fs::path(job.output) / name, error);
+  for (const fs::path& file : layer_files(job)) fs::remove(file, error);
   return {};
 }
 
@@ -125,9 +132,24 @@ Status check_slice_output(const Job& job) {
   if (!fs::is_directory(status)) {
     return Error{Fault::kOutput, fmt::format("{}: is a file, not a directory; name another one with -o", job.output)};
   }
-  if (job.overwrite) return {};
-  if (!find_manifests(job.output).empty()) {
+  if (!job.overwrite && !find_manifests(job.output).empty()) {
     return Error{Fault::kUsage, fmt::format("{}: holds a job; replace it with --overwrite, or name another directory", job.output)};
+  }
+  for (const std::string& name : {std::string("job.toml"), file_of(job)}) {
+    const fs::path file = fs::path(job.output) / name;
+    for (const PartRequest& part : job.parts) {
+      if (fs::equivalent(file, part.path, error)) {
+        return Error{Fault::kUsage, fmt::format("{}: is a part of the job and would be replaced; name another directory", file.string())};
+      }
+    }
+    // A job file that a person wrote is not ours to replace: ours stands beside a manifest.
+    if (name == "job.toml" && fs::exists(file, error) && (!job.overwrite || find_manifests(job.output).empty())) {
+      return Error{Fault::kUsage, fmt::format("{}: is there already, and the job would be kept in it; name another directory", file.string())};
+    }
+  }
+  if (job.overwrite) return {};
+  if (!layer_files(job).empty()) {
+    return Error{Fault::kUsage, fmt::format("{}/layers: holds layers; replace them with --overwrite, or name another directory", job.output)};
   }
   const fs::path file = fs::path(job.output) / file_of(job);
   if (!job.slice.file_a_layer && fs::exists(file, error)) {

@@ -163,6 +163,7 @@ Status append_fill(const ContoursView& contours, const FillContext& context, con
   for (std::uint32_t wall = 0; wall < parameters.walls; ++wall) {
     auto moved = offset_contours(contours, -(2 * std::int64_t{wall} + 1) * parameters.wall_width / 2);
     if (!moved) return moved.error();
+    if (moved->size() == 0) break;  // and so are all further in
     append_closed(*moved, wall == 0 ? PathKind::kOuter : PathKind::kInner, parameters.wall_width, out);
   }
   if (parameters.pattern == Pattern::kNone) return {};

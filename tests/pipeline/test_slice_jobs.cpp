@@ -76,6 +76,30 @@ TEST(SliceProgram, AnEarlierJobIsNotReplacedUnasked) {
   EXPECT_EQ(tree_text(directory.path() / "out"), before);
 }
 
+TEST(SliceProgram, NothingThatSomebodyElseWroteIsReplaced) {
+  const Directory directory;
+  const auto slice = [&](std::vector<std::string> more) {
+    more.insert(more.begin(), {"slice", "part.stl", "--layer", "1", "--quiet"});
+    return run_lamina(more, directory.path());
+  };
+  test::write_box(directory / "part.stl", {0, 0, 0}, {20, 10, 5});
+  write_text(directory / "job.toml", "# mine\n[[part]]\npath = 'part.stl'\n");
+  const auto before = tree_text(directory.path());
+  for (const std::vector<std::string>& more : {std::vector<std::string>{"-o", "."}, {"-o", ".", "--overwrite"}}) {
+    const Outcome refused = slice(more);
+    EXPECT_EQ(refused.code, 2);
+    EXPECT_NE(refused.err.find("job.toml"), std::string::npos) << refused.err;
+    EXPECT_EQ(tree_text(directory.path()), before);
+  }
+  std::filesystem::create_directories(directory / "out/layers");
+  write_text(directory / "out/layers/000003.svg", "mine");
+  EXPECT_EQ(slice({"-o", "out", "--file-a-layer"}).code, 2);
+  EXPECT_EQ(read_text(directory / "out/layers/000003.svg"), "mine");
+  EXPECT_EQ(slice({"-o", "out", "--file-a-layer", "--overwrite"}).code, 0);
+  EXPECT_EQ(slice({"-o", "out", "--format", "cli", "--overwrite"}).code, 0);
+  EXPECT_EQ(files_below(directory / "out"), (std::vector<std::string>{"job.toml", "manifest.json", "part.cli"}));
+}
+
 TEST(SliceProgram, WrongFillingsAreOneClearLineAndLeaveNothing) {
   const Directory directory;
   const std::vector<std::pair<std::vector<std::string>, std::string>> cases = {
