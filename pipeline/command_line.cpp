@@ -1,6 +1,7 @@
 #include "pipeline/command_line.h"
 
 #include <fmt/format.h>
+#include <malloc.h>
 
 #include <algorithm>
 #include <csignal>
@@ -96,7 +97,21 @@ std::string Arguments::text(std::string_view flag) const {
   return values.empty() ? std::string() : values.back();
 }
 
+namespace {
+
+/// What is freed shall go back to the system: left alone, glibc keeps up to 64 MiB after the first large buffer is freed,
+/// and --memory would not be what is resident.
+void bound_retained_memory() {
+#ifdef __GLIBC__
+  mallopt(M_MMAP_THRESHOLD, 2 << 20);
+  mallopt(M_TRIM_THRESHOLD, 4 << 20);
+#endif
+}
+
+}  // namespace
+
 int run_program(int argument_count, char** arguments) {
+  bound_retained_memory();
   std::signal(SIGPIPE, SIG_IGN);  // a closed reader is an error of write(), not the end
   std::signal(SIGXFSZ, SIG_IGN);  // and so is a limit on file sizes
   try {
