@@ -1,4 +1,4 @@
-// stages/write/decimal.h: nanometres as millimetres in text, exactly and fast.
+// stages/write/decimal.h: whole numbers of a decimal fraction as text (nanometres as millimetres), exactly, fast, without locale.
 #pragma once
 
 #include <cstdint>
@@ -10,15 +10,18 @@
 
 namespace lamina::write {
 
-/// Room that put_mm() needs at most: a sign, 13 digits, a point, 6 digits.
+/// Room that put_fixed() and put_mm() need at most: a sign, 20 digits, a point, and a little more.
 inline constexpr std::size_t kMostDecimal = 24;
 
-/// Writes a length in mm with as many decimals as it has, at most 6: 12500000 is "12.5". Returns the end.
-inline char* put_mm(std::int64_t nm, char* out) {
-  std::uint64_t value = nm < 0 ? 0 - static_cast<std::uint64_t>(nm) : static_cast<std::uint64_t>(nm);
-  if (nm < 0) *out++ = '-';
-  std::uint64_t whole = value / kNmPerMm;
-  auto rest = static_cast<std::uint32_t>(value % kNmPerMm);
+/// Writes `value` / 10^decimals without trailing zeros: 12500 with 3 decimals is "12.5", -5 is "-0.005", 0 is "0".
+/// Returns the end. decimals 0 .. 6; at most 22 bytes are written
+template <int kDecimals>
+char* put_fixed(std::int64_t value, char* out) {
+  std::uint64_t rest = value < 0 ? 0 - static_cast<std::uint64_t>(value) : static_cast<std::uint64_t>(value);
+  if (value < 0) *out++ = '-';
+  constexpr std::uint64_t kUnit[] = {1, 10, 100, 1000, 10'000, 100'000, 1'000'000};
+  std::uint64_t whole = rest / kUnit[kDecimals];
+  rest %= kUnit[kDecimals];
   char digits[20];
   char* first = digits + sizeof digits;
   do {
@@ -30,15 +33,19 @@ inline char* put_mm(std::int64_t nm, char* out) {
   out += count;
   if (rest == 0) return out;
   *out++ = '.';
-  char decimals[6];
-  for (int i = 5; i >= 0; --i) {
-    decimals[i] = static_cast<char>('0' + rest % 10);
+  int used = kDecimals;
+  for (int i = kDecimals - 1; i >= 0; --i) {
+    out[i] = static_cast<char>('0' + rest % 10);
     rest /= 10;
   }
-  std::size_t used = 6;
-  while (decimals[used - 1] == '0') --used;
-  std::memcpy(out, decimals, 6);  // room for all six is asked for
+  while (out[used - 1] == '0') --used;
   return out + used;
+}
+
+/// Writes a length in mm with as many decimals as it has, at most 6: 12500000 is "12.5". Returns the end.
+inline char* put_mm(std::int64_t nm, char* out) {
+  static_assert(kNmPerMm == 1'000'000);
+  return put_fixed<6>(nm, out);
 }
 
 inline void append(Buffer<char>& out, std::string_view text) { out.insert(out.end(), text.begin(), text.end()); }

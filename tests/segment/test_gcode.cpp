@@ -6,7 +6,7 @@
 #include <random>
 
 #include "stages/write/gcode/gcode.h"
-#include "stages/write/gcode/number.h"
+#include "stages/write/decimal.h"
 #include "tests/segment/gcode_reader.h"
 
 namespace lamina::write::gcode {

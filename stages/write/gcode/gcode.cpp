@@ -9,7 +9,6 @@
 
 #include "stages/data/units.h"
 #include "stages/write/decimal.h"
-#include "stages/write/gcode/number.h"
 
 namespace lamina::write::gcode {
 namespace {
