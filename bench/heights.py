@@ -10,6 +10,7 @@ remove it to have them sliced again.
 """
 import argparse
 import glob
+import itertools
 import json
 import math
 import os
@@ -22,6 +23,7 @@ import report
 
 ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
 LEAST, MOST, FLAT_MM2 = 0.05, 0.3, 5
+FIRST_LAYERS = (MOST, 0.1, LEAST)
 PARTS = {
     "3DBenchy": "3DBenchy.3mf",
     "NIST artifact": "nist_am_test_artifact_v3b.stl",
@@ -164,8 +166,7 @@ def part_section(name, part, ours, folder, definitions):
     say(f"bench: {name}")
     lines = [f"## {name}", "", "| table | layers | fewer than the peer | largest step, mm | mean step, mm | flats missed | "
              "by up to, um | top off by, um |", "|---|---|---|---|---|---|---|---|"]
-    for peer, slicer, first in (("Slic3r", slic3r, MOST), ("Slic3r", slic3r, LEAST), ("CuraEngine", cura, MOST),
-                                ("CuraEngine", cura, LEAST)):
+    for (peer, slicer), first in itertools.product([("Slic3r", slic3r), ("CuraEngine", cura)], FIRST_LAYERS):
         tops = os.path.join(folder, f"{os.path.basename(part)[:-4]}-{peer}-{first}.tops")
         if not os.path.exists(tops):
             heights = slicer(part, folder, first, *([definitions] if slicer is cura else []))
@@ -263,8 +264,8 @@ def main(arguments):
              f"{machine['processor']}, {machine['cores']} cores; {machine['system']}. Commit {report.commit(ROOT)}.", "",
              f"Layers of {LEAST} to {MOST} mm in steps of 0.001. Peers: Debian's Slic3r 1.3 with adaptive slicing at its quality of "
              "75 % and horizontal surfaces matched, CuraEngine 4.13 with adaptive layers around 0.175 mm, variation 0.125 mm, "
-             "steps of 0.01 mm, threshold 0.2 mm; both once with a first layer of 0.3 mm, as by default, whose step may be the highest of "
-             "all, and once with one of 0.05 mm, so that their own choice decides. Every table is measured by the same code. A step is thickness times |n_z| of a "
+             "steps of 0.01 mm, threshold 0.2 mm; both with a first layer of 0.3 mm, as by default, whose step may be the highest of "
+             "all, and with one of 0.1 and 0.05 mm, so that their own choice decides. Every table is measured by the same code. A step is thickness times |n_z| of a "
              f"sloped facet; flats are horizontal faces of at least {FLAT_MM2} mm2, and the top; a flat is missed if no layer ends "
              "within 1 um of it.", ""]
     for name in options.part or PARTS:

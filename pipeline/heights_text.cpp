@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <iterator>
 
@@ -32,6 +33,14 @@ double angle(const HeightsStudy& study, std::size_t layer) {
                                                         : study.plan.looked_at[layer]);
 }
 
+// Whether Dolenc and Makela's rule took a layer back because the surface changes above its bottom.
+bool stepped_back(const HeightsStudy& study, std::size_t layer) {
+  return !study.plan.stepped_back.empty() && study.plan.stepped_back[layer];
+}
+std::size_t stepped_back_count(const HeightsStudy& study) {
+  return static_cast<std::size_t>(std::ranges::count(study.plan.stepped_back, true));
+}
+
 std::string signed_mm(std::int64_t nm) { return fmt::format("{:+.4f} mm", mm(nm)); }
 
 std::string flats_line(const HeightsStudy& study) {
@@ -56,6 +65,9 @@ std::string heights_page(const Job& job, const Scene& scene, const HeightsStudy&
       study.options.mode != heights::Mode::kAngle) {
     line("", fmt::format("{} layers of the least thickness have a step above the limit of {} mm; thinner ones would help",
                          e.above_limit, number_text(mm(study.options.cusp))));
+  }
+  if (const std::size_t back = stepped_back_count(study); back > 0) {
+    line("", fmt::format("{} layers are thinner than the slopes at their bottom ask for: what lies above is flatter", back));
   }
   line("flats", flats_line(study));
   if (study.plan.one_less_reaches >= 0) {
@@ -82,7 +94,7 @@ std::string heights_page(const Job& job, const Scene& scene, const HeightsStudy&
 }
 
 std::string heights_csv(const Scene& scene, const std::vector<HeightsStudy>& studies) {
-  std::string text = "table,layer,bottom_mm,thickness_mm,reason,angle_deg,cusp_mm,hits_flat,part\n";
+  std::string text = "table,layer,bottom_mm,thickness_mm,reason,angle_deg,cusp_mm,hits_flat,stepped_back,part\n";
   const auto quoted = [](std::string name) {
     for (std::size_t at = 0; (at = name.find('"', at)) != std::string::npos; at += 2) name.insert(at, 1, '"');
     return '"' + name + '"';
@@ -90,9 +102,9 @@ std::string heights_csv(const Scene& scene, const std::vector<HeightsStudy>& stu
   for (const HeightsStudy& study : studies) {
     for (std::size_t i = 0; i < count(study); ++i) {
       const heights::LayerFacts& layer = study.evaluation.layers[i];
-      fmt::format_to(std::back_inserter(text), "{},{},{:.6f},{:.6f},{},{:.2f},{:.6f},{},{}\n", quoted(study.name), i + 1,
+      fmt::format_to(std::back_inserter(text), "{},{},{:.6f},{:.6f},{},{:.2f},{:.6f},{},{},{}\n", quoted(study.name), i + 1,
                      mm(study.boundaries[i]), mm(thickness(study, i)), reason(study, i), angle(study, i), mm(layer.cusp),
-                     layer.hits_flat ? 1 : 0, quoted(part_name(scene, layer.part)));
+                     layer.hits_flat ? 1 : 0, stepped_back(study, i) ? 1 : 0, quoted(part_name(scene, layer.part)));
     }
   }
   return text;
@@ -128,9 +140,9 @@ std::string heights_json(const Job& job, const Scene& scene, const std::vector<H
       const heights::LayerFacts& layer = e.layers[i];
       fmt::format_to(std::back_inserter(text),
                      "{}\n{{\"bottom_mm\": {:.6f}, \"thickness_mm\": {:.6f}, \"reason\": \"{}\", \"angle_deg\": {:.2f}, "
-                     "\"cusp_mm\": {:.6f}, \"hits_flat\": {}, \"part\": {}}}",
+                     "\"cusp_mm\": {:.6f}, \"hits_flat\": {}, \"stepped_back\": {}, \"part\": {}}}",
                      i > 0 ? "," : "", mm(study.boundaries[i]), mm(thickness(study, i)), reason(study, i), angle(study, i),
-                     mm(layer.cusp), layer.hits_flat,
+                     mm(layer.cusp), layer.hits_flat, stepped_back(study, i),
                      layer.part < scene.parts.size() ? fmt::format("{}", layer.part) : "null");
     }
     text += "]}";

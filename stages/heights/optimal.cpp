@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <type_traits>
 
+#include "stages/heights/least_steps.h"
 #include "stages/heights/section.h"
 #include "stages/heights/steepest.h"
 
@@ -109,14 +111,6 @@ class Solver {
       visit(i, up);
     }
   }
-  // The rung a thickness below one, or kNone.
-  std::uint32_t rung_below(std::uint32_t rung, std::uint32_t i) const {
-    if (!strides_.empty()) return rung >= strides_[i] ? rung - strides_[i] : kNone;
-    const std::int64_t height = ladder_[rung] - set_.values[i];
-    const std::uint32_t below = ladder_.rungs_up_to(height);
-    return below > 0 && ladder_[below - 1] == height ? below - 1 : kNone;
-  }
-
   // The highest rung that a layer from each rung may reach if every flat has to have a boundary within `distance`.
   void allow(std::int64_t distance) {
     allowed_ = distance;
@@ -157,33 +151,55 @@ class Solver {
     return sizeof(Cost) > 8 ? ladder_[rung] >= index_.top : is_end(rung);
   }
 
+  // The costs of reaching every rung that layers within limit_ reach.
+  template <class Cost>
+  Buffer<Cost> costs_by_layers() const {
+    Buffer<Cost> cost(ladder_.rungs(), unreached<Cost>());
+    cost[0] = 0;
+    for (std::uint32_t rung = 0; rung < ladder_.rungs(); ++rung) {
+      if (cost[rung] == unreached<Cost>() || is_last<Cost>(rung)) continue;
+      const std::size_t flat = first_flat_above(ladder_[rung]);
+      for_each_layer(rung, [&](std::uint32_t, std::uint32_t up) {
+        cost[up] = std::min(cost[up], cost[rung] + weight<Cost>(rung, flat, up));
+      });
+    }
+    return cost;
+  }
+  // The same where the thicknesses are all the multiples of the step in a range and a layer's cost does not depend on its
+  // top: the rungs below from which a rung can be reached are a window whose ends only move up, so that the cheapest of
+  // them costs O(1) a rung.
+  template <class Cost>
+  Buffer<Cost> costs_by_windows() const {
+    Buffer<Cost> cost(ladder_.rungs(), unreached<Cost>());
+    cost[0] = 0;
+    Buffer<std::uint32_t> window(ladder_.rungs());  // of increasing cost of what is built on them, the first is the cheapest
+    Buffer<Cost> built(ladder_.rungs());
+    std::uint32_t front = 0, back = 0;
+    for (std::uint32_t up = strides_.front(); up < ladder_.rungs(); ++up) {
+      const std::uint32_t rung = up - strides_.front();
+      if (cost[rung] != unreached<Cost>() && limit_[rung] > rung && !is_last<Cost>(rung)) {
+        built[rung] = cost[rung] + weight<Cost>(rung, 0, 0);
+        while (front < back && built[window[back - 1]] >= built[rung]) --back;
+        window[back++] = rung;
+      }
+      while (front < back && limit_[window[front]] < up) ++front;
+      if (front < back) cost[up] = built[window[front]];
+    }
+    return cost;
+  }
+
   // The stack that the header promises, as indices of thicknesses, bottom up; empty if none keeps limit_.
   template <class Cost>
   std::vector<std::uint32_t> solve() {
-    Buffer<Cost> cost(ladder_.rungs(), unreached<Cost>());
-    cost[0] = 0;
-    const bool run = sizeof(Cost) <= 8 && !strides_.empty() && set_.is_contiguous() && set_.step() == ladder_.step();
+    const Buffer<Cost> cost = sizeof(Cost) <= 8 && even_range() ? costs_by_windows<Cost>() : costs_by_layers<Cost>();
     std::uint32_t end = kNone;
     Cost best = unreached<Cost>();
     for (std::uint32_t rung = 0; rung < ladder_.rungs(); ++rung) {
-      if (cost[rung] == unreached<Cost>()) continue;
-      if (is_end(rung)) {
-        const Cost whole = cost[rung] + (sizeof(Cost) > 8 ? end_cost<Cost>(rung) : Cost{0});
-        if (whole < best || (whole == best && nearer_top(rung, end))) {
-          end = rung;
-          best = whole;
-        }
-      }
-      if (is_last<Cost>(rung)) continue;
-      if (run) {
-        const Cost next = cost[rung] + weight<Cost>(rung, 0, 0);
-        Cost* to = cost.data();
-        for (std::uint32_t up = rung + strides_.front(); up <= limit_[rung]; ++up) to[up] = std::min(to[up], next);
-      } else {
-        const std::size_t flat = first_flat_above(ladder_[rung]);
-        for_each_layer(rung, [&](std::uint32_t, std::uint32_t up) {
-          cost[up] = std::min(cost[up], cost[rung] + weight<Cost>(rung, flat, up));
-        });
+      if (cost[rung] == unreached<Cost>() || !is_end(rung)) continue;
+      const Cost whole = cost[rung] + (sizeof(Cost) > 8 ? end_cost<Cost>(rung) : Cost{0});
+      if (whole < best || (whole == best && nearer_top(rung, end))) {
+        end = rung;
+        best = whole;
       }
     }
     if (end == kNone) return {};
@@ -192,6 +208,8 @@ class Solver {
     }
     return trace(cost, end);
   }
+  // Whether the thicknesses are all the multiples of the ladder's step in a range.
+  bool even_range() const { return !strides_.empty() && set_.is_contiguous() && set_.step() == ladder_.step(); }
 
   bool nearer_top(std::uint32_t a, std::uint32_t b) const {
     return std::abs(ladder_[a] - index_.top) < std::abs(ladder_[b] - index_.top);
@@ -234,29 +252,36 @@ class Solver {
   template <class Cost>
   std::vector<std::uint32_t> trace(const Buffer<Cost>& cost, std::uint32_t end) const {
     const Buffer<double> below = projected_below(index_, index_.parts, ladder_, Sign::kBoth);
+    Buffer<std::uint32_t> via;  // the next rung of the stack from each rung
+    if constexpr (std::is_same_v<Cost, Layers>) {
+      if (even_range()) via = least_steps({cost, limit_, below, strides_.front(), end});
+    }
+    if (via.empty()) via = least_steps_by_layers(cost, below, end);
+    std::vector<std::uint32_t> thicknesses;
+    for (std::uint32_t rung = 0; rung != end; rung = via[rung]) {
+      const auto value = std::ranges::lower_bound(set_.values, ladder_[via[rung]] - ladder_[rung]);
+      thicknesses.push_back(static_cast<std::uint32_t>(value - set_.values.begin()));
+    }
+    return thicknesses;
+  }
+  template <class Cost>
+  Buffer<std::uint32_t> least_steps_by_layers(const Buffer<Cost>& cost, const Buffer<double>& below, std::uint32_t end) const {
     constexpr double kFar = std::numeric_limits<double>::infinity();
     Buffer<double> steps(end + 1, kFar);  // mm2 nm, from a rung to the end
     Buffer<std::uint32_t> via(end + 1, kNone);
     steps[end] = 0;
-    for (std::uint32_t up = end; up > 0; --up) {
-      if (steps[up] == kFar) continue;
-      for (std::uint32_t i = 0; i < set_.size(); ++i) {
-        const std::uint32_t rung = rung_below(up, i);
-        if (rung == kNone || limit_[rung] < up || cost[rung] == unreached<Cost>() || is_last<Cost>(rung)) continue;
-        if (cost[rung] + weight<Cost>(rung, first_flat_above_if<Cost>(rung), up) != cost[up]) continue;
+    for (std::uint32_t rung = end; rung-- > 0;) {
+      if (cost[rung] == unreached<Cost>() || is_last<Cost>(rung)) continue;
+      const std::size_t flat = first_flat_above_if<Cost>(rung);
+      for_each_layer(rung, [&](std::uint32_t i, std::uint32_t up) {
+        if (up > end || steps[up] == kFar || cost[rung] + weight<Cost>(rung, flat, up) != cost[up]) return;
         const double value = steps[up] + set_.values[i] * (below[up] - below[rung]);
-        if (value < steps[rung]) {
-          steps[rung] = value;
-          via[rung] = i;
-        }
-      }
+        if (value > steps[rung]) return;  // of equal ones the thickest
+        steps[rung] = value;
+        via[rung] = up;
+      });
     }
-    std::vector<std::uint32_t> thicknesses;
-    for (std::int64_t height = 0; height < ladder_[end];) {
-      thicknesses.push_back(via[ladder_.rungs_up_to(height) - 1]);
-      height += set_.values[thicknesses.back()];
-    }
-    return thicknesses;
+    return via;
   }
   template <class Cost>
   std::size_t first_flat_above_if(std::uint32_t rung) const {

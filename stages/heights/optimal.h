@@ -11,7 +11,8 @@ namespace lamina::heights {
 ///   1. the least distance from the flat that is missed most,
 ///   2. the least sum of the distances of all flats that are missed,
 ///   3. the fewest layers, or the least time,
-///   4. the least step on average, weighted by area.
+///   4. the end that is nearest to the top, the lower one of two,
+///   5. the least step on average, weighted by area.
 /// A flat is missed by its distance from the nearest boundary if that is more than options.surface.flat_tolerance or
 /// half the step that all thicknesses share, whichever is less: a flat that the thicknesses can meet is met. The top of
 /// the parts counts as a flat, and the stack ends there; with options.flats off there are no flats, and the stack ends
@@ -21,7 +22,8 @@ namespace lamina::heights {
 /// programming, R. Bellman 1957; for layers, each state is one height). Because the layers allowed from a state are the
 /// thinnest ones up to some limit, a state is expanded without looking at the surface again.
 ///
-/// cost  O(states * thicknesses); two passes, four if flats cannot be hit
+/// cost  O(states * log thicknesses) where the thicknesses are all of a range and its flats can be hit, else
+///       O(states * thicknesses)
 Plan plan_optimal(const SurfaceIndex& index, const Options& options, const Ladder& ladder);
 
 }  // namespace lamina::heights

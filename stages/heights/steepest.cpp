@@ -1,8 +1,13 @@
 #include "stages/heights/steepest.h"
 
+#include <tbb/parallel_for.h>
+
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <optional>
+#include <utility>
+#include <vector>
 
 namespace lamina::heights {
 namespace {
@@ -13,8 +18,10 @@ namespace {
 // keeps the table small.
 class RangeRaiser {
  public:
+  static constexpr std::uint32_t kLevels = 8;
+
   explicit RangeRaiser(std::uint32_t count)
-      : count_(count), fine_(make_levels(count, kBlockBits + 2)), coarse_(make_levels((count >> kBlockBits) + 1, 32)) {}
+      : count_(count), fine_(make_levels(count, kLevels)), coarse_(make_levels((count >> kBlockBits) + 1, 32)) {}
 
   void raise(std::uint32_t first, std::uint32_t last, Steepness value) {  // [first, last)
     if (last - first < (2u << kBlockBits)) return raise(fine_, first, last, value);
@@ -33,7 +40,7 @@ class RangeRaiser {
   }
 
  private:
-  static constexpr std::uint32_t kBlockBits = 6, kMask = (1u << kBlockBits) - 1;
+  static constexpr std::uint32_t kBlockBits = kLevels - 2, kMask = (1u << kBlockBits) - 1;
   using Levels = std::vector<Buffer<Steepness>>;
 
   static Levels make_levels(std::uint32_t count, std::uint32_t most) {
@@ -63,61 +70,98 @@ class RangeRaiser {
   Levels fine_, coarse_;
 };
 
+struct Range {
+  std::uint32_t first, last;
+};
+
+// The largest |n_z| of all facets by the range of entries that each covers. Every share raises entries of its own; the
+// larger of two is the same in any order.
+template <class RangeOf>
+Buffer<Steepness> steepest_by(const SurfaceIndex& index, std::span<const PartSurface> parts, std::uint32_t entries,
+                              const RangeOf& range_of) {
+  const std::uint32_t shares = worthwhile_shares(index, parts, RangeRaiser::kLevels * entries);
+  std::vector<Buffer<Steepness>> found(shares);
+  tbb::parallel_for(0u, shares, [&](std::uint32_t share) {
+    RangeRaiser raiser(entries);
+    for (const PartSurface& part : parts) {
+      for_each_slope(index, part, share, shares, [&](Nm lo, Nm hi, Steepness steepness, double) {
+        const Range range = range_of(lo, hi);
+        if (range.first < range.last) raiser.raise(range.first, range.last, steepness);
+      });
+    }
+    found[share] = raiser.finish();
+  });
+  for (std::uint32_t share = 1; share < shares; ++share) {
+    for (std::uint32_t i = 0; i < entries; ++i) found[0][i] = std::max(found[0][i], found[share][i]);
+  }
+  return std::move(found[0]);
+}
+
+// What facets put below each rung; sums of floating point, so shares are joined in their order.
+struct Spread {
+  Buffer<double> within;  // mm2 inside of a cell
+  Buffer<double> slope;   // mm2 per nm that begins (or ends) to cover whole cells at a rung
+  explicit Spread(std::uint32_t rungs) : within(rungs, 0.0), slope(rungs + 1, 0.0) {}
+
+  void add(const Ladder& ladder, Nm lo, Nm hi, double mm2) {
+    const auto [first, last] = ladder.cells_between(lo, hi);
+    if (first >= last) return;
+    if (last - first == 1 && lo >= ladder[first] && hi <= ladder[last]) {
+      within[first] += mm2;
+      return;
+    }
+    const double density = mm2 / (static_cast<double>(hi) - lo);
+    const auto share = [&](std::uint32_t cell) {
+      return density * static_cast<double>(std::min<std::int64_t>(hi, ladder[cell + 1]) -
+                                           std::max<std::int64_t>(lo, ladder[cell]));
+    };
+    within[first] += share(first);
+    if (last - first < 2) return;
+    within[last - 1] += share(last - 1);
+    if (last - first < 3) return;
+    slope[first + 1] += density;
+    slope[last - 1] -= density;
+  }
+  void add(const Spread& other) {
+    for (std::size_t i = 0; i < within.size(); ++i) within[i] += other.within[i];
+    for (std::size_t i = 0; i < slope.size(); ++i) slope[i] += other.slope[i];
+  }
+};
+
 }  // namespace
 
 Buffer<Steepness> steepest_in_cells(const SurfaceIndex& index, std::span<const PartSurface> parts, const Ladder& ladder) {
-  RangeRaiser raiser(ladder.cells());
-  for (const PartSurface& part : parts) {
-    for_each_slope(index, part, [&](Nm lo, Nm hi, Steepness steepness, double) {
-      const auto [first, last] = ladder.cells_between(lo, hi);
-      if (first < last) raiser.raise(first, last, steepness);
-    });
-  }
-  return raiser.finish();
+  return steepest_by(index, parts, ladder.cells(), [&](Nm lo, Nm hi) {
+    const auto [first, last] = ladder.cells_between(lo, hi);
+    return Range{first, last};
+  });
 }
 
 Buffer<Steepness> steepest_at_rungs(const SurfaceIndex& index, std::span<const PartSurface> parts, const Ladder& ladder) {
-  RangeRaiser raiser(ladder.rungs());
-  for (const PartSurface& part : parts) {
-    for_each_slope(index, part, [&](Nm lo, Nm hi, Steepness steepness, double) {
-      const std::uint32_t first = ladder.rungs_up_to(lo), last = ladder.rungs_up_to(hi);
-      if (first < last) raiser.raise(first, last, steepness);
-    });
-  }
-  return raiser.finish();
+  return steepest_by(index, parts, ladder.rungs(), [&](Nm lo, Nm hi) {
+    return Range{ladder.rungs_up_to(lo), ladder.rungs_up_to(hi)};
+  });
 }
 
 Buffer<double> projected_below(const SurfaceIndex& index, std::span<const PartSurface> parts, const Ladder& ladder,
                                Sign sign) {
-  // Within a cell: what lies in it; slope: mm2 per nm that begins (or ends) to cover whole cells at a rung.
-  Buffer<double> within(ladder.rungs(), 0.0), slope(ladder.rungs() + 1, 0.0);
-  for (const PartSurface& part : parts) {
-    for_each_slope(index, part, [&](Nm lo, Nm hi, Steepness, double projected) {
-      const auto [first, last] = ladder.cells_between(lo, hi);
-      if (first >= last) return;
-      const double mm2 = sign == Sign::kBoth ? std::abs(projected) : projected;
-      if (last - first == 1 && lo >= ladder[first] && hi <= ladder[last]) {
-        within[first] += mm2;
-        return;
-      }
-      const double density = mm2 / (static_cast<double>(hi) - lo);
-      const auto share = [&](std::uint32_t cell) {
-        return density * static_cast<double>(std::min<std::int64_t>(hi, ladder[cell + 1]) -
-                                             std::max<std::int64_t>(lo, ladder[cell]));
-      };
-      within[first] += share(first);
-      if (last - first < 2) return;
-      within[last - 1] += share(last - 1);
-      if (last - first < 3) return;
-      slope[first + 1] += density;
-      slope[last - 1] -= density;
-    });
-  }
+  const std::uint32_t shares = worthwhile_shares(index, parts, 4 * ladder.rungs());  // doubles of two arrays
+  std::vector<std::optional<Spread>> spreads(shares);
+  tbb::parallel_for(0u, shares, [&](std::uint32_t share) {
+    Spread& spread = spreads[share].emplace(ladder.rungs());
+    for (const PartSurface& part : parts) {
+      for_each_slope(index, part, share, shares, [&](Nm lo, Nm hi, Steepness, double projected) {
+        spread.add(ladder, lo, hi, sign == Sign::kBoth ? std::abs(projected) : projected);
+      });
+    }
+  });
+  Spread& all = *spreads[0];
+  for (std::uint32_t share = 1; share < shares; ++share) all.add(*spreads[share]);
   Buffer<double> below(ladder.rungs(), 0.0);
   double density = 0;
   for (std::uint32_t cell = 0; cell < ladder.cells(); ++cell) {
-    density += slope[cell];
-    below[cell + 1] = below[cell] + within[cell] + density * static_cast<double>(ladder[cell + 1] - ladder[cell]);
+    density += all.slope[cell];
+    below[cell + 1] = below[cell] + all.within[cell] + density * static_cast<double>(ladder[cell + 1] - ladder[cell]);
   }
   return below;
 }

@@ -4,6 +4,7 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <map>
 #include <numbers>
@@ -39,6 +40,37 @@ struct Limits {
   double least_mm2;
 };
 
+// Joins facets at the same height that come soon after each other: a terrain of whole metres has a hundred thousand of
+// them at a hundred heights. A place for each height that another height may take; what loses its place is listed.
+class FlatJoiner {
+ public:
+  explicit FlatJoiner(std::vector<FlatFacet>& out) : out_(out) {}
+  ~FlatJoiner() {
+    for (const FlatFacet& flat : places_) list(flat);
+  }
+  FlatJoiner(const FlatJoiner&) = delete;
+  FlatJoiner& operator=(const FlatJoiner&) = delete;
+
+  void add(const FlatFacet& flat) {
+    const std::uint32_t mixed = (static_cast<std::uint32_t>(flat.height) * 2 + flat.up) * 2654435769u;
+    FlatFacet& place = places_[mixed >> (32 - kBits)];
+    if (place.height == flat.height && place.up == flat.up) {
+      place.mm2 += flat.mm2;
+    } else {
+      list(place);
+      place = flat;
+    }
+  }
+
+ private:
+  static constexpr int kBits = 8;
+  void list(const FlatFacet& flat) {
+    if (flat.mm2 > 0) out_.push_back(flat);
+  }
+  std::vector<FlatFacet>& out_;
+  std::array<FlatFacet, 1 << kBits> places_{};
+};
+
 MeshSlopes slopes_of(const Mesh& mesh, const Limits& limits) {
   MeshSlopes slopes;
   const std::size_t count = mesh.triangles.size();
@@ -55,6 +87,7 @@ MeshSlopes slopes_of(const Mesh& mesh, const Limits& limits) {
   float* to_projected = slopes.projected_mm2.data();
   tbb::parallel_for(std::size_t{0}, blocks, [&](std::size_t block) {
     double block_area = 0;
+    FlatJoiner joiner(flats[block]);
     for (std::size_t i = block * kBlock; i < std::min(count, (block + 1) * kBlock); ++i) {
       const Triangle& t = triangles[i];
       const Normal n = normal_of(t);
@@ -65,7 +98,7 @@ MeshSlopes slopes_of(const Mesh& mesh, const Limits& limits) {
       const bool counts = up > 0 && mm2 >= limits.least_mm2;
       const bool level = counts && nz >= limits.horizontal && std::int64_t{hi} - lo <= limits.tolerance;
       const bool slope = counts && !level;
-      if (level) flats[block].push_back({static_cast<Nm>(lo + (std::int64_t{hi} - lo) / 2), n.z > 0, mm2});
+      if (level) joiner.add({static_cast<Nm>(lo + (std::int64_t{hi} - lo) / 2), n.z > 0, mm2});
       block_area += level ? 0 : mm2;
       to_lo[i] = lo;
       to_hi[i] = hi;
@@ -88,6 +121,15 @@ MeshSlopes slopes_of(const Mesh& mesh, const Limits& limits) {
 
 double angle_of(Steepness steepness) {
   return std::asin(static_cast<double>(steepness) / kHorizontal) * 180 / std::numbers::pi;
+}
+
+std::uint32_t worthwhile_shares(const SurfaceIndex& index, std::span<const PartSurface> parts, std::size_t entries) {
+  std::size_t facets = 0;
+  for (const PartSurface& part : parts) {
+    for (const Standing& standing : part.standing) facets += index.meshes[standing.mesh].steepness.size();
+  }
+  constexpr std::size_t kFacetsAnEntry = 4, kMost = 32;
+  return static_cast<std::uint32_t>(std::clamp<std::size_t>(facets / (kFacetsAnEntry * entries + 1), 1, kMost));
 }
 
 SurfaceIndex index_surface(std::span<const Mesh> meshes, std::span<const Instance> instances,

@@ -32,7 +32,7 @@ struct SurfaceOptions {
   double least_facet_mm2 = 0;        // smaller facets ask for nothing
 };
 
-/// One horizontal facet.
+/// A horizontal facet, or several at the same height that face the same way.
 struct FlatFacet {
   Nm height;     // nm, the middle of its corners
   bool up;       // its outside is above
@@ -45,7 +45,7 @@ struct MeshSlopes {
   Buffer<Nm> lo, hi;               // z range, nm
   Buffer<Steepness> steepness;
   Buffer<float> projected_mm2;     // area times n_z: negative where the facet looks down
-  std::vector<FlatFacet> flats;    // in the order of the facets
+  std::vector<FlatFacet> flats;    // in no order; the same for any number of threads
   double area_mm2 = 0;             // of all facets that are not horizontal
 };
 
@@ -78,17 +78,23 @@ SurfaceIndex index_surface(std::span<const Mesh> meshes, std::span<const Instanc
                            std::span<const std::uint32_t> part_of_instance, std::uint32_t part_count,
                            const SurfaceOptions& options);
 
-/// Calls visit(lo, hi, steepness, projected) for each sloped facet of a part: heights in nm above the bed, mm2 of all
-/// copies, negative where the facet looks down.
+/// Into how many shares a pass over the sloped facets of these parts may be cut whose every share fills `entries` numbers
+/// of its own: 1 where filling them would cost more than the facets. The same for any number of threads.
+std::uint32_t worthwhile_shares(const SurfaceIndex& index, std::span<const PartSurface> parts, std::size_t entries);
+
+/// Calls visit(lo, hi, steepness, projected) for each sloped facet of one of `shares` shares of a part: heights in nm
+/// above the bed, mm2 of all copies, negative where the facet looks down.
 template <class Visit>
-void for_each_slope(const SurfaceIndex& index, const PartSurface& part, const Visit& visit) {
+void for_each_slope(const SurfaceIndex& index, const PartSurface& part, std::uint32_t share, std::uint32_t shares,
+                    const Visit& visit) {
   for (const Standing& standing : part.standing) {
     const MeshSlopes& mesh = index.meshes[standing.mesh];
     const Nm* lo = mesh.lo.data();
     const Nm* hi = mesh.hi.data();
     const Steepness* steepness = mesh.steepness.data();
     const float* projected = mesh.projected_mm2.data();
-    for (std::size_t i = 0; i < mesh.steepness.size(); ++i) {
+    const std::size_t count = mesh.steepness.size(), end = count * (share + 1) / shares;
+    for (std::size_t i = count * share / shares; i < end; ++i) {
       if (steepness[i] == 0) continue;
       visit(lo[i] + standing.raise, hi[i] + standing.raise, steepness[i],
             static_cast<double>(projected[i]) * standing.copies);

@@ -237,5 +237,37 @@ TEST(Thicknesses, SetsAndRangesAreReadStrictly) {
   }
 }
 
+TEST(Steepest, ManyFacetsInSharesGiveWhatEachFacetAsksFor) {
+  std::mt19937 random(11);
+  Mesh mesh;
+  for (int i = 0; i < 40'000; ++i) {
+    const Nm z = static_cast<Nm>(random() % 1'500'000), rise = static_cast<Nm>(1 + random() % (i % 100 == 0 ? 400'000 : 9000));
+    const Nm out = static_cast<Nm>(1 + random() % 30'000);
+    mesh.triangles.push_back({{0, 0, z}, {0, 1'000'000, z}, {out, 0, z + rise}});
+  }
+  for (const Triangle& t : mesh.triangles) {
+    for (const Point3& p : {t.a, t.b, t.c}) mesh.bounds.add(p);
+  }
+  const SurfaceIndex index = test::index_of(mesh);
+  const Result<Ladder> ladder = Ladder::reachable(test::set_of({0.05, 0.06}), index.top);
+  ASSERT_TRUE(ladder.ok());
+  ASSERT_GT(worthwhile_shares(index, index.parts, 8 * ladder->rungs()), 1u);
+  Buffer<Steepness> cells(ladder->cells(), 0), rungs(ladder->rungs(), 0);
+  std::vector<double> below(ladder->rungs(), 0);
+  for_each_slope(index, index.parts[0], 0, 1, [&](Nm lo, Nm hi, Steepness steepness, double projected) {
+    for (std::uint32_t i = 0; i < ladder->rungs(); ++i) {
+      const std::int64_t bottom = (*ladder)[i];
+      if (i < ladder->cells() && lo < (*ladder)[i + 1] && hi > bottom) cells[i] = std::max(cells[i], steepness);
+      if (lo < bottom && hi >= bottom) rungs[i] = std::max(rungs[i], steepness);
+      const double share = std::clamp((static_cast<double>(bottom) - lo) / (static_cast<double>(hi) - lo), 0.0, 1.0);
+      below[i] += std::abs(projected) * share;
+    }
+  });
+  EXPECT_EQ(steepest_in_cells(index, index.parts, *ladder), cells);
+  EXPECT_EQ(steepest_at_rungs(index, index.parts, *ladder), rungs);
+  const Buffer<double> found = projected_below(index, index.parts, *ladder, Sign::kBoth);
+  for (std::uint32_t i = 0; i < ladder->rungs(); ++i) EXPECT_NEAR(found[i], below[i], 1e-9 * (1 + below[i])) << i;
+}
+
 }  // namespace
 }  // namespace lamina::heights
