@@ -21,6 +21,7 @@ constexpr Command kCommands[] = {
     {"extrude", "material extrusion: toolpaths as G-code or SML, with segmented lines and their pores", run_extrude_command},
     {"info", "what is in a part file, is it closed, and where is it not", run_info_command},
     {"verify", "is a job's directory whole and true to its manifest", run_verify_command},
+    {"calibrate", "test pieces of an extrusion printer, and its profile from what was measured on them", run_calibrate_command},
     {"permeability", "Darcy's and Forchheimer's coefficients from flows and pressure drops", run_permeability_command},
     {"merge", "join the shards of a job that was divided", run_merge_command},
     {"machines", "the powder printers that lamina jet writes programs for, and what follows from a profile", run_machines_command},

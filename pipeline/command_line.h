@@ -74,6 +74,7 @@ int run_info_command(const std::vector<std::string>& arguments);
 int run_verify_command(const std::vector<std::string>& arguments);
 int run_merge_command(const std::vector<std::string>& arguments);
 int run_machines_command(const std::vector<std::string>& arguments);
+int run_calibrate_command(const std::vector<std::string>& arguments);
 int run_permeability_command(const std::vector<std::string>& arguments);
 int run_preview_command(const std::vector<std::string>& arguments);
 int run_batch_command(const std::vector<std::string>& arguments);

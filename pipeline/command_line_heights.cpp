@@ -68,6 +68,13 @@ Result<Job> job_of(const Arguments& arguments) {
   return read;
 }
 
+std::string rp3_of(const Job& job, const HeightsStudy& study) {
+  write::rp3::Settings settings;
+  settings.shrink = job.parts.front().shrink;
+  settings.rotation_deg = job.parts.front().rotate_deg;
+  return heights_rp3(study, {0, static_cast<std::uint32_t>(study.boundaries.size() - 1)}, settings);
+}
+
 }  // namespace
 
 int run_heights_command(const std::vector<std::string>& texts) {
@@ -116,7 +123,7 @@ int run_heights_command(const std::vector<std::string>& texts) {
   std::string text;
   if (form == Form::kJson) text = heights_json(*job, *scene, studies);
   else if (form == Form::kCsv) text = heights_csv(*scene, studies);
-  else if (form == Form::kRp3) text = heights_rp3(*job, last);
+  else if (form == Form::kRp3) text = rp3_of(*job, last);
   else text = studies.size() > 1 ? comparison_page(studies) : heights_page(*job, *scene, last);
   if (Status status = tell(output, text); !status) return fail(status.error());
   if (studies.size() == 1 && !arguments->has("--quiet")) {

@@ -15,7 +15,10 @@
 namespace lamina::pipeline {
 namespace {
 
-const KeyChoice kJetKeys = {"bed", "layers", "heights", "place", "image", "machine", "dose", "load", "run", "part"};
+const KeyChoice kJetKeys = {"bed", "layers", "heights", "place", "image.format", "image.mirror", "machine", "dose", "fill", "segment.fill",
+                            "segment.rule", "segment.thick_mm", "segment.thin_mm", "segment.continuous_lines", "segment.spacing_sc_mm",
+                            "segment.spacing_cc_mm", "segment.gap_mm", "segment.shift_mm", "segment.thick_width_mm",
+                            "segment.thin_width_mm", "load", "run", "part"};
 
 CommandSpec jet_spec() {
   CommandSpec spec;
@@ -46,6 +49,7 @@ CommandSpec jet_spec() {
       "  lamina jet part.obj --unit inch --rotate 0,0,90 --shrink 1.02,1.02,1.025 -o out\n"
       "  lamina jet part.stl --layers 100:110 --format png -o look      ten layers only\n"
       "  lamina jet part.stl --shard 1/4 -o out                         a quarter; then lamina merge out -o out\n"
+      "  lamina jet part.stl --fill segmented --thin 1.5 --shell 1 -o out   pores planned by the filling, in a solid shell\n"
       "  lamina jet part.stl --dpi 600 --save-job job.toml --dry-run    write the job, plan nothing\n"
       "  lamina jet --job job.toml -o out --resume";
   return spec;

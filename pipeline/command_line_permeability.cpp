@@ -11,6 +11,7 @@
 
 #include "pipeline/command_line.h"
 #include "pipeline/console.h"
+#include "pipeline/delimited_text.h"
 #include "pipeline/json_text.h"
 #include "pipeline/nearest_name.h"
 #include "pipeline/number_text.h"
@@ -49,18 +50,6 @@ struct Group {
   std::vector<segment::FlowPoint> points;
 };
 
-std::vector<std::string> cells_of(std::string line, char separator) {
-  if (!line.empty() && line.back() == '\r') line.pop_back();
-  std::vector<std::string> cells;
-  for (const auto cell : split(line, std::string_view(&separator, 1))) {
-    std::string text(cell);
-    while (!text.empty() && (text.front() == ' ' || text.front() == '"')) text.erase(0, 1);
-    while (!text.empty() && (text.back() == ' ' || text.back() == '"')) text.pop_back();
-    cells.push_back(text);
-  }
-  return cells;
-}
-
 /// A table with a header: one column of flows or velocities, one or more of pressure drops; units by their endings.
 Result<std::vector<Group>> read_points(const std::string& path, const Settings& settings) {
   const auto wrong = [&](std::size_t line, const std::string& what) {
@@ -80,7 +69,7 @@ Result<std::vector<Group>> read_points(const std::string& path, const Settings& 
     ++number;
     if (line.empty() || line[0] == '#' || line == "\r") continue;
     if (names.empty()) {
-      separator = line.find('\t') != std::string::npos ? '\t' : line.find(';') != std::string::npos ? ';' : ',';
+      separator = separator_of(line);
       names = cells_of(line, separator);
       drop_units.assign(names.size(), 0);
       bool drops = false;

@@ -5,16 +5,20 @@
 #include <tbb/global_control.h>
 
 #include <chrono>
+#include <cmath>
 #include <filesystem>
 #include <numbers>
 #include <optional>
+#include <span>
 
 #include "pipeline/command_line.h"  // version
 #include "pipeline/extrude_layer.h"
+#include "pipeline/heights_study.h"
 #include "pipeline/json_text.h"
 #include "pipeline/layer_flow.h"
 #include "pipeline/number_text.h"
 #include "pipeline/slice.h"
+#include "stages/write/atomic_file.h"
 #include "stages/write/growing_file.h"
 
 namespace lamina::pipeline {
@@ -51,6 +55,24 @@ void predict(const SegmentPlan& segments, const segment::Calibration& calibratio
   for (const SegmentRange& range : segments.ranges) {
     one(range, fmt::format("{} to {} mm", number_text(mm(range.from)), number_text(mm(range.to))));
   }
+}
+
+/// The name of the report on a file of toolpaths.
+std::string report_name(const std::string& output) { return std::filesystem::path(output).replace_extension(".rp3").string(); }
+
+/// The layers of an SML file as the .rp3 report that belongs to it.
+Status write_layer_table(const Job& job, const SlicePlan& plan, const std::array<std::uint32_t, 2>& range) {
+  const auto study = study_heights(job, plan.scene());
+  if (!study) return study.error();
+  write::rp3::Settings settings;
+  settings.raster_width_mm = job.fill.all.width_mm;
+  settings.contour_offset_mm = job.fill.all.wall_width_mm > 0 ? job.fill.all.wall_width_mm : job.fill.all.width_mm;
+  settings.angle_step_deg = job.fill.all.angle_step_deg;
+  settings.first_angle_deg = std::fmod(job.fill.all.angle_deg + settings.angle_step_deg * range[0], 360);
+  settings.shrink = job.parts.front().shrink;
+  settings.rotation_deg = job.parts.front().rotate_deg;
+  const std::string text = heights_rp3(*study, range, settings);
+  return write::write_file(report_name(job.output), std::as_bytes(std::span(text)));
 }
 
 struct Work {
@@ -119,6 +141,9 @@ Result<ExtrudeSummary> run_extrude(const Job& asked, const ProgressCallback& pro
     return Error{Fault::kUsage, fmt::format("the parts are {:.3f} mm high, {} builds {:.3f} mm; lay them down or scale them",
                                             mm(plan->scene().height), machine.name, machine.bed.build_height_mm)};
   }
+  if (machine.format == "sml" && report_name(job.output) == job.output) {
+    return Error{Fault::kUsage, fmt::format("-o {}: is the name of its report; end it in .sml", job.output)};
+  }
   const auto format = machine.format == "sml" ? write::make_sml_format(machine) : write::make_gcode_format(machine);
   for (std::uint32_t i = first; i < last; ++i) {
     if (Status status = format->check(plan->layers()[i]); !status) return status.error();
@@ -126,6 +151,7 @@ Result<ExtrudeSummary> run_extrude(const Job& asked, const ProgressCallback& pro
   if (!plan->fills()) {
     summary.warnings.push_back("nothing is asked for: no walls and no filling; give --walls, --fill or both");
   }
+  if (Status status = check_thin_stretches(*segments, *plan); !status) return status.error();
   predict(*segments, profile->calibration, summary);
   if (segments->any() && !profile->own_calibration && machine.name != "Anet A8") {
     summary.warnings.push_back(fmt::format("{} has no calibration of its own; widths and limits are those measured on an Anet A8: "
@@ -164,14 +190,18 @@ Result<ExtrudeSummary> run_extrude(const Job& asked, const ProgressCallback& pro
     return {};
   };
   LayerExtrusion sums;
-  std::uint32_t done = 0, open_layers = 0;
-  std::string first_open;
+  std::uint32_t done = 0, open_layers = 0, undivided_layers = 0;
+  std::string first_open, first_undivided;
   const auto record = [&](std::uint32_t i, Work& work) -> Status {
     if (Status status = file->append(work.text); !status) return status;
     if (i == 0) summary.first_layer_points = work.sums.segments.points();
     sums.add(work.sums);
+    const Layer& layer = plan->layers()[first + i];
+    if (work.sums.segments.lines > 0 && work.sums.segments.thin == 0 && ++undivided_layers == 1) {
+      first_undivided = fmt::format("in layer {} at z {:.3f} mm", first + i, mm(layer.plane()));
+    }
     if (work.layer.report.gaps.open > 0 && ++open_layers == 1) {
-      first_open = fmt::format("in layer {} at z {:.3f} mm", first + i, mm(plan->layers()[first + i].plane()));
+      first_open = fmt::format("in layer {} at z {:.3f} mm", first + i, mm(layer.plane()));
     }
     progress({ProgressEvent::Stage::kLayers, ++done, summary.layers});
     return {};
@@ -192,6 +222,10 @@ Result<ExtrudeSummary> run_extrude(const Job& asked, const ProgressCallback& pro
   summary.bytes_written = file->size();
   if (Status status = file->finish(); !status) return status.error();
 
+  if (machine.format == "sml") {
+    if (Status status = write_layer_table(job, *plan, *range); !status) return status.error();
+  }
+
   summary.totals = sums.totals;
   summary.segments = sums.segments;
   summary.porosity = sums.porosity;
@@ -208,6 +242,10 @@ Result<ExtrudeSummary> run_extrude(const Job& asked, const ProgressCallback& pro
   if (open_layers > 0) {
     summary.warnings.push_back(fmt::format("chains of cuts stay open in {} layers, first {}: they bound nothing and are left out; "
                                            "leave out --no-repair to close the parts", open_layers, first_open));
+  }
+  if (undivided_layers > 0) {
+    summary.warnings.push_back(fmt::format("segment.thin_mm: longer than every segmented line less its ends in {} of {} layers, first {}: no pores there",
+                                           undivided_layers, summary.layers, first_undivided));
   }
   if (plan->fills() && sums.totals.moves == 0) {
     summary.warnings.push_back("no bead fits into the parts: they are narrower than the walls and the filling ask for");

@@ -1,5 +1,7 @@
 #include "pipeline/extrude_layer.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -36,8 +38,8 @@ std::array<double, 2> direction(infill::MicroDegrees angle) {
 /// What a machine does for each kind of stretch; made anew only where the stored width changes.
 class MoveTable {
  public:
-  MoveTable(const segment::Segmentation& plan, bool on, const Extruder& machine, const Layer& layer)
-      : plan_(plan), on_(on), height_(mm(layer.thickness)) {
+  MoveTable(const segment::Segmentation& plan, const segment::LayerCut& cut, const Extruder& machine, const Layer& layer)
+      : plan_(plan), cut_(cut), on_(cut.on), height_(mm(layer.thickness)) {
     const double limit = layer.index == 0 ? machine.speed.first_layer_mm_s : INFINITY;
     reference_ = std::min(machine.speed.print_mm_s, limit);
     wall_ = std::min(machine.speed.wall_mm_s, limit);
@@ -50,6 +52,10 @@ class MoveTable {
   };
 
   const Entry& of(const Stretch& s) {
+    if (s.thickness == Thickness::kThin && !plan_.sweep.empty()) {
+      make(s, swept_);
+      return swept_;
+    }
     Entry& entry = table_[static_cast<std::size_t>(s.kind) * 3 + static_cast<std::size_t>(s.thickness)];
     if (entry.stored != s.width) make(s, entry);
     return entry;
@@ -61,7 +67,10 @@ class MoveTable {
     const bool fills = s.kind != PathKind::kOuter && s.kind != PathKind::kInner;
     double share = 1, speed = 100, bead = fills && on_ ? plan_.continuous_width_mm : width;
     if (s.thickness == Thickness::kThick) share = plan_.thick_extrusion / 100, speed = plan_.thick_speed, bead = plan_.thick_width_mm;
-    if (s.thickness == Thickness::kThin) share = plan_.thin_extrusion / 100, speed = plan_.thin_speed, bead = plan_.thin_width_mm;
+    if (s.thickness == Thickness::kThin) {
+      const auto thin = plan_.thin_of(cut_.ordinal(s.line));
+      share = thin.extrusion / 100, speed = thin.speed, bead = thin.width_mm;
+    }
     entry.stored = s.width;
     entry.width = s.thickness == Thickness::kReference ? s.width : static_cast<Nm>(nm_of(bead));
     entry.area = full * share;
@@ -72,9 +81,11 @@ class MoveTable {
   }
 
   const segment::Segmentation& plan_;
+  const segment::LayerCut& cut_;
   bool on_;
   double height_, reference_, wall_, inner_;
   std::array<Entry, 15> table_;
+  Entry swept_;  // of a line of its own kind: not kept
 };
 
 }  // namespace
@@ -124,6 +135,21 @@ Result<segment::LayerCut> layer_cut(const SegmentRange& range, const infill::Fil
   return cut;
 }
 
+Status check_thin_stretches(const SegmentPlan& segments, const SlicePlan& plan) {
+  // No straight line is longer than the parts are across; curves may be.
+  const double across = mm(std::llround(std::hypot(static_cast<double>(plan.bounds().width()), static_cast<double>(plan.bounds().depth()))));
+  const auto too_long = [&](const SegmentRange& range) { return range.settings.on && range.plan.thin_mm >= across; };
+  const auto longer = [&](const SegmentRange& range, const std::string& where) {
+    return Error{Fault::kUsage, fmt::format("segment.thin_mm: {}{} mm is longer than any line in the parts, which are {:.3f} mm across; give less", where,
+                                            range.plan.thin_mm, across)};
+  };
+  if (too_long(segments.base)) return longer(segments.base, "");
+  for (const SegmentRange& range : segments.ranges) {
+    if (too_long(range)) return longer(range, fmt::format("{:g} to {:g} mm: ", mm(range.from), mm(range.to)));
+  }
+  return {};
+}
+
 Result<LayerExtrusion> extrude_layer(const SlicePlan& plan, const SegmentPlan& segments, const Extruder& machine,
                                      const Layer& layer, const SlicePlan::Work& work, write::LayerMoves& out) {
   LayerExtrusion sums;
@@ -135,7 +161,7 @@ Result<LayerExtrusion> extrude_layer(const SlicePlan& plan, const SegmentPlan& s
     const SegmentRange& range = segments.at(std::int64_t{layer.plane()} - part.lo.z);
     const auto cut = layer_cut(range, plan.filling(b, layer), layer, part);
     if (!cut) return cut.error();
-    MoveTable table(range.plan, cut->on, machine, layer);
+    MoveTable table(range.plan, *cut, machine, layer);
     ToolpathsView paths = all;
     paths.offset = all.offset.subspan(work.path_body[b], work.path_body[b + 1] - work.path_body[b] + 1);
     Point2 at{INT32_MIN, INT32_MIN};

@@ -21,6 +21,9 @@ struct LayerExtrusion {
 Result<segment::LayerCut> layer_cut(const SegmentRange& range, const infill::FillParameters& filling, const Layer& layer,
                                     const Box& part);
 
+/// Whether thin stretches fit into the parts at all. errors  kUsage: longer than any line can be
+Status check_thin_stretches(const SegmentPlan& segments, const SlicePlan& plan);
+
 /// The stored toolpaths of a layer become moves; stretches are expanded here and nowhere kept.
 Result<LayerExtrusion> extrude_layer(const SlicePlan& plan, const SegmentPlan& segments, const Extruder& machine,
                                      const Layer& layer, const SlicePlan::Work& work, write::LayerMoves& out);

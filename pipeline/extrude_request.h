@@ -30,6 +30,7 @@ struct SegmentSettings {
   std::optional<double> thin_extrusion;  // absent: as the thick one
   std::optional<double> thick_speed;     // absent: by the extrusion
   double thin_speed = 200;
+  std::vector<double> thin_speed_sweep, thin_extrusion_sweep;  // of segmented lines, in turn; test pieces of a calibration
   std::optional<double> thick_width_mm, thin_width_mm, continuous_width_mm;  // that beads will have
   bool one_direction = true;
   std::vector<double> shift_mm{0};  // pores are moved along the lines by these, layer by layer in turn

@@ -209,6 +209,20 @@ const ExtruderKey kKeys[] = {
        return write_rows(rows);
      },
      Form::kTable},
+    {"calibration", "spacing",
+     [](Text t, Profile& p) {
+       std::vector<std::vector<double>> rows;
+       if (auto wrong = read_rows(t, 3, rows); !wrong.empty()) return wrong;
+       p.calibration.spacing.clear();
+       for (const auto& row : rows) p.calibration.spacing.push_back({row[0], row[1], row[2]});
+       return std::string();
+     },
+     [](const Profile& p) {
+       std::vector<std::vector<double>> rows;
+       for (const auto& r : p.calibration.spacing) rows.push_back({r.extrusion_percent, r.segmented_mm, r.continuous_mm});
+       return write_rows(rows);
+     },
+     Form::kTable},
 };
 
 #undef NUMBER_KEY

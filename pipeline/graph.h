@@ -16,6 +16,7 @@
 #include <span>
 
 #include "pipeline/manifest.h"
+#include "pipeline/porous_plan.h"
 #include "pipeline/print_program.h"
 #include "stages/data/layer.h"
 #include "stages/data/runs.h"
@@ -29,7 +30,7 @@ namespace lamina::pipeline {
 struct LayerWork {
   /// Of its buffers; what an encoder keeps for itself is small.
   std::uint64_t bytes() const {
-    std::uint64_t total = scratch.bytes() + bytes_held(file) + program.bytes();
+    std::uint64_t total = scratch.bytes() + bytes_held(file) + program.bytes() + (porous ? porous->bytes() : 0);
     for (const Runs* image : {&runs, &second, &third, &lowest, &highest}) {
       total += bytes_held(image->row_offset) + bytes_held(image->change);
     }
@@ -41,6 +42,7 @@ struct LayerWork {
   Runs second;  // of the other engine, or mirrored, or before its dose
   Runs third;   // the core of a layer with a shell
   Runs lowest, highest;  // sections at both ends of the layer, where steps have to lie inside or outside
+  std::unique_ptr<PorousWork> porous;  // where beads fill parts
   std::unique_ptr<write::ImageEncoder> encoder;
   write::Bytes file;
   ProgramWork program;
@@ -50,6 +52,7 @@ struct LayerWork {
 struct LayerOutcome {
   LayerRecord record;
   raster::LayerReport report;
+  std::uint64_t solid_pixels = 0, bead_pixels = 0;  // of parts, and what beads and shells leave of them
   Status status;
 };
 

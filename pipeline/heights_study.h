@@ -1,6 +1,7 @@
 // pipeline/heights_study.h: what `lamina heights` finds out about a job's layers, and how it tells.
 #pragma once
 
+#include <array>
 #include <string>
 #include <vector>
 
@@ -8,6 +9,7 @@
 #include "pipeline/scene.h"
 #include "stages/heights/evaluate.h"
 #include "stages/heights/heights.h"
+#include "stages/write/rp3/rp3.h"
 
 namespace lamina::pipeline {
 
@@ -40,7 +42,8 @@ std::string heights_page(const Job& job, const Scene& scene, const HeightsStudy&
 /// The layers of all studies, one after the other; the first column names the study.
 std::string heights_csv(const Scene& scene, const std::vector<HeightsStudy>& studies);
 std::string heights_json(const Job& job, const Scene& scene, const std::vector<HeightsStudy>& studies);
-std::string heights_rp3(const Job& job, const HeightsStudy& study);
+/// Layers [first, last).
+std::string heights_rp3(const HeightsStudy& study, const std::array<std::uint32_t, 2>& layers, const write::rp3::Settings& settings);
 /// One line a study.
 std::string comparison_page(const std::vector<HeightsStudy>& studies);
 

@@ -150,12 +150,9 @@ std::string heights_json(const Job& job, const Scene& scene, const std::vector<H
   return text + "\n]}\n";
 }
 
-std::string heights_rp3(const Job& job, const HeightsStudy& study) {
+std::string heights_rp3(const HeightsStudy& study, const std::array<std::uint32_t, 2>& range, const write::rp3::Settings& settings) {
   std::vector<write::rp3::Layer> layers;
-  for (std::size_t i = 0; i < count(study); ++i) layers.push_back({mm(thickness(study, i)), angle(study, i)});
-  write::rp3::Settings settings;
-  settings.shrink = job.parts.front().shrink;
-  settings.rotation_deg = job.parts.front().rotate_deg;
+  for (std::size_t i = range[0]; i < range[1]; ++i) layers.push_back({mm(thickness(study, i)), angle(study, i)});
   return write::rp3::text_of(layers, settings);
 }
 

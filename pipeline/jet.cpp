@@ -16,6 +16,7 @@
 #include "pipeline/machine.h"
 #include "pipeline/manifest.h"
 #include "pipeline/output_directory.h"
+#include "pipeline/porous_plan.h"
 #include "pipeline/print_program.h"
 #include "pipeline/resume.h"
 #include "stages/raster/combine.h"
@@ -65,11 +66,12 @@ Error disagreement(const Layer& layer, const PixelGrid& grid, const RunsView& ra
 class LayerWorkshop {
  public:
   LayerWorkshop(const Job& job, const raster::Rasterizer& rasterizer, const write::ImageFormat& format,
-                const PrintProgram* program, std::uint64_t covered_pixels)
+                const PrintProgram* program, const PorousPlan* porous, std::uint64_t covered_pixels)
       : job_(job),
         rasterizer_(rasterizer),
         format_(format),
         program_(program),
+        porous_(porous),
         dose_(job, rasterizer.grid()),
         covered_pixels_(covered_pixels) {}
 
@@ -83,6 +85,11 @@ class LayerWorkshop {
       if (work.runs.row_offset != work.second.row_offset || work.runs.change != work.second.change) {
         return disagreement(layer, rasterizer_.grid(), work.runs, work.second);
       }
+    }
+    if (porous_ != nullptr) {
+      outcome.solid_pixels = set_pixels(work.runs);
+      if (Status status = porous_->apply(layer, work.runs, work.second, work.porous); !status) return status;
+      outcome.bead_pixels = set_pixels(work.runs);
     }
     if (job_.mirror != Mirror::kNone) {
       raster::mirror(work.runs, job_.mirror != Mirror::kY, job_.mirror != Mirror::kX, work.second);
@@ -102,7 +109,7 @@ class LayerWorkshop {
     const raster::LayerReport low = rasterizer_.layer(engine, layer.lowest_plane(), work.scratch, work.lowest);
     const raster::LayerReport high = rasterizer_.layer(engine, layer.highest_plane(), work.scratch, work.highest);
     raster::combine(work.lowest, work.highest,
-                    job_.heights.containment == Containment::kInside ? raster::Combine::kBoth : raster::Combine::kEither, image);
+                    job_.heights.containment == Containment::kInside ? raster::SetOperation::kIntersection : raster::SetOperation::kUnion, image);
     return low.open_rows + low.capped_rows >= high.open_rows + high.capped_rows ? low : high;
   }
 
@@ -132,16 +139,18 @@ class LayerWorkshop {
   std::uint64_t bytes_of_layer(const Layer& layer) const {
     if (job_.heights.containment != Containment::kAcross) {
       // Both sections, and an image that may have the crossings of both; twice with another engine or a mirror.
-      return 2 * (bytes_of_section(layer.lowest_plane()) + bytes_of_section(layer.highest_plane()));
+      return 2 * (bytes_of_section(layer.lowest_plane(), 0) + bytes_of_section(layer.highest_plane(), 0));
     }
-    return bytes_of_section(layer.plane());
+    if (porous_ == nullptr) return bytes_of_section(layer.plane(), 0);
+    return bytes_of_section(layer.plane(), 2 * porous_->spans_expected(layer.index)) + porous_->bytes_expected(layer.index);
   }
 
-  std::uint64_t bytes_of_section(Nm plane) const {
+  /// bead_changes  that a filling adds to an image
+  std::uint64_t bytes_of_section(Nm plane, std::uint64_t bead_changes) const {
     const std::uint64_t rows = rasterizer_.grid().rows();
     const std::uint64_t crossings =
-        dose_.changes_bound(rasterizer_.crossings_bound(plane), covered_pixels_);
-    const bool second = job_.engine == Engine::kBoth || job_.mirror != Mirror::kNone || dose_.any();
+        dose_.changes_bound(rasterizer_.crossings_bound(plane), covered_pixels_) + bead_changes;
+    const bool second = porous_ != nullptr || job_.engine == Engine::kBoth || job_.mirror != Mirror::kNone || dose_.any();
     const std::uint64_t second_image = (second ? 8 * crossings + 4 * rows : 0) * (dose_.any() ? 3 : 1);
     const std::uint64_t file = format_.most_bytes(rasterizer_.grid().columns(), rows, crossings);
     const std::uint64_t program = program_ == nullptr ? 0 : program_->bytes_bound(crossings);
@@ -155,6 +164,7 @@ class LayerWorkshop {
   const raster::Rasterizer& rasterizer_;
   const write::ImageFormat& format_;
   const PrintProgram* program_;  // or nullptr
+  const PorousPlan* porous_;     // or nullptr: parts are solid
   DosePlan dose_;
   std::uint64_t covered_pixels_;  // by the boxes of all parts, at most
 };
@@ -253,12 +263,22 @@ Result<JetSummary> run_jet(const Job& asked, const ProgressCallback& progress, c
   // --- parts
   auto start = Clock::now();
   progress({ProgressEvent::Stage::kLoading});
-  auto scene = load_scene(job);
+  const PixelGrid grid = grid_of(job);
+  const auto filled = PorousPlan::asked(job);
+  if (!filled) return filled.error();
+  std::optional<PorousPlan> porous;
+  if (*filled) {
+    auto made = PorousPlan::make(job, grid, progress);
+    if (!made) return made.error();
+    porous.emplace(std::move(*made));
+    summary.warnings = porous->warnings();
+  }
+  // The slicer points into its own meshes, the rasterizer takes those it is given.
+  auto scene = porous ? Result<Scene>(porous->slices().scene()) : load_scene(job);
   if (!scene) return scene.error();
   summary.seconds.load = seconds_since(start);
   if (cancel) return Error{Fault::kInterrupted, "interrupted before the first layer"};
 
-  const PixelGrid grid = grid_of(job);
   if (auto status = check_reach(job, *scene); !status) return status.error();
   const Result<heights::LayerTable> decided = layer_table(job, *scene);
   if (!decided) return decided.error();
@@ -289,6 +309,10 @@ Result<JetSummary> run_jet(const Job& asked, const ProgressCallback& progress, c
   summary.seconds.index = seconds_since(start);
   summary.mesh_bytes = rasterizer->mesh_bytes();
   summary.index_bytes = rasterizer->index_bytes();
+  if (porous) {
+    for (const Mesh& mesh : porous->slices().scene().meshes) summary.mesh_bytes += mesh.triangles.size() * sizeof(Triangle);
+    summary.index_bytes += porous->slices().slicer().index_bytes();
+  }
 
   std::optional<PrintProgram> program;
   if (job.machine.resolved) program.emplace(job, table.size());
@@ -298,7 +322,7 @@ Result<JetSummary> run_jet(const Job& asked, const ProgressCallback& progress, c
     covered += (static_cast<double>(box.width()) * grid.x.pixels_per_nm() + 1) *
                (static_cast<double>(box.depth()) * grid.y.pixels_per_nm() + 1);
   }
-  LayerWorkshop workshop(job, *rasterizer, *format, program ? &*program : nullptr,
+  LayerWorkshop workshop(job, *rasterizer, *format, program ? &*program : nullptr, porous ? &*porous : nullptr,
                          static_cast<std::uint64_t>(std::min(covered, static_cast<double>(grid.columns()) * grid.rows())));
   if (job.dry_run) {
     for (std::uint32_t index = range->front(); index < range->back(); ++index) {
@@ -346,6 +370,8 @@ Result<JetSummary> run_jet(const Job& asked, const ProgressCallback& progress, c
         if (auto status = manifest->append(outcome.record); !status) return status;
         count(outcome.record);
         warnings.add(outcome, grid, summary);
+        summary.solid_pixels += outcome.solid_pixels;
+        summary.bead_pixels += outcome.bead_pixels;
         ++summary.layers_planned;
         summary.bytes_written += outcome.record.bytes + outcome.record.program.bytes;
         progress({ProgressEvent::Stage::kLayers, ++done, layers});

@@ -33,6 +33,7 @@ struct JetSummary {
   std::uint64_t triangles = 0;        // with copies
   std::uint64_t set_pixels = 0, bytes_written = 0;
   double set_volume_mm3 = 0;          // set pixels x pixel area x thickness
+  std::uint64_t solid_pixels = 0, bead_pixels = 0;  // of the layers planned now: of parts, and of the beads in them
   std::uint64_t capped_rows = 0;      // rows of all layers that are closed only thanks to repair
   std::uint64_t mesh_bytes = 0, index_bytes = 0, peak_layer_bytes = 0, peak_resident_bytes = 0;
   std::uint32_t most_layers_in_flight = 0;

@@ -37,6 +37,23 @@ constexpr double kAny = 1e6;
   {name, flag, unit, meaning, [](Text t, Settings& s) { return read_optional(t, -kAny, kAny, "", s.member); }, \
    [](const Settings& s) { return write_optional(s.member); }, Form::kBare, {}}
 
+std::string read_percentages(Text text, std::vector<double>& list) {
+  std::vector<double> values;
+  for (const Text piece : text.empty() ? std::vector<Text>() : split(text, ",")) {
+    if (auto wrong = read_number(piece, -kAny, kAny, " %", values.emplace_back()); !wrong.empty()) return wrong;
+  }
+  list = values;
+  return {};
+}
+std::string list_text(const std::vector<double>& list) {
+  std::vector<std::string> texts;
+  for (const double value : list) texts.push_back(number_text(value));
+  return fmt::format("{}", fmt::join(texts, ","));
+}
+#define LIST_KEY(name, member, meaning)                                                              \
+  {name, "", "%,%,...", meaning, [](Text t, Settings& s) { return read_percentages(t, s.member); },   \
+   [](const Settings& s) { return list_text(s.member); }, Form::kList, {}}
+
 const SegmentKey kSegmentKeys[] = {
     {"on", "", "", "lines are segmented", [](Text t, Settings& s) { return read_switch(t, s.on); },
      [](const Settings& s) { return write_switch(s.on); }, Form::kBare, {}},
@@ -71,8 +88,10 @@ const SegmentKey kSegmentKeys[] = {
     OPTIONAL_KEY("thin_extrusion_percent", "", "%", thin_extrusion, "extrusion of thin stretches"),
     OPTIONAL_KEY("thick_speed_percent", "--thick-speed", "%", thick_speed, "speed of thick stretches; by the extrusion if absent"),
     NUMBER_KEY("thin_speed_percent", "--thin-speed", "%", thin_speed, "speed of thin stretches"),
-    OPTIONAL_KEY("thick_width_mm", "", "MM", thick_width_mm, "width that thick stretches will have; by the calibration if absent"),
-    OPTIONAL_KEY("thin_width_mm", "", "MM", thin_width_mm, "the same of thin ones"),
+    LIST_KEY("thin_speed_sweep", thin_speed_sweep, "speeds of thin stretches, from one segmented line to the next: a test piece"),
+    LIST_KEY("thin_extrusion_sweep", thin_extrusion_sweep, "the same of their extrusion"),
+    OPTIONAL_KEY("thick_width_mm", "--thick-width", "MM", thick_width_mm, "width that thick stretches will have; by the calibration if absent"),
+    OPTIONAL_KEY("thin_width_mm", "--thin-width", "MM", thin_width_mm, "the same of thin ones"),
     OPTIONAL_KEY("continuous_width_mm", "", "MM", continuous_width_mm, "the same of continuous lines"),
     {"one_direction", "", "", "all segmented lines are laid the same way", [](Text t, Settings& s) { return read_switch(t, s.one_direction); },
      [](const Settings& s) { return write_switch(s.one_direction); }, Form::kBare, {}},
@@ -85,17 +104,14 @@ const SegmentKey kSegmentKeys[] = {
        s.shift_mm = shifts;
        return std::string();
      },
-     [](const Settings& s) {
-       std::vector<std::string> texts;
-       for (const double shift : s.shift_mm) texts.push_back(number_text(shift));
-       return fmt::format("{}", fmt::join(texts, ","));
-     },
+     [](const Settings& s) { return list_text(s.shift_mm); },
      Form::kList, {}},
     {"across", "", "", "pores of layers turned by 90 degrees lie over each other (thick_mm + thin_mm twice the spacing)",
      [](Text t, Settings& s) { return read_switch(t, s.across); }, [](const Settings& s) { return write_switch(s.across); }, Form::kBare, {}},
 };
 #undef NUMBER_KEY
 #undef OPTIONAL_KEY
+#undef LIST_KEY
 
 constexpr std::size_t kCount = std::size(kSegmentKeys);
 
@@ -116,6 +132,13 @@ std::vector<JobKey> segment_keys_of(std::index_sequence<Index...>) {
   {"extrude", #name, flag, unit, meaning, false,                                                                           \
    [](Text t, Job& j) { return read_optional(t, low, high, "", j.extrude.name); },                                         \
    [](const Job& j) { return write_optional(j.extrude.name); }, Form::kBare}
+
+std::string set_fill_rule(Text text, Job& job) {
+  for (const JobKey& key : image_keys()) {
+    if (key.name == "fill") return key.read(text, job);
+  }
+  return {};
+}
 
 std::vector<JobKey> all_keys() {
   std::vector<JobKey> keys{
@@ -153,13 +176,15 @@ std::vector<JobKey> all_keys() {
                   },
                   [](const Job& j) { return j.segment.by_height; }, Form::kString});
   // The way to ask for a filling with one word; files hold fill.pattern and segment.on.
-  keys.push_back({"segment", "fill", "--fill", "FILLING", "segmented, or a pattern: none, raster, contour, contour+raster, honeycomb, quatrefoil",
+  keys.push_back({"segment", "fill", "--fill", "FILLING",
+                  "segmented, or a pattern: none, raster, contour, contour+raster, honeycomb, quatrefoil; or image.fill: nonzero, positive, evenodd",
                   false,
                   [](Text t, Job& j) {
                     if (t == "segmented") {
                       j.segment.all.on = true;
                       return std::string();
                     }
+                    if (t == "nonzero" || t == "positive" || t == "evenodd") return set_fill_rule(t, j);
                     const std::string wrong = fill_settings_keys().front().read(t, j.fill.all);
                     return wrong.empty() || wrong.find("none of ") == std::string::npos ? wrong : wrong + "; or segmented";
                   },

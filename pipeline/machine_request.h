@@ -10,6 +10,7 @@
 
 #include "stages/data/machine.h"
 #include "stages/data/program.h"
+#include "stages/raster/beads.h"
 
 namespace lamina::pipeline {
 
@@ -31,7 +32,8 @@ struct MachineRequest {
 /// [dose] of a job: how much binder goes where (stages/dose/).
 struct DoseRequest {
   std::array<double, 2> bleed_um{0, 0};  // along x and y: pixels nearer to the edge than this are left out
-  double shell_mm = 0;                   // so deep all pixels are set; only with a core below 1
+  double shell_mm = 0;                   // so deep all pixels are set; only with a core below 1 or beads
+  raster::BeadEnds bead_ends = raster::BeadEnds::kRound;  // of beads that fill a part, and where thick becomes thin
   double core = 1;                       // share of the pixels inside of the shell that is set
 };
 

@@ -18,6 +18,7 @@
 #include "pipeline/machine_profile.h"
 #include "pipeline/manifest_text.h"
 #include "pipeline/number_text.h"
+#include "pipeline/porous_plan.h"
 #include "stages/write/image_format.h"
 #include "stages/write/program/dialect.h"
 
@@ -131,6 +132,7 @@ ManifestHead make_head(const Job& job, const std::vector<PartSummary>& parts, st
   ManifestHead head;
   head.version = LAMINA_VERSION;
   head.job_toml = canonical_job_text(job);
+  if (const auto filled = PorousPlan::asked(job); filled && *filled) head.job_toml += filling_text(job);
   head.format = job.format;
   if (const auto* format = write::find_image_format(job.format)) head.extension = format->extension;
   head.fill_rule = key_text("image", "fill", job);

@@ -59,16 +59,24 @@ Result<SegmentRange> resolve(const SegmentSettings& settings, const segment::Cal
   const bool measured = !calibration.repeated.empty();
   plan.thick_width_mm = settings.thick_width_mm.value_or(measured ? widths.thick_mm * scale : bead_mm);
   plan.continuous_width_mm = settings.continuous_width_mm.value_or(measured ? widths.continuous_mm * scale : bead_mm);
-  if (settings.thin_width_mm) {
-    plan.thin_width_mm = *settings.thin_width_mm;
-  } else if (measured && plan.thin_extrusion == plan.thick_extrusion && std::abs(plan.thin_speed - 200) < 1) {
-    plan.thin_width_mm = widths.thin_mm * scale;
-  } else if (plan.thin_speed > 100) {
-    plan.thin_width_mm = segment::thin_width_at_speed(calibration, plan.thin_speed).value * scale;
-  } else {
-    plan.thin_width_mm = segment::thin_width_at_extrusion(calibration, plan.thin_extrusion).value * scale;
+  const auto thin_width = [&](double extrusion, double speed) {
+    if (settings.thin_width_mm) return *settings.thin_width_mm;
+    if (measured && extrusion == plan.thick_extrusion && std::abs(speed - 200) < 1) return widths.thin_mm * scale;
+    if (speed > 100) return segment::thin_width_at_speed(calibration, speed).value * scale;
+    return segment::thin_width_at_extrusion(calibration, extrusion).value * scale;
+  };
+  plan.thin_width_mm = thin_width(plan.thin_extrusion, plan.thin_speed);
+  const std::size_t lines = std::max(settings.thin_speed_sweep.size(), settings.thin_extrusion_sweep.size());
+  for (std::size_t i = 0; i < lines; ++i) {
+    const auto of = [i](const std::vector<double>& list, double all) { return list.empty() ? all : list[i % list.size()]; };
+    const double extrusion = of(settings.thin_extrusion_sweep, plan.thin_extrusion), speed = of(settings.thin_speed_sweep, plan.thin_speed);
+    plan.sweep.push_back({extrusion, speed, thin_width(extrusion, speed)});
   }
-  const segment::Spacing spacing = segment::spacing_for(plan.thick_width_mm, plan.continuous_width_mm, settings.gap_mm);
+  segment::Spacing spacing = segment::spacing_for(plan.thick_width_mm, plan.continuous_width_mm, settings.gap_mm);
+  const bool own_widths = settings.thick_width_mm || settings.continuous_width_mm;
+  if (const auto settled = segment::settled_spacing(calibration, settings.thick_extrusion); settled && !own_widths) {
+    spacing = {settled->segmented * scale + settings.gap_mm, settled->continuous * scale + settings.gap_mm};
+  }
   plan.spacing_sc_mm = settings.spacing_sc_mm.value_or(spacing.segmented);
   plan.spacing_cc_mm = settings.spacing_cc_mm.value_or(spacing.continuous);
   if (const Status status = segment::check(plan, bead_mm); !status) return status.error();

@@ -20,6 +20,8 @@ double pixels_planned(const JetSummary& s) {
   return static_cast<double>(s.columns) * s.rows * s.layers_planned;
 }
 
+double porosity(const JetSummary& s) { return 1 - static_cast<double>(s.bead_pixels) / static_cast<double>(s.solid_pixels); }
+
 std::string part_json(const PartSummary& part) {
   std::string notes;
   for (const Note& note : part.notes) {
@@ -62,6 +64,7 @@ std::string summary_text(const Job& job, const JetSummary& s) {
   } else {
     line("pixels", fmt::format("{} set, {:.3f} cm3 of binder-filled volume", readable_count(s.set_pixels),
                                s.set_volume_mm3 / 1000));
+    if (s.solid_pixels > 0) line("porosity", fmt::format("{:.2f} % of the parts' {} pixels are left empty", 100 * porosity(s), readable_count(s.solid_pixels)));
     line("files", fmt::format("{} in {}", readable_bytes(s.bytes_written), one_line(s.directory)));
     line("time", fmt::format("{}: load {}, index {}, layers {} (threads: raster {}, encode {}, write {})",
                              readable_seconds(s.seconds.load + s.seconds.index + s.seconds.layers),
@@ -92,6 +95,7 @@ std::string summary_json(const Job& job, const JetSummary& s) {
       grid_of(job).y.dpi(),
       s.layers_total, s.layers_planned, s.layers_kept, s.triangles, s.set_pixels, s.set_volume_mm3, s.bytes_written,
       s.capped_rows);
+  if (s.solid_pixels > 0) text += fmt::format("\"solid_pixels\":{},\"bead_pixels\":{},\"porosity\":{},", s.solid_pixels, s.bead_pixels, porosity(s));
   text += fmt::format(
       "\"seconds\":{{\"load\":{},\"index\":{},\"layers\":{},\"raster_threads\":{},\"encode_threads\":{},"
       "\"write_threads\":{}}},\"pixels_per_second\":{},\"layers_per_second\":{},",

@@ -38,7 +38,7 @@ struct Extruder {
   } speed;
 
   struct Retraction {
-    double length_mm = 1, speed_mm_s = 35, lift_mm = 0;
+    double length_mm = 1, speed_mm_s = 35;
     double least_travel_mm = 1.5;  // shorter travels are made without it
   } retraction;
 

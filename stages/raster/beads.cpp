@@ -121,31 +121,4 @@ void BeadRaster::runs(Runs& out) {
   }
 }
 
-void combine(const RunsView& a, const RunsView& b, SetOperation operation, Runs& out) {
-  out.columns = a.columns;
-  out.row_offset.assign(1, 0);
-  out.change.clear();
-  const auto wanted = [operation](bool in_a, bool in_b) {
-    switch (operation) {
-      case SetOperation::kUnion: return in_a || in_b;
-      case SetOperation::kIntersection: return in_a && in_b;
-      default: return in_a && !in_b;
-    }
-  };
-  for (std::uint32_t r = 0; r < a.rows(); ++r) {
-    const auto p = a.row(r), q = b.row(r);
-    std::size_t i = 0, j = 0;
-    bool inside = false;
-    while (i < p.size() || j < q.size()) {
-      const std::uint32_t at = std::min(i < p.size() ? p[i] : UINT32_MAX, j < q.size() ? q[j] : UINT32_MAX);
-      while (i < p.size() && p[i] == at) ++i;
-      while (j < q.size() && q[j] == at) ++j;
-      const bool now = wanted(i % 2 == 1, j % 2 == 1);
-      if (now != inside) out.change.push_back(at);
-      inside = now;
-    }
-    out.row_offset.push_back(static_cast<std::uint32_t>(out.change.size()));
-  }
-}
-
 }  // namespace lamina::raster

@@ -41,9 +41,4 @@ class BeadRaster {
   Buffer<std::uint32_t> start_;
 };
 
-enum class SetOperation : std::uint8_t { kUnion, kIntersection, kDifference };
-
-/// Pixels of a with those of b, row by row; both of the same size. cost  O(changes), no sorting
-void combine(const RunsView& a, const RunsView& b, SetOperation operation, Runs& out);
-
 }  // namespace lamina::raster

@@ -2,23 +2,25 @@
 
 namespace lamina::raster {
 
-void combine(const RunsView& a, const RunsView& b, Combine how, Runs& out) {
+void combine(const RunsView& a, const RunsView& b, SetOperation operation, Runs& out) {
   out.columns = a.columns;
   out.row_offset.resize(std::size_t{a.rows()} + 1);
   out.change.resize(a.change.size() + b.change.size());
   out.row_offset[0] = 0;
   std::uint32_t* next = out.change.data();
-  const unsigned needed = how == Combine::kBoth ? 2 : 1;
+  const auto wanted = [operation](std::size_t in_a, std::size_t in_b) {
+    if (operation == SetOperation::kUnion) return (in_a | in_b) != 0;
+    return operation == SetOperation::kIntersection ? (in_a & in_b) != 0 : in_a > in_b;
+  };
   for (std::uint32_t r = 0; r < a.rows(); ++r) {
     const auto first = a.row(r), second = b.row(r);
-    // Every change turns its image on or off; what matters is how many images are on.
+    // Every change turns its image on or off.
     for (std::size_t i = 0, j = 0; i < first.size() || j < second.size();) {
-      const unsigned before = (i & 1) + (j & 1);
+      const bool before = wanted(i & 1, j & 1);
       const std::uint32_t column = j == second.size() || (i < first.size() && first[i] < second[j]) ? first[i] : second[j];
       if (i < first.size() && first[i] == column) ++i;
       if (j < second.size() && second[j] == column) ++j;
-      const unsigned after = (i & 1) + (j & 1);
-      if ((before >= needed) != (after >= needed)) *next++ = column;
+      if (wanted(i & 1, j & 1) != before) *next++ = column;
     }
     out.row_offset[r + 1] = static_cast<std::uint32_t>(next - out.change.data());
   }

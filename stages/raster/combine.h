@@ -1,13 +1,16 @@
 // stages/raster/combine.h: two images of the same bed become one, as runs.
 #pragma once
 
+#include <cstdint>
+
 #include "stages/data/runs.h"
 
 namespace lamina::raster {
 
-enum class Combine { kEither, kBoth };  // set in one of them; set in both
+/// Set in one of them or both; in both; in the first but not in the second.
+enum class SetOperation : std::uint8_t { kUnion, kIntersection, kDifference };
 
-/// The pixels that are set in either or in both of two images of equal size. O(runs + rows)
-void combine(const RunsView& a, const RunsView& b, Combine how, Runs& out);
+/// Pixels of a with those of b, row by row; both of the same size; `out` is neither. cost  O(changes + rows), no sorting
+void combine(const RunsView& a, const RunsView& b, SetOperation operation, Runs& out);
 
 }  // namespace lamina::raster

@@ -69,7 +69,8 @@ const Calibration& anet_a8_calibration() {
       {{90, 0.37}, {80, 0.33}, {70, 0.31}, {60, 0.29}, {50, 0.27}, {40, 0.24}, {30, 0.21}, {20, 0.19}, {10, 0.16}},
       {{75, 200, 100, (0.38 + 0.39 + 0.39) / 3, (0.28 + 0.28 + 0.29) / 3, 0.40},
        {100, 200, 75, (0.45 + 0.45 + 0.44) / 3, (0.31 + 0.32 + 0.31) / 3, (0.39 + 0.39 + 0.40) / 3},
-       {125, 200, 50, (0.59 + 0.58 + 0.58) / 3, (0.32 + 0.32 + 0.31) / 3, (0.40 + 0.39 + 0.39) / 3}}};
+       {125, 200, 50, (0.59 + 0.58 + 0.58) / 3, (0.32 + 0.32 + 0.31) / 3, (0.40 + 0.39 + 0.39) / 3}},
+      {}};
   return calibration;
 }
 
@@ -103,6 +104,13 @@ Status check(const Calibration& calibration) {
         !(row.continuous_mm > 0)) {
       return wrong("repeated", i, "speeds and widths have to be above 0");
     }
+  }
+  for (std::size_t i = 0; i < calibration.spacing.size(); ++i) {
+    const auto& row = calibration.spacing[i];
+    if (!(row.extrusion_percent > (i == 0 ? 0 : calibration.spacing[i - 1].extrusion_percent))) {
+      return wrong("spacing", i, "extrusions have to be above 0 and to increase");
+    }
+    if (!(row.segmented_mm > 0) || !(row.continuous_mm > 0)) return wrong("spacing", i, "distances have to be above 0");
   }
   return {};
 }
@@ -140,6 +148,16 @@ RepeatedReading repeated_at(const Calibration& calibration, double extrusion_per
 
 Reading extrusion_for_thick_width(const Calibration& calibration, double width_mm) {
   return first_reach(of_repeated(calibration, &Calibration::Repeated::thick_mm), width_mm);
+}
+
+std::optional<Spacing> settled_spacing(const Calibration& calibration, double extrusion_percent) {
+  if (calibration.spacing.empty()) return std::nullopt;
+  std::vector<Mark> segmented, continuous;
+  for (const auto& row : calibration.spacing) {
+    segmented.push_back({row.extrusion_percent, row.segmented_mm});
+    continuous.push_back({row.extrusion_percent, row.continuous_mm});
+  }
+  return Spacing{interpolate(segmented, extrusion_percent).value, interpolate(continuous, extrusion_percent).value};
 }
 
 Spacing spacing_for(double thick_mm, double continuous_mm, double gap_mm) {

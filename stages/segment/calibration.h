@@ -5,6 +5,7 @@
 // and `inside` is false.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -36,6 +37,12 @@ struct Calibration {
     double thick_mm, thin_mm, continuous_mm;
   };
   std::vector<Repeated> repeated;  // extrusion increasing
+
+  /// Spacings that were settled on for an extrusion, centre to centre; where there are none they follow from the widths.
+  struct Spaced {
+    double extrusion_percent, segmented_mm, continuous_mm;
+  };
+  std::vector<Spaced> spacing;  // extrusion increasing
 };
 
 /// Anet A8, PLA, nozzle 0.4 mm: Di Nisio 2022, Tables 6, 7 and 11 to 15 (means over the three regions of the part).
@@ -67,11 +74,14 @@ RepeatedReading repeated_at(const Calibration& calibration, double extrusion_per
 /// The extrusion that makes thick stretches so wide; with it, repeated_at() gives the speed.
 Reading extrusion_for_thick_width(const Calibration& calibration, double width_mm);
 
-/// Centre to centre, mm, so that a thick stretch and a continuous line (two continuous lines) are `gap` apart.
-/// Di Nisio 2022, Appendix A, step 5.
 struct Spacing {
   double segmented, continuous;
 };
+/// Spacings settled on, in proportion between the extrusions; absent where the calibration holds none.
+std::optional<Spacing> settled_spacing(const Calibration& calibration, double extrusion_percent);
+
+/// Centre to centre, mm, so that a thick stretch and a continuous line (two continuous lines) are `gap` apart.
+/// Di Nisio 2022, Appendix A, step 5.
 Spacing spacing_for(double thick_mm, double continuous_mm, double gap_mm);
 /// The same as the document rounds it in its Tables 7 and 8: thick width to 0.01 mm, the set width for the continuous
 /// one, half of their sum rounded half up to 0.01 mm.

@@ -12,6 +12,7 @@
 
 #include "stages/data/stretch.h"
 #include "stages/data/toolpaths.h"
+#include "stages/data/units.h"
 #include "stages/segment/cut.h"
 
 namespace lamina::segment {
@@ -29,6 +30,8 @@ struct LayerCut {
     if (!on || number == kNoLine || (kind != PathKind::kRaster && kind != PathKind::kContour)) return false;
     return (std::int64_t{number} - first) % (std::int64_t{continuous} + 1) == 0;
   }
+  /// Which of the segmented lines a line is, from 0 for `first`.
+  std::int64_t ordinal(std::int32_t number) const { return floor_div(std::int64_t{number} - first, std::int64_t{continuous} + 1); }
 };
 
 namespace expand_detail {

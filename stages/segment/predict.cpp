@@ -28,6 +28,12 @@ Status check(const Segmentation& s, double bead_width_mm) {
        {std::pair{"thick_extrusion_percent", s.thick_extrusion}, {"thin_extrusion_percent", s.thin_extrusion}}) {
     if (!positive(value)) return wrong(key, fmt::format("{} %; an extrusion has to be above 0", value));
   }
+  for (std::size_t i = 0; i < s.sweep.size(); ++i) {
+    if (!positive(s.sweep[i].speed)) return wrong("thin_speed_sweep", fmt::format("line {}: {} %; a speed has to be above 0", i + 1, s.sweep[i].speed));
+    if (!positive(s.sweep[i].extrusion)) {
+      return wrong("thin_extrusion_sweep", fmt::format("line {}: {} %; an extrusion has to be above 0", i + 1, s.sweep[i].extrusion));
+    }
+  }
   if (s.continuous < 1) return wrong("continuous_lines", "0; give 1 or more, lines between two segmented ones");
   // A bead that is squeezed more than this has no room: its neighbour's centre lies inside of it.
   const double least = (s.thin_width_mm + s.continuous_width_mm) / 2;
@@ -43,6 +49,7 @@ Status check(const Segmentation& s, double bead_width_mm) {
 
 std::vector<std::string> warnings(const Segmentation& s, const Calibration& calibration) {
   std::vector<std::string> lines;
+  if (!s.sweep.empty()) return {fmt::format("segment: thin stretches differ from line to line ({} kinds): a test piece to be measured", s.sweep.size())};
   if (s.thin_speed > 100 && !calibration.by_speed.empty()) {
     const Reading stable = stable_distance(calibration, s.thin_speed);
     if (s.thin_mm > stable.value) {

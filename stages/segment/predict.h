@@ -1,10 +1,12 @@
 // stages/segment/predict.h: what a segmented filling will be, before anything is printed.
 #pragma once
 
+#include <cstdint>
 #include <string>
 #include <vector>
 
 #include "stages/data/status.h"
+#include "stages/data/units.h"
 #include "stages/segment/bead.h"
 #include "stages/segment/calibration.h"
 #include "stages/segment/cut.h"
@@ -21,6 +23,18 @@ struct Segmentation {
   double thick_extrusion = 100, thin_extrusion = 100;
   double thick_speed = 75, thin_speed = 200;
   double thick_width_mm = 0.45, thin_width_mm = 0.31, continuous_width_mm = 0.39;  // that beads will have
+
+  /// Thin stretches of one segmented line, where lines differ: what is varied on a test piece.
+  struct ThinLine {
+    double extrusion, speed, width_mm;
+  };
+  std::vector<ThinLine> sweep;  // of segmented lines in turn, from the first one; empty: all alike
+  /// That of segmented line k (negative before the first); also without a sweep.
+  ThinLine thin_of(std::int64_t k) const {
+    if (sweep.empty()) return {thin_extrusion, thin_speed, thin_width_mm};
+    const auto size = static_cast<std::int64_t>(sweep.size());
+    return sweep[static_cast<std::size_t>(k - floor_div(k, size) * size)];
+  }
 };
 
 /// Whether it can be laid. errors  kUsage, one line that begins with the key's name (as in [segment])

@@ -11,7 +11,6 @@
 #include "stages/heights/ladder.h"
 #include "stages/heights/per_part.h"
 #include "stages/heights/steepest.h"
-#include "stages/raster/combine.h"
 #include "stages/write/rp3/rp3.h"
 #include "surfaces.h"
 
@@ -177,47 +176,6 @@ TEST(Rp3, RowsOfTheFirstCaseAreThoseOfAppendixB) {
   }
   for (std::size_t at = 0; (at = expected.find("-0.00", at)) != std::string::npos;) expected.erase(at, 1);
   EXPECT_EQ(text, expected);
-}
-
-TEST(CombineRuns, PixelsOfEitherAndOfBothAreThoseOfTwoBitmaps) {
-  std::mt19937 random(5);
-  constexpr std::uint32_t kRows = 40, kColumns = 60;
-  const auto image = [&](std::vector<bool>& bits) {
-    Runs runs{kColumns, {0}, {}};
-    bits.assign(kRows * kColumns, false);
-    for (std::uint32_t row = 0; row < kRows; ++row) {
-      bool on = false;
-      for (std::uint32_t column = 0; column < kColumns; ++column) {
-        const bool next = random() % 5 == 0 ? !on : on;
-        if (next != on) runs.change.push_back(column);
-        bits[row * kColumns + column] = on = next;
-      }
-      if (on) runs.change.push_back(kColumns);
-      runs.row_offset.push_back(static_cast<std::uint32_t>(runs.change.size()));
-    }
-    return runs;
-  };
-  for (int round = 0; round < 50; ++round) {
-    std::vector<bool> a, b;
-    const Runs first = image(a), second = image(b);
-    for (const raster::Combine how : {raster::Combine::kEither, raster::Combine::kBoth}) {
-      Runs out;
-      raster::combine(first, second, how, out);
-      ASSERT_EQ(out.view().rows(), kRows);
-      std::vector<bool> bits(kRows * kColumns, false);
-      for (std::uint32_t row = 0; row < kRows; ++row) {
-        const auto changes = out.view().row(row);
-        ASSERT_EQ(changes.size() % 2, 0u);
-        for (std::size_t i = 0; i + 1 < changes.size(); i += 2) {
-          ASSERT_LT(changes[i], changes[i + 1]);
-          for (std::uint32_t column = changes[i]; column < changes[i + 1]; ++column) bits[row * kColumns + column] = true;
-        }
-      }
-      for (std::size_t i = 0; i < bits.size(); ++i) {
-        ASSERT_EQ(bits[i], how == raster::Combine::kEither ? a[i] || b[i] : a[i] && b[i]);
-      }
-    }
-  }
 }
 
 TEST(Thicknesses, SetsAndRangesAreReadStrictly) {

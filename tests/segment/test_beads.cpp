@@ -3,6 +3,7 @@
 #include <random>
 
 #include "stages/raster/beads.h"
+#include "stages/raster/combine.h"
 
 namespace lamina::raster {
 namespace {

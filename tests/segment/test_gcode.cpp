@@ -68,7 +68,6 @@ TEST(Gcode, SaysTheSameMovesAndVolumesRelativeAndAbsolute) {
       machine.name = "test";
       machine.code.relative_extrusion = relative;
       machine.retraction.length_mm = retraction;
-      machine.retraction.lift_mm = 0;
       machine.material.flow = 0.85;
       machine.bed.corner_mm = {-110, -110};
       const Written written = write_random(machine, 20, relative ? 1 : 2);
