@@ -33,8 +33,8 @@ struct MachineRequest {
 struct DoseRequest {
   std::array<double, 2> bleed_um{0, 0};  // along x and y: pixels nearer to the edge than this are left out
   double shell_mm = 0;                   // so deep all pixels are set; only with a core below 1 or beads
-  raster::BeadEnds bead_ends = raster::BeadEnds::kRound;  // of beads that fill a part, and where thick becomes thin
   double core = 1;                       // share of the pixels inside of the shell that is set
+  raster::BeadEnds bead_ends = raster::BeadEnds::kRound;  // of beads that fill a part, and where thick becomes thin
 };
 
 }  // namespace lamina::pipeline
