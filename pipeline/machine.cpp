@@ -51,6 +51,7 @@ Result<ResolvedMachine> resolve_profile(const Machine& machine) {
   const write::Dialect* dialect = write::find_dialect(machine.dialect);
   if (dialect == nullptr) return wrong("machine.dialect", fmt::format("there is no dialect '{}'", machine.dialect));
   if (Status status = write::check_dialect(*dialect, machine, *grid); !status) return status.error();
+  grid->bit_order = dialect->bit_order;
   return ResolvedMachine{machine, std::move(*grid)};
 }
 

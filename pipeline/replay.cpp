@@ -31,6 +31,7 @@ void ReplayCount::add(const ReplayCount& other) {
   seconds += other.seconds;
   fed_mm[0] += other.fed_mm[0];
   fed_mm[1] += other.fed_mm[1];
+  vats |= other.vats;
   farthest_along_um = std::max(farthest_along_um, other.farthest_along_um);
   farthest_across_um = std::max(farthest_across_um, other.farthest_across_um);
 }
@@ -229,6 +230,7 @@ void Printing::head_moves(double mm, double mm_s, bool scanning) {
 
 void Printing::feeds(std::uint32_t vat, double mm, double mm_s) {
   count.fed_mm[vat] += mm;
+  if (mm > 0) count.vats |= 1u << vat;
   count.seconds += std::abs(mm) / mm_s;
 }
 

@@ -24,6 +24,7 @@ struct ReplayCount {
   double scan_mm = 0, travel_mm = 0;           // of the head
   double seconds = 0;                          // head, roller and vats, one after the other
   std::array<double, 2> fed_mm{0, 0};          // by each vat
+  std::uint32_t vats = 0;                      // that feed, a bit each, by words or by movement
   double farthest_along_um = 0, farthest_across_um = 0;  // a drop from the centre of its pixel
   void add(const ReplayCount& other);
 };

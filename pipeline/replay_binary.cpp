@@ -64,7 +64,8 @@ void replay_raw(std::string_view text, Printing& printing) {
   ByteReader reader(text, printing);
   ScanLength length(printing);
   if (reader.take(4) != "LAYR" || reader.word() != printing.layer()) reader.fault("does not begin with this layer");
-  reader.take(4 * 4);
+  reader.take(3 * 4);
+  printing.count.vats = reader.word();
   const std::uint32_t words = (printing.nozzles() + 127) / 128;
   while (true) {
     const std::string_view tag = reader.take(4);
@@ -104,8 +105,11 @@ void replay_planes(std::string_view text, Printing& printing) {
   ScanLength length(printing);
   const std::uint32_t words = (printing.nozzles() + 31) / 32;
   std::uint32_t sweep = UINT32_MAX;
-  if (reader.word() != 0x4C01 || reader.word() != 4 || reader.word() != printing.layer()) reader.fault("does not begin with this layer");
+  const bool layer = reader.word() == 0x4C01;
+  const std::uint32_t counts = reader.word();
+  if (!layer || (counts != 4 && counts != 5) || reader.word() != printing.layer()) reader.fault("does not begin with this layer");
   reader.take(3 * 4);
+  printing.count.vats = counts == 5 ? reader.word() : 1;
   std::vector<std::vector<std::uint64_t>> rows;
   while (true) {
     const std::uint32_t command = reader.word(), size = reader.word();

@@ -25,6 +25,7 @@ struct HeadGrid {
   std::uint32_t nozzles = 0, passes = 1, overlap = 0, steps_per_pixel = 1;
   std::vector<std::uint32_t> lag;  // steps, the least is 0
   std::uint32_t most_lag = 0;
+  std::uint32_t bit_order = 0;     // of vectors: nozzle i is bit i ^ bit_order, as the dialect has it; below 128
   FirstSwath first_swath = FirstSwath::kBed;
   bool both_directions = false;
   std::vector<std::uint32_t> blocked;  // increasing
@@ -38,7 +39,8 @@ struct HeadGrid {
 
   double step_nm() const { return place_nm / steps_per_pixel; }
   std::uint32_t swath_lines() const { return nozzles * passes; }
-  std::uint32_t words() const { return (nozzles + 63) / 64; }
+  /// Of 64 bits a vector.
+  std::uint32_t words() const { return bit_order < 64 ? (nozzles + 63) / 64 : (nozzles + 127) / 128 * 2; }
   /// Steps of a sweep over a whole line, the first one 0.
   std::uint64_t steps() const { return (std::uint64_t{places} - 1) * steps_per_pixel + 1 + most_lag; }
   /// Swaths of a layer whose first line is `first`.
@@ -70,9 +72,12 @@ struct Sweep {
 };
 
 /// What the nozzles do in a sweep.
-/// bits  steps x words; bit i % 64 of word i / 64 of a step is nozzle i. The first and the last step fire something.
+/// bits    steps x words; nozzle i is bit b % 64 of word b / 64 of a step, b = i ^ HeadGrid::bit_order.
+/// firing  begin, end, begin, end, ... of the stretches of steps that fire something, from the first step, which does, as
+///         does the last one
 struct SweepVectors {
   std::uint32_t first_step = 0, steps = 0, words = 0;
+  Buffer<std::uint32_t> firing;
   Buffer<std::uint64_t> bits;
 
   const std::uint64_t* step(std::uint32_t s) const { return bits.data() + std::size_t{s - first_step} * words; }

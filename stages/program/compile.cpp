@@ -95,12 +95,7 @@ class Layer {
     backward_ = !backward_;
     for (const Line line : scratch_.nozzle) count_.drops += pixels_of(line);
     const SweepVectors& vectors = scratch_.vectors;
-    const std::uint64_t* word = vectors.bits.data();
-    for (std::uint32_t s = 0; s < vectors.steps; ++s) {
-      std::uint64_t any = 0;
-      for (std::uint32_t w = 0; w < vectors.words; ++w) any |= *word++;
-      count_.vectors += any != 0;
-    }
+    count_.vectors += pixels_of(vectors.firing);
     return emit_(sweep, vectors);
   }
 

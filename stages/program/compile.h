@@ -25,8 +25,8 @@ struct CompileScratch {
 
   std::uint64_t bytes() const {
     std::uint64_t total = bytes_held(scan.turned.row_offset) + bytes_held(scan.turned.change) + bytes_held(scan.next) +
-                          bytes_held(fire.event_offset) + bytes_held(fire.event_nozzle) + bytes_held(fire.rows) +
-                          bytes_held(fire.current) + bytes_held(vectors.bits) + bytes_held(line) +
+                          bytes_held(fire.event_offset) + bytes_held(fire.event_bit) + bytes_held(fire.rows) +
+                          bytes_held(fire.current) + bytes_held(vectors.bits) + bytes_held(vectors.firing) + bytes_held(line) +
                           nozzle.capacity() * sizeof(Line);
     for (const Buffer<std::uint32_t>& one : made) total += bytes_held(one);
     return total;

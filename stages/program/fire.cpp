@@ -22,6 +22,31 @@ void set_bits(std::uint64_t* row, std::uint64_t begin, std::uint64_t end) {
   row[last] |= tail;
 }
 
+/// Writes the same vector `count` times.
+std::uint64_t* repeat(const std::uint64_t* vector, std::uint32_t words, std::uint64_t count, std::uint64_t* out) {
+  constexpr std::uint64_t kBlock = 16;  // copied as one: 2 KiB for a head of 1000 nozzles
+  const std::uint64_t singly = std::min(count, kBlock);
+  const std::uint64_t* const block = out;
+  for (std::uint64_t k = 0; k < singly; ++k) out = std::copy_n(vector, words, out);
+  for (std::uint64_t left = count - singly; left > 0;) {
+    const std::uint64_t now = std::min(left, kBlock);
+    std::memcpy(out, block, now * words * sizeof(std::uint64_t));
+    out += now * words;
+    left -= now;
+  }
+  return out;
+}
+
+/// Appends a step that fires to the stretches.
+void add_firing(std::uint32_t step, std::uint32_t count, Buffer<std::uint32_t>& firing) {
+  if (!firing.empty() && firing.back() == step) {
+    firing.back() += count;
+  } else {
+    firing.push_back(step);
+    firing.push_back(step + count);
+  }
+}
+
 // Every change of a line turns its nozzle on or off from a step on; steps of one residue belong together.
 void fire_changes(const HeadGrid& grid, std::span<const Line> lines, FireScratch& scratch, SweepVectors& vectors) {
   const std::uint32_t ticks = grid.steps_per_pixel, words = vectors.words;
@@ -34,24 +59,34 @@ void fire_changes(const HeadGrid& grid, std::span<const Line> lines, FireScratch
     for (const std::uint32_t change : lines[i]) ++offset[place_of(change, grid.lag[i]) + 1];
   }
   for (std::size_t s = 0; s + 1 < offset.size(); ++s) offset[s + 1] += offset[s];
-  scratch.event_nozzle.resize(offset.back());
+  scratch.event_bit.resize(offset.back());
   for (std::uint32_t i = 0; i < grid.nozzles; ++i) {
     for (const std::uint32_t change : lines[i]) {
-      scratch.event_nozzle[offset[place_of(change, grid.lag[i])]++] = static_cast<std::uint16_t>(i);
+      scratch.event_bit[offset[place_of(change, grid.lag[i])]++] = static_cast<std::uint16_t>(i ^ grid.bit_order);
     }
   }
   // Filling moved each offset to the end of its step.
   scratch.current.assign(std::size_t{ticks} * words, 0);
-  const std::uint16_t* event = scratch.event_nozzle.data();
+  scratch.lit.assign(ticks, 0);
+  const std::uint16_t* event = scratch.event_bit.data();
   const std::uint16_t* const events = event;
   std::uint32_t residue = vectors.first_step % ticks;
   std::uint64_t* out = vectors.bits.data();
-  for (std::uint32_t s = 0; s < vectors.steps; ++s) {
+  for (std::uint32_t s = 0; s < vectors.steps;) {
     std::uint64_t* current = scratch.current.data() + std::size_t{residue} * words;
+    std::uint32_t& lit = scratch.lit[residue];
     for (const std::uint16_t* const stop = events + offset[s]; event != stop; ++event) {
-      current[*event / 64] ^= std::uint64_t{1} << (*event % 64);
+      const std::uint64_t bit = std::uint64_t{1} << (*event % 64);
+      std::uint64_t& word = current[*event / 64];
+      word ^= bit;
+      lit += (word & bit) != 0 ? 1u : ~0u;
     }
-    for (std::uint32_t w = 0; w < words; ++w) *out++ = current[w];
+    // Where steps are pixels the vector stays until something changes.
+    std::uint32_t next = s + 1;
+    while (ticks == 1 && next < vectors.steps && offset[next] == offset[s]) ++next;
+    out = repeat(current, words, next - s, out);
+    if (lit != 0) add_firing(s, next - s, vectors.firing);
+    s = next;
     if (++residue == ticks) residue = 0;
   }
 }
@@ -65,16 +100,15 @@ void fire_blocks(const HeadGrid& grid, std::span<const Line> lines, FireScratch&
   const std::size_t row_words = (end_step / ticks + 1 - base) / 64 + 1;
   scratch.rows.resize(row_words * 64);
   for (std::uint32_t word = 0; word < words; ++word) {
-    const std::uint32_t first = word * 64, count = std::min<std::uint32_t>(64, grid.nozzles - first);
     for (std::uint32_t residue = 0; residue < ticks; ++residue) {
       std::uint64_t from = UINT64_MAX, to = 0;  // q
       std::fill(scratch.rows.begin(), scratch.rows.end(), 0);
-      for (std::uint32_t i = 0; i < count; ++i) {
-        const Line line = lines[first + i];
-        const std::uint32_t lag = grid.lag[first + i];
-        if (line.empty() || lag % ticks != residue) continue;
-        const std::uint64_t shift = lag / ticks - base;
-        std::uint64_t* const row = scratch.rows.data() + i * row_words;
+      for (std::uint32_t bit = 0; bit < 64; ++bit) {
+        const std::uint32_t nozzle = (word * 64 + bit) ^ grid.bit_order;
+        if (nozzle >= grid.nozzles || lines[nozzle].empty() || grid.lag[nozzle] % ticks != residue) continue;
+        const Line line = lines[nozzle];
+        const std::uint64_t shift = grid.lag[nozzle] / ticks - base;
+        std::uint64_t* const row = scratch.rows.data() + bit * row_words;
         for (std::size_t c = 0; c + 1 < line.size(); c += 2) set_bits(row, line[c] + shift, line[c + 1] + shift);
         from = std::min(from, line.front() + shift);
         to = std::max(to, line.back() + shift);
@@ -93,6 +127,12 @@ void fire_blocks(const HeadGrid& grid, std::span<const Line> lines, FireScratch&
       }
     }
   }
+  const std::uint64_t* vector = vectors.bits.data();
+  for (std::uint32_t s = 0; s < vectors.steps; ++s, vector += words) {
+    std::uint64_t any = 0;
+    for (std::uint32_t w = 0; w < words; ++w) any |= vector[w];
+    if (any != 0) add_firing(s, 1, vectors.firing);
+  }
 }
 
 }  // namespace
@@ -107,6 +147,7 @@ bool fire(const HeadGrid& grid, std::span<const Line> lines, FireScratch& scratc
     changes += lines[i].size();
   }
   vectors.words = grid.words();
+  vectors.firing.clear();
   if (changes == 0) {
     vectors.first_step = vectors.steps = 0;
     vectors.bits.clear();

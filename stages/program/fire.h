@@ -14,9 +14,10 @@ using Line = std::span<const std::uint32_t>;
 
 struct FireScratch {
   Buffer<std::uint32_t> event_offset;
-  Buffer<std::uint16_t> event_nozzle;
+  Buffer<std::uint16_t> event_bit;  // of a vector, to be turned over
   Buffer<std::uint64_t> rows;     // 64 lines of bits
   Buffer<std::uint64_t> current;  // a vector for each residue of steps
+  Buffer<std::uint32_t> lit;      // set bits of each of them
 };
 
 /// Two ways to the same bits, chosen by what they cost.
@@ -25,7 +26,7 @@ enum class FireWay : std::uint8_t { kCheapest, kChanges, kBlocks };
 /// Fills `vectors` with the steps from the first to the last that fires. False if nothing fires.
 ///
 /// lines  one for each nozzle
-/// cost   by changes: each line's changes sorted by step, and a copy of the vector for every step; nothing is expanded.
+/// cost   by changes: each line's changes sorted by step, and copies of the vector between them; nothing is expanded.
 ///        by blocks, for patterns with a change every few pixels: 64 lines at a time expanded to bits, and blocks of
 ///        64 x 64 of them transposed
 bool fire(const HeadGrid& grid, std::span<const Line> lines, FireScratch& scratch, SweepVectors& vectors,

@@ -24,35 +24,54 @@ inline void put_tag(ProgramBytes& out, const char (&tag)[5]) {
   for (int i = 0; i < 4; ++i) out.push_back(static_cast<std::byte>(tag[i]));
 }
 
-/// Calls visit(place, count) for stretches of steps without a gap of zeros that would cost more than a segment's head:
-/// places count from the first step of the vectors, in increasing order.
-template <class Visit>
-void for_each_segment(const SweepVectors& vectors, std::size_t head_bytes, std::size_t vector_bytes, const Visit& visit) {
-  const std::uint32_t widest_gap = static_cast<std::uint32_t>(head_bytes / vector_bytes);
-  const auto fires = [&](std::uint32_t place) {
-    const std::uint64_t* words = vectors.bits.data() + std::size_t{place} * vectors.words;
-    std::uint64_t any = 0;
-    for (std::uint32_t w = 0; w < vectors.words; ++w) any |= words[w];
-    return any != 0;
-  };
-  std::uint32_t begin = 0, last = 0;  // the first and the last step of the stretch fire: so do those of the vectors
-  for (std::uint32_t place = 1; place < vectors.steps; ++place) {
-    if (!fires(place)) continue;
-    if (place - last - 1 > widest_gap) {
-      visit(begin, last + 1 - begin);
-      begin = place;
-    }
-    last = place;
-  }
-  visit(begin, last + 1 - begin);
+/// The vats that feed a layer, a bit each.
+inline std::uint32_t vat_bits(const LayerCycle& cycle) {
+  std::uint32_t bits = 0;
+  for (const std::uint32_t vat : cycle.feeds) bits |= 1u << vat;
+  return bits;
 }
 
-/// The word with its bits in the opposite order.
-inline std::uint64_t reversed(std::uint64_t word) {
-  word = (word >> 1 & 0x5555555555555555ull) | (word & 0x5555555555555555ull) << 1;
-  word = (word >> 2 & 0x3333333333333333ull) | (word & 0x3333333333333333ull) << 2;
-  word = (word >> 4 & 0x0F0F0F0F0F0F0F0Full) | (word & 0x0F0F0F0F0F0F0F0Full) << 4;
-  return __builtin_bswap64(word);
+/// Calls visit(place, count) for stretches of steps without a gap of zeros that would cost more than a segment's head:
+/// places count from the first step of the vectors, in increasing order. cost  O(stretches that fire)
+template <class Visit>
+void for_each_segment(const SweepVectors& vectors, std::size_t head_bytes, std::size_t vector_bytes, const Visit& visit) {
+  const std::size_t widest_gap = head_bytes / vector_bytes;
+  const auto& firing = vectors.firing;
+  for (std::size_t i = 0; i < firing.size();) {
+    const std::uint32_t begin = firing[i];
+    for (i += 2; i < firing.size() && firing[i] - firing[i - 1] <= widest_gap;) i += 2;
+    visit(begin, firing[i - 1] - begin);
+  }
+}
+
+/// Appends the segments of a sweep in the order of the movement: for each one its head, kHead bytes that
+/// head(to, place, count) writes, and its vectors as they stand in `vectors.bits`, whose order is that of the dialect
+/// (Dialect::bit_order), cut off at vector_bytes.
+/// turn  vectors of a segment run downwards
+template <std::size_t kHead, class Head>
+void put_segments(const SweepVectors& vectors, bool backward, bool turn, std::size_t vector_bytes, ProgramBytes& out,
+                  const Head& head) {
+  std::size_t end = out.size();
+  for_each_segment(vectors, kHead, vector_bytes, [&](std::uint32_t, std::uint32_t count) { end += kHead + count * vector_bytes; });
+  std::size_t next = backward ? end : out.size();
+  out.resize(end);
+  const std::size_t stride = vectors.words * sizeof(std::uint64_t);
+  for_each_segment(vectors, kHead, vector_bytes, [&](std::uint32_t place, std::uint32_t count) {
+    const std::size_t bytes = kHead + count * vector_bytes;
+    if (backward) next -= bytes;
+    std::byte* to = out.data() + next;
+    head(to, place, count);
+    to += kHead;
+    const auto* from = reinterpret_cast<const std::byte*>(vectors.bits.data()) + place * stride;
+    if (stride == vector_bytes && !turn) {
+      std::memcpy(to, from, count * stride);
+    } else {
+      for (std::uint32_t k = 0; k < count; ++k, to += vector_bytes) {
+        std::memcpy(to, from + (turn ? count - 1 - k : k) * stride, vector_bytes);
+      }
+    }
+    if (!backward) next += bytes;
+  });
 }
 
 /// The position of nozzle 0 across the scan, of the carriage in nm.

@@ -63,12 +63,14 @@ void put_powder_cycle(const Machine& machine, const LayerCycle& cycle, ProgramBy
 /// Calls visit(step, words) for the steps that fire, in the order of the movement.
 template <class Visit>
 void for_each_vector(const Sweep& sweep, const SweepVectors& vectors, const Visit& visit) {
-  for (std::uint32_t k = 0; k < vectors.steps; ++k) {
-    const std::uint32_t place = sweep.backward ? vectors.steps - 1 - k : k;
-    const std::uint64_t* words = vectors.bits.data() + std::size_t{place} * vectors.words;
-    std::uint64_t any = 0;
-    for (std::uint32_t w = 0; w < vectors.words; ++w) any |= words[w];
-    if (any != 0) visit(vectors.first_step + place, words);
+  const auto& firing = vectors.firing;
+  for (std::size_t i = 0; i < firing.size(); i += 2) {
+    const std::size_t stretch = sweep.backward ? firing.size() - 2 - i : i;
+    const std::uint32_t count = firing[stretch + 1] - firing[stretch];
+    for (std::uint32_t k = 0; k < count; ++k) {
+      const std::uint32_t place = firing[stretch] + (sweep.backward ? count - 1 - k : k);
+      visit(vectors.first_step + place, vectors.bits.data() + std::size_t{place} * vectors.words);
+    }
   }
 }
 

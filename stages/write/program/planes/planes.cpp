@@ -20,47 +20,24 @@ class Writer final : public ProgramWriter {
     }
   }
   void begin_layer(const LayerCycle& cycle, ProgramBytes& out) override {
-    for (const std::int64_t value : {std::int64_t{kLayer}, std::int64_t{4}, std::int64_t{cycle.layer}, std::int64_t{cycle.layers},
-                                     cycle.bottom_nm, cycle.thickness_nm}) {
+    const std::uint32_t vats = vat_bits(cycle);
+    for (const std::int64_t value : {std::int64_t{kLayer}, std::int64_t{vats == 1 ? 4 : 5}, std::int64_t{cycle.layer},
+                                     std::int64_t{cycle.layers}, cycle.bottom_nm, cycle.thickness_nm}) {
       put_little<std::uint32_t>(out, static_cast<std::uint32_t>(value));
     }
+    if (vats != 1) put_little<std::uint32_t>(out, vats);
   }
 
   // Planes of one sweep, in the order of the movement; inside of a plane steps increase.
   void sweep(const Sweep& sweep, const SweepVectors& vectors, ProgramBytes& out) override {
-    const std::size_t vector_bytes = words_ * 4;
-    const std::size_t start = out.size();
-    std::size_t all = 0;
-    for_each_segment(vectors, kPlaneHead, vector_bytes,
-                     [&](std::uint32_t, std::uint32_t count) { all += kPlaneHead + count * vector_bytes; });
-    out.resize(start + all);
-    std::size_t next = sweep.backward ? out.size() : start;
-    const std::int64_t across = across_nm(machine_, grid_, sweep.first_line);
-    for_each_segment(vectors, kPlaneHead, vector_bytes, [&](std::uint32_t begin, std::uint32_t count) {
-      const std::size_t bytes = kPlaneHead + count * vector_bytes;
-      if (sweep.backward) next -= bytes;
-      const std::uint32_t head[9] = {kPlane, static_cast<std::uint32_t>(7 + count * words_), sweep.number, sweep.of,
-                                     sweep.backward ? 1u : 0u, static_cast<std::uint32_t>(across),
-                                     vectors.first_step + begin, count, words_};
-      std::byte* to = out.data() + next;
-      std::memcpy(to, head, kPlaneHead);
-      to += kPlaneHead;
-      for (std::uint32_t k = 0; k < count; ++k) {
-        const std::uint64_t* words = vectors.bits.data() + std::size_t{begin + k} * vectors.words;
-        std::uint32_t left = words_;
-        for (std::uint32_t w = 0; w < vectors.words; ++w) {
-          const std::uint64_t turned = reversed(words[w]);
-          const auto high = static_cast<std::uint32_t>(turned >> 32), low = static_cast<std::uint32_t>(turned);
-          std::memcpy(to, &high, 4);
-          to += 4;
-          if (--left == 0) break;
-          std::memcpy(to, &low, 4);
-          to += 4;
-          --left;
-        }
-      }
-      if (!sweep.backward) next += bytes;
-    });
+    const auto across = static_cast<std::uint32_t>(across_nm(machine_, grid_, sweep.first_line));
+    put_segments<kPlaneHead>(vectors, sweep.backward, false, words_ * 4, out,
+                             [&](std::byte* to, std::uint32_t begin, std::uint32_t count) {
+                               const std::uint32_t head[9] = {kPlane, 7 + count * words_, sweep.number, sweep.of,
+                                                              sweep.backward ? 1u : 0u, across, vectors.first_step + begin,
+                                                              count, words_};
+                               std::memcpy(to, head, kPlaneHead);
+                             });
   }
 
   void end_layer(const LayerCycle& cycle, ProgramBytes& out) override {

@@ -26,9 +26,7 @@ class Writer final : public ProgramWriter {
     put_little<std::uint32_t>(out, cycle.layers);
     put_little<std::int32_t>(out, static_cast<std::int32_t>(cycle.bottom_nm));
     put_little<std::int32_t>(out, static_cast<std::int32_t>(cycle.thickness_nm));
-    std::uint32_t vats = 0;
-    for (const std::uint32_t vat : cycle.feeds) vats |= 1u << vat;
-    put_little<std::uint32_t>(out, vats);
+    put_little<std::uint32_t>(out, vat_bits(cycle));
   }
 
   void sweep(const Sweep& sweep, const SweepVectors& vectors, ProgramBytes& out) override {
@@ -41,35 +39,11 @@ class Writer final : public ProgramWriter {
     put_little<std::uint32_t>(out, sweep.backward ? 1 : 0);
     put_little<std::int64_t>(out, across_nm(machine_, grid_, sweep.first_line));
     put_little<std::uint32_t>(out, segments);
-    // A sweep back is written in the order of the movement: segments and the steps in them from the last to the first.
-    const auto write = [&](std::uint32_t begin, std::uint32_t count, std::size_t at) {
-      std::byte* to = out.data() + at;
-      const auto number = [&](std::uint32_t value) {
-        for (int byte = 0; byte < 4; ++byte) *to++ = static_cast<std::byte>(value >> (8 * byte) & 255);
-      };
-      number(vectors.first_step + (sweep.backward ? begin + count - 1 : begin));
-      number(count);
-      for (std::uint32_t k = 0; k < count; ++k) {
-        const std::uint32_t place = sweep.backward ? begin + count - 1 - k : begin + k;
-        const std::uint64_t* words = vectors.bits.data() + std::size_t{place} * vectors.words;
-        for (std::uint32_t w = 0; w < words_; ++w, to += 16) {
-          const std::uint64_t high = 2 * w + 1 < vectors.words ? words[2 * w + 1] : 0;
-          const std::uint64_t turned[2] = {__builtin_bswap64(high), __builtin_bswap64(words[2 * w])};
-          std::memcpy(to, turned, 16);
-        }
-      }
-    };
-    std::size_t at = out.size();
-    for_each_segment(vectors, kSegmentHead, vector_bytes,
-                     [&](std::uint32_t, std::uint32_t count) { at += kSegmentHead + count * vector_bytes; });
-    std::size_t next = sweep.backward ? at : out.size();
-    out.resize(at);
-    for_each_segment(vectors, kSegmentHead, vector_bytes, [&](std::uint32_t begin, std::uint32_t count) {
-      const std::size_t bytes = kSegmentHead + count * vector_bytes;
-      if (sweep.backward) next -= bytes;
-      write(begin, count, next);
-      if (!sweep.backward) next += bytes;
-    });
+    put_segments<kSegmentHead>(vectors, sweep.backward, sweep.backward, vector_bytes, out,
+                               [&](std::byte* to, std::uint32_t begin, std::uint32_t count) {
+                                 const std::uint32_t head[2] = {vectors.first_step + (sweep.backward ? begin + count - 1 : begin), count};
+                                 std::memcpy(to, head, kSegmentHead);
+                               });
   }
 
   void end_layer(const LayerCycle& cycle, ProgramBytes& out) override {
