@@ -32,7 +32,7 @@ Job unusual_job(const Directory& directory) {
   job.machine.bed_given = job.machine.dpi_given = true;
   job.machine.scan_speed_mm_s = 12.5;
   job.machine.blocked = {{3, 5}};
-  job.dose = {{20, 30}, 0.5, 0.75};
+  job.dose = {{20, 30}, 0.5, 0.75, raster::BeadEnds::kSquare};
   job.output = directory / "out";
   job.engine = Engine::kBoth;
   job.threads = 3;
