@@ -7,6 +7,8 @@
 #include "pipeline/jet.h"
 #include "pipeline/machine.h"
 #include "pipeline/job_toml.h"
+#include "pipeline/materials.h"
+#include "pipeline/number_text.h"
 #include "pipeline/output_directory.h"
 #include "pipeline/progress.h"
 #include "pipeline/summary.h"
@@ -29,6 +31,8 @@ CommandSpec jet_spec() {
   spec.operand = "PART";
   spec.operand_meaning = "STL, OBJ or 3MF files, STL and OBJ gzipped too; they replace the parts of --job";
   add_key_options(kJetKeys, spec);
+  spec.options.push_back({"--material", "NAME|NAME,...", "powder of all parts, or of each in their order; two vats can hold two",
+                          "", "Machine and binder"});
   for (const auto& [flag, meaning] :
        {std::pair{"--resume", "go on with an interrupted job; finished layers whose hash holds are kept"},
         {"--overwrite", "replace an earlier job in the directory"},
@@ -47,6 +51,7 @@ CommandSpec jet_spec() {
       "  lamina jet bracket.stl -o out                                  a part in the middle of the bed\n"
       "  lamina jet a.stl b.3mf --bed 400x400 --dpi 600 --copies 12 -o out\n"
       "  lamina jet part.obj --unit inch --rotate 0,0,90 --shrink 1.02,1.02,1.025 -o out\n"
+      "  lamina jet a.stl b.stl --material steel,bronze --machine nuferbj -o out\n"
       "  lamina jet part.stl --layers 100:110 --format png -o look      ten layers only\n"
       "  lamina jet part.stl --shard 1/4 -o out                         a quarter; then lamina merge out -o out\n"
       "  lamina jet part.stl --fill segmented --thin 1.5 --shell 1 -o out   pores planned by the filling, in a solid shell\n"
@@ -55,10 +60,28 @@ CommandSpec jet_spec() {
   return spec;
 }
 
+Status set_materials(const std::string& text, Job& job) {
+  const auto names = split(text, ",");
+  if (names.size() != 1 && names.size() != job.parts.size()) {
+    return Error{Fault::kUsage, fmt::format("--material: {} names for {} parts; give one for all or one for each", names.size(),
+                                            job.parts.size())};
+  }
+  for (std::size_t p = 0; p < job.parts.size(); ++p) {
+    const auto name = names[names.size() == 1 ? 0 : p];
+    if (const std::string wrong = read_material(name, job.parts[p].material); !wrong.empty()) {
+      return Error{Fault::kUsage, "--material: " + wrong};
+    }
+  }
+  return {};
+}
+
 Result<Job> resolve(const Arguments& arguments) {
   Result<Job> read = read_job_options(kJetKeys, arguments);
   if (!read) return read;
   Job& job = *read;
+  if (arguments.has("--material")) {
+    if (Status status = set_materials(arguments.text("--material"), job); !status) return status.error();
+  }
   job.resume = arguments.has("--resume");
   job.overwrite = arguments.has("--overwrite");
   job.dry_run = arguments.has("--dry-run");

@@ -18,6 +18,7 @@
 #include "pipeline/manifest.h"
 #include "pipeline/porous_plan.h"
 #include "pipeline/print_program.h"
+#include "pipeline/solids.h"
 #include "stages/data/layer.h"
 #include "stages/data/runs.h"
 #include "stages/data/status.h"
@@ -30,8 +31,10 @@ namespace lamina::pipeline {
 struct LayerWork {
   /// Of its buffers; what an encoder keeps for itself is small.
   std::uint64_t bytes() const {
-    std::uint64_t total = scratch.bytes() + bytes_held(file) + program.bytes() + (porous ? porous->bytes() : 0);
-    for (const Runs* image : {&runs, &second, &third, &lowest, &highest}) {
+    std::uint64_t total = scratch.bytes() + bytes_held(file) + program.bytes() + materials.bytes() +
+                          (porous ? porous->bytes() : 0);
+    for (const write::Bytes& one : files) total += bytes_held(one);
+    for (const Runs* image : {&runs, &second, &third, &lowest, &highest, &section}) {
       total += bytes_held(image->row_offset) + bytes_held(image->change);
     }
     return total;
@@ -42,9 +45,12 @@ struct LayerWork {
   Runs second;  // of the other engine, or mirrored, or before its dose
   Runs third;   // the core of a layer with a shell
   Runs lowest, highest;  // sections at both ends of the layer, where steps have to lie inside or outside
+  Runs section;          // of one solid of a layer with several materials
+  MaterialImages materials;
   std::unique_ptr<PorousWork> porous;  // where beads fill parts
   std::unique_ptr<write::ImageEncoder> encoder;
   write::Bytes file;
+  std::vector<write::Bytes> files;  // one for each material, if the job has several
   ProgramWork program;
 };
 

@@ -9,20 +9,17 @@
 #include <chrono>
 #include <optional>
 
-#include "pipeline/dose_plan.h"
 #include "pipeline/graph.h"
-#include "pipeline/hash.h"
 #include "pipeline/heights_plan.h"
+#include "pipeline/layer_workshop.h"
 #include "pipeline/machine.h"
 #include "pipeline/manifest.h"
+#include "pipeline/materials.h"
 #include "pipeline/output_directory.h"
 #include "pipeline/porous_plan.h"
 #include "pipeline/print_program.h"
 #include "pipeline/resume.h"
-#include "stages/raster/combine.h"
-#include "stages/raster/mirror.h"
-#include "stages/raster/raster.h"
-#include "stages/write/atomic_file.h"
+#include "pipeline/solids.h"
 #include "stages/write/image_format.h"
 
 namespace lamina::pipeline {
@@ -31,143 +28,6 @@ namespace {
 using Clock = std::chrono::steady_clock;
 
 double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
-
-/// Adds the life of an object to a sum that many threads share.
-class StageTimer {
- public:
-  explicit StageTimer(std::atomic<std::int64_t>& sum) : sum_(sum) {}
-  ~StageTimer() { sum_ += std::chrono::duration_cast<std::chrono::nanoseconds>(Clock::now() - start_).count(); }
-
- private:
-  std::atomic<std::int64_t>& sum_;
-  Clock::time_point start_ = Clock::now();
-};
-
-struct StageSums {
-  std::atomic<std::int64_t> raster{0}, encode{0}, write{0};  // ns, over all threads
-};
-
-/// Where two engines disagree first.
-Error disagreement(const Layer& layer, const PixelGrid& grid, const RunsView& rays, const RunsView& contours) {
-  std::uint32_t row = 0;
-  while (row + 1 < rays.rows() && std::ranges::equal(rays.row(row), contours.row(row))) ++row;
-  const auto a = rays.row(row), b = contours.row(row);
-  const auto place = static_cast<std::size_t>(std::ranges::mismatch(a, b).in1 - a.begin());
-  const std::uint32_t column = std::min(place < a.size() ? a[place] : rays.columns,
-                                        place < b.size() ? b[place] : rays.columns);
-  return {Fault::kVerification,
-          fmt::format("layer {}: engines disagree first in image row {}, column {} (x {:.4f} mm, y {:.4f} mm, z {:.4f} "
-                      "mm); this is a fault of lamina, please report it with the part",
-                      layer.index, row, column, mm(grid.x.centre(column)), mm(grid.y.centre(grid.rows() - 1 - row)),
-                      mm(layer.plane()))};
-}
-
-/// One job while its layers are in flight: what the graph calls for each of them.
-class LayerWorkshop {
- public:
-  LayerWorkshop(const Job& job, const raster::Rasterizer& rasterizer, const write::ImageFormat& format,
-                const PrintProgram* program, const PorousPlan* porous, std::uint64_t covered_pixels)
-      : job_(job),
-        rasterizer_(rasterizer),
-        format_(format),
-        program_(program),
-        porous_(porous),
-        dose_(job, rasterizer.grid()),
-        covered_pixels_(covered_pixels) {}
-
-  Status raster(LayerWork& work, LayerOutcome& outcome) {
-    const StageTimer timer(sums.raster);
-    const Layer& layer = outcome.record.layer;
-    const bool rays = job_.engine != Engine::kContours;
-    outcome.report = section(rays ? raster::Engine::kRays : raster::Engine::kContours, layer, work, work.runs);
-    if (job_.engine == Engine::kBoth) {
-      section(raster::Engine::kContours, layer, work, work.second);
-      if (work.runs.row_offset != work.second.row_offset || work.runs.change != work.second.change) {
-        return disagreement(layer, rasterizer_.grid(), work.runs, work.second);
-      }
-    }
-    if (porous_ != nullptr) {
-      outcome.solid_pixels = set_pixels(work.runs);
-      if (Status status = porous_->apply(layer, work.runs, work.second, work.porous); !status) return status;
-      outcome.bead_pixels = set_pixels(work.runs);
-    }
-    if (job_.mirror != Mirror::kNone) {
-      raster::mirror(work.runs, job_.mirror != Mirror::kY, job_.mirror != Mirror::kX, work.second);
-      std::swap(work.runs, work.second);
-    }
-    if (dose_.any()) dose_.apply(layer.index, work.runs, work.second, work.third);
-    outcome.record.set_pixels = set_pixels(work.runs);
-    outcome.record.capped_rows = outcome.report.capped_rows;
-    return {};
-  }
-
-  /// The image of a layer: its middle plane, or what its lowest and highest sections have in common or together.
-  raster::LayerReport section(raster::Engine engine, const Layer& layer, LayerWork& work, Runs& image) {
-    if (job_.heights.containment == Containment::kAcross) {
-      return rasterizer_.layer(engine, layer.plane(), work.scratch, image);
-    }
-    const raster::LayerReport low = rasterizer_.layer(engine, layer.lowest_plane(), work.scratch, work.lowest);
-    const raster::LayerReport high = rasterizer_.layer(engine, layer.highest_plane(), work.scratch, work.highest);
-    raster::combine(work.lowest, work.highest,
-                    job_.heights.containment == Containment::kInside ? raster::SetOperation::kIntersection : raster::SetOperation::kUnion, image);
-    return low.open_rows + low.capped_rows >= high.open_rows + high.capped_rows ? low : high;
-  }
-
-  Status encode(LayerWork& work, LayerOutcome& outcome) {
-    const StageTimer timer(sums.encode);
-    if (!work.encoder) work.encoder = format_.make_encoder();
-    work.file.clear();
-    if (auto status = work.encoder->encode(work.runs, rasterizer_.grid().x.dpi(), rasterizer_.grid().y.dpi(), work.file); !status) {
-      return Error{status.error().fault, fmt::format("layer {}: {}", outcome.record.layer.index, status.error().message)};
-    }
-    outcome.record.bytes = work.file.size();
-    outcome.record.hash = hash_bytes(work.file);
-    return {};
-  }
-
-  Status store(LayerWork& work, LayerOutcome& outcome) {
-    const StageTimer timer(sums.write);
-    const std::string name = layer_file_name(outcome.record.layer.index, format_.extension);
-    if (!name.empty()) {
-      if (auto status = write::write_file(job_.output + "/" + name, work.file); !status) return status;
-    }
-    if (program_ == nullptr) return {};
-    return program_->write_layer(outcome.record.layer, work.runs, work.program, outcome.record.program);
-  }
-
-  /// Scratch, runs and file, at most; a mirrored or second image counts as another one.
-  std::uint64_t bytes_of_layer(const Layer& layer) const {
-    if (job_.heights.containment != Containment::kAcross) {
-      // Both sections, and an image that may have the crossings of both; twice with another engine or a mirror.
-      return 2 * (bytes_of_section(layer.lowest_plane(), 0) + bytes_of_section(layer.highest_plane(), 0));
-    }
-    if (porous_ == nullptr) return bytes_of_section(layer.plane(), 0);
-    return bytes_of_section(layer.plane(), 2 * porous_->spans_expected(layer.index)) + porous_->bytes_expected(layer.index);
-  }
-
-  /// bead_changes  that a filling adds to an image
-  std::uint64_t bytes_of_section(Nm plane, std::uint64_t bead_changes) const {
-    const std::uint64_t rows = rasterizer_.grid().rows();
-    const std::uint64_t crossings =
-        dose_.changes_bound(rasterizer_.crossings_bound(plane), covered_pixels_) + bead_changes;
-    const bool second = porous_ != nullptr || job_.engine == Engine::kBoth || job_.mirror != Mirror::kNone || dose_.any();
-    const std::uint64_t second_image = (second ? 8 * crossings + 4 * rows : 0) * (dose_.any() ? 3 : 1);
-    const std::uint64_t file = format_.most_bytes(rasterizer_.grid().columns(), rows, crossings);
-    const std::uint64_t program = program_ == nullptr ? 0 : program_->bytes_bound(crossings);
-    return rasterizer_.layer_bytes_bound(plane) + second_image + file + program;
-  }
-
-  StageSums sums;
-
- private:
-  const Job& job_;
-  const raster::Rasterizer& rasterizer_;
-  const write::ImageFormat& format_;
-  const PrintProgram* program_;  // or nullptr
-  const PorousPlan* porous_;     // or nullptr: parts are solid
-  DosePlan dose_;
-  std::uint64_t covered_pixels_;  // by the boxes of all parts, at most
-};
 
 /// One line about rows that only repair closes, or that stay open, and where the first of them is.
 class RowWarnings {
@@ -260,6 +120,9 @@ Result<JetSummary> run_jet(const Job& asked, const ProgressCallback& progress, c
   const write::ImageFormat* format = write::find_image_format(job.format);
   if (format == nullptr) return Error{Fault::kUsage, fmt::format("unknown format '{}'", job.format)};
 
+  const Result<Materials> materials = materials_of(job);
+  if (!materials) return materials.error();
+
   // --- parts
   auto start = Clock::now();
   progress({ProgressEvent::Stage::kLoading});
@@ -285,7 +148,8 @@ Result<JetSummary> run_jet(const Job& asked, const ProgressCallback& progress, c
   const heights::LayerTable& table = *decided;
   const auto range = layer_range(job, table.size());
   if (!range) return range.error();
-  const ManifestHead head = make_head(job, scene->parts, table.size(), *range);
+  const ManifestHead head = make_head(job, scene->parts, table.size(), *range, *materials);
+  for (const JobMaterial& material : head.materials) summary.materials.push_back({material.name, 0});
   summary.columns = grid.columns();
   summary.rows = grid.rows();
   summary.layers_total = table.size();
@@ -303,12 +167,12 @@ Result<JetSummary> run_jet(const Job& asked, const ProgressCallback& progress, c
   // --- index
   start = Clock::now();
   progress({ProgressEvent::Stage::kIndexing});
-  auto rasterizer = raster::Rasterizer::build(scene->meshes, scene->instances, grid, job.fill_rule,
-                                              job.engine != Engine::kContours, job.engine != Engine::kRays);
-  if (!rasterizer) return rasterizer.error();
+  const auto solids = Solids::build(*scene, job, grid, *materials);
+  if (!solids) return solids.error();
   summary.seconds.index = seconds_since(start);
-  summary.mesh_bytes = rasterizer->mesh_bytes();
-  summary.index_bytes = rasterizer->index_bytes();
+  summary.mesh_bytes = solids->mesh_bytes();
+  summary.index_bytes = solids->index_bytes();
+
   if (porous) {
     for (const Mesh& mesh : porous->slices().scene().meshes) summary.mesh_bytes += mesh.triangles.size() * sizeof(Triangle);
     summary.index_bytes += porous->slices().slicer().index_bytes();
@@ -322,7 +186,7 @@ Result<JetSummary> run_jet(const Job& asked, const ProgressCallback& progress, c
     covered += (static_cast<double>(box.width()) * grid.x.pixels_per_nm() + 1) *
                (static_cast<double>(box.depth()) * grid.y.pixels_per_nm() + 1);
   }
-  LayerWorkshop workshop(job, *rasterizer, *format, program ? &*program : nullptr, porous ? &*porous : nullptr,
+  LayerWorkshop workshop(job, *solids, *materials, head, *format, program ? &*program : nullptr, porous ? &*porous : nullptr,
                          static_cast<std::uint64_t>(std::min(covered, static_cast<double>(grid.columns()) * grid.rows())));
   if (job.dry_run) {
     for (std::uint32_t index = range->front(); index < range->back(); ++index) {
@@ -349,6 +213,7 @@ Result<JetSummary> run_jet(const Job& asked, const ProgressCallback& progress, c
   const double pixel_mm2 = 25.4 * 25.4 / (grid.x.dpi() * grid.y.dpi());
   const auto count = [&](const LayerRecord& record) {
     summary.set_pixels += record.set_pixels;
+    for (std::size_t m = 0; m < record.images.size(); ++m) summary.materials[m].second += record.images[m].set_pixels;
     summary.set_volume_mm3 += static_cast<double>(record.set_pixels) * pixel_mm2 * mm(record.layer.thickness);
   };
   std::for_each(kept, prefix_end, count);

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <functional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "pipeline/job.h"
@@ -32,6 +33,7 @@ struct JetSummary {
   std::uint32_t columns = 0, rows = 0;
   std::uint64_t triangles = 0;        // with copies
   std::uint64_t set_pixels = 0, bytes_written = 0;
+  std::vector<std::pair<std::string, std::uint64_t>> materials;  // name, set pixels; if there are several
   double set_volume_mm3 = 0;          // set pixels x pixel area x thickness
   std::uint64_t solid_pixels = 0, bead_pixels = 0;  // of the layers planned now: of parts, and of the beads in them
   std::uint64_t capped_rows = 0;      // rows of all layers that are closed only thanks to repair

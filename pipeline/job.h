@@ -31,6 +31,8 @@ struct PartRequest {
   std::array<double, 3> rotate_deg{0, 0, 0};
   std::array<double, 3> shrink{1, 1, 1};  // compensation factors per axis of the bed, applied last
   std::string fill = {};  // changes to the job's filling, "pattern=contour gap_mm=0.1"
+  std::string material = {};            // name of its powder; no part or every part has one
+  std::string material_by_height = {};  // others between two heights above its bottom, "2:4 bronze; 4:6 steel"
 };
 
 enum class Engine { kRays, kContours, kBoth };

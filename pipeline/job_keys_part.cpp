@@ -1,5 +1,6 @@
 #include "pipeline/job_keys.h"
 #include "pipeline/key_text.h"
+#include "pipeline/materials.h"
 
 namespace lamina::pipeline {
 namespace {
@@ -73,6 +74,17 @@ const PartKey kPartKeys[] = {
        return wrong;
      },
      [](const PartRequest& p) { return p.fill; }, Form::kString},
+    {"part", "material", "", "NAME", "powder of the part, for machines with two vats", true,
+     [](Text t, PartRequest& p) { return read_material(t, p.material); },
+     [](const PartRequest& p) { return p.material; }, Form::kString},
+    {"part", "material_by_height", "", "RANGES", "other powders between two heights above the part's bottom", true,
+     [](Text t, PartRequest& p) {
+       std::vector<MaterialRange> tried;
+       auto wrong = read_material_ranges(t, tried);
+       if (wrong.empty()) p.material_by_height = t;
+       return wrong;
+     },
+     [](const PartRequest& p) { return p.material_by_height; }, Form::kString},
 };
 
 }  // namespace

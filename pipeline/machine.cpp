@@ -52,6 +52,10 @@ Result<ResolvedMachine> resolve_profile(const Machine& machine) {
   if (dialect == nullptr) return wrong("machine.dialect", fmt::format("there is no dialect '{}'", machine.dialect));
   if (Status status = write::check_dialect(*dialect, machine, *grid); !status) return status.error();
   grid->bit_order = dialect->bit_order;
+  if (!machine.powder.materials.empty() && machine.powder.materials.size() != machine.powder.vats) {
+    return wrong("powder.materials", fmt::format("{} names for {} vats of {}; name what is in each", machine.powder.materials.size(),
+                                                 machine.powder.vats, machine.name));
+  }
   return ResolvedMachine{machine, std::move(*grid)};
 }
 

@@ -5,6 +5,7 @@
 #define TOML_ENABLE_WINDOWS_COMPAT 0
 #include <toml++/toml.h>
 
+#include <algorithm>
 #include <cmath>
 #include <fstream>
 #include <iterator>
@@ -12,6 +13,7 @@
 #include "pipeline/json_text.h"
 #include "pipeline/key_text.h"
 #include "pipeline/job_keys.h"
+#include "pipeline/materials.h"
 #include "stages/write/program/dialect.h"
 
 namespace lamina::pipeline {
@@ -28,13 +30,15 @@ constexpr Word<BlockedRule> kBlocked[] = {
 constexpr Word<LagUnit> kLags[] = {{"pixel", LagUnit::kPixel}, {"tick", LagUnit::kTick}};
 constexpr Word<FirstSwath> kFirst[] = {{"bed", FirstSwath::kBed}, {"layer", FirstSwath::kLayer}};
 constexpr Word<VatRule> kVats[] = {
-    {"first", VatRule::kFirst}, {"second", VatRule::kSecond}, {"majority", VatRule::kMajority}, {"both", VatRule::kBoth}};
+    {"first", VatRule::kFirst}, {"second", VatRule::kSecond}, {"majority", VatRule::kMajority}, {"both", VatRule::kBoth},
+    {"refuse", VatRule::kRefuse}};
 
 struct MachineKey {
   Text section, name;
   std::string (*read)(Text text, Machine& machine);
   std::string (*write)(const Machine& machine);
   KeyForm form;
+  bool only_if_set = false;  // is left out of a profile's text while it is empty
 };
 
 std::string read_count(Text text, std::int64_t low, std::int64_t high, std::uint32_t& value) {
@@ -162,6 +166,20 @@ const MachineKey kKeys[] = {
     AXIS_KEY(motion, y_axis),
 
     COUNT_KEY(powder, vats, 1, 2),
+    {"powder", "materials",
+     [](Text t, Machine& m) {
+       std::vector<std::string> names;
+       for (const Text piece : t.empty() ? std::vector<Text>() : split(t, ",")) {
+         std::string name;
+         if (auto wrong = read_material(piece, name); !wrong.empty()) return wrong;
+         if (std::ranges::find(names, name) != names.end()) return fmt::format("'{}' is in two vats; name them apart", name);
+         names.push_back(name);
+       }
+       m.powder.materials = names;
+       return std::string();
+     },
+     [](const Machine& m) { return m.powder.materials.empty() ? "" : fmt::format("\"{}\"", fmt::join(m.powder.materials, "\",\"")); },
+     KeyForm::kList, true},
     WORD_KEY(powder, vat_rule, kVats),
     AXIS_KEY(powder, build_axis),
     {"powder", "feed_axes",
@@ -286,6 +304,7 @@ std::string machine_text(const Machine& machine) {
   std::string text;
   Text section;
   for (const MachineKey& key : kKeys) {
+    if (key.only_if_set && key.write(machine).empty()) continue;
     if (section != key.section) text += fmt::format("{}[{}]\n", section.empty() ? "" : "\n", key.section);
     section = key.section;
     const std::string value = key.write(machine);

@@ -55,6 +55,16 @@ std::string machine_line(const ManifestHead& head) {
                      hex(head.machine_profile));
 }
 
+// The line of a job with several materials.
+std::string materials_line(const ManifestHead& head) {
+  if (head.materials.empty()) return {};
+  std::string text;
+  for (const JobMaterial& material : head.materials) {
+    text += fmt::format("{}{{\"name\": {}, \"vat\": {}}}", text.empty() ? "" : ", ", json_string(material.name), material.vat);
+  }
+  return fmt::format("\"materials\": [{}],\n", text);
+}
+
 // Whole dpi as a number; another grid as the dots that a span of nm holds.
 std::string axis_text(const PixelAxis& axis) {
   if (axis.span == kNmPerInch) return fmt::format("{}", axis.dots);
@@ -67,11 +77,11 @@ std::string lasting_text(const ManifestHead& head) {
   for (const PartSummary& part : head.parts) parts += (parts.empty() ? "" : ",\n") + part_text(part);
   return fmt::format(
       "\"lamina\": {},\n\"job\": {},\n\"bed_mm\": [{}, {}],\n\"dpi\": [{}, {}],\n\"columns\": {},\n\"rows\": {},\n"
-      "\"format\": {},\n\"extension\": {},\n\"fill_rule\": {},\n\"mirror\": {},\n\"layer_count\": {},\n\"parts\": [\n{}\n],\n{}",
+      "\"format\": {},\n\"extension\": {},\n\"fill_rule\": {},\n\"mirror\": {},\n\"layer_count\": {},\n\"parts\": [\n{}\n],\n{}{}",
       json_string(head.version), json_string(head.job_toml), exact_mm(head.grid.x.length), exact_mm(head.grid.y.length),
       axis_text(head.grid.x), axis_text(head.grid.y), head.grid.columns(), head.grid.rows(), json_string(head.format),
       json_string(head.extension), json_string(head.fill_rule), json_string(head.mirror), head.layer_count, parts,
-      machine_line(head));
+      materials_line(head), machine_line(head));
 }
 
 // A writer holds its lock as long as it lives; the lock of a killed run is gone with it.
@@ -113,11 +123,26 @@ void add_program_text(const ProgramRecord& record, std::string& text) {
                  record.bytes, record.sweeps, record.drops, record.moved, record.lost, hex(record.hash));
 }
 
-void add_record_text(const LayerRecord& record, std::string_view extension, std::string& text) {
+void add_record_text(const LayerRecord& record, const ManifestHead& head, std::string& text) {
+  if (!head.materials.empty()) {
+    fmt::format_to(std::back_inserter(text),
+                   "{{\"index\": {}, \"bottom_nm\": {}, \"thickness_nm\": {}, \"reason\": \"{}\", \"capped_rows\": {}, "
+                   "\"images\": [", record.layer.index, record.layer.bottom, record.layer.thickness,
+                   reason_name(record.layer.reason), record.capped_rows);
+    bool first = true;
+    for (const LayerImageFile& image : layer_images(head, record)) {
+      fmt::format_to(std::back_inserter(text), "{}{{\"file\": {}, \"bytes\": {}, \"set_pixels\": {}, \"xxh3_128\": \"{}\"}}",
+                     first ? "" : ", ", json_string(image.name), image.record.bytes, image.record.set_pixels,
+                     hex(image.record.hash));
+      first = false;
+    }
+    text += "]}";
+    return;
+  }
   fmt::format_to(std::back_inserter(text),
                  "{{\"index\": {}, \"file\": {}, \"bottom_nm\": {}, \"thickness_nm\": {}, \"reason\": \"{}\", "
                  "\"bytes\": {}, \"set_pixels\": {}, \"capped_rows\": {}, \"xxh3_128\": \"{:016x}{:016x}\"}}",
-                 record.layer.index, json_string(layer_file_name(record.layer.index, extension)), record.layer.bottom,
+                 record.layer.index, json_string(layer_file_name(record.layer.index, head.extension)), record.layer.bottom,
                  record.layer.thickness, reason_name(record.layer.reason), record.bytes, record.set_pixels,
                  record.capped_rows, record.hash.high, record.hash.low);
 }
@@ -128,7 +153,7 @@ Hash128 ManifestHead::id() const {
 }
 
 ManifestHead make_head(const Job& job, const std::vector<PartSummary>& parts, std::uint32_t layer_count,
-                       std::array<std::uint32_t, 2> layers) {
+                       std::array<std::uint32_t, 2> layers, const Materials& materials) {
   ManifestHead head;
   head.version = LAMINA_VERSION;
   head.job_toml = canonical_job_text(job);
@@ -143,6 +168,7 @@ ManifestHead make_head(const Job& job, const std::vector<PartSummary>& parts, st
   head.last_layer = layers[1];
   head.parts = parts;
   for (PartSummary& part : head.parts) part.path = std::filesystem::path(part.path).filename().string();
+  if (materials.several()) head.materials = materials.used;
   if (job.machine.resolved) {
     const Machine& machine = job.machine.resolved->machine;
     head.machine = machine.name;
@@ -187,8 +213,21 @@ std::string manifest_name(const Job& job) {
   return fmt::format("manifest-{}-of-{}.json", (*job.shard)[0] + 1, (*job.shard)[1]);
 }
 
-std::string layer_file_name(std::uint32_t index, std::string_view extension) {
-  return extension.empty() ? std::string() : fmt::format("layers/{:06}{}", index, extension);
+std::string layer_file_name(std::uint32_t index, std::string_view extension, std::string_view material) {
+  if (extension.empty()) return {};
+  return fmt::format("layers/{:06}{}{}{}", index, material.empty() ? "" : "-", material, extension);
+}
+
+std::vector<LayerImageFile> layer_images(const ManifestHead& head, const LayerRecord& record) {
+  std::vector<LayerImageFile> files;
+  if (head.materials.empty()) {
+    files.push_back({layer_file_name(record.layer.index, head.extension), {record.bytes, record.set_pixels, record.hash}});
+  }
+  for (std::size_t m = 0; m < head.materials.size(); ++m) {
+    files.push_back({layer_file_name(record.layer.index, head.extension, head.materials[m].name),
+                     m < record.images.size() ? record.images[m] : ImageRecord()});
+  }
+  return files;
 }
 
 Status check_not_being_written(const std::string& path) {
@@ -205,7 +244,8 @@ struct ManifestWriter::State {
   static constexpr std::chrono::seconds kPatience{1};
 
   int file = -1;
-  std::string path, extension, buffer;
+  std::string path, buffer;
+  ManifestHead head;
   bool programs = false;  // lines speak of print programs
   std::uint32_t next_layer = 0, last_layer = 0, lines_buffered = 0;
   bool first_line = true;
@@ -222,7 +262,7 @@ struct ManifestWriter::State {
   void add(const LayerRecord& record) {
     buffer += first_line ? "\n" : ",\n";
     first_line = false;
-    add_record_text(record, extension, buffer);
+    add_record_text(record, head, buffer);
     if (programs) {
       buffer.pop_back();
       add_program_text(record.program, buffer);
@@ -256,7 +296,7 @@ Result<ManifestWriter> ManifestWriter::open(const std::string& path, const Manif
   ManifestWriter writer;
   State& state = *writer.state_;
   state.path = path;
-  state.extension = head.extension;
+  state.head = head;
   state.programs = !head.machine.empty();
   state.next_layer = head.first_layer;
   state.last_layer = head.last_layer;

@@ -14,6 +14,7 @@
 
 #include "pipeline/hash.h"
 #include "pipeline/job.h"
+#include "pipeline/materials.h"
 #include "pipeline/scene.h"
 #include "stages/data/grid.h"
 #include "stages/data/layer.h"
@@ -30,14 +31,21 @@ struct ProgramRecord {
   std::uint64_t moved = 0, lost = 0;  // pixels of blocked nozzles (stages/program/compile.h)
 };
 
+/// What a layer's line says of its image of one material, where a job has several.
+struct ImageRecord {
+  std::uint64_t bytes = 0, set_pixels = 0;
+  Hash128 hash;
+};
+
 /// One line of the manifest.
 struct LayerRecord {
   Layer layer;
-  std::uint64_t bytes = 0;          // of the file; 0 for the null format
+  std::uint64_t bytes = 0;          // of the file; 0 for the null format; of all of a layer's images
   std::uint64_t set_pixels = 0;
   std::uint32_t capped_rows = 0;    // rows that are closed only thanks to repair (load/repair.h)
-  Hash128 hash;                     // of the file
+  Hash128 hash;                     // of the file; nothing where there are several
   ProgramRecord program;            // zeros without a machine
+  std::vector<ImageRecord> images;  // one for each material, if the job has several
 };
 
 /// The head of the manifest: the job as resolved and all that decides bytes.
@@ -53,13 +61,14 @@ struct ManifestHead {
   std::vector<PartSummary> parts;
   std::string machine, dialect, program_extension;  // empty without a machine
   Hash128 machine_profile;                          // of program/machine.toml
+  std::vector<JobMaterial> materials;               // if there are several
   /// Hash of all of the above but the range: two directories with the same id belong to the same job.
   Hash128 id() const;
 };
 
 /// The head of a job whose parts are loaded. `layers` [first, last) as layer_range() gives it.
 ManifestHead make_head(const Job& job, const std::vector<PartSummary>& parts, std::uint32_t layer_count,
-                       std::array<std::uint32_t, 2> layers);
+                       std::array<std::uint32_t, 2> layers, const Materials& materials = {});
 
 /// What keeps two heads from belonging to the same job, as "bed.dpi is [600, 600], was [1200, 1200]"; empty if nothing.
 std::string difference(const ManifestHead& now, const ManifestHead& earlier);
@@ -72,8 +81,17 @@ struct Manifest {
 
 /// Name of the manifest in a job's directory: manifest.json, or manifest-<i>-of-<n>.json for a shard.
 std::string manifest_name(const Job& job);
-/// The name of a layer's file in the job's directory, layers/000042.tif; empty for a format without files.
-std::string layer_file_name(std::uint32_t index, std::string_view extension);
+/// The name of a layer's file in the job's directory, layers/000042.tif, or layers/000042-bronze.tif of a job with several
+/// materials; empty for a format without files.
+std::string layer_file_name(std::uint32_t index, std::string_view extension, std::string_view material = {});
+
+/// An image of a layer, as the manifest has it.
+struct LayerImageFile {
+  std::string name;  // in the job's directory; empty for a format without files
+  ImageRecord record;
+};
+/// All images of a layer: one, or one for each material in the order of the manifest.
+std::vector<LayerImageFile> layer_images(const ManifestHead& head, const LayerRecord& record);
 
 /// Reads a manifest, or as many whole lines as a .part holds. errors: kVerification with file and line
 Result<Manifest> read_manifest(const std::string& path);

@@ -56,6 +56,9 @@ ManifestHead head_from(const json& text) {
     for (const json& note : entry.at("notes")) part.notes.push_back({note.at("repair"), note.at("text")});
     head.parts.push_back(std::move(part));
   }
+  if (text.contains("materials")) {
+    for (const json& entry : text.at("materials")) head.materials.push_back({entry.at("name"), entry.at("vat")});
+  }
   if (text.contains("machine")) {
     const json& machine = text.at("machine");
     head.machine = machine.at("name");
@@ -97,20 +100,51 @@ class RecordLine {
   bool good_ = true;
 };
 
+// The middle of the line of a layer with several materials: empty, or what is wrong with it.
+std::string images_from(RecordLine& read, const ManifestHead& head, std::uint32_t index, LayerRecord& record) {
+  std::string_view reason;
+  read.text(", \"bottom_nm\": ").number(record.layer.bottom)
+      .text(", \"thickness_nm\": ").number(record.layer.thickness)
+      .text(", \"reason\": \"").word(reason)
+      .text("\", \"capped_rows\": ").number(record.capped_rows)
+      .text(", \"images\": [");
+  for (std::size_t m = 0; m < head.materials.size(); ++m) {
+    ImageRecord image;
+    std::string_view file, hash;
+    read.text(m == 0 ? "{\"file\": \"" : ", {\"file\": \"").word(file)
+        .text("\", \"bytes\": ").number(image.bytes)
+        .text(", \"set_pixels\": ").number(image.set_pixels)
+        .text(", \"xxh3_128\": \"").word(hash)
+        .text("\"}");
+    if (file != layer_file_name(index, head.extension, head.materials[m].name)) return fmt::format("layer {} names another file", index);
+    if (!read_hex(hash, image.hash)) return fmt::format("layer {} has a hash that is none", index);
+    record.bytes += image.bytes;
+    record.set_pixels += image.set_pixels;
+    record.images.push_back(image);
+  }
+  read.text("]");
+  if (!read_reason(reason, record.layer.reason)) return fmt::format("layer {} has a reason that is none", index);
+  return {};
+}
+
 // Empty, or what is wrong with the line.
 std::string record_from(std::string_view line, const ManifestHead& head, std::uint32_t index, LayerRecord& record) {
   std::string_view file, reason, hash;
   RecordLine read(line);
-  read.text("{\"index\": ").number(record.layer.index)
-                         .text(", \"file\": \"").word(file)
-                         .text("\", \"bottom_nm\": ").number(record.layer.bottom)
-                         .text(", \"thickness_nm\": ").number(record.layer.thickness)
-                         .text(", \"reason\": \"").word(reason)
-                         .text("\", \"bytes\": ").number(record.bytes)
-                         .text(", \"set_pixels\": ").number(record.set_pixels)
-                         .text(", \"capped_rows\": ").number(record.capped_rows)
-                         .text(", \"xxh3_128\": \"").word(hash)
-                         .text("\"");
+  read.text("{\"index\": ").number(record.layer.index);
+  if (!head.materials.empty()) {
+    if (std::string what = images_from(read, head, index, record); !what.empty()) return what;
+  } else {
+    read.text(", \"file\": \"").word(file)
+        .text("\", \"bottom_nm\": ").number(record.layer.bottom)
+        .text(", \"thickness_nm\": ").number(record.layer.thickness)
+        .text(", \"reason\": \"").word(reason)
+        .text("\", \"bytes\": ").number(record.bytes)
+        .text(", \"set_pixels\": ").number(record.set_pixels)
+        .text(", \"capped_rows\": ").number(record.capped_rows)
+        .text(", \"xxh3_128\": \"").word(hash)
+        .text("\"");
+  }
   std::string_view program_hash;
   if (!head.machine.empty()) {
     read.text(", \"program\": {\"bytes\": ").number(record.program.bytes)
@@ -124,12 +158,14 @@ std::string record_from(std::string_view line, const ManifestHead& head, std::ui
   const bool ended = read.text("}").ended();
   if (!ended) return "is not the line of a layer";
   if (record.layer.index != index) return fmt::format("layer {} stands where {} is next", record.layer.index, index);
-  if (file != layer_file_name(index, head.extension)) return fmt::format("layer {} names another file", index);
-  if (!read_reason(reason, record.layer.reason)) return fmt::format("layer {} has a reason that is none", index);
+  if (head.materials.empty()) {
+    if (file != layer_file_name(index, head.extension)) return fmt::format("layer {} names another file", index);
+    if (!read_reason(reason, record.layer.reason)) return fmt::format("layer {} has a reason that is none", index);
+    if (!read_hex(hash, record.hash)) return fmt::format("layer {} has a hash that is none", index);
+  }
   if (!head.machine.empty() && !read_hex(program_hash, record.program.hash)) {
     return fmt::format("layer {} has a program with a hash that is none", index);
   }
-  if (!read_hex(hash, record.hash)) return fmt::format("layer {} has a hash that is none", index);
   return {};
 }
 

@@ -12,7 +12,7 @@ namespace lamina::pipeline {
 std::string head_text(const ManifestHead& head);
 
 /// Appends one layer's object, without comma or line end.
-void add_record_text(const LayerRecord& record, std::string_view extension, std::string& text);
+void add_record_text(const LayerRecord& record, const ManifestHead& head, std::string& text);
 
 bool read_reason(std::string_view name, LayerReason& reason);
 

@@ -110,7 +110,9 @@ Status bring_files(const Shard& shard, const std::string& output, MergeReport& r
     return in_place ? Status() : bring_file(from, fs::path(output) / name, report);
   };
   for (const LayerRecord& record : shard.manifest.layers) {
-    if (Status status = bring(layer_file_name(record.layer.index, head.extension), record.bytes); !status) return status;
+    for (const LayerImageFile& image : layer_images(head, record)) {
+      if (Status status = bring(image.name, image.record.bytes); !status) return status;
+    }
     const std::string program = program_file_name(record.layer.index, head.program_extension);
     if (Status status = bring(program, record.program.bytes); !status) return status;
   }

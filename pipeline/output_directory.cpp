@@ -97,7 +97,8 @@ bool read_layer_file_name(std::string_view name, std::uint32_t& index, bool& par
   if (digits < 6) return false;
   const auto [stop, error] = std::from_chars(name.data(), name.data() + digits, index);
   if (error != std::errc()) return false;
-  const std::string_view extension = name.substr(digits);
+  std::string_view extension = name.substr(digits);
+  if (extension.starts_with('-')) extension.remove_prefix(std::min(extension.find('.'), extension.size()));  // a material
   return std::ranges::any_of(write::image_formats(), [&](const write::ImageFormat& format) {
     return !extension.empty() && extension == format.extension;
   });

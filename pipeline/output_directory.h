@@ -24,7 +24,7 @@ struct ManifestFile {
 /// All manifests of a directory, the whole job's first, then by shard; none if there is no such directory.
 std::vector<ManifestFile> find_manifests(const std::string& directory);
 
-/// Reads the name of a layer's file, 000042.tif or 000042.tif.part; false if it is none.
+/// Reads the name of a layer's file, 000042.tif, 000042-bronze.tif or either with .part; false if it is none.
 bool read_layer_file_name(std::string_view name, std::uint32_t& index, bool& partial);
 /// The same for the print program of a layer, 000042.gcode.
 bool read_program_file_name(std::string_view name, std::uint32_t& index, bool& partial);

@@ -232,16 +232,20 @@ int run_preview(const std::vector<std::string>& texts) {
   request.width = (*width).value_or(2400);
   for (const std::size_t index : *chosen) {
     const LayerRecord& record = manifest->layers[index];
-    request.layers.push_back(
-        {(std::filesystem::path(directory) / layer_file_name(record.layer.index, manifest->head.extension)).string(),
-         fmt::format("layer {}", record.layer.index), fmt::format("z {:.3f} mm", mm(record.layer.plane()))});
+    const auto images = layer_images(manifest->head, record);
+    for (std::size_t m = 0; m < images.size(); ++m) {
+      const std::string material = manifest->head.materials.empty() ? "" : ", " + manifest->head.materials[m].name;
+      request.layers.push_back({(std::filesystem::path(directory) / images[m].name).string(),
+                                fmt::format("layer {}{}", record.layer.index, material),
+                                fmt::format("z {:.3f} mm", mm(record.layer.plane()))});
+    }
   }
   const Result<Buffer<std::byte>> picture = write::picture::contact_sheet(request);
   if (!picture) return fail(picture.error());
   if (const Status status = write::write_file(output, *picture); !status) return fail(status.error());
   if (!arguments->has("--quiet")) {
     if (!write::picture::have_font()) say("lamina: no captions: no font; install fonts-dejavu-core");
-    say(fmt::format("{}: {} of {} layers, {}", output, request.layers.size(), manifest->head.layer_count,
+    say(fmt::format("{}: {} of {} layers, {}", output, chosen->size(), manifest->head.layer_count,
                     readable_bytes(picture->size())));
   }
   return 0;

@@ -9,6 +9,7 @@
 #include <iterator>
 #include <map>
 
+#include "pipeline/layer_images.h"
 #include "pipeline/machine_profile.h"
 #include "pipeline/print_program.h"
 #include "pipeline/replay.h"
@@ -61,8 +62,16 @@ Result<Buffer<std::byte>> draw_swath(const std::string& directory, const Manifes
   if (!machine) return machine.error();
   const auto built = VirtualMachine::build(*machine, head.grid.columns(), head.grid.rows());
   if (!built) return built.error();
-  const auto image = write::read_image(path(layer_file_name(choice.layer, head.extension)));
-  if (!image) return image.error();
+  Runs whole;
+  LayerRecord record;
+  record.layer.index = choice.layer;
+  for (const LayerImageFile& file : layer_images(head, record)) {
+    auto image = write::read_image(path(file.name));
+    if (!image) return image.error();
+    if (!add_image(std::move(image->runs), whole)) {
+      return Error{Fault::kVerification, fmt::format("{}: sets pixels of another material", file.name)};
+    }
+  }
 
   std::vector<VirtualMachine::Drop> drops;
   std::map<std::uint32_t, SweepSeen> sweeps;
@@ -89,7 +98,7 @@ Result<Buffer<std::byte>> draw_swath(const std::string& directory, const Manifes
   write::picture::SwathView view;
   view.grid = head.grid;
   view.width = choice.width;
-  view.image = image->runs;
+  view.image = whole;
   const bool x = machine->mounting.scan_axis == ScanAxis::kX;
   const std::uint32_t nozzles = machine->head.nozzles;
   for (const auto& [number, sweep] : sweeps) {

@@ -34,8 +34,8 @@ Status PrintProgram::begin() const {
   return write::write_file(path(fmt::format("end{}", dialect_.extension)), text);
 }
 
-Status PrintProgram::write_layer(const Layer& layer, const RunsView& image, ProgramWork& work,
-                                 ProgramRecord& record) const {
+Status PrintProgram::write_layer(const Layer& layer, const RunsView& image, const std::vector<std::uint32_t>& feeds,
+                                 ProgramWork& work, ProgramRecord& record) const {
   if (!work.writer) work.writer = dialect_.make_writer(resolved_.machine, resolved_.grid);
   auto file = ProgramFile::create(directory_ + "/" + program_file_name(layer.index, dialect_.extension));
   if (!file) return file.error();
@@ -44,6 +44,7 @@ Status PrintProgram::write_layer(const Layer& layer, const RunsView& image, Prog
   cycle.layers = layers_;
   cycle.bottom_nm = layer.bottom;
   cycle.thickness_nm = layer.thickness;
+  cycle.feeds = feeds;
   work.text.clear();
   work.writer->begin_layer(cycle, work.text);
   constexpr std::size_t kPiece = 256 << 10;

@@ -43,7 +43,9 @@ class PrintProgram {
   Status begin() const;
 
   /// Compiles a layer and writes its file, sweep by sweep. errors  kOutput
-  Status write_layer(const Layer& layer, const RunsView& image, ProgramWork& work, ProgramRecord& record) const;
+  /// feeds  the vats that it needs
+  Status write_layer(const Layer& layer, const RunsView& image, const std::vector<std::uint32_t>& feeds, ProgramWork& work,
+                     ProgramRecord& record) const;
 
   /// What write_layer may hold for an image of so many changes.
   std::uint64_t bytes_bound(std::uint64_t changes) const;

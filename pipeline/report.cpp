@@ -10,6 +10,7 @@
 
 #include "pipeline/hash.h"
 #include "pipeline/json_text.h"
+#include "pipeline/layer_images.h"
 #include "pipeline/manifest.h"
 #include "pipeline/report_views.h"
 #include "stages/write/read_image.h"
@@ -45,17 +46,21 @@ Result<Manifest> finished_manifest(const std::string& directory) {
   return manifest;
 }
 
-/// One layer's file into runs, if it is the one of the manifest.
+/// A layer's files into runs, if they are those of the manifest; several materials are drawn as one.
 Result<Runs> read_layer(const std::string& directory, const ManifestHead& head, const LayerRecord& record) {
-  const std::string path = directory + "/" + layer_file_name(record.layer.index, head.extension);
-  const Result<FileDigest> digest = digest_file(path);
-  if (!digest) return digest.error();
-  const Error changed{Fault::kVerification, fmt::format("{}: is not the file of the manifest; lamina verify tells more", path)};
-  if (digest->bytes != record.bytes || digest->hash != record.hash) return changed;
-  Result<write::LayerImage> image = write::read_image(path);
-  if (!image) return image.error();
-  if (image->runs.columns != head.grid.columns() || image->runs.view().rows() != head.grid.rows()) return changed;
-  return std::move(image->runs);
+  Runs whole;
+  for (const LayerImageFile& file : layer_images(head, record)) {
+    const std::string path = directory + "/" + file.name;
+    const Result<FileDigest> digest = digest_file(path);
+    if (!digest) return digest.error();
+    const Error changed{Fault::kVerification, fmt::format("{}: is not the file of the manifest; lamina verify tells more", path)};
+    if (digest->bytes != file.record.bytes || digest->hash != file.record.hash) return changed;
+    Result<write::LayerImage> image = write::read_image(path);
+    if (!image) return image.error();
+    if (image->runs.columns != head.grid.columns() || image->runs.view().rows() != head.grid.rows()) return changed;
+    if (!add_image(std::move(image->runs), whole)) return changed;
+  }
+  return whole;
 }
 
 /// The layers' codes that fit the page: when they get too many, every second one is let go.

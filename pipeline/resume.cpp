@@ -4,6 +4,8 @@
 #include <tbb/parallel_for.h>
 #include <unistd.h>
 
+#include <algorithm>
+
 #include "pipeline/hash.h"
 #include "pipeline/print_program.h"
 
@@ -33,13 +35,14 @@ Result<std::vector<LayerRecord>> layers_that_hold(const std::string& directory, 
   std::vector<char> holds(recorded.size(), 1);
   tbb::parallel_for(std::size_t{0}, recorded.size(), [&](std::size_t i) {
     const LayerRecord& record = recorded[i];
-    const std::string name = layer_file_name(record.layer.index, head.extension);
     const auto hold = [&](const std::string& file, std::uint64_t bytes, const Hash128& hash) {
       if (file.empty()) return true;  // a format without files, a job without a machine
       const auto digest = digest_file(directory + "/" + file);
       return digest.ok() && digest->bytes == bytes && digest->hash == hash;
     };
-    holds[i] = hold(name, record.bytes, record.hash) &&
+    holds[i] = std::ranges::all_of(layer_images(head, record), [&](const LayerImageFile& image) {
+                 return hold(image.name, image.record.bytes, image.record.hash);
+               }) &&
                hold(program_file_name(record.layer.index, head.program_extension), record.program.bytes, record.program.hash);
   });
   std::vector<LayerRecord> kept;

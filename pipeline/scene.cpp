@@ -31,7 +31,8 @@ struct Loaded {
   std::vector<Note> notes;
 };
 
-using LoadKey = std::tuple<std::string, std::string, std::array<double, 3>, std::array<double, 3>, std::array<double, 3>>;
+using LoadKey = std::tuple<std::string, std::string, std::array<double, 3>, std::array<double, 3>, std::array<double, 3>,
+                           std::string>;
 
 // splitmix64's finisher: spreads neighbouring offsets over all bits.
 std::uint64_t mix(std::uint64_t x) {
@@ -110,8 +111,10 @@ void note_overlaps(const Job& job, Scene& scene, const std::vector<std::pair<std
   for (const auto& [pair, unused] : noted) {
     const auto& [first, second] = pair;
     scene.parts[second].notes.push_back(
-        {false, fmt::format("its box overlaps that of part {} ({}); where solids overlap they are united", first + 1,
-                            std::filesystem::path(scene.parts[first].path).filename().string())});
+        {false, fmt::format("its box overlaps that of part {} ({}); where solids overlap {}", first + 1,
+                            std::filesystem::path(scene.parts[first].path).filename().string(),
+                            job.parts[first].material == job.parts[second].material ? "they are united"
+                                                                                    : "this one's material counts")});
   }
 }
 
@@ -137,7 +140,10 @@ Result<Scene> load_scene(const Job& job) {
   for (const PartRequest& part : job.parts) {
     std::error_code ignored;
     const std::filesystem::path file = std::filesystem::weakly_canonical(part.path, ignored);
-    const LoadKey key{file.empty() ? part.path : file.string(), part.unit, part.scale, part.rotate_deg, part.shrink};
+    // Parts of different materials are indexed apart (solids.h), so that each has meshes of its own.
+    const std::string solid =
+        part.material_by_height.empty() ? part.material : fmt::format("{} {} {}", part.material, part.material_by_height, part.bottom_mm);
+    const LoadKey key{file.empty() ? part.path : file.string(), part.unit, part.scale, part.rotate_deg, part.shrink, solid};
     auto found = files.find(key);
     if (found == files.end()) {
       Result<Loaded> fresh = load_part(job, part, scene);

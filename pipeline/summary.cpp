@@ -65,6 +65,7 @@ std::string summary_text(const Job& job, const JetSummary& s) {
     line("pixels", fmt::format("{} set, {:.3f} cm3 of binder-filled volume", readable_count(s.set_pixels),
                                s.set_volume_mm3 / 1000));
     if (s.solid_pixels > 0) line("porosity", fmt::format("{:.2f} % of the parts' {} pixels are left empty", 100 * porosity(s), readable_count(s.solid_pixels)));
+    for (const auto& [material, pixels] : s.materials) line("", fmt::format("{} of {}", readable_count(pixels), material));
     line("files", fmt::format("{} in {}", readable_bytes(s.bytes_written), one_line(s.directory)));
     line("time", fmt::format("{}: load {}, index {}, layers {} (threads: raster {}, encode {}, write {})",
                              readable_seconds(s.seconds.load + s.seconds.index + s.seconds.layers),
@@ -96,6 +97,13 @@ std::string summary_json(const Job& job, const JetSummary& s) {
       s.layers_total, s.layers_planned, s.layers_kept, s.triangles, s.set_pixels, s.set_volume_mm3, s.bytes_written,
       s.capped_rows);
   if (s.solid_pixels > 0) text += fmt::format("\"solid_pixels\":{},\"bead_pixels\":{},\"porosity\":{},", s.solid_pixels, s.bead_pixels, porosity(s));
+  if (!s.materials.empty()) {
+    std::string materials;
+    for (const auto& [material, pixels] : s.materials) {
+      materials += fmt::format("{}{{\"name\":{},\"set_pixels\":{}}}", materials.empty() ? "" : ",", json_string(material), pixels);
+    }
+    text += fmt::format("\"materials\":[{}],", materials);
+  }
   text += fmt::format(
       "\"seconds\":{{\"load\":{},\"index\":{},\"layers\":{},\"raster_threads\":{},\"encode_threads\":{},"
       "\"write_threads\":{}}},\"pixels_per_second\":{},\"layers_per_second\":{},",

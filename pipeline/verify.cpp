@@ -12,6 +12,7 @@
 #include <optional>
 
 #include "pipeline/hash.h"
+#include "pipeline/layer_images.h"
 #include "pipeline/machine_profile.h"
 #include "pipeline/manifest.h"
 #include "pipeline/output_directory.h"
@@ -46,6 +47,28 @@ std::string whole_file(const std::string& path) {
   return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
 }
 
+// Which vats have to feed a layer, a bit each, by the profile's rule.
+std::uint32_t vats_wanted(const Machine& machine, const ManifestHead& head, const LayerRecord& record) {
+  const std::size_t first = std::ranges::find_if(record.images, [](const ImageRecord& i) { return i.set_pixels > 0; }) - record.images.begin();
+  if (first == record.images.size()) return 1u << head.materials[0].vat;
+  const auto after = std::find_if(record.images.begin() + static_cast<std::ptrdiff_t>(first) + 1, record.images.end(),
+                                  [](const ImageRecord& i) { return i.set_pixels > 0; });
+  if (after == record.images.end()) return 1u << head.materials[first].vat;
+  switch (machine.powder.vat_rule) {
+    case VatRule::kFirst: return 1;
+    case VatRule::kSecond: return 2;
+    case VatRule::kBoth: return 3;
+    case VatRule::kMajority: return 1u << head.materials[after->set_pixels > record.images[first].set_pixels ? 1 : 0].vat;
+    case VatRule::kRefuse: break;
+  }
+  return 0;
+}
+
+std::string vats_text(std::uint32_t vats) {
+  constexpr const char* kTexts[] = {"no vat feeds", "the first vat feeds", "the second vat feeds", "both vats feed"};
+  return kTexts[vats & 3];
+}
+
 // Empty, or what is wrong with a layer's print program. A program whose hash differs is replayed all the same, since
 // that tells where it differs.
 std::string fault_of_program(Inspection& inspection, const LayerRecord& record, const RunsView* image) {
@@ -64,6 +87,12 @@ std::string fault_of_program(Inspection& inspection, const LayerRecord& record, 
     if (same && replay->drops != record.program.drops) {
       return fmt::format("{}: {} drops, the manifest says {}", name, replay->drops, record.program.drops);
     }
+    if (same && !inspection.head.materials.empty()) {
+      const std::uint32_t wanted = vats_wanted(inspection.machine->profile(), inspection.head, record);
+      if (replay->vats != wanted) {
+        return fmt::format("{}: layer {}: {} where {} has to", name, record.layer.index, vats_text(replay->vats), vats_text(wanted));
+      }
+    }
     const std::lock_guard lock(inspection.adding);
     inspection.report.replay.add(*replay);
     ++inspection.report.replayed;
@@ -71,11 +100,10 @@ std::string fault_of_program(Inspection& inspection, const LayerRecord& record, 
   return same ? std::string() : fmt::format("{}: its content is not what was written", name);
 }
 
-// Empty, or what is wrong with a layer's file.
-std::string fault_of_image(Inspection& inspection, const std::string& path, const std::string& name,
-                           const LayerRecord& record) {
-  const ManifestHead& head = inspection.head;
-  const Result<write::LayerImage> image = write::read_image(path);
+// Empty, or what is wrong with an image; what it sets is added to `whole`.
+std::string fault_of_image(const ManifestHead& head, const std::string& path, const LayerImageFile& file, Runs& whole) {
+  const std::string& name = file.name;
+  Result<write::LayerImage> image = write::read_image(path);
   if (!image) return image.error().message;
   const std::uint32_t columns = image->runs.columns, rows = image->runs.view().rows();
   if (columns != head.grid.columns() || rows != head.grid.rows()) {
@@ -91,27 +119,31 @@ std::string fault_of_image(Inspection& inspection, const std::string& path, cons
                        head.grid.y.dpi());
   }
   const std::uint64_t set = set_pixels(image->runs);
-  if (set != record.set_pixels) {
-    return fmt::format("{}: {} set pixels, the manifest says {}", name, set, record.set_pixels);
+  if (set != file.record.set_pixels) {
+    return fmt::format("{}: {} set pixels, the manifest says {}", name, set, file.record.set_pixels);
   }
-  const RunsView view = image->runs;
-  return fault_of_program(inspection, record, &view);
+  if (!add_image(std::move(image->runs), whole)) return fmt::format("{}: sets pixels that another material's image sets as well", name);
+  return {};
 }
 
 std::string fault_of_layer(Inspection& inspection, const LayerRecord& record) {
-  const std::string& directory = inspection.directory;
-  const std::string name = layer_file_name(record.layer.index, inspection.head.extension);
-  if (name.empty()) return fault_of_program(inspection, record, nullptr);  // a format without files
-  const std::string path = (fs::path(directory) / name).string();
-  std::error_code error;
-  if (!fs::is_regular_file(path, error)) return fmt::format("{}: is missing", name);
-  const Result<FileDigest> digest = digest_file(path);
-  if (!digest) return digest.error().message;
-  if (digest->bytes != record.bytes) {
-    return fmt::format("{}: {} bytes, the manifest says {}", name, digest->bytes, record.bytes);
+  if (inspection.head.extension.empty()) return fault_of_program(inspection, record, nullptr);  // a format without files
+  Runs whole;  // what is jetted, of whatever material
+  for (const LayerImageFile& file : layer_images(inspection.head, record)) {
+    const std::string path = (fs::path(inspection.directory) / file.name).string();
+    std::error_code error;
+    if (!fs::is_regular_file(path, error)) return fmt::format("{}: is missing", file.name);
+    const Result<FileDigest> digest = digest_file(path);
+    if (!digest) return digest.error().message;
+    if (digest->bytes != file.record.bytes) {
+      return fmt::format("{}: {} bytes, the manifest says {}", file.name, digest->bytes, file.record.bytes);
+    }
+    if (digest->hash != file.record.hash) return fmt::format("{}: its content is not what was written", file.name);
+    if (inspection.quick) continue;
+    if (std::string what = fault_of_image(inspection.head, path, file, whole); !what.empty()) return what;
   }
-  if (digest->hash != record.hash) return fmt::format("{}: its content is not what was written", name);
-  return inspection.quick ? fault_of_program(inspection, record, nullptr) : fault_of_image(inspection, path, name, record);
+  const RunsView view = whole;
+  return fault_of_program(inspection, record, inspection.quick ? nullptr : &view);
 }
 
 // Finds the machine again that the programs were written for.
@@ -177,9 +209,13 @@ void check_strays(const std::string& directory, const std::vector<Manifest>& man
     bool partial = false, named = false;
     if (read_layer_file_name(name, index, partial) && !partial) {
       for (const Manifest& manifest : manifests) {
-        named = named || (index >= manifest.head.first_layer &&
-                          index < manifest.head.first_layer + manifest.layers.size() &&
-                          layer_file_name(index, manifest.head.extension) == "layers/" + name);
+        const ManifestHead& head = manifest.head;
+        LayerRecord record;
+        record.layer.index = index;
+        named = named || (index >= head.first_layer && index < head.first_layer + manifest.layers.size() &&
+                          std::ranges::any_of(layer_images(head, record), [&](const LayerImageFile& image) {
+                            return image.name == "layers/" + name;
+                          }));
       }
     }
     if (!named) strays.push_back(name);

@@ -22,8 +22,8 @@ enum class BlockedRule : std::uint8_t {
 enum class LagUnit : std::uint8_t { kPixel, kTick };
 /// Where the first swath of a layer begins.
 enum class FirstSwath : std::uint8_t { kBed, kLayer };
-/// Which vat feeds a layer that holds both materials.
-enum class VatRule : std::uint8_t { kFirst, kSecond, kMajority, kBoth };
+/// Which vat feeds a layer that holds both materials; kRefuse: there must be none.
+enum class VatRule : std::uint8_t { kFirst, kSecond, kMajority, kBoth, kRefuse };
 
 /// Everything that a profile says. Checked by program::make_head_grid and program::check_machine.
 struct Machine {
@@ -74,6 +74,7 @@ struct Machine {
 
   struct Powder {
     std::uint32_t vats = 1;
+    std::vector<std::string> materials;  // what each vat holds; empty: whatever a job names, in that order
     VatRule vat_rule = VatRule::kMajority;
     std::string build_axis = "Z";
     std::vector<std::string> feed_axes{"A", "B"};

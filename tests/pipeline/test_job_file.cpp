@@ -48,6 +48,8 @@ Job unusual_job(const Directory& directory) {
   part.rotate_deg = {-90, 0.1, 359};
   part.shrink = {1.02, 1.02, 1.025};
   part.fill = "gap_mm=0.1 walls=2";
+  part.material = "316L";
+  part.material_by_height = "2:4.5 bronze";
   job.parts = {part, PartRequest{.path = directory / "second.stl"}};
   return job;
 }

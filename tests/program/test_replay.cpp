@@ -2,10 +2,17 @@
 #include "pipeline/replay.h"
 
 #include <gtest/gtest.h>
+#include <tbb/parallel_for.h>
+
+#include <atomic>
+#include <cstdlib>
+#include <filesystem>
 
 #include "pipeline/machine.h"
 #include "pipeline/machine_profile.h"
+#include "stages/load/load.h"
 #include "stages/program/compile.h"
+#include "stages/raster/raster.h"
 #include "stages/write/program/dialect.h"
 #include "tests/program/machines.h"
 
@@ -90,6 +97,87 @@ TEST(Replay, PrintsTheImageBitForBitOnEveryShippedMachine) {
       EXPECT_LE(printed->farthest_along_um, resolved.grid.step_nm() / 2000 + 1e-6);
     }
   }
+}
+
+/// A closed part as large as asked across its larger side, standing in the middle of a bed; nothing if it is not closed.
+struct Standing {
+  std::vector<Mesh> meshes;
+  std::vector<Instance> instances;
+  Box bounds;
+};
+
+Standing scaled(const Part& part, double side_mm, const Machine& machine) {
+  const double factor = side_mm * 1e6 / static_cast<double>(std::max({part.bounds.width(), part.bounds.depth(), std::int64_t{1}}));
+  const auto point = [&](const Point3& p) {
+    const auto nm = [&](Nm v) { return static_cast<Nm>(std::llround(v * factor)); };
+    return Point3{nm(p.x), nm(p.y), nm(p.z)};
+  };
+  Standing made;
+  for (const Mesh& mesh : part.meshes) {
+    Mesh& own = made.meshes.emplace_back(mesh);
+    own.bounds = {};
+    for (Triangle& t : own.triangles) {
+      t = {point(t.a), point(t.b), point(t.c)};
+      for (const Point3& p : {t.a, t.b, t.c}) own.bounds.add(p);
+    }
+  }
+  const auto moved = [](const Point3& p, const Point3& by) { return Point3{p.x + by.x, p.y + by.y, p.z + by.z}; };
+  for (const Instance& instance : part.instances) {
+    made.instances.push_back({instance.mesh, point(instance.offset)});
+    const Box& box = made.meshes[instance.mesh].bounds;
+    made.bounds.add(Box{moved(box.lo, made.instances.back().offset), moved(box.hi, made.instances.back().offset)});
+  }
+  const Point3 to{static_cast<Nm>(machine.bed.size_mm[0] * 5e5 - static_cast<double>(made.bounds.width()) / 2) - made.bounds.lo.x,
+                  static_cast<Nm>(machine.bed.size_mm[1] * 5e5 - static_cast<double>(made.bounds.depth()) / 2) - made.bounds.lo.y,
+                  -made.bounds.lo.z};
+  for (Instance& instance : made.instances) instance.offset = moved(instance.offset, to);
+  made.bounds = {moved(made.bounds.lo, to), moved(made.bounds.hi, to)};
+  return made;
+}
+
+TEST(Replay, EveryClosedModelIsPrintedBitForBitOnEveryShippedMachine) {
+  const char* const folder = std::getenv("LAMINA_MODELS");
+  if (folder == nullptr) GTEST_SKIP() << "LAMINA_MODELS is not set: NO real part was printed on all machines";
+  std::vector<ResolvedMachine> machines;
+  for (const ShippedMachine& shipped : shipped_machines()) {
+    machines.push_back(*resolve_profile(*read_machine(shipped.text, std::string(shipped.name))));
+  }
+  std::vector<std::string> files;
+  for (const auto& entry : std::filesystem::recursive_directory_iterator(folder)) {
+    if (entry.is_regular_file()) files.push_back(entry.path().string());
+  }
+  std::atomic<int> parts{0}, layers{0};
+  tbb::parallel_for(std::size_t{0}, files.size(), [&](std::size_t file) {
+    load::LoadOptions options;
+    options.repair = false;
+    const auto part = load::load(files[file], options);
+    if (!part.ok() || part->bounds.empty() || part->bounds.height() == 0) return;
+    for (const Mesh& mesh : part->meshes) {
+      if (!mesh.closed) return;
+    }
+    ++parts;
+    for (const ResolvedMachine& resolved : machines) {
+      // 16 mm are 500,000 pixels of 1200 dpi; the coarse machines print larger parts.
+      const double dots = 25.4e6 / resolved.grid.line_nm;
+      Standing standing = scaled(*part, std::min(16.0 * 1200 / dots, 0.6 * resolved.machine.bed.size_mm[0]), resolved.machine);
+      const auto rasterizer = raster::Rasterizer::build(standing.meshes, standing.instances, resolved.grid.image,
+                                                        FillRule::kNonzero, false, true);
+      ASSERT_TRUE(rasterizer.ok());
+      raster::LayerScratch scratch;
+      Runs runs;
+      for (const double share : {0.07, 0.46, 0.83}) {
+        const auto plane = static_cast<Nm>(static_cast<double>(standing.bounds.height()) * share);
+        rasterizer->layer(raster::Engine::kContours, plane, scratch, runs);
+        const Written program = write_layer(resolved, runs);
+        const auto printed = replay(resolved, runs, program);
+        ASSERT_TRUE(printed.ok()) << resolved.machine.name << " " << files[file] << ": " << printed.error().message;
+        EXPECT_EQ(printed->drops, set_pixels(runs)) << files[file];
+        layers += printed->drops > 0;
+      }
+    }
+  });
+  EXPECT_GE(parts, 20);
+  EXPECT_GE(layers, 20 * 9 * 2);
 }
 
 TEST(Replay, EveryDialectSpeaksForAnyMountingDirectionAndBlockedNozzle) {

@@ -1,0 +1,282 @@
+// Jobs of two powders: their images, the vats that feed each layer, and what is refused.
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <atomic>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <map>
+
+#include "pipeline/jet.h"
+#include "pipeline/layer_images.h"
+#include "pipeline/manifest.h"
+#include "pipeline/materials.h"
+#include "pipeline/merge.h"
+#include "pipeline/verify.h"
+#include "stages/write/read_image.h"
+
+namespace lamina::pipeline {
+namespace {
+
+namespace fs = std::filesystem;
+
+class TwoPowders : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    std::string name = (fs::temp_directory_path() / "lamina_powders_XXXXXX").string();
+    ASSERT_NE(::mkdtemp(name.data()), nullptr);
+    directory_ = name;
+  }
+  void TearDown() override { fs::remove_all(directory_); }
+
+  static PartRequest part(const std::string& file, double scale, const std::string& material) {
+    PartRequest made;
+    made.path = std::string(LAMINA_TEST_DIR) + "/corpus/" + file;
+    made.scale = {scale, scale, scale};
+    made.material = material;
+    return made;
+  }
+  Job job(std::vector<PartRequest> parts, const std::string& out, const std::string& machine = "nuferbj") const {
+    Job made;
+    made.parts = std::move(parts);
+    made.machine.profile = machine;
+    made.layer_mm = 1.5;
+    made.output = (directory_ / out).string();
+    return made;
+  }
+  /// A profile like a shipped one with other lines in [powder].
+  std::string profile(const std::string& powder) const {
+    std::ifstream shipped(fs::path(LAMINA_TEST_DIR).parent_path() / "stages/write/machines/nuferbj.toml");
+    std::string text{std::istreambuf_iterator<char>(shipped), std::istreambuf_iterator<char>()};
+    const std::string path = (directory_ / "mine.toml").string();
+    std::ofstream(path) << text << powder << "\n";
+    return path;
+  }
+  static Result<JetSummary> run(const Job& job) {
+    const std::atomic<bool> cancel{false};
+    return run_jet(job, [](const ProgressEvent&) {}, cancel);
+  }
+  static void expect_good(const Job& job) {
+    const auto report = verify(job.output, {});
+    ASSERT_TRUE(report.ok()) << report.error().message;
+    EXPECT_TRUE(report->ok()) << (report->faults.empty() ? "" : report->faults[0]);
+    EXPECT_EQ(report->replayed, report->layers);
+  }
+  static Runs image(const Job& job, std::uint32_t layer, const std::string& material = "") {
+    auto read = write::read_image(job.output + "/" + layer_file_name(layer, ".tif", material));
+    EXPECT_TRUE(read.ok()) << (read.ok() ? "" : read.error().message);
+    return read.ok() ? std::move(read->runs) : Runs();
+  }
+  static std::string text(const fs::path& path) {
+    std::ifstream file(path, std::ios::binary);
+    return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
+  }
+  static std::map<std::string, std::string> tree(const fs::path& path) {
+    std::map<std::string, std::string> files;
+    for (const auto& entry : fs::recursive_directory_iterator(path)) {
+      if (entry.is_regular_file()) files[fs::relative(entry.path(), path).string()] = text(entry.path());
+    }
+    return files;
+  }
+  fs::path directory_;
+};
+
+void expect_same(const Runs& a, const Runs& b, const std::string& what) {
+  EXPECT_EQ(a.row_offset, b.row_offset) << what;
+  EXPECT_EQ(a.change, b.change) << what;
+}
+
+TEST_F(TwoPowders, ImagesAreDisjointAndTogetherThatOfOnePowderWhereverThePartsStand) {
+  const std::array<std::array<double, 2>, 3> places[] = {{{{20, 30}, {55, 40}, {30, 60}}},    // apart
+                                                         {{{30, 30}, {35, 33}, {40, 36}}},    // all over each other
+                                                         {{{30, 30}, {30, 30}, {30, 30}}}};   // inside of each other
+  int variant = 0;
+  for (const auto& place : places) {
+    std::vector<PartRequest> parts = {part("parameter_quality_nut.stl", 1, "steel"), part("dental_crown.stl", 2, "bronze"),
+                                      part("rabbit_9_overlapping_shells.obj", 1, "steel")};
+    for (std::size_t p = 0; p < parts.size(); ++p) parts[p].at_mm = place[p];
+    const auto changed = [&](Job made) {
+      made.mirror = variant == 1 ? Mirror::kX : Mirror::kNone;
+      if (variant == 2) made.dose.bleed_um = {120, 80}, made.dose.shell_mm = 0.8, made.dose.core = 0.6;
+      made.engine = variant == 0 ? Engine::kBoth : Engine::kRays;
+      return made;
+    };
+    const Job both = changed(job(parts, fmt::format("both{}", variant)));
+    for (PartRequest& one : parts) one.material.clear();
+    const Job plain = changed(job(parts, fmt::format("plain{}", variant)));
+    const std::vector<PartRequest> last_part = {parts[2]};
+    const Job last = changed(job(last_part, fmt::format("last{}", variant)));
+    const auto summary = run(both), one = run(plain), alone = run(last);
+    ASSERT_TRUE(summary.ok()) << summary.error().message;
+    ASSERT_TRUE(one.ok() && alone.ok());
+    ASSERT_EQ(summary->layers_total, one->layers_total);
+    EXPECT_EQ(summary->set_pixels, one->set_pixels);
+    ASSERT_EQ(summary->materials.size(), 2u);
+    EXPECT_EQ(summary->materials[0].second + summary->materials[1].second, summary->set_pixels);
+    EXPECT_GT(summary->materials[1].second, 0u);
+    for (std::uint32_t layer = 0; layer < summary->layers_total; ++layer) {
+      Runs whole;
+      const Runs steel = image(both, layer, "steel"), bronze = image(both, layer, "bronze");
+      ASSERT_TRUE(add_image(Runs(steel), whole));
+      ASSERT_TRUE(add_image(Runs(bronze), whole)) << "a pixel of two materials in layer " << layer;
+      expect_same(whole, image(plain, layer), fmt::format("variant {} layer {}", variant, layer));
+      // The last part counts wherever it is: no pixel of it is of the other material.
+      if (variant < 2 && layer < alone->layers_total) {
+        Runs others = image(last, layer);
+        EXPECT_TRUE(add_image(Runs(bronze), others)) << layer;
+      }
+    }
+    expect_good(both);
+    ++variant;
+  }
+}
+
+TEST_F(TwoPowders, TheVatsThatFeedALayerFollowTheRuleOfTheProfileAndAreChecked) {
+  // The nut is low: layers of both materials below, of the second one above.
+  const std::vector<PartRequest> parts = {part("parameter_quality_nut.stl", 0.8, "steel"), part("dental_crown.stl", 3, "bronze")};
+  for (const std::string rule : {"first", "second", "majority", "both"}) {
+    Job made = job(parts, rule, profile("materials = [\"bronze\", \"steel\"]\nvat_rule = \"" + rule + "\""));
+    const auto summary = run(made);
+    ASSERT_TRUE(summary.ok()) << summary.error().message;
+    expect_good(made);
+    std::uint32_t mixed = 0, single = 0;
+    for (std::uint32_t layer = 0; layer < summary->layers_total; ++layer) {
+      const std::uint64_t bronze = set_pixels(image(made, layer, "bronze")), steel = set_pixels(image(made, layer, "steel"));
+      const std::string program = text(fmt::format("{}/program/{:06}.gcode", made.output, layer));
+      const bool first = program.find("\nG1 A") != std::string::npos, second = program.find("\nG1 B") != std::string::npos;
+      bool first_wanted = steel == 0, second_wanted = bronze == 0 && steel > 0;
+      if (bronze > 0 && steel > 0) {
+        first_wanted = rule == "first" || rule == "both" || (rule == "majority" && bronze >= steel);
+        second_wanted = rule == "second" || rule == "both" || (rule == "majority" && bronze < steel);
+      }
+      ++(bronze > 0 && steel > 0 ? mixed : single);
+      EXPECT_EQ(first, first_wanted) << rule << " " << layer;
+      EXPECT_EQ(second, second_wanted) << rule << " " << layer;
+    }
+    EXPECT_GT(mixed, 0u);
+    EXPECT_GT(single, 0u);
+  }
+  Job made = job(parts, "refused", profile("vat_rule = \"refuse\""));
+  const auto refused = run(made);
+  ASSERT_FALSE(refused.ok());
+  EXPECT_EQ(refused.error().fault, Fault::kUsage);
+  EXPECT_NE(refused.error().message.find("layer 0 (z 0.750 mm): holds steel, bronze, which powder.vat_rule of nuferbj refuses"),
+            std::string::npos) << refused.error().message;
+}
+
+TEST_F(TwoPowders, EveryDialectSaysWhichVatFeeds) {
+  for (const std::string machine : {"nuferbj", "nuferbj-31", "nuferbj-360dpi", "xaar128-raw", "production-1200", "jet1000",
+                                    "brundlefab", "reprap-inkjet"}) {
+    std::vector<PartRequest> parts = {part("parameter_quality_nut.stl", 0.5, "steel"), part("dental_crown.stl", 2, "bronze")};
+    Job made = job(parts, machine);
+    // Shipped machines of one vat, with a second one.
+    std::ifstream shipped(fs::path(LAMINA_TEST_DIR).parent_path() / ("stages/write/machines/" + machine + ".toml"));
+    std::string profile{std::istreambuf_iterator<char>(shipped), std::istreambuf_iterator<char>()};
+    if (profile.find("vats = 2") == std::string::npos) {
+      if (profile.find("[powder]") == std::string::npos) profile += "\n[powder]\n";
+      profile += "vats = 2\n";
+    }
+    made.machine.profile = (directory_ / (machine + ".toml")).string();
+    std::ofstream(made.machine.profile) << profile;
+    made.layer_mm = 4;
+    const auto summary = run(made);
+    ASSERT_TRUE(summary.ok()) << machine << ": " << summary.error().message;
+    expect_good(made);
+  }
+}
+
+TEST_F(TwoPowders, APartCanChangeItsPowderWithTheHeight) {
+  PartRequest nut = part("dental_crown.stl", 3, "steel");
+  nut.material_by_height = "6:12 bronze; 9:10.5 steel";
+  Job made = job({nut}, "graded");
+  const auto summary = run(made);
+  ASSERT_TRUE(summary.ok()) << summary.error().message;
+  expect_good(made);
+  nut.material_by_height.clear();
+  nut.material.clear();
+  Job plain = job({nut}, "plain");
+  ASSERT_TRUE(run(plain).ok());
+  for (std::uint32_t layer = 0; layer < summary->layers_total; ++layer) {
+    const double z = layer * 1.5 + 0.75;
+    const bool bronze = z >= 6 && z < 12 && !(z >= 9 && z < 10.5);
+    expect_same(image(made, layer, bronze ? "bronze" : "steel"), image(plain, layer), fmt::format("layer {}", layer));
+    EXPECT_EQ(set_pixels(image(made, layer, bronze ? "steel" : "bronze")), 0u);
+  }
+}
+
+TEST_F(TwoPowders, ShardsMergedResumedAndDamagedLayersBehaveAsThoseOfOnePowder) {
+  const Job whole = job({part("parameter_quality_nut.stl", 1, "steel"), part("dental_crown.stl", 2, "bronze")}, "whole");
+  ASSERT_TRUE(run(whole).ok());
+  Job shard = whole;
+  shard.output = (directory_ / "shards").string();
+  for (std::uint32_t i = 0; i < 2; ++i) {
+    shard.shard = {{i, 2}};
+    ASSERT_TRUE(run(shard).ok());
+  }
+  ASSERT_TRUE(merge({shard.output}, shard.output).ok());
+  const auto before = tree(whole.output);
+  EXPECT_EQ(tree(shard.output), before);
+  // Images whose materials are exchanged are whole files, and wrong ones.
+  const fs::path layers = fs::path(whole.output) / "layers";
+  fs::rename(layers / "000001-steel.tif", layers / "x");
+  fs::rename(layers / "000001-bronze.tif", layers / "000001-steel.tif");
+  fs::rename(layers / "x", layers / "000001-bronze.tif");
+  auto report = verify(whole.output, {});
+  ASSERT_TRUE(report.ok());
+  EXPECT_EQ(report->fault_count, 1u);
+  EXPECT_NE(report->faults[0].find("layers/000001-steel.tif"), std::string::npos) << report->faults[0];
+  fs::remove(layers / "000002-bronze.tif");
+  std::ofstream(layers / "000003-brass.tif") << "no material of the job";
+  report = verify(whole.output, {});
+  ASSERT_TRUE(report.ok());
+  EXPECT_EQ(report->fault_count, 3u);
+  fs::remove(layers / "000003-brass.tif");
+  Job resumed = whole;
+  resumed.resume = true;
+  const auto summary = run(resumed);
+  ASSERT_TRUE(summary.ok());
+  EXPECT_EQ(summary->layers_planned, 2u);
+  EXPECT_EQ(tree(whole.output), before);
+}
+
+TEST_F(TwoPowders, OnePowderOfTheJobIsAnOrdinaryJobFedByItsVat) {
+  const Job plain = job({part("parameter_quality_nut.stl", 1, "")}, "plain");
+  const Job second = job({part("parameter_quality_nut.stl", 1, "steel")}, "second", profile("materials = [\"bronze\", \"steel\"]"));
+  ASSERT_TRUE(run(plain).ok());
+  ASSERT_TRUE(run(second).ok());
+  expect_good(second);
+  const auto one = tree(plain.output), other = tree(second.output);
+  EXPECT_EQ(one.at("layers/000001.tif"), other.at("layers/000001.tif"));
+  EXPECT_NE(one.at("program/000001.gcode").find("\nG1 A"), std::string::npos);
+  EXPECT_NE(other.at("program/000001.gcode").find("\nG1 B"), std::string::npos);
+  EXPECT_EQ(one.at("program/machine.toml").find("materials"), std::string::npos);
+}
+
+TEST_F(TwoPowders, WhatTheVatsDoNotHoldIsRefusedInOneLine) {
+  const std::string named = profile("materials = [\"bronze\", \"steel\"]");
+  const auto refused = [&](const std::vector<std::string>& materials, const std::string& machine, const std::string& what) {
+    std::vector<PartRequest> parts;
+    for (const std::string& material : materials) parts.push_back(part("parameter_quality_nut.stl", 0.3, material));
+    const auto summary = run(job(parts, "refused", machine));
+    ASSERT_FALSE(summary.ok()) << what;
+    EXPECT_EQ(summary.error().fault, Fault::kUsage);
+    EXPECT_NE(summary.error().message.find(what), std::string::npos) << summary.error().message;
+    EXPECT_EQ(summary.error().message.find('\n'), std::string::npos);
+  };
+  refused({"bronze", "stel"}, named, "no vat of nuferbj holds it: 'stel' is none of bronze, steel; did you mean 'steel'?");
+  refused({"a", "b", "c"}, "nuferbj", "the parts are of 3 materials (a, b, c), nuferbj has 2 vats");
+  refused({"a", "b"}, "hp45", "the parts are of 2 materials (a, b), hp45 has one vat");
+  refused({"a", ""}, "nuferbj", "has none; name that of every part, or of none");
+  refused({"a"}, profile("materials = [\"bronze\"]"), "powder.materials: 1 names for 2 vats");
+  std::string name;
+  EXPECT_NE(read_material("a/b", name).find("is no name of a material"), std::string::npos);
+  std::vector<MaterialRange> ranges;
+  EXPECT_NE(read_material_ranges("4:2 bronze", ranges).find("ends where it begins"), std::string::npos);
+  EXPECT_NE(read_material_ranges("2 bronze", ranges).find("is no range"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace lamina::pipeline
