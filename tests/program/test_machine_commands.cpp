@@ -1,0 +1,114 @@
+// lamina machines and lamina preview --swath, as a user types them; the orientation target as a machine prints it.
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+
+#include "stages/write/read_image.h"
+
+namespace lamina::pipeline {
+namespace {
+
+namespace fs = std::filesystem;
+
+class MachineCommands : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    std::string name = (fs::temp_directory_path() / "lamina_machines_XXXXXX").string();
+    ASSERT_NE(::mkdtemp(name.data()), nullptr);
+    directory_ = name;
+  }
+  void TearDown() override { fs::remove_all(directory_); }
+
+  static std::string text(const fs::path& path) {
+    std::ifstream file(path, std::ios::binary);
+    return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
+  }
+  /// What a command prints, errors too; its exit code.
+  std::string lamina(const std::string& words, int expected = 0) const {
+    const std::string out = (directory_ / "printed").string();
+    const int status = std::system((std::string(LAMINA_PROGRAM) + " " + words + " > " + out + " 2>&1").c_str());
+    EXPECT_EQ(WEXITSTATUS(status), expected) << words << "\n" << text(out);
+    return text(out);
+  }
+  std::string at(const std::string& name) const { return (directory_ / name).string(); }
+  fs::path directory_;
+};
+
+void expect_words(const std::string& text, std::initializer_list<const char*> words) {
+  for (const char* const word : words) EXPECT_NE(text.find(word), std::string::npos) << word << " is not in\n" << text;
+}
+
+TEST_F(MachineCommands, CheckTellsWhatFollowsFromAProfile) {
+  // 137.1 um at 45 degrees: lines of 96.944 um, 262 dpi; 4250 Hz over them 412 mm/s; 98 mm are 1011 pixels, 8 swaths of 128.
+  expect_words(lamina("machines --check nuferbj"),
+               {"262.006 dpi", "1.000000 pixels a nozzle", "128 lines, 12.409 mm wide", "1011 x 1011 pixels", "128397 bytes as bits",
+                "8 swaths", "at most 412.0 mm/s", "s a full layer"});
+  // Equation (1): tan 31 = 0.600861 and 76 steps; cos 31 of the pitch between lines.
+  expect_words(lamina("machines --check nuferbj-31"), {"59.0000 degrees", "0.600861 pixels a nozzle", "76 steps", "117.5176"});
+  expect_words(lamina("machines --check nuferbj-360dpi"), {"30.97", "360.000 dpi", "1.66"});
+  expect_words(lamina("machines"), {"nuferbj", "nuferbj-31", "nuferbj-360dpi", "hp45", "jet1000", "production-1200"});
+  EXPECT_EQ(lamina("machines --check nuferbk", 2).find('\n'), lamina("machines --check nuferbk", 2).size() - 1);
+}
+
+TEST_F(MachineCommands, TheOrientationTargetIsAnFThatReadsRightOnEveryMounting) {
+  lamina("machines --target " + at("f.stl"));
+  for (const std::string machine : {"nuferbj", "nuferbj-31", "brundlefab", "xaar128-raw"}) {
+    const std::string out = at(machine);
+    lamina("jet " + at("f.stl") + " --machine " + machine + " --layer 1 -o " + out);
+    lamina("verify " + out);  // what is printed is the image
+    const auto image = write::read_image(out + "/layers/000000.tif");
+    ASSERT_TRUE(image.ok());
+    const RunsView runs = image->runs;
+    const double width = 25.4 / image->dpi_x, depth = 25.4 / image->dpi_y;
+    std::uint32_t left = UINT32_MAX, back = UINT32_MAX;
+    for (std::uint32_t r = 0; r < runs.rows(); ++r) {
+      if (runs.row(r).empty()) continue;
+      left = std::min(left, runs.row(r).front());
+      back = std::min(back, r);
+    }
+    // mm to the right of the stem's left side, and from the far end to the front: row 0 is the back of the bed.
+    const auto set = [&](double x, double y) {
+      const auto line = runs.row(back + static_cast<std::uint32_t>((30 - y) / depth));
+      const auto column = static_cast<std::uint32_t>(left + x / width);
+      return (std::upper_bound(line.begin(), line.end(), column) - line.begin()) % 2 == 1;
+    };
+    for (const double y : {2.0, 10.0, 15.0, 20.0, 27.0}) EXPECT_TRUE(set(3, y)) << machine << " stem at " << y;
+    EXPECT_TRUE(set(17, 27)) << machine << ": the far arm is the long one";
+    EXPECT_TRUE(set(12, 15)) << machine;
+    EXPECT_FALSE(set(17, 15)) << machine << ": the near arm is short";
+    EXPECT_FALSE(set(12, 3)) << machine << ": no arm at the foot";
+    EXPECT_FALSE(set(12, 21)) << machine;
+    // The step on top is at the foot: the third layer holds nothing else.
+    const auto top = write::read_image(out + "/layers/000002.tif");
+    ASSERT_TRUE(top.ok());
+    for (std::uint32_t r = 0; r < runs.rows(); ++r) {
+      const bool foot = r > back + static_cast<std::uint32_t>(23.5 / depth);
+      EXPECT_TRUE(foot || top->runs.view().row(r).empty()) << machine << " row " << r;
+    }
+    EXPECT_GT(set_pixels(top->runs), 0u);
+  }
+}
+
+TEST_F(MachineCommands, PreviewShowsALayerAtAStepOfASwath) {
+  const std::string part = std::string(LAMINA_TEST_DIR) + "/corpus/parameter_quality_nut.stl";
+  lamina("jet " + part + " " + part + " --material steel,bronze --machine nuferbj --layer 4 -o " + at("out"));
+  const auto picture = [&](const std::string& options, int expected = 0) {
+    fs::remove(at("p.png"));
+    const std::string said = lamina("preview " + at("out") + " -o " + at("p.png") + " --layer 1 --width 600 " + options, expected);
+    return expected == 0 ? text(at("p.png")) : said;
+  };
+  const std::string early = picture("--swath 4 --step 480"), late = picture("--swath 4 --step 640"), middle = picture("--swath middle");
+  for (const std::string& one : {early, late, middle}) EXPECT_EQ(one.substr(0, 8), "\x89PNG\r\n\x1a\n");
+  EXPECT_NE(early, late);
+  expect_words(picture("--swath 0", 2), {"--swath 0: fires nothing in layer 1; those that do are"});
+}
+
+}  // namespace
+}  // namespace lamina::pipeline
