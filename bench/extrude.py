@@ -1,60 +1,155 @@
 #!/usr/bin/env python3
-"""Toolpaths of one part beside Debian's PrusaSlicer, Slic3r and CuraEngine: processor seconds and peak memory.
+"""bench/extrude.py: toolpaths of 3DBenchy against Debian's CuraEngine, PrusaSlicer and Slic3r. scripts/bench extrude
 
-    bench/extrude.py PROGRAM PART.stl [FDMPRINTER.def.json] [--out DIR]
+    scripts/bench extrude [--runs N] [--models DIR] [--cache DIR] [--programs DIR]
 
-0.1 mm layers, two walls, 30 % raster, no solid layers, no supports, no skirt. Processor seconds (user and system, of the
-best of three runs; of one run of the two slow peers) do not depend on what else the machine does as wall time does.
-CuraEngine runs if its definitions (Debian's package cura) are named.
+0.1 mm layers, two walls, 30 % raster, no solid layers, no supports, no skirt; mesh on disk to G-code on disk, in turn. The slow
+peers run once. Before a figure is kept the answers are compared: the number of layers, and the filament of the whole file, which
+has to be within a fifth of CuraEngine's. Writes bench/results/extrude.json and bench/extrude.md.
 """
+import argparse
+import json
 import os
+import re
+import shutil
 import subprocess
 import sys
+import time
 
-COMMON = ["--layer-height", "0.1", "--first-layer-height", "0.1", "--perimeters", "2", "--fill-density", "30%", "--fill-pattern",
+ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
+sys.path.insert(0, os.path.join(ROOT, "bench"))
+import heights  # noqa: E402
+import make_parts  # noqa: E402
+import report  # noqa: E402
+import slice as slice_bench  # noqa: E402
+
+TIMES = 10  # as fast as the fastest peer we mean to be
+SLIC3R = ["--layer-height", "0.1", "--first-layer-height", "0.1", "--perimeters", "2", "--fill-density", "30%", "--fill-pattern",
           "rectilinear", "--top-solid-layers", "0", "--bottom-solid-layers", "0", "--skirts", "0", "--nozzle-diameter", "0.4"]
 CURA = {"layer_height": 0.1, "layer_height_0": 0.1, "infill_line_distance": 1.5, "infill_sparse_density": 30, "infill_pattern": "lines",
         "top_layers": 0, "bottom_layers": 0, "wall_line_count": 2, "adhesion_type": "none", "machine_width": 220, "machine_depth": 220,
         "machine_height": 250, "line_width": 0.45, "center_object": "true", "roofing_layer_count": 0, "support_enable": "false",
-        "machine_start_gcode": "", "machine_end_gcode": ""}
+        "machine_start_gcode": "", "machine_end_gcode": "", "material_diameter": 1.75}
+NAMES = {"cura": "CuraEngine 4.13", "prusa": "PrusaSlicer 2.5", "slic3r": "Slic3r 1.3"}
 
 
-def measured(command, runs):
-    best = None
-    for _ in range(runs):
-        process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-        _, status, usage = os.wait4(process.pid, 0)
-        if status != 0:
-            return None
-        seconds = usage.ru_utime + usage.ru_stime
-        best = min(best or (seconds, 0), (seconds, usage.ru_maxrss / 1024))
-    return best
-
-
-def main():
-    words = [a for a in sys.argv[1:] if a != "--out"]
-    out = words.pop() if "--out" in sys.argv else "/dev/shm"
-    program, part = words[:2]
-    cura = ["CuraEngine", "slice", "-j", words[2] if len(words) > 2 else ""]
+def commands(lamina, part, work, definitions):
+    """Each program's command and the file that it writes."""
+    out = {name: os.path.join(work, name + ".gcode") for name in ("lamina", "cura", "prusa", "slic3r")}
+    cura = ["CuraEngine", "slice", "-j", definitions]
     for scope in ([], ["-e0"]):
         cura += scope
         for name, value in CURA.items():
             cura += ["-s", f"{name}={value}"]
-    jobs = {"lamina": ([program, "extrude", part, "--machine", "marlin", "--layer", "0.1", "--walls", "2", "--bead", "0.45", "--fill",
-                        "raster", "--bead-gap", "1.05", "--tolerance", "5", "--quiet", "-o"], 3),
-            "CuraEngine": (cura + ["-l", part, "-o"], 3),
-            "PrusaSlicer": (["prusa-slicer", "-g", part, *COMMON, "-o"], 1), "Slic3r": (["slic3r", part, *COMMON, "-o"], 1)}
-    print("| program | processor s | peak MiB | moves | file MB |\n|---|---|---|---|---|")
-    for name, (command, runs) in jobs.items():
-        path = os.path.join(out, f"bench_{name}.gcode")
-        result = measured(command + [path], runs)
-        if result is None or not os.path.exists(path):
-            print(f"| {name} | failed | | | |", flush=True)
-            continue
-        with open(path, encoding="utf-8", errors="replace") as file:
-            moves = sum(1 for line in file if line.startswith(("G1 ", "G0 ")))
-        print(f"| {name} | {result[0]:.2f} | {result[1]:.0f} | {moves} | {os.path.getsize(path) / 1e6:.1f} |", flush=True)
+    own = [lamina, "extrude", part, "--machine", "marlin", "--layer", "0.1", "--walls", "2", "--bead", "0.45", "--fill", "raster",
+           "--bead-gap", "1.05", "--tolerance", "5", "--json", "--quiet", "-o", out["lamina"]]
+    return {"lamina": own, "cura": cura + ["-l", part, "-o", out["cura"]], "prusa": ["prusa-slicer", "-g", part, *SLIC3R, "-o", out["prusa"]],
+            "slic3r": ["slic3r", "--no-gui", part, *SLIC3R, "-o", out["slic3r"]]}, out
+
+
+def answer(path):
+    """Heights at which beads are laid, filament in mm, and moves of a G-code file, by its text alone."""
+    levels, moves, filament, e, z, relative = set(), 0, 0.0, 0.0, 0.0, False
+    with open(path, encoding="utf-8", errors="replace") as file:
+        for line in file:
+            if line.startswith("M83"):
+                relative = True
+            elif line.startswith("M82"):
+                relative = False
+            elif line.startswith("G92"):
+                found = re.search(r"E(-?[\d.]+)", line)
+                e = float(found.group(1)) if found else e
+            if not line.startswith(("G1 ", "G0 ")):
+                continue
+            moves += 1
+            words = {word[0]: word[1:] for word in line.split(";")[0].split()[1:]}
+            z = float(words.get("Z", z))
+            if "E" not in words:
+                continue
+            fed = float(words["E"]) if relative else float(words["E"]) - e
+            e = float(words["E"])
+            if "X" in words or "Y" in words:
+                filament += fed
+                levels.add(round(z, 3))
+    return {"layers": len(levels), "filament_mm": filament, "moves": moves, "bytes": os.path.getsize(path)}
+
+
+def run_all(options, lamina, part, work, definitions):
+    calls, out = commands(lamina, part, work, definitions)
+    runs = {name: [] for name in calls}
+    for turn in range(options.runs):
+        for name, command in calls.items():
+            if turn > 0 and name in ("prusa", "slic3r"):
+                continue
+            slice_bench.say(f"bench: {name}, turn {turn + 1}")
+            for _ in range(3 if name == "lamina" else 1):
+                runs[name].append(slice_bench.measured(command, os.path.join(work, name + ".log")))
+    result = {}
+    for name in calls:
+        result[name] = slice_bench.median_of(runs[name]) | answer(out[name])
+    with open(os.path.join(work, "lamina.log"), encoding="utf-8") as file:
+        summary = json.loads(file.read().splitlines()[-1])
+    result["lamina"]["points"] = summary["stored_points"]
+    for name in NAMES:
+        if abs(result[name]["layers"] - result["lamina"]["layers"]) > 1:
+            sys.exit(f"bench: {name} laid {result[name]['layers']} layers, lamina {result['lamina']['layers']}")
+    share = result["lamina"]["filament_mm"] / result["cura"]["filament_mm"]
+    if abs(share - 1) > 0.2:
+        sys.exit(f"bench: lamina's filament is {share:.2f} of CuraEngine's: not the same job")
+    return result
+
+
+def page(result):
+    programs, own = result["programs"], result["programs"]["lamina"]
+    machine = result["machine"]
+    ratio = {name: programs[name]["wall"] / own["wall"] for name in NAMES}
+    lines = ["# Toolpaths of 3DBenchy beside other slicers", "",
+             f"`scripts/bench extrude` on {result['date']} at {result['commit']}: {machine['processor']}, {machine['cores']} cores, "
+             f"{machine['memory_gib']} GiB, {machine['system']}.", "",
+             "225,154 triangles, 0.1 mm layers, two walls, 30 % raster, no solid layers, no supports, no skirt; mesh on disk to G-code on "
+             "disk. Medians; the slow peers run once.", "",
+             "| program | wall s | processor s | peak MiB | layers | moves | filament m | file MB |", "|---|---|---|---|---|---|---|---|"]
+    for name, title in [("lamina", "lamina"), *NAMES.items()]:
+        p = programs[name]
+        lines.append(f"| {title} | {p['wall']:.2f} | {p['processor']:.2f} | {p['peak_mib']:.0f} | {p['layers']} | {p['moves']} | "
+                     f"{p['filament_mm'] / 1000:.2f} | {p['bytes'] / 1e6:.1f} |")
+    least = min(programs[name]["peak_mib"] for name in NAMES)
+    lines += ["", "Times as fast, by wall time: " + ", ".join(f"{NAMES[name]} {value:.1f}" for name, value in ratio.items()) +
+              f". By processor seconds: " + ", ".join(f"{NAMES[n]} {programs[n]['processor'] / own['processor']:.1f}" for n in NAMES) +
+              f". Asked: {TIMES} times the fastest: {'met' if min(ratio.values()) >= TIMES else 'not met'}.",
+              f"Peak memory {own['peak_mib']:.0f} MiB, the least of the others {least:.0f} MiB. {own['points'] / own['wall'] / 1e6:.2f} million toolpath "
+              f"points a second.", ""]
+    with open(os.path.join(ROOT, "bench/extrude.md"), "w", encoding="utf-8") as file:
+        file.write("\n".join(lines))
+    print("\n".join(lines))
+
+
+def main(arguments):
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--runs", type=int, default=3, help="turns: CuraEngine once, ours three times")
+    parser.add_argument("--models", default=os.environ.get("LAMINA_MODELS", os.path.join(ROOT, "../shared/models")))
+    parser.add_argument("--cache", default=os.path.join(ROOT, "build/bench"))
+    parser.add_argument("--programs", help="folder of lamina; else build/release, built first")
+    options = parser.parse_args(arguments)
+    programs = options.programs or os.path.join(ROOT, "build/release")
+    if not options.programs:
+        subprocess.run([os.path.join(ROOT, "scripts/packages"), "--bench"], check=True)
+        subprocess.run(["cmake", "--preset", "release"], cwd=ROOT, check=True, stdout=subprocess.DEVNULL)
+        subprocess.run(["cmake", "--build", "--preset", "release", "--target", "lamina"], cwd=ROOT, check=True)
+    cache = os.path.abspath(options.cache)
+    work = os.path.join(cache, "work-extrude")
+    os.makedirs(work, exist_ok=True)
+    part = os.path.join(cache, "3DBenchy.stl")
+    if not os.path.exists(part):
+        axes = make_parts.read_3mf(os.path.join(options.models, "3DBenchy.3mf"))
+        make_parts.write_stl(part, make_parts.placed(axes, (1, 1, 1)))
+    definitions = heights.cura_definitions(cache)
+    result = {"date": time.strftime("%Y-%m-%d"), "commit": report.commit(ROOT), "machine": report.machine(cache),
+              "programs": run_all(options, os.path.join(programs, "lamina"), part, work, definitions)}
+    shutil.rmtree(work)
+    report.save(ROOT, "extrude", result)
+    page(result)
 
 
 if __name__ == "__main__":
-    main()
+    main(sys.argv[1:])

@@ -1,0 +1,80 @@
+// Mitered offsets against those of Clipper's own offset, which makes and resolves a loop at every corner.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+#include <polyclipping/clipper.hpp>
+#include <random>
+
+#include "stages/data/clipping.h"
+
+namespace lamina {
+namespace {
+
+namespace clip = ClipperLib;
+
+/// A closed curve around a centre whose radius and step change at random: corners of all kinds, edges from 1 nm up.
+void add_curve(std::mt19937& random, Point2 centre, double radius, double noise, int corners, bool hole, Contours& out) {
+  const auto between = [&](double low, double high) { return std::uniform_real_distribution<double>(low, high)(random); };
+  std::vector<Point2> points;
+  double angle = 0;
+  while (angle < 2 * std::numbers::pi - 1e-3) {
+    const double r = radius * between(1 - noise, 1 + noise);
+    points.push_back({static_cast<Nm>(centre.x + std::lround(r * std::cos(angle))), static_cast<Nm>(centre.y + std::lround(r * std::sin(angle)))});
+    angle += 2 * std::numbers::pi / corners * std::pow(10, between(-2, 0.5));
+  }
+  if (hole) std::ranges::reverse(points);
+  for (const Point2 p : points) {
+    if (out.point.size() == out.offset.back() || p != out.point.back()) out.point.push_back(p);
+  }
+  out.close();
+}
+
+clip::Paths paths_of(const ContoursView& contours) {
+  clip::Paths paths(contours.size());
+  for (std::uint32_t c = 0; c < contours.size(); ++c) {
+    for (const Point2 p : contours[c]) paths[c].emplace_back(p.x, p.y);
+  }
+  return paths;
+}
+
+TEST(OffsetContours, RegionIsThatOfClippersOffsetToWithinItsRounding) {
+  std::mt19937 random(11);
+  std::size_t pieces = 0;
+  for (int round = 0; round < 300; ++round) {
+    Contours raw;
+    const double noise = round % 3 == 0 ? 0.0 : round % 3 == 1 ? 0.02 : 0.3;
+    add_curve(random, {5'000'000, -3'000'000}, 4'000'000, noise, 10 + round % 200, false, raw);
+    if (round % 2 == 0) add_curve(random, {5'300'000, -3'200'000}, 1'500'000, noise, 8 + round % 90, true, raw);
+    const auto contours = unite_contours(raw, FillRule::kPositive);
+    ASSERT_TRUE(contours.ok());
+    for (const std::int64_t distance : {-150'000, -450'000, -1'300'000, 200'000, 900'000}) {
+      const auto own = offset_contours(*contours, distance);
+      ASSERT_TRUE(own.ok());
+      pieces += own->size();
+      clip::ClipperOffset offsetter(2.0, 1000);
+      offsetter.AddPaths(paths_of(*contours), clip::jtMiter, clip::etClosedPolygon);
+      clip::Paths expected, rest;
+      offsetter.Execute(expected, static_cast<double>(distance));
+      if (own->size() == 0 && expected.empty()) continue;
+      clip::Clipper difference;
+      difference.AddPaths(paths_of(*own), clip::ptSubject, true);
+      difference.AddPaths(expected, clip::ptClip, true);
+      ASSERT_TRUE(difference.Execute(clip::ctXor, rest, clip::pftNonZero, clip::pftNonZero));
+      double area = 0, length = 1000;
+      for (const clip::Path& path : rest) area += clip::Area(path);
+      for (const clip::Path& path : expected) {
+        for (std::size_t i = 0; i < path.size(); ++i) {
+          const auto &a = path[i], &b = path[(i + 1) % path.size()];
+          length += std::hypot(static_cast<double>(b.X - a.X), static_cast<double>(b.Y - a.Y));
+        }
+      }
+      // Two nanometres along the edge, and ten where edges of a few nanometres meet at odd angles.
+      EXPECT_LT(area, 2 * length + 1e7) << "round " << round << " distance " << distance;
+    }
+  }
+  EXPECT_GT(pieces, 1500);
+}
+
+}  // namespace
+}  // namespace lamina
