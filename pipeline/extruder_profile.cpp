@@ -1,9 +1,6 @@
 #include "pipeline/extruder_profile.h"
 
 #include <fmt/format.h>
-#define TOML_EXCEPTIONS 0
-#define TOML_ENABLE_WINDOWS_COMPAT 0
-#include <toml++/toml.h>
 
 #include <cmath>
 #include <fstream>
@@ -12,6 +9,7 @@
 
 #include "pipeline/json_text.h"
 #include "pipeline/key_text.h"
+#include "pipeline/toml_values.h"
 
 namespace lamina::pipeline {
 namespace {
@@ -229,28 +227,6 @@ const ExtruderKey kKeys[] = {
 #undef TEXT_KEY
 #undef PAIR_KEY
 
-/// A TOML value as the text that keys read; false if it is none. Lists of lists are rows, lists of texts are lines.
-bool text_of(const toml::node& node, std::string& text, int depth = 0) {
-  if (const auto* string = node.as_string()) {
-    text += string->get();
-  } else if (const auto* whole = node.as_integer()) {
-    text += fmt::format("{}", whole->get());
-  } else if (const auto* number = node.as_floating_point()) {
-    text += number_text(number->get());
-  } else if (const auto* boolean = node.as_boolean()) {
-    text += write_switch(boolean->get());
-  } else if (const auto* list = node.as_array(); list != nullptr && depth < 2) {
-    for (std::size_t i = 0; i < list->size(); ++i) {
-      const toml::node& entry = (*list)[i];
-      if (i > 0) text += entry.is_array() ? ';' : entry.is_string() ? '\n' : ',';
-      if (!text_of(entry, text, depth + 1)) return false;
-    }
-  } else {
-    return false;
-  }
-  return true;
-}
-
 std::vector<Text> sections() {
   std::vector<Text> names;
   for (const ExtruderKey& key : kKeys) {
@@ -283,31 +259,24 @@ const ExtruderKey* find_key(Text section, Text name, std::string& wrong) {
 }  // namespace
 
 Result<ExtruderProfile> read_extruder(std::string_view text, const std::string& where) {
-  const toml::parse_result parsed = toml::parse(text, where);
-  if (!parsed) {
-    const toml::source_position at = parsed.error().source().begin;
-    return Error{Fault::kUsage, fmt::format("{}:{}:{}: {}", where, at.line, at.column, one_line(parsed.error().description()))};
-  }
-  ExtruderProfile profile;
-  const auto wrong_at = [&](const toml::node& at, const std::string& what) {
-    return Error{Fault::kUsage, fmt::format("{}:{}: {}", where, at.source().begin.line, what)};
-  };
-  if (parsed.table().contains("head") || parsed.table().contains("powder")) {
+  const auto values = read_toml_values(text, where, TomlLists::kRows);
+  if (!values) return values.error();
+  for (const TomlValue& value : *values) {
+    if (value.section != "head" && value.section != "powder") continue;
     return Error{Fault::kUsage, fmt::format("{}: is the profile of a powder printer; lamina jet takes it", where)};
   }
-  for (const auto& [section, node] : parsed.table()) {
-    const toml::table* table = node.as_table();
-    if (table == nullptr) return wrong_at(node, fmt::format("{}: is not a section", section.str()));
-    for (const auto& [name, value] : *table) {
-      std::string what;
-      const ExtruderKey* key = find_key(section.str(), name.str(), what);
-      if (key == nullptr) return wrong_at(value, what);
-      std::string written;
-      if (!text_of(value, written)) return wrong_at(value, fmt::format("{}.{}: is not a value or a list of them", section.str(), name.str()));
-      if (what = key->read(written, profile); !what.empty()) {
-        return wrong_at(value, fmt::format("{}.{}: {}", section.str(), name.str(), what));
-      }
+  ExtruderProfile profile;
+  for (const TomlValue& value : *values) {
+    const auto wrong = [&](const std::string& what) { return Error{Fault::kUsage, fmt::format("{}:{}: {}", where, value.line, what)}; };
+    if (value.kind == TomlValue::Kind::kNoSection) return wrong(fmt::format("{}: is not a section", value.section));
+    if (value.kind == TomlValue::Kind::kSection) continue;
+    std::string what;
+    const ExtruderKey* key = find_key(value.section, value.name, what);
+    if (key == nullptr) return wrong(what);
+    if (value.kind == TomlValue::Kind::kNoValue) {
+      return wrong(fmt::format("{}.{}: is not a value or a list of them", value.section, value.name));
     }
+    if (what = key->read(value.text, profile); !what.empty()) return wrong(fmt::format("{}.{}: {}", value.section, value.name, what));
   }
   if (profile.machine.name.empty()) {
     return Error{Fault::kUsage, fmt::format("{}: machine.name is missing; name the machine", where)};

@@ -1,9 +1,6 @@
 #include "pipeline/machine_profile.h"
 
 #include <fmt/format.h>
-#define TOML_EXCEPTIONS 0
-#define TOML_ENABLE_WINDOWS_COMPAT 0
-#include <toml++/toml.h>
 
 #include <algorithm>
 #include <cmath>
@@ -14,6 +11,7 @@
 #include "pipeline/key_text.h"
 #include "pipeline/job_keys.h"
 #include "pipeline/materials.h"
+#include "pipeline/toml_values.h"
 #include "stages/write/program/dialect.h"
 
 namespace lamina::pipeline {
@@ -212,27 +210,6 @@ const MachineKey kKeys[] = {
 #undef PAIR_KEY
 #undef AXIS_KEY
 
-// A TOML value as the text that keys read; false if it is no value or list of values.
-bool text_of(const toml::node& node, std::string& text, bool inside_list = false) {
-  if (const auto* string = node.as_string()) {
-    text += string->get();
-  } else if (const auto* whole = node.as_integer()) {
-    text += fmt::format("{}", whole->get());
-  } else if (const auto* number = node.as_floating_point()) {
-    text += number_text(number->get());
-  } else if (const auto* boolean = node.as_boolean()) {
-    text += write_switch(boolean->get());
-  } else if (const auto* list = node.as_array(); list != nullptr && !inside_list) {
-    for (std::size_t i = 0; i < list->size(); ++i) {
-      if (i > 0) text += ',';
-      if (!text_of((*list)[i], text, true)) return false;
-    }
-  } else {
-    return false;
-  }
-  return true;
-}
-
 std::string names_of(std::span<const MachineKey> keys, Text section) {
   std::string names;
   for (const MachineKey& key : keys) {
@@ -244,37 +221,26 @@ std::string names_of(std::span<const MachineKey> keys, Text section) {
 }  // namespace
 
 Result<Machine> read_machine(std::string_view text, const std::string& where) {
-  const toml::parse_result parsed = toml::parse(text, where);
-  if (!parsed) {
-    const toml::source_position at = parsed.error().source().begin;
-    return Error{Fault::kUsage,
-                 fmt::format("{}:{}:{}: {}", where, at.line, at.column, one_line(parsed.error().description()))};
-  }
+  const auto values = read_toml_values(text, where, TomlLists::kFlat);
+  if (!values) return values.error();
   Machine machine;
-  for (const auto& [section, node] : parsed.table()) {
-    const auto wrong = [&](const toml::node& at, const std::string& what) {
-      return Error{Fault::kUsage, fmt::format("{}:{}: {}", where, at.source().begin.line, what)};
-    };
-    const toml::table* table = node.as_table();
-    if (table == nullptr || names_of(kKeys, section.str()).empty()) {
-      return wrong(node, fmt::format("{}: no such section; there are machine, bed, head, mounting, motion, powder", section.str()));
+  for (const auto& [kind, section, name, written, line] : *values) {
+    const std::uint32_t at = line;
+    const auto wrong = [&](const std::string& what) { return Error{Fault::kUsage, fmt::format("{}:{}: {}", where, at, what)}; };
+    if (kind == TomlValue::Kind::kNoSection || names_of(kKeys, section).empty()) {
+      return wrong(fmt::format("{}: no such section; there are machine, bed, head, mounting, motion, powder", section));
     }
-    for (const auto& [name, value] : *table) {
-      const MachineKey* found = nullptr;
-      for (const MachineKey& key : kKeys) {
-        if (key.section == section.str() && key.name == name.str()) found = &key;
-      }
-      if (found == nullptr) {
-        return wrong(value, fmt::format("{}.{}: no such key; [{}] has {}", section.str(), name.str(), section.str(),
-                                        names_of(kKeys, section.str())));
-      }
-      std::string written;
-      if (!text_of(value, written)) {
-        return wrong(value, fmt::format("{}.{}: is not a single value or a list of them", section.str(), name.str()));
-      }
-      if (const std::string what = found->read(written, machine); !what.empty()) {
-        return wrong(value, fmt::format("{}.{}: {}", section.str(), name.str(), what));
-      }
+    if (kind == TomlValue::Kind::kSection) continue;
+    const MachineKey* found = nullptr;
+    for (const MachineKey& key : kKeys) {
+      if (key.section == section && key.name == name) found = &key;
+    }
+    if (found == nullptr) {
+      return wrong(fmt::format("{}.{}: no such key; [{}] has {}", section, name, section, names_of(kKeys, section)));
+    }
+    if (kind == TomlValue::Kind::kNoValue) return wrong(fmt::format("{}.{}: is not a single value or a list of them", section, name));
+    if (const std::string what = found->read(written, machine); !what.empty()) {
+      return wrong(fmt::format("{}.{}: {}", section, name, what));
     }
   }
   if (machine.name.empty()) {
