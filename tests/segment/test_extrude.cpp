@@ -189,8 +189,19 @@ TEST_F(ExtrudeProgram, WrongInputIsOneLineAndTheCodeOfUsage) {
   EXPECT_NE(message("--fill segmented --thin -2").find("segment.thin_mm: -2 mm"), std::string::npos);
   EXPECT_NE(message("--fill segmented --thin-speed 0").find("segment.thin_speed_percent: 0 %"), std::string::npos);
   EXPECT_NE(message("--fill segmented --spacing-sc 0.2").find("segment.spacing_sc_mm: 0.2 mm is below"), std::string::npos);
+  EXPECT_NE(message("--fill segmented --thin 15").find("segment.thin_mm: 15 mm is longer than any line in the parts"), std::string::npos);
   EXPECT_NE(message("--machine anet-a9").find("no extrusion printer 'anet-a9'; did you mean 'anet-a8'?"), std::string::npos);
   EXPECT_NE(message("--fill segmentd").find("segmented"), std::string::npos);
+}
+
+TEST_F(ExtrudeProgram, SmlHasItsReportBesideItWithTheLayersThatItLays) {
+  const Outcome result = run("extrude " + block(20, 20, 2.54, 0) + " --machine fdm-2000 --layer 0.254 --bead 0.508 --fill raster --quiet --json -o " + file("a.sml"));
+  ASSERT_EQ(result.code, 0) << result.err;
+  const std::string report = text_of(file("a.rp3"));
+  EXPECT_EQ(result.json()["layers"], 10);
+  EXPECT_NE(report.find("\n10\t0.508\t0.508\t0.254\t"), std::string::npos) << report;
+  EXPECT_EQ(report.find("\n11\t"), std::string::npos);
+  EXPECT_TRUE(report.ends_with("----- fim do arquivo -----\n"));
 }
 
 TEST_F(ExtrudeProgram, PermeabilityOfTable18IsThatOfTable25WithAWarningAboutItsDensity) {
