@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <filesystem>
 #include <nlohmann/json.hpp>
@@ -233,6 +234,29 @@ TEST_F(Samples, TheTomographyCylinderHasThreeFillingsByHeightAndDenseLayersAt90D
     for (std::size_t i = 1; i < places.size(); ++i) EXPECT_NEAR(places[i] - places[i - 1], spacings[n / 10], 0.002) << n;
     EXPECT_EQ(feeds, (std::set<double>{thick_feeds[n / 10], 900, 1800})) << n;
   }
+}
+
+TEST_F(Samples, PoresOfLayersTurnedBy90DegreesLieOverEachOther) {
+  const auto outcome = test::run_lamina({"extrude", block(21, 17, 0.6f), "--machine", "anet-a8", "--layer", "0.3", "--fill", "segmented", "--angle", "90",
+                                         "--angle-step", "90", "--spacing-sc", "0.5", "--thin", "1.5", "--thick", "1.5", "--set", "segment.across=true",
+                                         "--quiet", "-o", folder / "a.gcode"}, folder.path());
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  const auto gcode = test::read_gcode(test::read_text(folder / "a.gcode"));
+  ASSERT_EQ(gcode.error, "");
+  // Middles of thin stretches lie on the segmented lines of the other layer, which are 1 mm apart.
+  const auto thin_of = [&](std::size_t layer) {
+    std::vector<std::array<double, 2>> middles;
+    for (const GcodeBead& b : gcode.layers[layer].beads) {
+      if (b.feed == 1800 && b.type == "Internal infill") middles.push_back({(b.x0 + b.x1) / 2, (b.y0 + b.y1) / 2});
+    }
+    return middles;
+  };
+  const auto first = thin_of(0), second = thin_of(1);
+  ASSERT_GT(first.size(), 30);
+  ASSERT_GT(second.size(), 30);
+  const auto off_line = [](double a, double b) { return std::abs(std::remainder(a - b, 1.0)); };
+  for (const auto& pore : first) EXPECT_LT(off_line(pore[1], second[0][1]), 0.003);
+  for (const auto& pore : second) EXPECT_LT(off_line(pore[0], first[0][0]), 0.003);
 }
 
 }  // namespace
