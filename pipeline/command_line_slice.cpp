@@ -7,6 +7,7 @@
 #include "pipeline/job_toml.h"
 #include "pipeline/progress.h"
 #include "pipeline/slice.h"
+#include "pipeline/slice_directory.h"
 
 namespace lamina::pipeline {
 namespace {

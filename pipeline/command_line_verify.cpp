@@ -14,9 +14,10 @@ CommandSpec verify_spec() {
   spec.summary =
       "Compares a job's directory with its manifest: every layer's file is there, of the recorded size and hash, and\n"
       "decodes to the recorded pixels; the print program of each layer, carried out by a virtual machine, prints exactly\n"
-      "that image; nothing else lies in layers/ and program/. Exit code 5 if anything differs.";
+      "that image; nothing else lies in layers/ and program/. Contours: every layer's bytes have the recorded hash.\n"
+      "Exit code 5 if anything differs.";
   spec.operand = "DIR";
-  spec.operand_meaning = "directory that lamina jet wrote; several are verified one after another";
+  spec.operand_meaning = "directory that lamina jet or lamina slice wrote; several are verified one after another";
   spec.options = {{"--quick", "", "sizes and hashes only, images are not decoded", "", ""},
                   {"--json", "", "print one JSON object for each directory on stdout", "", ""},
                   {"--quiet", "", "say nothing but faults", "", ""}};

@@ -175,9 +175,16 @@ Result<ExtrudeSummary> run_extrude(const Job& asked, const ProgressCallback& pro
   const auto timed = [](std::atomic<std::int64_t>& sum, Clock::time_point from) {
     sum += std::chrono::duration_cast<std::chrono::nanoseconds>(Clock::now() - from).count();
   };
-  const auto prepare = [&](std::uint32_t i, Work& work) -> Status {
+  const auto prepare = [&](std::uint32_t i, Work& work) -> Result<std::uint64_t> {
+    const auto from = Clock::now();
+    if (Status status = plan->contours(first + i, work.layer); !status) return status.error();
+    timed(plan_ns, from);
+    // A stretch takes some 40 bytes of text; how many a segmented line comes to is known when it is written.
+    return plan->fill_bytes_bound(first + i, work.layer, 48);
+  };
+  const auto expand = [&](std::uint32_t i, Work& work) -> Result<std::uint64_t> {
     auto from = Clock::now();
-    if (Status status = plan->layer(first + i, work.layer); !status) return status;
+    if (Status status = plan->fill(first + i, work.layer); !status) return status.error();
     timed(plan_ns, from);
     from = Clock::now();
     work.text.clear();
@@ -187,7 +194,7 @@ Result<ExtrudeSummary> run_extrude(const Job& asked, const ProgressCallback& pro
     if (!sums) return sums.error();
     work.sums = *sums;
     timed(write_ns, from);
-    return {};
+    return work.layer.bytes() + bytes_held(work.text);
   };
   LayerExtrusion sums;
   std::uint32_t done = 0, open_layers = 0, undivided_layers = 0;
@@ -213,9 +220,8 @@ Result<ExtrudeSummary> run_extrude(const Job& asked, const ProgressCallback& pro
   FlowReport flow;
   const auto start = Clock::now();
   const auto bytes_of = [&](std::uint32_t i) { return plan->bytes_bound(first + i); };
-  if (Status status = flow_layers<Work>(summary.layers, bytes_of, prepare, record, limits, cancel, flow); !status) {
-    return status.error();
-  }
+  const LayerSteps<Work> steps{bytes_of, prepare, expand, record};
+  if (Status status = flow_layers(summary.layers, steps, limits, cancel, flow); !status) return status.error();
   text.clear();
   format->tail(sums.totals, summary.layers, text);
   if (Status status = file->append(text); !status) return status.error();

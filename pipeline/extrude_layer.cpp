@@ -156,14 +156,15 @@ Result<LayerExtrusion> extrude_layer(const SlicePlan& plan, const SegmentPlan& s
   sums.porosity.solid_mm3 = square_mm(doubled_area(work.contours.contours)) * mm(layer.thickness);
   sums.points = work.paths.point.size();
   const ToolpathsView all = work.paths;
-  for (std::uint32_t b = 0; b + 1 < work.path_body.size(); ++b) {
-    const Box& part = plan.box_of_body(b);
+  for (std::uint32_t a = 0; a + 1 < work.path_area.size(); ++a) {
+    const SlicePlan::Area& area = plan.areas()[a];
+    const Box& part = area.box;
     const SegmentRange& range = segments.at(std::int64_t{layer.plane()} - part.lo.z);
-    const auto cut = layer_cut(range, plan.filling(b, layer), layer, part);
+    const auto cut = layer_cut(range, plan.filling(area, layer), layer, part);
     if (!cut) return cut.error();
     MoveTable table(range.plan, *cut, machine, layer);
     ToolpathsView paths = all;
-    paths.offset = all.offset.subspan(work.path_body[b], work.path_body[b + 1] - work.path_body[b] + 1);
+    paths.offset = all.offset.subspan(work.path_area[a], work.path_area[a + 1] - work.path_area[a] + 1);
     Point2 at{INT32_MIN, INT32_MIN};
     std::int32_t line = kNoLine;
     Thickness before = Thickness::kReference;

@@ -16,7 +16,7 @@ struct LayerExtrusion {
   void add(const LayerExtrusion& other);
 };
 
-/// How the lines of a body in a layer are cut.
+/// How the lines of a part in a layer are cut.
 /// errors  of infill::first_place
 Result<segment::LayerCut> layer_cut(const SegmentRange& range, const infill::FillParameters& filling, const Layer& layer,
                                     const Box& part);

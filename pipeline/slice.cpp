@@ -16,7 +16,8 @@
 #include "pipeline/json_text.h"
 #include "pipeline/layer_flow.h"
 #include "pipeline/manifest.h"
-#include "pipeline/output_directory.h"
+#include "pipeline/number_text.h"
+#include "pipeline/slice_directory.h"
 #include "stages/write/atomic_file.h"
 #include "stages/write/growing_file.h"
 #include "stages/write/slice3mf/slice3mf.h"
@@ -28,10 +29,6 @@ namespace {
 namespace fs = std::filesystem;
 using Clock = std::chrono::steady_clock;
 double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
-
-std::string_view extension_of(std::string_view format) {
-  return format == "svg" ? ".svg" : format == "3mf" ? ".3mf" : ".cli";
-}
 
 double length_mm(const ToolpathsView& paths) {
   double sum = 0;
@@ -71,8 +68,9 @@ class SliceManifest {
     first_ = false;
     return file_.append(text);
   }
-  Status finish() {
-    if (auto status = file_.append(std::string_view("\n  ]\n}\n")); !status) return status;
+  /// rest  keys after the layers: ",\n  \"key\": value"
+  Status finish(const std::string& rest) {
+    if (auto status = file_.append("\n  ]" + rest + "\n}\n"); !status) return status;
     return file_.finish();
   }
 
@@ -88,76 +86,7 @@ std::uint64_t peak_resident_bytes() {
   return static_cast<std::uint64_t>(usage.ru_maxrss) * 1024;
 }
 
-std::string file_of(const Job& job) {
-  const std::string stem = fs::path(job.parts.front().path).stem().string();
-  // part.stl.gz is part
-  const std::string name = fs::path(stem).extension() == ".stl" || fs::path(stem).extension() == ".obj"
-                               ? fs::path(stem).stem().string()
-                               : stem;
-  return fmt::format("{}{}", name.empty() ? "part" : name, extension_of(job.slice.format));
-}
-
-/// Files of single layers, 000042.svg, that an earlier job left in any format.
-std::vector<fs::path> layer_files(const Job& job) {
-  std::vector<fs::path> files;
-  std::error_code error;
-  for (fs::directory_iterator entry(fs::path(job.output) / "layers", error), end; !error && entry != end;
-       entry.increment(error)) {
-    const std::string name = entry->path().filename().string();
-    const std::size_t digits = std::min(name.find_first_not_of("0123456789"), name.size());
-    if (digits >= 6 && (entry->path().extension() == ".svg" || entry->path().extension() == ".cli")) {
-      files.push_back(entry->path());
-    }
-  }
-  return files;
-}
-
-Status prepare_directory(const Job& job) {
-  if (Status status = check_slice_output(job); !status) return status;
-  std::error_code error;
-  fs::create_directories(job.slice.file_a_layer ? fs::path(job.output) / "layers" : fs::path(job.output), error);
-  if (error) return Error{Fault::kOutput, fmt::format("{}: {}", job.output, error.message())};
-  if (!job.overwrite) return {};
-  for (const char* name : {"manifest.json", "job.toml"}) fs::remove(fs::path(job.output) / name, error);
-  for (const fs::path& file : layer_files(job)) fs::remove(file, error);
-  return {};
-}
-
 }  // namespace
-
-Status check_slice_output(const Job& job) {
-  std::error_code error;
-  const fs::file_status status = fs::status(job.output, error);
-  if (!fs::exists(status)) return {};
-  if (!fs::is_directory(status)) {
-    return Error{Fault::kOutput, fmt::format("{}: is a file, not a directory; name another one with -o", job.output)};
-  }
-  if (!job.overwrite && !find_manifests(job.output).empty()) {
-    return Error{Fault::kUsage, fmt::format("{}: holds a job; replace it with --overwrite, or name another directory", job.output)};
-  }
-  for (const std::string& name : {std::string("job.toml"), file_of(job)}) {
-    const fs::path file = fs::path(job.output) / name;
-    for (const PartRequest& part : job.parts) {
-      if (fs::equivalent(file, part.path, error)) {
-        return Error{Fault::kUsage, fmt::format("{}: is a part of the job and would be replaced; name another directory", file.string())};
-      }
-    }
-    // A job file that a person wrote is not ours to replace: ours stands beside a manifest.
-    if (name == "job.toml" && fs::exists(file, error) && (!job.overwrite || find_manifests(job.output).empty())) {
-      return Error{Fault::kUsage, fmt::format("{}: is there already, and the job would be kept in it; name another directory", file.string())};
-    }
-  }
-  if (job.overwrite) return {};
-  if (!layer_files(job).empty()) {
-    return Error{Fault::kUsage, fmt::format("{}/layers: holds layers; replace them with --overwrite, or name another directory", job.output)};
-  }
-  const fs::path file = fs::path(job.output) / file_of(job);
-  if (!job.slice.file_a_layer && fs::exists(file, error)) {
-    return Error{Fault::kUsage, fmt::format("{}: is there already; replace it with --overwrite, or name another directory",
-                                            file.string())};
-  }
-  return {};
-}
 
 Result<SliceSummary> run_slice(const Job& job, const ProgressCallback& progress, const std::atomic<bool>& cancel) {
   std::optional<tbb::global_control> threads;
@@ -183,7 +112,7 @@ Result<SliceSummary> run_slice(const Job& job, const ProgressCallback& progress,
   }
   summary.output = job.slice.format == "null" ? job.output
                    : job.slice.file_a_layer   ? job.output + "/layers"
-                                              : job.output + "/" + file_of(job);
+                                              : job.output + "/" + slice_file_name(job);
   if (job.dry_run) {
     for (std::uint32_t i = first; i < last; ++i) {
       summary.peak_layer_bytes = std::max(summary.peak_layer_bytes, plan->bytes_bound(i));
@@ -191,7 +120,8 @@ Result<SliceSummary> run_slice(const Job& job, const ProgressCallback& progress,
     summary.peak_resident_bytes = peak_resident_bytes();
     return summary;
   }
-  if (Status status = prepare_directory(job); !status) return status.error();
+  if (Status status = prepare_slice_directory(job); !status) return status.error();
+  const WaitingLayers waiting(job);
 
   // --- what is written
   write::SliceHead head;
@@ -213,20 +143,20 @@ Result<SliceSummary> run_slice(const Job& job, const ProgressCallback& progress,
                                         : write::make_cli_encoder(job.slice.format == "cli-binary", format_options);
   }
   std::optional<write::GrowingFile> file;
+  Buffer<char> ends;  // what stands before the first layer and behind the last
   if (encoder && !job.slice.file_a_layer) {
     auto opened = write::GrowingFile::open(summary.output);
     if (!opened) return opened.error();
     file.emplace(std::move(*opened));
-    Buffer<char> text;
-    encoder->head(head, text);
-    if (Status status = file->append(text); !status) return status.error();
+    encoder->head(head, ends);
+    if (Status status = file->append(ends); !status) return status.error();
   }
   auto manifest = SliceManifest::open(
       job.output + "/manifest.json",
       fmt::format("{{\n  \"lamina\": {},\n  \"kind\": \"slice\",\n  \"job\": {},\n  \"format\": {},\n  \"file\": {},\n"
                   "  \"layer_count\": {},\n  \"first_layer\": {},\n  \"last_layer\": {},\n  \"layers\": [",
                   json_string(version()), json_string(job_of_manifest(job)), json_string(job.slice.format),
-                  job.slice.file_a_layer || job.slice.format == "null" ? "null" : json_string(file_of(job)), summary.layers_total, first, last));
+                  job.slice.file_a_layer || job.slice.format == "null" ? "null" : json_string(slice_file_name(job)), summary.layers_total, first, last));
   if (!manifest) return manifest.error();
 
   // --- layers
@@ -237,12 +167,21 @@ Result<SliceSummary> run_slice(const Job& job, const ProgressCallback& progress,
   const auto view_of = [&](std::uint32_t index, const SlicePlan::Work& work) {
     return write::SliceLayer{plan->layers()[index], work.contours.contours, work.contours.body, work.paths, work.path_body};
   };
-  const auto prepare = [&](std::uint32_t i, SlicePlan::Work& work) -> Status {
+  const auto prepare = [&](std::uint32_t i, SlicePlan::Work& work) -> Result<std::uint64_t> {
+    // A stretch between two points is an element of its own at worst.
+    constexpr std::uint64_t kTextOfPoint = 150;
+    const auto from = Clock::now();
+    if (Status status = plan->contours(first + i, work); !status) return status.error();
+    auto more = plan->fill_bytes_bound(first + i, work, encoder ? kTextOfPoint : 0);
+    timed(slice_ns, from);
+    return more;
+  };
+  const auto expand = [&](std::uint32_t i, SlicePlan::Work& work) -> Result<std::uint64_t> {
     auto from = Clock::now();
-    if (Status status = plan->layer(first + i, work); !status) return status;
+    if (Status status = plan->fill(first + i, work); !status) return status.error();
     timed(slice_ns, from);
     work.text.clear();
-    if (!encoder) return {};
+    if (!encoder) return work.bytes();
     from = Clock::now();
     const write::SliceLayer layer = view_of(first + i, work);
     if (job.slice.file_a_layer) {
@@ -251,11 +190,13 @@ Result<SliceSummary> run_slice(const Job& job, const ProgressCallback& progress,
       encoder->layer(head, layer, work.text);
     }
     timed(encode_ns, from);
-    if (!job.slice.file_a_layer) return {};
-    const std::string name = fmt::format("{}/layers/{:06}{}", job.output, first + i, extension_of(job.slice.format));
-    return write::write_file(name, std::as_bytes(std::span(work.text)));
+    if (job.slice.file_a_layer) {
+      const std::string name = waiting_layers(job) / fmt::format("{:06}{}", first + i, slice_extension(job));
+      if (Status status = write::write_file(name, std::as_bytes(std::span(work.text))); !status) return status.error();
+    }
+    return work.bytes();
   };
-  std::string first_open;
+  std::string first_open, first_emptied;
   std::uint32_t done = 0;
   const auto record = [&](std::uint32_t i, SlicePlan::Work& work) -> Status {
     const Layer& layer = plan->layers()[first + i];
@@ -277,6 +218,10 @@ Result<SliceSummary> run_slice(const Job& job, const ProgressCallback& progress,
     summary.paths += work.paths.size();
     summary.united_layers += work.report.united > 0 ? 1 : 0;
     summary.gaps_closed += work.report.gaps.closed;
+    summary.largest_gap_mm = std::max(summary.largest_gap_mm, mm(work.report.gaps.largest_closed));
+    if (job.slice.offset_mm < 0 && work.report.cuts > 0 && work.contours.contours.size() == 0 && work.report.gaps.open == 0) {
+      if (++summary.emptied_layers == 1) first_emptied = fmt::format("layer {} at z {:.3f} mm", layer.index, mm(layer.plane()));
+    }
     if (work.report.gaps.open > 0 && summary.open_chains == 0) {
       first_open = fmt::format("in layer {} at z {:.3f} mm", layer.index, mm(layer.plane()));
     }
@@ -297,20 +242,28 @@ Result<SliceSummary> run_slice(const Job& job, const ProgressCallback& progress,
   FlowReport flow;
   const auto start = Clock::now();
   const auto bytes_of = [&](std::uint32_t i) { return plan->bytes_bound(first + i); };
-  if (Status status = flow_layers<SlicePlan::Work>(last - first, bytes_of, prepare, record, limits, cancel, flow); !status) {
-    return status.error();
-  }
+  const LayerSteps<SlicePlan::Work> steps{bytes_of, prepare, expand, record};
+  if (Status status = flow_layers(last - first, steps, limits, cancel, flow); !status) return status.error();
+  std::string rest;
   if (file) {
     Buffer<char> text;
     encoder->tail(head, text);
     if (Status status = file->append(text); !status) return status.error();
     summary.bytes_written = file->size();
-    if (Status status = file->finish(); !status) return status.error();
+    ends.insert(ends.end(), text.begin(), text.end());
+    rest = fmt::format(",\n  \"file_bytes\": {},\n  \"ends_xxh3_128\": \"{}\"", file->size(), hex(hash_bytes(std::as_bytes(std::span(ends)))));
   }
   if (package) {
     if (Status status = package->finish(summary.output); !status) return status.error();
     std::error_code ignored;
     summary.bytes_written = fs::file_size(summary.output, ignored);
+    const auto digest = digest_file(summary.output);
+    if (!digest) return Error{Fault::kOutput, digest.error().message};
+    rest = fmt::format(",\n  \"file_bytes\": {},\n  \"file_xxh3_128\": \"{}\"", digest->bytes, hex(digest->hash));
+  }
+  if (Status status = replace_earlier_slices(job); !status) return status.error();
+  if (file) {
+    if (Status status = file->finish(); !status) return status.error();
   }
   // For lamina preview, which plans a layer again: the job without what leaves the bytes alone. Parts whose names a job
   // file cannot hold are sliced all the same.
@@ -321,7 +274,7 @@ Result<SliceSummary> run_slice(const Job& job, const ProgressCallback& progress,
   if (Status status = save_job(job.output + "/job.toml", kept); !status && status.error().fault == Fault::kOutput) {
     return status.error();
   }
-  if (Status status = manifest->finish(); !status) return status.error();
+  if (Status status = manifest->finish(rest); !status) return status.error();
   summary.layers = last - first;
   summary.layer_seconds = seconds_since(start);
   summary.slice_seconds = static_cast<double>(slice_ns) * 1e-9;
@@ -333,6 +286,11 @@ Result<SliceSummary> run_slice(const Job& job, const ProgressCallback& progress,
     summary.warnings.push_back(fmt::format(
         "{} chains of cuts stay open, first {}: they bound nothing and are left out; leave out --no-repair to close the "
         "parts, or give a longer --bridge", summary.open_chains, first_open));
+  }
+  if (summary.emptied_layers > 0) {
+    summary.warnings.push_back(fmt::format(
+        "--offset {} leaves nothing of {} of {} layers, first {}: they are thinner than twice that; give a smaller offset",
+        number_text(job.slice.offset_mm), summary.emptied_layers, summary.layers, first_emptied));
   }
   return summary;
 }

@@ -3,6 +3,8 @@
 
 #include <atomic>
 #include <cstdint>
+#include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -26,14 +28,34 @@ class SlicePlan {
   struct Work {
     slice::LayerScratch scratch;
     slice::LayerContours contours;
+    slice::LayerContours parts;       // of areas of bodies that several parts share, united part by part
+    std::vector<Contours> surface;    // of these areas: what no earlier part takes
+    std::vector<Contours> region;     // of each area: where centres of filling beads may lie
     Toolpaths paths;
-    Buffer<std::uint32_t> path_body;
+    Buffer<std::uint32_t> path_body;  // the paths of body b are [path_body[b], path_body[b + 1])
+    Buffer<std::uint32_t> path_area;  // the same of areas
     Buffer<std::uint32_t> rebased;
     slice::LayerReport report;
     Buffer<char> text;
+
+    std::uint64_t bytes() const;  // that its buffers hold on to
   };
   /// Contours, and filling if the job asks for one. Pure: the same for any thread and order.
   Status layer(std::uint32_t index, Work& work) const;
+  /// Its two halves: contours and regions, then what fills these. In between it is known what the filling may need.
+  Status contours(std::uint32_t index, Work& work) const;
+  Status fill(std::uint32_t index, Work& work) const;
+
+  /// What one [[part]] fills of a body, on its own: instances of the part that touch. Areas are in the order of bodies,
+  /// then of parts in the job; where parts share room it belongs to the first one.
+  struct Area {
+    std::uint32_t body, part;
+    Box box;                                  // of its instances, before any offset
+    std::uint32_t shared = UINT32_MAX;        // number among the areas of bodies with several parts
+  };
+  const std::vector<Area>& areas() const { return areas_; }
+  /// What fills an area in a layer.
+  const infill::FillParameters& filling(const Area& area, const Layer& layer) const;
 
   const std::vector<Layer>& layers() const { return layers_; }
   const Scene& scene() const { return *scene_; }
@@ -41,10 +63,10 @@ class SlicePlan {
   const std::vector<std::string>& names() const { return names_; }  // of bodies
   const Box& bounds() const { return bounds_; }                      // around all, as sliced
   bool fills() const { return fills_; }
-  const Box& box_of_body(std::uint32_t body) const { return box_of_body_[body]; }
-  /// What fills a body in a layer.
-  const infill::FillParameters& filling(std::uint32_t body, const Layer& layer) const;
+  /// Bytes that contours() may need at most, and text of them.
   std::uint64_t bytes_bound(std::uint32_t index) const;
+  /// Bytes that fill() and `bytes_a_point` of text may need beside those. errors  of infill::bound_fill
+  Result<std::uint64_t> fill_bytes_bound(std::uint32_t index, Work& work, std::uint64_t bytes_a_point) const;
 
   double load_seconds = 0, index_seconds = 0;
 
@@ -55,9 +77,14 @@ class SlicePlan {
   std::unique_ptr<slice::Slicer> slicer_;
   std::vector<std::string> names_;
   std::vector<FillPlan> plans_;              // by [[part]]
-  std::vector<std::uint32_t> part_of_body_;
-  std::vector<Box> box_of_body_;
+  std::vector<Area> areas_;
+  std::vector<std::uint32_t> body_area_;     // bodies + 1, into areas_
+  std::optional<slice::Slicer> part_slicer_;  // of the shared areas, if there are any to be filled
+  std::vector<std::uint32_t> make_areas(const Job& job, const std::vector<Box>& boxes, const std::vector<std::uint32_t>& body);
+  ContoursView contours_of(const Area& area, Work& work) const;
+  Error failed(const Area& area, const Error& error) const;
   Box bounds_;
+  Nm grow_ = 0;  // of an offset outwards
   bool fills_ = false;
 };
 
@@ -66,6 +93,8 @@ struct SliceSummary {
   std::uint32_t layers_total = 0, layers = 0;
   std::uint64_t triangles = 0, cuts = 0, contours = 0, points = 0, paths = 0, bytes_written = 0;
   std::uint64_t united_layers = 0, gaps_closed = 0, open_chains = 0;
+  double largest_gap_mm = 0;   // of those closed
+  std::uint64_t emptied_layers = 0;  // that were solid before the offset
   double volume_mm3 = 0;       // area x thickness
   double bead_mm = 0;          // length of all beads
   double load_seconds = 0, index_seconds = 0, layer_seconds = 0, slice_seconds = 0, encode_seconds = 0;
@@ -75,12 +104,10 @@ struct SliceSummary {
   std::vector<std::string> warnings;
 };
 
-/// Writes DIR/NAME.svg, .cli or .3mf, or DIR/layers/000000.svg and up, and DIR/manifest.json.
+/// Writes DIR/NAME.svg, .cli or .3mf, or DIR/layers/000000.svg and up, and DIR/manifest.json. All of it appears when the
+/// last layer is done: a job that fails leaves what was there before.
 /// errors  of SlicePlan::make; kOutput; kInterrupted: nothing is left behind
 Result<SliceSummary> run_slice(const Job& job, const ProgressCallback& progress, const std::atomic<bool>& cancel);
-
-/// Refuses a directory that holds another job, unless job.overwrite. errors  kUsage, kOutput
-Status check_slice_output(const Job& job);
 
 std::string slice_summary_text(const Job& job, const SliceSummary& summary);
 std::string slice_summary_json(const Job& job, const SliceSummary& summary);

@@ -3,15 +3,19 @@
 #include <algorithm>
 #include <chrono>
 #include <filesystem>
+#include <iterator>
+#include <map>
 #include <numeric>
 
 #include "pipeline/heights_plan.h"
 #include "pipeline/slice.h"
+#include "stages/data/clipping.h"
 #include "stages/infill/fill.h"
 
 namespace lamina::pipeline {
 namespace {
 
+namespace fs = std::filesystem;
 using Clock = std::chrono::steady_clock;
 double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
 
@@ -22,6 +26,13 @@ Box box_of(const Scene& scene, const Instance& instance) {
   const Point3& by = instance.offset;
   box.add(Point3{own.lo.x + by.x, own.lo.y + by.y, own.lo.z + by.z});
   box.add(Point3{own.hi.x + by.x, own.hi.y + by.y, own.hi.z + by.z});
+  return box;
+}
+
+/// To the sides.
+Box grown(Box box, Nm by) {
+  if (box.empty()) return box;
+  box.lo.x -= by, box.lo.y -= by, box.hi.x += by, box.hi.y += by;
   return box;
 }
 
@@ -101,68 +112,160 @@ Result<SlicePlan> SlicePlan::make(const Job& job, const ProgressCallback& progre
     boxes.push_back(box_of(*plan.scene_, instance));
     plan.bounds_.add(boxes.back());
   }
-  const std::vector<std::uint32_t> body = group_bodies(boxes);
-  for (std::size_t i = 0; i < body.size(); ++i) {
-    if (body[i] == plan.box_of_body_.size()) {
-      const std::uint32_t part = plan.scene_->part_of_instance[i];
-      plan.part_of_body_.push_back(part);
-      plan.names_.push_back(std::filesystem::path(job.parts[part].path).filename().string());
-      plan.box_of_body_.emplace_back();
-    }
-    plan.box_of_body_[body[i]].add(boxes[i]);
-  }
+  if (job.slice.offset_mm > 0) plan.grow_ = static_cast<Nm>(nm_of(job.slice.offset_mm));
+  std::vector<Box> reach;  // parts may meet only when they have grown
+  for (const Box& box : boxes) reach.push_back(grown(box, plan.grow_));
+  const std::vector<std::uint32_t> body = group_bodies(reach);
+  const std::vector<std::uint32_t> part_area = plan.make_areas(job, boxes, body);
   slice::SliceOptions options;
   options.fill_rule = job.fill_rule;
   options.tolerance = static_cast<Nm>(nm_of(job.slice.tolerance_um / 1000));
   options.gap = static_cast<Nm>(nm_of(job.slice.bridge_mm));
   options.offset = nm_of(job.slice.offset_mm);
-  if (options.offset > 0) {
-    const auto grow = static_cast<Nm>(options.offset);
-    plan.bounds_.lo.x -= grow, plan.bounds_.lo.y -= grow, plan.bounds_.hi.x += grow, plan.bounds_.hi.y += grow;
-  }
+  plan.bounds_ = grown(plan.bounds_, plan.grow_);
   auto slicer = slice::Slicer::build(plan.scene_->meshes, plan.scene_->instances, body, planes, options);
   if (!slicer) return slicer.error();
   plan.slicer_ = std::make_unique<slice::Slicer>(std::move(*slicer));
+  const bool shares = std::ranges::any_of(part_area, [](std::uint32_t area) { return area != slice::Slicer::kLeftOut; });
+  if (plan.fills_ && shares) plan.part_slicer_ = plan.slicer_->regrouped(part_area);
   plan.index_seconds = seconds_since(start);
   return plan;
 }
 
-const infill::FillParameters& SlicePlan::filling(std::uint32_t body, const Layer& layer) const {
-  return plans_[part_of_body_[body]].at(std::int64_t{layer.plane()} - box_of_body_[body].lo.z);
+std::vector<std::uint32_t> SlicePlan::make_areas(const Job& job, const std::vector<Box>& boxes,
+                                                 const std::vector<std::uint32_t>& body) {
+  // Bodies are numbered by their first instances, instances in the order of the parts: so are the areas of a body.
+  std::map<std::pair<std::uint32_t, std::uint32_t>, std::vector<std::uint32_t>> members;  // by body and part
+  for (std::uint32_t i = 0; i < body.size(); ++i) members[{body[i], scene_->part_of_instance[i]}].push_back(i);
+  std::vector<std::uint32_t> part_area(body.size(), slice::Slicer::kLeftOut);
+  std::uint32_t shared = 0;
+  for (auto it = members.begin(); it != members.end();) {
+    const std::uint32_t b = it->first.first;
+    auto end = it;
+    while (end != members.end() && end->first.first == b) ++end;
+    body_area_.push_back(static_cast<std::uint32_t>(areas_.size()));
+    names_.push_back(fs::path(job.parts[it->first.second].path).filename().string());
+    const bool shares = std::next(it) != end;
+    for (; it != end; ++it) {
+      Area area{b, it->first.second, {}};
+      if (shares) area.shared = shared++;
+      for (const std::uint32_t i : it->second) {
+        area.box.add(boxes[i]);
+        if (shares) part_area[i] = area.shared;
+      }
+      areas_.push_back(area);
+    }
+  }
+  body_area_.push_back(static_cast<std::uint32_t>(areas_.size()));
+  return part_area;
 }
 
-Status SlicePlan::layer(std::uint32_t index, Work& work) const {
+const infill::FillParameters& SlicePlan::filling(const Area& area, const Layer& layer) const {
+  return plans_[area.part].at(std::int64_t{layer.plane()} - area.box.lo.z);
+}
+
+ContoursView SlicePlan::contours_of(const Area& area, Work& work) const {
+  return area.shared == UINT32_MAX ? work.contours.of(area.body, work.rebased) : ContoursView(work.surface[area.shared]);
+}
+
+Status SlicePlan::contours(std::uint32_t index, Work& work) const {
   auto report = slicer_->layer(index, work.scratch, work.contours);
   if (!report) return report.error();
   work.report = *report;
   work.paths.clear();
   work.path_body.clear();
+  work.path_area.clear();
   if (!fills_) return {};
-  work.path_body.push_back(0);
-  const Layer& layer = layers_[index];
-  for (std::uint32_t b = 0; b < slicer_->bodies(); ++b) {
-    const Box& box = box_of_body_[b];
-    const infill::FillParameters& parameters = filling(b, layer);
-    const ContoursView contours = work.contours.of(b, work.rebased);
-    if (Status status = infill::append_fill(contours, {layer, box}, parameters, work.paths); !status) {
-      return Error{status.error().fault, fmt::format("{}: fill: {}", names_[b], status.error().message)};
+  if (part_slicer_) {
+    if (auto again = part_slicer_->layer(index, work.scratch, work.parts); !again) return again.error();
+    work.surface.resize(part_slicer_->bodies());
+    for (std::size_t a = 0; a < areas_.size(); ++a) {
+      const Area& area = areas_[a];
+      if (area.shared == UINT32_MAX) continue;
+      const ContoursView own = work.parts.of(area.shared, work.rebased);
+      Contours earlier;
+      for (std::size_t other = body_area_[area.body]; other < a; ++other) {
+        if (!touch(grown(areas_[other].box, grow_), grown(area.box, grow_))) continue;
+        const Contours& taken = work.surface[areas_[other].shared];
+        for (std::uint32_t c = 0; c < taken.size(); ++c) {
+          earlier.point.insert(earlier.point.end(), taken[c].begin(), taken[c].end());
+          earlier.close();
+        }
+      }
+      auto rest = subtract_contours(own, earlier);
+      if (!rest) return rest.error();
+      work.surface[area.shared] = std::move(*rest);
     }
-    work.path_body.push_back(work.paths.size());
+  }
+  work.region.resize(areas_.size());
+  for (std::size_t a = 0; a < areas_.size(); ++a) {
+    const Area& area = areas_[a];
+    auto region = infill::fill_region(contours_of(area, work), {layers_[index], area.box}, filling(area, layers_[index]));
+    if (!region) return failed(area, region.error());
+    work.region[a] = std::move(*region);
   }
   return {};
 }
 
-std::uint64_t SlicePlan::bytes_bound(std::uint32_t index) const {
-  // Text of a contour's point is at most 50 bytes, and it is kept beside the contours. A filling's size depends on its
-  // lines: it is estimated by the box and the bead.
-  const std::uint64_t contours = slicer_->layer_bytes_bound(index);
-  std::uint64_t filling = 0;
-  if (fills_) {
-    for (const Box& box : box_of_body_) {
-      filling += static_cast<std::uint64_t>((box.width() + box.depth()) / 100'000 + 1) * 64;
-    }
+Status SlicePlan::fill(std::uint32_t index, Work& work) const {
+  if (!fills_) return {};
+  const Layer& layer = layers_[index];
+  work.path_body.push_back(0);
+  work.path_area.push_back(0);
+  for (std::size_t a = 0; a < areas_.size(); ++a) {
+    const Area& area = areas_[a];
+    const Status status = infill::append_fill(contours_of(area, work), std::move(work.region[a]), {layer, area.box},
+                                              filling(area, layer), work.paths);
+    if (!status) return failed(area, status.error());
+    work.region[a] = Contours();
+    work.path_area.push_back(work.paths.size());
+    if (a + 1 == body_area_[area.body + 1]) work.path_body.push_back(work.paths.size());
   }
-  return 3 * contours + 4 * filling + (1 << 14);
+  return {};
+}
+
+Status SlicePlan::layer(std::uint32_t index, Work& work) const {
+  if (Status status = contours(index, work); !status) return status;
+  return fill(index, work);
+}
+
+Error SlicePlan::failed(const Area& area, const Error& error) const {
+  const std::string name = fs::path(scene_->parts[area.part].path).filename().string();
+  return {error.fault, fmt::format("{}: fill: {}", name, error.message)};
+}
+
+std::uint64_t SlicePlan::bytes_bound(std::uint32_t index) const {
+  // Text of a contour's point is at most 50 bytes, and it is kept beside the contours.
+  std::uint64_t contours = 3 * slicer_->layer_bytes_bound(index);
+  if (part_slicer_) contours += 3 * part_slicer_->layer_bytes_bound(index);
+  return (fills_ ? 2 : 1) * contours + (1 << 14);
+}
+
+Result<std::uint64_t> SlicePlan::fill_bytes_bound(std::uint32_t index, Work& work, std::uint64_t bytes_a_point) const {
+  if (!fills_) return std::uint64_t{0};
+  constexpr std::uint64_t kOfPoint = 17;
+  std::uint64_t points = 0, scratch = 0;
+  for (std::size_t a = 0; a < areas_.size(); ++a) {
+    const Area& area = areas_[a];
+    const auto bound = infill::bound_fill(contours_of(area, work), work.region[a], {layers_[index], area.box},
+                                          filling(area, layers_[index]));
+    if (!bound) return failed(area, bound.error());
+    points += bound->points;
+    scratch = std::max(scratch, bound->scratch_bytes);
+  }
+  // Buffers grow by half or double: twice what is in them.
+  return 2 * points * (kOfPoint + bytes_a_point) + scratch;
+}
+
+std::uint64_t SlicePlan::Work::bytes() const {
+  const auto of = [](const Contours& c) { return bytes_held(c.point) + bytes_held(c.offset); };
+  std::uint64_t total = of(contours.contours) + of(parts.contours) + of(scratch.closed) + of(scratch.open) + bytes_held(text);
+  for (const Contours& c : surface) total += of(c);
+  for (const Contours& c : region) total += of(c);
+  for (const Contours& c : scratch.of_source) total += of(c);
+  total += scratch.cuts.bytes() + scratch.chain.bytes() + scratch.contact.bytes() + bytes_held(scratch.facets);
+  return total + bytes_held(paths.point) + bytes_held(paths.kind) + bytes_held(paths.width) + bytes_held(paths.line) +
+         bytes_held(paths.offset);
 }
 
 }  // namespace lamina::pipeline

@@ -33,6 +33,10 @@ std::string slice_summary_text(const Job& job, const SliceSummary& s) {
     line("contours", fmt::format("{} with {} points, {:.3f} cm3; {} layers needed a union", readable_count(s.contours),
                                  readable_count(s.points), s.volume_mm3 / 1000, readable_count(s.united_layers)));
     if (s.paths > 0) line("filling", fmt::format("{} paths, {:.2f} m of bead", readable_count(s.paths), s.bead_mm / 1000));
+    if (s.gaps_closed > 0 || s.open_chains > 0) {
+      line("gaps", fmt::format("{} closed by straight stretches, the longest {:.6f} mm; {} chains left open",
+                               readable_count(s.gaps_closed), s.largest_gap_mm, readable_count(s.open_chains)));
+    }
     line("file", fmt::format("{} in {}", readable_bytes(s.bytes_written), s.output));
     line("time", fmt::format("{}: load {}, index {}, layers {} (threads: slice and fill {}, encode {})",
                              readable_seconds(s.load_seconds + s.index_seconds + s.layer_seconds),
@@ -53,11 +57,11 @@ std::string slice_summary_json(const Job& job, const SliceSummary& s) {
   return fmt::format(
       "{{\"command\":\"slice\",\"dry_run\":{},\"output\":{},\"format\":{},\"layers_total\":{},\"layers\":{},"
       "\"triangles\":{},\"cuts\":{},\"contours\":{},\"points\":{},\"paths\":{},\"bead_mm\":{},\"volume_mm3\":{},"
-      "\"united_layers\":{},\"gaps_closed\":{},\"open_chains\":{},\"bytes_written\":{},"
+      "\"united_layers\":{},\"gaps_closed\":{},\"largest_gap_mm\":{},\"open_chains\":{},\"emptied_layers\":{},\"bytes_written\":{},"
       "\"seconds\":{{\"load\":{},\"index\":{},\"layers\":{},\"slice_threads\":{},\"encode_threads\":{}}},"
       "\"index_bytes\":{},\"peak_layer_bytes\":{},\"peak_resident_bytes\":{},\"warnings\":[{}]}}\n",
       job.dry_run, json_string(s.output), json_string(job.slice.format), s.layers_total, s.layers, s.triangles, s.cuts,
-      s.contours, s.points, s.paths, s.bead_mm, s.volume_mm3, s.united_layers, s.gaps_closed, s.open_chains,
+      s.contours, s.points, s.paths, s.bead_mm, s.volume_mm3, s.united_layers, s.gaps_closed, s.largest_gap_mm, s.open_chains, s.emptied_layers,
       s.bytes_written, s.load_seconds, s.index_seconds, s.layer_seconds, s.slice_seconds, s.encode_seconds,
       s.index_bytes, s.peak_layer_bytes, s.peak_resident_bytes, warnings);
 }

@@ -18,6 +18,8 @@
 #include "pipeline/output_directory.h"
 #include "pipeline/print_program.h"
 #include "pipeline/replay.h"
+#include "pipeline/slice_picture.h"  // is_slice_directory
+#include "pipeline/verify_slice.h"
 #include "stages/write/read_image.h"
 
 namespace lamina::pipeline {
@@ -246,8 +248,9 @@ void check_strays(const std::string& directory, const std::vector<Manifest>& man
 Result<VerifyReport> verify(const std::string& directory, const VerifyOptions& options) {
   std::error_code error;
   if (!fs::is_directory(directory, error)) {
-    return Error{Fault::kUsage, fmt::format("{}: no such directory; name one that lamina jet wrote", directory)};
+    return Error{Fault::kUsage, fmt::format("{}: no such directory; name one that lamina jet or lamina slice wrote", directory)};
   }
+  if (is_slice_directory(directory)) return verify_slices(directory);
   VerifyReport report;
   report.directory = directory;
   const std::vector<ManifestFile> files = find_manifests(directory);

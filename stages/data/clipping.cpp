@@ -41,16 +41,18 @@ Moved to_clipper(const ContoursView& contours, Point2 by) {
 
 Nm within_reach(std::int64_t v) { return static_cast<Nm>(std::clamp<std::int64_t>(v, -kNmReach, kNmReach)); }
 
+void append_contour(const clip::Path& path, Point2 by, Contours& out) {
+  if (path.size() < 3) return;
+  for (const clip::IntPoint& p : path) out.point.push_back({within_reach(p.X + by.x), within_reach(p.Y + by.y)});
+  out.close();
+}
+
 /// Each outer contour, then its holes, then what lies in them.
 void append_tree(const clip::PolyNode& node, Point2 by, Contours& out) {
-  for (const clip::PolyNode* child : node.Childs) {
-    if (child->Contour.size() >= 3) {
-      for (const clip::IntPoint& p : child->Contour) {
-        out.point.push_back({within_reach(p.X + by.x), within_reach(p.Y + by.y)});
-      }
-      out.close();
-    }
-    append_tree(*child, by, out);
+  for (const clip::PolyNode* outer : node.Childs) {
+    append_contour(outer->Contour, by, out);
+    for (const clip::PolyNode* hole : outer->Childs) append_contour(hole->Contour, by, out);
+    for (const clip::PolyNode* hole : outer->Childs) append_tree(*hole, by, out);
   }
 }
 
@@ -136,6 +138,25 @@ Result<Contours> unite_contours(const ContoursView& contours, FillRule rule) {
     clip::PolyTree tree;
     if (!clipper.Execute(clip::ctUnion, tree, type, type)) return refusal("the union failed");
     append_tree(tree, moved.by, out);
+  } catch (const std::exception& exception) {
+    return refusal(exception.what());
+  }
+  return out;
+}
+
+Result<Contours> subtract_contours(const ContoursView& contours, const ContoursView& less) {
+  Contours out;
+  if (contours.size() == 0) return out;
+  try {
+    const Point2 by = middle_of(contours);
+    clip::Clipper clipper(clip::ioStrictlySimple);
+    clipper.AddPaths(to_clipper(contours, by).paths, clip::ptSubject, true);
+    clipper.AddPaths(to_clipper(less, by).paths, clip::ptClip, true);
+    clip::PolyTree tree;
+    if (!clipper.Execute(clip::ctDifference, tree, clip::pftNonZero, clip::pftNonZero)) {
+      return refusal("the difference failed");
+    }
+    append_tree(tree, by, out);
   } catch (const std::exception& exception) {
     return refusal(exception.what());
   }

@@ -16,11 +16,16 @@ enum class OffsetJoin : std::uint8_t {
   kRound   // an arc, off by at most 1 micrometre
 };
 
-/// The region that `contours`, of any orientation and overlap, mean by `rule`, as clean contours, outer ones before
-/// the holes in them.
+/// The region that `contours`, of any orientation and overlap, mean by `rule`, as clean contours, each outer one
+/// followed by its holes.
 /// errors  kInternal if Clipper refuses the contours
 /// cost    O((P + X) log P) for P points and X crossings
 Result<Contours> unite_contours(const ContoursView& contours, FillRule rule);
+
+/// The region of clean contours less that of others, which may overlap each other: where they share an edge nothing is
+/// left of it. In the order of unite_contours.
+/// errors  kInternal if Clipper refuses them
+Result<Contours> subtract_contours(const ContoursView& contours, const ContoursView& less);
 
 /// The region of clean contours grown by `distance` nm, shrunk where it is negative, as clean contours; pieces that
 /// shrink away are gone. Contours keep their distance to within 1 nm of rounding where they are straight.

@@ -55,6 +55,10 @@ Result<Expression> Expression::parse(const std::string& text) {
   return expression;
 }
 
+bool Expression::uses(const std::string& variable) const {
+  return state_->parser.GetUsedVar().contains(variable);  // it has been parsed once, so nothing is thrown
+}
+
 Result<double> Expression::operator()(const Variables& variables) {
   state_->variables = variables;
   double value = 0;

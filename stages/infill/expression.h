@@ -25,6 +25,8 @@ class Expression {
   Expression(Expression&&) noexcept;
   ~Expression();
 
+  /// Whether the formula looks at a variable.
+  bool uses(const std::string& variable) const;
   /// errors  kUsage: no finite number, and for which variables
   Result<double> operator()(const Variables& variables);
 

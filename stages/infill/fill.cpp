@@ -3,10 +3,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
+#include <utility>
 
 #include "stages/data/clipping.h"
 #include "stages/infill/expression.h"
+#include "stages/infill/layout.h"
 #include "stages/infill/raster.h"
 #include "stages/infill/waves.h"
 
@@ -22,84 +23,52 @@ void append_closed(const ContoursView& contours, PathKind kind, Nm width, Toolpa
   }
 }
 
-/// The part's box in the frame of a layer's lines.
-struct TurnedBox {
-  std::int64_t low_u, low_v, high_v;
-};
-TurnedBox turned(const Box& part, const Frame& frame) {
-  TurnedBox box{INT64_MAX, INT64_MAX, INT64_MIN};
-  for (const Nm x : {part.lo.x, part.hi.x}) {
-    for (const Nm y : {part.lo.y, part.hi.y}) {
-      const Point2 p = frame.to(Point2{x, y});
-      box.low_u = std::min<std::int64_t>(box.low_u, p.x);
-      box.low_v = std::min<std::int64_t>(box.low_v, p.y);
-      box.high_v = std::max<std::int64_t>(box.high_v, p.y);
-    }
-  }
-  return box;
-}
-
-Frame frame_of(const FillContext& context, const FillParameters& parameters) {
-  const Box& part = context.part;
-  return Frame(layer_angle(parameters, context.layer.index),
-               {static_cast<Nm>((std::int64_t{part.lo.x} + part.hi.x) / 2),
-                static_cast<Nm>((std::int64_t{part.lo.y} + part.hi.y) / 2)});
-}
-
-Extent extent_of(const Box& part, const Frame& frame, const ContoursView& region) {
-  const TurnedBox box = turned(part, frame);
-  Extent extent{box.low_v, box.high_v - box.low_v, box.high_v, box.low_v};
-  for (const Point2 p : region.point) {
-    extent.low = std::min<std::int64_t>(extent.low, p.y);
-    extent.high = std::max<std::int64_t>(extent.high, p.y);
-  }
-  return extent;
-}
-
-/// One distance between lines of this layer, for what needs only one: links, closed curves, overlap with the wall.
-Result<std::int64_t> one_distance(const FillContext& context, const FillParameters& parameters) {
-  const Extent extent = extent_of(context.part, frame_of(context, parameters), {});
-  FillParameters from_zero = parameters;
-  from_zero.first_line.reset();
-  from_zero.walls = 0;
-  const auto first = first_place(from_zero, context, extent);
-  if (!first) return first;
-  return *first + parameters.width / 2;
-}
-
 Status append_lines(const ContoursView& region, const FillContext& context, const FillParameters& parameters,
                     Toolpaths& out) {
   const Frame frame = frame_of(context, parameters);
-  const Contours turned_region = frame.to(region);
-  const Extent extent = extent_of(context.part, frame, turned_region);
-  if (parameters.pattern == Pattern::kHoneycomb || parameters.pattern == Pattern::kQuatrefoil) {
-    const auto distance = one_distance(context, parameters);
-    if (!distance) return distance.error();
-    return append_waves(turned_region, parameters, static_cast<Nm>(*distance - parameters.width), extent.side,
-                        layer_stagger(parameters, context.layer.index), turned(context.part, frame).low_u, frame, out);
-  }
-  const auto places = place_lines(parameters, context, extent);
+  const Contours turned = frame.to(region);
+  const auto places = place_across(turned, frame, context, parameters);
   if (!places) return places.error();
+  if (is_wave(parameters.pattern)) {
+    // Crests are counted from the part's side as well.
+    std::int64_t start_u = INT64_MAX;
+    const Box& part = context.part;
+    for (const Nm x : {part.lo.x, part.hi.x}) {
+      for (const Nm y : {part.lo.y, part.hi.y}) start_u = std::min<std::int64_t>(start_u, frame.to(Point2{x, y}).x);
+    }
+    return append_waves(turned, parameters, *places, start_u, frame, out);
+  }
   RasterOptions options{parameters.width, parameters.longest_link, parameters.shortest_line};
   if (parameters.longest_link < 0) {
     std::int64_t widest = 0;
     for (std::size_t i = 1; i < places->at.size(); ++i) widest = std::max(widest, places->at[i] - places->at[i - 1]);
     options.longest_link = 3 * widest;
   }
-  append_raster(turned_region, *places, frame, options, out);
+  append_raster(turned, *places, frame, options, out);
   return {};
 }
 
-/// Closed curves inwards from the edge of the region: all that fit, or `most` of them. Leaves in `region` what they
-/// enclose, moved inwards once more.
-Status append_curves(Contours& region, const FillParameters& parameters, std::int64_t distance, std::uint32_t most,
+/// Closed curves from the edge of the region inwards: all that fit, or `most` of them. Leaves in `region` what the
+/// place of the next one encloses.
+Status append_curves(Contours& region, const FillContext& context, const FillParameters& parameters, std::uint32_t most,
                      Toolpaths& out) {
-  for (std::uint32_t k = 0; k < most && region.size() > 0; ++k) {
+  if (most == 0) return {};
+  const auto places = place_inwards(region, context, parameters);
+  if (!places) return places.error();
+  const auto depth = region_depth(context, parameters);
+  if (!depth) return depth.error();
+  std::int64_t at = *depth;
+  for (std::size_t k = 0; k < places->at.size() && region.size() > 0; ++k) {
+    if (places->at[k] != at) {
+      auto next = offset_contours(region, at - places->at[k]);
+      if (!next) return next.error();
+      region = std::move(*next);
+      at = places->at[k];
+    }
+    if (k == most) return {};
     append_closed(region, PathKind::kContour, parameters.width, out);
-    auto next = offset_contours(region, -distance);
-    if (!next) return next.error();
-    region = std::move(*next);
   }
+  region.clear();  // no place is left inside the last curve
   return {};
 }
 
@@ -134,31 +103,64 @@ Status check(const FillParameters& parameters) {
     }
   }
   if (!parameters.gap_expression.empty()) {
-    if (auto parsed = Expression::parse(parameters.gap_expression); !parsed) return parsed.error();
+    const auto parsed = Expression::parse(parameters.gap_expression);
+    if (!parsed) return parsed.error();
+    const bool curves = parameters.pattern == Pattern::kContour || parameters.pattern == Pattern::kContourRaster;
+    if (curves && parsed->uses("u")) {
+      return wrong(fmt::format("'{}': closed curves have no extent across, so u means nothing to them; use s, their depth in "
+                               "mm, or i", parameters.gap_expression));
+    }
   }
   if (parameters.cell <= 0) return wrong("cells have to be wider than 0");
   return {};
 }
 
 Result<Contours> fill_region(const ContoursView& contours, const FillContext& context, const FillParameters& parameters) {
-  const std::int64_t walls = parameters.walls;
-  const std::int64_t wall_centre = walls > 0 ? (2 * walls - 1) * parameters.wall_width / 2 : 0;
-  std::int64_t inset = 0;
-  if (parameters.end_inset) {
-    inset = *parameters.end_inset;
-  } else if (walls > 0) {
-    const auto distance = one_distance(context, parameters);
-    if (!distance) return distance.error();
-    inset = (std::int64_t{parameters.wall_width} + parameters.width) / 2 +
-            std::min<std::int64_t>(0, *distance - parameters.width);
-  } else {
-    inset = parameters.width / 2;
-  }
-  return offset_contours(contours, -(wall_centre + inset));
+  if (parameters.pattern == Pattern::kNone) return Contours();
+  const auto depth = region_depth(context, parameters);
+  if (!depth) return depth.error();
+  return offset_contours(contours, -*depth);
 }
 
-Status append_fill(const ContoursView& contours, const FillContext& context, const FillParameters& parameters,
-                   Toolpaths& out) {
+Result<FillBound> bound_fill(const ContoursView& contours, const ContoursView& region, const FillContext& context,
+                             const FillParameters& parameters) {
+  // Clipper takes an offset's or a line's points as edges, joins, scan beams and result at once.
+  constexpr std::uint64_t kOfClipper = 400;
+  const std::uint64_t surface = contours.point.size(), own = region.point.size();
+  FillBound bound;
+  bound.points = parameters.walls * (2 * surface + contours.size());
+  if (parameters.walls > 0) bound.scratch_bytes = kOfClipper * surface;
+  if (region.size() == 0) return bound;
+  if (parameters.pattern == Pattern::kContour || parameters.pattern == Pattern::kContourRaster) {
+    const auto places = place_inwards(region, context, parameters);
+    if (!places) return places.error();
+    std::uint64_t curves = places->at.size();
+    if (parameters.pattern == Pattern::kContourRaster) curves = std::min<std::uint64_t>(curves, parameters.loops);
+    bound.points += curves * (2 * own + region.size());
+    bound.scratch_bytes += kOfClipper * 2 * own;
+    if (parameters.pattern == Pattern::kContour) return bound;
+  }
+  const Frame frame = frame_of(context, parameters);
+  const Contours turned = frame.to(region);
+  const auto places = place_across(turned, frame, context, parameters);
+  if (!places) return places.error();
+  const std::uint64_t crossings = count_crossings(turned, *places);
+  if (is_wave(parameters.pattern)) {
+    Nm low = turned.point.front().x, high = low;
+    for (const Point2 p : turned.point) low = std::min(low, p.x), high = std::max(high, p.x);
+    const std::uint64_t of_wave = wave_points(parameters, std::int64_t{high} - low);
+    const std::uint64_t all = places->at.size() * of_wave;
+    bound.points += all + 4 * crossings;
+    bound.scratch_bytes += kOfClipper * (own + std::min(all, of_wave + wave_batch(own)));
+  } else {
+    bound.points += crossings + own;
+    bound.scratch_bytes += 30 * crossings + 24 * own + 24 * places->at.size();
+  }
+  return bound;
+}
+
+Status append_fill(const ContoursView& contours, Contours region, const FillContext& context,
+                   const FillParameters& parameters, Toolpaths& out) {
   if (contours.size() == 0) return {};
   for (std::uint32_t wall = 0; wall < parameters.walls; ++wall) {
     auto moved = offset_contours(contours, -(2 * std::int64_t{wall} + 1) * parameters.wall_width / 2);
@@ -166,20 +168,21 @@ Status append_fill(const ContoursView& contours, const FillContext& context, con
     if (moved->size() == 0) break;  // and so are all further in
     append_closed(*moved, wall == 0 ? PathKind::kOuter : PathKind::kInner, parameters.wall_width, out);
   }
-  if (parameters.pattern == Pattern::kNone) return {};
+  if (region.size() == 0) return {};
+  if (parameters.pattern == Pattern::kContour) return append_curves(region, context, parameters, UINT32_MAX, out);
+  if (parameters.pattern == Pattern::kContourRaster) {
+    if (Status status = append_curves(region, context, parameters, parameters.loops, out); !status) return status;
+    if (region.size() == 0) return {};
+  }
+  return append_lines(region, context, parameters, out);
+}
+
+Status append_fill(const ContoursView& contours, const FillContext& context, const FillParameters& parameters,
+                   Toolpaths& out) {
+  if (contours.size() == 0) return {};
   auto region = fill_region(contours, context, parameters);
   if (!region) return region.error();
-  if (region->size() == 0) return {};
-  if (parameters.pattern == Pattern::kContour || parameters.pattern == Pattern::kContourRaster) {
-    const auto distance = one_distance(context, parameters);
-    if (!distance) return distance.error();
-    const bool all = parameters.pattern == Pattern::kContour;
-    if (auto status = append_curves(*region, parameters, *distance, all ? UINT32_MAX : parameters.loops, out); !status) {
-      return status;
-    }
-    if (all) return {};
-  }
-  return append_lines(*region, context, parameters, out);
+  return append_fill(contours, std::move(*region), context, parameters, out);
 }
 
 }  // namespace lamina::infill

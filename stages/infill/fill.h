@@ -23,8 +23,23 @@ Status check(const FillParameters& parameters);
 Status append_fill(const ContoursView& contours, const FillContext& context, const FillParameters& parameters,
                    Toolpaths& out);
 
-/// Where the centres of filling beads may lie: the contours moved inwards past the walls.
+/// The same, with the region (fill_region) made beforehand.
+Status append_fill(const ContoursView& contours, Contours region, const FillContext& context,
+                   const FillParameters& parameters, Toolpaths& out);
+
+/// Where the centres of filling beads may lie: the contours moved inwards past the walls; nothing for kNone.
 /// errors  as append_fill
 Result<Contours> fill_region(const ContoursView& contours, const FillContext& context, const FillParameters& parameters);
+
+/// What append_fill may come to, counted before anything is laid: lines are placed and their crossings with the region
+/// counted, curves and waves counted by their places.
+struct FillBound {
+  std::uint64_t points = 0;         // of toolpaths
+  std::uint64_t scratch_bytes = 0;  // while they are made
+};
+/// errors  as append_fill
+/// cost    O(P log L) for P points of the region and L lines
+Result<FillBound> bound_fill(const ContoursView& contours, const ContoursView& region, const FillContext& context,
+                             const FillParameters& parameters);
 
 }  // namespace lamina::infill

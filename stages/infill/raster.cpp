@@ -175,6 +175,20 @@ class Scan {
 
 }  // namespace
 
+std::uint64_t count_crossings(const ContoursView& region, const LinePlaces& places) {
+  const auto line_at = [&](std::int64_t v) { return std::lower_bound(places.at.begin(), places.at.end(), v) - places.at.begin(); };
+  std::uint64_t total = 0;
+  for (std::uint32_t c = 0; c < region.size(); ++c) {
+    std::int64_t before = line_at(region[c].back().y);
+    for (const Point2 p : region[c]) {
+      const std::int64_t at = line_at(p.y);
+      total += static_cast<std::uint64_t>(std::abs(at - before));
+      before = at;
+    }
+  }
+  return total;
+}
+
 void append_raster(const ContoursView& region, const LinePlaces& places, const Frame& frame,
                    const RasterOptions& options, Toolpaths& out) {
   if (region.size() == 0 || places.at.empty()) return;

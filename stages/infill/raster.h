@@ -24,6 +24,9 @@ struct RasterOptions {
   Nm shortest_line = 0;
 };
 
+/// How often `places` cross the edges of `region`, both in the frame.
+std::uint64_t count_crossings(const ContoursView& region, const LinePlaces& places);
+
 /// Appends the lines of `places` (nm across the lines, in the frame) within `region`, turned back to the bed.
 ///
 /// region   clean contours, already turned into the frame

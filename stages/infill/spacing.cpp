@@ -49,6 +49,11 @@ class Distances {
       if (!gap) return gap;
       distance = parameters_.width + *gap;
     }
+    if (parameters_.pattern == Pattern::kQuatrefoil && distance <= parameters_.width) {
+      return Error{Fault::kUsage,
+                   fmt::format("layer {}: a quatrefoil's lines are kept apart, but the gap after line {} is {} mm; give one "
+                               "above 0, and groups of 1", context_.layer.index, i, mm(distance - parameters_.width))};
+    }
     if (distance <= 0) {
       return Error{Fault::kUsage,
                    fmt::format("layer {}: line {} would lie {} mm from line {}, centre to centre; bead width plus gap has "
@@ -122,8 +127,13 @@ Result<LinePlaces> place_lines(const FillParameters& parameters, const FillConte
   const std::int64_t shift = layer_stagger(parameters, context.layer.index);
   // Places count from the part's side and without the stagger while lines are laid out. No line is nearer to either
   // side of the part than the first one.
-  const std::int64_t lowest = std::max(extent.low - extent.side, *first) - shift;
-  const std::int64_t high = std::min(extent.high - extent.side, extent.length - *first) - shift;
+  std::int64_t lowest = extent.low - extent.side, high = extent.high - extent.side;
+  if (extent.off_sides) {
+    lowest = std::max(lowest, *first);
+    high = std::min(high, extent.length - *first);
+  }
+  lowest -= shift;
+  high -= shift;
 
   const auto too_many = [&] {
     return Error{Fault::kUsage, fmt::format("layer {}: more than {} lines; give wider beads or gaps",
@@ -136,7 +146,7 @@ Result<LinePlaces> place_lines(const FillParameters& parameters, const FillConte
     // Backwards: the distance is that of line i, asked where it would be if its gap were that of line i + 1.
     const auto distance = (*distances)(i, place);
     if (!distance) return distance.error();
-    place -= *distance;
+    place -= *distance + extent.line_height;
     if (place < lowest) break;
     before.push_back(place);
     if (static_cast<std::int64_t>(before.size()) > kMostLines) return too_many();
@@ -159,7 +169,7 @@ Result<LinePlaces> place_lines(const FillParameters& parameters, const FillConte
     if (i > kMostLines) return too_many();
     const auto distance = (*distances)(i, place);
     if (!distance) return distance.error();
-    place += *distance;
+    place += *distance + extent.line_height;
   }
   return places;
 }

@@ -1,4 +1,5 @@
-// stages/infill/spacing.h: where the lines of a layer lie, across their direction.
+// stages/infill/spacing.h: where the lines of a layer lie, across their direction. Straight lines, waves and closed
+// curves all take their places from here, so that gaps, groups, tables, formulas and staggers mean the same for each.
 #pragma once
 
 #include <cstdint>
@@ -20,6 +21,8 @@ struct Extent {
   std::int64_t side;    // of the part, where line numbers begin
   std::int64_t length;  // of the part
   std::int64_t low, high;  // of what is filled: only lines within are wanted
+  std::int64_t line_height = 0;  // of a wave, from trough to crest: the next line lies so much further
+  bool off_sides = true;         // no line is nearer to either side of the part than line 0 of an unstaggered layer
 };
 
 /// Lines of a layer by the gaps or distances of the parameters.

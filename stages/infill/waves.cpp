@@ -13,7 +13,7 @@
 namespace lamina::infill {
 namespace {
 
-constexpr std::int64_t kMostLines = 1'000'000;
+constexpr std::int64_t kMostPeriods = 1'000'000;  // of a wave
 constexpr int kCosineSteps = 48;  // a period; off by less than 0.4 % of the wave's height
 
 Nm side_length(const FillParameters& parameters) {
@@ -33,83 +33,98 @@ std::vector<Point2> period_of(const FillParameters& parameters) {
   return points;
 }
 
+/// A piece of a wave that Clipper gave, in any order and direction.
+struct Piece {
+  std::size_t line;  // into places
+  Nm u;
+  std::uint32_t index;
+  bool turned;
+};
+
+/// The wave in whose strip a piece lies, by the middle of the piece, which rounding left there.
+std::size_t line_of(const LinePlaces& places, Nm height, std::span<const Point2> piece) {
+  const Nm v = piece[piece.size() / 2].y;
+  const auto above = std::upper_bound(places.at.begin(), places.at.end(), v);
+  auto line = static_cast<std::size_t>(above - places.at.begin());
+  if (line == 0) return 0;
+  // Between two strips: in the nearer one.
+  if (above == places.at.end() || v - (places.at[line - 1] + height) <= *above - v) --line;
+  return line;
+}
+
+void append_pieces(const Contours& pieces, const FillParameters& parameters, const LinePlaces& places, const Frame& frame,
+                   Toolpaths& out) {
+  std::vector<Piece> order;
+  const Nm height = wave_height(parameters);
+  for (std::uint32_t c = 0; c < pieces.size(); ++c) {
+    const auto points = pieces[c];
+    const bool turned = points.front().x > points.back().x;
+    order.push_back({line_of(places, height, points), std::min(points.front().x, points.back().x), c, turned});
+  }
+  std::ranges::sort(order, [](const Piece& a, const Piece& b) {
+    return std::tie(a.line, a.u, a.index) < std::tie(b.line, b.u, b.index);
+  });
+  Buffer<Point2> whole, own;
+  for (std::size_t i = 0; i < order.size();) {
+    // Pieces that meet end to end are one.
+    whole.clear();
+    std::size_t end = i;
+    for (; end < order.size() && order[end].line == order[i].line; ++end) {
+      const auto points = pieces[order[end].index];
+      own.assign(points.begin(), points.end());
+      if (order[end].turned) std::reverse(own.begin(), own.end());
+      if (!whole.empty() && whole.back() != own.front()) break;
+      whole.insert(whole.end(), own.begin() + (whole.empty() ? 0 : 1), own.end());
+    }
+    const std::int32_t number = places.first_number + static_cast<std::int32_t>(order[i].line);
+    i = end;
+    if (std::int64_t{whole.back().x} - whole.front().x < parameters.shortest_line) continue;
+    if ((number % 2 != 0) != frame.reversed()) std::reverse(whole.begin(), whole.end());
+    for (const Point2 p : whole) out.add(frame.from(p), PathKind::kRaster, parameters.width, number);
+    out.close();
+  }
+}
+
 }  // namespace
 
 Nm wave_height(const FillParameters& parameters) {
   return static_cast<Nm>(std::llround(side_length(parameters) * std::numbers::sqrt3 / 2));
 }
 
-Status append_waves(const ContoursView& region, const FillParameters& parameters, Nm gap, std::int64_t side,
-                    std::int64_t shift, std::int64_t start_u, const Frame& frame, Toolpaths& out) {
-  if (region.size() == 0) return {};
+std::uint64_t wave_batch(std::size_t region_points) { return std::max<std::uint64_t>(4096, region_points); }
+
+std::uint64_t wave_points(const FillParameters& parameters, std::int64_t length) {
+  const std::uint64_t of_period = parameters.pattern == Pattern::kHoneycomb ? 4 : kCosineSteps;
+  return (static_cast<std::uint64_t>(length / (std::int64_t{3} * side_length(parameters))) + 3) * of_period;
+}
+
+Status append_waves(const ContoursView& region, const FillParameters& parameters, const LinePlaces& places,
+                    std::int64_t start_u, const Frame& frame, Toolpaths& out) {
+  if (region.size() == 0 || places.at.empty()) return {};
   const Nm height = wave_height(parameters);
-  const std::int64_t pitch = std::int64_t{height} + parameters.width + gap, length = std::int64_t{3} * side_length(parameters);
-  if (parameters.pattern == Pattern::kQuatrefoil && gap <= 0) {
-    return Error{Fault::kUsage, fmt::format("a quatrefoil's lines are kept apart; the gap is {} mm, give one above 0", mm(gap))};
-  }
-  Point2 lo = region.point.front(), hi = lo;
-  for (const Point2 p : region.point) {
-    lo = {std::min(lo.x, p.x), std::min(lo.y, p.y)};
-    hi = {std::max(hi.x, p.x), std::max(hi.y, p.y)};
-  }
-  const std::int64_t origin = side + parameters.width / 2 + shift;
-  const std::int64_t first = floor_div<std::int64_t>(lo.y - height - origin, pitch);
-  const std::int64_t last = floor_div<std::int64_t>(hi.y - origin, pitch);
-  if (last - first > kMostLines || (std::int64_t{hi.x} - lo.x) / length > kMostLines) {
+  const std::int64_t length = std::int64_t{3} * side_length(parameters);
+  Nm low = region.point.front().x, high = low;
+  for (const Point2 p : region.point) low = std::min(low, p.x), high = std::max(high, p.x);
+  if ((std::int64_t{high} - low) / length > kMostPeriods) {
     return Error{Fault::kUsage, fmt::format("cells of {} mm are too many; give larger ones", mm(parameters.cell))};
   }
   const std::vector<Point2> period = period_of(parameters);
   Contours waves;
-  for (std::int64_t i = first; i <= last; ++i) {
-    const std::int64_t v = origin + i * pitch;
-    for (std::int64_t k = floor_div<std::int64_t>(lo.x - start_u, length) - 1; start_u + k * length <= hi.x; ++k) {
+  for (std::size_t i = 0; i < places.at.size(); ++i) {
+    const bool mirrored = (places.first_number + static_cast<std::int64_t>(i)) % 2 != 0;
+    for (std::int64_t k = floor_div<std::int64_t>(low - start_u, length) - 1; start_u + k * length <= high; ++k) {
       for (const Point2 p : period) {
         const std::int64_t at_u = std::clamp<std::int64_t>(start_u + k * length + p.x, -kNmReach, kNmReach);
-        const std::int64_t at_v = std::clamp<std::int64_t>(v + (i % 2 == 0 ? p.y : height - p.y), -kNmReach, kNmReach);
+        const std::int64_t at_v = std::clamp<std::int64_t>(places.at[i] + (mirrored ? height - p.y : p.y), -kNmReach, kNmReach);
         waves.point.push_back({static_cast<Nm>(at_u), static_cast<Nm>(at_v)});
       }
     }
     waves.close();
-  }
-  auto pieces = clip_lines(waves, region);
-  if (!pieces) return pieces.error();
-
-  // Clipper gives pieces in any order and direction; waves run towards +u and lie in strips of their own.
-  struct Piece {
-    std::int64_t line;
-    Nm u;
-    std::uint32_t index;
-    bool turned;
-  };
-  std::vector<Piece> order;
-  for (std::uint32_t c = 0; c < pieces->size(); ++c) {
-    const auto points = (*pieces)[c];
-    const bool turned = points.front().x > points.back().x;
-    const Nm u = std::min(points.front().x, points.back().x);
-    // The middle of the piece is inside its strip whatever rounding did to its ends.
-    const Point2 middle = points[points.size() / 2];
-    const std::int64_t line = floor_div<std::int64_t>(middle.y - origin + (pitch - height) / 2, pitch);
-    order.push_back({line, u, c, turned});
-  }
-  std::ranges::sort(order, [](const Piece& a, const Piece& b) {
-    return std::tie(a.line, a.u, a.index) < std::tie(b.line, b.u, b.index);
-  });
-  for (std::size_t i = 0; i < order.size();) {
-    // Pieces that meet end to end are one.
-    Buffer<Point2> whole;
-    std::size_t end = i;
-    for (; end < order.size() && order[end].line == order[i].line; ++end) {
-      const auto points = (*pieces)[order[end].index];
-      Buffer<Point2> own(points.begin(), points.end());
-      if (order[end].turned) std::reverse(own.begin(), own.end());
-      if (!whole.empty() && whole.back() != own.front()) break;
-      whole.insert(whole.end(), own.begin() + (whole.empty() ? 0 : 1), own.end());
-    }
-    const auto number = static_cast<std::int32_t>(order[i].line);
-    if ((number % 2 != 0) != frame.reversed()) std::reverse(whole.begin(), whole.end());
-    for (const Point2 p : whole) out.add(frame.from(p), PathKind::kRaster, parameters.width, number);
-    out.close();
-    i = end;
+    if (waves.point.size() < wave_batch(region.point.size()) && i + 1 < places.at.size()) continue;
+    const auto pieces = clip_lines(waves, region);
+    if (!pieces) return pieces.error();
+    append_pieces(*pieces, parameters, places, frame, out);
+    waves.clear();
   }
   return {};
 }

@@ -13,16 +13,26 @@
 #include "stages/data/toolpaths.h"
 #include "stages/infill/frame.h"
 #include "stages/infill/parameters.h"
+#include "stages/infill/spacing.h"
 
 namespace lamina::infill {
+
+inline bool is_wave(Pattern pattern) { return pattern == Pattern::kHoneycomb || pattern == Pattern::kQuatrefoil; }
 
 /// Height of a wave from trough to crest, nm.
 Nm wave_height(const FillParameters& parameters);
 
-/// Appends the waves that lie in `region` (clean contours in the frame), line 0 at the part's side `side` plus half a
-/// bead, moved across by `shift`. `start_u` is where crests are counted from.
-/// errors  kUsage: a quatrefoil whose lines would touch; kInternal of the clipping library
-Status append_waves(const ContoursView& region, const FillParameters& parameters, Nm gap, std::int64_t side,
-                    std::int64_t shift, std::int64_t start_u, const Frame& frame, Toolpaths& out);
+/// Points of the waves that are clipped together in a region of so many points.
+std::uint64_t wave_batch(std::size_t region_points);
+
+/// Points of one wave over `length` nm, before it is cut at the region's edge.
+std::uint64_t wave_points(const FillParameters& parameters, std::int64_t length);
+
+/// Appends the waves that lie in `region` (clean contours in the frame), their troughs at `places` (of place_across).
+/// `start_u` is where crests are counted from. Pieces shorter than shortest_line along u are left out.
+/// errors  kUsage: too many cells; kInternal of the clipping library
+/// memory  some megabytes beside the result: waves are clipped a few at a time
+Status append_waves(const ContoursView& region, const FillParameters& parameters, const LinePlaces& places,
+                    std::int64_t start_u, const Frame& frame, Toolpaths& out);
 
 }  // namespace lamina::infill

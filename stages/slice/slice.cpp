@@ -7,6 +7,7 @@
 
 #include "stages/data/clipping.h"
 #include "stages/slice/nest.h"
+#include "stages/slice/order.h"
 #include "stages/slice/tidy.h"
 
 namespace lamina::slice {
@@ -42,30 +43,45 @@ Result<Slicer> Slicer::build(std::span<const Mesh> meshes, std::span<const Insta
   slicer.meshes_ = meshes;
   slicer.planes_.assign(planes.begin(), planes.end());
   slicer.options_ = options;
-  for (const std::uint32_t body : body_of) slicer.bodies_ = std::max(slicer.bodies_, body + 1);
 
   std::map<std::pair<std::uint32_t, Nm>, std::uint32_t> known;
   std::vector<std::int64_t> own_planes(planes.size());
-  std::vector<std::uint32_t> source_of(instances.size());
-  for (std::size_t i = 0; i < instances.size(); ++i) {
-    const Nm z = instances[i].offset.z;
-    const auto [found, is_new] =
-        known.emplace(std::pair(instances[i].mesh, z), static_cast<std::uint32_t>(slicer.sources_.size()));
+  std::vector<Source> sources;
+  for (const Instance& instance : instances) {
+    const Nm z = instance.offset.z;
+    const auto [found, is_new] = known.emplace(std::pair(instance.mesh, z), static_cast<std::uint32_t>(sources.size()));
     if (is_new) {
       std::ranges::transform(planes, own_planes.begin(), [&](Nm plane) { return std::int64_t{plane} - z; });
-      slicer.sources_.push_back({instances[i].mesh, z, PlaneIndex(meshes[instances[i].mesh].triangles, own_planes)});
+      sources.push_back({instance.mesh, z, PlaneIndex(meshes[instance.mesh].triangles, own_planes)});
     }
-    source_of[i] = found->second;
+    slicer.instances_.push_back({found->second, {instance.offset.x, instance.offset.y}});
   }
-  slicer.body_offset_.assign(slicer.bodies_ + 1, 0);
-  for (const std::uint32_t body : body_of) ++slicer.body_offset_[body + 1];
-  for (std::uint32_t b = 0; b < slicer.bodies_; ++b) slicer.body_offset_[b + 1] += slicer.body_offset_[b];
-  slicer.placed_.resize(instances.size());
-  std::vector<std::uint32_t> place(slicer.body_offset_.begin(), slicer.body_offset_.end() - 1);
-  for (std::size_t i = 0; i < instances.size(); ++i) {
-    slicer.placed_[place[body_of[i]]++] = {source_of[i], {instances[i].offset.x, instances[i].offset.y}};
-  }
+  slicer.sources_ = std::make_shared<const std::vector<Source>>(std::move(sources));
+  slicer.group(body_of);
   return slicer;
+}
+
+Slicer Slicer::regrouped(std::span<const std::uint32_t> body_of) const {
+  Slicer other = *this;
+  other.group(body_of);
+  return other;
+}
+
+void Slicer::group(std::span<const std::uint32_t> body_of) {
+  bodies_ = 0;
+  for (const std::uint32_t body : body_of) {
+    if (body != kLeftOut) bodies_ = std::max(bodies_, body + 1);
+  }
+  body_offset_.assign(bodies_ + 1, 0);
+  for (const std::uint32_t body : body_of) {
+    if (body != kLeftOut) ++body_offset_[body + 1];
+  }
+  for (std::uint32_t b = 0; b < bodies_; ++b) body_offset_[b + 1] += body_offset_[b];
+  placed_.resize(body_offset_.back());
+  std::vector<std::uint32_t> place(body_offset_.begin(), body_offset_.end() - 1);
+  for (std::size_t i = 0; i < body_of.size(); ++i) {
+    if (body_of[i] != kLeftOut) placed_[place[body_of[i]]++] = instances_[i];
+  }
 }
 
 void Slicer::loops_of(const Source& source, std::uint32_t plane, LayerScratch& scratch, Contours& closed,
@@ -92,11 +108,13 @@ Status Slicer::clean(Contours& contours, LayerScratch& scratch, LayerReport& rep
   const auto united = nest(contours, options_.fill_rule, scratch.group);
   if (!united) return united.error();
   report.united += *united;
-  if (options_.offset != 0) {
-    auto moved = offset_contours(contours, options_.offset);
-    if (!moved) return moved.error();
-    contours = std::move(*moved);
+  if (options_.offset == 0) {
+    order_by_outer(contours);
+    return {};
   }
+  auto moved = offset_contours(contours, options_.offset);
+  if (!moved) return moved.error();
+  contours = std::move(*moved);
   return {};
 }
 
@@ -104,8 +122,8 @@ Result<LayerReport> Slicer::layer(std::uint32_t plane, LayerScratch& scratch, La
   LayerReport report;
   out.contours.clear();
   out.body.assign(1, 0);
-  scratch.of_source.resize(sources_.size());
-  scratch.source_done.assign(sources_.size(), 0);
+  scratch.of_source.resize(sources_->size());
+  scratch.source_done.assign(sources_->size(), 0);
   const auto failed = [&](const Status& status) {
     return Error{status.error().fault, fmt::format("plane at {} mm: {}", mm(planes_[plane]), status.error().message)};
   };
@@ -117,7 +135,7 @@ Result<LayerReport> Slicer::layer(std::uint32_t plane, LayerScratch& scratch, La
       Contours& own = scratch.of_source[only.source];
       if (scratch.source_done[only.source] == 0) {
         own.clear();
-        loops_of(sources_[only.source], plane, scratch, own, report);
+        loops_of((*sources_)[only.source], plane, scratch, own, report);
         if (auto status = clean(own, scratch, report); !status) return failed(status);
         scratch.source_done[only.source] = 1;
       }
@@ -127,7 +145,7 @@ Result<LayerReport> Slicer::layer(std::uint32_t plane, LayerScratch& scratch, La
       all.clear();
       for (const Placed& member : members) {
         Contours own;
-        loops_of(sources_[member.source], plane, scratch, own, report);
+        loops_of((*sources_)[member.source], plane, scratch, own, report);
         append_moved(own, member.by, all);
       }
       if (auto status = clean(all, scratch, report); !status) return failed(status);
@@ -140,7 +158,7 @@ Result<LayerReport> Slicer::layer(std::uint32_t plane, LayerScratch& scratch, La
 
 std::uint64_t Slicer::index_bytes() const {
   std::uint64_t total = 0;
-  for (const Source& source : sources_) total += source.index.bytes();
+  for (const Source& source : *sources_) total += source.index.bytes();
   return total;
 }
 
@@ -148,9 +166,13 @@ std::uint64_t Slicer::layer_bytes_bound(std::uint32_t plane) const {
   // Of a cut: its two edges, hashes and point; slots, links and states; its edge in the grid; its points before and after.
   constexpr std::uint64_t kOfCut = 48 + 16 + 8 + 16 + 5 + 24 + 24;
   std::uint64_t most = 0;
-  for (const Source& source : sources_) most += source.index.most_facets(plane) * kOfCut;
+  std::vector<std::uint8_t> seen(sources_->size(), 0);
+  for (const Placed& placed : placed_) seen[placed.source] = 1;
+  for (std::size_t s = 0; s < seen.size(); ++s) {
+    if (seen[s] != 0) most += (*sources_)[s].index.most_facets(plane) * kOfCut;
+  }
   std::uint64_t points = 0;
-  for (const Placed& placed : placed_) points += sources_[placed.source].index.most_facets(plane);
+  for (const Placed& placed : placed_) points += (*sources_)[placed.source].index.most_facets(plane);
   return most + points * sizeof(Point2);
 }
 

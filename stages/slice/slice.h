@@ -1,6 +1,6 @@
 // stages/slice/slice.h: meshes standing on the bed -> clean contours of any layer.
 //
-//   PlaneIndex ─> cut ─> chain ─> tidy ─> find_contacts ─> nest ─> contours
+//   PlaneIndex ─> cut ─> chain ─> tidy ─> find_contacts ─> nest ─> order_by_outer ─> contours
 //                          └─> close_gaps (open meshes)      └─ unite what is in contact
 //
 // The plane rule is that of the bitmaps: a corner at the plane is below it. What is solid where shells overlap is
@@ -12,6 +12,7 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <span>
 #include <vector>
 
@@ -73,6 +74,11 @@ class Slicer {
                               std::span<const std::uint32_t> body_of, std::span<const Nm> planes,
                               const SliceOptions& options);
 
+  /// The same planes cut for other bodies, or for some of the instances only (those with a body below kLeftOut). Shares
+  /// the index; instances that only the other slicer cuts cost nothing here.
+  static constexpr std::uint32_t kLeftOut = UINT32_MAX;
+  Slicer regrouped(std::span<const std::uint32_t> body_of) const;
+
   /// The contours of plane p. Pure: the same for any thread and order.
   Result<LayerReport> layer(std::uint32_t plane, LayerScratch& scratch, LayerContours& out) const;
 
@@ -102,7 +108,10 @@ class Slicer {
   std::span<const Mesh> meshes_;
   std::vector<Nm> planes_;
   SliceOptions options_;
-  std::vector<Source> sources_;
+  void group(std::span<const std::uint32_t> body_of);
+
+  std::shared_ptr<const std::vector<Source>> sources_;
+  std::vector<Placed> instances_;            // as given
   std::vector<Placed> placed_;               // body by body
   std::vector<std::uint32_t> body_offset_;   // bodies + 1, into placed_
   std::uint32_t bodies_ = 0;

@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
+#include <sstream>
 
 #include "pipeline/fill_request.h"
 #include "tests/pipeline/program.h"
@@ -36,6 +37,30 @@ TEST(SliceProgram, SameBytesForAnyThreadsAndMemoryInEveryFormat) {
       ASSERT_GT(tree.size(), 1000u);
       if (first.empty()) first = tree;
       EXPECT_EQ(tree, first) << jobs[j][1] << " with " << threads << " threads";
+    }
+  }
+}
+
+TEST(SliceProgram, SameBytesForEveryPatternFormatThreadsAndMemory) {
+  const Directory directory;
+  write_box(directory / "near.stl", {0, 0, 0}, {9, 8, 2});
+  const std::vector<std::vector<std::string>> formats = {{"svg"}, {"svg", "--file-a-layer"}, {"cli"}, {"cli-binary"}, {"3mf"}};
+  int number = 0;
+  for (const char* pattern : {"none", "raster", "contour", "contour+raster", "honeycomb", "quatrefoil"}) {
+    for (const auto& format : formats) {
+      std::string first;
+      for (const auto& [threads, memory] : {std::pair{"1", "1G"}, {"2", "1M"}, {"8", "16M"}}) {
+        const std::string out = "o" + std::to_string(number++);
+        std::vector<std::string> arguments = {"slice", corpus("parameter_quality_nut.stl"), "near.stl", "--layer", "1.9", "--quiet", "-o", out,
+                                              "--walls", "1", "--bead-gap", "0.3,0.1", "--stagger", "0,0.1", "--angle-step", "37",
+                                              "--pattern", pattern, "--threads", threads, "--memory", memory, "--format"};
+        arguments.insert(arguments.end(), format.begin(), format.end());
+        const Outcome outcome = run_lamina(arguments, directory.path());
+        ASSERT_EQ(outcome.code, 0) << pattern << ", " << format[0] << ": " << outcome.err;
+        const std::string tree = tree_text(directory.path() / out);
+        if (first.empty()) first = tree;
+        EXPECT_EQ(tree, first) << pattern << ", " << format[0] << " with " << threads << " threads";
+      }
     }
   }
 }
@@ -131,6 +156,159 @@ TEST(SliceProgram, WrongFillingsAreOneClearLineAndLeaveNothing) {
     EXPECT_NE(outcome.err.find(expected), std::string::npos) << more.back() << ": " << outcome.err;
     EXPECT_TRUE(files_below(directory.path() / "out").empty()) << more.back();
   }
+}
+
+TEST(SliceProgram, AJobThatFailsLeavesTheEarlierOne) {
+  const Directory directory;
+  for (const bool alone : {false, true}) {
+    const std::string out = alone ? "alone" : "one";
+    std::vector<std::string> arguments = {"slice", corpus("parameter_quality_nut.stl"), "--layer", "1", "--quiet", "-o", out,
+                                          "--pattern", "raster"};
+    if (alone) arguments.push_back("--file-a-layer");
+    ASSERT_EQ(run_lamina(arguments, directory.path()).code, 0);
+    const std::string before = tree_text(directory.path() / out);
+    // The formula fails in layer 12, when others are long written.
+    arguments.insert(arguments.end(), {"--overwrite", "--gap-formula", "1 / (n - 13) ^ 2"});
+    const Outcome outcome = run_lamina(arguments, directory.path());
+    EXPECT_EQ(outcome.code, 2);
+    EXPECT_NE(outcome.err.find("n = 13"), std::string::npos) << outcome.err;
+    EXPECT_EQ(tree_text(directory.path() / out), before);
+    EXPECT_EQ(run_lamina({"verify", out}, directory.path()).code, 0);
+  }
+}
+
+TEST(SliceProgram, VerifyFindsWhatWasChangedMissingOrAdded) {
+  const Directory directory;
+  for (const auto& format : {std::vector<std::string>{"svg"}, {"svg", "--file-a-layer"}, {"cli"}, {"cli-binary"}, {"3mf"}}) {
+    std::vector<std::string> arguments = {"slice", corpus("parameter_quality_nut.stl"), "--layer", "2", "--quiet", "--overwrite",
+                                          "-o", "out", "--walls", "1", "--format"};
+    arguments.insert(arguments.end(), format.begin(), format.end());
+    const auto slice = [&] {
+      std::filesystem::remove_all(directory / "out");
+      ASSERT_EQ(run_lamina(arguments, directory.path()).code, 0);
+    };
+    slice();
+    const Outcome whole = run_lamina({"verify", "out"}, directory.path());
+    EXPECT_EQ(whole.code, 0) << format[0] << ": " << whole.err;
+    for (const std::string& name : files_below(directory.path() / "out")) {
+      if (name == "manifest.json" || name == "job.toml") continue;
+      const std::string path = directory / ("out/" + name), text = read_text(path);
+      for (const std::size_t at : {std::size_t{5}, text.size() / 2, text.size() - 3}) {
+        std::string changed = text;
+        changed[at] ^= 1;
+        write_text(path, changed);
+        const Outcome outcome = run_lamina({"verify", "out"}, directory.path());
+        EXPECT_EQ(outcome.code, 5) << format[0] << ", byte " << at;
+        EXPECT_NE(outcome.err.find(name), std::string::npos) << outcome.err;
+      }
+      write_text(path, text.substr(0, text.size() - 1));
+      EXPECT_EQ(run_lamina({"verify", "out"}, directory.path()).code, 5);
+      fs::remove(path);
+      EXPECT_NE(run_lamina({"verify", "out"}, directory.path()).err.find("is missing"), std::string::npos);
+      write_text(path, text);
+      if (name.starts_with("layers/")) break;
+    }
+    if (format.size() > 1) {
+      write_text(directory / "out/layers/000077.svg", "stray");
+      EXPECT_EQ(run_lamina({"verify", "out"}, directory.path()).code, 5);
+    }
+    write_text(directory / "out/manifest.json", read_text(directory / "out/manifest.json").substr(0, 900));
+    EXPECT_EQ(run_lamina({"verify", "out"}, directory.path()).code, 5) << "a manifest that was cut off";
+  }
+}
+
+/// Twice the area of x0 y0 x1 y1 ..., y upwards.
+double doubled_area_of(const std::vector<double>& c) {
+  double sum = 0;
+  for (std::size_t i = 0; i < c.size(); i += 2) {
+    const std::size_t j = (i + 2) % c.size();
+    sum -= c[i] * c[j + 1] - c[j] * c[i + 1];
+  }
+  return sum;
+}
+
+bool is_inside(const std::vector<double>& contour, double x, double y) {
+  bool inside = false;
+  for (std::size_t i = 0, j = contour.size() - 2; i < contour.size(); j = i, i += 2) {
+    if ((contour[i + 1] > y) == (contour[j + 1] > y)) continue;
+    if (x < contour[i] + (contour[j] - contour[i]) * (y - contour[i + 1]) / (contour[j + 1] - contour[i + 1])) inside = !inside;
+  }
+  return inside;
+}
+
+TEST(SliceProgram, SvgHasOnePathForEachOuterContourWithItsHoles) {
+  const Directory directory;
+  const Outcome outcome = run_lamina({"slice", corpus("nist_am_test_artifact_v3b.stl"), corpus("quad_knot.obj"), "--layer", "0.7", "-o", "out",
+                                      "--quiet"}, directory.path());
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  const auto manifest = nlohmann::json::parse(read_text(directory.path() / "out/manifest.json"));
+  const std::string svg = read_text(directory.path() / "out" / manifest["file"].get<std::string>());
+  std::size_t holes = 0, most_paths = 0;
+  for (const auto& layer : manifest["layers"]) {
+    const std::string text = svg.substr(layer["offset"].get<std::size_t>(), layer["bytes"].get<std::size_t>());
+    double area = 0;
+    std::size_t paths = 0;
+    for (std::size_t at = text.find("<path d=\""); at != std::string::npos; at = text.find("<path d=\"", at + 1), ++paths) {
+      std::istringstream words(text.substr(at + 9, text.find('"', at + 9) - at - 9));
+      std::vector<std::vector<double>> contours;
+      for (std::string word; words >> word;) {
+        if (word == "M") contours.emplace_back();
+        else if (word != "z") contours.back().push_back(std::stod(word));
+      }
+      double own = 0;
+      for (std::size_t c = 0; c < contours.size(); ++c) {
+        const double doubled = doubled_area_of(contours[c]);
+        own += doubled / 2;
+        ASSERT_EQ(doubled > 0, c == 0) << "one outer contour, and it is the first";
+        if (c == 0) continue;
+        ++holes;
+        // The middle of an edge: corners may touch.
+        const double x = (contours[c][0] + contours[c][2]) / 2, y = (contours[c][1] + contours[c][3]) / 2;
+        EXPECT_TRUE(is_inside(contours[0], x, y)) << "layer " << layer["layer"];
+      }
+      const std::size_t said = text.find("slic3r:area=\"", at) + 13;
+      EXPECT_NEAR(std::stod(text.substr(said)), own, 1e-3);
+      area += own;
+    }
+    most_paths = std::max(most_paths, paths);
+    EXPECT_NEAR(area, layer["area_mm2"].get<double>(), 1e-4);
+  }
+  EXPECT_GT(holes, 50u);
+  EXPECT_GT(most_paths, 5u);
+}
+
+TEST(SliceProgram, AnOffsetThatLeavesNothingIsSaid) {
+  const Directory directory;
+  write_box(directory / "post.stl", {0, 0, 0}, {20, 3, 5});
+  const Outcome outcome = run_lamina({"slice", "post.stl", "--layer", "1", "--offset", "-1.6", "-o", "out", "--json"}, directory.path());
+  EXPECT_EQ(outcome.code, 0);
+  EXPECT_NE(outcome.err.find("--offset -1.6 leaves nothing of 5 of 5 layers, first layer 0"), std::string::npos) << outcome.err;
+  EXPECT_EQ(nlohmann::json::parse(outcome.out)["emptied_layers"], 5);
+  EXPECT_EQ(run_lamina({"slice", "post.stl", "--layer", "1", "--offset", "-1.4", "-o", "thin"}, directory.path()).err.find("warning"),
+            std::string::npos);
+}
+
+/// Parts that are further apart than twice the offset before it, and meet after it.
+TEST(SliceProgram, PartsThatMeetOnlyAfterTheOffsetAreUnited) {
+  const Directory directory;
+  write_box(directory / "a.stl", {0, 0, 0}, {10, 10, 1});
+  write_text(directory / "j.toml", "[[part]]\npath = 'a.stl'\nat_mm = [100, 100]\n[[part]]\npath = 'a.stl'\nat_mm = [110.3, 100]\n");
+  const Outcome outcome = run_lamina({"slice", "--job", "j.toml", "--layer", "1", "--offset", "0.2", "-o", "out", "--json"}, directory.path());
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  const auto summary = nlohmann::json::parse(outcome.out);
+  EXPECT_EQ(summary["contours"], 1);
+  EXPECT_NEAR(summary["volume_mm3"].get<double>(), 20.7 * 10.4, 1e-6);
+}
+
+TEST(SliceProgram, ClosedGapsAreCountedWithTheLargest) {
+  const Directory directory;
+  const Outcome outcome = run_lamina({"slice", corpus("broken/cube_missing_corner.stl"), "--no-repair", "--bridge", "50", "--layer",
+                                      "5", "-o", "out", "--json"}, directory.path());
+  EXPECT_EQ(outcome.code, 0) << outcome.err;
+  const auto summary = nlohmann::json::parse(outcome.out);
+  EXPECT_EQ(summary["gaps_closed"], 5);
+  EXPECT_NEAR(summary["largest_gap_mm"].get<double>(), 36.203204, 1e-6);
+  EXPECT_NE(outcome.err.find("gaps      5 closed by straight stretches, the longest 36.203204 mm; 0 chains left open"), std::string::npos) << outcome.err;
 }
 
 TEST(SliceProgram, OpenMeshesAreReportedWithTheirFirstPlace) {

@@ -35,9 +35,30 @@ inline std::int32_t winding_about(const ContoursView& contours, Point2 p, std::u
   return winding;
 }
 
+/// Behind each outer contour come the holes in it: with it they wind once about what is just outside of each of them.
+inline void expect_ordered(const ContoursView& contours, const std::string& where) {
+  for (std::uint32_t first = 0, end = 0; first < contours.size(); first = end) {
+    ASSERT_GT(doubled_area(contours[first]), 0) << where << ": a hole before its outer contour";
+    end = first + 1;
+    while (end < contours.size() && doubled_area(contours[end]) < 0) ++end;
+    std::vector<std::uint32_t> offset;
+    for (std::uint32_t c = first; c <= end; ++c) offset.push_back(contours.offset[c] - contours.offset[first]);
+    const ContoursView region{offset, contours.point.subspan(contours.offset[first], offset.back())};
+    for (std::uint32_t c = 1; c < region.size(); ++c) {
+      std::int32_t outside = INT32_MAX;
+      for (const Point2 p : region[c]) {
+        outside = winding_about(region, p, c);
+        if (outside != INT32_MAX) break;
+      }
+      EXPECT_TRUE(outside == 1 || outside == INT32_MAX) << where << ": contour " << first + c << " is no hole of contour " << first;
+    }
+  }
+}
+
 /// Every contour has an area, and lies inside an even number of others if it is an outer one, else inside an odd
 /// number; whatever is just inside an outer contour has winding number 1, just inside a hole 0.
 inline void expect_clean(const ContoursView& contours, const std::string& where) {
+  expect_ordered(contours, where);
   for (std::uint32_t c = 0; c < contours.size(); ++c) {
     ASSERT_GE(contours[c].size(), 3u) << where;
     const __int128 area = doubled_area(contours[c]);

@@ -82,28 +82,7 @@ class SvgEncoder : public SliceEncoder {
     append_mm(out, layer.layer.thickness);
     append(out, "\">\n");
     for (std::size_t b = 0; b + 1 < layer.body.size(); ++b) {
-      if (layer.body[b] == layer.body[b + 1]) continue;
-      append(out, "\t\t<path d=\"");
-      __int128 area = 0;
-      for (std::uint32_t c = layer.body[b]; c < layer.body[b + 1]; ++c) {
-        const auto contour = layer.contours[c];
-        area += doubled_area(contour);
-        append_written(out, contour.size() * (2 * kMostDecimal + 2) + 4, [&](char* text) {
-          *text++ = 'M';
-          *text++ = ' ';
-          for (const Point2 p : contour) {
-            text = frame.put(p, text);
-            *text++ = ' ';
-          }
-          *text++ = 'z';
-          *text++ = ' ';
-          return text;
-        });
-      }
-      append(out, fmt::format("\" style=\"fill: white; stroke: black; stroke-width: 0; fill-type: evenodd; "
-                              "fill-rule: evenodd\" slic3r:area=\"{:.4f}\"", square_mm(area)));
-      if (head.parts.size() > 1) append(out, fmt::format(" class=\"{}\"", escaped(head.parts[b])));
-      append(out, " />\n");
+      for (std::uint32_t c = layer.body[b]; c < layer.body[b + 1];) c = put_region(head, frame, layer, b, c, out);
     }
     for (std::uint32_t p = 0; p < layer.paths.size(); ++p) put_path(frame, layer.paths, p, out);
     append(out, "\t</g>\n");
@@ -112,6 +91,36 @@ class SvgEncoder : public SliceEncoder {
   void tail(const SliceHead&, Buffer<char>& out) const override { append(out, "</svg>\n"); }
 
  private:
+  /// One element for an outer contour, the first, and the holes that follow it. returns the contour behind them
+  static std::uint32_t put_region(const SliceHead& head, const Frame& frame, const SliceLayer& layer, std::size_t b,
+                                  std::uint32_t first, Buffer<char>& out) {
+    append(out, "\t\t<path d=\"");
+    __int128 area = 0;
+    std::uint32_t c = first;
+    for (; c < layer.body[b + 1]; ++c) {
+      const auto contour = layer.contours[c];
+      const __int128 own = doubled_area(contour);
+      if (c > first && own > 0) break;
+      area += own;
+      append_written(out, contour.size() * (2 * kMostDecimal + 2) + 4, [&](char* text) {
+        *text++ = 'M';
+        *text++ = ' ';
+        for (const Point2 p : contour) {
+          text = frame.put(p, text);
+          *text++ = ' ';
+        }
+        *text++ = 'z';
+        *text++ = ' ';
+        return text;
+      });
+    }
+    append(out, fmt::format("\" style=\"fill: white; stroke: black; stroke-width: 0; fill-type: evenodd; "
+                            "fill-rule: evenodd\" slic3r:area=\"{:.4f}\"", square_mm(area)));
+    if (head.parts.size() > 1) append(out, fmt::format(" class=\"{}\"", escaped(head.parts[b])));
+    append(out, " />\n");
+    return c;
+  }
+
   /// One element for each stretch of one kind and width, as wide as its bead.
   static void put_path(const Frame& frame, const ToolpathsView& paths, std::uint32_t p, Buffer<char>& out) {
     std::uint32_t begin = paths.offset[p];
