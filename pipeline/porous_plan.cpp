@@ -15,17 +15,7 @@
 namespace lamina::pipeline {
 namespace {
 
-std::uint64_t bytes_of(const Contours& contours) { return bytes_held(contours.offset) + bytes_held(contours.point); }
 std::uint64_t bytes_of(const Runs& runs) { return bytes_held(runs.row_offset) + bytes_held(runs.change); }
-
-std::uint64_t bytes_of(const SlicePlan::Work& work) {
-  std::uint64_t sum = bytes_held(work.scratch.facets) + bytes_of(work.scratch.closed) + bytes_of(work.scratch.open) +
-                      bytes_of(work.contours.contours) + bytes_held(work.contours.body) + bytes_held(work.rebased) +
-                      bytes_held(work.path_body) + bytes_held(work.paths.offset) + bytes_held(work.paths.point) +
-                      bytes_held(work.paths.kind) + bytes_held(work.paths.width) + bytes_held(work.paths.line);
-  for (const Contours& contours : work.scratch.of_source) sum += bytes_of(contours);
-  return sum;
-}
 
 /// Widths of a powder's beads are what is asked for.
 void set_widths(const FillSettings& fill, SegmentSettings& segment) {
@@ -49,7 +39,7 @@ double mean_distance_mm(const infill::FillParameters& fill) {
 
 }  // namespace
 
-std::uint64_t PorousWork::bytes() const { return bytes_of(plan) + beads.bytes() + bytes_of(laid) + bytes_of(inner); }
+std::uint64_t PorousWork::bytes() const { return plan.bytes() + beads.bytes() + bytes_of(laid) + bytes_of(inner); }
 
 std::string filling_text(const Job& job) {
   std::string text;
@@ -135,13 +125,14 @@ Status PorousPlan::apply(const Layer& layer, Runs& image, Runs& scratch, std::un
   if (Status status = slices_->layer(layer.index, work.plan); !status) return status;
   work.beads.clear();
   const ToolpathsView all = work.plan.paths;
-  for (std::uint32_t b = 0; b + 1 < work.plan.path_body.size(); ++b) {
-    const Box& part = slices_->box_of_body(b);
+  for (std::uint32_t a = 0; a + 1 < work.plan.path_area.size(); ++a) {
+    const SlicePlan::Area& area = slices_->areas()[a];
+    const Box& part = area.box;
     const SegmentRange& range = segments_->at(std::int64_t{layer.plane()} - part.lo.z);
-    const auto cut = layer_cut(range, slices_->filling(b, layer), layer, part);
+    const auto cut = layer_cut(range, slices_->filling(area, layer), layer, part);
     if (!cut) return cut.error();
     ToolpathsView paths = all;
-    paths.offset = all.offset.subspan(work.plan.path_body[b], work.plan.path_body[b + 1] - work.plan.path_body[b] + 1);
+    paths.offset = all.offset.subspan(work.plan.path_area[a], work.plan.path_area[a + 1] - work.plan.path_area[a] + 1);
     lay(range, *cut, paths, work.beads);
   }
   work.beads.runs(work.laid);
@@ -162,10 +153,10 @@ std::uint64_t PorousPlan::spans_expected(std::uint32_t index) const {
   // Of a cut the slicer needs some 140 bytes: so many corners have walls and closed curves.
   const double corners = static_cast<double>(slices_->slicer().layer_bytes_bound(index)) / 140;
   double spans = 0;
-  for (std::uint32_t b = 0; b < slices_->slicer().bodies(); ++b) {
-    const Box& box = slices_->box_of_body(b);
+  for (const SlicePlan::Area& area : slices_->areas()) {
+    const Box& box = area.box;
     if (layer.plane() < box.lo.z || layer.plane() > box.hi.z) continue;
-    const infill::FillParameters& fill = slices_->filling(b, layer);
+    const infill::FillParameters& fill = slices_->filling(area, layer);
     const SegmentRange& range = segments_->at(std::int64_t{layer.plane()} - box.lo.z);
     const double width = mm(fill.width), distance = mean_distance_mm(fill);
     const double of_bead = width * rows_per_mm + 2;  // rows of a bead along x

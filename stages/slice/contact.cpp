@@ -4,25 +4,10 @@
 #include <cmath>
 #include <utility>
 
+#include "stages/slice/meet.h"
+
 namespace lamina::slice {
 namespace {
-
-int side(Point2 a, Point2 b, Point2 p) {
-  // Coordinates of a bed differ by less than 2^31, so nothing overflows.
-  const std::int64_t area = (std::int64_t{b.x} - a.x) * (std::int64_t{p.y} - a.y) -
-                            (std::int64_t{b.y} - a.y) * (std::int64_t{p.x} - a.x);
-  return area > 0 ? 1 : area < 0 ? -1 : 0;
-}
-
-/// Whether stretches ab and cd share a point, ends included.
-bool meet(Point2 a, Point2 b, Point2 c, Point2 d) {
-  if (std::max(a.x, b.x) < std::min(c.x, d.x) || std::max(c.x, d.x) < std::min(a.x, b.x) ||
-      std::max(a.y, b.y) < std::min(c.y, d.y) || std::max(c.y, d.y) < std::min(a.y, b.y)) {
-    return false;
-  }
-  // Boxes meet, so collinear stretches do.
-  return side(a, b, c) * side(a, b, d) <= 0 && side(c, d, a) * side(c, d, b) <= 0;
-}
 
 /// Square cells of 2^shift nm over the box of all points.
 struct Grid {
@@ -88,14 +73,33 @@ bool find_contacts(const ContoursView& contours, ContactScratch& scratch, Buffer
   group.assign(contours.size(), kNoContact);
   if (contours.size() == 0) return false;
   const std::span<const Point2> point = contours.point;
+  scratch.root.resize(contours.size());
+  for (std::uint32_t c = 0; c < contours.size(); ++c) scratch.root[c] = c;
+  const auto root_of = [&](std::uint32_t c) {
+    while (scratch.root[c] != c) c = scratch.root[c] = scratch.root[scratch.root[c]];
+    return c;
+  };
+  const auto join = [&](std::uint32_t a, std::uint32_t b) {
+    const std::uint32_t one = root_of(a), other = root_of(b);
+    scratch.root[std::max(one, other)] = std::min(one, other);
+    group[a] = group[b] = 0;  // in some group
+  };
+  const auto number_groups = [&] {
+    for (std::uint32_t c = 0; c < contours.size(); ++c) {
+      if (group[c] != kNoContact) group[c] = root_of(c);
+    }
+  };
+  if (find_monotone_contacts(contours, scratch.monotone)) {
+    for (const auto& [a, b] : scratch.monotone.contact) join(a, b);
+    number_groups();
+    return !scratch.monotone.contact.empty();
+  }
   scratch.next.resize(point.size());
   scratch.contour.resize(point.size());
-  scratch.root.resize(contours.size());
   for (std::uint32_t c = 0; c < contours.size(); ++c) {
     for (std::uint32_t i = contours.offset[c]; i + 1 < contours.offset[c + 1]; ++i) scratch.next[i] = i + 1;
     scratch.next[contours.offset[c + 1] - 1] = contours.offset[c];
     std::fill(scratch.contour.begin() + contours.offset[c], scratch.contour.begin() + contours.offset[c + 1], c);
-    scratch.root[c] = c;
   }
   const Grid grid = make_grid(contours);
   const std::size_t cells = std::size_t{grid.columns} * grid.rows;
@@ -113,10 +117,6 @@ bool find_contacts(const ContoursView& contours, ContactScratch& scratch, Buffer
     const Point2 a = point[i], b = point[scratch.next[i]];
     grid.for_each_cell(a, b, [&](std::size_t cell) { scratch.edge[place[cell]++] = i; });
   }
-  const auto root_of = [&](std::uint32_t c) {
-    while (scratch.root[c] != c) c = scratch.root[c] = scratch.root[scratch.root[c]];
-    return c;
-  };
   bool any = false;
   for (std::size_t cell = 0; cell < cells; ++cell) {
     const std::uint32_t end = place[cell];
@@ -126,19 +126,14 @@ bool find_contacts(const ContoursView& contours, ContactScratch& scratch, Buffer
       for (std::uint32_t m = k + 1; m < end; ++m) {
         const std::uint32_t j = scratch.edge[m];
         if (j == after || scratch.next[j] == i || j == i) continue;
-        if (!meet(a, b, point[j], point[scratch.next[j]])) continue;
-        const std::uint32_t one = root_of(scratch.contour[i]), other = root_of(scratch.contour[j]);
-        scratch.root[std::max(one, other)] = std::min(one, other);
-        group[scratch.contour[i]] = group[scratch.contour[j]] = 0;  // in some group
+        if (!stretches_meet(a, b, point[j], point[scratch.next[j]])) continue;
+        join(scratch.contour[i], scratch.contour[j]);
         any = true;
       }
     }
   }
-  if (!any) return false;
-  for (std::uint32_t c = 0; c < contours.size(); ++c) {
-    if (group[c] != kNoContact) group[c] = root_of(c);
-  }
-  return true;
+  number_groups();
+  return any;
 }
 
 }  // namespace lamina::slice

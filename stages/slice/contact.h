@@ -3,6 +3,7 @@
 
 #include "stages/data/buffer.h"
 #include "stages/data/contours.h"
+#include "stages/slice/monotone.h"
 
 namespace lamina::slice {
 
@@ -15,9 +16,11 @@ struct ContactScratch {
   Buffer<std::uint32_t> next;     // point -> next point of its contour
   Buffer<std::uint32_t> contour;  // point -> its contour
   Buffer<std::uint32_t> root;     // contour -> another one of its group
+  MonotoneScratch monotone;
 
   std::uint64_t bytes() const {
-    return bytes_held(offset) + bytes_held(edge) + bytes_held(next) + bytes_held(contour) + bytes_held(root);
+    return bytes_held(offset) + bytes_held(edge) + bytes_held(next) + bytes_held(contour) + bytes_held(root) +
+           monotone.bytes();
   }
 };
 
@@ -28,7 +31,8 @@ struct ContactScratch {
 ///
 /// group    for each contour the lowest contour of its group, or kNoContact
 /// returns  whether there is any contact
-/// cost     O(P) as a rule: edges are compared within the cells of a grid about as fine as they are long
+/// cost     O(P) as a rule: smooth contours are compared by halving (monotone.h), others edge by edge within the cells of a
+///          grid about as fine as they are long
 bool find_contacts(const ContoursView& contours, ContactScratch& scratch, Buffer<std::uint32_t>& group);
 
 }  // namespace lamina::slice
