@@ -20,6 +20,7 @@ import sys
 
 import make_parts
 import report
+from measure import say
 
 ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
 LEAST, MOST, FLAT_MM2 = 0.05, 0.3, 5
@@ -31,10 +32,6 @@ PARTS = {
     "bunny": "stanford_bunny.stl",
     "sphere of 40 mm": None,
 }
-
-
-def say(text):
-    print(text, file=sys.stderr, flush=True)
 
 
 def run(command, log=None):

@@ -1,0 +1,48 @@
+"""What every comparison of whole programs does: run them, take their seconds and memory, take medians."""
+import os
+import statistics
+import subprocess
+import sys
+import time
+
+
+def say(text):
+    print(text, file=sys.stderr, flush=True)
+
+
+def busy_and_total():
+    """Processor seconds in use and in all since the machine started."""
+    with open("/proc/stat", encoding="ascii") as file:
+        user, nice, system, idle, wait, irq, softirq, steal = map(int, file.readline().split()[1:9])
+    hertz = os.sysconf("SC_CLK_TCK")
+    busy = user + nice + system + irq + softirq + steal
+    return busy / hertz, (busy + idle + wait) / hertz
+
+
+def measured(command, log):
+    """Runs a command; wall seconds, processor seconds, peak resident MiB, and the share of the processors that other
+    programs used meanwhile. Any failure ends the benchmark."""
+    os.sync()
+    before = busy_and_total()
+    with open(log, "wb") as output:
+        start = time.perf_counter()
+        code = subprocess.call(["/usr/bin/time", "-q", "-o", log + ".time", "-f", "%U %S %M"] + command,
+                               stdin=subprocess.DEVNULL, stdout=output, stderr=subprocess.STDOUT,
+                               env=dict(os.environ, LC_ALL="C"))
+        wall = time.perf_counter() - start
+    if code != 0:
+        sys.exit(f"bench: exit code {code} of: {' '.join(command)}\n" + open(log, errors="replace").read()[-2000:])
+    after = busy_and_total()
+    with open(log + ".time", encoding="ascii") as file:
+        user, system, peak = file.read().split()[-3:]
+    own = float(user) + float(system)
+    others = max(0.0, after[0] - before[0] - own) / max(1e-9, after[1] - before[1])
+    return {"wall": wall, "processor": own, "peak_mib": int(peak) / 1024, "others": others}
+
+
+def median_of(runs):
+    walls = [run["wall"] for run in runs]
+    return {"wall": statistics.median(walls), "fastest": min(walls), "slowest": max(walls),
+            "processor": statistics.median(run["processor"] for run in runs),
+            "peak_mib": statistics.median(run["peak_mib"] for run in runs), "runs": len(runs),
+            "others": sum(run["others"] * run["wall"] for run in runs) / sum(walls)}
