@@ -177,7 +177,8 @@ std::uint64_t PorousPlan::bytes_expected(std::uint32_t layer) const {
   const std::uint64_t rows = grid_.rows(), spans = spans_expected(layer);
   const std::uint64_t of_beads = 24 * spans + 4 * rows;         // spans, and in the order of rows
   const std::uint64_t of_images = 2 * (8 * spans + 4 * rows);   // laid, inner
-  return slices_->bytes_bound(layer) + of_beads + of_images;
+  const std::uint64_t of_paths = 20 * spans;                    // a point of a toolpath is 17 bytes, and has a span or more
+  return slices_->bytes_bound(layer) + of_beads + of_images + of_paths;
 }
 
 }  // namespace lamina::pipeline

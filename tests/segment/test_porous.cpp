@@ -178,8 +178,8 @@ TEST_F(PorousJob, PorosityOfTheBitmapIsThatOfThePlanWithinThePixelsOfItsEdges) {
       request.all.thick_width_mm = request.all.continuous_width_mm = 0.4;
       const auto segments = pipeline::plan_segments(request, segment::Calibration(), fill);
       ASSERT_TRUE(segments.ok());
-      const Box& part = plan->slices().box_of_body(0);
-      const auto cut = pipeline::layer_cut(segments->base, plan->slices().filling(0, layer), layer, part);
+      const auto& room = plan->slices().areas().at(0);
+      const auto cut = pipeline::layer_cut(segments->base, plan->slices().filling(room, layer), layer, room.box);
       ASSERT_TRUE(cut.ok());
       cl::Clipper clipper;
       int thin = 0;
