@@ -1,0 +1,39 @@
+# The Python module (python/): `import lamina` over the library, with arrays of numpy. Debian's python3-dev, pybind11-dev
+# and python3-numpy. A module cannot be part of a sanitized build: Python itself is not sanitized.
+set(Python_FIND_STRATEGY LOCATION)
+if(NOT Python_EXECUTABLE AND EXISTS /usr/bin/python3)
+  set(Python_EXECUTABLE /usr/bin/python3)  # the system's, whose numpy a package can ask for; not one that stands before it
+endif()
+set(python_default OFF)
+if(NOT LAMINA_SANITIZE)
+  find_package(Python 3.9 QUIET COMPONENTS Interpreter Development.Module)
+  find_package(pybind11 2.10 QUIET)
+  if(Python_FOUND AND pybind11_FOUND)
+    set(python_default ON)
+  endif()
+endif()
+option(LAMINA_PYTHON "Build the Python module" ${python_default})
+if(NOT LAMINA_PYTHON)
+  message(STATUS "NOT BUILT: the Python module (it needs python3-dev and pybind11-dev, and no sanitizer)")
+  return()
+endif()
+if(NOT Python_FOUND OR NOT pybind11_FOUND)
+  message(FATAL_ERROR "LAMINA_PYTHON: install Debian's python3-dev and pybind11-dev, or configure with -DLAMINA_PYTHON=OFF")
+endif()
+
+# What is linked into a module must be able to lie anywhere; hidden symbols keep calls within it direct.
+set_target_properties(lamina_stages lamina_pipeline PROPERTIES POSITION_INDEPENDENT_CODE ON CXX_VISIBILITY_PRESET hidden)
+pybind11_add_module(lamina_python MODULE NO_EXTRAS python/module.cpp python/arrays.cpp)
+set_target_properties(lamina_python PROPERTIES OUTPUT_NAME lamina LIBRARY_OUTPUT_DIRECTORY ${PROJECT_BINARY_DIR}/python)
+target_link_libraries(lamina_python PRIVATE lamina::pipeline)
+# numpy is asked for when arrays are made; its headers are not needed. Size over speed: what is called is optimised.
+target_compile_options(lamina_python PRIVATE $<$<NOT:$<CONFIG:Debug>>:-Os> -Wno-conversion)
+set(LAMINA_PYTHON_DIR lib/python3/dist-packages CACHE STRING "Where the Python module is installed, below the prefix")
+install(TARGETS lamina_python LIBRARY DESTINATION ${LAMINA_PYTHON_DIR} COMPONENT python)
+
+if(LAMINA_TESTS)
+  add_test(NAME Python.ArraysAreTheDecodedFilesOfTheProgram
+           COMMAND ${Python_EXECUTABLE} ${PROJECT_SOURCE_DIR}/tests/python/test_module.py $<TARGET_FILE:lamina>)
+  set_tests_properties(Python.ArraysAreTheDecodedFilesOfTheProgram PROPERTIES SKIP_RETURN_CODE 77 TIMEOUT 300
+                       ENVIRONMENT "PYTHONPATH=${PROJECT_BINARY_DIR}/python;PYTHONDONTWRITEBYTECODE=1")
+endif()

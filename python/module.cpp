@@ -1,0 +1,318 @@
+// python/module.cpp: `import lamina`.
+#include <fmt/format.h>
+#include <pybind11/stl.h>
+
+#include <atomic>
+#include <chrono>
+#include <future>
+#include <memory>
+#include <mutex>
+#include <optional>
+
+#include "arrays.h"
+#include "pipeline/command_line.h"
+#include "pipeline/jet.h"
+#include "pipeline/jet_plan.h"
+#include "pipeline/job_keys.h"
+#include "pipeline/job_toml.h"
+#include "pipeline/output_directory.h"
+#include "pipeline/slice.h"
+#include "pipeline/summary.h"
+
+namespace lamina::python {
+namespace {
+
+using namespace pybind11::literals;
+using pipeline::Job;
+
+/// A value of a setting as a job's keys read it: lists are separated by commas.
+std::string setting_text(const py::handle& value) {
+  if (py::isinstance<py::bool_>(value)) return value.cast<bool>() ? "true" : "false";
+  if (py::isinstance<py::str>(value) || !py::hasattr(value, "__iter__")) return py::str(value);
+  std::string text;
+  for (const py::handle item : value) text += (text.empty() ? "" : ",") + setting_text(item);
+  return text;
+}
+
+/// A checked job; one without an output writes nothing.
+Job make_job(const py::object& parts, const py::dict& settings, const std::string& file, const std::string& output = {}) {
+  Job job;
+  if (!file.empty()) {
+    if (Status status = pipeline::read_job(file, job); !status) raise(status.error());
+  }
+  const auto add = [&](const py::handle& path) {
+    job.parts.emplace_back();
+    job.parts.back().path = py::module_::import("os").attr("fspath")(path).cast<std::string>();
+  };
+  if (!parts.is_none()) {
+    job.parts.clear();
+    if (py::isinstance<py::str>(parts) || py::hasattr(parts, "__fspath__")) {
+      add(parts);
+    } else {
+      for (const py::handle path : parts) add(path);
+    }
+  }
+  for (const auto& [key, value] : settings) {
+    const std::string assignment = fmt::format("{}={}", py::str(key).cast<std::string>(), setting_text(value));
+    if (Status status = pipeline::set_key(job, assignment); !status) raise(status.error());
+  }
+  job.output = output;
+  job.dry_run = output.empty();
+  if (Status status = pipeline::check_job(job); !status) raise(status.error());
+  return job;
+}
+
+/// A layer of a job: its place, and the image that it has.
+struct PlannedLayer : Image {
+  Layer layer;
+};
+
+struct LayerEntry {
+  std::int32_t bottom, thickness;
+  std::uint8_t reason;
+};
+
+/// Contours and the body that each is of.
+struct LayerContours {
+  slice::LayerContours of;
+};
+
+class Plan {
+ public:
+  explicit Plan(Job job) : plan_(without_lock([&] { return pipeline::JetPlan::make(job); })) {}
+
+  const pipeline::JetPlan& of() const { return plan_; }
+
+  std::uint32_t index(std::int64_t asked) const {
+    const std::int64_t count = plan_.layers().size(), index = asked < 0 ? asked + count : asked;
+    if (index < 0 || index >= count) throw py::index_error(fmt::format("layer {}: there are {} layers", asked, count));
+    return static_cast<std::uint32_t>(index);
+  }
+
+  PlannedLayer layer(std::uint32_t index) const {
+    PlannedLayer made;
+    made.runs = without_lock([&] { return plan_.layer(index); });
+    made.dpi_x = plan_.grid().x.dpi();
+    made.dpi_y = plan_.grid().y.dpi();
+    made.layer = plan_.layers()[index];
+    return made;
+  }
+
+  std::unique_ptr<LayerContours> contours(std::uint32_t index) {
+    return without_lock([&]() -> Result<std::unique_ptr<LayerContours>> {
+      {
+        const std::lock_guard lock(mutex_);
+        if (!slices_) {
+          auto made = pipeline::SlicePlan::make(plan_.job(), [](const pipeline::ProgressEvent&) {});
+          if (!made) return made.error();
+          slices_.emplace(std::move(*made));
+        }
+      }
+      pipeline::SlicePlan::Work work;
+      if (auto report = slices_->slicer().layer(index, work.scratch, work.contours); !report) return report.error();
+      return std::make_unique<LayerContours>(LayerContours{std::move(work.contours)});
+    });
+  }
+
+  py::array heights() const {
+    const heights::LayerTable& table = plan_.layers();
+    py::array_t<LayerEntry> array(table.size());
+    LayerEntry* entry = array.mutable_data();
+    for (std::uint32_t i = 0; i < table.size(); ++i) {
+      const Layer layer = table[i];
+      *entry++ = {layer.bottom, layer.thickness, static_cast<std::uint8_t>(layer.reason)};
+    }
+    return array;
+  }
+
+ private:
+  pipeline::JetPlan plan_;
+  std::mutex mutex_;
+  std::optional<pipeline::SlicePlan> slices_;  // made when contours are asked for the first time
+};
+
+/// Plans a layer when it is asked for the next one, and keeps none.
+struct LayerIterator {
+  std::shared_ptr<Plan> plan;
+  std::uint32_t next, end;
+};
+
+/// run_jet on a thread of its own, so that Ctrl-C stops it: finished layers are kept then.
+pipeline::JetSummary run_job(const Job& job) {
+  std::atomic<bool> cancel{false};
+  auto running = std::async(std::launch::async, [&] {
+    return pipeline::run_jet(job, [](const pipeline::ProgressEvent&) {}, cancel);
+  });
+  while (true) {
+    {
+      const py::gil_scoped_release release;
+      if (running.wait_for(std::chrono::milliseconds(100)) == std::future_status::ready) break;
+    }
+    if (PyErr_CheckSignals() == 0) continue;
+    cancel = true;
+    const py::gil_scoped_release release;
+    running.wait();
+    break;
+  }
+  if (cancel) throw py::error_already_set();
+  auto summary = running.get();
+  if (!summary) raise(summary.error());
+  return std::move(*summary);
+}
+
+py::object jet(const std::string& output, const py::object& parts, const py::dict& settings, const std::string& file,
+               bool resume, bool overwrite) {
+  if (output.empty()) raise({Fault::kUsage, "output is empty; name a directory"});
+  Job job = make_job(parts, settings, file, output);
+  job.resume = resume;
+  job.overwrite = overwrite;
+  const std::string said = pipeline::summary_json(job, run_job(job));
+  return py::module_::import("json").attr("loads")(said);
+}
+
+template <class Target>
+void append_keys(std::span<const pipeline::Key<Target>> keys, const Target& presets, py::list& list) {
+  for (const auto& key : keys) {
+    list.append(py::dict("key"_a = fmt::format("{}.{}", key.section, key.name), "flag"_a = std::string(key.flag),
+                         "value"_a = std::string(key.value), "default"_a = key.write(presets),
+                         "meaning"_a = std::string(key.meaning), "decides_bytes"_a = key.decides_bytes));
+  }
+}
+
+void define_layer(py::module_& module) {
+  PYBIND11_NUMPY_DTYPE(LayerEntry, bottom, thickness, reason);
+  py::class_<PlannedLayer, Image>(module, "Layer", "A layer of a plan: an Image, and where it lies. Heights are nm above the bed.")
+      .def_property_readonly("index", [](const PlannedLayer& l) { return l.layer.index; }, "From 0 at the bottom.")
+      .def_property_readonly("bottom", [](const PlannedLayer& l) { return l.layer.bottom; })
+      .def_property_readonly("thickness", [](const PlannedLayer& l) { return l.layer.thickness; })
+      .def_property_readonly("plane", [](const PlannedLayer& l) { return l.layer.plane(); }, "Where the parts are sampled.")
+      .def_property_readonly("reason", [](const PlannedLayer& l) { return std::string(reason_name(l.layer.reason)); })
+      .def("__repr__", [](const PlannedLayer& l) {
+        return fmt::format("<lamina.Layer {}: {} to {} mm, {} x {} pixels, {} set>", l.layer.index, mm(l.layer.bottom),
+                           mm(std::int64_t{l.layer.bottom} + l.layer.thickness), l.runs.columns, l.runs.view().rows(), set_pixels(l.runs));
+      });
+  py::class_<LayerContours>(module, "Contours", "Closed contours of a layer: a sequence of n x 2 arrays, nm on the bed, outer ones "
+                                                "counter-clockwise, those around holes clockwise.")
+      .def("__len__", [](const LayerContours& c) { return c.of.contours.size(); })
+      .def("__getitem__",
+           [](const py::object& self, std::int64_t asked) {
+             const Contours& contours = self.cast<const LayerContours&>().of.contours;
+             const std::int64_t index = asked < 0 ? asked + contours.size() : asked;
+             if (index < 0 || index >= contours.size()) throw py::index_error(fmt::format("contour {}: there are {}", asked, contours.size()));
+             const auto points = contours[static_cast<std::uint32_t>(index)];
+             return view(&points.data()->x, {static_cast<py::ssize_t>(points.size()), 2}, self);
+           })
+      .def_property_readonly(
+          "offset",
+          [](const py::object& self) {
+            const auto& offset = self.cast<const LayerContours&>().of.contours.offset;
+            return view(offset.data(), {static_cast<py::ssize_t>(offset.size())}, self);
+          },
+          "uint32, contours + 1: contour c owns point[offset[c]:offset[c + 1]]. A view, read-only.")
+      .def_property_readonly(
+          "point",
+          [](const py::object& self) {
+            const auto& point = self.cast<const LayerContours&>().of.contours.point;
+            return view(reinterpret_cast<const std::int32_t*>(point.data()), {static_cast<py::ssize_t>(point.size()), 2}, self);
+          },
+          "int32, points x (x, y), nm on the bed. A view, read-only.")
+      .def_property_readonly("area_mm2", [](const LayerContours& c) { return square_mm(doubled_area(c.of.contours)); });
+  py::class_<LayerIterator>(module, "LayerIterator")
+      .def("__iter__", [](LayerIterator& self) -> LayerIterator& { return self; })
+      .def("__length_hint__", [](const LayerIterator& self) { return self.end - self.next; })
+      .def("__next__", [](LayerIterator& self) {
+        if (self.next >= self.end) throw py::stop_iteration();
+        return self.plan->layer(self.next++);
+      });
+}
+
+void define_plan(py::module_& module) {
+  py::class_<Plan, std::shared_ptr<Plan>>(module, "Plan",
+                                          "A job with its parts loaded: a sequence of layers that are planned when they are asked "
+                                          "for. Threads may ask at the same time; the interpreter's lock is free meanwhile.")
+      .def("__len__", [](const Plan& plan) { return plan.of().layers().size(); })
+      .def("__getitem__", [](const Plan& plan, std::int64_t asked) { return plan.layer(plan.index(asked)); })
+      .def("__iter__", [](const std::shared_ptr<Plan>& plan) { return LayerIterator{plan, 0, plan->of().layers().size()}; })
+      .def(
+          "layers",
+          [](const std::shared_ptr<Plan>& plan, std::uint32_t first, std::optional<std::uint32_t> end) {
+            const std::uint32_t count = plan->of().layers().size();
+            return LayerIterator{plan, first, std::min(end.value_or(count), count)};
+          },
+          "first"_a = 0, "end"_a = py::none(), "Layers first to end, each planned when it is asked for and kept by nobody else.")
+      .def("contours", [](Plan& plan, std::int64_t asked) { return plan.contours(plan.index(asked)); }, "index"_a,
+           "Contours of a layer, as lamina slice cuts them. The first call loads the parts once more.")
+      .def_property_readonly("heights", &Plan::heights,
+                             "Structured array, a row a layer: bottom and thickness in nm (int32), reason (index into lamina.reasons).")
+      .def_property_readonly("columns", [](const Plan& plan) { return plan.of().grid().columns(); })
+      .def_property_readonly("rows", [](const Plan& plan) { return plan.of().grid().rows(); })
+      .def_property_readonly("dpi", [](const Plan& plan) { return py::make_tuple(plan.of().grid().x.dpi(), plan.of().grid().y.dpi()); }, "Along x and y.")
+      .def_property_readonly("bed_mm", [](const Plan& plan) { return plan.of().job().bed_mm; }, "Width (x) and depth (y).")
+      .def_property_readonly("job", [](const Plan& plan) { return pipeline::job_text(plan.of().job(), ""); },
+                             "The job as a TOML file would say it.")
+      .def_property_readonly(
+          "parts",
+          [](const Plan& plan) {
+            py::list parts;
+            for (const auto& part : plan.of().parts()) {
+              const auto& [lo, hi] = part.bounds;
+              parts.append(py::dict("path"_a = part.path, "copies"_a = part.copies, "triangles"_a = part.triangles,
+                                    "low"_a = py::make_tuple(lo.x, lo.y, lo.z), "high"_a = py::make_tuple(hi.x, hi.y, hi.z)));
+            }
+            return parts;
+          },
+          "One dict a part; low and high are the corners of the first copy's box on the bed, nm.");
+}
+
+}  // namespace
+}  // namespace lamina::python
+
+PYBIND11_MODULE(lamina, module) {
+  using namespace lamina;
+  using namespace lamina::python;
+  module.doc() =
+      "Plans additive-manufacturing jobs: meshes in, the exact 1-bit image of every layer out.\n\n"
+      "Settings are the keys of a job file (docs/job.md), as {'bed.dpi': 600, 'layers.thickness_mm': 0.1}; lamina.keys() lists\n"
+      "them. Lengths in settings are mm, as in job files; in arrays they are whole nanometres. What fails raises lamina.Error\n"
+      "with one line that says where, what is wrong and what to do.";
+  module.attr("__version__") = std::string(pipeline::version());
+  py::list reasons;
+  for (int reason = 0; reason <= static_cast<int>(LayerReason::kFlat); ++reason) {
+    reasons.append(std::string(reason_name(static_cast<LayerReason>(reason))));
+  }
+  module.attr("reasons") = reasons;
+  define_errors(module);
+  define_part(module);
+  define_image(module);
+  define_layer(module);
+  define_plan(module);
+  module.def(
+      "load",
+      [](const py::object& path, const py::dict& settings) {
+        const pipeline::Job job = make_job(py::make_tuple(path), settings, "");
+        return without_lock([&]() -> Result<std::shared_ptr<Part>> {
+          Result<Part> part = load::load(job.parts[0].path, pipeline::load_options(job, job.parts[0]));
+          if (!part) return part.error();
+          return std::make_shared<Part>(std::move(*part));
+        });
+      },
+      "path"_a, "settings"_a = py::dict(),
+      "Reads a part file (STL, OBJ, 3MF, gzip). Settings that matter are part.* and load.*, as {'part.unit': 'inch'}.");
+  module.def(
+      "plan",
+      [](const py::object& parts, const py::dict& settings, const std::string& job) {
+        return std::make_shared<Plan>(make_job(parts, settings, job));
+      },
+      "parts"_a = py::none(), "settings"_a = py::dict(), "job"_a = "",
+      "A job ready to give its layers. parts: a path or several; job: a TOML job file, which settings override.");
+  module.def("jet", &jet, "output"_a, "parts"_a = py::none(), "settings"_a = py::dict(), "job"_a = "", "resume"_a = false,
+             "overwrite"_a = false,
+             "Plans all layers into a directory, as lamina jet does, on all processors; returns its summary. Ctrl-C stops it, and "
+             "resume=True goes on.");
+  module.def("keys", [] {
+    py::list list;
+    append_keys<pipeline::Job>(pipeline::job_keys(), {}, list);
+    append_keys<pipeline::PartRequest>(pipeline::part_keys(), {}, list);
+    return list;
+  }, "Every key of a job: key, option of the program, value, default, meaning, and whether it decides bytes.");
+}

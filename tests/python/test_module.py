@@ -1,0 +1,198 @@
+"""tests/python/test_module.py LAMINA: the module `lamina` against the program LAMINA: its arrays are what the files decode to."""
+import gc
+import pathlib
+import resource
+import subprocess
+import sys
+import tempfile
+import threading
+import unittest
+
+try:
+    import numpy as np
+except ImportError:
+    print("NOT RUN: the Python module; install Debian's python3-numpy", file=sys.stderr)
+    sys.exit(77)
+import lamina
+
+PROGRAM = sys.argv.pop(1)
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+PART = str(ROOT / "tests/corpus/nist_am_test_artifact_v3b.stl")
+CROWN = str(ROOT / "tests/corpus/dental_crown.stl")
+SETTINGS = {"bed.size_mm": (200, 160), "bed.dpi": (300, 200), "layers.thickness_mm": 0.5}
+
+
+def run(*words):
+    return subprocess.run([PROGRAM, *map(str, words)], capture_output=True, text=True)
+
+
+class Module(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.place = tempfile.TemporaryDirectory()
+        cls.directory = pathlib.Path(cls.place.name)
+        done = run("jet", PART, "--bed", "200x160", "--dpi", "300x200", "--layer", "0.5", "--quiet", "-o", cls.directory / "out")
+        assert done.returncode == 0, done.stderr
+        cls.plan = lamina.plan(PART, SETTINGS)
+
+    @classmethod
+    def tearDownClass(cls):
+        cls.place.cleanup()
+
+    def file(self, index):
+        return self.directory / "out/layers" / f"{index:06}.tif"
+
+    def test_every_layer_is_the_decoded_file_of_the_program(self):
+        count = 0
+        for layer in self.plan:
+            decoded = lamina.read_image(str(self.file(layer.index)))
+            np.testing.assert_array_equal(layer.row_offset, decoded.row_offset)
+            np.testing.assert_array_equal(layer.change, decoded.change)
+            self.assertEqual(layer.encode(), self.file(layer.index).read_bytes())
+            count += 1
+        self.assertEqual(count, len(list((self.directory / "out/layers").iterdir())))
+        self.assertEqual(count, len(self.plan))
+
+    def test_pixels_are_those_of_a_reader_that_is_not_ours(self):
+        layer = self.plan[3]
+        layer.save(str(self.directory / "layer.pbm"))
+        raw = (self.directory / "layer.pbm").read_bytes()
+        bits = np.unpackbits(np.frombuffer(raw[-self.plan.rows * ((self.plan.columns + 7) // 8):], np.uint8)
+                             .reshape(self.plan.rows, -1), axis=1)[:, :self.plan.columns]
+        image = layer.pixels()
+        self.assertEqual(image.dtype, bool)
+        np.testing.assert_array_equal(image, bits != 0)
+        self.assertEqual(int(image.sum()), layer.set_pixels)
+        np.testing.assert_array_equal(layer.pixels(100, 300, 41, 777), image[100:300, 41:777])
+        for wrong in ((5, 4), (0, self.plan.rows + 1), (0, 1, 0, self.plan.columns + 1)):
+            with self.assertRaises(ValueError):
+                layer.pixels(*wrong)
+
+    def test_arrays_are_views_that_keep_their_owner(self):
+        layer = self.plan[0]
+        change = layer.change
+        self.assertFalse(change.flags.owndata)
+        self.assertFalse(change.flags.writeable)
+        self.assertIs(change.base, layer)
+        self.assertEqual(change.ctypes.data, layer.change.ctypes.data)
+        copy = change.copy()
+        del layer
+        gc.collect()
+        np.testing.assert_array_equal(change, copy)
+        triangles = lamina.load(CROWN).meshes[0].triangles  # neither the part nor its mesh is held by anything else
+        gc.collect()
+        self.assertEqual(triangles.shape[1:], (3, 3))
+        self.assertTrue((triangles.reshape(-1, 3).max(axis=0) > triangles.reshape(-1, 3).min(axis=0)).all())
+
+    def test_layers_are_planned_when_they_are_asked_for_and_kept_by_nobody(self):
+        plan = lamina.plan(PART, {**SETTINGS, "layers.thickness_mm": 0.0001})
+        self.assertEqual(len(plan), 170000)
+        before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+        for layer in plan.layers(0, 1500):
+            pass
+        grown = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before
+        self.assertLess(grown, 1500 * layer.change.nbytes // 1024 // 4)
+        self.assertEqual(layer.index, 1499)
+        self.assertEqual(plan[-1].index, 169999)
+        with self.assertRaises(IndexError):
+            plan[170000]
+
+    def test_other_threads_work_while_a_layer_is_planned(self):
+        plan = lamina.plan(PART, SETTINGS)
+        made = [None] * len(plan)
+
+        def work(begin):
+            for index in range(begin, len(plan), 3):
+                made[index] = plan[index]
+        threads = [threading.Thread(target=work, args=(i,)) for i in range(3)]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
+        for layer, alone in zip(made, self.plan):
+            np.testing.assert_array_equal(layer.change, alone.change)
+
+    def test_heights_add_up(self):
+        plan = lamina.plan(PART, {**SETTINGS, "heights.mode": "optimal", "heights.thickness_mm": "0.1..0.5"})
+        table = plan.heights
+        self.assertEqual(len(table), len(plan))
+        np.testing.assert_array_equal(table["bottom"][1:], np.cumsum(table["thickness"])[:-1])
+        self.assertEqual(table["bottom"][0], 0)
+        self.assertEqual((plan[1].bottom, plan[1].thickness), tuple(table[1])[:2])
+        self.assertEqual(plan[1].plane, plan[1].bottom + plan[1].thickness // 2)
+        self.assertEqual(lamina.reasons[table["reason"][1]], plan[1].reason)
+        said = run("heights", PART, "--heights", "optimal", "--thickness", "0.1..0.5", "--format", "csv", "-o", self.directory / "t.csv")
+        self.assertEqual(said.returncode, 0, said.stderr)
+        rows = (self.directory / "t.csv").read_text().count("\n")
+        self.assertIn(rows - len(table), (0, 1, 2))  # with a line of names
+
+    def test_contours_enclose_what_is_set(self):
+        contours, layer = self.plan.contours(4), self.plan[4]
+        area = 0.0
+        for points in contours:
+            self.assertEqual(points.dtype, np.int32)
+            x, y = points.astype(float).T / 1e6
+            area += 0.5 * float(np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y))
+        self.assertAlmostEqual(area, contours.area_mm2, places=6)
+        pixel = 25.4 ** 2 / (self.plan.dpi[0] * self.plan.dpi[1])
+        self.assertAlmostEqual(layer.set_pixels * pixel / area, 1, places=2)
+        self.assertEqual(contours.offset[-1], len(contours.point))
+        self.assertIs(contours.point.base, contours)
+
+    def test_a_whole_job_gives_the_bytes_of_the_program(self):
+        summary = lamina.jet(str(self.directory / "again"), PART, SETTINGS)
+        self.assertEqual(summary["layers_total"], len(self.plan))
+        for name in sorted(path.relative_to(self.directory / "out") for path in (self.directory / "out").rglob("*")):
+            if (self.directory / "out" / name).is_file():
+                self.assertEqual((self.directory / "out" / name).read_bytes(), (self.directory / "again" / name).read_bytes(), name)
+        with self.assertRaises(lamina.UsageError):
+            lamina.jet(str(self.directory / "again"), PART, {**SETTINGS, "bed.dpi": 100})
+
+    def test_errors_are_the_one_line_of_the_program(self):
+        for call, kind, code, words in (
+                (lambda: lamina.plan(str(ROOT / "tests/corpus/broken/empty_file.stl")), lamina.InputError, 3, "empty_file.stl"),
+                (lambda: lamina.plan("nowhere.stl"), lamina.InputError, 3, "nowhere.stl"),
+                (lambda: lamina.plan(PART, {"bed.dip": 600}), lamina.UsageError, 2, "bed.dip"),
+                (lambda: lamina.plan(PART, {"bed.dpi": -1}), lamina.UsageError, 2, "bed.dpi"),
+                (lambda: lamina.plan(), lamina.UsageError, 2, "part"),
+                (lambda: self.plan[0].encode("gif"), lamina.UsageError, 2, "gif"),
+                (lambda: self.plan[0].save(str(self.directory / "no/where.tif")), lamina.OutputError, 4, "where.tif"),
+                (lambda: lamina.read_image(PART), lamina.VerificationError, 5, "nist")):
+            with self.assertRaises(kind) as caught:
+                call()
+            self.assertEqual(caught.exception.code, code)
+            self.assertIn(words, str(caught.exception))
+            self.assertNotIn("\n", str(caught.exception))
+            self.assertIsInstance(caught.exception, lamina.Error)
+        self.assertTrue(issubclass(lamina.OutputError, OSError) and issubclass(lamina.UsageError, ValueError))
+
+    def test_keys_are_those_of_job_files_and_everything_is_described(self):
+        saved = self.directory / "job.toml"
+        self.assertEqual(run("jet", PART, "--save-job", saved, "--dry-run", "--quiet").returncode, 0)
+        keys = {key["key"] for key in lamina.keys()}
+        for section in ("bed.size_mm", "layers.thickness_mm", "part.rotate_deg", "run.memory"):
+            self.assertIn(section, keys)
+        planned = lamina.plan(job=str(saved), settings=SETTINGS)
+        np.testing.assert_array_equal(planned[2].change, self.plan[2].change)
+        for name in ("load", "plan", "jet", "read_image", "image_formats", "keys", "Plan", "Layer", "Image", "Mesh", "Part", "Contours"):
+            self.assertTrue(getattr(lamina, name).__doc__, name)
+        self.assertEqual("lamina " + lamina.__version__, run("--version").stdout.strip())
+
+    def test_a_plan_that_nobody_holds_is_gone_and_an_iterator_holds_its_plan(self):
+        plan = lamina.plan(CROWN, {"bed.dpi": 100, "layers.thickness_mm": 1})
+        layers = iter(plan)
+        del plan
+        gc.collect()
+        self.assertEqual(sum(1 for _ in layers), 10)
+
+    def test_the_example_draws_a_layer(self):
+        picture = self.directory / "picture.png"
+        said = subprocess.run([sys.executable, ROOT / "python/examples/plot_layer.py", CROWN, "--height", "4", "-o", picture, "--library"],
+                              capture_output=True, text=True)
+        self.assertEqual(said.returncode, 0, said.stderr)
+        self.assertIn("mm2", said.stdout)
+        self.assertGreater(lamina.read_image(str(picture)).set_pixels, 0)
+
+
+if __name__ == "__main__":
+    unittest.main(verbosity=1)
