@@ -16,15 +16,17 @@ CommandSpec report_spec() {
   spec.name = "report";
   spec.summary =
       "Writes one HTML page about a finished job: its layers to leaf, zoom and pan through, the parts from three sides,\n"
-      "area and thickness over the height, warnings, the job and all hashes. The page needs no network and no other file.";
+      "area, thickness and time over the height, warnings, the job and all hashes. The page needs no network and no other file.";
   spec.operand = "DIR";
   spec.operand_meaning = "finished directory of lamina jet";
   spec.options = {{"-o,--output", "HTML", "the page", "", ""},
                   {"--most-bytes", "SIZE", "layers are left out evenly until the page is smaller", "19M", ""},
+                  {"--parts", "DIR", "where the part files are, for the views from three sides; a file, or several times", "", ""},
                   {"--quiet", "", "say nothing but errors", "", ""}};
   spec.closing =
       "Examples:\n"
       "  lamina report out -o report.html\n"
+      "  lamina report out -o report.html --parts parts/      the parts themselves from three sides\n"
       "  lamina report out -o small.html --most-bytes 2M      for a mail";
   return spec;
 }
@@ -46,11 +48,13 @@ int run_report_command(const std::vector<std::string>& texts) {
     const std::string wrong = read_bytes(arguments->text("--most-bytes"), options.size_limit);
     if (!wrong.empty()) return fail({Fault::kUsage, "--most-bytes: " + wrong});
   }
+  options.parts = arguments->all("--parts");
   const Result<Report> report = make_report(arguments->operands.front(), options);
   if (!report) return fail(report.error());
   if (Status status = write::write_file(output, std::as_bytes(std::span(report->page))); !status) return fail(status.error());
   if (!arguments->has("--quiet")) {
     say(fmt::format("{}: {} of {} layers to look at, {}", output, report->held, report->layers, readable_bytes(report->page.size())));
+    if (!report->without_parts.empty()) say("views are of the layers: " + report->without_parts);
   }
   return 0;
 }

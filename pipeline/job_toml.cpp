@@ -161,12 +161,9 @@ Status set_in(std::string_view assignment, std::string_view section, std::string
 
 }  // namespace
 
-Status read_job(const std::string& path, Job& job) {
-  std::error_code error;
-  if (!fs::is_regular_file(path, error)) {
-    return Error{Fault::kUsage, fmt::format("{}: no such job file", path)};
-  }
-  const toml::parse_result parsed = toml::parse_file(path);
+namespace {
+
+Status read_parsed(const std::string& path, const toml::parse_result& parsed, Job& job) {
   if (!parsed) {
     const toml::source_position at = parsed.error().source().begin;
     return Error{Fault::kUsage,
@@ -197,6 +194,20 @@ Status read_job(const std::string& path, Job& job) {
     }
   }
   return {};
+}
+
+}  // namespace
+
+Status read_job(const std::string& path, Job& job) {
+  std::error_code error;
+  if (!fs::is_regular_file(path, error)) {
+    return Error{Fault::kUsage, fmt::format("{}: no such job file", path)};
+  }
+  return read_parsed(path, toml::parse_file(path), job);
+}
+
+Status read_job_text(std::string_view text, const std::string& path, Job& job) {
+  return read_parsed(path, toml::parse(text), job);
 }
 
 Status set_key(Job& job, std::string_view assignment) {

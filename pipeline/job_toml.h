@@ -14,6 +14,9 @@ namespace lamina::pipeline {
 /// errors  kUsage, one line: file, line, key, what is wrong. The job is then undefined.
 Status read_job(const std::string& path, Job& job);
 
+/// The same for the text of a job file, as one that a manifest records; `path` is where it would lie.
+Status read_job_text(std::string_view text, const std::string& path, Job& job);
+
 /// Sets one key from "section.key=value". part.key sets it for every part, part.2.key for the second one.
 /// errors  kUsage, one line that begins with the assignment
 Status set_key(Job& job, std::string_view assignment);

@@ -5,24 +5,15 @@
 
 #include <algorithm>
 #include <filesystem>
-#include <fstream>
-#include <iterator>
 #include <map>
 
 #include "pipeline/layer_images.h"
-#include "pipeline/machine_profile.h"
-#include "pipeline/print_program.h"
-#include "pipeline/replay.h"
+#include "pipeline/replay_job.h"
 #include "stages/write/picture/swath_view.h"
 #include "stages/write/read_image.h"
 
 namespace lamina::pipeline {
 namespace {
-
-std::string whole_file(const std::string& path) {
-  std::ifstream file(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
-}
 
 struct SweepSeen {
   std::int64_t first_line;
@@ -58,10 +49,9 @@ Result<Buffer<std::byte>> draw_swath(const std::string& directory, const Manifes
     return Error{Fault::kUsage, fmt::format("{}: the job has no print program; plan it with --machine", directory)};
   }
   const auto path = [&](const std::string& name) { return (std::filesystem::path(directory) / name).string(); };
-  const auto machine = read_machine(whole_file(path("program/machine.toml")), "program/machine.toml");
-  if (!machine) return machine.error();
-  const auto built = VirtualMachine::build(*machine, head.grid.columns(), head.grid.rows());
+  const auto built = machine_of_job(directory, head);
   if (!built) return built.error();
+  const Machine& machine = built->profile();
   Runs whole;
   LayerRecord record;
   record.layer.index = choice.layer;
@@ -76,7 +66,7 @@ Result<Buffer<std::byte>> draw_swath(const std::string& directory, const Manifes
   std::vector<VirtualMachine::Drop> drops;
   std::map<std::uint32_t, SweepSeen> sweeps;
   std::vector<std::uint32_t> order;
-  const auto replayed = built->run(whole_file(path(program_file_name(choice.layer, head.program_extension))), choice.layer,
+  const auto replayed = built->run(program_of_layer(directory, head, choice.layer), choice.layer,
                                    [&](const VirtualMachine::Drop& drop) {
                                      drops.push_back(drop);
                                      const auto [found, fresh] = sweeps.try_emplace(drop.sweep, SweepSeen{drop.first_line, drop.step, drop.step, false});
@@ -99,8 +89,8 @@ Result<Buffer<std::byte>> draw_swath(const std::string& directory, const Manifes
   view.grid = head.grid;
   view.width = choice.width;
   view.image = whole;
-  const bool x = machine->mounting.scan_axis == ScanAxis::kX;
-  const std::uint32_t nozzles = machine->head.nozzles;
+  const bool x = machine.mounting.scan_axis == ScanAxis::kX;
+  const std::uint32_t nozzles = machine.head.nozzles;
   for (const auto& [number, sweep] : sweeps) {
     // From the line of the first to that of the last nozzle, wherever they lie on the bed.
     const auto one = built->nozzle_at(sweep.first_line, 0, 0), other = built->nozzle_at(sweep.first_line, 0, nozzles - 1);

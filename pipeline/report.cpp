@@ -12,6 +12,8 @@
 #include "pipeline/json_text.h"
 #include "pipeline/layer_images.h"
 #include "pipeline/manifest.h"
+#include "pipeline/replay_job.h"
+#include "pipeline/report_cast.h"
 #include "pipeline/report_views.h"
 #include "stages/write/read_image.h"
 #include "stages/write/report/page.h"
@@ -90,7 +92,8 @@ class HeldLayers {
   std::vector<std::pair<std::uint32_t, Buffer<std::byte>>> layers_;
 };
 
-/// Calls `work(place, runs, slot)` for every layer on all processors, and then `gather(place, slot)` in order.
+/// Calls `work(place, runs, slot)` for every layer on all processors, and then `gather(place, slot)` in order. The
+/// first layer whose work fails ends it.
 template <class Slot, class Work, class Gather>
 Status each_layer(const std::string& directory, const Manifest& manifest, Work work, Gather gather) {
   const auto count = static_cast<std::uint32_t>(manifest.layers.size());
@@ -100,11 +103,7 @@ Status each_layer(const std::string& directory, const Manifest& manifest, Work w
     std::vector<Status> states(end - first);
     tbb::parallel_for(first, end, [&](std::uint32_t place) {
       const Result<Runs> runs = read_layer(directory, manifest.head, manifest.layers[place]);
-      if (runs) {
-        work(place, runs->view(), slots[place - first]);
-      } else {
-        states[place - first] = runs.error();
-      }
+      states[place - first] = runs ? work(place, runs->view(), slots[place - first]) : Status(runs.error());
     });
     for (std::uint32_t place = first; place < end; ++place) {
       if (!states[place - first]) return states[place - first];
@@ -138,15 +137,62 @@ std::string title_of(const ManifestHead& head) {
   return title;
 }
 
+/// A view of the page: what its head says of it, and its pixels.
+struct ShownView {
+  std::string name;
+  std::uint32_t width = 0, height = 0, most = 0;  // most: of a depth; 0 for light and cover
+  double width_mm = 0, height_mm = 0;
+  Buffer<std::byte> deflated;
+};
+
+/// How long the machine takes for a layer, by its program; replayed as lamina verify does.
+Result<double> seconds_of_layer(const std::string& directory, const ManifestHead& head, const VirtualMachine& machine,
+                                const LayerRecord& record, const RunsView& image) {
+  const std::string program = program_of_layer(directory, head, record.layer.index);
+  if (hash_bytes(std::as_bytes(std::span(program))) == record.program.hash) {
+    const auto replay = machine.replay(program, record.layer.index, image, record.program.moved, record.program.lost);
+    if (replay) return replay->seconds;
+    return Error{Fault::kVerification, fmt::format("{}: {}", directory, replay.error().message)};
+  }
+  return Error{Fault::kVerification, fmt::format("{}/{}: is not the file of the manifest; lamina verify tells more", directory,
+                                                 program_file_name(record.layer.index, head.program_extension))};
+}
+
+/// The parts themselves, if their files can be found and are still those that were planned.
+Result<std::vector<ShownView>> views_of_parts(const std::string& directory, const ManifestHead& head,
+                                              const ReportOptions& options) {
+  std::vector<std::string> folders = options.parts;
+  const fs::path place = fs::absolute(directory).lexically_normal();
+  folders.insert(folders.end(), {".", directory, (place.has_filename() ? place : place.parent_path()).parent_path().string()});
+  const auto pictures = cast_parts(head, folders, 360);
+  if (!pictures) return pictures.error();
+  std::vector<ShownView> views;
+  for (const auto& [name, picture] : {std::pair{"top", &(*pictures)[0]}, {"front", &(*pictures)[1]}, {"side", &(*pictures)[2]}}) {
+    views.push_back({name, picture->width, picture->height, 0, picture->width_mm, picture->height_mm,
+                     write::report::deflate_bytes(std::as_bytes(std::span(picture->light_cover)))});
+  }
+  return views;
+}
+
+std::vector<ShownView> views_of_layers(const ThreeViews& views) {
+  std::vector<ShownView> shown;
+  for (const DepthView& view : views.views()) {
+    shown.push_back({view.name, view.width, view.height, view.most, view.width_mm, view.height_mm,
+                     write::report::deflate_bytes(std::as_bytes(std::span(view.depth)))});
+  }
+  return shown;
+}
+
 /// What the page's script reads.
 std::string head_json(const Manifest& manifest, const FileDigest& file, const write::PixelWindow& window,
-                      HeldLayers& held, const std::array<DepthView, 3>& views) {
+                      HeldLayers& held, const std::vector<ShownView>& views,
+                      const std::vector<double>& seconds) {
   const ManifestHead& head = manifest.head;
   const std::vector<LayerRecord>& layers = manifest.layers;
   std::string parts, places, sides;
   for (const PartSummary& part : head.parts) parts += (parts.empty() ? "" : ",") + part_json(part);
   for (const auto& [place, code] : held.layers()) places += fmt::format("{}{}", places.empty() ? "" : ",", place);
-  for (const DepthView& view : views) {
+  for (const ShownView& view : views) {
     sides += fmt::format("{}\"{}\":[{},{},{},{:.6g},{:.6g}]", sides.empty() ? "" : ",", view.name, view.width, view.height,
                          view.most, view.width_mm, view.height_mm);
   }
@@ -172,6 +218,9 @@ std::string head_json(const Manifest& manifest, const FileDigest& file, const wr
       list(layers, [](const LayerRecord& r) { return fmt::format("\"{}\"", hex(r.hash)); }));
   if (!head.machine.empty()) {
     text += fmt::format(",\"sweeps\":{}", list(layers, [](const LayerRecord& r) { return r.program.sweeps; }));
+    std::string times;
+    for (const double time : seconds) times += fmt::format("{}{:.6g}", times.empty() ? "" : ",", time);
+    text += fmt::format(",\"seconds\":[{}]", times);
   }
   return text + "}}";
 }
@@ -186,42 +235,70 @@ Result<Report> make_report(const std::string& directory, const ReportOptions& op
   const std::vector<LayerRecord>& layers = manifest->layers;
   const PixelGrid& grid = manifest->head.grid;
 
+  std::optional<VirtualMachine> machine;
+  if (!manifest->head.machine.empty()) {
+    auto built = machine_of_job(directory, manifest->head);
+    if (!built) return Error{built.error().fault, fmt::format("{}/{}", directory, built.error().message)};
+    machine.emplace(std::move(*built));
+  }
+  Report report;
+  std::vector<ShownView> views;
+  if (auto shown = views_of_parts(directory, manifest->head, options)) {
+    views = std::move(*shown);
+  } else if (!options.parts.empty()) {
+    return Error{Fault::kInput, shown.error().message};
+  } else {
+    report.without_parts = shown.error().message;
+  }
+
   struct First {
     write::PixelWindow window;
     Buffer<std::byte> code;
+    double seconds = 0;
   };
   // What a layer's line and the rest of the page take is not the layers' own.
-  const std::uint64_t taken = 150'000 + 140 * layers.size();
+  std::uint64_t taken = (views.empty() ? 150'000 : 50'000) + 150 * layers.size();
+  for (const ShownView& view : views) taken += view.deflated.size() / 3 * 4;
   HeldLayers held(options.size_limit > taken ? options.size_limit - taken : 0);
   write::PixelWindow window;
+  std::vector<double> seconds;
   Status status = each_layer<First>(
       directory, *manifest,
-      [&](std::uint32_t place, const RunsView& runs, First& first) {
+      [&](std::uint32_t place, const RunsView& runs, First& first) -> Status {
         first.window = write::window_of(runs);
         if (held.wants(place)) first.code = write::report::pack_runs(runs);
+        if (!machine) return {};
+        const auto time = seconds_of_layer(directory, manifest->head, *machine, layers[place], runs);
+        if (!time) return time.error();
+        first.seconds = *time;
+        return {};
       },
       [&](std::uint32_t place, First& first) {
         window = write::joined(window, first.window);
         held.add(place, std::move(first.code));
+        if (machine) seconds.push_back(first.seconds);
       });
   if (!status) return status.error();
   if (window.empty()) window = {0, grid.columns(), 0, grid.rows()};
 
-  const Layer &lowest = layers.front().layer, &highest = layers.back().layer;
-  ThreeViews views(grid, window, lowest.bottom, highest.bottom + highest.thickness);
-  status = each_layer<std::vector<std::uint8_t>>(
-      directory, *manifest,
-      [&](std::uint32_t, const RunsView& runs, std::vector<std::uint8_t>& cells) { views.look(runs, cells); },
-      [&](std::uint32_t place, const std::vector<std::uint8_t>& cells) { views.add(layers[place].layer, cells); });
-  if (!status) return status.error();
-
-  std::vector<PageData> data;
-  for (const DepthView& view : views.views()) {
-    data.push_back({"v-" + view.name, write::report::deflate_bytes(std::as_bytes(std::span(view.depth)))});
+  if (views.empty()) {
+    const Layer &lowest = layers.front().layer, &highest = layers.back().layer;
+    ThreeViews built(grid, window, lowest.bottom, highest.bottom + highest.thickness);
+    status = each_layer<std::vector<std::uint8_t>>(
+        directory, *manifest,
+        [&](std::uint32_t, const RunsView& runs, std::vector<std::uint8_t>& cells) -> Status {
+          built.look(runs, cells);
+          return {};
+        },
+        [&](std::uint32_t place, const std::vector<std::uint8_t>& cells) { built.add(layers[place].layer, cells); });
+    if (!status) return status.error();
+    views = views_of_layers(built);
   }
-  const std::string head = head_json(*manifest, *file, window, held, views.views());
+
+  const std::string head = head_json(*manifest, *file, window, held, views, seconds);
+  std::vector<PageData> data;
+  for (ShownView& view : views) data.push_back({"v-" + view.name, std::move(view.deflated)});
   for (auto& [place, code] : held.layers()) data.push_back({fmt::format("r{}", place), std::move(code)});
-  Report report;
   report.layers = static_cast<std::uint32_t>(layers.size());
   report.held = static_cast<std::uint32_t>(held.layers().size());
   report.stride = held.stride();

@@ -6,18 +6,15 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
-#include <fstream>
-#include <iterator>
 #include <mutex>
 #include <optional>
 
 #include "pipeline/hash.h"
 #include "pipeline/layer_images.h"
-#include "pipeline/machine_profile.h"
 #include "pipeline/manifest.h"
 #include "pipeline/output_directory.h"
 #include "pipeline/print_program.h"
-#include "pipeline/replay.h"
+#include "pipeline/replay_job.h"
 #include "pipeline/slice_picture.h"  // is_slice_directory
 #include "pipeline/verify_slice.h"
 #include "stages/write/read_image.h"
@@ -43,11 +40,6 @@ struct Inspection {
   std::mutex adding;
   VerifyReport& report;
 };
-
-std::string whole_file(const std::string& path) {
-  std::ifstream file(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
-}
 
 // Which vats have to feed a layer, a bit each, by the profile's rule.
 std::uint32_t vats_wanted(const Machine& machine, const ManifestHead& head, const LayerRecord& record) {
@@ -83,8 +75,8 @@ std::string fault_of_program(Inspection& inspection, const LayerRecord& record, 
   if (!digest) return digest.error().message;
   const bool same = digest->bytes == record.program.bytes && digest->hash == record.program.hash;
   if (image != nullptr && inspection.machine) {
-    const auto replay = inspection.machine->replay(whole_file(path), record.layer.index, *image, record.program.moved,
-                                                   record.program.lost);
+    const auto replay = inspection.machine->replay(program_of_layer(inspection.directory, inspection.head, record.layer.index),
+                                                   record.layer.index, *image, record.program.moved, record.program.lost);
     if (!replay) return fmt::format("{}: {}", name, replay.error().message);
     if (same && replay->drops != record.program.drops) {
       return fmt::format("{}: {} drops, the manifest says {}", name, replay->drops, record.program.drops);
@@ -150,19 +142,10 @@ std::string fault_of_layer(Inspection& inspection, const LayerRecord& record) {
 
 // Finds the machine again that the programs were written for.
 void prepare_replay(Inspection& inspection) {
-  const std::string name = "program/machine.toml", path = (fs::path(inspection.directory) / name).string();
-  std::error_code error;
-  if (!fs::is_regular_file(path, error)) return add_fault(inspection.report, name + ": is missing");
-  const std::string text = whole_file(path);
-  if (hash_bytes(std::as_bytes(std::span(text))) != inspection.head.machine_profile) {
-    return add_fault(inspection.report, name + ": its content is not what was written");
-  }
-  const Result<Machine> machine = read_machine(text, name);
-  if (!machine) return add_fault(inspection.report, machine.error().message);
-  auto built = VirtualMachine::build(*machine, inspection.head.grid.columns(), inspection.head.grid.rows());
+  auto built = machine_of_job(inspection.directory, inspection.head);
   if (!built) return add_fault(inspection.report, built.error().message);
   inspection.machine = std::move(*built);
-  inspection.report.machine = machine->name;
+  inspection.report.machine = inspection.machine->profile().name;
 }
 
 // Sums that need the profile.

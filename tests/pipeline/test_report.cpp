@@ -1,6 +1,7 @@
 // The page about a job: what it shows is what the files hold, in the bytes and in a browser.
 #include <gtest/gtest.h>
 #include <sys/wait.h>
+#include <zlib.h>
 
 #include <array>
 #include <cstdio>
@@ -163,6 +164,75 @@ TEST_F(JobsReported, WhatIsNoFinishedJobIsRefusedInOneLine) {
   EXPECT_EQ(lamina({"report", "out", "-o", "nowhere/report.html"}).code, 4);
   EXPECT_EQ(lamina({"report", "out"}).code, 2);
   EXPECT_EQ(lamina({"report", "-o", "x.html"}).code, 2);
+}
+
+// The bytes of a piece of the page.
+std::vector<std::uint8_t> inflated(const Buffer<std::byte>& packed, std::size_t size) {
+  std::vector<std::uint8_t> bytes(size + 1);
+  uLongf have = bytes.size();
+  EXPECT_EQ(uncompress(bytes.data(), &have, reinterpret_cast<const Bytef*>(packed.data()), packed.size()), Z_OK);
+  bytes.resize(have);
+  return bytes;
+}
+
+Json head_of(const std::string& page) {
+  const std::string begin = "<script id=\"head\" type=\"application/json\">";
+  const std::size_t at = page.find(begin) + begin.size();
+  return Json::parse(page.substr(at, page.find("</script>", at) - at));
+}
+
+TEST_F(JobsReported, ThreeSidesAreThePartsThemselvesIfTheyAreStillThose) {
+  fs::create_directories(directory_ / "parts");
+  write_box(directory_ / "parts/part.stl", {0, 0, 0}, {8, 4, 2});
+  jet("parts/part.stl", {"--bed", "20x20", "--dpi", "100"});
+  ASSERT_EQ(lamina({"report", "out", "-o", "report.html", "--parts", "parts", "--quiet"}).code, 0);
+  const std::string page = read_text(directory_ / "report.html");
+  const Json views = head_of(page)["views"];
+  const std::array<std::array<double, 2>, 3> sizes = {{{8, 4}, {8, 2}, {4, 2}}};
+  std::size_t i = 0;
+  std::vector<std::uint8_t> lights;
+  for (const char* name : {"top", "front", "side"}) {
+    const Json& view = views[name];
+    EXPECT_NEAR(view[3], sizes[i][0], 1e-5);
+    EXPECT_NEAR(view[4], sizes[i][1], 1e-5);
+    EXPECT_EQ(view[2], 0);
+    const std::size_t pixels = view[0].get<std::size_t>() * view[1].get<std::size_t>();
+    const std::vector<std::uint8_t> bytes = inflated(piece(page, std::string("v-") + name), 2 * pixels);
+    ASSERT_EQ(bytes.size(), 2 * pixels) << name;
+    for (std::size_t p = 0; p < pixels; ++p) {  // a box fills its views, and each side is lit evenly
+      ASSERT_EQ(bytes[2 * p + 1], 255) << name << p;
+      ASSERT_EQ(bytes[2 * p], bytes[0]) << name << p;
+    }
+    EXPECT_GT(bytes[0], 128);
+    ++i;
+  }
+  // Not found, or no longer what was planned: the layers from three sides, or an error where the part was asked for.
+  ASSERT_EQ(lamina({"report", "out", "-o", "layers.html"}).code, 0);
+  EXPECT_GT(head_of(read_text(directory_ / "layers.html"))["views"]["top"][2], 0);
+  write_box(directory_ / "parts/part.stl", {0, 0, 0}, {8, 4.5, 2});
+  const Outcome changed = lamina({"report", "out", "-o", "changed.html", "--parts", "parts"});
+  EXPECT_EQ(changed.code, 3);
+  EXPECT_EQ(changed.error_lines(), 1u) << changed.err;
+  EXPECT_NE(changed.err.find("is not the part that was planned"), std::string::npos) << changed.err;
+  EXPECT_EQ(lamina({"report", "out", "-o", "changed.html", "--parts", "nowhere"}).code, 3);
+}
+
+TEST_F(JobsReported, TimesOfLayersAddUpToThatOfTheReplayedProgram) {
+  write_box(directory_ / "part.stl", {0, 0, 0}, {20, 20, 1});
+  jet("part.stl", {"--machine", "nuferbj", "--layer", "0.1"});
+  ASSERT_EQ(lamina({"report", "out", "-o", "report.html", "--quiet"}).code, 0);
+  const Json seconds = head_of(read_text(directory_ / "report.html"))["layers"]["seconds"];
+  const Outcome verified = lamina({"verify", "out", "--json", "--quiet"});
+  double sum = 0;
+  for (const Json& layer : seconds) sum += layer.get<double>();
+  EXPECT_EQ(seconds.size(), 10u);
+  EXPECT_NEAR(sum, Json::parse(verified.out)["replay"]["seconds"].get<double>(), 1e-3 * sum);
+  EXPECT_GT(sum, 1);
+  const std::string program = read_text(directory_ / "out/program/000004.gcode");
+  write_text(directory_ / "out/program/000004.gcode", program + "\n");
+  const Outcome changed = lamina({"report", "out", "-o", "report.html"});
+  EXPECT_EQ(changed.code, 5);
+  EXPECT_NE(changed.err.find("program/000004.gcode"), std::string::npos) << changed.err;
 }
 
 TEST_F(JobsReported, NamesOfPartsCannotBecomeMarkup) {

@@ -132,7 +132,8 @@ async function show(place) {  // place: within `shown`
   const i = shown[place];
   $('slider').value = place; $('number').value = head.first_layer + i;
   $('readout').textContent = `z ${mm(layers.bottom[i])} to ${mm(layers.bottom[i] + layers.thickness[i])} mm, ` +
-    `${(layers.set[i] * head.pixel_mm[0] * head.pixel_mm[1]).toFixed(2)} mm², ${layers.set[i].toLocaleString('en')} pixels`;
+    `${(layers.set[i] * head.pixel_mm[0] * head.pixel_mm[1]).toFixed(2)} mm², ${layers.set[i].toLocaleString('en')} pixels` +
+    (layers.seconds ? `, about ${duration(layers.seconds[i])}` : '');
   if (!state.fitted) { state.fitted = true; fit(); } else drawView();
   drawPlots();
   document.documentElement.dataset.layer = head.first_layer + i;
@@ -146,22 +147,29 @@ function showLayer(number) {  // the nearest that the page holds
 
 // --- from three sides
 async function drawViews() {
+  $('about-views').textContent = head.views.top[2] === 0 ? 'The part files, lit from the upper left.' :
+    'As the layers build it up, lighter where it is nearer.';
   for (const [name, title] of [['top', 'from above'], ['front', 'from the front'], ['side', 'from the right']]) {
     const figure = element('figure', undefined, $('views'));
     element('figcaption', title, figure);
     const canvas = element('canvas', undefined, figure), [width, height, most] = head.views[name];
     canvas.setAttribute('role', 'img'); canvas.setAttribute('aria-label', 'the parts ' + title);
-    const bytes = await unpack('v-' + name), depth = new Uint16Array(bytes.buffer, 0, width * height);
+    const bytes = await unpack('v-' + name);
     const picture = document.createElement('canvas');
     picture.width = width; picture.height = height;
     const pen = picture.getContext('2d'), image = pen.createImageData(width, height);
-    for (let y = 0, at = 0; y < height; ++y) {
-      for (let x = 0; x < width; ++x, ++at) {
-        if (!depth[at]) continue;
-        const right = x + 1 < width && depth[at + 1] ? depth[at + 1] - depth[at] : 0;
-        const below = y + 1 < height && depth[at + width] ? depth[at + width] - depth[at] : 0;
-        const light = 0.35 + 0.5 * depth[at] / most + Math.max(-0.3, Math.min(0.3, (right + below) * 12 / most));
-        image.data.set([70 + 120 * light, 95 + 125 * light, 125 + 120 * light, 255], 4 * at);
+    const paint = (at, light, cover) => image.data.set([35 + 190 * light, 55 + 185 * light, 80 + 172 * light, cover], 4 * at);
+    if (most === 0) {  // ray-cast: for each pixel how light, and how much of it is part
+      for (let at = 0; at < width * height; ++at) paint(at, bytes[2 * at] / 255, bytes[2 * at + 1]);
+    } else {  // the layers: depth, lighter where it is nearer
+      const depth = new Uint16Array(bytes.buffer, 0, width * height);
+      for (let y = 0, at = 0; y < height; ++y) {
+        for (let x = 0; x < width; ++x, ++at) {
+          if (!depth[at]) continue;
+          const right = x + 1 < width && depth[at + 1] ? depth[at + 1] - depth[at] : 0;
+          const below = y + 1 < height && depth[at + width] ? depth[at + width] - depth[at] : 0;
+          paint(at, 0.4 + 0.4 * depth[at] / most + Math.max(-0.25, Math.min(0.2, (right + below) * 10 / most)), 255);
+        }
       }
     }
     pen.putImageData(image, 0, 0);
@@ -215,10 +223,11 @@ function drawPlots() {
 }
 
 // --- texts
+const duration = s => s < 90 ? `${s.toFixed(1)} s` : s < 5400 ? `${(s / 60).toFixed(1)} min` : `${(s / 3600).toFixed(2)} h`;
 function fillTexts() {
   $('title').textContent = head.title;
   $('facts').textContent = `${head.layer_count.toLocaleString('en')} layers, ${head.columns} × ${head.rows} pixels of ` +
-    `${+head.dpi[0].toFixed(3)} × ${+head.dpi[1].toFixed(3)} dpi, ${head.format}` + (head.machine ? `, ${head.machine}` : '');
+    `${+head.dpi[0].toFixed(3)} × ${+head.dpi[1].toFixed(3)} dpi, ${head.format}` + (head.machine ? `, ${head.machine}, about ${duration(layers.seconds.reduce((a, b) => a + b, 0))}` : '');
   if (head.stride > 1) $('note').textContent = `To keep this page small, every ${head.stride}th layer can be looked at.`;
   const warnings = $('warnings'), warn = (text, layer) => {
     const line = element('li', layer === undefined ? text : undefined, warnings);
@@ -310,6 +319,9 @@ listen();
 addPlot('area', 'mm²', layers.set.map(set => set * head.pixel_mm[0] * head.pixel_mm[1]));
 addPlot('thickness', 'mm', layers.thickness.map(mm));
 addPlot('file', 'bytes', layers.bytes);
-if (head.machine) addPlot('sweeps', '', layers.sweeps);
+if (head.machine) {
+  addPlot('time, estimated', 's', layers.seconds);
+  addPlot('sweeps', '', layers.sweeps);
+}
 const ready = fromAddress().then(drawViews).then(() => { document.documentElement.dataset.ready = 'yes'; });
 window.laminaReport = { head, state, decodeLayer, showLayer, ready };

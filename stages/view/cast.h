@@ -1,0 +1,45 @@
+// stages/view/cast.h: parts on the bed as they look from a side, by one Embree ray a sample.
+//
+// For people only: a picture decides nothing, so coordinates are floats here. Rays are parallel (orthographic), four a
+// pixel; what is lit is the facet that a ray meets first, by the angle of its normal.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "stages/data/mesh.h"
+#include "stages/data/status.h"
+
+namespace lamina::view {
+
+/// From above with the front of the bed below; from the front; from the right with the front on the left.
+enum class Side : std::uint8_t { kTop, kFront, kRight };
+
+struct Picture {
+  std::uint32_t width = 0, height = 0;      // pixels
+  double width_mm = 0, height_mm = 0;       // of all parts together
+  std::vector<std::uint8_t> light_cover;    // for each pixel, rows from the top: how light (255 white), how much of it is part
+};
+
+class Caster {
+ public:
+  /// meshes, instances  on the bed, at least one facet; not needed afterwards
+  /// errors  kInternal if Embree fails
+  /// cost    O(T log T); 48 bytes a facet and Embree's tree. Copies share both
+  static Result<Caster> build(std::span<const Mesh> meshes, std::span<const Instance> instances);
+  Caster(Caster&&) noexcept;
+  ~Caster();
+
+  /// What is seen, `most` pixels along the longest side of the box around all parts (the same scale for every side).
+  /// cost  4 rays a pixel, on all processors
+  Picture look(Side side, std::uint32_t most) const;
+
+ private:
+  Caster();
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
+}  // namespace lamina::view
