@@ -1,7 +1,5 @@
-// stages/load/threemf_model.cpp: the only place that calls lib3mf (1.8, C interface).
+// stages/load/threemf_model.cpp: 3MF files are read through lib3mf (1.8, C interface), here alone.
 #include <fmt/core.h>
-
-#include <Model/COM/NMR_DLLInterfaces.h>
 
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
@@ -16,36 +14,15 @@
 #include <map>
 #include <utility>
 
+#include "stages/data/lib3mf_handle.h"
 #include "stages/load/threemf_model.h"
 
 namespace lamina::load {
 namespace {
 
-/// A handle of lib3mf, released at the end.
-class Handle {
- public:
-  Handle() = default;
-  Handle(Handle&& other) noexcept : pointer_(std::exchange(other.pointer_, nullptr)) {}
-  Handle& operator=(Handle&&) = delete;
-  ~Handle() {
-    if (pointer_ != nullptr) NMR::lib3mf_release(pointer_);
-  }
-  NMR::PLib3MFBase* get() const { return pointer_; }
-  NMR::PLib3MFBase** out() { return &pointer_; }
-
- private:
-  NMR::PLib3MFBase* pointer_ = nullptr;
-};
+using Handle = Lib3mfHandle;
 
 bool done(LIB3MFRESULT result) { return result == LIB3MF_OK; }
-
-std::string last_error(const Handle& handle) {
-  DWORD code = 0;
-  LPCSTR message = nullptr;
-  if (handle.get() == nullptr || !done(NMR::lib3mf_getlasterror(handle.get(), &code, &message)) || message == nullptr)
-    return "the library gives no reason";
-  return message;
-}
 
 /// The shortest decimal number that makes this float. lib3mf reads 0.1 into a float; this gives 0.1 back in double
 /// precision, so that a number of up to seven places means the same in 3MF as in OBJ or ASCII STL.
@@ -217,12 +194,12 @@ Result<ModelFile> read_model(const Source& source) {
       !done(NMR::lib3mf_model_queryreader(model.get(), "3mf", reader.out())))
     return Error{Fault::kInternal, "lib3mf cannot be started"};
   if (!read_file(reader, source.path()))
-    return source.error(fmt::format("is not a valid 3MF file ({}); export it again", last_error(reader)));
+    return source.error(fmt::format("is not a valid 3MF file ({}); export it again", reader.last_error()));
   ModelFile file;
   read_warnings(reader, file);
   DWORD unit = NMR::MODELUNIT_MILLIMETER;
   if (!done(NMR::lib3mf_model_getunit(model.get(), &unit)) || !read_objects(model, file) || !read_items(model, file))
-    return source.error(fmt::format("is not a valid 3MF file ({}); export it again", last_error(model)));
+    return source.error(fmt::format("is not a valid 3MF file ({}); export it again", model.last_error()));
   file.unit_mm = unit_in_mm(unit);
   std::map<std::uint32_t, std::uint32_t> index_of;
   for (std::uint32_t i = 0; i < file.objects.size(); ++i) index_of.emplace(file.objects[i].id, i);

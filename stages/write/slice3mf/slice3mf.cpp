@@ -1,38 +1,21 @@
 #include "stages/write/slice3mf/slice3mf.h"
 
 #include <fmt/format.h>
-#include <Model/COM/NMR_DLLInterfaces.h>
 
 #include <array>
 #include <cerrno>
 #include <cstdio>
 #include <cstring>
-#include <utility>
+
+#include "stages/data/lib3mf_handle.h"
 
 namespace lamina::write {
 namespace {
 
-class Handle {
- public:
-  Handle() = default;
-  Handle(Handle&& other) noexcept : pointer_(std::exchange(other.pointer_, nullptr)) {}
-  Handle& operator=(Handle&&) = delete;
-  ~Handle() {
-    if (pointer_ != nullptr) NMR::lib3mf_release(pointer_);
-  }
-  NMR::PLib3MFBase* get() const { return pointer_; }
-  NMR::PLib3MFBase** out() { return &pointer_; }
-
- private:
-  NMR::PLib3MFBase* pointer_ = nullptr;
-};
+using Handle = Lib3mfHandle;
 
 Error refused(std::string_view what, const Handle& handle) {
-  DWORD code = 0;
-  LPCSTR message = nullptr;
-  const bool known = handle.get() != nullptr && NMR::lib3mf_getlasterror(handle.get(), &code, &message) == LIB3MF_OK;
-  return {Fault::kOutput,
-          fmt::format("3MF: {} failed: {}", what, known && message != nullptr ? message : "the library gives no reason")};
+  return {Fault::kOutput, fmt::format("3MF: {} failed: {}", what, handle.last_error())};
 }
 
 /// The library would draw random ones; the same slices shall give the same bytes. Version 8: of our own making (RFC 9562).
