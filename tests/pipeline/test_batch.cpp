@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 #include <signal.h>
 #include <sys/file.h>
+#include <sys/mount.h>
 #include <fcntl.h>
 #include <unistd.h>
 
@@ -138,15 +139,18 @@ TEST_F(JobsInBatch, WhatIsWrongWithOneJobIsOneLineAndTheRestIsUnharmed) {
   write_text(directory_ / "missing.toml", "[[part]]\npath='nowhere.stl'\n");
   write_text(directory_ / "wrong.toml", "[bed]\ndpy=3\n");
   write_text(directory_ / "file", "");
+  fs::create_directories(directory_ / "half");
+  write_text(directory_ / "half/manifest.json.part", "{\n");  // a job that is not finished
   write_text(directory_ / "list.txt", "jet part10.stl --bed 60x60 --dpi 0 -o a\njott part10.stl\njet --job missing.toml -o b\n"
                                       "jet --job wrong.toml\nbatch list.txt -o x\npreview out -o x.png\njet part10.stl --help\n"
-                                      "jet part10.stl --bed 60x60 --dpi 100 -o ../file/deeper\nverify nothing\n"
+                                      "jet part10.stl --bed 60x60 --dpi 100 -o ../file/deeper\nverify nothing\nreport half -o page.html\n"
                                       "jet part10.stl --bed 60x60 --dpi 100 -o good\n");
   const Outcome outcome = lamina({"batch", "list.txt", "-o", "out"});
   EXPECT_EQ(outcome.code, 2);
   const Json json = summary("out");
-  const int codes[] = {2, 2, 3, 2, 2, 2, 2, 4, 2, 0};
-  for (std::size_t i = 0; i < 10; ++i) {
+  const int codes[] = {2, 2, 3, 2, 2, 2, 2, 4, 2, 5, 0};
+  ASSERT_EQ(json["jobs"].size(), std::size(codes));
+  for (std::size_t i = 0; i < std::size(codes); ++i) {
     const std::string reason = json["jobs"][i]["reason"];
     EXPECT_EQ(json["jobs"][i]["code"], codes[i]) << i << " " << reason;
     EXPECT_EQ(reason.empty(), codes[i] == 0) << i;
@@ -221,6 +225,55 @@ TEST_F(JobsInBatch, KilledAtAnyMomentItIsResumedToTheSameBytesAndNothingIsDoneTw
   for (const std::string& name : outcomes("out")) kept += name == "kept";
   EXPECT_EQ(lamina(batch("out", {"--resume"})).code, 0);
   EXPECT_EQ(outcomes("out"), Words(12, "kept"));
+}
+
+/// A file system of its own, so small that it is soon full.
+class SmallDisk {
+ public:
+  explicit SmallDisk(const std::string& place) : place_(place) {
+    fs::create_directories(place_);
+    mounted_ = ::mount("tmpfs", place_.c_str(), "tmpfs", 0, "size=192k") == 0;
+  }
+  ~SmallDisk() {
+    if (mounted_) ::umount2(place_.c_str(), MNT_DETACH);
+  }
+  bool mounted() const { return mounted_; }
+  bool grow() const { return ::mount("tmpfs", place_.c_str(), "tmpfs", MS_REMOUNT, "size=64m") == 0; }
+
+ private:
+  std::string place_;
+  bool mounted_;
+};
+
+TEST_F(JobsInBatch, AFullDiskIsOneLineTheRestIsUnharmedAndWithRoomItGoesOn) {
+  const SmallDisk disk(directory_ / "disk");
+  if (!disk.mounted()) GTEST_SKIP() << "NOT RUN: a batch on a full disk; mounting a tmpfs needs root";
+  write_boxes(3);
+  const std::string options = " --bed 60x60 --dpi 300 --layer 0.01";
+  // One job's output is on the disk that gets full.
+  write_text(directory_ / "list.txt", "jet part10.stl" + options + " -o a\njet part11.stl" + options + " -o " + directory_ / "disk/b" +
+                                          "\njet part12.stl" + options + " -o c\n");
+  const Outcome outcome = lamina({"batch", "list.txt", "-o", "out"});
+  EXPECT_EQ(outcome.code, 4);
+  Json json = summary("out");
+  EXPECT_EQ(outcomes("out"), (Words{"done", "failed", "done"}));
+  const std::string reason = json["jobs"][1]["reason"];
+  EXPECT_NE(reason.find("No space left on device"), std::string::npos) << reason;
+  EXPECT_EQ(reason.find('\n'), std::string::npos);
+  EXPECT_EQ(lamina({"verify", "out/a", "out/c", "--quiet"}).code, 0);
+
+  // The whole batch is.
+  fs::remove_all(directory_ / "disk/b");
+  const Words all = {"part10.stl", "part11.stl", "part12.stl", "--with", "jet" + options, "--quiet"};
+  ASSERT_EQ(lamina(batch_of({"-o", "whole"}, all)).code, 0);
+  const Outcome full = lamina(batch_of({"-o", "disk/out"}, all));
+  EXPECT_EQ(full.code, 4) << full.err;
+  EXPECT_NE(full.err.find("No space left on device"), std::string::npos) << full.err;
+  for (const std::string& file : files_below(directory_ / "disk")) EXPECT_FALSE(file.ends_with(".tif.part")) << file;
+  ASSERT_TRUE(disk.grow());
+  const Outcome resumed = lamina(batch_of({"-o", "disk/out", "--resume"}, all));
+  ASSERT_EQ(resumed.code, 0) << resumed.err;
+  EXPECT_EQ(tree("disk/out"), tree("whole"));
 }
 
 TEST_F(JobsInBatch, ResumeDoesAgainWhatHasChangedSince) {
