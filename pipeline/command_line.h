@@ -62,8 +62,11 @@ std::span<const Command> commands();
 const Command* find_command(std::string_view name);
 
 /// The definition of a command's arguments, from which help, manual pages, shell completion and the documentation's
-/// tests are made. Nothing of the command runs. Empty name: a command that is a program of its own, and does not say.
+/// tests are made. Nothing of the command runs.
 CommandSpec spec_of(const Command& command);
+
+/// That of lamina preview, whose work is done by a program of its own.
+CommandSpec preview_spec();
 
 // --- one file each
 int run_jet_command(const std::vector<std::string>& arguments);

@@ -20,8 +20,8 @@ thread_local CommandSpec* asked_spec = nullptr;
 }  // namespace
 
 CommandSpec spec_of(const Command& command) {
+  if (command.name == "preview") return preview_spec();  // it hands the process over to another program
   CommandSpec spec;
-  if (command.name == "preview") return spec;  // hands the process over to another program
   asked_spec = &spec;
   ConsoleCapture unheard;
   command.run({"--help"});

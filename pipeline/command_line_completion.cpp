@@ -6,6 +6,7 @@
 
 #include "pipeline/command_line.h"
 #include "pipeline/console.h"
+#include "pipeline/markdown_page.h"
 #include "pipeline/nearest_name.h"
 #include "pipeline/number_text.h"
 #include "stages/write/atomic_file.h"
@@ -171,10 +172,6 @@ std::string command_page(const Command& command) {
   std::string text = title(fmt::format("lamina-{}", command.name));
   text += fmt::format(".SH NAME\nlamina\\-{} \\- {}\n.SH SYNOPSIS\n.B lamina {}\n[OPTIONS]", command.name, roff(command.summary), command.name);
   if (!spec.operand.empty()) text += fmt::format("\n.IR {} \\ ...", roff(spec.operand));
-  if (spec.name.empty()) {
-    const std::string asking = fmt::format("A program of its own; lamina {} --help tells all about it.", command.name);
-    return text + fmt::format("\n.SH DESCRIPTION\n{}\n", roff(asking)) + exit_status() + ".SH SEE ALSO\n.BR lamina (1)\n";
-  }
   text += fmt::format("\n.SH DESCRIPTION\n{}\n", roff(spec.summary));
   if (!spec.operand.empty()) text += fmt::format(".TP\n.I {}\n{}\n", roff(spec.operand), roff(spec.operand_meaning));
   text += ".SH OPTIONS\n";
@@ -196,13 +193,17 @@ int show(const std::string& text) {
   return status ? 0 : fail(status.error());
 }
 
-int write_pages(const std::string& directory) {
+int write_pages(const std::string& directory, bool markdown) {
   const auto write = [&](const std::string& name, const std::string& page) {
-    return write::write_file(fmt::format("{}/{}.1", directory, name), std::as_bytes(std::span(page)));
+    return write::write_file(fmt::format("{}/{}", directory, name), std::as_bytes(std::span(page)));
   };
-  if (Status status = write("lamina", program_page()); !status) return fail(status.error());
+  if (!markdown) {
+    if (Status status = write("lamina.1", program_page()); !status) return fail(status.error());
+  }
   for (const Command& command : commands()) {
-    if (Status status = write(fmt::format("lamina-{}", command.name), command_page(command)); !status) return fail(status.error());
+    const Status status = markdown ? write(fmt::format("{}.md", command.name), markdown_page(command))
+                                   : write(fmt::format("lamina-{}.1", command.name), command_page(command));
+    if (!status) return fail(status.error());
   }
   return 0;
 }
@@ -227,10 +228,12 @@ CommandSpec manual_spec() {
   spec.summary = "Prints the manual page of lamina, or of one of its commands, as man reads it.";
   spec.operand = "COMMAND";
   spec.operand_meaning = "a command; none for the page of the program";
-  spec.options = {{"-o,--output", "DIR", "write all pages into a directory instead, as packages do", "", ""}};
+  spec.options = {{"-o,--output", "DIR", "write all pages into a directory instead, as packages do", "", ""},
+                  {"--markdown", "", "pages of commands as Markdown: docs/commands is made by this", "", ""}};
   spec.closing =
       "Examples:\n"
-      "  lamina manual jet | man -l -";
+      "  lamina manual jet | man -l -\n"
+      "  lamina manual --markdown -o docs/commands";
   return spec;
 }
 
@@ -251,10 +254,13 @@ int run_manual_command(const std::vector<std::string>& texts) {
   const Result<Arguments> arguments = read_arguments(manual_spec(), texts);
   if (!arguments) return fail(arguments.error());
   if (arguments->help) return show(*arguments->help);
-  if (arguments->has("-o,--output")) return write_pages(arguments->text("-o,--output"));
-  if (arguments->operands.empty()) return show(program_page());
+  const bool markdown = arguments->has("--markdown");
+  if (arguments->has("-o,--output")) return write_pages(arguments->text("-o,--output"), markdown);
+  if (arguments->operands.empty()) {
+    return markdown ? fail({Fault::kUsage, "--markdown: name a command, or -o DIR for all of them"}) : show(program_page());
+  }
   if (arguments->operands.size() == 1) {
-    if (const Command* command = find_command(arguments->operands.front())) return show(command_page(*command));
+    if (const Command* command = find_command(arguments->operands.front())) return show(markdown ? markdown_page(*command) : command_page(*command));
   }
   std::vector<std::string_view> names;
   for (const Command& command : commands()) names.push_back(command.name);

@@ -25,32 +25,6 @@ namespace {
 
 constexpr std::uint32_t kMostCells = 400;
 
-CommandSpec preview_spec() {
-  CommandSpec spec;
-  spec.name = "preview";
-  spec.summary =
-      "Draws layers of a job as one picture (PNG), each pixel as dark as the share of its area that is set; or one layer of\n"
-      "a sliced job with its filling, bead widths true (PNG or SVG).";
-  spec.operand = "DIR";
-  spec.operand_meaning = "directory that lamina jet or lamina slice wrote";
-  spec.options = {{"-o,--output", "PNG", "the picture", "", ""},
-                  {"--count", "N", "so many layers, spread over the height", "12", ""},
-                  {"--every", "N", "every N-th layer, from the first", "", ""},
-                  {"--layer", "K", "only layer K, counted from 0 at the bottom", "", ""},
-                  {"--swath", "N", "layer --layer of a job with a machine while swath N of it is jetted, with the head; middle: the one in the middle", "", ""},
-                  {"--step", "N", "of the swath, else the middle one", "", ""},
-                  {"--width", "PIXELS", "width of the picture, 200 to 20000", "2400", ""},
-                  {"--whole-bed", "", "show all of the bed, not only where the layers have something", "", ""},
-                  {"--drawing", "FILE", "draw what lamina heights left for it instead, and remove FILE", "", ""},
-                  {"--quiet", "", "say nothing but errors", "", ""}};
-  spec.closing =
-      "Examples:\n"
-      "  lamina preview out -o sheet.png\n"
-      "  lamina preview out -o layer.png --layer 120 --whole-bed\n"
-      "  lamina preview sliced -o layer.svg --layer 12";
-  return spec;
-}
-
 /// The number behind a flag; nothing if the flag is absent.
 Result<std::optional<std::uint32_t>> number(const Arguments& arguments, std::string_view flag, std::uint32_t least,
                                             std::uint32_t most) {

@@ -5,8 +5,11 @@
 #include <filesystem>
 #include <regex>
 #include <set>
+#include <sstream>
 
 #include "pipeline/command_line.h"
+#include "pipeline/machine_profile.h"
+#include "pipeline/markdown_page.h"
 #include "pipeline/number_text.h"
 #include "program.h"
 
@@ -16,12 +19,6 @@ namespace {
 namespace fs = std::filesystem;
 
 const fs::path kRoot = fs::path(LAMINA_TEST_DIR).parent_path();
-
-/// Whether one of the names of an option is among the words.
-bool named(const pipeline::OptionSpec& option, const std::set<std::string>& words) {
-  const auto flags = pipeline::split(option.flag, ",");
-  return std::ranges::any_of(flags, [&](std::string_view flag) { return words.contains(std::string(flag)); });
-}
 
 std::set<std::string> long_flags(const pipeline::CommandSpec& spec) {
   std::set<std::string> flags;
@@ -35,28 +32,76 @@ std::set<std::string> long_flags(const pipeline::CommandSpec& spec) {
 
 std::vector<fs::path> pages() {
   std::vector<fs::path> found = {kRoot / "README.md"};
-  for (const auto& entry : fs::directory_iterator(kRoot / "docs")) {
+  for (const auto& entry : fs::recursive_directory_iterator(kRoot / "docs")) {
     if (entry.path().extension() == ".md") found.push_back(entry.path());
   }
   return found;
 }
 
-// Commands and the page that has to name each of their options.
-TEST(Documentation, PagesOfCommandsNameEveryOption) {
-  const std::regex flag("--?[a-z][a-z0-9-]*");
-  for (const auto& [name, page] : {std::pair{"batch", "batch.md"}, {"report", "report.md"}, {"manual", "install.md"},
-                                   {"completion", "install.md"}}) {
-    const std::string text = read_text(kRoot / "docs" / page);
-    std::set<std::string> words;
-    for (std::sregex_iterator at(text.begin(), text.end(), flag), end; at != end; ++at) words.insert(at->str());
-    EXPECT_NE(text.find("lamina " + std::string(name)), std::string::npos) << name;
-    const pipeline::Command* found = pipeline::find_command(name);
-    ASSERT_NE(found, nullptr) << name;
-    const pipeline::Command& command = *found;
+// docs/commands is what the definitions give: lamina manual --markdown -o docs/commands.
+TEST(Documentation, PagesOfCommandsAreThoseOfTheirDefinitions) {
+  std::set<std::string> pages;
+  for (const auto& entry : fs::directory_iterator(kRoot / "docs/commands")) pages.insert(entry.path().filename());
+  for (const pipeline::Command& command : pipeline::commands()) {
+    const std::string name = std::string(command.name) + ".md";
     const pipeline::CommandSpec spec = pipeline::spec_of(command);
-    EXPECT_EQ(spec.name, name);
-    for (const pipeline::OptionSpec& option : spec.options) EXPECT_TRUE(named(option, words)) << command.name << " " << option.flag;
+    EXPECT_EQ(spec.name, command.name);
+    ASSERT_EQ(pages.erase(name), 1u) << name;
+    EXPECT_EQ(read_text(kRoot / "docs/commands" / name), pipeline::markdown_page(command)) << name;
+    const std::string readme = read_text(kRoot / "README.md");
+    EXPECT_NE(readme.find("lamina " + std::string(command.name)), std::string::npos) << command.name;
   }
+  EXPECT_TRUE(pages.empty()) << "docs/commands/" << *pages.begin() << " is of no command";
+}
+
+// What the commands' own programs take is what their definitions say: lamina preview is one of its own.
+TEST(Documentation, PreviewTakesTheOptionsOfItsDefinition) {
+  const Directory directory;
+  const Outcome outcome = run_lamina({"preview", "--help"}, directory.path());
+  ASSERT_EQ(outcome.code, 0);
+  for (const std::string& flag : long_flags(pipeline::preview_spec())) EXPECT_NE(outcome.out.find(flag), std::string::npos) << flag;
+}
+
+// Every --option that a page puts between backticks is one of some command, or of another program that it names.
+TEST(Documentation, EveryOptionThatItNamesExists) {
+  std::set<std::string> known = {"--help", "--version"};
+  for (const pipeline::Command& command : pipeline::commands()) known.merge(long_flags(pipeline::spec_of(command)));
+  const std::set<std::string> others = {"--install", "--export-sla", "--sanitize", "--models", "--bench", "--develop"};
+  const std::regex quoted("`[^`\n]*`"), flag("(?:^|[ `(])(--[a-z][a-z0-9-]*)");
+  std::size_t checked = 0;
+  for (const fs::path& page : pages()) {
+    const std::string text = read_text(page);
+    for (std::sregex_iterator at(text.begin(), text.end(), quoted), end; at != end; ++at) {
+      const std::string words = at->str();
+      for (std::sregex_iterator word(words.begin(), words.end(), flag); word != end; ++word) {
+        const std::string name = (*word)[1];
+        EXPECT_TRUE(known.contains(name) || others.contains(name)) << page.filename() << ": " << name;
+        ++checked;
+      }
+    }
+  }
+  EXPECT_GT(checked, 100u);
+}
+
+// Every key of a machine's profile, with the default that it has.
+TEST(Documentation, EveryKeyOfAMachineIsDocumented) {
+  const std::string page = read_text(kRoot / "docs/machines.md");
+  std::string section;
+  std::istringstream profile(pipeline::machine_text(Machine()));
+  std::size_t checked = 0;
+  for (std::string line; std::getline(profile, line);) {
+    if (line.starts_with('[')) section = line.substr(1, line.find(']') - 1);
+    const std::size_t equals = line.find(" = ");
+    if (equals == std::string::npos || line.starts_with('#')) continue;
+    const std::string name = line.substr(0, equals), value = line.substr(equals + 3);
+    const std::regex row("\\| `" + section + "\\.[^\n]*`?\\.?" + name + "`[^\n]*");
+    std::smatch found;
+    ASSERT_TRUE(std::regex_search(page, found, row)) << section << "." << name;
+    EXPECT_TRUE(value == "\"\"" || found.str().find(value) != std::string::npos)
+        << section << "." << name << " is " << value << ": " << found.str();
+    ++checked;
+  }
+  EXPECT_GT(checked, 40u);
 }
 
 // Whatever stands behind "lamina COMMAND" on a line, up to what ends a command there.
@@ -72,7 +117,6 @@ TEST(Documentation, EveryCommandLineInItCanBeTyped) {
       if (!typed) continue;
       ASSERT_NE(command, nullptr) << page.filename() << ": " << at->str();
       const pipeline::CommandSpec spec = pipeline::spec_of(*command);
-      if (spec.name.empty()) continue;
       // What stands in quotes is for another command, as in --with 'jet --dpi 600'.
       const std::string bare = std::regex_replace(rest, std::regex("'[^']*'"), "");
       for (std::sregex_iterator word(bare.begin(), bare.end(), flag); word != end; ++word) {
