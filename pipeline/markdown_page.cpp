@@ -20,6 +20,7 @@ constexpr More kMore[] = {
     {"slice", "[contours](../slice.md), [filling](../filling.md), [job files](../job.md), [formats](../formats.md)"},
     {"heights", "[layer heights](../heights.md)"},
     {"extrude", "[extrusion](../extrude.md), [segmented lines](../segmented.md), [filling](../filling.md), [job files](../job.md)"},
+    {"calibrate", "[the procedure](../calibrate.md), [segmented lines](../segmented.md)"},
     {"info", "[concepts](../concepts.md)"},
     {"verify", "[exactness](../exactness.md), [print programs](../print_program.md)"},
     {"permeability", "[segmented lines](../segmented.md)"},

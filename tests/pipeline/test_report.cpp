@@ -286,6 +286,11 @@ TEST_F(JobsReported, InABrowserItShowsTheLayersAndCanBeUsed) {
   EXPECT_GT(step["wheel"]["scale"], step["drag"]["scale"]);
   EXPECT_NEAR(step["plot"]["layer"].get<int>(), layers / 2, 2);
   EXPECT_EQ(said["file_rows"], layers + 1);
+  for (const Json& stretched : said["stretched"]) EXPECT_NEAR(stretched.get<double>(), 1, 0.02) << said["stretched"];
+  for (const char* label : {"the parts from above", "the parts from the front", "the parts from the right", "area against height",
+                            "thickness against height"}) {
+    EXPECT_NE(std::ranges::find(said["labels"], Json(label)), said["labels"].end()) << label;
+  }
   EXPECT_NE(said["grounds"][0], said["grounds"][1]);
   EXPECT_LE(said["phone"][0], said["phone"][1]);
   EXPECT_NE(said["text"].get<std::string>().find("nist_part_feature_open.stl"), std::string::npos);

@@ -137,6 +137,10 @@ def look(browser, page, layer, shots):
         said["warning"] = browser.value("document.querySelector('#warnings button').textContent")
     browser.value("document.querySelector('#files').open = true")
     browser.settle()
+    # Every picture has the shape of its place: a circle is one. And each plot says what it is.
+    said["stretched"] = browser.value("[...document.querySelectorAll('canvas')].map(c => { const b = c.getBoundingClientRect();"
+                                      " return (c.width / c.height) / (b.width / b.height); })")
+    said["labels"] = browser.value("[...document.querySelectorAll('canvas')].map(c => c.getAttribute('aria-label'))")
     said["file_rows"] = browser.value("document.querySelectorAll('#files tr').length")
     said["text"] = browser.value("document.body.innerText")
     before = browser.value("getComputedStyle(document.body).backgroundColor")

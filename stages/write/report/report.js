@@ -181,8 +181,8 @@ async function drawViews() {
       to.drawImage(picture, (canvas.width - w * scale) / 2, (canvas.height - h * scale) / 2, w * scale, h * scale);
     };
     redraw.push(draw);
-    draw();
   }
+  redraw.forEach(draw => draw());  // now that all have their places: the first alone would be as wide as the page
 }
 
 // --- over the height
