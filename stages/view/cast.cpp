@@ -28,6 +28,7 @@ constexpr Frame frame_of(Side side) {
 /// Where the light comes from: left, above, and from behind whoever looks. Unit length; the rest is never quite dark.
 constexpr Vector kLight = {-0.35f, 0.45f, 0.82f};
 constexpr float kLeastLight = 0.15f;
+constexpr float kDepthShade = 0.4f;
 
 float float_mm(std::int64_t nm) { return static_cast<float>(mm(nm)); }
 
@@ -81,8 +82,8 @@ struct Caster::State {
     return true;
   }
 
-  /// How light the facet is that a ray meets first; negative if it meets none.
-  float light(const Frame& frame, const Vector& origin) const {
+  /// How light the facet is that a ray meets first; negative if it meets none. The parts lie between the two depths, mm.
+  float light(const Frame& frame, const Vector& origin, float first_depth, float last_depth) const {
     RTCIntersectContext context;
     rtcInitIntersectContext(&context);
     RTCRayHit ray{};
@@ -102,7 +103,10 @@ struct Caster::State {
     // A facet that is turned over looks like one that is not.
     const float turned = of(frame.towards) * frame.sign < 0 ? -1.0f : 1.0f;
     const float lit = (kLight[0] * of(frame.right) + kLight[1] * of(frame.up) + kLight[2] * frame.sign * of(frame.towards)) * turned;
-    return kLeastLight + (1 - kLeastLight) * std::max(0.0f, lit / length);
+    // What lies deeper is darker, so that faces which look the same way can be told apart.
+    const float depth = (ray.ray.tfar - first_depth) / std::max(last_depth - first_depth, 1e-6f);
+    const float near = 1 - kDepthShade * std::clamp(depth, 0.0f, 1.0f);
+    return (kLeastLight + (1 - kLeastLight) * std::max(0.0f, lit / length)) * near;
   }
 };
 
@@ -166,7 +170,7 @@ Picture Caster::look(Side side, std::uint32_t most) const {
         origin[right] = lo[right] + (static_cast<float>(column) + x) / static_cast<float>(picture.width) * extent(frame.right);
         origin[up] = hi[up] - (static_cast<float>(row) + y) / static_cast<float>(picture.height) * extent(frame.up);
         origin[towards] = (frame.sign > 0 ? hi : lo)[towards] + frame.sign * longest;
-        const float light = state_->light(frame, origin);
+        const float light = state_->light(frame, origin, longest, longest + extent(frame.towards));
         if (light < 0) continue;
         sum += light;
         ++hits;
