@@ -135,7 +135,7 @@ Result<ExtrudeSummary> run_extrude(const Job& asked, const ProgressCallback& pro
   summary.load_seconds = plan->load_seconds;
   summary.index_seconds = plan->index_seconds;
   for (const Instance& instance : plan->scene().instances) summary.triangles += plan->scene().meshes[instance.mesh].triangles.size();
-  const Layer& highest = plan->layers().back();
+  const Layer& highest = plan->layers().back().layer;
   summary.height_mm = mm(std::int64_t{highest.bottom} + highest.thickness);
   if (mm(plan->scene().height) > machine.bed.build_height_mm) {
     return Error{Fault::kUsage, fmt::format("the parts are {:.3f} mm high, {} builds {:.3f} mm; lay them down or scale them",
@@ -146,7 +146,7 @@ Result<ExtrudeSummary> run_extrude(const Job& asked, const ProgressCallback& pro
   }
   const auto format = machine.format == "sml" ? write::make_sml_format(machine) : write::make_gcode_format(machine);
   for (std::uint32_t i = first; i < last; ++i) {
-    if (Status status = format->check(plan->layers()[i]); !status) return status.error();
+    if (Status status = format->check(plan->layers()[i].layer); !status) return status.error();
   }
   if (!plan->fills()) {
     summary.warnings.push_back("nothing is asked for: no walls and no filling; give --walls, --fill or both");
@@ -188,8 +188,8 @@ Result<ExtrudeSummary> run_extrude(const Job& asked, const ProgressCallback& pro
     timed(plan_ns, from);
     from = Clock::now();
     work.text.clear();
-    const Layer& layer = plan->layers()[first + i];
-    const auto out = format->layer(layer, summary.layers, work.text);
+    const ScheduledLayer& layer = plan->layers()[first + i];
+    const auto out = format->layer(layer.layer, summary.layers, work.text);
     auto sums = extrude_layer(*plan, *segments, machine, layer, work.layer, *out);
     if (!sums) return sums.error();
     work.sums = *sums;
@@ -203,7 +203,7 @@ Result<ExtrudeSummary> run_extrude(const Job& asked, const ProgressCallback& pro
     if (Status status = file->append(work.text); !status) return status;
     if (i == 0) summary.first_layer_points = work.sums.segments.points();
     sums.add(work.sums);
-    const Layer& layer = plan->layers()[first + i];
+    const Layer& layer = plan->layers()[first + i].layer;
     if (work.sums.segments.lines > 0 && work.sums.segments.thin == 0 && ++undivided_layers == 1) {
       first_undivided = fmt::format("in layer {} at z {:.3f} mm", first + i, mm(layer.plane()));
     }

@@ -151,8 +151,9 @@ Status check_thin_stretches(const SegmentPlan& segments, const SlicePlan& plan) 
 }
 
 Result<LayerExtrusion> extrude_layer(const SlicePlan& plan, const SegmentPlan& segments, const Extruder& machine,
-                                     const Layer& layer, const SlicePlan::Work& work, write::LayerMoves& out) {
+                                     const ScheduledLayer& scheduled, const SlicePlan::Work& work, write::LayerMoves& out) {
   LayerExtrusion sums;
+  const Layer layer = scheduled.own();
   sums.porosity.solid_mm3 = square_mm(doubled_area(work.contours.contours)) * mm(layer.thickness);
   sums.points = work.paths.point.size();
   const ToolpathsView all = work.paths;

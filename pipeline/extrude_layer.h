@@ -26,6 +26,6 @@ Status check_thin_stretches(const SegmentPlan& segments, const SlicePlan& plan);
 
 /// The stored toolpaths of a layer become moves; stretches are expanded here and nowhere kept.
 Result<LayerExtrusion> extrude_layer(const SlicePlan& plan, const SegmentPlan& segments, const Extruder& machine,
-                                     const Layer& layer, const SlicePlan::Work& work, write::LayerMoves& out);
+                                     const ScheduledLayer& layer, const SlicePlan::Work& work, write::LayerMoves& out);
 
 }  // namespace lamina::pipeline

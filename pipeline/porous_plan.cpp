@@ -148,7 +148,7 @@ Status PorousPlan::apply(const Layer& layer, Runs& image, Runs& scratch, std::un
 }
 
 std::uint64_t PorousPlan::spans_expected(std::uint32_t index) const {
-  const Layer& layer = slices_->layers()[index];
+  const Layer layer = slices_->layers()[index].own();
   const double rows_per_mm = grid_.y.pixels_per_nm() * kNmPerMm;
   // Of a cut the slicer needs some 140 bytes: so many corners have walls and closed curves.
   const double corners = static_cast<double>(slices_->slicer().layer_bytes_bound(index)) / 140;

@@ -94,6 +94,9 @@ Result<SliceSummary> run_slice(const Job& job, const ProgressCallback& progress,
   if (job.slice.format == "3mf" && job.slice.file_a_layer) {
     return Error{Fault::kUsage, "--file-a-layer: a 3MF package holds all slices; choose svg or cli, or leave it out"};
   }
+  if (job.heights.per_part) {
+    return Error{Fault::kUsage, "--per-part: a file of slices has one table of layers for all parts; leave it out"};
+  }
   const auto plan = SlicePlan::make(job, progress);
   if (!plan) return plan.error();
   if (cancel) return Error{Fault::kInterrupted, "interrupted before the first layer; nothing was written"};
@@ -128,7 +131,7 @@ Result<SliceSummary> run_slice(const Job& job, const ProgressCallback& progress,
   head.parts = plan->names();
   head.bounds = plan->bounds();
   head.layers = last - first;
-  head.first_bottom = first < last ? plan->layers()[first].bottom : 0;
+  head.first_bottom = first < last ? plan->layers()[first].layer.bottom : 0;
   head.program = fmt::format("lamina {}", version());
   write::SliceFormatOptions format_options;
   format_options.empty_first_layer = job.slice.empty_first_layer;
@@ -165,7 +168,7 @@ Result<SliceSummary> run_slice(const Job& job, const ProgressCallback& progress,
     sum += std::chrono::duration_cast<std::chrono::nanoseconds>(Clock::now() - from).count();
   };
   const auto view_of = [&](std::uint32_t index, const SlicePlan::Work& work) {
-    return write::SliceLayer{plan->layers()[index], work.contours.contours, work.contours.body, work.paths, work.path_body};
+    return write::SliceLayer{plan->layers()[index].layer, work.contours.contours, work.contours.body, work.paths, work.path_body};
   };
   const auto prepare = [&](std::uint32_t i, SlicePlan::Work& work) -> Result<std::uint64_t> {
     // A stretch between two points is an element of its own at worst.
@@ -199,7 +202,7 @@ Result<SliceSummary> run_slice(const Job& job, const ProgressCallback& progress,
   std::string first_open, first_emptied;
   std::uint32_t done = 0;
   const auto record = [&](std::uint32_t i, SlicePlan::Work& work) -> Status {
-    const Layer& layer = plan->layers()[first + i];
+    const Layer& layer = plan->layers()[first + i].layer;
     const double area = square_mm(doubled_area(work.contours.contours));
     std::string where;
     if (package) {

@@ -10,6 +10,7 @@
 
 #include "pipeline/job.h"
 #include "pipeline/jet.h"  // ProgressCallback
+#include "pipeline/layer_schedule.h"
 #include "pipeline/scene.h"
 #include "stages/data/layer.h"
 #include "stages/data/status.h"
@@ -28,13 +29,14 @@ class SlicePlan {
   struct Work {
     slice::LayerScratch scratch;
     slice::LayerContours contours;
+    slice::LayerContours highest;     // where steps have to stay on one side: the section at the top of the layer
     slice::LayerContours parts;       // of areas of bodies that several parts share, united part by part
     std::vector<Contours> surface;    // of these areas: what no earlier part takes
     std::vector<Contours> region;     // of each area: where centres of filling beads may lie
     Toolpaths paths;
     Buffer<std::uint32_t> path_body;  // the paths of body b are [path_body[b], path_body[b + 1])
     Buffer<std::uint32_t> path_area;  // the same of areas
-    Buffer<std::uint32_t> rebased;
+    Buffer<std::uint32_t> rebased, rebased_highest;
     slice::LayerReport report;
     Buffer<char> text;
 
@@ -57,7 +59,7 @@ class SlicePlan {
   /// What fills an area in a layer.
   const infill::FillParameters& filling(const Area& area, const Layer& layer) const;
 
-  const std::vector<Layer>& layers() const { return layers_; }
+  const std::vector<ScheduledLayer>& layers() const { return schedule_.layers; }
   const Scene& scene() const { return *scene_; }
   const slice::Slicer& slicer() const { return *slicer_; }
   const std::vector<std::string>& names() const { return names_; }  // of bodies
@@ -73,14 +75,19 @@ class SlicePlan {
  private:
   SlicePlan() = default;
   std::unique_ptr<Scene> scene_;  // stays where it is: the slicer points into it
-  std::vector<Layer> layers_;
+  LayerSchedule schedule_;
+  Containment containment_ = Containment::kAcross;
   std::unique_ptr<slice::Slicer> slicer_;
+  std::vector<slice::Slicer> own_slicers_;   // by part, where each has layers of its own
   std::vector<std::string> names_;
   std::vector<FillPlan> plans_;              // by [[part]]
   std::vector<Area> areas_;
   std::vector<std::uint32_t> body_area_;     // bodies + 1, into areas_
   std::optional<slice::Slicer> part_slicer_;  // of the shared areas, if there are any to be filled
+  Status make_own_slicers(const Job& job, const std::vector<std::uint32_t>& body);
   std::vector<std::uint32_t> make_areas(const Job& job, const std::vector<Box>& boxes, const std::vector<std::uint32_t>& body);
+  Result<slice::LayerReport> section(const slice::Slicer& slicer, const ScheduledLayer& scheduled, Work& work,
+                                     slice::LayerContours& out) const;
   ContoursView contours_of(const Area& area, Work& work) const;
   Error failed(const Area& area, const Error& error) const;
   Box bounds_;

@@ -84,7 +84,7 @@ Result<LayerShapes> slice_shapes(const std::string& directory, std::optional<std
   SlicePlan::Work work;
   if (Status status = plan->layer(index, work); !status) return status.error();
   LayerShapes shapes;
-  shapes.layer = plan->layers()[index];
+  shapes.layer = plan->layers()[index].layer;
   shapes.contours = std::move(work.contours.contours);
   const double area = square_mm(doubled_area(shapes.contours));
   const std::string line = line_of(manifest_text(directory), index);

@@ -7,7 +7,6 @@
 #include <map>
 #include <numeric>
 
-#include "pipeline/heights_plan.h"
 #include "pipeline/slice.h"
 #include "stages/data/clipping.h"
 #include "stages/infill/fill.h"
@@ -92,21 +91,10 @@ Result<SlicePlan> SlicePlan::make(const Job& job, const ProgressCallback& progre
 
   start = Clock::now();
   progress({ProgressEvent::Stage::kIndexing});
-  if (job.heights.containment != Containment::kAcross) {
-    return Error{Fault::kUsage, "--containment: contours are cut in the middle of layers; use it with lamina jet"};
-  }
-  if (job.heights.per_part) {
-    return Error{Fault::kUsage, "--per-part: a file of slices has one table of layers for all parts; leave it out"};
-  }
-  const Result<heights::LayerTable> table = layer_table(job, *plan.scene_);
-  if (!table) return table.error();
-  const std::uint32_t total = table->size();
-  std::vector<Nm> planes(total);
-  plan.layers_.reserve(total);
-  for (std::uint32_t i = 0; i < total; ++i) {
-    plan.layers_.push_back((*table)[i]);
-    planes[i] = plan.layers_[i].plane();
-  }
+  auto schedule = schedule_layers(job, *plan.scene_);
+  if (!schedule) return schedule.error();
+  plan.schedule_ = std::move(*schedule);
+  plan.containment_ = job.heights.containment;
   std::vector<Box> boxes;
   for (const Instance& instance : plan.scene_->instances) {
     boxes.push_back(box_of(*plan.scene_, instance));
@@ -123,13 +111,32 @@ Result<SlicePlan> SlicePlan::make(const Job& job, const ProgressCallback& progre
   options.gap = static_cast<Nm>(nm_of(job.slice.bridge_mm));
   options.offset = nm_of(job.slice.offset_mm);
   plan.bounds_ = grown(plan.bounds_, plan.grow_);
-  auto slicer = slice::Slicer::build(plan.scene_->meshes, plan.scene_->instances, body, planes, options);
+  auto slicer = slice::Slicer::build(plan.scene_->meshes, plan.scene_->instances, body, plan.schedule_.planes, options);
   if (!slicer) return slicer.error();
   plan.slicer_ = std::make_unique<slice::Slicer>(std::move(*slicer));
   const bool shares = std::ranges::any_of(part_area, [](std::uint32_t area) { return area != slice::Slicer::kLeftOut; });
   if (plan.fills_ && shares) plan.part_slicer_ = plan.slicer_->regrouped(part_area);
+  if (job.heights.per_part) {
+    if (Status status = plan.make_own_slicers(job, body); !status) return status.error();
+  }
   plan.index_seconds = seconds_since(start);
   return plan;
+}
+
+Status SlicePlan::make_own_slicers(const Job& job, const std::vector<std::uint32_t>& body) {
+  for (const Area& area : areas_) {
+    if (area.shared == UINT32_MAX) continue;
+    return Error{Fault::kUsage, fmt::format("--per-part: {} touches another part, so they have to share their layers; move "
+                                            "them apart or leave it out", fs::path(job.parts[area.part].path).filename().string())};
+  }
+  for (std::uint32_t part = 0; part < job.parts.size(); ++part) {
+    std::vector<std::uint32_t> own = body;
+    for (std::size_t i = 0; i < own.size(); ++i) {
+      if (scene_->part_of_instance[i] != part) own[i] = slice::Slicer::kLeftOut;
+    }
+    own_slicers_.push_back(slicer_->regrouped(own));
+  }
+  return {};
 }
 
 std::vector<std::uint32_t> SlicePlan::make_areas(const Job& job, const std::vector<Box>& boxes,
@@ -168,31 +175,60 @@ ContoursView SlicePlan::contours_of(const Area& area, Work& work) const {
   return area.shared == UINT32_MAX ? work.contours.of(area.body, work.rebased) : ContoursView(work.surface[area.shared]);
 }
 
+Result<slice::LayerReport> SlicePlan::section(const slice::Slicer& slicer, const ScheduledLayer& scheduled, Work& work,
+                                              slice::LayerContours& out) const {
+  auto report = slicer.layer(scheduled.low, work.scratch, out);
+  if (!report || containment_ == Containment::kAcross) return report;
+  const auto high = slicer.layer(scheduled.high, work.scratch, work.highest);
+  if (!high) return high.error();
+  report->cuts += high->cuts;
+  report->united += high->united;
+  report->gaps.add(high->gaps);
+  slice::LayerContours both;
+  for (std::uint32_t b = 0; b < slicer.bodies(); ++b) {
+    const ContoursView low_view = out.of(b, work.rebased), high_view = work.highest.of(b, work.rebased_highest);
+    Result<Contours> region = Contours();
+    if (containment_ == Containment::kInside) {
+      region = intersect_contours(low_view, high_view);
+    } else {
+      Contours all;
+      all.append(low_view);
+      all.append(high_view);
+      region = unite_contours(all, FillRule::kNonzero);
+    }
+    if (!region) return region.error();
+    both.contours.append(*region);
+    both.body.push_back(both.contours.size());
+  }
+  out = std::move(both);
+  return report;
+}
+
 Status SlicePlan::contours(std::uint32_t index, Work& work) const {
-  auto report = slicer_->layer(index, work.scratch, work.contours);
+  const ScheduledLayer& scheduled = schedule_.layers[index];
+  const Layer own = scheduled.own();
+  auto report = section(own_slicers_.empty() ? *slicer_ : own_slicers_[scheduled.part], scheduled, work, work.contours);
   if (!report) return report.error();
+  // Bodies of other parts have nothing in this layer.
+  work.contours.body.resize(slicer_->bodies() + 1, work.contours.contours.size());
   work.report = *report;
   work.paths.clear();
   work.path_body.clear();
   work.path_area.clear();
   if (!fills_) return {};
   if (part_slicer_) {
-    if (auto again = part_slicer_->layer(index, work.scratch, work.parts); !again) return again.error();
+    if (auto again = section(*part_slicer_, scheduled, work, work.parts); !again) return again.error();
     work.surface.resize(part_slicer_->bodies());
     for (std::size_t a = 0; a < areas_.size(); ++a) {
       const Area& area = areas_[a];
       if (area.shared == UINT32_MAX) continue;
-      const ContoursView own = work.parts.of(area.shared, work.rebased);
+      const ContoursView surface = work.parts.of(area.shared, work.rebased);
       Contours earlier;
       for (std::size_t other = body_area_[area.body]; other < a; ++other) {
         if (!touch(grown(areas_[other].box, grow_), grown(area.box, grow_))) continue;
-        const Contours& taken = work.surface[areas_[other].shared];
-        for (std::uint32_t c = 0; c < taken.size(); ++c) {
-          earlier.point.insert(earlier.point.end(), taken[c].begin(), taken[c].end());
-          earlier.close();
-        }
+        earlier.append(work.surface[areas_[other].shared]);
       }
-      auto rest = subtract_contours(own, earlier);
+      auto rest = subtract_contours(surface, earlier);
       if (!rest) return rest.error();
       work.surface[area.shared] = std::move(*rest);
     }
@@ -200,7 +236,7 @@ Status SlicePlan::contours(std::uint32_t index, Work& work) const {
   work.region.resize(areas_.size());
   for (std::size_t a = 0; a < areas_.size(); ++a) {
     const Area& area = areas_[a];
-    auto region = infill::fill_region(contours_of(area, work), {layers_[index], area.box}, filling(area, layers_[index]));
+    auto region = infill::fill_region(contours_of(area, work), {own, area.box}, filling(area, own));
     if (!region) return failed(area, region.error());
     work.region[a] = std::move(*region);
   }
@@ -209,7 +245,7 @@ Status SlicePlan::contours(std::uint32_t index, Work& work) const {
 
 Status SlicePlan::fill(std::uint32_t index, Work& work) const {
   if (!fills_) return {};
-  const Layer& layer = layers_[index];
+  const Layer layer = schedule_.layers[index].own();
   work.path_body.push_back(0);
   work.path_area.push_back(0);
   for (std::size_t a = 0; a < areas_.size(); ++a) {
@@ -236,19 +272,24 @@ Error SlicePlan::failed(const Area& area, const Error& error) const {
 
 std::uint64_t SlicePlan::bytes_bound(std::uint32_t index) const {
   // Text of a contour's point is at most 50 bytes, and it is kept beside the contours.
-  std::uint64_t contours = 3 * slicer_->layer_bytes_bound(index);
-  if (part_slicer_) contours += 3 * part_slicer_->layer_bytes_bound(index);
+  const ScheduledLayer& scheduled = schedule_.layers[index];
+  const auto bound = [&](const slice::Slicer& slicer) {
+    return 3 * (slicer.layer_bytes_bound(scheduled.low) +
+                (scheduled.low == scheduled.high ? 0 : 3 * slicer.layer_bytes_bound(scheduled.high)));
+  };
+  std::uint64_t contours = bound(own_slicers_.empty() ? *slicer_ : own_slicers_[scheduled.part]);
+  if (part_slicer_) contours += bound(*part_slicer_);
   return (fills_ ? 2 : 1) * contours + (1 << 14);
 }
 
 Result<std::uint64_t> SlicePlan::fill_bytes_bound(std::uint32_t index, Work& work, std::uint64_t bytes_a_point) const {
   if (!fills_) return std::uint64_t{0};
   constexpr std::uint64_t kOfPoint = 17;
+  const Layer own = schedule_.layers[index].own();
   std::uint64_t points = 0, scratch = 0;
   for (std::size_t a = 0; a < areas_.size(); ++a) {
     const Area& area = areas_[a];
-    const auto bound = infill::bound_fill(contours_of(area, work), work.region[a], {layers_[index], area.box},
-                                          filling(area, layers_[index]));
+    const auto bound = infill::bound_fill(contours_of(area, work), work.region[a], {own, area.box}, filling(area, own));
     if (!bound) return failed(area, bound.error());
     points += bound->points;
     scratch = std::max(scratch, bound->scratch_bytes);
@@ -259,7 +300,7 @@ Result<std::uint64_t> SlicePlan::fill_bytes_bound(std::uint32_t index, Work& wor
 
 std::uint64_t SlicePlan::Work::bytes() const {
   const auto of = [](const Contours& c) { return bytes_held(c.point) + bytes_held(c.offset); };
-  std::uint64_t total = of(contours.contours) + of(parts.contours) + of(scratch.closed) + of(scratch.open) + bytes_held(text);
+  std::uint64_t total = of(contours.contours) + of(highest.contours) + of(parts.contours) + of(scratch.closed) + of(scratch.open) + bytes_held(text);
   for (const Contours& c : surface) total += of(c);
   for (const Contours& c : region) total += of(c);
   for (const Contours& c : scratch.of_source) total += of(c);

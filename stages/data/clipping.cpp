@@ -123,6 +123,25 @@ Error refusal(const char* why) {
   return {Fault::kInternal, fmt::format("contours of a layer cannot be combined: {}; please report this with the part", why)};
 }
 
+Result<Contours> combine(const ContoursView& contours, const ContoursView& with, clip::ClipType how) {
+  Contours out;
+  if (contours.size() == 0) return out;
+  try {
+    const Point2 by = middle_of(contours);
+    clip::Clipper clipper(clip::ioStrictlySimple);
+    clipper.AddPaths(to_clipper(contours, by).paths, clip::ptSubject, true);
+    clipper.AddPaths(to_clipper(with, by).paths, clip::ptClip, true);
+    clip::PolyTree tree;
+    if (!clipper.Execute(how, tree, clip::pftNonZero, clip::pftNonZero)) {
+      return refusal("a difference or intersection failed");
+    }
+    append_tree(tree, by, out);
+  } catch (const std::exception& exception) {
+    return refusal(exception.what());
+  }
+  return out;
+}
+
 }  // namespace
 
 Result<Contours> unite_contours(const ContoursView& contours, FillRule rule) {
@@ -145,22 +164,11 @@ Result<Contours> unite_contours(const ContoursView& contours, FillRule rule) {
 }
 
 Result<Contours> subtract_contours(const ContoursView& contours, const ContoursView& less) {
-  Contours out;
-  if (contours.size() == 0) return out;
-  try {
-    const Point2 by = middle_of(contours);
-    clip::Clipper clipper(clip::ioStrictlySimple);
-    clipper.AddPaths(to_clipper(contours, by).paths, clip::ptSubject, true);
-    clipper.AddPaths(to_clipper(less, by).paths, clip::ptClip, true);
-    clip::PolyTree tree;
-    if (!clipper.Execute(clip::ctDifference, tree, clip::pftNonZero, clip::pftNonZero)) {
-      return refusal("the difference failed");
-    }
-    append_tree(tree, by, out);
-  } catch (const std::exception& exception) {
-    return refusal(exception.what());
-  }
-  return out;
+  return combine(contours, less, clip::ctDifference);
+}
+
+Result<Contours> intersect_contours(const ContoursView& one, const ContoursView& other) {
+  return combine(one, other, clip::ctIntersection);
 }
 
 Result<Contours> offset_contours(const ContoursView& contours, std::int64_t distance, OffsetJoin join) {

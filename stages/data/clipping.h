@@ -27,6 +27,9 @@ Result<Contours> unite_contours(const ContoursView& contours, FillRule rule);
 /// errors  kInternal if Clipper refuses them
 Result<Contours> subtract_contours(const ContoursView& contours, const ContoursView& less);
 
+/// The region that two sets of clean contours share. As subtract_contours.
+Result<Contours> intersect_contours(const ContoursView& one, const ContoursView& other);
+
 /// The region of clean contours grown by `distance` nm, shrunk where it is negative, as clean contours; pieces that
 /// shrink away are gone. Contours keep their distance to within 1 nm of rounding where they are straight.
 /// errors  kInternal if Clipper refuses the contours

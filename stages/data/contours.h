@@ -46,6 +46,11 @@ struct Contours {
     offset.assign(1, 0);
     point.clear();
   }
+  void append(const ContoursView& other) {
+    const auto base = static_cast<std::uint32_t>(point.size());
+    point.insert(point.end(), other.point.begin(), other.point.end());
+    for (std::uint32_t c = 0; c < other.size(); ++c) offset.push_back(base + other.offset[c + 1]);
+  }
   /// Ends the contour whose points were appended to `point`.
   void close() { offset.push_back(static_cast<std::uint32_t>(point.size())); }
 };

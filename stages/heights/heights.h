@@ -47,7 +47,8 @@ struct Options {
   double least_flat_mm2 = 1;         // smaller flats are not aimed at
   bool flats = true;                 // optimal: end layers on flats and on tops and bottoms of parts
   TimeModel time;                    // optimal
-  std::int64_t slab = 0;             // nm, optimal: if not 0, every multiple of it below the top is a boundary
+  std::int64_t slab = 0;             // nm, optimal: if not 0, every multiple of it is a boundary, but for one that is
+                             // nearer below the top than the least thickness
 };
 
 /// How near a flat the nearest boundary of a table lies.

@@ -122,7 +122,11 @@ class Solver {
       while (flat < flats_.size() && flats_[flat] - distance <= bottom) ++flat;
       std::int64_t most = std::min(ceiling, bottom + set_.most());
       if (flat < flats_.size()) most = std::min(most, flats_[flat] + distance);
-      if (options_.slab > 0) most = std::min(most, (bottom / options_.slab + 1) * options_.slab);
+      if (options_.slab > 0) {
+        // A boundary so near to the top that no layer fits between them would leave the top missed.
+        const std::int64_t boundary = (bottom / options_.slab + 1) * options_.slab;
+        if (boundary >= index_.top || index_.top - boundary >= set_.least()) most = std::min(most, boundary);
+      }
       // The least thickness is allowed whatever the slopes ask for.
       const std::uint32_t thinnest = ladder_.rungs_up_to(bottom + set_.least()) - 1;
       limit_[rung] = std::min(ladder_.rungs_up_to(most) - 1, std::max(highest_[rung], thinnest));

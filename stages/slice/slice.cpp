@@ -96,10 +96,7 @@ void Slicer::loops_of(const Source& source, std::uint32_t plane, LayerScratch& s
   report.cuts += scratch.cuts.size();
   if (scratch.open.size() == 0) return;
   const GapReport gaps = close_gaps(scratch.open, options_.gap, closed);
-  if (report.gaps.open == 0) report.gaps.first_open = gaps.first_open;
-  report.gaps.closed += gaps.closed;
-  report.gaps.open += gaps.open;
-  report.gaps.largest_closed = std::max(report.gaps.largest_closed, gaps.largest_closed);
+  report.gaps.add(gaps);
 }
 
 Status Slicer::clean(Contours& contours, LayerScratch& scratch, LayerReport& report) const {

@@ -78,8 +78,8 @@ TEST_F(FillAreas, PartsWhoseBoxesTouchKeepTheirOwnFillingAndHeights) {
   for (std::uint32_t layer = 0; layer < plan->layers().size(); ++layer) {
     // Each by the height above its own bottom.
     for (const auto& area : plan->areas()) {
-      const double z = mm(plan->layers()[layer].plane() - area.box.lo.z);
-      EXPECT_EQ(plan->filling(area, plan->layers()[layer]).gaps[0], z >= 2 && z < 3 ? 500'000 : 0) << layer;
+      const double z = mm(plan->layers()[layer].layer.plane() - area.box.lo.z);
+      EXPECT_EQ(plan->filling(area, plan->layers()[layer].layer).gaps[0], z >= 2 && z < 3 ? 500'000 : 0) << layer;
     }
   }
   SlicePlan::Work work;

@@ -162,7 +162,8 @@ TEST_F(PorousJob, PorosityOfTheBitmapIsThatOfThePlanWithinThePixelsOfItsEdges) {
     auto scene = plan->slices().scene();
     auto rasterizer = raster::Rasterizer::build(scene.meshes, scene.instances, grid, FillRule::kNonzero, false, true);
     ASSERT_TRUE(rasterizer.ok());
-    for (const Layer& layer : plan->slices().layers()) {
+    for (const pipeline::ScheduledLayer& scheduled : plan->slices().layers()) {
+      const Layer& layer = scheduled.layer;
       Runs image, scratch;
       raster::LayerScratch raster_scratch;
       rasterizer->layer(raster::Engine::kContours, layer.plane(), raster_scratch, image);
