@@ -76,7 +76,9 @@ def write_part(name, models, folder):
 
 
 def tops_of(gcode, comment):
-    """Heights at which layers were put, in mm, from a G-code's lines: the height of the first extrusion of each layer."""
+    """Heights at which layers were put, in mm, from a G-code's lines: the height of the first extrusion of each layer.
+
+    CuraEngine starts the bunny with two layers below the bed where its first layer is 0.05 mm; they are not counted."""
     tops, height, extruded_at = [], 0.0, None
     for line in open(gcode, errors="replace", encoding="utf-8"):
         if not line.startswith(("G0 ", "G1 ")):
@@ -89,7 +91,7 @@ def tops_of(gcode, comment):
         if "E" in words and ("X" in words or "Y" in words) and float(words["E"]) > 0 and height != extruded_at:
             extruded_at = height
             tops.append(height)
-    return sorted(set(round(top, 6) for top in tops))
+    return sorted(set(round(top, 6) for top in tops if top > 0))
 
 
 def slic3r(part, folder, first):
