@@ -131,18 +131,28 @@ Result<segment::LayerCut> layer_cut(const SegmentRange& range, const infill::Fil
     cut.line.origin = std::llround(centre) - cut.line.thin / 2;
   }
   const auto& shifts = range.settings.shift_mm;
-  if (!shifts.empty()) cut.line.origin += nm_of(shifts[layer.index % shifts.size()]);
+  if (!shifts.empty()) {
+    cut.shift = nm_of(shifts[layer.index % shifts.size()]);
+    cut.line.origin += cut.shift;
+  }
   return cut;
 }
 
 Status check_thin_stretches(const SegmentPlan& segments, const SlicePlan& plan) {
-  // No straight line is longer than the parts are across; curves may be.
+  // No straight line is longer than the parts are across; closed curves are.
   const double across = mm(std::llround(std::hypot(static_cast<double>(plan.bounds().width()), static_cast<double>(plan.bounds().depth()))));
   const auto too_long = [&](const SegmentRange& range) { return range.settings.on && range.plan.thin_mm >= across; };
   const auto longer = [&](const SegmentRange& range, const std::string& where) {
     return Error{Fault::kUsage, fmt::format("segment.thin_mm: {}{} mm is longer than any line in the parts, which are {:.3f} mm across; give less", where,
                                             range.plan.thin_mm, across)};
   };
+  if (!too_long(segments.base) && std::ranges::none_of(segments.ranges, too_long)) return {};
+  for (const SlicePlan::Area& area : plan.areas()) {
+    for (const ScheduledLayer& scheduled : plan.layers()) {
+      const infill::Pattern pattern = plan.filling(area, scheduled.own()).pattern;
+      if (pattern == infill::Pattern::kContour || pattern == infill::Pattern::kContourRaster) return {};
+    }
+  }
   if (too_long(segments.base)) return longer(segments.base, "");
   for (const SegmentRange& range : segments.ranges) {
     if (too_long(range)) return longer(range, fmt::format("{:g} to {:g} mm: ", mm(range.from), mm(range.to)));
@@ -168,6 +178,7 @@ Result<LayerExtrusion> extrude_layer(const SlicePlan& plan, const SegmentPlan& s
     paths.offset = all.offset.subspan(work.path_area[a], work.path_area[a + 1] - work.path_area[a] + 1);
     Point2 at{INT32_MIN, INT32_MIN};
     std::int32_t line = kNoLine;
+    PathKind kind = PathKind::kOuter;
     Thickness before = Thickness::kReference;
     PlannedPorosity& volume = sums.porosity;
     segment::for_each_stretch(paths, *cut, [&](const Stretch& s) {
@@ -177,9 +188,10 @@ Result<LayerExtrusion> extrude_layer(const SlicePlan& plan, const SegmentPlan& s
       volume.ellipses_mm3 += length * entry.ellipse;
       volume.measured_mm3 += length * entry.measured;
       if (!cut->on) return;
-      if (cut->segments(s.kind, s.line) && s.line != line) {
+      if (cut->segments(s.kind, s.line) && (s.line != line || s.kind != kind)) {
         ++sums.segments.lines;
         line = s.line;
+        kind = s.kind;
       }
       if (s.thickness != Thickness::kReference) {
         const bool follows = s.from == at && before != Thickness::kReference;

@@ -164,9 +164,13 @@ std::uint64_t PorousPlan::spans_expected(std::uint32_t index) const {
     if (fill.pattern == infill::Pattern::kContour) loops += mm(std::min(box.width(), box.depth())) / 2 / distance;
     if (fill.pattern == infill::Pattern::kContourRaster) loops += fill.loops;
     spans += loops * corners * of_bead + 2 * loops * mm(box.width() + box.depth()) * rows_per_mm;
-    if (fill.pattern == infill::Pattern::kNone || fill.pattern == infill::Pattern::kContour) continue;
+    if (fill.pattern == infill::Pattern::kNone) continue;
     const double length = mm(box.width()) * mm(box.depth()) / distance;
     double stretch = range.settings.on ? std::min(range.plan.thick_mm, range.plan.thin_mm) : INFINITY;
+    if (fill.pattern == infill::Pattern::kContour) {
+      spans += length / stretch * of_bead;  // closed curves are divided where they have no corner
+      continue;
+    }
     if (fill.pattern != infill::Pattern::kRaster && fill.pattern != infill::Pattern::kContourRaster) stretch = std::min(stretch, width);
     spans += length * rows_per_mm + (length / stretch + 2 * mm(box.width() + box.depth()) / distance) * of_bead;
   }

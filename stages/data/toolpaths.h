@@ -19,7 +19,7 @@ enum class PathKind : std::uint8_t {
   kLink      // short way from the end of one raster line to the start of the next, along the edge of the filled region
 };
 
-/// Line number of stretches that are no raster lines.
+/// Line number of walls and links.
 inline constexpr std::int32_t kNoLine = INT32_MIN;
 
 /// Borrowed toolpaths of one layer. A path is laid without a stop; from the end of one to the start of the next the
@@ -30,10 +30,10 @@ inline constexpr std::int32_t kNoLine = INT32_MIN;
 /// kind, width, line   one entry a point: they belong to the stretch from that point to the next one of its path. The
 ///         last point of a path starts no stretch and repeats the entries before it.
 /// width   nm of bead, > 0
-/// line    number of the raster line in its layer, counted across the lines over the whole part and the same in every
-///         layer with the same angle (negative before the first line); kNoLine for all that is no raster line. The
-///         pieces into which holes cut a line share its number. Even lines are laid along the raster's direction, odd
-///         lines against it.
+/// line    number of the raster line in its layer, counted across over the part, the same in every layer with one angle
+///         (negative before the first line); the pieces into which holes cut a line share it. Even lines run along the
+///         raster's direction, odd ones against it. Closed curves that fill are counted from the surface inwards, all
+///         of one depth alike. kNoLine for walls and links.
 struct ToolpathsView {
   std::span<const std::uint32_t> offset;
   std::span<const Point2> point;

@@ -15,10 +15,11 @@ namespace lamina::infill {
 namespace {
 
 /// A closed path: the first point comes again at the end.
-void append_closed(const ContoursView& contours, PathKind kind, Nm width, Toolpaths& out) {
+void append_closed(const ContoursView& contours, PathKind kind, Nm width, Toolpaths& out,
+                   std::int32_t number = kNoLine) {
   for (std::uint32_t c = 0; c < contours.size(); ++c) {
-    for (const Point2 p : contours[c]) out.add(p, kind, width);
-    out.add(contours[c].front(), kind, width);
+    for (const Point2 p : contours[c]) out.add(p, kind, width, number);
+    out.add(contours[c].front(), kind, width, number);
     out.close();
   }
 }
@@ -48,8 +49,8 @@ Status append_lines(const ContoursView& region, const FillContext& context, cons
   return {};
 }
 
-/// Closed curves from the edge of the region inwards: all that fit, or `most` of them. Leaves in `region` what the
-/// place of the next one encloses.
+/// Closed curves from the edge of the region inwards, numbered as their places: all that fit, or `most` of them. Leaves in
+/// `region` what the place of the next one encloses.
 Status append_curves(Contours& region, const FillContext& context, const FillParameters& parameters, std::uint32_t most,
                      Toolpaths& out) {
   if (most == 0) return {};
@@ -66,7 +67,8 @@ Status append_curves(Contours& region, const FillContext& context, const FillPar
       at = places->at[k];
     }
     if (k == most) return {};
-    append_closed(region, PathKind::kContour, parameters.width, out);
+    const std::int32_t number = places->first_number + static_cast<std::int32_t>(k);
+    append_closed(region, PathKind::kContour, parameters.width, out, number);
   }
   region.clear();  // no place is left inside the last curve
   return {};

@@ -24,6 +24,7 @@ struct LayerCut {
   double along_x = 1, along_y = 0;  // unit vector of the lines, within half a turn: layers 180 degrees apart agree
   std::uint32_t continuous = 1;     // lines between two segmented ones
   std::int32_t first = 0;           // number of a segmented line
+  std::int64_t shift = 0;           // nm: closed curves begin so much further along than they are stored
   bool one_direction = true;        // segmented lines are all laid the same way; needs a travel where a zigzag comes back
 
   bool segments(PathKind kind, std::int32_t number) const {
@@ -52,8 +53,8 @@ inline double distance(Point2 a, Point2 b) {
 /// Calls visit(const Stretch&) for everything that is laid in a layer, in the order in which it is laid.
 ///
 /// Straight lines are cut by their place along `along`, so that pores of all lines and layers lie on one grid. Lines of
-/// several points and closed curves are cut by their length: a closed curve into whole periods, its thick stretches
-/// made as much longer as that needs.
+/// several points and closed curves are cut by their length. A closed curve comes to whole periods under every rule: its
+/// thick stretches are made as much longer as that needs, and it begins and ends in the middle of one.
 /// cost  O(points + stretches), no memory
 template <class Visit>
 class Expander {
@@ -142,24 +143,36 @@ class Expander {
       cut.rule = CutRule::kThickEnds;
       cut.least_end = cut.thick / 2;
     }
-    std::uint32_t k = i;
+    std::uint32_t k = i, corners = end - i - 1;  // that are still to be passed
     double walked = 0, edge = expand_detail::distance(paths_.point[k], paths_.point[k + 1]);
-    Point2 here = paths_.point[k];
+    const auto pass = [&] {
+      walked += edge;
+      k = k + 1 < end ? k + 1 : i;
+      edge = expand_detail::distance(paths_.point[k], paths_.point[k + 1]);
+    };
+    const auto at = [&](double goal) {  // on the edge from k
+      const double share = std::clamp(edge > 0 ? (goal - walked) / edge : 1.0, 0.0, 1.0);
+      const Point2 a = paths_.point[k], b = paths_.point[k + 1];
+      return Point2{static_cast<Nm>(a.x + std::llround(share * (static_cast<double>(b.x) - a.x))),
+                    static_cast<Nm>(a.y + std::llround(share * (static_cast<double>(b.y) - a.y)))};
+    };
+    Point2 here = paths_.point[k], last = paths_.point[end];
+    const std::int64_t shift = closed && whole > 0 ? cut_.shift - floor_div(cut_.shift, whole) * whole : 0;
+    if (shift > 0) {
+      while (k + 1 < end && walked + edge <= static_cast<double>(shift)) pass();
+      here = last = at(static_cast<double>(shift));
+      walked -= static_cast<double>(shift);
+      ++corners;  // also the one where the curve is stored to begin
+    }
     cut_line(cut, 0, whole, [&](std::int64_t, std::int64_t stop, Thickness thickness) {
-      const double goal = static_cast<double>(stop);
-      while (k + 1 < end && walked + edge <= goal) {
-        give(here, paths_.point[k + 1], i, thickness);
-        here = paths_.point[++k];
-        walked += edge;
-        edge = expand_detail::distance(paths_.point[k], paths_.point[k + 1]);
+      const double goal = stop < whole ? static_cast<double>(stop) : INFINITY;
+      for (; corners > 0 && walked + edge <= goal; --corners) {
+        const Point2 corner = paths_.point[k + 1];
+        give(here, corner, i, thickness);
+        here = corner;
+        pass();
       }
-      Point2 there = paths_.point[end];
-      if (stop < whole) {
-        const double share = std::clamp(edge > 0 ? (goal - walked) / edge : 1.0, 0.0, 1.0);
-        const Point2 a = paths_.point[k], b = paths_.point[k + 1];
-        there = {static_cast<Nm>(a.x + std::llround(share * (static_cast<double>(b.x) - a.x))),
-                 static_cast<Nm>(a.y + std::llround(share * (static_cast<double>(b.y) - a.y)))};
-      }
+      const Point2 there = stop < whole ? at(goal) : last;
       give(here, there, i, thickness);
       here = there;
     });

@@ -6,6 +6,8 @@
 #include <random>
 
 #include "tests/infill/outlines.h"
+#include "tests/slice/contour_laws.h"
+#include "stages/infill/layout.h"
 #include "stages/infill/waves.h"
 
 namespace lamina::test {
@@ -144,8 +146,49 @@ TEST(CurvesAndWaves, ConcentricCurvesLieAtTheirDistance) {
     Nm lowest = INT32_MAX;
     for (const Point2 at : paths.view()[p]) lowest = std::min(lowest, at.x);
     EXPECT_EQ(lowest, 600'000 + static_cast<Nm>(p - 1) * 500'000);
+    for (std::uint32_t i = paths.offset[p]; i < paths.offset[p + 1]; ++i) ASSERT_EQ(paths.line[i], static_cast<std::int32_t>(p - 1));
   }
   EXPECT_EQ(paths.size(), 1u + 19u);
+}
+
+/// So that every n-th one can be found again, around holes too: a number is a depth.
+TEST(CurvesAndWaves, ClosedCurvesAreNumberedFromTheSurfaceInwardsAndThoseOfOneDepthAlike) {
+  for (const Outline& outline : outlines()) {
+    FillParameters parameters;
+    parameters.pattern = Pattern::kContour;
+    parameters.gaps = {150'000, 400'000};
+    for (const std::uint32_t layer : {0u, 1u}) {
+      parameters.stagger = {0, -450'000};
+      parameters.stagger_every_layer = true;
+      const FillContext context = context_of(outline.contours, layer);
+      const Toolpaths paths = filled(outline.contours, context, parameters);
+      const auto places = infill::place_inwards(*infill::fill_region(outline.contours, context, parameters), context, parameters);
+      ASSERT_TRUE(places.ok());
+      std::int32_t before = INT32_MIN;
+      for (std::uint32_t p = 0; p < paths.size(); ++p) {
+        const std::int32_t number = paths.line[paths.offset[p]];
+        if (paths.kind[paths.offset[p]] != PathKind::kContour) {
+          ASSERT_EQ(number, kNoLine);
+          continue;
+        }
+        ASSERT_GE(number, before) << outline.name;
+        before = number;
+        const auto depth = static_cast<double>(places->at[static_cast<std::size_t>(number - places->first_number)]);
+        double nearest = 1e300;
+        const auto points = paths.view()[p];
+        for (std::size_t i = 0; i + 1 < points.size(); ++i) {
+          for (const double share : {0.0, 0.5}) {
+            const double x = points[i].x + share * (static_cast<double>(points[i + 1].x) - points[i].x);
+            const double y = points[i].y + share * (static_cast<double>(points[i + 1].y) - points[i].y);
+            const double off = distance_to(outline.contours, x, y);
+            ASSERT_GE(off, depth - 60) << outline.name << ", curve " << number;  // rounded once for every curve before it
+            nearest = std::min(nearest, off);
+          }
+        }
+        EXPECT_LE(nearest, depth + 60) << outline.name << ", curve " << number;
+      }
+    }
+  }
 }
 
 TEST(CurvesAndWaves, HoneycombWavesTouchAndQuatrefoilsStayApart) {

@@ -11,6 +11,7 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <numbers>
+#include <span>
 
 #include "tests/segment/gcode_reader.h"
 
@@ -166,6 +167,63 @@ TEST_F(ExtrudeProgram, VolumesPlacesAndLayersOfAFileAreThoseOfThePlan) {
     EXPECT_NEAR(volume / (json["volume_mm3"].get<double>() * flow), 1, 0.001);
     EXPECT_GT(json["print_seconds"].get<double>(), 0);
   }
+}
+
+TEST_F(ExtrudeProgram, ClosedCurvesAreSegmentedFromTheOutsideInWithThickSeams) {
+  const std::string part = block(30, 20, 1.2, 4);
+  const Outcome result = run("extrude " + part + " --machine anet-a8 --layer 0.3 --walls 1 --fill segmented --pattern contour --continuous 2 "
+                         "--quiet --json -o " + file("a.gcode"));
+  ASSERT_EQ(result.code, 0) << result.err;
+  const auto json = result.json();
+  const test::GcodeFile gcode = test::read_gcode(text_of(file("a.gcode")));
+  ASSERT_EQ(gcode.error, "");
+  ASSERT_EQ(gcode.layers.size(), 4);
+  double filament = 0;
+  std::uint64_t thin_stretches = 0, segmented = 0;
+  for (const auto& layer : gcode.layers) {
+    for (const auto& bead : layer.beads) filament += bead.filament;
+    const bool first = &layer == &gcode.layers.front();  // all as fast as the first layer may be, or slower
+    for (std::size_t i = 0; i < layer.beads.size();) {
+      std::size_t end = i + 1;
+      const auto& start = layer.beads[i];
+      while (end < layer.beads.size() && layer.beads[end].x0 == layer.beads[end - 1].x1 && layer.beads[end].y0 == layer.beads[end - 1].y1 &&
+             layer.beads[end].type == start.type) ++end;
+      const auto beads = std::span(layer.beads).subspan(i, end - i);
+      i = end;
+      if (start.type.find("perimeter") != std::string::npos || start.type.find("wall") != std::string::npos) continue;
+      EXPECT_NEAR(beads.back().x1, start.x0, 1e-9);
+      EXPECT_NEAR(beads.back().y1, start.y0, 1e-9);
+      std::vector<std::pair<double, double>> stretches;  // speed, length
+      double depth = 1e9;
+      for (const auto& bead : beads) {
+        if (stretches.empty() || stretches.back().first != bead.feed) stretches.push_back({bead.feed, 0});
+        stretches.back().second += std::hypot(bead.x1 - bead.x0, bead.y1 - bead.y0);
+        depth = std::min({depth, 15 - std::abs(bead.x0 - 110), 10 - std::abs(bead.y0 - 110), std::hypot(bead.x0 - 110, bead.y0 - 110) - 4});
+      }
+      if (stretches.size() == 1) continue;
+      ++segmented;
+      const double thick = stretches.front().first, fast = stretches[1].first;
+      EXPECT_NEAR(fast / thick, 200. / 75, 1e-6);
+      ASSERT_EQ(stretches.size() % 2, 1) << "begins and ends thick";
+      for (std::size_t k = 0; k < stretches.size(); ++k) {
+        ASSERT_EQ(stretches[k].first, k % 2 == 0 ? thick : fast);
+        if (k % 2 == 1) {
+          ++thin_stretches;
+          ASSERT_NEAR(stretches[k].second, 1.5, 0.01);  // coordinates are rounded to 1 um
+        } else {
+          ASSERT_GE(stretches[k].second, (k == 0 || k + 1 == stretches.size() ? 0.75 : 1.5) - 0.01);
+        }
+      }
+      if (!first) {
+        EXPECT_NEAR(thick, 675, 1e-9);
+      }
+    }
+  }
+  EXPECT_EQ(json["segments"]["thin"], thin_stretches);
+  EXPECT_EQ(json["segments"]["pieces"], segmented);
+  EXPECT_GE(segmented, 4 * 2 * 3);
+  const double volume = filament * std::numbers::pi / 4 * 1.75 * 1.75;
+  EXPECT_NEAR(volume / (json["volume_mm3"].get<double>() * 0.85), 1, 0.001);
 }
 
 TEST_F(ExtrudeProgram, SameBytesForAnyThreads) {

@@ -61,6 +61,7 @@ TEST_F(PorousJob, EveryFillingStaysInsideOfTheExactBitmapAndNoEngineOrThreadChan
   const std::vector<std::vector<std::string>> fillings{
       {"--fill", "segmented", "--thin", "1", "--thick", "0.6", "--bead", "0.3"},
       {"--fill", "segmented", "--bead-ends", "square", "--walls", "1", "--angle-step", "60", "--bead", "0.3"},
+      {"--fill", "segmented", "--pattern", "contour", "--thin", "1", "--thick", "0.5", "--bead", "0.3"},
       {"--fill", "raster", "--bead-gap", "0.3"},
       {"--fill", "contour", "--bead-gap", "0.2", "--bead", "0.25"},
       {"--fill", "contour+raster", "--walls", "1", "--bead-gap", "0.4"},
@@ -82,7 +83,7 @@ TEST_F(PorousJob, EveryFillingStaysInsideOfTheExactBitmapAndNoEngineOrThreadChan
       fs::remove_all(folder / "again");
     };
     same({"--engine", "both", "--threads", "1"});
-    if (i < 2) same({"--engine", "contours", "--threads", "4", "--memory", "1M"});
+    if (i < 3) same({"--engine", "contours", "--threads", "4", "--memory", "1M"});
     EXPECT_EQ(run_lamina({"verify", folder / name, "--quiet"}, folder.path()).code, 0);
   }
 }
@@ -154,8 +155,11 @@ TEST_F(PorousJob, PorosityOfTheBitmapIsThatOfThePlanWithinThePixelsOfItsEdges) {
   job.segment.all.on = true;
   job.segment.all.thin_width_mm = 0.15;
   const PixelGrid grid = pipeline::grid_of(job);
-  for (const raster::BeadEnds ends : {raster::BeadEnds::kRound, raster::BeadEnds::kSquare}) {
+  for (const auto& [ends, pattern] : {std::pair{raster::BeadEnds::kRound, infill::Pattern::kRaster},
+                                      {raster::BeadEnds::kSquare, infill::Pattern::kRaster},
+                                      {raster::BeadEnds::kRound, infill::Pattern::kContour}}) {
     job.dose.bead_ends = ends;
+    job.fill.all.pattern = pattern;
     job.fill.all.walls = ends == raster::BeadEnds::kRound ? 1 : 0;
     auto plan = pipeline::PorousPlan::make(job, grid, [](const pipeline::ProgressEvent&) {});
     ASSERT_TRUE(plan.ok()) << plan.error().message;
