@@ -12,6 +12,7 @@
 #include <nlohmann/json.hpp>
 #include <thread>
 
+#include "pipeline/batch_summary.h"
 #include "pipeline/console.h"
 #include "pipeline/interrupt.h"
 #include "pipeline/json_text.h"
@@ -23,6 +24,7 @@ namespace {
 using Clock = std::chrono::steady_clock;
 using std::chrono::milliseconds;
 constexpr std::chrono::seconds kGrace{20};  // for a job that was told to stop
+constexpr Fault kOverdue = Fault::kInput;  // its part cannot be planned in the time that it was given
 
 double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
 
@@ -125,8 +127,9 @@ class Queue : public std::enable_shared_from_this<Queue> {
       slot.abandoned = summary_.abandoned = true;
       BatchResult result;
       result.outcome = slot.overdue ? BatchOutcome::kTimeLimit : BatchOutcome::kStopped;
-      result.code = static_cast<int>(Fault::kInterrupted);
+      result.code = static_cast<int>(slot.overdue ? kOverdue : Fault::kInterrupted);
       result.reason = "did not stop when it was told to, and was left behind";
+      if (slot.overdue) result.reason = fmt::format("{}, {}", overdue_reason(), result.reason);
       result.seconds = seconds_since(slot.begun);
       end(i, std::move(result));
       if (!stopped_) start_worker();
@@ -195,8 +198,7 @@ class Queue : public std::enable_shared_from_this<Queue> {
     const bool over = result.outcome != BatchOutcome::kStopped && result.outcome != BatchOutcome::kKept;
     slot.result = std::move(result);
     if (over) note(record_.ended(jobs_[i], static_cast<std::uint32_t>(i + 1), slot.result));
-    const bool bad = slot.result.outcome == BatchOutcome::kFailed || slot.result.outcome == BatchOutcome::kTimeLimit;
-    if (bad && options_.fail_fast) stop_all();
+    if (options_.fail_fast && has_failed(slot.result)) stop_all();
     changed_.notify_all();
   }
 
@@ -255,7 +257,11 @@ class Queue : public std::enable_shared_from_this<Queue> {
     return arguments;
   }
 
-  static BatchResult run_command(const BatchJob& job, Slot& slot, const std::vector<std::string>& arguments) {
+  std::string overdue_reason() const {
+    return fmt::format("took longer than its time limit of {} s", options_.time_limit_seconds);
+  }
+
+  BatchResult run_command(const BatchJob& job, Slot& slot, const std::vector<std::string>& arguments) const {
     BatchResult result;
     const auto start = Clock::now();
     ConsoleCapture console;
@@ -279,8 +285,12 @@ class Queue : public std::enable_shared_from_this<Queue> {
     result.outcome = result.code == 0 ? BatchOutcome::kDone : BatchOutcome::kFailed;
     if (result.code != 0) result.reason = reason_of(console.err);
     if (result.code == static_cast<int>(Fault::kInterrupted)) {
-      result.outcome = slot.overdue ? BatchOutcome::kTimeLimit : BatchOutcome::kStopped;
-      if (slot.overdue) result.reason = fmt::format("took more than its time limit; {}", result.reason);
+      result.outcome = BatchOutcome::kStopped;
+      if (slot.overdue) {
+        result.outcome = BatchOutcome::kTimeLimit;
+        result.code = static_cast<int>(kOverdue);
+        result.reason = overdue_reason();
+      }
     }
     return result;
   }

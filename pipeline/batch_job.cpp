@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <filesystem>
 #include <map>
 #include <set>
@@ -17,6 +18,9 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::uint64_t kMebibyte = 1ull << 20;
+
+/// What the batch writes in its directory; .part while they are written.
+constexpr std::array kOwnFiles = {"batch.jsonl", "summary.json", "summary.json.part", "summary.tsv", "summary.tsv.part"};
 
 const OptionSpec* find_option(const CommandSpec& spec, std::string_view name) {
   for (const OptionSpec& option : spec.options) {
@@ -44,6 +48,12 @@ class Digests {
 };
 
 Hash128 hash_text(const std::string& text) { return hash_bytes(std::as_bytes(std::span(text))); }
+
+/// A path seen from the batch's directory, as it is written; empty if it is not below.
+fs::path below_batch(const fs::path& path, const std::string& directory) {
+  const fs::path below = path.lexically_normal().lexically_relative(fs::path(directory).lexically_normal());
+  return below.empty() || *below.begin() == ".." ? fs::path() : below;
+}
 
 /// Resolves one entry; what is wrong with the job itself becomes job.refused.
 class Preparation {
@@ -109,7 +119,9 @@ class Preparation {
     if (!asked && !planned.output.empty()) {
       job.output = planned.output;  // as the job file says
     } else if (asked) {
-      job.output = (fs::path(share_.directory) / read.text(option->flag)).lexically_normal().string();
+      const fs::path given = read.text(option->flag);
+      job.relative_output = given.is_relative();
+      job.output = (fs::path(share_.directory) / given).lexically_normal().string();
     } else if (option->value.find("DIR") != std::string::npos) {
       std::string name = job.entry.name;
       for (std::uint32_t next = 2; !names_.insert(name).second; ++next) name = fmt::format("{}-{}", job.entry.name, next);
@@ -120,8 +132,8 @@ class Preparation {
                                               "-o", option->value)};
     }
     added.insert(added.end(), {"--output", job.output});
-    const fs::path below = fs::path(job.output).lexically_relative(share_.directory);
-    job.place = below.empty() || below.begin()->string() == ".." ? job.output : below.string();
+    const fs::path below = below_batch(job.output, share_.directory);
+    job.place = below.empty() ? job.output : below.string();
     return {};
   }
 
@@ -147,22 +159,35 @@ class Preparation {
   const BatchShare& share_;
   Digests& digests_;
   std::map<std::string_view, CommandSpec> specs_;
-  std::set<std::string> names_;  // of outputs that are called as their jobs
+  std::set<std::string> names_{kOwnFiles.begin(), kOwnFiles.end()};  // of outputs that are called as their jobs
 };
 
-/// Two jobs that would write over each other. Sorted by the parts of their paths, a directory stands right before what
-/// lies in it.
+bool lies_within(const fs::path& inner, const fs::path& outer) {
+  return std::mismatch(outer.begin(), outer.end(), inner.begin(), inner.end()).first == outer.end();
+}
+
+/// Refuses outputs out of place, and two jobs that would write over each other.
+/// Sorted by the parts of their paths, a directory stands right before what lies in it.
 Status check_apart(const std::vector<BatchJob>& jobs, const std::string& directory) {
   std::vector<std::pair<fs::path, const BatchJob*>> outputs;
   std::error_code ignored;
   const fs::path own = fs::weakly_canonical(fs::absolute(directory, ignored), ignored);
   for (const BatchJob& job : jobs) {
     if (job.refused || job.output.empty()) continue;
+    if (job.relative_output && below_batch(job.output, directory).empty()) {
+      return Error{Fault::kUsage, fmt::format("{}: -o leads out of {}, to {}; an output elsewhere has to be an absolute path",
+                                              job.entry.source, directory, job.output)};
+    }
     fs::path path = fs::weakly_canonical(fs::absolute(job.output, ignored), ignored);
     if (!path.has_filename()) path = path.parent_path();
     if (path == own) {
       return Error{Fault::kUsage, fmt::format("{}: writes into {} itself, which belongs to the batch; give it a name "
                                               "below it with -o", job.entry.source, directory)};
+    }
+    for (const char* name : kOwnFiles) {
+      if (!lies_within(path, own / name)) continue;
+      return Error{Fault::kUsage, fmt::format("{}: writes into {}, which belongs to the batch; give it another name with "
+                                              "-o", job.entry.source, (fs::path(directory) / name).string())};
     }
     outputs.emplace_back(std::move(path), &job);
   }
@@ -170,8 +195,7 @@ Status check_apart(const std::vector<BatchJob>& jobs, const std::string& directo
   for (std::size_t i = 1; i < outputs.size(); ++i) {
     const auto& [outer, first] = outputs[i - 1];
     const auto& [inner, second] = outputs[i];
-    const bool within = std::mismatch(outer.begin(), outer.end(), inner.begin(), inner.end()).first == outer.end();
-    if (within) {
+    if (lies_within(inner, outer)) {
       return Error{Fault::kUsage, fmt::format("{} and {}: both write into {}; give one of them another -o",
                                               first->entry.source, second->entry.source, first->output)};
     }

@@ -19,6 +19,7 @@ struct BatchJob {
   std::vector<std::string> arguments;  // what the command is given
   std::string output;                  // file or directory that it writes; empty if its result is what it prints
   std::string place;                   // the output for reports: below the batch's directory, else as it was given
+  bool relative_output = false;        // its output was given relative to the batch's directory
   bool can_resume = false, can_overwrite = false;
   std::uint64_t need_bytes = 0;        // most memory that it is expected to hold
   Hash128 id;                          // of the version, the words, the output's place and every file that it reads
@@ -31,7 +32,8 @@ struct BatchShare {
 };
 
 /// Makes the jobs ready, in the order of the entries. Nothing is written.
-/// errors  kUsage: two jobs write into the same place, or one into the other's; both are named
+/// errors  kUsage: two jobs write into the same place, or one into the other's (both are named); a job writes where the
+///         batch keeps its own files; a relative output leads out of the batch's directory
 /// cost    reads every file that a job names once, to tell later whether it has changed
 Result<std::vector<BatchJob>> prepare_batch(std::vector<BatchEntry> entries, const BatchShare& share);
 

@@ -30,7 +30,7 @@ std::string_view outcome_name(BatchOutcome outcome);
 
 struct BatchResult {
   BatchOutcome outcome = BatchOutcome::kNotRun;
-  int code = 0;             // of the command
+  int code = 0;             // of the command; 3 beyond the time limit
   std::string reason;       // one line, of what is not done
   std::string json;         // what the command printed: a JSON value, or "" if nothing
   double seconds = 0;

@@ -47,10 +47,19 @@ BatchTotals totals_of(const std::vector<BatchResult>& results) {
 
 int batch_code(const BatchSummary& summary) {
   if (summary.interrupted) return static_cast<int>(Fault::kInterrupted);
-  for (const BatchResult& result : summary.results) {
-    if (result.code != 0) return result.code;
-  }
-  return 0;
+  const auto failed = std::ranges::find_if(summary.results, has_failed);
+  if (failed != summary.results.end()) return failed->code;
+  const auto ended = [](const BatchResult& result) { return result.code == 0 && result.outcome != BatchOutcome::kNotRun; };
+  return std::ranges::all_of(summary.results, ended) ? 0 : static_cast<int>(Fault::kInterrupted);
+}
+
+bool has_failed(const BatchResult& result) {
+  return result.outcome == BatchOutcome::kFailed || result.outcome == BatchOutcome::kTimeLimit;
+}
+
+std::string failure_line(const BatchJob& job, const BatchResult& result) {
+  const std::string& source = job.entry.source;
+  return one_line(result.reason.starts_with(source) ? result.reason : fmt::format("{}: {}", source, result.reason));
 }
 
 std::string batch_json(const std::vector<BatchJob>& jobs, const BatchSummary& summary, const BatchOptions& options) {
@@ -105,7 +114,7 @@ std::string progress_line(const BatchState& state) {
 std::string batch_text(const std::vector<BatchJob>& jobs, const BatchSummary& summary, const BatchOptions& options) {
   const BatchTotals totals = totals_of(summary.results);
   std::string text;
-  const auto line = [&](std::string_view name, const std::string& value) { text += fmt::format("{:<10}{}\n", name, value); };
+  const auto line = [&](std::string_view name, const std::string& value) { text += fmt::format("{:<11}{}\n", name, value); };
   std::string counts = fmt::format("{}: {} done", totals.jobs, totals.done);
   for (const auto& [count, what] : {std::pair{totals.kept, "kept"}, {totals.failed, "failed"}, {totals.stopped, "stopped"},
                                     {totals.not_run, "not run"}}) {
@@ -114,10 +123,7 @@ std::string batch_text(const std::vector<BatchJob>& jobs, const BatchSummary& su
   line("jobs", counts);
   for (std::size_t i = 0; i < jobs.size(); ++i) {
     const BatchResult& result = summary.results[i];
-    if (result.code == 0 || result.outcome == BatchOutcome::kStopped) continue;
-    const std::string& source = jobs[i].entry.source;
-    const bool said = result.reason.starts_with(source);
-    line(outcome_name(result.outcome), one_line(said ? result.reason : fmt::format("{}: {}", source, result.reason)));
+    if (has_failed(result)) line(outcome_name(result.outcome), failure_line(jobs[i], result));
   }
   line("files", fmt::format("{} of {} below {}", readable_count(totals.files), readable_bytes(totals.bytes), options.directory));
   line("time", fmt::format("{}; {:.1f} jobs/s, {} at once at most", readable_seconds(summary.seconds),

@@ -17,7 +17,7 @@ struct BatchTotals {
 BatchTotals totals_of(const std::vector<BatchResult>& results);
 
 /// The exit code: 0 if every job is done or kept, 130 if the batch was interrupted, else that of the first job of the
-/// list that is not done.
+/// list that failed.
 int batch_code(const BatchSummary& summary);
 
 /// summary.json: one object; one line a job.
@@ -28,6 +28,12 @@ std::string batch_table(const std::vector<BatchJob>& jobs, const BatchSummary& s
 
 /// The line of a job as it ends: "[3/200] done     bracket: 51 files, 1.2 MB, 0.35 s".
 std::string job_line(const BatchJob& job, const BatchResult& result, std::uint32_t ended, std::uint32_t total);
+
+/// Whether it is the job's own fault that it is not done: not that of whoever stopped the batch.
+bool has_failed(const BatchResult& result);
+
+/// Where a job that failed was asked for and why it failed: "jobs.txt:3: part.stl: no such file".
+std::string failure_line(const BatchJob& job, const BatchResult& result);
 
 /// What stands behind the bar: "12/200 jobs, 1 failed; bracket 40/120 layers".
 std::string progress_line(const BatchState& state);

@@ -33,13 +33,13 @@ CommandSpec batch_spec() {
       {"--with", "WORDS", "command and options for parts that come without any, as in --with 'jet --dpi 600'", "jet", ""},
       {"--jobs", "N", "jobs at work at a time; 0 for as many as there are processors", "0", "Run"},
       {"--memory", "SIZE", "what all jobs at work may hold together: 512M, 4G", "1G", "Run"},
-      {"--time-limit", "SECONDS", "stop a job that takes longer", "", "Run"},
+      {"--time-limit", "SECONDS", "stop a job that takes longer: it fails, with exit code 3", "", "Run"},
       {"--keep-going", "", "a job that fails does not stop the others; this is what happens anyway", "", "Run"},
       {"--fail-fast", "", "the first job that fails stops the batch", "", "Run"},
       {"--resume", "", "go on with an earlier batch in DIR: jobs that are done, and whose files hold, are kept", "", "Run"},
       {"--overwrite", "", "replace an earlier batch in DIR", "", "Run"},
       {"--json", "", "print the summary as one JSON object on stdout", "", "Run"},
-      {"--quiet", "", "say nothing but errors", "", "Run"}};
+      {"--quiet", "", "say nothing but errors: a line for each job that fails", "", "Run"}};
   spec.closing =
       "A job is any command but batch and preview. -o of a job is below the batch's DIR; without one a job is called as its\n"
       "first file. Other paths are as on the command line. Jobs begin in order and must not need each other's results.\n\n"
@@ -106,7 +106,10 @@ class BatchConsole {
   explicit BatchConsole(bool quiet) : quiet_(quiet), terminal_(is_terminal()) {}
 
   void ended(const BatchJob& job, const BatchResult& result, const BatchState& state) {
-    if (quiet_) return;
+    if (quiet_) {
+      if (has_failed(result)) say("lamina: " + failure_line(job, result));
+      return;
+    }
     clear();
     say(job_line(job, result, ++ended_, state.total));
   }

@@ -1,5 +1,7 @@
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <filesystem>
 #include <span>
 
 #include "pipeline/command_line.h"
@@ -19,7 +21,7 @@ CommandSpec report_spec() {
       "area, thickness and time over the height, warnings, the job and all hashes. The page needs no network and no other file.";
   spec.operand = "DIR";
   spec.operand_meaning = "finished directory of lamina jet";
-  spec.options = {{"-o,--output", "HTML", "the page", "", ""},
+  spec.options = {{"-o,--output", "HTML", "the page; its name ends in .html or .htm", "", ""},
                   {"--most-bytes", "SIZE", "layers are left out evenly until the page is smaller", "19M", ""},
                   {"--parts", "DIR", "where the part files are, for the views from three sides; a file, or several times", "", ""},
                   {"--quiet", "", "say nothing but errors", "", ""}};
@@ -29,6 +31,14 @@ CommandSpec report_spec() {
       "  lamina report out -o report.html --parts parts/      the parts themselves from three sides\n"
       "  lamina report out -o small.html --most-bytes 2M      for a mail";
   return spec;
+}
+
+/// Whether a browser opens a file of this name as a page. A page under the name of a part, an image or a manifest would
+/// replace it.
+bool is_page_name(const std::string& path) {
+  std::string ending = std::filesystem::path(path).extension().string();
+  std::ranges::transform(ending, ending.begin(), [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return ending == ".html" || ending == ".htm";
 }
 
 }  // namespace
@@ -43,6 +53,9 @@ int run_report_command(const std::vector<std::string>& texts) {
   if (arguments->operands.size() != 1) return fail({Fault::kUsage, "name one finished directory of lamina jet"});
   const std::string output = arguments->text("-o,--output");
   if (output.empty()) return fail({Fault::kUsage, "-o HTML is missing; name the page"});
+  if (!is_page_name(output)) {
+    return fail({Fault::kUsage, fmt::format("-o {}: the page is HTML; give it a name that ends in .html", output)});
+  }
   ReportOptions options;
   if (arguments->has("--most-bytes")) {
     const std::string wrong = read_bytes(arguments->text("--most-bytes"), options.size_limit);

@@ -78,7 +78,7 @@ int run_verify_command(const std::vector<std::string>& texts) {
     const Status status = print(*arguments->help);
     return status ? 0 : fail(status.error());
   }
-  if (arguments->operands.empty()) return fail({Fault::kUsage, "no directory to verify; name one that lamina jet wrote"});
+  if (arguments->operands.empty()) return fail({Fault::kUsage, "no directory to verify; name one that lamina jet or lamina slice wrote"});
   int code = 0;
   for (const std::string& directory : arguments->operands) {
     const Result<VerifyReport> report = verify(directory, {.quick = arguments->has("--quick")});

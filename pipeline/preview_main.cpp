@@ -44,8 +44,8 @@ Result<Manifest> manifest_of(const std::string& directory) {
   if (!std::filesystem::exists(whole, ignored) && std::filesystem::exists(part, ignored)) return read_manifest(part);
   if (!std::filesystem::exists(whole, ignored)) {
     return Error{Fault::kVerification,
-                 fmt::format("{}: no manifest.json; name a directory that lamina jet wrote (shards: run lamina merge "
-                             "first)",
+                 fmt::format("{}: no manifest.json; name a directory that lamina jet or lamina slice wrote (shards: run "
+                             "lamina merge first)",
                              directory)};
   }
   return read_manifest(whole);
@@ -156,7 +156,7 @@ int run_preview(const std::vector<std::string>& texts) {
     return status ? 0 : fail(status.error());
   }
   if (arguments->has("--drawing")) return run_drawing(arguments->text("--drawing"), arguments->text("-o,--output"));
-  if (arguments->operands.size() != 1) return fail({Fault::kUsage, "name one directory that lamina jet wrote"});
+  if (arguments->operands.size() != 1) return fail({Fault::kUsage, "name one directory that lamina jet or lamina slice wrote"});
   const std::string directory = arguments->operands.front(), output = arguments->text("-o,--output");
   if (output.empty()) return fail({Fault::kUsage, "-o PNG is missing; name the picture"});
   const auto width_of_slice = number(*arguments, "--width", 200, 20'000);

@@ -15,6 +15,7 @@
 #include "pipeline/replay_job.h"
 #include "pipeline/report_cast.h"
 #include "pipeline/report_views.h"
+#include "pipeline/slice_picture.h"  // is_slice_directory
 #include "stages/write/read_image.h"
 #include "stages/write/report/page.h"
 #include "stages/write/report/run_code.h"
@@ -37,6 +38,10 @@ Result<Manifest> finished_manifest(const std::string& directory) {
   if (!fs::exists(path, ignored)) {
     return Error{Fault::kVerification, fmt::format("{}: no manifest.json; name a finished directory of lamina jet (shards: "
                                                    "run lamina merge first)", directory)};
+  }
+  if (is_slice_directory(directory)) {
+    return Error{Fault::kVerification, fmt::format("{}: is a job of lamina slice, and reports are of lamina jet's jobs; "
+                                                   "lamina preview draws its layers", directory)};
   }
   Result<Manifest> manifest = read_manifest(path);
   if (!manifest) return manifest;

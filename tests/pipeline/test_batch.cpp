@@ -143,7 +143,7 @@ TEST_F(JobsInBatch, WhatIsWrongWithOneJobIsOneLineAndTheRestIsUnharmed) {
   write_text(directory_ / "half/manifest.json.part", "{\n");  // a job that is not finished
   write_text(directory_ / "list.txt", "jet part10.stl --bed 60x60 --dpi 0 -o a\njott part10.stl\njet --job missing.toml -o b\n"
                                       "jet --job wrong.toml\nbatch list.txt -o x\npreview out -o x.png\njet part10.stl --help\n"
-                                      "jet part10.stl --bed 60x60 --dpi 100 -o ../file/deeper\nverify nothing\nreport half -o page.html\n"
+                                      "jet part10.stl --bed 60x60 --dpi 100 -o " + directory_ / "file/deeper" + "\nverify nothing\nreport half -o page.html\n"
                                       "jet part10.stl --bed 60x60 --dpi 100 -o good\n");
   const Outcome outcome = lamina({"batch", "list.txt", "-o", "out"});
   EXPECT_EQ(outcome.code, 2);
@@ -167,7 +167,16 @@ TEST_F(JobsInBatch, WrongBatchesAreRefusedInOneLineBeforeAnythingRuns) {
   write_text(directory_ / "same.txt", "jet part10.stl -o a\njet part11.stl -o b/../a/\n");
   write_text(directory_ / "nested.txt", "jet part10.stl -o a\njet part11.stl -o a-b\njet part11.stl -o a/layers/c\n");
   write_text(directory_ / "own.txt", "jet part10.stl -o .\n");
+  // Where the batch does not let its jobs write: out of its directory, and its own files.
+  write_text(directory_ / "away.txt", "jet part10.stl -o a\njet part11.stl -o a/../../keep\n");
+  write_text(directory_ / "above.txt", "jet part10.stl -o ..\n");
+  write_text(directory_ / "record.txt", "jet part10.stl -o a\njet part11.stl -o batch.jsonl\n");
+  write_text(directory_ / "summary.txt", "jet part10.stl -o b/../summary.json/\n");
+  write_text(directory_ / "table.txt", "jet part10.stl -o " + directory_ / "out/summary.tsv/deep/er" + "\n");
   const std::pair<Words, std::string> cases[] = {
+      {{"away.txt"}, "away.txt:2: -o leads out of out, to keep"}, {{"above.txt"}, "has to be an absolute path"},
+      {{"record.txt"}, "record.txt:2: writes into out/batch.jsonl, which belongs to the batch"},
+      {{"summary.txt"}, "out/summary.json, which belongs"}, {{"table.txt"}, "out/summary.tsv, which belongs"},
       {{"empty.txt"}, "no job in it"}, {{"empty"}, "no part"}, {{"quote.txt"}, "quote.txt:1: a ' is not closed"},
       {{"same.txt"}, "same.txt:1 and same.txt:2: both write into"}, {{"nested.txt"}, "nested.txt:1 and nested.txt:3"},
       {{"own.txt"}, "belongs to the batch"}, {{"gone.txt"}, "no such file"}, {{}, "no jobs"},
@@ -182,7 +191,29 @@ TEST_F(JobsInBatch, WrongBatchesAreRefusedInOneLineBeforeAnythingRuns) {
     EXPECT_NE(outcome.err.find(said), std::string::npos) << outcome.err;
     EXPECT_FALSE(fs::exists(directory_ / "out"));
   }
+  EXPECT_FALSE(fs::exists(directory_ / "keep"));
   EXPECT_EQ(lamina(batch_of({"part10.stl"}, {})).code, 2);
+}
+
+TEST_F(JobsInBatch, NamesOfPartsAreNoReasonToWriteOverTheBatchAndAbsoluteOutputsLieAnywhere) {
+  write_boxes(1);
+  fs::copy_file(directory_ / "part10.stl", directory_ / "summary.json.stl");
+  write_text(directory_ / "list.txt", "jet part10.stl --bed 60x60 --dpi 100 -o " + directory_ / "keep" + "\n");
+  const Outcome outcome = lamina(batch_of({"summary.json.stl", "list.txt", "-o", "./out"}));
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  EXPECT_EQ(outcome.err, "");
+  EXPECT_EQ(summary("out")["jobs"][0]["output"], "summary.json-2");
+  EXPECT_EQ(lamina({"verify", "keep", "--quiet"}).code, 0);
+}
+
+TEST_F(JobsInBatch, QuietItStillSaysWhichJobsFail) {
+  write_boxes(1);
+  write_text(directory_ / "list.txt", "jet part10.stl --bed 60x60 --dpi 100 -o a\njet nowhere.stl -o b\n");
+  const Outcome outcome = lamina({"batch", "list.txt", "-o", "out", "--quiet"});
+  EXPECT_EQ(outcome.code, 3);
+  EXPECT_EQ(outcome.error_lines(), 1u) << outcome.err;
+  EXPECT_EQ(outcome.err.find("lamina: list.txt:2: "), 0u) << outcome.err;
+  EXPECT_NE(outcome.err.find("nowhere.stl"), std::string::npos) << outcome.err;
 }
 
 TEST_F(JobsInBatch, KilledAtAnyMomentItIsResumedToTheSameBytesAndNothingIsDoneTwice) {
@@ -309,9 +340,13 @@ TEST_F(JobsInBatch, TimeLimitStopsOneJobAndFailFastAll) {
   write_text(directory_ / "list.txt", "jet part10.stl --bed 60x60 --dpi 100 -o a\n"
                                       "jet part10.stl --bed 400x400 --dpi 1200 --layer 0.0002 --format tiff-none -o long\n"
                                       "jet part11.stl --bed 60x60 --dpi 100 -o b\n");
-  EXPECT_EQ(lamina({"batch", "list.txt", "-o", "out", "--jobs", "1", "--time-limit", "0.5", "--quiet"}).code, 130);
+  const Outcome outcome = lamina({"batch", "list.txt", "-o", "out", "--jobs", "1", "--time-limit", "0.5"});
+  EXPECT_EQ(outcome.code, 3);  // of a job that failed: nobody interrupted the batch
   EXPECT_EQ(outcomes("out"), (Words{"done", "time limit", "done"}));
-  EXPECT_NE(summary("out")["jobs"][1]["reason"].get<std::string>().find("time limit"), std::string::npos);
+  EXPECT_EQ(summary("out")["jobs"][1]["reason"], "took longer than its time limit of 0.5 s");
+  EXPECT_EQ(summary("out")["jobs"][1]["code"], 3);
+  EXPECT_NE(outcome.err.find("3: 2 done, 1 failed\n"), std::string::npos) << outcome.err;
+  EXPECT_NE(outcome.err.find("time limit list.txt:2: took longer than its time limit of 0.5 s\n"), std::string::npos) << outcome.err;
   write_text(directory_ / "fast.txt", "jet part10.stl --bed 60x60 --dpi 100 -o a\njet nowhere.stl -o c\njet part11.stl -o d\n");
   EXPECT_EQ(lamina({"batch", "fast.txt", "-o", "fast", "--jobs", "1", "--fail-fast", "--quiet"}).code, 3);
   EXPECT_EQ(outcomes("fast"), (Words{"done", "failed", "not run"}));

@@ -161,9 +161,26 @@ TEST_F(JobsReported, WhatIsNoFinishedJobIsRefusedInOneLine) {
   write_text(directory_ / "out/layers/000007.tif", good);
   ASSERT_EQ(lamina({"jet", "part.stl", "--bed", "20x20", "--format", "null", "--quiet", "-o", "none"}).code, 0);
   refused("none", "wrote no images", 5);
+  ASSERT_EQ(lamina({"slice", "part.stl", "--quiet", "-o", "sliced"}).code, 0);
+  refused("sliced", "reports are of lamina jet's jobs", 5);
   EXPECT_EQ(lamina({"report", "out", "-o", "nowhere/report.html"}).code, 4);
   EXPECT_EQ(lamina({"report", "out"}).code, 2);
   EXPECT_EQ(lamina({"report", "-o", "x.html"}).code, 2);
+}
+
+TEST_F(JobsReported, APageHasTheNameOfOneAndReplacesNoFileOfTheJob) {
+  write_box(directory_ / "part.stl", {0, 0, 0}, {5, 5, 2});
+  jet("part.stl", {"--bed", "20x20", "--dpi", "100"});
+  const std::string before = tree_text(directory_ / "out"), part = read_text(directory_ / "part.stl");
+  for (const char* name : {"out/manifest.json", "out/layers/000000.tif", "part.stl", "page", ".html", "html", "page.html/.."}) {
+    const Outcome outcome = lamina({"report", "out", "-o", name});
+    EXPECT_EQ(outcome.code, 2) << name;
+    EXPECT_EQ(outcome.error_lines(), 1u) << outcome.err;
+    EXPECT_NE(outcome.err.find("ends in .html"), std::string::npos) << outcome.err;
+  }
+  EXPECT_EQ(tree_text(directory_ / "out"), before);
+  EXPECT_EQ(read_text(directory_ / "part.stl"), part);
+  for (const char* name : {"page.htm", "PAGE.HTML"}) EXPECT_EQ(lamina({"report", "out", "-o", name}).code, 0) << name;
 }
 
 // The bytes of a piece of the page.
