@@ -36,7 +36,7 @@ std::string program_help() {
   std::string text =
       "lamina plans additive-manufacturing jobs: meshes in, what a machine needs for every layer out.\n\n"
       "Usage: lamina COMMAND [OPTIONS] ...\n\nCommands:\n";
-  for (const Command& command : kCommands) text += fmt::format("  {:<10}{}\n", command.name, command.summary);
+  for (const Command& command : kCommands) text += fmt::format("  {:<13}{}\n", command.name, command.summary);
   text +=
       "\nOptions:\n  -h, --help     this text; lamina COMMAND --help tells all about a command\n"
       "  --version      the version\n\n"

@@ -44,8 +44,10 @@ std::string replay_json(const VerifyReport& report) {
 void say_replay(const VerifyReport& report) {
   if (report.machine.empty() || report.replayed == 0) return;
   const ReplayCount& replay = report.replay;
-  say(fmt::format("programs  {} layers replayed on {}: every pixel fired once, {} drops in {} sweeps, {:.3f} % of the bed",
-                  readable_count(report.replayed), report.machine, readable_count(replay.drops),
+  say(fmt::format("programs  {} layers replayed on {}: {}, {} drops in {} sweeps, {:.3f} % of the bed",
+                  readable_count(report.replayed), report.machine,
+                  report.moved + report.lost > 0 ? "every pixel fired once but those of blocked nozzles" : "every pixel fired once",
+                  readable_count(replay.drops),
                   readable_count(replay.sweeps), 100 * report.coverage));
   if (report.moved + report.lost > 0) {
     say(fmt::format("blocked   {} pixels fired by a neighbouring nozzle, {} not at all, as recorded",

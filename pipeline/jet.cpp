@@ -213,6 +213,8 @@ Result<JetSummary> run_jet(const Job& asked, const ProgressCallback& progress, c
   const double pixel_mm2 = 25.4 * 25.4 / (grid.x.dpi() * grid.y.dpi());
   const auto count = [&](const LayerRecord& record) {
     summary.set_pixels += record.set_pixels;
+    summary.moved_pixels += record.program.moved;
+    summary.lost_pixels += record.program.lost;
     for (std::size_t m = 0; m < record.images.size(); ++m) summary.materials[m].second += record.images[m].set_pixels;
     summary.set_volume_mm3 += static_cast<double>(record.set_pixels) * pixel_mm2 * mm(record.layer.thickness);
   };

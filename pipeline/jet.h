@@ -34,6 +34,7 @@ struct JetSummary {
   std::uint64_t triangles = 0;        // with copies
   std::uint64_t set_pixels = 0, bytes_written = 0;
   std::vector<std::pair<std::string, std::uint64_t>> materials;  // name, set pixels; if there are several
+  std::uint64_t moved_pixels = 0, lost_pixels = 0;  // of blocked nozzles: fired by another one, and not at all
   double set_volume_mm3 = 0;          // set pixels x pixel area x thickness
   std::uint64_t solid_pixels = 0, bead_pixels = 0;  // of the layers planned now: of parts, and of the beads in them
   std::uint64_t capped_rows = 0;      // rows of all layers that are closed only thanks to repair

@@ -79,6 +79,11 @@ std::string summary_text(const Job& job, const JetSummary& s) {
                                readable_bytes(s.index_bytes), readable_bytes(s.peak_layer_bytes),
                                readable_bytes(job.memory_bytes), s.most_layers_in_flight));
   }
+  if (s.moved_pixels > 0) line("blocked", fmt::format("{} pixels of blocked nozzles are fired by their neighbours", readable_count(s.moved_pixels)));
+  if (s.lost_pixels > 0) {
+    line("warning", fmt::format("{} pixels of blocked nozzles are not fired at all; head.blocked_rule = \"second-pass\" fires them",
+                                readable_count(s.lost_pixels)));
+  }
   if (s.capped_rows > 0) line("repaired", fmt::format("{} rows are closed only thanks to repair", readable_count(s.capped_rows)));
   for (const std::string& warning : s.warnings) line("warning", one_line(warning));
   return text;
@@ -97,6 +102,7 @@ std::string summary_json(const Job& job, const JetSummary& s) {
       s.layers_total, s.layers_planned, s.layers_kept, s.triangles, s.set_pixels, s.set_volume_mm3, s.bytes_written,
       s.capped_rows);
   if (s.solid_pixels > 0) text += fmt::format("\"solid_pixels\":{},\"bead_pixels\":{},\"porosity\":{},", s.solid_pixels, s.bead_pixels, porosity(s));
+  if (job.machine.resolved) text += fmt::format("\"moved_pixels\":{},\"lost_pixels\":{},", s.moved_pixels, s.lost_pixels);
   if (!s.materials.empty()) {
     std::string materials;
     for (const auto& [material, pixels] : s.materials) {

@@ -88,7 +88,12 @@ Result<HeadGrid> make_head_grid(const Machine& machine) {
   } else {
     const double turned = scan_x ? mount.tilt_deg : 90 - mount.tilt_deg;
     angle = turned * kPi / 180;
-    if (!(std::abs(std::sin(angle)) > 0.01) || !(std::abs(turned) < 180)) {
+    if (!(std::abs(turned) < 180)) {
+      return wrong(machine, "mounting.tilt_deg",
+                   fmt::format("{:g} degrees against X is half a turn or more from a scan along {}; give the same row's angle "
+                               "in the other direction", mount.tilt_deg, scan_x ? "x" : "y"));
+    }
+    if (!(std::abs(std::sin(angle)) > 0.01)) {
       return wrong(machine, "mounting.tilt_deg",
                    fmt::format("{:g} degrees against X puts all nozzles on one line of a scan along {}; turn the head",
                                mount.tilt_deg, scan_x ? "x" : "y"));

@@ -268,6 +268,7 @@ TEST(HeadGrid, WhatCannotBePrintedIsOneLineThatNamesTheKey) {
   };
   refused([](Machine& m) { m.mounting.tilt_deg = 0; }, "mounting.tilt_deg: 0 degrees");
   refused([](Machine& m) { m.mounting.tilt_deg = 180; }, "mounting.tilt_deg: 180 degrees");
+  refused([](Machine& m) { m.mounting.tilt_deg = 225; }, "half a turn or more");
   refused([](Machine& m) { m.head.pitch_um = 0; }, "head.pitch_um");
   refused([](Machine& m) { m.head.blocked.assign(129, 0); }, "head.blocked: 129 blocked nozzles of 128");
   refused([](Machine& m) { m.head.blocked = {128}; }, "there is no nozzle 128");

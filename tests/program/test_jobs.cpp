@@ -87,6 +87,9 @@ TEST_F(PrintJobs, BlockedNozzlesAndLessBinderAreRecordedAndReplayed) {
   EXPECT_TRUE(report->ok()) << (report->faults.empty() ? "" : report->faults[0]);
   EXPECT_GT(report->lost, 0u);
   EXPECT_EQ(report->replay.drops + report->lost, summary->set_pixels);
+  // The planner says at once what the replay finds.
+  EXPECT_EQ(summary->lost_pixels, report->lost);
+  EXPECT_EQ(summary->moved_pixels, report->moved);
 }
 
 TEST_F(PrintJobs, ShardsMergedAndLayersResumedGiveTheBytesOfOneRun) {
