@@ -132,8 +132,8 @@ def page(result):
     lines = ["# Contours, measured", "",
              "Written by `scripts/bench slice` from `bench/results/slice.json`; do not edit.", "",
              f"{result['date']}, commit {result['commit']}: {machine['cores']} cores of {machine['processor']}, "
-             f"{machine['memory_gib']} GiB, {machine['system']}, g++ {machine['compiler']}. Other programs were running; wall "
-             "seconds move with them, processor seconds less.", "",
+             f"{machine['memory_gib']} GiB, {machine['system']}, g++ {machine['compiler']}; load of the machine before: "
+             f"{result['load']:.1f}.", "",
              "## Whole programs", "",
              "Binary STL on disk to files on disk, medians. Slic3r 1.3 `--export-svg` against `lamina slice` to SVG, both with all "
              "cores; admesh's load and check against `lamina slice --format null --threads 1`, which loads, checks, indexes, cuts, "
@@ -194,7 +194,8 @@ def main(arguments):
     parts, work = os.path.join(cache, "parts"), os.path.join(cache, "work-slice")
     os.makedirs(work, exist_ok=True)
     subprocess.run([sys.executable, os.path.join(ROOT, "bench/make_parts.py"), options.models, parts], check=True)
-    result = {"date": time.strftime("%Y-%m-%d"), "commit": report.commit(ROOT), "machine": report.machine(cache), "cases": {}}
+    result = {"date": time.strftime("%Y-%m-%d"), "commit": report.commit(ROOT), "machine": report.machine(cache),
+              "load": round(os.getloadavg()[0], 1), "cases": {}}
     for case in options.case or CASES:
         result["cases"][case] = run_case(case, options, os.path.join(programs, "lamina"), parts, work)
     result["stages"] = stages(os.path.join(programs, "lamina_bench"), options)

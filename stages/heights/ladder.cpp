@@ -9,6 +9,7 @@ Result<Ladder> Ladder::reachable(const ThicknessSet& set, std::int64_t highest) 
   const std::int64_t step = set.step(), even = ceil_div(highest, step) + 1;
   if (even <= kMostRungs) {
     ladder.step_ = step;
+    ladder.inverse_ = step > 1 && step <= UINT32_MAX ? UINT64_MAX / static_cast<std::uint64_t>(step) + 1 : 0;
     ladder.count_ = static_cast<std::uint32_t>(even);
     return ladder;
   }

@@ -32,8 +32,9 @@ class Ladder {
   std::uint32_t rungs_up_to(std::int64_t height) const {
     if (step_ > 0) {
       if (height < 0) return 0;
-      if (height > UINT32_MAX) return static_cast<std::uint32_t>(std::min<std::int64_t>(height / step_ + 1, count_));
-      return std::min(static_cast<std::uint32_t>(height) / static_cast<std::uint32_t>(step_) + 1, count_);  // far faster
+      if (height > UINT32_MAX || inverse_ == 0) return static_cast<std::uint32_t>(std::min<std::int64_t>(height / step_ + 1, count_));
+      const auto below = static_cast<unsigned __int128>(inverse_) * static_cast<std::uint32_t>(height) >> 64;
+      return std::min(static_cast<std::uint32_t>(below) + 1, count_);
     }
     return static_cast<std::uint32_t>(std::upper_bound(heights_.begin(), heights_.end(), height) - heights_.begin());
   }
@@ -49,6 +50,9 @@ class Ladder {
 
  private:
   std::int64_t step_ = 0;
+  // ceil(2^64 / step): the upper half of its product with a height below 2^32 is the quotient, exactly (Lemire, Kaser and
+  // Kurz, "Faster remainder by direct computation", 2019). 0 where that does not hold: a step of 1, or none.
+  std::uint64_t inverse_ = 0;
   std::uint32_t count_ = 0;
   std::vector<std::int64_t> heights_;  // empty if evenly spaced
 };

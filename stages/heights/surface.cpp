@@ -14,6 +14,7 @@ namespace lamina::heights {
 namespace {
 
 constexpr std::size_t kBlock = 1 << 14;  // facets; fixed, so that sums do not depend on the threads
+constexpr std::size_t kGroup = 256;      // facets whose roots and quotients are taken together, two and more at a time
 
 struct Normal {
   double x, y, z;  // length: twice the area, nm2
@@ -74,39 +75,49 @@ class FlatJoiner {
 MeshSlopes slopes_of(const Mesh& mesh, const Limits& limits) {
   MeshSlopes slopes;
   const std::size_t count = mesh.triangles.size();
-  slopes.lo.resize(count);
-  slopes.hi.resize(count);
+  slopes.facets = mesh.triangles;
   slopes.steepness.resize(count);
-  slopes.projected_mm2.resize(count);
   const std::size_t blocks = (count + kBlock - 1) / kBlock;
   std::vector<std::vector<FlatFacet>> flats(blocks);
   std::vector<double> areas(blocks);
   const Triangle* triangles = mesh.triangles.data();
-  Nm *to_lo = slopes.lo.data(), *to_hi = slopes.hi.data();
   Steepness* to_steepness = slopes.steepness.data();
-  float* to_projected = slopes.projected_mm2.data();
   tbb::parallel_for(std::size_t{0}, blocks, [&](std::size_t block) {
     double block_area = 0;
     FlatJoiner joiner(flats[block]);
-    for (std::size_t i = block * kBlock; i < std::min(count, (block + 1) * kBlock); ++i) {
-      const Triangle& t = triangles[i];
-      const Normal n = normal_of(t);
-      const double length = std::sqrt(n.x * n.x + n.y * n.y + n.z * n.z);
-      const double mm2 = length * 0.5e-12, up = std::abs(n.z);
-      const Nm lo = std::min(std::min(t.a.z, t.b.z), t.c.z), hi = std::max(std::max(t.a.z, t.b.z), t.c.z);
-      const double nz = up / length;  // no number for a facet without area
-      const bool counts = up > 0 && mm2 >= limits.least_mm2;
-      const bool level = counts && nz >= limits.horizontal && std::int64_t{hi} - lo <= limits.tolerance;
-      const bool slope = counts && !level;
-      if (level) joiner.add({static_cast<Nm>(lo + (std::int64_t{hi} - lo) / 2), n.z > 0, mm2});
-      block_area += level ? 0 : mm2;
-      to_lo[i] = lo;
-      to_hi[i] = hi;
-      // Rounded up; the cast cuts off, and what is cut off is put back.
-      const double scaled = nz * kHorizontal;
-      const auto whole = static_cast<std::int32_t>(slope ? scaled : 0);
-      to_steepness[i] = static_cast<Steepness>(whole + (slope && whole < scaled ? 1 : 0));
-      to_projected[i] = static_cast<float>(n.z * 0.5e-12);
+    const std::size_t block_end = std::min(count, (block + 1) * kBlock);
+    for (std::size_t first = block * kBlock; first < block_end; first += kGroup) {
+      const std::size_t group = std::min(kGroup, block_end - first);
+      double x[kGroup], y[kGroup], z[kGroup], length[kGroup], up[kGroup];
+      Nm lo[kGroup], hi[kGroup];
+      for (std::size_t k = 0; k < group; ++k) {
+        const Triangle& t = triangles[first + k];
+        const Normal n = normal_of(t);
+        x[k] = n.x, y[k] = n.y, z[k] = n.z;
+        lo[k] = std::min(std::min(t.a.z, t.b.z), t.c.z);
+        hi[k] = std::max(std::max(t.a.z, t.b.z), t.c.z);
+      }
+      for (std::size_t k = 0; k < group; ++k) {
+        length[k] = std::sqrt(x[k] * x[k] + y[k] * y[k] + z[k] * z[k]);
+        up[k] = std::abs(z[k]) / length[k];  // no number for a facet without area
+      }
+      std::uint32_t level[kGroup], levels = 0;
+      for (std::size_t k = 0; k < group; ++k) {
+        const double mm2 = length[k] * 0.5e-12;
+        const bool counts = (z[k] != 0) & (mm2 >= limits.least_mm2);
+        const bool flat = counts & (up[k] >= limits.horizontal) & (std::int64_t{hi[k]} - lo[k] <= limits.tolerance);
+        level[levels] = static_cast<std::uint32_t>(k);
+        levels += flat;
+        block_area += flat ? 0 : mm2;
+        // Rounded up; the cast cuts off, and what is cut off is put back.
+        const double scaled = counts & !flat ? up[k] * kHorizontal : 0;
+        const auto whole = static_cast<std::int32_t>(scaled);
+        to_steepness[first + k] = static_cast<Steepness>(whole + (whole < scaled));
+      }
+      for (std::uint32_t l = 0; l < levels; ++l) {
+        const std::size_t k = level[l];
+        joiner.add({static_cast<Nm>(lo[k] + (std::int64_t{hi[k]} - lo[k]) / 2), z[k] > 0, length[k] * 0.5e-12});
+      }
     }
     areas[block] = block_area;
   });
@@ -128,7 +139,7 @@ std::uint32_t worthwhile_shares(const SurfaceIndex& index, std::span<const PartS
   for (const PartSurface& part : parts) {
     for (const Standing& standing : part.standing) facets += index.meshes[standing.mesh].steepness.size();
   }
-  constexpr std::size_t kFacetsAnEntry = 4, kMost = 32;
+  constexpr std::size_t kFacetsAnEntry = 1, kMost = 32;
   return static_cast<std::uint32_t>(std::clamp<std::size_t>(facets / (kFacetsAnEntry * entries + 1), 1, kMost));
 }
 

@@ -3,6 +3,7 @@
 // One pass over the facets of every mesh. Later questions are answered from these arrays; no layer looks at all facets.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -25,6 +26,15 @@ constexpr std::int64_t cusp_of(std::int64_t thickness, Steepness steepness) {
   return (thickness * steepness + kHorizontal - 1) / kHorizontal;
 }
 
+/// mm2 of a facet as seen from above, negative where it looks down. Exact before the last rounding.
+inline double projected_mm2(const Triangle& t) {
+  const std::int64_t ux = std::int64_t{t.b.x} - t.a.x, uy = std::int64_t{t.b.y} - t.a.y;
+  const std::int64_t vx = std::int64_t{t.c.x} - t.a.x, vy = std::int64_t{t.c.y} - t.a.y;
+  const auto small = [](std::int64_t v) { return v == static_cast<std::int32_t>(v); };  // a part below 2 m
+  if (small(ux) && small(uy) && small(vx) && small(vy)) return static_cast<double>(ux * vy - uy * vx) * 0.5e-12;
+  return static_cast<double>(static_cast<__int128>(ux) * vy - static_cast<__int128>(uy) * vx) * 0.5e-12;
+}
+
 struct SurfaceOptions {
   double peak_angle_deg = 90;        // facets at least as flat as this are horizontal
   double normal_tolerance = 1e-3;    // of |n_z|, for all comparisons of angles
@@ -40,13 +50,13 @@ struct FlatFacet {
 };
 
 /// The facets of one mesh, in its own coordinates. Those that are vertical, horizontal, degenerate or too small have
-/// steepness 0 and are to be passed over. 16 bytes a facet.
+/// steepness 0 and are to be passed over. 4 bytes a facet: heights and areas are read from the mesh again, which costs
+/// less than memory for them.
 struct MeshSlopes {
-  Buffer<Nm> lo, hi;               // z range, nm
-  Buffer<Steepness> steepness;
-  Buffer<float> projected_mm2;     // area times n_z: negative where the facet looks down
-  std::vector<FlatFacet> flats;    // in no order; the same for any number of threads
-  double area_mm2 = 0;             // of all facets that are not horizontal
+  std::span<const Triangle> facets;  // of the mesh, which has to outlive the index
+  Buffer<Steepness> steepness;       // of each facet
+  std::vector<FlatFacet> flats;      // in no order; the same for any number of threads
+  double area_mm2 = 0;               // of all facets that are not horizontal
 };
 
 /// A mesh at a height; copies that stand on the same level count as one with a larger area.
@@ -73,7 +83,8 @@ struct SurfaceIndex {
 ///
 /// instances, part_of_instance  of equal length; the offset's z is the height above the bed
 /// angles come from the corners of the facets, never from the normals that a file may hold
-/// cost  O(facets); 16 bytes a facet
+/// meshes       are referred to by the index
+/// cost  O(facets); 4 bytes a facet
 SurfaceIndex index_surface(std::span<const Mesh> meshes, std::span<const Instance> instances,
                            std::span<const std::uint32_t> part_of_instance, std::uint32_t part_count,
                            const SurfaceOptions& options);
@@ -89,15 +100,14 @@ void for_each_slope(const SurfaceIndex& index, const PartSurface& part, std::uin
                     const Visit& visit) {
   for (const Standing& standing : part.standing) {
     const MeshSlopes& mesh = index.meshes[standing.mesh];
-    const Nm* lo = mesh.lo.data();
-    const Nm* hi = mesh.hi.data();
+    const Triangle* facets = mesh.facets.data();
     const Steepness* steepness = mesh.steepness.data();
-    const float* projected = mesh.projected_mm2.data();
     const std::size_t count = mesh.steepness.size(), end = count * (share + 1) / shares;
     for (std::size_t i = count * share / shares; i < end; ++i) {
       if (steepness[i] == 0) continue;
-      visit(lo[i] + standing.raise, hi[i] + standing.raise, steepness[i],
-            static_cast<double>(projected[i]) * standing.copies);
+      const Triangle& t = facets[i];
+      const Nm lo = std::min(std::min(t.a.z, t.b.z), t.c.z), hi = std::max(std::max(t.a.z, t.b.z), t.c.z);
+      visit(lo + standing.raise, hi + standing.raise, steepness[i], projected_mm2(t) * standing.copies);
     }
   }
 }

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <cstdlib>
+#include <deque>
 #include <string>
 #include <utility>
 #include <vector>
@@ -43,10 +44,16 @@ inline Mesh strip(const std::vector<std::pair<double, double>>& profile) {
   return mesh;
 }
 
+/// Keeps meshes for as long as the tests run: an index refers to them.
+inline std::span<const Mesh> kept(std::vector<Mesh> meshes) {
+  static std::deque<std::vector<Mesh>> all;
+  return all.emplace_back(std::move(meshes));
+}
+
 inline SurfaceIndex index_of(const Mesh& mesh, const SurfaceOptions& options = {}) {
   const Instance instance{0, {0, 0, -mesh.bounds.lo.z}};
   const std::uint32_t part = 0;
-  return index_surface(std::span(&mesh, 1), std::span(&instance, 1), std::span(&part, 1), 1, options);
+  return index_surface(kept({mesh}), std::span(&instance, 1), std::span(&part, 1), 1, options);
 }
 
 /// A file standing on the bed.
@@ -57,7 +64,7 @@ inline SurfaceIndex index_of_file(const std::string& path, const SurfaceOptions&
   std::vector<Instance> instances = part->instances;
   for (Instance& instance : instances) instance.offset.z -= part->bounds.lo.z;
   const std::vector<std::uint32_t> parts(instances.size(), 0);
-  return index_surface(part->meshes, instances, parts, 1, options);
+  return index_surface(kept(std::move(part->meshes)), instances, parts, 1, options);
 }
 
 inline std::string reference(const std::string& name) {
