@@ -114,12 +114,17 @@ Printing::Printing(const VirtualMachine& machine, std::uint32_t layer, const Vir
       fired_(std::size_t{row_words_} * machine.rows_, 0) {}
 
 void Printing::fault(const std::string& what) const {
+  const bool ahead = reading_sweep_ != INT64_MIN;  // its words are read, and it has not begun
   std::string place = fmt::format("layer {}", layer_);
-  if (sweeping_) place += fmt::format(", swath {}", sweep_);
-  if (reading_ != INT64_MIN) {
-    place += fmt::format(", step {}", reading_);
-  } else if (stepped_) {
-    place += fmt::format(", step {}", step_);
+  if (ahead || sweeping_) {
+    place += fmt::format(", swath {}", ahead ? reading_sweep_ : std::int64_t{sweep_});
+    if (reading_ != INT64_MIN) {
+      place += fmt::format(", step {}", reading_);
+    } else {
+      place += stepped_ && !ahead ? fmt::format(", step {}", step_) : ", before its first step";
+    }
+  } else {
+    place += ", before its first swath";
   }
   throw place + ": " + what;
 }
@@ -132,6 +137,7 @@ void Printing::begin_sweep(std::uint32_t number, bool backward) {
     }
   }
   sweep_ = number;
+  reading_sweep_ = INT64_MIN;
   backward_ = backward;
   sweeping_ = true;
   stepped_ = false;
@@ -235,7 +241,7 @@ void Printing::feeds(std::uint32_t vat, double mm, double mm_s) {
 }
 
 // Where the nozzle is that has to see to a pixel.
-std::string Printing::place_of(std::uint32_t column, std::uint32_t row) {
+std::string Printing::place_of(std::uint32_t column, std::uint32_t row) const {
   const auto& mount = profile().mounting;
   const auto has = [&](Side side) { return mount.scan_from == side || mount.nozzle_0 == side; };
   const std::int64_t from_left = has(Side::kRight) ? machine_.columns_ - 1 - column : column;
@@ -248,14 +254,14 @@ std::string Printing::place_of(std::uint32_t column, std::uint32_t row) {
       return fmt::format("layer {}, swath {}, step {}", layer_, sweep.number, place * machine_.ticks_ + nozzle.step_offset);
     }
   }
-  return fmt::format("layer {}, no swath", layer_);
+  return fmt::format("layer {}, line {} across, place {} along, which no swath comes over", layer_, line, place);
 }
 
 void Printing::compare(const RunsView& image, std::uint64_t moved, std::uint64_t lost) {
   if (image.columns != machine_.columns_ || image.rows() != machine_.rows_) fault("the image is of another size");
   std::vector<std::uint64_t> wanted(row_words_);
   std::uint64_t missing = 0, added = 0;
-  std::string first;
+  std::string first, first_of_all;  // that nothing explains; explained or not
   const bool x = profile().mounting.scan_axis == ScanAxis::kX;
   const std::int64_t next = profile().mounting.passes;
   const auto set_and_unfired = [&](std::int64_t column, std::int64_t row) {
@@ -285,6 +291,7 @@ void Printing::compare(const RunsView& image, std::uint64_t moved, std::uint64_t
         const bool explained = !extra ? moved + lost > 0
                                       : moved > 0 && (x ? set_and_unfired(column, row - next) || set_and_unfired(column, row + next)
                                                         : set_and_unfired(column - next, row) || set_and_unfired(column + next, row));
+        if (first_of_all.empty()) first_of_all = place_of(column, row);
         if (first.empty() && !explained) {
           first = fmt::format("{}: column {}, row {} is {}", place_of(column, row), column, row,
                               extra ? "fired and not set in the image" : "set in the image and not fired");
@@ -293,11 +300,10 @@ void Printing::compare(const RunsView& image, std::uint64_t moved, std::uint64_t
     }
   }
   if (!first.empty()) throw first;
-  sweeping_ = stepped_ = false;
-  reading_ = INT64_MIN;
   if (added != moved || missing != moved + lost) {
-    fault(fmt::format("{} pixels are not fired and {} fired instead; the manifest says {} and {}", missing, added,
-                      moved + lost, moved));
+    if (first_of_all.empty()) first_of_all = fmt::format("layer {}", layer_);  // the manifest alone speaks of such pixels
+    throw fmt::format("{}: {} pixels are not fired and {} fired instead; the manifest says {} and {}", first_of_all, missing,
+                      added, moved + lost, moved);
   }
 }
 

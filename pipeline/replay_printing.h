@@ -18,6 +18,7 @@ class Printing {
   std::uint32_t layer() const { return layer_; }
   std::uint32_t nozzles() const { return static_cast<std::uint32_t>(machine_.nozzle_.size()); }
   std::int64_t steps_a_pixel() const { return machine_.ticks_; }
+  /// "layer 12, swath 3, step 417: what"; before the first swath or the first step of one, that is said instead.
   [[noreturn]] void fault(const std::string& what) const;
 
   // --- sweeps
@@ -28,7 +29,8 @@ class Printing {
   /// Carriage position in mm of a step, and the step nearest to a position, which has to be near.
   double position_of(double step) const;
   std::int64_t step_at(double carriage_mm) const;
-  /// For messages: the step that a vector is of which is read and not fired yet.
+  /// For messages: the sweep whose words are read before it begins, and the step of a vector that is not fired yet.
+  void reading_sweep(std::uint32_t number) { reading_sweep_ = number; reading_ = INT64_MIN; }
   void reading_step(std::int64_t step) { reading_ = step; }
   void at_step(std::int64_t step);
   void fire(std::uint32_t nozzle);
@@ -51,14 +53,14 @@ class Printing {
     std::int64_t first_line;
   };
   bool pixel(std::int64_t line, std::int64_t place, std::uint32_t& column, std::uint32_t& row) const;
-  std::string place_of(std::uint32_t column, std::uint32_t row);
+  std::string place_of(std::uint32_t column, std::uint32_t row) const;
 
   const VirtualMachine& machine_;
   const VirtualMachine::Watch* watch_;
   std::uint32_t layer_, row_words_;
   std::uint32_t sweep_ = 0;
   std::int64_t first_line_ = 0, step_ = 0, previous_step_ = 0;
-  std::int64_t reading_ = INT64_MIN;
+  std::int64_t reading_ = INT64_MIN, reading_sweep_ = INT64_MIN;
   bool backward_ = false, sweeping_ = false, stepped_ = false, fired_here_ = false;
   std::vector<std::uint64_t> fired_;  // a bit a pixel, the leftmost in bit 0
   std::vector<Sweep> sweeps_;

@@ -53,6 +53,7 @@ void replay_hp45(std::string_view text, Printing& printing) {
     if (line.command == "BCL") {
       if (!loaded.empty()) reader.fault("lines that were sent are cleared before the head moved");
     } else if (line.command == "SBR") {
+      if (loaded.empty()) printing.reading_sweep(sweep);
       const std::size_t gap = line.rest.find(' ');
       if (gap == std::string_view::npos || line.rest.size() - gap - 1 != 50) reader.fault("SBR has a position and 50 characters");
       const std::string_view raw = line.rest.substr(gap + 1);
@@ -108,6 +109,7 @@ void replay_brundlefab(std::string_view text, Printing& printing) {
       words.clear();
       in_sweep = false;
     } else if (line.command == "T1") {
+      if (!in_sweep) printing.reading_sweep(sweep);
       std::uint64_t bits[3] = {reader.count(line, 'P'), reader.count(line, 'Q'), reader.count(line, 'R')};
       words.assign((printing.nozzles() + 63) / 64, 0);
       for (std::uint32_t nozzle = 0; nozzle < 72; ++nozzle) {
@@ -151,6 +153,7 @@ void replay_m578(std::string_view text, Printing& printing) {
     if (ended) reader.fault("goes on behind M400");
     if (line.command == "M578") {
       const double at = axes.at(scan.along);
+      if (!in_sweep) printing.reading_sweep(sweep);
       const std::int64_t now = printing.step_at(at);
       if (!in_sweep) {
         const bool towards_end = printing.position_of(1) > printing.position_of(0);

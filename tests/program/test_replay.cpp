@@ -7,6 +7,7 @@
 #include <atomic>
 #include <cstdlib>
 #include <filesystem>
+#include <regex>
 
 #include "pipeline/machine.h"
 #include "pipeline/machine_profile.h"
@@ -211,11 +212,26 @@ TEST(Replay, EveryDialectSpeaksForAnyMountingDirectionAndBlockedNozzle) {
   }
 }
 
+/// Whether a fault says where: a swath and a step of it, or that the first of them has not been reached.
+bool tells_the_place(const std::string& fault) {
+  static const std::regex place("layer 7, (swath [0-9]+, (step -?[0-9]+|before its first step)|before its first swath"
+                                "|line [0-9]+ across, place [0-9]+ along, which no swath comes over): .*");
+  return std::regex_match(fault, place);
+}
+
 TEST(Replay, ATruncatedOrEditedProgramFailsWithTheLayerTheSwathAndTheStep) {
+  std::vector<ResolvedMachine> machines;
   for (const write::Dialect& dialect : write::dialects()) {
     Machine machine = program::testing::small_machine(12, 90, 100, 100);
     machine.dialect = dialect.id;
-    const ResolvedMachine resolved = shrunk(machine, 80, 30);
+    machines.push_back(shrunk(machine, 80, 30));
+  }
+  for (const ShippedMachine& shipped : shipped_machines()) {
+    machines.push_back(shrunk(*read_machine(shipped.text, std::string(shipped.name)), 160, 90));
+  }
+  for (std::size_t number = 0; number < machines.size(); ++number) {
+    const ResolvedMachine& resolved = machines[number];
+    const std::string name = resolved.machine.name + "/" + resolved.machine.dialect;
     Random random(5);
     Image image(resolved.grid.image.rows(), std::vector<int>(resolved.grid.image.columns(), 0));
     for (auto& row : image) {
@@ -224,27 +240,38 @@ TEST(Replay, ATruncatedOrEditedProgramFailsWithTheLayerTheSwathAndTheStep) {
     const Runs runs = runs_of(image);
     const Written program = write_layer(resolved, runs);
     ASSERT_TRUE(replay(resolved, runs, program).ok());
-    for (std::size_t length = 0; length < program.text.size(); length += 1 + program.text.size() / 97) {
+    std::size_t before_all = 0, cuts = 0;
+    for (std::size_t length = 0; length < program.text.size(); length += 1 + program.text.size() / 97, ++cuts) {
       const auto printed = replay(resolved, runs, {program.text.substr(0, length), program.count});
-      ASSERT_FALSE(printed.ok()) << dialect.id << " cut to " << length;
+      ASSERT_FALSE(printed.ok()) << name << " cut to " << length;
       EXPECT_EQ(printed.error().fault, Fault::kVerification);
-      EXPECT_NE(printed.error().message.find("layer 7"), std::string::npos) << printed.error().message;
+      EXPECT_TRUE(tells_the_place(printed.error().message)) << name << ": " << printed.error().message;
+      before_all += printed.error().message.find("before its first swath") != std::string::npos;
     }
+    EXPECT_LT(before_all * 4, cuts) << name;  // where the bed, the roller and the vats move
     // A pixel that the program does not know of: the place where it should have fired.
     Image other = image;
     other[20][40] ^= 1;
     const auto printed = replay(resolved, runs_of(other), program);
     ASSERT_FALSE(printed.ok());
-    EXPECT_NE(printed.error().message.find("layer 7, swath 1, step 40: column 40, row 20"), std::string::npos)
-        << dialect.id << ": " << printed.error().message;
-    // Any byte of the vectors changed: never a crash, and hardly ever unnoticed.
+    EXPECT_TRUE(tells_the_place(printed.error().message)) << printed.error().message;
+    EXPECT_NE(printed.error().message.find("column 40, row 20"), std::string::npos) << name << ": " << printed.error().message;
+    if (number < write::dialects().size()) {
+      EXPECT_NE(printed.error().message.find("layer 7, swath 1, step 40: "), std::string::npos) << printed.error().message;
+    }
+    // Any byte of the vectors changed: never a crash, hardly ever unnoticed, and the place told.
     std::size_t unnoticed = 0, tried = 0;
-    for (std::size_t at = program.text.size() / 4; at < program.text.size() * 3 / 4; at += 13, ++tried) {
+    const std::size_t stride = 13 + program.text.size() / 4000;
+    for (std::size_t at = program.text.size() / 4; at < program.text.size() * 3 / 4; at += stride, ++tried) {
       Written edited = program;
       edited.text[at] = static_cast<char>(edited.text[at] ^ 1);
-      unnoticed += replay(resolved, runs, edited).ok();
+      const auto replayed = replay(resolved, runs, edited);
+      unnoticed += replayed.ok();
+      if (!replayed.ok()) {
+        EXPECT_TRUE(tells_the_place(replayed.error().message)) << name << " byte " << at << ": " << replayed.error().message;
+      }
     }
-    EXPECT_LT(unnoticed * 3, tried) << dialect.id;  // numbers of speeds and of swaths print the same
+    EXPECT_LT(unnoticed * 3, tried) << name;  // numbers of speeds and of swaths print the same
   }
 }
 
