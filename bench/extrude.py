@@ -5,13 +5,15 @@
 
 0.1 mm layers, two walls, 30 % raster, no solid layers, no supports, no skirt; mesh on disk to G-code on disk, in turn. The slow
 peers run once. Before a figure is kept the answers are compared: the number of layers, and the filament of the whole file, which
-has to be within a fifth of CuraEngine's. Writes bench/results/extrude.json and bench/extrude.md.
+has to be within a fifth of CuraEngine's. Then the peak memory of segmented jobs beside that of the same ones without segmentation. Writes bench/results/extrude.json and bench/extrude.md.
 """
 import argparse
 import json
+import math
 import os
 import re
 import shutil
+import statistics
 import subprocess
 import sys
 import time
@@ -99,6 +101,80 @@ def run_all(options, lamina, part, work, definitions):
     return result
 
 
+def write_block(path, x, y, z, radius):
+    """A block in mm with a round hole upright through its middle, as text STL."""
+    angles = [(i + 0.5) * math.pi / 180 for i in range(360)]
+    angles += [math.atan2(sy * y, sx * x) % (2 * math.pi) for sx in (-1, 1) for sy in (-1, 1)]
+    outer, inner = [], []
+    for angle in sorted(angles):
+        c, s = math.cos(angle), math.sin(angle)
+        reach = min(x / 2 / abs(c) if abs(c) > 1e-12 else 1e9, y / 2 / abs(s) if abs(s) > 1e-12 else 1e9)
+        outer.append((reach * c, reach * s))
+        inner.append((radius * c, radius * s))
+    with open(path, "w", encoding="ascii") as file:
+        def facet(*corners):
+            file.write("facet normal 0 0 0\nouter loop\n")
+            file.writelines("vertex %.12g %.12g %.12g\n" % (*p, height) for p, height in corners)
+            file.write("endloop\nendfacet\n")
+
+        file.write("solid block\n")
+        for a, b, c, d in zip(outer, outer[1:] + outer[:1], inner, inner[1:] + inner[:1]):
+            facet((a, 0), (b, 0), (b, z))
+            facet((a, 0), (b, z), (a, z))
+            facet((a, z), (b, z), (d, z))
+            facet((a, z), (d, z), (c, z))
+            facet((a, 0), (d, 0), (b, 0))
+            facet((a, 0), (c, 0), (d, 0))
+            facet((c, 0), (d, z), (d, 0))
+            facet((c, 0), (c, z), (d, z))
+        file.write("endsolid block\n")
+
+
+def memory_of_segments(lamina, work):
+    """Peak MiB of jobs with and without segmentation, run in turn; medians of 15."""
+    # name, block, job, segmentation, points of stretches that the summary has to count
+    jobs = [("block of Fukuda 2020, 79 layers", (74, 100, 20, 12.5),
+             ["--layer", "0.254", "--walls", "0", "--bead", "0.508", "--bead-gap", "2.4", "--angle", "0", "--angle-step", "0",
+              "--set", "fill.first_line_mm=0.508", "--set", "fill.end_inset_mm=0.254"],
+             ["--segment-rule", "fukuda", "--thin", "5", "--thick", "3"], 27334),
+            ("200 x 200 x 6 mm, stretches of 0.5 mm", (200, 200, 6, 20), ["--layer", "0.2", "--walls", "1", "--bead", "0.4"],
+             ["--thin", "0.5", "--thick", "0.5"], None)]
+    rows = []
+    for name, size, job, segments, points in jobs:
+        part, log = os.path.join(work, "block.stl"), os.path.join(work, "memory.log")
+        write_block(part, *size)
+        for threads in (1, 2):
+            slice_bench.say(f"bench: memory, {name}, {threads} threads")
+            row = {"name": name, "threads": threads}
+            runs = {"plain": [], "segmented": []}
+            for _ in range(15):
+                for kind, fill in (("plain", ["--fill", "raster"]), ("segmented", ["--fill", "segmented", *segments])):
+                    out = os.path.join(work, kind + ".gcode")
+                    command = [lamina, "extrude", part, "--machine", "marlin", *job, *fill, "--threads", str(threads), "--json", "--quiet", "-o", out]
+                    runs[kind].append(slice_bench.measured(command, log)["peak_mib"])
+                    row[kind + "_bytes"] = os.path.getsize(out)
+            with open(log, encoding="utf-8") as file:
+                counted = json.loads(file.read().splitlines()[-1])["segments"]["points"]
+            if points is not None and counted != points:
+                sys.exit(f"bench: {counted} points of stretches, not {points}")
+            row["points"] = counted
+            for kind, peaks in runs.items():
+                row[kind + "_mib"] = statistics.median(peaks)
+            rows.append(row)
+    return rows
+
+
+def memory_lines(rows):
+    lines = ["## Memory with and without segmentation", "",
+             "The same job with `--fill raster` and `--fill segmented`, in turn; medians of 15 peaks. Asked: no more than 2 % above.", "",
+             "| job | threads | points of stretches | plain file MB | segmented file MB | plain peak MiB | segmented peak MiB | difference |",
+             "|---|---|---|---|---|---|---|---|"]
+    for r in rows:
+        lines.append(f"| {r['name']} | {r['threads']} | {r['points']} | {r['plain_bytes'] / 1e6:.2f} | {r['segmented_bytes'] / 1e6:.2f} | "
+                     f"{r['plain_mib']:.2f} | {r['segmented_mib']:.2f} | {100 * (r['segmented_mib'] / r['plain_mib'] - 1):+.1f} % |")
+    return lines + [""]
+
+
 def page(result):
     programs, own = result["programs"], result["programs"]["lamina"]
     machine = result["machine"]
@@ -118,7 +194,7 @@ def page(result):
               f". By processor seconds: " + ", ".join(f"{NAMES[n]} {programs[n]['processor'] / own['processor']:.1f}" for n in NAMES) +
               f". Asked: {TIMES} times the fastest: {'met' if min(ratio.values()) >= TIMES else 'not met'}.",
               f"Peak memory {own['peak_mib']:.0f} MiB, the least of the others {least:.0f} MiB. {own['points'] / own['wall'] / 1e6:.2f} million toolpath "
-              f"points a second.", ""]
+              f"points a second.", "", *memory_lines(result["memory"])]
     with open(os.path.join(ROOT, "bench/extrude.md"), "w", encoding="utf-8") as file:
         file.write("\n".join(lines))
     print("\n".join(lines))
@@ -145,7 +221,8 @@ def main(arguments):
         make_parts.write_stl(part, make_parts.placed(axes, (1, 1, 1)))
     definitions = heights.cura_definitions(cache)
     result = {"date": time.strftime("%Y-%m-%d"), "commit": report.commit(ROOT), "machine": report.machine(cache),
-              "programs": run_all(options, os.path.join(programs, "lamina"), part, work, definitions)}
+              "programs": run_all(options, os.path.join(programs, "lamina"), part, work, definitions),
+              "memory": memory_of_segments(os.path.join(programs, "lamina"), work)}
     shutil.rmtree(work)
     report.save(ROOT, "extrude", result)
     page(result)

@@ -75,10 +75,16 @@ Status write_layer_table(const Job& job, const SlicePlan& plan, const std::array
   return write::write_file(report_name(job.output), std::as_bytes(std::span(text)));
 }
 
+/// A point of stored toolpaths comes to some 40 bytes of text.
+constexpr std::size_t kTextOfPoint = 48;
+/// A layer's text waits until those before it are written. What segmented lines come to beyond these bytes, and beyond
+/// what the plain filling takes, does not wait: such a layer is written a piece at a time when its turn comes.
+constexpr std::size_t kWaitingText = 1 << 17, kPieceOfText = 1 << 16;
+
 struct Work {
   SlicePlan::Work layer;
   Buffer<char> text;
-  LayerExtrusion sums;
+  std::optional<LayerExtrusion> sums;  // none: the layer's text is made when it is recorded
 };
 
 }  // namespace
@@ -179,8 +185,9 @@ Result<ExtrudeSummary> run_extrude(const Job& asked, const ProgressCallback& pro
     const auto from = Clock::now();
     if (Status status = plan->contours(first + i, work.layer); !status) return status.error();
     timed(plan_ns, from);
-    // A stretch takes some 40 bytes of text; how many a segmented line comes to is known when it is written.
-    return plan->fill_bytes_bound(first + i, work.layer, 48);
+    auto bytes = plan->fill_bytes_bound(first + i, work.layer, kTextOfPoint);
+    if (bytes && segments->any()) *bytes += 2 * kWaitingText;
+    return bytes;
   };
   const auto expand = [&](std::uint32_t i, Work& work) -> Result<std::uint64_t> {
     auto from = Clock::now();
@@ -190,21 +197,41 @@ Result<ExtrudeSummary> run_extrude(const Job& asked, const ProgressCallback& pro
     work.text.clear();
     const ScheduledLayer& layer = plan->layers()[first + i];
     const auto out = format->layer(layer.layer, summary.layers, work.text);
-    auto sums = extrude_layer(*plan, *segments, machine, layer, work.layer, *out);
+    const std::size_t most = segments->any() ? std::max(kWaitingText, kTextOfPoint * work.layer.paths.point.size()) : SIZE_MAX;
+    auto sums = extrude_layer(*plan, *segments, machine, layer, work.layer, {work.text, most, [] { return false; }}, *out);
     if (!sums) return sums.error();
     work.sums = *sums;
+    if (!work.sums) Buffer<char>().swap(work.text);
     timed(write_ns, from);
     return work.layer.bytes() + bytes_held(work.text);
   };
   LayerExtrusion sums;
   std::uint32_t done = 0, open_layers = 0, undivided_layers = 0;
   std::string first_open, first_undivided;
+  const auto write_pieces = [&](const ScheduledLayer& layer, Work& work) -> Status {
+    const auto from = Clock::now();
+    text.clear();
+    Status status;
+    const auto give = [&] {
+      status = file->append(text);
+      text.clear();
+      return status.ok();
+    };
+    const auto out = format->layer(layer.layer, summary.layers, text);
+    auto made = extrude_layer(*plan, *segments, machine, layer, work.layer, {text, kPieceOfText, give}, *out);
+    if (!made) return made.error();
+    if (!status) return status;
+    work.sums = *made;
+    timed(write_ns, from);
+    return file->append(text);
+  };
   const auto record = [&](std::uint32_t i, Work& work) -> Status {
-    if (Status status = file->append(work.text); !status) return status;
-    if (i == 0) summary.first_layer_points = work.sums.segments.points();
-    sums.add(work.sums);
+    if (Status status = work.sums ? file->append(work.text) : write_pieces(plan->layers()[first + i], work); !status) return status;
+    const SegmentCounts& counts = work.sums->segments;
+    if (i == 0) summary.first_layer_points = counts.points();
+    sums.add(*work.sums);
     const Layer& layer = plan->layers()[first + i].layer;
-    if (work.sums.segments.lines > 0 && work.sums.segments.thin == 0 && ++undivided_layers == 1) {
+    if (counts.lines > 0 && counts.thin == 0 && ++undivided_layers == 1) {
       first_undivided = fmt::format("in layer {} at z {:.3f} mm", first + i, mm(layer.plane()));
     }
     if (work.layer.report.gaps.open > 0 && ++open_layers == 1) {

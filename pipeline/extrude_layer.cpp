@@ -160,9 +160,11 @@ Status check_thin_stretches(const SegmentPlan& segments, const SlicePlan& plan) 
   return {};
 }
 
-Result<LayerExtrusion> extrude_layer(const SlicePlan& plan, const SegmentPlan& segments, const Extruder& machine,
-                                     const ScheduledLayer& scheduled, const SlicePlan::Work& work, write::LayerMoves& out) {
+Result<std::optional<LayerExtrusion>> extrude_layer(const SlicePlan& plan, const SegmentPlan& segments, const Extruder& machine,
+                                                    const ScheduledLayer& scheduled, const SlicePlan::Work& work, const TextRoom& room,
+                                                    write::LayerMoves& out) {
   LayerExtrusion sums;
+  bool goes_on = true;
   const Layer layer = scheduled.own();
   sums.porosity.solid_mm3 = square_mm(doubled_area(work.contours.contours)) * mm(layer.thickness);
   sums.points = work.paths.point.size();
@@ -182,11 +184,13 @@ Result<LayerExtrusion> extrude_layer(const SlicePlan& plan, const SegmentPlan& s
     Thickness before = Thickness::kReference;
     PlannedPorosity& volume = sums.porosity;
     segment::for_each_stretch(paths, *cut, [&](const Stretch& s) {
+      if (!goes_on) return;
       const MoveTable::Entry& entry = table.of(s);
       const double length = out.lay({s.from, s.to, s.kind, s.jump, entry.width, entry.area, entry.speed});
       volume.extruded_mm3 += length * entry.area;
       volume.ellipses_mm3 += length * entry.ellipse;
       volume.measured_mm3 += length * entry.measured;
+      if (room.text.size() > room.most) goes_on = room.grown();
       if (!cut->on) return;
       if (cut->segments(s.kind, s.line) && (s.line != line || s.kind != kind)) {
         ++sums.segments.lines;
@@ -204,9 +208,10 @@ Result<LayerExtrusion> extrude_layer(const SlicePlan& plan, const SegmentPlan& s
       before = s.thickness;
       at = s.to;
     });
+    if (!goes_on) return std::optional<LayerExtrusion>();
   }
   sums.totals = out.finish();
-  return sums;
+  return std::optional(sums);
 }
 
 }  // namespace lamina::pipeline

@@ -108,6 +108,33 @@ TEST_F(ExtrudeProgram, PointsOfFukudaAre346InEachOf79Layers) {
   EXPECT_EQ(json["segments"]["stretches"], 79 * 324);
 }
 
+TEST_F(ExtrudeProgram, MemoryOfASegmentedJobIsThatOfThePlainOne) {
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+  GTEST_SKIP() << "a sanitizer keeps freed memory: peaks were NOT compared";
+#endif
+  // Runs of both in turn, and the one in the middle: what a page more or less of a library does to one run decides nothing.
+  const auto share = [&](const std::string& job, const std::string& segments, double least_text) {
+    std::vector<double> plain, segmented;
+    for (int turn = 0; turn < 7; ++turn) {
+      for (auto* peaks : {&plain, &segmented}) {
+        const Outcome result = run("extrude " + job + (peaks == &plain ? " --fill raster" : " --fill segmented " + segments) +
+                               " --threads 1 --quiet --json -o " + file(peaks == &plain ? "plain.gcode" : "segmented.gcode"));
+        EXPECT_EQ(result.code, 0) << result.err;
+        peaks->push_back(result.json()["peak_resident_bytes"].get<double>());
+      }
+    }
+    EXPECT_GE(static_cast<double>(fs::file_size(file("segmented.gcode"))), least_text * static_cast<double>(fs::file_size(file("plain.gcode"))));
+    for (auto* peaks : {&plain, &segmented}) std::sort(peaks->begin(), peaks->end());
+    return segmented[3] / plain[3];
+  };
+  const std::string fukuda = block(74, 100, 20, 12.5) + " --machine marlin --layer 0.254 --walls 0 --bead 0.508 --bead-gap 2.4 --angle 0 --angle-step 0 "
+                             "--set fill.first_line_mm=0.508 --set fill.end_inset_mm=0.254";
+  EXPECT_LE(share(fukuda, "--segment-rule fukuda --thin 5 --thick 3", 2), 1.02);
+  // Two megabytes of text a layer: it does not wait until the layers before it are written.
+  const std::string wide = block(180, 180, 0.8, 10) + " --machine marlin --layer 0.2 --bead 0.4";
+  EXPECT_LE(share(wide, "--thin 0.5 --thick 0.5", 40), 1.02);
+}
+
 TEST_F(ExtrudeProgram, TestPiecesOfDiNisioHaveTwelveAndNineSegmentedLines) {
   for (const auto& [width, lines] : {std::pair{62, 12}, {48, 9}}) {
     const Outcome result = run("extrude " + block(width, 50, 0.3, 0) + " --machine anet-a8 --layer 0.3 --walls 1 --fill segmented --segment-rule thick-ends "
@@ -232,6 +259,19 @@ TEST_F(ExtrudeProgram, SameBytesForAnyThreads) {
   ASSERT_EQ(run(arguments + "--threads 1 -o " + file("a.gcode")).code, 0);
   ASSERT_EQ(run(arguments + "--threads 4 --memory 1M -o " + file("b.gcode")).code, 0);
   EXPECT_EQ(text_of(file("a.gcode")), text_of(file("b.gcode")));
+  // Layers of so many stretches that they are written a piece at a time.
+  const std::string wide = "extrude " + block(60, 60, 0.6, 6) + " --machine klipper --layer 0.2 --fill segmented --thin 0.2 --thick 0.2 --quiet --json ";
+  const Outcome one = run(wide + "--threads 1 -o " + file("a.gcode")), many = run(wide + "--threads 4 -o " + file("b.gcode"));
+  ASSERT_EQ(one.code, 0) << one.err;
+  ASSERT_EQ(many.code, 0) << many.err;
+  const std::string text = text_of(file("a.gcode"));
+  EXPECT_GT(text.size(), 3u << 17);
+  EXPECT_TRUE(text == text_of(file("b.gcode")));
+  const test::GcodeFile gcode = test::read_gcode(text);
+  ASSERT_EQ(gcode.error, "");
+  std::size_t beads = 0;
+  for (const auto& layer : gcode.layers) beads += layer.beads.size();
+  EXPECT_EQ(one.json()["moves"], beads);
 }
 
 TEST_F(ExtrudeProgram, WrongInputIsOneLineAndTheCodeOfUsage) {
