@@ -3,6 +3,8 @@
 #include <signal.h>
 #include <sys/file.h>
 #include <sys/mount.h>
+#include <sys/stat.h>
+#include <sys/wait.h>
 #include <fcntl.h>
 #include <unistd.h>
 
@@ -15,6 +17,7 @@
 #include <set>
 #include <sstream>
 #include <thread>
+#include <tuple>
 
 #include "pipeline/batch_list.h"
 #include "program.h"
@@ -216,46 +219,77 @@ TEST_F(JobsInBatch, QuietItStillSaysWhichJobsFail) {
   EXPECT_NE(outcome.err.find("nowhere.stl"), std::string::npos) << outcome.err;
 }
 
-TEST_F(JobsInBatch, KilledAtAnyMomentItIsResumedToTheSameBytesAndNothingIsDoneTwice) {
-  write_boxes(12);
-  const Words job = {"--with", "jet --bed 60x60 --dpi 600 --layer 0.01 --format png", "--jobs", "2", "--quiet"};
+TEST_F(JobsInBatch, KilledFiveTimesItIsResumedToTheSameBytesAndNothingIsDoneTwice) {
+  constexpr int kJobs = 12, kKills = 5;
+  write_boxes(kJobs);
+  const Words job = {"--with", "jet --bed 60x60 --dpi 600 --layer 0.008 --format png", "--jobs", "2", "--quiet"};
   Words parts;
-  for (int i = 10; i < 22; ++i) parts.push_back("part" + std::to_string(i) + ".stl");
+  for (int i = 10; i < 10 + kJobs; ++i) parts.push_back("part" + std::to_string(i) + ".stl");
   const auto batch = [&](const std::string& output, const Words& more) {
     Words words = parts;
     words.insert(words.end(), {"-o", output});
     words.insert(words.end(), more.begin(), more.end());
     return batch_of(words, job);
   };
-  const auto start = std::chrono::steady_clock::now();
+  const auto layers_in = [&](const std::string& output) {
+    const std::vector<std::string> files = files_below(directory_ / output);
+    return std::ranges::count_if(files, [](const std::string& file) { return file.ends_with(".png"); });
+  };
+  // Files that are written again, be it with the same bytes, get another number or time.
+  using Stamps = std::map<std::string, std::tuple<ino_t, time_t, long>>;
+  const auto stamps = [&](const std::string& place) {
+    Stamps found;
+    for (const std::string& file : files_below(directory_ / place)) {
+      struct stat status {};
+      EXPECT_EQ(::stat((directory_ / (place + "/" + file)).c_str(), &status), 0) << file;
+      found[file] = {status.st_ino, status.st_mtim.tv_sec, status.st_mtim.tv_nsec};
+    }
+    return found;
+  };
+  const auto times_ended = [&] {
+    std::map<std::string, int> times;
+    std::istringstream record(read_text(directory_ / "out/batch.jsonl"));
+    for (std::string line; std::getline(record, line);) {
+      const Json json = Json::parse(line, nullptr, false);
+      if (json.is_object() && json.contains("ended")) ++times[json["output"]];
+    }
+    return times;
+  };
   ASSERT_EQ(lamina(batch("whole", {})).code, 0);
-  const double whole = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  const double all = static_cast<double>(layers_in("whole"));
 
-  std::mt19937 random(std::random_device{}());
-  std::map<std::string, int> times_ended;
-  std::size_t kept = 0;
-  int killed = 0;
-  for (int attempt = 0; attempt < 5; ++attempt) {
-    const auto delay = std::chrono::duration<double>(whole * std::uniform_real_distribution<>(0.02, 0.5)(random));
+  // Each kill comes once so many layers are there, at whatever the batch happens to do then: the last one long before it
+  // could end.
+  std::mt19937 random(20261);
+  std::uniform_real_distribution<> within(0.1, 0.9);
+  std::map<std::string, Stamps> finished;
+  for (int kill = 0; kill < kKills; ++kill) {
+    const auto enough = static_cast<std::ptrdiff_t>(all * 0.75 * (kill + within(random)) / kKills);
+    const auto delay = std::chrono::duration<double, std::milli>(20 * within(random));
     const Outcome outcome = lamina(batch("out", {"--resume"}), [&](int process) {
+      siginfo_t ended{};
+      while (layers_in("out") < enough &&
+             (::waitid(P_PID, static_cast<id_t>(process), &ended, WEXITED | WNOHANG | WNOWAIT) != 0 || ended.si_pid == 0)) {
+        std::this_thread::sleep_for(std::chrono::milliseconds(3));
+      }
       std::this_thread::sleep_for(delay);
       ::kill(process, SIGKILL);
     });
-    killed += outcome.code == 128 + SIGKILL;
+    ASSERT_EQ(outcome.code, 128 + SIGKILL) << "kill " << kill << ": " << outcome.err;
+    ASSERT_LT(layers_in("out"), layers_in("whole"));
+    for (const auto& [name, times] : times_ended()) finished.try_emplace(name, stamps("out/" + name));
   }
+  EXPECT_GE(finished.size(), 4u);  // so the kills were spread over the jobs
+  EXPECT_LT(finished.size(), kJobs);
   ASSERT_EQ(lamina(batch("out", {"--resume"})).code, 0);
-  EXPECT_GE(killed, 1);
   EXPECT_EQ(tree("out"), tree("whole"));
-  std::istringstream record(read_text(directory_ / "out/batch.jsonl"));
-  for (std::string line; std::getline(record, line);) {
-    const Json json = Json::parse(line, nullptr, false);
-    if (json.is_object() && json.contains("ended")) ++times_ended[json["output"]];
-  }
-  EXPECT_EQ(times_ended.size(), 12u);
-  for (const auto& [name, times] : times_ended) EXPECT_EQ(times, 1) << name;
-  for (const std::string& name : outcomes("out")) kept += name == "kept";
+  for (const auto& [name, then] : finished) EXPECT_EQ(stamps("out/" + name), then) << name << " was written again";
+  EXPECT_EQ(times_ended().size(), kJobs);
+  for (const auto& [name, times] : times_ended()) EXPECT_EQ(times, 1) << name;
+  const Words last = outcomes("out");
+  EXPECT_EQ(std::ranges::count(last, "kept"), static_cast<std::ptrdiff_t>(finished.size()));
   EXPECT_EQ(lamina(batch("out", {"--resume"})).code, 0);
-  EXPECT_EQ(outcomes("out"), Words(12, "kept"));
+  EXPECT_EQ(outcomes("out"), Words(kJobs, "kept"));
 }
 
 /// A file system of its own, so small that it is soon full.
