@@ -53,6 +53,17 @@ std::string reason_of(std::string said) {
   return one_line(said);
 }
 
+/// Whether a command says that every layer of its job was there already.
+bool kept_all_layers(const std::string& json) {
+  const nlohmann::json said = nlohmann::json::parse(json, nullptr, false);
+  return said.is_object() && said.value("layers_planned", 1) == 0 && said.value("layers_kept", 0) > 0;
+}
+
+bool holds_something(const std::string& output) {
+  std::error_code error;
+  return !output.empty() && std::filesystem::exists(output, error) && !std::filesystem::is_empty(output, error);
+}
+
 /// A job's place in the queue; lives until the last thread that knows it has ended.
 struct Slot {
   enum class State { kWaiting, kAtWork, kEnded } state = State::kWaiting;
@@ -195,9 +206,9 @@ class Queue : public std::enable_shared_from_this<Queue> {
     slot.state = Slot::State::kEnded;
     --at_work_;
     need_ -= jobs_[i].need_bytes;
-    const bool over = result.outcome != BatchOutcome::kStopped && result.outcome != BatchOutcome::kKept;
+    const bool news = result.outcome != BatchOutcome::kStopped && (result.outcome != BatchOutcome::kKept || result.recognized);
     slot.result = std::move(result);
-    if (over) note(record_.ended(jobs_[i], static_cast<std::uint32_t>(i + 1), slot.result));
+    if (news) note(record_.ended(jobs_[i], static_cast<std::uint32_t>(i + 1), slot.result));
     if (options_.fail_fast && has_failed(slot.result)) stop_all();
     changed_.notify_all();
   }
@@ -227,11 +238,16 @@ class Queue : public std::enable_shared_from_this<Queue> {
         return result;
       }
     }
+    const bool foreign = !options_.overwrite && (earlier == nullptr || earlier->foreign) && holds_something(job.output);
     {
       const std::lock_guard lock(mutex_);
-      note(record_.begun(job, static_cast<std::uint32_t>(i + 1)));
+      note(record_.begun(job, static_cast<std::uint32_t>(i + 1), foreign));
     }
-    result = run_command(job, slot, arguments_now(job, earlier));
+    result = run_command(job, slot, arguments_now(job, earlier, foreign));
+    if (foreign && options_.resume && !job.can_resume && job.can_overwrite && result.code == static_cast<int>(Fault::kUsage)) {
+      result.reason += fmt::format("; the batch has no record of it: remove {} to have it done again", job.output);
+    }
+    result.recognized = foreign && job.can_resume && result.outcome == BatchOutcome::kDone && kept_all_layers(result.json);
     if (result.outcome == BatchOutcome::kDone && !job.output.empty()) {
       if (Result<OutputDigest> digest = digest_output(job.output)) {
         result.output = *digest;
@@ -241,15 +257,19 @@ class Queue : public std::enable_shared_from_this<Queue> {
         result.reason = digest.error().message;
       }
     }
+    if (result.outcome == BatchOutcome::kDone && result.recognized) result.outcome = BatchOutcome::kKept;
     return result;
   }
 
-  /// What an earlier run of this batch left of the same job is continued; what it left of another one is replaced.
-  std::vector<std::string> arguments_now(const BatchJob& job, const BatchRecord::Earlier* earlier) const {
+  /// What an earlier run of this batch left of the same job is continued; what it left of another one is replaced. What is
+  /// there without a record is for the command to recognize as its own, or to refuse.
+  std::vector<std::string> arguments_now(const BatchJob& job, const BatchRecord::Earlier* earlier, bool foreign) const {
     std::vector<std::string> arguments = job.arguments;
     const auto add = [&](const char* flag) { arguments.insert(std::ranges::find(arguments, "--"), flag); };
     const bool same = earlier != nullptr && earlier->begun == job.id;
-    if (same && job.can_resume) {
+    if (foreign) {
+      if (options_.resume && job.can_resume) add("--resume");
+    } else if (same && job.can_resume) {
       add("--resume");
     } else if ((options_.overwrite || earlier != nullptr) && job.can_overwrite) {
       add("--overwrite");

@@ -32,7 +32,8 @@ void read_line(const std::string& line, std::map<std::string, BatchRecord::Earli
   BatchRecord::Earlier entry;
   if (!read_hex(id, entry.begun)) return;
   if (ended) {
-    entry.ended = text("outcome") == outcome_name(BatchOutcome::kDone);
+    const std::string outcome = text("outcome");
+    entry.ended = outcome == outcome_name(BatchOutcome::kDone) || outcome == outcome_name(BatchOutcome::kKept);
     entry.result.outcome = BatchOutcome::kDone;
     entry.result.seconds = json.contains("seconds") && json["seconds"].is_number() ? json["seconds"].get<double>() : 0;
     entry.result.output.files = whole("files");
@@ -41,7 +42,9 @@ void read_line(const std::string& line, std::map<std::string, BatchRecord::Earli
     if (json.contains("result")) entry.result.json = json["result"].dump();
   }
   const std::string place = text("output");
-  earlier[place.empty() ? id : place] = std::move(entry);
+  BatchRecord::Earlier& known = earlier[place.empty() ? id : place];
+  entry.foreign = ended ? known.foreign && !entry.ended : json.contains("foreign");
+  known = std::move(entry);
 }
 
 }  // namespace
@@ -128,8 +131,9 @@ Status BatchRecord::append(std::string line) {
   return Error{Fault::kOutput, fmt::format("{}: {}", path_, std::strerror(wrote < 0 ? errno : ENOSPC))};
 }
 
-Status BatchRecord::begun(const BatchJob& job, std::uint32_t number) {
-  return append(fmt::format("{{\"begun\":\"{}\",\"job\":{},\"output\":{}}}", hex(job.id), number, json_string(job.place)));
+Status BatchRecord::begun(const BatchJob& job, std::uint32_t number, bool foreign) {
+  return append(fmt::format("{{\"begun\":\"{}\",\"job\":{},\"output\":{}{}}}", hex(job.id), number, json_string(job.place),
+                            foreign ? ",\"foreign\":true" : ""));
 }
 
 Status BatchRecord::ended(const BatchJob& job, std::uint32_t number, const BatchResult& result) {

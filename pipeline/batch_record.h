@@ -19,7 +19,7 @@ namespace lamina::pipeline {
 
 enum class BatchOutcome {
   kDone,       // ended with exit code 0
-  kKept,       // done in an earlier run, and its output is still what it was
+  kKept,       // done before, and its output is still what it was
   kFailed,     // ended with another exit code
   kTimeLimit,  // stopped because it took too long
   kStopped,    // stopped because the batch was
@@ -35,6 +35,7 @@ struct BatchResult {
   std::string json;         // what the command printed: a JSON value, or "" if nothing
   double seconds = 0;
   OutputDigest output;
+  bool recognized = false;  // kept although no record knew of it: its directory holds the finished job
 };
 
 /// One JSON object, without the line's end: {"job":..., "outcome":..., ...}.
@@ -46,6 +47,7 @@ class BatchRecord {
   struct Earlier {
     Hash128 begun;                   // the job that wrote there last
     bool ended = false;              // with exit code 0
+    bool foreign = false;            // it found something there that no batch had written, and did not end well
     BatchResult result;              // if it ended
   };
 
@@ -61,7 +63,8 @@ class BatchRecord {
   const Earlier* earlier(const BatchJob& job) const;
 
   // --- from one thread at a time; errors  kOutput
-  Status begun(const BatchJob& job, std::uint32_t number);
+  /// foreign  what lies in its place is not on record: a later run must not take it for its own
+  Status begun(const BatchJob& job, std::uint32_t number, bool foreign);
   Status ended(const BatchJob& job, std::uint32_t number, const BatchResult& result);
 
  private:

@@ -356,6 +356,51 @@ TEST_F(JobsInBatch, ResumeDoesAgainWhatHasChangedSince) {
   EXPECT_EQ(lamina(batch_of({"part10.stl", "-o", "out", "--overwrite"})).code, 0);
 }
 
+TEST_F(JobsInBatch, WithoutItsRecordABatchRecognizesWhatIsDoneAndLeavesOtherJobsAlone) {
+  write_boxes(6);
+  const std::string options = " --bed 60x60 --dpi 300 --layer 0.1 --quiet -o ";
+  const auto list = [&](const std::string& name, const std::string& fourth) {
+    write_text(directory_ / name, "jet part10.stl" + options + "a\njet part11.stl" + options + "b\njet part12.stl" + options + "c\njet " +
+                                      fourth + options + "d\nslice part14.stl --layer 0.1 --quiet -o e\ninfo part14.stl\njet part15.stl" +
+                                      options + "f\n");
+  };
+  list("list.txt", "part13.stl");
+  ASSERT_EQ(lamina({"batch", "list.txt", "-o", "whole"}).code, 0);
+  // One run by hand before there was a list, one cut short, one damaged, one of another part; the record is gone.
+  ASSERT_EQ(lamina({"batch", "list.txt", "-o", "out"}).code, 0);
+  fs::remove_all(directory_ / "out/a");
+  ASSERT_EQ(lamina({"jet", "part10.stl", "--bed", "60x60", "--dpi", "300", "--layer", "0.1", "--quiet", "-o", "out/a"}).code, 0);
+  fs::rename(directory_ / "out/b/manifest.json", directory_ / "out/b/manifest.json.part");
+  fs::remove(directory_ / "out/b/layers/000007.tif");
+  write_text(directory_ / "out/c/layers/000003.tif", "damage");
+  fs::remove_all(directory_ / "out/f");
+  fs::remove(directory_ / "out/batch.jsonl");
+  list("other.txt", "part15.stl");
+  const std::string others = tree_text(directory_ / "out/d");
+  Outcome outcome = lamina({"batch", "other.txt", "-o", "out", "--resume"});
+  EXPECT_EQ(outcome.code, 2) << outcome.err;
+  EXPECT_EQ(outcomes("out"), (Words{"kept", "done", "done", "failed", "failed", "done", "done"})) << outcome.err;
+  const Json json = summary("out");
+  EXPECT_NE(json["jobs"][3]["reason"].get<std::string>().find("out/d/manifest.json: belongs to another job"), std::string::npos) << outcome.err;
+  EXPECT_NE(json["jobs"][4]["reason"].get<std::string>().find("remove out/e to have it done again"), std::string::npos) << outcome.err;
+  EXPECT_EQ(tree_text(directory_ / "out/d"), others);
+  // Asking twice does not make it the batch's own.
+  const std::string slices = tree_text(directory_ / "out/e");
+  EXPECT_EQ(lamina({"batch", "other.txt", "-o", "out", "--resume"}).code, 2);
+  EXPECT_EQ(outcomes("out"), (Words{"kept", "kept", "kept", "failed", "failed", "kept", "kept"}));
+  EXPECT_EQ(tree_text(directory_ / "out/d") + tree_text(directory_ / "out/e"), others + slices);
+  fs::remove_all(directory_ / "out/e");
+  outcome = lamina({"batch", "list.txt", "-o", "out", "--resume"});
+  EXPECT_EQ(outcome.code, 0) << outcome.err;
+  EXPECT_EQ(outcomes("out"), (Words{"kept", "kept", "kept", "kept", "done", "kept", "kept"})) << outcome.err;
+  EXPECT_EQ(tree("out"), tree("whole"));
+  // Without --resume nothing that is there is taken for the batch's own.
+  fs::remove(directory_ / "out/batch.jsonl");
+  outcome = lamina({"batch", "list.txt", "-o", "out", "--quiet"});
+  EXPECT_EQ(outcome.code, 2);
+  EXPECT_NE(outcome.err.find("out/a/manifest.json: a finished job"), std::string::npos) << outcome.err;
+}
+
 TEST_F(JobsInBatch, TwoBatchesInOneDirectoryAreRefused) {
   write_boxes(1);
   fs::create_directories(directory_ / "out");
