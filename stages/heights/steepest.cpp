@@ -18,7 +18,7 @@ namespace {
 // keeps the table small.
 class RangeRaiser {
  public:
-  static constexpr std::uint32_t kLevels = 8;
+  static constexpr std::uint32_t kLevels = 12;
 
   explicit RangeRaiser(std::uint32_t count)
       : count_(count), fine_(make_levels(count, kLevels)), coarse_(make_levels((count >> kBlockBits) + 1, 32)) {}
