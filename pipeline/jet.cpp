@@ -146,6 +146,9 @@ Result<JetSummary> run_jet(const Job& asked, const ProgressCallback& progress, c
   const Result<heights::LayerTable> decided = layer_table(job, *scene);
   if (!decided) return decided.error();
   const heights::LayerTable& table = *decided;
+  Result<std::string> steps = check_build_steps(job, table);
+  if (!steps) return steps.error();
+  if (!steps->empty()) summary.warnings.push_back(std::move(*steps));
   const auto range = layer_range(job, table.size());
   if (!range) return range.error();
   const ManifestHead head = make_head(job, scene->parts, table.size(), *range, *materials);

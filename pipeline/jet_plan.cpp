@@ -70,6 +70,7 @@ Result<JetPlan> JetPlan::make(const Job& job) {
   Result<heights::LayerTable> table = layer_table(state.job, state.scene);
   if (!table) return table.error();
   state.table = std::move(*table);
+  if (const Result<std::string> steps = check_build_steps(state.job, state.table); !steps) return steps.error();
   Result<Materials> materials = materials_of(state.job);
   if (!materials) return materials.error();
   state.materials = std::move(*materials);

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "pipeline/machine_profile.h"
@@ -82,10 +83,6 @@ Status resolve_machine(Job& job) {
     return wrong("bed.size_mm", fmt::format("the bed of {} is {:g} x {:g} mm; leave it out or change the profile",
                                             machine.name, machine.bed.size_mm[0], machine.bed.size_mm[1]));
   }
-  if (job.layer_mm * 1000 < machine.motion.layer_step_um * (1 - 1e-9)) {
-    return wrong("layers.thickness_mm", fmt::format("{:g} mm is less than a step of {}, {:g} mm; use thicker layers",
-                                                    job.layer_mm, machine.name, machine.motion.layer_step_um / 1000));
-  }
   job.bed_mm = machine.bed.size_mm;
   request.resolved = std::make_shared<const ResolvedMachine>(std::move(*resolved));
   return {};
@@ -111,6 +108,29 @@ Status check_reach(const Job& job, const Scene& scene) {
                                             mm(outside->place.z), outside->beyond_mm, machine.name)};
   }
   return {};
+}
+
+Result<std::string> check_build_steps(const Job& job, const heights::LayerTable& table) {
+  if (!job.machine.resolved) return std::string();
+  const Machine& machine = job.machine.resolved->machine;
+  const std::int64_t step = std::max<std::int64_t>(1, std::llround(machine.motion.layer_step_um * 1000));
+  std::uint32_t off = 0, first = 0;
+  std::int64_t most = 0;
+  for (std::uint32_t i = 0; i < table.size(); ++i) {
+    const Layer layer = table[i];
+    if (layer.thickness < step) {
+      return Error{Fault::kUsage, fmt::format("layer {}: {:g} mm is less than a step of {}, {:g} mm; use thicker layers", i,
+                                              mm(layer.thickness), machine.name, mm(step))};
+    }
+    const std::int64_t over = (std::int64_t{layer.bottom} + layer.thickness) % step;
+    if (over == 0) continue;
+    if (off++ == 0) first = i;
+    most = std::max(most, std::min(over, step - over));
+  }
+  if (off == 0) return std::string();
+  return fmt::format("{} of {} layers, first {}, end beside the {:g} mm steps of {}'s build vat, by up to {:g} mm, and cannot end "
+                     "there on the machine; thicknesses that are whole steps can", off, table.size(), first, mm(step),
+                     machine.name, mm(most));
 }
 
 }  // namespace lamina::pipeline

@@ -165,11 +165,31 @@ TEST_F(PrintJobs, WhatTheMachineCannotDoIsRefusedInOneLine) {
   refused([](Job& j) { j.parts[0].at_mm = {{0.0, 0.0}}; }, "outside of the bed of nuferbj");
   refused([](Job& j) { j.parts[0].scale = {6, 6, 6}; }, "larger than the bed");
   refused([](Job& j) { j.parts[0].bottom_mm = 90; }, "above the build height of nuferbj, 100 mm");
-  refused([](Job& j) { j.layer_mm = 0.004; }, "less than a step of nuferbj");
+  refused([](Job& j) { j.layer_mm = 0.004; }, "layer 0: 0.004 mm is less than a step of nuferbj");
+  refused([](Job& j) {
+    j.heights.mode = heights::Mode::kCusp;
+    j.heights.thickness_mm = "0.003..0.1";
+    j.heights.cusp_mm = 0.01;
+  }, "is less than a step of nuferbj");
   refused([](Job& j) { j.machine.scan_speed_mm_s = 500; }, "fires a nozzle");
   refused([](Job& j) { j.machine.profile = "nuferbk"; }, "did you mean 'nuferbj'");
   refused([](Job& j) { j.dpi = {300, 300}, j.machine.dpi_given = true; }, "300 dpi across the scan: the head of nuferbj reaches 262.01");
   refused([](Job& j) { j.machine.blocked = std::vector<std::uint32_t>{128}; }, "there is no nozzle 128");
+}
+
+TEST_F(PrintJobs, LayersThatEndBetweenStepsOfTheBuildVatAreTold) {
+  Job made = job("parameter_quality_nut.stl", 1, "nuferbj", "steps");
+  made.dry_run = true;
+  made.layer_mm = 0.2;
+  auto summary = run(made);
+  ASSERT_TRUE(summary.ok()) << summary.error().message;
+  EXPECT_TRUE(summary->warnings.empty());
+  made.layer_mm = 0.201;
+  summary = run(made);
+  ASSERT_TRUE(summary.ok()) << summary.error().message;
+  ASSERT_EQ(summary->warnings.size(), 1u);
+  EXPECT_NE(summary->warnings[0].find("first 0, end beside the 0.005 mm steps of nuferbj's build vat, by up to 0.002 mm"),
+            std::string::npos) << summary->warnings[0];
 }
 
 }  // namespace
