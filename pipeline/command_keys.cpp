@@ -31,8 +31,29 @@ void add_options(std::span<const Key<Target>> keys, const KeyChoice& choice, con
   }
 }
 
+/// Whether a word of --fill is no pattern: it sets another key.
+bool is_word_of_other_key(std::string_view word) {
+  return word == "segmented" || word == "nonzero" || word == "positive" || word == "evenodd";
+}
+
 Error at_option(std::string_view flag, const std::string& what) {
   return {Fault::kUsage, fmt::format("{}: {}", flag.substr(flag.rfind(',') + 1), what)};
+}
+
+/// Options that leave each other without a meaning.
+Status check_together(const KeyChoice& choice, const Arguments& arguments, const Job& job) {
+  const std::string fill = arguments.text("--fill"), pattern = arguments.text("--pattern");
+  if (choice.has("segment", "fill") && !fill.empty() && !pattern.empty() && fill != pattern && !is_word_of_other_key(fill)) {
+    return at_option("--fill", fmt::format("{}, but --pattern {}: two patterns; give one of them", fill, pattern));
+  }
+  if (job.segment.all.on || !job.segment.by_height.empty()) return {};
+  for (const JobKey& key : job_keys()) {
+    if (key.section != "segment" || key.name == "fill" || key.name == "on" || key.flag.empty()) continue;
+    if (choice.has(key.section, key.name) && arguments.has(key.flag)) {
+      return at_option(key.flag, "is of segmented lines, and nothing is segmented; add --fill segmented");
+    }
+  }
+  return {};
 }
 
 }  // namespace
@@ -86,6 +107,7 @@ Result<Job> read_job_options(const KeyChoice& choice, const Arguments& arguments
     }
     for (PartRequest& part : job.parts) key.read(arguments.text(key.flag), part);
   }
+  if (Status status = check_together(choice, arguments, job); !status) return status.error();
   return job;
 }
 

@@ -32,6 +32,7 @@ struct CommandSpec {
   std::string operand, operand_meaning;  // "PART", "..."; as many as there are
   std::vector<OptionSpec> options;
   std::string closing;  // examples, at the end of the help
+  std::vector<std::pair<std::string_view, std::string_view>> absent;  // options of other commands, and why this one has none
 };
 
 /// What stands on the command line, as text.

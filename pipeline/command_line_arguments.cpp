@@ -78,6 +78,9 @@ Result<Arguments> read_arguments(const CommandSpec& spec, const std::vector<std:
   for (const std::string& extra : app.remaining()) {
     if (extra == "--") continue;
     const std::string_view name = std::string_view(extra).substr(0, extra.find('='));
+    for (const auto& [flag, why] : spec.absent) {
+      if (name == flag) return wrong(fmt::format("{}: {}", flag, why));
+    }
     return wrong(extra.starts_with('-') ? fmt::format("{}: no such option{}", name, suggest(name, known))
                                         : fmt::format("'{}': not expected here", extra));
   }

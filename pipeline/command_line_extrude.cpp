@@ -31,6 +31,7 @@ CommandSpec extrude_spec() {
                                       {"--quiet", "say nothing but errors"}}) {
     spec.options.push_back({flag, "", meaning, "", "Run"});
   }
+  spec.absent = {{"--shard", kNoShards}};
   spec.closing = "Machines:\n";
   for (const ShippedExtruder& shipped : shipped_extruders()) {
     const auto profile = read_extruder(shipped.text, std::string(shipped.name));

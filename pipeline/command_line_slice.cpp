@@ -24,6 +24,7 @@ CommandSpec slice_spec() {
   spec.operand = "PART";
   spec.operand_meaning = "STL, OBJ or 3MF files, STL and OBJ gzipped too; they replace the parts of --job";
   add_key_options(kSliceKeys, spec);
+  spec.absent = {{"--shard", kNoShards}};
   for (const auto& [flag, meaning] : {std::pair{"--overwrite", "replace an earlier job in the directory"},
                                       {"--dry-run", "load, place and index, write nothing"},
                                       {"--json", "print the summary as one JSON object on stdout"},

@@ -127,6 +127,7 @@ Result<ExtrudeSummary> run_extrude(const Job& asked, const ProgressCallback& pro
   if (!segments) return segments.error();
 
   ExtrudeSummary summary;
+  if (job.shard) return Error{Fault::kUsage, fmt::format("run.shard: {}", kNoShards)};
   summary.output = job.output;
   summary.machine = machine.name;
   const auto plan = SlicePlan::make(job, progress);

@@ -1,6 +1,9 @@
 // pipeline/fill_keys.cpp: the keys of one filling: names, how they are read and written.
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <iterator>
+
 #include "pipeline/fill_request.h"
 #include "pipeline/key_text.h"
 
@@ -139,11 +142,23 @@ const FillKey kKeys[] = {
      [](const Settings& s) { return number_text(s.cell_mm); }, Form::kBare},
 };
 
+constexpr Text kDistanceKeys[] = {"distance_mm", "gap_formula", "gap_by_height", "gap_mm"};
+
 }  // namespace
 
 std::span<const FillKey> fill_settings_keys() { return kKeys; }
 
+std::vector<std::string_view> distance_keys(const FillSettings& settings) {
+  std::vector<std::string_view> names;
+  if (!settings.distance_mm.empty()) names.push_back("distance_mm");
+  if (!settings.gap_formula.empty()) names.push_back("gap_formula");
+  if (!settings.gap_by_height.empty()) names.push_back("gap_by_height");
+  if (settings.gap_mm != std::vector<double>{0}) names.push_back("gap_mm");
+  return names;
+}
+
 std::string read_fill_changes(std::string_view text, FillSettings& settings) {
+  std::vector<std::string_view> distances;
   for (const std::string_view change : split(text, " ")) {
     if (change.empty()) continue;
     const std::size_t equals = change.find('=');
@@ -159,7 +174,17 @@ std::string read_fill_changes(std::string_view text, FillSettings& settings) {
     if (const std::string wrong = found->read(change.substr(equals + 1), settings); !wrong.empty()) {
       return fmt::format("{}: {}", name, wrong);
     }
+    if (std::ranges::find(kDistanceKeys, name) != std::end(kDistanceKeys)) distances.push_back(name);
   }
+  if (distances.empty()) return {};
+  for (const std::string_view other : distances) {
+    if (other == distances[0]) continue;
+    return fmt::format("{} and {} both say how far lines lie from each other; give one of them", distances[0], other);
+  }
+  if (distances[0] != "distance_mm") settings.distance_mm.clear();
+  if (distances[0] != "gap_formula") settings.gap_formula.clear();
+  if (distances[0] != "gap_by_height") settings.gap_by_height.clear();
+  if (distances[0] != "gap_mm") settings.gap_mm = {0};
   return {};
 }
 

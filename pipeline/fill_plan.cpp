@@ -64,6 +64,27 @@ std::string_view trimmed(std::string_view text) {
   return text;
 }
 
+/// A key as a job file and a command line name it.
+std::string named(std::string_view name) {
+  for (const FillKey& key : fill_settings_keys()) {
+    if (key.name == name && !key.flag.empty()) return fmt::format("fill.{} ({})", name, key.flag);
+  }
+  return fmt::format("fill.{}", name);
+}
+
+/// Keys that cannot both hold. returns "" or what is wrong
+std::string contradiction(const FillSettings& settings) {
+  const auto keys = distance_keys(settings);
+  if (keys.size() > 1) {
+    return fmt::format("{} and {} both say how far lines lie from each other; give one of them", named(keys[0]), named(keys[1]));
+  }
+  if (!settings.distance_mm.empty() && settings.group > 1) {
+    return fmt::format("{} and {}: groups are of beads with gaps between; write the distances of a group one by one, or give gaps", named("distance_mm"),
+                       named("group"));
+  }
+  return {};
+}
+
 }  // namespace
 
 const infill::FillParameters& FillPlan::at(std::int64_t height) const {
@@ -83,7 +104,9 @@ Result<FillPlan> plan_filling(const FillRequest& request, const std::string& par
     return Error{Fault::kUsage, fmt::format("{}: {}", key, what)};
   };
   FillSettings settings = request.all;
+  if (const std::string what = contradiction(settings); !what.empty()) return Error{Fault::kUsage, what};
   if (const std::string what = read_fill_changes(part_changes, settings); !what.empty()) return wrong("part.fill", what);
+  if (const std::string what = contradiction(settings); !what.empty()) return wrong("part.fill", what);
   FillPlan plan;
   plan.base = parameters_of(settings);
   if (Status status = infill::check(plan.base); !status) {
@@ -110,6 +133,7 @@ Result<FillPlan> plan_filling(const FillRequest& request, const std::string& par
     if (const std::string what = read_fill_changes(entry.substr(space), own); !what.empty()) {
       return wrong("fill.by_height", fmt::format("{}: {}", heights, what));
     }
+    if (const std::string what = contradiction(own); !what.empty()) return wrong("fill.by_height", fmt::format("{}: {}", heights, what));
     FillPlan::Range range{nm_of(from), nm_of(to), parameters_of(own)};
     if (Status status = infill::check(range.parameters); !status) {
       return wrong("fill.by_height", fmt::format("{}: {}", heights, status.error().message));

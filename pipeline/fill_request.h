@@ -50,8 +50,13 @@ struct FillKey {
 };
 std::span<const FillKey> fill_settings_keys();
 
-/// Sets keys from "gap_mm=0 angle_deg=90". returns "" or what is wrong
+/// Sets keys from "gap_mm=0 angle_deg=90". What these say of the distances between lines takes the place of what held
+/// before. returns "" or what is wrong
 std::string read_fill_changes(std::string_view text, FillSettings& settings);
+
+/// The keys that say how far lines lie from each other and are not as they are without being set; at most one of
+/// distance_mm, gap_formula, gap_by_height and gap_mm can hold.
+std::vector<std::string_view> distance_keys(const FillSettings& settings);
 
 /// What fills a part at each height.
 struct FillPlan {

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "pipeline/extrude_request.h"
@@ -82,6 +83,10 @@ PixelGrid grid_of(const Job& job);
 /// Whether every value of a job is within what can be planned, and agrees with the others; for jobs from anywhere.
 /// errors  kUsage, one line that begins with the key
 Status check_job(const Job& job);
+
+/// Why jobs of one file refuse run.shard.
+inline constexpr std::string_view kNoShards =
+    "shards are of images, which lamina merge joins; a file of all layers is one, some of them are --layers A:B";
 
 /// The layers [first, last) that a job plans of all that its parts need: all, job.layers, or its shard. Shards are
 /// the equal shares floor(count * i / n); an end of job.layers beyond the last layer is the last layer.

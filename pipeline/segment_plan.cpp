@@ -101,9 +101,16 @@ std::string list_text(const std::vector<double>& values) {
 }
 
 /// Whether a filling leaves the distances between its lines to the segmentation.
-bool leaves_distances(const FillSettings& fill) {
-  return fill.distance_mm.empty() && fill.gap_formula.empty() && fill.gap_by_height.empty() &&
-         fill.gap_mm == std::vector<double>{0} && fill.group == 1;
+bool leaves_distances(const FillSettings& fill) { return distance_keys(fill).empty() && fill.group == 1; }
+
+/// Spacings of a segmentation beside distances that the filling gives itself.
+Status check_spacings(const SegmentSettings& settings, const FillSettings& fill, const std::string& where) {
+  if (!settings.on || leaves_distances(fill)) return {};
+  const Text key = settings.spacing_sc_mm ? "spacing_sc_mm" : settings.spacing_cc_mm ? "spacing_cc_mm" : settings.gap_mm != 0 ? "gap_mm" : "";
+  if (key.empty()) return {};
+  const auto keys = distance_keys(fill);
+  return Error{Fault::kUsage, fmt::format("segment.{}: {}fill.{} says how far lines lie from each other; leave out one of them", key, where,
+                                          keys.empty() ? Text("group") : keys.front())};
 }
 
 struct Entry {
@@ -161,6 +168,7 @@ Result<SegmentPlan> plan_segments(const SegmentRequest& request, const segment::
   if (!whole) return plan;
   if (fill.all.pattern == infill::Pattern::kNone) fill.all.pattern = infill::Pattern::kRaster;
   const bool spaced = leaves_distances(fill.all);
+  if (Status status = check_spacings(request.all, fill.all, ""); !status) return status.error();
   auto fillings = read_entries(fill.by_height, "fill.by_height");
   if (!fillings) return fillings.error();
   if (plan.base.settings.on && spaced) fill.all.distance_mm = distances_of(plan.base.plan, plan.base.settings.first);
@@ -170,6 +178,7 @@ Result<SegmentPlan> plan_segments(const SegmentRequest& request, const segment::
     if (const std::string what = read_changes(entry.changes, settings); !what.empty()) {
       return Error{Fault::kUsage, fmt::format("segment.by_height: {}: {}", entry.heights, what)};
     }
+    if (Status status = spaced ? Status() : check_spacings(settings, fill.all, entry.heights + ": "); !status) return status.error();
     auto range = resolve(settings, calibration, fill.all.width_mm);
     if (!range) return Error{Fault::kUsage, fmt::format("segment.by_height: {}: {}", entry.heights, range.error().message)};
     range->from = entry.from;
@@ -194,15 +203,6 @@ Result<SegmentPlan> plan_segments(const SegmentRequest& request, const segment::
         fillings->push_back({entry.from, entry.to, entry.heights, distance});
       } else if (!own_gap) {
         same->changes = distance + " " + same->changes;
-      } else if (same->changes.find("distance_mm") == std::string::npos) {
-        FillSettings own = fill.all;
-        own.distance_mm.clear();
-        if (const std::string what = read_fill_changes(same->changes, own); !what.empty()) {
-          return Error{Fault::kUsage, fmt::format("fill.by_height: {}: {}", same->heights, what)};
-        }
-        std::vector<double> distances;
-        for (const double gap : own.gap_mm) distances.push_back(own.width_mm + gap);
-        same->changes += " distance_mm=" + list_text(distances);
       }
     }
     plan.ranges.push_back(std::move(*range));

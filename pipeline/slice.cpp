@@ -97,6 +97,7 @@ Result<SliceSummary> run_slice(const Job& job, const ProgressCallback& progress,
   if (job.heights.per_part) {
     return Error{Fault::kUsage, "--per-part: a file of slices has one table of layers for all parts; leave it out"};
   }
+  if (job.shard) return Error{Fault::kUsage, fmt::format("run.shard: {}", kNoShards)};
   const auto plan = SlicePlan::make(job, progress);
   if (!plan) return plan.error();
   if (cancel) return Error{Fault::kInterrupted, "interrupted before the first layer; nothing was written"};

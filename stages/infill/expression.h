@@ -11,8 +11,9 @@ namespace lamina::infill {
 /// A formula over these variables, all numbers:
 ///   z  mm, middle of the layer above the part's bottom      h  the same as a share of the part's height, 0 .. 1
 ///   n  number of the layer, from 1                          a  degrees, direction of its lines
-///   i  number of the line before the gap, from 0            s  mm, its distance from the part's side, across the lines
+///   i  number of the line before the gap                    s  mm, its distance from the part's side, across the lines
 ///   u  the same as a share of the part's extent, 0 .. 1
+/// (s and u of what lies outside of the part are those of its nearer side)
 /// with + - * / ^, comparisons, `c ? x : y`, min, max, abs, sqrt, exp, ln, sin, cos, tan, rint and _pi (muParser 2.3).
 /// Names are not assigned to. Not shared between threads.
 class Expression {

@@ -78,8 +78,11 @@ class Distances {
       variables.n = context_.layer.index + 1.0;
       variables.a = static_cast<double>(layer_angle(parameters_, context_.layer.index)) * 1e-6;
       variables.i = static_cast<double>(i);
-      variables.s = mm(place);
-      variables.u = length > 0 ? static_cast<double>(place) / length : 0;
+      // A line that would lie outside of the part counts as one at its side: so does the wall that a part without walls
+      // has half a bead before its surface. A formula has to hold within the part only.
+      const std::int64_t within = std::clamp<std::int64_t>(place, 0, extent_.length);
+      variables.s = mm(within);
+      variables.u = length > 0 ? static_cast<double>(within) / length : 0;
       const auto value = (*expression_)(variables);
       if (!value) return value.error();
       if (std::abs(*value) > mm(kNmReach)) {

@@ -105,6 +105,34 @@ TEST(Fill, SameBytesFromAnyThreadInAnyOrder) {
   }
 }
 
+TEST(Fill, AFormulaHasToHoldWithinThePartOnly) {
+  const Contours& square = outline("square");
+  FillParameters parameters;
+  parameters.walls = 0;
+  parameters.gap_expression = "0.1 + sqrt(s) * sqrt(1 - u) / 10";
+  parameters.stagger = {-300'000};
+  for (const Pattern pattern : {Pattern::kRaster, Pattern::kContour, Pattern::kHoneycomb, Pattern::kQuatrefoil}) {
+    parameters.pattern = pattern;
+    if (pattern == Pattern::kContour) parameters.gap_expression = "0.1 + sqrt(s)";
+    if (pattern == Pattern::kHoneycomb) parameters.gap_expression = "0.1 + sqrt(s) * sqrt(1 - u)";
+    for (const infill::MicroDegrees angle : {0, 30'000'000}) {
+      parameters.angle_base = angle;
+      Toolpaths paths;
+      const Status status = infill::append_fill(square, context_of(square), parameters, paths);
+      ASSERT_TRUE(status.ok()) << status.error().message;
+      EXPECT_GT(paths.size(), 0u);
+    }
+  }
+  // Half a bead before the surface there is no wall: the gap to line 0 is that of the part's side.
+  parameters.pattern = Pattern::kRaster;
+  parameters.stagger = {0};
+  parameters.angle_base = 0;
+  parameters.gap_expression = "0.3 + s";
+  const Toolpaths paths = filled(square, context_of(square), parameters);
+  ASSERT_GT(paths.size(), 0u);
+  EXPECT_EQ(paths.point[0].y - context_of(square).part.lo.y, parameters.width / 2 + 300'000);
+}
+
 TEST(Fill, WhatCannotBeLaidIsOneClearLine) {
   const Contours& square = outline("square");
   const auto message = [&](const FillParameters& parameters) {

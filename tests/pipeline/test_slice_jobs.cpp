@@ -142,6 +142,14 @@ TEST(SliceProgram, WrongFillingsAreOneClearLineAndLeaveNothing) {
       {{"--pattern", "raster", "--set", "fill.by_height=5:4 gap_mm=0"}, "5:4"},
       {{"--pattern", "raster", "--set", "fill.by_height=1:2 gapp_mm=0"}, "did you mean 'gap_mm'"},
       {{"--pattern", "raster", "--set", "fill.gap_by_height=3:0.1, 2:0.2"}, "heights have to increase"},
+      {{"--pattern", "raster", "--bead-gap", "0.2", "--line-distance", "0.5"}, "fill.distance_mm (--line-distance) and fill.gap_mm (--bead-gap) both"},
+      {{"--pattern", "raster", "--bead-gap", "0.2", "--gap-formula", "z"}, "fill.gap_formula (--gap-formula) and fill.gap_mm"},
+      {{"--pattern", "raster", "--line-distance", "0.5", "--set", "fill.gap_by_height=0:0.1"}, "and fill.gap_by_height both"},
+      {{"--pattern", "raster", "--line-distance", "0.5", "--set", "fill.group=2"}, "groups are of beads with gaps"},
+      {{"--pattern", "raster", "--set", "fill.by_height=1:2 gap_mm=0 distance_mm=1"}, "1:2: gap_mm and distance_mm both"},
+      {{"--pattern", "raster", "--set", "part.fill=gap_formula=z gap_mm=0.1"}, "gap_formula and gap_mm both"},
+      {{"--pattern", "raster", "--shard", "1/2"}, "--shard: shards are of images"},
+      {{"--pattern", "raster", "--set", "run.shard=1/2"}, "run.shard: shards are of images"},
       {{"--pattern", "raster", "--set", "part.fill=angle_deg=x"}, "angle_deg: 'x'"},
       {{"--pattern", "quatrefoil"}, "kept apart"},
       {{"--pattern", "raster", "--bead", "0"}, "--bead: 0 is out of range"},
@@ -335,6 +343,25 @@ TEST(FillPlan, HeightsAndPartsChangeTheFilling) {
     EXPECT_EQ(at.walls, 2u);
   }
   EXPECT_TRUE(plan->fills());
+}
+
+TEST(FillPlan, TheOneWayToGiveDistancesTakesThePlaceOfTheOneThatHeld) {
+  using namespace pipeline;
+  FillRequest request;
+  ASSERT_EQ(read_fill_changes("pattern=raster distance_mm=0.5,0.7", request.all), "");
+  request.by_height = "1:2 gap_mm=0.1; 2:3 gap_formula=0.2*z; 3:4 gap_by_height=0:0.3; 4:5 angle_deg=0";
+  const auto plan = plan_filling(request, "");
+  ASSERT_TRUE(plan.ok()) << plan.error().message;
+  EXPECT_EQ(plan->at(500'000).distances, (std::vector<Nm>{500'000, 700'000}));
+  EXPECT_EQ(plan->at(4'500'000).distances, (std::vector<Nm>{500'000, 700'000}));
+  for (const std::int64_t height : {1'500'000, 2'500'000, 3'500'000}) EXPECT_TRUE(plan->at(height).distances.empty()) << height;
+  EXPECT_EQ(plan->at(1'500'000).gaps, std::vector<Nm>{100'000});
+  EXPECT_EQ(plan->at(2'500'000).gap_expression, "0.2*z");
+  EXPECT_EQ(plan->at(3'500'000).gap_table.size(), 1u);
+  const auto own = plan_filling(request, "gap_formula=0.1");
+  ASSERT_TRUE(own.ok()) << own.error().message;
+  EXPECT_TRUE(own->at(500'000).distances.empty());
+  EXPECT_EQ(own->at(500'000).gap_expression, "0.1");
 }
 
 }  // namespace

@@ -123,6 +123,18 @@ TEST_F(PorousJob, ResumedJobsAndShardsHaveTheBytesOfWholeOnesAndOtherFillingsAre
   EXPECT_EQ(run("resumed", {"--thin", "1", "--resume"}).code, 2);
   ASSERT_EQ(run("resumed", {"--resume"}).code, 0);
   EXPECT_EQ(test::tree_text(folder / "resumed"), test::tree_text(folder / "whole"));
+  for (const char* shard : {"3/3", "1/3", "2/3"}) ASSERT_EQ(run("shards", {"--shard", shard}).code, 0);
+  ASSERT_EQ(run_lamina({"merge", folder / "shards", "-o", folder / "shards", "--quiet"}, folder.path()).code, 0);
+  EXPECT_EQ(test::tree_text(folder / "shards"), test::tree_text(folder / "whole"));
+  // From directories of their own, and with another filling in one of them.
+  for (const char* shard : {"1/2", "2/2"}) ASSERT_EQ(run(std::string("half") + shard[0], {"--shard", shard}).code, 0);
+  ASSERT_EQ(run_lamina({"merge", folder / "half1", folder / "half2", "-o", folder / "merged", "--quiet"}, folder.path()).code, 0);
+  EXPECT_EQ(test::tree_text(folder / "merged"), test::tree_text(folder / "whole"));
+  ASSERT_EQ(run("other", {"--shard", "2/2", "--thin", "1"}).code, 0);
+  const test::Outcome mixed = run_lamina({"merge", folder / "half1", folder / "other", "-o", folder / "mixed", "--quiet"}, folder.path());
+  EXPECT_NE(mixed.code, 0);
+  EXPECT_EQ(mixed.error_lines(), 1) << mixed.err;
+  EXPECT_NE(mixed.err.find("another job"), std::string::npos) << mixed.err;
 }
 
 TEST_F(PorousJob, WhatHasNoMeaningTogetherIsOneLine) {
@@ -137,6 +149,8 @@ TEST_F(PorousJob, WhatHasNoMeaningTogetherIsOneLine) {
   EXPECT_NE(message({"--core", "0.5"}).find("dose.core: "), std::string::npos);
   EXPECT_NE(message({"--containment", "inside"}).find("--containment: "), std::string::npos);
   EXPECT_NE(message({"--fill", "rastr"}).find("raster"), std::string::npos);
+  EXPECT_NE(message({"--pattern", "contour"}).find("--fill: raster, but --pattern contour"), std::string::npos);
+  EXPECT_NE(message({"--bead-gap", "0.2", "--line-distance", "0.5"}).find("(--line-distance) and fill.gap_mm (--bead-gap) both"), std::string::npos);
   EXPECT_NE(message({"--fill", "segmented", "--thin-width", "0.5"}).find("segment.spacing_sc_mm"), std::string::npos);
 }
 
