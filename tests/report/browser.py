@@ -5,6 +5,7 @@ Speaks the DevTools protocol over pipes (--remote-debugging-pipe: JSON, each mes
 Python's own library is needed. Prints one JSON object: seconds until the page was loaded and drawn, messages of the
 console, the runs of layer LAYER as the page decodes them, and what each interaction changed. Exit code 77: no Chromium.
 
+  --open              only opens the page and decodes the layer, for scripts/bench report
   --screenshot NAME   writes NAME-light.png, NAME-dark.png, NAME-views.png and NAME-phone.png to be looked at
 """
 import base64
@@ -93,22 +94,50 @@ class Browser:
             file.write(base64.b64decode(shot["data"]))
 
 
+# The page's own clock, from the begin of the navigation: when it said that it is ready, and when what it had drawn by then
+# was on the screen (the second frame after that).
+CLOCK = """new MutationObserver((_, self) => {
+  if (!document.documentElement || document.documentElement.dataset.ready !== 'yes') return;
+  self.disconnect();
+  window.clock = {ready: performance.now()};
+  requestAnimationFrame(() => requestAnimationFrame(() => { window.clock.drawn = performance.now(); }));
+}).observe(document, {subtree: true, childList: true, attributes: true, attributeFilter: ['data-ready']});"""
+CLOCK_READ = """new Promise(done => { const look = () => {
+  if (!window.clock || !window.clock.drawn) { setTimeout(look, 5); return; }
+  const at = performance.getEntriesByType('navigation')[0];
+  done({...window.clock, read: at.responseEnd, parsed: at.domContentLoadedEventEnd, loaded: at.loadEventEnd, start: at.startTime,
+        layer: +document.documentElement.dataset.layer});
+}; look(); })"""
 STATE = "(() => { const s = laminaReport.state; return {layer: +document.documentElement.dataset.layer, scale: s.scale, x: s.x, y: s.y}; })()"
 
 
-def look(browser, page, layer, shots):
+def messages(browser):
+    return [event["params"] for event in browser.events
+            if event.get("method") in ("Runtime.exceptionThrown", "Runtime.consoleAPICalled", "Log.entryAdded")]
+
+
+def requests(browser):
+    urls = [event["params"]["request"]["url"] for event in browser.events if event.get("method") == "Network.requestWillBeSent"]
+    return [url for url in urls if not url.startswith(("file://", "data:", "blob:"))]
+
+
+def look(browser, page, layer, shots, only_open):
     said = {}
     for domain in ("Page", "Runtime", "Log", "Network"):
         browser.call(domain + ".enable")
     browser.call("Emulation.setDeviceMetricsOverride", width=1280, height=900, deviceScaleFactor=1, mobile=False)
+    browser.call("Page.addScriptToEvaluateOnNewDocument", source=CLOCK)
     start = time.monotonic()
     browser.call("Page.navigate", url="file://" + os.path.abspath(page))
     browser.wait_for("Page.loadEventFired")
     said["loaded_seconds"] = time.monotonic() - start
     browser.value("laminaReport.ready")
     said["ready_seconds"] = time.monotonic() - start
+    said["clock_ms"] = browser.value(CLOCK_READ)
     said["runs"] = browser.value(f"laminaReport.decodeLayer({layer}).then(r => [[...r.rowOffset], [...r.change]])")
     browser.value(f"laminaReport.showLayer({layer})")
+    if only_open:
+        return said | {"shown": browser.value(STATE)["layer"], "console": messages(browser), "requests": requests(browser)}
     steps = said["steps"] = {"start": browser.value(STATE)}
     if shots:
         browser.screenshot(shots + "-light.png")
@@ -161,11 +190,8 @@ def look(browser, page, layer, shots):
     browser.click("#fit")
     said["ink"] = browser.value("(() => { const v = document.getElementById('view'), d = v.getContext('2d').getImageData(0, 0, v.width, v.height).data;"
                                 " const seen = new Set(); for (let i = 0; i < d.length; i += 4) seen.add(d[i]); return seen.size; })()")
-    said["console"] = [event["params"] for event in browser.events
-                       if event.get("method") in ("Runtime.exceptionThrown", "Runtime.consoleAPICalled", "Log.entryAdded")]
-    said["requests"] = [event["params"]["request"]["url"] for event in browser.events
-                        if event.get("method") == "Network.requestWillBeSent"]
-    said["requests"] = [url for url in said["requests"] if not url.startswith(("file://", "data:", "blob:"))]
+    said["console"] = messages(browser)
+    said["requests"] = requests(browser)
     return said
 
 
@@ -180,7 +206,7 @@ def main():
         try:
             target = browser.call("Target.createTarget", url="about:blank")["targetId"]
             browser.session = browser.call("Target.attachToTarget", targetId=target, flatten=True)["sessionId"]
-            json.dump(look(browser, sys.argv[1], int(sys.argv[2]), shots), sys.stdout)
+            json.dump(look(browser, sys.argv[1], int(sys.argv[2]), shots, "--open" in sys.argv), sys.stdout)
         finally:
             browser.process.kill()
             browser.process.wait()
