@@ -130,7 +130,8 @@ def page_text(entries, options, about, busy):
     yield (f"Jobs of {LAYERS:,} layers of {entries[0]['pixels'] / 1e6:.1f} million pixels (100 x 100 mm at 1200 dpi). Each page is opened "
            f"{options.runs} times, each time by a Chromium that has just started with an empty profile. Seconds are the page's own clock, from the "
            "begin of the navigation: until its text is parsed, until it is loaded, and until the layer in the middle, all plots and the parts "
-           "from three sides are on the screen; medians, and the fastest and the slowest.")
+           "from three sides are on the screen; medians, and the fastest and the slowest. Where all layers would make the page "
+           "larger than 19 MB, every second one is left out (`--most-bytes`).")
     yield ""
     yield (f"In every one of these runs layer {LAYER} as the page decodes it was the TIFF of layer {LAYER} as libtiff decodes it, run for "
            "run, the console stayed empty, and nothing was asked from a network.")
