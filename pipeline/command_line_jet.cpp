@@ -60,27 +60,14 @@ CommandSpec jet_spec() {
   return spec;
 }
 
-Status set_materials(const std::string& text, Job& job) {
-  const auto names = split(text, ",");
-  if (names.size() != 1 && names.size() != job.parts.size()) {
-    return Error{Fault::kUsage, fmt::format("--material: {} names for {} parts; give one for all or one for each", names.size(),
-                                            job.parts.size())};
-  }
-  for (std::size_t p = 0; p < job.parts.size(); ++p) {
-    const auto name = names[names.size() == 1 ? 0 : p];
-    if (const std::string wrong = read_material(name, job.parts[p].material); !wrong.empty()) {
-      return Error{Fault::kUsage, "--material: " + wrong};
-    }
-  }
-  return {};
-}
-
 Result<Job> resolve(const Arguments& arguments) {
   Result<Job> read = read_job_options(kJetKeys, arguments);
   if (!read) return read;
   Job& job = *read;
   if (arguments.has("--material")) {
-    if (Status status = set_materials(arguments.text("--material"), job); !status) return status.error();
+    if (Status status = set_materials(arguments.text("--material"), job); !status) {
+      return Error{Fault::kUsage, "--material: " + status.error().message};
+    }
   }
   job.resume = arguments.has("--resume");
   job.overwrite = arguments.has("--overwrite");

@@ -90,15 +90,30 @@ const PixelGrid& JetPlan::grid() const { return state_->head.grid; }
 const heights::LayerTable& JetPlan::layers() const { return state_->table; }
 const std::vector<PartSummary>& JetPlan::parts() const { return state_->scene.parts; }
 
+std::vector<std::string> JetPlan::materials() const {
+  std::vector<std::string> names;
+  for (const JobMaterial& material : state_->materials.used) {
+    if (!material.name.empty()) names.push_back(material.name);
+  }
+  return names;
+}
+
 Result<Runs> JetPlan::layer(std::uint32_t index) const {
+  Result<PlannedImages> images = this->images(index);
+  if (!images) return images.error();
+  return std::move(images->whole);
+}
+
+Result<PlannedImages> JetPlan::images(std::uint32_t index) const {
   std::unique_ptr<LayerWork> work = state_->take();
   LayerOutcome outcome;
   outcome.record.layer = state_->table[index];
   const Status status = state_->workshop->raster(*work, outcome);
-  Runs runs = work->runs;  // of its own size; the scratch stays warm
+  PlannedImages images{work->runs, {}};  // of their own sizes; the scratch stays warm
+  if (state_->materials.several()) images.material = work->materials.image;
   state_->give_back(std::move(work));
   if (!status) return status.error();
-  return runs;
+  return images;
 }
 
 }  // namespace lamina::pipeline

@@ -5,6 +5,8 @@
 
 #include <cstdint>
 #include <memory>
+#include <string>
+#include <vector>
 
 #include "pipeline/job.h"
 #include "pipeline/scene.h"
@@ -14,6 +16,12 @@
 #include "stages/heights/table.h"
 
 namespace lamina::pipeline {
+
+/// A layer's image, and what of it is of each material.
+struct PlannedImages {
+  Runs whole;
+  std::vector<Runs> material;  // in the order of materials(), no pixel set in two; empty where the whole is of one
+};
 
 /// Immutable; layers may be asked for in any order and from any number of threads.
 class JetPlan {
@@ -30,9 +38,14 @@ class JetPlan {
   const heights::LayerTable& layers() const;
   const std::vector<PartSummary>& parts() const;
 
+  /// Names of the powders, as file names have them; empty if no part names one.
+  std::vector<std::string> materials() const;
+
   /// The image of layers()[index], of all materials together. errors  kVerification: engine is kBoth and they differ
   /// memory  the runs; scratch is kept for the next layer, one set for each layer that is made at the same time
   Result<Runs> layer(std::uint32_t index) const;
+  /// The same with those of the materials.
+  Result<PlannedImages> images(std::uint32_t index) const;
 
  private:
   JetPlan();

@@ -61,6 +61,21 @@ std::string read_material(std::string_view text, std::string& name) {
   return {};
 }
 
+Status set_materials(std::string_view text, Job& job) {
+  const auto names = split(text, ",");
+  if (names.size() != 1 && names.size() != job.parts.size()) {
+    return Error{Fault::kUsage, fmt::format("{} names for {} parts; give one for all or one for each", names.size(),
+                                            job.parts.size())};
+  }
+  for (std::size_t p = 0; p < job.parts.size(); ++p) {
+    const auto name = names[names.size() == 1 ? 0 : p];
+    if (const std::string what = read_material(name, job.parts[p].material); !what.empty()) {
+      return Error{Fault::kUsage, what};
+    }
+  }
+  return {};
+}
+
 std::string read_material_ranges(std::string_view text, std::vector<MaterialRange>& ranges) {
   ranges.clear();
   for (std::string_view piece : split(text, ";")) {

@@ -15,6 +15,7 @@
 #include "pipeline/jet_plan.h"
 #include "pipeline/job_keys.h"
 #include "pipeline/job_toml.h"
+#include "pipeline/materials.h"
 #include "pipeline/output_directory.h"
 #include "pipeline/slice.h"
 #include "pipeline/summary.h"
@@ -35,7 +36,8 @@ std::string setting_text(const py::handle& value) {
 }
 
 /// A checked job; one without an output writes nothing.
-Job make_job(const py::object& parts, const py::dict& settings, const std::string& file, const std::string& output = {}) {
+Job make_job(const py::object& parts, const py::dict& settings, const py::object& materials, const std::string& file,
+             const std::string& output = {}) {
   Job job;
   if (!file.empty()) {
     if (Status status = pipeline::read_job(file, job); !status) raise(status.error());
@@ -56,15 +58,22 @@ Job make_job(const py::object& parts, const py::dict& settings, const std::strin
     const std::string assignment = fmt::format("{}={}", py::str(key).cast<std::string>(), setting_text(value));
     if (Status status = pipeline::set_key(job, assignment); !status) raise(status.error());
   }
+  if (!materials.is_none()) {
+    if (Status status = pipeline::set_materials(setting_text(materials), job); !status) {
+      raise({Fault::kUsage, "materials: " + status.error().message});
+    }
+  }
   job.output = output;
   job.dry_run = output.empty();
   if (Status status = pipeline::check_job(job); !status) raise(status.error());
   return job;
 }
 
-/// A layer of a job: its place, and the image that it has.
+/// A layer of a job: its place, the image that it has, and of a job of several powders those of each.
 struct PlannedLayer : Image {
   Layer layer;
+  std::vector<std::string> materials;
+  std::vector<Image> images;  // one for each of several materials
 };
 
 struct LayerEntry {
@@ -91,9 +100,12 @@ class Plan {
 
   PlannedLayer layer(std::uint32_t index) const {
     PlannedLayer made;
-    made.runs = without_lock([&] { return plan_.layer(index); });
+    auto images = without_lock([&] { return plan_.images(index); });
+    made.runs = std::move(images.whole);
     made.dpi_x = plan_.grid().x.dpi();
     made.dpi_y = plan_.grid().y.dpi();
+    made.materials = plan_.materials();
+    for (Runs& image : images.material) made.images.push_back({std::move(image), made.dpi_x, made.dpi_y});
     made.layer = plan_.layers()[index];
     return made;
   }
@@ -161,9 +173,9 @@ pipeline::JetSummary run_job(const Job& job) {
 }
 
 py::object jet(const std::string& output, const py::object& parts, const py::dict& settings, const std::string& file,
-               bool resume, bool overwrite) {
+               bool resume, bool overwrite, const py::object& materials) {
   if (output.empty()) raise({Fault::kUsage, "output is empty; name a directory"});
-  Job job = make_job(parts, settings, file, output);
+  Job job = make_job(parts, settings, materials, file, output);
   job.resume = resume;
   job.overwrite = overwrite;
   const std::string said = pipeline::summary_json(job, run_job(job));
@@ -187,6 +199,19 @@ void define_layer(py::module_& module) {
       .def_property_readonly("thickness", [](const PlannedLayer& l) { return l.layer.thickness; })
       .def_property_readonly("plane", [](const PlannedLayer& l) { return l.layer.plane(); }, "Where the parts are sampled.")
       .def_property_readonly("reason", [](const PlannedLayer& l) { return std::string(reason_name(l.layer.reason)); })
+      .def_property_readonly(
+          "materials",
+          [](const py::object& self) {
+            auto& layer = self.cast<PlannedLayer&>();
+            py::dict images;
+            for (std::size_t m = 0; m < layer.materials.size(); ++m) {
+              images[py::str(layer.materials[m])] =
+                  layer.images.empty() ? self : py::cast(&layer.images[m], py::return_value_policy::reference_internal, self);
+            }
+            return images;
+          },
+          "dict: the Image of each powder by its name, in the plan's order; no pixel is set in two, and together they are the "
+          "layer. Empty if no part names a material. They lie in the layer; nothing is copied.")
       .def("__repr__", [](const PlannedLayer& l) {
         return fmt::format("<lamina.Layer {}: {} to {} mm, {} x {} pixels, {} set>", l.layer.index, mm(l.layer.bottom),
                            mm(std::int64_t{l.layer.bottom} + l.layer.thickness), l.runs.columns, l.runs.view().rows(), set_pixels(l.runs));
@@ -242,6 +267,8 @@ void define_plan(py::module_& module) {
           "first"_a = 0, "end"_a = py::none(), "Layers first to end, each planned when it is asked for and kept by nobody else.")
       .def("contours", [](Plan& plan, std::int64_t asked) { return plan.contours(plan.index(asked)); }, "index"_a,
            "Contours of a layer, as lamina slice cuts them. The first call loads the parts once more.")
+      .def_property_readonly("materials", [](const Plan& plan) { return plan.of().materials(); },
+                             "Names of the powders, by vat, else in the order in which parts name them; empty if none does.")
       .def_property_readonly("heights", &Plan::heights,
                              "Structured array, a row a layer: bottom and thickness in nm (int32), reason (index into lamina.reasons).")
       .def_property_readonly("columns", [](const Plan& plan) { return plan.of().grid().columns(); })
@@ -289,7 +316,7 @@ PYBIND11_MODULE(lamina, module) {
   module.def(
       "load",
       [](const py::object& path, const py::dict& settings) {
-        const pipeline::Job job = make_job(py::make_tuple(path), settings, "");
+        const pipeline::Job job = make_job(py::make_tuple(path), settings, py::none(), "");
         return without_lock([&]() -> Result<std::shared_ptr<Part>> {
           Result<Part> part = load::load(job.parts[0].path, pipeline::load_options(job, job.parts[0]));
           if (!part) return part.error();
@@ -300,13 +327,14 @@ PYBIND11_MODULE(lamina, module) {
       "Reads a part file (STL, OBJ, 3MF, gzip). Settings that matter are part.* and load.*, as {'part.unit': 'inch'}.");
   module.def(
       "plan",
-      [](const py::object& parts, const py::dict& settings, const std::string& job) {
-        return std::make_shared<Plan>(make_job(parts, settings, job));
+      [](const py::object& parts, const py::dict& settings, const std::string& job, const py::object& materials) {
+        return std::make_shared<Plan>(make_job(parts, settings, materials, job));
       },
-      "parts"_a = py::none(), "settings"_a = py::dict(), "job"_a = "",
-      "A job ready to give its layers. parts: a path or several; job: a TOML job file, which settings override.");
+      "parts"_a = py::none(), "settings"_a = py::dict(), "job"_a = "", "materials"_a = py::none(),
+      "A job ready to give its layers. parts: a path or several; job: a TOML job file, which settings override; materials: the "
+      "powder of all parts, or a sequence with that of each.");
   module.def("jet", &jet, "output"_a, "parts"_a = py::none(), "settings"_a = py::dict(), "job"_a = "", "resume"_a = false,
-             "overwrite"_a = false,
+             "overwrite"_a = false, "materials"_a = py::none(),
              "Plans all layers into a directory, as lamina jet does, on all processors; returns its summary. Ctrl-C stops it, and "
              "resume=True goes on.");
   module.def("keys", [] {

@@ -148,6 +148,67 @@ class Module(unittest.TestCase):
         with self.assertRaises(lamina.UsageError):
             lamina.jet(str(self.directory / "again"), PART, {**SETTINGS, "bed.dpi": 100})
 
+    def test_each_powder_of_a_layer_is_the_decoded_file_of_its_own(self):
+        rabbit, nut = (str(ROOT / "tests/corpus" / name) for name in ("rabbit_9_overlapping_shells.obj", "parameter_quality_nut.stl"))
+        job = self.directory / "powders.toml"
+        # They overlap in part of their layers; the nut is of bronze between two heights.
+        job.write_text("[bed]\nsize_mm = [60, 50]\ndpi = 300\n[layers]\nthickness_mm = 0.4\n"
+                       f"[[part]]\npath = '{rabbit}'\nat_mm = [5, 5]\nmaterial = 'steel'\n"
+                       f"[[part]]\npath = '{nut}'\nat_mm = [15, 10]\nmaterial = 'bronze'\n"
+                       "material_by_height = '4:8 steel; 8:12 tin'\n")
+        out = self.directory / "powders"
+        said = run("jet", "--job", job, "--quiet", "-o", out)
+        self.assertEqual(said.returncode, 0, said.stderr)
+        plan = lamina.plan(job=str(job))
+        self.assertEqual(plan.materials, ["steel", "bronze", "tin"])
+        mixed = 0
+        for layer in plan:
+            images = layer.materials
+            self.assertEqual(list(images), plan.materials)
+            whole = layer.pixels()
+            together = np.zeros(layer.shape, np.uint8)
+            for name, image in images.items():
+                decoded = lamina.read_image(str(out / f"layers/{layer.index:06}-{name}.tif"))
+                np.testing.assert_array_equal(image.row_offset, decoded.row_offset)
+                np.testing.assert_array_equal(image.change, decoded.change)
+                self.assertEqual(image.dpi, layer.dpi)
+                together += image.pixels()
+            np.testing.assert_array_equal(together, whole.astype(np.uint8))  # so no pixel is set in two
+            self.assertEqual(sum(image.set_pixels for image in images.values()), layer.set_pixels)
+            mixed += sum(image.set_pixels > 0 for image in images.values()) > 1
+        self.assertGreater(mixed, 20)
+        # Views into the layer, which lives as long as they do.
+        layer = plan[15]
+        change = layer.materials["steel"].change
+        self.assertFalse(change.flags.owndata)
+        self.assertEqual(change.ctypes.data, layer.materials["steel"].change.ctypes.data)
+        copy = change.copy()
+        self.assertGreater(len(copy), 0)
+        del layer, images, image
+        gc.collect()
+        np.testing.assert_array_equal(change, copy)
+
+    def test_powders_are_named_for_all_parts_or_for_each(self):
+        parts = [CROWN, str(ROOT / "tests/corpus/parameter_quality_nut.stl")]
+        settings = {"bed.size_mm": (60, 60), "bed.dpi": 100, "layers.thickness_mm": 1}
+        self.assertEqual(lamina.plan(parts, settings).materials, [])
+        self.assertEqual(lamina.plan(parts, settings)[3].materials, {})
+        one = lamina.plan(parts, settings, materials="steel")
+        layer = one[3]
+        self.assertEqual(one.materials, ["steel"])
+        self.assertIs(layer.materials["steel"], layer)
+        two = lamina.plan(parts, settings, materials=("steel", "bronze"))
+        self.assertEqual(two.materials, ["steel", "bronze"])
+        np.testing.assert_array_equal(two[3].change, layer.change)
+        for name, part in zip(two.materials, parts):
+            self.assertGreater(two[3].materials[name].set_pixels, 0, part)
+        summary = lamina.jet(str(self.directory / "two"), parts, settings, materials=["steel", "bronze"])
+        self.assertEqual(summary["layers_total"], len(two))
+        self.assertEqual(len(list((self.directory / "two/layers").iterdir())), 2 * len(two))
+        for wrong in ("steel,", ["a", "b", "c"], "two words"):
+            with self.assertRaisesRegex(lamina.UsageError, "^materials: "):
+                lamina.plan(parts, settings, materials=wrong)
+
     def test_errors_are_the_one_line_of_the_program(self):
         for call, kind, code, words in (
                 (lambda: lamina.plan(str(ROOT / "tests/corpus/broken/empty_file.stl")), lamina.InputError, 3, "empty_file.stl"),
