@@ -233,7 +233,10 @@ def time_section(ours, models, folder):
     terrain = os.path.join(folder, "terrain.stl")
     if not os.path.exists(terrain):
         make_parts.write_stl(terrain, make_parts.read_stl(os.path.join(models, "st_helens_terrain_645k.stl.gz")))
-    cases = [("terrain", terrain, 645364, (f"{LEAST}..{MOST}",), ("angle", "cusp", "stepwise", "optimal"))]
+    ways = ("angle", "cusp", "stepwise", "optimal")
+    cases = [("terrain, binary STL, in memory", terrain, 645364, (f"{LEAST}..{MOST}",), ways),
+             ("terrain, as published: gzipped STL", os.path.join(models, "st_helens_terrain_645k.stl.gz"), 645364,
+              (f"{LEAST}..{MOST}",), ways)]
     cases += [("column of 100 mm", tall_part(folder, 100, facets), facets, ("0.02..0.3",), ("cusp", "optimal"))
               for facets in (20_000, 80_000, 320_000)]
     cases += [(f"column of {height} mm", tall_part(folder, height, 80_000), 80_000, ("0.02..0.3",), ("cusp", "optimal"))

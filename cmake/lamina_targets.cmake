@@ -32,6 +32,11 @@ target_compile_definitions(lamina_pipeline PRIVATE LAMINA_VERSION="${PROJECT_VER
 target_link_libraries(lamina_pipeline PUBLIC lamina::stages
                       PRIVATE nlohmann_json::nlohmann_json PkgConfig::XXHASH)
 
+if(LAMINA_SANITIZE)
+  target_precompile_headers(lamina_stages PRIVATE cmake/precompiled.h)
+  target_precompile_headers(lamina_pipeline PRIVATE cmake/precompiled.h)
+endif()
+
 add_executable(lamina pipeline/main.cpp)
 target_link_libraries(lamina PRIVATE lamina::pipeline)
 
