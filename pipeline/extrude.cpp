@@ -75,8 +75,8 @@ Status write_layer_table(const Job& job, const SlicePlan& plan, const std::array
   return write::write_file(report_name(job.output), std::as_bytes(std::span(text)));
 }
 
-/// A point of stored toolpaths comes to some 40 bytes of text.
-constexpr std::size_t kTextOfPoint = 48;
+/// A point of stored toolpaths comes to some 40 bytes of text, a path to tags, the way to it and filament drawn back.
+constexpr std::size_t kTextOfPoint = 48, kTextOfPath = 128;
 /// A layer's text waits until those before it are written. What segmented lines come to beyond these bytes, and beyond
 /// what the plain filling takes, does not wait: such a layer is written a piece at a time when its turn comes.
 constexpr std::size_t kWaitingText = 1 << 17, kPieceOfText = 1 << 16;
@@ -186,7 +186,7 @@ Result<ExtrudeSummary> run_extrude(const Job& asked, const ProgressCallback& pro
     const auto from = Clock::now();
     if (Status status = plan->contours(first + i, work.layer); !status) return status.error();
     timed(plan_ns, from);
-    auto bytes = plan->fill_bytes_bound(first + i, work.layer, kTextOfPoint);
+    auto bytes = plan->fill_bytes_bound(first + i, work.layer, {kTextOfPoint, 0, kTextOfPath});
     if (bytes && segments->any()) *bytes += 2 * kWaitingText;
     return bytes;
   };

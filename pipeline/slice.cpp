@@ -172,11 +172,15 @@ Result<SliceSummary> run_slice(const Job& job, const ProgressCallback& progress,
     return write::SliceLayer{plan->layers()[index].layer, work.contours.contours, work.contours.body, work.paths, work.path_body};
   };
   const auto prepare = [&](std::uint32_t i, SlicePlan::Work& work) -> Result<std::uint64_t> {
-    // A stretch between two points is an element of its own at worst.
-    constexpr std::uint64_t kTextOfPoint = 150;
+    // Two numbers of some 11 characters and what divides them. An element of SVG names kind, colour and width, one of CLI
+    // its part and count; both repeat the point that they share with the element before.
+    const SlicePlan::TextBytes text = !encoder                           ? SlicePlan::TextBytes{}
+                                      : job.slice.format == "svg"        ? SlicePlan::TextBytes{26, 200, 0}
+                                      : job.slice.format == "cli-binary" ? SlicePlan::TextBytes{16, 24, 0}
+                                                                         : SlicePlan::TextBytes{48, 64, 0};
     const auto from = Clock::now();
     if (Status status = plan->contours(first + i, work); !status) return status.error();
-    auto more = plan->fill_bytes_bound(first + i, work, encoder ? kTextOfPoint : 0);
+    auto more = plan->fill_bytes_bound(first + i, work, text);
     timed(slice_ns, from);
     return more;
   };

@@ -67,8 +67,12 @@ class SlicePlan {
   bool fills() const { return fills_; }
   /// Bytes that contours() may need at most, and text of them.
   std::uint64_t bytes_bound(std::uint32_t index) const;
-  /// Bytes that fill() and `bytes_a_point` of text may need beside those. errors  of infill::bound_fill
-  Result<std::uint64_t> fill_bytes_bound(std::uint32_t index, Work& work, std::uint64_t bytes_a_point) const;
+  /// Bytes of text that a point of a path takes at most, and beside its points a stretch of one kind and a path.
+  struct TextBytes {
+    std::uint64_t point = 0, stretch = 0, path = 0;
+  };
+  /// Bytes that fill() and its text may need beside those. errors  of infill::bound_fill
+  Result<std::uint64_t> fill_bytes_bound(std::uint32_t index, Work& work, TextBytes text) const;
 
   double load_seconds = 0, index_seconds = 0;
 

@@ -282,20 +282,20 @@ std::uint64_t SlicePlan::bytes_bound(std::uint32_t index) const {
   return (fills_ ? 2 : 1) * contours + (1 << 14);
 }
 
-Result<std::uint64_t> SlicePlan::fill_bytes_bound(std::uint32_t index, Work& work, std::uint64_t bytes_a_point) const {
+Result<std::uint64_t> SlicePlan::fill_bytes_bound(std::uint32_t index, Work& work, TextBytes text) const {
   if (!fills_) return std::uint64_t{0};
-  constexpr std::uint64_t kOfPoint = 17;
+  constexpr std::uint64_t kOfPoint = 17, kOfPath = 4;
   const Layer own = schedule_.layers[index].own();
-  std::uint64_t points = 0, scratch = 0;
+  std::uint64_t bytes = 0, scratch = 0;
   for (std::size_t a = 0; a < areas_.size(); ++a) {
     const Area& area = areas_[a];
     const auto bound = infill::bound_fill(contours_of(area, work), work.region[a], {own, area.box}, filling(area, own));
     if (!bound) return failed(area, bound.error());
-    points += bound->points;
+    bytes += bound->points * (kOfPoint + text.point) + bound->stretches * text.stretch + bound->paths * (kOfPath + text.path);
     scratch = std::max(scratch, bound->scratch_bytes);
   }
   // Buffers grow by half or double: twice what is in them.
-  return 2 * points * (kOfPoint + bytes_a_point) + scratch;
+  return 2 * bytes + scratch;
 }
 
 std::uint64_t SlicePlan::Work::bytes() const {

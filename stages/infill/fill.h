@@ -32,13 +32,15 @@ Status append_fill(const ContoursView& contours, Contours region, const FillCont
 Result<Contours> fill_region(const ContoursView& contours, const FillContext& context, const FillParameters& parameters);
 
 /// What append_fill may come to, counted before anything is laid: lines are placed and their crossings with the region
-/// counted, curves and waves counted by their places.
+/// counted, curves counted by their places and what the region is like at some of these, waves by what of them lies within reach of the region.
 struct FillBound {
   std::uint64_t points = 0;         // of toolpaths
+  std::uint64_t paths = 0;
+  std::uint64_t stretches = 0;      // of one kind each, into which files divide paths
   std::uint64_t scratch_bytes = 0;  // while they are made
 };
 /// errors  as append_fill
-/// cost    O(P log L) for P points of the region and L lines
+/// cost    O(P log L) for P points of the region and L lines; of curves, an eighth of what laying them takes
 Result<FillBound> bound_fill(const ContoursView& contours, const ContoursView& region, const FillContext& context,
                              const FillParameters& parameters);
 

@@ -98,6 +98,55 @@ std::uint64_t wave_points(const FillParameters& parameters, std::int64_t length)
   return (static_cast<std::uint64_t>(length / (std::int64_t{3} * side_length(parameters))) + 3) * of_period;
 }
 
+WaveBound bound_waves(const ContoursView& region, const FillParameters& parameters, const LinePlaces& places) {
+  const Nm a = side_length(parameters), height = wave_height(parameters);
+  const std::int64_t period = std::int64_t{3} * a;
+  const bool straight = parameters.pattern == Pattern::kHoneycomb;
+  const std::int64_t of_period = straight ? 4 : kCosineSteps;
+  const std::int64_t nearest = std::max<std::int64_t>(1, straight ? a / 2 : period / kCosineSteps);  // corner to corner
+  const auto corners = [&](std::int64_t length) {
+    return static_cast<std::uint64_t>(length / period * of_period + std::min(of_period, length % period / nearest + 1));
+  };
+  struct Reach {
+    std::int64_t low = INT64_MAX, high = INT64_MIN;
+  };
+  std::vector<Reach> reach(places.at.size());
+  std::uint64_t crossings = 0;
+  for (std::uint32_t c = 0; c < region.size(); ++c) {
+    Point2 p = region[c].back();
+    for (const Point2 q : region[c]) {
+      const Point2 low = p.y <= q.y ? p : q, high = p.y <= q.y ? q : p;
+      p = q;
+      const auto begin_of_strips = places.at.begin();
+      const auto first = std::lower_bound(begin_of_strips, places.at.end(), std::int64_t{low.y} - height - 1) - begin_of_strips;
+      const auto last = std::upper_bound(begin_of_strips, places.at.end(), std::int64_t{high.y} + 1) - begin_of_strips;
+      const auto u_at = [&](std::int64_t v) {
+        if (v <= low.y || low.y == high.y) return static_cast<double>(low.x);
+        if (v >= high.y) return static_cast<double>(high.x);
+        const double share = static_cast<double>(v - low.y) / static_cast<double>(std::int64_t{high.y} - low.y);
+        return low.x + (static_cast<double>(high.x) - low.x) * share;
+      };
+      for (auto i = first; i < last; ++i) {
+        double from = u_at(places.at[i] - 1), to = u_at(places.at[i] + height + 1);
+        if (low.y == high.y) from = low.x, to = high.x;
+        if (from > to) std::swap(from, to);
+        const auto begin = static_cast<std::int64_t>(std::floor(from)) - 2, end = static_cast<std::int64_t>(std::ceil(to)) + 2;
+        reach[i].low = std::min(reach[i].low, begin);
+        reach[i].high = std::max(reach[i].high, end);
+        crossings += corners(end - begin) + 1;
+      }
+    }
+  }
+  WaveBound bound;
+  bound.points = 2 * crossings;  // both ends of what an edge shares with a wave
+  bound.pieces = crossings + 1;
+  for (const Reach& own : reach) {
+    // Clipper divides open lines where they turn back; the ends are joined again unless they lie between others.
+    if (own.low <= own.high) bound.points += corners(own.high - own.low) + 2 * static_cast<std::uint64_t>((own.high - own.low) / period + 2);
+  }
+  return bound;
+}
+
 Status append_waves(const ContoursView& region, const FillParameters& parameters, const LinePlaces& places,
                     std::int64_t start_u, const Frame& frame, Toolpaths& out) {
   if (region.size() == 0 || places.at.empty()) return {};

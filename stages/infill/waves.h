@@ -28,6 +28,14 @@ std::uint64_t wave_batch(std::size_t region_points);
 /// Points of one wave over `length` nm, before it is cut at the region's edge.
 std::uint64_t wave_points(const FillParameters& parameters, std::int64_t length);
 
+/// What clipped waves may come to at most: corners of waves within the reach of the region in their strip, and where its
+/// edges may cross them.
+struct WaveBound {
+  std::uint64_t points = 0, pieces = 0;
+};
+/// cost  O(edges x strips that they pass)
+WaveBound bound_waves(const ContoursView& region, const FillParameters& parameters, const LinePlaces& places);
+
 /// Appends the waves that lie in `region` (clean contours in the frame), their troughs at `places` (of place_across).
 /// `start_u` is where crests are counted from. Pieces shorter than shortest_line along u are left out.
 /// errors  kUsage: too many cells; kInternal of the clipping library

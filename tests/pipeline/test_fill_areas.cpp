@@ -1,10 +1,15 @@
 // tests/pipeline/test_fill_areas.cpp: parts that touch or overlap are filled each by its own parameters, in its own room.
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
+#include <numbers>
+#include <random>
 
 #include "pipeline/slice.h"
 #include "stages/data/clipping.h"
+#include "stages/write/slice_format.h"
 #include "tests/pipeline/program.h"
 #include "tests/slice/contour_laws.h"
 
@@ -46,6 +51,24 @@ void expect_within(const SlicePlan::Work& work, std::size_t a, const ContoursVie
     }
   }
   EXPECT_GT(seen, 3u) << "area " << a;
+}
+
+/// A prism over a star-shaped outline around the origin, in mm.
+void write_prism(const std::string& path, const std::vector<std::array<double, 2>>& outline, double height) {
+  std::string text = "solid prism\n";
+  const auto facet = [&](std::initializer_list<std::array<double, 3>> corners) {
+    text += "facet normal 0 0 0\nouter loop\n";
+    for (const auto& c : corners) text += fmt::format("vertex {:.6f} {:.6f} {:.6f}\n", c[0], c[1], c[2]);
+    text += "endloop\nendfacet\n";
+  };
+  for (std::size_t i = 0; i < outline.size(); ++i) {
+    const auto &a = outline[i], &b = outline[(i + 1) % outline.size()];
+    facet({{0, 0, 0}, {b[0], b[1], 0}, {a[0], a[1], 0}});
+    facet({{0, 0, height}, {a[0], a[1], height}, {b[0], b[1], height}});
+    facet({{a[0], a[1], 0}, {b[0], b[1], 0}, {b[0], b[1], height}});
+    facet({{a[0], a[1], 0}, {b[0], b[1], height}, {a[0], a[1], height}});
+  }
+  write_text(path, text + "endsolid prism\n");
 }
 
 class FillAreas : public ::testing::Test {
@@ -110,6 +133,68 @@ TEST_F(FillAreas, SharedRoomBelongsToTheFirstPart) {
   expect_within(work, 2, *third_rest, 300'000, PathKind::kRaster);
 }
 
+/// Bytes that the filling of layer 2 is charged with as SVG, and the least that buffers of doubling size come to at most.
+/// Checks what they hold.
+std::array<double, 2> charged_and_needed(const SlicePlan& plan) {
+  SlicePlan::Work work;
+  EXPECT_TRUE(plan.contours(2, work).ok());
+  const auto bound = plan.fill_bytes_bound(2, work, {26, 200, 0}), own = plan.fill_bytes_bound(2, work, {});
+  EXPECT_TRUE(bound.ok() && own.ok());
+  const std::uint64_t before = work.bytes();
+  EXPECT_TRUE(plan.fill(2, work).ok());
+  EXPECT_LE(work.bytes(), before + *own);
+  const auto encoder = write::make_svg_encoder();
+  write::SliceHead head;
+  head.parts.assign(work.contours.body.size() - 1, "part");
+  head.bounds = plan.bounds();
+  Buffer<char> text, outlines_alone;
+  encoder->layer(head, {plan.layers()[2].layer, work.contours.contours, work.contours.body, work.paths, work.path_body}, text);
+  encoder->layer(head, {plan.layers()[2].layer, work.contours.contours, work.contours.body, {}, {}}, outlines_alone);
+  const std::uint64_t needed = 2 * (text.size() - outlines_alone.size() + 17 * work.paths.point.size() + 4 * work.paths.size());
+  EXPECT_LE(needed, *bound);
+  return {static_cast<double>(*bound), static_cast<double>(needed)};
+}
+
+TEST_F(FillAreas, FineFillingsAreChargedWithAFewTimesWhatTheyNeed) {
+  for (const auto& [fill, times] : {std::pair{"pattern=raster width_mm=0.01", 3}, {"pattern=honeycomb width_mm=0.05 cell_mm=0.3", 3},
+                                    {"pattern=quatrefoil width_mm=0.05 gap_mm=0.05 cell_mm=0.3", 3}, {"pattern=contour width_mm=0.01", 6}}) {
+    const auto plan = plan_of({{{20, 20, 0}, {40, 40, 4}, fill}});
+    ASSERT_TRUE(plan.ok()) << plan.error().message;
+    const auto [charged, needed] = charged_and_needed(*plan);
+    EXPECT_LT(charged, times * needed) << fill << ": " << charged << " for " << needed;
+  }
+}
+
+TEST_F(FillAreas, RandomOutlinesAndPatternsNeedNoMoreThanTheyAreChargedWith) {
+  std::mt19937 random(4711);
+  const auto between = [&](double low, double high) { return low + (high - low) * static_cast<double>(random()) / 4294967295.0; };
+  const char* patterns[] = {"raster", "contour", "contour+raster", "honeycomb", "quatrefoil"};
+  for (int turn = 0; turn < 60; ++turn) {
+    // A star-shaped prism of random corners and a random one beside it, turned any way by its corners.
+    const auto corners = static_cast<int>(between(3, turn % 3 == 0 ? 400 : 30));
+    std::vector<std::array<double, 2>> outline;
+    const double least = between(0.05, 1);
+    for (int i = 0; i < corners; ++i) {
+      const double angle = (i + between(0, 0.5)) * 2 * std::numbers::pi / corners, radius = 12 * between(least, 1);
+      outline.push_back({radius * std::cos(angle), radius * std::sin(angle)});
+    }
+    const std::string path = directory_ / ("star" + std::to_string(turn) + ".stl");
+    write_prism(path, outline, 4);
+    Job job;
+    job.bed_mm = {100, 100};
+    job.layer_mm = 0.5;
+    job.parts.emplace_back();
+    job.parts.back().path = path;
+    job.parts.back().fill = fmt::format("pattern={} width_mm={:.3f} gap_mm={:.3f} cell_mm={:.3f} angle_deg={:.1f} walls={} loops={}", patterns[turn % 5],
+                                        between(0.05, 0.3), between(0.02, 0.3), between(0.3, 2), between(0, 180), turn % 4 == 0 ? 1 : 0,
+                                        static_cast<int>(between(1, 40)));
+    const auto plan = SlicePlan::make(job, [](const ProgressEvent&) {});
+    ASSERT_TRUE(plan.ok()) << plan.error().message;
+    SCOPED_TRACE(job.parts.back().fill);
+    charged_and_needed(*plan);
+  }
+}
+
 TEST_F(FillAreas, WhatFollowsTheCountOfPointsIsWithinIt) {
   const auto plan = plan_of({{{20, 20, 0}, {20, 20, 4}, "pattern=raster width_mm=0.02"},
                              {{40, 20, 0}, {20, 20, 4}, "pattern=quatrefoil width_mm=0.1 gap_mm=0.1 cell_mm=0.3"},
@@ -117,7 +202,7 @@ TEST_F(FillAreas, WhatFollowsTheCountOfPointsIsWithinIt) {
   ASSERT_TRUE(plan.ok()) << plan.error().message;
   SlicePlan::Work work;
   ASSERT_TRUE(plan->contours(2, work).ok());
-  const auto bound = plan->fill_bytes_bound(2, work, 0);
+  const auto bound = plan->fill_bytes_bound(2, work, {});
   ASSERT_TRUE(bound.ok());
   const std::uint64_t before = work.bytes();
   ASSERT_TRUE(plan->fill(2, work).ok());

@@ -63,6 +63,7 @@ TEST(HeightsCommand, WrongUseIsOneLineThatNamesTheOption) {
       {{"--heights", "cups"}, "did you mean 'cusp'?"},
       {{"--heights", "optimal", "--thickness", ""}, "--thickness: holds no thickness"},
       {{"--heights", "optimal", "--thickness", "0.3..0.1"}, "--thickness: the least thickness"},
+      {{"--heights", "optimal", "--thickness", "0.05..0.3:0.1"}, "end at 0.25 mm and miss 0.3 mm"},
       {{"--heights", "optimal", "--thickness", "-0.1,0.2"}, "--thickness: -0.1"},
       {{"--heights", "optimal", "--thickness", "0.1,0.2", "--cusp", "0"}, "--cusp: 0"},
       {{"--heights", "optimal", "--thickness", "0.1,0.2", "--time-model", "-1"}, "--time-model: -1"},
