@@ -16,7 +16,7 @@ CommandSpec preview_spec() {
   spec.name = "preview";
   spec.summary =
       "Draws layers of a job as one picture (PNG), each pixel as dark as the share of its area that is set; or one layer of\n"
-      "a sliced job with its filling, bead widths true (PNG or SVG).";
+      "a sliced job with its filling, bead widths true (PNG or SVG), or several with --count or --every (PNG).";
   spec.operand = "DIR";
   spec.operand_meaning = "directory that lamina jet or lamina slice wrote";
   spec.options = {{"-o,--output", "PNG", "the picture", "", ""},

@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <fstream>
 #include <iterator>
+#include <numeric>
 #include <optional>
 
 #include "pipeline/command_line.h"
@@ -51,8 +52,8 @@ Result<Manifest> manifest_of(const std::string& directory) {
   return read_manifest(whole);
 }
 
-/// Which of the manifest's layers are drawn.
-Result<std::vector<std::size_t>> chosen_layers(const Arguments& arguments, const Manifest& manifest) {
+/// Which of a job's layers are drawn: places in the list of their numbers.
+Result<std::vector<std::size_t>> chosen_layers(const Arguments& arguments, const std::vector<std::uint32_t>& layers) {
   const auto layer_read = number(arguments, "--layer", 0, UINT32_MAX);
   const auto every_read = number(arguments, "--every", 1, UINT32_MAX);
   const auto count_read = number(arguments, "--count", 1, kMostCells);
@@ -63,14 +64,13 @@ Result<std::vector<std::size_t>> chosen_layers(const Arguments& arguments, const
   if (layer.has_value() + every.has_value() + count.has_value() > 1) {
     return Error{Fault::kUsage, "--layer, --every and --count exclude each other; give one of them"};
   }
-  const std::vector<LayerRecord>& layers = manifest.layers;
   std::vector<std::size_t> chosen;
   if (layer) {
     for (std::size_t i = 0; i < layers.size(); ++i) {
-      if (layers[i].layer.index == *layer) return std::vector<std::size_t>{i};
+      if (layers[i] == *layer) return std::vector<std::size_t>{i};
     }
     return Error{Fault::kUsage, fmt::format("--layer {}: the job has layers {} to {}", *layer,
-                                            layers.front().layer.index, layers.back().layer.index)};
+                                            layers.front(), layers.back())};
   }
   if (every) {
     const std::size_t cells = (layers.size() + *every - 1) / *every;
@@ -98,33 +98,71 @@ std::string title_of(const ManifestHead& head) {
                              head.grid.x.dpi(), head.grid.y.dpi(), mm(head.grid.x.length), mm(head.grid.y.length));
 }
 
-/// One layer of what lamina slice wrote.
+write::picture::PlanView view_of(LayerShapes& shapes) {
+  write::picture::PlanView view;
+  view.title = shapes.title;
+  view.caption = shapes.caption;
+  view.box = shapes.box;
+  view.region = shapes.contours;
+  constexpr write::picture::Colour kInks[] = {{176, 58, 46}, {214, 137, 16}, {36, 113, 163}, {17, 120, 100}, {142, 68, 173}};
+  for (LayerShapes::Beads& beads : shapes.beads) {
+    view.shapes.push_back({kInks[static_cast<std::size_t>(beads.kind)], beads.name, std::move(beads.outline)});
+  }
+  return view;
+}
+
+/// Several layers of what lamina slice wrote.
+int preview_slice_sheet(const SlicePictures& pictures, const std::string& output, const Arguments& arguments, std::uint32_t width) {
+  if (std::filesystem::path(output).extension() == ".svg") {
+    return fail({Fault::kUsage, "-o: an SVG shows one layer, choose it by --layer K; several are drawn as PNG"});
+  }
+  std::vector<std::uint32_t> layers(pictures.last() - pictures.first());
+  std::iota(layers.begin(), layers.end(), pictures.first());
+  const auto chosen = chosen_layers(arguments, layers);
+  if (!chosen) return fail(chosen.error());
+  if (chosen->empty()) return fail({Fault::kVerification, "the job has no layers"});
+  Result<LayerShapes> shapes = pictures.layer(layers[chosen->front()]);
+  if (!shapes) return fail(shapes.error());
+  const std::string title = fmt::format("{}   |   {} layers   |   {:.1f} x {:.1f} mm", shapes->title.substr(0, shapes->title.find("   |")),
+                                        pictures.count(), mm(shapes->box.width()), mm(shapes->box.depth()));
+  const auto layer_view = [&](std::size_t i) -> Result<write::picture::PlanView> {
+    if (i > 0) shapes = pictures.layer(layers[(*chosen)[i]]);
+    if (!shapes) return shapes.error();
+    write::picture::PlanView view = view_of(*shapes);
+    view.title = fmt::format("layer {}", shapes->layer.index);
+    view.caption = fmt::format("z {:.3f} mm", mm(shapes->layer.plane()));
+    return view;
+  };
+  const auto picture = write::picture::plan_sheet(title, chosen->size(), shapes->box, width, layer_view);
+  if (!picture) return fail(picture.error());
+  if (const Status status = write::write_file(output, *picture); !status) return fail(status.error());
+  if (!arguments.has("--quiet")) {
+    say(fmt::format("{}: {} of {} layers, {}", output, chosen->size(), pictures.count(), readable_bytes(picture->size())));
+  }
+  return 0;
+}
+
+/// One layer of what lamina slice wrote, or several.
 int preview_slice(const std::string& directory, const std::string& output, const Arguments& arguments, std::uint32_t width) {
-  for (const std::string_view option : {"--count", "--every", "--whole-bed"}) {
+  for (const std::string_view option : {"--whole-bed", "--swath"}) {
     if (arguments.has(option)) {
-      return fail({Fault::kUsage, fmt::format("{}: is for images; of a sliced job one layer is drawn, choose it by --layer K",
-                                              option)});
+      return fail({Fault::kUsage, fmt::format("{}: is for images; of a sliced job what its parts cover is drawn, leave it out", option)});
     }
   }
   const auto layer = number(arguments, "--layer", 0, UINT32_MAX);
   if (!layer) return fail(layer.error());
-  Result<LayerShapes> shapes = slice_shapes(directory, *layer);
+  const auto pictures = SlicePictures::open(directory);
+  if (!pictures) return fail(pictures.error());
+  if (arguments.has("--every") || arguments.has("--count")) return preview_slice_sheet(*pictures, output, arguments, width);
+  Result<LayerShapes> shapes = pictures->layer((*layer).value_or(pictures->count() / 2));
   if (!shapes) return fail(shapes.error());
   Status status;
   if (std::filesystem::path(output).extension() == ".svg") {
     const std::string svg = shapes_svg(*shapes);
     status = write::write_file(output, std::as_bytes(std::span(svg)));
   } else {
-    write::picture::PlanView view;
-    view.title = shapes->title;
-    view.caption = shapes->caption;
-    view.box = shapes->box;
-    view.region = shapes->contours;
+    write::picture::PlanView view = view_of(*shapes);
     view.width = width;
-    constexpr write::picture::Colour kInks[] = {{176, 58, 46}, {214, 137, 16}, {36, 113, 163}, {17, 120, 100}, {142, 68, 173}};
-    for (LayerShapes::Beads& beads : shapes->beads) {
-      view.shapes.push_back({kInks[static_cast<std::size_t>(beads.kind)], beads.name, std::move(beads.outline)});
-    }
     const auto picture = write::picture::plan_view(view);
     if (!picture) return fail(picture.error());
     status = write::write_file(output, *picture);
@@ -196,7 +234,9 @@ int run_preview(const std::vector<std::string>& texts) {
     if (!arguments->has("--quiet")) say(fmt::format("{}: layer {}, {}", output, choice.layer, readable_bytes(picture->size())));
     return 0;
   }
-  const Result<std::vector<std::size_t>> chosen = chosen_layers(*arguments, *manifest);
+  std::vector<std::uint32_t> numbers;
+  for (const LayerRecord& record : manifest->layers) numbers.push_back(record.layer.index);
+  const Result<std::vector<std::size_t>> chosen = chosen_layers(*arguments, numbers);
   if (!chosen) return fail(chosen.error());
 
   write::picture::SheetRequest request;

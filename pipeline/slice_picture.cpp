@@ -71,36 +71,43 @@ bool is_slice_directory(const std::string& directory) {
   return head.find("\"kind\": \"slice\"") != std::string::npos;
 }
 
-Result<LayerShapes> slice_shapes(const std::string& directory, std::optional<std::uint32_t> wanted) {
+Result<SlicePictures> SlicePictures::open(const std::string& directory) {
   Job job;
   if (Status status = read_job(directory + "/job.toml", job); !status) return status.error();
-  const auto plan = SlicePlan::make(job, [](const ProgressEvent&) {});
+  auto plan = SlicePlan::make(job, [](const ProgressEvent&) {});
   if (!plan) return plan.error();
-  const auto count = static_cast<std::uint32_t>(plan->layers().size());
-  const std::uint32_t index = wanted.value_or(count / 2);
-  if (index >= count) {
-    return Error{Fault::kUsage, fmt::format("--layer {}: the job has layers 0 to {}", index, count - 1)};
+  const auto range = layer_range(job, static_cast<std::uint32_t>(plan->layers().size()));
+  if (!range) return range.error();
+  SlicePictures pictures(directory, std::move(*plan));
+  pictures.manifest_ = manifest_text(directory);
+  pictures.range_ = *range;
+  return pictures;
+}
+
+Result<LayerShapes> SlicePictures::layer(std::uint32_t index) const {
+  if (index >= count()) {
+    return Error{Fault::kUsage, fmt::format("--layer {}: the job has layers 0 to {}", index, count() - 1)};
   }
   SlicePlan::Work work;
-  if (Status status = plan->layer(index, work); !status) return status.error();
+  if (Status status = plan_.layer(index, work); !status) return status.error();
   LayerShapes shapes;
-  shapes.layer = plan->layers()[index].layer;
+  shapes.layer = plan_.layers()[index].layer;
   shapes.contours = std::move(work.contours.contours);
   const double area = square_mm(doubled_area(shapes.contours));
-  const std::string line = line_of(manifest_text(directory), index);
+  const std::string line = line_of(manifest_, index);
   if (!line.empty() && line.find(fmt::format("\"points\":{},\"area_mm2\":{:.9f},\"paths\":{},", shapes.contours.point.size(),
                                              area, work.paths.size())) == std::string::npos) {
     return Error{Fault::kVerification, fmt::format("{}: layer {} is not what was written: a part has changed since; slice it "
-                                                   "again", directory, index)};
+                                                   "again", directory_, index)};
   }
-  shapes.box = plan->bounds();
+  shapes.box = plan_.bounds();
   for (const auto& [kind, name] : kKinds) {
     auto outline = outline_of(work.paths, kind);
     if (!outline) return outline.error();
     if (outline->size() > 0) shapes.beads.push_back({kind, std::string(name), std::move(*outline)});
   }
-  shapes.title = fmt::format("{}   |   layer {} of {}   |   z {:.3f} mm", plan->names().empty() ? "" : plan->names().front(),
-                             index, count, mm(shapes.layer.plane()));
+  shapes.title = fmt::format("{}   |   layer {} of {}   |   z {:.3f} mm", plan_.names().empty() ? "" : plan_.names().front(),
+                             index, count(), mm(shapes.layer.plane()));
   shapes.caption = fmt::format("{} contours, {:.2f} mm2", shapes.contours.size(), area);
   if (work.paths.size() > 0) shapes.caption += fmt::format(", {} paths", work.paths.size());
   return shapes;

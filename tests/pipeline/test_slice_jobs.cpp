@@ -5,6 +5,7 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <sstream>
+#include <tuple>
 
 #include "pipeline/fill_request.h"
 #include "tests/pipeline/program.h"
@@ -325,6 +326,35 @@ TEST(SliceProgram, OpenMeshesAreReportedWithTheirFirstPlace) {
                                       "5", "-o", "out"}, directory.path());
   EXPECT_EQ(outcome.code, 0) << outcome.err;
   EXPECT_NE(outcome.err.find("chains of cuts stay open, first in layer"), std::string::npos) << outcome.err;
+}
+
+TEST(SliceProgram, PreviewsOfSeveralLayersAreASheetAndWhatIsForImagesIsOneLine) {
+  const Directory directory;
+  ASSERT_EQ(run_lamina({"slice", corpus("parameter_quality_nut.stl"), "--layer", "2", "--pattern", "raster", "--layers", "2:9", "--quiet", "-o", "out"},
+                       directory.path()).code, 0);
+  const auto preview = [&](const std::string& output, std::vector<std::string> more) {
+    more.insert(more.begin(), {"preview", "out", "-o", output, "--width", "400"});
+    return run_lamina(more, directory.path());
+  };
+  const Outcome every = preview("every.png", {"--every", "3"}), count = preview("count.png", {"--count", "3"}), one = preview("one.png", {"--layer", "2"});
+  for (const Outcome* outcome : {&every, &count, &one}) ASSERT_EQ(outcome->code, 0) << outcome->err;
+  EXPECT_NE(every.err.find("every.png: 3 of 12 layers"), std::string::npos) << every.err;
+  const std::string pictures[] = {read_text(directory / "every.png"), read_text(directory / "count.png"), read_text(directory / "one.png")};
+  for (const std::string& picture : pictures) EXPECT_EQ(picture.substr(0, 8), "\x89PNG\r\n\x1a\n");
+  EXPECT_NE(pictures[0], pictures[1]) << "layers 2, 5, 8 and 3, 5, 7";
+  EXPECT_NE(pictures[0], pictures[2]);
+  const std::vector<std::tuple<std::string, std::vector<std::string>, std::string>> wrong = {
+      {"x.svg", {"--every", "3"}, "an SVG shows one layer"},
+      {"x.png", {"--every", "3", "--count", "2"}, "exclude each other"},
+      {"x.png", {"--whole-bed"}, "--whole-bed: is for images"},
+      {"x.png", {"--layer", "77"}, "the job has layers 0 to 11"}};
+  for (const auto& [output, more, expected] : wrong) {
+    const Outcome outcome = preview(output, more);
+    EXPECT_EQ(outcome.code, 2) << outcome.err;
+    EXPECT_EQ(outcome.error_lines(), 1u) << outcome.err;
+    EXPECT_NE(outcome.err.find(expected), std::string::npos) << outcome.err;
+    EXPECT_FALSE(fs::exists(directory / output));
+  }
 }
 
 /// Nine porous layers, then a dense one at 90 degrees, three times: the tomography cylinder of Di Nisio 2022, 3.3.1.
