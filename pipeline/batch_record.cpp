@@ -13,6 +13,7 @@
 #include <utility>
 
 #include "pipeline/json_text.h"
+#include "stages/write/atomic_file.h"
 
 namespace lamina::pipeline {
 namespace {
@@ -128,7 +129,8 @@ Status BatchRecord::append(std::string line) {
   } while (wrote < 0 && errno == EINTR);
   torn_ = wrote > 0 ? static_cast<std::size_t>(wrote) != line.size() : torn_;
   if (wrote == static_cast<ssize_t>(line.size())) return {};
-  return Error{Fault::kOutput, fmt::format("{}: {}", path_, std::strerror(wrote < 0 ? errno : ENOSPC))};
+  const Error failed = write::write_failure(path_, wrote < 0 ? errno : ENOSPC);
+  return Error{failed.fault, failed.message + ", and go on with --resume"};
 }
 
 Status BatchRecord::begun(const BatchJob& job, std::uint32_t number, bool foreign) {

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <filesystem>
 
 #include "pipeline/job_toml.h"
 
@@ -52,6 +53,20 @@ Status check_together(const KeyChoice& choice, const Arguments& arguments, const
     if (choice.has(key.section, key.name) && arguments.has(key.flag)) {
       return at_option(key.flag, "is of segmented lines, and nothing is segmented; add --fill segmented");
     }
+  }
+  return {};
+}
+
+// What is wrong with the parts of a job file is told with the place in it, where their names alone would not say.
+Status check_parts_of_file(const std::string& file, const Job& job) {
+  if (job.parts.empty()) {
+    return Error{Fault::kUsage, fmt::format("{}: no part to plan; add a [[part]] with its path, or name parts on the command line", file)};
+  }
+  for (const PartRequest& part : job.parts) {
+    std::error_code error;
+    if (part.named_at.empty() || std::filesystem::exists(part.path, error)) continue;
+    return Error{Fault::kInput, fmt::format("{}: part.path: {}: no such file; correct it (a relative path begins beside the job file)",
+                                            part.named_at, part.path)};
   }
   return {};
 }
@@ -108,6 +123,9 @@ Result<Job> read_job_options(const KeyChoice& choice, const Arguments& arguments
     for (PartRequest& part : job.parts) key.read(arguments.text(key.flag), part);
   }
   if (Status status = check_together(choice, arguments, job); !status) return status.error();
+  if (arguments.has("--job")) {
+    if (Status status = check_parts_of_file(arguments.text("--job"), job); !status) return status.error();
+  }
   return job;
 }
 

@@ -256,7 +256,8 @@ Result<JetSummary> run_jet(const Job& asked, const ProgressCallback& progress, c
   if (auto status = run_layers(plan->todo, stages, limits, cancel, graph); !status) {
     // What is finished stays on record; the job can be resumed.
     if (auto flushed = manifest->flush(); !flushed && status.error().fault == Fault::kInterrupted) return flushed.error();
-    return status.error();
+    if (status.error().fault != Fault::kOutput) return status.error();
+    return Error{Fault::kOutput, status.error().message + "; finished layers are kept, go on with --resume"};
   }
   for (; kept != plan->kept.end(); ++kept) {
     if (auto status = manifest->append(*kept); !status) return status.error();

@@ -24,6 +24,7 @@ namespace lamina::pipeline {
 /// One [[part]] of a job.
 struct PartRequest {
   std::string path;
+  std::string named_at = {};  // where a job file names it, "job.toml:12"; empty if none does
   std::string unit = "mm";  // mm, cm, m, um, inch, foot: of STL and OBJ, which carry none
   std::uint32_t copies = 1;
   std::optional<std::array<double, 2>> at_mm = {};  // where the part's box starts on the bed; arranged if absent

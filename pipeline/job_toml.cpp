@@ -114,6 +114,7 @@ Status read_parts(const std::string& path, const toml::node& node, Job& job) {
     if (part.path.empty()) {
       return Error{Fault::kUsage, fmt::format("{}: part.path is missing; name a file", place(path, entry))};
     }
+    part.named_at = place(path, *entry.as_table()->get("path"));
     job.parts.push_back(std::move(part));
   }
   return {};

@@ -19,6 +19,7 @@
 #include "pipeline/manifest_text.h"
 #include "pipeline/number_text.h"
 #include "pipeline/porous_plan.h"
+#include "stages/write/atomic_file.h"
 #include "stages/write/image_format.h"
 #include "stages/write/program/dialect.h"
 
@@ -256,7 +257,7 @@ struct ManifestWriter::State {
   }
 
   Error failed(int reason) const {
-    return Error{Fault::kOutput, fmt::format("{}.part: {}", path, std::strerror(reason))};
+    return write::write_failure(path + ".part", reason);
   }
 
   void add(const LayerRecord& record) {
@@ -352,7 +353,7 @@ Status ManifestWriter::finish() {
   const std::string partial = state.path + ".part";
   if (std::rename(partial.c_str(), state.path.c_str()) != 0) return state.failed(errno);
   const int file = std::exchange(state.file, -1);
-  if (::close(file) != 0) return Error{Fault::kOutput, fmt::format("{}: {}", state.path, std::strerror(errno))};
+  if (::close(file) != 0) return write::write_failure(state.path, errno);
   return {};
 }
 

@@ -15,4 +15,7 @@ namespace lamina::write {
 ///         is removed again, and an older file of that name stays as it was.
 Status write_file(const std::string& path, std::span<const std::byte> bytes);
 
+/// The one line about a file that could not be written, from the system's error number: what happened and what to do.
+Error write_failure(const std::string& path, int code);
+
 }  // namespace lamina::write

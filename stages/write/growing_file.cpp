@@ -1,19 +1,19 @@
 #include "stages/write/growing_file.h"
 
 #include <fcntl.h>
-#include <fmt/format.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <cerrno>
 #include <cstdio>
-#include <cstring>
+
+#include "stages/write/atomic_file.h"
 
 namespace lamina::write {
 
 Result<GrowingFile> GrowingFile::open(const std::string& path) {
   const int file = ::open((path + ".part").c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
-  if (file < 0) return Error{Fault::kOutput, fmt::format("{}: cannot write: {}", path, std::strerror(errno))};
+  if (file < 0) return write_failure(path, errno);
   return GrowingFile(path, file);
 }
 
@@ -26,16 +26,11 @@ GrowingFile::~GrowingFile() {
   ::unlink((path_ + ".part").c_str());
 }
 
-Error GrowingFile::failure(int code) {
-  return {Fault::kOutput, fmt::format("{}: cannot write: {}{}", path_, std::strerror(code),
-                                      code == ENOSPC || code == EDQUOT ? "; free some space" : "")};
-}
-
 Status GrowingFile::append(std::span<const char> bytes) {
   while (!bytes.empty()) {
     const ssize_t written = ::write(file_, bytes.data(), std::min<std::size_t>(bytes.size(), 0x7FFFF000));
     if (written < 0 && errno == EINTR) continue;
-    if (written <= 0) return failure(written < 0 ? errno : EIO);
+    if (written <= 0) return write_failure(path_, written < 0 ? errno : EIO);
     bytes = bytes.subspan(static_cast<std::size_t>(written));
     size_ += static_cast<std::uint64_t>(written);
   }
@@ -49,7 +44,7 @@ Status GrowingFile::finish() {
   if (code == 0 && std::rename(part.c_str(), path_.c_str()) != 0) code = errno;
   if (code == 0) return {};
   ::unlink(part.c_str());
-  return failure(code);
+  return write_failure(path_, code);
 }
 
 }  // namespace lamina::write

@@ -24,7 +24,6 @@ class GrowingFile {
 
  private:
   GrowingFile(std::string path, int file) : path_(std::move(path)), file_(file) {}
-  Error failure(int code);
   std::string path_;
   int file_ = -1;
   std::uint64_t size_ = 0;

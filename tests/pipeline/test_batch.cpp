@@ -160,6 +160,9 @@ TEST_F(JobsInBatch, WhatIsWrongWithOneJobIsOneLineAndTheRestIsUnharmed) {
     EXPECT_NE(outcome.err.find(reason), std::string::npos) << reason;
   }
   EXPECT_EQ(lamina({"verify", "out/good"}).code, 0);
+  // Each says where it is wrong and what to do.
+  EXPECT_EQ(json["jobs"][2]["reason"], "missing.toml:2: part.path: nowhere.stl: no such file; correct it (a relative path begins beside the job file)");
+  EXPECT_EQ(json["jobs"][9]["reason"], "half: the job is not finished; end it with --resume, then ask for the report");
 }
 
 TEST_F(JobsInBatch, WrongBatchesAreRefusedInOneLineBeforeAnythingRuns) {
@@ -182,7 +185,7 @@ TEST_F(JobsInBatch, WrongBatchesAreRefusedInOneLineBeforeAnythingRuns) {
       {{"summary.txt"}, "out/summary.json, which belongs"}, {{"table.txt"}, "out/summary.tsv, which belongs"},
       {{"empty.txt"}, "no job in it"}, {{"empty"}, "no part"}, {{"quote.txt"}, "quote.txt:1: a ' is not closed"},
       {{"same.txt"}, "same.txt:1 and same.txt:2: both write into"}, {{"nested.txt"}, "nested.txt:1 and nested.txt:3"},
-      {{"own.txt"}, "belongs to the batch"}, {{"gone.txt"}, "no such file"}, {{}, "no jobs"},
+      {{"own.txt"}, "belongs to the batch"}, {{"gone.txt"}, "gone.txt: no such file or directory; name a list"}, {{}, "no jobs"},
       {{"part10.stl", "--memory", "x"}, "--memory"}, {{"part10.stl", "--jobs", "-1"}, "--jobs"},
       {{"part10.stl", "--time-limit", "0"}, "--time-limit"}, {{"part10.stl", "--resume", "--overwrite"}, "exclude each other"},
       {{"part10.stl", "--with", " "}, "--with"}};
@@ -323,7 +326,7 @@ TEST_F(JobsInBatch, AFullDiskIsOneLineTheRestIsUnharmedAndWithRoomItGoesOn) {
   Json json = summary("out");
   EXPECT_EQ(outcomes("out"), (Words{"done", "failed", "done"}));
   const std::string reason = json["jobs"][1]["reason"];
-  EXPECT_NE(reason.find("No space left on device"), std::string::npos) << reason;
+  EXPECT_NE(reason.find("No space left on device); free some space; finished layers are kept, go on with --resume"), std::string::npos) << reason;
   EXPECT_EQ(reason.find('\n'), std::string::npos);
   EXPECT_EQ(lamina({"verify", "out/a", "out/c", "--quiet"}).code, 0);
 
@@ -333,7 +336,7 @@ TEST_F(JobsInBatch, AFullDiskIsOneLineTheRestIsUnharmedAndWithRoomItGoesOn) {
   ASSERT_EQ(lamina(batch_of({"-o", "whole"}, all)).code, 0);
   const Outcome full = lamina(batch_of({"-o", "disk/out"}, all));
   EXPECT_EQ(full.code, 4) << full.err;
-  EXPECT_NE(full.err.find("No space left on device"), std::string::npos) << full.err;
+  EXPECT_NE(full.err.find("No space left on device); free some space"), std::string::npos) << full.err;
   for (const std::string& file : files_below(directory_ / "disk")) EXPECT_FALSE(file.ends_with(".tif.part")) << file;
   ASSERT_TRUE(disk.grow());
   const Outcome resumed = lamina(batch_of({"-o", "disk/out", "--resume"}, all));
