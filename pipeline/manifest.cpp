@@ -16,6 +16,7 @@
 #include "pipeline/job_toml.h"
 #include "pipeline/json_text.h"
 #include "pipeline/machine_profile.h"
+#include "pipeline/print_program.h"
 #include "pipeline/manifest_text.h"
 #include "pipeline/number_text.h"
 #include "pipeline/porous_plan.h"
@@ -51,9 +52,10 @@ std::string part_text(const PartSummary& part) {
 // The machine's line, if there is one.
 std::string machine_line(const ManifestHead& head) {
   if (head.machine.empty()) return {};
-  return fmt::format("\"machine\": {{\"name\": {}, \"dialect\": {}, \"extension\": {}, \"profile_xxh3_128\": \"{}\"}},\n",
+  return fmt::format("\"machine\": {{\"name\": {}, \"dialect\": {}, \"extension\": {}, \"profile_xxh3_128\": \"{}\", "
+                     "\"start_xxh3_128\": \"{}\", \"end_xxh3_128\": \"{}\"}},\n",
                      json_string(head.machine), json_string(head.dialect), json_string(head.program_extension),
-                     hex(head.machine_profile));
+                     hex(head.machine_profile), hex(head.program_start), hex(head.program_end));
 }
 
 // The line of a job with several materials.
@@ -177,6 +179,9 @@ ManifestHead make_head(const Job& job, const std::vector<PartSummary>& parts, st
     if (const auto* dialect = write::find_dialect(machine.dialect)) head.program_extension = dialect->extension;
     const std::string profile = machine_text(machine);
     head.machine_profile = hash_bytes(std::as_bytes(std::span(profile)));
+    const ProgramFrame frame = program_frame(*job.machine.resolved, layer_count);
+    head.program_start = hash_bytes(frame.start);
+    head.program_end = hash_bytes(frame.end);
   }
   return head;
 }

@@ -61,6 +61,7 @@ struct ManifestHead {
   std::vector<PartSummary> parts;
   std::string machine, dialect, program_extension;  // empty without a machine
   Hash128 machine_profile;                          // of program/machine.toml
+  Hash128 program_start, program_end;               // of program/start.* and end.*
   std::vector<JobMaterial> materials;               // if there are several
   /// Hash of all of the above but the range: two directories with the same id belong to the same job.
   Hash128 id() const;

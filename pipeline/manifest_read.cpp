@@ -64,7 +64,11 @@ ManifestHead head_from(const json& text) {
     head.machine = machine.at("name");
     head.dialect = machine.at("dialect");
     head.program_extension = machine.at("extension");
-    if (!read_hex(machine.at("profile_xxh3_128").get<std::string>(), head.machine_profile)) head.machine.clear();
+    const auto hash = [&](const char* key, Hash128& to) { return read_hex(machine.at(key).get<std::string>(), to); };
+    if (!hash("profile_xxh3_128", head.machine_profile) || !hash("start_xxh3_128", head.program_start) ||
+        !hash("end_xxh3_128", head.program_end)) {
+      head.machine.clear();
+    }
   }
   return head;
 }

@@ -65,6 +65,19 @@ std::vector<fs::path> layer_files(const std::string& directory) {
   return found;
 }
 
+// What is in program/ beside the layers' programs, of whatever dialect.
+std::vector<fs::path> program_frames(const std::string& directory) {
+  std::vector<fs::path> found;
+  for_each_entry(fs::path(directory) / "program", [&](const fs::directory_entry& entry) {
+    const std::string name = entry.path().filename().string();
+    const bool frame = std::ranges::any_of(write::dialects(), [&](const write::Dialect& one) {
+      return name == fmt::format("start{}", one.extension) || name == fmt::format("end{}", one.extension);
+    });
+    if (frame || name == "machine.toml") found.push_back(entry.path());
+  });
+  return found;
+}
+
 Error cannot(const fs::path& path, int reason) {
   return {Fault::kOutput, fmt::format("{}: {}", path.string(), std::strerror(reason))};
 }
@@ -189,10 +202,13 @@ Status prepare_output(const Job& job) {
     if (error) return cannot(directory / file.name, error.value());
   }
   if (job.shard) return {};
-  for (const fs::path& file : layer_files(job.output)) {
+  std::vector<fs::path> old = layer_files(job.output);
+  for (fs::path& file : program_frames(job.output)) old.push_back(std::move(file));
+  for (const fs::path& file : old) {
     fs::remove(file, error);
     if (error) return cannot(file, error.value());
   }
+  if (job.machine.profile.empty()) fs::remove(directory / "program", error);  // unless something else is in it
   return {};
 }
 

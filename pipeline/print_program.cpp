@@ -14,6 +14,14 @@ std::string program_file_name(std::uint32_t index, std::string_view extension) {
   return extension.empty() ? std::string() : fmt::format("program/{:06}{}", index, extension);
 }
 
+ProgramFrame program_frame(const ResolvedMachine& resolved, std::uint32_t layers) {
+  ProgramFrame frame;
+  const auto writer = write::find_dialect(resolved.machine.dialect)->make_writer(resolved.machine, resolved.grid);
+  writer->start(layers, frame.start);
+  writer->end(frame.end);
+  return frame;
+}
+
 PrintProgram::PrintProgram(const Job& job, std::uint32_t layers)
     : resolved_(*job.machine.resolved),
       dialect_(*write::find_dialect(resolved_.machine.dialect)),
@@ -25,13 +33,9 @@ std::string PrintProgram::path(std::string_view name) const { return fmt::format
 Status PrintProgram::begin() const {
   const std::string profile = machine_text(resolved_.machine);
   if (Status status = write::write_file(path("machine.toml"), std::as_bytes(std::span(profile))); !status) return status;
-  const auto writer = dialect_.make_writer(resolved_.machine, resolved_.grid);
-  write::ProgramBytes text;
-  writer->start(layers_, text);
-  if (Status status = write::write_file(path(fmt::format("start{}", dialect_.extension)), text); !status) return status;
-  text.clear();
-  writer->end(text);
-  return write::write_file(path(fmt::format("end{}", dialect_.extension)), text);
+  const ProgramFrame frame = program_frame(resolved_, layers_);
+  if (Status status = write::write_file(path(fmt::format("start{}", dialect_.extension)), frame.start); !status) return status;
+  return write::write_file(path(fmt::format("end{}", dialect_.extension)), frame.end);
 }
 
 Status PrintProgram::write_layer(const Layer& layer, const RunsView& image, const std::vector<std::uint32_t>& feeds,

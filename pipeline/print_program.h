@@ -34,6 +34,12 @@ struct ProgramWork {
 /// The file of a layer's program in a job's directory, program/000042.gcode; "" without a machine.
 std::string program_file_name(std::uint32_t index, std::string_view extension);
 
+/// What the machine is told before the first layer and after the last one.
+struct ProgramFrame {
+  write::ProgramBytes start, end;
+};
+ProgramFrame program_frame(const ResolvedMachine& resolved, std::uint32_t layers);
+
 class PrintProgram {
  public:
   /// For a job with a resolved machine, which has to outlive it.

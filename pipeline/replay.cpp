@@ -32,6 +32,8 @@ void ReplayCount::add(const ReplayCount& other) {
   fed_mm[0] += other.fed_mm[0];
   fed_mm[1] += other.fed_mm[1];
   vats |= other.vats;
+  moves |= other.moves;
+  build_mm = std::max(build_mm, other.build_mm);
   farthest_along_um = std::max(farthest_along_um, other.farthest_along_um);
   farthest_across_um = std::max(farthest_across_um, other.farthest_across_um);
 }
@@ -230,6 +232,11 @@ void Printing::fire_words(const std::vector<std::uint64_t>& words) {
 }
 
 void Printing::head_moves(double mm, double mm_s, bool scanning) {
+  const double hertz = mm_s * 1000 / machine_.place_um_;
+  if (scanning && hertz > profile().head.highest_frequency_hz * (1 + 1e-4)) {  // speeds are written rounded
+    fault(fmt::format("scans at {:g} mm/s, where nozzles fire {:.0f} times a second; they can {:.0f}", mm_s, hertz,
+                      profile().head.highest_frequency_hz));
+  }
   (scanning ? count.scan_mm : count.travel_mm) += std::abs(mm);
   count.seconds += std::abs(mm) / mm_s;
 }
@@ -238,6 +245,39 @@ void Printing::feeds(std::uint32_t vat, double mm, double mm_s) {
   count.fed_mm[vat] += mm;
   if (mm > 0) count.vats |= 1u << vat;
   count.seconds += std::abs(mm) / mm_s;
+}
+
+void Printing::build_vat_stands_at(double mm) {
+  count.moves = true;
+  count.build_mm = mm * profile().powder.build_sign;
+}
+
+void Printing::roller_stands_at(double mm) {
+  rolled_ = rolled_ || std::abs(mm - profile().powder.roller_mm[1]) < 1e-3;
+  roller_mm_ = mm;
+}
+
+void Printing::check_cycle(const Layer& layer) const {
+  if (!count.moves) return;
+  const auto& powder = profile().powder;
+  const auto wrong = [&](const std::string& what) { throw fmt::format("layer {}, powder cycle: {}", layer_, what); };
+  // Numbers are written to a tenth of a micrometre.
+  if (const double top = mm(std::int64_t{layer.bottom} + layer.thickness); std::abs(count.build_mm - top) > 1e-3) {
+    wrong(fmt::format("the build vat stands at {:g} mm where {:g} have to", count.build_mm, top));
+  }
+  const double fed = count.fed_mm[0] + count.fed_mm[1], dose = powder.dose * mm(layer.thickness);
+  if (std::abs(fed - dose) > 1e-3) wrong(fmt::format("{:g} mm are fed where {:g} have to", fed, dose));
+  if (!rolled_) wrong(fmt::format("the roller does not reach its far end at {:g} mm", powder.roller_mm[1]));
+  if (std::abs(roller_mm_ - powder.roller_mm[0]) > 1e-3) {
+    wrong(fmt::format("the roller stays at {:g} mm, not at {:g}", roller_mm_, powder.roller_mm[0]));
+  }
+}
+
+std::int64_t Printing::line_of(std::uint32_t column, std::uint32_t row) const {
+  const auto& mount = profile().mounting;
+  const auto has = [&](Side side) { return mount.scan_from == side || mount.nozzle_0 == side; };
+  if (mount.scan_axis == ScanAxis::kX) return has(Side::kFront) ? machine_.rows_ - 1 - row : row;
+  return has(Side::kRight) ? machine_.columns_ - 1 - column : column;
 }
 
 // Where the nozzle is that has to see to a pixel.
@@ -264,8 +304,21 @@ void Printing::compare(const RunsView& image, std::uint64_t moved, std::uint64_t
   std::string first, first_of_all;  // that nothing explains; explained or not
   const bool x = profile().mounting.scan_axis == ScanAxis::kX;
   const std::int64_t next = profile().mounting.passes;
+  // Lines that a nozzle which works comes over, and those of blocked ones: only these may lose pixels. A sweep in which
+  // nobody fires is not known; what no sweep comes over may be one.
+  std::vector<bool> worked(machine_.lines_), blocked(machine_.lines_);
+  for (const Sweep& sweep : sweeps_) {
+    for (const VirtualMachine::Nozzle& nozzle : machine_.nozzle_) {
+      const std::int64_t over = sweep.first_line + nozzle.line;
+      if (over >= 0 && over < machine_.lines_) (nozzle.blocked ? blocked : worked)[std::size_t(over)] = true;
+    }
+  }
+  const auto may_be_lost = [&](std::int64_t column, std::int64_t row) {
+    const auto over = std::size_t(line_of(static_cast<std::uint32_t>(column), static_cast<std::uint32_t>(row)));
+    return blocked[over] || !worked[over];
+  };
   const auto set_and_unfired = [&](std::int64_t column, std::int64_t row) {
-    if (column < 0 || row < 0 || column >= machine_.columns_ || row >= machine_.rows_) return false;
+    if (column < 0 || row < 0 || column >= machine_.columns_ || row >= machine_.rows_ || !may_be_lost(column, row)) return false;
     const auto line = image.row(static_cast<std::uint32_t>(row));
     const auto after = std::upper_bound(line.begin(), line.end(), static_cast<std::uint32_t>(column)) - line.begin();
     return after % 2 == 1 && (fired_[std::size_t(row) * row_words_ + std::size_t(column) / 64] >> (column % 64) & 1) == 0;
@@ -288,7 +341,7 @@ void Printing::compare(const RunsView& image, std::uint64_t moved, std::uint64_t
         const std::uint32_t column = w * 64 + bit;
         const bool extra = (got >> bit & 1) != 0;
         (extra ? added : missing) += 1;
-        const bool explained = !extra ? moved + lost > 0
+        const bool explained = !extra ? moved + lost > 0 && may_be_lost(column, row)
                                       : moved > 0 && (x ? set_and_unfired(column, row - next) || set_and_unfired(column, row + next)
                                                         : set_and_unfired(column - next, row) || set_and_unfired(column + next, row));
         if (first_of_all.empty()) first_of_all = place_of(column, row);
@@ -307,13 +360,14 @@ void Printing::compare(const RunsView& image, std::uint64_t moved, std::uint64_t
   }
 }
 
-Result<ReplayCount> VirtualMachine::replay(std::string_view program, std::uint32_t layer, const RunsView& image,
+Result<ReplayCount> VirtualMachine::replay(std::string_view program, const Layer& layer, const RunsView& image,
                                            std::uint64_t moved, std::uint64_t lost) const {
-  Printing printing(*this, layer, nullptr);
+  Printing printing(*this, layer.index, nullptr);
   try {
     for (const DialectReader& reader : kReaders) {
       if (reader.id != machine_.dialect) continue;
       reader.read(program, printing);
+      printing.check_cycle(layer);
       printing.compare(image, moved, lost);
       return printing.count;
     }

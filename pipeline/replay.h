@@ -11,6 +11,7 @@
 #include <string_view>
 #include <vector>
 
+#include "stages/data/layer.h"
 #include "stages/data/machine.h"
 #include "stages/data/runs.h"
 #include "stages/data/status.h"
@@ -25,6 +26,8 @@ struct ReplayCount {
   double seconds = 0;                          // head, roller and vats, one after the other
   std::array<double, 2> fed_mm{0, 0};          // by each vat
   std::uint32_t vats = 0;                      // that feed, a bit each, by words or by movement
+  bool moves = false;                          // whether the program moves the vats and the roller itself
+  double build_mm = 0;                         // where the build vat stands at the end
   double farthest_along_um = 0, farthest_across_um = 0;  // a drop from the centre of its pixel
   void add(const ReplayCount& other);
 };
@@ -39,14 +42,17 @@ class VirtualMachine {
 
   /// Carries out the program of a layer (the whole file) and compares what it printed with the image.
   ///
+  /// layer     its number, and where the build vat has to stand
   /// image     what was to be printed
   /// moved     pixels of blocked nozzles that neighbours fire instead, as recorded
   /// lost      those that nobody fires, as recorded
   /// errors    kVerification: "layer 12, swath 3, step 417: what is wrong"; a text that ends early, a word that the
   ///           dialect does not have, a nozzle that does not exist, is blocked or fires twice on a pixel, a pixel that is
-  ///           not fired, one that is fired and not set, other numbers of moved or lost pixels
+  ///           not fired although a nozzle that works comes over it, one that is fired and not set, other numbers of moved
+  ///           or lost pixels, a scan at which nozzles would fire too often, and where the dialect moves the machine: a
+  ///           build vat at another height, another dose, a roller that does not go to its far end and back
   /// cost      O(text + drops); a bit a pixel
-  Result<ReplayCount> replay(std::string_view program, std::uint32_t layer, const RunsView& image, std::uint64_t moved,
+  Result<ReplayCount> replay(std::string_view program, const Layer& layer, const RunsView& image, std::uint64_t moved,
                              std::uint64_t lost) const;
 
   /// Told of each drop in the order of the program: column and row of the image, sweep, step.

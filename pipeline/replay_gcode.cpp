@@ -74,6 +74,11 @@ bool Axes::take(const GcodeLine& line, bool scanning) {
       head_squared += way * way;
     } else if (axis == profile.powder.build_axis || axis == profile.powder.roller_axis) {
       printing_.takes(std::abs(way) / feed_mm_s_);
+      if (axis == profile.powder.build_axis) {
+        printing_.build_vat_stands_at(at);
+      } else {
+        printing_.roller_stands_at(at);
+      }
     } else if (axis == profile.powder.feed_axes[0] || axis == profile.powder.feed_axes[1]) {
       printing_.feeds(axis == profile.powder.feed_axes[0] ? 0 : 1, way * profile.powder.feed_sign, feed_mm_s_);
     } else {

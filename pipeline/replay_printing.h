@@ -40,8 +40,12 @@ class Printing {
   // --- what moves
   void head_moves(double mm, double mm_s, bool scanning);
   void feeds(std::uint32_t vat, double mm, double mm_s);
+  void build_vat_stands_at(double mm);
+  void roller_stands_at(double mm);
   void takes(double seconds) { count.seconds += seconds; }
 
+  /// Whether the powder cycle was that of a layer; to be asked at the end.
+  void check_cycle(const Layer& layer) const;
   /// Compares with an image; see VirtualMachine::replay.
   void compare(const RunsView& image, std::uint64_t moved, std::uint64_t lost);
 
@@ -52,6 +56,7 @@ class Printing {
     std::uint32_t number;
     std::int64_t first_line;
   };
+  std::int64_t line_of(std::uint32_t column, std::uint32_t row) const;
   bool pixel(std::int64_t line, std::int64_t place, std::uint32_t& column, std::uint32_t& row) const;
   std::string place_of(std::uint32_t column, std::uint32_t row) const;
 
@@ -61,6 +66,8 @@ class Printing {
   std::uint32_t sweep_ = 0;
   std::int64_t first_line_ = 0, step_ = 0, previous_step_ = 0;
   std::int64_t reading_ = INT64_MIN, reading_sweep_ = INT64_MIN;
+  bool rolled_ = false;       // to the far end
+  double roller_mm_ = 0;
   bool backward_ = false, sweeping_ = false, stepped_ = false, fired_here_ = false;
   std::vector<std::uint64_t> fired_;  // a bit a pixel, the leftmost in bit 0
   std::vector<Sweep> sweeps_;

@@ -155,7 +155,7 @@ Result<double> seconds_of_layer(const std::string& directory, const ManifestHead
                                 const LayerRecord& record, const RunsView& image) {
   const std::string program = program_of_layer(directory, head, record.layer.index);
   if (hash_bytes(std::as_bytes(std::span(program))) == record.program.hash) {
-    const auto replay = machine.replay(program, record.layer.index, image, record.program.moved, record.program.lost);
+    const auto replay = machine.replay(program, record.layer, image, record.program.moved, record.program.lost);
     if (replay) return replay->seconds;
     return Error{Fault::kVerification, fmt::format("{}: {}", directory, replay.error().message)};
   }

@@ -76,7 +76,7 @@ std::string fault_of_program(Inspection& inspection, const LayerRecord& record, 
   const bool same = digest->bytes == record.program.bytes && digest->hash == record.program.hash;
   if (image != nullptr && inspection.machine) {
     const auto replay = inspection.machine->replay(program_of_layer(inspection.directory, inspection.head, record.layer.index),
-                                                   record.layer.index, *image, record.program.moved, record.program.lost);
+                                                   record.layer, *image, record.program.moved, record.program.lost);
     if (!replay) return fmt::format("{}: {}", name, replay.error().message);
     if (same && replay->drops != record.program.drops) {
       return fmt::format("{}: {} drops, the manifest says {}", name, replay->drops, record.program.drops);
@@ -91,7 +91,9 @@ std::string fault_of_program(Inspection& inspection, const LayerRecord& record, 
     inspection.report.replay.add(*replay);
     ++inspection.report.replayed;
   }
-  return same ? std::string() : fmt::format("{}: its content is not what was written", name);
+  return same ? std::string()
+              : fmt::format("{}: layer {}: its content is not what was written{}", name, record.layer.index,
+                            image != nullptr ? ", though it prints the same" : "");
 }
 
 // Empty, or what is wrong with an image; what it sets is added to `whole`.
@@ -148,6 +150,25 @@ void prepare_replay(Inspection& inspection) {
   inspection.report.machine = inspection.machine->profile().name;
 }
 
+// The programs before the first and behind the last layer.
+void check_frame(const std::string& directory, const ManifestHead& head, VerifyReport& report) {
+  for (const auto& [stem, hash] : {std::pair{"start", head.program_start}, {"end", head.program_end}}) {
+    const std::string name = fmt::format("program/{}{}", stem, head.program_extension);
+    const std::string path = (fs::path(directory) / name).string();
+    std::error_code error;
+    if (!fs::is_regular_file(path, error)) {
+      add_fault(report, name + ": is missing");
+      continue;
+    }
+    const Result<FileDigest> digest = digest_file(path);
+    if (!digest) {
+      add_fault(report, digest.error().message);
+    } else if (digest->hash != hash) {
+      add_fault(report, name + ": its content is not what was written");
+    }
+  }
+}
+
 // Sums that need the profile.
 void finish_replay(const Inspection& inspection) {
   if (!inspection.machine || inspection.report.replayed == 0) return;
@@ -163,7 +184,10 @@ void finish_replay(const Inspection& inspection) {
 
 void check_layers(const std::string& directory, const Manifest& manifest, bool quick, VerifyReport& report) {
   Inspection inspection{directory, manifest.head, quick, std::nullopt, {}, report};
-  if (!manifest.head.machine.empty()) prepare_replay(inspection);
+  if (!manifest.head.machine.empty()) {
+    prepare_replay(inspection);
+    check_frame(directory, manifest.head, report);
+  }
   // In pieces, so that messages stay in layer order and cost no string for each of a hundred thousand layers.
   constexpr std::size_t kPiece = 1024;
   std::vector<std::string> faults(std::min(kPiece, manifest.layers.size()));

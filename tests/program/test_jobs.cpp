@@ -92,6 +92,104 @@ TEST_F(PrintJobs, BlockedNozzlesAndLessBinderAreRecordedAndReplayed) {
   EXPECT_EQ(summary->moved_pixels, report->moved);
 }
 
+TEST_F(PrintJobs, WhatSurroundsTheLayersAndThePowderCycleAreVerifiedToo) {
+  const Job made = job("parameter_quality_nut.stl", 1, "nuferbj", "cycle");
+  ASSERT_TRUE(run(made).ok());
+  const fs::path program = fs::path(made.output) / "program";
+  const auto text_of = [](const fs::path& path) {
+    std::ifstream file(path, std::ios::binary);
+    return std::string(std::istreambuf_iterator<char>(file), {});
+  };
+  const auto fault_with = [&](const fs::path& path, const std::string& from, const std::string& to) {
+    const std::string text = text_of(path);
+    std::string edited = text;
+    const std::size_t at = edited.find(from);
+    EXPECT_NE(at, std::string::npos) << from << " in " << text.substr(0, 200);
+    if (at != std::string::npos) edited.replace(at, from.size(), to);
+    std::ofstream(path, std::ios::binary) << edited;
+    const auto report = verify(made.output, {});
+    std::ofstream(path, std::ios::binary) << text;
+    return report.ok() && report->faults.size() == 1 ? report->faults[0] : std::string("not one fault");
+  };
+  const auto tells = [](const std::string& fault, const std::string& what) {
+    EXPECT_NE(fault.find(what), std::string::npos) << fault;
+  };
+  const fs::path layer = program / "000001.gcode";
+  tells(fault_with(program / "start.gcode", "G21", "G20"), "program/start.gcode: its content is not what was written");
+  tells(fault_with(layer, "Z3.0000", "Z2.5000"), "layer 1, powder cycle: the build vat stands at 2.5 mm where 3 have to");
+  tells(fault_with(layer, "G1 A1.8750", "G1 A0.8750"), "layer 1, powder cycle: 0.875 mm are fed where 1.875 have to");
+  tells(fault_with(layer, "G1 U260.0000", "G1 U100.0000"), "layer 1, powder cycle: the roller does not reach its far end");
+  tells(fault_with(layer, "G1 U0.0000", "G1 U9.0000"), "layer 1, powder cycle: the roller stays at 9 mm");
+  const std::string text = text_of(layer);
+  const std::size_t scan = text.find("G1 Y") != std::string::npos ? text.find("G1 Y") : text.find("G1 X");
+  ASSERT_NE(scan, std::string::npos);
+  const std::string line = text.substr(scan, text.find('\n', scan) - scan);
+  tells(fault_with(layer, line, line.substr(0, line.find(" F")) + " F60000"), ": scans at 1000 mm/s, where nozzles fire");
+  fs::remove(program / "end.gcode");
+  const auto report = verify(made.output, {});
+  ASSERT_TRUE(report.ok());
+  ASSERT_EQ(report->faults.size(), 1u);
+  EXPECT_EQ(report->faults[0], "program/end.gcode: is missing");
+}
+
+TEST_F(PrintJobs, AJobThatReplacesAnotherLeavesNoneOfItsPrograms) {
+  Job made = job("parameter_quality_nut.stl", 1, "hp45", "replaced");
+  ASSERT_TRUE(run(made).ok());
+  for (const char* machine : {"nuferbj", "production-1200", ""}) {
+    made.machine = {};
+    made.machine.profile = machine;
+    made.overwrite = true;
+    made.layer_mm = 3;
+    const auto summary = run(made);
+    ASSERT_TRUE(summary.ok()) << machine << ": " << summary.error().message;
+    const auto report = verify(made.output, {});
+    ASSERT_TRUE(report.ok());
+    EXPECT_TRUE(report->ok()) << machine << ": " << (report->faults.empty() ? "" : report->faults[0]);
+  }
+  EXPECT_FALSE(fs::exists(fs::path(made.output) / "program"));
+}
+
+TEST_F(PrintJobs, APixelThatAWorkingNozzleLeavesOutIsToldWhereverOthersAreBlocked) {
+  for (const char* const rule : {"report", "neighbour"}) {
+    Job made = job("dental_crown.stl", 2, "nuferbj", rule);
+    std::ofstream profile(directory_ / (std::string(rule) + ".toml"));
+    for (const ShippedMachine& shipped : shipped_machines()) {
+      if (shipped.name != "nuferbj") continue;
+      std::string text(shipped.text);
+      const std::size_t head = text.find("[head]\n");
+      ASSERT_NE(head, std::string::npos);
+      text.insert(head + 7, std::string("blocked = [17, 40, 41, 42, 93]\nblocked_rule = \"") + rule + "\"\n");
+      profile << text;
+    }
+    profile.close();
+    made.machine.profile = (directory_ / (std::string(rule) + ".toml")).string();
+    const auto summary = run(made);
+    ASSERT_TRUE(summary.ok()) << summary.error().message;
+    EXPECT_GT(summary->lost_pixels + summary->moved_pixels, 0u);
+    // One bit of a vector in the middle of a layer is taken away.
+    const fs::path layer = fs::path(made.output) / "program/000002.gcode";
+    std::ifstream in(layer, std::ios::binary);
+    std::string text(std::istreambuf_iterator<char>(in), {});
+    in.close();
+    std::size_t at = text.find("\nJ", text.size() / 2);
+    ASSERT_NE(at, std::string::npos);
+    at = text.find(' ', at);
+    while (text[at] != '1' && text[at] != '2' && text[at] != '4' && text[at] != '8') {
+      at = text[at] == '\n' ? text.find(' ', at) : at + 1;  // past the next step
+      ASSERT_LT(at, text.size());
+    }
+    const std::size_t begin = text.rfind("\nJ", at) + 2;
+    const std::string step = text.substr(begin, text.find(' ', begin) - begin);
+    text[at] = '0';
+    std::ofstream(layer, std::ios::binary) << text;
+    const auto report = verify(made.output, {});
+    ASSERT_TRUE(report.ok());
+    ASSERT_EQ(report->faults.size(), 1u) << rule;
+    EXPECT_NE(report->faults[0].find(", step " + step + ": column "), std::string::npos) << step << ": " << report->faults[0];
+    EXPECT_NE(report->faults[0].find("is set in the image and not fired"), std::string::npos) << report->faults[0];
+  }
+}
+
 TEST_F(PrintJobs, ShardsMergedAndLayersResumedGiveTheBytesOfOneRun) {
   const Job whole = job("dental_crown.stl", 1, "nuferbj-31", "whole");
   ASSERT_TRUE(run(whole).ok());

@@ -54,7 +54,7 @@ Written write_layer(const ResolvedMachine& resolved, const RunsView& image) {
 Result<ReplayCount> replay(const ResolvedMachine& resolved, const RunsView& image, const Written& program) {
   const auto machine = VirtualMachine::build(resolved.machine, resolved.grid.image.columns(), resolved.grid.image.rows());
   if (!machine) return machine.error();
-  return machine->replay(program.text, 7, image, program.count.moved, program.count.lost);
+  return machine->replay(program.text, {7, 700'000, 100'000}, image, program.count.moved, program.count.lost);
 }
 
 /// The machine with a bed of so many of its own pixels.
@@ -214,7 +214,7 @@ TEST(Replay, EveryDialectSpeaksForAnyMountingDirectionAndBlockedNozzle) {
 
 /// Whether a fault says where: a swath and a step of it, or that the first of them has not been reached.
 bool tells_the_place(const std::string& fault) {
-  static const std::regex place("layer 7, (swath [0-9]+, (step -?[0-9]+|before its first step)|before its first swath"
+  static const std::regex place("layer 7, (swath [0-9]+, (step -?[0-9]+|before its first step)|before its first swath|powder cycle"
                                 "|line [0-9]+ across, place [0-9]+ along, which no swath comes over): .*");
   return std::regex_match(fault, place);
 }
