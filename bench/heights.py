@@ -34,6 +34,8 @@ PARTS = {
 }
 # Layers and largest step of earlier tables of the same peers, whose settings are not known any more.
 EARLIER = {"3DBenchy": (("Slic3r", 462, 0.182), ("CuraEngine", 395, 0.295))}
+# At least so many per cent fewer layers than the peer, at the step that it leaves.
+GOALS = {"3DBenchy": {"Slic3r": 45, "CuraEngine": 50}, "sphere of 40 mm": {"Slic3r": 23, "CuraEngine": 18}}
 
 
 def run(command, log=None):
@@ -167,6 +169,7 @@ def part_section(name, part, ours, folder, definitions):
     say(f"bench: {name}")
     lines = [f"## {name}", "", "| table | layers | fewer than the peer | largest step, mm | mean step, mm | flats missed | "
              "by up to, um | top off by, um |", "|---|---|---|---|---|---|---|---|"]
+    judged = []
     for (peer, slicer), first in itertools.product([("Slic3r", slic3r), ("CuraEngine", cura)], FIRST_LAYERS):
         tops = os.path.join(folder, f"{os.path.basename(part)[:-4]}-{peer}-{first}.tops")
         if not os.path.exists(tops):
@@ -178,6 +181,10 @@ def part_section(name, part, ours, folder, definitions):
         cusp = theirs["largest_cusp_mm"]
         lines.append(row(f"**{peer}**, first layer {first}", theirs))
         best = ours.table(part, "optimal", cusp)
+        goal, fewer = GOALS.get(name, {}).get(peer), 100 * (1 - best["layers"] / theirs["layers"])
+        if goal is not None:
+            judged.append(f"{peer} with a first layer of {first} mm: {fewer:.1f} % fewer layers, {goal} % asked, "
+                          + ("met" if fewer >= goal else "not met"))
         lines.append(row(f"`optimal`, step {cusp:.4f}", best, theirs))
         for way in ("cusp", "stepwise"):
             lines.append(row(f"`{way}`, step {cusp:.4f}", ours.table(part, way, cusp), theirs))
@@ -189,7 +196,7 @@ def part_section(name, part, ours, folder, definitions):
                              table, {"layers": layers}))
     for table in ours.tables(part, "--thickness", f"{LEAST}..{MOST}", "--cusp", "0.1", "--compare"):
         lines.append(row(f"`{table['name']}`, step 0.1", table))
-    return lines + [""]
+    return lines + ["", *(["; ".join(judged) + ".", ""] if judged else [])]
 
 
 def times(ours, part, *options, turns=7):
@@ -229,7 +236,7 @@ def tall_part(folder, height, facets):
 def time_section(ours, models, folder):
     lines = ["## Time", "", f"Wall milliseconds, the least of 7 runs (load of the machine before them: {os.getloadavg()[0]:.1f}): reading the file (repair of the open column included), the pass "
              "over all facets, deciding the layers.", "",
-             "| part | triangles | way | read | surface | layers |", "|---|---|---|---|---|---|"]
+             "| part | triangles | way | read | surface | layers | surface and layers / read |", "|---|---|---|---|---|---|---|"]
     terrain = os.path.join(folder, "terrain.stl")
     if not os.path.exists(terrain):
         make_parts.write_stl(terrain, make_parts.read_stl(os.path.join(models, "st_helens_terrain_645k.stl.gz")))
@@ -244,7 +251,8 @@ def time_section(ours, models, folder):
     for name, part, triangles, (thickness,), ways in cases:
         for way in ways:
             load, surface, layers = times(ours, part, "--heights", way, "--thickness", thickness, "--cusp", "0.1")
-            lines.append(f"| {name} | {triangles:,} | `{way}` | {1000 * load:.1f} | {1000 * surface:.1f} | {1000 * layers:.1f} |")
+            lines.append(f"| {name} | {triangles:,} | `{way}` | {1000 * load:.1f} | {1000 * surface:.1f} | {1000 * layers:.1f} | "
+                         f"{(surface + layers) / load:.2f} |")
             say("  " + lines[-1])
     return lines + [""]
 
