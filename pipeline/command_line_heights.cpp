@@ -68,6 +68,16 @@ Result<Job> job_of(const Arguments& arguments) {
   return read;
 }
 
+// A file of this form holds one table and no name for it.
+Status check_one_table(const Job& job, const Arguments& arguments) {
+  const bool many = arguments.all("--measure").size() > 1;
+  if (!arguments.has("--compare") && !job.heights.per_part && !many) return {};
+  return Error{Fault::kUsage, fmt::format("--format rp3: holds one table, and {} makes several; leave it out or choose text, csv or json",
+                                          arguments.has("--compare") ? "--compare"
+                                          : job.heights.per_part     ? "--per-part"
+                                                                     : "more than one --measure")};
+}
+
 std::string rp3_of(const Job& job, const HeightsStudy& study) {
   write::rp3::Settings settings;
   settings.shrink = job.parts.front().shrink;
@@ -94,6 +104,9 @@ int run_heights_command(const std::vector<std::string>& texts) {
   if (const Status status = check_plot_name(plot); !status) return fail(status.error());
   const Result<Job> job = job_of(*arguments);
   if (!job) return fail(job.error());
+  if (form == Form::kRp3) {
+    if (Status status = check_one_table(*job, *arguments); !status) return fail(status.error());
+  }
   if (arguments->has("--save-job")) {
     if (Status status = save_job(arguments->text("--save-job"), *job); !status) return fail(status.error());
   }

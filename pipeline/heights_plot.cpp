@@ -207,8 +207,14 @@ std::string drawing_text(const Drawing& drawing) {
 
 Status check_plot_name(const std::string& path) {
   const std::string extension = std::filesystem::path(path).extension().string();
-  if (path.empty() || extension == ".svg" || extension == ".png") return {};
-  return Error{Fault::kUsage, fmt::format("--plot {}: plots are SVG or PNG; end the name with .svg or .png", path)};
+  if (path.empty()) return {};
+  if (extension != ".svg" && extension != ".png") {
+    return Error{Fault::kUsage, fmt::format("--plot {}: plots are SVG or PNG; end the name with .svg or .png", path)};
+  }
+  const std::filesystem::path folder = std::filesystem::path(path).parent_path();
+  std::error_code ignored;
+  if (folder.empty() || std::filesystem::is_directory(folder, ignored)) return {};
+  return Error{Fault::kOutput, fmt::format("--plot {}: there is no folder {}; make it or choose another place", path, folder.string())};
 }
 
 int draw_heights(const std::string& path, const Job&, const Scene& scene, const HeightsStudy& study) {
@@ -221,7 +227,11 @@ int draw_heights(const std::string& path, const Job&, const Scene& scene, const 
   // The drawing lies beside the picture until lamina-preview has read it; that program removes it.
   const std::string beside = path + ".drawing";
   const std::string text = drawing_text(drawing);
-  if (Status status = write::write_file(beside, std::as_bytes(std::span(text))); !status) return fail(status.error());
+  if (Status status = write::write_file(beside, std::as_bytes(std::span(text))); !status) {
+    Error error = status.error();
+    if (error.message.starts_with(beside)) error.message.replace(0, beside.size(), path);
+    return fail(error);
+  }
   return run_preview_command({"--drawing", beside, "-o", path});
 }
 

@@ -116,6 +116,7 @@ Result<std::vector<HeightsStudy>> study_per_part(const Job& job, const Scene& sc
   Result<heights::Options> options = heights_options(job);
   if (!options) return options.error();
   options->mode = heights::Mode::kOptimal;
+  if (Status status = heights::check_slab(options->set); !status) return status.error();
   heights::SurfaceIndex index = index_scene(scene, *options);
   Result<HeightsStudy> common = decide(index, *options);
   if (!common) return common.error();

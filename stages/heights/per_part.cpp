@@ -1,5 +1,7 @@
 #include "stages/heights/per_part.h"
 
+#include <fmt/format.h>
+
 #include <numeric>
 #include <utility>
 
@@ -10,7 +12,16 @@ std::int64_t slab_height(const ThicknessSet& set) {
   return set.is_contiguous() ? ceil_div(most, least) * least : std::lcm(least, most);
 }
 
+Status check_slab(const ThicknessSet& set) {
+  const std::int64_t slab = slab_height(set);
+  if (slab <= kMostSlab * set.most()) return {};
+  return Error{Fault::kUsage, fmt::format("heights.per_part: {} and {} mm meet only every {} mm; give thicknesses with a smaller "
+                                          "common multiple, or a range",
+                                          mm(set.least()), mm(set.most()), mm(slab))};
+}
+
 Result<PerPartPlan> plan_per_part(SurfaceIndex index, const Options& options) {
+  if (Status status = check_slab(options.set); !status) return status.error();
   PerPartPlan result;
   result.slab = slab_height(options.set);
   Options own = options;

@@ -21,9 +21,15 @@ struct PerPartPlan {
 /// are a range; else the lowest height that both the least and the greatest thickness divide.
 std::int64_t slab_height(const ThicknessSet& set);
 
+/// Slabs of more than so many times the greatest thickness would leave the parts with hardly a boundary in common.
+constexpr std::int64_t kMostSlab = 16;
+
+/// Whether slabs of these thicknesses are low enough. errors  kUsage
+Status check_slab(const ThicknessSet& set);
+
 /// The best table for every part (see optimal.h) of those that keep to the slabs.
 /// index  used up
-/// errors  as plan_heights
+/// errors  of check_slab; as plan_heights
 Result<PerPartPlan> plan_per_part(SurfaceIndex index, const Options& options);
 
 }  // namespace lamina::heights

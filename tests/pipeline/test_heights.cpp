@@ -70,6 +70,9 @@ TEST(HeightsCommand, WrongUseIsOneLineThatNamesTheOption) {
       {{"--thickness", "0.1,0.2"}, "uniform layers have one thickness"},
       {{"--format", "xml"}, "--format: 'xml'"},
       {{"--plot", "plot.gif"}, "--plot plot.gif"},
+      {{"--thickness", "0.1..0.3", "--compare", "--format", "rp3"}, "--format rp3: holds one table, and --compare makes several"},
+      {{"high.stl", "--thickness", "0.1..0.3", "--per-part", "--format", "rp3"}, "--per-part makes several"},
+      {{"high.stl", "--thickness", "0.178,0.254", "--per-part"}, "0.178 and 0.254 mm meet only every 22.606 mm"},
       {{"--heights", "optimal", "--thickness", "0.000002,0.000003", "--scale", "100"}, "heights.thickness"},
   };
   for (const auto& [options, told] : calls) {
@@ -80,6 +83,11 @@ TEST(HeightsCommand, WrongUseIsOneLineThatNamesTheOption) {
     EXPECT_EQ(outcome.error_lines(), 1u) << outcome.err;
     EXPECT_NE(outcome.err.find(told), std::string::npos) << outcome.err;
   }
+  const Outcome plot = run_lamina({"heights", "low.stl", "--plot", "no/o.png"}, directory.path());
+  EXPECT_EQ(plot.code, 4);
+  EXPECT_TRUE(plot.out.empty()) << plot.out;
+  EXPECT_NE(plot.err.find("--plot no/o.png: there is no folder no;"), std::string::npos) << plot.err;
+  EXPECT_EQ(plot.error_lines(), 1u) << plot.err;
   const Outcome jet = run_lamina({"jet", "low.stl", "--per-part", "-o", "out"}, directory.path());
   EXPECT_EQ(jet.code, 2);
   EXPECT_NE(jet.err.find("--per-part"), std::string::npos) << jet.err;
