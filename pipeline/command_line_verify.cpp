@@ -55,6 +55,13 @@ void say_replay(const VerifyReport& report) {
   }
   say(fmt::format("places    drops land up to {:.2f} um along and {:.2f} um across the scan from the centre of their pixel",
                   replay.farthest_along_um, replay.farthest_across_um));
+  if (replay.travel_mm == 0 && replay.fed_mm[0] == 0 && replay.fed_mm[1] == 0) {
+    // Words for the head alone: whoever drives the axes decides the rest.
+    say(fmt::format("machine   {:.1f} m scanned in {}; this dialect does not tell other movements nor powder", replay.scan_mm / 1000,
+                    readable_seconds(replay.seconds)));
+    say(fmt::format("material  {:.3f} ml of binder", report.binder_mm3 / 1000));
+    return;
+  }
   if (replay.seconds > 0) {
     say(fmt::format("machine   {:.2f} h, {:.1f} m scanned, {:.1f} m other travel", replay.seconds / 3600,
                     replay.scan_mm / 1000, replay.travel_mm / 1000));

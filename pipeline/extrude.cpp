@@ -123,6 +123,7 @@ Result<ExtrudeSummary> run_extrude(const Job& asked, const ProgressCallback& pro
   if (!profile) return profile.error();
   const Extruder& machine = profile->machine;
   job.bed_mm = machine.bed.size_mm;
+  job.machine.decides_bed = true;
   const auto segments = plan_segments(job.segment, profile->calibration, job.fill);
   if (!segments) return segments.error();
 

@@ -149,6 +149,10 @@ Result<JetSummary> run_jet(const Job& asked, const ProgressCallback& progress, c
   Result<std::string> steps = check_build_steps(job, table);
   if (!steps) return steps.error();
   if (!steps->empty()) summary.warnings.push_back(std::move(*steps));
+  if (job.dose.core == 0 && static_cast<double>(nm_of(job.dose.shell_mm)) * std::max(grid.x.pixels_per_nm(), grid.y.pixels_per_nm()) < 1) {
+    summary.warnings.push_back("dose.core: 0 without a shell of at least a pixel jets no drop, the parts stay loose powder; add --shell or "
+                               "give a share above 0");
+  }
   const auto range = layer_range(job, table.size());
   if (!range) return range.error();
   const ManifestHead head = make_head(job, scene->parts, table.size(), *range, *materials);

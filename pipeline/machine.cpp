@@ -84,6 +84,7 @@ Status resolve_machine(Job& job) {
                                             machine.name, machine.bed.size_mm[0], machine.bed.size_mm[1]));
   }
   job.bed_mm = machine.bed.size_mm;
+  job.machine.decides_bed = true;
   request.resolved = std::make_shared<const ResolvedMachine>(std::move(*resolved));
   return {};
 }

@@ -26,6 +26,7 @@ struct MachineRequest {
   std::optional<double> scan_speed_mm_s;                  // instead of the profile's
   std::optional<std::vector<std::uint32_t>> blocked;      // instead of the profile's
   bool bed_given = false, dpi_given = false;              // bed.size_mm, bed.dpi: asked of the machine
+  bool decides_bed = false;                               // the job's bed is that of a machine, so no other can be asked for
   std::shared_ptr<const ResolvedMachine> resolved;        // by resolve_machine; decides the grid of the images
 };
 

@@ -31,9 +31,11 @@ struct Place {
 /// The others fill rows from the left, `gap` apart; a row is as deep as its deepest box, and the next one begins
 /// behind it. The block of all rows is centred on the bed, rounded down. No box is turned.
 ///
+/// bed_of_machine  the bed is that of a machine, so that advice names no other size of it
+///
 /// errors  kUsage if a copy does not lie within the bed: which, by how much, and what would help
 /// cost    O(copies)
 Result<std::vector<Place>> place_boxes(std::span<const BoxRequest> requests, std::int64_t bed_width,
-                                       std::int64_t bed_depth, std::int64_t gap);
+                                       std::int64_t bed_depth, std::int64_t gap, bool bed_of_machine = false);
 
 }  // namespace lamina::pipeline

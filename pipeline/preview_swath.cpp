@@ -49,6 +49,10 @@ Result<Buffer<std::byte>> draw_swath(const std::string& directory, const Manifes
     return Error{Fault::kUsage, fmt::format("{}: the job has no print program; plan it with --machine", directory)};
   }
   const auto path = [&](const std::string& name) { return (std::filesystem::path(directory) / name).string(); };
+  if (std::ranges::none_of(manifest.layers, [&](const LayerRecord& one) { return one.layer.index == choice.layer; })) {
+    return Error{Fault::kUsage, fmt::format("--layer {}: the job has layers {} to {}", choice.layer, manifest.layers.front().layer.index,
+                                            manifest.layers.back().layer.index)};
+  }
   const auto built = machine_of_job(directory, head);
   if (!built) return built.error();
   const Machine& machine = built->profile();
@@ -83,6 +87,10 @@ Result<Buffer<std::byte>> draw_swath(const std::string& directory, const Manifes
                                             sweeps.begin()->first, sweeps.rbegin()->first)};
   }
   const SweepSeen& present = sweeps.at(swath);
+  if (choice.step && (*choice.step < present.first_step || *choice.step > present.last_step)) {
+    return Error{Fault::kUsage, fmt::format("--step {}: swath {} of layer {} fires at steps {} to {}", *choice.step, swath, choice.layer,
+                                            present.first_step, present.last_step)};
+  }
   const std::uint32_t step = choice.step.value_or(present.first_step + (present.last_step - present.first_step) / 2);
 
   write::picture::SwathView view;

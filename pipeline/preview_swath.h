@@ -17,7 +17,7 @@ struct SwathChoice {
   std::uint32_t width = 1200;
 };
 
-/// Replays the layer's program up to the step and draws what is jetted by then. errors  kUsage: no such layer, swath;
+/// Replays the layer's program up to the step and draws what is jetted by then. errors  kUsage: no such layer, swath, step;
 /// kVerification: files that are missing or are not what was written; kInternal
 Result<Buffer<std::byte>> draw_swath(const std::string& directory, const Manifest& manifest, const SwathChoice& choice);
 

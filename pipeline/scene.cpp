@@ -168,7 +168,7 @@ Result<Scene> load_scene(const Job& job) {
     }
   }
 
-  const Result<std::vector<Place>> places = place_boxes(requests, bed_width, bed_depth, nm_of(job.gap_mm));
+  const Result<std::vector<Place>> places = place_boxes(requests, bed_width, bed_depth, nm_of(job.gap_mm), job.machine.decides_bed);
   if (!places) return places.error();
 
   for (std::size_t p = 0; p < job.parts.size(); ++p) {

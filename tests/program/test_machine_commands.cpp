@@ -108,6 +108,22 @@ TEST_F(MachineCommands, PreviewShowsALayerAtAStepOfASwath) {
   for (const std::string& one : {early, late, middle}) EXPECT_EQ(one.substr(0, 8), "\x89PNG\r\n\x1a\n");
   EXPECT_NE(early, late);
   expect_words(picture("--swath 0", 2), {"--swath 0: fires nothing in layer 1; those that do are"});
+  expect_words(picture("--swath 4 --step 99999", 2), {"--step 99999: swath 4 of layer 1 fires at steps "});
+  expect_words(lamina("preview " + at("out") + " -o " + at("p.png") + " --swath 4 --layer 99", 2), {"--layer 99: the job has layers 0 to "});
+}
+
+TEST_F(MachineCommands, WhatAJobCannotTellOrJetIsSaid) {
+  const std::string nut = std::string(LAMINA_TEST_DIR) + "/corpus/parameter_quality_nut.stl ";
+  expect_words(lamina("jet " + nut + "--machine jet1000 --layer 4 --core 0 --shell 1 -o " + at("shell")), {"layers"});
+  expect_words(lamina("jet " + nut + "--dpi 100 --layer 4 --core 0 --shell 0.2 -o " + at("thin")), {"dose.core: 0 without a shell", " 0 set"});
+  const std::string words = lamina("verify " + at("shell"));
+  expect_words(words, {"does not tell other movements nor powder", "ml of binder"});
+  EXPECT_EQ(words.find("powder fed"), std::string::npos) << words;
+  lamina("jet " + nut + "--machine hp45 --layer 4 -o " + at("hp45"));
+  expect_words(lamina("verify " + at("hp45")), {" h, ", "powder fed"});
+  expect_words(lamina("jet " + nut + "--machine hp45 --layer 4 --core 0 -o " + at("none")), {"dose.core: 0 without a shell"});
+  expect_words(lamina("jet " + nut + "--machine hp45 --layer 4 --scale 20 -o " + at("large"), 2), {"use another machine or a smaller --scale"});
+  expect_words(lamina("extrude " + nut + "--scale 20 -o " + at("large.gcode"), 2), {"use another machine or a smaller --scale"});
 }
 
 }  // namespace
