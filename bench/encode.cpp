@@ -16,8 +16,7 @@ constexpr std::int64_t kDpi = 1200;
 /// Empty if the file that an encoder made gives the runs back.
 std::string wrong_with(const write::Bytes& file, const write::ImageFormat& format, const Runs& runs) {
   if (format.extension.empty()) return {};
-  const auto path =
-      (std::filesystem::temp_directory_path() / "lamina-bench-layer").string() + std::string(format.extension);
+  const auto path = (std::filesystem::temp_directory_path() / "lamina-bench-layer").string() + std::string(format.extension);
   if (auto written = write::write_file(path, file); !written) return written.error().message;
   const auto image = write::read_image(path);
   std::filesystem::remove(path);

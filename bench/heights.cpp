@@ -80,7 +80,12 @@ void plan_tall(benchmark::State& state) {
   }
   state.SetComplexityN(state.range(0));
 }
-BENCHMARK(plan_tall)->Name("heights/optimal/tall")->RangeMultiplier(2)->Range(125, 1000)->Unit(benchmark::kMillisecond)->Complexity();
+BENCHMARK(plan_tall)
+    ->Name("heights/optimal/tall")
+    ->RangeMultiplier(2)
+    ->Range(125, 1000)
+    ->Unit(benchmark::kMillisecond)
+    ->Complexity();
 
 [[maybe_unused]] const bool registered = [] {
   using heights::Mode;
@@ -91,7 +96,9 @@ BENCHMARK(plan_tall)->Name("heights/optimal/tall")->RangeMultiplier(2)->Range(12
       benchmark::RegisterBenchmark(("heights/" + what + "/" + part.name).c_str(), run)->Unit(benchmark::kMillisecond);
     };
     add("index", [path](benchmark::State& state) { index_part(state, path); });
-    for (const auto& [name, mode] : {std::pair{"angle", Mode::kAngle}, {"cusp", Mode::kCusp}, {"stepwise", Mode::kStepwise},
+    for (const auto& [name, mode] : {std::pair{"angle", Mode::kAngle},
+                                     {"cusp", Mode::kCusp},
+                                     {"stepwise", Mode::kStepwise},
                                      {"optimal", Mode::kOptimal}}) {
       add(name, [path, mode = mode](benchmark::State& state) { plan_part(state, path, mode); });
     }

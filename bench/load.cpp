@@ -70,9 +70,8 @@ void census_of_part(benchmark::State& state, const NamedPart& named, const std::
     auto census = load::census(triangles);
     benchmark::DoNotOptimize(census);
   }
-  state.counters["triangles/s"] =
-      benchmark::Counter(static_cast<double>(triangles.size()), benchmark::Counter::kIsIterationInvariantRate,
-                         benchmark::Counter::kIs1000);
+  state.counters["triangles/s"] = benchmark::Counter(
+      static_cast<double>(triangles.size()), benchmark::Counter::kIsIterationInvariantRate, benchmark::Counter::kIs1000);
   (void)named;
 }
 
@@ -81,9 +80,7 @@ void census_of_part(benchmark::State& state, const NamedPart& named, const std::
     const std::string path = model_path(part);
     if (path.empty()) continue;
     const std::string name = part.name;
-    benchmark::RegisterBenchmark(("load/" + name).c_str(), load_part, part, path)
-        ->Unit(benchmark::kMillisecond)
-        ->UseRealTime();
+    benchmark::RegisterBenchmark(("load/" + name).c_str(), load_part, part, path)->Unit(benchmark::kMillisecond)->UseRealTime();
     benchmark::RegisterBenchmark(("census/" + name).c_str(), census_of_part, part, path)
         ->Unit(benchmark::kMillisecond)
         ->UseRealTime();

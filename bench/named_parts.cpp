@@ -65,8 +65,7 @@ Buffer<Triangle> flattened(const Part& part) {
 }
 
 bool same_runs(const RunsView& a, const RunsView& b) {
-  return a.columns == b.columns && std::ranges::equal(a.row_offset, b.row_offset) &&
-         std::ranges::equal(a.change, b.change);
+  return a.columns == b.columns && std::ranges::equal(a.row_offset, b.row_offset) && std::ranges::equal(a.change, b.change);
 }
 
 }  // namespace lamina::bench

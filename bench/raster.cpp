@@ -17,8 +17,7 @@ struct Setup {
   bool load(benchmark::State& state, const std::string& path) {
     if (!load_on_bed(state, path, kNmPerMm, kNmPerMm, part)) return false;
     grid = snug_grid(part, kDpi);
-    for (int i = 0; i < kPlanes; ++i)
-      planes.push_back(static_cast<Nm>(part.bounds.height() * (2 * i + 1) / (2 * kPlanes)));
+    for (int i = 0; i < kPlanes; ++i) planes.push_back(static_cast<Nm>(part.bounds.height() * (2 * i + 1) / (2 * kPlanes)));
     return true;
   }
   Result<raster::Rasterizer> build(bool rays, bool contours) {
@@ -83,8 +82,7 @@ void index(benchmark::State& state, raster::Engine engine, const std::string& pa
     const std::string path = model_path(part);
     if (path.empty()) continue;
     const std::string name = part.name;
-    for (auto [engine, word] :
-         {std::pair{raster::Engine::kRays, "rays"}, std::pair{raster::Engine::kContours, "contours"}}) {
+    for (auto [engine, word] : {std::pair{raster::Engine::kRays, "rays"}, std::pair{raster::Engine::kContours, "contours"}}) {
       benchmark::RegisterBenchmark(("index/" + name + "/" + word).c_str(), index, engine, path)
           ->Unit(benchmark::kMillisecond)
           ->UseRealTime();

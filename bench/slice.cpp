@@ -101,8 +101,10 @@ void slice_part(benchmark::State& state, Until until, const std::string& path) {
   for (const NamedPart& part : named_parts()) {
     const std::string path = model_path(part), name = part.name;
     if (path.empty()) continue;
-    for (const auto& [stage, until] : {std::pair{"index", Until::kIndex}, {"cut", Until::kCut},
-                                       {"cut+chain", Until::kChain}, {"contours", Until::kContours}}) {
+    for (const auto& [stage, until] : {std::pair{"index", Until::kIndex},
+                                       {"cut", Until::kCut},
+                                       {"cut+chain", Until::kChain},
+                                       {"contours", Until::kContours}}) {
       benchmark::RegisterBenchmark(("slice/" + name + "/" + stage).c_str(), [until = until, path](benchmark::State& state) {
         slice_part(state, until, path);
       })->Unit(benchmark::kMillisecond);

@@ -24,7 +24,7 @@ namespace {
 using Clock = std::chrono::steady_clock;
 using std::chrono::milliseconds;
 constexpr std::chrono::seconds kGrace{20};  // for a job that was told to stop
-constexpr Fault kOverdue = Fault::kInput;  // its part cannot be planned in the time that it was given
+constexpr Fault kOverdue = Fault::kInput;   // its part cannot be planned in the time that it was given
 
 double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
 
@@ -155,7 +155,8 @@ class Queue : public std::enable_shared_from_this<Queue> {
     for (std::size_t i = 0; i < jobs_.size(); ++i) {
       const Slot& slot = *slots_[i];
       const auto number = static_cast<std::uint32_t>(i + 1);
-      if (slot.state == Slot::State::kAtWork) state.at_work.push_back({number, jobs_[i].entry.name, slot.layers_done, slot.layers});
+      if (slot.state == Slot::State::kAtWork)
+        state.at_work.push_back({number, jobs_[i].entry.name, slot.layers_done, slot.layers});
       if (slot.state != Slot::State::kEnded) continue;
       ++state.ended;
       if (slot.result.outcome != BatchOutcome::kDone && slot.result.outcome != BatchOutcome::kKept) ++state.failed;

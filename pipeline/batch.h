@@ -21,10 +21,10 @@ namespace lamina::pipeline {
 
 struct BatchOptions {
   std::string directory;
-  std::uint32_t jobs = 1;                   // at work at a time
+  std::uint32_t jobs = 1;  // at work at a time
   std::uint64_t memory_bytes = 1ull << 30;
-  double time_limit_seconds = 0;            // of each job; 0: none
-  bool fail_fast = false;                   // the first failure stops all
+  double time_limit_seconds = 0;  // of each job; 0: none
+  bool fail_fast = false;         // the first failure stops all
   bool resume = false, overwrite = false;
 };
 

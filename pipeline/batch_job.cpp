@@ -128,8 +128,8 @@ class Preparation {
       job.entry.name = name;
       job.output = (fs::path(share_.directory) / name).string();
     } else {
-      return Error{Fault::kUsage, fmt::format("{} {} is missing; in a batch it is below the batch's directory",
-                                              "-o", option->value)};
+      return Error{Fault::kUsage,
+                   fmt::format("{} {} is missing; in a batch it is below the batch's directory", "-o", option->value)};
     }
     added.insert(added.end(), {"--output", job.output});
     const fs::path below = below_batch(job.output, share_.directory);
@@ -182,12 +182,14 @@ Status check_apart(const std::vector<BatchJob>& jobs, const std::string& directo
     if (!path.has_filename()) path = path.parent_path();
     if (path == own) {
       return Error{Fault::kUsage, fmt::format("{}: writes into {} itself, which belongs to the batch; give it a name "
-                                              "below it with -o", job.entry.source, directory)};
+                                              "below it with -o",
+                                              job.entry.source, directory)};
     }
     for (const char* name : kOwnFiles) {
       if (!lies_within(path, own / name)) continue;
       return Error{Fault::kUsage, fmt::format("{}: writes into {}, which belongs to the batch; give it another name with "
-                                              "-o", job.entry.source, (fs::path(directory) / name).string())};
+                                              "-o",
+                                              job.entry.source, (fs::path(directory) / name).string())};
     }
     outputs.emplace_back(std::move(path), &job);
   }
@@ -196,8 +198,8 @@ Status check_apart(const std::vector<BatchJob>& jobs, const std::string& directo
     const auto& [outer, first] = outputs[i - 1];
     const auto& [inner, second] = outputs[i];
     if (lies_within(inner, outer)) {
-      return Error{Fault::kUsage, fmt::format("{} and {}: both write into {}; give one of them another -o",
-                                              first->entry.source, second->entry.source, first->output)};
+      return Error{Fault::kUsage, fmt::format("{} and {}: both write into {}; give one of them another -o", first->entry.source,
+                                              second->entry.source, first->output)};
     }
   }
   return {};

@@ -14,21 +14,21 @@
 namespace lamina::pipeline {
 
 struct BatchJob {
-  BatchEntry entry;                    // its name is the output's, and unique, if it does not name one itself
+  BatchEntry entry;  // its name is the output's, and unique, if it does not name one itself
   const Command* command = nullptr;
   std::vector<std::string> arguments;  // what the command is given
   std::string output;                  // file or directory that it writes; empty if its result is what it prints
   std::string place;                   // the output for reports: below the batch's directory, else as it was given
   bool relative_output = false;        // its output was given relative to the batch's directory
   bool can_resume = false, can_overwrite = false;
-  std::uint64_t need_bytes = 0;        // most memory that it is expected to hold
-  Hash128 id;                          // of the version, the words, the output's place and every file that it reads
-  std::optional<Error> refused;        // it is wrong in itself: it fails at its turn, the others run
+  std::uint64_t need_bytes = 0;  // most memory that it is expected to hold
+  Hash128 id;                    // of the version, the words, the output's place and every file that it reads
+  std::optional<Error> refused;  // it is wrong in itself: it fails at its turn, the others run
 };
 
 struct BatchShare {
-  std::string directory;               // of the batch
-  std::uint64_t layer_bytes = 0;       // --memory of every job that does not give one
+  std::string directory;          // of the batch
+  std::uint64_t layer_bytes = 0;  // --memory of every job that does not give one
 };
 
 /// Makes the jobs ready, in the order of the entries. Nothing is written.

@@ -93,8 +93,8 @@ Status read_list(const std::string& path, std::vector<BatchEntry>& entries) {
     entries.push_back({source, std::move(name), std::move(*words)});
   }
   if (entries.size() == before) {
-    return Error{Fault::kUsage, fmt::format("{}: no job in it; write one command line a line, as: jet part.stl --dpi 600",
-                                            path)};
+    return Error{Fault::kUsage,
+                 fmt::format("{}: no job in it; write one command line a line, as: jet part.stl --dpi 600", path)};
   }
   return {};
 }
@@ -144,7 +144,10 @@ Result<std::vector<BatchEntry>> read_batch(const std::vector<std::string>& opera
   for (const std::string& operand : operands) {
     std::error_code error;
     const fs::file_status status = fs::status(operand, error);
-    if (!fs::exists(status)) return Error{Fault::kUsage, fmt::format("{}: no such file or directory; name a list, a part, a job file or a directory of them", operand)};
+    if (!fs::exists(status))
+      return Error{
+          Fault::kUsage,
+          fmt::format("{}: no such file or directory; name a list, a part, a job file or a directory of them", operand)};
     if (fs::is_directory(status)) {
       if (Status read = read_directory(operand, with, entries); !read) return read.error();
     } else if (is_job_file(operand) || is_part(operand)) {

@@ -26,8 +26,12 @@ std::string key_of(const BatchJob& job) { return job.place.empty() ? hex(job.id)
 void read_line(const std::string& line, std::map<std::string, BatchRecord::Earlier>& earlier) {
   const Json json = Json::parse(line, nullptr, false);
   if (!json.is_object()) return;
-  const auto text = [&](const char* name) { return json.contains(name) && json[name].is_string() ? json[name].get<std::string>() : ""; };
-  const auto whole = [&](const char* name) { return json.contains(name) && json[name].is_number_unsigned() ? json[name].get<std::uint64_t>() : 0; };
+  const auto text = [&](const char* name) {
+    return json.contains(name) && json[name].is_string() ? json[name].get<std::string>() : "";
+  };
+  const auto whole = [&](const char* name) {
+    return json.contains(name) && json[name].is_number_unsigned() ? json[name].get<std::uint64_t>() : 0;
+  };
   const bool ended = json.contains("ended");
   const std::string id = text(ended ? "ended" : "begun");
   BatchRecord::Earlier entry;
@@ -80,18 +84,22 @@ Result<BatchRecord> BatchRecord::open(const std::string& directory, bool resume,
   if (error) return Error{Fault::kOutput, fmt::format("{}: {}", directory, error.message())};
   BatchRecord record;
   record.path_ = (fs::path(directory) / "batch.jsonl").string();
-  const auto failed = [&](int reason) { return Error{Fault::kOutput, fmt::format("{}: {}", record.path_, std::strerror(reason))}; };
+  const auto failed = [&](int reason) {
+    return Error{Fault::kOutput, fmt::format("{}: {}", record.path_, std::strerror(reason))};
+  };
   record.file_ = ::open(record.path_.c_str(), O_RDWR | O_CREAT | O_APPEND | O_CLOEXEC, 0666);
   if (record.file_ < 0) return failed(errno);
   if (::flock(record.file_, LOCK_EX | LOCK_NB) != 0) {
     if (errno != EWOULDBLOCK) return failed(errno);
     return Error{Fault::kOutput, fmt::format("{}: another batch is running here right now; wait for it or name another "
-                                             "directory", record.path_)};
+                                             "directory",
+                                             record.path_)};
   }
   const bool empty = fs::file_size(record.path_, error) == 0;
   if (!empty && !resume && !overwrite) {
     return Error{Fault::kUsage, fmt::format("{}: an earlier batch; go on with it by --resume, replace it with --overwrite, "
-                                            "or name another directory", record.path_)};
+                                            "or name another directory",
+                                            record.path_)};
   }
   if (!resume) {
     if (::ftruncate(record.file_, 0) != 0) return failed(errno);

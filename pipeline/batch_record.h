@@ -30,9 +30,9 @@ std::string_view outcome_name(BatchOutcome outcome);
 
 struct BatchResult {
   BatchOutcome outcome = BatchOutcome::kNotRun;
-  int code = 0;             // of the command; 3 beyond the time limit
-  std::string reason;       // one line, of what is not done
-  std::string json;         // what the command printed: a JSON value, or "" if nothing
+  int code = 0;        // of the command; 3 beyond the time limit
+  std::string reason;  // one line, of what is not done
+  std::string json;    // what the command printed: a JSON value, or "" if nothing
   double seconds = 0;
   OutputDigest output;
   bool recognized = false;  // kept although no record knew of it: its directory holds the finished job
@@ -45,10 +45,10 @@ class BatchRecord {
  public:
   /// What an earlier run of the batch has left of a place that jobs write into (or, for a job without one, of its id).
   struct Earlier {
-    Hash128 begun;                   // the job that wrote there last
-    bool ended = false;              // with exit code 0
-    bool foreign = false;            // it found something there that no batch had written, and did not end well
-    BatchResult result;              // if it ended
+    Hash128 begun;         // the job that wrote there last
+    bool ended = false;    // with exit code 0
+    bool foreign = false;  // it found something there that no batch had written, and did not end well
+    BatchResult result;    // if it ended
   };
 
   /// Opens directory/batch.jsonl, which is created with the directory. With `resume` what it says is read and it is

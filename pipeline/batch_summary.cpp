@@ -116,8 +116,8 @@ std::string batch_text(const std::vector<BatchJob>& jobs, const BatchSummary& su
   std::string text;
   const auto line = [&](std::string_view name, const std::string& value) { text += fmt::format("{:<11}{}\n", name, value); };
   std::string counts = fmt::format("{}: {} done", totals.jobs, totals.done);
-  for (const auto& [count, what] : {std::pair{totals.kept, "kept"}, {totals.failed, "failed"}, {totals.stopped, "stopped"},
-                                    {totals.not_run, "not run"}}) {
+  for (const auto& [count, what] :
+       {std::pair{totals.kept, "kept"}, {totals.failed, "failed"}, {totals.stopped, "stopped"}, {totals.not_run, "not run"}}) {
     if (count > 0) counts += fmt::format(", {} {}", count, what);
   }
   line("jobs", counts);
@@ -125,10 +125,12 @@ std::string batch_text(const std::vector<BatchJob>& jobs, const BatchSummary& su
     const BatchResult& result = summary.results[i];
     if (has_failed(result)) line(outcome_name(result.outcome), failure_line(jobs[i], result));
   }
-  line("files", fmt::format("{} of {} below {}", readable_count(totals.files), readable_bytes(totals.bytes), options.directory));
+  line("files",
+       fmt::format("{} of {} below {}", readable_count(totals.files), readable_bytes(totals.bytes), options.directory));
   line("time", fmt::format("{}; {:.1f} jobs/s, {} at once at most", readable_seconds(summary.seconds),
                            summary.seconds > 0 ? (totals.done + totals.failed) / summary.seconds : 0, summary.most_at_work));
-  line("memory", fmt::format("{} at most, budget {}", readable_bytes(peak_resident_bytes()), readable_bytes(options.memory_bytes)));
+  line("memory",
+       fmt::format("{} at most, budget {}", readable_bytes(peak_resident_bytes()), readable_bytes(options.memory_bytes)));
   return text;
 }
 

@@ -18,9 +18,9 @@
 namespace lamina::pipeline {
 
 struct CalibrationRequest {
-  std::string machine;    // as --machine takes it
-  std::string directory;  // of the pieces
-  double width_mm = 0, height_mm = 0;  // of a bead; 0: the nozzle, and three quarters of it
+  std::string machine;                                           // as --machine takes it
+  std::string directory;                                         // of the pieces
+  double width_mm = 0, height_mm = 0;                            // of a bead; 0: the nozzle, and three quarters of it
   std::vector<double> thin_speeds, thin_extrusions, extrusions;  // %; presets are the document's
 };
 
@@ -29,10 +29,10 @@ CalibrationRequest preset_calibration();
 
 /// A test piece: a block, and how it is filled.
 struct TestPiece {
-  std::string name;    // of its files: 4-speed
-  std::string task;    // what to do with it, one line
+  std::string name;  // of its files: 4-speed
+  std::string task;  // what to do with it, one line
   std::array<double, 3> size_mm;
-  Job job;             // complete but for the paths of its part and output
+  Job job;  // complete but for the paths of its part and output
 };
 
 /// The pieces of steps 2 to 7. Widths and heights are resolved in `request`. errors  kUsage

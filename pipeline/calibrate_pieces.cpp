@@ -51,17 +51,21 @@ std::string block_stl(const std::array<double, 3>& size) {
   return bytes;
 }
 
-Status write_text(const fs::path& path, std::string_view text) { return write::write_file(path.string(), std::as_bytes(std::span(text))); }
+Status write_text(const fs::path& path, std::string_view text) {
+  return write::write_file(path.string(), std::as_bytes(std::span(text)));
+}
 
 std::string steps_text(const std::vector<TestPiece>& pieces, const CalibrationRequest& request, std::string_view extension) {
   std::string text = fmt::format(
       "# Calibrating segmented lines\n\n1. Parameters: beads of {} mm, layers of {} mm, the speeds and temperatures of the machine's profile; keep them for all "
-      "pieces.\n", number_text(request.width_mm), number_text(request.height_mm));
+      "pieces.\n",
+      number_text(request.width_mm), number_text(request.height_mm));
   char step = '1';
   for (const TestPiece& piece : pieces) {
     if (piece.name[0] == '6' && step < '5') {
-      text += "5. Spacing: fill in widths.csv, then `lamina calibrate --measured widths.csv --machine MACHINE -o machine.toml`; plan the pieces of steps 6 and 7 "
-              "again with `lamina extrude --job FILE --machine machine.toml`.\n";
+      text +=
+          "5. Spacing: fill in widths.csv, then `lamina calibrate --measured widths.csv --machine MACHINE -o machine.toml`; plan the pieces of steps 6 and 7 "
+          "again with `lamina extrude --job FILE --machine machine.toml`.\n";
     }
     text += fmt::format("{}. `{}{}`: {}\n", piece.name[0], piece.name, extension, piece.task);
     step = piece.name[0];
@@ -77,7 +81,8 @@ std::string widths_text(const CalibrationRequest& request) {
   for (const double percent : request.thin_speeds) text += fmt::format("speed,{},,,,,,,\n", number_text(percent));
   for (const double percent : request.thin_extrusions) text += fmt::format("extrusion,{},,,,,,,\n", number_text(percent));
   for (const double percent : request.extrusions) {
-    for (const char* region : {"initial", "central", "final"}) text += fmt::format("repeated,{},100,{},,,,,\n", number_text(percent), region);
+    for (const char* region : {"initial", "central", "final"})
+      text += fmt::format("repeated,{},100,{},,,,,\n", number_text(percent), region);
   }
   return text;
 }
@@ -98,7 +103,8 @@ Result<std::vector<TestPiece>> test_pieces(CalibrationRequest& request, const Ex
   const double height = request.height_mm, bead = request.width_mm;
   Job base;
   base.machine.profile = request.machine;
-  if (request.machine.ends_with(".toml") || request.machine.find('/') != std::string::npos) base.machine.profile = fs::absolute(request.machine).string();
+  if (request.machine.ends_with(".toml") || request.machine.find('/') != std::string::npos)
+    base.machine.profile = fs::absolute(request.machine).string();
   base.layer_mm = height;
   base.quiet = true;
   base.fill.all.width_mm = bead;
@@ -110,10 +116,14 @@ Result<std::vector<TestPiece>> test_pieces(CalibrationRequest& request, const Ex
     TestPiece& piece = pieces.emplace_back(TestPiece{std::move(name), std::move(task), size, base});
     change(piece.job.fill.all, piece.job.segment.all);
   };
-  add("2-flow", fmt::format("two walls and nothing else; measure the wall in several places (wall_mm): it should be {} mm", number_text(2 * bead)),
+  add("2-flow",
+      fmt::format("two walls and nothing else; measure the wall in several places (wall_mm): it should be {} mm",
+                  number_text(2 * bead)),
       {20, 20, std::ceil(10 / height) * height}, [](FillSettings& fill, SegmentSettings&) { fill.walls = 2; });
-  add("3-level", fmt::format("lines 5 mm apart on 100 x 100 mm; level the bed until all of them are {} +- 0.01 mm wide", number_text(bead)), {100, 100, height},
-      [&](FillSettings& fill, SegmentSettings&) {
+  add("3-level",
+      fmt::format("lines 5 mm apart on 100 x 100 mm; level the bed until all of them are {} +- 0.01 mm wide",
+                  number_text(bead)),
+      {100, 100, height}, [&](FillSettings& fill, SegmentSettings&) {
         fill.walls = 0;
         fill.pattern = infill::Pattern::kRaster;
         fill.distance_mm = {5};
@@ -125,9 +135,12 @@ Result<std::vector<TestPiece>> test_pieces(CalibrationRequest& request, const Ex
     segment.on = true;
     segment.thick_speed = 100;
   };
-  add("4-speed", fmt::format("{} segmented lines, 10 + 30 + 10 mm, thin at {} to {} % of the speed from right to left; on each measure the narrowest place of "
-                             "the thin stretch (thin_mm), the widest one after it (thick_mm), and how far from the start of the thin stretch the bead is as wide as "
-                             "before (stable_mm)", request.thin_speeds.size(), number_text(request.thin_speeds.front()), number_text(request.thin_speeds.back())),
+  add("4-speed",
+      fmt::format(
+          "{} segmented lines, 10 + 30 + 10 mm, thin at {} to {} % of the speed from right to left; on each measure the narrowest place of "
+          "the thin stretch (thin_mm), the widest one after it (thick_mm), and how far from the start of the thin stretch the bead is as wide as "
+          "before (stable_mm)",
+          request.thin_speeds.size(), number_text(request.thin_speeds.front()), number_text(request.thin_speeds.back())),
       {width_for(request.thin_speeds.size(), bead), 50, height}, [&](FillSettings& fill, SegmentSettings& segment) {
         lines(fill, segment);
         segment.rule = segment::CutRule::kThickEnds;
@@ -135,8 +148,11 @@ Result<std::vector<TestPiece>> test_pieces(CalibrationRequest& request, const Ex
         segment.thin_mm = 30;
         segment.thin_speed_sweep = request.thin_speeds;
       });
-  add("4-extrusion", fmt::format("{} segmented lines, 10 + 30 + 10 mm, thin with {} to {} % of the extrusion from right to left; measure the narrowest place (thin_mm)",
-                                 request.thin_extrusions.size(), number_text(request.thin_extrusions.front()), number_text(request.thin_extrusions.back())),
+  add("4-extrusion",
+      fmt::format(
+          "{} segmented lines, 10 + 30 + 10 mm, thin with {} to {} % of the extrusion from right to left; measure the narrowest place (thin_mm)",
+          request.thin_extrusions.size(), number_text(request.thin_extrusions.front()),
+          number_text(request.thin_extrusions.back())),
       {width_for(request.thin_extrusions.size(), bead), 50, height}, [&](FillSettings& fill, SegmentSettings& segment) {
         lines(fill, segment);
         segment.rule = segment::CutRule::kThickEnds;
@@ -147,9 +163,10 @@ Result<std::vector<TestPiece>> test_pieces(CalibrationRequest& request, const Ex
       });
   for (const double extrusion : request.extrusions) {
     add(fmt::format("4-repeated-{}", number_text(extrusion)),
-        fmt::format("short stretches at {} % extrusion; measure thick, thin and continuous lines in the initial, the central and the final region. If they differ by "
-                    "more than {} mm, plan it again with `lamina extrude --job FILE --thick-speed PERCENT`, lower, and add rows for that speed",
-                    number_text(extrusion), segment::kAcceptedDeviation),
+        fmt::format(
+            "short stretches at {} % extrusion; measure thick, thin and continuous lines in the initial, the central and the final region. If they differ by "
+            "more than {} mm, plan it again with `lamina extrude --job FILE --thick-speed PERCENT`, lower, and add rows for that speed",
+            number_text(extrusion), segment::kAcceptedDeviation),
         {50, 28, height}, [&](FillSettings& fill, SegmentSettings& segment) {
           lines(fill, segment);
           segment.thick_extrusion = extrusion;
@@ -157,10 +174,13 @@ Result<std::vector<TestPiece>> test_pieces(CalibrationRequest& request, const Ex
   }
   for (const int layers : {1, 5, 10}) {
     for (const double extrusion : request.extrusions) {
-      add(fmt::format("{}-{}-{}", layers == 1 ? "6-layer" : "7-layers", layers == 1 ? "1" : fmt::format("{}", layers), number_text(extrusion)),
-          layers == 1 ? fmt::format("one layer at {} % extrusion with the spacing that follows from the widths; closed pores: larger spacing, beads apart: smaller",
-                                    number_text(extrusion))
-                      : fmt::format("{} layers at {} % extrusion", layers, number_text(extrusion)),
+      add(fmt::format("{}-{}-{}", layers == 1 ? "6-layer" : "7-layers", layers == 1 ? "1" : fmt::format("{}", layers),
+                      number_text(extrusion)),
+          layers == 1
+              ? fmt::format(
+                    "one layer at {} % extrusion with the spacing that follows from the widths; closed pores: larger spacing, beads apart: smaller",
+                    number_text(extrusion))
+              : fmt::format("{} layers at {} % extrusion", layers, number_text(extrusion)),
           {50, 28, layers * height}, [&](FillSettings& fill, SegmentSettings& segment) {
             fill.pattern = infill::Pattern::kRaster;
             segment.on = true;
@@ -178,7 +198,8 @@ Result<std::vector<std::string>> write_test_pieces(const CalibrationRequest& ask
   const fs::path directory = request.directory;
   std::error_code failed;
   if (fs::exists(directory / "widths.csv", failed)) {
-    return Error{Fault::kUsage, fmt::format("{}: has a widths.csv already, which may hold measurements; name another directory", request.directory)};
+    return Error{Fault::kUsage, fmt::format("{}: has a widths.csv already, which may hold measurements; name another directory",
+                                            request.directory)};
   }
   fs::create_directories(directory, failed);
   if (failed) return Error{Fault::kOutput, fmt::format("{}: {}", request.directory, failed.message())};
@@ -191,13 +212,16 @@ Result<std::vector<std::string>> write_test_pieces(const CalibrationRequest& ask
     if (Status status = write_text(stem.string() + ".stl", block_stl(piece.size_mm)); !status) return status.error();
     piece.job.parts = {{.path = stem.string() + ".stl"}};
     piece.job.output = stem.string() + extension;
-    const std::string job = fmt::format("# {}\n# lamina extrude --job {}.toml\n\n{}", piece.task, piece.name, job_text(piece.job, directory.string()));
+    const std::string job = fmt::format("# {}\n# lamina extrude --job {}.toml\n\n{}", piece.task, piece.name,
+                                        job_text(piece.job, directory.string()));
     if (Status status = write_text(stem.string() + ".toml", job); !status) return status.error();
-    const auto summary = run_extrude(piece.job, [](const ProgressEvent&) {}, cancel);
+    const auto summary = run_extrude(
+        piece.job, [](const ProgressEvent&) {}, cancel);
     if (!summary) return Error{summary.error().fault, fmt::format("{}: {}", piece.name, summary.error().message)};
     names.push_back(piece.name);
   }
-  if (Status status = write_text(directory / "STEPS.md", steps_text(*pieces, request, extension)); !status) return status.error();
+  if (Status status = write_text(directory / "STEPS.md", steps_text(*pieces, request, extension)); !status)
+    return status.error();
   if (Status status = write_text(directory / "widths.csv", widths_text(request)); !status) return status.error();
   return names;
 }

@@ -19,7 +19,8 @@ constexpr Word<Measured::Test> kTests[] = {{"flow", Measured::Test::kFlow},
                                            {"extrusion", Measured::Test::kExtrusion},
                                            {"repeated", Measured::Test::kRepeated}};
 
-constexpr std::string_view kColumns[] = {"test", "percent", "thick_speed_percent", "region", "wall_mm", "thick_mm", "thin_mm", "continuous_mm", "stable_mm"};
+constexpr std::string_view kColumns[] = {"test",     "percent", "thick_speed_percent", "region",   "wall_mm",
+                                         "thick_mm", "thin_mm", "continuous_mm",       "stable_mm"};
 
 /// Sets one cell. returns "" or what is wrong
 std::string set_cell(std::string_view column, const std::string& text, Measured& row) {
@@ -62,21 +63,26 @@ Result<std::vector<Measured>> read_widths(const std::string& path) {
       names = cells_of(line, separator);
       for (std::size_t i = 0; i < names.size(); ++i) {
         if (std::ranges::find(kColumns, names[i]) == std::end(kColumns)) {
-          return wrong(number, fmt::format("column '{}' is none of {}{}", one_line(names[i]), fmt::join(kColumns, ", "), suggest(names[i], kColumns)));
+          return wrong(number, fmt::format("column '{}' is none of {}{}", one_line(names[i]), fmt::join(kColumns, ", "),
+                                           suggest(names[i], kColumns)));
         }
-        if (std::find(names.begin(), names.begin() + static_cast<std::ptrdiff_t>(i), names[i]) != names.begin() + static_cast<std::ptrdiff_t>(i)) {
+        if (std::find(names.begin(), names.begin() + static_cast<std::ptrdiff_t>(i), names[i]) !=
+            names.begin() + static_cast<std::ptrdiff_t>(i)) {
           return wrong(number, fmt::format("column {} stands twice", names[i]));
         }
       }
-      if (std::ranges::find(names, "test") == names.end()) return wrong(number, fmt::format("no column test; the header is {}", fmt::join(kColumns, ",")));
+      if (std::ranges::find(names, "test") == names.end())
+        return wrong(number, fmt::format("no column test; the header is {}", fmt::join(kColumns, ",")));
       continue;
     }
     const auto cells = cells_of(line, separator);
-    if (cells.size() != names.size()) return wrong(number, fmt::format("{} columns where the header has {}", cells.size(), names.size()));
+    if (cells.size() != names.size())
+      return wrong(number, fmt::format("{} columns where the header has {}", cells.size(), names.size()));
     Measured row{};
     row.row = number;
     for (std::size_t i = 0; i < cells.size(); ++i) {
-      if (const std::string what = set_cell(names[i], cells[i], row); !what.empty()) return wrong(number, fmt::format("{}: {}", names[i], what));
+      if (const std::string what = set_cell(names[i], cells[i], row); !what.empty())
+        return wrong(number, fmt::format("{}: {}", names[i], what));
     }
     rows.push_back(std::move(row));
   }

@@ -27,8 +27,8 @@ void add_options(std::span<const Key<Target>> keys, const KeyChoice& choice, con
     if (key.flag.empty() || !choice.has(key.section, key.name)) continue;
     std::string preset = key.value.empty() ? std::string() : key.write(presets);
     if (key.section == "bed") std::ranges::replace(preset, ',', 'x');
-    spec.options.push_back({std::string(key.flag), std::string(key.value), std::string(key.meaning), preset,
-                            std::string(heading(key.section))});
+    spec.options.push_back(
+        {std::string(key.flag), std::string(key.value), std::string(key.meaning), preset, std::string(heading(key.section))});
   }
 }
 
@@ -60,13 +60,15 @@ Status check_together(const KeyChoice& choice, const Arguments& arguments, const
 // What is wrong with the parts of a job file is told with the place in it, where their names alone would not say.
 Status check_parts_of_file(const std::string& file, const Job& job) {
   if (job.parts.empty()) {
-    return Error{Fault::kUsage, fmt::format("{}: no part to plan; add a [[part]] with its path, or name parts on the command line", file)};
+    return Error{Fault::kUsage,
+                 fmt::format("{}: no part to plan; add a [[part]] with its path, or name parts on the command line", file)};
   }
   for (const PartRequest& part : job.parts) {
     std::error_code error;
     if (part.named_at.empty() || std::filesystem::exists(part.path, error)) continue;
-    return Error{Fault::kInput, fmt::format("{}: part.path: {}: no such file; correct it (a relative path begins beside the job file)",
-                                            part.named_at, part.path)};
+    return Error{Fault::kInput,
+                 fmt::format("{}: part.path: {}: no such file; correct it (a relative path begins beside the job file)",
+                             part.named_at, part.path)};
   }
   return {};
 }

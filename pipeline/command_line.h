@@ -20,18 +20,18 @@ std::string_view version();
 
 /// One option of a command. A switch has no value.
 struct OptionSpec {
-  std::string flag;     // "-o,--output"
-  std::string value;    // "MM"; empty for a switch
+  std::string flag;   // "-o,--output"
+  std::string value;  // "MM"; empty for a switch
   std::string meaning;
-  std::string preset;   // shown in the help; empty if there is none
-  std::string group;    // heading in the help
+  std::string preset;  // shown in the help; empty if there is none
+  std::string group;   // heading in the help
 };
 
 struct CommandSpec {
   std::string name, summary;
   std::string operand, operand_meaning;  // "PART", "..."; as many as there are
   std::vector<OptionSpec> options;
-  std::string closing;  // examples, at the end of the help
+  std::string closing;                                                // examples, at the end of the help
   std::vector<std::pair<std::string_view, std::string_view>> absent;  // options of other commands, and why this one has none
 };
 
@@ -42,7 +42,7 @@ struct Arguments {
   std::optional<std::string> help;                           // asked for: nothing else is to be done
 
   bool has(std::string_view flag) const;
-  std::string text(std::string_view flag) const;            // last one given, or ""
+  std::string text(std::string_view flag) const;  // last one given, or ""
   std::vector<std::string> all(std::string_view flag) const;
 };
 

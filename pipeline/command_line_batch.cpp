@@ -78,9 +78,11 @@ Result<Request> resolve(const Arguments& arguments) {
   if (arguments.has("--jobs")) {
     if (const auto what = read_whole(arguments.text("--jobs"), 0, 1024, jobs); !what.empty()) return wrong("--jobs", what);
   }
-  options.jobs = jobs > 0 ? static_cast<std::uint32_t>(jobs) : static_cast<std::uint32_t>(std::max(tbb::info::default_concurrency(), 1));
+  options.jobs =
+      jobs > 0 ? static_cast<std::uint32_t>(jobs) : static_cast<std::uint32_t>(std::max(tbb::info::default_concurrency(), 1));
   if (arguments.has("--memory")) {
-    if (const auto what = read_bytes(arguments.text("--memory"), options.memory_bytes); !what.empty()) return wrong("--memory", what);
+    if (const auto what = read_bytes(arguments.text("--memory"), options.memory_bytes); !what.empty())
+      return wrong("--memory", what);
   }
   if (arguments.has("--time-limit")) {
     const auto what = read_number(arguments.text("--time-limit"), 0.001, 1e9, " s", options.time_limit_seconds);

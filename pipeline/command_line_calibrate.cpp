@@ -22,15 +22,16 @@ CommandSpec calibrate_spec() {
   spec.summary =
       "Test pieces for segmented lines on a printer, as job files and toolpaths with a table to be filled in; then, from\n"
       "the measured widths, the printer's profile with its spacings and speeds.";
-  spec.options = {{"--machine", "NAME|FILE", "extrusion printer; lamina extrude --help lists them", "", "Machine"},
-                  {"-o,--output", "DIR|FILE", "directory for the pieces; with --measured, the profile to be written", "", "Machine"},
-                  {"--measured", "FILE", "the widths.csv of the pieces, filled in", "", "Measurements"},
-                  {"--bead", "MM", "width of a bead at 100 %; the nozzle if absent", "", "Beads"},
-                  {"--layer", "MM", "thickness of a layer; three quarters of the bead if absent", "", "Beads"},
-                  {"--gap", "MM", "wanted between thick beads and their neighbours; slightly negative bonds better", "0", "Beads"},
-                  {"--exact-spacing", "", "spacings from the mean widths, not rounded to 0.01 mm as in the document", "", "Measurements"},
-                  {"--json", "", "print the result as one JSON object on stdout", "", "Result"},
-                  {"--quiet", "", "say nothing but errors", "", "Result"}};
+  spec.options = {
+      {"--machine", "NAME|FILE", "extrusion printer; lamina extrude --help lists them", "", "Machine"},
+      {"-o,--output", "DIR|FILE", "directory for the pieces; with --measured, the profile to be written", "", "Machine"},
+      {"--measured", "FILE", "the widths.csv of the pieces, filled in", "", "Measurements"},
+      {"--bead", "MM", "width of a bead at 100 %; the nozzle if absent", "", "Beads"},
+      {"--layer", "MM", "thickness of a layer; three quarters of the bead if absent", "", "Beads"},
+      {"--gap", "MM", "wanted between thick beads and their neighbours; slightly negative bonds better", "0", "Beads"},
+      {"--exact-spacing", "", "spacings from the mean widths, not rounded to 0.01 mm as in the document", "", "Measurements"},
+      {"--json", "", "print the result as one JSON object on stdout", "", "Result"},
+      {"--quiet", "", "say nothing but errors", "", "Result"}};
   spec.closing =
       "The steps are those of Di Nisio (2022), Appendix A; docs/calibrate.md tells them.\n\n"
       "Examples:\n"
@@ -44,11 +45,13 @@ int say_pieces(const std::vector<std::string>& names, const std::string& directo
   std::vector<std::string> quoted;
   for (const std::string& name : names) quoted.push_back(json_string(name));
   if (!quiet) {
-    say_text(fmt::format("pieces    {} in {}: {}\nnext      print them in the order of STEPS.md, fill in widths.csv, then --measured {}/widths.csv\n", names.size(),
-                         one_line(directory), fmt::join(names, ", "), one_line(directory)));
+    say_text(fmt::format(
+        "pieces    {} in {}: {}\nnext      print them in the order of STEPS.md, fill in widths.csv, then --measured {}/widths.csv\n",
+        names.size(), one_line(directory), fmt::join(names, ", "), one_line(directory)));
   }
   if (!json) return 0;
-  const Status status = print(fmt::format("{{\"command\":\"calibrate\",\"directory\":{},\"pieces\":[{}]}}\n", json_string(directory), fmt::join(quoted, ",")));
+  const Status status = print(fmt::format("{{\"command\":\"calibrate\",\"directory\":{},\"pieces\":[{}]}}\n",
+                                          json_string(directory), fmt::join(quoted, ",")));
   return status ? 0 : fail(status.error());
 }
 
@@ -62,19 +65,23 @@ int run_calibrate_command(const std::vector<std::string>& texts) {
     return status ? 0 : fail(status.error());
   }
   const auto usage = [](const std::string& what) { return fail({Fault::kUsage, what}); };
-  if (!arguments->operands.empty()) return usage(fmt::format("'{}' is no option; the pieces are made here", one_line(arguments->operands.front())));
+  if (!arguments->operands.empty())
+    return usage(fmt::format("'{}' is no option; the pieces are made here", one_line(arguments->operands.front())));
   if (!arguments->has("--machine")) return usage("--machine is missing; name an extrusion printer, as lamina extrude takes it");
   const std::string output = arguments->text("-o,--output"), machine = arguments->text("--machine");
-  if (output.empty()) return usage("-o is missing; name a directory for the test pieces, or with --measured the profile to be written");
+  if (output.empty())
+    return usage("-o is missing; name a directory for the test pieces, or with --measured the profile to be written");
   CalibrationRequest request = preset_calibration();
   request.machine = machine;
   request.directory = output;
   double gap = 0;
   const auto number = [&](const char* flag, double low, double high, double& target) {
-    const std::string wrong = arguments->has(flag) ? read_number(arguments->text(flag), low, high, " mm", target) : std::string();
+    const std::string wrong =
+        arguments->has(flag) ? read_number(arguments->text(flag), low, high, " mm", target) : std::string();
     return wrong.empty() ? wrong : fmt::format("{}: {}", flag, wrong);
   };
-  for (const std::string& wrong : {number("--bead", 0.01, 20, request.width_mm), number("--layer", 0.01, 20, request.height_mm), number("--gap", -10, 10, gap)}) {
+  for (const std::string& wrong : {number("--bead", 0.01, 20, request.width_mm), number("--layer", 0.01, 20, request.height_mm),
+                                   number("--gap", -10, 10, gap)}) {
     if (!wrong.empty()) return usage(wrong);
   }
   const bool json = arguments->has("--json"), quiet = arguments->has("--quiet");
@@ -102,21 +109,27 @@ int run_calibrate_command(const std::vector<std::string>& texts) {
   profile->calibration = found->calibration;
   profile->own_calibration = true;
   if (found->flow) profile->machine.material.flow = std::round(*found->flow * 1000) / 1000;
-  const std::string toml = fmt::format("# {} with what was measured on it. Made by lamina calibrate.\n\n{}", one_line(profile->machine.name), extruder_text(*profile));
-  if (const auto again = read_extruder(toml, output); !again) return fail({Fault::kInput, fmt::format("{}: {}", path, again.error().message)});
+  const std::string toml = fmt::format("# {} with what was measured on it. Made by lamina calibrate.\n\n{}",
+                                       one_line(profile->machine.name), extruder_text(*profile));
+  if (const auto again = read_extruder(toml, output); !again)
+    return fail({Fault::kInput, fmt::format("{}: {}", path, again.error().message)});
   if (Status status = write::write_file(output, std::as_bytes(std::span(toml))); !status) return fail(status.error());
 
   std::string text, list;
   if (found->flow) text += fmt::format("flow      {:.3f}\n", profile->machine.material.flow);
   for (const segment::Settled& s : found->settled) {
-    text += fmt::format("extrusion {:g} %: thick speed {:g} %, thick {:.3f}, thin {:.3f}, continuous {:.3f} mm, within {:.3f} mm along the part; S-C {:.4g}, C-C {:.4g} mm\n",
-                        s.widths.extrusion_percent, s.widths.thick_speed_percent, s.widths.thick_mm, s.widths.thin_mm, s.widths.continuous_mm, s.deviation_mm,
-                        s.spacing.segmented, s.spacing.continuous);
-    list += fmt::format("{}{{\"extrusion_percent\":{},\"thick_speed_percent\":{},\"thick_mm\":{},\"thin_mm\":{},\"continuous_mm\":{},\"deviation_mm\":{},"
-                        "\"spacing_sc_mm\":{},\"spacing_cc_mm\":{}}}", list.empty() ? "" : ",", s.widths.extrusion_percent, s.widths.thick_speed_percent,
-                        s.widths.thick_mm, s.widths.thin_mm, s.widths.continuous_mm, s.deviation_mm, s.spacing.segmented, s.spacing.continuous);
+    text += fmt::format(
+        "extrusion {:g} %: thick speed {:g} %, thick {:.3f}, thin {:.3f}, continuous {:.3f} mm, within {:.3f} mm along the part; S-C {:.4g}, C-C {:.4g} mm\n",
+        s.widths.extrusion_percent, s.widths.thick_speed_percent, s.widths.thick_mm, s.widths.thin_mm, s.widths.continuous_mm,
+        s.deviation_mm, s.spacing.segmented, s.spacing.continuous);
+    list += fmt::format(
+        "{}{{\"extrusion_percent\":{},\"thick_speed_percent\":{},\"thick_mm\":{},\"thin_mm\":{},\"continuous_mm\":{},\"deviation_mm\":{},"
+        "\"spacing_sc_mm\":{},\"spacing_cc_mm\":{}}}",
+        list.empty() ? "" : ",", s.widths.extrusion_percent, s.widths.thick_speed_percent, s.widths.thick_mm, s.widths.thin_mm,
+        s.widths.continuous_mm, s.deviation_mm, s.spacing.segmented, s.spacing.continuous);
   }
-  text += fmt::format("speeds    {} measured, extrusions {}\nprofile   {}\n", found->calibration.by_speed.size(), found->calibration.by_extrusion.size(), one_line(output));
+  text += fmt::format("speeds    {} measured, extrusions {}\nprofile   {}\n", found->calibration.by_speed.size(),
+                      found->calibration.by_extrusion.size(), one_line(output));
   std::vector<std::string> advice;
   for (const std::string& line : found->advice) {
     text += fmt::format("warning   {}\n", line);
@@ -124,8 +137,9 @@ int run_calibrate_command(const std::vector<std::string>& texts) {
   }
   if (!quiet) say_text(text);
   if (json) {
-    const Status status = print(fmt::format("{{\"command\":\"calibrate\",\"profile\":{},\"flow\":{},\"repeated\":[{}],\"warnings\":[{}]}}\n", json_string(output),
-                                            profile->machine.material.flow, list, fmt::join(advice, ",")));
+    const Status status =
+        print(fmt::format("{{\"command\":\"calibrate\",\"profile\":{},\"flow\":{},\"repeated\":[{}],\"warnings\":[{}]}}\n",
+                          json_string(output), profile->machine.material.flow, list, fmt::join(advice, ",")));
     if (!status) return fail(status.error());
   }
   return 0;

@@ -36,7 +36,8 @@ std::string bash_completion() {
   for (const Command& command : commands()) {
     names += fmt::format("{}{}", names.empty() ? "" : " ", command.name);
     const CommandSpec spec = spec_of(command);
-    cases += fmt::format("    {}) options=\"{} --help\"; valued=\" {} \" ;;\n", command.name, flags_of(spec, false), flags_of(spec, true));
+    cases += fmt::format("    {}) options=\"{} --help\"; valued=\" {} \" ;;\n", command.name, flags_of(spec, false),
+                         flags_of(spec, true));
   }
   return fmt::format(R"(# bash completion for lamina, made by: lamina completion bash
 _lamina() {{
@@ -54,7 +55,8 @@ _lamina() {{
   fi
 }}
 complete -o filenames -F _lamina lamina
-)", names, cases);
+)",
+                     names, cases);
 }
 
 // --- zsh
@@ -102,7 +104,8 @@ _lamina() {{
 {}  esac
 }}
 _lamina "$@"
-)", names, cases);
+)",
+                     names, cases);
 }
 
 // --- fish
@@ -154,23 +157,25 @@ std::string title(std::string_view name) {
 }
 
 std::string program_page() {
-  std::string text = title("lamina") +
-                     ".SH NAME\nlamina \\- plans additive\\-manufacturing jobs\n.SH SYNOPSIS\n.B lamina\n.I COMMAND\n[OPTIONS] ...\n"
-                     ".SH DESCRIPTION\nMeshes go in; what a machine needs for every layer comes out. Each command has a page of its "
-                     "own.\n.SH COMMANDS\n";
+  std::string text =
+      title("lamina") +
+      ".SH NAME\nlamina \\- plans additive\\-manufacturing jobs\n.SH SYNOPSIS\n.B lamina\n.I COMMAND\n[OPTIONS] ...\n"
+      ".SH DESCRIPTION\nMeshes go in; what a machine needs for every layer comes out. Each command has a page of its "
+      "own.\n.SH COMMANDS\n";
   std::string also;
   for (const Command& command : commands()) {
     text += fmt::format(".TP\n.B {}\n{}\n", roff(command.name), roff(command.summary));
     also += fmt::format("{}.BR lamina\\-{} (1)", also.empty() ? "" : ",\n", command.name);
   }
-  return text + ".SH OPTIONS\n.TP\n.BR \\-h ,\\  \\-\\-help\nwhat there is\n.TP\n.B \\-\\-version\nthe version\n" + exit_status() +
-         ".SH SEE ALSO\n" + also + "\n";
+  return text + ".SH OPTIONS\n.TP\n.BR \\-h ,\\  \\-\\-help\nwhat there is\n.TP\n.B \\-\\-version\nthe version\n" +
+         exit_status() + ".SH SEE ALSO\n" + also + "\n";
 }
 
 std::string command_page(const Command& command) {
   const CommandSpec spec = spec_of(command);
   std::string text = title(fmt::format("lamina-{}", command.name));
-  text += fmt::format(".SH NAME\nlamina\\-{} \\- {}\n.SH SYNOPSIS\n.B lamina {}\n[OPTIONS]", command.name, roff(command.summary), command.name);
+  text += fmt::format(".SH NAME\nlamina\\-{} \\- {}\n.SH SYNOPSIS\n.B lamina {}\n[OPTIONS]", command.name,
+                      roff(command.summary), command.name);
   if (!spec.operand.empty()) text += fmt::format("\n.IR {} \\ ...", roff(spec.operand));
   text += fmt::format("\n.SH DESCRIPTION\n{}\n", roff(spec.summary));
   if (!spec.operand.empty()) text += fmt::format(".TP\n.I {}\n{}\n", roff(spec.operand), roff(spec.operand_meaning));
@@ -181,7 +186,8 @@ std::string command_page(const Command& command) {
     group = option.group;
     std::string flags = roff(option.flag);
     for (std::size_t at = flags.find(','); at != std::string::npos; at = flags.find(',', at + 2)) flags.insert(at + 1, " ");
-    text += fmt::format(".TP\n\\fB{}\\fR{}\n{}", flags, option.value.empty() ? "" : " \\fI" + roff(option.value) + "\\fR", roff(option.meaning));
+    text += fmt::format(".TP\n\\fB{}\\fR{}\n{}", flags, option.value.empty() ? "" : " \\fI" + roff(option.value) + "\\fR",
+                        roff(option.meaning));
     text += option.preset.empty() ? "\n" : fmt::format(" (default {})\n", roff(option.preset));
   }
   if (!spec.closing.empty()) text += fmt::format(".SH NOTES\n.nf\n{}\n.fi\n", roff(spec.closing));
@@ -260,7 +266,8 @@ int run_manual_command(const std::vector<std::string>& texts) {
     return markdown ? fail({Fault::kUsage, "--markdown: name a command, or -o DIR for all of them"}) : show(program_page());
   }
   if (arguments->operands.size() == 1) {
-    if (const Command* command = find_command(arguments->operands.front())) return show(markdown ? markdown_page(*command) : command_page(*command));
+    if (const Command* command = find_command(arguments->operands.front()))
+      return show(markdown ? markdown_page(*command) : command_page(*command));
   }
   std::vector<std::string_view> names;
   for (const Command& command : commands()) names.push_back(command.name);

@@ -14,8 +14,9 @@
 namespace lamina::pipeline {
 namespace {
 
-const KeyChoice kExtrudeKeys = {"layers", "heights", "place",     "machine.profile", "fill", "segment",
-                                "extrude", "load",   "slice.tolerance_um", "run.output", "run.threads", "run.memory", "run.layers", "part"};
+const KeyChoice kExtrudeKeys = {
+    "layers",     "heights",     "place",      "machine.profile", "fill", "segment", "extrude", "load", "slice.tolerance_um",
+    "run.output", "run.threads", "run.memory", "run.layers",      "part"};
 
 CommandSpec extrude_spec() {
   CommandSpec spec;
@@ -72,13 +73,16 @@ int run_extrude_command(const std::vector<std::string>& texts) {
     const auto profile = resolve_extruder(job);
     if (!profile) return fail(profile.error());
     if (!arguments->has("--walls") && !sets(*arguments, "fill.walls")) job.fill.all.walls = 1;
-    if (!arguments->has("--layer") && !sets(*arguments, "layers.thickness_mm") && !sets(*arguments, "heights.") && !arguments->has("--thickness")) {
-      job.layer_mm = profile->machine.format == "sml" && !profile->machine.sml.pd.empty() ? profile->machine.sml.pd.front().thickness_mm
-                                                                                           : profile->machine.material.nozzle_mm / 2;
+    if (!arguments->has("--layer") && !sets(*arguments, "layers.thickness_mm") && !sets(*arguments, "heights.") &&
+        !arguments->has("--thickness")) {
+      job.layer_mm = profile->machine.format == "sml" && !profile->machine.sml.pd.empty()
+                         ? profile->machine.sml.pd.front().thickness_mm
+                         : profile->machine.material.nozzle_mm / 2;
     }
   }
   if (job.segment.all.on && job.fill.all.pattern == infill::Pattern::kNone) job.fill.all.pattern = infill::Pattern::kRaster;
-  if (job.output.empty() && !job.dry_run) return fail({Fault::kUsage, "-o FILE is missing; name the file for the toolpaths, or use --dry-run"});
+  if (job.output.empty() && !job.dry_run)
+    return fail({Fault::kUsage, "-o FILE is missing; name the file for the toolpaths, or use --dry-run"});
   std::error_code ignored;
   if (std::filesystem::is_directory(job.output, ignored)) {
     return fail({Fault::kUsage, fmt::format("-o {}: is a directory; name a file in it, as in {}", job.output,
@@ -89,10 +93,9 @@ int run_extrude_command(const std::vector<std::string>& texts) {
     if (Status status = save_job(arguments->text("--save-job"), job); !status) return fail(status.error());
   }
   const std::atomic<bool>& cancel = watch_for_interrupts();
-  Progress progress(job.quiet     ? Progress::Style::kSilent
-                    : is_terminal() ? Progress::Style::kBar
-                                    : Progress::Style::kLines);
-  const Result<ExtrudeSummary> summary = run_extrude(job, [&](const ProgressEvent& event) { progress(event); }, cancel);
+  Progress progress(job.quiet ? Progress::Style::kSilent : is_terminal() ? Progress::Style::kBar : Progress::Style::kLines);
+  const Result<ExtrudeSummary> summary = run_extrude(
+      job, [&](const ProgressEvent& event) { progress(event); }, cancel);
   progress.clear();
   if (!summary) return fail(summary.error());
   if (!job.quiet) say_text(extrude_summary_text(job, *summary));

@@ -60,8 +60,7 @@ Result<Job> job_of(const Arguments& arguments) {
   read->dry_run = true;
   // Comparing and measuring need no way of their own.
   const bool own_way = arguments.has("--compare") || arguments.has("--measure") || read->heights.per_part;
-  if (own_way && read->heights.mode == heights::Mode::kUniform &&
-      !read->heights.thickness_mm.empty()) {
+  if (own_way && read->heights.mode == heights::Mode::kUniform && !read->heights.thickness_mm.empty()) {
     read->heights.mode = heights::Mode::kOptimal;
   }
   if (Status status = check_job(*read); !status) return status.error();
@@ -72,10 +71,11 @@ Result<Job> job_of(const Arguments& arguments) {
 Status check_one_table(const Job& job, const Arguments& arguments) {
   const bool many = arguments.all("--measure").size() > 1;
   if (!arguments.has("--compare") && !job.heights.per_part && !many) return {};
-  return Error{Fault::kUsage, fmt::format("--format rp3: holds one table, and {} makes several; leave it out or choose text, csv or json",
-                                          arguments.has("--compare") ? "--compare"
-                                          : job.heights.per_part     ? "--per-part"
-                                                                     : "more than one --measure")};
+  return Error{Fault::kUsage,
+               fmt::format("--format rp3: holds one table, and {} makes several; leave it out or choose text, csv or json",
+                           arguments.has("--compare") ? "--compare"
+                           : job.heights.per_part     ? "--per-part"
+                                                      : "more than one --measure")};
 }
 
 std::string rp3_of(const Job& job, const HeightsStudy& study) {
@@ -134,10 +134,14 @@ int run_heights_command(const std::vector<std::string>& texts) {
 
   const HeightsStudy& last = studies.back();
   std::string text;
-  if (form == Form::kJson) text = heights_json(*job, *scene, studies);
-  else if (form == Form::kCsv) text = heights_csv(*scene, studies);
-  else if (form == Form::kRp3) text = rp3_of(*job, last);
-  else text = studies.size() > 1 ? comparison_page(studies) : heights_page(*job, *scene, last);
+  if (form == Form::kJson)
+    text = heights_json(*job, *scene, studies);
+  else if (form == Form::kCsv)
+    text = heights_csv(*scene, studies);
+  else if (form == Form::kRp3)
+    text = rp3_of(*job, last);
+  else
+    text = studies.size() > 1 ? comparison_page(studies) : heights_page(*job, *scene, last);
   if (Status status = tell(output, text); !status) return fail(status.error());
   if (studies.size() == 1 && !arguments->has("--quiet")) {
     say(fmt::format("time      load {:.4f} s, surface {:.4f} s, layers {:.4f} s, measuring them {:.4f} s", load.count(),

@@ -5,8 +5,8 @@
 #include "pipeline/console.h"
 #include "pipeline/interrupt.h"
 #include "pipeline/jet.h"
-#include "pipeline/machine.h"
 #include "pipeline/job_toml.h"
+#include "pipeline/machine.h"
 #include "pipeline/materials.h"
 #include "pipeline/number_text.h"
 #include "pipeline/output_directory.h"
@@ -17,10 +17,12 @@
 namespace lamina::pipeline {
 namespace {
 
+// clang-format off
 const KeyChoice kJetKeys = {"bed", "layers", "heights", "place", "image.format", "image.mirror", "machine", "dose", "fill", "segment.fill",
                             "segment.rule", "segment.thick_mm", "segment.thin_mm", "segment.continuous_lines", "segment.spacing_sc_mm",
                             "segment.spacing_cc_mm", "segment.gap_mm", "segment.shift_mm", "segment.thick_width_mm",
                             "segment.thin_width_mm", "load", "run", "part"};
+// clang-format on
 
 CommandSpec jet_spec() {
   CommandSpec spec;
@@ -31,8 +33,8 @@ CommandSpec jet_spec() {
   spec.operand = "PART";
   spec.operand_meaning = "STL, OBJ or 3MF files, STL and OBJ gzipped too; they replace the parts of --job";
   add_key_options(kJetKeys, spec);
-  spec.options.push_back({"--material", "NAME|NAME,...", "powder of all parts, or of each in their order; two vats can hold two",
-                          "", "Machine and binder"});
+  spec.options.push_back({"--material", "NAME|NAME,...",
+                          "powder of all parts, or of each in their order; two vats can hold two", "", "Machine and binder"});
   for (const auto& [flag, meaning] :
        {std::pair{"--resume", "go on with an interrupted job; finished layers whose hash holds are kept"},
         {"--overwrite", "replace an earlier job in the directory"},
@@ -82,7 +84,8 @@ Result<Job> resolve(const Arguments& arguments) {
 Error interrupted(const Job& job) {
   const bool begun = !job.output.empty() && !find_manifests(job.output).empty();
   return {Fault::kInterrupted, begun ? fmt::format("interrupted; finished layers are kept in {}, go on with the same "
-                                                   "command and --resume instead of --overwrite", job.output)
+                                                   "command and --resume instead of --overwrite",
+                                                   job.output)
                                      : "interrupted before the first layer; nothing was written"};
 }
 
@@ -104,13 +107,14 @@ int run_jet_command(const std::vector<std::string>& texts) {
     if (Status status = check_output(*job); !status) return fail(status.error());
   }
   const std::atomic<bool>& cancel = watch_for_interrupts(false);
-  Progress progress(job->quiet     ? Progress::Style::kSilent
-                    : is_terminal() ? Progress::Style::kBar
-                                    : Progress::Style::kLines);
-  const Result<JetSummary> summary = run_jet(*job, [&](const ProgressEvent& event) {
-    if (event.stage == ProgressEvent::Stage::kLayers) keep_what_is_done();
-    progress(event);
-  }, cancel);
+  Progress progress(job->quiet ? Progress::Style::kSilent : is_terminal() ? Progress::Style::kBar : Progress::Style::kLines);
+  const Result<JetSummary> summary = run_jet(
+      *job,
+      [&](const ProgressEvent& event) {
+        if (event.stage == ProgressEvent::Stage::kLayers) keep_what_is_done();
+        progress(event);
+      },
+      cancel);
   progress.clear();
   if (!summary) return fail(summary.error().fault == Fault::kInterrupted ? interrupted(*job) : summary.error());
   if (!job->quiet) say_text(summary_text(*job, *summary));

@@ -37,8 +37,10 @@ int run(const Arguments& arguments) {
   if (arguments.has("--target")) {
     const auto part = program::orientation_target();
     if (Status status = write::write_file(arguments.text("--target"), part); !status) return fail(status.error());
-    say(fmt::format("{}: an F of 20 x 30 mm: its stem lies along +y, its arms point to +x, a step of 1 mm on top lies at its "
-                    "foot; read mirrored or turned, so is the machine", arguments.text("--target")));
+    say(
+        fmt::format("{}: an F of 20 x 30 mm: its stem lies along +y, its arms point to +x, a step of 1 mm on top lies at its "
+                    "foot; read mirrored or turned, so is the machine",
+                    arguments.text("--target")));
     return 0;
   }
   std::string text;

@@ -45,9 +45,9 @@ int run_merge_command(const std::vector<std::string>& texts) {
                     readable_count(report->layers), report->shards, report->linked, report->copied));
   }
   if (arguments->has("--json")) {
-    const Status status = print(fmt::format(
-        "{{\"command\":\"merge\",\"directory\":{},\"shards\":{},\"layers\":{},\"linked\":{},\"copied\":{}}}\n",
-        json_string(report->output), report->shards, report->layers, report->linked, report->copied));
+    const Status status = print(
+        fmt::format("{{\"command\":\"merge\",\"directory\":{},\"shards\":{},\"layers\":{},\"linked\":{},\"copied\":{}}}\n",
+                    json_string(report->output), report->shards, report->layers, report->linked, report->copied));
     if (!status) return fail(status.error());
   }
   return 0;

@@ -26,7 +26,8 @@ struct Unit {
   double si;
 };
 // Longer endings first: "_mbar" also ends in "bar".
-constexpr Unit kFlows[] = {{"_l_min", 1e-3 / 60}, {"_ml_min", 1e-6 / 60}, {"_l_h", 1e-3 / 3600}, {"_m3_h", 1.0 / 3600}, {"_m3_s", 1}, {"_l_s", 1e-3}};
+constexpr Unit kFlows[] = {{"_l_min", 1e-3 / 60}, {"_ml_min", 1e-6 / 60}, {"_l_h", 1e-3 / 3600},
+                           {"_m3_h", 1.0 / 3600}, {"_m3_s", 1},           {"_l_s", 1e-3}};
 constexpr Unit kVelocities[] = {{"_mm_s", 1e-3}, {"_cm_s", 1e-2}, {"_m_s", 1}};
 constexpr Unit kDrops[] = {{"_mbar", 100}, {"_kpa", 1000}, {"_hpa", 100}, {"_pa", 1}, {"_bar", 1e5}, {"_psi", 6894.757293}};
 
@@ -87,14 +88,17 @@ Result<std::vector<Group>> read_points(const std::string& path, const Settings& 
           velocity = true;
         }
       }
-      if (flow_column == SIZE_MAX) return wrong(number, "no column of flows (flow_l_min, flow_ml_min, flow_m3_s) or velocities (velocity_m_s)");
+      if (flow_column == SIZE_MAX)
+        return wrong(number, "no column of flows (flow_l_min, flow_ml_min, flow_m3_s) or velocities (velocity_m_s)");
       if (!drops) return wrong(number, "no column of pressure drops (drop_pa, drop_kpa, drop_mbar, drop_bar, drop_psi)");
       continue;
     }
     const auto cells = cells_of(line, separator);
-    if (cells.size() != names.size()) return wrong(number, fmt::format("{} columns where the header has {}", cells.size(), names.size()));
+    if (cells.size() != names.size())
+      return wrong(number, fmt::format("{} columns where the header has {}", cells.size(), names.size()));
     double flow = 0;
-    if (const auto what = read_number(cells[flow_column], 0, 1e12, "", flow); !what.empty()) return wrong(number, fmt::format("{}: {}", names[flow_column], what));
+    if (const auto what = read_number(cells[flow_column], 0, 1e12, "", flow); !what.empty())
+      return wrong(number, fmt::format("{}: {}", names[flow_column], what));
     const double v = flow * flow_unit / (velocity ? 1 : settings.area_m2);
     const std::string name = group_column == SIZE_MAX ? std::string() : cells[group_column];
     auto group = std::ranges::find(groups, name, &Group::name);
@@ -102,7 +106,8 @@ Result<std::vector<Group>> read_points(const std::string& path, const Settings& 
     for (std::size_t i = 0; i < cells.size(); ++i) {
       if (drop_units[i] == 0 || cells[i].empty()) continue;
       double drop = 0;
-      if (const auto what = read_number(cells[i], -1e12, 1e12, "", drop); !what.empty()) return wrong(number, fmt::format("{}: {}", names[i], what));
+      if (const auto what = read_number(cells[i], -1e12, 1e12, "", drop); !what.empty())
+        return wrong(number, fmt::format("{}: {}", names[i], what));
       group->points.push_back({v, drop * drop_units[i] / settings.length_m});
     }
   }
@@ -119,18 +124,23 @@ std::string plot_of(const Group& group, const segment::Permeability& fit) {
   }
   const auto x = [&](double v) { return 60 + 520 * v / most_v; };
   const auto y = [&](double g) { return 360 - 320 * g / most_y; };
-  std::string svg = "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"620\" height=\"420\" font-family=\"sans-serif\" font-size=\"12\">\n"
-                    "<rect width=\"620\" height=\"420\" fill=\"white\"/>\n<path d=\"M60 30V360H590\" fill=\"none\" stroke=\"black\"/>\n";
-  svg += fmt::format("<text x=\"300\" y=\"400\">velocity, 0 to {:.4g} m/s</text>\n<text x=\"10\" y=\"20\">pressure drop / length, 0 to {:.4g} Pa/m; "
-                     "k1 {:.2f} D, k2 {:.4g} m, R2 {:.5f} {}</text>\n", most_v, most_y, fit.k1_m2 / segment::kDarcy, fit.k2_m, fit.r_squared,
-                     group.name.find_first_of("<>&") == std::string::npos ? group.name : "");
+  std::string svg =
+      "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"620\" height=\"420\" font-family=\"sans-serif\" font-size=\"12\">\n"
+      "<rect width=\"620\" height=\"420\" fill=\"white\"/>\n<path d=\"M60 30V360H590\" fill=\"none\" stroke=\"black\"/>\n";
+  svg += fmt::format(
+      "<text x=\"300\" y=\"400\">velocity, 0 to {:.4g} m/s</text>\n<text x=\"10\" y=\"20\">pressure drop / length, 0 to {:.4g} Pa/m; "
+      "k1 {:.2f} D, k2 {:.4g} m, R2 {:.5f} {}</text>\n",
+      most_v, most_y, fit.k1_m2 / segment::kDarcy, fit.k2_m, fit.r_squared,
+      group.name.find_first_of("<>&") == std::string::npos ? group.name : "");
   std::string curve;
   for (int i = 0; i <= 100; ++i) {
     const double v = most_v * i / 100;
     curve += fmt::format("{}{:.2f} {:.2f}", i == 0 ? "M" : "L", x(v), y(fit.linear * v + fit.quadratic * v * v));
   }
   svg += fmt::format("<path d=\"{}\" fill=\"none\" stroke=\"#c33\"/>\n", curve);
-  for (const auto& p : group.points) svg += fmt::format("<circle cx=\"{:.2f}\" cy=\"{:.2f}\" r=\"2.5\" fill=\"#26c\" fill-opacity=\"0.5\"/>\n", x(p.velocity_m_s), y(p.gradient_pa_m));
+  for (const auto& p : group.points)
+    svg += fmt::format("<circle cx=\"{:.2f}\" cy=\"{:.2f}\" r=\"2.5\" fill=\"#26c\" fill-opacity=\"0.5\"/>\n",
+                       x(p.velocity_m_s), y(p.gradient_pa_m));
   return svg + "</svg>\n";
 }
 
@@ -141,7 +151,8 @@ CommandSpec permeability_spec() {
       "Fits dp / L = (mu / k1) v + (rho / k2) v^2 to measured flows and pressure drops: Darcy's k1, Forchheimer's k2,\n"
       "their standard errors and the quality of the fit.";
   spec.operand = "FILE";
-  spec.operand_meaning = "a table with a header: flow_l_min (or velocity_m_s) and drop_mbar (or _pa, _kpa, _bar, _psi), any number of drop columns";
+  spec.operand_meaning =
+      "a table with a header: flow_l_min (or velocity_m_s) and drop_mbar (or _pa, _kpa, _bar, _psi), any number of drop columns";
   spec.options = {{"--length", "MM", "of the medium along the flow", "", "Medium"},
                   {"--diameter", "MM", "of a round medium", "", "Medium"},
                   {"--area", "MM2", "cross-section, in place of a diameter", "", "Medium"},
@@ -184,9 +195,10 @@ int run_permeability_command(const std::vector<std::string>& texts) {
     return wrong.empty() ? wrong : fmt::format("{}: {}", flag, wrong);
   };
   double diameter = 0;
-  for (const std::string& wrong : {number("--length", 1e-3, settings.length_m), number("--area", 1e-6, settings.area_m2),
-                                   number("--diameter", 1e-3, diameter), number("--viscosity", 1, settings.fluid.viscosity_pa_s),
-                                   number("--density", 1, settings.fluid.density_kg_m3)}) {
+  for (const std::string& wrong :
+       {number("--length", 1e-3, settings.length_m), number("--area", 1e-6, settings.area_m2),
+        number("--diameter", 1e-3, diameter), number("--viscosity", 1, settings.fluid.viscosity_pa_s),
+        number("--density", 1, settings.fluid.density_kg_m3)}) {
     if (!wrong.empty()) return usage(wrong);
   }
   if (diameter > 0) settings.area_m2 = std::numbers::pi / 4 * diameter * diameter;
@@ -194,22 +206,29 @@ int run_permeability_command(const std::vector<std::string>& texts) {
   if (!(settings.area_m2 > 0)) return usage("--diameter or --area is missing; give the medium's cross-section");
   const auto groups = read_points(arguments->operands.front(), settings);
   if (!groups) return fail(groups.error());
-  const std::string warning = settings.fluid.density_kg_m3 > 100 && settings.fluid.viscosity_pa_s < 1e-4
-                                  ? fmt::format("a fluid of {:.4g} Pa.s and {:.4g} kg/m3 is neither a gas nor a liquid: the density is that of water; "
-                                                "k2 for air is {:.4g} times smaller", settings.fluid.viscosity_pa_s, settings.fluid.density_kg_m3,
-                                                settings.fluid.density_kg_m3 / 1.2)
-                                  : std::string();
+  const std::string warning =
+      settings.fluid.density_kg_m3 > 100 && settings.fluid.viscosity_pa_s < 1e-4
+          ? fmt::format(
+                "a fluid of {:.4g} Pa.s and {:.4g} kg/m3 is neither a gas nor a liquid: the density is that of water; "
+                "k2 for air is {:.4g} times smaller",
+                settings.fluid.viscosity_pa_s, settings.fluid.density_kg_m3, settings.fluid.density_kg_m3 / 1.2)
+          : std::string();
   std::string json, text;
   for (const Group& group : *groups) {
     const auto fit = segment::fit_permeability(group.points, settings.fluid);
-    if (!fit) return fail({fit.error().fault, fmt::format("{}: {}{}", arguments->operands.front(), group.name.empty() ? "" : group.name + ": ", fit.error().message)});
+    if (!fit)
+      return fail({fit.error().fault, fmt::format("{}: {}{}", arguments->operands.front(),
+                                                  group.name.empty() ? "" : group.name + ": ", fit.error().message)});
     const double k1 = fit->k1_m2 / segment::kDarcy, k1_error = fit->k1_error_m2 / segment::kDarcy;
-    text += fmt::format("{}k1   {:.2f} +- {:.2f} D ({:.4e} m2)\nk2   {:.4g} +- {:.2g} m\nfit  R2 {:.6f}, {} points, scatter {:.4g} Pa/m\n",
-                        group.name.empty() ? "" : group.name + "\n", k1, k1_error, fit->k1_m2, fit->k2_m, fit->k2_error_m, fit->r_squared,
-                        group.points.size(), fit->scatter_pa_m);
-    json += fmt::format("{}{{\"configuration\":{},\"points\":{},\"k1_darcy\":{},\"k1_error_darcy\":{},\"k1_m2\":{},\"k2_m\":{},\"k2_error_m\":{},"
-                        "\"r_squared\":{},\"scatter_pa_m\":{}}}", json.empty() ? "" : ",", json_string(group.name), group.points.size(), k1, k1_error,
-                        fit->k1_m2, fit->k2_m, fit->k2_error_m, fit->r_squared, fit->scatter_pa_m);
+    text += fmt::format(
+        "{}k1   {:.2f} +- {:.2f} D ({:.4e} m2)\nk2   {:.4g} +- {:.2g} m\nfit  R2 {:.6f}, {} points, scatter {:.4g} Pa/m\n",
+        group.name.empty() ? "" : group.name + "\n", k1, k1_error, fit->k1_m2, fit->k2_m, fit->k2_error_m, fit->r_squared,
+        group.points.size(), fit->scatter_pa_m);
+    json += fmt::format(
+        "{}{{\"configuration\":{},\"points\":{},\"k1_darcy\":{},\"k1_error_darcy\":{},\"k1_m2\":{},\"k2_m\":{},\"k2_error_m\":{},"
+        "\"r_squared\":{},\"scatter_pa_m\":{}}}",
+        json.empty() ? "" : ",", json_string(group.name), group.points.size(), k1, k1_error, fit->k1_m2, fit->k2_m,
+        fit->k2_error_m, fit->r_squared, fit->scatter_pa_m);
     if (arguments->has("--plot") && &group == &groups->front()) {
       auto file = write::GrowingFile::open(arguments->text("--plot"));
       if (!file) return fail(file.error());
@@ -218,9 +237,10 @@ int run_permeability_command(const std::vector<std::string>& texts) {
     }
   }
   if (!warning.empty()) say_text(fmt::format("warning   {}\n", warning));
-  const std::string out = arguments->has("--json") ? fmt::format("{{\"command\":\"permeability\",\"fits\":[{}],\"warnings\":[{}]}}\n", json,
-                                                                 warning.empty() ? "" : json_string(warning))
-                                                   : text;
+  const std::string out = arguments->has("--json")
+                              ? fmt::format("{{\"command\":\"permeability\",\"fits\":[{}],\"warnings\":[{}]}}\n", json,
+                                            warning.empty() ? "" : json_string(warning))
+                              : text;
   const Status status = print(out);
   return status ? 0 : fail(status.error());
 }

@@ -19,16 +19,19 @@ CommandSpec preview_spec() {
       "a sliced job with its filling, bead widths true (PNG or SVG), or several with --count or --every (PNG).";
   spec.operand = "DIR";
   spec.operand_meaning = "directory that lamina jet or lamina slice wrote";
-  spec.options = {{"-o,--output", "PNG", "the picture", "", ""},
-                  {"--count", "N", "so many layers, spread over the height", "12", ""},
-                  {"--every", "N", "every N-th layer, from the first", "", ""},
-                  {"--layer", "K", "only layer K, counted from 0 at the bottom", "", ""},
-                  {"--swath", "N", "layer --layer of a job with a machine while swath N of it is jetted, with the head; middle for the one in the middle", "", ""},
-                  {"--step", "N", "of the swath, else the middle one", "", ""},
-                  {"--width", "PIXELS", "width of the picture, 200 to 20000", "2400", ""},
-                  {"--whole-bed", "", "show all of the bed, not only where the layers have something", "", ""},
-                  {"--drawing", "FILE", "draw what lamina heights left for it instead, and remove FILE", "", ""},
-                  {"--quiet", "", "say nothing but errors", "", ""}};
+  spec.options = {
+      {"-o,--output", "PNG", "the picture", "", ""},
+      {"--count", "N", "so many layers, spread over the height", "12", ""},
+      {"--every", "N", "every N-th layer, from the first", "", ""},
+      {"--layer", "K", "only layer K, counted from 0 at the bottom", "", ""},
+      {"--swath", "N",
+       "layer --layer of a job with a machine while swath N of it is jetted, with the head; middle for the one in the middle",
+       "", ""},
+      {"--step", "N", "of the swath, else the middle one", "", ""},
+      {"--width", "PIXELS", "width of the picture, 200 to 20000", "2400", ""},
+      {"--whole-bed", "", "show all of the bed, not only where the layers have something", "", ""},
+      {"--drawing", "FILE", "draw what lamina heights left for it instead, and remove FILE", "", ""},
+      {"--quiet", "", "say nothing but errors", "", ""}};
   spec.closing =
       "Examples:\n"
       "  lamina preview out -o sheet.png\n"
@@ -53,8 +56,8 @@ int run_preview_command(const std::vector<std::string>& arguments) {
   std::signal(SIGXFSZ, SIG_DFL);
   if (!error) ::execv((own.parent_path() / kProgram).c_str(), texts.data());
   ::execvp(kProgram, texts.data());
-  return fail({Fault::kInternal, fmt::format("{}: {}; it belongs beside lamina or into PATH, install it there", kProgram,
-                                             std::strerror(errno))});
+  return fail({Fault::kInternal,
+               fmt::format("{}: {}; it belongs beside lamina or into PATH, install it there", kProgram, std::strerror(errno))});
 }
 
 }  // namespace lamina::pipeline

@@ -21,10 +21,11 @@ CommandSpec report_spec() {
       "area, thickness and time over the height, warnings, the job and all hashes. The page needs no network and no other file.";
   spec.operand = "DIR";
   spec.operand_meaning = "finished directory of lamina jet";
-  spec.options = {{"-o,--output", "HTML", "the page; its name ends in .html or .htm", "", ""},
-                  {"--most-bytes", "SIZE", "layers are left out evenly until the page is smaller", "19M", ""},
-                  {"--parts", "DIR", "where the part files are, for the views from three sides; a file, or several times", "", ""},
-                  {"--quiet", "", "say nothing but errors", "", ""}};
+  spec.options = {
+      {"-o,--output", "HTML", "the page; its name ends in .html or .htm", "", ""},
+      {"--most-bytes", "SIZE", "layers are left out evenly until the page is smaller", "19M", ""},
+      {"--parts", "DIR", "where the part files are, for the views from three sides; a file, or several times", "", ""},
+      {"--quiet", "", "say nothing but errors", "", ""}};
   spec.closing =
       "Examples:\n"
       "  lamina report out -o report.html\n"
@@ -66,7 +67,8 @@ int run_report_command(const std::vector<std::string>& texts) {
   if (!report) return fail(report.error());
   if (Status status = write::write_file(output, std::as_bytes(std::span(report->page))); !status) return fail(status.error());
   if (!arguments->has("--quiet")) {
-    say(fmt::format("{}: {} of {} layers to look at, {}", output, report->held, report->layers, readable_bytes(report->page.size())));
+    say(fmt::format("{}: {} of {} layers to look at, {}", output, report->held, report->layers,
+                    readable_bytes(report->page.size())));
     if (!report->without_parts.empty()) say("views are of the layers: " + report->without_parts);
   }
   return 0;

@@ -12,8 +12,8 @@
 namespace lamina::pipeline {
 namespace {
 
-const KeyChoice kSliceKeys = {"bed.size_mm", "layers",     "heights",     "place",      "image.fill", "load", "run.output",
-                              "run.threads", "run.memory", "run.layers", "slice",      "fill",       "part"};
+const KeyChoice kSliceKeys = {"bed.size_mm", "layers",     "heights",    "place", "image.fill", "load", "run.output",
+                              "run.threads", "run.memory", "run.layers", "slice", "fill",       "part"};
 
 CommandSpec slice_spec() {
   CommandSpec spec;
@@ -67,10 +67,9 @@ int run_slice_command(const std::vector<std::string>& texts) {
     if (Status status = check_slice_output(job); !status) return fail(status.error());
   }
   const std::atomic<bool>& cancel = watch_for_interrupts();
-  Progress progress(job.quiet     ? Progress::Style::kSilent
-                    : is_terminal() ? Progress::Style::kBar
-                                    : Progress::Style::kLines);
-  const Result<SliceSummary> summary = run_slice(job, [&](const ProgressEvent& event) { progress(event); }, cancel);
+  Progress progress(job.quiet ? Progress::Style::kSilent : is_terminal() ? Progress::Style::kBar : Progress::Style::kLines);
+  const Result<SliceSummary> summary = run_slice(
+      job, [&](const ProgressEvent& event) { progress(event); }, cancel);
   progress.clear();
   if (!summary) return fail(summary.error());
   if (!job.quiet) say_text(slice_summary_text(job, *summary));

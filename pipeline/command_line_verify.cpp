@@ -36,19 +36,19 @@ std::string replay_json(const VerifyReport& report) {
       "\"coverage\":{},\"seconds\":{},\"scan_mm\":{},\"travel_mm\":{},\"fed_mm\":[{},{}],\"binder_mm3\":{},"
       "\"powder_mm3\":{},\"farthest_along_um\":{},\"farthest_across_um\":{}}}",
       json_string(report.machine), report.replayed, replay.drops, replay.vectors, replay.sweeps, report.moved, report.lost,
-      report.coverage, replay.seconds, replay.scan_mm, replay.travel_mm, replay.fed_mm[0], replay.fed_mm[1],
-      report.binder_mm3, report.powder_mm3, replay.farthest_along_um, replay.farthest_across_um);
+      report.coverage, replay.seconds, replay.scan_mm, replay.travel_mm, replay.fed_mm[0], replay.fed_mm[1], report.binder_mm3,
+      report.powder_mm3, replay.farthest_along_um, replay.farthest_across_um);
 }
 
 // What the machine does, for people.
 void say_replay(const VerifyReport& report) {
   if (report.machine.empty() || report.replayed == 0) return;
   const ReplayCount& replay = report.replay;
-  say(fmt::format("programs  {} layers replayed on {}: {}, {} drops in {} sweeps, {:.3f} % of the bed",
-                  readable_count(report.replayed), report.machine,
-                  report.moved + report.lost > 0 ? "every pixel fired once but those of blocked nozzles" : "every pixel fired once",
-                  readable_count(replay.drops),
-                  readable_count(replay.sweeps), 100 * report.coverage));
+  say(fmt::format(
+      "programs  {} layers replayed on {}: {}, {} drops in {} sweeps, {:.3f} % of the bed", readable_count(report.replayed),
+      report.machine,
+      report.moved + report.lost > 0 ? "every pixel fired once but those of blocked nozzles" : "every pixel fired once",
+      readable_count(replay.drops), readable_count(replay.sweeps), 100 * report.coverage));
   if (report.moved + report.lost > 0) {
     say(fmt::format("blocked   {} pixels fired by a neighbouring nozzle, {} not at all, as recorded",
                     readable_count(report.moved), readable_count(report.lost)));
@@ -57,14 +57,14 @@ void say_replay(const VerifyReport& report) {
                   replay.farthest_along_um, replay.farthest_across_um));
   if (replay.travel_mm == 0 && replay.fed_mm[0] == 0 && replay.fed_mm[1] == 0) {
     // Words for the head alone: whoever drives the axes decides the rest.
-    say(fmt::format("machine   {:.1f} m scanned in {}; this dialect does not tell other movements nor powder", replay.scan_mm / 1000,
-                    readable_seconds(replay.seconds)));
+    say(fmt::format("machine   {:.1f} m scanned in {}; this dialect does not tell other movements nor powder",
+                    replay.scan_mm / 1000, readable_seconds(replay.seconds)));
     say(fmt::format("material  {:.3f} ml of binder", report.binder_mm3 / 1000));
     return;
   }
   if (replay.seconds > 0) {
-    say(fmt::format("machine   {:.2f} h, {:.1f} m scanned, {:.1f} m other travel", replay.seconds / 3600,
-                    replay.scan_mm / 1000, replay.travel_mm / 1000));
+    say(fmt::format("machine   {:.2f} h, {:.1f} m scanned, {:.1f} m other travel", replay.seconds / 3600, replay.scan_mm / 1000,
+                    replay.travel_mm / 1000));
   }
   say(fmt::format("material  {:.3f} ml of binder, {:.2f} cm3 of powder fed (solid), {:.2f} and {:.2f} mm of the vats",
                   report.binder_mm3 / 1000, report.powder_mm3 / 1000, replay.fed_mm[0], replay.fed_mm[1]));
@@ -87,7 +87,8 @@ int run_verify_command(const std::vector<std::string>& texts) {
     const Status status = print(*arguments->help);
     return status ? 0 : fail(status.error());
   }
-  if (arguments->operands.empty()) return fail({Fault::kUsage, "no directory to verify; name one that lamina jet or lamina slice wrote"});
+  if (arguments->operands.empty())
+    return fail({Fault::kUsage, "no directory to verify; name one that lamina jet or lamina slice wrote"});
   int code = 0;
   for (const std::string& directory : arguments->operands) {
     const Result<VerifyReport> report = verify(directory, {.quick = arguments->has("--quick")});

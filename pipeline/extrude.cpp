@@ -142,7 +142,8 @@ Result<ExtrudeSummary> run_extrude(const Job& asked, const ProgressCallback& pro
   summary.parts = plan->scene().parts;
   summary.load_seconds = plan->load_seconds;
   summary.index_seconds = plan->index_seconds;
-  for (const Instance& instance : plan->scene().instances) summary.triangles += plan->scene().meshes[instance.mesh].triangles.size();
+  for (const Instance& instance : plan->scene().instances)
+    summary.triangles += plan->scene().meshes[instance.mesh].triangles.size();
   const Layer& highest = plan->layers().back().layer;
   summary.height_mm = mm(std::int64_t{highest.bottom} + highest.thickness);
   if (mm(plan->scene().height) > machine.bed.build_height_mm) {
@@ -162,11 +163,14 @@ Result<ExtrudeSummary> run_extrude(const Job& asked, const ProgressCallback& pro
   if (Status status = check_thin_stretches(*segments, *plan); !status) return status.error();
   predict(*segments, profile->calibration, summary);
   if (segments->any() && !profile->own_calibration && machine.name != "Anet A8") {
-    summary.warnings.push_back(fmt::format("{} has no calibration of its own; widths and limits are those measured on an Anet A8: "
-                                           "lamina calibrate makes one", machine.name));
+    summary.warnings.push_back(
+        fmt::format("{} has no calibration of its own; widths and limits are those measured on an Anet A8: "
+                    "lamina calibrate makes one",
+                    machine.name));
   }
   if (job.dry_run) {
-    for (std::uint32_t i = first; i < last; ++i) summary.peak_layer_bytes = std::max(summary.peak_layer_bytes, plan->bytes_bound(i));
+    for (std::uint32_t i = first; i < last; ++i)
+      summary.peak_layer_bytes = std::max(summary.peak_layer_bytes, plan->bytes_bound(i));
     summary.peak_resident_bytes = peak_resident_bytes();
     return summary;
   }
@@ -228,7 +232,8 @@ Result<ExtrudeSummary> run_extrude(const Job& asked, const ProgressCallback& pro
     return file->append(text);
   };
   const auto record = [&](std::uint32_t i, Work& work) -> Status {
-    if (Status status = work.sums ? file->append(work.text) : write_pieces(plan->layers()[first + i], work); !status) return status;
+    if (Status status = work.sums ? file->append(work.text) : write_pieces(plan->layers()[first + i], work); !status)
+      return status;
     const SegmentCounts& counts = work.sums->segments;
     if (i == 0) summary.first_layer_points = counts.points();
     sums.add(*work.sums);
@@ -244,8 +249,8 @@ Result<ExtrudeSummary> run_extrude(const Job& asked, const ProgressCallback& pro
   };
   FlowLimits limits;
   limits.budget_bytes = job.memory_bytes;
-  limits.most_in_flight = 4 * static_cast<std::uint32_t>(
-                                  tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism));
+  limits.most_in_flight =
+      4 * static_cast<std::uint32_t>(tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism));
   FlowReport flow;
   const auto start = Clock::now();
   const auto bytes_of = [&](std::uint32_t i) { return plan->bytes_bound(first + i); };
@@ -275,12 +280,15 @@ Result<ExtrudeSummary> run_extrude(const Job& asked, const ProgressCallback& pro
   summary.peak_layer_bytes = flow.most_bytes;
   summary.peak_resident_bytes = peak_resident_bytes();
   if (open_layers > 0) {
-    summary.warnings.push_back(fmt::format("chains of cuts stay open in {} layers, first {}: they bound nothing and are left out; "
-                                           "leave out --no-repair to close the parts", open_layers, first_open));
+    summary.warnings.push_back(
+        fmt::format("chains of cuts stay open in {} layers, first {}: they bound nothing and are left out; "
+                    "leave out --no-repair to close the parts",
+                    open_layers, first_open));
   }
   if (undivided_layers > 0) {
-    summary.warnings.push_back(fmt::format("segment.thin_mm: longer than every segmented line less its ends in {} of {} layers, first {}: no pores there",
-                                           undivided_layers, summary.layers, first_undivided));
+    summary.warnings.push_back(fmt::format(
+        "segment.thin_mm: longer than every segmented line less its ends in {} of {} layers, first {}: no pores there",
+        undivided_layers, summary.layers, first_undivided));
   }
   if (plan->fills() && sums.totals.moves == 0) {
     summary.warnings.push_back("no bead fits into the parts: they are narrower than the walls and the filling ask for");

@@ -66,7 +66,8 @@ class MoveTable {
     const double width = mm(s.width), full = segment::bead_area(width, height_);
     const bool fills = s.kind != PathKind::kOuter && s.kind != PathKind::kInner;
     double share = 1, speed = 100, bead = fills && on_ ? plan_.continuous_width_mm : width;
-    if (s.thickness == Thickness::kThick) share = plan_.thick_extrusion / 100, speed = plan_.thick_speed, bead = plan_.thick_width_mm;
+    if (s.thickness == Thickness::kThick)
+      share = plan_.thick_extrusion / 100, speed = plan_.thick_speed, bead = plan_.thick_width_mm;
     if (s.thickness == Thickness::kThin) {
       const auto thin = plan_.thin_of(cut_.ordinal(s.line));
       share = thin.extrusion / 100, speed = thin.speed, bead = thin.width_mm;
@@ -125,7 +126,8 @@ Result<segment::LayerCut> layer_cut(const SegmentRange& range, const infill::Fil
     const auto [cx, cy] = direction(turned.angle_base);
     const double across_x = -cy, across_y = cx;
     const auto [low, high] = reach(part, across_x, across_y);
-    const auto place = infill::first_place(turned, {layer, part}, {std::llround(low), std::llround(high - low), std::llround(low), std::llround(high)});
+    const auto place = infill::first_place(
+        turned, {layer, part}, {std::llround(low), std::llround(high - low), std::llround(low), std::llround(high)});
     if (!place) return place.error();
     const double centre = (low + static_cast<double>(*place)) * (across_x * x + across_y * y);
     cut.line.origin = std::llround(centre) - cut.line.thin / 2;
@@ -140,11 +142,14 @@ Result<segment::LayerCut> layer_cut(const SegmentRange& range, const infill::Fil
 
 Status check_thin_stretches(const SegmentPlan& segments, const SlicePlan& plan) {
   // No straight line is longer than the parts are across; closed curves are.
-  const double across = mm(std::llround(std::hypot(static_cast<double>(plan.bounds().width()), static_cast<double>(plan.bounds().depth()))));
+  const double across =
+      mm(std::llround(std::hypot(static_cast<double>(plan.bounds().width()), static_cast<double>(plan.bounds().depth()))));
   const auto too_long = [&](const SegmentRange& range) { return range.settings.on && range.plan.thin_mm >= across; };
   const auto longer = [&](const SegmentRange& range, const std::string& where) {
-    return Error{Fault::kUsage, fmt::format("segment.thin_mm: {}{} mm is longer than any line in the parts, which are {:.3f} mm across; give less", where,
-                                            range.plan.thin_mm, across)};
+    return Error{
+        Fault::kUsage,
+        fmt::format("segment.thin_mm: {}{} mm is longer than any line in the parts, which are {:.3f} mm across; give less",
+                    where, range.plan.thin_mm, across)};
   };
   if (!too_long(segments.base) && std::ranges::none_of(segments.ranges, too_long)) return {};
   for (const SlicePlan::Area& area : plan.areas()) {
@@ -161,8 +166,8 @@ Status check_thin_stretches(const SegmentPlan& segments, const SlicePlan& plan) 
 }
 
 Result<std::optional<LayerExtrusion>> extrude_layer(const SlicePlan& plan, const SegmentPlan& segments, const Extruder& machine,
-                                                    const ScheduledLayer& scheduled, const SlicePlan::Work& work, const TextRoom& room,
-                                                    write::LayerMoves& out) {
+                                                    const ScheduledLayer& scheduled, const SlicePlan::Work& work,
+                                                    const TextRoom& room, write::LayerMoves& out) {
   LayerExtrusion sums;
   bool goes_on = true;
   const Layer layer = scheduled.own();

@@ -31,14 +31,14 @@ Status check_thin_stretches(const SegmentPlan& segments, const SlicePlan& plan);
 /// The text that a writer appends to, and what happens when it has grown.
 struct TextRoom {
   Buffer<char>& text;
-  std::size_t most;                   // bytes; `grown` is asked after a move that leaves more
-  std::function<bool()> grown;        // whether to go on: text was taken out, or the layer is given up
+  std::size_t most;             // bytes; `grown` is asked after a move that leaves more
+  std::function<bool()> grown;  // whether to go on: text was taken out, or the layer is given up
 };
 
 /// The stored toolpaths of a layer become moves; stretches are expanded here and nowhere kept.
 /// returns  nothing if `room.grown` gave the layer up
 Result<std::optional<LayerExtrusion>> extrude_layer(const SlicePlan& plan, const SegmentPlan& segments, const Extruder& machine,
-                                                    const ScheduledLayer& layer, const SlicePlan::Work& work, const TextRoom& room,
-                                                    write::LayerMoves& out);
+                                                    const ScheduledLayer& layer, const SlicePlan::Work& work,
+                                                    const TextRoom& room, write::LayerMoves& out);
 
 }  // namespace lamina::pipeline

@@ -34,7 +34,7 @@ struct SegmentSettings {
   std::optional<double> thick_width_mm, thin_width_mm, continuous_width_mm;  // that beads will have
   bool one_direction = true;
   std::vector<double> shift_mm{0};  // pores are moved along the lines by these, layer by layer in turn
-  bool across = false;  // the grid begins so that pores of a layer turned by 90 degrees lie on the same places
+  bool across = false;              // the grid begins so that pores of a layer turned by 90 degrees lie on the same places
 };
 
 /// Section [segment].
@@ -55,7 +55,8 @@ std::span<const SegmentKey> segment_settings_keys();
 
 /// Section [extrude]: what a job changes of its machine, and where material goes to.
 struct ExtrudeRequest {
-  std::optional<double> flow, nozzle_degc, bed_degc, print_mm_s, wall_mm_s, first_layer_mm_s, travel_mm_s, retraction_mm, fan_percent;
+  std::optional<double> flow, nozzle_degc, bed_degc, print_mm_s, wall_mm_s, first_layer_mm_s, travel_mm_s, retraction_mm,
+      fan_percent;
   std::optional<bool> relative_extrusion;
   std::string set;  // "fan.from_layer=2; bed.corner_mm=-110,-110": any other key of the machine's profile
 };

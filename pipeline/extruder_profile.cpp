@@ -60,6 +60,7 @@ std::string write_rows(const std::vector<std::vector<double>>& rows) {
   return text;
 }
 
+// clang-format off
 #define NUMBER_KEY(section, key, low, high, unit)                                                                      \
   {#section, #key, [](Text t, Profile& p) { return read_number(t, low, high, unit, p.machine.section.key); },          \
    [](const Profile& p) { return number_text(p.machine.section.key); }, Form::kBare}
@@ -69,9 +70,11 @@ std::string write_rows(const std::vector<std::vector<double>>& rows) {
 #define PAIR_KEY(section, key, low)                                                                                     \
   {#section, #key, [](Text t, Profile& p) { return read_pair(t, low, kMostMm, " mm", p.machine.section.key); },        \
    [](const Profile& p) { return write_list(p.machine.section.key); }, Form::kList}
+// clang-format on
 
 constexpr Word<int> kFormats[] = {{"gcode", 0}, {"sml", 1}};
 
+// clang-format off
 const ExtruderKey kKeys[] = {
     {"machine", "name",
      [](Text t, Profile& p) {
@@ -222,6 +225,7 @@ const ExtruderKey kKeys[] = {
      },
      Form::kTable},
 };
+// clang-format on
 
 #undef NUMBER_KEY
 #undef TEXT_KEY
@@ -250,7 +254,8 @@ const ExtruderKey* find_key(Text section, Text name, std::string& wrong) {
   }
   const auto all = sections();
   const auto own = names_of(section);
-  wrong = own.empty() ? fmt::format("{}: no such section{}; there are {}", one_line(section), suggest(section, all), fmt::join(all, ", "))
+  wrong = own.empty() ? fmt::format("{}: no such section{}; there are {}", one_line(section), suggest(section, all),
+                                    fmt::join(all, ", "))
                       : fmt::format("{}.{}: no such key{}; [{}] has {}", section, one_line(name), suggest(name, own), section,
                                     fmt::join(own, ", "));
   return nullptr;
@@ -267,7 +272,9 @@ Result<ExtruderProfile> read_extruder(std::string_view text, const std::string& 
   }
   ExtruderProfile profile;
   for (const TomlValue& value : *values) {
-    const auto wrong = [&](const std::string& what) { return Error{Fault::kUsage, fmt::format("{}:{}: {}", where, value.line, what)}; };
+    const auto wrong = [&](const std::string& what) {
+      return Error{Fault::kUsage, fmt::format("{}:{}: {}", where, value.line, what)};
+    };
     if (value.kind == TomlValue::Kind::kNoSection) return wrong(fmt::format("{}: is not a section", value.section));
     if (value.kind == TomlValue::Kind::kSection) continue;
     std::string what;
@@ -276,7 +283,8 @@ Result<ExtruderProfile> read_extruder(std::string_view text, const std::string& 
     if (value.kind == TomlValue::Kind::kNoValue) {
       return wrong(fmt::format("{}.{}: is not a value or a list of them", value.section, value.name));
     }
-    if (what = key->read(value.text, profile); !what.empty()) return wrong(fmt::format("{}.{}: {}", value.section, value.name, what));
+    if (what = key->read(value.text, profile); !what.empty())
+      return wrong(fmt::format("{}.{}: {}", value.section, value.name, what));
   }
   if (profile.machine.name.empty()) {
     return Error{Fault::kUsage, fmt::format("{}: machine.name is missing; name the machine", where)};
@@ -294,8 +302,9 @@ Result<ExtruderProfile> find_extruder(const std::string& name_or_file) {
       if (shipped.name == name_or_file) return read_extruder(shipped.text, std::string(shipped.name) + ".toml");
       names.push_back(shipped.name);
     }
-    return Error{Fault::kUsage, fmt::format("no extrusion printer '{}'{}; name a profile (a file that ends in .toml) or one of {}",
-                                            one_line(name_or_file), suggest(name_or_file, names), fmt::join(names, ", "))};
+    return Error{Fault::kUsage,
+                 fmt::format("no extrusion printer '{}'{}; name a profile (a file that ends in .toml) or one of {}",
+                             one_line(name_or_file), suggest(name_or_file, names), fmt::join(names, ", "))};
   }
   std::ifstream file(name_or_file, std::ios::binary);
   if (!file) return Error{Fault::kUsage, fmt::format("{}: no such machine profile", name_or_file)};
@@ -305,7 +314,8 @@ Result<ExtruderProfile> find_extruder(const std::string& name_or_file) {
 
 std::string set_extruder_key(std::string_view assignment, ExtruderProfile& profile) {
   const std::size_t dot = assignment.find('.'), equals = assignment.find('=');
-  if (dot == Text::npos || equals == Text::npos || dot > equals) return fmt::format("'{}' is not section.key=value", one_line(assignment));
+  if (dot == Text::npos || equals == Text::npos || dot > equals)
+    return fmt::format("'{}' is not section.key=value", one_line(assignment));
   std::string wrong;
   const ExtruderKey* key = find_key(assignment.substr(0, dot), assignment.substr(dot + 1, equals - dot - 1), wrong);
   if (key == nullptr) return wrong;

@@ -17,12 +17,9 @@ using infill::Pattern;
 
 constexpr std::size_t kMostInAList = 1000;
 
-constexpr Word<Pattern> kPatterns[] = {{"none", Pattern::kNone},
-                                       {"raster", Pattern::kRaster},
-                                       {"contour", Pattern::kContour},
-                                       {"contour+raster", Pattern::kContourRaster},
-                                       {"honeycomb", Pattern::kHoneycomb},
-                                       {"quatrefoil", Pattern::kQuatrefoil}};
+constexpr Word<Pattern> kPatterns[] = {{"none", Pattern::kNone},           {"raster", Pattern::kRaster},
+                                       {"contour", Pattern::kContour},     {"contour+raster", Pattern::kContourRaster},
+                                       {"honeycomb", Pattern::kHoneycomb}, {"quatrefoil", Pattern::kQuatrefoil}};
 constexpr Word<bool> kTurns[] = {{"angle", false}, {"layer", true}};
 
 std::string read_list(Text text, double low, double high, std::vector<double>& values) {

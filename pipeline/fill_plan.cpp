@@ -76,11 +76,13 @@ std::string named(std::string_view name) {
 std::string contradiction(const FillSettings& settings) {
   const auto keys = distance_keys(settings);
   if (keys.size() > 1) {
-    return fmt::format("{} and {} both say how far lines lie from each other; give one of them", named(keys[0]), named(keys[1]));
+    return fmt::format("{} and {} both say how far lines lie from each other; give one of them", named(keys[0]),
+                       named(keys[1]));
   }
   if (!settings.distance_mm.empty() && settings.group > 1) {
-    return fmt::format("{} and {}: groups are of beads with gaps between; write the distances of a group one by one, or give gaps", named("distance_mm"),
-                       named("group"));
+    return fmt::format(
+        "{} and {}: groups are of beads with gaps between; write the distances of a group one by one, or give gaps",
+        named("distance_mm"), named("group"));
   }
   return {};
 }
@@ -133,7 +135,8 @@ Result<FillPlan> plan_filling(const FillRequest& request, const std::string& par
     if (const std::string what = read_fill_changes(entry.substr(space), own); !what.empty()) {
       return wrong("fill.by_height", fmt::format("{}: {}", heights, what));
     }
-    if (const std::string what = contradiction(own); !what.empty()) return wrong("fill.by_height", fmt::format("{}: {}", heights, what));
+    if (const std::string what = contradiction(own); !what.empty())
+      return wrong("fill.by_height", fmt::format("{}: {}", heights, what));
     FillPlan::Range range{nm_of(from), nm_of(to), parameters_of(own)};
     if (Status status = infill::check(range.parameters); !status) {
       return wrong("fill.by_height", fmt::format("{}: {}", heights, status.error().message));

@@ -67,7 +67,7 @@ class Budget {
  private:
   const GraphLimits& limits_;
   std::vector<std::unique_ptr<LayerWork>> slots_;
-  std::vector<Loan> idle_;        // with what each holds on to
+  std::vector<Loan> idle_;  // with what each holds on to
   std::uint32_t in_flight_ = 0;
   std::uint64_t used_ = 0;        // by layers in flight
   std::uint64_t idle_bytes_ = 0;  // of idle slots
@@ -83,8 +83,8 @@ Status run_layers(std::span<const Layer> layers, const LayerStages& stages, cons
   std::mutex admission;
   std::uint32_t next = 0;      // position of the next layer to admit
   std::uint32_t recorded = 0;  // layers that `record` has seen
-  bool stopped = false;    // no further admissions
-  Status result;           // written by `record` only
+  bool stopped = false;        // no further admissions
+  Status result;               // written by `record` only
 
   const auto step = [](const std::function<Status(LayerWork&, LayerOutcome&)>& stage) {
     return [&stage](Ticket ticket) {

@@ -31,8 +31,8 @@ namespace lamina::pipeline {
 struct LayerWork {
   /// Of its buffers; what an encoder keeps for itself is small.
   std::uint64_t bytes() const {
-    std::uint64_t total = scratch.bytes() + bytes_held(file) + program.bytes() + materials.bytes() +
-                          (porous ? porous->bytes() : 0);
+    std::uint64_t total =
+        scratch.bytes() + bytes_held(file) + program.bytes() + materials.bytes() + (porous ? porous->bytes() : 0);
     for (const write::Bytes& one : files) total += bytes_held(one);
     for (const Runs* image : {&runs, &second, &third, &lowest, &highest, &section}) {
       total += bytes_held(image->row_offset) + bytes_held(image->change);
@@ -42,8 +42,8 @@ struct LayerWork {
 
   raster::LayerScratch scratch;
   Runs runs;
-  Runs second;  // of the other engine, or mirrored, or before its dose
-  Runs third;   // the core of a layer with a shell
+  Runs second;           // of the other engine, or mirrored, or before its dose
+  Runs third;            // the core of a layer with a shell
   Runs lowest, highest;  // sections at both ends of the layer, where steps have to lie inside or outside
   Runs section;          // of one solid of a layer with several materials
   MaterialImages materials;
@@ -71,9 +71,9 @@ struct LayerStages {
 
 struct GraphLimits {
   std::uint64_t budget_bytes = 1ull << 30;
-  std::uint32_t most_in_flight = 1;                             // layers; bounds the work lost by an interruption
-  std::uint32_t most_unrecorded = 256;                          // layers that may be ahead of a slow lower one
-  std::function<std::uint64_t(const Layer&)> bytes_of_layer;    // at most; scratch, runs and file
+  std::uint32_t most_in_flight = 1;                           // layers; bounds the work lost by an interruption
+  std::uint32_t most_unrecorded = 256;                        // layers that may be ahead of a slow lower one
+  std::function<std::uint64_t(const Layer&)> bytes_of_layer;  // at most; scratch, runs and file
 };
 
 struct GraphReport {

@@ -31,9 +31,7 @@ bool read_hex(std::string_view text, Hash128& hash) {
 }
 
 Result<FileDigest> digest_file(const std::string& path) {
-  const auto failed = [&] {
-    return Error{Fault::kVerification, fmt::format("{}: {}", path, std::strerror(errno))};
-  };
+  const auto failed = [&] { return Error{Fault::kVerification, fmt::format("{}: {}", path, std::strerror(errno))}; };
   const int file = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
   if (file < 0) return failed();
   const std::unique_ptr<XXH3_state_t, XXH_errorcode (*)(XXH3_state_t*)> state(XXH3_createState(), XXH3_freeState);

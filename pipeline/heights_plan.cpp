@@ -56,7 +56,8 @@ std::string heights_text(const Job& job) {
   std::string text = fmt::format("of {} mm", thickness);
   if (request.mode == heights::Mode::kUniform) return text;
   text += ", " + mode_name(request.mode);
-  if (request.mode == heights::Mode::kAngle) return text + fmt::format(", from {} degrees", number_text(request.adapt_angle_deg));
+  if (request.mode == heights::Mode::kAngle)
+    return text + fmt::format(", from {} degrees", number_text(request.adapt_angle_deg));
   return text + fmt::format(", steps up to {} mm", number_text(request.cusp_mm));
 }
 

@@ -76,10 +76,14 @@ double tick_step(double span, int count) {
 std::string escaped(const std::string& line) {
   std::string text;
   for (const char c : line) {
-    if (c == '<') text += "&lt;";
-    else if (c == '>') text += "&gt;";
-    else if (c == '&') text += "&amp;";
-    else text += c;
+    if (c == '<')
+      text += "&lt;";
+    else if (c == '>')
+      text += "&gt;";
+    else if (c == '&')
+      text += "&amp;";
+    else
+      text += c;
   }
   return text;
 }
@@ -153,19 +157,21 @@ Drawing draw_study(const Scene& scene, const HeightsStudy& study) {
   std::string title = std::filesystem::path(scene.parts.front().path).filename().string();
   if (scene.parts.size() > 1) title += fmt::format(" and {} more", scene.parts.size() - 1);
   const heights::Evaluation& e = study.evaluation;
-  drawing.texts.push_back({kLeft, 34, 20, Drawing::Anchor::kStart, kInk, fmt::format("{}: {} layers, {}", title, layers, study.name)});
-  drawing.texts.push_back({kLeft, 60, 15, Drawing::Anchor::kStart, kInk,
-                           fmt::format("step up to {:.4f} mm, {:.4f} mm on average; {} of {} flats hit; top {:+.4f} mm",
-                                       mm(e.largest_cusp), e.mean_cusp * 1e-6, e.flats.size() - e.flats_missed, e.flats.size(),
-                                       mm(e.top_miss))});
+  drawing.texts.push_back(
+      {kLeft, 34, 20, Drawing::Anchor::kStart, kInk, fmt::format("{}: {} layers, {}", title, layers, study.name)});
+  drawing.texts.push_back(
+      {kLeft, 60, 15, Drawing::Anchor::kStart, kInk,
+       fmt::format("step up to {:.4f} mm, {:.4f} mm on average; {} of {} flats hit; top {:+.4f} mm", mm(e.largest_cusp),
+                   e.mean_cusp * 1e-6, e.flats.size() - e.flats_missed, e.flats.size(), mm(e.top_miss))});
   double legend = plot_left;
-  for (const auto& [reason, name] : {std::pair{LayerReason::kUniform, "thickest"}, {LayerReason::kCusp, "slope"},
-                                     {LayerReason::kFlat, "to meet a flat"}}) {
+  for (const auto& [reason, name] :
+       {std::pair{LayerReason::kUniform, "thickest"}, {LayerReason::kCusp, "slope"}, {LayerReason::kFlat, "to meet a flat"}}) {
     drawing.boxes.push_back({legend, kTop - 20.0, 12, 12, colour_of(reason)});
     drawing.texts.push_back({legend + 17, kTop - 9.0, 14, Drawing::Anchor::kStart, kInk, name});
     legend += 40 + 8.0 * static_cast<double>(std::string_view(name).size());
   }
-  drawing.texts.push_back({plot_left + half / 2, kHeight - 18.0, 15, Drawing::Anchor::kMiddle, kInk, "thickness of the layer, mm"});
+  drawing.texts.push_back(
+      {plot_left + half / 2, kHeight - 18.0, 15, Drawing::Anchor::kMiddle, kInk, "thickness of the layer, mm"});
   drawing.texts.push_back({middle, kHeight - 18.0, 15, Drawing::Anchor::kMiddle, kInk, "outline from the front; height, mm"});
   return drawing;
 }
@@ -176,11 +182,14 @@ std::string svg_text(const Drawing& drawing) {
       "font-family=\"DejaVu Sans, sans-serif\">\n<rect width=\"{0}\" height=\"{1}\" fill=\"#ffffff\"/>\n",
       drawing.width, drawing.height);
   for (const Drawing::Box& box : drawing.boxes) {
-    fmt::format_to(std::back_inserter(text), "<rect x=\"{:.2f}\" y=\"{:.2f}\" width=\"{:.2f}\" height=\"{:.2f}\" fill=\"#{}\"/>\n",
-                   box.left, box.top, box.width, box.height, box.colour);
+    fmt::format_to(std::back_inserter(text),
+                   "<rect x=\"{:.2f}\" y=\"{:.2f}\" width=\"{:.2f}\" height=\"{:.2f}\" fill=\"#{}\"/>\n", box.left, box.top,
+                   box.width, box.height, box.colour);
   }
   for (const Drawing::Text& line : drawing.texts) {
-    const char* anchor = line.anchor == Drawing::Anchor::kStart ? "start" : line.anchor == Drawing::Anchor::kEnd ? "end" : "middle";
+    const char* anchor = line.anchor == Drawing::Anchor::kStart ? "start"
+                         : line.anchor == Drawing::Anchor::kEnd ? "end"
+                                                                : "middle";
     fmt::format_to(std::back_inserter(text),
                    "<text x=\"{:.2f}\" y=\"{:.2f}\" font-size=\"{}\" text-anchor=\"{}\" fill=\"#{}\">{}</text>\n", line.x,
                    line.baseline, line.size, anchor, line.colour, escaped(line.line));
@@ -194,13 +203,15 @@ std::string drawing_text(const Drawing& drawing) {
     // Edges are rounded, not sizes, so that neighbours touch.
     const long left = std::lround(box.left), top = std::lround(box.top);
     fmt::format_to(std::back_inserter(text), "box {} {} {} {} {}\n", left, top,
-                   std::max(1l, std::lround(box.left + box.width) - left), std::max(1l, std::lround(box.top + box.height) - top),
-                   box.colour);
+                   std::max(1l, std::lround(box.left + box.width) - left),
+                   std::max(1l, std::lround(box.top + box.height) - top), box.colour);
   }
   for (const Drawing::Text& line : drawing.texts) {
-    const char* anchor = line.anchor == Drawing::Anchor::kStart ? "start" : line.anchor == Drawing::Anchor::kEnd ? "end" : "middle";
-    fmt::format_to(std::back_inserter(text), "text {} {} {} {} {} {}\n", std::lround(line.x), std::lround(line.baseline), line.size,
-                   anchor, line.colour, line.line);
+    const char* anchor = line.anchor == Drawing::Anchor::kStart ? "start"
+                         : line.anchor == Drawing::Anchor::kEnd ? "end"
+                                                                : "middle";
+    fmt::format_to(std::back_inserter(text), "text {} {} {} {} {} {}\n", std::lround(line.x), std::lround(line.baseline),
+                   line.size, anchor, line.colour, line.line);
   }
   return text;
 }
@@ -214,7 +225,8 @@ Status check_plot_name(const std::string& path) {
   const std::filesystem::path folder = std::filesystem::path(path).parent_path();
   std::error_code ignored;
   if (folder.empty() || std::filesystem::is_directory(folder, ignored)) return {};
-  return Error{Fault::kOutput, fmt::format("--plot {}: there is no folder {}; make it or choose another place", path, folder.string())};
+  return Error{Fault::kOutput,
+               fmt::format("--plot {}: there is no folder {}; make it or choose another place", path, folder.string())};
 }
 
 int draw_heights(const std::string& path, const Job&, const Scene& scene, const HeightsStudy& study) {

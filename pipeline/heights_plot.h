@@ -22,7 +22,7 @@ struct Drawing {
     std::string colour, line;
   };
   int width = 0, height = 0;
-  std::vector<Box> boxes;   // later ones cover earlier ones, text covers all
+  std::vector<Box> boxes;  // later ones cover earlier ones, text covers all
   std::vector<Text> texts;
 };
 

@@ -33,12 +33,14 @@ std::string read_range(std::string_view text, std::size_t dots, heights::Thickne
                        mm(high));
   }
   if ((high - low) / step >= static_cast<Nm>(kMostThicknesses)) {
-    return fmt::format("'{}' is more than {} thicknesses; give a coarser step, as {}..{}:{}", text, kMostThicknesses,
-                       mm(low), mm(high), mm((high - low) / 1000 + 1));
+    return fmt::format("'{}' is more than {} thicknesses; give a coarser step, as {}..{}:{}", text, kMostThicknesses, mm(low),
+                       mm(high), mm((high - low) / 1000 + 1));
   }
   if (const Nm rest = (high - low) % step; rest != 0) {
-    return fmt::format("'{}': steps of {} mm from {} mm end at {} mm and miss {} mm; end there, choose a step that divides the range, or give a "
-                       "set as 0.178,0.254", text, mm(step), mm(low), mm(high - rest), mm(high));
+    return fmt::format(
+        "'{}': steps of {} mm from {} mm end at {} mm and miss {} mm; end there, choose a step that divides the range, or give a "
+        "set as 0.178,0.254",
+        text, mm(step), mm(low), mm(high - rest), mm(high));
   }
   set.values.clear();
   for (std::int64_t value = low; value <= high; value += step) set.values.push_back(static_cast<Nm>(value));

@@ -78,7 +78,8 @@ Result<HeightsStudy> study_table(const Job& job, const Scene& scene, const std::
     if (height == 0 && study.boundaries.size() == 1) continue;
     if (height <= study.boundaries.back()) {
       return Error{Fault::kInput, fmt::format("{}:{}: {} mm is not above the height before it; list the tops of the layers "
-                                              "from the bottom up", path, number, line)};
+                                              "from the bottom up",
+                                              path, number, line)};
     }
     study.boundaries.push_back(height);
   }

@@ -17,9 +17,9 @@ namespace lamina::pipeline {
 struct HeightsStudy {
   std::string name;  // "optimal", "uniform 0.05 mm", "from table.txt"
   heights::Options options;
-  std::vector<std::int64_t> boundaries;   // nm, one more than layers
-  std::vector<LayerReason> reasons;       // of each layer; empty if the table is somebody else's
-  heights::Plan plan;                     // its table is empty if somebody else's
+  std::vector<std::int64_t> boundaries;  // nm, one more than layers
+  std::vector<LayerReason> reasons;      // of each layer; empty if the table is somebody else's
+  heights::Plan plan;                    // its table is empty if somebody else's
   heights::Evaluation evaluation;
   double index_seconds = 0, plan_seconds = 0, evaluate_seconds = 0;  // wall
 };
@@ -43,7 +43,8 @@ std::string heights_page(const Job& job, const Scene& scene, const HeightsStudy&
 std::string heights_csv(const Scene& scene, const std::vector<HeightsStudy>& studies);
 std::string heights_json(const Job& job, const Scene& scene, const std::vector<HeightsStudy>& studies);
 /// Layers [first, last).
-std::string heights_rp3(const HeightsStudy& study, const std::array<std::uint32_t, 2>& layers, const write::rp3::Settings& settings);
+std::string heights_rp3(const HeightsStudy& study, const std::array<std::uint32_t, 2>& layers,
+                        const write::rp3::Settings& settings);
 /// One line a study.
 std::string comparison_page(const std::vector<HeightsStudy>& studies);
 

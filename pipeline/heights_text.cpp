@@ -77,14 +77,14 @@ std::string heights_page(const Job& job, const Scene& scene, const HeightsStudy&
   }
   if (study.options.time.on()) line("time", readable_seconds(e.seconds));
   for (const heights::FlatHit& hit : e.flats) {
-    text += fmt::format("  flat at {:9.4f} mm  {:10.2f} mm2 up {:10.2f} mm2 down  {}{}\n", mm(hit.flat.height), hit.flat.up_mm2,
-                        hit.flat.down_mm2,
-                        hit.miss > study.options.surface.flat_tolerance ? fmt::format("missed by {:.4f} mm", mm(hit.miss))
-                                                                        : "hit",
-                        hit.flat.end ? ", end of a part" : "");
+    text +=
+        fmt::format("  flat at {:9.4f} mm  {:10.2f} mm2 up {:10.2f} mm2 down  {}{}\n", mm(hit.flat.height), hit.flat.up_mm2,
+                    hit.flat.down_mm2,
+                    hit.miss > study.options.surface.flat_tolerance ? fmt::format("missed by {:.4f} mm", mm(hit.miss)) : "hit",
+                    hit.flat.end ? ", end of a part" : "");
   }
-  text += fmt::format("\n{:>6} {:>10} {:>9}  {:<8} {:>6} {:>8}  {}\n", "layer", "bottom", "thickness", "reason", "angle", "step",
-                      "decided by");
+  text += fmt::format("\n{:>6} {:>10} {:>9}  {:<8} {:>6} {:>8}  {}\n", "layer", "bottom", "thickness", "reason", "angle",
+                      "step", "decided by");
   for (std::size_t i = 0; i < count(study); ++i) {
     fmt::format_to(std::back_inserter(text), "{:>6} {:>10.4f} {:>9.4f}  {:<8} {:>6.2f} {:>8.4f}  {}\n", i + 1,
                    mm(study.boundaries[i]), mm(thickness(study, i)), reason(study, i), angle(study, i), mm(e.layers[i].cusp),
@@ -122,8 +122,8 @@ std::string heights_json(const Job& job, const Scene& scene, const std::vector<H
     text += fmt::format(
         "{}\n{{\"name\": {}, \"layers\": {}, \"top_mm\": {:.6f}, \"top_miss_mm\": {:.6f}, \"largest_cusp_mm\": {:.6f}, "
         "\"mean_cusp_mm\": {:.6f}, \"layers_above_limit\": {}, \"flats\": {}, \"flats_missed\": {}, \"largest_miss_mm\": {:.6f}",
-        s > 0 ? "," : "", json_string(study.name), count(study), mm(study.boundaries.back()), mm(e.top_miss), mm(e.largest_cusp),
-        e.mean_cusp * 1e-6, e.above_limit, e.flats.size(), e.flats_missed, mm(e.largest_miss));
+        s > 0 ? "," : "", json_string(study.name), count(study), mm(study.boundaries.back()), mm(e.top_miss),
+        mm(e.largest_cusp), e.mean_cusp * 1e-6, e.above_limit, e.flats.size(), e.flats_missed, mm(e.largest_miss));
     if (study.plan.one_less_reaches >= 0) {
       text += fmt::format(", \"one_less_reaches_mm\": {:.6f}", mm(study.plan.one_less_reaches));
     }
@@ -131,9 +131,9 @@ std::string heights_json(const Job& job, const Scene& scene, const std::vector<H
     text += ",\n\"flat\": [";
     for (std::size_t i = 0; i < e.flats.size(); ++i) {
       const heights::FlatHit& hit = e.flats[i];
-      text += fmt::format("{}{{\"height_mm\": {:.6f}, \"up_mm2\": {:.4f}, \"down_mm2\": {:.4f}, \"end\": {}, \"miss_mm\": {:.6f}}}",
-                          i > 0 ? ", " : "", mm(hit.flat.height), hit.flat.up_mm2, hit.flat.down_mm2, hit.flat.end,
-                          mm(hit.miss));
+      text +=
+          fmt::format("{}{{\"height_mm\": {:.6f}, \"up_mm2\": {:.4f}, \"down_mm2\": {:.4f}, \"end\": {}, \"miss_mm\": {:.6f}}}",
+                      i > 0 ? ", " : "", mm(hit.flat.height), hit.flat.up_mm2, hit.flat.down_mm2, hit.flat.end, mm(hit.miss));
     }
     text += "],\n\"layer\": [";
     for (std::size_t i = 0; i < count(study); ++i) {
@@ -150,16 +150,17 @@ std::string heights_json(const Job& job, const Scene& scene, const std::vector<H
   return text + "\n]}\n";
 }
 
-std::string heights_rp3(const HeightsStudy& study, const std::array<std::uint32_t, 2>& range, const write::rp3::Settings& settings) {
+std::string heights_rp3(const HeightsStudy& study, const std::array<std::uint32_t, 2>& range,
+                        const write::rp3::Settings& settings) {
   std::vector<write::rp3::Layer> layers;
   for (std::size_t i = range[0]; i < range[1]; ++i) layers.push_back({mm(thickness(study, i)), angle(study, i)});
   return write::rp3::text_of(layers, settings);
 }
 
 std::string comparison_page(const std::vector<HeightsStudy>& studies) {
-  std::string text = fmt::format("{:<24} {:>7} {:>12} {:>10} {:>12} {:>12} {:>10}{}\n", "way", "layers", "largest step",
-                                 "mean step", "flats missed", "largest miss", "top",
-                                 studies.front().options.time.on() ? "        time" : "");
+  std::string text =
+      fmt::format("{:<24} {:>7} {:>12} {:>10} {:>12} {:>12} {:>10}{}\n", "way", "layers", "largest step", "mean step",
+                  "flats missed", "largest miss", "top", studies.front().options.time.on() ? "        time" : "");
   for (const HeightsStudy& study : studies) {
     const heights::Evaluation& e = study.evaluation;
     text += fmt::format("{:<24} {:>7} {:>9.4f} mm {:>7.4f} mm {:>12} {:>9.4f} mm {:>+7.3f} mm{}\n", study.name, count(study),

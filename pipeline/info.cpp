@@ -101,9 +101,7 @@ std::string short_name(const Description& description, std::size_t mesh) {
   return name.size() > prefix ? name.substr(prefix) : name;
 }
 
-void row(std::string& text, const char* label, const std::string& value) {
-  text += fmt::format("  {:<20} {}\n", label, value);
-}
+void row(std::string& text, const char* label, const std::string& value) { text += fmt::format("  {:<20} {}\n", label, value); }
 
 /// The first places of a kind in all meshes.
 std::string first_places(const Description& description, const Kind& kind) {
@@ -124,9 +122,8 @@ void describe_meshes(const Description& description, std::string& text) {
   text += "\n  mesh  copies   triangles  closed  size, name\n";
   for (std::size_t i = 0; i < description.diagnosis.size() && i < kMeshesShown; ++i) {
     const load::Diagnosis& found = description.diagnosis[i];
-    text +=
-        fmt::format("  {:>4}  {:>6}  {:>10}  {:<6}  {}, {}\n", i + 1, description.copies[i], grouped(found.triangles),
-                    found.balanced ? "yes" : "no", size_of(found.bounds), short_name(description, i));
+    text += fmt::format("  {:>4}  {:>6}  {:>10}  {:<6}  {}, {}\n", i + 1, description.copies[i], grouped(found.triangles),
+                        found.balanced ? "yes" : "no", size_of(found.bounds), short_name(description, i));
   }
   if (description.diagnosis.size() > kMeshesShown)
     text += fmt::format("  and {} more\n", description.diagnosis.size() - kMeshesShown);
@@ -142,8 +139,8 @@ void describe_findings(const Description& description, std::string& text) {
     if (const std::uint64_t count = count_of(description, kind); count > 0)
       text += fmt::format("  {:<20} {:>10}  {}\n", kind.name, grouped(count), first_places(description, kind));
   if (inverted > 0)
-    text += fmt::format("  {:<20} {:>10}  a hollow within a shell, or a shell turned inside out\n", "inverted shells",
-                        inverted);
+    text +=
+        fmt::format("  {:<20} {:>10}  a hollow within a shell, or a shell turned inside out\n", "inverted shells", inverted);
 }
 
 void describe_plan(const Description& description, std::string& text) {
@@ -177,8 +174,7 @@ nlohmann::ordered_json as_json(const load::Diagnosis& found) {
   for (const Kind& kind : kKinds) {
     const auto& finding = found.*kind.finding;
     nlohmann::ordered_json places = nlohmann::ordered_json::array();
-    for (const auto& place : finding.first)
-      places.push_back({{"triangle", place.triangle + 1}, {"at_mm", as_json(place.at)}});
+    for (const auto& place : finding.first) places.push_back({{"triangle", place.triangle + 1}, {"at_mm", as_json(place.at)}});
     mesh[kind.key] = {{"count", finding.count}, {"first", places}};
   }
   return mesh;
@@ -201,8 +197,7 @@ Result<std::string> describe_part_text(const std::string& path, const load::Load
   row(text, "from", point(d.part.bounds.lo) + " mm");
   row(text, "to", point(d.part.bounds.hi) + " mm");
   row(text, "volume",
-      fmt::format("{:.6g} mm3{}", d.total(&load::Diagnosis::volume_mm3),
-                  d.balanced ? "" : " (of an open mesh: an estimate)"));
+      fmt::format("{:.6g} mm3{}", d.total(&load::Diagnosis::volume_mm3), d.balanced ? "" : " (of an open mesh: an estimate)"));
   row(text, "closed", d.balanced ? "yes" : "no");
   if (d.diagnosis.size() > 1) describe_meshes(d, text);
   describe_findings(d, text);

@@ -60,8 +60,8 @@ class RowWarnings {
     std::uint32_t layers = 0, instance = 0;
     std::string place;
   };
-  static void note(Tally& tally, const Layer& layer, std::uint32_t rows, std::uint32_t first_row,
-                   std::uint32_t instance, const PixelGrid& grid) {
+  static void note(Tally& tally, const Layer& layer, std::uint32_t rows, std::uint32_t first_row, std::uint32_t instance,
+                   const PixelGrid& grid) {
     if (rows == 0) return;
     if (tally.rows == 0) {
       tally.place = fmt::format("in layer {} at y {:.3f} mm, z {:.3f} mm (image row {})", layer.index,
@@ -149,9 +149,11 @@ Result<JetSummary> run_jet(const Job& asked, const ProgressCallback& progress, c
   Result<std::string> steps = check_build_steps(job, table);
   if (!steps) return steps.error();
   if (!steps->empty()) summary.warnings.push_back(std::move(*steps));
-  if (job.dose.core == 0 && static_cast<double>(nm_of(job.dose.shell_mm)) * std::max(grid.x.pixels_per_nm(), grid.y.pixels_per_nm()) < 1) {
-    summary.warnings.push_back("dose.core: 0 without a shell of at least a pixel jets no drop, the parts stay loose powder; add --shell or "
-                               "give a share above 0");
+  if (job.dose.core == 0 &&
+      static_cast<double>(nm_of(job.dose.shell_mm)) * std::max(grid.x.pixels_per_nm(), grid.y.pixels_per_nm()) < 1) {
+    summary.warnings.push_back(
+        "dose.core: 0 without a shell of at least a pixel jets no drop, the parts stay loose powder; add --shell or "
+        "give a share above 0");
   }
   const auto range = layer_range(job, table.size());
   if (!range) return range.error();
@@ -207,15 +209,13 @@ Result<JetSummary> run_jet(const Job& asked, const ProgressCallback& progress, c
   start = Clock::now();
   auto kept = plan->kept.begin();
   auto prefix_end = kept;  // the kept records below the first layer to do
-  while (prefix_end != plan->kept.end() &&
-         (plan->todo.empty() || prefix_end->layer.index < plan->todo.front().index)) {
+  while (prefix_end != plan->kept.end() && (plan->todo.empty() || prefix_end->layer.index < plan->todo.front().index)) {
     ++prefix_end;
   }
   if (program) {
     if (auto status = program->begin(); !status) return status.error();
   }
-  auto manifest = ManifestWriter::open(job.output + "/" + manifest_name(job), head,
-                                       std::vector<LayerRecord>(kept, prefix_end));
+  auto manifest = ManifestWriter::open(job.output + "/" + manifest_name(job), head, std::vector<LayerRecord>(kept, prefix_end));
   if (!manifest) return manifest.error();
   const double pixel_mm2 = 25.4 * 25.4 / (grid.x.dpi() * grid.y.dpi());
   const auto count = [&](const LayerRecord& record) {
@@ -232,29 +232,28 @@ Result<JetSummary> run_jet(const Job& asked, const ProgressCallback& progress, c
   const auto layers = static_cast<std::uint32_t>(range->back() - range->front());
   std::uint32_t done = layers - static_cast<std::uint32_t>(plan->todo.size());
   progress({ProgressEvent::Stage::kLayers, done, layers});
-  const LayerStages stages{
-      [&](LayerWork& work, LayerOutcome& outcome) { return workshop.raster(work, outcome); },
-      [&](LayerWork& work, LayerOutcome& outcome) { return workshop.encode(work, outcome); },
-      [&](LayerWork& work, LayerOutcome& outcome) { return workshop.store(work, outcome); },
-      [&](const LayerOutcome& outcome) -> Status {
-        for (; kept != plan->kept.end() && kept->layer.index < outcome.record.layer.index; ++kept) {
-          if (auto status = manifest->append(*kept); !status) return status;
-          count(*kept);
-        }
-        if (auto status = manifest->append(outcome.record); !status) return status;
-        count(outcome.record);
-        warnings.add(outcome, grid, summary);
-        summary.solid_pixels += outcome.solid_pixels;
-        summary.bead_pixels += outcome.bead_pixels;
-        ++summary.layers_planned;
-        summary.bytes_written += outcome.record.bytes + outcome.record.program.bytes;
-        progress({ProgressEvent::Stage::kLayers, ++done, layers});
-        return {};
-      }};
+  const LayerStages stages{[&](LayerWork& work, LayerOutcome& outcome) { return workshop.raster(work, outcome); },
+                           [&](LayerWork& work, LayerOutcome& outcome) { return workshop.encode(work, outcome); },
+                           [&](LayerWork& work, LayerOutcome& outcome) { return workshop.store(work, outcome); },
+                           [&](const LayerOutcome& outcome) -> Status {
+                             for (; kept != plan->kept.end() && kept->layer.index < outcome.record.layer.index; ++kept) {
+                               if (auto status = manifest->append(*kept); !status) return status;
+                               count(*kept);
+                             }
+                             if (auto status = manifest->append(outcome.record); !status) return status;
+                             count(outcome.record);
+                             warnings.add(outcome, grid, summary);
+                             summary.solid_pixels += outcome.solid_pixels;
+                             summary.bead_pixels += outcome.bead_pixels;
+                             ++summary.layers_planned;
+                             summary.bytes_written += outcome.record.bytes + outcome.record.program.bytes;
+                             progress({ProgressEvent::Stage::kLayers, ++done, layers});
+                             return {};
+                           }};
   GraphLimits limits;
   limits.budget_bytes = job.memory_bytes;
-  limits.most_in_flight = 2 * static_cast<std::uint32_t>(
-                                  tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism));
+  limits.most_in_flight =
+      2 * static_cast<std::uint32_t>(tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism));
   limits.bytes_of_layer = [&](const Layer& layer) { return workshop.bytes_of_layer(layer); };
   GraphReport graph;
   if (auto status = run_layers(plan->todo, stages, limits, cancel, graph); !status) {

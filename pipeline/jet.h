@@ -22,8 +22,8 @@ struct ProgressEvent {
 using ProgressCallback = std::function<void(const ProgressEvent&)>;
 
 struct StageSeconds {
-  double load = 0, index = 0, layers = 0;            // wall
-  double raster = 0, encode = 0, write = 0;          // summed over threads, within layers
+  double load = 0, index = 0, layers = 0;    // wall
+  double raster = 0, encode = 0, write = 0;  // summed over threads, within layers
 };
 
 /// What a person or a script is told at the end; the numbers of --json.
@@ -31,13 +31,13 @@ struct JetSummary {
   std::string directory;
   std::uint32_t layers_total = 0, layers_planned = 0, layers_kept = 0;
   std::uint32_t columns = 0, rows = 0;
-  std::uint64_t triangles = 0;        // with copies
+  std::uint64_t triangles = 0;  // with copies
   std::uint64_t set_pixels = 0, bytes_written = 0;
   std::vector<std::pair<std::string, std::uint64_t>> materials;  // name, set pixels; if there are several
-  std::uint64_t moved_pixels = 0, lost_pixels = 0;  // of blocked nozzles: fired by another one, and not at all
-  double set_volume_mm3 = 0;          // set pixels x pixel area x thickness
+  std::uint64_t moved_pixels = 0, lost_pixels = 0;               // of blocked nozzles: fired by another one, and not at all
+  double set_volume_mm3 = 0;                                     // set pixels x pixel area x thickness
   std::uint64_t solid_pixels = 0, bead_pixels = 0;  // of the layers planned now: of parts, and of the beads in them
-  std::uint64_t capped_rows = 0;      // rows of all layers that are closed only thanks to repair
+  std::uint64_t capped_rows = 0;                    // rows of all layers that are closed only thanks to repair
   std::uint64_t mesh_bytes = 0, index_bytes = 0, peak_layer_bytes = 0, peak_resident_bytes = 0;
   std::uint32_t most_layers_in_flight = 0;
   StageSeconds seconds;

@@ -56,8 +56,8 @@ Result<std::array<std::uint32_t, 2>> layer_range(const Job& job, std::uint32_t l
   }
   if (!job.layers) return std::array<std::uint32_t, 2>{0, layer_count};
   if ((*job.layers)[0] >= layer_count) {
-    return Error{Fault::kUsage, fmt::format("--layers {}:: the job has {} layers, 0 to {}; begin below that",
-                                            (*job.layers)[0], layer_count, layer_count - 1)};
+    return Error{Fault::kUsage, fmt::format("--layers {}:: the job has {} layers, 0 to {}; begin below that", (*job.layers)[0],
+                                            layer_count, layer_count - 1)};
   }
   return std::array<std::uint32_t, 2>{(*job.layers)[0], std::min((*job.layers)[1], layer_count)};
 }

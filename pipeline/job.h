@@ -25,16 +25,16 @@ namespace lamina::pipeline {
 struct PartRequest {
   std::string path;
   std::string named_at = {};  // where a job file names it, "job.toml:12"; empty if none does
-  std::string unit = "mm";  // mm, cm, m, um, inch, foot: of STL and OBJ, which carry none
+  std::string unit = "mm";    // mm, cm, m, um, inch, foot: of STL and OBJ, which carry none
   std::uint32_t copies = 1;
   std::optional<std::array<double, 2>> at_mm = {};  // where the part's box starts on the bed; arranged if absent
-  double bottom_mm = 0;                        // height of the part's lowest point above the bed
+  double bottom_mm = 0;                             // height of the part's lowest point above the bed
   std::array<double, 3> scale{1, 1, 1};
   std::array<double, 3> rotate_deg{0, 0, 0};
   std::array<double, 3> shrink{1, 1, 1};  // compensation factors per axis of the bed, applied last
-  std::string fill = {};  // changes to the job's filling, "pattern=contour gap_mm=0.1"
-  std::string material = {};            // name of its powder; no part or every part has one
-  std::string material_by_height = {};  // others between two heights above its bottom, "2:4 bronze; 4:6 steel"
+  std::string fill = {};                  // changes to the job's filling, "pattern=contour gap_mm=0.1"
+  std::string material = {};              // name of its powder; no part or every part has one
+  std::string material_by_height = {};    // others between two heights above its bottom, "2:4 bronze; 4:6 steel"
 };
 
 enum class Engine { kRays, kContours, kBoth };
@@ -62,12 +62,12 @@ struct Job {
   DoseRequest dose;
 
   // --- no effect on the bytes of any layer
-  std::string output;                                        // directory
+  std::string output;  // directory
   Engine engine = Engine::kRays;
-  std::uint32_t threads = 0;                                 // 0: all that the machine has
-  std::uint64_t memory_bytes = 1ull << 30;                   // what layers in flight may hold
-  std::optional<std::array<std::uint32_t, 2>> layers;        // [first, last) only
-  std::optional<std::array<std::uint32_t, 2>> shard;         // i of n, i from 0
+  std::uint32_t threads = 0;                           // 0: all that the machine has
+  std::uint64_t memory_bytes = 1ull << 30;             // what layers in flight may hold
+  std::optional<std::array<std::uint32_t, 2>> layers;  // [first, last) only
+  std::optional<std::array<std::uint32_t, 2>> shard;   // i of n, i from 0
   bool resume = false;
   bool overwrite = false;  // allow a directory that holds another job's output
   bool dry_run = false;

@@ -7,8 +7,8 @@ std::span<const JobKey> job_keys() {
   static const std::vector<JobKey> keys = [] {
     std::vector<JobKey> all;
     for (const std::span<const JobKey> group :
-         {bed_keys(), heights_keys(), place_keys(), image_keys(), machine_keys(), dose_keys(), slice_keys(), fill_keys(), extrude_keys(),
-          load_keys(), run_keys()}) {
+         {bed_keys(), heights_keys(), place_keys(), image_keys(), machine_keys(), dose_keys(), slice_keys(), fill_keys(),
+          extrude_keys(), load_keys(), run_keys()}) {
       all.insert(all.end(), group.begin(), group.end());
     }
     return all;

@@ -30,12 +30,14 @@ std::string write_optional(const std::optional<double>& value) { return value ? 
 // Lengths and percentages may be anything here: what can be laid is decided by segment::check, with reasons.
 constexpr double kAny = 1e6;
 
+// clang-format off
 #define NUMBER_KEY(name, flag, unit, member, meaning)                                                       \
   {name, flag, unit, meaning, [](Text t, Settings& s) { return read_number(t, -kAny, kAny, "", s.member); }, \
    [](const Settings& s) { return number_text(s.member); }, Form::kBare, {}}
 #define OPTIONAL_KEY(name, flag, unit, member, meaning)                                                       \
   {name, flag, unit, meaning, [](Text t, Settings& s) { return read_optional(t, -kAny, kAny, "", s.member); }, \
    [](const Settings& s) { return write_optional(s.member); }, Form::kBare, {}}
+// clang-format on
 
 std::string read_percentages(Text text, std::vector<double>& list) {
   std::vector<double> values;
@@ -50,6 +52,8 @@ std::string list_text(const std::vector<double>& list) {
   for (const double value : list) texts.push_back(number_text(value));
   return fmt::format("{}", fmt::join(texts, ","));
 }
+
+// clang-format off
 #define LIST_KEY(name, member, meaning)                                                              \
   {name, "", "%,%,...", meaning, [](Text t, Settings& s) { return read_percentages(t, s.member); },   \
    [](const Settings& s) { return list_text(s.member); }, Form::kList, {}}
@@ -109,6 +113,7 @@ const SegmentKey kSegmentKeys[] = {
     {"across", "", "", "pores of layers turned by 90 degrees lie over each other (thick_mm + thin_mm twice the spacing)",
      [](Text t, Settings& s) { return read_switch(t, s.across); }, [](const Settings& s) { return write_switch(s.across); }, Form::kBare, {}},
 };
+// clang-format on
 #undef NUMBER_KEY
 #undef OPTIONAL_KEY
 #undef LIST_KEY
@@ -118,9 +123,16 @@ constexpr std::size_t kCount = std::size(kSegmentKeys);
 template <std::size_t Index>
 JobKey segment_key() {
   const SegmentKey& key = kSegmentKeys[Index];
-  return {"segment", key.name, key.flag, key.value, key.meaning, false,
+  return {"segment",
+          key.name,
+          key.flag,
+          key.value,
+          key.meaning,
+          false,
           [](Text text, Job& job) { return kSegmentKeys[Index].read(text, job.segment.all); },
-          [](const Job& job) { return kSegmentKeys[Index].write(job.segment.all); }, key.form, key.switch_text};
+          [](const Job& job) { return kSegmentKeys[Index].write(job.segment.all); },
+          key.form,
+          key.switch_text};
 }
 
 template <std::size_t... Index>
@@ -128,6 +140,7 @@ std::vector<JobKey> segment_keys_of(std::index_sequence<Index...>) {
   return {segment_key<Index>()...};
 }
 
+// clang-format off
 #define EXTRUDE_KEY(name, flag, unit, low, high, meaning)                                                                  \
   {"extrude", #name, flag, unit, meaning, false,                                                                           \
    [](Text t, Job& j) { return read_optional(t, low, high, "", j.extrude.name); },                                         \
@@ -191,6 +204,7 @@ std::vector<JobKey> all_keys() {
                   [](const Job&) { return std::string(); }, Form::kString});
   return keys;
 }
+// clang-format on
 #undef EXTRUDE_KEY
 
 }  // namespace

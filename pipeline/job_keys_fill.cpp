@@ -13,9 +13,15 @@ using Text = std::string_view;
 template <std::size_t Index>
 JobKey job_key() {
   const FillKey& key = fill_settings_keys()[Index];
-  return {"fill", key.name, key.flag, key.value, key.meaning, false,
+  return {"fill",
+          key.name,
+          key.flag,
+          key.value,
+          key.meaning,
+          false,
           [](Text text, Job& job) { return fill_settings_keys()[Index].read(text, job.fill.all); },
-          [](const Job& job) { return fill_settings_keys()[Index].write(job.fill.all); }, key.form};
+          [](const Job& job) { return fill_settings_keys()[Index].write(job.fill.all); },
+          key.form};
 }
 
 constexpr std::size_t kFillKeys = 20;

@@ -15,9 +15,8 @@ constexpr Word<Mode> kModes[] = {{"uniform", Mode::kUniform},
                                  {"stepwise", Mode::kStepwise},
                                  {"optimal", Mode::kOptimal}};
 constexpr Word<Facets> kFacets[] = {{"range", Facets::kRange}, {"plane", Facets::kPlane}};
-constexpr Word<Containment> kContainments[] = {{"across", Containment::kAcross},
-                                               {"inside", Containment::kInside},
-                                               {"outside", Containment::kOutside}};
+constexpr Word<Containment> kContainments[] = {
+    {"across", Containment::kAcross}, {"inside", Containment::kInside}, {"outside", Containment::kOutside}};
 
 std::string read_time_model(Text text, Job& job) {
   std::array<double, 2> model{};
@@ -36,8 +35,7 @@ const JobKey kHeightsKeys[] = {
      [](Text t, Job& j) { return read_word(kModes, t, j.heights.mode); },
      [](const Job& j) { return write_word(kModes, j.heights.mode); }, Form::kString},
     {"heights", "thickness_mm", "--thickness", "SET|RANGE",
-     "thicknesses in mm: a set as 0.178,0.254, or a range as 0.05..0.3:0.01 (step 0.001 if left out); --layer if absent",
-     true,
+     "thicknesses in mm: a set as 0.178,0.254, or a range as 0.05..0.3:0.01 (step 0.001 if left out); --layer if absent", true,
      [](Text t, Job& j) {
        heights::ThicknessSet set;
        auto wrong = read_thicknesses(t, set);
@@ -55,8 +53,8 @@ const JobKey kHeightsKeys[] = {
     {"heights", "peak_angle_deg", "--peak-angle", "DEG", "facets at least this flat, and level, are horizontal faces", true,
      [](Text t, Job& j) { return read_number(t, 45, 90, " degrees", j.heights.peak_angle_deg); },
      [](const Job& j) { return number_text(j.heights.peak_angle_deg); }, Form::kBare},
-    {"heights", "normal_tolerance", "", "", "of the vertical component of a facet's normal, in all comparisons of angles",
-     true, [](Text t, Job& j) { return read_number(t, 0, 0.1, "", j.heights.normal_tolerance); },
+    {"heights", "normal_tolerance", "", "", "of the vertical component of a facet's normal, in all comparisons of angles", true,
+     [](Text t, Job& j) { return read_number(t, 0, 0.1, "", j.heights.normal_tolerance); },
      [](const Job& j) { return number_text(j.heights.normal_tolerance); }, Form::kBare},
     {"heights", "facets", "--facets", "range|plane",
      "what a layer looks at: facets within it, or only those that its bounding plane cuts, as in the documents", true,
@@ -66,8 +64,8 @@ const JobKey kHeightsKeys[] = {
      [](Text t, Job& j) { return read_number(t, 0, 1e9, " mm2", j.heights.least_facet_mm2); },
      [](const Job& j) { return number_text(j.heights.least_facet_mm2); }, Form::kBare},
     {"heights", "flats", "--no-flats", "", "optimal: do not aim at horizontal faces and tops, only keep the step", true,
-     [](Text t, Job& j) { return read_switch(t, j.heights.flats); },
-     [](const Job& j) { return write_switch(j.heights.flats); }, Form::kBare, "false"},
+     [](Text t, Job& j) { return read_switch(t, j.heights.flats); }, [](const Job& j) { return write_switch(j.heights.flats); },
+     Form::kBare, "false"},
     {"heights", "flat_mm2", "--flat-area", "MM2", "horizontal faces smaller than this are not aimed at", true,
      [](Text t, Job& j) { return read_number(t, 0, 1e9, " mm2", j.heights.least_flat_mm2); },
      [](const Job& j) { return number_text(j.heights.least_flat_mm2); }, Form::kBare},
@@ -76,8 +74,7 @@ const JobKey kHeightsKeys[] = {
      [](Text t, Job& j) { return read_number(t, 0, 1000, " um", j.heights.flat_tolerance_um); },
      [](const Job& j) { return number_text(j.heights.flat_tolerance_um); }, Form::kBare},
     {"heights", "time_model", "--time-model", "S[,S]",
-     "optimal: the least time instead of the fewest layers; seconds a layer, and a mm2 of its section", true,
-     read_time_model,
+     "optimal: the least time instead of the fewest layers; seconds a layer, and a mm2 of its section", true, read_time_model,
      [](const Job& j) {
        const auto& model = j.heights.time_model;
        return model[0] > 0 || model[1] > 0 ? write_list(model) : std::string();

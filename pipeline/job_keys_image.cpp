@@ -10,8 +10,7 @@ using Text = std::string_view;
 
 constexpr Word<FillRule> kFillRules[] = {
     {"nonzero", FillRule::kNonzero}, {"positive", FillRule::kPositive}, {"evenodd", FillRule::kEvenOdd}};
-constexpr Word<Mirror> kMirrors[] = {
-    {"none", Mirror::kNone}, {"x", Mirror::kX}, {"y", Mirror::kY}, {"xy", Mirror::kXY}};
+constexpr Word<Mirror> kMirrors[] = {{"none", Mirror::kNone}, {"x", Mirror::kX}, {"y", Mirror::kY}, {"xy", Mirror::kXY}};
 
 std::string read_format(std::string_view text, Job& job) {
   if (write::find_image_format(text) == nullptr) {
@@ -24,8 +23,8 @@ std::string read_format(std::string_view text, Job& job) {
 }
 
 const JobKey kImageKeys[] = {
-    {"image", "format", "--format", "FORMAT", "of the layer files", true, read_format,
-     [](const Job& j) { return j.format; }, Form::kString},
+    {"image", "format", "--format", "FORMAT", "of the layer files", true, read_format, [](const Job& j) { return j.format; },
+     Form::kString},
     {"image", "fill", "--fill", "RULE",
      "what is solid where shells overlap: nonzero (any), positive (drops shells turned inside out), evenodd", true,
      [](Text t, Job& j) { return read_word(kFillRules, t, j.fill_rule); },

@@ -47,25 +47,25 @@ const JobKey kMachineKeys[] = {
      Form::kBare},
     {"machine", "blocked", "--blocked", "N,N,...", "nozzles that do not fire, from 0, instead of the machine's", true,
      read_blocked,
-     [](const Job& j) {
-       return j.machine.blocked ? fmt::format("{}", fmt::join(*j.machine.blocked, ",")) : std::string();
-     },
+     [](const Job& j) { return j.machine.blocked ? fmt::format("{}", fmt::join(*j.machine.blocked, ",")) : std::string(); },
      Form::kList},
 };
 
 const JobKey kDoseKeys[] = {
-    {"dose", "bleed_um", "--bleed", "UM|XxY", "leave out pixels nearer to the edge than binder spreads, along x and y",
-     true, read_bleed, [](const Job& j) { return write_list(j.dose.bleed_um); }, Form::kList},
-    {"dose", "shell_mm", "--shell", "MM", "depth below the edge of a layer that gets all its binder (with --core or --fill)", true,
-     [](Text t, Job& j) { return read_number(t, 0, 1000, " mm", j.dose.shell_mm); },
+    {"dose", "bleed_um", "--bleed", "UM|XxY", "leave out pixels nearer to the edge than binder spreads, along x and y", true,
+     read_bleed, [](const Job& j) { return write_list(j.dose.bleed_um); }, Form::kList},
+    {"dose", "shell_mm", "--shell", "MM", "depth below the edge of a layer that gets all its binder (with --core or --fill)",
+     true, [](Text t, Job& j) { return read_number(t, 0, 1000, " mm", j.dose.shell_mm); },
      [](const Job& j) { return number_text(j.dose.shell_mm); }, Form::kBare},
     {"dose", "core", "--core", "SHARE", "of the pixels inside of the shell that is jetted, 0 to 1", true,
      [](Text t, Job& j) { return read_number(t, 0, 1, "", j.dose.core); },
      [](const Job& j) { return number_text(j.dose.core); }, Form::kBare},
-    {"dose", "bead_ends", "--bead-ends", "round|square", "of the beads that fill a part, and of their thick and thin stretches", true,
-     [](Text t, Job& j) { return read_word(kBeadEnds, t, j.dose.bead_ends); },
+    {"dose", "bead_ends", "--bead-ends", "round|square", "of the beads that fill a part, and of their thick and thin stretches",
+     true, [](Text t, Job& j) { return read_word(kBeadEnds, t, j.dose.bead_ends); },
      // Jobs without beads are recorded as they were before there were any.
-     [](const Job& j) { return j.dose.bead_ends == raster::BeadEnds::kRound ? std::string() : write_word(kBeadEnds, j.dose.bead_ends); },
+     [](const Job& j) {
+       return j.dose.bead_ends == raster::BeadEnds::kRound ? std::string() : write_word(kBeadEnds, j.dose.bead_ends);
+     },
      Form::kString},
 };
 

@@ -28,8 +28,7 @@ std::string read_factors(std::string_view text, double low, bool negative, std::
 
 const PartKey kPartKeys[] = {
     {"part", "path", "", "FILE", "STL, OBJ or 3MF file; in a job file, relative to that file", true,
-     [](Text t, PartRequest& p) { return read_path(t, p.path); }, [](const PartRequest& p) { return p.path; },
-     Form::kString},
+     [](Text t, PartRequest& p) { return read_path(t, p.path); }, [](const PartRequest& p) { return p.path; }, Form::kString},
     {"part", "unit", "--unit", "UNIT", "of STL and OBJ, which carry none: mm, cm, m, um, inch, foot", true,
      [](Text t, PartRequest& p) {
        int ignored = 0;
@@ -75,8 +74,8 @@ const PartKey kPartKeys[] = {
      },
      [](const PartRequest& p) { return p.fill; }, Form::kString},
     {"part", "material", "", "NAME", "powder of the part, for machines with two vats", true,
-     [](Text t, PartRequest& p) { return read_material(t, p.material); },
-     [](const PartRequest& p) { return p.material; }, Form::kString},
+     [](Text t, PartRequest& p) { return read_material(t, p.material); }, [](const PartRequest& p) { return p.material; },
+     Form::kString},
     {"part", "material_by_height", "", "RANGES", "other powders between two heights above the part's bottom", true,
      [](Text t, PartRequest& p) {
        std::vector<MaterialRange> tried;

@@ -11,11 +11,11 @@ constexpr Word<Engine> kEngines[] = {{"rays", Engine::kRays}, {"contours", Engin
 
 const JobKey kLoadKeys[] = {
     {"load", "repair", "--no-repair", "", "plan open meshes as they are instead of closing them", true,
-     [](Text t, Job& j) { return read_switch(t, j.repair); },
-     [](const Job& j) { return write_switch(j.repair); }, Form::kBare, "false"},
+     [](Text t, Job& j) { return read_switch(t, j.repair); }, [](const Job& j) { return write_switch(j.repair); }, Form::kBare,
+     "false"},
     {"load", "drop_bad", "--drop-bad", "", "drop facets with coordinates that are no numbers instead of refusing the file",
-     true, [](Text t, Job& j) { return read_switch(t, j.drop_bad); },
-     [](const Job& j) { return write_switch(j.drop_bad); }, Form::kBare, "true"},
+     true, [](Text t, Job& j) { return read_switch(t, j.drop_bad); }, [](const Job& j) { return write_switch(j.drop_bad); },
+     Form::kBare, "true"},
     {"load", "weld_um", "--weld", "UM", "repair joins open edges that are at most this far apart, in micrometres", true,
      [](Text t, Job& j) { return read_number(t, 0, 1e6, " um", j.weld_um); },
      [](const Job& j) { return number_text(j.weld_um); }, Form::kBare},
@@ -64,9 +64,7 @@ const JobKey kRunKeys[] = {
        if (wrong.empty()) j.shard = shard;
        return wrong;
      },
-     [](const Job& j) {
-       return j.shard ? fmt::format("{}/{}", (*j.shard)[0] + 1, (*j.shard)[1]) : std::string();
-     },
+     [](const Job& j) { return j.shard ? fmt::format("{}/{}", (*j.shard)[0] + 1, (*j.shard)[1]) : std::string(); },
      Form::kString},
 };
 

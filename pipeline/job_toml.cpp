@@ -22,9 +22,13 @@ namespace fs = std::filesystem;
 template <class Target>
 std::span<const Key<Target>> keys_of();
 template <>
-std::span<const JobKey> keys_of<Job>() { return job_keys(); }
+std::span<const JobKey> keys_of<Job>() {
+  return job_keys();
+}
 template <>
-std::span<const PartKey> keys_of<PartRequest>() { return part_keys(); }
+std::span<const PartKey> keys_of<PartRequest>() {
+  return part_keys();
+}
 
 template <class Target>
 const Key<Target>* find_key(std::string_view section, std::string_view name) {
@@ -167,8 +171,7 @@ namespace {
 Status read_parsed(const std::string& path, const toml::parse_result& parsed, Job& job) {
   if (!parsed) {
     const toml::source_position at = parsed.error().source().begin;
-    return Error{Fault::kUsage,
-                 fmt::format("{}:{}:{}: {}", path, at.line, at.column, one_line(parsed.error().description()))};
+    return Error{Fault::kUsage, fmt::format("{}:{}:{}: {}", path, at.line, at.column, one_line(parsed.error().description()))};
   }
   for (const auto& [name, node] : parsed.table()) {
     const std::string_view section = name.str();

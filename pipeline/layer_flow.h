@@ -39,9 +39,9 @@ struct FlowReport {
 /// What is done to a layer; layers are numbered from 0.
 template <class Work>
 struct LayerSteps {
-  std::function<std::uint64_t(std::uint32_t)> bytes_of;                   // that `prepare` may need at most
-  std::function<Result<std::uint64_t>(std::uint32_t, Work&)> prepare;      // -> bytes that `expand` may need beside those
-  std::function<Result<std::uint64_t>(std::uint32_t, Work&)> expand;       // -> bytes that the layer now holds in all
+  std::function<std::uint64_t(std::uint32_t)> bytes_of;                // that `prepare` may need at most
+  std::function<Result<std::uint64_t>(std::uint32_t, Work&)> prepare;  // -> bytes that `expand` may need beside those
+  std::function<Result<std::uint64_t>(std::uint32_t, Work&)> expand;   // -> bytes that the layer now holds in all
   std::function<Status(std::uint32_t, Work&)> record;
 };
 

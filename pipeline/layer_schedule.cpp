@@ -9,9 +9,7 @@
 namespace lamina::pipeline {
 namespace {
 
-std::int64_t top(const ScheduledLayer& scheduled) {
-  return std::int64_t{scheduled.layer.bottom} + scheduled.layer.thickness;
-}
+std::int64_t top(const ScheduledLayer& scheduled) { return std::int64_t{scheduled.layer.bottom} + scheduled.layer.thickness; }
 
 Status add_layers_of_parts(const Job& job, const Scene& scene, std::vector<ScheduledLayer>& layers) {
   const Result<heights::Options> options = heights_options(job);

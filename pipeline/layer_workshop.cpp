@@ -32,8 +32,7 @@ Error disagreement(const Layer& layer, const PixelGrid& grid, const RunsView& ra
   while (row + 1 < rays.rows() && std::ranges::equal(rays.row(row), contours.row(row))) ++row;
   const auto a = rays.row(row), b = contours.row(row);
   const auto place = static_cast<std::size_t>(std::ranges::mismatch(a, b).in1 - a.begin());
-  const std::uint32_t column = std::min(place < a.size() ? a[place] : rays.columns,
-                                        place < b.size() ? b[place] : rays.columns);
+  const std::uint32_t column = std::min(place < a.size() ? a[place] : rays.columns, place < b.size() ? b[place] : rays.columns);
   return {Fault::kVerification,
           fmt::format("layer {}: engines disagree first in image row {}, column {} (x {:.4f} mm, y {:.4f} mm, z {:.4f} "
                       "mm); this is a fault of lamina, please report it with the part",
@@ -123,15 +122,18 @@ void LayerWorkshop::mirror(Runs& image, Runs& scratch) const {
 }
 
 /// The image of a layer: its middle plane, or what its lowest and highest sections have in common or together.
-raster::LayerReport LayerWorkshop::section(const Solid& solid, raster::Engine engine, const Layer& layer, LayerWork& work, Runs& image) {
+raster::LayerReport LayerWorkshop::section(const Solid& solid, raster::Engine engine, const Layer& layer, LayerWork& work,
+                                           Runs& image) {
   const raster::Rasterizer& rasterizer = solid.rasterizer;
   if (job_.heights.containment == Containment::kAcross) {
     return rasterizer.layer(engine, layer.plane(), work.scratch, image);
   }
   const raster::LayerReport low = rasterizer.layer(engine, layer.lowest_plane(), work.scratch, work.lowest);
   const raster::LayerReport high = rasterizer.layer(engine, layer.highest_plane(), work.scratch, work.highest);
-  raster::combine(work.lowest, work.highest,
-                  job_.heights.containment == Containment::kInside ? raster::SetOperation::kIntersection : raster::SetOperation::kUnion, image);
+  raster::combine(
+      work.lowest, work.highest,
+      job_.heights.containment == Containment::kInside ? raster::SetOperation::kIntersection : raster::SetOperation::kUnion,
+      image);
   return low.open_rows + low.capped_rows >= high.open_rows + high.capped_rows ? low : high;
 }
 
@@ -155,7 +157,8 @@ Status LayerWorkshop::encode(LayerWork& work, LayerOutcome& outcome) {
   return {};
 }
 
-Status LayerWorkshop::encode_image(LayerWork& work, const LayerRecord& record, const RunsView& image, write::Bytes& file) const {
+Status LayerWorkshop::encode_image(LayerWork& work, const LayerRecord& record, const RunsView& image,
+                                   write::Bytes& file) const {
   file.clear();
   const Status status = work.encoder->encode(image, head_.grid.x.dpi(), head_.grid.y.dpi(), file);
   if (status) return {};

@@ -24,7 +24,8 @@ Status ask_for_dpi(Machine& machine, const HeadGrid& grid, const std::array<std:
   // The last nozzle may be a quarter of a pixel off.
   if (passes < 1 || passes > 64 || std::abs(across / head - passes) * grid.nozzles > 0.25) {
     return wrong("bed.dpi", fmt::format("{:g} dpi across the scan: the head of {} reaches {:.2f} and its multiples; change the "
-                                        "tilt or the asked dpi", across, machine.name, head));
+                                        "tilt or the asked dpi",
+                                        across, machine.name, head));
   }
   machine.mounting.passes = static_cast<std::uint32_t>(passes);
   if (machine.mounting.dpi != 0) machine.mounting.dpi = std::round(head * passes * 1e6) / 1e6;
@@ -33,7 +34,8 @@ Status ask_for_dpi(Machine& machine, const HeadGrid& grid, const std::array<std:
     const double ticks = std::round(machine.motion.encoder_dpi / along);
     if (ticks < 1 || std::abs(machine.motion.encoder_dpi / ticks - along) > 0.5) {
       return wrong("bed.dpi", fmt::format("{:g} dpi along the scan: the encoder of {} has {:g} ticks an inch; ask for a "
-                                          "whole fraction of it", along, machine.name, machine.motion.encoder_dpi));
+                                          "whole fraction of it",
+                                          along, machine.name, machine.motion.encoder_dpi));
     }
     machine.motion.ticks_per_pixel = static_cast<std::uint32_t>(ticks);
   } else if (std::abs(along - square) > 0.5) {
@@ -54,8 +56,8 @@ Result<ResolvedMachine> resolve_profile(const Machine& machine) {
   if (Status status = write::check_dialect(*dialect, machine, *grid); !status) return status.error();
   grid->bit_order = dialect->bit_order;
   if (!machine.powder.materials.empty() && machine.powder.materials.size() != machine.powder.vats) {
-    return wrong("powder.materials", fmt::format("{} names for {} vats of {}; name what is in each", machine.powder.materials.size(),
-                                                 machine.powder.vats, machine.name));
+    return wrong("powder.materials", fmt::format("{} names for {} vats of {}; name what is in each",
+                                                 machine.powder.materials.size(), machine.powder.vats, machine.name));
   }
   return ResolvedMachine{machine, std::move(*grid)};
 }
@@ -80,8 +82,8 @@ Status resolve_machine(Job& job) {
     if (!resolved) return resolved.error();
   }
   if (request.bed_given && job.bed_mm != machine.bed.size_mm) {
-    return wrong("bed.size_mm", fmt::format("the bed of {} is {:g} x {:g} mm; leave it out or change the profile",
-                                            machine.name, machine.bed.size_mm[0], machine.bed.size_mm[1]));
+    return wrong("bed.size_mm", fmt::format("the bed of {} is {:g} x {:g} mm; leave it out or change the profile", machine.name,
+                                            machine.bed.size_mm[0], machine.bed.size_mm[1]));
   }
   job.bed_mm = machine.bed.size_mm;
   job.machine.decides_bed = true;
@@ -100,13 +102,15 @@ Status check_reach(const Job& job, const Scene& scene) {
     const std::string& part = scene.parts[scene.part_of_instance[i]].path;
     if (outside->above) {
       return Error{Fault::kUsage, fmt::format("{}: reaches z {:.3f} mm at x {:.3f}, y {:.3f}, above the build height of {}, "
-                                              "{:g} mm; turn or scale the part", part, mm(outside->place.z),
-                                              mm(outside->place.x), mm(outside->place.y), machine.name,
-                                              machine.bed.build_height_mm)};
+                                              "{:g} mm; turn or scale the part",
+                                              part, mm(outside->place.z), mm(outside->place.x), mm(outside->place.y),
+                                              machine.name, machine.bed.build_height_mm)};
     }
-    return Error{Fault::kUsage, fmt::format("{}: reaches x {:.3f}, y {:.3f} mm at z {:.3f}, {:.3f} mm outside of the bed of {}; "
-                                            "move, turn or scale the part", part, mm(outside->place.x), mm(outside->place.y),
-                                            mm(outside->place.z), outside->beyond_mm, machine.name)};
+    return Error{
+        Fault::kUsage,
+        fmt::format("{}: reaches x {:.3f}, y {:.3f} mm at z {:.3f}, {:.3f} mm outside of the bed of {}; "
+                    "move, turn or scale the part",
+                    part, mm(outside->place.x), mm(outside->place.y), mm(outside->place.z), outside->beyond_mm, machine.name)};
   }
   return {};
 }
@@ -129,9 +133,10 @@ Result<std::string> check_build_steps(const Job& job, const heights::LayerTable&
     most = std::max(most, std::min(over, step - over));
   }
   if (off == 0) return std::string();
-  return fmt::format("{} of {} layers, first {}, end beside the {:g} mm steps of {}'s build vat, by up to {:g} mm, and cannot end "
-                     "there on the machine; thicknesses that are whole steps can", off, table.size(), first, mm(step),
-                     machine.name, mm(most));
+  return fmt::format(
+      "{} of {} layers, first {}, end beside the {:g} mm steps of {}'s build vat, by up to {:g} mm, and cannot end "
+      "there on the machine; thicknesses that are whole steps can",
+      off, table.size(), first, mm(step), machine.name, mm(most));
 }
 
 }  // namespace lamina::pipeline

@@ -7,9 +7,9 @@
 #include <fstream>
 #include <iterator>
 
+#include "pipeline/job_keys.h"
 #include "pipeline/json_text.h"
 #include "pipeline/key_text.h"
-#include "pipeline/job_keys.h"
 #include "pipeline/materials.h"
 #include "pipeline/toml_values.h"
 #include "stages/write/program/dialect.h"
@@ -22,14 +22,17 @@ constexpr double kMost = 1e9;
 
 constexpr Word<BedShape> kShapes[] = {{"rectangle", BedShape::kRectangle}, {"round", BedShape::kRound}};
 constexpr Word<ScanAxis> kScans[] = {{"x", ScanAxis::kX}, {"y", ScanAxis::kY}};
-constexpr Word<Side> kSides[] = {{"left", Side::kLeft}, {"right", Side::kRight}, {"front", Side::kFront}, {"back", Side::kBack}};
+constexpr Word<Side> kSides[] = {
+    {"left", Side::kLeft}, {"right", Side::kRight}, {"front", Side::kFront}, {"back", Side::kBack}};
 constexpr Word<BlockedRule> kBlocked[] = {
     {"report", BlockedRule::kReport}, {"neighbour", BlockedRule::kNeighbour}, {"second-pass", BlockedRule::kSecondPass}};
 constexpr Word<LagUnit> kLags[] = {{"pixel", LagUnit::kPixel}, {"tick", LagUnit::kTick}};
 constexpr Word<FirstSwath> kFirst[] = {{"bed", FirstSwath::kBed}, {"layer", FirstSwath::kLayer}};
-constexpr Word<VatRule> kVats[] = {
-    {"first", VatRule::kFirst}, {"second", VatRule::kSecond}, {"majority", VatRule::kMajority}, {"both", VatRule::kBoth},
-    {"refuse", VatRule::kRefuse}};
+constexpr Word<VatRule> kVats[] = {{"first", VatRule::kFirst},
+                                   {"second", VatRule::kSecond},
+                                   {"majority", VatRule::kMajority},
+                                   {"both", VatRule::kBoth},
+                                   {"refuse", VatRule::kRefuse}};
 
 struct MachineKey {
   Text section, name;
@@ -63,6 +66,7 @@ std::string read_sign(Text text, double& sign) {
   return {};
 }
 
+// clang-format off
 #define NUMBER_KEY(section, key, low, high, unit)                                                                      \
   {#section, #key, [](Text t, Machine& m) { return read_number(t, low, high, unit, m.section.key); },                    \
    [](const Machine& m) { return number_text(m.section.key); }, KeyForm::kBare}
@@ -202,6 +206,7 @@ const MachineKey kKeys[] = {
     NUMBER_KEY(powder, vat_speed_mm_s, 1e-3, 1e6, " mm/s"),
     NUMBER_KEY(powder, packing, 0.01, 1, ""),
 };
+// clang-format on
 
 #undef NUMBER_KEY
 #undef COUNT_KEY
@@ -238,7 +243,8 @@ Result<Machine> read_machine(std::string_view text, const std::string& where) {
     if (found == nullptr) {
       return wrong(fmt::format("{}.{}: no such key; [{}] has {}", section, name, section, names_of(kKeys, section)));
     }
-    if (kind == TomlValue::Kind::kNoValue) return wrong(fmt::format("{}.{}: is not a single value or a list of them", section, name));
+    if (kind == TomlValue::Kind::kNoValue)
+      return wrong(fmt::format("{}.{}: is not a single value or a list of them", section, name));
     if (const std::string what = found->read(written, machine); !what.empty()) {
       return wrong(fmt::format("{}.{}: {}", section, name, what));
     }

@@ -16,10 +16,10 @@
 #include "pipeline/job_toml.h"
 #include "pipeline/json_text.h"
 #include "pipeline/machine_profile.h"
-#include "pipeline/print_program.h"
 #include "pipeline/manifest_text.h"
 #include "pipeline/number_text.h"
 #include "pipeline/porous_plan.h"
+#include "pipeline/print_program.h"
 #include "stages/write/atomic_file.h"
 #include "stages/write/image_format.h"
 #include "stages/write/program/dialect.h"
@@ -33,9 +33,7 @@ std::string exact_mm(std::int64_t nm) {
   return fmt::format("{}{}.{:06}", nm < 0 ? "-" : "", size / kNmPerMm, size % kNmPerMm);
 }
 
-std::string point_text(const Point3& p) {
-  return fmt::format("[{}, {}, {}]", exact_mm(p.x), exact_mm(p.y), exact_mm(p.z));
-}
+std::string point_text(const Point3& p) { return fmt::format("[{}, {}, {}]", exact_mm(p.x), exact_mm(p.y), exact_mm(p.z)); }
 
 std::string part_text(const PartSummary& part) {
   std::string notes;
@@ -52,10 +50,11 @@ std::string part_text(const PartSummary& part) {
 // The machine's line, if there is one.
 std::string machine_line(const ManifestHead& head) {
   if (head.machine.empty()) return {};
-  return fmt::format("\"machine\": {{\"name\": {}, \"dialect\": {}, \"extension\": {}, \"profile_xxh3_128\": \"{}\", "
-                     "\"start_xxh3_128\": \"{}\", \"end_xxh3_128\": \"{}\"}},\n",
-                     json_string(head.machine), json_string(head.dialect), json_string(head.program_extension),
-                     hex(head.machine_profile), hex(head.program_start), hex(head.program_end));
+  return fmt::format(
+      "\"machine\": {{\"name\": {}, \"dialect\": {}, \"extension\": {}, \"profile_xxh3_128\": \"{}\", "
+      "\"start_xxh3_128\": \"{}\", \"end_xxh3_128\": \"{}\"}},\n",
+      json_string(head.machine), json_string(head.dialect), json_string(head.program_extension), hex(head.machine_profile),
+      hex(head.program_start), hex(head.program_end));
 }
 
 // The line of a job with several materials.
@@ -105,8 +104,8 @@ std::string key_text(std::string_view section, std::string_view name, const Job&
 }  // namespace
 
 bool read_reason(std::string_view name, LayerReason& reason) {
-  for (const LayerReason one : {LayerReason::kUniform, LayerReason::kSlope, LayerReason::kPeak, LayerReason::kCusp,
-                                LayerReason::kFlat}) {
+  for (const LayerReason one :
+       {LayerReason::kUniform, LayerReason::kSlope, LayerReason::kPeak, LayerReason::kCusp, LayerReason::kFlat}) {
     if (reason_name(one) != name) continue;
     reason = one;
     return true;
@@ -130,8 +129,9 @@ void add_record_text(const LayerRecord& record, const ManifestHead& head, std::s
   if (!head.materials.empty()) {
     fmt::format_to(std::back_inserter(text),
                    "{{\"index\": {}, \"bottom_nm\": {}, \"thickness_nm\": {}, \"reason\": \"{}\", \"capped_rows\": {}, "
-                   "\"images\": [", record.layer.index, record.layer.bottom, record.layer.thickness,
-                   reason_name(record.layer.reason), record.capped_rows);
+                   "\"images\": [",
+                   record.layer.index, record.layer.bottom, record.layer.thickness, reason_name(record.layer.reason),
+                   record.capped_rows);
     bool first = true;
     for (const LayerImageFile& image : layer_images(head, record)) {
       fmt::format_to(std::back_inserter(text), "{}{{\"file\": {}, \"bytes\": {}, \"set_pixels\": {}, \"xxh3_128\": \"{}\"}}",
@@ -146,8 +146,8 @@ void add_record_text(const LayerRecord& record, const ManifestHead& head, std::s
                  "{{\"index\": {}, \"file\": {}, \"bottom_nm\": {}, \"thickness_nm\": {}, \"reason\": \"{}\", "
                  "\"bytes\": {}, \"set_pixels\": {}, \"capped_rows\": {}, \"xxh3_128\": \"{:016x}{:016x}\"}}",
                  record.layer.index, json_string(layer_file_name(record.layer.index, head.extension)), record.layer.bottom,
-                 record.layer.thickness, reason_name(record.layer.reason), record.bytes, record.set_pixels,
-                 record.capped_rows, record.hash.high, record.hash.low);
+                 record.layer.thickness, reason_name(record.layer.reason), record.bytes, record.set_pixels, record.capped_rows,
+                 record.hash.high, record.hash.low);
 }
 
 Hash128 ManifestHead::id() const {
@@ -261,9 +261,7 @@ struct ManifestWriter::State {
     if (file >= 0) ::close(file);
   }
 
-  Error failed(int reason) const {
-    return write::write_failure(path + ".part", reason);
-  }
+  Error failed(int reason) const { return write::write_failure(path + ".part", reason); }
 
   void add(const LayerRecord& record) {
     buffer += first_line ? "\n" : ",\n";
@@ -320,8 +318,8 @@ Result<ManifestWriter> ManifestWriter::open(const std::string& path, const Manif
   state.buffer = head_text(head);
   for (const LayerRecord& record : kept_prefix) {
     if (record.layer.index != state.next_layer) {
-      return give_up({Fault::kInternal, fmt::format("manifest: layer {} kept where {} is next", record.layer.index,
-                                                    state.next_layer)});
+      return give_up(
+          {Fault::kInternal, fmt::format("manifest: layer {} kept where {} is next", record.layer.index, state.next_layer)});
     }
     state.add(record);
     if (state.lines_buffered == State::kLines) {
@@ -340,8 +338,8 @@ Status ManifestWriter::append(const LayerRecord& record) {
                                                state.next_layer, state.last_layer)};
   }
   state.add(record);
-  const bool due = state.lines_buffered >= State::kLines ||
-                   std::chrono::steady_clock::now() - state.written >= State::kPatience;
+  const bool due =
+      state.lines_buffered >= State::kLines || std::chrono::steady_clock::now() - state.written >= State::kPatience;
   return due ? state.flush() : Status();
 }
 
@@ -350,8 +348,7 @@ Status ManifestWriter::flush() { return state_->flush(); }
 Status ManifestWriter::finish() {
   State& state = *state_;
   if (state.next_layer != state.last_layer) {
-    return Error{Fault::kInternal,
-                 fmt::format("manifest: closed at layer {} of {}", state.next_layer, state.last_layer)};
+    return Error{Fault::kInternal, fmt::format("manifest: closed at layer {} of {}", state.next_layer, state.last_layer)};
   }
   state.buffer += "\n]\n}\n";
   if (Status status = state.flush(); !status) return status;

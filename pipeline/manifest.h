@@ -26,7 +26,7 @@ namespace lamina::pipeline {
 struct ProgramRecord {
   std::uint64_t bytes = 0;
   Hash128 hash;
-  std::uint32_t sweeps = 0;          // that fire
+  std::uint32_t sweeps = 0;  // that fire
   std::uint64_t drops = 0;
   std::uint64_t moved = 0, lost = 0;  // pixels of blocked nozzles (stages/program/compile.h)
 };
@@ -40,7 +40,7 @@ struct ImageRecord {
 /// One line of the manifest.
 struct LayerRecord {
   Layer layer;
-  std::uint64_t bytes = 0;          // of the file; 0 for the null format; of all of a layer's images
+  std::uint64_t bytes = 0;  // of the file; 0 for the null format; of all of a layer's images
   std::uint64_t set_pixels = 0;
   std::uint32_t capped_rows = 0;    // rows that are closed only thanks to repair (load/repair.h)
   Hash128 hash;                     // of the file; nothing where there are several
@@ -50,13 +50,13 @@ struct LayerRecord {
 
 /// The head of the manifest: the job as resolved and all that decides bytes.
 struct ManifestHead {
-  std::string version;      // of lamina
-  std::string job_toml;     // the resolved job, only keys that decide bytes
-  std::string format;       // id of the image format
-  std::string extension;    // of its files, with the dot
+  std::string version;    // of lamina
+  std::string job_toml;   // the resolved job, only keys that decide bytes
+  std::string format;     // id of the image format
+  std::string extension;  // of its files, with the dot
   std::string fill_rule, mirror;
   PixelGrid grid;
-  std::uint32_t layer_count = 0;               // of the whole job
+  std::uint32_t layer_count = 0;                  // of the whole job
   std::uint32_t first_layer = 0, last_layer = 0;  // the range [first, last) that this manifest covers
   std::vector<PartSummary> parts;
   std::string machine, dialect, program_extension;  // empty without a machine
@@ -107,8 +107,7 @@ class ManifestWriter {
   /// Starts `path`.part with the head and the records that a resumed job keeps from its start. An earlier .part is
   /// replaced at once, so that a kill at any moment loses no record that is kept.
   /// errors  kOutput: cannot be written, or another run is writing it right now
-  static Result<ManifestWriter> open(const std::string& path, const ManifestHead& head,
-                                     std::vector<LayerRecord> kept_prefix);
+  static Result<ManifestWriter> open(const std::string& path, const ManifestHead& head, std::vector<LayerRecord> kept_prefix);
   ManifestWriter(ManifestWriter&&) noexcept;
   ManifestWriter& operator=(ManifestWriter&&) noexcept;
   ~ManifestWriter();

@@ -104,6 +104,7 @@ class RecordLine {
   bool good_ = true;
 };
 
+// clang-format off
 // The middle of the line of a layer with several materials: empty, or what is wrong with it.
 std::string images_from(RecordLine& read, const ManifestHead& head, std::uint32_t index, LayerRecord& record) {
   std::string_view reason;
@@ -172,6 +173,7 @@ std::string record_from(std::string_view line, const ManifestHead& head, std::ui
   }
   return {};
 }
+// clang-format on
 
 }  // namespace
 
@@ -216,16 +218,15 @@ Result<Manifest> read_manifest(const std::string& path) {
       if (line.ends_with(',')) line.pop_back();
       const auto index = range.first_layer + static_cast<std::uint32_t>(manifest.layers.size());
       LayerRecord record;
-      const std::string what =
-          index >= range.last_layer ? "a layer beyond the range" : record_from(line, range, index, record);
+      const std::string what = index >= range.last_layer ? "a layer beyond the range" : record_from(line, range, index, record);
       // What a killed run left at the end of its .part is not worth more than its whole lines.
       if (!what.empty() && partial) return manifest;
       if (!what.empty()) return wrong(what);
       manifest.layers.push_back(record);
     }
     if (!partial && (!closed || manifest.layers.size() != range.last_layer - range.first_layer)) {
-      return wrong(fmt::format("the manifest ends after {} of {} layers", manifest.layers.size(),
-                               range.last_layer - range.first_layer));
+      return wrong(
+          fmt::format("the manifest ends after {} of {} layers", manifest.layers.size(), range.last_layer - range.first_layer));
     }
     manifest.complete = closed && !partial;
   } catch (const std::exception& error) {

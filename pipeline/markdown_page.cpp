@@ -15,11 +15,13 @@ struct More {
   std::string_view command, pages;
 };
 constexpr More kMore[] = {
-    {"jet", "[concepts](../concepts.md), [what a bitmap means](../bitmap.md), [job files](../job.md), "
-            "[print programs](../print_program.md), [formats](../formats.md)"},
+    {"jet",
+     "[concepts](../concepts.md), [what a bitmap means](../bitmap.md), [job files](../job.md), "
+     "[print programs](../print_program.md), [formats](../formats.md)"},
     {"slice", "[contours](../slice.md), [filling](../filling.md), [job files](../job.md), [formats](../formats.md)"},
     {"heights", "[layer heights](../heights.md)"},
-    {"extrude", "[extrusion](../extrude.md), [segmented lines](../segmented.md), [filling](../filling.md), [job files](../job.md)"},
+    {"extrude",
+     "[extrusion](../extrude.md), [segmented lines](../segmented.md), [filling](../filling.md), [job files](../job.md)"},
     {"calibrate", "[the procedure](../calibrate.md), [segmented lines](../segmented.md)"},
     {"info", "[concepts](../concepts.md)"},
     {"verify", "[exactness](../exactness.md), [print programs](../print_program.md)"},
@@ -59,9 +61,12 @@ std::string sentence(std::string_view text) {
 
 std::string markdown_page(const Command& command) {
   const CommandSpec spec = spec_of(command);
-  std::string text = fmt::format("<!-- Made from the definition of the command: lamina manual --markdown -o docs/commands -->\n"
-                                 "# lamina {}\n\n{}\n\n", command.name, sentence(command.summary));
-  text += fmt::format("    lamina {} [OPTIONS]{}\n\n{}\n\n", command.name, spec.operand.empty() ? "" : " " + spec.operand + " ...", spec.summary);
+  std::string text = fmt::format(
+      "<!-- Made from the definition of the command: lamina manual --markdown -o docs/commands -->\n"
+      "# lamina {}\n\n{}\n\n",
+      command.name, sentence(command.summary));
+  text += fmt::format("    lamina {} [OPTIONS]{}\n\n{}\n\n", command.name,
+                      spec.operand.empty() ? "" : " " + spec.operand + " ...", spec.summary);
   if (!spec.operand.empty()) text += fmt::format("{}: {}.\n\n", code(spec.operand), cell(spec.operand_meaning));
   std::string group = "-";
   for (const OptionSpec& option : spec.options) {
@@ -73,9 +78,11 @@ std::string markdown_page(const Command& command) {
     std::string flags;
     for (const std::string_view flag : split(option.flag, ",")) flags += fmt::format("{}{}", flags.empty() ? "" : ", ", flag);
     if (!option.value.empty()) flags += " " + option.value;
-    text += fmt::format("| {} | {} | {} |\n", code(flags), cell(option.meaning), option.preset.empty() ? "" : code(option.preset));
+    text +=
+        fmt::format("| {} | {} | {} |\n", code(flags), cell(option.meaning), option.preset.empty() ? "" : code(option.preset));
   }
-  if (!spec.closing.empty()) text += fmt::format("{}## Notes and examples\n\n```text\n{}\n```\n", spec.options.empty() ? "" : "\n", spec.closing);
+  if (!spec.closing.empty())
+    text += fmt::format("{}## Notes and examples\n\n```text\n{}\n```\n", spec.options.empty() ? "" : "\n", spec.closing);
   for (const More& more : kMore) {
     if (more.command == command.name) text += fmt::format("\nMore: {}.\n", more.pages);
   }

@@ -64,8 +64,8 @@ std::string read_material(std::string_view text, std::string& name) {
 Status set_materials(std::string_view text, Job& job) {
   const auto names = split(text, ",");
   if (names.size() != 1 && names.size() != job.parts.size()) {
-    return Error{Fault::kUsage, fmt::format("{} names for {} parts; give one for all or one for each", names.size(),
-                                            job.parts.size())};
+    return Error{Fault::kUsage,
+                 fmt::format("{} names for {} parts; give one for all or one for each", names.size(), job.parts.size())};
   }
   for (std::size_t p = 0; p < job.parts.size(); ++p) {
     const auto name = names[names.size() == 1 ? 0 : p];
@@ -167,7 +167,8 @@ Result<std::vector<std::uint32_t>> vats_of_layer(const Machine& machine, const M
     case VatRule::kRefuse: break;
   }
   return Error{Fault::kUsage, fmt::format("holds {}, which powder.vat_rule of {} refuses; choose another rule, or move the "
-                                          "parts to other heights", names_text(materials.used), machine.name)};
+                                          "parts to other heights",
+                                          names_text(materials.used), machine.name)};
 }
 
 }  // namespace lamina::pipeline

@@ -30,8 +30,7 @@ Result<std::vector<Shard>> read_shards(const std::vector<std::string>& directori
   for (const std::string& directory : directories) {
     std::error_code error;
     if (!fs::is_directory(directory, error)) {
-      return Error{Fault::kUsage, fmt::format("{}: no such directory; name those that the shards were written to",
-                                              directory)};
+      return Error{Fault::kUsage, fmt::format("{}: no such directory; name those that the shards were written to", directory)};
     }
     const fs::path canonical = fs::canonical(directory, error);
     if (std::ranges::find(seen, canonical) != seen.end()) continue;
@@ -58,7 +57,8 @@ Status check_coverage(std::vector<Shard>& shards) {
   std::uint32_t next = 0;
   const Shard* before = nullptr;
   const auto missing = [&](std::uint32_t first, std::uint32_t last) {
-    return unmatched(fmt::format("layers {} to {} of {} are in no shard; run what is missing", first, last - 1, job.layer_count));
+    return unmatched(
+        fmt::format("layers {} to {} of {} are in no shard; run what is missing", first, last - 1, job.layer_count));
   };
   for (const Shard& shard : shards) {
     const ManifestHead& head = shard.manifest.head;
@@ -104,8 +104,8 @@ Status bring_files(const Shard& shard, const std::string& output, MergeReport& r
     const std::uintmax_t size = fs::file_size(from, error);
     if (error) return unmatched(fmt::format("{}: is missing; run its shard again with --resume", from.string()));
     if (size != bytes) {
-      return unmatched(fmt::format("{}: {} bytes, the manifest says {}; run its shard again with --resume",
-                                   from.string(), size, bytes));
+      return unmatched(
+          fmt::format("{}: {} bytes, the manifest says {}; run its shard again with --resume", from.string(), size, bytes));
     }
     return in_place ? Status() : bring_file(from, fs::path(output) / name, report);
   };
@@ -118,7 +118,8 @@ Status bring_files(const Shard& shard, const std::string& output, MergeReport& r
   }
   if (head.machine.empty() || in_place) return {};
   // What all shards write alike.
-  for (const std::string& name : {std::string("machine.toml"), "start" + head.program_extension, "end" + head.program_extension}) {
+  for (const std::string& name :
+       {std::string("machine.toml"), "start" + head.program_extension, "end" + head.program_extension}) {
     const fs::path from = fs::path(shard.directory) / "program" / name;
     if (Status status = bring_file(from, fs::path(output) / "program" / name, report); !status) return status;
   }

@@ -64,8 +64,7 @@ std::string read_switch(std::string_view text, bool& value) {
   return {};
 }
 
-std::string read_pair(std::string_view text, double low, double high, std::string_view unit,
-                      std::array<double, 2>& values) {
+std::string read_pair(std::string_view text, double low, double high, std::string_view unit, std::array<double, 2>& values) {
   const auto pieces = split(text, ",x");
   if (pieces.size() != 2) return fmt::format("{} is not two numbers; write them as A,B or AxB", quoted(text));
   std::array<double, 2> parsed{};
@@ -110,8 +109,7 @@ std::string read_bytes(std::string_view text, std::uint64_t& bytes) {
   }
   double parsed = 0;
   if (!parse(number, parsed) || !(parsed * unit >= 1) || parsed * unit > std::ldexp(1.0, 50)) {
-    return fmt::format("{} is not a size from 1 byte to 1024 tebibytes; write it as 256M, 1G or in bytes",
-                       quoted(text));
+    return fmt::format("{} is not a size from 1 byte to 1024 tebibytes; write it as 256M, 1G or in bytes", quoted(text));
   }
   bytes = static_cast<std::uint64_t>(parsed * unit);
   return {};

@@ -22,8 +22,7 @@ std::string read_whole(std::string_view text, std::int64_t low, std::int64_t hig
 std::string read_switch(std::string_view text, bool& value);
 
 /// Two numbers, as 490x380 or 490,380.
-std::string read_pair(std::string_view text, double low, double high, std::string_view unit,
-                      std::array<double, 2>& values);
+std::string read_pair(std::string_view text, double low, double high, std::string_view unit, std::array<double, 2>& values);
 
 /// Three numbers, as 1,1,1.02, or one that stands for all three if `one_for_all`.
 std::string read_triple(std::string_view text, double low, double high, std::string_view unit, bool one_for_all,

@@ -150,16 +150,18 @@ Status check_output(const Job& job) {
       shared = true;
     } else if (is_own && !job.resume && !job.overwrite) {
       if (file.partial) return refuse("an interrupted job", "go on with --resume, or start over with --overwrite");
-      return refuse("a finished job", "replace it with --overwrite, check and keep it with --resume, or name another "
-                                      "directory");
+      return refuse("a finished job",
+                    "replace it with --overwrite, check and keep it with --resume, or name another "
+                    "directory");
     } else if (!is_own && (job.shard || !job.overwrite)) {
-      return refuse("a job that was split otherwise", job.shard ? "name another directory"
-                                                                : "replace it with --overwrite, or name another directory");
+      return refuse("a job that was split otherwise",
+                    job.shard ? "name another directory" : "replace it with --overwrite, or name another directory");
     }
   }
   if (!(job.resume && begun) && !job.overwrite && !shared && !layer_files(job.output).empty()) {
     return Error{Fault::kUsage, fmt::format("{}/layers: holds layers without a manifest; replace them with --overwrite, "
-                                            "or name another directory", job.output)};
+                                            "or name another directory",
+                                            job.output)};
   }
   return {};
 }
@@ -172,7 +174,8 @@ Status check_shard_replaces_itself(const Job& job, const ManifestHead& head) {
     const Result<Manifest> earlier = read_manifest(path);
     if (earlier && earlier->head.id() == head.id()) continue;
     return Error{Fault::kUsage, fmt::format("{}: is of another job, whose layers a shard cannot clear away; remove {} first, "
-                                            "or name another directory", path, job.output)};
+                                            "or name another directory",
+                                            path, job.output)};
   }
   return {};
 }

@@ -16,8 +16,8 @@ namespace lamina::pipeline {
 
 /// A manifest in a job's directory, by its name.
 struct ManifestFile {
-  std::string name;  // in the directory
-  bool partial = false;                              // ends in .part: a run that has not finished
+  std::string name;                                   // in the directory
+  bool partial = false;                               // ends in .part: a run that has not finished
   std::optional<std::array<std::uint32_t, 2>> shard;  // i of n, i from 0
 };
 

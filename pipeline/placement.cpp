@@ -10,20 +10,19 @@ namespace lamina::pipeline {
 namespace {
 
 // A box that is wider or deeper than the bed cannot stand anywhere.
-std::optional<Error> too_large(const BoxRequest& box, std::int64_t bed_width, std::int64_t bed_depth,
-                               bool bed_of_machine) {
+std::optional<Error> too_large(const BoxRequest& box, std::int64_t bed_width, std::int64_t bed_depth, bool bed_of_machine) {
   if (box.width <= bed_width && box.depth <= bed_depth) return std::nullopt;
   const bool turned = box.depth <= bed_width && box.width <= bed_depth;
   return Error{Fault::kUsage,
-               fmt::format("{}: {} x {} mm is larger than the bed of {} x {} mm; {} {} or a smaller --scale",
-                           box.name, mm(box.width), mm(box.depth), mm(bed_width), mm(bed_depth),
-                           turned ? "try --rotate 0,0,90," : "use", bed_of_machine ? "another machine" : "a larger --bed")};
+               fmt::format("{}: {} x {} mm is larger than the bed of {} x {} mm; {} {} or a smaller --scale", box.name,
+                           mm(box.width), mm(box.depth), mm(bed_width), mm(bed_depth), turned ? "try --rotate 0,0,90," : "use",
+                           bed_of_machine ? "another machine" : "a larger --bed")};
 }
 
 }  // namespace
 
-Result<std::vector<Place>> place_boxes(std::span<const BoxRequest> requests, std::int64_t bed_width,
-                                       std::int64_t bed_depth, std::int64_t gap, bool bed_of_machine) {
+Result<std::vector<Place>> place_boxes(std::span<const BoxRequest> requests, std::int64_t bed_width, std::int64_t bed_depth,
+                                       std::int64_t gap, bool bed_of_machine) {
   std::vector<Place> places;
   std::int64_t x = 0, y = 0, row_depth = 0, block_width = 0;
   bool begun = false;
@@ -55,8 +54,8 @@ Result<std::vector<Place>> place_boxes(std::span<const BoxRequest> requests, std
         return Error{Fault::kUsage,
                      fmt::format("{}: copy {} of {} finds no room on the bed of {} x {} mm, {} mm of depth are missing; "
                                  "use fewer --copies, a smaller --gap or {}",
-                                 box.name, copy + 1, box.copies, mm(bed_width), mm(bed_depth),
-                                 mm(y + box.depth - bed_depth), bed_of_machine ? "another machine" : "a larger --bed")};
+                                 box.name, copy + 1, box.copies, mm(bed_width), mm(bed_depth), mm(y + box.depth - bed_depth),
+                                 bed_of_machine ? "another machine" : "a larger --bed")};
       }
       places.push_back({r, x, y});
       begun = true;

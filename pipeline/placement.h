@@ -13,10 +13,10 @@ namespace lamina::pipeline {
 
 /// The box of one [[part]] and how many of it have to stand.
 struct BoxRequest {
-  std::int64_t width = 0, depth = 0;        // nm
+  std::int64_t width = 0, depth = 0;  // nm
   std::uint32_t copies = 1;
   std::optional<std::int64_t> at_x = {}, at_y = {};  // nm; both or none
-  std::string name = {};                     // for messages
+  std::string name = {};                             // for messages
 };
 
 /// The front left corner of one copy.
@@ -35,7 +35,7 @@ struct Place {
 ///
 /// errors  kUsage if a copy does not lie within the bed: which, by how much, and what would help
 /// cost    O(copies)
-Result<std::vector<Place>> place_boxes(std::span<const BoxRequest> requests, std::int64_t bed_width,
-                                       std::int64_t bed_depth, std::int64_t gap, bool bed_of_machine = false);
+Result<std::vector<Place>> place_boxes(std::span<const BoxRequest> requests, std::int64_t bed_width, std::int64_t bed_depth,
+                                       std::int64_t gap, bool bed_of_machine = false);
 
 }  // namespace lamina::pipeline

@@ -65,7 +65,8 @@ Result<bool> PorousPlan::asked(const Job& job) {
 
 Result<PorousPlan> PorousPlan::make(const Job& asked, const PixelGrid& grid, const ProgressCallback& progress) {
   if (asked.dose.core < 1) {
-    return Error{Fault::kUsage, "dose.core: a part that is filled by beads has no core to thin out; leave out --core or the filling"};
+    return Error{Fault::kUsage,
+                 "dose.core: a part that is filled by beads has no core to thin out; leave out --core or the filling"};
   }
   if (asked.heights.containment != Containment::kAcross) {
     return Error{Fault::kUsage, "--containment: a filling is cut in the middle of layers; leave out one of the two"};
@@ -112,7 +113,8 @@ void PorousPlan::lay(const SegmentRange& range, const segment::LayerCut& cut, co
     beads.add(s.from, s.to, width, ends_);
     // Square ends leave a wedge where a bead turns; they are wanted only where its width changes along a line.
     const bool turns = !s.jump && (s.thickness == last || s.kind != last_kind);
-    if (ends_ == raster::BeadEnds::kSquare && turns) beads.add(s.from, s.from, std::min(width, last_width), raster::BeadEnds::kRound);
+    if (ends_ == raster::BeadEnds::kSquare && turns)
+      beads.add(s.from, s.from, std::min(width, last_width), raster::BeadEnds::kRound);
     last_width = width;
     last = s.thickness;
     last_kind = s.kind;
@@ -171,7 +173,8 @@ std::uint64_t PorousPlan::spans_expected(std::uint32_t index) const {
       spans += length / stretch * of_bead;  // closed curves are divided where they have no corner
       continue;
     }
-    if (fill.pattern != infill::Pattern::kRaster && fill.pattern != infill::Pattern::kContourRaster) stretch = std::min(stretch, width);
+    if (fill.pattern != infill::Pattern::kRaster && fill.pattern != infill::Pattern::kContourRaster)
+      stretch = std::min(stretch, width);
     spans += length * rows_per_mm + (length / stretch + 2 * mm(box.width() + box.depth()) / distance) * of_bead;
   }
   return static_cast<std::uint64_t>(spans) + 1;
@@ -179,9 +182,9 @@ std::uint64_t PorousPlan::spans_expected(std::uint32_t index) const {
 
 std::uint64_t PorousPlan::bytes_expected(std::uint32_t layer) const {
   const std::uint64_t rows = grid_.rows(), spans = spans_expected(layer);
-  const std::uint64_t of_beads = 24 * spans + 4 * rows;         // spans, and in the order of rows
-  const std::uint64_t of_images = 2 * (8 * spans + 4 * rows);   // laid, inner
-  const std::uint64_t of_paths = 20 * spans;                    // a point of a toolpath is 17 bytes, and has a span or more
+  const std::uint64_t of_beads = 24 * spans + 4 * rows;        // spans, and in the order of rows
+  const std::uint64_t of_images = 2 * (8 * spans + 4 * rows);  // laid, inner
+  const std::uint64_t of_paths = 20 * spans;                   // a point of a toolpath is 17 bytes, and has a span or more
   return slices_->bytes_bound(layer) + of_beads + of_images + of_paths;
 }
 

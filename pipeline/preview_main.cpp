@@ -69,14 +69,13 @@ Result<std::vector<std::size_t>> chosen_layers(const Arguments& arguments, const
     for (std::size_t i = 0; i < layers.size(); ++i) {
       if (layers[i] == *layer) return std::vector<std::size_t>{i};
     }
-    return Error{Fault::kUsage, fmt::format("--layer {}: the job has layers {} to {}", *layer,
-                                            layers.front(), layers.back())};
+    return Error{Fault::kUsage, fmt::format("--layer {}: the job has layers {} to {}", *layer, layers.front(), layers.back())};
   }
   if (every) {
     const std::size_t cells = (layers.size() + *every - 1) / *every;
     if (cells > kMostCells) {
-      return Error{Fault::kUsage, fmt::format("--every {}: {} layers are too many for a picture; give {} or more",
-                                              *every, cells, (layers.size() + kMostCells - 1) / kMostCells)};
+      return Error{Fault::kUsage, fmt::format("--every {}: {} layers are too many for a picture; give {} or more", *every,
+                                              cells, (layers.size() + kMostCells - 1) / kMostCells)};
     }
     for (std::size_t i = 0; i < layers.size(); i += *every) chosen.push_back(i);
     return chosen;
@@ -94,8 +93,8 @@ std::string title_of(const ManifestHead& head) {
     if (head.parts.size() > 1) title += fmt::format(" and {} more", head.parts.size() - 1);
     title += "   |   ";
   }
-  return title + fmt::format("{} layers   |   {:g} x {:g} dpi   |   bed {:g} x {:g} mm", head.layer_count,
-                             head.grid.x.dpi(), head.grid.y.dpi(), mm(head.grid.x.length), mm(head.grid.y.length));
+  return title + fmt::format("{} layers   |   {:g} x {:g} dpi   |   bed {:g} x {:g} mm", head.layer_count, head.grid.x.dpi(),
+                             head.grid.y.dpi(), mm(head.grid.x.length), mm(head.grid.y.length));
 }
 
 write::picture::PlanView view_of(LayerShapes& shapes) {
@@ -112,7 +111,8 @@ write::picture::PlanView view_of(LayerShapes& shapes) {
 }
 
 /// Several layers of what lamina slice wrote.
-int preview_slice_sheet(const SlicePictures& pictures, const std::string& output, const Arguments& arguments, std::uint32_t width) {
+int preview_slice_sheet(const SlicePictures& pictures, const std::string& output, const Arguments& arguments,
+                        std::uint32_t width) {
   if (std::filesystem::path(output).extension() == ".svg") {
     return fail({Fault::kUsage, "-o: an SVG shows one layer, choose it by --layer K; several are drawn as PNG"});
   }
@@ -123,8 +123,9 @@ int preview_slice_sheet(const SlicePictures& pictures, const std::string& output
   if (chosen->empty()) return fail({Fault::kVerification, "the job has no layers"});
   Result<LayerShapes> shapes = pictures.layer(layers[chosen->front()]);
   if (!shapes) return fail(shapes.error());
-  const std::string title = fmt::format("{}   |   {} layers   |   {:.1f} x {:.1f} mm", shapes->title.substr(0, shapes->title.find("   |")),
-                                        pictures.count(), mm(shapes->box.width()), mm(shapes->box.depth()));
+  const std::string title =
+      fmt::format("{}   |   {} layers   |   {:.1f} x {:.1f} mm", shapes->title.substr(0, shapes->title.find("   |")),
+                  pictures.count(), mm(shapes->box.width()), mm(shapes->box.depth()));
   const auto layer_view = [&](std::size_t i) -> Result<write::picture::PlanView> {
     if (i > 0) shapes = pictures.layer(layers[(*chosen)[i]]);
     if (!shapes) return shapes.error();
@@ -146,7 +147,8 @@ int preview_slice_sheet(const SlicePictures& pictures, const std::string& output
 int preview_slice(const std::string& directory, const std::string& output, const Arguments& arguments, std::uint32_t width) {
   for (const std::string_view option : {"--whole-bed", "--swath"}) {
     if (arguments.has(option)) {
-      return fail({Fault::kUsage, fmt::format("{}: is for images; of a sliced job what its parts cover is drawn, leave it out", option)});
+      return fail({Fault::kUsage,
+                   fmt::format("{}: is for images; of a sliced job what its parts cover is drawn, leave it out", option)});
     }
   }
   const auto layer = number(arguments, "--layer", 0, UINT32_MAX);
@@ -212,15 +214,16 @@ int run_preview(const std::vector<std::string>& texts) {
   if (!manifest) return fail(manifest.error());
   if (manifest->layers.empty()) return fail({Fault::kVerification, directory + ": the manifest has no layers yet"});
   if (manifest->head.extension.empty()) {
-    return fail({Fault::kVerification,
-                 fmt::format("{}: the job wrote no images (format {}); plan it with another format, as tiff-g4",
-                             directory, manifest->head.format)});
+    return fail(
+        {Fault::kVerification, fmt::format("{}: the job wrote no images (format {}); plan it with another format, as tiff-g4",
+                                           directory, manifest->head.format)});
   }
   if (arguments->has("--swath")) {
     SwathChoice choice;
     const auto layer = number(*arguments, "--layer", 0, UINT32_MAX), step = number(*arguments, "--step", 0, UINT32_MAX);
     const bool middle = arguments->text("--swath") == "middle";
-    const auto swath = middle ? Result<std::optional<std::uint32_t>>(std::nullopt) : number(*arguments, "--swath", 0, UINT32_MAX);
+    const auto swath =
+        middle ? Result<std::optional<std::uint32_t>>(std::nullopt) : number(*arguments, "--swath", 0, UINT32_MAX);
     for (const auto* option : {&layer, &step, &swath}) {
       if (!*option) return fail(option->error());
     }

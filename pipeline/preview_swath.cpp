@@ -22,7 +22,8 @@ struct SweepSeen {
 };
 
 Runs runs_of(std::vector<VirtualMachine::Drop>& drops, std::uint32_t columns, std::uint32_t rows) {
-  std::ranges::sort(drops, [](const auto& a, const auto& b) { return std::pair(a.row, a.column) < std::pair(b.row, b.column); });
+  std::ranges::sort(drops,
+                    [](const auto& a, const auto& b) { return std::pair(a.row, a.column) < std::pair(b.row, b.column); });
   Runs runs;
   runs.columns = columns;
   std::size_t next = 0;
@@ -50,8 +51,8 @@ Result<Buffer<std::byte>> draw_swath(const std::string& directory, const Manifes
   }
   const auto path = [&](const std::string& name) { return (std::filesystem::path(directory) / name).string(); };
   if (std::ranges::none_of(manifest.layers, [&](const LayerRecord& one) { return one.layer.index == choice.layer; })) {
-    return Error{Fault::kUsage, fmt::format("--layer {}: the job has layers {} to {}", choice.layer, manifest.layers.front().layer.index,
-                                            manifest.layers.back().layer.index)};
+    return Error{Fault::kUsage, fmt::format("--layer {}: the job has layers {} to {}", choice.layer,
+                                            manifest.layers.front().layer.index, manifest.layers.back().layer.index)};
   }
   const auto built = machine_of_job(directory, head);
   if (!built) return built.error();
@@ -70,26 +71,27 @@ Result<Buffer<std::byte>> draw_swath(const std::string& directory, const Manifes
   std::vector<VirtualMachine::Drop> drops;
   std::map<std::uint32_t, SweepSeen> sweeps;
   std::vector<std::uint32_t> order;
-  const auto replayed = built->run(program_of_layer(directory, head, choice.layer), choice.layer,
-                                   [&](const VirtualMachine::Drop& drop) {
-                                     drops.push_back(drop);
-                                     const auto [found, fresh] = sweeps.try_emplace(drop.sweep, SweepSeen{drop.first_line, drop.step, drop.step, false});
-                                     if (fresh) order.push_back(drop.sweep);
-                                     found->second.first_step = std::min(found->second.first_step, drop.step);
-                                     found->second.last_step = std::max(found->second.last_step, drop.step);
-                                     if (drop.step < found->second.last_step) found->second.backward = true;
-                                   });
+  const auto replayed =
+      built->run(program_of_layer(directory, head, choice.layer), choice.layer, [&](const VirtualMachine::Drop& drop) {
+        drops.push_back(drop);
+        const auto [found, fresh] = sweeps.try_emplace(drop.sweep, SweepSeen{drop.first_line, drop.step, drop.step, false});
+        if (fresh) order.push_back(drop.sweep);
+        found->second.first_step = std::min(found->second.first_step, drop.step);
+        found->second.last_step = std::max(found->second.last_step, drop.step);
+        if (drop.step < found->second.last_step) found->second.backward = true;
+      });
   if (!replayed) return replayed.error();
-  if (order.empty()) return Error{Fault::kUsage, fmt::format("layer {}: its program fires nothing; choose another --layer", choice.layer)};
+  if (order.empty())
+    return Error{Fault::kUsage, fmt::format("layer {}: its program fires nothing; choose another --layer", choice.layer)};
   const std::uint32_t swath = choice.swath.value_or(order[order.size() / 2]);
   if (!sweeps.contains(swath)) {
-    return Error{Fault::kUsage, fmt::format("--swath {}: fires nothing in layer {}; those that do are {} to {}", swath, choice.layer,
-                                            sweeps.begin()->first, sweeps.rbegin()->first)};
+    return Error{Fault::kUsage, fmt::format("--swath {}: fires nothing in layer {}; those that do are {} to {}", swath,
+                                            choice.layer, sweeps.begin()->first, sweeps.rbegin()->first)};
   }
   const SweepSeen& present = sweeps.at(swath);
   if (choice.step && (*choice.step < present.first_step || *choice.step > present.last_step)) {
-    return Error{Fault::kUsage, fmt::format("--step {}: swath {} of layer {} fires at steps {} to {}", *choice.step, swath, choice.layer,
-                                            present.first_step, present.last_step)};
+    return Error{Fault::kUsage, fmt::format("--step {}: swath {} of layer {} fires at steps {} to {}", *choice.step, swath,
+                                            choice.layer, present.first_step, present.last_step)};
   }
   const std::uint32_t step = choice.step.value_or(present.first_step + (present.last_step - present.first_step) / 2);
 
@@ -128,7 +130,8 @@ Result<Buffer<std::byte>> draw_swath(const std::string& directory, const Manifes
   const auto place = std::ranges::find(order, swath) - order.begin() + 1;
   view.title = fmt::format("{}, layer {}, swath {} ({} of {} that fire), step {}", head.machine, choice.layer, swath, place,
                            order.size(), step);
-  view.caption = fmt::format("{} of {} drops fired; {} of {} nozzles fire at this step (red)", fired.size(), drops.size(), firing, nozzles);
+  view.caption = fmt::format("{} of {} drops fired; {} of {} nozzles fire at this step (red)", fired.size(), drops.size(),
+                             firing, nozzles);
   const Runs runs = runs_of(fired, head.grid.columns(), head.grid.rows());
   view.fired = runs;
   return write::picture::swath_picture(view);

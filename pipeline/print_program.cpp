@@ -52,14 +52,14 @@ Status PrintProgram::write_layer(const Layer& layer, const RunsView& image, cons
   work.text.clear();
   work.writer->begin_layer(cycle, work.text);
   constexpr std::size_t kPiece = 256 << 10;
-  const auto count = program::compile(resolved_.grid, image, work.compile,
-                                      [&](const Sweep& sweep, const SweepVectors& vectors) -> Status {
-                                        work.writer->sweep(sweep, vectors, work.text);
-                                        if (work.text.size() < kPiece) return {};
-                                        Status status = file->append(work.text);
-                                        work.text.clear();
-                                        return status;
-                                      });
+  const auto count =
+      program::compile(resolved_.grid, image, work.compile, [&](const Sweep& sweep, const SweepVectors& vectors) -> Status {
+        work.writer->sweep(sweep, vectors, work.text);
+        if (work.text.size() < kPiece) return {};
+        Status status = file->append(work.text);
+        work.text.clear();
+        return status;
+      });
   if (!count) return count.error();
   work.writer->end_layer(cycle, work.text);
   if (Status status = file->append(work.text); !status) return status;

@@ -19,9 +19,7 @@ struct ProgramFile::State {
   XXH3_state_t* hash = XXH3_createState();
 
   std::string partial() const { return path + ".part"; }
-  Error failed(int reason) const {
-    return {Fault::kOutput, fmt::format("{}: cannot write: {}", path, std::strerror(reason))};
-  }
+  Error failed(int reason) const { return {Fault::kOutput, fmt::format("{}: cannot write: {}", path, std::strerror(reason))}; }
   ~State() {
     XXH3_freeState(hash);
     if (file < 0) return;

@@ -17,8 +17,9 @@ struct DialectReader {
   std::string_view id;
   void (*read)(std::string_view, Printing&);
 };
-constexpr DialectReader kReaders[] = {{"nuferbj", replay_nuferbj}, {"raw", replay_raw}, {"planes", replay_planes},
-                                      {"hp45", replay_hp45}, {"brundlefab", replay_brundlefab}, {"m578", replay_m578}};
+constexpr DialectReader kReaders[] = {{"nuferbj", replay_nuferbj},       {"raw", replay_raw},
+                                      {"planes", replay_planes},         {"hp45", replay_hp45},
+                                      {"brundlefab", replay_brundlefab}, {"m578", replay_m578}};
 
 }  // namespace
 
@@ -97,7 +98,8 @@ Result<VirtualMachine> VirtualMachine::build(const Machine& machine, std::uint32
 std::array<double, 2> VirtualMachine::nozzle_at(std::int64_t first_line, double step, std::uint32_t number) const {
   const Nozzle& nozzle = nozzle_[number];
   const double line = static_cast<double>(first_line + nozzle.line) + nozzle.across_um / line_um_;
-  const double place = (step - static_cast<double>(nozzle.step_offset)) / static_cast<double>(ticks_) + nozzle.along_um / place_um_;
+  const double place =
+      (step - static_cast<double>(nozzle.step_offset)) / static_cast<double>(ticks_) + nozzle.along_um / place_um_;
   const bool x = machine_.mounting.scan_axis == ScanAxis::kX;
   double column = x ? place : line, row = x ? line : place;
   const auto has = [&](Side side) { return machine_.mounting.scan_from == side || machine_.mounting.nozzle_0 == side; };
@@ -318,7 +320,8 @@ void Printing::compare(const RunsView& image, std::uint64_t moved, std::uint64_t
     return blocked[over] || !worked[over];
   };
   const auto set_and_unfired = [&](std::int64_t column, std::int64_t row) {
-    if (column < 0 || row < 0 || column >= machine_.columns_ || row >= machine_.rows_ || !may_be_lost(column, row)) return false;
+    if (column < 0 || row < 0 || column >= machine_.columns_ || row >= machine_.rows_ || !may_be_lost(column, row))
+      return false;
     const auto line = image.row(static_cast<std::uint32_t>(row));
     const auto after = std::upper_bound(line.begin(), line.end(), static_cast<std::uint32_t>(column)) - line.begin();
     return after % 2 == 1 && (fired_[std::size_t(row) * row_words_ + std::size_t(column) / 64] >> (column % 64) & 1) == 0;
@@ -341,9 +344,10 @@ void Printing::compare(const RunsView& image, std::uint64_t moved, std::uint64_t
         const std::uint32_t column = w * 64 + bit;
         const bool extra = (got >> bit & 1) != 0;
         (extra ? added : missing) += 1;
-        const bool explained = !extra ? moved + lost > 0 && may_be_lost(column, row)
-                                      : moved > 0 && (x ? set_and_unfired(column, row - next) || set_and_unfired(column, row + next)
-                                                        : set_and_unfired(column - next, row) || set_and_unfired(column + next, row));
+        const bool explained =
+            !extra ? moved + lost > 0 && may_be_lost(column, row)
+                   : moved > 0 && (x ? set_and_unfired(column, row - next) || set_and_unfired(column, row + next)
+                                     : set_and_unfired(column - next, row) || set_and_unfired(column + next, row));
         if (first_of_all.empty()) first_of_all = place_of(column, row);
         if (first.empty() && !explained) {
           first = fmt::format("{}: column {}, row {} is {}", place_of(column, row), column, row,

@@ -22,12 +22,12 @@ namespace lamina::pipeline {
 struct ReplayCount {
   std::uint64_t drops = 0, vectors = 0;
   std::uint32_t sweeps = 0;
-  double scan_mm = 0, travel_mm = 0;           // of the head
-  double seconds = 0;                          // head, roller and vats, one after the other
-  std::array<double, 2> fed_mm{0, 0};          // by each vat
-  std::uint32_t vats = 0;                      // that feed, a bit each, by words or by movement
-  bool moves = false;                          // whether the program moves the vats and the roller itself
-  double build_mm = 0;                         // where the build vat stands at the end
+  double scan_mm = 0, travel_mm = 0;                     // of the head
+  double seconds = 0;                                    // head, roller and vats, one after the other
+  std::array<double, 2> fed_mm{0, 0};                    // by each vat
+  std::uint32_t vats = 0;                                // that feed, a bit each, by words or by movement
+  bool moves = false;                                    // whether the program moves the vats and the roller itself
+  double build_mm = 0;                                   // where the build vat stands at the end
   double farthest_along_um = 0, farthest_across_um = 0;  // a drop from the centre of its pixel
   void add(const ReplayCount& other);
 };
@@ -74,8 +74,8 @@ class VirtualMachine {
   double line_um_ = 0, place_um_ = 0, step_um_ = 0;
   std::uint32_t lines_ = 0, places_ = 0;
   struct Nozzle {
-    std::int64_t line;         // from that of nozzle 0
-    std::int64_t step_offset;  // steps behind the foremost nozzle, rounded
+    std::int64_t line;           // from that of nozzle 0
+    std::int64_t step_offset;    // steps behind the foremost nozzle, rounded
     double along_um, across_um;  // from the centre of its pixel when it fires
     bool blocked;
   };

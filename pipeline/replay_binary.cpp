@@ -47,7 +47,8 @@ class ScanLength {
   }
   void end() {
     if (!any_) return;
-    const double mm = std::abs(printing_.position_of(static_cast<double>(last_)) - printing_.position_of(static_cast<double>(first_)));
+    const double mm =
+        std::abs(printing_.position_of(static_cast<double>(last_)) - printing_.position_of(static_cast<double>(first_)));
     printing_.head_moves(mm + 2 * printing_.profile().motion.ramp_mm, printing_.profile().motion.scan_speed_mm_s, true);
     any_ = false;
   }
@@ -107,14 +108,16 @@ void replay_planes(std::string_view text, Printing& printing) {
   std::uint32_t sweep = UINT32_MAX;
   const bool layer = reader.word() == 0x4C01;
   const std::uint32_t counts = reader.word();
-  if (!layer || (counts != 4 && counts != 5) || reader.word() != printing.layer()) reader.fault("does not begin with this layer");
+  if (!layer || (counts != 4 && counts != 5) || reader.word() != printing.layer())
+    reader.fault("does not begin with this layer");
   reader.take(3 * 4);
   printing.count.vats = counts == 5 ? reader.word() : 1;
   std::vector<std::vector<std::uint64_t>> rows;
   while (true) {
     const std::uint32_t command = reader.word(), size = reader.word();
     if (command == 0x4C03) {
-      if (size != 1 || reader.word() != printing.layer() || !reader.done()) reader.fault("the end is not of this layer, or not the end");
+      if (size != 1 || reader.word() != printing.layer() || !reader.done())
+        reader.fault("the end is not of this layer, or not the end");
       length.end();
       return;
     }

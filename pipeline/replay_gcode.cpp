@@ -4,9 +4,7 @@
 
 namespace lamina::pipeline {
 
-void GcodeReader::fault(const std::string& what) const {
-  printing_.fault(fmt::format("line {}: {}", number_, what));
-}
+void GcodeReader::fault(const std::string& what) const { printing_.fault(fmt::format("line {}: {}", number_, what)); }
 
 bool GcodeReader::take(GcodeLine& line, bool all_words) {
   while (!left_.empty()) {
@@ -50,7 +48,8 @@ double GcodeReader::number(const GcodeLine& line, char letter) const {
 
 std::uint32_t GcodeReader::count(const GcodeLine& line, char letter) const {
   const double value = number(line, letter);
-  if (!(value >= 0 && value <= 4294967295.0) || value != std::floor(value)) fault(fmt::format("{}{:g} is no count", letter, value));
+  if (!(value >= 0 && value <= 4294967295.0) || value != std::floor(value))
+    fault(fmt::format("{}{:g} is no count", letter, value));
   return static_cast<std::uint32_t>(value);
 }
 

@@ -28,7 +28,8 @@ Vector read_vector(const GcodeLine& line, GcodeReader& reader, std::uint32_t noz
     const char* digits = line.rest.data() + std::size_t{group} * 9;
     std::uint32_t bits = 0;
     const auto [end, wrong] = std::from_chars(digits, digits + 8, bits, 16);
-    if (wrong != std::errc() || end != digits + 8 || (group > 0 && digits[-1] != ' ')) reader.fault("a word that is no hexadecimal number");
+    if (wrong != std::errc() || end != digits + 8 || (group > 0 && digits[-1] != ' '))
+      reader.fault("a word that is no hexadecimal number");
     vector.words[group / 2] |= std::uint64_t{bits} << (group % 2 == 0 ? 32 : 0);
   }
   return vector;

@@ -30,7 +30,10 @@ class Printing {
   double position_of(double step) const;
   std::int64_t step_at(double carriage_mm) const;
   /// For messages: the sweep whose words are read before it begins, and the step of a vector that is not fired yet.
-  void reading_sweep(std::uint32_t number) { reading_sweep_ = number; reading_ = INT64_MIN; }
+  void reading_sweep(std::uint32_t number) {
+    reading_sweep_ = number;
+    reading_ = INT64_MIN;
+  }
   void reading_step(std::int64_t step) { reading_ = step; }
   void at_step(std::int64_t step);
   void fire(std::uint32_t nozzle);
@@ -66,7 +69,7 @@ class Printing {
   std::uint32_t sweep_ = 0;
   std::int64_t first_line_ = 0, step_ = 0, previous_step_ = 0;
   std::int64_t reading_ = INT64_MIN, reading_sweep_ = INT64_MIN;
-  bool rolled_ = false;       // to the far end
+  bool rolled_ = false;  // to the far end
   double roller_mm_ = 0;
   bool backward_ = false, sweeping_ = false, stepped_ = false, fired_here_ = false;
   std::vector<std::uint64_t> fired_;  // a bit a pixel, the leftmost in bit 0

@@ -55,7 +55,8 @@ void replay_hp45(std::string_view text, Printing& printing) {
     } else if (line.command == "SBR") {
       if (loaded.empty()) printing.reading_sweep(sweep);
       const std::size_t gap = line.rest.find(' ');
-      if (gap == std::string_view::npos || line.rest.size() - gap - 1 != 50) reader.fault("SBR has a position and 50 characters");
+      if (gap == std::string_view::npos || line.rest.size() - gap - 1 != 50)
+        reader.fault("SBR has a position and 50 characters");
       const std::string_view raw = line.rest.substr(gap + 1);
       std::vector<std::uint64_t> words((printing.nozzles() + 63) / 64, 0);
       for (std::uint32_t nozzle = 0; nozzle < 300; ++nozzle) {
@@ -77,7 +78,8 @@ void replay_hp45(std::string_view text, Printing& printing) {
       for (const auto& [step, words] : loaded) {
         printing.at_step(step);
         const double at = printing.position_of(static_cast<double>(step));
-        if (at < std::min(from, to) - 1e-3 || at > std::max(from, to) + 1e-3) printing.fault("the head does not come over this step");
+        if (at < std::min(from, to) - 1e-3 || at > std::max(from, to) + 1e-3)
+          printing.fault("the head does not come over this step");
         printing.fire_words(words);
       }
       loaded.clear();

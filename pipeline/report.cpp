@@ -33,21 +33,25 @@ Result<Manifest> finished_manifest(const std::string& directory) {
   const std::string path = directory + "/manifest.json";
   if (!fs::exists(path, ignored) && fs::exists(path + ".part", ignored)) {
     return Error{Fault::kVerification, fmt::format("{}: the job is not finished; end it with --resume, then ask for the "
-                                                   "report", directory)};
+                                                   "report",
+                                                   directory)};
   }
   if (!fs::exists(path, ignored)) {
     return Error{Fault::kVerification, fmt::format("{}: no manifest.json; name a finished directory of lamina jet (shards: "
-                                                   "run lamina merge first)", directory)};
+                                                   "run lamina merge first)",
+                                                   directory)};
   }
   if (is_slice_directory(directory)) {
     return Error{Fault::kVerification, fmt::format("{}: is a job of lamina slice, and reports are of lamina jet's jobs; "
-                                                   "lamina preview draws its layers", directory)};
+                                                   "lamina preview draws its layers",
+                                                   directory)};
   }
   Result<Manifest> manifest = read_manifest(path);
   if (!manifest) return manifest;
   if (manifest->head.extension.empty()) {
     return Error{Fault::kVerification, fmt::format("{}: the job wrote no images (format {}); plan it with another format, "
-                                                   "as tiff-g4", directory, manifest->head.format)};
+                                                   "as tiff-g4",
+                                                   directory, manifest->head.format)};
   }
   if (manifest->layers.empty()) return Error{Fault::kVerification, directory + ": the job has no layers"};
   return manifest;
@@ -60,7 +64,8 @@ Result<Runs> read_layer(const std::string& directory, const ManifestHead& head, 
     const std::string path = directory + "/" + file.name;
     const Result<FileDigest> digest = digest_file(path);
     if (!digest) return digest.error();
-    const Error changed{Fault::kVerification, fmt::format("{}: is not the file of the manifest; lamina verify tells more", path)};
+    const Error changed{Fault::kVerification,
+                        fmt::format("{}: is not the file of the manifest; lamina verify tells more", path)};
     if (digest->bytes != file.record.bytes || digest->hash != file.record.hash) return changed;
     Result<write::LayerImage> image = write::read_image(path);
     if (!image) return image.error();
@@ -121,7 +126,8 @@ Status each_layer(const std::string& directory, const Manifest& manifest, Work w
 template <class Value>
 std::string list(const std::vector<LayerRecord>& layers, Value value) {
   std::string text = "[";
-  for (const LayerRecord& record : layers) fmt::format_to(std::back_inserter(text), "{}{}", text.size() > 1 ? "," : "", value(record));
+  for (const LayerRecord& record : layers)
+    fmt::format_to(std::back_inserter(text), "{}{}", text.size() > 1 ? "," : "", value(record));
   return text + "]";
 }
 
@@ -172,7 +178,8 @@ Result<std::vector<ShownView>> views_of_parts(const std::string& directory, cons
   const auto pictures = cast_parts(head, folders, 360);
   if (!pictures) return pictures.error();
   std::vector<ShownView> views;
-  for (const auto& [name, picture] : {std::pair{"top", &(*pictures)[0]}, {"front", &(*pictures)[1]}, {"side", &(*pictures)[2]}}) {
+  for (const auto& [name, picture] :
+       {std::pair{"top", &(*pictures)[0]}, {"front", &(*pictures)[1]}, {"side", &(*pictures)[2]}}) {
     views.push_back({name, picture->width, picture->height, 0, picture->width_mm, picture->height_mm,
                      write::report::deflate_bytes(std::as_bytes(std::span(picture->light_cover)))});
   }
@@ -189,9 +196,8 @@ std::vector<ShownView> views_of_layers(const ThreeViews& views) {
 }
 
 /// What the page's script reads.
-std::string head_json(const Manifest& manifest, const FileDigest& file, const write::PixelWindow& window,
-                      HeldLayers& held, const std::vector<ShownView>& views,
-                      const std::vector<double>& seconds) {
+std::string head_json(const Manifest& manifest, const FileDigest& file, const write::PixelWindow& window, HeldLayers& held,
+                      const std::vector<ShownView>& views, const std::vector<double>& seconds) {
   const ManifestHead& head = manifest.head;
   const std::vector<LayerRecord>& layers = manifest.layers;
   std::string parts, places, sides;
@@ -213,14 +219,15 @@ std::string head_json(const Manifest& manifest, const FileDigest& file, const wr
       head.grid.columns(), head.grid.rows(), head.grid.x.dpi(), head.grid.y.dpi(), 25.4 / head.grid.x.dpi(),
       25.4 / head.grid.y.dpi(), window.left, window.top, window.right, window.bottom, head.layer_count, head.first_layer,
       held.stride(), json_string(head.job_toml), file.bytes, hex(file.hash), parts, sides, reasons, places);
-  text += fmt::format(
-      "\"layers\":{{\"bottom\":{},\"thickness\":{},\"reason\":{},\"set\":{},\"bytes\":{},\"capped\":{},\"hash\":{}",
-      list(layers, [](const LayerRecord& r) { return r.layer.bottom; }),
-      list(layers, [](const LayerRecord& r) { return r.layer.thickness; }),
-      list(layers, [](const LayerRecord& r) { return static_cast<int>(r.layer.reason); }),
-      list(layers, [](const LayerRecord& r) { return r.set_pixels; }), list(layers, [](const LayerRecord& r) { return r.bytes; }),
-      list(layers, [](const LayerRecord& r) { return r.capped_rows; }),
-      list(layers, [](const LayerRecord& r) { return fmt::format("\"{}\"", hex(r.hash)); }));
+  text +=
+      fmt::format("\"layers\":{{\"bottom\":{},\"thickness\":{},\"reason\":{},\"set\":{},\"bytes\":{},\"capped\":{},\"hash\":{}",
+                  list(layers, [](const LayerRecord& r) { return r.layer.bottom; }),
+                  list(layers, [](const LayerRecord& r) { return r.layer.thickness; }),
+                  list(layers, [](const LayerRecord& r) { return static_cast<int>(r.layer.reason); }),
+                  list(layers, [](const LayerRecord& r) { return r.set_pixels; }),
+                  list(layers, [](const LayerRecord& r) { return r.bytes; }),
+                  list(layers, [](const LayerRecord& r) { return r.capped_rows; }),
+                  list(layers, [](const LayerRecord& r) { return fmt::format("\"{}\"", hex(r.hash)); }));
   if (!head.machine.empty()) {
     text += fmt::format(",\"sweeps\":{}", list(layers, [](const LayerRecord& r) { return r.program.sweeps; }));
     std::string times;

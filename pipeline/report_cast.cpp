@@ -39,7 +39,8 @@ Result<std::array<view::Picture, 3>> cast_parts(const ManifestHead& head, const 
   if (!scene) return scene.error();
   for (std::size_t i = 0; i < scene->parts.size(); ++i) {
     if (i < head.parts.size() && scene->parts[i].fingerprint == head.parts[i].fingerprint) continue;
-    return Error{Fault::kInput, fmt::format("{}: is not the part that was planned, its triangles are others", job.parts[i].path)};
+    return Error{Fault::kInput,
+                 fmt::format("{}: is not the part that was planned, its triangles are others", job.parts[i].path)};
   }
   const Result<view::Caster> caster = view::Caster::build(scene->meshes, scene->instances);
   if (!caster) return caster.error();

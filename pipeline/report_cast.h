@@ -14,9 +14,9 @@ namespace lamina::pipeline {
 
 /// The job's parts from above, from the front and from the right, `most` pixels along the longest side of all.
 ///
-/// A manifest names parts without their folders. Each is looked for in `folders` (files among them stand for themselves), and is the
-/// one only if its triangles have the recorded fingerprint.
-/// errors  kInput: a part that is not there or has changed, with its name; of load_scene
+/// A manifest names parts without their folders. Each is looked for in `folders` (files among them stand for themselves), and
+/// is the one only if its triangles have the recorded fingerprint. errors  kInput: a part that is not there or has changed,
+/// with its name; of load_scene
 Result<std::array<view::Picture, 3>> cast_parts(const ManifestHead& head, const std::vector<std::string>& folders,
                                                 std::uint32_t most);
 

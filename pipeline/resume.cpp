@@ -21,8 +21,8 @@ Result<std::vector<LayerRecord>> layers_that_hold(const std::string& directory, 
   if (!manifest) return manifest.error();
   if (manifest->head.id() != head.id()) {
     const std::string what = difference(head, manifest->head);
-    return Error{Fault::kUsage, fmt::format("{}: belongs to another job ({}); choose another directory, or --overwrite",
-                                            path, what.empty() ? "its parts or keys differ" : what)};
+    return Error{Fault::kUsage, fmt::format("{}: belongs to another job ({}); choose another directory, or --overwrite", path,
+                                            what.empty() ? "its parts or keys differ" : what)};
   }
   const ManifestHead& was = manifest->head;
   if (was.first_layer < head.first_layer || was.last_layer > head.last_layer) {
@@ -40,9 +40,9 @@ Result<std::vector<LayerRecord>> layers_that_hold(const std::string& directory, 
       const auto digest = digest_file(directory + "/" + file);
       return digest.ok() && digest->bytes == bytes && digest->hash == hash;
     };
-    holds[i] = std::ranges::all_of(layer_images(head, record), [&](const LayerImageFile& image) {
-                 return hold(image.name, image.record.bytes, image.record.hash);
-               }) &&
+    holds[i] = std::ranges::all_of(
+                   layer_images(head, record),
+                   [&](const LayerImageFile& image) { return hold(image.name, image.record.bytes, image.record.hash); }) &&
                hold(program_file_name(record.layer.index, head.program_extension), record.program.bytes, record.program.hash);
   });
   std::vector<LayerRecord> kept;

@@ -24,15 +24,15 @@ double millimetres_of(const std::string& unit) {
 
 // A file as it was loaded once for all [[part]] entries that ask for the same of it.
 struct Loaded {
-  std::uint32_t first_mesh = 0;         // of its meshes in the scene
-  std::vector<Instance> instances;      // mesh counts from first_mesh
+  std::uint32_t first_mesh = 0;     // of its meshes in the scene
+  std::vector<Instance> instances;  // mesh counts from first_mesh
   Box bounds;
   std::uint64_t triangles = 0, fingerprint = 0;
   std::vector<Note> notes;
 };
 
-using LoadKey = std::tuple<std::string, std::string, std::array<double, 3>, std::array<double, 3>, std::array<double, 3>,
-                           std::string>;
+using LoadKey =
+    std::tuple<std::string, std::string, std::array<double, 3>, std::array<double, 3>, std::array<double, 3>, std::string>;
 
 // splitmix64's finisher: spreads neighbouring offsets over all bits.
 std::uint64_t mix(std::uint64_t x) {
@@ -73,8 +73,8 @@ Result<Loaded> load_part(const Job& job, const PartRequest& request, Scene& scen
     return Error{Fault::kInput, fmt::format("{}: holds no triangles; nothing to plan", request.path)};
   }
   if (part->bounds.height() == 0) {
-    return Error{Fault::kInput, fmt::format("{}: all of it lies at z = {} mm, it has no height; nothing to plan",
-                                            request.path, mm(part->bounds.lo.z))};
+    return Error{Fault::kInput, fmt::format("{}: all of it lies at z = {} mm, it has no height; nothing to plan", request.path,
+                                            mm(part->bounds.lo.z))};
   }
   Loaded loaded;
   loaded.first_mesh = static_cast<std::uint32_t>(scene.meshes.size());
@@ -141,8 +141,9 @@ Result<Scene> load_scene(const Job& job) {
     std::error_code ignored;
     const std::filesystem::path file = std::filesystem::weakly_canonical(part.path, ignored);
     // Parts of different materials are indexed apart (solids.h), so that each has meshes of its own.
-    const std::string solid =
-        part.material_by_height.empty() ? part.material : fmt::format("{} {} {}", part.material, part.material_by_height, part.bottom_mm);
+    const std::string solid = part.material_by_height.empty()
+                                  ? part.material
+                                  : fmt::format("{} {} {}", part.material, part.material_by_height, part.bottom_mm);
     const LoadKey key{file.empty() ? part.path : file.string(), part.unit, part.scale, part.rotate_deg, part.shrink, solid};
     auto found = files.find(key);
     if (found == files.end()) {
@@ -162,18 +163,20 @@ Result<Scene> load_scene(const Job& job) {
     }
     requests.push_back(std::move(request));
     if (nm_of(part.bottom_mm) + found->second.bounds.height() > kNmReach) {
-      return Error{Fault::kUsage, fmt::format("{}: reaches {} mm above the bed, beyond {} mm; use a smaller --scale or "
-                                              "--bottom", part.path,
-                                              mm(nm_of(part.bottom_mm) + found->second.bounds.height()), mm(kNmReach))};
+      return Error{Fault::kUsage,
+                   fmt::format("{}: reaches {} mm above the bed, beyond {} mm; use a smaller --scale or "
+                               "--bottom",
+                               part.path, mm(nm_of(part.bottom_mm) + found->second.bounds.height()), mm(kNmReach))};
     }
   }
 
-  const Result<std::vector<Place>> places = place_boxes(requests, bed_width, bed_depth, nm_of(job.gap_mm), job.machine.decides_bed);
+  const Result<std::vector<Place>> places =
+      place_boxes(requests, bed_width, bed_depth, nm_of(job.gap_mm), job.machine.decides_bed);
   if (!places) return places.error();
 
   for (std::size_t p = 0; p < job.parts.size(); ++p) {
-    scene.parts.push_back({job.parts[p].path, job.parts[p].copies, loaded[p]->triangles, loaded[p]->fingerprint, Box(),
-                           loaded[p]->notes});
+    scene.parts.push_back(
+        {job.parts[p].path, job.parts[p].copies, loaded[p]->triangles, loaded[p]->fingerprint, Box(), loaded[p]->notes});
   }
   // Meshes far from the origin of their file, whose way to the bed is longer than 32 bits of nanometres.
   std::map<std::uint32_t, Point3> rebased;

@@ -18,7 +18,7 @@ struct PartSummary {
   std::uint32_t copies = 1;
   std::uint64_t triangles = 0;  // of the file, once
   std::uint64_t fingerprint = 0;
-  Box bounds;                   // nm, of the first copy, on the bed
+  Box bounds;  // nm, of the first copy, on the bed
   std::vector<Note> notes;
 };
 

@@ -32,7 +32,8 @@ std::string read_changes(Text text, SegmentSettings& settings) {
       if (key.name == change.substr(0, equals)) found = &key;
     }
     if (found == nullptr) {
-      return fmt::format("'{}' is no key of a segmentation{}", change.substr(0, equals), suggest(change.substr(0, equals), names));
+      return fmt::format("'{}' is no key of a segmentation{}", change.substr(0, equals),
+                         suggest(change.substr(0, equals), names));
     }
     if (const std::string wrong = found->read(change.substr(equals + 1), settings); !wrong.empty()) {
       return fmt::format("{}: {}", found->name, wrong);
@@ -69,7 +70,8 @@ Result<SegmentRange> resolve(const SegmentSettings& settings, const segment::Cal
   const std::size_t lines = std::max(settings.thin_speed_sweep.size(), settings.thin_extrusion_sweep.size());
   for (std::size_t i = 0; i < lines; ++i) {
     const auto of = [i](const std::vector<double>& list, double all) { return list.empty() ? all : list[i % list.size()]; };
-    const double extrusion = of(settings.thin_extrusion_sweep, plan.thin_extrusion), speed = of(settings.thin_speed_sweep, plan.thin_speed);
+    const double extrusion = of(settings.thin_extrusion_sweep, plan.thin_extrusion),
+                 speed = of(settings.thin_speed_sweep, plan.thin_speed);
     plan.sweep.push_back({extrusion, speed, thin_width(extrusion, speed)});
   }
   segment::Spacing spacing = segment::spacing_for(plan.thick_width_mm, plan.continuous_width_mm, settings.gap_mm);
@@ -106,11 +108,14 @@ bool leaves_distances(const FillSettings& fill) { return distance_keys(fill).emp
 /// Spacings of a segmentation beside distances that the filling gives itself.
 Status check_spacings(const SegmentSettings& settings, const FillSettings& fill, const std::string& where) {
   if (!settings.on || leaves_distances(fill)) return {};
-  const Text key = settings.spacing_sc_mm ? "spacing_sc_mm" : settings.spacing_cc_mm ? "spacing_cc_mm" : settings.gap_mm != 0 ? "gap_mm" : "";
+  const Text key = settings.spacing_sc_mm   ? "spacing_sc_mm"
+                   : settings.spacing_cc_mm ? "spacing_cc_mm"
+                   : settings.gap_mm != 0   ? "gap_mm"
+                                            : "";
   if (key.empty()) return {};
   const auto keys = distance_keys(fill);
-  return Error{Fault::kUsage, fmt::format("segment.{}: {}fill.{} says how far lines lie from each other; leave out one of them", key, where,
-                                          keys.empty() ? Text("group") : keys.front())};
+  return Error{Fault::kUsage, fmt::format("segment.{}: {}fill.{} says how far lines lie from each other; leave out one of them",
+                                          key, where, keys.empty() ? Text("group") : keys.front())};
 }
 
 struct Entry {
@@ -128,8 +133,8 @@ Result<std::vector<Entry>> read_entries(Text text, Text key) {
     const auto ends = split(piece.substr(0, space), ":");
     double from = 0, to = 0;
     const bool two = ends.size() == 2;
-    if (!two || !read_number(ends[0], 0, kMostMm, " mm", from).empty() || !read_number(ends[1], 0, kMostMm, " mm", to).empty() ||
-        nm_of(to) <= nm_of(from)) {
+    if (!two || !read_number(ends[0], 0, kMostMm, " mm", from).empty() ||
+        !read_number(ends[1], 0, kMostMm, " mm", to).empty() || nm_of(to) <= nm_of(from)) {
       return Error{Fault::kUsage, fmt::format("{}: '{}' is not from:to in mm, as in 2.7:3", key, piece.substr(0, space))};
     }
     entries.push_back({nm_of(from), nm_of(to), std::string(piece.substr(0, space)), std::string(trimmed(piece.substr(space)))});
@@ -178,7 +183,8 @@ Result<SegmentPlan> plan_segments(const SegmentRequest& request, const segment::
     if (const std::string what = read_changes(entry.changes, settings); !what.empty()) {
       return Error{Fault::kUsage, fmt::format("segment.by_height: {}: {}", entry.heights, what)};
     }
-    if (Status status = spaced ? Status() : check_spacings(settings, fill.all, entry.heights + ": "); !status) return status.error();
+    if (Status status = spaced ? Status() : check_spacings(settings, fill.all, entry.heights + ": "); !status)
+      return status.error();
     auto range = resolve(settings, calibration, fill.all.width_mm);
     if (!range) return Error{Fault::kUsage, fmt::format("segment.by_height: {}: {}", entry.heights, range.error().message)};
     range->from = entry.from;
@@ -189,16 +195,16 @@ Result<SegmentPlan> plan_segments(const SegmentRequest& request, const segment::
       if (filling.from == entry.from && filling.to == entry.to) {
         same = &filling;
       } else if (filling.from < entry.to && entry.from < filling.to) {
-        return Error{Fault::kUsage, fmt::format("segment.by_height: {} overlaps {} of fill.by_height in part; give both the same ends",
-                                                entry.heights, filling.heights)};
+        return Error{Fault::kUsage,
+                     fmt::format("segment.by_height: {} overlaps {} of fill.by_height in part; give both the same ends",
+                                 entry.heights, filling.heights)};
       }
     }
     if (spaced) {
       const bool own_gap = same != nullptr && (same->changes.find("gap") != std::string::npos ||
                                                same->changes.find("distance_mm") != std::string::npos);
       const std::vector<double> plain{fill.all.width_mm};
-      const std::string distance =
-          "distance_mm=" + list_text(settings.on ? distances_of(range->plan, settings.first) : plain);
+      const std::string distance = "distance_mm=" + list_text(settings.on ? distances_of(range->plan, settings.first) : plain);
       if (same == nullptr) {
         fillings->push_back({entry.from, entry.to, entry.heights, distance});
       } else if (!own_gap) {

@@ -160,7 +160,8 @@ Result<SliceSummary> run_slice(const Job& job, const ProgressCallback& progress,
       fmt::format("{{\n  \"lamina\": {},\n  \"kind\": \"slice\",\n  \"job\": {},\n  \"format\": {},\n  \"file\": {},\n"
                   "  \"layer_count\": {},\n  \"first_layer\": {},\n  \"last_layer\": {},\n  \"layers\": [",
                   json_string(version()), json_string(job_of_manifest(job)), json_string(job.slice.format),
-                  job.slice.file_a_layer || job.slice.format == "null" ? "null" : json_string(slice_file_name(job)), summary.layers_total, first, last));
+                  job.slice.file_a_layer || job.slice.format == "null" ? "null" : json_string(slice_file_name(job)),
+                  summary.layers_total, first, last));
   if (!manifest) return manifest.error();
 
   // --- layers
@@ -169,7 +170,8 @@ Result<SliceSummary> run_slice(const Job& job, const ProgressCallback& progress,
     sum += std::chrono::duration_cast<std::chrono::nanoseconds>(Clock::now() - from).count();
   };
   const auto view_of = [&](std::uint32_t index, const SlicePlan::Work& work) {
-    return write::SliceLayer{plan->layers()[index].layer, work.contours.contours, work.contours.body, work.paths, work.path_body};
+    return write::SliceLayer{plan->layers()[index].layer, work.contours.contours, work.contours.body, work.paths,
+                             work.path_body};
   };
   const auto prepare = [&](std::uint32_t i, SlicePlan::Work& work) -> Result<std::uint64_t> {
     // Two numbers of some 11 characters and what divides them. An element of SVG names kind, colour and width, one of CLI
@@ -240,13 +242,13 @@ Result<SliceSummary> run_slice(const Job& job, const ProgressCallback& progress,
     return manifest->append(fmt::format(
         "{{\"layer\":{},\"bottom_nm\":{},\"thickness_nm\":{},\"contours\":{},\"points\":{},\"area_mm2\":{:.9f},"
         "\"paths\":{},\"united\":{},\"open\":{}{}}}",
-        layer.index, layer.bottom, layer.thickness, work.contours.contours.size(), work.contours.contours.point.size(),
-        area, work.paths.size(), work.report.united, work.report.gaps.open, where));
+        layer.index, layer.bottom, layer.thickness, work.contours.contours.size(), work.contours.contours.point.size(), area,
+        work.paths.size(), work.report.united, work.report.gaps.open, where));
   };
   FlowLimits limits;
   limits.budget_bytes = job.memory_bytes;
-  limits.most_in_flight = 4 * static_cast<std::uint32_t>(
-                                  tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism));
+  limits.most_in_flight =
+      4 * static_cast<std::uint32_t>(tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism));
   FlowReport flow;
   const auto start = Clock::now();
   const auto bytes_of = [&](std::uint32_t i) { return plan->bytes_bound(first + i); };
@@ -259,7 +261,8 @@ Result<SliceSummary> run_slice(const Job& job, const ProgressCallback& progress,
     if (Status status = file->append(text); !status) return status.error();
     summary.bytes_written = file->size();
     ends.insert(ends.end(), text.begin(), text.end());
-    rest = fmt::format(",\n  \"file_bytes\": {},\n  \"ends_xxh3_128\": \"{}\"", file->size(), hex(hash_bytes(std::as_bytes(std::span(ends)))));
+    rest = fmt::format(",\n  \"file_bytes\": {},\n  \"ends_xxh3_128\": \"{}\"", file->size(),
+                       hex(hash_bytes(std::as_bytes(std::span(ends)))));
   }
   if (package) {
     if (Status status = package->finish(summary.output); !status) return status.error();
@@ -293,7 +296,8 @@ Result<SliceSummary> run_slice(const Job& job, const ProgressCallback& progress,
   if (summary.open_chains > 0) {
     summary.warnings.push_back(fmt::format(
         "{} chains of cuts stay open, first {}: they bound nothing and are left out; leave out --no-repair to close the "
-        "parts, or give a longer --bridge", summary.open_chains, first_open));
+        "parts, or give a longer --bridge",
+        summary.open_chains, first_open));
   }
   if (summary.emptied_layers > 0) {
     summary.warnings.push_back(fmt::format(

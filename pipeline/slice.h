@@ -8,8 +8,8 @@
 #include <string>
 #include <vector>
 
-#include "pipeline/job.h"
 #include "pipeline/jet.h"  // ProgressCallback
+#include "pipeline/job.h"
 #include "pipeline/layer_schedule.h"
 #include "pipeline/scene.h"
 #include "stages/data/layer.h"
@@ -29,10 +29,10 @@ class SlicePlan {
   struct Work {
     slice::LayerScratch scratch;
     slice::LayerContours contours;
-    slice::LayerContours highest;     // where steps have to stay on one side: the section at the top of the layer
-    slice::LayerContours parts;       // of areas of bodies that several parts share, united part by part
-    std::vector<Contours> surface;    // of these areas: what no earlier part takes
-    std::vector<Contours> region;     // of each area: where centres of filling beads may lie
+    slice::LayerContours highest;   // where steps have to stay on one side: the section at the top of the layer
+    slice::LayerContours parts;     // of areas of bodies that several parts share, united part by part
+    std::vector<Contours> surface;  // of these areas: what no earlier part takes
+    std::vector<Contours> region;   // of each area: where centres of filling beads may lie
     Toolpaths paths;
     Buffer<std::uint32_t> path_body;  // the paths of body b are [path_body[b], path_body[b + 1])
     Buffer<std::uint32_t> path_area;  // the same of areas
@@ -52,8 +52,8 @@ class SlicePlan {
   /// then of parts in the job; where parts share room it belongs to the first one.
   struct Area {
     std::uint32_t body, part;
-    Box box;                                  // of its instances, before any offset
-    std::uint32_t shared = UINT32_MAX;        // number among the areas of bodies with several parts
+    Box box;                            // of its instances, before any offset
+    std::uint32_t shared = UINT32_MAX;  // number among the areas of bodies with several parts
   };
   const std::vector<Area>& areas() const { return areas_; }
   /// What fills an area in a layer.
@@ -63,7 +63,7 @@ class SlicePlan {
   const Scene& scene() const { return *scene_; }
   const slice::Slicer& slicer() const { return *slicer_; }
   const std::vector<std::string>& names() const { return names_; }  // of bodies
-  const Box& bounds() const { return bounds_; }                      // around all, as sliced
+  const Box& bounds() const { return bounds_; }                     // around all, as sliced
   bool fills() const { return fills_; }
   /// Bytes that contours() may need at most, and text of them.
   std::uint64_t bytes_bound(std::uint32_t index) const;
@@ -82,11 +82,11 @@ class SlicePlan {
   LayerSchedule schedule_;
   Containment containment_ = Containment::kAcross;
   std::unique_ptr<slice::Slicer> slicer_;
-  std::vector<slice::Slicer> own_slicers_;   // by part, where each has layers of its own
+  std::vector<slice::Slicer> own_slicers_;  // by part, where each has layers of its own
   std::vector<std::string> names_;
-  std::vector<FillPlan> plans_;              // by [[part]]
+  std::vector<FillPlan> plans_;  // by [[part]]
   std::vector<Area> areas_;
-  std::vector<std::uint32_t> body_area_;     // bodies + 1, into areas_
+  std::vector<std::uint32_t> body_area_;      // bodies + 1, into areas_
   std::optional<slice::Slicer> part_slicer_;  // of the shared areas, if there are any to be filled
   Status make_own_slicers(const Job& job, const std::vector<std::uint32_t>& body);
   std::vector<std::uint32_t> make_areas(const Job& job, const std::vector<Box>& boxes, const std::vector<std::uint32_t>& body);
@@ -104,10 +104,10 @@ struct SliceSummary {
   std::uint32_t layers_total = 0, layers = 0;
   std::uint64_t triangles = 0, cuts = 0, contours = 0, points = 0, paths = 0, bytes_written = 0;
   std::uint64_t united_layers = 0, gaps_closed = 0, open_chains = 0;
-  double largest_gap_mm = 0;   // of those closed
+  double largest_gap_mm = 0;         // of those closed
   std::uint64_t emptied_layers = 0;  // that were solid before the offset
-  double volume_mm3 = 0;       // area x thickness
-  double bead_mm = 0;          // length of all beads
+  double volume_mm3 = 0;             // area x thickness
+  double bead_mm = 0;                // length of all beads
   double load_seconds = 0, index_seconds = 0, layer_seconds = 0, slice_seconds = 0, encode_seconds = 0;
   std::uint64_t index_bytes = 0, peak_layer_bytes = 0, peak_resident_bytes = 0;
   std::uint32_t most_in_flight = 0;

@@ -38,9 +38,8 @@ std::string_view slice_extension(const Job& job) {
 std::string slice_file_name(const Job& job) {
   const std::string stem = fs::path(job.parts.front().path).stem().string();
   // part.stl.gz is part
-  const std::string name = fs::path(stem).extension() == ".stl" || fs::path(stem).extension() == ".obj"
-                               ? fs::path(stem).stem().string()
-                               : stem;
+  const std::string name =
+      fs::path(stem).extension() == ".stl" || fs::path(stem).extension() == ".obj" ? fs::path(stem).stem().string() : stem;
   return fmt::format("{}{}", name.empty() ? "part" : name, slice_extension(job));
 }
 
@@ -52,28 +51,32 @@ Status check_slice_output(const Job& job) {
     return Error{Fault::kOutput, fmt::format("{}: is a file, not a directory; name another one with -o", job.output)};
   }
   if (!job.overwrite && !find_manifests(job.output).empty()) {
-    return Error{Fault::kUsage, fmt::format("{}: holds a job; replace it with --overwrite, or name another directory", job.output)};
+    return Error{Fault::kUsage,
+                 fmt::format("{}: holds a job; replace it with --overwrite, or name another directory", job.output)};
   }
   for (const std::string& name : {std::string("job.toml"), slice_file_name(job)}) {
     const fs::path file = fs::path(job.output) / name;
     for (const PartRequest& part : job.parts) {
       if (fs::equivalent(file, part.path, error)) {
-        return Error{Fault::kUsage, fmt::format("{}: is a part of the job and would be replaced; name another directory", file.string())};
+        return Error{Fault::kUsage,
+                     fmt::format("{}: is a part of the job and would be replaced; name another directory", file.string())};
       }
     }
     // A job file that a person wrote is not ours to replace: ours stands beside a manifest.
     if (name == "job.toml" && fs::exists(file, error) && (!job.overwrite || find_manifests(job.output).empty())) {
-      return Error{Fault::kUsage, fmt::format("{}: is there already, and the job would be kept in it; name another directory", file.string())};
+      return Error{Fault::kUsage,
+                   fmt::format("{}: is there already, and the job would be kept in it; name another directory", file.string())};
     }
   }
   if (job.overwrite) return {};
   if (!layer_files(job).empty()) {
-    return Error{Fault::kUsage, fmt::format("{}/layers: holds layers; replace them with --overwrite, or name another directory", job.output)};
+    return Error{Fault::kUsage,
+                 fmt::format("{}/layers: holds layers; replace them with --overwrite, or name another directory", job.output)};
   }
   const fs::path file = fs::path(job.output) / slice_file_name(job);
   if (!job.slice.file_a_layer && fs::exists(file, error)) {
-    return Error{Fault::kUsage, fmt::format("{}: is there already; replace it with --overwrite, or name another directory",
-                                            file.string())};
+    return Error{Fault::kUsage,
+                 fmt::format("{}: is there already; replace it with --overwrite, or name another directory", file.string())};
   }
   return {};
 }

@@ -98,7 +98,8 @@ Result<LayerShapes> SlicePictures::layer(std::uint32_t index) const {
   if (!line.empty() && line.find(fmt::format("\"points\":{},\"area_mm2\":{:.9f},\"paths\":{},", shapes.contours.point.size(),
                                              area, work.paths.size())) == std::string::npos) {
     return Error{Fault::kVerification, fmt::format("{}: layer {} is not what was written: a part has changed since; slice it "
-                                                   "again", directory_, index)};
+                                                   "again",
+                                                   directory_, index)};
   }
   shapes.box = plan_.bounds();
   for (const auto& [kind, name] : kKinds) {

@@ -127,7 +127,8 @@ Status SlicePlan::make_own_slicers(const Job& job, const std::vector<std::uint32
   for (const Area& area : areas_) {
     if (area.shared == UINT32_MAX) continue;
     return Error{Fault::kUsage, fmt::format("--per-part: {} touches another part, so they have to share their layers; move "
-                                            "them apart or leave it out", fs::path(job.parts[area.part].path).filename().string())};
+                                            "them apart or leave it out",
+                                            fs::path(job.parts[area.part].path).filename().string())};
   }
   for (std::uint32_t part = 0; part < job.parts.size(); ++part) {
     std::vector<std::uint32_t> own = body;
@@ -300,7 +301,8 @@ Result<std::uint64_t> SlicePlan::fill_bytes_bound(std::uint32_t index, Work& wor
 
 std::uint64_t SlicePlan::Work::bytes() const {
   const auto of = [](const Contours& c) { return bytes_held(c.point) + bytes_held(c.offset); };
-  std::uint64_t total = of(contours.contours) + of(highest.contours) + of(parts.contours) + of(scratch.closed) + of(scratch.open) + bytes_held(text);
+  std::uint64_t total = of(contours.contours) + of(highest.contours) + of(parts.contours) + of(scratch.closed) +
+                        of(scratch.open) + bytes_held(text);
   for (const Contours& c : surface) total += of(c);
   for (const Contours& c : region) total += of(c);
   for (const Contours& c : scratch.of_source) total += of(c);

@@ -49,9 +49,8 @@ std::vector<Group> groups_of(Scene& scene, const Job& job, const Materials& mate
   std::vector<std::uint32_t> home(scene.meshes.size(), UINT32_MAX);
   for (std::uint32_t i = 0; i < scene.instances.size(); ++i) {
     const std::uint32_t part = scene.part_of_instance[i], mesh = scene.instances[i].mesh;
-    const auto found = std::ranges::find_if(groups, [&](const Group& group) {
-      return group.level == level[part] && group.material == materials.part[part];
-    });
+    const auto found = std::ranges::find_if(
+        groups, [&](const Group& group) { return group.level == level[part] && group.material == materials.part[part]; });
     const auto number = static_cast<std::uint32_t>(found - groups.begin());
     if (found == groups.end()) {
       groups.push_back({level[part], materials.part[part], {}, {}, {}, {}});
@@ -135,7 +134,8 @@ void MaterialImages::lay(std::uint32_t material, const RunsView& section, Runs& 
   if (section.change.empty()) return;
   for (std::uint32_t m = 0; m < image.size(); ++m) {
     if (m != material && image[m].change.empty()) continue;
-    raster::combine(image[m], section, m == material ? raster::SetOperation::kUnion : raster::SetOperation::kDifference, scratch);
+    raster::combine(image[m], section, m == material ? raster::SetOperation::kUnion : raster::SetOperation::kDifference,
+                    scratch);
     std::swap(image[m], scratch);
   }
   raster::combine(whole, section, raster::SetOperation::kUnion, scratch);

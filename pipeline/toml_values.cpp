@@ -39,8 +39,7 @@ Result<std::vector<TomlValue>> read_toml_values(std::string_view text, const std
   const toml::parse_result parsed = toml::parse(text, where);
   if (!parsed) {
     const toml::source_position at = parsed.error().source().begin;
-    return Error{Fault::kUsage,
-                 fmt::format("{}:{}:{}: {}", where, at.line, at.column, one_line(parsed.error().description()))};
+    return Error{Fault::kUsage, fmt::format("{}:{}:{}: {}", where, at.line, at.column, one_line(parsed.error().description()))};
   }
   std::vector<TomlValue> values;
   const auto add = [&](TomlValue::Kind kind, std::string_view section, std::string_view name, const toml::node& node) {

@@ -43,7 +43,8 @@ struct Inspection {
 
 // Which vats have to feed a layer, a bit each, by the profile's rule.
 std::uint32_t vats_wanted(const Machine& machine, const ManifestHead& head, const LayerRecord& record) {
-  const std::size_t first = std::ranges::find_if(record.images, [](const ImageRecord& i) { return i.set_pixels > 0; }) - record.images.begin();
+  const std::size_t first =
+      std::ranges::find_if(record.images, [](const ImageRecord& i) { return i.set_pixels > 0; }) - record.images.begin();
   if (first == record.images.size()) return 1u << head.materials[0].vat;
   const auto after = std::find_if(record.images.begin() + static_cast<std::ptrdiff_t>(first) + 1, record.images.end(),
                                   [](const ImageRecord& i) { return i.set_pixels > 0; });
@@ -84,7 +85,8 @@ std::string fault_of_program(Inspection& inspection, const LayerRecord& record, 
     if (same && !inspection.head.materials.empty()) {
       const std::uint32_t wanted = vats_wanted(inspection.machine->profile(), inspection.head, record);
       if (replay->vats != wanted) {
-        return fmt::format("{}: layer {}: {} where {} has to", name, record.layer.index, vats_text(replay->vats), vats_text(wanted));
+        return fmt::format("{}: layer {}: {} where {} has to", name, record.layer.index, vats_text(replay->vats),
+                           vats_text(wanted));
       }
     }
     const std::lock_guard lock(inspection.adding);
@@ -118,7 +120,8 @@ std::string fault_of_image(const ManifestHead& head, const std::string& path, co
   if (set != file.record.set_pixels) {
     return fmt::format("{}: {} set pixels, the manifest says {}", name, set, file.record.set_pixels);
   }
-  if (!add_image(std::move(image->runs), whole)) return fmt::format("{}: sets pixels that another material's image sets as well", name);
+  if (!add_image(std::move(image->runs), whole))
+    return fmt::format("{}: sets pixels that another material's image sets as well", name);
   return {};
 }
 
@@ -193,9 +196,8 @@ void check_layers(const std::string& directory, const Manifest& manifest, bool q
   std::vector<std::string> faults(std::min(kPiece, manifest.layers.size()));
   for (std::size_t first = 0; first < manifest.layers.size(); first += kPiece) {
     const std::size_t count = std::min(kPiece, manifest.layers.size() - first);
-    tbb::parallel_for(std::size_t{0}, count, [&](std::size_t i) {
-      faults[i] = fault_of_layer(inspection, manifest.layers[first + i]);
-    });
+    tbb::parallel_for(std::size_t{0}, count,
+                      [&](std::size_t i) { faults[i] = fault_of_layer(inspection, manifest.layers[first + i]); });
     for (std::size_t i = 0; i < count; ++i) {
       const LayerRecord& record = manifest.layers[first + i];
       report.bytes += record.bytes + record.program.bytes;
@@ -222,9 +224,8 @@ void check_strays(const std::string& directory, const std::vector<Manifest>& man
         LayerRecord record;
         record.layer.index = index;
         named = named || (index >= head.first_layer && index < head.first_layer + manifest.layers.size() &&
-                          std::ranges::any_of(layer_images(head, record), [&](const LayerImageFile& image) {
-                            return image.name == "layers/" + name;
-                          }));
+                          std::ranges::any_of(layer_images(head, record),
+                                              [&](const LayerImageFile& image) { return image.name == "layers/" + name; }));
       }
     }
     if (!named) strays.push_back(name);
@@ -255,7 +256,8 @@ void check_strays(const std::string& directory, const std::vector<Manifest>& man
 Result<VerifyReport> verify(const std::string& directory, const VerifyOptions& options) {
   std::error_code error;
   if (!fs::is_directory(directory, error)) {
-    return Error{Fault::kUsage, fmt::format("{}: no such directory; name one that lamina jet or lamina slice wrote", directory)};
+    return Error{Fault::kUsage,
+                 fmt::format("{}: no such directory; name one that lamina jet or lamina slice wrote", directory)};
   }
   if (is_slice_directory(directory)) return verify_slices(directory);
   VerifyReport report;

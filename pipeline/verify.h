@@ -16,15 +16,15 @@ struct VerifyOptions {
 
 struct VerifyReport {
   std::string directory;
-  std::uint64_t layers = 0;       // that the manifests name
-  std::uint64_t bytes = 0;        // of their files, as recorded
-  std::string machine;            // whose programs were replayed; empty if there are none
-  std::uint64_t replayed = 0;     // layers
-  ReplayCount replay;             // of all of them
+  std::uint64_t layers = 0;           // that the manifests name
+  std::uint64_t bytes = 0;            // of their files, as recorded
+  std::string machine;                // whose programs were replayed; empty if there are none
+  std::uint64_t replayed = 0;         // layers
+  ReplayCount replay;                 // of all of them
   std::uint64_t moved = 0, lost = 0;  // pixels of blocked nozzles
-  double binder_mm3 = 0;          // drops x their volume
-  double powder_mm3 = 0;          // height fed x area of the bed
-  double coverage = 0;            // drops / pixels of the layers replayed
+  double binder_mm3 = 0;              // drops x their volume
+  double powder_mm3 = 0;              // height fed x area of the bed
+  double coverage = 0;                // drops / pixels of the layers replayed
   std::uint64_t fault_count = 0;
   std::vector<std::string> faults;  // the first 20, in layer order, then stray files; each begins with a file's name
   bool ok() const { return fault_count == 0; }

@@ -38,7 +38,8 @@ class SliceVerifier {
       while (std::getline(manifest, line)) rest += line;
       end(json::parse(rest));
     } catch (const json::exception& error) {
-      return Error{Fault::kVerification, fmt::format("{}: line {}: is not what lamina slice writes ({})", path, number + 1, error.what())};
+      return Error{Fault::kVerification,
+                   fmt::format("{}: line {}: is not what lamina slice writes ({})", path, number + 1, error.what())};
     }
     return std::move(report_);
   }
@@ -80,7 +81,8 @@ class SliceVerifier {
     if (!record.contains("bytes")) return;  // the format keeps all layers in a package, or in no file
     const std::uint64_t bytes = record.at("bytes");
     Hash128 hash;
-    if (!read_hex(record.at("xxh3_128").get<std::string>(), hash)) fault(fmt::format("manifest.json: layer {}: no hash", index));
+    if (!read_hex(record.at("xxh3_128").get<std::string>(), hash))
+      fault(fmt::format("manifest.json: layer {}: no hash", index));
     report_.bytes += bytes;
     if (name_.empty()) return alone(index, bytes, hash);
     if (!file_.is_open()) return;
@@ -113,7 +115,8 @@ class SliceVerifier {
     if (files_ > 0) {
       std::uint64_t found = 0;
       std::error_code error;
-      for (fs::directory_iterator entry(directory_ / "layers", error), stop; !error && entry != stop; entry.increment(error)) ++found;
+      for (fs::directory_iterator entry(directory_ / "layers", error), stop; !error && entry != stop; entry.increment(error))
+        ++found;
       if (found > files_) fault(fmt::format("layers: holds {} files that the manifest does not name", found - files_));
     }
     if (!file_.is_open()) return;

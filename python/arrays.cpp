@@ -54,7 +54,8 @@ const write::ImageFormat& format_of(const std::string& path, const std::string& 
 write::Bytes encode(const Image& image, const write::ImageFormat& format) {
   return without_lock([&]() -> Result<write::Bytes> {
     write::Bytes file;
-    if (Status status = format.make_encoder()->encode(image.runs, image.dpi_x, image.dpi_y, file); !status) return status.error();
+    if (Status status = format.make_encoder()->encode(image.runs, image.dpi_x, image.dpi_y, file); !status)
+      return status.error();
     return file;
   });
 }
@@ -68,8 +69,10 @@ py::array pixels(const Image& image, std::uint32_t top, std::optional<std::uint3
 }  // namespace
 
 void define_errors(py::module_& module) {
-  general_error = PyErr_NewExceptionWithDoc("lamina.Error", "One line: the place, what is wrong, what to do. `code` is the "
-                                                            "exit code of the program.", nullptr, nullptr);
+  general_error = PyErr_NewExceptionWithDoc("lamina.Error",
+                                            "One line: the place, what is wrong, what to do. `code` is the "
+                                            "exit code of the program.",
+                                            nullptr, nullptr);
   module.attr("Error") = py::reinterpret_borrow<py::object>(general_error);
   for (std::size_t i = 0; i < std::size(kKinds); ++i) {
     const Kind& kind = kKinds[i];
@@ -90,10 +93,11 @@ void raise(const Error& error) {
   throw py::error_already_set();
 }
 
-py::array boolean_pixels(const RunsView& runs, std::uint32_t top, std::uint32_t bottom, std::uint32_t left, std::uint32_t right) {
+py::array boolean_pixels(const RunsView& runs, std::uint32_t top, std::uint32_t bottom, std::uint32_t left,
+                         std::uint32_t right) {
   if (top > bottom || bottom > runs.rows() || left > right || right > runs.columns) {
-    throw py::value_error(fmt::format("rows {} to {}, columns {} to {}: not within an image of {} x {} pixels", top, bottom, left,
-                                      right, runs.columns, runs.rows()));
+    throw py::value_error(fmt::format("rows {} to {}, columns {} to {}: not within an image of {} x {} pixels", top, bottom,
+                                      left, right, runs.columns, runs.rows()));
   }
   py::array_t<bool> array(std::vector<py::ssize_t>{py::ssize_t{bottom} - top, py::ssize_t{right} - left});
   bool* const values = array.mutable_data();
@@ -126,26 +130,28 @@ void define_part(py::module_& module) {
           },
           "int32, n x 3 corners x (x, y, z), nm in the frame of the file; counter-clockwise seen from outside. A view of the "
           "mesh, read-only.")
-      .def_property_readonly("bounds", [](const Mesh& mesh) { return bounds_array(mesh.bounds); }, "int32, lowest and highest corner, nm.")
+      .def_property_readonly(
+          "bounds", [](const Mesh& mesh) { return bounds_array(mesh.bounds); }, "int32, lowest and highest corner, nm.")
       .def("__len__", [](const Mesh& mesh) { return mesh.triangles.size(); });
   py::class_<Part, std::shared_ptr<Part>>(module, "Part", "A part file as loaded: its meshes, and where it puts them.")
       .def_readonly("path", &Part::path)
-      .def_property_readonly(
-          "meshes",
-          [](const std::shared_ptr<Part>& part) {
-            py::list meshes;
-            for (Mesh& mesh : part->meshes) meshes.append(std::shared_ptr<Mesh>(part, &mesh));
-            return meshes;
-          })
+      .def_property_readonly("meshes",
+                             [](const std::shared_ptr<Part>& part) {
+                               py::list meshes;
+                               for (Mesh& mesh : part->meshes) meshes.append(std::shared_ptr<Mesh>(part, &mesh));
+                               return meshes;
+                             })
       .def_property_readonly(
           "instances",
           [](const Part& part) {
             py::list instances;
-            for (const Instance& i : part.instances) instances.append(py::make_tuple(i.mesh, py::make_tuple(i.offset.x, i.offset.y, i.offset.z)));
+            for (const Instance& i : part.instances)
+              instances.append(py::make_tuple(i.mesh, py::make_tuple(i.offset.x, i.offset.y, i.offset.z)));
             return instances;
           },
           "(index into meshes, (x, y, z) in nm that is added to every corner), one for each copy.")
-      .def_property_readonly("bounds", [](const Part& part) { return bounds_array(part.bounds); }, "int32, lowest and highest corner, nm.")
+      .def_property_readonly(
+          "bounds", [](const Part& part) { return bounds_array(part.bounds); }, "int32, lowest and highest corner, nm.")
       .def_property_readonly(
           "notes",
           [](const Part& part) {
@@ -160,8 +166,10 @@ void define_image(py::module_& module) {
   py::class_<Image>(module, "Image", "A 1-bit image as the columns where its rows change colour.")
       .def_property_readonly("columns", [](const Image& image) { return image.runs.columns; })
       .def_property_readonly("rows", [](const Image& image) { return image.runs.view().rows(); })
-      .def_property_readonly("shape", [](const Image& image) { return py::make_tuple(image.runs.view().rows(), image.runs.columns); })
-      .def_property_readonly("dpi", [](const Image& image) { return py::make_tuple(image.dpi_x, image.dpi_y); }, "Along x and y.")
+      .def_property_readonly("shape",
+                             [](const Image& image) { return py::make_tuple(image.runs.view().rows(), image.runs.columns); })
+      .def_property_readonly(
+          "dpi", [](const Image& image) { return py::make_tuple(image.dpi_x, image.dpi_y); }, "Along x and y.")
       .def_property_readonly("set_pixels", [](const Image& image) { return set_pixels(image.runs); })
       .def_property_readonly(
           "row_offset",
@@ -178,7 +186,8 @@ void define_image(py::module_& module) {
             return view(change.data(), {static_cast<py::ssize_t>(change.size())}, self);
           },
           "uint32: for each row begin, end, begin, end, ... of its runs, in columns, ends exclusive. A view, read-only.")
-      .def("pixels", &pixels, py::arg("top") = 0, py::arg("bottom") = py::none(), py::arg("left") = 0, py::arg("right") = py::none(),
+      .def("pixels", &pixels, py::arg("top") = 0, py::arg("bottom") = py::none(), py::arg("left") = 0,
+           py::arg("right") = py::none(),
            "bool, rows x columns: the image, or a window of it, in pixels. A byte a pixel: a whole bed may be large.")
       .def(
           "encode",
@@ -205,11 +214,15 @@ void define_image(py::module_& module) {
         });
       },
       py::arg("path"), "Reads a 1-bit TIFF, PNG or PBM, such as the layers of lamina jet.");
-  module.def("image_formats", [] {
-    py::dict formats;
-    for (const auto& format : write::image_formats()) formats[py::str(std::string(format.id))] = std::string(format.description);
-    return formats;
-  }, "The formats of layer images and what they are.");
+  module.def(
+      "image_formats",
+      [] {
+        py::dict formats;
+        for (const auto& format : write::image_formats())
+          formats[py::str(std::string(format.id))] = std::string(format.description);
+        return formats;
+      },
+      "The formats of layer images and what they are.");
 }
 
 }  // namespace lamina::python

@@ -43,7 +43,8 @@ py::array view(const Value* values, std::vector<py::ssize_t> shape, py::handle o
 }
 
 /// Pixels [top, bottom) x [left, right) of an image, a byte each. errors  ValueError: not within the image
-py::array boolean_pixels(const RunsView& runs, std::uint32_t top, std::uint32_t bottom, std::uint32_t left, std::uint32_t right);
+py::array boolean_pixels(const RunsView& runs, std::uint32_t top, std::uint32_t bottom, std::uint32_t left,
+                         std::uint32_t right);
 
 /// Adds Part and Mesh, and Image and what reads it from a file.
 void define_part(py::module_& module);

@@ -153,7 +153,8 @@ struct LayerIterator {
 pipeline::JetSummary run_job(const Job& job) {
   std::atomic<bool> cancel{false};
   auto running = std::async(std::launch::async, [&] {
-    return pipeline::run_jet(job, [](const pipeline::ProgressEvent&) {}, cancel);
+    return pipeline::run_jet(
+        job, [](const pipeline::ProgressEvent&) {}, cancel);
   });
   while (true) {
     {
@@ -193,11 +194,14 @@ void append_keys(std::span<const pipeline::Key<Target>> keys, const Target& pres
 
 void define_layer(py::module_& module) {
   PYBIND11_NUMPY_DTYPE(LayerEntry, bottom, thickness, reason);
-  py::class_<PlannedLayer, Image>(module, "Layer", "A layer of a plan: an Image, and where it lies. Heights are nm above the bed.")
-      .def_property_readonly("index", [](const PlannedLayer& l) { return l.layer.index; }, "From 0 at the bottom.")
+  py::class_<PlannedLayer, Image>(module, "Layer",
+                                  "A layer of a plan: an Image, and where it lies. Heights are nm above the bed.")
+      .def_property_readonly(
+          "index", [](const PlannedLayer& l) { return l.layer.index; }, "From 0 at the bottom.")
       .def_property_readonly("bottom", [](const PlannedLayer& l) { return l.layer.bottom; })
       .def_property_readonly("thickness", [](const PlannedLayer& l) { return l.layer.thickness; })
-      .def_property_readonly("plane", [](const PlannedLayer& l) { return l.layer.plane(); }, "Where the parts are sampled.")
+      .def_property_readonly(
+          "plane", [](const PlannedLayer& l) { return l.layer.plane(); }, "Where the parts are sampled.")
       .def_property_readonly("reason", [](const PlannedLayer& l) { return std::string(reason_name(l.layer.reason)); })
       .def_property_readonly(
           "materials",
@@ -214,16 +218,19 @@ void define_layer(py::module_& module) {
           "layer. Empty if no part names a material. They lie in the layer; nothing is copied.")
       .def("__repr__", [](const PlannedLayer& l) {
         return fmt::format("<lamina.Layer {}: {} to {} mm, {} x {} pixels, {} set>", l.layer.index, mm(l.layer.bottom),
-                           mm(std::int64_t{l.layer.bottom} + l.layer.thickness), l.runs.columns, l.runs.view().rows(), set_pixels(l.runs));
+                           mm(std::int64_t{l.layer.bottom} + l.layer.thickness), l.runs.columns, l.runs.view().rows(),
+                           set_pixels(l.runs));
       });
-  py::class_<LayerContours>(module, "Contours", "Closed contours of a layer: a sequence of n x 2 arrays, nm on the bed, outer ones "
-                                                "counter-clockwise, those around holes clockwise.")
+  py::class_<LayerContours>(module, "Contours",
+                            "Closed contours of a layer: a sequence of n x 2 arrays, nm on the bed, outer ones "
+                            "counter-clockwise, those around holes clockwise.")
       .def("__len__", [](const LayerContours& c) { return c.of.contours.size(); })
       .def("__getitem__",
            [](const py::object& self, std::int64_t asked) {
              const Contours& contours = self.cast<const LayerContours&>().of.contours;
              const std::int64_t index = asked < 0 ? asked + contours.size() : asked;
-             if (index < 0 || index >= contours.size()) throw py::index_error(fmt::format("contour {}: there are {}", asked, contours.size()));
+             if (index < 0 || index >= contours.size())
+               throw py::index_error(fmt::format("contour {}: there are {}", asked, contours.size()));
              const auto points = contours[static_cast<std::uint32_t>(index)];
              return view(&points.data()->x, {static_cast<py::ssize_t>(points.size()), 2}, self);
            })
@@ -252,31 +259,43 @@ void define_layer(py::module_& module) {
 }
 
 void define_plan(py::module_& module) {
-  py::class_<Plan, std::shared_ptr<Plan>>(module, "Plan",
-                                          "A job with its parts loaded: a sequence of layers that are planned when they are asked "
-                                          "for. Threads may ask at the same time; the interpreter's lock is free meanwhile.")
+  py::class_<Plan, std::shared_ptr<Plan>>(
+      module, "Plan",
+      "A job with its parts loaded: a sequence of layers that are planned when they are asked "
+      "for. Threads may ask at the same time; the interpreter's lock is free meanwhile.")
       .def("__len__", [](const Plan& plan) { return plan.of().layers().size(); })
       .def("__getitem__", [](const Plan& plan, std::int64_t asked) { return plan.layer(plan.index(asked)); })
-      .def("__iter__", [](const std::shared_ptr<Plan>& plan) { return LayerIterator{plan, 0, plan->of().layers().size()}; })
+      .def("__iter__",
+           [](const std::shared_ptr<Plan>& plan) {
+             return LayerIterator{plan, 0, plan->of().layers().size()};
+           })
       .def(
           "layers",
           [](const std::shared_ptr<Plan>& plan, std::uint32_t first, std::optional<std::uint32_t> end) {
             const std::uint32_t count = plan->of().layers().size();
             return LayerIterator{plan, first, std::min(end.value_or(count), count)};
           },
-          "first"_a = 0, "end"_a = py::none(), "Layers first to end, each planned when it is asked for and kept by nobody else.")
-      .def("contours", [](Plan& plan, std::int64_t asked) { return plan.contours(plan.index(asked)); }, "index"_a,
-           "Contours of a layer, as lamina slice cuts them. The first call loads the parts once more.")
-      .def_property_readonly("materials", [](const Plan& plan) { return plan.of().materials(); },
-                             "Names of the powders, by vat, else in the order in which parts name them; empty if none does.")
-      .def_property_readonly("heights", &Plan::heights,
-                             "Structured array, a row a layer: bottom and thickness in nm (int32), reason (index into lamina.reasons).")
+          "first"_a = 0, "end"_a = py::none(),
+          "Layers first to end, each planned when it is asked for and kept by nobody else.")
+      .def(
+          "contours", [](Plan& plan, std::int64_t asked) { return plan.contours(plan.index(asked)); }, "index"_a,
+          "Contours of a layer, as lamina slice cuts them. The first call loads the parts once more.")
+      .def_property_readonly(
+          "materials", [](const Plan& plan) { return plan.of().materials(); },
+          "Names of the powders, by vat, else in the order in which parts name them; empty if none does.")
+      .def_property_readonly(
+          "heights", &Plan::heights,
+          "Structured array, a row a layer: bottom and thickness in nm (int32), reason (index into lamina.reasons).")
       .def_property_readonly("columns", [](const Plan& plan) { return plan.of().grid().columns(); })
       .def_property_readonly("rows", [](const Plan& plan) { return plan.of().grid().rows(); })
-      .def_property_readonly("dpi", [](const Plan& plan) { return py::make_tuple(plan.of().grid().x.dpi(), plan.of().grid().y.dpi()); }, "Along x and y.")
-      .def_property_readonly("bed_mm", [](const Plan& plan) { return plan.of().job().bed_mm; }, "Width (x) and depth (y).")
-      .def_property_readonly("job", [](const Plan& plan) { return pipeline::job_text(plan.of().job(), ""); },
-                             "The job as a TOML file would say it.")
+      .def_property_readonly(
+          "dpi", [](const Plan& plan) { return py::make_tuple(plan.of().grid().x.dpi(), plan.of().grid().y.dpi()); },
+          "Along x and y.")
+      .def_property_readonly(
+          "bed_mm", [](const Plan& plan) { return plan.of().job().bed_mm; }, "Width (x) and depth (y).")
+      .def_property_readonly(
+          "job", [](const Plan& plan) { return pipeline::job_text(plan.of().job(), ""); },
+          "The job as a TOML file would say it.")
       .def_property_readonly(
           "parts",
           [](const Plan& plan) {
@@ -333,14 +352,18 @@ PYBIND11_MODULE(lamina, module) {
       "parts"_a = py::none(), "settings"_a = py::dict(), "job"_a = "", "materials"_a = py::none(),
       "A job ready to give its layers. parts: a path or several; job: a TOML job file, which settings override; materials: the "
       "powder of all parts, or a sequence with that of each.");
-  module.def("jet", &jet, "output"_a, "parts"_a = py::none(), "settings"_a = py::dict(), "job"_a = "", "resume"_a = false,
-             "overwrite"_a = false, "materials"_a = py::none(),
-             "Plans all layers into a directory, as lamina jet does, on all processors; returns its summary. Ctrl-C stops it, and "
-             "resume=True goes on.");
-  module.def("keys", [] {
-    py::list list;
-    append_keys<pipeline::Job>(pipeline::job_keys(), {}, list);
-    append_keys<pipeline::PartRequest>(pipeline::part_keys(), {}, list);
-    return list;
-  }, "Every key of a job: key, option of the program, value, default, meaning, and whether it decides bytes.");
+  module.def(
+      "jet", &jet, "output"_a, "parts"_a = py::none(), "settings"_a = py::dict(), "job"_a = "", "resume"_a = false,
+      "overwrite"_a = false, "materials"_a = py::none(),
+      "Plans all layers into a directory, as lamina jet does, on all processors; returns its summary. Ctrl-C stops it, and "
+      "resume=True goes on.");
+  module.def(
+      "keys",
+      [] {
+        py::list list;
+        append_keys<pipeline::Job>(pipeline::job_keys(), {}, list);
+        append_keys<pipeline::PartRequest>(pipeline::part_keys(), {}, list);
+        return list;
+      },
+      "Every key of a job: key, option of the program, value, default, meaning, and whether it decides bytes.");
 }

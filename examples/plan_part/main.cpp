@@ -16,7 +16,8 @@ int main(int argc, char** argv) {
   job.layer_mm = 0.1;
   if (const auto status = check_job(job); !status) return std::fprintf(stderr, "%s\n", status.error().message.c_str()), 2;
   const std::atomic<bool> cancel{false};
-  const auto done = run_jet(job, [](const ProgressEvent&) {}, cancel);
+  const auto done = run_jet(
+      job, [](const ProgressEvent&) {}, cancel);
   if (!done) {
     std::fprintf(stderr, "%s\n", done.error().message.c_str());
     return static_cast<int>(done.error().fault);

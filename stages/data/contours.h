@@ -21,15 +21,14 @@ struct Point2 {
 /// point   nm. The last point of a contour joins the first, which is not repeated; at least three points.
 /// Clean contours (stages/slice and stages/infill hand out no others): outer ones run counter-clockwise, those around
 /// holes clockwise, so the solid is on the left; they do not cross each other or themselves, and going inwards outer
-/// contours and holes alternate; an outer contour is followed by the holes in it. So nonzero, positive and even-odd mean the same region.
+/// contours and holes alternate; an outer contour is followed by the holes in it. So nonzero, positive and even-odd mean the
+/// same region.
 struct ContoursView {
   std::span<const std::uint32_t> offset;
   std::span<const Point2> point;
 
   std::uint32_t size() const { return offset.empty() ? 0 : static_cast<std::uint32_t>(offset.size() - 1); }
-  std::span<const Point2> operator[](std::uint32_t c) const {
-    return point.subspan(offset[c], offset[c + 1] - offset[c]);
-  }
+  std::span<const Point2> operator[](std::uint32_t c) const { return point.subspan(offset[c], offset[c + 1] - offset[c]); }
 };
 
 /// Owned contours; 4 bytes a contour and 8 bytes a point.

@@ -29,7 +29,7 @@ struct Extruder {
   } material;
 
   struct Speed {
-    double print_mm_s = 40;       // raster and closed curves that fill: the reference of segmented lines
+    double print_mm_s = 40;  // raster and closed curves that fill: the reference of segmented lines
     double wall_mm_s = 30, inner_wall_mm_s = 40;
     double first_layer_mm_s = 15;  // nothing of the first layer is laid faster
     double travel_mm_s = 120, lift_mm_s = 10;

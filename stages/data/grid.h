@@ -32,9 +32,7 @@ struct PixelAxis {
 
   /// The first pixel whose centre is at or beyond `nm` (not clamped to 0 .. count).
   /// floor(q) >= nm is q >= nm for a whole nm, so no rounding enters.
-  constexpr std::int64_t first_at_or_beyond(std::int64_t nm) const {
-    return ceil_div(nm * 2 * dots - span, 2 * span);
-  }
+  constexpr std::int64_t first_at_or_beyond(std::int64_t nm) const { return ceil_div(nm * 2 * dots - span, 2 * span); }
 };
 
 /// The image of a bed. Columns count from the left edge. Geometry rows count from the front edge (smallest y);

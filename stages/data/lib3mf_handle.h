@@ -1,4 +1,5 @@
-// stages/data/lib3mf_handle.h: an object of lib3mf (1.8, C interface) that is released at its end, for readers and writers of 3MF.
+// stages/data/lib3mf_handle.h: an object of lib3mf (1.8, C interface) that is released at its end, for readers and writers of
+// 3MF.
 #pragma once
 
 #include <Model/COM/NMR_DLLInterfaces.h>

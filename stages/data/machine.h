@@ -42,18 +42,18 @@ struct Machine {
     std::vector<double> row_offset_um{0};  // nozzle i lies in row i mod rows, so far behind the first row
     double highest_frequency_hz = 5000;    // of one nozzle
     double drop_pl = 50;
-    std::vector<std::uint32_t> blocked;    // numbers from 0
+    std::vector<std::uint32_t> blocked;  // numbers from 0
     BlockedRule blocked_rule = BlockedRule::kReport;
   } head;
 
   struct Mounting {
-    double tilt_deg = 90;    // of the row of nozzles against the X axis; not used if dpi is set
-    double dpi = 0;          // across the scan: the tilt follows from it; 0: the dpi follow from the tilt
-    double along_dpi = 0;    // along the scan; 0: as across, or ticks_per_pixel
+    double tilt_deg = 90;  // of the row of nozzles against the X axis; not used if dpi is set
+    double dpi = 0;        // across the scan: the tilt follows from it; 0: the dpi follow from the tilt
+    double along_dpi = 0;  // along the scan; 0: as across, or ticks_per_pixel
     ScanAxis scan_axis = ScanAxis::kX;
-    Side scan_from = Side::kLeft;  // where a forward sweep begins: left or right for x, front or back for y
-    Side nozzle_0 = Side::kBack;   // where nozzle 0 lies: back or front for x, left or right for y
-    bool first_leads = true;       // nozzle 0 goes ahead on a forward sweep, else the last nozzle
+    Side scan_from = Side::kLeft;     // where a forward sweep begins: left or right for x, front or back for y
+    Side nozzle_0 = Side::kBack;      // where nozzle 0 lies: back or front for x, left or right for y
+    bool first_leads = true;          // nozzle 0 goes ahead on a forward sweep, else the last nozzle
     std::uint32_t passes = 1;         // interlaced sweeps a swath: dpi across is so many times that of the head
     std::uint32_t overlap_lines = 0;  // that neighbouring swaths share
     FirstSwath first_swath = FirstSwath::kBed;
@@ -64,10 +64,10 @@ struct Machine {
     double encoder_dpi = 0;             // ticks of the scan's encoder an inch; 0: none, sweeps step by pixels
     std::uint32_t ticks_per_pixel = 0;  // whole ticks; 0: pixels are not tied to ticks
     LagUnit lag_unit = LagUnit::kPixel;
-    bool both_directions = false;       // every other sweep runs backwards
+    bool both_directions = false;  // every other sweep runs backwards
     double scan_speed_mm_s = 100, travel_speed_mm_s = 200;
-    double ramp_mm = 5;                 // before the first and behind the last step of a sweep
-    double layer_step_um = 1;           // of the build vat
+    double ramp_mm = 5;        // before the first and behind the last step of a sweep
+    double layer_step_um = 1;  // of the build vat
     std::array<double, 2> safe_mm{0, 0};
     std::string x_axis = "X", y_axis = "Y";
   } motion;
@@ -79,8 +79,8 @@ struct Machine {
     std::string build_axis = "Z";
     std::vector<std::string> feed_axes{"A", "B"};
     std::string roller_axis = "U";
-    double build_sign = 1, feed_sign = 1;  // of the axis when the build vat goes down, when a feed vat goes up
-    double dose = 1.2;                     // height fed / height of the layer
+    double build_sign = 1, feed_sign = 1;     // of the axis when the build vat goes down, when a feed vat goes up
+    double dose = 1.2;                        // height fed / height of the layer
     std::array<double, 2> roller_mm{0, 200};  // home and far end
     double roller_speed_mm_s = 50, vat_speed_mm_s = 5;
     double packing = 0.6;  // share of the powder bed that is solid, for the report

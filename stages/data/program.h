@@ -25,16 +25,16 @@ struct HeadGrid {
   std::uint32_t nozzles = 0, passes = 1, overlap = 0, steps_per_pixel = 1;
   std::vector<std::uint32_t> lag;  // steps, the least is 0
   std::uint32_t most_lag = 0;
-  std::uint32_t bit_order = 0;     // of vectors: nozzle i is bit i ^ bit_order, as the dialect has it; below 128
+  std::uint32_t bit_order = 0;  // of vectors: nozzle i is bit i ^ bit_order, as the dialect has it; below 128
   FirstSwath first_swath = FirstSwath::kBed;
   bool both_directions = false;
   std::vector<std::uint32_t> blocked;  // increasing
   BlockedRule blocked_rule = BlockedRule::kReport;
 
   // --- for reports and positions
-  double line_nm = 0, place_nm = 0;  // pitch of pixels across and along the scan
-  double angle_deg = 90;             // between the row of nozzles and the scan
-  double lag_pixels = 0;             // from one nozzle to the next, exactly
+  double line_nm = 0, place_nm = 0;              // pitch of pixels across and along the scan
+  double angle_deg = 90;                         // between the row of nozzles and the scan
+  double lag_pixels = 0;                         // from one nozzle to the next, exactly
   double worst_place_nm = 0, worst_line_nm = 0;  // how far a drop lands from the centre of its pixel, at most
 
   double step_nm() const { return place_nm / steps_per_pixel; }
@@ -65,10 +65,10 @@ struct HeadGrid {
 
 /// One movement of the head over the bed.
 struct Sweep {
-  std::uint32_t number = 0, of = 0;  // among all sweeps of the layer, those that are skipped included
-  std::uint32_t swath = 0, pass = 0; // pass >= HeadGrid::passes: a further one for blocked nozzles
-  bool backward = false;             // steps run downwards
-  std::int64_t first_line = 0;       // of nozzle 0; negative or behind the last line where a further pass needs it
+  std::uint32_t number = 0, of = 0;   // among all sweeps of the layer, those that are skipped included
+  std::uint32_t swath = 0, pass = 0;  // pass >= HeadGrid::passes: a further one for blocked nozzles
+  bool backward = false;              // steps run downwards
+  std::int64_t first_line = 0;        // of nozzle 0; negative or behind the last line where a further pass needs it
 };
 
 /// What the nozzles do in a sweep.

@@ -23,15 +23,15 @@ struct LayerFacts {
 
 struct Evaluation {
   std::vector<LayerFacts> layers;
-  std::vector<FlatHit> flats;       // all, in increasing height
-  std::int64_t largest_cusp = 0;    // nm
+  std::vector<FlatHit> flats;     // all, in increasing height
+  std::int64_t largest_cusp = 0;  // nm
   std::uint32_t largest_cusp_layer = 0;
-  std::uint32_t above_limit = 0;    // layers with a step above the limit that was given
-  double mean_cusp = 0;             // nm, over the area of all facets that are not horizontal
-  std::uint32_t flats_missed = 0;   // by more than the tolerance
-  std::int64_t largest_miss = 0;    // nm, of those
-  std::int64_t top_miss = 0;        // nm: end of the last layer minus top of the parts
-  double seconds = 0;               // by the time model
+  std::uint32_t above_limit = 0;   // layers with a step above the limit that was given
+  double mean_cusp = 0;            // nm, over the area of all facets that are not horizontal
+  std::uint32_t flats_missed = 0;  // by more than the tolerance
+  std::int64_t largest_miss = 0;   // nm, of those
+  std::int64_t top_miss = 0;       // nm: end of the last layer minus top of the parts
+  double seconds = 0;              // by the time model
 };
 
 /// boundaries  nm, strictly increasing, the first is the bottom of the lowest layer; n layers have n + 1

@@ -11,10 +11,10 @@ namespace lamina::heights {
 
 /// Horizontal faces at one height, or the top or bottom of a part.
 struct Flat {
-  Nm height;                           // nm above the bed, > 0
-  double up_mm2 = 0, down_mm2 = 0;     // of one copy of each part
-  bool end = false;                    // top or bottom of a part
-  std::uint32_t part = 0;              // the one with the largest area here
+  Nm height;                        // nm above the bed, > 0
+  double up_mm2 = 0, down_mm2 = 0;  // of one copy of each part
+  bool end = false;                 // top or bottom of a part
+  std::uint32_t part = 0;           // the one with the largest area here
 };
 
 /// The flats of these parts, in increasing height, none at the bed itself.

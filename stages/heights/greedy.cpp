@@ -114,9 +114,7 @@ Plan plan_by_cusp(const SurfaceIndex& index, const Options& options, const Ladde
     const bool limited = chosen + 1 < set.size();
     plan.stepped_back.push_back(limited && cusp_of(set.values[chosen + 1], at_bottom) <= options.cusp);
     const std::uint32_t last = covering(set, index.top - bottom, chosen);
-    plan.table.add(set.values[last], last < chosen ? LayerReason::kFlat
-                                     : limited     ? LayerReason::kCusp
-                                                   : LayerReason::kUniform);
+    plan.table.add(set.values[last], last < chosen ? LayerReason::kFlat : limited ? LayerReason::kCusp : LayerReason::kUniform);
   }
   return plan;
 }

@@ -19,9 +19,10 @@ Status check_options(const Options& options) {
     before = value;
   }
   if (options.mode == Mode::kUniform && options.set.size() > 1) {
-    return wrong(fmt::format("heights.thickness: uniform layers have one thickness, here are {}; give one, or another "
-                             "--heights",
-                             options.set.size()));
+    return wrong(
+        fmt::format("heights.thickness: uniform layers have one thickness, here are {}; give one, or another "
+                    "--heights",
+                    options.set.size()));
   }
   const bool by_cusp = options.mode == Mode::kCusp || options.mode == Mode::kStepwise || options.mode == Mode::kOptimal;
   if (by_cusp && options.cusp <= 0) {

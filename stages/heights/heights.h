@@ -39,16 +39,16 @@ struct TimeModel {
 
 struct Options {
   Mode mode = Mode::kUniform;
-  ThicknessSet set;                  // all modes; uniform has exactly one
-  Nm cusp = 100'000;                 // nm, the highest step on a slope: cusp, stepwise, optimal
-  double adapt_angle_deg = 45;       // angle: slopes at least this flat get thinner layers
+  ThicknessSet set;             // all modes; uniform has exactly one
+  Nm cusp = 100'000;            // nm, the highest step on a slope: cusp, stepwise, optimal
+  double adapt_angle_deg = 45;  // angle: slopes at least this flat get thinner layers
   SurfaceOptions surface;
-  Facets facets = Facets::kRange;    // angle, cusp, stepwise
-  double least_flat_mm2 = 1;         // smaller flats are not aimed at
-  bool flats = true;                 // optimal: end layers on flats and on tops and bottoms of parts
-  TimeModel time;                    // optimal
-  std::int64_t slab = 0;             // nm, optimal: if not 0, every multiple of it is a boundary, but for one that is
-                             // nearer below the top than the least thickness
+  Facets facets = Facets::kRange;  // angle, cusp, stepwise
+  double least_flat_mm2 = 1;       // smaller flats are not aimed at
+  bool flats = true;               // optimal: end layers on flats and on tops and bottoms of parts
+  TimeModel time;                  // optimal
+  std::int64_t slab = 0;           // nm, optimal: if not 0, every multiple of it is a boundary, but for one that is
+                                   // nearer below the top than the least thickness
 };
 
 /// How near a flat the nearest boundary of a table lies.
@@ -60,12 +60,12 @@ struct FlatHit {
 /// A table and what can be said for it.
 struct Plan {
   LayerTable table;
-  std::vector<Steepness> looked_at;   // angle: of each layer, the flattest slope that decided; else empty
-  std::vector<bool> stepped_back;     // cusp: thinner than the slopes at its bottom ask for
+  std::vector<Steepness> looked_at;  // angle: of each layer, the flattest slope that decided; else empty
+  std::vector<bool> stepped_back;    // cusp: thinner than the slopes at its bottom ask for
   /// optimal: no table of one layer less (or, with a time model, of less time) that ends as near to the flats and keeps
   /// the step gets higher than this, nm; -1 if there is no such statement
   std::int64_t one_less_reaches = -1;
-  std::int64_t largest_miss = 0;      // optimal: nm, the smallest that any table can have
+  std::int64_t largest_miss = 0;  // optimal: nm, the smallest that any table can have
 };
 
 /// Whether options make sense together. errors  kUsage, one line that begins with the key

@@ -32,7 +32,8 @@ class Ladder {
   std::uint32_t rungs_up_to(std::int64_t height) const {
     if (step_ > 0) {
       if (height < 0) return 0;
-      if (height > UINT32_MAX || inverse_ == 0) return static_cast<std::uint32_t>(std::min<std::int64_t>(height / step_ + 1, count_));
+      if (height > UINT32_MAX || inverse_ == 0)
+        return static_cast<std::uint32_t>(std::min<std::int64_t>(height / step_ + 1, count_));
       const auto below = static_cast<unsigned __int128>(inverse_) * static_cast<std::uint32_t>(height) >> 64;
       return std::min(static_cast<std::uint32_t>(below) + 1, count_);
     }

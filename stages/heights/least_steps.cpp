@@ -10,8 +10,7 @@ constexpr double kFar = std::numeric_limits<double>::infinity();
 
 class Search {
  public:
-  explicit Search(const Stacks& stacks)
-      : stacks_(stacks), steps_(stacks.end + 1, kFar), via_(stacks.end + 1, UINT32_MAX) {}
+  explicit Search(const Stacks& stacks) : stacks_(stacks), steps_(stacks.end + 1, kFar), via_(stacks.end + 1, UINT32_MAX) {}
 
   Buffer<std::uint32_t> all() {
     sort_by_layers();
@@ -82,10 +81,10 @@ class Search {
   }
 
   const Stacks& stacks_;
-  Buffer<double> steps_;            // mm2 times rungs, from a rung to the end
+  Buffer<double> steps_;  // mm2 times rungs, from a rung to the end
   Buffer<std::uint32_t> via_;
   Buffer<std::uint32_t> rungs_, begin_;  // rungs by number of layers below them, with the offset of each number
-  Buffer<std::uint32_t> columns_;   // rungs of one layer more from which the end is reached
+  Buffer<std::uint32_t> columns_;        // rungs of one layer more from which the end is reached
   Buffer<Row> rows_;
 };
 

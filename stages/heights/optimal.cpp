@@ -309,8 +309,8 @@ class Solver {
   const Ladder& ladder_;
   const ThicknessSet& set_;
   const Nm tolerance_;
-  std::vector<std::int64_t> flats_;      // below the top
-  std::vector<std::uint32_t> strides_;   // thicknesses in rungs, where rungs are even
+  std::vector<std::int64_t> flats_;     // below the top
+  std::vector<std::uint32_t> strides_;  // thicknesses in rungs, where rungs are even
   Buffer<std::uint32_t> highest_, limit_;
   Buffer<std::int64_t> weights_;
   std::int64_t hit_ = 0, allowed_ = 0, one_less_ = -1;

@@ -15,9 +15,10 @@ std::int64_t slab_height(const ThicknessSet& set) {
 Status check_slab(const ThicknessSet& set) {
   const std::int64_t slab = slab_height(set);
   if (slab <= kMostSlab * set.most()) return {};
-  return Error{Fault::kUsage, fmt::format("heights.per_part: {} and {} mm meet only every {} mm; give thicknesses with a smaller "
-                                          "common multiple, or a range",
-                                          mm(set.least()), mm(set.most()), mm(slab))};
+  return Error{Fault::kUsage,
+               fmt::format("heights.per_part: {} and {} mm meet only every {} mm; give thicknesses with a smaller "
+                           "common multiple, or a range",
+                           mm(set.least()), mm(set.most()), mm(slab))};
 }
 
 Result<PerPartPlan> plan_per_part(SurfaceIndex index, const Options& options) {

@@ -12,9 +12,9 @@ namespace lamina::heights {
 /// with steep walls need not be built in the thin layers that its neighbour's slopes ask for.
 /// source  J. Tyberg and J. H. Bohn, "Local adaptive slicing", Rapid Prototyping Journal 4 (1998)
 struct PerPartPlan {
-  std::int64_t slab = 0;     // nm: every part has a boundary at each multiple of it, up to the least thickness
-                             // below its top
-  std::vector<Plan> parts;   // by part; the table ends at the part's top
+  std::int64_t slab = 0;    // nm: every part has a boundary at each multiple of it, up to the least thickness
+                            // below its top
+  std::vector<Plan> parts;  // by part; the table ends at the part's top
 };
 
 /// The height of the slabs: the greatest thickness, rounded up to a multiple of the least one, where the thicknesses

@@ -112,8 +112,8 @@ struct Spread {
     }
     const double density = mm2 / (static_cast<double>(hi) - lo);
     const auto share = [&](std::uint32_t cell) {
-      return density * static_cast<double>(std::min<std::int64_t>(hi, ladder[cell + 1]) -
-                                           std::max<std::int64_t>(lo, ladder[cell]));
+      return density *
+             static_cast<double>(std::min<std::int64_t>(hi, ladder[cell + 1]) - std::max<std::int64_t>(lo, ladder[cell]));
     };
     within[first] += share(first);
     if (last - first < 2) return;
@@ -143,8 +143,7 @@ Buffer<Steepness> steepest_at_rungs(const SurfaceIndex& index, std::span<const P
   });
 }
 
-Buffer<double> projected_below(const SurfaceIndex& index, std::span<const PartSurface> parts, const Ladder& ladder,
-                               Sign sign) {
+Buffer<double> projected_below(const SurfaceIndex& index, std::span<const PartSurface> parts, const Ladder& ladder, Sign sign) {
   const std::uint32_t shares = worthwhile_shares(index, parts, 4 * ladder.rungs());  // doubles of two arrays
   std::vector<std::optional<Spread>> spreads(shares);
   tbb::parallel_for(0u, shares, [&](std::uint32_t share) {

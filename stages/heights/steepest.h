@@ -23,7 +23,6 @@ enum class Sign { kBoth, kUpMinusDown };
 
 /// For each rung, the mm2 of the sloped facets below it as seen from above; a facet's area counts as evenly spread over
 /// its height. With kBoth, differences times the thickness add up to the mean cusp.
-Buffer<double> projected_below(const SurfaceIndex& index, std::span<const PartSurface> parts, const Ladder& ladder,
-                               Sign sign);
+Buffer<double> projected_below(const SurfaceIndex& index, std::span<const PartSurface> parts, const Ladder& ladder, Sign sign);
 
 }  // namespace lamina::heights

@@ -36,16 +36,16 @@ inline double projected_mm2(const Triangle& t) {
 }
 
 struct SurfaceOptions {
-  double peak_angle_deg = 90;        // facets at least as flat as this are horizontal
-  double normal_tolerance = 1e-3;    // of |n_z|, for all comparisons of angles
-  Nm flat_tolerance = 1000;          // nm: a horizontal facet may be that much out of level
-  double least_facet_mm2 = 0;        // smaller facets ask for nothing
+  double peak_angle_deg = 90;      // facets at least as flat as this are horizontal
+  double normal_tolerance = 1e-3;  // of |n_z|, for all comparisons of angles
+  Nm flat_tolerance = 1000;        // nm: a horizontal facet may be that much out of level
+  double least_facet_mm2 = 0;      // smaller facets ask for nothing
 };
 
 /// A horizontal facet, or several at the same height that face the same way.
 struct FlatFacet {
-  Nm height;     // nm, the middle of its corners
-  bool up;       // its outside is above
+  Nm height;  // nm, the middle of its corners
+  bool up;    // its outside is above
   double mm2;
 };
 
@@ -62,7 +62,7 @@ struct MeshSlopes {
 /// A mesh at a height; copies that stand on the same level count as one with a larger area.
 struct Standing {
   std::uint32_t mesh;
-  Nm raise;              // nm, added to every height
+  Nm raise;  // nm, added to every height
   std::uint32_t copies;
 };
 

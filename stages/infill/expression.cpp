@@ -24,8 +24,7 @@ Result<Expression> Expression::parse(const std::string& text) {
   // muParser would take = for an assignment to a variable; comparisons are left.
   for (std::size_t i = 0; i < text.size(); ++i) {
     if (text[i] != '=') continue;
-    const bool comparison = (i > 0 && (text[i - 1] == '=' || text[i - 1] == '<' || text[i - 1] == '>' ||
-                                       text[i - 1] == '!')) ||
+    const bool comparison = (i > 0 && (text[i - 1] == '=' || text[i - 1] == '<' || text[i - 1] == '>' || text[i - 1] == '!')) ||
                             (i + 1 < text.size() && text[i + 1] == '=');
     if (!comparison) {
       return Error{Fault::kUsage, fmt::format("'{}': = at character {} assigns; write == to compare", text, i + 1)};
@@ -42,8 +41,7 @@ Result<Expression> Expression::parse(const std::string& text) {
     state.parser.SetExpr(text);
     state.parser.Eval();
     if (state.parser.GetNumResults() != 1) {
-      return Error{Fault::kUsage, fmt::format("'{}': gives {} numbers; write one formula", text,
-                                              state.parser.GetNumResults())};
+      return Error{Fault::kUsage, fmt::format("'{}': gives {} numbers; write one formula", text, state.parser.GetNumResults())};
     }
   } catch (const mu::Parser::exception_type& error) {
     std::string why = error.GetMsg();
@@ -69,8 +67,8 @@ Result<double> Expression::operator()(const Variables& variables) {
   }
   if (!std::isfinite(value)) {
     return Error{Fault::kUsage, fmt::format("'{}': is {} where z = {:g}, n = {:g}, i = {:g}, s = {:g}; it has to be a "
-                                            "finite number of mm", state_->text, value, variables.z, variables.n,
-                                            variables.i, variables.s)};
+                                            "finite number of mm",
+                                            state_->text, value, variables.z, variables.n, variables.i, variables.s)};
   }
   return value;
 }

@@ -15,8 +15,7 @@ namespace lamina::infill {
 namespace {
 
 /// A closed path: the first point comes again at the end.
-void append_closed(const ContoursView& contours, PathKind kind, Nm width, Toolpaths& out,
-                   std::int32_t number = kNoLine) {
+void append_closed(const ContoursView& contours, PathKind kind, Nm width, Toolpaths& out, std::int32_t number = kNoLine) {
   for (std::uint32_t c = 0; c < contours.size(); ++c) {
     for (const Point2 p : contours[c]) out.add(p, kind, width, number);
     out.add(contours[c].front(), kind, width, number);
@@ -24,8 +23,7 @@ void append_closed(const ContoursView& contours, PathKind kind, Nm width, Toolpa
   }
 }
 
-Status append_lines(const ContoursView& region, const FillContext& context, const FillParameters& parameters,
-                    Toolpaths& out) {
+Status append_lines(const ContoursView& region, const FillContext& context, const FillParameters& parameters, Toolpaths& out) {
   const Frame frame = frame_of(context, parameters);
   const Contours turned = frame.to(region);
   const auto places = place_across(turned, frame, context, parameters);
@@ -87,7 +85,8 @@ Result<std::uint64_t> bound_curves(const ContoursView& region, const FillContext
   for (std::size_t k = 0; k < curves; k += step) {
     ContoursView here = region;
     if (k > 0) {
-      auto next = offset_contours(k == step ? region : ContoursView(inner), (k == step ? *depth : places.at[k - step]) - places.at[k]);
+      auto next =
+          offset_contours(k == step ? region : ContoursView(inner), (k == step ? *depth : places.at[k - step]) - places.at[k]);
       if (!next) return next.error();
       inner = std::move(*next);
       here = inner;
@@ -123,8 +122,8 @@ Status check(const FillParameters& parameters) {
         return wrong(fmt::format("height {} mm of the gap table is not above the one before; give them in order", mm(z)));
       }
       if (std::int64_t{parameters.width} + gap <= 0) {
-        return wrong(fmt::format("a gap of {} mm at {} mm with beads of {} mm leaves nothing from line to line", mm(gap),
-                                 mm(z), mm(parameters.width)));
+        return wrong(fmt::format("a gap of {} mm at {} mm with beads of {} mm leaves nothing from line to line", mm(gap), mm(z),
+                                 mm(parameters.width)));
       }
     }
   }
@@ -133,8 +132,10 @@ Status check(const FillParameters& parameters) {
     if (!parsed) return parsed.error();
     const bool curves = parameters.pattern == Pattern::kContour || parameters.pattern == Pattern::kContourRaster;
     if (curves && parsed->uses("u")) {
-      return wrong(fmt::format("'{}': closed curves have no extent across, so u means nothing to them; use s, their depth in "
-                               "mm, or i", parameters.gap_expression));
+      return wrong(
+          fmt::format("'{}': closed curves have no extent across, so u means nothing to them; use s, their depth in "
+                      "mm, or i",
+                      parameters.gap_expression));
     }
   }
   if (parameters.cell <= 0) return wrong("cells have to be wider than 0");
@@ -187,15 +188,15 @@ Result<FillBound> bound_fill(const ContoursView& contours, const ContoursView& r
   } else {
     const std::uint64_t crossings = count_crossings(turned, *places);
     bound.points += crossings + own;
-    bound.paths += crossings / 2;     // a line ends at two of them
-    bound.stretches += crossings;     // lines, and links between them
+    bound.paths += crossings / 2;  // a line ends at two of them
+    bound.stretches += crossings;  // lines, and links between them
     bound.scratch_bytes += 30 * crossings + 24 * own + 24 * places->at.size();
   }
   return bound;
 }
 
-Status append_fill(const ContoursView& contours, Contours region, const FillContext& context,
-                   const FillParameters& parameters, Toolpaths& out) {
+Status append_fill(const ContoursView& contours, Contours region, const FillContext& context, const FillParameters& parameters,
+                   Toolpaths& out) {
   if (contours.size() == 0) return {};
   for (std::uint32_t wall = 0; wall < parameters.walls; ++wall) {
     auto moved = offset_contours(contours, -(2 * std::int64_t{wall} + 1) * parameters.wall_width / 2);
@@ -212,8 +213,7 @@ Status append_fill(const ContoursView& contours, Contours region, const FillCont
   return append_lines(region, context, parameters, out);
 }
 
-Status append_fill(const ContoursView& contours, const FillContext& context, const FillParameters& parameters,
-                   Toolpaths& out) {
+Status append_fill(const ContoursView& contours, const FillContext& context, const FillParameters& parameters, Toolpaths& out) {
   if (contours.size() == 0) return {};
   auto region = fill_region(contours, context, parameters);
   if (!region) return region.error();

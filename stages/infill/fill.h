@@ -20,21 +20,21 @@ Status check(const FillParameters& parameters);
 /// Appends walls, then the filling.
 /// contours  clean, of one body
 /// errors    kUsage: a distance between lines that is not positive, a formula that fails; kInternal of Clipper
-Status append_fill(const ContoursView& contours, const FillContext& context, const FillParameters& parameters,
-                   Toolpaths& out);
+Status append_fill(const ContoursView& contours, const FillContext& context, const FillParameters& parameters, Toolpaths& out);
 
 /// The same, with the region (fill_region) made beforehand.
-Status append_fill(const ContoursView& contours, Contours region, const FillContext& context,
-                   const FillParameters& parameters, Toolpaths& out);
+Status append_fill(const ContoursView& contours, Contours region, const FillContext& context, const FillParameters& parameters,
+                   Toolpaths& out);
 
 /// Where the centres of filling beads may lie: the contours moved inwards past the walls; nothing for kNone.
 /// errors  as append_fill
 Result<Contours> fill_region(const ContoursView& contours, const FillContext& context, const FillParameters& parameters);
 
 /// What append_fill may come to, counted before anything is laid: lines are placed and their crossings with the region
-/// counted, curves counted by their places and what the region is like at some of these, waves by what of them lies within reach of the region.
+/// counted, curves counted by their places and what the region is like at some of these, waves by what of them lies within
+/// reach of the region.
 struct FillBound {
-  std::uint64_t points = 0;         // of toolpaths
+  std::uint64_t points = 0;  // of toolpaths
   std::uint64_t paths = 0;
   std::uint64_t stretches = 0;      // of one kind each, into which files divide paths
   std::uint64_t scratch_bytes = 0;  // while they are made

@@ -43,9 +43,8 @@ Result<std::int64_t> distance_from_wall(const FillContext& context, const FillPa
 
 Frame frame_of(const FillContext& context, const FillParameters& parameters) {
   const Box& part = context.part;
-  return Frame(layer_angle(parameters, context.layer.index),
-               {static_cast<Nm>((std::int64_t{part.lo.x} + part.hi.x) / 2),
-                static_cast<Nm>((std::int64_t{part.lo.y} + part.hi.y) / 2)});
+  return Frame(layer_angle(parameters, context.layer.index), {static_cast<Nm>((std::int64_t{part.lo.x} + part.hi.x) / 2),
+                                                              static_cast<Nm>((std::int64_t{part.lo.y} + part.hi.y) / 2)});
 }
 
 Result<std::int64_t> region_depth(const FillContext& context, const FillParameters& parameters) {
@@ -75,8 +74,7 @@ Result<LinePlaces> place_across(const ContoursView& region, const Frame& frame, 
   return place_lines(own, context, extent);
 }
 
-Result<LinePlaces> place_inwards(const ContoursView& region, const FillContext& context,
-                                 const FillParameters& parameters) {
+Result<LinePlaces> place_inwards(const ContoursView& region, const FillContext& context, const FillParameters& parameters) {
   const auto depth = region_depth(context, parameters);
   if (!depth) return depth.error();
   Range x, y;

@@ -24,7 +24,6 @@ Result<LinePlaces> place_across(const ContoursView& region, const Frame& frame, 
 /// Closed curves: their depths below the surface, nm, from the first one inwards, as far as any can lie in `region`.
 /// The list of distances is the one that lines follow; line 0 is the curve at the region's edge, or first_line deep.
 /// errors  of place_lines
-Result<LinePlaces> place_inwards(const ContoursView& region, const FillContext& context,
-                                 const FillParameters& parameters);
+Result<LinePlaces> place_inwards(const ContoursView& region, const FillContext& context, const FillParameters& parameters);
 
 }  // namespace lamina::infill

@@ -47,20 +47,20 @@ struct FillParameters {
   std::uint32_t build_layers = 1;  // layers in a row with one angle
 
   // --- distance between lines
-  std::vector<Nm> gaps{0};                               // edge to edge; may be negative
-  std::uint32_t group = 1;                               // beads in contact before a gap
-  std::vector<std::pair<std::int64_t, Nm>> gap_table;    // (height above the part's bottom, gap), heights increasing
-  std::string gap_expression;                            // mm; see expression.h for its variables
-  std::vector<Nm> distances;                             // centre to centre, in turn; empty: by gaps
+  std::vector<Nm> gaps{0};                             // edge to edge; may be negative
+  std::uint32_t group = 1;                             // beads in contact before a gap
+  std::vector<std::pair<std::int64_t, Nm>> gap_table;  // (height above the part's bottom, gap), heights increasing
+  std::string gap_expression;                          // mm; see expression.h for its variables
+  std::vector<Nm> distances;                           // centre to centre, in turn; empty: by gaps
 
   // --- stagger: lines of layers with the same angle are moved sideways by these amounts in turn
   std::vector<Nm> stagger{0};
   bool stagger_every_layer = false;  // the turn goes on with every layer, not with every return of the angle
 
-  std::optional<Nm> first_line;  // distance of line 0 from the part's side, across the lines; no line of any layer is
-                                 // nearer to either side. Absent: one distance from the centre of the innermost wall
-  std::optional<Nm> end_inset;   // of line ends from the centre of the innermost wall (from the surface without
-                                 // walls). Absent: beads touch the wall, or overlap it as they do each other
+  std::optional<Nm> first_line;    // distance of line 0 from the part's side, across the lines; no line of any layer is
+                                   // nearer to either side. Absent: one distance from the centre of the innermost wall
+  std::optional<Nm> end_inset;     // of line ends from the centre of the innermost wall (from the surface without
+                                   // walls). Absent: beads touch the wall, or overlap it as they do each other
   std::int64_t longest_link = -1;  // between two lines along the edge; -1: three distances; 0: no links
   Nm shortest_line = 0;            // shorter lines are left out
   Nm cell = 2'000'000;             // kHoneycomb, kQuatrefoil: cells across flats, centre to centre

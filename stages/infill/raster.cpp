@@ -11,9 +11,9 @@ constexpr std::uint32_t kNone = UINT32_MAX;
 
 /// Where a line crosses an edge. The edge runs from point `edge` to the next one of its contour.
 struct Crossing {
-  double u;            // for ordering; off by less than 2^-20 nm
+  double u;  // for ordering; off by less than 2^-20 nm
   std::uint32_t edge;
-  bool enters;         // going towards +u
+  bool enters;  // going towards +u
 };
 
 /// A stretch of a line inside the region.
@@ -112,8 +112,7 @@ class Scan {
   std::pair<__int128, std::int64_t> exact(std::uint32_t e, std::int64_t v) const {
     const Point2 a = point_[e], b = point_[next_[e]];
     std::int64_t denominator = std::int64_t{b.y} - a.y;
-    __int128 numerator = static_cast<__int128>(std::int64_t{b.x} - a.x) * (v - a.y) +
-                         static_cast<__int128>(a.x) * denominator;
+    __int128 numerator = static_cast<__int128>(std::int64_t{b.x} - a.x) * (v - a.y) + static_cast<__int128>(a.x) * denominator;
     if (denominator < 0) {
       denominator = -denominator;
       numerator = -numerator;
@@ -122,7 +121,8 @@ class Scan {
   }
 
   bool is_before(const Crossing& a, const Crossing& b, std::int64_t v) const {
-    if (std::abs(a.u - b.u) > 1e-3) [[likely]] return a.u < b.u;
+    if (std::abs(a.u - b.u) > 1e-3) [[likely]]
+      return a.u < b.u;
     const auto [na, da] = exact(a.edge, v);
     const auto [nb, db] = exact(b.edge, v);
     const __int128 left = na * db, right = nb * da;  // below 2^97
@@ -176,7 +176,9 @@ class Scan {
 }  // namespace
 
 std::uint64_t count_crossings(const ContoursView& region, const LinePlaces& places) {
-  const auto line_at = [&](std::int64_t v) { return std::lower_bound(places.at.begin(), places.at.end(), v) - places.at.begin(); };
+  const auto line_at = [&](std::int64_t v) {
+    return std::lower_bound(places.at.begin(), places.at.end(), v) - places.at.begin();
+  };
   std::uint64_t total = 0;
   for (std::uint32_t c = 0; c < region.size(); ++c) {
     std::int64_t before = line_at(region[c].back().y);
@@ -189,8 +191,8 @@ std::uint64_t count_crossings(const ContoursView& region, const LinePlaces& plac
   return total;
 }
 
-void append_raster(const ContoursView& region, const LinePlaces& places, const Frame& frame,
-                   const RasterOptions& options, Toolpaths& out) {
+void append_raster(const ContoursView& region, const LinePlaces& places, const Frame& frame, const RasterOptions& options,
+                   Toolpaths& out) {
   if (region.size() == 0 || places.at.empty()) return;
   Scan scan(region, places);
   Buffer<Point2> way;

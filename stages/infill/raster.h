@@ -32,7 +32,7 @@ std::uint64_t count_crossings(const ContoursView& region, const LinePlaces& plac
 /// region   clean contours, already turned into the frame
 /// returns  paths in the order of their first lines; even lines run towards +u (-u in a reversed frame), odd ones back
 /// cost     O(P + X log X) for P points and X crossings, count, scan, fill; no allocation for a line
-void append_raster(const ContoursView& region, const LinePlaces& places, const Frame& frame,
-                   const RasterOptions& options, Toolpaths& out);
+void append_raster(const ContoursView& region, const LinePlaces& places, const Frame& frame, const RasterOptions& options,
+                   Toolpaths& out);
 
 }  // namespace lamina::infill

@@ -52,12 +52,14 @@ class Distances {
     if (parameters_.pattern == Pattern::kQuatrefoil && distance <= parameters_.width) {
       return Error{Fault::kUsage,
                    fmt::format("layer {}: a quatrefoil's lines are kept apart, but the gap after line {} is {} mm; give one "
-                               "above 0, and groups of 1", context_.layer.index, i, mm(distance - parameters_.width))};
+                               "above 0, and groups of 1",
+                               context_.layer.index, i, mm(distance - parameters_.width))};
     }
     if (distance <= 0) {
       return Error{Fault::kUsage,
                    fmt::format("layer {}: line {} would lie {} mm from line {}, centre to centre; bead width plus gap has "
-                               "to be above 0", context_.layer.index, i + 1, mm(distance), i)};
+                               "to be above 0",
+                               context_.layer.index, i + 1, mm(distance), i)};
     }
     return distance;
   }
@@ -86,15 +88,15 @@ class Distances {
       const auto value = (*expression_)(variables);
       if (!value) return value.error();
       if (std::abs(*value) > mm(kNmReach)) {
-        return Error{Fault::kUsage, fmt::format("'{}': is {} mm in layer {}; gaps end at {} mm",
-                                                parameters_.gap_expression, *value, context_.layer.index, mm(kNmReach))};
+        return Error{Fault::kUsage, fmt::format("'{}': is {} mm in layer {}; gaps end at {} mm", parameters_.gap_expression,
+                                                *value, context_.layer.index, mm(kNmReach))};
       }
       return static_cast<std::int64_t>(std::llround(*value * static_cast<double>(kNmPerMm)));
     }
     if (!parameters_.gap_table.empty()) return by_table(parameters_.gap_table, z);
     const std::int64_t turn = floor_div(i, group);
-    return std::int64_t{parameters_.gaps[static_cast<std::size_t>(
-        wrapped(turn, static_cast<std::int64_t>(parameters_.gaps.size())))]};
+    return std::int64_t{
+        parameters_.gaps[static_cast<std::size_t>(wrapped(turn, static_cast<std::int64_t>(parameters_.gaps.size())))]};
   }
 
   const FillParameters& parameters_;
@@ -139,8 +141,8 @@ Result<LinePlaces> place_lines(const FillParameters& parameters, const FillConte
   high -= shift;
 
   const auto too_many = [&] {
-    return Error{Fault::kUsage, fmt::format("layer {}: more than {} lines; give wider beads or gaps",
-                                            context.layer.index, kMostLines)};
+    return Error{Fault::kUsage,
+                 fmt::format("layer {}: more than {} lines; give wider beads or gaps", context.layer.index, kMostLines)};
   };
   LinePlaces places;
   Buffer<std::int64_t> before;

@@ -18,9 +18,9 @@ struct LinePlaces {
 
 /// What the distances are measured against, nm across the lines.
 struct Extent {
-  std::int64_t side;    // of the part, where line numbers begin
-  std::int64_t length;  // of the part
-  std::int64_t low, high;  // of what is filled: only lines within are wanted
+  std::int64_t side;             // of the part, where line numbers begin
+  std::int64_t length;           // of the part
+  std::int64_t low, high;        // of what is filled: only lines within are wanted
   std::int64_t line_height = 0;  // of a wave, from trough to crest: the next line lies so much further
   bool off_sides = true;         // no line is nearer to either side of the part than line 0 of an unstaggered layer
 };

@@ -14,7 +14,7 @@ namespace lamina::infill {
 namespace {
 
 constexpr std::int64_t kMostPeriods = 1'000'000;  // of a wave
-constexpr int kCosineSteps = 48;  // a period; off by less than 0.4 % of the wave's height
+constexpr int kCosineSteps = 48;                  // a period; off by less than 0.4 % of the wave's height
 
 Nm side_length(const FillParameters& parameters) {
   return static_cast<Nm>(std::llround(parameters.cell / std::numbers::sqrt3));
@@ -61,9 +61,8 @@ void append_pieces(const Contours& pieces, const FillParameters& parameters, con
     const bool turned = points.front().x > points.back().x;
     order.push_back({line_of(places, height, points), std::min(points.front().x, points.back().x), c, turned});
   }
-  std::ranges::sort(order, [](const Piece& a, const Piece& b) {
-    return std::tie(a.line, a.u, a.index) < std::tie(b.line, b.u, b.index);
-  });
+  std::ranges::sort(
+      order, [](const Piece& a, const Piece& b) { return std::tie(a.line, a.u, a.index) < std::tie(b.line, b.u, b.index); });
   Buffer<Point2> whole, own;
   for (std::size_t i = 0; i < order.size();) {
     // Pieces that meet end to end are one.
@@ -142,7 +141,8 @@ WaveBound bound_waves(const ContoursView& region, const FillParameters& paramete
   bound.pieces = crossings + 1;
   for (const Reach& own : reach) {
     // Clipper divides open lines where they turn back; the ends are joined again unless they lie between others.
-    if (own.low <= own.high) bound.points += corners(own.high - own.low) + 2 * static_cast<std::uint64_t>((own.high - own.low) / period + 2);
+    if (own.low <= own.high)
+      bound.points += corners(own.high - own.low) + 2 * static_cast<std::uint64_t>((own.high - own.low) / period + 2);
   }
   return bound;
 }

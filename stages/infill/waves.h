@@ -3,7 +3,8 @@
 // Both are waves of period 3a for cells with sides a, neighbours mirrored, so that crests meet crests. A honeycomb's
 // waves are trapezoids whose flat crests touch: two beads side by side, as thick as the cells' walls between. A
 // quatrefoil's are cosines that stay a gap apart, so that no closed cell forms within a layer; its exact curve is not
-// published, only that it is like a honeycomb with its lines kept apart (Entezari et al. 2019, design D, as reported by Di Nisio 2022, section 2.5).
+// published, only that it is like a honeycomb with its lines kept apart (Entezari et al. 2019, design D, as reported by Di
+// Nisio 2022, section 2.5).
 #pragma once
 
 #include <cstdint>

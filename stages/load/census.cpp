@@ -7,8 +7,7 @@
 namespace lamina::load {
 namespace {
 
-constexpr std::uint64_t kA = 0x2d358dccaa6c78a5, kB = 0x8bb84b93962eacc9, kC = 0x4b33a62ed433d4a3,
-                        kD = 0x9e3779b97f4a7c15;
+constexpr std::uint64_t kA = 0x2d358dccaa6c78a5, kB = 0x8bb84b93962eacc9, kC = 0x4b33a62ed433d4a3, kD = 0x9e3779b97f4a7c15;
 
 __extension__ using Wide = unsigned __int128;
 

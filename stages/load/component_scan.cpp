@@ -269,8 +269,8 @@ Status ComponentScan::check(const Source& source, std::uint64_t triangle_limit) 
   for (auto& [id, same_id] : objects_) {
     for (auto& [file, object] : same_id) {
       if (!expand(object, 0))
-        return source.error(fmt::format(
-            "an object contains itself, or components are nested more than {} deep; export it again", kDeepest));
+        return source.error(
+            fmt::format("an object contains itself, or components are nested more than {} deep; export it again", kDeepest));
       objects = std::max(objects, object.expanded_objects);
     }
   }

@@ -26,7 +26,8 @@ class ComponentScan {
   void feed(const char* bytes, std::size_t count);
 
   /// When all files were fed.
-  /// errors  kInput: a model that cannot be scanned; an object that contains itself; components nested more than 1000 deep; more than kMostObjects
+  /// errors  kInput: a model that cannot be scanned; an object that contains itself; components nested more than 1000 deep;
+  /// more than kMostObjects
   ///         objects, or more triangles than the limit, when all components are expanded
   Status check(const Source& source, std::uint64_t triangle_limit);
 
@@ -53,9 +54,9 @@ class ComponentScan {
   std::array<Object*, 2> find(const Reference& reference);
   bool expand(Object& object, std::uint32_t depth);
 
-  std::string file_;     // being fed; lower case, with a leading slash
+  std::string file_;  // being fed; lower case, with a leading slash
   Place place_ = Place::kStart;
-  std::string tag_;      // what was fed of the tag, or of the end of a remark, that is not whole yet
+  std::string tag_;  // what was fed of the tag, or of the end of a remark, that is not whole yet
   char quote_ = 0;
   std::string refused_;  // why, if a file cannot be scanned
 

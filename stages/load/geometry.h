@@ -28,8 +28,7 @@ inline bool has_area(const Triangle& t) {
 /// Length of the vector, nm2; for comparisons that may be rounded.
 inline double doubled_area_length(const Triangle& t) {
   const auto normal = doubled_area(t);
-  const double x = static_cast<double>(normal[0]), y = static_cast<double>(normal[1]),
-               z = static_cast<double>(normal[2]);
+  const double x = static_cast<double>(normal[0]), y = static_cast<double>(normal[1]), z = static_cast<double>(normal[2]);
   return std::sqrt(x * x + y * y + z * z);
 }
 
@@ -37,8 +36,7 @@ inline double doubled_area_length(const Triangle& t) {
 /// over more facets stay within them as long as the volume itself is that of a body within reach.
 inline Int128 sixfold_volume(const Triangle& t, const Point3& from) {
   const auto normal = doubled_area(t);
-  return normal[0] * (Int128{t.a.x} - from.x) + normal[1] * (Int128{t.a.y} - from.y) +
-         normal[2] * (Int128{t.a.z} - from.z);
+  return normal[0] * (Int128{t.a.x} - from.x) + normal[1] * (Int128{t.a.y} - from.y) + normal[2] * (Int128{t.a.z} - from.z);
 }
 
 }  // namespace lamina::load

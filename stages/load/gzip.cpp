@@ -16,8 +16,7 @@ constexpr std::size_t kStep = std::size_t{1} << 20;
 /// The size that the last four bytes of the file claim, as a hint; 0 if it is not plausible.
 std::size_t claimed_size(const Source& compressed) {
   std::array<unsigned char, 4> tail{};
-  if (compressed.size() < 18 || !compressed.read(compressed.size() - 4, reinterpret_cast<char*>(tail.data()), 4))
-    return 0;
+  if (compressed.size() < 18 || !compressed.read(compressed.size() - 4, reinterpret_cast<char*>(tail.data()), 4)) return 0;
   const std::uint64_t claim = tail[0] | tail[1] << 8 | tail[2] << 16 | std::uint64_t{tail[3]} << 24;
   return claim > compressed.size() * 20 ? 0 : static_cast<std::size_t>(claim);
 }
@@ -63,8 +62,7 @@ Result<Source> inflate_gzip(const Source& compressed, std::uint64_t limit) {
                                           read - stream.avail_in, stream.msg ? stream.msg : "unknown error"));
     }
     if (written > limit)
-      return compressed.error(
-          fmt::format("expands to more than the limit of {} bytes; inflate it to see what it is", limit));
+      return compressed.error(fmt::format("expands to more than the limit of {} bytes; inflate it to see what it is", limit));
     if (expansion_is_absurd(read - stream.avail_in, written))
       return compressed.error("expands more than 200-fold, as no part does; inflate it to see what it is");
   }

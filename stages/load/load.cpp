@@ -36,18 +36,13 @@ Result<Source> open_plain(const std::string& path, const LoadOptions& options, F
 Result<Facets> read_facets(const Source& source, Format format, const LoadOptions& options) {
   const Snapper snapper(options.transform, options.unit_mm);
   switch (format) {
-    case Format::kBinaryStl:
-      return read_binary_stl(source, snapper, options);
-    case Format::kAsciiStl:
-      return read_ascii_stl(source, snapper, options);
-    default:
-      return read_obj(source, snapper, options);
+    case Format::kBinaryStl: return read_binary_stl(source, snapper, options);
+    case Format::kAsciiStl: return read_ascii_stl(source, snapper, options);
+    default: return read_obj(source, snapper, options);
   }
 }
 
-std::string plural(std::uint64_t count, const char* what) {
-  return fmt::format("{} {}{}", count, what, count == 1 ? "" : "s");
-}
+std::string plural(std::uint64_t count, const char* what) { return fmt::format("{} {}{}", count, what, count == 1 ? "" : "s"); }
 
 std::string place(const Box& box) {
   const auto middle = [](Nm lo, Nm hi) { return mm((std::int64_t{lo} + hi) / 2); };
@@ -62,15 +57,13 @@ void describe_repair(const RepairReport& report, const std::string& prefix, std:
   if (report.vertices_welded > 0)
     note(fmt::format("{} {} at open edges welded to a neighbour", report.vertices_welded,
                      report.vertices_welded == 1 ? "vertex" : "vertices"));
-  if (report.facets_turned > 0)
-    note(plural(report.facets_turned, "facet") + " turned over to agree with the neighbours");
+  if (report.facets_turned > 0) note(plural(report.facets_turned, "facet") + " turned over to agree with the neighbours");
   if (report.sheets_dropped > 0)
     note(fmt::format("{} with {} dropped (an open rim, hanging on the solid, enclosing nothing)",
                      plural(report.sheets_dropped, "stray surface"), plural(report.sheet_facets_dropped, "facet")));
   if (report.openings_capped > 0)
     note(fmt::format("{} capped with {}, the largest {:.3g} mm wide near {}", plural(report.openings_capped, "opening"),
-                     plural(report.cap_triangles, "triangle"), report.largest_opening_mm,
-                     place(report.largest_opening)));
+                     plural(report.cap_triangles, "triangle"), report.largest_opening_mm, place(report.largest_opening)));
 }
 
 /// Facets of a file become a mesh that later stages can trust.
@@ -90,8 +83,7 @@ Result<Mesh> finish(const Source& source, const std::string& name, const std::st
   if (!found.balanced && options.repair) {
     describe_repair(repair(mesh, options.weld_nm), prefix, notes);
     found = census(mesh.triangles);
-    if (!found.balanced)
-      return Error{Fault::kInternal, source.path() + ": repair left the mesh open; please report it"};
+    if (!found.balanced) return Error{Fault::kInternal, source.path() + ": repair left the mesh open; please report it"};
   } else if (!found.balanced) {
     mesh.closed = false;
     notes.push_back({false, prefix + "the mesh is not closed and repair is off: rows of it may stay open"});
@@ -107,8 +99,7 @@ Status check_extent(const Source& source, const Part& part) {
   });
   if (part.bounds.empty()) return source.error("holds no facets");
   if (part.bounds.height() == 0)
-    return source.error(
-        fmt::format("has no height: nothing to print (all of it lies at z = {:.6g} mm)", mm(part.bounds.lo.z)));
+    return source.error(fmt::format("has no height: nothing to print (all of it lies at z = {:.6g} mm)", mm(part.bounds.lo.z)));
   if (part.bounds.width() == 0 || part.bounds.depth() == 0)
     return source.error(fmt::format("has no {}: nothing to print", part.bounds.width() == 0 ? "width" : "depth"));
   if (!any_area) return source.error("all facets are degenerate: nothing to print");
@@ -119,10 +110,9 @@ Status check_extent(const Source& source, const Part& part) {
 void hint_at_unit(Part& part) {
   const double largest = mm(std::max({part.bounds.width(), part.bounds.depth(), part.bounds.height()}));
   if (largest >= 10) return;
-  part.notes.push_back(
-      {false, fmt::format("the largest side is {:.4g} mm{}", largest,
-                          largest < 1 ? "; is the unit right? The file carries none: try --unit inch, cm or m"
-                                      : "; if the file was drawn in inches, say --unit inch")});
+  part.notes.push_back({false, fmt::format("the largest side is {:.4g} mm{}", largest,
+                                           largest < 1 ? "; is the unit right? The file carries none: try --unit inch, cm or m"
+                                                       : "; if the file was drawn in inches, say --unit inch")});
 }
 
 Status add_bounds(const Source& source, Part& part) {
@@ -153,8 +143,7 @@ Result<Part> load_unguarded(const std::string& path, const LoadOptions& options)
     part.notes = std::move(package->notes);
     for (PlacedObject& object : package->objects) {
       const std::string prefix = package->objects.size() > 1 ? object.name + ": " : "";
-      Result<Mesh> mesh =
-          finish(*source, path + ": " + object.name, prefix, std::move(object.facets), options, part.notes);
+      Result<Mesh> mesh = finish(*source, path + ": " + object.name, prefix, std::move(object.facets), options, part.notes);
       if (!mesh) return mesh.error();
       for (const Point3& offset : object.offsets)
         part.instances.push_back({static_cast<std::uint32_t>(part.meshes.size()), offset});

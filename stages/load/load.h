@@ -25,12 +25,11 @@ Transform make_transform(const std::array<double, 3>& scale, const std::array<do
 
 struct LoadOptions {
   Transform transform;
-  double unit_mm = 1.0;          // mm per unit of files that carry none (STL, OBJ); 3MF states its own
-  bool drop_bad = false;         // drop facets with coordinates that are not finite instead of refusing the file
-  bool repair = true;            // orient, remove duplicates, weld and cap a mesh that is not closed (repair.h)
-  std::int64_t weld_nm = 5'000;  // repair joins vertices at open edges that are at most this far apart
-  std::uint64_t triangle_limit =
-      1ull << 30;  // refused above; a header can lie, so sizes are checked against the file first
+  double unit_mm = 1.0;                       // mm per unit of files that carry none (STL, OBJ); 3MF states its own
+  bool drop_bad = false;                      // drop facets with coordinates that are not finite instead of refusing the file
+  bool repair = true;                         // orient, remove duplicates, weld and cap a mesh that is not closed (repair.h)
+  std::int64_t weld_nm = 5'000;               // repair joins vertices at open edges that are at most this far apart
+  std::uint64_t triangle_limit = 1ull << 30;  // refused above; a header can lie, so sizes are checked against the file first
   std::uint64_t expanded_limit = 8ull << 30;  // bytes a compressed file may expand to
 };
 

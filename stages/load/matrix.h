@@ -15,8 +15,8 @@ inline Matrix multiply(const Matrix& first, const Matrix& second) {
   Matrix product{};
   for (std::size_t row = 0; row < 3; ++row)
     for (std::size_t column = 0; column < 3; ++column)
-      product[3 * row + column] = first[3 * row] * second[column] + first[3 * row + 1] * second[3 + column] +
-                                  first[3 * row + 2] * second[6 + column];
+      product[3 * row + column] =
+          first[3 * row] * second[column] + first[3 * row + 1] * second[3 + column] + first[3 * row + 2] * second[6 + column];
   return product;
 }
 

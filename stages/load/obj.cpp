@@ -76,8 +76,8 @@ class ObjParser {
     if (short_faces_ > 0)
       facets.notes.push_back({false, fmt::format("{} faces with less than three corners are left out", short_faces_)});
     if (remarks_ > 0)
-      facets.notes.push_back({false, fmt::format("{} lines are not understood and left out, the first is line {}",
-                                                 remarks_, line_of(source_, remark_offset_))});
+      facets.notes.push_back({false, fmt::format("{} lines are not understood and left out, the first is line {}", remarks_,
+                                                 line_of(source_, remark_offset_))});
     return facets;
   }
 
@@ -173,8 +173,8 @@ class ObjParser {
   }
 
   void remark_on(std::string_view kind) {
-    for (const char* known : {"vt", "vn", "vp", "g", "o", "s", "l", "p", "usemtl", "mtllib", "usemap", "maplib", "mg",
-                              "bevel", "c_interp", "d_interp", "lod", "shadow_obj", "trace_obj"})
+    for (const char* known : {"vt", "vn", "vp", "g", "o", "s", "l", "p", "usemtl", "mtllib", "usemap", "maplib", "mg", "bevel",
+                              "c_interp", "d_interp", "lod", "shadow_obj", "trace_obj"})
       if (kind == known) return;
     if (remarks_++ == 0) remark_offset_ = offset_of(kind.data());
   }

@@ -19,9 +19,8 @@ using Facet = Indexed::Facet;
 /// Sum over all edges of how much more often they are walked one way than the other; 0 is balanced.
 std::uint64_t imbalance(std::span<const Side> sides) {
   std::uint64_t sum = 0;
-  for_each_edge(sides, [&](const Side* begin, const Side* end) {
-    sum += static_cast<std::uint64_t>(std::abs(surplus(begin, end)));
-  });
+  for_each_edge(sides,
+                [&](const Side* begin, const Side* end) { sum += static_cast<std::uint64_t>(std::abs(surplus(begin, end))); });
   return sum;
 }
 
@@ -76,8 +75,7 @@ std::uint64_t weld(Work& work, std::int64_t weld_nm) {
   work.unmatched = imbalance(work.sides);
   for (std::size_t i = 0; i < before.size(); ++i) {
     const Facet& facet = work.indexed.facet[i];
-    work.mesh.triangles[i] = {work.indexed.vertex[facet[0]], work.indexed.vertex[facet[1]],
-                              work.indexed.vertex[facet[2]]};
+    work.mesh.triangles[i] = {work.indexed.vertex[facet[0]], work.indexed.vertex[facet[1]], work.indexed.vertex[facet[2]]};
   }
   return welding.moved;
 }

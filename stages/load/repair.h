@@ -20,9 +20,7 @@ struct RepairReport {
   Box capped;                     // around all caps
   double largest_opening_mm = 0;  // largest box diagonal of one loop
   Box largest_opening;            // around that loop
-  bool changed() const {
-    return duplicates_dropped + facets_turned + vertices_welded + sheets_dropped + openings_capped > 0;
-  }
+  bool changed() const { return duplicates_dropped + facets_turned + vertices_welded + sheets_dropped + openings_capped > 0; }
 };
 
 /// Repairs a mesh that is not balanced (diagnose.h), in this order, each step only while the mesh is unbalanced:

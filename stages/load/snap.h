@@ -30,8 +30,7 @@ class Snapper {
     if (!std::isfinite(x) || !std::isfinite(y) || !std::isfinite(z)) return Snapped::kNotFinite;
     if (plain_) return round(x, y, z, out);
     const std::array<double, 3> at = apply(transform_.linear, {x * unit_mm_, y * unit_mm_, z * unit_mm_});
-    return round(at[0] + transform_.translation[0], at[1] + transform_.translation[1],
-                 at[2] + transform_.translation[2], out);
+    return round(at[0] + transform_.translation[0], at[1] + transform_.translation[1], at[2] + transform_.translation[2], out);
   }
 
  private:

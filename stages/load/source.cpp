@@ -37,8 +37,7 @@ Result<Source> Source::open(const std::string& path) {
   source.file_ = ::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);
   if (source.file_ < 0) return source.error(std::string("cannot be opened: ") + std::strerror(errno));
   struct stat status {};
-  if (::fstat(source.file_, &status) != 0)
-    return source.error(std::string("cannot be opened: ") + std::strerror(errno));
+  if (::fstat(source.file_, &status) != 0) return source.error(std::string("cannot be opened: ") + std::strerror(errno));
   if (S_ISDIR(status.st_mode)) return source.error("is a directory; name a part file (STL, OBJ or 3MF)");
   if (!S_ISREG(status.st_mode)) return source.error("is not a regular file; write the part to a file first");
   source.size_ = static_cast<std::uint64_t>(status.st_size);

@@ -59,8 +59,7 @@ class BlockParser {
 
   void fail(std::string_view at, std::string message) {
     block_.error_at = at.empty() ? end_ : at.data();
-    block_.error =
-        at.empty() ? "is cut short: the text ends within a facet; copy or export it again" : std::move(message);
+    block_.error = at.empty() ? "is cut short: the text ends within a facet; copy or export it again" : std::move(message);
   }
 
   bool expect(std::string_view lower_case) {
@@ -158,9 +157,8 @@ Result<Facets> read_ascii_stl(const Source& source, const Snapper& snapper, cons
     }
     cuts.push_back(end);
     std::vector<Block> blocks(cuts.size() - 1);
-    tbb::parallel_for(std::size_t{0}, blocks.size(), [&](std::size_t i) {
-      BlockParser(cuts[i], cuts[i + 1], snapper, options.drop_bad, blocks[i]).parse();
-    });
+    tbb::parallel_for(std::size_t{0}, blocks.size(),
+                      [&](std::size_t i) { BlockParser(cuts[i], cuts[i + 1], snapper, options.drop_bad, blocks[i]).parse(); });
     for (Block& block : blocks) {
       if (block.error_at != nullptr)
         return source.error(fmt::format(
@@ -177,13 +175,12 @@ Result<Facets> read_ascii_stl(const Source& source, const Snapper& snapper, cons
   if (const Status read = for_each_window(source, kWindow, behind_last_facet, read_window); !read) return read.error();
   if (facets.triangles.empty() && dropped == 0) return source.error("holds no facets");
   if (dropped > 0)
-    facets.notes.push_back({true, fmt::format("{} facet{} with coordinates that are not finite dropped", dropped,
-                                              dropped == 1 ? "" : "s")});
+    facets.notes.push_back(
+        {true, fmt::format("{} facet{} with coordinates that are not finite dropped", dropped, dropped == 1 ? "" : "s")});
   if (solids > 1) facets.notes.push_back({false, fmt::format("{} solids are planned as one part", solids)});
   if (ends < solids)
-    facets.doubt =
-        Doubt{"the last solid has no 'endsolid', but its facets close",
-              "is cut short: the last solid has no 'endsolid' and its facets do not close; copy or export it again"};
+    facets.doubt = Doubt{"the last solid has no 'endsolid', but its facets close",
+                         "is cut short: the last solid has no 'endsolid' and its facets do not close; copy or export it again"};
   return facets;
 }
 

@@ -94,8 +94,8 @@ Snapped snap_facet(const char* facet, const Snapper& snapper, Triangle& out) {
   std::array<float, 9> corner;
   std::memcpy(corner.data(), facet + 12, 36);
   Triangle triangle{};
-  const std::array<Point3*, 3> points = snapper.mirrors() ? std::array{&triangle.a, &triangle.c, &triangle.b}
-                                                          : std::array{&triangle.a, &triangle.b, &triangle.c};
+  const std::array<Point3*, 3> points =
+      snapper.mirrors() ? std::array{&triangle.a, &triangle.c, &triangle.b} : std::array{&triangle.a, &triangle.b, &triangle.c};
   for (std::size_t i = 0; i < 3; ++i) {
     const Snapped snapped = snapper.snap(static_cast<double>(corner[3 * i]), static_cast<double>(corner[3 * i + 1]),
                                          static_cast<double>(corner[3 * i + 2]), *points[i]);
@@ -121,10 +121,8 @@ Box snapped_box(const FloatBox& from, const Snapper& snapper) {
   for (std::size_t k = 0; k < 12; k += 3) {
     Point3 lo{}, hi{};
     if (from.lo[k] > from.hi[k]) continue;
-    snapper.snap(static_cast<double>(from.lo[k]), static_cast<double>(from.lo[k + 1]),
-                 static_cast<double>(from.lo[k + 2]), lo);
-    snapper.snap(static_cast<double>(from.hi[k]), static_cast<double>(from.hi[k + 1]),
-                 static_cast<double>(from.hi[k + 2]), hi);
+    snapper.snap(static_cast<double>(from.lo[k]), static_cast<double>(from.lo[k + 1]), static_cast<double>(from.lo[k + 2]), lo);
+    snapper.snap(static_cast<double>(from.hi[k]), static_cast<double>(from.hi[k + 1]), static_cast<double>(from.hi[k + 2]), hi);
     box.add(lo);
     box.add(hi);
   }
@@ -148,17 +146,16 @@ Status read_carefully(const Source& source, const Snapper& snapper, const LoadOp
         continue;
       }
       if (snapped != Snapped::kYes)
-        return source.error(fmt::format("facet {} (byte {}): {}", first + i + 1, kHeader + (first + i) * kFacet,
-                                        what_is_wrong(snapped)));
+        return source.error(
+            fmt::format("facet {} (byte {}): {}", first + i + 1, kHeader + (first + i) * kFacet, what_is_wrong(snapped)));
       for (const Point3& corner : {triangle.a, triangle.b, triangle.c}) facets.bounds.add(corner);
       facets.triangles[kept++] = triangle;
     }
   }
   facets.triangles.resize(kept);
   if (dropped > 0)
-    facets.notes.push_back(
-        {true, fmt::format("{} facet{} with coordinates that are not finite dropped, the first is facet {}", dropped,
-                           dropped == 1 ? "" : "s", first_dropped + 1)});
+    facets.notes.push_back({true, fmt::format("{} facet{} with coordinates that are not finite dropped, the first is facet {}",
+                                              dropped, dropped == 1 ? "" : "s", first_dropped + 1)});
   return {};
 }
 
@@ -174,16 +171,16 @@ Result<std::uint64_t> count_facets(const Source& source, const LoadOptions& opti
     count = held;
     facets.notes.push_back({false, fmt::format("the header says 0 facets, the file holds {}: all are read", held)});
   } else if (claimed < held || (claimed == held && stray > 0)) {
-    facets.notes.push_back({false, fmt::format("{} stray bytes after the last of {} facets are ignored",
-                                               body - claimed * kFacet, claimed)});
+    facets.notes.push_back(
+        {false, fmt::format("{} stray bytes after the last of {} facets are ignored", body - claimed * kFacet, claimed)});
   } else if (claimed > held) {
     const std::string cut = fmt::format(
-        "is cut short: the header says {} facets, the file ends at byte {} within facet {}; copy or export it again",
-        claimed, source.size(), held + 1);
+        "is cut short: the header says {} facets, the file ends at byte {} within facet {}; copy or export it again", claimed,
+        source.size(), held + 1);
     if (stray != 0 || held == 0) return source.error(cut);
     count = held;
-    facets.doubt = Doubt{
-        fmt::format("the header says {} facets, the file holds {}, which close: all are read", claimed, held), cut};
+    facets.doubt =
+        Doubt{fmt::format("the header says {} facets, the file holds {}, which close: all are read", claimed, held), cut};
   }
   if (count == 0) return source.error("holds no facets");
   if (count > options.triangle_limit)
@@ -246,8 +243,7 @@ Result<Facets> read_binary_stl(const Source& source, const Snapper& snapper, con
       });
   if (unreadable) return source.changed_while_read();
   if (bad) {
-    if (const Status careful = read_carefully(source, snapper, options, count, facets); !careful)
-      return careful.error();
+    if (const Status careful = read_carefully(source, snapper, options, count, facets); !careful) return careful.error();
   } else {
     facets.bounds = plain ? snapped_box(progress.plain, snapper) : progress.transformed;
   }

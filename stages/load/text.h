@@ -18,8 +18,7 @@ inline bool is_space(char c) { return c == ' ' || (c >= '\t' && c <= '\r') || c 
 
 /// Whether a word is `lower_case`, in whatever case the file has it.
 inline bool is_word(std::string_view word, std::string_view lower_case) {
-  return word.size() == lower_case.size() &&
-         std::equal(word.begin(), word.end(), lower_case.begin(), [](char c, char low) {
+  return word.size() == lower_case.size() && std::equal(word.begin(), word.end(), lower_case.begin(), [](char c, char low) {
            return (c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c) == low;
          });
 }

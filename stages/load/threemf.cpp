@@ -27,8 +27,7 @@ struct Expansion {
 };
 
 std::string label(const ModelObject& object) {
-  return object.name.empty() ? fmt::format("object {}", object.id)
-                             : fmt::format("object {} \"{}\"", object.id, object.name);
+  return object.name.empty() ? fmt::format("object {}", object.id) : fmt::format("object {} \"{}\"", object.id, object.name);
 }
 
 struct Worst {
@@ -88,8 +87,7 @@ Result<Facets> snap_leaf(const Source& source, const ModelObject& object, const 
     }
   }
   facets.triangles.resize(kept);
-  facets.notes.push_back(
-      {true, fmt::format("{} triangles with coordinates that are not finite dropped", count - kept)});
+  facets.notes.push_back({true, fmt::format("{} triangles with coordinates that are not finite dropped", count - kept)});
   return facets;
 }
 
@@ -102,9 +100,7 @@ bool is_moved_copy(const Facets& original, const Facets& copy, Point3& offset) {
                      z = std::int64_t{copy.bounds.lo.z} - original.bounds.lo.z;
   if (std::max({std::abs(x), std::abs(y), std::abs(z)}) > kNmReach) return false;
   offset = {static_cast<Nm>(x), static_cast<Nm>(y), static_cast<Nm>(z)};
-  const auto moved = [&](const Point3& p, const Point3& q) {
-    return p.x + x == q.x && p.y + y == q.y && p.z + z == q.z;
-  };
+  const auto moved = [&](const Point3& p, const Point3& q) { return p.x + x == q.x && p.y + y == q.y && p.z + z == q.z; };
   return std::equal(
       original.triangles.begin(), original.triangles.end(), copy.triangles.begin(),
       [&](const Triangle& p, const Triangle& q) { return moved(p.a, q.a) && moved(p.b, q.b) && moved(p.c, q.c); });
@@ -124,10 +120,8 @@ std::vector<Leaf> expand(const ModelFile& model, std::vector<Note>& notes) {
     expansion.add(item.object, item.transform, i);
   }
   if (expansion.supports > 0)
-    notes.push_back(
-        {false, fmt::format("{} objects are supports or surfaces and are not planned", expansion.supports)});
-  if (other > 0)
-    notes.push_back({false, fmt::format("{} build items are of type \"other\" and are not planned", other)});
+    notes.push_back({false, fmt::format("{} objects are supports or surfaces and are not planned", expansion.supports)});
+  if (other > 0) notes.push_back({false, fmt::format("{} build items are of type \"other\" and are not planned", other)});
   return std::move(expansion.leaves);
 }
 

@@ -48,18 +48,12 @@ Transform transform_of(const NMR::MODELTRANSFORM& matrix) {
 
 double unit_in_mm(DWORD unit) {
   switch (unit) {
-    case NMR::MODELUNIT_MICROMETER:
-      return 0.001;
-    case NMR::MODELUNIT_CENTIMETER:
-      return 10;
-    case NMR::MODELUNIT_INCH:
-      return 25.4;
-    case NMR::MODELUNIT_FOOT:
-      return 304.8;
-    case NMR::MODELUNIT_METER:
-      return 1000;
-    default:
-      return 1;
+    case NMR::MODELUNIT_MICROMETER: return 0.001;
+    case NMR::MODELUNIT_CENTIMETER: return 10;
+    case NMR::MODELUNIT_INCH: return 25.4;
+    case NMR::MODELUNIT_FOOT: return 304.8;
+    case NMR::MODELUNIT_METER: return 1000;
+    default: return 1;
   }
 }
 
@@ -106,8 +100,7 @@ std::string name_of(const Handle& handle) {
   ULONG needed = 0;
   if (!done(NMR::lib3mf_object_getnameutf8(handle.get(), nullptr, 0, &needed)) || needed == 0) return {};
   std::string name(needed + 1, '\0');
-  if (!done(NMR::lib3mf_object_getnameutf8(handle.get(), name.data(), static_cast<ULONG>(name.size()), &needed)))
-    return {};
+  if (!done(NMR::lib3mf_object_getnameutf8(handle.get(), name.data(), static_cast<ULONG>(name.size()), &needed))) return {};
   name.resize(name.find('\0') == name.npos ? name.size() : name.find('\0'));
   return name;
 }
@@ -115,8 +108,7 @@ std::string name_of(const Handle& handle) {
 bool read_object(const Handle& handle, ModelObject& object) {
   DWORD id = 0, type = 0;
   BOOL is_mesh = 0, is_components = 0;
-  if (!done(NMR::lib3mf_resource_getresourceid(handle.get(), &id)) ||
-      !done(NMR::lib3mf_object_gettype(handle.get(), &type)) ||
+  if (!done(NMR::lib3mf_resource_getresourceid(handle.get(), &id)) || !done(NMR::lib3mf_object_gettype(handle.get(), &type)) ||
       !done(NMR::lib3mf_object_ismeshobject(handle.get(), &is_mesh)) ||
       !done(NMR::lib3mf_object_iscomponentsobject(handle.get(), &is_components)))
     return false;
@@ -134,8 +126,7 @@ bool read_objects(const Handle& model, ModelFile& file) {
   for (BOOL more = 0; done(NMR::lib3mf_resourceiterator_movenext(iterator.get(), &more)) && more;) {
     Handle resource;
     ModelObject object;
-    if (!done(NMR::lib3mf_resourceiterator_getcurrent(iterator.get(), resource.out())) ||
-        !read_object(resource, object))
+    if (!done(NMR::lib3mf_resourceiterator_getcurrent(iterator.get(), resource.out())) || !read_object(resource, object))
       return false;
     file.objects.push_back(std::move(object));
   }
@@ -190,8 +181,7 @@ void read_warnings(const Handle& reader, ModelFile& file) {
 
 Result<ModelFile> read_model(const Source& source) {
   Handle model, reader;
-  if (!done(NMR::lib3mf_createmodel(model.out())) ||
-      !done(NMR::lib3mf_model_queryreader(model.get(), "3mf", reader.out())))
+  if (!done(NMR::lib3mf_createmodel(model.out())) || !done(NMR::lib3mf_model_queryreader(model.get(), "3mf", reader.out())))
     return Error{Fault::kInternal, "lib3mf cannot be started"};
   if (!read_file(reader, source.path()))
     return source.error(fmt::format("is not a valid 3MF file ({}); export it again", reader.last_error()));

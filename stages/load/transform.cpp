@@ -28,8 +28,7 @@ void sine_cosine(double degrees, double& sine, double& cosine) {
 
 bool Transform::mirrors() const {
   const auto& m = linear;
-  return m[0] * (m[4] * m[8] - m[5] * m[7]) - m[1] * (m[3] * m[8] - m[5] * m[6]) + m[2] * (m[3] * m[7] - m[4] * m[6]) <
-         0;
+  return m[0] * (m[4] * m[8] - m[5] * m[7]) - m[1] * (m[3] * m[8] - m[5] * m[6]) + m[2] * (m[3] * m[7] - m[4] * m[6]) < 0;
 }
 
 Transform make_transform(const std::array<double, 3>& scale, const std::array<double, 3>& rotate_deg,

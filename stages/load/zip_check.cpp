@@ -35,22 +35,21 @@ Status check_package(const Source& source, const LoadOptions& options) {
   for (zip_int64_t i = 0; i < entries; ++i) {
     zip_stat_t entry;
     zip_stat_init(&entry);
-    if (zip_stat_index(archive.get(), static_cast<zip_uint64_t>(i), 0, &entry) != 0 ||
-        (entry.valid & ZIP_STAT_NAME) == 0)
+    if (zip_stat_index(archive.get(), static_cast<zip_uint64_t>(i), 0, &entry) != 0 || (entry.valid & ZIP_STAT_NAME) == 0)
       return source.error(fmt::format("zip entry {} is damaged; copy or export the file again", i + 1));
     if ((entry.valid & ZIP_STAT_ENCRYPTION_METHOD) != 0 && entry.encryption_method != ZIP_EM_NONE)
       return source.error("is encrypted; save it without a password");
     const std::unique_ptr<zip_file_t, Discard> file(zip_fopen_index(archive.get(), static_cast<zip_uint64_t>(i), 0));
     if (file == nullptr)
-      return source.error(fmt::format("zip entry {} cannot be opened ({}); copy or export the file again", i + 1,
-                                      zip_strerror(archive.get())));
+      return source.error(
+          fmt::format("zip entry {} cannot be opened ({}); copy or export the file again", i + 1, zip_strerror(archive.get())));
     std::uint64_t expanded = 0;
     scan.begin_file(entry.name);
     while (true) {
       const zip_int64_t got = zip_fread(file.get(), block.data(), block.size());
       if (got < 0)
-        return source.error(fmt::format("zip entry {} is damaged ({}); copy or export the file again", i + 1,
-                                        zip_file_strerror(file.get())));
+        return source.error(
+            fmt::format("zip entry {} is damaged ({}); copy or export the file again", i + 1, zip_file_strerror(file.get())));
       if (got == 0) break;
       expanded += static_cast<std::uint64_t>(got);
       total += static_cast<std::uint64_t>(got);

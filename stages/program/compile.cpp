@@ -147,8 +147,8 @@ class Layer {
           return true;
         });
         if (waiting.size() == before) continue;
-        Sweep sweep{further_++, swaths_ * grid_.passes, swath, further_pass++, false,
-                    first_line(swath, pass) - d * grid_.passes};
+        Sweep sweep{
+            further_++, swaths_ * grid_.passes, swath, further_pass++, false, first_line(swath, pass) - d * grid_.passes};
         if (Status status = make(sweep); !status) return status;
       }
     }
@@ -170,8 +170,7 @@ class Layer {
 
 }  // namespace
 
-Result<ProgramCount> compile(const HeadGrid& grid, const RunsView& image, CompileScratch& scratch,
-                             const EmitSweep& emit) {
+Result<ProgramCount> compile(const HeadGrid& grid, const RunsView& image, CompileScratch& scratch, const EmitSweep& emit) {
   return Layer(grid, image, scratch, emit).run();
 }
 

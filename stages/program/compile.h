@@ -18,9 +18,9 @@ struct CompileScratch {
   ScanScratch scan;
   FireScratch fire;
   SweepVectors vectors;
-  Buffer<Line> line;                        // every line of the layer
-  std::vector<Line> nozzle;                 // what is under each nozzle of a sweep
-  std::deque<Buffer<std::uint32_t>> made;   // lines that are not those of the image: shared or moved ones
+  Buffer<Line> line;                       // every line of the layer
+  std::vector<Line> nozzle;                // what is under each nozzle of a sweep
+  std::deque<Buffer<std::uint32_t>> made;  // lines that are not those of the image: shared or moved ones
   std::size_t made_used = 0;
 
   std::uint64_t bytes() const {
@@ -49,7 +49,6 @@ using EmitSweep = std::function<Status(const Sweep&, const SweepVectors&)>;
 ///           the head shifted by whole nozzles, the shortest shift first.
 /// errors    those of `emit`, which end the layer
 /// cost      of fire() for each sweep; memory is one sweep's vectors
-Result<ProgramCount> compile(const HeadGrid& grid, const RunsView& image, CompileScratch& scratch,
-                             const EmitSweep& emit);
+Result<ProgramCount> compile(const HeadGrid& grid, const RunsView& image, CompileScratch& scratch, const EmitSweep& emit);
 
 }  // namespace lamina::program

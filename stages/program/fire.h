@@ -15,9 +15,9 @@ using Line = std::span<const std::uint32_t>;
 struct FireScratch {
   Buffer<std::uint32_t> event_offset;
   Buffer<std::uint16_t> event_bit;  // of a vector, to be turned over
-  Buffer<std::uint64_t> rows;     // 64 lines of bits
-  Buffer<std::uint64_t> current;  // a vector for each residue of steps
-  Buffer<std::uint32_t> lit;      // set bits of each of them
+  Buffer<std::uint64_t> rows;       // 64 lines of bits
+  Buffer<std::uint64_t> current;    // a vector for each residue of steps
+  Buffer<std::uint32_t> lit;        // set bits of each of them
 };
 
 /// Two ways to the same bits, chosen by what they cost.

@@ -59,12 +59,13 @@ Result<HeadGrid> make_head_grid(const Machine& machine) {
                              head.nozzles * mount.passes));
   }
   if (const bool across = mount.scan_from == Side::kFront || mount.scan_from == Side::kBack; across == scan_x) {
-    return wrong(machine, "mounting.scan_from", scan_x ? "a scan along x begins left or right"
-                                                       : "a scan along y begins front or back");
+    return wrong(machine, "mounting.scan_from",
+                 scan_x ? "a scan along x begins left or right" : "a scan along y begins front or back");
   }
   if (const bool across = mount.nozzle_0 == Side::kLeft || mount.nozzle_0 == Side::kRight; across == scan_x) {
-    return wrong(machine, "mounting.nozzle_0", scan_x ? "with a scan along x nozzle 0 lies back or front"
-                                                      : "with a scan along y nozzle 0 lies left or right");
+    return wrong(
+        machine, "mounting.nozzle_0",
+        scan_x ? "with a scan along x nozzle 0 lies back or front" : "with a scan along y nozzle 0 lies left or right");
   }
 
   // --- the angle, and how far apart the lines are
@@ -79,10 +80,11 @@ Result<HeadGrid> make_head_grid(const Machine& machine) {
     line = pitch_of_dpi(mount.dpi);
     const double sine = line.nm() * passes / pitch_nm;
     if (sine > 1 + kSlack) {
-      return wrong(machine, "mounting.dpi",
-                   fmt::format("{:g} dpi across the scan cannot be reached: nozzles {:g} um apart give at least {:.2f} dpi "
-                               "in {} pass{}", mount.dpi, head.pitch_um, kNmPerInch * passes / pitch_nm, mount.passes,
-                               mount.passes == 1 ? "" : "es"));
+      return wrong(
+          machine, "mounting.dpi",
+          fmt::format("{:g} dpi across the scan cannot be reached: nozzles {:g} um apart give at least {:.2f} dpi "
+                      "in {} pass{}",
+                      mount.dpi, head.pitch_um, kNmPerInch * passes / pitch_nm, mount.passes, mount.passes == 1 ? "" : "es"));
     }
     angle = sine >= 1 ? kPi / 2 : std::asin(sine);
   } else {
@@ -91,7 +93,8 @@ Result<HeadGrid> make_head_grid(const Machine& machine) {
     if (!(std::abs(turned) < 180)) {
       return wrong(machine, "mounting.tilt_deg",
                    fmt::format("{:g} degrees against X is half a turn or more from a scan along {}; give the same row's angle "
-                               "in the other direction", mount.tilt_deg, scan_x ? "x" : "y"));
+                               "in the other direction",
+                               mount.tilt_deg, scan_x ? "x" : "y"));
     }
     if (!(std::abs(std::sin(angle)) > 0.01)) {
       return wrong(machine, "mounting.tilt_deg",
@@ -168,8 +171,7 @@ Result<HeadGrid> make_head_grid(const Machine& machine) {
   std::vector<std::int64_t> steps(head.nozzles);
   for (std::uint32_t i = 0; i < head.nozzles; ++i) {
     steps[i] = static_cast<std::int64_t>(round_half_down((behind[i] - least) / step));
-    grid.worst_place_nm =
-        std::max(grid.worst_place_nm, std::abs((behind[i] - least) - static_cast<double>(steps[i]) * step));
+    grid.worst_place_nm = std::max(grid.worst_place_nm, std::abs((behind[i] - least) - static_cast<double>(steps[i]) * step));
     if (steps[i] > 100'000'000) return wrong(machine, "head.row_offset_um", "a nozzle lags behind by metres");
   }
   for (const std::int64_t lag : steps) {
@@ -183,12 +185,12 @@ Result<HeadGrid> make_head_grid(const Machine& machine) {
   grid.blocked.erase(std::unique(grid.blocked.begin(), grid.blocked.end()), grid.blocked.end());
   grid.blocked_rule = head.blocked_rule;
   if (head.blocked.size() > head.nozzles || grid.blocked.size() >= head.nozzles) {
-    return wrong(machine, "head.blocked", fmt::format("{} blocked nozzles of {}; one at least has to fire",
-                                                      head.blocked.size(), head.nozzles));
+    return wrong(machine, "head.blocked",
+                 fmt::format("{} blocked nozzles of {}; one at least has to fire", head.blocked.size(), head.nozzles));
   }
   if (!grid.blocked.empty() && grid.blocked.back() >= head.nozzles) {
-    return wrong(machine, "head.blocked", fmt::format("there is no nozzle {}; they count from 0 to {}",
-                                                      grid.blocked.back(), head.nozzles - 1));
+    return wrong(machine, "head.blocked",
+                 fmt::format("there is no nozzle {}; they count from 0 to {}", grid.blocked.back(), head.nozzles - 1));
   }
 
   // --- speed
@@ -205,16 +207,14 @@ Result<HeadGrid> make_head_grid(const Machine& machine) {
 
 std::string explain(const Machine& machine, const HeadGrid& grid) {
   std::string text;
-  const auto line = [&](std::string_view name, const std::string& value) {
-    text += fmt::format("{:<12}{}\n", name, value);
-  };
+  const auto line = [&](std::string_view name, const std::string& value) { text += fmt::format("{:<12}{}\n", name, value); };
   const auto dpi = [](double nm) { return kNmPerInch / nm; };
   const std::uint32_t swaths = grid.swaths(0), sweeps = swaths * grid.passes;
   const double sweep_mm = static_cast<double>(grid.steps()) * grid.step_nm() / kNmPerMm + 2 * machine.motion.ramp_mm;
   const double scan_s = sweeps * sweep_mm / machine.motion.scan_speed_mm_s;
   const double back_s = machine.motion.both_directions ? 0 : sweeps * sweep_mm / machine.motion.travel_speed_mm_s;
-  const double roll_s = 2 * std::abs(machine.powder.roller_mm[1] - machine.powder.roller_mm[0]) /
-                        machine.powder.roller_speed_mm_s;
+  const double roll_s =
+      2 * std::abs(machine.powder.roller_mm[1] - machine.powder.roller_mm[0]) / machine.powder.roller_speed_mm_s;
   line("machine", fmt::format("{}: {}", machine.name, machine.description));
   line("bed", machine.bed.shape == BedShape::kRound
                   ? fmt::format("round, {:g} mm, parts up to {:g} mm high", machine.bed.size_mm[0], machine.bed.build_height_mm)
@@ -229,19 +229,18 @@ std::string explain(const Machine& machine, const HeadGrid& grid) {
   line("across", fmt::format("{:.3f} dpi, lines {:.4f} um apart{}", dpi(grid.line_nm), grid.line_nm / kNmPerUm,
                              grid.passes > 1 ? fmt::format(" in {} interlaced passes", grid.passes) : ""));
   line("along", fmt::format("{:.3f} dpi, pixels of {:.4f} um{}", dpi(grid.place_nm), grid.place_nm / kNmPerUm,
-                            grid.steps_per_pixel > 1 ? fmt::format(" in {} steps of {:.4f} um", grid.steps_per_pixel,
-                                                                   grid.step_nm() / kNmPerUm)
-                                                     : ""));
+                            grid.steps_per_pixel > 1
+                                ? fmt::format(" in {} steps of {:.4f} um", grid.steps_per_pixel, grid.step_nm() / kNmPerUm)
+                                : ""));
   line("lag", fmt::format("{:.6f} pixels a nozzle, {} steps in all; drops land up to {:.2f} um along and {:.2f} um across "
-                          "from the centre of their pixel", grid.lag_pixels, grid.most_lag,
-                          grid.worst_place_nm / kNmPerUm, grid.worst_line_nm / kNmPerUm));
-  line("swath", fmt::format("{} lines, {:.3f} mm wide{}", grid.swath_lines(),
-                            grid.swath_lines() * grid.line_nm / kNmPerMm,
+                          "from the centre of their pixel",
+                          grid.lag_pixels, grid.most_lag, grid.worst_place_nm / kNmPerUm, grid.worst_line_nm / kNmPerUm));
+  line("swath", fmt::format("{} lines, {:.3f} mm wide{}", grid.swath_lines(), grid.swath_lines() * grid.line_nm / kNmPerMm,
                             grid.overlap > 0 ? fmt::format(", {} of them shared with the next", grid.overlap) : ""));
-  line("layer", fmt::format("{} x {} pixels, {} bytes as bits; {} swaths, {} sweeps of {} steps, {} bytes of vectors",
-                            grid.image.columns(), grid.image.rows(),
-                            (std::uint64_t{grid.image.columns()} + 7) / 8 * grid.image.rows(), swaths, sweeps, grid.steps(),
-                            std::uint64_t{sweeps} * grid.steps() * ((grid.nozzles + 7) / 8)));
+  line("layer",
+       fmt::format("{} x {} pixels, {} bytes as bits; {} swaths, {} sweeps of {} steps, {} bytes of vectors",
+                   grid.image.columns(), grid.image.rows(), (std::uint64_t{grid.image.columns()} + 7) / 8 * grid.image.rows(),
+                   swaths, sweeps, grid.steps(), std::uint64_t{sweeps} * grid.steps() * ((grid.nozzles + 7) / 8)));
   line("speed", fmt::format("{:g} mm/s, at most {:.1f} mm/s at {:g} Hz", machine.motion.scan_speed_mm_s,
                             machine.head.highest_frequency_hz * grid.place_nm / kNmPerMm, machine.head.highest_frequency_hz));
   line("time", fmt::format("{:.1f} s a full layer: scan {:.1f} s, return {:.1f} s, roller {:.1f} s", scan_s + back_s + roll_s,

@@ -48,12 +48,8 @@ void transpose(const RunsView& image, Runs& result, Buffer<std::uint32_t>& next)
   const std::uint32_t rows = image.rows();
   result.columns = rows;
   result.row_offset.assign(std::size_t{image.columns} + 1, 0);
-  const auto above = [&](std::uint32_t r) {
-    return r == 0 ? std::span<const std::uint32_t>() : image.row(r - 1);
-  };
-  const auto row_or_none = [&](std::uint32_t r) {
-    return r == rows ? std::span<const std::uint32_t>() : image.row(r);
-  };
+  const auto above = [&](std::uint32_t r) { return r == 0 ? std::span<const std::uint32_t>() : image.row(r - 1); };
+  const auto row_or_none = [&](std::uint32_t r) { return r == rows ? std::span<const std::uint32_t>() : image.row(r); };
   // Count, scan, fill.
   for (std::uint32_t r = 0; r <= rows; ++r) {
     for_difference(above(r), row_or_none(r), [&](std::uint32_t begin, std::uint32_t end) {

@@ -67,7 +67,13 @@ Interval estimate(const Bead& bead, double radius, double y) {
 }  // namespace
 
 void BeadRaster::add(Point2 a, Point2 b, Nm width, BeadEnds ends) {
-  Bead bead{a.x, a.y, std::int64_t{b.x} - a.x, std::int64_t{b.y} - a.y, static_cast<Wide>(width) * width, 0, ends == BeadEnds::kSquare};
+  Bead bead{a.x,
+            a.y,
+            std::int64_t{b.x} - a.x,
+            std::int64_t{b.y} - a.y,
+            static_cast<Wide>(width) * width,
+            0,
+            ends == BeadEnds::kSquare};
   bead.length2 = static_cast<Wide>(bead.dx) * bead.dx + static_cast<Wide>(bead.dy) * bead.dy;
   const std::int64_t half = (std::int64_t{width} + 1) / 2;
   const auto rows = static_cast<std::int64_t>(grid_.rows()), columns = static_cast<std::int64_t>(grid_.columns());
@@ -80,17 +86,20 @@ void BeadRaster::add(Point2 a, Point2 b, Nm width, BeadEnds ends) {
     Interval x = estimate(bead, radius, static_cast<double>(y - bead.ay));
     if (!(x.low <= x.high)) {
       // A row that only touches the bead's edge, as far as doubles can tell: look where it is widest.
-      const double share = bead.dy == 0 ? 0.5 : std::clamp(static_cast<double>(y - bead.ay) / static_cast<double>(bead.dy), 0.0, 1.0);
+      const double share =
+          bead.dy == 0 ? 0.5 : std::clamp(static_cast<double>(y - bead.ay) / static_cast<double>(bead.dy), 0.0, 1.0);
       x.add(share * static_cast<double>(bead.dx), share * static_cast<double>(bead.dx));
     }
-    const std::int64_t low = bead.ax + static_cast<std::int64_t>(std::floor(x.low)), high = bead.ax + static_cast<std::int64_t>(std::ceil(x.high));
+    const std::int64_t low = bead.ax + static_cast<std::int64_t>(std::floor(x.low)),
+                       high = bead.ax + static_cast<std::int64_t>(std::ceil(x.high));
     std::int64_t begin = grid_.x.first_at_or_beyond(low) - 1, end = grid_.x.first_at_or_beyond(high + 1) + 1;
     while (begin < end && !bead.holds(grid_.x.centre(begin), y)) ++begin;
     while (end > begin && !bead.holds(grid_.x.centre(end - 1), y)) --end;
     begin = std::max<std::int64_t>(begin, 0);
     end = std::min(end, columns);
     if (begin >= end) continue;
-    spans_.push_back({static_cast<std::uint32_t>(rows - 1 - row), static_cast<std::uint32_t>(begin), static_cast<std::uint32_t>(end)});
+    spans_.push_back(
+        {static_cast<std::uint32_t>(rows - 1 - row), static_cast<std::uint32_t>(begin), static_cast<std::uint32_t>(end)});
   }
 }
 

@@ -83,7 +83,8 @@ struct BeamIndex::State {
     RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_USER);
     rtcSetGeometryUserPrimitiveCount(geometry, static_cast<unsigned>(source.placed->mesh->clusters.size()));
     rtcSetGeometryUserData(geometry, &source);
-    rtcSetGeometryBoundsFunction(geometry, [](const RTCBoundsFunctionArguments* a) { cluster_bounds(a); }, nullptr);
+    rtcSetGeometryBoundsFunction(
+        geometry, [](const RTCBoundsFunctionArguments* a) { cluster_bounds(a); }, nullptr);
     rtcSetGeometryIntersectFunction(geometry, visit_cluster);
     return geometry;
   }
@@ -93,16 +94,15 @@ BeamIndex::BeamIndex(BeamIndex&&) noexcept = default;
 BeamIndex& BeamIndex::operator=(BeamIndex&&) noexcept = default;
 BeamIndex::~BeamIndex() = default;
 
-Result<BeamIndex> BeamIndex::build(std::span<const PlacedMesh> placed, const PixelGrid& grid,
-                                   std::uint32_t band_rows) {
+Result<BeamIndex> BeamIndex::build(std::span<const PlacedMesh> placed, const PixelGrid& grid, std::uint32_t band_rows) {
   BeamIndex index;
   index.state_ = std::make_unique<State>();
   State& state = *index.state_;
   state.placed = placed;
   state.device = rtcNewDevice("start_threads=0,set_affinity=0");
   if (state.device == nullptr) {
-    return Error{Fault::kInternal, fmt::format("Embree could not be started (error {})",
-                                               static_cast<int>(rtcGetDeviceError(nullptr)))};
+    return Error{Fault::kInternal,
+                 fmt::format("Embree could not be started (error {})", static_cast<int>(rtcGetDeviceError(nullptr)))};
   }
   rtcSetDeviceErrorFunction(
       state.device,
@@ -121,8 +121,7 @@ Result<BeamIndex> BeamIndex::build(std::span<const PlacedMesh> placed, const Pix
   state.scene = rtcNewScene(state.device);
   rtcSetSceneFlags(state.scene, RTC_SCENE_FLAG_ROBUST | RTC_SCENE_FLAG_COMPACT);
 
-  const auto half_band =
-      static_cast<float>((grid.y.centre(std::int64_t{band_rows} - 1) - grid.y.centre(0)) / 2 + 2);
+  const auto half_band = static_cast<float>((grid.y.centre(std::int64_t{band_rows} - 1) - grid.y.centre(0)) / 2 + 2);
 
   // Instances of one mesh follow each other here; a mesh that stands once needs no level of its own.
   std::vector<std::uint32_t> order(placed.size());

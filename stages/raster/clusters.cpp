@@ -29,9 +29,7 @@ struct Spread {
   /// Clusters of real files in their own order come to 10 to 25 times a triangle, those of a shuffled file to thousands.
   /// Up to here, ordering the whole mesh costs more than it saves in a job of some hundred layers (measured).
   bool is_poor() const { return clusters > 40 * triangles; }
-  friend Spread operator+(const Spread& a, const Spread& b) {
-    return {a.clusters + b.clusters, a.triangles + b.triangles};
-  }
+  friend Spread operator+(const Spread& a, const Spread& b) { return {a.clusters + b.clusters, a.triangles + b.triangles}; }
 };
 
 /// Writes 16 triangles as a cluster; where there are fewer, the last ones' places are points.
@@ -119,8 +117,7 @@ ClusteredMesh make_clusters(Mesh& mesh) {
   out.storage.reserve(std::size_t{clusters} * kClusterSize);  // nothing moves if the loader left kTriangleSlack
   out.storage.resize(std::size_t{clusters} * kClusterSize);
   if (first_cap_at != own) {
-    std::copy_backward(out.storage.begin() + own, out.storage.begin() + total,
-                       out.storage.begin() + first_cap_at + caps);
+    std::copy_backward(out.storage.begin() + own, out.storage.begin() + total, out.storage.begin() + first_cap_at + caps);
   }
   out.bounds.resize(clusters);
   const Spread spread = cluster_in_place(out.storage.data(), own, out.bounds.data(), false);
@@ -128,9 +125,7 @@ ClusteredMesh make_clusters(Mesh& mesh) {
   out.clusters = {reinterpret_cast<const Cluster*>(out.storage.data()), clusters};
 
   if (spread.is_poor() && own > kBlock) {
-    const auto triangle_at = [&](std::uint32_t i) {
-      return out.clusters[i / kClusterSize].triangle(i % kClusterSize);
-    };
+    const auto triangle_at = [&](std::uint32_t i) { return out.clusters[i / kClusterSize].triangle(i % kClusterSize); };
     const Buffer<std::uint32_t> order = morton_order(own, mesh.bounds, triangle_at);
     Buffer<Triangle> ordered(out.storage.size());
     tbb::parallel_for(0u, own, [&](std::uint32_t i) { ordered[i] = triangle_at(order[i]); });

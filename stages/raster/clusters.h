@@ -26,11 +26,11 @@ static_assert(sizeof(Cluster) == kClusterSize * sizeof(Triangle));
 
 /// A mesh in clusters: 36 bytes a triangle, in the memory of the list that it was made from.
 struct ClusteredMesh {
-  Buffer<Triangle> storage;      // whose bytes are the clusters; moves with its heap block, so `clusters` stays valid
+  Buffer<Triangle> storage;  // whose bytes are the clusters; moves with its heap block, so `clusters` stays valid
   std::span<const Cluster> clusters;
-  Buffer<Box> bounds;            // nm, of each cluster
-  std::uint32_t first_cap = 0;   // clusters from here on hold only triangles that repair added
-  bool closed = true;            // as Mesh::closed
+  Buffer<Box> bounds;           // nm, of each cluster
+  std::uint32_t first_cap = 0;  // clusters from here on hold only triangles that repair added
+  bool closed = true;           // as Mesh::closed
 };
 
 /// Groups the triangles of a mesh into clusters, in place, and takes them out of the mesh.

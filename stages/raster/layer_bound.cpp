@@ -35,8 +35,7 @@ LayerBound::LayerBound(std::span<const PlacedMesh> placed, const PixelGrid& grid
               const auto [lo_z, hi_z] = std::minmax({cluster.z[0][i], cluster.z[1][i], cluster.z[2][i]});
               if (lo_z == hi_z) continue;
               const auto [lo_y, hi_y] = std::minmax({cluster.y[0][i], cluster.y[1][i], cluster.y[2][i]});
-              const auto rows =
-                  static_cast<std::int64_t>(static_cast<double>(std::int64_t{hi_y} - lo_y) * rows_per_nm) + 2;
+              const auto rows = static_cast<std::int64_t>(static_cast<double>(std::int64_t{hi_y} - lo_y) * rows_per_nm) + 2;
               const auto slab_of = [&](Nm z) {
                 return std::clamp(static_cast<std::int32_t>((static_cast<double>(z) + lift) * slabs_per_nm), 0,
                                   static_cast<std::int32_t>(kSlabs) - 1);

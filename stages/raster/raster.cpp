@@ -16,9 +16,8 @@ namespace {
 constexpr std::uint32_t kMostBandRows = 1024;
 
 /// Segments of all clusters that an engine found. A mesh is larger than the caches, so what comes next is fetched early.
-void cut_clusters(const PixelSampling& sampling, std::span<const PlacedMesh> placed,
-                  std::span<const ClusterVisit> visits, Nm plane, std::uint32_t first_row, std::uint32_t last_row,
-                  Segments& out) {
+void cut_clusters(const PixelSampling& sampling, std::span<const PlacedMesh> placed, std::span<const ClusterVisit> visits,
+                  Nm plane, std::uint32_t first_row, std::uint32_t last_row, Segments& out) {
   constexpr std::size_t kAhead = 4, kLine = 64;
   for (std::size_t i = 0; i < visits.size(); ++i) {
     if (i + kAhead < visits.size()) {
@@ -55,8 +54,8 @@ Rasterizer::Rasterizer(Rasterizer&&) noexcept = default;
 Rasterizer& Rasterizer::operator=(Rasterizer&&) noexcept = default;
 Rasterizer::~Rasterizer() = default;
 
-Result<Rasterizer> Rasterizer::build(std::span<Mesh> meshes, std::span<const Instance> instances,
-                                     const PixelGrid& grid, FillRule rule, bool rays, bool contours) {
+Result<Rasterizer> Rasterizer::build(std::span<Mesh> meshes, std::span<const Instance> instances, const PixelGrid& grid,
+                                     FillRule rule, bool rays, bool contours) {
   Rasterizer rasterizer;
   rasterizer.state_ = std::make_unique<State>(grid, rule);
   State& state = *rasterizer.state_;
@@ -105,8 +104,8 @@ LayerReport Rasterizer::layer(Engine engine, Nm plane, LayerScratch& scratch, Ru
   const auto append = [&](std::uint32_t first_row, std::uint32_t last_row) {
     scratch.segments.clear();
     cut_clusters(state.sampling, state.placed, scratch.visits, plane, first_row, last_row, scratch.segments);
-    scratch.scan.append_rows(state.sampling, scratch.segments, state.placed, plane, state.rule, first_row, last_row,
-                             out, report);
+    scratch.scan.append_rows(state.sampling, scratch.segments, state.placed, plane, state.rule, first_row, last_row, out,
+                             report);
   };
   if (engine == Engine::kRays) {
     // Bands from the back of the bed to its front, the order of the image's rows.
@@ -138,8 +137,8 @@ std::uint64_t Rasterizer::layer_bytes_bound(Nm plane) const {
   const bool open = !std::ranges::all_of(state_->meshes, &ClusteredMesh::closed);
   const std::uint64_t closing = open ? 2 * count.segments * sizeof(Segment) + 3 * 8 * count.crossings : 0;
   // Buffers may hold up to twice what they need, crossings and changes take 4 bytes each.
-  return 2 * count.segments * (sizeof(Segment) + sizeof(ClusterVisit)) + 2 * (count.crossings + rows) * 4 * 2 +
-         rows * 8 + closing;
+  return 2 * count.segments * (sizeof(Segment) + sizeof(ClusterVisit)) + 2 * (count.crossings + rows) * 4 * 2 + rows * 8 +
+         closing;
 }
 
 std::uint64_t Rasterizer::crossings_bound(Nm plane) const { return state_->bound.front().at(plane).crossings; }

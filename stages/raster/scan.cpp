@@ -70,8 +70,8 @@ void ScanConverter::place_segments(std::span<const Segment> segments, std::uint3
   crossing_.resize(total);
 }
 
-void ScanConverter::fill_crossings(const PixelSampling& sampling, const Segment& segment,
-                                   std::span<const PlacedMesh> placed, Nm plane, std::uint32_t first_row) {
+void ScanConverter::fill_crossings(const PixelSampling& sampling, const Segment& segment, std::span<const PlacedMesh> placed,
+                                   Nm plane, std::uint32_t first_row) {
   std::uint32_t* const place = place_.data();
   std::uint32_t* const crossing = crossing_.data();
   const Nm* const centre = sampling.row_centre.data();
@@ -80,14 +80,11 @@ void ScanConverter::fill_crossings(const PixelSampling& sampling, const Segment&
     const PlacedMesh& source = placed[segment.instance];
     const Cluster& cluster = source.mesh->clusters[segment.cluster];
     const std::uint32_t lane = segment.flags & Segment::kLane;
-    const ExactTriangle triangle(corner_on_bed(cluster, 0, lane, source.offset),
-                                 corner_on_bed(cluster, 1, lane, source.offset),
+    const ExactTriangle triangle(corner_on_bed(cluster, 0, lane, source.offset), corner_on_bed(cluster, 1, lane, source.offset),
                                  corner_on_bed(cluster, 2, lane, source.offset));
     return static_cast<std::uint32_t>(exact_column(sampling.x, triangle, centre[row], plane));
   };
-  const auto put = [&](std::uint32_t row, std::uint32_t column) {
-    crossing[place[row - first_row]++] = column * 2 + enters;
-  };
+  const auto put = [&](std::uint32_t row, std::uint32_t column) { crossing[place[row - first_row]++] = column * 2 + enters; };
 
   if ((segment.flags & Segment::kUpright) != 0) {
     const std::uint32_t column = exact(segment.first_row);
@@ -103,14 +100,15 @@ void ScanConverter::fill_crossings(const PixelSampling& sampling, const Segment&
   for (std::uint32_t row = segment.first_row; row < segment.last_row; ++row) {
     const double guess = segment.column + segment.columns_per_nm * (centre[row] - y);
     auto column = static_cast<std::uint32_t>(static_cast<std::int32_t>(guess));
-    if (guess - static_cast<std::int32_t>(column) < undecided) [[unlikely]] column = exact(row);
+    if (guess - static_cast<std::int32_t>(column) < undecided) [[unlikely]]
+      column = exact(row);
     put(row, column);
   }
 }
 
 void ScanConverter::close_open_parts(const PixelSampling& sampling, std::span<const Segment> segments,
-                                     std::span<const PlacedMesh> placed, Nm plane, std::uint32_t first_row,
-                                     std::uint32_t rows, LayerReport& report) {
+                                     std::span<const PlacedMesh> placed, Nm plane, std::uint32_t first_row, std::uint32_t rows,
+                                     LayerReport& report) {
   of_open_parts_.clear();
   closing_.clear();
   if (std::ranges::all_of(placed, [](const PlacedMesh& part) { return part.mesh->closed; })) return;
@@ -120,8 +118,8 @@ void ScanConverter::close_open_parts(const PixelSampling& sampling, std::span<co
   std::ranges::sort(of_open_parts_, {}, &Segment::instance);
   Buffer<Closing> closings;  // closing_ stays empty while the crossings of single parts are placed
   for (auto begin = of_open_parts_.begin(); begin != of_open_parts_.end();) {
-    const auto end = std::find_if(begin, of_open_parts_.end(),
-                                  [&](const Segment& segment) { return segment.instance != begin->instance; });
+    const auto end =
+        std::find_if(begin, of_open_parts_.end(), [&](const Segment& segment) { return segment.instance != begin->instance; });
     const std::span<const Segment> part(begin, end);
     place_segments(part, first_row, rows);
     for (const Segment& segment : part) fill_crossings(sampling, segment, placed, plane, first_row);

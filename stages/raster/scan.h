@@ -44,13 +44,11 @@ struct LayerReport {
 class ScanConverter {
  public:
   /// Appends rows last_row - 1 down to first_row (image order) to `out`; `segments` lie within these rows.
-  void append_rows(const PixelSampling& sampling, std::span<const Segment> segments,
-                   std::span<const PlacedMesh> placed, Nm plane, FillRule rule, std::uint32_t first_row,
-                   std::uint32_t last_row, Runs& out, LayerReport& report);
+  void append_rows(const PixelSampling& sampling, std::span<const Segment> segments, std::span<const PlacedMesh> placed,
+                   Nm plane, FillRule rule, std::uint32_t first_row, std::uint32_t last_row, Runs& out, LayerReport& report);
 
   std::uint64_t bytes() const {
-    return bytes_held(place_) + bytes_held(crossing_) + bytes_held(capped_) + bytes_held(of_open_parts_) +
-           bytes_held(closing_);
+    return bytes_held(place_) + bytes_held(crossing_) + bytes_held(capped_) + bytes_held(of_open_parts_) + bytes_held(closing_);
   }
 
  private:
@@ -61,13 +59,11 @@ class ScanConverter {
   };
 
   void place_segments(std::span<const Segment> segments, std::uint32_t first_row, std::uint32_t rows);
-  void close_open_parts(const PixelSampling& sampling, std::span<const Segment> segments,
-                        std::span<const PlacedMesh> placed, Nm plane, std::uint32_t first_row, std::uint32_t rows,
-                        LayerReport& report);
-  void fill_crossings(const PixelSampling& sampling, const Segment& segment, std::span<const PlacedMesh> placed,
-                      Nm plane, std::uint32_t first_row);
-  void report_caps(std::span<const Segment> segments, std::uint32_t first_row, std::uint32_t rows,
-                   LayerReport& report);
+  void close_open_parts(const PixelSampling& sampling, std::span<const Segment> segments, std::span<const PlacedMesh> placed,
+                        Nm plane, std::uint32_t first_row, std::uint32_t rows, LayerReport& report);
+  void fill_crossings(const PixelSampling& sampling, const Segment& segment, std::span<const PlacedMesh> placed, Nm plane,
+                      std::uint32_t first_row);
+  void report_caps(std::span<const Segment> segments, std::uint32_t first_row, std::uint32_t rows, LayerReport& report);
 
   Buffer<std::uint32_t> place_;     // per geometry row of the band: where its next crossing goes
   Buffer<std::uint32_t> crossing_;  // column * 2 + (1 if it enters), row by row

@@ -24,15 +24,14 @@ double meeting(const Point3& from, const Point3& to, Nm z) {
   return static_cast<double>(std::int64_t{z} - from.z) / static_cast<double>(std::int64_t{to.z} - from.z);
 }
 
-double between(Nm from, Nm to, double share) {
-  return from + share * static_cast<double>(std::int64_t{to} - from);
-}
+double between(Nm from, Nm to, double share) { return from + share * static_cast<double>(std::int64_t{to} - from); }
 
 /// First row at or beyond an edge's meeting point: guessed, and decided in integers when the guess is near.
 std::int64_t first_row(const PixelSampling& sampling, const Point3& from, const Point3& to, Nm z, double y) {
   const double guess = y * sampling.rows_per_nm + 0.5 + sampling.near_y;  // row + 1 + near, and y >= 0
   const auto row = static_cast<std::int64_t>(guess);
-  if (guess - static_cast<double>(row) < 2 * sampling.near_y) [[unlikely]] return exact_row(sampling.y, from, to, z);
+  if (guess - static_cast<double>(row) < 2 * sampling.near_y) [[unlikely]]
+    return exact_row(sampling.y, from, to, z);
   return row;
 }
 
@@ -78,8 +77,8 @@ PixelSampling::PixelSampling(const PixelGrid& grid)
 }
 
 std::int64_t exact_column(const PixelAxis& axis, const ExactTriangle& triangle, Nm y, Nm z) {
-  Int128 numerator = Int128{triangle.ny} * (std::int64_t{y} - triangle.a.y) +
-                     Int128{triangle.nz} * (std::int64_t{z} - triangle.a.z);
+  Int128 numerator =
+      Int128{triangle.ny} * (std::int64_t{y} - triangle.a.y) + Int128{triangle.nz} * (std::int64_t{z} - triangle.a.z);
   Int128 denominator = triangle.nx;
   if (denominator < 0) {
     numerator = -numerator;
@@ -122,8 +121,7 @@ void append_segments(const PixelSampling& sampling, const SegmentSource& source,
     const double to_left = meeting(tip, left, plane);
     const double y = between(tip.y, left.y, to_left);
     std::int64_t first = first_row(sampling, tip, left, plane, y);
-    std::int64_t last =
-        first_row(sampling, tip, right, plane, between(tip.y, right.y, meeting(tip, right, plane)));
+    std::int64_t last = first_row(sampling, tip, right, plane, between(tip.y, right.y, meeting(tip, right, plane)));
     if (first > last) std::swap(first, last);
     first = std::max<std::int64_t>(first, row_begin);
     last = std::min<std::int64_t>(last, row_end);

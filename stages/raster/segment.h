@@ -24,13 +24,13 @@ namespace lamina::raster {
 
 /// The cut of one triangle, as wide as its rows. 40 bytes; crossings are expanded from it row by row.
 struct Segment {
-  double column;             // of the crossing in row `first_row`, + 1 + PixelSampling::near, in pixels
-  double columns_per_nm;     // slope over y
-  std::uint32_t first_row;   // geometry rows [first_row, last_row)
+  double column;            // of the crossing in row `first_row`, + 1 + PixelSampling::near, in pixels
+  double columns_per_nm;    // slope over y
+  std::uint32_t first_row;  // geometry rows [first_row, last_row)
   std::uint32_t last_row;
-  std::uint32_t cluster;     // in its mesh
-  std::uint32_t instance;    // in the scene
-  std::uint32_t flags;       // lane in the low 4 bits, then kEnters, kExact, kUpright, kCap
+  std::uint32_t cluster;   // in its mesh
+  std::uint32_t instance;  // in the scene
+  std::uint32_t flags;     // lane in the low 4 bits, then kEnters, kExact, kUpright, kCap
 
   static constexpr std::uint32_t kLane = 15;
   static constexpr std::uint32_t kEnters = 16;   // a ray towards +x goes into the solid

@@ -62,10 +62,21 @@ std::vector<Mark> of_repeated(const Calibration& calibration, Member member) {
 const Calibration& anet_a8_calibration() {
   static const Calibration calibration{
       "Di Nisio 2022, Tables 6, 7 and 11 to 15: Anet A8, PLA, nozzle 0.4 mm",
-      0.4, 0.3, 15,
-      {{125, 0.31, 1.05, 0.45}, {150, 0.27, 2.25, 0.50}, {175, 0.26, 3.50, 0.53}, {200, 0.21, 4.45, 0.57},
-       {225, 0.19, 5.20, 0.60}, {250, 0.17, 5.75, 0.64}, {275, 0.17, 6.95, 0.66}, {300, 0.15, 7.45, 0.70},
-       {325, 0.17, 8.02, 0.74}, {350, 0.16, 8.80, 0.76}, {375, 0.16, 9.40, 0.76}, {400, 0.12, 9.80, 0.79}},
+      0.4,
+      0.3,
+      15,
+      {{125, 0.31, 1.05, 0.45},
+       {150, 0.27, 2.25, 0.50},
+       {175, 0.26, 3.50, 0.53},
+       {200, 0.21, 4.45, 0.57},
+       {225, 0.19, 5.20, 0.60},
+       {250, 0.17, 5.75, 0.64},
+       {275, 0.17, 6.95, 0.66},
+       {300, 0.15, 7.45, 0.70},
+       {325, 0.17, 8.02, 0.74},
+       {350, 0.16, 8.80, 0.76},
+       {375, 0.16, 9.40, 0.76},
+       {400, 0.12, 9.80, 0.79}},
       {{90, 0.37}, {80, 0.33}, {70, 0.31}, {60, 0.29}, {50, 0.27}, {40, 0.24}, {30, 0.21}, {20, 0.19}, {10, 0.16}},
       {{75, 200, 100, (0.38 + 0.39 + 0.39) / 3, (0.28 + 0.28 + 0.29) / 3, 0.40},
        {100, 200, 75, (0.45 + 0.45 + 0.44) / 3, (0.31 + 0.32 + 0.31) / 3, (0.39 + 0.39 + 0.40) / 3},
@@ -86,7 +97,8 @@ Status check(const Calibration& calibration) {
     if (!(row.percent > (i == 0 ? 100 : calibration.by_speed[i - 1].percent))) {
       return wrong("by_speed", i, "speeds have to be above 100 % and to increase");
     }
-    if (!(row.thin_mm > 0) || !(row.stable_mm > 0) || !(row.swell_mm > 0)) return wrong("by_speed", i, "lengths have to be above 0");
+    if (!(row.thin_mm > 0) || !(row.stable_mm > 0) || !(row.swell_mm > 0))
+      return wrong("by_speed", i, "lengths have to be above 0");
   }
   for (std::size_t i = 0; i < calibration.by_extrusion.size(); ++i) {
     const auto& row = calibration.by_extrusion[i];
@@ -141,7 +153,7 @@ Reading extrusion_for_thin_width(const Calibration& calibration, double width_mm
 
 RepeatedReading repeated_at(const Calibration& calibration, double extrusion_percent) {
   using Row = Calibration::Repeated;
-  const auto at = [&](double Row::* member) { return interpolate(of_repeated(calibration, member), extrusion_percent); };
+  const auto at = [&](double Row::*member) { return interpolate(of_repeated(calibration, member), extrusion_percent); };
   const Reading speed = at(&Row::thick_speed_percent);
   return {speed.value, at(&Row::thick_mm).value, at(&Row::thin_mm).value, at(&Row::continuous_mm).value, speed.inside};
 }

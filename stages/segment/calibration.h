@@ -14,7 +14,7 @@
 namespace lamina::segment {
 
 struct Calibration {
-  std::string source;  // of the numbers, for people
+  std::string source;                                       // of the numbers, for people
   double width_mm = 0.4, height_mm = 0.3, speed_mm_s = 15;  // what 100 % means
 
   /// A thin stretch between long thick ones, by its speed; extrusion 100 %.

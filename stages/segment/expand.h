@@ -32,7 +32,9 @@ struct LayerCut {
     return (std::int64_t{number} - first) % (std::int64_t{continuous} + 1) == 0;
   }
   /// Which of the segmented lines a line is, from 0 for `first`.
-  std::int64_t ordinal(std::int32_t number) const { return floor_div(std::int64_t{number} - first, std::int64_t{continuous} + 1); }
+  std::int64_t ordinal(std::int32_t number) const {
+    return floor_div(std::int64_t{number} - first, std::int64_t{continuous} + 1);
+  }
 };
 
 namespace expand_detail {

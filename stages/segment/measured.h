@@ -44,8 +44,8 @@ struct Settled {
 
 struct MeasuredMachine {
   Calibration calibration;
-  std::optional<double> flow;     // with which two walls measure twice the width
-  std::vector<Settled> settled;   // extrusion increasing
+  std::optional<double> flow;       // with which two walls measure twice the width
+  std::vector<Settled> settled;     // extrusion increasing
   std::vector<std::string> advice;  // what is to be printed again, and with what; one line each
 };
 
@@ -54,6 +54,7 @@ inline constexpr double kAcceptedDeviation = 0.012;
 
 /// source  names the measurements, for people
 /// errors  kInput: "row N: ..." where a row lacks a width or repeats one; nothing measured at all
-Result<MeasuredMachine> calibrate(const std::vector<Measured>& rows, const MeasuringSettings& settings, const std::string& source);
+Result<MeasuredMachine> calibrate(const std::vector<Measured>& rows, const MeasuringSettings& settings,
+                                  const std::string& source);
 
 }  // namespace lamina::segment

@@ -27,7 +27,8 @@ Result<Permeability> fit_permeability(std::span<const FlowPoint> points, const F
   }
   const double determinant = s2 * s4 - s3 * s3;
   if (!(determinant > 1e-12 * s2 * s4)) {
-    return Error{Fault::kInput, "all points have one velocity; linear and quadratic parts cannot be told apart, measure at more flows"};
+    return Error{Fault::kInput,
+                 "all points have one velocity; linear and quadratic parts cannot be told apart, measure at more flows"};
   }
   const double a = (t1 * s4 - t2 * s3) / determinant, b = (t2 * s2 - t1 * s3) / determinant;
   double squares = 0, total = 0;
@@ -41,9 +42,10 @@ Result<Permeability> fit_permeability(std::span<const FlowPoint> points, const F
   result.linear = a / unit;
   result.quadratic = b / (unit * unit);
   if (!(result.linear > 0) || !(result.quadratic > 0)) {
-    return Error{Fault::kInput, fmt::format("the parabola has a {} part that is not positive ({:.4g}); the flow may be too low or too high "
-                                            "for this equation, or a column is wrong", result.linear > 0 ? "quadratic" : "linear",
-                                            result.linear > 0 ? result.quadratic : result.linear)};
+    return Error{Fault::kInput,
+                 fmt::format("the parabola has a {} part that is not positive ({:.4g}); the flow may be too low or too high "
+                             "for this equation, or a column is wrong",
+                             result.linear > 0 ? "quadratic" : "linear", result.linear > 0 ? result.quadratic : result.linear)};
   }
   result.k1_m2 = fluid.viscosity_pa_s / result.linear;
   result.k2_m = fluid.density_kg_m3 / result.quadratic;

@@ -14,7 +14,7 @@ namespace lamina::segment {
 inline constexpr double kDarcy = 9.869233e-13;  // m2
 
 struct FlowPoint {
-  double velocity_m_s;  // flow / cross-section, not that in the pores
+  double velocity_m_s;   // flow / cross-section, not that in the pores
   double gradient_pa_m;  // pressure drop / length
 };
 

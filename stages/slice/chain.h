@@ -25,7 +25,8 @@ struct ChainScratch {
 /// an edge without a neighbour, of open meshes only, go to `open`, from their first to their last point. Both may hold
 /// repeated and collinear points, and chains of fewer than three.
 /// cost  O(C) for C cuts; the table of edges is that of one layer and stays in the cache
-/// source  R. Minetto, N. Volpato, J. Stolfi et al., "An optimal algorithm for 3D triangle mesh slicing", Computer-Aided Design 92 (2017), for
+/// source  R. Minetto, N. Volpato, J. Stolfi et al., "An optimal algorithm for 3D triangle mesh slicing", Computer-Aided Design
+/// 92 (2017), for
 ///         loop closure by a table; naming crossings by their edges in place of hashing points is ours
 void chain(const Cuts& cuts, std::int64_t z, ChainScratch& scratch, Contours& closed, Contours& open);
 

@@ -19,8 +19,7 @@ struct ContactScratch {
   MonotoneScratch monotone;
 
   std::uint64_t bytes() const {
-    return bytes_held(offset) + bytes_held(edge) + bytes_held(next) + bytes_held(contour) + bytes_held(root) +
-           monotone.bytes();
+    return bytes_held(offset) + bytes_held(edge) + bytes_held(next) + bytes_held(contour) + bytes_held(root) + monotone.bytes();
   }
 };
 

@@ -21,14 +21,15 @@ Nm exact_between(Nm from, Nm to, std::int64_t num, std::int64_t den) {
   return static_cast<Nm>(from + static_cast<std::int64_t>(floor_div<__int128>(way, static_cast<__int128>(den) * 2)));
 }
 
-/// The product of two doubles that are each off by at most 2^-53 of themselves, for ways below 2^31, then one addition: off by less
-/// than 2^-19. Whatever lies near a half is decided in integers.
+/// The product of two doubles that are each off by at most 2^-53 of themselves, for ways below 2^31, then one addition: off by
+/// less than 2^-19. Whatever lies near a half is decided in integers.
 Nm between(Nm from, Nm to, double share, std::int64_t num, std::int64_t den) {
   constexpr double kNear = 0x1p-17, kPositive = 0x1p32;
   const double way = share * static_cast<double>(std::int64_t{to} - from) + 0.5 + kPositive;
   const auto whole = static_cast<std::int64_t>(way);
   const double rest = way - static_cast<double>(whole);
-  if (rest < kNear || rest > 1 - kNear) [[unlikely]] return exact_between(from, to, num, den);
+  if (rest < kNear || rest > 1 - kNear) [[unlikely]]
+    return exact_between(from, to, num, den);
   return static_cast<Nm>(from + whole - static_cast<std::int64_t>(kPositive));
 }
 

@@ -9,10 +9,10 @@
 namespace lamina::slice {
 
 struct GapReport {
-  std::uint32_t closed = 0;        // gaps that were bridged
+  std::uint32_t closed = 0;         // gaps that were bridged
   std::int64_t largest_closed = 0;  // nm, the longest bridge, rounded up
-  std::uint32_t open = 0;          // chains that stay open
-  Point2 first_open{};             // start of the first of these
+  std::uint32_t open = 0;           // chains that stay open
+  Point2 first_open{};              // start of the first of these
 
   void add(const GapReport& other) {
     if (open == 0) first_open = other.first_open;

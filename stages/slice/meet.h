@@ -11,8 +11,8 @@ namespace lamina::slice {
 /// 1: p lies left of the line from a to b, -1: right of it, 0: on it
 inline int side_of(Point2 a, Point2 b, Point2 p) {
   // Coordinates of a bed differ by less than 2^31, so nothing overflows.
-  const std::int64_t area = (std::int64_t{b.x} - a.x) * (std::int64_t{p.y} - a.y) -
-                            (std::int64_t{b.y} - a.y) * (std::int64_t{p.x} - a.x);
+  const std::int64_t area =
+      (std::int64_t{b.x} - a.x) * (std::int64_t{p.y} - a.y) - (std::int64_t{b.y} - a.y) * (std::int64_t{p.x} - a.x);
   return area > 0 ? 1 : area < 0 ? -1 : 0;
 }
 

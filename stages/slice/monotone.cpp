@@ -12,7 +12,9 @@ int sign(std::int64_t v) { return v > 0 ? 1 : v < 0 ? -1 : 0; }
 class Search {
  public:
   Search(const ContoursView& contours, MonotoneScratch& scratch)
-      : contours_(contours), scratch_(scratch), most_chains_(32 + contours.point.size() / 6),
+      : contours_(contours),
+        scratch_(scratch),
+        most_chains_(32 + contours.point.size() / 6),
         comparisons_left_(4096 + 8 * static_cast<std::int64_t>(contours.point.size())) {}
 
   bool run() {

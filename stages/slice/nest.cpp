@@ -29,8 +29,8 @@ Outline outline_of(std::span<const Point2> points) {
   const std::size_t i = static_cast<std::size_t>(std::min_element(points.begin(), points.end()) - points.begin());
   const Point2 a = points[(i + n - 1) % n], b = points[i], c = points[(i + 1) % n];
   outline.leftmost = b;
-  outline.counter_clockwise = (std::int64_t{b.x} - a.x) * (std::int64_t{c.y} - b.y) >
-                              (std::int64_t{b.y} - a.y) * (std::int64_t{c.x} - b.x);
+  outline.counter_clockwise =
+      (std::int64_t{b.x} - a.x) * (std::int64_t{c.y} - b.y) > (std::int64_t{b.y} - a.y) * (std::int64_t{c.x} - b.x);
   return outline;
 }
 
@@ -40,8 +40,8 @@ std::int32_t winding_about(std::span<const Point2> points, Point2 p) {
   Point2 a = points.back();
   for (const Point2 b : points) {
     if ((a.y <= p.y) != (b.y <= p.y)) {
-      const std::int64_t area = (std::int64_t{b.x} - a.x) * (std::int64_t{p.y} - a.y) -
-                                (std::int64_t{b.y} - a.y) * (std::int64_t{p.x} - a.x);
+      const std::int64_t area =
+          (std::int64_t{b.x} - a.x) * (std::int64_t{p.y} - a.y) - (std::int64_t{b.y} - a.y) * (std::int64_t{p.x} - a.x);
       // p is right of an edge that goes down, or of one that goes up.
       if (b.y < a.y && area > 0) ++winding;
       if (b.y > a.y && area < 0) --winding;

@@ -37,8 +37,8 @@ int place_of(std::span<const Point2> contour, Point2 p) {
   bool inside = false;
   Point2 a = contour.back();
   for (const Point2 b : contour) {
-    const std::int64_t area = (std::int64_t{b.x} - a.x) * (std::int64_t{p.y} - a.y) -
-                              (std::int64_t{b.y} - a.y) * (std::int64_t{p.x} - a.x);
+    const std::int64_t area =
+        (std::int64_t{b.x} - a.x) * (std::int64_t{p.y} - a.y) - (std::int64_t{b.y} - a.y) * (std::int64_t{p.x} - a.x);
     if (area == 0 && std::min(a.x, b.x) <= p.x && p.x <= std::max(a.x, b.x) && std::min(a.y, b.y) <= p.y &&
         p.y <= std::max(a.y, b.y)) {
       return 0;
@@ -75,7 +75,8 @@ std::vector<std::uint32_t> outers_of(const Contours& contours, const std::vector
     // Of nested outer contours the inner one begins further right, and so came later.
     for (auto other = open.rbegin(); other != open.rend() && outer_of[c] == kNone; ++other) {
       const Outline& around = outlines[*other];
-      if (around.lo.y <= own.lo.y && own.hi.y <= around.hi.y && own.hi.x <= around.hi.x && is_around(contours[*other], contours[c])) {
+      if (around.lo.y <= own.lo.y && own.hi.y <= around.hi.y && own.hi.x <= around.hi.x &&
+          is_around(contours[*other], contours[c])) {
         outer_of[c] = *other;
       }
     }
@@ -95,7 +96,8 @@ void order_by_outer(Contours& contours) {
     if (outlines[c].outer) ++outers, an_outer = c;
   }
   if (outers == count || (outers == 1 && an_outer == 0)) return;
-  std::vector<std::uint32_t> outer_of = outers == 1 ? std::vector<std::uint32_t>(count, an_outer) : outers_of(contours, outlines);
+  std::vector<std::uint32_t> outer_of =
+      outers == 1 ? std::vector<std::uint32_t>(count, an_outer) : outers_of(contours, outlines);
   for (std::uint32_t c = 0; c < count; ++c) {
     if (outlines[c].outer || outer_of[c] == kNone) outer_of[c] = c;
   }

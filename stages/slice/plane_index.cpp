@@ -35,9 +35,7 @@ class PlaneFinder {
   Buffer<std::uint32_t> place_;
 };
 
-std::uint32_t level_of(std::uint32_t planes_crossed) {
-  return static_cast<std::uint32_t>(std::bit_width(planes_crossed - 1));
-}
+std::uint32_t level_of(std::uint32_t planes_crossed) { return static_cast<std::uint32_t>(std::bit_width(planes_crossed - 1)); }
 
 }  // namespace
 

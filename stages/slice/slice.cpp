@@ -31,8 +31,7 @@ ContoursView LayerContours::of(std::uint32_t b, Buffer<std::uint32_t>& rebased) 
 }
 
 Result<Slicer> Slicer::build(std::span<const Mesh> meshes, std::span<const Instance> instances,
-                             std::span<const std::uint32_t> body_of, std::span<const Nm> planes,
-                             const SliceOptions& options) {
+                             std::span<const std::uint32_t> body_of, std::span<const Nm> planes, const SliceOptions& options) {
   for (std::size_t p = 1; p < planes.size(); ++p) {
     if (planes[p] <= planes[p - 1]) {
       return Error{Fault::kUsage, fmt::format("plane {} at {} mm is not above plane {} at {} mm; give planes in order", p,
@@ -125,8 +124,7 @@ Result<LayerReport> Slicer::layer(std::uint32_t plane, LayerScratch& scratch, La
     return Error{status.error().fault, fmt::format("plane at {} mm: {}", mm(planes_[plane]), status.error().message)};
   };
   for (std::uint32_t b = 0; b < bodies_; ++b) {
-    const std::span<const Placed> members =
-        std::span(placed_).subspan(body_offset_[b], body_offset_[b + 1] - body_offset_[b]);
+    const std::span<const Placed> members = std::span(placed_).subspan(body_offset_[b], body_offset_[b + 1] - body_offset_[b]);
     if (members.size() == 1) {
       const Placed& only = members.front();
       Contours& own = scratch.of_source[only.source];

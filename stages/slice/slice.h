@@ -30,9 +30,9 @@ namespace lamina::slice {
 
 struct SliceOptions {
   FillRule fill_rule = FillRule::kNonzero;
-  Nm tolerance = 0;            // nm by which dropping points may move a contour; 0 drops only points on straight lines
-  Nm gap = 100'000;            // nm, longest gap of an open mesh that is bridged
-  std::int64_t offset = 0;     // nm by which contours are grown (shrunk if negative), last
+  Nm tolerance = 0;         // nm by which dropping points may move a contour; 0 drops only points on straight lines
+  Nm gap = 100'000;         // nm, longest gap of an open mesh that is bridged
+  std::int64_t offset = 0;  // nm by which contours are grown (shrunk if negative), last
 };
 
 /// One layer. The contours of body b are [body[b], body[b + 1]).
@@ -44,9 +44,9 @@ struct LayerContours {
 };
 
 struct LayerReport {
-  std::uint64_t cuts = 0;      // facets that the plane crosses, with copies once
-  std::uint32_t united = 0;    // groups of contours that needed a boolean operation
-  GapReport gaps;              // sums over bodies; first_open of the first one
+  std::uint64_t cuts = 0;    // facets that the plane crosses, with copies once
+  std::uint32_t united = 0;  // groups of contours that needed a boolean operation
+  GapReport gaps;            // sums over bodies; first_open of the first one
 };
 
 /// Buffers of a layer in flight, reused.
@@ -71,8 +71,7 @@ class Slicer {
   /// errors     kUsage: planes not increasing, the first bad one
   /// cost       O(T + P) for each mesh and height at which it stands; copies at one height share all
   static Result<Slicer> build(std::span<const Mesh> meshes, std::span<const Instance> instances,
-                              std::span<const std::uint32_t> body_of, std::span<const Nm> planes,
-                              const SliceOptions& options);
+                              std::span<const std::uint32_t> body_of, std::span<const Nm> planes, const SliceOptions& options);
 
   /// The same planes cut for other bodies, or for some of the instances only (those with a body below kLeftOut). Shares
   /// the index; instances that only the other slicer cuts cost nothing here.
@@ -101,8 +100,7 @@ class Slicer {
     std::uint32_t source;
     Point2 by;
   };
-  void loops_of(const Source& source, std::uint32_t plane, LayerScratch& scratch, Contours& closed,
-                LayerReport& report) const;
+  void loops_of(const Source& source, std::uint32_t plane, LayerScratch& scratch, Contours& closed, LayerReport& report) const;
   Status clean(Contours& contours, LayerScratch& scratch, LayerReport& report) const;
 
   std::span<const Mesh> meshes_;
@@ -111,9 +109,9 @@ class Slicer {
   void group(std::span<const std::uint32_t> body_of);
 
   std::shared_ptr<const std::vector<Source>> sources_;
-  std::vector<Placed> instances_;            // as given
-  std::vector<Placed> placed_;               // body by body
-  std::vector<std::uint32_t> body_offset_;   // bodies + 1, into placed_
+  std::vector<Placed> instances_;           // as given
+  std::vector<Placed> placed_;              // body by body
+  std::vector<std::uint32_t> body_offset_;  // bodies + 1, into placed_
   std::uint32_t bodies_ = 0;
 };
 

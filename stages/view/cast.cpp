@@ -102,7 +102,8 @@ struct Caster::State {
     if (!(length > 0)) return kLeastLight;
     // A facet that is turned over looks like one that is not.
     const float turned = of(frame.towards) * frame.sign < 0 ? -1.0f : 1.0f;
-    const float lit = (kLight[0] * of(frame.right) + kLight[1] * of(frame.up) + kLight[2] * frame.sign * of(frame.towards)) * turned;
+    const float lit =
+        (kLight[0] * of(frame.right) + kLight[1] * of(frame.up) + kLight[2] * frame.sign * of(frame.towards)) * turned;
     // What lies deeper is darker, so that faces which look the same way can be told apart.
     const float depth = (ray.ray.tfar - first_depth) / std::max(last_depth - first_depth, 1e-6f);
     const float near = 1 - kDepthShade * std::clamp(depth, 0.0f, 1.0f);
@@ -151,7 +152,9 @@ Picture Caster::look(Side side, std::uint32_t most) const {
   const Vector hi = {float_mm(box.hi.x), float_mm(box.hi.y), float_mm(box.hi.z)};
   const auto extent = [&](int axis) { return hi[static_cast<std::size_t>(axis)] - lo[static_cast<std::size_t>(axis)]; };
   const float longest = std::max({extent(0), extent(1), extent(2), 1e-6f}), pixel = longest / static_cast<float>(most);
-  const auto pixels = [&](int axis) { return std::clamp(static_cast<std::uint32_t>(std::ceil(extent(axis) / pixel)), 1u, most); };
+  const auto pixels = [&](int axis) {
+    return std::clamp(static_cast<std::uint32_t>(std::ceil(extent(axis) / pixel)), 1u, most);
+  };
   Picture picture;
   picture.width = pixels(frame.right);
   picture.height = pixels(frame.up);

@@ -18,9 +18,9 @@ namespace lamina::view {
 enum class Side : std::uint8_t { kTop, kFront, kRight };
 
 struct Picture {
-  std::uint32_t width = 0, height = 0;      // pixels
-  double width_mm = 0, height_mm = 0;       // of all parts together
-  std::vector<std::uint8_t> light_cover;    // for each pixel, rows from the top: how light (255 white), how much of it is part
+  std::uint32_t width = 0, height = 0;    // pixels
+  double width_mm = 0, height_mm = 0;     // of all parts together
+  std::vector<std::uint8_t> light_cover;  // for each pixel, rows from the top: how light (255 white), how much of it is part
 };
 
 class Caster {

@@ -34,13 +34,10 @@ int write_all(int file, std::span<const std::byte> bytes) {
 Error write_failure(const std::string& path, int code) {
   switch (code) {
     case ENOSPC:
-    case EDQUOT:
-      return {Fault::kOutput, fmt::format("{}: disk full ({}); free some space", path, std::strerror(code))};
+    case EDQUOT: return {Fault::kOutput, fmt::format("{}: disk full ({}); free some space", path, std::strerror(code))};
     case EFBIG:
-      return {Fault::kOutput,
-              fmt::format("{}: {}; raise the limit on file sizes (ulimit -f)", path, std::strerror(code))};
-    default:
-      return {Fault::kOutput, fmt::format("{}: cannot write: {}", path, std::strerror(code))};
+      return {Fault::kOutput, fmt::format("{}: {}; raise the limit on file sizes (ulimit -f)", path, std::strerror(code))};
+    default: return {Fault::kOutput, fmt::format("{}: cannot write: {}", path, std::strerror(code))};
   }
 }
 

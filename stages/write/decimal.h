@@ -1,4 +1,5 @@
-// stages/write/decimal.h: whole numbers of a decimal fraction as text (nanometres as millimetres), exactly, fast, without locale.
+// stages/write/decimal.h: whole numbers of a decimal fraction as text (nanometres as millimetres), exactly, fast, without
+// locale.
 #pragma once
 
 #include <cstdint>

@@ -23,8 +23,8 @@ struct SliceHead {
   std::vector<std::string> parts;  // names, one for each body
   Box bounds;                      // nm on the bed, around all that is sliced
   std::uint32_t layers = 0;
-  Nm first_bottom = 0;             // nm, bottom of the first layer that is written
-  std::string program;             // "lamina 0.1.0"
+  Nm first_bottom = 0;  // nm, bottom of the first layer that is written
+  std::string program;  // "lamina 0.1.0"
 };
 
 /// One layer. The contours of body b are [body[b], body[b + 1]).

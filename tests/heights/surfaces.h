@@ -28,7 +28,8 @@ inline ThicknessSet range_of(double low, double high, double step) {
   return set;
 }
 
-/// A profile in x and z (mm), 10 mm deep, its outside on the right of its way (x right, z up). Layers look at slopes and heights only, so it need not be closed.
+/// A profile in x and z (mm), 10 mm deep, its outside on the right of its way (x right, z up). Layers look at slopes and
+/// heights only, so it need not be closed.
 inline Mesh strip(const std::vector<std::pair<double, double>>& profile) {
   Mesh mesh;
   for (std::size_t i = 0; i + 1 < profile.size(); ++i) {
@@ -67,9 +68,7 @@ inline SurfaceIndex index_of_file(const std::string& path, const SurfaceOptions&
   return index_surface(kept(std::move(part->meshes)), instances, parts, 1, options);
 }
 
-inline std::string reference(const std::string& name) {
-  return std::string(LAMINA_TEST_DIR) + "/reference/lima2009/" + name;
-}
+inline std::string reference(const std::string& name) { return std::string(LAMINA_TEST_DIR) + "/reference/lima2009/" + name; }
 
 /// A real part, or "" where the folder of models is not given.
 inline std::string model(const std::string& name) {

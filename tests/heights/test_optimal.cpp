@@ -34,7 +34,9 @@ class Enumeration {
   Enumeration(const SurfaceIndex& index, const Options& options, std::int64_t hit, bool measure = false)
       : index_(index), options_(options), top_(index.top), hit_(hit), measure_(measure) {
     for (const PartSurface& part : index.parts) {
-      for_each_slope(index, part, 0, 1, [&](Nm lo, Nm hi, Steepness steepness, double) { facets_.push_back({lo, hi, steepness}); });
+      for_each_slope(index, part, 0, 1, [&](Nm lo, Nm hi, Steepness steepness, double) {
+        facets_.push_back({lo, hi, steepness});
+      });
     }
     if (options.flats) {
       for (const Flat& flat : find_flats(index, options.surface.flat_tolerance, options.least_flat_mm2)) {
@@ -107,8 +109,8 @@ Verdict verdict_of(const SurfaceIndex& index, const Plan& plan, const Options& o
   verdict.cost = plan.table.size();
   if (!options.flats) return verdict;
   for (const Flat& flat : find_flats(index, options.surface.flat_tolerance, options.least_flat_mm2)) {
-    const std::int64_t miss = flat.height == index.top ? std::abs(boundaries.back() - index.top)
-                                                       : distance_to_nearest(boundaries, flat.height);
+    const std::int64_t miss =
+        flat.height == index.top ? std::abs(boundaries.back() - index.top) : distance_to_nearest(boundaries, flat.height);
     if (miss <= hit) continue;
     verdict.largest_miss = std::max(verdict.largest_miss, miss);
     verdict.missed += miss;
@@ -211,7 +213,7 @@ TEST(OptimalHeights, ThicknessesWithoutACommonStepAreTriedAtEveryHeightTheyReach
   const Result<Plan> plan = plan_heights(index, options);
   ASSERT_TRUE(plan.ok());
   EXPECT_LE(std::abs(plan->table.top() - 40'000'000), 1000);  // 3 of 333333 are nearly 5 of 200000
-  EXPECT_EQ(plan->table.size(), 120u);  // 40 nm short
+  EXPECT_EQ(plan->table.size(), 120u);                        // 40 nm short
 }
 
 TEST(OptimalHeights, LeastTimeWeighsLayersByTheirSection) {
@@ -321,7 +323,8 @@ TEST(OptimalHeights, OfAllTablesOfTheFewestLayersTheOneFoundHasTheLeastMeanStep)
     ASSERT_EQ(verdict_of(index, *plan, options, hit), all.best()) << "round " << round;
     choices += all.best().largest_miss == 0 && options.set.size() > 1;
     EXPECT_NEAR(evaluate(index, boundaries_of(plan->table), options).mean_cusp, all.least_mean_cusp(),
-                1e-6 * all.least_mean_cusp()) << "round " << round;
+                1e-6 * all.least_mean_cusp())
+        << "round " << round;
   }
   EXPECT_GT(choices, 40);
 }

@@ -60,8 +60,8 @@ TEST(HeightSurface, EveryLayerSeesExactlyTheFacetsThatReachIntoIt) {
       if (length == 0 || (hi - lo <= options.surface.flat_tolerance && std::abs(nz) >= 0.999 * length)) continue;
       area += length / 2;
       for (std::size_t i = 0; i + 1 < boundaries.size(); ++i) {
-        const double shared = static_cast<double>(std::min<std::int64_t>(hi, boundaries[i + 1]) -
-                                                  std::max<std::int64_t>(lo, boundaries[i]));
+        const double shared =
+            static_cast<double>(std::min<std::int64_t>(hi, boundaries[i + 1]) - std::max<std::int64_t>(lo, boundaries[i]));
         if (shared <= 0) continue;
         flattest[i] = std::max(flattest[i], std::abs(nz) / length);
         steps += static_cast<double>(boundaries[i + 1] - boundaries[i]) * std::abs(nz) / 2 * shared / (double(hi) - lo);
@@ -189,8 +189,9 @@ TEST(Thicknesses, SetsAndRangesAreReadStrictly) {
   EXPECT_EQ(read("0.05..0.3").size(), 251u);
   EXPECT_EQ(read("0.05..0.05:0.1"), std::vector<Nm>{50'000});
   EXPECT_EQ(read("0.1"), (std::vector<Nm>{100'000}));
-  for (const char* wrong : {"", ",", "0.1,", "0.1,0.1", "-0.1,0.2", "0", "nan", "0.3..0.1", "0.1..", "..0.3", "0.1..0.3:0",
-                            "0.1..0.3:-1", "0.1..0.3:x", "0.05..0.3:0.1", "0.05..0.12:0.05", "0.0254..0.3", "0.001..1000:0.000001", "0.1...0.3"}) {
+  for (const char* wrong :
+       {"", ",", "0.1,", "0.1,0.1", "-0.1,0.2", "0", "nan", "0.3..0.1", "0.1..", "..0.3", "0.1..0.3:0", "0.1..0.3:-1",
+        "0.1..0.3:x", "0.05..0.3:0.1", "0.05..0.12:0.05", "0.0254..0.3", "0.001..1000:0.000001", "0.1...0.3"}) {
     EXPECT_TRUE(read(wrong).empty()) << wrong;
   }
 }

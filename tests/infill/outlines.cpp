@@ -14,7 +14,8 @@ namespace lamina::test {
 Contours contours_of(std::initializer_list<std::vector<std::array<double, 2>>> all) {
   Contours out;
   for (const auto& one : all) {
-    for (const auto& [x, y] : one) out.point.push_back({static_cast<Nm>(std::llround(x * kMm)), static_cast<Nm>(std::llround(y * kMm))});
+    for (const auto& [x, y] : one)
+      out.point.push_back({static_cast<Nm>(std::llround(x * kMm)), static_cast<Nm>(std::llround(y * kMm))});
     out.close();
   }
   return out;

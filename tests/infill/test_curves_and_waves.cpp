@@ -5,10 +5,10 @@
 #include <map>
 #include <random>
 
-#include "tests/infill/outlines.h"
-#include "tests/slice/contour_laws.h"
 #include "stages/infill/layout.h"
 #include "stages/infill/waves.h"
+#include "tests/infill/outlines.h"
+#include "tests/slice/contour_laws.h"
 
 namespace lamina::test {
 namespace {
@@ -67,7 +67,8 @@ TEST(CurvesAndWaves, OneListOfDistancesPlacesLinesWavesAndCurves) {
     const auto of_lines = distances_of(places_of(parameters, layer)), of_curves = distances_of(depths_of(parameters, layer));
     ASSERT_GT(of_curves.size(), 5u);
     ASSERT_GE(of_lines.size(), of_curves.size());
-    for (std::size_t i = 0; i < of_curves.size(); ++i) ASSERT_EQ(of_curves[i], of_lines[i]) << "turn " << turn << ", curve " << i;
+    for (std::size_t i = 0; i < of_curves.size(); ++i)
+      ASSERT_EQ(of_curves[i], of_lines[i]) << "turn " << turn << ", curve " << i;
     parameters.pattern = Pattern::kHoneycomb;
     parameters.cell = pick(1'500'000, 3'000'000);
     const auto troughs = troughs_of(parameters, layer);
@@ -77,7 +78,8 @@ TEST(CurvesAndWaves, OneListOfDistancesPlacesLinesWavesAndCurves) {
       const auto& [next, above] = *std::next(it);
       if (line < 0 || next != line + 1) continue;
       ++compared;
-      ASSERT_EQ(above - at - infill::wave_height(parameters), of_lines[static_cast<std::size_t>(line)]) << "turn " << turn << ", wave " << line;
+      ASSERT_EQ(above - at - infill::wave_height(parameters), of_lines[static_cast<std::size_t>(line)])
+          << "turn " << turn << ", wave " << line;
     }
     EXPECT_GT(compared, 1u) << "turn " << turn;
   }
@@ -146,7 +148,8 @@ TEST(CurvesAndWaves, ConcentricCurvesLieAtTheirDistance) {
     Nm lowest = INT32_MAX;
     for (const Point2 at : paths.view()[p]) lowest = std::min(lowest, at.x);
     EXPECT_EQ(lowest, 600'000 + static_cast<Nm>(p - 1) * 500'000);
-    for (std::uint32_t i = paths.offset[p]; i < paths.offset[p + 1]; ++i) ASSERT_EQ(paths.line[i], static_cast<std::int32_t>(p - 1));
+    for (std::uint32_t i = paths.offset[p]; i < paths.offset[p + 1]; ++i)
+      ASSERT_EQ(paths.line[i], static_cast<std::int32_t>(p - 1));
   }
   EXPECT_EQ(paths.size(), 1u + 19u);
 }
@@ -162,7 +165,8 @@ TEST(CurvesAndWaves, ClosedCurvesAreNumberedFromTheSurfaceInwardsAndThoseOfOneDe
       parameters.stagger_every_layer = true;
       const FillContext context = context_of(outline.contours, layer);
       const Toolpaths paths = filled(outline.contours, context, parameters);
-      const auto places = infill::place_inwards(*infill::fill_region(outline.contours, context, parameters), context, parameters);
+      const auto places =
+          infill::place_inwards(*infill::fill_region(outline.contours, context, parameters), context, parameters);
       ASSERT_TRUE(places.ok());
       std::int32_t before = INT32_MIN;
       for (std::uint32_t p = 0; p < paths.size(); ++p) {

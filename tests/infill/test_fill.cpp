@@ -19,7 +19,8 @@ using infill::Pattern;
 bool stays_inside(const ContoursView& region, Point2 a, Point2 b, double slack) {
   constexpr int kSteps = 7;
   for (int k = 0; k <= kSteps; ++k) {
-    const double x = a.x + (static_cast<double>(b.x) - a.x) * k / kSteps, y = a.y + (static_cast<double>(b.y) - a.y) * k / kSteps;
+    const double x = a.x + (static_cast<double>(b.x) - a.x) * k / kSteps,
+                 y = a.y + (static_cast<double>(b.y) - a.y) * k / kSteps;
     if (winding_about(region, {static_cast<Nm>(std::llround(x)), static_cast<Nm>(std::llround(y))}) != 0) continue;
     if (distance_to(region, x, y) > slack) return false;
   }
@@ -29,7 +30,8 @@ bool stays_inside(const ContoursView& region, Point2 a, Point2 b, double slack) 
 TEST(Fill, NoBeadCentreLeavesItsRegionWhateverOutlinePatternAngleAndGap) {
   std::size_t stretches = 0;
   for (const Outline& outline : outlines()) {
-    for (const Pattern pattern : {Pattern::kRaster, Pattern::kContour, Pattern::kContourRaster, Pattern::kHoneycomb, Pattern::kQuatrefoil}) {
+    for (const Pattern pattern :
+         {Pattern::kRaster, Pattern::kContour, Pattern::kContourRaster, Pattern::kHoneycomb, Pattern::kQuatrefoil}) {
       for (const infill::MicroDegrees angle : {0, 90'000'000, 45'000'000, 12'345'678, 270'000'000, 211'000'000}) {
         for (const Nm gap : {-100'000, 0, 300'000}) {
           FillParameters parameters;
@@ -55,7 +57,8 @@ TEST(Fill, NoBeadCentreLeavesItsRegionWhateverOutlinePatternAngleAndGap) {
             const ContoursView within = wall ? ContoursView(outline.contours) : ContoursView(*region);
             // Looking is slow: some hundred stretches of each filling, others each time.
             const auto step = static_cast<std::uint32_t>(1 + paths.point.size() * within.point.size() / 10'000);
-            for (std::uint32_t i = paths.offset[p] + static_cast<std::uint32_t>(stretches % step); i + 1 < paths.offset[p + 1]; i += step) {
+            for (std::uint32_t i = paths.offset[p] + static_cast<std::uint32_t>(stretches % step); i + 1 < paths.offset[p + 1];
+                 i += step) {
               ++stretches;
               ASSERT_TRUE(stays_inside(within, paths.point[i], paths.point[i + 1], 3))
                   << outline.name << ", pattern " << static_cast<int>(pattern) << ", angle " << angle << ", gap " << gap
@@ -101,7 +104,8 @@ TEST(Fill, SameBytesFromAnyThreadInAnyOrder) {
   tbb::parallel_for(0u, 24u, [&](std::uint32_t i) { many[23 - i] = filled(knot, context_of(knot, 23 - i), parameters); });
   for (std::uint32_t layer = 0; layer < 24; ++layer) {
     EXPECT_TRUE(once[layer].point == many[layer].point && once[layer].offset == many[layer].offset &&
-                once[layer].kind == many[layer].kind && once[layer].line == many[layer].line) << layer;
+                once[layer].kind == many[layer].kind && once[layer].line == many[layer].line)
+        << layer;
   }
 }
 

@@ -20,7 +20,8 @@ void add_curve(std::mt19937& random, Point2 centre, double radius, double noise,
   double angle = 0;
   while (angle < 2 * std::numbers::pi - 1e-3) {
     const double r = radius * between(1 - noise, 1 + noise);
-    points.push_back({static_cast<Nm>(centre.x + std::lround(r * std::cos(angle))), static_cast<Nm>(centre.y + std::lround(r * std::sin(angle)))});
+    points.push_back({static_cast<Nm>(centre.x + std::lround(r * std::cos(angle))),
+                      static_cast<Nm>(centre.y + std::lround(r * std::sin(angle)))});
     angle += 2 * std::numbers::pi / corners * std::pow(10, between(-2, 0.5));
   }
   if (hole) std::ranges::reverse(points);

@@ -14,7 +14,8 @@ using infill::FillParameters;
 using infill::Pattern;
 
 TEST(RasterPlaces, RasterLinesLieExactlyAtTheirDistance) {
-  for (const auto& [angle, axis] : {std::pair<infill::MicroDegrees, int>{0, 0}, {90'000'000, 1}, {180'000'000, 0}, {270'000'000, 1}}) {
+  for (const auto& [angle, axis] :
+       {std::pair<infill::MicroDegrees, int>{0, 0}, {90'000'000, 1}, {180'000'000, 0}, {270'000'000, 1}}) {
     FillParameters parameters;
     parameters.angle_base = angle;
     parameters.gaps = {123'457};
@@ -62,10 +63,12 @@ TEST(RasterPlaces, StaggerComesWithEveryReturnOfTheAngleAndBuildLayersKeepIt) {
     EXPECT_EQ(infill::layer_stagger(parameters, layer), parameters.stagger[layer / 6 % 3]);
   }
   parameters.stagger_every_layer = true;
-  for (std::uint32_t layer = 0; layer < 9; ++layer) EXPECT_EQ(infill::layer_stagger(parameters, layer), parameters.stagger[layer % 3]);
+  for (std::uint32_t layer = 0; layer < 9; ++layer)
+    EXPECT_EQ(infill::layer_stagger(parameters, layer), parameters.stagger[layer % 3]);
   // 45, 135, 225, 315 degrees: Lima 2009, Appendix B.
   parameters = FillParameters();
-  for (std::uint32_t layer = 0; layer < 58; ++layer) EXPECT_EQ(infill::layer_angle(parameters, layer), 45'000'000 + layer % 4 * 90'000'000ll);
+  for (std::uint32_t layer = 0; layer < 58; ++layer)
+    EXPECT_EQ(infill::layer_angle(parameters, layer), 45'000'000 + layer % 4 * 90'000'000ll);
 }
 
 TEST(RasterPlaces, GroupsAlternatingGapsAndDistancesAreAsDefined) {

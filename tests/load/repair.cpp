@@ -280,9 +280,8 @@ TEST(Repair, OpeningsThatTouchInAVertexStayApart) {
 }
 
 TEST(Repair, IsTheSameForOneAndEightThreads) {
-  for (const char* file :
-       {"broken/nist_holes_3pct.stl", "broken/nist_flipped_20pct.stl", "broken/nist_unwelded_1um.stl",
-        "broken/extra_surface.stl", "broken/nut_ascii_upper_crlf_tabs.stl", "quad_knot.obj"}) {
+  for (const char* file : {"broken/nist_holes_3pct.stl", "broken/nist_flipped_20pct.stl", "broken/nist_unwelded_1um.stl",
+                           "broken/extra_surface.stl", "broken/nut_ascii_upper_crlf_tabs.stl", "quad_knot.obj"}) {
     std::vector<Buffer<Triangle>> results;
     for (const std::size_t threads : {1u, 2u, 8u}) {
       const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);

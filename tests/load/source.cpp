@@ -88,24 +88,12 @@ std::string mutated(std::string bytes, std::mt19937& random) {
     const std::size_t at = random() % bytes.size();
     const std::size_t length = std::min<std::size_t>(bytes.size() - at, 1 + random() % 12);
     switch (random() % 6) {
-      case 0:
-        bytes[at] = static_cast<char>(random());
-        break;
-      case 1:
-        bytes[at] ^= static_cast<char>(1 << random() % 8);
-        break;
-      case 2:
-        bytes.erase(at, length);
-        break;
-      case 3:
-        bytes.insert(at, bytes.substr(at, length));
-        break;
-      case 4:
-        bytes.replace(at, length, std::string(length, "09-.e/\n\\ \xff"[random() % 10]));
-        break;
-      default:
-        bytes.resize(at);
-        break;
+      case 0: bytes[at] = static_cast<char>(random()); break;
+      case 1: bytes[at] ^= static_cast<char>(1 << random() % 8); break;
+      case 2: bytes.erase(at, length); break;
+      case 3: bytes.insert(at, bytes.substr(at, length)); break;
+      case 4: bytes.replace(at, length, std::string(length, "09-.e/\n\\ \xff"[random() % 10])); break;
+      default: bytes.resize(at); break;
     }
   }
   return bytes;
@@ -116,8 +104,8 @@ class Mutations : public ::testing::TestWithParam<std::pair<const char*, int>> {
 TEST_P(Mutations, EndInAPartOrInALine) {
   const auto [kind, count] = GetParam();
   const std::string name = kind;
-  const std::string model_3mf = model(
-      box_object(1, 10, 20, 30) + components(2, component(1) + component(1, "1 0 0 0 1 0 0 0 1 20 0 0")), item(2));
+  const std::string model_3mf =
+      model(box_object(1, 10, 20, 30) + components(2, component(1) + component(1, "1 0 0 0 1 0 0 0 1 20 0 0")), item(2));
   const std::string whole = name == "binary.stl"  ? binary_stl(unit_box())
                             : name == "ascii.stl" ? ascii_stl(unit_box())
                             : name == "box.obj"   ? box_obj()
@@ -146,8 +134,8 @@ TEST_P(Mutations, EndInAPartOrInALine) {
 
 INSTANTIATE_TEST_SUITE_P(Every, Mutations,
                          ::testing::Values(std::pair{"binary.stl", 1500}, std::pair{"ascii.stl", 1500},
-                                           std::pair{"box.obj", 1500}, std::pair{"box.gz", 1000},
-                                           std::pair{"model.3mf", 1500}, std::pair{"package.3mf", 1000}),
+                                           std::pair{"box.obj", 1500}, std::pair{"box.gz", 1000}, std::pair{"model.3mf", 1500},
+                                           std::pair{"package.3mf", 1000}),
                          [](const auto& one) {
                            std::string name = one.param.first;
                            std::replace(name.begin(), name.end(), '.', '_');

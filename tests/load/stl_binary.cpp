@@ -43,8 +43,7 @@ TEST(ReadBinaryStl, VerticesAreRoundedLikeLlroundForEveryKindOfFloat) {
     std::memcpy(got.data(), &part.meshes[0].triangles[i], 36);
     for (std::size_t k = 0; k < 9; ++k)
       ASSERT_EQ(got[k], std::llround(static_cast<double>(facets[i][k]) * 1e6)) << facets[i][k];
-    for (const Point3& p :
-         {part.meshes[0].triangles[i].a, part.meshes[0].triangles[i].b, part.meshes[0].triangles[i].c})
+    for (const Point3& p : {part.meshes[0].triangles[i].a, part.meshes[0].triangles[i].b, part.meshes[0].triangles[i].c})
       bounds.add(p);
   }
   EXPECT_EQ(part.bounds.lo, bounds.lo);
@@ -65,8 +64,7 @@ TEST(ReadBinaryStl, BoundsAreExactForEveryNumberOfFacets) {
   options.repair = false;
   for (const std::size_t count : {1, 2, 3, 4, 5, 7, 255, 256, 257, 259, 511, 512, 513, 530}) {
     const Part part =
-        loaded(write_file("n.stl", binary_stl({facets.begin(), facets.begin() + static_cast<std::ptrdiff_t>(count)})),
-               options);
+        loaded(write_file("n.stl", binary_stl({facets.begin(), facets.begin() + static_cast<std::ptrdiff_t>(count)})), options);
     Box bounds;
     for (const Triangle& t : part.meshes[0].triangles) bounds.add(t.a), bounds.add(t.b), bounds.add(t.c);
     EXPECT_EQ(part.bounds.lo, bounds.lo) << count;

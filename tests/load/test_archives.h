@@ -37,8 +37,8 @@ inline std::string zip(const std::vector<std::pair<std::string, std::string>>& e
   std::string file, directory;
   for (const auto& [name, bytes] : entries) {
     const std::string packed = deflated(bytes, -MAX_WBITS);
-    const auto crc = static_cast<std::uint32_t>(
-        crc32(0, reinterpret_cast<const Bytef*>(bytes.data()), static_cast<uInt>(bytes.size())));
+    const auto crc =
+        static_cast<std::uint32_t>(crc32(0, reinterpret_cast<const Bytef*>(bytes.data()), static_cast<uInt>(bytes.size())));
     const std::string common = little(20, 2) + little(flags, 2) + little(8, 2) + little(0, 4) + little(crc, 4) +
                                little(static_cast<std::uint32_t>(packed.size()), 4) +
                                little(static_cast<std::uint32_t>(bytes.size()), 4) +
@@ -67,11 +67,10 @@ inline std::vector<std::pair<std::string, std::string>> package(const std::strin
           {"3D/3dmodel.model", model}};
 }
 
-inline std::string model(const std::string& resources, const std::string& build,
-                         const std::string& unit = "millimeter") {
+inline std::string model(const std::string& resources, const std::string& build, const std::string& unit = "millimeter") {
   return "<?xml version=\"1.0\" encoding=\"UTF-8\"?><model unit=\"" + unit +
-         "\" xml:lang=\"en-US\" xmlns=\"http://schemas.microsoft.com/3dmanufacturing/core/2015/02\"><resources>" +
-         resources + "</resources><build>" + build + "</build></model>";
+         "\" xml:lang=\"en-US\" xmlns=\"http://schemas.microsoft.com/3dmanufacturing/core/2015/02\"><resources>" + resources +
+         "</resources><build>" + build + "</build></model>";
 }
 
 /// An object whose mesh is a box from the origin.
@@ -87,13 +86,12 @@ inline std::string box_object(int id, int x, int y, int z, const std::string& at
 }
 
 inline std::string item(int id, const std::string& transform = "") {
-  return "<item objectid=\"" + std::to_string(id) + "\"" +
-         (transform.empty() ? "" : " transform=\"" + transform + "\"") + "/>";
+  return "<item objectid=\"" + std::to_string(id) + "\"" + (transform.empty() ? "" : " transform=\"" + transform + "\"") + "/>";
 }
 
 inline std::string component(int id, const std::string& transform = "") {
-  return "<component objectid=\"" + std::to_string(id) + "\"" +
-         (transform.empty() ? "" : " transform=\"" + transform + "\"") + "/>";
+  return "<component objectid=\"" + std::to_string(id) + "\"" + (transform.empty() ? "" : " transform=\"" + transform + "\"") +
+         "/>";
 }
 
 inline std::string components(int id, const std::string& inner) {

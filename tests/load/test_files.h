@@ -93,8 +93,7 @@ inline std::string binary_stl(const std::vector<FloatTriangle>& facets, std::str
   const auto number = static_cast<std::uint32_t>(count < 0 ? static_cast<std::int64_t>(facets.size()) : count);
   std::string bytes = header + std::string(reinterpret_cast<const char*>(&number), 4);
   for (const FloatTriangle& facet : facets)
-    bytes +=
-        std::string(12, '\0') + std::string(reinterpret_cast<const char*>(facet.data()), 36) + std::string(2, '\0');
+    bytes += std::string(12, '\0') + std::string(reinterpret_cast<const char*>(facet.data()), 36) + std::string(2, '\0');
   return bytes;
 }
 
@@ -105,8 +104,7 @@ inline std::string ascii_stl(const std::vector<FloatTriangle>& facets, const std
   text << "solid " << name << line_end;
   for (const FloatTriangle& f : facets) {
     text << "  facet normal 0 0 0" << line_end << "    outer loop" << line_end;
-    for (std::size_t k = 0; k < 9; k += 3)
-      text << "      vertex " << f[k] << ' ' << f[k + 1] << ' ' << f[k + 2] << line_end;
+    for (std::size_t k = 0; k < 9; k += 3) text << "      vertex " << f[k] << ' ' << f[k + 1] << ' ' << f[k + 2] << line_end;
     text << "    endloop" << line_end << "  endfacet" << line_end;
   }
   text << "endsolid " << name << line_end;

@@ -133,8 +133,7 @@ TEST(ReadObj, EveryDialectIsTheSameSurface) {
   EXPECT_EQ(clean.size(), 12u);
   EXPECT_EQ(placed(loaded(write_file("b.obj", replaced(text, "\n", "\r\n")))), clean);
   EXPECT_EQ(placed(loaded(write_file("b.obj", replaced(text, "\n", "\r")))), clean);
-  EXPECT_EQ(placed(loaded(write_file("b.obj", "\xef\xbb\xbf# box\nmtllib a.mtl\no box\ng all\ns off\n" + text))),
-            clean);
+  EXPECT_EQ(placed(loaded(write_file("b.obj", "\xef\xbb\xbf# box\nmtllib a.mtl\no box\ng all\ns off\n" + text))), clean);
   EXPECT_EQ(placed(loaded(write_file("b.obj", "# C:\\parts\\\n" + text))), clean) << "a remark does not go on";
   EXPECT_EQ(placed(loaded(write_file("b.obj", replaced(text, "f 1 4 3 2", "f 1 4 \\\n 3 2")))), clean);
   EXPECT_EQ(placed(loaded(write_file("b.obj", replaced(text, "f 1 4 3 2", "f 1 4 \\\r\n 3 2")))), clean);
@@ -142,8 +141,7 @@ TEST(ReadObj, EveryDialectIsTheSameSurface) {
   EXPECT_EQ(placed(loaded(write_file("b.obj", replaced(text, "f 1 4 3 2", "f 1//1 4//1 3//1 2//1")))), clean);
   EXPECT_EQ(placed(loaded(write_file("b.obj", replaced(text, "f 1 4 3 2", "f 1/1/1 4/2/1 3/3/1 2/4/1")))), clean);
   EXPECT_EQ(placed(loaded(write_file("b.obj", replaced(text, "f 1 4 3 2", "f -8 -5 -6 -7")))), clean);
-  EXPECT_EQ(placed(loaded(write_file("b.obj", replaced(text, "v 0 0 0\n", "v 0 0 0 0.5 0.25 1\n")))), clean)
-      << "colours";
+  EXPECT_EQ(placed(loaded(write_file("b.obj", replaced(text, "v 0 0 0\n", "v 0 0 0 0.5 0.25 1\n")))), clean) << "colours";
   EXPECT_EQ(placed(loaded(write_file("b.obj", replaced(text, "v 0 0 0\n", "v +0 -0.0 0e0 1.0\n")))), clean) << "weight";
   EXPECT_EQ(placed(loaded(write_file("b.txt", text))), clean);
   const std::size_t faces = text.find("f 1");

@@ -70,14 +70,13 @@ TEST(Read3mf, MirroredItemsKeepTheirInsideInside) {
   // Mirrored twice, by the item and by the job, it is as it was.
   load::LoadOptions options;
   options.transform = load::make_transform({-1, 1, 1}, {0, 0, 0}, {1, 1, 1});
-  EXPECT_NEAR(
-      volume(placed(loaded(write_3mf(box_object(1, 10, 20, 30), item(1, "-1 0 0 0 1 0 0 0 1 0 0 0")), options))), 6000,
-      1e-6);
+  EXPECT_NEAR(volume(placed(loaded(write_3mf(box_object(1, 10, 20, 30), item(1, "-1 0 0 0 1 0 0 0 1 0 0 0")), options))), 6000,
+              1e-6);
 }
 
 TEST(Read3mf, CopiesShareAMeshAndStandWhereTheyShould) {
-  const Part part = loaded(write_3mf(
-      box_object(1, 10, 20, 30), item(1) + item(1, "1 0 0 0 1 0 0 0 1 40 0 0") + item(1, "0 1 0 -1 0 0 0 0 1 0 50 0")));
+  const Part part = loaded(write_3mf(box_object(1, 10, 20, 30),
+                                     item(1) + item(1, "1 0 0 0 1 0 0 0 1 40 0 0") + item(1, "0 1 0 -1 0 0 0 0 1 0 50 0")));
   EXPECT_EQ(part.meshes.size(), 2u) << "the turned one has its own";
   ASSERT_EQ(part.instances.size(), 3u);
   EXPECT_EQ(part.bounds.hi.x, 50'000'000);
@@ -92,8 +91,7 @@ TEST(Read3mf, SharedMeshesEqualSnappingEachVertexWhereItStands) {
   for (const double x : {0.0, 0.33333334, 100.7}) {
     load::LoadOptions options;
     options.transform.translation = {x, x > 100 ? 50.1 : 0.0, 0};
-    for (const Triangle& t : placed(loaded(write_3mf(box_object(1, 10, 20, 30), item(1)), options)))
-      expected.push_back(t);
+    for (const Triangle& t : placed(loaded(write_3mf(box_object(1, 10, 20, 30), item(1)), options))) expected.push_back(t);
   }
   Buffer<Triangle> all(expected.begin(), expected.end());
   EXPECT_EQ(placed(part), canonical(all));
@@ -124,8 +122,7 @@ TEST(Read3mf, ComponentsThatExpandToBillionsAreRefusedBeforeTheyDo) {
   std::string resources = box_object(1, 10, 20, 30);
   for (int id = 2; id < 42; ++id) resources += components(id, component(id - 1) + component(id - 1));
   EXPECT_CONTAINS(refusal(write_3mf(resources, item(41))), "components expand to more triangles than the limit");
-  EXPECT_CONTAINS(refusal(write_3mf(resources, item(1))), "components expand to more than 1048576 objects")
-      << "unused ones";
+  EXPECT_CONTAINS(refusal(write_3mf(resources, item(1))), "components expand to more than 1048576 objects") << "unused ones";
   std::string empty = "<object id=\"1\" type=\"model\"><mesh><vertices/><triangles/></mesh></object>";
   for (int id = 2; id < 42; ++id) empty += components(id, component(id - 1) + component(id - 1));
   EXPECT_CONTAINS(refusal(write_3mf(empty, item(41))), "components expand to more than 1048576 objects");
@@ -139,8 +136,8 @@ TEST(Read3mf, ComponentsThatExpandToBillionsAreFoundHoweverTheyAreWritten) {
     std::string resources = box_object(1, 10, 20, 30);
     for (int id = 2; id < levels; ++id) {
       const std::string part = fmt::format("<component objectid=\"{}{}\"/>", id % 2 ? "0" : "", id - 1);
-      resources += fmt::format("<object {}id=\"{}\"{} type=\"model\"><components>{}{}</components></object>", before_id,
-                               id, behind_id, part, part);
+      resources += fmt::format("<object {}id=\"{}\"{} type=\"model\"><components>{}{}</components></object>", before_id, id,
+                               behind_id, part, part);
     }
     return resources;
   };
@@ -171,8 +168,9 @@ TEST(Read3mf, ComponentsThatExpandToBillionsAreFoundHoweverTheyAreWritten) {
     EXPECT_CONTAINS(refusal(write_file("named.3mf", zip(entries))), why) << name;
   }
   // A path that leads to a small object of that id, for readers that know paths, and to a large one for others.
-  auto entries = package(model(doubled("", " ", 42), "<item objectid=\"41\" p:path=\"/3D/other.model\" "
-                                                    "xmlns:p=\"http://schemas.microsoft.com/3dmanufacturing/production/2015/06\"/>"));
+  auto entries = package(model(doubled("", " ", 42),
+                               "<item objectid=\"41\" p:path=\"/3D/other.model\" "
+                               "xmlns:p=\"http://schemas.microsoft.com/3dmanufacturing/production/2015/06\"/>"));
   entries.push_back({"3D/other.model", model(box_object(41, 1, 1, 1), "")});
   EXPECT_CONTAINS(refusal(write_file("path.3mf", zip(entries))), why);
 }
@@ -192,8 +190,7 @@ TEST(Read3mf, ModelsThatCannotBeScannedAreRefused) {
 
 TEST(Read3mf, ComponentsThatContainThemselvesAreRefused) {
   EXPECT_CONTAINS(refusal(write_3mf(box_object(1, 1, 1, 1) + components(2, component(2)), item(2))), "contains itself");
-  EXPECT_CONTAINS(refusal(write_3mf(components(2, component(3)) + components(3, component(2)), item(2))),
-                  "contains itself");
+  EXPECT_CONTAINS(refusal(write_3mf(components(2, component(3)) + components(3, component(2)), item(2))), "contains itself");
 }
 
 TEST(Read3mf, SupportsAndOtherItemsAreNoted) {
@@ -222,14 +219,12 @@ TEST(Read3mf, BombsAreRefusedBeforeTheyAreRead) {
   EXPECT_CONTAINS(refusal(write_file("bomb.3mf", zip(entries))), "expands more than 200-fold");
   load::LoadOptions options;
   options.expanded_limit = 100;
-  EXPECT_CONTAINS(refusal(write_3mf(box_object(1, 1, 1, 1), item(1)), options),
-                  "expands to more than the limit of 100 bytes");
+  EXPECT_CONTAINS(refusal(write_3mf(box_object(1, 1, 1, 1), item(1)), options), "expands to more than the limit of 100 bytes");
 }
 
 TEST(Read3mf, NumbersMeanWhatTheyMeanInOtherTextFormats) {
   std::string resources = box_object(1, 1, 1, 30);
-  for (std::size_t at = 0; (at = resources.find("z=\"30\"", at)) != resources.npos;)
-    resources.replace(at, 6, "z=\"0.03\"");
+  for (std::size_t at = 0; (at = resources.find("z=\"30\"", at)) != resources.npos;) resources.replace(at, 6, "z=\"0.03\"");
   for (const char* unit : {"meter", "inch", "millimeter"}) {
     const Part part = loaded(write_3mf(resources, item(1, "1 0 0 0 1 0 0 0 1 0.1 0.2 0.7"), unit));
     const double mm_of_unit = unit[1] == 'e' ? 1000 : unit[1] == 'n' ? 25.4 : 1;

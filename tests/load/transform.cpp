@@ -23,8 +23,7 @@ TEST(Transform, QuarterTurnsAreExact) {
   EXPECT_EQ(about_z.linear, (std::array<double, 9>{0, -1, 0, 1, 0, 0, 0, 0, 1}));
   EXPECT_EQ(load::make_transform(kOnes, {0, 0, 450}, kOnes).linear, about_z.linear);
   EXPECT_EQ(load::make_transform(kOnes, {0, 0, -270}, kOnes).linear, about_z.linear);
-  EXPECT_EQ(load::make_transform(kOnes, {180, 0, 0}, kOnes).linear,
-            (std::array<double, 9>{1, 0, 0, 0, -1, 0, 0, 0, -1}));
+  EXPECT_EQ(load::make_transform(kOnes, {180, 0, 0}, kOnes).linear, (std::array<double, 9>{1, 0, 0, 0, -1, 0, 0, 0, -1}));
   const Box bounds = loaded_with(about_z).bounds;
   EXPECT_EQ(bounds.lo, (Point3{-20'000'000, 0, 0}));
   EXPECT_EQ(bounds.hi, (Point3{0, 10'000'000, 30'000'000}));
@@ -57,8 +56,7 @@ TEST(Transform, MirroringKeepsTheInsideInside) {
   for (const Triangle& t : part.meshes[0].triangles) {
     const auto x = [](const Point3& p) { return std::array<double, 3>{mm(p.x), mm(p.y), mm(p.z)}; };
     const auto a = x(t.a), b = x(t.b), c = x(t.c);
-    volume +=
-        a[0] * (b[1] * c[2] - b[2] * c[1]) + a[1] * (b[2] * c[0] - b[0] * c[2]) + a[2] * (b[0] * c[1] - b[1] * c[0]);
+    volume += a[0] * (b[1] * c[2] - b[2] * c[1]) + a[1] * (b[2] * c[0] - b[0] * c[2]) + a[2] * (b[0] * c[1] - b[1] * c[0]);
   }
   EXPECT_NEAR(volume / 6, 6000, 1e-6);
   EXPECT_EQ(part.bounds.lo, expected.bounds.lo);
@@ -118,8 +116,7 @@ TEST(Extent, NothingToPrintIsRefused) {
   EXPECT_CONTAINS(refusal(write_file("flat.stl", binary_stl(box_facets({0, 0, 1}, {2, 2, 1})))),
                   "has no height: nothing to print");
   EXPECT_CONTAINS(refusal(write_file("flat.stl", binary_stl(box_facets({0, 0, 0}, {2, 0, 1})))), "has no depth");
-  EXPECT_CONTAINS(refusal(write_file("line.stl", binary_stl({{0, 0, 0, 1, 1, 1, 2, 2, 2}}))),
-                  "all facets are degenerate");
+  EXPECT_CONTAINS(refusal(write_file("line.stl", binary_stl({{0, 0, 0, 1, 1, 1, 2, 2, 2}}))), "all facets are degenerate");
 }
 
 }  // namespace

@@ -18,8 +18,9 @@ std::vector<std::uint8_t> pixels_by_openimageio(const std::string& path, const R
   const OIIO::ImageSpec& spec = input->spec();
   EXPECT_EQ(static_cast<std::uint32_t>(spec.width), runs.columns);
   EXPECT_EQ(static_cast<std::uint32_t>(spec.height), runs.rows());
-  const double unit = spec.get_string_attribute("ResolutionUnit") == "m" ? 0.0254
-                      : spec.get_string_attribute("ResolutionUnit") == "cm" ? 2.54 : 1;
+  const double unit = spec.get_string_attribute("ResolutionUnit") == "m"    ? 0.0254
+                      : spec.get_string_attribute("ResolutionUnit") == "cm" ? 2.54
+                                                                            : 1;
   dpi[0] = spec.get_float_attribute("XResolution") * unit;
   dpi[1] = spec.get_float_attribute("YResolution") * unit;
   const auto channels = static_cast<std::size_t>(spec.nchannels);

@@ -40,7 +40,8 @@ Outcome run_lamina(const std::vector<std::string>& arguments, const fs::path& di
 
   const pid_t child = ::fork();
   if (child == 0) {
-    const int out_file = ::open(out.c_str(), O_WRONLY | O_CREAT, 0600), err_file = ::open(err.c_str(), O_WRONLY | O_CREAT, 0600);
+    const int out_file = ::open(out.c_str(), O_WRONLY | O_CREAT, 0600),
+              err_file = ::open(err.c_str(), O_WRONLY | O_CREAT, 0600);
     ::dup2(out_file, 1);
     ::dup2(err_file, 2);
     if (::chdir(directory.c_str()) == 0) ::execv(pointers[0], pointers.data());
@@ -61,9 +62,7 @@ std::string read_text(const fs::path& path) {
   return {std::istreambuf_iterator<char>(file), {}};
 }
 
-void write_text(const fs::path& path, std::string_view text) {
-  std::ofstream(path, std::ios::binary) << text;
-}
+void write_text(const fs::path& path, std::string_view text) { std::ofstream(path, std::ios::binary) << text; }
 
 void write_box(const fs::path& path, const std::array<float, 3>& lo, const std::array<float, 3>& hi) {
   // Corner i has bit 0 for x, bit 1 for y, bit 2 for z.

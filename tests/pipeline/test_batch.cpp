@@ -1,11 +1,11 @@
 // Many jobs in one queue: every one ends as it would alone, whatever happens to the others or to the batch.
+#include <fcntl.h>
 #include <gtest/gtest.h>
 #include <signal.h>
 #include <sys/file.h>
 #include <sys/mount.h>
 #include <sys/stat.h>
 #include <sys/wait.h>
-#include <fcntl.h>
 #include <unistd.h>
 
 #include <chrono>
@@ -46,7 +46,9 @@ class JobsInBatch : public ::testing::Test {
     return run_lamina(arguments, directory_.path(), watch);
   }
 
-  Json summary(const std::string& batch) { return Json::parse(read_text(directory_ / (batch + "/summary.json")), nullptr, false); }
+  Json summary(const std::string& batch) {
+    return Json::parse(read_text(directory_ / (batch + "/summary.json")), nullptr, false);
+  }
 
   std::vector<std::string> outcomes(const std::string& batch) {
     std::vector<std::string> names;
@@ -106,7 +108,10 @@ TEST_F(JobsInBatch, EveryFileOfTheCorpusEndsAsTheTableSaysAndAsItWouldAlone) {
     if (job["code"] != 0) continue;
     EXPECT_GT(job["result"]["layers_planned"], 0);
     if (done++ % 4 != 0) continue;
-    ASSERT_EQ(lamina({"jet", corpus / file, "--bed", "400x400", "--dpi", "60", "--layer", "1", "--quiet", "-o", "alone", "--overwrite"}).code, 0);
+    ASSERT_EQ(lamina({"jet", corpus / file, "--bed", "400x400", "--dpi", "60", "--layer", "1", "--quiet", "-o", "alone",
+                      "--overwrite"})
+                  .code,
+              0);
     EXPECT_EQ(tree_text(directory_ / "alone"), tree_text(directory_ / ("out/" + job["output"].get<std::string>()))) << file;
   }
   EXPECT_EQ(json["done"], done);
@@ -121,8 +126,9 @@ TEST_F(JobsInBatch, ListsJobFilesAndDirectoriesMakeOneQueueInOrder) {
   write_box(directory_ / "more/p.STL", {0, 0, 0}, {5, 5, 1});
   write_text(directory_ / "more/notes.txt", "no job");
   write_text(directory_ / "job.toml", "[bed]\nsize_mm=[40,40]\ndpi=100\n[[part]]\npath='part10.stl'\n");
-  write_text(directory_ / "list.txt", "# comment\n\nlamina jet part10.stl --bed 40x40 --dpi 100 -o 'own place'\ninfo part11.stl\n"
-                                      "jet part10.stl --bed 40x40 --dpi 100\njet part10.stl --bed 40x40 --dpi 100 --dry-run\n");
+  write_text(directory_ / "list.txt",
+             "# comment\n\nlamina jet part10.stl --bed 40x40 --dpi 100 -o 'own place'\ninfo part11.stl\n"
+             "jet part10.stl --bed 40x40 --dpi 100\njet part10.stl --bed 40x40 --dpi 100 --dry-run\n");
   const Outcome outcome = lamina(batch_of({"list.txt", "job.toml", "more", "part11.stl", "-o", "out"}));
   ASSERT_EQ(outcome.code, 0) << outcome.err;
   const Json json = summary("out");
@@ -132,7 +138,8 @@ TEST_F(JobsInBatch, ListsJobFilesAndDirectoriesMakeOneQueueInOrder) {
   EXPECT_EQ(json["jobs"][0]["source"], "list.txt:3");
   EXPECT_TRUE(json["jobs"][1]["result"].is_object());
   EXPECT_EQ(json["jobs"][3]["result"]["dry_run"], true);
-  for (const char* name : {"own place", "job", "deep_p"}) EXPECT_EQ(lamina({"verify", "out/" + std::string(name), "--quiet"}).code, 0) << name;
+  for (const char* name : {"own place", "job", "deep_p"})
+    EXPECT_EQ(lamina({"verify", "out/" + std::string(name), "--quiet"}).code, 0) << name;
   const std::string table = read_text(directory_ / "out/summary.tsv");
   EXPECT_EQ(std::ranges::count(table, '\n'), 9);
 }
@@ -144,10 +151,13 @@ TEST_F(JobsInBatch, WhatIsWrongWithOneJobIsOneLineAndTheRestIsUnharmed) {
   write_text(directory_ / "file", "");
   fs::create_directories(directory_ / "half");
   write_text(directory_ / "half/manifest.json.part", "{\n");  // a job that is not finished
-  write_text(directory_ / "list.txt", "jet part10.stl --bed 60x60 --dpi 0 -o a\njott part10.stl\njet --job missing.toml -o b\n"
-                                      "jet --job wrong.toml\nbatch list.txt -o x\npreview out -o x.png\njet part10.stl --help\n"
-                                      "jet part10.stl --bed 60x60 --dpi 100 -o " + directory_ / "file/deeper" + "\nverify nothing\nreport half -o page.html\n"
-                                      "jet part10.stl --bed 60x60 --dpi 100 -o good\n");
+  write_text(directory_ / "list.txt",
+             "jet part10.stl --bed 60x60 --dpi 0 -o a\njott part10.stl\njet --job missing.toml -o b\n"
+             "jet --job wrong.toml\nbatch list.txt -o x\npreview out -o x.png\njet part10.stl --help\n"
+             "jet part10.stl --bed 60x60 --dpi 100 -o " +
+                 directory_ / "file/deeper" +
+                 "\nverify nothing\nreport half -o page.html\n"
+                 "jet part10.stl --bed 60x60 --dpi 100 -o good\n");
   const Outcome outcome = lamina({"batch", "list.txt", "-o", "out"});
   EXPECT_EQ(outcome.code, 2);
   const Json json = summary("out");
@@ -161,7 +171,8 @@ TEST_F(JobsInBatch, WhatIsWrongWithOneJobIsOneLineAndTheRestIsUnharmed) {
   }
   EXPECT_EQ(lamina({"verify", "out/good"}).code, 0);
   // Each says where it is wrong and what to do.
-  EXPECT_EQ(json["jobs"][2]["reason"], "missing.toml:2: part.path: nowhere.stl: no such file; correct it (a relative path begins beside the job file)");
+  EXPECT_EQ(json["jobs"][2]["reason"],
+            "missing.toml:2: part.path: nowhere.stl: no such file; correct it (a relative path begins beside the job file)");
   EXPECT_EQ(json["jobs"][9]["reason"], "half: the job is not finished; end it with --resume, then ask for the report");
 }
 
@@ -180,14 +191,23 @@ TEST_F(JobsInBatch, WrongBatchesAreRefusedInOneLineBeforeAnythingRuns) {
   write_text(directory_ / "summary.txt", "jet part10.stl -o b/../summary.json/\n");
   write_text(directory_ / "table.txt", "jet part10.stl -o " + directory_ / "out/summary.tsv/deep/er" + "\n");
   const std::pair<Words, std::string> cases[] = {
-      {{"away.txt"}, "away.txt:2: -o leads out of out, to keep"}, {{"above.txt"}, "has to be an absolute path"},
+      {{"away.txt"}, "away.txt:2: -o leads out of out, to keep"},
+      {{"above.txt"}, "has to be an absolute path"},
       {{"record.txt"}, "record.txt:2: writes into out/batch.jsonl, which belongs to the batch"},
-      {{"summary.txt"}, "out/summary.json, which belongs"}, {{"table.txt"}, "out/summary.tsv, which belongs"},
-      {{"empty.txt"}, "no job in it"}, {{"empty"}, "no part"}, {{"quote.txt"}, "quote.txt:1: a ' is not closed"},
-      {{"same.txt"}, "same.txt:1 and same.txt:2: both write into"}, {{"nested.txt"}, "nested.txt:1 and nested.txt:3"},
-      {{"own.txt"}, "belongs to the batch"}, {{"gone.txt"}, "gone.txt: no such file or directory; name a list"}, {{}, "no jobs"},
-      {{"part10.stl", "--memory", "x"}, "--memory"}, {{"part10.stl", "--jobs", "-1"}, "--jobs"},
-      {{"part10.stl", "--time-limit", "0"}, "--time-limit"}, {{"part10.stl", "--resume", "--overwrite"}, "exclude each other"},
+      {{"summary.txt"}, "out/summary.json, which belongs"},
+      {{"table.txt"}, "out/summary.tsv, which belongs"},
+      {{"empty.txt"}, "no job in it"},
+      {{"empty"}, "no part"},
+      {{"quote.txt"}, "quote.txt:1: a ' is not closed"},
+      {{"same.txt"}, "same.txt:1 and same.txt:2: both write into"},
+      {{"nested.txt"}, "nested.txt:1 and nested.txt:3"},
+      {{"own.txt"}, "belongs to the batch"},
+      {{"gone.txt"}, "gone.txt: no such file or directory; name a list"},
+      {{}, "no jobs"},
+      {{"part10.stl", "--memory", "x"}, "--memory"},
+      {{"part10.stl", "--jobs", "-1"}, "--jobs"},
+      {{"part10.stl", "--time-limit", "0"}, "--time-limit"},
+      {{"part10.stl", "--resume", "--overwrite"}, "exclude each other"},
       {{"part10.stl", "--with", " "}, "--with"}};
   for (auto [words, said] : cases) {
     words.insert(words.end(), {"-o", "out"});
@@ -319,14 +339,16 @@ TEST_F(JobsInBatch, AFullDiskIsOneLineTheRestIsUnharmedAndWithRoomItGoesOn) {
   write_boxes(3);
   const std::string options = " --bed 60x60 --dpi 300 --layer 0.01";
   // One job's output is on the disk that gets full.
-  write_text(directory_ / "list.txt", "jet part10.stl" + options + " -o a\njet part11.stl" + options + " -o " + directory_ / "disk/b" +
-                                          "\njet part12.stl" + options + " -o c\n");
+  write_text(directory_ / "list.txt", "jet part10.stl" + options + " -o a\njet part11.stl" + options + " -o " +
+                                          directory_ / "disk/b" + "\njet part12.stl" + options + " -o c\n");
   const Outcome outcome = lamina({"batch", "list.txt", "-o", "out"});
   EXPECT_EQ(outcome.code, 4);
   Json json = summary("out");
   EXPECT_EQ(outcomes("out"), (Words{"done", "failed", "done"}));
   const std::string reason = json["jobs"][1]["reason"];
-  EXPECT_NE(reason.find("No space left on device); free some space; finished layers are kept, go on with --resume"), std::string::npos) << reason;
+  EXPECT_NE(reason.find("No space left on device); free some space; finished layers are kept, go on with --resume"),
+            std::string::npos)
+      << reason;
   EXPECT_EQ(reason.find('\n'), std::string::npos);
   EXPECT_EQ(lamina({"verify", "out/a", "out/c", "--quiet"}).code, 0);
 
@@ -347,7 +369,7 @@ TEST_F(JobsInBatch, AFullDiskIsOneLineTheRestIsUnharmedAndWithRoomItGoesOn) {
 TEST_F(JobsInBatch, ResumeDoesAgainWhatHasChangedSince) {
   write_boxes(4);
   ASSERT_EQ(lamina(batch_of({"part10.stl", "part11.stl", "part12.stl", "part13.stl", "-o", "out"})).code, 0);
-  write_box(directory_ / "part11.stl", {0, 0, 0}, {9, 3, 1});        // another part
+  write_box(directory_ / "part11.stl", {0, 0, 0}, {9, 3, 1});         // another part
   write_text(directory_ / "out/part12/layers/000003.tif", "damage");  // another layer
   fs::remove(directory_ / "out/part13/layers/000000.tif");
   const Outcome outcome = lamina(batch_of({"part10.stl", "part11.stl", "part12.stl", "part13.stl", "-o", "out", "--resume"}));
@@ -363,16 +385,17 @@ TEST_F(JobsInBatch, WithoutItsRecordABatchRecognizesWhatIsDoneAndLeavesOtherJobs
   write_boxes(6);
   const std::string options = " --bed 60x60 --dpi 300 --layer 0.1 --quiet -o ";
   const auto list = [&](const std::string& name, const std::string& fourth) {
-    write_text(directory_ / name, "jet part10.stl" + options + "a\njet part11.stl" + options + "b\njet part12.stl" + options + "c\njet " +
-                                      fourth + options + "d\nslice part14.stl --layer 0.1 --quiet -o e\ninfo part14.stl\njet part15.stl" +
-                                      options + "f\n");
+    write_text(directory_ / name,
+               "jet part10.stl" + options + "a\njet part11.stl" + options + "b\njet part12.stl" + options + "c\njet " + fourth +
+                   options + "d\nslice part14.stl --layer 0.1 --quiet -o e\ninfo part14.stl\njet part15.stl" + options + "f\n");
   };
   list("list.txt", "part13.stl");
   ASSERT_EQ(lamina({"batch", "list.txt", "-o", "whole"}).code, 0);
   // One run by hand before there was a list, one cut short, one damaged, one of another part; the record is gone.
   ASSERT_EQ(lamina({"batch", "list.txt", "-o", "out"}).code, 0);
   fs::remove_all(directory_ / "out/a");
-  ASSERT_EQ(lamina({"jet", "part10.stl", "--bed", "60x60", "--dpi", "300", "--layer", "0.1", "--quiet", "-o", "out/a"}).code, 0);
+  ASSERT_EQ(lamina({"jet", "part10.stl", "--bed", "60x60", "--dpi", "300", "--layer", "0.1", "--quiet", "-o", "out/a"}).code,
+            0);
   fs::rename(directory_ / "out/b/manifest.json", directory_ / "out/b/manifest.json.part");
   fs::remove(directory_ / "out/b/layers/000007.tif");
   write_text(directory_ / "out/c/layers/000003.tif", "damage");
@@ -384,8 +407,10 @@ TEST_F(JobsInBatch, WithoutItsRecordABatchRecognizesWhatIsDoneAndLeavesOtherJobs
   EXPECT_EQ(outcome.code, 2) << outcome.err;
   EXPECT_EQ(outcomes("out"), (Words{"kept", "done", "done", "failed", "failed", "done", "done"})) << outcome.err;
   const Json json = summary("out");
-  EXPECT_NE(json["jobs"][3]["reason"].get<std::string>().find("out/d/manifest.json: belongs to another job"), std::string::npos) << outcome.err;
-  EXPECT_NE(json["jobs"][4]["reason"].get<std::string>().find("remove out/e to have it done again"), std::string::npos) << outcome.err;
+  EXPECT_NE(json["jobs"][3]["reason"].get<std::string>().find("out/d/manifest.json: belongs to another job"), std::string::npos)
+      << outcome.err;
+  EXPECT_NE(json["jobs"][4]["reason"].get<std::string>().find("remove out/e to have it done again"), std::string::npos)
+      << outcome.err;
   EXPECT_EQ(tree_text(directory_ / "out/d"), others);
   // Asking twice does not make it the batch's own.
   const std::string slices = tree_text(directory_ / "out/e");
@@ -419,16 +444,18 @@ TEST_F(JobsInBatch, TwoBatchesInOneDirectoryAreRefused) {
 
 TEST_F(JobsInBatch, TimeLimitStopsOneJobAndFailFastAll) {
   write_boxes(2);
-  write_text(directory_ / "list.txt", "jet part10.stl --bed 60x60 --dpi 100 -o a\n"
-                                      "jet part10.stl --bed 400x400 --dpi 1200 --layer 0.0002 --format tiff-none -o long\n"
-                                      "jet part11.stl --bed 60x60 --dpi 100 -o b\n");
+  write_text(directory_ / "list.txt",
+             "jet part10.stl --bed 60x60 --dpi 100 -o a\n"
+             "jet part10.stl --bed 400x400 --dpi 1200 --layer 0.0002 --format tiff-none -o long\n"
+             "jet part11.stl --bed 60x60 --dpi 100 -o b\n");
   const Outcome outcome = lamina({"batch", "list.txt", "-o", "out", "--jobs", "1", "--time-limit", "0.5"});
   EXPECT_EQ(outcome.code, 3);  // of a job that failed: nobody interrupted the batch
   EXPECT_EQ(outcomes("out"), (Words{"done", "time limit", "done"}));
   EXPECT_EQ(summary("out")["jobs"][1]["reason"], "took longer than its time limit of 0.5 s");
   EXPECT_EQ(summary("out")["jobs"][1]["code"], 3);
   EXPECT_NE(outcome.err.find("3: 2 done, 1 failed\n"), std::string::npos) << outcome.err;
-  EXPECT_NE(outcome.err.find("time limit list.txt:2: took longer than its time limit of 0.5 s\n"), std::string::npos) << outcome.err;
+  EXPECT_NE(outcome.err.find("time limit list.txt:2: took longer than its time limit of 0.5 s\n"), std::string::npos)
+      << outcome.err;
   write_text(directory_ / "fast.txt", "jet part10.stl --bed 60x60 --dpi 100 -o a\njet nowhere.stl -o c\njet part11.stl -o d\n");
   EXPECT_EQ(lamina({"batch", "fast.txt", "-o", "fast", "--jobs", "1", "--fail-fast", "--quiet"}).code, 3);
   EXPECT_EQ(outcomes("fast"), (Words{"done", "failed", "not run"}));
@@ -455,7 +482,8 @@ TEST_F(JobsInBatch, InterruptedItSaysHowToGoOn) {
   const Words words = batch_of({"part10.stl", "-o", "out", "--resume"},
                                {"--with", "jet --bed 400x400 --dpi 1200 --layer 0.0002 --format tiff-none"});
   const Outcome outcome = lamina(words, [&](int process) {
-    for (int i = 0; i < 2000 && !fs::exists(directory_ / "out/part10/layers/000000.tif"); ++i) std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    for (int i = 0; i < 2000 && !fs::exists(directory_ / "out/part10/layers/000000.tif"); ++i)
+      std::this_thread::sleep_for(std::chrono::milliseconds(5));
     ::kill(process, SIGINT);
   });
   EXPECT_EQ(outcome.code, 130) << outcome.err;

@@ -32,7 +32,8 @@ TEST(JsonText, EveryByteSequenceIsJsonAndUtf8StaysAsItIs) {
     }
   }
   EXPECT_TRUE(is_utf8("\xe2\x82\xac \xf0\x9f\x98\x80"));
-  for (const char* bad : {"\xc0\xaf", "\xed\xa0\x80", "\xf4\x90\x80\x80", "\xe2\x82", "\x80", "\xe0\x80\x80"}) EXPECT_FALSE(is_utf8(bad));
+  for (const char* bad : {"\xc0\xaf", "\xed\xa0\x80", "\xf4\x90\x80\x80", "\xe2\x82", "\x80", "\xe0\x80\x80"})
+    EXPECT_FALSE(is_utf8(bad));
   EXPECT_EQ(one_line("a\r\nb\x1b[31mc\n"), "a b [31mc");
 }
 
@@ -97,10 +98,11 @@ TEST(Help, EveryCommandTeachesWithExamplesAndNamesEveryOption) {
     EXPECT_NE(help.out.find("lamina " + command), std::string::npos);
   }
   const std::string jet = run_lamina({"jet", "--help"}, directory.path()).out;
-  for (const char* flag : {"--job", "--save-job", "--set", "--bed", "--dpi", "--layer", "--copies", "--at", "--gap", "--scale",
-                           "--rotate", "--shrink", "--unit", "--engine", "--fill", "--format", "--mirror", "--layers",
-                           "--shard", "--threads", "--memory", "--resume", "--overwrite", "--dry-run", "--json", "--quiet",
-                           "--no-repair", "--drop-bad", "--weld"}) {
+  for (const char* flag :
+       {"--job",    "--save-job", "--set",       "--bed",      "--dpi",    "--layer",  "--copies",    "--at",
+        "--gap",    "--scale",    "--rotate",    "--shrink",   "--unit",   "--engine", "--fill",      "--format",
+        "--mirror", "--layers",   "--shard",     "--threads",  "--memory", "--resume", "--overwrite", "--dry-run",
+        "--json",   "--quiet",    "--no-repair", "--drop-bad", "--weld"}) {
     EXPECT_NE(jet.find(flag), std::string::npos) << flag;
   }
   EXPECT_NE(jet.find("(default 490x380)"), std::string::npos);

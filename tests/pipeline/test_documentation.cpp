@@ -59,7 +59,8 @@ TEST(Documentation, PreviewTakesTheOptionsOfItsDefinition) {
   const Directory directory;
   const Outcome outcome = run_lamina({"preview", "--help"}, directory.path());
   ASSERT_EQ(outcome.code, 0);
-  for (const std::string& flag : long_flags(pipeline::preview_spec())) EXPECT_NE(outcome.out.find(flag), std::string::npos) << flag;
+  for (const std::string& flag : long_flags(pipeline::preview_spec()))
+    EXPECT_NE(outcome.out.find(flag), std::string::npos) << flag;
 }
 
 // Every --option that a page puts between backticks is one of some command, or of another program that it names.
@@ -106,7 +107,8 @@ TEST(Documentation, EveryKeyOfAMachineIsDocumented) {
 
 // Whatever stands behind "lamina COMMAND" on a line, up to what ends a command there.
 TEST(Documentation, EveryCommandLineInItCanBeTyped) {
-  const std::regex line("(?:^|[^-/a-z])lamina ([a-z]+)((?: [^\\n`|;&#()]*)?)", std::regex::multiline), flag("(?:^| )(--[a-z][a-z0-9-]*)");
+  const std::regex line("(?:^|[^-/a-z])lamina ([a-z]+)((?: [^\\n`|;&#()]*)?)", std::regex::multiline),
+      flag("(?:^| )(--[a-z][a-z0-9-]*)");
   std::size_t checked = 0;
   for (const fs::path& page : pages()) {
     const std::string text = read_text(page);
@@ -121,7 +123,8 @@ TEST(Documentation, EveryCommandLineInItCanBeTyped) {
       const std::string bare = std::regex_replace(rest, std::regex("'[^']*'"), "");
       for (std::sregex_iterator word(bare.begin(), bare.end(), flag); word != end; ++word) {
         const std::string name = (*word)[1];
-        EXPECT_TRUE(name == "--help" || long_flags(spec).contains(name)) << page.filename() << ": " << at->str() << ": " << name;
+        EXPECT_TRUE(name == "--help" || long_flags(spec).contains(name))
+            << page.filename() << ": " << at->str() << ": " << name;
         ++checked;
       }
     }

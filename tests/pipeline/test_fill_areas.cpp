@@ -95,7 +95,8 @@ class FillAreas : public ::testing::Test {
 
 TEST_F(FillAreas, PartsWhoseBoxesTouchKeepTheirOwnFillingAndHeights) {
   const auto plan = plan_of({{{20, 20, 0}, {20, 20, 4}, "pattern=raster angle_deg=0 width_mm=0.4"},
-                             {{40, 20, 1}, {20, 20, 4}, "pattern=contour width_mm=0.6"}}, "2:3 gap_mm=0.5");
+                             {{40, 20, 1}, {20, 20, 4}, "pattern=contour width_mm=0.6"}},
+                            "2:3 gap_mm=0.5");
   ASSERT_TRUE(plan.ok()) << plan.error().message;
   ASSERT_EQ(plan->areas().size(), 2u);
   for (std::uint32_t layer = 0; layer < plan->layers().size(); ++layer) {
@@ -156,8 +157,10 @@ std::array<double, 2> charged_and_needed(const SlicePlan& plan) {
 }
 
 TEST_F(FillAreas, FineFillingsAreChargedWithAFewTimesWhatTheyNeed) {
-  for (const auto& [fill, times] : {std::pair{"pattern=raster width_mm=0.01", 3}, {"pattern=honeycomb width_mm=0.05 cell_mm=0.3", 3},
-                                    {"pattern=quatrefoil width_mm=0.05 gap_mm=0.05 cell_mm=0.3", 3}, {"pattern=contour width_mm=0.01", 6}}) {
+  for (const auto& [fill, times] : {std::pair{"pattern=raster width_mm=0.01", 3},
+                                    {"pattern=honeycomb width_mm=0.05 cell_mm=0.3", 3},
+                                    {"pattern=quatrefoil width_mm=0.05 gap_mm=0.05 cell_mm=0.3", 3},
+                                    {"pattern=contour width_mm=0.01", 6}}) {
     const auto plan = plan_of({{{20, 20, 0}, {40, 40, 4}, fill}});
     ASSERT_TRUE(plan.ok()) << plan.error().message;
     const auto [charged, needed] = charged_and_needed(*plan);
@@ -167,7 +170,9 @@ TEST_F(FillAreas, FineFillingsAreChargedWithAFewTimesWhatTheyNeed) {
 
 TEST_F(FillAreas, RandomOutlinesAndPatternsNeedNoMoreThanTheyAreChargedWith) {
   std::mt19937 random(4711);
-  const auto between = [&](double low, double high) { return low + (high - low) * static_cast<double>(random()) / 4294967295.0; };
+  const auto between = [&](double low, double high) {
+    return low + (high - low) * static_cast<double>(random()) / 4294967295.0;
+  };
   const char* patterns[] = {"raster", "contour", "contour+raster", "honeycomb", "quatrefoil"};
   for (int turn = 0; turn < 60; ++turn) {
     // A star-shaped prism of random corners and a random one beside it, turned any way by its corners.
@@ -185,9 +190,10 @@ TEST_F(FillAreas, RandomOutlinesAndPatternsNeedNoMoreThanTheyAreChargedWith) {
     job.layer_mm = 0.5;
     job.parts.emplace_back();
     job.parts.back().path = path;
-    job.parts.back().fill = fmt::format("pattern={} width_mm={:.3f} gap_mm={:.3f} cell_mm={:.3f} angle_deg={:.1f} walls={} loops={}", patterns[turn % 5],
-                                        between(0.05, 0.3), between(0.02, 0.3), between(0.3, 2), between(0, 180), turn % 4 == 0 ? 1 : 0,
-                                        static_cast<int>(between(1, 40)));
+    job.parts.back().fill =
+        fmt::format("pattern={} width_mm={:.3f} gap_mm={:.3f} cell_mm={:.3f} angle_deg={:.1f} walls={} loops={}",
+                    patterns[turn % 5], between(0.05, 0.3), between(0.02, 0.3), between(0.3, 2), between(0, 180),
+                    turn % 4 == 0 ? 1 : 0, static_cast<int>(between(1, 40)));
     const auto plan = SlicePlan::make(job, [](const ProgressEvent&) {});
     ASSERT_TRUE(plan.ok()) << plan.error().message;
     SCOPED_TRACE(job.parts.back().fill);

@@ -45,10 +45,11 @@ TEST(HeightsCommand, LayersOfOthersAreMeasuredByTheSameRules) {
   const Directory directory;
   write_ledge(directory);
   write_text(directory / "tops.txt", "# tops\n0.5\n1.0 \n\n2.0\n");
-  const Outcome outcome =
-      run_lamina({"heights", "low.stl", "--measure", "tops.txt", "--layer", "0.5", "--format", "json", "--quiet"}, directory.path());
+  const Outcome outcome = run_lamina(
+      {"heights", "low.stl", "--measure", "tops.txt", "--layer", "0.5", "--format", "json", "--quiet"}, directory.path());
   EXPECT_EQ(outcome.code, 0) << outcome.err;
-  EXPECT_NE(outcome.out.find("\"layers\": 3, \"top_mm\": 2.000000, \"top_miss_mm\": -0.050000"), std::string::npos) << outcome.out;
+  EXPECT_NE(outcome.out.find("\"layers\": 3, \"top_mm\": 2.000000, \"top_miss_mm\": -0.050000"), std::string::npos)
+      << outcome.out;
   write_text(directory / "tops.txt", "0.5\n0.5\n");
   const Outcome wrong = run_lamina({"heights", "low.stl", "--measure", "tops.txt"}, directory.path());
   EXPECT_EQ(wrong.code, 3);
@@ -70,7 +71,8 @@ TEST(HeightsCommand, WrongUseIsOneLineThatNamesTheOption) {
       {{"--thickness", "0.1,0.2"}, "uniform layers have one thickness"},
       {{"--format", "xml"}, "--format: 'xml'"},
       {{"--plot", "plot.gif"}, "--plot plot.gif"},
-      {{"--thickness", "0.1..0.3", "--compare", "--format", "rp3"}, "--format rp3: holds one table, and --compare makes several"},
+      {{"--thickness", "0.1..0.3", "--compare", "--format", "rp3"},
+       "--format rp3: holds one table, and --compare makes several"},
       {{"high.stl", "--thickness", "0.1..0.3", "--per-part", "--format", "rp3"}, "--per-part makes several"},
       {{"high.stl", "--thickness", "0.178,0.254", "--per-part"}, "0.178 and 0.254 mm meet only every 22.606 mm"},
       {{"--heights", "optimal", "--thickness", "0.000002,0.000003", "--scale", "100"}, "heights.thickness"},
@@ -97,8 +99,8 @@ TEST(JetHeights, LayersOfEveryWayAreVerifiedAndRecordedWithTheirReason) {
   const Directory directory;
   write_ledge(directory);
   for (const char* way : {"angle", "cusp", "stepwise", "optimal"}) {
-    const Outcome jet = run_lamina({"jet", "low.stl", "high.stl", "--bed", "40x40", "--dpi", "200", "--heights", way, "--thickness",
-                                    "0.1..0.3:0.01", "-o", way},
+    const Outcome jet = run_lamina({"jet", "low.stl", "high.stl", "--bed", "40x40", "--dpi", "200", "--heights", way,
+                                    "--thickness", "0.1..0.3:0.01", "-o", way},
                                    directory.path());
     ASSERT_EQ(jet.code, 0) << jet.err;
     EXPECT_EQ(run_lamina({"verify", way}, directory.path()).code, 0) << way;

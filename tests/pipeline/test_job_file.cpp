@@ -26,8 +26,20 @@ Job unusual_job(const Directory& directory) {
   job.repair = false;
   job.drop_bad = true;
   job.weld_um = 0.5;
-  job.heights = {heights::Mode::kOptimal, "0.05..0.3:0.01", 0.07, 30, 80, 1e-4, heights::Facets::kPlane, 0.5, false, 2, 3,
-                 {12, 0.03}, Containment::kInside, true};
+  job.heights = {heights::Mode::kOptimal,
+                 "0.05..0.3:0.01",
+                 0.07,
+                 30,
+                 80,
+                 1e-4,
+                 heights::Facets::kPlane,
+                 0.5,
+                 false,
+                 2,
+                 3,
+                 {12, 0.03},
+                 Containment::kInside,
+                 true};
   job.machine.profile = "nuferbj";
   job.machine.bed_given = job.machine.dpi_given = true;
   job.machine.scan_speed_mm_s = 12.5;

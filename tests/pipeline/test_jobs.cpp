@@ -32,7 +32,8 @@ class Jobs : public ::testing::Test {
 };
 
 TEST_F(Jobs, SavedJobGivesTheSameManifest) {
-  ASSERT_EQ(jet("out", {"--copies", "2", "--rotate", "0,0,30", "--scale", "0.5", "--mirror", "x", "--save-job", "job.toml"}).code, 0);
+  ASSERT_EQ(
+      jet("out", {"--copies", "2", "--rotate", "0,0,30", "--scale", "0.5", "--mirror", "x", "--save-job", "job.toml"}).code, 0);
   ASSERT_EQ(lamina({"jet", "--job", "job.toml", "-o", "again", "--quiet"}).code, 0);
   EXPECT_EQ(tree("again"), tree("out"));
   fs::create_directory(directory_ / "sub");
@@ -171,7 +172,8 @@ TEST_F(Jobs, VerifyFindsEveryKindOfDamage) {
 
 TEST_F(Jobs, VerifyTellsTheFirstTwentyFaultsInLayerOrderAndCountsTheRest) {
   ASSERT_EQ(jet("out").code, 0);
-  for (const std::string& name : files_below(directory_ / "out/layers")) fs::remove(directory_ / "out/layers/" / fs::path(name));
+  for (const std::string& name : files_below(directory_ / "out/layers"))
+    fs::remove(directory_ / "out/layers/" / fs::path(name));
   const Outcome outcome = lamina({"verify", "out"});
   EXPECT_EQ(outcome.code, 5);
   EXPECT_EQ(outcome.error_lines(), 21u);
@@ -263,9 +265,7 @@ TEST_F(Interrupted, SecondRunInTheSameDirectoryIsRefusedAndHarmsNothing) {
   EXPECT_EQ(lamina({"verify", "out"}).code, 0);
 }
 
-TEST_F(Interrupted, TerminationIsAnInterruptionToo) {
-  EXPECT_EQ(stopped(long_job("out"), "out", 2, SIGTERM).code, 130);
-}
+TEST_F(Interrupted, TerminationIsAnInterruptionToo) { EXPECT_EQ(stopped(long_job("out"), "out", 2, SIGTERM).code, 130); }
 
 }  // namespace
 }  // namespace lamina::test

@@ -25,7 +25,8 @@ struct Meter {
   void add(std::int64_t bytes) {
     const std::int64_t sum = now += bytes;
     std::int64_t before = most;
-    while (before < sum && !most.compare_exchange_weak(before, sum)) {}
+    while (before < sum && !most.compare_exchange_weak(before, sum)) {
+    }
   }
 };
 

@@ -10,8 +10,8 @@ namespace {
 
 TEST(NumberText, OnlyWholeFiniteTextsAreNumbers) {
   double value = -7;
-  for (const char* text : {"", " ", "nan", "NaN", "-nan", "inf", "-inf", "infinity", "1e999", "1,5", "12mm", " 1", "1 ",
-                           "0x10", "+1", "--1", "1e", ".", "1_000", "1\n"}) {
+  for (const char* text : {"",     " ",  "nan", "NaN",  "-nan", "inf", "-inf", "infinity", "1e999", "1,5",
+                           "12mm", " 1", "1 ",  "0x10", "+1",   "--1", "1e",   ".",        "1_000", "1\n"}) {
     EXPECT_FALSE(read_number(text, -1e300, 1e300, "", value).empty()) << '\'' << text << '\'';
     EXPECT_EQ(value, -7) << text;
   }

@@ -32,7 +32,9 @@ Runs random_runs(std::mt19937& random, std::uint32_t columns, std::uint32_t rows
     const auto kind = random() % 4;
     if (kind == 0) {  // else like the row before, moved, or the same
       row.clear();
-      for (std::uint32_t column = static_cast<std::uint32_t>(random() % columns); column < columns; column += 1 + static_cast<std::uint32_t>(random() % 50)) row.push_back(column);
+      for (std::uint32_t column = static_cast<std::uint32_t>(random() % columns); column < columns;
+           column += 1 + static_cast<std::uint32_t>(random() % 50))
+        row.push_back(column);
       if (row.size() % 2 != 0) row.push_back(columns);
     } else if (kind == 1 && !row.empty() && row.front() > 0) {
       for (std::uint32_t& column : row) --column;
@@ -264,12 +266,13 @@ TEST_F(JobsReported, NamesOfPartsCannotBecomeMarkup) {
 // A page about 1,000 layers of 22 million pixels is used in Chromium: keys, buttons, mouse, a phone's width; its layer 500 is
 // the decoded TIFF.
 TEST_F(JobsReported, InABrowserItShowsTheLayersAndCanBeUsed) {
-  jet(kCorpus / "nist_part_feature_open.stl", {"--unit", "inch", "--bed", "160x64", "--dpi", "1200", "--layer", "0.0349", "--layers", "0:1000"});
+  jet(kCorpus / "nist_part_feature_open.stl",
+      {"--unit", "inch", "--bed", "160x64", "--dpi", "1200", "--layer", "0.0349", "--layers", "0:1000"});
   ASSERT_EQ(lamina({"report", "out", "-o", "report.html", "--quiet"}).code, 0);
   EXPECT_LT(fs::file_size(directory_ / "report.html"), 20'000'000u);
   const int index = 500, layers = 1000;
-  const std::string command = "python3 '" + std::string(LAMINA_TEST_DIR) + "/report/browser.py' '" + directory_ / "report.html" +
-                              "' " + std::to_string(index) + " 2>/dev/null";
+  const std::string command = "python3 '" + std::string(LAMINA_TEST_DIR) + "/report/browser.py' '" +
+                              directory_ / "report.html" + "' " + std::to_string(index) + " 2>/dev/null";
   std::FILE* pipe = ::popen(command.c_str(), "r");
   ASSERT_NE(pipe, nullptr);
   std::string text;
@@ -307,8 +310,8 @@ TEST_F(JobsReported, InABrowserItShowsTheLayersAndCanBeUsed) {
   EXPECT_NEAR(step["plot"]["layer"].get<int>(), layers / 2, 3);
   EXPECT_EQ(said["file_rows"], layers + 1);
   for (const Json& stretched : said["stretched"]) EXPECT_NEAR(stretched.get<double>(), 1, 0.02) << said["stretched"];
-  for (const char* label : {"the parts from above", "the parts from the front", "the parts from the right", "area against height",
-                            "thickness against height"}) {
+  for (const char* label : {"the parts from above", "the parts from the front", "the parts from the right",
+                            "area against height", "thickness against height"}) {
     EXPECT_NE(std::ranges::find(said["labels"], Json(label)), said["labels"].end()) << label;
   }
   EXPECT_NE(said["grounds"][0], said["grounds"][1]);

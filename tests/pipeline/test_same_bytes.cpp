@@ -34,14 +34,23 @@ std::string bytes_of(const Directory& directory, const Words& job, const std::st
 
 TEST(SameBytes, ForAnyThreadsEngineAndMemory) {
   const Directory directory;
-  const Words job = {kCorpus + "nist_am_test_artifact_v3b.stl", kCorpus + "dental_crown.stl", kCorpus + "cube_gears_17_items.3mf",
-                     "--copies", "2", "--bed", "420x330", "--dpi", "600x300", "--layer", "0.7"};
+  const Words job = {kCorpus + "nist_am_test_artifact_v3b.stl",
+                     kCorpus + "dental_crown.stl",
+                     kCorpus + "cube_gears_17_items.3mf",
+                     "--copies",
+                     "2",
+                     "--bed",
+                     "420x330",
+                     "--dpi",
+                     "600x300",
+                     "--layer",
+                     "0.7"};
   const std::string expected = bytes_of(directory, job, "one");
   EXPECT_GT(expected.size(), 10'000u);
   int variant = 0;
-  for (const Words& how : {Words{"--threads", "1"}, Words{"--threads", "2", "--engine", "contours"},
-                           Words{"--threads", "8", "--memory", "64K"}, Words{"--threads", "8", "--engine", "both"},
-                           Words{"--memory", "8M", "--engine", "contours", "--threads", "1"}}) {
+  for (const Words& how :
+       {Words{"--threads", "1"}, Words{"--threads", "2", "--engine", "contours"}, Words{"--threads", "8", "--memory", "64K"},
+        Words{"--threads", "8", "--engine", "both"}, Words{"--memory", "8M", "--engine", "contours", "--threads", "1"}}) {
     EXPECT_TRUE(bytes_of(directory, job + how, "v" + std::to_string(++variant)) == expected) << "variant " << variant;
   }
 }
@@ -64,15 +73,16 @@ TEST(SameBytes, CopiesAreThePartStandingWhereTheyStand) {
 
 std::uint64_t peak_of(const Directory& directory, const Words& job) {
   static int run = 0;
-  const Outcome outcome = run_lamina(Words{"jet"} + job + Words{"--json", "--quiet", "-o", "m" + std::to_string(++run)},
-                                     directory.path());
+  const Outcome outcome =
+      run_lamina(Words{"jet"} + job + Words{"--json", "--quiet", "-o", "m" + std::to_string(++run)}, directory.path());
   EXPECT_EQ(outcome.code, 0) << outcome.err;
   return outcome.code == 0 ? nlohmann::json::parse(outcome.out)["peak_resident_bytes"].get<std::uint64_t>() : 0;
 }
 
 TEST(BoundedMemory, TenThousandLayersNeedWhatAHundredNeed) {
   const Directory directory;
-  const Words job = {kCorpus + "nist_am_test_artifact_v3b.stl", "--bed", "150x150", "--dpi", "300", "--threads", "2", "--memory", "32M"};
+  const Words job = {
+      kCorpus + "nist_am_test_artifact_v3b.stl", "--bed", "150x150", "--dpi", "300", "--threads", "2", "--memory", "32M"};
   const std::uint64_t hundred = peak_of(directory, job + Words{"--layer", "0.17"});
   const std::uint64_t many = peak_of(directory, job + Words{"--layer", "0.0017"});
   EXPECT_GT(hundred, 0u);
@@ -88,9 +98,7 @@ void write_tower(const std::string& path, int storeys, int posts) {
   std::uint32_t triangles = 0;
   file.append(4, '\0');
   const auto box = [&](float x0, float y0, float z0, float x1, float y1, float z1) {
-    const auto corner = [&](int i, float* to) {
-      to[0] = i & 1 ? x1 : x0, to[1] = i & 2 ? y1 : y0, to[2] = i & 4 ? z1 : z0;
-    };
+    const auto corner = [&](int i, float* to) { to[0] = i & 1 ? x1 : x0, to[1] = i & 2 ? y1 : y0, to[2] = i & 4 ? z1 : z0; };
     constexpr int kFacets[12][3] = {{0, 2, 3}, {0, 3, 1}, {4, 5, 7}, {4, 7, 6}, {0, 1, 5}, {0, 5, 4},
                                     {2, 6, 7}, {2, 7, 3}, {0, 4, 6}, {0, 6, 2}, {1, 3, 7}, {1, 7, 5}};
     for (const auto& facet : kFacets) {
@@ -127,7 +135,8 @@ TEST(BoundedMemory, PeakIsMeshIndexAndBudgetWhateverLayersNeed) {
   const std::uint64_t program = peak_of(directory, {directory / "small.stl", "--bed", "10x10", "--dpi", "60"});
   const auto check = [&](const Words& job) {
     static int run = 0;
-    const Outcome outcome = run_lamina(Words{"jet"} + job + Words{"--json", "--quiet", "-o", "b" + std::to_string(++run)}, directory.path());
+    const Outcome outcome =
+        run_lamina(Words{"jet"} + job + Words{"--json", "--quiet", "-o", "b" + std::to_string(++run)}, directory.path());
     ASSERT_EQ(outcome.code, 0) << outcome.err;
     const auto said = nlohmann::json::parse(outcome.out);
     const auto of = [&](const char* key) { return said[key].get<std::uint64_t>(); };
@@ -181,8 +190,8 @@ void check_outcomes(const std::string& folder, std::size_t least) {
     if (!fs::exists(folder + "/" + row.file)) continue;
     SCOPED_TRACE(row.file);
     const std::string output = "o" + std::to_string(checked++);
-    const Outcome outcome = run_lamina({"jet", folder + "/" + row.file, "--engine", "both", "--bed", "520x520", "--dpi",
-                                        "300", "--layer", "0.5", "-o", output, "--quiet"},
+    const Outcome outcome = run_lamina({"jet", folder + "/" + row.file, "--engine", "both", "--bed", "520x520", "--dpi", "300",
+                                        "--layer", "0.5", "-o", output, "--quiet"},
                                        directory.path());
     EXPECT_EQ(outcome.code, row.code) << outcome.err;
     if (row.code != 0) {

@@ -53,7 +53,8 @@ TEST(Placement, CopiesOfAPositionFollowAlongX) {
     EXPECT_EQ(places[i].x, 1 + 6 * i);
     EXPECT_EQ(places[i].y, 2);
   }
-  EXPECT_FALSE(place_boxes(std::vector<BoxRequest>{{.width = 4, .depth = 2, .copies = 3, .at_x = 2, .at_y = 2}}, 17, 9, 2).ok());
+  EXPECT_FALSE(
+      place_boxes(std::vector<BoxRequest>{{.width = 4, .depth = 2, .copies = 3, .at_x = 2, .at_y = 2}}, 17, 9, 2).ok());
 }
 
 TEST(Placement, ArrangedBoxesLieWithinTheBedAndAGapApart) {
@@ -104,7 +105,9 @@ TEST(Scene, EqualFilesWithEqualTransformsAreLoadedOnce) {
   const Directory directory;
   test::write_box(directory / "a.stl", {0, 0, 0}, {10, 20, 5});
   Job job;
-  job.parts = {{.path = directory / "a.stl", .copies = 3}, {.path = directory / "./a.stl"}, {.path = directory / "a.stl", .scale = {2, 2, 2}}};
+  job.parts = {{.path = directory / "a.stl", .copies = 3},
+               {.path = directory / "./a.stl"},
+               {.path = directory / "a.stl", .scale = {2, 2, 2}}};
   const Scene scene = loaded(job);
   EXPECT_EQ(scene.meshes.size(), 2u);
   ASSERT_EQ(scene.instances.size(), 5u);

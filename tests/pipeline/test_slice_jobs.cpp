@@ -29,8 +29,18 @@ TEST(SliceProgram, SameBytesForAnyThreadsAndMemoryInEveryFormat) {
     std::string first;
     for (const auto& [threads, memory] : {std::pair{"1", "1G"}, {"2", "1G"}, {"5", "1M"}}) {
       const std::string out = "out" + std::to_string(j) + threads;
-      std::vector<std::string> arguments = {"slice", corpus("nist_am_test_artifact_v3b.stl"), corpus("dental_crown.stl"),
-                                            "--layer", "2.3", "--quiet", "-o", out, "--threads", threads, "--memory", memory};
+      std::vector<std::string> arguments = {"slice",
+                                            corpus("nist_am_test_artifact_v3b.stl"),
+                                            corpus("dental_crown.stl"),
+                                            "--layer",
+                                            "2.3",
+                                            "--quiet",
+                                            "-o",
+                                            out,
+                                            "--threads",
+                                            threads,
+                                            "--memory",
+                                            memory};
       arguments.insert(arguments.end(), jobs[j].begin(), jobs[j].end());
       const Outcome outcome = run_lamina(arguments, directory.path());
       ASSERT_EQ(outcome.code, 0) << outcome.err;
@@ -52,9 +62,18 @@ TEST(SliceProgram, SameBytesForEveryPatternFormatThreadsAndMemory) {
       std::string first;
       for (const auto& [threads, memory] : {std::pair{"1", "1G"}, {"2", "1M"}, {"8", "16M"}}) {
         const std::string out = "o" + std::to_string(number++);
-        std::vector<std::string> arguments = {"slice", corpus("parameter_quality_nut.stl"), "near.stl", "--layer", "1.9", "--quiet", "-o", out,
-                                              "--walls", "1", "--bead-gap", "0.3,0.1", "--stagger", "0,0.1", "--angle-step", "37",
-                                              "--pattern", pattern, "--threads", threads, "--memory", memory, "--format"};
+        std::vector<std::string> arguments = {"slice",        corpus("parameter_quality_nut.stl"),
+                                              "near.stl",     "--layer",
+                                              "1.9",          "--quiet",
+                                              "-o",           out,
+                                              "--walls",      "1",
+                                              "--bead-gap",   "0.3,0.1",
+                                              "--stagger",    "0,0.1",
+                                              "--angle-step", "37",
+                                              "--pattern",    pattern,
+                                              "--threads",    threads,
+                                              "--memory",     memory,
+                                              "--format"};
         arguments.insert(arguments.end(), format.begin(), format.end());
         const Outcome outcome = run_lamina(arguments, directory.path());
         ASSERT_EQ(outcome.code, 0) << pattern << ", " << format[0] << ": " << outcome.err;
@@ -68,8 +87,8 @@ TEST(SliceProgram, SameBytesForEveryPatternFormatThreadsAndMemory) {
 
 TEST(SliceProgram, ManifestSaysWhereEveryLayerLiesInTheFile) {
   const Directory directory;
-  const Outcome outcome = run_lamina({"slice", corpus("parameter_quality_nut.stl"), "--layer", "0.5", "-o", "out", "--json"},
-                                     directory.path());
+  const Outcome outcome =
+      run_lamina({"slice", corpus("parameter_quality_nut.stl"), "--layer", "0.5", "-o", "out", "--json"}, directory.path());
   ASSERT_EQ(outcome.code, 0) << outcome.err;
   const auto manifest = nlohmann::json::parse(read_text(directory.path() / "out/manifest.json"));
   const std::string file = read_text(directory.path() / "out" / manifest["file"].get<std::string>());
@@ -84,12 +103,14 @@ TEST(SliceProgram, ManifestSaysWhereEveryLayerLiesInTheFile) {
   const auto summary = nlohmann::json::parse(outcome.out);
   EXPECT_NEAR(summary["volume_mm3"].get<double>(), volume, 1e-3);
   EXPECT_NEAR(volume, 4427.93, 100);
-  EXPECT_EQ(files_below(directory.path() / "out"), (std::vector<std::string>{"job.toml", "manifest.json", "parameter_quality_nut.svg"}));
+  EXPECT_EQ(files_below(directory.path() / "out"),
+            (std::vector<std::string>{"job.toml", "manifest.json", "parameter_quality_nut.svg"}));
 }
 
 TEST(SliceProgram, AnEarlierJobIsNotReplacedUnasked) {
   const Directory directory;
-  const std::vector<std::string> arguments = {"slice", corpus("parameter_quality_nut.stl"), "--layer", "2", "--quiet", "-o", "out"};
+  const std::vector<std::string> arguments = {"slice", corpus("parameter_quality_nut.stl"), "--layer", "2", "--quiet", "-o",
+                                              "out"};
   ASSERT_EQ(run_lamina(arguments, directory.path()).code, 0);
   const std::string before = tree_text(directory.path() / "out");
   const Outcome again = run_lamina(arguments, directory.path());
@@ -143,7 +164,8 @@ TEST(SliceProgram, WrongFillingsAreOneClearLineAndLeaveNothing) {
       {{"--pattern", "raster", "--set", "fill.by_height=5:4 gap_mm=0"}, "5:4"},
       {{"--pattern", "raster", "--set", "fill.by_height=1:2 gapp_mm=0"}, "did you mean 'gap_mm'"},
       {{"--pattern", "raster", "--set", "fill.gap_by_height=3:0.1, 2:0.2"}, "heights have to increase"},
-      {{"--pattern", "raster", "--bead-gap", "0.2", "--line-distance", "0.5"}, "fill.distance_mm (--line-distance) and fill.gap_mm (--bead-gap) both"},
+      {{"--pattern", "raster", "--bead-gap", "0.2", "--line-distance", "0.5"},
+       "fill.distance_mm (--line-distance) and fill.gap_mm (--bead-gap) both"},
       {{"--pattern", "raster", "--bead-gap", "0.2", "--gap-formula", "z"}, "fill.gap_formula (--gap-formula) and fill.gap_mm"},
       {{"--pattern", "raster", "--line-distance", "0.5", "--set", "fill.gap_by_height=0:0.1"}, "and fill.gap_by_height both"},
       {{"--pattern", "raster", "--line-distance", "0.5", "--set", "fill.group=2"}, "groups are of beads with gaps"},
@@ -171,8 +193,8 @@ TEST(SliceProgram, AJobThatFailsLeavesTheEarlierOne) {
   const Directory directory;
   for (const bool alone : {false, true}) {
     const std::string out = alone ? "alone" : "one";
-    std::vector<std::string> arguments = {"slice", corpus("parameter_quality_nut.stl"), "--layer", "1", "--quiet", "-o", out,
-                                          "--pattern", "raster"};
+    std::vector<std::string> arguments = {
+        "slice", corpus("parameter_quality_nut.stl"), "--layer", "1", "--quiet", "-o", out, "--pattern", "raster"};
     if (alone) arguments.push_back("--file-a-layer");
     ASSERT_EQ(run_lamina(arguments, directory.path()).code, 0);
     const std::string before = tree_text(directory.path() / out);
@@ -189,8 +211,9 @@ TEST(SliceProgram, AJobThatFailsLeavesTheEarlierOne) {
 TEST(SliceProgram, VerifyFindsWhatWasChangedMissingOrAdded) {
   const Directory directory;
   for (const auto& format : {std::vector<std::string>{"svg"}, {"svg", "--file-a-layer"}, {"cli"}, {"cli-binary"}, {"3mf"}}) {
-    std::vector<std::string> arguments = {"slice", corpus("parameter_quality_nut.stl"), "--layer", "2", "--quiet", "--overwrite",
-                                          "-o", "out", "--walls", "1", "--format"};
+    std::vector<std::string> arguments = {
+        "slice",   corpus("parameter_quality_nut.stl"), "--layer", "2", "--quiet", "--overwrite", "-o", "out", "--walls", "1",
+        "--format"};
     arguments.insert(arguments.end(), format.begin(), format.end());
     const auto slice = [&] {
       std::filesystem::remove_all(directory / "out");
@@ -247,8 +270,9 @@ bool is_inside(const std::vector<double>& contour, double x, double y) {
 
 TEST(SliceProgram, SvgHasOnePathForEachOuterContourWithItsHoles) {
   const Directory directory;
-  const Outcome outcome = run_lamina({"slice", corpus("nist_am_test_artifact_v3b.stl"), corpus("quad_knot.obj"), "--layer", "0.7", "-o", "out",
-                                      "--quiet"}, directory.path());
+  const Outcome outcome = run_lamina(
+      {"slice", corpus("nist_am_test_artifact_v3b.stl"), corpus("quad_knot.obj"), "--layer", "0.7", "-o", "out", "--quiet"},
+      directory.path());
   ASSERT_EQ(outcome.code, 0) << outcome.err;
   const auto manifest = nlohmann::json::parse(read_text(directory.path() / "out/manifest.json"));
   const std::string svg = read_text(directory.path() / "out" / manifest["file"].get<std::string>());
@@ -261,8 +285,10 @@ TEST(SliceProgram, SvgHasOnePathForEachOuterContourWithItsHoles) {
       std::istringstream words(text.substr(at + 9, text.find('"', at + 9) - at - 9));
       std::vector<std::vector<double>> contours;
       for (std::string word; words >> word;) {
-        if (word == "M") contours.emplace_back();
-        else if (word != "z") contours.back().push_back(std::stod(word));
+        if (word == "M")
+          contours.emplace_back();
+        else if (word != "z")
+          contours.back().push_back(std::stod(word));
       }
       double own = 0;
       for (std::size_t c = 0; c < contours.size(); ++c) {
@@ -289,20 +315,24 @@ TEST(SliceProgram, SvgHasOnePathForEachOuterContourWithItsHoles) {
 TEST(SliceProgram, AnOffsetThatLeavesNothingIsSaid) {
   const Directory directory;
   write_box(directory / "post.stl", {0, 0, 0}, {20, 3, 5});
-  const Outcome outcome = run_lamina({"slice", "post.stl", "--layer", "1", "--offset", "-1.6", "-o", "out", "--json"}, directory.path());
+  const Outcome outcome =
+      run_lamina({"slice", "post.stl", "--layer", "1", "--offset", "-1.6", "-o", "out", "--json"}, directory.path());
   EXPECT_EQ(outcome.code, 0);
   EXPECT_NE(outcome.err.find("--offset -1.6 leaves nothing of 5 of 5 layers, first layer 0"), std::string::npos) << outcome.err;
   EXPECT_EQ(nlohmann::json::parse(outcome.out)["emptied_layers"], 5);
-  EXPECT_EQ(run_lamina({"slice", "post.stl", "--layer", "1", "--offset", "-1.4", "-o", "thin"}, directory.path()).err.find("warning"),
-            std::string::npos);
+  EXPECT_EQ(
+      run_lamina({"slice", "post.stl", "--layer", "1", "--offset", "-1.4", "-o", "thin"}, directory.path()).err.find("warning"),
+      std::string::npos);
 }
 
 /// Parts that are further apart than twice the offset before it, and meet after it.
 TEST(SliceProgram, PartsThatMeetOnlyAfterTheOffsetAreUnited) {
   const Directory directory;
   write_box(directory / "a.stl", {0, 0, 0}, {10, 10, 1});
-  write_text(directory / "j.toml", "[[part]]\npath = 'a.stl'\nat_mm = [100, 100]\n[[part]]\npath = 'a.stl'\nat_mm = [110.3, 100]\n");
-  const Outcome outcome = run_lamina({"slice", "--job", "j.toml", "--layer", "1", "--offset", "0.2", "-o", "out", "--json"}, directory.path());
+  write_text(directory / "j.toml",
+             "[[part]]\npath = 'a.stl'\nat_mm = [100, 100]\n[[part]]\npath = 'a.stl'\nat_mm = [110.3, 100]\n");
+  const Outcome outcome =
+      run_lamina({"slice", "--job", "j.toml", "--layer", "1", "--offset", "0.2", "-o", "out", "--json"}, directory.path());
   ASSERT_EQ(outcome.code, 0) << outcome.err;
   const auto summary = nlohmann::json::parse(outcome.out);
   EXPECT_EQ(summary["contours"], 1);
@@ -311,35 +341,44 @@ TEST(SliceProgram, PartsThatMeetOnlyAfterTheOffsetAreUnited) {
 
 TEST(SliceProgram, ClosedGapsAreCountedWithTheLargest) {
   const Directory directory;
-  const Outcome outcome = run_lamina({"slice", corpus("broken/cube_missing_corner.stl"), "--no-repair", "--bridge", "50", "--layer",
-                                      "5", "-o", "out", "--json"}, directory.path());
+  const Outcome outcome = run_lamina({"slice", corpus("broken/cube_missing_corner.stl"), "--no-repair", "--bridge", "50",
+                                      "--layer", "5", "-o", "out", "--json"},
+                                     directory.path());
   EXPECT_EQ(outcome.code, 0) << outcome.err;
   const auto summary = nlohmann::json::parse(outcome.out);
   EXPECT_EQ(summary["gaps_closed"], 5);
   EXPECT_NEAR(summary["largest_gap_mm"].get<double>(), 36.203204, 1e-6);
-  EXPECT_NE(outcome.err.find("gaps      5 closed by straight stretches, the longest 36.203204 mm; 0 chains left open"), std::string::npos) << outcome.err;
+  EXPECT_NE(outcome.err.find("gaps      5 closed by straight stretches, the longest 36.203204 mm; 0 chains left open"),
+            std::string::npos)
+      << outcome.err;
 }
 
 TEST(SliceProgram, OpenMeshesAreReportedWithTheirFirstPlace) {
   const Directory directory;
-  const Outcome outcome = run_lamina({"slice", corpus("broken/cube_missing_corner.stl"), "--no-repair", "--bridge", "0", "--layer",
-                                      "5", "-o", "out"}, directory.path());
+  const Outcome outcome = run_lamina(
+      {"slice", corpus("broken/cube_missing_corner.stl"), "--no-repair", "--bridge", "0", "--layer", "5", "-o", "out"},
+      directory.path());
   EXPECT_EQ(outcome.code, 0) << outcome.err;
   EXPECT_NE(outcome.err.find("chains of cuts stay open, first in layer"), std::string::npos) << outcome.err;
 }
 
 TEST(SliceProgram, PreviewsOfSeveralLayersAreASheetAndWhatIsForImagesIsOneLine) {
   const Directory directory;
-  ASSERT_EQ(run_lamina({"slice", corpus("parameter_quality_nut.stl"), "--layer", "2", "--pattern", "raster", "--layers", "2:9", "--quiet", "-o", "out"},
-                       directory.path()).code, 0);
+  ASSERT_EQ(run_lamina({"slice", corpus("parameter_quality_nut.stl"), "--layer", "2", "--pattern", "raster", "--layers", "2:9",
+                        "--quiet", "-o", "out"},
+                       directory.path())
+                .code,
+            0);
   const auto preview = [&](const std::string& output, std::vector<std::string> more) {
     more.insert(more.begin(), {"preview", "out", "-o", output, "--width", "400"});
     return run_lamina(more, directory.path());
   };
-  const Outcome every = preview("every.png", {"--every", "3"}), count = preview("count.png", {"--count", "3"}), one = preview("one.png", {"--layer", "2"});
+  const Outcome every = preview("every.png", {"--every", "3"}), count = preview("count.png", {"--count", "3"}),
+                one = preview("one.png", {"--layer", "2"});
   for (const Outcome* outcome : {&every, &count, &one}) ASSERT_EQ(outcome->code, 0) << outcome->err;
   EXPECT_NE(every.err.find("every.png: 3 of 12 layers"), std::string::npos) << every.err;
-  const std::string pictures[] = {read_text(directory / "every.png"), read_text(directory / "count.png"), read_text(directory / "one.png")};
+  const std::string pictures[] = {read_text(directory / "every.png"), read_text(directory / "count.png"),
+                                  read_text(directory / "one.png")};
   for (const std::string& picture : pictures) EXPECT_EQ(picture.substr(0, 8), "\x89PNG\r\n\x1a\n");
   EXPECT_NE(pictures[0], pictures[1]) << "layers 2, 5, 8 and 3, 5, 7";
   EXPECT_NE(pictures[0], pictures[2]);

@@ -29,8 +29,8 @@ std::string zip_of(const std::string& name, const std::string& content) {
   deflate(&stream, Z_FINISH);
   packed.resize(stream.total_out);
   deflateEnd(&stream);
-  const auto crc = static_cast<std::uint32_t>(
-      crc32(0, reinterpret_cast<const Bytef*>(content.data()), static_cast<uInt>(content.size())));
+  const auto crc =
+      static_cast<std::uint32_t>(crc32(0, reinterpret_cast<const Bytef*>(content.data()), static_cast<uInt>(content.size())));
   const auto entry = [&](std::string& bytes) {
     append(bytes, 20, 2);  // version
     append(bytes, 0, 2);   // flags
@@ -99,17 +99,18 @@ TEST_F(WrongUse, UnknownNamesAreRefusedWithTheNearestKnownOne) {
 
 TEST_F(WrongUse, ValuesOutOfRangeNameTheirOption) {
   const std::pair<const char*, const char*> values[] = {
-      {"--dpi", "0"},          {"--dpi", "-1"},       {"--dpi", "1e9"},       {"--dpi", "nan"},      {"--dpi", "600x"},
-      {"--dpi", "600.5"},      {"--layer", "0"},      {"--layer", "-1"},      {"--layer", "NaN"},    {"--layer", "inf"},
-      {"--layer", "1e-9"},     {"--layer", "0.05mm"}, {"--bed", "0x0"},       {"--bed", "-10x10"},   {"--bed", "10"},
-      {"--bed", "2148x100"},   {"--bed", "nanxnan"},  {"--copies", "0"},      {"--copies", "1e10"},  {"--copies", "2.5"},
-      {"--gap", "-1"},         {"--scale", "0"},      {"--scale", "1,2"},     {"--scale", "nan"},    {"--rotate", "90"},
-      {"--shrink", "0"},       {"--shrink", "-1"},    {"--at", "-1,0"},       {"--at", "1"},         {"--unit", "parsec"},
-      {"--engine", "magic"},   {"--fill", "some"},    {"--mirror", "z"},      {"--layers", "3:3"},   {"--layers", "x"},
-      {"--shard", "0/4"},      {"--shard", "5/4"},    {"--threads", "-1"},    {"--memory", "0"},     {"--memory", "lots"},
-      {"--weld", "-1"},        {"--bottom", "-1"},    {"--dpi", ""},          {"-o", ""},
+      {"--dpi", "0"},        {"--dpi", "-1"},       {"--dpi", "1e9"},    {"--dpi", "nan"},     {"--dpi", "600x"},
+      {"--dpi", "600.5"},    {"--layer", "0"},      {"--layer", "-1"},   {"--layer", "NaN"},   {"--layer", "inf"},
+      {"--layer", "1e-9"},   {"--layer", "0.05mm"}, {"--bed", "0x0"},    {"--bed", "-10x10"},  {"--bed", "10"},
+      {"--bed", "2148x100"}, {"--bed", "nanxnan"},  {"--copies", "0"},   {"--copies", "1e10"}, {"--copies", "2.5"},
+      {"--gap", "-1"},       {"--scale", "0"},      {"--scale", "1,2"},  {"--scale", "nan"},   {"--rotate", "90"},
+      {"--shrink", "0"},     {"--shrink", "-1"},    {"--at", "-1,0"},    {"--at", "1"},        {"--unit", "parsec"},
+      {"--engine", "magic"}, {"--fill", "some"},    {"--mirror", "z"},   {"--layers", "3:3"},  {"--layers", "x"},
+      {"--shard", "0/4"},    {"--shard", "5/4"},    {"--threads", "-1"}, {"--memory", "0"},    {"--memory", "lots"},
+      {"--weld", "-1"},      {"--bottom", "-1"},    {"--dpi", ""},       {"-o", ""},
   };
-  for (const auto& [option, value] : values) refused(2, {"jet", "part.stl", "-o", "out", option, value}, {option + std::strlen(option) - 1});
+  for (const auto& [option, value] : values)
+    refused(2, {"jet", "part.stl", "-o", "out", option, value}, {option + std::strlen(option) - 1});
 }
 
 TEST_F(WrongUse, OptionsThatExcludeEachOtherAreRefused) {
@@ -168,15 +169,15 @@ TEST_F(WrongUse, WrittenFilesReplaceNeitherPartsNorDevices) {
 }
 
 TEST_F(WrongUse, StandardOutputThatIsFullIsAnOutputError) {
-  const std::string command = "cd '" + directory_.path().string() + "' && '" LAMINA_PROGRAM
-                              "' jet part.stl --dry-run --json --quiet > /dev/full 2> err; exit $?";
+  const std::string command = "cd '" + directory_.path().string() +
+                              "' && '" LAMINA_PROGRAM "' jet part.stl --dry-run --json --quiet > /dev/full 2> err; exit $?";
   EXPECT_EQ(WEXITSTATUS(std::system(command.c_str())), 4);
   EXPECT_NE(read_text(directory_ / "err").find("standard output"), std::string::npos);
 }
 
 TEST_F(WrongUse, ReaderThatHasGoneAwayIsNoReasonToCrash) {
-  const std::string command = "cd '" + directory_.path().string() + "' && { '" LAMINA_PROGRAM
-                              "' jet part.stl --dpi 60 --json -o out; echo $? > code; } 2>&1 | true";
+  const std::string command = "cd '" + directory_.path().string() +
+                              "' && { '" LAMINA_PROGRAM "' jet part.stl --dpi 60 --json -o out; echo $? > code; } 2>&1 | true";
   ASSERT_EQ(std::system(command.c_str()), 0);
   EXPECT_EQ(read_text(directory_ / "code"), "0\n");
   EXPECT_TRUE(std::filesystem::exists(directory_ / "out/manifest.json"));
@@ -201,8 +202,8 @@ TEST_F(WrongUse, DirectoriesOfOtherJobsAreLeftAlone) {
   refused(2, jet({"--dpi", "60"}), {"out/layers"});
   refused(2, jet({"--dpi", "60", "--resume"}), {"out/layers"});
   ASSERT_EQ(run_lamina(jet({"--dpi", "70", "--format", "png", "--overwrite", "--layers", "0:3"}), directory_.path()).code, 0);
-  EXPECT_EQ(files_below(directory_ / "out"), (std::vector<std::string>{"layers/000000.png", "layers/000001.png",
-                                                                       "layers/000002.png", "manifest.json"}));
+  EXPECT_EQ(files_below(directory_ / "out"),
+            (std::vector<std::string>{"layers/000000.png", "layers/000001.png", "layers/000002.png", "manifest.json"}));
 }
 
 TEST_F(WrongUse, NothingThatIsFinishedFallsOutOfTheManifest) {
@@ -221,7 +222,8 @@ TEST_F(WrongUse, NothingThatIsFinishedFallsOutOfTheManifest) {
   for (const char* shard : {"1/2", "2/2"}) {
     ASSERT_EQ(run_lamina(jet({"--layer", "0.5", "-o", "shards", "--shard", shard}), directory_.path()).code, 0);
   }
-  refused(2, jet({"--layer", "1", "-o", "shards", "--shard", "1/2", "--overwrite"}), {"shards/manifest-1-of-2.json", "another job"});
+  refused(2, jet({"--layer", "1", "-o", "shards", "--shard", "1/2", "--overwrite"}),
+          {"shards/manifest-1-of-2.json", "another job"});
   EXPECT_EQ(run_lamina(jet({"--layer", "0.5", "-o", "shards", "--shard", "1/2", "--overwrite"}), directory_.path()).code, 0);
   EXPECT_EQ(run_lamina({"merge", "shards", "-o", "shards"}, directory_.path()).code, 0);
   EXPECT_EQ(run_lamina({"verify", "shards"}, directory_.path()).code, 0);
@@ -248,8 +250,8 @@ TEST_F(WrongUse, FullDiskLeavesNothingHalfUnderAFinalName) {
   if (::mount("none", disk.c_str(), "tmpfs", 0, "size=64k") != 0) {
     GTEST_SKIP() << "FULL DISK NOT TESTED: a tmpfs cannot be mounted here (" << std::strerror(errno) << "); run as root";
   }
-  const Outcome outcome = run_lamina({"jet", "part.stl", "-o", "disk/out", "--format", "tiff-none", "--bed", "100x100", "--dpi", "300"},
-                                     directory_.path());
+  const Outcome outcome = run_lamina(
+      {"jet", "part.stl", "-o", "disk/out", "--format", "tiff-none", "--bed", "100x100", "--dpi", "300"}, directory_.path());
   EXPECT_EQ(outcome.code, 4) << outcome.err;
   EXPECT_NE(outcome.err.find("No space left"), std::string::npos) << outcome.err;
   EXPECT_EQ(std::ranges::count(outcome.err.substr(outcome.err.find("lamina:")), '\n'), 1) << outcome.err;
@@ -258,7 +260,8 @@ TEST_F(WrongUse, FullDiskLeavesNothingHalfUnderAFinalName) {
     EXPECT_GT(std::filesystem::file_size(disk + "/out/layers/" + name), 0u) << name;
     EXPECT_FALSE(name.ends_with(".part")) << name;
   }
-  const Outcome full = run_lamina({"jet", "part.stl", "--dry-run", "--quiet", "--save-job", "disk/job.toml"}, directory_.path());
+  const Outcome full =
+      run_lamina({"jet", "part.stl", "--dry-run", "--quiet", "--save-job", "disk/job.toml"}, directory_.path());
   EXPECT_TRUE(full.code == 4 || full.code == 0) << full.err;
   ::umount(disk.c_str());
 }

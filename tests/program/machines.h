@@ -97,8 +97,8 @@ class SlowHead {
       for (std::uint32_t i = 0; i < grid_.nozzles; ++i) {
         if ((vectors.step(s)[i / 64] >> (i % 64) & 1) == 0) continue;
         ++drops;
-        const bool blocked = std::find(machine_.head.blocked.begin(), machine_.head.blocked.end(), i) !=
-                             machine_.head.blocked.end();
+        const bool blocked =
+            std::find(machine_.head.blocked.begin(), machine_.head.blocked.end(), i) != machine_.head.blocked.end();
         if (blocked) ++blocked_drops;
         drop(sweep, s, i);
       }
@@ -108,8 +108,7 @@ class SlowHead {
  private:
   void drop(const Sweep& sweep, std::uint32_t step, std::uint32_t nozzle) {
     const double along = step * grid_.step_nm() - behind_[nozzle];  // from the centre of place 0
-    const double across = static_cast<double>(sweep.first_line) * grid_.line_nm +
-                          across_[nozzle];
+    const double across = static_cast<double>(sweep.first_line) * grid_.line_nm + across_[nozzle];
     const double place = along / grid_.place_nm, line = across / grid_.line_nm;
     // The nearest place; lags are rounded half down, so that a drop half way between two belongs to the farther one.
     const auto p = static_cast<std::int64_t>(std::floor(place + 0.5 + 1e-6));

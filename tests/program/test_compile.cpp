@@ -14,8 +14,8 @@ namespace {
 using testing::Image;
 using testing::random_image;
 using testing::runs_of;
-using testing::small_machine;
 using testing::SlowHead;
+using testing::small_machine;
 
 const Image kFigure = {{1, 0, 0, 1}, {0, 1, 0, 1}, {1, 1, 0, 0}, {0, 0, 1, 0}};
 
@@ -32,7 +32,8 @@ std::vector<Fired> vectors_of(const HeadGrid& grid, const Image& image, ProgramC
   const auto result = compile(grid, runs, scratch, [&](const Sweep& sweep, const SweepVectors& vectors) -> Status {
     for (std::uint32_t s = 0; s < vectors.steps; ++s) {
       std::string bits;
-      for (std::uint32_t i = 0; i < grid.nozzles; ++i) bits += '0' + int(vectors.bits[s * vectors.words + i / 64] >> i % 64 & 1);
+      for (std::uint32_t i = 0; i < grid.nozzles; ++i)
+        bits += '0' + int(vectors.bits[s * vectors.words + i / 64] >> i % 64 & 1);
       all.push_back({sweep, vectors.first_step + s, bits});
     }
     return {};
@@ -180,8 +181,10 @@ TEST(Compile, EverySetPixelIsFiredOnceAndNoOtherWhateverTheMounting) {
     const auto count = compile(grid, runs, scratch, [&](const Sweep& sweep, const SweepVectors& vectors) -> Status {
       ++emitted;
       EXPECT_EQ(sweep.of, grid.swaths(setup.machine.mounting.first_swath == FirstSwath::kBed
-                                          ? 0 : static_cast<std::uint32_t>(sweep.first_line - sweep.pass -
-                                                sweep.swath * (grid.swath_lines() - grid.overlap))) * grid.passes);
+                                          ? 0
+                                          : static_cast<std::uint32_t>(sweep.first_line - sweep.pass -
+                                                                       sweep.swath * (grid.swath_lines() - grid.overlap))) *
+                              grid.passes);
       head.sweep(sweep, vectors);
       return {};
     });
@@ -251,8 +254,12 @@ TEST(Compile, WithBlockedNozzlesTheDifferenceIsExactlyWhatIsReported) {
     EXPECT_EQ(head.outside, 0u);
     EXPECT_EQ(added, count->moved) << "seed " << seed;
     EXPECT_EQ(missing, count->moved + count->lost) << "seed " << seed;
-    if (rule == BlockedRule::kReport) { EXPECT_EQ(added, 0u); }
-    if (rule == BlockedRule::kSecondPass) { EXPECT_EQ(missing, 0u) << "seed " << seed; }
+    if (rule == BlockedRule::kReport) {
+      EXPECT_EQ(added, 0u);
+    }
+    if (rule == BlockedRule::kSecondPass) {
+      EXPECT_EQ(missing, 0u) << "seed " << seed;
+    }
   }
 }
 

@@ -20,7 +20,9 @@ Image image_of(const RunsView& runs) {
     const auto row = runs.row(r);
     for (std::size_t i = 0; i + 1 < row.size(); i += 2) {
       EXPECT_LT(row[i], row[i + 1]);
-      if (i > 0) { EXPECT_GT(row[i], row[i - 1]); }
+      if (i > 0) {
+        EXPECT_GT(row[i], row[i - 1]);
+      }
       for (std::uint32_t c = row[i]; c < row[i + 1]; ++c) image[r][c] = 1;
     }
   }
@@ -65,7 +67,7 @@ TEST(Erode, IsTheExactEllipticDistanceToTheNearestUnsetPixel) {
 }
 
 TEST(Erode, RadiiOfWholePixelsTakeThePixelsAtExactlyThatDistance) {
-  const PixelGrid grid{PixelAxis(1, 100'000, 1000), PixelAxis(1, 100'000, 1000)};  // pixels of 1 um
+  const PixelGrid grid{PixelAxis(1, 100'000, 1000), PixelAxis(1, 100'000, 1000)};                    // pixels of 1 um
   EXPECT_EQ(reach_of(grid, 5000, 5000).half_width, (std::vector<std::uint32_t>{5, 4, 4, 4, 3, 0}));  // 3-4-5
   EXPECT_EQ(reach_of(grid, 4999, 4999).half_width, (std::vector<std::uint32_t>{4, 4, 4, 3, 2}));
   EXPECT_TRUE(reach_of(grid, 0, 0).half_width.empty());

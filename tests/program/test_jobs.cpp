@@ -41,14 +41,16 @@ class PrintJobs : public ::testing::Test {
   }
   static Result<JetSummary> run(const Job& job) {
     const std::atomic<bool> cancel{false};
-    return run_jet(job, [](const ProgressEvent&) {}, cancel);
+    return run_jet(
+        job, [](const ProgressEvent&) {}, cancel);
   }
   static std::map<std::string, std::string> tree(const fs::path& path) {
     std::map<std::string, std::string> files;
     for (const auto& entry : fs::recursive_directory_iterator(path)) {
       if (!entry.is_regular_file()) continue;
       std::ifstream file(entry.path(), std::ios::binary);
-      files[fs::relative(entry.path(), path).string()] = {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
+      files[fs::relative(entry.path(), path).string()] = {std::istreambuf_iterator<char>(file),
+                                                          std::istreambuf_iterator<char>()};
     }
     return files;
   }
@@ -56,8 +58,10 @@ class PrintJobs : public ::testing::Test {
 };
 
 TEST_F(PrintJobs, ProgramsOfRealPartsPrintTheirImagesOnEveryShippedMachine) {
-  const std::pair<const char*, double> parts[] = {
-      {"parameter_quality_nut.stl", 1}, {"dental_crown.stl", 2}, {"quad_knot.obj", 0.3}, {"rabbit_9_overlapping_shells.obj", 1}};
+  const std::pair<const char*, double> parts[] = {{"parameter_quality_nut.stl", 1},
+                                                  {"dental_crown.stl", 2},
+                                                  {"quad_knot.obj", 0.3},
+                                                  {"rabbit_9_overlapping_shells.obj", 1}};
   for (const ShippedMachine& machine : shipped_machines()) {
     for (const auto& [part, scale] : parts) {
       Job made = job(part, scale, std::string(machine.name), std::string(machine.name) + part);
@@ -219,7 +223,8 @@ TEST_F(PrintJobs, PeakMemoryDoesNotGrowWithTheNumberOfLayers) {
   const auto stl = (directory_ / "prism.stl").string();
   {
     std::ofstream file(stl);
-    const double corner[8][3] = {{0, 0, 0}, {30, 0, 0}, {30, 20, 0}, {0, 20, 0}, {0, 0, 20}, {30, 0, 20}, {30, 20, 20}, {0, 20, 20}};
+    const double corner[8][3] = {{0, 0, 0},  {30, 0, 0},  {30, 20, 0},  {0, 20, 0},
+                                 {0, 0, 20}, {30, 0, 20}, {30, 20, 20}, {0, 20, 20}};
     const int face[12][3] = {{0, 2, 1}, {0, 3, 2}, {4, 5, 6}, {4, 6, 7}, {0, 1, 5}, {0, 5, 4},
                              {1, 2, 6}, {1, 6, 5}, {2, 3, 7}, {2, 7, 6}, {3, 0, 4}, {3, 4, 7}};
     file << "solid prism\n";
@@ -232,12 +237,15 @@ TEST_F(PrintJobs, PeakMemoryDoesNotGrowWithTheNumberOfLayers) {
   }
   const auto peak = [&](const std::string& layers) {
     const std::string out = (directory_ / layers).string(), json = (directory_ / "summary.json").string();
-    const std::string command = std::string(LAMINA_PROGRAM) + " jet " + stl + " --machine nuferbj --layer 0.01 --threads 2 --format null --layers " +
-                                layers + " --json --quiet -o " + out + " > " + json;
+    const std::string command = std::string(LAMINA_PROGRAM) + " jet " + stl +
+                                " --machine nuferbj --layer 0.01 --threads 2 --format null --layers " + layers +
+                                " --json --quiet -o " + out + " > " + json;
     EXPECT_EQ(std::system(command.c_str()), 0);
     std::ifstream file(json);
     const std::string text{std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
-    const auto value = [&](const std::string& key) { return std::stod(text.substr(text.find("\"" + key + "\":") + key.size() + 3)); };
+    const auto value = [&](const std::string& key) {
+      return std::stod(text.substr(text.find("\"" + key + "\":") + key.size() + 3));
+    };
     fs::remove_all(out);
     return std::pair(value("peak_resident_bytes"), value("peak_layer_bytes"));
   };
@@ -264,14 +272,20 @@ TEST_F(PrintJobs, WhatTheMachineCannotDoIsRefusedInOneLine) {
   refused([](Job& j) { j.parts[0].scale = {6, 6, 6}; }, "larger than the bed");
   refused([](Job& j) { j.parts[0].bottom_mm = 90; }, "above the build height of nuferbj, 100 mm");
   refused([](Job& j) { j.layer_mm = 0.004; }, "layer 0: 0.004 mm is less than a step of nuferbj");
-  refused([](Job& j) {
-    j.heights.mode = heights::Mode::kCusp;
-    j.heights.thickness_mm = "0.003..0.1";
-    j.heights.cusp_mm = 0.01;
-  }, "is less than a step of nuferbj");
+  refused(
+      [](Job& j) {
+        j.heights.mode = heights::Mode::kCusp;
+        j.heights.thickness_mm = "0.003..0.1";
+        j.heights.cusp_mm = 0.01;
+      },
+      "is less than a step of nuferbj");
   refused([](Job& j) { j.machine.scan_speed_mm_s = 500; }, "fires a nozzle");
   refused([](Job& j) { j.machine.profile = "nuferbk"; }, "did you mean 'nuferbj'");
-  refused([](Job& j) { j.dpi = {300, 300}, j.machine.dpi_given = true; }, "300 dpi across the scan: the head of nuferbj reaches 262.01");
+  refused(
+      [](Job& j) {
+        j.dpi = {300, 300}, j.machine.dpi_given = true;
+      },
+      "300 dpi across the scan: the head of nuferbj reaches 262.01");
   refused([](Job& j) { j.machine.blocked = std::vector<std::uint32_t>{128}; }, "there is no nozzle 128");
 }
 
@@ -287,7 +301,8 @@ TEST_F(PrintJobs, LayersThatEndBetweenStepsOfTheBuildVatAreTold) {
   ASSERT_TRUE(summary.ok()) << summary.error().message;
   ASSERT_EQ(summary->warnings.size(), 1u);
   EXPECT_NE(summary->warnings[0].find("first 0, end beside the 0.005 mm steps of nuferbj's build vat, by up to 0.002 mm"),
-            std::string::npos) << summary->warnings[0];
+            std::string::npos)
+      << summary->warnings[0];
 }
 
 }  // namespace

@@ -48,8 +48,8 @@ void expect_words(const std::string& text, std::initializer_list<const char*> wo
 TEST_F(MachineCommands, CheckTellsWhatFollowsFromAProfile) {
   // 137.1 um at 45 degrees: lines of 96.944 um, 262 dpi; 4250 Hz over them 412 mm/s; 98 mm are 1011 pixels, 8 swaths of 128.
   expect_words(lamina("machines --check nuferbj"),
-               {"262.006 dpi", "1.000000 pixels a nozzle", "128 lines, 12.409 mm wide", "1011 x 1011 pixels", "128397 bytes as bits",
-                "8 swaths", "at most 412.0 mm/s", "s a full layer"});
+               {"262.006 dpi", "1.000000 pixels a nozzle", "128 lines, 12.409 mm wide", "1011 x 1011 pixels",
+                "128397 bytes as bits", "8 swaths", "at most 412.0 mm/s", "s a full layer"});
   // Equation (1): tan 31 = 0.600861 and 76 steps; cos 31 of the pitch between lines.
   expect_words(lamina("machines --check nuferbj-31"), {"59.0000 degrees", "0.600861 pixels a nozzle", "76 steps", "117.5176"});
   expect_words(lamina("machines --check nuferbj-360dpi"), {"30.97", "360.000 dpi", "1.66"});
@@ -101,29 +101,35 @@ TEST_F(MachineCommands, PreviewShowsALayerAtAStepOfASwath) {
   lamina("jet " + part + " " + part + " --material steel,bronze --machine nuferbj --layer 4 -o " + at("out"));
   const auto picture = [&](const std::string& options, int expected = 0) {
     fs::remove(at("p.png"));
-    const std::string said = lamina("preview " + at("out") + " -o " + at("p.png") + " --layer 1 --width 600 " + options, expected);
+    const std::string said =
+        lamina("preview " + at("out") + " -o " + at("p.png") + " --layer 1 --width 600 " + options, expected);
     return expected == 0 ? text(at("p.png")) : said;
   };
-  const std::string early = picture("--swath 4 --step 480"), late = picture("--swath 4 --step 640"), middle = picture("--swath middle");
+  const std::string early = picture("--swath 4 --step 480"), late = picture("--swath 4 --step 640"),
+                    middle = picture("--swath middle");
   for (const std::string& one : {early, late, middle}) EXPECT_EQ(one.substr(0, 8), "\x89PNG\r\n\x1a\n");
   EXPECT_NE(early, late);
   expect_words(picture("--swath 0", 2), {"--swath 0: fires nothing in layer 1; those that do are"});
   expect_words(picture("--swath 4 --step 99999", 2), {"--step 99999: swath 4 of layer 1 fires at steps "});
-  expect_words(lamina("preview " + at("out") + " -o " + at("p.png") + " --swath 4 --layer 99", 2), {"--layer 99: the job has layers 0 to "});
+  expect_words(lamina("preview " + at("out") + " -o " + at("p.png") + " --swath 4 --layer 99", 2),
+               {"--layer 99: the job has layers 0 to "});
 }
 
 TEST_F(MachineCommands, WhatAJobCannotTellOrJetIsSaid) {
   const std::string nut = std::string(LAMINA_TEST_DIR) + "/corpus/parameter_quality_nut.stl ";
   expect_words(lamina("jet " + nut + "--machine jet1000 --layer 4 --core 0 --shell 1 -o " + at("shell")), {"layers"});
-  expect_words(lamina("jet " + nut + "--dpi 100 --layer 4 --core 0 --shell 0.2 -o " + at("thin")), {"dose.core: 0 without a shell", " 0 set"});
+  expect_words(lamina("jet " + nut + "--dpi 100 --layer 4 --core 0 --shell 0.2 -o " + at("thin")),
+               {"dose.core: 0 without a shell", " 0 set"});
   const std::string words = lamina("verify " + at("shell"));
   expect_words(words, {"does not tell other movements nor powder", "ml of binder"});
   EXPECT_EQ(words.find("powder fed"), std::string::npos) << words;
   lamina("jet " + nut + "--machine hp45 --layer 4 -o " + at("hp45"));
   expect_words(lamina("verify " + at("hp45")), {" h, ", "powder fed"});
   expect_words(lamina("jet " + nut + "--machine hp45 --layer 4 --core 0 -o " + at("none")), {"dose.core: 0 without a shell"});
-  expect_words(lamina("jet " + nut + "--machine hp45 --layer 4 --scale 20 -o " + at("large"), 2), {"use another machine or a smaller --scale"});
-  expect_words(lamina("extrude " + nut + "--scale 20 -o " + at("large.gcode"), 2), {"use another machine or a smaller --scale"});
+  expect_words(lamina("jet " + nut + "--machine hp45 --layer 4 --scale 20 -o " + at("large"), 2),
+               {"use another machine or a smaller --scale"});
+  expect_words(lamina("extrude " + nut + "--scale 20 -o " + at("large.gcode"), 2),
+               {"use another machine or a smaller --scale"});
 }
 
 }  // namespace

@@ -57,7 +57,8 @@ class TwoPowders : public ::testing::Test {
   }
   static Result<JetSummary> run(const Job& job) {
     const std::atomic<bool> cancel{false};
-    return run_jet(job, [](const ProgressEvent&) {}, cancel);
+    return run_jet(
+        job, [](const ProgressEvent&) {}, cancel);
   }
   static void expect_good(const Job& job) {
     const auto report = verify(job.output, {});
@@ -90,9 +91,9 @@ void expect_same(const Runs& a, const Runs& b, const std::string& what) {
 }
 
 TEST_F(TwoPowders, ImagesAreDisjointAndTogetherThatOfOnePowderWhereverThePartsStand) {
-  const std::array<std::array<double, 2>, 3> places[] = {{{{20, 30}, {55, 40}, {30, 60}}},    // apart
-                                                         {{{30, 30}, {35, 33}, {40, 36}}},    // all over each other
-                                                         {{{30, 30}, {30, 30}, {30, 30}}}};   // inside of each other
+  const std::array<std::array<double, 2>, 3> places[] = {{{{20, 30}, {55, 40}, {30, 60}}},   // apart
+                                                         {{{30, 30}, {35, 33}, {40, 36}}},   // all over each other
+                                                         {{{30, 30}, {30, 30}, {30, 30}}}};  // inside of each other
   int variant = 0;
   for (const auto& place : places) {
     std::vector<PartRequest> parts = {part("parameter_quality_nut.stl", 1, "steel"), part("dental_crown.stl", 2, "bronze"),
@@ -136,7 +137,8 @@ TEST_F(TwoPowders, ImagesAreDisjointAndTogetherThatOfOnePowderWhereverThePartsSt
 
 TEST_F(TwoPowders, TheVatsThatFeedALayerFollowTheRuleOfTheProfileAndAreChecked) {
   // The nut is low: layers of both materials below, of the second one above.
-  const std::vector<PartRequest> parts = {part("parameter_quality_nut.stl", 0.8, "steel"), part("dental_crown.stl", 3, "bronze")};
+  const std::vector<PartRequest> parts = {part("parameter_quality_nut.stl", 0.8, "steel"),
+                                          part("dental_crown.stl", 3, "bronze")};
   for (const std::string rule : {"first", "second", "majority", "both"}) {
     Job made = job(parts, rule, profile("materials = [\"bronze\", \"steel\"]\nvat_rule = \"" + rule + "\""));
     const auto summary = run(made);
@@ -164,7 +166,8 @@ TEST_F(TwoPowders, TheVatsThatFeedALayerFollowTheRuleOfTheProfileAndAreChecked) 
   ASSERT_FALSE(refused.ok());
   EXPECT_EQ(refused.error().fault, Fault::kUsage);
   EXPECT_NE(refused.error().message.find("layer 0 (z 0.750 mm): holds steel, bronze, which powder.vat_rule of nuferbj refuses"),
-            std::string::npos) << refused.error().message;
+            std::string::npos)
+      << refused.error().message;
 }
 
 TEST_F(TwoPowders, EveryDialectSaysWhichVatFeeds) {
@@ -244,7 +247,8 @@ TEST_F(TwoPowders, ShardsMergedResumedAndDamagedLayersBehaveAsThoseOfOnePowder) 
 
 TEST_F(TwoPowders, OnePowderOfTheJobIsAnOrdinaryJobFedByItsVat) {
   const Job plain = job({part("parameter_quality_nut.stl", 1, "")}, "plain");
-  const Job second = job({part("parameter_quality_nut.stl", 1, "steel")}, "second", profile("materials = [\"bronze\", \"steel\"]"));
+  const Job second =
+      job({part("parameter_quality_nut.stl", 1, "steel")}, "second", profile("materials = [\"bronze\", \"steel\"]"));
   ASSERT_TRUE(run(plain).ok());
   ASSERT_TRUE(run(second).ok());
   expect_good(second);

@@ -41,11 +41,11 @@ Written write_layer(const ResolvedMachine& resolved, const RunsView& image) {
   write::ProgramBytes bytes;
   writer->begin_layer(cycle, bytes);
   program::CompileScratch scratch;
-  const auto count = program::compile(resolved.grid, image, scratch,
-                                      [&](const Sweep& sweep, const SweepVectors& vectors) -> Status {
-                                        writer->sweep(sweep, vectors, bytes);
-                                        return {};
-                                      });
+  const auto count =
+      program::compile(resolved.grid, image, scratch, [&](const Sweep& sweep, const SweepVectors& vectors) -> Status {
+        writer->sweep(sweep, vectors, bytes);
+        return {};
+      });
   EXPECT_TRUE(count.ok());
   writer->end_layer(cycle, bytes);
   return {std::string(reinterpret_cast<const char*>(bytes.data()), bytes.size()), *count};
@@ -108,7 +108,8 @@ struct Standing {
 };
 
 Standing scaled(const Part& part, double side_mm, const Machine& machine) {
-  const double factor = side_mm * 1e6 / static_cast<double>(std::max({part.bounds.width(), part.bounds.depth(), std::int64_t{1}}));
+  const double factor =
+      side_mm * 1e6 / static_cast<double>(std::max({part.bounds.width(), part.bounds.depth(), std::int64_t{1}}));
   const auto point = [&](const Point3& p) {
     const auto nm = [&](Nm v) { return static_cast<Nm>(std::llround(v * factor)); };
     return Point3{nm(p.x), nm(p.y), nm(p.z)};
@@ -128,9 +129,10 @@ Standing scaled(const Part& part, double side_mm, const Machine& machine) {
     const Box& box = made.meshes[instance.mesh].bounds;
     made.bounds.add(Box{moved(box.lo, made.instances.back().offset), moved(box.hi, made.instances.back().offset)});
   }
-  const Point3 to{static_cast<Nm>(machine.bed.size_mm[0] * 5e5 - static_cast<double>(made.bounds.width()) / 2) - made.bounds.lo.x,
-                  static_cast<Nm>(machine.bed.size_mm[1] * 5e5 - static_cast<double>(made.bounds.depth()) / 2) - made.bounds.lo.y,
-                  -made.bounds.lo.z};
+  const Point3 to{
+      static_cast<Nm>(machine.bed.size_mm[0] * 5e5 - static_cast<double>(made.bounds.width()) / 2) - made.bounds.lo.x,
+      static_cast<Nm>(machine.bed.size_mm[1] * 5e5 - static_cast<double>(made.bounds.depth()) / 2) - made.bounds.lo.y,
+      -made.bounds.lo.z};
   for (Instance& instance : made.instances) instance.offset = moved(instance.offset, to);
   made.bounds = {moved(made.bounds.lo, to), moved(made.bounds.hi, to)};
   return made;
@@ -161,8 +163,8 @@ TEST(Replay, EveryClosedModelIsPrintedBitForBitOnEveryShippedMachine) {
       // 16 mm are 500,000 pixels of 1200 dpi; the coarse machines print larger parts.
       const double dots = 25.4e6 / resolved.grid.line_nm;
       Standing standing = scaled(*part, std::min(16.0 * 1200 / dots, 0.6 * resolved.machine.bed.size_mm[0]), resolved.machine);
-      const auto rasterizer = raster::Rasterizer::build(standing.meshes, standing.instances, resolved.grid.image,
-                                                        FillRule::kNonzero, false, true);
+      const auto rasterizer =
+          raster::Rasterizer::build(standing.meshes, standing.instances, resolved.grid.image, FillRule::kNonzero, false, true);
       ASSERT_TRUE(rasterizer.ok());
       raster::LayerScratch scratch;
       Runs runs;
@@ -214,8 +216,9 @@ TEST(Replay, EveryDialectSpeaksForAnyMountingDirectionAndBlockedNozzle) {
 
 /// Whether a fault says where: a swath and a step of it, or that the first of them has not been reached.
 bool tells_the_place(const std::string& fault) {
-  static const std::regex place("layer 7, (swath [0-9]+, (step -?[0-9]+|before its first step)|before its first swath|powder cycle"
-                                "|line [0-9]+ across, place [0-9]+ along, which no swath comes over): .*");
+  static const std::regex place(
+      "layer 7, (swath [0-9]+, (step -?[0-9]+|before its first step)|before its first swath|powder cycle"
+      "|line [0-9]+ across, place [0-9]+ along, which no swath comes over): .*");
   return std::regex_match(fault, place);
 }
 

@@ -27,9 +27,7 @@ Int128 plane_side(const Triangle& t, Int128 x, Int128 y, Int128 z) {
 
 Runs reference_layer(std::span<const Triangle> triangles, const PixelGrid& grid, Nm plane, FillRule rule) {
   const std::int64_t columns = grid.columns(), rows = grid.rows();
-  const auto centre = [](const PixelAxis& axis, std::int64_t i) {
-    return ((2 * i + 1) * axis.span) / (2 * axis.dots);
-  };
+  const auto centre = [](const PixelAxis& axis, std::int64_t i) { return ((2 * i + 1) * axis.span) / (2 * axis.dots); };
   std::vector<std::map<std::int64_t, int>> steps(static_cast<std::size_t>(rows));  // column -> change of winding
   for (const Triangle& t : triangles) {
     const Point3 corner[3] = {t.a, t.b, t.c};
@@ -68,9 +66,7 @@ Runs reference_layer(std::span<const Triangle> triangles, const PixelGrid& grid,
     bool solid = false;
     for (const auto& [column, step] : steps[static_cast<std::size_t>(row)]) {
       winding += step;
-      const bool now = rule == FillRule::kNonzero    ? winding != 0
-                       : rule == FillRule::kPositive ? winding > 0
-                                                     : winding % 2 != 0;
+      const bool now = rule == FillRule::kNonzero ? winding != 0 : rule == FillRule::kPositive ? winding > 0 : winding % 2 != 0;
       if (now != solid) runs.change.push_back(static_cast<std::uint32_t>(column));
       solid = now;
     }

@@ -157,7 +157,11 @@ TEST(Engines, ManySmallFacetsThroughEveryClusterAndBand) {
   }
   Triangles part;
   const auto at = [&](int i, int j) { return top[static_cast<std::size_t>(j * (n + 1) + i)]; };
-  const auto flat = [&](int i, int j) { Point3 p = at(i, j); p.z = 0; return p; };
+  const auto flat = [&](int i, int j) {
+    Point3 p = at(i, j);
+    p.z = 0;
+    return p;
+  };
   for (int j = 0; j < n; ++j) {
     for (int i = 0; i < n; ++i) {
       part.push_back({at(i, j), at(i + 1, j), at(i + 1, j + 1)});
@@ -202,14 +206,16 @@ TEST(Scan, AnOpenPartEndsWhereItEndsWhateverStandsBesideIt) {
   const Triangles whole = box({1'000'000, 1'000'000, 0}, {4'000'000, 3'000'000, 1'000'000});
   Triangles without_right = whole, without_left;
   std::erase_if(without_right, [](const Triangle& t) { return std::min({t.a.x, t.b.x, t.c.x}) == 4'000'000; });
-  std::copy_if(whole.begin(), whole.end(), std::back_inserter(without_left),
-               [](const Triangle& t) { return std::max({t.a.x, t.b.x, t.c.x}) != 1'000'000; });
+  std::copy_if(whole.begin(), whole.end(), std::back_inserter(without_left), [](const Triangle& t) {
+    return std::max({t.a.x, t.b.x, t.c.x}) != 1'000'000;
+  });
   ASSERT_EQ(without_right.size() + 2, whole.size());
   ASSERT_EQ(without_left.size() + 2, whole.size());
   // The open ones add up to zero together, and a whole one stands behind each.
   std::vector<Mesh> meshes{make_mesh(without_right), make_mesh(without_left), make_mesh(whole)};
   meshes[0].closed = meshes[1].closed = false;
-  const std::vector<Instance> instances{{0, {0, 0, 0}}, {2, {6'000'000, 0, 0}}, {1, {12'000'000, 0, 0}}, {2, {18'000'000, 0, 0}}};
+  const std::vector<Instance> instances{
+      {0, {0, 0, 0}}, {2, {6'000'000, 0, 0}}, {1, {12'000'000, 0, 0}}, {2, {18'000'000, 0, 0}}};
   for (const FillRule rule : {FillRule::kNonzero, FillRule::kPositive, FillRule::kEvenOdd}) {
     std::vector<Mesh> copies = meshes;
     auto rasterizer = raster::Rasterizer::build(copies, instances, grid, rule, true, true);

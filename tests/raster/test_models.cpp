@@ -143,9 +143,7 @@ void check_folder(const fs::path& folder, std::uint32_t least_parts) {
             << " layers, 2 engines, " << checked.pixels << " set pixels\n";
 }
 
-TEST(Models, EveryPartOfTheCorpusIsExactAt300And1200Dpi) {
-  check_folder(fs::path(LAMINA_TEST_DIR) / "corpus", 5);
-}
+TEST(Models, EveryPartOfTheCorpusIsExactAt300And1200Dpi) { check_folder(fs::path(LAMINA_TEST_DIR) / "corpus", 5); }
 
 TEST(Models, EveryPartOfTheModelFolderIsExactAt300And1200Dpi) {
   const char* folder = std::getenv("LAMINA_MODELS");

@@ -49,8 +49,9 @@ inline GcodeFile read_gcode(const std::string& text) {
     std::istringstream words(code);
     std::string command;
     if (!(words >> command)) continue;
-    static const std::set<std::string> kKnown = {"G0", "G1", "G20", "G21", "G28", "G90", "G92", "M82", "M83", "M84", "M104", "M106",
-                                                 "M107", "M109", "M140", "M190", "M204", "M572", "M900", "SET_PRESSURE_ADVANCE"};
+    static const std::set<std::string> kKnown = {
+        "G0",   "G1",   "G20",  "G21",  "G28",  "G90",  "G92",  "M82",  "M83",  "M84",
+        "M104", "M106", "M107", "M109", "M140", "M190", "M204", "M572", "M900", "SET_PRESSURE_ADVANCE"};
     if (kKnown.count(command) == 0) wrong("unknown command");
     if (command == "SET_PRESSURE_ADVANCE") continue;
     double at[5] = {x, y, z, e, feed};
@@ -61,7 +62,8 @@ inline GcodeFile read_gcode(const std::string& text) {
       const std::string letters = "XYZEF";
       const auto place = letters.find(word[0]);
       if (word.size() > 1 && *end != 0) wrong("not a number: " + word);
-      if (word.size() > 1 && word.find_first_not_of("0123456789.-", 1) != std::string::npos) wrong("not a plain decimal: " + word);
+      if (word.size() > 1 && word.find_first_not_of("0123456789.-", 1) != std::string::npos)
+        wrong("not a plain decimal: " + word);
       if ((command == "G0" || command == "G1" || command == "G92")) {
         if (place == std::string::npos || word.size() < 2) {
           wrong("unknown letter");

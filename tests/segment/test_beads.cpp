@@ -41,7 +41,8 @@ TEST(BeadRaster, SetsThePixelsWhoseCentresLieInABeadAndNoOthers) {
     // Steps of whole pixels at 254 dpi put many centres exactly on edges.
     const std::int64_t step = round % 4 == 1 ? 50'000 : 1;
     const auto place = [&](std::int64_t limit) {
-      return static_cast<Nm>(std::uniform_int_distribution<std::int64_t>(-300'000 / step, (limit + 300'000) / step)(random) * step);
+      return static_cast<Nm>(std::uniform_int_distribution<std::int64_t>(-300'000 / step, (limit + 300'000) / step)(random) *
+                             step);
     };
     const int beads = round % 5 + 1;
     std::vector<std::tuple<Point2, Point2, Nm, BeadEnds>> list;
@@ -99,7 +100,9 @@ TEST(BeadRaster, SetOperationsAreThoseOfTheirPixels) {
       combine(a, b, operation, out);
       const auto bits = bits_of(out);
       for (std::size_t i = 0; i < bits.size(); ++i) {
-        const bool expected = operation == SetOperation::kUnion ? p[i] || q[i] : operation == SetOperation::kIntersection ? p[i] && q[i] : p[i] && !q[i];
+        const bool expected = operation == SetOperation::kUnion          ? p[i] || q[i]
+                              : operation == SetOperation::kIntersection ? p[i] && q[i]
+                                                                         : p[i] && !q[i];
         ASSERT_EQ(bits[i], expected);
       }
     }

@@ -4,9 +4,9 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
+#include "pipeline/extrude_request.h"
 #include "pipeline/extruder_profile.h"
 #include "pipeline/fill_request.h"
-#include "pipeline/extrude_request.h"
 #include "tests/pipeline/program.h"
 #include "tests/segment/gcode_reader.h"
 #include "tests/segment/table.h"
@@ -25,14 +25,18 @@ class CalibrateProgram : public testing::Test {
   }
   /// Tables 11 to 15 as a person would fill them in: all thick speeds that were tried.
   std::string measured() {
-    std::string text = "test,percent,thick_speed_percent,region,wall_mm,thick_mm,thin_mm,continuous_mm,stable_mm\nflow,,,,0.94,,,,\n";
+    std::string text =
+        "test,percent,thick_speed_percent,region,wall_mm,thick_mm,thin_mm,continuous_mm,stable_mm\nflow,,,,0.94,,,,\n";
     for (const auto& row : test::table(11)) {
-      text += "speed," + row.at("thin_speed_percent") + ",,,," + row.at("thick_width_max_mm") + "," + row.at("thin_width_min_mm") + ",," + row.at("stabilisation_distance_mm") + "\n";
+      text += "speed," + row.at("thin_speed_percent") + ",,,," + row.at("thick_width_max_mm") + "," +
+              row.at("thin_width_min_mm") + ",," + row.at("stabilisation_distance_mm") + "\n";
     }
-    for (const auto& row : test::table(12)) text += "extrusion," + row.at("thin_extrusion_percent") + ",,,,," + row.at("thin_width_min_mm") + ",,\n";
+    for (const auto& row : test::table(12))
+      text += "extrusion," + row.at("thin_extrusion_percent") + ",,,,," + row.at("thin_width_min_mm") + ",,\n";
     for (const auto& [table, speed] : {std::pair{13, "100"}, {14, "75"}, {15, "50"}}) {
       for (const auto& row : test::table(table)) {
-        text += "repeated," + row.at("sample").substr(1) + "," + speed + "," + row.at("region") + ",," + row.at("thick_mm") + "," + row.at("thin_mm") + "," + row.at("continuous_mm") + ",\n";
+        text += "repeated," + row.at("sample").substr(1) + "," + speed + "," + row.at("region") + ",," + row.at("thick_mm") +
+                "," + row.at("thin_mm") + "," + row.at("continuous_mm") + ",\n";
       }
     }
     return text;
@@ -62,10 +66,12 @@ TEST_F(CalibrateProgram, TheDocumentsOwnWidthsGiveItsOwnSpeedsAndSpacings) {
   ASSERT_TRUE(profile.ok()) << profile.error().message;
   EXPECT_TRUE(profile->own_calibration);
   for (const auto& row : test::table(11)) {
-    EXPECT_DOUBLE_EQ(segment::stable_distance(profile->calibration, number(row, "thin_speed_percent")).value, number(row, "stabilisation_distance_mm"));
+    EXPECT_DOUBLE_EQ(segment::stable_distance(profile->calibration, number(row, "thin_speed_percent")).value,
+                     number(row, "stabilisation_distance_mm"));
   }
   for (const auto& row : test::table(12)) {
-    EXPECT_DOUBLE_EQ(segment::thin_width_at_extrusion(profile->calibration, number(row, "thin_extrusion_percent")).value, number(row, "thin_width_min_mm"));
+    EXPECT_DOUBLE_EQ(segment::thin_width_at_extrusion(profile->calibration, number(row, "thin_extrusion_percent")).value,
+                     number(row, "thin_width_min_mm"));
   }
   for (const auto& row : wanted) {
     pipeline::SegmentRequest request;
@@ -82,12 +88,16 @@ TEST_F(CalibrateProgram, TheDocumentsOwnWidthsGiveItsOwnSpeedsAndSpacings) {
 TEST_F(CalibrateProgram, WidthsThatStillChangeAlongThePartAreToBePrintedAgain) {
   std::string text = "test,percent,thick_speed_percent,region,thick_mm,thin_mm,continuous_mm\n";
   for (const auto& row : test::table(13)) {
-    if (row.at("sample") == "A125") text += "repeated,125,100," + row.at("region") + "," + row.at("thick_mm") + "," + row.at("thin_mm") + "," + row.at("continuous_mm") + "\n";
+    if (row.at("sample") == "A125")
+      text += "repeated,125,100," + row.at("region") + "," + row.at("thick_mm") + "," + row.at("thin_mm") + "," +
+              row.at("continuous_mm") + "\n";
   }
   test::write_text(folder / "widths.csv", text);
   const auto outcome = run({"--measured", "widths.csv", "--machine", "anet-a8", "-o", "own.toml"});
   EXPECT_EQ(outcome.code, 0);
-  EXPECT_NE(outcome.err.find("extrusion 125 %: widths change by 0.100 mm along the part at 100 % of the speed"), std::string::npos) << outcome.err;
+  EXPECT_NE(outcome.err.find("extrusion 125 %: widths change by 0.100 mm along the part at 100 % of the speed"),
+            std::string::npos)
+      << outcome.err;
 }
 
 TEST_F(CalibrateProgram, WrongTablesAreOneLineThatNamesThePlace) {
@@ -135,7 +145,8 @@ TEST_F(CalibrateProgram, PiecesAreThoseOfTheDocumentAndTheirFilesBelongTogether)
   EXPECT_EQ(flow.layers.size(), 34);
   EXPECT_EQ(flow.layers[0].beads.size(), 8);
   // The job file is the piece.
-  const auto again = test::run_lamina({"extrude", "--job", folder / "pieces/4-speed.toml", "-o", folder / "again.gcode", "--quiet"}, folder.path());
+  const auto again = test::run_lamina(
+      {"extrude", "--job", folder / "pieces/4-speed.toml", "-o", folder / "again.gcode", "--quiet"}, folder.path());
   EXPECT_EQ(again.code, 0) << again.err;
   EXPECT_EQ(test::read_text(folder / "again.gcode"), test::read_text(folder / "pieces/4-speed.gcode"));
   // Measurements are never written over.

@@ -30,7 +30,8 @@ std::string published(std::int64_t from, std::int64_t to) {
   std::string text;
   for (const auto& p : pieces(cut, from, to)) {
     if (p.thickness == Thickness::kReference) continue;
-    text += (text.empty() ? "" : " ") + std::to_string(p.begin / kNmPerMm) + (p.thickness == Thickness::kThin ? ":thin" : ":thick");
+    text +=
+        (text.empty() ? "" : " ") + std::to_string(p.begin / kNmPerMm) + (p.thickness == Thickness::kThin ? ":thin" : ":thick");
   }
   return text;
 }
@@ -139,11 +140,13 @@ TEST(CutLine, LawsHoldForRandomLines) {
 
 TEST(CutLine, LengthsOfTheSpeedTestGiveOneThinStretchBetweenEqualEnds) {
   LineCut cut{CutRule::kThickEnds, 30'000'000, 10'000'000, 0, 5'000'000};
-  const std::vector<Piece> whole = {{0, 10'000'000, Thickness::kThick}, {10'000'000, 40'000'000, Thickness::kThin},
+  const std::vector<Piece> whole = {{0, 10'000'000, Thickness::kThick},
+                                    {10'000'000, 40'000'000, Thickness::kThin},
                                     {40'000'000, 50'000'000, Thickness::kThick}};
   EXPECT_EQ(pieces(cut, 0, 50'000'000), whole);
   // Inside of a contour the line is a little shorter: the ends share what is missing.
-  const std::vector<Piece> inside = {{400'000, 10'000'000, Thickness::kThick}, {10'000'000, 40'000'000, Thickness::kThin},
+  const std::vector<Piece> inside = {{400'000, 10'000'000, Thickness::kThick},
+                                     {10'000'000, 40'000'000, Thickness::kThin},
                                      {40'000'000, 49'600'000, Thickness::kThick}};
   EXPECT_EQ(pieces(cut, 400'000, 49'600'000), inside);
 }
@@ -153,7 +156,8 @@ Toolpaths zigzag(std::int32_t first, std::int32_t count, double degrees) {
   Toolpaths paths;
   const double c = std::cos(degrees * 3.14159265358979 / 180), s = std::sin(degrees * 3.14159265358979 / 180);
   const auto at = [&](double u, double v) {
-    return Point2{static_cast<Nm>(std::llround(1e6 * (100 + u * c - v * s))), static_cast<Nm>(std::llround(1e6 * (100 + u * s + v * c)))};
+    return Point2{static_cast<Nm>(std::llround(1e6 * (100 + u * c - v * s))),
+                  static_cast<Nm>(std::llround(1e6 * (100 + u * s + v * c)))};
   };
   for (std::int32_t n = first; n < first + count; ++n) {
     const bool odd = (n & 1) != 0;
@@ -250,7 +254,8 @@ TEST(ExpandToolpaths, ClosedCurvesAreCutIntoWholePeriodsFromTheMiddleOfAThickStr
     const double seam = static_cast<double>(cut.shift) - std::floor(static_cast<double>(cut.shift) / length) * length;
     const auto edge = static_cast<std::size_t>(std::upper_bound(walked.begin(), walked.end() - 1, seam) - walked.begin()) - 1;
     const double along = walked[edge] + expand_detail::distance(paths.point[edge], begin);
-    EXPECT_LT(std::min(std::abs(along - seam), length - std::abs(along - seam)), 45) << turn;  // whole turns are rounded to 1 nm
+    EXPECT_LT(std::min(std::abs(along - seam), length - std::abs(along - seam)), 45)
+        << turn;  // whole turns are rounded to 1 nm
 
     const double slack = 4 + corners;  // ends of stretches are rounded to the nm
     const auto periods = static_cast<std::int64_t>(length / static_cast<double>(cut.line.thin + cut.line.thick));

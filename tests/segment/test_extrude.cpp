@@ -56,12 +56,14 @@ class ExtrudeProgram : public testing::Test {
     std::vector<double> angles;
     for (int i = 0; i < 360; ++i) angles.push_back((i + 0.5) * std::numbers::pi / 180);
     for (const double sx : {-1.0, 1.0}) {
-      for (const double sy : {-1.0, 1.0}) angles.push_back(std::fmod(std::atan2(sy * y, sx * x) + 2 * std::numbers::pi, 2 * std::numbers::pi));
+      for (const double sy : {-1.0, 1.0})
+        angles.push_back(std::fmod(std::atan2(sy * y, sx * x) + 2 * std::numbers::pi, 2 * std::numbers::pi));
     }
     std::sort(angles.begin(), angles.end());
     for (const double a : angles) {
       const double c = std::cos(a), s = std::sin(a);
-      const double reach = std::min(std::abs(c) > 1e-12 ? x / 2 / std::abs(c) : 1e9, std::abs(s) > 1e-12 ? y / 2 / std::abs(s) : 1e9);
+      const double reach =
+          std::min(std::abs(c) > 1e-12 ? x / 2 / std::abs(c) : 1e9, std::abs(s) > 1e-12 ? y / 2 / std::abs(s) : 1e9);
       outer.push_back({reach * c, reach * s});
       inner.push_back({radius * c, radius * s});
     }
@@ -97,9 +99,12 @@ class ExtrudeProgram : public testing::Test {
 
 TEST_F(ExtrudeProgram, PointsOfFukudaAre346InEachOf79Layers) {
   const std::string part = block(74, 100, 20, 12.5);
-  const Outcome result = run("extrude " + part + " --machine marlin --layer 0.254 --walls 0 --fill segmented --segment-rule fukuda --thin 5 --thick 3 "
-                         "--bead 0.508 --bead-gap 2.4 --angle 0 --angle-step 0 --set fill.first_line_mm=0.508 --set fill.end_inset_mm=0.254 "
-                         "--quiet --json -o " + file("a.gcode"));
+  const Outcome result =
+      run("extrude " + part +
+          " --machine marlin --layer 0.254 --walls 0 --fill segmented --segment-rule fukuda --thin 5 --thick 3 "
+          "--bead 0.508 --bead-gap 2.4 --angle 0 --angle-step 0 --set fill.first_line_mm=0.508 --set fill.end_inset_mm=0.254 "
+          "--quiet --json -o " +
+          file("a.gcode"));
   ASSERT_EQ(result.code, 0) << result.err;
   const auto json = result.json();
   EXPECT_EQ(json["layers"], 79);
@@ -117,17 +122,20 @@ TEST_F(ExtrudeProgram, MemoryOfASegmentedJobIsThatOfThePlainOne) {
     std::vector<double> plain, segmented;
     for (int turn = 0; turn < 7; ++turn) {
       for (auto* peaks : {&plain, &segmented}) {
-        const Outcome result = run("extrude " + job + (peaks == &plain ? " --fill raster" : " --fill segmented " + segments) +
-                               " --threads 1 --quiet --json -o " + file(peaks == &plain ? "plain.gcode" : "segmented.gcode"));
+        const Outcome result =
+            run("extrude " + job + (peaks == &plain ? " --fill raster" : " --fill segmented " + segments) +
+                " --threads 1 --quiet --json -o " + file(peaks == &plain ? "plain.gcode" : "segmented.gcode"));
         EXPECT_EQ(result.code, 0) << result.err;
         peaks->push_back(result.json()["peak_resident_bytes"].get<double>());
       }
     }
-    EXPECT_GE(static_cast<double>(fs::file_size(file("segmented.gcode"))), least_text * static_cast<double>(fs::file_size(file("plain.gcode"))));
+    EXPECT_GE(static_cast<double>(fs::file_size(file("segmented.gcode"))),
+              least_text * static_cast<double>(fs::file_size(file("plain.gcode"))));
     for (auto* peaks : {&plain, &segmented}) std::sort(peaks->begin(), peaks->end());
     return segmented[3] / plain[3];
   };
-  const std::string fukuda = block(74, 100, 20, 12.5) + " --machine marlin --layer 0.254 --walls 0 --bead 0.508 --bead-gap 2.4 --angle 0 --angle-step 0 "
+  const std::string fukuda = block(74, 100, 20, 12.5) +
+                             " --machine marlin --layer 0.254 --walls 0 --bead 0.508 --bead-gap 2.4 --angle 0 --angle-step 0 "
                              "--set fill.first_line_mm=0.508 --set fill.end_inset_mm=0.254";
   EXPECT_LE(share(fukuda, "--segment-rule fukuda --thin 5 --thick 3", 2), 1.02);
   // Two megabytes of text a layer: it does not wait until the layers before it are written.
@@ -137,8 +145,11 @@ TEST_F(ExtrudeProgram, MemoryOfASegmentedJobIsThatOfThePlainOne) {
 
 TEST_F(ExtrudeProgram, TestPiecesOfDiNisioHaveTwelveAndNineSegmentedLines) {
   for (const auto& [width, lines] : {std::pair{62, 12}, {48, 9}}) {
-    const Outcome result = run("extrude " + block(width, 50, 0.3, 0) + " --machine anet-a8 --layer 0.3 --walls 1 --fill segmented --segment-rule thick-ends "
-                           "--thin 30 --thick 10 --thick-speed 100 --bead-gap 2 --angle 90 --angle-step 0 --quiet --json -o " + file("a.gcode"));
+    const Outcome result =
+        run("extrude " + block(width, 50, 0.3, 0) +
+            " --machine anet-a8 --layer 0.3 --walls 1 --fill segmented --segment-rule thick-ends "
+            "--thin 30 --thick 10 --thick-speed 100 --bead-gap 2 --angle 90 --angle-step 0 --quiet --json -o " +
+            file("a.gcode"));
     ASSERT_EQ(result.code, 0) << result.err;
     const auto json = result.json();
     EXPECT_EQ(json["layers"], 1);
@@ -163,7 +174,8 @@ TEST_F(ExtrudeProgram, TestPiecesOfDiNisioHaveTwelveAndNineSegmentedLines) {
 TEST_F(ExtrudeProgram, VolumesPlacesAndLayersOfAFileAreThoseOfThePlan) {
   const std::string part = block(30, 20, 2.4, 6);
   for (const std::string machine : {"anet-a8", "marlin", "klipper", "reprapfirmware"}) {
-    const Outcome result = run("extrude " + part + " --machine " + machine + " --layer 0.3 --walls 2 --fill segmented --quiet --json -o " + file("a.gcode"));
+    const Outcome result = run("extrude " + part + " --machine " + machine +
+                               " --layer 0.3 --walls 2 --fill segmented --quiet --json -o " + file("a.gcode"));
     ASSERT_EQ(result.code, 0) << result.err;
     const auto json = result.json();
     const test::GcodeFile gcode = test::read_gcode(text_of(file("a.gcode")));
@@ -198,8 +210,10 @@ TEST_F(ExtrudeProgram, VolumesPlacesAndLayersOfAFileAreThoseOfThePlan) {
 
 TEST_F(ExtrudeProgram, ClosedCurvesAreSegmentedFromTheOutsideInWithThickSeams) {
   const std::string part = block(30, 20, 1.2, 4);
-  const Outcome result = run("extrude " + part + " --machine anet-a8 --layer 0.3 --walls 1 --fill segmented --pattern contour --continuous 2 "
-                         "--quiet --json -o " + file("a.gcode"));
+  const Outcome result = run("extrude " + part +
+                             " --machine anet-a8 --layer 0.3 --walls 1 --fill segmented --pattern contour --continuous 2 "
+                             "--quiet --json -o " +
+                             file("a.gcode"));
   ASSERT_EQ(result.code, 0) << result.err;
   const auto json = result.json();
   const test::GcodeFile gcode = test::read_gcode(text_of(file("a.gcode")));
@@ -213,8 +227,9 @@ TEST_F(ExtrudeProgram, ClosedCurvesAreSegmentedFromTheOutsideInWithThickSeams) {
     for (std::size_t i = 0; i < layer.beads.size();) {
       std::size_t end = i + 1;
       const auto& start = layer.beads[i];
-      while (end < layer.beads.size() && layer.beads[end].x0 == layer.beads[end - 1].x1 && layer.beads[end].y0 == layer.beads[end - 1].y1 &&
-             layer.beads[end].type == start.type) ++end;
+      while (end < layer.beads.size() && layer.beads[end].x0 == layer.beads[end - 1].x1 &&
+             layer.beads[end].y0 == layer.beads[end - 1].y1 && layer.beads[end].type == start.type)
+        ++end;
       const auto beads = std::span(layer.beads).subspan(i, end - i);
       i = end;
       if (start.type.find("perimeter") != std::string::npos || start.type.find("wall") != std::string::npos) continue;
@@ -225,7 +240,8 @@ TEST_F(ExtrudeProgram, ClosedCurvesAreSegmentedFromTheOutsideInWithThickSeams) {
       for (const auto& bead : beads) {
         if (stretches.empty() || stretches.back().first != bead.feed) stretches.push_back({bead.feed, 0});
         stretches.back().second += std::hypot(bead.x1 - bead.x0, bead.y1 - bead.y0);
-        depth = std::min({depth, 15 - std::abs(bead.x0 - 110), 10 - std::abs(bead.y0 - 110), std::hypot(bead.x0 - 110, bead.y0 - 110) - 4});
+        depth = std::min(
+            {depth, 15 - std::abs(bead.x0 - 110), 10 - std::abs(bead.y0 - 110), std::hypot(bead.x0 - 110, bead.y0 - 110) - 4});
       }
       if (stretches.size() == 1) continue;
       ++segmented;
@@ -255,12 +271,14 @@ TEST_F(ExtrudeProgram, ClosedCurvesAreSegmentedFromTheOutsideInWithThickSeams) {
 
 TEST_F(ExtrudeProgram, SameBytesForAnyThreads) {
   const std::string part = block(30, 20, 3, 6);
-  const std::string arguments = "extrude " + part + " --machine anet-a8 --layer 0.2 --fill segmented --angle 30 --angle-step 60 --quiet ";
+  const std::string arguments =
+      "extrude " + part + " --machine anet-a8 --layer 0.2 --fill segmented --angle 30 --angle-step 60 --quiet ";
   ASSERT_EQ(run(arguments + "--threads 1 -o " + file("a.gcode")).code, 0);
   ASSERT_EQ(run(arguments + "--threads 4 --memory 1M -o " + file("b.gcode")).code, 0);
   EXPECT_EQ(text_of(file("a.gcode")), text_of(file("b.gcode")));
   // Layers of so many stretches that they are written a piece at a time.
-  const std::string wide = "extrude " + block(60, 60, 0.6, 6) + " --machine klipper --layer 0.2 --fill segmented --thin 0.2 --thick 0.2 --quiet --json ";
+  const std::string wide = "extrude " + block(60, 60, 0.6, 6) +
+                           " --machine klipper --layer 0.2 --fill segmented --thin 0.2 --thick 0.2 --quiet --json ";
   const Outcome one = run(wide + "--threads 1 -o " + file("a.gcode")), many = run(wide + "--threads 4 -o " + file("b.gcode"));
   ASSERT_EQ(one.code, 0) << one.err;
   ASSERT_EQ(many.code, 0) << many.err;
@@ -283,21 +301,25 @@ TEST_F(ExtrudeProgram, WrongInputIsOneLineAndTheCodeOfUsage) {
     EXPECT_FALSE(fs::exists(file("a.gcode")));
     return result.err;
   };
-  EXPECT_NE(message("--fill segmented --thin 0").find("segment.thin_mm: 0 mm; a thin stretch has to be longer than 0"), std::string::npos);
+  EXPECT_NE(message("--fill segmented --thin 0").find("segment.thin_mm: 0 mm; a thin stretch has to be longer than 0"),
+            std::string::npos);
   EXPECT_NE(message("--fill segmented --thin -2").find("segment.thin_mm: -2 mm"), std::string::npos);
   EXPECT_NE(message("--fill segmented --thin-speed 0").find("segment.thin_speed_percent: 0 %"), std::string::npos);
   EXPECT_NE(message("--fill segmented --spacing-sc 0.2").find("segment.spacing_sc_mm: 0.2 mm is below"), std::string::npos);
-  EXPECT_NE(message("--fill segmented --thin 15").find("segment.thin_mm: 15 mm is longer than any line in the parts"), std::string::npos);
+  EXPECT_NE(message("--fill segmented --thin 15").find("segment.thin_mm: 15 mm is longer than any line in the parts"),
+            std::string::npos);
   EXPECT_NE(message("--machine anet-a9").find("no extrusion printer 'anet-a9'; did you mean 'anet-a8'?"), std::string::npos);
   EXPECT_NE(message("--fill segmentd").find("segmented"), std::string::npos);
   EXPECT_NE(message("--fill raster --thin 2").find("--thin: is of segmented lines"), std::string::npos);
-  EXPECT_NE(message("--fill segmented --bead-gap 2 --spacing-sc 0.6").find("segment.spacing_sc_mm: fill.gap_mm says"), std::string::npos);
+  EXPECT_NE(message("--fill segmented --bead-gap 2 --spacing-sc 0.6").find("segment.spacing_sc_mm: fill.gap_mm says"),
+            std::string::npos);
   EXPECT_NE(message("--fill raster --shard 1/2").find("--shard: shards are of images"), std::string::npos);
   EXPECT_NE(message("--fill raster --set run.shard=1/2").find("run.shard: shards are of images"), std::string::npos);
 }
 
 TEST_F(ExtrudeProgram, SmlHasItsReportBesideItWithTheLayersThatItLays) {
-  const Outcome result = run("extrude " + block(20, 20, 2.54, 0) + " --machine fdm-2000 --layer 0.254 --bead 0.508 --fill raster --quiet --json -o " + file("a.sml"));
+  const Outcome result = run("extrude " + block(20, 20, 2.54, 0) +
+                             " --machine fdm-2000 --layer 0.254 --bead 0.508 --fill raster --quiet --json -o " + file("a.sml"));
   ASSERT_EQ(result.code, 0) << result.err;
   const std::string report = text_of(file("a.rp3"));
   EXPECT_EQ(result.json()["layers"], 10);
@@ -307,7 +329,8 @@ TEST_F(ExtrudeProgram, SmlHasItsReportBesideItWithTheLayersThatItLays) {
 }
 
 TEST_F(ExtrudeProgram, PermeabilityOfTable18IsThatOfTable25WithAWarningAboutItsDensity) {
-  const Outcome result = run("permeability " + std::string(LAMINA_TEST_DIR) + "/reference/dinisio2022/table_18.tsv --convention dinisio2022 --json");
+  const Outcome result = run("permeability " + std::string(LAMINA_TEST_DIR) +
+                             "/reference/dinisio2022/table_18.tsv --convention dinisio2022 --json");
   ASSERT_EQ(result.code, 0) << result.err;
   const auto fit = result.json()["fits"][0];
   EXPECT_NEAR(fit["k1_darcy"].get<double>(), 100.09, 0.01);

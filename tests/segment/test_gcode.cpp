@@ -5,8 +5,8 @@
 #include <numbers>
 #include <random>
 
-#include "stages/write/gcode/gcode.h"
 #include "stages/write/decimal.h"
+#include "stages/write/gcode/gcode.h"
 #include "tests/segment/gcode_reader.h"
 
 namespace lamina::write::gcode {
@@ -48,8 +48,8 @@ Written write_random(const Extruder& machine, int layers, unsigned seed) {
       if (jump) at = point();
       const Point2 to = between(0, 1) < 0.5 ? point() : Point2{at.x + static_cast<Nm>(between(-9e5, 9e5)), at.y};
       if (to == at) continue;
-      moves.push_back({at, to, i % 3 == 0 ? PathKind::kOuter : PathKind::kRaster, jump, static_cast<Nm>(300'000 + 50'000 * (i % 4)),
-                       between(0.05, 0.2), between(5, 60)});
+      moves.push_back({at, to, i % 3 == 0 ? PathKind::kOuter : PathKind::kRaster, jump,
+                       static_cast<Nm>(300'000 + 50'000 * (i % 4)), between(0.05, 0.2), between(5, 60)});
       writer.lay(moves.back());
       at = to;
     }

@@ -46,7 +46,7 @@ TEST(Permeability, CoefficientsOfTable25ComeOutOfThe630PressureDrops) {
     // The density scales k2 alone.
     const auto air = fit_permeability(points, {1.87e-5, 1.2});
     EXPECT_DOUBLE_EQ(air->k1_m2, fit->k1_m2);
-    EXPECT_NEAR(air->k2_m * 1e3, number(row, "k2_fit_air_1.2_kg_m3") , 0.0003);
+    EXPECT_NEAR(air->k2_m * 1e3, number(row, "k2_fit_air_1.2_kg_m3"), 0.0003);
   }
 }
 

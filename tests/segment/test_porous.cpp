@@ -37,7 +37,8 @@ class PorousJob : public testing::Test {
   std::vector<Runs> layers(const std::string& name) {
     std::vector<Runs> images;
     for (std::uint32_t i = 0;; ++i) {
-      const std::string file = folder / (name + "/layers/" + std::string(6 - std::to_string(i).size(), '0') + std::to_string(i) + ".pbm");
+      const std::string file =
+          folder / (name + "/layers/" + std::string(6 - std::to_string(i).size(), '0') + std::to_string(i) + ".pbm");
       if (!fs::exists(file)) return images;
       auto image = write::read_image(file);
       EXPECT_TRUE(image.ok()) << (image.ok() ? "" : image.error().message);
@@ -45,7 +46,8 @@ class PorousJob : public testing::Test {
     }
   }
   nlohmann::json jet(const std::string& name, std::vector<std::string> more) {
-    std::vector<std::string> arguments{"jet", kCrown, "--bed", "16x16", "--dpi", "600x508", "--layer", "0.4", "--format", "pbm", "--json", "--quiet", "-o", folder / name};
+    std::vector<std::string> arguments{"jet", kCrown,     "--bed", "16x16",  "--dpi",   "600x508", "--layer",
+                                       "0.4", "--format", "pbm",   "--json", "--quiet", "-o",      folder / name};
     arguments.insert(arguments.end(), more.begin(), more.end());
     const test::Outcome outcome = run_lamina(arguments, folder.path());
     EXPECT_EQ(outcome.code, 0) << outcome.err;
@@ -128,10 +130,12 @@ TEST_F(PorousJob, ResumedJobsAndShardsHaveTheBytesOfWholeOnesAndOtherFillingsAre
   EXPECT_EQ(test::tree_text(folder / "shards"), test::tree_text(folder / "whole"));
   // From directories of their own, and with another filling in one of them.
   for (const char* shard : {"1/2", "2/2"}) ASSERT_EQ(run(std::string("half") + shard[0], {"--shard", shard}).code, 0);
-  ASSERT_EQ(run_lamina({"merge", folder / "half1", folder / "half2", "-o", folder / "merged", "--quiet"}, folder.path()).code, 0);
+  ASSERT_EQ(run_lamina({"merge", folder / "half1", folder / "half2", "-o", folder / "merged", "--quiet"}, folder.path()).code,
+            0);
   EXPECT_EQ(test::tree_text(folder / "merged"), test::tree_text(folder / "whole"));
   ASSERT_EQ(run("other", {"--shard", "2/2", "--thin", "1"}).code, 0);
-  const test::Outcome mixed = run_lamina({"merge", folder / "half1", folder / "other", "-o", folder / "mixed", "--quiet"}, folder.path());
+  const test::Outcome mixed =
+      run_lamina({"merge", folder / "half1", folder / "other", "-o", folder / "mixed", "--quiet"}, folder.path());
   EXPECT_NE(mixed.code, 0);
   EXPECT_EQ(mixed.error_lines(), 1) << mixed.err;
   EXPECT_NE(mixed.err.find("another job"), std::string::npos) << mixed.err;
@@ -150,7 +154,9 @@ TEST_F(PorousJob, WhatHasNoMeaningTogetherIsOneLine) {
   EXPECT_NE(message({"--containment", "inside"}).find("--containment: "), std::string::npos);
   EXPECT_NE(message({"--fill", "rastr"}).find("raster"), std::string::npos);
   EXPECT_NE(message({"--pattern", "contour"}).find("--fill: raster, but --pattern contour"), std::string::npos);
-  EXPECT_NE(message({"--bead-gap", "0.2", "--line-distance", "0.5"}).find("(--line-distance) and fill.gap_mm (--bead-gap) both"), std::string::npos);
+  EXPECT_NE(
+      message({"--bead-gap", "0.2", "--line-distance", "0.5"}).find("(--line-distance) and fill.gap_mm (--bead-gap) both"),
+      std::string::npos);
   EXPECT_NE(message({"--fill", "segmented", "--thin-width", "0.5"}).find("segment.spacing_sc_mm"), std::string::npos);
 }
 
@@ -205,7 +211,8 @@ TEST_F(PorousJob, PorosityOfTheBitmapIsThatOfThePlanWithinThePixelsOfItsEdges) {
       segment::for_each_stretch(work->plan.paths, *cut, [&](const Stretch& s) {
         const double w = s.thickness == Thickness::kThin ? 75e3 : 200e3;
         thin += s.thickness == Thickness::kThin ? 1 : 0;
-        const double dx = s.to.x - s.from.x, dy = s.to.y - s.from.y, length = std::hypot(dx, dy), ux = dx / length, uy = dy / length;
+        const double dx = s.to.x - s.from.x, dy = s.to.y - s.from.y, length = std::hypot(dx, dy), ux = dx / length,
+                     uy = dy / length;
         cl::Path path;
         const auto at = [&](double x, double y) { path.emplace_back(std::llround(x), std::llround(y)); };
         const double first = std::atan2(uy, ux) - std::numbers::pi / 2;
@@ -220,7 +227,9 @@ TEST_F(PorousJob, PorosityOfTheBitmapIsThatOfThePlanWithinThePixelsOfItsEdges) {
         if (ends == raster::BeadEnds::kSquare && s.kind == PathKind::kLink) {
           for (const Point2 centre : {s.from, s.to}) {  // joints of links are round
             cl::Path disc;
-            for (int i = 0; i < 180; ++i) disc.emplace_back(std::llround(centre.x + 200e3 * std::cos(i * std::numbers::pi / 90)), std::llround(centre.y + 200e3 * std::sin(i * std::numbers::pi / 90)));
+            for (int i = 0; i < 180; ++i)
+              disc.emplace_back(std::llround(centre.x + 200e3 * std::cos(i * std::numbers::pi / 90)),
+                                std::llround(centre.y + 200e3 * std::sin(i * std::numbers::pi / 90)));
             clipper.AddPath(disc, cl::ptSubject, true);
           }
         }
@@ -246,7 +255,8 @@ TEST_F(PorousJob, PorosityOfTheBitmapIsThatOfThePlanWithinThePixelsOfItsEdges) {
       EXPECT_LT(std::abs(set - planned), edge);
       // Errors of edge pixels have no preferred sign: together they are far smaller than that.
       const double whole = cl::Area(outline) / (pixel * pixel);
-      EXPECT_NEAR(1 - set / static_cast<double>(solid), 1 - planned / whole, 0.001) << (ends == raster::BeadEnds::kRound ? "round" : "square");
+      EXPECT_NEAR(1 - set / static_cast<double>(solid), 1 - planned / whole, 0.001)
+          << (ends == raster::BeadEnds::kRound ? "round" : "square");
     }
   }
 }

@@ -27,7 +27,8 @@ class Samples : public testing::Test {
   };
   Plan plan(const std::string& job, const std::string& part) {
     const std::string file = std::string(LAMINA_TEST_DIR) + "/../docs/examples/dinisio2022/" + job + ".toml";
-    const test::Outcome outcome = test::run_lamina({"extrude", part, "--job", file, "--json", "--quiet", "-o", folder / "a.gcode"}, folder.path());
+    const test::Outcome outcome =
+        test::run_lamina({"extrude", part, "--job", file, "--json", "--quiet", "-o", folder / "a.gcode"}, folder.path());
     EXPECT_EQ(outcome.code, 0) << job << ": " << outcome.err;
     Plan result{nlohmann::json::parse(outcome.out, nullptr, false), test::read_gcode(test::read_text(folder / "a.gcode"))};
     EXPECT_EQ(result.gcode.error, "") << job;
@@ -108,7 +109,8 @@ TEST_F(Samples, SpeedsOfTable3AndExtrusionsOfTable4GoFromLineToLine) {
   for (std::size_t i = 0; i < extrusions.size(); ++i) {
     const auto& line = segmented[i];
     for (const GcodeBead& b : line) EXPECT_EQ(b.feed, 900);
-    EXPECT_NEAR(line[1].filament / length(line[1]) / (line[0].filament / length(line[0])), number(extrusions[i], "thin_extrusion_percent") / 100, 0.001);
+    EXPECT_NEAR(line[1].filament / length(line[1]) / (line[0].filament / length(line[0])),
+                number(extrusions[i], "thin_extrusion_percent") / 100, 0.001);
   }
 }
 
@@ -121,11 +123,14 @@ TEST_F(Samples, RepeatedStretchesOfTables5To7HaveTheirSpeedsExtrusionsAndSpacing
   };
   std::vector<Kind> kinds;
   for (const auto& row : test::table(7)) {
-    const int extrusion = static_cast<int>(number(row, "extrusion_percent")), speed = static_cast<int>(number(row, "thick_speed_percent"));
+    const int extrusion = static_cast<int>(number(row, "extrusion_percent")),
+              speed = static_cast<int>(number(row, "thick_speed_percent"));
     const std::string percent = std::to_string(extrusion);
-    if (extrusion > 75) kinds.push_back({"A" + percent + "-first", extrusion, 100, 2.4, 0.3f});  // Table 5; A75 stayed as it was
-    kinds.push_back({"A" + percent, extrusion, speed, 2.4, 0.3f});                              // Table 6
-    for (const float height : {0.3f, 1.5f, 3.0f}) kinds.push_back({"B" + percent, extrusion, speed, number(row, "spacing_sc_mm"), height});
+    if (extrusion > 75)
+      kinds.push_back({"A" + percent + "-first", extrusion, 100, 2.4, 0.3f});  // Table 5; A75 stayed as it was
+    kinds.push_back({"A" + percent, extrusion, speed, 2.4, 0.3f});             // Table 6
+    for (const float height : {0.3f, 1.5f, 3.0f})
+      kinds.push_back({"B" + percent, extrusion, speed, number(row, "spacing_sc_mm"), height});
   }
   for (const Kind& kind : kinds) {
     const auto sample = plan(kind.job, block(50, 28, kind.height));
@@ -207,7 +212,8 @@ TEST_F(Samples, TheTomographyCylinderHasThreeFillingsByHeightAndDenseLayersAt90D
     const auto along_y = lines_of(layer, true), along_x = lines_of(layer, false);
     const auto longest = [](const auto& lines) {
       double most = 0;
-      for (const auto& line : lines) most = std::max(most, std::hypot(line.back().x1 - line[0].x0, line.back().y1 - line[0].y0));
+      for (const auto& line : lines)
+        most = std::max(most, std::hypot(line.back().x1 - line[0].x0, line.back().y1 - line[0].y0));
       return most;
     };
     if (n % 10 == 9) {
@@ -237,9 +243,19 @@ TEST_F(Samples, TheTomographyCylinderHasThreeFillingsByHeightAndDenseLayersAt90D
 }
 
 TEST_F(Samples, PoresOfLayersTurnedBy90DegreesLieOverEachOther) {
-  const auto outcome = test::run_lamina({"extrude", block(21, 17, 0.6f), "--machine", "anet-a8", "--layer", "0.3", "--fill", "segmented", "--angle", "90",
-                                         "--angle-step", "90", "--spacing-sc", "0.5", "--thin", "1.5", "--thick", "1.5", "--set", "segment.across=true",
-                                         "--quiet", "-o", folder / "a.gcode"}, folder.path());
+  const auto outcome = test::run_lamina({"extrude",         block(21, 17, 0.6f),
+                                         "--machine",       "anet-a8",
+                                         "--layer",         "0.3",
+                                         "--fill",          "segmented",
+                                         "--angle",         "90",
+                                         "--angle-step",    "90",
+                                         "--spacing-sc",    "0.5",
+                                         "--thin",          "1.5",
+                                         "--thick",         "1.5",
+                                         "--set",           "segment.across=true",
+                                         "--quiet",         "-o",
+                                         folder / "a.gcode"},
+                                        folder.path());
   ASSERT_EQ(outcome.code, 0) << outcome.err;
   const auto gcode = test::read_gcode(test::read_text(folder / "a.gcode"));
   ASSERT_EQ(gcode.error, "");

@@ -9,8 +9,10 @@ TEST(Sml, PdLinesFollowTheThicknessOfTheLayerAndTheUseOfThePath) {
   Extruder machine;
   machine.name = "test";
   machine.format = "sml";
-  machine.sml.pd = {{0.254, "raster", "PD.08,41;MM;SR800;AC5"}, {0.254, "contour", "PD.08,42;MM;SR800;AC5"},
-                    {0.178, "raster", "PD.08,29;MM;SR800;AC5"}, {0.178, "contour", "PD.08,30;MM;SR800;AC5"}};
+  machine.sml.pd = {{0.254, "raster", "PD.08,41;MM;SR800;AC5"},
+                    {0.254, "contour", "PD.08,42;MM;SR800;AC5"},
+                    {0.178, "raster", "PD.08,29;MM;SR800;AC5"},
+                    {0.178, "contour", "PD.08,30;MM;SR800;AC5"}};
   const auto format = make_sml_format(machine);
   Buffer<char> out;
   for (const Layer& layer : {Layer{0, 0, 254'000}, Layer{1, 254'000, 178'000}}) {
@@ -26,7 +28,8 @@ TEST(Sml, PdLinesFollowTheThicknessOfTheLayerAndTheUseOfThePath) {
             "PD.08,41;MM;SR800;AC5\nPU1181,200;\nPA1575,200;\n"
             "; layer 2 thickness 0.178 mm\nPZ17;\nPD.08,30;MM;SR800;AC5\nPU1000,0;\nPA2000,0;\nPA2000,1000;\n"
             "PD.08,29;MM;SR800;AC5\nPU1181,200;\nPA1575,200;\n");
-  EXPECT_EQ(format->check({7, 0, 300'000}).error().message, "layer 7: test has no PD line for a raster of 0.3 mm; its table has 0.254, 0.178");
+  EXPECT_EQ(format->check({7, 0, 300'000}).error().message,
+            "layer 7: test has no PD line for a raster of 0.3 mm; its table has 0.254, 0.178");
 }
 
 }  // namespace

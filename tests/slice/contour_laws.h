@@ -50,7 +50,8 @@ inline void expect_ordered(const ContoursView& contours, const std::string& wher
         outside = winding_about(region, p, c);
         if (outside != INT32_MAX) break;
       }
-      EXPECT_TRUE(outside == 1 || outside == INT32_MAX) << where << ": contour " << first + c << " is no hole of contour " << first;
+      EXPECT_TRUE(outside == 1 || outside == INT32_MAX)
+          << where << ": contour " << first + c << " is no hole of contour " << first;
     }
   }
 }

@@ -47,13 +47,15 @@ std::vector<std::uint32_t> groups_of(const Contours& contours) {
 /// A closed curve about a place; `rough` shakes its points.
 void add_curve(std::mt19937& random, Nm span, double rough, Contours& out) {
   std::uniform_real_distribution<double> any(0, 1);
-  const double x = any(random) * span, y = any(random) * span, radius = (0.02 + 0.2 * any(random)) * span, wave = 0.3 * any(random);
+  const double x = any(random) * span, y = any(random) * span, radius = (0.02 + 0.2 * any(random)) * span,
+               wave = 0.3 * any(random);
   const int points = 4 + static_cast<int>(any(random) * 120);
   const double turn = any(random) * 7;
   for (int k = 0; k < points; ++k) {
     const double angle = 2 * std::numbers::pi * k / points;
     const double r = radius * (1 + wave * std::sin(3 * angle + turn) + rough * (any(random) - 0.5));
-    out.point.push_back({static_cast<Nm>(std::llround(x + r * std::cos(angle))), static_cast<Nm>(std::llround(y + r * std::sin(angle)))});
+    out.point.push_back(
+        {static_cast<Nm>(std::llround(x + r * std::cos(angle))), static_cast<Nm>(std::llround(y + r * std::sin(angle)))});
   }
   out.close();
 }

@@ -57,7 +57,8 @@ void compare_with_bitmap(const ContoursView& contours, const Runs& bitmap, const
     }
   }
   const double area = static_cast<double>(doubled_area(contours)) / 2;
-  EXPECT_LE(std::abs(area - static_cast<double>(set_pixels(bitmap)) * pixel * pixel), perimeter(contours) * pixel + pixel * pixel);
+  EXPECT_LE(std::abs(area - static_cast<double>(set_pixels(bitmap)) * pixel * pixel),
+            perimeter(contours) * pixel + pixel * pixel);
 }
 
 /// Planes at the middle of layers, all of them inside the part.
@@ -165,7 +166,8 @@ TEST(SliceModels, VolumeIsAreaTimesThicknessAtThreeThicknesses) {
     for (const Instance& instance : part->instances) {
       for (const Triangle& t : part->meshes[instance.mesh].triangles) {
         shadow += std::abs((static_cast<double>(t.b.x) - t.a.x) * (static_cast<double>(t.c.y) - t.a.y) -
-                           (static_cast<double>(t.b.y) - t.a.y) * (static_cast<double>(t.c.x) - t.a.x)) / 2;
+                           (static_cast<double>(t.b.y) - t.a.y) * (static_cast<double>(t.c.x) - t.a.x)) /
+                  2;
       }
     }
     for (const std::int64_t layers : {40, 160, 640}) {

@@ -56,8 +56,8 @@ TEST(Cut, CrossingsAreTheNearestNanometreOfTheExactPoint) {
     const __int128 den = std::int64_t{edge.high.z} - edge.low.z, num = std::int64_t{z} - edge.low.z;
     for (const auto& [from, to, got] : {std::tuple{edge.low.x, edge.high.x, p.x}, {edge.low.y, edge.high.y, p.y}}) {
       // |got - exact| <= 1/2, the upper half when it is a tie: -den < 2 (exact - got) den <= den reversed
-      const __int128 twice = 2 * (static_cast<__int128>(got - std::int64_t{from}) * den -
-                                  static_cast<__int128>(std::int64_t{to} - from) * num);
+      const __int128 twice =
+          2 * (static_cast<__int128>(got - std::int64_t{from}) * den - static_cast<__int128>(std::int64_t{to} - from) * num);
       ASSERT_TRUE(-den < twice && twice <= den) << "edge " << i;
     }
   }
@@ -76,7 +76,9 @@ TEST(Slice, CornersEdgesAndFacesInThePlaneCountOnce) {
   std::mt19937 random(11);
   std::uniform_int_distribution<Nm> pick(0, 4);
   for (int i = 0; i < 400; ++i) {
-    const Triangles some = random_tetrahedra(1 + i % 3, [&] { return Point3{pick(random) * 100, pick(random) * 100, pick(random) * 100}; });
+    const Triangles some = random_tetrahedra(1 + i % 3, [&] {
+      return Point3{pick(random) * 100, pick(random) * 100, pick(random) * 100};
+    });
     for (const Nm z : {100, 150, 200}) {
       const Sliced result = sliced(some, z);
       EXPECT_EQ(result.report.gaps.open, 0u);
@@ -114,11 +116,11 @@ TEST(Slice, WhatIsInContactIsUnitedWhereverItLies) {
   // Crossing boxes within a solid, within a hole of it, and within an island in that hole; whole ones beside them.
   const Triangles crossing = joined({box({0, 0, 0}, {100, 100, 1000}), box({50, 50, 0}, {150, 150, 1000})});
   const Triangles holes = reversed(moved(crossing, {1300, 300, 0}));
-  const Triangles all = joined({box({0, 0, 0}, {2000, 2000, 1000}), moved(crossing, {300, 300, 0}), holes,
-                                reversed(box({400, 1000, 0}, {1600, 1900, 1000})), moved(crossing, {500, 1100, 0}),
-                                box({900, 1100, 0}, {1500, 1800, 1000}), reversed(moved(crossing, {1000, 1200, 0})),
-                                moved(box({0, 0, 0}, {50, 50, 1000}), {1700, 100, 0}),
-                                moved(box({0, 0, 0}, {50, 50, 1000}), {450, 1700, 0})});
+  const Triangles all =
+      joined({box({0, 0, 0}, {2000, 2000, 1000}), moved(crossing, {300, 300, 0}), holes,
+              reversed(box({400, 1000, 0}, {1600, 1900, 1000})), moved(crossing, {500, 1100, 0}),
+              box({900, 1100, 0}, {1500, 1800, 1000}), reversed(moved(crossing, {1000, 1200, 0})),
+              moved(box({0, 0, 0}, {50, 50, 1000}), {1700, 100, 0}), moved(box({0, 0, 0}, {50, 50, 1000}), {450, 1700, 0})});
   const double cross = 17'500, solid = 4e6 - 1200 * 900, in_hole = cross + 600 * 700 + 2500;
   for (const auto& [rule, area] : {std::pair{FillRule::kNonzero, solid - cross + in_hole - cross},
                                    {FillRule::kPositive, solid - cross + in_hole - cross}}) {
@@ -186,7 +188,8 @@ TEST(PlaneIndex, FindsExactlyTheFacetsThatAPlaneCrossesForAnyPlanes) {
   }
   for (const int spread : {1, 3, 400}) {
     std::vector<std::int64_t> planes;
-    for (std::int64_t z = -6000; z < 6000; z += 1 + static_cast<std::int64_t>(random() % static_cast<unsigned>(spread))) planes.push_back(z);
+    for (std::int64_t z = -6000; z < 6000; z += 1 + static_cast<std::int64_t>(random() % static_cast<unsigned>(spread)))
+      planes.push_back(z);
     const slice::PlaneIndex index(triangles, planes);
     Buffer<std::uint32_t> found;
     for (std::uint32_t p = 0; p < planes.size(); p += static_cast<std::uint32_t>(1 + planes.size() / 200)) {
@@ -220,7 +223,8 @@ TEST(Tidy, DroppedPointsLieWithinTheToleranceAndStraightOnesAlwaysGo) {
     for (const Point2 p : circle.point) ASSERT_LE(distance_to(less, p.x, p.y), tolerance + 1e-3);
   }
   Contours square;
-  for (const Point2 p : {Point2{0, 0}, {0, 0}, {5, 0}, {10, 0}, {10, 5}, {14, 5}, {10, 5}, {10, 10}, {5, 10}, {0, 10}, {0, 4}}) {
+  for (const Point2 p :
+       {Point2{0, 0}, {0, 0}, {5, 0}, {10, 0}, {10, 5}, {14, 5}, {10, 5}, {10, 10}, {5, 10}, {0, 10}, {0, 4}}) {
     square.point.push_back(p);
   }
   square.close();
@@ -247,10 +251,14 @@ TEST(Contact, IsFoundExactlyWhereAnyTwoEdgesMeet) {
     slice::tidy(contours, 0);
     bool expected = false;
     const auto side = [](Point2 a, Point2 b, Point2 p) {
-      const std::int64_t area = (std::int64_t{b.x} - a.x) * (std::int64_t{p.y} - a.y) - (std::int64_t{b.y} - a.y) * (std::int64_t{p.x} - a.x);
+      const std::int64_t area =
+          (std::int64_t{b.x} - a.x) * (std::int64_t{p.y} - a.y) - (std::int64_t{b.y} - a.y) * (std::int64_t{p.x} - a.x);
       return area > 0 ? 1 : area < 0 ? -1 : 0;
     };
-    struct Stretch { Point2 a, b; std::uint32_t c, k, n; };
+    struct Stretch {
+      Point2 a, b;
+      std::uint32_t c, k, n;
+    };
     std::vector<Stretch> all;
     for (std::uint32_t c = 0; c < contours.size(); ++c) {
       const auto n = static_cast<std::uint32_t>(contours[c].size());
@@ -263,7 +271,8 @@ TEST(Contact, IsFoundExactlyWhereAnyTwoEdgesMeet) {
         if (s.c == t.c && ((s.k + 1) % s.n == t.k || (t.k + 1) % t.n == s.k)) continue;
         const bool apart = std::max(s.a.x, s.b.x) < std::min(t.a.x, t.b.x) || std::max(t.a.x, t.b.x) < std::min(s.a.x, s.b.x) ||
                            std::max(s.a.y, s.b.y) < std::min(t.a.y, t.b.y) || std::max(t.a.y, t.b.y) < std::min(s.a.y, s.b.y);
-        if (!apart && side(s.a, s.b, t.a) * side(s.a, s.b, t.b) <= 0 && side(t.a, t.b, s.a) * side(t.a, t.b, s.b) <= 0) expected = true;
+        if (!apart && side(s.a, s.b, t.a) * side(s.a, s.b, t.b) <= 0 && side(t.a, t.b, s.a) * side(t.a, t.b, s.b) <= 0)
+          expected = true;
       }
     }
     with += expected ? 1 : 0;

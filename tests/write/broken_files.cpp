@@ -35,21 +35,11 @@ void expect_survival(const ImageFormat& format, const Bytes& file, std::uint32_t
     for (std::uint32_t i = 0; i < damages; ++i) {
       const std::uint32_t at = testing::below(random, static_cast<std::uint32_t>(damaged.size()));
       switch (testing::below(random, 5)) {
-        case 0:
-          damaged[at] = std::byte{0xFF};
-          break;
-        case 1:
-          damaged[at] = std::byte{0};
-          break;
-        case 2:
-          damaged[at] ^= std::byte(1u << testing::below(random, 8));
-          break;
-        case 3:
-          damaged[at] = std::byte(random() & 0xFF);
-          break;
-        default:
-          damaged.erase(damaged.begin() + at);
-          break;
+        case 0: damaged[at] = std::byte{0xFF}; break;
+        case 1: damaged[at] = std::byte{0}; break;
+        case 2: damaged[at] ^= std::byte(1u << testing::below(random, 8)); break;
+        case 3: damaged[at] = std::byte(random() & 0xFF); break;
+        default: damaged.erase(damaged.begin() + at); break;
       }
     }
     testing::save(path, damaged);
@@ -129,10 +119,10 @@ TEST(ReadImage, ATiffThatPromisesMorePixelsThanItsBytesCanHoldIsRefusedAtOnce) {
 TEST(ReadImage, HeadersThatPromiseTooMuchAreRefusedAtOnce) {
   const testing::Folder folder;
   const std::string pbm = folder / "liar.pbm", png = folder / "liar.png";
-  for (const std::string& text : {std::string("P4\n2000000 2000000\nx"), std::string("P4\n4294967297 1\nx"),
-                                  std::string("P4\n99999999999999999999 1\nx"), std::string("P4\n0 1\nx"),
-                                  std::string("P4\n1 0\n"), std::string("P4\n-8 1\nx"), std::string("P4\n8 1\nxy"),
-                                  std::string("P4#"), std::string("P4\n8 1"), std::string("P1\n1 1\n1")}) {
+  for (const std::string& text :
+       {std::string("P4\n2000000 2000000\nx"), std::string("P4\n4294967297 1\nx"), std::string("P4\n99999999999999999999 1\nx"),
+        std::string("P4\n0 1\nx"), std::string("P4\n1 0\n"), std::string("P4\n-8 1\nx"), std::string("P4\n8 1\nxy"),
+        std::string("P4#"), std::string("P4\n8 1"), std::string("P1\n1 1\n1")}) {
     testing::save(pbm, std::as_bytes(std::span(text)));
     EXPECT_FALSE(read_image(pbm).ok()) << text;
   }

@@ -8,8 +8,7 @@ namespace lamina::write {
 namespace {
 
 /// The share of each part by looking at every pixel, in floating point.
-std::vector<double> shares_by_pixels(const Runs& runs, const PixelWindow& window, std::uint32_t columns,
-                                     std::uint32_t rows) {
+std::vector<double> shares_by_pixels(const Runs& runs, const PixelWindow& window, std::uint32_t columns, std::uint32_t rows) {
   std::vector<double> shares(std::size_t{columns} * rows);
   const auto overlap = [](double pixel, double part, double size) {
     return std::max(0.0, std::min(pixel + 1, (part + 1) * size) - std::max(pixel, part * size));
@@ -22,8 +21,8 @@ std::vector<double> shares_by_pixels(const Runs& runs, const PixelWindow& window
         if (column < window.left || column >= window.right) continue;
         for (std::uint32_t to_y = 0; to_y < rows; ++to_y) {
           for (std::uint32_t to_x = 0; to_x < columns; ++to_x) {
-            shares[to_y * columns + to_x] += overlap(column - window.left, to_x, part_width) *
-                                             overlap(y, to_y, part_height) / (part_width * part_height);
+            shares[to_y * columns + to_x] +=
+                overlap(column - window.left, to_x, part_width) * overlap(y, to_y, part_height) / (part_width * part_height);
           }
         }
       }

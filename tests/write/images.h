@@ -26,9 +26,7 @@ inline Runs image_of(std::uint32_t columns, const std::vector<Row>& rows) {
   return runs;
 }
 
-inline std::uint32_t below(std::mt19937& random, std::uint32_t limit) {
-  return static_cast<std::uint32_t>(random() % limit);
-}
+inline std::uint32_t below(std::mt19937& random, std::uint32_t limit) { return static_cast<std::uint32_t>(random() % limit); }
 
 /// Every column is a change with probability 1 / spacing.
 inline Row random_row(std::mt19937& random, std::uint32_t columns, std::uint32_t spacing) {
@@ -47,8 +45,7 @@ inline Row neighbour(std::mt19937& random, std::uint32_t columns, const Row& row
     if (below(random, 12) == 0) continue;
     const std::int64_t begin = std::int64_t{row[i]} + below(random, 9) - 4,
                        end = std::int64_t{row[i + 1]} + below(random, 9) - 4;
-    for (std::int64_t column = std::max<std::int64_t>(begin, 0); column < std::min<std::int64_t>(end, columns);
-         ++column) {
+    for (std::int64_t column = std::max<std::int64_t>(begin, 0); column < std::min<std::int64_t>(end, columns); ++column) {
       set[static_cast<std::size_t>(column)] = true;
     }
   }
@@ -71,24 +68,12 @@ inline Runs random_image(std::uint32_t seed, std::uint32_t columns, std::uint32_
   while (image.size() < rows) {
     const Row above = image.empty() ? Row{} : image.back();
     switch (below(random, 10)) {
-      case 0:
-        image.push_back(random_row(random, columns, spacing));
-        break;
-      case 1:
-        image.push_back({});
-        break;
-      case 2:
-        image.push_back({0, columns});
-        break;
-      case 3:
-        image.push_back(above);
-        break;
-      case 4:
-        image.push_back(random_row(random, columns, 1 + below(random, 4)));
-        break;
-      default:
-        image.push_back(neighbour(random, columns, above));
-        break;
+      case 0: image.push_back(random_row(random, columns, spacing)); break;
+      case 1: image.push_back({}); break;
+      case 2: image.push_back({0, columns}); break;
+      case 3: image.push_back(above); break;
+      case 4: image.push_back(random_row(random, columns, 1 + below(random, 4))); break;
+      default: image.push_back(neighbour(random, columns, above)); break;
     }
   }
   return image_of(columns, image);
@@ -106,9 +91,7 @@ class Folder {
   Folder(const Folder&) = delete;
   Folder& operator=(const Folder&) = delete;
   std::string operator/(const std::string& name) const { return (path_ / name).string(); }
-  std::size_t files() const {
-    return static_cast<std::size_t>(std::distance(std::filesystem::directory_iterator(path_), {}));
-  }
+  std::size_t files() const { return static_cast<std::size_t>(std::distance(std::filesystem::directory_iterator(path_), {})); }
 
  private:
   std::filesystem::path path_;
@@ -127,8 +110,7 @@ inline std::string load(const std::string& path) {
 }
 
 /// The file of an image, or no bytes if the encoder refuses.
-inline Bytes encoded(const ImageFormat& format, const RunsView& runs, double dpi_x = 1200,
-                     double dpi_y = 600) {
+inline Bytes encoded(const ImageFormat& format, const RunsView& runs, double dpi_x = 1200, double dpi_y = 600) {
   Bytes file;
   if (!format.make_encoder()->encode(runs, dpi_x, dpi_y, file)) file.clear();
   return file;

@@ -22,8 +22,7 @@ TEST(TiffTags, SayOneBitMinIsWhiteTopLeftAndTheResolutionInDpi) {
   const struct {
     const char* id;
     std::uint16_t compression;
-  } cases[] = {
-      {"tiff-g4", COMPRESSION_CCITTFAX4}, {"tiff-packbits", COMPRESSION_PACKBITS}, {"tiff-none", COMPRESSION_NONE}};
+  } cases[] = {{"tiff-g4", COMPRESSION_CCITTFAX4}, {"tiff-packbits", COMPRESSION_PACKBITS}, {"tiff-none", COMPRESSION_NONE}};
   for (const auto& [id, compression] : cases) {
     SCOPED_TRACE(id);
     const std::string path = folder / "tags.tif";
@@ -107,15 +106,13 @@ TEST(Png, LibpngsOwnReaderSeesBlackWhereRunsAre) {
 
 TEST(Pbm, IsAHeaderWithTheDpiAndPackedRows) {
   const std::string text = text_of(testing::encoded(*find_image_format("pbm"), small_image(), 1200, 600));
-  EXPECT_EQ(text, std::string("P4\n# lamina dpi 1200 600\n20 4\n") +
-                      std::string("\xE3\xF8\x30\xE3\xF8\x30\0\0\0\0\x40\0", 12));
+  EXPECT_EQ(text, std::string("P4\n# lamina dpi 1200 600\n20 4\n") + std::string("\xE3\xF8\x30\xE3\xF8\x30\0\0\0\0\x40\0", 12));
 }
 
 TEST(Pbm, OtherWritersHeadersAreRead) {
   const testing::Folder folder;
   const std::string path = folder / "other.pbm";
-  for (const std::string& head :
-       {std::string("P4 8 1\n"), std::string("P4#x\n#y\r\n 8 #z\n\t1 "), std::string("P4\n8\n1\n")}) {
+  for (const std::string& head : {std::string("P4 8 1\n"), std::string("P4#x\n#y\r\n 8 #z\n\t1 "), std::string("P4\n8\n1\n")}) {
     const std::string text = head + "\x3C";
     testing::save(path, std::as_bytes(std::span(text)));
     const auto image = read_image(path);
@@ -151,8 +148,8 @@ TEST(Null, WritesNothing) {
 TEST(Golden, EachFormatWritesTheBytesThatItAlwaysWrote) {
   for (const ImageFormat* format : testing::file_formats()) {
     const Bytes file = testing::encoded(*format, small_image(), 1200, 600);
-    const std::string path = std::string(LAMINA_TEST_DIR) + "/golden/write/small." + std::string(format->id) +
-                             std::string(format->extension);
+    const std::string path =
+        std::string(LAMINA_TEST_DIR) + "/golden/write/small." + std::string(format->id) + std::string(format->extension);
     if (std::getenv("LAMINA_WRITE_GOLDEN") != nullptr) testing::save(path, file);
     EXPECT_EQ(text_of(file), testing::load(path)) << path;
   }

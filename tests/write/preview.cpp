@@ -97,8 +97,7 @@ TEST_F(Preview, MakesAContactSheetOfTheWantedWidthAndTheSameBytesEachTime) {
 }
 
 TEST_F(Preview, ASingleLayerIsNeverWiderThanAskedFor) {
-  for (const char* options :
-       {"--layer 0 --width 300", "--layer 19 --whole-bed --width 2000", "--every 7", "--count 1"}) {
+  for (const char* options : {"--layer 0 --width 300", "--layer 19 --whole-bed --width 2000", "--every 7", "--count 1"}) {
     const Outcome outcome = preview(directory() + " -o " + sheet() + " " + options);
     ASSERT_EQ(outcome.code, 0) << outcome.output;
     EXPECT_GT(size().first, 0u) << options;
@@ -117,8 +116,8 @@ TEST_F(Preview, WrongUseIsExitCodeTwoAndOneLine) {
   const std::string good = directory() + " -o " + sheet();
   for (const std::string& arguments :
        {std::string(""), directory(), "-o " + sheet(), good + " --layer 20", good + " --layer x", good + " --count 0",
-        good + " --count 9999", good + " --every 0", good + " --layer 1 --count 2", good + " --width 10",
-        good + " --nonsense", directory() + " -o " + (folder_ / "sheet.jpg"), good + " more"}) {
+        good + " --count 9999", good + " --every 0", good + " --layer 1 --count 2", good + " --width 10", good + " --nonsense",
+        directory() + " -o " + (folder_ / "sheet.jpg"), good + " more"}) {
     const Outcome outcome = preview(arguments);
     EXPECT_EQ(outcome.code, 2) << arguments << "\n" << outcome.output;
     EXPECT_EQ(std::count(outcome.output.begin(), outcome.output.end(), '\n'), 1) << outcome.output;

@@ -50,8 +50,8 @@ TEST(ImageFormats, EveryFormatGivesRandomImagesBackAtEveryWidthUpToSeventy) {
 
 TEST(ImageFormats, EveryFormatGivesWideImagesBack) {
   const testing::Folder folder;
-  for (const std::uint32_t columns : {127u, 128u, 1791u, 1793u, 2559u, 2560u, 2561u, 2562u, 2623u, 2624u, 2625u, 5120u,
-                                      5183u, 5184u, 10007u, 18898u, 70000u}) {
+  for (const std::uint32_t columns : {127u, 128u, 1791u, 1793u, 2559u, 2560u, 2561u, 2562u, 2623u, 2624u, 2625u, 5120u, 5183u,
+                                      5184u, 10007u, 18898u, 70000u}) {
     expect_round_trip(folder, testing::random_image(columns, columns, 25), std::to_string(columns) + " columns");
   }
 }
@@ -130,8 +130,7 @@ TEST(G4, ARunOfEveryLengthInBothColoursComesBack) {
   const std::uint32_t columns = 41000;
   std::vector<Row> rows;
   for (const std::uint32_t length : lengths) {
-    rows.push_back(
-        {length, 2 * length});  // white, then black of this length, in horizontal mode: the row above is empty
+    rows.push_back({length, 2 * length});  // white, then black of this length, in horizontal mode: the row above is empty
     rows.push_back({});
     rows.push_back({0, length});  // a white run of none
     rows.push_back({});
@@ -150,8 +149,7 @@ TEST(G4, EveryPairOfNeighbouringRowsOfNinePixelsComesBack) {
   const auto row_of = [](std::uint32_t bits) {
     Row row;
     for (std::uint32_t column = 0; column <= kColumns; ++column) {
-      const bool now = column < kColumns && (bits >> column & 1) != 0,
-                 before = column > 0 && (bits >> (column - 1) & 1) != 0;
+      const bool now = column < kColumns && (bits >> column & 1) != 0, before = column > 0 && (bits >> (column - 1) & 1) != 0;
       if (now != before) row.push_back(column);
     }
     return row;
@@ -199,8 +197,7 @@ TEST(G4, TheBytesAreThoseOfLibtiffsOwnEncoder) {
     tiff = TIFFOpen(path.c_str(), "r");
     ASSERT_NE(tiff, nullptr);
     std::vector<std::byte> peer(TIFFGetStrileByteCount(tiff, 0));
-    ASSERT_EQ(TIFFReadRawStrip(tiff, 0, peer.data(), static_cast<tmsize_t>(peer.size())),
-              static_cast<tmsize_t>(peer.size()));
+    ASSERT_EQ(TIFFReadRawStrip(tiff, 0, peer.data(), static_cast<tmsize_t>(peer.size())), static_cast<tmsize_t>(peer.size()));
     TIFFClose(tiff);
 
     Bytes ours;

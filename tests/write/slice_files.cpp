@@ -45,7 +45,8 @@ struct Job {
     for (std::uint32_t layer = 0; layer < 2; ++layer) {
       Contours& c = contours[layer];
       const Nm odd = layer == 0 ? 0 : 1;  // the last nanometre has to survive in text
-      for (const Point2 p : {Point2{5 * kMm, 7 * kMm}, {25 * kMm + odd, 7 * kMm}, {25 * kMm, 27 * kMm}, {5 * kMm, 27 * kMm}}) c.point.push_back(p);
+      for (const Point2 p : {Point2{5 * kMm, 7 * kMm}, {25 * kMm + odd, 7 * kMm}, {25 * kMm, 27 * kMm}, {5 * kMm, 27 * kMm}})
+        c.point.push_back(p);
       c.close();
       for (const Point2 p : {Point2{10 * kMm, 12 * kMm}, {10 * kMm, 17 * kMm}, {15 * kMm, 12'500'000}}) c.point.push_back(p);
       c.close();
@@ -64,7 +65,10 @@ struct Job {
     }
     for (std::uint32_t layer = 0; layer < 2; ++layer) {
       layers.push_back({{layer, static_cast<Nm>(layer * 300'000), layer == 0 ? 300'000 : 300'001, LayerReason::kUniform},
-                        contours[layer], body[layer], paths[layer], path_body[layer]});
+                        contours[layer],
+                        body[layer],
+                        paths[layer],
+                        path_body[layer]});
     }
   }
 
@@ -106,7 +110,8 @@ TEST(WriteSvg, EveryPointAndAttributeIsReadBack) {
   EXPECT_NE(svg.find("xmlns:slic3r=\"http://slic3r.org/namespaces/slic3r\" viewport-fill=\"black\""), std::string::npos);
   EXPECT_NE(svg.find("<g id=\"layer1\" slic3r:z=\"0.600001\" slic3r:slice-z=\"0.45\" slic3r:layer-height=\"0.300001\">"),
             std::string::npos);
-  const std::regex group("<g id=\"layer(\\d+)\"[^>]*>([^]*?)</g>"), path("<path d=\"([^\"]*)\" style=\"fill: white;[^\"]*fill-type: evenodd");
+  const std::regex group("<g id=\"layer(\\d+)\"[^>]*>([^]*?)</g>"),
+      path("<path d=\"([^\"]*)\" style=\"fill: white;[^\"]*fill-type: evenodd");
   std::uint32_t layer = 0;
   for (std::sregex_iterator it(svg.begin(), svg.end(), group), end; it != end; ++it, ++layer) {
     EXPECT_EQ((*it)[1].str(), std::to_string(layer));
@@ -127,7 +132,10 @@ TEST(WriteSvg, EveryPointAndAttributeIsReadBack) {
     EXPECT_TRUE(std::ranges::equal(points, job.contours[layer].point)) << "layer " << layer;
   }
   EXPECT_EQ(layer, 2u);
-  EXPECT_NE(svg.find("class=\"raster\" style=\"fill: none; stroke: #2980b9; stroke-linecap: round; stroke-linejoin: round; stroke-width: 0.4\""), std::string::npos);
+  EXPECT_NE(
+      svg.find(
+          "class=\"raster\" style=\"fill: none; stroke: #2980b9; stroke-linecap: round; stroke-linejoin: round; stroke-width: 0.4\""),
+      std::string::npos);
   EXPECT_NE(svg.find("class=\"a,b/c $$x &lt;&amp;&quot;&gt; -&#45; .stl\""), std::string::npos) << "names are escaped";
 }
 
@@ -150,13 +158,16 @@ std::vector<CliLayer> read_cli_ascii(const std::string& text) {
     if (!geometry) continue;
     const std::size_t slash = line.find('/');
     const std::string name = line.substr(0, slash);
-    const std::vector<std::string> fields = slash == std::string::npos ? std::vector<std::string>() : split_at(line.substr(slash + 1), ',');
+    const std::vector<std::string> fields =
+        slash == std::string::npos ? std::vector<std::string>() : split_at(line.substr(slash + 1), ',');
     if (name == "$$LAYER") layers.push_back({std::stod(fields[0]), {}});
     if (name == "$$HATCHES") layers.back().hatches += static_cast<std::uint32_t>(std::stoul(fields[1]));
     if (name != "$$POLYLINE") continue;
-    CliPolyline polyline{static_cast<std::uint32_t>(std::stoul(fields[0])), static_cast<std::uint32_t>(std::stoul(fields[1])), {}};
+    CliPolyline polyline{
+        static_cast<std::uint32_t>(std::stoul(fields[0])), static_cast<std::uint32_t>(std::stoul(fields[1])), {}};
     EXPECT_EQ(fields.size(), 3 + 2 * std::stoul(fields[2]));
-    for (std::size_t i = 3; i + 1 < fields.size(); i += 2) polyline.points.push_back({std::stod(fields[i]), std::stod(fields[i + 1])});
+    for (std::size_t i = 3; i + 1 < fields.size(); i += 2)
+      polyline.points.push_back({std::stod(fields[i]), std::stod(fields[i + 1])});
     layers.back().polylines.push_back(std::move(polyline));
   }
   return layers;
@@ -201,9 +212,12 @@ TEST(WriteCli, TextAndBinaryAreReadBackWithBothConventionsOfZ) {
   for (const bool binary : {false, true}) {
     for (const bool empty_first : {false, true}) {
       const std::string file = job.file(*make_cli_encoder(binary, {empty_first}));
-      EXPECT_TRUE(file.starts_with(binary ? "$$HEADERSTART\n$$BINARY\n$$UNITS/1\n$$VERSION/200\n$$LABEL/1,a_b_c __x <&\"> -- .stl\n"
-                                          : "$$HEADERSTART\n$$ASCII\n$$UNITS/1\n$$VERSION/200\n$$LABEL/1,a_b_c __x <&\"> -- .stl\n"));
-      EXPECT_NE(file.find("\n$$DIMENSION/5,7,0,40,27,0.600001\n$$LAYERS/" + std::to_string(empty_first ? 3 : 2) + "\n$$HEADEREND"), std::string::npos);
+      EXPECT_TRUE(
+          file.starts_with(binary ? "$$HEADERSTART\n$$BINARY\n$$UNITS/1\n$$VERSION/200\n$$LABEL/1,a_b_c __x <&\"> -- .stl\n"
+                                  : "$$HEADERSTART\n$$ASCII\n$$UNITS/1\n$$VERSION/200\n$$LABEL/1,a_b_c __x <&\"> -- .stl\n"));
+      EXPECT_NE(
+          file.find("\n$$DIMENSION/5,7,0,40,27,0.600001\n$$LAYERS/" + std::to_string(empty_first ? 3 : 2) + "\n$$HEADEREND"),
+          std::string::npos);
       std::vector<CliLayer> layers = binary ? read_cli_binary(file) : read_cli_ascii(file);
       ASSERT_EQ(layers.size(), empty_first ? 3u : 2u);
       if (empty_first) {
@@ -214,8 +228,10 @@ TEST(WriteCli, TextAndBinaryAreReadBackWithBothConventionsOfZ) {
       EXPECT_EQ(layers[0].hatches, 2u);
       for (std::uint32_t layer = 0; layer < 2; ++layer) {
         const double top = layer == 0 ? 0.3 : 0.600001;
-        if (binary) EXPECT_EQ(layers[layer].z, static_cast<double>(static_cast<float>(top)));
-        else EXPECT_EQ(layers[layer].z, top);
+        if (binary)
+          EXPECT_EQ(layers[layer].z, static_cast<double>(static_cast<float>(top)));
+        else
+          EXPECT_EQ(layers[layer].z, top);
         std::uint32_t closed = 0;
         for (const CliPolyline& polyline : layers[layer].polylines) {
           if (polyline.direction == 2) continue;
@@ -285,12 +301,14 @@ TEST(Write3mfSlices, PackageHoldsStacksThatSayWhatTheSlicesAreAndIsTheSameEveryT
       EXPECT_NEAR(std::stod((*l)[1].str()), layer == 0 ? 0.3 : 0.600001, 1e-7);
       const std::string inside = (*l)[3].str();
       std::vector<std::array<double, 2>> vertices;
-      for (std::sregex_iterator v(inside.begin(), inside.end(), vertex); v != end; ++v) vertices.push_back({std::stod((*v)[1]), std::stod((*v)[2])});
+      for (std::sregex_iterator v(inside.begin(), inside.end(), vertex); v != end; ++v)
+        vertices.push_back({std::stod((*v)[1]), std::stod((*v)[2])});
       std::uint32_t contour = job.body[layer][stacks];
       for (std::sregex_iterator p(inside.begin(), inside.end(), polygon); p != end; ++p, ++contour) {
         std::vector<std::size_t> indices{std::stoul((*p)[1])};
         const std::string segments = (*p)[2].str();
-        for (std::sregex_iterator i(segments.begin(), segments.end(), segment); i != end; ++i) indices.push_back(std::stoul((*i)[1]));
+        for (std::sregex_iterator i(segments.begin(), segments.end(), segment); i != end; ++i)
+          indices.push_back(std::stoul((*i)[1]));
         EXPECT_EQ(indices.front(), indices.back()) << "closed";
         const std::span<const Point2> expected = job.contours[layer][contour];
         ASSERT_EQ(indices.size(), expected.size() + 1);

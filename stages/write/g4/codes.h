@@ -32,8 +32,8 @@ inline constexpr Code kHorizontal = code_of("001");
 inline constexpr Code kEndOfFacsimileBlock = code_of("000000000001000000000001");
 
 /// Vertical modes by a1 - b1 + 3: three to the left of b1 ... three to the right of it.
-inline constexpr std::array<Code, 7> kVertical = {code_of("0000010"), code_of("000010"), code_of("010"), code_of("1"),
-                                                  code_of("011"), code_of("000011"), code_of("0000011")};
+inline constexpr std::array<Code, 7> kVertical = {code_of("0000010"), code_of("000010"), code_of("010"),    code_of("1"),
+                                                  code_of("011"),     code_of("000011"), code_of("0000011")};
 
 /// Four vertical modes after each other, by (a1 - b1 + 3) of the first + 8 of the second + 64 + 512. Entries with a
 /// 7 in them are never asked for.

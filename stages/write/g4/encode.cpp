@@ -55,8 +55,7 @@ struct RunWord {
 
 RunWord run_word(const RunCodes& codes, std::uint32_t run) {
   const Code make_up = codes.make_up[run >> 6], terminating = codes.terminating[run & 63];
-  return {std::uint64_t{make_up.bits()} << terminating.length() | terminating.bits(),
-          make_up.length() + terminating.length()};
+  return {std::uint64_t{make_up.bits()} << terminating.length() | terminating.bits(), make_up.length() + terminating.length()};
 }
 
 void put_long_run(BitWriter& writer, const RunCodes& codes, std::uint32_t run) {

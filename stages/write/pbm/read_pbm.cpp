@@ -86,8 +86,7 @@ Result<LayerImage> read(int file, std::uint64_t bytes, const std::string& path) 
   const auto columns = static_cast<std::uint32_t>(head->columns), rows = static_cast<std::uint32_t>(head->rows);
   const std::size_t stride = row_bytes(columns);
   const std::uint64_t expected = head->bytes + std::uint64_t{stride} * rows;
-  if (bytes != expected)
-    return failure(fmt::format("{} bytes where {} x {} pixels take {}", bytes, columns, rows, expected));
+  if (bytes != expected) return failure(fmt::format("{} bytes where {} x {} pixels take {}", bytes, columns, rows, expected));
 
   RunsBuilder builder(columns);
   const std::uint32_t rows_at_once = static_cast<std::uint32_t>(std::max<std::size_t>(1, 256 * 1024 / stride));

@@ -13,8 +13,7 @@
 namespace lamina::write::picture {
 namespace {
 
-constexpr Colour kGround{250, 248, 243}, kPaper{255, 255, 255}, kFrame{214, 208, 196}, kInk{27, 38, 59},
-    kQuiet{120, 116, 108};
+constexpr Colour kGround{250, 248, 243}, kPaper{255, 255, 255}, kFrame{214, 208, 196}, kInk{27, 38, 59}, kQuiet{120, 116, 108};
 
 /// Calls use(index, runs) for each layer's image, from several threads. The error is that of the first layer with one.
 template <class Use>
@@ -28,10 +27,9 @@ Status for_each_image(const SheetRequest& request, const Use& use) {
     if (!image) {
       wrong = image.error();
     } else if (image->runs.columns != request.grid.columns() || image->runs.view().rows() != request.grid.rows()) {
-      wrong = {Fault::kVerification,
-               fmt::format("{}: {} x {} pixels where the manifest says {} x {}; plan the layer again",
-                           request.layers[index].path, image->runs.columns, image->runs.view().rows(),
-                           request.grid.columns(), request.grid.rows())};
+      wrong = {Fault::kVerification, fmt::format("{}: {} x {} pixels where the manifest says {} x {}; plan the layer again",
+                                                 request.layers[index].path, image->runs.columns, image->runs.view().rows(),
+                                                 request.grid.columns(), request.grid.rows())};
     } else {
       use(index, image->runs.view());
       return;

@@ -27,14 +27,12 @@ SheetLayout with_columns(int columns, int cells, double proportion, int width, d
   layout.caption_size = std::clamp(layout.cell_width / 14, 9, scaled(26, scale));
   layout.caption_height = layout.caption_size * 3 / 2;
   const double height = layout.cell_width * proportion;
-  layout.cell_height =
-      std::max(1, static_cast<int>(std::lround(std::min<double>(height, kMostHeight * layout.cell_width))));
+  layout.cell_height = std::max(1, static_cast<int>(std::lround(std::min<double>(height, kMostHeight * layout.cell_width))));
   layout.picture_height = layout.cell_height;
-  layout.picture_width =
-      std::clamp(static_cast<int>(std::lround(layout.cell_height / proportion)), 1, layout.cell_width);
+  layout.picture_width = std::clamp(static_cast<int>(std::lround(layout.cell_height / proportion)), 1, layout.cell_width);
   const int rows = (cells + columns - 1) / columns;
-  layout.height = 2 * layout.margin + layout.title_height + rows * (layout.cell_height + layout.caption_height) +
-                  (rows - 1) * layout.gap;
+  layout.height =
+      2 * layout.margin + layout.title_height + rows * (layout.cell_height + layout.caption_height) + (rows - 1) * layout.gap;
   return layout;
 }
 
@@ -51,18 +49,18 @@ PixelWindow with_margin(const PixelWindow& window, const PixelGrid& grid) {
   const PixelWindow bed{0, grid.columns(), 0, grid.rows()};
   if (window.empty()) return bed;
   // 4 % of the longer side in mm, at least 3 pixels.
-  const double side = std::max(static_cast<double>(window.width()) / grid.x.dpi(),
-                               static_cast<double>(window.height()) / grid.y.dpi());
+  const double side =
+      std::max(static_cast<double>(window.width()) / grid.x.dpi(), static_cast<double>(window.height()) / grid.y.dpi());
   const auto x = static_cast<std::uint32_t>(std::max(3.0, side * 0.04 * grid.x.dpi()));
   const auto y = static_cast<std::uint32_t>(std::max(3.0, side * 0.04 * grid.y.dpi()));
-  return {window.left - std::min(window.left, x), std::min(bed.right, window.right + x),
-          window.top - std::min(window.top, y), std::min(bed.bottom, window.bottom + y)};
+  return {window.left - std::min(window.left, x), std::min(bed.right, window.right + x), window.top - std::min(window.top, y),
+          std::min(bed.bottom, window.bottom + y)};
 }
 
 SheetLayout lay_out(int cells, const PixelWindow& window, const PixelGrid& grid, int width) {
   const double scale = std::clamp(width / kDesignWidth, kLeastScale, kMostScale);
-  const double proportion = static_cast<double>(window.height()) / grid.y.dpi() *
-                            grid.x.dpi() / static_cast<double>(window.width());
+  const double proportion =
+      static_cast<double>(window.height()) / grid.y.dpi() * grid.x.dpi() / static_cast<double>(window.width());
   if (cells == 1) {
     const SheetLayout frame = with_columns(1, 1, proportion, width, scale);
     // A layer alone is not made larger than its pixels, but its caption needs some room.

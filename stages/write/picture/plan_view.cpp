@@ -85,7 +85,8 @@ std::vector<std::uint8_t> coverage(const ContoursView& contours, const Scale& sc
 void paint(Canvas& canvas, const PlanView& view, const Scale& scale, int left, int top, int width, int height) {
   canvas.fill_box(left, top, width, height, kPaper);
   canvas.paint(left, top, width, coverage(view.region, scale, width, height), kSolid);
-  for (const PlanView::Shape& shape : view.shapes) canvas.paint(left, top, width, coverage(shape.outline, scale, width, height), shape.ink);
+  for (const PlanView::Shape& shape : view.shapes)
+    canvas.paint(left, top, width, coverage(shape.outline, scale, width, height), shape.ink);
 }
 
 /// A square of each ink and what it is for, from `left` on.
@@ -103,10 +104,12 @@ void legend(Canvas& canvas, const std::vector<std::pair<Colour, std::string>>& i
 Result<Buffer<std::byte>> plan_sheet(const std::string& title, std::size_t layers, const Box& box, std::uint32_t width,
                                      const std::function<Result<PlanView>(std::size_t)>& view_of) {
   constexpr std::int64_t kPixels = 20'000, kLeastPixel = 1000;  // of the longer side: no cell is as large; nm
-  const std::int64_t shown = std::max<std::int64_t>(box.width(), 1000) * 26 / 25, tall = std::max<std::int64_t>(box.depth(), 1000) * 26 / 25;
+  const std::int64_t shown = std::max<std::int64_t>(box.width(), 1000) * 26 / 25,
+                     tall = std::max<std::int64_t>(box.depth(), 1000) * 26 / 25;
   const std::int64_t side = std::max(shown, tall), dots = std::min(kPixels, side / kLeastPixel);
   const PixelGrid grid{PixelAxis(dots, shown, side), PixelAxis(dots, tall, side)};
-  const SheetLayout layout = lay_out(static_cast<int>(layers), {0, grid.columns(), 0, grid.rows()}, grid, static_cast<int>(width));
+  const SheetLayout layout =
+      lay_out(static_cast<int>(layers), {0, grid.columns(), 0, grid.rows()}, grid, static_cast<int>(width));
   Canvas canvas(layout.width, layout.height, kGround);
   const double pixels_per_nm = layout.picture_width / static_cast<double>(shown);
   const Scale scale{(static_cast<double>(box.lo.x) + box.hi.x) / 2 - static_cast<double>(shown) / 2,
@@ -116,20 +119,21 @@ Result<Buffer<std::byte>> plan_sheet(const std::string& title, std::size_t layer
     const Result<PlanView> view = view_of(i);
     if (!view) return view.error();
     const int cell = static_cast<int>(i), size = layout.caption_size, left = layout.cell_left(cell);
-    paint(canvas, *view, scale, left + (layout.cell_width - layout.picture_width) / 2, layout.cell_top(cell), layout.picture_width,
-          layout.picture_height);
+    paint(canvas, *view, scale, left + (layout.cell_width - layout.picture_width) / 2, layout.cell_top(cell),
+          layout.picture_width, layout.picture_height);
     const int baseline = layout.cell_top(cell) + layout.cell_height + size * 5 / 4, remark = text_width(view->caption, size);
     canvas.text(left, baseline, size, view->title, kText);
     if (text_width(view->title, size) + size / 2 + remark <= layout.cell_width) {
       canvas.text(left + layout.cell_width - remark, baseline, size, view->caption, kText);
     }
     for (const PlanView::Shape& shape : view->shapes) {
-      if (std::ranges::none_of(inks, [&](const auto& ink) { return ink.second == shape.name; })) inks.emplace_back(shape.ink, shape.name);
+      if (std::ranges::none_of(inks, [&](const auto& ink) { return ink.second == shape.name; }))
+        inks.emplace_back(shape.ink, shape.name);
     }
   }
   canvas.text(layout.margin, layout.margin + layout.title_size, layout.title_size, title, kText);
-  legend(canvas, inks, layout.margin + text_width(title, layout.title_size) + layout.title_size, layout.margin + layout.title_size,
-         layout.title_size * 3 / 4);
+  legend(canvas, inks, layout.margin + text_width(title, layout.title_size) + layout.title_size,
+         layout.margin + layout.title_size, layout.title_size * 3 / 4);
   return canvas.png();
 }
 

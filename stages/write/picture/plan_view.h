@@ -16,12 +16,12 @@ namespace lamina::write::picture {
 
 struct PlanView {
   std::string title, caption;
-  Box box;                     // nm on the bed, what is shown, with a margin around it
-  ContoursView region;         // clean contours: the solid, drawn first
+  Box box;              // nm on the bed, what is shown, with a margin around it
+  ContoursView region;  // clean contours: the solid, drawn first
   struct Shape {
     Colour ink;
-    std::string name;          // for the legend
-    Contours outline;          // nonzero
+    std::string name;  // for the legend
+    Contours outline;  // nonzero
   };
   std::vector<Shape> shapes;   // drawn in this order, over each other
   std::uint32_t width = 2400;  // pixels

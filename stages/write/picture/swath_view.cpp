@@ -27,8 +27,10 @@ Result<Buffer<std::byte>> swath_picture(const SwathView& view) {
   canvas.text(left, margin + 16, 17, view.title, kText);
   canvas.fill_box(left, top, wide, high, kBed);
   const auto box = [&](double x0, double y0, double x1, double y1, Colour colour) {
-    const int l = std::clamp(static_cast<int>(std::lround(x0 * sx)), 0, wide), r = std::clamp(static_cast<int>(std::lround(x1 * sx)), 0, wide);
-    const int t = std::clamp(static_cast<int>(std::lround(y0 * sy)), 0, high), b = std::clamp(static_cast<int>(std::lround(y1 * sy)), 0, high);
+    const int l = std::clamp(static_cast<int>(std::lround(x0 * sx)), 0, wide),
+              r = std::clamp(static_cast<int>(std::lround(x1 * sx)), 0, wide);
+    const int t = std::clamp(static_cast<int>(std::lround(y0 * sy)), 0, high),
+              b = std::clamp(static_cast<int>(std::lround(y1 * sy)), 0, high);
     if (r > l && b > t) canvas.fill_box(left + l, top + t, r - l, b - t, colour);
   };
   bool odd = false;
@@ -48,7 +50,10 @@ Result<Buffer<std::byte>> swath_picture(const SwathView& view) {
   const auto paint = [&](const RunsView& runs, Colour ink) {
     coverage(runs, window, static_cast<std::uint32_t>(wide), shares);
     for (int row = 0; row < high; ++row) {
-      canvas.paint(left, top + row, wide, std::span(shares).subspan(static_cast<std::size_t>(row) * static_cast<std::size_t>(wide), static_cast<std::size_t>(wide)), ink);
+      canvas.paint(left, top + row, wide,
+                   std::span(shares).subspan(static_cast<std::size_t>(row) * static_cast<std::size_t>(wide),
+                                             static_cast<std::size_t>(wide)),
+                   ink);
     }
   };
   paint(view.image, kAsked);

@@ -51,8 +51,8 @@ void flush_nothing(png_structp) {}
 std::uint32_t per_metre(double dpi) { return static_cast<std::uint32_t>((dpi * 10'000 + 127) / 254); }
 
 /// No object of this frame needs its destructor run when libpng jumps out.
-bool write_image(png_structp png, png_infop info, const RunsView& runs, std::uint32_t per_metre_x,
-                 std::uint32_t per_metre_y, std::byte* row, std::size_t stride) {
+bool write_image(png_structp png, png_infop info, const RunsView& runs, std::uint32_t per_metre_x, std::uint32_t per_metre_y,
+                 std::byte* row, std::size_t stride) {
   if (setjmp(png_jmpbuf(png)) != 0) return false;
   png_set_user_limits(png, kMostPixelsASide, kMostPixelsASide);
   png_set_IHDR(png, info, runs.columns, runs.rows(), 1, PNG_COLOR_TYPE_PALETTE, PNG_INTERLACE_NONE,

@@ -52,7 +52,8 @@ template <std::size_t kHead, class Head>
 void put_segments(const SweepVectors& vectors, bool backward, bool turn, std::size_t vector_bytes, ProgramBytes& out,
                   const Head& head) {
   std::size_t end = out.size();
-  for_each_segment(vectors, kHead, vector_bytes, [&](std::uint32_t, std::uint32_t count) { end += kHead + count * vector_bytes; });
+  for_each_segment(vectors, kHead, vector_bytes,
+                   [&](std::uint32_t, std::uint32_t count) { end += kHead + count * vector_bytes; });
   std::size_t next = backward ? end : out.size();
   out.resize(end);
   const std::size_t stride = vectors.words * sizeof(std::uint64_t);

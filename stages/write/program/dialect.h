@@ -33,12 +33,12 @@ class ProgramWriter {
 
 /// One row of the registry.
 struct Dialect {
-  std::string_view id;           // as in machine.dialect
-  std::string_view extension;    // with the dot
+  std::string_view id;         // as in machine.dialect
+  std::string_view extension;  // with the dot
   std::string_view description;
   std::uint32_t most_nozzles;
-  std::uint32_t bit_order;       // HeadGrid::bit_order that its vectors have
-  bool has_motion;               // the text moves axes and vats; else it is the data of the head alone
+  std::uint32_t bit_order;  // HeadGrid::bit_order that its vectors have
+  bool has_motion;          // the text moves axes and vats; else it is the data of the head alone
   /// A writer for one thread. machine and grid have to live as long as it does.
   std::unique_ptr<ProgramWriter> (*make_writer)(const Machine& machine, const HeadGrid& grid);
 };

@@ -17,11 +17,11 @@ namespace {
 constexpr std::array<Dialect, 6> kDialects = {{
     {"nuferbj", ".gcode", "G-code with vectors as hexadecimal words, powder cycle and counters", 65'535, 0, true,
      nuferbj::make_writer},
-    {"raw", ".raw", "128-bit words as a Xaar XJ128 takes them, with binary swath heads", 65'535, 120, false,
-     raw::make_writer},
-    {"planes", ".planes", "32-bit padded planes of a swath, as drive electronics of production heads take them", 65'535, 31, false,
-     planes::make_writer},
-    {"hp45", ".hp45", "lines of the HP45 controller: SBR, position and 300 nozzles in base 64", 300, 0, true, hp45::make_writer},
+    {"raw", ".raw", "128-bit words as a Xaar XJ128 takes them, with binary swath heads", 65'535, 120, false, raw::make_writer},
+    {"planes", ".planes", "32-bit padded planes of a swath, as drive electronics of production heads take them", 65'535, 31,
+     false, planes::make_writer},
+    {"hp45", ".hp45", "lines of the HP45 controller: SBR, position and 300 nozzles in base 64", 300, 0, true,
+     hp45::make_writer},
     {"brundlefab", ".gcode", "BrundleFab's T1 P Q R S with up to 72 nozzles", 72, 0, true, brundlefab::make_writer},
     {"m578", ".gcode", "RepRapFirmware's M578, 32 nozzles a head number", 1024, 0, true, m578::make_writer},
 }};

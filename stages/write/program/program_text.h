@@ -23,7 +23,8 @@ void put(ProgramBytes& out, fmt::format_string<Values...> format, Values&&... va
 
 /// mm with four digits (a tenth of a micrometre), never -0.
 inline std::string mm_text(double millimetres) {
-  const double rounded = static_cast<double>(static_cast<std::int64_t>(millimetres * 1e4 + (millimetres < 0 ? -0.5 : 0.5))) / 1e4;
+  const double rounded =
+      static_cast<double>(static_cast<std::int64_t>(millimetres * 1e4 + (millimetres < 0 ? -0.5 : 0.5))) / 1e4;
   return fmt::format("{:.4f}", rounded == 0 ? 0.0 : rounded);
 }
 
@@ -35,8 +36,12 @@ class Carriage {
  public:
   Carriage(const Machine& machine, const HeadGrid& grid) : machine_(machine), grid_(grid) {}
 
-  const std::string& scan_axis() const { return grid_.scan_axis == ScanAxis::kX ? machine_.motion.x_axis : machine_.motion.y_axis; }
-  const std::string& line_axis() const { return grid_.scan_axis == ScanAxis::kX ? machine_.motion.y_axis : machine_.motion.x_axis; }
+  const std::string& scan_axis() const {
+    return grid_.scan_axis == ScanAxis::kX ? machine_.motion.x_axis : machine_.motion.y_axis;
+  }
+  const std::string& line_axis() const {
+    return grid_.scan_axis == ScanAxis::kX ? machine_.motion.y_axis : machine_.motion.x_axis;
+  }
   double along(double step) const {
     return grid_.step_position_nm(step) / kNmPerMm + machine_.mounting.offset_mm[grid_.scan_axis == ScanAxis::kX ? 0 : 1];
   }

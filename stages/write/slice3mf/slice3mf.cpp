@@ -48,7 +48,7 @@ Status set_box(const Handle& object, const Box& box, std::int64_t left, std::int
 struct Slice3mfWriter::State {
   Handle model;
   std::int64_t left = 0, front = 0;  // nm, whole mm: where the items stand, and what their coordinates count from
-  std::vector<Handle> stacks;  // one for each body
+  std::vector<Handle> stacks;        // one for each body
 };
 
 Slice3mfWriter::Slice3mfWriter() : state_(std::make_unique<State>()) {}
@@ -103,7 +103,8 @@ Status Slice3mfWriter::add(const SliceLayer& layer) {
     if (NMR::lib3mf_slicestack_addslice(stack.get(), top, slice.out()) != LIB3MF_OK) return refused("a slice", stack);
     for (std::uint32_t c = layer.body[b]; c < layer.body[b + 1]; ++c) {
       vertices.clear();
-      for (const Point2 p : layer.contours[c]) vertices.push_back({{float_mm(p.x - state_->left), float_mm(p.y - state_->front)}});
+      for (const Point2 p : layer.contours[c])
+        vertices.push_back({{float_mm(p.x - state_->left), float_mm(p.y - state_->front)}});
       DWORD first = 0, polygon = 0;
       const auto count = static_cast<DWORD>(vertices.size());
       if (NMR::lib3mf_slice_addvertices(slice.get(), vertices.data(), count, &first) != LIB3MF_OK) {

@@ -18,7 +18,8 @@ std::int64_t mils(std::int64_t nm) { return std::llround(static_cast<double>(nm)
 
 void replace_all(std::string& text, std::string_view name, std::int64_t value) {
   const std::string digits = fmt::format("{}", value);
-  for (std::size_t at = 0; (at = text.find(name, at)) != std::string::npos; at += digits.size()) text.replace(at, name.size(), digits);
+  for (std::size_t at = 0; (at = text.find(name, at)) != std::string::npos; at += digits.size())
+    text.replace(at, name.size(), digits);
 }
 
 /// The PD line for a thickness and use, or nullptr. Thicknesses are those of the table to a micrometre.
@@ -52,7 +53,8 @@ class SmlLayer final : public LayerMoves {
     begun_ = true;
     if (!moved_ || move.from != at_) {
       command(machine_.sml.travel, move.from);
-      const double length = moved_ ? std::hypot(mm(std::int64_t{move.from.x} - at_.x), mm(std::int64_t{move.from.y} - at_.y)) : 0;
+      const double length =
+          moved_ ? std::hypot(mm(std::int64_t{move.from.x} - at_.x), mm(std::int64_t{move.from.y} - at_.y)) : 0;
       totals_.travel_mm += length;
       totals_.seconds += length / machine_.speed.travel_mm_s;
       ++totals_.travels;
@@ -111,7 +113,8 @@ class SmlFormat final : public ExtrusionFormat {
     return {};
   }
   void head(const ExtrusionHead& head, Buffer<char>& out) const override {
-    append(out, fmt::format("; SML of {}\n; machine: {}\n; parts: {}\n; layers: {}\n", head.program, machine_.name, head.source, head.layers));
+    append(out, fmt::format("; SML of {}\n; machine: {}\n; parts: {}\n; layers: {}\n", head.program, machine_.name, head.source,
+                            head.layers));
     if (!machine_.sml.header.empty()) append(out, machine_.sml.header + (machine_.sml.header.ends_with('\n') ? "" : "\n"));
   }
   std::unique_ptr<LayerMoves> layer(const Layer& layer, std::uint32_t, Buffer<char>& out) const override {

@@ -34,12 +34,18 @@ std::string_view name_of(PathKind kind) {
 std::string escaped(std::string_view text) {
   std::string out;
   for (const char c : text) {
-    if (c == '&') out += "&amp;";
-    else if (c == '<') out += "&lt;";
-    else if (c == '>') out += "&gt;";
-    else if (c == '"') out += "&quot;";
-    else if (c == '-' && out.ends_with('-')) out += "&#45;";  // "--" may not stand in a comment
-    else if (static_cast<unsigned char>(c) >= 0x20) out += c;
+    if (c == '&')
+      out += "&amp;";
+    else if (c == '<')
+      out += "&lt;";
+    else if (c == '>')
+      out += "&gt;";
+    else if (c == '"')
+      out += "&quot;";
+    else if (c == '-' && out.ends_with('-'))
+      out += "&#45;";  // "--" may not stand in a comment
+    else if (static_cast<unsigned char>(c) >= 0x20)
+      out += c;
   }
   return out;
 }
@@ -115,7 +121,8 @@ class SvgEncoder : public SliceEncoder {
       });
     }
     append(out, fmt::format("\" style=\"fill: white; stroke: black; stroke-width: 0; fill-type: evenodd; "
-                            "fill-rule: evenodd\" slic3r:area=\"{:.4f}\"", square_mm(area)));
+                            "fill-rule: evenodd\" slic3r:area=\"{:.4f}\"",
+                            square_mm(area)));
     if (head.parts.size() > 1) append(out, fmt::format(" class=\"{}\"", escaped(head.parts[b])));
     append(out, " />\n");
     return c;
@@ -138,7 +145,8 @@ class SvgEncoder : public SliceEncoder {
         return text;
       });
       append(out, fmt::format("\" class=\"{}\" style=\"fill: none; stroke: {}; stroke-linecap: round; stroke-linejoin: round; "
-                              "stroke-width: ", name_of(paths.kind[begin]), colour_of(paths.kind[begin])));
+                              "stroke-width: ",
+                              name_of(paths.kind[begin]), colour_of(paths.kind[begin])));
       append_mm(out, paths.width[begin]);
       append(out, "\" />\n");
       begin = end;

@@ -77,8 +77,8 @@ OptionsHandle strict_options(std::string& message) {
 TiffHandle open_for_writing(MemoryFile& file, std::string& message) {
   const auto options = strict_options(message);
   if (options == nullptr) return nullptr;
-  return TiffHandle(TIFFClientOpenExt("layer", "wl", &file, read_nothing, write_bytes, seek, close_nothing, size_of,
-                                      nullptr, nullptr, options.get()));
+  return TiffHandle(TIFFClientOpenExt("layer", "wl", &file, read_nothing, write_bytes, seek, close_nothing, size_of, nullptr,
+                                      nullptr, options.get()));
 }
 
 }  // namespace lamina::write::tiff

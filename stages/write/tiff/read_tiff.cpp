@@ -17,16 +17,12 @@ namespace {
 /// Rows of `stride` bytes that `bytes` of this compression can hold at most; a header that promises more lies.
 std::uint64_t most_rows(std::uint16_t compression, std::uint64_t bytes, std::uint64_t stride) {
   switch (compression) {
-    case COMPRESSION_NONE:
-      return bytes / stride;
-    case COMPRESSION_PACKBITS:
-      return bytes * 64 / stride;  // two bytes make 128
+    case COMPRESSION_NONE: return bytes / stride;
+    case COMPRESSION_PACKBITS: return bytes * 64 / stride;  // two bytes make 128
     case COMPRESSION_CCITTFAX4:
     case COMPRESSION_CCITTFAX3:
-    case COMPRESSION_CCITTRLE:
-      return bytes * 8;  // a row takes a bit
-    default:
-      return bytes * 2048 / stride + 1;  // deflate 1032, LZW about 1400
+    case COMPRESSION_CCITTRLE: return bytes * 8;  // a row takes a bit
+    default: return bytes * 2048 / stride + 1;    // deflate 1032, LZW about 1400
   }
 }
 
@@ -75,8 +71,8 @@ Result<LayerImage> read(int file, std::uint64_t bytes, const std::string& path) 
   TIFFGetFieldDefaulted(tiff.get(), TIFFTAG_SAMPLESPERPIXEL, &samples);
   TIFFGetFieldDefaulted(tiff.get(), TIFFTAG_COMPRESSION, &compression);
   TIFFGetFieldDefaulted(tiff.get(), TIFFTAG_RESOLUTIONUNIT, &unit);
-  if (TIFFGetField(tiff.get(), TIFFTAG_PHOTOMETRIC, &photometric) == 0 || photometric > PHOTOMETRIC_MINISBLACK ||
-      bits != 1 || samples != 1) {
+  if (TIFFGetField(tiff.get(), TIFFTAG_PHOTOMETRIC, &photometric) == 0 || photometric > PHOTOMETRIC_MINISBLACK || bits != 1 ||
+      samples != 1) {
     return failure("not a 1-bit image");
   }
   if (TIFFIsTiled(tiff.get()) != 0) return failure("tiles are not supported");

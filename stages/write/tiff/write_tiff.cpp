@@ -25,8 +25,7 @@ constexpr std::size_t kDirectoryBytes = 1024;
 constexpr std::size_t kStripBytes = 256 * 1024;
 
 Error cannot_hold(const RunsView& runs, std::string_view why) {
-  return {Fault::kOutput,
-          fmt::format("TIFF cannot hold a layer of {} x {} pixels: {}", runs.columns, runs.rows(), why)};
+  return {Fault::kOutput, fmt::format("TIFF cannot hold a layer of {} x {} pixels: {}", runs.columns, runs.rows(), why)};
 }
 
 Status check_size(const RunsView& runs) {
@@ -56,8 +55,7 @@ void set_tags(TIFF* tiff, const RunsView& runs, double dpi_x, double dpi_y, std:
 }
 
 /// Writes the directory; after this the file is whole or the error says why not.
-Status finish(TiffHandle tiff, bool strips_written, MemoryFile& memory, const RunsView& runs,
-              const std::string& message) {
+Status finish(TiffHandle tiff, bool strips_written, MemoryFile& memory, const RunsView& runs, const std::string& message) {
   const bool directory_written = strips_written && TIFFFlush(tiff.get()) != 0;
   tiff.reset();
   if (!directory_written) {
@@ -103,8 +101,7 @@ class StripEncoder : public ImageEncoder {
     if (compression_ == COMPRESSION_NONE && stride * runs.rows() > kMostClassicBytes - kStripBytes) {
       return cannot_hold(runs, "the file would exceed 4 GiB; use --format tiff-g4");
     }
-    const auto rows_per_strip =
-        static_cast<std::uint32_t>(std::clamp<std::size_t>(kStripBytes / stride, 1, runs.rows()));
+    const auto rows_per_strip = static_cast<std::uint32_t>(std::clamp<std::size_t>(kStripBytes / stride, 1, runs.rows()));
     if (compression_ == COMPRESSION_NONE) {  // its size is known: nothing has to grow, and no second copy exists meanwhile
       const std::size_t strips = ceil_div<std::size_t>(runs.rows(), rows_per_strip);
       file.clear();
@@ -125,9 +122,8 @@ class StripEncoder : public ImageEncoder {
         expand_row(runs.row(first + r), std::span(bits_).subspan(stride * r, stride));
       }
       const auto length = static_cast<tmsize_t>(stride * rows);
-      written = compression_ == COMPRESSION_NONE
-                    ? TIFFWriteRawStrip(tiff.get(), strip, bits_.data(), length) == length
-                    : TIFFWriteEncodedStrip(tiff.get(), strip, bits_.data(), length) == length;
+      written = compression_ == COMPRESSION_NONE ? TIFFWriteRawStrip(tiff.get(), strip, bits_.data(), length) == length
+                                                 : TIFFWriteEncodedStrip(tiff.get(), strip, bits_.data(), length) == length;
     }
     return finish(std::move(tiff), written, memory, runs, message);
   }

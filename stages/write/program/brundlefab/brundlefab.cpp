@@ -24,8 +24,8 @@ class Writer final : public ProgramWriter {
     const int ahead = sweep.backward ? -1 : 1;
     put(out, "T0\nG0 {}{} {}{} F{}\n", along, mm_text(carriage_.begin(sweep, vectors)), carriage_.line_axis(),
         mm_text(carriage_.across(sweep.first_line)), feed_text(machine_.motion.travel_speed_mm_s));
-    std::int64_t at = INT64_MIN / 2;          // the step where the head is; far from all at first
-    const std::uint64_t* pending = nullptr;   // jetted by the move to `at`, which is not written yet
+    std::int64_t at = INT64_MIN / 2;         // the step where the head is; far from all at first
+    const std::uint64_t* pending = nullptr;  // jetted by the move to `at`, which is not written yet
     std::uint64_t now[2] = {0, 0};
     const auto flush = [&] {
       if (pending != nullptr) put(out, "G1 {}{} F{}\n", along, mm_text(carriage_.along(static_cast<double>(at))), speed());

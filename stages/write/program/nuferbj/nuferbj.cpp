@@ -62,8 +62,7 @@ class Writer final : public ProgramWriter {
 
   void end_layer(const LayerCycle& cycle, ProgramBytes& out) override {
     put(out, "G0 {}{} {}{} F{}\nM813 L{}\n", machine_.motion.x_axis, mm_text(machine_.motion.safe_mm[0]),
-        machine_.motion.y_axis, mm_text(machine_.motion.safe_mm[1]), feed_text(machine_.motion.travel_speed_mm_s),
-        cycle.layer);
+        machine_.motion.y_axis, mm_text(machine_.motion.safe_mm[1]), feed_text(machine_.motion.travel_speed_mm_s), cycle.layer);
   }
 
   void end(ProgramBytes& out) override { put(out, "M814\n"); }

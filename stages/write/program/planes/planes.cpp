@@ -15,7 +15,8 @@ class Writer final : public ProgramWriter {
   Writer(const Machine& machine, const HeadGrid& grid) : machine_(machine), grid_(grid), words_((grid.nozzles + 31) / 32) {}
 
   void start(std::uint32_t layers, ProgramBytes& out) override {
-    for (const std::uint32_t value : {kStart, 7u, 1u, layers, grid_.nozzles, grid_.places, grid_.lines, grid_.steps_per_pixel, words_}) {
+    for (const std::uint32_t value :
+         {kStart, 7u, 1u, layers, grid_.nozzles, grid_.places, grid_.lines, grid_.steps_per_pixel, words_}) {
       put_little<std::uint32_t>(out, value);
     }
   }
@@ -31,13 +32,12 @@ class Writer final : public ProgramWriter {
   // Planes of one sweep, in the order of the movement; inside of a plane steps increase.
   void sweep(const Sweep& sweep, const SweepVectors& vectors, ProgramBytes& out) override {
     const auto across = static_cast<std::uint32_t>(across_nm(machine_, grid_, sweep.first_line));
-    put_segments<kPlaneHead>(vectors, sweep.backward, false, words_ * 4, out,
-                             [&](std::byte* to, std::uint32_t begin, std::uint32_t count) {
-                               const std::uint32_t head[9] = {kPlane, 7 + count * words_, sweep.number, sweep.of,
-                                                              sweep.backward ? 1u : 0u, across, vectors.first_step + begin,
-                                                              count, words_};
-                               std::memcpy(to, head, kPlaneHead);
-                             });
+    put_segments<kPlaneHead>(
+        vectors, sweep.backward, false, words_ * 4, out, [&](std::byte* to, std::uint32_t begin, std::uint32_t count) {
+          const std::uint32_t head[9] = {kPlane, 7 + count * words_,         sweep.number, sweep.of, sweep.backward ? 1u : 0u,
+                                         across, vectors.first_step + begin, count,        words_};
+          std::memcpy(to, head, kPlaneHead);
+        });
   }
 
   void end_layer(const LayerCycle& cycle, ProgramBytes& out) override {

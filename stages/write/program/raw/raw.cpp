@@ -39,11 +39,12 @@ class Writer final : public ProgramWriter {
     put_little<std::uint32_t>(out, sweep.backward ? 1 : 0);
     put_little<std::int64_t>(out, across_nm(machine_, grid_, sweep.first_line));
     put_little<std::uint32_t>(out, segments);
-    put_segments<kSegmentHead>(vectors, sweep.backward, sweep.backward, vector_bytes, out,
-                               [&](std::byte* to, std::uint32_t begin, std::uint32_t count) {
-                                 const std::uint32_t head[2] = {vectors.first_step + (sweep.backward ? begin + count - 1 : begin), count};
-                                 std::memcpy(to, head, kSegmentHead);
-                               });
+    put_segments<kSegmentHead>(
+        vectors, sweep.backward, sweep.backward, vector_bytes, out,
+        [&](std::byte* to, std::uint32_t begin, std::uint32_t count) {
+          const std::uint32_t head[2] = {vectors.first_step + (sweep.backward ? begin + count - 1 : begin), count};
+          std::memcpy(to, head, kSegmentHead);
+        });
   }
 
   void end_layer(const LayerCycle& cycle, ProgramBytes& out) override {
