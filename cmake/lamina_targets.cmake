@@ -24,7 +24,7 @@ target_link_libraries(lamina_stages PUBLIC TBB::tbb Eigen3::Eigen fmt::fmt embre
 
 # --- pipeline: how work moves
 lamina_sources(pipeline_sources "pipeline/*.cpp")
-list(FILTER pipeline_sources EXCLUDE REGEX "/pipeline/(main|preview_main|preview_swath)\\.cpp$")
+list(FILTER pipeline_sources EXCLUDE REGEX "/pipeline/(main|preview_main|preview_layers|preview_swath)\\.cpp$")
 add_library(lamina_pipeline STATIC ${pipeline_sources})
 add_library(lamina::pipeline ALIAS lamina_pipeline)
 # toml++ is used as headers: job_toml.cpp wants errors as values, and Debian's library was built with exceptions.
@@ -32,9 +32,13 @@ target_compile_definitions(lamina_pipeline PRIVATE LAMINA_VERSION="${PROJECT_VER
 target_link_libraries(lamina_pipeline PUBLIC lamina::stages
                       PRIVATE nlohmann_json::nlohmann_json PkgConfig::XXHASH)
 
-if(LAMINA_SANITIZE)
-  target_precompile_headers(lamina_stages PRIVATE cmake/precompiled.h)
-  target_precompile_headers(lamina_pipeline PRIVATE cmake/precompiled.h)
+# ccache keeps nothing that was made from precompiled headers, and does better without them.
+if(LAMINA_PRECOMPILE AND NOT CMAKE_CXX_COMPILER_LAUNCHER MATCHES "ccache")
+  foreach(library lamina_stages lamina_pipeline)
+    target_precompile_headers(${library} PRIVATE cmake/precompiled.h)
+    # g++ 12 forgets that precompiled headers are the system's, and has these wrong for std::string.
+    target_compile_options(${library} PRIVATE -Wno-array-bounds -Wno-stringop-overflow -Wno-stringop-overread)
+  endforeach()
 endif()
 
 add_executable(lamina pipeline/main.cpp)
@@ -43,7 +47,8 @@ target_link_libraries(lamina PRIVATE lamina::pipeline)
 # Pictures need OpenImageIO, which brings some 260 shared libraries and a tenth of a second of start-up: a program of
 # its own that `lamina preview` hands over to, so that no job pays for it.
 lamina_sources(picture_sources "stages/write/picture/*.cpp")
-add_executable(lamina-preview pipeline/preview_main.cpp pipeline/preview_swath.cpp ${picture_sources})
+add_executable(lamina-preview pipeline/preview_main.cpp pipeline/preview_layers.cpp pipeline/preview_swath.cpp
+               ${picture_sources})
 target_link_libraries(lamina-preview PRIVATE lamina::pipeline PkgConfig::OPENIMAGEIO nlohmann_json::nlohmann_json)
 
 if(LAMINA_TESTS)

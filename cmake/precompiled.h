@@ -1,5 +1,5 @@
-// cmake/precompiled.h: what most sources include anyway, parsed once. Only sanitized builds use it, which are long; the
-// others see that every file includes what it needs.
+// cmake/precompiled.h: what most sources include anyway, parsed once. -DLAMINA_PRECOMPILE=OFF builds without it, to see that
+// every file includes what it needs.
 #pragma once
 
 #include <fmt/format.h>

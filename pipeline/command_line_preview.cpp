@@ -16,9 +16,11 @@ CommandSpec preview_spec() {
   spec.name = "preview";
   spec.summary =
       "Draws layers of a job as one picture (PNG), each pixel as dark as the share of its area that is set; or one layer of\n"
-      "a sliced job with its filling, bead widths true (PNG or SVG), or several with --count or --every (PNG).";
-  spec.operand = "DIR";
-  spec.operand_meaning = "directory that lamina jet or lamina slice wrote";
+      "a sliced job with its filling, or of a G-code file, bead widths true (PNG or SVG), or several with --count or --every\n"
+      "(PNG).";
+  spec.operand = "DIR|GCODE";
+  spec.operand_meaning =
+      "directory that lamina jet or lamina slice wrote, or a G-code file of lamina extrude or another slicer";
   spec.options = {
       {"-o,--output", "PNG", "the picture", "", ""},
       {"--count", "N", "so many layers, spread over the height", "12", ""},
@@ -36,7 +38,8 @@ CommandSpec preview_spec() {
       "Examples:\n"
       "  lamina preview out -o sheet.png\n"
       "  lamina preview out -o layer.png --layer 120 --whole-bed\n"
-      "  lamina preview sliced -o layer.svg --layer 12";
+      "  lamina preview sliced -o layer.svg --layer 12\n"
+      "  lamina preview part.gcode -o layer.png --layer 3";
   return spec;
 }
 

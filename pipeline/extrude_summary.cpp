@@ -1,7 +1,6 @@
 #include <fmt/format.h>
 
 #include <cmath>
-#include <iterator>
 
 #include "pipeline/console.h"
 #include "pipeline/extrude.h"
@@ -13,9 +12,7 @@ namespace lamina::pipeline {
 
 std::string extrude_summary_text(const Job& job, const ExtrudeSummary& s) {
   std::string text;
-  const auto line = [&](std::string_view name, const std::string& value) {
-    fmt::format_to(std::back_inserter(text), "{:<10}{}\n", name, value);
-  };
+  const auto line = [&](std::string_view name, const std::string& value) { text += fmt::format("{:<10}{}\n", name, value); };
   for (std::size_t i = 0; i < s.parts.size(); ++i) {
     const PartSummary& part = s.parts[i];
     const Box& box = part.bounds;

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
-#include <iterator>
 #include <utility>
 
 #include "pipeline/command_line.h"
@@ -182,17 +181,15 @@ std::string svg_text(const Drawing& drawing) {
       "font-family=\"DejaVu Sans, sans-serif\">\n<rect width=\"{0}\" height=\"{1}\" fill=\"#ffffff\"/>\n",
       drawing.width, drawing.height);
   for (const Drawing::Box& box : drawing.boxes) {
-    fmt::format_to(std::back_inserter(text),
-                   "<rect x=\"{:.2f}\" y=\"{:.2f}\" width=\"{:.2f}\" height=\"{:.2f}\" fill=\"#{}\"/>\n", box.left, box.top,
-                   box.width, box.height, box.colour);
+    text += fmt::format("<rect x=\"{:.2f}\" y=\"{:.2f}\" width=\"{:.2f}\" height=\"{:.2f}\" fill=\"#{}\"/>\n", box.left,
+                        box.top, box.width, box.height, box.colour);
   }
   for (const Drawing::Text& line : drawing.texts) {
     const char* anchor = line.anchor == Drawing::Anchor::kStart ? "start"
                          : line.anchor == Drawing::Anchor::kEnd ? "end"
                                                                 : "middle";
-    fmt::format_to(std::back_inserter(text),
-                   "<text x=\"{:.2f}\" y=\"{:.2f}\" font-size=\"{}\" text-anchor=\"{}\" fill=\"#{}\">{}</text>\n", line.x,
-                   line.baseline, line.size, anchor, line.colour, escaped(line.line));
+    text += fmt::format("<text x=\"{:.2f}\" y=\"{:.2f}\" font-size=\"{}\" text-anchor=\"{}\" fill=\"#{}\">{}</text>\n", line.x,
+                        line.baseline, line.size, anchor, line.colour, escaped(line.line));
   }
   return text + "</svg>\n";
 }
@@ -202,16 +199,15 @@ std::string drawing_text(const Drawing& drawing) {
   for (const Drawing::Box& box : drawing.boxes) {
     // Edges are rounded, not sizes, so that neighbours touch.
     const long left = std::lround(box.left), top = std::lround(box.top);
-    fmt::format_to(std::back_inserter(text), "box {} {} {} {} {}\n", left, top,
-                   std::max(1l, std::lround(box.left + box.width) - left),
-                   std::max(1l, std::lround(box.top + box.height) - top), box.colour);
+    text += fmt::format("box {} {} {} {} {}\n", left, top, std::max(1l, std::lround(box.left + box.width) - left),
+                        std::max(1l, std::lround(box.top + box.height) - top), box.colour);
   }
   for (const Drawing::Text& line : drawing.texts) {
     const char* anchor = line.anchor == Drawing::Anchor::kStart ? "start"
                          : line.anchor == Drawing::Anchor::kEnd ? "end"
                                                                 : "middle";
-    fmt::format_to(std::back_inserter(text), "text {} {} {} {} {} {}\n", std::lround(line.x), std::lround(line.baseline),
-                   line.size, anchor, line.colour, line.line);
+    text += fmt::format("text {} {} {} {} {} {}\n", std::lround(line.x), std::lround(line.baseline), line.size, anchor,
+                        line.colour, line.line);
   }
   return text;
 }

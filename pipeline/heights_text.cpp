@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <filesystem>
-#include <iterator>
 
 #include "pipeline/console.h"
 #include "pipeline/heights_plan.h"
@@ -86,9 +85,9 @@ std::string heights_page(const Job& job, const Scene& scene, const HeightsStudy&
   text += fmt::format("\n{:>6} {:>10} {:>9}  {:<8} {:>6} {:>8}  {}\n", "layer", "bottom", "thickness", "reason", "angle",
                       "step", "decided by");
   for (std::size_t i = 0; i < count(study); ++i) {
-    fmt::format_to(std::back_inserter(text), "{:>6} {:>10.4f} {:>9.4f}  {:<8} {:>6.2f} {:>8.4f}  {}\n", i + 1,
-                   mm(study.boundaries[i]), mm(thickness(study, i)), reason(study, i), angle(study, i), mm(e.layers[i].cusp),
-                   part_name(scene, e.layers[i].part));
+    text += fmt::format("{:>6} {:>10.4f} {:>9.4f}  {:<8} {:>6.2f} {:>8.4f}  {}\n", i + 1, mm(study.boundaries[i]),
+                        mm(thickness(study, i)), reason(study, i), angle(study, i), mm(e.layers[i].cusp),
+                        part_name(scene, e.layers[i].part));
   }
   return text;
 }
@@ -102,9 +101,9 @@ std::string heights_csv(const Scene& scene, const std::vector<HeightsStudy>& stu
   for (const HeightsStudy& study : studies) {
     for (std::size_t i = 0; i < count(study); ++i) {
       const heights::LayerFacts& layer = study.evaluation.layers[i];
-      fmt::format_to(std::back_inserter(text), "{},{},{:.6f},{:.6f},{},{:.2f},{:.6f},{},{},{}\n", quoted(study.name), i + 1,
-                     mm(study.boundaries[i]), mm(thickness(study, i)), reason(study, i), angle(study, i), mm(layer.cusp),
-                     layer.hits_flat ? 1 : 0, stepped_back(study, i) ? 1 : 0, quoted(part_name(scene, layer.part)));
+      text += fmt::format("{},{},{:.6f},{:.6f},{},{:.2f},{:.6f},{},{},{}\n", quoted(study.name), i + 1, mm(study.boundaries[i]),
+                          mm(thickness(study, i)), reason(study, i), angle(study, i), mm(layer.cusp), layer.hits_flat ? 1 : 0,
+                          stepped_back(study, i) ? 1 : 0, quoted(part_name(scene, layer.part)));
     }
   }
   return text;
@@ -138,12 +137,11 @@ std::string heights_json(const Job& job, const Scene& scene, const std::vector<H
     text += "],\n\"layer\": [";
     for (std::size_t i = 0; i < count(study); ++i) {
       const heights::LayerFacts& layer = e.layers[i];
-      fmt::format_to(std::back_inserter(text),
-                     "{}\n{{\"bottom_mm\": {:.6f}, \"thickness_mm\": {:.6f}, \"reason\": \"{}\", \"angle_deg\": {:.2f}, "
-                     "\"cusp_mm\": {:.6f}, \"hits_flat\": {}, \"stepped_back\": {}, \"part\": {}}}",
-                     i > 0 ? "," : "", mm(study.boundaries[i]), mm(thickness(study, i)), reason(study, i), angle(study, i),
-                     mm(layer.cusp), layer.hits_flat, stepped_back(study, i),
-                     layer.part < scene.parts.size() ? fmt::format("{}", layer.part) : "null");
+      text += fmt::format(
+          "{}\n{{\"bottom_mm\": {:.6f}, \"thickness_mm\": {:.6f}, \"reason\": \"{}\", \"angle_deg\": {:.2f}, "
+          "\"cusp_mm\": {:.6f}, \"hits_flat\": {}, \"stepped_back\": {}, \"part\": {}}}",
+          i > 0 ? "," : "", mm(study.boundaries[i]), mm(thickness(study, i)), reason(study, i), angle(study, i), mm(layer.cusp),
+          layer.hits_flat, stepped_back(study, i), layer.part < scene.parts.size() ? fmt::format("{}", layer.part) : "null");
     }
     text += "]}";
   }

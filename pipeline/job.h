@@ -75,9 +75,6 @@ struct Job {
   bool quiet = false;
 };
 
-/// Millimetres of a job in nanometres, rounded to the nearest.
-inline std::int64_t nm_of(double millimetres) { return std::llround(millimetres * static_cast<double>(kNmPerMm)); }
-
 /// The pixels of a job's bed: of its machine, once that is resolved. Only for a checked job.
 PixelGrid grid_of(const Job& job);
 

@@ -119,35 +119,33 @@ std::string head_text(const ManifestHead& head) {
 }
 
 void add_program_text(const ProgramRecord& record, std::string& text) {
-  fmt::format_to(std::back_inserter(text),
-                 ", \"program\": {{\"bytes\": {}, \"sweeps\": {}, \"drops\": {}, \"moved\": {}, \"lost\": {}, "
-                 "\"xxh3_128\": \"{}\"}}}}",
-                 record.bytes, record.sweeps, record.drops, record.moved, record.lost, hex(record.hash));
+  text += fmt::format(
+      ", \"program\": {{\"bytes\": {}, \"sweeps\": {}, \"drops\": {}, \"moved\": {}, \"lost\": {}, "
+      "\"xxh3_128\": \"{}\"}}}}",
+      record.bytes, record.sweeps, record.drops, record.moved, record.lost, hex(record.hash));
 }
 
 void add_record_text(const LayerRecord& record, const ManifestHead& head, std::string& text) {
   if (!head.materials.empty()) {
-    fmt::format_to(std::back_inserter(text),
-                   "{{\"index\": {}, \"bottom_nm\": {}, \"thickness_nm\": {}, \"reason\": \"{}\", \"capped_rows\": {}, "
-                   "\"images\": [",
-                   record.layer.index, record.layer.bottom, record.layer.thickness, reason_name(record.layer.reason),
-                   record.capped_rows);
+    text += fmt::format(
+        "{{\"index\": {}, \"bottom_nm\": {}, \"thickness_nm\": {}, \"reason\": \"{}\", \"capped_rows\": {}, "
+        "\"images\": [",
+        record.layer.index, record.layer.bottom, record.layer.thickness, reason_name(record.layer.reason), record.capped_rows);
     bool first = true;
     for (const LayerImageFile& image : layer_images(head, record)) {
-      fmt::format_to(std::back_inserter(text), "{}{{\"file\": {}, \"bytes\": {}, \"set_pixels\": {}, \"xxh3_128\": \"{}\"}}",
-                     first ? "" : ", ", json_string(image.name), image.record.bytes, image.record.set_pixels,
-                     hex(image.record.hash));
+      text += fmt::format("{}{{\"file\": {}, \"bytes\": {}, \"set_pixels\": {}, \"xxh3_128\": \"{}\"}}", first ? "" : ", ",
+                          json_string(image.name), image.record.bytes, image.record.set_pixels, hex(image.record.hash));
       first = false;
     }
     text += "]}";
     return;
   }
-  fmt::format_to(std::back_inserter(text),
-                 "{{\"index\": {}, \"file\": {}, \"bottom_nm\": {}, \"thickness_nm\": {}, \"reason\": \"{}\", "
-                 "\"bytes\": {}, \"set_pixels\": {}, \"capped_rows\": {}, \"xxh3_128\": \"{:016x}{:016x}\"}}",
-                 record.layer.index, json_string(layer_file_name(record.layer.index, head.extension)), record.layer.bottom,
-                 record.layer.thickness, reason_name(record.layer.reason), record.bytes, record.set_pixels, record.capped_rows,
-                 record.hash.high, record.hash.low);
+  text += fmt::format(
+      "{{\"index\": {}, \"file\": {}, \"bottom_nm\": {}, \"thickness_nm\": {}, \"reason\": \"{}\", "
+      "\"bytes\": {}, \"set_pixels\": {}, \"capped_rows\": {}, \"xxh3_128\": \"{:016x}{:016x}\"}}",
+      record.layer.index, json_string(layer_file_name(record.layer.index, head.extension)), record.layer.bottom,
+      record.layer.thickness, reason_name(record.layer.reason), record.bytes, record.set_pixels, record.capped_rows,
+      record.hash.high, record.hash.low);
 }
 
 Hash128 ManifestHead::id() const {

@@ -126,8 +126,7 @@ Status each_layer(const std::string& directory, const Manifest& manifest, Work w
 template <class Value>
 std::string list(const std::vector<LayerRecord>& layers, Value value) {
   std::string text = "[";
-  for (const LayerRecord& record : layers)
-    fmt::format_to(std::back_inserter(text), "{}{}", text.size() > 1 ? "," : "", value(record));
+  for (const LayerRecord& record : layers) text += fmt::format("{}{}", text.size() > 1 ? "," : "", value(record));
   return text + "]";
 }
 

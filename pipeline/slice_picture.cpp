@@ -7,11 +7,11 @@
 #include <fstream>
 #include <iterator>
 #include <map>
+#include <memory>
 
 #include "pipeline/job_toml.h"
 #include "pipeline/slice.h"
 #include "stages/data/clipping.h"
-#include "stages/write/decimal.h"
 
 namespace lamina::pipeline {
 namespace {
@@ -91,7 +91,8 @@ Result<LayerShapes> SlicePictures::layer(std::uint32_t index) const {
   SlicePlan::Work work;
   if (Status status = plan_.layer(index, work); !status) return status.error();
   LayerShapes shapes;
-  shapes.layer = plan_.layers()[index].layer;
+  shapes.index = index;
+  shapes.z = plan_.layers()[index].layer.plane();
   shapes.contours = std::move(work.contours.contours);
   const double area = square_mm(doubled_area(shapes.contours));
   const std::string line = line_of(manifest_, index);
@@ -105,52 +106,20 @@ Result<LayerShapes> SlicePictures::layer(std::uint32_t index) const {
   for (const auto& [kind, name] : kKinds) {
     auto outline = outline_of(work.paths, kind);
     if (!outline) return outline.error();
-    if (outline->size() > 0) shapes.beads.push_back({kind, std::string(name), std::move(*outline)});
+    if (outline->size() > 0) shapes.beads.push_back({ink_of(kind), std::string(name), std::move(*outline)});
   }
-  shapes.title = fmt::format("{}   |   layer {} of {}   |   z {:.3f} mm", plan_.names().empty() ? "" : plan_.names().front(),
-                             index, count(), mm(shapes.layer.plane()));
+  shapes.title = fmt::format("{}   |   layer {} of {}   |   z {:.3f} mm", name(), index, count(), mm(shapes.z));
   shapes.caption = fmt::format("{} contours, {:.2f} mm2", shapes.contours.size(), area);
   if (work.paths.size() > 0) shapes.caption += fmt::format(", {} paths", work.paths.size());
   return shapes;
 }
 
-std::string shapes_svg(const LayerShapes& shapes) {
-  const std::int64_t margin = std::max(shapes.box.width(), shapes.box.depth()) / 50;
-  const std::int64_t left = shapes.box.lo.x - margin, back = shapes.box.hi.y + margin;
-  Buffer<char> out;
-  const auto put = [&](std::string_view text) { write::append(out, text); };
-  const auto length = [&](std::int64_t nm) { write::append_mm(out, nm); };
-  const std::int64_t width = shapes.box.width() + 2 * margin, height = shapes.box.depth() + 2 * margin;
-  put("<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"");
-  length(width);
-  put("mm\" height=\"");
-  length(height);
-  put("mm\" viewBox=\"0 0 ");
-  length(width);
-  put(" ");
-  length(height);
-  put("\">\n");
-  const auto shape = [&](const ContoursView& contours, std::string_view name, std::string_view colour) {
-    put(fmt::format("<path class=\"{}\" fill=\"{}\" fill-rule=\"nonzero\" d=\"", name, colour));
-    for (std::uint32_t c = 0; c < contours.size(); ++c) {
-      put("M");
-      for (const Point2 p : contours[c]) {
-        put(" ");
-        length(p.x - left);
-        put(" ");
-        length(back - p.y);
-      }
-      put(" z");
-    }
-    put("\"/>\n");
-  };
-  shape(shapes.contours, "solid", "#cdd1d8");
-  for (const LayerShapes::Beads& beads : shapes.beads) {
-    constexpr std::string_view kColours[] = {"#b03a2e", "#d68910", "#2471a3", "#117864", "#8e44ad"};
-    shape(beads.outline, beads.name, kColours[static_cast<std::size_t>(beads.kind)]);
-  }
-  put("</svg>\n");
-  return {out.begin(), out.end()};
+Result<LayerSeries> slice_series(const std::string& directory) {
+  auto opened = SlicePictures::open(directory);
+  if (!opened) return opened.error();
+  const auto pictures = std::make_shared<const SlicePictures>(std::move(*opened));
+  return LayerSeries{pictures->name(), pictures->first(), pictures->last(), pictures->count(),
+                     [pictures](std::uint32_t index) { return pictures->layer(index); }};
 }
 
 }  // namespace lamina::pipeline

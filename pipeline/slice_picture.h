@@ -5,33 +5,15 @@
 #include <cstdint>
 #include <string>
 #include <utility>
-#include <vector>
 
+#include "pipeline/layer_shapes.h"
 #include "pipeline/slice.h"
-#include "stages/data/contours.h"
-#include "stages/data/layer.h"
-#include "stages/data/mesh.h"
 #include "stages/data/status.h"
-#include "stages/data/toolpaths.h"
 
 namespace lamina::pipeline {
 
 /// Whether a directory's manifest.json is that of lamina slice.
 bool is_slice_directory(const std::string& directory);
-
-/// What pictures of a layer show.
-struct LayerShapes {
-  std::string title, caption;
-  Box box;
-  Layer layer{};
-  Contours contours;
-  struct Beads {
-    PathKind kind;
-    std::string name;
-    Contours outline;  // all that the beads of this kind cover
-  };
-  std::vector<Beads> beads;  // in the order in which they are laid
-};
 
 /// The job that lamina slice left in a directory (job.toml), planned again from its parts.
 class SlicePictures {
@@ -44,6 +26,8 @@ class SlicePictures {
   std::uint32_t count() const { return static_cast<std::uint32_t>(plan_.layers().size()); }
   /// errors  kUsage: no such layer; kVerification: a part that is not what it was
   Result<LayerShapes> layer(std::uint32_t index) const;
+  /// Of the first part.
+  std::string name() const { return plan_.names().empty() ? std::string() : plan_.names().front(); }
 
  private:
   SlicePictures(std::string directory, SlicePlan plan) : directory_(std::move(directory)), plan_(std::move(plan)) {}
@@ -52,7 +36,7 @@ class SlicePictures {
   std::array<std::uint32_t, 2> range_{};
 };
 
-/// A drawing of the layer in its true size, bead widths true.
-std::string shapes_svg(const LayerShapes& shapes);
+/// The same as a series. errors  of SlicePictures
+Result<LayerSeries> slice_series(const std::string& directory);
 
 }  // namespace lamina::pipeline

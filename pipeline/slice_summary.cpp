@@ -1,7 +1,5 @@
 #include <fmt/format.h>
 
-#include <iterator>
-
 #include "pipeline/console.h"
 #include "pipeline/heights_plan.h"
 #include "pipeline/json_text.h"
@@ -12,9 +10,7 @@ namespace lamina::pipeline {
 
 std::string slice_summary_text(const Job& job, const SliceSummary& s) {
   std::string text;
-  const auto line = [&](std::string_view name, const std::string& value) {
-    fmt::format_to(std::back_inserter(text), "{:<10}{}\n", name, value);
-  };
+  const auto line = [&](std::string_view name, const std::string& value) { text += fmt::format("{:<10}{}\n", name, value); };
   for (std::size_t i = 0; i < s.parts.size(); ++i) {
     const PartSummary& part = s.parts[i];
     const Box& box = part.bounds;

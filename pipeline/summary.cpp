@@ -4,7 +4,6 @@
 
 #include <fmt/format.h>
 
-#include <iterator>
 #include <vector>
 
 #include "pipeline/console.h"
@@ -34,9 +33,7 @@ std::string part_json(const PartSummary& part) {
 
 std::string summary_text(const Job& job, const JetSummary& s) {
   std::string text;
-  const auto line = [&](std::string_view name, const std::string& value) {
-    fmt::format_to(std::back_inserter(text), "{:<10}{}\n", name, value);
-  };
+  const auto line = [&](std::string_view name, const std::string& value) { text += fmt::format("{:<10}{}\n", name, value); };
   for (std::size_t i = 0; i < s.parts.size(); ++i) {
     const PartSummary& part = s.parts[i];
     const Box& box = part.bounds;

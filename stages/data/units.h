@@ -1,6 +1,7 @@
 // stages/data/units.h: lengths are integer nanometres everywhere after a file is read.
 #pragma once
 
+#include <cmath>
 #include <cstdint>
 
 namespace lamina {
@@ -14,6 +15,9 @@ inline constexpr std::int64_t kNmReach = 2'147'483'647;
 
 /// Millimetres of a length in nanometres; for reports, never for decisions.
 constexpr double mm(std::int64_t nm) { return static_cast<double>(nm) / kNmPerMm; }
+
+/// Nanometres of a length in millimetres, to the nearest.
+inline std::int64_t nm_of(double millimetres) { return std::llround(millimetres * static_cast<double>(kNmPerMm)); }
 
 /// Quotient rounded towards minus infinity. `divisor` > 0.
 template <class Integer>

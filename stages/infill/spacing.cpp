@@ -91,7 +91,7 @@ class Distances {
         return Error{Fault::kUsage, fmt::format("'{}': is {} mm in layer {}; gaps end at {} mm", parameters_.gap_expression,
                                                 *value, context_.layer.index, mm(kNmReach))};
       }
-      return static_cast<std::int64_t>(std::llround(*value * static_cast<double>(kNmPerMm)));
+      return nm_of(*value);
     }
     if (!parameters_.gap_table.empty()) return by_table(parameters_.gap_table, z);
     const std::int64_t turn = floor_div(i, group);

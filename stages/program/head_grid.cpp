@@ -138,7 +138,7 @@ Result<HeadGrid> make_head_grid(const Machine& machine) {
   // --- the image
   const auto axis = [&](const Pitch& pitch, double mm_long, PixelAxis& made) {
     if (!(mm_long > 0 && mm_long <= 2147)) return false;
-    made = PixelAxis(pitch.dots, std::llround(mm_long * kNmPerMm), pitch.span);
+    made = PixelAxis(pitch.dots, nm_of(mm_long), pitch.span);
     return true;
   };
   if (!axis(scan_x ? place : line, machine.bed.size_mm[0], grid.image.x) ||

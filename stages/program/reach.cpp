@@ -5,9 +5,9 @@
 namespace lamina::program {
 
 std::optional<Outside> first_outside(const Machine& machine, const Mesh& mesh, const Point3& offset) {
-  const std::int64_t top = std::llround(machine.bed.build_height_mm * kNmPerMm);
-  const std::int64_t width = std::llround(machine.bed.size_mm[0] * kNmPerMm);
-  const std::int64_t depth = std::llround(machine.bed.size_mm[1] * kNmPerMm);
+  const std::int64_t top = nm_of(machine.bed.build_height_mm);
+  const std::int64_t width = nm_of(machine.bed.size_mm[0]);
+  const std::int64_t depth = nm_of(machine.bed.size_mm[1]);
   std::optional<Outside> worst;
   __int128 farthest = 0;
   const auto look = [&](const Point3& vertex) {

@@ -38,8 +38,8 @@ LayerWriter::LayerWriter(const Extruder& machine, const Layer& layer, std::uint3
     : machine_(machine), out_(out), layer_index_(layer.index) {
   const double filament = machine.material.filament_mm;
   feed_per_volume_ = machine.material.flow / (std::numbers::pi / 4 * filament * filament);
-  corner_x_ = std::llround(machine.bed.corner_mm[0] * kNmPerMm);
-  corner_y_ = std::llround(machine.bed.corner_mm[1] * kNmPerMm);
+  corner_x_ = nm_of(machine.bed.corner_mm[0]);
+  corner_y_ = nm_of(machine.bed.corner_mm[1]);
   retracted_ = machine.retraction.length_mm > 0;
   const std::int64_t top = std::int64_t{layer.bottom} + layer.thickness;
   append(out_, ";LAYER_CHANGE\n;Z:");

@@ -89,10 +89,11 @@ void paint(Canvas& canvas, const PlanView& view, const Scale& scale, int left, i
     canvas.paint(left, top, width, coverage(shape.outline, scale, width, height), shape.ink);
 }
 
-/// A square of each ink and what it is for, from `left` on.
-void legend(Canvas& canvas, const std::vector<std::pair<Colour, std::string>>& inks, int left, int baseline, int size) {
+/// A square of each ink and what it is for, from `left` on, as many as there is room for up to `right`.
+void legend(Canvas& canvas, const std::vector<std::pair<Colour, std::string>>& inks, int left, int right, int baseline, int size) {
   if (!have_font()) return;
   for (const auto& [ink, name] : inks) {
+    if (left + size + text_width(name, size) > right) return canvas.text(left, baseline, size, "...", kText);
     canvas.fill_box(left, baseline - size * 3 / 4, size * 3 / 4, size * 3 / 4, ink);
     canvas.text(left + size, baseline, size, name, kText);
     left += size + text_width(name, size) + size * 4 / 3;
@@ -133,7 +134,7 @@ Result<Buffer<std::byte>> plan_sheet(const std::string& title, std::size_t layer
   }
   canvas.text(layout.margin, layout.margin + layout.title_size, layout.title_size, title, kText);
   legend(canvas, inks, layout.margin + text_width(title, layout.title_size) + layout.title_size,
-         layout.margin + layout.title_size, layout.title_size * 3 / 4);
+         layout.width, layout.margin + layout.title_size, layout.title_size * 3 / 4);
   return canvas.png();
 }
 
@@ -156,7 +157,7 @@ Result<Buffer<std::byte>> plan_view(const PlanView& view) {
   left += text_width(view.caption, small) + size;
   std::vector<std::pair<Colour, std::string>> inks;
   for (const PlanView::Shape& shape : view.shapes) inks.emplace_back(shape.ink, shape.name);
-  legend(canvas, inks, left, line, small);
+  legend(canvas, inks, left, width, line, small);
   return canvas.png();
 }
 

@@ -4,8 +4,9 @@
 #include <fmt/format.h>
 
 #include <cstring>
-#include <iterator>
+#include <string>
 #include <string_view>
+#include <utility>
 
 #include "stages/write/program/dialect.h"
 
@@ -14,8 +15,7 @@ namespace lamina::write {
 /// Appends formatted text to bytes.
 template <class... Values>
 void put(ProgramBytes& out, fmt::format_string<Values...> format, Values&&... values) {
-  fmt::memory_buffer text;
-  fmt::format_to(std::back_inserter(text), format, std::forward<Values>(values)...);
+  const std::string text = fmt::format(format, std::forward<Values>(values)...);
   const std::size_t at = out.size();
   out.resize(at + text.size());
   std::memcpy(out.data() + at, text.data(), text.size());

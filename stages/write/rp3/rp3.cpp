@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <cmath>
-#include <iterator>
 
 namespace lamina::write::rp3 {
 
@@ -22,9 +21,9 @@ std::string text_of(std::span<const Layer> layers, const Settings& settings) {
       "parâmetros do sólido:\n"
       "camada\toffset\traster\tlayer\tang_stl\tângulo\ta_base\ta_incr\tzigzag\tvolta\tvel_var\tvel_pos\tt_p\n-----\n";
   const auto row = [&](std::size_t number, const Layer& layer, double filling) {
-    fmt::format_to(std::back_inserter(text), "{}\t{:.3f}\t{:.3f}\t{:.3f}\t{:.2f}\t{:.2f}\t{:.2f}\t{:.2f}\t0\t0\t0\t0\t0\n",
-                   number, settings.contour_offset_mm, settings.raster_width_mm, layer.thickness_mm, layer.angle_deg, filling,
-                   settings.first_angle_deg, settings.angle_step_deg);
+    text += fmt::format("{}\t{:.3f}\t{:.3f}\t{:.3f}\t{:.2f}\t{:.2f}\t{:.2f}\t{:.2f}\t0\t0\t0\t0\t0\n", number,
+                        settings.contour_offset_mm, settings.raster_width_mm, layer.thickness_mm, layer.angle_deg, filling,
+                        settings.first_angle_deg, settings.angle_step_deg);
   };
   // The summary: the number of layers, the first one's thickness, the last one's filling angle.
   if (!layers.empty()) row(layers.size(), {layers.front().thickness_mm, 0}, filling_angle(layers.size() - 1));

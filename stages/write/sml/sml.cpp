@@ -82,8 +82,8 @@ class SmlLayer final : public LayerMoves {
  private:
   void command(const std::string& form, Point2 at) {
     std::string text = form;
-    replace_all(text, "{x}", mils(at.x + std::llround(machine_.bed.corner_mm[0] * kNmPerMm)));
-    replace_all(text, "{y}", mils(at.y + std::llround(machine_.bed.corner_mm[1] * kNmPerMm)));
+    replace_all(text, "{x}", mils(at.x + nm_of(machine_.bed.corner_mm[0])));
+    replace_all(text, "{y}", mils(at.y + nm_of(machine_.bed.corner_mm[1])));
     append(out_, text + "\n");
   }
 

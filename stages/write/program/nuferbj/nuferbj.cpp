@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <charconv>
 
 #include "stages/write/program/program_text.h"
 
@@ -75,7 +76,7 @@ class Writer final : public ProgramWriter {
     out.resize(at + 12 + std::size_t{groups} * 9);
     char* text = reinterpret_cast<char*>(out.data()) + at;
     *text++ = 'J';
-    text = fmt::format_to(text, "{}", step);
+    text = std::to_chars(text, text + 10, step).ptr;
     for (std::uint32_t group = 0; group < groups; ++group) {
       const auto bits = static_cast<std::uint32_t>(words[group / 2] >> (group % 2 * 32));
       *text++ = ' ';

@@ -1,0 +1,188 @@
+// G-code files read back as beads, and drawn.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+#include <string>
+#include <vector>
+
+#include "pipeline/gcode_layers.h"
+#include "pipeline/gcode_picture.h"
+#include "stages/data/contours.h"
+#include "tests/pipeline/program.h"
+#include "tests/segment/gcode_reader.h"
+
+namespace lamina::pipeline {
+namespace {
+
+using test::Directory;
+using test::Outcome;
+using test::run_lamina;
+
+Point2 at(double x_mm, double y_mm) { return {static_cast<Nm>(nm_of(x_mm)), static_cast<Nm>(nm_of(y_mm))}; }
+
+std::string nut() { return std::string(LAMINA_TEST_DIR) + "/corpus/parameter_quality_nut.stl"; }
+
+/// `text` as a file, read.
+Result<GcodeFile> file_of(const Directory& directory, const std::string& text) {
+  test::write_text(directory.path() / "part.gcode", text);
+  return GcodeFile::open(directory / "part.gcode");
+}
+
+TEST(GcodeLayers, ASegmentedPlanHasTheBeadsThatAnotherReaderFinds) {
+  for (const std::string machine : {"anet-a8", "klipper"}) {
+    const Directory directory;
+    const Outcome planned = run_lamina({"extrude", nut(), "--machine", machine, "--layer", "0.3", "--fill", "segmented",
+                                        "--angle", "30", "-o", "part.gcode", "--quiet"},
+                                       directory.path());
+    ASSERT_EQ(planned.code, 0) << planned.err;
+    const auto expected = test::read_gcode(test::read_text(directory.path() / "part.gcode"));
+    ASSERT_EQ(expected.error, "");
+    const auto file = GcodeFile::open(directory / "part.gcode");
+    ASSERT_TRUE(file) << file.error().message;
+    EXPECT_TRUE(file->tells_widths());
+    ASSERT_EQ(file->count(), expected.layers.size());
+    std::size_t beads = 0;
+    for (std::uint32_t k = 0; k < file->count(); ++k) {
+      const auto layer = file->layer(k);
+      ASSERT_TRUE(layer) << layer.error().message;
+      std::vector<test::GcodeBead> wanted = expected.layers[k].beads;
+      std::erase_if(wanted, [](const test::GcodeBead& b) {  // shorter than a micrometre
+        return b.filament == 0 || (b.x0 == b.x1 && b.y0 == b.y1);
+      });
+      ASSERT_EQ(layer->beads.size(), wanted.size()) << "layer " << k;
+      EXPECT_TRUE(wanted.empty() || layer->z == nm_of(expected.layers[k].z));
+      for (std::size_t i = 0; i < wanted.size(); ++i) {
+        const GcodeBead& bead = layer->beads[i];
+        EXPECT_EQ(bead.from, at(wanted[i].x0, wanted[i].y0));
+        EXPECT_EQ(bead.to, at(wanted[i].x1, wanted[i].y1));
+        EXPECT_EQ(bead.width, nm_of(wanted[i].width));
+        EXPECT_EQ(file->types()[bead.type], wanted[i].type);
+      }
+      beads += wanted.size();
+    }
+    EXPECT_GT(beads, 10'000u);
+  }
+}
+
+// What CuraEngine writes has no widths: 10 mm of a bead 0.4 mm wide and 0.2 mm high hold this much filament of 1.75 mm.
+constexpr double kFed = 10 * (0.2 * 0.2 + std::numbers::pi * 0.01) / (std::numbers::pi * 1.75 * 1.75 / 4);
+
+TEST(GcodeLayers, WidthsFollowFromWhatIsFedWhereNoTagTellsThem) {
+  const Directory directory;
+  const std::string fed = std::to_string(kFed), twice = std::to_string(2 * kFed);
+  const auto file = file_of(directory,
+                            "M82\nG28\nG92 E0\nG1 X1 Y1 Z0.2 F600\nG1 X90 E9 ; primes\nG92 E0\n;LAYER:0\n;TYPE:WALL-OUTER\n"
+                            "G0 X10 Y10\nG1 X20 E" +
+                                fed + "\nG1 F1200 E-2\nG0 X50 Y50 Z1\nG0 Z0.2\nG1 E" + fed +
+                                "\n;LAYER:1\nG1 Z.4\nG1 X50 Y60 E" + twice + "\n;LAYER:2\n");
+  ASSERT_TRUE(file) << file.error().message;
+  EXPECT_FALSE(file->tells_widths());
+  ASSERT_EQ(file->count(), 3u);
+  const auto first = file->layer(0), second = file->layer(1), empty = file->layer(2);
+  ASSERT_TRUE(first && second && empty);
+  ASSERT_EQ(first->beads.size(), 1u);
+  EXPECT_EQ(first->beads[0].width, 400'000);
+  EXPECT_EQ(file->types()[first->beads[0].type], "WALL-OUTER");
+  ASSERT_EQ(second->beads.size(), 1u);
+  EXPECT_EQ(second->beads[0].width, 400'000);
+  EXPECT_EQ(second->z, 400'000);
+  EXPECT_TRUE(empty->beads.empty());
+  EXPECT_EQ(file->box().lo.x, 9'800'000) << "the line in front of the first layer belongs to none";
+}
+
+TEST(GcodeLayers, TheDiameterOfTheFilamentIsReadWhereItIsTold) {
+  const Directory directory;
+  const std::string fed = std::to_string(kFed * 1.75 * 1.75 / 9);
+  const auto file = file_of(directory, "M83\nG1 Z0.2\nG1 X10 E" + fed + "\n; filament_diameter = 3\n");
+  ASSERT_TRUE(file) << file.error().message;
+  EXPECT_EQ(file->layer(0)->beads[0].width, 400'000);
+}
+
+TEST(GcodeLayers, WithoutTagsLayersAreHeightsAtWhichSomethingIsLaid) {
+  const Directory directory;
+  const auto file = file_of(directory,
+                            "G20 ; inches\nM83\nG91\nG1 Z0.01\nG1 X1 E.1\nG0 Z0.1\nG1 X1\nG1 Z-0.1\nG1 Y1 E0.1\nG90\n"
+                            "N12 G1 Z0.02 E-1*71\nG01 X+2.5 Y0 E.1 (back)\nG1 Z1\n");
+  ASSERT_TRUE(file) << file.error().message;
+  ASSERT_EQ(file->count(), 2u);
+  EXPECT_EQ(file->layer(0)->beads.size(), 2u);
+  const auto second = file->layer(1);
+  ASSERT_EQ(second->beads.size(), 1u);
+  EXPECT_EQ(second->beads[0].from, (Point2{50'800'000, 25'400'000}));
+  EXPECT_EQ(second->beads[0].to, (Point2{63'500'000, 0}));
+}
+
+TEST(GcodeLayers, WhatCannotBeDrawnIsOneLineThatNamesThePlace) {
+  const Directory directory;
+  const std::vector<std::pair<std::string, std::string>> files = {
+      {"", "no move in it lays filament"},
+      {"solid nut\nfacet normal 0 0 0\n", "no move in it lays filament"},
+      {std::string("GIF89a\0\0\0", 9), "line 1: is no text of G-code"},
+      {"G1 X1 E1\nG2 X1 Y1 I1 E2\n", "line 2: arcs (G2, G3) are not drawn"},
+      {"M83\nG1 Xnan E1\n", "line 2: 'nan' is not a number"},
+      {"G1 X1..2 E1\n", "line 1: '.2 E1' is no word of a move"},
+      {"G1 X1e9 E1\n", "line 1: a bead at 1e+09 mm; beds are at most 2000 mm wide"},
+      {";WIDTH:wide\nG1 X1 E1\n", "line 1: 'wide' is not a length"},
+  };
+  for (const auto& [text, told] : files) {
+    const auto file = file_of(directory, text);
+    ASSERT_FALSE(file) << told;
+    EXPECT_NE(file.error().message.find(told), std::string::npos) << file.error().message;
+    EXPECT_EQ(file.error().message.find('\n'), std::string::npos);
+  }
+  EXPECT_FALSE(GcodeFile::open(directory / "none.gcode"));
+}
+
+TEST(GcodeLayers, BeadsCoverTheirLengthTimesTheirWidthAndRoundEnds) {
+  const Directory directory;
+  ASSERT_TRUE(file_of(directory,
+                      "M83\n;TYPE:Internal infill\n;HEIGHT:0.2\n;WIDTH:0.3\nG1 X0 Y0 Z0.2\nG1 X10 E1\n;WIDTH:0.5\nG0 Y5\n"
+                      "G1 X0 E1\n;TYPE:External perimeter\nG0 X0 Y9\nG1 X10 E1\n"));
+  const auto series = gcode_series(directory / "part.gcode");
+  ASSERT_TRUE(series) << series.error().message;
+  EXPECT_EQ(series->count, 1u);
+  const auto shapes = series->layer(0);
+  ASSERT_TRUE(shapes) << shapes.error().message;
+  ASSERT_EQ(shapes->beads.size(), 3u);
+  const double widths[] = {0.3, 0.5, 0.5};
+  const std::string names[] = {"Internal infill 0.3 mm", "Internal infill 0.5 mm", "External perimeter 0.5 mm"};
+  for (std::size_t i = 0; i < 3; ++i) {
+    const double covered = square_mm(doubled_area(shapes->beads[i].outline));
+    EXPECT_NEAR(covered, 10 * widths[i] + std::numbers::pi * widths[i] * widths[i] / 4, 0.01);
+    EXPECT_EQ(shapes->beads[i].name, names[i]);
+  }
+  EXPECT_NE(shapes->beads[0].ink, shapes->beads[1].ink) << "thin and thick stretches can be told apart";
+  EXPECT_NE(shapes->beads[1].ink, shapes->beads[2].ink);
+  EXPECT_FALSE(series->layer(1));
+}
+
+TEST(PreviewGcode, DrawsLayersOfAPlanAsPngAndSvg) {
+  const Directory directory;
+  ASSERT_EQ(
+      run_lamina({"extrude", nut(), "--layer", "0.3", "--fill", "segmented", "-o", "part.gcode", "--quiet"}, directory.path())
+          .code,
+      0);
+  const Outcome svg = run_lamina({"preview", "part.gcode", "-o", "part.svg", "--layer", "3"}, directory.path());
+  ASSERT_EQ(svg.code, 0) << svg.err;
+  const std::string drawn = test::read_text(directory.path() / "part.svg");
+  for (const std::string name : {"\"External perimeter 0.4", "\"Internal infill 0.3", "\"Internal infill 0.4"}) {
+    EXPECT_NE(drawn.find("<path class=" + name), std::string::npos) << name;
+  }
+  for (const std::vector<std::string>& more : {std::vector<std::string>{"--layer", "3"}, {"--count", "4"}, {}}) {
+    std::vector<std::string> arguments = {"preview", "part.gcode", "-o", "part.png", "--width", "600"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    const Outcome png = run_lamina(arguments, directory.path());
+    ASSERT_EQ(png.code, 0) << png.err;
+    EXPECT_EQ(test::read_text(directory.path() / "part.png").substr(1, 3), "PNG");
+  }
+  const Outcome far = run_lamina({"preview", "part.gcode", "-o", "part.png", "--layer", "99"}, directory.path());
+  EXPECT_EQ(far.code, 2);
+  EXPECT_NE(far.err.find("--layer 99: the file has layers 0 to "), std::string::npos) << far.err;
+  const Outcome bed = run_lamina({"preview", "part.gcode", "-o", "part.png", "--whole-bed"}, directory.path());
+  EXPECT_EQ(bed.code, 2);
+  EXPECT_EQ(bed.error_lines(), 1u) << bed.err;
+}
+
+}  // namespace
+}  // namespace lamina::pipeline
