@@ -114,8 +114,10 @@ def run_case(case, options, lamina, parts, work):
         answers["slic3r_open_loops"] = file.read().count("Unable to close this loop")
     with open(os.path.join(work, "svg.log"), encoding="utf-8", errors="replace") as file:
         text = file.read()
+    summary = json.loads(text[text.index("{"):])
+    summary["output"] = os.path.basename(summary["output"])
     return {"part": part, "target": target, "layer_mm": LAYER, "answers": answers,
-            "summary": json.loads(text[text.index("{"):]), **{name: median_of(of) for name, of in runs.items()}}
+            "summary": summary, **{name: median_of(of) for name, of in runs.items()}}
 
 
 def stages(program, options):
