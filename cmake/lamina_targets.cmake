@@ -32,6 +32,16 @@ target_compile_definitions(lamina_pipeline PRIVATE LAMINA_VERSION="${PROJECT_VER
 target_link_libraries(lamina_pipeline PUBLIC lamina::stages
                       PRIVATE nlohmann_json::nlohmann_json PkgConfig::XXHASH)
 
+# What runs once a job is compiled to be compiled fast; what runs once a layer, and what decodes programs, is optimised.
+if(NOT CMAKE_BUILD_TYPE STREQUAL "Debug")
+  set(once_a_job ${pipeline_sources})
+  list(FILTER once_a_job INCLUDE REGEX
+       "/pipeline/(batch|calibrate|command_|console|extruder_profile|fill_keys|heights_|info|job|json|machine|markdown|materials|merge|nearest|number|output_|placement|progress|report|resume|slice_directory|slice_picture|summary|toml)")
+  list(APPEND once_a_job ${PROJECT_SOURCE_DIR}/pipeline/extrude_summary.cpp ${PROJECT_SOURCE_DIR}/pipeline/slice_summary.cpp)
+  list(FILTER once_a_job EXCLUDE REGEX "/pipeline/report_cast\\.cpp$")
+  set_source_files_properties(${once_a_job} PROPERTIES COMPILE_OPTIONS -O1)
+endif()
+
 # ccache keeps nothing that was made from precompiled headers, and does better without them.
 if(LAMINA_PRECOMPILE AND NOT CMAKE_CXX_COMPILER_LAUNCHER MATCHES "ccache")
   foreach(library lamina_stages lamina_pipeline)
@@ -51,6 +61,10 @@ add_executable(lamina-preview pipeline/preview_main.cpp pipeline/preview_layers.
                ${picture_sources})
 target_link_libraries(lamina-preview PRIVATE lamina::pipeline PkgConfig::OPENIMAGEIO nlohmann_json::nlohmann_json)
 
+if(NOT LAMINA_TEST_COMMANDS)
+  set_target_properties(lamina-preview PROPERTIES EXCLUDE_FROM_ALL ON)
+endif()
+
 if(LAMINA_TESTS)
   enable_testing()
   find_package(GTest REQUIRED)
@@ -58,7 +72,10 @@ if(LAMINA_TESTS)
   set_source_files_properties(${PROJECT_SOURCE_DIR}/tests/raster/reference.cpp
                               PROPERTIES COMPILE_OPTIONS -O3 SKIP_PRECOMPILE_HEADERS ON)
   set(precompiled)
-  foreach(folder data load heights slice infill segment raster program write picture pipeline)
+  foreach(folder data load heights slice infill segment raster program write pipeline commands picture)
+    if(NOT LAMINA_TEST_COMMANDS AND folder MATCHES "commands|picture")
+      continue()
+    endif()
     lamina_sources(test_sources "tests/${folder}/*.cpp")
     if(test_sources)
       add_executable(test_${folder} ${test_sources})
@@ -75,9 +92,12 @@ if(LAMINA_TESTS)
       endif()
       target_compile_definitions(test_${folder} PRIVATE LAMINA_TEST_DIR="${PROJECT_SOURCE_DIR}/tests"
                                  LAMINA_PROGRAM="$<TARGET_FILE:lamina>")
-      add_dependencies(test_${folder} lamina lamina-preview)
-      if(folder STREQUAL "segment")
-        target_sources(test_${folder} PRIVATE tests/pipeline/program.cpp)
+      add_dependencies(test_${folder} lamina)
+      if(LAMINA_TEST_COMMANDS)
+        add_dependencies(test_${folder} lamina-preview)
+      endif()
+      if(folder MATCHES "segment|pipeline")
+        target_sources(test_${folder} PRIVATE tests/commands/program.cpp)
       endif()
       if(folder STREQUAL "picture")
         target_link_libraries(test_${folder} PRIVATE PkgConfig::OPENIMAGEIO)

@@ -20,7 +20,7 @@
 #include <tuple>
 
 #include "pipeline/batch_list.h"
-#include "program.h"
+#include "tests/commands/program.h"
 
 namespace lamina::test {
 namespace {

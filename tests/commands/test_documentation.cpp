@@ -11,7 +11,7 @@
 #include "pipeline/machine_profile.h"
 #include "pipeline/markdown_page.h"
 #include "pipeline/number_text.h"
-#include "program.h"
+#include "tests/commands/program.h"
 
 namespace lamina::test {
 namespace {

@@ -7,7 +7,7 @@
 #include <nlohmann/json.hpp>
 #include <thread>
 
-#include "program.h"
+#include "tests/commands/program.h"
 
 namespace lamina::test {
 namespace {

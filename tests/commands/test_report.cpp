@@ -8,9 +8,9 @@
 #include <nlohmann/json.hpp>
 #include <random>
 
-#include "program.h"
 #include "stages/write/read_image.h"
 #include "stages/write/report/run_code.h"
+#include "tests/commands/program.h"
 
 namespace lamina::test {
 namespace {

@@ -9,7 +9,7 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
-#include "tests/pipeline/program.h"
+#include "tests/commands/program.h"
 
 namespace lamina::test {
 namespace {

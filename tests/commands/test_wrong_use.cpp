@@ -8,7 +8,7 @@
 #include <cstdlib>
 #include <cstring>
 
-#include "program.h"
+#include "tests/commands/program.h"
 
 namespace lamina::test {
 namespace {

@@ -9,7 +9,7 @@
 #include "pipeline/json_text.h"
 #include "pipeline/progress.h"
 #include "pipeline/summary.h"
-#include "program.h"
+#include "tests/commands/program.h"
 
 namespace lamina::pipeline {
 namespace {

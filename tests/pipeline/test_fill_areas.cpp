@@ -10,7 +10,7 @@
 #include "pipeline/slice.h"
 #include "stages/data/clipping.h"
 #include "stages/write/slice_format.h"
-#include "tests/pipeline/program.h"
+#include "tests/commands/program.h"
 #include "tests/slice/contour_laws.h"
 
 namespace lamina::test {

@@ -9,7 +9,7 @@
 #include "pipeline/gcode_layers.h"
 #include "pipeline/gcode_picture.h"
 #include "stages/data/contours.h"
-#include "tests/pipeline/program.h"
+#include "tests/commands/program.h"
 #include "tests/segment/gcode_reader.h"
 
 namespace lamina::pipeline {

@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-#include "program.h"
+#include "tests/commands/program.h"
 
 namespace lamina::test {
 namespace {

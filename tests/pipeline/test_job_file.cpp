@@ -2,7 +2,7 @@
 
 #include "pipeline/job_keys.h"
 #include "pipeline/job_toml.h"
-#include "program.h"
+#include "tests/commands/program.h"
 
 namespace lamina::pipeline {
 namespace {

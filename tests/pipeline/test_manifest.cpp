@@ -4,7 +4,7 @@
 
 #include "pipeline/hash.h"
 #include "pipeline/manifest.h"
-#include "program.h"
+#include "tests/commands/program.h"
 
 namespace lamina::pipeline {
 namespace {

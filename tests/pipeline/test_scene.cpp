@@ -4,7 +4,7 @@
 
 #include "pipeline/placement.h"
 #include "pipeline/scene.h"
-#include "program.h"
+#include "tests/commands/program.h"
 
 namespace lamina::pipeline {
 namespace {

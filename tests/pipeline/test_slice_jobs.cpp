@@ -8,7 +8,7 @@
 #include <tuple>
 
 #include "pipeline/fill_request.h"
-#include "tests/pipeline/program.h"
+#include "tests/commands/program.h"
 
 namespace lamina::test {
 namespace {

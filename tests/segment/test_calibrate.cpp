@@ -7,7 +7,7 @@
 #include "pipeline/extrude_request.h"
 #include "pipeline/extruder_profile.h"
 #include "pipeline/fill_request.h"
-#include "tests/pipeline/program.h"
+#include "tests/commands/program.h"
 #include "tests/segment/gcode_reader.h"
 #include "tests/segment/table.h"
 

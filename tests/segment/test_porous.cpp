@@ -15,7 +15,7 @@
 #include "stages/raster/raster.h"
 #include "stages/segment/expand.h"
 #include "stages/write/read_image.h"
-#include "tests/pipeline/program.h"
+#include "tests/commands/program.h"
 #include "tests/segment/cylinder.h"
 
 namespace lamina {

@@ -8,7 +8,7 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
-#include "tests/pipeline/program.h"
+#include "tests/commands/program.h"
 #include "tests/segment/cylinder.h"
 #include "tests/segment/gcode_reader.h"
 #include "tests/segment/table.h"

@@ -90,7 +90,8 @@ void paint(Canvas& canvas, const PlanView& view, const Scale& scale, int left, i
 }
 
 /// A square of each ink and what it is for, from `left` on, as many as there is room for up to `right`.
-void legend(Canvas& canvas, const std::vector<std::pair<Colour, std::string>>& inks, int left, int right, int baseline, int size) {
+void legend(Canvas& canvas, const std::vector<std::pair<Colour, std::string>>& inks, int left, int right, int baseline,
+            int size) {
   if (!have_font()) return;
   for (const auto& [ink, name] : inks) {
     if (left + size + text_width(name, size) > right) return canvas.text(left, baseline, size, "...", kText);
@@ -133,8 +134,8 @@ Result<Buffer<std::byte>> plan_sheet(const std::string& title, std::size_t layer
     }
   }
   canvas.text(layout.margin, layout.margin + layout.title_size, layout.title_size, title, kText);
-  legend(canvas, inks, layout.margin + text_width(title, layout.title_size) + layout.title_size,
-         layout.width, layout.margin + layout.title_size, layout.title_size * 3 / 4);
+  legend(canvas, inks, layout.margin + text_width(title, layout.title_size) + layout.title_size, layout.width,
+         layout.margin + layout.title_size, layout.title_size * 3 / 4);
   return canvas.png();
 }
 
