@@ -7,6 +7,7 @@ A part that is in the cache already is not made again. Every part is a closed me
 shall stand on the bed; parts.json says where that is, in nanometres:
 
     terrain.stl       St. Helens scaled to fit 100 x 100 mm: 645,364 triangles, 191 layers of 0.1 mm
+    benchy.stl        3DBenchy: 225,154 triangles, 480 layers of 0.1 mm
     benchy15.stl      3DBenchy at 1.5 times its size: 225,154 triangles, 720 layers of 0.1 mm
     crown.stl         a dental crown made 27.8 x 29.6 x 9.6 mm: 3,878 triangles, 96 layers of 0.1 mm, 20 of 0.48 mm
     gyroid.stl        a gyroid sheet of 24 mm: 246,820 triangles, for the runs that measure memory
@@ -169,6 +170,7 @@ def main():
         return placed(model("3DBenchy.3mf"), (factor, factor, factor))
 
     make("terrain.stl", lambda: one(terrain()))
+    make("benchy.stl", lambda: one(benchy(1.0)))
     make("benchy15.stl", lambda: one(benchy(1.5)))
     make("crown.stl", lambda: one(crown()))
     make("gyroid.stl", lambda: one(placed(model("gyroid_sheet_cyl_247k.stl.gz"), (1, 1, 1)), 30.0))

@@ -24,7 +24,7 @@ from measure import measured, median_of, say  # noqa: E402
 
 LAYER = 0.1
 # part, how many times as fast as Slic3r we mean to be
-CASES = {"terrain": ("terrain.stl", 40), "benchy": ("benchy15.stl", 20)}
+CASES = {"terrain": ("terrain.stl", 40), "3dbenchy": ("benchy.stl", 20), "benchy15": ("benchy15.stl", 20)}
 ADMESH_SHARE = 1 / 3
 SEGMENTS = {"cut": 20e6, "cut+chain": 10e6}
 
