@@ -33,6 +33,7 @@ class LayerWriter final : public LayerMoves {
   Buffer<char>& out_;
   MoveTotals totals_;
   std::uint32_t layer_index_;
+  Nm height_;                    // of the layer
   double feed_per_volume_;       // mm of filament a mm3 of bead
   double fed_ = 0;               // mm of filament in this layer, exact
   std::int64_t written_ = 0;     // the same as far as it is written, 1e-5 mm
