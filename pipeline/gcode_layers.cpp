@@ -6,7 +6,6 @@
 #include <charconv>
 #include <cmath>
 #include <fstream>
-#include <functional>
 #include <numbers>
 #include <optional>
 #include <string_view>
@@ -19,7 +18,7 @@ namespace {
 using Place = GcodeFile::Place;
 
 constexpr double kFarthestMm = 2000;
-constexpr std::size_t kLongestLine = 65536;
+constexpr std::size_t kLongestLine = 65536;  // bytes
 
 struct RawBead {
   double from[2], to[2], z, fed, length;  // mm
@@ -38,7 +37,6 @@ class Walk {
   }
   const Place& place() const { return place_; }  // in front of the line that next() reads
   std::optional<std::string> fault;
-  std::string_view line() const { return text_; }
   bool layer_tag = false;  // the line begins a layer
   double filament_mm = 0;  // its diameter, where a comment tells it
 
@@ -47,12 +45,7 @@ class Walk {
     bead.reset();
     layer_tag = false;
     while (!fault && read_line()) {
-      const Place before = before_;
-      if (text_.starts_with(';')) {
-        if (tag()) return before_ = before, true;
-        continue;
-      }
-      if (command(bead)) return before_ = before, true;
+      if (text_.starts_with(';') ? tag() : command(bead)) return true;
     }
     return false;
   }
@@ -62,11 +55,14 @@ class Walk {
  private:
   bool read_line() {
     before_ = place_;
-    if (!std::getline(file_, buffer_)) return false;
+    file_.getline(buffer_.data(), static_cast<std::streamsize>(buffer_.size()));
+    const auto read = static_cast<std::size_t>(file_.gcount());  // with the end of the line
+    if (read == 0) return false;
     ++place_.line;
-    place_.byte += buffer_.size() + (file_.eof() ? 0 : 1);
-    text_ = buffer_;
-    if (text_.size() > kLongestLine || text_.find('\0') != std::string_view::npos) {
+    place_.byte += read;
+    text_ = std::string_view(buffer_.data(), file_.eof() || file_.fail() ? read : read - 1);
+    // A line that does not fit: whatever it is, it is not read into memory.
+    if (file_.fail() || text_.find('\0') != std::string_view::npos) {
       return fail("is no text of G-code; name a file that lamina extrude or a slicer wrote"), false;
     }
     while (!text_.empty() && (text_.front() == ' ' || text_.front() == '\t')) text_.remove_prefix(1);
@@ -183,7 +179,7 @@ class Walk {
   const std::string& path_;
   std::vector<std::string>& types_;
   std::ifstream file_;
-  std::string buffer_;
+  std::vector<char> buffer_ = std::vector<char>(kLongestLine);
   std::string_view text_;
   Place place_, before_;
 };
