@@ -24,7 +24,7 @@ target_link_libraries(lamina_stages PUBLIC TBB::tbb Eigen3::Eigen fmt::fmt embre
 
 # --- pipeline: how work moves
 lamina_sources(pipeline_sources "pipeline/*.cpp")
-list(FILTER pipeline_sources EXCLUDE REGEX "/pipeline/(main|preview_main|preview_layers|preview_swath)\\.cpp$")
+list(FILTER pipeline_sources EXCLUDE REGEX "/pipeline/(main|preview_main|show/preview_layers|show/preview_swath)\\.cpp$")
 add_library(lamina_pipeline STATIC ${pipeline_sources})
 add_library(lamina::pipeline ALIAS lamina_pipeline)
 # toml++ is used as headers: job_toml.cpp wants errors as values, and Debian's library was built with exceptions.
@@ -34,12 +34,10 @@ target_link_libraries(lamina_pipeline PUBLIC lamina::stages
 
 # What runs once a job is compiled to be compiled fast; what runs once a layer, and what decodes programs, is optimised.
 if(NOT CMAKE_BUILD_TYPE STREQUAL "Debug")
-  set(once_a_job ${pipeline_sources})
-  list(FILTER once_a_job INCLUDE REGEX
-       "/pipeline/(batch|calibrate|command_|console|extruder_profile|fill_keys|heights_|info|job|json|machine|markdown|materials|merge|nearest|number|output_|placement|progress|report|resume|slice_directory|slice_picture|summary|toml)")
-  list(APPEND once_a_job ${PROJECT_SOURCE_DIR}/pipeline/extrude_summary.cpp ${PROJECT_SOURCE_DIR}/pipeline/slice_summary.cpp)
-  list(FILTER once_a_job EXCLUDE REGEX "/pipeline/report_cast\\.cpp$")
-  set_source_files_properties(${once_a_job} PROPERTIES COMPILE_OPTIONS -O1)
+  foreach(folder batch calibrate cli job machine show text)
+    lamina_sources(once_a_job "pipeline/${folder}/*.cpp")
+    set_source_files_properties(${once_a_job} PROPERTIES COMPILE_OPTIONS -O1)
+  endforeach()
 endif()
 
 # ccache keeps nothing that was made from precompiled headers, and does better without them.
@@ -57,7 +55,7 @@ target_link_libraries(lamina PRIVATE lamina::pipeline)
 # Pictures need OpenImageIO, which brings some 260 shared libraries and a tenth of a second of start-up: a program of
 # its own that `lamina preview` hands over to, so that no job pays for it.
 lamina_sources(picture_sources "stages/write/picture/*.cpp")
-add_executable(lamina-preview pipeline/preview_main.cpp pipeline/preview_layers.cpp pipeline/preview_swath.cpp
+add_executable(lamina-preview pipeline/preview_main.cpp pipeline/show/preview_layers.cpp pipeline/show/preview_swath.cpp
                ${picture_sources})
 target_link_libraries(lamina-preview PRIVATE lamina::pipeline PkgConfig::OPENIMAGEIO nlohmann_json::nlohmann_json)
 

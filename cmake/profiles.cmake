@@ -29,5 +29,5 @@ std::span<const @type@> @function@() { return kShipped; }
   target_sources(lamina_pipeline PRIVATE ${source})
 endfunction()
 
-lamina_ship_profiles(stages/write/machines pipeline/machine_profile.h ShippedMachine shipped_machines)
-lamina_ship_profiles(stages/write/machines/extrusion pipeline/extruder_profile.h ShippedExtruder shipped_extruders)
+lamina_ship_profiles(stages/write/machines pipeline/machine/printer_profile.h ShippedMachine shipped_machines)
+lamina_ship_profiles(stages/write/machines/extrusion pipeline/machine/extruder.h ShippedExtruder shipped_extruders)

@@ -8,13 +8,13 @@
 #include <iterator>
 #include <optional>
 
-#include "pipeline/command_line.h"
-#include "pipeline/console.h"
-#include "pipeline/gcode_picture.h"
-#include "pipeline/manifest.h"
-#include "pipeline/preview_layers.h"
-#include "pipeline/preview_swath.h"
-#include "pipeline/slice_picture.h"
+#include "pipeline/cli/command.h"
+#include "pipeline/cli/console.h"
+#include "pipeline/output/manifest.h"
+#include "pipeline/show/gcode_picture.h"
+#include "pipeline/show/preview_layers.h"
+#include "pipeline/show/preview_swath.h"
+#include "pipeline/show/slice_picture.h"
 #include "stages/write/atomic_file.h"
 #include "stages/write/picture/canvas.h"  // have_font
 #include "stages/write/picture/contact_sheet.h"

@@ -10,15 +10,15 @@
 #include <optional>
 
 #include "arrays.h"
-#include "pipeline/command_line.h"
-#include "pipeline/jet.h"
-#include "pipeline/jet_plan.h"
-#include "pipeline/job_keys.h"
-#include "pipeline/job_toml.h"
-#include "pipeline/materials.h"
-#include "pipeline/output_directory.h"
-#include "pipeline/slice.h"
-#include "pipeline/summary.h"
+#include "pipeline/cli/command.h"
+#include "pipeline/job/file.h"
+#include "pipeline/job/keys.h"
+#include "pipeline/machine/materials.h"
+#include "pipeline/output/directory.h"
+#include "pipeline/plan/jet_plan.h"
+#include "pipeline/run/jet.h"
+#include "pipeline/run/slice.h"
+#include "pipeline/run/summary.h"
 
 namespace lamina::python {
 namespace {

@@ -1,8 +1,8 @@
 // Plans a part at 300 dpi and says how much of each tenth layer is binder.
 #include <cstdio>
 
-#include "pipeline/jet.h"
-#include "pipeline/manifest.h"
+#include "pipeline/output/manifest.h"
+#include "pipeline/run/jet.h"
 
 using namespace lamina::pipeline;
 

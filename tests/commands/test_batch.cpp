@@ -19,7 +19,7 @@
 #include <thread>
 #include <tuple>
 
-#include "pipeline/batch_list.h"
+#include "pipeline/batch/list.h"
 #include "tests/commands/program.h"
 
 namespace lamina::test {

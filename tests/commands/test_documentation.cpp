@@ -7,10 +7,10 @@
 #include <set>
 #include <sstream>
 
-#include "pipeline/command_line.h"
-#include "pipeline/machine_profile.h"
-#include "pipeline/markdown_page.h"
-#include "pipeline/number_text.h"
+#include "pipeline/cli/command.h"
+#include "pipeline/cli/markdown_page.h"
+#include "pipeline/machine/printer_profile.h"
+#include "pipeline/text/number_text.h"
 #include "tests/commands/program.h"
 
 namespace lamina::test {

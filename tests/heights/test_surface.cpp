@@ -7,7 +7,7 @@
 #include <random>
 #include <sstream>
 
-#include "pipeline/heights_request.h"
+#include "pipeline/job/heights.h"
 #include "stages/heights/ladder.h"
 #include "stages/heights/per_part.h"
 #include "stages/heights/steepest.h"

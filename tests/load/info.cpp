@@ -1,5 +1,5 @@
 // tests/load/info.cpp: the report of `lamina info`.
-#include "pipeline/info.h"
+#include "pipeline/show/info.h"
 
 #include <nlohmann/json.hpp>
 

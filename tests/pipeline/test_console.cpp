@@ -5,10 +5,10 @@
 #include <cstdlib>
 #include <nlohmann/json.hpp>
 
-#include "pipeline/console.h"
-#include "pipeline/json_text.h"
-#include "pipeline/progress.h"
-#include "pipeline/summary.h"
+#include "pipeline/cli/console.h"
+#include "pipeline/flow/progress.h"
+#include "pipeline/run/summary.h"
+#include "pipeline/text/json_text.h"
 #include "tests/commands/program.h"
 
 namespace lamina::pipeline {

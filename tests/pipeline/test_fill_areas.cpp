@@ -7,7 +7,7 @@
 #include <numbers>
 #include <random>
 
-#include "pipeline/slice.h"
+#include "pipeline/run/slice.h"
 #include "stages/data/clipping.h"
 #include "stages/write/slice_format.h"
 #include "tests/commands/program.h"

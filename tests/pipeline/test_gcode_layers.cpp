@@ -6,9 +6,9 @@
 #include <string>
 #include <vector>
 
-#include "pipeline/gcode_layers.h"
-#include "pipeline/gcode_picture.h"
+#include "pipeline/show/gcode_picture.h"
 #include "stages/data/contours.h"
+#include "stages/read/gcode_layers.h"
 #include "tests/commands/program.h"
 #include "tests/segment/gcode_reader.h"
 

@@ -1,7 +1,7 @@
 #include <gtest/gtest.h>
 
-#include "pipeline/job_keys.h"
-#include "pipeline/job_toml.h"
+#include "pipeline/job/file.h"
+#include "pipeline/job/keys.h"
 #include "tests/commands/program.h"
 
 namespace lamina::pipeline {

@@ -5,7 +5,7 @@
 #include <atomic>
 #include <random>
 
-#include "pipeline/layer_flow.h"
+#include "pipeline/flow/layer_flow.h"
 
 namespace lamina::test {
 namespace {

@@ -5,7 +5,7 @@
 #include <map>
 #include <string>
 
-#include "pipeline/slice.h"
+#include "pipeline/run/slice.h"
 #include "stages/data/clipping.h"
 
 namespace lamina::pipeline {

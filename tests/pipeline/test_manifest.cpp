@@ -2,8 +2,8 @@
 
 #include <nlohmann/json.hpp>
 
-#include "pipeline/hash.h"
-#include "pipeline/manifest.h"
+#include "pipeline/output/manifest.h"
+#include "pipeline/text/hash.h"
 #include "tests/commands/program.h"
 
 namespace lamina::pipeline {

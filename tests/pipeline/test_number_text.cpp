@@ -2,8 +2,8 @@
 
 #include <random>
 
-#include "pipeline/nearest_name.h"
-#include "pipeline/number_text.h"
+#include "pipeline/text/names.h"
+#include "pipeline/text/number_text.h"
 
 namespace lamina::pipeline {
 namespace {

@@ -2,8 +2,8 @@
 
 #include <random>
 
-#include "pipeline/placement.h"
-#include "pipeline/scene.h"
+#include "pipeline/plan/scene.h"
+#include "stages/arrange/placement.h"
 #include "tests/commands/program.h"
 
 namespace lamina::pipeline {

@@ -7,7 +7,7 @@
 #include <sstream>
 #include <tuple>
 
-#include "pipeline/fill_request.h"
+#include "pipeline/job/fill.h"
 #include "tests/commands/program.h"
 
 namespace lamina::test {

@@ -10,10 +10,10 @@
 #include <iterator>
 #include <map>
 
-#include "pipeline/jet.h"
-#include "pipeline/machine_profile.h"
-#include "pipeline/merge.h"
-#include "pipeline/verify.h"
+#include "pipeline/check/verify.h"
+#include "pipeline/machine/printer_profile.h"
+#include "pipeline/output/merge.h"
+#include "pipeline/run/jet.h"
 
 namespace lamina::pipeline {
 namespace {

@@ -10,12 +10,12 @@
 #include <iterator>
 #include <map>
 
-#include "pipeline/jet.h"
-#include "pipeline/layer_images.h"
-#include "pipeline/manifest.h"
-#include "pipeline/materials.h"
-#include "pipeline/merge.h"
-#include "pipeline/verify.h"
+#include "pipeline/check/verify.h"
+#include "pipeline/machine/materials.h"
+#include "pipeline/output/layer_images.h"
+#include "pipeline/output/manifest.h"
+#include "pipeline/output/merge.h"
+#include "pipeline/run/jet.h"
 #include "stages/write/read_image.h"
 
 namespace lamina::pipeline {

@@ -1,5 +1,5 @@
 // Programs of every shipped machine and of random ones, carried out by the virtual machine.
-#include "pipeline/replay.h"
+#include "stages/replay/replay.h"
 
 #include <gtest/gtest.h>
 #include <tbb/parallel_for.h>
@@ -9,8 +9,8 @@
 #include <filesystem>
 #include <regex>
 
-#include "pipeline/machine.h"
-#include "pipeline/machine_profile.h"
+#include "pipeline/machine/powder_printer.h"
+#include "pipeline/machine/printer_profile.h"
 #include "stages/load/load.h"
 #include "stages/program/compile.h"
 #include "stages/raster/raster.h"

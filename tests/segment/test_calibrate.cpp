@@ -4,9 +4,9 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
-#include "pipeline/extrude_request.h"
-#include "pipeline/extruder_profile.h"
-#include "pipeline/fill_request.h"
+#include "pipeline/job/extrude.h"
+#include "pipeline/job/fill.h"
+#include "pipeline/machine/extruder.h"
 #include "tests/commands/program.h"
 #include "tests/segment/gcode_reader.h"
 #include "tests/segment/table.h"

@@ -5,7 +5,7 @@
 #include <cstdio>
 #include <cstdlib>
 
-#include "pipeline/manifest.h"
+#include "pipeline/output/manifest.h"
 #include "stages/write/atomic_file.h"
 #include "tests/write/images.h"
 

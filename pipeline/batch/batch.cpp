@@ -1,0 +1,346 @@
+#include "pipeline/batch/batch.h"
+
+#include <fmt/format.h>
+#include <malloc.h>
+
+#include <algorithm>
+#include <chrono>
+#include <condition_variable>
+#include <filesystem>
+#include <memory>
+#include <mutex>
+#include <nlohmann/json.hpp>
+#include <thread>
+
+#include "pipeline/batch/summary.h"
+#include "pipeline/cli/console.h"
+#include "pipeline/flow/interrupt.h"
+#include "pipeline/flow/progress.h"
+#include "pipeline/text/json_text.h"
+
+namespace lamina::pipeline {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+using std::chrono::milliseconds;
+constexpr std::chrono::seconds kGrace{20};  // for a job that was told to stop
+constexpr Fault kOverdue = Fault::kInput;   // its part cannot be planned in the time that it was given
+
+double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
+
+/// What a command printed, as one JSON value: an object, an array of the objects of several lines, or a text.
+std::string printed_json(const std::string& printed) {
+  if (printed.empty()) return {};
+  if (nlohmann::json::accept(printed)) return nlohmann::json::parse(printed).dump();  // on one line
+  std::string values;
+  std::size_t count = 0;
+  for (std::size_t begin = 0; begin < printed.size();) {
+    const std::size_t end = std::min(printed.find('\n', begin), printed.size());
+    const std::string line = printed.substr(begin, end - begin);
+    begin = end + 1;
+    if (line.empty()) continue;
+    if (!nlohmann::json::accept(line)) return json_string(printed);
+    values += (count++ > 0 ? "," : "") + line;
+  }
+  return count == 1 ? values : "[" + values + "]";
+}
+
+/// What the last line on stderr says, without the program's name.
+std::string reason_of(std::string said) {
+  while (said.ends_with('\n')) said.pop_back();
+  said.erase(0, said.rfind('\n') + 1);
+  if (said.starts_with("lamina: ")) said.erase(0, 8);
+  return one_line(said);
+}
+
+/// Whether a command says that every layer of its job was there already.
+bool kept_all_layers(const std::string& json) {
+  const nlohmann::json said = nlohmann::json::parse(json, nullptr, false);
+  return said.is_object() && said.value("layers_planned", 1) == 0 && said.value("layers_kept", 0) > 0;
+}
+
+bool holds_something(const std::string& output) {
+  std::error_code error;
+  return !output.empty() && std::filesystem::exists(output, error) && !std::filesystem::is_empty(output, error);
+}
+
+/// A job's place in the queue; lives until the last thread that knows it has ended.
+struct Slot {
+  enum class State { kWaiting, kAtWork, kEnded } state = State::kWaiting;
+  std::atomic<bool> cancel{false};
+  std::atomic<std::uint32_t> layers_done{0}, layers{0};
+  Clock::time_point begun, told_to_stop;
+  std::atomic<bool> overdue{false};
+  bool abandoned = false, reported = false;
+  BatchResult result;
+};
+
+class Queue : public std::enable_shared_from_this<Queue> {
+ public:
+  Queue(std::vector<BatchJob> jobs, BatchRecord record, const BatchOptions& options)
+      : jobs_(std::move(jobs)), record_(std::move(record)), options_(options) {
+    for (std::size_t i = 0; i < jobs_.size(); ++i) slots_.push_back(std::make_unique<Slot>());
+  }
+
+  Result<BatchSummary> run(const BatchWatcher& watcher, const std::atomic<bool>& interrupt) {
+    const auto start = Clock::now();
+    const std::size_t threads = std::min<std::size_t>(std::max(options_.jobs, 1u), jobs_.size());
+    for (std::size_t i = 0; i < threads; ++i) start_worker();
+    std::unique_lock lock(mutex_);
+    while (true) {
+      if (interrupt && !summary_.interrupted) {
+        summary_.interrupted = true;
+        stop_all();
+      }
+      look_at_clocks();
+      if (const auto ended = report(watcher, lock); ended == jobs_.size() || (stopped_ && at_work_ == 0)) break;
+      changed_.wait_for(lock, milliseconds(100));
+    }
+    report(watcher, lock);
+    for (const auto& slot : slots_) summary_.results.push_back(slot->result);
+    summary_.seconds = seconds_since(start);
+    // Workers that wait see that nothing is left; they are gone before what they use is, which they hold themselves.
+    stopped_ = true;
+    changed_.notify_all();
+    changed_.wait_for(lock, kGrace, [&] { return workers_ == 0; });
+    if (!record_status_) return record_status_.error();
+    return summary_;
+  }
+
+ private:
+  // A thread is on its own: one whose job cannot be stopped must not keep the batch from ending.
+  void start_worker() {
+    ++workers_;
+    std::thread([self = shared_from_this()] { self->work(); }).detach();
+  }
+
+  void stop_all() {
+    stopped_ = true;
+    for (const auto& slot : slots_) tell_to_stop(*slot);
+    changed_.notify_all();
+  }
+
+  static void tell_to_stop(Slot& slot) {
+    if (slot.state != Slot::State::kAtWork || slot.cancel) return;
+    slot.told_to_stop = Clock::now();
+    slot.cancel = true;
+  }
+
+  void look_at_clocks() {
+    for (std::size_t i = 0; i < jobs_.size(); ++i) {
+      Slot& slot = *slots_[i];
+      if (slot.state != Slot::State::kAtWork) continue;
+      if (options_.time_limit_seconds > 0 && !slot.cancel && seconds_since(slot.begun) > options_.time_limit_seconds) {
+        slot.overdue = true;
+        tell_to_stop(slot);
+      }
+      if (!slot.cancel || Clock::now() - slot.told_to_stop < kGrace) continue;
+      slot.abandoned = summary_.abandoned = true;
+      BatchResult result;
+      result.outcome = slot.overdue ? BatchOutcome::kTimeLimit : BatchOutcome::kStopped;
+      result.code = static_cast<int>(slot.overdue ? kOverdue : Fault::kInterrupted);
+      result.reason = "did not stop when it was told to, and was left behind";
+      if (slot.overdue) result.reason = fmt::format("{}, {}", overdue_reason(), result.reason);
+      result.seconds = seconds_since(slot.begun);
+      end(i, std::move(result));
+      if (!stopped_) start_worker();
+    }
+  }
+
+  /// With the lock; it is let go for the watcher. returns how many have ended
+  std::size_t report(const BatchWatcher& watcher, std::unique_lock<std::mutex>& lock) {
+    BatchState state;
+    state.total = static_cast<std::uint32_t>(jobs_.size());
+    std::vector<std::size_t> fresh;
+    for (std::size_t i = 0; i < jobs_.size(); ++i) {
+      const Slot& slot = *slots_[i];
+      const auto number = static_cast<std::uint32_t>(i + 1);
+      if (slot.state == Slot::State::kAtWork)
+        state.at_work.push_back({number, jobs_[i].entry.name, slot.layers_done, slot.layers});
+      if (slot.state != Slot::State::kEnded) continue;
+      ++state.ended;
+      if (slot.result.outcome != BatchOutcome::kDone && slot.result.outcome != BatchOutcome::kKept) ++state.failed;
+      if (!slot.reported) fresh.push_back(i);
+    }
+    lock.unlock();
+    // Ended jobs are not touched any more.
+    for (const std::size_t i : fresh) {
+      slots_[i]->reported = true;
+      if (watcher.ended) watcher.ended(jobs_[i], static_cast<std::uint32_t>(i + 1), slots_[i]->result, state);
+    }
+    if (watcher.progress) watcher.progress(state);
+    lock.lock();
+    return state.ended;
+  }
+
+  void work() {
+    std::unique_lock lock(mutex_);
+    while (!stopped_ && next_ < jobs_.size()) {
+      const BatchJob& job = jobs_[next_];
+      if (at_work_ > 0 && need_ + job.need_bytes > options_.memory_bytes) {
+        changed_.wait(lock);
+        continue;
+      }
+      const std::size_t i = next_++;
+      Slot& slot = *slots_[i];
+      slot.state = Slot::State::kAtWork;
+      slot.begun = Clock::now();
+      ++at_work_;
+      need_ += job.need_bytes;
+      summary_.most_at_work = std::max(summary_.most_at_work, at_work_);
+      summary_.most_need_bytes = std::max(summary_.most_need_bytes, need_);
+      lock.unlock();
+      BatchResult result = run_job(i);
+      // What the job has freed goes back to the system, so that the next one does not come on top of it.
+      ::malloc_trim(0);
+      lock.lock();
+      if (slot.abandoned) break;  // its place has been taken
+      end(i, std::move(result));
+    }
+    --workers_;
+    changed_.notify_all();
+  }
+
+  /// With the lock.
+  void end(std::size_t i, BatchResult result) {
+    Slot& slot = *slots_[i];
+    slot.state = Slot::State::kEnded;
+    --at_work_;
+    need_ -= jobs_[i].need_bytes;
+    const bool news = result.outcome != BatchOutcome::kStopped && (result.outcome != BatchOutcome::kKept || result.recognized);
+    slot.result = std::move(result);
+    if (news) note(record_.ended(jobs_[i], static_cast<std::uint32_t>(i + 1), slot.result));
+    if (options_.fail_fast && has_failed(slot.result)) stop_all();
+    changed_.notify_all();
+  }
+
+  void note(const Status& status) {
+    if (!status && record_status_) record_status_ = status;
+  }
+
+  /// Without the lock.
+  BatchResult run_job(std::size_t i) {
+    const BatchJob& job = jobs_[i];
+    Slot& slot = *slots_[i];
+    BatchResult result;
+    if (job.refused) {
+      result.outcome = BatchOutcome::kFailed;
+      result.code = static_cast<int>(job.refused->fault);
+      result.reason = one_line(job.refused->message);
+      return result;
+    }
+    const BatchRecord::Earlier* earlier = options_.resume ? record_.earlier(job) : nullptr;
+    if (earlier != nullptr && earlier->ended && earlier->begun == job.id) {
+      Result<OutputDigest> now = job.output.empty() ? OutputDigest() : digest_output(job.output);
+      const OutputDigest& then = earlier->result.output;
+      if (job.output.empty() || (now && now->files == then.files && now->hash == then.hash)) {
+        result = earlier->result;
+        result.outcome = BatchOutcome::kKept;
+        return result;
+      }
+    }
+    const bool foreign = !options_.overwrite && (earlier == nullptr || earlier->foreign) && holds_something(job.output);
+    {
+      const std::lock_guard lock(mutex_);
+      note(record_.begun(job, static_cast<std::uint32_t>(i + 1), foreign));
+    }
+    result = run_command(job, slot, arguments_now(job, earlier, foreign));
+    if (foreign && options_.resume && !job.can_resume && job.can_overwrite && result.code == static_cast<int>(Fault::kUsage)) {
+      result.reason += fmt::format("; the batch has no record of it: remove {} to have it done again", job.output);
+    }
+    result.recognized = foreign && job.can_resume && result.outcome == BatchOutcome::kDone && kept_all_layers(result.json);
+    if (result.outcome == BatchOutcome::kDone && !job.output.empty()) {
+      if (Result<OutputDigest> digest = digest_output(job.output)) {
+        result.output = *digest;
+      } else {
+        result.outcome = BatchOutcome::kFailed;
+        result.code = static_cast<int>(Fault::kOutput);
+        result.reason = digest.error().message;
+      }
+    }
+    if (result.outcome == BatchOutcome::kDone && result.recognized) result.outcome = BatchOutcome::kKept;
+    return result;
+  }
+
+  /// What an earlier run of this batch left of the same job is continued; what it left of another one is replaced. What is
+  /// there without a record is for the command to recognize as its own, or to refuse.
+  std::vector<std::string> arguments_now(const BatchJob& job, const BatchRecord::Earlier* earlier, bool foreign) const {
+    std::vector<std::string> arguments = job.arguments;
+    const auto add = [&](const char* flag) { arguments.insert(std::ranges::find(arguments, "--"), flag); };
+    const bool same = earlier != nullptr && earlier->begun == job.id;
+    if (foreign) {
+      if (options_.resume && job.can_resume) add("--resume");
+    } else if (same && job.can_resume) {
+      add("--resume");
+    } else if ((options_.overwrite || earlier != nullptr) && job.can_overwrite) {
+      add("--overwrite");
+    }
+    return arguments;
+  }
+
+  std::string overdue_reason() const {
+    return fmt::format("took longer than its time limit of {} s", options_.time_limit_seconds);
+  }
+
+  BatchResult run_command(const BatchJob& job, Slot& slot, const std::vector<std::string>& arguments) const {
+    BatchResult result;
+    const auto start = Clock::now();
+    ConsoleCapture console;
+    const InterruptScope interrupts(slot.cancel);
+    const ProgressCallback progress = [&slot](const ProgressEvent& event) {
+      slot.layers_done.store(event.done, std::memory_order_relaxed);
+      slot.layers.store(event.total, std::memory_order_relaxed);
+    };
+    const ProgressListener listener(progress);
+    try {
+      result.code = job.command->run(arguments);
+    } catch (const std::bad_alloc&) {
+      result.code = fail({Fault::kInternal, "out of memory; try a smaller --memory or fewer --jobs"});
+    } catch (const std::exception& error) {
+      result.code = fail({Fault::kInternal, fmt::format("internal error: {}", error.what())});
+    } catch (...) {
+      result.code = fail({Fault::kInternal, "internal error"});
+    }
+    result.seconds = seconds_since(start);
+    result.json = printed_json(console.out);
+    result.outcome = result.code == 0 ? BatchOutcome::kDone : BatchOutcome::kFailed;
+    if (result.code != 0) result.reason = reason_of(console.err);
+    if (result.code == static_cast<int>(Fault::kInterrupted)) {
+      result.outcome = BatchOutcome::kStopped;
+      if (slot.overdue) {
+        result.outcome = BatchOutcome::kTimeLimit;
+        result.code = static_cast<int>(kOverdue);
+        result.reason = overdue_reason();
+      }
+    }
+    return result;
+  }
+
+  std::vector<BatchJob> jobs_;
+  std::vector<std::unique_ptr<Slot>> slots_;
+  BatchRecord record_;
+  BatchOptions options_;
+
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  std::size_t next_ = 0;
+  std::uint32_t at_work_ = 0, workers_ = 0;
+  std::uint64_t need_ = 0;
+  bool stopped_ = false;
+  Status record_status_;
+  BatchSummary summary_;
+};
+
+}  // namespace
+
+std::uint64_t layer_share(std::uint64_t memory_bytes, std::uint32_t jobs) {
+  constexpr std::uint64_t kLeast = 32ull << 20;
+  return std::max(memory_bytes / (2 * std::max(jobs, 1u)), kLeast);
+}
+
+Result<BatchSummary> run_batch(std::vector<BatchJob> jobs, BatchRecord record, const BatchOptions& options,
+                               const BatchWatcher& watcher, const std::atomic<bool>& interrupt) {
+  return std::make_shared<Queue>(std::move(jobs), std::move(record), options)->run(watcher, interrupt);
+}
+
+}  // namespace lamina::pipeline

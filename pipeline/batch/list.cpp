@@ -1,0 +1,162 @@
+#include "pipeline/batch/list.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <sstream>
+
+namespace lamina::pipeline {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::string lower(std::string text) {
+  std::ranges::transform(text, text.begin(), [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return text;
+}
+
+bool is_job_file(const fs::path& path) { return lower(path.extension().string()) == ".toml"; }
+
+bool is_part(const fs::path& path) {
+  const std::string extension = lower(path.extension().string());
+  if (extension == ".gz") return is_part(path.stem());
+  return extension == ".stl" || extension == ".obj" || extension == ".3mf";
+}
+
+/// The file's name without what says its format; folders become part of it.
+std::string name_of(const fs::path& path) {
+  fs::path name = path;
+  if (lower(name.extension().string()) == ".gz") name.replace_extension();
+  name.replace_extension();
+  std::string text = name.lexically_normal().string();
+  std::ranges::replace(text, '/', '_');
+  return text;
+}
+
+BatchEntry entry_of_file(const fs::path& path, const fs::path& below, const std::vector<std::string>& with) {
+  BatchEntry entry{path.string(), name_of(below), {}};
+  if (is_job_file(path)) {
+    entry.words = {"jet", "--job", path.string()};
+  } else {
+    entry.words = with;
+    // A name that begins with a dash is a file all the same.
+    entry.words.push_back(path.string().starts_with('-') ? "./" + path.string() : path.string());
+  }
+  return entry;
+}
+
+Status read_directory(const fs::path& directory, const std::vector<std::string>& with, std::vector<BatchEntry>& entries) {
+  std::vector<fs::path> files;
+  std::error_code error;
+  for (fs::recursive_directory_iterator at(directory, error), end; !error && at != end; at.increment(error)) {
+    std::error_code ignored;
+    if (at->is_regular_file(ignored) && (is_job_file(at->path()) || is_part(at->path()))) files.push_back(at->path());
+  }
+  if (error) return Error{Fault::kUsage, fmt::format("{}: {}", directory.string(), error.message())};
+  if (files.empty()) {
+    return Error{Fault::kUsage, fmt::format("{}: no part (.stl .obj .3mf, .gz of them) and no job (.toml) in it or below it",
+                                            directory.string())};
+  }
+  std::ranges::sort(files);
+  for (const fs::path& file : files) entries.push_back(entry_of_file(file, file.lexically_relative(directory), with));
+  return {};
+}
+
+/// A name for a job of a list: that of its first file.
+std::string name_of_words(const std::vector<std::string>& words) {
+  for (std::size_t i = 1; i < words.size(); ++i) {
+    const fs::path path = words[i];
+    if (!words[i].starts_with('-') && (is_part(path) || is_job_file(path))) return name_of(path.filename());
+  }
+  return words.front();
+}
+
+Status read_list(const std::string& path, std::vector<BatchEntry>& entries) {
+  std::ifstream file(path, std::ios::binary);
+  if (!file) return Error{Fault::kUsage, fmt::format("{}: {}", path, std::strerror(errno))};
+  const std::size_t before = entries.size();
+  std::string line;
+  for (std::uint32_t number = 1; std::getline(file, line); ++number) {
+    const std::string source = fmt::format("{}:{}", path, number);
+    if (line.find('\0') != std::string::npos) {
+      return Error{Fault::kUsage, fmt::format("{}: not a text; a list has one command line a line", source)};
+    }
+    Result<std::vector<std::string>> words = split_words(line);
+    if (!words) return Error{Fault::kUsage, fmt::format("{}: {}", source, words.error().message)};
+    if (!words->empty() && words->front() == "lamina") words->erase(words->begin());
+    if (words->empty()) continue;
+    std::string name = name_of_words(*words);
+    entries.push_back({source, std::move(name), std::move(*words)});
+  }
+  if (entries.size() == before) {
+    return Error{Fault::kUsage,
+                 fmt::format("{}: no job in it; write one command line a line, as: jet part.stl --dpi 600", path)};
+  }
+  return {};
+}
+
+}  // namespace
+
+Result<std::vector<std::string>> split_words(std::string_view line) {
+  std::vector<std::string> words;
+  std::string word;
+  bool within = false;
+  char quote = 0;
+  for (std::size_t i = 0; i < line.size(); ++i) {
+    const char c = line[i];
+    const bool blank = c == ' ' || c == '\t' || c == '\r' || c == '\n';
+    if (quote != 0) {
+      if (c == quote) {
+        quote = 0;
+      } else if (c == '\\' && quote == '"' && i + 1 < line.size()) {
+        word += line[++i];
+      } else {
+        word += c;
+      }
+    } else if (blank) {
+      if (within) words.push_back(std::move(word));
+      word.clear();
+      within = false;
+    } else if (c == '#' && !within) {
+      break;
+    } else {
+      within = true;
+      if (c == '\'' || c == '"') {
+        quote = c;
+      } else if (c == '\\' && i + 1 < line.size()) {
+        word += line[++i];
+      } else {
+        word += c;
+      }
+    }
+  }
+  if (quote != 0) return Error{Fault::kUsage, fmt::format("a {} is not closed", quote)};
+  if (within) words.push_back(std::move(word));
+  return words;
+}
+
+Result<std::vector<BatchEntry>> read_batch(const std::vector<std::string>& operands, const std::vector<std::string>& with) {
+  std::vector<BatchEntry> entries;
+  for (const std::string& operand : operands) {
+    std::error_code error;
+    const fs::file_status status = fs::status(operand, error);
+    if (!fs::exists(status))
+      return Error{
+          Fault::kUsage,
+          fmt::format("{}: no such file or directory; name a list, a part, a job file or a directory of them", operand)};
+    if (fs::is_directory(status)) {
+      if (Status read = read_directory(operand, with, entries); !read) return read.error();
+    } else if (is_job_file(operand) || is_part(operand)) {
+      entries.push_back(entry_of_file(operand, fs::path(operand).filename(), with));
+    } else if (Status read = read_list(operand, entries); !read) {
+      return read.error();
+    }
+  }
+  return entries;
+}
+
+}  // namespace lamina::pipeline

@@ -1,0 +1,33 @@
+// pipeline/batch/list.h: what a batch is asked to do, from lists, directories and job files, before anything is looked at.
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "stages/data/status.h"
+
+namespace lamina::pipeline {
+
+/// One job as somebody wrote it down.
+struct BatchEntry {
+  std::string source;              // where: "jobs.txt:12", "parts/bracket.stl"
+  std::string name;                // what its output is called if it does not say; not unique yet
+  std::vector<std::string> words;  // command and arguments: "jet", "bracket.stl", "--dpi", "600"
+};
+
+/// The words of a line as a shell reads them: split at blanks; '...' and "..." hold blanks, a backslash takes the next
+/// character as it is (within '...' too it is an ordinary character), # begins a comment where a word could begin.
+/// Nothing is expanded. errors  kUsage: a quote that is not closed
+Result<std::vector<std::string>> split_words(std::string_view line);
+
+/// The jobs of all operands, in order:
+///   NAME.toml                         a job file: jet --job NAME.toml
+///   NAME.stl .obj .3mf (.gz)          a part: `with` and the file
+///   a directory                       all of the above in it and below it, by name
+///   anything else                     a list: one command line a line, "jet bracket.stl --dpi 600 -o bracket"; the word
+///                                     lamina in front, empty lines and comments are skipped
+/// errors  kUsage: an operand that is not there, cannot be read, or holds no job; a line that cannot be split
+Result<std::vector<BatchEntry>> read_batch(const std::vector<std::string>& operands, const std::vector<std::string>& with);
+
+}  // namespace lamina::pipeline

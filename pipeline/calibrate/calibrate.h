@@ -1,0 +1,49 @@
+// pipeline/calibrate/calibrate.h: from a printer that nothing is known of to one whose segmented lines are: test pieces, then
+// what was measured on them.
+//
+// The procedure is that of Di Nisio 2022, Appendix A: 1 parameters, 2 flow, 3 level, 4 widths of thick and thin stretches,
+// 5 spacings, 6 one layer, 7 the part. docs/calibrate.md tells it for people.
+#pragma once
+
+#include <array>
+#include <atomic>
+#include <string>
+#include <vector>
+
+#include "pipeline/job/job.h"
+#include "pipeline/machine/extruder.h"
+#include "stages/data/status.h"
+#include "stages/segment/measured.h"
+
+namespace lamina::pipeline {
+
+struct CalibrationRequest {
+  std::string machine;                                           // as --machine takes it
+  std::string directory;                                         // of the pieces
+  double width_mm = 0, height_mm = 0;                            // of a bead; 0: the nozzle, and three quarters of it
+  std::vector<double> thin_speeds, thin_extrusions, extrusions;  // %; presets are the document's
+};
+
+/// The preset sweeps of Tables 3 to 5.
+CalibrationRequest preset_calibration();
+
+/// A test piece: a block, and how it is filled.
+struct TestPiece {
+  std::string name;  // of its files: 4-speed
+  std::string task;  // what to do with it, one line
+  std::array<double, 3> size_mm;
+  Job job;  // complete but for the paths of its part and output
+};
+
+/// The pieces of steps 2 to 7. Widths and heights are resolved in `request`. errors  kUsage
+Result<std::vector<TestPiece>> test_pieces(CalibrationRequest& request, const ExtruderProfile& profile);
+
+/// Writes DIR/<name>.stl, .toml and .gcode (or .sml) of each piece, DIR/widths.csv to be filled in, and DIR/STEPS.md.
+/// returns names of the pieces
+/// errors  kUsage: the directory has a widths.csv already; kOutput; of run_extrude
+Result<std::vector<std::string>> write_test_pieces(const CalibrationRequest& asked, const std::atomic<bool>& cancel);
+
+/// The rows of a filled in widths.csv. errors  kInput: file, line, column, what is wrong
+Result<std::vector<segment::Measured>> read_widths(const std::string& path);
+
+}  // namespace lamina::pipeline

@@ -1,0 +1,229 @@
+// Test pieces of a calibration: their blocks, job files and toolpaths, and the table to be filled in.
+#include <fmt/format.h>
+
+#include <array>
+#include <cmath>
+#include <filesystem>
+#include <span>
+
+#include "pipeline/calibrate/calibrate.h"
+#include "pipeline/job/file.h"
+#include "pipeline/run/extrude.h"
+#include "pipeline/text/number_text.h"
+#include "stages/write/atomic_file.h"
+
+namespace lamina::pipeline {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr double kLineGap = 2;  // between the lines that are measured, edge to edge
+
+/// A block that so many segmented lines fit into, each beside a continuous one: lines one distance from the wall's centre
+/// and from each other, and two thirds of a distance to spare (62 and 48 mm for the document's 12 and 9).
+double width_for(std::size_t lines, double bead) {
+  return std::round((2 * static_cast<double>(lines) + 1 + 2.0 / 3) * (bead + kLineGap) + bead);
+}
+
+/// A closed block from the origin as binary STL.
+std::string block_stl(const std::array<double, 3>& size) {
+  std::string bytes(80, ' ');
+  const auto put = [&](const auto& value) { bytes.append(reinterpret_cast<const char*>(&value), sizeof value); };
+  put(std::uint32_t{12});
+  for (int axis = 0; axis < 3; ++axis) {
+    for (int side = 0; side < 2; ++side) {
+      // The four corners of a side, anticlockwise seen from outside.
+      const int u = (axis + 1) % 3, v = (axis + 2) % 3;
+      std::array<std::array<float, 3>, 4> corner{};
+      for (int i = 0; i < 4; ++i) {
+        const bool at_u = i == 1 || i == 2, at_v = i >= 2;
+        corner[i][axis] = static_cast<float>(side * size[axis]);
+        corner[i][side == 1 ? u : v] = static_cast<float>(at_u ? size[side == 1 ? u : v] : 0);
+        corner[i][side == 1 ? v : u] = static_cast<float>(at_v ? size[side == 1 ? v : u] : 0);
+      }
+      for (const auto& triangle : {std::array{0, 1, 2}, {0, 2, 3}}) {
+        put(std::array<float, 3>{});
+        for (const int i : triangle) put(corner[i]);
+        put(std::uint16_t{0});
+      }
+    }
+  }
+  return bytes;
+}
+
+Status write_text(const fs::path& path, std::string_view text) {
+  return write::write_file(path.string(), std::as_bytes(std::span(text)));
+}
+
+std::string steps_text(const std::vector<TestPiece>& pieces, const CalibrationRequest& request, std::string_view extension) {
+  std::string text = fmt::format(
+      "# Calibrating segmented lines\n\n1. Parameters: beads of {} mm, layers of {} mm, the speeds and temperatures of the machine's profile; keep them for all "
+      "pieces.\n",
+      number_text(request.width_mm), number_text(request.height_mm));
+  char step = '1';
+  for (const TestPiece& piece : pieces) {
+    if (piece.name[0] == '6' && step < '5') {
+      text +=
+          "5. Spacing: fill in widths.csv, then `lamina calibrate --measured widths.csv --machine MACHINE -o machine.toml`; plan the pieces of steps 6 and 7 "
+          "again with `lamina extrude --job FILE --machine machine.toml`.\n";
+    }
+    text += fmt::format("{}. `{}{}`: {}\n", piece.name[0], piece.name, extension, piece.task);
+    step = piece.name[0];
+  }
+  return text;
+}
+
+std::string widths_text(const CalibrationRequest& request) {
+  std::string text =
+      "# Widths in mm; leave cells empty where nothing was measured, add rows for further thick speeds or repeated measurements.\n"
+      "test,percent,thick_speed_percent,region,wall_mm,thick_mm,thin_mm,continuous_mm,stable_mm\n"
+      "flow,,,,,,,,\n";
+  for (const double percent : request.thin_speeds) text += fmt::format("speed,{},,,,,,,\n", number_text(percent));
+  for (const double percent : request.thin_extrusions) text += fmt::format("extrusion,{},,,,,,,\n", number_text(percent));
+  for (const double percent : request.extrusions) {
+    for (const char* region : {"initial", "central", "final"})
+      text += fmt::format("repeated,{},100,{},,,,,\n", number_text(percent), region);
+  }
+  return text;
+}
+
+}  // namespace
+
+CalibrationRequest preset_calibration() {
+  CalibrationRequest request;
+  for (int percent = 125; percent <= 400; percent += 25) request.thin_speeds.push_back(percent);
+  for (int percent = 90; percent >= 10; percent -= 10) request.thin_extrusions.push_back(percent);
+  request.extrusions = {75, 100, 125};
+  return request;
+}
+
+Result<std::vector<TestPiece>> test_pieces(CalibrationRequest& request, const ExtruderProfile& profile) {
+  if (request.width_mm <= 0) request.width_mm = profile.machine.material.nozzle_mm;
+  if (request.height_mm <= 0) request.height_mm = std::round(request.width_mm * 750) / 1000;
+  const double height = request.height_mm, bead = request.width_mm;
+  Job base;
+  base.machine.profile = request.machine;
+  if (request.machine.ends_with(".toml") || request.machine.find('/') != std::string::npos)
+    base.machine.profile = fs::absolute(request.machine).string();
+  base.layer_mm = height;
+  base.quiet = true;
+  base.fill.all.width_mm = bead;
+  base.fill.all.walls = 1;
+  base.fill.all.angle_deg = 90;
+  base.fill.all.angle_step_deg = 0;
+  std::vector<TestPiece> pieces;
+  const auto add = [&](std::string name, std::string task, std::array<double, 3> size, const auto& change) {
+    TestPiece& piece = pieces.emplace_back(TestPiece{std::move(name), std::move(task), size, base});
+    change(piece.job.fill.all, piece.job.segment.all);
+  };
+  add("2-flow",
+      fmt::format("two walls and nothing else; measure the wall in several places (wall_mm): it should be {} mm",
+                  number_text(2 * bead)),
+      {20, 20, std::ceil(10 / height) * height}, [](FillSettings& fill, SegmentSettings&) { fill.walls = 2; });
+  add("3-level",
+      fmt::format("lines 5 mm apart on 100 x 100 mm; level the bed until all of them are {} +- 0.01 mm wide",
+                  number_text(bead)),
+      {100, 100, height}, [&](FillSettings& fill, SegmentSettings&) {
+        fill.walls = 0;
+        fill.pattern = infill::Pattern::kRaster;
+        fill.distance_mm = {5};
+        fill.first_line_mm = 2.5;
+      });
+  const auto lines = [&](FillSettings& fill, SegmentSettings& segment) {
+    fill.pattern = infill::Pattern::kRaster;
+    fill.gap_mm = {kLineGap};
+    segment.on = true;
+    segment.thick_speed = 100;
+  };
+  add("4-speed",
+      fmt::format(
+          "{} segmented lines, 10 + 30 + 10 mm, thin at {} to {} % of the speed from right to left; on each measure the narrowest place of "
+          "the thin stretch (thin_mm), the widest one after it (thick_mm), and how far from the start of the thin stretch the bead is as wide as "
+          "before (stable_mm)",
+          request.thin_speeds.size(), number_text(request.thin_speeds.front()), number_text(request.thin_speeds.back())),
+      {width_for(request.thin_speeds.size(), bead), 50, height}, [&](FillSettings& fill, SegmentSettings& segment) {
+        lines(fill, segment);
+        segment.rule = segment::CutRule::kThickEnds;
+        segment.thick_mm = 10;
+        segment.thin_mm = 30;
+        segment.thin_speed_sweep = request.thin_speeds;
+      });
+  add("4-extrusion",
+      fmt::format(
+          "{} segmented lines, 10 + 30 + 10 mm, thin with {} to {} % of the extrusion from right to left; measure the narrowest place (thin_mm)",
+          request.thin_extrusions.size(), number_text(request.thin_extrusions.front()),
+          number_text(request.thin_extrusions.back())),
+      {width_for(request.thin_extrusions.size(), bead), 50, height}, [&](FillSettings& fill, SegmentSettings& segment) {
+        lines(fill, segment);
+        segment.rule = segment::CutRule::kThickEnds;
+        segment.thick_mm = 10;
+        segment.thin_mm = 30;
+        segment.thin_speed = 100;
+        segment.thin_extrusion_sweep = request.thin_extrusions;
+      });
+  for (const double extrusion : request.extrusions) {
+    add(fmt::format("4-repeated-{}", number_text(extrusion)),
+        fmt::format(
+            "short stretches at {} % extrusion; measure thick, thin and continuous lines in the initial, the central and the final region. If they differ by "
+            "more than {} mm, plan it again with `lamina extrude --job FILE --thick-speed PERCENT`, lower, and add rows for that speed",
+            number_text(extrusion), segment::kAcceptedDeviation),
+        {50, 28, height}, [&](FillSettings& fill, SegmentSettings& segment) {
+          lines(fill, segment);
+          segment.thick_extrusion = extrusion;
+        });
+  }
+  for (const int layers : {1, 5, 10}) {
+    for (const double extrusion : request.extrusions) {
+      add(fmt::format("{}-{}-{}", layers == 1 ? "6-layer" : "7-layers", layers == 1 ? "1" : fmt::format("{}", layers),
+                      number_text(extrusion)),
+          layers == 1
+              ? fmt::format(
+                    "one layer at {} % extrusion with the spacing that follows from the widths; closed pores: larger spacing, beads apart: smaller",
+                    number_text(extrusion))
+              : fmt::format("{} layers at {} % extrusion", layers, number_text(extrusion)),
+          {50, 28, layers * height}, [&](FillSettings& fill, SegmentSettings& segment) {
+            fill.pattern = infill::Pattern::kRaster;
+            segment.on = true;
+            segment.thick_extrusion = extrusion;
+          });
+    }
+  }
+  return pieces;
+}
+
+Result<std::vector<std::string>> write_test_pieces(const CalibrationRequest& asked, const std::atomic<bool>& cancel) {
+  CalibrationRequest request = asked;
+  const auto profile = find_extruder(request.machine);
+  if (!profile) return Error{profile.error().fault, "--machine: " + profile.error().message};
+  const fs::path directory = request.directory;
+  std::error_code failed;
+  if (fs::exists(directory / "widths.csv", failed)) {
+    return Error{Fault::kUsage, fmt::format("{}: has a widths.csv already, which may hold measurements; name another directory",
+                                            request.directory)};
+  }
+  fs::create_directories(directory, failed);
+  if (failed) return Error{Fault::kOutput, fmt::format("{}: {}", request.directory, failed.message())};
+  auto pieces = test_pieces(request, *profile);
+  if (!pieces) return pieces.error();
+  const std::string extension = profile->machine.format == "sml" ? ".sml" : ".gcode";
+  std::vector<std::string> names;
+  for (TestPiece& piece : *pieces) {
+    const fs::path stem = directory / piece.name;
+    if (Status status = write_text(stem.string() + ".stl", block_stl(piece.size_mm)); !status) return status.error();
+    piece.job.parts = {{.path = stem.string() + ".stl"}};
+    piece.job.output = stem.string() + extension;
+    const std::string job = fmt::format("# {}\n# lamina extrude --job {}.toml\n\n{}", piece.task, piece.name,
+                                        job_text(piece.job, directory.string()));
+    if (Status status = write_text(stem.string() + ".toml", job); !status) return status.error();
+    const auto summary = run_extrude(
+        piece.job, [](const ProgressEvent&) {}, cancel);
+    if (!summary) return Error{summary.error().fault, fmt::format("{}: {}", piece.name, summary.error().message)};
+    names.push_back(piece.name);
+  }
+  if (Status status = write_text(directory / "STEPS.md", steps_text(*pieces, request, extension)); !status)
+    return status.error();
+  if (Status status = write_text(directory / "widths.csv", widths_text(request)); !status) return status.error();
+  return names;
+}
+
+}  // namespace lamina::pipeline

@@ -1,0 +1,43 @@
+// pipeline/check/verify.h: is a directory what its manifest says.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "stages/data/status.h"
+#include "stages/replay/replay.h"
+
+namespace lamina::pipeline {
+
+struct VerifyOptions {
+  bool quick = false;  // sizes and hashes only; images are not decoded
+};
+
+struct VerifyReport {
+  std::string directory;
+  std::uint64_t layers = 0;           // that the manifests name
+  std::uint64_t bytes = 0;            // of their files, as recorded
+  std::string machine;                // whose programs were replayed; empty if there are none
+  std::uint64_t replayed = 0;         // layers
+  ReplayCount replay;                 // of all of them
+  std::uint64_t moved = 0, lost = 0;  // pixels of blocked nozzles
+  double binder_mm3 = 0;              // drops x their volume
+  double powder_mm3 = 0;              // height fed x area of the bed
+  double coverage = 0;                // drops / pixels of the layers replayed
+  std::uint64_t fault_count = 0;
+  std::vector<std::string> faults;  // the first 20, in layer order, then stray files; each begins with a file's name
+  bool ok() const { return fault_count == 0; }
+};
+
+/// Compares every file with the manifest (of the whole job, or of all shards that are there): present, of the recorded
+/// size and hash, and, unless quick, an image of the recorded columns, rows, resolution and number of set pixels; and the
+/// print program of each layer, carried out by a virtual machine (replay.h), prints that image bit for bit. Files in
+/// layers/ and program/ that no manifest names are faults, and so is a job that was interrupted.
+///
+/// errors  kVerification if there is no manifest to compare with, or none that can be read; kUsage if the directory
+///         does not exist
+/// cost    reads every file once, and once more to decode it; parallel over layers; memory of a few layers' runs
+Result<VerifyReport> verify(const std::string& directory, const VerifyOptions& options);
+
+}  // namespace lamina::pipeline

@@ -1,0 +1,108 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <filesystem>
+
+#include "pipeline/cli/command.h"
+#include "pipeline/cli/console.h"
+#include "pipeline/cli/keys.h"
+#include "pipeline/flow/interrupt.h"
+#include "pipeline/flow/progress.h"
+#include "pipeline/job/file.h"
+#include "pipeline/run/extrude.h"
+
+namespace lamina::pipeline {
+namespace {
+
+const KeyChoice kExtrudeKeys = {
+    "layers",     "heights",     "place",      "machine.profile", "fill", "segment", "extrude", "load", "slice.tolerance_um",
+    "run.output", "run.threads", "run.memory", "run.layers",      "part"};
+
+CommandSpec extrude_spec() {
+  CommandSpec spec;
+  spec.name = "extrude";
+  spec.summary =
+      "Plans parts for a material extrusion printer: walls, filling and segmented lines as G-code or SML, with what the\n"
+      "pores will be. The same parts and options give the same bytes.";
+  spec.operand = "PART";
+  spec.operand_meaning = "STL, OBJ or 3MF files, STL and OBJ gzipped too; they replace the parts of --job";
+  add_key_options(kExtrudeKeys, spec);
+  for (const auto& [flag, meaning] : {std::pair{"--dry-run", "load, place and index, predict, write nothing"},
+                                      {"--json", "print the summary as one JSON object on stdout"},
+                                      {"--quiet", "say nothing but errors"}}) {
+    spec.options.push_back({flag, "", meaning, "", "Run"});
+  }
+  spec.absent = {{"--shard", kNoShards}};
+  spec.closing = "Machines:\n";
+  for (const ShippedExtruder& shipped : shipped_extruders()) {
+    const auto profile = read_extruder(shipped.text, std::string(shipped.name));
+    spec.closing += fmt::format("  {:<16}{}\n", shipped.name, profile ? profile->machine.description : "");
+  }
+  spec.closing +=
+      "\nWithout a job file one wall is laid and layers are half of the nozzle thick. Lengths are mm, angles degrees.\n"
+      "docs/extrude.md has the profiles and the file formats, docs/segmented.md the segmented filling.\n\n"
+      "Examples:\n"
+      "  lamina extrude bracket.stl --machine marlin --layer 0.2 --walls 2 --fill raster --bead-gap 1 -o bracket.gcode\n"
+      "  lamina extrude part.stl --machine anet-a8 --layer 0.3 --fill segmented --angle 90 --angle-step 0 -o part.gcode\n"
+      "  lamina extrude part.stl --machine anet-a8 --layer 0.3 --fill segmented --extrusion 125 --thin 2 -o part.gcode\n"
+      "  lamina extrude part.stl --machine fdm-2000 --layer 0.254 --bead 0.508 --fill raster -o part.sml";
+  return spec;
+}
+
+bool sets(const Arguments& arguments, std::string_view key) {
+  return std::ranges::any_of(arguments.all("--set"), [&](const std::string& text) { return text.starts_with(key); });
+}
+
+}  // namespace
+
+int run_extrude_command(const std::vector<std::string>& texts) {
+  const Result<Arguments> arguments = read_arguments(extrude_spec(), texts);
+  if (!arguments) return fail(arguments.error());
+  if (arguments->help) {
+    const Status status = print(*arguments->help);
+    return status ? 0 : fail(status.error());
+  }
+  Result<Job> read = read_job_options(kExtrudeKeys, *arguments);
+  if (!read) return fail(read.error());
+  Job& job = *read;
+  job.dry_run = arguments->has("--dry-run");
+  job.json = arguments->has("--json");
+  job.quiet = arguments->has("--quiet");
+  if (!arguments->has("--job")) {
+    // A job file says everything; a command line may leave to the printer what a powder job has other defaults for.
+    const auto profile = resolve_extruder(job);
+    if (!profile) return fail(profile.error());
+    if (!arguments->has("--walls") && !sets(*arguments, "fill.walls")) job.fill.all.walls = 1;
+    if (!arguments->has("--layer") && !sets(*arguments, "layers.thickness_mm") && !sets(*arguments, "heights.") &&
+        !arguments->has("--thickness")) {
+      job.layer_mm = profile->machine.format == "sml" && !profile->machine.sml.pd.empty()
+                         ? profile->machine.sml.pd.front().thickness_mm
+                         : profile->machine.material.nozzle_mm / 2;
+    }
+  }
+  if (job.segment.all.on && job.fill.all.pattern == infill::Pattern::kNone) job.fill.all.pattern = infill::Pattern::kRaster;
+  if (job.output.empty() && !job.dry_run)
+    return fail({Fault::kUsage, "-o FILE is missing; name the file for the toolpaths, or use --dry-run"});
+  std::error_code ignored;
+  if (std::filesystem::is_directory(job.output, ignored)) {
+    return fail({Fault::kUsage, fmt::format("-o {}: is a directory; name a file in it, as in {}", job.output,
+                                            (std::filesystem::path(job.output) / "part.gcode").string())});
+  }
+  if (Status status = check_job(job); !status) return fail(status.error());
+  if (arguments->has("--save-job")) {
+    if (Status status = save_job(arguments->text("--save-job"), job); !status) return fail(status.error());
+  }
+  const std::atomic<bool>& cancel = watch_for_interrupts();
+  Progress progress(job.quiet ? Progress::Style::kSilent : is_terminal() ? Progress::Style::kBar : Progress::Style::kLines);
+  const Result<ExtrudeSummary> summary = run_extrude(
+      job, [&](const ProgressEvent& event) { progress(event); }, cancel);
+  progress.clear();
+  if (!summary) return fail(summary.error());
+  if (!job.quiet) say_text(extrude_summary_text(job, *summary));
+  if (job.json) {
+    if (Status status = print(extrude_summary_json(job, *summary)); !status) return fail(status.error());
+  }
+  return 0;
+}
+
+}  // namespace lamina::pipeline

@@ -1,0 +1,153 @@
+#include <fmt/format.h>
+
+#include <chrono>
+
+#include "pipeline/cli/command.h"
+#include "pipeline/cli/console.h"
+#include "pipeline/cli/keys.h"
+#include "pipeline/job/file.h"
+#include "pipeline/plan/heights.h"
+#include "pipeline/plan/heights_study.h"
+#include "pipeline/show/heights_plot.h"
+#include "pipeline/text/key_text.h"
+#include "stages/write/atomic_file.h"
+
+namespace lamina::pipeline {
+namespace {
+
+const KeyChoice kHeightsCommandKeys = {"layers", "heights", "load", "part"};
+
+enum class Form { kText, kCsv, kJson, kRp3 };
+constexpr Word<Form> kForms[] = {{"text", Form::kText}, {"csv", Form::kCsv}, {"json", Form::kJson}, {"rp3", Form::kRp3}};
+
+CommandSpec heights_spec() {
+  CommandSpec spec;
+  spec.name = "heights";
+  spec.summary =
+      "Decides the layers of parts and tells them: bottom, thickness, reason, steepest angle and the step that is left.\n"
+      "lamina jet and lamina slice decide with the same options in the same way.";
+  spec.operand = "PART";
+  spec.operand_meaning = "STL, OBJ or 3MF files, STL and OBJ gzipped too; they replace the parts of --job";
+  add_key_options(kHeightsCommandKeys, spec);
+  for (const auto& [flag, value, meaning] :
+       {std::tuple{"--format", "FORMAT", "text, csv, json, or rp3 as in Lima (2009)"},
+        {"-o,--output", "FILE", "write the table there instead of to stdout"},
+        {"--compare", "", "all ways with these thicknesses and limits, one line each"},
+        {"--measure", "FILE", "measure layers that somebody else decided: tops in mm, one a line"},
+        {"--plot", "FILE", "draw thickness against height beside the part, as .svg or .png"}}) {
+    spec.options.push_back({flag, value, meaning, "", "Table"});
+  }
+  spec.options.push_back({"--quiet", "", "say nothing but errors beside the table", "", "Table"});
+  spec.closing =
+      "Examples:\n"
+      "  lamina heights boat.3mf --heights optimal --thickness 0.05..0.3 --cusp 0.1\n"
+      "  lamina heights boat.3mf --thickness 0.05..0.3 --cusp 0.1 --compare\n"
+      "  lamina heights part.stl --heights angle --thickness 0.178,0.254 --facets plane --format rp3\n"
+      "  lamina heights part.stl --heights optimal --thickness 0.1,0.2 --plot heights.svg";
+  return spec;
+}
+
+Status tell(const std::string& path, const std::string& text) {
+  return path.empty() ? print(text) : write::write_file(path, std::as_bytes(std::span(text)));
+}
+
+Result<Job> job_of(const Arguments& arguments) {
+  Result<Job> read = read_job_options(kHeightsCommandKeys, arguments);
+  if (!read) return read;
+  if (read->parts.empty()) return Error{Fault::kUsage, "no part to look at; name one or more STL, OBJ or 3MF files"};
+  // Heights do not depend on where parts stand or whether the bed is large enough.
+  read->bed_mm = {kMostMm, kMostMm};
+  read->dry_run = true;
+  // Comparing and measuring need no way of their own.
+  const bool own_way = arguments.has("--compare") || arguments.has("--measure") || read->heights.per_part;
+  if (own_way && read->heights.mode == heights::Mode::kUniform && !read->heights.thickness_mm.empty()) {
+    read->heights.mode = heights::Mode::kOptimal;
+  }
+  if (Status status = check_job(*read); !status) return status.error();
+  return read;
+}
+
+// A file of this form holds one table and no name for it.
+Status check_one_table(const Job& job, const Arguments& arguments) {
+  const bool many = arguments.all("--measure").size() > 1;
+  if (!arguments.has("--compare") && !job.heights.per_part && !many) return {};
+  return Error{Fault::kUsage,
+               fmt::format("--format rp3: holds one table, and {} makes several; leave it out or choose text, csv or json",
+                           arguments.has("--compare") ? "--compare"
+                           : job.heights.per_part     ? "--per-part"
+                                                      : "more than one --measure")};
+}
+
+std::string rp3_of(const Job& job, const HeightsStudy& study) {
+  write::rp3::Settings settings;
+  settings.shrink = job.parts.front().shrink;
+  settings.rotation_deg = job.parts.front().rotate_deg;
+  return heights_rp3(study, {0, static_cast<std::uint32_t>(study.boundaries.size() - 1)}, settings);
+}
+
+}  // namespace
+
+int run_heights_command(const std::vector<std::string>& texts) {
+  const Result<Arguments> arguments = read_arguments(heights_spec(), texts);
+  if (!arguments) return fail(arguments.error());
+  if (arguments->help) {
+    const Status status = print(*arguments->help);
+    return status ? 0 : fail(status.error());
+  }
+  const std::string output = arguments->text("-o,--output"), plot = arguments->text("--plot");
+  Form form = Form::kText;
+  if (arguments->has("--format")) {
+    if (const std::string wrong = read_word(kForms, arguments->text("--format"), form); !wrong.empty()) {
+      return fail({Fault::kUsage, "--format: " + wrong});
+    }
+  }
+  if (const Status status = check_plot_name(plot); !status) return fail(status.error());
+  const Result<Job> job = job_of(*arguments);
+  if (!job) return fail(job.error());
+  if (form == Form::kRp3) {
+    if (Status status = check_one_table(*job, *arguments); !status) return fail(status.error());
+  }
+  if (arguments->has("--save-job")) {
+    if (Status status = save_job(arguments->text("--save-job"), *job); !status) return fail(status.error());
+  }
+  const auto start = std::chrono::steady_clock::now();
+  const Result<Scene> scene = load_scene(*job);
+  const std::chrono::duration<double> load = std::chrono::steady_clock::now() - start;
+  if (!scene) return fail(scene.error());
+
+  std::vector<HeightsStudy> studies;
+  if (arguments->has("--compare") || job->heights.per_part) {
+    Result<std::vector<HeightsStudy>> all =
+        arguments->has("--compare") ? study_all_ways(*job, *scene) : study_per_part(*job, *scene);
+    if (!all) return fail(all.error());
+    studies = std::move(*all);
+  } else if (!arguments->has("--measure")) {
+    Result<HeightsStudy> study = study_heights(*job, *scene);
+    if (!study) return fail(study.error());
+    studies.push_back(std::move(*study));
+  }
+  for (const std::string& path : arguments->all("--measure")) {
+    Result<HeightsStudy> study = study_table(*job, *scene, path);
+    if (!study) return fail(study.error());
+    studies.push_back(std::move(*study));
+  }
+
+  const HeightsStudy& last = studies.back();
+  std::string text;
+  if (form == Form::kJson)
+    text = heights_json(*job, *scene, studies);
+  else if (form == Form::kCsv)
+    text = heights_csv(*scene, studies);
+  else if (form == Form::kRp3)
+    text = rp3_of(*job, last);
+  else
+    text = studies.size() > 1 ? comparison_page(studies) : heights_page(*job, *scene, last);
+  if (Status status = tell(output, text); !status) return fail(status.error());
+  if (studies.size() == 1 && !arguments->has("--quiet")) {
+    say(fmt::format("time      load {:.4f} s, surface {:.4f} s, layers {:.4f} s, measuring them {:.4f} s", load.count(),
+                    last.index_seconds, last.plan_seconds, last.evaluate_seconds));
+  }
+  return plot.empty() ? 0 : draw_heights(plot, *job, *scene, last);
+}
+
+}  // namespace lamina::pipeline

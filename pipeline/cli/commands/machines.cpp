@@ -1,0 +1,87 @@
+#include <fmt/format.h>
+
+#include "pipeline/cli/command.h"
+#include "pipeline/cli/console.h"
+#include "pipeline/machine/powder_printer.h"
+#include "pipeline/machine/printer_profile.h"
+#include "stages/program/head_grid.h"
+#include "stages/program/orientation_target.h"
+#include "stages/write/atomic_file.h"
+#include "stages/write/program/dialect.h"
+
+namespace lamina::pipeline {
+namespace {
+
+CommandSpec machines_spec() {
+  CommandSpec spec;
+  spec.name = "machines";
+  spec.summary =
+      "Lists the powder printers whose print programs lamina jet can write, and explains what follows from a profile:\n"
+      "dpi across and along the scan, lag from nozzle to nozzle, swaths, highest speed, time and bytes of a layer.";
+  spec.operand = "NAME|FILE";
+  spec.operand_meaning = "machines to explain, the same as --check";
+  spec.options = {{"--check", "NAME|FILE", "explain this machine; a profile is a TOML file", "", ""},
+                  {"--show", "NAME|FILE", "print the whole profile, every key of it, to be changed and saved", "", ""},
+                  {"--dialects", "", "list the dialects that programs can be written in", "", ""},
+                  {"--target", "STL", "write a part whose print shows which way x, y and up are", "", ""}};
+  spec.closing =
+      "Examples:\n"
+      "  lamina machines\n"
+      "  lamina machines --check nuferbj\n"
+      "  lamina machines --show nuferbj > mine.toml\n"
+      "  lamina jet part.stl --machine mine.toml -o out";
+  return spec;
+}
+
+int run(const Arguments& arguments) {
+  if (arguments.has("--target")) {
+    const auto part = program::orientation_target();
+    if (Status status = write::write_file(arguments.text("--target"), part); !status) return fail(status.error());
+    say(
+        fmt::format("{}: an F of 20 x 30 mm: its stem lies along +y, its arms point to +x, a step of 1 mm on top lies at its "
+                    "foot; read mirrored or turned, so is the machine",
+                    arguments.text("--target")));
+    return 0;
+  }
+  std::string text;
+  if (arguments.has("--dialects")) {
+    for (const write::Dialect& dialect : write::dialects()) text += fmt::format("{:<12}{}\n", dialect.id, dialect.description);
+  }
+  for (const std::string& name : arguments.all("--show")) {
+    const Result<Machine> machine = find_machine(name);
+    if (!machine) return fail(machine.error());
+    text += machine_text(*machine);
+  }
+  std::vector<std::string> checked = arguments.all("--check");
+  checked.insert(checked.end(), arguments.operands.begin(), arguments.operands.end());
+  for (const std::string& name : checked) {
+    const Result<Machine> machine = find_machine(name);
+    if (!machine) return fail(machine.error());
+    const auto resolved = resolve_profile(*machine);
+    if (!resolved) return fail(resolved.error());
+    text += (text.empty() ? "" : "\n") + program::explain(resolved->machine, resolved->grid);
+  }
+  if (text.empty()) {
+    for (const ShippedMachine& shipped : shipped_machines()) {
+      const Result<Machine> machine = read_machine(shipped.text, std::string(shipped.name));
+      if (!machine) return fail(machine.error());
+      text += fmt::format("{:<16}{}\n", shipped.name, machine->description);
+    }
+  }
+  const Status status = print(text);
+  return status ? 0 : fail(status.error());
+}
+
+}  // namespace
+
+int run_machines_command(const std::vector<std::string>& texts) {
+  const Result<Arguments> arguments = read_arguments(machines_spec(), texts);
+  if (!arguments) return fail(arguments.error());
+  if (arguments->help) {
+    const Status status = print(*arguments->help);
+    return status ? 0 : fail(status.error());
+  }
+  return run(*arguments);
+}
+
+}  // namespace lamina::pipeline

@@ -1,0 +1,56 @@
+#include <fmt/format.h>
+
+#include "pipeline/cli/command.h"
+#include "pipeline/cli/console.h"
+#include "pipeline/output/merge.h"
+#include "pipeline/text/json_text.h"
+
+namespace lamina::pipeline {
+namespace {
+
+CommandSpec merge_spec() {
+  CommandSpec spec;
+  spec.name = "merge";
+  spec.summary =
+      "Joins the shards of a job, from one or several directories, into the directory of a job that was never divided:\n"
+      "its manifest.json is the same byte for byte. Layers are linked, or copied to another file system.";
+  spec.operand = "DIR";
+  spec.operand_meaning = "directories that lamina jet --shard or --layers wrote";
+  spec.options = {{"-o,--output", "OUT", "directory of the whole job; may be one of DIR", "", ""},
+                  {"--json", "", "print one JSON object on stdout", "", ""},
+                  {"--quiet", "", "say nothing but errors", "", ""}};
+  spec.closing =
+      "Examples:\n"
+      "  for i in 1 2 3 4; do lamina jet part.stl --shard $i/4 -o out; done; lamina merge out -o out\n"
+      "  lamina merge machine-a/out machine-b/out -o whole && lamina verify whole";
+  return spec;
+}
+
+}  // namespace
+
+int run_merge_command(const std::vector<std::string>& texts) {
+  const Result<Arguments> arguments = read_arguments(merge_spec(), texts);
+  if (!arguments) return fail(arguments.error());
+  if (arguments->help) {
+    const Status status = print(*arguments->help);
+    return status ? 0 : fail(status.error());
+  }
+  if (arguments->operands.empty()) return fail({Fault::kUsage, "no directory to merge; name those of the shards"});
+  const std::string output = arguments->text("-o,--output");
+  if (output.empty()) return fail({Fault::kUsage, "-o OUT is missing; name the directory of the whole job"});
+  const Result<MergeReport> report = merge(arguments->operands, output);
+  if (!report) return fail(report.error());
+  if (!arguments->has("--quiet")) {
+    say(fmt::format("{}: {} layers of {} shards joined, {} files linked, {} copied", report->output,
+                    readable_count(report->layers), report->shards, report->linked, report->copied));
+  }
+  if (arguments->has("--json")) {
+    const Status status = print(
+        fmt::format("{{\"command\":\"merge\",\"directory\":{},\"shards\":{},\"layers\":{},\"linked\":{},\"copied\":{}}}\n",
+                    json_string(report->output), report->shards, report->layers, report->linked, report->copied));
+    if (!status) return fail(status.error());
+  }
+  return 0;
+}
+
+}  // namespace lamina::pipeline

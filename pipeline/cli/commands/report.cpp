@@ -1,0 +1,77 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <span>
+
+#include "pipeline/cli/command.h"
+#include "pipeline/cli/console.h"
+#include "pipeline/show/report.h"
+#include "pipeline/text/number_text.h"
+#include "stages/write/atomic_file.h"
+
+namespace lamina::pipeline {
+namespace {
+
+CommandSpec report_spec() {
+  CommandSpec spec;
+  spec.name = "report";
+  spec.summary =
+      "Writes one HTML page about a finished job: its layers to leaf, zoom and pan through, the parts from three sides,\n"
+      "area, thickness and time over the height, warnings, the job and all hashes. The page needs no network and no other file.";
+  spec.operand = "DIR";
+  spec.operand_meaning = "finished directory of lamina jet";
+  spec.options = {
+      {"-o,--output", "HTML", "the page; its name ends in .html or .htm", "", ""},
+      {"--most-bytes", "SIZE", "layers are left out evenly until the page is smaller", "19M", ""},
+      {"--parts", "DIR", "where the part files are, for the views from three sides; a file, or several times", "", ""},
+      {"--quiet", "", "say nothing but errors", "", ""}};
+  spec.closing =
+      "Examples:\n"
+      "  lamina report out -o report.html\n"
+      "  lamina report out -o report.html --parts parts/      the parts themselves from three sides\n"
+      "  lamina report out -o small.html --most-bytes 2M      for a mail";
+  return spec;
+}
+
+/// Whether a browser opens a file of this name as a page. A page under the name of a part, an image or a manifest would
+/// replace it.
+bool is_page_name(const std::string& path) {
+  std::string ending = std::filesystem::path(path).extension().string();
+  std::ranges::transform(ending, ending.begin(), [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return ending == ".html" || ending == ".htm";
+}
+
+}  // namespace
+
+int run_report_command(const std::vector<std::string>& texts) {
+  const Result<Arguments> arguments = read_arguments(report_spec(), texts);
+  if (!arguments) return fail(arguments.error());
+  if (arguments->help) {
+    const Status status = print(*arguments->help);
+    return status ? 0 : fail(status.error());
+  }
+  if (arguments->operands.size() != 1) return fail({Fault::kUsage, "name one finished directory of lamina jet"});
+  const std::string output = arguments->text("-o,--output");
+  if (output.empty()) return fail({Fault::kUsage, "-o HTML is missing; name the page"});
+  if (!is_page_name(output)) {
+    return fail({Fault::kUsage, fmt::format("-o {}: the page is HTML; give it a name that ends in .html", output)});
+  }
+  ReportOptions options;
+  if (arguments->has("--most-bytes")) {
+    const std::string wrong = read_bytes(arguments->text("--most-bytes"), options.size_limit);
+    if (!wrong.empty()) return fail({Fault::kUsage, "--most-bytes: " + wrong});
+  }
+  options.parts = arguments->all("--parts");
+  const Result<Report> report = make_report(arguments->operands.front(), options);
+  if (!report) return fail(report.error());
+  if (Status status = write::write_file(output, std::as_bytes(std::span(report->page))); !status) return fail(status.error());
+  if (!arguments->has("--quiet")) {
+    say(fmt::format("{}: {} of {} layers to look at, {}", output, report->held, report->layers,
+                    readable_bytes(report->page.size())));
+    if (!report->without_parts.empty()) say("views are of the layers: " + report->without_parts);
+  }
+  return 0;
+}
+
+}  // namespace lamina::pipeline

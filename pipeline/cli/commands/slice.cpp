@@ -1,0 +1,82 @@
+#include <fmt/format.h>
+
+#include "pipeline/cli/command.h"
+#include "pipeline/cli/console.h"
+#include "pipeline/cli/keys.h"
+#include "pipeline/flow/interrupt.h"
+#include "pipeline/flow/progress.h"
+#include "pipeline/job/file.h"
+#include "pipeline/output/slice_directory.h"
+#include "pipeline/run/slice.h"
+
+namespace lamina::pipeline {
+namespace {
+
+const KeyChoice kSliceKeys = {"bed.size_mm", "layers",     "heights",    "place", "image.fill", "load", "run.output",
+                              "run.threads", "run.memory", "run.layers", "slice", "fill",       "part"};
+
+CommandSpec slice_spec() {
+  CommandSpec spec;
+  spec.name = "slice";
+  spec.summary =
+      "Cuts parts into layers: closed contours in exact nanometres, outer ones counter-clockwise, holes clockwise, as\n"
+      "SVG, CLI or 3MF slices, and fills them if a pattern or walls are asked for.";
+  spec.operand = "PART";
+  spec.operand_meaning = "STL, OBJ or 3MF files, STL and OBJ gzipped too; they replace the parts of --job";
+  add_key_options(kSliceKeys, spec);
+  spec.absent = {{"--shard", kNoShards}};
+  for (const auto& [flag, meaning] : {std::pair{"--overwrite", "replace an earlier job in the directory"},
+                                      {"--dry-run", "load, place and index, write nothing"},
+                                      {"--json", "print the summary as one JSON object on stdout"},
+                                      {"--quiet", "say nothing but errors"}}) {
+    spec.options.push_back({flag, "", meaning, "", "Run"});
+  }
+  spec.closing =
+      "Lengths are mm, angles degrees. Keys of a filling that have no option are set by --set fill.KEY=VALUE, between\n"
+      "heights by fill.by_height, for one part by part.fill; docs/filling.md has all of them.\n\n"
+      "Examples:\n"
+      "  lamina slice bracket.stl --layer 0.1 -o out                      out/bracket.svg\n"
+      "  lamina slice bracket.stl --layer 0.05 --format cli-binary -o out\n"
+      "  lamina slice a.stl b.stl --layer 0.2 --format 3mf -o out\n"
+      "  lamina slice part.stl --layer 0.3 --walls 1 --pattern raster --bead 0.4 --bead-gap 0.12 --angle 90 -o out\n"
+      "  lamina slice part.stl --layer 0.3 --pattern raster --stagger 0,0.26 --gap-formula '0.1+0.6*h' -o out";
+  return spec;
+}
+
+}  // namespace
+
+int run_slice_command(const std::vector<std::string>& texts) {
+  const Result<Arguments> arguments = read_arguments(slice_spec(), texts);
+  if (!arguments) return fail(arguments.error());
+  if (arguments->help) {
+    const Status status = print(*arguments->help);
+    return status ? 0 : fail(status.error());
+  }
+  Result<Job> read = read_job_options(kSliceKeys, *arguments);
+  if (!read) return fail(read.error());
+  Job& job = *read;
+  job.overwrite = arguments->has("--overwrite");
+  job.dry_run = arguments->has("--dry-run");
+  job.json = arguments->has("--json");
+  job.quiet = arguments->has("--quiet");
+  if (Status status = check_job(job); !status) return fail(status.error());
+  if (arguments->has("--save-job")) {
+    if (Status status = save_job(arguments->text("--save-job"), job); !status) return fail(status.error());
+  }
+  if (!job.dry_run) {
+    if (Status status = check_slice_output(job); !status) return fail(status.error());
+  }
+  const std::atomic<bool>& cancel = watch_for_interrupts();
+  Progress progress(job.quiet ? Progress::Style::kSilent : is_terminal() ? Progress::Style::kBar : Progress::Style::kLines);
+  const Result<SliceSummary> summary = run_slice(
+      job, [&](const ProgressEvent& event) { progress(event); }, cancel);
+  progress.clear();
+  if (!summary) return fail(summary.error());
+  if (!job.quiet) say_text(slice_summary_text(job, *summary));
+  if (job.json) {
+    if (Status status = print(slice_summary_json(job, *summary)); !status) return fail(status.error());
+  }
+  return 0;
+}
+
+}  // namespace lamina::pipeline

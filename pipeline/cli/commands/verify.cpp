@@ -1,0 +1,116 @@
+#include <fmt/format.h>
+
+#include "pipeline/check/verify.h"
+#include "pipeline/cli/command.h"
+#include "pipeline/cli/console.h"
+#include "pipeline/text/json_text.h"
+
+namespace lamina::pipeline {
+namespace {
+
+CommandSpec verify_spec() {
+  CommandSpec spec;
+  spec.name = "verify";
+  spec.summary =
+      "Compares a job's directory with its manifest: every layer's file is there, of the recorded size and hash, and\n"
+      "decodes to the recorded pixels; the print program of each layer, carried out by a virtual machine, prints exactly\n"
+      "that image; nothing else lies in layers/ and program/. Contours: every layer's bytes have the recorded hash.\n"
+      "Exit code 5 if anything differs.";
+  spec.operand = "DIR";
+  spec.operand_meaning = "directory that lamina jet or lamina slice wrote; several are verified one after another";
+  spec.options = {{"--quick", "", "sizes and hashes only, images are not decoded", "", ""},
+                  {"--json", "", "print one JSON object for each directory on stdout", "", ""},
+                  {"--quiet", "", "say nothing but faults", "", ""}};
+  spec.closing =
+      "Examples:\n"
+      "  lamina verify out\n"
+      "  lamina verify --quick --json out | jq .fault_count";
+  return spec;
+}
+
+std::string replay_json(const VerifyReport& report) {
+  if (report.machine.empty()) return {};
+  const ReplayCount& replay = report.replay;
+  return fmt::format(
+      ",\"replay\":{{\"machine\":{},\"layers\":{},\"drops\":{},\"vectors\":{},\"sweeps\":{},\"moved\":{},\"lost\":{},"
+      "\"coverage\":{},\"seconds\":{},\"scan_mm\":{},\"travel_mm\":{},\"fed_mm\":[{},{}],\"binder_mm3\":{},"
+      "\"powder_mm3\":{},\"farthest_along_um\":{},\"farthest_across_um\":{}}}",
+      json_string(report.machine), report.replayed, replay.drops, replay.vectors, replay.sweeps, report.moved, report.lost,
+      report.coverage, replay.seconds, replay.scan_mm, replay.travel_mm, replay.fed_mm[0], replay.fed_mm[1], report.binder_mm3,
+      report.powder_mm3, replay.farthest_along_um, replay.farthest_across_um);
+}
+
+// What the machine does, for people.
+void say_replay(const VerifyReport& report) {
+  if (report.machine.empty() || report.replayed == 0) return;
+  const ReplayCount& replay = report.replay;
+  say(fmt::format(
+      "programs  {} layers replayed on {}: {}, {} drops in {} sweeps, {:.3f} % of the bed", readable_count(report.replayed),
+      report.machine,
+      report.moved + report.lost > 0 ? "every pixel fired once but those of blocked nozzles" : "every pixel fired once",
+      readable_count(replay.drops), readable_count(replay.sweeps), 100 * report.coverage));
+  if (report.moved + report.lost > 0) {
+    say(fmt::format("blocked   {} pixels fired by a neighbouring nozzle, {} not at all, as recorded",
+                    readable_count(report.moved), readable_count(report.lost)));
+  }
+  say(fmt::format("places    drops land up to {:.2f} um along and {:.2f} um across the scan from the centre of their pixel",
+                  replay.farthest_along_um, replay.farthest_across_um));
+  if (replay.travel_mm == 0 && replay.fed_mm[0] == 0 && replay.fed_mm[1] == 0) {
+    // Words for the head alone: whoever drives the axes decides the rest.
+    say(fmt::format("machine   {:.1f} m scanned in {}; this dialect does not tell other movements nor powder",
+                    replay.scan_mm / 1000, readable_seconds(replay.seconds)));
+    say(fmt::format("material  {:.3f} ml of binder", report.binder_mm3 / 1000));
+    return;
+  }
+  if (replay.seconds > 0) {
+    say(fmt::format("machine   {:.2f} h, {:.1f} m scanned, {:.1f} m other travel", replay.seconds / 3600, replay.scan_mm / 1000,
+                    replay.travel_mm / 1000));
+  }
+  say(fmt::format("material  {:.3f} ml of binder, {:.2f} cm3 of powder fed (solid), {:.2f} and {:.2f} mm of the vats",
+                  report.binder_mm3 / 1000, report.powder_mm3 / 1000, replay.fed_mm[0], replay.fed_mm[1]));
+}
+
+std::string report_json(const VerifyReport& report) {
+  std::string faults;
+  for (const std::string& fault : report.faults) faults += (faults.empty() ? "" : ",") + json_string(one_line(fault));
+  return fmt::format(
+      "{{\"command\":\"verify\",\"directory\":{},\"ok\":{},\"layers\":{},\"bytes\":{},\"fault_count\":{},\"faults\":[{}]{}}}\n",
+      json_string(report.directory), report.ok(), report.layers, report.bytes, report.fault_count, faults, replay_json(report));
+}
+
+}  // namespace
+
+int run_verify_command(const std::vector<std::string>& texts) {
+  const Result<Arguments> arguments = read_arguments(verify_spec(), texts);
+  if (!arguments) return fail(arguments.error());
+  if (arguments->help) {
+    const Status status = print(*arguments->help);
+    return status ? 0 : fail(status.error());
+  }
+  if (arguments->operands.empty())
+    return fail({Fault::kUsage, "no directory to verify; name one that lamina jet or lamina slice wrote"});
+  int code = 0;
+  for (const std::string& directory : arguments->operands) {
+    const Result<VerifyReport> report = verify(directory, {.quick = arguments->has("--quick")});
+    if (!report) {
+      code = std::max(code, fail(report.error()));
+      continue;
+    }
+    for (const std::string& fault : report->faults) say(fmt::format("lamina: {}: {}", directory, fault));
+    if (report->fault_count > report->faults.size()) {
+      say(fmt::format("lamina: {}: and {} more", directory, report->fault_count - report->faults.size()));
+    }
+    if (!report->ok()) code = std::max(code, static_cast<int>(Fault::kVerification));
+    if (report->ok() && !arguments->has("--quiet")) {
+      say(fmt::format("{}: {} layers, {}, all as the manifest says", directory, readable_count(report->layers),
+                      readable_bytes(report->bytes)));
+      say_replay(*report);
+    }
+    if (arguments->has("--json")) {
+      if (Status status = print(report_json(*report)); !status) return fail(status.error());
+    }
+  }
+  return code;
+}
+
+}  // namespace lamina::pipeline

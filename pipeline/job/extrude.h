@@ -1,0 +1,85 @@
+// pipeline/job/extrude.h: how a job is extruded: sections [extrude] and [segment].
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "pipeline/job/fill.h"
+#include "stages/data/status.h"
+#include "stages/segment/calibration.h"
+#include "stages/segment/expand.h"
+#include "stages/segment/predict.h"
+
+namespace lamina::pipeline {
+
+/// The keys of one segmentation, lengths in mm. What is absent follows from the machine's calibration.
+struct SegmentSettings {
+  bool on = false;
+  segment::CutRule rule = segment::CutRule::kAligned;
+  double thick_mm = 1.5, thin_mm = 1.5;
+  std::optional<double> least_end_mm;  // absent: half of thick_mm
+  std::uint32_t continuous = 1;
+  std::int32_t first = 0;
+  std::optional<double> spacing_sc_mm, spacing_cc_mm;  // centre to centre
+  double gap_mm = 0;                                   // wanted between beads, for spacings that are not given
+  double thick_extrusion = 100;
+  std::optional<double> thin_extrusion;  // absent: as the thick one
+  std::optional<double> thick_speed;     // absent: by the extrusion
+  double thin_speed = 200;
+  std::vector<double> thin_speed_sweep, thin_extrusion_sweep;  // of segmented lines, in turn; test pieces of a calibration
+  std::optional<double> thick_width_mm, thin_width_mm, continuous_width_mm;  // that beads will have
+  bool one_direction = true;
+  std::vector<double> shift_mm{0};  // pores are moved along the lines by these, layer by layer in turn
+  bool across = false;              // the grid begins so that pores of a layer turned by 90 degrees lie on the same places
+};
+
+/// Section [segment].
+struct SegmentRequest {
+  SegmentSettings all;
+  std::string by_height;  // "0:2.7 thin_mm=2; 2.7:3 on=false": other keys from one height to another
+};
+
+/// One key of a segmentation.
+struct SegmentKey {
+  std::string_view name, flag, value, meaning;
+  std::string (*read)(std::string_view text, SegmentSettings& settings);
+  std::string (*write)(const SegmentSettings& settings);
+  KeyForm form;
+  std::string_view switch_text;
+};
+std::span<const SegmentKey> segment_settings_keys();
+
+/// Section [extrude]: what a job changes of its machine, and where material goes to.
+struct ExtrudeRequest {
+  std::optional<double> flow, nozzle_degc, bed_degc, print_mm_s, wall_mm_s, first_layer_mm_s, travel_mm_s, retraction_mm,
+      fan_percent;
+  std::optional<bool> relative_extrusion;
+  std::string set;  // "fan.from_layer=2; bed.corner_mm=-110,-110": any other key of the machine's profile
+};
+
+/// Segmentation of a range of heights, resolved.
+struct SegmentRange {
+  std::int64_t from = 0, to = INT64_MAX;  // nm above the part's bottom: layers whose middle is in [from, to)
+  SegmentSettings settings;
+  segment::Segmentation plan;
+};
+
+/// What is segmented at each height, and the fillings that this asks for.
+struct SegmentPlan {
+  SegmentRange base;
+  std::vector<SegmentRange> ranges;  // in order, none overlaps another
+
+  const SegmentRange& at(std::int64_t height) const;
+  bool any() const;
+};
+
+/// The plan, and in `fill` the distances between lines that follow from it, unless they are given there.
+/// bead_mm  reference width
+/// errors   kUsage, one line that begins with the key
+Result<SegmentPlan> plan_segments(const SegmentRequest& request, const segment::Calibration& calibration, FillRequest& fill);
+
+}  // namespace lamina::pipeline

@@ -1,0 +1,65 @@
+#include "pipeline/job/job.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "pipeline/job/keys.h"
+#include "pipeline/plan/heights.h"
+
+namespace lamina::pipeline {
+
+PixelGrid grid_of(const Job& job) {
+  if (job.machine.resolved) return job.machine.resolved->grid.image;
+  return {PixelAxis(job.dpi[0], nm_of(job.bed_mm[0])), PixelAxis(job.dpi[1], nm_of(job.bed_mm[1]))};
+}
+
+Status check_job(const Job& job) {
+  if (job.parts.empty()) return Error{Fault::kUsage, "no part to plan; name one or more STL, OBJ or 3MF files"};
+  // A value is right if what it is written as can be read back.
+  Job copy;
+  for (const JobKey& key : job_keys()) {
+    const std::string text = key.write(job);
+    if (text.empty()) continue;
+    if (const std::string wrong = key.read(text, copy); !wrong.empty()) {
+      return Error{Fault::kUsage, fmt::format("{}.{}: {}", key.section, key.name, wrong)};
+    }
+  }
+  for (const PartRequest& part : job.parts) {
+    PartRequest part_copy;
+    for (const PartKey& key : part_keys()) {
+      const std::string text = key.write(part);
+      if (text.empty()) continue;
+      if (const std::string wrong = key.read(text, part_copy); !wrong.empty()) {
+        return Error{Fault::kUsage, fmt::format("{}: {}.{}: {}", part.path, key.section, key.name, wrong)};
+      }
+    }
+  }
+  if (const auto options = heights_options(job); !options) return options.error();
+  if (job.layers && job.shard) {
+    return Error{Fault::kUsage, "--layers and --shard exclude each other; a shard is a share of all layers"};
+  }
+  if (job.resume && job.overwrite) {
+    return Error{Fault::kUsage, "--resume and --overwrite exclude each other; --resume keeps what --overwrite replaces"};
+  }
+  if (job.output.empty() && !job.dry_run) {
+    return Error{Fault::kUsage, "-o DIR is missing; name the directory for the layers, or use --dry-run"};
+  }
+  return {};
+}
+
+Result<std::array<std::uint32_t, 2>> layer_range(const Job& job, std::uint32_t layer_count) {
+  if (job.shard) {
+    const auto [index, shards] = *job.shard;
+    const auto share = [&](std::uint64_t i) { return static_cast<std::uint32_t>(layer_count * i / shards); };
+    return std::array<std::uint32_t, 2>{share(index), share(std::uint64_t{index} + 1)};
+  }
+  if (!job.layers) return std::array<std::uint32_t, 2>{0, layer_count};
+  if ((*job.layers)[0] >= layer_count) {
+    return Error{Fault::kUsage, fmt::format("--layers {}:: the job has {} layers, 0 to {}; begin below that", (*job.layers)[0],
+                                            layer_count, layer_count - 1)};
+  }
+  return std::array<std::uint32_t, 2>{(*job.layers)[0], std::min((*job.layers)[1], layer_count)};
+}
+
+}  // namespace lamina::pipeline

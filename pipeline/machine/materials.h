@@ -1,0 +1,69 @@
+// pipeline/machine/materials.h: the powders of a job: which part is of which, in which vat it is, and which vat feeds a layer.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "pipeline/job/job.h"
+#include "stages/data/machine.h"
+#include "stages/data/status.h"
+#include "stages/data/units.h"
+
+namespace lamina::pipeline {
+
+/// Reads the name of a material: letters, digits, - and _, as it stands in file names too. returns "" or what is wrong
+std::string read_material(std::string_view text, std::string& name);
+
+/// Gives the parts of a job their materials: "steel" to all, or "steel,bronze" one to each in their order.
+/// errors  kUsage: another number of names, or one that is none
+Status set_materials(std::string_view names, Job& job);
+
+/// Another material from a height to the next, in mm above the bottom of a part.
+struct MaterialRange {
+  double from_mm = 0, to_mm = 0;
+  std::string material;
+};
+/// Reads "2:4 bronze; 4:6 steel". Where ranges overlap, the last one counts. returns "" or what is wrong
+std::string read_material_ranges(std::string_view text, std::vector<MaterialRange>& ranges);
+
+/// A powder that parts of a job are of.
+struct JobMaterial {
+  std::string name;       // empty if no part names one
+  std::uint32_t vat = 0;  // of the machine, from 0
+  bool operator==(const JobMaterial&) const = default;
+};
+
+/// What a part is of, at each height.
+struct PartMaterial {
+  struct Range {
+    std::int64_t from, to;  // nm above the bed, [from, to)
+    std::uint32_t material;
+    bool operator==(const Range&) const = default;
+  };
+  std::uint32_t elsewhere = 0;  // number of a material
+  std::vector<Range> ranges;
+  std::uint32_t at(Nm plane) const;
+  bool operator==(const PartMaterial&) const = default;
+};
+
+struct Materials {
+  std::vector<JobMaterial> used{{}};  // at least one; by vat, or without a machine in the order of the parts
+  std::vector<PartMaterial> part;     // one for each part of the job
+  bool several() const { return used.size() > 1; }
+};
+
+/// The materials of a job whose machine is resolved, if it has one. No part, or every part names its own. They have to be
+/// those of the vats (powder.materials); vats without names take them in the order in which parts name them.
+/// errors  kUsage: a part without a material among others, a name that no vat has, more materials than vats
+Result<Materials> materials_of(const Job& job);
+
+/// The vats that feed a layer with so many pixels of each material: that of its only material; for a layer of several by
+/// the machine's rule, the first one on a tie; for an empty layer that of the job's first material.
+/// errors  kUsage by the rule `refuse`; what follows "layer 12"
+Result<std::vector<std::uint32_t>> vats_of_layer(const Machine& machine, const Materials& materials,
+                                                 std::span<const std::uint64_t> pixels);
+
+}  // namespace lamina::pipeline

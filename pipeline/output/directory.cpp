@@ -1,0 +1,230 @@
+#include "pipeline/output/directory.h"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <charconv>
+#include <cstring>
+#include <filesystem>
+#include <tuple>
+
+#include "pipeline/output/manifest.h"
+#include "pipeline/text/number_text.h"
+#include "stages/write/image_format.h"
+#include "stages/write/program/dialect.h"
+
+namespace lamina::pipeline {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::string_view kPartial = ".part";
+
+bool take_end(std::string_view& text, std::string_view end) {
+  if (!text.ends_with(end)) return false;
+  text.remove_suffix(end.size());
+  return true;
+}
+
+bool is_manifest(std::string_view name, ManifestFile& file) {
+  file = {};
+  file.name = name;
+  file.partial = take_end(name, kPartial);
+  if (name == "manifest.json") return true;
+  if (!name.starts_with("manifest-") || !take_end(name, ".json")) return false;
+  name.remove_prefix(std::string_view("manifest-").size());
+  const std::size_t of = name.find("-of-");
+  if (of == std::string_view::npos) return false;
+  std::array<std::uint32_t, 2> shard{};
+  if (!read_shard(fmt::format("{}/{}", name.substr(0, of), name.substr(of + 4)), shard).empty()) return false;
+  file.shard = shard;
+  return true;
+}
+
+template <class Visit>
+void for_each_entry(const fs::path& directory, Visit visit) {
+  std::error_code error;
+  for (fs::directory_iterator entry(directory, error), end; !error && entry != end; entry.increment(error)) visit(*entry);
+}
+
+// Layers' files of any earlier job, half-written ones too, and all that is in program/ of their print programs.
+std::vector<fs::path> layer_files(const std::string& directory) {
+  std::vector<fs::path> found;
+  for_each_entry(fs::path(directory) / "program", [&](const fs::directory_entry& entry) {
+    std::uint32_t index = 0;
+    bool partial = false;
+    if (read_program_file_name(entry.path().filename().string(), index, partial)) found.push_back(entry.path());
+  });
+  for_each_entry(fs::path(directory) / "layers", [&](const fs::directory_entry& entry) {
+    std::uint32_t index = 0;
+    bool partial = false;
+    if (read_layer_file_name(entry.path().filename().string(), index, partial)) found.push_back(entry.path());
+  });
+  return found;
+}
+
+// What is in program/ beside the layers' programs, of whatever dialect.
+std::vector<fs::path> program_frames(const std::string& directory) {
+  std::vector<fs::path> found;
+  for_each_entry(fs::path(directory) / "program", [&](const fs::directory_entry& entry) {
+    const std::string name = entry.path().filename().string();
+    const bool frame = std::ranges::any_of(write::dialects(), [&](const write::Dialect& one) {
+      return name == fmt::format("start{}", one.extension) || name == fmt::format("end{}", one.extension);
+    });
+    if (frame || name == "machine.toml") found.push_back(entry.path());
+  });
+  return found;
+}
+
+Error cannot(const fs::path& path, int reason) {
+  return {Fault::kOutput, fmt::format("{}: {}", path.string(), std::strerror(reason))};
+}
+
+// A shard beside shards of the same split: they share the directory.
+bool joins(const Job& job, const ManifestFile& file) {
+  return job.shard && file.shard && (*job.shard)[1] == (*file.shard)[1] && (*job.shard)[0] != (*file.shard)[0];
+}
+
+}  // namespace
+
+std::vector<ManifestFile> find_manifests(const std::string& directory) {
+  std::vector<ManifestFile> found;
+  for_each_entry(directory, [&](const fs::directory_entry& entry) {
+    ManifestFile file;
+    if (is_manifest(entry.path().filename().string(), file)) found.push_back(std::move(file));
+  });
+  constexpr std::array<std::uint32_t, 2> kWhole{};
+  std::sort(found.begin(), found.end(), [&](const ManifestFile& a, const ManifestFile& b) {
+    const auto [a_index, a_count] = a.shard.value_or(kWhole);
+    const auto [b_index, b_count] = b.shard.value_or(kWhole);
+    return std::tie(a_count, a_index, a.partial) < std::tie(b_count, b_index, b.partial);
+  });
+  return found;
+}
+
+bool read_layer_file_name(std::string_view name, std::uint32_t& index, bool& partial) {
+  partial = take_end(name, kPartial);
+  const std::size_t digits = std::min(name.find_first_not_of("0123456789"), name.size());
+  if (digits < 6) return false;
+  const auto [stop, error] = std::from_chars(name.data(), name.data() + digits, index);
+  if (error != std::errc()) return false;
+  std::string_view extension = name.substr(digits);
+  if (extension.starts_with('-')) extension.remove_prefix(std::min(extension.find('.'), extension.size()));  // a material
+  return std::ranges::any_of(write::image_formats(), [&](const write::ImageFormat& format) {
+    return !extension.empty() && extension == format.extension;
+  });
+}
+
+bool read_program_file_name(std::string_view name, std::uint32_t& index, bool& partial) {
+  partial = take_end(name, kPartial);
+  const std::size_t digits = std::min(name.find_first_not_of("0123456789"), name.size());
+  if (digits < 6) return false;
+  const auto [stop, error] = std::from_chars(name.data(), name.data() + digits, index);
+  if (error != std::errc()) return false;
+  const std::string_view extension = name.substr(digits);
+  return std::ranges::any_of(write::dialects(), [&](const write::Dialect& one) { return extension == one.extension; });
+}
+
+Status check_output(const Job& job) {
+  std::error_code error;
+  const fs::file_status status = fs::status(job.output, error);
+  if (!fs::exists(status)) return {};
+  if (!fs::is_directory(status)) {
+    return Error{Fault::kOutput, fmt::format("{}: is a file, not a directory; name another one with -o", job.output)};
+  }
+  const std::string own = manifest_name(job);
+  bool shared = false, begun = false;
+  for (const ManifestFile& file : find_manifests(job.output)) {
+    const bool is_own = file.name == own || file.name == own + std::string(kPartial);
+    const auto refuse = [&](std::string_view what, std::string_view advice) {
+      return Error{Fault::kUsage, fmt::format("{}/{}: {}; {}", job.output, file.name, what, advice)};
+    };
+    if (file.partial && !joins(job, file)) {
+      const std::string path = fmt::format("{}/{}", job.output, file.name.substr(0, file.name.size() - kPartial.size()));
+      if (Status busy = check_not_being_written(path); !busy) return busy;
+    }
+    begun |= is_own;
+    if (joins(job, file)) {
+      shared = true;
+    } else if (is_own && !job.resume && !job.overwrite) {
+      if (file.partial) return refuse("an interrupted job", "go on with --resume, or start over with --overwrite");
+      return refuse("a finished job",
+                    "replace it with --overwrite, check and keep it with --resume, or name another "
+                    "directory");
+    } else if (!is_own && (job.shard || !job.overwrite)) {
+      return refuse("a job that was split otherwise",
+                    job.shard ? "name another directory" : "replace it with --overwrite, or name another directory");
+    }
+  }
+  if (!(job.resume && begun) && !job.overwrite && !shared && !layer_files(job.output).empty()) {
+    return Error{Fault::kUsage, fmt::format("{}/layers: holds layers without a manifest; replace them with --overwrite, "
+                                            "or name another directory",
+                                            job.output)};
+  }
+  return {};
+}
+
+Status check_shard_replaces_itself(const Job& job, const ManifestHead& head) {
+  if (!job.shard || !job.overwrite) return {};
+  for (const std::string& name : {manifest_name(job), manifest_name(job) + std::string(kPartial)}) {
+    const std::string path = job.output + "/" + name;
+    if (::access(path.c_str(), F_OK) != 0) continue;
+    const Result<Manifest> earlier = read_manifest(path);
+    if (earlier && earlier->head.id() == head.id()) continue;
+    return Error{Fault::kUsage, fmt::format("{}: is of another job, whose layers a shard cannot clear away; remove {} first, "
+                                            "or name another directory",
+                                            path, job.output)};
+  }
+  return {};
+}
+
+Status prepare_output(const Job& job) {
+  if (Status status = check_output(job); !status) return status;
+  const fs::path directory = job.output, layers = directory / "layers";
+  std::error_code error;
+  fs::create_directories(layers, error);
+  if (error) return cannot(layers, error.value());
+  if (!job.machine.profile.empty()) {
+    fs::create_directories(directory / "program", error);
+    if (error) return cannot(directory / "program", error.value());
+  }
+  if (!fs::is_directory(layers)) {
+    return Error{Fault::kOutput, fmt::format("{}: is a file, not a directory; remove it", layers.string())};
+  }
+  for (const fs::path& place : {directory, layers}) {
+    if (::access(place.c_str(), W_OK | X_OK) != 0) return cannot(place, errno);
+  }
+  if (!job.overwrite) {
+    if (!job.shard) sweep_partial_files(job.output);
+    return {};
+  }
+  for (const ManifestFile& file : find_manifests(job.output)) {
+    if (!joins(job, file)) fs::remove(directory / file.name, error);
+    if (error) return cannot(directory / file.name, error.value());
+  }
+  if (job.shard) return {};
+  std::vector<fs::path> old = layer_files(job.output);
+  for (fs::path& file : program_frames(job.output)) old.push_back(std::move(file));
+  for (const fs::path& file : old) {
+    fs::remove(file, error);
+    if (error) return cannot(file, error.value());
+  }
+  if (job.machine.profile.empty()) fs::remove(directory / "program", error);  // unless something else is in it
+  return {};
+}
+
+void sweep_partial_files(const std::string& directory, std::uint32_t first, std::uint32_t last) {
+  for (const fs::path& file : layer_files(directory)) {
+    std::uint32_t index = 0;
+    bool partial = false;
+    if (!read_layer_file_name(file.filename().string(), index, partial)) {
+      read_program_file_name(file.filename().string(), index, partial);
+    }
+    std::error_code ignored;
+    if (partial && index >= first && index < last) fs::remove(file, ignored);
+  }
+}
+
+}  // namespace lamina::pipeline

@@ -1,0 +1,80 @@
+#include "pipeline/output/print_program.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "pipeline/machine/printer_profile.h"
+#include "pipeline/output/program_file.h"
+#include "stages/write/atomic_file.h"
+
+namespace lamina::pipeline {
+
+std::string program_file_name(std::uint32_t index, std::string_view extension) {
+  return extension.empty() ? std::string() : fmt::format("program/{:06}{}", index, extension);
+}
+
+ProgramFrame program_frame(const ResolvedMachine& resolved, std::uint32_t layers) {
+  ProgramFrame frame;
+  const auto writer = write::find_dialect(resolved.machine.dialect)->make_writer(resolved.machine, resolved.grid);
+  writer->start(layers, frame.start);
+  writer->end(frame.end);
+  return frame;
+}
+
+PrintProgram::PrintProgram(const Job& job, std::uint32_t layers)
+    : resolved_(*job.machine.resolved),
+      dialect_(*write::find_dialect(resolved_.machine.dialect)),
+      directory_(job.output),
+      layers_(layers) {}
+
+std::string PrintProgram::path(std::string_view name) const { return fmt::format("{}/program/{}", directory_, name); }
+
+Status PrintProgram::begin() const {
+  const std::string profile = machine_text(resolved_.machine);
+  if (Status status = write::write_file(path("machine.toml"), std::as_bytes(std::span(profile))); !status) return status;
+  const ProgramFrame frame = program_frame(resolved_, layers_);
+  if (Status status = write::write_file(path(fmt::format("start{}", dialect_.extension)), frame.start); !status) return status;
+  return write::write_file(path(fmt::format("end{}", dialect_.extension)), frame.end);
+}
+
+Status PrintProgram::write_layer(const Layer& layer, const RunsView& image, const std::vector<std::uint32_t>& feeds,
+                                 ProgramWork& work, ProgramRecord& record) const {
+  if (!work.writer) work.writer = dialect_.make_writer(resolved_.machine, resolved_.grid);
+  auto file = ProgramFile::create(directory_ + "/" + program_file_name(layer.index, dialect_.extension));
+  if (!file) return file.error();
+  LayerCycle cycle;
+  cycle.layer = layer.index;
+  cycle.layers = layers_;
+  cycle.bottom_nm = layer.bottom;
+  cycle.thickness_nm = layer.thickness;
+  cycle.feeds = feeds;
+  work.text.clear();
+  work.writer->begin_layer(cycle, work.text);
+  constexpr std::size_t kPiece = 256 << 10;
+  const auto count =
+      program::compile(resolved_.grid, image, work.compile, [&](const Sweep& sweep, const SweepVectors& vectors) -> Status {
+        work.writer->sweep(sweep, vectors, work.text);
+        if (work.text.size() < kPiece) return {};
+        Status status = file->append(work.text);
+        work.text.clear();
+        return status;
+      });
+  if (!count) return count.error();
+  work.writer->end_layer(cycle, work.text);
+  if (Status status = file->append(work.text); !status) return status;
+  const auto digest = file->finish();
+  if (!digest) return digest.error();
+  record = {digest->bytes, digest->hash, count->sweeps - count->skipped, count->drops, count->moved, count->lost};
+  return {};
+}
+
+std::uint64_t PrintProgram::bytes_bound(std::uint64_t changes) const {
+  const HeadGrid& grid = resolved_.grid;
+  // A sweep's vectors and their text, at most three times as long; lines, sorted changes and their steps.
+  const std::uint64_t vectors = grid.steps() * grid.words() * 8;
+  const std::uint64_t turned = grid.scan_axis == ScanAxis::kX ? 4 * changes : 16 * changes;
+  return 4 * vectors + 4 * grid.steps() + 16 * grid.lines + 2 * changes + turned + (512 << 10);
+}
+
+}  // namespace lamina::pipeline

@@ -1,0 +1,67 @@
+// pipeline/output/print_program.h: the print program of a job, one file a layer beside the layer's image.
+//
+// out/program/machine.toml   the machine as it was used: its profile with the job's changes
+//             start.<ext>    what stands before the first layer, and
+//             end.<ext>      behind the last one
+//             000000.<ext>   a layer; it depends on that layer alone, so that jobs can be resumed, sharded and merged
+// The whole program is the concatenation: start, layers in order, end.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <string_view>
+
+#include "pipeline/job/job.h"
+#include "pipeline/output/manifest.h"
+#include "stages/data/layer.h"
+#include "stages/data/runs.h"
+#include "stages/data/status.h"
+#include "stages/program/compile.h"
+#include "stages/write/program/dialect.h"
+
+namespace lamina::pipeline {
+
+/// What a layer's program occupies while it is made; reused by later layers.
+struct ProgramWork {
+  program::CompileScratch compile;
+  std::unique_ptr<write::ProgramWriter> writer;
+  write::ProgramBytes text;
+
+  std::uint64_t bytes() const { return compile.bytes() + bytes_held(text); }
+};
+
+/// The file of a layer's program in a job's directory, program/000042.gcode; "" without a machine.
+std::string program_file_name(std::uint32_t index, std::string_view extension);
+
+/// What the machine is told before the first layer and after the last one.
+struct ProgramFrame {
+  write::ProgramBytes start, end;
+};
+ProgramFrame program_frame(const ResolvedMachine& resolved, std::uint32_t layers);
+
+class PrintProgram {
+ public:
+  /// For a job with a resolved machine, which has to outlive it.
+  explicit PrintProgram(const Job& job, std::uint32_t layers);
+
+  /// Writes machine.toml, start and end. errors  kOutput
+  Status begin() const;
+
+  /// Compiles a layer and writes its file, sweep by sweep. errors  kOutput
+  /// feeds  the vats that it needs
+  Status write_layer(const Layer& layer, const RunsView& image, const std::vector<std::uint32_t>& feeds, ProgramWork& work,
+                     ProgramRecord& record) const;
+
+  /// What write_layer may hold for an image of so many changes.
+  std::uint64_t bytes_bound(std::uint64_t changes) const;
+
+ private:
+  std::string path(std::string_view name) const;
+  const ResolvedMachine& resolved_;
+  const write::Dialect& dialect_;
+  std::string directory_;
+  std::uint32_t layers_;
+};
+
+}  // namespace lamina::pipeline

@@ -1,0 +1,156 @@
+// pipeline/plan/fill.cpp: what a job says of fillings -> parameters of each height.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "pipeline/job/fill.h"
+#include "pipeline/job/job.h"
+#include "pipeline/text/key_text.h"
+#include "stages/infill/fill.h"
+
+namespace lamina::pipeline {
+namespace {
+
+Nm short_nm(double millimetres) { return static_cast<Nm>(nm_of(millimetres)); }
+infill::MicroDegrees micro(double degrees) { return std::llround(degrees * 1e6); }
+
+std::vector<Nm> list_nm(const std::vector<double>& list) {
+  std::vector<Nm> nm;
+  for (const double value : list) nm.push_back(short_nm(value));
+  return nm;
+}
+
+infill::FillParameters parameters_of(const FillSettings& settings) {
+  infill::FillParameters p;
+  p.pattern = settings.pattern;
+  p.width = short_nm(settings.width_mm);
+  p.wall_width = settings.wall_width_mm > 0 ? short_nm(settings.wall_width_mm) : p.width;
+  p.walls = settings.walls;
+  p.loops = settings.loops;
+  p.angle_base = micro(settings.angle_deg);
+  p.angle_step = micro(settings.angle_step_deg);
+  p.build_layers = settings.build_layers;
+  p.gaps = list_nm(settings.gap_mm);
+  p.group = settings.group;
+  if (!settings.gap_by_height.empty()) {
+    for (const std::string_view entry : split(settings.gap_by_height, ",")) {
+      const auto pair = split(entry, ":");  // checked when it was read
+      double z = 0, gap = 0;
+      std::string_view height = pair.front();
+      while (height.starts_with(' ')) height.remove_prefix(1);
+      std::string_view amount = pair.back();
+      while (amount.ends_with(' ')) amount.remove_suffix(1);
+      read_number(height, 0, kMostMm, "", z);
+      read_number(amount, -100, 1000, "", gap);
+      p.gap_table.emplace_back(nm_of(z), short_nm(gap));
+    }
+  }
+  p.gap_expression = settings.gap_formula;
+  p.distances = list_nm(settings.distance_mm);
+  p.stagger = list_nm(settings.stagger_mm);
+  p.stagger_every_layer = settings.stagger_every_layer;
+  if (settings.first_line_mm) p.first_line = short_nm(*settings.first_line_mm);
+  if (settings.end_inset_mm) p.end_inset = short_nm(*settings.end_inset_mm);
+  if (settings.link_mm) p.longest_link = nm_of(*settings.link_mm);
+  p.shortest_line = short_nm(settings.shortest_mm);
+  p.cell = short_nm(settings.cell_mm);
+  return p;
+}
+
+std::string_view trimmed(std::string_view text) {
+  while (text.starts_with(' ')) text.remove_prefix(1);
+  while (text.ends_with(' ')) text.remove_suffix(1);
+  return text;
+}
+
+/// A key as a job file and a command line name it.
+std::string named(std::string_view name) {
+  for (const FillKey& key : fill_settings_keys()) {
+    if (key.name == name && !key.flag.empty()) return fmt::format("fill.{} ({})", name, key.flag);
+  }
+  return fmt::format("fill.{}", name);
+}
+
+/// Keys that cannot both hold. returns "" or what is wrong
+std::string contradiction(const FillSettings& settings) {
+  const auto keys = distance_keys(settings);
+  if (keys.size() > 1) {
+    return fmt::format("{} and {} both say how far lines lie from each other; give one of them", named(keys[0]),
+                       named(keys[1]));
+  }
+  if (!settings.distance_mm.empty() && settings.group > 1) {
+    return fmt::format(
+        "{} and {}: groups are of beads with gaps between; write the distances of a group one by one, or give gaps",
+        named("distance_mm"), named("group"));
+  }
+  return {};
+}
+
+}  // namespace
+
+const infill::FillParameters& FillPlan::at(std::int64_t height) const {
+  for (const Range& range : ranges) {
+    if (range.from <= height && height < range.to) return range.parameters;
+  }
+  return base;
+}
+
+bool FillPlan::fills() const {
+  const auto does = [](const infill::FillParameters& p) { return p.walls > 0 || p.pattern != infill::Pattern::kNone; };
+  return does(base) || std::ranges::any_of(ranges, [&](const Range& range) { return does(range.parameters); });
+}
+
+Result<FillPlan> plan_filling(const FillRequest& request, const std::string& part_changes) {
+  const auto wrong = [](std::string_view key, const std::string& what) {
+    return Error{Fault::kUsage, fmt::format("{}: {}", key, what)};
+  };
+  FillSettings settings = request.all;
+  if (const std::string what = contradiction(settings); !what.empty()) return Error{Fault::kUsage, what};
+  if (const std::string what = read_fill_changes(part_changes, settings); !what.empty()) return wrong("part.fill", what);
+  if (const std::string what = contradiction(settings); !what.empty()) return wrong("part.fill", what);
+  FillPlan plan;
+  plan.base = parameters_of(settings);
+  if (Status status = infill::check(plan.base); !status) {
+    return wrong(part_changes.empty() ? "fill" : "part.fill", status.error().message);
+  }
+  std::vector<std::pair<FillPlan::Range, std::string>> ranges;
+  for (std::string_view entry : split(request.by_height, ";")) {
+    entry = trimmed(entry);
+    if (entry.empty()) continue;
+    const std::size_t space = std::min(entry.find(' '), entry.size());
+    const std::string heights(entry.substr(0, space));
+    const auto ends = split(heights, ":");
+    double from = 0, to = 0;
+    if (ends.size() != 2) return wrong("fill.by_height", fmt::format("'{}' is not from:to, as in 2.7:3", heights));
+    for (const auto& [text, value] : {std::pair{ends[0], &from}, {ends[1], &to}}) {
+      if (const std::string what = read_number(text, 0, kMostMm, " mm", *value); !what.empty()) {
+        return wrong("fill.by_height", fmt::format("{}: {}", heights, what));
+      }
+    }
+    if (nm_of(to) <= nm_of(from)) {
+      return wrong("fill.by_height", fmt::format("{}: ends at or below its start; write the lower height first", heights));
+    }
+    FillSettings own = settings;
+    if (const std::string what = read_fill_changes(entry.substr(space), own); !what.empty()) {
+      return wrong("fill.by_height", fmt::format("{}: {}", heights, what));
+    }
+    if (const std::string what = contradiction(own); !what.empty())
+      return wrong("fill.by_height", fmt::format("{}: {}", heights, what));
+    FillPlan::Range range{nm_of(from), nm_of(to), parameters_of(own)};
+    if (Status status = infill::check(range.parameters); !status) {
+      return wrong("fill.by_height", fmt::format("{}: {}", heights, status.error().message));
+    }
+    for (const auto& [other, name] : ranges) {
+      if (range.from < other.to && other.from < range.to) {
+        return wrong("fill.by_height", fmt::format("{} overlaps {}; end one where the other begins", heights, name));
+      }
+    }
+    ranges.emplace_back(std::move(range), heights);
+  }
+  std::ranges::sort(ranges, {}, [](const auto& entry) { return entry.first.from; });
+  for (auto& [range, name] : ranges) plan.ranges.push_back(std::move(range));
+  return plan;
+}
+
+}  // namespace lamina::pipeline

@@ -1,0 +1,68 @@
+#include "pipeline/plan/layers.h"
+
+#include <algorithm>
+#include <tuple>
+
+#include "pipeline/plan/heights.h"
+#include "stages/heights/per_part.h"
+
+namespace lamina::pipeline {
+namespace {
+
+std::int64_t top(const ScheduledLayer& scheduled) { return std::int64_t{scheduled.layer.bottom} + scheduled.layer.thickness; }
+
+Status add_layers_of_parts(const Job& job, const Scene& scene, std::vector<ScheduledLayer>& layers) {
+  const Result<heights::Options> options = heights_options(job);
+  if (!options) return options.error();
+  const heights::SurfaceIndex index = index_scene(scene, *options);
+  const Result<heights::PerPartPlan> plan = heights::plan_per_part(index, *options);
+  if (!plan) return plan.error();
+  for (std::uint32_t part = 0; part < plan->parts.size(); ++part) {
+    const heights::LayerTable& table = plan->parts[part].table;
+    std::uint32_t number = 0;
+    for (std::uint32_t i = 0; i < table.size(); ++i) {
+      const ScheduledLayer scheduled{table[i], part, number, 0, 0};
+      if (top(scheduled) <= index.parts[part].bottom) continue;  // under a part that does not stand on the bed
+      layers.push_back(scheduled);
+      ++number;
+    }
+  }
+  std::ranges::stable_sort(layers, {}, [](const ScheduledLayer& s) { return std::tuple(top(s), s.layer.bottom, s.part); });
+  for (std::uint32_t i = 0; i < layers.size(); ++i) layers[i].layer.index = i;
+  return {};
+}
+
+}  // namespace
+
+Result<LayerSchedule> schedule_layers(const Job& job, const Scene& scene) {
+  LayerSchedule schedule;
+  if (job.heights.per_part) {
+    if (Status status = add_layers_of_parts(job, scene, schedule.layers); !status) return status.error();
+  } else {
+    const Result<heights::LayerTable> table = layer_table(job, scene);
+    if (!table) return table.error();
+    schedule.layers.reserve(table->size());
+    for (std::uint32_t i = 0; i < table->size(); ++i) schedule.layers.push_back({(*table)[i], kEveryPart, i, 0, 0});
+  }
+  const bool across = job.heights.containment == Containment::kAcross;
+  const auto lowest = [&](const Layer& layer) { return across ? layer.plane() : layer.lowest_plane(); };
+  const auto highest = [&](const Layer& layer) { return across ? layer.plane() : layer.highest_plane(); };
+  std::vector<Nm>& planes = schedule.planes;
+  planes.reserve(schedule.layers.size() * (across ? 1 : 2));
+  for (const ScheduledLayer& scheduled : schedule.layers) {
+    planes.push_back(lowest(scheduled.layer));
+    if (!across) planes.push_back(highest(scheduled.layer));
+  }
+  std::ranges::sort(planes);
+  planes.erase(std::unique(planes.begin(), planes.end()), planes.end());
+  const auto place = [&](Nm plane) {
+    return static_cast<std::uint32_t>(std::ranges::lower_bound(planes, plane) - planes.begin());
+  };
+  for (ScheduledLayer& scheduled : schedule.layers) {
+    scheduled.low = place(lowest(scheduled.layer));
+    scheduled.high = place(highest(scheduled.layer));
+  }
+  return schedule;
+}
+
+}  // namespace lamina::pipeline

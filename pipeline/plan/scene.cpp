@@ -1,0 +1,225 @@
+#include "pipeline/plan/scene.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <map>
+#include <tuple>
+
+#include "stages/arrange/placement.h"
+#include "stages/load/load.h"
+
+namespace lamina::pipeline {
+namespace {
+
+double millimetres_of(const std::string& unit) {
+  constexpr std::pair<std::string_view, double> kUnits[] = {{"mm", 1},     {"cm", 10},     {"m", 1000},
+                                                            {"um", 0.001}, {"inch", 25.4}, {"foot", 304.8}};
+  for (const auto& [name, size] : kUnits) {
+    if (name == unit) return size;
+  }
+  return 1;
+}
+
+// A file as it was loaded once for all [[part]] entries that ask for the same of it.
+struct Loaded {
+  std::uint32_t first_mesh = 0;     // of its meshes in the scene
+  std::vector<Instance> instances;  // mesh counts from first_mesh
+  Box bounds;
+  std::uint64_t triangles = 0, fingerprint = 0;
+  std::vector<Note> notes;
+};
+
+using LoadKey =
+    std::tuple<std::string, std::string, std::array<double, 3>, std::array<double, 3>, std::array<double, 3>, std::string>;
+
+// splitmix64's finisher: spreads neighbouring offsets over all bits.
+std::uint64_t mix(std::uint64_t x) {
+  x = (x ^ (x >> 30)) * 0xbf58476d1ce4e5b9ull;
+  x = (x ^ (x >> 27)) * 0x94d049bb133111ebull;
+  return x ^ (x >> 31);
+}
+
+std::uint64_t fingerprint_of(const Instance& instance, const Mesh& mesh) {
+  std::uint64_t hash = mix(mesh.fingerprint);
+  for (const Nm part : {instance.offset.x, instance.offset.y, instance.offset.z}) {
+    hash = mix(hash + 0x9e3779b97f4a7c15ull + static_cast<std::uint32_t>(part));
+  }
+  return hash;
+}
+
+// Brings a mesh's box to the origin, so that any offset on the bed fits 32 bits; returns where it was.
+Point3 rebase(Mesh& mesh) {
+  const Point3 from = mesh.bounds.lo;
+  const auto shift = [&](Point3& p) { p = {p.x - from.x, p.y - from.y, p.z - from.z}; };
+  for (Triangle& t : mesh.triangles) {
+    shift(t.a);
+    shift(t.b);
+    shift(t.c);
+  }
+  const Point3 hi{static_cast<Nm>(mesh.bounds.width()), static_cast<Nm>(mesh.bounds.depth()),
+                  static_cast<Nm>(mesh.bounds.height())};
+  mesh.bounds = {{0, 0, 0}, hi};
+  return from;
+}
+
+bool fits(std::int64_t nm) { return nm >= INT32_MIN && nm <= INT32_MAX; }
+
+Result<Loaded> load_part(const Job& job, const PartRequest& request, Scene& scene) {
+  Result<Part> part = load::load(request.path, load_options(job, request));
+  if (!part) return part.error();
+  if (part->bounds.empty() || part->instances.empty()) {
+    return Error{Fault::kInput, fmt::format("{}: holds no triangles; nothing to plan", request.path)};
+  }
+  if (part->bounds.height() == 0) {
+    return Error{Fault::kInput, fmt::format("{}: all of it lies at z = {} mm, it has no height; nothing to plan", request.path,
+                                            mm(part->bounds.lo.z))};
+  }
+  Loaded loaded;
+  loaded.first_mesh = static_cast<std::uint32_t>(scene.meshes.size());
+  loaded.bounds = part->bounds;
+  loaded.instances = std::move(part->instances);
+  loaded.notes = std::move(part->notes);
+  for (const Instance& instance : loaded.instances) {
+    const Mesh& mesh = part->meshes[instance.mesh];
+    loaded.triangles += mesh.triangles.size();
+    loaded.fingerprint += fingerprint_of(instance, mesh);
+  }
+  for (Mesh& mesh : part->meshes) scene.meshes.push_back(std::move(mesh));
+  return loaded;
+}
+
+// Overlaps matter only where somebody asked for positions: arranged boxes cannot overlap each other.
+void note_overlaps(const Job& job, Scene& scene, const std::vector<std::pair<std::uint32_t, Box>>& boxes) {
+  std::vector<std::uint32_t> order(boxes.size());
+  for (std::uint32_t i = 0; i < order.size(); ++i) order[i] = i;
+  std::sort(order.begin(), order.end(), [&](std::uint32_t a, std::uint32_t b) {
+    return std::tie(boxes[a].second.lo.x, a) < std::tie(boxes[b].second.lo.x, b);
+  });
+  std::map<std::pair<std::uint32_t, std::uint32_t>, bool> noted;
+  for (std::size_t i = 0; i < order.size(); ++i) {
+    const auto& [part, box] = boxes[order[i]];
+    for (std::size_t j = i + 1; j < order.size(); ++j) {
+      const auto& [other_part, other] = boxes[order[j]];
+      if (other.lo.x >= box.hi.x) break;
+      if (part == other_part || (!job.parts[part].at_mm && !job.parts[other_part].at_mm)) continue;
+      const bool apart = other.lo.y >= box.hi.y || other.hi.y <= box.lo.y || other.lo.z >= box.hi.z || other.hi.z <= box.lo.z;
+      if (!apart) noted[{std::min(part, other_part), std::max(part, other_part)}] = true;
+    }
+  }
+  for (const auto& [pair, unused] : noted) {
+    const auto& [first, second] = pair;
+    scene.parts[second].notes.push_back(
+        {false, fmt::format("its box overlaps that of part {} ({}); where solids overlap {}", first + 1,
+                            std::filesystem::path(scene.parts[first].path).filename().string(),
+                            job.parts[first].material == job.parts[second].material ? "they are united"
+                                                                                    : "this one's material counts")});
+  }
+}
+
+}  // namespace
+
+load::LoadOptions load_options(const Job& job, const PartRequest& request) {
+  load::LoadOptions options;
+  options.transform = load::make_transform(request.scale, request.rotate_deg, request.shrink);
+  options.unit_mm = millimetres_of(request.unit);
+  options.drop_bad = job.drop_bad;
+  options.repair = job.repair;
+  options.weld_nm = nm_of(job.weld_um / 1000);
+  return options;
+}
+
+Result<Scene> load_scene(const Job& job) {
+  Scene scene;
+  std::map<LoadKey, Loaded> files;
+  std::vector<const Loaded*> loaded;  // by [[part]]; a map's values stay where they are
+  std::vector<BoxRequest> requests;
+  const std::int64_t bed_width = nm_of(job.bed_mm[0]), bed_depth = nm_of(job.bed_mm[1]);
+
+  for (const PartRequest& part : job.parts) {
+    std::error_code ignored;
+    const std::filesystem::path file = std::filesystem::weakly_canonical(part.path, ignored);
+    // Parts of different materials are indexed apart (solids.h), so that each has meshes of its own.
+    const std::string solid = part.material_by_height.empty()
+                                  ? part.material
+                                  : fmt::format("{} {} {}", part.material, part.material_by_height, part.bottom_mm);
+    const LoadKey key{file.empty() ? part.path : file.string(), part.unit, part.scale, part.rotate_deg, part.shrink, solid};
+    auto found = files.find(key);
+    if (found == files.end()) {
+      Result<Loaded> fresh = load_part(job, part, scene);
+      if (!fresh) return fresh.error();
+      found = files.emplace(key, std::move(*fresh)).first;
+    }
+    loaded.push_back(&found->second);
+    BoxRequest request;
+    request.width = found->second.bounds.width();
+    request.depth = found->second.bounds.depth();
+    request.copies = part.copies;
+    request.name = part.path;
+    if (part.at_mm) {
+      request.at_x = nm_of((*part.at_mm)[0]);
+      request.at_y = nm_of((*part.at_mm)[1]);
+    }
+    requests.push_back(std::move(request));
+    if (nm_of(part.bottom_mm) + found->second.bounds.height() > kNmReach) {
+      return Error{Fault::kUsage,
+                   fmt::format("{}: reaches {} mm above the bed, beyond {} mm; use a smaller --scale or "
+                               "--bottom",
+                               part.path, mm(nm_of(part.bottom_mm) + found->second.bounds.height()), mm(kNmReach))};
+    }
+  }
+
+  const Result<std::vector<Place>> places =
+      place_boxes(requests, bed_width, bed_depth, nm_of(job.gap_mm), job.machine.decides_bed);
+  if (!places) return places.error();
+
+  for (std::size_t p = 0; p < job.parts.size(); ++p) {
+    scene.parts.push_back(
+        {job.parts[p].path, job.parts[p].copies, loaded[p]->triangles, loaded[p]->fingerprint, Box(), loaded[p]->notes});
+  }
+  // Meshes far from the origin of their file, whose way to the bed is longer than 32 bits of nanometres.
+  std::map<std::uint32_t, Point3> rebased;
+  std::vector<std::pair<std::uint32_t, Box>> boxes;
+  bool positions_asked = false;
+  for (const Place& place : *places) {
+    const Loaded& part = *loaded[place.request];
+    const std::int64_t bottom = nm_of(job.parts[place.request].bottom_mm);
+    positions_asked = positions_asked || job.parts[place.request].at_mm.has_value();
+    for (const Instance& instance : part.instances) {
+      const std::uint32_t mesh = part.first_mesh + instance.mesh;
+      const auto way = [&](Nm own, std::int64_t target, Nm lo) { return std::int64_t{own} + target - lo; };
+      std::int64_t x = way(instance.offset.x, place.x, part.bounds.lo.x);
+      std::int64_t y = way(instance.offset.y, place.y, part.bounds.lo.y);
+      std::int64_t z = way(instance.offset.z, bottom, part.bounds.lo.z);
+      auto base = rebased.find(mesh);
+      if (base == rebased.end() && !(fits(x) && fits(y) && fits(z))) {
+        base = rebased.emplace(mesh, scene.meshes[mesh].bounds.lo).first;
+        rebase(scene.meshes[mesh]);
+        // Earlier instances of the mesh have to follow.
+        for (Instance& earlier : scene.instances) {
+          if (earlier.mesh != mesh) continue;
+          earlier.offset = {earlier.offset.x + base->second.x, earlier.offset.y + base->second.y,
+                            earlier.offset.z + base->second.z};
+        }
+      }
+      if (base != rebased.end()) {
+        x += base->second.x;
+        y += base->second.y;
+        z += base->second.z;
+      }
+      scene.instances.push_back({mesh, {static_cast<Nm>(x), static_cast<Nm>(y), static_cast<Nm>(z)}});
+      scene.part_of_instance.push_back(place.request);
+    }
+    const Box box{{static_cast<Nm>(place.x), static_cast<Nm>(place.y), static_cast<Nm>(bottom)},
+                  {static_cast<Nm>(place.x + part.bounds.width()), static_cast<Nm>(place.y + part.bounds.depth()),
+                   static_cast<Nm>(bottom + part.bounds.height())}};
+    if (scene.parts[place.request].bounds.empty()) scene.parts[place.request].bounds = box;
+    scene.height = std::max<std::int64_t>(scene.height, box.hi.z);
+    boxes.emplace_back(place.request, box);
+  }
+  if (positions_asked) note_overlaps(job, scene, boxes);
+  return scene;
+}
+
+}  // namespace lamina::pipeline

@@ -1,0 +1,314 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <filesystem>
+#include <iterator>
+#include <map>
+#include <numeric>
+
+#include "pipeline/run/slice.h"
+#include "stages/data/clipping.h"
+#include "stages/infill/fill.h"
+
+namespace lamina::pipeline {
+namespace {
+
+namespace fs = std::filesystem;
+using Clock = std::chrono::steady_clock;
+double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
+
+Box box_of(const Scene& scene, const Instance& instance) {
+  const Box& own = scene.meshes[instance.mesh].bounds;
+  Box box;
+  if (own.empty()) return box;
+  const Point3& by = instance.offset;
+  box.add(Point3{own.lo.x + by.x, own.lo.y + by.y, own.lo.z + by.z});
+  box.add(Point3{own.hi.x + by.x, own.hi.y + by.y, own.hi.z + by.z});
+  return box;
+}
+
+/// To the sides.
+Box grown(Box box, Nm by) {
+  if (box.empty()) return box;
+  box.lo.x -= by, box.lo.y -= by, box.hi.x += by, box.hi.y += by;
+  return box;
+}
+
+bool touch(const Box& a, const Box& b) {
+  return !a.empty() && !b.empty() && a.lo.x <= b.hi.x && b.lo.x <= a.hi.x && a.lo.y <= b.hi.y && b.lo.y <= a.hi.y &&
+         a.lo.z <= b.hi.z && b.lo.z <= a.hi.z;
+}
+
+/// Instances whose boxes touch, directly or through others, are one body: only there can solids overlap. Bodies are
+/// numbered by their first instance.
+std::vector<std::uint32_t> group_bodies(const std::vector<Box>& boxes) {
+  const auto count = static_cast<std::uint32_t>(boxes.size());
+  std::vector<std::uint32_t> root(count), order(count);
+  std::iota(root.begin(), root.end(), 0u);
+  std::iota(order.begin(), order.end(), 0u);
+  const auto find = [&](std::uint32_t i) {
+    while (root[i] != i) i = root[i] = root[root[i]];
+    return i;
+  };
+  std::ranges::sort(order, {}, [&](std::uint32_t i) { return std::pair(boxes[i].lo.x, i); });
+  std::vector<std::uint32_t> open;
+  for (const std::uint32_t i : order) {
+    std::erase_if(open, [&](std::uint32_t other) { return boxes[other].hi.x < boxes[i].lo.x; });
+    for (const std::uint32_t other : open) {
+      if (!touch(boxes[i], boxes[other])) continue;
+      const std::uint32_t a = find(i), b = find(other);
+      root[std::max(a, b)] = std::min(a, b);
+    }
+    open.push_back(i);
+  }
+  std::vector<std::uint32_t> body(count), number(count, UINT32_MAX);
+  std::uint32_t bodies = 0;
+  for (std::uint32_t i = 0; i < count; ++i) {
+    std::uint32_t& own = number[find(i)];
+    if (own == UINT32_MAX) own = bodies++;
+    body[i] = own;
+  }
+  return body;
+}
+
+}  // namespace
+
+Result<SlicePlan> SlicePlan::make(const Job& job, const ProgressCallback& progress) {
+  SlicePlan plan;
+  for (const PartRequest& part : job.parts) {
+    auto filling = plan_filling(job.fill, part.fill);
+    if (!filling) return filling.error();
+    plan.fills_ = plan.fills_ || filling->fills();
+    plan.plans_.push_back(std::move(*filling));
+  }
+  auto start = Clock::now();
+  progress({ProgressEvent::Stage::kLoading});
+  auto scene = load_scene(job);
+  if (!scene) return scene.error();
+  plan.scene_ = std::make_unique<Scene>(std::move(*scene));
+  plan.load_seconds = seconds_since(start);
+
+  start = Clock::now();
+  progress({ProgressEvent::Stage::kIndexing});
+  auto schedule = schedule_layers(job, *plan.scene_);
+  if (!schedule) return schedule.error();
+  plan.schedule_ = std::move(*schedule);
+  plan.containment_ = job.heights.containment;
+  std::vector<Box> boxes;
+  for (const Instance& instance : plan.scene_->instances) {
+    boxes.push_back(box_of(*plan.scene_, instance));
+    plan.bounds_.add(boxes.back());
+  }
+  if (job.slice.offset_mm > 0) plan.grow_ = static_cast<Nm>(nm_of(job.slice.offset_mm));
+  std::vector<Box> reach;  // parts may meet only when they have grown
+  for (const Box& box : boxes) reach.push_back(grown(box, plan.grow_));
+  const std::vector<std::uint32_t> body = group_bodies(reach);
+  const std::vector<std::uint32_t> part_area = plan.make_areas(job, boxes, body);
+  slice::SliceOptions options;
+  options.fill_rule = job.fill_rule;
+  options.tolerance = static_cast<Nm>(nm_of(job.slice.tolerance_um / 1000));
+  options.gap = static_cast<Nm>(nm_of(job.slice.bridge_mm));
+  options.offset = nm_of(job.slice.offset_mm);
+  plan.bounds_ = grown(plan.bounds_, plan.grow_);
+  auto slicer = slice::Slicer::build(plan.scene_->meshes, plan.scene_->instances, body, plan.schedule_.planes, options);
+  if (!slicer) return slicer.error();
+  plan.slicer_ = std::make_unique<slice::Slicer>(std::move(*slicer));
+  const bool shares = std::ranges::any_of(part_area, [](std::uint32_t area) { return area != slice::Slicer::kLeftOut; });
+  if (plan.fills_ && shares) plan.part_slicer_ = plan.slicer_->regrouped(part_area);
+  if (job.heights.per_part) {
+    if (Status status = plan.make_own_slicers(job, body); !status) return status.error();
+  }
+  plan.index_seconds = seconds_since(start);
+  return plan;
+}
+
+Status SlicePlan::make_own_slicers(const Job& job, const std::vector<std::uint32_t>& body) {
+  for (const Area& area : areas_) {
+    if (area.shared == UINT32_MAX) continue;
+    return Error{Fault::kUsage, fmt::format("--per-part: {} touches another part, so they have to share their layers; move "
+                                            "them apart or leave it out",
+                                            fs::path(job.parts[area.part].path).filename().string())};
+  }
+  for (std::uint32_t part = 0; part < job.parts.size(); ++part) {
+    std::vector<std::uint32_t> own = body;
+    for (std::size_t i = 0; i < own.size(); ++i) {
+      if (scene_->part_of_instance[i] != part) own[i] = slice::Slicer::kLeftOut;
+    }
+    own_slicers_.push_back(slicer_->regrouped(own));
+  }
+  return {};
+}
+
+std::vector<std::uint32_t> SlicePlan::make_areas(const Job& job, const std::vector<Box>& boxes,
+                                                 const std::vector<std::uint32_t>& body) {
+  // Bodies are numbered by their first instances, instances in the order of the parts: so are the areas of a body.
+  std::map<std::pair<std::uint32_t, std::uint32_t>, std::vector<std::uint32_t>> members;  // by body and part
+  for (std::uint32_t i = 0; i < body.size(); ++i) members[{body[i], scene_->part_of_instance[i]}].push_back(i);
+  std::vector<std::uint32_t> part_area(body.size(), slice::Slicer::kLeftOut);
+  std::uint32_t shared = 0;
+  for (auto it = members.begin(); it != members.end();) {
+    const std::uint32_t b = it->first.first;
+    auto end = it;
+    while (end != members.end() && end->first.first == b) ++end;
+    body_area_.push_back(static_cast<std::uint32_t>(areas_.size()));
+    names_.push_back(fs::path(job.parts[it->first.second].path).filename().string());
+    const bool shares = std::next(it) != end;
+    for (; it != end; ++it) {
+      Area area{b, it->first.second, {}};
+      if (shares) area.shared = shared++;
+      for (const std::uint32_t i : it->second) {
+        area.box.add(boxes[i]);
+        if (shares) part_area[i] = area.shared;
+      }
+      areas_.push_back(area);
+    }
+  }
+  body_area_.push_back(static_cast<std::uint32_t>(areas_.size()));
+  return part_area;
+}
+
+const infill::FillParameters& SlicePlan::filling(const Area& area, const Layer& layer) const {
+  return plans_[area.part].at(std::int64_t{layer.plane()} - area.box.lo.z);
+}
+
+ContoursView SlicePlan::contours_of(const Area& area, Work& work) const {
+  return area.shared == UINT32_MAX ? work.contours.of(area.body, work.rebased) : ContoursView(work.surface[area.shared]);
+}
+
+Result<slice::LayerReport> SlicePlan::section(const slice::Slicer& slicer, const ScheduledLayer& scheduled, Work& work,
+                                              slice::LayerContours& out) const {
+  auto report = slicer.layer(scheduled.low, work.scratch, out);
+  if (!report || containment_ == Containment::kAcross) return report;
+  const auto high = slicer.layer(scheduled.high, work.scratch, work.highest);
+  if (!high) return high.error();
+  report->cuts += high->cuts;
+  report->united += high->united;
+  report->gaps.add(high->gaps);
+  slice::LayerContours both;
+  for (std::uint32_t b = 0; b < slicer.bodies(); ++b) {
+    const ContoursView low_view = out.of(b, work.rebased), high_view = work.highest.of(b, work.rebased_highest);
+    Result<Contours> region = Contours();
+    if (containment_ == Containment::kInside) {
+      region = intersect_contours(low_view, high_view);
+    } else {
+      Contours all;
+      all.append(low_view);
+      all.append(high_view);
+      region = unite_contours(all, FillRule::kNonzero);
+    }
+    if (!region) return region.error();
+    both.contours.append(*region);
+    both.body.push_back(both.contours.size());
+  }
+  out = std::move(both);
+  return report;
+}
+
+Status SlicePlan::contours(std::uint32_t index, Work& work) const {
+  const ScheduledLayer& scheduled = schedule_.layers[index];
+  const Layer own = scheduled.own();
+  auto report = section(own_slicers_.empty() ? *slicer_ : own_slicers_[scheduled.part], scheduled, work, work.contours);
+  if (!report) return report.error();
+  // Bodies of other parts have nothing in this layer.
+  work.contours.body.resize(slicer_->bodies() + 1, work.contours.contours.size());
+  work.report = *report;
+  work.paths.clear();
+  work.path_body.clear();
+  work.path_area.clear();
+  if (!fills_) return {};
+  if (part_slicer_) {
+    if (auto again = section(*part_slicer_, scheduled, work, work.parts); !again) return again.error();
+    work.surface.resize(part_slicer_->bodies());
+    for (std::size_t a = 0; a < areas_.size(); ++a) {
+      const Area& area = areas_[a];
+      if (area.shared == UINT32_MAX) continue;
+      const ContoursView surface = work.parts.of(area.shared, work.rebased);
+      Contours earlier;
+      for (std::size_t other = body_area_[area.body]; other < a; ++other) {
+        if (!touch(grown(areas_[other].box, grow_), grown(area.box, grow_))) continue;
+        earlier.append(work.surface[areas_[other].shared]);
+      }
+      auto rest = subtract_contours(surface, earlier);
+      if (!rest) return rest.error();
+      work.surface[area.shared] = std::move(*rest);
+    }
+  }
+  work.region.resize(areas_.size());
+  for (std::size_t a = 0; a < areas_.size(); ++a) {
+    const Area& area = areas_[a];
+    auto region = infill::fill_region(contours_of(area, work), {own, area.box}, filling(area, own));
+    if (!region) return failed(area, region.error());
+    work.region[a] = std::move(*region);
+  }
+  return {};
+}
+
+Status SlicePlan::fill(std::uint32_t index, Work& work) const {
+  if (!fills_) return {};
+  const Layer layer = schedule_.layers[index].own();
+  work.path_body.push_back(0);
+  work.path_area.push_back(0);
+  for (std::size_t a = 0; a < areas_.size(); ++a) {
+    const Area& area = areas_[a];
+    const Status status = infill::append_fill(contours_of(area, work), std::move(work.region[a]), {layer, area.box},
+                                              filling(area, layer), work.paths);
+    if (!status) return failed(area, status.error());
+    work.region[a] = Contours();
+    work.path_area.push_back(work.paths.size());
+    if (a + 1 == body_area_[area.body + 1]) work.path_body.push_back(work.paths.size());
+  }
+  return {};
+}
+
+Status SlicePlan::layer(std::uint32_t index, Work& work) const {
+  if (Status status = contours(index, work); !status) return status;
+  return fill(index, work);
+}
+
+Error SlicePlan::failed(const Area& area, const Error& error) const {
+  const std::string name = fs::path(scene_->parts[area.part].path).filename().string();
+  return {error.fault, fmt::format("{}: fill: {}", name, error.message)};
+}
+
+std::uint64_t SlicePlan::bytes_bound(std::uint32_t index) const {
+  // Text of a contour's point is at most 50 bytes, and it is kept beside the contours.
+  const ScheduledLayer& scheduled = schedule_.layers[index];
+  const auto bound = [&](const slice::Slicer& slicer) {
+    return 3 * (slicer.layer_bytes_bound(scheduled.low) +
+                (scheduled.low == scheduled.high ? 0 : 3 * slicer.layer_bytes_bound(scheduled.high)));
+  };
+  std::uint64_t contours = bound(own_slicers_.empty() ? *slicer_ : own_slicers_[scheduled.part]);
+  if (part_slicer_) contours += bound(*part_slicer_);
+  return (fills_ ? 2 : 1) * contours + (1 << 14);
+}
+
+Result<std::uint64_t> SlicePlan::fill_bytes_bound(std::uint32_t index, Work& work, TextBytes text) const {
+  if (!fills_) return std::uint64_t{0};
+  constexpr std::uint64_t kOfPoint = 17, kOfPath = 4;
+  const Layer own = schedule_.layers[index].own();
+  std::uint64_t bytes = 0, scratch = 0;
+  for (std::size_t a = 0; a < areas_.size(); ++a) {
+    const Area& area = areas_[a];
+    const auto bound = infill::bound_fill(contours_of(area, work), work.region[a], {own, area.box}, filling(area, own));
+    if (!bound) return failed(area, bound.error());
+    bytes += bound->points * (kOfPoint + text.point) + bound->stretches * text.stretch + bound->paths * (kOfPath + text.path);
+    scratch = std::max(scratch, bound->scratch_bytes);
+  }
+  // Buffers grow by half or double: twice what is in them.
+  return 2 * bytes + scratch;
+}
+
+std::uint64_t SlicePlan::Work::bytes() const {
+  const auto of = [](const Contours& c) { return bytes_held(c.point) + bytes_held(c.offset); };
+  std::uint64_t total = of(contours.contours) + of(highest.contours) + of(parts.contours) + of(scratch.closed) +
+                        of(scratch.open) + bytes_held(text);
+  for (const Contours& c : surface) total += of(c);
+  for (const Contours& c : region) total += of(c);
+  for (const Contours& c : scratch.of_source) total += of(c);
+  total += scratch.cuts.bytes() + scratch.chain.bytes() + scratch.contact.bytes() + bytes_held(scratch.facets);
+  return total + bytes_held(paths.point) + bytes_held(paths.kind) + bytes_held(paths.width) + bytes_held(paths.line) +
+         bytes_held(paths.offset);
+}
+
+}  // namespace lamina::pipeline

@@ -1,0 +1,158 @@
+#include "pipeline/plan/solids.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "stages/raster/combine.h"
+
+namespace lamina::pipeline {
+namespace {
+
+bool overlap(const Box& a, const Box& b) {
+  return a.lo.x < b.hi.x && b.lo.x < a.hi.x && a.lo.y < b.hi.y && b.lo.y < a.hi.y && a.lo.z < b.hi.z && b.lo.z < a.hi.z;
+}
+
+/// How many solids of other materials lie below each part, one upon the other: parts are laid in this order. By the boxes
+/// of all copies of a part, so that it may be more than needed.
+std::vector<std::uint32_t> levels_of(const Scene& scene, const Job& job, const Materials& materials) {
+  std::vector<std::uint32_t> level(job.parts.size(), 0);
+  if (std::ranges::none_of(job.parts, [](const PartRequest& part) { return part.at_mm.has_value(); })) return level;
+  std::vector<Box> box(job.parts.size());
+  for (std::size_t i = 0; i < scene.instances.size(); ++i) {
+    const Box& own = scene.meshes[scene.instances[i].mesh].bounds;
+    const Point3& by = scene.instances[i].offset;
+    const auto moved = [&](const Point3& p) { return Point3{p.x + by.x, p.y + by.y, p.z + by.z}; };
+    box[scene.part_of_instance[i]].add(Box{moved(own.lo), moved(own.hi)});
+  }
+  for (std::size_t later = 0; later < box.size(); ++later) {
+    for (std::size_t earlier = 0; earlier < later; ++earlier) {
+      if (materials.part[later] == materials.part[earlier] || !overlap(box[later], box[earlier])) continue;
+      level[later] = std::max(level[later], level[earlier] + 1);
+    }
+  }
+  return level;
+}
+
+struct Group {
+  std::uint32_t level;
+  PartMaterial material;
+  std::vector<Mesh> meshes;
+  std::vector<Instance> instances;
+  std::vector<std::uint32_t> instance;
+  std::vector<std::uint32_t> own_mesh;  // by mesh of the scene; UINT32_MAX: not here yet
+};
+
+/// Moves meshes into the groups; one that two groups need is copied.
+std::vector<Group> groups_of(Scene& scene, const Job& job, const Materials& materials) {
+  const std::vector<std::uint32_t> level = levels_of(scene, job, materials);
+  std::vector<Group> groups;
+  std::vector<std::uint32_t> home(scene.meshes.size(), UINT32_MAX);
+  for (std::uint32_t i = 0; i < scene.instances.size(); ++i) {
+    const std::uint32_t part = scene.part_of_instance[i], mesh = scene.instances[i].mesh;
+    const auto found = std::ranges::find_if(
+        groups, [&](const Group& group) { return group.level == level[part] && group.material == materials.part[part]; });
+    const auto number = static_cast<std::uint32_t>(found - groups.begin());
+    if (found == groups.end()) {
+      groups.push_back({level[part], materials.part[part], {}, {}, {}, {}});
+      groups.back().own_mesh.assign(scene.meshes.size(), UINT32_MAX);
+    }
+    Group& group = groups[number];
+    if (group.own_mesh[mesh] == UINT32_MAX) {
+      group.own_mesh[mesh] = static_cast<std::uint32_t>(group.meshes.size());
+      if (home[mesh] == UINT32_MAX) {
+        group.meshes.push_back(std::move(scene.meshes[mesh]));  // its box stays
+        home[mesh] = number;
+      } else {
+        group.meshes.push_back(groups[home[mesh]].meshes[groups[home[mesh]].own_mesh[mesh]]);
+      }
+    }
+    group.instances.push_back({group.own_mesh[mesh], scene.instances[i].offset});
+    group.instance.push_back(i);
+  }
+  std::ranges::stable_sort(groups, {}, &Group::level);
+  return groups;
+}
+
+}  // namespace
+
+Result<Solids> Solids::build(Scene& scene, const Job& job, const PixelGrid& grid, const Materials& materials) {
+  Solids result;
+  const bool rays = job.engine != Engine::kContours, contours = job.engine != Engine::kRays;
+  const auto add = [&](std::span<Mesh> meshes, std::span<const Instance> instances, PartMaterial material,
+                       std::vector<std::uint32_t> instance) -> Status {
+    auto built = raster::Rasterizer::build(meshes, instances, grid, job.fill_rule, rays, contours);
+    if (!built) return built.error();
+    result.solids_.push_back({std::move(material), std::move(*built), std::move(instance)});
+    return {};
+  };
+  if (!materials.several()) {
+    if (Status status = add(scene.meshes, scene.instances, {}, {}); !status) return status.error();
+    return result;
+  }
+  for (Group& group : groups_of(scene, job, materials)) {
+    if (Status status = add(group.meshes, group.instances, std::move(group.material), std::move(group.instance)); !status) {
+      return status.error();
+    }
+  }
+  return result;
+}
+
+std::uint64_t Solids::layer_bytes_bound(Nm plane) const {
+  std::uint64_t total = 0;
+  for (const Solid& solid : solids_) total += solid.rasterizer.layer_bytes_bound(plane);
+  return total;
+}
+
+std::uint64_t Solids::crossings_bound(Nm plane) const {
+  std::uint64_t total = 0;
+  for (const Solid& solid : solids_) total += solid.rasterizer.crossings_bound(plane);
+  return total;
+}
+
+std::uint64_t Solids::mesh_bytes() const {
+  std::uint64_t total = 0;
+  for (const Solid& solid : solids_) total += solid.rasterizer.mesh_bytes();
+  return total;
+}
+
+std::uint64_t Solids::index_bytes() const {
+  std::uint64_t total = 0;
+  for (const Solid& solid : solids_) total += solid.rasterizer.index_bytes();
+  return total;
+}
+
+void MaterialImages::start(std::size_t materials, std::uint32_t columns, std::uint32_t rows) {
+  image.resize(materials);
+  for (Runs& one : image) {
+    one.columns = columns;
+    one.row_offset.assign(std::size_t{rows} + 1, 0);
+    one.change.clear();
+  }
+}
+
+void MaterialImages::lay(std::uint32_t material, const RunsView& section, Runs& whole) {
+  if (section.change.empty()) return;
+  for (std::uint32_t m = 0; m < image.size(); ++m) {
+    if (m != material && image[m].change.empty()) continue;
+    raster::combine(image[m], section, m == material ? raster::SetOperation::kUnion : raster::SetOperation::kDifference,
+                    scratch);
+    std::swap(image[m], scratch);
+  }
+  raster::combine(whole, section, raster::SetOperation::kUnion, scratch);
+  std::swap(whole, scratch);
+}
+
+void MaterialImages::keep(const RunsView& whole) {
+  for (Runs& one : image) {
+    raster::combine(one, whole, raster::SetOperation::kIntersection, scratch);
+    std::swap(one, scratch);
+  }
+}
+
+std::uint64_t MaterialImages::bytes() const {
+  std::uint64_t total = bytes_held(scratch.row_offset) + bytes_held(scratch.change);
+  for (const Runs& one : image) total += bytes_held(one.row_offset) + bytes_held(one.change);
+  return total;
+}
+
+}  // namespace lamina::pipeline

@@ -1,0 +1,68 @@
+// pipeline/run/extrude.h: a job from its parts to a file of toolpaths for an extrusion printer.
+#pragma once
+
+#include <array>
+#include <atomic>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "pipeline/job/job.h"
+#include "pipeline/machine/extruder.h"
+#include "pipeline/plan/scene.h"
+#include "pipeline/run/jet.h"  // ProgressCallback
+#include "stages/data/status.h"
+#include "stages/write/extrusion_format.h"
+
+namespace lamina::pipeline {
+
+/// Segmented lines as they were laid. A piece is a line, or what holes leave of it, that is divided.
+struct SegmentCounts {
+  std::uint64_t pieces = 0;
+  std::uint64_t stretches = 0;  // points of the lists of Fukuda 2020: the start of a piece and its marks
+  std::uint64_t thin = 0;
+  std::uint64_t points() const { return stretches + pieces; }  // with the ends of pieces
+  std::uint64_t lines = 0;  // segmented lines, divided or not; a line cut by holes counts once
+};
+
+/// Void share of what was planned: of the volume within the contours, by three ways to know what beads are.
+struct PlannedPorosity {
+  double solid_mm3 = 0;     // area within the contours x thickness, over all layers
+  double extruded_mm3 = 0;  // rounded rectangles: what is fed
+  double ellipses_mm3 = 0;  // the same beads as ellipses
+  double measured_mm3 = 0;  // rounded rectangles with the widths that were measured
+  double by_extrusion() const { return 1 - extruded_mm3 / solid_mm3; }
+  double by_ellipses() const { return 1 - ellipses_mm3 / solid_mm3; }
+  double by_widths() const { return 1 - measured_mm3 / solid_mm3; }
+};
+
+struct ExtrudeSummary {
+  std::string output, machine;
+  std::uint32_t layers = 0;
+  std::uint64_t triangles = 0, points = 0, bytes_written = 0;
+  double height_mm = 0;
+  write::MoveTotals totals;
+  double filament_cm3 = 0, filament_g = 0;
+  SegmentCounts segments;
+  std::uint64_t first_layer_points = 0;  // segments.points() of the first layer
+  PlannedPorosity porosity;
+  std::vector<std::pair<std::string, segment::Pores>> pores;  // by heights
+  double load_seconds = 0, index_seconds = 0, layer_seconds = 0, plan_seconds = 0, write_seconds = 0;
+  std::uint64_t peak_layer_bytes = 0, peak_resident_bytes = 0;
+  std::uint32_t most_in_flight = 0;
+  std::vector<PartSummary> parts;
+  std::vector<std::string> warnings;
+};
+
+/// The printer of a job: found, with the job's changes. errors  kUsage
+Result<ExtruderProfile> resolve_extruder(const Job& job);
+
+/// Writes job.output.
+/// errors  of resolve_extruder, plan_segments and SlicePlan::make; kUsage: a part that is too high, layers that the
+///         machine cannot lay; kOutput; kInterrupted: nothing is left behind
+Result<ExtrudeSummary> run_extrude(const Job& asked, const ProgressCallback& progress, const std::atomic<bool>& cancel);
+
+std::string extrude_summary_text(const Job& job, const ExtrudeSummary& summary);
+std::string extrude_summary_json(const Job& job, const ExtrudeSummary& summary);
+
+}  // namespace lamina::pipeline

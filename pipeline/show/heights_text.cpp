@@ -1,0 +1,172 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <filesystem>
+
+#include "pipeline/cli/console.h"
+#include "pipeline/plan/heights.h"
+#include "pipeline/plan/heights_study.h"
+#include "pipeline/text/json_text.h"
+#include "pipeline/text/number_text.h"
+#include "stages/write/rp3/rp3.h"
+
+namespace lamina::pipeline {
+namespace {
+
+std::string part_name(const Scene& scene, std::uint32_t part) {
+  if (part >= scene.parts.size()) return "-";
+  return std::filesystem::path(scene.parts[part].path).filename().string();
+}
+
+std::size_t count(const HeightsStudy& study) { return study.boundaries.size() - 1; }
+std::int64_t thickness(const HeightsStudy& study, std::size_t layer) {
+  return study.boundaries[layer + 1] - study.boundaries[layer];
+}
+std::string_view reason(const HeightsStudy& study, std::size_t layer) {
+  return study.reasons.empty() ? "given" : reason_name(study.reasons[layer]);
+}
+
+// The slope that the layer looked at when it was decided, or else the flattest one in it.
+double angle(const HeightsStudy& study, std::size_t layer) {
+  return heights::angle_of(study.plan.looked_at.empty() ? study.evaluation.layers[layer].flattest
+                                                        : study.plan.looked_at[layer]);
+}
+
+// Whether Dolenc and Makela's rule took a layer back because the surface changes above its bottom.
+bool stepped_back(const HeightsStudy& study, std::size_t layer) {
+  return !study.plan.stepped_back.empty() && study.plan.stepped_back[layer];
+}
+std::size_t stepped_back_count(const HeightsStudy& study) {
+  return static_cast<std::size_t>(std::ranges::count(study.plan.stepped_back, true));
+}
+
+std::string signed_mm(std::int64_t nm) { return fmt::format("{:+.4f} mm", mm(nm)); }
+
+std::string flats_line(const HeightsStudy& study) {
+  const heights::Evaluation& e = study.evaluation;
+  if (e.flats_missed == 0) return fmt::format("{} of {} hit", e.flats.size(), e.flats.size());
+  return fmt::format("{} of {} hit, {} missed by up to {:.4f} mm", e.flats.size() - e.flats_missed, e.flats.size(),
+                     e.flats_missed, mm(e.largest_miss));
+}
+
+}  // namespace
+
+std::string heights_page(const Job& job, const Scene& scene, const HeightsStudy& study) {
+  const heights::Evaluation& e = study.evaluation;
+  std::string text;
+  const auto line = [&](std::string_view name, const std::string& what) { text += fmt::format("{:<10}{}\n", name, what); };
+  line("layers", fmt::format("{} {}", readable_count(count(study)), study.reasons.empty() ? study.name : heights_text(job)));
+  line("height", fmt::format("{:.4f} mm, the parts {:.4f} mm ({})", mm(study.boundaries.back()), mm(scene.height),
+                             signed_mm(e.top_miss)));
+  line("steps", fmt::format("up to {:.4f} mm (layer {}), {:.4f} mm on average over the surface", mm(e.largest_cusp),
+                            e.largest_cusp_layer + 1, e.mean_cusp * 1e-6));
+  if (e.above_limit > 0 && !study.reasons.empty() && study.options.mode != heights::Mode::kUniform &&
+      study.options.mode != heights::Mode::kAngle) {
+    line("", fmt::format("{} layers of the least thickness have a step above the limit of {} mm; thinner ones would help",
+                         e.above_limit, number_text(mm(study.options.cusp))));
+  }
+  if (const std::size_t back = stepped_back_count(study); back > 0) {
+    line("", fmt::format("{} layers are thinner than the slopes at their bottom ask for: what lies above is flatter", back));
+  }
+  line("flats", flats_line(study));
+  if (study.plan.one_less_reaches >= 0) {
+    line("proof", fmt::format("{} that keeps these steps and flats gets higher than {:.4f} mm",
+                              study.options.time.on() ? "no table of less time" : "no table of a layer less",
+                              mm(study.plan.one_less_reaches)));
+  }
+  if (study.options.time.on()) line("time", readable_seconds(e.seconds));
+  for (const heights::FlatHit& hit : e.flats) {
+    text +=
+        fmt::format("  flat at {:9.4f} mm  {:10.2f} mm2 up {:10.2f} mm2 down  {}{}\n", mm(hit.flat.height), hit.flat.up_mm2,
+                    hit.flat.down_mm2,
+                    hit.miss > study.options.surface.flat_tolerance ? fmt::format("missed by {:.4f} mm", mm(hit.miss)) : "hit",
+                    hit.flat.end ? ", end of a part" : "");
+  }
+  text += fmt::format("\n{:>6} {:>10} {:>9}  {:<8} {:>6} {:>8}  {}\n", "layer", "bottom", "thickness", "reason", "angle",
+                      "step", "decided by");
+  for (std::size_t i = 0; i < count(study); ++i) {
+    text += fmt::format("{:>6} {:>10.4f} {:>9.4f}  {:<8} {:>6.2f} {:>8.4f}  {}\n", i + 1, mm(study.boundaries[i]),
+                        mm(thickness(study, i)), reason(study, i), angle(study, i), mm(e.layers[i].cusp),
+                        part_name(scene, e.layers[i].part));
+  }
+  return text;
+}
+
+std::string heights_csv(const Scene& scene, const std::vector<HeightsStudy>& studies) {
+  std::string text = "table,layer,bottom_mm,thickness_mm,reason,angle_deg,cusp_mm,hits_flat,stepped_back,part\n";
+  const auto quoted = [](std::string name) {
+    for (std::size_t at = 0; (at = name.find('"', at)) != std::string::npos; at += 2) name.insert(at, 1, '"');
+    return '"' + name + '"';
+  };
+  for (const HeightsStudy& study : studies) {
+    for (std::size_t i = 0; i < count(study); ++i) {
+      const heights::LayerFacts& layer = study.evaluation.layers[i];
+      text += fmt::format("{},{},{:.6f},{:.6f},{},{:.2f},{:.6f},{},{},{}\n", quoted(study.name), i + 1, mm(study.boundaries[i]),
+                          mm(thickness(study, i)), reason(study, i), angle(study, i), mm(layer.cusp), layer.hits_flat ? 1 : 0,
+                          stepped_back(study, i) ? 1 : 0, quoted(part_name(scene, layer.part)));
+    }
+  }
+  return text;
+}
+
+std::string heights_json(const Job& job, const Scene& scene, const std::vector<HeightsStudy>& studies) {
+  std::string text = fmt::format("{{\"height_mm\": {:.6f}, \"parts\": [", mm(scene.height));
+  for (std::size_t i = 0; i < scene.parts.size(); ++i) {
+    text += fmt::format("{}{}", i > 0 ? ", " : "", json_string(scene.parts[i].path));
+  }
+  text += fmt::format("], \"cusp_limit_mm\": {}, \"tables\": [", number_text(job.heights.cusp_mm));
+  for (std::size_t s = 0; s < studies.size(); ++s) {
+    const HeightsStudy& study = studies[s];
+    const heights::Evaluation& e = study.evaluation;
+    text += fmt::format(
+        "{}\n{{\"name\": {}, \"layers\": {}, \"top_mm\": {:.6f}, \"top_miss_mm\": {:.6f}, \"largest_cusp_mm\": {:.6f}, "
+        "\"mean_cusp_mm\": {:.6f}, \"layers_above_limit\": {}, \"flats\": {}, \"flats_missed\": {}, \"largest_miss_mm\": {:.6f}",
+        s > 0 ? "," : "", json_string(study.name), count(study), mm(study.boundaries.back()), mm(e.top_miss),
+        mm(e.largest_cusp), e.mean_cusp * 1e-6, e.above_limit, e.flats.size(), e.flats_missed, mm(e.largest_miss));
+    if (study.plan.one_less_reaches >= 0) {
+      text += fmt::format(", \"one_less_reaches_mm\": {:.6f}", mm(study.plan.one_less_reaches));
+    }
+    if (study.options.time.on()) text += fmt::format(", \"seconds\": {:.3f}", e.seconds);
+    text += ",\n\"flat\": [";
+    for (std::size_t i = 0; i < e.flats.size(); ++i) {
+      const heights::FlatHit& hit = e.flats[i];
+      text +=
+          fmt::format("{}{{\"height_mm\": {:.6f}, \"up_mm2\": {:.4f}, \"down_mm2\": {:.4f}, \"end\": {}, \"miss_mm\": {:.6f}}}",
+                      i > 0 ? ", " : "", mm(hit.flat.height), hit.flat.up_mm2, hit.flat.down_mm2, hit.flat.end, mm(hit.miss));
+    }
+    text += "],\n\"layer\": [";
+    for (std::size_t i = 0; i < count(study); ++i) {
+      const heights::LayerFacts& layer = e.layers[i];
+      text += fmt::format(
+          "{}\n{{\"bottom_mm\": {:.6f}, \"thickness_mm\": {:.6f}, \"reason\": \"{}\", \"angle_deg\": {:.2f}, "
+          "\"cusp_mm\": {:.6f}, \"hits_flat\": {}, \"stepped_back\": {}, \"part\": {}}}",
+          i > 0 ? "," : "", mm(study.boundaries[i]), mm(thickness(study, i)), reason(study, i), angle(study, i), mm(layer.cusp),
+          layer.hits_flat, stepped_back(study, i), layer.part < scene.parts.size() ? fmt::format("{}", layer.part) : "null");
+    }
+    text += "]}";
+  }
+  return text + "\n]}\n";
+}
+
+std::string heights_rp3(const HeightsStudy& study, const std::array<std::uint32_t, 2>& range,
+                        const write::rp3::Settings& settings) {
+  std::vector<write::rp3::Layer> layers;
+  for (std::size_t i = range[0]; i < range[1]; ++i) layers.push_back({mm(thickness(study, i)), angle(study, i)});
+  return write::rp3::text_of(layers, settings);
+}
+
+std::string comparison_page(const std::vector<HeightsStudy>& studies) {
+  std::string text =
+      fmt::format("{:<24} {:>7} {:>12} {:>10} {:>12} {:>12} {:>10}{}\n", "way", "layers", "largest step", "mean step",
+                  "flats missed", "largest miss", "top", studies.front().options.time.on() ? "        time" : "");
+  for (const HeightsStudy& study : studies) {
+    const heights::Evaluation& e = study.evaluation;
+    text += fmt::format("{:<24} {:>7} {:>9.4f} mm {:>7.4f} mm {:>12} {:>9.4f} mm {:>+7.3f} mm{}\n", study.name, count(study),
+                        mm(e.largest_cusp), e.mean_cusp * 1e-6, fmt::format("{} of {}", e.flats_missed, e.flats.size()),
+                        mm(e.largest_miss), mm(e.top_miss),
+                        study.options.time.on() ? fmt::format(" {:>11}", readable_seconds(e.seconds)) : "");
+  }
+  return text;
+}
+
+}  // namespace lamina::pipeline

@@ -1,0 +1,237 @@
+// pipeline/show/info.cpp: a part is loaded as it is, diagnosed, and loaded again as a job would.
+#include "pipeline/show/info.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <array>
+#include <nlohmann/json.hpp>
+#include <vector>
+
+#include "pipeline/text/json_text.h"
+#include "stages/load/diagnose.h"
+
+namespace lamina::pipeline {
+namespace {
+
+constexpr std::size_t kPlaces = 3;
+constexpr std::size_t kMeshesShown = 24;
+
+struct Description {
+  std::string format;
+  Part part;                               // as in the file
+  std::vector<load::Diagnosis> diagnosis;  // of each mesh
+  std::vector<std::uint32_t> copies;       // of each mesh
+  std::vector<Note> notes;                 // of the part as planned
+  bool balanced = true;
+  bool repairs = false;  // options.repair
+
+  template <class Value>
+  auto total(Value load::Diagnosis::*member) const {
+    Value sum{};
+    for (std::size_t i = 0; i < diagnosis.size(); ++i) sum += static_cast<Value>(copies[i]) * diagnosis[i].*member;
+    return sum;
+  }
+};
+
+Result<Description> describe(const std::string& path, const load::LoadOptions& options) {
+  const Result<std::string> format = load::format_of(path, options);
+  if (!format) return format.error();
+  load::LoadOptions as_is = options;
+  as_is.repair = false;
+  Result<Part> part = load::load(path, as_is);
+  if (!part) return part.error();
+  Description description;
+  description.format = *format;
+  description.repairs = options.repair;
+  description.copies.resize(part->meshes.size(), 0);
+  for (const Instance& instance : part->instances) ++description.copies[instance.mesh];
+  for (const Mesh& mesh : part->meshes) {
+    description.diagnosis.push_back(load::diagnose(mesh, kPlaces));
+    description.balanced = description.balanced && description.diagnosis.back().balanced;
+  }
+  description.notes = part->notes;
+  description.part = std::move(*part);
+  if (!description.balanced && options.repair) {
+    for (Mesh& mesh : description.part.meshes) Buffer<Triangle>().swap(mesh.triangles);
+    Result<Part> planned = load::load(path, options);
+    if (!planned) return planned.error();
+    description.notes = std::move(planned->notes);
+  }
+  return description;
+}
+
+struct Kind {
+  const char* name;
+  const char* key;
+  load::Diagnosis::Finding load::Diagnosis::*finding;
+};
+constexpr std::array<Kind, 5> kKinds{{
+    {"open edges", "open_edges", &load::Diagnosis::open_edges},
+    {"non-manifold edges", "non_manifold_edges", &load::Diagnosis::non_manifold_edges},
+    {"misoriented edges", "misoriented_edges", &load::Diagnosis::misoriented_edges},
+    {"degenerate facets", "degenerate_facets", &load::Diagnosis::degenerate_facets},
+    {"duplicate facets", "duplicate_facets", &load::Diagnosis::duplicate_facets},
+}};
+
+std::uint64_t count_of(const Description& description, const Kind& kind) {
+  std::uint64_t count = 0;
+  for (std::size_t i = 0; i < description.diagnosis.size(); ++i)
+    count += description.copies[i] * (description.diagnosis[i].*kind.finding).count;
+  return count;
+}
+
+/// 1234567 as 1,234,567.
+std::string grouped(std::uint64_t number) {
+  std::string text = std::to_string(number);
+  for (std::size_t at = text.size(); at > 3;) text.insert(at -= 3, 1, ',');
+  return text;
+}
+
+std::string size_of(const Box& box) {
+  return fmt::format("{:.3f} x {:.3f} x {:.3f} mm", mm(box.width()), mm(box.depth()), mm(box.height()));
+}
+
+std::string point(const Point3& p) { return fmt::format("({:.3f}, {:.3f}, {:.3f})", mm(p.x), mm(p.y), mm(p.z)); }
+
+/// What is behind the name of the file in a mesh's name.
+std::string short_name(const Description& description, std::size_t mesh) {
+  const std::string& name = description.part.meshes[mesh].name;
+  const std::size_t prefix = description.part.path.size() + 2;
+  return name.size() > prefix ? name.substr(prefix) : name;
+}
+
+void row(std::string& text, const char* label, const std::string& value) { text += fmt::format("  {:<20} {}\n", label, value); }
+
+/// The first places of a kind in all meshes.
+std::string first_places(const Description& description, const Kind& kind) {
+  std::string text;
+  std::size_t shown = 0;
+  for (std::size_t i = 0; i < description.diagnosis.size() && shown < kPlaces; ++i) {
+    for (const auto& place : (description.diagnosis[i].*kind.finding).first) {
+      if (shown == kPlaces) break;
+      text += fmt::format("{}{}", shown == 0 ? "" : "  ", point(place.at));
+      if (description.diagnosis.size() > 1) text += " of mesh " + std::to_string(i + 1);
+      ++shown;
+    }
+  }
+  return text;
+}
+
+void describe_meshes(const Description& description, std::string& text) {
+  text += "\n  mesh  copies   triangles  closed  size, name\n";
+  for (std::size_t i = 0; i < description.diagnosis.size() && i < kMeshesShown; ++i) {
+    const load::Diagnosis& found = description.diagnosis[i];
+    text += fmt::format("  {:>4}  {:>6}  {:>10}  {:<6}  {}, {}\n", i + 1, description.copies[i], grouped(found.triangles),
+                        found.balanced ? "yes" : "no", size_of(found.bounds), short_name(description, i));
+  }
+  if (description.diagnosis.size() > kMeshesShown)
+    text += fmt::format("  and {} more\n", description.diagnosis.size() - kMeshesShown);
+}
+
+void describe_findings(const Description& description, std::string& text) {
+  const auto inverted = description.total(&load::Diagnosis::inverted_shells);
+  bool any = inverted > 0;
+  for (const Kind& kind : kKinds) any = any || count_of(description, kind) > 0;
+  if (!any) return;
+  text += "\n  found                     count  first places, mm\n";
+  for (const Kind& kind : kKinds)
+    if (const std::uint64_t count = count_of(description, kind); count > 0)
+      text += fmt::format("  {:<20} {:>10}  {}\n", kind.name, grouped(count), first_places(description, kind));
+  if (inverted > 0)
+    text +=
+        fmt::format("  {:<20} {:>10}  a hollow within a shell, or a shell turned inside out\n", "inverted shells", inverted);
+}
+
+void describe_plan(const Description& description, std::string& text) {
+  std::vector<const Note*> remarks, repairs;
+  for (const Note& note : description.notes) (note.repair ? repairs : remarks).push_back(&note);
+  if (!remarks.empty()) text += "\n  notes\n";
+  for (const Note* note : remarks) text += "    " + one_line(note->text) + "\n";
+  text += "\n  lamina jet ";
+  if (repairs.empty() && description.balanced) {
+    text += "plans it as it is.\n";
+  } else if (!description.balanced && !description.repairs) {
+    text += "plans it as it is, since repair is off; rows that stay open are reported.\n";
+  } else {
+    text += "plans it after these changes:\n";
+  }
+  for (const Note* note : repairs) text += "    " + one_line(note->text) + "\n";
+}
+
+nlohmann::ordered_json as_json(const Point3& p) { return {mm(p.x), mm(p.y), mm(p.z)}; }
+
+nlohmann::ordered_json as_json(const load::Diagnosis& found) {
+  nlohmann::ordered_json mesh;
+  mesh["triangles"] = found.triangles;
+  mesh["vertices"] = found.vertices;
+  mesh["edges"] = found.edges;
+  mesh["shells"] = found.shells;
+  mesh["inverted_shells"] = found.inverted_shells;
+  mesh["closed"] = found.balanced;
+  mesh["bounds_mm"] = {{"lo", as_json(found.bounds.lo)}, {"hi", as_json(found.bounds.hi)}};
+  mesh["volume_mm3"] = found.volume_mm3;
+  for (const Kind& kind : kKinds) {
+    const auto& finding = found.*kind.finding;
+    nlohmann::ordered_json places = nlohmann::ordered_json::array();
+    for (const auto& place : finding.first) places.push_back({{"triangle", place.triangle + 1}, {"at_mm", as_json(place.at)}});
+    mesh[kind.key] = {{"count", finding.count}, {"first", places}};
+  }
+  return mesh;
+}
+
+}  // namespace
+
+Result<std::string> describe_part_text(const std::string& path, const load::LoadOptions& options) {
+  const Result<Description> description = describe(path, options);
+  if (!description) return description.error();
+  const Description& d = *description;
+  std::string text = one_line(path) + "\n";
+  row(text, "format", d.format);
+  if (d.part.instances.size() > 1 || d.part.meshes.size() > 1)
+    row(text, "meshes", fmt::format("{}, placed {} times", d.part.meshes.size(), d.part.instances.size()));
+  row(text, "triangles", grouped(d.total(&load::Diagnosis::triangles)));
+  row(text, "vertices", grouped(d.total(&load::Diagnosis::vertices)));
+  row(text, "shells", grouped(d.total(&load::Diagnosis::shells)));
+  row(text, "size", size_of(d.part.bounds));
+  row(text, "from", point(d.part.bounds.lo) + " mm");
+  row(text, "to", point(d.part.bounds.hi) + " mm");
+  row(text, "volume",
+      fmt::format("{:.6g} mm3{}", d.total(&load::Diagnosis::volume_mm3), d.balanced ? "" : " (of an open mesh: an estimate)"));
+  row(text, "closed", d.balanced ? "yes" : "no");
+  if (d.diagnosis.size() > 1) describe_meshes(d, text);
+  describe_findings(d, text);
+  describe_plan(d, text);
+  return text;
+}
+
+Result<std::string> describe_part_json(const std::string& path, const load::LoadOptions& options) {
+  const Result<Description> description = describe(path, options);
+  if (!description) return description.error();
+  const Description& d = *description;
+  nlohmann::ordered_json json;
+  json["path"] = path;
+  json["format"] = d.format;
+  json["items"] = d.part.instances.size();
+  json["triangles"] = d.total(&load::Diagnosis::triangles);
+  json["vertices"] = d.total(&load::Diagnosis::vertices);
+  json["shells"] = d.total(&load::Diagnosis::shells);
+  json["inverted_shells"] = d.total(&load::Diagnosis::inverted_shells);
+  json["bounds_mm"] = {{"lo", as_json(d.part.bounds.lo)}, {"hi", as_json(d.part.bounds.hi)}};
+  json["volume_mm3"] = d.total(&load::Diagnosis::volume_mm3);
+  json["closed"] = d.balanced;
+  json["notes"] = nlohmann::ordered_json::array();
+  json["repairs"] = nlohmann::ordered_json::array();
+  for (const Note& note : d.notes) json[note.repair ? "repairs" : "notes"].push_back(note.text);
+  json["meshes"] = nlohmann::ordered_json::array();
+  for (std::size_t i = 0; i < d.diagnosis.size(); ++i) {
+    nlohmann::ordered_json mesh = as_json(d.diagnosis[i]);
+    mesh["name"] = short_name(d, i);
+    mesh["copies"] = d.copies[i];
+    json["meshes"].push_back(std::move(mesh));
+  }
+  // Names in a file may be bytes that are not UTF-8.
+  return json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n";
+}
+
+}  // namespace lamina::pipeline

@@ -1,0 +1,320 @@
+#include "pipeline/show/report.h"
+
+#include <fmt/format.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <optional>
+#include <span>
+
+#include "pipeline/check/replay_job.h"
+#include "pipeline/output/layer_images.h"
+#include "pipeline/output/manifest.h"
+#include "pipeline/show/report_cast.h"
+#include "pipeline/show/slice_picture.h"  // is_slice_directory
+#include "pipeline/text/hash.h"
+#include "pipeline/text/json_text.h"
+#include "stages/view/report_views.h"
+#include "stages/write/read_image.h"
+#include "stages/write/report/page.h"
+#include "stages/write/report/run_code.h"
+
+namespace lamina::pipeline {
+namespace {
+
+namespace fs = std::filesystem;
+using write::report::PageData;
+
+constexpr std::uint32_t kChunk = 64;  // layers that are read together
+
+Result<Manifest> finished_manifest(const std::string& directory) {
+  std::error_code ignored;
+  const std::string path = directory + "/manifest.json";
+  if (!fs::exists(path, ignored) && fs::exists(path + ".part", ignored)) {
+    return Error{Fault::kVerification, fmt::format("{}: the job is not finished; end it with --resume, then ask for the "
+                                                   "report",
+                                                   directory)};
+  }
+  if (!fs::exists(path, ignored)) {
+    return Error{Fault::kVerification, fmt::format("{}: no manifest.json; name a finished directory of lamina jet (shards: "
+                                                   "run lamina merge first)",
+                                                   directory)};
+  }
+  if (is_slice_directory(directory)) {
+    return Error{Fault::kVerification, fmt::format("{}: is a job of lamina slice, and reports are of lamina jet's jobs; "
+                                                   "lamina preview draws its layers",
+                                                   directory)};
+  }
+  Result<Manifest> manifest = read_manifest(path);
+  if (!manifest) return manifest;
+  if (manifest->head.extension.empty()) {
+    return Error{Fault::kVerification, fmt::format("{}: the job wrote no images (format {}); plan it with another format, "
+                                                   "as tiff-g4",
+                                                   directory, manifest->head.format)};
+  }
+  if (manifest->layers.empty()) return Error{Fault::kVerification, directory + ": the job has no layers"};
+  return manifest;
+}
+
+/// A layer's files into runs, if they are those of the manifest; several materials are drawn as one.
+Result<Runs> read_layer(const std::string& directory, const ManifestHead& head, const LayerRecord& record) {
+  Runs whole;
+  for (const LayerImageFile& file : layer_images(head, record)) {
+    const std::string path = directory + "/" + file.name;
+    const Result<FileDigest> digest = digest_file(path);
+    if (!digest) return digest.error();
+    const Error changed{Fault::kVerification,
+                        fmt::format("{}: is not the file of the manifest; lamina verify tells more", path)};
+    if (digest->bytes != file.record.bytes || digest->hash != file.record.hash) return changed;
+    Result<write::LayerImage> image = write::read_image(path);
+    if (!image) return image.error();
+    if (image->runs.columns != head.grid.columns() || image->runs.view().rows() != head.grid.rows()) return changed;
+    if (!add_image(std::move(image->runs), whole)) return changed;
+  }
+  return whole;
+}
+
+/// The layers' codes that fit the page: when they get too many, every second one is let go.
+class HeldLayers {
+ public:
+  explicit HeldLayers(std::uint64_t limit) : limit_(limit) {}
+
+  bool wants(std::uint32_t place) const { return place % stride_ == 0; }
+  void add(std::uint32_t place, Buffer<std::byte> code) {
+    if (!wants(place)) return;
+    bytes_ += cost(code);
+    layers_.push_back({place, std::move(code)});
+    while (bytes_ > limit_ && layers_.size() > 1) {
+      stride_ *= 2;
+      std::erase_if(layers_, [&](const auto& layer) { return layer.first % stride_ != 0; });
+      bytes_ = 0;
+      for (const auto& layer : layers_) bytes_ += cost(layer.second);
+    }
+  }
+  std::uint32_t stride() const { return stride_; }
+  std::vector<std::pair<std::uint32_t, Buffer<std::byte>>>& layers() { return layers_; }
+
+ private:
+  static std::uint64_t cost(const Buffer<std::byte>& code) { return code.size() / 3 * 4 + 60; }
+  std::uint64_t limit_, bytes_ = 0;
+  std::uint32_t stride_ = 1;
+  std::vector<std::pair<std::uint32_t, Buffer<std::byte>>> layers_;
+};
+
+/// Calls `work(place, runs, slot)` for every layer on all processors, and then `gather(place, slot)` in order. The
+/// first layer whose work fails ends it.
+template <class Slot, class Work, class Gather>
+Status each_layer(const std::string& directory, const Manifest& manifest, Work work, Gather gather) {
+  const auto count = static_cast<std::uint32_t>(manifest.layers.size());
+  for (std::uint32_t first = 0; first < count; first += kChunk) {
+    const std::uint32_t end = std::min(first + kChunk, count);
+    std::vector<Slot> slots(end - first);
+    std::vector<Status> states(end - first);
+    tbb::parallel_for(first, end, [&](std::uint32_t place) {
+      const Result<Runs> runs = read_layer(directory, manifest.head, manifest.layers[place]);
+      states[place - first] = runs ? work(place, runs->view(), slots[place - first]) : Status(runs.error());
+    });
+    for (std::uint32_t place = first; place < end; ++place) {
+      if (!states[place - first]) return states[place - first];
+      gather(place, slots[place - first]);
+    }
+  }
+  return {};
+}
+
+template <class Value>
+std::string list(const std::vector<LayerRecord>& layers, Value value) {
+  std::string text = "[";
+  for (const LayerRecord& record : layers) text += fmt::format("{}{}", text.size() > 1 ? "," : "", value(record));
+  return text + "]";
+}
+
+std::string part_json(const PartSummary& part) {
+  std::string notes;
+  for (const Note& note : part.notes) {
+    notes += (notes.empty() ? "" : ",") + json_string((note.repair ? "repair: " : "") + note.text);
+  }
+  const auto point = [](const Point3& p) { return fmt::format("[{},{},{}]", mm(p.x), mm(p.y), mm(p.z)); };
+  return fmt::format("{{\"path\":{},\"copies\":{},\"triangles\":{},\"low_mm\":{},\"high_mm\":{},\"notes\":[{}]}}",
+                     json_string(part.path), part.copies, part.triangles, point(part.bounds.lo), point(part.bounds.hi), notes);
+}
+
+std::string title_of(const ManifestHead& head) {
+  if (head.parts.empty()) return "a job";
+  std::string title = fs::path(head.parts.front().path).filename().string();
+  if (head.parts.size() > 1) title += fmt::format(" and {} more", head.parts.size() - 1);
+  return title;
+}
+
+/// A view of the page: what its head says of it, and its pixels.
+struct ShownView {
+  std::string name;
+  std::uint32_t width = 0, height = 0, most = 0;  // most: of a depth; 0 for light and cover
+  double width_mm = 0, height_mm = 0;
+  Buffer<std::byte> deflated;
+};
+
+/// How long the machine takes for a layer, by its program; replayed as lamina verify does.
+Result<double> seconds_of_layer(const std::string& directory, const ManifestHead& head, const VirtualMachine& machine,
+                                const LayerRecord& record, const RunsView& image) {
+  const std::string program = program_of_layer(directory, head, record.layer.index);
+  if (hash_bytes(std::as_bytes(std::span(program))) == record.program.hash) {
+    const auto replay = machine.replay(program, record.layer, image, record.program.moved, record.program.lost);
+    if (replay) return replay->seconds;
+    return Error{Fault::kVerification, fmt::format("{}: {}", directory, replay.error().message)};
+  }
+  return Error{Fault::kVerification, fmt::format("{}/{}: is not the file of the manifest; lamina verify tells more", directory,
+                                                 program_file_name(record.layer.index, head.program_extension))};
+}
+
+/// The parts themselves, if their files can be found and are still those that were planned.
+Result<std::vector<ShownView>> views_of_parts(const std::string& directory, const ManifestHead& head,
+                                              const ReportOptions& options) {
+  std::vector<std::string> folders = options.parts;
+  const fs::path place = fs::absolute(directory).lexically_normal();
+  folders.insert(folders.end(), {".", directory, (place.has_filename() ? place : place.parent_path()).parent_path().string()});
+  const auto pictures = cast_parts(head, folders, 360);
+  if (!pictures) return pictures.error();
+  std::vector<ShownView> views;
+  for (const auto& [name, picture] :
+       {std::pair{"top", &(*pictures)[0]}, {"front", &(*pictures)[1]}, {"side", &(*pictures)[2]}}) {
+    views.push_back({name, picture->width, picture->height, 0, picture->width_mm, picture->height_mm,
+                     write::report::deflate_bytes(std::as_bytes(std::span(picture->light_cover)))});
+  }
+  return views;
+}
+
+std::vector<ShownView> views_of_layers(const ThreeViews& views) {
+  std::vector<ShownView> shown;
+  for (const DepthView& view : views.views()) {
+    shown.push_back({view.name, view.width, view.height, view.most, view.width_mm, view.height_mm,
+                     write::report::deflate_bytes(std::as_bytes(std::span(view.depth)))});
+  }
+  return shown;
+}
+
+/// What the page's script reads.
+std::string head_json(const Manifest& manifest, const FileDigest& file, const write::PixelWindow& window, HeldLayers& held,
+                      const std::vector<ShownView>& views, const std::vector<double>& seconds) {
+  const ManifestHead& head = manifest.head;
+  const std::vector<LayerRecord>& layers = manifest.layers;
+  std::string parts, places, sides;
+  for (const PartSummary& part : head.parts) parts += (parts.empty() ? "" : ",") + part_json(part);
+  for (const auto& [place, code] : held.layers()) places += fmt::format("{}{}", places.empty() ? "" : ",", place);
+  for (const ShownView& view : views) {
+    sides += fmt::format("{}\"{}\":[{},{},{},{:.6g},{:.6g}]", sides.empty() ? "" : ",", view.name, view.width, view.height,
+                         view.most, view.width_mm, view.height_mm);
+  }
+  std::string reasons;
+  for (int reason = 0; reason <= static_cast<int>(LayerReason::kFlat); ++reason) {
+    reasons += fmt::format("{}\"{}\"", reason == 0 ? "" : ",", reason_name(static_cast<LayerReason>(reason)));
+  }
+  std::string text = fmt::format(
+      "{{\"title\":{},\"version\":{},\"format\":{},\"machine\":{},\"columns\":{},\"rows\":{},\"dpi\":[{},{}],"
+      "\"pixel_mm\":[{},{}],\"window\":[{},{},{},{}],\"layer_count\":{},\"first_layer\":{},\"stride\":{},\"job\":{},"
+      "\"manifest\":{{\"bytes\":{},\"hash\":\"{}\"}},\"parts\":[{}],\"views\":{{{}}},\"reasons\":[{}],\"embedded\":[{}],",
+      json_string(title_of(head)), json_string(head.version), json_string(head.format), json_string(head.machine),
+      head.grid.columns(), head.grid.rows(), head.grid.x.dpi(), head.grid.y.dpi(), 25.4 / head.grid.x.dpi(),
+      25.4 / head.grid.y.dpi(), window.left, window.top, window.right, window.bottom, head.layer_count, head.first_layer,
+      held.stride(), json_string(head.job_toml), file.bytes, hex(file.hash), parts, sides, reasons, places);
+  text +=
+      fmt::format("\"layers\":{{\"bottom\":{},\"thickness\":{},\"reason\":{},\"set\":{},\"bytes\":{},\"capped\":{},\"hash\":{}",
+                  list(layers, [](const LayerRecord& r) { return r.layer.bottom; }),
+                  list(layers, [](const LayerRecord& r) { return r.layer.thickness; }),
+                  list(layers, [](const LayerRecord& r) { return static_cast<int>(r.layer.reason); }),
+                  list(layers, [](const LayerRecord& r) { return r.set_pixels; }),
+                  list(layers, [](const LayerRecord& r) { return r.bytes; }),
+                  list(layers, [](const LayerRecord& r) { return r.capped_rows; }),
+                  list(layers, [](const LayerRecord& r) { return fmt::format("\"{}\"", hex(r.hash)); }));
+  if (!head.machine.empty()) {
+    text += fmt::format(",\"sweeps\":{}", list(layers, [](const LayerRecord& r) { return r.program.sweeps; }));
+    std::string times;
+    for (const double time : seconds) times += fmt::format("{}{:.6g}", times.empty() ? "" : ",", time);
+    text += fmt::format(",\"seconds\":[{}]", times);
+  }
+  return text + "}}";
+}
+
+}  // namespace
+
+Result<Report> make_report(const std::string& directory, const ReportOptions& options) {
+  const Result<Manifest> manifest = finished_manifest(directory);
+  if (!manifest) return manifest.error();
+  const Result<FileDigest> file = digest_file(directory + "/manifest.json");
+  if (!file) return file.error();
+  const std::vector<LayerRecord>& layers = manifest->layers;
+  const PixelGrid& grid = manifest->head.grid;
+
+  std::optional<VirtualMachine> machine;
+  if (!manifest->head.machine.empty()) {
+    auto built = machine_of_job(directory, manifest->head);
+    if (!built) return Error{built.error().fault, fmt::format("{}/{}", directory, built.error().message)};
+    machine.emplace(std::move(*built));
+  }
+  Report report;
+  std::vector<ShownView> views;
+  if (auto shown = views_of_parts(directory, manifest->head, options)) {
+    views = std::move(*shown);
+  } else if (!options.parts.empty()) {
+    return Error{Fault::kInput, shown.error().message};
+  } else {
+    report.without_parts = shown.error().message;
+  }
+
+  struct First {
+    write::PixelWindow window;
+    Buffer<std::byte> code;
+    double seconds = 0;
+  };
+  // What a layer's line and the rest of the page take is not the layers' own.
+  std::uint64_t taken = (views.empty() ? 150'000 : 50'000) + 150 * layers.size();
+  for (const ShownView& view : views) taken += view.deflated.size() / 3 * 4;
+  HeldLayers held(options.size_limit > taken ? options.size_limit - taken : 0);
+  write::PixelWindow window;
+  std::vector<double> seconds;
+  Status status = each_layer<First>(
+      directory, *manifest,
+      [&](std::uint32_t place, const RunsView& runs, First& first) -> Status {
+        first.window = write::window_of(runs);
+        if (held.wants(place)) first.code = write::report::pack_runs(runs);
+        if (!machine) return {};
+        const auto time = seconds_of_layer(directory, manifest->head, *machine, layers[place], runs);
+        if (!time) return time.error();
+        first.seconds = *time;
+        return {};
+      },
+      [&](std::uint32_t place, First& first) {
+        window = write::joined(window, first.window);
+        held.add(place, std::move(first.code));
+        if (machine) seconds.push_back(first.seconds);
+      });
+  if (!status) return status.error();
+  if (window.empty()) window = {0, grid.columns(), 0, grid.rows()};
+
+  if (views.empty()) {
+    const Layer &lowest = layers.front().layer, &highest = layers.back().layer;
+    ThreeViews built(grid, window, lowest.bottom, highest.bottom + highest.thickness);
+    status = each_layer<std::vector<std::uint8_t>>(
+        directory, *manifest,
+        [&](std::uint32_t, const RunsView& runs, std::vector<std::uint8_t>& cells) -> Status {
+          built.look(runs, cells);
+          return {};
+        },
+        [&](std::uint32_t place, const std::vector<std::uint8_t>& cells) { built.add(layers[place].layer, cells); });
+    if (!status) return status.error();
+    views = views_of_layers(built);
+  }
+
+  const std::string head = head_json(*manifest, *file, window, held, views, seconds);
+  std::vector<PageData> data;
+  for (ShownView& view : views) data.push_back({"v-" + view.name, std::move(view.deflated)});
+  for (auto& [place, code] : held.layers()) data.push_back({fmt::format("r{}", place), std::move(code)});
+  report.layers = static_cast<std::uint32_t>(layers.size());
+  report.held = static_cast<std::uint32_t>(held.layers().size());
+  report.stride = held.stride();
+  report.page = write::report::make_page("lamina: " + title_of(manifest->head), head, data);
+  return report;
+}
+
+}  // namespace lamina::pipeline

@@ -1,0 +1,51 @@
+#include "pipeline/show/report_cast.h"
+
+#include <fmt/format.h>
+
+#include <filesystem>
+
+#include "pipeline/job/file.h"
+#include "pipeline/plan/scene.h"
+
+namespace lamina::pipeline {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// The file of that name in the first folder that has one; empty if none has.
+std::string find_part(const std::string& name, const std::vector<std::string>& folders) {
+  std::error_code ignored;
+  for (const fs::path folder : folders) {
+    if (fs::is_regular_file(folder, ignored) && folder.filename() == name) return folder.string();
+    if (fs::is_regular_file(folder / name, ignored)) return (folder / name).string();
+  }
+  return {};
+}
+
+}  // namespace
+
+Result<std::array<view::Picture, 3>> cast_parts(const ManifestHead& head, const std::vector<std::string>& folders,
+                                                std::uint32_t most) {
+  Job job;
+  if (Status status = read_job_text(head.job_toml, "manifest.json", job); !status) return status.error();
+  for (PartRequest& part : job.parts) {
+    const std::string name = fs::path(part.path).filename().string();
+    part.path = find_part(name, folders);
+    if (part.path.empty()) return Error{Fault::kInput, fmt::format("{}: not found; name its folder with --parts", name)};
+  }
+  // The bed is what the manifest says, whatever has become of the machine's profile.
+  job.bed_mm = {mm(head.grid.x.length), mm(head.grid.y.length)};
+  const Result<Scene> scene = load_scene(job);
+  if (!scene) return scene.error();
+  for (std::size_t i = 0; i < scene->parts.size(); ++i) {
+    if (i < head.parts.size() && scene->parts[i].fingerprint == head.parts[i].fingerprint) continue;
+    return Error{Fault::kInput,
+                 fmt::format("{}: is not the part that was planned, its triangles are others", job.parts[i].path)};
+  }
+  const Result<view::Caster> caster = view::Caster::build(scene->meshes, scene->instances);
+  if (!caster) return caster.error();
+  return std::array{caster->look(view::Side::kTop, most), caster->look(view::Side::kFront, most),
+                    caster->look(view::Side::kRight, most)};
+}
+
+}  // namespace lamina::pipeline

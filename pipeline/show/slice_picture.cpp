@@ -1,0 +1,125 @@
+#include "pipeline/show/slice_picture.h"
+
+#include <fmt/format.h>
+
+#include <array>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <map>
+#include <memory>
+
+#include "pipeline/job/file.h"
+#include "pipeline/run/slice.h"
+#include "stages/data/clipping.h"
+
+namespace lamina::pipeline {
+namespace {
+
+std::string manifest_text(const std::string& directory) {
+  std::ifstream file(directory + "/manifest.json", std::ios::binary);
+  return {std::istreambuf_iterator<char>(file), {}};
+}
+
+/// The line of a layer in a manifest of our own making, or "".
+std::string line_of(const std::string& manifest, std::uint32_t layer) {
+  const std::string begin = fmt::format("\n    {{\"layer\":{},", layer);
+  const std::size_t at = manifest.find(begin);
+  return at == std::string::npos ? std::string() : manifest.substr(at + 1, manifest.find('\n', at + 1) - at - 1);
+}
+
+constexpr std::array<std::pair<PathKind, std::string_view>, 5> kKinds = {{{PathKind::kOuter, "outer wall"},
+                                                                          {PathKind::kInner, "inner wall"},
+                                                                          {PathKind::kContour, "closed curve"},
+                                                                          {PathKind::kLink, "link"},
+                                                                          {PathKind::kRaster, "line"}}};
+
+/// What the beads of a kind cover, width by width.
+Result<Contours> outline_of(const ToolpathsView& paths, PathKind kind) {
+  std::map<Nm, Contours> by_width;
+  for (std::uint32_t p = 0; p < paths.size(); ++p) {
+    const std::uint32_t last = paths.offset[p + 1] - 1;
+    for (std::uint32_t begin = paths.offset[p]; begin < last;) {
+      std::uint32_t end = begin + 1;
+      while (end < last && paths.kind[end] == paths.kind[begin] && paths.width[end] == paths.width[begin]) ++end;
+      if (paths.kind[begin] == kind) {
+        Contours& lines = by_width[paths.width[begin]];
+        lines.point.insert(lines.point.end(), paths.point.begin() + begin, paths.point.begin() + end + 1);
+        lines.close();
+      }
+      begin = end;
+    }
+  }
+  Contours all;
+  for (const auto& [width, lines] : by_width) {
+    const auto covered = cover_lines(lines, width);
+    if (!covered) return covered.error();
+    for (std::uint32_t c = 0; c < covered->size(); ++c) {
+      all.point.insert(all.point.end(), (*covered)[c].begin(), (*covered)[c].end());
+      all.close();
+    }
+  }
+  return all;
+}
+
+}  // namespace
+
+bool is_slice_directory(const std::string& directory) {
+  std::ifstream file(directory + "/manifest.json", std::ios::binary);
+  std::string head(200, '\0');
+  file.read(head.data(), static_cast<std::streamsize>(head.size()));
+  return head.find("\"kind\": \"slice\"") != std::string::npos;
+}
+
+Result<SlicePictures> SlicePictures::open(const std::string& directory) {
+  Job job;
+  if (Status status = read_job(directory + "/job.toml", job); !status) return status.error();
+  auto plan = SlicePlan::make(job, [](const ProgressEvent&) {});
+  if (!plan) return plan.error();
+  const auto range = layer_range(job, static_cast<std::uint32_t>(plan->layers().size()));
+  if (!range) return range.error();
+  SlicePictures pictures(directory, std::move(*plan));
+  pictures.manifest_ = manifest_text(directory);
+  pictures.range_ = *range;
+  return pictures;
+}
+
+Result<LayerShapes> SlicePictures::layer(std::uint32_t index) const {
+  if (index >= count()) {
+    return Error{Fault::kUsage, fmt::format("--layer {}: the job has layers 0 to {}", index, count() - 1)};
+  }
+  SlicePlan::Work work;
+  if (Status status = plan_.layer(index, work); !status) return status.error();
+  LayerShapes shapes;
+  shapes.index = index;
+  shapes.z = plan_.layers()[index].layer.plane();
+  shapes.contours = std::move(work.contours.contours);
+  const double area = square_mm(doubled_area(shapes.contours));
+  const std::string line = line_of(manifest_, index);
+  if (!line.empty() && line.find(fmt::format("\"points\":{},\"area_mm2\":{:.9f},\"paths\":{},", shapes.contours.point.size(),
+                                             area, work.paths.size())) == std::string::npos) {
+    return Error{Fault::kVerification, fmt::format("{}: layer {} is not what was written: a part has changed since; slice it "
+                                                   "again",
+                                                   directory_, index)};
+  }
+  shapes.box = plan_.bounds();
+  for (const auto& [kind, name] : kKinds) {
+    auto outline = outline_of(work.paths, kind);
+    if (!outline) return outline.error();
+    if (outline->size() > 0) shapes.beads.push_back({ink_of(kind), std::string(name), std::move(*outline)});
+  }
+  shapes.title = fmt::format("{}   |   layer {} of {}   |   z {:.3f} mm", name(), index, count(), mm(shapes.z));
+  shapes.caption = fmt::format("{} contours, {:.2f} mm2", shapes.contours.size(), area);
+  if (work.paths.size() > 0) shapes.caption += fmt::format(", {} paths", work.paths.size());
+  return shapes;
+}
+
+Result<LayerSeries> slice_series(const std::string& directory) {
+  auto opened = SlicePictures::open(directory);
+  if (!opened) return opened.error();
+  const auto pictures = std::make_shared<const SlicePictures>(std::move(*opened));
+  return LayerSeries{pictures->name(), pictures->first(), pictures->last(), pictures->count(),
+                     [pictures](std::uint32_t index) { return pictures->layer(index); }};
+}
+
+}  // namespace lamina::pipeline

@@ -1,0 +1,42 @@
+// pipeline/show/slice_picture.h: one layer of a sliced job again, as shapes to look at.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <string>
+#include <utility>
+
+#include "pipeline/run/slice.h"
+#include "stages/data/status.h"
+#include "stages/view/layer_shapes.h"
+
+namespace lamina::pipeline {
+
+/// Whether a directory's manifest.json is that of lamina slice.
+bool is_slice_directory(const std::string& directory);
+
+/// The job that lamina slice left in a directory (job.toml), planned again from its parts.
+class SlicePictures {
+ public:
+  /// errors  kUsage; kInput: a part that cannot be read
+  static Result<SlicePictures> open(const std::string& directory);
+  /// Of all layers, those that were sliced: [first, last).
+  std::uint32_t first() const { return range_[0]; }
+  std::uint32_t last() const { return range_[1]; }
+  std::uint32_t count() const { return static_cast<std::uint32_t>(plan_.layers().size()); }
+  /// errors  kUsage: no such layer; kVerification: a part that is not what it was
+  Result<LayerShapes> layer(std::uint32_t index) const;
+  /// Of the first part.
+  std::string name() const { return plan_.names().empty() ? std::string() : plan_.names().front(); }
+
+ private:
+  SlicePictures(std::string directory, SlicePlan plan) : directory_(std::move(directory)), plan_(std::move(plan)) {}
+  std::string directory_, manifest_;
+  SlicePlan plan_;
+  std::array<std::uint32_t, 2> range_{};
+};
+
+/// The same as a series. errors  of SlicePictures
+Result<LayerSeries> slice_series(const std::string& directory);
+
+}  // namespace lamina::pipeline

@@ -1,0 +1,59 @@
+#include "pipeline/text/hash.h"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <unistd.h>
+#include <xxhash.h>
+
+#include <cerrno>
+#include <charconv>
+#include <cstring>
+#include <memory>
+#include <vector>
+
+namespace lamina::pipeline {
+
+Hash128 hash_bytes(std::span<const std::byte> bytes) {
+  const XXH128_hash_t hash = XXH3_128bits(bytes.data(), bytes.size());
+  return {hash.high64, hash.low64};
+}
+
+std::string hex(const Hash128& hash) { return fmt::format("{:016x}{:016x}", hash.high, hash.low); }
+
+bool read_hex(std::string_view text, Hash128& hash) {
+  if (text.size() != 32) return false;
+  const auto half = [&](std::size_t from, std::uint64_t& value) {
+    const char* end = text.data() + from + 16;
+    const auto [stop, error] = std::from_chars(text.data() + from, end, value, 16);
+    return error == std::errc() && stop == end;
+  };
+  return half(0, hash.high) && half(16, hash.low);
+}
+
+Result<FileDigest> digest_file(const std::string& path) {
+  const auto failed = [&] { return Error{Fault::kVerification, fmt::format("{}: {}", path, std::strerror(errno))}; };
+  const int file = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
+  if (file < 0) return failed();
+  const std::unique_ptr<XXH3_state_t, XXH_errorcode (*)(XXH3_state_t*)> state(XXH3_createState(), XXH3_freeState);
+  XXH3_128bits_reset(state.get());
+  std::vector<std::byte> piece(256 << 10);
+  FileDigest digest;
+  while (true) {
+    const ssize_t got = ::read(file, piece.data(), piece.size());
+    if (got < 0 && errno == EINTR) continue;
+    if (got < 0) {
+      const Error error = failed();
+      ::close(file);
+      return error;
+    }
+    if (got == 0) break;
+    digest.bytes += static_cast<std::uint64_t>(got);
+    XXH3_128bits_update(state.get(), piece.data(), static_cast<std::size_t>(got));
+  }
+  ::close(file);
+  const XXH128_hash_t hash = XXH3_128bits_digest(state.get());
+  digest.hash = {hash.high64, hash.low64};
+  return digest;
+}
+
+}  // namespace lamina::pipeline

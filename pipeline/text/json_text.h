@@ -1,0 +1,18 @@
+// pipeline/text/json_text.h: the few pieces of JSON that are written by hand, so that a line costs no document tree.
+#pragma once
+
+#include <string>
+#include <string_view>
+
+namespace lamina::pipeline {
+
+/// The text in quotes, escaped for JSON (and for TOML's basic strings); bytes that are not UTF-8 become U+FFFD.
+std::string json_string(std::string_view text);
+
+/// Whether the bytes are UTF-8.
+bool is_utf8(std::string_view text);
+
+/// The text without line breaks and other control characters, for messages of one line.
+std::string one_line(std::string_view text);
+
+}  // namespace lamina::pipeline

@@ -1,0 +1,46 @@
+// pipeline/text/number_text.h: numbers as people write them in options and job files, read strictly.
+//
+// The whole text has to be a number, and it has to be finite: "12mm", "1e999", "nan" and "inf" are no numbers here.
+// Every reader returns an empty string, or what is wrong and what would be right, to stand behind the option's name.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace lamina::pipeline {
+
+/// A number in [low, high]. `unit` is for the message only, as in " mm".
+std::string read_number(std::string_view text, double low, double high, std::string_view unit, double& value);
+
+/// A whole number in [low, high]; 600 and 600.0 are both whole.
+std::string read_whole(std::string_view text, std::int64_t low, std::int64_t high, std::int64_t& value);
+
+/// true or false.
+std::string read_switch(std::string_view text, bool& value);
+
+/// Two numbers, as 490x380 or 490,380.
+std::string read_pair(std::string_view text, double low, double high, std::string_view unit, std::array<double, 2>& values);
+
+/// Three numbers, as 1,1,1.02, or one that stands for all three if `one_for_all`.
+std::string read_triple(std::string_view text, double low, double high, std::string_view unit, bool one_for_all,
+                        std::array<double, 3>& values);
+
+/// Bytes: 1073741824, 256M, 1G, 1.5GiB; K, M and G are powers of 1024.
+std::string read_bytes(std::string_view text, std::uint64_t& bytes);
+
+/// Layers first:last, from 0, without last; either side may be missing. An open end is UINT32_MAX.
+std::string read_layer_range(std::string_view text, std::array<std::uint32_t, 2>& range);
+
+/// Shard i/n with i from 1 to n; `shard` holds i from 0.
+std::string read_shard(std::string_view text, std::array<std::uint32_t, 2>& shard);
+
+/// The parts of a text between any of `separators`; one empty part for an empty text.
+std::vector<std::string_view> split(std::string_view text, std::string_view separators);
+
+/// The shortest text that reads back as the same number; never -0.
+std::string number_text(double value);
+
+}  // namespace lamina::pipeline

@@ -1,0 +1,29 @@
+// pipeline/text/table.h: lines of tables that people fill in: CSV by commas or semicolons, or tabs.
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "pipeline/text/number_text.h"
+
+namespace lamina::pipeline {
+
+/// What separates the columns of a table, by its first line.
+inline char separator_of(std::string_view header) {
+  return header.find('\t') != std::string_view::npos ? '\t' : header.find(';') != std::string_view::npos ? ';' : ',';
+}
+
+/// The cells of a line without blanks and quotes around them.
+inline std::vector<std::string> cells_of(std::string_view line, char separator) {
+  if (line.ends_with('\r')) line.remove_suffix(1);
+  std::vector<std::string> cells;
+  for (std::string_view cell : split(line, std::string_view(&separator, 1))) {
+    while (!cell.empty() && (cell.front() == ' ' || cell.front() == '"')) cell.remove_prefix(1);
+    while (!cell.empty() && (cell.back() == ' ' || cell.back() == '"')) cell.remove_suffix(1);
+    cells.emplace_back(cell);
+  }
+  return cells;
+}
+
+}  // namespace lamina::pipeline

@@ -1,0 +1,41 @@
+// stages/arrange/placement.h: where boxes stand on the bed.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "stages/data/status.h"
+
+namespace lamina::pipeline {
+
+/// The box of one [[part]] and how many of it have to stand.
+struct BoxRequest {
+  std::int64_t width = 0, depth = 0;  // nm
+  std::uint32_t copies = 1;
+  std::optional<std::int64_t> at_x = {}, at_y = {};  // nm; both or none
+  std::string name = {};                             // for messages
+};
+
+/// The front left corner of one copy.
+struct Place {
+  std::uint32_t request;  // index of its BoxRequest
+  std::int64_t x, y;      // nm
+};
+
+/// Places all copies, in the order of the requests.
+///
+/// A request with a position gets it for its first copy; further ones follow along x, their width and the gap apart.
+/// The others fill rows from the left, `gap` apart; a row is as deep as its deepest box, and the next one begins
+/// behind it. The block of all rows is centred on the bed, rounded down. No box is turned.
+///
+/// bed_of_machine  the bed is that of a machine, so that advice names no other size of it
+///
+/// errors  kUsage if a copy does not lie within the bed: which, by how much, and what would help
+/// cost    O(copies)
+Result<std::vector<Place>> place_boxes(std::span<const BoxRequest> requests, std::int64_t bed_width, std::int64_t bed_depth,
+                                       std::int64_t gap, bool bed_of_machine = false);
+
+}  // namespace lamina::pipeline

@@ -1,0 +1,91 @@
+#include "stages/replay/replay_gcode.h"
+
+#include <fmt/format.h>
+
+namespace lamina::pipeline {
+
+void GcodeReader::fault(const std::string& what) const { printing_.fault(fmt::format("line {}: {}", number_, what)); }
+
+bool GcodeReader::take(GcodeLine& line, bool all_words) {
+  while (!left_.empty()) {
+    const std::size_t end = left_.find('\n');
+    if (end == std::string_view::npos) {
+      ++number_;
+      fault("the program ends within a line");
+    }
+    now_ = left_.substr(0, end);
+    left_.remove_prefix(end + 1);
+    ++number_;
+    now_ = now_.substr(0, now_.find(';'));
+    while (now_.ends_with(' ')) now_.remove_suffix(1);
+    if (now_.empty()) continue;
+    const std::size_t space = now_.find(' ');
+    line.command = now_.substr(0, space);
+    line.rest = space == std::string_view::npos ? std::string_view() : now_.substr(space + 1);
+    line.word.clear();
+    if (line.command[0] != 'G' && line.command[0] != 'M' && line.command[0] != 'T') return true;
+    if (!all_words && line.command == "M117") return true;
+    for (std::string_view rest = line.rest; !rest.empty();) {
+      const std::size_t gap = std::min(rest.find(' '), rest.size());
+      double value = 0;
+      const auto [stop, error] = std::from_chars(rest.data() + 1, rest.data() + gap, value);
+      if (rest[0] < 'A' || rest[0] > 'Z' || error != std::errc() || stop != rest.data() + gap) {
+        fault(fmt::format("'{}' is no word", rest.substr(0, gap)));
+      }
+      line.word[rest[0]] = value;
+      rest.remove_prefix(std::min(gap + 1, rest.size()));
+    }
+    return true;
+  }
+  return false;
+}
+
+double GcodeReader::number(const GcodeLine& line, char letter) const {
+  const auto found = line.word.find(letter);
+  if (found == line.word.end()) fault(fmt::format("{} lacks {}", line.command, letter));
+  return found->second;
+}
+
+std::uint32_t GcodeReader::count(const GcodeLine& line, char letter) const {
+  const double value = number(line, letter);
+  if (!(value >= 0 && value <= 4294967295.0) || value != std::floor(value))
+    fault(fmt::format("{}{:g} is no count", letter, value));
+  return static_cast<std::uint32_t>(value);
+}
+
+bool Axes::take(const GcodeLine& line, bool scanning) {
+  if (line.command == "G90" || line.command == "G91") {
+    relative_ = line.command == "G91";
+    return true;
+  }
+  if (line.command != "G0" && line.command != "G1") return false;
+  const auto& profile = printing_.profile();
+  double head_squared = 0;
+  if (line.has('F')) feed_mm_s_ = line.word.at('F') / 60;
+  if (!(feed_mm_s_ > 0)) reader_.fault("moves at no speed");
+  for (const auto& [letter, value] : line.word) {
+    if (letter == 'F') continue;
+    double& at = at_[letter];
+    const double way = relative_ ? value : value - at;
+    at += way;
+    const std::string axis(1, letter);
+    if (axis == profile.motion.x_axis || axis == profile.motion.y_axis) {
+      head_squared += way * way;
+    } else if (axis == profile.powder.build_axis || axis == profile.powder.roller_axis) {
+      printing_.takes(std::abs(way) / feed_mm_s_);
+      if (axis == profile.powder.build_axis) {
+        printing_.build_vat_stands_at(at);
+      } else {
+        printing_.roller_stands_at(at);
+      }
+    } else if (axis == profile.powder.feed_axes[0] || axis == profile.powder.feed_axes[1]) {
+      printing_.feeds(axis == profile.powder.feed_axes[0] ? 0 : 1, way * profile.powder.feed_sign, feed_mm_s_);
+    } else {
+      reader_.fault(fmt::format("the machine has no axis {}", letter));
+    }
+  }
+  if (head_squared > 0) printing_.head_moves(std::sqrt(head_squared), feed_mm_s_, scanning);
+  return true;
+}
+
+}  // namespace lamina::pipeline

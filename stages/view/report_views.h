@@ -1,0 +1,48 @@
+// stages/view/report_views.h: parts from three sides, as their layers build them up.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "stages/data/grid.h"
+#include "stages/data/layer.h"
+#include "stages/data/runs.h"
+#include "stages/write/coverage.h"
+
+namespace lamina::pipeline {
+
+/// How near the surface is in each direction of a view; 0 where nothing is. Rows from the top.
+struct DepthView {
+  std::string name;  // top, front, side
+  std::uint32_t width = 0, height = 0, most = 1;
+  double width_mm = 0, height_mm = 0;
+  std::vector<std::uint16_t> depth;
+};
+
+/// Layers are looked at as coverage on a grid of at most 360 x 360 cells of the window that holds them all; a cell that
+/// is at least half set is solid.
+class ThreeViews {
+ public:
+  /// `window` not empty; heights in nm above the bed.
+  ThreeViews(const PixelGrid& grid, const write::PixelWindow& window, Nm bottom, Nm top);
+
+  std::uint32_t columns() const { return columns_; }
+  std::uint32_t rows() const { return rows_; }
+
+  /// The coverage of a layer, columns() x rows() values; for any thread.
+  void look(const RunsView& runs, std::vector<std::uint8_t>& cells) const;
+  /// Adds a layer that was looked at; in any order, from one thread at a time.
+  void add(const Layer& layer, const std::vector<std::uint8_t>& cells);
+
+  const std::array<DepthView, 3>& views() const { return views_; }
+
+ private:
+  write::PixelWindow window_;
+  std::uint32_t columns_, rows_, levels_;
+  Nm bottom_, top_;
+  std::array<DepthView, 3> views_;
+};
+
+}  // namespace lamina::pipeline
