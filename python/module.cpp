@@ -19,6 +19,7 @@
 #include "pipeline/run/jet.h"
 #include "pipeline/run/slice.h"
 #include "pipeline/run/summary.h"
+#include "pipeline/text/version.h"
 
 namespace lamina::python {
 namespace {

@@ -14,8 +14,8 @@
 
 #include "pipeline/batch/summary.h"
 #include "pipeline/cli/console.h"
+#include "pipeline/cli/progress_bar.h"
 #include "pipeline/flow/interrupt.h"
-#include "pipeline/flow/progress.h"
 #include "pipeline/text/json_text.h"
 
 namespace lamina::pipeline {

@@ -1,4 +1,5 @@
 #include "pipeline/batch/job.h"
+#include "pipeline/text/version.h"
 
 #include <fmt/format.h>
 

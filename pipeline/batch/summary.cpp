@@ -1,7 +1,9 @@
 #include "pipeline/batch/summary.h"
+#include "pipeline/flow/progress.h"
+#include "pipeline/text/readable.h"
+#include "pipeline/text/version.h"
 
 #include <fmt/format.h>
-#include <sys/resource.h>
 
 #include <algorithm>
 
@@ -11,12 +13,6 @@
 
 namespace lamina::pipeline {
 namespace {
-
-std::uint64_t peak_resident_bytes() {
-  rusage usage{};
-  getrusage(RUSAGE_SELF, &usage);
-  return static_cast<std::uint64_t>(usage.ru_maxrss) * 1024;
-}
 
 std::string cell(std::string_view text) {
   std::string line = one_line(text);

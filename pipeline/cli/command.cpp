@@ -1,4 +1,5 @@
 #include "pipeline/cli/command.h"
+#include "pipeline/text/version.h"
 
 #include <fmt/format.h>
 #include <malloc.h>
@@ -76,8 +77,6 @@ const Command* find_command(std::string_view name) {
   const auto found = std::ranges::find(kCommands, name, &Command::name);
   return found == std::end(kCommands) ? nullptr : found;
 }
-
-std::string_view version() { return LAMINA_VERSION; }
 
 bool Arguments::has(std::string_view flag) const {
   for (const auto& [name, value] : options) {

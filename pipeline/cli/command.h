@@ -15,9 +15,6 @@ namespace lamina::pipeline {
 /// Runs the command that the arguments name and returns the exit code; errors are one line on stderr.
 int run_program(int argument_count, char** arguments);
 
-/// The version, as in "0.1.0".
-std::string_view version();
-
 /// One option of a command. A switch has no value.
 struct OptionSpec {
   std::string flag;   // "-o,--output"

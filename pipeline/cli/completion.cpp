@@ -9,6 +9,7 @@
 #include "pipeline/cli/markdown_page.h"
 #include "pipeline/text/names.h"
 #include "pipeline/text/number_text.h"
+#include "pipeline/text/version.h"
 #include "stages/write/atomic_file.h"
 
 namespace lamina::pipeline {

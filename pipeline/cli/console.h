@@ -40,9 +40,4 @@ bool is_terminal();
 /// Columns of the terminal at stderr, or 80.
 int terminal_columns();
 
-// --- numbers for people
-std::string readable_bytes(std::uint64_t bytes);  // 1.50 GB (powers of 1000)
-std::string readable_seconds(double seconds);     // 0.123 s, 12.3 s, 3 min 20 s, 2 h 05 min
-std::string readable_count(std::uint64_t count);  // 1 234 567
-
 }  // namespace lamina::pipeline

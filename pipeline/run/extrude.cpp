@@ -1,7 +1,8 @@
 #include "pipeline/run/extrude.h"
+#include "pipeline/flow/progress.h"
+#include "pipeline/text/version.h"
 
 #include <fmt/format.h>
-#include <sys/resource.h>
 #include <tbb/global_control.h>
 
 #include <chrono>
@@ -11,7 +12,6 @@
 #include <optional>
 #include <span>
 
-#include "pipeline/cli/command.h"  // version
 #include "pipeline/flow/layer_flow.h"
 #include "pipeline/plan/heights_study.h"
 #include "pipeline/run/extrude_layer.h"
@@ -26,12 +26,6 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
-
-std::uint64_t peak_resident_bytes() {
-  rusage usage{};
-  getrusage(RUSAGE_SELF, &usage);
-  return static_cast<std::uint64_t>(usage.ru_maxrss) * 1024;
-}
 
 std::string source_text(const SlicePlan& plan) {
   std::string text;

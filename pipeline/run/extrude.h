@@ -7,10 +7,10 @@
 #include <string>
 #include <vector>
 
+#include "pipeline/flow/progress.h"
 #include "pipeline/job/job.h"
 #include "pipeline/machine/extruder.h"
 #include "pipeline/plan/scene.h"
-#include "pipeline/run/jet.h"  // ProgressCallback
 #include "stages/data/status.h"
 #include "stages/write/extrusion_format.h"
 

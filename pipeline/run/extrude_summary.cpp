@@ -2,10 +2,10 @@
 
 #include <cmath>
 
-#include "pipeline/cli/console.h"
 #include "pipeline/run/extrude.h"
 #include "pipeline/text/json_text.h"
 #include "pipeline/text/number_text.h"
+#include "pipeline/text/readable.h"
 #include "stages/write/gcode/gcode.h"
 
 namespace lamina::pipeline {

@@ -1,7 +1,7 @@
 #include "pipeline/run/jet.h"
+#include "pipeline/flow/progress.h"
 
 #include <fmt/core.h>
-#include <sys/resource.h>
 #include <tbb/global_control.h>
 #include <tbb/info.h>
 
@@ -73,12 +73,6 @@ class RowWarnings {
   }
   Tally capped_, open_;
 };
-
-std::uint64_t peak_resident_bytes() {
-  rusage usage{};
-  getrusage(RUSAGE_SELF, &usage);
-  return static_cast<std::uint64_t>(usage.ru_maxrss) * 1024;
-}
 
 /// The layers of the range that are still to do, and the records that stand, by resume.
 struct LayerPlan {

@@ -3,23 +3,16 @@
 
 #include <atomic>
 #include <cstdint>
-#include <functional>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "pipeline/flow/progress.h"
 #include "pipeline/job/job.h"
 #include "pipeline/plan/scene.h"
 #include "stages/data/status.h"
 
 namespace lamina::pipeline {
-
-/// Told from time to time, from one thread at a time, while a job runs.
-struct ProgressEvent {
-  enum class Stage { kLoading, kIndexing, kLayers } stage;
-  std::uint32_t done = 0, total = 0;  // layers
-};
-using ProgressCallback = std::function<void(const ProgressEvent&)>;
 
 struct StageSeconds {
   double load = 0, index = 0, layers = 0;    // wall

@@ -1,7 +1,8 @@
 #include "pipeline/run/slice.h"
+#include "pipeline/flow/progress.h"
+#include "pipeline/text/version.h"
 
 #include <fmt/format.h>
-#include <sys/resource.h>
 #include <tbb/global_control.h>
 
 #include <chrono>
@@ -9,7 +10,6 @@
 #include <filesystem>
 #include <optional>
 
-#include "pipeline/cli/command.h"  // version
 #include "pipeline/flow/layer_flow.h"
 #include "pipeline/job/file.h"
 #include "pipeline/job/keys.h"
@@ -79,12 +79,6 @@ class SliceManifest {
   write::GrowingFile file_;
   bool first_ = true;
 };
-
-std::uint64_t peak_resident_bytes() {
-  rusage usage{};
-  getrusage(RUSAGE_SELF, &usage);
-  return static_cast<std::uint64_t>(usage.ru_maxrss) * 1024;
-}
 
 }  // namespace
 

@@ -8,10 +8,10 @@
 #include <string>
 #include <vector>
 
+#include "pipeline/flow/progress.h"
 #include "pipeline/job/job.h"
 #include "pipeline/plan/layers.h"
 #include "pipeline/plan/scene.h"
-#include "pipeline/run/jet.h"  // ProgressCallback
 #include "stages/data/layer.h"
 #include "stages/data/status.h"
 #include "stages/data/toolpaths.h"

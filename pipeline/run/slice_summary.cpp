@@ -1,10 +1,10 @@
 #include <fmt/format.h>
 
-#include "pipeline/cli/console.h"
 #include "pipeline/plan/heights.h"
 #include "pipeline/run/slice.h"
 #include "pipeline/text/json_text.h"
 #include "pipeline/text/number_text.h"
+#include "pipeline/text/readable.h"
 
 namespace lamina::pipeline {
 

@@ -1,4 +1,5 @@
 #include "pipeline/run/summary.h"
+#include "pipeline/text/readable.h"
 
 #include "pipeline/plan/heights.h"
 
@@ -6,7 +7,6 @@
 
 #include <vector>
 
-#include "pipeline/cli/console.h"
 #include "pipeline/text/json_text.h"
 #include "pipeline/text/number_text.h"
 

@@ -3,11 +3,11 @@
 #include <algorithm>
 #include <filesystem>
 
-#include "pipeline/cli/console.h"
 #include "pipeline/plan/heights.h"
 #include "pipeline/plan/heights_study.h"
 #include "pipeline/text/json_text.h"
 #include "pipeline/text/number_text.h"
+#include "pipeline/text/readable.h"
 #include "stages/write/rp3/rp3.h"
 
 namespace lamina::pipeline {

@@ -1,4 +1,5 @@
 #include "pipeline/show/preview_layers.h"
+#include "pipeline/text/readable.h"
 
 #include <fmt/format.h>
 

@@ -6,9 +6,10 @@
 #include <nlohmann/json.hpp>
 
 #include "pipeline/cli/console.h"
-#include "pipeline/flow/progress.h"
+#include "pipeline/cli/progress_bar.h"
 #include "pipeline/run/summary.h"
 #include "pipeline/text/json_text.h"
+#include "pipeline/text/readable.h"
 #include "tests/commands/program.h"
 
 namespace lamina::pipeline {

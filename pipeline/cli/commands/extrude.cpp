@@ -6,8 +6,8 @@
 #include "pipeline/cli/command.h"
 #include "pipeline/cli/console.h"
 #include "pipeline/cli/keys.h"
+#include "pipeline/cli/progress_bar.h"
 #include "pipeline/flow/interrupt.h"
-#include "pipeline/flow/progress.h"
 #include "pipeline/job/file.h"
 #include "pipeline/run/extrude.h"
 

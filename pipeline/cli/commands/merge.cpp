@@ -4,6 +4,7 @@
 #include "pipeline/cli/console.h"
 #include "pipeline/output/merge.h"
 #include "pipeline/text/json_text.h"
+#include "pipeline/text/readable.h"
 
 namespace lamina::pipeline {
 namespace {

@@ -8,6 +8,7 @@
 #include "pipeline/cli/console.h"
 #include "pipeline/show/report.h"
 #include "pipeline/text/number_text.h"
+#include "pipeline/text/readable.h"
 #include "stages/write/atomic_file.h"
 
 namespace lamina::pipeline {
