@@ -11,6 +11,7 @@
 #include "pipeline/run/extrude.h"
 #include "pipeline/text/number_text.h"
 #include "stages/write/atomic_file.h"
+#include "stages/write/stl/block.h"
 
 namespace lamina::pipeline {
 namespace {
@@ -23,32 +24,6 @@ constexpr double kLineGap = 2;  // between the lines that are measured, edge to 
 /// and from each other, and two thirds of a distance to spare (62 and 48 mm for the document's 12 and 9).
 double width_for(std::size_t lines, double bead) {
   return std::round((2 * static_cast<double>(lines) + 1 + 2.0 / 3) * (bead + kLineGap) + bead);
-}
-
-/// A closed block from the origin as binary STL.
-std::string block_stl(const std::array<double, 3>& size) {
-  std::string bytes(80, ' ');
-  const auto put = [&](const auto& value) { bytes.append(reinterpret_cast<const char*>(&value), sizeof value); };
-  put(std::uint32_t{12});
-  for (int axis = 0; axis < 3; ++axis) {
-    for (int side = 0; side < 2; ++side) {
-      // The four corners of a side, anticlockwise seen from outside.
-      const int u = (axis + 1) % 3, v = (axis + 2) % 3;
-      std::array<std::array<float, 3>, 4> corner{};
-      for (int i = 0; i < 4; ++i) {
-        const bool at_u = i == 1 || i == 2, at_v = i >= 2;
-        corner[i][axis] = static_cast<float>(side * size[axis]);
-        corner[i][side == 1 ? u : v] = static_cast<float>(at_u ? size[side == 1 ? u : v] : 0);
-        corner[i][side == 1 ? v : u] = static_cast<float>(at_v ? size[side == 1 ? v : u] : 0);
-      }
-      for (const auto& triangle : {std::array{0, 1, 2}, {0, 2, 3}}) {
-        put(std::array<float, 3>{});
-        for (const int i : triangle) put(corner[i]);
-        put(std::uint16_t{0});
-      }
-    }
-  }
-  return bytes;
 }
 
 Status write_text(const fs::path& path, std::string_view text) {
@@ -209,7 +184,7 @@ Result<std::vector<std::string>> write_test_pieces(const CalibrationRequest& ask
   std::vector<std::string> names;
   for (TestPiece& piece : *pieces) {
     const fs::path stem = directory / piece.name;
-    if (Status status = write_text(stem.string() + ".stl", block_stl(piece.size_mm)); !status) return status.error();
+    if (Status status = write_text(stem.string() + ".stl", write::stl::block(piece.size_mm)); !status) return status.error();
     piece.job.parts = {{.path = stem.string() + ".stl"}};
     piece.job.output = stem.string() + extension;
     const std::string job = fmt::format("# {}\n# lamina extrude --job {}.toml\n\n{}", piece.task, piece.name,

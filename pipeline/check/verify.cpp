@@ -12,11 +12,11 @@
 #include "pipeline/check/replay_job.h"
 #include "pipeline/check/verify_slice.h"
 #include "pipeline/output/directory.h"
-#include "pipeline/output/layer_images.h"
 #include "pipeline/output/manifest.h"
 #include "pipeline/output/print_program.h"
 #include "pipeline/show/slice_picture.h"  // is_slice_directory
 #include "pipeline/text/hash.h"
+#include "stages/raster/materials.h"
 #include "stages/write/read_image.h"
 
 namespace lamina::pipeline {
@@ -120,7 +120,7 @@ std::string fault_of_image(const ManifestHead& head, const std::string& path, co
   if (set != file.record.set_pixels) {
     return fmt::format("{}: {} set pixels, the manifest says {}", name, set, file.record.set_pixels);
   }
-  if (!add_image(std::move(image->runs), whole))
+  if (!raster::add_image(std::move(image->runs), whole))
     return fmt::format("{}: sets pixels that another material's image sets as well", name);
   return {};
 }

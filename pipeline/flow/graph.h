@@ -18,10 +18,10 @@
 #include "pipeline/output/manifest.h"
 #include "pipeline/output/print_program.h"
 #include "pipeline/plan/porous_plan.h"
-#include "pipeline/plan/solids.h"
 #include "stages/data/layer.h"
 #include "stages/data/runs.h"
 #include "stages/data/status.h"
+#include "stages/raster/materials.h"
 #include "stages/raster/raster.h"
 #include "stages/write/image_format.h"
 
@@ -46,7 +46,7 @@ struct LayerWork {
   Runs third;            // the core of a layer with a shell
   Runs lowest, highest;  // sections at both ends of the layer, where steps have to lie inside or outside
   Runs section;          // of one solid of a layer with several materials
-  MaterialImages materials;
+  raster::MaterialImages materials;
   std::unique_ptr<PorousWork> porous;  // where beads fill parts
   std::unique_ptr<write::ImageEncoder> encoder;
   write::Bytes file;

@@ -13,7 +13,7 @@ namespace lamina::pipeline {
 namespace {
 
 Nm short_nm(double millimetres) { return static_cast<Nm>(nm_of(millimetres)); }
-infill::MicroDegrees micro(double degrees) { return std::llround(degrees * 1e6); }
+MicroDegrees micro(double degrees) { return std::llround(degrees * 1e6); }
 
 std::vector<Nm> list_nm(const std::vector<double>& list) {
   std::vector<Nm> nm;

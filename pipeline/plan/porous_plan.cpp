@@ -6,9 +6,9 @@
 #include <cmath>
 
 #include "pipeline/job/keys.h"
-#include "pipeline/run/extrude_layer.h"  // layer_cut
+#include "pipeline/plan/layer_cut.h"
 #include "pipeline/text/json_text.h"
-#include "stages/raster/combine.h"
+#include "stages/raster/porous.h"
 #include "stages/segment/expand.h"
 #include "stages/segment/predict.h"
 
@@ -97,30 +97,6 @@ Result<PorousPlan> PorousPlan::make(const Job& asked, const PixelGrid& grid, con
   return plan;
 }
 
-void PorousPlan::lay(const SegmentRange& range, const segment::LayerCut& cut, const ToolpathsView& paths,
-                     raster::BeadRaster& beads) const {
-  const auto width_of = [&](const Stretch& s) {
-    if (s.thickness == Thickness::kThick) return static_cast<Nm>(nm_of(range.plan.thick_width_mm));
-    if (s.thickness == Thickness::kThin) return static_cast<Nm>(nm_of(range.plan.thin_width_mm));
-    const bool wall = s.kind == PathKind::kOuter || s.kind == PathKind::kInner;
-    return cut.on && !wall ? static_cast<Nm>(nm_of(range.plan.continuous_width_mm)) : s.width;
-  };
-  Nm last_width = 0;
-  Thickness last = Thickness::kReference;
-  PathKind last_kind = PathKind::kOuter;
-  segment::for_each_stretch(paths, cut, [&](const Stretch& s) {
-    const Nm width = width_of(s);
-    beads.add(s.from, s.to, width, ends_);
-    // Square ends leave a wedge where a bead turns; they are wanted only where its width changes along a line.
-    const bool turns = !s.jump && (s.thickness == last || s.kind != last_kind);
-    if (ends_ == raster::BeadEnds::kSquare && turns)
-      beads.add(s.from, s.from, std::min(width, last_width), raster::BeadEnds::kRound);
-    last_width = width;
-    last = s.thickness;
-    last_kind = s.kind;
-  });
-}
-
 Status PorousPlan::apply(const Layer& layer, Runs& image, Runs& scratch, std::unique_ptr<PorousWork>& kept) const {
   if (!kept) kept = std::make_unique<PorousWork>(grid_);
   PorousWork& work = *kept;
@@ -135,17 +111,16 @@ Status PorousPlan::apply(const Layer& layer, Runs& image, Runs& scratch, std::un
     if (!cut) return cut.error();
     ToolpathsView paths = all;
     paths.offset = all.offset.subspan(work.plan.path_area[a], work.plan.path_area[a + 1] - work.plan.path_area[a] + 1);
-    lay(range, *cut, paths, work.beads);
+    const auto width = [](double millimetres) { return static_cast<Nm>(nm_of(millimetres)); };
+    const segment::Segmentation& of = range.plan;
+    const raster::BeadWidths widths{cut->on, width(of.thick_width_mm), width(of.thin_width_mm), width(of.continuous_width_mm)};
+    raster::BeadPen pen(work.beads, widths, ends_);
+    segment::for_each_stretch(paths, *cut, [&](const Stretch& s) { pen.lay(s); });
   }
   work.beads.runs(work.laid);
-  raster::combine(image, work.laid, raster::SetOperation::kIntersection, scratch);
-  if (!shell_.half_width.empty()) {
-    dose::erode(image, shell_, work.inner);
-    raster::combine(image, work.inner, raster::SetOperation::kDifference, work.laid);
-    raster::combine(scratch, work.laid, raster::SetOperation::kUnion, work.inner);
-    std::swap(scratch, work.inner);
-  }
-  std::swap(image, scratch);
+  const bool has_shell = !shell_.half_width.empty();
+  if (has_shell) dose::erode(image, shell_, work.inner);
+  raster::keep_beads(image, work.laid, has_shell ? &work.inner : nullptr, scratch);
   return {};
 }
 

@@ -58,8 +58,6 @@ class PorousPlan {
 
  private:
   PorousPlan() = default;
-  void lay(const SegmentRange& range, const segment::LayerCut& cut, const ToolpathsView& paths,
-           raster::BeadRaster& beads) const;
 
   PixelGrid grid_;
   std::unique_ptr<SlicePlan> slices_;

@@ -5,11 +5,11 @@
 #include <filesystem>
 #include <iterator>
 #include <map>
-#include <numeric>
 
 #include "pipeline/run/slice.h"
 #include "stages/data/clipping.h"
 #include "stages/infill/fill.h"
+#include "stages/slice/bodies.h"
 
 namespace lamina::pipeline {
 namespace {
@@ -26,50 +26,6 @@ Box box_of(const Scene& scene, const Instance& instance) {
   box.add(Point3{own.lo.x + by.x, own.lo.y + by.y, own.lo.z + by.z});
   box.add(Point3{own.hi.x + by.x, own.hi.y + by.y, own.hi.z + by.z});
   return box;
-}
-
-/// To the sides.
-Box grown(Box box, Nm by) {
-  if (box.empty()) return box;
-  box.lo.x -= by, box.lo.y -= by, box.hi.x += by, box.hi.y += by;
-  return box;
-}
-
-bool touch(const Box& a, const Box& b) {
-  return !a.empty() && !b.empty() && a.lo.x <= b.hi.x && b.lo.x <= a.hi.x && a.lo.y <= b.hi.y && b.lo.y <= a.hi.y &&
-         a.lo.z <= b.hi.z && b.lo.z <= a.hi.z;
-}
-
-/// Instances whose boxes touch, directly or through others, are one body: only there can solids overlap. Bodies are
-/// numbered by their first instance.
-std::vector<std::uint32_t> group_bodies(const std::vector<Box>& boxes) {
-  const auto count = static_cast<std::uint32_t>(boxes.size());
-  std::vector<std::uint32_t> root(count), order(count);
-  std::iota(root.begin(), root.end(), 0u);
-  std::iota(order.begin(), order.end(), 0u);
-  const auto find = [&](std::uint32_t i) {
-    while (root[i] != i) i = root[i] = root[root[i]];
-    return i;
-  };
-  std::ranges::sort(order, {}, [&](std::uint32_t i) { return std::pair(boxes[i].lo.x, i); });
-  std::vector<std::uint32_t> open;
-  for (const std::uint32_t i : order) {
-    std::erase_if(open, [&](std::uint32_t other) { return boxes[other].hi.x < boxes[i].lo.x; });
-    for (const std::uint32_t other : open) {
-      if (!touch(boxes[i], boxes[other])) continue;
-      const std::uint32_t a = find(i), b = find(other);
-      root[std::max(a, b)] = std::min(a, b);
-    }
-    open.push_back(i);
-  }
-  std::vector<std::uint32_t> body(count), number(count, UINT32_MAX);
-  std::uint32_t bodies = 0;
-  for (std::uint32_t i = 0; i < count; ++i) {
-    std::uint32_t& own = number[find(i)];
-    if (own == UINT32_MAX) own = bodies++;
-    body[i] = own;
-  }
-  return body;
 }
 
 }  // namespace
@@ -102,15 +58,15 @@ Result<SlicePlan> SlicePlan::make(const Job& job, const ProgressCallback& progre
   }
   if (job.slice.offset_mm > 0) plan.grow_ = static_cast<Nm>(nm_of(job.slice.offset_mm));
   std::vector<Box> reach;  // parts may meet only when they have grown
-  for (const Box& box : boxes) reach.push_back(grown(box, plan.grow_));
-  const std::vector<std::uint32_t> body = group_bodies(reach);
+  for (const Box& box : boxes) reach.push_back(slice::grown(box, plan.grow_));
+  const std::vector<std::uint32_t> body = slice::group_bodies(reach);
   const std::vector<std::uint32_t> part_area = plan.make_areas(job, boxes, body);
   slice::SliceOptions options;
   options.fill_rule = job.fill_rule;
   options.tolerance = static_cast<Nm>(nm_of(job.slice.tolerance_um / 1000));
   options.gap = static_cast<Nm>(nm_of(job.slice.bridge_mm));
   options.offset = nm_of(job.slice.offset_mm);
-  plan.bounds_ = grown(plan.bounds_, plan.grow_);
+  plan.bounds_ = slice::grown(plan.bounds_, plan.grow_);
   auto slicer = slice::Slicer::build(plan.scene_->meshes, plan.scene_->instances, body, plan.schedule_.planes, options);
   if (!slicer) return slicer.error();
   plan.slicer_ = std::make_unique<slice::Slicer>(std::move(*slicer));
@@ -226,7 +182,7 @@ Status SlicePlan::contours(std::uint32_t index, Work& work) const {
       const ContoursView surface = work.parts.of(area.shared, work.rebased);
       Contours earlier;
       for (std::size_t other = body_area_[area.body]; other < a; ++other) {
-        if (!touch(grown(areas_[other].box, grow_), grown(area.box, grow_))) continue;
+        if (!slice::touch(slice::grown(areas_[other].box, grow_), slice::grown(area.box, grow_))) continue;
         earlier.append(work.surface[areas_[other].shared]);
       }
       auto rest = subtract_contours(surface, earlier);

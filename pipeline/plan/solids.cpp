@@ -3,8 +3,6 @@
 #include <algorithm>
 #include <utility>
 
-#include "stages/raster/combine.h"
-
 namespace lamina::pipeline {
 namespace {
 
@@ -118,40 +116,6 @@ std::uint64_t Solids::mesh_bytes() const {
 std::uint64_t Solids::index_bytes() const {
   std::uint64_t total = 0;
   for (const Solid& solid : solids_) total += solid.rasterizer.index_bytes();
-  return total;
-}
-
-void MaterialImages::start(std::size_t materials, std::uint32_t columns, std::uint32_t rows) {
-  image.resize(materials);
-  for (Runs& one : image) {
-    one.columns = columns;
-    one.row_offset.assign(std::size_t{rows} + 1, 0);
-    one.change.clear();
-  }
-}
-
-void MaterialImages::lay(std::uint32_t material, const RunsView& section, Runs& whole) {
-  if (section.change.empty()) return;
-  for (std::uint32_t m = 0; m < image.size(); ++m) {
-    if (m != material && image[m].change.empty()) continue;
-    raster::combine(image[m], section, m == material ? raster::SetOperation::kUnion : raster::SetOperation::kDifference,
-                    scratch);
-    std::swap(image[m], scratch);
-  }
-  raster::combine(whole, section, raster::SetOperation::kUnion, scratch);
-  std::swap(whole, scratch);
-}
-
-void MaterialImages::keep(const RunsView& whole) {
-  for (Runs& one : image) {
-    raster::combine(one, whole, raster::SetOperation::kIntersection, scratch);
-    std::swap(one, scratch);
-  }
-}
-
-std::uint64_t MaterialImages::bytes() const {
-  std::uint64_t total = bytes_held(scratch.row_offset) + bytes_held(scratch.change);
-  for (const Runs& one : image) total += bytes_held(one.row_offset) + bytes_held(one.change);
   return total;
 }
 

@@ -1,4 +1,4 @@
-// pipeline/plan/solids.h: the parts of a scene as solids of one material each, and a layer's images of them.
+// pipeline/plan/solids.h: the parts of a scene as solids of one material each.
 #pragma once
 
 #include <cstdint>
@@ -9,7 +9,6 @@
 #include "pipeline/machine/materials.h"
 #include "pipeline/plan/scene.h"
 #include "stages/data/grid.h"
-#include "stages/data/runs.h"
 #include "stages/data/status.h"
 #include "stages/raster/raster.h"
 
@@ -41,19 +40,6 @@ class Solids {
 
  private:
   std::vector<Solid> solids_;
-};
-
-/// The images of a layer that has several materials, while its solids are laid over each other.
-struct MaterialImages {
-  std::vector<Runs> image;  // one for each material; no pixel is set in two
-  Runs scratch;
-
-  void start(std::size_t materials, std::uint32_t columns, std::uint32_t rows);
-  /// Lays a solid's section over the others: it is set in `whole` and in its material's image, and in no other one.
-  void lay(std::uint32_t material, const RunsView& section, Runs& whole);
-  /// Keeps only what is set in `whole`.
-  void keep(const RunsView& whole);
-  std::uint64_t bytes() const;
 };
 
 }  // namespace lamina::pipeline

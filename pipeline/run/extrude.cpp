@@ -14,6 +14,7 @@
 
 #include "pipeline/flow/layer_flow.h"
 #include "pipeline/plan/heights_study.h"
+#include "pipeline/plan/layer_cut.h"
 #include "pipeline/run/extrude_layer.h"
 #include "pipeline/run/slice.h"
 #include "pipeline/text/json_text.h"
@@ -228,7 +229,7 @@ Result<ExtrudeSummary> run_extrude(const Job& asked, const ProgressCallback& pro
   const auto record = [&](std::uint32_t i, Work& work) -> Status {
     if (Status status = work.sums ? file->append(work.text) : write_pieces(plan->layers()[first + i], work); !status)
       return status;
-    const SegmentCounts& counts = work.sums->segments;
+    const segment::SegmentCounts& counts = work.sums->segments;
     if (i == 0) summary.first_layer_points = counts.points();
     sums.add(*work.sums);
     const Layer& layer = plan->layers()[first + i].layer;

@@ -12,29 +12,10 @@
 #include "pipeline/machine/extruder.h"
 #include "pipeline/plan/scene.h"
 #include "stages/data/status.h"
+#include "stages/segment/moves.h"
 #include "stages/write/extrusion_format.h"
 
 namespace lamina::pipeline {
-
-/// Segmented lines as they were laid. A piece is a line, or what holes leave of it, that is divided.
-struct SegmentCounts {
-  std::uint64_t pieces = 0;
-  std::uint64_t stretches = 0;  // points of the lists of Fukuda 2020: the start of a piece and its marks
-  std::uint64_t thin = 0;
-  std::uint64_t points() const { return stretches + pieces; }  // with the ends of pieces
-  std::uint64_t lines = 0;  // segmented lines, divided or not; a line cut by holes counts once
-};
-
-/// Void share of what was planned: of the volume within the contours, by three ways to know what beads are.
-struct PlannedPorosity {
-  double solid_mm3 = 0;     // area within the contours x thickness, over all layers
-  double extruded_mm3 = 0;  // rounded rectangles: what is fed
-  double ellipses_mm3 = 0;  // the same beads as ellipses
-  double measured_mm3 = 0;  // rounded rectangles with the widths that were measured
-  double by_extrusion() const { return 1 - extruded_mm3 / solid_mm3; }
-  double by_ellipses() const { return 1 - ellipses_mm3 / solid_mm3; }
-  double by_widths() const { return 1 - measured_mm3 / solid_mm3; }
-};
 
 struct ExtrudeSummary {
   std::string output, machine;
@@ -43,9 +24,9 @@ struct ExtrudeSummary {
   double height_mm = 0;
   write::MoveTotals totals;
   double filament_cm3 = 0, filament_g = 0;
-  SegmentCounts segments;
+  segment::SegmentCounts segments;
   std::uint64_t first_layer_points = 0;  // segments.points() of the first layer
-  PlannedPorosity porosity;
+  segment::PlannedPorosity porosity;
   std::vector<std::pair<std::string, segment::Pores>> pores;  // by heights
   double load_seconds = 0, index_seconds = 0, layer_seconds = 0, plan_seconds = 0, write_seconds = 0;
   std::uint64_t peak_layer_bytes = 0, peak_resident_bytes = 0;

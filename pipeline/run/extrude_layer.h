@@ -5,28 +5,22 @@
 #include <functional>
 #include <optional>
 
-#include "pipeline/run/extrude.h"
 #include "pipeline/run/slice.h"
+#include "stages/data/extruder.h"
+#include "stages/segment/moves.h"
+#include "stages/write/extrusion_format.h"
 
 namespace lamina::pipeline {
 
 /// What a layer contributes to the summary.
 struct LayerExtrusion {
   write::MoveTotals totals;
-  SegmentCounts segments;
-  PlannedPorosity porosity;
+  segment::SegmentCounts segments;
+  segment::PlannedPorosity porosity;
   std::uint64_t points = 0;  // of the stored toolpaths
 
   void add(const LayerExtrusion& other);
 };
-
-/// How the lines of a part in a layer are cut.
-/// errors  of infill::first_place
-Result<segment::LayerCut> layer_cut(const SegmentRange& range, const infill::FillParameters& filling, const Layer& layer,
-                                    const Box& part);
-
-/// Whether thin stretches fit into the parts at all. errors  kUsage: longer than any line can be
-Status check_thin_stretches(const SegmentPlan& segments, const SlicePlan& plan);
 
 /// The text that a writer appends to, and what happens when it has grown.
 struct TextRoom {

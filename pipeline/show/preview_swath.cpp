@@ -8,7 +8,7 @@
 #include <map>
 
 #include "pipeline/check/replay_job.h"
-#include "pipeline/output/layer_images.h"
+#include "stages/raster/materials.h"
 #include "stages/write/picture/swath_view.h"
 #include "stages/write/read_image.h"
 
@@ -63,7 +63,7 @@ Result<Buffer<std::byte>> draw_swath(const std::string& directory, const Manifes
   for (const LayerImageFile& file : layer_images(head, record)) {
     auto image = write::read_image(path(file.name));
     if (!image) return image.error();
-    if (!add_image(std::move(image->runs), whole)) {
+    if (!raster::add_image(std::move(image->runs), whole)) {
       return Error{Fault::kVerification, fmt::format("{}: sets pixels of another material", file.name)};
     }
   }

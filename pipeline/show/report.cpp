@@ -9,12 +9,12 @@
 #include <span>
 
 #include "pipeline/check/replay_job.h"
-#include "pipeline/output/layer_images.h"
 #include "pipeline/output/manifest.h"
 #include "pipeline/show/report_cast.h"
 #include "pipeline/show/slice_picture.h"  // is_slice_directory
 #include "pipeline/text/hash.h"
 #include "pipeline/text/json_text.h"
+#include "stages/raster/materials.h"
 #include "stages/view/report_views.h"
 #include "stages/write/read_image.h"
 #include "stages/write/report/page.h"
@@ -70,7 +70,7 @@ Result<Runs> read_layer(const std::string& directory, const ManifestHead& head, 
     Result<write::LayerImage> image = write::read_image(path);
     if (!image) return image.error();
     if (image->runs.columns != head.grid.columns() || image->runs.view().rows() != head.grid.rows()) return changed;
-    if (!add_image(std::move(image->runs), whole)) return changed;
+    if (!raster::add_image(std::move(image->runs), whole)) return changed;
   }
   return whole;
 }

@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "stages/data/angle.h"
 #include "stages/data/layer.h"
 #include "stages/data/mesh.h"  // Box
 #include "stages/data/units.h"
@@ -22,10 +23,6 @@ enum class Pattern : std::uint8_t {
   kHoneycomb,      // trapezoid waves that touch: hexagonal cells
   kQuatrefoil      // round waves kept apart: no closed cells in a layer
 };
-
-/// Angles are whole millionths of a degree.
-using MicroDegrees = std::int64_t;
-inline constexpr MicroDegrees kTurn = 360'000'000;
 
 /// All lengths nm. The gap after line i of a layer (i = 0 is the first line, see `first_line`) is, in this order:
 ///   0           inside a group: where (i + 1) is no multiple of `group`

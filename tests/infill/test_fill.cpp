@@ -32,7 +32,7 @@ TEST(Fill, NoBeadCentreLeavesItsRegionWhateverOutlinePatternAngleAndGap) {
   for (const Outline& outline : outlines()) {
     for (const Pattern pattern :
          {Pattern::kRaster, Pattern::kContour, Pattern::kContourRaster, Pattern::kHoneycomb, Pattern::kQuatrefoil}) {
-      for (const infill::MicroDegrees angle : {0, 90'000'000, 45'000'000, 12'345'678, 270'000'000, 211'000'000}) {
+      for (const MicroDegrees angle : {0, 90'000'000, 45'000'000, 12'345'678, 270'000'000, 211'000'000}) {
         for (const Nm gap : {-100'000, 0, 300'000}) {
           FillParameters parameters;
           parameters.pattern = pattern;
@@ -75,7 +75,7 @@ TEST(Fill, NoBeadCentreLeavesItsRegionWhateverOutlinePatternAngleAndGap) {
 
 TEST(Fill, LengthTimesDistanceTendsToTheArea) {
   for (const Outline& outline : outlines()) {
-    for (const infill::MicroDegrees angle : {0, 45'000'000, 77'000'000}) {
+    for (const MicroDegrees angle : {0, 45'000'000, 77'000'000}) {
       for (const Nm width : {400'000, 100'000, 25'000}) {
         FillParameters parameters;
         parameters.walls = 0;
@@ -119,7 +119,7 @@ TEST(Fill, AFormulaHasToHoldWithinThePartOnly) {
     parameters.pattern = pattern;
     if (pattern == Pattern::kContour) parameters.gap_expression = "0.1 + sqrt(s)";
     if (pattern == Pattern::kHoneycomb) parameters.gap_expression = "0.1 + sqrt(s) * sqrt(1 - u)";
-    for (const infill::MicroDegrees angle : {0, 30'000'000}) {
+    for (const MicroDegrees angle : {0, 30'000'000}) {
       parameters.angle_base = angle;
       Toolpaths paths;
       const Status status = infill::append_fill(square, context_of(square), parameters, paths);

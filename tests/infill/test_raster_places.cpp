@@ -14,8 +14,7 @@ using infill::FillParameters;
 using infill::Pattern;
 
 TEST(RasterPlaces, RasterLinesLieExactlyAtTheirDistance) {
-  for (const auto& [angle, axis] :
-       {std::pair<infill::MicroDegrees, int>{0, 0}, {90'000'000, 1}, {180'000'000, 0}, {270'000'000, 1}}) {
+  for (const auto& [angle, axis] : {std::pair<MicroDegrees, int>{0, 0}, {90'000'000, 1}, {180'000'000, 0}, {270'000'000, 1}}) {
     FillParameters parameters;
     parameters.angle_base = angle;
     parameters.gaps = {123'457};
@@ -59,7 +58,7 @@ TEST(RasterPlaces, StaggerComesWithEveryReturnOfTheAngleAndBuildLayersKeepIt) {
   parameters.build_layers = 2;
   parameters.stagger = {0, 100'000, 50'000};
   for (std::uint32_t layer = 0; layer < 40; ++layer) {
-    EXPECT_EQ(infill::layer_angle(parameters, layer), (45'000'000 + layer / 2 * 60'000'000ll) % infill::kTurn);
+    EXPECT_EQ(infill::layer_angle(parameters, layer), (45'000'000 + layer / 2 * 60'000'000ll) % kTurn);
     EXPECT_EQ(infill::layer_stagger(parameters, layer), parameters.stagger[layer / 6 % 3]);
   }
   parameters.stagger_every_layer = true;

@@ -12,10 +12,10 @@
 
 #include "pipeline/check/verify.h"
 #include "pipeline/machine/materials.h"
-#include "pipeline/output/layer_images.h"
 #include "pipeline/output/manifest.h"
 #include "pipeline/output/merge.h"
 #include "pipeline/run/jet.h"
+#include "stages/raster/materials.h"
 #include "stages/write/read_image.h"
 
 namespace lamina::pipeline {
@@ -121,13 +121,13 @@ TEST_F(TwoPowders, ImagesAreDisjointAndTogetherThatOfOnePowderWhereverThePartsSt
     for (std::uint32_t layer = 0; layer < summary->layers_total; ++layer) {
       Runs whole;
       const Runs steel = image(both, layer, "steel"), bronze = image(both, layer, "bronze");
-      ASSERT_TRUE(add_image(Runs(steel), whole));
-      ASSERT_TRUE(add_image(Runs(bronze), whole)) << "a pixel of two materials in layer " << layer;
+      ASSERT_TRUE(raster::add_image(Runs(steel), whole));
+      ASSERT_TRUE(raster::add_image(Runs(bronze), whole)) << "a pixel of two materials in layer " << layer;
       expect_same(whole, image(plain, layer), fmt::format("variant {} layer {}", variant, layer));
       // The last part counts wherever it is: no pixel of it is of the other material.
       if (variant < 2 && layer < alone->layers_total) {
         Runs others = image(last, layer);
-        EXPECT_TRUE(add_image(Runs(bronze), others)) << layer;
+        EXPECT_TRUE(raster::add_image(Runs(bronze), others)) << layer;
       }
     }
     expect_good(both);

@@ -8,8 +8,8 @@
 #include <numbers>
 #include <polyclipping/clipper.hpp>
 
+#include "pipeline/plan/layer_cut.h"
 #include "pipeline/plan/porous_plan.h"
-#include "pipeline/run/extrude_layer.h"
 #include "stages/dose/erode.h"
 #include "stages/raster/combine.h"
 #include "stages/raster/raster.h"

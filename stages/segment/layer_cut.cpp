@@ -1,0 +1,55 @@
+#include "stages/segment/layer_cut.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+namespace lamina::segment {
+
+std::array<double, 2> direction(MicroDegrees angle) {
+  angle %= kTurn / 2;
+  if (angle == 0) return {1, 0};
+  if (angle == kTurn / 4) return {0, 1};
+  const double radians = static_cast<double>(angle) * 1e-6 * std::numbers::pi / 180;
+  return {std::cos(radians), std::sin(radians)};
+}
+
+std::array<double, 2> across(MicroDegrees angle) {
+  const auto [x, y] = direction(angle);
+  return {-y, x};
+}
+
+std::array<double, 2> reach(const Box& part, const std::array<double, 2>& along) {
+  std::array<double, 2> ends{INFINITY, -INFINITY};
+  for (const Nm px : {part.lo.x, part.hi.x}) {
+    for (const Nm py : {part.lo.y, part.hi.y}) {
+      const double place = along[0] * px + along[1] * py;
+      ends = {std::min(ends[0], place), std::max(ends[1], place)};
+    }
+  }
+  return ends;
+}
+
+LayerCut layer_cut(const Segmentation& plan, const CutPlace& place, const Box& part) {
+  LayerCut cut;
+  cut.on = place.on;
+  if (!cut.on) return cut;
+  const auto along = direction(place.angle);
+  cut.along_x = along[0];
+  cut.along_y = along[1];
+  cut.continuous = plan.continuous;
+  cut.first = place.first;
+  cut.one_direction = place.one_direction;
+  cut.line = {plan.rule, nm_of(plan.thin_mm), nm_of(plan.thick_mm), 0, nm_of(plan.least_end_mm)};
+  cut.line.origin = std::llround(reach(part, along)[0]);
+  if (place.first_line) {
+    const auto other = across(place.angle + kTurn / 4);
+    const double centre = *place.first_line * (other[0] * along[0] + other[1] * along[1]);
+    cut.line.origin = std::llround(centre) - cut.line.thin / 2;
+  }
+  cut.shift = nm_of(place.shift_mm);
+  cut.line.origin += cut.shift;
+  return cut;
+}
+
+}  // namespace lamina::segment

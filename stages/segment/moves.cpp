@@ -1,0 +1,51 @@
+#include "stages/segment/moves.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "stages/segment/bead.h"
+
+namespace lamina::segment {
+
+void SegmentCounts::add(const SegmentCounts& other) {
+  pieces += other.pieces;
+  stretches += other.stretches;
+  thin += other.thin;
+  lines += other.lines;
+}
+
+void PlannedPorosity::add(const PlannedPorosity& other) {
+  solid_mm3 += other.solid_mm3;
+  extruded_mm3 += other.extruded_mm3;
+  ellipses_mm3 += other.ellipses_mm3;
+  measured_mm3 += other.measured_mm3;
+}
+
+MoveTable::MoveTable(const Segmentation& plan, const LayerCut& cut, const Extruder& machine, const Layer& layer)
+    : plan_(plan), cut_(cut), height_(mm(layer.thickness)) {
+  const double limit = layer.index == 0 ? machine.speed.first_layer_mm_s : INFINITY;
+  reference_ = std::min(machine.speed.print_mm_s, limit);
+  wall_ = std::min(machine.speed.wall_mm_s, limit);
+  inner_ = std::min(machine.speed.inner_wall_mm_s, limit);
+}
+
+void MoveTable::make(const Stretch& s, Entry& entry) const {
+  const double width = mm(s.width), full = bead_area(width, height_);
+  const bool fills = s.kind != PathKind::kOuter && s.kind != PathKind::kInner;
+  double share = 1, speed = 100, bead = fills && cut_.on ? plan_.continuous_width_mm : width;
+  if (s.thickness == Thickness::kThick)
+    share = plan_.thick_extrusion / 100, speed = plan_.thick_speed, bead = plan_.thick_width_mm;
+  if (s.thickness == Thickness::kThin) {
+    const auto thin = plan_.thin_of(cut_.ordinal(s.line));
+    share = thin.extrusion / 100, speed = thin.speed, bead = thin.width_mm;
+  }
+  entry.stored = s.width;
+  entry.width = s.thickness == Thickness::kReference ? s.width : static_cast<Nm>(nm_of(bead));
+  entry.area = full * share;
+  entry.ellipse = bead_area(width, height_, BeadShape::kEllipse) * share;
+  entry.measured = bead_area(bead, height_);
+  const double reference = s.kind == PathKind::kOuter ? wall_ : s.kind == PathKind::kInner ? inner_ : reference_;
+  entry.speed = reference * speed / 100;
+}
+
+}  // namespace lamina::segment
