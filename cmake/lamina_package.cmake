@@ -60,6 +60,8 @@ if(LAMINA_TESTS AND NOT LAMINA_SANITIZE)
   find_program(PYTHON3 python3 REQUIRED)
   add_test(NAME Documentation.EveryExampleOfEveryCommandRuns
            COMMAND ${PYTHON3} ${PROJECT_SOURCE_DIR}/tests/documentation/examples $<TARGET_FILE:lamina> ${PROJECT_SOURCE_DIR})
+  add_test(NAME Golden.EveryJobWritesTheBytesOfTheTable
+           COMMAND ${PYTHON3} ${PROJECT_SOURCE_DIR}/tests/golden/check $<TARGET_FILE:lamina>)
   add_test(NAME Cluster.SharesOnSlurmAreOneRunThoughAWorkerIsKilled
            COMMAND ${PROJECT_SOURCE_DIR}/tests/cluster/slurm $<TARGET_FILE:lamina>)
   set_tests_properties(Cluster.SharesOnSlurmAreOneRunThoughAWorkerIsKilled PROPERTIES SKIP_RETURN_CODE 77 TIMEOUT 900)

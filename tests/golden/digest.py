@@ -1,0 +1,32 @@
+"""What a job leaves, as one hash: names and bytes of layers, programs, toolpaths and tables.
+
+Left out is what tells about the job instead of being its product: manifests and other JSON, job files, locks.
+"""
+import hashlib
+import os
+
+
+def is_product(name):
+    return not name.endswith((".json", ".part", ".lock")) and (name == "machine.toml" or not name.endswith(".toml"))
+
+
+def product_files(place):
+    """Paths below `place` of all files of the product, sorted."""
+    found = []
+    for folder, _, names in os.walk(place):
+        found += [os.path.relpath(os.path.join(folder, name), place) for name in names if is_product(name)]
+    return sorted(found)
+
+
+def digest(place, version=""):
+    """Hash of the product below the directory `place`; a program's `version` in its files counts as any other. No file: ''."""
+    names = product_files(place)
+    whole = hashlib.blake2b(digest_size=16)
+    for name in names:
+        with open(os.path.join(place, name), "rb") as file:
+            content = file.read()
+        if version:
+            content = content.replace(b"lamina " + version.encode(), b"lamina VERSION")
+        whole.update(f"{name}\0{len(content)}\0".encode())
+        whole.update(content)
+    return whole.hexdigest() if names else ""
