@@ -9,10 +9,7 @@
 #include <vector>
 
 #include "pipeline/job/fill.h"
-#include "stages/data/status.h"
-#include "stages/segment/calibration.h"
 #include "stages/segment/expand.h"
-#include "stages/segment/predict.h"
 
 namespace lamina::pipeline {
 
@@ -60,26 +57,5 @@ struct ExtrudeRequest {
   std::optional<bool> relative_extrusion;
   std::string set;  // "fan.from_layer=2; bed.corner_mm=-110,-110": any other key of the machine's profile
 };
-
-/// Segmentation of a range of heights, resolved.
-struct SegmentRange {
-  std::int64_t from = 0, to = INT64_MAX;  // nm above the part's bottom: layers whose middle is in [from, to)
-  SegmentSettings settings;
-  segment::Segmentation plan;
-};
-
-/// What is segmented at each height, and the fillings that this asks for.
-struct SegmentPlan {
-  SegmentRange base;
-  std::vector<SegmentRange> ranges;  // in order, none overlaps another
-
-  const SegmentRange& at(std::int64_t height) const;
-  bool any() const;
-};
-
-/// The plan, and in `fill` the distances between lines that follow from it, unless they are given there.
-/// bead_mm  reference width
-/// errors   kUsage, one line that begins with the key
-Result<SegmentPlan> plan_segments(const SegmentRequest& request, const segment::Calibration& calibration, FillRequest& fill);
 
 }  // namespace lamina::pipeline

@@ -9,7 +9,6 @@
 #include <vector>
 
 #include "pipeline/text/key_form.h"
-#include "stages/data/status.h"
 #include "stages/infill/parameters.h"
 
 namespace lamina::pipeline {
@@ -57,23 +56,5 @@ std::string read_fill_changes(std::string_view text, FillSettings& settings);
 /// The keys that say how far lines lie from each other and are not as they are without being set; at most one of
 /// distance_mm, gap_formula, gap_by_height and gap_mm can hold.
 std::vector<std::string_view> distance_keys(const FillSettings& settings);
-
-/// What fills a part at each height.
-struct FillPlan {
-  struct Range {
-    std::int64_t from, to;  // nm above the part's bottom: layers whose middle is in [from, to)
-    infill::FillParameters parameters;
-  };
-  infill::FillParameters base;
-  std::vector<Range> ranges;  // in order, none overlaps another
-
-  const infill::FillParameters& at(std::int64_t height) const;
-  /// Whether any layer gets walls or a filling.
-  bool fills() const;
-};
-
-/// The plan of a part, from the job's section and the part's own changes ("pattern=contour gap_mm=0.1").
-/// errors  kUsage, one line that begins with the key
-Result<FillPlan> plan_filling(const FillRequest& request, const std::string& part_changes);
 
 }  // namespace lamina::pipeline

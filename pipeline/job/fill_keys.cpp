@@ -3,6 +3,7 @@
 #include <utility>
 
 #include "pipeline/job/keys.h"
+#include "pipeline/plan/fill.h"
 #include "pipeline/text/key_text.h"
 
 namespace lamina::pipeline {

@@ -6,9 +6,12 @@
 #include <string_view>
 
 #include "stages/data/layer.h"
+#include "stages/data/status.h"
 #include "stages/heights/heights.h"
 
 namespace lamina::pipeline {
+
+struct Job;
 
 struct HeightsRequest {
   heights::Mode mode = heights::Mode::kUniform;
@@ -31,5 +34,14 @@ struct HeightsRequest {
 /// 0.001 mm, and holds what lies on the steps from its lower end. Sets may be in any order.
 /// returns "" or what is wrong and what would be right; the set is then as it was
 std::string read_thicknesses(std::string_view text, heights::ThicknessSet& set);
+
+/// [heights] of a job as the stage takes it, checked. errors  kUsage, one line that begins with the key
+Result<heights::Options> heights_options(const Job& job);
+
+/// What a person is told of [heights]: "of 0.05 mm", "of 0.05..0.3 mm, optimal, steps up to 0.1 mm".
+std::string heights_text(const Job& job);
+
+/// The word of a way, as in a job file.
+std::string mode_name(heights::Mode mode);
 
 }  // namespace lamina::pipeline

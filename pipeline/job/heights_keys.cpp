@@ -93,4 +93,6 @@ const JobKey kHeightsKeys[] = {
 
 std::span<const JobKey> heights_keys() { return kHeightsKeys; }
 
+std::string mode_name(heights::Mode mode) { return write_word(kModes, mode); }
+
 }  // namespace lamina::pipeline

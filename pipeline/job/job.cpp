@@ -5,7 +5,6 @@
 #include <algorithm>
 
 #include "pipeline/job/keys.h"
-#include "pipeline/plan/heights.h"
 
 namespace lamina::pipeline {
 

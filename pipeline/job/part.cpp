@@ -1,5 +1,5 @@
 #include "pipeline/job/keys.h"
-#include "pipeline/machine/materials.h"
+#include "pipeline/job/material.h"
 #include "pipeline/text/key_text.h"
 
 namespace lamina::pipeline {

@@ -5,6 +5,7 @@
 #include <string>
 #include <string_view>
 
+#include "pipeline/job/job.h"
 #include "stages/data/extruder.h"
 #include "stages/data/status.h"
 #include "stages/segment/calibration.h"
@@ -37,5 +38,9 @@ std::string set_extruder_key(std::string_view assignment, ExtruderProfile& profi
 
 /// Every key of a profile; reading it back gives the same profile.
 std::string extruder_text(const ExtruderProfile& profile);
+
+/// The printer of a job: found, with the job's changes. The job stays as it is.
+/// errors  kUsage
+Result<ExtruderProfile> resolve_extruder(const Job& job);
 
 }  // namespace lamina::pipeline

@@ -7,9 +7,9 @@
 #include <fstream>
 #include <iterator>
 
-#include "pipeline/job/keys.h"
-#include "pipeline/machine/materials.h"
+#include "pipeline/job/material.h"
 #include "pipeline/text/json_text.h"
+#include "pipeline/text/key_form.h"
 #include "pipeline/text/key_text.h"
 #include "pipeline/text/toml_values.h"
 #include "stages/write/program/dialect.h"

@@ -4,8 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "pipeline/job/fill.h"
 #include "pipeline/job/job.h"
+#include "pipeline/plan/fill.h"
 #include "pipeline/text/key_text.h"
 #include "stages/infill/fill.h"
 

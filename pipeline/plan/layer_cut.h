@@ -1,7 +1,7 @@
 // pipeline/plan/layer_cut.h: the segmentation of a job, applied to a part in a layer.
 #pragma once
 
-#include "pipeline/job/extrude.h"
+#include "pipeline/plan/segment.h"
 #include "pipeline/run/slice.h"
 #include "stages/infill/parameters.h"
 #include "stages/segment/layer_cut.h"

@@ -13,6 +13,7 @@
 #include <string>
 #include <vector>
 
+#include "pipeline/plan/segment.h"
 #include "pipeline/run/slice.h"
 #include "stages/data/grid.h"
 #include "stages/data/runs.h"

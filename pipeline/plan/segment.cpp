@@ -4,8 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "pipeline/job/extrude.h"
 #include "pipeline/job/job.h"
+#include "pipeline/plan/segment.h"
 #include "pipeline/text/key_text.h"
 
 namespace lamina::pipeline {

@@ -84,32 +84,6 @@ struct Work {
 
 }  // namespace
 
-Result<ExtruderProfile> resolve_extruder(const Job& job) {
-  auto found = find_extruder(job.machine.profile.empty() ? "marlin" : job.machine.profile);
-  if (!found) return Error{found.error().fault, "--machine: " + found.error().message};
-  ExtruderProfile& profile = *found;
-  for (std::string_view change : split(job.extrude.set, ";")) {
-    while (change.starts_with(' ')) change.remove_prefix(1);
-    if (change.empty()) continue;
-    if (const std::string wrong = set_extruder_key(change, profile); !wrong.empty()) {
-      return Error{Fault::kUsage, fmt::format("extrude.set: {}", wrong)};
-    }
-  }
-  const ExtrudeRequest& r = job.extrude;
-  Extruder& m = profile.machine;
-  if (r.flow) m.material.flow = *r.flow;
-  if (r.nozzle_degc) m.material.nozzle_degc = m.material.first_nozzle_degc = *r.nozzle_degc;
-  if (r.bed_degc) m.material.bed_degc = m.material.first_bed_degc = *r.bed_degc;
-  if (r.print_mm_s) m.speed.print_mm_s = *r.print_mm_s;
-  if (r.wall_mm_s) m.speed.wall_mm_s = m.speed.inner_wall_mm_s = *r.wall_mm_s;
-  if (r.first_layer_mm_s) m.speed.first_layer_mm_s = *r.first_layer_mm_s;
-  if (r.travel_mm_s) m.speed.travel_mm_s = *r.travel_mm_s;
-  if (r.retraction_mm) m.retraction.length_mm = *r.retraction_mm;
-  if (r.fan_percent) m.fan.percent = *r.fan_percent;
-  if (r.relative_extrusion) m.code.relative_extrusion = *r.relative_extrusion;
-  return found;
-}
-
 Result<ExtrudeSummary> run_extrude(const Job& asked, const ProgressCallback& progress, const std::atomic<bool>& cancel) {
   std::optional<tbb::global_control> threads;
   if (asked.threads > 0) threads.emplace(tbb::global_control::max_allowed_parallelism, asked.threads);

@@ -11,6 +11,7 @@
 #include "pipeline/job/job.h"
 #include "pipeline/machine/extruder.h"
 #include "pipeline/plan/scene.h"
+#include "pipeline/plan/segment.h"
 #include "stages/data/status.h"
 #include "stages/segment/moves.h"
 #include "stages/write/extrusion_format.h"
@@ -34,9 +35,6 @@ struct ExtrudeSummary {
   std::vector<PartSummary> parts;
   std::vector<std::string> warnings;
 };
-
-/// The printer of a job: found, with the job's changes. errors  kUsage
-Result<ExtruderProfile> resolve_extruder(const Job& job);
 
 /// Writes job.output.
 /// errors  of resolve_extruder, plan_segments and SlicePlan::make; kUsage: a part that is too high, layers that the

@@ -5,6 +5,7 @@
 #include <functional>
 #include <optional>
 
+#include "pipeline/plan/segment.h"
 #include "pipeline/run/slice.h"
 #include "stages/data/extruder.h"
 #include "stages/segment/moves.h"

@@ -18,6 +18,7 @@
 #include "pipeline/output/resume.h"
 #include "pipeline/plan/heights.h"
 #include "pipeline/plan/porous_plan.h"
+#include "pipeline/plan/reach.h"
 #include "pipeline/plan/solids.h"
 #include "pipeline/run/layer_workshop.h"
 #include "stages/write/image_format.h"

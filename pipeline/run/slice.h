@@ -10,6 +10,7 @@
 
 #include "pipeline/flow/progress.h"
 #include "pipeline/job/job.h"
+#include "pipeline/plan/fill.h"
 #include "pipeline/plan/layers.h"
 #include "pipeline/plan/scene.h"
 #include "stages/data/layer.h"

@@ -7,7 +7,7 @@
 #include <sstream>
 #include <tuple>
 
-#include "pipeline/job/fill.h"
+#include "pipeline/plan/fill.h"
 #include "tests/commands/program.h"
 
 namespace lamina::test {

@@ -4,9 +4,8 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
-#include "pipeline/job/extrude.h"
-#include "pipeline/job/fill.h"
 #include "pipeline/machine/extruder.h"
+#include "pipeline/plan/segment.h"
 #include "tests/commands/program.h"
 #include "tests/segment/gcode_reader.h"
 #include "tests/segment/table.h"

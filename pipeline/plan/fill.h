@@ -1,0 +1,32 @@
+// pipeline/plan/fill.h: what fills a part at each height, decided from [fill] of a job.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "pipeline/job/fill.h"
+#include "stages/data/status.h"
+#include "stages/infill/parameters.h"
+
+namespace lamina::pipeline {
+
+/// What fills a part at each height.
+struct FillPlan {
+  struct Range {
+    std::int64_t from, to;  // nm above the part's bottom: layers whose middle is in [from, to)
+    infill::FillParameters parameters;
+  };
+  infill::FillParameters base;
+  std::vector<Range> ranges;  // in order, none overlaps another
+
+  const infill::FillParameters& at(std::int64_t height) const;
+  /// Whether any layer gets walls or a filling.
+  bool fills() const;
+};
+
+/// The plan of a part, from the job's section and the part's own changes ("pattern=contour gap_mm=0.1").
+/// errors  kUsage, one line that begins with the key
+Result<FillPlan> plan_filling(const FillRequest& request, const std::string& part_changes);
+
+}  // namespace lamina::pipeline
