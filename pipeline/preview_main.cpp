@@ -66,7 +66,7 @@ int run_drawing(const std::string& path, const std::string& output) {
 }
 
 int run_preview(const std::vector<std::string>& texts) {
-  const Result<Arguments> arguments = read_arguments(preview_spec(), texts);
+  const Result<Arguments> arguments = read_arguments(spec_of(preview_command), texts);
   if (!arguments) return fail(arguments.error());
   if (arguments->help) {
     const Status status = print(*arguments->help);

@@ -13,9 +13,7 @@
 #include <thread>
 
 #include "pipeline/batch/summary.h"
-#include "pipeline/cli/console.h"
-#include "pipeline/cli/progress_bar.h"
-#include "pipeline/flow/interrupt.h"
+#include "pipeline/cli/command.h"
 #include "pipeline/text/json_text.h"
 
 namespace lamina::pipeline {
@@ -45,20 +43,6 @@ std::string printed_json(const std::string& printed) {
   return count == 1 ? values : "[" + values + "]";
 }
 
-/// What the last line on stderr says, without the program's name.
-std::string reason_of(std::string said) {
-  while (said.ends_with('\n')) said.pop_back();
-  said.erase(0, said.rfind('\n') + 1);
-  if (said.starts_with("lamina: ")) said.erase(0, 8);
-  return one_line(said);
-}
-
-/// Whether a command says that every layer of its job was there already.
-bool kept_all_layers(const std::string& json) {
-  const nlohmann::json said = nlohmann::json::parse(json, nullptr, false);
-  return said.is_object() && said.value("layers_planned", 1) == 0 && said.value("layers_kept", 0) > 0;
-}
-
 bool holds_something(const std::string& output) {
   std::error_code error;
   return !output.empty() && std::filesystem::exists(output, error) && !std::filesystem::is_empty(output, error);
@@ -73,6 +57,31 @@ struct Slot {
   std::atomic<bool> overdue{false};
   bool abandoned = false, reported = false;
   BatchResult result;
+};
+
+/// What a job says and gives, its progress in its slot.
+class JobContext : public Context {
+ public:
+  explicit JobContext(Slot& slot) : slot_(slot) {}
+  void say_text(std::string_view) override {}
+  int complain(const Error& error) override {
+    reason = one_line(error.message);
+    return static_cast<int>(error.fault);
+  }
+  Status print(std::string_view text) override {
+    out += text;
+    return {};
+  }
+  Status give(const nlohmann::ordered_json& value) override { return print(value.dump() + "\n"); }
+  void progress(const ProgressEvent& event) override {
+    slot_.layers_done.store(event.done, std::memory_order_relaxed);
+    slot_.layers.store(event.total, std::memory_order_relaxed);
+  }
+  const std::atomic<bool>& cancel() override { return slot_.cancel; }
+  std::string out, reason;
+
+ private:
+  Slot& slot_;
 };
 
 class Queue : public std::enable_shared_from_this<Queue> {
@@ -248,7 +257,7 @@ class Queue : public std::enable_shared_from_this<Queue> {
     if (foreign && options_.resume && !job.can_resume && job.can_overwrite && result.code == static_cast<int>(Fault::kUsage)) {
       result.reason += fmt::format("; the batch has no record of it: remove {} to have it done again", job.output);
     }
-    result.recognized = foreign && job.can_resume && result.outcome == BatchOutcome::kDone && kept_all_layers(result.json);
+    result.recognized = result.recognized && foreign && job.can_resume && result.outcome == BatchOutcome::kDone;
     if (result.outcome == BatchOutcome::kDone && !job.output.empty()) {
       if (Result<OutputDigest> digest = digest_output(job.output)) {
         result.output = *digest;
@@ -285,26 +294,15 @@ class Queue : public std::enable_shared_from_this<Queue> {
   BatchResult run_command(const BatchJob& job, Slot& slot, const std::vector<std::string>& arguments) const {
     BatchResult result;
     const auto start = Clock::now();
-    ConsoleCapture console;
-    const InterruptScope interrupts(slot.cancel);
-    const ProgressCallback progress = [&slot](const ProgressEvent& event) {
-      slot.layers_done.store(event.done, std::memory_order_relaxed);
-      slot.layers.store(event.total, std::memory_order_relaxed);
-    };
-    const ProgressListener listener(progress);
-    try {
-      result.code = job.command->run(arguments);
-    } catch (const std::bad_alloc&) {
-      result.code = fail({Fault::kInternal, "out of memory; try a smaller --memory or fewer --jobs"});
-    } catch (const std::exception& error) {
-      result.code = fail({Fault::kInternal, fmt::format("internal error: {}", error.what())});
-    } catch (...) {
-      result.code = fail({Fault::kInternal, "internal error"});
-    }
+    JobContext context(slot);
+    const Result<Arguments> read = read_arguments(spec_of(*job.command), arguments);
+    const Outcome outcome = read ? pipeline::run(*job.command, *read, context) : Outcome(read.error());
+    result.code = outcome.error ? context.complain(*outcome.error) : outcome.code;
+    result.recognized = outcome.layers_planned == 0 && outcome.layers_kept > 0;
     result.seconds = seconds_since(start);
-    result.json = printed_json(console.out);
+    result.json = printed_json(context.out);
     result.outcome = result.code == 0 ? BatchOutcome::kDone : BatchOutcome::kFailed;
-    if (result.code != 0) result.reason = reason_of(console.err);
+    if (result.code != 0) result.reason = context.reason;
     if (result.code == static_cast<int>(Fault::kInterrupted)) {
       result.outcome = BatchOutcome::kStopped;
       if (slot.overdue) {

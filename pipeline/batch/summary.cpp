@@ -7,8 +7,6 @@
 
 #include <algorithm>
 
-#include "pipeline/cli/command.h"
-#include "pipeline/cli/console.h"
 #include "pipeline/text/json_text.h"
 
 namespace lamina::pipeline {

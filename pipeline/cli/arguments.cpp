@@ -4,38 +4,41 @@
 #include <CLI/App.hpp>
 #include <CLI/Config.hpp>
 #include <CLI/Formatter.hpp>
+#include <algorithm>
 #include <deque>
 
-#include "pipeline/cli/command.h"
-#include "pipeline/cli/console.h"
+#include "pipeline/cli/arguments.h"
 #include "pipeline/text/json_text.h"
 #include "pipeline/text/names.h"
 #include "pipeline/text/number_text.h"
 
 namespace lamina::pipeline {
-namespace {
 
-thread_local CommandSpec* asked_spec = nullptr;
+const OptionSpec* CommandSpec::find(std::string_view flag) const {
+  for (const OptionSpec& option : options) {
+    if (const auto flags = split(option.flag, ","); std::ranges::find(flags, flag) != flags.end()) return &option;
+  }
+  return nullptr;
+}
 
-}  // namespace
+bool Arguments::has(std::string_view flag) const {
+  return std::ranges::any_of(options, [&](const auto& option) { return option.first == flag; });
+}
 
-CommandSpec spec_of(const Command& command) {
-  if (command.name == "preview") return preview_spec();  // it hands the process over to another program
-  CommandSpec spec;
-  asked_spec = &spec;
-  ConsoleCapture unheard;
-  command.run({"--help"});
-  asked_spec = nullptr;
-  return spec;
+std::vector<std::string> Arguments::all(std::string_view flag) const {
+  std::vector<std::string> values;
+  for (const auto& [name, value] : options) {
+    if (name == flag) values.push_back(value);
+  }
+  return values;
+}
+
+std::string Arguments::text(std::string_view flag) const {
+  const auto values = all(flag);
+  return values.empty() ? std::string() : values.back();
 }
 
 Result<Arguments> read_arguments(const CommandSpec& spec, const std::vector<std::string>& arguments) {
-  if (asked_spec != nullptr) {
-    *asked_spec = spec;
-    Arguments only_asked;
-    only_asked.help = "";
-    return only_asked;
-  }
   const auto wrong = [&](const std::string& what) {
     const std::string line = one_line(what);
     if (line.ends_with('?')) return Error{Fault::kUsage, line};
@@ -47,6 +50,7 @@ Result<Arguments> read_arguments(const CommandSpec& spec, const std::vector<std:
   app.allow_extras();
 
   Arguments read;
+  read.given = arguments;
   std::vector<std::string_view> known = {"--help"};
   std::deque<std::vector<std::string>> values;  // stay where they are
   std::vector<CLI::Option*> options;

@@ -1,86 +1,92 @@
-// pipeline/cli/command.h: the program `lamina`, and what its commands share.
+// pipeline/cli/command.h: the program `lamina`: its commands as rows of a table, and what a command gets and gives.
 #pragma once
 
+#include <atomic>
+#include <cstdint>
+#include <nlohmann/json_fwd.hpp>
 #include <optional>
 #include <span>
 #include <string>
 #include <string_view>
-#include <utility>
 #include <vector>
 
+#include "pipeline/cli/arguments.h"
+#include "pipeline/flow/progress.h"
 #include "stages/data/status.h"
 
 namespace lamina::pipeline {
 
-/// Runs the command that the arguments name and returns the exit code; errors are one line on stderr.
-int run_program(int argument_count, char** arguments);
+/// Where a command's words and results go, and what tells it to stop: the console of the program, or a job of a batch.
+class Context {
+ public:
+  virtual ~Context() = default;
 
-/// One option of a command. A switch has no value.
-struct OptionSpec {
-  std::string flag;   // "-o,--output"
-  std::string value;  // "MM"; empty for a switch
-  std::string meaning;
-  std::string preset;  // shown in the help; empty if there is none
-  std::string group;   // heading in the help
+  // --- for people
+  /// Text as it is.
+  virtual void say_text(std::string_view text) = 0;
+  /// One line, line breaks and control characters taken out.
+  void say(std::string_view line);
+  /// Something is wrong and the command goes on, as with its next operand. returns  the exit code that belongs to it
+  virtual int complain(const Error& error) = 0;
+
+  // --- for scripts; errors  kOutput if it could not be written; a reader that closed the pipe is none
+  virtual Status print(std::string_view text) = 0;
+  /// A value, printed as one line of JSON.
+  virtual Status give(const nlohmann::ordered_json& value) = 0;
+
+  // --- while it runs
+  /// How far a job is. Layers that have begun are worth keeping: from then on cancel() is set rather than the program ended.
+  virtual void progress(const ProgressEvent& event) = 0;
+  /// Set when the command has to stop. A command that never asks for it is ended by the first signal.
+  virtual const std::atomic<bool>& cancel() = 0;
 };
 
-struct CommandSpec {
-  std::string name, summary;
-  std::string operand, operand_meaning;  // "PART", "..."; as many as there are
-  std::vector<OptionSpec> options;
-  std::string closing;                                                // examples, at the end of the help
-  std::vector<std::pair<std::string_view, std::string_view>> absent;  // options of other commands, and why this one has none
+/// How a command ended. What it had to say and to give went into its context, all but the error that ended it.
+struct Outcome {
+  Outcome() = default;
+  Outcome(int exit_code) : code(exit_code) {}
+  Outcome(const Error& failure) : code(static_cast<int>(failure.fault)), error(failure) {}
+  Outcome(const Status& status) {
+    if (!status) *this = status.error();
+  }
+
+  int code = 0;
+  std::optional<Error> error;
+  std::uint32_t layers_planned = 0, layers_kept = 0;  // of a job; kept: they were there already
 };
 
-/// What stands on the command line, as text.
-struct Arguments {
-  std::vector<std::string> operands;
-  std::vector<std::pair<std::string, std::string>> options;  // (spec flag, text); switches with an empty text
-  std::optional<std::string> help;                           // asked for: nothing else is to be done
-
-  bool has(std::string_view flag) const;
-  std::string text(std::string_view flag) const;  // last one given, or ""
-  std::vector<std::string> all(std::string_view flag) const;
-};
-
-/// Reads the arguments behind the command's name. errors  kUsage: unknown option (and which one was probably meant),
-/// value missing
-Result<Arguments> read_arguments(const CommandSpec& spec, const std::vector<std::string>& arguments);
-
-/// One command of the program. It begins by reading its arguments, so that it can be asked for its definition.
+/// One command of the program.
 struct Command {
   std::string_view name, summary;
-  int (*run)(const std::vector<std::string>&);
+  CommandSpec (*spec)();
+  Outcome (*run)(const Arguments&, Context&);
+  bool reads_itself = false;  // another program reads its arguments, which are handed over as they were typed
 };
 
 /// All commands, in the order of the help.
-std::span<const Command> commands();
+std::span<const Command* const> commands();
 
 /// The command of that name, or nullptr.
 const Command* find_command(std::string_view name);
 
-/// The definition of a command's arguments, from which help, manual pages, shell completion and the documentation's
-/// tests are made. Nothing of the command runs.
+/// The definition of a command's arguments, under its name.
 CommandSpec spec_of(const Command& command);
 
-/// That of lamina preview, whose work is done by a program of its own.
-CommandSpec preview_spec();
+/// "'jett' is no command, did you mean 'jet'? ..."
+std::string unknown_command(std::string_view name);
 
-// --- one file each
-int run_jet_command(const std::vector<std::string>& arguments);
-int run_slice_command(const std::vector<std::string>& arguments);
-int run_heights_command(const std::vector<std::string>& arguments);
-int run_extrude_command(const std::vector<std::string>& arguments);
-int run_info_command(const std::vector<std::string>& arguments);
-int run_verify_command(const std::vector<std::string>& arguments);
-int run_merge_command(const std::vector<std::string>& arguments);
-int run_machines_command(const std::vector<std::string>& arguments);
-int run_calibrate_command(const std::vector<std::string>& arguments);
-int run_permeability_command(const std::vector<std::string>& arguments);
-int run_preview_command(const std::vector<std::string>& arguments);
-int run_batch_command(const std::vector<std::string>& arguments);
-int run_report_command(const std::vector<std::string>& arguments);
-int run_completion_command(const std::vector<std::string>& arguments);
-int run_manual_command(const std::vector<std::string>& arguments);
+/// Runs a command; exceptions become errors.
+Outcome run(const Command& command, const Arguments& arguments, Context& context);
+
+/// Runs the command that the arguments name and returns the exit code; errors are one line on stderr.
+int run_program(int argument_count, char** arguments);
+
+// --- one file each, in commands/
+extern const Command jet_command, slice_command, heights_command, extrude_command, info_command, verify_command,
+    calibrate_command, permeability_command, merge_command, machines_command, preview_command, report_command, batch_command,
+    completion_command, manual_command;
+
+/// Hands the process over to the program lamina-preview. Returns only if it cannot be started.
+Error hand_over_to_preview(const std::vector<std::string>& arguments);
 
 }  // namespace lamina::pipeline

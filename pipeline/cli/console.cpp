@@ -7,20 +7,16 @@
 #include <algorithm>
 #include <cerrno>
 #include <cstring>
+#include <nlohmann/json.hpp>
 
+#include "pipeline/cli/signals.h"
 #include "pipeline/text/json_text.h"
 
 namespace lamina::pipeline {
 namespace {
 
-thread_local ConsoleCapture* capture = nullptr;
-
 // 0 or the reason.
 int write_all(int file, std::string_view text) {
-  if (capture != nullptr) {
-    (file == STDOUT_FILENO ? capture->out : capture->err) += text;
-    return 0;
-  }
   while (!text.empty()) {
     const ssize_t wrote = ::write(file, text.data(), text.size());
     if (wrote < 0 && errno == EINTR) continue;
@@ -47,14 +43,37 @@ Status print(std::string_view text) {
   return Error{Fault::kOutput, fmt::format("standard output: {}", std::strerror(reason))};
 }
 
-ConsoleCapture::ConsoleCapture() : outer_(capture) { capture = this; }
-ConsoleCapture::~ConsoleCapture() { capture = outer_; }
-
-bool is_terminal() { return capture == nullptr && ::isatty(STDERR_FILENO) == 1; }
+bool is_terminal() { return ::isatty(STDERR_FILENO) == 1; }
 
 int terminal_columns() {
   winsize size{};
   return ::ioctl(STDERR_FILENO, TIOCGWINSZ, &size) == 0 && size.ws_col > 0 ? size.ws_col : 80;
 }
+
+void Console::say_text(std::string_view text) {
+  if (progress_) progress_->clear();
+  pipeline::say_text(text);
+}
+
+int Console::complain(const Error& error) {
+  if (progress_) progress_->clear();
+  return fail(error);
+}
+
+Status Console::print(std::string_view text) { return pipeline::print(text); }
+
+Status Console::give(const nlohmann::ordered_json& value) {
+  return pipeline::print(value.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n");
+}
+
+void Console::progress(const ProgressEvent& event) {
+  if (event.stage == ProgressEvent::Stage::kLayers) keep_on_signals();
+  if (!progress_) {
+    progress_.emplace(quiet ? Progress::Style::kSilent : is_terminal() ? Progress::Style::kBar : Progress::Style::kLines);
+  }
+  (*progress_)(event);
+}
+
+const std::atomic<bool>& Console::cancel() { return watch_for_signals(); }
 
 }  // namespace lamina::pipeline

@@ -1,14 +1,32 @@
-// pipeline/cli/console.h: what is said to people and scripts. A reader that has gone away is no reason to crash.
+// pipeline/cli/console.h: the terminal. A reader that has gone away is no reason to crash.
 #pragma once
 
-#include <cstdint>
-#include <string>
+#include <optional>
 #include <string_view>
 
+#include "pipeline/cli/command.h"
+#include "pipeline/cli/progress_bar.h"
 #include "stages/data/status.h"
 
 namespace lamina::pipeline {
 
+/// The program's own context: stdout, stderr, signals, and a progress bar on a terminal.
+class Console : public Context {
+ public:
+  void say_text(std::string_view text) override;
+  int complain(const Error& error) override;
+  Status print(std::string_view text) override;
+  Status give(const nlohmann::ordered_json& value) override;
+  void progress(const ProgressEvent& event) override;
+  const std::atomic<bool>& cancel() override;
+
+  bool quiet = false;  // no progress is told
+
+ private:
+  std::optional<Progress> progress_;
+};
+
+// --- the same without a context
 /// One line to stderr, line breaks and control characters taken out.
 void say(std::string_view line);
 
@@ -20,20 +38,6 @@ int fail(const Error& error);
 
 /// Results to stdout. errors  kOutput if they could not be written (a full disk); a reader that closed the pipe is none
 Status print(std::string_view text);
-
-/// What this thread says goes here instead of to stderr and stdout as long as the object lives: for a job of a batch.
-/// Other threads are not affected, and captures of one thread may be nested.
-class ConsoleCapture {
- public:
-  ConsoleCapture();
-  ~ConsoleCapture();
-  ConsoleCapture(const ConsoleCapture&) = delete;
-  ConsoleCapture& operator=(const ConsoleCapture&) = delete;
-  std::string out, err;
-
- private:
-  ConsoleCapture* outer_;
-};
 
 /// Whether stderr is a terminal.
 bool is_terminal();

@@ -13,16 +13,7 @@ namespace {
 using std::chrono::milliseconds;
 using Stage = ProgressEvent::Stage;
 
-thread_local const ProgressCallback* current_listener = nullptr;
-
 }  // namespace
-
-ProgressListener::ProgressListener(const ProgressCallback& listener) : outer_(current_listener) {
-  current_listener = &listener;
-}
-ProgressListener::~ProgressListener() { current_listener = outer_; }
-
-Progress::Progress(Style style) : style_(style), listener_(current_listener) {}
 
 std::string Progress::text(const ProgressEvent& event, std::uint32_t done_before, double seconds) {
   std::string text = fmt::format("{}/{} layers", event.done, event.total);
@@ -51,7 +42,6 @@ void Progress::draw(const std::string& what, double share) {
 }
 
 void Progress::operator()(const ProgressEvent& event) {
-  if (listener_ != nullptr) (*listener_)(event);
   if (style_ == Style::kSilent) return;
   const Clock::time_point now = Clock::now();
   if (event.stage != Stage::kLayers) {

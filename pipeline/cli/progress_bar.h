@@ -8,26 +8,13 @@
 
 namespace lamina::pipeline {
 
-/// While it lives, every Progress that this thread makes tells `listener` too, whatever its style, from whichever thread
-/// its events come: how a batch knows how far each of its jobs is.
-class ProgressListener {
- public:
-  explicit ProgressListener(const ProgressCallback& listener);
-  ~ProgressListener();
-  ProgressListener(const ProgressListener&) = delete;
-  ProgressListener& operator=(const ProgressListener&) = delete;
-
- private:
-  const ProgressCallback* outer_;
-};
-
 /// A bar on a terminal, redrawn at most every 100 ms; elsewhere a plain line every tenth of the layers, but not more
 /// often than once a second, and every 5 s. All goes to stderr.
 /// cost  a clock is read for every event; nothing is written in between
 class Progress {
  public:
   enum class Style { kSilent, kBar, kLines };
-  explicit Progress(Style style);
+  explicit Progress(Style style) : style_(style) {}
   ~Progress() { clear(); }
   Progress(const Progress&) = delete;
   Progress& operator=(const Progress&) = delete;
@@ -44,7 +31,6 @@ class Progress {
   void draw(const std::string& what, double share);
 
   Style style_;
-  const ProgressCallback* listener_;  // or nullptr
   bool drawn_ = false, counting_ = false;
   std::uint32_t done_before_ = 0;  // layers that a resumed job kept
   std::uint32_t tenths_told_ = 0;

@@ -240,7 +240,7 @@ int draw_heights(const std::string& path, const Job&, const Scene& scene, const 
     if (error.message.starts_with(beside)) error.message.replace(0, beside.size(), path);
     return fail(error);
   }
-  return run_preview_command({"--drawing", beside, "-o", path});
+  return fail(hand_over_to_preview({"--drawing", beside, "-o", path}));
 }
 
 }  // namespace lamina::pipeline

@@ -8,7 +8,7 @@
 #include <sstream>
 
 #include "pipeline/cli/command.h"
-#include "pipeline/cli/markdown_page.h"
+#include "pipeline/cli/help/help.h"
 #include "pipeline/machine/printer_profile.h"
 #include "pipeline/text/number_text.h"
 #include "tests/commands/program.h"
@@ -42,14 +42,12 @@ std::vector<fs::path> pages() {
 TEST(Documentation, PagesOfCommandsAreThoseOfTheirDefinitions) {
   std::set<std::string> pages;
   for (const auto& entry : fs::directory_iterator(kRoot / "docs/commands")) pages.insert(entry.path().filename());
-  for (const pipeline::Command& command : pipeline::commands()) {
-    const std::string name = std::string(command.name) + ".md";
-    const pipeline::CommandSpec spec = pipeline::spec_of(command);
-    EXPECT_EQ(spec.name, command.name);
+  for (const pipeline::Command* command : pipeline::commands()) {
+    const std::string name = std::string(command->name) + ".md";
     ASSERT_EQ(pages.erase(name), 1u) << name;
-    EXPECT_EQ(read_text(kRoot / "docs/commands" / name), pipeline::markdown_page(command)) << name;
+    EXPECT_EQ(read_text(kRoot / "docs/commands" / name), pipeline::markdown_page(*command)) << name;
     const std::string readme = read_text(kRoot / "README.md");
-    EXPECT_NE(readme.find("lamina " + std::string(command.name)), std::string::npos) << command.name;
+    EXPECT_NE(readme.find("lamina " + std::string(command->name)), std::string::npos) << command->name;
   }
   EXPECT_TRUE(pages.empty()) << "docs/commands/" << *pages.begin() << " is of no command";
 }
@@ -59,14 +57,14 @@ TEST(Documentation, PreviewTakesTheOptionsOfItsDefinition) {
   const Directory directory;
   const Outcome outcome = run_lamina({"preview", "--help"}, directory.path());
   ASSERT_EQ(outcome.code, 0);
-  for (const std::string& flag : long_flags(pipeline::preview_spec()))
+  for (const std::string& flag : long_flags(pipeline::spec_of(pipeline::preview_command)))
     EXPECT_NE(outcome.out.find(flag), std::string::npos) << flag;
 }
 
 // Every --option that a page puts between backticks is one of some command, or of another program that it names.
 TEST(Documentation, EveryOptionThatItNamesExists) {
   std::set<std::string> known = {"--help", "--version"};
-  for (const pipeline::Command& command : pipeline::commands()) known.merge(long_flags(pipeline::spec_of(command)));
+  for (const pipeline::Command* command : pipeline::commands()) known.merge(long_flags(pipeline::spec_of(*command)));
   const std::set<std::string> others = {"--install", "--export-sla", "--sanitize", "--models", "--bench", "--develop"};
   const std::regex quoted("`[^`\n]*`"), flag("(?:^|[ `(])(--[a-z][a-z0-9-]*)");
   std::size_t checked = 0;

@@ -11,7 +11,7 @@
 #include "pipeline/batch/summary.h"
 #include "pipeline/cli/command.h"
 #include "pipeline/cli/console.h"
-#include "pipeline/flow/interrupt.h"
+#include "pipeline/cli/signals.h"
 #include "pipeline/text/number_text.h"
 #include "stages/write/atomic_file.h"
 
@@ -20,7 +20,6 @@ namespace {
 
 CommandSpec batch_spec() {
   CommandSpec spec;
-  spec.name = "batch";
   spec.summary =
       "Runs many jobs in one queue that shares the processors and a memory budget. A job that fails does so alone; each\n"
       "result and reason is in OUT/summary.json and OUT/summary.tsv. A batch that was killed goes on with --resume.";
@@ -105,29 +104,31 @@ Result<Request> resolve(const Arguments& arguments) {
 /// A line a job; on a terminal a line that is drawn again and again below them.
 class BatchConsole {
  public:
-  explicit BatchConsole(bool quiet) : quiet_(quiet), terminal_(is_terminal()) {}
+  BatchConsole(bool quiet, Context& context) : context_(context), quiet_(quiet), terminal_(is_terminal()) {}
 
   void ended(const BatchJob& job, const BatchResult& result, const BatchState& state) {
     if (quiet_) {
-      if (has_failed(result)) say("lamina: " + failure_line(job, result));
+      if (has_failed(result)) context_.complain({static_cast<Fault>(result.code), failure_line(job, result)});
       return;
     }
     clear();
-    say(job_line(job, result, ++ended_, state.total));
+    context_.say(job_line(job, result, ++ended_, state.total));
   }
 
   void progress(const BatchState& state) {
     if (quiet_ || !terminal_) return;
-    say_text("\r\x1b[K" + progress_line(state).substr(0, static_cast<std::size_t>(std::max(terminal_columns() - 1, 1))));
+    context_.say_text("\r\x1b[K" +
+                      progress_line(state).substr(0, static_cast<std::size_t>(std::max(terminal_columns() - 1, 1))));
     drawn_ = true;
   }
 
   void clear() {
-    if (drawn_) say_text("\r\x1b[K");
+    if (drawn_) context_.say_text("\r\x1b[K");
     drawn_ = false;
   }
 
  private:
+  Context& context_;
   bool quiet_, terminal_, drawn_ = false;
   std::uint32_t ended_ = 0;
 };
@@ -136,7 +137,7 @@ Status write_text_file(const std::string& directory, const char* name, const std
   return write::write_file((std::filesystem::path(directory) / name).string(), std::as_bytes(std::span(text)));
 }
 
-Result<int> run_request(const Request& request) {
+Outcome run_request(const Request& request, Context& context) {
   const BatchOptions& options = request.options;
   Result<std::vector<BatchEntry>> entries = read_batch(request.lists, request.with);
   if (!entries) return entries.error();
@@ -145,41 +146,40 @@ Result<int> run_request(const Request& request) {
   Result<BatchRecord> record = BatchRecord::open(options.directory, options.resume, options.overwrite);
   if (!record) return record.error();
 
-  BatchConsole console(request.quiet);
+  BatchConsole console(request.quiet, context);
+  keep_on_signals();  // jobs that are done
   BatchWatcher watcher;
   watcher.progress = [&](const BatchState& state) { console.progress(state); };
   watcher.ended = [&](const BatchJob& job, std::uint32_t, const BatchResult& result, const BatchState& state) {
     console.ended(job, result, state);
   };
-  const Result<BatchSummary> summary = run_batch(*jobs, std::move(*record), options, watcher, watch_for_interrupts());
+  const Result<BatchSummary> summary = run_batch(*jobs, std::move(*record), options, watcher, context.cancel());
   console.clear();
   if (!summary) return summary.error();
   const std::string json = batch_json(*jobs, *summary, options);
   Status written = write_text_file(options.directory, "summary.json", json);
   if (written) written = write_text_file(options.directory, "summary.tsv", batch_table(*jobs, *summary));
-  int code = written ? batch_code(*summary) : fail(written.error());
-  if (!request.quiet) say_text(batch_text(*jobs, *summary, options));
-  if (summary->interrupted) say("lamina: interrupted; what is done is kept, go on with the same command and --resume");
+  int code = written ? batch_code(*summary) : context.complain(written.error());
+  if (!request.quiet) context.say_text(batch_text(*jobs, *summary, options));
+  if (summary->interrupted) {
+    context.complain({Fault::kInterrupted, "interrupted; what is done is kept, go on with the same command and --resume"});
+  }
   if (request.json) {
-    if (Status status = print(json); !status) code = fail(status.error());
+    if (Status status = context.print(json); !status) code = context.complain(status.error());
   }
   if (summary->abandoned) std::_Exit(code);  // a job that does not stop is still at work
   return code;
 }
 
+Outcome run_command(const Arguments& arguments, Context& context) {
+  const Result<Request> request = resolve(arguments);
+  if (!request) return request.error();
+  return run_request(*request, context);
+}
+
 }  // namespace
 
-int run_batch_command(const std::vector<std::string>& texts) {
-  const Result<Arguments> arguments = read_arguments(batch_spec(), texts);
-  if (!arguments) return fail(arguments.error());
-  if (arguments->help) {
-    const Status status = print(*arguments->help);
-    return status ? 0 : fail(status.error());
-  }
-  const Result<Request> request = resolve(*arguments);
-  if (!request) return fail(request.error());
-  const Result<int> code = run_request(*request);
-  return code ? *code : fail(code.error());
-}
+const Command batch_command = {"batch", "many jobs in one queue, sharing processors and memory, with one summary", batch_spec,
+                               run_command};
 
 }  // namespace lamina::pipeline

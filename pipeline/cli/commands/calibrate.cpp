@@ -6,8 +6,6 @@
 
 #include "pipeline/calibrate/calibrate.h"
 #include "pipeline/cli/command.h"
-#include "pipeline/cli/console.h"
-#include "pipeline/flow/interrupt.h"
 #include "pipeline/text/json_text.h"
 #include "pipeline/text/names.h"
 #include "pipeline/text/number_text.h"
@@ -18,7 +16,6 @@ namespace {
 
 CommandSpec calibrate_spec() {
   CommandSpec spec;
-  spec.name = "calibrate";
   spec.summary =
       "Test pieces for segmented lines on a printer, as job files and toolpaths with a table to be filled in; then, from\n"
       "the measured widths, the printer's profile with its spacings and speeds.";
@@ -41,34 +38,26 @@ CommandSpec calibrate_spec() {
   return spec;
 }
 
-int say_pieces(const std::vector<std::string>& names, const std::string& directory, bool json, bool quiet) {
+Outcome say_pieces(const std::vector<std::string>& names, const std::string& directory, bool json, bool quiet,
+                   Context& context) {
   std::vector<std::string> quoted;
   for (const std::string& name : names) quoted.push_back(json_string(name));
   if (!quiet) {
-    say_text(fmt::format(
+    context.say_text(fmt::format(
         "pieces    {} in {}: {}\nnext      print them in the order of STEPS.md, fill in widths.csv, then --measured {}/widths.csv\n",
         names.size(), one_line(directory), fmt::join(names, ", "), one_line(directory)));
   }
-  if (!json) return 0;
-  const Status status = print(fmt::format("{{\"command\":\"calibrate\",\"directory\":{},\"pieces\":[{}]}}\n",
-                                          json_string(directory), fmt::join(quoted, ",")));
-  return status ? 0 : fail(status.error());
+  if (!json) return {};
+  return context.print(fmt::format("{{\"command\":\"calibrate\",\"directory\":{},\"pieces\":[{}]}}\n", json_string(directory),
+                                   fmt::join(quoted, ",")));
 }
 
-}  // namespace
-
-int run_calibrate_command(const std::vector<std::string>& texts) {
-  const Result<Arguments> arguments = read_arguments(calibrate_spec(), texts);
-  if (!arguments) return fail(arguments.error());
-  if (arguments->help) {
-    const Status status = print(*arguments->help);
-    return status ? 0 : fail(status.error());
-  }
-  const auto usage = [](const std::string& what) { return fail({Fault::kUsage, what}); };
-  if (!arguments->operands.empty())
-    return usage(fmt::format("'{}' is no option; the pieces are made here", one_line(arguments->operands.front())));
-  if (!arguments->has("--machine")) return usage("--machine is missing; name an extrusion printer, as lamina extrude takes it");
-  const std::string output = arguments->text("-o,--output"), machine = arguments->text("--machine");
+Outcome run_calibrate(const Arguments& arguments, Context& context) {
+  const auto usage = [](const std::string& what) { return Error{Fault::kUsage, what}; };
+  if (!arguments.operands.empty())
+    return usage(fmt::format("'{}' is no option; the pieces are made here", one_line(arguments.operands.front())));
+  if (!arguments.has("--machine")) return usage("--machine is missing; name an extrusion printer, as lamina extrude takes it");
+  const std::string output = arguments.text("-o,--output"), machine = arguments.text("--machine");
   if (output.empty())
     return usage("-o is missing; name a directory for the test pieces, or with --measured the profile to be written");
   CalibrationRequest request = preset_calibration();
@@ -76,44 +65,44 @@ int run_calibrate_command(const std::vector<std::string>& texts) {
   request.directory = output;
   double gap = 0;
   const auto number = [&](const char* flag, double low, double high, double& target) {
-    const std::string wrong =
-        arguments->has(flag) ? read_number(arguments->text(flag), low, high, " mm", target) : std::string();
+    const std::string wrong = arguments.has(flag) ? read_number(arguments.text(flag), low, high, " mm", target) : std::string();
     return wrong.empty() ? wrong : fmt::format("{}: {}", flag, wrong);
   };
   for (const std::string& wrong : {number("--bead", 0.01, 20, request.width_mm), number("--layer", 0.01, 20, request.height_mm),
                                    number("--gap", -10, 10, gap)}) {
     if (!wrong.empty()) return usage(wrong);
   }
-  const bool json = arguments->has("--json"), quiet = arguments->has("--quiet");
-  if (!arguments->has("--measured")) {
-    const auto names = write_test_pieces(request, watch_for_interrupts());
-    return names ? say_pieces(*names, output, json, quiet) : fail(names.error());
+  const bool json = arguments.has("--json"), quiet = arguments.has("--quiet");
+  if (!arguments.has("--measured")) {
+    const auto names = write_test_pieces(request, context.cancel());
+    if (!names) return names.error();
+    return say_pieces(*names, output, json, quiet, context);
   }
 
   // --- measurements into a profile
   auto profile = find_extruder(machine);
   if (!profile) return usage("--machine: " + profile.error().message);
-  const std::string path = arguments->text("--measured");
+  const std::string path = arguments.text("--measured");
   const auto rows = read_widths(path);
-  if (!rows) return fail(rows.error());
-  if (const auto pieces = test_pieces(request, *profile); !pieces) return fail(pieces.error());  // resolves the bead
+  if (!rows) return rows.error();
+  if (const auto pieces = test_pieces(request, *profile); !pieces) return pieces.error();  // resolves the bead
   segment::MeasuringSettings settings;
   settings.width_mm = request.width_mm;
   settings.height_mm = request.height_mm;
   settings.speed_mm_s = profile->machine.speed.print_mm_s;
   settings.flow = profile->machine.material.flow;
   settings.gap_mm = gap;
-  settings.exact_spacing = arguments->has("--exact-spacing");
+  settings.exact_spacing = arguments.has("--exact-spacing");
   const auto found = segment::calibrate(*rows, settings, fmt::format("measured on {}", profile->machine.name));
-  if (!found) return fail({found.error().fault, fmt::format("{}: {}", path, found.error().message)});
+  if (!found) return Error{found.error().fault, fmt::format("{}: {}", path, found.error().message)};
   profile->calibration = found->calibration;
   profile->own_calibration = true;
   if (found->flow) profile->machine.material.flow = std::round(*found->flow * 1000) / 1000;
   const std::string toml = fmt::format("# {} with what was measured on it. Made by lamina calibrate.\n\n{}",
                                        one_line(profile->machine.name), extruder_text(*profile));
   if (const auto again = read_extruder(toml, output); !again)
-    return fail({Fault::kInput, fmt::format("{}: {}", path, again.error().message)});
-  if (Status status = write::write_file(output, std::as_bytes(std::span(toml))); !status) return fail(status.error());
+    return Error{Fault::kInput, fmt::format("{}: {}", path, again.error().message)};
+  if (Status status = write::write_file(output, std::as_bytes(std::span(toml))); !status) return status.error();
 
   std::string text, list;
   if (found->flow) text += fmt::format("flow      {:.3f}\n", profile->machine.material.flow);
@@ -135,14 +124,20 @@ int run_calibrate_command(const std::vector<std::string>& texts) {
     text += fmt::format("warning   {}\n", line);
     advice.push_back(json_string(line));
   }
-  if (!quiet) say_text(text);
+  if (!quiet) context.say_text(text);
   if (json) {
-    const Status status =
-        print(fmt::format("{{\"command\":\"calibrate\",\"profile\":{},\"flow\":{},\"repeated\":[{}],\"warnings\":[{}]}}\n",
-                          json_string(output), profile->machine.material.flow, list, fmt::join(advice, ",")));
-    if (!status) return fail(status.error());
+    const Status status = context.print(
+        fmt::format("{{\"command\":\"calibrate\",\"profile\":{},\"flow\":{},\"repeated\":[{}],\"warnings\":[{}]}}\n",
+                    json_string(output), profile->machine.material.flow, list, fmt::join(advice, ",")));
+    if (!status) return status.error();
   }
   return 0;
 }
+
+}  // namespace
+
+const Command calibrate_command = {"calibrate",
+                                   "test pieces of an extrusion printer, and its profile from what was measured on them",
+                                   calibrate_spec, run_calibrate};
 
 }  // namespace lamina::pipeline

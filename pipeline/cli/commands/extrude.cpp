@@ -4,10 +4,7 @@
 #include <filesystem>
 
 #include "pipeline/cli/command.h"
-#include "pipeline/cli/console.h"
 #include "pipeline/cli/keys.h"
-#include "pipeline/cli/progress_bar.h"
-#include "pipeline/flow/interrupt.h"
 #include "pipeline/job/file.h"
 #include "pipeline/run/extrude.h"
 
@@ -20,7 +17,6 @@ const KeyChoice kExtrudeKeys = {
 
 CommandSpec extrude_spec() {
   CommandSpec spec;
-  spec.name = "extrude";
   spec.summary =
       "Plans parts for a material extrusion printer: walls, filling and segmented lines as G-code or SML, with what the\n"
       "pores will be. The same parts and options give the same bytes.";
@@ -53,28 +49,20 @@ bool sets(const Arguments& arguments, std::string_view key) {
   return std::ranges::any_of(arguments.all("--set"), [&](const std::string& text) { return text.starts_with(key); });
 }
 
-}  // namespace
-
-int run_extrude_command(const std::vector<std::string>& texts) {
-  const Result<Arguments> arguments = read_arguments(extrude_spec(), texts);
-  if (!arguments) return fail(arguments.error());
-  if (arguments->help) {
-    const Status status = print(*arguments->help);
-    return status ? 0 : fail(status.error());
-  }
-  Result<Job> read = read_job_options(kExtrudeKeys, *arguments);
-  if (!read) return fail(read.error());
+Outcome run_command(const Arguments& arguments, Context& context) {
+  Result<Job> read = read_job_options(kExtrudeKeys, arguments);
+  if (!read) return read.error();
   Job& job = *read;
-  job.dry_run = arguments->has("--dry-run");
-  job.json = arguments->has("--json");
-  job.quiet = arguments->has("--quiet");
-  if (!arguments->has("--job")) {
+  job.dry_run = arguments.has("--dry-run");
+  job.json = arguments.has("--json");
+  job.quiet = arguments.has("--quiet");
+  if (!arguments.has("--job")) {
     // A job file says everything; a command line may leave to the printer what a powder job has other defaults for.
     const auto profile = resolve_extruder(job);
-    if (!profile) return fail(profile.error());
-    if (!arguments->has("--walls") && !sets(*arguments, "fill.walls")) job.fill.all.walls = 1;
-    if (!arguments->has("--layer") && !sets(*arguments, "layers.thickness_mm") && !sets(*arguments, "heights.") &&
-        !arguments->has("--thickness")) {
+    if (!profile) return profile.error();
+    if (!arguments.has("--walls") && !sets(arguments, "fill.walls")) job.fill.all.walls = 1;
+    if (!arguments.has("--layer") && !sets(arguments, "layers.thickness_mm") && !sets(arguments, "heights.") &&
+        !arguments.has("--thickness")) {
       job.layer_mm = profile->machine.format == "sml" && !profile->machine.sml.pd.empty()
                          ? profile->machine.sml.pd.front().thickness_mm
                          : profile->machine.material.nozzle_mm / 2;
@@ -82,27 +70,30 @@ int run_extrude_command(const std::vector<std::string>& texts) {
   }
   if (job.segment.all.on && job.fill.all.pattern == infill::Pattern::kNone) job.fill.all.pattern = infill::Pattern::kRaster;
   if (job.output.empty() && !job.dry_run)
-    return fail({Fault::kUsage, "-o FILE is missing; name the file for the toolpaths, or use --dry-run"});
+    return Error{Fault::kUsage, "-o FILE is missing; name the file for the toolpaths, or use --dry-run"};
   std::error_code ignored;
   if (std::filesystem::is_directory(job.output, ignored)) {
-    return fail({Fault::kUsage, fmt::format("-o {}: is a directory; name a file in it, as in {}", job.output,
-                                            (std::filesystem::path(job.output) / "part.gcode").string())});
+    return Error{Fault::kUsage, fmt::format("-o {}: is a directory; name a file in it, as in {}", job.output,
+                                            (std::filesystem::path(job.output) / "part.gcode").string())};
   }
-  if (Status status = check_job(job); !status) return fail(status.error());
-  if (arguments->has("--save-job")) {
-    if (Status status = save_job(arguments->text("--save-job"), job); !status) return fail(status.error());
+  if (Status status = check_job(job); !status) return status.error();
+  if (arguments.has("--save-job")) {
+    if (Status status = save_job(arguments.text("--save-job"), job); !status) return status.error();
   }
-  const std::atomic<bool>& cancel = watch_for_interrupts();
-  Progress progress(job.quiet ? Progress::Style::kSilent : is_terminal() ? Progress::Style::kBar : Progress::Style::kLines);
   const Result<ExtrudeSummary> summary = run_extrude(
-      job, [&](const ProgressEvent& event) { progress(event); }, cancel);
-  progress.clear();
-  if (!summary) return fail(summary.error());
-  if (!job.quiet) say_text(extrude_summary_text(job, *summary));
+      job, [&](const ProgressEvent& event) { context.progress(event); }, context.cancel());
+  if (!summary) return summary.error();
+  if (!job.quiet) context.say_text(extrude_summary_text(job, *summary));
   if (job.json) {
-    if (Status status = print(extrude_summary_json(job, *summary)); !status) return fail(status.error());
+    if (Status status = context.print(extrude_summary_json(job, *summary)); !status) return status.error();
   }
   return 0;
 }
+
+}  // namespace
+
+const Command extrude_command = {"extrude",
+                                 "material extrusion: toolpaths as G-code or SML, with segmented lines and their pores",
+                                 extrude_spec, run_command};
 
 }  // namespace lamina::pipeline

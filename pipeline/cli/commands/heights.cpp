@@ -3,7 +3,6 @@
 #include <chrono>
 
 #include "pipeline/cli/command.h"
-#include "pipeline/cli/console.h"
 #include "pipeline/cli/keys.h"
 #include "pipeline/job/file.h"
 #include "pipeline/plan/heights.h"
@@ -22,7 +21,6 @@ constexpr Word<Form> kForms[] = {{"text", Form::kText}, {"csv", Form::kCsv}, {"j
 
 CommandSpec heights_spec() {
   CommandSpec spec;
-  spec.name = "heights";
   spec.summary =
       "Decides the layers of parts and tells them: bottom, thickness, reason, steepest angle and the step that is left.\n"
       "lamina jet and lamina slice decide with the same options in the same way.";
@@ -47,8 +45,8 @@ CommandSpec heights_spec() {
   return spec;
 }
 
-Status tell(const std::string& path, const std::string& text) {
-  return path.empty() ? print(text) : write::write_file(path, std::as_bytes(std::span(text)));
+Status tell(const std::string& path, const std::string& text, Context& context) {
+  return path.empty() ? context.print(text) : write::write_file(path, std::as_bytes(std::span(text)));
 }
 
 Result<Job> job_of(const Arguments& arguments) {
@@ -85,50 +83,42 @@ std::string rp3_of(const Job& job, const HeightsStudy& study) {
   return heights_rp3(study, {0, static_cast<std::uint32_t>(study.boundaries.size() - 1)}, settings);
 }
 
-}  // namespace
-
-int run_heights_command(const std::vector<std::string>& texts) {
-  const Result<Arguments> arguments = read_arguments(heights_spec(), texts);
-  if (!arguments) return fail(arguments.error());
-  if (arguments->help) {
-    const Status status = print(*arguments->help);
-    return status ? 0 : fail(status.error());
-  }
-  const std::string output = arguments->text("-o,--output"), plot = arguments->text("--plot");
+Outcome run_heights(const Arguments& arguments, Context& context) {
+  const std::string output = arguments.text("-o,--output"), plot = arguments.text("--plot");
   Form form = Form::kText;
-  if (arguments->has("--format")) {
-    if (const std::string wrong = read_word(kForms, arguments->text("--format"), form); !wrong.empty()) {
-      return fail({Fault::kUsage, "--format: " + wrong});
+  if (arguments.has("--format")) {
+    if (const std::string wrong = read_word(kForms, arguments.text("--format"), form); !wrong.empty()) {
+      return Error{Fault::kUsage, "--format: " + wrong};
     }
   }
-  if (const Status status = check_plot_name(plot); !status) return fail(status.error());
-  const Result<Job> job = job_of(*arguments);
-  if (!job) return fail(job.error());
+  if (const Status status = check_plot_name(plot); !status) return status.error();
+  const Result<Job> job = job_of(arguments);
+  if (!job) return job.error();
   if (form == Form::kRp3) {
-    if (Status status = check_one_table(*job, *arguments); !status) return fail(status.error());
+    if (Status status = check_one_table(*job, arguments); !status) return status.error();
   }
-  if (arguments->has("--save-job")) {
-    if (Status status = save_job(arguments->text("--save-job"), *job); !status) return fail(status.error());
+  if (arguments.has("--save-job")) {
+    if (Status status = save_job(arguments.text("--save-job"), *job); !status) return status.error();
   }
   const auto start = std::chrono::steady_clock::now();
   const Result<Scene> scene = load_scene(*job);
   const std::chrono::duration<double> load = std::chrono::steady_clock::now() - start;
-  if (!scene) return fail(scene.error());
+  if (!scene) return scene.error();
 
   std::vector<HeightsStudy> studies;
-  if (arguments->has("--compare") || job->heights.per_part) {
+  if (arguments.has("--compare") || job->heights.per_part) {
     Result<std::vector<HeightsStudy>> all =
-        arguments->has("--compare") ? study_all_ways(*job, *scene) : study_per_part(*job, *scene);
-    if (!all) return fail(all.error());
+        arguments.has("--compare") ? study_all_ways(*job, *scene) : study_per_part(*job, *scene);
+    if (!all) return all.error();
     studies = std::move(*all);
-  } else if (!arguments->has("--measure")) {
+  } else if (!arguments.has("--measure")) {
     Result<HeightsStudy> study = study_heights(*job, *scene);
-    if (!study) return fail(study.error());
+    if (!study) return study.error();
     studies.push_back(std::move(*study));
   }
-  for (const std::string& path : arguments->all("--measure")) {
+  for (const std::string& path : arguments.all("--measure")) {
     Result<HeightsStudy> study = study_table(*job, *scene, path);
-    if (!study) return fail(study.error());
+    if (!study) return study.error();
     studies.push_back(std::move(*study));
   }
 
@@ -142,12 +132,17 @@ int run_heights_command(const std::vector<std::string>& texts) {
     text = rp3_of(*job, last);
   else
     text = studies.size() > 1 ? comparison_page(studies) : heights_page(*job, *scene, last);
-  if (Status status = tell(output, text); !status) return fail(status.error());
-  if (studies.size() == 1 && !arguments->has("--quiet")) {
-    say(fmt::format("time      load {:.4f} s, surface {:.4f} s, layers {:.4f} s, measuring them {:.4f} s", load.count(),
-                    last.index_seconds, last.plan_seconds, last.evaluate_seconds));
+  if (Status status = tell(output, text, context); !status) return status.error();
+  if (studies.size() == 1 && !arguments.has("--quiet")) {
+    context.say(fmt::format("time      load {:.4f} s, surface {:.4f} s, layers {:.4f} s, measuring them {:.4f} s", load.count(),
+                            last.index_seconds, last.plan_seconds, last.evaluate_seconds));
   }
   return plot.empty() ? 0 : draw_heights(plot, *job, *scene, last);
 }
+
+}  // namespace
+
+const Command heights_command = {
+    "heights", "the layers of a part: thicknesses that fit its slopes and flats, compared, plotted", heights_spec, run_heights};
 
 }  // namespace lamina::pipeline

@@ -3,7 +3,6 @@
 #include <algorithm>
 
 #include "pipeline/cli/command.h"
-#include "pipeline/cli/console.h"
 #include "pipeline/job/keys.h"
 #include "pipeline/plan/scene.h"
 #include "pipeline/show/info.h"
@@ -13,7 +12,6 @@ namespace {
 
 CommandSpec info_spec() {
   CommandSpec spec;
-  spec.name = "info";
   spec.summary =
       "Says what is in a part file: triangles, shells, size, volume, whether it is closed and where it is not, and what\n"
       "lamina jet will do about that. Nothing is written.";
@@ -51,31 +49,27 @@ Status set_keys(const Arguments& arguments, Job& job) {
   return {};
 }
 
-}  // namespace
-
-int run_info_command(const std::vector<std::string>& texts) {
-  const Result<Arguments> arguments = read_arguments(info_spec(), texts);
-  if (!arguments) return fail(arguments.error());
-  if (arguments->help) {
-    const Status status = print(*arguments->help);
-    return status ? 0 : fail(status.error());
-  }
-  if (arguments->operands.empty()) return fail({Fault::kUsage, "no part to look at; name an STL, OBJ or 3MF file"});
+Outcome run_info(const Arguments& arguments, Context& context) {
+  if (arguments.operands.empty()) return Error{Fault::kUsage, "no part to look at; name an STL, OBJ or 3MF file"};
   int code = 0;
-  for (const std::string& path : arguments->operands) {
+  for (const std::string& path : arguments.operands) {
     Job job;
     job.parts.emplace_back().path = path;
-    if (Status status = set_keys(*arguments, job); !status) return fail(status.error());
+    if (Status status = set_keys(arguments, job); !status) return status.error();
     const load::LoadOptions options = load_options(job, job.parts.front());
     const Result<std::string> page =
-        arguments->has("--json") ? describe_part_json(path, options) : describe_part_text(path, options);
+        arguments.has("--json") ? describe_part_json(path, options) : describe_part_text(path, options);
     if (!page) {
-      code = std::max(code, fail(page.error()));
+      code = std::max(code, context.complain(page.error()));
       continue;
     }
-    if (Status status = print(*page); !status) return fail(status.error());
+    if (Status status = context.print(*page); !status) return status.error();
   }
   return code;
 }
+
+}  // namespace
+
+const Command info_command = {"info", "what is in a part file, is it closed, and where is it not", info_spec, run_info};
 
 }  // namespace lamina::pipeline

@@ -1,10 +1,7 @@
 #include <fmt/format.h>
 
 #include "pipeline/cli/command.h"
-#include "pipeline/cli/console.h"
 #include "pipeline/cli/keys.h"
-#include "pipeline/cli/progress_bar.h"
-#include "pipeline/flow/interrupt.h"
 #include "pipeline/job/file.h"
 #include "pipeline/machine/materials.h"
 #include "pipeline/machine/powder_printer.h"
@@ -26,7 +23,6 @@ const KeyChoice kJetKeys = {"bed", "layers", "heights", "place", "image.format",
 
 CommandSpec jet_spec() {
   CommandSpec spec;
-  spec.name = "jet";
   spec.summary =
       "Plans a binder-jet job: the exact 1-bit image of every layer of the bed, layers/000000.tif and up from the\n"
       "bottom, and a manifest.json. The same parts and options give the same bytes on every machine.";
@@ -89,39 +85,31 @@ Error interrupted(const Job& job) {
                                      : "interrupted before the first layer; nothing was written"};
 }
 
-}  // namespace
-
-int run_jet_command(const std::vector<std::string>& texts) {
-  const Result<Arguments> arguments = read_arguments(jet_spec(), texts);
-  if (!arguments) return fail(arguments.error());
-  if (arguments->help) {
-    const Status status = print(*arguments->help);
-    return status ? 0 : fail(status.error());
-  }
-  const Result<Job> job = resolve(*arguments);
-  if (!job) return fail(job.error());
-  if (arguments->has("--save-job")) {
-    if (Status status = save_job(arguments->text("--save-job"), *job); !status) return fail(status.error());
+Outcome run_command(const Arguments& arguments, Context& context) {
+  const Result<Job> job = resolve(arguments);
+  if (!job) return job.error();
+  if (arguments.has("--save-job")) {
+    if (Status status = save_job(arguments.text("--save-job"), *job); !status) return status.error();
   }
   if (!job->dry_run) {
-    if (Status status = check_output(*job); !status) return fail(status.error());
+    if (Status status = check_output(*job); !status) return status.error();
   }
-  const std::atomic<bool>& cancel = watch_for_interrupts(false);
-  Progress progress(job->quiet ? Progress::Style::kSilent : is_terminal() ? Progress::Style::kBar : Progress::Style::kLines);
   const Result<JetSummary> summary = run_jet(
-      *job,
-      [&](const ProgressEvent& event) {
-        if (event.stage == ProgressEvent::Stage::kLayers) keep_what_is_done();
-        progress(event);
-      },
-      cancel);
-  progress.clear();
-  if (!summary) return fail(summary.error().fault == Fault::kInterrupted ? interrupted(*job) : summary.error());
-  if (!job->quiet) say_text(summary_text(*job, *summary));
+      *job, [&](const ProgressEvent& event) { context.progress(event); }, context.cancel());
+  if (!summary) return summary.error().fault == Fault::kInterrupted ? interrupted(*job) : summary.error();
+  if (!job->quiet) context.say_text(summary_text(*job, *summary));
   if (job->json) {
-    if (Status status = print(summary_json(*job, *summary)); !status) return fail(status.error());
+    if (Status status = context.print(summary_json(*job, *summary)); !status) return status.error();
   }
-  return 0;
+  Outcome outcome;
+  outcome.layers_planned = summary->layers_planned;
+  outcome.layers_kept = summary->layers_kept;
+  return outcome;
 }
+
+}  // namespace
+
+const Command jet_command = {"jet", "binder jetting: exact 1-bit images of every layer of the bed, and a manifest", jet_spec,
+                             run_command};
 
 }  // namespace lamina::pipeline

@@ -1,7 +1,6 @@
 #include <fmt/format.h>
 
 #include "pipeline/cli/command.h"
-#include "pipeline/cli/console.h"
 #include "pipeline/machine/powder_printer.h"
 #include "pipeline/machine/printer_profile.h"
 #include "stages/program/head_grid.h"
@@ -14,7 +13,6 @@ namespace {
 
 CommandSpec machines_spec() {
   CommandSpec spec;
-  spec.name = "machines";
   spec.summary =
       "Lists the powder printers whose print programs lamina jet can write, and explains what follows from a profile:\n"
       "dpi across and along the scan, lag from nozzle to nozzle, swaths, highest speed, time and bytes of a layer.";
@@ -33,11 +31,11 @@ CommandSpec machines_spec() {
   return spec;
 }
 
-int run(const Arguments& arguments) {
+Outcome run_machines(const Arguments& arguments, Context& context) {
   if (arguments.has("--target")) {
     const auto part = program::orientation_target();
-    if (Status status = write::write_file(arguments.text("--target"), part); !status) return fail(status.error());
-    say(
+    if (Status status = write::write_file(arguments.text("--target"), part); !status) return status.error();
+    context.say(
         fmt::format("{}: an F of 20 x 30 mm: its stem lies along +y, its arms point to +x, a step of 1 mm on top lies at its "
                     "foot; read mirrored or turned, so is the machine",
                     arguments.text("--target")));
@@ -49,39 +47,32 @@ int run(const Arguments& arguments) {
   }
   for (const std::string& name : arguments.all("--show")) {
     const Result<Machine> machine = find_machine(name);
-    if (!machine) return fail(machine.error());
+    if (!machine) return machine.error();
     text += machine_text(*machine);
   }
   std::vector<std::string> checked = arguments.all("--check");
   checked.insert(checked.end(), arguments.operands.begin(), arguments.operands.end());
   for (const std::string& name : checked) {
     const Result<Machine> machine = find_machine(name);
-    if (!machine) return fail(machine.error());
+    if (!machine) return machine.error();
     const auto resolved = resolve_profile(*machine);
-    if (!resolved) return fail(resolved.error());
+    if (!resolved) return resolved.error();
     text += (text.empty() ? "" : "\n") + program::explain(resolved->machine, resolved->grid);
   }
   if (text.empty()) {
     for (const ShippedMachine& shipped : shipped_machines()) {
       const Result<Machine> machine = read_machine(shipped.text, std::string(shipped.name));
-      if (!machine) return fail(machine.error());
+      if (!machine) return machine.error();
       text += fmt::format("{:<16}{}\n", shipped.name, machine->description);
     }
   }
-  const Status status = print(text);
-  return status ? 0 : fail(status.error());
+  return context.print(text);
 }
 
 }  // namespace
 
-int run_machines_command(const std::vector<std::string>& texts) {
-  const Result<Arguments> arguments = read_arguments(machines_spec(), texts);
-  if (!arguments) return fail(arguments.error());
-  if (arguments->help) {
-    const Status status = print(*arguments->help);
-    return status ? 0 : fail(status.error());
-  }
-  return run(*arguments);
-}
+const Command machines_command = {"machines",
+                                  "the powder printers that lamina jet writes programs for, and what follows from a profile",
+                                  machines_spec, run_machines};
 
 }  // namespace lamina::pipeline

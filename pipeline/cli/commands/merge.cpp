@@ -1,7 +1,6 @@
 #include <fmt/format.h>
 
 #include "pipeline/cli/command.h"
-#include "pipeline/cli/console.h"
 #include "pipeline/output/merge.h"
 #include "pipeline/text/json_text.h"
 #include "pipeline/text/readable.h"
@@ -11,7 +10,6 @@ namespace {
 
 CommandSpec merge_spec() {
   CommandSpec spec;
-  spec.name = "merge";
   spec.summary =
       "Joins the shards of a job, from one or several directories, into the directory of a job that was never divided:\n"
       "its manifest.json is the same byte for byte. Layers are linked, or copied to another file system.";
@@ -27,31 +25,27 @@ CommandSpec merge_spec() {
   return spec;
 }
 
-}  // namespace
-
-int run_merge_command(const std::vector<std::string>& texts) {
-  const Result<Arguments> arguments = read_arguments(merge_spec(), texts);
-  if (!arguments) return fail(arguments.error());
-  if (arguments->help) {
-    const Status status = print(*arguments->help);
-    return status ? 0 : fail(status.error());
+Outcome run_merge(const Arguments& arguments, Context& context) {
+  if (arguments.operands.empty()) return Error{Fault::kUsage, "no directory to merge; name those of the shards"};
+  const std::string output = arguments.text("-o,--output");
+  if (output.empty()) return Error{Fault::kUsage, "-o OUT is missing; name the directory of the whole job"};
+  const Result<MergeReport> report = merge(arguments.operands, output);
+  if (!report) return report.error();
+  if (!arguments.has("--quiet")) {
+    context.say(fmt::format("{}: {} layers of {} shards joined, {} files linked, {} copied", report->output,
+                            readable_count(report->layers), report->shards, report->linked, report->copied));
   }
-  if (arguments->operands.empty()) return fail({Fault::kUsage, "no directory to merge; name those of the shards"});
-  const std::string output = arguments->text("-o,--output");
-  if (output.empty()) return fail({Fault::kUsage, "-o OUT is missing; name the directory of the whole job"});
-  const Result<MergeReport> report = merge(arguments->operands, output);
-  if (!report) return fail(report.error());
-  if (!arguments->has("--quiet")) {
-    say(fmt::format("{}: {} layers of {} shards joined, {} files linked, {} copied", report->output,
-                    readable_count(report->layers), report->shards, report->linked, report->copied));
-  }
-  if (arguments->has("--json")) {
-    const Status status = print(
+  if (arguments.has("--json")) {
+    const Status status = context.print(
         fmt::format("{{\"command\":\"merge\",\"directory\":{},\"shards\":{},\"layers\":{},\"linked\":{},\"copied\":{}}}\n",
                     json_string(report->output), report->shards, report->layers, report->linked, report->copied));
-    if (!status) return fail(status.error());
+    if (!status) return status.error();
   }
   return 0;
 }
+
+}  // namespace
+
+const Command merge_command = {"merge", "join the shards of a job that was divided", merge_spec, run_merge};
 
 }  // namespace lamina::pipeline

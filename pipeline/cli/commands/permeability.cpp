@@ -10,7 +10,6 @@
 #include <vector>
 
 #include "pipeline/cli/command.h"
-#include "pipeline/cli/console.h"
 #include "pipeline/text/json_text.h"
 #include "pipeline/text/names.h"
 #include "pipeline/text/number_text.h"
@@ -146,7 +145,6 @@ std::string plot_of(const Group& group, const segment::Permeability& fit) {
 
 CommandSpec permeability_spec() {
   CommandSpec spec;
-  spec.name = "permeability";
   spec.summary =
       "Fits dp / L = (mu / k1) v + (rho / k2) v^2 to measured flows and pressure drops: Darcy's k1, Forchheimer's k2,\n"
       "their standard errors and the quality of the fit.";
@@ -169,28 +167,20 @@ CommandSpec permeability_spec() {
   return spec;
 }
 
-}  // namespace
-
-int run_permeability_command(const std::vector<std::string>& texts) {
-  const Result<Arguments> arguments = read_arguments(permeability_spec(), texts);
-  if (!arguments) return fail(arguments.error());
-  if (arguments->help) {
-    const Status status = print(*arguments->help);
-    return status ? 0 : fail(status.error());
-  }
-  const auto usage = [](const std::string& what) { return fail({Fault::kUsage, what}); };
-  if (arguments->operands.size() != 1) return usage("name one file of measurements");
+Outcome run_permeability(const Arguments& arguments, Context& context) {
+  const auto usage = [](const std::string& what) { return Error{Fault::kUsage, what}; };
+  if (arguments.operands.size() != 1) return usage("name one file of measurements");
   Settings settings;
-  if (arguments->has("--convention")) {
-    if (arguments->text("--convention") != "dinisio2022") {
-      return usage(fmt::format("--convention: '{}' is none of dinisio2022", one_line(arguments->text("--convention"))));
+  if (arguments.has("--convention")) {
+    if (arguments.text("--convention") != "dinisio2022") {
+      return usage(fmt::format("--convention: '{}' is none of dinisio2022", one_line(arguments.text("--convention"))));
     }
     settings = {0.0255, 1e-3 / 60 * 28, {1.87e-5, 998.2}, true};
   }
   double value = 0;
   const auto number = [&](const char* flag, double unit, double& target) {
-    if (!arguments->has(flag)) return std::string();
-    const std::string wrong = read_number(arguments->text(flag), 1e-12, 1e9, "", value);
+    if (!arguments.has(flag)) return std::string();
+    const std::string wrong = read_number(arguments.text(flag), 1e-12, 1e9, "", value);
     if (wrong.empty()) target = value * unit;
     return wrong.empty() ? wrong : fmt::format("{}: {}", flag, wrong);
   };
@@ -204,8 +194,8 @@ int run_permeability_command(const std::vector<std::string>& texts) {
   if (diameter > 0) settings.area_m2 = std::numbers::pi / 4 * diameter * diameter;
   if (!(settings.length_m > 0)) return usage("--length is missing; give the medium's length along the flow in mm");
   if (!(settings.area_m2 > 0)) return usage("--diameter or --area is missing; give the medium's cross-section");
-  const auto groups = read_points(arguments->operands.front(), settings);
-  if (!groups) return fail(groups.error());
+  const auto groups = read_points(arguments.operands.front(), settings);
+  if (!groups) return groups.error();
   const std::string warning =
       settings.fluid.density_kg_m3 > 100 && settings.fluid.viscosity_pa_s < 1e-4
           ? fmt::format(
@@ -217,8 +207,8 @@ int run_permeability_command(const std::vector<std::string>& texts) {
   for (const Group& group : *groups) {
     const auto fit = segment::fit_permeability(group.points, settings.fluid);
     if (!fit)
-      return fail({fit.error().fault, fmt::format("{}: {}{}", arguments->operands.front(),
-                                                  group.name.empty() ? "" : group.name + ": ", fit.error().message)});
+      return Error{fit.error().fault, fmt::format("{}: {}{}", arguments.operands.front(),
+                                                  group.name.empty() ? "" : group.name + ": ", fit.error().message)};
     const double k1 = fit->k1_m2 / segment::kDarcy, k1_error = fit->k1_error_m2 / segment::kDarcy;
     text += fmt::format(
         "{}k1   {:.2f} +- {:.2f} D ({:.4e} m2)\nk2   {:.4g} +- {:.2g} m\nfit  R2 {:.6f}, {} points, scatter {:.4g} Pa/m\n",
@@ -229,20 +219,24 @@ int run_permeability_command(const std::vector<std::string>& texts) {
         "\"r_squared\":{},\"scatter_pa_m\":{}}}",
         json.empty() ? "" : ",", json_string(group.name), group.points.size(), k1, k1_error, fit->k1_m2, fit->k2_m,
         fit->k2_error_m, fit->r_squared, fit->scatter_pa_m);
-    if (arguments->has("--plot") && &group == &groups->front()) {
-      auto file = write::GrowingFile::open(arguments->text("--plot"));
-      if (!file) return fail(file.error());
-      if (Status status = file->append(plot_of(group, *fit)); !status) return fail(status.error());
-      if (Status status = file->finish(); !status) return fail(status.error());
+    if (arguments.has("--plot") && &group == &groups->front()) {
+      auto file = write::GrowingFile::open(arguments.text("--plot"));
+      if (!file) return file.error();
+      if (Status status = file->append(plot_of(group, *fit)); !status) return status.error();
+      if (Status status = file->finish(); !status) return status.error();
     }
   }
-  if (!warning.empty()) say_text(fmt::format("warning   {}\n", warning));
-  const std::string out = arguments->has("--json")
+  if (!warning.empty()) context.say_text(fmt::format("warning   {}\n", warning));
+  const std::string out = arguments.has("--json")
                               ? fmt::format("{{\"command\":\"permeability\",\"fits\":[{}],\"warnings\":[{}]}}\n", json,
                                             warning.empty() ? "" : json_string(warning))
                               : text;
-  const Status status = print(out);
-  return status ? 0 : fail(status.error());
+  return context.print(out);
 }
+
+}  // namespace
+
+const Command permeability_command = {"permeability", "Darcy's and Forchheimer's coefficients from flows and pressure drops",
+                                      permeability_spec, run_permeability};
 
 }  // namespace lamina::pipeline

@@ -7,13 +7,12 @@
 #include <filesystem>
 
 #include "pipeline/cli/command.h"
-#include "pipeline/cli/console.h"
 
 namespace lamina::pipeline {
+namespace {
 
 CommandSpec preview_spec() {
   CommandSpec spec;
-  spec.name = "preview";
   spec.summary =
       "Draws layers of a job as one picture (PNG), each pixel as dark as the share of its area that is set; or one layer of\n"
       "a sliced job with its filling, or of a G-code file, bead widths true (PNG or SVG), or several with --count or --every\n"
@@ -43,8 +42,14 @@ CommandSpec preview_spec() {
   return spec;
 }
 
+Outcome run_preview(const Arguments& arguments, Context&) { return hand_over_to_preview(arguments.given); }
+
+}  // namespace
+
+const Command preview_command = {"preview", "pictures of a job's layers for people", preview_spec, run_preview, true};
+
 // Pictures need libraries that no job should have to load: they are made by a program of its own.
-int run_preview_command(const std::vector<std::string>& arguments) {
+Error hand_over_to_preview(const std::vector<std::string>& arguments) {
   constexpr const char* kProgram = "lamina-preview";
   std::vector<char*> texts;
   std::string name = kProgram;
@@ -59,8 +64,8 @@ int run_preview_command(const std::vector<std::string>& arguments) {
   std::signal(SIGXFSZ, SIG_DFL);
   if (!error) ::execv((own.parent_path() / kProgram).c_str(), texts.data());
   ::execvp(kProgram, texts.data());
-  return fail({Fault::kInternal,
-               fmt::format("{}: {}; it belongs beside lamina or into PATH, install it there", kProgram, std::strerror(errno))});
+  return {Fault::kInternal,
+          fmt::format("{}: {}; it belongs beside lamina or into PATH, install it there", kProgram, std::strerror(errno))};
 }
 
 }  // namespace lamina::pipeline

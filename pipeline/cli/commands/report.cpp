@@ -5,7 +5,6 @@
 #include <span>
 
 #include "pipeline/cli/command.h"
-#include "pipeline/cli/console.h"
 #include "pipeline/show/report.h"
 #include "pipeline/text/number_text.h"
 #include "pipeline/text/readable.h"
@@ -16,7 +15,6 @@ namespace {
 
 CommandSpec report_spec() {
   CommandSpec spec;
-  spec.name = "report";
   spec.summary =
       "Writes one HTML page about a finished job: its layers to leaf, zoom and pan through, the parts from three sides,\n"
       "area, thickness and time over the height, warnings, the job and all hashes. The page needs no network and no other file.";
@@ -43,36 +41,33 @@ bool is_page_name(const std::string& path) {
   return ending == ".html" || ending == ".htm";
 }
 
-}  // namespace
-
-int run_report_command(const std::vector<std::string>& texts) {
-  const Result<Arguments> arguments = read_arguments(report_spec(), texts);
-  if (!arguments) return fail(arguments.error());
-  if (arguments->help) {
-    const Status status = print(*arguments->help);
-    return status ? 0 : fail(status.error());
-  }
-  if (arguments->operands.size() != 1) return fail({Fault::kUsage, "name one finished directory of lamina jet"});
-  const std::string output = arguments->text("-o,--output");
-  if (output.empty()) return fail({Fault::kUsage, "-o HTML is missing; name the page"});
+Outcome run_report(const Arguments& arguments, Context& context) {
+  if (arguments.operands.size() != 1) return Error{Fault::kUsage, "name one finished directory of lamina jet"};
+  const std::string output = arguments.text("-o,--output");
+  if (output.empty()) return Error{Fault::kUsage, "-o HTML is missing; name the page"};
   if (!is_page_name(output)) {
-    return fail({Fault::kUsage, fmt::format("-o {}: the page is HTML; give it a name that ends in .html", output)});
+    return Error{Fault::kUsage, fmt::format("-o {}: the page is HTML; give it a name that ends in .html", output)};
   }
   ReportOptions options;
-  if (arguments->has("--most-bytes")) {
-    const std::string wrong = read_bytes(arguments->text("--most-bytes"), options.size_limit);
-    if (!wrong.empty()) return fail({Fault::kUsage, "--most-bytes: " + wrong});
+  if (arguments.has("--most-bytes")) {
+    const std::string wrong = read_bytes(arguments.text("--most-bytes"), options.size_limit);
+    if (!wrong.empty()) return Error{Fault::kUsage, "--most-bytes: " + wrong};
   }
-  options.parts = arguments->all("--parts");
-  const Result<Report> report = make_report(arguments->operands.front(), options);
-  if (!report) return fail(report.error());
-  if (Status status = write::write_file(output, std::as_bytes(std::span(report->page))); !status) return fail(status.error());
-  if (!arguments->has("--quiet")) {
-    say(fmt::format("{}: {} of {} layers to look at, {}", output, report->held, report->layers,
-                    readable_bytes(report->page.size())));
-    if (!report->without_parts.empty()) say("views are of the layers: " + report->without_parts);
+  options.parts = arguments.all("--parts");
+  const Result<Report> report = make_report(arguments.operands.front(), options);
+  if (!report) return report.error();
+  if (Status status = write::write_file(output, std::as_bytes(std::span(report->page))); !status) return status.error();
+  if (!arguments.has("--quiet")) {
+    context.say(fmt::format("{}: {} of {} layers to look at, {}", output, report->held, report->layers,
+                            readable_bytes(report->page.size())));
+    if (!report->without_parts.empty()) context.say("views are of the layers: " + report->without_parts);
   }
   return 0;
 }
+
+}  // namespace
+
+const Command report_command = {"report", "one page about a finished job: layers, plots, warnings, hashes", report_spec,
+                                run_report};
 
 }  // namespace lamina::pipeline

@@ -1,10 +1,7 @@
 #include <fmt/format.h>
 
 #include "pipeline/cli/command.h"
-#include "pipeline/cli/console.h"
 #include "pipeline/cli/keys.h"
-#include "pipeline/cli/progress_bar.h"
-#include "pipeline/flow/interrupt.h"
 #include "pipeline/job/file.h"
 #include "pipeline/output/slice_directory.h"
 #include "pipeline/run/slice.h"
@@ -17,7 +14,6 @@ const KeyChoice kSliceKeys = {"bed.size_mm", "layers",     "heights",    "place"
 
 CommandSpec slice_spec() {
   CommandSpec spec;
-  spec.name = "slice";
   spec.summary =
       "Cuts parts into layers: closed contours in exact nanometres, outer ones counter-clockwise, holes clockwise, as\n"
       "SVG, CLI or 3MF slices, and fills them if a pattern or walls are asked for.";
@@ -43,40 +39,34 @@ CommandSpec slice_spec() {
   return spec;
 }
 
-}  // namespace
-
-int run_slice_command(const std::vector<std::string>& texts) {
-  const Result<Arguments> arguments = read_arguments(slice_spec(), texts);
-  if (!arguments) return fail(arguments.error());
-  if (arguments->help) {
-    const Status status = print(*arguments->help);
-    return status ? 0 : fail(status.error());
-  }
-  Result<Job> read = read_job_options(kSliceKeys, *arguments);
-  if (!read) return fail(read.error());
+Outcome run_command(const Arguments& arguments, Context& context) {
+  Result<Job> read = read_job_options(kSliceKeys, arguments);
+  if (!read) return read.error();
   Job& job = *read;
-  job.overwrite = arguments->has("--overwrite");
-  job.dry_run = arguments->has("--dry-run");
-  job.json = arguments->has("--json");
-  job.quiet = arguments->has("--quiet");
-  if (Status status = check_job(job); !status) return fail(status.error());
-  if (arguments->has("--save-job")) {
-    if (Status status = save_job(arguments->text("--save-job"), job); !status) return fail(status.error());
+  job.overwrite = arguments.has("--overwrite");
+  job.dry_run = arguments.has("--dry-run");
+  job.json = arguments.has("--json");
+  job.quiet = arguments.has("--quiet");
+  if (Status status = check_job(job); !status) return status.error();
+  if (arguments.has("--save-job")) {
+    if (Status status = save_job(arguments.text("--save-job"), job); !status) return status.error();
   }
   if (!job.dry_run) {
-    if (Status status = check_slice_output(job); !status) return fail(status.error());
+    if (Status status = check_slice_output(job); !status) return status.error();
   }
-  const std::atomic<bool>& cancel = watch_for_interrupts();
-  Progress progress(job.quiet ? Progress::Style::kSilent : is_terminal() ? Progress::Style::kBar : Progress::Style::kLines);
   const Result<SliceSummary> summary = run_slice(
-      job, [&](const ProgressEvent& event) { progress(event); }, cancel);
-  progress.clear();
-  if (!summary) return fail(summary.error());
-  if (!job.quiet) say_text(slice_summary_text(job, *summary));
+      job, [&](const ProgressEvent& event) { context.progress(event); }, context.cancel());
+  if (!summary) return summary.error();
+  if (!job.quiet) context.say_text(slice_summary_text(job, *summary));
   if (job.json) {
-    if (Status status = print(slice_summary_json(job, *summary)); !status) return fail(status.error());
+    if (Status status = context.print(slice_summary_json(job, *summary)); !status) return status.error();
   }
   return 0;
 }
+
+}  // namespace
+
+const Command slice_command = {"slice", "contours of every layer, and their filling: SVG, CLI, 3MF slices", slice_spec,
+                               run_command};
 
 }  // namespace lamina::pipeline

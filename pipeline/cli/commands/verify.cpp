@@ -2,7 +2,6 @@
 
 #include "pipeline/check/verify.h"
 #include "pipeline/cli/command.h"
-#include "pipeline/cli/console.h"
 #include "pipeline/text/json_text.h"
 #include "pipeline/text/readable.h"
 
@@ -11,7 +10,6 @@ namespace {
 
 CommandSpec verify_spec() {
   CommandSpec spec;
-  spec.name = "verify";
   spec.summary =
       "Compares a job's directory with its manifest: every layer's file is there, of the recorded size and hash, and\n"
       "decodes to the recorded pixels; the print program of each layer, carried out by a virtual machine, prints exactly\n"
@@ -42,33 +40,34 @@ std::string replay_json(const VerifyReport& report) {
 }
 
 // What the machine does, for people.
-void say_replay(const VerifyReport& report) {
+void say_replay(const VerifyReport& report, Context& context) {
   if (report.machine.empty() || report.replayed == 0) return;
   const ReplayCount& replay = report.replay;
-  say(fmt::format(
+  context.say(fmt::format(
       "programs  {} layers replayed on {}: {}, {} drops in {} sweeps, {:.3f} % of the bed", readable_count(report.replayed),
       report.machine,
       report.moved + report.lost > 0 ? "every pixel fired once but those of blocked nozzles" : "every pixel fired once",
       readable_count(replay.drops), readable_count(replay.sweeps), 100 * report.coverage));
   if (report.moved + report.lost > 0) {
-    say(fmt::format("blocked   {} pixels fired by a neighbouring nozzle, {} not at all, as recorded",
-                    readable_count(report.moved), readable_count(report.lost)));
+    context.say(fmt::format("blocked   {} pixels fired by a neighbouring nozzle, {} not at all, as recorded",
+                            readable_count(report.moved), readable_count(report.lost)));
   }
-  say(fmt::format("places    drops land up to {:.2f} um along and {:.2f} um across the scan from the centre of their pixel",
+  context.say(
+      fmt::format("places    drops land up to {:.2f} um along and {:.2f} um across the scan from the centre of their pixel",
                   replay.farthest_along_um, replay.farthest_across_um));
   if (replay.travel_mm == 0 && replay.fed_mm[0] == 0 && replay.fed_mm[1] == 0) {
     // Words for the head alone: whoever drives the axes decides the rest.
-    say(fmt::format("machine   {:.1f} m scanned in {}; this dialect does not tell other movements nor powder",
-                    replay.scan_mm / 1000, readable_seconds(replay.seconds)));
-    say(fmt::format("material  {:.3f} ml of binder", report.binder_mm3 / 1000));
+    context.say(fmt::format("machine   {:.1f} m scanned in {}; this dialect does not tell other movements nor powder",
+                            replay.scan_mm / 1000, readable_seconds(replay.seconds)));
+    context.say(fmt::format("material  {:.3f} ml of binder", report.binder_mm3 / 1000));
     return;
   }
   if (replay.seconds > 0) {
-    say(fmt::format("machine   {:.2f} h, {:.1f} m scanned, {:.1f} m other travel", replay.seconds / 3600, replay.scan_mm / 1000,
-                    replay.travel_mm / 1000));
+    context.say(fmt::format("machine   {:.2f} h, {:.1f} m scanned, {:.1f} m other travel", replay.seconds / 3600,
+                            replay.scan_mm / 1000, replay.travel_mm / 1000));
   }
-  say(fmt::format("material  {:.3f} ml of binder, {:.2f} cm3 of powder fed (solid), {:.2f} and {:.2f} mm of the vats",
-                  report.binder_mm3 / 1000, report.powder_mm3 / 1000, replay.fed_mm[0], replay.fed_mm[1]));
+  context.say(fmt::format("material  {:.3f} ml of binder, {:.2f} cm3 of powder fed (solid), {:.2f} and {:.2f} mm of the vats",
+                          report.binder_mm3 / 1000, report.powder_mm3 / 1000, replay.fed_mm[0], replay.fed_mm[1]));
 }
 
 std::string report_json(const VerifyReport& report) {
@@ -79,39 +78,37 @@ std::string report_json(const VerifyReport& report) {
       json_string(report.directory), report.ok(), report.layers, report.bytes, report.fault_count, faults, replay_json(report));
 }
 
-}  // namespace
-
-int run_verify_command(const std::vector<std::string>& texts) {
-  const Result<Arguments> arguments = read_arguments(verify_spec(), texts);
-  if (!arguments) return fail(arguments.error());
-  if (arguments->help) {
-    const Status status = print(*arguments->help);
-    return status ? 0 : fail(status.error());
-  }
-  if (arguments->operands.empty())
-    return fail({Fault::kUsage, "no directory to verify; name one that lamina jet or lamina slice wrote"});
+Outcome run_verify(const Arguments& arguments, Context& context) {
+  if (arguments.operands.empty())
+    return Error{Fault::kUsage, "no directory to verify; name one that lamina jet or lamina slice wrote"};
   int code = 0;
-  for (const std::string& directory : arguments->operands) {
-    const Result<VerifyReport> report = verify(directory, {.quick = arguments->has("--quick")});
+  for (const std::string& directory : arguments.operands) {
+    const Result<VerifyReport> report = verify(directory, {.quick = arguments.has("--quick")});
     if (!report) {
-      code = std::max(code, fail(report.error()));
+      code = std::max(code, context.complain(report.error()));
       continue;
     }
-    for (const std::string& fault : report->faults) say(fmt::format("lamina: {}: {}", directory, fault));
+    for (const std::string& fault : report->faults)
+      context.complain({Fault::kVerification, fmt::format("{}: {}", directory, fault)});
     if (report->fault_count > report->faults.size()) {
-      say(fmt::format("lamina: {}: and {} more", directory, report->fault_count - report->faults.size()));
+      context.complain(
+          {Fault::kVerification, fmt::format("{}: and {} more", directory, report->fault_count - report->faults.size())});
     }
     if (!report->ok()) code = std::max(code, static_cast<int>(Fault::kVerification));
-    if (report->ok() && !arguments->has("--quiet")) {
-      say(fmt::format("{}: {} layers, {}, all as the manifest says", directory, readable_count(report->layers),
-                      readable_bytes(report->bytes)));
-      say_replay(*report);
+    if (report->ok() && !arguments.has("--quiet")) {
+      context.say(fmt::format("{}: {} layers, {}, all as the manifest says", directory, readable_count(report->layers),
+                              readable_bytes(report->bytes)));
+      say_replay(*report, context);
     }
-    if (arguments->has("--json")) {
-      if (Status status = print(report_json(*report)); !status) return fail(status.error());
+    if (arguments.has("--json")) {
+      if (Status status = context.print(report_json(*report)); !status) return status.error();
     }
   }
   return code;
 }
+
+}  // namespace
+
+const Command verify_command = {"verify", "is a job's directory whole and true to its manifest", verify_spec, run_verify};
 
 }  // namespace lamina::pipeline

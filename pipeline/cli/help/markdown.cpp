@@ -1,4 +1,4 @@
-#include "pipeline/cli/markdown_page.h"
+#include "pipeline/cli/help/help.h"
 
 #include <fmt/format.h>
 

@@ -1,4 +1,4 @@
-#include "pipeline/flow/interrupt.h"
+#include "pipeline/cli/signals.h"
 
 #include <unistd.h>
 
@@ -8,7 +8,7 @@
 namespace lamina::pipeline {
 namespace {
 
-std::atomic<bool> interrupted{false}, keeping{true};
+std::atomic<bool> interrupted{false}, keeping{false};
 static_assert(std::atomic<bool>::is_always_lock_free);  // a signal handler may touch nothing else
 
 void on_signal(int) {
@@ -19,26 +19,21 @@ void on_signal(int) {
   if (interrupted.exchange(true) || !keeping) ::_exit(130);
 }
 
-thread_local const std::atomic<bool>* own_flag = nullptr;
-
 }  // namespace
 
-InterruptScope::InterruptScope(const std::atomic<bool>& flag) : outer_(own_flag) { own_flag = &flag; }
-InterruptScope::~InterruptScope() { own_flag = outer_; }
-
-const std::atomic<bool>& watch_for_interrupts(bool something_to_keep) {
-  if (own_flag != nullptr) return *own_flag;
-  static const bool decided = (keeping = something_to_keep, true);
-  static_cast<void>(decided);
-  struct sigaction action {};
+const std::atomic<bool>& watch_for_signals() {
+  struct sigaction action {
+  }, before{};
   action.sa_handler = on_signal;
   action.sa_flags = SA_RESTART;
   sigemptyset(&action.sa_mask);
   sigaction(SIGINT, &action, nullptr);
   sigaction(SIGTERM, &action, nullptr);
+  sigaction(SIGHUP, nullptr, &before);
+  if (before.sa_handler != SIG_IGN) sigaction(SIGHUP, &action, nullptr);
   return interrupted;
 }
 
-void keep_what_is_done() { keeping = true; }
+void keep_on_signals() { keeping = true; }
 
 }  // namespace lamina::pipeline

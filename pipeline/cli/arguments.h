@@ -1,0 +1,51 @@
+// pipeline/cli/arguments.h: what a command takes on the command line, and what stands there.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "stages/data/status.h"
+
+namespace lamina::pipeline {
+
+/// One option of a command. A switch has no value.
+struct OptionSpec {
+  std::string flag;   // "-o,--output"
+  std::string value;  // "MM"; empty for a switch
+  std::string meaning;
+  std::string preset;  // shown in the help; empty if there is none
+  std::string group;   // heading in the help
+};
+
+/// The arguments of a command: help, manual pages, shell completion and the documentation's tests are made from it.
+struct CommandSpec {
+  std::string name, summary;
+  std::string operand, operand_meaning;  // "PART", "..."; as many as there are
+  std::vector<OptionSpec> options;
+  std::string closing;                                                // examples, at the end of the help
+  std::vector<std::pair<std::string_view, std::string_view>> absent;  // options of other commands, and why this one has none
+
+  /// The option that `flag`, "--output" or "-o", names, or nullptr.
+  const OptionSpec* find(std::string_view flag) const;
+};
+
+/// What stands on the command line, as text.
+struct Arguments {
+  std::vector<std::string> operands;
+  std::vector<std::pair<std::string, std::string>> options;  // (spec flag, text); switches with an empty text
+  std::optional<std::string> help;                           // --help is there: nothing else is to be done
+  std::vector<std::string> given;                            // as they were typed, all of them
+
+  bool has(std::string_view flag) const;
+  std::string text(std::string_view flag) const;  // last one given, or ""
+  std::vector<std::string> all(std::string_view flag) const;
+};
+
+/// Reads the arguments behind the command's name. errors  kUsage: unknown option (and which one was probably meant),
+/// value missing
+Result<Arguments> read_arguments(const CommandSpec& spec, const std::vector<std::string>& arguments);
+
+}  // namespace lamina::pipeline

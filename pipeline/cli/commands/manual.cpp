@@ -1,0 +1,61 @@
+#include <fmt/format.h>
+
+#include <filesystem>
+#include <span>
+
+#include "pipeline/cli/command.h"
+#include "pipeline/cli/help/help.h"
+#include "stages/write/atomic_file.h"
+
+namespace lamina::pipeline {
+namespace {
+
+CommandSpec manual_spec() {
+  CommandSpec spec;
+  spec.summary = "Prints the manual page of lamina, or of one of its commands, as man reads it.";
+  spec.operand = "COMMAND";
+  spec.operand_meaning = "a command; none for the page of the program";
+  spec.options = {{"-o,--output", "DIR", "write all pages into a directory instead, as packages do", "", ""},
+                  {"--markdown", "", "pages of commands as Markdown: docs/commands is made by this", "", ""}};
+  spec.closing =
+      "Examples:\n"
+      "  lamina manual jet | man -l -\n"
+      "  lamina manual --markdown -o docs/commands";
+  return spec;
+}
+
+Status write_pages(const std::string& directory, bool markdown) {
+  const auto write = [&](const std::string& name, const std::string& page) {
+    return write::write_file(fmt::format("{}/{}", directory, name), std::as_bytes(std::span(page)));
+  };
+  std::error_code error;
+  std::filesystem::create_directories(directory, error);
+  if (error) return Error{Fault::kOutput, fmt::format("{}: {}", directory, error.message())};
+  if (!markdown) {
+    if (Status status = write("lamina.1", man_page()); !status) return status;
+  }
+  for (const Command* command : commands()) {
+    const Status status = markdown ? write(fmt::format("{}.md", command->name), markdown_page(*command))
+                                   : write(fmt::format("lamina-{}.1", command->name), man_page(*command));
+    if (!status) return status;
+  }
+  return {};
+}
+
+Outcome run_manual(const Arguments& arguments, Context& context) {
+  const bool markdown = arguments.has("--markdown");
+  if (arguments.has("-o,--output")) return write_pages(arguments.text("-o,--output"), markdown);
+  if (arguments.operands.empty()) {
+    if (markdown) return Error{Fault::kUsage, "--markdown: name a command, or -o DIR for all of them"};
+    return context.print(man_page());
+  }
+  const Command* command = arguments.operands.size() == 1 ? find_command(arguments.operands.front()) : nullptr;
+  if (command == nullptr) return Error{Fault::kUsage, unknown_command(arguments.operands.front())};
+  return context.print(markdown ? markdown_page(*command) : man_page(*command));
+}
+
+}  // namespace
+
+const Command manual_command = {"manual", "manual pages", manual_spec, run_manual};
+
+}  // namespace lamina::pipeline
