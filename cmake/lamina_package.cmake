@@ -51,18 +51,3 @@ set(CPACK_COMPONENT_PYTHON_DESCRIPTION "The Python module lamina")
 set(CPACK_COMPONENT_PROGRAM_DESCRIPTION "The programs lamina and lamina-preview")
 set(CPACK_COMPONENT_DEVELOPMENT_DESCRIPTION "Static libraries and headers of lamina")
 include(CPack)
-
-# A project of its own finds the installed library, and plans a part.
-if(LAMINA_TESTS AND NOT LAMINA_SANITIZE)
-  add_test(NAME Installed.AnotherProjectFindsTheLibraryAndPlansAPart
-           COMMAND ${PROJECT_SOURCE_DIR}/tests/install/example ${PROJECT_BINARY_DIR} ${PROJECT_SOURCE_DIR})
-  set_tests_properties(Installed.AnotherProjectFindsTheLibraryAndPlansAPart PROPERTIES TIMEOUT 900)
-  find_program(PYTHON3 python3 REQUIRED)
-  add_test(NAME Documentation.EveryExampleOfEveryCommandRuns
-           COMMAND ${PYTHON3} ${PROJECT_SOURCE_DIR}/tests/documentation/examples $<TARGET_FILE:lamina> ${PROJECT_SOURCE_DIR})
-  add_test(NAME Golden.EveryJobWritesTheBytesOfTheTable
-           COMMAND ${PYTHON3} ${PROJECT_SOURCE_DIR}/tests/golden/check $<TARGET_FILE:lamina>)
-  add_test(NAME Cluster.SharesOnSlurmAreOneRunThoughAWorkerIsKilled
-           COMMAND ${PROJECT_SOURCE_DIR}/tests/cluster/slurm $<TARGET_FILE:lamina>)
-  set_tests_properties(Cluster.SharesOnSlurmAreOneRunThoughAWorkerIsKilled PROPERTIES SKIP_RETURN_CODE 77 TIMEOUT 900)
-endif()

@@ -30,10 +30,3 @@ target_link_libraries(lamina_python PRIVATE lamina::pipeline)
 target_compile_options(lamina_python PRIVATE $<$<NOT:$<CONFIG:Debug>>:-Os> -Wno-conversion)
 set(LAMINA_PYTHON_DIR lib/python3/dist-packages CACHE STRING "Where the Python module is installed, below the prefix")
 install(TARGETS lamina_python LIBRARY DESTINATION ${LAMINA_PYTHON_DIR} COMPONENT python)
-
-if(LAMINA_TESTS)
-  add_test(NAME Python.ArraysAreTheDecodedFilesOfTheProgram
-           COMMAND ${Python_EXECUTABLE} ${PROJECT_SOURCE_DIR}/tests/python/test_module.py $<TARGET_FILE:lamina>)
-  set_tests_properties(Python.ArraysAreTheDecodedFilesOfTheProgram PROPERTIES SKIP_RETURN_CODE 77 TIMEOUT 300
-                       ENVIRONMENT "PYTHONPATH=${PROJECT_BINARY_DIR}/python;PYTHONDONTWRITEBYTECODE=1")
-endif()

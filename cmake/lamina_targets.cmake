@@ -1,4 +1,4 @@
-# Libraries, programs, tests and benchmarks. Sources are found by folder: a file belongs to the stage it lies in.
+# Libraries, programs and benchmarks. Sources are found by folder: a file belongs to the stage it lies in.
 
 function(lamina_sources result)
   set(found)
@@ -61,48 +61,6 @@ target_link_libraries(lamina-preview PRIVATE lamina::pipeline PkgConfig::OPENIMA
 
 if(NOT LAMINA_TEST_COMMANDS)
   set_target_properties(lamina-preview PROPERTIES EXCLUDE_FROM_ALL ON)
-endif()
-
-if(LAMINA_TESTS)
-  enable_testing()
-  find_package(GTest REQUIRED)
-  include(GoogleTest)
-  set_source_files_properties(${PROJECT_SOURCE_DIR}/tests/raster/reference.cpp
-                              PROPERTIES COMPILE_OPTIONS -O3 SKIP_PRECOMPILE_HEADERS ON)
-  set(precompiled)
-  foreach(folder data load heights slice infill segment raster program write pipeline commands picture)
-    if(NOT LAMINA_TEST_COMMANDS AND folder MATCHES "commands|picture")
-      continue()
-    endif()
-    lamina_sources(test_sources "tests/${folder}/*.cpp")
-    if(test_sources)
-      add_executable(test_${folder} ${test_sources})
-      target_link_libraries(test_${folder} PRIVATE lamina::pipeline GTest::gtest GTest::gtest_main TIFF::TIFF PNG::PNG
-                            ZLIB::ZLIB nlohmann_json::nlohmann_json PkgConfig::XXHASH)
-      # Tests are compiled to be compiled fast; what they call is optimised, and so is the slow reference of the bitmaps.
-      target_compile_options(test_${folder} PRIVATE $<$<NOT:$<CONFIG:Debug>>:-O1> -fno-sanitize=undefined
-                             -Wno-array-bounds -Wno-stringop-overflow)  # g++ 12 has them wrong for std::string at -O1
-      if(precompiled)
-        target_precompile_headers(test_${folder} REUSE_FROM ${precompiled})
-      else()
-        target_precompile_headers(test_${folder} PRIVATE tests/precompiled.h)
-        set(precompiled test_${folder})
-      endif()
-      target_compile_definitions(test_${folder} PRIVATE LAMINA_TEST_DIR="${PROJECT_SOURCE_DIR}/tests"
-                                 LAMINA_PROGRAM="$<TARGET_FILE:lamina>")
-      add_dependencies(test_${folder} lamina)
-      if(LAMINA_TEST_COMMANDS)
-        add_dependencies(test_${folder} lamina-preview)
-      endif()
-      if(folder MATCHES "segment|pipeline")
-        target_sources(test_${folder} PRIVATE tests/commands/program.cpp)
-      endif()
-      if(folder STREQUAL "picture")
-        target_link_libraries(test_${folder} PRIVATE PkgConfig::OPENIMAGEIO)
-      endif()
-      gtest_discover_tests(test_${folder} DISCOVERY_TIMEOUT 120 PROPERTIES TIMEOUT 900)
-    endif()
-  endforeach()
 endif()
 
 if(LAMINA_BENCH)

@@ -1,4 +1,4 @@
-// tests/pipeline/program.h: runs the real program in a directory of its own, and makes parts for it.
+// tests/commands/program.h: runs the real program in a directory of its own, and makes parts for it.
 #pragma once
 
 #include <array>

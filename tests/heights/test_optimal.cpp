@@ -8,7 +8,7 @@
 #include <tuple>
 #include <utility>
 
-#include "surfaces.h"
+#include "tests/heights/surfaces.h"
 
 namespace lamina::heights {
 namespace {

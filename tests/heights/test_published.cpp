@@ -5,7 +5,7 @@
 #include <fstream>
 #include <sstream>
 
-#include "surfaces.h"
+#include "tests/heights/surfaces.h"
 
 namespace lamina::heights {
 namespace {

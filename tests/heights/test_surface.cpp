@@ -12,7 +12,7 @@
 #include "stages/heights/per_part.h"
 #include "stages/heights/steepest.h"
 #include "stages/write/rp3/rp3.h"
-#include "surfaces.h"
+#include "tests/heights/surfaces.h"
 
 namespace lamina::heights {
 namespace {

@@ -1,9 +1,9 @@
-// tests/load/stl_binary.cpp: binary STL, whatever its header says.
+// tests/load/test_stl_binary.cpp: binary STL, whatever its header says.
 #include <cmath>
 #include <random>
 
 #include "stages/load/diagnose.h"
-#include "test_files.h"
+#include "tests/load/files.h"
 
 namespace lamina::test {
 namespace {

@@ -1,4 +1,4 @@
-// tests/pipeline/test_slice_jobs.cpp: lamina slice as a program: same bytes, right and wrong use, what is left behind.
+// tests/pipeline/run/test_slice_jobs.cpp: lamina slice as a program: same bytes, right and wrong use, what is left behind.
 #include <gtest/gtest.h>
 
 #include <filesystem>

@@ -1,4 +1,4 @@
-// tests/write/slice_files.cpp: SVG, CLI and 3MF slices, read back by readers that share no code with the writers.
+// tests/write/test_slice_files.cpp: SVG, CLI and 3MF slices, read back by readers that share no code with the writers.
 #include <gtest/gtest.h>
 
 #include <unistd.h>

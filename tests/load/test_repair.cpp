@@ -1,4 +1,4 @@
-// tests/load/repair.cpp: the census, the diagnosis, and what repair makes of broken meshes.
+// tests/load/test_repair.cpp: the census, the diagnosis, and what repair makes of broken meshes.
 #include "stages/load/repair.h"
 
 #include <oneapi/tbb/global_control.h>
@@ -7,7 +7,7 @@
 #include <random>
 
 #include "stages/load/diagnose.h"
-#include "test_files.h"
+#include "tests/load/files.h"
 
 namespace lamina::test {
 namespace {

@@ -1,4 +1,4 @@
-// tests/load/test_archives.h: gzip and zip files made byte by byte, so that they can be wrong on purpose.
+// tests/load/archives.h: gzip and zip files made byte by byte, so that they can be wrong on purpose.
 #pragma once
 
 #include <zlib.h>

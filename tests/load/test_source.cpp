@@ -1,12 +1,12 @@
-// tests/load/source.cpp: files that are no files, gzip, and what happens to thousands of damaged ones.
+// tests/load/test_source.cpp: files that are no files, gzip, and what happens to thousands of damaged ones.
 #include "stages/load/source.h"
 
 #include <sys/stat.h>
 
 #include <random>
 
-#include "test_archives.h"
-#include "test_files.h"
+#include "tests/load/archives.h"
+#include "tests/load/files.h"
 
 namespace lamina::test {
 namespace {

@@ -1,9 +1,9 @@
-// tests/load/info.cpp: the report of `lamina info`.
+// tests/pipeline/show/test_info.cpp: the report of `lamina info`.
 #include "pipeline/show/info.h"
 
 #include <nlohmann/json.hpp>
 
-#include "test_files.h"
+#include "tests/load/files.h"
 
 namespace lamina::test {
 namespace {

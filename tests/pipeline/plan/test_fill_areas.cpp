@@ -1,4 +1,4 @@
-// tests/pipeline/test_fill_areas.cpp: parts that touch or overlap are filled each by its own parameters, in its own room.
+// tests/pipeline/plan/test_fill_areas.cpp: parts that touch or overlap are filled each by its own parameters, in its own room.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 

@@ -1,7 +1,7 @@
-// tests/load/outcomes.cpp: every file of the corpus, and of LAMINA_MODELS, ends as tests/corpus/outcomes.tsv says.
+// tests/load/test_outcomes.cpp: every file of the corpus, and of LAMINA_MODELS, ends as tests/corpus/outcomes.tsv says.
 #include <set>
 
-#include "test_files.h"
+#include "tests/load/files.h"
 
 namespace lamina::test {
 namespace {

@@ -1,10 +1,10 @@
-// tests/load/threemf.cpp: 3MF packages, right and wrong.
+// tests/load/test_threemf.cpp: 3MF packages, right and wrong.
 #include <fmt/format.h>
 
 #include <cmath>
 
-#include "test_archives.h"
-#include "test_files.h"
+#include "tests/load/archives.h"
+#include "tests/load/files.h"
 
 namespace lamina::test {
 namespace {

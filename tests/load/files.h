@@ -1,4 +1,4 @@
-// tests/load/test_files.h: files made for a test, and the parts of the corpus.
+// tests/load/files.h: files made for a test, and the parts of the corpus.
 #pragma once
 
 #include <gtest/gtest.h>

@@ -1,8 +1,8 @@
-// tests/load/transform.cpp: scale, rotation, shrink factors and units.
+// tests/load/test_transform.cpp: scale, rotation, shrink factors and units.
 #include <cmath>
 
 #include "stages/load/snap.h"
-#include "test_files.h"
+#include "tests/load/files.h"
 
 namespace lamina::test {
 namespace {

@@ -1,5 +1,5 @@
-// tests/load/text_formats.cpp: the dialects of ASCII STL and OBJ.
-#include "test_files.h"
+// tests/load/test_text_formats.cpp: the dialects of ASCII STL and OBJ.
+#include "tests/load/files.h"
 
 namespace lamina::test {
 namespace {

@@ -1,4 +1,4 @@
-// tests/pipeline/test_layer_flow.cpp: layers through prepare, expand and record within a budget of bytes.
+// tests/pipeline/flow/test_layer_flow.cpp: layers through prepare, expand and record within a budget of bytes.
 #include <gtest/gtest.h>
 
 #include <algorithm>
