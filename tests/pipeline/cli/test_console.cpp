@@ -113,7 +113,7 @@ TEST(Help, EveryCommandTeachesWithExamplesAndNamesEveryOption) {
   EXPECT_NE(bare.err.find("Commands:"), std::string::npos);
 }
 
-TEST(Preview, HandsAllArgumentsAndTheExitCodeToTheProgramBesideIt) {
+TEST(PreviewCommand, HandsAllArgumentsAndTheExitCodeToTheProgramBesideIt) {
   const Directory directory;
   std::filesystem::copy_file(LAMINA_PROGRAM, directory / "lamina");
   test::write_text(directory / "lamina-preview", "#!/bin/sh\nprintf '%s|' \"$@\"\nexit 7\n");
