@@ -4,7 +4,7 @@
 #include <filesystem>
 
 #include "bench/named_parts.h"
-#include "stages/write/atomic_file.h"
+#include "stages/write/file.h"
 #include "stages/write/image_format.h"
 #include "stages/write/read_image.h"
 

@@ -6,7 +6,7 @@
 #include <string>
 
 #include "bench/named_parts.h"
-#include "stages/write/atomic_file.h"
+#include "stages/write/file.h"
 #include "stages/write/g4/encode.h"
 #include "stages/write/image_format.h"
 #include "stages/write/read_image.h"

@@ -20,7 +20,7 @@ target_include_directories(lamina_stages PUBLIC $<BUILD_INTERFACE:${PROJECT_SOUR
                                                 $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}/lamina>)
 target_link_libraries(lamina_stages PUBLIC TBB::tbb Eigen3::Eigen fmt::fmt embree
                       PRIVATE TIFF::TIFF PNG::PNG ZLIB::ZLIB PkgConfig::LIBZIP PkgConfig::LIB3MF
-                              PkgConfig::POLYCLIPPING PkgConfig::MUPARSER)
+                              PkgConfig::POLYCLIPPING PkgConfig::MUPARSER PkgConfig::XXHASH)
 
 # --- pipeline: how work moves
 lamina_sources(pipeline_sources "pipeline/*.cpp")
@@ -30,7 +30,7 @@ add_library(lamina::pipeline ALIAS lamina_pipeline)
 # toml++ is used as headers: job_toml.cpp wants errors as values, and Debian's library was built with exceptions.
 target_compile_definitions(lamina_pipeline PRIVATE LAMINA_VERSION="${PROJECT_VERSION}")
 target_link_libraries(lamina_pipeline PUBLIC lamina::stages
-                      PRIVATE nlohmann_json::nlohmann_json PkgConfig::XXHASH)
+                      PRIVATE nlohmann_json::nlohmann_json)
 
 # What runs once a job is compiled to be compiled fast; what runs once a layer, and what decodes programs, is optimised.
 if(NOT CMAKE_BUILD_TYPE STREQUAL "Debug")

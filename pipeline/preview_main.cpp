@@ -16,7 +16,7 @@
 #include "pipeline/show/preview_swath.h"
 #include "pipeline/show/slice_picture.h"
 #include "pipeline/text/readable.h"
-#include "stages/write/atomic_file.h"
+#include "stages/write/file.h"
 #include "stages/write/picture/canvas.h"  // have_font
 #include "stages/write/picture/contact_sheet.h"
 #include "stages/write/picture/drawing.h"

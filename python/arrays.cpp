@@ -8,7 +8,7 @@
 #include <filesystem>
 #include <memory>
 
-#include "stages/write/atomic_file.h"
+#include "stages/write/file.h"
 #include "stages/write/image_format.h"
 
 namespace lamina::python {

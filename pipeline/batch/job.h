@@ -8,7 +8,7 @@
 
 #include "pipeline/batch/list.h"
 #include "pipeline/cli/command.h"
-#include "pipeline/text/hash.h"
+#include "stages/data/hash.h"
 #include "stages/data/status.h"
 
 namespace lamina::pipeline {

@@ -13,7 +13,7 @@
 #include <utility>
 
 #include "pipeline/text/json_text.h"
-#include "stages/write/atomic_file.h"
+#include "stages/write/file.h"
 
 namespace lamina::pipeline {
 namespace {

@@ -12,7 +12,7 @@
 #include <string>
 
 #include "pipeline/batch/job.h"
-#include "pipeline/text/hash.h"
+#include "stages/data/hash.h"
 #include "stages/data/status.h"
 
 namespace lamina::pipeline {

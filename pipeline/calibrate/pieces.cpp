@@ -10,7 +10,7 @@
 #include "pipeline/job/file.h"
 #include "pipeline/run/extrude.h"
 #include "pipeline/text/number_text.h"
-#include "stages/write/atomic_file.h"
+#include "stages/write/file.h"
 #include "stages/write/stl/block.h"
 
 namespace lamina::pipeline {

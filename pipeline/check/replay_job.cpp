@@ -6,7 +6,7 @@
 
 #include "pipeline/machine/printer_profile.h"
 #include "pipeline/output/print_program.h"
-#include "pipeline/text/hash.h"
+#include "stages/data/hash.h"
 
 namespace lamina::pipeline {
 namespace {

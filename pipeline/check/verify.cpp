@@ -15,7 +15,7 @@
 #include "pipeline/output/manifest.h"
 #include "pipeline/output/print_program.h"
 #include "pipeline/show/slice_picture.h"  // is_slice_directory
-#include "pipeline/text/hash.h"
+#include "stages/data/hash.h"
 #include "stages/raster/materials.h"
 #include "stages/write/read_image.h"
 

@@ -9,7 +9,7 @@
 #include <span>
 #include <utility>
 
-#include "pipeline/text/hash.h"
+#include "stages/data/hash.h"
 
 namespace lamina::pipeline {
 namespace {

@@ -12,7 +12,7 @@
 #include "pipeline/text/json_text.h"
 #include "pipeline/text/names.h"
 #include "pipeline/text/number_text.h"
-#include "stages/write/atomic_file.h"
+#include "stages/write/file.h"
 
 namespace lamina::pipeline {
 namespace {

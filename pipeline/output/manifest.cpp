@@ -20,7 +20,7 @@
 #include "pipeline/plan/porous_plan.h"
 #include "pipeline/text/json_text.h"
 #include "pipeline/text/number_text.h"
-#include "stages/write/atomic_file.h"
+#include "stages/write/file.h"
 #include "stages/write/image_format.h"
 #include "stages/write/program/dialect.h"
 

@@ -15,7 +15,7 @@
 #include "pipeline/job/job.h"
 #include "pipeline/machine/materials.h"
 #include "pipeline/plan/scene.h"
-#include "pipeline/text/hash.h"
+#include "stages/data/hash.h"
 #include "stages/data/grid.h"
 #include "stages/data/layer.h"
 #include "stages/data/status.h"

@@ -5,8 +5,7 @@
 #include <algorithm>
 
 #include "pipeline/machine/printer_profile.h"
-#include "pipeline/output/program_file.h"
-#include "stages/write/atomic_file.h"
+#include "stages/write/file.h"
 
 namespace lamina::pipeline {
 
@@ -41,7 +40,8 @@ Status PrintProgram::begin() const {
 Status PrintProgram::write_layer(const Layer& layer, const RunsView& image, const std::vector<std::uint32_t>& feeds,
                                  ProgramWork& work, ProgramRecord& record) const {
   if (!work.writer) work.writer = dialect_.make_writer(resolved_.machine, resolved_.grid);
-  auto file = ProgramFile::create(directory_ + "/" + program_file_name(layer.index, dialect_.extension));
+  auto file =
+      write::File::open(directory_ + "/" + program_file_name(layer.index, dialect_.extension), {.hash = true, .lock = false});
   if (!file) return file.error();
   LayerCycle cycle;
   cycle.layer = layer.index;

@@ -7,7 +7,7 @@
 #include <algorithm>
 
 #include "pipeline/output/print_program.h"
-#include "pipeline/text/hash.h"
+#include "stages/data/hash.h"
 
 namespace lamina::pipeline {
 

@@ -19,8 +19,7 @@
 #include "pipeline/run/slice.h"
 #include "pipeline/text/json_text.h"
 #include "pipeline/text/number_text.h"
-#include "stages/write/atomic_file.h"
-#include "stages/write/growing_file.h"
+#include "stages/write/file.h"
 
 namespace lamina::pipeline {
 namespace {
@@ -145,7 +144,7 @@ Result<ExtrudeSummary> run_extrude(const Job& asked, const ProgressCallback& pro
   }
 
   // --- file
-  auto file = write::GrowingFile::open(job.output);
+  auto file = write::File::open(job.output);
   if (!file) return file.error();
   Buffer<char> text;
   format->head({fmt::format("lamina {}", version()), source_text(*plan), summary.layers, segments->any()}, text);
@@ -229,7 +228,7 @@ Result<ExtrudeSummary> run_extrude(const Job& asked, const ProgressCallback& pro
   format->tail(sums.totals, summary.layers, text);
   if (Status status = file->append(text); !status) return status.error();
   summary.bytes_written = file->size();
-  if (Status status = file->finish(); !status) return status.error();
+  if (const auto written = file->finish(); !written) return written.error();
 
   if (machine.format == "sml") {
     if (Status status = write_layer_table(job, *plan, *range); !status) return status.error();

@@ -5,10 +5,10 @@
 #include <algorithm>
 #include <chrono>
 
-#include "pipeline/text/hash.h"
+#include "stages/data/hash.h"
 #include "stages/raster/combine.h"
 #include "stages/raster/mirror.h"
-#include "stages/write/atomic_file.h"
+#include "stages/write/file.h"
 
 namespace lamina::pipeline {
 namespace {
@@ -171,7 +171,7 @@ Status LayerWorkshop::store(LayerWork& work, LayerOutcome& outcome) {
   const auto images = layer_images(head_, record);
   for (std::size_t m = 0; m < images.size() && !images[m].name.empty(); ++m) {
     const write::Bytes& file = materials_.several() ? work.files[m] : work.file;
-    if (auto status = write::write_file(job_.output + "/" + images[m].name, file); !status) return status;
+    if (auto status = write::write_file(job_.output + "/" + images[m].name, file, {.lock = false}); !status) return status;
   }
   if (program_ == nullptr) return {};
   std::vector<std::uint64_t> pixels;

@@ -15,11 +15,10 @@
 #include "pipeline/job/keys.h"
 #include "pipeline/output/manifest.h"
 #include "pipeline/output/slice_directory.h"
-#include "pipeline/text/hash.h"
 #include "pipeline/text/json_text.h"
 #include "pipeline/text/number_text.h"
-#include "stages/write/atomic_file.h"
-#include "stages/write/growing_file.h"
+#include "stages/data/hash.h"
+#include "stages/write/file.h"
 #include "stages/write/slice3mf/slice3mf.h"
 #include "stages/write/slice_format.h"
 
@@ -58,7 +57,7 @@ std::string job_of_manifest(const Job& job) {
 class SliceManifest {
  public:
   static Result<SliceManifest> open(const std::string& path, const std::string& head) {
-    auto file = write::GrowingFile::open(path);
+    auto file = write::File::open(path);
     if (!file) return file.error();
     if (auto status = file->append(head); !status) return status.error();
     return SliceManifest(std::move(*file));
@@ -71,12 +70,13 @@ class SliceManifest {
   /// rest  keys after the layers: ",\n  \"key\": value"
   Status finish(const std::string& rest) {
     if (auto status = file_.append("\n  ]" + rest + "\n}\n"); !status) return status;
-    return file_.finish();
+    const auto done = file_.finish();
+    return done ? Status() : Status(done.error());
   }
 
  private:
-  explicit SliceManifest(write::GrowingFile file) : file_(std::move(file)) {}
-  write::GrowingFile file_;
+  explicit SliceManifest(write::File file) : file_(std::move(file)) {}
+  write::File file_;
   bool first_ = true;
 };
 
@@ -140,10 +140,10 @@ Result<SliceSummary> run_slice(const Job& job, const ProgressCallback& progress,
     encoder = job.slice.format == "svg" ? write::make_svg_encoder()
                                         : write::make_cli_encoder(job.slice.format == "cli-binary", format_options);
   }
-  std::optional<write::GrowingFile> file;
+  std::optional<write::File> file;
   Buffer<char> ends;  // what stands before the first layer and behind the last
   if (encoder && !job.slice.file_a_layer) {
-    auto opened = write::GrowingFile::open(summary.output);
+    auto opened = write::File::open(summary.output);
     if (!opened) return opened.error();
     file.emplace(std::move(*opened));
     encoder->head(head, ends);
@@ -196,7 +196,8 @@ Result<SliceSummary> run_slice(const Job& job, const ProgressCallback& progress,
     timed(encode_ns, from);
     if (job.slice.file_a_layer) {
       const std::string name = waiting_layers(job) / fmt::format("{:06}{}", first + i, slice_extension(job));
-      if (Status status = write::write_file(name, std::as_bytes(std::span(work.text))); !status) return status.error();
+      if (Status status = write::write_file(name, std::as_bytes(std::span(work.text)), {.lock = false}); !status)
+        return status.error();
     }
     return work.bytes();
   };
@@ -268,7 +269,7 @@ Result<SliceSummary> run_slice(const Job& job, const ProgressCallback& progress,
   }
   if (Status status = replace_earlier_slices(job); !status) return status.error();
   if (file) {
-    if (Status status = file->finish(); !status) return status.error();
+    if (const auto written = file->finish(); !written) return written.error();
   }
   // For lamina preview, which plans a layer again: the job without what leaves the bytes alone. Parts whose names a job
   // file cannot hold are sliced all the same.

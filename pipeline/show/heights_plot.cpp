@@ -10,7 +10,7 @@
 #include "pipeline/cli/command.h"
 #include "pipeline/cli/console.h"
 #include "pipeline/plan/heights.h"
-#include "stages/write/atomic_file.h"
+#include "stages/write/file.h"
 
 namespace lamina::pipeline {
 namespace {

@@ -9,7 +9,7 @@
 #include <optional>
 
 #include "pipeline/cli/console.h"
-#include "stages/write/atomic_file.h"
+#include "stages/write/file.h"
 #include "stages/write/picture/plan_view.h"
 
 namespace lamina::pipeline {

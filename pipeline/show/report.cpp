@@ -12,7 +12,7 @@
 #include "pipeline/output/manifest.h"
 #include "pipeline/show/report_cast.h"
 #include "pipeline/show/slice_picture.h"  // is_slice_directory
-#include "pipeline/text/hash.h"
+#include "stages/data/hash.h"
 #include "pipeline/text/json_text.h"
 #include "stages/raster/materials.h"
 #include "stages/view/report_views.h"

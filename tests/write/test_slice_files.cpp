@@ -14,7 +14,6 @@
 #include <sstream>
 
 #include "stages/write/decimal.h"
-#include "stages/write/growing_file.h"
 #include "stages/write/slice3mf/slice3mf.h"
 #include "stages/write/slice_format.h"
 
@@ -323,23 +322,6 @@ TEST(Write3mfSlices, PackageHoldsStacksThatSayWhatTheSlicesAreAndIsTheSameEveryT
     EXPECT_EQ(layer, 2u) << "an empty slice is there too";
   }
   EXPECT_EQ(stacks, 2u);
-}
-
-TEST(GrowingFile, AppearsWholeOrNotAtAll) {
-  const fs::path path = fs::temp_directory_path() / ("lamina_growing_" + std::to_string(::getpid()));
-  {
-    auto file = GrowingFile::open(path.string());
-    ASSERT_TRUE(file.ok());
-    ASSERT_TRUE(file->append(std::string_view("half")).ok());
-    EXPECT_FALSE(fs::exists(path));
-  }
-  EXPECT_FALSE(fs::exists(path.string() + ".part")) << "given up";
-  auto file = GrowingFile::open(path.string());
-  ASSERT_TRUE(file.ok());
-  ASSERT_TRUE(file->append(std::string_view("who")).ok() && file->append(std::string_view("le")).ok() && file->finish().ok());
-  EXPECT_EQ(fs::file_size(path), 5u);
-  fs::remove(path);
-  EXPECT_FALSE(GrowingFile::open("/nowhere/at/all").ok());
 }
 
 }  // namespace

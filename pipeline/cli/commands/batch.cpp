@@ -13,7 +13,7 @@
 #include "pipeline/cli/console.h"
 #include "pipeline/cli/signals.h"
 #include "pipeline/text/number_text.h"
-#include "stages/write/atomic_file.h"
+#include "stages/write/file.h"
 
 namespace lamina::pipeline {
 namespace {

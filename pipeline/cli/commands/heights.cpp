@@ -9,7 +9,7 @@
 #include "pipeline/plan/heights_study.h"
 #include "pipeline/show/heights_plot.h"
 #include "pipeline/text/key_text.h"
-#include "stages/write/atomic_file.h"
+#include "stages/write/file.h"
 
 namespace lamina::pipeline {
 namespace {

@@ -5,7 +5,7 @@
 #include "pipeline/machine/printer_profile.h"
 #include "stages/program/head_grid.h"
 #include "stages/program/orientation_target.h"
-#include "stages/write/atomic_file.h"
+#include "stages/write/file.h"
 #include "stages/write/program/dialect.h"
 
 namespace lamina::pipeline {

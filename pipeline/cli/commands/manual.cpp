@@ -5,7 +5,7 @@
 
 #include "pipeline/cli/command.h"
 #include "pipeline/cli/help/help.h"
-#include "stages/write/atomic_file.h"
+#include "stages/write/file.h"
 
 namespace lamina::pipeline {
 namespace {

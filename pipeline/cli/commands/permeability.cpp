@@ -15,7 +15,7 @@
 #include "pipeline/text/number_text.h"
 #include "pipeline/text/table.h"
 #include "stages/segment/permeability.h"
-#include "stages/write/growing_file.h"
+#include "stages/write/file.h"
 
 namespace lamina::pipeline {
 namespace {
@@ -220,10 +220,7 @@ Outcome run_permeability(const Arguments& arguments, Context& context) {
         json.empty() ? "" : ",", json_string(group.name), group.points.size(), k1, k1_error, fit->k1_m2, fit->k2_m,
         fit->k2_error_m, fit->r_squared, fit->scatter_pa_m);
     if (arguments.has("--plot") && &group == &groups->front()) {
-      auto file = write::GrowingFile::open(arguments.text("--plot"));
-      if (!file) return file.error();
-      if (Status status = file->append(plot_of(group, *fit)); !status) return status.error();
-      if (Status status = file->finish(); !status) return status.error();
+      if (Status status = write::write_file(arguments.text("--plot"), plot_of(group, *fit)); !status) return status.error();
     }
   }
   if (!warning.empty()) context.say_text(fmt::format("warning   {}\n", warning));

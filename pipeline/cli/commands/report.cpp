@@ -8,7 +8,7 @@
 #include "pipeline/show/report.h"
 #include "pipeline/text/number_text.h"
 #include "pipeline/text/readable.h"
-#include "stages/write/atomic_file.h"
+#include "stages/write/file.h"
 
 namespace lamina::pipeline {
 namespace {

@@ -3,7 +3,7 @@
 #include <nlohmann/json.hpp>
 
 #include "pipeline/output/manifest.h"
-#include "pipeline/text/hash.h"
+#include "stages/data/hash.h"
 #include "tests/commands/program.h"
 
 namespace lamina::pipeline {

@@ -6,7 +6,7 @@
 #include <cstdlib>
 
 #include "pipeline/output/manifest.h"
-#include "stages/write/atomic_file.h"
+#include "stages/write/file.h"
 #include "tests/write/images.h"
 
 namespace lamina::write {

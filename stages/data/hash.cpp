@@ -1,4 +1,4 @@
-#include "pipeline/text/hash.h"
+#include "stages/data/hash.h"
 
 #include <fcntl.h>
 #include <fmt/format.h>
@@ -11,7 +11,7 @@
 #include <memory>
 #include <vector>
 
-namespace lamina::pipeline {
+namespace lamina {
 
 Hash128 hash_bytes(std::span<const std::byte> bytes) {
   const XXH128_hash_t hash = XXH3_128bits(bytes.data(), bytes.size());
@@ -56,4 +56,4 @@ Result<FileDigest> digest_file(const std::string& path) {
   return digest;
 }
 
-}  // namespace lamina::pipeline
+}  // namespace lamina

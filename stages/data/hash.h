@@ -1,4 +1,4 @@
-// pipeline/text/hash.h: XXH3-128, the fingerprint of every file that a job leaves.
+// stages/data/hash.h: XXH3-128, the fingerprint of every file that a job leaves.
 #pragma once
 
 #include <cstddef>
@@ -9,7 +9,7 @@
 
 #include "stages/data/status.h"
 
-namespace lamina::pipeline {
+namespace lamina {
 
 /// XXH3-128 of some bytes.
 struct Hash128 {
@@ -33,4 +33,4 @@ struct FileDigest {
 /// errors  kVerification with the file's name and the system's reason
 Result<FileDigest> digest_file(const std::string& path);
 
-}  // namespace lamina::pipeline
+}  // namespace lamina
