@@ -1,5 +1,5 @@
-// tests/commands/test_old_manifest.cpp: directories as lamina of commit ef3e1c3 left them, tests/corpus/old_manifest: what reads
-// them takes them or says in one line which manifest it does not read, and changes nothing.
+// tests/commands/test_old_manifest.cpp: directories as lamina of commit ef3e1c3 left them, tests/corpus/old_manifest: what
+// reads them takes them or says in one line which manifest it does not read, and changes nothing.
 #include <gtest/gtest.h>
 
 #include "tests/commands/program.h"

@@ -23,7 +23,7 @@ TEST(PreviewGcode, BeadsCoverTheirLengthTimesTheirWidthAndRoundEnds) {
   const Directory directory;
   test::write_text(directory.path() / "part.gcode",
                    "M83\n;TYPE:Internal infill\n;HEIGHT:0.2\n;WIDTH:0.3\nG1 X0 Y0 Z0.2\nG1 X10 E1\n;WIDTH:0.5\nG0 Y5\n"
-                      "G1 X0 E1\n;TYPE:External perimeter\nG0 X0 Y9\nG1 X10 E1\n");
+                   "G1 X0 E1\n;TYPE:External perimeter\nG0 X0 Y9\nG1 X10 E1\n");
   const auto series = gcode_series(directory / "part.gcode");
   ASSERT_TRUE(series) << series.error().message;
   EXPECT_EQ(series->count, 1u);
