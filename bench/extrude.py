@@ -7,14 +7,12 @@
 peers run once. Before a figure is kept the answers are compared: the number of layers, and the filament of the whole file, which
 has to be within a fifth of CuraEngine's. Then the peak memory of segmented jobs beside that of the same ones without segmentation. Writes bench/results/extrude.json and bench/extrude.md.
 """
-import argparse
 import json
 import math
 import os
 import re
 import shutil
 import statistics
-import subprocess
 import sys
 import time
 
@@ -22,8 +20,8 @@ ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
 sys.path.insert(0, os.path.join(ROOT, "bench"))
 import heights  # noqa: E402
 import make_parts  # noqa: E402
-import report  # noqa: E402
-import slice as slice_bench  # noqa: E402
+import figures  # noqa: E402
+import measure  # noqa: E402
 
 TIMES = 10  # as fast as the fastest peer we mean to be
 SLIC3R = ["--layer-height", "0.1", "--first-layer-height", "0.1", "--perimeters", "2", "--fill-density", "30%", "--fill-pattern",
@@ -83,12 +81,12 @@ def run_all(options, lamina, part, work, definitions):
         for name, command in calls.items():
             if turn > 0 and name in ("prusa", "slic3r"):
                 continue
-            slice_bench.say(f"bench: {name}, turn {turn + 1}")
+            measure.say(f"bench: {name}, turn {turn + 1}")
             for _ in range(3 if name == "lamina" else 1):
-                runs[name].append(slice_bench.measured(command, os.path.join(work, name + ".log")))
+                runs[name].append(measure.measured(command, os.path.join(work, name + ".log")))
     result = {}
     for name in calls:
-        result[name] = slice_bench.median_of(runs[name]) | answer(out[name])
+        result[name] = measure.median_of(runs[name]) | answer(out[name])
     with open(os.path.join(work, "lamina.log"), encoding="utf-8") as file:
         summary = json.loads(file.read().splitlines()[-1])
     result["lamina"]["points"] = summary["stored_points"]
@@ -144,14 +142,14 @@ def memory_of_segments(lamina, work):
         part, log = os.path.join(work, "block.stl"), os.path.join(work, "memory.log")
         write_block(part, *size)
         for threads in (1, 2):
-            slice_bench.say(f"bench: memory, {name}, {threads} threads")
+            measure.say(f"bench: memory, {name}, {threads} threads")
             row = {"name": name, "threads": threads}
             runs = {"plain": [], "segmented": []}
             for _ in range(15):
                 for kind, fill in (("plain", ["--fill", "raster"]), ("segmented", ["--fill", "segmented", *segments])):
                     out = os.path.join(work, kind + ".gcode")
                     command = [lamina, "extrude", part, "--machine", "marlin", *job, *fill, "--threads", str(threads), "--json", "--quiet", "-o", out]
-                    runs[kind].append(slice_bench.measured(command, log)["peak_mib"])
+                    runs[kind].append(measure.measured(command, log)["peak_mib"])
                     row[kind + "_bytes"] = os.path.getsize(out)
             with open(log, encoding="utf-8") as file:
                 counted = json.loads(file.read().splitlines()[-1])["segments"]["points"]
@@ -201,30 +199,18 @@ def page(result):
 
 
 def main(arguments):
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--runs", type=int, default=3, help="turns: CuraEngine once, ours three times")
-    parser.add_argument("--models", default=os.environ.get("LAMINA_MODELS", os.path.join(ROOT, "../shared/models")))
-    parser.add_argument("--cache", default=os.path.join(ROOT, "build/bench"))
-    parser.add_argument("--programs", help="folder of lamina; else build/release, built first")
-    options = parser.parse_args(arguments)
-    programs = options.programs or os.path.join(ROOT, "build/release")
-    if not options.programs:
-        subprocess.run([os.path.join(ROOT, "scripts/packages"), "--bench"], check=True)
-        subprocess.run(["cmake", "--preset", "release"], cwd=ROOT, check=True, stdout=subprocess.DEVNULL)
-        subprocess.run(["cmake", "--build", "--preset", "release", "--target", "lamina"], cwd=ROOT, check=True)
-    cache = os.path.abspath(options.cache)
-    work = os.path.join(cache, "work-extrude")
-    os.makedirs(work, exist_ok=True)
+    options, programs, work = measure.comparison(arguments, __doc__, "CuraEngine once, ours three times", "extrude", ["lamina"])
+    cache = options.cache
     part = os.path.join(cache, "3DBenchy.stl")
     if not os.path.exists(part):
         axes = make_parts.read_3mf(os.path.join(options.models, "3DBenchy.3mf"))
         make_parts.write_stl(part, make_parts.placed(axes, (1, 1, 1)))
     definitions = heights.cura_definitions(cache)
-    result = {"date": time.strftime("%Y-%m-%d"), "commit": report.commit(ROOT), "machine": report.machine(cache),
+    result = {"date": time.strftime("%Y-%m-%d"), "commit": figures.commit(ROOT), "machine": figures.machine(cache),
               "programs": run_all(options, os.path.join(programs, "lamina"), part, work, definitions),
               "memory": memory_of_segments(os.path.join(programs, "lamina"), work)}
     shutil.rmtree(work)
-    report.save(ROOT, "extrude", result)
+    figures.save(ROOT, "extrude", result)
     page(result)
 
 

@@ -19,8 +19,8 @@ import subprocess
 import sys
 
 import make_parts
-import report
-from measure import say
+import figures
+from measure import build, say
 
 ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
 LEAST, MOST, FLAT_MM2 = 0.05, 0.3, 5
@@ -271,14 +271,12 @@ def main(arguments):
     folder = os.path.join(os.path.abspath(options.cache), "heights")
     os.makedirs(folder, exist_ok=True)
     if not options.lamina:
-        subprocess.run([os.path.join(ROOT, "scripts/packages"), "--bench"], check=True)
-        subprocess.run(["cmake", "--preset", "release"], cwd=ROOT, check=True, stdout=subprocess.DEVNULL)
-        subprocess.run(["cmake", "--build", "--preset", "release", "--target", "lamina"], cwd=ROOT, check=True)
-    machine = report.machine(options.cache)
+        build("lamina")
+    machine = figures.machine(options.cache)
     ours = Ours(options.lamina or os.path.join(ROOT, "build/release/lamina"))
     definitions = cura_definitions(os.path.abspath(options.cache))
     lines = ["# Layer heights, measured", "", "Written by `scripts/bench heights`; edits are lost.", "",
-             f"{machine['processor']}, {machine['cores']} cores; {machine['system']}. Commit {report.commit(ROOT)}.", "",
+             f"{machine['processor']}, {machine['cores']} cores; {machine['system']}. Commit {figures.commit(ROOT)}.", "",
              f"Layers of {LEAST} to {MOST} mm in steps of 0.001. Peers: Debian's Slic3r 1.3 with adaptive slicing at its quality of "
              "75 % and horizontal surfaces matched, CuraEngine 4.13 with adaptive layers around 0.175 mm, variation 0.125 mm, "
              "steps of 0.01 mm, threshold 0.2 mm; both with a first layer of 0.3 mm, as by default, whose step may be the highest of "

@@ -1,9 +1,12 @@
-"""What every comparison of whole programs does: run them, take their seconds and memory, take medians."""
+"""What every comparison of whole programs does: build, run them, take their seconds and memory, take medians."""
+import argparse
 import os
 import statistics
 import subprocess
 import sys
 import time
+
+ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
 
 
 def say(text):
@@ -46,3 +49,32 @@ def median_of(runs):
             "processor": statistics.median(run["processor"] for run in runs),
             "peak_mib": statistics.median(run["peak_mib"] for run in runs), "runs": len(runs),
             "others": sum(run["others"] * run["wall"] for run in runs) / sum(walls)}
+
+
+def models_default():
+    return os.environ.get("LAMINA_MODELS", os.path.join(ROOT, "../shared/models"))
+
+
+def build(*targets):
+    """Installs what is compared with, and builds these targets of build/release."""
+    subprocess.run([os.path.join(ROOT, "scripts/packages"), "--bench"], check=True)
+    subprocess.run(["cmake", "--preset", "release"], cwd=ROOT, check=True, stdout=subprocess.DEVNULL)
+    subprocess.run(["cmake", "--build", "--preset", "release", "--target", *targets], cwd=ROOT, check=True)
+
+
+def comparison(arguments, about, turns, name, targets, cases=()):
+    """Options of a comparison with other programs, the folder of ours, built if it was not named, and a folder to work in."""
+    parser = argparse.ArgumentParser(description=about, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--runs", type=int, default=3, help="turns: " + turns)
+    if cases:
+        parser.add_argument("--case", action="append", choices=sorted(cases))
+    parser.add_argument("--models", default=models_default())
+    parser.add_argument("--cache", default=os.path.join(ROOT, "build/bench"))
+    parser.add_argument("--programs", help=f"folder of {' and '.join(targets)}; else build/release, built first")
+    options = parser.parse_args(arguments)
+    if not options.programs:
+        build(*targets)
+    options.cache = os.path.abspath(options.cache)
+    work = os.path.join(options.cache, "work-" + name)
+    os.makedirs(work, exist_ok=True)
+    return options, options.programs or os.path.join(ROOT, "build/release"), work

@@ -20,7 +20,7 @@ import subprocess
 import sys
 import time
 
-import report
+import figures
 from measure import busy_and_total, say
 
 ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
@@ -136,10 +136,10 @@ def page_text(entries, options, about, busy):
     yield (f"In every one of these runs layer {LAYER} as the page decodes it was the TIFF of layer {LAYER} as libtiff decodes it, run for "
            "run, the console stayed empty, and nothing was asked from a network.")
     yield ""
-    rows = [[e["name"], f"{e['runs']:,}", report.seconds(e["plan"]), report.seconds(e["write"]), f"{e['bytes'] / 1e6:.2f}",
-             f"{e['held']:,}", report.seconds(e["parsed"]), report.seconds(e["loaded"]),
-             f"{report.seconds(e['drawn'])} ({report.seconds(e['fastest'])} to {report.seconds(e['slowest'])})"] for e in entries]
-    yield from report.table(["job", f"runs in layer {LAYER}", "planned, s", "page written, s", "page, MB", "layers in it", "parsed, s",
+    rows = [[e["name"], f"{e['runs']:,}", figures.seconds(e["plan"]), figures.seconds(e["write"]), f"{e['bytes'] / 1e6:.2f}",
+             f"{e['held']:,}", figures.seconds(e["parsed"]), figures.seconds(e["loaded"]),
+             f"{figures.seconds(e['drawn'])} ({figures.seconds(e['fastest'])} to {figures.seconds(e['slowest'])})"] for e in entries]
+    yield from figures.table(["job", f"runs in layer {LAYER}", "planned, s", "page written, s", "page, MB", "layers in it", "parsed, s",
                              "loaded, s", "on the screen, s"], rows)
     slowest, largest = max(e["slowest"] for e in entries), max(e["bytes"] for e in entries)
     yield (f"Meant: below {MOST_BYTES / 1e6:.0f} MB ({'true' if largest < MOST_BYTES else 'not true'}: {largest / 1e6:.2f} MB at most), on the "
@@ -158,8 +158,8 @@ def main(arguments=None):
     before = busy_and_total()
     time.sleep(5)
     after = busy_and_total()
-    busy, about = (after[0] - before[0]) / (after[1] - before[1]), report.machine(options.out)
-    about["commit"] = report.commit(ROOT)  # before the runs: the program is of this one
+    busy, about = (after[0] - before[0]) / (after[1] - before[1]), figures.machine(options.out)
+    about["commit"] = figures.commit(ROOT)  # before the runs: the program is of this one
     entries = [measure(name, words, options) for name, words in CASES.items()]
     shutil.rmtree(options.out)
     with open(os.path.join(ROOT, "bench/report.md"), "w", encoding="utf-8") as file:

@@ -8,7 +8,6 @@ and lamina slice on one thread with nothing written but its manifest. Before a f
 the number of layers, and the area of all contours of every layer. Stages are timed by lamina_bench (bench/slice.cpp),
 which checks its own answers. Writes bench/results/slice.json and bench/slice.md.
 """
-import argparse
 import json
 import os
 import re
@@ -19,8 +18,8 @@ import time
 
 ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
 sys.path.insert(0, os.path.join(ROOT, "bench"))
-import report  # noqa: E402
-from measure import measured, median_of, say  # noqa: E402
+import figures  # noqa: E402
+import measure  # noqa: E402
 
 LAYER = 0.1
 # part, how many times as fast as Slic3r we mean to be
@@ -71,7 +70,7 @@ def compare(case, slic3r_svg, own_svg):
     different = sum(differences) / total
     # Where Slic3r cannot close a loop it leaves out a hole or an island: single layers, far off.
     torn = sum(1 for a, b in zip(theirs, ours) if abs(a - b) > 0.001 * b)
-    say(f"  {len(ours)} layers, Slic3r {len(theirs)}; areas differ by {100 * different:.4f} % of {total:.0f} mm2")
+    measure.say(f"  {len(ours)} layers, Slic3r {len(theirs)}; areas differ by {100 * different:.4f} % of {total:.0f} mm2")
     if different > 0.01:
         sys.exit(f"bench: {case}: the areas are not Slic3r's")
     return {"layers": len(ours), "slic3r_layers": len(theirs), "area_difference": different, "torn_layers": torn,
@@ -89,7 +88,7 @@ def bitmap_difference(lamina, path, out, answers):
 def run_case(case, options, lamina, parts, work):
     part, target = CASES[case]
     path = os.path.join(parts, part)
-    say(f"bench: {case}: {part}, layers of {LAYER} mm")
+    measure.say(f"bench: {case}: {part}, layers of {LAYER} mm")
     with open(path, "rb") as file:  # into the page cache, for all
         while file.read(1 << 22):
             pass
@@ -105,8 +104,8 @@ def run_case(case, options, lamina, parts, work):
     for turn in range(options.runs):
         for name in ("slic3r", "svg", "svg", "svg", "admesh", "null", "null", "null"):
             shutil.rmtree(out if name == "svg" else out + "-null", ignore_errors=True)
-            runs[name].append(measured(commands[name], os.path.join(work, name + ".log")))
-        say("  " + "  ".join(f"{name} {runs[name][-1]['wall']:.3f} s" for name in runs))
+            runs[name].append(measure.measured(commands[name], os.path.join(work, name + ".log")))
+        measure.say("  " + "  ".join(f"{name} {runs[name][-1]['wall']:.3f} s" for name in runs))
         if turn == 0:
             answers = compare(case, svg, os.path.join(out, os.path.splitext(part)[0] + ".svg"))
     answers["bitmap_difference"] = bitmap_difference(lamina, path, out + "-jet", answers)
@@ -117,7 +116,7 @@ def run_case(case, options, lamina, parts, work):
     summary = json.loads(text[text.index("{"):])
     summary["output"] = os.path.basename(summary["output"])
     return {"part": part, "target": target, "layer_mm": LAYER, "answers": answers,
-            "summary": summary, **{name: median_of(of) for name, of in runs.items()}}
+            "summary": summary, **{name: measure.median_of(of) for name, of in runs.items()}}
 
 
 def stages(program, options):
@@ -180,29 +179,17 @@ def page(result):
 
 
 def main(arguments):
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--runs", type=int, default=3, help="turns: Slic3r once, ours three times, admesh once, ours three times")
-    parser.add_argument("--case", action="append", choices=sorted(CASES))
-    parser.add_argument("--models", default=os.environ.get("LAMINA_MODELS", os.path.join(ROOT, "../shared/models")))
-    parser.add_argument("--cache", default=os.path.join(ROOT, "build/bench"))
-    parser.add_argument("--programs", help="folder of lamina and lamina_bench; else build/release, built first")
-    options = parser.parse_args(arguments)
-    programs = options.programs or os.path.join(ROOT, "build/release")
-    if not options.programs:
-        subprocess.run([os.path.join(ROOT, "scripts/packages"), "--bench"], check=True)
-        subprocess.run(["cmake", "--preset", "release"], cwd=ROOT, check=True, stdout=subprocess.DEVNULL)
-        subprocess.run(["cmake", "--build", "--preset", "release", "--target", "lamina", "lamina_bench"], cwd=ROOT, check=True)
-    cache = os.path.abspath(options.cache)
-    parts, work = os.path.join(cache, "parts"), os.path.join(cache, "work-slice")
-    os.makedirs(work, exist_ok=True)
+    options, programs, work = measure.comparison(arguments, __doc__, "Slic3r once, ours three times, admesh once, ours three times",
+                                                 "slice", ["lamina", "lamina_bench"], CASES)
+    cache, parts = options.cache, os.path.join(options.cache, "parts")
     subprocess.run([sys.executable, os.path.join(ROOT, "bench/make_parts.py"), options.models, parts], check=True)
-    result = {"date": time.strftime("%Y-%m-%d"), "commit": report.commit(ROOT), "machine": report.machine(cache),
+    result = {"date": time.strftime("%Y-%m-%d"), "commit": figures.commit(ROOT), "machine": figures.machine(cache),
               "load": round(os.getloadavg()[0], 1), "cases": {}}
     for case in options.case or CASES:
         result["cases"][case] = run_case(case, options, os.path.join(programs, "lamina"), parts, work)
     result["stages"] = stages(os.path.join(programs, "lamina_bench"), options)
     shutil.rmtree(work)
-    report.save(ROOT, "slice", result)
+    figures.save(ROOT, "slice", result)
     page(result)
 
 

@@ -1,4 +1,4 @@
-"""bench/report.py: results of scripts/bench as JSON files and as bench/README.md. A number without its commit is not printed."""
+"""bench/figures.py: results of scripts/bench as JSON files and as bench/README.md. A number without its commit is not printed."""
 import json
 import os
 import platform
