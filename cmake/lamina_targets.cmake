@@ -59,6 +59,12 @@ add_executable(lamina-preview pipeline/preview_main.cpp pipeline/show/preview_la
                ${picture_sources})
 target_link_libraries(lamina-preview PRIVATE lamina::pipeline PkgConfig::OPENIMAGEIO nlohmann_json::nlohmann_json)
 
+if(LAMINA_PRECOMPILE AND NOT CMAKE_CXX_COMPILER_LAUNCHER MATCHES "ccache")
+  target_precompile_headers(lamina-preview PRIVATE cmake/precompiled.h <OpenImageIO/imagebuf.h> <OpenImageIO/imagebufalgo.h>
+                            <OpenImageIO/imageio.h>)
+  target_compile_options(lamina-preview PRIVATE -Wno-array-bounds -Wno-stringop-overflow -Wno-stringop-overread)
+endif()
+
 if(NOT LAMINA_TEST_COMMANDS)
   set_target_properties(lamina-preview PROPERTIES EXCLUDE_FROM_ALL ON)
 endif()
