@@ -20,7 +20,7 @@ std::string whole_file(const fs::path& path) {
 
 }  // namespace
 
-Result<VirtualMachine> machine_of_job(const std::string& directory, const ManifestHead& head) {
+Result<replay::VirtualMachine> machine_of_job(const std::string& directory, const ManifestHead& head) {
   const std::string name = "program/machine.toml";
   const fs::path path = fs::path(directory) / name;
   std::error_code error;
@@ -31,7 +31,7 @@ Result<VirtualMachine> machine_of_job(const std::string& directory, const Manife
   }
   const Result<Machine> machine = read_machine(text, name);
   if (!machine) return machine.error();
-  return VirtualMachine::build(*machine, head.grid.columns(), head.grid.rows());
+  return replay::VirtualMachine::build(*machine, head.grid.columns(), head.grid.rows());
 }
 
 std::string program_of_layer(const std::string& directory, const ManifestHead& head, std::uint32_t layer) {

@@ -36,7 +36,7 @@ struct Inspection {
   std::string directory;
   const ManifestHead& head;
   bool quick;
-  std::optional<VirtualMachine> machine;  // if there are programs to replay
+  std::optional<replay::VirtualMachine> machine;  // if there are programs to replay
   std::mutex adding;
   VerifyReport& report;
 };

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "stages/data/status.h"
-#include "stages/replay/replay.h"
+#include "stages/replay/machine.h"
 
 namespace lamina::pipeline {
 
@@ -20,7 +20,7 @@ struct VerifyReport {
   std::uint64_t bytes = 0;            // of their files, as recorded
   std::string machine;                // whose programs were replayed; empty if there are none
   std::uint64_t replayed = 0;         // layers
-  ReplayCount replay;                 // of all of them
+  replay::Count replay;                 // of all of them
   std::uint64_t moved = 0, lost = 0;  // pixels of blocked nozzles
   double binder_mm3 = 0;              // drops x their volume
   double powder_mm3 = 0;              // height fed x area of the bed
@@ -32,7 +32,7 @@ struct VerifyReport {
 
 /// Compares every file with the manifest (of the whole job, or of all shards that are there): present, of the recorded
 /// size and hash, and, unless quick, an image of the recorded columns, rows, resolution and number of set pixels; and the
-/// print program of each layer, carried out by a virtual machine (replay.h), prints that image bit for bit. Files in
+/// print program of each layer, carried out by a virtual machine, prints that image bit for bit. Files in
 /// layers/ and program/ that no manifest names are faults, and so is a job that was interrupted.
 ///
 /// errors  kVerification if there is no manifest to compare with, or none that can be read; kUsage if the directory

@@ -21,7 +21,7 @@ struct SweepSeen {
   bool backward;
 };
 
-Runs runs_of(std::vector<VirtualMachine::Drop>& drops, std::uint32_t columns, std::uint32_t rows) {
+Runs runs_of(std::vector<replay::VirtualMachine::Drop>& drops, std::uint32_t columns, std::uint32_t rows) {
   std::ranges::sort(drops,
                     [](const auto& a, const auto& b) { return std::pair(a.row, a.column) < std::pair(b.row, b.column); });
   Runs runs;
@@ -68,11 +68,11 @@ Result<Buffer<std::byte>> draw_swath(const std::string& directory, const Manifes
     }
   }
 
-  std::vector<VirtualMachine::Drop> drops;
+  std::vector<replay::VirtualMachine::Drop> drops;
   std::map<std::uint32_t, SweepSeen> sweeps;
   std::vector<std::uint32_t> order;
   const auto replayed =
-      built->run(program_of_layer(directory, head, choice.layer), choice.layer, [&](const VirtualMachine::Drop& drop) {
+      built->run(program_of_layer(directory, head, choice.layer), choice.layer, [&](const replay::VirtualMachine::Drop& drop) {
         drops.push_back(drop);
         const auto [found, fresh] = sweeps.try_emplace(drop.sweep, SweepSeen{drop.first_line, drop.step, drop.step, false});
         if (fresh) order.push_back(drop.sweep);
@@ -109,14 +109,14 @@ Result<Buffer<std::byte>> draw_swath(const std::string& directory, const Manifes
                            : write::picture::SwathView::Band{lo, hi, 0, double(head.grid.rows()), number == swath});
   }
   // Drops of earlier sweeps, and of this one up to the step, in the order of the program.
-  std::vector<VirtualMachine::Drop> fired;
+  std::vector<replay::VirtualMachine::Drop> fired;
   std::vector<bool> fires(nozzles, false);
-  for (const VirtualMachine::Drop& drop : drops) {
+  for (const replay::VirtualMachine::Drop& drop : drops) {
     if (drop.sweep == swath && drop.step == step) fires[drop.nozzle] = true;
   }
   const bool backward = present.backward;
   bool here = false;
-  for (const VirtualMachine::Drop& drop : drops) {
+  for (const replay::VirtualMachine::Drop& drop : drops) {
     here = here || drop.sweep == swath;
     if (here && (drop.sweep != swath || (backward ? drop.step < step : drop.step > step))) break;
     fired.push_back(drop);

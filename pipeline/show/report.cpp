@@ -156,7 +156,7 @@ struct ShownView {
 };
 
 /// How long the machine takes for a layer, by its program; replayed as lamina verify does.
-Result<double> seconds_of_layer(const std::string& directory, const ManifestHead& head, const VirtualMachine& machine,
+Result<double> seconds_of_layer(const std::string& directory, const ManifestHead& head, const replay::VirtualMachine& machine,
                                 const LayerRecord& record, const RunsView& image) {
   const std::string program = program_of_layer(directory, head, record.layer.index);
   if (hash_bytes(std::as_bytes(std::span(program))) == record.program.hash) {
@@ -246,7 +246,7 @@ Result<Report> make_report(const std::string& directory, const ReportOptions& op
   const std::vector<LayerRecord>& layers = manifest->layers;
   const PixelGrid& grid = manifest->head.grid;
 
-  std::optional<VirtualMachine> machine;
+  std::optional<replay::VirtualMachine> machine;
   if (!manifest->head.machine.empty()) {
     auto built = machine_of_job(directory, manifest->head);
     if (!built) return Error{built.error().fault, fmt::format("{}/{}", directory, built.error().message)};

@@ -1,5 +1,5 @@
 // Programs of every shipped machine and of random ones, carried out by the virtual machine.
-#include "stages/replay/replay.h"
+#include "stages/replay/machine.h"
 
 #include <gtest/gtest.h>
 #include <tbb/parallel_for.h>
@@ -51,8 +51,8 @@ Written write_layer(const ResolvedMachine& resolved, const RunsView& image) {
   return {std::string(reinterpret_cast<const char*>(bytes.data()), bytes.size()), *count};
 }
 
-Result<ReplayCount> replay(const ResolvedMachine& resolved, const RunsView& image, const Written& program) {
-  const auto machine = VirtualMachine::build(resolved.machine, resolved.grid.image.columns(), resolved.grid.image.rows());
+Result<replay::Count> replay(const ResolvedMachine& resolved, const RunsView& image, const Written& program) {
+  const auto machine = replay::VirtualMachine::build(resolved.machine, resolved.grid.image.columns(), resolved.grid.image.rows());
   if (!machine) return machine.error();
   return machine->replay(program.text, {7, 700'000, 100'000}, image, program.count.moved, program.count.lost);
 }

@@ -29,7 +29,7 @@ CommandSpec verify_spec() {
 
 std::string replay_json(const VerifyReport& report) {
   if (report.machine.empty()) return {};
-  const ReplayCount& replay = report.replay;
+  const replay::Count& replay = report.replay;
   return fmt::format(
       ",\"replay\":{{\"machine\":{},\"layers\":{},\"drops\":{},\"vectors\":{},\"sweeps\":{},\"moved\":{},\"lost\":{},"
       "\"coverage\":{},\"seconds\":{},\"scan_mm\":{},\"travel_mm\":{},\"fed_mm\":[{},{}],\"binder_mm3\":{},"
@@ -42,7 +42,7 @@ std::string replay_json(const VerifyReport& report) {
 // What the machine does, for people.
 void say_replay(const VerifyReport& report, Context& context) {
   if (report.machine.empty() || report.replayed == 0) return;
-  const ReplayCount& replay = report.replay;
+  const replay::Count& replay = report.replay;
   context.say(fmt::format(
       "programs  {} layers replayed on {}: {}, {} drops in {} sweeps, {:.3f} % of the bed", readable_count(report.replayed),
       report.machine,

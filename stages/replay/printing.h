@@ -1,15 +1,17 @@
-// stages/replay/replay_printing.h: a layer being printed by the virtual machine; what the parsers of dialects drive.
+// stages/replay/printing.h: a layer that the virtual machine prints; what the readers of dialects drive.
 #pragma once
 
 #include <cmath>
 #include <string>
+#include <string_view>
 #include <vector>
 
-#include "stages/replay/replay.h"
+#include "stages/replay/machine.h"
 
-namespace lamina::pipeline {
+namespace lamina::replay {
 
-/// Throws a std::string, the fault, where the program does what it must not; replay.cpp turns it into an error.
+/// The first fault of a program ends it: ok() is false from then on, later faults are not recorded, and what is printed
+/// behind it means nothing. Readers return when they see it.
 class Printing {
  public:
   Printing(const VirtualMachine& machine, std::uint32_t layer, const VirtualMachine::Watch* watch);
@@ -17,18 +19,19 @@ class Printing {
   const Machine& profile() const { return machine_.machine_; }
   std::uint32_t layer() const { return layer_; }
   std::uint32_t nozzles() const { return static_cast<std::uint32_t>(machine_.nozzle_.size()); }
-  std::int64_t steps_a_pixel() const { return machine_.ticks_; }
   /// "layer 12, swath 3, step 417: what"; before the first swath or the first step of one, that is said instead.
-  [[noreturn]] void fault(const std::string& what) const;
+  void fault(std::string_view what);
+  bool ok() const { return fault_.empty(); }
+  /// errors  kVerification: the first fault
+  Status status() const { return ok() ? Status() : Status(Error{Fault::kVerification, fault_}); }
 
   // --- sweeps
   void begin_sweep(std::uint32_t number, bool backward);
-  /// Where nozzle 0 goes: a line, or a position of the carriage in mm.
-  void go_to_line(std::int64_t line) { first_line_ = line; }
+  /// Where nozzle 0 goes, as a position of the carriage in mm.
   void go_across(double carriage_mm);
-  /// Carriage position in mm of a step, and the step nearest to a position, which has to be near.
+  /// Carriage position in mm of a step, and the step nearest to a position, which has to be near; 0 where it is not.
   double position_of(double step) const;
-  std::int64_t step_at(double carriage_mm) const;
+  std::int64_t step_at(double carriage_mm);
   /// For messages: the sweep whose words are read before it begins, and the step of a vector that is not fired yet.
   void reading_sweep(std::uint32_t number) {
     reading_sweep_ = number;
@@ -47,18 +50,20 @@ class Printing {
   void roller_stands_at(double mm);
   void takes(double seconds) { count.seconds += seconds; }
 
-  /// Whether the powder cycle was that of a layer; to be asked at the end.
-  void check_cycle(const Layer& layer) const;
+  /// Whether the powder cycle was that of a layer; called at the end.
+  void check_cycle(const Layer& layer);
   /// Compares with an image; see VirtualMachine::replay.
   void compare(const RunsView& image, std::uint64_t moved, std::uint64_t lost);
 
-  ReplayCount count;
+  Count count;
 
  private:
   struct Sweep {
     std::uint32_t number;
     std::int64_t first_line;
   };
+  void fail(std::string what);  // the message is whole
+  void coverage(std::vector<bool>& worked, std::vector<bool>& blocked) const;
   std::int64_t line_of(std::uint32_t column, std::uint32_t row) const;
   bool pixel(std::int64_t line, std::int64_t place, std::uint32_t& column, std::uint32_t& row) const;
   std::string place_of(std::uint32_t column, std::uint32_t row) const;
@@ -74,14 +79,7 @@ class Printing {
   bool backward_ = false, sweeping_ = false, stepped_ = false, fired_here_ = false;
   std::vector<std::uint64_t> fired_;  // a bit a pixel, the leftmost in bit 0
   std::vector<Sweep> sweeps_;
+  std::string fault_;  // the first one
 };
 
-/// Reads the program of a layer in each dialect.
-void replay_nuferbj(std::string_view text, Printing& printing);
-void replay_raw(std::string_view text, Printing& printing);
-void replay_planes(std::string_view text, Printing& printing);
-void replay_hp45(std::string_view text, Printing& printing);
-void replay_brundlefab(std::string_view text, Printing& printing);
-void replay_m578(std::string_view text, Printing& printing);
-
-}  // namespace lamina::pipeline
+}  // namespace lamina::replay

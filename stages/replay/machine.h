@@ -1,4 +1,4 @@
-// stages/replay/replay.h: a virtual machine that carries out print programs and shows what they print.
+// stages/replay/machine.h: a virtual machine that carries out print programs and shows what they print.
 //
 // It shares nothing with the compiler but the profile: it reads the text of each dialect with parsers of its own, computes
 // from pitch, angle and offsets where each nozzle is when it fires, and puts the drop on the pixel that is nearest.
@@ -16,10 +16,10 @@
 #include "stages/data/runs.h"
 #include "stages/data/status.h"
 
-namespace lamina::pipeline {
+namespace lamina::replay {
 
 /// What a program did.
-struct ReplayCount {
+struct Count {
   std::uint64_t drops = 0, vectors = 0;
   std::uint32_t sweeps = 0;
   double scan_mm = 0, travel_mm = 0;                     // of the head
@@ -29,7 +29,7 @@ struct ReplayCount {
   bool moves = false;                                    // whether the program moves the vats and the roller itself
   double build_mm = 0;                                   // where the build vat stands at the end
   double farthest_along_um = 0, farthest_across_um = 0;  // a drop from the centre of its pixel
-  void add(const ReplayCount& other);
+  void add(const Count& other);
 };
 
 /// The pixels of a machine, found again from its profile.
@@ -52,17 +52,18 @@ class VirtualMachine {
   ///           or lost pixels, a scan at which nozzles would fire too often, and where the dialect moves the machine: a
   ///           build vat at another height, another dose, a roller that does not go to its far end and back
   /// cost      O(text + drops); a bit a pixel
-  Result<ReplayCount> replay(std::string_view program, const Layer& layer, const RunsView& image, std::uint64_t moved,
-                             std::uint64_t lost) const;
+  Result<Count> replay(std::string_view program, const Layer& layer, const RunsView& image, std::uint64_t moved,
+                       std::uint64_t lost) const;
 
-  /// Told of each drop in the order of the program: column and row of the image, sweep, step.
+  /// A drop: column and row of the image, sweep, step.
   struct Drop {
     std::uint32_t column, row, sweep, step, nozzle;
     std::int64_t first_line;  // of nozzle 0 in this sweep
   };
+  /// Called with each drop in the order of the program.
   using Watch = std::function<void(const Drop&)>;
   /// Carries out a program without comparing. errors  as replay
-  Result<ReplayCount> run(std::string_view program, std::uint32_t layer, const Watch& watch) const;
+  Result<Count> run(std::string_view program, std::uint32_t layer, const Watch& watch) const;
 
   /// Column and row of the image, in pixels and parts of them, where a nozzle is at a step of a sweep.
   std::array<double, 2> nozzle_at(std::int64_t first_line, double step, std::uint32_t nozzle) const;
@@ -83,4 +84,4 @@ class VirtualMachine {
   std::int64_t ticks_ = 1;  // steps a pixel
 };
 
-}  // namespace lamina::pipeline
+}  // namespace lamina::replay

@@ -1,17 +1,18 @@
-#include "stages/replay/replay_gcode.h"
+#include "stages/replay/gcode.h"
 
 #include <fmt/format.h>
 
-namespace lamina::pipeline {
+namespace lamina::replay {
 
-void GcodeReader::fault(const std::string& what) const { printing_.fault(fmt::format("line {}: {}", number_, what)); }
+void GcodeReader::fault(std::string_view what) { printing_.fault(fmt::format("line {}: {}", number_, what)); }
 
 bool GcodeReader::take(GcodeLine& line, bool all_words) {
-  while (!left_.empty()) {
+  while (!left_.empty() && printing_.ok()) {
     const std::size_t end = left_.find('\n');
     if (end == std::string_view::npos) {
       ++number_;
       fault("the program ends within a line");
+      return false;
     }
     now_ = left_.substr(0, end);
     left_.remove_prefix(end + 1);
@@ -31,6 +32,7 @@ bool GcodeReader::take(GcodeLine& line, bool all_words) {
       const auto [stop, error] = std::from_chars(rest.data() + 1, rest.data() + gap, value);
       if (rest[0] < 'A' || rest[0] > 'Z' || error != std::errc() || stop != rest.data() + gap) {
         fault(fmt::format("'{}' is no word", rest.substr(0, gap)));
+        return false;
       }
       line.word[rest[0]] = value;
       rest.remove_prefix(std::min(gap + 1, rest.size()));
@@ -40,16 +42,19 @@ bool GcodeReader::take(GcodeLine& line, bool all_words) {
   return false;
 }
 
-double GcodeReader::number(const GcodeLine& line, char letter) const {
+double GcodeReader::number(const GcodeLine& line, char letter) {
   const auto found = line.word.find(letter);
-  if (found == line.word.end()) fault(fmt::format("{} lacks {}", line.command, letter));
-  return found->second;
+  if (found != line.word.end()) return found->second;
+  fault(fmt::format("{} lacks {}", line.command, letter));
+  return 0;
 }
 
-std::uint32_t GcodeReader::count(const GcodeLine& line, char letter) const {
+std::uint32_t GcodeReader::count(const GcodeLine& line, char letter) {
   const double value = number(line, letter);
-  if (!(value >= 0 && value <= 4294967295.0) || value != std::floor(value))
+  if (!(value >= 0 && value <= 4294967295.0) || value != std::floor(value)) {
     fault(fmt::format("{}{:g} is no count", letter, value));
+    return 0;
+  }
   return static_cast<std::uint32_t>(value);
 }
 
@@ -62,7 +67,10 @@ bool Axes::take(const GcodeLine& line, bool scanning) {
   const auto& profile = printing_.profile();
   double head_squared = 0;
   if (line.has('F')) feed_mm_s_ = line.word.at('F') / 60;
-  if (!(feed_mm_s_ > 0)) reader_.fault("moves at no speed");
+  if (!(feed_mm_s_ > 0)) {
+    reader_.fault("moves at no speed");
+    return true;
+  }
   for (const auto& [letter, value] : line.word) {
     if (letter == 'F') continue;
     double& at = at_[letter];
@@ -82,10 +90,11 @@ bool Axes::take(const GcodeLine& line, bool scanning) {
       printing_.feeds(axis == profile.powder.feed_axes[0] ? 0 : 1, way * profile.powder.feed_sign, feed_mm_s_);
     } else {
       reader_.fault(fmt::format("the machine has no axis {}", letter));
+      return true;
     }
   }
   if (head_squared > 0) printing_.head_moves(std::sqrt(head_squared), feed_mm_s_, scanning);
   return true;
 }
 
-}  // namespace lamina::pipeline
+}  // namespace lamina::replay

@@ -1,4 +1,4 @@
-// stages/replay/replay_gcode.h: lines of G-code, and the axes of a powder printer that they move.
+// stages/replay/gcode.h: lines of G-code, and the axes of a powder printer that they move.
 #pragma once
 
 #include <charconv>
@@ -6,9 +6,9 @@
 #include <string>
 #include <string_view>
 
-#include "stages/replay/replay_printing.h"
+#include "stages/replay/printing.h"
 
-namespace lamina::pipeline {
+namespace lamina::replay {
 
 /// One line: a command such as G1 or M812, and its words.
 struct GcodeLine {
@@ -19,7 +19,7 @@ struct GcodeLine {
   bool has(char letter) const { return word.contains(letter); }
 };
 
-/// The lines of a program one after another, without comments and empty ones; faults name them.
+/// The lines of a program one after another, without comments and empty ones. Faults name them and end them.
 class GcodeReader {
  public:
   GcodeReader(std::string_view text, Printing& printing) : left_(text), printing_(printing) {}
@@ -27,9 +27,10 @@ class GcodeReader {
   bool next(GcodeLine& line) { return take(line, true); }
   /// The same, but words of M117, which is a text, are not read.
   bool next_comment(GcodeLine& line) { return take(line, false); }
-  double number(const GcodeLine& line, char letter) const;
-  std::uint32_t count(const GcodeLine& line, char letter) const;
-  [[noreturn]] void fault(const std::string& what) const;
+  /// A word that the line has to have; 0 at a fault.
+  double number(const GcodeLine& line, char letter);
+  std::uint32_t count(const GcodeLine& line, char letter);
+  void fault(std::string_view what);
 
  private:
   bool take(GcodeLine& line, bool all_words);
@@ -38,12 +39,22 @@ class GcodeReader {
   std::size_t number_ = 0;
 };
 
+/// Which axes carry the head along and across the scan.
+struct ScanAxes {
+  std::string along, across;
+  explicit ScanAxes(const Machine& machine) {
+    const bool x = machine.mounting.scan_axis == ScanAxis::kX;
+    along = x ? machine.motion.x_axis : machine.motion.y_axis;
+    across = x ? machine.motion.y_axis : machine.motion.x_axis;
+  }
+};
+
 /// The axes and what their moves mean: the head over the bed, the build vat, the feed vats, the roller.
 class Axes {
  public:
   Axes(Printing& printing, GcodeReader& reader) : printing_(printing), reader_(reader) {}
 
-  /// Carries out G0, G1, G90, G91; false for any other command.
+  /// Carries out G0, G1, G90, G91; false for any other command. At a fault the axes may stay where they are.
   /// The head's positions are in `at`; the build vat has to reach the depth of the layer before the head moves.
   bool take(const GcodeLine& line, bool scanning);
   double at(const std::string& axis) { return at_[axis[0]]; }
@@ -56,4 +67,4 @@ class Axes {
   double feed_mm_s_ = 0;
 };
 
-}  // namespace lamina::pipeline
+}  // namespace lamina::replay

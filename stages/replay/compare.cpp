@@ -1,0 +1,104 @@
+// What a layer printed against its image: Printing::compare.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <bit>
+
+#include "stages/replay/printing.h"
+
+namespace lamina::replay {
+
+std::int64_t Printing::line_of(std::uint32_t column, std::uint32_t row) const {
+  const auto& mount = profile().mounting;
+  const auto has = [&](Side side) { return mount.scan_from == side || mount.nozzle_0 == side; };
+  if (mount.scan_axis == ScanAxis::kX) return has(Side::kFront) ? machine_.rows_ - 1 - row : row;
+  return has(Side::kRight) ? machine_.columns_ - 1 - column : column;
+}
+
+// Where the nozzle is that has to see to a pixel.
+std::string Printing::place_of(std::uint32_t column, std::uint32_t row) const {
+  const auto& mount = profile().mounting;
+  const auto has = [&](Side side) { return mount.scan_from == side || mount.nozzle_0 == side; };
+  const std::int64_t from_left = has(Side::kRight) ? machine_.columns_ - 1 - column : column;
+  const std::int64_t from_back = has(Side::kFront) ? machine_.rows_ - 1 - row : row;
+  const bool x = mount.scan_axis == ScanAxis::kX;
+  const std::int64_t line = x ? from_back : from_left, place = x ? from_left : from_back;
+  for (const Sweep& sweep : sweeps_) {
+    for (const VirtualMachine::Nozzle& nozzle : machine_.nozzle_) {
+      if (nozzle.blocked || sweep.first_line + nozzle.line != line) continue;
+      return fmt::format("layer {}, swath {}, step {}", layer_, sweep.number, place * machine_.ticks_ + nozzle.step_offset);
+    }
+  }
+  return fmt::format("layer {}, line {} across, place {} along, which no swath comes over", layer_, line, place);
+}
+
+// Lines that a nozzle which works comes over, and those of blocked ones: only these may lose pixels. A sweep in which
+// nobody fires is not known; what no sweep comes over may be one.
+void Printing::coverage(std::vector<bool>& worked, std::vector<bool>& blocked) const {
+  for (const Sweep& sweep : sweeps_) {
+    for (const VirtualMachine::Nozzle& nozzle : machine_.nozzle_) {
+      const std::int64_t over = sweep.first_line + nozzle.line;
+      if (over >= 0 && over < machine_.lines_) (nozzle.blocked ? blocked : worked)[std::size_t(over)] = true;
+    }
+  }
+}
+
+void Printing::compare(const RunsView& image, std::uint64_t moved, std::uint64_t lost) {
+  if (image.columns != machine_.columns_ || image.rows() != machine_.rows_) return fault("the image is of another size");
+  std::vector<std::uint64_t> wanted(row_words_);
+  std::uint64_t missing = 0, added = 0;
+  std::string first, first_of_all;  // that nothing explains; explained or not
+  const bool x = profile().mounting.scan_axis == ScanAxis::kX;
+  const std::int64_t next = profile().mounting.passes;
+  std::vector<bool> worked(machine_.lines_), blocked(machine_.lines_);
+  coverage(worked, blocked);
+  const auto may_be_lost = [&](std::int64_t column, std::int64_t row) {
+    const auto over = std::size_t(line_of(static_cast<std::uint32_t>(column), static_cast<std::uint32_t>(row)));
+    return blocked[over] || !worked[over];
+  };
+  const auto set_and_unfired = [&](std::int64_t column, std::int64_t row) {
+    if (column < 0 || row < 0 || column >= machine_.columns_ || row >= machine_.rows_ || !may_be_lost(column, row))
+      return false;
+    const auto line = image.row(static_cast<std::uint32_t>(row));
+    const auto after = std::upper_bound(line.begin(), line.end(), static_cast<std::uint32_t>(column)) - line.begin();
+    return after % 2 == 1 && (fired_[std::size_t(row) * row_words_ + std::size_t(column) / 64] >> (column % 64) & 1) == 0;
+  };
+  for (std::uint32_t row = 0; row < image.rows(); ++row) {
+    std::fill(wanted.begin(), wanted.end(), 0);
+    const auto line = image.row(row);
+    for (std::size_t i = 0; i + 1 < line.size(); i += 2) {
+      for (std::uint32_t c = line[i]; c < line[i + 1];) {
+        const std::uint32_t to = std::min((c / 64 + 1) * 64, line[i + 1]);
+        const std::uint64_t ones = to - c == 64 ? ~std::uint64_t{0} : (std::uint64_t{1} << (to - c)) - 1;
+        wanted[c / 64] |= ones << (c % 64);
+        c = to;
+      }
+    }
+    for (std::uint32_t w = 0; w < row_words_; ++w) {
+      const std::uint64_t got = fired_[std::size_t{row} * row_words_ + w];
+      for (std::uint64_t differ = got ^ wanted[w]; differ != 0; differ &= differ - 1) {
+        const auto bit = static_cast<std::uint32_t>(std::countr_zero(differ));
+        const std::uint32_t column = w * 64 + bit;
+        const bool extra = (got >> bit & 1) != 0;
+        (extra ? added : missing) += 1;
+        const bool explained =
+            !extra ? moved + lost > 0 && may_be_lost(column, row)
+                   : moved > 0 && (x ? set_and_unfired(column, row - next) || set_and_unfired(column, row + next)
+                                     : set_and_unfired(column - next, row) || set_and_unfired(column + next, row));
+        if (first_of_all.empty()) first_of_all = place_of(column, row);
+        if (first.empty() && !explained) {
+          first = fmt::format("{}: column {}, row {} is {}", place_of(column, row), column, row,
+                              extra ? "fired and not set in the image" : "set in the image and not fired");
+        }
+      }
+    }
+  }
+  if (!first.empty()) return fail(first);
+  if (added != moved || missing != moved + lost) {
+    if (first_of_all.empty()) first_of_all = fmt::format("layer {}", layer_);  // the manifest alone speaks of such pixels
+    fail(fmt::format("{}: {} pixels are not fired and {} fired instead; the manifest says {} and {}", first_of_all, missing,
+                     added, moved + lost, moved));
+  }
+}
+
+}  // namespace lamina::replay

@@ -1,0 +1,137 @@
+#include "stages/replay/machine.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+
+#include "stages/replay/dialects.h"
+
+namespace lamina::replay {
+namespace {
+
+constexpr double kPi = 3.14159265358979323846;
+
+struct DialectReader {
+  std::string_view id;
+  void (*read)(std::string_view, Printing&);
+};
+constexpr DialectReader kReaders[] = {{"nuferbj", read_nuferbj},       {"raw", read_raw},
+                                      {"planes", read_planes},         {"hp45", read_hp45},
+                                      {"brundlefab", read_brundlefab}, {"m578", read_m578}};
+
+/// Reads a program with the reader of its dialect. errors  kVerification
+Status read(std::string_view dialect, std::string_view program, Printing& printing) {
+  const auto reader = std::ranges::find(kReaders, dialect, &DialectReader::id);
+  if (reader == std::end(kReaders)) {
+    return Error{Fault::kVerification, fmt::format("no virtual machine reads the dialect '{}'", dialect)};
+  }
+  reader->read(program, printing);
+  return printing.status();
+}
+
+}  // namespace
+
+void Count::add(const Count& other) {
+  drops += other.drops;
+  vectors += other.vectors;
+  sweeps += other.sweeps;
+  scan_mm += other.scan_mm;
+  travel_mm += other.travel_mm;
+  seconds += other.seconds;
+  fed_mm[0] += other.fed_mm[0];
+  fed_mm[1] += other.fed_mm[1];
+  vats |= other.vats;
+  moves |= other.moves;
+  build_mm = std::max(build_mm, other.build_mm);
+  farthest_along_um = std::max(farthest_along_um, other.farthest_along_um);
+  farthest_across_um = std::max(farthest_across_um, other.farthest_across_um);
+}
+
+Result<VirtualMachine> VirtualMachine::build(const Machine& machine, std::uint32_t columns, std::uint32_t rows) {
+  const auto wrong = [](const std::string& what) { return Error{Fault::kVerification, "program/machine.toml: " + what}; };
+  VirtualMachine made;
+  made.machine_ = machine;
+  made.columns_ = columns;
+  made.rows_ = rows;
+  const bool x = machine.mounting.scan_axis == ScanAxis::kX;
+  const double pitch = machine.head.pitch_um;
+  const double passes = machine.mounting.passes;
+  double angle = (x ? machine.mounting.tilt_deg : 90 - machine.mounting.tilt_deg) * kPi / 180;
+  if (machine.mounting.dpi > 0) angle = std::asin(std::min(1.0, 25'400 * passes / machine.mounting.dpi / pitch));
+  angle = std::abs(angle);
+  made.line_um_ = machine.mounting.dpi > 0 ? 25'400 / machine.mounting.dpi : pitch * std::sin(angle) / passes;
+  made.place_um_ = made.line_um_;
+  if (machine.motion.ticks_per_pixel > 0) {
+    made.place_um_ = 25'400 / machine.motion.encoder_dpi * machine.motion.ticks_per_pixel;
+  } else if (machine.mounting.along_dpi > 0) {
+    made.place_um_ = 25'400 / machine.mounting.along_dpi;
+  }
+  if (!(made.line_um_ > 0.5 && made.place_um_ > 0.5)) return wrong("its pixels have no size");
+  made.ticks_ = machine.motion.lag_unit == LagUnit::kTick ? std::max(1u, machine.motion.ticks_per_pixel) : 1;
+  made.step_um_ = made.place_um_ / static_cast<double>(made.ticks_);
+  made.lines_ = x ? rows : columns;
+  made.places_ = x ? columns : rows;
+  const auto expected = [](double bed_mm, double pixel_um) { return bed_mm * 1000 / pixel_um; };
+  const double want_lines = expected(machine.bed.size_mm[x ? 1 : 0], made.line_um_);
+  const double want_places = expected(machine.bed.size_mm[x ? 0 : 1], made.place_um_);
+  if (made.lines_ + 0.01 < want_lines || made.lines_ > want_lines + 1.01 || made.places_ + 0.01 < want_places ||
+      made.places_ > want_places + 1.01) {
+    return wrong(fmt::format("its bed has {:.1f} x {:.1f} pixels along and across the scan, the images {} x {}", want_places,
+                             want_lines, made.places_, made.lines_));
+  }
+  // Where the nozzles are: across from nozzle 0, and behind the foremost one.
+  const auto& offsets = machine.head.row_offset_um;
+  std::vector<double> across, behind;
+  for (std::uint32_t i = 0; i < machine.head.nozzles; ++i) {
+    const double along_row = (machine.mounting.first_leads ? i : machine.head.nozzles - 1.0 - i) * pitch;
+    const double offset = offsets[i % offsets.size()];
+    across.push_back(i * pitch * std::sin(angle) - offset * std::cos(angle));
+    behind.push_back(along_row * std::cos(angle) + offset * std::sin(angle));
+  }
+  const double foremost = *std::min_element(behind.begin(), behind.end());
+  for (std::uint32_t i = 0; i < machine.head.nozzles; ++i) {
+    const double late = (behind[i] - foremost) / made.step_um_;
+    Nozzle nozzle{};
+    nozzle.line = std::llround(across[i] / made.line_um_);
+    // A drop half a step from two places is that of the one behind.
+    nozzle.step_offset = -static_cast<std::int64_t>(std::floor(-late + 0.5 + 1e-6));
+    nozzle.along_um = (static_cast<double>(nozzle.step_offset) - late) * made.step_um_;
+    nozzle.across_um = across[i] - static_cast<double>(nozzle.line) * made.line_um_;
+    nozzle.blocked = std::ranges::find(machine.head.blocked, i) != machine.head.blocked.end();
+    made.nozzle_.push_back(nozzle);
+  }
+  return made;
+}
+
+std::array<double, 2> VirtualMachine::nozzle_at(std::int64_t first_line, double step, std::uint32_t number) const {
+  const Nozzle& nozzle = nozzle_[number];
+  const double line = static_cast<double>(first_line + nozzle.line) + nozzle.across_um / line_um_;
+  const double place =
+      (step - static_cast<double>(nozzle.step_offset)) / static_cast<double>(ticks_) + nozzle.along_um / place_um_;
+  const bool x = machine_.mounting.scan_axis == ScanAxis::kX;
+  double column = x ? place : line, row = x ? line : place;
+  const auto has = [&](Side side) { return machine_.mounting.scan_from == side || machine_.mounting.nozzle_0 == side; };
+  if (has(Side::kRight)) column = columns_ - 1 - column;
+  if (has(Side::kFront)) row = rows_ - 1 - row;
+  return {column, row};
+}
+
+Result<Count> VirtualMachine::replay(std::string_view program, const Layer& layer, const RunsView& image, std::uint64_t moved,
+                                     std::uint64_t lost) const {
+  Printing printing(*this, layer.index, nullptr);
+  if (Status status = read(machine_.dialect, program, printing); !status) return status.error();
+  printing.check_cycle(layer);
+  if (printing.ok()) printing.compare(image, moved, lost);
+  if (!printing.ok()) return printing.status().error();
+  return printing.count;
+}
+
+Result<Count> VirtualMachine::run(std::string_view program, std::uint32_t layer, const Watch& watch) const {
+  Printing printing(*this, layer, &watch);
+  if (Status status = read(machine_.dialect, program, printing); !status) return status.error();
+  return printing.count;
+}
+
+}  // namespace lamina::replay

@@ -1,0 +1,185 @@
+#include "stages/replay/printing.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <utility>
+
+namespace lamina::replay {
+
+Printing::Printing(const VirtualMachine& machine, std::uint32_t layer, const VirtualMachine::Watch* watch)
+    : machine_(machine),
+      watch_(watch),
+      layer_(layer),
+      row_words_((machine.columns_ + 63) / 64),
+      fired_(std::size_t{row_words_} * machine.rows_, 0) {}
+
+void Printing::fail(std::string what) {
+  if (ok()) fault_ = std::move(what);
+}
+
+void Printing::fault(std::string_view what) {
+  if (!ok()) return;
+  const bool ahead = reading_sweep_ != INT64_MIN;  // its words are read, and it has not begun
+  std::string place = fmt::format("layer {}", layer_);
+  if (ahead || sweeping_) {
+    place += fmt::format(", swath {}", ahead ? reading_sweep_ : std::int64_t{sweep_});
+    if (reading_ != INT64_MIN) {
+      place += fmt::format(", step {}", reading_);
+    } else {
+      place += stepped_ && !ahead ? fmt::format(", step {}", step_) : ", before its first step";
+    }
+  } else {
+    place += ", before its first swath";
+  }
+  fail(fmt::format("{}: {}", place, what));
+}
+
+void Printing::begin_sweep(std::uint32_t number, bool backward) {
+  if (sweeping_ && number <= sweep_ && !(sweeps_.empty())) {
+    // Further sweeps for blocked nozzles have higher numbers than the regular ones that follow them.
+    for (const Sweep& sweep : sweeps_) {
+      if (sweep.number == number) return fault(fmt::format("swath {} begins a second time", number));
+    }
+  }
+  sweep_ = number;
+  reading_sweep_ = INT64_MIN;
+  backward_ = backward;
+  sweeping_ = true;
+  stepped_ = false;
+  fired_here_ = false;
+  ++count.sweeps;
+}
+
+void Printing::go_across(double carriage_mm) {
+  const auto& mount = profile().mounting;
+  const bool x = mount.scan_axis == ScanAxis::kX;
+  double um = (carriage_mm - mount.offset_mm[x ? 1 : 0]) * 1000;
+  // From the side of nozzle 0: back and right are the far ends.
+  const bool far = mount.nozzle_0 == Side::kBack || mount.nozzle_0 == Side::kRight;
+  if (far) um = machine_.lines_ * machine_.line_um_ - um;
+  const double line = um / machine_.line_um_ - 0.5;
+  first_line_ = std::llround(line);
+  if (std::abs(line - static_cast<double>(first_line_)) > 0.02) {
+    fault(fmt::format("the head stands {:.2f} lines beside line {}", line - static_cast<double>(first_line_), first_line_));
+  }
+}
+
+double Printing::position_of(double step) const {
+  const auto& mount = profile().mounting;
+  double um = 0.5 * machine_.place_um_ + step * machine_.step_um_;
+  if (mount.scan_from == Side::kRight || mount.scan_from == Side::kBack) um = machine_.places_ * machine_.place_um_ - um;
+  return um / 1000 + mount.offset_mm[mount.scan_axis == ScanAxis::kX ? 0 : 1];
+}
+
+std::int64_t Printing::step_at(double carriage_mm) {
+  const double one = position_of(1) - position_of(0), step = (carriage_mm - position_of(0)) / one;
+  if (std::abs(step - std::round(step)) > 0.05) {
+    fault(fmt::format("{:.4f} mm is {:.2f} steps beside a step", carriage_mm, step - std::round(step)));
+    return 0;
+  }
+  return std::llround(step);
+}
+
+void Printing::at_step(std::int64_t step) {
+  reading_ = INT64_MIN;
+  if (!sweeping_) return fault("vectors before a swath");
+  previous_step_ = step_;
+  const bool moved = stepped_;
+  step_ = step;
+  stepped_ = true;
+  if (moved && (backward_ ? step >= previous_step_ : step <= previous_step_)) {
+    return fault(fmt::format("the head would have to go back from step {}", previous_step_));
+  }
+  ++count.vectors;
+}
+
+bool Printing::pixel(std::int64_t line, std::int64_t place, std::uint32_t& column, std::uint32_t& row) const {
+  if (line < 0 || place < 0 || line >= machine_.lines_ || place >= machine_.places_) return false;
+  const auto& mount = profile().mounting;
+  const bool x = mount.scan_axis == ScanAxis::kX;
+  const auto from_left = x ? place : line, from_back = x ? line : place;
+  const auto has = [&](Side side) { return mount.scan_from == side || mount.nozzle_0 == side; };
+  column = static_cast<std::uint32_t>(has(Side::kRight) ? machine_.columns_ - 1 - from_left : from_left);
+  row = static_cast<std::uint32_t>(has(Side::kFront) ? machine_.rows_ - 1 - from_back : from_back);
+  return true;
+}
+
+void Printing::fire(std::uint32_t number) {
+  if (number >= machine_.nozzle_.size()) return fault(fmt::format("nozzle {} does not exist", number));
+  const VirtualMachine::Nozzle& nozzle = machine_.nozzle_[number];
+  if (nozzle.blocked) return fault(fmt::format("nozzle {} fires, which is blocked", number));
+  if (!fired_here_) sweeps_.push_back({sweep_, first_line_});
+  fired_here_ = true;
+  const std::int64_t late = step_ - nozzle.step_offset;
+  std::uint32_t column = 0, row = 0;
+  if (late < 0 || late % machine_.ticks_ != 0 || !pixel(first_line_ + nozzle.line, late / machine_.ticks_, column, row)) {
+    return fault(fmt::format("nozzle {} fires where there is no pixel", number));
+  }
+  std::uint64_t& word = fired_[std::size_t{row} * row_words_ + column / 64];
+  const std::uint64_t bit = std::uint64_t{1} << (column % 64);
+  if ((word & bit) != 0) {
+    return fault(fmt::format("nozzle {} fires on column {}, row {} a second time", number, column, row));
+  }
+  word |= bit;
+  ++count.drops;
+  count.farthest_along_um = std::max(count.farthest_along_um, std::abs(nozzle.along_um));
+  count.farthest_across_um = std::max(count.farthest_across_um, std::abs(nozzle.across_um));
+  if (watch_ != nullptr) (*watch_)({column, row, sweep_, static_cast<std::uint32_t>(step_), number, first_line_});
+}
+
+void Printing::fire_words(const std::vector<std::uint64_t>& words) {
+  for (std::size_t w = 0; w < words.size(); ++w) {
+    for (std::uint64_t left = words[w]; left != 0 && ok();) {
+      const int bit = std::countl_zero(left);
+      left &= ~(std::uint64_t{1} << (63 - bit));
+      fire(static_cast<std::uint32_t>(w * 64) + static_cast<std::uint32_t>(bit));
+    }
+  }
+}
+
+void Printing::head_moves(double mm, double mm_s, bool scanning) {
+  const double hertz = mm_s * 1000 / machine_.place_um_;
+  if (scanning && hertz > profile().head.highest_frequency_hz * (1 + 1e-4)) {  // speeds are written rounded
+    return fault(fmt::format("scans at {:g} mm/s, where nozzles fire {:.0f} times a second; they can {:.0f}", mm_s, hertz,
+                             profile().head.highest_frequency_hz));
+  }
+  (scanning ? count.scan_mm : count.travel_mm) += std::abs(mm);
+  count.seconds += std::abs(mm) / mm_s;
+}
+
+void Printing::feeds(std::uint32_t vat, double mm, double mm_s) {
+  count.fed_mm[vat] += mm;
+  if (mm > 0) count.vats |= 1u << vat;
+  count.seconds += std::abs(mm) / mm_s;
+}
+
+void Printing::build_vat_stands_at(double mm) {
+  count.moves = true;
+  count.build_mm = mm * profile().powder.build_sign;
+}
+
+void Printing::roller_stands_at(double mm) {
+  rolled_ = rolled_ || std::abs(mm - profile().powder.roller_mm[1]) < 1e-3;
+  roller_mm_ = mm;
+}
+
+void Printing::check_cycle(const Layer& layer) {
+  if (!count.moves) return;
+  const auto& powder = profile().powder;
+  const auto wrong = [&](const std::string& what) { fail(fmt::format("layer {}, powder cycle: {}", layer_, what)); };
+  // Numbers are written to a tenth of a micrometre.
+  if (const double top = mm(std::int64_t{layer.bottom} + layer.thickness); std::abs(count.build_mm - top) > 1e-3) {
+    wrong(fmt::format("the build vat stands at {:g} mm where {:g} have to", count.build_mm, top));
+  }
+  const double fed = count.fed_mm[0] + count.fed_mm[1], dose = powder.dose * mm(layer.thickness);
+  if (std::abs(fed - dose) > 1e-3) wrong(fmt::format("{:g} mm are fed where {:g} have to", fed, dose));
+  if (!rolled_) wrong(fmt::format("the roller does not reach its far end at {:g} mm", powder.roller_mm[1]));
+  if (std::abs(roller_mm_ - powder.roller_mm[0]) > 1e-3) {
+    wrong(fmt::format("the roller stays at {:g} mm, not at {:g}", roller_mm_, powder.roller_mm[0]));
+  }
+}
+
+}  // namespace lamina::replay

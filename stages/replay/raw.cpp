@@ -1,0 +1,49 @@
+// stages/write/program/raw/README.md tells the format.
+#include "stages/replay/bytes.h"
+#include "stages/replay/dialects.h"
+
+namespace lamina::replay {
+
+void read_raw(std::string_view text, Printing& printing) {
+  ByteReader reader(text, printing);
+  ScanLength length(printing);
+  if (reader.take(4) != "LAYR" || reader.word() != printing.layer()) return reader.fault("does not begin with this layer");
+  reader.take(3 * 4);
+  printing.count.vats = reader.word();
+  const std::uint32_t words = (printing.nozzles() + 127) / 128;
+  while (printing.ok()) {
+    const std::string_view tag = reader.take(4);
+    if (tag == "LEND") {
+      if (reader.word() != printing.layer() || !reader.done())
+        return reader.fault("the end is not of this layer, or not the end");
+      length.end();
+      return;
+    }
+    if (tag != "SWTH") return reader.fault("neither a swath nor the end");
+    const std::uint32_t number = reader.word();
+    reader.word();
+    const bool backward = reader.word() == 1;
+    length.begin();
+    printing.begin_sweep(number, backward);
+    printing.go_across(static_cast<double>(static_cast<std::int64_t>(reader.number(8))) / 1e6);
+    for (std::uint32_t segments = reader.word(); segments > 0 && printing.ok(); --segments) {
+      std::int64_t step = reader.word();
+      for (std::uint32_t left = reader.word(); left > 0; --left, step += backward ? -1 : 1) {
+        const std::string_view bytes = reader.take(std::size_t{words} * 16);
+        if (!printing.ok()) return;
+        bool any = false;
+        for (const char c : bytes) any = any || c != 0;
+        if (!any) continue;
+        printing.at_step(step);
+        length.at(step);
+        // Each word is a number of 128 bits, the highest byte first; bit i is nozzle i of the word.
+        for (std::uint32_t nozzle = 0; nozzle < words * 128; ++nozzle) {
+          const auto byte = static_cast<std::uint8_t>(bytes[nozzle / 128 * 16 + 15 - nozzle % 128 / 8]);
+          if ((byte >> (nozzle % 8) & 1) != 0) printing.fire(nozzle);
+        }
+      }
+    }
+  }
+}
+
+}  // namespace lamina::replay
