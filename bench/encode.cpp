@@ -4,9 +4,9 @@
 #include <filesystem>
 
 #include "bench/named_parts.h"
+#include "stages/read/image.h"
 #include "stages/write/file.h"
 #include "stages/write/image_format.h"
-#include "stages/write/read_image.h"
 
 namespace lamina::bench {
 namespace {
@@ -18,7 +18,7 @@ std::string wrong_with(const write::Bytes& file, const write::ImageFormat& forma
   if (format.extension.empty()) return {};
   const auto path = (std::filesystem::temp_directory_path() / "lamina-bench-layer").string() + std::string(format.extension);
   if (auto written = write::write_file(path, file); !written) return written.error().message;
-  const auto image = write::read_image(path);
+  const auto image = read::image(path);
   std::filesystem::remove(path);
   if (!image) return image.error().message;
   return same_runs(image->runs, runs) ? "" : "the file does not hold the layer's pixels";

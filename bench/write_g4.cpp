@@ -6,10 +6,10 @@
 #include <string>
 
 #include "bench/named_parts.h"
+#include "stages/read/image.h"
 #include "stages/write/file.h"
 #include "stages/write/g4/encode.h"
 #include "stages/write/image_format.h"
-#include "stages/write/read_image.h"
 
 namespace lamina::bench {
 namespace {
@@ -63,7 +63,7 @@ std::string wrong_with(const Runs& runs) {
   }
   const std::string path = (std::filesystem::temp_directory_path() / "lamina-bench-g4.tif").string();
   if (auto written = write::write_file(path, file); !written) return written.error().message;
-  const auto image = write::read_image(path);
+  const auto image = read::image(path);
   std::filesystem::remove(path);
   if (!image) return image.error().message;
   return same_runs(image->runs, runs) ? "" : "libtiff decodes other pixels";

@@ -208,7 +208,7 @@ void define_image(py::module_& module) {
       "read_image",
       [](const std::string& path) {
         return without_lock([&]() -> Result<Image> {
-          Result<write::LayerImage> read = write::read_image(path);
+          Result<read::Image> read = read::image(path);
           if (!read) return read.error();
           return Image{std::move(read->runs), read->dpi_x, read->dpi_y};
         });

@@ -11,7 +11,7 @@
 #include "stages/data/runs.h"
 #include "stages/data/status.h"
 #include "stages/load/load.h"
-#include "stages/write/read_image.h"
+#include "stages/read/image.h"
 
 namespace lamina::python {
 

@@ -17,7 +17,7 @@
 #include "pipeline/show/slice_picture.h"  // is_slice_directory
 #include "stages/data/hash.h"
 #include "stages/raster/materials.h"
-#include "stages/write/read_image.h"
+#include "stages/read/image.h"
 
 namespace lamina::pipeline {
 namespace {
@@ -101,7 +101,7 @@ std::string fault_of_program(Inspection& inspection, const LayerRecord& record, 
 // Empty, or what is wrong with an image; what it sets is added to `whole`.
 std::string fault_of_image(const ManifestHead& head, const std::string& path, const LayerImageFile& file, Runs& whole) {
   const std::string& name = file.name;
-  Result<write::LayerImage> image = write::read_image(path);
+  Result<read::Image> image = read::image(path);
   if (!image) return image.error().message;
   const std::uint32_t columns = image->runs.columns, rows = image->runs.view().rows();
   if (columns != head.grid.columns() || rows != head.grid.rows()) {

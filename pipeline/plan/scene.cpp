@@ -134,7 +134,7 @@ Result<Scene> load_scene(const Job& job) {
   Scene scene;
   std::map<LoadKey, Loaded> files;
   std::vector<const Loaded*> loaded;  // by [[part]]; a map's values stay where they are
-  std::vector<BoxRequest> requests;
+  std::vector<arrange::BoxRequest> requests;
   const std::int64_t bed_width = nm_of(job.bed_mm[0]), bed_depth = nm_of(job.bed_mm[1]);
 
   for (const PartRequest& part : job.parts) {
@@ -152,7 +152,7 @@ Result<Scene> load_scene(const Job& job) {
       found = files.emplace(key, std::move(*fresh)).first;
     }
     loaded.push_back(&found->second);
-    BoxRequest request;
+    arrange::BoxRequest request;
     request.width = found->second.bounds.width();
     request.depth = found->second.bounds.depth();
     request.copies = part.copies;
@@ -170,8 +170,8 @@ Result<Scene> load_scene(const Job& job) {
     }
   }
 
-  const Result<std::vector<Place>> places =
-      place_boxes(requests, bed_width, bed_depth, nm_of(job.gap_mm), job.machine.decides_bed);
+  const Result<std::vector<arrange::Place>> places =
+      arrange::place_boxes(requests, bed_width, bed_depth, nm_of(job.gap_mm), job.machine.decides_bed);
   if (!places) return places.error();
 
   for (std::size_t p = 0; p < job.parts.size(); ++p) {
@@ -182,7 +182,7 @@ Result<Scene> load_scene(const Job& job) {
   std::map<std::uint32_t, Point3> rebased;
   std::vector<std::pair<std::uint32_t, Box>> boxes;
   bool positions_asked = false;
-  for (const Place& place : *places) {
+  for (const arrange::Place& place : *places) {
     const Loaded& part = *loaded[place.request];
     const std::int64_t bottom = nm_of(job.parts[place.request].bottom_mm);
     positions_asked = positions_asked || job.parts[place.request].at_mm.has_value();

@@ -7,7 +7,7 @@
 #include <map>
 
 #include "pipeline/run/slice.h"
-#include "stages/data/clipping.h"
+#include "stages/geometry/clipping.h"
 #include "stages/infill/fill.h"
 #include "stages/slice/bodies.h"
 

@@ -8,8 +8,8 @@
 #include <map>
 #include <memory>
 
-#include "stages/data/clipping.h"
-#include "stages/read/gcode_layers.h"
+#include "stages/geometry/clipping.h"
+#include "stages/read/gcode.h"
 
 namespace lamina::pipeline {
 namespace {
@@ -27,25 +27,16 @@ PathKind kind_of(const std::string& type) {
   return PathKind::kInner;
 }
 
-/// Narrow beads are pale, the widest have the full ink.
-Ink shade(const Ink& ink, std::size_t step, std::size_t steps) {
-  if (steps < 2) return ink;
-  const double paper = 0.6 * static_cast<double>(steps - 1 - step) / static_cast<double>(steps - 1);
-  Ink mixed{};
-  for (std::size_t c = 0; c < mixed.size(); ++c) mixed[c] = static_cast<std::uint8_t>(ink[c] + (255 - ink[c]) * paper);
-  return mixed;
-}
-
 /// The beads of one type, width by width, joined where one begins at the end of another.
-std::map<Nm, Contours> lines_by_width(const GcodeLayer& layer, std::uint32_t type) {
+std::map<Nm, Contours> lines_by_width(const read::GcodeLayer& layer, std::uint32_t type) {
   std::map<Nm, Contours> lines;
-  const GcodeBead* last = nullptr;
+  const read::GcodeBead* last = nullptr;
   const auto end_line = [&] {
     if (last == nullptr) return;
     lines[last->width].close();
     last = nullptr;
   };
-  for (const GcodeBead& bead : layer.beads) {
+  for (const read::GcodeBead& bead : layer.beads) {
     if (bead.type != type) {
       end_line();
       continue;
@@ -61,7 +52,7 @@ std::map<Nm, Contours> lines_by_width(const GcodeLayer& layer, std::uint32_t typ
   return lines;
 }
 
-Status add_beads(const GcodeLayer& layer, std::uint32_t type, const std::string& name, LayerShapes& shapes) {
+Status add_beads(const read::GcodeLayer& layer, std::uint32_t type, const std::string& name, view::LayerShapes& shapes) {
   const std::map<Nm, Contours> lines = lines_by_width(layer, type);
   if (lines.empty()) return {};
   const Nm least = lines.begin()->first, most = lines.rbegin()->first;
@@ -70,7 +61,7 @@ Status add_beads(const GcodeLayer& layer, std::uint32_t type, const std::string&
     if (lines.size() <= kMostShades) return place;
     return std::min(steps - 1, static_cast<std::size_t>((width - least) * static_cast<std::int64_t>(steps) / (most - least)));
   };
-  std::vector<LayerShapes::Beads> beads(steps);
+  std::vector<view::LayerShapes::Beads> beads(steps);
   std::vector<std::pair<Nm, Nm>> range(steps, {INT32_MAX, 0});
   std::size_t place = 0;
   for (const auto& [width, line] : lines) {
@@ -83,7 +74,7 @@ Status add_beads(const GcodeLayer& layer, std::uint32_t type, const std::string&
   for (std::size_t step = 0; step < steps; ++step) {
     if (beads[step].outline.size() == 0) continue;
     const auto& [narrow, wide] = range[step];
-    beads[step].ink = shade(ink_of(kind_of(name)), step, steps);
+    beads[step].ink = view::shade(view::ink_of(kind_of(name)), step, steps);
     beads[step].name = fmt::format("{} {:.3g}{} mm", name.empty() ? "bead" : name, mm(narrow),
                                    wide > narrow ? fmt::format(" to {:.3g}", mm(wide)) : "");
     shapes.beads.push_back(std::move(beads[step]));
@@ -91,17 +82,17 @@ Status add_beads(const GcodeLayer& layer, std::uint32_t type, const std::string&
   return {};
 }
 
-Result<LayerShapes> shapes_of(const GcodeFile& file, const std::string& name, std::uint32_t index) {
-  const Result<GcodeLayer> layer = file.layer(index);
+Result<view::LayerShapes> shapes_of(const read::GcodeFile& file, const std::string& name, std::uint32_t index) {
+  const Result<read::GcodeLayer> layer = file.layer(index);
   if (!layer) return layer.error();
-  LayerShapes shapes;
+  view::LayerShapes shapes;
   shapes.index = index;
   shapes.z = layer->z;
   shapes.box = file.box();
   // In the order in which they are first laid.
   std::vector<std::uint32_t> types;
   double length_mm = 0;
-  for (const GcodeBead& bead : layer->beads) {
+  for (const read::GcodeBead& bead : layer->beads) {
     if (std::ranges::find(types, bead.type) == types.end()) types.push_back(bead.type);
     length_mm += std::hypot(mm(std::int64_t{bead.to.x} - bead.from.x), mm(std::int64_t{bead.to.y} - bead.from.y));
   }
@@ -116,13 +107,13 @@ Result<LayerShapes> shapes_of(const GcodeFile& file, const std::string& name, st
 
 }  // namespace
 
-Result<LayerSeries> gcode_series(const std::string& path) {
-  auto file = GcodeFile::open(path);
+Result<view::LayerSeries> gcode_series(const std::string& path) {
+  auto file = read::GcodeFile::open(path);
   if (!file) return file.error();
-  LayerSeries series;
+  view::LayerSeries series;
   series.name = std::filesystem::path(path).filename().string();
   series.last = series.count = file->count();
-  series.layer = [file = std::make_shared<const GcodeFile>(std::move(*file)), name = series.name](std::uint32_t index) {
+  series.layer = [file = std::make_shared<const read::GcodeFile>(std::move(*file)), name = series.name](std::uint32_t index) {
     return shapes_of(*file, name, index);
   };
   return series;

@@ -4,13 +4,13 @@
 #include <string>
 
 #include "stages/data/status.h"
-#include "stages/view/layer_shapes.h"
+#include "stages/view/shapes.h"
 
 namespace lamina::pipeline {
 
 /// Layers of a file that lamina extrude or another slicer wrote: beads by what they are for, in their true widths, wide
 /// and narrow ones of a kind in different shades.
-/// errors  of GcodeFile
-Result<LayerSeries> gcode_series(const std::string& path);
+/// errors  of read::GcodeFile
+Result<view::LayerSeries> gcode_series(const std::string& path);
 
 }  // namespace lamina::pipeline

@@ -11,26 +11,34 @@
 #include "pipeline/cli/console.h"
 #include "stages/write/file.h"
 #include "stages/write/picture/plan_view.h"
+#include "stages/write/svg/drawing.h"
 
 namespace lamina::pipeline {
 namespace {
 
 constexpr std::uint32_t kMostCells = 400;
 
-write::picture::PlanView view_of(LayerShapes& shapes) {
+write::picture::PlanView view_of(view::LayerShapes& shapes) {
   write::picture::PlanView view;
   view.title = shapes.title;
   view.caption = shapes.caption;
   view.box = shapes.box;
   view.region = shapes.contours;
-  for (LayerShapes::Beads& beads : shapes.beads) {
+  for (view::LayerShapes::Beads& beads : shapes.beads) {
     view.shapes.push_back({{beads.ink[0], beads.ink[1], beads.ink[2]}, beads.name, std::move(beads.outline)});
   }
   return view;
 }
 
+/// The layer in its true size, bead widths true.
+std::string svg_of(const view::LayerShapes& shapes) {
+  std::vector<write::svg::Region> regions{{shapes.contours, "solid", {205, 209, 216}}};
+  for (const view::LayerShapes::Beads& beads : shapes.beads) regions.push_back({beads.outline, beads.name, beads.ink});
+  return write::svg::drawing(shapes.box, regions);
+}
+
 /// Several layers side by side.
-int draw_sheet(const LayerSeries& series, const std::string& output, const Arguments& arguments, std::uint32_t width) {
+int draw_sheet(const view::LayerSeries& series, const std::string& output, const Arguments& arguments, std::uint32_t width) {
   if (std::filesystem::path(output).extension() == ".svg") {
     return fail({Fault::kUsage, "-o: an SVG shows one layer, choose it by --layer K; several are drawn as PNG"});
   }
@@ -39,7 +47,7 @@ int draw_sheet(const LayerSeries& series, const std::string& output, const Argum
   const auto chosen = chosen_layers(arguments, layers);
   if (!chosen) return fail(chosen.error());
   if (chosen->empty()) return fail({Fault::kVerification, "the job has no layers"});
-  Result<LayerShapes> shapes = series.layer(layers[chosen->front()]);
+  Result<view::LayerShapes> shapes = series.layer(layers[chosen->front()]);
   if (!shapes) return fail(shapes.error());
   const std::string title = fmt::format("{}   |   {} layers   |   {:.1f} x {:.1f} mm", series.name, series.count,
                                         mm(shapes->box.width()), mm(shapes->box.depth()));
@@ -107,7 +115,8 @@ Result<std::vector<std::size_t>> chosen_layers(const Arguments& arguments, const
   return chosen;
 }
 
-int preview_series(const LayerSeries& series, const std::string& output, const Arguments& arguments, std::uint32_t width) {
+int preview_series(const view::LayerSeries& series, const std::string& output, const Arguments& arguments,
+                   std::uint32_t width) {
   for (const std::string_view option : {"--whole-bed", "--swath", "--step"}) {
     if (arguments.has(option)) {
       return fail({Fault::kUsage,
@@ -117,11 +126,11 @@ int preview_series(const LayerSeries& series, const std::string& output, const A
   if (arguments.has("--every") || arguments.has("--count")) return draw_sheet(series, output, arguments, width);
   const auto layer = whole_number(arguments, "--layer", 0, UINT32_MAX);
   if (!layer) return fail(layer.error());
-  Result<LayerShapes> shapes = series.layer((*layer).value_or(series.count / 2));
+  Result<view::LayerShapes> shapes = series.layer((*layer).value_or(series.count / 2));
   if (!shapes) return fail(shapes.error());
   Status status;
   if (std::filesystem::path(output).extension() == ".svg") {
-    const std::string svg = shapes_svg(*shapes);
+    const std::string svg = svg_of(*shapes);
     status = write::write_file(output, std::as_bytes(std::span(svg)));
   } else {
     write::picture::PlanView view = view_of(*shapes);

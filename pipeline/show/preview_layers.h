@@ -10,7 +10,7 @@
 
 #include "pipeline/cli/command.h"
 #include "stages/data/status.h"
-#include "stages/view/layer_shapes.h"
+#include "stages/view/shapes.h"
 
 namespace lamina::pipeline {
 
@@ -22,6 +22,6 @@ Result<std::optional<std::uint32_t>> whole_number(const Arguments& arguments, st
 Result<std::vector<std::size_t>> chosen_layers(const Arguments& arguments, const std::vector<std::uint32_t>& layers);
 
 /// One layer, or with --every or --count several side by side, into `output`. Says what is wrong and returns the exit code.
-int preview_series(const LayerSeries& series, const std::string& output, const Arguments& arguments, std::uint32_t width);
+int preview_series(const view::LayerSeries& series, const std::string& output, const Arguments& arguments, std::uint32_t width);
 
 }  // namespace lamina::pipeline

@@ -9,8 +9,8 @@
 
 #include "pipeline/check/replay_job.h"
 #include "stages/raster/materials.h"
+#include "stages/read/image.h"
 #include "stages/write/picture/swath_view.h"
-#include "stages/write/read_image.h"
 
 namespace lamina::pipeline {
 namespace {
@@ -61,7 +61,7 @@ Result<Buffer<std::byte>> draw_swath(const std::string& directory, const Manifes
   LayerRecord record;
   record.layer.index = choice.layer;
   for (const LayerImageFile& file : layer_images(head, record)) {
-    auto image = write::read_image(path(file.name));
+    auto image = read::image(path(file.name));
     if (!image) return image.error();
     if (!raster::add_image(std::move(image->runs), whole)) {
       return Error{Fault::kVerification, fmt::format("{}: sets pixels of another material", file.name)};

@@ -15,8 +15,8 @@
 #include "stages/data/hash.h"
 #include "pipeline/text/json_text.h"
 #include "stages/raster/materials.h"
-#include "stages/view/report_views.h"
-#include "stages/write/read_image.h"
+#include "stages/read/image.h"
+#include "stages/view/depth.h"
 #include "stages/write/report/page.h"
 #include "stages/write/report/run_code.h"
 
@@ -67,7 +67,7 @@ Result<Runs> read_layer(const std::string& directory, const ManifestHead& head, 
     const Error changed{Fault::kVerification,
                         fmt::format("{}: is not the file of the manifest; lamina verify tells more", path)};
     if (digest->bytes != file.record.bytes || digest->hash != file.record.hash) return changed;
-    Result<write::LayerImage> image = write::read_image(path);
+    Result<read::Image> image = read::image(path);
     if (!image) return image.error();
     if (image->runs.columns != head.grid.columns() || image->runs.view().rows() != head.grid.rows()) return changed;
     if (!raster::add_image(std::move(image->runs), whole)) return changed;
@@ -185,9 +185,9 @@ Result<std::vector<ShownView>> views_of_parts(const std::string& directory, cons
   return views;
 }
 
-std::vector<ShownView> views_of_layers(const ThreeViews& views) {
+std::vector<ShownView> views_of_layers(const view::ThreeViews& views) {
   std::vector<ShownView> shown;
-  for (const DepthView& view : views.views()) {
+  for (const view::DepthView& view : views.views()) {
     shown.push_back({view.name, view.width, view.height, view.most, view.width_mm, view.height_mm,
                      write::report::deflate_bytes(std::as_bytes(std::span(view.depth)))});
   }
@@ -195,7 +195,7 @@ std::vector<ShownView> views_of_layers(const ThreeViews& views) {
 }
 
 /// What the page's script reads.
-std::string head_json(const Manifest& manifest, const FileDigest& file, const write::PixelWindow& window, HeldLayers& held,
+std::string head_json(const Manifest& manifest, const FileDigest& file, const PixelWindow& window, HeldLayers& held,
                       const std::vector<ShownView>& views, const std::vector<double>& seconds) {
   const ManifestHead& head = manifest.head;
   const std::vector<LayerRecord>& layers = manifest.layers;
@@ -263,7 +263,7 @@ Result<Report> make_report(const std::string& directory, const ReportOptions& op
   }
 
   struct First {
-    write::PixelWindow window;
+    PixelWindow window;
     Buffer<std::byte> code;
     double seconds = 0;
   };
@@ -271,12 +271,12 @@ Result<Report> make_report(const std::string& directory, const ReportOptions& op
   std::uint64_t taken = (views.empty() ? 150'000 : 50'000) + 150 * layers.size();
   for (const ShownView& view : views) taken += view.deflated.size() / 3 * 4;
   HeldLayers held(options.size_limit > taken ? options.size_limit - taken : 0);
-  write::PixelWindow window;
+  PixelWindow window;
   std::vector<double> seconds;
   Status status = each_layer<First>(
       directory, *manifest,
       [&](std::uint32_t place, const RunsView& runs, First& first) -> Status {
-        first.window = write::window_of(runs);
+        first.window = window_of(runs);
         if (held.wants(place)) first.code = write::report::pack_runs(runs);
         if (!machine) return {};
         const auto time = seconds_of_layer(directory, manifest->head, *machine, layers[place], runs);
@@ -285,7 +285,7 @@ Result<Report> make_report(const std::string& directory, const ReportOptions& op
         return {};
       },
       [&](std::uint32_t place, First& first) {
-        window = write::joined(window, first.window);
+        window = joined(window, first.window);
         held.add(place, std::move(first.code));
         if (machine) seconds.push_back(first.seconds);
       });
@@ -294,7 +294,7 @@ Result<Report> make_report(const std::string& directory, const ReportOptions& op
 
   if (views.empty()) {
     const Layer &lowest = layers.front().layer, &highest = layers.back().layer;
-    ThreeViews built(grid, window, lowest.bottom, highest.bottom + highest.thickness);
+    view::ThreeViews built(grid, window, lowest.bottom, highest.bottom + highest.thickness);
     status = each_layer<std::vector<std::uint8_t>>(
         directory, *manifest,
         [&](std::uint32_t, const RunsView& runs, std::vector<std::uint8_t>& cells) -> Status {

@@ -11,7 +11,7 @@
 
 #include "pipeline/job/file.h"
 #include "pipeline/run/slice.h"
-#include "stages/data/clipping.h"
+#include "stages/geometry/clipping.h"
 
 namespace lamina::pipeline {
 namespace {
@@ -84,13 +84,13 @@ Result<SlicePictures> SlicePictures::open(const std::string& directory) {
   return pictures;
 }
 
-Result<LayerShapes> SlicePictures::layer(std::uint32_t index) const {
+Result<view::LayerShapes> SlicePictures::layer(std::uint32_t index) const {
   if (index >= count()) {
     return Error{Fault::kUsage, fmt::format("--layer {}: the job has layers 0 to {}", index, count() - 1)};
   }
   SlicePlan::Work work;
   if (Status status = plan_.layer(index, work); !status) return status.error();
-  LayerShapes shapes;
+  view::LayerShapes shapes;
   shapes.index = index;
   shapes.z = plan_.layers()[index].layer.plane();
   shapes.contours = std::move(work.contours.contours);
@@ -106,7 +106,7 @@ Result<LayerShapes> SlicePictures::layer(std::uint32_t index) const {
   for (const auto& [kind, name] : kKinds) {
     auto outline = outline_of(work.paths, kind);
     if (!outline) return outline.error();
-    if (outline->size() > 0) shapes.beads.push_back({ink_of(kind), std::string(name), std::move(*outline)});
+    if (outline->size() > 0) shapes.beads.push_back({view::ink_of(kind), std::string(name), std::move(*outline)});
   }
   shapes.title = fmt::format("{}   |   layer {} of {}   |   z {:.3f} mm", name(), index, count(), mm(shapes.z));
   shapes.caption = fmt::format("{} contours, {:.2f} mm2", shapes.contours.size(), area);
@@ -114,12 +114,12 @@ Result<LayerShapes> SlicePictures::layer(std::uint32_t index) const {
   return shapes;
 }
 
-Result<LayerSeries> slice_series(const std::string& directory) {
+Result<view::LayerSeries> slice_series(const std::string& directory) {
   auto opened = SlicePictures::open(directory);
   if (!opened) return opened.error();
   const auto pictures = std::make_shared<const SlicePictures>(std::move(*opened));
-  return LayerSeries{pictures->name(), pictures->first(), pictures->last(), pictures->count(),
-                     [pictures](std::uint32_t index) { return pictures->layer(index); }};
+  return view::LayerSeries{pictures->name(), pictures->first(), pictures->last(), pictures->count(),
+                           [pictures](std::uint32_t index) { return pictures->layer(index); }};
 }
 
 }  // namespace lamina::pipeline

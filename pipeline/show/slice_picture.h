@@ -8,7 +8,7 @@
 
 #include "pipeline/run/slice.h"
 #include "stages/data/status.h"
-#include "stages/view/layer_shapes.h"
+#include "stages/view/shapes.h"
 
 namespace lamina::pipeline {
 
@@ -25,7 +25,7 @@ class SlicePictures {
   std::uint32_t last() const { return range_[1]; }
   std::uint32_t count() const { return static_cast<std::uint32_t>(plan_.layers().size()); }
   /// errors  kUsage: no such layer; kVerification: a part that is not what it was
-  Result<LayerShapes> layer(std::uint32_t index) const;
+  Result<view::LayerShapes> layer(std::uint32_t index) const;
   /// Of the first part.
   std::string name() const { return plan_.names().empty() ? std::string() : plan_.names().front(); }
 
@@ -37,6 +37,6 @@ class SlicePictures {
 };
 
 /// The same as a series. errors  of SlicePictures
-Result<LayerSeries> slice_series(const std::string& directory);
+Result<view::LayerSeries> slice_series(const std::string& directory);
 
 }  // namespace lamina::pipeline

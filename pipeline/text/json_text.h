@@ -4,6 +4,8 @@
 #include <string>
 #include <string_view>
 
+#include "stages/data/text.h"  // one_line
+
 namespace lamina::pipeline {
 
 /// The text in quotes, escaped for JSON (and for TOML's basic strings); bytes that are not UTF-8 become U+FFFD.
@@ -11,8 +13,5 @@ std::string json_string(std::string_view text);
 
 /// Whether the bytes are UTF-8.
 bool is_utf8(std::string_view text);
-
-/// The text without line breaks and other control characters, for messages of one line.
-std::string one_line(std::string_view text);
 
 }  // namespace lamina::pipeline

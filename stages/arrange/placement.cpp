@@ -6,7 +6,7 @@
 
 #include "stages/data/units.h"
 
-namespace lamina::pipeline {
+namespace lamina::arrange {
 namespace {
 
 // A box that is wider or deeper than the bed cannot stand anywhere.
@@ -73,4 +73,4 @@ Result<std::vector<Place>> place_boxes(std::span<const BoxRequest> requests, std
   return places;
 }
 
-}  // namespace lamina::pipeline
+}  // namespace lamina::arrange

@@ -9,7 +9,7 @@
 
 #include "stages/data/status.h"
 
-namespace lamina::pipeline {
+namespace lamina::arrange {
 
 /// The box of one [[part]] and how many of it have to stand.
 struct BoxRequest {
@@ -38,4 +38,4 @@ struct Place {
 Result<std::vector<Place>> place_boxes(std::span<const BoxRequest> requests, std::int64_t bed_width, std::int64_t bed_depth,
                                        std::int64_t gap, bool bed_of_machine = false);
 
-}  // namespace lamina::pipeline
+}  // namespace lamina::arrange

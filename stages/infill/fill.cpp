@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "stages/data/clipping.h"
+#include "stages/geometry/clipping.h"
 #include "stages/infill/expression.h"
 #include "stages/infill/layout.h"
 #include "stages/infill/raster.h"

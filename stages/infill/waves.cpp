@@ -8,7 +8,7 @@
 #include <tuple>
 #include <vector>
 
-#include "stages/data/clipping.h"
+#include "stages/geometry/clipping.h"
 
 namespace lamina::infill {
 namespace {

@@ -14,7 +14,7 @@
 #include <map>
 #include <utility>
 
-#include "stages/data/lib3mf_handle.h"
+#include "stages/data/handles/lib3mf.h"
 #include "stages/load/threemf_model.h"
 
 namespace lamina::load {

@@ -6,7 +6,7 @@
 #include <utility>
 #include <vector>
 
-#include "stages/data/clipping.h"
+#include "stages/geometry/clipping.h"
 #include "stages/slice/contact.h"
 
 namespace lamina::slice {

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <map>
 
-#include "stages/data/clipping.h"
+#include "stages/geometry/clipping.h"
 #include "stages/slice/nest.h"
 #include "stages/slice/order.h"
 #include "stages/slice/tidy.h"

@@ -8,7 +8,7 @@
 #include <nlohmann/json.hpp>
 #include <random>
 
-#include "stages/write/read_image.h"
+#include "stages/read/image.h"
 #include "stages/write/report/run_code.h"
 #include "tests/commands/program.h"
 
@@ -106,7 +106,7 @@ class JobsReported : public ::testing::Test {
   Runs layer(int index) {
     char name[32];
     std::snprintf(name, sizeof name, "out/layers/%06d.tif", index);
-    const auto image = write::read_image(directory_ / name);
+    const auto image = read::image(directory_ / name);
     EXPECT_TRUE(image.ok());
     return image->runs;
   }

@@ -6,7 +6,7 @@
 #include <polyclipping/clipper.hpp>
 #include <random>
 
-#include "stages/data/clipping.h"
+#include "stages/geometry/clipping.h"
 
 namespace lamina {
 namespace {

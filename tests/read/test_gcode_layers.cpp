@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "stages/data/contours.h"
-#include "stages/read/gcode_layers.h"
+#include "stages/read/gcode.h"
 #include "tests/commands/program.h"
 #include "tests/segment/gcode_reader.h"
 
@@ -23,9 +23,9 @@ Point2 at(double x_mm, double y_mm) { return {static_cast<Nm>(nm_of(x_mm)), stat
 std::string nut() { return std::string(LAMINA_TEST_DIR) + "/corpus/parameter_quality_nut.stl"; }
 
 /// `text` as a file, read.
-Result<GcodeFile> file_of(const Directory& directory, const std::string& text) {
+Result<read::GcodeFile> file_of(const Directory& directory, const std::string& text) {
   test::write_text(directory.path() / "part.gcode", text);
-  return GcodeFile::open(directory / "part.gcode");
+  return read::GcodeFile::open(directory / "part.gcode");
 }
 
 TEST(GcodeLayers, ASegmentedPlanHasTheBeadsThatAnotherReaderFinds) {
@@ -37,7 +37,7 @@ TEST(GcodeLayers, ASegmentedPlanHasTheBeadsThatAnotherReaderFinds) {
     ASSERT_EQ(planned.code, 0) << planned.err;
     const auto expected = test::read_gcode(test::read_text(directory.path() / "part.gcode"));
     ASSERT_EQ(expected.error, "");
-    const auto file = GcodeFile::open(directory / "part.gcode");
+    const auto file = read::GcodeFile::open(directory / "part.gcode");
     ASSERT_TRUE(file) << file.error().message;
     EXPECT_TRUE(file->tells_widths());
     ASSERT_EQ(file->count(), expected.layers.size());
@@ -52,7 +52,7 @@ TEST(GcodeLayers, ASegmentedPlanHasTheBeadsThatAnotherReaderFinds) {
       ASSERT_EQ(layer->beads.size(), wanted.size()) << "layer " << k;
       EXPECT_TRUE(wanted.empty() || layer->z == nm_of(expected.layers[k].z));
       for (std::size_t i = 0; i < wanted.size(); ++i) {
-        const GcodeBead& bead = layer->beads[i];
+        const read::GcodeBead& bead = layer->beads[i];
         EXPECT_EQ(bead.from, at(wanted[i].x0, wanted[i].y0));
         EXPECT_EQ(bead.to, at(wanted[i].x1, wanted[i].y1));
         EXPECT_EQ(bead.width, nm_of(wanted[i].width));
@@ -131,7 +131,7 @@ TEST(GcodeLayers, WhatCannotBeDrawnIsOneLineThatNamesThePlace) {
     EXPECT_NE(file.error().message.find(told), std::string::npos) << file.error().message;
     EXPECT_EQ(file.error().message.find('\n'), std::string::npos);
   }
-  EXPECT_FALSE(GcodeFile::open(directory / "none.gcode"));
+  EXPECT_FALSE(read::GcodeFile::open(directory / "none.gcode"));
 }
 
 }  // namespace

@@ -3,7 +3,7 @@
 
 #include <random>
 
-#include "stages/data/clipping.h"
+#include "stages/geometry/clipping.h"
 #include "stages/slice/nest.h"
 #include "stages/slice/slice.h"
 #include "stages/slice/tidy.h"

@@ -1,7 +1,7 @@
 // Reading what is not whole: always an error, never a crash, never a wait.
 #include <gtest/gtest.h>
 
-#include "stages/write/read_image.h"
+#include "stages/read/image.h"
 #include "tests/write/images.h"
 
 namespace lamina::write {
@@ -14,7 +14,7 @@ TEST(ReadImage, AFileCutOffAtAnyLengthIsAnErrorInOneLine) {
     const std::string path = folder / ("cut" + std::string(format->extension));
     for (std::size_t length = 0; length < file.size(); ++length) {
       testing::save(path, std::span(file).first(length));
-      const auto image = read_image(path);
+      const auto image = read::image(path);
       ASSERT_FALSE(image.ok()) << format->id << " cut off after " << length << " of " << file.size();
       EXPECT_EQ(image.error().fault, Fault::kVerification);
       EXPECT_EQ(image.error().message.find(path), 0u) << image.error().message;
@@ -43,7 +43,7 @@ void expect_survival(const ImageFormat& format, const Bytes& file, std::uint32_t
       }
     }
     testing::save(path, damaged);
-    const auto image = read_image(path);
+    const auto image = read::image(path);
     if (!image.ok()) {
       ASSERT_EQ(image.error().message.find('\n'), std::string::npos) << image.error().message;
       continue;
@@ -111,7 +111,7 @@ TEST(ReadImage, ATiffThatPromisesMorePixelsThanItsBytesCanHoldIsRefusedAtOnce) {
       file[rows_per_strip - 6] = std::byte{4};
       put_long(file, rows_per_strip, rows);
       testing::save(path, file);
-      EXPECT_FALSE(read_image(path).ok()) << id << " " << rows;
+      EXPECT_FALSE(read::image(path).ok()) << id << " " << rows;
     }
   }
 }
@@ -124,7 +124,7 @@ TEST(ReadImage, HeadersThatPromiseTooMuchAreRefusedAtOnce) {
         std::string("P4\n0 1\nx"), std::string("P4\n1 0\n"), std::string("P4\n-8 1\nx"), std::string("P4\n8 1\nxy"),
         std::string("P4#"), std::string("P4\n8 1"), std::string("P1\n1 1\n1")}) {
     testing::save(pbm, std::as_bytes(std::span(text)));
-    EXPECT_FALSE(read_image(pbm).ok()) << text;
+    EXPECT_FALSE(read::image(pbm).ok()) << text;
   }
   // A whole PNG of 2,000,000 x 2,000,000 white pixels cannot be this short; CRC of this IHDR computed for the test.
   Bytes file = testing::encoded(*find_image_format("png"), testing::image_of(9, {{1, 5}, {}}));
@@ -134,7 +134,7 @@ TEST(ReadImage, HeadersThatPromiseTooMuchAreRefusedAtOnce) {
     file[29 + i] = std::byte{sum[i]};
   }
   testing::save(png, file);
-  EXPECT_FALSE(read_image(png).ok());
+  EXPECT_FALSE(read::image(png).ok());
 }
 
 TEST(ReadImage, WhatIsNoImageIsAnError) {
@@ -142,10 +142,10 @@ TEST(ReadImage, WhatIsNoImageIsAnError) {
   const std::string text = folder / "text.tif", none = folder / "none.tif";
   const std::string words = "not an image at all";
   testing::save(text, std::as_bytes(std::span(words)));
-  EXPECT_FALSE(read_image(text).ok());
-  EXPECT_FALSE(read_image(none).ok());
-  EXPECT_FALSE(read_image(folder / ".").ok());
-  EXPECT_FALSE(read_image("/dev/zero").ok());
+  EXPECT_FALSE(read::image(text).ok());
+  EXPECT_FALSE(read::image(none).ok());
+  EXPECT_FALSE(read::image(folder / ".").ok());
+  EXPECT_FALSE(read::image("/dev/zero").ok());
 }
 
 }  // namespace

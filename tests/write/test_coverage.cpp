@@ -1,4 +1,4 @@
-#include "stages/write/coverage.h"
+#include "stages/geometry/coverage.h"
 
 #include <gtest/gtest.h>
 

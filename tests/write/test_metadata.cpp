@@ -5,7 +5,7 @@
 
 #include <cstdlib>
 
-#include "stages/write/read_image.h"
+#include "stages/read/image.h"
 #include "tests/write/images.h"
 
 namespace lamina::write {
@@ -115,7 +115,7 @@ TEST(Pbm, OtherWritersHeadersAreRead) {
   for (const std::string& head : {std::string("P4 8 1\n"), std::string("P4#x\n#y\r\n 8 #z\n\t1 "), std::string("P4\n8\n1\n")}) {
     const std::string text = head + "\x3C";
     testing::save(path, std::as_bytes(std::span(text)));
-    const auto image = read_image(path);
+    const auto image = read::image(path);
     ASSERT_TRUE(image.ok()) << head << ": " << image.error().message;
     EXPECT_EQ(image->dpi_x, 0);
     ASSERT_EQ(image->runs.change.size(), 2u);

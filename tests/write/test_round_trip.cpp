@@ -2,9 +2,9 @@
 #include <gtest/gtest.h>
 #include <tiffio.h>
 
+#include "stages/geometry/bits.h"
+#include "stages/read/image.h"
 #include "stages/write/g4/encode.h"
-#include "stages/write/limits.h"
-#include "stages/write/read_image.h"
 #include "tests/write/images.h"
 
 namespace lamina::write {
@@ -12,7 +12,7 @@ namespace {
 
 using testing::Row;
 
-::testing::AssertionResult same(const LayerImage& image, const Runs& runs) {
+::testing::AssertionResult same(const read::Image& image, const Runs& runs) {
   if (image.runs.columns != runs.columns) return ::testing::AssertionFailure() << image.runs.columns << " columns";
   if (image.runs.row_offset.size() != runs.row_offset.size()) {
     return ::testing::AssertionFailure() << image.runs.row_offset.size() << " offsets";
@@ -33,7 +33,7 @@ void expect_round_trip(const testing::Folder& folder, const Runs& runs, const st
     const Bytes file = testing::encoded(*format, runs);
     ASSERT_FALSE(file.empty());
     testing::save(path, file);
-    const auto image = read_image(path);
+    const auto image = read::image(path);
     ASSERT_TRUE(image.ok()) << image.error().message;
     ASSERT_TRUE(same(*image, runs));
     EXPECT_NEAR(image->dpi_x, 1200, 0.02);  // PNG has whole pixels a metre
@@ -138,7 +138,7 @@ TEST(G4, ARunOfEveryLengthInBothColoursComesBack) {
   const Runs runs = testing::image_of(columns, rows);
   const std::string path = folder / "runs.tif";
   testing::save(path, testing::encoded(*find_image_format("tiff-g4"), runs));
-  const auto image = read_image(path);
+  const auto image = read::image(path);
   ASSERT_TRUE(image.ok()) << image.error().message;
   EXPECT_TRUE(same(*image, runs));
 }
@@ -164,7 +164,7 @@ TEST(G4, EveryPairOfNeighbouringRowsOfNinePixelsComesBack) {
   const Runs runs = testing::image_of(kColumns, rows);
   const std::string path = folder / "pairs.tif";
   testing::save(path, testing::encoded(*find_image_format("tiff-g4"), runs));
-  const auto image = read_image(path);
+  const auto image = read::image(path);
   ASSERT_TRUE(image.ok()) << image.error().message;
   EXPECT_TRUE(same(*image, runs));
 }

@@ -3,7 +3,7 @@
 #include <cstring>
 #include <string>
 
-#include "stages/write/bits.h"
+#include "stages/geometry/bits.h"
 #include "stages/write/pbm/pbm.h"
 
 namespace lamina::write::pbm {

@@ -5,10 +5,10 @@
 
 #include <mutex>
 
-#include "stages/write/coverage.h"
+#include "stages/geometry/coverage.h"
+#include "stages/read/image.h"
 #include "stages/write/picture/canvas.h"
 #include "stages/write/picture/layout.h"
-#include "stages/write/read_image.h"
 
 namespace lamina::write::picture {
 namespace {

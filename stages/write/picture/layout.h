@@ -4,7 +4,7 @@
 #include <cstdint>
 
 #include "stages/data/grid.h"
-#include "stages/write/coverage.h"
+#include "stages/geometry/coverage.h"
 
 namespace lamina::write::picture {
 

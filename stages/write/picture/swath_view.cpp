@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "stages/write/coverage.h"
+#include "stages/geometry/coverage.h"
 #include "stages/write/picture/canvas.h"
 
 namespace lamina::write::picture {

@@ -7,8 +7,7 @@
 #include <cstring>
 #include <string>
 
-#include "stages/write/bits.h"
-#include "stages/write/limits.h"
+#include "stages/geometry/bits.h"
 #include "stages/write/png/png_format.h"
 
 namespace lamina::write::png {

@@ -7,7 +7,7 @@
 #include <cstdio>
 #include <cstring>
 
-#include "stages/data/lib3mf_handle.h"
+#include "stages/data/handles/lib3mf.h"
 
 namespace lamina::write {
 namespace {

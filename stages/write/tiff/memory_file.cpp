@@ -1,7 +1,6 @@
 #include "stages/write/tiff/memory_file.h"
 
 #include <algorithm>
-#include <cstdarg>
 #include <cstdio>
 #include <cstring>
 #include <new>
@@ -50,32 +49,10 @@ int close_nothing(thandle_t) { return 0; }
 
 toff_t size_of(thandle_t handle) { return file_of(handle).size; }
 
-int keep_first_message(TIFF*, void* user, const char*, const char* format, va_list arguments) {
-  std::string& message = *static_cast<std::string*>(user);
-  if (!message.empty()) return 1;
-  char text[256];
-  std::vsnprintf(text, sizeof text, format, arguments);
-  message = text;
-  return 1;
-}
-
-int keep_warning_of_damage(TIFF* tiff, void* user, const char* module, const char* format, va_list arguments) {
-  const bool harmless = std::strstr(format, "Unknown field") != nullptr;
-  return harmless ? 1 : keep_first_message(tiff, user, module, format, arguments);
-}
-
 }  // namespace
 
-OptionsHandle strict_options(std::string& message) {
-  OptionsHandle options(TIFFOpenOptionsAlloc());
-  if (options == nullptr) return nullptr;
-  TIFFOpenOptionsSetErrorHandlerExtR(options.get(), keep_first_message, &message);
-  TIFFOpenOptionsSetWarningHandlerExtR(options.get(), keep_warning_of_damage, &message);
-  return options;
-}
-
 TiffHandle open_for_writing(MemoryFile& file, std::string& message) {
-  const auto options = strict_options(message);
+  const auto options = strict_tiff_options(message);
   if (options == nullptr) return nullptr;
   return TiffHandle(TIFFClientOpenExt("layer", "wl", &file, read_nothing, write_bytes, seek, close_nothing, size_of, nullptr,
                                       nullptr, options.get()));

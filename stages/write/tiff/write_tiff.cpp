@@ -7,9 +7,8 @@
 #include <string>
 
 #include "stages/data/units.h"
-#include "stages/write/bits.h"
+#include "stages/geometry/bits.h"
 #include "stages/write/g4/encode.h"
-#include "stages/write/limits.h"
 #include "stages/write/tiff/memory_file.h"
 #include "stages/write/tiff/tiff.h"
 

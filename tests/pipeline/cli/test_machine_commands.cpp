@@ -10,7 +10,7 @@
 #include <fstream>
 #include <iterator>
 
-#include "stages/write/read_image.h"
+#include "stages/read/image.h"
 
 namespace lamina::pipeline {
 namespace {
@@ -63,7 +63,7 @@ TEST_F(MachineCommands, TheOrientationTargetIsAnFThatReadsRightOnEveryMounting) 
     const std::string out = at(machine);
     lamina("jet " + at("f.stl") + " --machine " + machine + " --layer 1 -o " + out);
     lamina("verify " + out);  // what is printed is the image
-    const auto image = write::read_image(out + "/layers/000000.tif");
+    const auto image = read::image(out + "/layers/000000.tif");
     ASSERT_TRUE(image.ok());
     const RunsView runs = image->runs;
     const double width = 25.4 / image->dpi_x, depth = 25.4 / image->dpi_y;
@@ -86,7 +86,7 @@ TEST_F(MachineCommands, TheOrientationTargetIsAnFThatReadsRightOnEveryMounting) 
     EXPECT_FALSE(set(12, 3)) << machine << ": no arm at the foot";
     EXPECT_FALSE(set(12, 21)) << machine;
     // The step on top is at the foot: the third layer holds nothing else.
-    const auto top = write::read_image(out + "/layers/000002.tif");
+    const auto top = read::image(out + "/layers/000002.tif");
     ASSERT_TRUE(top.ok());
     for (std::uint32_t r = 0; r < runs.rows(); ++r) {
       const bool foot = r > back + static_cast<std::uint32_t>(23.5 / depth);

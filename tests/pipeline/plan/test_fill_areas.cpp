@@ -8,7 +8,7 @@
 #include <random>
 
 #include "pipeline/run/slice.h"
-#include "stages/data/clipping.h"
+#include "stages/geometry/clipping.h"
 #include "stages/write/slice_format.h"
 #include "tests/commands/program.h"
 #include "tests/slice/contour_laws.h"

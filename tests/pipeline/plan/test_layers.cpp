@@ -6,7 +6,7 @@
 #include <string>
 
 #include "pipeline/run/slice.h"
-#include "stages/data/clipping.h"
+#include "stages/geometry/clipping.h"
 
 namespace lamina::pipeline {
 namespace {

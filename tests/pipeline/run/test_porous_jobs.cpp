@@ -13,8 +13,8 @@
 #include "stages/dose/erode.h"
 #include "stages/raster/combine.h"
 #include "stages/raster/raster.h"
+#include "stages/read/image.h"
 #include "stages/segment/expand.h"
-#include "stages/write/read_image.h"
 #include "tests/commands/program.h"
 #include "tests/segment/cylinder.h"
 
@@ -40,7 +40,7 @@ class PorousJob : public testing::Test {
       const std::string file =
           folder / (name + "/layers/" + std::string(6 - std::to_string(i).size(), '0') + std::to_string(i) + ".pbm");
       if (!fs::exists(file)) return images;
-      auto image = write::read_image(file);
+      auto image = read::image(file);
       EXPECT_TRUE(image.ok()) << (image.ok() ? "" : image.error().message);
       images.push_back(std::move(image->runs));
     }

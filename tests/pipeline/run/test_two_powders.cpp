@@ -16,7 +16,7 @@
 #include "pipeline/output/merge.h"
 #include "pipeline/run/jet.h"
 #include "stages/raster/materials.h"
-#include "stages/write/read_image.h"
+#include "stages/read/image.h"
 
 namespace lamina::pipeline {
 namespace {
@@ -67,7 +67,7 @@ class TwoPowders : public ::testing::Test {
     EXPECT_EQ(report->replayed, report->layers);
   }
   static Runs image(const Job& job, std::uint32_t layer, const std::string& material = "") {
-    auto read = write::read_image(job.output + "/" + layer_file_name(layer, ".tif", material));
+    auto read = read::image(job.output + "/" + layer_file_name(layer, ".tif", material));
     EXPECT_TRUE(read.ok()) << (read.ok() ? "" : read.error().message);
     return read.ok() ? std::move(read->runs) : Runs();
   }

@@ -1,4 +1,4 @@
-#include "stages/data/clipping.h"
+#include "stages/geometry/clipping.h"
 
 #include <fmt/format.h>
 

@@ -1,4 +1,4 @@
-// stages/view/layer_shapes.h: what pictures of a layer show: its contours, and what its beads cover.
+// stages/view/shapes.h: what pictures of a layer show: its contours, and what its beads cover.
 #pragma once
 
 #include <array>
@@ -12,13 +12,16 @@
 #include "stages/data/status.h"
 #include "stages/data/toolpaths.h"
 
-namespace lamina::pipeline {
+namespace lamina::view {
 
 /// Red, green, blue.
 using Ink = std::array<std::uint8_t, 3>;
 
 /// The ink of a kind of bead, the same in every picture.
 Ink ink_of(PathKind kind);
+
+/// The ink of one of several widths of a kind: the narrowest, step 0, is pale, the widest has the full ink.
+Ink shade(const Ink& ink, std::size_t step, std::size_t steps);
 
 struct LayerShapes {
   std::string title, caption;
@@ -42,7 +45,4 @@ struct LayerSeries {
   std::function<Result<LayerShapes>(std::uint32_t)> layer;
 };
 
-/// A drawing of the layer in its true size, bead widths true.
-std::string shapes_svg(const LayerShapes& shapes);
-
-}  // namespace lamina::pipeline
+}  // namespace lamina::view

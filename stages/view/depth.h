@@ -1,4 +1,4 @@
-// stages/view/report_views.h: parts from three sides, as their layers build them up.
+// stages/view/depth.h: parts from three sides, as their layers build them up.
 #pragma once
 
 #include <array>
@@ -9,9 +9,9 @@
 #include "stages/data/grid.h"
 #include "stages/data/layer.h"
 #include "stages/data/runs.h"
-#include "stages/write/coverage.h"
+#include "stages/geometry/coverage.h"
 
-namespace lamina::pipeline {
+namespace lamina::view {
 
 /// How near the surface is in each direction of a view; 0 where nothing is. Rows from the top.
 struct DepthView {
@@ -26,7 +26,7 @@ struct DepthView {
 class ThreeViews {
  public:
   /// `window` not empty; heights in nm above the bed.
-  ThreeViews(const PixelGrid& grid, const write::PixelWindow& window, Nm bottom, Nm top);
+  ThreeViews(const PixelGrid& grid, const PixelWindow& window, Nm bottom, Nm top);
 
   std::uint32_t columns() const { return columns_; }
   std::uint32_t rows() const { return rows_; }
@@ -39,10 +39,10 @@ class ThreeViews {
   const std::array<DepthView, 3>& views() const { return views_; }
 
  private:
-  write::PixelWindow window_;
+  PixelWindow window_;
   std::uint32_t columns_, rows_, levels_;
   Nm bottom_, top_;
   std::array<DepthView, 3> views_;
 };
 
-}  // namespace lamina::pipeline
+}  // namespace lamina::view

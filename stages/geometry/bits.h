@@ -1,4 +1,4 @@
-// stages/write/bits.h: between runs and rows of bits, the leftmost pixel in the highest bit of the first byte.
+// stages/geometry/bits.h: between runs and rows of bits, the leftmost pixel in the highest bit of the first byte.
 #pragma once
 
 #include <cstddef>
@@ -6,9 +6,14 @@
 #include <span>
 
 #include "stages/data/runs.h"
-#include "stages/data/status.h"
+#include "stages/data/units.h"
 
-namespace lamina::write {
+namespace lamina {
+
+/// A side of the largest bed at the finest dpi (data/units.h, data/grid.h): no writer makes, and no reader believes,
+/// more columns or rows. A row of bits is then at most 268,436 bytes.
+inline constexpr std::uint32_t kMostPixelsASide =
+    static_cast<std::uint32_t>(ceil_div(kNmReach * std::int64_t{25'400}, kNmPerInch));
 
 constexpr std::size_t row_bytes(std::uint32_t columns) { return (std::size_t{columns} + 7) / 8; }
 
@@ -35,4 +40,4 @@ class RunsBuilder {
   std::size_t used_ = 0;  // of runs_.change, which is kept larger
 };
 
-}  // namespace lamina::write
+}  // namespace lamina

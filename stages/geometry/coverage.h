@@ -1,4 +1,4 @@
-// stages/write/coverage.h: runs made smaller for the eye.
+// stages/geometry/coverage.h: runs made smaller for the eye.
 #pragma once
 
 #include <cstdint>
@@ -6,7 +6,7 @@
 
 #include "stages/data/runs.h"
 
-namespace lamina::write {
+namespace lamina {
 
 /// Columns [left, right) and rows [top, bottom) of an image; empty if left == right.
 struct PixelWindow {
@@ -31,4 +31,4 @@ PixelWindow joined(const PixelWindow& one, const PixelWindow& other);
 /// cost     a few operations a run and result row that it touches, and one a result value
 void coverage(const RunsView& runs, const PixelWindow& window, std::uint32_t columns, std::span<std::uint8_t> result);
 
-}  // namespace lamina::write
+}  // namespace lamina

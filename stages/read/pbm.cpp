@@ -7,11 +7,10 @@
 #include <optional>
 #include <string_view>
 
-#include "stages/write/bits.h"
-#include "stages/write/limits.h"
-#include "stages/write/pbm/pbm.h"
+#include "stages/geometry/bits.h"
+#include "stages/read/image_formats.h"
 
-namespace lamina::write::pbm {
+namespace lamina::read {
 namespace {
 
 // More than any header of ours, and than any sensible comment of others.
@@ -72,11 +71,11 @@ bool read_all_at(int file, std::span<std::byte> to, std::uint64_t offset) {
 
 }  // namespace
 
-Result<LayerImage> read(int file, std::uint64_t bytes, const std::string& path) {
+Result<Image> pbm(int file, std::uint64_t bytes, const std::string& path) {
   const auto failure = [&](std::string_view why) {
     return Error{Fault::kVerification, fmt::format("{}: not a whole PBM (P4): {}; plan the layer again", path, why)};
   };
-  Bytes buffer(std::min<std::uint64_t>(bytes, kMostHeadBytes));
+  Buffer<std::byte> buffer(std::min<std::uint64_t>(bytes, kMostHeadBytes));
   if (!read_all_at(file, buffer, 0)) return failure("cannot read");
   const auto head = parse_head({reinterpret_cast<const char*>(buffer.data()), buffer.size()});
   if (!head) return failure("its header is not one");
@@ -99,7 +98,7 @@ Result<LayerImage> read(int file, std::uint64_t bytes, const std::string& path) 
       if (!builder.add_row(strip.subspan(stride * r, stride), false)) return failure("too many runs");
     }
   }
-  return LayerImage{builder.finish(), head->dpi_x, head->dpi_y};
+  return Image{builder.finish(), head->dpi_x, head->dpi_y};
 }
 
-}  // namespace lamina::write::pbm
+}  // namespace lamina::read

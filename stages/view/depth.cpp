@@ -1,16 +1,16 @@
-#include "stages/view/report_views.h"
+#include "stages/view/depth.h"
 
 #include <algorithm>
 #include <cmath>
 
-namespace lamina::pipeline {
+namespace lamina::view {
 namespace {
 
 constexpr std::uint32_t kMost = 360;
 
 }  // namespace
 
-ThreeViews::ThreeViews(const PixelGrid& grid, const write::PixelWindow& window, Nm bottom, Nm top)
+ThreeViews::ThreeViews(const PixelGrid& grid, const PixelWindow& window, Nm bottom, Nm top)
     : window_(window), bottom_(bottom), top_(top) {
   const double width = window.width() / grid.x.pixels_per_nm(), depth = window.height() / grid.y.pixels_per_nm();
   const double height = static_cast<double>(std::int64_t{top} - bottom), longest = std::max({width, depth, height});
@@ -29,7 +29,7 @@ ThreeViews::ThreeViews(const PixelGrid& grid, const write::PixelWindow& window, 
 
 void ThreeViews::look(const RunsView& runs, std::vector<std::uint8_t>& cells) const {
   cells.resize(std::size_t{columns_} * rows_);
-  write::coverage(runs, window_, columns_, cells);
+  coverage(runs, window_, columns_, cells);
 }
 
 void ThreeViews::add(const Layer& layer, const std::vector<std::uint8_t>& cells) {
@@ -57,4 +57,4 @@ void ThreeViews::add(const Layer& layer, const std::vector<std::uint8_t>& cells)
   }
 }
 
-}  // namespace lamina::pipeline
+}  // namespace lamina::view

@@ -1,4 +1,4 @@
-// stages/read/gcode_layers.h: the beads that a G-code file lays, layer by layer, as its printer would.
+// stages/read/gcode.h: the beads that a G-code file lays, layer by layer, as its printer would.
 #pragma once
 
 #include <cstdint>
@@ -12,7 +12,7 @@
 #include "stages/data/status.h"
 #include "stages/data/units.h"
 
-namespace lamina::pipeline {
+namespace lamina::read {
 
 /// One straight move that lays filament.
 struct GcodeBead {
@@ -67,4 +67,4 @@ class GcodeFile {
   double filament_mm_ = 1.75;
 };
 
-}  // namespace lamina::pipeline
+}  // namespace lamina::read

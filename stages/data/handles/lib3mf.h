@@ -1,5 +1,5 @@
-// stages/data/lib3mf_handle.h: an object of lib3mf (1.8, C interface) that is released at its end, for readers and writers of
-// 3MF.
+// stages/data/handles/lib3mf.h: an object of lib3mf (1.8, C interface) that is released at its end. It lies here because the
+// reader and the writer of 3MF are two stages.
 #pragma once
 
 #include <Model/COM/NMR_DLLInterfaces.h>

@@ -6,12 +6,11 @@
 #include <cstdint>
 #include <string>
 
-#include "stages/write/bits.h"
-#include "stages/write/limits.h"
-#include "stages/write/tiff/memory_file.h"
-#include "stages/write/tiff/tiff.h"
+#include "stages/data/handles/tiff.h"
+#include "stages/geometry/bits.h"
+#include "stages/read/image_formats.h"
 
-namespace lamina::write::tiff {
+namespace lamina::read {
 namespace {
 
 /// Rows of `stride` bytes that `bytes` of this compression can hold at most; a header that promises more lies.
@@ -48,46 +47,46 @@ std::string check_strips(TIFF* tiff, std::uint64_t file_bytes, std::uint16_t com
 
 }  // namespace
 
-Result<LayerImage> read(int file, std::uint64_t bytes, const std::string& path) {
+Result<Image> tiff(int file, std::uint64_t bytes, const std::string& path) {
   std::string message;  // of libtiff, outlives the handle
   const auto failure = [&](std::string_view why) {
     return Error{Fault::kVerification, fmt::format("{}: not a whole 1-bit TIFF: {}; plan the layer again", path, why)};
   };
-  const auto options = strict_options(message);
+  const auto options = strict_tiff_options(message);
   const int own_file = ::dup(file);
   if (options == nullptr || own_file < 0) return failure("out of memory or files");
   TIFFOpenOptionsSetMaxSingleMemAlloc(options.get(), 64 << 20);
-  const TiffHandle tiff(TIFFFdOpenExt(own_file, path.c_str(), "rC", options.get()));
-  if (tiff == nullptr) {
+  const TiffHandle handle(TIFFFdOpenExt(own_file, path.c_str(), "rC", options.get()));
+  if (handle == nullptr) {
     ::close(own_file);
     return failure(message.empty() ? "no directory" : message);
   }
   if (!message.empty()) return failure(message);
   std::uint32_t columns = 0, rows = 0;
   std::uint16_t bits = 1, samples = 1, photometric = 0, compression = COMPRESSION_NONE, unit = RESUNIT_INCH;
-  TIFFGetField(tiff.get(), TIFFTAG_IMAGEWIDTH, &columns);
-  TIFFGetField(tiff.get(), TIFFTAG_IMAGELENGTH, &rows);
-  TIFFGetFieldDefaulted(tiff.get(), TIFFTAG_BITSPERSAMPLE, &bits);
-  TIFFGetFieldDefaulted(tiff.get(), TIFFTAG_SAMPLESPERPIXEL, &samples);
-  TIFFGetFieldDefaulted(tiff.get(), TIFFTAG_COMPRESSION, &compression);
-  TIFFGetFieldDefaulted(tiff.get(), TIFFTAG_RESOLUTIONUNIT, &unit);
-  if (TIFFGetField(tiff.get(), TIFFTAG_PHOTOMETRIC, &photometric) == 0 || photometric > PHOTOMETRIC_MINISBLACK || bits != 1 ||
+  TIFFGetField(handle.get(), TIFFTAG_IMAGEWIDTH, &columns);
+  TIFFGetField(handle.get(), TIFFTAG_IMAGELENGTH, &rows);
+  TIFFGetFieldDefaulted(handle.get(), TIFFTAG_BITSPERSAMPLE, &bits);
+  TIFFGetFieldDefaulted(handle.get(), TIFFTAG_SAMPLESPERPIXEL, &samples);
+  TIFFGetFieldDefaulted(handle.get(), TIFFTAG_COMPRESSION, &compression);
+  TIFFGetFieldDefaulted(handle.get(), TIFFTAG_RESOLUTIONUNIT, &unit);
+  if (TIFFGetField(handle.get(), TIFFTAG_PHOTOMETRIC, &photometric) == 0 || photometric > PHOTOMETRIC_MINISBLACK || bits != 1 ||
       samples != 1) {
     return failure("not a 1-bit image");
   }
-  if (TIFFIsTiled(tiff.get()) != 0) return failure("tiles are not supported");
+  if (TIFFIsTiled(handle.get()) != 0) return failure("tiles are not supported");
   if (columns == 0 || rows == 0 || columns > kMostPixelsASide || rows > kMostPixelsASide) {
     return failure(fmt::format("{} x {} pixels", columns, rows));
   }
   const std::size_t stride = row_bytes(columns);
-  const std::string wrong = check_strips(tiff.get(), bytes, compression, rows, stride);
+  const std::string wrong = check_strips(handle.get(), bytes, compression, rows, stride);
   if (!wrong.empty()) return failure(wrong);
-  if (TIFFScanlineSize(tiff.get()) != static_cast<tmsize_t>(stride)) return failure("rows of an unexpected length");
+  if (TIFFScanlineSize(handle.get()) != static_cast<tmsize_t>(stride)) return failure("rows of an unexpected length");
 
-  LayerImage image;
+  Image image;
   float resolution_x = 0, resolution_y = 0;
-  if (TIFFGetField(tiff.get(), TIFFTAG_XRESOLUTION, &resolution_x) != 0 &&
-      TIFFGetField(tiff.get(), TIFFTAG_YRESOLUTION, &resolution_y) != 0 && unit != RESUNIT_NONE) {
+  if (TIFFGetField(handle.get(), TIFFTAG_XRESOLUTION, &resolution_x) != 0 &&
+      TIFFGetField(handle.get(), TIFFTAG_YRESOLUTION, &resolution_y) != 0 && unit != RESUNIT_NONE) {
     const double to_inch = unit == RESUNIT_CENTIMETER ? 2.54 : 1;
     image.dpi_x = double{resolution_x} * to_inch;
     image.dpi_y = double{resolution_y} * to_inch;
@@ -95,7 +94,7 @@ Result<LayerImage> read(int file, std::uint64_t bytes, const std::string& path) 
   RunsBuilder builder(columns);
   Buffer<std::byte> row(stride);
   for (std::uint32_t r = 0; r < rows; ++r) {
-    if (TIFFReadScanline(tiff.get(), row.data(), r, 0) < 0 || !message.empty()) {
+    if (TIFFReadScanline(handle.get(), row.data(), r, 0) < 0 || !message.empty()) {
       return failure(fmt::format("row {}: {}", r, message.empty() ? "cannot be decoded" : message));
     }
     if (!builder.add_row(row, photometric == PHOTOMETRIC_MINISBLACK)) return failure("too many runs");
@@ -104,4 +103,4 @@ Result<LayerImage> read(int file, std::uint64_t bytes, const std::string& path) 
   return image;
 }
 
-}  // namespace lamina::write::tiff
+}  // namespace lamina::read

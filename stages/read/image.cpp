@@ -1,4 +1,4 @@
-#include "stages/write/read_image.h"
+#include "stages/read/image.h"
 
 #include <fcntl.h>
 #include <fmt/format.h>
@@ -9,11 +9,9 @@
 #include <cstring>
 #include <new>
 
-#include "stages/write/pbm/pbm.h"
-#include "stages/write/png/png_format.h"
-#include "stages/write/tiff/tiff.h"
+#include "stages/read/image_formats.h"
 
-namespace lamina::write {
+namespace lamina::read {
 namespace {
 
 struct Descriptor {
@@ -24,21 +22,21 @@ struct Descriptor {
 };
 
 /// By the first bytes, whatever the name says.
-Result<LayerImage> read_by_magic(int file, std::uint64_t bytes, const std::string& path) {
+Result<Image> read_by_magic(int file, std::uint64_t bytes, const std::string& path) {
   unsigned char magic[8] = {};
   if (::pread(file, magic, sizeof magic, 0) < 0) {
     return Error{Fault::kVerification, fmt::format("{}: cannot read: {}", path, std::strerror(errno))};
   }
   const auto begins = [&](const char* text, std::size_t length) { return std::memcmp(magic, text, length) == 0; };
-  if (begins("II", 2) || begins("MM", 2)) return tiff::read(file, bytes, path);
-  if (begins("\x89PNG\r\n\x1a\n", 8)) return png::read(file, bytes, path);
-  if (begins("P4", 2)) return pbm::read(file, bytes, path);
+  if (begins("II", 2) || begins("MM", 2)) return tiff(file, bytes, path);
+  if (begins("\x89PNG\r\n\x1a\n", 8)) return png(file, bytes, path);
+  if (begins("P4", 2)) return pbm(file, bytes, path);
   return Error{Fault::kVerification, fmt::format("{}: neither TIFF nor PNG nor PBM (P4); plan the layer again", path)};
 }
 
 }  // namespace
 
-Result<LayerImage> read_image(const std::string& path) {
+Result<Image> image(const std::string& path) {
   const Descriptor descriptor{::open(path.c_str(), O_RDONLY | O_CLOEXEC)};
   struct stat state;
   if (descriptor.file < 0 || ::fstat(descriptor.file, &state) != 0) {
@@ -52,4 +50,4 @@ Result<LayerImage> read_image(const std::string& path) {
   }
 }
 
-}  // namespace lamina::write
+}  // namespace lamina::read

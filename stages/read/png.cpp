@@ -8,11 +8,10 @@
 #include <new>
 #include <optional>
 
-#include "stages/write/bits.h"
-#include "stages/write/limits.h"
-#include "stages/write/png/png_format.h"
+#include "stages/geometry/bits.h"
+#include "stages/read/image_formats.h"
 
-namespace lamina::write::png {
+namespace lamina::read {
 namespace {
 
 // Deflate makes at most 1032 bytes of one (zlib's technical notes); a header that promises more lies.
@@ -120,23 +119,23 @@ bool read_rows(png_structp png, png_infop info, Source& source) {
 
 }  // namespace
 
-Result<LayerImage> read(int file, std::uint64_t bytes, const std::string& path) {
+Result<Image> png(int file, std::uint64_t bytes, const std::string& path) {
   const auto source = std::make_unique<Source>();
   source->file = file;
   source->bytes = bytes;
-  png_structp png = png_create_read_struct(PNG_LIBPNG_VER_STRING, source.get(), keep_error, ignore_warning);
-  png_infop info = png != nullptr ? png_create_info_struct(png) : nullptr;
+  png_structp reader = png_create_read_struct(PNG_LIBPNG_VER_STRING, source.get(), keep_error, ignore_warning);
+  png_infop info = reader != nullptr ? png_create_info_struct(reader) : nullptr;
   bool whole = false;
   if (info != nullptr) {
-    png_set_read_fn(png, source.get(), read_bytes);
-    whole = read_rows(png, info, *source);
+    png_set_read_fn(reader, source.get(), read_bytes);
+    whole = read_rows(reader, info, *source);
   }
-  png_destroy_read_struct(&png, &info, nullptr);
+  png_destroy_read_struct(&reader, &info, nullptr);
   if (!whole) {
     return Error{Fault::kVerification, fmt::format("{}: not a whole 1-bit PNG: {}; plan the layer again", path,
                                                    source->message[0] != 0 ? source->message : "out of memory")};
   }
-  return LayerImage{source->builder->finish(), source->dpi_x, source->dpi_y};
+  return Image{source->builder->finish(), source->dpi_x, source->dpi_y};
 }
 
-}  // namespace lamina::write::png
+}  // namespace lamina::read

@@ -1,10 +1,10 @@
-#include "stages/write/bits.h"
+#include "stages/geometry/bits.h"
 
 #include <algorithm>
 #include <bit>
 #include <cstring>
 
-namespace lamina::write {
+namespace lamina {
 
 void expand_row(std::span<const std::uint32_t> change, std::span<std::byte> row) {
   std::byte* const bytes = row.data();
@@ -74,4 +74,4 @@ Runs RunsBuilder::finish() {
   return std::move(runs_);
 }
 
-}  // namespace lamina::write
+}  // namespace lamina

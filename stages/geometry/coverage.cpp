@@ -1,9 +1,9 @@
-#include "stages/write/coverage.h"
+#include "stages/geometry/coverage.h"
 
 #include <algorithm>
 #include <vector>
 
-namespace lamina::write {
+namespace lamina {
 
 PixelWindow window_of(const RunsView& runs) {
   PixelWindow window{UINT32_MAX, 0, UINT32_MAX, 0};
@@ -95,4 +95,4 @@ void coverage(const RunsView& runs, const PixelWindow& window, std::uint32_t col
   }
 }
 
-}  // namespace lamina::write
+}  // namespace lamina

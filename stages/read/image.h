@@ -1,4 +1,4 @@
-// stages/write/read_image.h: layer images back into runs, through libtiff, libpng and a PBM reader.
+// stages/read/image.h: layer images back into runs, through libtiff, libpng and a PBM reader.
 #pragma once
 
 #include <cstddef>
@@ -8,9 +8,9 @@
 #include "stages/data/runs.h"
 #include "stages/data/status.h"
 
-namespace lamina::write {
+namespace lamina::read {
 
-struct LayerImage {
+struct Image {
   Runs runs;
   double dpi_x = 0, dpi_y = 0;  // 0 where the file does not say
 };
@@ -18,6 +18,6 @@ struct LayerImage {
 /// Decodes a 1-bit image as the writers make them (TIFF of any 1-bit compression, PNG, PBM), row by row: memory is
 /// the runs plus one row or strip of bits.
 /// errors  kVerification with the file's name: truncated, not 1 bit, not readable
-Result<LayerImage> read_image(const std::string& path);
+Result<Image> image(const std::string& path);
 
-}  // namespace lamina::write
+}  // namespace lamina::read

@@ -1,4 +1,4 @@
-#include "stages/read/gcode_layers.h"
+#include "stages/read/gcode.h"
 
 #include <fmt/format.h>
 
@@ -10,9 +10,9 @@
 #include <optional>
 #include <string_view>
 
-#include "pipeline/text/json_text.h"
+#include "stages/data/text.h"
 
-namespace lamina::pipeline {
+namespace lamina::read {
 namespace {
 
 using Place = GcodeFile::Place;
@@ -267,4 +267,4 @@ Result<GcodeLayer> GcodeFile::layer(std::uint32_t index) const {
   return layer;
 }
 
-}  // namespace lamina::pipeline
+}  // namespace lamina::read

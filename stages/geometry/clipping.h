@@ -1,4 +1,4 @@
-// stages/data/clipping.h: unions and offsets of contours, on Clipper's integers.
+// stages/geometry/clipping.h: unions and offsets of contours, on Clipper's integers.
 //
 // The library is A. Johnson's Clipper 6.4.2 (Debian's polyclipping), which works on whole numbers: corners of the
 // operands stay where they are, new corners are rounded to the nearest nm.
