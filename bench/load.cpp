@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "bench/named_parts.h"
-#include "stages/load/diagnose.h"
 #include "stages/load/load.h"
+#include "stages/load/repair/diagnose.h"
 
 namespace lamina::bench {
 namespace {

@@ -16,6 +16,7 @@
 #include "pipeline/show/preview_swath.h"
 #include "pipeline/show/slice_picture.h"
 #include "pipeline/text/readable.h"
+#include "stages/read/image.h"
 #include "stages/write/file.h"
 #include "stages/write/picture/canvas.h"  // have_font
 #include "stages/write/picture/contact_sheet.h"
@@ -140,7 +141,12 @@ int run_preview(const std::vector<std::string>& texts) {
                                 fmt::format("z {:.3f} mm", mm(record.layer.plane()))});
     }
   }
-  const Result<Buffer<std::byte>> picture = write::picture::contact_sheet(request);
+  const auto read = [](const std::string& path) -> Result<Runs> {
+    auto image = read::image(path);
+    if (!image) return image.error();
+    return std::move(image->runs);
+  };
+  const Result<Buffer<std::byte>> picture = write::picture::contact_sheet(request, read);
   if (!picture) return fail(picture.error());
   if (const Status status = write::write_file(output, *picture); !status) return fail(status.error());
   if (!arguments->has("--quiet")) {

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "pipeline/text/json_text.h"
-#include "stages/load/diagnose.h"
+#include "stages/load/repair/diagnose.h"
 
 namespace lamina::pipeline {
 namespace {

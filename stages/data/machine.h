@@ -25,7 +25,7 @@ enum class FirstSwath : std::uint8_t { kBed, kLayer };
 /// Which vat feeds a layer that holds both materials; kRefuse: there must be none.
 enum class VatRule : std::uint8_t { kFirst, kSecond, kMajority, kBoth, kRefuse };
 
-/// Everything that a profile says. Checked by program::make_head_grid and program::check_machine.
+/// Everything that a profile says. Checked by program::make_head_grid.
 struct Machine {
   std::string name, description;
   std::string dialect = "nuferbj";

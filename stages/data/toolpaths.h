@@ -43,9 +43,6 @@ struct ToolpathsView {
 
   std::uint32_t size() const { return offset.empty() ? 0 : static_cast<std::uint32_t>(offset.size() - 1); }
   std::span<const Point2> operator[](std::uint32_t p) const { return point.subspan(offset[p], offset[p + 1] - offset[p]); }
-  bool is_closed(std::uint32_t p) const {
-    return offset[p + 1] - offset[p] > 3 && point[offset[p]] == point[offset[p + 1] - 1];
-  }
 };
 
 /// Owned toolpaths; 17 bytes a point.

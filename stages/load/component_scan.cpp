@@ -118,39 +118,85 @@ void ComponentScan::refuse(std::string_view why) {
   place_ = Place::kSkip;
 }
 
+// A file that does not begin as XML does is skipped.
+void ComponentScan::feed_start(char next) {
+  tag_ += next;
+  const auto may_become = [&](std::string_view whole) { return whole.starts_with(tag_); };
+  constexpr std::string_view kMark = "\xEF\xBB\xBF", kBig = "\xFE\xFF", kLittle = "\xFF\xFE";
+  constexpr std::string_view kBigTag("\0<", 2), kLittleTag("<\0", 2);
+  if (tag_ == kBig || tag_ == kLittle || tag_ == kBigTag || tag_ == kLittleTag) {
+    refuse("is UTF-16; save it as UTF-8");
+  } else if (tag_ == kMark || is_blank(tag_.front())) {
+    tag_.clear();
+  } else if (tag_.front() == '<' && tag_.size() == 2) {
+    tag_.clear();
+    place_ = Place::kOpen;
+    feed_open(next);
+  } else if (!may_become(kMark) && !may_become(kBig) && !may_become(kLittle) && !may_become("<") && !may_become(kBigTag)) {
+    place_ = Place::kSkip;
+  }
+}
+
+// What stands behind '<' tells what it opens.
+void ComponentScan::feed_open(char next) {
+  tag_ += next;
+  const auto may_become = [&](std::string_view whole) { return whole.starts_with(tag_); };
+  if (tag_ == "!--" || tag_ == "![CDATA[" || tag_ == "?") {
+    place_ = tag_ == "?" ? Place::kInstruction : tag_ == "!--" ? Place::kRemark : Place::kData;
+    tag_.clear();
+  } else if (tag_ == "!D") {
+    refuse("has a document type, which 3MF forbids; export it again");
+  } else if (!may_become("!--") && !may_become("![CDATA[") && !may_become("!D")) {
+    place_ = Place::kTag;
+    tag_.pop_back();
+    feed_tag({&next, 1}, 0);
+  }
+}
+
+// Both take the longest piece of text that needs no decision, and return where it ends.
+std::size_t ComponentScan::feed_tag(std::string_view text, std::size_t at) {
+  const std::size_t end = std::min(text.find_first_of(">\"'", at), text.size());
+  tag_.append(text, at, end - at);
+  if (end == text.size()) return end;
+  if (text[end] == '>') {
+    tag(tag_);
+    tag_.clear();
+    place_ = Place::kText;
+  } else {
+    quote_ = text[end];
+    tag_ += quote_;
+    place_ = Place::kQuote;
+  }
+  return end + 1;
+}
+
+std::size_t ComponentScan::feed_quote(std::string_view text, std::size_t at) {
+  const std::size_t end = std::min(text.find(quote_, at), text.size());
+  tag_.append(text, at, end - at);
+  if (end == text.size()) return end;
+  tag_ += quote_;
+  place_ = Place::kTag;
+  return end + 1;
+}
+
+// Skips to the end mark, which may have begun in the piece before.
+std::size_t ComponentScan::skip_past(std::string_view mark, std::string_view text, std::size_t at) {
+  for (; at < text.size(); ++at) {
+    tag_ += text[at];
+    if (tag_.size() > mark.size()) tag_.erase(0, 1);
+    if (tag_ != mark) continue;
+    tag_.clear();
+    place_ = Place::kText;
+    return at + 1;
+  }
+  return at;
+}
+
 void ComponentScan::feed(const char* bytes, std::size_t count) {
   const std::string_view text(bytes, count);
-  const auto is_beginning_of = [&](std::string_view whole) { return whole.starts_with(tag_); };
-  // Skips to the end mark, which may have begun in the piece before.
-  const auto skip_past = [&](std::string_view mark, std::size_t& at) {
-    for (; at < text.size(); ++at) {
-      tag_ += text[at];
-      if (tag_.size() > mark.size()) tag_.erase(0, 1);
-      if (tag_ != mark) continue;
-      tag_.clear();
-      place_ = Place::kText;
-      ++at;
-      return;
-    }
-  };
   for (std::size_t at = 0; at < text.size() && place_ != Place::kSkip;) {
     switch (place_) {
-      case Place::kStart:
-        tag_ += text[at++];
-        if (tag_ == "\xFE\xFF" || tag_ == "\xFF\xFE" || tag_ == std::string_view("\0<", 2) ||
-            tag_ == std::string_view("<\0", 2)) {
-          refuse("is UTF-16; save it as UTF-8");
-        } else if (tag_ == "\xEF\xBB\xBF" || is_blank(tag_.front())) {
-          tag_.clear();
-        } else if (tag_.front() == '<' && tag_.size() == 2) {
-          place_ = Place::kOpen;
-          tag_.clear();
-          --at;
-        } else if (!is_beginning_of("\xEF\xBB\xBF") && !is_beginning_of("\xFE\xFF") && !is_beginning_of("\xFF\xFE") &&
-                   !is_beginning_of("<") && !is_beginning_of(std::string_view("\0<", 2))) {
-          place_ = Place::kSkip;
-        }
-        break;
+      case Place::kStart: feed_start(text[at++]); break;
       case Place::kText:
         at = std::min(text.find('<', at), text.size());
         if (at < text.size()) {
@@ -158,50 +204,12 @@ void ComponentScan::feed(const char* bytes, std::size_t count) {
           place_ = Place::kOpen;
         }
         break;
-      case Place::kOpen:
-        tag_ += text[at++];
-        if (tag_ == "!--" || tag_ == "![CDATA[" || tag_ == "?") {
-          place_ = tag_ == "?" ? Place::kInstruction : tag_ == "!--" ? Place::kRemark : Place::kData;
-          tag_.clear();
-        } else if (tag_ == "!D") {
-          refuse("has a document type, which 3MF forbids; export it again");
-        } else if (!is_beginning_of("!--") && !is_beginning_of("![CDATA[") && !is_beginning_of("!D")) {
-          place_ = Place::kTag;
-          tag_.pop_back();
-          --at;
-        }
-        break;
-      case Place::kTag: {
-        const std::size_t end = std::min(text.find_first_of(">\"'", at), text.size());
-        tag_.append(text, at, end - at);
-        at = end;
-        if (end < text.size() && text[end] == '>') {
-          tag(tag_);
-          tag_.clear();
-          place_ = Place::kText;
-          ++at;
-        } else if (end < text.size()) {
-          quote_ = text[end];
-          tag_ += quote_;
-          place_ = Place::kQuote;
-          ++at;
-        }
-        break;
-      }
-      case Place::kQuote: {
-        const std::size_t end = std::min(text.find(quote_, at), text.size());
-        tag_.append(text, at, end - at);
-        at = end;
-        if (end < text.size()) {
-          tag_ += quote_;
-          place_ = Place::kTag;
-          ++at;
-        }
-        break;
-      }
-      case Place::kRemark: skip_past("-->", at); break;
-      case Place::kData: skip_past("]]>", at); break;
-      case Place::kInstruction: skip_past("?>", at); break;
+      case Place::kOpen: feed_open(text[at++]); break;
+      case Place::kTag: at = feed_tag(text, at); break;
+      case Place::kQuote: at = feed_quote(text, at); break;
+      case Place::kRemark: at = skip_past("-->", text, at); break;
+      case Place::kData: at = skip_past("]]>", text, at); break;
+      case Place::kInstruction: at = skip_past("?>", text, at); break;
       case Place::kSkip: break;
     }
     if (tag_.size() > kLongestTag) refuse(fmt::format("has a tag of more than {} bytes; export it again", kLongestTag));

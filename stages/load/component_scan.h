@@ -49,6 +49,11 @@ class ComponentScan {
   };
   enum class Place { kStart, kSkip, kText, kOpen, kTag, kQuote, kRemark, kData, kInstruction };
 
+  void feed_start(char next);
+  void feed_open(char next);
+  std::size_t feed_tag(std::string_view text, std::size_t at);
+  std::size_t feed_quote(std::string_view text, std::size_t at);
+  std::size_t skip_past(std::string_view mark, std::string_view text, std::size_t at);
   void tag(std::string_view text);
   void refuse(std::string_view why);
   std::array<Object*, 2> find(const Reference& reference);

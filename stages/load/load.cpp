@@ -6,10 +6,10 @@
 #include <algorithm>
 #include <exception>
 
-#include "stages/load/diagnose.h"
-#include "stages/load/geometry.h"
 #include "stages/load/reader.h"
-#include "stages/load/repair.h"
+#include "stages/load/repair/diagnose.h"
+#include "stages/load/repair/geometry.h"
+#include "stages/load/repair/repair.h"
 
 namespace lamina::load {
 namespace {

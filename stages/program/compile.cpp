@@ -8,9 +8,9 @@ namespace lamina::program {
 namespace {
 
 /// One layer while it is compiled.
-class Layer {
+class LayerCompiler {
  public:
-  Layer(const HeadGrid& grid, const RunsView& image, CompileScratch& scratch, const EmitSweep& emit)
+  LayerCompiler(const HeadGrid& grid, const RunsView& image, CompileScratch& scratch, const EmitSweep& emit)
       : grid_(grid), scratch_(scratch), emit_(emit), blocked_(grid.nozzles, false) {
     for (const std::uint32_t nozzle : grid.blocked) blocked_[nozzle] = true;
     scratch.made_used = 0;
@@ -26,13 +26,13 @@ class Layer {
   }
 
   Result<ProgramCount> run() {
-    if (!grid_.blocked.empty() && grid_.blocked_rule != BlockedRule::kSecondPass) settle_dead_lines();
-    settled_ = scratch_.made_used;
+    if (!grid_.blocked.empty() && grid_.blocked_rule != BlockedRule::kSecondPass) resolve_dead_lines();
+    kept_ = scratch_.made_used;
     const std::uint32_t regular = swaths_ * grid_.passes;
     further_ = regular;
     for (std::uint32_t swath = 0; swath < swaths_; ++swath) {
       for (std::uint32_t pass = 0; pass < grid_.passes; ++pass) {
-        scratch_.made_used = settled_;
+        scratch_.made_used = kept_;
         Sweep sweep{swath * grid_.passes + pass, regular, swath, pass, false, first_line(swath, pass)};
         for (std::uint32_t i = 0; i < grid_.nozzles; ++i) scratch_.nozzle[i] = under(swath, pass, i);
         if (Status status = make(sweep); !status) return status.error();
@@ -100,7 +100,7 @@ class Layer {
   }
 
   // Left out, or moved to the line of the next nozzle where that is free.
-  void settle_dead_lines() {
+  void resolve_dead_lines() {
     const std::int64_t next = grid_.passes;
     for (std::uint32_t l = first_; l < grid_.lines; ++l) {
       if (scratch_.line[l].empty() || !dead(l)) continue;
@@ -163,7 +163,7 @@ class Layer {
   const EmitSweep& emit_;
   std::vector<bool> blocked_;
   std::uint32_t first_ = 0, stride_ = 0, swaths_ = 0, further_ = 0;
-  std::size_t settled_ = 0;  // made lines that are needed to the end of the layer
+  std::size_t kept_ = 0;  // made lines that are needed to the end of the layer
   bool backward_ = false;
   ProgramCount count_;
 };
@@ -171,7 +171,7 @@ class Layer {
 }  // namespace
 
 Result<ProgramCount> compile(const HeadGrid& grid, const RunsView& image, CompileScratch& scratch, const EmitSweep& emit) {
-  return Layer(grid, image, scratch, emit).run();
+  return LayerCompiler(grid, image, scratch, emit).run();
 }
 
 }  // namespace lamina::program

@@ -33,177 +33,234 @@ Error wrong(const Machine& machine, std::string_view key, const std::string& wha
 /// Halves down, and what rounding left beside a half or a whole number counts as it.
 double round_half_down(double value) { return std::ceil(value - 0.5 - kSlack); }
 
-}  // namespace
+/// The grid of a machine in the making; each step adds to it, in this order.
+class Builder {
+ public:
+  explicit Builder(const Machine& machine) : machine_(machine) {}
 
-Result<HeadGrid> make_head_grid(const Machine& machine) {
-  const auto& head = machine.head;
-  const auto& mount = machine.mounting;
-  const auto& motion = machine.motion;
-  const bool scan_x = mount.scan_axis == ScanAxis::kX;
-  HeadGrid grid;
-  grid.scan_axis = mount.scan_axis;
-  grid.nozzles = head.nozzles;
-  grid.passes = mount.passes;
-  grid.overlap = mount.overlap_lines;
-  grid.first_swath = mount.first_swath;
-  grid.both_directions = motion.both_directions;
-
-  if (head.nozzles == 0 || head.nozzles > 65'535) return wrong(machine, "head.nozzles", "give 1 to 65535");
-  if (!(head.pitch_um > 0)) {
-    return wrong(machine, "head.pitch_um", fmt::format("{:g} um between nozzles; give a pitch above 0", head.pitch_um));
+  Result<HeadGrid> build() {
+    using Step = Status (Builder::*)();
+    for (const Step step : {&Builder::check_head, &Builder::turn_head, &Builder::divide_scan, &Builder::make_image,
+                            &Builder::aim_nozzles, &Builder::block_nozzles, &Builder::check_speed}) {
+      if (Status status = (this->*step)(); !status) return status.error();
+    }
+    return std::move(grid_);
   }
-  if (mount.passes == 0) return wrong(machine, "mounting.passes", "give at least 1");
+
+ private:
+  Status check_head();
+  Status turn_head();  // the angle, and how far apart the lines are
+  Status turn_to_dpi();
+  Status turn_by_tilt();
+  Status divide_scan();  // pixels along the scan
+  Status make_image();
+  Status aim_nozzles();    // where each is: u along the row, v behind it
+  Status block_nozzles();  // what does not fire
+  Status check_speed();
+
+  const Machine& machine_;
+  HeadGrid grid_;
+  bool scan_x_ = machine_.mounting.scan_axis == ScanAxis::kX;
+  double pitch_nm_ = machine_.head.pitch_um * kNmPerUm;  // of nozzles
+  double angle_ = 0, sine_ = 0, cosine_ = 0;             // between row and scan
+  Pitch line_, place_;
+};
+
+Status Builder::check_head() {
+  const auto& head = machine_.head;
+  const auto& mount = machine_.mounting;
+  grid_.scan_axis = mount.scan_axis;
+  grid_.nozzles = head.nozzles;
+  grid_.passes = mount.passes;
+  grid_.overlap = mount.overlap_lines;
+  grid_.first_swath = mount.first_swath;
+  grid_.both_directions = machine_.motion.both_directions;
+  if (head.nozzles == 0 || head.nozzles > 65'535) return wrong(machine_, "head.nozzles", "give 1 to 65535");
+  if (!(head.pitch_um > 0)) {
+    return wrong(machine_, "head.pitch_um", fmt::format("{:g} um between nozzles; give a pitch above 0", head.pitch_um));
+  }
+  if (mount.passes == 0) return wrong(machine_, "mounting.passes", "give at least 1");
   if (mount.overlap_lines > head.nozzles * mount.passes / 2) {
-    return wrong(machine, "mounting.overlap_lines",
+    return wrong(machine_, "mounting.overlap_lines",
                  fmt::format("{} of the {} lines of a swath; at most half of them can be shared", mount.overlap_lines,
                              head.nozzles * mount.passes));
   }
-  if (const bool across = mount.scan_from == Side::kFront || mount.scan_from == Side::kBack; across == scan_x) {
-    return wrong(machine, "mounting.scan_from",
-                 scan_x ? "a scan along x begins left or right" : "a scan along y begins front or back");
+  if (const bool across = mount.scan_from == Side::kFront || mount.scan_from == Side::kBack; across == scan_x_) {
+    return wrong(machine_, "mounting.scan_from",
+                 scan_x_ ? "a scan along x begins left or right" : "a scan along y begins front or back");
   }
-  if (const bool across = mount.nozzle_0 == Side::kLeft || mount.nozzle_0 == Side::kRight; across == scan_x) {
+  if (const bool across = mount.nozzle_0 == Side::kLeft || mount.nozzle_0 == Side::kRight; across == scan_x_) {
     return wrong(
-        machine, "mounting.nozzle_0",
-        scan_x ? "with a scan along x nozzle 0 lies back or front" : "with a scan along y nozzle 0 lies left or right");
+        machine_, "mounting.nozzle_0",
+        scan_x_ ? "with a scan along x nozzle 0 lies back or front" : "with a scan along y nozzle 0 lies left or right");
   }
+  return {};
+}
 
-  // --- the angle, and how far apart the lines are
-  const double pitch_nm = head.pitch_um * kNmPerUm;
+Status Builder::turn_head() {
+  if (Status status = machine_.mounting.dpi != 0 ? turn_to_dpi() : turn_by_tilt(); !status) return status;
+  if (line_.nm() < 1000) return wrong(machine_, "head.pitch_um", "lines are less than 1 um apart");
+  sine_ = std::abs(angle_ - kPi / 2) < 1e-12 ? 1 : std::sin(angle_);
+  cosine_ = std::abs(angle_ - kPi / 2) < 1e-12 ? 0 : std::cos(angle_);
+  grid_.angle_deg = angle_ * 180 / kPi;
+  return {};
+}
+
+Status Builder::turn_to_dpi() {
+  const auto& head = machine_.head;
+  const auto& mount = machine_.mounting;
   const double passes = mount.passes;
-  double angle = 0;  // between row and scan
-  Pitch line;
-  if (mount.dpi != 0) {
-    if (!(mount.dpi >= 1 && mount.dpi <= 25'400)) {
-      return wrong(machine, "mounting.dpi", fmt::format("{:g} is out of range; give 1 to 25400", mount.dpi));
-    }
-    line = pitch_of_dpi(mount.dpi);
-    const double sine = line.nm() * passes / pitch_nm;
-    if (sine > 1 + kSlack) {
-      return wrong(
-          machine, "mounting.dpi",
-          fmt::format("{:g} dpi across the scan cannot be reached: nozzles {:g} um apart give at least {:.2f} dpi "
-                      "in {} pass{}",
-                      mount.dpi, head.pitch_um, kNmPerInch * passes / pitch_nm, mount.passes, mount.passes == 1 ? "" : "es"));
-    }
-    angle = sine >= 1 ? kPi / 2 : std::asin(sine);
-  } else {
-    const double turned = scan_x ? mount.tilt_deg : 90 - mount.tilt_deg;
-    angle = turned * kPi / 180;
-    if (!(std::abs(turned) < 180)) {
-      return wrong(machine, "mounting.tilt_deg",
-                   fmt::format("{:g} degrees against X is half a turn or more from a scan along {}; give the same row's angle "
-                               "in the other direction",
-                               mount.tilt_deg, scan_x ? "x" : "y"));
-    }
-    if (!(std::abs(std::sin(angle)) > 0.01)) {
-      return wrong(machine, "mounting.tilt_deg",
-                   fmt::format("{:g} degrees against X puts all nozzles on one line of a scan along {}; turn the head",
-                               mount.tilt_deg, scan_x ? "x" : "y"));
-    }
-    if (angle < 0) angle = -angle;
-    line = pitch_of_nm(pitch_nm * std::sin(angle) / passes);
+  if (!(mount.dpi >= 1 && mount.dpi <= 25'400)) {
+    return wrong(machine_, "mounting.dpi", fmt::format("{:g} is out of range; give 1 to 25400", mount.dpi));
   }
-  if (line.nm() < 1000) return wrong(machine, "head.pitch_um", "lines are less than 1 um apart");
-  const double sine = std::abs(angle - kPi / 2) < 1e-12 ? 1 : std::sin(angle);
-  const double cosine = std::abs(angle - kPi / 2) < 1e-12 ? 0 : std::cos(angle);
-  grid.angle_deg = angle * 180 / kPi;
+  line_ = pitch_of_dpi(mount.dpi);
+  const double sine = line_.nm() * passes / pitch_nm_;
+  if (sine > 1 + kSlack) {
+    return wrong(
+        machine_, "mounting.dpi",
+        fmt::format("{:g} dpi across the scan cannot be reached: nozzles {:g} um apart give at least {:.2f} dpi "
+                    "in {} pass{}",
+                    mount.dpi, head.pitch_um, kNmPerInch * passes / pitch_nm_, mount.passes, mount.passes == 1 ? "" : "es"));
+  }
+  angle_ = sine >= 1 ? kPi / 2 : std::asin(sine);
+  return {};
+}
 
-  // --- pixels along the scan
-  Pitch place = line;
+Status Builder::turn_by_tilt() {
+  const auto& mount = machine_.mounting;
+  const double turned = scan_x_ ? mount.tilt_deg : 90 - mount.tilt_deg;
+  angle_ = turned * kPi / 180;
+  if (!(std::abs(turned) < 180)) {
+    return wrong(machine_, "mounting.tilt_deg",
+                 fmt::format("{:g} degrees against X is half a turn or more from a scan along {}; give the same row's angle "
+                             "in the other direction",
+                             mount.tilt_deg, scan_x_ ? "x" : "y"));
+  }
+  if (!(std::abs(std::sin(angle_)) > 0.01)) {
+    return wrong(machine_, "mounting.tilt_deg",
+                 fmt::format("{:g} degrees against X puts all nozzles on one line of a scan along {}; turn the head",
+                             mount.tilt_deg, scan_x_ ? "x" : "y"));
+  }
+  if (angle_ < 0) angle_ = -angle_;
+  line_ = pitch_of_nm(pitch_nm_ * std::sin(angle_) / mount.passes);
+  return {};
+}
+
+Status Builder::divide_scan() {
+  const auto& mount = machine_.mounting;
+  const auto& motion = machine_.motion;
+  place_ = line_;
   if (motion.ticks_per_pixel > 0) {
     if (!(motion.encoder_dpi >= 1 && motion.encoder_dpi <= 25'400)) {
-      return wrong(machine, "motion.ticks_per_pixel", "needs motion.encoder_dpi, the ticks an inch, 1 to 25400");
+      return wrong(machine_, "motion.ticks_per_pixel", "needs motion.encoder_dpi, the ticks an inch, 1 to 25400");
     }
-    if (motion.ticks_per_pixel > 1000) return wrong(machine, "motion.ticks_per_pixel", "give at most 1000");
-    place = pitch_of_dpi(motion.encoder_dpi);
-    place.span *= motion.ticks_per_pixel;
+    if (motion.ticks_per_pixel > 1000) return wrong(machine_, "motion.ticks_per_pixel", "give at most 1000");
+    place_ = pitch_of_dpi(motion.encoder_dpi);
+    place_.span *= motion.ticks_per_pixel;
   } else if (mount.along_dpi != 0) {
     if (!(mount.along_dpi >= 1 && mount.along_dpi <= 25'400)) {
-      return wrong(machine, "mounting.along_dpi", fmt::format("{:g} is out of range; give 1 to 25400", mount.along_dpi));
+      return wrong(machine_, "mounting.along_dpi", fmt::format("{:g} is out of range; give 1 to 25400", mount.along_dpi));
     }
-    place = pitch_of_dpi(mount.along_dpi);
+    place_ = pitch_of_dpi(mount.along_dpi);
   }
-  if (place.nm() < 1000) return wrong(machine, "mounting.along_dpi", "pixels along the scan are shorter than 1 um");
+  if (place_.nm() < 1000) return wrong(machine_, "mounting.along_dpi", "pixels along the scan are shorter than 1 um");
   if (motion.lag_unit == LagUnit::kTick) {
     if (motion.ticks_per_pixel == 0) {
-      return wrong(machine, "motion.lag_unit", "tick needs motion.ticks_per_pixel; use pixel otherwise");
+      return wrong(machine_, "motion.lag_unit", "tick needs motion.ticks_per_pixel; use pixel otherwise");
     }
-    grid.steps_per_pixel = motion.ticks_per_pixel;
+    grid_.steps_per_pixel = motion.ticks_per_pixel;
   }
-  grid.line_nm = line.nm();
-  grid.place_nm = place.nm();
-  grid.lag_pixels = pitch_nm * cosine / place.nm();
+  grid_.line_nm = line_.nm();
+  grid_.place_nm = place_.nm();
+  grid_.lag_pixels = pitch_nm_ * cosine_ / place_.nm();
+  return {};
+}
 
-  // --- the image
+Status Builder::make_image() {
+  const auto& mount = machine_.mounting;
   const auto axis = [&](const Pitch& pitch, double mm_long, PixelAxis& made) {
     if (!(mm_long > 0 && mm_long <= 2147)) return false;
     made = PixelAxis(pitch.dots, nm_of(mm_long), pitch.span);
     return true;
   };
-  if (!axis(scan_x ? place : line, machine.bed.size_mm[0], grid.image.x) ||
-      !axis(scan_x ? line : place, machine.bed.size_mm[1], grid.image.y)) {
-    return wrong(machine, "bed.size_mm", "give sides above 0 and up to 2147 mm");
+  if (!axis(scan_x_ ? place_ : line_, machine_.bed.size_mm[0], grid_.image.x) ||
+      !axis(scan_x_ ? line_ : place_, machine_.bed.size_mm[1], grid_.image.y)) {
+    return wrong(machine_, "bed.size_mm", "give sides above 0 and up to 2147 mm");
   }
-  grid.lines = scan_x ? grid.image.rows() : grid.image.columns();
-  grid.places = scan_x ? grid.image.columns() : grid.image.rows();
-  grid.lines_from_end = mount.nozzle_0 == Side::kFront || mount.nozzle_0 == Side::kRight;
-  grid.places_from_end = mount.scan_from == Side::kRight || mount.scan_from == Side::kBack;
+  grid_.lines = scan_x_ ? grid_.image.rows() : grid_.image.columns();
+  grid_.places = scan_x_ ? grid_.image.columns() : grid_.image.rows();
+  grid_.lines_from_end = mount.nozzle_0 == Side::kFront || mount.nozzle_0 == Side::kRight;
+  grid_.places_from_end = mount.scan_from == Side::kRight || mount.scan_from == Side::kBack;
+  return {};
+}
 
-  // --- where each nozzle is: u along the row, v behind it
+Status Builder::aim_nozzles() {
+  const auto& head = machine_.head;
+  const double passes = machine_.mounting.passes;
   const std::size_t rows = head.row_offset_um.size();
-  if (rows == 0) return wrong(machine, "head.row_offset_um", "give one offset a row, as [0]");
+  if (rows == 0) return wrong(machine_, "head.row_offset_um", "give one offset a row, as [0]");
   std::vector<double> behind(head.nozzles);  // nm
   for (std::uint32_t i = 0; i < head.nozzles; ++i) {
-    const double along_row = mount.first_leads ? i : double(head.nozzles - 1) - i;
+    const double along_row = machine_.mounting.first_leads ? i : double(head.nozzles - 1) - i;
     const double offset = head.row_offset_um[i % rows] * kNmPerUm;
-    behind[i] = along_row * pitch_nm * cosine + offset * sine;
-    const double off_line = i * pitch_nm * sine - offset * cosine - i * passes * line.nm();
-    grid.worst_line_nm = std::max(grid.worst_line_nm, std::abs(off_line));
+    behind[i] = along_row * pitch_nm_ * cosine_ + offset * sine_;
+    const double off_line = i * pitch_nm_ * sine_ - offset * cosine_ - i * passes * line_.nm();
+    grid_.worst_line_nm = std::max(grid_.worst_line_nm, std::abs(off_line));
   }
-  if (grid.worst_line_nm > line.nm() / 4) {
-    return wrong(machine, rows > 1 ? "head.row_offset_um" : "mounting.dpi",
+  if (grid_.worst_line_nm > line_.nm() / 4) {
+    return wrong(machine_, rows > 1 ? "head.row_offset_um" : "mounting.dpi",
                  fmt::format("a nozzle lies {:.1f} um beside its line, more than a quarter of a pixel; use another angle",
-                             grid.worst_line_nm / kNmPerUm));
+                             grid_.worst_line_nm / kNmPerUm));
   }
   const double least = *std::min_element(behind.begin(), behind.end());
-  const double step = grid.step_nm();
+  const double step = grid_.step_nm();
   std::vector<std::int64_t> steps(head.nozzles);
   for (std::uint32_t i = 0; i < head.nozzles; ++i) {
     steps[i] = static_cast<std::int64_t>(round_half_down((behind[i] - least) / step));
-    grid.worst_place_nm = std::max(grid.worst_place_nm, std::abs((behind[i] - least) - static_cast<double>(steps[i]) * step));
-    if (steps[i] > 100'000'000) return wrong(machine, "head.row_offset_um", "a nozzle lags behind by metres");
+    grid_.worst_place_nm = std::max(grid_.worst_place_nm, std::abs((behind[i] - least) - static_cast<double>(steps[i]) * step));
+    if (steps[i] > 100'000'000) return wrong(machine_, "head.row_offset_um", "a nozzle lags behind by metres");
   }
   for (const std::int64_t lag : steps) {
-    grid.lag.push_back(static_cast<std::uint32_t>(lag));
-    grid.most_lag = std::max(grid.most_lag, grid.lag.back());
+    grid_.lag.push_back(static_cast<std::uint32_t>(lag));
+    grid_.most_lag = std::max(grid_.most_lag, grid_.lag.back());
   }
+  return {};
+}
 
-  // --- what does not fire
-  grid.blocked = head.blocked;
-  std::sort(grid.blocked.begin(), grid.blocked.end());
-  grid.blocked.erase(std::unique(grid.blocked.begin(), grid.blocked.end()), grid.blocked.end());
-  grid.blocked_rule = head.blocked_rule;
-  if (head.blocked.size() > head.nozzles || grid.blocked.size() >= head.nozzles) {
-    return wrong(machine, "head.blocked",
+Status Builder::block_nozzles() {
+  const auto& head = machine_.head;
+  grid_.blocked = head.blocked;
+  std::sort(grid_.blocked.begin(), grid_.blocked.end());
+  grid_.blocked.erase(std::unique(grid_.blocked.begin(), grid_.blocked.end()), grid_.blocked.end());
+  grid_.blocked_rule = head.blocked_rule;
+  if (head.blocked.size() > head.nozzles || grid_.blocked.size() >= head.nozzles) {
+    return wrong(machine_, "head.blocked",
                  fmt::format("{} blocked nozzles of {}; one at least has to fire", head.blocked.size(), head.nozzles));
   }
-  if (!grid.blocked.empty() && grid.blocked.back() >= head.nozzles) {
-    return wrong(machine, "head.blocked",
-                 fmt::format("there is no nozzle {}; they count from 0 to {}", grid.blocked.back(), head.nozzles - 1));
+  if (!grid_.blocked.empty() && grid_.blocked.back() >= head.nozzles) {
+    return wrong(machine_, "head.blocked",
+                 fmt::format("there is no nozzle {}; they count from 0 to {}", grid_.blocked.back(), head.nozzles - 1));
   }
+  return {};
+}
 
-  // --- speed
-  const double frequency = motion.scan_speed_mm_s * kNmPerMm / grid.place_nm;
-  if (!(motion.scan_speed_mm_s > 0)) return wrong(machine, "motion.scan_speed_mm_s", "give a speed above 0");
+Status Builder::check_speed() {
+  const auto& head = machine_.head;
+  const auto& motion = machine_.motion;
+  const double frequency = motion.scan_speed_mm_s * kNmPerMm / grid_.place_nm;
+  if (!(motion.scan_speed_mm_s > 0)) return wrong(machine_, "motion.scan_speed_mm_s", "give a speed above 0");
   if (frequency > head.highest_frequency_hz * (1 + 1e-9)) {
-    return wrong(machine, "motion.scan_speed_mm_s",
+    return wrong(machine_, "motion.scan_speed_mm_s",
                  fmt::format("{:g} mm/s fires a nozzle {:.0f} times a second, it can {:.0f}; scan at {:.1f} mm/s or slower",
                              motion.scan_speed_mm_s, frequency, head.highest_frequency_hz,
-                             std::floor(head.highest_frequency_hz * grid.place_nm / kNmPerMm * 10) / 10));
+                             std::floor(head.highest_frequency_hz * grid_.place_nm / kNmPerMm * 10) / 10));
   }
-  return grid;
+  return {};
 }
+
+}  // namespace
+
+Result<HeadGrid> make_head_grid(const Machine& machine) { return Builder(machine).build(); }
 
 std::string explain(const Machine& machine, const HeadGrid& grid) {
   std::string text;

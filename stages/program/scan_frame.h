@@ -17,18 +17,6 @@ struct ScanScratch {
 /// cost   nothing, or O(rows + changes), and for a scan along y O(columns + pixels that differ from the one above)
 RunsView to_scan_frame(const HeadGrid& grid, const RunsView& image, ScanScratch& scratch);
 
-/// The pixel of the image (column, row from the back) at a place of a line.
-struct Pixel {
-  std::uint32_t column, row;
-};
-inline Pixel pixel_at(const HeadGrid& grid, std::uint32_t line, std::uint32_t place) {
-  const bool x = grid.scan_axis == ScanAxis::kX;
-  const std::uint32_t l = grid.lines_from_end ? grid.lines - 1 - line : line;
-  // Places of a scan along y count from the front unless they count from the end; image rows count from the back.
-  const std::uint32_t p = (x ? grid.places_from_end : !grid.places_from_end) ? grid.places - 1 - place : place;
-  return x ? Pixel{p, l} : Pixel{l, p};
-}
-
 /// Columns become rows: row c of the result holds, as columns, the rows of column c.
 void transpose(const RunsView& image, Runs& result, Buffer<std::uint32_t>& next);
 

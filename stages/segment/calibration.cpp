@@ -25,18 +25,6 @@ Reading interpolate(std::span<const Mark> marks, double x) {
   return {marks.back().y, x <= marks.back().x};
 }
 
-/// The first x, from the front, where y reaches `goal`; measured widths need not be monotonic.
-Reading first_reach(std::span<const Mark> marks, double goal) {
-  if (marks.empty()) return {0, false};
-  for (std::size_t i = 1; i < marks.size(); ++i) {
-    const double a = marks[i - 1].y, b = marks[i].y;
-    if ((a - goal) * (b - goal) > 0 || a == b) continue;
-    return {marks[i - 1].x + (goal - a) / (b - a) * (marks[i].x - marks[i - 1].x), true};
-  }
-  const auto nearest = std::ranges::min_element(marks, {}, [&](const Mark& m) { return std::abs(m.y - goal); });
-  return {nearest->x, nearest->y == goal};
-}
-
 std::vector<Mark> thin_by_speed(const Calibration& calibration) {
   std::vector<Mark> marks{{100, calibration.width_mm}};
   for (const auto& row : calibration.by_speed) marks.push_back({row.percent, row.thin_mm});
@@ -141,25 +129,11 @@ Reading thin_width_at_extrusion(const Calibration& calibration, double percent) 
   return interpolate(thin_by_extrusion(calibration), percent);
 }
 
-Reading speed_for_thin_width(const Calibration& calibration, double width_mm) {
-  return first_reach(thin_by_speed(calibration), width_mm);
-}
-
-Reading extrusion_for_thin_width(const Calibration& calibration, double width_mm) {
-  auto marks = thin_by_extrusion(calibration);
-  std::ranges::reverse(marks);
-  return first_reach(marks, width_mm);
-}
-
 RepeatedReading repeated_at(const Calibration& calibration, double extrusion_percent) {
   using Row = Calibration::Repeated;
   const auto at = [&](double Row::*member) { return interpolate(of_repeated(calibration, member), extrusion_percent); };
   const Reading speed = at(&Row::thick_speed_percent);
   return {speed.value, at(&Row::thick_mm).value, at(&Row::thin_mm).value, at(&Row::continuous_mm).value, speed.inside};
-}
-
-Reading extrusion_for_thick_width(const Calibration& calibration, double width_mm) {
-  return first_reach(of_repeated(calibration, &Calibration::Repeated::thick_mm), width_mm);
 }
 
 std::optional<Spacing> settled_spacing(const Calibration& calibration, double extrusion_percent) {

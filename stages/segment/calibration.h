@@ -1,4 +1,4 @@
-// stages/segment/calibration.h: what a printer makes of speed and extrusion: measured tables, read both ways.
+// stages/segment/calibration.h: what a printer makes of speed and extrusion: measured tables.
 //
 // Percentages are relative to the reference: 100 % extrusion gives the set width at the set height, 100 % speed is that of
 // walls and continuous lines. Between measured values everything is in proportion; outside of them the nearest one holds
@@ -61,9 +61,6 @@ Reading thin_width_at_speed(const Calibration& calibration, double percent);
 Reading stable_distance(const Calibration& calibration, double percent);
 /// Least width of a thin stretch at that extrusion (100 % and below) and the reference speed.
 Reading thin_width_at_extrusion(const Calibration& calibration, double percent);
-/// The lowest speed, or the highest extrusion, that makes a thin stretch so narrow.
-Reading speed_for_thin_width(const Calibration& calibration, double width_mm);
-Reading extrusion_for_thin_width(const Calibration& calibration, double width_mm);
 
 /// Thick speed and widths for an extrusion that holds along the whole segmented line.
 struct RepeatedReading {
@@ -71,8 +68,6 @@ struct RepeatedReading {
   bool inside;
 };
 RepeatedReading repeated_at(const Calibration& calibration, double extrusion_percent);
-/// The extrusion that makes thick stretches so wide; with it, repeated_at() gives the speed.
-Reading extrusion_for_thick_width(const Calibration& calibration, double width_mm);
 
 struct Spacing {
   double segmented, continuous;

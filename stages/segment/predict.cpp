@@ -120,15 +120,4 @@ Pores predict_pores(const Segmentation& s) {
   return pores;
 }
 
-FillPorosity predict_porosity(const Segmentation& s, double set_width_mm, double height_mm, BeadShape shape) {
-  const double share = s.thin_mm / (s.thin_mm + s.thick_mm), lines = s.continuous;
-  const double room = group_distance(s) * height_mm;
-  const double full = bead_area(set_width_mm, height_mm, shape);
-  const double extruded = full * (lines + share * s.thin_extrusion / 100 + (1 - share) * s.thick_extrusion / 100);
-  const double measured = lines * bead_area(s.continuous_width_mm, height_mm, shape) +
-                          share * bead_area(s.thin_width_mm, height_mm, shape) +
-                          (1 - share) * bead_area(s.thick_width_mm, height_mm, shape);
-  return {1 - extruded / room, 1 - measured / room};
-}
-
 }  // namespace lamina::segment

@@ -7,7 +7,6 @@
 
 #include "stages/data/status.h"
 #include "stages/data/units.h"
-#include "stages/segment/bead.h"
 #include "stages/segment/calibration.h"
 #include "stages/segment/cut.h"
 
@@ -52,12 +51,5 @@ struct Pores {
   double density_mm2;  // pores in a mm2 of a layer: two beside each thin stretch
 };
 Pores predict_pores(const Segmentation& segmentation);
-
-/// Share of a wide layer that stays empty, by three ways to know what the beads are.
-struct FillPorosity {
-  double by_extrusion;  // what is extruded, with the bead of `shape` as 100 %: material does not vanish
-  double by_widths;     // cross-sections of beads with the measured widths
-};
-FillPorosity predict_porosity(const Segmentation& segmentation, double set_width_mm, double height_mm, BeadShape shape);
 
 }  // namespace lamina::segment

@@ -11,6 +11,7 @@
 #include "stages/read/image.h"
 #include "stages/write/report/run_code.h"
 #include "tests/commands/program.h"
+#include "tests/commands/unpack_runs.h"
 
 namespace lamina::test {
 namespace {
@@ -51,21 +52,21 @@ TEST(RunCode, GivesTheRunsBackAndRefusesWhatIsNone) {
     const auto columns = static_cast<std::uint32_t>(1 + random() % 3000), rows = static_cast<std::uint32_t>(1 + random() % 60);
     const Runs runs = random_runs(random, columns, rows);
     Buffer<std::byte> packed = write::report::pack_runs(runs);
-    const Result<Runs> back = write::report::unpack_runs(packed, columns, rows);
+    const Result<Runs> back = unpack_runs(packed, columns, rows);
     ASSERT_TRUE(back.ok());
     ASSERT_TRUE(equal(runs, *back));
-    EXPECT_FALSE(write::report::unpack_runs(packed, columns, rows + 1).ok());
-    EXPECT_FALSE(write::report::unpack_runs(std::span(packed).first(packed.size() - 1), columns, rows).ok());
+    EXPECT_FALSE(unpack_runs(packed, columns, rows + 1).ok());
+    EXPECT_FALSE(unpack_runs(std::span(packed).first(packed.size() - 1), columns, rows).ok());
     for (int k = 0; k < 20; ++k) {
       Buffer<std::byte> code(1 + random() % 40);  // any code, within a whole zlib stream
       for (std::byte& byte : code) byte = static_cast<std::byte>(random() % (k < 10 ? 256 : 5));
-      const Result<Runs> any = write::report::unpack_runs(write::report::deflate_bytes(code), columns, rows);
+      const Result<Runs> any = unpack_runs(write::report::deflate_bytes(code), columns, rows);
       if (!any) continue;
       for (const std::uint32_t change : any->change) EXPECT_LE(change, columns);
     }
   }
   const Runs empty = {9, {0, 0, 0}, {}};
-  EXPECT_TRUE(equal(empty, *write::report::unpack_runs(write::report::pack_runs(empty), 9, 2)));
+  EXPECT_TRUE(equal(empty, *unpack_runs(write::report::pack_runs(empty), 9, 2)));
 }
 
 TEST(RunCode, Base64IsThatOfRfc4648) {
@@ -123,7 +124,7 @@ TEST_F(JobsReported, EveryLayerOfThePageIsItsFile) {
   const std::string page = read_text(directory_ / "report.html");
   for (int i = 0; i < 34; ++i) {
     const Runs runs = layer(i);
-    const auto back = write::report::unpack_runs(piece(page, "r" + std::to_string(i)), runs.columns, runs.view().rows());
+    const auto back = unpack_runs(piece(page, "r" + std::to_string(i)), runs.columns, runs.view().rows());
     ASSERT_TRUE(back.ok()) << i;
     EXPECT_TRUE(equal(runs, *back)) << i;
   }

@@ -32,6 +32,11 @@ infill::FillContext context_of(const ContoursView& contours, std::uint32_t index
 
 Toolpaths filled(const ContoursView& contours, const infill::FillContext& context, const infill::FillParameters& parameters);
 
+/// Whether a path ends where it begins.
+inline bool is_closed(const ToolpathsView& paths, std::uint32_t p) {
+  return paths[p].size() > 3 && paths[p].front() == paths[p].back();
+}
+
 struct Sums {
   double raster = 0, link = 0, closed = 0;  // nm
 };

@@ -144,7 +144,7 @@ TEST(CurvesAndWaves, ConcentricCurvesLieAtTheirDistance) {
   const Contours& square = outline("square");
   const Toolpaths paths = filled(square, context_of(square), parameters);
   for (std::uint32_t p = 1; p < paths.size(); ++p) {
-    EXPECT_TRUE(paths.view().is_closed(p));
+    EXPECT_TRUE(is_closed(paths, p));
     Nm lowest = INT32_MAX;
     for (const Point2 at : paths.view()[p]) lowest = std::min(lowest, at.x);
     EXPECT_EQ(lowest, 600'000 + static_cast<Nm>(p - 1) * 500'000);

@@ -45,7 +45,7 @@ TEST(RasterPlaces, ZigzagAlternatesAndStaysOneToolpathOnASquare) {
   const Toolpaths paths = filled(square, context_of(square), parameters);
   ASSERT_EQ(paths.size(), 2u) << "a wall, and a zigzag without a stop";
   EXPECT_EQ(paths.kind[0], PathKind::kOuter);
-  EXPECT_TRUE(paths.view().is_closed(0));
+  EXPECT_TRUE(is_closed(paths, 0));
   for (std::uint32_t i = paths.offset[1]; i + 1 < paths.offset[2]; ++i) {
     if (paths.kind[i] != PathKind::kRaster) continue;
     EXPECT_EQ(paths.point[i + 1].x > paths.point[i].x, paths.line[i] % 2 == 0);

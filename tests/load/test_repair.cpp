@@ -1,12 +1,12 @@
 // tests/load/test_repair.cpp: the census, the diagnosis, and what repair makes of broken meshes.
-#include "stages/load/repair.h"
+#include "stages/load/repair/repair.h"
 
 #include <oneapi/tbb/global_control.h>
 
 #include <map>
 #include <random>
 
-#include "stages/load/diagnose.h"
+#include "stages/load/repair/diagnose.h"
 #include "tests/load/files.h"
 
 namespace lamina::test {

@@ -2,7 +2,7 @@
 #include <cmath>
 #include <random>
 
-#include "stages/load/diagnose.h"
+#include "stages/load/repair/diagnose.h"
 #include "tests/load/files.h"
 
 namespace lamina::test {

@@ -31,21 +31,9 @@ TEST(Calibration, EveryMeasuredValueComesBackAndBetweenThemIsInProportion) {
   for (const auto& row : table(12)) {
     const double percent = number(row, "thin_extrusion_percent"), width = number(row, "thin_width_min_mm");
     EXPECT_DOUBLE_EQ(thin_width_at_extrusion(anet, percent).value, width);
-    EXPECT_NEAR(extrusion_for_thin_width(anet, width).value, percent, 1e-9);
   }
   EXPECT_FALSE(stable_distance(anet, 500).inside);
   EXPECT_FALSE(stable_distance(anet, 90).inside);
-}
-
-TEST(Calibration, SpeedForAWidthIsTheLowestThatGivesIt) {
-  const Calibration& anet = anet_a8_calibration();
-  EXPECT_NEAR(speed_for_thin_width(anet, 0.21).value, 200, 1e-9);
-  EXPECT_NEAR(speed_for_thin_width(anet, 0.17).value, 250, 1e-9);  // 275 % and 325 % give the same width
-  EXPECT_NEAR(speed_for_thin_width(anet, 0.355).value, 112.5, 1e-9);
-  EXPECT_FALSE(speed_for_thin_width(anet, 0.05).inside);
-  for (double width = 0.13; width < 0.4; width += 0.01) {
-    EXPECT_NEAR(thin_width_at_speed(anet, speed_for_thin_width(anet, width).value).value, width, 1e-9);
-  }
 }
 
 TEST(Calibration, ThickSpeedFollowsFromTheExtrusion) {

@@ -6,7 +6,6 @@
 #include <mutex>
 
 #include "stages/geometry/coverage.h"
-#include "stages/read/image.h"
 #include "stages/write/picture/canvas.h"
 #include "stages/write/picture/layout.h"
 
@@ -17,21 +16,21 @@ constexpr Colour kGround{250, 248, 243}, kPaper{255, 255, 255}, kFrame{214, 208,
 
 /// Calls use(index, runs) for each layer's image, from several threads. The error is that of the first layer with one.
 template <class Use>
-Status for_each_image(const SheetRequest& request, const Use& use) {
+Status for_each_image(const SheetRequest& request, const ReadImage& read, const Use& use) {
   std::mutex mutex;
   std::size_t first_wrong = request.layers.size();
   Error error;
   tbb::parallel_for(std::size_t{0}, request.layers.size(), [&](std::size_t index) {
-    const Result<LayerImage> image = read_image(request.layers[index].path);
+    const Result<Runs> image = read(request.layers[index].path);
     Error wrong;
     if (!image) {
       wrong = image.error();
-    } else if (image->runs.columns != request.grid.columns() || image->runs.view().rows() != request.grid.rows()) {
+    } else if (image->columns != request.grid.columns() || image->view().rows() != request.grid.rows()) {
       wrong = {Fault::kVerification, fmt::format("{}: {} x {} pixels where the manifest says {} x {}; plan the layer again",
-                                                 request.layers[index].path, image->runs.columns, image->runs.view().rows(),
+                                                 request.layers[index].path, image->columns, image->view().rows(),
                                                  request.grid.columns(), request.grid.rows())};
     } else {
-      use(index, image->runs.view());
+      use(index, image->view());
       return;
     }
     const std::lock_guard lock(mutex);
@@ -44,12 +43,12 @@ Status for_each_image(const SheetRequest& request, const Use& use) {
   return {};
 }
 
-Result<PixelWindow> shown_window(const SheetRequest& request) {
+Result<PixelWindow> shown_window(const SheetRequest& request, const ReadImage& read) {
   const PixelWindow bed{0, request.grid.columns(), 0, request.grid.rows()};
   if (request.whole_bed) return bed;
   std::mutex mutex;
   PixelWindow all;
-  const Status status = for_each_image(request, [&](std::size_t, const RunsView& runs) {
+  const Status status = for_each_image(request, read, [&](std::size_t, const RunsView& runs) {
     const PixelWindow window = window_of(runs);
     const std::lock_guard lock(mutex);
     all = joined(all, window);
@@ -86,8 +85,8 @@ void draw_frame(Canvas& canvas, const SheetRequest& request, const SheetLayout& 
 
 }  // namespace
 
-Result<Buffer<std::byte>> contact_sheet(const SheetRequest& request) {
-  const Result<PixelWindow> window = shown_window(request);
+Result<Buffer<std::byte>> contact_sheet(const SheetRequest& request, const ReadImage& read) {
+  const Result<PixelWindow> window = shown_window(request, read);
   if (!window) return window.error();
   const int cells = static_cast<int>(request.layers.size());
   const SheetLayout layout = lay_out(cells, *window, request.grid, static_cast<int>(request.width));
@@ -97,7 +96,7 @@ Result<Buffer<std::byte>> contact_sheet(const SheetRequest& request) {
               fitted(title, layout.title_size, layout.width - 2 * layout.margin), kInk);
   for (int cell = 0; cell < cells; ++cell) draw_frame(canvas, request, layout, cell);
 
-  const Status status = for_each_image(request, [&](std::size_t index, const RunsView& runs) {
+  const Status status = for_each_image(request, read, [&](std::size_t index, const RunsView& runs) {
     Buffer<std::uint8_t> shares(static_cast<std::size_t>(layout.picture_width) * layout.picture_height);
     coverage(runs, *window, static_cast<std::uint32_t>(layout.picture_width), shares);
     const int cell = static_cast<int>(index);

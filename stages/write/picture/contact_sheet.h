@@ -2,11 +2,13 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <string>
 #include <vector>
 
 #include "stages/data/buffer.h"
 #include "stages/data/grid.h"
+#include "stages/data/runs.h"
 #include "stages/data/status.h"
 
 namespace lamina::write::picture {
@@ -27,8 +29,10 @@ struct SheetRequest {
 /// A PNG of the layers. All cells show the same part of the bed at the same scale; each of its pixels is as dark as
 /// the share of its area that is set. The bytes depend on the images, the request and the versions of OpenImageIO and
 /// of the font alone.
-/// errors  those of read_image; kVerification if an image is not of the bed's size
+/// read    the image of a file, called from any thread
+/// errors  those of `read`; kVerification if an image is not of the bed's size
 /// cost    two readings of each image, on all processors; memory is the picture and the runs of the images being read
-Result<Buffer<std::byte>> contact_sheet(const SheetRequest& request);
+using ReadImage = std::function<Result<Runs>(const std::string& path)>;
+Result<Buffer<std::byte>> contact_sheet(const SheetRequest& request, const ReadImage& read);
 
 }  // namespace lamina::write::picture

@@ -15,15 +15,11 @@
 
 #include "stages/data/buffer.h"
 #include "stages/data/runs.h"
-#include "stages/data/status.h"
 
 namespace lamina::write::report {
 
 /// The code of an image, deflated. cost  one pass over the changes, and deflate
 Buffer<std::byte> pack_runs(const RunsView& runs);
-
-/// The image again. errors  kVerification: the bytes are not such a code of an image of that size
-Result<Runs> unpack_runs(std::span<const std::byte> packed, std::uint32_t columns, std::uint32_t rows);
 
 /// Any bytes as one zlib stream.
 Buffer<std::byte> deflate_bytes(std::span<const std::byte> bytes);

@@ -1,11 +1,11 @@
-// stages/load/diagnose.cpp: counts and places of everything that keeps a mesh from being a plain solid.
-#include "stages/load/diagnose.h"
+// stages/load/repair/diagnose.cpp: counts and places of everything that keeps a mesh from being a plain solid.
+#include "stages/load/repair/diagnose.h"
 
 #include <algorithm>
 #include <array>
 
-#include "stages/load/geometry.h"
-#include "stages/load/topology.h"
+#include "stages/load/repair/geometry.h"
+#include "stages/load/repair/topology.h"
 
 namespace lamina::load {
 namespace {

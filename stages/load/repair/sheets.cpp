@@ -1,5 +1,5 @@
-// stages/load/sheets.cpp: patches, and what is left at their rims without them.
-#include "stages/load/sheets.h"
+// stages/load/repair/sheets.cpp: patches, and what is left at their rims without them.
+#include "stages/load/repair/sheets.h"
 
 #include <algorithm>
 #include <vector>

@@ -1,8 +1,8 @@
-// stages/load/census.cpp: whether a mesh is closed, and which mesh it is, in one pass without sorting.
+// stages/load/repair/census.cpp: whether a mesh is closed, and which mesh it is, in one pass without sorting.
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_reduce.h>
 
-#include "stages/load/diagnose.h"
+#include "stages/load/repair/diagnose.h"
 
 namespace lamina::load {
 namespace {

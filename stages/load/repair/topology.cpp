@@ -1,5 +1,5 @@
-// stages/load/topology.cpp: sorting brings together what is equal, the same way for any number of threads.
-#include "stages/load/topology.h"
+// stages/load/repair/topology.cpp: sorting brings together what is equal, the same way for any number of threads.
+#include "stages/load/repair/topology.h"
 
 #include <tbb/parallel_for.h>
 #include <tbb/parallel_sort.h>

@@ -1,5 +1,5 @@
-// stages/load/loops.cpp: a walk with a stack, after Hierholzer (1873), cut at every vertex that comes again.
-#include "stages/load/loops.h"
+// stages/load/repair/loops.cpp: a walk with a stack, after Hierholzer (1873), cut at every vertex that comes again.
+#include "stages/load/repair/loops.h"
 
 #include <algorithm>
 #include <utility>

@@ -1,11 +1,11 @@
-// stages/load/loops.h: unmatched edges as closed loops; internal to load.
+// stages/load/repair/loops.h: unmatched edges as closed loops; internal to load.
 #pragma once
 
 #include <cstdint>
 #include <functional>
 #include <span>
 
-#include "stages/load/topology.h"
+#include "stages/load/repair/topology.h"
 
 namespace lamina::load {
 

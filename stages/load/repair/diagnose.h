@@ -1,4 +1,4 @@
-// stages/load/diagnose.h: is a mesh closed, and where is it not.
+// stages/load/repair/diagnose.h: is a mesh closed, and where is it not.
 #pragma once
 
 #include <cstdint>

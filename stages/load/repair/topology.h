@@ -1,4 +1,4 @@
-// stages/load/topology.h: which corners are the same vertex, and which facets meet at an edge; internal to load.
+// stages/load/repair/topology.h: which corners are the same vertex, and which facets meet at an edge; internal to load.
 #pragma once
 
 #include <array>

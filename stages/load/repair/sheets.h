@@ -1,10 +1,10 @@
-// stages/load/sheets.h: surfaces that hang on a solid without enclosing anything; internal to load.
+// stages/load/repair/sheets.h: surfaces that hang on a solid without enclosing anything; internal to load.
 #pragma once
 
 #include <cstdint>
 #include <span>
 
-#include "stages/load/topology.h"
+#include "stages/load/repair/topology.h"
 
 namespace lamina::load {
 

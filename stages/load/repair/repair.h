@@ -1,4 +1,4 @@
-// stages/load/repair.h: makes the winding number of an open mesh defined everywhere, and says how.
+// stages/load/repair/repair.h: makes the winding number of an open mesh defined everywhere, and says how.
 #pragma once
 
 #include <cstdint>

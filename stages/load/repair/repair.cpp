@@ -1,15 +1,15 @@
-// stages/load/repair.cpp: the steps, over one indexed mesh.
-#include "stages/load/repair.h"
+// stages/load/repair/repair.cpp: the steps, over one indexed mesh.
+#include "stages/load/repair/repair.h"
 
 #include <algorithm>
 #include <cmath>
 
-#include "stages/load/diagnose.h"
-#include "stages/load/geometry.h"
-#include "stages/load/loops.h"
-#include "stages/load/sheets.h"
-#include "stages/load/topology.h"
-#include "stages/load/weld.h"
+#include "stages/load/repair/diagnose.h"
+#include "stages/load/repair/geometry.h"
+#include "stages/load/repair/loops.h"
+#include "stages/load/repair/sheets.h"
+#include "stages/load/repair/topology.h"
+#include "stages/load/repair/weld.h"
 
 namespace lamina::load {
 namespace {

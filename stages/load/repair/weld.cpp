@@ -1,5 +1,5 @@
-// stages/load/weld.cpp: a sweep along x over the vertices, which are sorted already.
-#include "stages/load/weld.h"
+// stages/load/repair/weld.cpp: a sweep along x over the vertices, which are sorted already.
+#include "stages/load/repair/weld.h"
 
 #include <algorithm>
 #include <array>

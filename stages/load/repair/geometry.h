@@ -1,4 +1,4 @@
-// stages/load/geometry.h: exact areas and volumes of facets in nm; internal to load.
+// stages/load/repair/geometry.h: exact areas and volumes of facets in nm; internal to load.
 #pragma once
 
 #include <array>

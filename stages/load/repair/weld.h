@@ -1,10 +1,10 @@
-// stages/load/weld.h: vertices at open edges that were meant to be one; internal to load.
+// stages/load/repair/weld.h: vertices at open edges that were meant to be one; internal to load.
 #pragma once
 
 #include <cstdint>
 #include <span>
 
-#include "stages/load/topology.h"
+#include "stages/load/repair/topology.h"
 
 namespace lamina::load {
 
