@@ -1,4 +1,5 @@
-// stages/data/toolpaths.h: where a bead is laid in one layer, in the order in which it is laid.
+// stages/data/toolpaths.h: where a bead is laid in one layer, in the order in which it is laid, and its straight pieces on
+// their way to a file: these are never stored, only passed on.
 #pragma once
 
 #include <cstdint>
@@ -72,6 +73,32 @@ struct Toolpaths {
   }
   /// Ends the path whose points were added.
   void close() { offset.push_back(static_cast<std::uint32_t>(point.size())); }
+};
+
+enum class Thickness : std::uint8_t {
+  kReference,  // as wide as walls and continuous lines
+  kThick,      // wide enough to touch the neighbouring lines
+  kThin        // leaves pores beside it
+};
+
+/// A straight piece of a layer's toolpaths, in the order in which they are laid.
+struct Stretch {
+  Point2 from, to;  // nm; never equal
+  PathKind kind;
+  Thickness thickness;
+  Nm width;           // of the stored path: the reference width
+  std::int32_t line;  // kNoLine if none
+  bool jump;          // the nozzle travels to `from`, which is not where the stretch before ended
+};
+
+/// What a machine is told of a stretch.
+struct BeadMove {
+  Point2 from, to;  // nm
+  PathKind kind;
+  bool jump;
+  Nm width;         // nm, that the bead is expected to have: a tag for viewers
+  double area_mm2;  // cross-section of what is extruded: volume / length
+  double speed_mm_s;
 };
 
 }  // namespace lamina

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "stages/data/runs.h"
-#include "stages/data/stretch.h"
+#include "stages/data/toolpaths.h"
 #include "stages/raster/beads.h"
 
 namespace lamina::raster {

@@ -10,7 +10,7 @@
 #include <algorithm>
 #include <cstdint>
 
-#include "stages/data/stretch.h"
+#include "stages/data/toolpaths.h"
 #include "stages/data/units.h"
 
 namespace lamina::segment {

@@ -10,7 +10,6 @@
 #include <type_traits>
 #include <utility>
 
-#include "stages/data/stretch.h"
 #include "stages/data/toolpaths.h"
 #include "stages/data/units.h"
 #include "stages/segment/cut.h"

@@ -9,7 +9,6 @@
 
 #include "stages/data/extruder.h"
 #include "stages/data/layer.h"
-#include "stages/data/stretch.h"
 #include "stages/data/toolpaths.h"
 #include "stages/segment/expand.h"
 #include "stages/segment/predict.h"

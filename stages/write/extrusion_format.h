@@ -10,7 +10,7 @@
 #include "stages/data/extruder.h"
 #include "stages/data/layer.h"
 #include "stages/data/status.h"
-#include "stages/data/stretch.h"
+#include "stages/data/toolpaths.h"
 
 namespace lamina::write {
 

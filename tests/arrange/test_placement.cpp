@@ -5,7 +5,7 @@
 
 #include <random>
 
-namespace lamina::pipeline {
+namespace lamina::arrange {
 namespace {
 
 std::vector<Place> placed(const std::vector<BoxRequest>& boxes, std::int64_t width, std::int64_t depth, std::int64_t gap) {
@@ -84,4 +84,4 @@ TEST(Placement, ArrangedBoxesLieWithinTheBedAndAGapApart) {
 }
 
 }  // namespace
-}  // namespace lamina::pipeline
+}  // namespace lamina::arrange

@@ -10,7 +10,7 @@
 #include "stages/data/buffer.h"
 #include "stages/data/extruder.h"
 #include "stages/data/layer.h"
-#include "stages/data/stretch.h"
+#include "stages/data/toolpaths.h"
 #include "stages/write/extrusion_format.h"
 
 namespace lamina::write::gcode {
