@@ -10,15 +10,11 @@
 #include <optional>
 
 #include "arrays.h"
-#include "pipeline/cli/command.h"
 #include "pipeline/job/file.h"
 #include "pipeline/job/keys.h"
 #include "pipeline/machine/materials.h"
-#include "pipeline/output/directory.h"
-#include "pipeline/plan/jet_plan.h"
-#include "pipeline/run/jet.h"
-#include "pipeline/run/slice.h"
-#include "pipeline/run/summary.h"
+#include "pipeline/run/image_source.h"
+#include "pipeline/run/run.h"
 #include "pipeline/text/version.h"
 
 namespace lamina::python {
@@ -89,25 +85,27 @@ struct LayerContours {
 
 class Plan {
  public:
-  explicit Plan(Job job) : plan_(without_lock([&] { return pipeline::JetPlan::make(job); })) {}
+  explicit Plan(Job job) : images_(without_lock([&] { return pipeline::ImageSource::make(job); })) {}
 
-  const pipeline::JetPlan& of() const { return plan_; }
+  const pipeline::Plan& of() const { return images_.plan(); }
+  const PixelGrid& grid() const { return of().images->grid; }
+  std::vector<std::string> materials() const { return images_.materials(); }
 
   std::uint32_t index(std::int64_t asked) const {
-    const std::int64_t count = plan_.layers().size(), index = asked < 0 ? asked + count : asked;
+    const std::int64_t count = of().layer_count, index = asked < 0 ? asked + count : asked;
     if (index < 0 || index >= count) throw py::index_error(fmt::format("layer {}: there are {} layers", asked, count));
     return static_cast<std::uint32_t>(index);
   }
 
   PlannedLayer layer(std::uint32_t index) const {
     PlannedLayer made;
-    auto images = without_lock([&] { return plan_.images(index); });
+    auto images = without_lock([&] { return images_.images(index); });
     made.runs = std::move(images.whole);
-    made.dpi_x = plan_.grid().x.dpi();
-    made.dpi_y = plan_.grid().y.dpi();
-    made.materials = plan_.materials();
+    made.dpi_x = grid().x.dpi();
+    made.dpi_y = grid().y.dpi();
+    made.materials = images_.materials();
     for (Runs& image : images.material) made.images.push_back({std::move(image), made.dpi_x, made.dpi_y});
-    made.layer = plan_.layers()[index];
+    made.layer = of().layer(index);
     return made;
   }
 
@@ -115,33 +113,40 @@ class Plan {
     return without_lock([&]() -> Result<std::unique_ptr<LayerContours>> {
       {
         const std::lock_guard lock(mutex_);
-        if (!slices_) {
-          auto made = pipeline::SlicePlan::make(plan_.job(), [](const pipeline::ProgressEvent&) {});
+        if (!contours_) {
+          auto made = plan_contours();
           if (!made) return made.error();
-          slices_.emplace(std::move(*made));
+          contours_.emplace(std::move(*made));
         }
       }
-      pipeline::SlicePlan::Work work;
-      if (auto report = slices_->slicer().layer(index, work.scratch, work.contours); !report) return report.error();
+      pipeline::Sections::Work work;
+      if (auto report = contours_->sections->slicer().layer(index, work.scratch, work.contours); !report) return report.error();
       return std::make_unique<LayerContours>(LayerContours{std::move(work.contours)});
     });
   }
 
   py::array heights() const {
-    const heights::LayerTable& table = plan_.layers();
-    py::array_t<LayerEntry> array(table.size());
+    py::array_t<LayerEntry> array(of().layer_count);
     LayerEntry* entry = array.mutable_data();
-    for (std::uint32_t i = 0; i < table.size(); ++i) {
-      const Layer layer = table[i];
+    for (std::uint32_t i = 0; i < of().layer_count; ++i) {
+      const Layer layer = of().layer(i);
       *entry++ = {layer.bottom, layer.thickness, static_cast<std::uint8_t>(layer.reason)};
     }
     return array;
   }
 
  private:
-  pipeline::JetPlan plan_;
+  Result<pipeline::Plan> plan_contours() const {
+    Job job = of().job;
+    job.shard.reset();
+    auto resolved = pipeline::resolve(job, pipeline::Product::kContours);
+    if (!resolved) return resolved.error();
+    return pipeline::make_plan(std::move(*resolved), [](const pipeline::ProgressEvent&) {});
+  }
+
+  pipeline::ImageSource images_;
   std::mutex mutex_;
-  std::optional<pipeline::SlicePlan> slices_;  // made when contours are asked for the first time
+  std::optional<pipeline::Plan> contours_;  // made when contours are read for the first time
 };
 
 /// Plans a layer when it is asked for the next one, and keeps none.
@@ -150,12 +155,12 @@ struct LayerIterator {
   std::uint32_t next, end;
 };
 
-/// run_jet on a thread of its own, so that Ctrl-C stops it: finished layers are kept then.
-pipeline::JetSummary run_job(const Job& job) {
+/// Runs on a thread of its own, so that Ctrl-C stops it: finished layers are kept then. returns  the summary of --json
+py::object run_job(const Job& job, pipeline::Product product) {
   std::atomic<bool> cancel{false};
   auto running = std::async(std::launch::async, [&] {
-    return pipeline::run_jet(
-        job, [](const pipeline::ProgressEvent&) {}, cancel);
+    return pipeline::run(
+        job, product, [](const pipeline::ProgressEvent&) {}, cancel);
   });
   while (true) {
     {
@@ -171,17 +176,17 @@ pipeline::JetSummary run_job(const Job& job) {
   if (cancel) throw py::error_already_set();
   auto summary = running.get();
   if (!summary) raise(summary.error());
-  return std::move(*summary);
+  return py::module_::import("json").attr("loads")(summary->json());
 }
 
-py::object jet(const std::string& output, const py::object& parts, const py::dict& settings, const std::string& file,
+template <pipeline::Product product>
+py::object plan_into(const std::string& output, const py::object& parts, const py::dict& settings, const std::string& file,
                bool resume, bool overwrite, const py::object& materials) {
-  if (output.empty()) raise({Fault::kUsage, "output is empty; name a directory"});
+  if (output.empty()) raise({Fault::kUsage, "output is empty; name a directory or file"});
   Job job = make_job(parts, settings, materials, file, output);
   job.resume = resume;
   job.overwrite = overwrite;
-  const std::string said = pipeline::summary_json(job, run_job(job));
-  return py::module_::import("json").attr("loads")(said);
+  return run_job(job, product);
 }
 
 template <class Target>
@@ -264,16 +269,16 @@ void define_plan(py::module_& module) {
       module, "Plan",
       "A job with its parts loaded: a sequence of layers that are planned when they are asked "
       "for. Threads may ask at the same time; the interpreter's lock is free meanwhile.")
-      .def("__len__", [](const Plan& plan) { return plan.of().layers().size(); })
+      .def("__len__", [](const Plan& plan) { return plan.of().layer_count; })
       .def("__getitem__", [](const Plan& plan, std::int64_t asked) { return plan.layer(plan.index(asked)); })
       .def("__iter__",
            [](const std::shared_ptr<Plan>& plan) {
-             return LayerIterator{plan, 0, plan->of().layers().size()};
+             return LayerIterator{plan, 0, plan->of().layer_count};
            })
       .def(
           "layers",
           [](const std::shared_ptr<Plan>& plan, std::uint32_t first, std::optional<std::uint32_t> end) {
-            const std::uint32_t count = plan->of().layers().size();
+            const std::uint32_t count = plan->of().layer_count;
             return LayerIterator{plan, first, std::min(end.value_or(count), count)};
           },
           "first"_a = 0, "end"_a = py::none(),
@@ -282,26 +287,26 @@ void define_plan(py::module_& module) {
           "contours", [](Plan& plan, std::int64_t asked) { return plan.contours(plan.index(asked)); }, "index"_a,
           "Contours of a layer, as lamina slice cuts them. The first call loads the parts once more.")
       .def_property_readonly(
-          "materials", [](const Plan& plan) { return plan.of().materials(); },
+          "materials", [](const Plan& plan) { return plan.materials(); },
           "Names of the powders, by vat, else in the order in which parts name them; empty if none does.")
       .def_property_readonly(
           "heights", &Plan::heights,
           "Structured array, a row a layer: bottom and thickness in nm (int32), reason (index into lamina.reasons).")
-      .def_property_readonly("columns", [](const Plan& plan) { return plan.of().grid().columns(); })
-      .def_property_readonly("rows", [](const Plan& plan) { return plan.of().grid().rows(); })
+      .def_property_readonly("columns", [](const Plan& plan) { return plan.grid().columns(); })
+      .def_property_readonly("rows", [](const Plan& plan) { return plan.grid().rows(); })
       .def_property_readonly(
-          "dpi", [](const Plan& plan) { return py::make_tuple(plan.of().grid().x.dpi(), plan.of().grid().y.dpi()); },
+          "dpi", [](const Plan& plan) { return py::make_tuple(plan.grid().x.dpi(), plan.grid().y.dpi()); },
           "Along x and y.")
       .def_property_readonly(
-          "bed_mm", [](const Plan& plan) { return plan.of().job().bed_mm; }, "Width (x) and depth (y).")
+          "bed_mm", [](const Plan& plan) { return plan.of().job.bed_mm; }, "Width (x) and depth (y).")
       .def_property_readonly(
-          "job", [](const Plan& plan) { return pipeline::job_text(plan.of().job(), ""); },
+          "job", [](const Plan& plan) { return pipeline::job_text(plan.of().job, ""); },
           "The job as a TOML file would say it.")
       .def_property_readonly(
           "parts",
           [](const Plan& plan) {
             py::list parts;
-            for (const auto& part : plan.of().parts()) {
+            for (const auto& part : plan.of().scene->parts) {
               const auto& [lo, hi] = part.bounds;
               parts.append(py::dict("path"_a = part.path, "copies"_a = part.copies, "triangles"_a = part.triangles,
                                     "low"_a = py::make_tuple(lo.x, lo.y, lo.z), "high"_a = py::make_tuple(hi.x, hi.y, hi.z)));
@@ -353,11 +358,17 @@ PYBIND11_MODULE(lamina, module) {
       "parts"_a = py::none(), "settings"_a = py::dict(), "job"_a = "", "materials"_a = py::none(),
       "A job ready to give its layers. parts: a path or several; job: a TOML job file, which settings override; materials: the "
       "powder of all parts, or a sequence with that of each.");
-  module.def(
-      "jet", &jet, "output"_a, "parts"_a = py::none(), "settings"_a = py::dict(), "job"_a = "", "resume"_a = false,
-      "overwrite"_a = false, "materials"_a = py::none(),
-      "Plans all layers into a directory, as lamina jet does, on all processors; returns its summary. Ctrl-C stops it, and "
-      "resume=True goes on.");
+  const auto def_product = [&](const char* name, auto function, const char* meaning) {
+    module.def(name, function, "output"_a, "parts"_a = py::none(), "settings"_a = py::dict(), "job"_a = "", "resume"_a = false,
+               "overwrite"_a = false, "materials"_a = py::none(), meaning);
+  };
+  def_product("jet", &plan_into<pipeline::Product::kImages>,
+              "Plans all layers into a directory, as lamina jet does, on all processors; returns its summary. Ctrl-C stops it, and "
+              "resume=True goes on.");
+  def_product("slice", &plan_into<pipeline::Product::kContours>,
+              "Contours and fillings of all layers into a directory, as lamina slice does; returns its summary.");
+  def_product("extrude", &plan_into<pipeline::Product::kMoves>,
+              "Toolpaths of all layers into a file, as lamina extrude --job does; returns its summary.");
   module.def(
       "keys",
       [] {

@@ -40,7 +40,7 @@ Result<std::vector<TestPiece>> test_pieces(CalibrationRequest& request, const Ex
 
 /// Writes DIR/<name>.stl, .toml and .gcode (or .sml) of each piece, DIR/widths.csv to be filled in, and DIR/STEPS.md.
 /// returns names of the pieces
-/// errors  kUsage: the directory has a widths.csv already; kOutput; of run_extrude
+/// errors  kUsage: the directory has a widths.csv already; kOutput; of run
 Result<std::vector<std::string>> write_test_pieces(const CalibrationRequest& asked, const std::atomic<bool>& cancel);
 
 /// The rows of a filled in widths.csv. errors  kInput: file, line, column, what is wrong

@@ -8,7 +8,8 @@
 
 #include "pipeline/calibrate/calibrate.h"
 #include "pipeline/job/file.h"
-#include "pipeline/run/extrude.h"
+#include "pipeline/machine/extruder.h"
+#include "pipeline/run/run.h"
 #include "pipeline/text/number_text.h"
 #include "stages/write/file.h"
 #include "stages/write/stl/block.h"
@@ -187,11 +188,12 @@ Result<std::vector<std::string>> write_test_pieces(const CalibrationRequest& ask
     if (Status status = write_text(stem.string() + ".stl", write::stl::block(piece.size_mm)); !status) return status.error();
     piece.job.parts = {{.path = stem.string() + ".stl"}};
     piece.job.output = stem.string() + extension;
+    piece.job.overwrite = true;  // the pieces of an earlier call in this directory
     const std::string job = fmt::format("# {}\n# lamina extrude --job {}.toml\n\n{}", piece.task, piece.name,
                                         job_text(piece.job, directory.string()));
     if (Status status = write_text(stem.string() + ".toml", job); !status) return status.error();
-    const auto summary = run_extrude(
-        piece.job, [](const ProgressEvent&) {}, cancel);
+    const auto summary = run(
+        piece.job, Product::kMoves, [](const ProgressEvent&) {}, cancel);
     if (!summary) return Error{summary.error().fault, fmt::format("{}: {}", piece.name, summary.error().message)};
     names.push_back(piece.name);
   }

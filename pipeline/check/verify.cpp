@@ -10,11 +10,10 @@
 #include <optional>
 
 #include "pipeline/check/replay_job.h"
-#include "pipeline/check/verify_slice.h"
+#include "pipeline/check/verify_paths.h"
 #include "pipeline/output/directory.h"
 #include "pipeline/output/manifest.h"
 #include "pipeline/output/print_program.h"
-#include "pipeline/show/slice_picture.h"  // is_slice_directory
 #include "stages/data/hash.h"
 #include "stages/raster/materials.h"
 #include "stages/read/image.h"
@@ -251,15 +250,39 @@ void check_strays(const std::string& directory, const std::vector<Manifest>& man
   for (const std::string& name : strays) add_fault(report, fmt::format("{}: no manifest names it", name));
 }
 
+/// A file of toolpaths, by the manifest beside it.
+Result<VerifyReport> verify_file(const std::string& path) {
+  const std::string manifest_path = path + ".json";
+  std::error_code error;
+  if (!fs::is_regular_file(manifest_path, error)) {
+    const bool begun = fs::is_regular_file(manifest_path + ".part", error);
+    return Error{Fault::kVerification,
+                 fmt::format("{}: {}", path,
+                             begun ? "job was interrupted; run again with --resume"
+                                   : fmt::format("has no manifest beside it ({}); it is no file of lamina extrude", manifest_path))};
+  }
+  const auto manifest = read_manifest(manifest_path);
+  if (!manifest) return manifest.error();
+  const fs::path folder = fs::path(path).parent_path();
+  return verify_paths(path, folder.empty() ? "." : folder.string(), *manifest);
+}
+
 }  // namespace
 
 Result<VerifyReport> verify(const std::string& directory, const VerifyOptions& options) {
   std::error_code error;
+  if (fs::is_regular_file(directory, error)) return verify_file(directory);
   if (!fs::is_directory(directory, error)) {
-    return Error{Fault::kUsage,
-                 fmt::format("{}: no such directory; name one that lamina jet or lamina slice wrote", directory)};
+    return Error{Fault::kUsage, fmt::format("{}: no such directory or file; name what lamina jet, lamina slice or lamina "
+                                            "extrude wrote",
+                                            directory)};
   }
-  if (is_slice_directory(directory)) return verify_slices(directory);
+  const std::string whole = (fs::path(directory) / "manifest.json").string();
+  if (product_of_manifest(whole) == Product::kContours) {
+    const auto manifest = read_manifest(whole);
+    if (!manifest) return manifest.error();
+    return verify_paths(directory, directory, *manifest);
+  }
   VerifyReport report;
   report.directory = directory;
   const std::vector<ManifestFile> files = find_manifests(directory);

@@ -1,4 +1,4 @@
-// pipeline/check/verify.h: is a directory what its manifest says.
+// pipeline/check/verify.h: is a directory, or a file of toolpaths, what its manifest says.
 #pragma once
 
 #include <cstdint>
@@ -35,8 +35,9 @@ struct VerifyReport {
 /// print program of each layer, carried out by a virtual machine, prints that image bit for bit. Files in
 /// layers/ and program/ that no manifest names are faults, and so is a job that was interrupted.
 ///
-/// errors  kVerification if there is no manifest to compare with, or none that can be read; kUsage if the directory
-///         does not exist
+/// directory  or a file of toolpaths: its bytes and those of each layer (verify_paths.h), as of contours
+/// errors  kVerification if there is no manifest to compare with, or none that can be read; kUsage if there is no such
+///         directory or file
 /// cost    reads every file once, and once more to decode it; parallel over layers; memory of a few layers' runs
 Result<VerifyReport> verify(const std::string& directory, const VerifyOptions& options);
 

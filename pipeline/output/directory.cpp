@@ -12,6 +12,7 @@
 
 #include "pipeline/output/manifest.h"
 #include "pipeline/text/number_text.h"
+#include "stages/write/file.h"
 #include "stages/write/image_format.h"
 #include "stages/write/program/dialect.h"
 
@@ -143,7 +144,7 @@ Status check_output(const Job& job) {
     };
     if (file.partial && !joins(job, file)) {
       const std::string path = fmt::format("{}/{}", job.output, file.name.substr(0, file.name.size() - kPartial.size()));
-      if (Status busy = check_not_being_written(path); !busy) return busy;
+      if (Status busy = write::check_not_being_written(path); !busy) return busy;
     }
     begun |= is_own;
     if (joins(job, file)) {

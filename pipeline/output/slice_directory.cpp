@@ -50,9 +50,14 @@ Status check_slice_output(const Job& job) {
   if (!fs::is_directory(status)) {
     return Error{Fault::kOutput, fmt::format("{}: is a file, not a directory; name another one with -o", job.output)};
   }
-  if (!job.overwrite && !find_manifests(job.output).empty()) {
+  const std::vector<ManifestFile> manifests = find_manifests(job.output);
+  const bool replaces = job.overwrite || job.resume;
+  if (!replaces && !manifests.empty()) {
     return Error{Fault::kUsage,
-                 fmt::format("{}: holds a job; replace it with --overwrite, or name another directory", job.output)};
+                 fmt::format("{}: holds {}; {}, or name another directory", job.output,
+                             manifests.front().partial ? "an interrupted job" : "a job",
+                             manifests.front().partial ? "go on with --resume, start over with --overwrite"
+                                                       : "replace it with --overwrite")};
   }
   for (const std::string& name : {std::string("job.toml"), slice_file_name(job)}) {
     const fs::path file = fs::path(job.output) / name;
@@ -63,12 +68,12 @@ Status check_slice_output(const Job& job) {
       }
     }
     // A job file that a person wrote is not ours to replace: ours stands beside a manifest.
-    if (name == "job.toml" && fs::exists(file, error) && (!job.overwrite || find_manifests(job.output).empty())) {
+    if (name == "job.toml" && fs::exists(file, error) && (!replaces || manifests.empty())) {
       return Error{Fault::kUsage,
                    fmt::format("{}: is there already, and the job would be kept in it; name another directory", file.string())};
     }
   }
-  if (job.overwrite) return {};
+  if (replaces) return {};
   if (!layer_files(job).empty()) {
     return Error{Fault::kUsage,
                  fmt::format("{}/layers: holds layers; replace them with --overwrite, or name another directory", job.output)};

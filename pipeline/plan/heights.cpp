@@ -7,13 +7,13 @@ heights::SurfaceIndex index_scene(const Scene& scene, const heights::Options& op
                                 static_cast<std::uint32_t>(scene.parts.size()), options.surface);
 }
 
-Result<heights::LayerTable> layer_table(const Job& job, const Scene& scene) {
+Result<heights::Plan> decide_heights(const Job& job, const Scene& scene) {
   const Result<heights::Options> options = heights_options(job);
   if (!options) return options.error();
-  if (options->mode == heights::Mode::kUniform) return heights::LayerTable::uniform(scene.height, options->set.least());
-  Result<heights::Plan> plan = heights::plan_heights(index_scene(scene, *options), *options);
-  if (!plan) return plan.error();
-  return std::move(plan->table);
+  if (options->mode != heights::Mode::kUniform) return heights::plan_heights(index_scene(scene, *options), *options);
+  heights::Plan plan;
+  plan.table = heights::LayerTable::uniform(scene.height, options->set.least());
+  return plan;
 }
 
 }  // namespace lamina::pipeline

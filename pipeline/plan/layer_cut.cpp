@@ -43,7 +43,7 @@ Result<segment::LayerCut> layer_cut(const SegmentRange& range, const infill::Fil
   return segment::layer_cut(range.plan, place, part);
 }
 
-Status check_thin_stretches(const SegmentPlan& segments, const SlicePlan& plan) {
+Status check_thin_stretches(const SegmentPlan& segments, const Sections& plan) {
   // No straight line is longer than the parts are across; closed curves are.
   const double across =
       mm(std::llround(std::hypot(static_cast<double>(plan.bounds().width()), static_cast<double>(plan.bounds().depth()))));
@@ -55,7 +55,7 @@ Status check_thin_stretches(const SegmentPlan& segments, const SlicePlan& plan) 
                     where, range.plan.thin_mm, across)};
   };
   if (!too_long(segments.base) && std::ranges::none_of(segments.ranges, too_long)) return {};
-  for (const SlicePlan::Area& area : plan.areas()) {
+  for (const Sections::Area& area : plan.areas()) {
     for (const ScheduledLayer& scheduled : plan.layers()) {
       const infill::Pattern pattern = plan.filling(area, scheduled.own()).pattern;
       if (pattern == infill::Pattern::kContour || pattern == infill::Pattern::kContourRaster) return {};

@@ -34,15 +34,13 @@ Status add_layers_of_parts(const Job& job, const Scene& scene, std::vector<Sched
 
 }  // namespace
 
-Result<LayerSchedule> schedule_layers(const Job& job, const Scene& scene) {
+Result<LayerSchedule> schedule_layers(const Job& job, const Scene& scene, const heights::LayerTable& table) {
   LayerSchedule schedule;
   if (job.heights.per_part) {
     if (Status status = add_layers_of_parts(job, scene, schedule.layers); !status) return status.error();
   } else {
-    const Result<heights::LayerTable> table = layer_table(job, scene);
-    if (!table) return table.error();
-    schedule.layers.reserve(table->size());
-    for (std::uint32_t i = 0; i < table->size(); ++i) schedule.layers.push_back({(*table)[i], kEveryPart, i, 0, 0});
+    schedule.layers.reserve(table.size());
+    for (std::uint32_t i = 0; i < table.size(); ++i) schedule.layers.push_back({table[i], kEveryPart, i, 0, 0});
   }
   const bool across = job.heights.containment == Containment::kAcross;
   const auto lowest = [&](const Layer& layer) { return across ? layer.plane() : layer.lowest_plane(); };

@@ -9,6 +9,7 @@
 #include "pipeline/plan/scene.h"
 #include "stages/data/layer.h"
 #include "stages/data/status.h"
+#include "stages/heights/table.h"
 
 namespace lamina::pipeline {
 
@@ -31,9 +32,9 @@ struct LayerSchedule {
 
 /// With job.heights.per_part every part has the best layers of its own between common slabs (stages/heights/per_part.h);
 /// they are made in the order of their tops, so that the nozzle never has to go below what is printed by more than a
-/// slab.
-/// errors  as layer_table
+/// slab. Else all parts have those of the table.
+/// errors  of heights_options and heights::plan_per_part
 /// cost    28 bytes a layer and 4 bytes a plane
-Result<LayerSchedule> schedule_layers(const Job& job, const Scene& scene);
+Result<LayerSchedule> schedule_layers(const Job& job, const Scene& scene, const heights::LayerTable& table);
 
 }  // namespace lamina::pipeline

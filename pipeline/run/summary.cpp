@@ -1,126 +1,136 @@
 #include "pipeline/run/summary.h"
-#include "pipeline/text/readable.h"
-
-#include "pipeline/plan/heights.h"
 
 #include <fmt/format.h>
 
-#include <vector>
+#include <nlohmann/json.hpp>
 
 #include "pipeline/text/json_text.h"
-#include "pipeline/text/number_text.h"
+#include "pipeline/text/readable.h"
 
 namespace lamina::pipeline {
 namespace {
 
+using Json = nlohmann::ordered_json;
+
+std::string text_of(const Json& json) { return json.dump(-1, ' ', false, Json::error_handler_t::replace); }
+
 double rate(double amount, double seconds) { return seconds > 0 ? amount / seconds : 0; }
 
-double pixels_planned(const JetSummary& s) { return static_cast<double>(s.columns) * s.rows * s.layers_planned; }
+Json point_json(const Point3& p) { return {mm(p.x), mm(p.y), mm(p.z)}; }
 
-double porosity(const JetSummary& s) { return 1 - static_cast<double>(s.bead_pixels) / static_cast<double>(s.solid_pixels); }
+Json part_json(const PartSummary& part) {
+  Json notes = Json::array();
+  for (const Note& note : part.notes) notes.push_back({{"repair", note.repair}, {"text", note.text}});
+  return {{"path", part.path},
+          {"copies", part.copies},
+          {"triangles", part.triangles},
+          {"bounds_mm", {point_json(part.bounds.lo), point_json(part.bounds.hi)}},
+          {"notes", notes}};
+}
 
-std::string part_json(const PartSummary& part) {
-  std::string notes;
-  for (const Note& note : part.notes) {
-    notes += fmt::format("{}{{\"repair\":{},\"text\":{}}}", notes.empty() ? "" : ",", note.repair, json_string(note.text));
+using Line = std::pair<std::string, std::string>;
+
+void add_parts(const Summary& s, std::vector<Line>& lines) {
+  for (const PartSummary& part : s.parts) {
+    const Box& box = part.bounds;
+    lines.emplace_back(
+        &part == &s.parts.front() ? "parts" : "",
+        fmt::format("{}{}: {} triangles, {:.3f} x {:.3f} x {:.3f} mm at {:.3f}, {:.3f} mm", one_line(part.path),
+                    part.copies > 1 ? fmt::format(" x {}", part.copies) : "", readable_count(part.triangles), mm(box.width()),
+                    mm(box.depth()), mm(box.height()), mm(box.lo.x), mm(box.lo.y)));
+    for (const Note& note : part.notes) {
+      lines.emplace_back("", fmt::format("  {}{}", note.repair ? "repair: " : "", one_line(note.text)));
+    }
   }
-  const auto point = [](const Point3& p) { return fmt::format("[{},{},{}]", mm(p.x), mm(p.y), mm(p.z)); };
-  return fmt::format("{{\"path\":{},\"copies\":{},\"triangles\":{},\"bounds_mm\":[{},{}],\"notes\":[{}]}}",
-                     json_string(part.path), part.copies, part.triangles, point(part.bounds.lo), point(part.bounds.hi), notes);
+}
+
+std::string layers_line(const Summary& s) {
+  std::string text = fmt::format("{} {}", readable_count(s.layers_total), s.layer_text);
+  if (!s.dry_run && s.layers_planned != s.layers_total) text += fmt::format("; {} planned", readable_count(s.layers_planned));
+  if (s.layers_kept > 0) text += fmt::format(", {} kept", readable_count(s.layers_kept));
+  return text;
+}
+
+void add_costs(const Summary& s, std::vector<Line>& lines) {
+  std::string steps;
+  for (const auto& [name, seconds] : s.step_seconds) {
+    steps += fmt::format("{}{} {}", steps.empty() ? "" : ", ", name, readable_seconds(seconds));
+  }
+  lines.emplace_back("time", fmt::format("{}: load {}, index {}, layers {} (threads: {})",
+                                         readable_seconds(s.load_seconds + s.index_seconds + s.layer_seconds),
+                                         readable_seconds(s.load_seconds), readable_seconds(s.index_seconds),
+                                         readable_seconds(s.layer_seconds), steps));
+  lines.emplace_back("memory",
+                     fmt::format("{} at most (mesh {}, index {}, layers in flight up to {} of {}, {} at once)",
+                                 readable_bytes(s.peak_resident_bytes), readable_bytes(s.mesh_bytes),
+                                 readable_bytes(s.index_bytes), readable_bytes(s.peak_layer_bytes),
+                                 readable_bytes(s.memory_budget_bytes), s.most_layers_in_flight));
+}
+
+void add_dry_run(const Summary& s, std::vector<Line>& lines) {
+  lines.emplace_back("memory", fmt::format("mesh {}, index {}, a layer needs up to {}", readable_bytes(s.mesh_bytes),
+                                           readable_bytes(s.index_bytes), readable_bytes(s.peak_layer_bytes)));
+  lines.emplace_back("time",
+                     fmt::format("load {}, index {}", readable_seconds(s.load_seconds), readable_seconds(s.index_seconds)));
+  lines.emplace_back("dry run", "nothing was written");
 }
 
 }  // namespace
 
-std::string summary_text(const Job& job, const JetSummary& s) {
-  std::string text;
-  const auto line = [&](std::string_view name, const std::string& value) { text += fmt::format("{:<10}{}\n", name, value); };
-  for (std::size_t i = 0; i < s.parts.size(); ++i) {
-    const PartSummary& part = s.parts[i];
-    const Box& box = part.bounds;
-    line(i == 0 ? "parts" : "",
-         fmt::format("{}{}: {} triangles, {:.3f} x {:.3f} x {:.3f} mm at {:.3f}, {:.3f} mm", one_line(part.path),
-                     part.copies > 1 ? fmt::format(" x {}", part.copies) : "", readable_count(part.triangles), mm(box.width()),
-                     mm(box.depth()), mm(box.height()), mm(box.lo.x), mm(box.lo.y)));
-    for (const Note& note : part.notes) line("", fmt::format("  {}{}", note.repair ? "repair: " : "", one_line(note.text)));
-  }
-  line("image", fmt::format("{} x {} pixels of {:g} x {:g} dpi on {} x {} mm, {}", s.columns, s.rows, grid_of(job).x.dpi(),
-                            grid_of(job).y.dpi(), number_text(job.bed_mm[0]), number_text(job.bed_mm[1]), job.format));
-  std::string layers = fmt::format("{} {}", readable_count(s.layers_total), heights_text(job));
-  if (!job.dry_run && s.layers_planned != s.layers_total)
-    layers += fmt::format("; {} planned", readable_count(s.layers_planned));
-  if (s.layers_kept > 0) layers += fmt::format(", {} kept", readable_count(s.layers_kept));
-  line("layers", layers);
-  if (job.dry_run) {
-    line("memory", fmt::format("mesh {}, index {}, a layer needs up to {}", readable_bytes(s.mesh_bytes),
-                               readable_bytes(s.index_bytes), readable_bytes(s.peak_layer_bytes)));
-    line("time", fmt::format("load {}, index {}", readable_seconds(s.seconds.load), readable_seconds(s.seconds.index)));
-    line("dry run", "nothing was written");
+std::string_view command_name(Product product) {
+  constexpr std::string_view kNames[] = {"jet", "slice", "extrude"};
+  return kNames[static_cast<std::size_t>(product)];
+}
+
+std::string Summary::text() const {
+  Lines lines;
+  add_parts(*this, lines);
+  if (!machine.empty()) lines.emplace_back("machine", machine);
+  lines.insert(lines.end(), head.begin(), head.end());
+  lines.emplace_back("layers", layers_line(*this));
+  if (dry_run) {
+    add_dry_run(*this, lines);
   } else {
-    line("pixels",
-         fmt::format("{} set, {:.3f} cm3 of binder-filled volume", readable_count(s.set_pixels), s.set_volume_mm3 / 1000));
-    if (s.solid_pixels > 0)
-      line("porosity",
-           fmt::format("{:.2f} % of the parts' {} pixels are left empty", 100 * porosity(s), readable_count(s.solid_pixels)));
-    for (const auto& [material, pixels] : s.materials) line("", fmt::format("{} of {}", readable_count(pixels), material));
-    line("files", fmt::format("{} in {}", readable_bytes(s.bytes_written), one_line(s.directory)));
-    line("time",
-         fmt::format("{}: load {}, index {}, layers {} (threads: raster {}, encode {}, write {})",
-                     readable_seconds(s.seconds.load + s.seconds.index + s.seconds.layers), readable_seconds(s.seconds.load),
-                     readable_seconds(s.seconds.index), readable_seconds(s.seconds.layers), readable_seconds(s.seconds.raster),
-                     readable_seconds(s.seconds.encode), readable_seconds(s.seconds.write)));
-    line("rate", fmt::format("{:.2f} Gpx/s, {:.1f} layers/s", rate(pixels_planned(s), s.seconds.layers) / 1e9,
-                             rate(s.layers_planned, s.seconds.layers)));
-    line("memory",
-         fmt::format("{} at most (mesh {}, index {}, layers in flight up to {} of {}, {} at once)",
-                     readable_bytes(s.peak_resident_bytes), readable_bytes(s.mesh_bytes), readable_bytes(s.index_bytes),
-                     readable_bytes(s.peak_layer_bytes), readable_bytes(job.memory_bytes), s.most_layers_in_flight));
+    lines.insert(lines.end(), results.begin(), results.end());
+    lines.emplace_back(product == Product::kImages ? "files" : "file",
+                       fmt::format("{} in {}", readable_bytes(bytes_written), one_line(output)));
+    add_costs(*this, lines);
   }
-  if (s.moved_pixels > 0)
-    line("blocked", fmt::format("{} pixels of blocked nozzles are fired by their neighbours", readable_count(s.moved_pixels)));
-  if (s.lost_pixels > 0) {
-    line("warning",
-         fmt::format("{} pixels of blocked nozzles are not fired at all; head.blocked_rule = \"second-pass\" fires them",
-                     readable_count(s.lost_pixels)));
-  }
-  if (s.capped_rows > 0)
-    line("repaired", fmt::format("{} rows are closed only thanks to repair", readable_count(s.capped_rows)));
-  for (const std::string& warning : s.warnings) line("warning", one_line(warning));
+  lines.insert(lines.end(), end.begin(), end.end());
+  for (const std::string& warning : warnings) lines.emplace_back("warning", one_line(warning));
+  std::string text;
+  for (const auto& [name, what] : lines) text += fmt::format("{:<10}{}\n", name, what);
   return text;
 }
 
-std::string summary_json(const Job& job, const JetSummary& s) {
-  std::vector<std::string> parts, warnings;
-  for (const PartSummary& part : s.parts) parts.push_back(part_json(part));
-  for (const std::string& warning : s.warnings) warnings.push_back(json_string(warning));
-  std::string text = fmt::format(
-      "{{\"command\":\"jet\",\"dry_run\":{},\"directory\":{},\"format\":{},\"columns\":{},\"rows\":{},\"dpi\":[{},{}],"
-      "\"layers_total\":{},\"layers_planned\":{},\"layers_kept\":{},\"triangles\":{},\"set_pixels\":{},"
-      "\"set_volume_mm3\":{},\"bytes_written\":{},\"capped_rows\":{},",
-      job.dry_run, json_string(s.directory), json_string(job.format), s.columns, s.rows, grid_of(job).x.dpi(),
-      grid_of(job).y.dpi(), s.layers_total, s.layers_planned, s.layers_kept, s.triangles, s.set_pixels, s.set_volume_mm3,
-      s.bytes_written, s.capped_rows);
-  if (s.solid_pixels > 0)
-    text += fmt::format("\"solid_pixels\":{},\"bead_pixels\":{},\"porosity\":{},", s.solid_pixels, s.bead_pixels, porosity(s));
-  if (job.machine.resolved) text += fmt::format("\"moved_pixels\":{},\"lost_pixels\":{},", s.moved_pixels, s.lost_pixels);
-  if (!s.materials.empty()) {
-    std::string materials;
-    for (const auto& [material, pixels] : s.materials) {
-      materials +=
-          fmt::format("{}{{\"name\":{},\"set_pixels\":{}}}", materials.empty() ? "" : ",", json_string(material), pixels);
-    }
-    text += fmt::format("\"materials\":[{}],", materials);
-  }
-  text += fmt::format(
-      "\"seconds\":{{\"load\":{},\"index\":{},\"layers\":{},\"raster_threads\":{},\"encode_threads\":{},"
-      "\"write_threads\":{}}},\"pixels_per_second\":{},\"layers_per_second\":{},",
-      s.seconds.load, s.seconds.index, s.seconds.layers, s.seconds.raster, s.seconds.encode, s.seconds.write,
-      rate(pixels_planned(s), s.seconds.layers), rate(s.layers_planned, s.seconds.layers));
-  text += fmt::format(
-      "\"mesh_bytes\":{},\"index_bytes\":{},\"peak_layer_bytes\":{},\"memory_budget_bytes\":{},\"peak_resident_bytes\":{},"
-      "\"most_layers_in_flight\":{},\"parts\":[{}],\"warnings\":[{}]}}\n",
-      s.mesh_bytes, s.index_bytes, s.peak_layer_bytes, job.memory_bytes, s.peak_resident_bytes, s.most_layers_in_flight,
-      fmt::join(parts, ","), fmt::join(warnings, ","));
-  return text;
+std::string Summary::json() const {
+  Json threads = Json::object(), part_list = Json::array();
+  for (const auto& [name, value] : step_seconds) threads[std::string(name)] = value;
+  for (const PartSummary& part : parts) part_list.push_back(part_json(part));
+  Json all{{"command", command_name(product)},
+           {"dry_run", dry_run},
+           {"output", output},
+           {"format", format},
+           {"machine", machine},
+           {"height_mm", height_mm},
+           {"layers_total", layers_total},
+           {"layers_planned", layers_planned},
+           {"layers_kept", layers_kept},
+           {"triangles", triangles},
+           {"volume_mm3", volume_mm3},
+           {"bytes_written", bytes_written},
+           {"seconds", {{"load", load_seconds}, {"index", index_seconds}, {"layers", layer_seconds}, {"threads", threads}}},
+           {"layers_per_second", rate(layers_planned, layer_seconds)},
+           {"mesh_bytes", mesh_bytes},
+           {"index_bytes", index_bytes},
+           {"peak_layer_bytes", peak_layer_bytes},
+           {"memory_budget_bytes", memory_budget_bytes},
+           {"peak_resident_bytes", peak_resident_bytes},
+           {"most_layers_in_flight", most_layers_in_flight},
+           {"parts", part_list},
+           {"warnings", warnings}};
+  if (facts) all.update(*facts);
+  return text_of(all) + "\n";
 }
 
 }  // namespace lamina::pipeline

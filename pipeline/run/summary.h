@@ -1,16 +1,48 @@
-// pipeline/run/summary.h: what a job did, for a person and for a script.
+// pipeline/run/summary.h: what a job did, for a person and for a script; one text and one object for all products.
 #pragma once
 
+#include <cstdint>
+#include <memory>
+#include <nlohmann/json_fwd.hpp>
 #include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
 
-#include "pipeline/run/jet.h"
+#include "pipeline/job/product.h"
+#include "pipeline/plan/scene.h"
 
 namespace lamina::pipeline {
 
-/// Aligned lines with units; ends with one line a warning.
-std::string summary_text(const Job& job, const JetSummary& summary);
+struct Summary {
+  Product product = Product::kImages;
+  bool dry_run = false;
+  std::string output, format, machine;  // machine: empty without one
+  std::string layer_text;               // "of 0.1 mm"
+  double height_mm = 0;                 // of the highest layer's top
+  std::uint32_t layers_total = 0, layers_planned = 0, layers_kept = 0;
+  std::uint64_t triangles = 0;  // with copies
+  double volume_mm3 = 0;        // of set pixels, within contours, or of beads
+  std::uint64_t bytes_written = 0;
+  double load_seconds = 0, index_seconds = 0, layer_seconds = 0;            // wall
+  std::vector<std::pair<std::string_view, double>> step_seconds;            // of each step, over all threads
+  std::uint64_t mesh_bytes = 0, index_bytes = 0, peak_layer_bytes = 0, memory_budget_bytes = 0, peak_resident_bytes = 0;
+  std::uint32_t most_layers_in_flight = 0;
+  std::vector<PartSummary> parts;
+  std::vector<std::string> warnings;  // one line each
 
-/// One JSON object on one line. Lengths in mm or nm, times in seconds and sizes in bytes, as the keys say.
-std::string summary_json(const Job& job, const JetSummary& summary);
+  // --- what only this product tells
+  using Lines = std::vector<std::pair<std::string, std::string>>;  // name, text
+  Lines head, results, end;                                // before the layers, behind them, after memory
+  std::shared_ptr<nlohmann::ordered_json> facts;           // an object, or null
+
+  /// Aligned lines with units; ends with one line a warning.
+  std::string text() const;
+  /// One JSON object on one line. Lengths in mm or nm, times in seconds and sizes in bytes, as the keys say.
+  std::string json() const;
+};
+
+/// The command of a product: jet, slice, extrude.
+std::string_view command_name(Product product);
 
 }  // namespace lamina::pipeline

@@ -4,29 +4,14 @@
 
 #include <array>
 #include <filesystem>
-#include <fstream>
-#include <iterator>
 #include <map>
 #include <memory>
 
 #include "pipeline/job/file.h"
-#include "pipeline/run/slice.h"
 #include "stages/geometry/clipping.h"
 
 namespace lamina::pipeline {
 namespace {
-
-std::string manifest_text(const std::string& directory) {
-  std::ifstream file(directory + "/manifest.json", std::ios::binary);
-  return {std::istreambuf_iterator<char>(file), {}};
-}
-
-/// The line of a layer in a manifest of our own making, or "".
-std::string line_of(const std::string& manifest, std::uint32_t layer) {
-  const std::string begin = fmt::format("\n    {{\"layer\":{},", layer);
-  const std::size_t at = manifest.find(begin);
-  return at == std::string::npos ? std::string() : manifest.substr(at + 1, manifest.find('\n', at + 1) - at - 1);
-}
 
 constexpr std::array<std::pair<PathKind, std::string_view>, 5> kKinds = {{{PathKind::kOuter, "outer wall"},
                                                                           {PathKind::kInner, "inner wall"},
@@ -65,44 +50,42 @@ Result<Contours> outline_of(const ToolpathsView& paths, PathKind kind) {
 }  // namespace
 
 bool is_slice_directory(const std::string& directory) {
-  std::ifstream file(directory + "/manifest.json", std::ios::binary);
-  std::string head(200, '\0');
-  file.read(head.data(), static_cast<std::streamsize>(head.size()));
-  return head.find("\"kind\": \"slice\"") != std::string::npos;
+  return product_of_manifest(directory + "/manifest.json") == Product::kContours;
 }
 
 Result<SlicePictures> SlicePictures::open(const std::string& directory) {
+  auto manifest = read_manifest(directory + "/manifest.json");
+  if (!manifest) return manifest.error();
   Job job;
   if (Status status = read_job(directory + "/job.toml", job); !status) return status.error();
-  auto plan = SlicePlan::make(job, [](const ProgressEvent&) {});
+  auto resolved = resolve(job, Product::kContours);
+  if (!resolved) return resolved.error();
+  auto plan = make_plan(std::move(*resolved), [](const ProgressEvent&) {});
   if (!plan) return plan.error();
-  const auto range = layer_range(job, static_cast<std::uint32_t>(plan->layers().size()));
-  if (!range) return range.error();
-  SlicePictures pictures(directory, std::move(*plan));
-  pictures.manifest_ = manifest_text(directory);
-  pictures.range_ = *range;
-  return pictures;
+  return SlicePictures(directory, std::move(*plan), std::move(*manifest));
 }
 
 Result<view::LayerShapes> SlicePictures::layer(std::uint32_t index) const {
   if (index >= count()) {
     return Error{Fault::kUsage, fmt::format("--layer {}: the job has layers 0 to {}", index, count() - 1)};
   }
-  SlicePlan::Work work;
-  if (Status status = plan_.layer(index, work); !status) return status.error();
+  Sections::Work work;
+  if (Status status = plan_.sections->layer(index, work); !status) return status.error();
   view::LayerShapes shapes;
   shapes.index = index;
-  shapes.z = plan_.layers()[index].layer.plane();
+  shapes.z = plan_.layer(index).plane();
   shapes.contours = std::move(work.contours.contours);
   const double area = square_mm(doubled_area(shapes.contours));
-  const std::string line = line_of(manifest_, index);
-  if (!line.empty() && line.find(fmt::format("\"points\":{},\"area_mm2\":{:.9f},\"paths\":{},", shapes.contours.point.size(),
-                                             area, work.paths.size())) == std::string::npos) {
+  const std::vector<LayerRecord>& recorded = manifest_.layers;
+  const std::uint32_t place = index - manifest_.head.first_layer;
+  const PathFacts* written = place < recorded.size() ? recorded[place].paths.get() : nullptr;
+  if (written != nullptr && (written->points != shapes.contours.point.size() || written->area_mm2 != area ||
+                             written->paths != work.paths.size())) {
     return Error{Fault::kVerification, fmt::format("{}: layer {} is not what was written: a part has changed since; slice it "
                                                    "again",
                                                    directory_, index)};
   }
-  shapes.box = plan_.bounds();
+  shapes.box = plan_.sections->bounds();
   for (const auto& [kind, name] : kKinds) {
     auto outline = outline_of(work.paths, kind);
     if (!outline) return outline.error();

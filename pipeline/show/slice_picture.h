@@ -6,7 +6,8 @@
 #include <string>
 #include <utility>
 
-#include "pipeline/run/slice.h"
+#include "pipeline/output/manifest.h"
+#include "pipeline/plan/plan.h"
 #include "stages/data/status.h"
 #include "stages/view/shapes.h"
 
@@ -21,19 +22,20 @@ class SlicePictures {
   /// errors  kUsage; kInput: a part that cannot be read
   static Result<SlicePictures> open(const std::string& directory);
   /// Of all layers, those that were sliced: [first, last).
-  std::uint32_t first() const { return range_[0]; }
-  std::uint32_t last() const { return range_[1]; }
-  std::uint32_t count() const { return static_cast<std::uint32_t>(plan_.layers().size()); }
+  std::uint32_t first() const { return plan_.range[0]; }
+  std::uint32_t last() const { return plan_.range[1]; }
+  std::uint32_t count() const { return plan_.layer_count; }
   /// errors  kUsage: no such layer; kVerification: a part that is not what it was
   Result<view::LayerShapes> layer(std::uint32_t index) const;
   /// Of the first part.
-  std::string name() const { return plan_.names().empty() ? std::string() : plan_.names().front(); }
+  std::string name() const { return plan_.sections->names().empty() ? std::string() : plan_.sections->names().front(); }
 
  private:
-  SlicePictures(std::string directory, SlicePlan plan) : directory_(std::move(directory)), plan_(std::move(plan)) {}
-  std::string directory_, manifest_;
-  SlicePlan plan_;
-  std::array<std::uint32_t, 2> range_{};
+  SlicePictures(std::string directory, Plan plan, Manifest manifest)
+      : directory_(std::move(directory)), plan_(std::move(plan)), manifest_(std::move(manifest)) {}
+  std::string directory_;
+  Plan plan_;
+  Manifest manifest_;
 };
 
 /// The same as a series. errors  of SlicePictures

@@ -71,5 +71,9 @@ class ExtrusionFormat {
 /// `machine` has to outlive them.
 std::unique_ptr<ExtrusionFormat> make_gcode_format(const Extruder& machine);
 std::unique_ptr<ExtrusionFormat> make_sml_format(const Extruder& machine);
+/// The one that the machine reads.
+inline std::unique_ptr<ExtrusionFormat> make_extrusion_format(const Extruder& machine) {
+  return machine.format == "sml" ? make_sml_format(machine) : make_gcode_format(machine);
+}
 
 }  // namespace lamina::write

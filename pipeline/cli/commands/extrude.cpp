@@ -6,7 +6,8 @@
 #include "pipeline/cli/command.h"
 #include "pipeline/cli/keys.h"
 #include "pipeline/job/file.h"
-#include "pipeline/run/extrude.h"
+#include "pipeline/machine/extruder.h"
+#include "pipeline/run/run.h"
 
 namespace lamina::pipeline {
 namespace {
@@ -23,7 +24,9 @@ CommandSpec extrude_spec() {
   spec.operand = "PART";
   spec.operand_meaning = "STL, OBJ or 3MF files, STL and OBJ gzipped too; they replace the parts of --job";
   add_key_options(kExtrudeKeys, spec);
-  for (const auto& [flag, meaning] : {std::pair{"--dry-run", "load, place and index, predict, write nothing"},
+  for (const auto& [flag, meaning] : {std::pair{"--resume", "go on with an interrupted job: whole layers are kept"},
+                                      {"--overwrite", "replace an earlier file"},
+                                      {"--dry-run", "load, place and index, predict, write nothing"},
                                       {"--json", "print the summary as one JSON object on stdout"},
                                       {"--quiet", "say nothing but errors"}}) {
     spec.options.push_back({flag, "", meaning, "", "Run"});
@@ -53,6 +56,8 @@ Outcome run_command(const Arguments& arguments, Context& context) {
   Result<Job> read = read_job_options(kExtrudeKeys, arguments);
   if (!read) return read.error();
   Job& job = *read;
+  job.resume = arguments.has("--resume");
+  job.overwrite = arguments.has("--overwrite");
   job.dry_run = arguments.has("--dry-run");
   job.json = arguments.has("--json");
   job.quiet = arguments.has("--quiet");
@@ -80,14 +85,17 @@ Outcome run_command(const Arguments& arguments, Context& context) {
   if (arguments.has("--save-job")) {
     if (Status status = save_job(arguments.text("--save-job"), job); !status) return status.error();
   }
-  const Result<ExtrudeSummary> summary = run_extrude(
-      job, [&](const ProgressEvent& event) { context.progress(event); }, context.cancel());
+  const Result<Summary> summary = run(
+      job, Product::kMoves, [&](const ProgressEvent& event) { context.progress(event); }, context.cancel());
   if (!summary) return summary.error();
-  if (!job.quiet) context.say_text(extrude_summary_text(job, *summary));
+  if (!job.quiet) context.say_text(summary->text());
   if (job.json) {
-    if (Status status = context.print(extrude_summary_json(job, *summary)); !status) return status.error();
+    if (Status status = context.print(summary->json()); !status) return status.error();
   }
-  return 0;
+  Outcome outcome;
+  outcome.layers_planned = summary->layers_planned;
+  outcome.layers_kept = summary->layers_kept;
+  return outcome;
 }
 
 }  // namespace

@@ -5,9 +5,7 @@
 #include "pipeline/job/file.h"
 #include "pipeline/machine/materials.h"
 #include "pipeline/machine/powder_printer.h"
-#include "pipeline/output/directory.h"
-#include "pipeline/run/jet.h"
-#include "pipeline/run/summary.h"
+#include "pipeline/run/run.h"
 #include "pipeline/text/number_text.h"
 #include "stages/write/image_format.h"
 
@@ -77,29 +75,18 @@ Result<Job> resolve(const Arguments& arguments) {
   return read;
 }
 
-Error interrupted(const Job& job) {
-  const bool begun = !job.output.empty() && !find_manifests(job.output).empty();
-  return {Fault::kInterrupted, begun ? fmt::format("interrupted; finished layers are kept in {}, go on with the same "
-                                                   "command and --resume instead of --overwrite",
-                                                   job.output)
-                                     : "interrupted before the first layer; nothing was written"};
-}
-
 Outcome run_command(const Arguments& arguments, Context& context) {
   const Result<Job> job = resolve(arguments);
   if (!job) return job.error();
   if (arguments.has("--save-job")) {
     if (Status status = save_job(arguments.text("--save-job"), *job); !status) return status.error();
   }
-  if (!job->dry_run) {
-    if (Status status = check_output(*job); !status) return status.error();
-  }
-  const Result<JetSummary> summary = run_jet(
-      *job, [&](const ProgressEvent& event) { context.progress(event); }, context.cancel());
-  if (!summary) return summary.error().fault == Fault::kInterrupted ? interrupted(*job) : summary.error();
-  if (!job->quiet) context.say_text(summary_text(*job, *summary));
+  const Result<Summary> summary = run(
+      *job, Product::kImages, [&](const ProgressEvent& event) { context.progress(event); }, context.cancel());
+  if (!summary) return summary.error();
+  if (!job->quiet) context.say_text(summary->text());
   if (job->json) {
-    if (Status status = context.print(summary_json(*job, *summary)); !status) return status.error();
+    if (Status status = context.print(summary->json()); !status) return status.error();
   }
   Outcome outcome;
   outcome.layers_planned = summary->layers_planned;

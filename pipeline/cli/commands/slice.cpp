@@ -3,8 +3,7 @@
 #include "pipeline/cli/command.h"
 #include "pipeline/cli/keys.h"
 #include "pipeline/job/file.h"
-#include "pipeline/output/slice_directory.h"
-#include "pipeline/run/slice.h"
+#include "pipeline/run/run.h"
 
 namespace lamina::pipeline {
 namespace {
@@ -21,7 +20,8 @@ CommandSpec slice_spec() {
   spec.operand_meaning = "STL, OBJ or 3MF files, STL and OBJ gzipped too; they replace the parts of --job";
   add_key_options(kSliceKeys, spec);
   spec.absent = {{"--shard", kNoShards}};
-  for (const auto& [flag, meaning] : {std::pair{"--overwrite", "replace an earlier job in the directory"},
+  for (const auto& [flag, meaning] : {std::pair{"--resume", "go on with an interrupted job: whole layers are kept"},
+                                      {"--overwrite", "replace an earlier job in the directory"},
                                       {"--dry-run", "load, place and index, write nothing"},
                                       {"--json", "print the summary as one JSON object on stdout"},
                                       {"--quiet", "say nothing but errors"}}) {
@@ -43,6 +43,7 @@ Outcome run_command(const Arguments& arguments, Context& context) {
   Result<Job> read = read_job_options(kSliceKeys, arguments);
   if (!read) return read.error();
   Job& job = *read;
+  job.resume = arguments.has("--resume");
   job.overwrite = arguments.has("--overwrite");
   job.dry_run = arguments.has("--dry-run");
   job.json = arguments.has("--json");
@@ -51,17 +52,17 @@ Outcome run_command(const Arguments& arguments, Context& context) {
   if (arguments.has("--save-job")) {
     if (Status status = save_job(arguments.text("--save-job"), job); !status) return status.error();
   }
-  if (!job.dry_run) {
-    if (Status status = check_slice_output(job); !status) return status.error();
-  }
-  const Result<SliceSummary> summary = run_slice(
-      job, [&](const ProgressEvent& event) { context.progress(event); }, context.cancel());
+  const Result<Summary> summary = run(
+      job, Product::kContours, [&](const ProgressEvent& event) { context.progress(event); }, context.cancel());
   if (!summary) return summary.error();
-  if (!job.quiet) context.say_text(slice_summary_text(job, *summary));
+  if (!job.quiet) context.say_text(summary->text());
   if (job.json) {
-    if (Status status = context.print(slice_summary_json(job, *summary)); !status) return status.error();
+    if (Status status = context.print(summary->json()); !status) return status.error();
   }
-  return 0;
+  Outcome outcome;
+  outcome.layers_planned = summary->layers_planned;
+  outcome.layers_kept = summary->layers_kept;
+  return outcome;
 }
 
 }  // namespace

@@ -67,23 +67,20 @@ TEST(Progress, MillionEventsCostNoMillionWrites) {
 }
 
 TEST(Summary, JsonHoldsWhatTheTextTells) {
-  Job job;
-  JetSummary summary;
-  summary.directory = "a \"b\"";
-  summary.columns = 10;
-  summary.rows = 20;
+  Summary summary;
+  summary.output = "a \"b\"";
   summary.layers_total = summary.layers_planned = 1'234'567;
   summary.parts.resize(1);
   summary.parts[0].path = "p.stl";
   summary.parts[0].bounds = {{0, 0, 0}, {1'000'000, 2'000'000, 3'000'000}};
   summary.parts[0].notes = {{true, "one hole closed"}};
   summary.warnings = {"first\nwarning", "second"};
-  const auto json = nlohmann::json::parse(summary_json(job, summary));
-  EXPECT_EQ(json["directory"], "a \"b\"");
+  const auto json = nlohmann::json::parse(summary.json());
+  EXPECT_EQ(json["output"], "a \"b\"");
   EXPECT_EQ(json["layers_total"], 1'234'567);
   EXPECT_EQ(json["warnings"].size(), 2u);
   EXPECT_EQ(json["layers_per_second"], 0) << "no time is no rate, and never inf, which JSON does not have";
-  const std::string text = summary_text(job, summary);
+  const std::string text = summary.text();
   for (const char* words : {"1 234 567", "1.000 x 2.000 x 3.000 mm", "repair: one hole closed", "first warning", "second"}) {
     EXPECT_NE(text.find(words), std::string::npos) << words << "\n" << text;
   }

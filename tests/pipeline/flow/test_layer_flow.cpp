@@ -1,11 +1,11 @@
-// tests/pipeline/flow/test_layer_flow.cpp: layers through prepare, expand and record within a budget of bytes.
+// Layers through steps and a record within a budget of bytes.
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <atomic>
 #include <random>
 
-#include "pipeline/flow/layer_flow.h"
+#include "pipeline/flow/layers.h"
 
 namespace lamina::test {
 namespace {
@@ -14,10 +14,7 @@ using pipeline::flow_layers;
 using pipeline::FlowLimits;
 using pipeline::FlowReport;
 using pipeline::LayerSteps;
-
-struct Fake {
-  std::uint64_t holds = 0;
-};
+using pipeline::Ticket;
 
 /// What layers hold at once, as they do it.
 struct Meter {
@@ -30,64 +27,112 @@ struct Meter {
   }
 };
 
+/// Scratch of layers that hold bytes and remember whose they are.
+struct Slots {
+  std::vector<std::uint64_t> holds;
+  std::vector<std::atomic<int>> users;
+  explicit Slots(std::uint32_t slots) : holds(slots, 0), users(slots) {}
+};
+
+/// Layers that hold `first` bytes, learn that they need `more`, and come to `real` of these.
+struct Layers {
+  std::vector<std::uint64_t> first, more, real;
+};
+
+Layers random_layers(std::uint32_t count, std::uint64_t most, std::mt19937& random) {
+  Layers layers;
+  for (std::uint32_t i = 0; i < count; ++i) {
+    layers.first.push_back(random() % 50);
+    layers.more.push_back(random() % most);
+    layers.real.push_back(layers.more.back() == 0 ? 0 : random() % layers.more.back());
+  }
+  return layers;
+}
+
 TEST(LayerFlow, LayersInFlightHoldTheBudgetOrItAndOneLayer) {
   std::mt19937 random(7);
   for (int turn = 0; turn < 40; ++turn) {
     constexpr std::uint32_t kLayers = 200;
-    std::vector<std::uint64_t> first(kLayers), more(kLayers), real(kLayers);
-    std::uint64_t largest = 0;
-    for (std::uint32_t i = 0; i < kLayers; ++i) {
-      first[i] = random() % 50;
-      more[i] = random() % (turn % 4 == 0 ? 3000 : 300);
-      real[i] = more[i] == 0 ? 0 : random() % more[i];  // what it comes to is no more than what was said
-      largest = std::max(largest, more[i]);
-    }
+    const Layers layers = random_layers(kLayers, turn % 4 == 0 ? 3000 : 300, random);
+    const bool from_work = turn % 2 == 0;
     FlowLimits limits;
     limits.budget_bytes = 1000;
     limits.most_in_flight = 16;
+    Slots slots(limits.most_in_flight);
     Meter meter;
     std::vector<std::uint32_t> order;
-    LayerSteps<Fake> steps;
-    steps.bytes_of = [&](std::uint32_t i) { return first[i]; };
-    steps.prepare = [&](std::uint32_t i, Fake& work) -> Result<std::uint64_t> {
-      meter.add(static_cast<std::int64_t>(first[i]));
-      work.holds = first[i];
-      return more[i];
+    LayerSteps steps;
+    const auto leave = [&](const Ticket& ticket) {
+      meter.add(-static_cast<std::int64_t>(slots.holds[ticket.work]));
+      slots.holds[ticket.work] = 0;
+      --slots.users[ticket.work];
     };
-    steps.expand = [&](std::uint32_t i, Fake& work) -> Result<std::uint64_t> {
-      meter.add(static_cast<std::int64_t>(real[i]));
-      work.holds += real[i];
-      return work.holds;
-    };
-    steps.record = [&](std::uint32_t i, Fake& work) -> Status {
-      order.push_back(i);
-      meter.add(-static_cast<std::int64_t>(work.holds));
+    steps.bytes_of = [&](std::uint32_t i) { return layers.first[i]; };
+    steps.steps = {{"first",
+                    [&](const Ticket& ticket) -> Status {
+                      EXPECT_EQ(++slots.users[ticket.work], 1) << "a slot is one layer's";
+                      slots.holds[ticket.work] = layers.first[ticket.position];
+                      meter.add(static_cast<std::int64_t>(layers.first[ticket.position]));
+                      return {};
+                    }},
+                   {"second",
+                    [&](const Ticket& ticket) -> Status {
+                      slots.holds[ticket.work] += layers.real[ticket.position];
+                      meter.add(static_cast<std::int64_t>(layers.real[ticket.position]));
+                      if (!from_work) leave(ticket);
+                      return {};
+                    },
+                    [&](const Ticket& ticket) -> Result<std::uint64_t> { return layers.more[ticket.position]; }}};
+    steps.record = [&](const Ticket& ticket) -> Status {
+      order.push_back(ticket.position);
+      if (from_work) leave(ticket);
       return {};
     };
+    steps.bytes_held = [&](std::uint32_t work) { return slots.holds[work]; };
+    steps.let_go = [&](std::uint32_t work) { slots.holds[work] = 0; };
+    steps.records_from_work = from_work;
     FlowReport report;
     const std::atomic<bool> cancel{false};
     ASSERT_TRUE(flow_layers(kLayers, steps, limits, cancel, report).ok());
     ASSERT_EQ(order.size(), kLayers);
     EXPECT_TRUE(std::ranges::is_sorted(order));
+    const std::uint64_t largest = *std::ranges::max_element(layers.more);
     EXPECT_LE(meter.most, static_cast<std::int64_t>(limits.budget_bytes + largest));
     EXPECT_LE(report.most_bytes, limits.budget_bytes + largest);
     EXPECT_GE(report.most_bytes, static_cast<std::uint64_t>(meter.most));
     EXPECT_GE(report.most_in_flight, turn % 4 != 0 ? 2u : 1u);
+    ASSERT_EQ(report.step_seconds.size(), 3u);
+    EXPECT_EQ(report.step_seconds[2].first, "record");
   }
 }
 
+/// Steps that hold nothing.
+LayerSteps plain_steps() {
+  LayerSteps steps;
+  steps.bytes_of = [](std::uint32_t) { return 1; };
+  steps.record = [](const Ticket&) { return Status(); };
+  steps.bytes_held = [](std::uint32_t) { return 0; };
+  steps.let_go = [](std::uint32_t) {};
+  return steps;
+}
+
 TEST(LayerFlow, TheFirstFailureInOrderIsTheAnswerWhereverItHappens) {
-  for (const bool in_prepare : {true, false}) {
-    LayerSteps<Fake> steps;
+  const auto fails = [](const Ticket& ticket) -> Status {
+    if (ticket.position == 17 || ticket.position == 23) return Error{Fault::kUsage, "layer " + std::to_string(ticket.position)};
+    return {};
+  };
+  const auto works = [](const Ticket&) { return Status(); };
+  for (int where = 0; where < 3; ++where) {
+    LayerSteps steps = plain_steps();
     std::uint32_t recorded = 0;
-    const auto fails = [](std::uint32_t i) -> Result<std::uint64_t> {
-      if (i == 17 || i == 23) return Error{Fault::kUsage, "layer " + std::to_string(i)};
-      return std::uint64_t{1};
-    };
-    steps.bytes_of = [](std::uint32_t) { return 1; };
-    steps.prepare = [&](std::uint32_t i, Fake&) { return in_prepare ? fails(i) : Result<std::uint64_t>(std::uint64_t{1}); };
-    steps.expand = [&](std::uint32_t i, Fake&) { return in_prepare ? Result<std::uint64_t>(std::uint64_t{1}) : fails(i); };
-    steps.record = [&](std::uint32_t, Fake&) -> Status { return ++recorded, Status(); };
+    steps.steps = {{"first", where == 0 ? std::function<Status(const Ticket&)>(fails) : works},
+                   {"second", where == 1 ? std::function<Status(const Ticket&)>(fails) : works,
+                    [&](const Ticket& ticket) -> Result<std::uint64_t> {
+                      const Status status = where == 2 ? fails(ticket) : Status();
+                      if (!status) return status.error();
+                      return std::uint64_t{1};
+                    }}};
+    steps.record = [&](const Ticket&) -> Status { return ++recorded, Status(); };
     FlowReport report;
     FlowLimits limits;
     limits.most_in_flight = 8;
@@ -97,6 +142,27 @@ TEST(LayerFlow, TheFirstFailureInOrderIsTheAnswerWhereverItHappens) {
     EXPECT_EQ(status.error().message, "layer 17");
     EXPECT_EQ(recorded, 17u);
   }
+}
+
+TEST(LayerFlow, ACancelledFlowRecordsWhatIsInFlight) {
+  LayerSteps steps = plain_steps();
+  std::atomic<bool> cancel{false};
+  std::atomic<std::uint32_t> made{0};
+  std::uint32_t recorded = 0;
+  steps.steps = {{"only", [&](const Ticket& ticket) -> Status {
+                    ++made;
+                    if (ticket.position == 20) cancel = true;
+                    return {};
+                  }}};
+  steps.record = [&](const Ticket&) -> Status { return ++recorded, Status(); };
+  FlowReport report;
+  FlowLimits limits;
+  limits.most_in_flight = 4;
+  const Status status = flow_layers(1000, steps, limits, cancel, report);
+  ASSERT_FALSE(status.ok());
+  EXPECT_EQ(status.error().fault, Fault::kInterrupted);
+  EXPECT_EQ(recorded, made);
+  EXPECT_LT(recorded, 1000u);
 }
 
 }  // namespace

@@ -1,8 +1,11 @@
 #include <gtest/gtest.h>
 
+#include <filesystem>
 #include <nlohmann/json.hpp>
 
+#include "pipeline/job/file.h"
 #include "pipeline/output/manifest.h"
+#include "pipeline/text/version.h"
 #include "stages/data/hash.h"
 #include "tests/commands/program.h"
 
@@ -13,6 +16,24 @@ using test::Directory;
 
 constexpr std::uint32_t kLayers = 150;
 
+ManifestHead head_of(const Job& job, const std::vector<PartSummary>& parts, std::uint32_t layers, std::uint32_t first,
+                     std::uint32_t last) {
+  ManifestHead head;
+  head.version = version();
+  head.job_toml = canonical_job_text(job);
+  head.format = job.format;
+  head.extension = ".tif";
+  head.fill_rule = "nonzero";
+  head.mirror = "none";
+  head.grid = grid_of(job);
+  head.layer_count = layers;
+  head.first_layer = first;
+  head.last_layer = last;
+  head.parts = parts;
+  for (PartSummary& part : head.parts) part.path = std::filesystem::path(part.path).filename().string();
+  return head;
+}
+
 ManifestHead some_head(std::uint32_t first = 0, std::uint32_t last = kLayers) {
   Job job;
   job.parts.push_back({.path = "/far/away/bracket \"x\" \\ \xff.stl"});
@@ -22,7 +43,7 @@ ManifestHead some_head(std::uint32_t first = 0, std::uint32_t last = kLayers) {
   part.fingerprint = 0xfedcba9876543210;
   part.bounds = {{-1, 2'147'483'647, 3}, {999'999, 2'147'483'647, 1'000'001}};
   part.notes = {{true, "a \"hole\"\nclosed"}, {false, "plain"}};
-  return make_head(job, {part}, kLayers, {first, last});
+  return head_of(job, {part}, kLayers, first, last);
 }
 
 LayerRecord record(std::uint32_t index) {
@@ -103,7 +124,7 @@ TEST(Manifest, IdIsTheSameForEveryRangeAndAnotherForEveryOtherJob) {
   Job job;
   job.layer_mm = 0.1;
   job.parts.resize(1);
-  head = make_head(job, {}, 1, {0, 1});
+  head = head_of(job, {}, 1, 0, 1);
   EXPECT_NE(difference(head, some_head()).find("layers.thickness_mm = 0.1, was 0.05"), std::string::npos);
 }
 

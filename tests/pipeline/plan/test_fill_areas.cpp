@@ -7,11 +7,11 @@
 #include <numbers>
 #include <random>
 
-#include "pipeline/run/slice.h"
 #include "stages/geometry/clipping.h"
 #include "stages/write/slice_format.h"
 #include "tests/commands/program.h"
 #include "tests/slice/contour_laws.h"
+#include "tests/pipeline/plan/plan_of.h"
 
 namespace lamina::test {
 namespace {
@@ -35,7 +35,7 @@ struct Placed {
 };
 
 /// Every bead of area `a` lies inside `room`: its centre, and half its width to all sides.
-void expect_within(const SlicePlan::Work& work, std::size_t a, const ContoursView& room, Nm width, PathKind kind) {
+void expect_within(const Sections::Work& work, std::size_t a, const ContoursView& room, Nm width, PathKind kind) {
   const ToolpathsView paths = work.paths;
   std::size_t seen = 0;
   for (std::uint32_t p = work.path_area[a]; p < work.path_area[a + 1]; ++p) {
@@ -73,7 +73,7 @@ void write_prism(const std::string& path, const std::vector<std::array<double, 2
 
 class FillAreas : public ::testing::Test {
  protected:
-  Result<SlicePlan> plan_of(const std::vector<Placed>& parts, const std::string& by_height = {}) {
+  Result<Plan> plan_of(const std::vector<Placed>& parts, const std::string& by_height = {}) {
     Job job;
     job.layer_mm = 0.5;
     job.fill.all.walls = 1;
@@ -88,7 +88,7 @@ class FillAreas : public ::testing::Test {
       part.fill = parts[i].fill;
       job.parts.push_back(part);
     }
-    return SlicePlan::make(job, [](const ProgressEvent&) {});
+    return test::plan_of(job, Product::kContours);
   }
   Directory directory_;
 };
@@ -98,16 +98,16 @@ TEST_F(FillAreas, PartsWhoseBoxesTouchKeepTheirOwnFillingAndHeights) {
                              {{40, 20, 1}, {20, 20, 4}, "pattern=contour width_mm=0.6"}},
                             "2:3 gap_mm=0.5");
   ASSERT_TRUE(plan.ok()) << plan.error().message;
-  ASSERT_EQ(plan->areas().size(), 2u);
-  for (std::uint32_t layer = 0; layer < plan->layers().size(); ++layer) {
+  ASSERT_EQ(plan->sections->areas().size(), 2u);
+  for (std::uint32_t layer = 0; layer < plan->sections->layers().size(); ++layer) {
     // Each by the height above its own bottom.
-    for (const auto& area : plan->areas()) {
-      const double z = mm(plan->layers()[layer].layer.plane() - area.box.lo.z);
-      EXPECT_EQ(plan->filling(area, plan->layers()[layer].layer).gaps[0], z >= 2 && z < 3 ? 500'000 : 0) << layer;
+    for (const auto& area : plan->sections->areas()) {
+      const double z = mm(plan->sections->layers()[layer].layer.plane() - area.box.lo.z);
+      EXPECT_EQ(plan->sections->filling(area, plan->sections->layers()[layer].layer).gaps[0], z >= 2 && z < 3 ? 500'000 : 0) << layer;
     }
   }
-  SlicePlan::Work work;
-  ASSERT_TRUE(plan->layer(4, work).ok());  // z 2.25: both are solid
+  Sections::Work work;
+  ASSERT_TRUE(plan->sections->layer(4, work).ok());  // z 2.25: both are solid
   EXPECT_EQ(work.contours.contours.size(), 1u) << "contours are united";
   EXPECT_NEAR(square_mm(doubled_area(work.contours.contours)), 800, 1e-9);
   expect_within(work, 0, rectangle(20, 20, 40, 40), 400'000, PathKind::kRaster);
@@ -119,8 +119,8 @@ TEST_F(FillAreas, SharedRoomBelongsToTheFirstPart) {
                              {{30, 25, 0}, {20, 20, 4}, "pattern=contour+raster width_mm=0.5"},
                              {{25, 35, 0}, {8, 30, 4}, "pattern=honeycomb width_mm=0.3 cell_mm=3"}});
   ASSERT_TRUE(plan.ok()) << plan.error().message;
-  SlicePlan::Work work;
-  ASSERT_TRUE(plan->layer(3, work).ok());
+  Sections::Work work;
+  ASSERT_TRUE(plan->sections->layer(3, work).ok());
   const Contours first = rectangle(20, 20, 40, 40), second = rectangle(30, 25, 50, 45), third = rectangle(25, 35, 33, 65);
   const auto second_rest = subtract_contours(second, first);
   auto third_rest = subtract_contours(third, first);
@@ -136,8 +136,8 @@ TEST_F(FillAreas, SharedRoomBelongsToTheFirstPart) {
 
 /// Bytes that the filling of layer 2 is charged with as SVG, and the least that buffers of doubling size come to at most.
 /// Checks what they hold.
-std::array<double, 2> charged_and_needed(const SlicePlan& plan) {
-  SlicePlan::Work work;
+std::array<double, 2> charged_and_needed(const Sections& plan) {
+  Sections::Work work;
   EXPECT_TRUE(plan.contours(2, work).ok());
   const auto bound = plan.fill_bytes_bound(2, work, {26, 200, 0}), own = plan.fill_bytes_bound(2, work, {});
   EXPECT_TRUE(bound.ok() && own.ok());
@@ -163,7 +163,7 @@ TEST_F(FillAreas, FineFillingsAreChargedWithAFewTimesWhatTheyNeed) {
                                     {"pattern=contour width_mm=0.01", 6}}) {
     const auto plan = plan_of({{{20, 20, 0}, {40, 40, 4}, fill}});
     ASSERT_TRUE(plan.ok()) << plan.error().message;
-    const auto [charged, needed] = charged_and_needed(*plan);
+    const auto [charged, needed] = charged_and_needed(*plan->sections);
     EXPECT_LT(charged, times * needed) << fill << ": " << charged << " for " << needed;
   }
 }
@@ -194,10 +194,10 @@ TEST_F(FillAreas, RandomOutlinesAndPatternsNeedNoMoreThanTheyAreChargedWith) {
         fmt::format("pattern={} width_mm={:.3f} gap_mm={:.3f} cell_mm={:.3f} angle_deg={:.1f} walls={} loops={}",
                     patterns[turn % 5], between(0.05, 0.3), between(0.02, 0.3), between(0.3, 2), between(0, 180),
                     turn % 4 == 0 ? 1 : 0, static_cast<int>(between(1, 40)));
-    const auto plan = SlicePlan::make(job, [](const ProgressEvent&) {});
+    const auto plan = test::plan_of(job, Product::kContours);
     ASSERT_TRUE(plan.ok()) << plan.error().message;
     SCOPED_TRACE(job.parts.back().fill);
-    charged_and_needed(*plan);
+    charged_and_needed(*plan->sections);
   }
 }
 
@@ -206,12 +206,12 @@ TEST_F(FillAreas, WhatFollowsTheCountOfPointsIsWithinIt) {
                              {{40, 20, 0}, {20, 20, 4}, "pattern=quatrefoil width_mm=0.1 gap_mm=0.1 cell_mm=0.3"},
                              {{70, 20, 0}, {20, 20, 4}, "pattern=contour width_mm=0.02"}});
   ASSERT_TRUE(plan.ok()) << plan.error().message;
-  SlicePlan::Work work;
-  ASSERT_TRUE(plan->contours(2, work).ok());
-  const auto bound = plan->fill_bytes_bound(2, work, {});
+  Sections::Work work;
+  ASSERT_TRUE(plan->sections->contours(2, work).ok());
+  const auto bound = plan->sections->fill_bytes_bound(2, work, {});
   ASSERT_TRUE(bound.ok());
   const std::uint64_t before = work.bytes();
-  ASSERT_TRUE(plan->fill(2, work).ok());
+  ASSERT_TRUE(plan->sections->fill(2, work).ok());
   EXPECT_GT(work.paths.point.size(), 50'000u);
   EXPECT_LE(work.bytes(), before + *bound);
 }

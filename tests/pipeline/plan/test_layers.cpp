@@ -5,8 +5,8 @@
 #include <map>
 #include <string>
 
-#include "pipeline/run/slice.h"
 #include "stages/geometry/clipping.h"
+#include "tests/pipeline/plan/plan_of.h"
 
 namespace lamina::pipeline {
 namespace {
@@ -28,9 +28,8 @@ Job job_of(const std::vector<std::string>& parts) {
   return job;
 }
 
-Result<SlicePlan> plan_of(const Job& job) {
-  return SlicePlan::make(job, [](const ProgressEvent&) {});
-}
+/// As toolpaths are planned, of which each part may have layers of its own.
+Result<Plan> plan_of(const Job& job) { return test::plan_of(job, Product::kMoves); }
 
 double area(const ContoursView& contours) { return square_mm(doubled_area(contours)); }
 
@@ -38,15 +37,15 @@ TEST(LayersOfParts, EachPartIsCutByItsOwnTableAndTopsNeverGoDown) {
   Job job = job_of({kNut, kCrown});
   job.heights.per_part = true;
   job.fill.all.walls = 1;
-  const Result<SlicePlan> plan = plan_of(job);
+  const Result<Plan> plan = plan_of(job);
   ASSERT_TRUE(plan.ok()) << plan.error().message;
   std::map<std::uint32_t, std::uint32_t> layers;
   std::map<std::uint32_t, std::int64_t> top;
   std::array<double, 2> mm3{};
   std::int64_t before = 0;
-  SlicePlan::Work work;
-  for (std::uint32_t i = 0; i < plan->layers().size(); ++i) {
-    const ScheduledLayer& scheduled = plan->layers()[i];
+  Sections::Work work;
+  for (std::uint32_t i = 0; i < plan->sections->layers().size(); ++i) {
+    const ScheduledLayer& scheduled = plan->sections->layers()[i];
     const Layer& layer = scheduled.layer;
     const std::int64_t end = std::int64_t{layer.bottom} + layer.thickness;
     EXPECT_EQ(layer.index, i);
@@ -56,7 +55,7 @@ TEST(LayersOfParts, EachPartIsCutByItsOwnTableAndTopsNeverGoDown) {
     EXPECT_EQ(layer.bottom, top[scheduled.part]) << "a gap under layer " << i;
     top[scheduled.part] = end;
     EXPECT_EQ(scheduled.number, layers[scheduled.part]++);
-    ASSERT_TRUE(plan->layer(i, work));
+    ASSERT_TRUE(plan->sections->layer(i, work));
     ASSERT_EQ(work.contours.body.size(), 3u);
     const std::uint32_t other = 1 - scheduled.part;
     EXPECT_EQ(work.contours.body[other], work.contours.body[other + 1]) << "layer " << i << " holds the other part";
@@ -66,16 +65,16 @@ TEST(LayersOfParts, EachPartIsCutByItsOwnTableAndTopsNeverGoDown) {
   // As many layers as each part gets when it is alone, within the slabs; together they differ.
   EXPECT_NE(layers[0], layers[1]);
   for (std::uint32_t part = 0; part < 2; ++part) {
-    const Result<SlicePlan> alone = plan_of(job_of({part == 0 ? kNut : kCrown}));
+    const Result<Plan> alone = plan_of(job_of({part == 0 ? kNut : kCrown}));
     ASSERT_TRUE(alone.ok());
-    EXPECT_GE(layers[part], alone->layers().size());
+    EXPECT_GE(layers[part], alone->sections->layers().size());
     double own_mm3 = 0;
-    for (std::uint32_t i = 0; i < alone->layers().size(); ++i) {
-      ASSERT_TRUE(alone->layer(i, work));
-      own_mm3 += area(work.contours.contours) * mm(alone->layers()[i].layer.thickness);
+    for (std::uint32_t i = 0; i < alone->sections->layers().size(); ++i) {
+      ASSERT_TRUE(alone->sections->layer(i, work));
+      own_mm3 += area(work.contours.contours) * mm(alone->sections->layers()[i].layer.thickness);
     }
     EXPECT_NEAR(mm3[part], own_mm3, 0.01 * own_mm3);
-    EXPECT_EQ(top[part], std::int64_t{alone->layers().back().layer.bottom} + alone->layers().back().layer.thickness);
+    EXPECT_EQ(top[part], std::int64_t{alone->sections->layers().back().layer.bottom} + alone->sections->layers().back().layer.thickness);
   }
 }
 
@@ -85,7 +84,7 @@ TEST(LayersOfParts, PartsThatTouchShareTheirLayersOrAreRefused) {
   job.fill.all.walls = 1;
   EXPECT_TRUE(plan_of(job).ok());
   job.heights.per_part = true;
-  const Result<SlicePlan> plan = plan_of(job);
+  const Result<Plan> plan = plan_of(job);
   ASSERT_FALSE(plan.ok());
   EXPECT_EQ(plan.error().fault, Fault::kUsage);
   EXPECT_NE(plan.error().message.find("touches another part"), std::string::npos) << plan.error().message;
@@ -94,18 +93,18 @@ TEST(LayersOfParts, PartsThatTouchShareTheirLayersOrAreRefused) {
 TEST(Containment, StepsOfContoursLieInsideOrOutsideOfBothSectionsOfALayer) {
   Job job = job_of({kCrown});
   job.heights.cusp_mm = 0.3;
-  const Result<SlicePlan> across = plan_of(job);
+  const Result<Plan> across = plan_of(job);
   job.heights.containment = Containment::kInside;
-  const Result<SlicePlan> inside = plan_of(job);
+  const Result<Plan> inside = plan_of(job);
   job.heights.containment = Containment::kOutside;
-  const Result<SlicePlan> outside = plan_of(job);
+  const Result<Plan> outside = plan_of(job);
   ASSERT_TRUE(across.ok() && inside.ok() && outside.ok());
-  ASSERT_EQ(inside->layers().size(), across->layers().size());
-  SlicePlan::Work middle, least, most;
+  ASSERT_EQ(inside->sections->layers().size(), across->sections->layers().size());
+  Sections::Work middle, least, most;
   double least_mm3 = 0, middle_mm3 = 0, most_mm3 = 0;
-  for (std::uint32_t i = 0; i < across->layers().size(); ++i) {
-    ASSERT_TRUE(across->layer(i, middle) && inside->layer(i, least) && outside->layer(i, most));
-    const double thickness = mm(across->layers()[i].layer.thickness);
+  for (std::uint32_t i = 0; i < across->sections->layers().size(); ++i) {
+    ASSERT_TRUE(across->sections->layer(i, middle) && inside->sections->layer(i, least) && outside->sections->layer(i, most));
+    const double thickness = mm(across->sections->layers()[i].layer.thickness);
     least_mm3 += area(least.contours.contours) * thickness;
     middle_mm3 += area(middle.contours.contours) * thickness;
     most_mm3 += area(most.contours.contours) * thickness;
@@ -116,8 +115,8 @@ TEST(Containment, StepsOfContoursLieInsideOrOutsideOfBothSectionsOfALayer) {
     // Their sum is that of the two sections.
     slice::LayerScratch scratch;
     slice::LayerContours low, high;
-    ASSERT_TRUE(inside->slicer().layer(inside->layers()[i].low, scratch, low).ok());
-    ASSERT_TRUE(inside->slicer().layer(inside->layers()[i].high, scratch, high).ok());
+    ASSERT_TRUE(inside->sections->slicer().layer(inside->sections->layers()[i].low, scratch, low).ok());
+    ASSERT_TRUE(inside->sections->slicer().layer(inside->sections->layers()[i].high, scratch, high).ok());
     EXPECT_NEAR(area(least.contours.contours) + area(most.contours.contours), area(low.contours) + area(high.contours), 1e-3);
   }
   EXPECT_LT(least_mm3, 0.99 * middle_mm3);

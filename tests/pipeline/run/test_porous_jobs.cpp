@@ -9,13 +9,13 @@
 #include <polyclipping/clipper.hpp>
 
 #include "pipeline/plan/layer_cut.h"
-#include "pipeline/plan/porous_plan.h"
 #include "stages/dose/erode.h"
 #include "stages/raster/combine.h"
 #include "stages/raster/raster.h"
 #include "stages/read/image.h"
 #include "stages/segment/expand.h"
 #include "tests/commands/program.h"
+#include "tests/pipeline/plan/plan_of.h"
 #include "tests/segment/cylinder.h"
 
 namespace lamina {
@@ -181,21 +181,24 @@ TEST_F(PorousJob, PorosityOfTheBitmapIsThatOfThePlanWithinThePixelsOfItsEdges) {
     job.dose.bead_ends = ends;
     job.fill.all.pattern = pattern;
     job.fill.all.walls = ends == raster::BeadEnds::kRound ? 1 : 0;
-    auto plan = pipeline::PorousPlan::make(job, grid, [](const pipeline::ProgressEvent&) {});
+    auto plan = test::plan_of(job, pipeline::Product::kImages);
     ASSERT_TRUE(plan.ok()) << plan.error().message;
-    auto scene = plan->slices().scene();
+    pipeline::Scene scene = *plan->scene;
     auto rasterizer = raster::Rasterizer::build(scene.meshes, scene.instances, grid, FillRule::kNonzero, false, true);
     ASSERT_TRUE(rasterizer.ok());
-    for (const pipeline::ScheduledLayer& scheduled : plan->slices().layers()) {
+    for (const pipeline::ScheduledLayer& scheduled : plan->sections->layers()) {
       const Layer& layer = scheduled.layer;
       Runs image, scratch;
       raster::LayerScratch raster_scratch;
       rasterizer->layer(raster::Engine::kContours, layer.plane(), raster_scratch, image);
       const auto solid = set_pixels(image);
-      std::unique_ptr<pipeline::PorousWork> work;
-      ASSERT_TRUE(plan->apply(layer, image, scratch, work).ok());
+      const pipeline::Beads& beads = *plan->images->beads;
+      const auto work = std::make_unique<pipeline::BeadWork>(grid);
+      ASSERT_TRUE(plan->sections->layer(layer.index, work->sections).ok());
+      ASSERT_TRUE(beads.lay(layer, *work).ok());
+      beads.apply(image, scratch, *work);
       const auto bytes = work->bytes();
-      EXPECT_LE(bytes, plan->bytes_expected(layer.index));
+      EXPECT_LE(bytes, beads.bytes_expected(layer.index));
 
       // The same beads as polygons: their union within the contours, by an independent library.
       pipeline::FillRequest fill = job.fill;
@@ -203,12 +206,12 @@ TEST_F(PorousJob, PorosityOfTheBitmapIsThatOfThePlanWithinThePixelsOfItsEdges) {
       request.all.thick_width_mm = request.all.continuous_width_mm = 0.4;
       const auto segments = pipeline::plan_segments(request, segment::Calibration(), fill);
       ASSERT_TRUE(segments.ok());
-      const auto& room = plan->slices().areas().at(0);
-      const auto cut = pipeline::layer_cut(segments->base, plan->slices().filling(room, layer), layer, room.box);
+      const auto& room = plan->sections->areas().at(0);
+      const auto cut = pipeline::layer_cut(segments->base, plan->sections->filling(room, layer), layer, room.box);
       ASSERT_TRUE(cut.ok());
       cl::Clipper clipper;
       int thin = 0;
-      segment::for_each_stretch(work->plan.paths, *cut, [&](const Stretch& s) {
+      segment::for_each_stretch(work->sections.paths, *cut, [&](const Stretch& s) {
         const double w = s.thickness == Thickness::kThin ? 75e3 : 200e3;
         thin += s.thickness == Thickness::kThin ? 1 : 0;
         const double dx = s.to.x - s.from.x, dy = s.to.y - s.from.y, length = std::hypot(dx, dy), ux = dx / length,
@@ -236,7 +239,7 @@ TEST_F(PorousJob, PorosityOfTheBitmapIsThatOfThePlanWithinThePixelsOfItsEdges) {
       });
       EXPECT_GT(thin, 30);
       cl::Path outline;
-      for (const Point2 p : work->plan.contours.contours.point) outline.emplace_back(p.x, p.y);
+      for (const Point2 p : work->sections.contours.contours.point) outline.emplace_back(p.x, p.y);
       clipper.AddPath(outline, cl::ptClip, true);
       cl::Paths united;
       ASSERT_TRUE(clipper.Execute(cl::ctIntersection, united, cl::pftNonZero, cl::pftNonZero));

@@ -9,16 +9,20 @@
 #include <fstream>
 #include <iterator>
 #include <map>
+#include <nlohmann/json.hpp>
 
 #include "pipeline/check/verify.h"
 #include "pipeline/machine/printer_profile.h"
 #include "pipeline/output/merge.h"
-#include "pipeline/run/jet.h"
+#include "pipeline/run/run.h"
 
 namespace lamina::pipeline {
 namespace {
 
 namespace fs = std::filesystem;
+
+/// A number of a summary that only images have.
+std::uint64_t fact(const Summary& summary, const char* key) { return (*summary.facts)[key]; }
 
 class PrintJobs : public ::testing::Test {
  protected:
@@ -39,10 +43,10 @@ class PrintJobs : public ::testing::Test {
     made.output = (directory_ / out).string();
     return made;
   }
-  static Result<JetSummary> run(const Job& job) {
+  static Result<Summary> run(const Job& job) {
     const std::atomic<bool> cancel{false};
-    return run_jet(
-        job, [](const ProgressEvent&) {}, cancel);
+    return pipeline::run(
+        job, Product::kImages, [](const ProgressEvent&) {}, cancel);
   }
   static std::map<std::string, std::string> tree(const fs::path& path) {
     std::map<std::string, std::string> files;
@@ -72,7 +76,7 @@ TEST_F(PrintJobs, ProgramsOfRealPartsPrintTheirImagesOnEveryShippedMachine) {
       ASSERT_TRUE(report.ok()) << report.error().message;
       EXPECT_TRUE(report->ok()) << machine.name << " " << part << ": " << (report->faults.empty() ? "" : report->faults[0]);
       EXPECT_EQ(report->replayed, summary->layers_total);
-      EXPECT_EQ(report->replay.drops, summary->set_pixels);
+      EXPECT_EQ(report->replay.drops, fact(*summary, "set_pixels"));
       EXPECT_GT(report->replay.drops, 0u);
     }
   }
@@ -90,10 +94,10 @@ TEST_F(PrintJobs, BlockedNozzlesAndLessBinderAreRecordedAndReplayed) {
   ASSERT_TRUE(report.ok());
   EXPECT_TRUE(report->ok()) << (report->faults.empty() ? "" : report->faults[0]);
   EXPECT_GT(report->lost, 0u);
-  EXPECT_EQ(report->replay.drops + report->lost, summary->set_pixels);
+  EXPECT_EQ(report->replay.drops + report->lost, fact(*summary, "set_pixels"));
   // The planner says at once what the replay finds.
-  EXPECT_EQ(summary->lost_pixels, report->lost);
-  EXPECT_EQ(summary->moved_pixels, report->moved);
+  EXPECT_EQ(fact(*summary, "lost_pixels"), report->lost);
+  EXPECT_EQ(fact(*summary, "moved_pixels"), report->moved);
 }
 
 TEST_F(PrintJobs, WhatSurroundsTheLayersAndThePowderCycleAreVerifiedToo) {
@@ -169,7 +173,7 @@ TEST_F(PrintJobs, APixelThatAWorkingNozzleLeavesOutIsToldWhereverOthersAreBlocke
     made.machine.profile = (directory_ / (std::string(rule) + ".toml")).string();
     const auto summary = run(made);
     ASSERT_TRUE(summary.ok()) << summary.error().message;
-    EXPECT_GT(summary->lost_pixels + summary->moved_pixels, 0u);
+    EXPECT_GT(fact(*summary, "lost_pixels") + fact(*summary, "moved_pixels"), 0u);
     // One bit of a vector in the middle of a layer is taken away.
     const fs::path layer = fs::path(made.output) / "program/000002.gcode";
     std::ifstream in(layer, std::ios::binary);

@@ -1,12 +1,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <chrono>
 #include <filesystem>
 #include <iterator>
 #include <map>
 
-#include "pipeline/run/slice.h"
+#include "pipeline/plan/sections.h"
 #include "stages/geometry/clipping.h"
 #include "stages/infill/fill.h"
 #include "stages/slice/bodies.h"
@@ -15,9 +14,6 @@ namespace lamina::pipeline {
 namespace {
 
 namespace fs = std::filesystem;
-using Clock = std::chrono::steady_clock;
-double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
-
 Box box_of(const Scene& scene, const Instance& instance) {
   const Box& own = scene.meshes[instance.mesh].bounds;
   Box box;
@@ -30,56 +26,41 @@ Box box_of(const Scene& scene, const Instance& instance) {
 
 }  // namespace
 
-Result<SlicePlan> SlicePlan::make(const Job& job, const ProgressCallback& progress) {
-  SlicePlan plan;
-  for (const PartRequest& part : job.parts) {
-    auto filling = plan_filling(job.fill, part.fill);
-    if (!filling) return filling.error();
-    plan.fills_ = plan.fills_ || filling->fills();
-    plan.plans_.push_back(std::move(*filling));
-  }
-  auto start = Clock::now();
-  progress({ProgressEvent::Stage::kLoading});
-  auto scene = load_scene(job);
-  if (!scene) return scene.error();
-  plan.scene_ = std::make_unique<Scene>(std::move(*scene));
-  plan.load_seconds = seconds_since(start);
-
-  start = Clock::now();
-  progress({ProgressEvent::Stage::kIndexing});
-  auto schedule = schedule_layers(job, *plan.scene_);
-  if (!schedule) return schedule.error();
-  plan.schedule_ = std::move(*schedule);
-  plan.containment_ = job.heights.containment;
+Result<Sections> Sections::make(const Job& job, const Scene& scene, LayerSchedule schedule, std::vector<FillPlan> fillings) {
+  Sections made;
+  made.scene_ = &scene;
+  made.schedule_ = std::move(schedule);
+  made.plans_ = std::move(fillings);
+  made.fills_ = std::ranges::any_of(made.plans_, &FillPlan::fills);
+  made.containment_ = job.heights.containment;
   std::vector<Box> boxes;
-  for (const Instance& instance : plan.scene_->instances) {
-    boxes.push_back(box_of(*plan.scene_, instance));
-    plan.bounds_.add(boxes.back());
+  for (const Instance& instance : scene.instances) {
+    boxes.push_back(box_of(scene, instance));
+    made.bounds_.add(boxes.back());
   }
-  if (job.slice.offset_mm > 0) plan.grow_ = static_cast<Nm>(nm_of(job.slice.offset_mm));
+  if (job.slice.offset_mm > 0) made.grow_ = static_cast<Nm>(nm_of(job.slice.offset_mm));
   std::vector<Box> reach;  // parts may meet only when they have grown
-  for (const Box& box : boxes) reach.push_back(slice::grown(box, plan.grow_));
+  for (const Box& box : boxes) reach.push_back(slice::grown(box, made.grow_));
   const std::vector<std::uint32_t> body = slice::group_bodies(reach);
-  const std::vector<std::uint32_t> part_area = plan.make_areas(job, boxes, body);
+  const std::vector<std::uint32_t> part_area = made.make_areas(job, boxes, body);
+  made.bounds_ = slice::grown(made.bounds_, made.grow_);
   slice::SliceOptions options;
   options.fill_rule = job.fill_rule;
   options.tolerance = static_cast<Nm>(nm_of(job.slice.tolerance_um / 1000));
   options.gap = static_cast<Nm>(nm_of(job.slice.bridge_mm));
   options.offset = nm_of(job.slice.offset_mm);
-  plan.bounds_ = slice::grown(plan.bounds_, plan.grow_);
-  auto slicer = slice::Slicer::build(plan.scene_->meshes, plan.scene_->instances, body, plan.schedule_.planes, options);
+  auto slicer = slice::Slicer::build(scene.meshes, scene.instances, body, made.schedule_.planes, options);
   if (!slicer) return slicer.error();
-  plan.slicer_ = std::make_unique<slice::Slicer>(std::move(*slicer));
+  made.slicer_.emplace(std::move(*slicer));
   const bool shares = std::ranges::any_of(part_area, [](std::uint32_t area) { return area != slice::Slicer::kLeftOut; });
-  if (plan.fills_ && shares) plan.part_slicer_ = plan.slicer_->regrouped(part_area);
+  if (made.fills_ && shares) made.part_slicer_ = made.slicer_->regrouped(part_area);
   if (job.heights.per_part) {
-    if (Status status = plan.make_own_slicers(job, body); !status) return status.error();
+    if (Status status = made.make_own_slicers(job, body); !status) return status.error();
   }
-  plan.index_seconds = seconds_since(start);
-  return plan;
+  return made;
 }
 
-Status SlicePlan::make_own_slicers(const Job& job, const std::vector<std::uint32_t>& body) {
+Status Sections::make_own_slicers(const Job& job, const std::vector<std::uint32_t>& body) {
   for (const Area& area : areas_) {
     if (area.shared == UINT32_MAX) continue;
     return Error{Fault::kUsage, fmt::format("--per-part: {} touches another part, so they have to share their layers; move "
@@ -96,7 +77,7 @@ Status SlicePlan::make_own_slicers(const Job& job, const std::vector<std::uint32
   return {};
 }
 
-std::vector<std::uint32_t> SlicePlan::make_areas(const Job& job, const std::vector<Box>& boxes,
+std::vector<std::uint32_t> Sections::make_areas(const Job& job, const std::vector<Box>& boxes,
                                                  const std::vector<std::uint32_t>& body) {
   // Bodies are numbered by their first instances, instances in the order of the parts: so are the areas of a body.
   std::map<std::pair<std::uint32_t, std::uint32_t>, std::vector<std::uint32_t>> members;  // by body and part
@@ -124,15 +105,15 @@ std::vector<std::uint32_t> SlicePlan::make_areas(const Job& job, const std::vect
   return part_area;
 }
 
-const infill::FillParameters& SlicePlan::filling(const Area& area, const Layer& layer) const {
+const infill::FillParameters& Sections::filling(const Area& area, const Layer& layer) const {
   return plans_[area.part].at(std::int64_t{layer.plane()} - area.box.lo.z);
 }
 
-ContoursView SlicePlan::contours_of(const Area& area, Work& work) const {
+ContoursView Sections::contours_of(const Area& area, Work& work) const {
   return area.shared == UINT32_MAX ? work.contours.of(area.body, work.rebased) : ContoursView(work.surface[area.shared]);
 }
 
-Result<slice::LayerReport> SlicePlan::section(const slice::Slicer& slicer, const ScheduledLayer& scheduled, Work& work,
+Result<slice::LayerReport> Sections::section(const slice::Slicer& slicer, const ScheduledLayer& scheduled, Work& work,
                                               slice::LayerContours& out) const {
   auto report = slicer.layer(scheduled.low, work.scratch, out);
   if (!report || containment_ == Containment::kAcross) return report;
@@ -161,7 +142,7 @@ Result<slice::LayerReport> SlicePlan::section(const slice::Slicer& slicer, const
   return report;
 }
 
-Status SlicePlan::contours(std::uint32_t index, Work& work) const {
+Status Sections::contours(std::uint32_t index, Work& work) const {
   const ScheduledLayer& scheduled = schedule_.layers[index];
   const Layer own = scheduled.own();
   auto report = section(own_slicers_.empty() ? *slicer_ : own_slicers_[scheduled.part], scheduled, work, work.contours);
@@ -200,7 +181,7 @@ Status SlicePlan::contours(std::uint32_t index, Work& work) const {
   return {};
 }
 
-Status SlicePlan::fill(std::uint32_t index, Work& work) const {
+Status Sections::fill(std::uint32_t index, Work& work) const {
   if (!fills_) return {};
   const Layer layer = schedule_.layers[index].own();
   work.path_body.push_back(0);
@@ -217,17 +198,17 @@ Status SlicePlan::fill(std::uint32_t index, Work& work) const {
   return {};
 }
 
-Status SlicePlan::layer(std::uint32_t index, Work& work) const {
+Status Sections::layer(std::uint32_t index, Work& work) const {
   if (Status status = contours(index, work); !status) return status;
   return fill(index, work);
 }
 
-Error SlicePlan::failed(const Area& area, const Error& error) const {
+Error Sections::failed(const Area& area, const Error& error) const {
   const std::string name = fs::path(scene_->parts[area.part].path).filename().string();
   return {error.fault, fmt::format("{}: fill: {}", name, error.message)};
 }
 
-std::uint64_t SlicePlan::bytes_bound(std::uint32_t index) const {
+std::uint64_t Sections::bytes_bound(std::uint32_t index) const {
   // Text of a contour's point is at most 50 bytes, and it is kept beside the contours.
   const ScheduledLayer& scheduled = schedule_.layers[index];
   const auto bound = [&](const slice::Slicer& slicer) {
@@ -239,7 +220,7 @@ std::uint64_t SlicePlan::bytes_bound(std::uint32_t index) const {
   return (fills_ ? 2 : 1) * contours + (1 << 14);
 }
 
-Result<std::uint64_t> SlicePlan::fill_bytes_bound(std::uint32_t index, Work& work, TextBytes text) const {
+Result<std::uint64_t> Sections::fill_bytes_bound(std::uint32_t index, Work& work, TextBytes text) const {
   if (!fills_) return std::uint64_t{0};
   constexpr std::uint64_t kOfPoint = 17, kOfPath = 4;
   const Layer own = schedule_.layers[index].own();
@@ -255,7 +236,7 @@ Result<std::uint64_t> SlicePlan::fill_bytes_bound(std::uint32_t index, Work& wor
   return 2 * bytes + scratch;
 }
 
-std::uint64_t SlicePlan::Work::bytes() const {
+std::uint64_t Sections::Work::bytes() const {
   const auto of = [](const Contours& c) { return bytes_held(c.point) + bytes_held(c.offset); };
   std::uint64_t total = of(contours.contours) + of(highest.contours) + of(parts.contours) + of(scratch.closed) +
                         of(scratch.open) + bytes_held(text);

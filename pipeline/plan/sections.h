@@ -1,14 +1,11 @@
-// pipeline/run/slice.h: a job from its parts to a file of contours and filling.
+// pipeline/plan/sections.h: the contours of a job's layers, and what fills them.
 #pragma once
 
-#include <atomic>
 #include <cstdint>
-#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
-#include "pipeline/flow/progress.h"
 #include "pipeline/job/job.h"
 #include "pipeline/plan/fill.h"
 #include "pipeline/plan/layers.h"
@@ -20,11 +17,13 @@
 
 namespace lamina::pipeline {
 
-/// A job with its parts loaded, ready to give any of its layers: what `lamina slice` and pictures of it share.
-class SlicePlan {
+/// The contours of any layer of a scene, and what fills them. Immutable; any thread may ask.
+class Sections {
  public:
-  /// errors  of load_scene, Slicer::build and plan_filling
-  static Result<SlicePlan> make(const Job& job, const ProgressCallback& progress);
+  /// scene     has to outlive it: the slicer refers to its meshes
+  /// fillings  one for each part of the job
+  /// errors    of Slicer::build; kUsage: parts with layers of their own that touch
+  static Result<Sections> make(const Job& job, const Scene& scene, LayerSchedule schedule, std::vector<FillPlan> fillings);
 
   /// What a layer in flight occupies.
   struct Work {
@@ -61,7 +60,6 @@ class SlicePlan {
   const infill::FillParameters& filling(const Area& area, const Layer& layer) const;
 
   const std::vector<ScheduledLayer>& layers() const { return schedule_.layers; }
-  const Scene& scene() const { return *scene_; }
   const slice::Slicer& slicer() const { return *slicer_; }
   const std::vector<std::string>& names() const { return names_; }  // of bodies
   const Box& bounds() const { return bounds_; }                     // around all, as sliced
@@ -75,14 +73,12 @@ class SlicePlan {
   /// Bytes that fill() and its text may need beside those. errors  of infill::bound_fill
   Result<std::uint64_t> fill_bytes_bound(std::uint32_t index, Work& work, TextBytes text) const;
 
-  double load_seconds = 0, index_seconds = 0;
-
  private:
-  SlicePlan() = default;
-  std::unique_ptr<Scene> scene_;  // stays where it is: the slicer points into it
+  Sections() = default;
+  const Scene* scene_ = nullptr;
   LayerSchedule schedule_;
   Containment containment_ = Containment::kAcross;
-  std::unique_ptr<slice::Slicer> slicer_;
+  std::optional<slice::Slicer> slicer_;
   std::vector<slice::Slicer> own_slicers_;  // by part, where each has layers of its own
   std::vector<std::string> names_;
   std::vector<FillPlan> plans_;  // by [[part]]
@@ -99,29 +95,5 @@ class SlicePlan {
   Nm grow_ = 0;  // of an offset outwards
   bool fills_ = false;
 };
-
-struct SliceSummary {
-  std::string output;  // the file, or the directory of one file a layer
-  std::uint32_t layers_total = 0, layers = 0;
-  std::uint64_t triangles = 0, cuts = 0, contours = 0, points = 0, paths = 0, bytes_written = 0;
-  std::uint64_t united_layers = 0, gaps_closed = 0, open_chains = 0;
-  double largest_gap_mm = 0;         // of those closed
-  std::uint64_t emptied_layers = 0;  // that were solid before the offset
-  double volume_mm3 = 0;             // area x thickness
-  double bead_mm = 0;                // length of all beads
-  double load_seconds = 0, index_seconds = 0, layer_seconds = 0, slice_seconds = 0, encode_seconds = 0;
-  std::uint64_t index_bytes = 0, peak_layer_bytes = 0, peak_resident_bytes = 0;
-  std::uint32_t most_in_flight = 0;
-  std::vector<PartSummary> parts;
-  std::vector<std::string> warnings;
-};
-
-/// Writes DIR/NAME.svg, .cli or .3mf, or DIR/layers/000000.svg and up, and DIR/manifest.json. All of it appears when the
-/// last layer is done: a job that fails leaves what was there before.
-/// errors  of SlicePlan::make; kOutput; kInterrupted: nothing is left behind
-Result<SliceSummary> run_slice(const Job& job, const ProgressCallback& progress, const std::atomic<bool>& cancel);
-
-std::string slice_summary_text(const Job& job, const SliceSummary& summary);
-std::string slice_summary_json(const Job& job, const SliceSummary& summary);
 
 }  // namespace lamina::pipeline

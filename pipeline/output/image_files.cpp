@@ -1,0 +1,160 @@
+#include "pipeline/output/image_files.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <filesystem>
+
+#include "pipeline/job/file.h"
+#include "pipeline/job/keys.h"
+#include "pipeline/machine/printer_profile.h"
+#include "pipeline/output/directory.h"
+#include "pipeline/output/resume.h"
+#include "pipeline/text/version.h"
+#include "stages/write/file.h"
+#include "stages/write/program/dialect.h"
+
+namespace lamina::pipeline {
+namespace {
+
+/// A key's text as a job file has it.
+std::string value_of(std::string_view section, std::string_view name, const Job& job) {
+  for (const JobKey& key : job_keys()) {
+    if (key.section == section && key.name == name) return key.write(job);
+  }
+  return {};
+}
+
+}  // namespace
+
+ManifestHead image_head(const Plan& plan) {
+  const Job& job = plan.job;
+  ManifestHead head = plan_head(plan);
+  head.format = job.format;
+  if (const auto* format = write::find_image_format(job.format)) head.extension = format->extension;
+  head.fill_rule = value_of("image", "fill", job);
+  head.mirror = value_of("image", "mirror", job);
+  head.grid = plan.images->grid;
+  if (plan.images->materials.several()) head.materials = plan.images->materials.used;
+  if (!job.machine.resolved) return head;
+  const Machine& machine = job.machine.resolved->machine;
+  head.machine = machine.name;
+  head.dialect = machine.dialect;
+  if (const auto* dialect = write::find_dialect(machine.dialect)) head.program_extension = dialect->extension;
+  const std::string profile = machine_text(machine);
+  head.machine_profile = hash_bytes(std::as_bytes(std::span(profile)));
+  const ProgramFrame frame = program_frame(*job.machine.resolved, plan.layer_count);
+  head.program_start = hash_bytes(frame.start);
+  head.program_end = hash_bytes(frame.end);
+  return head;
+}
+
+ImageFiles::ImageFiles(const Plan& plan)
+    : plan_(plan), head_(image_head(plan)), format_(*write::find_image_format(plan.job.format)) {
+  if (plan.job.machine.resolved) program_.emplace(plan.job, plan.layer_count);
+}
+
+Status ImageFiles::open() {
+  const Job& job = plan_.job;
+  if (Status status = check_shard_replaces_itself(job, head_); !status) return status;
+  if (Status status = prepare_output(job); !status) return status;
+  if (job.resume) {
+    auto kept = layers_that_hold(job.output, manifest_name(job), head_);
+    if (!kept) return kept.error();
+    kept_ = std::move(*kept);
+  }
+  auto stands = kept_.begin();
+  for (std::uint32_t index = head_.first_layer; index < head_.last_layer; ++index) {
+    if (stands != kept_.end() && stands->layer.index == index) {
+      ++stands;
+    } else {
+      todo_.push_back(index);
+    }
+  }
+  while (next_kept_ < kept_.size() && (todo_.empty() || kept_[next_kept_].layer.index < todo_.front())) ++next_kept_;
+  if (program_) {
+    if (Status status = program_->begin(); !status) return status;
+  }
+  auto manifest = ManifestWriter::open(job.output + "/" + manifest_name(job), head_,
+                                       {kept_.begin(), kept_.begin() + static_cast<std::ptrdiff_t>(next_kept_)});
+  if (!manifest) return manifest.error();
+  manifest_.emplace(std::move(*manifest));
+  return {};
+}
+
+std::uint64_t ImageFiles::Work::bytes() const {
+  std::uint64_t total = bytes_held(file) + program.bytes();
+  for (const write::Bytes& one : files) total += bytes_held(one);
+  return total;
+}
+
+Status ImageFiles::encode(const Runs& whole, std::span<const Runs> materials, Work& work, LayerRecord& record) const {
+  if (!work.encoder) work.encoder = format_.make_encoder();
+  if (head_.materials.empty()) {
+    if (Status status = encode_one(whole, work, record, work.file); !status) return status;
+    record.bytes = work.file.size();
+    record.hash = hash_bytes(work.file);
+    return {};
+  }
+  work.files.resize(materials.size());
+  for (std::size_t m = 0; m < materials.size(); ++m) {
+    if (Status status = encode_one(materials[m], work, record, work.files[m]); !status) return status;
+    record.images[m].bytes = work.files[m].size();
+    record.images[m].hash = hash_bytes(work.files[m]);
+    record.bytes += work.files[m].size();
+  }
+  return {};
+}
+
+Status ImageFiles::encode_one(const Runs& image, Work& work, const LayerRecord& record, write::Bytes& file) const {
+  file.clear();
+  const Status status = work.encoder->encode(image, head_.grid.x.dpi(), head_.grid.y.dpi(), file);
+  if (status) return {};
+  return Error{status.error().fault, fmt::format("layer {}: {}", record.layer.index, status.error().message)};
+}
+
+Status ImageFiles::store(const Runs& whole, Work& work, LayerRecord& record) const {
+  const auto images = layer_images(head_, record);
+  for (std::size_t m = 0; m < images.size() && !images[m].name.empty(); ++m) {
+    const write::Bytes& file = head_.materials.empty() ? work.file : work.files[m];
+    if (Status status = write::write_file(plan_.job.output + "/" + images[m].name, file, {.lock = false}); !status) {
+      return status;
+    }
+  }
+  if (!program_) return {};
+  std::vector<std::uint64_t> pixels;
+  for (const LayerImageFile& image : images) pixels.push_back(image.record.set_pixels);
+  const auto feeds = vats_of_layer(plan_.job.machine.resolved->machine, plan_.images->materials, pixels);
+  if (!feeds) {
+    return Error{feeds.error().fault, fmt::format("layer {} (z {:.3f} mm): {}", record.layer.index, mm(record.layer.plane()),
+                                                  feeds.error().message)};
+  }
+  return program_->write_layer(record.layer, whole, *feeds, work.program, record.program);
+}
+
+std::uint64_t ImageFiles::bytes_bound(std::uint64_t changes) const {
+  const std::uint64_t files = std::max<std::size_t>(1, head_.materials.size());
+  return files * format_.most_bytes(head_.grid.columns(), head_.grid.rows(), changes) +
+         (program_ ? program_->bytes_bound(changes) : 0);
+}
+
+Status ImageFiles::record_kept_below(std::uint32_t layer) {
+  for (; next_kept_ < kept_.size() && kept_[next_kept_].layer.index < layer; ++next_kept_) {
+    if (Status status = manifest_->append(kept_[next_kept_]); !status) return status;
+  }
+  return {};
+}
+
+Status ImageFiles::record(const LayerRecord& record) {
+  if (Status status = record_kept_below(record.layer.index); !status) return status;
+  return manifest_->append(record);
+}
+
+Status ImageFiles::finish() {
+  if (Status status = record_kept_below(UINT32_MAX); !status) return status;
+  return manifest_->finish();
+}
+
+Status ImageFiles::keep() { return manifest_->flush(); }
+
+}  // namespace lamina::pipeline

@@ -1,0 +1,132 @@
+// pipeline/output/line_io.h: one line of JSON, written and read piece by piece through the same calls.
+//
+// A line is read exactly as it is written: a hundred thousand of them take a few hundredths of a second, and no other
+// spelling is accepted.
+#pragma once
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <charconv>
+#include <iterator>
+#include <string>
+#include <string_view>
+
+#include "stages/data/hash.h"
+#include "pipeline/text/json_text.h"
+#include "stages/data/layer.h"
+
+namespace lamina::pipeline {
+
+/// Appends the pieces of a line.
+class LineWriter {
+ public:
+  explicit LineWriter(std::string& out) : out_(out) {}
+  template <class Number>
+  void number(std::string_view key, const Number& value) {
+    begin(key);
+    fmt::format_to(std::back_inserter(out_), "{}", value);
+  }
+  /// A text that follows from the rest of the line.
+  void fixed(std::string_view key, std::string_view value) {
+    begin(key);
+    out_ += json_string(value);
+  }
+  void hash(std::string_view key, const Hash128& value) {
+    begin(key);
+    fmt::format_to(std::back_inserter(out_), "\"{:016x}{:016x}\"", value.high, value.low);
+  }
+  void reason(std::string_view key, const LayerReason& value) { fixed(key, reason_name(value)); }
+  /// Opens an object or a list below a key; without a key it is an element of a list.
+  void open(std::string_view key, std::string_view bracket) {
+    if (!key.empty()) {
+      begin(key);
+    } else if (!first_) {
+      out_ += ", ";
+    }
+    out_ += bracket;
+    first_ = true;
+  }
+  void close(std::string_view bracket) {
+    out_ += bracket;
+    first_ = false;
+  }
+
+ private:
+  void begin(std::string_view key) {
+    fmt::format_to(std::back_inserter(out_), "{}\"{}\": ", first_ ? "" : ", ", key);
+    first_ = false;
+  }
+  std::string& out_;
+  bool first_ = true;
+};
+
+/// Takes the pieces of a line away from its front; what() says what is wrong with it.
+class LineReader {
+ public:
+  explicit LineReader(std::string_view line) : rest_(line) {}
+  template <class Number>
+  void number(std::string_view key, Number& value) {
+    begin(key);
+    const auto [stop, error] = std::from_chars(rest_.data(), rest_.data() + rest_.size(), value);
+    expect(error == std::errc());
+    if (good()) rest_.remove_prefix(static_cast<std::size_t>(stop - rest_.data()));
+  }
+  void fixed(std::string_view key, std::string_view value) {
+    begin(key);
+    if (good() && !take(json_string(value))) what_ = fmt::format("its \"{}\" is not {}", key, value);
+  }
+  void hash(std::string_view key, Hash128& value) {
+    begin(key);
+    expect(take("\""));
+    if (good() && !read_hex(rest_.substr(0, 32), value)) what_ = "has a hash that is none";
+    rest_.remove_prefix(std::min<std::size_t>(32, rest_.size()));
+    expect(take("\""));
+  }
+  void reason(std::string_view key, LayerReason& value) {
+    begin(key);
+    for (const LayerReason one :
+         {LayerReason::kUniform, LayerReason::kSlope, LayerReason::kPeak, LayerReason::kCusp, LayerReason::kFlat}) {
+      if (!take(fmt::format("\"{}\"", reason_name(one)))) continue;
+      value = one;
+      return;
+    }
+    if (good()) what_ = "has a reason that is none";
+  }
+  void open(std::string_view key, std::string_view bracket) {
+    if (!key.empty()) {
+      begin(key);
+    } else if (!first_) {
+      expect(take(", "));
+    }
+    expect(take(bracket));
+    first_ = true;
+  }
+  void close(std::string_view bracket) {
+    expect(take(bracket));
+    first_ = false;
+  }
+  bool good() const { return what_.empty(); }
+  const std::string& what() const { return what_; }
+  bool ended() const { return rest_.empty(); }
+
+ private:
+  void begin(std::string_view key) {
+    if (!first_) expect(take(", "));
+    expect(take("\"") && take(key) && take("\": "));
+    first_ = false;
+  }
+  bool take(std::string_view piece) {
+    if (!rest_.starts_with(piece)) return false;
+    rest_.remove_prefix(piece.size());
+    return true;
+  }
+  void expect(bool holds) {
+    if (!holds && what_.empty()) what_ = "is not the line of a layer";
+  }
+  std::string_view rest_;
+  std::string what_;
+  bool first_ = true;
+};
+
+}  // namespace lamina::pipeline

@@ -1,0 +1,102 @@
+// pipeline/output/manifest_line.h: the line of a layer in a manifest, described once for its writer and its reader.
+#pragma once
+
+#include <string_view>
+
+#include "pipeline/output/line_io.h"
+#include "pipeline/output/manifest.h"
+
+namespace lamina::pipeline {
+
+template <class Io, class Paths>
+void describe_moves(Io& io, Paths& paths) {
+  auto& t = paths.totals;
+  io.number("stored_points", paths.stored_points);
+  io.number("moves", t.moves);
+  io.number("travels", t.travels);
+  io.number("retractions", t.retractions);
+  io.number("laid_mm", t.bead_mm);
+  io.number("travel_mm", t.travel_mm);
+  io.number("volume_mm3", t.volume_mm3);
+  io.number("filament_mm", t.filament_mm);
+  io.number("seconds", t.seconds);
+  io.number("low_x_nm", t.lo_x);
+  io.number("low_y_nm", t.lo_y);
+  io.number("high_x_nm", t.hi_x);
+  io.number("high_y_nm", t.hi_y);
+  io.number("segmented_lines", paths.segments.lines);
+  io.number("pieces", paths.segments.pieces);
+  io.number("stretches", paths.segments.stretches);
+  io.number("thin", paths.segments.thin);
+  io.number("solid_mm3", paths.porosity.solid_mm3);
+  io.number("extruded_mm3", paths.porosity.extruded_mm3);
+  io.number("ellipses_mm3", paths.porosity.ellipses_mm3);
+  io.number("measured_mm3", paths.porosity.measured_mm3);
+}
+
+template <class Io, class Paths>
+void describe_paths(Io& io, Product product, Paths& paths) {
+  io.number("contours", paths.contours);
+  io.number("points", paths.points);
+  io.number("area_mm2", paths.area_mm2);
+  io.number("paths", paths.paths);
+  io.number("bead_mm", paths.bead_mm);
+  io.number("united", paths.united);
+  io.number("open", paths.open);
+  if (product == Product::kMoves) describe_moves(io, paths);
+}
+
+template <class Io, class Record>
+void describe_images(Io& io, const ManifestHead& head, Record& record) {
+  io.number("capped_rows", record.capped_rows);
+  if (head.materials.empty()) {
+    io.number("set_pixels", record.set_pixels);
+  } else {
+    io.open("images", "[");
+    for (std::size_t m = 0; m < head.materials.size(); ++m) {
+      auto& image = record.images[m];
+      io.open("", "{");
+      io.fixed("file", layer_file_name(record.layer.index, head.extension, head.materials[m].name));
+      io.number("bytes", image.bytes);
+      io.number("set_pixels", image.set_pixels);
+      io.hash("xxh3_128", image.hash);
+      io.close("}");
+    }
+    io.close("]");
+  }
+  if (head.machine.empty()) return;
+  io.open("program", "{");
+  io.number("bytes", record.program.bytes);
+  io.number("sweeps", record.program.sweeps);
+  io.number("drops", record.program.drops);
+  io.number("moved", record.program.moved);
+  io.number("lost", record.program.lost);
+  io.hash("xxh3_128", record.program.hash);
+  io.close("}");
+}
+
+/// images of a record that is read are there already, one for each material; `paths` is not used for images.
+template <class Io, class Record, class Paths>
+void describe_line(Io& io, const ManifestHead& head, Record& record, Paths& paths) {
+  io.open("", "{");
+  io.number("index", record.layer.index);
+  if (!head.extension.empty() && head.materials.empty()) {
+    io.fixed("file", layer_file_name(record.layer.index, head.extension));
+  }
+  io.number("bottom_nm", record.layer.bottom);
+  io.number("thickness_nm", record.layer.thickness);
+  io.reason("reason", record.layer.reason);
+  if (head.materials.empty()) {
+    if (!head.file.empty()) io.number("offset", record.offset);
+    io.number("bytes", record.bytes);
+    io.hash("xxh3_128", record.hash);
+  }
+  if (head.product == Product::kImages) {
+    describe_images(io, head, record);
+  } else {
+    describe_paths(io, head.product, paths);
+  }
+  io.close("}");
+}
+
+}  // namespace lamina::pipeline

@@ -1,0 +1,61 @@
+// pipeline/output/record.h: what a manifest says of one layer.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "stages/data/hash.h"
+#include "stages/data/layer.h"
+#include "stages/segment/moves.h"
+#include "stages/write/extrusion_format.h"
+
+namespace lamina::pipeline {
+
+/// The print program of a layer, for a job with a machine.
+struct ProgramRecord {
+  std::uint64_t bytes = 0;
+  Hash128 hash;
+  std::uint32_t sweeps = 0;  // that fire
+  std::uint64_t drops = 0;
+  std::uint64_t moved = 0, lost = 0;  // pixels of blocked nozzles (stages/program/compile.h)
+};
+
+/// The image of one material, where a job has several.
+struct ImageRecord {
+  std::uint64_t bytes = 0, set_pixels = 0;
+  Hash128 hash;
+};
+
+/// Contours and toolpaths of a layer.
+struct PathFacts {
+  std::uint64_t contours = 0, points = 0, paths = 0, united = 0, open = 0;  // united: bodies that needed a union
+  double area_mm2 = 0;                                                      // within the contours
+  double bead_mm = 0;                                                       // length of the stored toolpaths
+
+  // --- toolpaths of an extrusion printer
+  std::uint64_t stored_points = 0;
+  write::MoveTotals totals;
+  segment::SegmentCounts segments;
+  segment::PlannedPorosity porosity;
+
+  /// Sums; in layer order they are the same whoever adds them.
+  void add(const PathFacts& other);
+};
+
+struct LayerRecord {
+  Layer layer{};
+  std::uint64_t bytes = 0;   // of the layer's files, or of its stretch of the one file
+  std::uint64_t offset = 0;  // where that stretch begins
+  Hash128 hash;              // of the file or stretch; nothing where a layer has several images
+
+  // --- images
+  std::uint64_t set_pixels = 0;
+  std::uint32_t capped_rows = 0;    // rows that are closed only thanks to repair (stages/load)
+  ProgramRecord program;            // zeros without a machine
+  std::vector<ImageRecord> images;  // one for each material, if the job has several
+
+  std::shared_ptr<const PathFacts> paths;  // null for images
+};
+
+}  // namespace lamina::pipeline

@@ -1,0 +1,64 @@
+// pipeline/output/slice_files.h: where the layers of a sliced job go: one file (SVG, CLI, 3MF) or a file a layer, and the
+// manifest beside them.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "pipeline/output/layered_file.h"
+#include "pipeline/plan/plan.h"
+#include "stages/data/buffer.h"
+#include "stages/data/status.h"
+#include "stages/write/slice3mf/slice3mf.h"
+#include "stages/write/slice_format.h"
+
+namespace lamina::pipeline {
+
+class SliceFiles {
+ public:
+  /// The plan has to outlive it.
+  explicit SliceFiles(const Plan& plan);
+  /// Layers that wait for their names go with a job that does not finish.
+  ~SliceFiles();
+
+  /// errors  kUsage, kOutput
+  Status open();
+  /// Of one file: what stands of it. Null for other kinds.
+  const LayeredFile* file() const { return file_ ? &*file_ : nullptr; }
+  /// What the summary names.
+  std::string output() const;
+  /// Bytes of text that points and paths take.
+  Sections::TextBytes text_bytes() const;
+
+  // --- from many threads at once, each with a text of its own
+  void encode(const write::SliceLayer& layer, Buffer<char>& text) const;
+  /// Of a file a layer: writes it. errors  kOutput
+  Status store(std::uint32_t index, const Buffer<char>& text, LayerRecord& record) const;
+
+  // --- from one thread at a time, in layer order
+  Status record(const write::SliceLayer& layer, const Buffer<char>& text, LayerRecord& record);
+  /// returns  the bytes of all files
+  Result<std::uint64_t> finish();
+  Status keep() { return file_ ? file_->keep() : Status(); }
+  void discard();
+  /// Whether an interrupted job can be resumed.
+  bool keeps() const { return file_.has_value(); }
+
+ private:
+  Status save_plan() const;
+  Result<FileDigest> finish_package();
+
+  const Plan& plan_;
+  const bool file_a_layer_;
+  write::SliceHead head_;
+  std::unique_ptr<write::SliceEncoder> encoder_;    // of text formats
+  std::optional<write::Slice3mfWriter> package_;    // 3MF
+  std::optional<LayeredFile> file_;                 // of one text file
+  std::optional<ManifestWriter> manifest_;          // of all others
+  std::uint64_t bytes_ = 0;
+  bool finished_ = false;
+};
+
+}  // namespace lamina::pipeline

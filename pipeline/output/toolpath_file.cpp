@@ -1,0 +1,140 @@
+#include "pipeline/output/toolpath_file.h"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <cmath>
+#include <filesystem>
+
+#include "pipeline/output/plan_head.h"
+#include "pipeline/plan/heights.h"
+#include "pipeline/text/json_text.h"
+#include "pipeline/text/version.h"
+#include "stages/heights/evaluate.h"
+#include "stages/write/file.h"
+#include "stages/write/rp3/rp3.h"
+
+namespace lamina::pipeline {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::string manifest_path(const Job& job) { return job.output + ".json"; }
+
+/// The layer table that belongs to a file of toolpaths.
+std::string table_path(const Job& job) { return fs::path(job.output).replace_extension(".rp3").string(); }
+
+bool streams(const Job& job) {
+  std::error_code error;
+  const fs::file_status status = fs::status(job.output, error);
+  return job.output == "-" || (fs::exists(status) && !fs::is_regular_file(status) && !fs::is_directory(status));
+}
+
+std::string source_text(const Plan& plan) {
+  std::string text;
+  for (const std::string& name : plan.sections->names()) {
+    if (text.size() > 200) return text + ", ...";
+    text += (text.empty() ? "" : ", ") + one_line(name);
+  }
+  return text;
+}
+
+/// The slopes that the layers were decided by, or else the flattest ones in them.
+Result<std::string> layer_table(const Plan& plan) {
+  const Job& job = plan.job;
+  const auto options = heights_options(job);
+  if (!options) return options.error();
+  auto own = job.heights.per_part ? decide_heights(job, *plan.scene) : Result<heights::Plan>(heights::Plan());
+  if (!own) return own.error();
+  const heights::Plan& of = job.heights.per_part ? *own : plan.heights;
+  heights::Evaluation evaluation;
+  if (of.looked_at.empty()) {
+    evaluation = heights::evaluate(index_scene(*plan.scene, *options), heights::boundaries_of(of.table), *options);
+  }
+  std::vector<write::rp3::Layer> layers;
+  for (std::uint32_t i = plan.range[0]; i < std::min(plan.range[1], of.table.size()); ++i) {
+    const auto& slope = of.looked_at.empty() ? evaluation.layers[i].flattest : of.looked_at[i];
+    layers.push_back({mm(of.table[i].thickness), heights::angle_of(slope)});
+  }
+  const FillSettings& fill = job.fill.all;
+  write::rp3::Settings settings;
+  settings.raster_width_mm = fill.width_mm;
+  settings.contour_offset_mm = fill.wall_width_mm > 0 ? fill.wall_width_mm : fill.width_mm;
+  settings.angle_step_deg = fill.angle_step_deg;
+  settings.first_angle_deg = std::fmod(fill.angle_deg + settings.angle_step_deg * plan.range[0], 360);
+  settings.shrink = job.parts.front().shrink;
+  settings.rotation_deg = job.parts.front().rotate_deg;
+  return write::rp3::text_of(layers, settings);
+}
+
+}  // namespace
+
+Status check_toolpath_output(const Job& job, const Extruder& machine) {
+  const bool sml = machine.format == "sml";
+  if (sml && table_path(job) == job.output) {
+    return Error{Fault::kUsage, fmt::format("-o {}: is the name of its report; end it in .sml", job.output)};
+  }
+  std::error_code error;
+  if (fs::is_directory(job.output, error)) {
+    return Error{Fault::kUsage, fmt::format("-o {}: is a directory; name a file in it, as in {}", job.output,
+                                            (fs::path(job.output) / "part.gcode").string())};
+  }
+  if (streams(job)) {
+    if (!job.resume && !sml) return {};
+    return Error{Fault::kUsage, fmt::format("-o {}: is no file, which {} needs; name one", job.output,
+                                            sml ? "the layer table beside an SML file" : "--resume")};
+  }
+  if (Status status = write::check_not_being_written(job.output); !status) return status;
+  if (job.overwrite || job.resume) return {};
+  std::vector<std::string> names{job.output, manifest_path(job)};
+  if (sml) names.push_back(table_path(job));
+  for (const std::string& name : names) {
+    if (!fs::exists(fs::symlink_status(name, error))) continue;
+    return Error{Fault::kUsage,
+                 fmt::format("{}: is there already; replace it with --overwrite, or name another file with -o", name)};
+  }
+  if (!fs::exists(manifest_path(job) + ".part", error)) return {};
+  return Error{Fault::kUsage, fmt::format("{}.part: an interrupted job; go on with --resume, or start over with --overwrite",
+                                          job.output)};
+}
+
+ToolpathFile::ToolpathFile(const Plan& plan) : plan_(plan), format_(write::make_extrusion_format(plan.moves->profile.machine)) {}
+
+Status ToolpathFile::open() {
+  const Job& job = plan_.job;
+  ManifestHead head = plan_head(plan_);
+  const Extruder& machine = plan_.moves->profile.machine;
+  head.format = machine.format;
+  head.file = fs::path(job.output).filename().string();
+  head.machine = machine.name;
+  const std::string profile = extruder_text(plan_.moves->profile);
+  head.machine_profile = hash_bytes(std::as_bytes(std::span(profile)));
+  Buffer<char> start;
+  format_->head({fmt::format("lamina {}", version()), source_text(plan_), layers(), plan_.segments->any()}, start);
+  auto file = LayeredFile::open({job.output, manifest_path(job), job.resume, streams(job)}, head, {start.data(), start.size()});
+  if (!file) return file.error();
+  file_.emplace(std::move(*file));
+  return {};
+}
+
+std::unique_ptr<write::LayerMoves> ToolpathFile::layer(const Layer& layer, Buffer<char>& text) const {
+  return format_->layer(layer, layers(), text);
+}
+
+Result<std::uint64_t> ToolpathFile::finish(const write::MoveTotals& totals) {
+  if (file_->finished()) return file_->size();
+  if (plan_.moves->profile.machine.format == "sml") {
+    const auto table = layer_table(plan_);
+    if (!table) return table.error();
+    if (Status status = write::write_file(table_path(plan_.job), std::string_view(*table)); !status) return status.error();
+  }
+  Buffer<char> end;
+  format_->tail(totals, layers(), end);
+  return file_->finish({end.data(), end.size()});
+}
+
+void ToolpathFile::discard() {
+  if (file_) file_->discard();
+}
+
+}  // namespace lamina::pipeline

@@ -1,0 +1,49 @@
+// pipeline/output/toolpath_file.h: where the layers of an extrusion job go: one file of moves, its manifest beside it, and
+// for SML its layer table (.rp3).
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string_view>
+
+#include "pipeline/output/layered_file.h"
+#include "pipeline/plan/plan.h"
+#include "stages/data/buffer.h"
+#include "stages/data/status.h"
+#include "stages/write/extrusion_format.h"
+
+namespace lamina::pipeline {
+
+/// Refuses a file that is there, unless the job resumes or overwrites it; nothing is touched. errors  kUsage, kOutput
+Status check_toolpath_output(const Job& job, const Extruder& machine);
+
+class ToolpathFile {
+ public:
+  /// The plan has to outlive it.
+  explicit ToolpathFile(const Plan& plan);
+
+  /// errors  of LayeredFile::open
+  Status open();
+  const LayeredFile& file() const { return *file_; }
+
+  /// Takes the moves of a layer as text; from many threads at once, each with a text of its own.
+  std::unique_ptr<write::LayerMoves> layer(const Layer& layer, Buffer<char>& text) const;
+
+  // --- from one thread at a time, in layer order
+  Status append(std::string_view text) { return file_->append(text); }
+  Status record(LayerRecord& record) { return file_->record(record); }
+  /// totals  of all layers. returns  the file's size
+  Result<std::uint64_t> finish(const write::MoveTotals& totals);
+  Status keep() { return file_ ? file_->keep() : Status(); }
+  void discard();
+
+ private:
+  std::uint32_t layers() const { return plan_.range[1] - plan_.range[0]; }
+
+  const Plan& plan_;
+  std::unique_ptr<write::ExtrusionFormat> format_;
+  std::optional<LayeredFile> file_;
+};
+
+}  // namespace lamina::pipeline

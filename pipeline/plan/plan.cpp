@@ -1,0 +1,256 @@
+#include "pipeline/plan/plan.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+
+#include "pipeline/machine/powder_printer.h"
+#include "pipeline/plan/fill.h"
+#include "pipeline/plan/heights.h"
+#include "pipeline/plan/layer_cut.h"
+#include "pipeline/plan/layers.h"
+#include "pipeline/plan/reach.h"
+#include "pipeline/text/number_text.h"
+#include "stages/write/extrusion_format.h"
+#include "stages/write/image_format.h"
+
+namespace lamina::pipeline {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
+
+Error usage(std::string what) { return {Fault::kUsage, std::move(what)}; }
+
+/// Puts a plan together, one step after the other.
+class Planner {
+ public:
+  Planner(Resolved resolved, const ProgressCallback& progress) : progress_(progress) {
+    plan_.job = std::move(resolved.job);
+    plan_.product = resolved.product;
+    if (resolved.extruder) plan_.moves.emplace(MovePlan{std::move(*resolved.extruder), {}});
+  }
+
+  Result<Plan> make() {
+    for (const auto step : {&Planner::read_fillings, &Planner::load, &Planner::decide_layers, &Planner::check_machine,
+                            &Planner::index_sections, &Planner::index_images, &Planner::predict_pores}) {
+      if (Status status = (this->*step)(); !status) return status.error();
+    }
+    return std::move(plan_);
+  }
+
+ private:
+  Job& job() { return plan_.job; }
+  bool images() const { return plan_.product == Product::kImages; }
+  bool moves() const { return plan_.product == Product::kMoves; }
+
+  /// Segmentations come before fillings, whose lines lie as they ask.
+  Status read_fillings() {
+    FillRequest fill = job().fill;
+    if (images()) {
+      auto materials = materials_of(job());
+      if (!materials) return materials.error();
+      materials_ = std::move(*materials);
+      beads_ = job().segment.all.on || !job().segment.by_height.empty();
+    }
+    if (beads_ || moves()) {
+      if (Status status = segment(fill); !status) return status;
+    }
+    const auto fills = read_parts(fill);
+    if (!fills) return fills.error();
+    if (!images() || beads_ || !*fills) return {};
+    beads_ = true;
+    return segment(fill);
+  }
+
+  Status segment(FillRequest& fill) {
+    auto segments = images() ? plan_bead_segments(job(), fill, plan_.warnings)
+                             : plan_segments(job().segment, plan_.moves->profile.calibration, fill);
+    if (!segments) return segments.error();
+    plan_.segments = std::make_unique<SegmentPlan>(std::move(*segments));
+    return {};
+  }
+
+  /// The filling of each part. returns  whether any part has walls or lines
+  Result<bool> read_parts(const FillRequest& fill) {
+    bool any = false;
+    for (const PartRequest& part : job().parts) {
+      auto filling = plan_filling(fill, part.fill);
+      if (!filling) return filling.error();
+      any |= filling->fills();
+      fillings_.push_back(std::move(*filling));
+    }
+    return any;
+  }
+
+  Status load() {
+    const auto start = Clock::now();
+    progress_({ProgressEvent::Stage::kLoading});
+    auto scene = load_scene(job());
+    if (!scene) return scene.error();
+    plan_.scene = std::make_unique<Scene>(std::move(*scene));
+    for (const Instance& instance : plan_.scene->instances) {
+      plan_.triangles += plan_.scene->meshes[instance.mesh].triangles.size();
+    }
+    plan_.load_seconds = seconds_since(start);
+    return {};
+  }
+
+  Status decide_layers() {
+    index_start_ = Clock::now();
+    progress_({ProgressEvent::Stage::kIndexing});
+    if (images()) {
+      if (Status status = check_reach(job(), *plan_.scene); !status) return status;
+    }
+    if (!job().heights.per_part) {
+      auto heights = decide_heights(job(), *plan_.scene);
+      if (!heights) return heights.error();
+      plan_.heights = std::move(*heights);
+    }
+    if (!images() || beads_) {
+      auto schedule = schedule_layers(job(), *plan_.scene, plan_.heights.table);
+      if (!schedule) return schedule.error();
+      schedule_ = std::move(*schedule);
+    }
+    plan_.layer_count =
+        job().heights.per_part ? static_cast<std::uint32_t>(schedule_.layers.size()) : plan_.heights.table.size();
+    return {};
+  }
+
+  Status check_machine() {
+    if (images()) {
+      Result<std::string> steps = check_build_steps(job(), plan_.heights.table);
+      if (!steps) return steps.error();
+      if (!steps->empty()) plan_.warnings.push_back(std::move(*steps));
+    }
+    const auto range = layer_range(job(), plan_.layer_count);
+    if (!range) return range.error();
+    plan_.range = *range;
+    if (!moves()) return {};
+    const Extruder& machine = plan_.moves->profile.machine;
+    if (mm(plan_.scene->height) > machine.bed.build_height_mm) {
+      return usage(fmt::format("the parts are {:.3f} mm high, {} builds {:.3f} mm; lay them down or scale them",
+                               mm(plan_.scene->height), machine.name, machine.bed.build_height_mm));
+    }
+    const auto format = write::make_extrusion_format(machine);
+    for (std::uint32_t i = plan_.range[0]; i < plan_.range[1]; ++i) {
+      if (Status status = format->check(schedule_.layers[i].layer); !status) return status;
+    }
+    return {};
+  }
+
+  Status index_sections() {
+    if (images() && !beads_) return {};
+    auto sections = Sections::make(job(), *plan_.scene, std::move(schedule_), std::move(fillings_));
+    if (!sections) return sections.error();
+    plan_.sections = std::make_unique<Sections>(std::move(*sections));
+    if (plan_.segments) {
+      if (Status status = check_thin_stretches(*plan_.segments, *plan_.sections); !status) return status;
+    }
+    plan_.index_seconds = seconds_since(index_start_);
+    return {};
+  }
+
+  Status index_images() {
+    if (!images()) return {};
+    const PixelGrid grid = grid_of(job());
+    if (job().dose.core == 0 &&
+        static_cast<double>(nm_of(job().dose.shell_mm)) * std::max(grid.x.pixels_per_nm(), grid.y.pixels_per_nm()) < 1) {
+      plan_.warnings.push_back(
+          "dose.core: 0 without a shell of at least a pixel jets no drop, the parts stay loose powder; add --shell or "
+          "give a share above 0");
+    }
+    double covered = 0;
+    for (const Instance& instance : plan_.scene->instances) {
+      const Box& box = plan_.scene->meshes[instance.mesh].bounds;
+      covered += (static_cast<double>(box.width()) * grid.x.pixels_per_nm() + 1) *
+                 (static_cast<double>(box.depth()) * grid.y.pixels_per_nm() + 1);
+    }
+    // The slicer refers to the scene's meshes, the rasterizer takes those it is given.
+    std::optional<Scene> copy;
+    if (beads_) copy.emplace(*plan_.scene);
+    auto solids = Solids::build(copy ? *copy : *plan_.scene, job(), grid, materials_);
+    if (!solids) return solids.error();
+    std::optional<Beads> beads;
+    if (beads_) beads.emplace(job(), grid, *plan_.sections, *plan_.segments);
+    const double bed = static_cast<double>(grid.columns()) * grid.rows();
+    plan_.images.emplace(ImagePlan{grid, std::move(materials_), std::move(*solids), DosePlan(job(), grid), std::move(beads),
+                                   static_cast<std::uint64_t>(std::min(covered, bed))});
+    plan_.index_seconds = seconds_since(index_start_);
+    return {};
+  }
+
+  /// What a person is told of each range of heights before anything is printed.
+  Status predict_pores() {
+    if (!moves()) return {};
+    if (!plan_.sections->fills()) {
+      plan_.warnings.push_back("nothing is asked for: no walls and no filling; give --walls, --fill or both");
+    }
+    const ExtruderProfile& profile = plan_.moves->profile;
+    const auto one = [&](const SegmentRange& range, const std::string& heights) {
+      if (!range.settings.on) return;
+      for (const std::string& warning : segment::warnings(range.plan, profile.calibration)) {
+        plan_.warnings.push_back(heights.empty() ? warning : heights + ": " + warning);
+      }
+      plan_.moves->pores.emplace_back(heights, segment::predict_pores(range.plan));
+    };
+    one(plan_.segments->base, "");
+    for (const SegmentRange& range : plan_.segments->ranges) {
+      one(range, fmt::format("{} to {} mm", number_text(mm(range.from)), number_text(mm(range.to))));
+    }
+    if (plan_.segments->any() && !profile.own_calibration && profile.machine.name != "Anet A8") {
+      plan_.warnings.push_back(
+          fmt::format("{} has no calibration of its own; widths and limits are those measured on an Anet A8: "
+                      "lamina calibrate makes one",
+                      profile.machine.name));
+    }
+    return {};
+  }
+
+  const ProgressCallback& progress_;
+  Plan plan_;
+  Materials materials_;
+  std::vector<FillPlan> fillings_;
+  LayerSchedule schedule_;
+  bool beads_ = false;  // fill the parts of an image
+  Clock::time_point index_start_;
+};
+
+}  // namespace
+
+Result<Resolved> resolve(const Job& asked, Product product) {
+  Resolved resolved{asked, product, std::nullopt};
+  Job& job = resolved.job;
+  if (product == Product::kImages) {
+    if (job.heights.per_part) {
+      return usage("--per-part: a powder bed has one table of layers for all parts; leave it out");
+    }
+    if (Status status = resolve_machine(job); !status) return status.error();
+    if (write::find_image_format(job.format) == nullptr) return usage(fmt::format("unknown format '{}'", job.format));
+    return resolved;
+  }
+  if (job.shard) return usage(fmt::format("run.shard: {}", kNoShards));
+  if (product == Product::kContours) {
+    if (job.slice.format == "3mf" && job.slice.file_a_layer) {
+      return usage("--file-a-layer: a 3MF package holds all slices; choose svg or cli, or leave it out");
+    }
+    if (job.heights.per_part) {
+      return usage("--per-part: a file of slices has one table of layers for all parts; leave it out");
+    }
+    return resolved;
+  }
+  auto profile = resolve_extruder(job);
+  if (!profile) return profile.error();
+  job.bed_mm = profile->machine.bed.size_mm;
+  job.machine.decides_bed = true;
+  resolved.extruder = std::move(*profile);
+  return resolved;
+}
+
+Result<Plan> make_plan(Resolved resolved, const ProgressCallback& progress) {
+  return Planner(std::move(resolved), progress).make();
+}
+
+}  // namespace lamina::pipeline

@@ -1,0 +1,13 @@
+// pipeline/run/contour_maker.h: the layers of a sliced job: contours, and what fills them.
+#pragma once
+
+#include <memory>
+
+#include "pipeline/plan/plan.h"
+#include "pipeline/run/maker.h"
+
+namespace lamina::pipeline {
+
+std::unique_ptr<Maker> make_contour_maker(const Plan& plan, const FlowLimits& limits);
+
+}  // namespace lamina::pipeline

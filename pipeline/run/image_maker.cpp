@@ -1,0 +1,236 @@
+#include "pipeline/run/image_maker.h"
+
+#include <fmt/format.h>
+
+#include <nlohmann/json.hpp>
+
+#include "pipeline/text/number_text.h"
+#include "pipeline/text/readable.h"
+
+namespace lamina::pipeline {
+namespace {
+
+/// One line about rows that only repair closes, or that stay open, and where the first of them is.
+class RowWarnings {
+ public:
+  void add(const Layer& layer, const raster::LayerReport& report, const PixelGrid& grid) {
+    note(capped_, layer, report.capped_rows, report.first_capped_row, report.first_capped_instance, grid);
+    note(open_, layer, report.open_rows, report.first_open_row, 0, grid);
+  }
+
+  void tell(const Scene& scene, Summary& summary) const {
+    if (capped_.rows > 0) {
+      const std::uint32_t part = scene.part_of_instance[capped_.instance];
+      summary.warnings.push_back(fmt::format(
+          "{}: {} rows in {} layers are closed only by the caps put over its openings, first {}; look at `lamina info`",
+          scene.parts[part].path, capped_.rows, capped_.layers, capped_.place));
+    }
+    if (open_.rows > 0) {
+      summary.warnings.push_back(
+          fmt::format("{} rows in {} layers stay open, first {}; each is drawn up to its last crossing; leave out "
+                      "--no-repair to close the parts",
+                      open_.rows, open_.layers, open_.place));
+    }
+  }
+  std::uint64_t capped() const { return capped_.rows; }
+
+ private:
+  struct Tally {
+    std::uint64_t rows = 0;
+    std::uint32_t layers = 0, instance = 0;
+    std::string place;
+  };
+  static void note(Tally& tally, const Layer& layer, std::uint32_t rows, std::uint32_t first_row, std::uint32_t instance,
+                   const PixelGrid& grid) {
+    if (rows == 0) return;
+    if (tally.rows == 0) {
+      tally.place = fmt::format("in layer {} at y {:.3f} mm, z {:.3f} mm (image row {})", layer.index,
+                                mm(grid.y.centre(first_row)), mm(layer.plane()), grid.rows() - 1 - first_row);
+      tally.instance = instance;
+    }
+    tally.rows += rows;
+    ++tally.layers;
+  }
+  Tally capped_, open_;
+};
+
+class ImageMaker : public Maker {
+ public:
+  ImageMaker(const Plan& plan, const FlowLimits& limits)
+      : plan_(plan), imager_(plan), files_(plan), work_(limits.most_in_flight), made_(limits.most_unrecorded) {
+    for (const JobMaterial& material : plan.images->materials.used) materials_.emplace_back(material.name, 0);
+  }
+
+  std::uint64_t bytes_of(std::uint32_t layer) const override {
+    const Layer of = plan_.layer(layer);
+    return imager_.bytes_of(of) + files_.bytes_bound(imager_.changes_bound(of));
+  }
+
+  Result<std::vector<std::uint32_t>> open() override {
+    if (Status status = files_.open(); !status) return status.error();
+    return files_.todo();
+  }
+  std::vector<LayerRecord> kept() const override { return files_.kept(); }
+
+  std::vector<MakerStep> steps() override {
+    std::vector<MakerStep> steps;
+    const auto add = [&](std::string_view name, auto step) {
+      steps.push_back({name, [this, step](std::uint32_t layer, const Ticket& ticket) {
+                         return step(plan_.layer(layer), work_[ticket.work], made_[ticket.record]);
+                       }});
+    };
+    add("raster", [this](const Layer& layer, Work& work, Made& made) {
+      made = {};
+      made.record.layer = layer;
+      return imager_.raster(layer, work.images, made.record, made.notes);
+    });
+    if (plan_.images->beads) {
+      add("contours", [this](const Layer& layer, Work& work, Made&) { return imager_.contours(layer, work.images); });
+      add("fill", [this](const Layer& layer, Work& work, Made&) { return imager_.fill(layer, work.images); });
+      add("beads", [this](const Layer& layer, Work& work, Made& made) { return imager_.beads(layer, work.images, made.notes); });
+    }
+    add("dose", [this](const Layer& layer, Work& work, Made& made) {
+      imager_.dose(layer, work.images, made.record);
+      return Status();
+    });
+    add("encode", [this](const Layer&, Work& work, Made& made) {
+      return files_.encode(work.images.runs, work.images.materials.image, work.files, made.record);
+    });
+    add("store", [this](const Layer&, Work& work, Made& made) {
+      return files_.store(work.images.runs, work.files, made.record);
+    });
+    return steps;
+  }
+  bool records_from_work() const override { return false; }
+
+  Status record(std::uint32_t, const Ticket& ticket) override {
+    const Made& made = made_[ticket.record];
+    if (Status status = files_.record(made.record); !status) return status;
+    add(made.record);
+    warnings_.add(made.record.layer, made.notes.report, plan_.images->grid);
+    capped_rows_ += made.notes.report.capped_rows;
+    solid_pixels_ += made.notes.solid_pixels;
+    bead_pixels_ += made.notes.bead_pixels;
+    bytes_written_ += made.record.bytes + made.record.program.bytes;
+    return {};
+  }
+  void add_kept(const LayerRecord& record) override { add(record); }
+
+  std::uint64_t bytes_held(std::uint32_t work) const override { return work_[work].images.bytes() + work_[work].files.bytes(); }
+  void let_go(std::uint32_t work) override { work_[work] = Work(); }
+
+  Status finish() override { return files_.finish(); }
+  Status stop(bool) override { return files_.keep(); }
+
+  void tell(Summary& summary) const override;
+
+ private:
+  struct Work {
+    ImageWork images;
+    ImageFiles::Work files;
+  };
+  struct Made {
+    LayerRecord record;
+    ImageNotes notes;
+  };
+
+  void add(const LayerRecord& record) {
+    const PixelGrid& grid = plan_.images->grid;
+    set_pixels_ += record.set_pixels;
+    moved_pixels_ += record.program.moved;
+    lost_pixels_ += record.program.lost;
+    for (std::size_t m = 0; m < record.images.size(); ++m) materials_[m].second += record.images[m].set_pixels;
+    const double pixel_mm2 = 25.4 * 25.4 / (grid.x.dpi() * grid.y.dpi());
+    volume_mm3_ += static_cast<double>(record.set_pixels) * pixel_mm2 * mm(record.layer.thickness);
+  }
+
+  const Plan& plan_;
+  LayerImager imager_;
+  ImageFiles files_;
+  std::vector<Work> work_;
+  std::vector<Made> made_;
+
+  RowWarnings warnings_;
+  std::uint64_t set_pixels_ = 0, moved_pixels_ = 0, lost_pixels_ = 0, solid_pixels_ = 0, bead_pixels_ = 0, capped_rows_ = 0;
+  std::uint64_t bytes_written_ = 0;
+  double volume_mm3_ = 0;
+  std::vector<std::pair<std::string, std::uint64_t>> materials_;  // name, set pixels
+};
+
+void ImageMaker::tell(Summary& summary) const {
+  const PixelGrid& grid = plan_.images->grid;
+  const double porosity = 1 - static_cast<double>(bead_pixels_) / static_cast<double>(solid_pixels_);
+  const double pixels = static_cast<double>(grid.columns()) * grid.rows() * summary.layers_planned;
+  const double pixels_a_second = summary.layer_seconds > 0 ? pixels / summary.layer_seconds : 0;
+  const bool several = plan_.images->materials.several();
+  summary.bytes_written = bytes_written_;
+  summary.volume_mm3 = volume_mm3_;
+
+  const auto result = [&](std::string_view name, std::string text) { summary.results.emplace_back(name, std::move(text)); };
+  const auto end = [&](std::string_view name, std::string text) { summary.end.emplace_back(name, std::move(text)); };
+  result("pixels",
+         fmt::format("{} set, {:.3f} cm3 of binder-filled volume", readable_count(set_pixels_), volume_mm3_ / 1000));
+  if (solid_pixels_ > 0) {
+    result("porosity",
+           fmt::format("{:.2f} % of the parts' {} pixels are left empty", 100 * porosity, readable_count(solid_pixels_)));
+  }
+  if (several) {
+    for (const auto& [name, count] : materials_) result("", fmt::format("{} of {}", readable_count(count), name));
+  }
+  if (!summary.dry_run) {
+    end("rate", fmt::format("{:.2f} Gpx/s, {:.1f} layers/s", pixels_a_second / 1e9,
+                            summary.layer_seconds > 0 ? summary.layers_planned / summary.layer_seconds : 0));
+  }
+  if (moved_pixels_ > 0)
+    end("blocked", fmt::format("{} pixels of blocked nozzles are fired by their neighbours", readable_count(moved_pixels_)));
+  if (lost_pixels_ > 0) {
+    end("warning", fmt::format("{} pixels of blocked nozzles are not fired at all; head.blocked_rule = \"second-pass\" fires them",
+                               readable_count(lost_pixels_)));
+  }
+  if (capped_rows_ > 0) end("repaired", fmt::format("{} rows are closed only thanks to repair", readable_count(capped_rows_)));
+  warnings_.tell(*plan_.scene, summary);
+
+  nlohmann::ordered_json& facts = *summary.facts;
+  facts["set_pixels"] = set_pixels_;
+  facts["capped_rows"] = capped_rows_;
+  facts["pixels_per_second"] = pixels_a_second;
+  if (solid_pixels_ > 0) {
+    facts["solid_pixels"] = solid_pixels_;
+    facts["bead_pixels"] = bead_pixels_;
+    facts["porosity"] = porosity;
+  }
+  if (plan_.job.machine.resolved) {
+    facts["moved_pixels"] = moved_pixels_;
+    facts["lost_pixels"] = lost_pixels_;
+  }
+  if (!several) return;
+  for (const auto& [name, count] : materials_) facts["materials"].push_back({{"name", name}, {"set_pixels", count}});
+}
+
+}  // namespace
+
+void tell_images(const Plan& plan, Summary& summary) {
+  const PixelGrid& grid = plan.images->grid;
+  summary.output = plan.job.output;
+  summary.format = plan.job.format;
+  if (plan.job.machine.resolved) summary.machine = plan.job.machine.resolved->machine.name;
+  summary.mesh_bytes = plan.images->solids.mesh_bytes();
+  summary.index_bytes = plan.images->solids.index_bytes();
+  if (plan.sections) {
+    for (const Mesh& mesh : plan.scene->meshes) summary.mesh_bytes += mesh.triangles.size() * sizeof(Triangle);
+    summary.index_bytes += plan.sections->slicer().index_bytes();
+  }
+  summary.head.emplace_back(
+      "image", fmt::format("{} x {} pixels of {:g} x {:g} dpi on {} x {} mm, {}", grid.columns(), grid.rows(), grid.x.dpi(),
+                           grid.y.dpi(), number_text(plan.job.bed_mm[0]), number_text(plan.job.bed_mm[1]), plan.job.format));
+  nlohmann::ordered_json& facts = *summary.facts;
+  facts["columns"] = grid.columns();
+  facts["rows"] = grid.rows();
+  facts["dpi"] = {grid.x.dpi(), grid.y.dpi()};
+}
+
+std::unique_ptr<Maker> make_image_maker(const Plan& plan, const FlowLimits& limits) {
+  return std::make_unique<ImageMaker>(plan, limits);
+}
+
+}  // namespace lamina::pipeline

@@ -1,0 +1,177 @@
+// The steps of a layer's images.
+#include <fmt/core.h>
+
+#include <algorithm>
+
+#include "pipeline/run/image_maker.h"
+#include "stages/raster/combine.h"
+#include "stages/raster/mirror.h"
+
+namespace lamina::pipeline {
+namespace {
+
+/// Where two engines disagree first.
+Error disagreement(const Layer& layer, const PixelGrid& grid, const RunsView& rays, const RunsView& contours) {
+  std::uint32_t row = 0;
+  while (row + 1 < rays.rows() && std::ranges::equal(rays.row(row), contours.row(row))) ++row;
+  const auto a = rays.row(row), b = contours.row(row);
+  const auto place = static_cast<std::size_t>(std::ranges::mismatch(a, b).in1 - a.begin());
+  const std::uint32_t column = std::min(place < a.size() ? a[place] : rays.columns, place < b.size() ? b[place] : rays.columns);
+  return {Fault::kVerification,
+          fmt::format("layer {}: engines disagree first in image row {}, column {} (x {:.4f} mm, y {:.4f} mm, z {:.4f} "
+                      "mm); this is a fault of lamina, please report it with the part",
+                      layer.index, row, column, mm(grid.x.centre(column)), mm(grid.y.centre(grid.rows() - 1 - row)),
+                      mm(layer.plane()))};
+}
+
+/// Sums of a layer's solids; the places are those of the first that has any.
+void add(const raster::LayerReport& solid, raster::LayerReport& all) {
+  if (all.capped_rows == 0) {
+    all.first_capped_row = solid.first_capped_row;
+    all.first_capped_instance = solid.first_capped_instance;
+  }
+  if (all.open_rows == 0) all.first_open_row = solid.first_open_row;
+  all.capped_rows += solid.capped_rows;
+  all.open_rows += solid.open_rows;
+}
+
+}  // namespace
+
+std::uint64_t ImageWork::bytes() const {
+  std::uint64_t total = scratch.bytes() + materials.bytes() + (beads ? beads->bytes() : 0);
+  for (const Runs* image : {&runs, &second, &third, &lowest, &highest, &section}) {
+    total += bytes_held(image->row_offset) + bytes_held(image->change);
+  }
+  return total;
+}
+
+Status LayerImager::raster(const Layer& layer, ImageWork& work, LayerRecord& record, ImageNotes& notes) const {
+  const ImagePlan& images = *plan_.images;
+  const bool several = images.materials.several();
+  if (several) {
+    work.materials.start(images.materials.used.size(), images.grid.columns(), images.grid.rows());
+    work.runs.columns = images.grid.columns();
+    work.runs.row_offset.assign(std::size_t{images.grid.rows()} + 1, 0);
+    work.runs.change.clear();
+  }
+  for (const Solid& solid : images.solids.all()) {
+    Runs& image = several ? work.section : work.runs;
+    if (Status status = section_of(solid, layer, work, image, record, notes); !status) return status;
+    if (several) work.materials.lay(solid.material.at(layer.plane()), image, work.runs);
+  }
+  return {};
+}
+
+Status LayerImager::contours(const Layer& layer, ImageWork& work) const {
+  if (!work.beads) work.beads = std::make_unique<BeadWork>(plan_.images->grid);
+  return plan_.sections->contours(layer.index, work.beads->sections);
+}
+
+Status LayerImager::fill(const Layer& layer, ImageWork& work) const {
+  return plan_.sections->fill(layer.index, work.beads->sections);
+}
+
+Status LayerImager::beads(const Layer& layer, ImageWork& work, ImageNotes& notes) const {
+  if (Status status = plan_.images->beads->lay(layer, *work.beads); !status) return status;
+  notes.solid_pixels = set_pixels(work.runs);
+  plan_.images->beads->apply(work.runs, work.second, *work.beads);
+  notes.bead_pixels = set_pixels(work.runs);
+  return {};
+}
+
+void LayerImager::dose(const Layer& layer, ImageWork& work, LayerRecord& record) const {
+  const ImagePlan& images = *plan_.images;
+  if (plan_.job.mirror != Mirror::kNone) {
+    mirror(work.runs, work.second);
+    for (Runs& image : work.materials.image) mirror(image, work.second);
+  }
+  if (images.dose.any()) images.dose.apply(layer.index, work.runs, work.second, work.third);
+  if (images.materials.several() && (images.beads || images.dose.any())) work.materials.keep(work.runs);
+  record.set_pixels = set_pixels(work.runs);
+  for (const Runs& image : work.materials.image) record.images.push_back({0, set_pixels(image), {}});
+}
+
+Status LayerImager::make(const Layer& layer, ImageWork& work, LayerRecord& record, ImageNotes& notes) const {
+  if (Status status = raster(layer, work, record, notes); !status) return status;
+  if (plan_.images->beads) {
+    if (Status status = contours(layer, work); !status) return status;
+    if (Status status = fill(layer, work); !status) return status;
+    if (Status status = beads(layer, work, notes); !status) return status;
+  }
+  dose(layer, work, record);
+  return {};
+}
+
+/// The section of one solid; what was noticed goes to the record and the notes.
+Status LayerImager::section_of(const Solid& solid, const Layer& layer, ImageWork& work, Runs& image, LayerRecord& record,
+                               ImageNotes& notes) const {
+  const Engine engine = plan_.job.engine;
+  const auto first = engine != Engine::kContours ? raster::Engine::kRays : raster::Engine::kContours;
+  raster::LayerReport report = section(solid, first, layer, work, image);
+  if (engine == Engine::kBoth) {
+    section(solid, raster::Engine::kContours, layer, work, work.second);
+    if (image.row_offset != work.second.row_offset || image.change != work.second.change) {
+      return disagreement(layer, plan_.images->grid, image, work.second);
+    }
+  }
+  if (!solid.instance.empty() && report.capped_rows > 0) {
+    report.first_capped_instance = solid.instance[report.first_capped_instance];
+  }
+  record.capped_rows += report.capped_rows;
+  add(report, notes.report);
+  return {};
+}
+
+void LayerImager::mirror(Runs& image, Runs& scratch) const {
+  raster::mirror(image, plan_.job.mirror != Mirror::kY, plan_.job.mirror != Mirror::kX, scratch);
+  std::swap(image, scratch);
+}
+
+/// The image of a layer: its middle plane, or what its lowest and highest sections have in common or together.
+raster::LayerReport LayerImager::section(const Solid& solid, raster::Engine engine, const Layer& layer, ImageWork& work,
+                                         Runs& image) const {
+  const raster::Rasterizer& rasterizer = solid.rasterizer;
+  const Containment containment = plan_.job.heights.containment;
+  if (containment == Containment::kAcross) return rasterizer.layer(engine, layer.plane(), work.scratch, image);
+  const raster::LayerReport low = rasterizer.layer(engine, layer.lowest_plane(), work.scratch, work.lowest);
+  const raster::LayerReport high = rasterizer.layer(engine, layer.highest_plane(), work.scratch, work.highest);
+  const bool inside = containment == Containment::kInside;
+  raster::combine(work.lowest, work.highest, inside ? raster::SetOperation::kIntersection : raster::SetOperation::kUnion, image);
+  return low.open_rows + low.capped_rows >= high.open_rows + high.capped_rows ? low : high;
+}
+
+std::uint64_t LayerImager::changes_of_section(Nm plane, std::uint64_t bead_changes) const {
+  const ImagePlan& images = *plan_.images;
+  return images.dose.changes_bound(images.solids.crossings_bound(plane), images.covered_pixels) + bead_changes;
+}
+
+std::uint64_t LayerImager::changes_bound(const Layer& layer) const {
+  if (plan_.job.heights.containment != Containment::kAcross) {
+    return changes_of_section(layer.lowest_plane(), 0) + changes_of_section(layer.highest_plane(), 0);
+  }
+  return changes_of_section(layer.plane(), plan_.images->beads ? 2 * plan_.images->beads->spans_expected(layer.index) : 0);
+}
+
+std::uint64_t LayerImager::bytes_of(const Layer& layer) const {
+  if (plan_.job.heights.containment != Containment::kAcross) {
+    // Both sections, and an image that may have the crossings of both; twice with another engine or a mirror.
+    return 2 * (bytes_of_section(layer.lowest_plane(), changes_of_section(layer.lowest_plane(), 0)) +
+                bytes_of_section(layer.highest_plane(), changes_of_section(layer.highest_plane(), 0)));
+  }
+  const std::uint64_t of_section = bytes_of_section(layer.plane(), changes_bound(layer));
+  return plan_.images->beads ? of_section + plan_.images->beads->bytes_expected(layer.index) : of_section;
+}
+
+std::uint64_t LayerImager::bytes_of_section(Nm plane, std::uint64_t changes) const {
+  const ImagePlan& images = *plan_.images;
+  const std::uint64_t rows = images.grid.rows();
+  const bool dosed = images.dose.any();
+  const bool second = images.beads || plan_.job.engine == Engine::kBoth || plan_.job.mirror != Mirror::kNone || dosed;
+  const std::uint64_t second_image = (second ? 8 * changes + 4 * rows : 0) * (dosed ? 3 : 1);
+  // The image of each material, of all, of one solid, and another one in the making.
+  const std::uint64_t materials = images.materials.several() ? images.materials.used.size() : 0;
+  const std::uint64_t material_images = materials == 0 ? 0 : (materials + 3) * 2 * (4 * changes + 4 * rows);
+  return images.solids.layer_bytes_bound(plane) + second_image + material_images;
+}
+
+}  // namespace lamina::pipeline

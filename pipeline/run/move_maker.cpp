@@ -1,0 +1,224 @@
+#include "pipeline/run/move_maker.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+#include <numbers>
+
+#include "pipeline/output/toolpath_file.h"
+#include "pipeline/run/path_layer.h"
+#include "pipeline/text/readable.h"
+#include "stages/write/gcode/gcode.h"
+
+namespace lamina::pipeline {
+namespace {
+
+/// A point of stored toolpaths comes to some 40 bytes of text, a path to tags, the way to it and filament drawn back.
+constexpr std::size_t kTextOfPoint = 48, kTextOfPath = 128;
+/// A layer's text waits until those before it are written. What segmented lines come to beyond these bytes, and beyond
+/// what the plain filling takes, does not wait: such a layer is written a piece at a time when its turn comes.
+constexpr std::size_t kWaitingText = 1 << 17, kPieceOfText = 1 << 16;
+
+class MoveMaker : public Maker {
+ public:
+  MoveMaker(const Plan& plan, const FlowLimits& limits)
+      : plan_(plan), file_(plan), work_(limits.most_in_flight), made_(limits.most_unrecorded) {}
+
+  std::uint64_t bytes_of(std::uint32_t layer) const override { return plan_.sections->bytes_bound(layer); }
+
+  Result<std::vector<std::uint32_t>> open() override {
+    if (Status status = file_.open(); !status) return status.error();
+    std::vector<std::uint32_t> todo;
+    const auto stand = static_cast<std::uint32_t>(file_.file().kept().size());
+    for (std::uint32_t i = plan_.range[0] + stand; i < plan_.range[1]; ++i) todo.push_back(i);
+    return todo;
+  }
+  std::vector<LayerRecord> kept() const override { return file_.file().kept(); }
+
+  std::vector<MakerStep> steps() override {
+    return {{"contours",
+             [this](std::uint32_t layer, const Ticket& ticket) {
+               made_[ticket.record] = Made();
+               made_[ticket.record].record.layer = plan_.layer(layer);
+               return plan_.sections->contours(layer, work_[ticket.work]);
+             }},
+            {"fill",
+             [this](std::uint32_t layer, const Ticket& ticket) { return plan_.sections->fill(layer, work_[ticket.work]); },
+             [this](std::uint32_t layer, const Ticket& ticket) {
+               auto bytes = plan_.sections->fill_bytes_bound(layer, work_[ticket.work], {kTextOfPoint, 0, kTextOfPath});
+               if (bytes && plan_.segments->any()) *bytes += 2 * kWaitingText;
+               return bytes;
+             }},
+            {"stretches", [this](std::uint32_t layer, const Ticket& ticket) {
+               return lay_waiting(layer, work_[ticket.work], made_[ticket.record]);
+             }}};
+  }
+  bool records_from_work() const override { return true; }
+
+  Status record(std::uint32_t layer, const Ticket& ticket) override {
+    Made& made = made_[ticket.record];
+    Sections::Work& work = work_[ticket.work];
+    if (Status status = made.waits ? file_.append({work.text.data(), work.text.size()}) : lay_pieces(layer, work, made); !status)
+      return status;
+    made.record.paths = std::make_shared<const PathFacts>(made.facts);
+    if (Status status = file_.record(made.record); !status) return status;
+    add_kept(made.record);
+    if (made.facts.segments.lines > 0 && made.facts.segments.thin == 0) undivided_.add(made.record.layer);
+    return {};
+  }
+  void add_kept(const LayerRecord& record) override {
+    if (record.layer.index == plan_.range[0]) first_layer_points_ = record.paths->segments.points();
+    if (record.paths->open > 0) open_.add(record.layer);
+    sums_.add(*record.paths);
+  }
+
+  std::uint64_t bytes_held(std::uint32_t work) const override { return work_[work].bytes(); }
+  void let_go(std::uint32_t work) override { work_[work] = Sections::Work(); }
+
+  Status finish() override {
+    const auto bytes = file_.finish(sums_.totals);
+    if (!bytes) return bytes.error();
+    bytes_written_ = *bytes;
+    return {};
+  }
+  Status stop(bool keep) override {
+    if (keep) return file_.keep();
+    file_.discard();
+    return {};
+  }
+  void tell(Summary& summary) const override;
+
+ private:
+  struct Made {
+    LayerRecord record;
+    PathFacts facts;
+    bool waits = false;  // the layer's text is whole; else it is made when the layer is recorded
+  };
+
+  /// The layer's text, unless it becomes too long to wait.
+  Status lay_waiting(std::uint32_t layer, Sections::Work& work, Made& made) {
+    made.facts = facts_of(work);
+    work.text.clear();
+    const auto out = file_.layer(made.record.layer, work.text);
+    const std::size_t most = plan_.segments->any() ? std::max(kWaitingText, kTextOfPoint * work.paths.point.size()) : SIZE_MAX;
+    const auto laid = lay_moves(plan_, layer, work, {work.text, most, [] { return false; }}, *out, made.facts);
+    if (!laid) return laid.error();
+    made.waits = *laid;
+    if (!made.waits) Buffer<char>().swap(work.text);
+    return {};
+  }
+
+  Status lay_pieces(std::uint32_t layer, const Sections::Work& work, Made& made) {
+    piece_.clear();
+    Status status;
+    const auto give = [&] {
+      status = file_.append({piece_.data(), piece_.size()});
+      piece_.clear();
+      return status.ok();
+    };
+    const auto out = file_.layer(made.record.layer, piece_);
+    const auto laid = lay_moves(plan_, layer, work, {piece_, kPieceOfText, give}, *out, made.facts);
+    if (!laid) return laid.error();
+    if (!status) return status;
+    return file_.append({piece_.data(), piece_.size()});
+  }
+
+  const Plan& plan_;
+  ToolpathFile file_;
+  std::vector<Sections::Work> work_;
+  std::vector<Made> made_;
+  Buffer<char> piece_;
+
+  PathFacts sums_;
+  std::uint64_t first_layer_points_ = 0, bytes_written_ = 0;
+  LayersTold open_, undivided_;
+};
+
+void MoveMaker::tell(Summary& summary) const {
+  const write::MoveTotals& totals = sums_.totals;
+  const segment::SegmentCounts& segments = sums_.segments;
+  const segment::PlannedPorosity& porosity = sums_.porosity;
+  const Extruder& machine = plan_.moves->profile.machine;
+  const double filament_cm3 =
+      totals.filament_mm * std::numbers::pi / 4 * machine.material.filament_mm * machine.material.filament_mm / 1000;
+  const double filament_g = filament_cm3 * machine.material.density_g_cm3;
+  const bool solid = porosity.solid_mm3 > 0;
+  summary.volume_mm3 = totals.volume_mm3;
+  summary.bytes_written = bytes_written_;
+
+  const auto result = [&](std::string_view name, std::string text) { summary.results.emplace_back(name, std::move(text)); };
+  result("beads", fmt::format("{} moves, {:.2f} m, {:.3f} cm3; {} travels, {:.2f} m", readable_count(totals.moves),
+                              totals.bead_mm / 1000, totals.volume_mm3 / 1000, readable_count(totals.travels),
+                              totals.travel_mm / 1000));
+  if (segments.stretches > 0) {
+    result("segments", fmt::format("{} lines, {} thick and {} thin stretches, {} points", readable_count(segments.lines),
+                                   readable_count(segments.stretches - segments.thin), readable_count(segments.thin),
+                                   readable_count(segments.points())));
+  }
+  if (solid) {
+    result("porosity",
+           fmt::format("{:.2f} % by what is extruded, {:.2f} % with elliptic beads, {:.2f} % by measured widths",
+                       100 * porosity.by_extrusion(), 100 * porosity.by_ellipses(), 100 * porosity.by_widths()));
+  }
+  result("filament", fmt::format("{:.1f} mm, {:.2f} cm3, {:.2f} g", totals.filament_mm, filament_cm3, filament_g));
+  result("printing", fmt::format("about {}", write::gcode::time_text(totals.seconds)));
+  if (open_.count > 0) {
+    summary.warnings.push_back(fmt::format(
+        "chains of cuts stay open in {} layers, first in {}: they bound nothing and are left out; leave out --no-repair to "
+        "close the parts",
+        open_.count, open_.first));
+  }
+  if (undivided_.count > 0) {
+    summary.warnings.push_back(fmt::format(
+        "segment.thin_mm: longer than every segmented line less its ends in {} of {} layers, first in {}: no pores there",
+        undivided_.count, summary.layers_planned, undivided_.first));
+  }
+  if (!summary.dry_run && plan_.sections->fills() && totals.moves == 0) {
+    summary.warnings.push_back("no bead fits into the parts: they are narrower than the walls and the filling ask for");
+  }
+
+  nlohmann::ordered_json& facts = *summary.facts;
+  facts["moves"] = totals.moves;
+  facts["travels"] = totals.travels;
+  facts["retractions"] = totals.retractions;
+  facts["stored_points"] = sums_.stored_points;
+  facts["bead_mm"] = totals.bead_mm;
+  facts["travel_mm"] = totals.travel_mm;
+  facts["filament_mm"] = totals.filament_mm;
+  facts["filament_g"] = filament_g;
+  facts["print_seconds"] = totals.seconds;
+  facts["segments"] = {{"lines", segments.lines},   {"pieces", segments.pieces},   {"stretches", segments.stretches},
+                       {"thin", segments.thin},     {"points", segments.points()}, {"points_first_layer", first_layer_points_}};
+  facts["solid_mm3"] = porosity.solid_mm3;
+  facts["porosity"] = {{"by_extrusion", solid ? porosity.by_extrusion() : 0},
+                       {"by_ellipses", solid ? porosity.by_ellipses() : 0},
+                       {"by_widths", solid ? porosity.by_widths() : 0}};
+}
+
+}  // namespace
+
+void tell_moves(const Plan& plan, Summary& summary) {
+  summary.output = plan.job.output;
+  summary.machine = plan.moves->profile.machine.name;
+  summary.format = plan.moves->profile.machine.format;
+  summary.index_bytes = plan.sections->slicer().index_bytes();
+  nlohmann::ordered_json pores = nlohmann::ordered_json::array();
+  for (const auto& [heights, p] : plan.moves->pores) {
+    summary.head.emplace_back(
+        "pores", fmt::format("{}{:.2f} mm long, {:.3f} mm wide (ratio {:.2f}), {:.2f} a mm2 of layer",
+                             heights.empty() ? "" : heights + ": ", p.length_mm, p.width_mm, p.aspect, p.density_mm2));
+    pores.push_back({{"heights", heights},
+                     {"length_mm", p.length_mm},
+                     {"width_mm", p.width_mm},
+                     {"aspect", p.aspect},
+                     {"density_mm2", p.density_mm2}});
+  }
+  (*summary.facts)["pores"] = pores;
+}
+
+std::unique_ptr<Maker> make_move_maker(const Plan& plan, const FlowLimits& limits) {
+  return std::make_unique<MoveMaker>(plan, limits);
+}
+
+}  // namespace lamina::pipeline

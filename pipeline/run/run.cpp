@@ -1,0 +1,162 @@
+#include "pipeline/run/run.h"
+
+#include <fmt/format.h>
+#include <tbb/global_control.h>
+
+#include <algorithm>
+#include <chrono>
+#include <nlohmann/json.hpp>
+#include <optional>
+
+#include "pipeline/flow/layers.h"
+#include "pipeline/output/directory.h"
+#include "pipeline/output/slice_directory.h"
+#include "pipeline/output/toolpath_file.h"
+#include "pipeline/plan/plan.h"
+#include "pipeline/run/contour_maker.h"
+#include "pipeline/run/image_maker.h"
+#include "pipeline/run/move_maker.h"
+
+namespace lamina::pipeline {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+/// Refuses what may not be replaced before parts are loaded.
+Status check_output_of(const Resolved& resolved) {
+  switch (resolved.product) {
+    case Product::kImages: return check_output(resolved.job);
+    case Product::kContours: return check_slice_output(resolved.job);
+    case Product::kMoves: return check_toolpath_output(resolved.job, resolved.extruder->machine);
+  }
+  return {};
+}
+
+std::unique_ptr<Maker> make_maker(const Plan& plan, const FlowLimits& limits) {
+  switch (plan.product) {
+    case Product::kImages: return make_image_maker(plan, limits);
+    case Product::kContours: return make_contour_maker(plan, limits);
+    case Product::kMoves: break;
+  }
+  return make_move_maker(plan, limits);
+}
+
+Summary summary_of(const Plan& plan) {
+  Summary summary;
+  summary.product = plan.product;
+  summary.dry_run = plan.job.dry_run;
+  summary.output = plan.job.output;
+  summary.layer_text = heights_text(plan.job);
+  summary.layers_total = plan.layer_count;
+  summary.triangles = plan.triangles;
+  summary.load_seconds = plan.load_seconds;
+  summary.index_seconds = plan.index_seconds;
+  summary.memory_budget_bytes = plan.job.memory_bytes;
+  summary.parts = plan.scene->parts;
+  summary.warnings = plan.warnings;
+  summary.facts = std::make_shared<nlohmann::ordered_json>(nlohmann::ordered_json::object());
+  if (plan.layer_count > 0) {
+    const Layer highest = plan.layer(plan.layer_count - 1);
+    summary.height_mm = mm(std::int64_t{highest.bottom} + highest.thickness);
+  }
+  if (plan.product == Product::kImages) tell_images(plan, summary);
+  if (plan.product == Product::kMoves) tell_moves(plan, summary);
+  return summary;
+}
+
+/// The maker's steps as those of the flow. todo  layers by position; outlives them
+LayerSteps steps_of(Maker& maker, const std::vector<std::uint32_t>& todo, const std::function<void()>& recorded) {
+  LayerSteps steps;
+  steps.bytes_of = [&](std::uint32_t position) { return maker.bytes_of(todo[position]); };
+  for (MakerStep& step : maker.steps()) {
+    Step& made = steps.steps.emplace_back();
+    made.name = step.name;
+    made.run = [&todo, run = std::move(step.run)](const Ticket& ticket) { return run(todo[ticket.position], ticket); };
+    if (!step.needs) continue;
+    made.needs = [&todo, needs = std::move(step.needs)](const Ticket& ticket) { return needs(todo[ticket.position], ticket); };
+  }
+  steps.record = [&](const Ticket& ticket) {
+    const Status status = maker.record(todo[ticket.position], ticket);
+    if (status) recorded();
+    return status;
+  };
+  steps.bytes_held = [&](std::uint32_t work) { return maker.bytes_held(work); };
+  steps.let_go = [&](std::uint32_t work) { maker.let_go(work); };
+  steps.records_from_work = maker.records_from_work();
+  return steps;
+}
+
+/// What a job that ends early says, and what stays of it.
+Error ended_early(Maker& maker, const Error& error, bool any_layer) {
+  const bool interrupted = error.fault == Fault::kInterrupted;
+  const bool keep = any_layer && (interrupted || error.fault == Fault::kOutput);
+  if (Status stopped = maker.stop(keep); !stopped && interrupted) return stopped.error();
+  if (interrupted) {
+    return {Fault::kInterrupted, keep ? "interrupted; finished layers are kept, run again with --resume to go on"
+                                      : "interrupted before the first layer; nothing was written"};
+  }
+  if (!keep) return error;
+  return {Fault::kOutput, error.message + "; finished layers are kept, go on with --resume"};
+}
+
+/// Makes the layers that are still to be made. errors  of the lowest failing layer
+Status make_layers(const Plan& plan, Maker& maker, const FlowLimits& limits, Summary& summary, const ProgressCallback& progress,
+                   const std::atomic<bool>& cancel) {
+  auto todo = maker.open();
+  if (!todo) return todo.error();
+  const std::vector<LayerRecord> kept = maker.kept();
+  for (const LayerRecord& record : kept) maker.add_kept(record);
+  summary.layers_kept = static_cast<std::uint32_t>(kept.size());
+  const std::uint32_t layers = plan.range[1] - plan.range[0];
+  std::uint32_t done = layers - static_cast<std::uint32_t>(todo->size());
+  progress({ProgressEvent::Stage::kLayers, done, layers});
+  const auto start = Clock::now();
+  const std::function<void()> recorded = [&] {
+    ++summary.layers_planned;
+    progress({ProgressEvent::Stage::kLayers, ++done, layers});
+  };
+  const LayerSteps steps = steps_of(maker, *todo, recorded);
+  FlowReport report;
+  const Status moved = flow_layers(static_cast<std::uint32_t>(todo->size()), steps, limits, cancel, report);
+  if (!moved) return ended_early(maker, moved.error(), done > 0);
+  if (Status status = maker.finish(); !status) return ended_early(maker, status.error(), done > 0);
+  summary.layer_seconds = std::chrono::duration<double>(Clock::now() - start).count();
+  summary.step_seconds = report.step_seconds;
+  summary.most_layers_in_flight = report.most_in_flight;
+  summary.peak_layer_bytes = report.most_bytes;
+  return {};
+}
+
+}  // namespace
+
+Result<Summary> run(const Job& job, Product product, const ProgressCallback& progress, const std::atomic<bool>& cancel) {
+  std::optional<tbb::global_control> threads;
+  if (job.threads > 0) threads.emplace(tbb::global_control::max_allowed_parallelism, job.threads);
+  auto resolved = resolve(job, product);
+  if (!resolved) return resolved.error();
+  if (!job.dry_run) {
+    if (Status status = check_output_of(*resolved); !status) return status.error();
+  }
+  const auto plan = make_plan(std::move(*resolved), progress);
+  if (!plan) return plan.error();
+  if (cancel) return Error{Fault::kInterrupted, "interrupted before the first layer; nothing was written"};
+
+  FlowLimits limits;
+  limits.budget_bytes = job.memory_bytes;
+  limits.most_in_flight = layers_in_flight();
+  if (product != Product::kImages) limits.most_in_flight *= 2;  // some wait for their turn in the one file
+  Summary summary = summary_of(*plan);
+  const std::unique_ptr<Maker> maker = make_maker(*plan, limits);
+  if (job.dry_run) {
+    for (std::uint32_t i = plan->range[0]; i < plan->range[1]; ++i) {
+      summary.peak_layer_bytes = std::max(summary.peak_layer_bytes, maker->bytes_of(i));
+    }
+  } else if (Status status = make_layers(*plan, *maker, limits, summary, progress, cancel); !status) {
+    return status.error();
+  }
+  maker->tell(summary);
+  summary.peak_resident_bytes = peak_resident_bytes();
+  return summary;
+}
+
+}  // namespace lamina::pipeline
