@@ -22,7 +22,7 @@ if(NOT Python_FOUND OR NOT pybind11_FOUND)
 endif()
 
 # What is linked into a module must be able to lie anywhere; hidden symbols keep calls within it direct.
-set_target_properties(lamina_stages lamina_pipeline PROPERTIES POSITION_INDEPENDENT_CODE ON CXX_VISIBILITY_PRESET hidden)
+set_target_properties(lamina_stages lamina_once_a_job lamina_pipeline PROPERTIES POSITION_INDEPENDENT_CODE ON CXX_VISIBILITY_PRESET hidden)
 pybind11_add_module(lamina_python MODULE NO_EXTRAS python/module.cpp python/arrays.cpp)
 set_target_properties(lamina_python PROPERTIES OUTPUT_NAME lamina LIBRARY_OUTPUT_DIRECTORY ${PROJECT_BINARY_DIR}/python)
 target_link_libraries(lamina_python PRIVATE lamina::pipeline)
