@@ -52,7 +52,8 @@ Written write_layer(const ResolvedMachine& resolved, const RunsView& image) {
 }
 
 Result<replay::Count> replay(const ResolvedMachine& resolved, const RunsView& image, const Written& program) {
-  const auto machine = replay::VirtualMachine::build(resolved.machine, resolved.grid.image.columns(), resolved.grid.image.rows());
+  const auto machine =
+      replay::VirtualMachine::build(resolved.machine, resolved.grid.image.columns(), resolved.grid.image.rows());
   if (!machine) return machine.error();
   return machine->replay(program.text, {7, 700'000, 100'000}, image, program.count.moved, program.count.lost);
 }
@@ -138,6 +139,12 @@ Standing scaled(const Part& part, double side_mm, const Machine& machine) {
   return made;
 }
 
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+constexpr double kSideMm = 8;
+#else
+constexpr double kSideMm = 16;
+#endif
+
 TEST(Replay, EveryClosedModelIsPrintedBitForBitOnEveryShippedMachine) {
   const char* const folder = std::getenv("LAMINA_MODELS");
   if (folder == nullptr) GTEST_SKIP() << "LAMINA_MODELS is not set: NO real part was printed on all machines";
@@ -160,9 +167,10 @@ TEST(Replay, EveryClosedModelIsPrintedBitForBitOnEveryShippedMachine) {
     }
     ++parts;
     for (const ResolvedMachine& resolved : machines) {
-      // 16 mm are 500,000 pixels of 1200 dpi; the coarse machines print larger parts.
+      // 16 mm are 500,000 pixels of 1200 dpi, a quarter of them under a sanitizer; the coarse machines print larger parts.
       const double dots = 25.4e6 / resolved.grid.line_nm;
-      Standing standing = scaled(*part, std::min(16.0 * 1200 / dots, 0.6 * resolved.machine.bed.size_mm[0]), resolved.machine);
+      Standing standing =
+          scaled(*part, std::min(kSideMm * 1200 / dots, 0.6 * resolved.machine.bed.size_mm[0]), resolved.machine);
       const auto rasterizer =
           raster::Rasterizer::build(standing.meshes, standing.instances, resolved.grid.image, FillRule::kNonzero, false, true);
       ASSERT_TRUE(rasterizer.ok());

@@ -219,7 +219,7 @@ TEST_F(PorousJob, PorosityOfTheBitmapIsThatOfThePlanWithinThePixelsOfItsEdges) {
         cl::Path path;
         const auto at = [&](double x, double y) { path.emplace_back(std::llround(x), std::llround(y)); };
         const double first = std::atan2(uy, ux) - std::numbers::pi / 2;
-        const int steps = ends == raster::BeadEnds::kRound ? 90 : 1;
+        const int steps = ends == raster::BeadEnds::kRound ? 30 : 1;
         for (const auto& [centre, from] : {std::pair{s.to, first}, {s.from, first + std::numbers::pi}}) {
           for (int i = 0; i <= steps; ++i) {
             const double a = from + std::numbers::pi * i / steps;
@@ -230,9 +230,9 @@ TEST_F(PorousJob, PorosityOfTheBitmapIsThatOfThePlanWithinThePixelsOfItsEdges) {
         if (ends == raster::BeadEnds::kSquare && s.kind == PathKind::kLink) {
           for (const Point2 centre : {s.from, s.to}) {  // joints of links are round
             cl::Path disc;
-            for (int i = 0; i < 180; ++i)
-              disc.emplace_back(std::llround(centre.x + 200e3 * std::cos(i * std::numbers::pi / 90)),
-                                std::llround(centre.y + 200e3 * std::sin(i * std::numbers::pi / 90)));
+            for (int i = 0; i < 60; ++i)
+              disc.emplace_back(std::llround(centre.x + 200e3 * std::cos(i * std::numbers::pi / 30)),
+                                std::llround(centre.y + 200e3 * std::sin(i * std::numbers::pi / 30)));
             clipper.AddPath(disc, cl::ptSubject, true);
           }
         }
