@@ -10,6 +10,7 @@
 
 #include "pipeline/cli/command.h"
 #include "pipeline/cli/console.h"
+#include "pipeline/cli/outputs.h"
 #include "pipeline/output/manifest.h"
 #include "pipeline/show/gcode_picture.h"
 #include "pipeline/show/preview_layers.h"
@@ -73,7 +74,9 @@ int run_preview(const std::vector<std::string>& texts) {
     const Status status = print(*arguments->help);
     return status ? 0 : fail(status.error());
   }
+  // Of a drawing the outputs are those of the command that left it.
   if (arguments->has("--drawing")) return run_drawing(arguments->text("--drawing"), arguments->text("-o,--output"));
+  if (Status status = check_outputs("preview", *arguments); !status) return fail(status.error());
   if (arguments->operands.size() != 1) {
     return fail({Fault::kUsage, "name one directory that lamina jet or lamina slice wrote, or one G-code file"});
   }

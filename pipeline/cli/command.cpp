@@ -10,6 +10,7 @@
 #include <new>
 
 #include "pipeline/cli/console.h"
+#include "pipeline/cli/outputs.h"
 #include "pipeline/text/json_text.h"
 #include "pipeline/text/names.h"
 
@@ -95,6 +96,7 @@ CommandSpec spec_of(const Command& command) {
 
 Outcome run(const Command& command, const Arguments& arguments, Context& context) {
   try {
+    if (Status status = check_outputs(command.name, arguments); !status) return status;
     return command.run(arguments, context);
   } catch (const std::bad_alloc&) {
     return Error{Fault::kInternal, "out of memory; try a smaller --memory, fewer --threads or --jobs, or fewer triangles"};

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <filesystem>
 
+#include "pipeline/cli/outputs.h"
 #include "pipeline/job/file.h"
 
 namespace lamina::pipeline {
@@ -128,6 +129,7 @@ Result<Job> read_job_options(const KeyChoice& choice, const Arguments& arguments
   if (arguments.has("--job")) {
     if (Status status = check_parts_of_file(arguments.text("--job"), job); !status) return status.error();
   }
+  if (Status status = check_outputs(arguments, job); !status) return status.error();
   return job;
 }
 

@@ -178,7 +178,7 @@ Drawing draw_study(const Scene& scene, const HeightsStudy& study) {
 std::string svg_text(const Drawing& drawing) {
   std::string text = fmt::format(
       "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{0}\" height=\"{1}\" viewBox=\"0 0 {0} {1}\" "
-      "font-family=\"DejaVu Sans, sans-serif\">\n<rect width=\"{0}\" height=\"{1}\" fill=\"#ffffff\"/>\n",
+      "font-family=\"DejaVu Sans, sans-serif\">\n<!-- drawn by lamina -->\n<rect width=\"{0}\" height=\"{1}\" fill=\"#ffffff\"/>\n",
       drawing.width, drawing.height);
   for (const Drawing::Box& box : drawing.boxes) {
     text += fmt::format("<rect x=\"{:.2f}\" y=\"{:.2f}\" width=\"{:.2f}\" height=\"{:.2f}\" fill=\"#{}\"/>\n", box.left,

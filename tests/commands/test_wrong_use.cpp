@@ -146,14 +146,16 @@ TEST_F(WrongUse, BedSmallerThanThePartSaysBothSizes) {
 }
 
 TEST_F(WrongUse, DirectoryThatCannotBeWrittenIsAnOutputError) {
-  refused(4, {"jet", "part.stl", "-o", "part.stl"}, {"part.stl"});
+  write_text(directory_ / "file", "not a directory");
+  refused(4, {"jet", "part.stl", "-o", "file"}, {"file"});
+  refused(2, {"jet", "part.stl", "-o", "part.stl"}, {"part.stl", "is read by this call as a part"});
   refused(4, {"jet", "part.stl", "-o", "part.stl/out"}, {"part.stl/out"});
   refused(4, {"jet", "part.stl", "-o", "/proc/nowhere/out"}, {"/proc/nowhere/out"});
   refused(4, {"jet", "part.stl", "--dry-run", "--save-job", "/proc/nowhere/job.toml"}, {"/proc/nowhere/job.toml"});
 }
 
 TEST_F(WrongUse, WrittenFilesReplaceNeitherPartsNorDevices) {
-  refused(2, {"jet", "part.stl", "--dry-run", "--save-job", "part.stl"}, {"part.stl", "is a part"});
+  refused(2, {"jet", "part.stl", "--dry-run", "--save-job", "part.stl"}, {"part.stl", "is read by this call as a part"});
   EXPECT_EQ(run_lamina({"info", "part.stl"}, directory_.path()).code, 0);
   ASSERT_EQ(::mkfifo((directory_ / "pipe").c_str(), 0600), 0);
   std::filesystem::create_symlink("pipe", directory_ / "device");
@@ -161,7 +163,7 @@ TEST_F(WrongUse, WrittenFilesReplaceNeitherPartsNorDevices) {
   refused(4, {"jet", "part.stl", "--dry-run", "--save-job", "device"}, {"device", "a device or a pipe"});
   refused(4, {"jet", "part.stl", "--dry-run", "--save-job", "."}, {"a directory"});
   // A link to a file stays one.
-  write_text(directory_ / "file.toml", "old");
+  write_text(directory_ / "file.toml", "# A job of lamina.");
   std::filesystem::create_symlink("file.toml", directory_ / "link.toml");
   EXPECT_EQ(run_lamina({"jet", "part.stl", "--dry-run", "--quiet", "--save-job", "link.toml"}, directory_.path()).code, 0);
   EXPECT_TRUE(std::filesystem::is_symlink(directory_ / "link.toml"));

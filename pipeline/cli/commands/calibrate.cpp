@@ -27,6 +27,7 @@ CommandSpec calibrate_spec() {
       {"--layer", "MM", "thickness of a layer; three quarters of the bead if absent", "", "Beads"},
       {"--gap", "MM", "wanted between thick beads and their neighbours; slightly negative bonds better", "0", "Beads"},
       {"--exact-spacing", "", "spacings from the mean widths, not rounded to 0.01 mm as in the document", "", "Measurements"},
+      {"--overwrite", "", "replace a file that lamina did not write", "", "Result"},
       {"--json", "", "print the result as one JSON object on stdout", "", "Result"},
       {"--quiet", "", "say nothing but errors", "", "Result"}};
   spec.closing =

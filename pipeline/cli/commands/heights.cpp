@@ -35,6 +35,7 @@ CommandSpec heights_spec() {
         {"--plot", "FILE", "draw thickness against height beside the part, as .svg or .png"}}) {
     spec.options.push_back({flag, value, meaning, "", "Table"});
   }
+  spec.options.push_back({"--overwrite", "", "replace a file that lamina did not write", "", "Table"});
   spec.options.push_back({"--quiet", "", "say nothing but errors beside the table", "", "Table"});
   spec.closing =
       "Examples:\n"
@@ -46,7 +47,7 @@ CommandSpec heights_spec() {
 }
 
 Status tell(const std::string& path, const std::string& text, Context& context) {
-  return path.empty() ? context.print(text) : write::write_file(path, std::as_bytes(std::span(text)));
+  return path.empty() ? context.print(text) : write::write_file(path, text, {.stream = true});
 }
 
 Result<Job> job_of(const Arguments& arguments) {

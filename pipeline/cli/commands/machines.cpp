@@ -21,7 +21,8 @@ CommandSpec machines_spec() {
   spec.options = {{"--check", "NAME|FILE", "explain this machine; a profile is a TOML file", "", ""},
                   {"--show", "NAME|FILE", "print the whole profile, every key of it, to be changed and saved", "", ""},
                   {"--dialects", "", "list the dialects that programs can be written in", "", ""},
-                  {"--target", "STL", "write a part whose print shows which way x, y and up are", "", ""}};
+                  {"--target", "STL", "write a part whose print shows which way x, y and up are", "", ""},
+                  {"--overwrite", "", "replace a file that lamina did not write", "", ""}};
   spec.closing =
       "Examples:\n"
       "  lamina machines\n"

@@ -5,6 +5,7 @@
 
 #include "pipeline/cli/command.h"
 #include "pipeline/cli/help/help.h"
+#include "pipeline/cli/outputs.h"
 #include "stages/write/file.h"
 
 namespace lamina::pipeline {
@@ -16,7 +17,8 @@ CommandSpec manual_spec() {
   spec.operand = "COMMAND";
   spec.operand_meaning = "a command; none for the page of the program";
   spec.options = {{"-o,--output", "DIR", "write all pages into a directory instead, as packages do", "", ""},
-                  {"--markdown", "", "pages of commands as Markdown: docs/commands is made by this", "", ""}};
+                  {"--markdown", "", "pages of commands as Markdown: docs/commands is made by this", "", ""},
+                  {"--overwrite", "", "replace a file that lamina did not write", "", ""}};
   spec.closing =
       "Examples:\n"
       "  lamina manual jet | man -l -\n"
@@ -24,9 +26,12 @@ CommandSpec manual_spec() {
   return spec;
 }
 
-Status write_pages(const std::string& directory, bool markdown) {
+Status write_pages(const std::string& directory, bool markdown, bool overwrite) {
   const auto write = [&](const std::string& name, const std::string& page) {
-    return write::write_file(fmt::format("{}/{}", directory, name), std::as_bytes(std::span(page)));
+    const std::string path = fmt::format("{}/{}", directory, name);
+    constexpr std::string_view kMarks[] = {"\"lamina ", "lamina manual --markdown"};
+    if (Status status = check_own_file(path, kMarks); !status && !overwrite) return status;
+    return write::write_file(path, page);
   };
   std::error_code error;
   std::filesystem::create_directories(directory, error);
@@ -44,7 +49,7 @@ Status write_pages(const std::string& directory, bool markdown) {
 
 Outcome run_manual(const Arguments& arguments, Context& context) {
   const bool markdown = arguments.has("--markdown");
-  if (arguments.has("-o,--output")) return write_pages(arguments.text("-o,--output"), markdown);
+  if (arguments.has("-o,--output")) return write_pages(arguments.text("-o,--output"), markdown, arguments.has("--overwrite"));
   if (arguments.operands.empty()) {
     if (markdown) return Error{Fault::kUsage, "--markdown: name a command, or -o DIR for all of them"};
     return context.print(man_page());

@@ -124,7 +124,7 @@ std::string plot_of(const Group& group, const segment::Permeability& fit) {
   const auto x = [&](double v) { return 60 + 520 * v / most_v; };
   const auto y = [&](double g) { return 360 - 320 * g / most_y; };
   std::string svg =
-      "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"620\" height=\"420\" font-family=\"sans-serif\" font-size=\"12\">\n"
+      "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"620\" height=\"420\" font-family=\"sans-serif\" font-size=\"12\">\n<!-- drawn by lamina -->\n"
       "<rect width=\"620\" height=\"420\" fill=\"white\"/>\n<path d=\"M60 30V360H590\" fill=\"none\" stroke=\"black\"/>\n";
   svg += fmt::format(
       "<text x=\"300\" y=\"400\">velocity, 0 to {:.4g} m/s</text>\n<text x=\"10\" y=\"20\">pressure drop / length, 0 to {:.4g} Pa/m; "
@@ -158,6 +158,7 @@ CommandSpec permeability_spec() {
                   {"--density", "KG/M3", "of the fluid", "1.204", "Fluid"},
                   {"--convention", "NAME", "dinisio2022: what reproduces Table 25 of that document", "", "Fluid"},
                   {"--plot", "FILE", "draw points and parabola as SVG", "", "Result"},
+                  {"--overwrite", "", "replace a file that lamina did not write", "", "Result"},
                   {"--json", "", "print the result as one JSON object on stdout", "", "Result"}};
   spec.closing =
       "Rows of one column `configuration` are fitted group by group. The convention dinisio2022 is L = 25.5 mm, v = Q / 28 in\n"

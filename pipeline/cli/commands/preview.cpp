@@ -32,6 +32,7 @@ CommandSpec preview_spec() {
       {"--width", "PIXELS", "width of the picture, 200 to 20000", "2400", ""},
       {"--whole-bed", "", "show all of the bed, not only where the layers have something", "", ""},
       {"--drawing", "FILE", "draw what lamina heights left for it instead, and remove FILE", "", ""},
+      {"--overwrite", "", "replace a file that lamina did not write", "", ""},
       {"--quiet", "", "say nothing but errors", "", ""}};
   spec.closing =
       "Examples:\n"

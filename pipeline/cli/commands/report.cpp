@@ -24,6 +24,7 @@ CommandSpec report_spec() {
       {"-o,--output", "HTML", "the page; its name ends in .html or .htm", "", ""},
       {"--most-bytes", "SIZE", "layers are left out evenly until the page is smaller", "19M", ""},
       {"--parts", "DIR", "where the part files are, for the views from three sides; a file, or several times", "", ""},
+      {"--overwrite", "", "replace a file that lamina did not write", "", ""},
       {"--quiet", "", "say nothing but errors", "", ""}};
   spec.closing =
       "Examples:\n"

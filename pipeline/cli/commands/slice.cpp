@@ -2,6 +2,7 @@
 
 #include "pipeline/cli/command.h"
 #include "pipeline/cli/keys.h"
+#include "pipeline/cli/outputs.h"
 #include "pipeline/job/file.h"
 #include "pipeline/run/run.h"
 
@@ -45,6 +46,10 @@ Outcome run_command(const Arguments& arguments, Context& context) {
   Job& job = *read;
   job.resume = arguments.has("--resume");
   job.overwrite = arguments.has("--overwrite");
+  // A sliced job keeps its job beside its manifest.
+  const InputFile asked = {arguments.text("--job"), "the job file"};
+  const std::string kept = job.output + "/job.toml";
+  if (Status status = check_outputs({&asked, 1}, {&kept, 1}); !status) return status.error();
   job.dry_run = arguments.has("--dry-run");
   job.json = arguments.has("--json");
   job.quiet = arguments.has("--quiet");

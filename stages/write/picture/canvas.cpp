@@ -27,6 +27,7 @@ std::string ascii(const std::string& line) {
 
 Canvas::Canvas(int width, int height, Colour ground)
     : width_(width), height_(height), pixels_(OIIO::ImageSpec(width, height, 3, OIIO::TypeDesc::UINT8)) {
+  pixels_.specmod().attribute("Software", "lamina");
   fill_box(0, 0, width, height, ground);
 }
 

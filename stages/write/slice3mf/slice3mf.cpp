@@ -3,11 +3,10 @@
 #include <fmt/format.h>
 
 #include <array>
-#include <cerrno>
-#include <cstdio>
 #include <cstring>
 
 #include "stages/data/handles/lib3mf.h"
+#include "stages/write/file.h"
 
 namespace lamina::write {
 namespace {
@@ -41,6 +40,25 @@ Status set_box(const Handle& object, const Box& box, std::int64_t left, std::int
     return refused("a mesh", object);
   }
   return {};
+}
+
+/// The package as the library writes it: it goes back to fill in lengths.
+struct Package {
+  Buffer<std::byte> bytes;
+  std::size_t at = 0;
+};
+
+std::uint32_t write_piece(const BYTE* data, std::uint32_t size, void* user) {
+  auto& package = *static_cast<Package*>(user);
+  if (package.bytes.size() < package.at + size) package.bytes.resize(package.at + size);
+  std::memcpy(package.bytes.data() + package.at, data, size);
+  package.at += size;
+  return 0;
+}
+
+std::uint32_t seek_piece(std::uint64_t position, void* user) {
+  static_cast<Package*>(user)->at = position;
+  return 0;
 }
 
 }  // namespace
@@ -126,16 +144,14 @@ Status Slice3mfWriter::finish(const std::string& path) {
   if (NMR::lib3mf_model_querywriter(state_->model.get(), "3mf", writer.out()) != LIB3MF_OK) {
     return refused("a writer", state_->model);
   }
-  const std::string part = path + ".part";
-  if (NMR::lib3mf_writer_writetofileutf8(writer.get(), part.c_str()) != LIB3MF_OK) {
-    const Error error = refused("writing", writer);
-    std::remove(part.c_str());
-    return Error{Fault::kOutput, fmt::format("{}: {}", path, error.message)};
+  // Into memory: the library ends the program where a disk is full.
+  Package package;
+  void* write = reinterpret_cast<void*>(write_piece);
+  void* seek = reinterpret_cast<void*>(seek_piece);
+  if (NMR::lib3mf_writer_writetocallback(writer.get(), write, seek, &package) != LIB3MF_OK) {
+    return Error{Fault::kOutput, fmt::format("{}: {}", path, refused("writing", writer).message)};
   }
-  if (std::rename(part.c_str(), path.c_str()) != 0) {
-    return Error{Fault::kOutput, fmt::format("{}: cannot write: {}", path, std::strerror(errno))};
-  }
-  return {};
+  return write_file(path, package.bytes);
 }
 
 }  // namespace lamina::write

@@ -23,7 +23,7 @@ std::string drawing(const Box& box, std::span<const Region> regions) {
   length(width);
   put(" ");
   length(height);
-  put("\">\n");
+  put("\">\n<!-- drawn by lamina -->\n");
   for (const auto& [contours, name, ink] : regions) {
     put(fmt::format("<path class=\"{}\" fill=\"#{:02x}{:02x}{:02x}\" fill-rule=\"nonzero\" d=\"", name, ink[0], ink[1],
                     ink[2]));

@@ -1,0 +1,183 @@
+#include "pipeline/cli/outputs.h"
+
+#include <fmt/format.h>
+#include <sys/stat.h>
+
+#include <algorithm>
+#include <array>
+#include <filesystem>
+#include <fstream>
+#include <vector>
+
+namespace lamina::pipeline {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::size_t kHead = 4096;  // bytes of a file in which its mark stands
+
+struct InputOption {
+  std::string_view flag, role;
+};
+constexpr InputOption kInputs[] = {
+    {"--job", "the job file"},       {"--machine", "the machine profile"}, {"--check", "a machine profile"},
+    {"--show", "a machine profile"}, {"--measured", "the measurements"},   {"--measure", "a measured table"},
+    {"--parts", "a part"},           {"--drawing", "the drawing"}};
+constexpr std::string_view kOutputs[] = {"-o,--output", "--save-job", "--plot", "--target"};
+
+/// A file of its own that a command writes. Marks: one of them stands in the head of each that lamina wrote; a ^ before
+/// the first character: it begins with it.
+struct OwnFile {
+  std::string_view command, flag;
+  bool stream;  // may go to a device, a pipe or standard output
+  std::array<std::string_view, 5> marks;
+};
+constexpr std::string_view kPicture("Software\0lamina", 15), kDrawing = "<!-- drawn by lamina -->";
+constexpr OwnFile kOwnFiles[] = {
+    {"", "--save-job", false, {"^# A job of lamina."}},
+    {"heights", "-o,--output", true, {"^layers    ", "^way    ", "^table,layer,", "^{\"height_mm\": ", "^Portugu"}},
+    {"heights", "--plot", false, {kDrawing, kPicture}},
+    {"permeability", "--plot", false, {kDrawing}},
+    {"preview", "-o,--output", false, {kDrawing, kPicture}},
+    {"report", "-o,--output", false, {"name=\"generator\" content=\"lamina\""}},
+    {"calibrate", "-o,--output", false, {"Made by lamina calibrate."}},
+    {"machines", "--target", false, {"^orientation target"}},
+};
+
+bool same_file(const std::string& a, const std::string& b) {
+  struct stat first {
+  }, second{};
+  return ::stat(a.c_str(), &first) == 0 && ::stat(b.c_str(), &second) == 0 && first.st_dev == second.st_dev &&
+         first.st_ino == second.st_ino;
+}
+
+bool is_regular(const std::string& path) {
+  struct stat status {};
+  return ::stat(path.c_str(), &status) == 0 && S_ISREG(status.st_mode);
+}
+
+/// The operand whose directory, or whose layers or programs, a file lies in; nullptr for none.
+const std::string* directory_read(const std::string& file, const Arguments& arguments) {
+  std::error_code ignored;
+  const std::string place = fs::absolute(file, ignored).parent_path().string();
+  const auto found = std::ranges::find_if(arguments.operands, [&](const std::string& operand) {
+    return std::ranges::any_of(std::array{"", "/layers", "/program"},
+                               [&](const char* below) { return same_file(place, operand + below); });
+  });
+  return found == arguments.operands.end() ? nullptr : &*found;
+}
+
+/// Whether a file lies where a run in that directory removes and replaces what it finds.
+bool lies_in_layers(const std::string& file, const std::string& directory) {
+  std::error_code ignored;
+  const std::string place = fs::weakly_canonical(fs::absolute(file, ignored), ignored).parent_path().string();
+  return same_file(place, directory + "/layers") || same_file(place, directory + "/program");
+}
+
+std::vector<InputFile> inputs_of(const Arguments& arguments, std::string_view operand_role) {
+  std::vector<InputFile> inputs;
+  for (const std::string& operand : arguments.operands) inputs.push_back({operand, std::string(operand_role)});
+  for (const InputOption& option : kInputs) {
+    for (const std::string& path : arguments.all(option.flag)) inputs.push_back({path, std::string(option.role)});
+  }
+  return inputs;
+}
+
+/// An output, and what is written beside it.
+void add_output(const std::string& path, std::vector<std::string>& outputs) {
+  if (path.empty()) return;
+  for (const char* ending : {"", ".part", ".json", ".json.part", ".drawing"}) outputs.push_back(path + ending);
+}
+
+std::vector<std::string> outputs_of(const Arguments& arguments) {
+  std::vector<std::string> outputs;
+  for (const std::string_view flag : kOutputs) add_output(arguments.text(flag), outputs);
+  return outputs;
+}
+
+Status check_not_a_device(const OwnFile& own, const std::string& path) {
+  struct stat status {};
+  const bool there = ::stat(path.c_str(), &status) == 0;
+  const bool device = path == "-" || (there && !S_ISREG(status.st_mode) && !S_ISDIR(status.st_mode));
+  if (!device || own.stream) return {};
+  return Error{Fault::kOutput, fmt::format("{}: is {}, not a file; name another one", path,
+                                           path == "-" ? "standard output" : "a device or a pipe")};
+}
+
+}  // namespace
+
+bool is_input_option(std::string_view flag) {
+  return std::ranges::find(kInputs, flag, &InputOption::flag) != std::end(kInputs);
+}
+bool is_output_option(std::string_view flag) { return std::ranges::find(kOutputs, flag) != std::end(kOutputs); }
+
+Status check_outputs(std::span<const InputFile> inputs, std::span<const std::string> outputs) {
+  for (const InputFile& input : inputs) {
+    if (!is_regular(input.path)) continue;
+    for (const std::string& output : outputs) {
+      if (same_file(input.path, output)) {
+        return Error{Fault::kUsage, fmt::format("{}: is read by this call as {}; name another output", output, input.role)};
+      }
+      if (lies_in_layers(input.path, output)) {
+        return Error{Fault::kUsage, fmt::format("{}: is read by this call as {}, and lies among the layers of the output {}; "
+                                                "name another output",
+                                                input.path, input.role, output)};
+      }
+    }
+  }
+  return {};
+}
+
+Status check_own_file(const std::string& path, std::span<const std::string_view> marks) {
+  if (!is_regular(path)) return {};
+  std::string head(kHead, '\0');
+  std::ifstream file(path, std::ios::binary);
+  file.read(head.data(), static_cast<std::streamsize>(head.size()));
+  head.resize(static_cast<std::size_t>(file.gcount()));
+  const bool own = std::ranges::any_of(marks, [&](std::string_view mark) {
+    if (mark.empty()) return false;
+    return mark.front() == '^' ? head.starts_with(mark.substr(1)) : head.find(mark) != std::string::npos;
+  });
+  if (own || (head.empty() && file.eof())) return {};
+  return Error{Fault::kUsage,
+               fmt::format("{}: is there already, and is no such file of lamina; name another one, or replace it "
+                           "with --overwrite",
+                           path)};
+}
+
+Status check_outputs(std::string_view command, const Arguments& arguments) {
+  const std::string_view operands = command == "batch"          ? "a list"
+                                    : command == "permeability" ? "the measurements"
+                                    : command == "preview"      ? "what is drawn"
+                                                                : "a part";
+  std::vector<std::string> outputs = outputs_of(arguments);
+  if (command == "batch") {
+    for (const char* name : {"batch.jsonl", "summary.json", "summary.tsv"})
+      outputs.push_back(arguments.text("-o,--output") + "/" + name);
+  }
+  if (Status status = check_outputs(inputs_of(arguments, operands), outputs); !status) return status;
+  for (const OwnFile& own : kOwnFiles) {
+    if ((!own.command.empty() && own.command != command) || !arguments.has(own.flag)) continue;
+    const std::string path = arguments.text(own.flag);
+    if (Status status = check_not_a_device(own, path); !status) return status;
+    const Status status = check_own_file(path, own.marks);
+    if (status) continue;
+    if (const std::string* directory = directory_read(path, arguments)) {
+      return Error{Fault::kUsage,
+                   fmt::format("{}: belongs to {}, which this call reads; name another output", path, *directory)};
+    }
+    if (!arguments.has("--overwrite")) return status;
+  }
+  return {};
+}
+
+Status check_outputs(const Arguments& arguments, const Job& job) {
+  std::vector<InputFile> inputs = inputs_of(arguments, "a part");
+  for (const PartRequest& part : job.parts) inputs.push_back({part.path, "a part"});
+  inputs.push_back({job.machine.profile, "the machine profile"});
+  std::vector<std::string> outputs = outputs_of(arguments);
+  add_output(job.output, outputs);
+  return check_outputs(inputs, outputs);
+}
+
+}  // namespace lamina::pipeline
