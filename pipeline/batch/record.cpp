@@ -131,13 +131,10 @@ const BatchRecord::Earlier* BatchRecord::earlier(const BatchJob& job) const {
 Status BatchRecord::append(std::string line) {
   line += '\n';
   if (torn_) line.insert(line.begin(), '\n');
-  ssize_t wrote = 0;
-  do {
-    wrote = ::write(file_, line.data(), line.size());
-  } while (wrote < 0 && errno == EINTR);
-  torn_ = wrote > 0 ? static_cast<std::size_t>(wrote) != line.size() : torn_;
-  if (wrote == static_cast<ssize_t>(line.size())) return {};
-  const Error failed = write::write_failure(path_, wrote < 0 ? errno : ENOSPC);
+  const int reason = write::write_all(file_, std::as_bytes(std::span(line)));
+  torn_ = reason != 0;
+  if (!torn_) return {};
+  const Error failed = write::write_failure(path_, reason);
   return Error{failed.fault, failed.message + ", and go on with --resume"};
 }
 

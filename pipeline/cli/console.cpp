@@ -11,20 +11,13 @@
 
 #include "pipeline/cli/signals.h"
 #include "pipeline/text/json_text.h"
+#include "stages/write/file.h"
 
 namespace lamina::pipeline {
 namespace {
 
 // 0 or the reason.
-int write_all(int file, std::string_view text) {
-  while (!text.empty()) {
-    const ssize_t wrote = ::write(file, text.data(), text.size());
-    if (wrote < 0 && errno == EINTR) continue;
-    if (wrote < 0) return errno;
-    text.remove_prefix(static_cast<std::size_t>(wrote));
-  }
-  return 0;
-}
+int write_all(int file, std::string_view text) { return write::write_all(file, std::as_bytes(std::span(text))); }
 
 }  // namespace
 
