@@ -1,11 +1,14 @@
 // tests/write/test_slice_files.cpp: SVG, CLI and 3MF slices, read back by readers that share no code with the writers.
 #include <gtest/gtest.h>
 
+#include <sys/resource.h>
+#include <sys/wait.h>
 #include <unistd.h>
 #include <zip.h>
 
 #include <bit>
 #include <cmath>
+#include <csignal>
 #include <cstdlib>
 #include <cstring>
 #include <filesystem>
@@ -322,6 +325,27 @@ TEST(Write3mfSlices, PackageHoldsStacksThatSayWhatTheSlicesAreAndIsTheSameEveryT
     EXPECT_EQ(layer, 2u) << "an empty slice is there too";
   }
   EXPECT_EQ(stacks, 2u);
+}
+
+TEST(Write3mfSlices, AFileThatMayNotGrowIsAnErrorAndLeavesNothing) {
+  const Job job;
+  const std::string path = fs::temp_directory_path() / ("lamina_limited_" + std::to_string(::getpid()) + ".3mf");
+  const pid_t child = ::fork();
+  if (child == 0) {
+    std::signal(SIGXFSZ, SIG_IGN);
+    const rlimit limit{512, 512};
+    ::setrlimit(RLIMIT_FSIZE, &limit);
+    auto writer = Slice3mfWriter::make(job.head);
+    for (const SliceLayer& layer : job.layers) {
+      if (!writer->add(layer)) ::_exit(1);
+    }
+    const Status status = writer->finish(path);
+    ::_exit(!status && status.error().message.find("File too large") != std::string::npos ? 0 : 2);
+  }
+  int result = -1;
+  ASSERT_EQ(::waitpid(child, &result, 0), child);
+  EXPECT_EQ(result, 0);
+  EXPECT_FALSE(fs::exists(path) || fs::exists(path + ".part"));
 }
 
 }  // namespace
