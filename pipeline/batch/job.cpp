@@ -1,5 +1,4 @@
 #include "pipeline/batch/job.h"
-#include "pipeline/text/version.h"
 
 #include <fmt/format.h>
 
@@ -10,8 +9,7 @@
 #include <set>
 #include <span>
 
-#include "pipeline/job/file.h"
-#include "pipeline/text/number_text.h"
+#include "pipeline/text/version.h"
 
 namespace lamina::pipeline {
 namespace {
@@ -22,15 +20,6 @@ constexpr std::uint64_t kMebibyte = 1ull << 20;
 
 /// What the batch writes in its directory; .part while they are written.
 constexpr std::array kOwnFiles = {"batch.jsonl", "summary.json", "summary.json.part", "summary.tsv", "summary.tsv.part"};
-
-const OptionSpec* find_option(const CommandSpec& spec, std::string_view name) {
-  for (const OptionSpec& option : spec.options) {
-    for (const std::string_view flag : split(option.flag, ",")) {
-      if (flag == name) return &option;
-    }
-  }
-  return nullptr;
-}
 
 /// Digests of the files that the jobs of a batch read; many jobs read the same ones.
 class Digests {
@@ -56,99 +45,54 @@ fs::path below_batch(const fs::path& path, const std::string& directory) {
   return below.empty() || *below.begin() == ".." ? fs::path() : below;
 }
 
-/// Resolves one entry; what is wrong with the job itself becomes job.refused.
+/// Resolves entries one after the other; what is wrong with a job itself becomes job.refused.
 class Preparation {
  public:
-  Preparation(const BatchShare& share, Digests& digests) : share_(share), digests_(digests) {}
+  explicit Preparation(const BatchShare& share) : share_(share) {}
 
-  Status prepare(BatchJob& job) {
-    const std::vector<std::string>& words = job.entry.words;
-    if (words.front() == "batch" || words.front() == "preview") {
-      return Error{Fault::kUsage, fmt::format("'{}' cannot be a job of a batch; run it by itself", words.front())};
+  void prepare(BatchJob& job, const ReadCall& read) {
+    Result<Call> call = read(job.entry.words);
+    if (!call) {
+      job.refused = call.error();
+      return;
     }
-    job.command = find_command(words.front());
-    if (job.command == nullptr) {
-      return Error{Fault::kUsage, fmt::format("'{}' is no command; lamina --help lists them", words.front())};
-    }
-    const CommandSpec& spec = spec_of_command(*job.command);
-    job.arguments.assign(words.begin() + 1, words.end());
-    const Result<Arguments> read = read_arguments(spec, job.arguments);
-    if (!read) return read.error();
-    if (read->help) return Error{Fault::kUsage, "--help is no job"};
-    Job planned;
-    if (read->has("--job")) {
-      if (Status status = read_job(read->text("--job"), planned); !status) return status;
-    }
-    std::vector<std::string> added;
-    if (Status status = find_output(spec, *read, planned, job, added); !status) return status;
-    job.can_resume = find_option(spec, "--resume") != nullptr && !read->has("--resume");
-    job.can_overwrite = find_option(spec, "--overwrite") != nullptr && !read->has("--overwrite") && !read->has("--resume");
-    for (const char* flag : {"--json", "--quiet"}) {
-      if (find_option(spec, flag) != nullptr && !read->has(flag)) added.emplace_back(flag);
-    }
+    job.call = std::move(*call);
+    find_output(job);
     job.need_bytes = 16 * kMebibyte;
-    if (const OptionSpec* memory = find_option(spec, "--memory")) {
-      std::uint64_t bytes = share_.layer_bytes;
-      if (read->has(memory->flag)) {
-        read_bytes(read->text(memory->flag), bytes);
-      } else {
-        added.insert(added.end(), {"--memory", fmt::format("{}", bytes)});
-      }
-      job.need_bytes += bytes;
+    if (job.call.layer_bytes) {
+      job.layer_bytes = *job.call.layer_bytes > 0 ? *job.call.layer_bytes : share_.layer_bytes;
+      job.need_bytes += job.layer_bytes;
     }
-    // One pool for all: a job's own number of threads would hold for the whole program.
-    if (find_option(spec, "--threads") != nullptr) added.insert(added.end(), {"--threads", "0"});
-    // The last one of an option counts, and nothing behind -- is an option.
-    const auto end_of_options = std::ranges::find(job.arguments, "--");
-    job.arguments.insert(end_of_options, added.begin(), added.end());
-    look_at_inputs(*read, planned, job);
-    return {};
+    digest_inputs(job);
   }
 
  private:
-  const CommandSpec& spec_of_command(const Command& command) {
-    const auto [found, fresh] = specs_.try_emplace(command.name);
-    if (fresh) found->second = spec_of(command);
-    return found->second;
-  }
-
-  Status find_output(const CommandSpec& spec, const Arguments& read, const Job& planned, BatchJob& job,
-                     std::vector<std::string>& added) {
-    const OptionSpec* option = find_option(spec, "--output");
-    if (option == nullptr || read.has("--dry-run")) return {};
-    const bool asked = read.has(option->flag);
-    if (!asked && !planned.output.empty()) {
-      job.output = planned.output;  // as the job file says
-    } else if (asked) {
-      const fs::path given = read.text(option->flag);
+  void find_output(BatchJob& job) {
+    const Call& call = job.call;
+    if (!call.output.empty() && call.output_of_job_file) {
+      job.output = call.output;
+    } else if (!call.output.empty()) {
+      const fs::path given = call.output;
       job.relative_output = given.is_relative();
       job.output = (fs::path(share_.directory) / given).lexically_normal().string();
-    } else if (option->value.find("DIR") != std::string::npos) {
+    } else if (call.ending) {
       std::string name = job.entry.name;
-      for (std::uint32_t next = 2; !names_.insert(name).second; ++next) name = fmt::format("{}-{}", job.entry.name, next);
+      for (std::uint32_t next = 2; !names_.insert(name + *call.ending).second; ++next) {
+        name = fmt::format("{}-{}", job.entry.name, next);
+      }
       job.entry.name = name;
-      job.output = (fs::path(share_.directory) / name).string();
+      job.output = (fs::path(share_.directory) / (name + *call.ending)).string();
     } else {
-      return Error{Fault::kUsage,
-                   fmt::format("{} {} is missing; in a batch it is below the batch's directory", "-o", option->value)};
+      return;
     }
-    added.insert(added.end(), {"--output", job.output});
     const fs::path below = below_batch(job.output, share_.directory);
     job.place = below.empty() ? job.output : below.string();
-    return {};
   }
 
-  void look_at_inputs(const Arguments& read, const Job& planned, BatchJob& job) {
-    std::set<std::string> inputs(read.operands.begin(), read.operands.end());
-    for (const auto& [flag, text] : read.options) {
-      if (flag.find("--output") == std::string::npos && !text.empty()) inputs.insert(text);
-    }
-    if (read.operands.empty()) {
-      for (const PartRequest& part : planned.parts) inputs.insert(part.path);
-    }
+  void digest_inputs(BatchJob& job) {
     std::string identity = fmt::format("lamina {}\n{}\n", version(), job.place);
     for (const std::string& word : job.entry.words) identity += fmt::format("{}:{}\n", word.size(), word);
-    for (const std::string& input : inputs) {
+    for (const std::string& input : std::set<std::string>(job.call.inputs.begin(), job.call.inputs.end())) {
       const FileDigest* digest = digests_.of(input);
       if (digest == nullptr) continue;
       identity += fmt::format("{} {} {}\n", input, digest->bytes, hex(digest->hash));
@@ -158,8 +102,7 @@ class Preparation {
   }
 
   const BatchShare& share_;
-  Digests& digests_;
-  std::map<std::string_view, CommandSpec> specs_;
+  Digests digests_;
   std::set<std::string> names_{kOwnFiles.begin(), kOwnFiles.end()};  // of outputs that are called as their jobs
 };
 
@@ -242,14 +185,13 @@ Result<OutputDigest> digest_output(const std::string& path) {
   return digest;
 }
 
-Result<std::vector<BatchJob>> prepare_batch(std::vector<BatchEntry> entries, const BatchShare& share) {
-  Digests digests;
-  Preparation preparation(share, digests);
+Result<std::vector<BatchJob>> prepare_batch(std::vector<BatchEntry> entries, const BatchShare& share, const ReadCall& read) {
+  Preparation preparation(share);
   std::vector<BatchJob> jobs;
   for (BatchEntry& entry : entries) {
     BatchJob& job = jobs.emplace_back();
     job.entry = std::move(entry);
-    if (Status status = preparation.prepare(job); !status) job.refused = status.error();
+    preparation.prepare(job, read);
   }
   if (Status status = check_apart(jobs, share.directory); !status) return status.error();
   return jobs;

@@ -6,19 +6,18 @@
 #include <unistd.h>
 
 #include <cerrno>
+#include <cmath>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
-#include <nlohmann/json.hpp>
 #include <utility>
 
+#include "pipeline/text/json.h"
 #include "pipeline/text/json_text.h"
 #include "stages/write/file.h"
 
 namespace lamina::pipeline {
 namespace {
-
-using Json = nlohmann::json;
 
 std::string key_of(const BatchJob& job) { return job.place.empty() ? hex(job.id) : job.place; }
 
@@ -44,7 +43,7 @@ void read_line(const std::string& line, std::map<std::string, BatchRecord::Earli
     entry.result.output.files = whole("files");
     entry.result.output.bytes = whole("bytes");
     if (!read_hex(text("hash"), entry.result.output.hash)) entry.ended = false;
-    if (json.contains("result")) entry.result.json = json["result"].dump();
+    if (json.contains("result")) entry.result.value = json["result"];
   }
   const std::string place = text("output");
   BatchRecord::Earlier& known = earlier[place.empty() ? id : place];
@@ -66,15 +65,19 @@ std::string_view outcome_name(BatchOutcome outcome) {
   return "";
 }
 
-std::string result_json(const BatchJob& job, std::uint32_t number, const BatchResult& result) {
-  std::string words;
-  for (const std::string& word : job.entry.words) words += (words.empty() ? "" : ",") + json_string(word);
-  return fmt::format(
-      "{{\"job\":{},\"source\":{},\"words\":[{}],\"output\":{},\"outcome\":\"{}\",\"code\":{},\"reason\":{},"
-      "\"seconds\":{:.3f},\"files\":{},\"bytes\":{},\"hash\":\"{}\",\"result\":{}}}",
-      number, json_string(job.entry.source), words, json_string(job.place), outcome_name(result.outcome), result.code,
-      json_string(result.reason), result.seconds, result.output.files, result.output.bytes, hex(result.output.hash),
-      result.json.empty() ? "null" : result.json);
+Json result_json(const BatchJob& job, std::uint32_t number, const BatchResult& result) {
+  return {{"job", number},
+          {"source", job.entry.source},
+          {"words", job.entry.words},
+          {"output", job.place},
+          {"outcome", outcome_name(result.outcome)},
+          {"code", result.code},
+          {"reason", result.reason},
+          {"seconds", std::round(result.seconds * 1000) / 1000},
+          {"files", result.output.files},
+          {"bytes", result.output.bytes},
+          {"hash", hex(result.output.hash)},
+          {"result", result.value}};
 }
 
 Result<BatchRecord> BatchRecord::open(const std::string& directory, bool resume, bool overwrite) {
@@ -128,8 +131,8 @@ const BatchRecord::Earlier* BatchRecord::earlier(const BatchJob& job) const {
   return found == earlier_.end() ? nullptr : &found->second;
 }
 
-Status BatchRecord::append(std::string line) {
-  line += '\n';
+Status BatchRecord::append(const Json& entry) {
+  std::string line = json_line(entry);
   if (torn_) line.insert(line.begin(), '\n');
   const int reason = write::write_all(file_, std::as_bytes(std::span(line)));
   torn_ = reason != 0;
@@ -139,12 +142,15 @@ Status BatchRecord::append(std::string line) {
 }
 
 Status BatchRecord::begun(const BatchJob& job, std::uint32_t number, bool foreign) {
-  return append(fmt::format("{{\"begun\":\"{}\",\"job\":{},\"output\":{}{}}}", hex(job.id), number, json_string(job.place),
-                            foreign ? ",\"foreign\":true" : ""));
+  Json entry = {{"begun", hex(job.id)}, {"job", number}, {"output", job.place}};
+  if (foreign) entry["foreign"] = true;
+  return append(entry);
 }
 
 Status BatchRecord::ended(const BatchJob& job, std::uint32_t number, const BatchResult& result) {
-  return append(fmt::format("{{\"ended\":\"{}\",", hex(job.id)) + result_json(job, number, result).substr(1));
+  Json entry = {{"ended", hex(job.id)}};
+  entry.update(result_json(job, number, result));
+  return append(entry);
 }
 
 }  // namespace lamina::pipeline

@@ -12,6 +12,7 @@
 #include <string>
 
 #include "pipeline/batch/job.h"
+#include "pipeline/text/json.h"
 #include "stages/data/hash.h"
 #include "stages/data/status.h"
 
@@ -32,14 +33,14 @@ struct BatchResult {
   BatchOutcome outcome = BatchOutcome::kNotRun;
   int code = 0;        // of the command; 3 beyond the time limit
   std::string reason;  // one line, of what is not done
-  std::string json;    // what the command printed: a JSON value, or "" if nothing
+  Json value;          // what the command gave; null if nothing
   double seconds = 0;
   OutputDigest output;
   bool recognized = false;  // kept although no record knew of it: its directory holds the finished job
 };
 
-/// One JSON object, without the line's end: {"job":..., "outcome":..., ...}.
-std::string result_json(const BatchJob& job, std::uint32_t number, const BatchResult& result);
+/// {"job":..., "outcome":..., ...}.
+Json result_json(const BatchJob& job, std::uint32_t number, const BatchResult& result);
 
 class BatchRecord {
  public:
@@ -69,7 +70,7 @@ class BatchRecord {
 
  private:
   BatchRecord() = default;
-  Status append(std::string line);
+  Status append(const Json& entry);
 
   std::string path_;
   int file_ = -1;

@@ -1,13 +1,14 @@
 #include "pipeline/batch/summary.h"
-#include "pipeline/flow/progress.h"
-#include "pipeline/text/readable.h"
-#include "pipeline/text/version.h"
 
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 
+#include "pipeline/flow/progress.h"
 #include "pipeline/text/json_text.h"
+#include "pipeline/text/readable.h"
+#include "pipeline/text/version.h"
 
 namespace lamina::pipeline {
 namespace {
@@ -56,21 +57,33 @@ std::string failure_line(const BatchJob& job, const BatchResult& result) {
   return one_line(result.reason.starts_with(source) ? result.reason : fmt::format("{}: {}", source, result.reason));
 }
 
-std::string batch_json(const std::vector<BatchJob>& jobs, const BatchSummary& summary, const BatchOptions& options) {
+Json batch_json(const std::vector<BatchJob>& jobs, const BatchSummary& summary, const BatchOptions& options) {
   const BatchTotals totals = totals_of(summary.results);
-  std::string text = fmt::format(
-      "{{\"command\":\"batch\",\"version\":\"{}\",\"directory\":{},\"code\":{},\"interrupted\":{},\"jobs_total\":{},"
-      "\"done\":{},\"kept\":{},\"failed\":{},\"stopped\":{},\"not_run\":{},\"files\":{},\"bytes\":{},\"seconds\":{:.3f},"
-      "\"job_seconds\":{:.3f},\"most_at_work\":{},\"memory_budget_bytes\":{},\"most_need_bytes\":{},"
-      "\"peak_resident_bytes\":{},\"jobs\":[\n",
-      version(), json_string(options.directory), batch_code(summary), summary.interrupted, totals.jobs, totals.done,
-      totals.kept, totals.failed, totals.stopped, totals.not_run, totals.files, totals.bytes, summary.seconds,
-      totals.job_seconds, summary.most_at_work, options.memory_bytes, summary.most_need_bytes, peak_resident_bytes());
+  const auto rounded = [](double seconds) { return std::round(seconds * 1000) / 1000; };
+  Json json = {{"command", "batch"},
+               {"version", version()},
+               {"directory", options.directory},
+               {"code", batch_code(summary)},
+               {"interrupted", summary.interrupted},
+               {"jobs_total", totals.jobs},
+               {"done", totals.done},
+               {"kept", totals.kept},
+               {"failed", totals.failed},
+               {"stopped", totals.stopped},
+               {"not_run", totals.not_run},
+               {"files", totals.files},
+               {"bytes", totals.bytes},
+               {"seconds", rounded(summary.seconds)},
+               {"job_seconds", rounded(totals.job_seconds)},
+               {"most_at_work", summary.most_running},
+               {"memory_budget_bytes", options.memory_bytes},
+               {"most_need_bytes", summary.most_need_bytes},
+               {"peak_resident_bytes", peak_resident_bytes()}};
+  Json& results = json["jobs"] = Json::array();
   for (std::size_t i = 0; i < jobs.size(); ++i) {
-    text += result_json(jobs[i], static_cast<std::uint32_t>(i + 1), summary.results[i]);
-    text += i + 1 < jobs.size() ? ",\n" : "\n";
+    results.push_back(result_json(jobs[i], static_cast<std::uint32_t>(i + 1), summary.results[i]));
   }
-  return text + "]}\n";
+  return json;
 }
 
 std::string batch_table(const std::vector<BatchJob>& jobs, const BatchSummary& summary) {
@@ -97,8 +110,8 @@ std::string job_line(const BatchJob& job, const BatchResult& result, std::uint32
 std::string progress_line(const BatchState& state) {
   std::string line = fmt::format("{}/{} jobs", state.ended, state.total);
   if (state.failed > 0) line += fmt::format(", {} failed", state.failed);
-  for (std::size_t i = 0; i < state.at_work.size(); ++i) {
-    const BatchAtWork& job = state.at_work[i];
+  for (std::size_t i = 0; i < state.running.size(); ++i) {
+    const RunningJob& job = state.running[i];
     line += fmt::format("{} {}", i == 0 ? ";" : ",", job.name);
     if (job.layers > 0) line += fmt::format(" {}/{} layers", job.layers_done, job.layers);
   }
@@ -122,7 +135,7 @@ std::string batch_text(const std::vector<BatchJob>& jobs, const BatchSummary& su
   line("files",
        fmt::format("{} of {} below {}", readable_count(totals.files), readable_bytes(totals.bytes), options.directory));
   line("time", fmt::format("{}; {:.1f} jobs/s, {} at once at most", readable_seconds(summary.seconds),
-                           summary.seconds > 0 ? (totals.done + totals.failed) / summary.seconds : 0, summary.most_at_work));
+                           summary.seconds > 0 ? (totals.done + totals.failed) / summary.seconds : 0, summary.most_running));
   line("memory",
        fmt::format("{} at most, budget {}", readable_bytes(peak_resident_bytes()), readable_bytes(options.memory_bytes)));
   return text;

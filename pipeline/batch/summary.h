@@ -4,7 +4,8 @@
 #include <string>
 #include <vector>
 
-#include "pipeline/batch/batch.h"
+#include "pipeline/batch/queue.h"
+#include "pipeline/text/json.h"
 
 namespace lamina::pipeline {
 
@@ -20,8 +21,8 @@ BatchTotals totals_of(const std::vector<BatchResult>& results);
 /// list that failed.
 int batch_code(const BatchSummary& summary);
 
-/// summary.json: one object; one line a job.
-std::string batch_json(const std::vector<BatchJob>& jobs, const BatchSummary& summary, const BatchOptions& options);
+/// summary.json: one object.
+Json batch_json(const std::vector<BatchJob>& jobs, const BatchSummary& summary, const BatchOptions& options);
 
 /// summary.tsv: a line of names, then one a job: job, outcome, code, seconds, files, bytes, output, source, reason.
 std::string batch_table(const std::vector<BatchJob>& jobs, const BatchSummary& summary);

@@ -61,6 +61,8 @@ struct Command {
   CommandSpec (*spec)();
   Outcome (*run)(const Arguments&, Context&);
   bool reads_itself = false;  // another program reads its arguments, which are handed over as they were typed
+  /// Ending of the name that a batch gives its output, if that is a file; nullptr if it has no name of its own.
+  std::string (*ending)(const Arguments&) = nullptr;
 };
 
 /// All commands, in the order of the help.

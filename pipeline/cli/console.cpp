@@ -7,9 +7,9 @@
 #include <algorithm>
 #include <cerrno>
 #include <cstring>
-#include <nlohmann/json.hpp>
 
 #include "pipeline/cli/signals.h"
+#include "pipeline/text/json.h"
 #include "pipeline/text/json_text.h"
 #include "stages/write/file.h"
 
@@ -55,9 +55,7 @@ int Console::complain(const Error& error) {
 
 Status Console::print(std::string_view text) { return pipeline::print(text); }
 
-Status Console::give(const nlohmann::ordered_json& value) {
-  return pipeline::print(value.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n");
-}
+Status Console::give(const Json& value) { return pipeline::print(json_line(value)); }
 
 void Console::progress(const ProgressEvent& event) {
   if (event.stage == ProgressEvent::Stage::kLayers) keep_on_signals();

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <map>
 
 #include "pipeline/cli/outputs.h"
 #include "pipeline/job/file.h"
@@ -16,6 +17,8 @@ std::string_view heading(std::string_view section) {
   if (section == "part" || section == "place") return "Parts";
   if (section == "slice") return "Contours and files";
   if (section == "fill") return "Filling";
+  if (section == "segment") return "Segmented lines";
+  if (section == "extrude") return "Extrusion";
   if (section == "machine" || section == "dose") return "Machine and binder";
   if (section == "load") return "Repair";
   if (section == "run") return "Run";
@@ -91,6 +94,10 @@ void add_key_options(const KeyChoice& choice, CommandSpec& spec) {
        {"--set", "KEY=VALUE", "set any key of the job, as in --set bed.dpi=600; part.2.copies is of part 2", "", "Job"}});
   add_options<Job>(job_keys(), choice, Job(), spec);
   add_options<PartRequest>(part_keys(), choice, PartRequest(), spec);
+  // Each heading once, in the order in which they come first.
+  std::map<std::string, std::size_t> places;
+  for (const OptionSpec& option : spec.options) places.try_emplace(option.group, places.size());
+  std::ranges::stable_sort(spec.options, {}, [&](const OptionSpec& option) { return places[option.group]; });
 }
 
 Result<Job> read_job_options(const KeyChoice& choice, const Arguments& arguments) {

@@ -4,6 +4,7 @@
 #include <unistd.h>
 
 #include <chrono>
+#include <csignal>
 #include <nlohmann/json.hpp>
 #include <thread>
 
@@ -265,7 +266,13 @@ TEST_F(Interrupted, SecondRunInTheSameDirectoryIsRefusedAndHarmsNothing) {
   EXPECT_EQ(lamina({"verify", "out"}).code, 0);
 }
 
-TEST_F(Interrupted, TerminationIsAnInterruptionToo) { EXPECT_EQ(stopped(long_job("out"), "out", 2, SIGTERM).code, 130); }
+TEST_F(Interrupted, TerminationAndAClosedTerminalAreInterruptionsToo) {
+  EXPECT_EQ(stopped(long_job("out"), "out", 2, SIGTERM).code, 130);
+  std::signal(SIGHUP, SIG_DFL);  // a program that finds it ignored, as under nohup, leaves it so
+  const Outcome outcome = stopped(long_job("closed"), "closed", 2, SIGHUP);
+  EXPECT_EQ(outcome.code, 130);
+  EXPECT_NE(outcome.err.find("--resume"), std::string::npos) << outcome.err;
+}
 
 }  // namespace
 }  // namespace lamina::test

@@ -7,11 +7,14 @@
 #include <filesystem>
 #include <span>
 
-#include "pipeline/batch/batch.h"
+#include "pipeline/batch/queue.h"
 #include "pipeline/batch/summary.h"
+#include "pipeline/cli/batch_call.h"
 #include "pipeline/cli/command.h"
 #include "pipeline/cli/console.h"
 #include "pipeline/cli/signals.h"
+#include "pipeline/text/json.h"
+#include "pipeline/text/json_text.h"
 #include "pipeline/text/number_text.h"
 #include "stages/write/file.h"
 
@@ -30,8 +33,8 @@ CommandSpec batch_spec() {
   spec.options = {
       {"-o,--output", "DIR", "directory of the batch; jobs write below it", "", ""},
       {"--with", "WORDS", "command and options for parts that come without any, as in --with 'jet --dpi 600'", "jet", ""},
-      {"--jobs", "N", "jobs at work at a time; 0 for as many as there are processors", "0", "Run"},
-      {"--memory", "SIZE", "what all jobs at work may hold together: 512M, 4G", "1G", "Run"},
+      {"--jobs", "N", "jobs running at a time; 0 for as many as there are processors", "0", "Run"},
+      {"--memory", "SIZE", "what all running jobs may hold together: 512M, 4G", "1G", "Run"},
       {"--time-limit", "SECONDS", "stop a job that takes longer: it fails, with exit code 3", "", "Run"},
       {"--keep-going", "", "a job that fails does not stop the others; this is what happens anyway", "", "Run"},
       {"--fail-fast", "", "the first job that fails stops the batch", "", "Run"},
@@ -141,7 +144,8 @@ Outcome run_request(const Request& request, Context& context) {
   const BatchOptions& options = request.options;
   Result<std::vector<BatchEntry>> entries = read_batch(request.lists, request.with);
   if (!entries) return entries.error();
-  const auto jobs = prepare_batch(std::move(*entries), {options.directory, layer_share(options.memory_bytes, options.jobs)});
+  const auto jobs =
+      prepare_batch(std::move(*entries), {options.directory, layer_share(options.memory_bytes, options.jobs)}, read_call);
   if (!jobs) return jobs.error();
   Result<BatchRecord> record = BatchRecord::open(options.directory, options.resume, options.overwrite);
   if (!record) return record.error();
@@ -156,8 +160,8 @@ Outcome run_request(const Request& request, Context& context) {
   const Result<BatchSummary> summary = run_batch(*jobs, std::move(*record), options, watcher, context.cancel());
   console.clear();
   if (!summary) return summary.error();
-  const std::string json = batch_json(*jobs, *summary, options);
-  Status written = write_text_file(options.directory, "summary.json", json);
+  const Json json = batch_json(*jobs, *summary, options);
+  Status written = write_text_file(options.directory, "summary.json", json_line(json, 2));
   if (written) written = write_text_file(options.directory, "summary.tsv", batch_table(*jobs, *summary));
   int code = written ? batch_code(*summary) : context.complain(written.error());
   if (!request.quiet) context.say_text(batch_text(*jobs, *summary, options));
@@ -165,9 +169,9 @@ Outcome run_request(const Request& request, Context& context) {
     context.complain({Fault::kInterrupted, "interrupted; what is done is kept, go on with the same command and --resume"});
   }
   if (request.json) {
-    if (Status status = context.print(json); !status) code = context.complain(status.error());
+    if (Status status = context.give(json); !status) code = context.complain(status.error());
   }
-  if (summary->abandoned) std::_Exit(code);  // a job that does not stop is still at work
+  if (summary->abandoned) std::_Exit(code);  // a job that does not stop is still running
   return code;
 }
 

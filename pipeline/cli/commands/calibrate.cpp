@@ -6,6 +6,7 @@
 
 #include "pipeline/calibrate/calibrate.h"
 #include "pipeline/cli/command.h"
+#include "pipeline/text/json.h"
 #include "pipeline/text/json_text.h"
 #include "pipeline/text/names.h"
 #include "pipeline/text/number_text.h"
@@ -49,8 +50,8 @@ Outcome say_pieces(const std::vector<std::string>& names, const std::string& dir
         names.size(), one_line(directory), fmt::join(names, ", "), one_line(directory)));
   }
   if (!json) return {};
-  return context.print(fmt::format("{{\"command\":\"calibrate\",\"directory\":{},\"pieces\":[{}]}}\n", json_string(directory),
-                                   fmt::join(quoted, ",")));
+  return context.give(Json::parse(fmt::format("{{\"command\":\"calibrate\",\"directory\":{},\"pieces\":[{}]}}\n",
+                                              json_string(directory), fmt::join(quoted, ","))));
 }
 
 Outcome run_calibrate(const Arguments& arguments, Context& context) {
@@ -127,9 +128,9 @@ Outcome run_calibrate(const Arguments& arguments, Context& context) {
   }
   if (!quiet) context.say_text(text);
   if (json) {
-    const Status status = context.print(
+    const Status status = context.give(Json::parse(
         fmt::format("{{\"command\":\"calibrate\",\"profile\":{},\"flow\":{},\"repeated\":[{}],\"warnings\":[{}]}}\n",
-                    json_string(output), profile->machine.material.flow, list, fmt::join(advice, ",")));
+                    json_string(output), profile->machine.material.flow, list, fmt::join(advice, ","))));
     if (!status) return status.error();
   }
   return 0;

@@ -6,6 +6,7 @@
 #include "pipeline/job/keys.h"
 #include "pipeline/plan/scene.h"
 #include "pipeline/show/info.h"
+#include "pipeline/text/json.h"
 
 namespace lamina::pipeline {
 namespace {
@@ -63,7 +64,8 @@ Outcome run_info(const Arguments& arguments, Context& context) {
       code = std::max(code, context.complain(page.error()));
       continue;
     }
-    if (Status status = context.print(*page); !status) return status.error();
+    const Status status = arguments.has("--json") ? context.give(Json::parse(*page)) : context.print(*page);
+    if (!status) return status.error();
   }
   return code;
 }

@@ -1,6 +1,9 @@
 #include <fmt/format.h>
 
+#include <optional>
+
 #include "pipeline/cli/command.h"
+#include "pipeline/machine/extruder.h"
 #include "pipeline/machine/powder_printer.h"
 #include "pipeline/machine/printer_profile.h"
 #include "stages/program/head_grid.h"
@@ -14,8 +17,9 @@ namespace {
 CommandSpec machines_spec() {
   CommandSpec spec;
   spec.summary =
-      "Lists the powder printers whose print programs lamina jet can write, and explains what follows from a profile:\n"
-      "dpi across and along the scan, lag from nozzle to nozzle, swaths, highest speed, time and bytes of a layer.";
+      "Lists the powder printers whose print programs lamina jet can write, and explains what follows from a profile: dpi\n"
+      "across and along the scan, lag from nozzle to nozzle, swaths, highest speed, time and bytes of a layer. And lists the\n"
+      "extrusion printers of lamina extrude.";
   spec.operand = "NAME|FILE";
   spec.operand_meaning = "machines to explain, the same as --check";
   spec.options = {{"--check", "NAME|FILE", "explain this machine; a profile is a TOML file", "", ""},
@@ -30,6 +34,34 @@ CommandSpec machines_spec() {
       "  lamina machines --show nuferbj > mine.toml\n"
       "  lamina jet part.stl --machine mine.toml -o out";
   return spec;
+}
+
+/// Printers by name or file: of powder, else of extrusion. errors  of a name that is neither, those of powder printers
+struct Printer {
+  std::optional<Machine> powder;
+  std::optional<ExtruderProfile> extrusion;
+};
+Result<Printer> find_printer(const std::string& name) {
+  Printer printer;
+  const Result<Machine> powder = find_machine(name);
+  if (powder) {
+    printer.powder = *powder;
+    return printer;
+  }
+  const auto extrusion = find_extruder(name);
+  if (!extrusion) return powder.error();
+  printer.extrusion = *extrusion;
+  return printer;
+}
+
+std::string explain(const ExtruderProfile& profile) {
+  const Extruder& m = profile.machine;
+  return fmt::format(
+      "machine   {}: {}\nbed       {:g} x {:g} mm, {:g} mm high\nnozzle    {:g} mm, filament {:g} mm\nfile      {}\n"
+      "widths    {}\n",
+      m.name, m.description, m.bed.size_mm[0], m.bed.size_mm[1], m.bed.build_height_mm, m.material.nozzle_mm,
+      m.material.filament_mm, m.format == "sml" ? "SML" : "G-code",
+      profile.own_calibration ? "measured on it" : "as published for an Anet A8; lamina calibrate measures them");
 }
 
 Outcome run_machines(const Arguments& arguments, Context& context) {
@@ -47,18 +79,23 @@ Outcome run_machines(const Arguments& arguments, Context& context) {
     for (const write::Dialect& dialect : write::dialects()) text += fmt::format("{:<12}{}\n", dialect.id, dialect.description);
   }
   for (const std::string& name : arguments.all("--show")) {
-    const Result<Machine> machine = find_machine(name);
-    if (!machine) return machine.error();
-    text += machine_text(*machine);
+    const Result<Printer> printer = find_printer(name);
+    if (!printer) return printer.error();
+    text += printer->powder ? machine_text(*printer->powder) : extruder_text(*printer->extrusion);
   }
   std::vector<std::string> checked = arguments.all("--check");
   checked.insert(checked.end(), arguments.operands.begin(), arguments.operands.end());
   for (const std::string& name : checked) {
-    const Result<Machine> machine = find_machine(name);
-    if (!machine) return machine.error();
-    const auto resolved = resolve_profile(*machine);
+    const Result<Printer> printer = find_printer(name);
+    if (!printer) return printer.error();
+    if (!text.empty()) text += "\n";
+    if (printer->extrusion) {
+      text += explain(*printer->extrusion);
+      continue;
+    }
+    const auto resolved = resolve_profile(*printer->powder);
     if (!resolved) return resolved.error();
-    text += (text.empty() ? "" : "\n") + program::explain(resolved->machine, resolved->grid);
+    text += program::explain(resolved->machine, resolved->grid);
   }
   if (text.empty()) {
     for (const ShippedMachine& shipped : shipped_machines()) {
@@ -66,14 +103,19 @@ Outcome run_machines(const Arguments& arguments, Context& context) {
       if (!machine) return machine.error();
       text += fmt::format("{:<16}{}\n", shipped.name, machine->description);
     }
+    text += "\nlamina extrude:\n";
+    for (const ShippedExtruder& shipped : shipped_extruders()) {
+      const auto profile = read_extruder(shipped.text, std::string(shipped.name));
+      if (!profile) return profile.error();
+      text += fmt::format("{:<16}{}\n", shipped.name, profile->machine.description);
+    }
   }
   return context.print(text);
 }
 
 }  // namespace
 
-const Command machines_command = {"machines",
-                                  "the powder printers that lamina jet writes programs for, and what follows from a profile",
+const Command machines_command = {"machines", "the printers that lamina plans for, and what follows from a profile",
                                   machines_spec, run_machines};
 
 }  // namespace lamina::pipeline

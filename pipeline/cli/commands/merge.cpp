@@ -2,7 +2,7 @@
 
 #include "pipeline/cli/command.h"
 #include "pipeline/output/merge.h"
-#include "pipeline/text/json_text.h"
+#include "pipeline/text/json.h"
 #include "pipeline/text/readable.h"
 
 namespace lamina::pipeline {
@@ -35,13 +35,13 @@ Outcome run_merge(const Arguments& arguments, Context& context) {
     context.say(fmt::format("{}: {} layers of {} shards joined, {} files linked, {} copied", report->output,
                             readable_count(report->layers), report->shards, report->linked, report->copied));
   }
-  if (arguments.has("--json")) {
-    const Status status = context.print(
-        fmt::format("{{\"command\":\"merge\",\"directory\":{},\"shards\":{},\"layers\":{},\"linked\":{},\"copied\":{}}}\n",
-                    json_string(report->output), report->shards, report->layers, report->linked, report->copied));
-    if (!status) return status.error();
-  }
-  return 0;
+  if (!arguments.has("--json")) return {};
+  return context.give({{"command", "merge"},
+                       {"directory", report->output},
+                       {"shards", report->shards},
+                       {"layers", report->layers},
+                       {"linked", report->linked},
+                       {"copied", report->copied}});
 }
 
 }  // namespace

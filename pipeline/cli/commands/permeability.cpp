@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "pipeline/cli/command.h"
+#include "pipeline/text/json.h"
 #include "pipeline/text/json_text.h"
 #include "pipeline/text/names.h"
 #include "pipeline/text/number_text.h"
@@ -225,11 +226,9 @@ Outcome run_permeability(const Arguments& arguments, Context& context) {
     }
   }
   if (!warning.empty()) context.say_text(fmt::format("warning   {}\n", warning));
-  const std::string out = arguments.has("--json")
-                              ? fmt::format("{{\"command\":\"permeability\",\"fits\":[{}],\"warnings\":[{}]}}\n", json,
-                                            warning.empty() ? "" : json_string(warning))
-                              : text;
-  return context.print(out);
+  if (!arguments.has("--json")) return context.print(text);
+  return context.give(Json::parse(fmt::format("{{\"command\":\"permeability\",\"fits\":[{}],\"warnings\":[{}]}}\n", json,
+                                              warning.empty() ? "" : json_string(warning))));
 }
 
 }  // namespace

@@ -1,7 +1,10 @@
 #include <fmt/format.h>
 
+#include <algorithm>
+
 #include "pipeline/check/verify.h"
 #include "pipeline/cli/command.h"
+#include "pipeline/text/json.h"
 #include "pipeline/text/json_text.h"
 #include "pipeline/text/readable.h"
 
@@ -27,16 +30,33 @@ CommandSpec verify_spec() {
   return spec;
 }
 
-std::string replay_json(const VerifyReport& report) {
-  if (report.machine.empty()) return {};
+Json replay_json(const VerifyReport& report) {
   const replay::Count& replay = report.replay;
-  return fmt::format(
-      ",\"replay\":{{\"machine\":{},\"layers\":{},\"drops\":{},\"vectors\":{},\"sweeps\":{},\"moved\":{},\"lost\":{},"
-      "\"coverage\":{},\"seconds\":{},\"scan_mm\":{},\"travel_mm\":{},\"fed_mm\":[{},{}],\"binder_mm3\":{},"
-      "\"powder_mm3\":{},\"farthest_along_um\":{},\"farthest_across_um\":{}}}",
-      json_string(report.machine), report.replayed, replay.drops, replay.vectors, replay.sweeps, report.moved, report.lost,
-      report.coverage, replay.seconds, replay.scan_mm, replay.travel_mm, replay.fed_mm[0], replay.fed_mm[1], report.binder_mm3,
-      report.powder_mm3, replay.farthest_along_um, replay.farthest_across_um);
+  return {{"machine", report.machine},
+          {"layers", report.replayed},
+          {"drops", replay.drops},
+          {"vectors", replay.vectors},
+          {"sweeps", replay.sweeps},
+          {"moved", report.moved},
+          {"lost", report.lost},
+          {"coverage", report.coverage},
+          {"seconds", replay.seconds},
+          {"scan_mm", replay.scan_mm},
+          {"travel_mm", replay.travel_mm},
+          {"fed_mm", replay.fed_mm},
+          {"binder_mm3", report.binder_mm3},
+          {"powder_mm3", report.powder_mm3},
+          {"farthest_along_um", replay.farthest_along_um},
+          {"farthest_across_um", replay.farthest_across_um}};
+}
+
+Json report_json(const VerifyReport& report) {
+  Json faults = Json::array();
+  for (const std::string& fault : report.faults) faults.push_back(one_line(fault));
+  Json json = {{"command", "verify"},   {"directory", report.directory},     {"ok", report.ok()}, {"layers", report.layers},
+               {"bytes", report.bytes}, {"fault_count", report.fault_count}, {"faults", faults}};
+  if (!report.machine.empty()) json["replay"] = replay_json(report);
+  return json;
 }
 
 // What the machine does, for people.
@@ -70,14 +90,6 @@ void say_replay(const VerifyReport& report, Context& context) {
                           report.binder_mm3 / 1000, report.powder_mm3 / 1000, replay.fed_mm[0], replay.fed_mm[1]));
 }
 
-std::string report_json(const VerifyReport& report) {
-  std::string faults;
-  for (const std::string& fault : report.faults) faults += (faults.empty() ? "" : ",") + json_string(one_line(fault));
-  return fmt::format(
-      "{{\"command\":\"verify\",\"directory\":{},\"ok\":{},\"layers\":{},\"bytes\":{},\"fault_count\":{},\"faults\":[{}]{}}}\n",
-      json_string(report.directory), report.ok(), report.layers, report.bytes, report.fault_count, faults, replay_json(report));
-}
-
 Outcome run_verify(const Arguments& arguments, Context& context) {
   if (arguments.operands.empty())
     return Error{Fault::kUsage, "no directory to verify; name one that lamina jet or lamina slice wrote"};
@@ -101,7 +113,7 @@ Outcome run_verify(const Arguments& arguments, Context& context) {
       say_replay(*report, context);
     }
     if (arguments.has("--json")) {
-      if (Status status = context.print(report_json(*report)); !status) return status.error();
+      if (Status status = context.give(report_json(*report)); !status) return status.error();
     }
   }
   return code;

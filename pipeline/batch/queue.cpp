@@ -1,4 +1,4 @@
-#include "pipeline/batch/batch.h"
+#include "pipeline/batch/queue.h"
 
 #include <fmt/format.h>
 #include <malloc.h>
@@ -9,11 +9,9 @@
 #include <filesystem>
 #include <memory>
 #include <mutex>
-#include <nlohmann/json.hpp>
 #include <thread>
 
 #include "pipeline/batch/summary.h"
-#include "pipeline/cli/command.h"
 #include "pipeline/text/json_text.h"
 
 namespace lamina::pipeline {
@@ -26,23 +24,6 @@ constexpr Fault kOverdue = Fault::kInput;   // its part cannot be planned in the
 
 double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
 
-/// What a command printed, as one JSON value: an object, an array of the objects of several lines, or a text.
-std::string printed_json(const std::string& printed) {
-  if (printed.empty()) return {};
-  if (nlohmann::json::accept(printed)) return nlohmann::json::parse(printed).dump();  // on one line
-  std::string values;
-  std::size_t count = 0;
-  for (std::size_t begin = 0; begin < printed.size();) {
-    const std::size_t end = std::min(printed.find('\n', begin), printed.size());
-    const std::string line = printed.substr(begin, end - begin);
-    begin = end + 1;
-    if (line.empty()) continue;
-    if (!nlohmann::json::accept(line)) return json_string(printed);
-    values += (count++ > 0 ? "," : "") + line;
-  }
-  return count == 1 ? values : "[" + values + "]";
-}
-
 bool holds_something(const std::string& output) {
   std::error_code error;
   return !output.empty() && std::filesystem::exists(output, error) && !std::filesystem::is_empty(output, error);
@@ -50,38 +31,13 @@ bool holds_something(const std::string& output) {
 
 /// A job's place in the queue; lives until the last thread that knows it has ended.
 struct Slot {
-  enum class State { kWaiting, kAtWork, kEnded } state = State::kWaiting;
+  enum class State { kWaiting, kRunning, kEnded } state = State::kWaiting;
   std::atomic<bool> cancel{false};
   std::atomic<std::uint32_t> layers_done{0}, layers{0};
   Clock::time_point begun, told_to_stop;
   std::atomic<bool> overdue{false};
   bool abandoned = false, reported = false;
   BatchResult result;
-};
-
-/// What a job says and gives, its progress in its slot.
-class JobContext : public Context {
- public:
-  explicit JobContext(Slot& slot) : slot_(slot) {}
-  void say_text(std::string_view) override {}
-  int complain(const Error& error) override {
-    reason = one_line(error.message);
-    return static_cast<int>(error.fault);
-  }
-  Status print(std::string_view text) override {
-    out += text;
-    return {};
-  }
-  Status give(const nlohmann::ordered_json& value) override { return print(value.dump() + "\n"); }
-  void progress(const ProgressEvent& event) override {
-    slot_.layers_done.store(event.done, std::memory_order_relaxed);
-    slot_.layers.store(event.total, std::memory_order_relaxed);
-  }
-  const std::atomic<bool>& cancel() override { return slot_.cancel; }
-  std::string out, reason;
-
- private:
-  Slot& slot_;
 };
 
 class Queue : public std::enable_shared_from_this<Queue> {
@@ -102,7 +58,7 @@ class Queue : public std::enable_shared_from_this<Queue> {
         stop_all();
       }
       look_at_clocks();
-      if (const auto ended = report(watcher, lock); ended == jobs_.size() || (stopped_ && at_work_ == 0)) break;
+      if (const auto ended = report(watcher, lock); ended == jobs_.size() || (stopped_ && running_ == 0)) break;
       changed_.wait_for(lock, milliseconds(100));
     }
     report(watcher, lock);
@@ -130,7 +86,7 @@ class Queue : public std::enable_shared_from_this<Queue> {
   }
 
   static void tell_to_stop(Slot& slot) {
-    if (slot.state != Slot::State::kAtWork || slot.cancel) return;
+    if (slot.state != Slot::State::kRunning || slot.cancel) return;
     slot.told_to_stop = Clock::now();
     slot.cancel = true;
   }
@@ -138,7 +94,7 @@ class Queue : public std::enable_shared_from_this<Queue> {
   void look_at_clocks() {
     for (std::size_t i = 0; i < jobs_.size(); ++i) {
       Slot& slot = *slots_[i];
-      if (slot.state != Slot::State::kAtWork) continue;
+      if (slot.state != Slot::State::kRunning) continue;
       if (options_.time_limit_seconds > 0 && !slot.cancel && seconds_since(slot.begun) > options_.time_limit_seconds) {
         slot.overdue = true;
         tell_to_stop(slot);
@@ -164,8 +120,8 @@ class Queue : public std::enable_shared_from_this<Queue> {
     for (std::size_t i = 0; i < jobs_.size(); ++i) {
       const Slot& slot = *slots_[i];
       const auto number = static_cast<std::uint32_t>(i + 1);
-      if (slot.state == Slot::State::kAtWork)
-        state.at_work.push_back({number, jobs_[i].entry.name, slot.layers_done, slot.layers});
+      if (slot.state == Slot::State::kRunning)
+        state.running.push_back({number, jobs_[i].entry.name, slot.layers_done, slot.layers});
       if (slot.state != Slot::State::kEnded) continue;
       ++state.ended;
       if (slot.result.outcome != BatchOutcome::kDone && slot.result.outcome != BatchOutcome::kKept) ++state.failed;
@@ -186,17 +142,17 @@ class Queue : public std::enable_shared_from_this<Queue> {
     std::unique_lock lock(mutex_);
     while (!stopped_ && next_ < jobs_.size()) {
       const BatchJob& job = jobs_[next_];
-      if (at_work_ > 0 && need_ + job.need_bytes > options_.memory_bytes) {
+      if (running_ > 0 && need_ + job.need_bytes > options_.memory_bytes) {
         changed_.wait(lock);
         continue;
       }
       const std::size_t i = next_++;
       Slot& slot = *slots_[i];
-      slot.state = Slot::State::kAtWork;
+      slot.state = Slot::State::kRunning;
       slot.begun = Clock::now();
-      ++at_work_;
+      ++running_;
       need_ += job.need_bytes;
-      summary_.most_at_work = std::max(summary_.most_at_work, at_work_);
+      summary_.most_running = std::max(summary_.most_running, running_);
       summary_.most_need_bytes = std::max(summary_.most_need_bytes, need_);
       lock.unlock();
       BatchResult result = run_job(i);
@@ -214,7 +170,7 @@ class Queue : public std::enable_shared_from_this<Queue> {
   void end(std::size_t i, BatchResult result) {
     Slot& slot = *slots_[i];
     slot.state = Slot::State::kEnded;
-    --at_work_;
+    --running_;
     need_ -= jobs_[i].need_bytes;
     const bool news = result.outcome != BatchOutcome::kStopped && (result.outcome != BatchOutcome::kKept || result.recognized);
     slot.result = std::move(result);
@@ -253,11 +209,8 @@ class Queue : public std::enable_shared_from_this<Queue> {
       const std::lock_guard lock(mutex_);
       note(record_.begun(job, static_cast<std::uint32_t>(i + 1), foreign));
     }
-    result = run_command(job, slot, arguments_now(job, earlier, foreign));
-    if (foreign && options_.resume && !job.can_resume && job.can_overwrite && result.code == static_cast<int>(Fault::kUsage)) {
-      result.reason += fmt::format("; the batch has no record of it: remove {} to have it done again", job.output);
-    }
-    result.recognized = result.recognized && foreign && job.can_resume && result.outcome == BatchOutcome::kDone;
+    result = run_call(job, slot, {job.output, job.layer_bytes, earlier_of(job, earlier, foreign)});
+    result.recognized = result.recognized && foreign && result.outcome == BatchOutcome::kDone;
     if (result.outcome == BatchOutcome::kDone && !job.output.empty()) {
       if (Result<OutputDigest> digest = digest_output(job.output)) {
         result.output = *digest;
@@ -273,36 +226,31 @@ class Queue : public std::enable_shared_from_this<Queue> {
 
   /// What an earlier run of this batch left of the same job is continued; what it left of another one is replaced. What is
   /// there without a record is for the command to recognize as its own, or to refuse.
-  std::vector<std::string> arguments_now(const BatchJob& job, const BatchRecord::Earlier* earlier, bool foreign) const {
-    std::vector<std::string> arguments = job.arguments;
-    const auto add = [&](const char* flag) { arguments.insert(std::ranges::find(arguments, "--"), flag); };
+  CallSettings::Earlier earlier_of(const BatchJob& job, const BatchRecord::Earlier* earlier, bool foreign) const {
     const bool same = earlier != nullptr && earlier->begun == job.id;
-    if (foreign) {
-      if (options_.resume && job.can_resume) add("--resume");
-    } else if (same && job.can_resume) {
-      add("--resume");
-    } else if ((options_.overwrite || earlier != nullptr) && job.can_overwrite) {
-      add("--overwrite");
-    }
-    return arguments;
+    if (job.call.can_continue && (foreign ? options_.resume : same)) return CallSettings::Earlier::kContinue;
+    if (!foreign && job.call.can_replace && (options_.overwrite || earlier != nullptr)) return CallSettings::Earlier::kReplace;
+    return CallSettings::Earlier::kNone;
   }
 
   std::string overdue_reason() const {
     return fmt::format("took longer than its time limit of {} s", options_.time_limit_seconds);
   }
 
-  BatchResult run_command(const BatchJob& job, Slot& slot, const std::vector<std::string>& arguments) const {
-    BatchResult result;
+  BatchResult run_call(const BatchJob& job, Slot& slot, const CallSettings& settings) const {
     const auto start = Clock::now();
-    JobContext context(slot);
-    const Result<Arguments> read = read_arguments(spec_of(*job.command), arguments);
-    const Outcome outcome = read ? pipeline::run(*job.command, *read, context) : Outcome(read.error());
-    result.code = outcome.error ? context.complain(*outcome.error) : outcome.code;
-    result.recognized = outcome.layers_planned == 0 && outcome.layers_kept > 0;
+    const ProgressCallback progress = [&slot](const ProgressEvent& event) {
+      slot.layers_done.store(event.done, std::memory_order_relaxed);
+      slot.layers.store(event.total, std::memory_order_relaxed);
+    };
+    CallResult ended = job.call.run(settings, progress, slot.cancel);
+    BatchResult result;
     result.seconds = seconds_since(start);
-    result.json = printed_json(context.out);
+    result.code = ended.code;
+    result.reason = std::move(ended.reason);
+    result.value = std::move(ended.value);
+    result.recognized = ended.found_whole;
     result.outcome = result.code == 0 ? BatchOutcome::kDone : BatchOutcome::kFailed;
-    if (result.code != 0) result.reason = context.reason;
     if (result.code == static_cast<int>(Fault::kInterrupted)) {
       result.outcome = BatchOutcome::kStopped;
       if (slot.overdue) {
@@ -322,7 +270,7 @@ class Queue : public std::enable_shared_from_this<Queue> {
   std::mutex mutex_;
   std::condition_variable changed_;
   std::size_t next_ = 0;
-  std::uint32_t at_work_ = 0, workers_ = 0;
+  std::uint32_t running_ = 0, workers_ = 0;
   std::uint64_t need_ = 0;
   bool stopped_ = false;
   Status record_status_;
