@@ -40,18 +40,18 @@ target_link_libraries(lamina_stages PUBLIC TBB::tbb Eigen3::Eigen fmt::fmt embre
 
 # --- pipeline: how work moves
 lamina_sources(pipeline_sources "pipeline/*.cpp")
-list(FILTER pipeline_sources EXCLUDE REGEX "/pipeline/(main|preview_main|show/preview_layers|show/preview_swath)\\.cpp$")
+list(FILTER pipeline_sources EXCLUDE REGEX "/pipeline/(main|preview_main|show/sheet|show/swath)\\.cpp$")
 # What runs once a job is compiled to be compiled fast; what runs once a layer, and what decodes programs, is optimised.
 lamina_sources(once_a_job "pipeline/batch/*.cpp" "pipeline/calibrate/*.cpp" "pipeline/cli/*.cpp" "pipeline/job/*.cpp"
                "pipeline/machine/*.cpp" "pipeline/show/*.cpp" "pipeline/text/*.cpp")
-list(FILTER once_a_job EXCLUDE REGEX "/show/preview_(layers|swath)\\.cpp$")
+list(FILTER once_a_job EXCLUDE REGEX "/show/(sheet|swath)\\.cpp$")
 list(REMOVE_ITEM pipeline_sources ${once_a_job})
 add_library(lamina_once_a_job OBJECT ${once_a_job})
 target_link_libraries(lamina_once_a_job PRIVATE lamina::stages nlohmann_json::nlohmann_json)
 target_compile_options(lamina_once_a_job PRIVATE $<$<NOT:$<CONFIG:Debug>>:-O1>)
 if(LAMINA_UNITE)
   set(united ${once_a_job})
-  list(FILTER united EXCLUDE REGEX "/(machine/printer_profile|show/slice_picture|cli/commands/(jet|slice|extrude)|job/extrude)\\.cpp$")
+  list(FILTER united EXCLUDE REGEX "/(machine/printer_profile|show/slice_series|cli/commands/(jet|slice|extrude)|job/extrude)\\.cpp$")
   lamina_unite(lamina_once_a_job ${united})
 endif()
 
@@ -78,7 +78,7 @@ target_link_libraries(lamina PRIVATE lamina::pipeline)
 # Pictures need OpenImageIO, which brings some 260 shared libraries and a tenth of a second of start-up: a program of
 # its own that `lamina preview` hands over to, so that no job pays for it.
 lamina_sources(picture_sources "stages/write/picture/*.cpp")
-add_executable(lamina-preview pipeline/preview_main.cpp pipeline/show/preview_layers.cpp pipeline/show/preview_swath.cpp
+add_executable(lamina-preview pipeline/preview_main.cpp pipeline/show/sheet.cpp pipeline/show/swath.cpp
                ${picture_sources})
 target_link_libraries(lamina-preview PRIVATE lamina::pipeline PkgConfig::OPENIMAGEIO nlohmann_json::nlohmann_json)
 

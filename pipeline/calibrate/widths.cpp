@@ -1,10 +1,11 @@
-// The table of measured widths, as people fill it in.
+#include "pipeline/calibrate/widths.h"
+
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <fstream>
 
-#include "pipeline/calibrate/calibrate.h"
 #include "pipeline/text/json_text.h"
 #include "pipeline/text/key_text.h"
 #include "pipeline/text/table.h"
@@ -88,6 +89,31 @@ Result<std::vector<Measured>> read_widths(const std::string& path) {
   }
   if (rows.empty()) return wrong(0, "holds no rows; lamina calibrate -o DIR writes a table to be filled in");
   return rows;
+}
+
+Result<CalibratedProfile> calibrate_profile(CalibrationRequest request, const std::string& widths, double gap_mm, bool exact) {
+  auto profile = find_extruder(request.machine);
+  if (!profile) return Error{Fault::kUsage, "--machine: " + profile.error().message};
+  const auto rows = read_widths(widths);
+  if (!rows) return rows.error();
+  resolve_bead(request, *profile);
+  segment::MeasuringSettings settings;
+  settings.width_mm = request.width_mm;
+  settings.height_mm = request.height_mm;
+  settings.speed_mm_s = profile->machine.speed.print_mm_s;
+  settings.flow = profile->machine.material.flow;
+  settings.gap_mm = gap_mm;
+  settings.exact_spacing = exact;
+  auto found = segment::calibrate(*rows, settings, fmt::format("measured on {}", profile->machine.name));
+  if (!found) return Error{found.error().fault, fmt::format("{}: {}", widths, found.error().message)};
+  profile->calibration = found->calibration;
+  profile->own_calibration = true;
+  if (found->flow) profile->machine.material.flow = std::round(*found->flow * 1000) / 1000;
+  std::string toml = fmt::format("# {} with what was measured on it. Made by lamina calibrate.\n\n{}",
+                                 one_line(profile->machine.name), extruder_text(*profile));
+  if (const auto again = read_extruder(toml, "the profile"); !again)
+    return Error{Fault::kInput, fmt::format("{}: {}", widths, again.error().message)};
+  return CalibratedProfile{std::move(*profile), std::move(toml), std::move(*found)};
 }
 
 }  // namespace lamina::pipeline

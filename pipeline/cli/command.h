@@ -88,7 +88,4 @@ extern const Command jet_command, slice_command, heights_command, extrude_comman
     calibrate_command, permeability_command, merge_command, machines_command, preview_command, report_command, batch_command,
     completion_command, manual_command;
 
-/// Hands the process over to the program lamina-preview. Returns only if it cannot be started.
-Error hand_over_to_preview(const std::vector<std::string>& arguments);
-
 }  // namespace lamina::pipeline

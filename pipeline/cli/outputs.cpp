@@ -19,10 +19,13 @@ constexpr std::size_t kHead = 4096;  // bytes of a file in which its mark stands
 struct InputOption {
   std::string_view flag, role;
 };
-constexpr InputOption kInputs[] = {
-    {"--job", "the job file"},       {"--machine", "the machine profile"}, {"--check", "a machine profile"},
-    {"--show", "a machine profile"}, {"--measured", "the measurements"},   {"--measure", "a measured table"},
-    {"--parts", "a part"},           {"--drawing", "the drawing"}};
+constexpr InputOption kInputs[] = {{"--job", "the job file"},
+                                   {"--machine", "the machine profile"},
+                                   {"--check", "a machine profile"},
+                                   {"--show", "a machine profile"},
+                                   {"--measured", "the measurements"},
+                                   {"--measure", "a measured table"},
+                                   {"--parts", "a part"}};
 constexpr std::string_view kOutputs[] = {"-o,--output", "--save-job", "--plot", "--target"};
 
 /// A file of its own that a command writes. Marks: one of them stands in the head of each that lamina wrote; a ^ before
@@ -35,9 +38,9 @@ struct OwnFile {
 constexpr std::string_view kPicture("Software\0lamina", 15), kDrawing = "<!-- drawn by lamina -->";
 constexpr OwnFile kOwnFiles[] = {
     {"", "--save-job", false, {"^# A job of lamina."}},
-    {"heights", "-o,--output", true, {"^layers    ", "^way    ", "^table,layer,", "^{\"height_mm\": ", "^Portugu"}},
+    {"heights", "-o,--output", true, {"^layers    ", "^way    ", "^table,layer,", "^{\"height_mm\":", "^Portugu"}},
     {"heights", "--plot", false, {kDrawing, kPicture}},
-    {"permeability", "--plot", false, {kDrawing}},
+    {"permeability", "--plot", false, {kDrawing, kPicture}},
     {"preview", "-o,--output", false, {kDrawing, kPicture}},
     {"report", "-o,--output", false, {"name=\"generator\" content=\"lamina\""}},
     {"calibrate", "-o,--output", false, {"Made by lamina calibrate."}},
@@ -86,7 +89,7 @@ std::vector<InputFile> inputs_of(const Arguments& arguments, std::string_view op
 /// An output, and what is written beside it.
 void add_output(const std::string& path, std::vector<std::string>& outputs) {
   if (path.empty()) return;
-  for (const char* ending : {"", ".part", ".json", ".json.part", ".drawing"}) outputs.push_back(path + ending);
+  for (const char* ending : {"", ".part", ".json", ".json.part"}) outputs.push_back(path + ending);
 }
 
 std::vector<std::string> outputs_of(const Arguments& arguments) {

@@ -231,7 +231,7 @@ Result<std::string> describe_part_json(const std::string& path, const load::Load
     json["meshes"].push_back(std::move(mesh));
   }
   // Names in a file may be bytes that are not UTF-8.
-  return json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n";
+  return json.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n";
 }
 
 }  // namespace lamina::pipeline

@@ -17,7 +17,7 @@ namespace lamina::pipeline {
 /// cost     a load, a diagnosis (sorting all edges), and a second load with repair if the mesh is not closed
 Result<std::string> describe_part_text(const std::string& path, const load::LoadOptions& options);
 
-/// The same as one JSON object. Places are in mm, in the coordinates of the file after options.transform; triangles
+/// The same as one JSON object on a line. Places are in mm, in the coordinates of the file after options.transform; triangles
 /// count from 1.
 Result<std::string> describe_part_json(const std::string& path, const load::LoadOptions& options);
 

@@ -4,16 +4,17 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
+#include <nlohmann/json.hpp>
 #include <optional>
 #include <span>
 
 #include "pipeline/check/replay_job.h"
 #include "pipeline/output/manifest.h"
 #include "pipeline/show/report_cast.h"
-#include "pipeline/show/slice_picture.h"  // is_slice_directory
+#include "pipeline/show/title.h"
 #include "stages/data/hash.h"
-#include "pipeline/text/json_text.h"
 #include "stages/raster/materials.h"
 #include "stages/read/image.h"
 #include "stages/view/depth.h"
@@ -25,6 +26,7 @@ namespace {
 
 namespace fs = std::filesystem;
 using write::report::PageData;
+using Json = nlohmann::ordered_json;
 
 constexpr std::uint32_t kChunk = 64;  // layers that are read together
 
@@ -41,7 +43,7 @@ Result<Manifest> finished_manifest(const std::string& directory) {
                                                    "run lamina merge first)",
                                                    directory)};
   }
-  if (is_slice_directory(directory)) {
+  if (product_of_manifest(directory + "/manifest.json") == Product::kContours) {
     return Error{Fault::kVerification, fmt::format("{}: is a job of lamina slice, and reports are of lamina jet's jobs; "
                                                    "lamina preview draws its layers",
                                                    directory)};
@@ -123,29 +125,19 @@ Status each_layer(const std::string& directory, const Manifest& manifest, Work w
   return {};
 }
 
-template <class Value>
-std::string list(const std::vector<LayerRecord>& layers, Value value) {
-  std::string text = "[";
-  for (const LayerRecord& record : layers) text += fmt::format("{}{}", text.size() > 1 ? "," : "", value(record));
-  return text + "]";
+Json part_json(const PartSummary& part) {
+  const auto point = [](const Point3& p) { return Json{mm(p.x), mm(p.y), mm(p.z)}; };
+  Json json = {{"path", part.path},
+               {"copies", part.copies},
+               {"triangles", part.triangles},
+               {"low_mm", point(part.bounds.lo)},
+               {"high_mm", point(part.bounds.hi)},
+               {"notes", Json::array()}};
+  for (const Note& note : part.notes) json["notes"].push_back((note.repair ? "repair: " : "") + note.text);
+  return json;
 }
 
-std::string part_json(const PartSummary& part) {
-  std::string notes;
-  for (const Note& note : part.notes) {
-    notes += (notes.empty() ? "" : ",") + json_string((note.repair ? "repair: " : "") + note.text);
-  }
-  const auto point = [](const Point3& p) { return fmt::format("[{},{},{}]", mm(p.x), mm(p.y), mm(p.z)); };
-  return fmt::format("{{\"path\":{},\"copies\":{},\"triangles\":{},\"low_mm\":{},\"high_mm\":{},\"notes\":[{}]}}",
-                     json_string(part.path), part.copies, part.triangles, point(part.bounds.lo), point(part.bounds.hi), notes);
-}
-
-std::string title_of(const ManifestHead& head) {
-  if (head.parts.empty()) return "a job";
-  std::string title = fs::path(head.parts.front().path).filename().string();
-  if (head.parts.size() > 1) title += fmt::format(" and {} more", head.parts.size() - 1);
-  return title;
-}
+std::string title_of(const ManifestHead& head) { return head.parts.empty() ? "a job" : title_of(head.parts); }
 
 /// A view of the page: what its head says of it, and its pixels.
 struct ShownView {
@@ -194,46 +186,111 @@ std::vector<ShownView> views_of_layers(const view::ThreeViews& views) {
   return shown;
 }
 
+/// The layers' numbers, a list for each column.
+Json layers_json(const Manifest& manifest, const std::vector<double>& seconds) {
+  Json columns;
+  const auto column = [&](const char* name, auto value) {
+    Json& list = columns[name] = Json::array();
+    for (const LayerRecord& record : manifest.layers) list.push_back(value(record));
+  };
+  column("bottom", [](const LayerRecord& r) { return r.layer.bottom; });
+  column("thickness", [](const LayerRecord& r) { return r.layer.thickness; });
+  column("reason", [](const LayerRecord& r) { return static_cast<int>(r.layer.reason); });
+  column("set", [](const LayerRecord& r) { return r.set_pixels; });
+  column("bytes", [](const LayerRecord& r) { return r.bytes; });
+  column("capped", [](const LayerRecord& r) { return r.capped_rows; });
+  column("hash", [](const LayerRecord& r) { return hex(r.hash); });
+  if (manifest.head.machine.empty()) return columns;
+  column("sweeps", [](const LayerRecord& r) { return r.program.sweeps; });
+  columns["seconds"] = Json::array();
+  for (const double time : seconds) columns["seconds"].push_back(std::round(time * 1e6) / 1e6);
+  return columns;
+}
+
 /// What the page's script reads.
-std::string head_json(const Manifest& manifest, const FileDigest& file, const PixelWindow& window, HeldLayers& held,
-                      const std::vector<ShownView>& views, const std::vector<double>& seconds) {
+Json head_json(const Manifest& manifest, const FileDigest& file, const PixelWindow& window, HeldLayers& held,
+               const std::vector<ShownView>& views, const std::vector<double>& seconds) {
   const ManifestHead& head = manifest.head;
+  const double dpi_x = head.grid.x.dpi(), dpi_y = head.grid.y.dpi();
+  Json json = {{"title", title_of(head)},
+               {"version", head.version},
+               {"format", head.format},
+               {"machine", head.machine},
+               {"columns", head.grid.columns()},
+               {"rows", head.grid.rows()},
+               {"dpi", {dpi_x, dpi_y}},
+               {"pixel_mm", {25.4 / dpi_x, 25.4 / dpi_y}},
+               {"window", {window.left, window.top, window.right, window.bottom}},
+               {"layer_count", head.layer_count},
+               {"first_layer", head.first_layer},
+               {"stride", held.stride()},
+               {"job", head.job_toml},
+               {"manifest", {{"bytes", file.bytes}, {"hash", hex(file.hash)}}},
+               {"parts", Json::array()},
+               {"views", Json::object()},
+               {"reasons", Json::array()},
+               {"embedded", Json::array()}};
+  for (const PartSummary& part : head.parts) json["parts"].push_back(part_json(part));
+  for (const ShownView& view : views)
+    json["views"][view.name] = {view.width, view.height, view.most, view.width_mm, view.height_mm};
+  for (int reason = 0; reason <= static_cast<int>(LayerReason::kFlat); ++reason)
+    json["reasons"].push_back(reason_name(static_cast<LayerReason>(reason)));
+  for (const auto& [place, code] : held.layers()) json["embedded"].push_back(place);
+  json["layers"] = layers_json(manifest, seconds);
+  return json;
+}
+
+/// What one pass over all layers gives.
+struct LayersSeen {
+  PixelWindow window;
+  std::vector<double> seconds;  // of each, with a machine
+};
+
+/// Reads every layer; codes that fit the page go to `held`.
+Result<LayersSeen> see_layers(const std::string& directory, const Manifest& manifest, const replay::VirtualMachine* machine,
+                              HeldLayers& held) {
+  struct First {
+    PixelWindow window;
+    Buffer<std::byte> code;
+    double seconds = 0;
+  };
+  LayersSeen seen;
+  const Status status = each_layer<First>(
+      directory, manifest,
+      [&](std::uint32_t place, const RunsView& runs, First& first) -> Status {
+        first.window = window_of(runs);
+        if (held.wants(place)) first.code = write::report::pack_runs(runs);
+        if (machine == nullptr) return {};
+        const auto time = seconds_of_layer(directory, manifest.head, *machine, manifest.layers[place], runs);
+        if (!time) return time.error();
+        first.seconds = *time;
+        return {};
+      },
+      [&](std::uint32_t place, First& first) {
+        seen.window = joined(seen.window, first.window);
+        held.add(place, std::move(first.code));
+        if (machine != nullptr) seen.seconds.push_back(first.seconds);
+      });
+  if (!status) return status.error();
+  const PixelGrid& grid = manifest.head.grid;
+  if (seen.window.empty()) seen.window = {0, grid.columns(), 0, grid.rows()};
+  return seen;
+}
+
+/// The parts as their layers build them up, where their files are not at hand: a second pass over all layers.
+Result<std::vector<ShownView>> build_up(const std::string& directory, const Manifest& manifest, const PixelWindow& window) {
   const std::vector<LayerRecord>& layers = manifest.layers;
-  std::string parts, places, sides;
-  for (const PartSummary& part : head.parts) parts += (parts.empty() ? "" : ",") + part_json(part);
-  for (const auto& [place, code] : held.layers()) places += fmt::format("{}{}", places.empty() ? "" : ",", place);
-  for (const ShownView& view : views) {
-    sides += fmt::format("{}\"{}\":[{},{},{},{:.6g},{:.6g}]", sides.empty() ? "" : ",", view.name, view.width, view.height,
-                         view.most, view.width_mm, view.height_mm);
-  }
-  std::string reasons;
-  for (int reason = 0; reason <= static_cast<int>(LayerReason::kFlat); ++reason) {
-    reasons += fmt::format("{}\"{}\"", reason == 0 ? "" : ",", reason_name(static_cast<LayerReason>(reason)));
-  }
-  std::string text = fmt::format(
-      "{{\"title\":{},\"version\":{},\"format\":{},\"machine\":{},\"columns\":{},\"rows\":{},\"dpi\":[{},{}],"
-      "\"pixel_mm\":[{},{}],\"window\":[{},{},{},{}],\"layer_count\":{},\"first_layer\":{},\"stride\":{},\"job\":{},"
-      "\"manifest\":{{\"bytes\":{},\"hash\":\"{}\"}},\"parts\":[{}],\"views\":{{{}}},\"reasons\":[{}],\"embedded\":[{}],",
-      json_string(title_of(head)), json_string(head.version), json_string(head.format), json_string(head.machine),
-      head.grid.columns(), head.grid.rows(), head.grid.x.dpi(), head.grid.y.dpi(), 25.4 / head.grid.x.dpi(),
-      25.4 / head.grid.y.dpi(), window.left, window.top, window.right, window.bottom, head.layer_count, head.first_layer,
-      held.stride(), json_string(head.job_toml), file.bytes, hex(file.hash), parts, sides, reasons, places);
-  text +=
-      fmt::format("\"layers\":{{\"bottom\":{},\"thickness\":{},\"reason\":{},\"set\":{},\"bytes\":{},\"capped\":{},\"hash\":{}",
-                  list(layers, [](const LayerRecord& r) { return r.layer.bottom; }),
-                  list(layers, [](const LayerRecord& r) { return r.layer.thickness; }),
-                  list(layers, [](const LayerRecord& r) { return static_cast<int>(r.layer.reason); }),
-                  list(layers, [](const LayerRecord& r) { return r.set_pixels; }),
-                  list(layers, [](const LayerRecord& r) { return r.bytes; }),
-                  list(layers, [](const LayerRecord& r) { return r.capped_rows; }),
-                  list(layers, [](const LayerRecord& r) { return fmt::format("\"{}\"", hex(r.hash)); }));
-  if (!head.machine.empty()) {
-    text += fmt::format(",\"sweeps\":{}", list(layers, [](const LayerRecord& r) { return r.program.sweeps; }));
-    std::string times;
-    for (const double time : seconds) times += fmt::format("{}{:.6g}", times.empty() ? "" : ",", time);
-    text += fmt::format(",\"seconds\":[{}]", times);
-  }
-  return text + "}}";
+  const Layer &lowest = layers.front().layer, &highest = layers.back().layer;
+  view::ThreeViews built(manifest.head.grid, window, lowest.bottom, highest.bottom + highest.thickness);
+  const Status status = each_layer<std::vector<std::uint8_t>>(
+      directory, manifest,
+      [&](std::uint32_t, const RunsView& runs, std::vector<std::uint8_t>& cells) -> Status {
+        built.look(runs, cells);
+        return {};
+      },
+      [&](std::uint32_t place, const std::vector<std::uint8_t>& cells) { built.add(layers[place].layer, cells); });
+  if (!status) return status.error();
+  return views_of_layers(built);
 }
 
 }  // namespace
@@ -243,9 +300,6 @@ Result<Report> make_report(const std::string& directory, const ReportOptions& op
   if (!manifest) return manifest.error();
   const Result<FileDigest> file = digest_file(directory + "/manifest.json");
   if (!file) return file.error();
-  const std::vector<LayerRecord>& layers = manifest->layers;
-  const PixelGrid& grid = manifest->head.grid;
-
   std::optional<replay::VirtualMachine> machine;
   if (!manifest->head.machine.empty()) {
     auto built = machine_of_job(directory, manifest->head);
@@ -262,55 +316,23 @@ Result<Report> make_report(const std::string& directory, const ReportOptions& op
     report.without_parts = shown.error().message;
   }
 
-  struct First {
-    PixelWindow window;
-    Buffer<std::byte> code;
-    double seconds = 0;
-  };
   // What a layer's line and the rest of the page take is not the layers' own.
-  std::uint64_t taken = (views.empty() ? 150'000 : 50'000) + 150 * layers.size();
+  std::uint64_t taken = (views.empty() ? 150'000 : 50'000) + 150 * manifest->layers.size();
   for (const ShownView& view : views) taken += view.deflated.size() / 3 * 4;
   HeldLayers held(options.size_limit > taken ? options.size_limit - taken : 0);
-  PixelWindow window;
-  std::vector<double> seconds;
-  Status status = each_layer<First>(
-      directory, *manifest,
-      [&](std::uint32_t place, const RunsView& runs, First& first) -> Status {
-        first.window = window_of(runs);
-        if (held.wants(place)) first.code = write::report::pack_runs(runs);
-        if (!machine) return {};
-        const auto time = seconds_of_layer(directory, manifest->head, *machine, layers[place], runs);
-        if (!time) return time.error();
-        first.seconds = *time;
-        return {};
-      },
-      [&](std::uint32_t place, First& first) {
-        window = joined(window, first.window);
-        held.add(place, std::move(first.code));
-        if (machine) seconds.push_back(first.seconds);
-      });
-  if (!status) return status.error();
-  if (window.empty()) window = {0, grid.columns(), 0, grid.rows()};
-
+  const auto seen = see_layers(directory, *manifest, machine ? &*machine : nullptr, held);
+  if (!seen) return seen.error();
   if (views.empty()) {
-    const Layer &lowest = layers.front().layer, &highest = layers.back().layer;
-    view::ThreeViews built(grid, window, lowest.bottom, highest.bottom + highest.thickness);
-    status = each_layer<std::vector<std::uint8_t>>(
-        directory, *manifest,
-        [&](std::uint32_t, const RunsView& runs, std::vector<std::uint8_t>& cells) -> Status {
-          built.look(runs, cells);
-          return {};
-        },
-        [&](std::uint32_t place, const std::vector<std::uint8_t>& cells) { built.add(layers[place].layer, cells); });
-    if (!status) return status.error();
-    views = views_of_layers(built);
+    auto built = build_up(directory, *manifest, seen->window);
+    if (!built) return built.error();
+    views = std::move(*built);
   }
-
-  const std::string head = head_json(*manifest, *file, window, held, views, seconds);
+  const std::string head = head_json(*manifest, *file, seen->window, held, views, seen->seconds)
+                               .dump(-1, ' ', false, Json::error_handler_t::replace);
   std::vector<PageData> data;
   for (ShownView& view : views) data.push_back({"v-" + view.name, std::move(view.deflated)});
   for (auto& [place, code] : held.layers()) data.push_back({fmt::format("r{}", place), std::move(code)});
-  report.layers = static_cast<std::uint32_t>(layers.size());
+  report.layers = static_cast<std::uint32_t>(manifest->layers.size());
   report.held = static_cast<std::uint32_t>(held.layers().size());
   report.stride = held.stride();
   report.page = write::report::make_page("lamina: " + title_of(manifest->head), head, data);

@@ -1,13 +1,15 @@
 #include <fmt/format.h>
 
 #include <chrono>
+#include <nlohmann/json.hpp>
 
 #include "pipeline/cli/command.h"
 #include "pipeline/cli/keys.h"
+#include "pipeline/cli/plot_file.h"
 #include "pipeline/job/file.h"
 #include "pipeline/plan/heights.h"
-#include "pipeline/plan/heights_study.h"
 #include "pipeline/show/heights_plot.h"
+#include "pipeline/show/heights_table.h"
 #include "pipeline/text/key_text.h"
 #include "stages/write/file.h"
 
@@ -66,7 +68,7 @@ Result<Job> job_of(const Arguments& arguments) {
   return read;
 }
 
-// A file of this form holds one table and no name for it.
+/// A file of this form holds one table and no name for it.
 Status check_one_table(const Job& job, const Arguments& arguments) {
   const bool many = arguments.all("--measure").size() > 1;
   if (!arguments.has("--compare") && !job.heights.per_part && !many) return {};
@@ -77,11 +79,40 @@ Status check_one_table(const Job& job, const Arguments& arguments) {
                                                       : "more than one --measure")};
 }
 
-std::string rp3_of(const Job& job, const HeightsStudy& study) {
-  write::rp3::Settings settings;
-  settings.shrink = job.parts.front().shrink;
-  settings.rotation_deg = job.parts.front().rotate_deg;
-  return heights_rp3(study, {0, static_cast<std::uint32_t>(study.boundaries.size() - 1)}, settings);
+std::string table_text(Form form, const Job& job, const Scene& scene, const std::vector<HeightsStudy>& studies) {
+  using Json = nlohmann::ordered_json;
+  switch (form) {
+    case Form::kJson: return heights_json(job, scene, studies).dump(-1, ' ', false, Json::error_handler_t::replace) + "\n";
+    case Form::kCsv: return heights_csv(scene, studies);
+    case Form::kRp3: {
+      write::rp3::Settings settings;
+      settings.shrink = job.parts.front().shrink;
+      settings.rotation_deg = job.parts.front().rotate_deg;
+      return heights_rp3(studies.back(), settings);
+    }
+    case Form::kText: break;
+  }
+  return studies.size() > 1 ? comparison_page(studies) : heights_page(job, scene, studies.back());
+}
+
+/// The tables that the options name, the last one of which is drawn.
+Result<std::vector<HeightsStudy>> studies_of(const Arguments& arguments, const Job& job, const Scene& scene) {
+  std::vector<HeightsStudy> studies;
+  if (arguments.has("--compare") || job.heights.per_part) {
+    auto all = arguments.has("--compare") ? study_all_ways(job, scene) : study_per_part(job, scene);
+    if (!all) return all;
+    studies = std::move(*all);
+  } else if (!arguments.has("--measure")) {
+    auto study = study_heights(job, scene);
+    if (!study) return study.error();
+    studies.push_back(std::move(*study));
+  }
+  for (const std::string& path : arguments.all("--measure")) {
+    auto study = study_table(job, scene, path);
+    if (!study) return study.error();
+    studies.push_back(std::move(*study));
+  }
+  return studies;
 }
 
 Outcome run_heights(const Arguments& arguments, Context& context) {
@@ -106,39 +137,15 @@ Outcome run_heights(const Arguments& arguments, Context& context) {
   const std::chrono::duration<double> load = std::chrono::steady_clock::now() - start;
   if (!scene) return scene.error();
 
-  std::vector<HeightsStudy> studies;
-  if (arguments.has("--compare") || job->heights.per_part) {
-    Result<std::vector<HeightsStudy>> all =
-        arguments.has("--compare") ? study_all_ways(*job, *scene) : study_per_part(*job, *scene);
-    if (!all) return all.error();
-    studies = std::move(*all);
-  } else if (!arguments.has("--measure")) {
-    Result<HeightsStudy> study = study_heights(*job, *scene);
-    if (!study) return study.error();
-    studies.push_back(std::move(*study));
-  }
-  for (const std::string& path : arguments.all("--measure")) {
-    Result<HeightsStudy> study = study_table(*job, *scene, path);
-    if (!study) return study.error();
-    studies.push_back(std::move(*study));
-  }
-
-  const HeightsStudy& last = studies.back();
-  std::string text;
-  if (form == Form::kJson)
-    text = heights_json(*job, *scene, studies);
-  else if (form == Form::kCsv)
-    text = heights_csv(*scene, studies);
-  else if (form == Form::kRp3)
-    text = rp3_of(*job, last);
-  else
-    text = studies.size() > 1 ? comparison_page(studies) : heights_page(*job, *scene, last);
-  if (Status status = tell(output, text, context); !status) return status.error();
-  if (studies.size() == 1 && !arguments.has("--quiet")) {
+  const auto studies = studies_of(arguments, *job, *scene);
+  if (!studies) return studies.error();
+  const HeightsStudy& last = studies->back();
+  if (Status status = tell(output, table_text(form, *job, *scene, *studies), context); !status) return status.error();
+  if (studies->size() == 1 && !arguments.has("--quiet")) {
     context.say(fmt::format("time      load {:.4f} s, surface {:.4f} s, layers {:.4f} s, measuring them {:.4f} s", load.count(),
                             last.index_seconds, last.plan_seconds, last.evaluate_seconds));
   }
-  return plot.empty() ? 0 : draw_heights(plot, *job, *scene, last);
+  return plot.empty() ? Status() : write_plot(plot, draw_study(*scene, last));
 }
 
 }  // namespace

@@ -1,148 +1,22 @@
 // lamina permeability: k1 and k2 of measured pressure drops.
 #include <fmt/format.h>
 
-#include <algorithm>
-#include <cmath>
-#include <fstream>
-#include <map>
+#include <nlohmann/json.hpp>
 #include <numbers>
-#include <sstream>
-#include <vector>
 
+#include "pipeline/calibrate/permeability.h"
 #include "pipeline/cli/command.h"
-#include "pipeline/text/json.h"
+#include "pipeline/cli/plot_file.h"
 #include "pipeline/text/json_text.h"
-#include "pipeline/text/names.h"
 #include "pipeline/text/number_text.h"
-#include "pipeline/text/table.h"
-#include "stages/segment/permeability.h"
-#include "stages/write/file.h"
 
 namespace lamina::pipeline {
 namespace {
 
-struct Unit {
-  std::string_view ending;
-  double si;
-};
-// Longer endings first: "_mbar" also ends in "bar".
-constexpr Unit kFlows[] = {{"_l_min", 1e-3 / 60}, {"_ml_min", 1e-6 / 60}, {"_l_h", 1e-3 / 3600},
-                           {"_m3_h", 1.0 / 3600}, {"_m3_s", 1},           {"_l_s", 1e-3}};
-constexpr Unit kVelocities[] = {{"_mm_s", 1e-3}, {"_cm_s", 1e-2}, {"_m_s", 1}};
-constexpr Unit kDrops[] = {{"_mbar", 100}, {"_kpa", 1000}, {"_hpa", 100}, {"_pa", 1}, {"_bar", 1e5}, {"_psi", 6894.757293}};
-
-template <std::size_t N>
-double unit_of(std::string name, const Unit (&units)[N]) {
-  std::ranges::transform(name, name.begin(), [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  for (const Unit& unit : units) {
-    if (name.ends_with(unit.ending)) return unit.si;
-  }
-  return 0;
-}
-
 struct Settings {
-  double length_m = 0, area_m2 = 0;
+  Medium medium;
   segment::Fluid fluid;
-  bool document = false;
 };
-
-struct Group {
-  std::string name;
-  std::vector<segment::FlowPoint> points;
-};
-
-/// A table with a header: one column of flows or velocities, one or more of pressure drops; units by their endings.
-Result<std::vector<Group>> read_points(const std::string& path, const Settings& settings) {
-  const auto wrong = [&](std::size_t line, const std::string& what) {
-    return Error{Fault::kInput, line == 0 ? fmt::format("{}: {}", path, what) : fmt::format("{}:{}: {}", path, line, what)};
-  };
-  std::ifstream file(path);
-  if (!file) return wrong(0, "no such file, or it cannot be read");
-  std::vector<std::string> names;
-  std::vector<double> drop_units;
-  std::size_t flow_column = SIZE_MAX, group_column = SIZE_MAX;
-  double flow_unit = 0;
-  bool velocity = false;
-  char separator = ',';
-  std::vector<Group> groups;
-  std::size_t number = 0;
-  for (std::string line; std::getline(file, line);) {
-    ++number;
-    if (line.empty() || line[0] == '#' || line == "\r") continue;
-    if (names.empty()) {
-      separator = separator_of(line);
-      names = cells_of(line, separator);
-      drop_units.assign(names.size(), 0);
-      bool drops = false;
-      for (std::size_t i = 0; i < names.size(); ++i) {
-        if (names[i] == "configuration") group_column = i;
-        if (const double unit = unit_of(names[i], kDrops); unit > 0) {
-          drop_units[i] = unit;
-          drops = true;
-        } else if (const double flow = unit_of(names[i], kFlows); flow > 0 && flow_column == SIZE_MAX) {
-          flow_column = i;
-          flow_unit = flow;
-        } else if (const double speed = unit_of(names[i], kVelocities); speed > 0 && flow_column == SIZE_MAX) {
-          flow_column = i;
-          flow_unit = speed;
-          velocity = true;
-        }
-      }
-      if (flow_column == SIZE_MAX)
-        return wrong(number, "no column of flows (flow_l_min, flow_ml_min, flow_m3_s) or velocities (velocity_m_s)");
-      if (!drops) return wrong(number, "no column of pressure drops (drop_pa, drop_kpa, drop_mbar, drop_bar, drop_psi)");
-      continue;
-    }
-    const auto cells = cells_of(line, separator);
-    if (cells.size() != names.size())
-      return wrong(number, fmt::format("{} columns where the header has {}", cells.size(), names.size()));
-    double flow = 0;
-    if (const auto what = read_number(cells[flow_column], 0, 1e12, "", flow); !what.empty())
-      return wrong(number, fmt::format("{}: {}", names[flow_column], what));
-    const double v = flow * flow_unit / (velocity ? 1 : settings.area_m2);
-    const std::string name = group_column == SIZE_MAX ? std::string() : cells[group_column];
-    auto group = std::ranges::find(groups, name, &Group::name);
-    if (group == groups.end()) group = groups.insert(groups.end(), {name, {}});
-    for (std::size_t i = 0; i < cells.size(); ++i) {
-      if (drop_units[i] == 0 || cells[i].empty()) continue;
-      double drop = 0;
-      if (const auto what = read_number(cells[i], -1e12, 1e12, "", drop); !what.empty())
-        return wrong(number, fmt::format("{}: {}", names[i], what));
-      group->points.push_back({v, drop * drop_units[i] / settings.length_m});
-    }
-  }
-  if (groups.empty()) return wrong(0, "holds no measurements; the first line names the columns, the others hold numbers");
-  return groups;
-}
-
-/// Points and parabola as SVG.
-std::string plot_of(const Group& group, const segment::Permeability& fit) {
-  double most_v = 0, most_y = 0;
-  for (const auto& p : group.points) {
-    most_v = std::max(most_v, p.velocity_m_s);
-    most_y = std::max(most_y, p.gradient_pa_m);
-  }
-  const auto x = [&](double v) { return 60 + 520 * v / most_v; };
-  const auto y = [&](double g) { return 360 - 320 * g / most_y; };
-  std::string svg =
-      "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"620\" height=\"420\" font-family=\"sans-serif\" font-size=\"12\">\n<!-- drawn by lamina -->\n"
-      "<rect width=\"620\" height=\"420\" fill=\"white\"/>\n<path d=\"M60 30V360H590\" fill=\"none\" stroke=\"black\"/>\n";
-  svg += fmt::format(
-      "<text x=\"300\" y=\"400\">velocity, 0 to {:.4g} m/s</text>\n<text x=\"10\" y=\"20\">pressure drop / length, 0 to {:.4g} Pa/m; "
-      "k1 {:.2f} D, k2 {:.4g} m, R2 {:.5f} {}</text>\n",
-      most_v, most_y, fit.k1_m2 / segment::kDarcy, fit.k2_m, fit.r_squared,
-      group.name.find_first_of("<>&") == std::string::npos ? group.name : "");
-  std::string curve;
-  for (int i = 0; i <= 100; ++i) {
-    const double v = most_v * i / 100;
-    curve += fmt::format("{}{:.2f} {:.2f}", i == 0 ? "M" : "L", x(v), y(fit.linear * v + fit.quadratic * v * v));
-  }
-  svg += fmt::format("<path d=\"{}\" fill=\"none\" stroke=\"#c33\"/>\n", curve);
-  for (const auto& p : group.points)
-    svg += fmt::format("<circle cx=\"{:.2f}\" cy=\"{:.2f}\" r=\"2.5\" fill=\"#26c\" fill-opacity=\"0.5\"/>\n",
-                       x(p.velocity_m_s), y(p.gradient_pa_m));
-  return svg + "</svg>\n";
-}
 
 CommandSpec permeability_spec() {
   CommandSpec spec;
@@ -158,7 +32,7 @@ CommandSpec permeability_spec() {
                   {"--viscosity", "PA.S", "of the fluid", "1.81e-05", "Fluid"},
                   {"--density", "KG/M3", "of the fluid", "1.204", "Fluid"},
                   {"--convention", "NAME", "dinisio2022: what reproduces Table 25 of that document", "", "Fluid"},
-                  {"--plot", "FILE", "draw points and parabola as SVG", "", "Result"},
+                  {"--plot", "FILE", "draw points and parabola, as .svg or .png", "", "Result"},
                   {"--overwrite", "", "replace a file that lamina did not write", "", "Result"},
                   {"--json", "", "print the result as one JSON object on stdout", "", "Result"}};
   spec.closing =
@@ -169,18 +43,18 @@ CommandSpec permeability_spec() {
   return spec;
 }
 
-Outcome run_permeability(const Arguments& arguments, Context& context) {
+/// What the options say of medium and fluid. errors  kUsage
+Result<Settings> read_settings(const Arguments& arguments) {
   const auto usage = [](const std::string& what) { return Error{Fault::kUsage, what}; };
-  if (arguments.operands.size() != 1) return usage("name one file of measurements");
   Settings settings;
   if (arguments.has("--convention")) {
     if (arguments.text("--convention") != "dinisio2022") {
       return usage(fmt::format("--convention: '{}' is none of dinisio2022", one_line(arguments.text("--convention"))));
     }
-    settings = {0.0255, 1e-3 / 60 * 28, {1.87e-5, 998.2}, true};
+    settings = {{0.0255, 1e-3 / 60 * 28}, {1.87e-5, 998.2}};
   }
-  double value = 0;
   const auto number = [&](const char* flag, double unit, double& target) {
+    double value = 0;
     if (!arguments.has(flag)) return std::string();
     const std::string wrong = read_number(arguments.text(flag), 1e-12, 1e9, "", value);
     if (wrong.empty()) target = value * unit;
@@ -188,47 +62,64 @@ Outcome run_permeability(const Arguments& arguments, Context& context) {
   };
   double diameter = 0;
   for (const std::string& wrong :
-       {number("--length", 1e-3, settings.length_m), number("--area", 1e-6, settings.area_m2),
+       {number("--length", 1e-3, settings.medium.length_m), number("--area", 1e-6, settings.medium.area_m2),
         number("--diameter", 1e-3, diameter), number("--viscosity", 1, settings.fluid.viscosity_pa_s),
         number("--density", 1, settings.fluid.density_kg_m3)}) {
     if (!wrong.empty()) return usage(wrong);
   }
-  if (diameter > 0) settings.area_m2 = std::numbers::pi / 4 * diameter * diameter;
-  if (!(settings.length_m > 0)) return usage("--length is missing; give the medium's length along the flow in mm");
-  if (!(settings.area_m2 > 0)) return usage("--diameter or --area is missing; give the medium's cross-section");
-  const auto groups = read_points(arguments.operands.front(), settings);
+  if (diameter > 0) settings.medium.area_m2 = std::numbers::pi / 4 * diameter * diameter;
+  if (!(settings.medium.length_m > 0)) return usage("--length is missing; give the medium's length along the flow in mm");
+  if (!(settings.medium.area_m2 > 0)) return usage("--diameter or --area is missing; give the medium's cross-section");
+  return settings;
+}
+
+/// What is odd about a fluid; empty if nothing is.
+std::string warning_of(const segment::Fluid& fluid) {
+  if (fluid.density_kg_m3 <= 100 || fluid.viscosity_pa_s >= 1e-4) return {};
+  return fmt::format(
+      "a fluid of {:.4g} Pa.s and {:.4g} kg/m3 is neither a gas nor a liquid: the density is that of water; "
+      "k2 for air is {:.4g} times smaller",
+      fluid.viscosity_pa_s, fluid.density_kg_m3, fluid.density_kg_m3 / 1.2);
+}
+
+Outcome run_permeability(const Arguments& arguments, Context& context) {
+  using Json = nlohmann::ordered_json;
+  if (arguments.operands.size() != 1) return Error{Fault::kUsage, "name one file of measurements"};
+  const std::string &file = arguments.operands.front(), plot = arguments.text("--plot");
+  if (Status status = check_plot_name(plot); !status) return status;
+  const auto settings = read_settings(arguments);
+  if (!settings) return settings.error();
+  const auto groups = read_flows(file, settings->medium);
   if (!groups) return groups.error();
-  const std::string warning =
-      settings.fluid.density_kg_m3 > 100 && settings.fluid.viscosity_pa_s < 1e-4
-          ? fmt::format(
-                "a fluid of {:.4g} Pa.s and {:.4g} kg/m3 is neither a gas nor a liquid: the density is that of water; "
-                "k2 for air is {:.4g} times smaller",
-                settings.fluid.viscosity_pa_s, settings.fluid.density_kg_m3, settings.fluid.density_kg_m3 / 1.2)
-          : std::string();
-  std::string json, text;
-  for (const Group& group : *groups) {
-    const auto fit = segment::fit_permeability(group.points, settings.fluid);
+  Json json = {{"command", "permeability"}, {"fits", Json::array()}, {"warnings", Json::array()}};
+  std::string text;
+  for (const FlowGroup& group : *groups) {
+    const auto fit = segment::fit_permeability(group.points, settings->fluid);
     if (!fit)
-      return Error{fit.error().fault, fmt::format("{}: {}{}", arguments.operands.front(),
-                                                  group.name.empty() ? "" : group.name + ": ", fit.error().message)};
+      return Error{fit.error().fault,
+                   fmt::format("{}: {}{}", file, group.name.empty() ? "" : group.name + ": ", fit.error().message)};
     const double k1 = fit->k1_m2 / segment::kDarcy, k1_error = fit->k1_error_m2 / segment::kDarcy;
     text += fmt::format(
         "{}k1   {:.2f} +- {:.2f} D ({:.4e} m2)\nk2   {:.4g} +- {:.2g} m\nfit  R2 {:.6f}, {} points, scatter {:.4g} Pa/m\n",
         group.name.empty() ? "" : group.name + "\n", k1, k1_error, fit->k1_m2, fit->k2_m, fit->k2_error_m, fit->r_squared,
         group.points.size(), fit->scatter_pa_m);
-    json += fmt::format(
-        "{}{{\"configuration\":{},\"points\":{},\"k1_darcy\":{},\"k1_error_darcy\":{},\"k1_m2\":{},\"k2_m\":{},\"k2_error_m\":{},"
-        "\"r_squared\":{},\"scatter_pa_m\":{}}}",
-        json.empty() ? "" : ",", json_string(group.name), group.points.size(), k1, k1_error, fit->k1_m2, fit->k2_m,
-        fit->k2_error_m, fit->r_squared, fit->scatter_pa_m);
-    if (arguments.has("--plot") && &group == &groups->front()) {
-      if (Status status = write::write_file(arguments.text("--plot"), plot_of(group, *fit)); !status) return status.error();
-    }
+    json["fits"].push_back({{"configuration", group.name},
+                            {"points", group.points.size()},
+                            {"k1_darcy", k1},
+                            {"k1_error_darcy", k1_error},
+                            {"k1_m2", fit->k1_m2},
+                            {"k2_m", fit->k2_m},
+                            {"k2_error_m", fit->k2_error_m},
+                            {"r_squared", fit->r_squared},
+                            {"scatter_pa_m", fit->scatter_pa_m}});
+    if (plot.empty() || &group != &groups->front()) continue;
+    if (Status status = write_plot(plot, draw_fit(group, *fit)); !status) return status;
   }
-  if (!warning.empty()) context.say_text(fmt::format("warning   {}\n", warning));
-  if (!arguments.has("--json")) return context.print(text);
-  return context.give(Json::parse(fmt::format("{{\"command\":\"permeability\",\"fits\":[{}],\"warnings\":[{}]}}\n", json,
-                                              warning.empty() ? "" : json_string(warning))));
+  if (const std::string warning = warning_of(settings->fluid); !warning.empty()) {
+    context.say_text(fmt::format("warning   {}\n", warning));
+    json["warnings"].push_back(warning);
+  }
+  return arguments.has("--json") ? context.give(json) : context.print(text);
 }
 
 }  // namespace

@@ -1,12 +1,5 @@
-#include <fmt/format.h>
-#include <unistd.h>
-
-#include <cerrno>
-#include <csignal>
-#include <cstring>
-#include <filesystem>
-
 #include "pipeline/cli/command.h"
+#include "pipeline/cli/preview_program.h"
 
 namespace lamina::pipeline {
 namespace {
@@ -31,7 +24,6 @@ CommandSpec preview_spec() {
       {"--step", "N", "of the swath, else the middle one", "", ""},
       {"--width", "PIXELS", "width of the picture, 200 to 20000", "2400", ""},
       {"--whole-bed", "", "show all of the bed, not only where the layers have something", "", ""},
-      {"--drawing", "FILE", "draw what lamina heights left for it instead, and remove FILE", "", ""},
       {"--overwrite", "", "replace a file that lamina did not write", "", ""},
       {"--quiet", "", "say nothing but errors", "", ""}};
   spec.closing =
@@ -48,25 +40,5 @@ Outcome run_preview(const Arguments& arguments, Context&) { return hand_over_to_
 }  // namespace
 
 const Command preview_command = {"preview", "pictures of a job's layers for people", preview_spec, run_preview, true};
-
-// Pictures need libraries that no job should have to load: they are made by a program of its own.
-Error hand_over_to_preview(const std::vector<std::string>& arguments) {
-  constexpr const char* kProgram = "lamina-preview";
-  std::vector<char*> texts;
-  std::string name = kProgram;
-  texts.push_back(name.data());
-  std::vector<std::string> copies = arguments;
-  for (std::string& argument : copies) texts.push_back(argument.data());
-  texts.push_back(nullptr);
-
-  std::error_code error;
-  const std::filesystem::path own = std::filesystem::read_symlink("/proc/self/exe", error);
-  std::signal(SIGPIPE, SIG_DFL);
-  std::signal(SIGXFSZ, SIG_DFL);
-  if (!error) ::execv((own.parent_path() / kProgram).c_str(), texts.data());
-  ::execvp(kProgram, texts.data());
-  return {Fault::kInternal,
-          fmt::format("{}: {}; it belongs beside lamina or into PATH, install it there", kProgram, std::strerror(errno))};
-}
 
 }  // namespace lamina::pipeline

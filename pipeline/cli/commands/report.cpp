@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <filesystem>
-#include <span>
 
 #include "pipeline/cli/command.h"
 #include "pipeline/show/report.h"
@@ -57,7 +56,7 @@ Outcome run_report(const Arguments& arguments, Context& context) {
   options.parts = arguments.all("--parts");
   const Result<Report> report = make_report(arguments.operands.front(), options);
   if (!report) return report.error();
-  if (Status status = write::write_file(output, std::as_bytes(std::span(report->page))); !status) return status.error();
+  if (Status status = write::write_file(output, report->page); !status) return status.error();
   if (!arguments.has("--quiet")) {
     context.say(fmt::format("{}: {} of {} layers to look at, {}", output, report->held, report->layers,
                             readable_bytes(report->page.size())));

@@ -2,6 +2,8 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <filesystem>
+#include <nlohmann/json.hpp>
 
 #include "tests/commands/program.h"
 
@@ -32,13 +34,38 @@ TEST(HeightsCommand, TellsTheTableInEveryForm) {
   const Outcome csv = run({"--format", "csv"});
   EXPECT_EQ(std::count(csv.out.begin(), csv.out.end(), '\n'), 8) << csv.out;
   const Outcome json = run({"--format", "json", "--compare"});
-  EXPECT_NE(json.out.find("\"name\": \"stepwise\""), std::string::npos) << json.out;
+  const auto compared = nlohmann::json::parse(json.out);
+  EXPECT_EQ(compared["tables"].size(), 6u);
+  EXPECT_EQ(compared["tables"][3]["name"], "stepwise");
+  EXPECT_EQ(std::count(json.out.begin(), json.out.end(), '\n'), 1) << "one line";
   const Outcome rp3 = run({"--format", "rp3", "-o", "table.rp3"});
   EXPECT_EQ(rp3.code, 0);
   EXPECT_TRUE(rp3.out.empty());
   EXPECT_TRUE(read_text(directory / "table.rp3").ends_with("----- fim do arquivo -----\n"));
   EXPECT_EQ(run({"--plot", "plot.svg"}).code, 0);
   EXPECT_TRUE(read_text(directory / "plot.svg").ends_with("</svg>\n"));
+}
+
+TEST(HeightsCommand, PlotsOfBothFormsHoldTheSameAndLeaveNothingBeside) {
+  const Directory directory;
+  write_ledge(directory);
+  for (const std::string name : {"plot.svg", "plot.png"}) {
+    const Outcome plot = run_lamina({"heights", "low.stl", "--layer", "0.2", "--plot", name, "--quiet"}, directory.path());
+    ASSERT_EQ(plot.code, 0) << plot.err;
+    EXPECT_TRUE(plot.out.starts_with("layers ")) << plot.out;
+    EXPECT_TRUE(plot.err.empty()) << plot.err;
+  }
+  EXPECT_EQ(std::distance(std::filesystem::directory_iterator(directory.path()), {}), 4);
+  const std::string svg = read_text(directory / "plot.svg"), png = read_text(directory / "plot.png");
+  EXPECT_NE(svg.find("width=\"1200\" height=\"900\""), std::string::npos);
+  EXPECT_NE(svg.find(">low.stl: 11 layers, uniform 0.2 mm</text>"), std::string::npos) << svg;
+  EXPECT_EQ(png.substr(1, 3), "PNG");
+  EXPECT_EQ(png.substr(16, 8), std::string("\0\0\x04\xb0\0\0\x03\x84", 8)) << "1200 x 900";
+  std::filesystem::create_directory(directory / "taken.png");
+  const Outcome taken =
+      run_lamina({"heights", "low.stl", "--layer", "0.2", "--plot", "taken.png", "--quiet"}, directory.path());
+  EXPECT_EQ(taken.code, 4) << taken.err;
+  EXPECT_EQ(taken.error_lines(), 1u) << taken.err;
 }
 
 TEST(HeightsCommand, LayersOfOthersAreMeasuredByTheSameRules) {
@@ -48,8 +75,10 @@ TEST(HeightsCommand, LayersOfOthersAreMeasuredByTheSameRules) {
   const Outcome outcome = run_lamina(
       {"heights", "low.stl", "--measure", "tops.txt", "--layer", "0.5", "--format", "json", "--quiet"}, directory.path());
   EXPECT_EQ(outcome.code, 0) << outcome.err;
-  EXPECT_NE(outcome.out.find("\"layers\": 3, \"top_mm\": 2.000000, \"top_miss_mm\": -0.050000"), std::string::npos)
-      << outcome.out;
+  const auto table = nlohmann::json::parse(outcome.out)["tables"][0];
+  EXPECT_EQ(table["layers"], 3) << outcome.out;
+  EXPECT_EQ(table["top_mm"], 2) << outcome.out;
+  EXPECT_EQ(table["top_miss_mm"], -0.05) << outcome.out;
   write_text(directory / "tops.txt", "0.5\n0.5\n");
   const Outcome wrong = run_lamina({"heights", "low.stl", "--measure", "tops.txt"}, directory.path());
   EXPECT_EQ(wrong.code, 3);

@@ -1,13 +1,14 @@
-#include "pipeline/show/slice_picture.h"
+#include "pipeline/show/slice_series.h"
 
 #include <fmt/format.h>
 
 #include <array>
-#include <filesystem>
 #include <map>
 #include <memory>
 
 #include "pipeline/job/file.h"
+#include "pipeline/output/manifest.h"
+#include "pipeline/plan/plan.h"
 #include "stages/geometry/clipping.h"
 
 namespace lamina::pipeline {
@@ -39,21 +40,56 @@ Result<Contours> outline_of(const ToolpathsView& paths, PathKind kind) {
   for (const auto& [width, lines] : by_width) {
     const auto covered = cover_lines(lines, width);
     if (!covered) return covered.error();
-    for (std::uint32_t c = 0; c < covered->size(); ++c) {
-      all.point.insert(all.point.end(), (*covered)[c].begin(), (*covered)[c].end());
-      all.close();
-    }
+    all.append(*covered);
   }
   return all;
 }
 
-}  // namespace
+/// What a sliced job is drawn from.
+struct SlicedJob {
+  std::string directory;
+  Manifest manifest;
+  Plan plan;
 
-bool is_slice_directory(const std::string& directory) {
-  return product_of_manifest(directory + "/manifest.json") == Product::kContours;
+  /// Of the first part.
+  std::string name() const { return plan.sections->names().empty() ? std::string() : plan.sections->names().front(); }
+};
+
+Result<view::LayerShapes> shapes_of(const SlicedJob& job, std::uint32_t index) {
+  const std::uint32_t count = job.plan.layer_count, place = index - job.manifest.head.first_layer;
+  if (index >= count) {
+    return Error{Fault::kUsage, fmt::format("--layer {}: the job has layers 0 to {}", index, count - 1)};
+  }
+  Sections::Work work;
+  if (Status status = job.plan.sections->layer(index, work); !status) return status.error();
+  view::LayerShapes shapes;
+  shapes.index = index;
+  shapes.z = job.plan.layer(index).plane();
+  shapes.contours = std::move(work.contours.contours);
+  const double area = square_mm(doubled_area(shapes.contours));
+  const std::vector<LayerRecord>& recorded = job.manifest.layers;
+  const PathFacts* written = place < recorded.size() ? recorded[place].paths.get() : nullptr;
+  if (written != nullptr &&
+      (written->points != shapes.contours.point.size() || written->area_mm2 != area || written->paths != work.paths.size())) {
+    return Error{Fault::kVerification, fmt::format("{}: layer {} is not what was written: a part has changed since; slice it "
+                                                   "again",
+                                                   job.directory, index)};
+  }
+  shapes.box = job.plan.sections->bounds();
+  for (const auto& [kind, name] : kKinds) {
+    auto outline = outline_of(work.paths, kind);
+    if (!outline) return outline.error();
+    if (outline->size() > 0) shapes.beads.push_back({view::ink_of(kind), std::string(name), std::move(*outline)});
+  }
+  shapes.title = fmt::format("{}   |   layer {} of {}   |   z {:.3f} mm", job.name(), index, count, mm(shapes.z));
+  shapes.caption = fmt::format("{} contours, {:.2f} mm2", shapes.contours.size(), area);
+  if (work.paths.size() > 0) shapes.caption += fmt::format(", {} paths", work.paths.size());
+  return shapes;
 }
 
-Result<SlicePictures> SlicePictures::open(const std::string& directory) {
+}  // namespace
+
+Result<view::LayerSeries> slice_series(const std::string& directory) {
   auto manifest = read_manifest(directory + "/manifest.json");
   if (!manifest) return manifest.error();
   Job job;
@@ -62,47 +98,9 @@ Result<SlicePictures> SlicePictures::open(const std::string& directory) {
   if (!resolved) return resolved.error();
   auto plan = make_plan(std::move(*resolved), [](const ProgressEvent&) {});
   if (!plan) return plan.error();
-  return SlicePictures(directory, std::move(*plan), std::move(*manifest));
-}
-
-Result<view::LayerShapes> SlicePictures::layer(std::uint32_t index) const {
-  if (index >= count()) {
-    return Error{Fault::kUsage, fmt::format("--layer {}: the job has layers 0 to {}", index, count() - 1)};
-  }
-  Sections::Work work;
-  if (Status status = plan_.sections->layer(index, work); !status) return status.error();
-  view::LayerShapes shapes;
-  shapes.index = index;
-  shapes.z = plan_.layer(index).plane();
-  shapes.contours = std::move(work.contours.contours);
-  const double area = square_mm(doubled_area(shapes.contours));
-  const std::vector<LayerRecord>& recorded = manifest_.layers;
-  const std::uint32_t place = index - manifest_.head.first_layer;
-  const PathFacts* written = place < recorded.size() ? recorded[place].paths.get() : nullptr;
-  if (written != nullptr && (written->points != shapes.contours.point.size() || written->area_mm2 != area ||
-                             written->paths != work.paths.size())) {
-    return Error{Fault::kVerification, fmt::format("{}: layer {} is not what was written: a part has changed since; slice it "
-                                                   "again",
-                                                   directory_, index)};
-  }
-  shapes.box = plan_.sections->bounds();
-  for (const auto& [kind, name] : kKinds) {
-    auto outline = outline_of(work.paths, kind);
-    if (!outline) return outline.error();
-    if (outline->size() > 0) shapes.beads.push_back({view::ink_of(kind), std::string(name), std::move(*outline)});
-  }
-  shapes.title = fmt::format("{}   |   layer {} of {}   |   z {:.3f} mm", name(), index, count(), mm(shapes.z));
-  shapes.caption = fmt::format("{} contours, {:.2f} mm2", shapes.contours.size(), area);
-  if (work.paths.size() > 0) shapes.caption += fmt::format(", {} paths", work.paths.size());
-  return shapes;
-}
-
-Result<view::LayerSeries> slice_series(const std::string& directory) {
-  auto opened = SlicePictures::open(directory);
-  if (!opened) return opened.error();
-  const auto pictures = std::make_shared<const SlicePictures>(std::move(*opened));
-  return view::LayerSeries{pictures->name(), pictures->first(), pictures->last(), pictures->count(),
-                           [pictures](std::uint32_t index) { return pictures->layer(index); }};
+  const auto sliced = std::make_shared<const SlicedJob>(SlicedJob{directory, std::move(*manifest), std::move(*plan)});
+  return view::LayerSeries{sliced->name(), sliced->plan.range[0], sliced->plan.range[1], sliced->plan.layer_count,
+                           [sliced](std::uint32_t index) { return shapes_of(*sliced, index); }};
 }
 
 }  // namespace lamina::pipeline

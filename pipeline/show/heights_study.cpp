@@ -1,4 +1,4 @@
-#include "pipeline/plan/heights_study.h"
+#include "pipeline/show/heights_study.h"
 
 #include <fmt/format.h>
 

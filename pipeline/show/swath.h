@@ -1,4 +1,4 @@
-// pipeline/show/preview_swath.h: lamina preview --swath: a layer at a step of its print program.
+// pipeline/show/swath.h: lamina preview --swath: a layer at a step of its print program.
 #pragma once
 
 #include <cstdint>

@@ -1,4 +1,4 @@
-#include "pipeline/show/gcode_picture.h"
+#include "pipeline/show/gcode_series.h"
 
 #include <fmt/format.h>
 

@@ -1,14 +1,15 @@
+#include "pipeline/show/heights_table.h"
+
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
+#include <nlohmann/json.hpp>
 
 #include "pipeline/plan/heights.h"
-#include "pipeline/plan/heights_study.h"
-#include "pipeline/text/json_text.h"
 #include "pipeline/text/number_text.h"
 #include "pipeline/text/readable.h"
-#include "stages/write/rp3/rp3.h"
 
 namespace lamina::pipeline {
 namespace {
@@ -41,6 +42,11 @@ std::size_t stepped_back_count(const HeightsStudy& study) {
 }
 
 std::string signed_mm(std::int64_t nm) { return fmt::format("{:+.4f} mm", mm(nm)); }
+
+double rounded(double value, int decimals) {
+  const double unit = std::pow(10, decimals);
+  return std::round(value * unit) / unit;
+}
 
 std::string flats_line(const HeightsStudy& study) {
   const heights::Evaluation& e = study.evaluation;
@@ -109,49 +115,52 @@ std::string heights_csv(const Scene& scene, const std::vector<HeightsStudy>& stu
   return text;
 }
 
-std::string heights_json(const Job& job, const Scene& scene, const std::vector<HeightsStudy>& studies) {
-  std::string text = fmt::format("{{\"height_mm\": {:.6f}, \"parts\": [", mm(scene.height));
-  for (std::size_t i = 0; i < scene.parts.size(); ++i) {
-    text += fmt::format("{}{}", i > 0 ? ", " : "", json_string(scene.parts[i].path));
-  }
-  text += fmt::format("], \"cusp_limit_mm\": {}, \"tables\": [", number_text(job.heights.cusp_mm));
-  for (std::size_t s = 0; s < studies.size(); ++s) {
-    const HeightsStudy& study = studies[s];
+nlohmann::ordered_json heights_json(const Job& job, const Scene& scene, const std::vector<HeightsStudy>& studies) {
+  using Json = nlohmann::ordered_json;
+  Json all = {{"height_mm", mm(scene.height)}, {"parts", Json::array()}, {"cusp_limit_mm", job.heights.cusp_mm}};
+  for (const PartSummary& part : scene.parts) all["parts"].push_back(part.path);
+  for (const HeightsStudy& study : studies) {
     const heights::Evaluation& e = study.evaluation;
-    text += fmt::format(
-        "{}\n{{\"name\": {}, \"layers\": {}, \"top_mm\": {:.6f}, \"top_miss_mm\": {:.6f}, \"largest_cusp_mm\": {:.6f}, "
-        "\"mean_cusp_mm\": {:.6f}, \"layers_above_limit\": {}, \"flats\": {}, \"flats_missed\": {}, \"largest_miss_mm\": {:.6f}",
-        s > 0 ? "," : "", json_string(study.name), count(study), mm(study.boundaries.back()), mm(e.top_miss),
-        mm(e.largest_cusp), e.mean_cusp * 1e-6, e.above_limit, e.flats.size(), e.flats_missed, mm(e.largest_miss));
-    if (study.plan.one_less_reaches >= 0) {
-      text += fmt::format(", \"one_less_reaches_mm\": {:.6f}", mm(study.plan.one_less_reaches));
+    Json table = {{"name", study.name},
+                  {"layers", count(study)},
+                  {"top_mm", mm(study.boundaries.back())},
+                  {"top_miss_mm", mm(e.top_miss)},
+                  {"largest_cusp_mm", mm(e.largest_cusp)},
+                  {"mean_cusp_mm", rounded(e.mean_cusp * 1e-6, 6)},
+                  {"layers_above_limit", e.above_limit},
+                  {"flats", e.flats.size()},
+                  {"flats_missed", e.flats_missed},
+                  {"largest_miss_mm", mm(e.largest_miss)}};
+    if (study.plan.one_less_reaches >= 0) table["one_less_reaches_mm"] = mm(study.plan.one_less_reaches);
+    if (study.options.time.on()) table["seconds"] = rounded(e.seconds, 3);
+    table["flat"] = Json::array();
+    table["layer"] = Json::array();
+    for (const heights::FlatHit& hit : e.flats) {
+      table["flat"].push_back({{"height_mm", mm(hit.flat.height)},
+                               {"up_mm2", rounded(hit.flat.up_mm2, 4)},
+                               {"down_mm2", rounded(hit.flat.down_mm2, 4)},
+                               {"end", hit.flat.end},
+                               {"miss_mm", mm(hit.miss)}});
     }
-    if (study.options.time.on()) text += fmt::format(", \"seconds\": {:.3f}", e.seconds);
-    text += ",\n\"flat\": [";
-    for (std::size_t i = 0; i < e.flats.size(); ++i) {
-      const heights::FlatHit& hit = e.flats[i];
-      text +=
-          fmt::format("{}{{\"height_mm\": {:.6f}, \"up_mm2\": {:.4f}, \"down_mm2\": {:.4f}, \"end\": {}, \"miss_mm\": {:.6f}}}",
-                      i > 0 ? ", " : "", mm(hit.flat.height), hit.flat.up_mm2, hit.flat.down_mm2, hit.flat.end, mm(hit.miss));
-    }
-    text += "],\n\"layer\": [";
     for (std::size_t i = 0; i < count(study); ++i) {
       const heights::LayerFacts& layer = e.layers[i];
-      text += fmt::format(
-          "{}\n{{\"bottom_mm\": {:.6f}, \"thickness_mm\": {:.6f}, \"reason\": \"{}\", \"angle_deg\": {:.2f}, "
-          "\"cusp_mm\": {:.6f}, \"hits_flat\": {}, \"stepped_back\": {}, \"part\": {}}}",
-          i > 0 ? "," : "", mm(study.boundaries[i]), mm(thickness(study, i)), reason(study, i), angle(study, i), mm(layer.cusp),
-          layer.hits_flat, stepped_back(study, i), layer.part < scene.parts.size() ? fmt::format("{}", layer.part) : "null");
+      table["layer"].push_back({{"bottom_mm", mm(study.boundaries[i])},
+                                {"thickness_mm", mm(thickness(study, i))},
+                                {"reason", reason(study, i)},
+                                {"angle_deg", rounded(angle(study, i), 2)},
+                                {"cusp_mm", mm(layer.cusp)},
+                                {"hits_flat", layer.hits_flat},
+                                {"stepped_back", stepped_back(study, i)},
+                                {"part", layer.part < scene.parts.size() ? Json(layer.part) : Json()}});
     }
-    text += "]}";
+    all["tables"].push_back(std::move(table));
   }
-  return text + "\n]}\n";
+  return all;
 }
 
-std::string heights_rp3(const HeightsStudy& study, const std::array<std::uint32_t, 2>& range,
-                        const write::rp3::Settings& settings) {
+std::string heights_rp3(const HeightsStudy& study, const write::rp3::Settings& settings) {
   std::vector<write::rp3::Layer> layers;
-  for (std::size_t i = range[0]; i < range[1]; ++i) layers.push_back({mm(thickness(study, i)), angle(study, i)});
+  for (std::size_t i = 0; i < count(study); ++i) layers.push_back({mm(thickness(study, i)), angle(study, i)});
   return write::rp3::text_of(layers, settings);
 }
 

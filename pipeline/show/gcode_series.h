@@ -1,4 +1,4 @@
-// pipeline/show/gcode_picture.h: the layers of a G-code file as shapes to look at.
+// pipeline/show/gcode_series.h: the layers of a G-code file as shapes to look at.
 #pragma once
 
 #include <string>

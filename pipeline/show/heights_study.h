@@ -1,7 +1,6 @@
-// pipeline/plan/heights_study.h: what `lamina heights` finds out about a job's layers, and how it tells.
+// pipeline/show/heights_study.h: what `lamina heights` finds out about a job's layers.
 #pragma once
 
-#include <array>
 #include <string>
 #include <vector>
 
@@ -9,7 +8,6 @@
 #include "pipeline/plan/scene.h"
 #include "stages/heights/evaluate.h"
 #include "stages/heights/heights.h"
-#include "stages/write/rp3/rp3.h"
 
 namespace lamina::pipeline {
 
@@ -37,15 +35,5 @@ Result<std::vector<HeightsStudy>> study_all_ways(const Job& job, const Scene& sc
 
 /// The one table of all parts, then the table that each part has of its own (heights/per_part.h).
 Result<std::vector<HeightsStudy>> study_per_part(const Job& job, const Scene& scene);
-
-std::string heights_page(const Job& job, const Scene& scene, const HeightsStudy& study);
-/// The layers of all studies, one after the other; the first column names the study.
-std::string heights_csv(const Scene& scene, const std::vector<HeightsStudy>& studies);
-std::string heights_json(const Job& job, const Scene& scene, const std::vector<HeightsStudy>& studies);
-/// Layers [first, last).
-std::string heights_rp3(const HeightsStudy& study, const std::array<std::uint32_t, 2>& layers,
-                        const write::rp3::Settings& settings);
-/// One line a study.
-std::string comparison_page(const std::vector<HeightsStudy>& studies);
 
 }  // namespace lamina::pipeline

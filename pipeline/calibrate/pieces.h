@@ -1,5 +1,4 @@
-// pipeline/calibrate/calibrate.h: from a printer that nothing is known of to one whose segmented lines are: test pieces, then
-// what was measured on them.
+// pipeline/calibrate/pieces.h: test pieces for a printer that nothing is known of; widths.h reads what is measured on them.
 //
 // The procedure is that of Di Nisio 2022, Appendix A: 1 parameters, 2 flow, 3 level, 4 widths of thick and thin stretches,
 // 5 spacings, 6 one layer, 7 the part. docs/calibrate.md tells it for people.
@@ -13,7 +12,6 @@
 #include "pipeline/job/job.h"
 #include "pipeline/machine/extruder.h"
 #include "stages/data/status.h"
-#include "stages/segment/measured.h"
 
 namespace lamina::pipeline {
 
@@ -35,15 +33,15 @@ struct TestPiece {
   Job job;  // complete but for the paths of its part and output
 };
 
-/// The pieces of steps 2 to 7. Widths and heights are resolved in `request`. errors  kUsage
-Result<std::vector<TestPiece>> test_pieces(CalibrationRequest& request, const ExtruderProfile& profile);
+/// Sets the width and height of a bead that the request leaves to the machine.
+void resolve_bead(CalibrationRequest& request, const ExtruderProfile& profile);
+
+/// The pieces of steps 2 to 7 of a request whose bead is resolved.
+std::vector<TestPiece> test_pieces(const CalibrationRequest& request);
 
 /// Writes DIR/<name>.stl, .toml and .gcode (or .sml) of each piece, DIR/widths.csv to be filled in, and DIR/STEPS.md.
 /// returns names of the pieces
 /// errors  kUsage: the directory has a widths.csv already; kOutput; of run
 Result<std::vector<std::string>> write_test_pieces(const CalibrationRequest& asked, const std::atomic<bool>& cancel);
-
-/// The rows of a filled in widths.csv. errors  kInput: file, line, column, what is wrong
-Result<std::vector<segment::Measured>> read_widths(const std::string& path);
 
 }  // namespace lamina::pipeline

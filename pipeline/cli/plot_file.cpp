@@ -1,0 +1,33 @@
+#include "pipeline/cli/plot_file.h"
+
+#include <fmt/format.h>
+
+#include <filesystem>
+
+#include "pipeline/cli/preview_program.h"
+#include "pipeline/show/plot_json.h"
+#include "stages/write/file.h"
+
+namespace lamina::pipeline {
+
+Status check_plot_name(const std::string& path) {
+  const std::filesystem::path name = path;
+  if (path.empty()) return {};
+  if (name.extension() != ".svg" && name.extension() != ".png") {
+    return Error{Fault::kUsage, fmt::format("--plot {}: plots are SVG or PNG; end the name with .svg or .png", path)};
+  }
+  const std::filesystem::path folder = name.parent_path();
+  std::error_code ignored;
+  if (folder.empty() || std::filesystem::is_directory(folder, ignored)) return {};
+  return Error{Fault::kOutput,
+               fmt::format("--plot {}: there is no folder {}; make it or choose another place", path, folder.string())};
+}
+
+Status write_plot(const std::string& path, const write::Plot& plot) {
+  const auto text = std::filesystem::path(path).extension() == ".svg" ? Result<std::string>(write::plot_svg(plot))
+                                                                      : filter_by_preview("--plot", plot_json(plot));
+  if (!text) return Error{text.error().fault, fmt::format("--plot {}: {}", path, text.error().message)};
+  return write::write_file(path, *text);
+}
+
+}  // namespace lamina::pipeline

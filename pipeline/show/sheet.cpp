@@ -1,0 +1,222 @@
+// A part of lamina-preview: it needs the libraries of pictures.
+#include "pipeline/show/sheet.h"
+
+#include <fmt/format.h>
+
+#include <filesystem>
+#include <numeric>
+
+#include "pipeline/output/manifest.h"
+#include "pipeline/show/gcode_series.h"
+#include "pipeline/show/slice_series.h"
+#include "pipeline/show/swath.h"
+#include "pipeline/show/title.h"
+#include "pipeline/text/readable.h"
+#include "stages/read/image.h"
+#include "stages/write/picture/canvas.h"  // have_font
+#include "stages/write/picture/contact_sheet.h"
+#include "stages/write/picture/plan_view.h"
+#include "stages/write/svg/drawing.h"
+
+namespace lamina::pipeline {
+namespace {
+
+constexpr std::uint32_t kSheetWidth = 2400, kSwathWidth = 1200;
+
+Result<Manifest> manifest_of(const std::string& directory) {
+  std::error_code ignored;
+  const std::string whole = directory + "/manifest.json", part = whole + ".part";
+  if (!std::filesystem::exists(whole, ignored) && std::filesystem::exists(part, ignored)) return read_manifest(part);
+  if (!std::filesystem::exists(directory, ignored)) {
+    return Error{Fault::kUsage, fmt::format("{}: no such directory or file", directory)};
+  }
+  if (!std::filesystem::exists(whole, ignored)) {
+    return Error{Fault::kVerification,
+                 fmt::format("{}: no manifest.json; name a directory that lamina jet or lamina slice wrote (shards: run "
+                             "lamina merge first)",
+                             directory)};
+  }
+  return read_manifest(whole);
+}
+
+std::string title_of(const ManifestHead& head) {
+  const std::string parts = title_of(head.parts);
+  return (parts.empty() ? "" : parts + "   |   ") + fmt::format("{} layers   |   {:g} x {:g} dpi   |   bed {:g} x {:g} mm",
+                                                                head.layer_count, head.grid.x.dpi(), head.grid.y.dpi(),
+                                                                mm(head.grid.x.length), mm(head.grid.y.length));
+}
+
+write::picture::PlanView view_of(view::LayerShapes& shapes) {
+  write::picture::PlanView view;
+  view.title = shapes.title;
+  view.caption = shapes.caption;
+  view.box = shapes.box;
+  view.region = shapes.contours;
+  for (view::LayerShapes::Beads& beads : shapes.beads) {
+    view.shapes.push_back({{beads.ink[0], beads.ink[1], beads.ink[2]}, beads.name, std::move(beads.outline)});
+  }
+  return view;
+}
+
+/// The layer in its true size, bead widths true.
+Buffer<std::byte> layer_svg(const view::LayerShapes& shapes) {
+  std::vector<write::svg::Region> regions = {{shapes.contours, "solid", {205, 209, 216}}};
+  for (const view::LayerShapes::Beads& beads : shapes.beads) regions.push_back({beads.outline, beads.name, beads.ink});
+  const std::string text = write::svg::drawing(shapes.box, regions);
+  const auto bytes = std::as_bytes(std::span(text));
+  return {bytes.begin(), bytes.end()};
+}
+
+/// Several layers side by side.
+Result<Preview> draw_series_sheet(const view::LayerSeries& series, const PreviewRequest& request) {
+  std::vector<std::uint32_t> layers(series.last - series.first);
+  std::iota(layers.begin(), layers.end(), series.first);
+  const auto chosen = chosen_layers(request.layers, layers);
+  if (!chosen) return chosen.error();
+  if (chosen->empty()) return Error{Fault::kVerification, "the job has no layers"};
+  Result<view::LayerShapes> shapes = series.layer(layers[chosen->front()]);
+  if (!shapes) return shapes.error();
+  const std::string title = fmt::format("{}   |   {} layers   |   {:.1f} x {:.1f} mm", series.name, series.count,
+                                        mm(shapes->box.width()), mm(shapes->box.depth()));
+  const auto layer_view = [&](std::size_t i) -> Result<write::picture::PlanView> {
+    if (i > 0) shapes = series.layer(layers[(*chosen)[i]]);
+    if (!shapes) return shapes.error();
+    write::picture::PlanView view = view_of(*shapes);
+    view.title = fmt::format("layer {}", shapes->index);
+    view.caption = fmt::format("z {:.3f} mm", mm(shapes->z));
+    return view;
+  };
+  auto picture =
+      write::picture::plan_sheet(title, chosen->size(), shapes->box, request.width.value_or(kSheetWidth), layer_view);
+  if (!picture) return picture.error();
+  const std::string said =
+      fmt::format("{}: {} of {} layers, {}", request.output, chosen->size(), series.count, readable_bytes(picture->size()));
+  return Preview{std::move(*picture), {said}};
+}
+
+/// One layer, or several side by side, of what comes as shapes.
+Result<Preview> draw_series(const view::LayerSeries& series, const PreviewRequest& request, bool svg) {
+  for (const auto& [given, option] :
+       {std::pair{request.whole_bed, "--whole-bed"}, {request.swath, "--swath"}, {request.step.has_value(), "--step"}}) {
+    if (given) {
+      return Error{Fault::kUsage,
+                   fmt::format("{}: is for images; of slices and toolpaths what they cover is drawn, leave it out", option)};
+    }
+  }
+  if (request.layers.every || request.layers.count) {
+    if (!svg) return draw_series_sheet(series, request);
+    return Error{Fault::kUsage, "-o: an SVG shows one layer, choose it by --layer K; several are drawn as PNG"};
+  }
+  Result<view::LayerShapes> shapes = series.layer(request.layers.layer.value_or(series.count / 2));
+  if (!shapes) return shapes.error();
+  const std::string said = fmt::format("{}: {}", request.output, shapes->title);
+  if (svg) return Preview{layer_svg(*shapes), {said}};
+  write::picture::PlanView view = view_of(*shapes);
+  view.width = request.width.value_or(kSheetWidth);
+  auto picture = write::picture::plan_view(view);
+  if (!picture) return picture.error();
+  return Preview{std::move(*picture), {said}};
+}
+
+/// A layer while it is jetted.
+Result<Preview> draw_jetting(const Manifest& manifest, const PreviewRequest& request) {
+  SwathChoice choice;
+  choice.layer = request.layers.layer.value_or(manifest.layers[manifest.layers.size() / 2].layer.index);
+  choice.swath = request.swath_number;
+  choice.step = request.step;
+  choice.width = request.width.value_or(kSwathWidth);
+  auto picture = draw_swath(request.source, manifest, choice);
+  if (!picture) return picture.error();
+  const std::string said = fmt::format("{}: layer {}, {}", request.output, choice.layer, readable_bytes(picture->size()));
+  return Preview{std::move(*picture), {said}};
+}
+
+/// Images side by side.
+Result<Preview> draw_images(const Manifest& manifest, const PreviewRequest& request) {
+  std::vector<std::uint32_t> numbers;
+  for (const LayerRecord& record : manifest.layers) numbers.push_back(record.layer.index);
+  const auto chosen = chosen_layers(request.layers, numbers);
+  if (!chosen) return chosen.error();
+  write::picture::SheetRequest sheet;
+  sheet.title = title_of(manifest.head);
+  sheet.grid = manifest.head.grid;
+  sheet.whole_bed = request.whole_bed;
+  sheet.width = request.width.value_or(kSheetWidth);
+  for (const std::size_t index : *chosen) {
+    const LayerRecord& record = manifest.layers[index];
+    const auto images = layer_images(manifest.head, record);
+    for (std::size_t m = 0; m < images.size(); ++m) {
+      const std::string material = manifest.head.materials.empty() ? "" : ", " + manifest.head.materials[m].name;
+      sheet.layers.push_back({(std::filesystem::path(request.source) / images[m].name).string(),
+                              fmt::format("layer {}{}", record.layer.index, material),
+                              fmt::format("z {:.3f} mm", mm(record.layer.plane()))});
+    }
+  }
+  const auto read_runs = [](const std::string& path) -> Result<Runs> {
+    auto image = read::image(path);
+    if (!image) return image.error();
+    return std::move(image->runs);
+  };
+  auto picture = write::picture::contact_sheet(sheet, read_runs);
+  if (!picture) return picture.error();
+  std::vector<std::string> said;
+  if (!write::picture::have_font()) said.emplace_back("lamina: no captions: no font; install fonts-dejavu-core");
+  said.push_back(fmt::format("{}: {} of {} layers, {}", request.output, chosen->size(), manifest.head.layer_count,
+                             readable_bytes(picture->size())));
+  return Preview{std::move(*picture), std::move(said)};
+}
+
+}  // namespace
+
+Result<std::vector<std::size_t>> chosen_layers(const LayerChoice& choice, const std::vector<std::uint32_t>& layers) {
+  if (choice.layer.has_value() + choice.every.has_value() + choice.count.has_value() > 1) {
+    return Error{Fault::kUsage, "--layer, --every and --count exclude each other; give one of them"};
+  }
+  std::vector<std::size_t> chosen;
+  if (choice.layer) {
+    for (std::size_t i = 0; i < layers.size(); ++i) {
+      if (layers[i] == *choice.layer) return std::vector<std::size_t>{i};
+    }
+    return Error{Fault::kUsage,
+                 fmt::format("--layer {}: the job has layers {} to {}", *choice.layer, layers.front(), layers.back())};
+  }
+  if (const auto every = choice.every) {
+    const std::size_t cells = (layers.size() + *every - 1) / *every;
+    if (cells > kMostCells) {
+      return Error{Fault::kUsage, fmt::format("--every {}: {} layers are too many for a picture; give {} or more", *every,
+                                              cells, (layers.size() + kMostCells - 1) / kMostCells)};
+    }
+    for (std::size_t i = 0; i < layers.size(); i += *every) chosen.push_back(i);
+    return chosen;
+  }
+  // The middle one of each of `cells` equal stretches of the height.
+  const std::size_t cells = std::min<std::size_t>(choice.count.value_or(12), layers.size());
+  for (std::size_t cell = 0; cell < cells; ++cell) chosen.push_back((2 * cell + 1) * layers.size() / (2 * cells));
+  return chosen;
+}
+
+Result<Preview> draw_preview(const PreviewRequest& request) {
+  const std::string ending = std::filesystem::path(request.output).extension().string();
+  std::error_code ignored;
+  const bool toolpaths = std::filesystem::is_regular_file(request.source, ignored);
+  if ((ending == ".png" || ending == ".svg") &&
+      (toolpaths || product_of_manifest(request.source + "/manifest.json") == Product::kContours)) {
+    const auto series = toolpaths ? gcode_series(request.source) : slice_series(request.source);
+    return series ? draw_series(*series, request, ending == ".svg") : Result<Preview>(series.error());
+  }
+  if (ending != ".png") {
+    return Error{Fault::kUsage,
+                 fmt::format("-o {}: pictures are PNG, of slices and G-code SVG too; end the name with .png", request.output)};
+  }
+  const Result<Manifest> manifest = manifest_of(request.source);
+  if (!manifest) return manifest.error();
+  if (manifest->layers.empty()) return Error{Fault::kVerification, request.source + ": the manifest has no layers yet"};
+  if (manifest->head.extension.empty()) {
+    return Error{Fault::kVerification,
+                 fmt::format("{}: the job wrote no images (format {}); plan it with another format, as tiff-g4", request.source,
+                             manifest->head.format)};
+  }
+  return request.swath ? draw_jetting(*manifest, request) : draw_images(*manifest, request);
+}
+
+}  // namespace lamina::pipeline
