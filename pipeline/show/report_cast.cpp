@@ -5,7 +5,7 @@
 #include <filesystem>
 
 #include "pipeline/job/file.h"
-#include "pipeline/plan/scene.h"
+#include "pipeline/plan/plan.h"
 
 namespace lamina::pipeline {
 namespace {
@@ -33,8 +33,14 @@ Result<std::array<view::Picture, 3>> cast_parts(const ManifestHead& head, const 
     part.path = find_part(name, folders);
     if (part.path.empty()) return Error{Fault::kInput, fmt::format("{}: not found; name its folder with --parts", name)};
   }
-  // The bed is what the manifest says, whatever has become of the machine's profile.
-  job.bed_mm = {mm(head.grid.x.length), mm(head.grid.y.length)};
+  if (head.product == Product::kImages) {
+    // The bed is what the manifest says, whatever has become of the machine's profile.
+    job.bed_mm = {mm(head.grid.x.length), mm(head.grid.y.length)};
+  } else {
+    auto resolved = resolve(job, head.product);
+    if (!resolved) return resolved.error();
+    job = std::move(resolved->job);
+  }
   const Result<Scene> scene = load_scene(job);
   if (!scene) return scene.error();
   for (std::size_t i = 0; i < scene->parts.size(); ++i) {

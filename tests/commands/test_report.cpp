@@ -117,6 +117,38 @@ class JobsReported : public ::testing::Test {
 
 const fs::path kCorpus = fs::path(LAMINA_TEST_DIR) / "corpus";
 
+TEST_F(JobsReported, ToolpathsAreDrawnInTheirWidthsWithWhatTheirManifestSays) {
+  const Outcome made =
+      lamina({"extrude", (kCorpus / "parameter_quality_nut.stl").string(), "--layer", "0.3", "--quiet", "-o", "part.gcode"});
+  ASSERT_EQ(made.code, 0) << made.err;
+  ASSERT_EQ(lamina({"report", "part.gcode", "-o", "part.html"}).code, 0);
+  const std::string page = read_text(directory_ / "part.html");
+  const std::string begin = "<script id=\"head\" type=\"application/json\">";
+  const std::size_t at = page.find(begin) + begin.size();
+  const Json head = Json::parse(page.substr(at, page.find("</script>", at) - at));
+  EXPECT_EQ(head["manifest"]["name"], "part.gcode.json");
+  EXPECT_EQ(head["images"], false);
+  const std::size_t layers = head["layers"]["volume"].size();
+  EXPECT_EQ(layers, head["layer_count"]);
+  const double pixel_mm2 = head["pixel_mm"][0].get<double>() * head["pixel_mm"][1].get<double>();
+  for (std::size_t i = 0; i < layers; ++i) {
+    // Beads overlap at corners and fill no more than their rectangles: what they cover times the thickness is about what is
+    // laid.
+    const double covered =
+        head["layers"]["set"][i].get<double>() * pixel_mm2 * head["layers"]["thickness"][i].get<double>() * 1e-6;
+    EXPECT_NEAR(covered / head["layers"]["volume"][i].get<double>(), 1, 0.15) << i;
+    EXPECT_GT(head["layers"]["seconds"][i], 0) << i;
+  }
+  const auto drawn = unpack_runs(piece(page, "r3"), head["columns"], head["rows"]);
+  ASSERT_TRUE(drawn.ok());
+  EXPECT_GT(drawn->change.size(), 100u);
+
+  write_text(directory_ / "part.gcode", read_text(directory_ / "part.gcode") + "G4 P1\n");
+  const Outcome changed = lamina({"report", "part.gcode", "-o", "part.html"});
+  EXPECT_EQ(changed.code, 5);
+  EXPECT_NE(changed.err.find("part.gcode: is not the file of its manifest"), std::string::npos) << changed.err;
+}
+
 TEST_F(JobsReported, EveryLayerOfThePageIsItsFile) {
   jet(kCorpus / "nist_am_test_artifact_v3b.stl", {"--bed", "200x160", "--dpi", "300x200", "--layer", "0.5"});
   const Outcome outcome = lamina({"report", "out", "-o", "report.html"});

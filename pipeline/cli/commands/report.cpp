@@ -17,8 +17,8 @@ CommandSpec report_spec() {
   spec.summary =
       "Writes one HTML page about a finished job: its layers to leaf, zoom and pan through, the parts from three sides,\n"
       "area, thickness and time over the height, warnings, the job and all hashes. The page needs no network and no other file.";
-  spec.operand = "DIR";
-  spec.operand_meaning = "finished directory of lamina jet";
+  spec.operand = "DIR|GCODE";
+  spec.operand_meaning = "finished directory of lamina jet, or G-code file of lamina extrude beside its manifest";
   spec.options = {
       {"-o,--output", "HTML", "the page; its name ends in .html or .htm", "", ""},
       {"--most-bytes", "SIZE", "layers are left out evenly until the page is smaller", "19M", ""},
@@ -29,7 +29,8 @@ CommandSpec report_spec() {
       "Examples:\n"
       "  lamina report out -o report.html\n"
       "  lamina report out -o report.html --parts parts/      the parts themselves from three sides\n"
-      "  lamina report out -o small.html --most-bytes 2M      for a mail";
+      "  lamina report out -o small.html --most-bytes 2M      for a mail\n"
+      "  lamina report part.gcode -o part.html                toolpaths, drawn in their beads' true widths";
   return spec;
 }
 
@@ -42,7 +43,8 @@ bool is_page_name(const std::string& path) {
 }
 
 Outcome run_report(const Arguments& arguments, Context& context) {
-  if (arguments.operands.size() != 1) return Error{Fault::kUsage, "name one finished directory of lamina jet"};
+  if (arguments.operands.size() != 1)
+    return Error{Fault::kUsage, "name one finished directory of lamina jet, or one G-code file of lamina extrude"};
   const std::string output = arguments.text("-o,--output");
   if (output.empty()) return Error{Fault::kUsage, "-o HTML is missing; name the page"};
   if (!is_page_name(output)) {

@@ -132,7 +132,8 @@ async function show(place) {  // place: within `shown`
   const i = shown[place];
   $('slider').value = place; $('number').value = head.first_layer + i;
   $('readout').textContent = `z ${mm(layers.bottom[i])} to ${mm(layers.bottom[i] + layers.thickness[i])} mm, ` +
-    `${(layers.set[i] * head.pixel_mm[0] * head.pixel_mm[1]).toFixed(2)} mm², ${layers.set[i].toLocaleString('en')} pixels` +
+    `${(layers.set[i] * head.pixel_mm[0] * head.pixel_mm[1]).toFixed(2)} mm², ` +
+    (head.images ? `${layers.set[i].toLocaleString('en')} pixels` : `${layers.volume[i].toFixed(3)} mm³ in beads`) +
     (layers.seconds ? `, about ${duration(layers.seconds[i])}` : '');
   if (!state.fitted) { state.fitted = true; fit(); } else drawView();
   drawPlots();
@@ -226,8 +227,9 @@ function drawPlots() {
 const duration = s => s < 90 ? `${s.toFixed(1)} s` : s < 5400 ? `${(s / 60).toFixed(1)} min` : `${(s / 3600).toFixed(2)} h`;
 function fillTexts() {
   $('title').textContent = head.title;
-  $('facts').textContent = `${head.layer_count.toLocaleString('en')} layers, ${head.columns} × ${head.rows} pixels of ` +
-    `${+head.dpi[0].toFixed(3)} × ${+head.dpi[1].toFixed(3)} dpi, ${head.format}` + (head.machine ? `, ${head.machine}, about ${duration(layers.seconds.reduce((a, b) => a + b, 0))}` : '');
+  $('facts').textContent = `${head.layer_count.toLocaleString('en')} layers, ` + (head.images ?
+    `${head.columns} × ${head.rows} pixels of ${+head.dpi[0].toFixed(3)} × ${+head.dpi[1].toFixed(3)} dpi, ` :
+    `drawn in pixels of ${Math.round(head.pixel_mm[0] * 1000)} µm, `) + head.format + (head.machine ? `, ${head.machine}, about ${duration(layers.seconds.reduce((a, b) => a + b, 0))}` : '');
   if (head.stride > 1) $('note').textContent = `To keep this page small, every ${head.stride}th layer can be looked at.`;
   const warnings = $('warnings'), warn = (text, layer) => {
     const line = element('li', layer === undefined ? text : undefined, warnings);
@@ -243,7 +245,7 @@ function fillTexts() {
     if (!rows && !empty) return;
     if (told++ >= 200) { ++more; return; }
     const number = head.first_layer + i;
-    warn(`layer ${number}: ` + (empty ? 'nothing is set' : `${rows} rows are closed only thanks to repair`), number);
+    warn(`layer ${number}: ` + (empty ? head.images ? 'nothing is set' : 'nothing is laid' : `${rows} rows are closed only thanks to repair`), number);
   });
   if (more) warn(`and ${more} more layers`);
   if (!warnings.children.length) warn('none');
@@ -254,13 +256,13 @@ function fillTexts() {
   }
   $('job').textContent = head.job;
   const line = $('manifest');
-  line.append('manifest.json, ', `${head.manifest.bytes} bytes, XXH3-128 `);
+  line.append(`${head.manifest.name}, ${head.manifest.bytes} bytes, XXH3-128 `);
   element('code', head.manifest.hash, line);
   line.append(`, written by lamina ${head.version}`);
   $('files').addEventListener('toggle', () => {
     const table = $('files').querySelector('table');
     if (table.rows.length) return;
-    row(table, ['layer', 'bottom, mm', 'thickness, mm', 'reason', 'bytes', 'set pixels', 'XXH3-128'], 'th');
+    row(table, ['layer', 'bottom, mm', 'thickness, mm', 'reason', 'bytes', head.images ? 'set pixels' : 'covered pixels', 'XXH3-128'], 'th');
     layers.hash.forEach((hash, i) => row(table, [head.first_layer + i, mm(layers.bottom[i]), mm(layers.thickness[i]),
       head.reasons[layers.reason[i]], layers.bytes[i], layers.set[i], hash]));
   });
@@ -319,9 +321,8 @@ listen();
 addPlot('area', 'mm²', layers.set.map(set => set * head.pixel_mm[0] * head.pixel_mm[1]));
 addPlot('thickness', 'mm', layers.thickness.map(mm));
 addPlot('file', 'bytes', layers.bytes);
-if (head.machine) {
-  addPlot('time, estimated', 's', layers.seconds);
-  addPlot('sweeps', '', layers.sweeps);
-}
+if (layers.seconds) addPlot('time, estimated', 's', layers.seconds);
+if (layers.sweeps) addPlot('sweeps', '', layers.sweeps);
+if (layers.filament) addPlot('filament', 'mm', layers.filament);
 const ready = fromAddress().then(drawViews).then(() => { document.documentElement.dataset.ready = 'yes'; });
 window.laminaReport = { head, state, decodeLayer, showLayer, ready };

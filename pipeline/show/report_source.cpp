@@ -1,0 +1,157 @@
+#include "pipeline/show/report_source.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <span>
+
+#include "pipeline/check/replay_job.h"
+#include "stages/data/hash.h"
+#include "stages/raster/beads.h"
+#include "stages/raster/materials.h"
+#include "stages/read/gcode.h"
+#include "stages/read/image.h"
+
+namespace lamina::pipeline {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::int64_t kBeadDots = 508;           // an inch: toolpaths are drawn in pixels of 50 um
+constexpr std::int64_t kMostBeadPixels = 20'000;  // along a side
+
+Error wrong(const std::string& path, std::string_view what) {
+  return {Fault::kVerification, fmt::format("{}: {}", path, what)};
+}
+
+Result<Manifest> finished_manifest(const std::string& place, const std::string& path) {
+  std::error_code ignored;
+  if (!fs::exists(path, ignored)) {
+    if (fs::exists(path + ".part", ignored)) {
+      return wrong(place, "the job is not finished; end it with --resume, then ask for the report");
+    }
+    return wrong(place,
+                 fmt::format("no {}; name a finished directory of lamina jet (shards: run lamina merge first) or a G-code "
+                             "file of lamina extrude",
+                             fs::path(path).filename().string()));
+  }
+  Result<Manifest> manifest = read_manifest(path);
+  if (!manifest) return manifest;
+  if (manifest->layers.empty()) return wrong(place, "the job has no layers");
+  return manifest;
+}
+
+/// A layer's files into runs, if they are those of the manifest.
+Result<Runs> read_layer(const std::string& directory, const ManifestHead& head, const LayerRecord& record) {
+  Runs whole;
+  for (const LayerImageFile& file : layer_images(head, record)) {
+    const std::string path = directory + "/" + file.name;
+    const Result<FileDigest> digest = digest_file(path);
+    if (!digest) return digest.error();
+    const Error changed = wrong(path, "is not the file of the manifest; lamina verify tells more");
+    if (digest->bytes != file.record.bytes || digest->hash != file.record.hash) return changed;
+    Result<read::Image> image = read::image(path);
+    if (!image) return image.error();
+    if (image->runs.columns != head.grid.columns() || image->runs.view().rows() != head.grid.rows()) return changed;
+    if (!raster::add_image(std::move(image->runs), whole)) return changed;
+  }
+  return whole;
+}
+
+/// How long the machine takes for a layer, by its program; replayed as lamina verify does.
+Result<double> seconds_of_layer(const std::string& directory, const ManifestHead& head, const replay::VirtualMachine& machine,
+                                const LayerRecord& record, const RunsView& image) {
+  const std::string program = program_of_layer(directory, head, record.layer.index);
+  if (hash_bytes(std::as_bytes(std::span(program))) == record.program.hash) {
+    const auto replay = machine.replay(program, record.layer, image, record.program.moved, record.program.lost);
+    if (replay) return replay->seconds;
+    return Error{Fault::kVerification, fmt::format("{}: {}", directory, replay.error().message)};
+  }
+  return Error{Fault::kVerification, fmt::format("{}/{}: is not the file of the manifest; lamina verify tells more", directory,
+                                                 program_file_name(record.layer.index, head.program_extension))};
+}
+
+Result<ReportSource> source_of_images(const std::string& directory, ReportSource source) {
+  const ManifestHead& head = source.manifest.head;
+  if (head.extension.empty()) {
+    return wrong(directory,
+                 fmt::format("the job wrote no images (format {}); plan it with another format, as tiff-g4", head.format));
+  }
+  source.grid = head.grid;
+  std::optional<replay::VirtualMachine> machine;
+  if (!head.machine.empty()) {
+    auto built = machine_of_job(directory, head);
+    if (!built) return Error{built.error().fault, fmt::format("{}/{}", directory, built.error().message)};
+    machine.emplace(std::move(*built));
+  }
+  const auto manifest = std::make_shared<const Manifest>(source.manifest);
+  source.layer = [directory, manifest, machine](std::uint32_t place, bool timed) -> Result<LayerSeen> {
+    const LayerRecord& record = manifest->layers[place];
+    auto runs = read_layer(directory, manifest->head, record);
+    if (!runs) return runs.error();
+    if (!machine || !timed) return LayerSeen{std::move(*runs)};
+    const auto seconds = seconds_of_layer(directory, manifest->head, *machine, record, runs->view());
+    if (!seconds) return seconds.error();
+    return LayerSeen{std::move(*runs), *seconds};
+  };
+  return source;
+}
+
+Result<ReportSource> source_of_toolpaths(const std::string& path, ReportSource source) {
+  const Result<FileDigest> digest = digest_file(path);
+  if (!digest) return digest.error();
+  const Manifest& manifest = source.manifest;
+  if (digest->bytes != manifest.file.bytes || digest->hash != manifest.file.hash) {
+    return wrong(path, "is not the file of its manifest; lamina verify tells more");
+  }
+  auto opened = read::GcodeFile::open(path);
+  if (!opened) return opened.error();
+  if (opened->count() != manifest.layers.size()) {
+    return wrong(path, fmt::format("has {} layers, its manifest {}", opened->count(), manifest.layers.size()));
+  }
+  const auto file = std::make_shared<const read::GcodeFile>(std::move(*opened));
+  const Box box = file->box();
+  const std::int64_t longest = std::max<std::int64_t>({box.width(), box.depth(), 1});
+  const std::int64_t dots = std::clamp<std::int64_t>(kMostBeadPixels * kNmPerInch / longest, 1, kBeadDots);
+  source.grid = {PixelAxis(dots, std::max<std::int64_t>(box.width(), 1)),
+                 PixelAxis(dots, std::max<std::int64_t>(box.depth(), 1))};
+  std::vector<double> seconds;
+  for (const LayerRecord& record : manifest.layers) seconds.push_back(record.paths ? record.paths->totals.seconds : 0);
+  source.layer = [file, box, grid = source.grid, seconds](std::uint32_t place, bool) -> Result<LayerSeen> {
+    const auto layer = file->layer(place);
+    if (!layer) return layer.error();
+    raster::BeadRaster beads(grid);
+    const auto at = [&](Point2 p) { return Point2{p.x - box.lo.x, p.y - box.lo.y}; };
+    for (const read::GcodeBead& bead : layer->beads)
+      beads.add(at(bead.from), at(bead.to), bead.width, raster::BeadEnds::kRound);
+    LayerSeen seen{{}, seconds[place]};
+    beads.runs(seen.runs);
+    return seen;
+  };
+  return source;
+}
+
+}  // namespace
+
+Result<ReportSource> report_source(const std::string& path) {
+  std::error_code ignored;
+  const bool toolpaths = fs::is_regular_file(path, ignored);
+  ReportSource source;
+  source.manifest_path = toolpaths ? path + ".json" : path + "/manifest.json";
+  auto manifest = finished_manifest(path, source.manifest_path);
+  if (!manifest) return manifest.error();
+  source.manifest = std::move(*manifest);
+  switch (source.manifest.head.product) {
+    case Product::kMoves:
+      if (toolpaths) return source_of_toolpaths(path, std::move(source));
+      break;
+    case Product::kImages: return source_of_images(path, std::move(source));
+    case Product::kContours: break;
+  }
+  return wrong(path, "is a job of lamina slice, and reports are of images and toolpaths; lamina preview draws its layers");
+}
+
+}  // namespace lamina::pipeline
