@@ -105,7 +105,8 @@ def stage_rows(results):
             if not part:
                 continue
             yield [f"`{name}`", variant.replace("-", ", ", 1), seconds(result["lamina"][variant]["wall"])] + [
-                f"{1000 * part.get(key, 0):.0f}" for key in ("load", "index", "layers", "raster_threads", "encode_threads", "write_threads")]
+                f"{1000 * value:.0f}" for value in [part.get(key, 0) for key in ("load", "index", "layers")] +
+                [part.get("threads", {}).get(step, 0) for step in ("raster", "encode", "store")]]
 
 
 def limit_rows(root, results):

@@ -94,7 +94,7 @@ Result<LayeredFile> LayeredFile::open(Options options, const ManifestHead& head,
   const std::string &path = state.options.file, &manifest_path = state.options.manifest;
   const bool whole = is_there(path) && is_there(manifest_path);
   const std::string part = manifest_path + ".part";
-  if (state.options.resume && (whole || is_there(part))) {
+  if (state.options.resume && (whole || has_manifest_head(part))) {
     auto earlier = read_manifest(whole ? manifest_path : part);
     if (!earlier) return earlier.error();
     if (Status status = check_same_job(whole ? manifest_path : part, *earlier, head); !status) return status.error();

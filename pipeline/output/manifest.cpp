@@ -6,6 +6,7 @@
 #include <chrono>
 #include <filesystem>
 #include <optional>
+#include <utility>
 
 #include "pipeline/output/manifest_head.h"
 #include "pipeline/output/manifest_line.h"
@@ -69,6 +70,17 @@ std::vector<LayerImageFile> layer_images(const ManifestHead& head, const LayerRe
   return files;
 }
 
+namespace {
+
+void add_line(const LayerRecord& record, const ManifestHead& head, bool first, std::string& text) {
+  static const PathFacts kNone;
+  text += first ? "\n" : ",\n";
+  LineWriter io(text);
+  describe_line(io, head, record, record.paths ? *record.paths : kNone);
+}
+
+}  // namespace
+
 struct ManifestWriter::State {
   static constexpr std::uint32_t kLines = 64;
   static constexpr std::chrono::seconds kPatience{1};
@@ -83,11 +95,7 @@ struct ManifestWriter::State {
   State(write::File opened, const ManifestHead& of) : file(std::move(opened)), head(of), next_layer(of.first_layer) {}
 
   void add(const LayerRecord& record) {
-    static const PathFacts kNone;
-    buffer += first_line ? "\n" : ",\n";
-    first_line = false;
-    LineWriter io(buffer);
-    describe_line(io, head, record, record.paths ? *record.paths : kNone);
+    add_line(record, head, std::exchange(first_line, false), buffer);
     ++next_layer;
     ++lines_buffered;
   }
@@ -106,24 +114,42 @@ ManifestWriter::ManifestWriter(ManifestWriter&&) noexcept = default;
 ManifestWriter& ManifestWriter::operator=(ManifestWriter&&) noexcept = default;
 ManifestWriter::~ManifestWriter() = default;
 
+namespace {
+
+/// Head and kept records as `path`.part, which takes the place of an earlier one at once. returns  its size
+Result<std::uint64_t> begin_partial(const std::string& path, const ManifestHead& head, const std::vector<LayerRecord>& kept) {
+  if (Status status = write::check_not_being_written(path); !status) return status.error();
+  auto file = write::File::open(path + ".part");
+  if (!file) return file.error();
+  std::string text = head_text(head);
+  std::uint32_t next = head.first_layer;
+  for (const LayerRecord& record : kept) {
+    if (record.layer.index != next++) {
+      return Error{Fault::kInternal, fmt::format("manifest: layer {} kept where {} is next", record.layer.index, next - 1)};
+    }
+    add_line(record, head, &record == &kept.front(), text);
+    if (text.size() < (1u << 20)) continue;
+    if (Status status = file->append(std::string_view(text)); !status) return status.error();
+    text.clear();
+  }
+  if (Status status = file->append(std::string_view(text)); !status) return status.error();
+  const auto whole = file->finish();
+  if (!whole) return whole.error();
+  return whole->bytes;
+}
+
+}  // namespace
+
 Result<ManifestWriter> ManifestWriter::open(const std::string& path, const ManifestHead& head,
                                             const std::vector<LayerRecord>& kept_prefix) {
-  auto file = write::File::open(path, {.keep_part = true});
+  const auto size = begin_partial(path, head, kept_prefix);
+  if (!size) return size.error();
+  auto file = write::File::reopen(path, *size, {.keep_part = true});
   if (!file) return file.error();
   ManifestWriter writer;
   writer.state_ = std::make_unique<State>(std::move(*file), head);
-  State& state = *writer.state_;
-  state.buffer = head_text(head);
-  for (const LayerRecord& record : kept_prefix) {
-    if (record.layer.index != state.next_layer) {
-      return Error{Fault::kInternal,
-                   fmt::format("manifest: layer {} kept where {} is next", record.layer.index, state.next_layer)};
-    }
-    state.add(record);
-    if (state.lines_buffered < State::kLines) continue;
-    if (Status status = state.flush(); !status) return status.error();
-  }
-  if (Status status = state.flush(); !status) return status.error();
+  writer.state_->next_layer = head.first_layer + static_cast<std::uint32_t>(kept_prefix.size());
+  writer.state_->first_line = kept_prefix.empty();
   return writer;
 }
 

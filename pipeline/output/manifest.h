@@ -83,6 +83,9 @@ std::vector<LayerImageFile> layer_images(const ManifestHead& head, const LayerRe
 /// errors  kVerification with file and line; a manifest of an earlier version of lamina says so
 Result<Manifest> read_manifest(const std::string& path);
 
+/// Whether a file has all that stands before its first layer: the .part of a run that was killed at once may not.
+bool has_manifest_head(const std::string& path);
+
 /// The product of a manifest, from its first lines; nothing if the file is absent or no manifest of this version.
 std::optional<Product> product_of_manifest(const std::string& path);
 

@@ -90,6 +90,12 @@ Result<Manifest> read_manifest(const std::string& path) {
   return manifest;
 }
 
+bool has_manifest_head(const std::string& path) {
+  std::ifstream file(path, std::ios::binary);
+  std::uint64_t lines = 0;
+  return file && read_head_text(file, lines).ends_with(kLayers);
+}
+
 std::optional<Product> product_of_manifest(const std::string& path) {
   std::ifstream file(path, std::ios::binary);
   std::uint64_t lines = 0;

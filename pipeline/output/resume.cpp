@@ -14,8 +14,10 @@ namespace lamina::pipeline {
 Result<std::vector<LayerRecord>> layers_that_hold(const std::string& directory, const std::string& manifest_name,
                                                   const ManifestHead& head) {
   std::string path = directory + "/" + manifest_name;
-  if (::access(path.c_str(), F_OK) != 0) path += ".part";
-  if (::access(path.c_str(), F_OK) != 0) return std::vector<LayerRecord>{};
+  if (::access(path.c_str(), F_OK) != 0) {
+    path += ".part";
+    if (!has_manifest_head(path)) return std::vector<LayerRecord>{};
+  }
 
   auto manifest = read_manifest(path);
   if (!manifest) return manifest.error();

@@ -89,7 +89,7 @@ LayerSteps steps_of(Maker& maker, const std::vector<std::uint32_t>& todo, const 
 /// What a job that ends early says, and what stays of it.
 Error ended_early(Maker& maker, const Error& error, bool any_layer) {
   const bool interrupted = error.fault == Fault::kInterrupted;
-  const bool keep = any_layer && (interrupted || error.fault == Fault::kOutput);
+  const bool keep = (any_layer || !maker.records_from_work()) && (interrupted || error.fault == Fault::kOutput);
   if (Status stopped = maker.stop(keep); !stopped && interrupted) return stopped.error();
   if (interrupted) {
     return {Fault::kInterrupted, keep ? "interrupted; finished layers are kept, run again with --resume to go on"

@@ -53,7 +53,7 @@ TEST_F(Jobs, JsonIsOneObjectOnStandardOutput) {
   EXPECT_EQ(json["layers_planned"], 50);
   EXPECT_EQ(json["columns"], 473);
   EXPECT_EQ(json["parts"][0]["triangles"], 12);
-  EXPECT_NEAR(json["set_volume_mm3"].get<double>(), 20 * 10 * 5, 10);
+  EXPECT_NEAR(json["volume_mm3"].get<double>(), 20 * 10 * 5, 10);
   const Outcome verified = lamina({"verify", "--json", "--quiet", "out"});
   EXPECT_EQ(verified.code, 0);
   EXPECT_EQ(nlohmann::json::parse(verified.out)["layers"], 50);

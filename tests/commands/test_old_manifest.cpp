@@ -1,4 +1,4 @@
-// tests/commands/test_old_manifest.cpp: directories as lamina of commit ef3e1c3 left them, tests/corpus/old_manifest: what
+// tests/commands/test_old_manifest.cpp: directories as lamina of commit ef3e1c3 left them, tests/golden/old_manifest: what
 // reads them says in one line that another version wrote them, and changes nothing.
 #include <gtest/gtest.h>
 
@@ -24,7 +24,7 @@ TEST(OldManifest, IsRefusedInOneLineAndLeftAsItIs) {
   for (const std::vector<std::string>& use : uses) {
     SCOPED_TRACE(testing::PrintToString(use));
     const Directory directory;
-    fs::copy(corpus / "old_manifest", directory.path(), fs::copy_options::recursive);
+    fs::copy(fs::path(LAMINA_TEST_DIR) / "golden/old_manifest", directory.path(), fs::copy_options::recursive);
     const std::string jet = tree_text(directory.path() / "jet"), slice = tree_text(directory.path() / "slice");
     const Outcome outcome = run_lamina(use, directory.path());
     EXPECT_EQ(outcome.code, 5);

@@ -107,7 +107,7 @@ TEST_F(ExtrudeProgram, PointsOfFukudaAre346InEachOf79Layers) {
           file("a.gcode"));
   ASSERT_EQ(result.code, 0) << result.err;
   const auto json = result.json();
-  EXPECT_EQ(json["layers"], 79);
+  EXPECT_EQ(json["layers_planned"], 79);
   EXPECT_EQ(json["segments"]["points_first_layer"], 346);
   EXPECT_EQ(json["segments"]["points"], 27334);
   EXPECT_EQ(json["segments"]["stretches"], 79 * 324);
@@ -152,7 +152,7 @@ TEST_F(ExtrudeProgram, TestPiecesOfDiNisioHaveTwelveAndNineSegmentedLines) {
             file("a.gcode"));
     ASSERT_EQ(result.code, 0) << result.err;
     const auto json = result.json();
-    EXPECT_EQ(json["layers"], 1);
+    EXPECT_EQ(json["layers_planned"], 1);
     EXPECT_EQ(json["segments"]["lines"], lines);
     EXPECT_EQ(json["segments"]["thin"], lines);
     EXPECT_EQ(json["segments"]["stretches"], 3 * lines);
@@ -322,7 +322,7 @@ TEST_F(ExtrudeProgram, SmlHasItsReportBesideItWithTheLayersThatItLays) {
                              " --machine fdm-2000 --layer 0.254 --bead 0.508 --fill raster --quiet --json -o " + file("a.sml"));
   ASSERT_EQ(result.code, 0) << result.err;
   const std::string report = text_of(file("a.rp3"));
-  EXPECT_EQ(result.json()["layers"], 10);
+  EXPECT_EQ(result.json()["layers_planned"], 10);
   EXPECT_NE(report.find("\n10\t0.508\t0.508\t0.254\t"), std::string::npos) << report;
   EXPECT_EQ(report.find("\n11\t"), std::string::npos);
   EXPECT_TRUE(report.ends_with("----- fim do arquivo -----\n"));

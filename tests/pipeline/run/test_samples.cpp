@@ -82,7 +82,7 @@ void expect_thick_ends(const test::GcodeLayer& layer, double thin_feed, const st
 TEST_F(Samples, SpeedsOfTable3AndExtrusionsOfTable4GoFromLineToLine) {
   const auto speed = plan("speed", block(62, 50, 0.3f));
   const auto speeds = test::table(3), extrusions = test::table(4);
-  EXPECT_EQ(speed.json["layers"], 1);
+  EXPECT_EQ(speed.json["layers_planned"], 1);
   EXPECT_EQ(speed.json["segments"]["lines"], 12);
   std::vector<std::vector<GcodeBead>> segmented;
   for (const auto& line : lines_of(speed.gcode.layers[0], true)) {
