@@ -13,6 +13,7 @@
 #include <numbers>
 #include <span>
 
+#include "tests/commands/program.h"
 #include "tests/segment/gcode_reader.h"
 
 namespace lamina {
@@ -100,7 +101,7 @@ class ExtrudeProgram : public testing::Test {
 TEST_F(ExtrudeProgram, PointsOfFukudaAre346InEachOf79Layers) {
   const std::string part = block(74, 100, 20, 12.5);
   const Outcome result =
-      run("extrude " + part +
+      run("extrude --overwrite " + part +
           " --machine marlin --layer 0.254 --walls 0 --fill segmented --segment-rule fukuda --thin 5 --thick 3 "
           "--bead 0.508 --bead-gap 2.4 --angle 0 --angle-step 0 --set fill.first_line_mm=0.508 --set fill.end_inset_mm=0.254 "
           "--quiet --json -o " +
@@ -123,7 +124,7 @@ TEST_F(ExtrudeProgram, MemoryOfASegmentedJobIsThatOfThePlainOne) {
     for (int turn = 0; turn < 7; ++turn) {
       for (auto* peaks : {&plain, &segmented}) {
         const Outcome result =
-            run("extrude " + job + (peaks == &plain ? " --fill raster" : " --fill segmented " + segments) +
+            run("extrude --overwrite " + job + (peaks == &plain ? " --fill raster" : " --fill segmented " + segments) +
                 " --threads 1 --quiet --json -o " + file(peaks == &plain ? "plain.gcode" : "segmented.gcode"));
         EXPECT_EQ(result.code, 0) << result.err;
         peaks->push_back(result.json()["peak_resident_bytes"].get<double>());
@@ -146,7 +147,7 @@ TEST_F(ExtrudeProgram, MemoryOfASegmentedJobIsThatOfThePlainOne) {
 TEST_F(ExtrudeProgram, TestPiecesOfDiNisioHaveTwelveAndNineSegmentedLines) {
   for (const auto& [width, lines] : {std::pair{62, 12}, {48, 9}}) {
     const Outcome result =
-        run("extrude " + block(width, 50, 0.3, 0) +
+        run("extrude --overwrite " + block(width, 50, 0.3, 0) +
             " --machine anet-a8 --layer 0.3 --walls 1 --fill segmented --segment-rule thick-ends "
             "--thin 30 --thick 10 --thick-speed 100 --bead-gap 2 --angle 90 --angle-step 0 --quiet --json -o " +
             file("a.gcode"));
@@ -174,7 +175,7 @@ TEST_F(ExtrudeProgram, TestPiecesOfDiNisioHaveTwelveAndNineSegmentedLines) {
 TEST_F(ExtrudeProgram, VolumesPlacesAndLayersOfAFileAreThoseOfThePlan) {
   const std::string part = block(30, 20, 2.4, 6);
   for (const std::string machine : {"anet-a8", "marlin", "klipper", "reprapfirmware"}) {
-    const Outcome result = run("extrude " + part + " --machine " + machine +
+    const Outcome result = run("extrude --overwrite " + part + " --machine " + machine +
                                " --layer 0.3 --walls 2 --fill segmented --quiet --json -o " + file("a.gcode"));
     ASSERT_EQ(result.code, 0) << result.err;
     const auto json = result.json();
@@ -210,7 +211,7 @@ TEST_F(ExtrudeProgram, VolumesPlacesAndLayersOfAFileAreThoseOfThePlan) {
 
 TEST_F(ExtrudeProgram, ClosedCurvesAreSegmentedFromTheOutsideInWithThickSeams) {
   const std::string part = block(30, 20, 1.2, 4);
-  const Outcome result = run("extrude " + part +
+  const Outcome result = run("extrude --overwrite " + part +
                              " --machine anet-a8 --layer 0.3 --walls 1 --fill segmented --pattern contour --continuous 2 "
                              "--quiet --json -o " +
                              file("a.gcode"));
@@ -269,15 +270,50 @@ TEST_F(ExtrudeProgram, ClosedCurvesAreSegmentedFromTheOutsideInWithThickSeams) {
   EXPECT_NEAR(volume / (json["volume_mm3"].get<double>() * 0.85), 1, 0.001);
 }
 
+TEST_F(ExtrudeProgram, AFileIsNotReplacedUnaskedItsManifestVouchesForItAndWhatIsInterruptedGoesOn) {
+  const std::string job = block(20, 20, 3, 0) + " --machine anet-a8 --layer 0.3 --walls 1 --quiet -o ";
+  ASSERT_EQ(run("extrude " + job + file("a.gcode")).code, 0);
+  const std::string whole = test::read_text(file("a.gcode")), manifest = test::read_text(file("a.gcode.json"));
+  EXPECT_NE(manifest.find("\"kind\": \"toolpaths\""), std::string::npos);
+  EXPECT_EQ(run("verify " + file("a.gcode")).code, 0);
+  const Outcome again = run("extrude " + job + file("a.gcode"));
+  EXPECT_EQ(again.code, 2);
+  EXPECT_NE(again.err.find("--overwrite"), std::string::npos) << again.err;
+  EXPECT_EQ(test::read_text(file("a.gcode")), whole);
+
+  // A run that was killed: the manifest's lines are ahead of the file, whose last layer is torn.
+  const std::size_t half = whole.size() / 2;
+  test::write_text(file("a.gcode.part"), whole.substr(0, half));
+  test::write_text(file("a.gcode.json.part"), manifest.substr(0, manifest.find("\n],\n")));
+  fs::remove(file("a.gcode"));
+  fs::remove(file("a.gcode.json"));
+  EXPECT_EQ(run("extrude " + job + file("a.gcode")).code, 2) << "an interrupted job is neither lost nor taken for granted";
+  const Outcome resumed = run("extrude " + job + file("a.gcode") + " --resume --json");
+  ASSERT_EQ(resumed.code, 0) << resumed.err;
+  EXPECT_GT(resumed.json()["layers_kept"], 2);
+  EXPECT_GT(resumed.json()["layers_planned"], 2);
+  EXPECT_EQ(test::read_text(file("a.gcode")), whole);
+  EXPECT_EQ(test::read_text(file("a.gcode.json")), manifest);
+  EXPECT_FALSE(fs::exists(file("a.gcode.part")) || fs::exists(file("a.gcode.json.part")));
+
+  // One changed byte is told with its layer.
+  std::string changed = whole;
+  changed[half] = changed[half] == '1' ? '2' : '1';
+  test::write_text(file("a.gcode"), changed);
+  const Outcome verified = run("verify " + file("a.gcode"));
+  EXPECT_EQ(verified.code, 5);
+  EXPECT_NE(verified.err.find("is not what was written"), std::string::npos) << verified.err;
+}
+
 TEST_F(ExtrudeProgram, SameBytesForAnyThreads) {
   const std::string part = block(30, 20, 3, 6);
   const std::string arguments =
-      "extrude " + part + " --machine anet-a8 --layer 0.2 --fill segmented --angle 30 --angle-step 60 --quiet ";
+      "extrude --overwrite " + part + " --machine anet-a8 --layer 0.2 --fill segmented --angle 30 --angle-step 60 --quiet ";
   ASSERT_EQ(run(arguments + "--threads 1 -o " + file("a.gcode")).code, 0);
   ASSERT_EQ(run(arguments + "--threads 4 --memory 1M -o " + file("b.gcode")).code, 0);
   EXPECT_EQ(text_of(file("a.gcode")), text_of(file("b.gcode")));
   // Layers of so many stretches that they are written a piece at a time.
-  const std::string wide = "extrude " + block(60, 60, 0.6, 6) +
+  const std::string wide = "extrude --overwrite " + block(60, 60, 0.6, 6) +
                            " --machine klipper --layer 0.2 --fill segmented --thin 0.2 --thick 0.2 --quiet --json ";
   const Outcome one = run(wide + "--threads 1 -o " + file("a.gcode")), many = run(wide + "--threads 4 -o " + file("b.gcode"));
   ASSERT_EQ(one.code, 0) << one.err;
@@ -295,7 +331,7 @@ TEST_F(ExtrudeProgram, SameBytesForAnyThreads) {
 TEST_F(ExtrudeProgram, WrongInputIsOneLineAndTheCodeOfUsage) {
   const std::string part = block(10, 10, 1, 0);
   const auto message = [&](const std::string& arguments) {
-    const Outcome result = run("extrude " + part + " --quiet -o " + file("a.gcode") + " " + arguments);
+    const Outcome result = run("extrude --overwrite " + part + " --quiet -o " + file("a.gcode") + " " + arguments);
     EXPECT_EQ(result.code, 2) << arguments;
     EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err;
     EXPECT_FALSE(fs::exists(file("a.gcode")));
@@ -318,7 +354,7 @@ TEST_F(ExtrudeProgram, WrongInputIsOneLineAndTheCodeOfUsage) {
 }
 
 TEST_F(ExtrudeProgram, SmlHasItsReportBesideItWithTheLayersThatItLays) {
-  const Outcome result = run("extrude " + block(20, 20, 2.54, 0) +
+  const Outcome result = run("extrude --overwrite " + block(20, 20, 2.54, 0) +
                              " --machine fdm-2000 --layer 0.254 --bead 0.508 --fill raster --quiet --json -o " + file("a.sml"));
   ASSERT_EQ(result.code, 0) << result.err;
   const std::string report = text_of(file("a.rp3"));

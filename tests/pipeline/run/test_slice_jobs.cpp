@@ -96,7 +96,7 @@ TEST(SliceProgram, ManifestSaysWhereEveryLayerLiesInTheFile) {
   double volume = 0;
   for (const auto& layer : manifest["layers"]) {
     const std::string piece = file.substr(layer["offset"].get<std::size_t>(), layer["bytes"].get<std::size_t>());
-    EXPECT_TRUE(piece.starts_with("\t<g id=\"layer" + std::to_string(layer["layer"].get<int>()) + "\""));
+    EXPECT_TRUE(piece.starts_with("\t<g id=\"layer" + std::to_string(layer["index"].get<int>()) + "\""));
     EXPECT_TRUE(piece.ends_with("</g>\n"));
     volume += layer["area_mm2"].get<double>() * layer["thickness_nm"].get<double>() * 1e-6;
   }
@@ -299,7 +299,7 @@ TEST(SliceProgram, SvgHasOnePathForEachOuterContourWithItsHoles) {
         ++holes;
         // The middle of an edge: corners may touch.
         const double x = (contours[c][0] + contours[c][2]) / 2, y = (contours[c][1] + contours[c][3]) / 2;
-        EXPECT_TRUE(is_inside(contours[0], x, y)) << "layer " << layer["layer"];
+        EXPECT_TRUE(is_inside(contours[0], x, y)) << "layer " << layer["index"];
       }
       const std::size_t said = text.find("slic3r:area=\"", at) + 13;
       EXPECT_NEAR(std::stod(text.substr(said)), own, 1e-3);
