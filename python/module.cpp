@@ -194,7 +194,7 @@ void append_keys(std::span<const pipeline::Key<Target>> keys, const Target& pres
   for (const auto& key : keys) {
     list.append(py::dict("key"_a = fmt::format("{}.{}", key.section, key.name), "flag"_a = std::string(key.flag),
                          "value"_a = std::string(key.value), "default"_a = key.write(presets),
-                         "meaning"_a = std::string(key.meaning), "decides_bytes"_a = key.decides_bytes));
+                         "meaning"_a = std::string(key.meaning), "decides_bytes"_a = (key.decides & pipeline::decides::images) != 0));
   }
 }
 

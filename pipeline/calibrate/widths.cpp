@@ -7,8 +7,9 @@
 #include <fstream>
 
 #include "pipeline/text/json_text.h"
-#include "pipeline/text/key_text.h"
+#include "pipeline/text/names.h"
 #include "pipeline/text/table.h"
+#include "pipeline/text/value.h"
 
 namespace lamina::pipeline {
 namespace {

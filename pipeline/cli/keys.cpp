@@ -51,7 +51,7 @@ Status check_together(const KeyChoice& choice, const Arguments& arguments, const
   if (choice.has("segment", "fill") && !fill.empty() && !pattern.empty() && fill != pattern && !is_word_of_other_key(fill)) {
     return at_option("--fill", fmt::format("{}, but --pattern {}: two patterns; give one of them", fill, pattern));
   }
-  if (job.segment.all.on || !job.segment.by_height.empty()) return {};
+  if (job.segment.any()) return {};
   for (const JobKey& key : job_keys()) {
     if (key.section != "segment" || key.name == "fill" || key.name == "on" || key.flag.empty()) continue;
     if (choice.has(key.section, key.name) && arguments.has(key.flag)) {
@@ -98,6 +98,12 @@ void add_key_options(const KeyChoice& choice, CommandSpec& spec) {
   std::map<std::string, std::size_t> places;
   for (const OptionSpec& option : spec.options) places.try_emplace(option.group, places.size());
   std::ranges::stable_sort(spec.options, {}, [&](const OptionSpec& option) { return places[option.group]; });
+}
+
+void say_notes(const Job& job, Context& context) {
+  for (const std::string& note : job.notes) {
+    if (!job.quiet) context.say("note: " + note);
+  }
 }
 
 Result<Job> read_job_options(const KeyChoice& choice, const Arguments& arguments) {

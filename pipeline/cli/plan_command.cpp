@@ -55,6 +55,7 @@ CommandSpec plan_spec(const PlanCommand& row) {
 Outcome plan(const PlanCommand& row, const Arguments& arguments, Context& context) {
   const Result<Job> job = read_plan(row, arguments);
   if (!job) return job.error();
+  say_notes(*job, context);
   if (arguments.has("--save-job")) {
     const Result<Resolved> resolved = resolve(*job, row.product);
     if (!resolved) return resolved.error();

@@ -1,48 +1,40 @@
+// Sections [bed], [layers] and [place].
 #include "pipeline/job/keys.h"
-#include "pipeline/text/key_text.h"
 
 namespace lamina::pipeline {
 namespace {
 
-using Form = KeyForm;
-using Text = std::string_view;
+constexpr Limits kSize{kLeastMm, kMostMm, " mm"}, kDpi{1, 25400, "", true};
+
+std::string read_bed(std::string_view text, Job& job) {
+  auto wrong = read_value(text, kSize, job.bed_mm);
+  job.machine.bed_given = job.machine.bed_given || wrong.empty();
+  return wrong;
+}
+std::string write_bed(const Job& job) { return value_text(job.bed_mm); }
 
 std::string read_dpi(std::string_view text, Job& job) {
-  const auto pieces = split(text, ",x");
-  if (pieces.size() > 2) return fmt::format("'{}' is not one or two numbers; write 1200 or 1200x600", text);
-  std::array<std::int64_t, 2> dpi{};
-  for (std::size_t i = 0; i < 2; ++i) {
-    if (auto wrong = read_whole(pieces[std::min(i, pieces.size() - 1)], 1, 25400, dpi[i]); !wrong.empty()) return wrong;
-  }
-  job.dpi = dpi;
-  job.machine.dpi_given = true;
-  return {};
+  auto wrong = read_value(text, kDpi, job.dpi);
+  job.machine.dpi_given = job.machine.dpi_given || wrong.empty();
+  return wrong;
 }
+std::string write_dpi(const Job& job) { return value_text(job.dpi); }
 
+// A machine has its own bed and dpi, unless others were asked of it.
 const JobKey kBedKeys[] = {
-    {"bed", "size_mm", "--bed", "WIDTHxDEPTH", "size of the bed in mm; the image covers all of it", true,
-     [](Text t, Job& j) {
-       auto wrong = read_pair(t, kLeastMm, kMostMm, " mm", j.bed_mm);
-       j.machine.bed_given = j.machine.bed_given || wrong.empty();
-       return wrong;
-     },
-     // A machine has its own bed and dpi, unless others were asked of it.
-     [](const Job& j) { return j.machine.profile.empty() || j.machine.bed_given ? write_list(j.bed_mm) : std::string(); },
-     Form::kList},
-    {"bed", "dpi", "--dpi", "DPI|XxY", "pixels per inch along x and y, each 1 to 25400", true, read_dpi,
-     [](const Job& j) {
-       return j.machine.profile.empty() || j.machine.dpi_given ? fmt::format("{},{}", j.dpi[0], j.dpi[1]) : std::string();
-     },
-     Form::kList},
-    {"layers", "thickness_mm", "--layer", "MM", "thickness of a layer in mm", true,
-     [](Text t, Job& j) { return read_number(t, kLeastMm, kMostMm, " mm", j.layer_mm); },
-     [](const Job& j) { return number_text(j.layer_mm); }, Form::kBare},
+    custom<Job, read_bed, write_bed>({"bed", "size_mm", "--bed", "WIDTHxDEPTH",
+                                      "size of the bed in mm; the image covers all of it", decides::images | decides::contours},
+                                     Form::kList)
+        .shown_if([](const Job& job) { return job.machine.profile.empty() || job.machine.bed_given; }),
+    custom<Job, read_dpi, write_dpi>(
+        {"bed", "dpi", "--dpi", "DPI|XxY", "pixels per inch along x and y, each 1 to 25400", decides::images}, Form::kList)
+        .shown_if([](const Job& job) { return job.machine.profile.empty() || job.machine.dpi_given; }),
+    field<&Job::layer_mm>({"layers", "thickness_mm", "--layer", "MM", "thickness of a layer in mm", decides::all}, kSize),
 };
 
 const JobKey kPlaceKeys[] = {
-    {"place", "gap_mm", "--gap", "MM", "between parts and copies that are arranged, in mm", true,
-     [](Text t, Job& j) { return read_number(t, 0, kMostMm, " mm", j.gap_mm); },
-     [](const Job& j) { return number_text(j.gap_mm); }, Form::kBare},
+    field<&Job::gap_mm>({"place", "gap_mm", "--gap", "MM", "between parts and copies that are arranged, in mm", decides::all},
+                        {0, kMostMm, " mm"}),
 };
 
 }  // namespace

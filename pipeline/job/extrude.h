@@ -5,13 +5,16 @@
 #include <optional>
 #include <span>
 #include <string>
-#include <string_view>
+#include <utility>
 #include <vector>
 
-#include "pipeline/job/fill.h"
+#include "pipeline/text/changes.h"
 #include "stages/segment/expand.h"
 
 namespace lamina::pipeline {
+
+template <class Target>
+struct Key;
 
 /// The keys of one segmentation, lengths in mm. What is absent follows from the machine's calibration.
 struct SegmentSettings {
@@ -34,28 +37,23 @@ struct SegmentSettings {
   bool across = false;              // the grid begins so that pores of a layer turned by 90 degrees lie on the same places
 };
 
+/// The keys of one segmentation, in the order of a job file.
+std::span<const Key<SegmentSettings>> segment_settings_keys();
+
 /// Section [segment].
 struct SegmentRequest {
   SegmentSettings all;
-  std::string by_height;  // "0:2.7 thin_mm=2; 2.7:3 on=false": other keys from one height to another
+  std::vector<Range<SegmentSettings>> ranges;  // none overlaps another
+  /// Whether any layer may be segmented.
+  bool any() const { return all.on || !ranges.empty(); }
 };
-
-/// One key of a segmentation.
-struct SegmentKey {
-  std::string_view name, flag, value, meaning;
-  std::string (*read)(std::string_view text, SegmentSettings& settings);
-  std::string (*write)(const SegmentSettings& settings);
-  KeyForm form;
-  std::string_view switch_text;
-};
-std::span<const SegmentKey> segment_settings_keys();
 
 /// Section [extrude]: what a job changes of its machine, and where material goes to.
 struct ExtrudeRequest {
   std::optional<double> flow, nozzle_degc, bed_degc, print_mm_s, wall_mm_s, first_layer_mm_s, travel_mm_s, retraction_mm,
       fan_percent;
   std::optional<bool> relative_extrusion;
-  std::string set;  // "fan.from_layer=2; bed.corner_mm=-110,-110": any other key of the machine's profile
+  std::vector<std::pair<std::string, std::string>> machine;  // any other key of its profile and the value: fan.from_layer, 2
 };
 
 }  // namespace lamina::pipeline

@@ -5,13 +5,15 @@
 #include <string_view>
 
 #include "pipeline/job/job.h"
+#include "pipeline/job/product.h"
 #include "stages/data/status.h"
 
 namespace lamina::pipeline {
 
 /// Reads a job file over `job`: keys that the file does not name stay as they are; its parts replace the job's.
 /// Relative paths in it (of parts, and the output) are relative to the file.
-/// errors  kUsage, one line: file, line, key, what is wrong. The job is then undefined.
+/// Old forms are read too, and told in job.notes.
+/// errors  kUsage, one line: file, line, column, key, what is wrong. The job is then undefined.
 Status read_job(const std::string& path, Job& job);
 
 /// The same for the text of a job file, as one that a manifest records; `path` is where it would lie.
@@ -25,9 +27,9 @@ Status set_key(Job& job, std::string_view assignment);
 /// absolute; as they are if `directory` is empty.
 std::string job_text(const Job& job, const std::string& directory);
 
-/// Only what decides the bytes of the layers, parts by their file names. The same job gives the same text, wherever it
+/// Only what decides the bytes of a product, parts by their file names. The same job gives the same text, wherever it
 /// runs and however it was asked for.
-std::string canonical_job_text(const Job& job);
+std::string canonical_job_text(const Job& job, Product product);
 
 /// Writes the resolved job, so that read_job gives it back. errors  kOutput; kUsage if a path is not UTF-8
 Status save_job(const std::string& path, const Job& job);

@@ -15,21 +15,14 @@ PixelGrid grid_of(const Job& job) {
 
 Status check_job(const Job& job) {
   if (job.parts.empty()) return Error{Fault::kUsage, "no part to plan; name one or more STL, OBJ or 3MF files"};
-  // A value is right if what it is written as can be read back.
-  Job copy;
   for (const JobKey& key : job_keys()) {
-    const std::string text = key.write(job);
-    if (text.empty()) continue;
-    if (const std::string wrong = key.read(text, copy); !wrong.empty()) {
+    if (const std::string wrong = key.check(job); !wrong.empty()) {
       return Error{Fault::kUsage, fmt::format("{}.{}: {}", key.section, key.name, wrong)};
     }
   }
   for (const PartRequest& part : job.parts) {
-    PartRequest part_copy;
     for (const PartKey& key : part_keys()) {
-      const std::string text = key.write(part);
-      if (text.empty()) continue;
-      if (const std::string wrong = key.read(text, part_copy); !wrong.empty()) {
+      if (const std::string wrong = key.check(part); !wrong.empty()) {
         return Error{Fault::kUsage, fmt::format("{}: {}.{}: {}", part.path, key.section, key.name, wrong)};
       }
     }
@@ -45,6 +38,19 @@ Status check_job(const Job& job) {
     return Error{Fault::kUsage, "-o DIR is missing; name the directory for the layers, or use --dry-run"};
   }
   return {};
+}
+
+bool fills(const Job& job) {
+  if (job.segment.any()) return true;
+  return std::ranges::any_of(job.parts, [&](const PartRequest& part) {
+    FillSettings own = job.fill.all;
+    apply(part.fill, own);
+    return fills(own) || std::ranges::any_of(job.fill.ranges, [&](const FillRange& range) {
+             FillSettings there = own;
+             apply(range.changes, there);
+             return fills(there);
+           });
+  });
 }
 
 Result<std::array<std::uint32_t, 2>> layer_range(const Job& job, std::uint32_t layer_count) {

@@ -13,6 +13,7 @@
 #include "pipeline/job/fill.h"
 #include "pipeline/job/heights.h"
 #include "pipeline/job/machine.h"
+#include "pipeline/job/material.h"
 #include "pipeline/job/slice.h"
 #include "stages/data/fill_rule.h"
 #include "stages/data/grid.h"
@@ -24,17 +25,17 @@ namespace lamina::pipeline {
 /// One [[part]] of a job.
 struct PartRequest {
   std::string path;
-  std::string named_at = {};  // where a job file names it, "job.toml:12"; empty if none does
+  std::string named_at = {};  // where a job file names it, "job.toml:12:8"; empty if none does
   std::string unit = "mm";    // mm, cm, m, um, inch, foot: of STL and OBJ, which carry none
   std::uint32_t copies = 1;
   std::optional<std::array<double, 2>> at_mm = {};  // where the part's box starts on the bed; arranged if absent
   double bottom_mm = 0;                             // height of the part's lowest point above the bed
   std::array<double, 3> scale{1, 1, 1};
   std::array<double, 3> rotate_deg{0, 0, 0};
-  std::array<double, 3> shrink{1, 1, 1};  // compensation factors per axis of the bed, applied last
-  std::string fill = {};                  // changes to the job's filling, "pattern=contour gap_mm=0.1"
-  std::string material = {};              // name of its powder; no part or every part has one
-  std::string material_by_height = {};    // others between two heights above its bottom, "2:4 bronze; 4:6 steel"
+  std::array<double, 3> shrink{1, 1, 1};            // compensation factors per axis of the bed, applied last
+  FillChanges fill = {};                            // keys of the job's filling that differ
+  std::string material = {};                        // name of its powder; no part or every part has one
+  std::vector<MaterialRange> material_ranges = {};  // others between two heights above its bottom
 };
 
 enum class Engine { kRays, kContours, kBoth };
@@ -73,6 +74,7 @@ struct Job {
   bool dry_run = false;
   bool json = false;
   bool quiet = false;
+  std::vector<std::string> notes;  // of reading it, for people: old forms, and what to write now
 };
 
 /// The pixels of a job's bed: of its machine, once that is resolved. Only for a checked job.
@@ -81,6 +83,9 @@ PixelGrid grid_of(const Job& job);
 /// Whether every value of a job is within what can be planned, and agrees with the others; for jobs from anywhere.
 /// errors  kUsage, one line that begins with the key
 Status check_job(const Job& job);
+
+/// Whether any layer of any part gets walls, a filling or segmented lines.
+bool fills(const Job& job);
 
 /// Why jobs of one file refuse run.shard.
 inline constexpr std::string_view kNoShards =

@@ -3,12 +3,12 @@
 namespace lamina::pipeline {
 
 std::span<const JobKey> job_keys() {
-  // The order of the sections in a job file. A new group is a file job_keys_<group>.cpp and a line here.
+  // The order of the sections in a job file. A new group is a file job/<group>.cpp and a line here.
   static const std::vector<JobKey> keys = [] {
     std::vector<JobKey> all;
     for (const std::span<const JobKey> group :
          {bed_keys(), heights_keys(), place_keys(), image_keys(), machine_keys(), dose_keys(), slice_keys(), fill_keys(),
-          extrude_keys(), load_keys(), run_keys()}) {
+          extrude_keys(), segment_keys(), load_keys(), run_keys()}) {
       all.insert(all.end(), group.begin(), group.end());
     }
     return all;

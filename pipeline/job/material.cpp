@@ -5,22 +5,24 @@
 #include <algorithm>
 
 #include "pipeline/job/job.h"
-#include "pipeline/text/key_text.h"
+#include "pipeline/text/key.h"
+#include "pipeline/text/ranges.h"
 
 namespace lamina::pipeline {
 namespace {
 
 constexpr std::size_t kLongestName = 40;
 
+constexpr Key<MaterialRange> kMaterialKeys[] = {text<check_material, &MaterialRange::material>({"material_range", "material"})};
+
 }  // namespace
 
-std::string read_material(std::string_view text, std::string& name) {
-  const bool good = !text.empty() && text.size() <= kLongestName && std::ranges::all_of(text, [](unsigned char c) {
+std::string check_material(std::string_view name) {
+  const bool good = !name.empty() && name.size() <= kLongestName && std::ranges::all_of(name, [](unsigned char c) {
     return (c >= '0' && c <= '9') || (c >= 'A' && c <= 'Z') || (c >= 'a' && c <= 'z') || c == '-' || c == '_';
   });
-  if (!good) return fmt::format("'{}' is no name of a material; use up to {} letters, digits, - and _", text, kLongestName);
-  name = text;
-  return {};
+  if (good) return {};
+  return fmt::format("'{}' is no name of a material; use up to {} letters, digits, - and _", name, kLongestName);
 }
 
 Status set_materials(std::string_view text, Job& job) {
@@ -31,30 +33,33 @@ Status set_materials(std::string_view text, Job& job) {
   }
   for (std::size_t p = 0; p < job.parts.size(); ++p) {
     const auto name = names[names.size() == 1 ? 0 : p];
-    if (const std::string what = read_material(name, job.parts[p].material); !what.empty()) {
-      return Error{Fault::kUsage, what};
-    }
+    if (const std::string what = check_material(name); !what.empty()) return Error{Fault::kUsage, what};
+    job.parts[p].material = name;
   }
   return {};
 }
 
-std::string read_material_ranges(std::string_view text, std::vector<MaterialRange>& ranges) {
-  ranges.clear();
-  for (std::string_view piece : split(text, ";")) {
-    while (piece.starts_with(' ')) piece.remove_prefix(1);
-    while (piece.ends_with(' ')) piece.remove_suffix(1);
-    const std::size_t gap = piece.find(' ');
-    const auto ends = split(piece.substr(0, gap), ":");
-    MaterialRange range;
-    if (gap == std::string_view::npos || ends.size() != 2) return fmt::format("'{}' is no range; write 2:4.5 bronze", piece);
-    for (const auto& [end, value] : {std::pair{ends[0], &range.from_mm}, {ends[1], &range.to_mm}}) {
-      if (auto what = read_number(end, 0, kMostMm, " mm", *value); !what.empty()) return what;
-    }
-    if (range.from_mm >= range.to_mm) return fmt::format("'{}' ends where it begins, or below", piece);
-    if (auto what = read_material(piece.substr(piece.find_last_of(' ') + 1), range.material); !what.empty()) return what;
-    ranges.push_back(range);
+std::string read_material_ranges(const TomlValue& list, std::vector<MaterialRange>& ranges, Place& at) {
+  if (auto wrong = check_tables(list, "from_mm, to_mm and material"); !wrong.empty()) return wrong;
+  std::vector<MaterialRange> read;
+  for (TomlValue table : list.value) {
+    MaterialRange& range = read.emplace_back();
+    at = table.place;
+    if (auto wrong = take_ends(table, range.from_mm, range.to_mm, at); !wrong.empty()) return wrong;
+    if (auto wrong = read_table<MaterialRange>(table, "material_range", kMaterialKeys, range, at); !wrong.empty()) return wrong;
+    if (range.material.empty()) return fmt::format("{}: material is missing", range_name(range.from_mm, range.to_mm));
   }
+  ranges = std::move(read);
   return {};
+}
+
+std::string material_ranges_text(const std::vector<MaterialRange>& ranges) {
+  std::string text;
+  for (const auto& [from, to, material] : ranges) {
+    text += fmt::format("{}{{ from_mm = {}, to_mm = {}, material = {} }}", text.empty() ? "" : ", ", number_text(from),
+                        number_text(to), toml_string(material));
+  }
+  return text.empty() ? text : fmt::format("[{}]", text);
 }
 
 }  // namespace lamina::pipeline

@@ -1,40 +1,36 @@
+// Section [slice].
 #include "pipeline/job/keys.h"
-#include "pipeline/text/key_text.h"
 
 namespace lamina::pipeline {
 namespace {
 
-using Form = KeyForm;
-using Text = std::string_view;
+constexpr std::string_view kFormats[] = {"svg", "cli", "cli-binary", "3mf", "null"};
 
-constexpr Word<int> kFormats[] = {{"svg", 0}, {"cli", 1}, {"cli-binary", 2}, {"3mf", 3}, {"null", 4}};
+std::string check_slice_format(std::string_view text) {
+  return std::ranges::find(kFormats, text) == std::end(kFormats) ? not_one_of(text, kFormats) : std::string();
+}
 
-// None of them decides the bytes of images, and the manifests of contours list them on their own.
+constexpr unsigned kContour = decides::contours | decides::moves;
+
 const JobKey kSliceKeys[] = {
-    {"slice", "format", "--format", "FORMAT", "svg, cli, cli-binary, 3mf, or null to write none", false,
-     [](Text t, Job& j) {
-       int ignored = 0;
-       auto wrong = read_word(kFormats, t, ignored);
-       if (wrong.empty()) j.slice.format = t;
-       return wrong;
-     },
-     [](const Job& j) { return j.slice.format; }, Form::kString},
-    {"slice", "file_a_layer", "--file-a-layer", "", "one file for each layer, layers/000000.svg and up", false,
-     [](Text t, Job& j) { return read_switch(t, j.slice.file_a_layer); },
-     [](const Job& j) { return write_switch(j.slice.file_a_layer); }, Form::kBare, "true"},
-    {"slice", "empty_first_layer", "--empty-first-layer", "",
-     "CLI: begin with an empty layer at the bottom, from which readers infer the thickness", false,
-     [](Text t, Job& j) { return read_switch(t, j.slice.empty_first_layer); },
-     [](const Job& j) { return write_switch(j.slice.empty_first_layer); }, Form::kBare, "true"},
-    {"slice", "tolerance_um", "--tolerance", "UM", "points are dropped if the contour moves by no more, in micrometres", false,
-     [](Text t, Job& j) { return read_number(t, 0, 1e6, " um", j.slice.tolerance_um); },
-     [](const Job& j) { return number_text(j.slice.tolerance_um); }, Form::kBare},
-    {"slice", "bridge_mm", "--bridge", "MM", "longest gap of an open mesh (--no-repair) that is closed, in mm", false,
-     [](Text t, Job& j) { return read_number(t, 0, 1000, " mm", j.slice.bridge_mm); },
-     [](const Job& j) { return number_text(j.slice.bridge_mm); }, Form::kBare},
-    {"slice", "offset_mm", "--offset", "MM", "contours are moved outwards by this, inwards if negative", false,
-     [](Text t, Job& j) { return read_number(t, -1000, 1000, " mm", j.slice.offset_mm); },
-     [](const Job& j) { return number_text(j.slice.offset_mm); }, Form::kBare},
+    text<check_slice_format, &Job::slice, &SliceRequest::format>(
+        {"slice", "format", "--format", "FORMAT", "svg, cli, cli-binary, 3mf, or null to write none", decides::contours}),
+    field<&Job::slice, &SliceRequest::file_a_layer>({"slice", "file_a_layer", "--file-a-layer", "",
+                                                     "one file for each layer, layers/000000.svg and up", decides::contours,
+                                                     "true"}),
+    field<&Job::slice, &SliceRequest::empty_first_layer>(
+        {"slice", "empty_first_layer", "--empty-first-layer", "",
+         "CLI: begin with an empty layer at the bottom, from which readers infer the thickness", decides::contours, "true"}),
+    field<&Job::slice, &SliceRequest::tolerance_um>(
+        {"slice", "tolerance_um", "--tolerance", "UM", "points are dropped if the contour moves by no more, in micrometres",
+         kContour},
+        {0, 1e6, " um"}),
+    field<&Job::slice, &SliceRequest::bridge_mm>(
+        {"slice", "bridge_mm", "--bridge", "MM", "longest gap of an open mesh (--no-repair) that is closed, in mm", kContour},
+        {0, 1000, " mm"}),
+    field<&Job::slice, &SliceRequest::offset_mm>(
+        {"slice", "offset_mm", "--offset", "MM", "contours are moved outwards by this, inwards if negative", kContour},
+        {-1000, 1000, " mm"}),
 };
 
 }  // namespace

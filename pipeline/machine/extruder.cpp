@@ -2,289 +2,196 @@
 
 #include <fmt/format.h>
 
-#include <cmath>
 #include <fstream>
 #include <iterator>
 #include <vector>
 
 #include "pipeline/text/json_text.h"
-#include "pipeline/text/key_text.h"
-#include "pipeline/text/toml_values.h"
+#include "pipeline/text/key.h"
+#include "pipeline/text/names.h"
 
 namespace lamina::pipeline {
 namespace {
 
 using Text = std::string_view;
 using Profile = ExtruderProfile;
+using segment::Calibration;
 
-enum class Form { kBare, kString, kList, kTable, kLines };
+constexpr Text kFormats[] = {"gcode", "sml"}, kUses[] = {"raster", "contour", "support"};
 
-struct ExtruderKey {
-  Text section, name;
-  std::string (*read)(Text text, Profile& profile);
-  std::string (*write)(const Profile& profile);
-  Form form;
-};
-
-std::string read_count(Text text, std::uint32_t& value) {
-  std::int64_t whole = 0;
-  auto wrong = read_whole(text, 0, 1'000'000, whole);
-  if (wrong.empty()) value = static_cast<std::uint32_t>(whole);
-  return wrong;
+std::string check_format(Text text) { return text == "gcode" || text == "sml" ? std::string() : not_one_of(text, kFormats); }
+std::string check_nothing(Text) { return {}; }
+std::string read_name(Text text, std::string& name) {
+  name = one_line(text);
+  return name.empty() ? "is empty; name the machine" : "";
 }
+std::string read_line(Text text, std::string& line) { return line = one_line(text), std::string(); }
+std::string same_text(const std::string& text) { return text; }
 
-/// Rows "a,b;c,d" of so many numbers.
-std::string read_rows(Text text, std::size_t columns, std::vector<std::vector<double>>& rows) {
-  rows.clear();
-  if (text.empty()) return {};
-  for (const Text row : split(text, ";")) {
-    const auto cells = split(row, ",");
-    if (cells.size() != columns) return fmt::format("row {} holds {} numbers; give {}", rows.size() + 1, cells.size(), columns);
-    rows.emplace_back();
-    for (const Text cell : cells) {
-      if (auto wrong = read_number(cell, 0, 1e6, "", rows.back().emplace_back()); !wrong.empty()) {
-        return fmt::format("row {}: {}", rows.size(), wrong);
-      }
-    }
-  }
+std::string read_source(Text text, Profile& profile) {
+  profile.own_calibration = true;
+  profile.calibration.source = one_line(text);
   return {};
 }
+std::string write_source(const Profile& profile) { return profile.calibration.source; }
 
-std::string write_rows(const std::vector<std::vector<double>>& rows) {
-  std::string text;
-  for (const auto& row : rows) {
-    std::vector<std::string> cells;
-    for (const double value : row) cells.push_back(number_text(value));
-    text += fmt::format("{}{}", text.empty() ? "" : ";", fmt::join(cells, ","));
-  }
-  return text;
+/// A list with an entry a line, as files of many rows are written.
+std::string lines_text(const std::vector<std::string>& entries) {
+  std::string text = "[\n";
+  for (const std::string& entry : entries) text += "  " + entry + ",\n";
+  return text + "]";
 }
 
-// clang-format off
-#define NUMBER_KEY(section, key, low, high, unit)                                                                      \
-  {#section, #key, [](Text t, Profile& p) { return read_number(t, low, high, unit, p.machine.section.key); },          \
-   [](const Profile& p) { return number_text(p.machine.section.key); }, Form::kBare}
-#define TEXT_KEY(section, key)                                                                                          \
-  {#section, #key, [](Text t, Profile& p) { return p.machine.section.key = t, std::string(); },                        \
-   [](const Profile& p) { return p.machine.section.key; }, Form::kString}
-#define PAIR_KEY(section, key, low)                                                                                     \
-  {#section, #key, [](Text t, Profile& p) { return read_pair(t, low, kMostMm, " mm", p.machine.section.key); },        \
-   [](const Profile& p) { return write_list(p.machine.section.key); }, Form::kList}
-// clang-format on
+/// Rows of so many numbers: { percent, thin_mm, ... } of a calibration.
+template <class Row, double Row::*... Columns>
+std::string read_rows(const TomlValue& list, std::vector<Row>& rows, Place& at) {
+  if (!list.is_list()) return "is a list of rows, as in [[100, 0.4], [50, 0.3]]";
+  std::vector<Row> read;
+  for (const TomlValue& cells : list.value) {
+    at = cells.place;
+    if (cells.value.size() != sizeof...(Columns)) {
+      return fmt::format("row {} holds {} numbers; give {}", read.size() + 1, cells.value.size(), sizeof...(Columns));
+    }
+    Row& row = read.emplace_back();
+    std::string wrong;
+    std::size_t i = 0;
+    const auto cell = [&](double& value) {
+      if (wrong.empty()) wrong = read_number(cells.value[i++].text, 0, 1e6, "", value);
+    };
+    (cell(row.*Columns), ...);
+    if (!wrong.empty()) return fmt::format("row {}: {}", read.size(), wrong);
+  }
+  rows = std::move(read);
+  return {};
+}
+template <class Row, double Row::*... Columns>
+std::string write_rows(const std::vector<Row>& rows) {
+  std::vector<std::string> lines;
+  for (const Row& row : rows) lines.push_back(fmt::format("[{}]", fmt::join(std::array{number_text(row.*Columns)...}, ", ")));
+  return lines_text(lines);
+}
+template <auto Member, class Row, double Row::*... Columns>
+constexpr Key<Profile> table(Text name) {
+  return structure<read_rows<Row, Columns...>, write_rows<Row, Columns...>, &Profile::calibration, Member>(
+      {"calibration", name});
+}
 
-constexpr Word<int> kFormats[] = {{"gcode", 0}, {"sml", 1}};
+/// "THICKNESS_MM USE COMMAND" a line.
+std::string read_commands(const TomlValue& list, std::vector<Extruder::Sml::Pd>& commands, Place& at) {
+  if (!list.is_list()) return "is a list of \"THICKNESS_MM USE COMMAND\"";
+  std::vector<Extruder::Sml::Pd> read;
+  for (const TomlValue& line : list.value) {
+    at = line.place;
+    const auto words = split(line.text, " ");
+    Extruder::Sml::Pd& command = read.emplace_back();
+    if (words.size() != 3) return fmt::format("'{}' is not \"THICKNESS_MM USE COMMAND\"", one_line(line.text));
+    if (auto wrong = read_number(words[0], kLeastMm, 10, " mm", command.thickness_mm); !wrong.empty()) return wrong;
+    if (std::ranges::find(kUses, words[1]) == std::end(kUses)) return not_one_of(one_line(words[1]), kUses);
+    command.use = words[1];
+    command.line = words[2];
+  }
+  commands = std::move(read);
+  return {};
+}
+std::string write_commands(const std::vector<Extruder::Sml::Pd>& commands) {
+  std::vector<std::string> lines;
+  for (const auto& [thickness, use, line] : commands) {
+    lines.push_back(toml_string(fmt::format("{} {} {}", number_text(thickness), use, line)));
+  }
+  return lines_text(lines);
+}
 
-// clang-format off
-const ExtruderKey kKeys[] = {
-    {"machine", "name",
-     [](Text t, Profile& p) {
-       p.machine.name = one_line(t);
-       return std::string(p.machine.name.empty() ? "is empty; name the machine" : "");
-     },
-     [](const Profile& p) { return p.machine.name; }, Form::kString},
-    {"machine", "description", [](Text t, Profile& p) { return p.machine.description = one_line(t), std::string(); },
-     [](const Profile& p) { return p.machine.description; }, Form::kString},
-    {"machine", "format",
-     [](Text t, Profile& p) {
-       int ignored = 0;
-       auto wrong = read_word(kFormats, t, ignored);
-       if (wrong.empty()) p.machine.format = t;
-       return wrong;
-     },
-     [](const Profile& p) { return p.machine.format; }, Form::kString},
-    PAIR_KEY(bed, size_mm, 1),
-    NUMBER_KEY(bed, build_height_mm, 1, kMostMm, " mm"),
-    PAIR_KEY(bed, corner_mm, -kMostMm),
-    NUMBER_KEY(material, nozzle_mm, 0.01, 20, " mm"),
-    NUMBER_KEY(material, filament_mm, 0.1, 20, " mm"),
-    NUMBER_KEY(material, density_g_cm3, 0.01, 30, " g/cm3"),
-    NUMBER_KEY(material, flow, 0.01, 10, ""),
-    NUMBER_KEY(material, nozzle_degc, 0, 600, " degrees"),
-    NUMBER_KEY(material, bed_degc, 0, 300, " degrees"),
-    NUMBER_KEY(material, first_nozzle_degc, 0, 600, " degrees"),
-    NUMBER_KEY(material, first_bed_degc, 0, 300, " degrees"),
-    NUMBER_KEY(speed, print_mm_s, 0.1, 2000, " mm/s"),
-    NUMBER_KEY(speed, wall_mm_s, 0.1, 2000, " mm/s"),
-    NUMBER_KEY(speed, inner_wall_mm_s, 0.1, 2000, " mm/s"),
-    NUMBER_KEY(speed, first_layer_mm_s, 0.1, 2000, " mm/s"),
-    NUMBER_KEY(speed, travel_mm_s, 0.1, 2000, " mm/s"),
-    NUMBER_KEY(speed, lift_mm_s, 0.1, 2000, " mm/s"),
-    NUMBER_KEY(speed, acceleration_mm_s2, 1, 1e6, " mm/s2"),
-    NUMBER_KEY(speed, corner_mm_s, 0.1, 1000, " mm/s"),
-    NUMBER_KEY(retraction, length_mm, 0, 50, " mm"),
-    NUMBER_KEY(retraction, speed_mm_s, 0.1, 1000, " mm/s"),
-    NUMBER_KEY(retraction, least_travel_mm, 0, 1000, " mm"),
-    NUMBER_KEY(fan, percent, 0, 100, " %"),
-    {"fan", "from_layer", [](Text t, Profile& p) { return read_count(t, p.machine.fan.from_layer); },
-     [](const Profile& p) { return fmt::format("{}", p.machine.fan.from_layer); }, Form::kBare},
-    {"code", "relative_extrusion", [](Text t, Profile& p) { return read_switch(t, p.machine.code.relative_extrusion); },
-     [](const Profile& p) { return write_switch(p.machine.code.relative_extrusion); }, Form::kBare},
-    TEXT_KEY(code, start),
-    TEXT_KEY(code, end),
-    TEXT_KEY(code, layer),
-    TEXT_KEY(code, plain_pressure),
-    {"sml", "pd",
-     [](Text t, Profile& p) {
-       p.machine.sml.pd.clear();
-       if (t.empty()) return std::string();
-       for (const Text line : split(t, "\n")) {
-         const auto words = split(line, " ");
-         Extruder::Sml::Pd pd;
-         if (words.size() != 3) return fmt::format("'{}' is not \"THICKNESS_MM USE COMMAND\"", one_line(line));
-         if (auto wrong = read_number(words[0], kLeastMm, 10, " mm", pd.thickness_mm); !wrong.empty()) return wrong;
-         if (words[1] != "raster" && words[1] != "contour" && words[1] != "support") {
-           return fmt::format("'{}' is none of raster, contour, support", one_line(words[1]));
-         }
-         pd.use = words[1];
-         pd.line = words[2];
-         p.machine.sml.pd.push_back(pd);
-       }
-       return std::string();
-     },
-     [](const Profile& p) {
-       std::string text;
-       for (const auto& pd : p.machine.sml.pd) {
-         text += fmt::format("{}{} {} {}", text.empty() ? "" : "\n", number_text(pd.thickness_mm), pd.use, pd.line);
-       }
-       return text;
-     },
-     Form::kLines},
-    TEXT_KEY(sml, header),
-    TEXT_KEY(sml, footer),
-    TEXT_KEY(sml, height),
-    TEXT_KEY(sml, travel),
-    TEXT_KEY(sml, draw),
-    {"calibration", "source",
-     [](Text t, Profile& p) {
-       p.own_calibration = true;
-       return p.calibration.source = one_line(t), std::string();
-     },
-     [](const Profile& p) { return p.calibration.source; }, Form::kString},
-    {"calibration", "width_mm", [](Text t, Profile& p) { return read_number(t, 0.01, 20, " mm", p.calibration.width_mm); },
-     [](const Profile& p) { return number_text(p.calibration.width_mm); }, Form::kBare},
-    {"calibration", "height_mm", [](Text t, Profile& p) { return read_number(t, 0.01, 20, " mm", p.calibration.height_mm); },
-     [](const Profile& p) { return number_text(p.calibration.height_mm); }, Form::kBare},
-    {"calibration", "speed_mm_s", [](Text t, Profile& p) { return read_number(t, 0.01, 2000, " mm/s", p.calibration.speed_mm_s); },
-     [](const Profile& p) { return number_text(p.calibration.speed_mm_s); }, Form::kBare},
-    {"calibration", "by_speed",
-     [](Text t, Profile& p) {
-       std::vector<std::vector<double>> rows;
-       if (auto wrong = read_rows(t, 4, rows); !wrong.empty()) return wrong;
-       p.calibration.by_speed.clear();
-       for (const auto& row : rows) p.calibration.by_speed.push_back({row[0], row[1], row[2], row[3]});
-       return std::string();
-     },
-     [](const Profile& p) {
-       std::vector<std::vector<double>> rows;
-       for (const auto& r : p.calibration.by_speed) rows.push_back({r.percent, r.thin_mm, r.stable_mm, r.swell_mm});
-       return write_rows(rows);
-     },
-     Form::kTable},
-    {"calibration", "by_extrusion",
-     [](Text t, Profile& p) {
-       std::vector<std::vector<double>> rows;
-       if (auto wrong = read_rows(t, 2, rows); !wrong.empty()) return wrong;
-       p.calibration.by_extrusion.clear();
-       for (const auto& row : rows) p.calibration.by_extrusion.push_back({row[0], row[1]});
-       return std::string();
-     },
-     [](const Profile& p) {
-       std::vector<std::vector<double>> rows;
-       for (const auto& r : p.calibration.by_extrusion) rows.push_back({r.percent, r.thin_mm});
-       return write_rows(rows);
-     },
-     Form::kTable},
-    {"calibration", "repeated",
-     [](Text t, Profile& p) {
-       std::vector<std::vector<double>> rows;
-       if (auto wrong = read_rows(t, 6, rows); !wrong.empty()) return wrong;
-       p.calibration.repeated.clear();
-       for (const auto& row : rows) p.calibration.repeated.push_back({row[0], row[1], row[2], row[3], row[4], row[5]});
-       return std::string();
-     },
-     [](const Profile& p) {
-       std::vector<std::vector<double>> rows;
-       for (const auto& r : p.calibration.repeated) {
-         rows.push_back({r.extrusion_percent, r.thin_speed_percent, r.thick_speed_percent, r.thick_mm, r.thin_mm, r.continuous_mm});
-       }
-       return write_rows(rows);
-     },
-     Form::kTable},
-    {"calibration", "spacing",
-     [](Text t, Profile& p) {
-       std::vector<std::vector<double>> rows;
-       if (auto wrong = read_rows(t, 3, rows); !wrong.empty()) return wrong;
-       p.calibration.spacing.clear();
-       for (const auto& row : rows) p.calibration.spacing.push_back({row[0], row[1], row[2]});
-       return std::string();
-     },
-     [](const Profile& p) {
-       std::vector<std::vector<double>> rows;
-       for (const auto& r : p.calibration.spacing) rows.push_back({r.extrusion_percent, r.segmented_mm, r.continuous_mm});
-       return write_rows(rows);
-     },
-     Form::kTable},
+constexpr auto kMachine = &Profile::machine;
+constexpr auto kCalibration = &Profile::calibration;
+using Bed = decltype(Extruder::bed);
+using Material = decltype(Extruder::material);
+using Speed = decltype(Extruder::speed);
+using Retraction = decltype(Extruder::retraction);
+using Fan = decltype(Extruder::fan);
+using Code = decltype(Extruder::code);
+using Sml = decltype(Extruder::sml);
+
+constexpr Limits kSpeed{0.1, 2000, " mm/s"}, kNozzle{0, 600, " degrees"}, kPlate{0, 300, " degrees"};
+
+template <auto... Path>
+constexpr Key<Profile> code(Text section, Text name) {
+  return text<check_nothing, kMachine, Path...>({section, name});
+}
+
+constexpr Key<Profile> kKeys[] = {
+    custom<Profile, read_name, same_text, kMachine, &Extruder::name>({"machine", "name"}, Form::kString),
+    custom<Profile, read_line, same_text, kMachine, &Extruder::description>({"machine", "description"}, Form::kString),
+    text<check_format, kMachine, &Extruder::format>({"machine", "format"}),
+
+    field<kMachine, &Extruder::bed, &Bed::size_mm>({"bed", "size_mm"}, {1, kMostMm, " mm"}),
+    field<kMachine, &Extruder::bed, &Bed::build_height_mm>({"bed", "build_height_mm"}, {1, kMostMm, " mm"}),
+    field<kMachine, &Extruder::bed, &Bed::corner_mm>({"bed", "corner_mm"}, {-kMostMm, kMostMm, " mm"}),
+
+    field<kMachine, &Extruder::material, &Material::nozzle_mm>({"material", "nozzle_mm"}, {0.01, 20, " mm"}),
+    field<kMachine, &Extruder::material, &Material::filament_mm>({"material", "filament_mm"}, {0.1, 20, " mm"}),
+    field<kMachine, &Extruder::material, &Material::density_g_cm3>({"material", "density_g_cm3"}, {0.01, 30, " g/cm3"}),
+    field<kMachine, &Extruder::material, &Material::flow>({"material", "flow"}, {0.01, 10}),
+    field<kMachine, &Extruder::material, &Material::nozzle_degc>({"material", "nozzle_degc"}, kNozzle),
+    field<kMachine, &Extruder::material, &Material::bed_degc>({"material", "bed_degc"}, kPlate),
+    field<kMachine, &Extruder::material, &Material::first_nozzle_degc>({"material", "first_nozzle_degc"}, kNozzle),
+    field<kMachine, &Extruder::material, &Material::first_bed_degc>({"material", "first_bed_degc"}, kPlate),
+
+    field<kMachine, &Extruder::speed, &Speed::print_mm_s>({"speed", "print_mm_s"}, kSpeed),
+    field<kMachine, &Extruder::speed, &Speed::wall_mm_s>({"speed", "wall_mm_s"}, kSpeed),
+    field<kMachine, &Extruder::speed, &Speed::inner_wall_mm_s>({"speed", "inner_wall_mm_s"}, kSpeed),
+    field<kMachine, &Extruder::speed, &Speed::first_layer_mm_s>({"speed", "first_layer_mm_s"}, kSpeed),
+    field<kMachine, &Extruder::speed, &Speed::travel_mm_s>({"speed", "travel_mm_s"}, kSpeed),
+    field<kMachine, &Extruder::speed, &Speed::lift_mm_s>({"speed", "lift_mm_s"}, kSpeed),
+    field<kMachine, &Extruder::speed, &Speed::acceleration_mm_s2>({"speed", "acceleration_mm_s2"}, {1, 1e6, " mm/s2"}),
+    field<kMachine, &Extruder::speed, &Speed::corner_mm_s>({"speed", "corner_mm_s"}, {0.1, 1000, " mm/s"}),
+
+    field<kMachine, &Extruder::retraction, &Retraction::length_mm>({"retraction", "length_mm"}, {0, 50, " mm"}),
+    field<kMachine, &Extruder::retraction, &Retraction::speed_mm_s>({"retraction", "speed_mm_s"}, {0.1, 1000, " mm/s"}),
+    field<kMachine, &Extruder::retraction, &Retraction::least_travel_mm>({"retraction", "least_travel_mm"}, {0, 1000, " mm"}),
+
+    field<kMachine, &Extruder::fan, &Fan::percent>({"fan", "percent"}, {0, 100, " %"}),
+    field<kMachine, &Extruder::fan, &Fan::from_layer>({"fan", "from_layer"}, {0, 1'000'000}),
+
+    field<kMachine, &Extruder::code, &Code::relative_extrusion>({"code", "relative_extrusion"}),
+    code<&Extruder::code, &Code::start>("code", "start"),
+    code<&Extruder::code, &Code::end>("code", "end"),
+    code<&Extruder::code, &Code::layer>("code", "layer"),
+    code<&Extruder::code, &Code::plain_pressure>("code", "plain_pressure"),
+
+    structure<read_commands, write_commands, kMachine, &Extruder::sml, &Sml::pd>({"sml", "pd"}),
+    code<&Extruder::sml, &Sml::header>("sml", "header"),
+    code<&Extruder::sml, &Sml::footer>("sml", "footer"),
+    code<&Extruder::sml, &Sml::height>("sml", "height"),
+    code<&Extruder::sml, &Sml::travel>("sml", "travel"),
+    code<&Extruder::sml, &Sml::draw>("sml", "draw"),
+
+    custom<Profile, read_source, write_source>({"calibration", "source"}, Form::kString),
+    field<kCalibration, &Calibration::width_mm>({"calibration", "width_mm"}, {0.01, 20, " mm"}),
+    field<kCalibration, &Calibration::height_mm>({"calibration", "height_mm"}, {0.01, 20, " mm"}),
+    field<kCalibration, &Calibration::speed_mm_s>({"calibration", "speed_mm_s"}, {0.01, 2000, " mm/s"}),
+    table<&Calibration::by_speed, Calibration::BySpeed, &Calibration::BySpeed::percent, &Calibration::BySpeed::thin_mm,
+          &Calibration::BySpeed::stable_mm, &Calibration::BySpeed::swell_mm>("by_speed"),
+    table<&Calibration::by_extrusion, Calibration::ByExtrusion, &Calibration::ByExtrusion::percent,
+          &Calibration::ByExtrusion::thin_mm>("by_extrusion"),
+    table<&Calibration::repeated, Calibration::Repeated, &Calibration::Repeated::extrusion_percent,
+          &Calibration::Repeated::thin_speed_percent, &Calibration::Repeated::thick_speed_percent,
+          &Calibration::Repeated::thick_mm, &Calibration::Repeated::thin_mm, &Calibration::Repeated::continuous_mm>("repeated"),
+    table<&Calibration::spacing, Calibration::Spaced, &Calibration::Spaced::extrusion_percent,
+          &Calibration::Spaced::segmented_mm, &Calibration::Spaced::continuous_mm>("spacing"),
 };
-// clang-format on
-
-#undef NUMBER_KEY
-#undef TEXT_KEY
-#undef PAIR_KEY
-
-std::vector<Text> sections() {
-  std::vector<Text> names;
-  for (const ExtruderKey& key : kKeys) {
-    if (names.empty() || names.back() != key.section) names.push_back(key.section);
-  }
-  return names;
-}
-
-std::vector<Text> names_of(Text section) {
-  std::vector<Text> names;
-  for (const ExtruderKey& key : kKeys) {
-    if (key.section == section) names.push_back(key.name);
-  }
-  return names;
-}
-
-/// The key, or what is wrong with its name.
-const ExtruderKey* find_key(Text section, Text name, std::string& wrong) {
-  for (const ExtruderKey& key : kKeys) {
-    if (key.section == section && key.name == name) return &key;
-  }
-  const auto all = sections();
-  const auto own = names_of(section);
-  wrong = own.empty() ? fmt::format("{}: no such section{}; there are {}", one_line(section), suggest(section, all),
-                                    fmt::join(all, ", "))
-                      : fmt::format("{}.{}: no such key{}; [{}] has {}", section, one_line(name), suggest(name, own), section,
-                                    fmt::join(own, ", "));
-  return nullptr;
-}
 
 }  // namespace
 
 Result<ExtruderProfile> read_extruder(std::string_view text, const std::string& where) {
-  const auto values = read_toml_values(text, where, TomlLists::kRows);
-  if (!values) return values.error();
-  for (const TomlValue& value : *values) {
-    if (value.section != "head" && value.section != "powder") continue;
+  const auto file = read_toml(text, where);
+  if (!file) return file.error();
+  if (file->find("head") != nullptr || file->find("powder") != nullptr) {
     return Error{Fault::kUsage, fmt::format("{}: is the profile of a powder printer; lamina jet takes it", where)};
   }
   ExtruderProfile profile;
-  for (const TomlValue& value : *values) {
-    const auto wrong = [&](const std::string& what) {
-      return Error{Fault::kUsage, fmt::format("{}:{}: {}", where, value.line, what)};
-    };
-    if (value.kind == TomlValue::Kind::kNoSection) return wrong(fmt::format("{}: is not a section", value.section));
-    if (value.kind == TomlValue::Kind::kSection) continue;
-    std::string what;
-    const ExtruderKey* key = find_key(value.section, value.name, what);
-    if (key == nullptr) return wrong(what);
-    if (value.kind == TomlValue::Kind::kNoValue) {
-      return wrong(fmt::format("{}.{}: is not a value or a list of them", value.section, value.name));
-    }
-    if (what = key->read(value.text, profile); !what.empty())
-      return wrong(fmt::format("{}.{}: {}", value.section, value.name, what));
+  for (std::size_t i = 0; i < file->value.size(); ++i) {
+    if (Status status = read_section<Profile>(file->value[i], file->name[i], where, kKeys, profile); !status)
+      return status.error();
   }
   if (profile.machine.name.empty()) {
     return Error{Fault::kUsage, fmt::format("{}: machine.name is missing; name the machine", where)};
@@ -312,52 +219,32 @@ Result<ExtruderProfile> find_extruder(const std::string& name_or_file) {
   return read_extruder(text, name_or_file);
 }
 
-std::string set_extruder_key(std::string_view assignment, ExtruderProfile& profile) {
-  const std::size_t dot = assignment.find('.'), equals = assignment.find('=');
-  if (dot == Text::npos || equals == Text::npos || dot > equals)
-    return fmt::format("'{}' is not section.key=value", one_line(assignment));
+std::string set_extruder_key(std::string_view name, std::string_view value, ExtruderProfile& profile) {
+  const std::size_t dot = std::min(name.find('.'), name.size());
+  const Text section = name.substr(0, dot), key_name = name.substr(std::min(dot + 1, name.size()));
+  const auto sections = section_names<Profile>(kKeys);
+  if (std::ranges::find(sections, section) == sections.end()) {
+    return fmt::format("{}: {}", one_line(section), no_such_section(section, sections));
+  }
   std::string wrong;
-  const ExtruderKey* key = find_key(assignment.substr(0, dot), assignment.substr(dot + 1, equals - dot - 1), wrong);
-  if (key == nullptr) return wrong;
-  wrong = key->read(assignment.substr(equals + 1), profile);
-  return wrong.empty() ? wrong : fmt::format("{}.{}: {}", key->section, key->name, wrong);
+  const auto* key = find_key<Profile>(kKeys, section, key_name, wrong);
+  if (key != nullptr) wrong = key->read(value, profile);
+  return wrong.empty() ? wrong : fmt::format("{}: {}", one_line(name), wrong);
 }
 
 std::string extruder_text(const ExtruderProfile& profile) {
-  std::string text;
-  Text section;
-  for (const ExtruderKey& key : kKeys) {
-    if (key.section == "calibration" && !profile.own_calibration) continue;
-    if (section != key.section) text += fmt::format("{}[{}]\n", section.empty() ? "" : "\n", key.section);
-    section = key.section;
-    const std::string value = key.write(profile);
-    switch (key.form) {
-      case Form::kBare: text += fmt::format("{} = {}\n", key.name, value); break;
-      case Form::kString: text += fmt::format("{} = {}\n", key.name, json_string(value)); break;
-      case Form::kList: text += fmt::format("{} = [{}]\n", key.name, value); break;
-      case Form::kTable:
-      case Form::kLines:
-        text += fmt::format("{} = [\n", key.name);
-        if (!value.empty()) {
-          for (const Text row : split(value, key.form == Form::kTable ? ";" : "\n")) {
-            text += key.form == Form::kTable ? fmt::format("  [{}],\n", row) : fmt::format("  {},\n", json_string(row));
-          }
-        }
-        text += "]\n";
-    }
-  }
-  return text;
+  return sections_text<Profile>(kKeys, profile, [&](const Key<Profile>& key, const std::string&) {
+    return key.section != "calibration" || profile.own_calibration;
+  });
 }
 
 Result<ExtruderProfile> resolve_extruder(const Job& job) {
   auto found = find_extruder(job.machine.profile.empty() ? "marlin" : job.machine.profile);
   if (!found) return Error{found.error().fault, "--machine: " + found.error().message};
   ExtruderProfile& profile = *found;
-  for (std::string_view change : split(job.extrude.set, ";")) {
-    while (change.starts_with(' ')) change.remove_prefix(1);
-    if (change.empty()) continue;
-    if (const std::string wrong = set_extruder_key(change, profile); !wrong.empty()) {
-      return Error{Fault::kUsage, fmt::format("extrude.set: {}", wrong)};
+  for (const auto& [name, value] : job.extrude.machine) {
+    if (const std::string wrong = set_extruder_key(name, value, profile); !wrong.empty()) {
+      return Error{Fault::kUsage, fmt::format("extrude.machine: {}", wrong)};
     }
   }
   const ExtrudeRequest& r = job.extrude;

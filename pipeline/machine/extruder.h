@@ -33,8 +33,8 @@ Result<ExtruderProfile> read_extruder(std::string_view text, const std::string& 
 /// errors  kUsage, with the shipped names
 Result<ExtruderProfile> find_extruder(const std::string& name_or_file);
 
-/// Changes one key, as in "material.flow=0.85". returns "" or what is wrong
-std::string set_extruder_key(std::string_view assignment, ExtruderProfile& profile);
+/// Changes one key, as in material.flow to 0.85. returns "" or what is wrong
+std::string set_extruder_key(std::string_view name, std::string_view value, ExtruderProfile& profile);
 
 /// Every key of a profile; reading it back gives the same profile.
 std::string extruder_text(const ExtruderProfile& profile);

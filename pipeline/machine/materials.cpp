@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-#include "pipeline/text/key_text.h"
+#include "pipeline/text/value.h"
 
 namespace lamina::pipeline {
 namespace {
@@ -63,7 +63,7 @@ Result<Materials> materials_of(const Job& job) {
   result.part.resize(job.parts.size());
   const bool any = std::ranges::any_of(job.parts, named);
   for (const PartRequest& part : job.parts) {
-    if (named(part) || (!any && part.material_by_height.empty())) continue;
+    if (named(part) || (!any && part.material_ranges.empty())) continue;
     return wrong(fmt::format("{}: has none; name that of every part, or of none", part.path));
   }
   if (!any) return result;
@@ -74,10 +74,8 @@ Result<Materials> materials_of(const Job& job) {
     const auto elsewhere = naming.number_of(part.material, part.path);
     if (!elsewhere) return elsewhere.error();
     result.part[p].elsewhere = *elsewhere;
-    std::vector<MaterialRange> ranges;
-    if (!part.material_by_height.empty()) read_material_ranges(part.material_by_height, ranges);  // checked with the job
     const std::int64_t bottom = nm_of(part.bottom_mm);
-    for (const MaterialRange& range : ranges) {
+    for (const MaterialRange& range : part.material_ranges) {
       const auto number = naming.number_of(range.material, part.path);
       if (!number) return number.error();
       result.part[p].ranges.push_back({bottom + nm_of(range.from_mm), bottom + nm_of(range.to_mm), *number});

@@ -1,4 +1,3 @@
-// pipeline/plan/fill.cpp: what a job says of fillings -> parameters of each height.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -6,7 +5,7 @@
 
 #include "pipeline/job/job.h"
 #include "pipeline/plan/fill.h"
-#include "pipeline/text/key_text.h"
+#include "pipeline/text/ranges.h"
 #include "stages/infill/fill.h"
 
 namespace lamina::pipeline {
@@ -33,19 +32,7 @@ infill::FillParameters parameters_of(const FillSettings& settings) {
   p.build_layers = settings.build_layers;
   p.gaps = list_nm(settings.gap_mm);
   p.group = settings.group;
-  if (!settings.gap_by_height.empty()) {
-    for (const std::string_view entry : split(settings.gap_by_height, ",")) {
-      const auto pair = split(entry, ":");  // checked when it was read
-      double z = 0, gap = 0;
-      std::string_view height = pair.front();
-      while (height.starts_with(' ')) height.remove_prefix(1);
-      std::string_view amount = pair.back();
-      while (amount.ends_with(' ')) amount.remove_suffix(1);
-      read_number(height, 0, kMostMm, "", z);
-      read_number(amount, -100, 1000, "", gap);
-      p.gap_table.emplace_back(nm_of(z), short_nm(gap));
-    }
-  }
+  for (const auto& [z, gap] : settings.gap_by_height) p.gap_table.emplace_back(nm_of(z), short_nm(gap));
   p.gap_expression = settings.gap_formula;
   p.distances = list_nm(settings.distance_mm);
   p.stagger = list_nm(settings.stagger_mm);
@@ -58,15 +45,9 @@ infill::FillParameters parameters_of(const FillSettings& settings) {
   return p;
 }
 
-std::string_view trimmed(std::string_view text) {
-  while (text.starts_with(' ')) text.remove_prefix(1);
-  while (text.ends_with(' ')) text.remove_suffix(1);
-  return text;
-}
-
 /// A key as a job file and a command line name it.
 std::string named(std::string_view name) {
-  for (const FillKey& key : fill_settings_keys()) {
+  for (const auto& key : fill_settings_keys()) {
     if (key.name == name && !key.flag.empty()) return fmt::format("fill.{} ({})", name, key.flag);
   }
   return fmt::format("fill.{}", name);
@@ -101,55 +82,28 @@ bool FillPlan::fills() const {
   return does(base) || std::ranges::any_of(ranges, [&](const Range& range) { return does(range.parameters); });
 }
 
-Result<FillPlan> plan_filling(const FillRequest& request, const std::string& part_changes) {
+Result<FillPlan> plan_filling(const FillRequest& request, const FillChanges& part_changes) {
   const auto wrong = [](std::string_view key, const std::string& what) {
     return Error{Fault::kUsage, fmt::format("{}: {}", key, what)};
   };
+  if (const std::string what = contradiction(request.all); !what.empty()) return Error{Fault::kUsage, what};
   FillSettings settings = request.all;
-  if (const std::string what = contradiction(settings); !what.empty()) return Error{Fault::kUsage, what};
-  if (const std::string what = read_fill_changes(part_changes, settings); !what.empty()) return wrong("part.fill", what);
+  apply(part_changes, settings);
   if (const std::string what = contradiction(settings); !what.empty()) return wrong("part.fill", what);
   FillPlan plan;
   plan.base = parameters_of(settings);
   if (Status status = infill::check(plan.base); !status) {
     return wrong(part_changes.empty() ? "fill" : "part.fill", status.error().message);
   }
-  std::vector<std::pair<FillPlan::Range, std::string>> ranges;
-  for (std::string_view entry : split(request.by_height, ";")) {
-    entry = trimmed(entry);
-    if (entry.empty()) continue;
-    const std::size_t space = std::min(entry.find(' '), entry.size());
-    const std::string heights(entry.substr(0, space));
-    const auto ends = split(heights, ":");
-    double from = 0, to = 0;
-    if (ends.size() != 2) return wrong("fill.by_height", fmt::format("'{}' is not from:to, as in 2.7:3", heights));
-    for (const auto& [text, value] : {std::pair{ends[0], &from}, {ends[1], &to}}) {
-      if (const std::string what = read_number(text, 0, kMostMm, " mm", *value); !what.empty()) {
-        return wrong("fill.by_height", fmt::format("{}: {}", heights, what));
-      }
-    }
-    if (nm_of(to) <= nm_of(from)) {
-      return wrong("fill.by_height", fmt::format("{}: ends at or below its start; write the lower height first", heights));
-    }
+  for (const FillRange& range : request.ranges) {
     FillSettings own = settings;
-    if (const std::string what = read_fill_changes(entry.substr(space), own); !what.empty()) {
-      return wrong("fill.by_height", fmt::format("{}: {}", heights, what));
-    }
-    if (const std::string what = contradiction(own); !what.empty())
-      return wrong("fill.by_height", fmt::format("{}: {}", heights, what));
-    FillPlan::Range range{nm_of(from), nm_of(to), parameters_of(own)};
-    if (Status status = infill::check(range.parameters); !status) {
-      return wrong("fill.by_height", fmt::format("{}: {}", heights, status.error().message));
-    }
-    for (const auto& [other, name] : ranges) {
-      if (range.from < other.to && other.from < range.to) {
-        return wrong("fill.by_height", fmt::format("{} overlaps {}; end one where the other begins", heights, name));
-      }
-    }
-    ranges.emplace_back(std::move(range), heights);
+    apply(range.changes, own);
+    const std::string name = fmt::format("fill.range: {}", range_name(range.from_mm, range.to_mm));
+    if (const std::string what = contradiction(own); !what.empty()) return wrong(name, what);
+    plan.ranges.push_back({nm_of(range.from_mm), nm_of(range.to_mm), parameters_of(own)});
+    if (Status status = infill::check(plan.ranges.back().parameters); !status) return wrong(name, status.error().message);
   }
-  std::ranges::sort(ranges, {}, [](const auto& entry) { return entry.first.from; });
-  for (auto& [range, name] : ranges) plan.ranges.push_back(std::move(range));
+  std::ranges::sort(plan.ranges, {}, &FillPlan::Range::from);
   return plan;
 }
 

@@ -2,7 +2,6 @@
 #pragma once
 
 #include <cstdint>
-#include <string>
 #include <vector>
 
 #include "pipeline/job/fill.h"
@@ -25,8 +24,8 @@ struct FillPlan {
   bool fills() const;
 };
 
-/// The plan of a part, from the job's section and the part's own changes ("pattern=contour gap_mm=0.1").
+/// The plan of a part, from the job's section and the part's own changes.
 /// errors  kUsage, one line that begins with the key
-Result<FillPlan> plan_filling(const FillRequest& request, const std::string& part_changes);
+Result<FillPlan> plan_filling(const FillRequest& request, const FillChanges& part_changes);
 
 }  // namespace lamina::pipeline

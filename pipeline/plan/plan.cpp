@@ -53,7 +53,7 @@ class Planner {
       auto materials = materials_of(job());
       if (!materials) return materials.error();
       materials_ = std::move(*materials);
-      beads_ = job().segment.all.on || !job().segment.by_height.empty();
+      beads_ = job().segment.any();
     }
     if (beads_ || moves()) {
       if (Status status = segment(fill); !status) return status;

@@ -141,9 +141,10 @@ Result<Scene> load_scene(const Job& job) {
     std::error_code ignored;
     const std::filesystem::path file = std::filesystem::weakly_canonical(part.path, ignored);
     // Parts of different materials are indexed apart (solids.h), so that each has meshes of its own.
-    const std::string solid = part.material_by_height.empty()
-                                  ? part.material
-                                  : fmt::format("{} {} {}", part.material, part.material_by_height, part.bottom_mm);
+    const std::string solid =
+        part.material_ranges.empty()
+            ? part.material
+            : fmt::format("{} {} {}", part.material, material_ranges_text(part.material_ranges), part.bottom_mm);
     const LoadKey key{file.empty() ? part.path : file.string(), part.unit, part.scale, part.rotate_deg, part.shrink, solid};
     auto found = files.find(key);
     if (found == files.end()) {

@@ -78,7 +78,7 @@ Status Sections::make_own_slicers(const Job& job, const std::vector<std::uint32_
 }
 
 std::vector<std::uint32_t> Sections::make_areas(const Job& job, const std::vector<Box>& boxes,
-                                                 const std::vector<std::uint32_t>& body) {
+                                                const std::vector<std::uint32_t>& body) {
   // Bodies are numbered by their first instances, instances in the order of the parts: so are the areas of a body.
   std::map<std::pair<std::uint32_t, std::uint32_t>, std::vector<std::uint32_t>> members;  // by body and part
   for (std::uint32_t i = 0; i < body.size(); ++i) members[{body[i], scene_->part_of_instance[i]}].push_back(i);
@@ -114,7 +114,7 @@ ContoursView Sections::contours_of(const Area& area, Work& work) const {
 }
 
 Result<slice::LayerReport> Sections::section(const slice::Slicer& slicer, const ScheduledLayer& scheduled, Work& work,
-                                              slice::LayerContours& out) const {
+                                             slice::LayerContours& out) const {
   auto report = slicer.layer(scheduled.low, work.scratch, out);
   if (!report || containment_ == Containment::kAcross) return report;
   const auto high = slicer.layer(scheduled.high, work.scratch, work.highest);

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "pipeline/job/extrude.h"
+#include "pipeline/job/fill.h"
 #include "stages/data/status.h"
 #include "stages/segment/calibration.h"
 #include "stages/segment/expand.h"
@@ -28,8 +29,7 @@ struct SegmentPlan {
   bool any() const;
 };
 
-/// The plan, and in `fill` the distances between lines that follow from it, unless they are given there.
-/// bead_mm  reference width
+/// The plan; `fill` gets the distances between lines that follow from it, unless it gives them, and lines where it has none.
 /// errors   kUsage, one line that begins with the key
 Result<SegmentPlan> plan_segments(const SegmentRequest& request, const segment::Calibration& calibration, FillRequest& fill);
 

@@ -34,6 +34,12 @@ std::vector<std::string_view> split(std::string_view text, std::string_view sepa
   }
 }
 
+std::string_view trimmed(std::string_view text) {
+  while (text.starts_with(' ')) text.remove_prefix(1);
+  while (text.ends_with(' ')) text.remove_suffix(1);
+  return text;
+}
+
 std::string read_number(std::string_view text, double low, double high, std::string_view unit, double& value) {
   double parsed = 0;
   if (!parse(text, parsed)) {
@@ -61,32 +67,6 @@ std::string read_whole(std::string_view text, std::int64_t low, std::int64_t hig
 std::string read_switch(std::string_view text, bool& value) {
   if (text != "true" && text != "false") return fmt::format("{} is neither true nor false", quoted(text));
   value = text == "true";
-  return {};
-}
-
-std::string read_pair(std::string_view text, double low, double high, std::string_view unit, std::array<double, 2>& values) {
-  const auto pieces = split(text, ",x");
-  if (pieces.size() != 2) return fmt::format("{} is not two numbers; write them as A,B or AxB", quoted(text));
-  std::array<double, 2> parsed{};
-  for (std::size_t i = 0; i < 2; ++i) {
-    if (auto wrong = read_number(pieces[i], low, high, unit, parsed[i]); !wrong.empty()) return wrong;
-  }
-  values = parsed;
-  return {};
-}
-
-std::string read_triple(std::string_view text, double low, double high, std::string_view unit, bool one_for_all,
-                        std::array<double, 3>& values) {
-  const auto pieces = split(text, ",");
-  if (pieces.size() != 3 && !(one_for_all && pieces.size() == 1)) {
-    return fmt::format("{} is not {}three numbers; write them as X,Y,Z", quoted(text), one_for_all ? "one or " : "");
-  }
-  std::array<double, 3> parsed{};
-  for (std::size_t i = 0; i < 3; ++i) {
-    const std::string_view piece = pieces.size() == 1 ? pieces[0] : pieces[i];
-    if (auto wrong = read_number(piece, low, high, unit, parsed[i]); !wrong.empty()) return wrong;
-  }
-  values = parsed;
   return {};
 }
 

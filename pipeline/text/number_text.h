@@ -21,13 +21,6 @@ std::string read_whole(std::string_view text, std::int64_t low, std::int64_t hig
 /// true or false.
 std::string read_switch(std::string_view text, bool& value);
 
-/// Two numbers, as 490x380 or 490,380.
-std::string read_pair(std::string_view text, double low, double high, std::string_view unit, std::array<double, 2>& values);
-
-/// Three numbers, as 1,1,1.02, or one that stands for all three if `one_for_all`.
-std::string read_triple(std::string_view text, double low, double high, std::string_view unit, bool one_for_all,
-                        std::array<double, 3>& values);
-
 /// Bytes: 1073741824, 256M, 1G, 1.5GiB; K, M and G are powers of 1024.
 std::string read_bytes(std::string_view text, std::uint64_t& bytes);
 
@@ -39,6 +32,9 @@ std::string read_shard(std::string_view text, std::array<std::uint32_t, 2>& shar
 
 /// The parts of a text between any of `separators`; one empty part for an empty text.
 std::vector<std::string_view> split(std::string_view text, std::string_view separators);
+
+/// The text without the spaces around it.
+std::string_view trimmed(std::string_view text);
 
 /// The shortest text that reads back as the same number; never -0.
 std::string number_text(double value);

@@ -155,7 +155,8 @@ class Module(unittest.TestCase):
         job.write_text("[bed]\nsize_mm = [60, 50]\ndpi = 300\n[layers]\nthickness_mm = 0.4\n"
                        f"[[part]]\npath = '{rabbit}'\nat_mm = [5, 5]\nmaterial = 'steel'\n"
                        f"[[part]]\npath = '{nut}'\nat_mm = [15, 10]\nmaterial = 'bronze'\n"
-                       "material_by_height = '4:8 steel; 8:12 tin'\n")
+                       "[[part.material_range]]\nfrom_mm = 4\nto_mm = 8\nmaterial = 'steel'\n"
+                       "[[part.material_range]]\nfrom_mm = 8\nto_mm = 12\nmaterial = 'tin'\n")
         out = self.directory / "powders"
         said = run("jet", "--job", job, "--quiet", "-o", out)
         self.assertEqual(said.returncode, 0, said.stderr)

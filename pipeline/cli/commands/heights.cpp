@@ -10,7 +10,7 @@
 #include "pipeline/plan/heights.h"
 #include "pipeline/show/heights_plot.h"
 #include "pipeline/show/heights_table.h"
-#include "pipeline/text/key_text.h"
+#include "pipeline/text/value.h"
 #include "stages/write/file.h"
 
 namespace lamina::pipeline {

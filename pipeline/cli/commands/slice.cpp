@@ -26,7 +26,7 @@ PlanCommand row() {
           kOwn,
           {},
           "Lengths are mm, angles degrees. Keys of a filling that have no option are set by --set fill.KEY=VALUE, between\n"
-          "heights by fill.by_height, for one part by part.fill; docs/filling.md has all of them.\n\n"
+          "heights by fill.range, for one part by part.fill; docs/filling.md has all of them.\n\n"
           "Examples:\n"
           "  lamina slice bracket.stl --layer 0.1 -o out                      out/bracket.svg\n"
           "  lamina slice bracket.stl --layer 0.05 --format cli-binary -o out\n"

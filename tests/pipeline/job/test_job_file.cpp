@@ -9,6 +9,13 @@ namespace {
 
 using test::Directory;
 
+FillChanges changes_of(std::string_view table) {
+  FillChanges changes;
+  Place at;
+  EXPECT_EQ(read_fill_changes(*read_toml_value(table), changes, at), "");
+  return changes;
+}
+
 // A job in which every key differs from its default.
 Job unusual_job(const Directory& directory) {
   Job job;
@@ -22,7 +29,10 @@ Job unusual_job(const Directory& directory) {
   job.slice = {"cli", true, true, 2.5, 0.25, -0.125};
   job.fill.all.gap_mm = {0.1, 0.25};
   job.fill.all.stagger_mm = {0, 0.2};
-  job.fill.by_height = "1:2 gap_mm=0";
+  job.fill.all.gap_by_height = {{0, 0.75}, {6, 0.1}};
+  job.fill.ranges = {{1, 2.5, changes_of("{ gap_mm = 0, pattern = 'contour' }")}, {3, 4, {}}};
+  job.segment.ranges = {{0, 1.5, {}}};
+  job.extrude.machine = {{"bed.corner_mm", "-110,-110"}, {"fan.from_layer", "2"}};
   job.repair = false;
   job.drop_bad = true;
   job.weld_um = 0.5;
@@ -59,12 +69,14 @@ Job unusual_job(const Directory& directory) {
   part.scale = {1.0 / 3, 2, -1};
   part.rotate_deg = {-90, 0.1, 359};
   part.shrink = {1.02, 1.02, 1.025};
-  part.fill = "gap_mm=0.1 walls=2";
+  part.fill = changes_of("{ gap_mm = 0.1, walls = 2 }");
   part.material = "316L";
-  part.material_by_height = "2:4.5 bronze";
+  part.material_ranges = {{2, 4.5, "bronze"}};
   job.parts = {part, PartRequest{.path = directory / "second.stl"}};
   return job;
 }
+
+constexpr Product kProducts[] = {Product::kImages, Product::kContours, Product::kMoves};
 
 std::string all_of(const Job& job) { return job_text(job, ""); }
 
@@ -80,7 +92,10 @@ TEST(JobFile, SavedJobReadsBackAsTheSameJob) {
   EXPECT_EQ(back.bed_mm, job.bed_mm);
   EXPECT_EQ(back.parts[0].scale, job.parts[0].scale);
   EXPECT_EQ(back.layers, job.layers);
-  EXPECT_EQ(canonical_job_text(back), canonical_job_text(job));
+  ASSERT_EQ(back.fill.ranges.size(), 2u);
+  EXPECT_EQ(back.fill.ranges[0].changes.values.pattern, infill::Pattern::kContour);
+  EXPECT_EQ(back.extrude.machine, job.extrude.machine);
+  for (const Product product : kProducts) EXPECT_EQ(canonical_job_text(back, product), canonical_job_text(job, product));
 }
 
 TEST(JobFile, ShardIsKept) {
@@ -109,7 +124,7 @@ TEST(JobFile, PathsAreRelativeToTheFile) {
 TEST(JobFile, CanonicalTextHasNoPathsAndNothingThatLeavesBytesAlone) {
   const Directory directory;
   Job job = unusual_job(directory);
-  const std::string text = canonical_job_text(job);
+  const std::string text = canonical_job_text(job, Product::kImages);
   EXPECT_EQ(text.find(directory.path().string()), std::string::npos);
   job.output = "elsewhere";
   job.engine = Engine::kContours;
@@ -119,24 +134,28 @@ TEST(JobFile, CanonicalTextHasNoPathsAndNothingThatLeavesBytesAlone) {
   job.shard = {0, 2};
   job.resume = true;
   job.parts[0].path = "/somewhere/else/" + std::filesystem::path(job.parts[0].path).filename().string();
-  EXPECT_EQ(canonical_job_text(job), text);
+  EXPECT_EQ(canonical_job_text(job, Product::kImages), text);
 }
 
 TEST(JobFile, EveryKeyThatDecidesBytesChangesTheCanonicalText) {
   const Directory directory;
   const Job usual, unusual = unusual_job(directory);
   for (const JobKey& key : job_keys()) {
-    if (!key.decides_bytes) continue;
-    Job job = usual;
-    ASSERT_EQ(key.read(key.write(unusual), job), "") << key.name;
-    EXPECT_NE(canonical_job_text(job), canonical_job_text(usual)) << key.name;
+    for (const Product product : kProducts) {
+      // What fills a part and moves a nozzle is as usual here but for a few keys.
+      if ((key.decides & bit(product)) == 0 || (product != Product::kImages && key.write(unusual) == key.write(usual)))
+        continue;
+      Job job = usual;
+      ASSERT_EQ(key.read(key.write(unusual), job), "") << key.name;
+      EXPECT_NE(canonical_job_text(job, product), canonical_job_text(usual, product)) << key.name;
+    }
   }
   Job plain;
   plain.parts.emplace_back();
   for (const PartKey& key : part_keys()) {
     Job job = plain;
     ASSERT_EQ(key.read(key.write(unusual.parts[0]), job.parts[0]), "") << key.name;
-    EXPECT_NE(canonical_job_text(job), canonical_job_text(plain)) << key.name;
+    EXPECT_NE(canonical_job_text(job, Product::kImages), canonical_job_text(plain, Product::kImages)) << key.name;
   }
 }
 
@@ -158,24 +177,24 @@ TEST(JobFile, EveryKeyIsDocumented) {
 TEST(JobFile, WrongKeysAndValuesNameFileLineAndKey) {
   const Directory directory;
   const std::pair<const char*, const char*> jobs[] = {
-      {"[bed]\nsize_mm = [490, nan]\n", ":2: bed.size_mm: 'nan'"},
-      {"[layers]\nthickness_mm = inf\n", ":2: layers.thickness_mm: 'inf'"},
-      {"[layers]\nthickness_mm = 0\n", ":2: layers.thickness_mm: 0 is out of range"},
-      {"[bed]\ndpi = 0\n", ":2: bed.dpi: 0 is out of range"},
-      {"[bed]\ndpi = 1e9\n", ":2: bed.dpi"},
-      {"[bed]\nsize_mm = [2148, 1]\n", ":2: bed.size_mm: 2148 is out of range"},
-      {"[bed]\nsize_mm = [-1, 1]\n", ":2: bed.size_mm: -1 is out of range"},
-      {"[bed]\n\nsise_mm = [1, 1]\n", ":3: bed.sise_mm: no such key; did you mean 'size_mm'?"},
-      {"[layer]\nthickness_mm = 1\n", ":1: layer: no such section; did you mean 'layers'?"},
-      {"bed = 3\n", ":1: bed is a section"},
-      {"[bed]\nsize_mm = {x = 1}\n", ":2: bed.size_mm"},
-      {"[bed]\nsize_mm = 1979-05-27\n", ":2: bed.size_mm"},
-      {"[part]\npath = 'a'\n", ":1: part: write one [[part]] table"},
-      {"[[part]]\ncopies = 2\n", ":1: part.path is missing"},
-      {"[[part]]\npath = 'a'\ncopies = 0\n", ":3: part.copies: 0 is out of range"},
-      {"[[part]]\npath = 'a'\nscale = 0\n", ":3: part.scale: 0 is out of range"},
+      {"[bed]\nsize_mm = [490, nan]\n", ":2:11: bed.size_mm: 'nan'"},
+      {"[layers]\nthickness_mm = inf\n", ":2:16: layers.thickness_mm: 'inf'"},
+      {"[layers]\nthickness_mm = 0\n", ":2:16: layers.thickness_mm: 0 is out of range"},
+      {"[bed]\ndpi = 0\n", ":2:7: bed.dpi: 0 is out of range"},
+      {"[bed]\ndpi = 1e9\n", ":2:7: bed.dpi"},
+      {"[bed]\nsize_mm = [2148, 1]\n", ":2:11: bed.size_mm: 2148 is out of range"},
+      {"[bed]\nsize_mm = [-1, 1]\n", ":2:11: bed.size_mm: -1 is out of range"},
+      {"[bed]\n\nsise_mm = [1, 1]\n", ":3:11: bed.sise_mm: no such key; did you mean 'size_mm'?"},
+      {"[layer]\nthickness_mm = 1\n", ":1:1: layer: no such section; did you mean 'layers'?"},
+      {"bed = 3\n", ":1:7: bed is a section"},
+      {"[bed]\nsize_mm = {x = 1}\n", ":2:11: bed.size_mm"},
+      {"[bed]\nsize_mm = 1979-05-27\n", ":2:11: bed.size_mm"},
+      {"[part]\npath = 'a'\n", ":1:1: part: write one [[part]] table"},
+      {"[[part]]\ncopies = 2\n", ":1:1: part.path is missing"},
+      {"[[part]]\npath = 'a'\ncopies = 0\n", ":3:10: part.copies: 0 is out of range"},
+      {"[[part]]\npath = 'a'\nscale = 0\n", ":3:9: part.scale: 0 is out of range"},
       {"[bed\n", ":1:"},
-      {"[image]\nformat = 'tif'\n", ":2: image.format: 'tif' is none of"},
+      {"[image]\nformat = 'tif'\n", ":2:10: image.format: 'tif' is none of"},
   };
   for (const auto& [text, told] : jobs) {
     test::write_text(directory / "job.toml", text);
@@ -186,6 +205,100 @@ TEST(JobFile, WrongKeysAndValuesNameFileLineAndKey) {
     EXPECT_NE(status.error().message.find("job.toml" + std::string(told)), std::string::npos) << status.error().message;
     EXPECT_EQ(status.error().message.find('\n'), std::string::npos) << text;
   }
+}
+
+TEST(JobFile, ContoursAndMovesAreDecidedByTheirOwnKeys) {
+  Job job;
+  job.slice.format = "cli";
+  job.parts.emplace_back().path = "a.stl";
+  const std::string contours = canonical_job_text(job, Product::kContours), moves = canonical_job_text(job, Product::kMoves);
+  for (const char* line : {"[slice]\nformat = \"cli\"\nfile_a_layer = false\n", "tolerance_um = 0\n", "\n[fill]\n"}) {
+    EXPECT_NE(contours.find(line), std::string::npos) << line << contours;
+  }
+  for (const char* text : {"tiff", "dpi", "[segment]", "[dose]", "mirror"}) {
+    EXPECT_EQ(contours.find(text), std::string::npos) << text;
+    EXPECT_EQ(moves.find(text) == std::string::npos, text != std::string_view("[segment]")) << text;
+  }
+  EXPECT_EQ(moves.find("format"), std::string::npos);
+  Job back;
+  ASSERT_TRUE(read_job_text(contours, "manifest.json", back).ok());
+  EXPECT_EQ(canonical_job_text(back, Product::kContours), contours);
+}
+
+TEST(JobFile, RangesAreTablesAndTheirErrorsNameThePlace) {
+  const Directory directory;
+  const std::string begin = "[[fill.range]]\nfrom_mm = 2.7\nto_mm = 3\n";
+  const auto read = [&](const std::string& text, Job& job) {
+    test::write_text(directory / "job.toml", text);
+    return read_job(directory / "job.toml", job);
+  };
+  Job job;
+  ASSERT_TRUE(read(begin + "gap_mm = 0\nangle_deg = 90\n[[segment.range]]\nfrom_mm = 1\nto_mm = 2\non = true\n"
+                           "[extrude.machine]\nfan.from_layer = 2\n[[part]]\npath = 'a'\nfill = { walls = 2 }\n"
+                           "[[part.material_range]]\nfrom_mm = 1\nto_mm = 2\nmaterial = 'tin'\n",
+                   job)
+                  .ok());
+  ASSERT_EQ(job.fill.ranges.size(), 1u);
+  FillSettings there;
+  apply(job.fill.ranges[0].changes, there);
+  EXPECT_EQ(there.angle_deg, 90);
+  EXPECT_EQ(job.segment.ranges.at(0).changes.values.on, true);
+  EXPECT_EQ(job.parts[0].fill.values.walls, 2u);
+  EXPECT_EQ(job.parts[0].material_ranges.at(0).material, "tin");
+  EXPECT_EQ(job.extrude.machine.at(0).first, "fan.from_layer");
+  EXPECT_TRUE(job.notes.empty());
+  const std::pair<std::string, const char*> wrong[] = {
+      {begin + "gapp_mm = 0\n", ":4:11: fill.range: 2.7:3: gapp_mm: no such key; did you mean 'gap_mm'?"},
+      {begin + "gap_mm = 'x'\n", ":4:10: fill.range: 2.7:3: gap_mm: 'x' is not a finite number"},
+      {begin + "[[fill.range]]\nfrom_mm = 1\nto_mm = 2.8\n", ": fill.range: 1:2.8 overlaps 2.7:3"},
+      {"[[fill.range]]\nfrom_mm = 2\n", ": fill.range: to_mm is missing"},
+      {"[[fill.range]]\nfrom_mm = 2\nto_mm = 1\n", ": fill.range: 2:1 ends at or below its start"},
+      {"[fill]\nrange = 3\n", ":2:9: fill.range: is an array of tables"},
+      {"[fill]\ngap_by_height = [[0, 0.75], [0, 0.1]]\n", ":2:29: fill.gap_by_height: [0, 0.1]: heights have to increase"},
+      {"[[part]]\npath = 'a'\nfill = { gap_mm = 1, distance_mm = 1 }\n", "both say how far lines lie from each other"},
+  };
+  for (const auto& [text, told] : wrong) {
+    Job bad;
+    const Status status = read(text, bad);
+    ASSERT_FALSE(status.ok()) << text;
+    EXPECT_NE(status.error().message.find(told), std::string::npos) << status.error().message;
+  }
+}
+
+TEST(JobFile, StringsOfOldJobsAreReadWithANoteAndSavedAsTables) {
+  const Directory directory;
+  test::write_text(directory / "job.toml",
+                   "[fill]\nby_height = '2.7:3 gap_mm=0 angle_deg=90; 5.7:6 pattern=contour'\n"
+                   "gap_by_height = '0:0.75, 6:0.1'\n[segment]\nby_height = '0:2.7 thin_mm=2'\n"
+                   "[extrude]\nset = 'fan.from_layer=2; bed.corner_mm=-110,-110'\n"
+                   "[[part]]\npath = 'a'\nfill = 'gap_mm=0.1,0.2 walls=2'\nmaterial = 'tin'\n"
+                   "material_by_height = '2:4 bronze; 4:6 steel'\n");
+  Job job;
+  const Status status = read_job(directory / "job.toml", job);
+  ASSERT_TRUE(status.ok()) << status.error().message;
+  EXPECT_EQ(job.notes.size(), 6u);
+  for (const std::string& note : job.notes) EXPECT_NE(note.find("job.toml:"), std::string::npos) << note;
+  ASSERT_EQ(job.fill.ranges.size(), 2u);
+  EXPECT_EQ(job.fill.ranges[1].changes.values.pattern, infill::Pattern::kContour);
+  EXPECT_EQ(job.fill.all.gap_by_height, (std::vector<std::array<double, 2>>{{0, 0.75}, {6, 0.1}}));
+  EXPECT_EQ(job.parts[0].fill.values.gap_mm, (std::vector<double>{0.1, 0.2}));
+  EXPECT_EQ(job.parts[0].material_ranges.at(1).material, "steel");
+  EXPECT_EQ(job.extrude.machine.at(0).second, "-110,-110");
+  ASSERT_TRUE(save_job(directory / "new.toml", job).ok());
+  const std::string saved = test::read_text(directory / "new.toml");
+  for (const char* old : {"by_height = \"", "set = ", "material_by_height", "fill = \"gap"}) {
+    EXPECT_EQ(saved.find(old), std::string::npos) << old;
+  }
+  Job back;
+  ASSERT_TRUE(read_job(directory / "new.toml", back).ok());
+  EXPECT_TRUE(back.notes.empty());
+  EXPECT_EQ(all_of(back), all_of(job));
+  Job set;
+  ASSERT_TRUE(set_key(set, "fill.by_height=2.7:3 gap_mm=0").ok());
+  ASSERT_EQ(set.notes.size(), 1u);
+  EXPECT_TRUE(set.notes[0].starts_with("--set fill.by_height: ")) << set.notes[0];
+  ASSERT_TRUE(set_key(set, "fill.range=[{ from_mm = 1, to_mm = 2, walls = 1 }]").ok());
+  EXPECT_EQ(set.fill.ranges.at(0).to_mm, 2);
 }
 
 TEST(JobFile, SetTakesValuesAsFilesAndOptionsDo) {

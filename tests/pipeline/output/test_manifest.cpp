@@ -20,7 +20,7 @@ ManifestHead head_of(const Job& job, const std::vector<PartSummary>& parts, std:
                      std::uint32_t last) {
   ManifestHead head;
   head.version = version();
-  head.job_toml = canonical_job_text(job);
+  head.job_toml = canonical_job_text(job, Product::kImages);
   head.format = job.format;
   head.extension = ".tif";
   head.fill_rule = "nonzero";

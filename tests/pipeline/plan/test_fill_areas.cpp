@@ -7,11 +7,12 @@
 #include <numbers>
 #include <random>
 
+#include "pipeline/job/file.h"
 #include "stages/geometry/clipping.h"
 #include "stages/write/slice_format.h"
 #include "tests/commands/program.h"
-#include "tests/slice/contour_laws.h"
 #include "tests/pipeline/plan/plan_of.h"
+#include "tests/slice/contour_laws.h"
 
 namespace lamina::test {
 namespace {
@@ -73,11 +74,10 @@ void write_prism(const std::string& path, const std::vector<std::array<double, 2
 
 class FillAreas : public ::testing::Test {
  protected:
-  Result<Plan> plan_of(const std::vector<Placed>& parts, const std::string& by_height = {}) {
+  Result<Plan> plan_of(const std::vector<Placed>& parts, const std::string& ranges = {}) {
     Job job;
     job.layer_mm = 0.5;
     job.fill.all.walls = 1;
-    job.fill.by_height = by_height;
     for (std::size_t i = 0; i < parts.size(); ++i) {
       PartRequest part;
       part.path = directory_ / ("part" + std::to_string(i) + ".stl");
@@ -85,25 +85,28 @@ class FillAreas : public ::testing::Test {
       write_box(part.path, {0, 0, 0}, {static_cast<float>(size[0]), static_cast<float>(size[1]), static_cast<float>(size[2])});
       part.at_mm = {parts[i].at[0], parts[i].at[1]};
       part.bottom_mm = parts[i].at[2];
-      part.fill = parts[i].fill;
       job.parts.push_back(part);
+      const std::string fill = parts[i].fill.empty() ? "{}" : parts[i].fill;
+      EXPECT_TRUE(set_key(job, fmt::format("part.{}.fill={}", i + 1, fill)).ok()) << fill;
     }
+    EXPECT_TRUE(set_key(job, "fill.range=" + (ranges.empty() ? "[]" : ranges)).ok()) << ranges;
     return test::plan_of(job, Product::kContours);
   }
   Directory directory_;
 };
 
 TEST_F(FillAreas, PartsWhoseBoxesTouchKeepTheirOwnFillingAndHeights) {
-  const auto plan = plan_of({{{20, 20, 0}, {20, 20, 4}, "pattern=raster angle_deg=0 width_mm=0.4"},
-                             {{40, 20, 1}, {20, 20, 4}, "pattern=contour width_mm=0.6"}},
-                            "2:3 gap_mm=0.5");
+  const auto plan = plan_of({{{20, 20, 0}, {20, 20, 4}, "{ pattern = 'raster', angle_deg = 0, width_mm = 0.4 }"},
+                             {{40, 20, 1}, {20, 20, 4}, "{ pattern = 'contour', width_mm = 0.6 }"}},
+                            "[{ from_mm = 2, to_mm = 3, gap_mm = 0.5 }]");
   ASSERT_TRUE(plan.ok()) << plan.error().message;
   ASSERT_EQ(plan->sections->areas().size(), 2u);
   for (std::uint32_t layer = 0; layer < plan->sections->layers().size(); ++layer) {
     // Each by the height above its own bottom.
     for (const auto& area : plan->sections->areas()) {
       const double z = mm(plan->sections->layers()[layer].layer.plane() - area.box.lo.z);
-      EXPECT_EQ(plan->sections->filling(area, plan->sections->layers()[layer].layer).gaps[0], z >= 2 && z < 3 ? 500'000 : 0) << layer;
+      EXPECT_EQ(plan->sections->filling(area, plan->sections->layers()[layer].layer).gaps[0], z >= 2 && z < 3 ? 500'000 : 0)
+          << layer;
     }
   }
   Sections::Work work;
@@ -115,9 +118,9 @@ TEST_F(FillAreas, PartsWhoseBoxesTouchKeepTheirOwnFillingAndHeights) {
 }
 
 TEST_F(FillAreas, SharedRoomBelongsToTheFirstPart) {
-  const auto plan = plan_of({{{20, 20, 0}, {20, 20, 4}, "pattern=raster width_mm=0.4 gap_mm=0.3"},
-                             {{30, 25, 0}, {20, 20, 4}, "pattern=contour+raster width_mm=0.5"},
-                             {{25, 35, 0}, {8, 30, 4}, "pattern=honeycomb width_mm=0.3 cell_mm=3"}});
+  const auto plan = plan_of({{{20, 20, 0}, {20, 20, 4}, "{ pattern = 'raster', width_mm = 0.4, gap_mm = 0.3 }"},
+                             {{30, 25, 0}, {20, 20, 4}, "{ pattern = 'contour+raster', width_mm = 0.5 }"},
+                             {{25, 35, 0}, {8, 30, 4}, "{ pattern = 'honeycomb', width_mm = 0.3, cell_mm = 3 }"}});
   ASSERT_TRUE(plan.ok()) << plan.error().message;
   Sections::Work work;
   ASSERT_TRUE(plan->sections->layer(3, work).ok());
@@ -157,10 +160,10 @@ std::array<double, 2> charged_and_needed(const Sections& plan) {
 }
 
 TEST_F(FillAreas, FineFillingsAreChargedWithAFewTimesWhatTheyNeed) {
-  for (const auto& [fill, times] : {std::pair{"pattern=raster width_mm=0.01", 3},
-                                    {"pattern=honeycomb width_mm=0.05 cell_mm=0.3", 3},
-                                    {"pattern=quatrefoil width_mm=0.05 gap_mm=0.05 cell_mm=0.3", 3},
-                                    {"pattern=contour width_mm=0.01", 6}}) {
+  for (const auto& [fill, times] : {std::pair{"{ pattern = 'raster', width_mm = 0.01 }", 3},
+                                    {"{ pattern = 'honeycomb', width_mm = 0.05, cell_mm = 0.3 }", 3},
+                                    {"{ pattern = 'quatrefoil', width_mm = 0.05, gap_mm = 0.05, cell_mm = 0.3 }", 3},
+                                    {"{ pattern = 'contour', width_mm = 0.01 }", 6}}) {
     const auto plan = plan_of({{{20, 20, 0}, {40, 40, 4}, fill}});
     ASSERT_TRUE(plan.ok()) << plan.error().message;
     const auto [charged, needed] = charged_and_needed(*plan->sections);
@@ -190,21 +193,23 @@ TEST_F(FillAreas, RandomOutlinesAndPatternsNeedNoMoreThanTheyAreChargedWith) {
     job.layer_mm = 0.5;
     job.parts.emplace_back();
     job.parts.back().path = path;
-    job.parts.back().fill =
-        fmt::format("pattern={} width_mm={:.3f} gap_mm={:.3f} cell_mm={:.3f} angle_deg={:.1f} walls={} loops={}",
-                    patterns[turn % 5], between(0.05, 0.3), between(0.02, 0.3), between(0.3, 2), between(0, 180),
-                    turn % 4 == 0 ? 1 : 0, static_cast<int>(between(1, 40)));
+    const std::string fill = fmt::format(
+        "{{ pattern = '{}', width_mm = {:.3f}, gap_mm = {:.3f}, cell_mm = {:.3f}, angle_deg = {:.1f}, walls = {}, loops = {} }}",
+        patterns[turn % 5], between(0.05, 0.3), between(0.02, 0.3), between(0.3, 2), between(0, 180), turn % 4 == 0 ? 1 : 0,
+        static_cast<int>(between(1, 40)));
+    ASSERT_TRUE(set_key(job, "part.fill=" + fill).ok()) << fill;
     const auto plan = test::plan_of(job, Product::kContours);
     ASSERT_TRUE(plan.ok()) << plan.error().message;
-    SCOPED_TRACE(job.parts.back().fill);
+    SCOPED_TRACE(fill);
     charged_and_needed(*plan->sections);
   }
 }
 
 TEST_F(FillAreas, WhatFollowsTheCountOfPointsIsWithinIt) {
-  const auto plan = plan_of({{{20, 20, 0}, {20, 20, 4}, "pattern=raster width_mm=0.02"},
-                             {{40, 20, 0}, {20, 20, 4}, "pattern=quatrefoil width_mm=0.1 gap_mm=0.1 cell_mm=0.3"},
-                             {{70, 20, 0}, {20, 20, 4}, "pattern=contour width_mm=0.02"}});
+  const auto plan =
+      plan_of({{{20, 20, 0}, {20, 20, 4}, "{ pattern = 'raster', width_mm = 0.02 }"},
+               {{40, 20, 0}, {20, 20, 4}, "{ pattern = 'quatrefoil', width_mm = 0.1, gap_mm = 0.1, cell_mm = 0.3 }"},
+               {{70, 20, 0}, {20, 20, 4}, "{ pattern = 'contour', width_mm = 0.02 }"}});
   ASSERT_TRUE(plan.ok()) << plan.error().message;
   Sections::Work work;
   ASSERT_TRUE(plan->sections->contours(2, work).ok());

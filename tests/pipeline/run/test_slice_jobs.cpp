@@ -8,6 +8,7 @@
 #include <tuple>
 
 #include "pipeline/plan/fill.h"
+#include "pipeline/text/toml.h"
 #include "tests/commands/program.h"
 
 namespace lamina::test {
@@ -164,13 +165,16 @@ TEST(SliceProgram, WrongFillingsAreOneClearLineAndLeaveNothing) {
       {{"--pattern", "raster", "--set", "fill.by_height=5:4 gap_mm=0"}, "5:4"},
       {{"--pattern", "raster", "--set", "fill.by_height=1:2 gapp_mm=0"}, "did you mean 'gap_mm'"},
       {{"--pattern", "raster", "--set", "fill.gap_by_height=3:0.1, 2:0.2"}, "heights have to increase"},
+      {{"--pattern", "raster", "--set", "fill.range=[{from_mm=0, to_mm=5}, {from_mm=4, to_mm=6}]"}, "4:6 overlaps 0:5"},
+      {{"--pattern", "raster", "--set", "fill.range=[{from_mm=1, to_mm=2, gapp_mm=0}]"}, "did you mean 'gap_mm'"},
+      {{"--pattern", "raster", "--set", "part.fill={angle_deg='x'}"}, "angle_deg: 'x'"},
       {{"--pattern", "raster", "--bead-gap", "0.2", "--line-distance", "0.5"},
        "fill.distance_mm (--line-distance) and fill.gap_mm (--bead-gap) both"},
       {{"--pattern", "raster", "--bead-gap", "0.2", "--gap-formula", "z"}, "fill.gap_formula (--gap-formula) and fill.gap_mm"},
       {{"--pattern", "raster", "--line-distance", "0.5", "--set", "fill.gap_by_height=0:0.1"}, "and fill.gap_by_height both"},
       {{"--pattern", "raster", "--line-distance", "0.5", "--set", "fill.group=2"}, "groups are of beads with gaps"},
       {{"--pattern", "raster", "--set", "fill.by_height=1:2 gap_mm=0 distance_mm=1"}, "1:2: gap_mm and distance_mm both"},
-      {{"--pattern", "raster", "--set", "part.fill=gap_formula=z gap_mm=0.1"}, "gap_formula and gap_mm both"},
+      {{"--pattern", "raster", "--set", "part.fill=gap_formula=z gap_mm=0.1"}, "gap_mm and gap_formula both"},
       {{"--pattern", "raster", "--shard", "1/2"}, "--shard: shards are of images"},
       {{"--pattern", "raster", "--set", "run.shard=1/2"}, "run.shard: shards are of images"},
       {{"--pattern", "raster", "--set", "part.fill=angle_deg=x"}, "angle_deg: 'x'"},
@@ -396,13 +400,21 @@ TEST(SliceProgram, PreviewsOfSeveralLayersAreASheetAndWhatIsForImagesIsOneLine) 
   }
 }
 
+pipeline::FillChanges changes_of(std::string_view table) {
+  pipeline::FillChanges changes;
+  pipeline::Place at;
+  EXPECT_EQ(pipeline::read_fill_changes(*pipeline::read_toml_value(table), changes, at), "");
+  return changes;
+}
+
 /// Nine porous layers, then a dense one at 90 degrees, three times: the tomography cylinder of Di Nisio 2022, 3.3.1.
 TEST(FillPlan, HeightsAndPartsChangeTheFilling) {
   using namespace pipeline;
   FillRequest request;
-  ASSERT_EQ(read_fill_changes("pattern=raster gap_mm=0.12 angle_deg=0 angle_step_deg=0", request.all), "");
-  request.by_height = "2.7:3 gap_mm=0 angle_deg=90; 5.7:6 gap_mm=0 angle_deg=90";
-  const auto plan = plan_filling(request, "walls=2");
+  apply(changes_of("{ pattern = 'raster', gap_mm = 0.12, angle_deg = 0, angle_step_deg = 0 }"), request.all);
+  const FillChanges dense_there = changes_of("{ gap_mm = 0, angle_deg = 90 }");
+  request.ranges = {{2.7, 3, dense_there}, {5.7, 6, dense_there}};
+  const auto plan = plan_filling(request, changes_of("{ walls = 2 }"));
   ASSERT_TRUE(plan.ok()) << plan.error().message;
   for (int layer = 0; layer < 29; ++layer) {
     const auto& at = plan->at(layer * 300'000 + 150'000);
@@ -417,9 +429,12 @@ TEST(FillPlan, HeightsAndPartsChangeTheFilling) {
 TEST(FillPlan, TheOneWayToGiveDistancesTakesThePlaceOfTheOneThatHeld) {
   using namespace pipeline;
   FillRequest request;
-  ASSERT_EQ(read_fill_changes("pattern=raster distance_mm=0.5,0.7", request.all), "");
-  request.by_height = "1:2 gap_mm=0.1; 2:3 gap_formula=0.2*z; 3:4 gap_by_height=0:0.3; 4:5 angle_deg=0";
-  const auto plan = plan_filling(request, "");
+  apply(changes_of("{ pattern = 'raster', distance_mm = [0.5, 0.7] }"), request.all);
+  request.ranges = {{1, 2, changes_of("{ gap_mm = 0.1 }")},
+                    {2, 3, changes_of("{ gap_formula = '0.2*z' }")},
+                    {3, 4, changes_of("{ gap_by_height = [[0, 0.3]] }")},
+                    {4, 5, changes_of("{ angle_deg = 0 }")}};
+  const auto plan = plan_filling(request, {});
   ASSERT_TRUE(plan.ok()) << plan.error().message;
   EXPECT_EQ(plan->at(500'000).distances, (std::vector<Nm>{500'000, 700'000}));
   EXPECT_EQ(plan->at(4'500'000).distances, (std::vector<Nm>{500'000, 700'000}));
@@ -427,7 +442,7 @@ TEST(FillPlan, TheOneWayToGiveDistancesTakesThePlaceOfTheOneThatHeld) {
   EXPECT_EQ(plan->at(1'500'000).gaps, std::vector<Nm>{100'000});
   EXPECT_EQ(plan->at(2'500'000).gap_expression, "0.2*z");
   EXPECT_EQ(plan->at(3'500'000).gap_table.size(), 1u);
-  const auto own = plan_filling(request, "gap_formula=0.1");
+  const auto own = plan_filling(request, changes_of("{ gap_formula = '0.1' }"));
   ASSERT_TRUE(own.ok()) << own.error().message;
   EXPECT_TRUE(own->at(500'000).distances.empty());
   EXPECT_EQ(own->at(500'000).gap_expression, "0.1");

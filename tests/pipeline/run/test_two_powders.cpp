@@ -16,6 +16,7 @@
 #include "pipeline/output/manifest.h"
 #include "pipeline/output/merge.h"
 #include "pipeline/run/run.h"
+#include "pipeline/text/toml.h"
 #include "stages/raster/materials.h"
 #include "stages/read/image.h"
 
@@ -198,12 +199,12 @@ TEST_F(TwoPowders, EveryDialectSaysWhichVatFeeds) {
 
 TEST_F(TwoPowders, APartCanChangeItsPowderWithTheHeight) {
   PartRequest nut = part("dental_crown.stl", 3, "steel");
-  nut.material_by_height = "6:12 bronze; 9:10.5 steel";
+  nut.material_ranges = {{6, 12, "bronze"}, {9, 10.5, "steel"}};
   Job made = job({nut}, "graded");
   const auto summary = run(made);
   ASSERT_TRUE(summary.ok()) << summary.error().message;
   expect_good(made);
-  nut.material_by_height.clear();
+  nut.material_ranges.clear();
   nut.material.clear();
   Job plain = job({nut}, "plain");
   ASSERT_TRUE(run(plain).ok());
@@ -280,11 +281,16 @@ TEST_F(TwoPowders, WhatTheVatsDoNotHoldIsRefusedInOneLine) {
   refused({"a", "b"}, "hp45", "the parts are of 2 materials (a, b), hp45 has one vat");
   refused({"a", ""}, "nuferbj", "has none; name that of every part, or of none");
   refused({"a"}, profile("materials = [\"bronze\"]"), "powder.materials: 1 names for 2 vats");
-  std::string name;
-  EXPECT_NE(read_material("a/b", name).find("is no name of a material"), std::string::npos);
-  std::vector<MaterialRange> ranges;
-  EXPECT_NE(read_material_ranges("4:2 bronze", ranges).find("ends where it begins"), std::string::npos);
-  EXPECT_NE(read_material_ranges("2 bronze", ranges).find("is no range"), std::string::npos);
+  EXPECT_NE(check_material("a/b").find("is no name of a material"), std::string::npos);
+  const auto wrong_ranges = [](const char* text) {
+    std::vector<MaterialRange> ranges;
+    Place at;
+    return read_material_ranges(*read_toml_value(text), ranges, at);
+  };
+  EXPECT_NE(wrong_ranges("[{ from_mm = 4, to_mm = 2, material = 'bronze' }]").find("ends at or below its start"),
+            std::string::npos);
+  EXPECT_NE(wrong_ranges("[{ from_mm = 2, material = 'bronze' }]").find("to_mm is missing"), std::string::npos);
+  EXPECT_NE(wrong_ranges("[{ from_mm = 2, to_mm = 4 }]").find("material is missing"), std::string::npos);
 }
 
 }  // namespace

@@ -4,6 +4,7 @@
 
 #include "pipeline/text/names.h"
 #include "pipeline/text/number_text.h"
+#include "pipeline/text/value.h"
 
 namespace lamina::pipeline {
 namespace {
@@ -51,18 +52,19 @@ TEST(NumberText, WholeNumbersMayBeWrittenAsDecimalsButHaveNoFraction) {
 
 TEST(NumberText, PairsTakeAnXOrACommaAndTriplesMayBeOneNumber) {
   std::array<double, 2> pair{};
-  EXPECT_EQ(read_pair("490x380", 0, 1000, "", pair), "");
+  const Limits limits{0, 1000};
+  EXPECT_EQ(read_value("490x380", limits, pair), "");
   EXPECT_EQ(pair, (std::array<double, 2>{490, 380}));
-  EXPECT_EQ(read_pair("1,2.5", 0, 1000, "", pair), "");
+  EXPECT_EQ(read_value("1,2.5", limits, pair), "");
   EXPECT_EQ(pair, (std::array<double, 2>{1, 2.5}));
   for (const char* text : {"490", "1x2x3", "x", "1x", "x1", "1xnan", ""}) {
-    EXPECT_NE(read_pair(text, 0, 1000, "", pair), "") << text;
+    EXPECT_NE(read_value(text, limits, pair), "") << text;
   }
   std::array<double, 3> triple{};
-  EXPECT_EQ(read_triple("2", 0, 9, "", true, triple), "");
+  EXPECT_EQ(read_value("2", {0, 9, "", true}, triple), "");
   EXPECT_EQ(triple, (std::array<double, 3>{2, 2, 2}));
-  EXPECT_NE(read_triple("2", 0, 9, "", false, triple), "");
-  EXPECT_NE(read_triple("1,2", 0, 9, "", true, triple), "");
+  EXPECT_NE(read_value("2", {0, 9, "", false}, triple), "");
+  EXPECT_NE(read_value("1,2", {0, 9, "", true}, triple), "");
 }
 
 TEST(NumberText, BytesTakeBinarySuffixes) {
