@@ -59,8 +59,9 @@ TEST_F(Outputs, WhatACallReadsIsNeverReplaced) {
   done("jet part.stl --layer 1 --dpi 60 --format png -o out --quiet");
   fs::copy(directory_ / "part.stl", directory_ / "out/layers/part.stl");
   done("slice --job job.toml -o cut --quiet");
-  done("extrude part.stl --machine anet-a8 --layer 1 -o part.gcode --quiet");
-  fs::copy(fs::path(LAMINA_TEST_DIR) / "corpus/arrow_scaled_mirrored.3mf", directory_ / "arrow.3mf");
+  done("extrude part.stl --machine anet-a8 --layer 0.3 -o part.gcode --quiet");
+  fs::create_directory(directory_ / "own");
+  fs::copy(fs::path(LAMINA_TEST_DIR) / "corpus/arrow_scaled_mirrored.3mf", directory_ / "own/arrow.3mf");
   fs::create_directory(directory_ / "farm");
   fs::copy(directory_ / "list.txt", directory_ / "farm/summary.tsv");
 
@@ -79,7 +80,7 @@ TEST_F(Outputs, WhatACallReadsIsNeverReplaced) {
       {"slice part.stl -o part.stl", "part.stl"},
       {"slice part.stl --dry-run --save-job hard.stl --overwrite", "hard.stl"},
       {"slice --job cut/job.toml -o cut --overwrite", "cut/job.toml"},
-      {"slice arrow.3mf --layer 1 --format 3mf -o . --overwrite", "arrow.3mf"},
+      {"slice own/arrow.3mf --layer 1 --format 3mf -o own --overwrite", "own/arrow.3mf"},
       {"extrude part.stl --layer 1 -o part.stl", "part.stl"},
       {"extrude part.stl --layer 1 -o link.stl", "part.stl"},
       {"extrude part.stl --layer 1 -o hard.stl", "part.stl"},
@@ -120,7 +121,7 @@ TEST_F(Outputs, WhatACallReadsIsNeverReplaced) {
 
 TEST_F(Outputs, WhatLaminaDidNotWriteIsReplacedOnlyWithOverwrite) {
   done("jet part.stl --layer 1 --dpi 60 -o out --quiet");
-  done("extrude part.stl --machine anet-a8 --layer 1 -o part.gcode --quiet");
+  done("extrude part.stl --machine anet-a8 --layer 0.3 -o part.gcode --quiet");
   const std::string words = "is there already, and is no such file of lamina; name another one, or replace it with --overwrite";
   const struct {
     const char *call, *output;
@@ -153,7 +154,7 @@ TEST_F(Outputs, WhatLaminaDidNotWriteIsReplacedOnlyWithOverwrite) {
 
 TEST_F(Outputs, WhatLaminaWroteIsWrittenAgain) {
   done("jet part.stl --layer 1 --dpi 60 -o out --quiet");
-  done("extrude part.stl --machine anet-a8 --layer 1 -o part.gcode --quiet");
+  done("extrude part.stl --machine anet-a8 --layer 0.3 -o part.gcode --quiet");
   for (const std::string line :
        {"heights part.stl --layer 1 --quiet -o table", "heights part.stl --layer 1 --format csv --quiet -o csv",
         "heights part.stl --layer 1 --format json --quiet -o json", "heights part.stl --layer 1 --format rp3 --quiet -o rp3",
