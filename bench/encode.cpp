@@ -51,7 +51,7 @@ void encode(benchmark::State& state, const write::ImageFormat& format, const std
   state.counters["file_bytes"] = static_cast<double>(file.size());
 }
 
-[[maybe_unused]] const bool registered = [] {
+[[maybe_unused]] const bool encode_registered = [] {
   for (const NamedPart& part : named_parts()) {
     const std::string path = model_path(part);
     if (path.empty()) continue;

@@ -87,7 +87,7 @@ BENCHMARK(plan_tall)
     ->Unit(benchmark::kMillisecond)
     ->Complexity();
 
-[[maybe_unused]] const bool registered = [] {
+[[maybe_unused]] const bool heights_registered = [] {
   using heights::Mode;
   for (const NamedPart& part : named_parts()) {
     const std::string path = model_path(part);

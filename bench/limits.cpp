@@ -51,7 +51,7 @@ void touch_crossings(benchmark::State& state, const Job& job, const std::string&
   state.counters["layers"] = table.size();
 }
 
-[[maybe_unused]] const bool registered = [] {
+[[maybe_unused]] const bool limits_registered = [] {
   const char* folder = std::getenv("LAMINA_BENCH_PARTS");
   for (const Job& job : kJobs) {
     const std::string path = folder == nullptr ? std::string() : std::string(folder) + "/" + job.file;

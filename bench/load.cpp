@@ -75,7 +75,7 @@ void census_of_part(benchmark::State& state, const NamedPart& named, const std::
   (void)named;
 }
 
-[[maybe_unused]] const bool registered = [] {
+[[maybe_unused]] const bool load_registered = [] {
   for (const NamedPart& part : named_parts()) {
     const std::string path = model_path(part);
     if (path.empty()) continue;

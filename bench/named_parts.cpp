@@ -10,7 +10,7 @@
 namespace lamina::bench {
 namespace {
 
-constexpr std::array kParts{
+constexpr std::array kNamedParts{
     NamedPart{"nut", "parameter_quality_nut.stl", 414},
     NamedPart{"nist", "nist_am_test_artifact_v3b.stl", 7392},
     NamedPart{"herringbone", "herringbone_wheels_x4.stl", 71974},
@@ -23,7 +23,7 @@ constexpr std::array kParts{
 
 }  // namespace
 
-std::span<const NamedPart> named_parts() { return kParts; }
+std::span<const NamedPart> named_parts() { return kNamedParts; }
 
 std::string model_path(const NamedPart& part) {
   const char* models = std::getenv("LAMINA_MODELS");

@@ -6,7 +6,7 @@
 namespace lamina::bench {
 namespace {
 
-constexpr std::int64_t kDpi = 1200;
+constexpr std::int64_t kRasterDpi = 1200;
 constexpr int kPlanes = 32;
 
 struct Setup {
@@ -16,7 +16,7 @@ struct Setup {
 
   bool load(benchmark::State& state, const std::string& path) {
     if (!load_on_bed(state, path, kNmPerMm, kNmPerMm, part)) return false;
-    grid = snug_grid(part, kDpi);
+    grid = snug_grid(part, kRasterDpi);
     for (int i = 0; i < kPlanes; ++i) planes.push_back(static_cast<Nm>(part.bounds.height() * (2 * i + 1) / (2 * kPlanes)));
     return true;
   }
@@ -77,7 +77,7 @@ void index(benchmark::State& state, raster::Engine engine, const std::string& pa
   }
 }
 
-[[maybe_unused]] const bool registered = [] {
+[[maybe_unused]] const bool raster_registered = [] {
   for (const NamedPart& part : named_parts()) {
     const std::string path = model_path(part);
     if (path.empty()) continue;

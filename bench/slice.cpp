@@ -97,7 +97,7 @@ void slice_part(benchmark::State& state, Until until, const std::string& path) {
   state.counters["segments"] = static_cast<double>(stack.cuts);
 }
 
-[[maybe_unused]] const bool registered = [] {
+[[maybe_unused]] const bool slice_registered = [] {
   for (const NamedPart& part : named_parts()) {
     const std::string path = model_path(part), name = part.name;
     if (path.empty()) continue;

@@ -65,8 +65,10 @@ target_link_libraries(lamina_pipeline PUBLIC lamina::stages PRIVATE nlohmann_jso
 
 # ccache keeps nothing that was made from precompiled headers, and does better without them.
 if(LAMINA_PRECOMPILE AND NOT CMAKE_CXX_COMPILER_LAUNCHER MATCHES "ccache")
+  target_precompile_headers(lamina_stages PRIVATE cmake/precompiled.h)
+  target_precompile_headers(lamina_once_a_job REUSE_FROM lamina_stages)
+  target_precompile_headers(lamina_pipeline REUSE_FROM lamina_stages)
   foreach(library lamina_stages lamina_once_a_job lamina_pipeline)
-    target_precompile_headers(${library} PRIVATE cmake/precompiled.h)
     # g++ 12 forgets that precompiled headers are the system's, and has these wrong for std::string.
     target_compile_options(${library} PRIVATE -Wno-array-bounds -Wno-stringop-overflow -Wno-stringop-overread)
   endforeach()
@@ -99,5 +101,6 @@ if(LAMINA_BENCH)
     # Benchmarks check their answers against the same slow reference as the tests.
     add_executable(lamina_bench ${bench_sources} tests/raster/reference.cpp)
     target_link_libraries(lamina_bench PRIVATE lamina::pipeline benchmark::benchmark)
+    set_target_properties(lamina_bench PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE 0)
   endif()
 endif()
