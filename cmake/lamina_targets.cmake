@@ -62,6 +62,10 @@ foreach(library lamina_pipeline lamina_once_a_job)
   target_compile_definitions(${library} PRIVATE LAMINA_VERSION="${PROJECT_VERSION}")
 endforeach()
 target_link_libraries(lamina_pipeline PUBLIC lamina::stages PRIVATE nlohmann_json::nlohmann_json)
+if(LAMINA_UNITE STREQUAL "all")
+  list(FILTER pipeline_sources EXCLUDE REGEX "/plan/(plan|segment)\\.cpp$")
+  lamina_unite(lamina_pipeline ${pipeline_sources})
+endif()
 
 # ccache keeps nothing that was made from precompiled headers, and does better without them.
 if(LAMINA_PRECOMPILE AND NOT CMAKE_CXX_COMPILER_LAUNCHER MATCHES "ccache")
