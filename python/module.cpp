@@ -181,7 +181,7 @@ py::object run_job(const Job& job, pipeline::Product product) {
 
 template <pipeline::Product product>
 py::object plan_into(const std::string& output, const py::object& parts, const py::dict& settings, const std::string& file,
-               bool resume, bool overwrite, const py::object& materials) {
+                     bool resume, bool overwrite, const py::object& materials) {
   if (output.empty()) raise({Fault::kUsage, "output is empty; name a directory or file"});
   Job job = make_job(parts, settings, materials, file, output);
   job.resume = resume;
@@ -194,7 +194,8 @@ void append_keys(std::span<const pipeline::Key<Target>> keys, const Target& pres
   for (const auto& key : keys) {
     list.append(py::dict("key"_a = fmt::format("{}.{}", key.section, key.name), "flag"_a = std::string(key.flag),
                          "value"_a = std::string(key.value), "default"_a = key.write(presets),
-                         "meaning"_a = std::string(key.meaning), "decides_bytes"_a = (key.decides & pipeline::decides::images) != 0));
+                         "meaning"_a = std::string(key.meaning),
+                         "decides_bytes"_a = (key.decides & pipeline::decides::images) != 0));
   }
 }
 
@@ -295,13 +296,11 @@ void define_plan(py::module_& module) {
       .def_property_readonly("columns", [](const Plan& plan) { return plan.grid().columns(); })
       .def_property_readonly("rows", [](const Plan& plan) { return plan.grid().rows(); })
       .def_property_readonly(
-          "dpi", [](const Plan& plan) { return py::make_tuple(plan.grid().x.dpi(), plan.grid().y.dpi()); },
-          "Along x and y.")
+          "dpi", [](const Plan& plan) { return py::make_tuple(plan.grid().x.dpi(), plan.grid().y.dpi()); }, "Along x and y.")
       .def_property_readonly(
           "bed_mm", [](const Plan& plan) { return plan.of().job.bed_mm; }, "Width (x) and depth (y).")
       .def_property_readonly(
-          "job", [](const Plan& plan) { return pipeline::job_text(plan.of().job, ""); },
-          "The job as a TOML file would say it.")
+          "job", [](const Plan& plan) { return pipeline::job_text(plan.of().job, ""); }, "The job as a TOML file would say it.")
       .def_property_readonly(
           "parts",
           [](const Plan& plan) {
@@ -362,9 +361,10 @@ PYBIND11_MODULE(lamina, module) {
     module.def(name, function, "output"_a, "parts"_a = py::none(), "settings"_a = py::dict(), "job"_a = "", "resume"_a = false,
                "overwrite"_a = false, "materials"_a = py::none(), meaning);
   };
-  def_product("jet", &plan_into<pipeline::Product::kImages>,
-              "Plans all layers into a directory, as lamina jet does, on all processors; returns its summary. Ctrl-C stops it, and "
-              "resume=True goes on.");
+  def_product(
+      "jet", &plan_into<pipeline::Product::kImages>,
+      "Plans all layers into a directory, as lamina jet does, on all processors; returns its summary. Ctrl-C stops it, and "
+      "resume=True goes on.");
   def_product("slice", &plan_into<pipeline::Product::kContours>,
               "Contours and fillings of all layers into a directory, as lamina slice does; returns its summary.");
   def_product("extrude", &plan_into<pipeline::Product::kMoves>,

@@ -256,10 +256,11 @@ Result<VerifyReport> verify_file(const std::string& path) {
   std::error_code error;
   if (!fs::is_regular_file(manifest_path, error)) {
     const bool begun = fs::is_regular_file(manifest_path + ".part", error);
-    return Error{Fault::kVerification,
-                 fmt::format("{}: {}", path,
-                             begun ? "job was interrupted; run again with --resume"
-                                   : fmt::format("has no manifest beside it ({}); it is no file of lamina extrude", manifest_path))};
+    return Error{
+        Fault::kVerification,
+        fmt::format("{}: {}", path,
+                    begun ? "job was interrupted; run again with --resume"
+                          : fmt::format("has no manifest beside it ({}); it is no file of lamina extrude", manifest_path))};
   }
   const auto manifest = read_manifest(manifest_path);
   if (!manifest) return manifest.error();

@@ -20,7 +20,7 @@ struct VerifyReport {
   std::uint64_t bytes = 0;            // of their files, as recorded
   std::string machine;                // whose programs were replayed; empty if there are none
   std::uint64_t replayed = 0;         // layers
-  replay::Count replay;                 // of all of them
+  replay::Count replay;               // of all of them
   std::uint64_t moved = 0, lost = 0;  // pixels of blocked nozzles
   double binder_mm3 = 0;              // drops x their volume
   double powder_mm3 = 0;              // height fed x area of the bed

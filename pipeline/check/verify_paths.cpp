@@ -108,7 +108,8 @@ class PathVerifier {
     }
     std::uint64_t found = 0;
     std::error_code error;
-    for (fs::directory_iterator entry(directory_ / "layers", error), end; !error && entry != end; entry.increment(error)) ++found;
+    for (fs::directory_iterator entry(directory_ / "layers", error), end; !error && entry != end; entry.increment(error))
+      ++found;
     if (found <= manifest_.layers.size()) return;
     fault(fmt::format("layers: holds {} files that the manifest does not name", found - manifest_.layers.size()));
   }

@@ -56,7 +56,7 @@ struct FlowLimits {
 
 struct FlowReport {
   std::uint32_t most_in_flight = 0;
-  std::uint64_t most_bytes = 0;                                    // of credits given out at once, idle scratch included
+  std::uint64_t most_bytes = 0;                                   // of credits given out at once, idle scratch included
   std::vector<std::pair<std::string_view, double>> step_seconds;  // of each step and of "record", over all threads
 };
 

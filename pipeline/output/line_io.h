@@ -12,8 +12,8 @@
 #include <string>
 #include <string_view>
 
-#include "stages/data/hash.h"
 #include "pipeline/text/json_text.h"
+#include "stages/data/hash.h"
 #include "stages/data/layer.h"
 
 namespace lamina::pipeline {

@@ -21,8 +21,8 @@
 #include "pipeline/machine/materials.h"
 #include "pipeline/output/record.h"
 #include "pipeline/plan/scene.h"
-#include "stages/data/hash.h"
 #include "stages/data/grid.h"
+#include "stages/data/hash.h"
 #include "stages/data/status.h"
 
 namespace lamina::pipeline {
@@ -33,12 +33,12 @@ inline constexpr int kManifestVersion = 2;
 /// The head of the manifest: the job as resolved and all that decides bytes.
 struct ManifestHead {
   Product product = Product::kImages;
-  std::string version;            // of lamina
-  std::string job_toml;           // the resolved job, only keys that decide bytes of this product
-  std::string format;             // of the files: an image format, svg, cli, ..., gcode, sml
-  std::string extension;          // of a layer's file, with the dot; empty if no layer has a file of its own
-  std::string file;               // the one file of all layers, beside the manifest; empty if there is none
-  std::uint32_t layer_count = 0;  // of the whole job
+  std::string version;                            // of lamina
+  std::string job_toml;                           // the resolved job, only keys that decide bytes of this product
+  std::string format;                             // of the files: an image format, svg, cli, ..., gcode, sml
+  std::string extension;                          // of a layer's file, with the dot; empty if no layer has a file of its own
+  std::string file;                               // the one file of all layers, beside the manifest; empty if there is none
+  std::uint32_t layer_count = 0;                  // of the whole job
   std::uint32_t first_layer = 0, last_layer = 0;  // the range [first, last) that this manifest covers
   std::vector<PartSummary> parts;
   std::string machine;  // empty without one

@@ -172,8 +172,9 @@ Result<ManifestHead> read_head(const std::string& text) {
   if (!json.is_object()) return wrong("is no manifest of lamina");
   if (!json.contains("manifest") || json["manifest"] != kManifestVersion) {
     if (!json.contains("lamina")) return wrong("is no manifest of lamina");
-    return wrong(fmt::format("is of another version of lamina, whose manifests differ from those of this one; read it with that "
-                             "version, or plan the job again with --overwrite"));
+    return wrong(
+        fmt::format("is of another version of lamina, whose manifests differ from those of this one; read it with that "
+                    "version, or plan the job again with --overwrite"));
   }
   ManifestHead head;
   try {

@@ -53,11 +53,10 @@ Status check_slice_output(const Job& job) {
   const std::vector<ManifestFile> manifests = find_manifests(job.output);
   const bool replaces = job.overwrite || job.resume;
   if (!replaces && !manifests.empty()) {
-    return Error{Fault::kUsage,
-                 fmt::format("{}: holds {}; {}, or name another directory", job.output,
-                             manifests.front().partial ? "an interrupted job" : "a job",
-                             manifests.front().partial ? "go on with --resume, start over with --overwrite"
-                                                       : "replace it with --overwrite")};
+    return Error{Fault::kUsage, fmt::format("{}: holds {}; {}, or name another directory", job.output,
+                                            manifests.front().partial ? "an interrupted job" : "a job",
+                                            manifests.front().partial ? "go on with --resume, start over with --overwrite"
+                                                                      : "replace it with --overwrite")};
   }
   for (const std::string& name : {std::string("job.toml"), slice_file_name(job)}) {
     const fs::path file = fs::path(job.output) / name;

@@ -53,10 +53,10 @@ class SliceFiles {
   const Plan& plan_;
   const bool file_a_layer_;
   write::SliceHead head_;
-  std::unique_ptr<write::SliceEncoder> encoder_;    // of text formats
-  std::optional<write::Slice3mfWriter> package_;    // 3MF
-  std::optional<LayeredFile> file_;                 // of one text file
-  std::optional<ManifestWriter> manifest_;          // of all others
+  std::unique_ptr<write::SliceEncoder> encoder_;  // of text formats
+  std::optional<write::Slice3mfWriter> package_;  // 3MF
+  std::optional<LayeredFile> file_;               // of one text file
+  std::optional<ManifestWriter> manifest_;        // of all others
   std::uint64_t bytes_ = 0;
   bool finished_ = false;
 };

@@ -94,11 +94,12 @@ Status check_toolpath_output(const Job& job, const Extruder& machine) {
                  fmt::format("{}: is there already; replace it with --overwrite, or name another file with -o", name)};
   }
   if (!fs::exists(manifest_path(job) + ".part", error)) return {};
-  return Error{Fault::kUsage, fmt::format("{}.part: an interrupted job; go on with --resume, or start over with --overwrite",
-                                          job.output)};
+  return Error{Fault::kUsage,
+               fmt::format("{}.part: an interrupted job; go on with --resume, or start over with --overwrite", job.output)};
 }
 
-ToolpathFile::ToolpathFile(const Plan& plan) : plan_(plan), format_(write::make_extrusion_format(plan.moves->profile.machine)) {}
+ToolpathFile::ToolpathFile(const Plan& plan)
+    : plan_(plan), format_(write::make_extrusion_format(plan.moves->profile.machine)) {}
 
 Status ToolpathFile::open() {
   const Job& job = plan_.job;

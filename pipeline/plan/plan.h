@@ -51,9 +51,9 @@ struct Plan {
   Job job;  // resolved: bed and dpi are those of its machine
   Product product = Product::kImages;
   std::unique_ptr<Scene> scene;
-  heights::Plan heights;                 // the one table of all parts; empty where each has layers of its own
-  std::uint32_t layer_count = 0;         // of the whole job
-  std::array<std::uint32_t, 2> range{};  // [first, last) that this job makes
+  heights::Plan heights;                  // the one table of all parts; empty where each has layers of its own
+  std::uint32_t layer_count = 0;          // of the whole job
+  std::array<std::uint32_t, 2> range{};   // [first, last) that this job makes
   std::unique_ptr<Sections> sections;     // null for images of solid parts
   std::unique_ptr<SegmentPlan> segments;  // null for contours, and for images of solid parts
   std::optional<ImagePlan> images;

@@ -39,8 +39,7 @@ class ContourMaker : public Maker {
                made_[ticket.record].layer = plan_.layer(layer);
                return sections.contours(layer, work_[ticket.work]);
              }},
-            {"fill",
-             [&](std::uint32_t layer, const Ticket& ticket) { return sections.fill(layer, work_[ticket.work]); },
+            {"fill", [&](std::uint32_t layer, const Ticket& ticket) { return sections.fill(layer, work_[ticket.work]); },
              [&](std::uint32_t layer, const Ticket& ticket) {
                return sections.fill_bytes_bound(layer, work_[ticket.work], files_.text_bytes());
              }},

@@ -87,7 +87,8 @@ class ImageMaker : public Maker {
     if (plan_.images->beads) {
       add("contours", [this](const Layer& layer, Work& work, Made&) { return imager_.contours(layer, work.images); });
       add("fill", [this](const Layer& layer, Work& work, Made&) { return imager_.fill(layer, work.images); });
-      add("beads", [this](const Layer& layer, Work& work, Made& made) { return imager_.beads(layer, work.images, made.notes); });
+      add("beads",
+          [this](const Layer& layer, Work& work, Made& made) { return imager_.beads(layer, work.images, made.notes); });
     }
     add("dose", [this](const Layer& layer, Work& work, Made& made) {
       imager_.dose(layer, work.images, made.record);
@@ -96,9 +97,8 @@ class ImageMaker : public Maker {
     add("encode", [this](const Layer&, Work& work, Made& made) {
       return files_.encode(work.images.runs, work.images.materials.image, work.files, made.record);
     });
-    add("store", [this](const Layer&, Work& work, Made& made) {
-      return files_.store(work.images.runs, work.files, made.record);
-    });
+    add("store",
+        [this](const Layer&, Work& work, Made& made) { return files_.store(work.images.runs, work.files, made.record); });
     return steps;
   }
   bool records_from_work() const override { return false; }
@@ -168,8 +168,7 @@ void ImageMaker::tell(Summary& summary) const {
 
   const auto result = [&](std::string_view name, std::string text) { summary.results.emplace_back(name, std::move(text)); };
   const auto end = [&](std::string_view name, std::string text) { summary.end.emplace_back(name, std::move(text)); };
-  result("pixels",
-         fmt::format("{} set, {:.3f} cm3 of binder-filled volume", readable_count(set_pixels_), volume_mm3_ / 1000));
+  result("pixels", fmt::format("{} set, {:.3f} cm3 of binder-filled volume", readable_count(set_pixels_), volume_mm3_ / 1000));
   if (solid_pixels_ > 0) {
     result("porosity",
            fmt::format("{:.2f} % of the parts' {} pixels are left empty", 100 * porosity, readable_count(solid_pixels_)));
@@ -184,8 +183,9 @@ void ImageMaker::tell(Summary& summary) const {
   if (moved_pixels_ > 0)
     end("blocked", fmt::format("{} pixels of blocked nozzles are fired by their neighbours", readable_count(moved_pixels_)));
   if (lost_pixels_ > 0) {
-    end("warning", fmt::format("{} pixels of blocked nozzles are not fired at all; head.blocked_rule = \"second-pass\" fires them",
-                               readable_count(lost_pixels_)));
+    end("warning",
+        fmt::format("{} pixels of blocked nozzles are not fired at all; head.blocked_rule = \"second-pass\" fires them",
+                    readable_count(lost_pixels_)));
   }
   if (capped_rows_ > 0) end("repaired", fmt::format("{} rows are closed only thanks to repair", readable_count(capped_rows_)));
   warnings_.tell(*plan_.scene, summary);

@@ -60,7 +60,8 @@ class LayerImager {
  private:
   Status section_of(const Solid& solid, const Layer& layer, ImageWork& work, Runs& image, LayerRecord& record,
                     ImageNotes& notes) const;
-  raster::LayerReport section(const Solid& solid, raster::Engine engine, const Layer& layer, ImageWork& work, Runs& image) const;
+  raster::LayerReport section(const Solid& solid, raster::Engine engine, const Layer& layer, ImageWork& work,
+                              Runs& image) const;
   void mirror(Runs& image, Runs& scratch) const;
   std::uint64_t bytes_of_section(Nm plane, std::uint64_t changes) const;
   std::uint64_t changes_of_section(Nm plane, std::uint64_t bead_changes) const;

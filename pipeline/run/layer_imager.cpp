@@ -136,7 +136,8 @@ raster::LayerReport LayerImager::section(const Solid& solid, raster::Engine engi
   const raster::LayerReport low = rasterizer.layer(engine, layer.lowest_plane(), work.scratch, work.lowest);
   const raster::LayerReport high = rasterizer.layer(engine, layer.highest_plane(), work.scratch, work.highest);
   const bool inside = containment == Containment::kInside;
-  raster::combine(work.lowest, work.highest, inside ? raster::SetOperation::kIntersection : raster::SetOperation::kUnion, image);
+  raster::combine(work.lowest, work.highest, inside ? raster::SetOperation::kIntersection : raster::SetOperation::kUnion,
+                  image);
   return low.open_rows + low.capped_rows >= high.open_rows + high.capped_rows ? low : high;
 }
 

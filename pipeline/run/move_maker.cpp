@@ -37,29 +37,30 @@ class MoveMaker : public Maker {
   std::vector<LayerRecord> kept() const override { return file_.file().kept(); }
 
   std::vector<MakerStep> steps() override {
-    return {{"contours",
-             [this](std::uint32_t layer, const Ticket& ticket) {
-               made_[ticket.record] = Made();
-               made_[ticket.record].record.layer = plan_.layer(layer);
-               return plan_.sections->contours(layer, work_[ticket.work]);
-             }},
-            {"fill",
-             [this](std::uint32_t layer, const Ticket& ticket) { return plan_.sections->fill(layer, work_[ticket.work]); },
-             [this](std::uint32_t layer, const Ticket& ticket) {
-               auto bytes = plan_.sections->fill_bytes_bound(layer, work_[ticket.work], {kTextOfPoint, 0, kTextOfPath});
-               if (bytes && plan_.segments->any()) *bytes += 2 * kWaitingText;
-               return bytes;
-             }},
-            {"stretches", [this](std::uint32_t layer, const Ticket& ticket) {
-               return lay_waiting(layer, work_[ticket.work], made_[ticket.record]);
-             }}};
+    return {
+        {"contours",
+         [this](std::uint32_t layer, const Ticket& ticket) {
+           made_[ticket.record] = Made();
+           made_[ticket.record].record.layer = plan_.layer(layer);
+           return plan_.sections->contours(layer, work_[ticket.work]);
+         }},
+        {"fill", [this](std::uint32_t layer, const Ticket& ticket) { return plan_.sections->fill(layer, work_[ticket.work]); },
+         [this](std::uint32_t layer, const Ticket& ticket) {
+           auto bytes = plan_.sections->fill_bytes_bound(layer, work_[ticket.work], {kTextOfPoint, 0, kTextOfPath});
+           if (bytes && plan_.segments->any()) *bytes += 2 * kWaitingText;
+           return bytes;
+         }},
+        {"stretches", [this](std::uint32_t layer, const Ticket& ticket) {
+           return lay_waiting(layer, work_[ticket.work], made_[ticket.record]);
+         }}};
   }
   bool records_from_work() const override { return true; }
 
   Status record(std::uint32_t layer, const Ticket& ticket) override {
     Made& made = made_[ticket.record];
     Sections::Work& work = work_[ticket.work];
-    if (Status status = made.waits ? file_.append({work.text.data(), work.text.size()}) : lay_pieces(layer, work, made); !status)
+    if (Status status = made.waits ? file_.append({work.text.data(), work.text.size()}) : lay_pieces(layer, work, made);
+        !status)
       return status;
     made.record.paths = std::make_shared<const PathFacts>(made.facts);
     if (Status status = file_.record(made.record); !status) return status;
@@ -148,18 +149,17 @@ void MoveMaker::tell(Summary& summary) const {
   summary.bytes_written = bytes_written_;
 
   const auto result = [&](std::string_view name, std::string text) { summary.results.emplace_back(name, std::move(text)); };
-  result("beads", fmt::format("{} moves, {:.2f} m, {:.3f} cm3; {} travels, {:.2f} m", readable_count(totals.moves),
-                              totals.bead_mm / 1000, totals.volume_mm3 / 1000, readable_count(totals.travels),
-                              totals.travel_mm / 1000));
+  result("beads",
+         fmt::format("{} moves, {:.2f} m, {:.3f} cm3; {} travels, {:.2f} m", readable_count(totals.moves),
+                     totals.bead_mm / 1000, totals.volume_mm3 / 1000, readable_count(totals.travels), totals.travel_mm / 1000));
   if (segments.stretches > 0) {
     result("segments", fmt::format("{} lines, {} thick and {} thin stretches, {} points", readable_count(segments.lines),
                                    readable_count(segments.stretches - segments.thin), readable_count(segments.thin),
                                    readable_count(segments.points())));
   }
   if (solid) {
-    result("porosity",
-           fmt::format("{:.2f} % by what is extruded, {:.2f} % with elliptic beads, {:.2f} % by measured widths",
-                       100 * porosity.by_extrusion(), 100 * porosity.by_ellipses(), 100 * porosity.by_widths()));
+    result("porosity", fmt::format("{:.2f} % by what is extruded, {:.2f} % with elliptic beads, {:.2f} % by measured widths",
+                                   100 * porosity.by_extrusion(), 100 * porosity.by_ellipses(), 100 * porosity.by_widths()));
   }
   result("filament", fmt::format("{:.1f} mm, {:.2f} cm3, {:.2f} g", totals.filament_mm, filament_cm3, filament_g));
   result("printing", fmt::format("about {}", write::gcode::time_text(totals.seconds)));
@@ -188,8 +188,8 @@ void MoveMaker::tell(Summary& summary) const {
   facts["filament_mm"] = totals.filament_mm;
   facts["filament_g"] = filament_g;
   facts["print_seconds"] = totals.seconds;
-  facts["segments"] = {{"lines", segments.lines},   {"pieces", segments.pieces},   {"stretches", segments.stretches},
-                       {"thin", segments.thin},     {"points", segments.points()}, {"points_first_layer", first_layer_points_}};
+  facts["segments"] = {{"lines", segments.lines}, {"pieces", segments.pieces},   {"stretches", segments.stretches},
+                       {"thin", segments.thin},   {"points", segments.points()}, {"points_first_layer", first_layer_points_}};
   facts["solid_mm3"] = porosity.solid_mm3;
   facts["porosity"] = {{"by_extrusion", solid ? porosity.by_extrusion() : 0},
                        {"by_ellipses", solid ? porosity.by_ellipses() : 0},

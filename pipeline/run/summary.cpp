@@ -33,11 +33,10 @@ using Line = std::pair<std::string, std::string>;
 void add_parts(const Summary& s, std::vector<Line>& lines) {
   for (const PartSummary& part : s.parts) {
     const Box& box = part.bounds;
-    lines.emplace_back(
-        &part == &s.parts.front() ? "parts" : "",
-        fmt::format("{}{}: {} triangles, {:.3f} x {:.3f} x {:.3f} mm at {:.3f}, {:.3f} mm", one_line(part.path),
-                    part.copies > 1 ? fmt::format(" x {}", part.copies) : "", readable_count(part.triangles), mm(box.width()),
-                    mm(box.depth()), mm(box.height()), mm(box.lo.x), mm(box.lo.y)));
+    lines.emplace_back(&part == &s.parts.front() ? "parts" : "",
+                       fmt::format("{}{}: {} triangles, {:.3f} x {:.3f} x {:.3f} mm at {:.3f}, {:.3f} mm", one_line(part.path),
+                                   part.copies > 1 ? fmt::format(" x {}", part.copies) : "", readable_count(part.triangles),
+                                   mm(box.width()), mm(box.depth()), mm(box.height()), mm(box.lo.x), mm(box.lo.y)));
     for (const Note& note : part.notes) {
       lines.emplace_back("", fmt::format("  {}{}", note.repair ? "repair: " : "", one_line(note.text)));
     }
@@ -60,11 +59,10 @@ void add_costs(const Summary& s, std::vector<Line>& lines) {
                                          readable_seconds(s.load_seconds + s.index_seconds + s.layer_seconds),
                                          readable_seconds(s.load_seconds), readable_seconds(s.index_seconds),
                                          readable_seconds(s.layer_seconds), steps));
-  lines.emplace_back("memory",
-                     fmt::format("{} at most (mesh {}, index {}, layers in flight up to {} of {}, {} at once)",
-                                 readable_bytes(s.peak_resident_bytes), readable_bytes(s.mesh_bytes),
-                                 readable_bytes(s.index_bytes), readable_bytes(s.peak_layer_bytes),
-                                 readable_bytes(s.memory_budget_bytes), s.most_layers_in_flight));
+  lines.emplace_back("memory", fmt::format("{} at most (mesh {}, index {}, layers in flight up to {} of {}, {} at once)",
+                                           readable_bytes(s.peak_resident_bytes), readable_bytes(s.mesh_bytes),
+                                           readable_bytes(s.index_bytes), readable_bytes(s.peak_layer_bytes),
+                                           readable_bytes(s.memory_budget_bytes), s.most_layers_in_flight));
 }
 
 void add_dry_run(const Summary& s, std::vector<Line>& lines) {

@@ -24,8 +24,8 @@ struct Summary {
   std::uint64_t triangles = 0;  // with copies
   double volume_mm3 = 0;        // of set pixels, within contours, or of beads
   std::uint64_t bytes_written = 0;
-  double load_seconds = 0, index_seconds = 0, layer_seconds = 0;            // wall
-  std::vector<std::pair<std::string_view, double>> step_seconds;            // of each step, over all threads
+  double load_seconds = 0, index_seconds = 0, layer_seconds = 0;  // wall
+  std::vector<std::pair<std::string_view, double>> step_seconds;  // of each step, over all threads
   std::uint64_t mesh_bytes = 0, index_bytes = 0, peak_layer_bytes = 0, memory_budget_bytes = 0, peak_resident_bytes = 0;
   std::uint32_t most_layers_in_flight = 0;
   std::vector<PartSummary> parts;
@@ -33,8 +33,8 @@ struct Summary {
 
   // --- what only this product tells
   using Lines = std::vector<std::pair<std::string, std::string>>;  // name, text
-  Lines head, results, end;                                // before the layers, behind them, after memory
-  std::shared_ptr<nlohmann::ordered_json> facts;           // an object, or null
+  Lines head, results, end;                                        // before the layers, behind them, after memory
+  std::shared_ptr<nlohmann::ordered_json> facts;                   // an object, or null
 
   /// Aligned lines with units; ends with one line a warning.
   std::string text() const;

@@ -159,7 +159,7 @@ TEST_F(JobsInBatch, AnyCommandIsAJobAndGivesItsValue) {
   for (const Json& job : jobs) outputs.push_back(job["output"]);
   EXPECT_EQ(outputs, (Words{"s", "part10.gcode", "part10.sml", "", "", "", "beads.gcode", "pages"}));
   for (const int i : {0, 1, 2, 6}) {
-    EXPECT_GT(jobs[i]["result"]["layers"], 0) << i;
+    EXPECT_GT(jobs[i]["result"]["layers_planned"], 0) << i;
     EXPECT_GT(jobs[i]["files"], 0) << i;
   }
   EXPECT_EQ(jobs[0]["result"]["command"], "slice");

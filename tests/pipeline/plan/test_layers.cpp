@@ -74,7 +74,8 @@ TEST(LayersOfParts, EachPartIsCutByItsOwnTableAndTopsNeverGoDown) {
       own_mm3 += area(work.contours.contours) * mm(alone->sections->layers()[i].layer.thickness);
     }
     EXPECT_NEAR(mm3[part], own_mm3, 0.01 * own_mm3);
-    EXPECT_EQ(top[part], std::int64_t{alone->sections->layers().back().layer.bottom} + alone->sections->layers().back().layer.thickness);
+    EXPECT_EQ(top[part],
+              std::int64_t{alone->sections->layers().back().layer.bottom} + alone->sections->layers().back().layer.thickness);
   }
 }
 

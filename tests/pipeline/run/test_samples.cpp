@@ -27,8 +27,8 @@ class Samples : public testing::Test {
   };
   Plan plan(const std::string& job, const std::string& part) {
     const std::string file = std::string(LAMINA_TEST_DIR) + "/../docs/examples/dinisio2022/" + job + ".toml";
-    const test::Outcome outcome =
-        test::run_lamina({"extrude", part, "--job", file, "--overwrite", "--json", "--quiet", "-o", folder / "a.gcode"}, folder.path());
+    const test::Outcome outcome = test::run_lamina(
+        {"extrude", part, "--job", file, "--overwrite", "--json", "--quiet", "-o", folder / "a.gcode"}, folder.path());
     EXPECT_EQ(outcome.code, 0) << job << ": " << outcome.err;
     Plan result{nlohmann::json::parse(outcome.out, nullptr, false), test::read_gcode(test::read_text(folder / "a.gcode"))};
     EXPECT_EQ(result.gcode.error, "") << job;
