@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "pipeline/batch/list.h"
-#include "pipeline/flow/progress.h"
+#include "pipeline/plan/progress.h"
 #include "pipeline/text/json.h"
 #include "stages/data/hash.h"
 #include "stages/data/status.h"

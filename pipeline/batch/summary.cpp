@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "pipeline/flow/progress.h"
+#include "pipeline/plan/progress.h"
 #include "pipeline/text/json_text.h"
 #include "pipeline/text/readable.h"
 #include "pipeline/text/version.h"

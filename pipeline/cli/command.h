@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "pipeline/cli/arguments.h"
-#include "pipeline/flow/progress.h"
+#include "pipeline/plan/progress.h"
 #include "stages/data/status.h"
 
 namespace lamina::pipeline {

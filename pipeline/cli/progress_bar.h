@@ -4,7 +4,7 @@
 #include <chrono>
 #include <string>
 
-#include "pipeline/flow/progress.h"
+#include "pipeline/plan/progress.h"
 
 namespace lamina::pipeline {
 

@@ -27,9 +27,9 @@ class LayerGraph {
         limits_(limits),
         cancel_(cancel),
         budget_(limits.budget_bytes, limits.most_in_flight, {steps.bytes_held, steps.let_go}),
-        moving_(limits.most_unrecorded),
+        moving_(limits.record_slots),
         step_ns_(steps.steps.size() + 1) {
-    for (std::uint32_t slot = limits.most_unrecorded; slot-- > 0;) free_records_.push_back(slot);
+    for (std::uint32_t slot = limits.record_slots; slot-- > 0;) free_records_.push_back(slot);
     connect();
   }
 

@@ -27,7 +27,7 @@ namespace lamina::pipeline {
 struct Ticket {
   std::uint32_t position = 0;  // of the layer among those that move, from 0
   std::uint32_t work = 0;      // slot of scratch, below FlowLimits::most_in_flight
-  std::uint32_t record = 0;    // slot of what is recorded, below FlowLimits::most_unrecorded
+  std::uint32_t record = 0;    // slot of what is recorded, below FlowLimits::record_slots
 };
 
 struct Step {
@@ -50,8 +50,8 @@ struct LayerSteps {
 
 struct FlowLimits {
   std::uint64_t budget_bytes = 1ull << 30;
-  std::uint32_t most_in_flight = 1;     // layers with scratch of their own; bounds the work that an interruption loses
-  std::uint32_t most_unrecorded = 256;  // layers that may be ahead of a slow lower one
+  std::uint32_t most_in_flight = 1;  // layers with scratch of their own; bounds the work that an interruption loses
+  std::uint32_t record_slots = 256;  // layers that may be ahead of a slow lower one
 };
 
 struct FlowReport {

@@ -13,13 +13,13 @@
 #include <utility>
 #include <vector>
 
-#include "pipeline/flow/progress.h"
 #include "pipeline/job/job.h"
 #include "pipeline/job/product.h"
 #include "pipeline/machine/extruder.h"
 #include "pipeline/machine/materials.h"
 #include "pipeline/plan/beads.h"
 #include "pipeline/plan/dose.h"
+#include "pipeline/plan/progress.h"
 #include "pipeline/plan/scene.h"
 #include "pipeline/plan/sections.h"
 #include "pipeline/plan/segment.h"

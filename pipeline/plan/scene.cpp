@@ -130,13 +130,12 @@ load::LoadOptions load_options(const Job& job, const PartRequest& request) {
   return options;
 }
 
-Result<Scene> load_scene(const Job& job) {
-  Scene scene;
-  std::map<LoadKey, Loaded> files;
-  std::vector<const Loaded*> loaded;  // by [[part]]; a map's values stay where they are
-  std::vector<arrange::BoxRequest> requests;
-  const std::int64_t bed_width = nm_of(job.bed_mm[0]), bed_depth = nm_of(job.bed_mm[1]);
+namespace {
 
+/// The file of each [[part]]; equal files with equal transforms are loaded once. A map's values stay where they are.
+/// errors  of load_part; kUsage: a part that reaches beyond what nm can say
+Result<std::vector<const Loaded*>> load_parts(const Job& job, std::map<LoadKey, Loaded>& files, Scene& scene) {
+  std::vector<const Loaded*> loaded;
   for (const PartRequest& part : job.parts) {
     std::error_code ignored;
     const std::filesystem::path file = std::filesystem::weakly_canonical(part.path, ignored);
@@ -153,26 +152,43 @@ Result<Scene> load_scene(const Job& job) {
       found = files.emplace(key, std::move(*fresh)).first;
     }
     loaded.push_back(&found->second);
-    arrange::BoxRequest request;
-    request.width = found->second.bounds.width();
-    request.depth = found->second.bounds.depth();
-    request.copies = part.copies;
-    request.name = part.path;
-    if (part.at_mm) {
-      request.at_x = nm_of((*part.at_mm)[0]);
-      request.at_y = nm_of((*part.at_mm)[1]);
-    }
-    requests.push_back(std::move(request));
-    if (nm_of(part.bottom_mm) + found->second.bounds.height() > kNmReach) {
+    const std::int64_t top = nm_of(part.bottom_mm) + found->second.bounds.height();
+    if (top > kNmReach) {
       return Error{Fault::kUsage,
-                   fmt::format("{}: reaches {} mm above the bed, beyond {} mm; use a smaller --scale or "
-                               "--bottom",
-                               part.path, mm(nm_of(part.bottom_mm) + found->second.bounds.height()), mm(kNmReach))};
+                   fmt::format("{}: reaches {} mm above the bed, beyond {} mm; use a smaller --scale or --bottom", part.path,
+                               mm(top), mm(kNmReach))};
     }
   }
+  return loaded;
+}
+
+/// The room that a part takes.
+arrange::BoxRequest box_request(const PartRequest& part, const Loaded& loaded) {
+  arrange::BoxRequest request;
+  request.width = loaded.bounds.width();
+  request.depth = loaded.bounds.depth();
+  request.copies = part.copies;
+  request.name = part.path;
+  if (part.at_mm) {
+    request.at_x = nm_of((*part.at_mm)[0]);
+    request.at_y = nm_of((*part.at_mm)[1]);
+  }
+  return request;
+}
+
+}  // namespace
+
+Result<Scene> load_scene(const Job& job) {
+  Scene scene;
+  std::map<LoadKey, Loaded> files;
+  const auto parts = load_parts(job, files, scene);
+  if (!parts) return parts.error();
+  const std::vector<const Loaded*>& loaded = *parts;
+  std::vector<arrange::BoxRequest> requests;
+  for (std::size_t p = 0; p < job.parts.size(); ++p) requests.push_back(box_request(job.parts[p], *loaded[p]));
 
   const Result<std::vector<arrange::Place>> places =
-      arrange::place_boxes(requests, bed_width, bed_depth, nm_of(job.gap_mm), job.machine.decides_bed);
+      arrange::place_boxes(requests, nm_of(job.bed_mm[0]), nm_of(job.bed_mm[1]), nm_of(job.gap_mm), job.machine.decides_bed);
   if (!places) return places.error();
 
   for (std::size_t p = 0; p < job.parts.size(); ++p) {

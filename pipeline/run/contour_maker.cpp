@@ -16,7 +16,7 @@ namespace {
 class ContourMaker : public Maker {
  public:
   ContourMaker(const Plan& plan, const FlowLimits& limits)
-      : plan_(plan), files_(plan), work_(limits.most_in_flight), made_(limits.most_unrecorded) {}
+      : plan_(plan), files_(plan), work_(limits.most_in_flight), made_(limits.record_slots) {}
 
   std::uint64_t bytes_of(std::uint32_t layer) const override { return plan_.sections->bytes_bound(layer); }
 

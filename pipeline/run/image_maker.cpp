@@ -57,7 +57,7 @@ class RowWarnings {
 class ImageMaker : public Maker {
  public:
   ImageMaker(const Plan& plan, const FlowLimits& limits)
-      : plan_(plan), imager_(plan), files_(plan), work_(limits.most_in_flight), made_(limits.most_unrecorded) {
+      : plan_(plan), imager_(plan), files_(plan), work_(limits.most_in_flight), made_(limits.record_slots) {
     for (const JobMaterial& material : plan.images->materials.used) materials_.emplace_back(material.name, 0);
   }
 

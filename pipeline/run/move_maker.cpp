@@ -23,7 +23,7 @@ constexpr std::size_t kWaitingText = 1 << 17, kPieceOfText = 1 << 16;
 class MoveMaker : public Maker {
  public:
   MoveMaker(const Plan& plan, const FlowLimits& limits)
-      : plan_(plan), file_(plan), work_(limits.most_in_flight), made_(limits.most_unrecorded) {}
+      : plan_(plan), file_(plan), work_(limits.most_in_flight), made_(limits.record_slots) {}
 
   std::uint64_t bytes_of(std::uint32_t layer) const override { return plan_.sections->bytes_bound(layer); }
 

@@ -5,9 +5,9 @@
 
 #include <atomic>
 
-#include "pipeline/flow/progress.h"
 #include "pipeline/job/job.h"
 #include "pipeline/job/product.h"
+#include "pipeline/plan/progress.h"
 #include "pipeline/run/summary.h"
 #include "stages/data/status.h"
 

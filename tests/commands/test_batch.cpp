@@ -201,7 +201,7 @@ TEST_F(JobsInBatch, WhatIsWrongWithOneJobIsOneLineAndTheRestIsUnharmed) {
   EXPECT_EQ(lamina({"verify", "out/good"}).code, 0);
   // Each says where it is wrong and what to do.
   EXPECT_EQ(json["jobs"][2]["reason"],
-            "missing.toml:2:8: part.path: nowhere.stl: no such file; correct it (a relative path begins beside the job file)");
+            "missing.toml:2:6: part.path: nowhere.stl: no such file; correct it (a relative path begins beside the job file)");
   EXPECT_EQ(json["jobs"][9]["reason"], "half: the job is not finished; end it with --resume, then ask for the report");
 }
 

@@ -131,7 +131,7 @@ TEST_F(Outputs, WhatLaminaDidNotWriteIsReplacedOnlyWithOverwrite) {
       {"heights part.stl --layer 1 --quiet -o new --plot ", "mine.svg"},
       {"heights part.stl --layer 1 --quiet -o new --plot ", "mine.png"},
       {"jet part.stl --layer 1 --dry-run --quiet --save-job ", "mine.toml"},
-      {"permeability drops.csv --convention dinisio2022 --plot ", "mine"},
+      {"permeability drops.csv --convention dinisio2022 --plot ", "mine.svg"},
       {"preview part.gcode --quiet -o ", "mine.png"},
       {"preview part.gcode --quiet -o ", "mine.svg"},
       {"report out --quiet -o ", "mine.html"},

@@ -2,6 +2,9 @@
 
 #include <filesystem>
 #include <span>
+#include <string>
+#include <utility>
+#include <vector>
 
 #include "pipeline/cli/command.h"
 #include "pipeline/cli/help/help.h"
@@ -26,23 +29,26 @@ CommandSpec manual_spec() {
   return spec;
 }
 
+/// All pages, or none where one of them would replace somebody's file.
 Status write_pages(const std::string& directory, bool markdown, bool overwrite) {
-  const auto write = [&](const std::string& name, const std::string& page) {
-    const std::string path = fmt::format("{}/{}", directory, name);
-    constexpr std::string_view kMarks[] = {"\"lamina ", "lamina manual --markdown"};
+  std::vector<std::pair<std::string, std::string>> pages;  // path, text
+  if (!markdown) pages.emplace_back(fmt::format("{}/lamina.1", directory), man_page());
+  for (const Command* command : commands()) {
+    if (markdown) {
+      pages.emplace_back(fmt::format("{}/{}.md", directory, command->name), markdown_page(*command));
+    } else {
+      pages.emplace_back(fmt::format("{}/lamina-{}.1", directory, command->name), man_page(*command));
+    }
+  }
+  constexpr std::string_view kMarks[] = {"\"lamina ", "lamina manual --markdown"};
+  for (const auto& [path, text] : pages) {
     if (Status status = check_own_file(path, kMarks); !status && !overwrite) return status;
-    return write::write_file(path, page);
-  };
+  }
   std::error_code error;
   std::filesystem::create_directories(directory, error);
   if (error) return Error{Fault::kOutput, fmt::format("{}: {}", directory, error.message())};
-  if (!markdown) {
-    if (Status status = write("lamina.1", man_page()); !status) return status;
-  }
-  for (const Command* command : commands()) {
-    const Status status = markdown ? write(fmt::format("{}.md", command->name), markdown_page(*command))
-                                   : write(fmt::format("lamina-{}.1", command->name), man_page(*command));
-    if (!status) return status;
+  for (const auto& [path, text] : pages) {
+    if (Status status = write::write_file(path, text); !status) return status;
   }
   return {};
 }

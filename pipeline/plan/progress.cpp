@@ -1,4 +1,4 @@
-#include "pipeline/flow/progress.h"
+#include "pipeline/plan/progress.h"
 
 #include <sys/resource.h>
 

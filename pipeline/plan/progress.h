@@ -1,4 +1,4 @@
-// pipeline/flow/progress.h: what a job tells while it runs.
+// pipeline/plan/progress.h: what a job tells while it runs.
 #pragma once
 
 #include <cstdint>
