@@ -148,6 +148,23 @@ class Module(unittest.TestCase):
         with self.assertRaises(lamina.UsageError):
             lamina.jet(str(self.directory / "again"), PART, {**SETTINGS, "bed.dpi": 100})
 
+    def test_slices_and_toolpaths_have_the_bytes_of_the_program(self):
+        done = run("slice", CROWN, "--layer", "0.4", "--walls", "1", "--quiet", "-o", self.directory / "cut")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        summary = lamina.slice(str(self.directory / "own"), CROWN, {"layers.thickness_mm": 0.4, "fill.walls": 1})
+        self.assertEqual(summary["command"], "slice")
+        name = pathlib.Path(CROWN).stem + ".svg"
+        self.assertEqual((self.directory / "cut" / name).read_bytes(), (self.directory / "own" / name).read_bytes())
+        settings = {"layers.thickness_mm": 0.2, "fill.walls": 1, "machine.profile": "marlin"}
+        one, two = self.directory / "one.gcode", self.directory / "two.gcode"
+        done = run("extrude", CROWN, "--machine", "marlin", "--quiet", "-o", one)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        summary = lamina.extrude(str(two), CROWN, settings)
+        self.assertEqual(summary["layers_planned"], summary["layers_total"])
+        self.assertEqual(one.read_bytes(), two.read_bytes())
+        with self.assertRaises(lamina.UsageError):
+            lamina.extrude(str(two), CROWN, settings)
+
     def test_each_powder_of_a_layer_is_the_decoded_file_of_its_own(self):
         rabbit, nut = (str(ROOT / "tests/corpus" / name) for name in ("rabbit_9_overlapping_shells.obj", "parameter_quality_nut.stl"))
         job = self.directory / "powders.toml"
