@@ -46,7 +46,8 @@ TEST(HeightsCommand, TellsTheTableInEveryForm) {
   EXPECT_TRUE(read_text(directory / "plot.svg").ends_with("</svg>\n"));
 }
 
-TEST(HeightsCommand, PlotsOfBothFormsHoldTheSameAndLeaveNothingBeside) {
+// Pictures are drawn by lamina-preview.
+TEST(HeightsCommand, PreviewDrawsThePlotThatSvgHoldsAndLeavesNothingBeside) {
   const Directory directory;
   write_ledge(directory);
   for (const std::string name : {"plot.svg", "plot.png"}) {
