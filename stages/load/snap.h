@@ -37,10 +37,7 @@ class Snapper {
   static bool round(double mm, Nm& out) {
     const double nm = mm * 1e6;
     if (!(std::fabs(nm) < 2147483647.5)) return false;
-    // llround: trunc is exact, the remainder is exact, and so is the comparison with a half.
-    const auto whole = static_cast<Nm>(nm);
-    const double rest = nm - whole;
-    out = whole + (rest >= 0.5 ? 1 : 0) - (rest <= -0.5 ? 1 : 0);
+    out = static_cast<Nm>(nearest(nm));
     return true;
   }
   static Snapped round(double x, double y, double z, Point3& out) {

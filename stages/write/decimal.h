@@ -2,6 +2,7 @@
 // locale.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <cstring>
 #include <string_view>
@@ -14,31 +15,47 @@ namespace lamina::write {
 /// Room that put_fixed() and put_mm() need at most: a sign, 20 digits, a point, and a little more.
 inline constexpr std::size_t kMostDecimal = 24;
 
+/// "000102...99": the two digits of n begin at 2 n.
+inline constexpr auto kDigitPairs = [] {
+  std::array<char, 200> pairs{};
+  for (std::size_t n = 0; n < 100; ++n) {
+    pairs[2 * n] = static_cast<char>('0' + n / 10);
+    pairs[2 * n + 1] = static_cast<char>('0' + n % 10);
+  }
+  return pairs;
+}();
+
+/// Writes the last `count` digits of a number before `end`, two at a time. Returns their begin.
+inline char* put_digits_before(std::uint64_t value, int count, char* end) {
+  for (; count >= 2; count -= 2, value /= 100) {
+    end -= 2;
+    std::memcpy(end, &kDigitPairs[2 * (value % 100)], 2);
+  }
+  if (count > 0) *--end = static_cast<char>('0' + value % 10);
+  return end;
+}
+
+/// Writes a whole number. Returns the end.
+inline char* put_whole(std::uint64_t value, char* out) {
+  int count = 1;
+  for (std::uint64_t rest = value; rest >= 10; rest /= 10) ++count;
+  put_digits_before(value, count, out + count);
+  return out + count;
+}
+
 /// Writes `value` / 10^decimals without trailing zeros: 12500 with 3 decimals is "12.5", -5 is "-0.005", 0 is "0".
 /// Returns the end. decimals 0 .. 6; at most 22 bytes are written
 template <int kDecimals>
 char* put_fixed(std::int64_t value, char* out) {
-  std::uint64_t rest = value < 0 ? 0 - static_cast<std::uint64_t>(value) : static_cast<std::uint64_t>(value);
+  const std::uint64_t size = value < 0 ? 0 - static_cast<std::uint64_t>(value) : static_cast<std::uint64_t>(value);
   if (value < 0) *out++ = '-';
   constexpr std::uint64_t kUnit[] = {1, 10, 100, 1000, 10'000, 100'000, 1'000'000};
-  std::uint64_t whole = rest / kUnit[kDecimals];
-  rest %= kUnit[kDecimals];
-  char digits[20];
-  char* first = digits + sizeof digits;
-  do {
-    *--first = static_cast<char>('0' + whole % 10);
-    whole /= 10;
-  } while (whole != 0);
-  const auto count = static_cast<std::size_t>(digits + sizeof digits - first);
-  std::memcpy(out, first, count);
-  out += count;
+  out = put_whole(size / kUnit[kDecimals], out);
+  const auto rest = static_cast<std::uint32_t>(size % kUnit[kDecimals]);
   if (rest == 0) return out;
   *out++ = '.';
+  put_digits_before(rest, kDecimals, out + kDecimals);
   int used = kDecimals;
-  for (int i = kDecimals - 1; i >= 0; --i) {
-    out[i] = static_cast<char>('0' + rest % 10);
-    rest /= 10;
-  }
   while (out[used - 1] == '0') --used;
   return out + used;
 }

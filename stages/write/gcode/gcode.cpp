@@ -50,7 +50,7 @@ LayerWriter::LayerWriter(const Extruder& machine, const Layer& layer, std::uint3
   if (!machine.code.relative_extrusion) append(out_, "G92 E0\n");
   append_written(out_, kMostLine, [&](char* text) {
     text = put_fixed<3>(micrometres(top), put(text, "G1 Z"));
-    text = put_fixed<0>(std::llround(machine_.speed.lift_mm_s * 60), put(text, " F"));
+    text = put_fixed<0>(nearest(machine_.speed.lift_mm_s * 60), put(text, " F"));
     *text++ = '\n';
     return text;
   });
@@ -70,7 +70,7 @@ LayerWriter::LayerWriter(const Extruder& machine, const Layer& layer, std::uint3
 
 void LayerWriter::extrude_to(double filament_mm, char*& text) {
   fed_ += filament_mm;
-  const std::int64_t now = std::llround(fed_ * 1e5);
+  const std::int64_t now = nearest(fed_ * 1e5);
   text = put_fixed<5>(machine_.code.relative_extrusion ? now - written_ : now, put(text, " E"));
   written_ = now;
 }
@@ -122,9 +122,9 @@ void LayerWriter::travel(Point2 to) {
     if (draws_back) {
       retracted_ = true;
       ++totals_.retractions;
-      const std::int64_t back = std::llround(retraction.length_mm * 1e5);
+      const std::int64_t back = nearest(retraction.length_mm * 1e5);
       text = put_fixed<5>(machine_.code.relative_extrusion ? -back : written_ - back, put(text, "G1 E"));
-      feed_rate_ = std::llround(retraction.speed_mm_s * 60);
+      feed_rate_ = nearest(retraction.speed_mm_s * 60);
       text = put_fixed<0>(feed_rate_, put(text, " F"));
       *text++ = '\n';
       totals_.seconds += retraction.length_mm / retraction.speed_mm_s;
@@ -132,7 +132,7 @@ void LayerWriter::travel(Point2 to) {
     }
     text = put_fixed<3>(micrometres(to.x + corner_x_), put(text, "G0 X"));
     text = put_fixed<3>(micrometres(to.y + corner_y_), put(text, " Y"));
-    const std::int64_t rate = std::llround(machine_.speed.travel_mm_s * 60);
+    const std::int64_t rate = nearest(machine_.speed.travel_mm_s * 60);
     if (rate != feed_rate_) text = put_fixed<0>(feed_rate_ = rate, put(text, " F"));
     *text++ = '\n';
     return text;
@@ -150,7 +150,7 @@ double LayerWriter::lay(const BeadMove& move) {
   if (!placed_ || move.from != at_) travel(move.from);
   if (retracted_) {
     append_written(out_, kMostLine, [&](char* text) {
-      const std::int64_t forth = std::llround(machine_.retraction.length_mm * 1e5);
+      const std::int64_t forth = nearest(machine_.retraction.length_mm * 1e5);
       // Absolute counting starts a layer at 0 with the filament drawn back.
       if (machine_.code.relative_extrusion) {
         text = put_fixed<5>(forth, put(text, "G1 E"));
@@ -161,7 +161,7 @@ double LayerWriter::lay(const BeadMove& move) {
         }
         text = put_fixed<5>(written_, put(text, "G1 E"));
       }
-      feed_rate_ = std::llround(machine_.retraction.speed_mm_s * 60);
+      feed_rate_ = nearest(machine_.retraction.speed_mm_s * 60);
       text = put_fixed<0>(feed_rate_, put(text, " F"));
       *text++ = '\n';
       return text;
@@ -178,7 +178,7 @@ double LayerWriter::lay(const BeadMove& move) {
     text = put_fixed<3>(micrometres(move.to.x + corner_x_), put(text, "G1 X"));
     text = put_fixed<3>(micrometres(move.to.y + corner_y_), put(text, " Y"));
     extrude_to(volume * feed_per_volume_, text);
-    const std::int64_t rate = std::max<std::int64_t>(1, std::llround(move.speed_mm_s * 60));
+    const std::int64_t rate = std::max<std::int64_t>(1, nearest(move.speed_mm_s * 60));
     if (rate != feed_rate_) text = put_fixed<0>(feed_rate_ = rate, put(text, " F"));
     *text++ = '\n';
     return text;
@@ -201,9 +201,9 @@ double LayerWriter::lay(const BeadMove& move) {
 const MoveTotals& LayerWriter::finish() {
   if (!retracted_ && machine_.retraction.length_mm > 0) {
     append_written(out_, kMostLine, [&](char* text) {
-      const std::int64_t back = std::llround(machine_.retraction.length_mm * 1e5);
+      const std::int64_t back = nearest(machine_.retraction.length_mm * 1e5);
       text = put_fixed<5>(machine_.code.relative_extrusion ? -back : written_ - back, put(text, "G1 E"));
-      text = put_fixed<0>(std::llround(machine_.retraction.speed_mm_s * 60), put(text, " F"));
+      text = put_fixed<0>(nearest(machine_.retraction.speed_mm_s * 60), put(text, " F"));
       *text++ = '\n';
       return text;
     });
@@ -254,7 +254,7 @@ void append_head(const Extruder& machine, const ExtrusionHead& facts, Buffer<cha
 }
 
 std::string time_text(double seconds) {
-  const auto whole = static_cast<std::int64_t>(std::llround(seconds));
+  const std::int64_t whole = nearest(seconds);
   std::string text;
   if (whole >= 86'400) text += fmt::format("{}d ", whole / 86'400);
   if (whole >= 3600) text += fmt::format("{}h ", whole / 3600 % 24);
