@@ -1,12 +1,10 @@
-// pipeline/text/json_text.h: the few pieces of JSON that are written by hand, so that a line costs no document tree.
+// stages/text/json_text.h: the few pieces of JSON that are written by hand, so that a line costs no document tree.
 #pragma once
 
 #include <string>
 #include <string_view>
 
-#include "stages/data/text.h"  // one_line
-
-namespace lamina::pipeline {
+namespace lamina {
 
 /// The text in quotes, escaped for JSON (and for TOML's basic strings); bytes that are not UTF-8 become U+FFFD.
 std::string json_string(std::string_view text);
@@ -14,4 +12,4 @@ std::string json_string(std::string_view text);
 /// Whether the bytes are UTF-8.
 bool is_utf8(std::string_view text);
 
-}  // namespace lamina::pipeline
+}  // namespace lamina

@@ -1,13 +1,13 @@
-// pipeline/text/table.h: lines of tables that people fill in: CSV by commas or semicolons, or tabs.
+// stages/text/table.h: lines of tables that people fill in: CSV by commas or semicolons, or tabs.
 #pragma once
 
 #include <string>
 #include <string_view>
 #include <vector>
 
-#include "pipeline/text/number_text.h"
+#include "stages/text/number_text.h"
 
-namespace lamina::pipeline {
+namespace lamina {
 
 /// What separates the columns of a table, by its first line.
 inline char separator_of(std::string_view header) {
@@ -26,4 +26,4 @@ inline std::vector<std::string> cells_of(std::string_view line, char separator) 
   return cells;
 }
 
-}  // namespace lamina::pipeline
+}  // namespace lamina

@@ -1,10 +1,10 @@
-#include "pipeline/text/json_text.h"
+#include "stages/text/json_text.h"
 
 #include <fmt/format.h>
 
 #include <cstdint>
 
-namespace lamina::pipeline {
+namespace lamina {
 namespace {
 
 // Bytes of the UTF-8 character at the front of `text`; 0 if there is none (RFC 3629: no surrogates, no overlong forms).
@@ -56,4 +56,4 @@ bool is_utf8(std::string_view text) {
   return true;
 }
 
-}  // namespace lamina::pipeline
+}  // namespace lamina

@@ -1,8 +1,8 @@
-#include "pipeline/text/value.h"
+#include "stages/text/value.h"
 
-#include "pipeline/text/names.h"
+#include "stages/text/names.h"
 
-namespace lamina::pipeline {
+namespace lamina {
 namespace {
 
 template <class Whole>
@@ -57,4 +57,4 @@ std::string check_path(std::string_view text) {
   return {};
 }
 
-}  // namespace lamina::pipeline
+}  // namespace lamina

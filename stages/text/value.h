@@ -1,4 +1,4 @@
-// pipeline/text/value.h: how a value of each type is read from text within its limits, checked, and written.
+// stages/text/value.h: how a value of each type is read from text within its limits, checked, and written.
 //
 // Readers and checks return an empty string, or what is wrong and what would be right, to stand behind the value's name.
 #pragma once
@@ -13,9 +13,9 @@
 #include <string_view>
 #include <vector>
 
-#include "pipeline/text/number_text.h"
+#include "stages/text/number_text.h"
 
-namespace lamina::pipeline {
+namespace lamina {
 
 inline constexpr double kLeastMm = 1e-6;  // 1 nm
 inline constexpr double kMostMm = 2147;   // what 32 bits of nanometres hold, in whole mm
@@ -158,4 +158,4 @@ std::string write_word(const Word<Value> (&words)[N], Value value) {
 /// The name of a file or directory.
 std::string check_path(std::string_view text);
 
-}  // namespace lamina::pipeline
+}  // namespace lamina

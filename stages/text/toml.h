@@ -1,4 +1,4 @@
-// pipeline/text/toml.h: TOML as a tree of texts, each with its place, for the keys of jobs, profiles and printers.
+// stages/text/toml.h: TOML as a tree of texts, each with its place, for the keys of jobs, profiles and printers.
 #pragma once
 
 #include <cstdint>
@@ -9,7 +9,7 @@
 
 #include "stages/data/status.h"
 
-namespace lamina::pipeline {
+namespace lamina {
 
 /// Where a value begins in its file, from 1; 0 if it came from no file.
 struct Place {
@@ -51,4 +51,4 @@ std::string toml_string(std::string_view text);
 /// A text as the number or switch that it is, or in quotes.
 std::string toml_text(std::string_view text);
 
-}  // namespace lamina::pipeline
+}  // namespace lamina

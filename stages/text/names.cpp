@@ -1,11 +1,11 @@
-#include "pipeline/text/names.h"
+#include "stages/text/names.h"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <vector>
 
-namespace lamina::pipeline {
+namespace lamina {
 namespace {
 
 // Levenshtein's distance.
@@ -42,4 +42,4 @@ std::string suggest(std::string_view mistyped, std::span<const std::string_view>
   return nearest.empty() ? std::string() : fmt::format("; did you mean '{}'?", nearest);
 }
 
-}  // namespace lamina::pipeline
+}  // namespace lamina

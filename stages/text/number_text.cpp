@@ -1,4 +1,4 @@
-#include "pipeline/text/number_text.h"
+#include "stages/text/number_text.h"
 
 #include <fmt/format.h>
 
@@ -6,7 +6,7 @@
 #include <cmath>
 #include <system_error>
 
-namespace lamina::pipeline {
+namespace lamina {
 namespace {
 
 bool parse(std::string_view text, double& value) {
@@ -120,4 +120,4 @@ std::string read_shard(std::string_view text, std::array<std::uint32_t, 2>& shar
   return {};
 }
 
-}  // namespace lamina::pipeline
+}  // namespace lamina

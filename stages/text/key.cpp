@@ -1,9 +1,9 @@
-#include "pipeline/text/key.h"
+#include "stages/text/key.h"
 
-#include "pipeline/text/json_text.h"
-#include "pipeline/text/names.h"
+#include "stages/text/json_text.h"
+#include "stages/text/names.h"
 
-namespace lamina::pipeline {
+namespace lamina {
 
 std::string no_such_key(std::string_view section, std::string_view name, std::span<const std::string_view> names) {
   const std::string near = suggest(name, names);
@@ -27,4 +27,4 @@ std::string key_line(std::string_view name, Form form, std::string_view text) {
   return fmt::format("{} = [{}]", name, list);
 }
 
-}  // namespace lamina::pipeline
+}  // namespace lamina

@@ -1,10 +1,10 @@
-// pipeline/text/changes.h: other values for some keys of a table, and where they hold: part.fill, [[fill.range]] of a job.
+// stages/text/changes.h: other values for some keys of a table, and where they hold: part.fill, [[fill.range]] of a job.
 #pragma once
 
 #include <cstddef>
 #include <vector>
 
-namespace lamina::pipeline {
+namespace lamina {
 
 /// Some keys of a table with their values; where they are applied the others stay as they are.
 template <class Target>
@@ -21,4 +21,4 @@ struct Range {
   Changes<Target> changes;
 };
 
-}  // namespace lamina::pipeline
+}  // namespace lamina

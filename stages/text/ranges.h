@@ -1,12 +1,12 @@
-// pipeline/text/ranges.h: how changes of keys, and those between two heights, are read, applied and written.
+// stages/text/ranges.h: how changes of keys, and those between two heights, are read, applied and written.
 #pragma once
 
 #include <algorithm>
 
-#include "pipeline/text/changes.h"
-#include "pipeline/text/key.h"
+#include "stages/text/changes.h"
+#include "stages/text/key.h"
 
-namespace lamina::pipeline {
+namespace lamina {
 
 /// "2.7:3", for messages.
 std::string range_name(double from_mm, double to_mm);
@@ -77,4 +77,4 @@ std::string ranges_text(std::span<const Key<Target>> keys, const std::vector<Ran
   return text.empty() ? text : fmt::format("[{}]", text);
 }
 
-}  // namespace lamina::pipeline
+}  // namespace lamina

@@ -1,10 +1,10 @@
-#include "pipeline/text/readable.h"
+#include "stages/text/readable.h"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 
-namespace lamina::pipeline {
+namespace lamina {
 
 std::string readable_bytes(std::uint64_t bytes) {
   const double value = static_cast<double>(bytes);
@@ -28,4 +28,24 @@ std::string readable_count(std::uint64_t count) {
   return text;
 }
 
-}  // namespace lamina::pipeline
+std::string one_line(std::string_view text) {
+  std::string out;
+  for (const char c : text) {
+    const bool control = static_cast<std::uint8_t>(c) < 0x20 || c == 0x7f;
+    if (!control) {
+      out += c;
+    } else if (!out.empty() && out.back() != ' ') {
+      out += ' ';
+    }
+  }
+  while (!out.empty() && out.back() == ' ') out.pop_back();
+  return out;
+}
+
+std::string lower_case(std::string_view text) {
+  std::string out(text);
+  std::ranges::transform(out, out.begin(), [](char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; });
+  return out;
+}
+
+}  // namespace lamina

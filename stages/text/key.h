@@ -1,4 +1,4 @@
-// pipeline/text/key.h: a named, typed, ranged value of what people describe: a job, a part, a filling, a printer.
+// stages/text/key.h: a named, typed, ranged value of what people describe: a job, a part, a filling, a printer.
 //
 // A table of keys says everything once: options, files, --set, messages, the help and the canonical text follow from it.
 // Tables are made by helpers that name the member:
@@ -14,10 +14,10 @@
 #include <utility>
 #include <vector>
 
-#include "pipeline/text/toml.h"
-#include "pipeline/text/value.h"
+#include "stages/text/toml.h"
+#include "stages/text/value.h"
 
-namespace lamina::pipeline {
+namespace lamina {
 
 /// What is the same for a key of anything.
 struct KeyName {
@@ -310,4 +310,4 @@ std::string sections_text(std::span<const Key<Target>> keys, const Target& targe
   return text;
 }
 
-}  // namespace lamina::pipeline
+}  // namespace lamina

@@ -2,9 +2,9 @@
 
 #include <random>
 
-#include "pipeline/text/names.h"
-#include "pipeline/text/number_text.h"
-#include "pipeline/text/value.h"
+#include "stages/text/names.h"
+#include "stages/text/number_text.h"
+#include "stages/text/value.h"
 
 namespace lamina::pipeline {
 namespace {

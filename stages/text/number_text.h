@@ -1,4 +1,4 @@
-// pipeline/text/number_text.h: numbers as people write them in options and job files, read strictly.
+// stages/text/number_text.h: numbers as people write them in options and job files, read strictly.
 //
 // The whole text has to be a number, and it has to be finite: "12mm", "1e999", "nan" and "inf" are no numbers here.
 // Every reader returns an empty string, or what is wrong and what would be right, to stand behind the option's name.
@@ -10,7 +10,7 @@
 #include <string_view>
 #include <vector>
 
-namespace lamina::pipeline {
+namespace lamina {
 
 /// A number in [low, high]. `unit` is for the message only, as in " mm".
 std::string read_number(std::string_view text, double low, double high, std::string_view unit, double& value);
@@ -39,4 +39,4 @@ std::string_view trimmed(std::string_view text);
 /// The shortest text that reads back as the same number; never -0.
 std::string number_text(double value);
 
-}  // namespace lamina::pipeline
+}  // namespace lamina

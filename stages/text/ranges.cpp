@@ -1,6 +1,6 @@
-#include "pipeline/text/ranges.h"
+#include "stages/text/ranges.h"
 
-namespace lamina::pipeline {
+namespace lamina {
 
 std::string range_name(double from_mm, double to_mm) { return fmt::format("{}:{}", number_text(from_mm), number_text(to_mm)); }
 
@@ -24,4 +24,4 @@ std::string check_tables(const TomlValue& value, std::string_view example) {
   return fmt::format("is an array of tables, each with {}", example);
 }
 
-}  // namespace lamina::pipeline
+}  // namespace lamina

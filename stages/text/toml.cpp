@@ -1,4 +1,5 @@
-#include "pipeline/text/toml.h"
+#include "stages/text/toml.h"
+#include "stages/text/readable.h"
 
 #include <fmt/format.h>
 #define TOML_EXCEPTIONS 0
@@ -7,10 +8,10 @@
 
 #include <algorithm>
 
-#include "pipeline/text/json_text.h"
-#include "pipeline/text/number_text.h"
+#include "stages/text/json_text.h"
+#include "stages/text/number_text.h"
 
-namespace lamina::pipeline {
+namespace lamina {
 namespace {
 
 TomlValue tree_of(const toml::node& node) {
@@ -95,4 +96,4 @@ std::string toml_text(std::string_view text) {
   return text == "true" || text == "false" || is_number ? std::string(text) : toml_string(text);
 }
 
-}  // namespace lamina::pipeline
+}  // namespace lamina
