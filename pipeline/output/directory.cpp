@@ -10,10 +10,11 @@
 #include <filesystem>
 #include <tuple>
 
-#include "pipeline/output/manifest.h"
-#include "pipeline/text/number_text.h"
+#include "pipeline/job/decisions.h"
+#include "stages/text/number_text.h"
 #include "stages/write/file.h"
 #include "stages/write/image_format.h"
+#include "stages/write/manifest/manifest.h"
 #include "stages/write/program/dialect.h"
 
 namespace lamina::pipeline {
@@ -90,6 +91,11 @@ bool joins(const Job& job, const ManifestFile& file) {
 
 }  // namespace
 
+std::string manifest_name(const Job& job) {
+  if (!job.shard) return "manifest.json";
+  return fmt::format("manifest-{}-of-{}.json", (*job.shard)[0] + 1, (*job.shard)[1]);
+}
+
 std::vector<ManifestFile> find_manifests(const std::string& directory) {
   std::vector<ManifestFile> found;
   for_each_entry(directory, [&](const fs::directory_entry& entry) {
@@ -129,6 +135,7 @@ bool read_program_file_name(std::string_view name, std::uint32_t& index, bool& p
 }
 
 Status check_output(const Job& job) {
+  count(Decision::kOutput);
   std::error_code error;
   const fs::file_status status = fs::status(job.output, error);
   if (!fs::exists(status)) return {};
@@ -181,8 +188,19 @@ Status check_shard_replaces_itself(const Job& job, const ManifestHead& head) {
   return {};
 }
 
+Status check_nobody_came(const Job& job) {
+  const std::string path = job.output + "/" + manifest_name(job);
+  if (Status busy = write::check_not_being_written(path); !busy) return busy;
+  if (job.resume || job.overwrite) return {};
+  for (const std::string& name : {path, path + std::string(kPartial)}) {
+    if (::access(name.c_str(), F_OK) != 0) continue;
+    return Error{Fault::kUsage, fmt::format("{}: another run has begun it meanwhile; name another directory", name)};
+  }
+  return {};
+}
+
 Status prepare_output(const Job& job) {
-  if (Status status = check_output(job); !status) return status;
+  if (Status status = check_nobody_came(job); !status) return status;
   const fs::path directory = job.output, layers = directory / "layers";
   std::error_code error;
   fs::create_directories(layers, error);

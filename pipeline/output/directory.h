@@ -9,8 +9,8 @@
 #include <vector>
 
 #include "pipeline/job/job.h"
-#include "pipeline/output/manifest.h"
 #include "stages/data/status.h"
+#include "stages/write/manifest/manifest.h"
 
 namespace lamina::pipeline {
 
@@ -20,6 +20,9 @@ struct ManifestFile {
   bool partial = false;                               // ends in .part: a run that has not finished
   std::optional<std::array<std::uint32_t, 2>> shard;  // i of n, i from 0
 };
+
+/// Name of a job's manifest in its directory of images: manifest.json, or manifest-<i>-of-<n>.json for a shard.
+std::string manifest_name(const Job& job);
 
 /// All manifests of a directory, the whole job's first, then by shard; none if there is no such directory.
 std::vector<ManifestFile> find_manifests(const std::string& directory);
@@ -36,14 +39,17 @@ bool read_program_file_name(std::string_view name, std::uint32_t& index, bool& p
 ///         another run writes into it right now
 Status check_output(const Job& job);
 
+/// Whether another run took the directory while this one loaded its parts. errors  kUsage, kOutput
+Status check_nobody_came(const Job& job);
+
 /// A shard leaves the layers of other shards alone, and cannot tell them from those of an earlier job: where its own
 /// manifest is of another job, the directory has to be cleared first.
 /// errors  kUsage
 Status check_shard_replaces_itself(const Job& job, const ManifestHead& head);
 
-/// check_output, then creates the directory and its layers/, and clears it: with --overwrite of all that an earlier
+/// After check_output: creates the directory and its layers/, and clears it: with --overwrite of all that an earlier
 /// job left (a shard: of its own manifest), else of files that an interrupted run left half written.
-/// errors  those of check_output; kOutput with the system's reason
+/// errors  those of check_nobody_came; kOutput with the system's reason
 Status prepare_output(const Job& job);
 
 /// Removes half-written files of the layers [first, last) from directory/layers: what a killed run leaves behind.

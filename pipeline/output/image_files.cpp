@@ -7,10 +7,10 @@
 
 #include "pipeline/job/file.h"
 #include "pipeline/job/keys.h"
-#include "pipeline/machine/printer_profile.h"
+#include "pipeline/machine/profiles.h"
 #include "pipeline/output/directory.h"
 #include "pipeline/output/resume.h"
-#include "pipeline/text/version.h"
+#include "stages/text/version.h"
 #include "stages/write/file.h"
 #include "stages/write/program/dialect.h"
 
@@ -36,14 +36,14 @@ ManifestHead image_head(const Plan& plan) {
   head.mirror = value_of("image", "mirror", job);
   head.grid = plan.images->grid;
   if (plan.images->materials.several()) head.materials = plan.images->materials.used;
-  if (!job.machine.resolved) return head;
-  const Machine& machine = job.machine.resolved->machine;
+  if (!plan.images->machine) return head;
+  const Machine& machine = plan.images->machine->machine;
   head.machine = machine.name;
   head.dialect = machine.dialect;
   if (const auto* dialect = write::find_dialect(machine.dialect)) head.program_extension = dialect->extension;
-  const std::string profile = machine_text(machine);
+  const std::string profile = read::machine_text(machine);
   head.machine_profile = hash_bytes(std::as_bytes(std::span(profile)));
-  const ProgramFrame frame = program_frame(*job.machine.resolved, plan.layer_count);
+  const ProgramFrame frame = program_frame(*plan.images->machine, plan.layer_count);
   head.program_start = hash_bytes(frame.start);
   head.program_end = hash_bytes(frame.end);
   return head;
@@ -51,7 +51,7 @@ ManifestHead image_head(const Plan& plan) {
 
 ImageFiles::ImageFiles(const Plan& plan)
     : plan_(plan), head_(image_head(plan)), format_(*write::find_image_format(plan.job.format)) {
-  if (plan.job.machine.resolved) program_.emplace(plan.job, plan.layer_count);
+  if (plan.images->machine) program_.emplace(*plan.images->machine, plan.job.output, plan.layer_count);
 }
 
 Status ImageFiles::open() {
@@ -124,7 +124,7 @@ Status ImageFiles::store(const Runs& whole, Work& work, LayerRecord& record) con
   if (!program_) return {};
   std::vector<std::uint64_t> pixels;
   for (const LayerImageFile& image : images) pixels.push_back(image.record.set_pixels);
-  const auto feeds = vats_of_layer(plan_.job.machine.resolved->machine, plan_.images->materials, pixels);
+  const auto feeds = vats_of_layer(plan_.images->machine->machine, plan_.images->materials, pixels);
   if (!feeds) {
     return Error{feeds.error().fault, fmt::format("layer {} (z {:.3f} mm): {}", record.layer.index, mm(record.layer.plane()),
                                                   feeds.error().message)};

@@ -9,13 +9,13 @@
 #include <string>
 #include <vector>
 
-#include "pipeline/output/manifest.h"
 #include "pipeline/output/plan_head.h"
 #include "pipeline/output/print_program.h"
 #include "pipeline/plan/plan.h"
 #include "stages/data/runs.h"
 #include "stages/data/status.h"
 #include "stages/write/image_format.h"
+#include "stages/write/manifest/manifest.h"
 
 namespace lamina::pipeline {
 

@@ -6,8 +6,8 @@
 #include <filesystem>
 
 #include "pipeline/output/directory.h"
-#include "pipeline/output/manifest.h"
 #include "pipeline/output/print_program.h"
+#include "stages/write/manifest/manifest.h"
 
 namespace lamina::pipeline {
 namespace {

@@ -3,7 +3,7 @@
 #include <filesystem>
 
 #include "pipeline/job/file.h"
-#include "pipeline/text/version.h"
+#include "stages/text/version.h"
 
 namespace lamina::pipeline {
 

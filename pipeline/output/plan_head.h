@@ -1,8 +1,8 @@
 // pipeline/output/plan_head.h: what every manifest says of its plan.
 #pragma once
 
-#include "pipeline/output/manifest.h"
 #include "pipeline/plan/plan.h"
+#include "stages/write/manifest/manifest.h"
 
 namespace lamina::pipeline {
 

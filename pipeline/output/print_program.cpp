@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-#include "pipeline/machine/printer_profile.h"
+#include "pipeline/machine/profiles.h"
 #include "stages/write/file.h"
 
 namespace lamina::pipeline {
@@ -21,16 +21,16 @@ ProgramFrame program_frame(const ResolvedMachine& resolved, std::uint32_t layers
   return frame;
 }
 
-PrintProgram::PrintProgram(const Job& job, std::uint32_t layers)
-    : resolved_(*job.machine.resolved),
-      dialect_(*write::find_dialect(resolved_.machine.dialect)),
-      directory_(job.output),
+PrintProgram::PrintProgram(const ResolvedMachine& resolved, std::string directory, std::uint32_t layers)
+    : resolved_(resolved),
+      dialect_(*write::find_dialect(resolved.machine.dialect)),
+      directory_(std::move(directory)),
       layers_(layers) {}
 
 std::string PrintProgram::path(std::string_view name) const { return fmt::format("{}/program/{}", directory_, name); }
 
 Status PrintProgram::begin() const {
-  const std::string profile = machine_text(resolved_.machine);
+  const std::string profile = read::machine_text(resolved_.machine);
   if (Status status = write::write_file(path("machine.toml"), std::as_bytes(std::span(profile))); !status) return status;
   const ProgramFrame frame = program_frame(resolved_, layers_);
   if (Status status = write::write_file(path(fmt::format("start{}", dialect_.extension)), frame.start); !status) return status;

@@ -13,11 +13,12 @@
 #include <string_view>
 
 #include "pipeline/job/job.h"
-#include "pipeline/output/manifest.h"
+#include "pipeline/machine/powder_printer.h"
 #include "stages/data/layer.h"
 #include "stages/data/runs.h"
 #include "stages/data/status.h"
 #include "stages/program/compile.h"
+#include "stages/write/manifest/manifest.h"
 #include "stages/write/program/dialect.h"
 
 namespace lamina::pipeline {
@@ -42,8 +43,8 @@ ProgramFrame program_frame(const ResolvedMachine& resolved, std::uint32_t layers
 
 class PrintProgram {
  public:
-  /// For a job with a resolved machine, which has to outlive it.
-  explicit PrintProgram(const Job& job, std::uint32_t layers);
+  /// directory  of the job; the machine has to outlive it
+  PrintProgram(const ResolvedMachine& resolved, std::string directory, std::uint32_t layers);
 
   /// Writes machine.toml, start and end. errors  kOutput
   Status begin() const;

@@ -6,6 +6,7 @@
 #include <system_error>
 #include <vector>
 
+#include "pipeline/job/decisions.h"
 #include "pipeline/output/directory.h"
 
 namespace lamina::pipeline {
@@ -44,6 +45,7 @@ std::string slice_file_name(const Job& job) {
 }
 
 Status check_slice_output(const Job& job) {
+  count(Decision::kOutput);
   std::error_code error;
   const fs::file_status status = fs::status(job.output, error);
   if (!fs::exists(status)) return {};
@@ -88,7 +90,7 @@ Status check_slice_output(const Job& job) {
 fs::path waiting_layers(const Job& job) { return fs::path(job.output) / "layers.part"; }
 
 Status prepare_slice_directory(const Job& job) {
-  if (Status status = check_slice_output(job); !status) return status;
+  if (Status status = check_nobody_came(job); !status) return status;
   std::error_code error;
   if (job.slice.file_a_layer) fs::remove_all(waiting_layers(job), error);  // of a run that was killed
   fs::create_directories(job.slice.file_a_layer ? waiting_layers(job) : fs::path(job.output), error);

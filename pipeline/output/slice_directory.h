@@ -22,7 +22,7 @@ Status check_slice_output(const Job& job);
 /// Where layers in files of their own wait until all are written.
 std::filesystem::path waiting_layers(const Job& job);
 
-/// check_slice_output, then makes the directory. What an earlier job left stays. errors  kUsage, kOutput
+/// After check_slice_output: makes the directory. What an earlier job left stays. errors  of check_nobody_came, kOutput
 Status prepare_slice_directory(const Job& job);
 
 /// Called when the job is whole: what an earlier job left is removed, and layers that wait get their names.

@@ -7,7 +7,7 @@
 #include "pipeline/job/file.h"
 #include "pipeline/output/plan_head.h"
 #include "pipeline/output/slice_directory.h"
-#include "pipeline/text/version.h"
+#include "stages/text/version.h"
 #include "stages/write/file.h"
 
 namespace lamina::pipeline {
@@ -88,19 +88,17 @@ void SliceFiles::encode(const write::SliceLayer& layer, Buffer<char>& text) cons
 }
 
 Status SliceFiles::store(std::uint32_t index, const Buffer<char>& text, LayerRecord& record) const {
-  if (!file_a_layer_ || !encoder_) return {};
+  if (!encoder_) return {};
   const auto bytes = std::as_bytes(std::span(text));
   record.bytes = bytes.size();
   record.hash = hash_bytes(bytes);
+  if (!file_a_layer_) return {};
   const std::string path = waiting_layers(plan_.job) / fmt::format("{:06}{}", index, slice_extension(plan_.job));
   return write::write_file(path, bytes, {.lock = false});
 }
 
 Status SliceFiles::record(const write::SliceLayer& layer, const Buffer<char>& text, LayerRecord& record) {
-  if (file_) {
-    if (Status status = file_->append({text.data(), text.size()}); !status) return status;
-    return file_->record(record);
-  }
+  if (file_) return file_->append({text.data(), text.size()}, record);
   if (package_) {
     if (Status status = package_->add(layer); !status) return status;
   }

@@ -7,10 +7,10 @@
 #include <optional>
 #include <string>
 
-#include "pipeline/output/layered_file.h"
 #include "pipeline/plan/plan.h"
 #include "stages/data/buffer.h"
 #include "stages/data/status.h"
+#include "stages/write/manifest/layered_file.h"
 #include "stages/write/slice3mf/slice3mf.h"
 #include "stages/write/slice_format.h"
 
@@ -34,7 +34,7 @@ class SliceFiles {
 
   // --- from many threads at once, each with a text of its own
   void encode(const write::SliceLayer& layer, Buffer<char>& text) const;
-  /// Of a file a layer: writes it. errors  kOutput
+  /// Size and hash of the text into the record; of a file a layer: writes it. errors  kOutput
   Status store(std::uint32_t index, const Buffer<char>& text, LayerRecord& record) const;
 
   // --- from one thread at a time, in layer order

@@ -6,11 +6,15 @@
 #include <cmath>
 #include <filesystem>
 
+#include "pipeline/job/decisions.h"
+#include "pipeline/job/heights.h"
 #include "pipeline/output/plan_head.h"
 #include "pipeline/plan/heights.h"
-#include "pipeline/text/json_text.h"
-#include "pipeline/text/version.h"
 #include "stages/heights/evaluate.h"
+#include "stages/read/profiles/extruder.h"
+#include "stages/text/json_text.h"
+#include "stages/text/readable.h"
+#include "stages/text/version.h"
 #include "stages/write/file.h"
 #include "stages/write/rp3/rp3.h"
 
@@ -70,6 +74,7 @@ Result<std::string> layer_table(const Plan& plan) {
 }  // namespace
 
 Status check_toolpath_output(const Job& job, const Extruder& machine) {
+  count(Decision::kOutput);
   const bool sml = machine.format == "sml";
   if (sml && table_path(job) == job.output) {
     return Error{Fault::kUsage, fmt::format("-o {}: is the name of its report; end it in .sml", job.output)};
@@ -108,7 +113,7 @@ Status ToolpathFile::open() {
   head.format = machine.format;
   head.file = fs::path(job.output).filename().string();
   head.machine = machine.name;
-  const std::string profile = extruder_text(plan_.moves->profile);
+  const std::string profile = read::extruder_text(plan_.moves->profile);
   head.machine_profile = hash_bytes(std::as_bytes(std::span(profile)));
   Buffer<char> start;
   format_->head({fmt::format("lamina {}", version()), source_text(plan_), layers(), plan_.segments->any()}, start);

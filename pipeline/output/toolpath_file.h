@@ -7,11 +7,11 @@
 #include <optional>
 #include <string_view>
 
-#include "pipeline/output/layered_file.h"
 #include "pipeline/plan/plan.h"
 #include "stages/data/buffer.h"
 #include "stages/data/status.h"
 #include "stages/write/extrusion_format.h"
+#include "stages/write/manifest/layered_file.h"
 
 namespace lamina::pipeline {
 
@@ -25,14 +25,13 @@ class ToolpathFile {
 
   /// errors  of LayeredFile::open
   Status open();
+  LayeredFile& file() { return *file_; }
   const LayeredFile& file() const { return *file_; }
 
   /// Takes the moves of a layer as text; from many threads at once, each with a text of its own.
   std::unique_ptr<write::LayerMoves> layer(const Layer& layer, Buffer<char>& text) const;
 
   // --- from one thread at a time, in layer order
-  Status append(std::string_view text) { return file_->append(text); }
-  Status record(LayerRecord& record) { return file_->record(record); }
   /// totals  of all layers. returns  the file's size
   Result<std::uint64_t> finish(const write::MoveTotals& totals);
   Status keep() { return file_ ? file_->keep() : Status(); }

@@ -1,4 +1,5 @@
-// stages/data/extruder.h: a material extrusion printer as its profile describes it. Plain values, units in the names.
+// stages/data/extruder.h: a material extrusion printer as its profile describes it, and what was measured on it. Plain values,
+// units in the names.
 #pragma once
 
 #include <array>
@@ -64,6 +65,47 @@ struct Extruder {
     std::vector<Pd> pd;
     std::string header, footer, height = "PZ{z};", travel = "PU{x},{y};", draw = "PA{x},{y};";  // 1/1000 inch
   } sml;
+};
+
+/// What a printer makes of speed and extrusion: measured tables. Percentages are relative to the reference: 100 % extrusion
+/// gives the set width at the set height, 100 % speed is that of walls and continuous lines.
+struct Calibration {
+  std::string source;                                       // of the numbers, for people
+  double width_mm = 0.4, height_mm = 0.3, speed_mm_s = 15;  // what 100 % means
+
+  /// A thin stretch between long thick ones, by its speed; extrusion 100 %.
+  struct BySpeed {
+    double percent, thin_mm;
+    double stable_mm;  // after this distance the bead is as wide as before: a longer thin stretch closes its pore
+    double swell_mm;   // width of the thick stretch that follows, at its widest
+  };
+  std::vector<BySpeed> by_speed;  // percent increasing, above 100
+
+  /// A thin stretch by its extrusion; speed 100 %.
+  struct ByExtrusion {
+    double percent, thin_mm;
+  };
+  std::vector<ByExtrusion> by_extrusion;  // percent decreasing, below 100
+
+  /// Short thick and thin stretches in turn: the thick speed that keeps widths the same along the part, and the widths.
+  struct Repeated {
+    double extrusion_percent, thin_speed_percent, thick_speed_percent;
+    double thick_mm, thin_mm, continuous_mm;
+  };
+  std::vector<Repeated> repeated;  // extrusion increasing
+
+  /// Spacings that were settled on for an extrusion, centre to centre; where there are none they follow from the widths.
+  struct Spaced {
+    double extrusion_percent, segmented_mm, continuous_mm;
+  };
+  std::vector<Spaced> spacing;  // extrusion increasing
+};
+
+/// A printer and what was measured on it.
+struct ExtruderProfile {
+  Extruder machine;
+  Calibration calibration;
+  bool own_calibration = false;  // the profile has one
 };
 
 }  // namespace lamina

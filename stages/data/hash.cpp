@@ -5,9 +5,11 @@
 #include <unistd.h>
 #include <xxhash.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <charconv>
 #include <cstring>
+#include <filesystem>
 #include <memory>
 #include <vector>
 
@@ -17,6 +19,8 @@ Hash128 hash_bytes(std::span<const std::byte> bytes) {
   const XXH128_hash_t hash = XXH3_128bits(bytes.data(), bytes.size());
   return {hash.high64, hash.low64};
 }
+
+Hash128 hash_text(std::string_view text) { return hash_bytes(std::as_bytes(std::span(text))); }
 
 std::string hex(const Hash128& hash) { return fmt::format("{:016x}{:016x}", hash.high, hash.low); }
 
@@ -53,6 +57,32 @@ Result<FileDigest> digest_file(const std::string& path) {
   ::close(file);
   const XXH128_hash_t hash = XXH3_128bits_digest(state.get());
   digest.hash = {hash.high64, hash.low64};
+  return digest;
+}
+
+Result<TreeDigest> digest_tree(const std::string& path) {
+  namespace fs = std::filesystem;
+  TreeDigest digest;
+  std::vector<fs::path> files;
+  std::error_code error;
+  if (fs::is_regular_file(path, error)) files.emplace_back(path);
+  if (fs::is_directory(path, error)) {
+    for (fs::recursive_directory_iterator at(path, error), end; !error && at != end; at.increment(error)) {
+      std::error_code ignored;
+      if (at->is_regular_file(ignored)) files.push_back(at->path());
+    }
+    if (error) return Error{Fault::kVerification, fmt::format("{}: {}", path, error.message())};
+  }
+  std::ranges::sort(files);
+  std::string text;
+  for (const fs::path& file : files) {
+    const Result<FileDigest> one = digest_file(file.string());
+    if (!one) return one.error();
+    text += fmt::format("{} {} {}\n", file.lexically_relative(path).string(), one->bytes, hex(one->hash));
+    digest.bytes += one->bytes;
+  }
+  digest.files = files.size();
+  digest.hash = hash_text(text);
   return digest;
 }
 

@@ -18,6 +18,7 @@ struct Hash128 {
 };
 
 Hash128 hash_bytes(std::span<const std::byte> bytes);
+Hash128 hash_text(std::string_view text);
 
 /// 32 lower-case hexadecimal digits, high half first: what `xxhsum -H2` prints.
 std::string hex(const Hash128& hash);
@@ -32,5 +33,14 @@ struct FileDigest {
 /// Size and hash of a file, read in pieces of 256 KiB.
 /// errors  kVerification with the file's name and the system's reason
 Result<FileDigest> digest_file(const std::string& path);
+
+struct TreeDigest {
+  std::uint64_t files = 0, bytes = 0;
+  Hash128 hash;  // of names, sizes and contents
+};
+
+/// The regular files at or below `path`, in the order of their names; no file if there is none.
+/// errors  kVerification if one cannot be read
+Result<TreeDigest> digest_tree(const std::string& path);
 
 }  // namespace lamina

@@ -87,4 +87,11 @@ struct Machine {
   } powder;
 };
 
+/// A powder that parts of a job are of.
+struct JobMaterial {
+  std::string name;       // empty if no part names one
+  std::uint32_t vat = 0;  // of the machine, from 0
+  bool operator==(const JobMaterial&) const = default;
+};
+
 }  // namespace lamina

@@ -79,4 +79,14 @@ struct Part {
   std::vector<Note> notes;
 };
 
+/// What the manifest and the summary say of one [[part]].
+struct PartSummary {
+  std::string path;
+  std::uint32_t copies = 1;
+  std::uint64_t triangles = 0;  // of the file, once
+  std::uint64_t fingerprint = 0;
+  Box bounds;  // nm, of the first copy, on the bed
+  std::vector<Note> notes;
+};
+
 }  // namespace lamina

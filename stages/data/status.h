@@ -1,10 +1,12 @@
 // stages/data/status.h: expected failures are values that say where and what to do.
 #pragma once
 
+#include <cstdint>
 #include <optional>
 #include <string>
 #include <utility>
 #include <variant>
+#include <vector>
 
 namespace lamina {
 
@@ -63,5 +65,15 @@ class [[nodiscard]] Result<void> {
 };
 
 using Status = Result<void>;
+
+/// What is wrong with many files.
+struct Faults {
+  std::uint64_t fault_count = 0;
+  std::vector<std::string> faults;  // the first 20; each begins with a file's name
+  bool ok() const { return fault_count == 0; }
+  void add(std::string fault) {
+    if (++fault_count <= 20) faults.push_back(std::move(fault));
+  }
+};
 
 }  // namespace lamina

@@ -16,6 +16,14 @@ inline constexpr std::int64_t kNmReach = 2'147'483'647;
 /// Millimetres of a length in nanometres; for reports, never for decisions.
 constexpr double mm(std::int64_t nm) { return static_cast<double>(nm) / kNmPerMm; }
 
+/// To the nearest whole number, halves away from zero: llround() without the call. |value| < 2^63
+inline std::int64_t nearest(double value) {
+  // Truncation is exact, the rest is exact, and so is its comparison with a half.
+  const auto whole = static_cast<std::int64_t>(value);
+  const double rest = value - static_cast<double>(whole);
+  return whole + (rest >= 0.5 ? 1 : 0) - (rest <= -0.5 ? 1 : 0);
+}
+
 /// Nanometres of a length in millimetres, to the nearest.
 inline std::int64_t nm_of(double millimetres) { return std::llround(millimetres * static_cast<double>(kNmPerMm)); }
 

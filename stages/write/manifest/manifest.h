@@ -1,4 +1,4 @@
-// pipeline/output/manifest.h: what a finished job says of itself; every product leaves one of this kind.
+// stages/write/manifest/manifest.h: what a finished job says of itself; every product leaves one of this kind.
 //
 // A manifest is JSON with one line a layer, in layer order. It holds nothing that differs between two runs of the same
 // job: no times, no thread counts, no engine, no host. While a job runs it grows as NAME.json.part, so that an
@@ -16,16 +16,15 @@
 #include <string_view>
 #include <vector>
 
-#include "pipeline/job/job.h"
-#include "pipeline/job/product.h"
-#include "pipeline/machine/materials.h"
-#include "pipeline/output/record.h"
-#include "pipeline/plan/scene.h"
+#include "stages/data/choices.h"
 #include "stages/data/grid.h"
 #include "stages/data/hash.h"
+#include "stages/data/machine.h"
+#include "stages/data/mesh.h"
 #include "stages/data/status.h"
+#include "stages/write/manifest/record.h"
 
-namespace lamina::pipeline {
+namespace lamina {
 
 /// Of the lines and keys of a manifest; readers refuse others.
 inline constexpr int kManifestVersion = 2;
@@ -55,6 +54,9 @@ struct ManifestHead {
   Hash128 id() const;
 };
 
+/// "bracket.stl and 2 more"; empty without parts.
+std::string title_of(const std::vector<PartSummary>& parts);
+
 /// What keeps two heads from belonging to the same job, as "bed.dpi is [600, 600], was [1200, 1200]"; empty if nothing.
 std::string difference(const ManifestHead& now, const ManifestHead& earlier);
 
@@ -65,8 +67,6 @@ struct Manifest {
   FileDigest file;                  // the one file of all layers, if there is one and the manifest is complete
 };
 
-/// Name of the manifest in a directory of images: manifest.json, or manifest-<i>-of-<n>.json for a shard.
-std::string manifest_name(const Job& job);
 /// The name of a layer's file in the job's directory, layers/000042.tif, or layers/000042-bronze.tif of a job with several
 /// materials; empty for a format without files.
 std::string layer_file_name(std::uint32_t index, std::string_view extension, std::string_view material = {});
@@ -116,4 +116,4 @@ class ManifestWriter {
   std::unique_ptr<State> state_;
 };
 
-}  // namespace lamina::pipeline
+}  // namespace lamina

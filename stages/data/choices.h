@@ -1,9 +1,15 @@
-// stages/data/fill_rule.h: which winding numbers are solid.
+// stages/data/choices.h: the ways of working among which a job chooses, by name; the stages that know them say more.
 #pragma once
 
 #include <cstdint>
 
 namespace lamina {
+
+/// Bitmaps of a powder printer, contours of layers, or the moves of an extrusion printer.
+enum class Product { kImages, kContours, kMoves };
+
+/// The bit of a product in a set of them.
+constexpr unsigned bit(Product product) { return 1u << static_cast<unsigned>(product); }
 
 /// Applied to the winding number of all facets together about a point.
 enum class FillRule : std::uint8_t {
@@ -22,3 +28,10 @@ constexpr bool is_solid(FillRule rule, std::int32_t winding) {
 }
 
 }  // namespace lamina
+
+namespace lamina::raster {
+
+/// Of beads, where they end and where thick becomes thin.
+enum class BeadEnds : std::uint8_t { kRound, kSquare };
+
+}  // namespace lamina::raster

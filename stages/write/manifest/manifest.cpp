@@ -1,5 +1,5 @@
-// pipeline/output/manifest.cpp: the head of a manifest, and the file that grows while a job runs.
-#include "pipeline/output/manifest.h"
+// stages/write/manifest/manifest.cpp: the head of a manifest, and the file that grows while a job runs.
+#include "stages/write/manifest/manifest.h"
 
 #include <fmt/format.h>
 
@@ -8,16 +8,22 @@
 #include <optional>
 #include <utility>
 
-#include "pipeline/output/manifest_head.h"
-#include "pipeline/output/manifest_line.h"
-#include "pipeline/text/number_text.h"
+#include "stages/text/number_text.h"
 #include "stages/write/file.h"
+#include "stages/write/manifest/manifest_head.h"
+#include "stages/write/manifest/manifest_line.h"
 
-namespace lamina::pipeline {
+namespace lamina {
 
 Hash128 ManifestHead::id() const {
   const std::string text = lasting_text(*this);
   return hash_bytes(std::as_bytes(std::span(text)));
+}
+
+std::string title_of(const std::vector<PartSummary>& parts) {
+  if (parts.empty()) return {};
+  const std::string name = std::filesystem::path(parts.front().path).filename().string();
+  return parts.size() == 1 ? name : name + " and " + std::to_string(parts.size() - 1) + " more";
 }
 
 std::string difference(const ManifestHead& now, const ManifestHead& earlier) {
@@ -46,11 +52,6 @@ std::string difference(const ManifestHead& now, const ManifestHead& earlier) {
   }
   if (now.machine_profile != earlier.machine_profile) return "the machine, or its profile, has changed";
   return "the parts have changed";
-}
-
-std::string manifest_name(const Job& job) {
-  if (!job.shard) return "manifest.json";
-  return fmt::format("manifest-{}-of-{}.json", (*job.shard)[0] + 1, (*job.shard)[1]);
 }
 
 std::string layer_file_name(std::uint32_t index, std::string_view extension, std::string_view material) {
@@ -180,4 +181,4 @@ Status ManifestWriter::finish(const FileDigest& file) {
 
 void ManifestWriter::discard() { state_->file.discard(); }
 
-}  // namespace lamina::pipeline
+}  // namespace lamina

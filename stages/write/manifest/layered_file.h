@@ -1,4 +1,4 @@
-// pipeline/output/layered_file.h: one file that holds all layers, and the manifest that grows with it.
+// stages/write/manifest/layered_file.h: one file that holds all layers, and the manifest that grows with it.
 //
 // While the job runs, NAME.part and the manifest's .part grow together: the lines that are whole say how far the file
 // stands. They stay after a signal or a kill, and a resumed job goes on behind the last layer whose bytes hold.
@@ -10,11 +10,11 @@
 #include <string_view>
 #include <vector>
 
-#include "pipeline/output/manifest.h"
 #include "stages/data/buffer.h"
 #include "stages/data/status.h"
+#include "stages/write/manifest/manifest.h"
 
-namespace lamina::pipeline {
+namespace lamina {
 
 class LayeredFile {
  public:
@@ -36,10 +36,12 @@ class LayeredFile {
   /// Nothing is left to do: file and manifest are finished and hold.
   bool finished() const;
 
-  /// A piece of the layer that comes next.
-  Status append(std::string_view text);
-  /// Ends the layer: its place, size and hash go into the record, and that into the manifest.
-  Status record(LayerRecord& record);
+  /// The layer that comes next; its record has its size and hash, gets its place and goes into the manifest.
+  Status append(std::string_view text, LayerRecord& record);
+  /// A piece of the layer that comes next, of many.
+  Status append_piece(std::string_view text);
+  /// Ends a layer of pieces: its place, size and hash go into the record, and that into the manifest.
+  Status end_pieces(LayerRecord& record);
   /// Adds what stands behind the last layer and gives both files their names. returns  the file's size
   Result<std::uint64_t> finish(std::string_view end);
   /// An interrupted or failed job: whole layers stay, for a resumed run.
@@ -54,4 +56,4 @@ class LayeredFile {
   std::unique_ptr<State> state_;
 };
 
-}  // namespace lamina::pipeline
+}  // namespace lamina

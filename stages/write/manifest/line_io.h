@@ -1,22 +1,22 @@
-// pipeline/output/line_io.h: one line of JSON, written and read piece by piece through the same calls.
+// stages/write/manifest/line_io.h: one line of JSON, written and read piece by piece through the same calls.
 //
 // A line is read exactly as it is written: a hundred thousand of them take a few hundredths of a second, and no other
 // spelling is accepted.
 #pragma once
 
+#include <fmt/compile.h>
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <charconv>
-#include <iterator>
 #include <string>
 #include <string_view>
 
-#include "pipeline/text/json_text.h"
 #include "stages/data/hash.h"
 #include "stages/data/layer.h"
+#include "stages/text/json_text.h"
 
-namespace lamina::pipeline {
+namespace lamina {
 
 /// Appends the pieces of a line.
 class LineWriter {
@@ -25,7 +25,8 @@ class LineWriter {
   template <class Number>
   void number(std::string_view key, const Number& value) {
     begin(key);
-    fmt::format_to(std::back_inserter(out_), "{}", value);
+    char text[32];
+    out_.append(text, fmt::format_to(text, FMT_COMPILE("{}"), value));
   }
   /// A text that follows from the rest of the line.
   void fixed(std::string_view key, std::string_view value) {
@@ -34,7 +35,8 @@ class LineWriter {
   }
   void hash(std::string_view key, const Hash128& value) {
     begin(key);
-    fmt::format_to(std::back_inserter(out_), "\"{:016x}{:016x}\"", value.high, value.low);
+    char text[40];
+    out_.append(text, fmt::format_to(text, FMT_COMPILE("\"{:016x}{:016x}\""), value.high, value.low));
   }
   void reason(std::string_view key, const LayerReason& value) { fixed(key, reason_name(value)); }
   /// Opens an object or a list below a key; without a key it is an element of a list.
@@ -54,7 +56,10 @@ class LineWriter {
 
  private:
   void begin(std::string_view key) {
-    fmt::format_to(std::back_inserter(out_), "{}\"{}\": ", first_ ? "" : ", ", key);
+    if (!first_) out_ += ", ";
+    out_ += '"';
+    out_ += key;
+    out_ += "\": ";
     first_ = false;
   }
   std::string& out_;
@@ -129,4 +134,4 @@ class LineReader {
   bool first_ = true;
 };
 
-}  // namespace lamina::pipeline
+}  // namespace lamina

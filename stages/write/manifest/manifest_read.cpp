@@ -3,11 +3,12 @@
 
 #include <fstream>
 
-#include "pipeline/output/manifest.h"
-#include "pipeline/output/manifest_head.h"
-#include "pipeline/output/manifest_line.h"
+#include "stages/text/readable.h"
+#include "stages/write/manifest/manifest.h"
+#include "stages/write/manifest/manifest_head.h"
+#include "stages/write/manifest/manifest_line.h"
 
-namespace lamina::pipeline {
+namespace lamina {
 namespace {
 
 constexpr std::size_t kLongestHead = 256u << 20;
@@ -104,4 +105,4 @@ std::optional<Product> product_of_manifest(const std::string& path) {
   return head->product;
 }
 
-}  // namespace lamina::pipeline
+}  // namespace lamina

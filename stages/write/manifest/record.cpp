@@ -1,6 +1,6 @@
-#include "pipeline/output/record.h"
+#include "stages/write/manifest/record.h"
 
-namespace lamina::pipeline {
+namespace lamina {
 
 void PathFacts::add(const PathFacts& other) {
   contours += other.contours;
@@ -16,4 +16,4 @@ void PathFacts::add(const PathFacts& other) {
   porosity.add(other.porosity);
 }
 
-}  // namespace lamina::pipeline
+}  // namespace lamina

@@ -1,4 +1,4 @@
-#include "pipeline/output/manifest_head.h"
+#include "stages/write/manifest/manifest_head.h"
 
 #include <fmt/format.h>
 
@@ -7,7 +7,7 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
-namespace lamina::pipeline {
+namespace lamina {
 namespace {
 
 using Json = nlohmann::ordered_json;
@@ -203,4 +203,4 @@ bool read_tail(const ManifestHead& head, const std::string& text, FileDigest& fi
   return whole.substr(whole.find(head.file.empty() ? "]\n" : "],\n") + (head.file.empty() ? 2 : 3)) == text;
 }
 
-}  // namespace lamina::pipeline
+}  // namespace lamina

@@ -4,9 +4,10 @@
 #include <nlohmann/json.hpp>
 
 #include "pipeline/job/file.h"
-#include "pipeline/output/manifest.h"
-#include "pipeline/text/version.h"
+#include "pipeline/machine/powder_printer.h"
 #include "stages/data/hash.h"
+#include "stages/text/version.h"
+#include "stages/write/manifest/manifest.h"
 #include "tests/commands/program.h"
 
 namespace lamina::pipeline {
@@ -25,7 +26,7 @@ ManifestHead head_of(const Job& job, const std::vector<PartSummary>& parts, std:
   head.extension = ".tif";
   head.fill_rule = "nonzero";
   head.mirror = "none";
-  head.grid = grid_of(job);
+  head.grid = resolve_powder_printer(job)->grid;
   head.layer_count = layers;
   head.first_layer = first;
   head.last_layer = last;

@@ -1,4 +1,4 @@
-// pipeline/output/record.h: what a manifest says of one layer.
+// stages/write/manifest/record.h: what a manifest says of one layer.
 #pragma once
 
 #include <cstdint>
@@ -7,10 +7,10 @@
 
 #include "stages/data/hash.h"
 #include "stages/data/layer.h"
-#include "stages/segment/moves.h"
+#include "stages/data/toolpaths.h"
 #include "stages/write/extrusion_format.h"
 
-namespace lamina::pipeline {
+namespace lamina {
 
 /// The print program of a layer, for a job with a machine.
 struct ProgramRecord {
@@ -31,13 +31,13 @@ struct ImageRecord {
 struct PathFacts {
   std::uint64_t contours = 0, points = 0, paths = 0, united = 0, open = 0;  // united: bodies that needed a union
   double area_mm2 = 0;                                                      // within the contours
-  double bead_mm = 0;                                                       // length of the stored toolpaths
+  double bead_mm = 0;                                                       // length of the stored toolpaths, of contours only
 
   // --- toolpaths of an extrusion printer
   std::uint64_t stored_points = 0;
   write::MoveTotals totals;
-  segment::SegmentCounts segments;
-  segment::PlannedPorosity porosity;
+  SegmentCounts segments;
+  PlannedPorosity porosity;
 
   /// Sums; in layer order they are the same whoever adds them.
   void add(const PathFacts& other);
@@ -58,4 +58,4 @@ struct LayerRecord {
   std::shared_ptr<const PathFacts> paths;  // null for images
 };
 
-}  // namespace lamina::pipeline
+}  // namespace lamina

@@ -1,11 +1,11 @@
-// pipeline/output/manifest_head.h: the text around the lines of a manifest, for its writer and its reader.
+// stages/write/manifest/manifest_head.h: the text around the lines of a manifest, for its writer and its reader.
 #pragma once
 
 #include <string>
 
-#include "pipeline/output/manifest.h"
+#include "stages/write/manifest/manifest.h"
 
-namespace lamina::pipeline {
+namespace lamina {
 
 /// The head without what differs between shards of one job: what its id is the hash of.
 std::string lasting_text(const ManifestHead& head);
@@ -22,4 +22,4 @@ Result<ManifestHead> read_head(const std::string& text);
 /// Reads what tail_text() wrote, without its first line. errors  false if it is another text
 bool read_tail(const ManifestHead& head, const std::string& text, FileDigest& file);
 
-}  // namespace lamina::pipeline
+}  // namespace lamina

@@ -1,12 +1,12 @@
-// pipeline/output/manifest_line.h: the line of a layer in a manifest, described once for its writer and its reader.
+// stages/write/manifest/manifest_line.h: the line of a layer in a manifest, described once for its writer and its reader.
 #pragma once
 
 #include <string_view>
 
-#include "pipeline/output/line_io.h"
-#include "pipeline/output/manifest.h"
+#include "stages/write/manifest/line_io.h"
+#include "stages/write/manifest/manifest.h"
 
-namespace lamina::pipeline {
+namespace lamina {
 
 template <class Io, class Paths>
 void describe_moves(Io& io, Paths& paths) {
@@ -40,7 +40,7 @@ void describe_paths(Io& io, Product product, Paths& paths) {
   io.number("points", paths.points);
   io.number("area_mm2", paths.area_mm2);
   io.number("paths", paths.paths);
-  io.number("bead_mm", paths.bead_mm);
+  if (product == Product::kContours) io.number("bead_mm", paths.bead_mm);
   io.number("united", paths.united);
   io.number("open", paths.open);
   if (product == Product::kMoves) describe_moves(io, paths);
@@ -99,4 +99,4 @@ void describe_line(Io& io, const ManifestHead& head, Record& record, Paths& path
   io.close("}");
 }
 
-}  // namespace lamina::pipeline
+}  // namespace lamina

@@ -1,4 +1,4 @@
-#include "pipeline/output/layered_file.h"
+#include "stages/write/manifest/layered_file.h"
 
 #include <fmt/format.h>
 #include <unistd.h>
@@ -11,7 +11,7 @@
 
 #include "stages/write/file.h"
 
-namespace lamina::pipeline {
+namespace lamina {
 namespace {
 
 bool is_there(const std::string& path) { return ::access(path.c_str(), F_OK) == 0; }
@@ -131,13 +131,21 @@ const std::vector<LayerRecord>& LayeredFile::kept() const { return state_->kept;
 bool LayeredFile::finished() const { return state_->finished; }
 std::uint64_t LayeredFile::size() const { return state_->size; }
 
-Status LayeredFile::append(std::string_view text) {
+Status LayeredFile::append(std::string_view text, LayerRecord& record) {
+  State& state = *state_;
+  record.offset = state.size;
+  state.layer_begin = state.size += text.size();
+  if (Status status = state.file->append(text); !status) return status;
+  return state.manifest ? state.manifest->append(record) : Status();
+}
+
+Status LayeredFile::append_piece(std::string_view text) {
   state_->hasher.add(text);
   state_->size += text.size();
   return state_->file->append(text);
 }
 
-Status LayeredFile::record(LayerRecord& record) {
+Status LayeredFile::end_pieces(LayerRecord& record) {
   State& state = *state_;
   record.offset = state.layer_begin;
   record.bytes = state.size - state.layer_begin;
@@ -172,4 +180,4 @@ void LayeredFile::discard() {
   if (state_->manifest) state_->manifest->discard();
 }
 
-}  // namespace lamina::pipeline
+}  // namespace lamina

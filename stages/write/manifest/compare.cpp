@@ -1,0 +1,118 @@
+#include "stages/write/manifest/compare.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <fstream>
+
+namespace lamina {
+namespace {
+
+namespace fs = std::filesystem;
+
+class PathComparison {
+ public:
+  PathComparison(const std::string& directory, const Manifest& manifest, Faults& faults)
+      : directory_(directory), manifest_(manifest), faults_(faults) {}
+
+  std::uint64_t run() {
+    if (!manifest_.head.file.empty()) check_file();
+    if (!manifest_.head.extension.empty()) check_layer_files();
+    return bytes_;
+  }
+
+ private:
+  /// The one file of all layers; where it differs, which layers do.
+  void check_file() {
+    const std::string& name = manifest_.head.file;
+    const fs::path path = directory_ / name;
+    std::error_code error;
+    if (!fs::is_regular_file(path, error)) return faults_.add(fmt::format("{}: is missing", name));
+    const auto digest = digest_file(path.string());
+    if (!digest) return faults_.add(digest.error().message);
+    bytes_ = digest->bytes;
+    if (digest->bytes == manifest_.file.bytes && digest->hash == manifest_.file.hash) return check_places();
+    const std::uint64_t before = faults_.fault_count;
+    check_stretches(path);
+    if (faults_.fault_count > before) return;
+    if (digest->bytes != manifest_.file.bytes) {
+      faults_.add(fmt::format("{}: {} bytes, the manifest says {}", name, digest->bytes, manifest_.file.bytes));
+    } else if (has_stretches()) {
+      faults_.add(fmt::format("{}: before its first or behind its last layer it is not what was written", name));
+    } else {
+      faults_.add(fmt::format("{}: its content is not what was written", name));
+    }
+  }
+
+  /// Whether layers are stretches of the file; those of a package are not.
+  bool has_stretches() const {
+    return std::ranges::any_of(manifest_.layers, [](const LayerRecord& record) { return record.bytes > 0; });
+  }
+
+  void check_places() {
+    for (std::size_t i = 0; i + 1 < manifest_.layers.size(); ++i) {
+      const LayerRecord &layer = manifest_.layers[i], &next = manifest_.layers[i + 1];
+      if (layer.offset + layer.bytes == next.offset) continue;
+      faults_.add(fmt::format("{}: layer {} begins at byte {}, the manifest says {}", manifest_.head.file, next.layer.index,
+                              layer.offset + layer.bytes, next.offset));
+    }
+  }
+
+  void check_stretches(const fs::path& path) {
+    if (!has_stretches()) return;
+    std::ifstream file(path, std::ios::binary);
+    std::error_code error;
+    const std::uint64_t size = fs::file_size(path, error);
+    std::string text;
+    for (const LayerRecord& record : manifest_.layers) {
+      if (record.bytes > size || record.offset > size - record.bytes) {
+        return faults_.add(fmt::format("{}: ends within layer {}", manifest_.head.file, record.layer.index));
+      }
+      text.resize(record.bytes);
+      file.seekg(static_cast<std::streamoff>(record.offset));
+      file.read(text.data(), static_cast<std::streamsize>(text.size()));
+      if (file && hash_bytes(std::as_bytes(std::span(text))) == record.hash) continue;
+      faults_.add(fmt::format("{}: layer {} is not what was written", manifest_.head.file, record.layer.index));
+    }
+  }
+
+  void check_layer_files() {
+    for (const LayerRecord& record : manifest_.layers) {
+      const std::string name = layer_file_name(record.layer.index, manifest_.head.extension);
+      bytes_ += record.bytes;
+      std::string fault = fault_of_file(directory_.string(), name, record.hash, record.bytes);
+      if (!fault.empty()) faults_.add(std::move(fault));
+    }
+    std::uint64_t found = 0;
+    std::error_code error;
+    for (fs::directory_iterator entry(directory_ / "layers", error), end; !error && entry != end; entry.increment(error))
+      ++found;
+    if (found <= manifest_.layers.size()) return;
+    faults_.add(fmt::format("layers: holds {} files that the manifest does not name", found - manifest_.layers.size()));
+  }
+
+  fs::path directory_;
+  const Manifest& manifest_;
+  Faults& faults_;
+  std::uint64_t bytes_ = 0;
+};
+
+}  // namespace
+
+std::string fault_of_file(const std::string& directory, const std::string& name, const Hash128& hash,
+                          std::optional<std::uint64_t> bytes) {
+  const std::string path = (fs::path(directory) / name).string();
+  std::error_code error;
+  if (!fs::is_regular_file(path, error)) return fmt::format("{}: is missing", name);
+  const Result<FileDigest> digest = digest_file(path);
+  if (!digest) return digest.error().message;
+  if (bytes && digest->bytes != *bytes) return fmt::format("{}: {} bytes, the manifest says {}", name, digest->bytes, *bytes);
+  return digest->hash == hash ? "" : fmt::format("{}: its content is not what was written", name);
+}
+
+std::uint64_t compare_paths(const std::string& directory, const Manifest& manifest, Faults& faults) {
+  return PathComparison(directory, manifest, faults).run();
+}
+
+}  // namespace lamina
