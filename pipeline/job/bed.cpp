@@ -6,29 +6,23 @@ namespace {
 
 constexpr Limits kSize{kLeastMm, kMostMm, " mm"}, kDpi{1, 25400, "", true};
 
-std::string read_bed(std::string_view text, Job& job) {
-  auto wrong = read_value(text, kSize, job.bed_mm);
-  job.machine.bed_given = job.machine.bed_given || wrong.empty();
-  return wrong;
+// A machine has its own bed and dpi, unless others are asked of it; jobs without one say those of a bare bed.
+template <auto Member, const auto& Bare>
+JobKey of_bed(const KeyName& name, const Limits& limits) {
+  JobKey key = field<Member>(name, limits);
+  key.write_text = [](const JobKey&, const Job& job) {
+    const auto& asked = job.*Member;
+    return asked || !job.machine.profile.empty() ? value_text(asked) : value_text(Bare);
+  };
+  return key;
 }
-std::string write_bed(const Job& job) { return value_text(job.bed_mm); }
 
-std::string read_dpi(std::string_view text, Job& job) {
-  auto wrong = read_value(text, kDpi, job.dpi);
-  job.machine.dpi_given = job.machine.dpi_given || wrong.empty();
-  return wrong;
-}
-std::string write_dpi(const Job& job) { return value_text(job.dpi); }
-
-// A machine has its own bed and dpi, unless others were asked of it.
 const JobKey kBedKeys[] = {
-    custom<Job, read_bed, write_bed>({"bed", "size_mm", "--bed", "WIDTHxDEPTH",
+    of_bed<&Job::bed_mm, kBareBedMm>({"bed", "size_mm", "--bed", "WIDTHxDEPTH",
                                       "size of the bed in mm; the image covers all of it", decides::images | decides::contours},
-                                     Form::kList)
-        .shown_if([](const Job& job) { return job.machine.profile.empty() || job.machine.bed_given; }),
-    custom<Job, read_dpi, write_dpi>(
-        {"bed", "dpi", "--dpi", "DPI|XxY", "pixels per inch along x and y, each 1 to 25400", decides::images}, Form::kList)
-        .shown_if([](const Job& job) { return job.machine.profile.empty() || job.machine.dpi_given; }),
+                                     kSize),
+    of_bed<&Job::dpi, kBareDpi>(
+        {"bed", "dpi", "--dpi", "DPI|XxY", "pixels per inch along x and y, each 1 to 25400", decides::images}, kDpi),
     field<&Job::layer_mm>({"layers", "thickness_mm", "--layer", "MM", "thickness of a layer in mm", decides::all}, kSize),
 };
 

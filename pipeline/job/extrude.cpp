@@ -1,69 +1,21 @@
 // Section [extrude].
-#include "pipeline/job/extrude.h"
-
-#include <algorithm>
+#include "pipeline/job/job.h"
 
 #include "pipeline/job/keys.h"
+#include "stages/read/profiles/changes.h"
 
 namespace lamina::pipeline {
 namespace {
 
-using Changes = std::vector<std::pair<std::string, std::string>>;
-
-/// Keys of a profile with their section: { fan = { from_layer = 2 } }, or fan.from_layer = 2.
-std::string read_machine_tree(const TomlValue& table, Changes& changes, Place& at) {
-  if (!table.is_table()) return "is a table of keys of the machine's profile, as in fan.from_layer = 2";
-  Changes read;
-  for (std::size_t s = 0; s < table.value.size(); ++s) {
-    at = table.value[s].place;
-    if (!table.value[s].is_table()) return fmt::format("{}: is not section.key, as in fan.from_layer = 2", table.name[s]);
-    for (std::size_t i = 0; i < table.value[s].value.size(); ++i) {
-      at = table.value[s].value[i].place;
-      const std::string name = fmt::format("{}.{}", table.name[s], table.value[s].name[i]);
-      const auto text = flat_text(table.value[s].value[i]);
-      if (!text) return fmt::format("{}: is not a single value or a list of them", name);
-      read.emplace_back(name, *text);
-    }
-  }
-  changes = std::move(read);
-  return {};
-}
-
-/// The same as an option: "fan.from_layer=2; bed.corner_mm=-110,-110".
-std::string read_machine_text(std::string_view text, Changes& changes) {
-  if (text.starts_with('{')) {
-    Place unused;
-    const auto table = read_toml_value(text);
-    return table ? read_machine_tree(*table, changes, unused) : "is no table";
-  }
-  Changes read;
-  for (std::string_view change : split(text, ";")) {
-    change = trimmed(change);
-    if (change.empty()) continue;
-    const std::size_t equals = change.find('='), dot = change.find('.');
-    if (equals == std::string_view::npos || dot > equals) return fmt::format("'{}' is not section.key=value", change);
-    read.emplace_back(change.substr(0, equals), change.substr(equals + 1));
-  }
-  std::ranges::stable_sort(read, {}, &Changes::value_type::first);  // as a table is read: the same job is the same text
-  changes = std::move(read);
-  return {};
-}
-
-std::string machine_changes_text(const Changes& changes) {
-  std::string text;
-  for (const auto& [name, value] : changes) text += fmt::format("{}{} = {}", text.empty() ? "" : ", ", name, toml_text(value));
-  return text.empty() ? text : fmt::format("{{ {} }}", text);
+std::string read_machine_changes(const TomlValue& tree, read::ProfileChanges& changes, Place& at) {
+  return tree.is_text() ? read::read_changes(tree.text, changes) : read::read_changes(tree, changes, at);
 }
 
 JobKey machine_key() {
-  JobKey key = structure<read_machine_tree, machine_changes_text, &Job::extrude, &ExtrudeRequest::machine>(
+  JobKey key = structure<read_machine_changes, read::changes_text, &Job::extrude, &ExtrudeRequest::machine>(
       {"extrude", "machine", "--machine-set", "KEY=VALUE;...", "other keys of the machine's profile, as in fan.from_layer=2",
        decides::moves});
-  key.read_text = [](const JobKey&, std::string_view text, Job& job) { return read_machine_text(text, job.extrude.machine); };
-  key.read_tree = [](const JobKey&, const TomlValue& tree, Job& job, Place& at) {
-    return tree.is_text() ? read_machine_text(tree.text, job.extrude.machine)
-                          : read_machine_tree(tree, job.extrude.machine, at);
-  };
+  key.read_text = [](const JobKey&, std::string_view text, Job& job) { return read::read_changes(text, job.extrude.machine); };
   return key;
 }
 

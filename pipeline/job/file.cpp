@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
@@ -9,7 +10,7 @@
 
 #include "pipeline/job/keys.h"
 #include "pipeline/job/old_forms.h"
-#include "pipeline/text/json_text.h"
+#include "stages/text/json_text.h"
 #include "stages/write/file.h"
 
 namespace lamina::pipeline {

@@ -3,9 +3,10 @@
 
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "pipeline/job/job.h"
-#include "pipeline/job/product.h"
+#include "stages/data/choices.h"
 #include "stages/data/status.h"
 
 namespace lamina::pipeline {
@@ -22,6 +23,14 @@ Status read_job_text(std::string_view text, const std::string& path, Job& job);
 /// Sets one key from "section.key=value". part.key sets it for every part, part.2.key for the second one.
 /// errors  kUsage, one line that begins with the assignment
 Status set_key(Job& job, std::string_view assignment);
+
+/// A key of a job file or of one of its parts, as people are told of it.
+struct KeyFacts {
+  std::string name, flag, value, preset, meaning;  // "bed.dpi", "--dpi", "DPI|XxY", "1200", ...
+  bool decides_images = false;                     // whether another value gives other images
+};
+/// Every key, those of parts last.
+std::vector<KeyFacts> key_facts();
 
 /// The whole job as a TOML file would say it. Paths are written relative to `directory` where they lie below it, else
 /// absolute; as they are if `directory` is empty.

@@ -2,7 +2,7 @@
 #include "pipeline/job/fill.h"
 
 #include "pipeline/job/keys.h"
-#include "pipeline/text/ranges.h"
+#include "stages/text/ranges.h"
 
 namespace lamina::pipeline {
 namespace {

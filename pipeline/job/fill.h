@@ -1,45 +1,16 @@
 // pipeline/job/fill.h: how layers are to be filled, as a job says it: section [fill], and fill of a [[part]].
 #pragma once
 
-#include <array>
-#include <cstdint>
-#include <optional>
-#include <span>
-#include <string>
 #include <string_view>
 #include <vector>
 
-#include "pipeline/text/changes.h"
-#include "stages/infill/parameters.h"
+#include "stages/infill/settings.h"
+#include "stages/text/changes.h"
 
 namespace lamina::pipeline {
 
-struct Place;
-struct TomlValue;
-template <class Target>
-struct Key;
-
-/// The keys of one filling, lengths in mm, angles in degrees. Lists are taken in turn.
-struct FillSettings {
-  infill::Pattern pattern = infill::Pattern::kNone;
-  double width_mm = 0.4;
-  double wall_width_mm = 0;  // 0: like width_mm
-  std::uint32_t walls = 0;
-  std::uint32_t loops = 1;
-  double angle_deg = 45, angle_step_deg = 90;
-  std::uint32_t build_layers = 1;
-  std::vector<double> gap_mm{0};
-  std::vector<double> distance_mm;
-  std::uint32_t group = 1;
-  std::vector<std::array<double, 2>> gap_by_height;  // height above the part's bottom, increasing, and gap
-  std::string gap_formula;
-  std::vector<double> stagger_mm{0};
-  bool stagger_every_layer = false;
-  std::optional<double> first_line_mm, end_inset_mm, link_mm;
-  double shortest_mm = 0;
-  double cell_mm = 2;
-};
-
+/// The keys of one filling.
+using FillSettings = infill::Settings;
 using FillChanges = Changes<FillSettings>;
 using FillRange = Range<FillSettings>;
 
@@ -48,13 +19,6 @@ struct FillRequest {
   FillSettings all;
   std::vector<FillRange> ranges;  // none overlaps another
 };
-
-/// The keys of one filling, in the order of a job file.
-std::span<const Key<FillSettings>> fill_settings_keys();
-
-/// Reads a table of keys. At most one of them may say how far lines lie from each other. returns "" or what is wrong
-std::string read_fill_changes(const TomlValue& table, FillChanges& changes, Place& at);
-std::string fill_changes_text(const FillChanges& changes);
 
 /// Sets the keys of changes. What these say of the distances between lines takes the place of what held before.
 void apply(const FillChanges& changes, FillSettings& settings);

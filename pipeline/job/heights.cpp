@@ -3,10 +3,9 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
-#include <cmath>
-
 #include "pipeline/job/keys.h"
+#include "stages/data/units.h"
+#include "stages/heights/heights.h"
 
 namespace lamina::pipeline {
 namespace {
@@ -23,46 +22,9 @@ constexpr Word<Facets> kFacets[] = {{"range", Facets::kRange}, {"plane", Facets:
 constexpr Word<Containment> kContainments[] = {
     {"across", Containment::kAcross}, {"inside", Containment::kInside}, {"outside", Containment::kOutside}};
 
-constexpr std::size_t kMostThicknesses = 10'000;
-constexpr double kDefaultStepMm = 0.001;
-
-std::string read_nm(std::string_view text, Nm& nm) {
-  double millimetres = 0;
-  if (auto wrong = read_number(text, kLeastMm, kMostMm, " mm", millimetres); !wrong.empty()) return wrong;
-  nm = static_cast<Nm>(std::llround(millimetres * static_cast<double>(kNmPerMm)));
-  return {};
-}
-
-std::string read_range(std::string_view text, std::size_t dots, heights::ThicknessSet& set) {
-  const std::size_t colon = std::min(text.find(':', dots), text.size());
-  Nm low = 0, high = 0, step = static_cast<Nm>(kDefaultStepMm * kNmPerMm);
-  if (auto wrong = read_nm(text.substr(0, dots), low); !wrong.empty()) return wrong;
-  if (auto wrong = read_nm(text.substr(dots + 2, colon - dots - 2), high); !wrong.empty()) return wrong;
-  if (colon < text.size()) {
-    if (auto wrong = read_nm(text.substr(colon + 1), step); !wrong.empty()) return wrong;
-  }
-  if (low > high) {
-    return fmt::format("the least thickness, {} mm, is above the greatest, {} mm; write the smaller one first", mm(low),
-                       mm(high));
-  }
-  if ((high - low) / step >= static_cast<Nm>(kMostThicknesses)) {
-    return fmt::format("'{}' is more than {} thicknesses; give a coarser step, as {}..{}:{}", text, kMostThicknesses, mm(low),
-                       mm(high), mm((high - low) / 1000 + 1));
-  }
-  if (const Nm rest = (high - low) % step; rest != 0) {
-    return fmt::format(
-        "'{}': steps of {} mm from {} mm end at {} mm and miss {} mm; end there, choose a step that divides the range, or give a "
-        "set as 0.178,0.254",
-        text, mm(step), mm(low), mm(high - rest), mm(high));
-  }
-  set.values.clear();
-  for (std::int64_t value = low; value <= high; value += step) set.values.push_back(static_cast<Nm>(value));
-  return {};
-}
-
 std::string read_thickness_text(std::string_view text, std::string& thickness_mm) {
   heights::ThicknessSet set;
-  auto wrong = read_thicknesses(text, set);
+  auto wrong = heights::read_thicknesses(text, set);
   if (wrong.empty()) thickness_mm = text;
   return wrong;
 }
@@ -137,32 +99,11 @@ const JobKey kHeightsKeys[] = {
 
 std::span<const JobKey> heights_keys() { return kHeightsKeys; }
 
-std::string mode_name(heights::Mode mode) { return write_word(kModes, mode); }
-
-std::string read_thicknesses(std::string_view text, heights::ThicknessSet& set) {
-  if (text.empty()) return "holds no thickness; give a set as 0.178,0.254 or a range as 0.05..0.3:0.01";
-  if (const std::size_t dots = text.find(".."); dots != std::string_view::npos) return read_range(text, dots, set);
-  heights::ThicknessSet read;
-  for (const std::string_view piece : split(text, ",")) {
-    if (auto wrong = read_nm(piece, read.values.emplace_back()); !wrong.empty()) return wrong;
-  }
-  if (read.values.size() > kMostThicknesses) {
-    return fmt::format("holds {} thicknesses; {} are enough", read.values.size(), kMostThicknesses);
-  }
-  std::ranges::sort(read.values);
-  if (const auto twice = std::ranges::adjacent_find(read.values); twice != read.values.end()) {
-    return fmt::format("holds {} mm twice; leave one out", mm(*twice));
-  }
-  set = std::move(read);
-  return {};
-}
-
 Result<heights::Options> heights_options(const Job& job) {
   const HeightsRequest& request = job.heights;
-  heights::Options options;
-  options.mode = request.mode;
+  heights::Options options = heights::options_of(request);
   if (!request.thickness_mm.empty()) {
-    if (const std::string wrong = read_thicknesses(request.thickness_mm, options.set); !wrong.empty()) {
+    if (const std::string wrong = heights::read_thicknesses(request.thickness_mm, options.set); !wrong.empty()) {
       return Error{Fault::kUsage, "heights.thickness_mm: " + wrong};
     }
   } else if (request.mode == heights::Mode::kUniform) {
@@ -172,16 +113,6 @@ Result<heights::Options> heights_options(const Job& job) {
                                             "0.178,0.254 or a range as 0.05..0.3",
                                             mode_name(request.mode))};
   }
-  options.cusp = static_cast<Nm>(nm_of(request.cusp_mm));
-  options.adapt_angle_deg = request.adapt_angle_deg;
-  options.surface.peak_angle_deg = request.peak_angle_deg;
-  options.surface.normal_tolerance = request.normal_tolerance;
-  options.surface.flat_tolerance = static_cast<Nm>(nm_of(request.flat_tolerance_um / 1000));
-  options.surface.least_facet_mm2 = request.least_facet_mm2;
-  options.facets = request.facets;
-  options.flats = request.flats;
-  options.least_flat_mm2 = request.least_flat_mm2;
-  options.time = {request.time_model[0], request.time_model[1]};
   if (Status status = heights::check_options(options); !status) return status.error();
   return options;
 }
@@ -191,7 +122,7 @@ std::string heights_text(const Job& job) {
   const std::string thickness = request.thickness_mm.empty() ? number_text(job.layer_mm) : request.thickness_mm;
   std::string text = fmt::format("of {} mm", thickness);
   if (request.mode == heights::Mode::kUniform) return text;
-  text += ", " + mode_name(request.mode);
+  text += fmt::format(", {}", mode_name(request.mode));
   if (request.mode == heights::Mode::kAngle)
     return text + fmt::format(", from {} degrees", number_text(request.adapt_angle_deg));
   return text + fmt::format(", steps up to {} mm", number_text(request.cusp_mm));

@@ -4,14 +4,11 @@
 
 #include <algorithm>
 
+#include "pipeline/job/heights.h"
 #include "pipeline/job/keys.h"
+#include "stages/heights/heights.h"
 
 namespace lamina::pipeline {
-
-PixelGrid grid_of(const Job& job) {
-  if (job.machine.resolved) return job.machine.resolved->grid.image;
-  return {PixelAxis(job.dpi[0], nm_of(job.bed_mm[0])), PixelAxis(job.dpi[1], nm_of(job.bed_mm[1]))};
-}
 
 Status check_job(const Job& job) {
   if (job.parts.empty()) return Error{Fault::kUsage, "no part to plan; name one or more STL, OBJ or 3MF files"};

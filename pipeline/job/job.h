@@ -1,26 +1,29 @@
-// pipeline/job/job.h: what was asked for. A job is fully resolved before work starts, and is what the manifest records.
+// pipeline/job/job.h: what is asked for, as plain values; what follows from it is decided by resolve() (plan/plan.h).
 #pragma once
 
 #include <array>
-#include <cmath>
 #include <cstdint>
 #include <optional>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
-#include "pipeline/job/extrude.h"
 #include "pipeline/job/fill.h"
-#include "pipeline/job/heights.h"
-#include "pipeline/job/machine.h"
-#include "pipeline/job/material.h"
-#include "pipeline/job/slice.h"
-#include "stages/data/fill_rule.h"
+#include "stages/data/choices.h"
 #include "stages/data/grid.h"
 #include "stages/data/status.h"
-#include "stages/data/units.h"
+#include "stages/heights/settings.h"
+#include "stages/segment/settings.h"
+#include "stages/text/changes.h"
 
 namespace lamina::pipeline {
+
+/// Another material from a height to the next, in mm above the bottom of a part. Where ranges overlap, the last one counts.
+struct MaterialRange {
+  double from_mm = 0, to_mm = 0;
+  std::string material;
+};
 
 /// One [[part]] of a job.
 struct PartRequest {
@@ -41,11 +44,62 @@ struct PartRequest {
 enum class Engine { kRays, kContours, kBoth };
 enum class Mirror { kNone, kX, kY, kXY };
 
+/// Of jobs that name no machine.
+inline constexpr std::array<double, 2> kBareBedMm{490, 380};
+inline constexpr std::array<std::int64_t, 2> kBareDpi{1200, 1200};
+
+/// Section [heights].
+using HeightsRequest = heights::Settings;
+
+/// Section [slice]: contours and the files they go to.
+struct SliceRequest {
+  std::string format = "svg";      // svg, cli, cli-binary, 3mf
+  bool file_a_layer = false;       // layers/000000.svg ... in place of one file
+  bool empty_first_layer = false;  // CLI
+  double tolerance_um = 0;         // points may be dropped if the contour moves by no more
+  double bridge_mm = 0.1;          // longest gap of an open mesh that is closed by a straight stretch
+  double offset_mm = 0;            // contours are moved outwards by this; inwards if negative
+};
+
+/// The keys of one segmentation.
+using SegmentSettings = segment::Settings;
+
+/// Section [segment].
+struct SegmentRequest {
+  SegmentSettings all;
+  std::vector<Range<SegmentSettings>> ranges;  // none overlaps another
+  /// Whether any layer may be segmented.
+  bool any() const { return all.on || !ranges.empty(); }
+};
+
+/// Section [extrude]: what a job changes of its machine, and where material goes to.
+struct ExtrudeRequest {
+  std::optional<double> flow, nozzle_degc, bed_degc, print_mm_s, wall_mm_s, first_layer_mm_s, travel_mm_s, retraction_mm,
+      fan_percent;
+  std::optional<bool> relative_extrusion;
+  std::vector<std::pair<std::string, std::string>> machine;  // any other key of its profile and the value: fan.from_layer, 2
+};
+
+/// [machine] of a job.
+struct MachineRequest {
+  std::string profile;                                // a shipped one's name, or a file; empty: none
+  std::optional<double> scan_speed_mm_s;              // instead of the profile's
+  std::optional<std::vector<std::uint32_t>> blocked;  // instead of the profile's
+};
+
+/// [dose] of a job: how much binder goes where (stages/dose/).
+struct DoseRequest {
+  std::array<double, 2> bleed_um{0, 0};                   // along x and y: pixels nearer to the edge than this are left out
+  double shell_mm = 0;                                    // so deep all pixels are set; only with a core below 1 or beads
+  double core = 1;                                        // share of the pixels inside of the shell that is set
+  raster::BeadEnds bead_ends = raster::BeadEnds::kRound;  // of beads that fill a part, and where thick becomes thin
+};
+
 /// Everything that decides the bytes of the output, then everything that does not.
 struct Job {
   std::vector<PartRequest> parts;
-  std::array<double, 2> bed_mm{490, 380};
-  std::array<std::int64_t, 2> dpi{1200, 1200};
+  std::optional<std::array<double, 2>> bed_mm;     // absent: that of the machine; without one kBareBedMm
+  std::optional<std::array<std::int64_t, 2>> dpi;  // absent: that of the machine; without one kBareDpi
   double layer_mm = 0.05;
   HeightsRequest heights;
   double gap_mm = 5;  // between parts that are arranged by the planner
@@ -77,12 +131,13 @@ struct Job {
   std::vector<std::string> notes;  // of reading it, for people: old forms, and what to write now
 };
 
-/// The pixels of a job's bed: of its machine, once that is resolved. Only for a checked job.
-PixelGrid grid_of(const Job& job);
-
 /// Whether every value of a job is within what can be planned, and agrees with the others; for jobs from anywhere.
 /// errors  kUsage, one line that begins with the key
 Status check_job(const Job& job);
+
+/// Gives the parts of a job their materials: "steel" to all, or "steel,bronze" one to each in their order.
+/// errors  kUsage: another number of names, or one that is none
+Status set_materials(std::string_view names, Job& job);
 
 /// Whether any layer of any part gets walls, a filling or segmented lines.
 bool fills(const Job& job);

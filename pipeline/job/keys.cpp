@@ -1,5 +1,9 @@
 #include "pipeline/job/keys.h"
 
+#include <fmt/format.h>
+
+#include "pipeline/job/file.h"
+
 namespace lamina::pipeline {
 
 std::span<const JobKey> job_keys() {
@@ -14,6 +18,19 @@ std::span<const JobKey> job_keys() {
     return all;
   }();
   return keys;
+}
+
+std::vector<KeyFacts> key_facts() {
+  std::vector<KeyFacts> facts;
+  const auto add = [&]<class Target>(std::span<const Key<Target>> keys, const Target& presets) {
+    for (const auto& key : keys) {
+      facts.push_back({fmt::format("{}.{}", key.section, key.name), std::string(key.flag), std::string(key.value),
+                       key.write(presets), std::string(key.meaning), (key.decides & decides::images) != 0});
+    }
+  };
+  add(job_keys(), Job());
+  add(part_keys(), PartRequest());
+  return facts;
 }
 
 }  // namespace lamina::pipeline

@@ -7,8 +7,8 @@
 #include <string_view>
 
 #include "pipeline/job/job.h"
-#include "pipeline/job/product.h"
-#include "pipeline/text/key.h"
+#include "stages/data/choices.h"
+#include "stages/text/key.h"
 
 namespace lamina::pipeline {
 
@@ -38,6 +38,19 @@ std::span<const JobKey> load_keys();
 std::span<const JobKey> machine_keys();
 std::span<const JobKey> dose_keys();
 std::span<const JobKey> run_keys();
+
+// --- tables inside of sections
+std::span<const Key<FillSettings>> fill_settings_keys();
+std::span<const Key<SegmentSettings>> segment_settings_keys();
+
+/// Reads a table of keys of a filling. At most one of them may say how far lines lie from each other.
+/// returns "" or what is wrong; at  where
+std::string read_fill_changes(const TomlValue& table, FillChanges& changes, Place& at);
+std::string fill_changes_text(const FillChanges& changes);
+
+/// An array of tables { from_mm, to_mm, material }. returns "" or what is wrong; at  where
+std::string read_material_ranges(const TomlValue& list, std::vector<MaterialRange>& ranges, Place& at);
+std::string material_ranges_text(const std::vector<MaterialRange>& ranges);
 
 /// Words that --fill of lamina extrude takes beside those of fill.pattern.
 std::string read_fill_rule(std::string_view text, FillRule& rule);

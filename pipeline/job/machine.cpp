@@ -4,7 +4,9 @@
 namespace lamina::pipeline {
 namespace {
 
-constexpr Word<raster::BeadEnds> kBeadEnds[] = {{"round", raster::BeadEnds::kRound}, {"square", raster::BeadEnds::kSquare}};
+using raster::BeadEnds;
+
+constexpr Word<BeadEnds> kBeadEnds[] = {{"round", BeadEnds::kRound}, {"square", BeadEnds::kSquare}};
 
 const JobKey kMachineKeys[] = {
     text<check_path, &Job::machine, &MachineRequest::profile>(
@@ -37,7 +39,7 @@ const JobKey kDoseKeys[] = {
     word<kBeadEnds, &Job::dose, &DoseRequest::bead_ends>(
         {"dose", "bead_ends", "--bead-ends", "round|square",
          "of the beads that fill a part, and of their thick and thin stretches", decides::images})
-        .shown_if([](const Job& job) { return job.dose.bead_ends != raster::BeadEnds::kRound; }),
+        .shown_if([](const Job& job) { return job.dose.bead_ends != BeadEnds::kRound; }),
 };
 
 }  // namespace

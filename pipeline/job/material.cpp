@@ -1,29 +1,22 @@
-#include "pipeline/job/material.h"
+#include "pipeline/job/job.h"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 
 #include "pipeline/job/job.h"
-#include "pipeline/text/key.h"
-#include "pipeline/text/ranges.h"
+#include "pipeline/job/keys.h"
+#include "stages/read/profiles/printer.h"
+#include "stages/text/key.h"
+#include "stages/text/ranges.h"
 
 namespace lamina::pipeline {
 namespace {
 
-constexpr std::size_t kLongestName = 40;
-
-constexpr Key<MaterialRange> kMaterialKeys[] = {text<check_material, &MaterialRange::material>({"material_range", "material"})};
+constexpr Key<MaterialRange> kMaterialKeys[] = {
+    text<read::check_material, &MaterialRange::material>({"material_range", "material"})};
 
 }  // namespace
-
-std::string check_material(std::string_view name) {
-  const bool good = !name.empty() && name.size() <= kLongestName && std::ranges::all_of(name, [](unsigned char c) {
-    return (c >= '0' && c <= '9') || (c >= 'A' && c <= 'Z') || (c >= 'a' && c <= 'z') || c == '-' || c == '_';
-  });
-  if (good) return {};
-  return fmt::format("'{}' is no name of a material; use up to {} letters, digits, - and _", name, kLongestName);
-}
 
 Status set_materials(std::string_view text, Job& job) {
   const auto names = split(text, ",");
@@ -33,7 +26,7 @@ Status set_materials(std::string_view text, Job& job) {
   }
   for (std::size_t p = 0; p < job.parts.size(); ++p) {
     const auto name = names[names.size() == 1 ? 0 : p];
-    if (const std::string what = check_material(name); !what.empty()) return Error{Fault::kUsage, what};
+    if (const std::string what = read::check_material(name); !what.empty()) return Error{Fault::kUsage, what};
     job.parts[p].material = name;
   }
   return {};

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "pipeline/text/toml.h"
+#include "stages/text/toml.h"
 
 namespace lamina::pipeline {
 

@@ -1,9 +1,11 @@
 // [[part]] of a job.
+#include <algorithm>
 #include <cmath>
 
 #include "pipeline/job/fill.h"
+#include "pipeline/job/job.h"
 #include "pipeline/job/keys.h"
-#include "pipeline/job/material.h"
+#include "stages/read/profiles/printer.h"
 
 namespace lamina::pipeline {
 namespace {
@@ -54,7 +56,7 @@ const PartKey kPartKeys[] = {
         Form::kList),
     structure<read_fill_changes, fill_changes_text, &PartRequest::fill>(
         {"part", "fill", "", "{...}", "keys of the job's filling that differ for this part", decides::all}),
-    text<check_material, &PartRequest::material>(
+    text<read::check_material, &PartRequest::material>(
         {"part", "material", "", "NAME", "powder of the part, for machines with two vats", decides::all}),
     structure<read_material_ranges, material_ranges_text, &PartRequest::material_ranges>(
         {"part", "material_range", "", "[{...}]", "other powders between two heights above the part's bottom", decides::all}),

@@ -15,10 +15,11 @@ std::string write_bytes(const std::uint64_t& bytes) {
   return fmt::format("{}", bytes);
 }
 
-std::string read_layers(std::string_view text, Pair& layers) {
-  std::array<std::uint32_t, 2> range{};
-  auto wrong = read_layer_range(text, range);
-  if (wrong.empty()) layers = range;
+template <std::string (*Read)(std::string_view, std::array<std::uint32_t, 2>&)>
+std::string read_pair(std::string_view text, Pair& pair) {
+  std::array<std::uint32_t, 2> read{};
+  auto wrong = Read(text, read);
+  if (wrong.empty()) pair = read;
   return wrong;
 }
 std::string write_layers(const Pair& layers) {
@@ -27,12 +28,6 @@ std::string write_layers(const Pair& layers) {
   return last == UINT32_MAX ? fmt::format("{}:", first) : fmt::format("{}:{}", first, last);
 }
 
-std::string read_share(std::string_view text, Pair& share) {
-  std::array<std::uint32_t, 2> read{};
-  auto wrong = read_shard(text, read);
-  if (wrong.empty()) share = read;
-  return wrong;
-}
 std::string write_share(const Pair& share) {
   return share ? fmt::format("{}/{}", (*share)[0] + 1, (*share)[1]) : std::string();
 }
@@ -55,10 +50,10 @@ const JobKey kRunKeys[] = {
     field<&Job::threads>({"run", "threads", "--threads", "N", "0 for all that the machine has"}, {0, 4096}),
     custom<Job, read_bytes, write_bytes, &Job::memory_bytes>(
         {"run", "memory", "--memory", "SIZE", "what the layers in flight may hold beside the mesh: 256M, 1G"}, Form::kString),
-    custom<Job, read_layers, write_layers, &Job::layers>(
+    custom<Job, read_pair<read_layer_range>, write_layers, &Job::layers>(
         {"run", "layers", "--layers", "A:B", "only layers A to B - 1, counted from 0 at the bottom; A: and :B are open"},
         Form::kString),
-    custom<Job, read_share, write_share, &Job::shard>(
+    custom<Job, read_pair<read_shard>, write_share, &Job::shard>(
         {"run", "shard", "--shard", "I/N", "only the I-th of N equal shares of the layers, I from 1; see lamina merge"},
         Form::kString),
 };

@@ -1,4 +1,6 @@
 // Section [slice].
+#include <algorithm>
+
 #include "pipeline/job/keys.h"
 
 namespace lamina::pipeline {

@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-#include "pipeline/text/value.h"
+#include "stages/text/value.h"
 
 namespace lamina::pipeline {
 namespace {
@@ -17,35 +17,22 @@ std::string names_text(const std::vector<JobMaterial>& materials) {
   return text;
 }
 
-/// Numbers the materials as parts name them.
-class Naming {
- public:
-  explicit Naming(const Machine* machine) : machine_(machine) {}
-
-  /// errors  a name that no vat has
-  Result<std::uint32_t> number_of(const std::string& name, const std::string& part) {
-    for (std::uint32_t i = 0; i < used.size(); ++i) {
-      if (used[i].name == name) return i;
+/// Adds a material that a part names. errors  a name that no vat has
+Status use(const std::string& name, const std::string& part, const Machine* machine, std::vector<JobMaterial>& used) {
+  if (std::ranges::find(used, name, &JobMaterial::name) != used.end()) return {};
+  JobMaterial material{name, static_cast<std::uint32_t>(used.size())};
+  if (machine != nullptr && !machine->powder.materials.empty()) {
+    const auto& vats = machine->powder.materials;
+    const auto vat = std::ranges::find(vats, name) - vats.begin();
+    if (vat == static_cast<std::ptrdiff_t>(vats.size())) {
+      const std::vector<std::string_view> names(vats.begin(), vats.end());
+      return wrong(fmt::format("{}: no vat of {} holds it: {}", part, machine->name, not_one_of(name, names)));
     }
-    JobMaterial material{name, static_cast<std::uint32_t>(used.size())};
-    if (machine_ != nullptr && !machine_->powder.materials.empty()) {
-      const auto& vats = machine_->powder.materials;
-      const auto vat = std::ranges::find(vats, name) - vats.begin();
-      if (vat == static_cast<std::ptrdiff_t>(vats.size())) {
-        const std::vector<std::string_view> names(vats.begin(), vats.end());
-        return wrong(fmt::format("{}: no vat of {} holds it: {}", part, machine_->name, not_one_of(name, names)));
-      }
-      material.vat = static_cast<std::uint32_t>(vat);
-    }
-    used.push_back(material);
-    return static_cast<std::uint32_t>(used.size() - 1);
+    material.vat = static_cast<std::uint32_t>(vat);
   }
-
-  std::vector<JobMaterial> used;
-
- private:
-  const Machine* machine_;
-};
+  used.push_back(material);
+  return {};
+}
 
 }  // namespace
 
@@ -57,7 +44,7 @@ std::uint32_t PartMaterial::at(Nm plane) const {
   return material;
 }
 
-Result<Materials> materials_of(const Job& job) {
+Result<Materials> materials_of(const Job& job, const Machine* machine) {
   Materials result;
   const auto named = [](const PartRequest& part) { return !part.material.empty(); };
   result.part.resize(job.parts.size());
@@ -67,37 +54,30 @@ Result<Materials> materials_of(const Job& job) {
     return wrong(fmt::format("{}: has none; name that of every part, or of none", part.path));
   }
   if (!any) return result;
-  const Machine* machine = job.machine.resolved ? &job.machine.resolved->machine : nullptr;
-  Naming naming(machine);
-  for (std::size_t p = 0; p < job.parts.size(); ++p) {
-    const PartRequest& part = job.parts[p];
-    const auto elsewhere = naming.number_of(part.material, part.path);
-    if (!elsewhere) return elsewhere.error();
-    result.part[p].elsewhere = *elsewhere;
-    const std::int64_t bottom = nm_of(part.bottom_mm);
+  result.used.clear();
+  for (const PartRequest& part : job.parts) {
+    if (Status status = use(part.material, part.path, machine, result.used); !status) return status.error();
     for (const MaterialRange& range : part.material_ranges) {
-      const auto number = naming.number_of(range.material, part.path);
-      if (!number) return number.error();
-      result.part[p].ranges.push_back({bottom + nm_of(range.from_mm), bottom + nm_of(range.to_mm), *number});
+      if (Status status = use(range.material, part.path, machine, result.used); !status) return status.error();
     }
   }
-  if (machine != nullptr && naming.used.size() > machine->powder.vats) {
-    return wrong(fmt::format("the parts are of {} materials ({}), {} has {}; plan them as several jobs", naming.used.size(),
-                             names_text(naming.used), machine->name,
+  if (machine != nullptr && result.used.size() > machine->powder.vats) {
+    return wrong(fmt::format("the parts are of {} materials ({}), {} has {}; plan them as several jobs", result.used.size(),
+                             names_text(result.used), machine->name,
                              machine->powder.vats == 1 ? "one vat" : fmt::format("{} vats", machine->powder.vats)));
   }
   // In the order of the vats, whoever is named first.
-  std::vector<std::uint32_t> order(naming.used.size()), place(order.size());
-  for (std::uint32_t i = 0; i < order.size(); ++i) order[i] = i;
-  std::ranges::sort(order, {}, [&](std::uint32_t i) { return naming.used[i].vat; });
-  result.used.clear();
-  for (std::uint32_t i = 0; i < order.size(); ++i) {
-    place[order[i]] = i;
-    result.used.push_back(naming.used[order[i]]);
-  }
-  for (PartMaterial& part : result.part) {
-    part.elsewhere = place[part.elsewhere];
-    for (PartMaterial::Range& range : part.ranges) range.material = place[range.material];
+  std::ranges::sort(result.used, {}, &JobMaterial::vat);
+  const auto number_of = [&](const std::string& name) {
+    return static_cast<std::uint32_t>(std::ranges::find(result.used, name, &JobMaterial::name) - result.used.begin());
+  };
+  for (std::size_t p = 0; p < job.parts.size(); ++p) {
+    const PartRequest& part = job.parts[p];
+    const std::int64_t bottom = nm_of(part.bottom_mm);
+    result.part[p].elsewhere = number_of(part.material);
+    for (const auto& [from_mm, to_mm, material] : part.material_ranges) {
+      result.part[p].ranges.push_back({bottom + nm_of(from_mm), bottom + nm_of(to_mm), number_of(material)});
+    }
   }
   return result;
 }

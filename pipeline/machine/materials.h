@@ -8,19 +8,11 @@
 #include <vector>
 
 #include "pipeline/job/job.h"
-#include "pipeline/job/material.h"
 #include "stages/data/machine.h"
 #include "stages/data/status.h"
 #include "stages/data/units.h"
 
 namespace lamina::pipeline {
-
-/// A powder that parts of a job are of.
-struct JobMaterial {
-  std::string name;       // empty if no part names one
-  std::uint32_t vat = 0;  // of the machine, from 0
-  bool operator==(const JobMaterial&) const = default;
-};
 
 /// What a part is of, at each height.
 struct PartMaterial {
@@ -41,10 +33,10 @@ struct Materials {
   bool several() const { return used.size() > 1; }
 };
 
-/// The materials of a job whose machine is resolved, if it has one. No part, or every part names its own. They have to be
+/// The materials of a job. machine  null: it has none. No part, or every part names its own. They have to be
 /// those of the vats (powder.materials); vats without names take them in the order in which parts name them.
 /// errors  kUsage: a part without a material among others, a name that no vat has, more materials than vats
-Result<Materials> materials_of(const Job& job);
+Result<Materials> materials_of(const Job& job, const Machine* machine);
 
 /// The vats that feed a layer with so many pixels of each material: that of its only material; for a layer of several by
 /// the machine's rule, the first one on a tie; for an empty layer that of the job's first material.

@@ -2,20 +2,38 @@
 #pragma once
 
 #include <array>
-#include <memory>
+#include <optional>
 
 #include "pipeline/job/job.h"
+#include "stages/data/grid.h"
+#include "stages/data/machine.h"
+#include "stages/data/program.h"
 #include "stages/data/status.h"
 
 namespace lamina::pipeline {
+
+/// The bed that parts stand on.
+struct Bed {
+  std::array<double, 2> size_mm = kBareBedMm;
+  bool of_machine = false;  // no other can be asked for
+};
+
+/// That of a job without a machine.
+inline Bed bare_bed(const Job& job) { return {job.bed_mm.value_or(kBareBedMm), false}; }
+
+/// A profile with the job's changes to it, and the grid that follows.
+struct ResolvedMachine {
+  Machine machine;
+  HeadGrid grid;
+};
 
 /// A profile and its grid, with the dialect checked. errors  of make_head_grid and check_dialect
 Result<ResolvedMachine> resolve_profile(const Machine& machine);
 
 /// What the images of a job are planned for: its machine, or a bare bed.
 struct PowderPrinter {
-  std::shared_ptr<const ResolvedMachine> machine;  // null: the job names none
-  std::array<double, 2> bed_mm{};
+  std::optional<ResolvedMachine> machine;  // absent: the job names none
+  Bed bed;
   PixelGrid grid;  // of the images
 };
 
@@ -23,8 +41,5 @@ struct PowderPrinter {
 /// the head: across the scan the number of interlaced passes follows, along it the length of a pixel.
 /// errors  kUsage: no such machine, a dpi that the head cannot reach, another bed
 Result<PowderPrinter> resolve_powder_printer(const Job& job);
-
-/// The same, kept in the job: sets job.machine.resolved, decides_bed and job.bed_mm; nothing for a job without a machine.
-Status resolve_machine(Job& job);
 
 }  // namespace lamina::pipeline

@@ -1,49 +1,16 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
 
+#include "pipeline/job/decisions.h"
 #include "pipeline/job/job.h"
+#include "pipeline/job/keys.h"
 #include "pipeline/plan/fill.h"
-#include "pipeline/text/ranges.h"
 #include "stages/infill/fill.h"
+#include "stages/text/ranges.h"
 
 namespace lamina::pipeline {
 namespace {
-
-Nm short_nm(double millimetres) { return static_cast<Nm>(nm_of(millimetres)); }
-MicroDegrees micro(double degrees) { return std::llround(degrees * 1e6); }
-
-std::vector<Nm> list_nm(const std::vector<double>& list) {
-  std::vector<Nm> nm;
-  for (const double value : list) nm.push_back(short_nm(value));
-  return nm;
-}
-
-infill::FillParameters parameters_of(const FillSettings& settings) {
-  infill::FillParameters p;
-  p.pattern = settings.pattern;
-  p.width = short_nm(settings.width_mm);
-  p.wall_width = settings.wall_width_mm > 0 ? short_nm(settings.wall_width_mm) : p.width;
-  p.walls = settings.walls;
-  p.loops = settings.loops;
-  p.angle_base = micro(settings.angle_deg);
-  p.angle_step = micro(settings.angle_step_deg);
-  p.build_layers = settings.build_layers;
-  p.gaps = list_nm(settings.gap_mm);
-  p.group = settings.group;
-  for (const auto& [z, gap] : settings.gap_by_height) p.gap_table.emplace_back(nm_of(z), short_nm(gap));
-  p.gap_expression = settings.gap_formula;
-  p.distances = list_nm(settings.distance_mm);
-  p.stagger = list_nm(settings.stagger_mm);
-  p.stagger_every_layer = settings.stagger_every_layer;
-  if (settings.first_line_mm) p.first_line = short_nm(*settings.first_line_mm);
-  if (settings.end_inset_mm) p.end_inset = short_nm(*settings.end_inset_mm);
-  if (settings.link_mm) p.longest_link = nm_of(*settings.link_mm);
-  p.shortest_line = short_nm(settings.shortest_mm);
-  p.cell = short_nm(settings.cell_mm);
-  return p;
-}
 
 /// A key as a job file and a command line name it.
 std::string named(std::string_view name) {
@@ -83,6 +50,7 @@ bool FillPlan::fills() const {
 }
 
 Result<FillPlan> plan_filling(const FillRequest& request, const FillChanges& part_changes) {
+  count(Decision::kFilling);
   const auto wrong = [](std::string_view key, const std::string& what) {
     return Error{Fault::kUsage, fmt::format("{}: {}", key, what)};
   };
@@ -91,7 +59,7 @@ Result<FillPlan> plan_filling(const FillRequest& request, const FillChanges& par
   apply(part_changes, settings);
   if (const std::string what = contradiction(settings); !what.empty()) return wrong("part.fill", what);
   FillPlan plan;
-  plan.base = parameters_of(settings);
+  plan.base = infill::parameters_of(settings);
   if (Status status = infill::check(plan.base); !status) {
     return wrong(part_changes.empty() ? "fill" : "part.fill", status.error().message);
   }
@@ -100,7 +68,7 @@ Result<FillPlan> plan_filling(const FillRequest& request, const FillChanges& par
     apply(range.changes, own);
     const std::string name = fmt::format("fill.range: {}", range_name(range.from_mm, range.to_mm));
     if (const std::string what = contradiction(own); !what.empty()) return wrong(name, what);
-    plan.ranges.push_back({nm_of(range.from_mm), nm_of(range.to_mm), parameters_of(own)});
+    plan.ranges.push_back({nm_of(range.from_mm), nm_of(range.to_mm), infill::parameters_of(own)});
     if (Status status = infill::check(plan.ranges.back().parameters); !status) return wrong(name, status.error().message);
   }
   std::ranges::sort(plan.ranges, {}, &FillPlan::Range::from);

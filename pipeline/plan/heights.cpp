@@ -1,5 +1,8 @@
 #include "pipeline/plan/heights.h"
 
+#include "pipeline/job/decisions.h"
+#include "pipeline/job/heights.h"
+
 namespace lamina::pipeline {
 
 heights::SurfaceIndex index_scene(const Scene& scene, const heights::Options& options) {
@@ -8,6 +11,7 @@ heights::SurfaceIndex index_scene(const Scene& scene, const heights::Options& op
 }
 
 Result<heights::Plan> decide_heights(const Job& job, const Scene& scene) {
+  count(Decision::kHeights);
   const Result<heights::Options> options = heights_options(job);
   if (!options) return options.error();
   if (options->mode != heights::Mode::kUniform) return heights::plan_heights(index_scene(scene, *options), *options);

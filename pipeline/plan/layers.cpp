@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <tuple>
 
+#include "pipeline/job/decisions.h"
+#include "pipeline/job/heights.h"
 #include "pipeline/plan/heights.h"
 #include "stages/heights/per_part.h"
 
@@ -12,6 +14,7 @@ namespace {
 std::int64_t top(const ScheduledLayer& scheduled) { return std::int64_t{scheduled.layer.bottom} + scheduled.layer.thickness; }
 
 Status add_layers_of_parts(const Job& job, const Scene& scene, std::vector<ScheduledLayer>& layers) {
+  count(Decision::kHeights);
   const Result<heights::Options> options = heights_options(job);
   if (!options) return options.error();
   const heights::SurfaceIndex index = index_scene(scene, *options);

@@ -6,13 +6,15 @@
 #include <chrono>
 #include <cmath>
 
+#include "pipeline/machine/extruder.h"
 #include "pipeline/machine/powder_printer.h"
 #include "pipeline/plan/fill.h"
 #include "pipeline/plan/heights.h"
 #include "pipeline/plan/layer_cut.h"
 #include "pipeline/plan/layers.h"
 #include "pipeline/plan/reach.h"
-#include "pipeline/text/number_text.h"
+#include "stages/heights/build_steps.h"
+#include "stages/text/number_text.h"
 #include "stages/write/extrusion_format.h"
 #include "stages/write/image_format.h"
 
@@ -30,6 +32,8 @@ class Planner {
   Planner(Resolved resolved, const ProgressCallback& progress) : progress_(progress) {
     plan_.job = std::move(resolved.job);
     plan_.product = resolved.product;
+    plan_.bed = resolved.bed;
+    if (resolved.printer) printer_ = std::move(*resolved.printer);
     if (resolved.extruder) plan_.moves.emplace(MovePlan{std::move(*resolved.extruder), {}});
   }
 
@@ -44,13 +48,15 @@ class Planner {
  private:
   Job& job() { return plan_.job; }
   bool images() const { return plan_.product == Product::kImages; }
+  /// The powder printer; null if there is none.
+  const Machine* machine() const { return printer_.machine ? &printer_.machine->machine : nullptr; }
   bool moves() const { return plan_.product == Product::kMoves; }
 
   /// Segmentations come before fillings, whose lines lie as they ask.
   Status read_fillings() {
     FillRequest fill = job().fill;
     if (images()) {
-      auto materials = materials_of(job());
+      auto materials = materials_of(job(), machine());
       if (!materials) return materials.error();
       materials_ = std::move(*materials);
       beads_ = job().segment.any();
@@ -88,7 +94,7 @@ class Planner {
   Status load() {
     const auto start = Clock::now();
     progress_({ProgressEvent::Stage::kLoading});
-    auto scene = load_scene(job());
+    auto scene = load_scene(job(), plan_.bed);
     if (!scene) return scene.error();
     plan_.scene = std::make_unique<Scene>(std::move(*scene));
     for (const Instance& instance : plan_.scene->instances) {
@@ -101,8 +107,8 @@ class Planner {
   Status decide_layers() {
     index_start_ = Clock::now();
     progress_({ProgressEvent::Stage::kIndexing});
-    if (images()) {
-      if (Status status = check_reach(job(), *plan_.scene); !status) return status;
+    if (machine() != nullptr) {
+      if (Status status = check_reach(*machine(), *plan_.scene); !status) return status;
     }
     if (!job().heights.per_part) {
       auto heights = decide_heights(job(), *plan_.scene);
@@ -120,8 +126,8 @@ class Planner {
   }
 
   Status check_machine() {
-    if (images()) {
-      Result<std::string> steps = check_build_steps(job(), plan_.heights.table);
+    if (machine() != nullptr) {
+      Result<std::string> steps = heights::check_build_steps(*machine(), plan_.heights.table);
       if (!steps) return steps.error();
       if (!steps->empty()) plan_.warnings.push_back(std::move(*steps));
     }
@@ -155,7 +161,7 @@ class Planner {
 
   Status index_images() {
     if (!images()) return {};
-    const PixelGrid grid = grid_of(job());
+    const PixelGrid grid = printer_.grid;
     if (job().dose.core == 0 &&
         static_cast<double>(nm_of(job().dose.shell_mm)) * std::max(grid.x.pixels_per_nm(), grid.y.pixels_per_nm()) < 1) {
       plan_.warnings.push_back(
@@ -176,7 +182,8 @@ class Planner {
     std::optional<Beads> beads;
     if (beads_) beads.emplace(job(), grid, *plan_.sections, *plan_.segments);
     const double bed = static_cast<double>(grid.columns()) * grid.rows();
-    plan_.images.emplace(ImagePlan{grid, std::move(materials_), std::move(*solids), DosePlan(job(), grid), std::move(beads),
+    plan_.images.emplace(ImagePlan{std::move(printer_.machine), grid, std::move(materials_), std::move(*solids),
+                                   DosePlan(job(), grid), std::move(beads),
                                    static_cast<std::uint64_t>(std::min(covered, bed))});
     plan_.index_seconds = seconds_since(index_start_);
     return {};
@@ -211,6 +218,7 @@ class Planner {
 
   const ProgressCallback& progress_;
   Plan plan_;
+  PowderPrinter printer_;  // of images, until they are indexed
   Materials materials_;
   std::vector<FillPlan> fillings_;
   LayerSchedule schedule_;
@@ -220,14 +228,16 @@ class Planner {
 
 }  // namespace
 
-Result<Resolved> resolve(const Job& asked, Product product) {
-  Resolved resolved{asked, product, std::nullopt};
-  Job& job = resolved.job;
+Result<Resolved> resolve(const Job& job, Product product) {
+  Resolved resolved{job, product, bare_bed(job), std::nullopt, std::nullopt};
   if (product == Product::kImages) {
     if (job.heights.per_part) {
       return usage("--per-part: a powder bed has one table of layers for all parts; leave it out");
     }
-    if (Status status = resolve_machine(job); !status) return status.error();
+    auto printer = resolve_powder_printer(job);
+    if (!printer) return printer.error();
+    resolved.bed = printer->bed;
+    resolved.printer = std::move(*printer);
     if (write::find_image_format(job.format) == nullptr) return usage(fmt::format("unknown format '{}'", job.format));
     return resolved;
   }
@@ -243,8 +253,7 @@ Result<Resolved> resolve(const Job& asked, Product product) {
   }
   auto profile = resolve_extruder(job);
   if (!profile) return profile.error();
-  job.bed_mm = profile->machine.bed.size_mm;
-  job.machine.decides_bed = true;
+  resolved.bed = {profile->machine.bed.size_mm, true};
   resolved.extruder = std::move(*profile);
   return resolved;
 }

@@ -14,9 +14,9 @@
 #include <vector>
 
 #include "pipeline/job/job.h"
-#include "pipeline/job/product.h"
 #include "pipeline/machine/extruder.h"
 #include "pipeline/machine/materials.h"
+#include "pipeline/machine/powder_printer.h"
 #include "pipeline/plan/beads.h"
 #include "pipeline/plan/dose.h"
 #include "pipeline/plan/progress.h"
@@ -24,6 +24,8 @@
 #include "pipeline/plan/sections.h"
 #include "pipeline/plan/segment.h"
 #include "pipeline/plan/solids.h"
+#include "stages/data/choices.h"
+#include "stages/data/extruder.h"
 #include "stages/data/grid.h"
 #include "stages/data/status.h"
 #include "stages/heights/heights.h"
@@ -32,6 +34,7 @@ namespace lamina::pipeline {
 
 /// What only images need.
 struct ImagePlan {
+  std::optional<ResolvedMachine> machine;  // absent: images alone
   PixelGrid grid;
   Materials materials;
   Solids solids;
@@ -48,8 +51,9 @@ struct MovePlan {
 
 /// Scene, sections and segments stay where they are when the plan moves: others refer to them.
 struct Plan {
-  Job job;  // resolved: bed and dpi are those of its machine
+  Job job;  // as asked
   Product product = Product::kImages;
+  Bed bed;
   std::unique_ptr<Scene> scene;
   heights::Plan heights;                  // the one table of all parts; empty where each has layers of its own
   std::uint32_t layer_count = 0;          // of the whole job
@@ -68,8 +72,10 @@ struct Plan {
 
 /// A job with its machine found and changed as the job says.
 struct Resolved {
-  Job job;  // bed and dpi are those of its machine
+  Job job;  // as asked
   Product product = Product::kImages;
+  Bed bed;
+  std::optional<PowderPrinter> printer;     // of images
   std::optional<ExtruderProfile> extruder;  // of toolpaths
 };
 

@@ -7,6 +7,7 @@
 #include <map>
 #include <tuple>
 
+#include "pipeline/job/keys.h"
 #include "stages/arrange/placement.h"
 #include "stages/load/load.h"
 
@@ -178,7 +179,7 @@ arrange::BoxRequest box_request(const PartRequest& part, const Loaded& loaded) {
 
 }  // namespace
 
-Result<Scene> load_scene(const Job& job) {
+Result<Scene> load_scene(const Job& job, const Bed& bed) {
   Scene scene;
   std::map<LoadKey, Loaded> files;
   const auto parts = load_parts(job, files, scene);
@@ -188,7 +189,7 @@ Result<Scene> load_scene(const Job& job) {
   for (std::size_t p = 0; p < job.parts.size(); ++p) requests.push_back(box_request(job.parts[p], *loaded[p]));
 
   const Result<std::vector<arrange::Place>> places =
-      arrange::place_boxes(requests, nm_of(job.bed_mm[0]), nm_of(job.bed_mm[1]), nm_of(job.gap_mm), job.machine.decides_bed);
+      arrange::place_boxes(requests, nm_of(bed.size_mm[0]), nm_of(bed.size_mm[1]), nm_of(job.gap_mm), bed.of_machine);
   if (!places) return places.error();
 
   for (std::size_t p = 0; p < job.parts.size(); ++p) {

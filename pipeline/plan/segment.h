@@ -4,8 +4,8 @@
 #include <cstdint>
 #include <vector>
 
-#include "pipeline/job/extrude.h"
 #include "pipeline/job/fill.h"
+#include "pipeline/job/job.h"
 #include "stages/data/status.h"
 #include "stages/segment/calibration.h"
 #include "stages/segment/expand.h"

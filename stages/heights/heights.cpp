@@ -8,6 +8,22 @@
 
 namespace lamina::heights {
 
+Options options_of(const Settings& settings) {
+  Options options;
+  options.mode = settings.mode;
+  options.cusp = static_cast<Nm>(nm_of(settings.cusp_mm));
+  options.adapt_angle_deg = settings.adapt_angle_deg;
+  options.surface.peak_angle_deg = settings.peak_angle_deg;
+  options.surface.normal_tolerance = settings.normal_tolerance;
+  options.surface.flat_tolerance = static_cast<Nm>(nm_of(settings.flat_tolerance_um / 1000));
+  options.surface.least_facet_mm2 = settings.least_facet_mm2;
+  options.facets = settings.facets;
+  options.flats = settings.flats;
+  options.least_flat_mm2 = settings.least_flat_mm2;
+  options.time = {settings.time_model[0], settings.time_model[1]};
+  return options;
+}
+
 Status check_options(const Options& options) {
   const auto wrong = [](std::string text) { return Error{Fault::kUsage, std::move(text)}; };
   if (options.set.values.empty()) {

@@ -8,27 +8,18 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
+#include "stages/data/choices.h"
 #include "stages/data/status.h"
 #include "stages/heights/flats.h"
+#include "stages/heights/settings.h"
 #include "stages/heights/surface.h"
 #include "stages/heights/table.h"
 #include "stages/heights/thickness_set.h"
 
 namespace lamina::heights {
-
-enum class Mode : std::uint8_t {
-  kUniform,   // one thickness
-  kAngle,     // thinner where a facet is flatter than an angle, or to meet a horizontal face (Lima 2009)
-  kCusp,      // from the bottom up, each layer as thick as the step on the slopes allows (Dolenc and Makela 1994)
-  kStepwise,  // slabs of the greatest thickness, each divided evenly (Sabourin, Houser and Bohn 1996)
-  kOptimal    // the fewest layers, or the least time, of all tables that keep the step and end on the flats
-};
-
-/// Which slopes a layer looks at: all that reach into it, or only those that its bounding plane cuts, as the documents
-/// do. The latter can miss whatever lies between two planes.
-enum class Facets : std::uint8_t { kRange, kPlane };
 
 /// What a layer costs; with both 0 every layer costs the same.
 struct TimeModel {
@@ -67,6 +58,9 @@ struct Plan {
   std::int64_t one_less_reaches = -1;
   std::int64_t largest_miss = 0;  // optimal: nm, the smallest that any table can have
 };
+
+/// Settings as the stage takes them, without the thicknesses; not checked.
+Options options_of(const Settings& settings);
 
 /// Whether options make sense together. errors  kUsage, one line that begins with the key
 Status check_options(const Options& options);

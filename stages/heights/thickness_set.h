@@ -3,7 +3,8 @@
 
 #include <cstdint>
 #include <numeric>
-#include <span>
+#include <string>
+#include <string_view>
 #include <vector>
 
 #include "stages/data/units.h"
@@ -26,5 +27,10 @@ struct ThicknessSet {
   /// Whether they are all the multiples of step() from the least to the most.
   bool is_contiguous() const { return (most() - least()) / step() + 1 == static_cast<Nm>(values.size()); }
 };
+
+/// Reads a set "0.178,0.254" or a range "0.05..0.3:0.01" of thicknesses in mm; a range without a step has steps of
+/// 0.001 mm, and holds what lies on the steps from its lower end. Sets may be in any order.
+/// returns "" or what is wrong and what would be right; the set is then as it was
+std::string read_thicknesses(std::string_view text, ThicknessSet& set);
 
 }  // namespace lamina::heights

@@ -1,8 +1,46 @@
 #include "stages/infill/parameters.h"
 
+#include <cmath>
 #include <numeric>
 
 namespace lamina::infill {
+namespace {
+
+Nm short_nm(double millimetres) { return static_cast<Nm>(nm_of(millimetres)); }
+MicroDegrees micro(double degrees) { return std::llround(degrees * 1e6); }
+
+std::vector<Nm> list_nm(const std::vector<double>& list) {
+  std::vector<Nm> nm;
+  for (const double value : list) nm.push_back(short_nm(value));
+  return nm;
+}
+
+}  // namespace
+
+FillParameters parameters_of(const Settings& settings) {
+  FillParameters p;
+  p.pattern = settings.pattern;
+  p.width = short_nm(settings.width_mm);
+  p.wall_width = settings.wall_width_mm > 0 ? short_nm(settings.wall_width_mm) : p.width;
+  p.walls = settings.walls;
+  p.loops = settings.loops;
+  p.angle_base = micro(settings.angle_deg);
+  p.angle_step = micro(settings.angle_step_deg);
+  p.build_layers = settings.build_layers;
+  p.gaps = list_nm(settings.gap_mm);
+  p.group = settings.group;
+  for (const auto& [z, gap] : settings.gap_by_height) p.gap_table.emplace_back(nm_of(z), short_nm(gap));
+  p.gap_expression = settings.gap_formula;
+  p.distances = list_nm(settings.distance_mm);
+  p.stagger = list_nm(settings.stagger_mm);
+  p.stagger_every_layer = settings.stagger_every_layer;
+  if (settings.first_line_mm) p.first_line = short_nm(*settings.first_line_mm);
+  if (settings.end_inset_mm) p.end_inset = short_nm(*settings.end_inset_mm);
+  if (settings.link_mm) p.longest_link = nm_of(*settings.link_mm);
+  p.shortest_line = short_nm(settings.shortest_mm);
+  p.cell = short_nm(settings.cell_mm);
+  return p;
+}
 
 MicroDegrees layer_angle(const FillParameters& parameters, std::uint32_t layer) {
   const std::int64_t blocks = layer / parameters.build_layers;

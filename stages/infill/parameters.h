@@ -9,20 +9,13 @@
 #include <vector>
 
 #include "stages/data/angle.h"
+#include "stages/data/choices.h"
 #include "stages/data/layer.h"
 #include "stages/data/mesh.h"  // Box
 #include "stages/data/units.h"
+#include "stages/infill/settings.h"
 
 namespace lamina::infill {
-
-enum class Pattern : std::uint8_t {
-  kNone,           // walls only
-  kRaster,         // parallel lines, zigzag
-  kContour,        // closed curves at equal distances, inwards
-  kContourRaster,  // some of those, then a raster inside them
-  kHoneycomb,      // trapezoid waves that touch: hexagonal cells
-  kQuatrefoil      // round waves kept apart: no closed cells in a layer
-};
 
 /// All lengths nm. The gap after line i of a layer (i = 0 is the first line, see `first_line`) is, in this order:
 ///   0           inside a group: where (i + 1) is no multiple of `group`
@@ -62,6 +55,9 @@ struct FillParameters {
   Nm shortest_line = 0;            // shorter lines are left out
   Nm cell = 2'000'000;             // kHoneycomb, kQuatrefoil: cells across flats, centre to centre
 };
+
+/// Settings as the stage takes them, in nm and micro-degrees; not checked, see check() in fill.h.
+FillParameters parameters_of(const Settings& settings);
 
 /// Where a layer stands in its part.
 struct FillContext {

@@ -10,7 +10,7 @@
 #include <optional>
 #include <string_view>
 
-#include "stages/data/text.h"
+#include "stages/text/readable.h"
 
 namespace lamina::read {
 namespace {

@@ -7,19 +7,15 @@
 #include <vector>
 
 #include "stages/data/buffer.h"
-#include "stages/data/contours.h"  // Point2
-#include "stages/data/mesh.h"      // Box
+#include "stages/data/mesh.h"  // Box
 #include "stages/data/status.h"
+#include "stages/data/toolpaths.h"
 #include "stages/data/units.h"
 
 namespace lamina::read {
 
-/// One straight move that lays filament.
-struct GcodeBead {
-  Point2 from, to;     // nm on the bed
-  Nm width;            // nm
-  std::uint32_t type;  // of GcodeFile::types
-};
+/// One straight move that lays filament; its type is one of GcodeFile::types.
+using GcodeBead = LaidBead;
 
 struct GcodeLayer {
   std::int64_t z = 0;  // nm, of the nozzle at the first bead; without beads about there

@@ -6,6 +6,7 @@
 #include <unistd.h>
 
 #include <cerrno>
+#include <cmath>
 #include <cstring>
 #include <new>
 
@@ -48,6 +49,22 @@ Result<Image> image(const std::string& path) {
   } catch (const std::bad_alloc&) {
     return Error{Fault::kVerification, fmt::format("{}: too many runs for the memory", path)};
   }
+}
+
+std::string difference(const Image& image, const PixelGrid& grid, std::uint64_t set) {
+  const std::uint32_t columns = image.runs.columns, rows = image.runs.view().rows();
+  if (columns != grid.columns() || rows != grid.rows()) {
+    return fmt::format("{} x {} pixels, the manifest says {} x {}", columns, rows, grid.columns(), grid.rows());
+  }
+  const auto dpi_differs = [](double dpi, double recorded) {
+    // PNG stores whole pixels a metre, so that 600 dpi reads as 599.999.
+    return dpi != 0 && std::abs(dpi - recorded) > 0.02;
+  };
+  if (dpi_differs(image.dpi_x, grid.x.dpi()) || dpi_differs(image.dpi_y, grid.y.dpi())) {
+    return fmt::format("{} x {} dpi, the manifest says {} x {}", image.dpi_x, image.dpi_y, grid.x.dpi(), grid.y.dpi());
+  }
+  const std::uint64_t is_set = set_pixels(image.runs);
+  return is_set == set ? "" : fmt::format("{} set pixels, the manifest says {}", is_set, set);
 }
 
 }  // namespace lamina::read

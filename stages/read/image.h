@@ -2,9 +2,11 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <span>
 #include <string>
 
+#include "stages/data/grid.h"
 #include "stages/data/runs.h"
 #include "stages/data/status.h"
 
@@ -19,5 +21,10 @@ struct Image {
 /// the runs plus one row or strip of bits.
 /// errors  kVerification with the file's name: truncated, not 1 bit, not readable
 Result<Image> image(const std::string& path);
+
+/// What an image differs from its manifest in, its pixels or their size first: "12 x 10 pixels, the manifest says 12 x 11";
+/// or "".
+/// set  pixels that are to be set
+std::string difference(const Image& image, const PixelGrid& grid, std::uint64_t set);
 
 }  // namespace lamina::read

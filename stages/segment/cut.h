@@ -10,16 +10,12 @@
 #include <algorithm>
 #include <cstdint>
 
+#include "stages/data/choices.h"
 #include "stages/data/toolpaths.h"
 #include "stages/data/units.h"
+#include "stages/segment/settings.h"
 
 namespace lamina::segment {
-
-enum class CutRule : std::uint8_t {
-  kGrid,       // Fukuda: on a grid fixed to the part, thin first; a line between two marks is not divided
-  kThickEnds,  // Di Nisio: both ends thick; what the pattern leaves over is shared by them
-  kAligned     // on the grid, but a thin stretch that the line does not hold whole, and clear of its ends, is thick
-};
 
 /// How the lines of a layer are cut. nm along the lines.
 struct LineCut {

@@ -7,20 +7,6 @@
 
 namespace lamina::segment {
 
-void SegmentCounts::add(const SegmentCounts& other) {
-  pieces += other.pieces;
-  stretches += other.stretches;
-  thin += other.thin;
-  lines += other.lines;
-}
-
-void PlannedPorosity::add(const PlannedPorosity& other) {
-  solid_mm3 += other.solid_mm3;
-  extruded_mm3 += other.extruded_mm3;
-  ellipses_mm3 += other.ellipses_mm3;
-  measured_mm3 += other.measured_mm3;
-}
-
 MoveTable::MoveTable(const Segmentation& plan, const LayerCut& cut, const Extruder& machine, const Layer& layer)
     : plan_(plan), cut_(cut), height_(mm(layer.thickness)) {
   const double limit = layer.index == 0 ? machine.speed.first_layer_mm_s : INFINITY;

@@ -15,30 +15,6 @@
 
 namespace lamina::segment {
 
-/// Segmented lines as they were laid. A piece is a line, or what holes leave of it, that is divided.
-struct SegmentCounts {
-  std::uint64_t pieces = 0;
-  std::uint64_t stretches = 0;  // points of the lists of Fukuda 2020: the start of a piece and its marks
-  std::uint64_t thin = 0;
-  std::uint64_t points() const { return stretches + pieces; }  // with the ends of pieces
-  std::uint64_t lines = 0;  // segmented lines, divided or not; a line cut by holes counts once
-
-  void add(const SegmentCounts& other);
-};
-
-/// Void share of what was planned: of the volume within the contours, by three ways to know what beads are.
-struct PlannedPorosity {
-  double solid_mm3 = 0;     // area within the contours x thickness, over all layers
-  double extruded_mm3 = 0;  // rounded rectangles: what is fed
-  double ellipses_mm3 = 0;  // the same beads as ellipses
-  double measured_mm3 = 0;  // rounded rectangles with the widths that were measured
-  double by_extrusion() const { return 1 - extruded_mm3 / solid_mm3; }
-  double by_ellipses() const { return 1 - ellipses_mm3 / solid_mm3; }
-  double by_widths() const { return 1 - measured_mm3 / solid_mm3; }
-
-  void add(const PlannedPorosity& other);
-};
-
 /// What a machine does for each kind of stretch in a layer; made anew only where the stored width changes.
 class MoveTable {
  public:

@@ -6,6 +6,14 @@
 
 namespace lamina::segment {
 
+std::string odd_about(const Fluid& fluid) {
+  if (fluid.density_kg_m3 <= 100 || fluid.viscosity_pa_s >= 1e-4) return {};
+  return fmt::format(
+      "a fluid of {:.4g} Pa.s and {:.4g} kg/m3 is neither a gas nor a liquid: the density is that of water; "
+      "k2 for air is {:.4g} times smaller",
+      fluid.viscosity_pa_s, fluid.density_kg_m3, fluid.density_kg_m3 / 1.2);
+}
+
 Result<Permeability> fit_permeability(std::span<const FlowPoint> points, const Fluid& fluid) {
   if (points.size() < 3) return Error{Fault::kInput, fmt::format("{} points; a fit needs three or more", points.size())};
   // Velocities in units of their largest, so that both columns are of one size.

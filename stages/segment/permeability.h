@@ -6,6 +6,7 @@
 #pragma once
 
 #include <span>
+#include <string>
 
 #include "stages/data/status.h"
 
@@ -22,6 +23,9 @@ struct Fluid {
   double viscosity_pa_s = 1.81e-5;  // air at 20 degC
   double density_kg_m3 = 1.204;
 };
+
+/// What is odd about a fluid, one line; "" if nothing is.
+std::string odd_about(const Fluid& fluid);
 
 struct Permeability {
   double k1_m2 = 0, k2_m = 0;

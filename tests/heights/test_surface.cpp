@@ -7,7 +7,6 @@
 #include <random>
 #include <sstream>
 
-#include "pipeline/job/heights.h"
 #include "stages/heights/ladder.h"
 #include "stages/heights/per_part.h"
 #include "stages/heights/steepest.h"
@@ -181,7 +180,7 @@ TEST(Rp3, RowsOfTheFirstCaseAreThoseOfAppendixB) {
 TEST(Thicknesses, SetsAndRangesAreReadStrictly) {
   const auto read = [](std::string_view text) {
     ThicknessSet set;
-    const std::string wrong = pipeline::read_thicknesses(text, set);
+    const std::string wrong = read_thicknesses(text, set);
     return wrong.empty() ? set.values : std::vector<Nm>{};
   };
   EXPECT_EQ(read("0.254,0.178"), (std::vector<Nm>{178'000, 254'000}));

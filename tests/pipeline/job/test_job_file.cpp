@@ -51,7 +51,6 @@ Job unusual_job(const Directory& directory) {
                  Containment::kInside,
                  true};
   job.machine.profile = "nuferbj";
-  job.machine.bed_given = job.machine.dpi_given = true;
   job.machine.scan_speed_mm_s = 12.5;
   job.machine.blocked = {{3, 5}};
   job.dose = {{20, 30}, 0.5, 0.75, raster::BeadEnds::kSquare};
@@ -357,9 +356,9 @@ TEST(Job, ValuesThatCameFromElsewhereAreChecked) {
     const Status status = check_job(bad);
     return !status.ok() && status.error().fault == Fault::kUsage;
   };
-  EXPECT_TRUE(refused([](Job& j) { j.dpi[1] = 0; }));
+  EXPECT_TRUE(refused([](Job& j) { j.dpi = {1200, 0}; }));
   EXPECT_TRUE(refused([](Job& j) { j.layer_mm = std::numeric_limits<double>::quiet_NaN(); }));
-  EXPECT_TRUE(refused([](Job& j) { j.bed_mm[0] = 1e9; }));
+  EXPECT_TRUE(refused([](Job& j) { j.bed_mm = {1e9, 380}; }));
   EXPECT_TRUE(refused([](Job& j) { j.parts[0].scale[2] = 0; }));
   EXPECT_TRUE(refused([](Job& j) { j.parts[0].at_mm = {-1.0, 0.0}; }));
   EXPECT_TRUE(refused([](Job& j) { j.parts.clear(); }));

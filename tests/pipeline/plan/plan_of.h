@@ -7,7 +7,7 @@
 
 namespace lamina::test {
 
-inline Result<pipeline::Plan> plan_of(const pipeline::Job& job, pipeline::Product product) {
+inline Result<pipeline::Plan> plan_of(const pipeline::Job& job, Product product) {
   auto resolved = pipeline::resolve(job, product);
   if (!resolved) return resolved.error();
   return pipeline::make_plan(std::move(*resolved), [](const pipeline::ProgressEvent&) {});

@@ -18,7 +18,7 @@ Box box_of(const Scene& scene, std::size_t instance) {
 }
 
 Scene loaded(const Job& job) {
-  auto scene = load_scene(job);
+  auto scene = load_scene(job, bare_bed(job));
   EXPECT_TRUE(scene.ok()) << scene.error().message;
   return scene.ok() ? std::move(*scene) : Scene{};
 }
@@ -93,7 +93,7 @@ TEST(Scene, FlatPartIsRefusedAsInput) {
   test::write_box(directory / "flat.stl", {0, 0, 1}, {10, 10, 1});
   Job job;
   job.parts = {{.path = directory / "flat.stl"}};
-  const auto scene = load_scene(job);
+  const auto scene = load_scene(job, bare_bed(job));
   ASSERT_FALSE(scene.ok());
   EXPECT_EQ(scene.error().fault, Fault::kInput);
 }
@@ -103,7 +103,7 @@ TEST(Scene, PartHigherThanTheReachIsRefused) {
   test::write_box(directory / "a.stl", {0, 0, 0}, {1, 1, 10});
   Job job;
   job.parts = {{.path = directory / "a.stl", .bottom_mm = 2140}};
-  const auto scene = load_scene(job);
+  const auto scene = load_scene(job, bare_bed(job));
   ASSERT_FALSE(scene.ok());
   EXPECT_EQ(scene.error().fault, Fault::kUsage);
 }

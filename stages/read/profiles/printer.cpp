@@ -1,18 +1,16 @@
-#include "pipeline/machine/printer_profile.h"
+#include "stages/read/profiles/printer.h"
 
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <fstream>
-#include <iterator>
 
-#include "pipeline/job/material.h"
-#include "pipeline/text/json_text.h"
-#include "pipeline/text/key.h"
-#include "pipeline/text/names.h"
-#include "stages/write/program/dialect.h"
+#include "stages/read/profiles/sections.h"
+#include "stages/text/json_text.h"
+#include "stages/text/key.h"
+#include "stages/text/names.h"
+#include "stages/text/readable.h"
 
-namespace lamina::pipeline {
+namespace lamina::read {
 namespace {
 
 using Text = std::string_view;
@@ -45,18 +43,9 @@ using Powder = decltype(Machine::powder);
 constexpr double kMost = 1e9;
 constexpr Limits kAny{-kMost, kMost}, kDpi{0, 25'400}, kLength{kLeastMm, kMostMm, " mm"}, kSpeed{1e-3, 1e6, " mm/s"};
 
-std::string read_name(Text text, std::string& name) {
-  name = one_line(text);
-  return name.empty() ? "is empty; name the machine" : "";
-}
-std::string read_line(Text text, std::string& line) { return line = one_line(text), std::string(); }
-std::string same_text(const std::string& text) { return text; }
+constexpr std::size_t kLongestMaterial = 40;
 
-std::string check_dialect_name(Text text) {
-  std::vector<Text> ids;
-  for (const auto& dialect : write::dialects()) ids.push_back(dialect.id);
-  return write::find_dialect(text) == nullptr ? not_one_of(text, ids) : std::string();
-}
+std::string check_nothing(Text) { return {}; }
 
 std::string check_axis(Text text) {
   if (text.size() == 1 && text[0] >= 'A' && text[0] <= 'Z') return {};
@@ -95,7 +84,7 @@ std::string join(const std::vector<std::string>& names) { return fmt::format("{}
 constexpr Key<Machine> kKeys[] = {
     custom<Machine, read_name, same_text, &Machine::name>({"machine", "name"}, Form::kString),
     custom<Machine, read_line, same_text, &Machine::description>({"machine", "description"}, Form::kString),
-    text<check_dialect_name, &Machine::dialect>({"machine", "dialect"}),
+    text<check_nothing, &Machine::dialect>({"machine", "dialect"}),
 
     word<kShapes, kBed, &Bed::shape>({"bed", "shape"}),
     field<kBed, &Bed::size_mm>({"bed", "size_mm"}, kLength),
@@ -150,35 +139,22 @@ constexpr Key<Machine> kKeys[] = {
 
 }  // namespace
 
-Result<Machine> read_machine(std::string_view text, const std::string& where) {
+std::string check_material(std::string_view name) {
+  const bool good = !name.empty() && name.size() <= kLongestMaterial && std::ranges::all_of(name, [](unsigned char c) {
+    return (c >= '0' && c <= '9') || (c >= 'A' && c <= 'Z') || (c >= 'a' && c <= 'z') || c == '-' || c == '_';
+  });
+  if (good) return {};
+  return fmt::format("'{}' is no name of a material; use up to {} letters, digits, - and _", name, kLongestMaterial);
+}
+
+Result<Machine> read_machine(std::string_view text, const std::string& where, std::span<const std::string_view> dialects) {
   const auto file = read_toml(text, where);
   if (!file) return file.error();
   Machine machine;
-  for (std::size_t i = 0; i < file->value.size(); ++i) {
-    if (Status status = read_section<Machine>(file->value[i], file->name[i], where, kKeys, machine); !status)
-      return status.error();
-  }
-  if (machine.name.empty()) {
-    return Error{Fault::kUsage, fmt::format("{}: machine.name is missing; name the machine", where)};
-  }
-  return machine;
-}
-
-Result<Machine> find_machine(const std::string& name_or_file) {
-  if (name_or_file.find('/') == std::string::npos && !name_or_file.ends_with(".toml")) {
-    std::vector<Text> names;
-    for (const ShippedMachine& shipped : shipped_machines()) {
-      if (shipped.name == name_or_file) return read_machine(shipped.text, std::string(shipped.name) + ".toml");
-      names.push_back(shipped.name);
-    }
-    return Error{Fault::kUsage, fmt::format("no machine {}; name a profile (a file that ends in .toml) or one of {}{}",
-                                            not_one_of(name_or_file, names).substr(0, name_or_file.size() + 2),
-                                            fmt::join(names, ", "), suggest(name_or_file, names))};
-  }
-  std::ifstream file(name_or_file, std::ios::binary);
-  if (!file) return Error{Fault::kUsage, fmt::format("{}: no such machine profile", name_or_file)};
-  const std::string text{std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
-  return read_machine(text, name_or_file);
+  if (Status status = read_sections<Machine>(*file, where, kKeys, machine, machine.name); !status) return status.error();
+  if (std::ranges::find(dialects, machine.dialect) != dialects.end()) return machine;
+  const Place at = file->find("machine")->find("dialect")->place;
+  return Error{Fault::kUsage, fmt::format("{}machine.dialect: {}", at.text(where), not_one_of(machine.dialect, dialects))};
 }
 
 std::string machine_text(const Machine& machine) {
@@ -187,4 +163,4 @@ std::string machine_text(const Machine& machine) {
   });
 }
 
-}  // namespace lamina::pipeline
+}  // namespace lamina::read

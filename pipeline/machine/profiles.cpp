@@ -1,0 +1,69 @@
+#include "pipeline/machine/profiles.h"
+
+#include <fmt/format.h>
+
+#include <fstream>
+#include <iterator>
+#include <vector>
+
+#include "pipeline/job/decisions.h"
+#include "stages/segment/calibration.h"
+#include "stages/text/json_text.h"
+#include "stages/text/names.h"
+#include "stages/text/readable.h"
+#include "stages/write/program/dialect.h"
+
+namespace lamina::pipeline {
+namespace {
+
+/// Reads a shipped profile or a file. unknown(suggestion, names)  says that there is none of that name
+template <class Profile, class Unknown>
+Result<Profile> find(const std::string& name_or_file, std::span<const ShippedProfile> shipped,
+                     Result<Profile> (*read)(std::string_view, const std::string&), const Unknown& unknown) {
+  if (name_or_file.find('/') == std::string::npos && !name_or_file.ends_with(".toml")) {
+    std::vector<std::string_view> names;
+    for (const auto& [name, text] : shipped) {
+      if (name == name_or_file) return read(text, std::string(name) + ".toml");
+      names.push_back(name);
+    }
+    return Error{Fault::kUsage, unknown(suggest(name_or_file, names), fmt::format("{}", fmt::join(names, ", ")))};
+  }
+  std::ifstream file(name_or_file, std::ios::binary);
+  if (!file) return Error{Fault::kUsage, fmt::format("{}: no such machine profile", name_or_file)};
+  const std::string text{std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
+  return read(text, name_or_file);
+}
+
+}  // namespace
+
+Result<Machine> read_machine(std::string_view text, const std::string& where) {
+  std::vector<std::string_view> dialects;
+  for (const auto& dialect : write::dialects()) dialects.push_back(dialect.id);
+  return read::read_machine(text, where, dialects);
+}
+
+Result<ExtruderProfile> read_extruder(std::string_view text, const std::string& where) {
+  auto profile = read::read_extruder(text, where, {.machine = {}, .calibration = segment::anet_a8_calibration()});
+  if (!profile) return profile;
+  if (const Status status = segment::check(profile->calibration); !status) {
+    return Error{Fault::kUsage, fmt::format("{}: calibration.{}", where, status.error().message)};
+  }
+  return profile;
+}
+
+Result<Machine> find_machine(const std::string& name_or_file) {
+  count(Decision::kMachine);
+  return find(name_or_file, shipped_machines(), read_machine, [&](const std::string& near, const std::string& names) {
+    return fmt::format("no machine '{}'; name a profile (a file that ends in .toml) or one of {}{}", name_or_file, names, near);
+  });
+}
+
+Result<ExtruderProfile> find_extruder(const std::string& name_or_file) {
+  count(Decision::kMachine);
+  return find(name_or_file, shipped_extruders(), read_extruder, [&](const std::string& near, const std::string& names) {
+    return fmt::format("no extrusion printer '{}'{}; name a profile (a file that ends in .toml) or one of {}",
+                       one_line(name_or_file), near, names);
+  });
+}
+
+}  // namespace lamina::pipeline

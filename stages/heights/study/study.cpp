@@ -1,0 +1,117 @@
+#include "stages/heights/study/study.h"
+
+#include <fmt/format.h>
+
+#include <chrono>
+#include <fstream>
+#include <utility>
+
+#include "stages/heights/per_part.h"
+#include "stages/text/number_text.h"
+
+namespace lamina::heights {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
+
+Study study_of(const SurfaceIndex& index, const Options& options, Plan plan) {
+  Study study;
+  study.options = options;
+  study.boundaries = boundaries_of(plan.table);
+  for (std::uint32_t i = 0; i < plan.table.size(); ++i) study.reasons.push_back(plan.table[i].reason);
+  const auto start = Clock::now();
+  study.evaluation = evaluate(index, study.boundaries, options);
+  study.evaluate_seconds = seconds_since(start);
+  study.plan = std::move(plan);
+  return study;
+}
+
+}  // namespace
+
+Result<Study> study(const SurfaceIndex& index, const Options& options) {
+  const auto start = Clock::now();
+  Result<Plan> plan = plan_heights(index, options);
+  if (!plan) return plan.error();
+  const double seconds = seconds_since(start);
+  Study study = study_of(index, options, std::move(*plan));
+  study.plan_seconds = seconds;
+  study.name = mode_name(options.mode);
+  if (options.mode == Mode::kUniform) study.name += fmt::format(" {} mm", number_text(mm(options.set.least())));
+  return study;
+}
+
+Result<Study> study_table(const SurfaceIndex& index, const Options& options, const std::string& path) {
+  std::ifstream file(path);
+  if (!file) return Error{Fault::kInput, fmt::format("{}: cannot be read; name a file of heights", path)};
+  Study study;
+  study.name = "from " + path;
+  study.options = options;
+  study.boundaries.push_back(0);
+  std::string line;
+  for (int number = 1; std::getline(file, line); ++number) {
+    line = line.substr(0, line.find('#'));
+    while (!line.empty() && (line.back() == ' ' || line.back() == '\r' || line.back() == '\t')) line.pop_back();
+    if (line.empty()) continue;
+    double millimetres = 0;
+    if (const std::string wrong = read_number(line, 0, 2147, " mm", millimetres); !wrong.empty()) {
+      return Error{Fault::kInput, fmt::format("{}:{}: {}", path, number, wrong)};
+    }
+    const std::int64_t height = nm_of(millimetres);
+    if (height == 0 && study.boundaries.size() == 1) continue;
+    if (height <= study.boundaries.back()) {
+      return Error{Fault::kInput, fmt::format("{}:{}: {} mm is not above the height before it; list the tops of the layers "
+                                              "from the bottom up",
+                                              path, number, line)};
+    }
+    study.boundaries.push_back(height);
+  }
+  if (study.boundaries.size() < 2) return Error{Fault::kInput, fmt::format("{}: holds no layer; list their tops in mm", path)};
+  study.evaluation = evaluate(index, study.boundaries, options);
+  return study;
+}
+
+Result<std::vector<Study>> study_all_ways(const SurfaceIndex& index, const Options& options) {
+  std::vector<std::pair<Mode, ThicknessSet>> ways = {{Mode::kUniform, {{options.set.least()}}}};
+  if (options.set.size() > 1) ways.push_back({Mode::kUniform, {{options.set.most()}}});
+  for (const Mode mode : {Mode::kAngle, Mode::kStepwise, Mode::kCusp, Mode::kOptimal}) ways.push_back({mode, options.set});
+  std::vector<Study> studies;
+  Options way = options;
+  for (auto& [mode, set] : ways) {
+    way.mode = mode;
+    way.set = std::move(set);
+    Result<Study> made = study(index, way);
+    if (!made) return made.error();
+    studies.push_back(std::move(*made));
+  }
+  return studies;
+}
+
+Result<std::vector<Study>> study_per_part(SurfaceIndex index, Options options) {
+  options.mode = Mode::kOptimal;
+  if (Status status = check_slab(options.set); !status) return status.error();
+  Result<Study> common = study(index, options);
+  if (!common) return common.error();
+  common->name = "all parts in one table";
+  std::vector<Study> studies;
+  studies.push_back(std::move(*common));
+  Result<PerPartPlan> plan = plan_per_part(index, options);
+  if (!plan) return plan.error();
+  const std::vector<PartSurface> parts = std::exchange(index.parts, {});
+  for (std::uint32_t part = 0; part < parts.size(); ++part) {
+    index.parts = {parts[part]};
+    index.top = parts[part].top;
+    index.area_mm2 = 0;
+    for (const Standing& standing : parts[part].standing) {
+      index.area_mm2 += index.meshes[standing.mesh].area_mm2 * standing.copies;
+    }
+    Study study = study_of(index, options, std::move(plan->parts[part]));
+    for (LayerFacts& layer : study.evaluation.layers) layer.part = layer.part == kNoPart ? layer.part : part;
+    study.name = fmt::format("part {}, slabs of {} mm", part + 1, number_text(mm(plan->slab)));
+    studies.push_back(std::move(study));
+  }
+  return studies;
+}
+
+}  // namespace lamina::heights

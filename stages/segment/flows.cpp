@@ -1,0 +1,135 @@
+#include "stages/segment/flows.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <fstream>
+
+#include "stages/text/number_text.h"
+#include "stages/text/table.h"
+
+namespace lamina::segment {
+namespace {
+
+struct Unit {
+  std::string_view ending;
+  double si;
+};
+// Longer endings first: "_mbar" also ends in "bar".
+constexpr Unit kFlows[] = {{"_l_min", 1e-3 / 60}, {"_ml_min", 1e-6 / 60}, {"_l_h", 1e-3 / 3600},
+                           {"_m3_h", 1.0 / 3600}, {"_m3_s", 1},           {"_l_s", 1e-3}};
+constexpr Unit kVelocities[] = {{"_mm_s", 1e-3}, {"_cm_s", 1e-2}, {"_m_s", 1}};
+constexpr Unit kDrops[] = {{"_mbar", 100}, {"_kpa", 1000}, {"_hpa", 100}, {"_pa", 1}, {"_bar", 1e5}, {"_psi", 6894.757293}};
+
+template <std::size_t N>
+double unit_of(std::string name, const Unit (&units)[N]) {
+  std::ranges::transform(name, name.begin(), [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  for (const Unit& unit : units) {
+    if (name.ends_with(unit.ending)) return unit.si;
+  }
+  return 0;
+}
+
+/// What the columns of a table hold.
+struct Columns {
+  std::vector<std::string> names;
+  std::vector<double> drop_units;  // of each; 0: no pressure drop
+  std::size_t flow = SIZE_MAX, group = SIZE_MAX;
+  double flow_unit = 0;  // SI
+  bool velocity = false;
+
+  /// Reads a header. returns "" or what is missing
+  std::string read(std::vector<std::string> header) {
+    names = std::move(header);
+    drop_units.assign(names.size(), 0);
+    for (std::size_t i = 0; i < names.size(); ++i) {
+      if (names[i] == "configuration") group = i;
+      drop_units[i] = unit_of(names[i], kDrops);
+      if (drop_units[i] > 0 || flow != SIZE_MAX) continue;
+      flow_unit = unit_of(names[i], kFlows);
+      velocity = flow_unit == 0;
+      if (velocity) flow_unit = unit_of(names[i], kVelocities);
+      if (flow_unit > 0) flow = i;
+    }
+    if (flow == SIZE_MAX) return "no column of flows (flow_l_min, flow_ml_min, flow_m3_s) or velocities (velocity_m_s)";
+    if (std::ranges::max(drop_units) > 0) return {};
+    return "no column of pressure drops (drop_pa, drop_kpa, drop_mbar, drop_bar, drop_psi)";
+  }
+};
+
+/// Adds the points of a row to its group. returns "" or what is wrong
+std::string add_row(const Columns& columns, const std::vector<std::string>& cells, const Medium& medium,
+                    std::vector<FlowGroup>& groups) {
+  const auto number = [&](std::size_t column, double least, double& value) {
+    const auto wrong = read_number(cells[column], least, 1e12, "", value);
+    return wrong.empty() ? wrong : fmt::format("{}: {}", columns.names[column], wrong);
+  };
+  if (cells.size() != columns.names.size())
+    return fmt::format("{} columns where the header has {}", cells.size(), columns.names.size());
+  double flow = 0;
+  if (const auto wrong = number(columns.flow, 0, flow); !wrong.empty()) return wrong;
+  const double velocity = flow * columns.flow_unit / (columns.velocity ? 1 : medium.area_m2);
+  const std::string name = columns.group == SIZE_MAX ? std::string() : cells[columns.group];
+  auto group = std::ranges::find(groups, name, &FlowGroup::name);
+  if (group == groups.end()) group = groups.insert(groups.end(), {name, {}});
+  for (std::size_t i = 0; i < cells.size(); ++i) {
+    if (columns.drop_units[i] == 0 || cells[i].empty()) continue;
+    double drop = 0;
+    if (const auto wrong = number(i, -1e12, drop); !wrong.empty()) return wrong;
+    group->points.push_back({velocity, drop * columns.drop_units[i] / medium.length_m});
+  }
+  return {};
+}
+
+}  // namespace
+
+Result<std::vector<FlowGroup>> read_flows(const std::string& path, const Medium& medium) {
+  std::ifstream file(path);
+  if (!file) return Error{Fault::kInput, path + ": no such file, or it cannot be read"};
+  Columns columns;
+  char separator = ',';
+  std::vector<FlowGroup> groups;
+  std::size_t number = 0;
+  for (std::string line; std::getline(file, line);) {
+    ++number;
+    if (line.empty() || line[0] == '#' || line == "\r") continue;
+    const bool header = columns.names.empty();
+    if (header) separator = separator_of(line);
+    auto cells = cells_of(line, separator);
+    const std::string wrong = header ? columns.read(std::move(cells)) : add_row(columns, cells, medium, groups);
+    if (!wrong.empty()) return Error{Fault::kInput, fmt::format("{}:{}: {}", path, number, wrong)};
+  }
+  if (!groups.empty()) return groups;
+  return Error{Fault::kInput, path + ": holds no measurements; the first line names the columns, the others hold numbers"};
+}
+
+Plot draw_fit(const FlowGroup& group, const Permeability& fit) {
+  constexpr const char* kInk = "000000";
+  double most_v = 0, most_y = 0;
+  for (const auto& p : group.points) {
+    most_v = std::max(most_v, p.velocity_m_s);
+    most_y = std::max(most_y, p.gradient_pa_m);
+  }
+  const auto x = [&](double v) { return 60 + 520 * v / most_v; };
+  const auto y = [&](double g) { return 360 - 320 * g / most_y; };
+  Plot plot;
+  plot.width = 620;
+  plot.height = 420;
+  plot.lines.push_back({{{60, 30}, {60, 360}, {590, 360}}, kInk});
+  auto& curve = plot.lines.emplace_back(Plot::Line{{}, "cc3333"});
+  for (int i = 0; i <= 100; ++i) {
+    const double v = most_v * i / 100;
+    curve.points.push_back({x(v), y(fit.linear * v + fit.quadratic * v * v)});
+  }
+  for (const auto& p : group.points) plot.dots.push_back({x(p.velocity_m_s), y(p.gradient_pa_m), 2.5, "2266cc"});
+  const auto put = [&](double left, double baseline, std::string line) {
+    plot.texts.push_back({left, baseline, 12, Plot::Anchor::kStart, kInk, std::move(line)});
+  };
+  put(300, 400, fmt::format("velocity, 0 to {:.4g} m/s", most_v));
+  put(10, 20,
+      fmt::format("pressure drop / length, 0 to {:.4g} Pa/m; k1 {:.2f} D, k2 {:.4g} m, R2 {:.5f} {}", most_y,
+                  fit.k1_m2 / kDarcy, fit.k2_m, fit.r_squared, group.name));
+  return plot;
+}
+
+}  // namespace lamina::segment

@@ -1,0 +1,30 @@
+// stages/segment/flows.h: tables of measured flows and pressure drops, and the parabola through them.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "stages/data/picture/plot.h"
+#include "stages/data/status.h"
+#include "stages/segment/permeability.h"
+
+namespace lamina::segment {
+
+/// What the fluid flows through.
+struct Medium {
+  double length_m = 0, area_m2 = 0;  // along the flow; its cross-section
+};
+
+struct FlowGroup {
+  std::string name;  // of the rows' column "configuration", if there is one
+  std::vector<FlowPoint> points;
+};
+
+/// A table with a header: one column of flows or velocities, one or more of pressure drops; units by their endings.
+/// errors  kInput: file, line, column, what is wrong
+Result<std::vector<FlowGroup>> read_flows(const std::string& path, const Medium& medium);
+
+/// Points and parabola.
+Plot draw_fit(const FlowGroup& group, const Permeability& fit);
+
+}  // namespace lamina::segment
