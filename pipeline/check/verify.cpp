@@ -4,31 +4,23 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
-#include <cmath>
 #include <filesystem>
 #include <mutex>
 #include <optional>
 
-#include "pipeline/check/replay_job.h"
-#include "pipeline/check/verify_paths.h"
+#include "pipeline/check/job_files.h"
 #include "pipeline/output/directory.h"
-#include "pipeline/output/manifest.h"
 #include "pipeline/output/print_program.h"
-#include "stages/data/hash.h"
 #include "stages/raster/materials.h"
 #include "stages/read/image.h"
+#include "stages/replay/feeding.h"
+#include "stages/write/manifest/compare.h"
+#include "stages/write/manifest/manifest.h"
 
 namespace lamina::pipeline {
 namespace {
 
 namespace fs = std::filesystem;
-
-constexpr std::size_t kFaultsTold = 20;
-
-void add_fault(VerifyReport& report, std::string fault) {
-  if (report.faults.size() < kFaultsTold) report.faults.push_back(std::move(fault));
-  ++report.fault_count;
-}
 
 // What all layers of a directory are compared by.
 struct Inspection {
@@ -39,29 +31,6 @@ struct Inspection {
   std::mutex adding;
   VerifyReport& report;
 };
-
-// Which vats have to feed a layer, a bit each, by the profile's rule.
-std::uint32_t vats_wanted(const Machine& machine, const ManifestHead& head, const LayerRecord& record) {
-  const std::size_t first =
-      std::ranges::find_if(record.images, [](const ImageRecord& i) { return i.set_pixels > 0; }) - record.images.begin();
-  if (first == record.images.size()) return 1u << head.materials[0].vat;
-  const auto after = std::find_if(record.images.begin() + static_cast<std::ptrdiff_t>(first) + 1, record.images.end(),
-                                  [](const ImageRecord& i) { return i.set_pixels > 0; });
-  if (after == record.images.end()) return 1u << head.materials[first].vat;
-  switch (machine.powder.vat_rule) {
-    case VatRule::kFirst: return 1;
-    case VatRule::kSecond: return 2;
-    case VatRule::kBoth: return 3;
-    case VatRule::kMajority: return 1u << head.materials[after->set_pixels > record.images[first].set_pixels ? 1 : 0].vat;
-    case VatRule::kRefuse: break;
-  }
-  return 0;
-}
-
-std::string vats_text(std::uint32_t vats) {
-  constexpr const char* kTexts[] = {"no vat feeds", "the first vat feeds", "the second vat feeds", "both vats feed"};
-  return kTexts[vats & 3];
-}
 
 // Empty, or what is wrong with a layer's print program. A program whose hash differs is replayed all the same, since
 // that tells where it differs.
@@ -82,10 +51,14 @@ std::string fault_of_program(Inspection& inspection, const LayerRecord& record, 
       return fmt::format("{}: {} drops, the manifest says {}", name, replay->drops, record.program.drops);
     }
     if (same && !inspection.head.materials.empty()) {
-      const std::uint32_t wanted = vats_wanted(inspection.machine->profile(), inspection.head, record);
+      std::vector<std::uint64_t> set;
+      std::vector<std::uint32_t> vats;
+      for (const ImageRecord& one : record.images) set.push_back(one.set_pixels);
+      for (const JobMaterial& material : inspection.head.materials) vats.push_back(material.vat);
+      const std::uint32_t wanted = replay::vats_wanted(inspection.machine->profile(), set, vats);
       if (replay->vats != wanted) {
-        return fmt::format("{}: layer {}: {} where {} has to", name, record.layer.index, vats_text(replay->vats),
-                           vats_text(wanted));
+        return fmt::format("{}: layer {}: {} where {} has to", name, record.layer.index, replay::vats_text(replay->vats),
+                           replay::vats_text(wanted));
       }
     }
     const std::lock_guard lock(inspection.adding);
@@ -98,27 +71,12 @@ std::string fault_of_program(Inspection& inspection, const LayerRecord& record, 
 }
 
 // Empty, or what is wrong with an image; what it sets is added to `whole`.
-std::string fault_of_image(const ManifestHead& head, const std::string& path, const LayerImageFile& file, Runs& whole) {
+std::string fault_of_image(const Inspection& inspection, const LayerImageFile& file, Runs& whole) {
   const std::string& name = file.name;
-  Result<read::Image> image = read::image(path);
+  Result<read::Image> image = read::image((fs::path(inspection.directory) / name).string());
   if (!image) return image.error().message;
-  const std::uint32_t columns = image->runs.columns, rows = image->runs.view().rows();
-  if (columns != head.grid.columns() || rows != head.grid.rows()) {
-    return fmt::format("{}: {} x {} pixels, the manifest says {} x {}", name, columns, rows, head.grid.columns(),
-                       head.grid.rows());
-  }
-  const auto dpi_differs = [](double dpi, double recorded) {
-    // PNG stores whole pixels a metre, so that 600 dpi reads as 599.999.
-    return dpi != 0 && std::abs(dpi - recorded) > 0.02;
-  };
-  if (dpi_differs(image->dpi_x, head.grid.x.dpi()) || dpi_differs(image->dpi_y, head.grid.y.dpi())) {
-    return fmt::format("{}: {} x {} dpi, the manifest says {} x {}", name, image->dpi_x, image->dpi_y, head.grid.x.dpi(),
-                       head.grid.y.dpi());
-  }
-  const std::uint64_t set = set_pixels(image->runs);
-  if (set != file.record.set_pixels) {
-    return fmt::format("{}: {} set pixels, the manifest says {}", name, set, file.record.set_pixels);
-  }
+  if (const std::string what = read::difference(*image, inspection.head.grid, file.record.set_pixels); !what.empty())
+    return fmt::format("{}: {}", name, what);
   if (!raster::add_image(std::move(image->runs), whole))
     return fmt::format("{}: sets pixels that another material's image sets as well", name);
   return {};
@@ -128,17 +86,10 @@ std::string fault_of_layer(Inspection& inspection, const LayerRecord& record) {
   if (inspection.head.extension.empty()) return fault_of_program(inspection, record, nullptr);  // a format without files
   Runs whole;  // what is jetted, of whatever material
   for (const LayerImageFile& file : layer_images(inspection.head, record)) {
-    const std::string path = (fs::path(inspection.directory) / file.name).string();
-    std::error_code error;
-    if (!fs::is_regular_file(path, error)) return fmt::format("{}: is missing", file.name);
-    const Result<FileDigest> digest = digest_file(path);
-    if (!digest) return digest.error().message;
-    if (digest->bytes != file.record.bytes) {
-      return fmt::format("{}: {} bytes, the manifest says {}", file.name, digest->bytes, file.record.bytes);
-    }
-    if (digest->hash != file.record.hash) return fmt::format("{}: its content is not what was written", file.name);
+    std::string fault = fault_of_file(inspection.directory, file.name, file.record.hash, file.record.bytes);
+    if (!fault.empty()) return fault;
     if (inspection.quick) continue;
-    if (std::string what = fault_of_image(inspection.head, path, file, whole); !what.empty()) return what;
+    if (std::string what = fault_of_image(inspection, file, whole); !what.empty()) return what;
   }
   const RunsView view = whole;
   return fault_of_program(inspection, record, inspection.quick ? nullptr : &view);
@@ -147,7 +98,7 @@ std::string fault_of_layer(Inspection& inspection, const LayerRecord& record) {
 // Finds the machine again that the programs were written for.
 void prepare_replay(Inspection& inspection) {
   auto built = machine_of_job(inspection.directory, inspection.head);
-  if (!built) return add_fault(inspection.report, built.error().message);
+  if (!built) return inspection.report.add(built.error().message);
   inspection.machine = std::move(*built);
   inspection.report.machine = inspection.machine->profile().name;
 }
@@ -156,18 +107,7 @@ void prepare_replay(Inspection& inspection) {
 void check_frame(const std::string& directory, const ManifestHead& head, VerifyReport& report) {
   for (const auto& [stem, hash] : {std::pair{"start", head.program_start}, {"end", head.program_end}}) {
     const std::string name = fmt::format("program/{}{}", stem, head.program_extension);
-    const std::string path = (fs::path(directory) / name).string();
-    std::error_code error;
-    if (!fs::is_regular_file(path, error)) {
-      add_fault(report, name + ": is missing");
-      continue;
-    }
-    const Result<FileDigest> digest = digest_file(path);
-    if (!digest) {
-      add_fault(report, digest.error().message);
-    } else if (digest->hash != hash) {
-      add_fault(report, name + ": its content is not what was written");
-    }
+    if (std::string fault = fault_of_file(directory, name, hash); !fault.empty()) report.add(std::move(fault));
   }
 }
 
@@ -175,11 +115,7 @@ void check_frame(const std::string& directory, const ManifestHead& head, VerifyR
 void finish_replay(const Inspection& inspection) {
   if (!inspection.machine || inspection.report.replayed == 0) return;
   VerifyReport& report = inspection.report;
-  const Machine& machine = inspection.machine->profile();
-  const double side = machine.bed.size_mm[0] * machine.bed.size_mm[1];
-  const double area = machine.bed.shape == BedShape::kRound ? side * 3.14159265358979 / 4 : side;
-  report.binder_mm3 = static_cast<double>(report.replay.drops) * machine.head.drop_pl * 1e-6;
-  report.powder_mm3 = (report.replay.fed_mm[0] + report.replay.fed_mm[1]) * area * machine.powder.packing;
+  report.material = replay::material_of(inspection.machine->profile(), report.replay);
   report.coverage = static_cast<double>(report.replay.drops) / static_cast<double>(report.replayed) /
                     static_cast<double>(inspection.head.grid.columns()) / static_cast<double>(inspection.head.grid.rows());
 }
@@ -202,7 +138,7 @@ void check_layers(const std::string& directory, const Manifest& manifest, bool q
       report.bytes += record.bytes + record.program.bytes;
       report.moved += record.program.moved;
       report.lost += record.program.lost;
-      if (!faults[i].empty()) add_fault(report, std::move(faults[i]));
+      if (!faults[i].empty()) report.add(std::move(faults[i]));
     }
   }
   report.layers += manifest.layers.size();
@@ -211,43 +147,47 @@ void check_layers(const std::string& directory, const Manifest& manifest, bool q
 
 void check_strays(const std::string& directory, const std::vector<Manifest>& manifests, VerifyReport& report) {
   std::vector<std::string> strays;
-  std::error_code error;
-  for (fs::directory_iterator entry(fs::path(directory) / "layers", error), end; !error && entry != end;
-       entry.increment(error)) {
-    const std::string name = entry->path().filename().string();
-    std::uint32_t index = 0;
-    bool partial = false, named = false;
-    if (read_layer_file_name(name, index, partial) && !partial) {
-      for (const Manifest& manifest : manifests) {
-        const ManifestHead& head = manifest.head;
-        LayerRecord record;
-        record.layer.index = index;
-        named = named || (index >= head.first_layer && index < head.first_layer + manifest.layers.size() &&
-                          std::ranges::any_of(layer_images(head, record),
-                                              [&](const LayerImageFile& image) { return image.name == "layers/" + name; }));
+  const auto look = [&](const std::string& folder, const auto& names) {
+    std::error_code error;
+    for (fs::directory_iterator entry(fs::path(directory) / folder, error), end; !error && entry != end;
+         entry.increment(error)) {
+      const std::string name = folder + "/" + entry->path().filename().string();
+      if (std::ranges::none_of(manifests, [&](const Manifest& manifest) { return names(manifest, name); })) {
+        strays.push_back(name);
       }
     }
-    if (!named) strays.push_back(name);
-  }
-  for (std::string& name : strays) name = "layers/" + name;
-  for (fs::directory_iterator entry(fs::path(directory) / "program", error), end; !error && entry != end;
-       entry.increment(error)) {
-    const std::string name = entry->path().filename().string();
+  };
+  const auto has_layer = [](const Manifest& manifest, std::uint32_t index) {
+    return index >= manifest.head.first_layer && index < manifest.head.first_layer + manifest.layers.size();
+  };
+  look("layers", [&](const Manifest& manifest, const std::string& name) {
+    LayerRecord record;
+    bool partial = false;
+    if (!read_layer_file_name(fs::path(name).filename().string(), record.layer.index, partial)) return false;
+    return !partial && has_layer(manifest, record.layer.index) &&
+           std::ranges::any_of(layer_images(manifest.head, record),
+                               [&](const LayerImageFile& image) { return image.name == name; });
+  });
+  look("program", [&](const Manifest& manifest, const std::string& name) {
+    const std::string& extension = manifest.head.program_extension;
     std::uint32_t index = 0;
-    bool partial = false, named = false;
-    const bool layer = read_program_file_name(name, index, partial);
-    for (const Manifest& manifest : manifests) {
-      const ManifestHead& head = manifest.head;
-      named = named || (!head.machine.empty() &&
-                        (layer ? !partial && index >= head.first_layer && index < head.first_layer + manifest.layers.size() &&
-                                     program_file_name(index, head.program_extension) == "program/" + name
-                               : name == "machine.toml" || name == "start" + head.program_extension ||
-                                     name == "end" + head.program_extension));
+    bool partial = false;
+    if (manifest.head.machine.empty()) return false;
+    if (read_program_file_name(fs::path(name).filename().string(), index, partial)) {
+      return !partial && has_layer(manifest, index) && program_file_name(index, extension) == name;
     }
-    if (!named) strays.push_back("program/" + name);
-  }
+    return name == "program/machine.toml" || name == "program/start" + extension || name == "program/end" + extension;
+  });
   std::sort(strays.begin(), strays.end());
-  for (const std::string& name : strays) add_fault(report, fmt::format("{}: no manifest names it", name));
+  for (const std::string& name : strays) report.add(fmt::format("{}: no manifest names it", name));
+}
+
+VerifyReport verify_paths(const std::string& name, const std::string& directory, const Manifest& manifest) {
+  VerifyReport report;
+  report.directory = name;
+  report.layers = manifest.layers.size();
+  report.bytes = compare_paths(directory, manifest, report);
+  return report;
 }
 
 /// A file of toolpaths, by the manifest beside it.
@@ -296,16 +236,16 @@ Result<VerifyReport> verify(const std::string& directory, const VerifyOptions& o
     Result<Manifest> manifest = read_manifest((fs::path(directory) / file.name).string());
     if (!manifest) return manifest.error();
     if (!manifests.empty() && manifest->head.id() != manifests[0].head.id()) {
-      add_fault(report, fmt::format("{}: belongs to another job than {} ({})", file.name, files[0].name,
-                                    difference(manifest->head, manifests[0].head)));
+      report.add(fmt::format("{}: belongs to another job than {} ({})", file.name, files[0].name,
+                             difference(manifest->head, manifests[0].head)));
       continue;
     }
     if (file.partial) {
       interrupted = true;
-      add_fault(report, manifest->layers.empty()
-                            ? fmt::format("{}: job was interrupted before its first layer; run again with --resume", file.name)
-                            : fmt::format("{}: job was interrupted after layer {}; run again with --resume", file.name,
-                                          manifest->layers.back().layer.index));
+      report.add(manifest->layers.empty()
+                     ? fmt::format("{}: job was interrupted before its first layer; run again with --resume", file.name)
+                     : fmt::format("{}: job was interrupted after layer {}; run again with --resume", file.name,
+                                   manifest->layers.back().layer.index));
     }
     manifests.push_back(std::move(*manifest));
   }

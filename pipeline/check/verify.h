@@ -3,10 +3,9 @@
 
 #include <cstdint>
 #include <string>
-#include <vector>
 
 #include "stages/data/status.h"
-#include "stages/replay/machine.h"
+#include "stages/replay/count.h"
 
 namespace lamina::pipeline {
 
@@ -14,7 +13,8 @@ struct VerifyOptions {
   bool quick = false;  // sizes and hashes only; images are not decoded
 };
 
-struct VerifyReport {
+/// Faults are in layer order, then stray files.
+struct VerifyReport : Faults {
   std::string directory;
   std::uint64_t layers = 0;           // that the manifests name
   std::uint64_t bytes = 0;            // of their files, as recorded
@@ -22,12 +22,8 @@ struct VerifyReport {
   std::uint64_t replayed = 0;         // layers
   replay::Count replay;               // of all of them
   std::uint64_t moved = 0, lost = 0;  // pixels of blocked nozzles
-  double binder_mm3 = 0;              // drops x their volume
-  double powder_mm3 = 0;              // height fed x area of the bed
+  replay::Material material;          // used up
   double coverage = 0;                // drops / pixels of the layers replayed
-  std::uint64_t fault_count = 0;
-  std::vector<std::string> faults;  // the first 20, in layer order, then stray files; each begins with a file's name
-  bool ok() const { return fault_count == 0; }
 };
 
 /// Compares every file with the manifest (of the whole job, or of all shards that are there): present, of the recorded
@@ -35,7 +31,7 @@ struct VerifyReport {
 /// print program of each layer, carried out by a virtual machine, prints that image bit for bit. Files in
 /// layers/ and program/ that no manifest names are faults, and so is a job that was interrupted.
 ///
-/// directory  or a file of toolpaths: its bytes and those of each layer (verify_paths.h), as of contours
+/// directory  or a file of toolpaths: its bytes and those of each layer (compare_paths), as of contours
 /// errors  kVerification if there is no manifest to compare with, or none that can be read; kUsage if there is no such
 ///         directory or file
 /// cost    reads every file once, and once more to decode it; parallel over layers; memory of a few layers' runs

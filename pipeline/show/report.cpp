@@ -4,17 +4,15 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
-#include <cmath>
 #include <filesystem>
-#include <nlohmann/json.hpp>
 #include <span>
 
 #include "pipeline/show/report_cast.h"
 #include "pipeline/show/report_source.h"
-#include "pipeline/show/title.h"
 #include "stages/data/hash.h"
 #include "stages/geometry/coverage.h"
 #include "stages/view/depth.h"
+#include "stages/write/report/head.h"
 #include "stages/write/report/page.h"
 #include "stages/write/report/run_code.h"
 
@@ -22,37 +20,12 @@ namespace lamina::pipeline {
 namespace {
 
 namespace fs = std::filesystem;
+using write::report::HeldLayers;
+using write::report::LayersSeen;
 using write::report::PageData;
-using Json = nlohmann::ordered_json;
+using write::report::ShownView;
 
 constexpr std::uint32_t kChunk = 64;  // layers that are read together
-
-/// The layers' codes that fit the page: when they get too many, every second one is let go.
-class HeldLayers {
- public:
-  explicit HeldLayers(std::uint64_t limit) : limit_(limit) {}
-
-  bool wants(std::uint32_t place) const { return place % stride_ == 0; }
-  void add(std::uint32_t place, Buffer<std::byte> code) {
-    if (!wants(place)) return;
-    bytes_ += cost(code);
-    layers_.push_back({place, std::move(code)});
-    while (bytes_ > limit_ && layers_.size() > 1) {
-      stride_ *= 2;
-      std::erase_if(layers_, [&](const auto& layer) { return layer.first % stride_ != 0; });
-      bytes_ = 0;
-      for (const auto& layer : layers_) bytes_ += cost(layer.second);
-    }
-  }
-  std::uint32_t stride() const { return stride_; }
-  std::vector<std::pair<std::uint32_t, Buffer<std::byte>>>& layers() { return layers_; }
-
- private:
-  static std::uint64_t cost(const Buffer<std::byte>& code) { return code.size() / 3 * 4 + 60; }
-  std::uint64_t limit_, bytes_ = 0;
-  std::uint32_t stride_ = 1;
-  std::vector<std::pair<std::uint32_t, Buffer<std::byte>>> layers_;
-};
 
 /// Calls `work(place, layer, slot)` for every layer on all processors, and then `gather(place, slot)` in order. The
 /// first layer that cannot be read ends it.
@@ -79,28 +52,6 @@ Status each_layer(const ReportSource& source, bool timed, Work work, Gather gath
   return {};
 }
 
-Json part_json(const PartSummary& part) {
-  const auto point = [](const Point3& p) { return Json{mm(p.x), mm(p.y), mm(p.z)}; };
-  Json json = {{"path", part.path},
-               {"copies", part.copies},
-               {"triangles", part.triangles},
-               {"low_mm", point(part.bounds.lo)},
-               {"high_mm", point(part.bounds.hi)},
-               {"notes", Json::array()}};
-  for (const Note& note : part.notes) json["notes"].push_back((note.repair ? "repair: " : "") + note.text);
-  return json;
-}
-
-std::string title_of(const ManifestHead& head) { return head.parts.empty() ? "a job" : title_of(head.parts); }
-
-/// A view of the page: what its head says of it, and its pixels.
-struct ShownView {
-  std::string name;
-  std::uint32_t width = 0, height = 0, most = 0;  // most: of a depth; 0 for light and cover
-  double width_mm = 0, height_mm = 0;
-  Buffer<std::byte> deflated;
-};
-
 /// The parts themselves, if their files can be found and are still those that were planned.
 Result<std::vector<ShownView>> views_of_parts(const fs::path& folder, const ManifestHead& head, const ReportOptions& options) {
   std::vector<std::string> folders = options.parts;
@@ -123,77 +74,6 @@ std::vector<ShownView> views_of_layers(const view::ThreeViews& views) {
                      write::report::deflate_bytes(std::as_bytes(std::span(view.depth)))});
   }
   return shown;
-}
-
-/// What one pass over all layers gives.
-struct LayersSeen {
-  PixelWindow window;
-  std::vector<std::uint64_t> set;  // pixels of each
-  std::vector<double> seconds;     // of each, with a machine
-};
-
-/// The layers' numbers, a list for each column.
-Json layers_json(const Manifest& manifest, const LayersSeen& seen) {
-  const ManifestHead& head = manifest.head;
-  Json columns;
-  const auto column = [&](const char* name, auto value) {
-    Json& list = columns[name] = Json::array();
-    for (const LayerRecord& record : manifest.layers) list.push_back(value(record));
-  };
-  const auto rounded = [](double value) { return std::round(value * 1e6) / 1e6; };
-  column("bottom", [](const LayerRecord& r) { return r.layer.bottom; });
-  column("thickness", [](const LayerRecord& r) { return r.layer.thickness; });
-  column("reason", [](const LayerRecord& r) { return static_cast<int>(r.layer.reason); });
-  columns["set"] = seen.set;
-  column("bytes", [](const LayerRecord& r) { return r.bytes; });
-  column("capped", [](const LayerRecord& r) { return r.capped_rows; });
-  column("hash", [](const LayerRecord& r) { return hex(r.hash); });
-  if (head.product == Product::kMoves) {
-    column("volume", [&](const LayerRecord& r) { return r.paths ? rounded(r.paths->totals.volume_mm3) : 0; });
-    column("filament", [&](const LayerRecord& r) { return r.paths ? rounded(r.paths->totals.filament_mm) : 0; });
-  } else if (!head.machine.empty()) {
-    column("sweeps", [](const LayerRecord& r) { return r.program.sweeps; });
-  }
-  if (head.machine.empty()) return columns;
-  columns["seconds"] = Json::array();
-  for (const double time : seen.seconds) columns["seconds"].push_back(rounded(time));
-  return columns;
-}
-
-/// What the page's script reads.
-Json head_json(const ReportSource& source, const FileDigest& file, const LayersSeen& seen, HeldLayers& held,
-               const std::vector<ShownView>& views) {
-  const ManifestHead& head = source.manifest.head;
-  const double dpi_x = source.grid.x.dpi(), dpi_y = source.grid.y.dpi();
-  Json json = {
-      {"title", title_of(head)},
-      {"version", head.version},
-      {"images", head.product == Product::kImages},
-      {"format", head.format},
-      {"machine", head.machine},
-      {"columns", source.grid.columns()},
-      {"rows", source.grid.rows()},
-      {"dpi", {dpi_x, dpi_y}},
-      {"pixel_mm", {25.4 / dpi_x, 25.4 / dpi_y}},
-      {"window", {seen.window.left, seen.window.top, seen.window.right, seen.window.bottom}},
-      {"layer_count", head.layer_count},
-      {"first_layer", head.first_layer},
-      {"stride", held.stride()},
-      {"job", head.job_toml},
-      {"manifest",
-       {{"name", fs::path(source.manifest_path).filename().string()}, {"bytes", file.bytes}, {"hash", hex(file.hash)}}},
-      {"parts", Json::array()},
-      {"views", Json::object()},
-      {"reasons", Json::array()},
-      {"embedded", Json::array()}};
-  for (const PartSummary& part : head.parts) json["parts"].push_back(part_json(part));
-  for (const ShownView& view : views)
-    json["views"][view.name] = {view.width, view.height, view.most, view.width_mm, view.height_mm};
-  for (int reason = 0; reason <= static_cast<int>(LayerReason::kFlat); ++reason)
-    json["reasons"].push_back(reason_name(static_cast<LayerReason>(reason)));
-  for (const auto& [place, code] : held.layers()) json["embedded"].push_back(place);
-  json["layers"] = layers_json(source.manifest, seen);
-  return json;
 }
 
 /// Reads every layer; codes that fit the page go to `held`.
@@ -268,14 +148,15 @@ Result<Report> make_report(const std::string& path, const ReportOptions& options
     if (!built) return built.error();
     views = std::move(*built);
   }
-  const std::string head = head_json(*source, *file, *seen, held, views).dump(-1, ' ', false, Json::error_handler_t::replace);
+  const std::string head = write::report::head_json(manifest, {fs::path(source->manifest_path).filename().string(), *file},
+                                                    source->grid, *seen, held, views);
   std::vector<PageData> data;
   for (ShownView& view : views) data.push_back({"v-" + view.name, std::move(view.deflated)});
   for (auto& [place, code] : held.layers()) data.push_back({fmt::format("r{}", place), std::move(code)});
   report.layers = static_cast<std::uint32_t>(manifest.layers.size());
   report.held = static_cast<std::uint32_t>(held.layers().size());
   report.stride = held.stride();
-  report.page = write::report::make_page("lamina: " + title_of(manifest.head), head, data);
+  report.page = write::report::make_page("lamina: " + write::report::page_title(manifest.head), head, data);
   return report;
 }
 

@@ -33,15 +33,14 @@ Result<std::array<view::Picture, 3>> cast_parts(const ManifestHead& head, const 
     part.path = find_part(name, folders);
     if (part.path.empty()) return Error{Fault::kInput, fmt::format("{}: not found; name its folder with --parts", name)};
   }
-  if (head.product == Product::kImages) {
-    // The bed is what the manifest says, whatever has become of the machine's profile.
-    job.bed_mm = {mm(head.grid.x.length), mm(head.grid.y.length)};
-  } else {
-    auto resolved = resolve(job, head.product);
+  // The bed of images is what the manifest says, whatever has become of the machine's profile.
+  Bed bed{{mm(head.grid.x.length), mm(head.grid.y.length)}};
+  if (head.product != Product::kImages) {
+    const auto resolved = resolve(job, head.product);
     if (!resolved) return resolved.error();
-    job = std::move(resolved->job);
+    bed = resolved->bed;
   }
-  const Result<Scene> scene = load_scene(job);
+  const Result<Scene> scene = load_scene(job, bed);
   if (!scene) return scene.error();
   for (std::size_t i = 0; i < scene->parts.size(); ++i) {
     if (i < head.parts.size() && scene->parts[i].fingerprint == head.parts[i].fingerprint) continue;

@@ -6,9 +6,9 @@
 #include <string>
 #include <vector>
 
-#include "pipeline/output/manifest.h"
 #include "stages/data/status.h"
 #include "stages/view/cast.h"
+#include "stages/write/manifest/manifest.h"
 
 namespace lamina::pipeline {
 

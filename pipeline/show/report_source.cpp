@@ -2,30 +2,26 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <filesystem>
 #include <memory>
 #include <optional>
 #include <span>
 
-#include "pipeline/check/replay_job.h"
+#include "pipeline/check/job_files.h"
 #include "stages/data/hash.h"
 #include "stages/raster/beads.h"
-#include "stages/raster/materials.h"
 #include "stages/read/gcode.h"
-#include "stages/read/image.h"
 
 namespace lamina::pipeline {
 namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::int64_t kBeadDots = 508;           // an inch: toolpaths are drawn in pixels of 50 um
-constexpr std::int64_t kMostBeadPixels = 20'000;  // along a side
-
 Error wrong(const std::string& path, std::string_view what) {
   return {Fault::kVerification, fmt::format("{}: {}", path, what)};
 }
+
+Error changed(const std::string& path) { return wrong(path, "is not the file of the manifest; lamina verify tells more"); }
 
 Result<Manifest> finished_manifest(const std::string& place, const std::string& path) {
   std::error_code ignored;
@@ -46,19 +42,13 @@ Result<Manifest> finished_manifest(const std::string& place, const std::string& 
 
 /// A layer's files into runs, if they are those of the manifest.
 Result<Runs> read_layer(const std::string& directory, const ManifestHead& head, const LayerRecord& record) {
-  Runs whole;
   for (const LayerImageFile& file : layer_images(head, record)) {
     const std::string path = directory + "/" + file.name;
     const Result<FileDigest> digest = digest_file(path);
     if (!digest) return digest.error();
-    const Error changed = wrong(path, "is not the file of the manifest; lamina verify tells more");
-    if (digest->bytes != file.record.bytes || digest->hash != file.record.hash) return changed;
-    Result<read::Image> image = read::image(path);
-    if (!image) return image.error();
-    if (image->runs.columns != head.grid.columns() || image->runs.view().rows() != head.grid.rows()) return changed;
-    if (!raster::add_image(std::move(image->runs), whole)) return changed;
+    if (digest->bytes != file.record.bytes || digest->hash != file.record.hash) return changed(path);
   }
-  return whole;
+  return picture_of_layer(directory, head, record);
 }
 
 /// How long the machine takes for a layer, by its program; replayed as lamina verify does.
@@ -70,8 +60,7 @@ Result<double> seconds_of_layer(const std::string& directory, const ManifestHead
     if (replay) return replay->seconds;
     return Error{Fault::kVerification, fmt::format("{}: {}", directory, replay.error().message)};
   }
-  return Error{Fault::kVerification, fmt::format("{}/{}: is not the file of the manifest; lamina verify tells more", directory,
-                                                 program_file_name(record.layer.index, head.program_extension))};
+  return changed(directory + "/" + program_file_name(record.layer.index, head.program_extension));
 }
 
 Result<ReportSource> source_of_images(const std::string& directory, ReportSource source) {
@@ -113,20 +102,14 @@ Result<ReportSource> source_of_toolpaths(const std::string& path, ReportSource s
     return wrong(path, fmt::format("has {} layers, its manifest {}", opened->count(), manifest.layers.size()));
   }
   const auto file = std::make_shared<const read::GcodeFile>(std::move(*opened));
-  const Box box = file->box();
-  const std::int64_t longest = std::max<std::int64_t>({box.width(), box.depth(), 1});
-  const std::int64_t dots = std::clamp<std::int64_t>(kMostBeadPixels * kNmPerInch / longest, 1, kBeadDots);
-  source.grid = {PixelAxis(dots, std::max<std::int64_t>(box.width(), 1)),
-                 PixelAxis(dots, std::max<std::int64_t>(box.depth(), 1))};
+  source.grid = raster::bead_grid(file->box());
   std::vector<double> seconds;
   for (const LayerRecord& record : manifest.layers) seconds.push_back(record.paths ? record.paths->totals.seconds : 0);
-  source.layer = [file, box, grid = source.grid, seconds](std::uint32_t place, bool) -> Result<LayerSeen> {
+  source.layer = [file, grid = source.grid, seconds](std::uint32_t place, bool) -> Result<LayerSeen> {
     const auto layer = file->layer(place);
     if (!layer) return layer.error();
     raster::BeadRaster beads(grid);
-    const auto at = [&](Point2 p) { return Point2{p.x - box.lo.x, p.y - box.lo.y}; };
-    for (const read::GcodeBead& bead : layer->beads)
-      beads.add(at(bead.from), at(bead.to), bead.width, raster::BeadEnds::kRound);
+    beads.add(layer->beads, {file->box().lo.x, file->box().lo.y});
     LayerSeen seen{{}, seconds[place]};
     beads.runs(seen.runs);
     return seen;

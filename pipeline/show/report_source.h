@@ -5,10 +5,10 @@
 #include <functional>
 #include <string>
 
-#include "pipeline/output/manifest.h"
 #include "stages/data/grid.h"
 #include "stages/data/runs.h"
 #include "stages/data/status.h"
+#include "stages/write/manifest/manifest.h"
 
 namespace lamina::pipeline {
 

@@ -6,13 +6,11 @@
 #include <filesystem>
 #include <numeric>
 
-#include "pipeline/output/manifest.h"
-#include "pipeline/show/gcode_series.h"
-#include "pipeline/show/slice_series.h"
+#include "pipeline/show/series.h"
 #include "pipeline/show/swath.h"
-#include "pipeline/show/title.h"
-#include "pipeline/text/readable.h"
 #include "stages/read/image.h"
+#include "stages/text/readable.h"
+#include "stages/write/manifest/manifest.h"
 #include "stages/write/picture/canvas.h"  // have_font
 #include "stages/write/picture/contact_sheet.h"
 #include "stages/write/picture/plan_view.h"
@@ -40,31 +38,10 @@ Result<Manifest> manifest_of(const std::string& directory) {
 }
 
 std::string title_of(const ManifestHead& head) {
-  const std::string parts = title_of(head.parts);
+  const std::string parts = lamina::title_of(head.parts);
   return (parts.empty() ? "" : parts + "   |   ") + fmt::format("{} layers   |   {:g} x {:g} dpi   |   bed {:g} x {:g} mm",
                                                                 head.layer_count, head.grid.x.dpi(), head.grid.y.dpi(),
                                                                 mm(head.grid.x.length), mm(head.grid.y.length));
-}
-
-write::picture::PlanView view_of(view::LayerShapes& shapes) {
-  write::picture::PlanView view;
-  view.title = shapes.title;
-  view.caption = shapes.caption;
-  view.box = shapes.box;
-  view.region = shapes.contours;
-  for (view::LayerShapes::Beads& beads : shapes.beads) {
-    view.shapes.push_back({{beads.ink[0], beads.ink[1], beads.ink[2]}, beads.name, std::move(beads.outline)});
-  }
-  return view;
-}
-
-/// The layer in its true size, bead widths true.
-Buffer<std::byte> layer_svg(const view::LayerShapes& shapes) {
-  std::vector<write::svg::Region> regions = {{shapes.contours, "solid", {205, 209, 216}}};
-  for (const view::LayerShapes::Beads& beads : shapes.beads) regions.push_back({beads.outline, beads.name, beads.ink});
-  const std::string text = write::svg::drawing(shapes.box, regions);
-  const auto bytes = std::as_bytes(std::span(text));
-  return {bytes.begin(), bytes.end()};
 }
 
 /// Several layers side by side.
@@ -74,20 +51,19 @@ Result<Preview> draw_series_sheet(const view::LayerSeries& series, const Preview
   const auto chosen = chosen_layers(request.layers, layers);
   if (!chosen) return chosen.error();
   if (chosen->empty()) return Error{Fault::kVerification, "the job has no layers"};
-  Result<view::LayerShapes> shapes = series.layer(layers[chosen->front()]);
+  Result<LayerShapes> shapes = series.layer(layers[chosen->front()]);
   if (!shapes) return shapes.error();
   const std::string title = fmt::format("{}   |   {} layers   |   {:.1f} x {:.1f} mm", series.name, series.count,
                                         mm(shapes->box.width()), mm(shapes->box.depth()));
-  const auto layer_view = [&](std::size_t i) -> Result<write::picture::PlanView> {
-    if (i > 0) shapes = series.layer(layers[(*chosen)[i]]);
-    if (!shapes) return shapes.error();
-    write::picture::PlanView view = view_of(*shapes);
-    view.title = fmt::format("layer {}", shapes->index);
-    view.caption = fmt::format("z {:.3f} mm", mm(shapes->z));
-    return view;
+  const Box box = shapes->box;
+  const auto captioned = [&](std::size_t i) {
+    Result<LayerShapes> layer = i > 0 ? series.layer(layers[(*chosen)[i]]) : std::move(shapes);
+    if (!layer) return layer;
+    layer->title = fmt::format("layer {}", layer->index);
+    layer->caption = fmt::format("z {:.3f} mm", mm(layer->z));
+    return layer;
   };
-  auto picture =
-      write::picture::plan_sheet(title, chosen->size(), shapes->box, request.width.value_or(kSheetWidth), layer_view);
+  auto picture = write::picture::plan_sheet(title, chosen->size(), box, request.width.value_or(kSheetWidth), captioned);
   if (!picture) return picture.error();
   const std::string said =
       fmt::format("{}: {} of {} layers, {}", request.output, chosen->size(), series.count, readable_bytes(picture->size()));
@@ -107,25 +83,24 @@ Result<Preview> draw_series(const view::LayerSeries& series, const PreviewReques
     if (!svg) return draw_series_sheet(series, request);
     return Error{Fault::kUsage, "-o: an SVG shows one layer, choose it by --layer K; several are drawn as PNG"};
   }
-  Result<view::LayerShapes> shapes = series.layer(request.layers.layer.value_or(series.count / 2));
+  Result<LayerShapes> shapes = series.layer(request.layers.layer.value_or(series.count / 2));
   if (!shapes) return shapes.error();
   const std::string said = fmt::format("{}: {}", request.output, shapes->title);
-  if (svg) return Preview{layer_svg(*shapes), {said}};
-  write::picture::PlanView view = view_of(*shapes);
-  view.width = request.width.value_or(kSheetWidth);
-  auto picture = write::picture::plan_view(view);
+  if (svg) {
+    const std::string text = write::svg::drawing(*shapes);
+    const auto bytes = std::as_bytes(std::span(text));
+    return Preview{{bytes.begin(), bytes.end()}, {said}};
+  }
+  auto picture = write::picture::plan_view(*shapes, request.width.value_or(kSheetWidth));
   if (!picture) return picture.error();
   return Preview{std::move(*picture), {said}};
 }
 
 /// A layer while it is jetted.
 Result<Preview> draw_jetting(const Manifest& manifest, const PreviewRequest& request) {
-  SwathChoice choice;
-  choice.layer = request.layers.layer.value_or(manifest.layers[manifest.layers.size() / 2].layer.index);
-  choice.swath = request.swath_number;
-  choice.step = request.step;
-  choice.width = request.width.value_or(kSwathWidth);
-  auto picture = draw_swath(request.source, manifest, choice);
+  const std::uint32_t middle = manifest.layers[manifest.layers.size() / 2].layer.index;
+  const replay::StepChoice choice{request.layers.layer.value_or(middle), request.swath_number, request.step};
+  auto picture = draw_swath(request.source, manifest, choice, request.width.value_or(kSwathWidth));
   if (!picture) return picture.error();
   const std::string said = fmt::format("{}: layer {}, {}", request.output, choice.layer, readable_bytes(picture->size()));
   return Preview{std::move(*picture), {said}};
@@ -167,33 +142,6 @@ Result<Preview> draw_images(const Manifest& manifest, const PreviewRequest& requ
 }
 
 }  // namespace
-
-Result<std::vector<std::size_t>> chosen_layers(const LayerChoice& choice, const std::vector<std::uint32_t>& layers) {
-  if (choice.layer.has_value() + choice.every.has_value() + choice.count.has_value() > 1) {
-    return Error{Fault::kUsage, "--layer, --every and --count exclude each other; give one of them"};
-  }
-  std::vector<std::size_t> chosen;
-  if (choice.layer) {
-    for (std::size_t i = 0; i < layers.size(); ++i) {
-      if (layers[i] == *choice.layer) return std::vector<std::size_t>{i};
-    }
-    return Error{Fault::kUsage,
-                 fmt::format("--layer {}: the job has layers {} to {}", *choice.layer, layers.front(), layers.back())};
-  }
-  if (const auto every = choice.every) {
-    const std::size_t cells = (layers.size() + *every - 1) / *every;
-    if (cells > kMostCells) {
-      return Error{Fault::kUsage, fmt::format("--every {}: {} layers are too many for a picture; give {} or more", *every,
-                                              cells, (layers.size() + kMostCells - 1) / kMostCells)};
-    }
-    for (std::size_t i = 0; i < layers.size(); i += *every) chosen.push_back(i);
-    return chosen;
-  }
-  // The middle one of each of `cells` equal stretches of the height.
-  const std::size_t cells = std::min<std::size_t>(choice.count.value_or(12), layers.size());
-  for (std::size_t cell = 0; cell < cells; ++cell) chosen.push_back((2 * cell + 1) * layers.size() / (2 * cells));
-  return chosen;
-}
 
 Result<Preview> draw_preview(const PreviewRequest& request) {
   const std::string ending = std::filesystem::path(request.output).extension().string();

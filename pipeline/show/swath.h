@@ -2,23 +2,18 @@
 #pragma once
 
 #include <cstdint>
-#include <optional>
 #include <string>
 
-#include "pipeline/output/manifest.h"
 #include "stages/data/buffer.h"
 #include "stages/data/status.h"
+#include "stages/replay/jetting.h"
+#include "stages/write/manifest/manifest.h"
 
 namespace lamina::pipeline {
 
-struct SwathChoice {
-  std::uint32_t layer = 0;
-  std::optional<std::uint32_t> swath, step;  // the middle ones of those that fire, if not chosen
-  std::uint32_t width = 1200;
-};
-
-/// Replays the layer's program up to the step and draws what is jetted by then. errors  kUsage: no such layer, swath, step;
-/// kVerification: files that are missing or are not what was written; kInternal
-Result<Buffer<std::byte>> draw_swath(const std::string& directory, const Manifest& manifest, const SwathChoice& choice);
+/// Replays the layer's program up to the step and draws what is jetted by then, `width` pixels wide. errors  kUsage: no such
+/// layer, swath, step; kVerification: files that are missing or are not what was written; kInternal
+Result<Buffer<std::byte>> draw_swath(const std::string& directory, const Manifest& manifest, const replay::StepChoice& choice,
+                                     std::uint32_t width);
 
 }  // namespace lamina::pipeline

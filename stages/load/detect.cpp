@@ -1,4 +1,4 @@
-// stages/load/detect.cpp: what kind of file is this.
+// stages/load/detect.cpp: what kind of file is this, by its content or by its name alone.
 #include <algorithm>
 #include <string_view>
 
@@ -46,6 +46,18 @@ bool has_binary_stl_size(const Source& source, std::string_view head) {
 }
 
 }  // namespace
+
+bool is_part_name(std::string_view path) {
+  std::string_view name = path.substr(path.rfind('/') + 1);
+  while (ends_with(name, ".gz")) name.remove_suffix(3);
+  return name.size() > 4 && (ends_with(name, ".stl") || ends_with(name, ".obj") || ends_with(name, ".3mf"));
+}
+
+std::uint64_t part_bytes(std::string_view path, std::uint64_t file_bytes) {
+  if (ends_with(path, ".stl") || ends_with(path, ".obj")) return 4 * file_bytes;
+  if (ends_with(path, ".3mf")) return 40 * file_bytes;
+  return (ends_with(path, ".gz") ? 16 : 1) * file_bytes;
+}
 
 Result<Format> detect(const Source& source) {
   if (source.size() == 0) return source.error("is empty; export the part again");

@@ -4,6 +4,7 @@
 #include <array>
 #include <cstdint>
 #include <string>
+#include <string_view>
 
 #include "stages/data/mesh.h"
 #include "stages/data/status.h"
@@ -48,5 +49,12 @@ Result<Part> load(const std::string& path, const LoadOptions& options);
 /// What load() would take the file for, in words: "binary STL", "ASCII STL, gzip", "OBJ", "3MF".
 /// errors  kInput as load()
 Result<std::string> format_of(const std::string& path, const LoadOptions& options);
+
+/// Whether a file of this name is taken for a part: .stl, .obj or .3mf, gzipped (.gz) too, in any case.
+bool is_part_name(std::string_view path);
+
+/// Memory in bytes that a part file of this name and size may take while it is loaded and planned; a file of another kind
+/// its own size.
+std::uint64_t part_bytes(std::string_view path, std::uint64_t file_bytes);
 
 }  // namespace lamina::load

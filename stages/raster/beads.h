@@ -6,15 +6,17 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 
 #include "stages/data/buffer.h"
+#include "stages/data/choices.h"
 #include "stages/data/contours.h"  // Point2
 #include "stages/data/grid.h"
+#include "stages/data/mesh.h"  // Box
 #include "stages/data/runs.h"
+#include "stages/data/toolpaths.h"
 
 namespace lamina::raster {
-
-enum class BeadEnds : std::uint8_t { kRound, kSquare };
 
 /// Collects the beads of a layer, in any order. Keeps 12 bytes for each row that a bead covers; reused from layer to
 /// layer.
@@ -27,6 +29,8 @@ class BeadRaster {
   /// width  nm, > 0 and below 2^27 (134 mm)
   /// cost   O(rows covered)
   void add(Point2 a, Point2 b, Nm width, BeadEnds ends);
+  /// All beads of a layer, with round ends. origin  nm on the bed: the front left corner of the grid
+  void add(std::span<const LaidBead> beads, Point2 origin);
   /// The union of all beads, as image rows (row 0 at the back). cost  O(S log(S of a row) + rows)
   void runs(Runs& out);
 
@@ -40,5 +44,8 @@ class BeadRaster {
   Buffer<Span> spans_, ordered_;
   Buffer<std::uint32_t> start_;
 };
+
+/// A grid to look at the beads in a box: pixels of 50 um, larger ones where there were more than 20 000 along a side.
+PixelGrid bead_grid(const Box& box);
 
 }  // namespace lamina::raster

@@ -5,7 +5,7 @@
 #include <span>
 
 #include "stages/data/buffer.h"
-#include "stages/data/fill_rule.h"
+#include "stages/data/choices.h"
 #include "stages/data/runs.h"
 #include "stages/raster/clusters.h"
 #include "stages/raster/segment.h"

@@ -15,22 +15,9 @@
 #include "stages/data/machine.h"
 #include "stages/data/runs.h"
 #include "stages/data/status.h"
+#include "stages/replay/count.h"
 
 namespace lamina::replay {
-
-/// What a program did.
-struct Count {
-  std::uint64_t drops = 0, vectors = 0;
-  std::uint32_t sweeps = 0;
-  double scan_mm = 0, travel_mm = 0;                     // of the head
-  double seconds = 0;                                    // head, roller and vats, one after the other
-  std::array<double, 2> fed_mm{0, 0};                    // by each vat
-  std::uint32_t vats = 0;                                // that feed, a bit each, by words or by movement
-  bool moves = false;                                    // whether the program moves the vats and the roller itself
-  double build_mm = 0;                                   // where the build vat stands at the end
-  double farthest_along_um = 0, farthest_across_um = 0;  // a drop from the centre of its pixel
-  void add(const Count& other);
-};
 
 /// The pixels of a machine, found again from its profile.
 class VirtualMachine {

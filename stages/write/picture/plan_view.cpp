@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "stages/data/grid.h"
+#include "stages/write/picture/canvas.h"
 #include "stages/write/picture/contour_shares.h"
 #include "stages/write/picture/layout.h"
 
@@ -13,12 +14,14 @@ namespace {
 
 constexpr Colour kGround{255, 255, 255}, kPaper{244, 244, 246}, kSolid{205, 209, 216}, kText{40, 44, 52};
 
+Colour colour_of(const Ink& ink) { return {ink[0], ink[1], ink[2]}; }
+
 /// The layer within a panel of the canvas.
-void paint(Canvas& canvas, const PlanView& view, const Scale& scale, int left, int top, int width, int height) {
+void paint(Canvas& canvas, const LayerShapes& shapes, const Scale& scale, int left, int top, int width, int height) {
   canvas.fill_box(left, top, width, height, kPaper);
-  canvas.paint(left, top, width, contour_shares(view.region, scale, width, height), kSolid);
-  for (const PlanView::Shape& shape : view.shapes)
-    canvas.paint(left, top, width, contour_shares(shape.outline, scale, width, height), shape.ink);
+  canvas.paint(left, top, width, contour_shares(shapes.contours, scale, width, height), kSolid);
+  for (const LayerShapes::Beads& beads : shapes.beads)
+    canvas.paint(left, top, width, contour_shares(beads.outline, scale, width, height), colour_of(beads.ink));
 }
 
 /// A square of each ink and what it is for, from `left` on, as many as there is room for up to `right`.
@@ -36,7 +39,7 @@ void legend(Canvas& canvas, const std::vector<std::pair<Colour, std::string>>& i
 }  // namespace
 
 Result<Buffer<std::byte>> plan_sheet(const std::string& title, std::size_t layers, const Box& box, std::uint32_t width,
-                                     const std::function<Result<PlanView>(std::size_t)>& view_of) {
+                                     const std::function<Result<LayerShapes>(std::size_t)>& shapes_of) {
   constexpr std::int64_t kPixels = 20'000, kLeastPixel = 1000;  // of the longer side: no cell is as large; nm
   const std::int64_t shown = std::max<std::int64_t>(box.width(), 1000) * 26 / 25,
                      tall = std::max<std::int64_t>(box.depth(), 1000) * 26 / 25;
@@ -50,19 +53,19 @@ Result<Buffer<std::byte>> plan_sheet(const std::string& title, std::size_t layer
                     (static_cast<double>(box.lo.y) + box.hi.y) / 2 + static_cast<double>(tall) / 2, pixels_per_nm};
   std::vector<std::pair<Colour, std::string>> inks;
   for (std::size_t i = 0; i < layers; ++i) {
-    const Result<PlanView> view = view_of(i);
-    if (!view) return view.error();
+    const Result<LayerShapes> shapes = shapes_of(i);
+    if (!shapes) return shapes.error();
     const int cell = static_cast<int>(i), size = layout.caption_size, left = layout.cell_left(cell);
-    paint(canvas, *view, scale, left + (layout.cell_width - layout.picture_width) / 2, layout.cell_top(cell),
+    paint(canvas, *shapes, scale, left + (layout.cell_width - layout.picture_width) / 2, layout.cell_top(cell),
           layout.picture_width, layout.picture_height);
-    const int baseline = layout.cell_top(cell) + layout.cell_height + size * 5 / 4, remark = text_width(view->caption, size);
-    canvas.text(left, baseline, size, view->title, kText);
-    if (text_width(view->title, size) + size / 2 + remark <= layout.cell_width) {
-      canvas.text(left + layout.cell_width - remark, baseline, size, view->caption, kText);
+    const int baseline = layout.cell_top(cell) + layout.cell_height + size * 5 / 4, remark = text_width(shapes->caption, size);
+    canvas.text(left, baseline, size, shapes->title, kText);
+    if (text_width(shapes->title, size) + size / 2 + remark <= layout.cell_width) {
+      canvas.text(left + layout.cell_width - remark, baseline, size, shapes->caption, kText);
     }
-    for (const PlanView::Shape& shape : view->shapes) {
-      if (std::ranges::none_of(inks, [&](const auto& ink) { return ink.second == shape.name; }))
-        inks.emplace_back(shape.ink, shape.name);
+    for (const LayerShapes::Beads& beads : shapes->beads) {
+      if (std::ranges::none_of(inks, [&](const auto& ink) { return ink.second == beads.name; }))
+        inks.emplace_back(colour_of(beads.ink), beads.name);
     }
   }
   canvas.text(layout.margin, layout.margin + layout.title_size, layout.title_size, title, kText);
@@ -71,25 +74,25 @@ Result<Buffer<std::byte>> plan_sheet(const std::string& title, std::size_t layer
   return canvas.png();
 }
 
-Result<Buffer<std::byte>> plan_view(const PlanView& view) {
-  const int width = static_cast<int>(view.width), size = std::clamp(width / 60, 14, 48), margin = size;
-  const double shown = static_cast<double>(std::max<std::int64_t>(view.box.width(), 1000));
-  const double tall = static_cast<double>(std::max<std::int64_t>(view.box.depth(), 1000));
+Result<Buffer<std::byte>> plan_view(const LayerShapes& shapes, std::uint32_t picture_width) {
+  const int width = static_cast<int>(picture_width), size = std::clamp(width / 60, 14, 48), margin = size;
+  const double shown = static_cast<double>(std::max<std::int64_t>(shapes.box.width(), 1000));
+  const double tall = static_cast<double>(std::max<std::int64_t>(shapes.box.depth(), 1000));
   const double pixels_per_nm = std::min((width - 2 * margin) / (shown * 1.04), 4.0 * width / (tall * 1.04));
   const int height = std::max(1, static_cast<int>(std::ceil(tall * 1.04 * pixels_per_nm)));
   const int head = have_font() ? 3 * size + size / 2 : margin, panel = width - 2 * margin;
-  const double middle = (static_cast<double>(view.box.lo.x) + view.box.hi.x) / 2;
-  const Scale scale{middle - panel / pixels_per_nm / 2, view.box.hi.y + tall * 0.02, pixels_per_nm};
+  const double middle = (static_cast<double>(shapes.box.lo.x) + shapes.box.hi.x) / 2;
+  const Scale scale{middle - panel / pixels_per_nm / 2, shapes.box.hi.y + tall * 0.02, pixels_per_nm};
 
   Canvas canvas(width, head + height + margin, kGround);
-  paint(canvas, view, scale, margin, head, panel, height);
-  canvas.text(margin, size + size / 2, size, view.title, kText);
+  paint(canvas, shapes, scale, margin, head, panel, height);
+  canvas.text(margin, size + size / 2, size, shapes.title, kText);
   int left = margin;
   const int small = size * 3 / 4, line = 2 * size + size / 2 + size / 4;
-  canvas.text(left, line, small, view.caption, kText);
-  left += text_width(view.caption, small) + size;
+  canvas.text(left, line, small, shapes.caption, kText);
+  left += text_width(shapes.caption, small) + size;
   std::vector<std::pair<Colour, std::string>> inks;
-  for (const PlanView::Shape& shape : view.shapes) inks.emplace_back(shape.ink, shape.name);
+  for (const LayerShapes::Beads& beads : shapes.beads) inks.emplace_back(colour_of(beads.ink), beads.name);
   legend(canvas, inks, left, width, line, small);
   return canvas.png();
 }

@@ -2,8 +2,8 @@
 #pragma once
 
 #include "stages/data/buffer.h"
+#include "stages/data/picture/plot.h"
 #include "stages/data/status.h"
-#include "stages/write/plot.h"
 
 namespace lamina::write::picture {
 

@@ -34,12 +34,12 @@ Result<Buffer<std::byte>> swath_picture(const SwathView& view) {
     if (r > l && b > t) canvas.fill_box(left + l, top + t, r - l, b - t, colour);
   };
   bool odd = false;
-  for (const SwathView::Band& band : view.bands) {
+  for (const SwathBand& band : view.bands) {
     box(band.left, band.top, band.right, band.bottom, band.present ? kPresent : odd ? kOdd : kBed);
     odd = !odd;
   }
   const double line_x = 1 / sx, line_y = 1 / sy;
-  for (const SwathView::Band& band : view.bands) {
+  for (const SwathBand& band : view.bands) {
     box(band.left, band.top, band.right, band.top + line_y, kEdge);
     box(band.left, band.bottom - line_y, band.right, band.bottom, kEdge);
     box(band.left, band.top, band.left + line_x, band.bottom, kEdge);
@@ -59,7 +59,7 @@ Result<Buffer<std::byte>> swath_picture(const SwathView& view) {
   paint(view.image, kAsked);
   paint(view.fired, kFired);
   const double radius = std::max(0.5, 1.6 / sx);
-  for (const SwathView::Nozzle& nozzle : view.nozzles) {
+  for (const NozzlePlace& nozzle : view.nozzles) {
     box(nozzle.column + 0.5 - radius, nozzle.row + 0.5 - radius * sx / sy, nozzle.column + 0.5 + radius,
         nozzle.row + 0.5 + radius * sx / sy, nozzle.fires ? kFires : kNozzle);
   }

@@ -7,6 +7,7 @@
 
 #include "stages/data/buffer.h"
 #include "stages/data/grid.h"
+#include "stages/data/picture/jetting.h"
 #include "stages/data/runs.h"
 #include "stages/data/status.h"
 
@@ -15,19 +16,10 @@ namespace lamina::write::picture {
 struct SwathView {
   std::string title, caption;
   PixelGrid grid;
-  RunsView image;  // what is to be jetted: drawn light
-  RunsView fired;  // what is jetted so far: drawn dark
-  /// A swath's pixels [left, right) x [top, bottom); the present one is marked.
-  struct Band {
-    double left, right, top, bottom;
-    bool present;
-  };
-  std::vector<Band> bands;
-  struct Nozzle {
-    double column, row;  // of its centre, in pixels
-    bool fires;
-  };
-  std::vector<Nozzle> nozzles;
+  RunsView image;                // what is to be jetted: drawn light
+  RunsView fired;                // what is jetted so far: drawn dark
+  std::vector<SwathBand> bands;  // the present one is marked
+  std::vector<NozzlePlace> nozzles;
   std::uint32_t width = 1200;  // of the picture
 };
 

@@ -7,8 +7,23 @@
 #include "stages/write/svg/svg_writer.h"
 
 namespace lamina::write::svg {
+namespace {
 
-std::string drawing(const Box& box, std::span<const Region> regions) {
+void write_region(SvgWriter& svg, const SvgFrame& frame, const std::string& name, const Ink& ink, const Contours& contours) {
+  svg.begin("path");
+  svg.attribute("class", svg_escaped(name));
+  svg.attribute("fill", fmt::format("#{:02x}{:02x}{:02x}", ink[0], ink[1], ink[2]));
+  svg.attribute("fill-rule", "nonzero");
+  svg.begin_data();
+  for (std::uint32_t c = 0; c < contours.size(); ++c) svg.contour(contours[c], frame);
+  svg.end_data();
+  svg.end();
+}
+
+}  // namespace
+
+std::string drawing(const LayerShapes& shapes) {
+  const Box& box = shapes.box;
   const std::int64_t margin = std::max(box.width(), box.depth()) / 50;
   const std::int64_t width = box.width() + 2 * margin, height = box.depth() + 2 * margin;
   const SvgFrame frame{box.lo.x - margin, box.hi.y + margin};
@@ -21,16 +36,8 @@ std::string drawing(const Box& box, std::span<const Region> regions) {
   svg.attribute("viewBox", fmt::format("0 0 {} {}", mm(width), mm(height)));
   svg.open();
   svg.comment("drawn by lamina");
-  for (const auto& [contours, name, ink] : regions) {
-    svg.begin("path");
-    svg.attribute("class", svg_escaped(name));
-    svg.attribute("fill", fmt::format("#{:02x}{:02x}{:02x}", ink[0], ink[1], ink[2]));
-    svg.attribute("fill-rule", "nonzero");
-    svg.begin_data();
-    for (std::uint32_t c = 0; c < contours.size(); ++c) svg.contour(contours[c], frame);
-    svg.end_data();
-    svg.end();
-  }
+  write_region(svg, frame, "solid", {205, 209, 216}, shapes.contours);
+  for (const LayerShapes::Beads& beads : shapes.beads) write_region(svg, frame, beads.name, beads.ink, beads.outline);
   svg.close("svg");
   return {out.begin(), out.end()};
 }

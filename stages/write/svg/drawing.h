@@ -1,24 +1,13 @@
-// stages/write/svg/drawing.h: regions of a layer as a picture in SVG, in their true size.
+// stages/write/svg/drawing.h: a layer as a picture in SVG, in its true size, bead widths true.
 #pragma once
 
-#include <array>
-#include <cstdint>
-#include <span>
 #include <string>
-#include <string_view>
 
-#include "stages/data/contours.h"
-#include "stages/data/mesh.h"  // Box
+#include "stages/data/picture/layer_shapes.h"
 
 namespace lamina::write::svg {
 
-struct Region {
-  ContoursView contours;            // nm on the bed; the nonzero rule
-  std::string_view name;            // its class
-  std::array<std::uint8_t, 3> ink;  // red, green, blue
-};
-
-/// The file of a picture of the box and a margin around it; each region is drawn over those before it.
-std::string drawing(const Box& box, std::span<const Region> regions);
+/// The file of a picture of the box and a margin around it; the classes of its paths are "solid" and the names of the beads.
+std::string drawing(const LayerShapes& shapes);
 
 }  // namespace lamina::write::svg

@@ -1,5 +1,5 @@
-// pipeline/show/info.cpp: a part is loaded as it is, diagnosed, and loaded again as a job would.
-#include "pipeline/show/info.h"
+// stages/load/info/info.cpp: a part is loaded as it is, diagnosed, and loaded again as a job would.
+#include "stages/load/info/info.h"
 
 #include <fmt/core.h>
 
@@ -8,10 +8,11 @@
 #include <nlohmann/json.hpp>
 #include <vector>
 
-#include "pipeline/text/json_text.h"
 #include "stages/load/repair/diagnose.h"
+#include "stages/text/json_text.h"
+#include "stages/text/readable.h"
 
-namespace lamina::pipeline {
+namespace lamina::load {
 namespace {
 
 constexpr std::size_t kPlaces = 3;
@@ -19,27 +20,27 @@ constexpr std::size_t kMeshesShown = 24;
 
 struct Description {
   std::string format;
-  Part part;                               // as in the file
-  std::vector<load::Diagnosis> diagnosis;  // of each mesh
-  std::vector<std::uint32_t> copies;       // of each mesh
-  std::vector<Note> notes;                 // of the part as planned
+  Part part;                          // as in the file
+  std::vector<Diagnosis> diagnosis;   // of each mesh
+  std::vector<std::uint32_t> copies;  // of each mesh
+  std::vector<Note> notes;            // of the part as planned
   bool balanced = true;
   bool repairs = false;  // options.repair
 
   template <class Value>
-  auto total(Value load::Diagnosis::*member) const {
+  auto total(Value Diagnosis::*member) const {
     Value sum{};
     for (std::size_t i = 0; i < diagnosis.size(); ++i) sum += static_cast<Value>(copies[i]) * diagnosis[i].*member;
     return sum;
   }
 };
 
-Result<Description> describe(const std::string& path, const load::LoadOptions& options) {
-  const Result<std::string> format = load::format_of(path, options);
+Result<Description> describe(const std::string& path, const LoadOptions& options) {
+  const Result<std::string> format = format_of(path, options);
   if (!format) return format.error();
-  load::LoadOptions as_is = options;
+  LoadOptions as_is = options;
   as_is.repair = false;
-  Result<Part> part = load::load(path, as_is);
+  Result<Part> part = load(path, as_is);
   if (!part) return part.error();
   Description description;
   description.format = *format;
@@ -47,14 +48,14 @@ Result<Description> describe(const std::string& path, const load::LoadOptions& o
   description.copies.resize(part->meshes.size(), 0);
   for (const Instance& instance : part->instances) ++description.copies[instance.mesh];
   for (const Mesh& mesh : part->meshes) {
-    description.diagnosis.push_back(load::diagnose(mesh, kPlaces));
+    description.diagnosis.push_back(diagnose(mesh, kPlaces));
     description.balanced = description.balanced && description.diagnosis.back().balanced;
   }
   description.notes = part->notes;
   description.part = std::move(*part);
   if (!description.balanced && options.repair) {
     for (Mesh& mesh : description.part.meshes) Buffer<Triangle>().swap(mesh.triangles);
-    Result<Part> planned = load::load(path, options);
+    Result<Part> planned = load(path, options);
     if (!planned) return planned.error();
     description.notes = std::move(planned->notes);
   }
@@ -64,14 +65,14 @@ Result<Description> describe(const std::string& path, const load::LoadOptions& o
 struct Kind {
   const char* name;
   const char* key;
-  load::Diagnosis::Finding load::Diagnosis::*finding;
+  Diagnosis::Finding Diagnosis::*finding;
 };
 constexpr std::array<Kind, 5> kKinds{{
-    {"open edges", "open_edges", &load::Diagnosis::open_edges},
-    {"non-manifold edges", "non_manifold_edges", &load::Diagnosis::non_manifold_edges},
-    {"misoriented edges", "misoriented_edges", &load::Diagnosis::misoriented_edges},
-    {"degenerate facets", "degenerate_facets", &load::Diagnosis::degenerate_facets},
-    {"duplicate facets", "duplicate_facets", &load::Diagnosis::duplicate_facets},
+    {"open edges", "open_edges", &Diagnosis::open_edges},
+    {"non-manifold edges", "non_manifold_edges", &Diagnosis::non_manifold_edges},
+    {"misoriented edges", "misoriented_edges", &Diagnosis::misoriented_edges},
+    {"degenerate facets", "degenerate_facets", &Diagnosis::degenerate_facets},
+    {"duplicate facets", "duplicate_facets", &Diagnosis::duplicate_facets},
 }};
 
 std::uint64_t count_of(const Description& description, const Kind& kind) {
@@ -121,7 +122,7 @@ std::string first_places(const Description& description, const Kind& kind) {
 void describe_meshes(const Description& description, std::string& text) {
   text += "\n  mesh  copies   triangles  closed  size, name\n";
   for (std::size_t i = 0; i < description.diagnosis.size() && i < kMeshesShown; ++i) {
-    const load::Diagnosis& found = description.diagnosis[i];
+    const Diagnosis& found = description.diagnosis[i];
     text += fmt::format("  {:>4}  {:>6}  {:>10}  {:<6}  {}, {}\n", i + 1, description.copies[i], grouped(found.triangles),
                         found.balanced ? "yes" : "no", size_of(found.bounds), short_name(description, i));
   }
@@ -130,7 +131,7 @@ void describe_meshes(const Description& description, std::string& text) {
 }
 
 void describe_findings(const Description& description, std::string& text) {
-  const auto inverted = description.total(&load::Diagnosis::inverted_shells);
+  const auto inverted = description.total(&Diagnosis::inverted_shells);
   bool any = inverted > 0;
   for (const Kind& kind : kKinds) any = any || count_of(description, kind) > 0;
   if (!any) return;
@@ -161,7 +162,7 @@ void describe_plan(const Description& description, std::string& text) {
 
 nlohmann::ordered_json as_json(const Point3& p) { return {mm(p.x), mm(p.y), mm(p.z)}; }
 
-nlohmann::ordered_json as_json(const load::Diagnosis& found) {
+nlohmann::ordered_json as_json(const Diagnosis& found) {
   nlohmann::ordered_json mesh;
   mesh["triangles"] = found.triangles;
   mesh["vertices"] = found.vertices;
@@ -182,7 +183,7 @@ nlohmann::ordered_json as_json(const load::Diagnosis& found) {
 
 }  // namespace
 
-Result<std::string> describe_part_text(const std::string& path, const load::LoadOptions& options) {
+Result<std::string> describe_part_text(const std::string& path, const LoadOptions& options) {
   const Result<Description> description = describe(path, options);
   if (!description) return description.error();
   const Description& d = *description;
@@ -190,14 +191,14 @@ Result<std::string> describe_part_text(const std::string& path, const load::Load
   row(text, "format", d.format);
   if (d.part.instances.size() > 1 || d.part.meshes.size() > 1)
     row(text, "meshes", fmt::format("{}, placed {} times", d.part.meshes.size(), d.part.instances.size()));
-  row(text, "triangles", grouped(d.total(&load::Diagnosis::triangles)));
-  row(text, "vertices", grouped(d.total(&load::Diagnosis::vertices)));
-  row(text, "shells", grouped(d.total(&load::Diagnosis::shells)));
+  row(text, "triangles", grouped(d.total(&Diagnosis::triangles)));
+  row(text, "vertices", grouped(d.total(&Diagnosis::vertices)));
+  row(text, "shells", grouped(d.total(&Diagnosis::shells)));
   row(text, "size", size_of(d.part.bounds));
   row(text, "from", point(d.part.bounds.lo) + " mm");
   row(text, "to", point(d.part.bounds.hi) + " mm");
   row(text, "volume",
-      fmt::format("{:.6g} mm3{}", d.total(&load::Diagnosis::volume_mm3), d.balanced ? "" : " (of an open mesh: an estimate)"));
+      fmt::format("{:.6g} mm3{}", d.total(&Diagnosis::volume_mm3), d.balanced ? "" : " (of an open mesh: an estimate)"));
   row(text, "closed", d.balanced ? "yes" : "no");
   if (d.diagnosis.size() > 1) describe_meshes(d, text);
   describe_findings(d, text);
@@ -205,7 +206,7 @@ Result<std::string> describe_part_text(const std::string& path, const load::Load
   return text;
 }
 
-Result<std::string> describe_part_json(const std::string& path, const load::LoadOptions& options) {
+Result<std::string> describe_part_json(const std::string& path, const LoadOptions& options) {
   const Result<Description> description = describe(path, options);
   if (!description) return description.error();
   const Description& d = *description;
@@ -213,12 +214,12 @@ Result<std::string> describe_part_json(const std::string& path, const load::Load
   json["path"] = path;
   json["format"] = d.format;
   json["items"] = d.part.instances.size();
-  json["triangles"] = d.total(&load::Diagnosis::triangles);
-  json["vertices"] = d.total(&load::Diagnosis::vertices);
-  json["shells"] = d.total(&load::Diagnosis::shells);
-  json["inverted_shells"] = d.total(&load::Diagnosis::inverted_shells);
+  json["triangles"] = d.total(&Diagnosis::triangles);
+  json["vertices"] = d.total(&Diagnosis::vertices);
+  json["shells"] = d.total(&Diagnosis::shells);
+  json["inverted_shells"] = d.total(&Diagnosis::inverted_shells);
   json["bounds_mm"] = {{"lo", as_json(d.part.bounds.lo)}, {"hi", as_json(d.part.bounds.hi)}};
-  json["volume_mm3"] = d.total(&load::Diagnosis::volume_mm3);
+  json["volume_mm3"] = d.total(&Diagnosis::volume_mm3);
   json["closed"] = d.balanced;
   json["notes"] = nlohmann::ordered_json::array();
   json["repairs"] = nlohmann::ordered_json::array();
@@ -234,4 +235,4 @@ Result<std::string> describe_part_json(const std::string& path, const load::Load
   return json.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n";
 }
 
-}  // namespace lamina::pipeline
+}  // namespace lamina::load

@@ -1,4 +1,4 @@
-// pipeline/show/gcode_series.h: the layers of a G-code file as shapes to look at.
+// pipeline/show/series.h: the layers of a sliced job, or of a G-code file, as shapes to look at.
 #pragma once
 
 #include <string>
@@ -12,5 +12,10 @@ namespace lamina::pipeline {
 /// and narrow ones of a kind in different shades.
 /// errors  of read::GcodeFile
 Result<view::LayerSeries> gcode_series(const std::string& path);
+
+/// The job that lamina slice left in a directory (job.toml), planned again from its parts.
+/// errors  kUsage; kInput: a part that cannot be read. Of a layer: kUsage: there is none of that number; kVerification: a part
+///         that is not what it was
+Result<view::LayerSeries> slice_series(const std::string& directory);
 
 }  // namespace lamina::pipeline

@@ -1,18 +1,28 @@
-// pipeline/calibrate/widths.h: what was measured on the test pieces of pieces.h, and the profile that follows from it.
+// pipeline/calibrate/calibrate.h: a printer's test pieces (stages/segment/pieces.h), and its profile from what was measured.
 #pragma once
 
+#include <atomic>
 #include <string>
 #include <vector>
 
-#include "pipeline/calibrate/pieces.h"
 #include "pipeline/machine/extruder.h"
+#include "pipeline/machine/profiles.h"
 #include "stages/data/status.h"
 #include "stages/segment/measured.h"
+#include "stages/segment/pieces.h"
 
 namespace lamina::pipeline {
 
-/// The rows of a filled in widths.csv. errors  kInput: file, line, column, what is wrong
-Result<std::vector<segment::Measured>> read_widths(const std::string& path);
+struct CalibrationRequest {
+  std::string machine;           // as --machine takes it
+  std::string directory;         // of the pieces
+  segment::PieceRequest pieces;  // a bead of 0: the nozzle, and three quarters of it
+};
+
+/// Writes DIR/<name>.stl, .toml and .gcode (or .sml) of each piece, DIR/widths.csv to be filled in, and DIR/STEPS.md.
+/// returns names of the pieces
+/// errors  kUsage: the directory has a widths.csv already; kOutput; of run
+Result<std::vector<std::string>> write_test_pieces(CalibrationRequest request, const std::atomic<bool>& cancel);
 
 struct CalibratedProfile {
   ExtruderProfile profile;

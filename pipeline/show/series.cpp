@@ -1,48 +1,32 @@
-#include "pipeline/show/slice_series.h"
+#include "pipeline/show/series.h"
 
 #include <fmt/format.h>
 
-#include <array>
-#include <map>
+#include <filesystem>
 #include <memory>
 
 #include "pipeline/job/file.h"
-#include "pipeline/output/manifest.h"
 #include "pipeline/plan/plan.h"
 #include "stages/geometry/clipping.h"
+#include "stages/read/gcode.h"
+#include "stages/view/bead_shapes.h"
+#include "stages/write/manifest/manifest.h"
 
 namespace lamina::pipeline {
 namespace {
 
-constexpr std::array<std::pair<PathKind, std::string_view>, 5> kKinds = {{{PathKind::kOuter, "outer wall"},
-                                                                          {PathKind::kInner, "inner wall"},
-                                                                          {PathKind::kContour, "closed curve"},
-                                                                          {PathKind::kLink, "link"},
-                                                                          {PathKind::kRaster, "line"}}};
-
-/// What the beads of a kind cover, width by width.
-Result<Contours> outline_of(const ToolpathsView& paths, PathKind kind) {
-  std::map<Nm, Contours> by_width;
-  for (std::uint32_t p = 0; p < paths.size(); ++p) {
-    const std::uint32_t last = paths.offset[p + 1] - 1;
-    for (std::uint32_t begin = paths.offset[p]; begin < last;) {
-      std::uint32_t end = begin + 1;
-      while (end < last && paths.kind[end] == paths.kind[begin] && paths.width[end] == paths.width[begin]) ++end;
-      if (paths.kind[begin] == kind) {
-        Contours& lines = by_width[paths.width[begin]];
-        lines.point.insert(lines.point.end(), paths.point.begin() + begin, paths.point.begin() + end + 1);
-        lines.close();
-      }
-      begin = end;
-    }
-  }
-  Contours all;
-  for (const auto& [width, lines] : by_width) {
-    const auto covered = cover_lines(lines, width);
-    if (!covered) return covered.error();
-    all.append(*covered);
-  }
-  return all;
+Result<LayerShapes> gcode_shapes(const read::GcodeFile& file, const std::string& name, std::uint32_t index) {
+  const Result<read::GcodeLayer> layer = file.layer(index);
+  if (!layer) return layer.error();
+  LayerShapes shapes;
+  shapes.index = index;
+  shapes.z = layer->z;
+  shapes.box = file.box();
+  if (Status status = view::add_beads(layer->beads, file.types(), shapes); !status) return status.error();
+  shapes.title = fmt::format("{}   |   layer {} of {}   |   z {:.3f} mm", name, index, file.count(), mm(shapes.z));
+  shapes.caption = fmt::format("{} moves, {:.1f} mm{}", layer->beads.size(), view::length_mm(layer->beads),
+                               file.tells_widths() ? "" : fmt::format(", widths by {:g} mm filament", file.filament_mm()));
+  return shapes;
 }
 
 /// What a sliced job is drawn from.
@@ -55,14 +39,14 @@ struct SlicedJob {
   std::string name() const { return plan.sections->names().empty() ? std::string() : plan.sections->names().front(); }
 };
 
-Result<view::LayerShapes> shapes_of(const SlicedJob& job, std::uint32_t index) {
+Result<LayerShapes> slice_shapes(const SlicedJob& job, std::uint32_t index) {
   const std::uint32_t count = job.plan.layer_count, place = index - job.manifest.head.first_layer;
   if (index >= count) {
     return Error{Fault::kUsage, fmt::format("--layer {}: the job has layers 0 to {}", index, count - 1)};
   }
   Sections::Work work;
   if (Status status = job.plan.sections->layer(index, work); !status) return status.error();
-  view::LayerShapes shapes;
+  LayerShapes shapes;
   shapes.index = index;
   shapes.z = job.plan.layer(index).plane();
   shapes.contours = std::move(work.contours.contours);
@@ -76,11 +60,7 @@ Result<view::LayerShapes> shapes_of(const SlicedJob& job, std::uint32_t index) {
                                                    job.directory, index)};
   }
   shapes.box = job.plan.sections->bounds();
-  for (const auto& [kind, name] : kKinds) {
-    auto outline = outline_of(work.paths, kind);
-    if (!outline) return outline.error();
-    if (outline->size() > 0) shapes.beads.push_back({view::ink_of(kind), std::string(name), std::move(*outline)});
-  }
+  if (Status status = view::add_paths(work.paths, shapes); !status) return status.error();
   shapes.title = fmt::format("{}   |   layer {} of {}   |   z {:.3f} mm", job.name(), index, count, mm(shapes.z));
   shapes.caption = fmt::format("{} contours, {:.2f} mm2", shapes.contours.size(), area);
   if (work.paths.size() > 0) shapes.caption += fmt::format(", {} paths", work.paths.size());
@@ -88,6 +68,18 @@ Result<view::LayerShapes> shapes_of(const SlicedJob& job, std::uint32_t index) {
 }
 
 }  // namespace
+
+Result<view::LayerSeries> gcode_series(const std::string& path) {
+  auto file = read::GcodeFile::open(path);
+  if (!file) return file.error();
+  view::LayerSeries series;
+  series.name = std::filesystem::path(path).filename().string();
+  series.last = series.count = file->count();
+  series.layer = [file = std::make_shared<const read::GcodeFile>(std::move(*file)), name = series.name](std::uint32_t index) {
+    return gcode_shapes(*file, name, index);
+  };
+  return series;
+}
 
 Result<view::LayerSeries> slice_series(const std::string& directory) {
   auto manifest = read_manifest(directory + "/manifest.json");
@@ -100,7 +92,7 @@ Result<view::LayerSeries> slice_series(const std::string& directory) {
   if (!plan) return plan.error();
   const auto sliced = std::make_shared<const SlicedJob>(SlicedJob{directory, std::move(*manifest), std::move(*plan)});
   return view::LayerSeries{sliced->name(), sliced->plan.range[0], sliced->plan.range[1], sliced->plan.layer_count,
-                           [sliced](std::uint32_t index) { return shapes_of(*sliced, index); }};
+                           [sliced](std::uint32_t index) { return slice_shapes(*sliced, index); }};
 }
 
 }  // namespace lamina::pipeline

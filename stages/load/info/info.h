@@ -1,4 +1,4 @@
-// pipeline/show/info.h: what `lamina info` says about a part file.
+// stages/load/info/info.h: what there is to say about a part file before it is planned.
 #pragma once
 
 #include <string>
@@ -6,7 +6,7 @@
 #include "stages/data/status.h"
 #include "stages/load/load.h"
 
-namespace lamina::pipeline {
+namespace lamina::load {
 
 /// A page about a part, as in its file: format, counts, size in mm, volume, whether it is closed and where it is not,
 /// what was noticed, and what `lamina jet` will do about it. Lines end with LF, the last one too. Counts and volume are
@@ -15,10 +15,10 @@ namespace lamina::pipeline {
 /// options  as for a job; the mesh is diagnosed before any repair, even if options.repair is on
 /// errors   of load(): a file that cannot be planned
 /// cost     a load, a diagnosis (sorting all edges), and a second load with repair if the mesh is not closed
-Result<std::string> describe_part_text(const std::string& path, const load::LoadOptions& options);
+Result<std::string> describe_part_text(const std::string& path, const LoadOptions& options);
 
 /// The same as one JSON object on a line. Places are in mm, in the coordinates of the file after options.transform; triangles
 /// count from 1.
-Result<std::string> describe_part_json(const std::string& path, const load::LoadOptions& options);
+Result<std::string> describe_part_json(const std::string& path, const LoadOptions& options);
 
-}  // namespace lamina::pipeline
+}  // namespace lamina::load

@@ -1,0 +1,54 @@
+#include "pipeline/check/job_files.h"
+
+#include <fmt/format.h>
+
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+
+#include "pipeline/machine/profiles.h"
+#include "pipeline/output/print_program.h"
+#include "stages/raster/materials.h"
+#include "stages/read/image.h"
+
+namespace lamina::pipeline {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::string whole_file(const fs::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
+}
+
+}  // namespace
+
+Result<replay::VirtualMachine> machine_of_job(const std::string& directory, const ManifestHead& head) {
+  const std::string name = "program/machine.toml";
+  std::string fault = fault_of_file(directory, name, head.machine_profile);
+  if (!fault.empty()) return Error{Fault::kVerification, std::move(fault)};
+  const Result<Machine> machine = read_machine(whole_file(fs::path(directory) / name), name);
+  if (!machine) return machine.error();
+  return replay::VirtualMachine::build(*machine, head.grid.columns(), head.grid.rows());
+}
+
+std::string program_of_layer(const std::string& directory, const ManifestHead& head, std::uint32_t layer) {
+  return whole_file(fs::path(directory) / program_file_name(layer, head.program_extension));
+}
+
+Result<Runs> picture_of_layer(const std::string& directory, const ManifestHead& head, const LayerRecord& record) {
+  Runs whole;
+  for (const LayerImageFile& file : layer_images(head, record)) {
+    auto image = read::image((fs::path(directory) / file.name).string());
+    if (!image) return image.error();
+    if (image->runs.columns != head.grid.columns() || image->runs.view().rows() != head.grid.rows()) {
+      return Error{Fault::kVerification, fmt::format("{}: is not of the manifest's size", file.name)};
+    }
+    if (!raster::add_image(std::move(image->runs), whole)) {
+      return Error{Fault::kVerification, fmt::format("{}: sets pixels of another material", file.name)};
+    }
+  }
+  return whole;
+}
+
+}  // namespace lamina::pipeline

@@ -1,0 +1,35 @@
+#include "stages/replay/feeding.h"
+
+#include <algorithm>
+
+namespace lamina::replay {
+
+std::uint32_t vats_wanted(const Machine& machine, std::span<const std::uint64_t> set, std::span<const std::uint32_t> vat) {
+  const auto is_set = [](std::uint64_t pixels) { return pixels > 0; };
+  const auto first = std::ranges::find_if(set, is_set);
+  if (first == set.end()) return 1u << vat[0];
+  const auto after = std::find_if(first + 1, set.end(), is_set);
+  if (after == set.end()) return 1u << vat[static_cast<std::size_t>(first - set.begin())];
+  switch (machine.powder.vat_rule) {
+    case VatRule::kFirst: return 1;
+    case VatRule::kSecond: return 2;
+    case VatRule::kBoth: return 3;
+    case VatRule::kMajority: return 1u << vat[*after > *first ? 1 : 0];
+    case VatRule::kRefuse: break;
+  }
+  return 0;
+}
+
+std::string vats_text(std::uint32_t vats) {
+  constexpr const char* kTexts[] = {"no vat feeds", "the first vat feeds", "the second vat feeds", "both vats feed"};
+  return kTexts[vats & 3];
+}
+
+Material material_of(const Machine& machine, const Count& count) {
+  const double side = machine.bed.size_mm[0] * machine.bed.size_mm[1];
+  const double area = machine.bed.shape == BedShape::kRound ? side * 3.14159265358979 / 4 : side;
+  return {static_cast<double>(count.drops) * machine.head.drop_pl * 1e-6,
+          (count.fed_mm[0] + count.fed_mm[1]) * area * machine.powder.packing};
+}
+
+}  // namespace lamina::replay

@@ -1,0 +1,146 @@
+#include "stages/view/bead_shapes.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <map>
+#include <utility>
+#include <vector>
+
+#include "stages/geometry/clipping.h"
+
+namespace lamina::view {
+namespace {
+
+constexpr std::array<std::pair<PathKind, std::string_view>, 5> kKinds = {{{PathKind::kOuter, "outer wall"},
+                                                                          {PathKind::kInner, "inner wall"},
+                                                                          {PathKind::kContour, "closed curve"},
+                                                                          {PathKind::kLink, "link"},
+                                                                          {PathKind::kRaster, "line"}}};
+
+/// What the beads of a kind cover, width by width.
+Result<Contours> outline_of(const ToolpathsView& paths, PathKind kind) {
+  std::map<Nm, Contours> by_width;
+  for (std::uint32_t p = 0; p < paths.size(); ++p) {
+    const std::uint32_t last = paths.offset[p + 1] - 1;
+    for (std::uint32_t begin = paths.offset[p]; begin < last;) {
+      std::uint32_t end = begin + 1;
+      while (end < last && paths.kind[end] == paths.kind[begin] && paths.width[end] == paths.width[begin]) ++end;
+      if (paths.kind[begin] == kind) {
+        Contours& lines = by_width[paths.width[begin]];
+        lines.point.insert(lines.point.end(), paths.point.begin() + begin, paths.point.begin() + end + 1);
+        lines.close();
+      }
+      begin = end;
+    }
+  }
+  Contours all;
+  for (const auto& [width, lines] : by_width) {
+    const auto covered = cover_lines(lines, width);
+    if (!covered) return covered.error();
+    all.append(*covered);
+  }
+  return all;
+}
+
+constexpr std::size_t kMostShades = 4;
+
+/// The words that slicers use: PrusaSlicer and Slic3r, CuraEngine, Orca.
+PathKind kind_of(const std::string& type) {
+  std::string word = type;
+  std::ranges::transform(word, word.begin(), [](char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c + 32) : c; });
+  const auto has = [&](std::string_view part) { return word.find(part) != std::string::npos; };
+  if (has("skirt") || has("brim") || has("support") || has("prime") || has("wipe") || has("custom")) return PathKind::kLink;
+  if (has("infill") || has("fill") || has("skin") || has("surface") || word.empty()) return PathKind::kRaster;
+  if (has("external") || has("outer")) return PathKind::kOuter;
+  return PathKind::kInner;
+}
+
+/// The beads of one type, width by width, joined where one begins at the end of another.
+std::map<Nm, Contours> lines_by_width(std::span<const LaidBead> beads, std::uint32_t type) {
+  std::map<Nm, Contours> lines;
+  const LaidBead* last = nullptr;
+  const auto end_line = [&] {
+    if (last == nullptr) return;
+    lines[last->width].close();
+    last = nullptr;
+  };
+  for (const LaidBead& bead : beads) {
+    if (bead.type != type) {
+      end_line();
+      continue;
+    }
+    if (last == nullptr || last->width != bead.width || last->to != bead.from) {
+      end_line();
+      lines[bead.width].point.push_back(bead.from);
+    }
+    lines[bead.width].point.push_back(bead.to);
+    last = &bead;
+  }
+  end_line();
+  return lines;
+}
+
+Status add_type(std::span<const LaidBead> laid, std::uint32_t type, const std::string& name, LayerShapes& shapes) {
+  const std::map<Nm, Contours> lines = lines_by_width(laid, type);
+  if (lines.empty()) return {};
+  const Nm least = lines.begin()->first, most = lines.rbegin()->first;
+  const std::size_t steps = std::min(lines.size(), kMostShades);
+  const auto step_of = [&](Nm width, std::size_t place) {
+    if (lines.size() <= kMostShades) return place;
+    return std::min(steps - 1, static_cast<std::size_t>((width - least) * static_cast<std::int64_t>(steps) / (most - least)));
+  };
+  std::vector<LayerShapes::Beads> beads(steps);
+  std::vector<std::pair<Nm, Nm>> range(steps, {INT32_MAX, 0});
+  std::size_t place = 0;
+  for (const auto& [width, line] : lines) {
+    const auto covered = cover_lines(line, width);
+    if (!covered) return covered.error();
+    const std::size_t step = step_of(width, place++);
+    beads[step].outline.append(*covered);
+    range[step] = {std::min(range[step].first, width), std::max(range[step].second, width)};
+  }
+  for (std::size_t step = 0; step < steps; ++step) {
+    if (beads[step].outline.size() == 0) continue;
+    const auto& [narrow, wide] = range[step];
+    beads[step].ink = shade(ink_of(kind_of(name)), step, steps);
+    beads[step].name = fmt::format("{} {:.3g}{} mm", name.empty() ? "bead" : name, mm(narrow),
+                                   wide > narrow ? fmt::format(" to {:.3g}", mm(wide)) : "");
+    shapes.beads.push_back(std::move(beads[step]));
+  }
+  return {};
+}
+
+}  // namespace
+
+Status add_paths(const ToolpathsView& paths, LayerShapes& shapes) {
+  for (const auto& [kind, name] : kKinds) {
+    auto outline = outline_of(paths, kind);
+    if (!outline) return outline.error();
+    if (outline->size() > 0) shapes.beads.push_back({ink_of(kind), std::string(name), std::move(*outline)});
+  }
+  return {};
+}
+
+Status add_beads(std::span<const LaidBead> beads, std::span<const std::string> types, LayerShapes& shapes) {
+  std::vector<std::uint32_t> order;
+  for (const LaidBead& bead : beads) {
+    if (std::ranges::find(order, bead.type) == order.end()) order.push_back(bead.type);
+  }
+  for (const std::uint32_t type : order) {
+    if (Status status = add_type(beads, type, types[type], shapes); !status) return status;
+  }
+  return {};
+}
+
+double length_mm(std::span<const LaidBead> beads) {
+  double length = 0;
+  for (const LaidBead& bead : beads) {
+    length += std::hypot(mm(std::int64_t{bead.to.x} - bead.from.x), mm(std::int64_t{bead.to.y} - bead.from.y));
+  }
+  return length;
+}
+
+}  // namespace lamina::view

@@ -1,0 +1,47 @@
+// stages/write/report/head.h: what a page says of its job, as its script reads it.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "stages/data/buffer.h"
+#include "stages/data/grid.h"
+#include "stages/data/hash.h"
+#include "stages/geometry/coverage.h"  // PixelWindow
+#include "stages/write/manifest/manifest.h"
+#include "stages/write/report/held_layers.h"
+
+namespace lamina::write::report {
+
+/// A view of the page: what its head says of it, and its pixels.
+struct ShownView {
+  std::string name;
+  std::uint32_t width = 0, height = 0, most = 0;  // most: of a depth; 0 for light and cover
+  double width_mm = 0, height_mm = 0;
+  Buffer<std::byte> deflated;
+};
+
+/// What one pass over all layers gives.
+struct LayersSeen {
+  PixelWindow window;
+  std::vector<std::uint64_t> set;  // pixels of each
+  std::vector<double> seconds;     // of each, with a machine
+};
+
+/// The manifest's own file.
+struct ManifestSeen {
+  std::string name;
+  FileDigest digest;
+};
+
+/// What the job is called.
+std::string page_title(const ManifestHead& head);
+
+/// One JSON object on a line: the job, its parts and views, and a list of numbers for each column of its layers.
+/// grid  of the layers' pixels
+/// cost  O(layers)
+std::string head_json(const Manifest& manifest, const ManifestSeen& file, const PixelGrid& grid, const LayersSeen& seen,
+                      HeldLayers& held, const std::vector<ShownView>& views);
+
+}  // namespace lamina::write::report
