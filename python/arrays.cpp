@@ -8,9 +8,6 @@
 #include <filesystem>
 #include <memory>
 
-#include "stages/write/file.h"
-#include "stages/write/image_format.h"
-
 namespace lamina::python {
 namespace {
 
@@ -199,8 +196,8 @@ void define_image(py::module_& module) {
       .def(
           "save",
           [](const Image& image, const std::string& path, const std::string& format) {
-            const write::Bytes file = encode(image, format_of(path, format));
-            without_lock([&] { return write::write_file(path, file); });
+            const write::ImageFormat& as = format_of(path, format);
+            without_lock([&] { return pipeline::save_image(path, image.runs, image.dpi_x, image.dpi_y, as); });
           },
           py::arg("path"), py::arg("format") = "",
           "Writes the image; the format follows from the name (.tif is tiff-g4) if none is given. The file appears whole.");

@@ -8,10 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "stages/data/runs.h"
-#include "stages/data/status.h"
-#include "stages/load/load.h"
-#include "stages/read/image.h"
+#include "pipeline/lamina.h"
 
 namespace lamina::python {
 

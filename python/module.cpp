@@ -6,16 +6,9 @@
 #include <chrono>
 #include <future>
 #include <memory>
-#include <mutex>
 #include <optional>
 
 #include "arrays.h"
-#include "pipeline/job/file.h"
-#include "pipeline/job/keys.h"
-#include "pipeline/machine/materials.h"
-#include "pipeline/run/image_source.h"
-#include "pipeline/run/run.h"
-#include "pipeline/text/version.h"
 
 namespace lamina::python {
 namespace {
@@ -78,57 +71,39 @@ struct LayerEntry {
   std::uint8_t reason;
 };
 
-/// Contours and the body that each is of.
-struct LayerContours {
-  slice::LayerContours of;
-};
-
 class Plan {
  public:
-  explicit Plan(Job job) : images_(without_lock([&] { return pipeline::ImageSource::make(job); })) {}
+  explicit Plan(const Job& job) : source_(without_lock([&] { return pipeline::LayerSource::make(job); })) {}
 
-  const pipeline::Plan& of() const { return images_.plan(); }
-  const PixelGrid& grid() const { return of().images->grid; }
-  std::vector<std::string> materials() const { return images_.materials(); }
+  const pipeline::LayerSource& of() const { return source_; }
+  const PixelGrid& grid() const { return source_.grid(); }
 
   std::uint32_t index(std::int64_t asked) const {
-    const std::int64_t count = of().layer_count, index = asked < 0 ? asked + count : asked;
+    const std::int64_t count = of().layer_count(), index = asked < 0 ? asked + count : asked;
     if (index < 0 || index >= count) throw py::index_error(fmt::format("layer {}: there are {} layers", asked, count));
     return static_cast<std::uint32_t>(index);
   }
 
   PlannedLayer layer(std::uint32_t index) const {
     PlannedLayer made;
-    auto images = without_lock([&] { return images_.images(index); });
+    auto images = without_lock([&] { return source_.images(index); });
     made.runs = std::move(images.whole);
     made.dpi_x = grid().x.dpi();
     made.dpi_y = grid().y.dpi();
-    made.materials = images_.materials();
+    made.materials = source_.materials();
     for (Runs& image : images.material) made.images.push_back({std::move(image), made.dpi_x, made.dpi_y});
     made.layer = of().layer(index);
     return made;
   }
 
-  std::unique_ptr<LayerContours> contours(std::uint32_t index) {
-    return without_lock([&]() -> Result<std::unique_ptr<LayerContours>> {
-      {
-        const std::lock_guard lock(mutex_);
-        if (!contours_) {
-          auto made = plan_contours();
-          if (!made) return made.error();
-          contours_.emplace(std::move(*made));
-        }
-      }
-      pipeline::Sections::Work work;
-      if (auto report = contours_->sections->slicer().layer(index, work.scratch, work.contours); !report) return report.error();
-      return std::make_unique<LayerContours>(LayerContours{std::move(work.contours)});
-    });
+  std::unique_ptr<Contours> contours(std::uint32_t index) const {
+    return std::make_unique<Contours>(without_lock([&] { return source_.contours(index); }));
   }
 
   py::array heights() const {
-    py::array_t<LayerEntry> array(of().layer_count);
+    py::array_t<LayerEntry> array(of().layer_count());
     LayerEntry* entry = array.mutable_data();
-    for (std::uint32_t i = 0; i < of().layer_count; ++i) {
+    for (std::uint32_t i = 0; i < of().layer_count(); ++i) {
       const Layer layer = of().layer(i);
       *entry++ = {layer.bottom, layer.thickness, static_cast<std::uint8_t>(layer.reason)};
     }
@@ -136,17 +111,7 @@ class Plan {
   }
 
  private:
-  Result<pipeline::Plan> plan_contours() const {
-    Job job = of().job;
-    job.shard.reset();
-    auto resolved = pipeline::resolve(job, pipeline::Product::kContours);
-    if (!resolved) return resolved.error();
-    return pipeline::make_plan(std::move(*resolved), [](const pipeline::ProgressEvent&) {});
-  }
-
-  pipeline::ImageSource images_;
-  std::mutex mutex_;
-  std::optional<pipeline::Plan> contours_;  // made when contours are read for the first time
+  pipeline::LayerSource source_;
 };
 
 /// Plans a layer when it is asked for the next one, and keeps none.
@@ -156,7 +121,7 @@ struct LayerIterator {
 };
 
 /// Runs on a thread of its own, so that Ctrl-C stops it: finished layers are kept then. returns  the summary of --json
-py::object run_job(const Job& job, pipeline::Product product) {
+py::object run_job(const Job& job, Product product) {
   std::atomic<bool> cancel{false};
   auto running = std::async(std::launch::async, [&] {
     return pipeline::run(
@@ -179,7 +144,7 @@ py::object run_job(const Job& job, pipeline::Product product) {
   return py::module_::import("json").attr("loads")(summary->json());
 }
 
-template <pipeline::Product product>
+template <Product product>
 py::object plan_into(const std::string& output, const py::object& parts, const py::dict& settings, const std::string& file,
                      bool resume, bool overwrite, const py::object& materials) {
   if (output.empty()) raise({Fault::kUsage, "output is empty; name a directory or file"});
@@ -187,16 +152,6 @@ py::object plan_into(const std::string& output, const py::object& parts, const p
   job.resume = resume;
   job.overwrite = overwrite;
   return run_job(job, product);
-}
-
-template <class Target>
-void append_keys(std::span<const pipeline::Key<Target>> keys, const Target& presets, py::list& list) {
-  for (const auto& key : keys) {
-    list.append(py::dict("key"_a = fmt::format("{}.{}", key.section, key.name), "flag"_a = std::string(key.flag),
-                         "value"_a = std::string(key.value), "default"_a = key.write(presets),
-                         "meaning"_a = std::string(key.meaning),
-                         "decides_bytes"_a = (key.decides & pipeline::decides::images) != 0));
-  }
 }
 
 void define_layer(py::module_& module) {
@@ -228,13 +183,13 @@ void define_layer(py::module_& module) {
                            mm(std::int64_t{l.layer.bottom} + l.layer.thickness), l.runs.columns, l.runs.view().rows(),
                            set_pixels(l.runs));
       });
-  py::class_<LayerContours>(module, "Contours",
-                            "Closed contours of a layer: a sequence of n x 2 arrays, nm on the bed, outer ones "
-                            "counter-clockwise, those around holes clockwise.")
-      .def("__len__", [](const LayerContours& c) { return c.of.contours.size(); })
+  py::class_<Contours>(module, "Contours",
+                       "Closed contours of a layer: a sequence of n x 2 arrays, nm on the bed, outer ones "
+                       "counter-clockwise, those around holes clockwise.")
+      .def("__len__", [](const Contours& c) { return c.size(); })
       .def("__getitem__",
            [](const py::object& self, std::int64_t asked) {
-             const Contours& contours = self.cast<const LayerContours&>().of.contours;
+             const Contours& contours = self.cast<const Contours&>();
              const std::int64_t index = asked < 0 ? asked + contours.size() : asked;
              if (index < 0 || index >= contours.size())
                throw py::index_error(fmt::format("contour {}: there are {}", asked, contours.size()));
@@ -244,18 +199,18 @@ void define_layer(py::module_& module) {
       .def_property_readonly(
           "offset",
           [](const py::object& self) {
-            const auto& offset = self.cast<const LayerContours&>().of.contours.offset;
+            const auto& offset = self.cast<const Contours&>().offset;
             return view(offset.data(), {static_cast<py::ssize_t>(offset.size())}, self);
           },
           "uint32, contours + 1: contour c owns point[offset[c]:offset[c + 1]]. A view, read-only.")
       .def_property_readonly(
           "point",
           [](const py::object& self) {
-            const auto& point = self.cast<const LayerContours&>().of.contours.point;
+            const auto& point = self.cast<const Contours&>().point;
             return view(reinterpret_cast<const std::int32_t*>(point.data()), {static_cast<py::ssize_t>(point.size()), 2}, self);
           },
           "int32, points x (x, y), nm on the bed. A view, read-only.")
-      .def_property_readonly("area_mm2", [](const LayerContours& c) { return square_mm(doubled_area(c.of.contours)); });
+      .def_property_readonly("area_mm2", [](const Contours& c) { return square_mm(doubled_area(c)); });
   py::class_<LayerIterator>(module, "LayerIterator")
       .def("__iter__", [](LayerIterator& self) -> LayerIterator& { return self; })
       .def("__length_hint__", [](const LayerIterator& self) { return self.end - self.next; })
@@ -270,16 +225,16 @@ void define_plan(py::module_& module) {
       module, "Plan",
       "A job with its parts loaded: a sequence of layers that are planned when they are asked "
       "for. Threads may ask at the same time; the interpreter's lock is free meanwhile.")
-      .def("__len__", [](const Plan& plan) { return plan.of().layer_count; })
+      .def("__len__", [](const Plan& plan) { return plan.of().layer_count(); })
       .def("__getitem__", [](const Plan& plan, std::int64_t asked) { return plan.layer(plan.index(asked)); })
       .def("__iter__",
            [](const std::shared_ptr<Plan>& plan) {
-             return LayerIterator{plan, 0, plan->of().layer_count};
+             return LayerIterator{plan, 0, plan->of().layer_count()};
            })
       .def(
           "layers",
           [](const std::shared_ptr<Plan>& plan, std::uint32_t first, std::optional<std::uint32_t> end) {
-            const std::uint32_t count = plan->of().layer_count;
+            const std::uint32_t count = plan->of().layer_count();
             return LayerIterator{plan, first, std::min(end.value_or(count), count)};
           },
           "first"_a = 0, "end"_a = py::none(),
@@ -288,7 +243,7 @@ void define_plan(py::module_& module) {
           "contours", [](Plan& plan, std::int64_t asked) { return plan.contours(plan.index(asked)); }, "index"_a,
           "Contours of a layer, as lamina slice cuts them. The first call loads the parts once more.")
       .def_property_readonly(
-          "materials", [](const Plan& plan) { return plan.materials(); },
+          "materials", [](const Plan& plan) { return plan.of().materials(); },
           "Names of the powders, by vat, else in the order in which parts name them; empty if none does.")
       .def_property_readonly(
           "heights", &Plan::heights,
@@ -298,14 +253,15 @@ void define_plan(py::module_& module) {
       .def_property_readonly(
           "dpi", [](const Plan& plan) { return py::make_tuple(plan.grid().x.dpi(), plan.grid().y.dpi()); }, "Along x and y.")
       .def_property_readonly(
-          "bed_mm", [](const Plan& plan) { return plan.of().job.bed_mm; }, "Width (x) and depth (y).")
+          "bed_mm", [](const Plan& plan) { return plan.of().bed_mm(); }, "Width (x) and depth (y).")
       .def_property_readonly(
-          "job", [](const Plan& plan) { return pipeline::job_text(plan.of().job, ""); }, "The job as a TOML file would say it.")
+          "job", [](const Plan& plan) { return pipeline::job_text(plan.of().job(), ""); },
+          "The job as a TOML file would say it.")
       .def_property_readonly(
           "parts",
           [](const Plan& plan) {
             py::list parts;
-            for (const auto& part : plan.of().scene->parts) {
+            for (const auto& part : plan.of().parts()) {
               const auto& [lo, hi] = part.bounds;
               parts.append(py::dict("path"_a = part.path, "copies"_a = part.copies, "triangles"_a = part.triangles,
                                     "low"_a = py::make_tuple(lo.x, lo.y, lo.z), "high"_a = py::make_tuple(hi.x, hi.y, hi.z)));
@@ -326,7 +282,7 @@ PYBIND11_MODULE(lamina, module) {
       "Settings are the keys of a job file (docs/job.md), as {'bed.dpi': 600, 'layers.thickness_mm': 0.1}; lamina.keys() lists\n"
       "them. Lengths in settings are mm, as in job files; in arrays they are whole nanometres. What fails raises lamina.Error\n"
       "with one line that says where, what is wrong and what to do.";
-  module.attr("__version__") = std::string(pipeline::version());
+  module.attr("__version__") = std::string(version());
   py::list reasons;
   for (int reason = 0; reason <= static_cast<int>(LayerReason::kFlat); ++reason) {
     reasons.append(std::string(reason_name(static_cast<LayerReason>(reason))));
@@ -342,7 +298,7 @@ PYBIND11_MODULE(lamina, module) {
       [](const py::object& path, const py::dict& settings) {
         const pipeline::Job job = make_job(py::make_tuple(path), settings, py::none(), "");
         return without_lock([&]() -> Result<std::shared_ptr<Part>> {
-          Result<Part> part = load::load(job.parts[0].path, pipeline::load_options(job, job.parts[0]));
+          Result<Part> part = pipeline::load_part(job, job.parts[0]);
           if (!part) return part.error();
           return std::make_shared<Part>(std::move(*part));
         });
@@ -362,19 +318,21 @@ PYBIND11_MODULE(lamina, module) {
                "overwrite"_a = false, "materials"_a = py::none(), meaning);
   };
   def_product(
-      "jet", &plan_into<pipeline::Product::kImages>,
+      "jet", &plan_into<Product::kImages>,
       "Plans all layers into a directory, as lamina jet does, on all processors; returns its summary. Ctrl-C stops it, and "
       "resume=True goes on.");
-  def_product("slice", &plan_into<pipeline::Product::kContours>,
+  def_product("slice", &plan_into<Product::kContours>,
               "Contours and fillings of all layers into a directory, as lamina slice does; returns its summary.");
-  def_product("extrude", &plan_into<pipeline::Product::kMoves>,
+  def_product("extrude", &plan_into<Product::kMoves>,
               "Toolpaths of all layers into a file, as lamina extrude --job does; returns its summary.");
   module.def(
       "keys",
       [] {
         py::list list;
-        append_keys<pipeline::Job>(pipeline::job_keys(), {}, list);
-        append_keys<pipeline::PartRequest>(pipeline::part_keys(), {}, list);
+        for (const pipeline::KeyFacts& key : pipeline::key_facts()) {
+          list.append(py::dict("key"_a = key.name, "flag"_a = key.flag, "value"_a = key.value, "default"_a = key.preset,
+                               "meaning"_a = key.meaning, "decides_bytes"_a = key.decides_images));
+        }
         return list;
       },
       "Every key of a job: key, option of the program, value, default, meaning, and whether it decides bytes.");

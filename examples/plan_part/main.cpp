@@ -1,8 +1,7 @@
-// Plans a part at 300 dpi and says how much of each tenth layer is binder.
+// Plans a part at 300 dpi into files and says how much of each tenth layer is binder.
 #include <cstdio>
 
-#include "pipeline/output/manifest.h"
-#include "pipeline/run/run.h"
+#include "pipeline/lamina.h"
 
 using namespace lamina::pipeline;
 
@@ -14,20 +13,29 @@ int main(int argc, char** argv) {
   job.bed_mm = {200, 200};
   job.dpi = {300, 300};
   job.layer_mm = 0.1;
-  if (const auto status = check_job(job); !status) return std::fprintf(stderr, "%s\n", status.error().message.c_str()), 2;
+  const auto failed = [](const lamina::Error& error) {
+    std::fprintf(stderr, "%s\n", error.message.c_str());
+    return static_cast<int>(error.fault);
+  };
+  if (const auto status = check_job(job); !status) return failed(status.error());
   const std::atomic<bool> cancel{false};
   const auto done = run(
-      job, Product::kImages, [](const ProgressEvent&) {}, cancel);
-  if (!done) {
-    std::fprintf(stderr, "%s\n", done.error().message.c_str());
-    return static_cast<int>(done.error().fault);
-  }
-  const auto manifest = read_manifest(job.output + "/manifest.json");
-  if (!manifest) return 5;
+      job, lamina::Product::kImages, [](const ProgressEvent&) {}, cancel);
+  if (!done) return failed(done.error());
+  const auto report = verify(job.output, {});
+  if (!report) return failed(report.error());
+
+  // The same layers, without a file.
+  const auto source = LayerSource::make(job);
+  if (!source) return failed(source.error());
   unsigned long long pixels = 0;
-  for (const LayerRecord& layer : manifest->layers) pixels += layer.set_pixels;
-  for (std::size_t i = 0; i < manifest->layers.size(); i += 10) {
-    std::printf("layer %zu: %llu pixels\n", i, static_cast<unsigned long long>(manifest->layers[i].set_pixels));
+  for (std::uint32_t i = 0; i < source->layer_count(); ++i) {
+    const auto images = source->images(i);
+    if (!images) return failed(images.error());
+    const auto set = static_cast<unsigned long long>(lamina::set_pixels(images->whole));
+    pixels += set;
+    if (i % 10 == 0) std::printf("layer %u: %llu pixels\n", i, set);
   }
-  std::printf("%u layers, %llu pixels\n", done->layers_total, pixels);
+  std::printf("%u layers, %llu pixels, %llu faults\n", done->layers_total, pixels,
+              static_cast<unsigned long long>(report->fault_count));
 }

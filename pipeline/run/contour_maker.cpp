@@ -7,8 +7,8 @@
 
 #include "pipeline/output/slice_files.h"
 #include "pipeline/run/path_layer.h"
-#include "pipeline/text/number_text.h"
-#include "pipeline/text/readable.h"
+#include "stages/text/number_text.h"
+#include "stages/text/readable.h"
 
 namespace lamina::pipeline {
 namespace {
@@ -46,7 +46,9 @@ class ContourMaker : public Maker {
             {"encode",
              [&](std::uint32_t, const Ticket& ticket) {
                Sections::Work& work = work_[ticket.work];
-               made_[ticket.record].paths = std::make_shared<const PathFacts>(facts_of(work));
+               PathFacts facts = facts_of(work);
+               facts.bead_mm = length_mm(work.paths);
+               made_[ticket.record].paths = std::make_shared<const PathFacts>(facts);
                files_.encode(view_of(made_[ticket.record].layer, work), work.text);
                return Status();
              }},

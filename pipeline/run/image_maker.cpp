@@ -4,8 +4,8 @@
 
 #include <nlohmann/json.hpp>
 
-#include "pipeline/text/number_text.h"
-#include "pipeline/text/readable.h"
+#include "stages/text/number_text.h"
+#include "stages/text/readable.h"
 
 namespace lamina::pipeline {
 namespace {
@@ -199,7 +199,7 @@ void ImageMaker::tell(Summary& summary) const {
     facts["bead_pixels"] = bead_pixels_;
     facts["porosity"] = porosity;
   }
-  if (plan_.job.machine.resolved) {
+  if (plan_.images->machine) {
     facts["moved_pixels"] = moved_pixels_;
     facts["lost_pixels"] = lost_pixels_;
   }
@@ -213,7 +213,7 @@ void tell_images(const Plan& plan, Summary& summary) {
   const PixelGrid& grid = plan.images->grid;
   summary.output = plan.job.output;
   summary.format = plan.job.format;
-  if (plan.job.machine.resolved) summary.machine = plan.job.machine.resolved->machine.name;
+  if (plan.images->machine) summary.machine = plan.images->machine->machine.name;
   summary.mesh_bytes = plan.images->solids.mesh_bytes();
   summary.index_bytes = plan.images->solids.index_bytes();
   if (plan.sections) {
@@ -222,7 +222,7 @@ void tell_images(const Plan& plan, Summary& summary) {
   }
   summary.head.emplace_back(
       "image", fmt::format("{} x {} pixels of {:g} x {:g} dpi on {} x {} mm, {}", grid.columns(), grid.rows(), grid.x.dpi(),
-                           grid.y.dpi(), number_text(plan.job.bed_mm[0]), number_text(plan.job.bed_mm[1]), plan.job.format));
+                           grid.y.dpi(), number_text(plan.bed.size_mm[0]), number_text(plan.bed.size_mm[1]), plan.job.format));
   nlohmann::ordered_json& facts = *summary.facts;
   facts["columns"] = grid.columns();
   facts["rows"] = grid.rows();

@@ -8,7 +8,7 @@
 
 #include "pipeline/output/toolpath_file.h"
 #include "pipeline/run/path_layer.h"
-#include "pipeline/text/readable.h"
+#include "stages/text/readable.h"
 #include "stages/write/gcode/gcode.h"
 
 namespace lamina::pipeline {
@@ -59,11 +59,13 @@ class MoveMaker : public Maker {
   Status record(std::uint32_t layer, const Ticket& ticket) override {
     Made& made = made_[ticket.record];
     Sections::Work& work = work_[ticket.work];
-    if (Status status = made.waits ? file_.append({work.text.data(), work.text.size()}) : lay_pieces(layer, work, made);
-        !status)
-      return status;
+    if (!made.waits) {
+      if (Status status = lay_pieces(layer, work, made); !status) return status;
+    }
     made.record.paths = std::make_shared<const PathFacts>(made.facts);
-    if (Status status = file_.record(made.record); !status) return status;
+    const std::string_view text(work.text.data(), work.text.size());
+    if (Status status = made.waits ? file_.file().append(text, made.record) : file_.file().end_pieces(made.record); !status)
+      return status;
     add_kept(made.record);
     if (made.facts.segments.lines > 0 && made.facts.segments.thin == 0) undivided_.add(made.record.layer);
     return {};
@@ -106,7 +108,12 @@ class MoveMaker : public Maker {
     const auto laid = lay_moves(plan_, layer, work, {work.text, most, [] { return false; }}, *out, made.facts);
     if (!laid) return laid.error();
     made.waits = *laid;
-    if (!made.waits) Buffer<char>().swap(work.text);
+    if (made.waits) {
+      made.record.bytes = work.text.size();
+      made.record.hash = hash_bytes(std::as_bytes(std::span(work.text)));
+    } else {
+      Buffer<char>().swap(work.text);
+    }
     return {};
   }
 
@@ -114,7 +121,7 @@ class MoveMaker : public Maker {
     piece_.clear();
     Status status;
     const auto give = [&] {
-      status = file_.append({piece_.data(), piece_.size()});
+      status = file_.file().append_piece({piece_.data(), piece_.size()});
       piece_.clear();
       return status.ok();
     };
@@ -122,7 +129,7 @@ class MoveMaker : public Maker {
     const auto laid = lay_moves(plan_, layer, work, {piece_, kPieceOfText, give}, *out, made.facts);
     if (!laid) return laid.error();
     if (!status) return status;
-    return file_.append({piece_.data(), piece_.size()});
+    return file_.file().append_piece({piece_.data(), piece_.size()});
   }
 
   const Plan& plan_;
@@ -138,8 +145,8 @@ class MoveMaker : public Maker {
 
 void MoveMaker::tell(Summary& summary) const {
   const write::MoveTotals& totals = sums_.totals;
-  const segment::SegmentCounts& segments = sums_.segments;
-  const segment::PlannedPorosity& porosity = sums_.porosity;
+  const SegmentCounts& segments = sums_.segments;
+  const PlannedPorosity& porosity = sums_.porosity;
   const Extruder& machine = plan_.moves->profile.machine;
   const double filament_cm3 =
       totals.filament_mm * std::numbers::pi / 4 * machine.material.filament_mm * machine.material.filament_mm / 1000;

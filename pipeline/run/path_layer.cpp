@@ -9,8 +9,6 @@
 #include "stages/segment/moves.h"
 
 namespace lamina::pipeline {
-namespace {
-
 double length_mm(const ToolpathsView& paths) {
   double sum = 0;
   for (std::uint32_t p = 0; p < paths.size(); ++p) {
@@ -22,8 +20,6 @@ double length_mm(const ToolpathsView& paths) {
   return sum * 1e-6;
 }
 
-}  // namespace
-
 PathFacts facts_of(const Sections::Work& work) {
   PathFacts facts;
   const Contours& contours = work.contours.contours;
@@ -33,7 +29,6 @@ PathFacts facts_of(const Sections::Work& work) {
   facts.united = work.report.united;
   facts.open = work.report.gaps.open;
   facts.area_mm2 = square_mm(doubled_area(contours));
-  facts.bead_mm = length_mm(work.paths);
   facts.stored_points = work.paths.point.size();
   return facts;
 }
@@ -44,7 +39,7 @@ Result<bool> lay_moves(const Plan& plan, std::uint32_t index, const Sections::Wo
   const Layer layer = sections.layers()[index].own();
   const ToolpathsView all = work.paths;
   PathFacts laid;
-  laid.porosity.solid_mm3 = square_mm(doubled_area(work.contours.contours)) * mm(layer.thickness);
+  laid.porosity.solid_mm3 = facts.area_mm2 * mm(layer.thickness);
   for (std::uint32_t a = 0; a + 1 < work.path_area.size(); ++a) {
     const Sections::Area& area = sections.areas()[a];
     const SegmentRange& range = plan.segments->at(std::int64_t{layer.plane()} - area.box.lo.z);

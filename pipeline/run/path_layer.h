@@ -5,17 +5,20 @@
 #include <functional>
 #include <string>
 
-#include "pipeline/output/record.h"
 #include "pipeline/plan/plan.h"
 #include "pipeline/run/summary.h"
 #include "stages/data/buffer.h"
 #include "stages/data/status.h"
 #include "stages/write/extrusion_format.h"
+#include "stages/write/manifest/record.h"
 
 namespace lamina::pipeline {
 
-/// What contours and stored paths of a layer come to.
+/// What contours and stored paths of a layer come to; without the length of the paths.
 PathFacts facts_of(const Sections::Work& work);
+
+/// Length of stored paths.
+double length_mm(const ToolpathsView& paths);
 
 /// The text that a writer appends to, and what happens when it has grown.
 struct TextRoom {

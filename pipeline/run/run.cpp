@@ -9,6 +9,7 @@
 #include <optional>
 
 #include "pipeline/flow/layers.h"
+#include "pipeline/job/heights.h"
 #include "pipeline/output/directory.h"
 #include "pipeline/output/slice_directory.h"
 #include "pipeline/output/toolpath_file.h"
@@ -130,17 +131,22 @@ Status make_layers(const Plan& plan, Maker& maker, const FlowLimits& limits, Sum
 }  // namespace
 
 Result<Summary> run(const Job& job, Product product, const ProgressCallback& progress, const std::atomic<bool>& cancel) {
-  std::optional<tbb::global_control> threads;
-  if (job.threads > 0) threads.emplace(tbb::global_control::max_allowed_parallelism, job.threads);
   auto resolved = resolve(job, product);
-  if (!resolved) return resolved.error();
-  if (!job.dry_run) {
-    if (Status status = check_output_of(*resolved); !status) return status.error();
+  return resolved ? run(std::move(*resolved), progress, cancel) : resolved.error();
+}
+
+Result<Summary> run(Resolved resolved, const ProgressCallback& progress, const std::atomic<bool>& cancel) {
+  const Product product = resolved.product;
+  std::optional<tbb::global_control> threads;
+  if (resolved.job.threads > 0) threads.emplace(tbb::global_control::max_allowed_parallelism, resolved.job.threads);
+  if (!resolved.job.dry_run) {
+    if (Status status = check_output_of(resolved); !status) return status.error();
   }
-  const auto plan = make_plan(std::move(*resolved), progress);
+  const auto plan = make_plan(std::move(resolved), progress);
   if (!plan) return plan.error();
   if (cancel) return Error{Fault::kInterrupted, "interrupted before the first layer; nothing was written"};
 
+  const Job& job = plan->job;
   FlowLimits limits;
   limits.budget_bytes = job.memory_bytes;
   limits.most_in_flight = layers_in_flight();

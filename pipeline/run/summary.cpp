@@ -4,8 +4,8 @@
 
 #include <nlohmann/json.hpp>
 
-#include "pipeline/text/json_text.h"
-#include "pipeline/text/readable.h"
+#include "stages/text/json_text.h"
+#include "stages/text/readable.h"
 
 namespace lamina::pipeline {
 namespace {

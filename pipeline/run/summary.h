@@ -9,8 +9,8 @@
 #include <utility>
 #include <vector>
 
-#include "pipeline/job/product.h"
-#include "pipeline/plan/scene.h"
+#include "stages/data/choices.h"
+#include "stages/data/mesh.h"
 
 namespace lamina::pipeline {
 

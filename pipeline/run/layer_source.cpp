@@ -1,0 +1,115 @@
+#include "pipeline/run/layer_source.h"
+
+#include <mutex>
+#include <optional>
+#include <utility>
+
+#include "pipeline/run/image_maker.h"
+#include "stages/load/load.h"
+#include "stages/write/file.h"
+
+namespace lamina::pipeline {
+namespace {
+
+Result<Plan> plan_of(const Job& job, Product product) {
+  auto resolved = resolve(job, product);
+  if (!resolved) return resolved.error();
+  return make_plan(std::move(*resolved), [](const ProgressEvent&) {});
+}
+
+}  // namespace
+
+struct LayerSource::State {
+  Plan plan;
+  std::optional<LayerImager> imager;
+  std::mutex mutex;                  // of all below
+  std::optional<Plan> contour_plan;  // made when contours are read for the first time
+  std::vector<std::unique_ptr<ImageWork>> idle;
+
+  std::unique_ptr<ImageWork> take() {
+    const std::lock_guard lock(mutex);
+    if (idle.empty()) return std::make_unique<ImageWork>();
+    std::unique_ptr<ImageWork> work = std::move(idle.back());
+    idle.pop_back();
+    return work;
+  }
+  void give_back(std::unique_ptr<ImageWork> work) {
+    const std::lock_guard lock(mutex);
+    idle.push_back(std::move(work));
+  }
+  Result<const Sections*> sections() {
+    const std::lock_guard lock(mutex);
+    if (!contour_plan) {
+      Job job = plan.job;
+      job.shard.reset();
+      auto made = plan_of(job, Product::kContours);
+      if (!made) return made.error();
+      contour_plan.emplace(std::move(*made));
+    }
+    return contour_plan->sections.get();
+  }
+};
+
+LayerSource::LayerSource() : state_(std::make_unique<State>()) {}
+LayerSource::LayerSource(LayerSource&&) noexcept = default;
+LayerSource& LayerSource::operator=(LayerSource&&) noexcept = default;
+LayerSource::~LayerSource() = default;
+
+Result<LayerSource> LayerSource::make(const Job& asked) {
+  Job job = asked;
+  job.dry_run = true;  // there is nothing to write into
+  if (Status status = check_job(job); !status) return status.error();
+  auto plan = plan_of(job, Product::kImages);
+  if (!plan) return plan.error();
+  LayerSource source;
+  source.state_->plan = std::move(*plan);
+  source.state_->imager.emplace(source.state_->plan);
+  return source;
+}
+
+const Job& LayerSource::job() const { return state_->plan.job; }
+std::array<double, 2> LayerSource::bed_mm() const { return state_->plan.bed.size_mm; }
+const PixelGrid& LayerSource::grid() const { return state_->plan.images->grid; }
+const std::vector<PartSummary>& LayerSource::parts() const { return state_->plan.scene->parts; }
+std::uint32_t LayerSource::layer_count() const { return state_->plan.layer_count; }
+Layer LayerSource::layer(std::uint32_t index) const { return state_->plan.layer(index); }
+
+std::vector<std::string> LayerSource::materials() const {
+  std::vector<std::string> names;
+  for (const JobMaterial& material : state_->plan.images->materials.used) {
+    if (!material.name.empty()) names.push_back(material.name);
+  }
+  return names;
+}
+
+Result<PlannedImages> LayerSource::images(std::uint32_t index) const {
+  std::unique_ptr<ImageWork> work = state_->take();
+  LayerRecord record;
+  ImageNotes notes;
+  const Status status = state_->imager->make(state_->plan.layer(index), *work, record, notes);
+  PlannedImages images{work->runs, {}};  // of their own sizes; the scratch stays warm
+  if (state_->plan.images->materials.several()) images.material = work->materials.image;
+  state_->give_back(std::move(work));
+  if (!status) return status.error();
+  return images;
+}
+
+Result<Contours> LayerSource::contours(std::uint32_t index) const {
+  const auto sections = state_->sections();
+  if (!sections) return sections.error();
+  Sections::Work work;
+  const auto report = (*sections)->slicer().layer(index, work.scratch, work.contours);
+  if (!report) return report.error();
+  return std::move(work.contours.contours);
+}
+
+Result<Part> load_part(const Job& job, const PartRequest& part) { return load::load(part.path, load_options(job, part)); }
+
+Status save_image(const std::string& path, const RunsView& image, double dpi_x, double dpi_y,
+                  const write::ImageFormat& format) {
+  write::Bytes file;
+  if (Status status = format.make_encoder()->encode(image, dpi_x, dpi_y, file); !status) return status;
+  return write::write_file(path, file);
+}
+
+}  // namespace lamina::pipeline
