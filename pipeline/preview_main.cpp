@@ -2,34 +2,29 @@
 #include <fmt/format.h>
 
 #include <charconv>
-#include <csignal>
 #include <iostream>
 #include <iterator>
 
 #include "pipeline/cli/command.h"
 #include "pipeline/cli/console.h"
-#include "pipeline/cli/outputs.h"
-#include "pipeline/show/plot_json.h"
 #include "pipeline/show/sheet.h"
 #include "stages/write/file.h"
 #include "stages/write/picture/plot.h"
+#include "stages/write/plot.h"
 
 namespace lamina::pipeline {
 namespace {
 
 /// lamina-preview --plot: a plot on standard input becomes a PNG on standard output, or the reason why not.
-int draw_plot() {
-  const std::string json{std::istreambuf_iterator<char>(std::cin), {}};
-  const auto end = [](const Error& error) {
-    const Status status = print(error.message);
-    return static_cast<int>(status ? error.fault : status.error().fault);
+Outcome draw_plot(Context& context) {
+  const auto end = [&](std::string_view text, int code) {
+    const Status status = context.print(text);
+    return status ? code : static_cast<int>(status.error().fault);
   };
-  const auto plot = read_plot(json);
-  if (!plot) return end(plot.error());
-  const auto picture = write::picture::plot_png(*plot);
-  if (!picture) return end(picture.error());
-  const Status status = print({reinterpret_cast<const char*>(picture->data()), picture->size()});
-  return status ? 0 : static_cast<int>(status.error().fault);
+  const auto plot = write::read_plot(std::string(std::istreambuf_iterator<char>(std::cin), {}));
+  const auto picture = plot ? write::picture::plot_png(*plot) : plot.error();
+  if (!picture) return end(picture.error().message, static_cast<int>(picture.error().fault));
+  return end({reinterpret_cast<const char*>(picture->data()), picture->size()}, 0);
 }
 
 /// Sets `value` to the number behind a flag, if it is there.
@@ -56,48 +51,39 @@ Result<PreviewRequest> read_request(const Arguments& arguments) {
   if (request.output.empty()) return Error{Fault::kUsage, "-o PNG is missing; name the picture"};
   request.whole_bed = arguments.has("--whole-bed");
   request.swath = arguments.has("--swath");
-  const auto whole = [&](std::string_view flag, std::uint32_t least, std::uint32_t most, std::optional<std::uint32_t>& value) {
-    return read_whole(arguments, flag, least, most, value);
-  };
   for (const Status& status :
-       {whole("--width", 200, 20'000, request.width), whole("--layer", 0, UINT32_MAX, request.layers.layer),
-        whole("--every", 1, UINT32_MAX, request.layers.every), whole("--count", 1, kMostCells, request.layers.count),
-        whole("--step", 0, UINT32_MAX, request.step),
-        arguments.text("--swath") == "middle" ? Status() : whole("--swath", 0, UINT32_MAX, request.swath_number)}) {
+       {read_whole(arguments, "--width", 200, 20'000, request.width),
+        read_whole(arguments, "--layer", 0, UINT32_MAX, request.layers.layer),
+        read_whole(arguments, "--every", 1, UINT32_MAX, request.layers.every),
+        read_whole(arguments, "--count", 1, view::kMostCells, request.layers.count),
+        read_whole(arguments, "--step", 0, UINT32_MAX, request.step),
+        arguments.text("--swath") == "middle" ? Status()
+                                              : read_whole(arguments, "--swath", 0, UINT32_MAX, request.swath_number)}) {
     if (!status) return status.error();
   }
   return request;
 }
 
-int run_preview(const std::vector<std::string>& texts) {
-  if (texts.size() == 1 && texts.front() == "--plot") return draw_plot();
-  const Result<Arguments> arguments = read_arguments(spec_of(preview_command), texts);
-  if (!arguments) return fail(arguments.error());
-  if (arguments->help) {
-    const Status status = print(*arguments->help);
-    return status ? 0 : fail(status.error());
-  }
-  if (Status status = check_outputs("preview", *arguments); !status) return fail(status.error());
-  const auto request = read_request(*arguments);
-  if (!request) return fail(request.error());
+Outcome draw(const Arguments& arguments, Context& context) {
+  const auto request = read_request(arguments);
+  if (!request) return request.error();
   const auto preview = draw_preview(*request);
-  if (!preview) return fail(preview.error());
-  if (const Status status = write::write_file(request->output, preview->bytes); !status) return fail(status.error());
-  if (arguments->has("--quiet")) return 0;
-  for (const std::string& line : preview->said) say(line);
-  return 0;
+  if (!preview) return preview.error();
+  if (Status status = write::write_file(request->output, preview->bytes); !status) return status;
+  if (arguments.has("--quiet")) return {};
+  for (const std::string& line : preview->said) context.say(line);
+  return {};
+}
+
+Outcome run_preview(const std::vector<std::string>& words, Console& console) {
+  if (words.size() == 1 && words.front() == "--plot") return draw_plot(console);
+  Command command = preview_command;
+  command.run = draw;
+  command.reads_itself = false;
+  return run_command(command, words, console);
 }
 
 }  // namespace
 }  // namespace lamina::pipeline
 
-int main(int argc, char** argv) {
-  // A full disk and a closed pipe are reported by the calls that meet them.
-  std::signal(SIGPIPE, SIG_IGN);
-  std::signal(SIGXFSZ, SIG_IGN);
-  try {
-    return lamina::pipeline::run_preview({argv + 1, argv + argc});
-  } catch (const std::exception& exception) {
-    return lamina::pipeline::fail({lamina::Fault::kInternal, exception.what()});
-  }
-}
+int main(int argc, char** argv) { return lamina::pipeline::run_program(argc, argv, lamina::pipeline::run_preview); }

@@ -7,9 +7,10 @@
 #include <filesystem>
 #include <map>
 #include <set>
-#include <span>
 
-#include "pipeline/text/version.h"
+#include "stages/load/load.h"
+#include "stages/text/version.h"
+#include "stages/write/replaceable.h"
 
 namespace lamina::pipeline {
 namespace {
@@ -20,24 +21,6 @@ constexpr std::uint64_t kMebibyte = 1ull << 20;
 
 /// What the batch writes in its directory; .part while they are written.
 constexpr std::array kOwnFiles = {"batch.jsonl", "summary.json", "summary.json.part", "summary.tsv", "summary.tsv.part"};
-
-/// Digests of the files that the jobs of a batch read; many jobs read the same ones.
-class Digests {
- public:
-  const FileDigest* of(const std::string& path) {
-    const auto [found, fresh] = known_.try_emplace(path);
-    std::error_code ignored;
-    if (fresh && fs::is_regular_file(path, ignored)) {
-      if (const Result<FileDigest> digest = digest_file(path)) found->second = *digest;
-    }
-    return found->second ? &*found->second : nullptr;
-  }
-
- private:
-  std::map<std::string, std::optional<FileDigest>> known_;
-};
-
-Hash128 hash_text(const std::string& text) { return hash_bytes(std::as_bytes(std::span(text))); }
 
 /// A path seen from the batch's directory, as it is written; empty if it is not below.
 fs::path below_batch(const fs::path& path, const std::string& directory) {
@@ -93,16 +76,18 @@ class Preparation {
     std::string identity = fmt::format("lamina {}\n{}\n", version(), job.place);
     for (const std::string& word : job.entry.words) identity += fmt::format("{}:{}\n", word.size(), word);
     for (const std::string& input : std::set<std::string>(job.call.inputs.begin(), job.call.inputs.end())) {
-      const FileDigest* digest = digests_.of(input);
-      if (digest == nullptr) continue;
+      const auto [known, fresh] = digests_.try_emplace(input, Error{});
+      if (fresh && write::is_file(input)) known->second = digest_file(input);
+      const Result<FileDigest>& digest = known->second;
+      if (!digest) continue;
       identity += fmt::format("{} {} {}\n", input, digest->bytes, hex(digest->hash));
-      job.need_bytes += part_bytes(input, digest->bytes);
+      job.need_bytes += load::part_bytes(input, digest->bytes);
     }
     job.id = hash_text(identity);
   }
 
   const BatchShare& share_;
-  Digests digests_;
+  std::map<std::string, Result<FileDigest>> digests_;                // many jobs read the same files
   std::set<std::string> names_{kOwnFiles.begin(), kOwnFiles.end()};  // of outputs that are called as their jobs
 };
 
@@ -118,22 +103,23 @@ Status check_apart(const std::vector<BatchJob>& jobs, const std::string& directo
   const fs::path own = fs::weakly_canonical(fs::absolute(directory, ignored), ignored);
   for (const BatchJob& job : jobs) {
     if (job.refused || job.output.empty()) continue;
+    const auto refused = [&](const std::string& why) {
+      return Error{Fault::kUsage, fmt::format("{}: {}", job.entry.source, why)};
+    };
     if (job.relative_output && below_batch(job.output, directory).empty()) {
-      return Error{Fault::kUsage, fmt::format("{}: -o leads out of {}, to {}; an output elsewhere has to be an absolute path",
-                                              job.entry.source, directory, job.output)};
+      return refused(
+          fmt::format("-o leads out of {}, to {}; an output elsewhere has to be an absolute path", directory, job.output));
     }
     fs::path path = fs::weakly_canonical(fs::absolute(job.output, ignored), ignored);
     if (!path.has_filename()) path = path.parent_path();
     if (path == own) {
-      return Error{Fault::kUsage, fmt::format("{}: writes into {} itself, which belongs to the batch; give it a name "
-                                              "below it with -o",
-                                              job.entry.source, directory)};
+      return refused(
+          fmt::format("writes into {} itself, which belongs to the batch; give it a name below it with -o", directory));
     }
     for (const char* name : kOwnFiles) {
       if (!lies_within(path, own / name)) continue;
-      return Error{Fault::kUsage, fmt::format("{}: writes into {}, which belongs to the batch; give it another name with "
-                                              "-o",
-                                              job.entry.source, (fs::path(directory) / name).string())};
+      return refused(fmt::format("writes into {}, which belongs to the batch; give it another name with -o",
+                                 (fs::path(directory) / name).string()));
     }
     outputs.emplace_back(std::move(path), &job);
   }
@@ -151,38 +137,9 @@ Status check_apart(const std::vector<BatchJob>& jobs, const std::string& directo
 
 }  // namespace
 
-std::uint64_t part_bytes(const std::string& path, std::uint64_t file_bytes) {
-  std::string end = path.substr(path.size() - std::min<std::size_t>(path.size(), 4));
-  std::ranges::transform(end, end.begin(), [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  if (end == ".stl" || end == ".obj") return 4 * file_bytes;
-  if (end == ".3mf") return 40 * file_bytes;
-  if (end.ends_with(".gz")) return 16 * file_bytes;
-  return file_bytes;
-}
-
-Result<OutputDigest> digest_output(const std::string& path) {
-  OutputDigest digest;
-  std::vector<fs::path> files;
-  std::error_code error;
-  if (fs::is_regular_file(path, error)) files.emplace_back(path);
-  if (fs::is_directory(path, error)) {
-    for (fs::recursive_directory_iterator at(path, error), end; !error && at != end; at.increment(error)) {
-      std::error_code ignored;
-      if (at->is_regular_file(ignored)) files.push_back(at->path());
-    }
-    if (error) return Error{Fault::kVerification, fmt::format("{}: {}", path, error.message())};
-  }
-  std::ranges::sort(files);
-  std::string text;
-  for (const fs::path& file : files) {
-    const Result<FileDigest> one = digest_file(file.string());
-    if (!one) return one.error();
-    text += fmt::format("{} {} {}\n", file.lexically_relative(path).string(), one->bytes, hex(one->hash));
-    digest.bytes += one->bytes;
-  }
-  digest.files = files.size();
-  digest.hash = hash_text(text);
-  return digest;
+std::string_view outcome_name(BatchOutcome outcome) {
+  constexpr std::string_view kNames[] = {"done", "kept", "failed", "time limit", "stopped", "not run"};
+  return kNames[static_cast<std::size_t>(outcome)];
 }
 
 Result<std::vector<BatchJob>> prepare_batch(std::vector<BatchEntry> entries, const BatchShare& share, const ReadCall& read) {
@@ -190,6 +147,7 @@ Result<std::vector<BatchJob>> prepare_batch(std::vector<BatchEntry> entries, con
   std::vector<BatchJob> jobs;
   for (BatchEntry& entry : entries) {
     BatchJob& job = jobs.emplace_back();
+    job.number = static_cast<std::uint32_t>(jobs.size());
     job.entry = std::move(entry);
     preparation.prepare(job, read);
   }

@@ -10,9 +10,9 @@
 
 #include "pipeline/batch/list.h"
 #include "pipeline/plan/progress.h"
-#include "pipeline/text/json.h"
 #include "stages/data/hash.h"
 #include "stages/data/status.h"
+#include "stages/text/json.h"
 
 namespace lamina::pipeline {
 
@@ -23,12 +23,28 @@ struct CallSettings {
   enum class Earlier { kNone, kContinue, kReplace } earlier = Earlier::kNone;  // what an earlier run has left
 };
 
-/// How a command line ended.
-struct CallResult {
-  int code = 0;
-  std::string reason;        // one line; "" if the code is 0
-  Json value;                // what the command gives; null if nothing
-  bool found_whole = false;  // nothing was planned: all layers of the job were there already
+enum class BatchOutcome {
+  kDone,       // ended with exit code 0
+  kKept,       // done before, and its output is still what it was
+  kFailed,     // ended with another exit code
+  kTimeLimit,  // stopped because it took too long
+  kStopped,    // stopped because the batch was
+  kNotRun      // its turn never came
+};
+
+std::string_view outcome_name(BatchOutcome outcome);
+
+struct BatchResult {
+  BatchOutcome outcome = BatchOutcome::kNotRun;
+  int code = 0;        // of the command; 3 beyond the time limit
+  std::string reason;  // one line, of what is not done
+  Json value;          // what the command gave; null if nothing
+  double seconds = 0;
+  TreeDigest output;
+  bool recognized = false;  // kept although no record knew of it: its directory holds the finished job
+
+  /// Whether it is the job's own fault that it is not done: not that of whoever stopped the batch.
+  bool failed() const { return outcome == BatchOutcome::kFailed || outcome == BatchOutcome::kTimeLimit; }
 };
 
 /// A command line as a batch sees it.
@@ -40,15 +56,17 @@ struct Call {
   bool can_continue = false, can_replace = false;  // what an earlier run has left
   std::optional<std::uint64_t> layer_bytes;        // budget that it names; 0 if it takes one and names none
   std::vector<std::string> inputs;                 // texts of the command line that may name files it reads
-  /// Runs it, from any thread. Progress comes from one thread at a time.
-  std::function<CallResult(const CallSettings&, const ProgressCallback&, const std::atomic<bool>& cancel)> run;
+  /// Runs it, from any thread. Progress comes from one thread at a time. returns  code, reason and value, and whether all
+  /// layers of the job were there already; the queue tells the rest
+  std::function<BatchResult(const CallSettings&, const ProgressCallback&, const std::atomic<bool>& cancel)> run;
 };
 
 /// Reads a command line, of one word or more. errors  kUsage: it is wrong in itself
 using ReadCall = std::function<Result<Call>(const std::vector<std::string>& words)>;
 
 struct BatchJob {
-  BatchEntry entry;  // its name is the output's, and unique, if it does not name one itself
+  std::uint32_t number = 0;  // from 1
+  BatchEntry entry;          // its name is the output's, and unique, if it does not name one itself
   Call call;
   std::string output;             // file or directory that it writes; empty if its result is what it gives
   std::string place;              // the output for reports: below the batch's directory, else as it was given
@@ -69,17 +87,5 @@ struct BatchShare {
 ///         batch keeps its own files; a relative output leads out of the batch's directory
 /// cost    reads every file that a job names once, to tell later whether it has changed
 Result<std::vector<BatchJob>> prepare_batch(std::vector<BatchEntry> entries, const BatchShare& share, const ReadCall& read);
-
-/// Memory that a part file may take while it is loaded and planned, from its size and format.
-std::uint64_t part_bytes(const std::string& path, std::uint64_t file_bytes);
-
-struct OutputDigest {
-  std::uint64_t files = 0, bytes = 0;
-  Hash128 hash;  // of names, sizes and contents
-};
-
-/// The regular files at or below `path`, in the order of their names; no file if there is none.
-/// errors  kVerification if one cannot be read
-Result<OutputDigest> digest_output(const std::string& path);
 
 }  // namespace lamina::pipeline

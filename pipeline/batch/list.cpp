@@ -7,30 +7,24 @@
 #include <cstring>
 #include <filesystem>
 #include <fstream>
-#include <sstream>
+
+#include "stages/load/load.h"
+#include "stages/text/readable.h"
+#include "stages/text/shell_words.h"
 
 namespace lamina::pipeline {
 namespace {
 
 namespace fs = std::filesystem;
 
-std::string lower(std::string text) {
-  std::ranges::transform(text, text.begin(), [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return text;
-}
+bool is_job_file(const fs::path& path) { return lower_case(path.extension().string()) == ".toml"; }
 
-bool is_job_file(const fs::path& path) { return lower(path.extension().string()) == ".toml"; }
-
-bool is_part(const fs::path& path) {
-  const std::string extension = lower(path.extension().string());
-  if (extension == ".gz") return is_part(path.stem());
-  return extension == ".stl" || extension == ".obj" || extension == ".3mf";
-}
+bool is_part(const fs::path& path) { return load::is_part_name(path.string()); }
 
 /// The file's name without what says its format; folders become part of it.
 std::string name_of(const fs::path& path) {
   fs::path name = path;
-  if (lower(name.extension().string()) == ".gz") name.replace_extension();
+  if (lower_case(name.extension().string()) == ".gz") name.replace_extension();
   name.replace_extension();
   std::string text = name.lexically_normal().string();
   std::ranges::replace(text, '/', '_');
@@ -100,44 +94,6 @@ Status read_list(const std::string& path, std::vector<BatchEntry>& entries) {
 }
 
 }  // namespace
-
-Result<std::vector<std::string>> split_words(std::string_view line) {
-  std::vector<std::string> words;
-  std::string word;
-  bool within = false;
-  char quote = 0;
-  for (std::size_t i = 0; i < line.size(); ++i) {
-    const char c = line[i];
-    const bool blank = c == ' ' || c == '\t' || c == '\r' || c == '\n';
-    if (quote != 0) {
-      if (c == quote) {
-        quote = 0;
-      } else if (c == '\\' && quote == '"' && i + 1 < line.size()) {
-        word += line[++i];
-      } else {
-        word += c;
-      }
-    } else if (blank) {
-      if (within) words.push_back(std::move(word));
-      word.clear();
-      within = false;
-    } else if (c == '#' && !within) {
-      break;
-    } else {
-      within = true;
-      if (c == '\'' || c == '"') {
-        quote = c;
-      } else if (c == '\\' && i + 1 < line.size()) {
-        word += line[++i];
-      } else {
-        word += c;
-      }
-    }
-  }
-  if (quote != 0) return Error{Fault::kUsage, fmt::format("a {} is not closed", quote)};
-  if (within) words.push_back(std::move(word));
-  return words;
-}
 
 Result<std::vector<BatchEntry>> read_batch(const std::vector<std::string>& operands, const std::vector<std::string>& with) {
   std::vector<BatchEntry> entries;

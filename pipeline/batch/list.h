@@ -16,11 +16,6 @@ struct BatchEntry {
   std::vector<std::string> words;  // command and arguments: "jet", "bracket.stl", "--dpi", "600"
 };
 
-/// The words of a line as a shell reads them: split at blanks; '...' and "..." hold blanks, a backslash takes the next
-/// character as it is (within '...' too it is an ordinary character), # begins a comment where a word could begin.
-/// Nothing is expanded. errors  kUsage: a quote that is not closed
-Result<std::vector<std::string>> split_words(std::string_view line);
-
 /// The jobs of all operands, in order:
 ///   NAME.toml                         a job file: jet --job NAME.toml
 ///   NAME.stl .obj .3mf (.gz)          a part: `with` and the file

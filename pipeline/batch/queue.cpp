@@ -6,13 +6,13 @@
 #include <algorithm>
 #include <chrono>
 #include <condition_variable>
+#include <deque>
 #include <filesystem>
 #include <memory>
 #include <mutex>
 #include <thread>
 
-#include "pipeline/batch/summary.h"
-#include "pipeline/text/json_text.h"
+#include "stages/text/readable.h"
 
 namespace lamina::pipeline {
 namespace {
@@ -43,9 +43,7 @@ struct Slot {
 class Queue : public std::enable_shared_from_this<Queue> {
  public:
   Queue(std::vector<BatchJob> jobs, BatchRecord record, const BatchOptions& options)
-      : jobs_(std::move(jobs)), record_(std::move(record)), options_(options) {
-    for (std::size_t i = 0; i < jobs_.size(); ++i) slots_.push_back(std::make_unique<Slot>());
-  }
+      : jobs_(std::move(jobs)), slots_(jobs_.size()), record_(std::move(record)), options_(options) {}
 
   Result<BatchSummary> run(const BatchWatcher& watcher, const std::atomic<bool>& interrupt) {
     const auto start = Clock::now();
@@ -62,7 +60,7 @@ class Queue : public std::enable_shared_from_this<Queue> {
       changed_.wait_for(lock, milliseconds(100));
     }
     report(watcher, lock);
-    for (const auto& slot : slots_) summary_.results.push_back(slot->result);
+    for (const Slot& slot : slots_) summary_.results.push_back(slot.result);
     summary_.seconds = seconds_since(start);
     // Workers that wait see that nothing is left; they are gone before what they use is, which they hold themselves.
     stopped_ = true;
@@ -81,7 +79,7 @@ class Queue : public std::enable_shared_from_this<Queue> {
 
   void stop_all() {
     stopped_ = true;
-    for (const auto& slot : slots_) tell_to_stop(*slot);
+    for (Slot& slot : slots_) tell_to_stop(slot);
     changed_.notify_all();
   }
 
@@ -93,7 +91,7 @@ class Queue : public std::enable_shared_from_this<Queue> {
 
   void look_at_clocks() {
     for (std::size_t i = 0; i < jobs_.size(); ++i) {
-      Slot& slot = *slots_[i];
+      Slot& slot = slots_[i];
       if (slot.state != Slot::State::kRunning) continue;
       if (options_.time_limit_seconds > 0 && !slot.cancel && seconds_since(slot.begun) > options_.time_limit_seconds) {
         slot.overdue = true;
@@ -102,11 +100,10 @@ class Queue : public std::enable_shared_from_this<Queue> {
       if (!slot.cancel || Clock::now() - slot.told_to_stop < kGrace) continue;
       slot.abandoned = summary_.abandoned = true;
       BatchResult result;
-      result.outcome = slot.overdue ? BatchOutcome::kTimeLimit : BatchOutcome::kStopped;
-      result.code = static_cast<int>(slot.overdue ? kOverdue : Fault::kInterrupted);
+      result.code = static_cast<int>(Fault::kInterrupted);
       result.reason = "did not stop when it was told to, and was left behind";
-      if (slot.overdue) result.reason = fmt::format("{}, {}", overdue_reason(), result.reason);
       result.seconds = seconds_since(slot.begun);
+      stopped_by(slot, result, ", " + result.reason);
       end(i, std::move(result));
       if (!stopped_) start_worker();
     }
@@ -118,10 +115,10 @@ class Queue : public std::enable_shared_from_this<Queue> {
     state.total = static_cast<std::uint32_t>(jobs_.size());
     std::vector<std::size_t> fresh;
     for (std::size_t i = 0; i < jobs_.size(); ++i) {
-      const Slot& slot = *slots_[i];
-      const auto number = static_cast<std::uint32_t>(i + 1);
-      if (slot.state == Slot::State::kRunning)
-        state.running.push_back({number, jobs_[i].entry.name, slot.layers_done, slot.layers});
+      const Slot& slot = slots_[i];
+      if (slot.state == Slot::State::kRunning) {
+        state.running.push_back({jobs_[i].entry.name, slot.layers_done, slot.layers});
+      }
       if (slot.state != Slot::State::kEnded) continue;
       ++state.ended;
       if (slot.result.outcome != BatchOutcome::kDone && slot.result.outcome != BatchOutcome::kKept) ++state.failed;
@@ -130,8 +127,8 @@ class Queue : public std::enable_shared_from_this<Queue> {
     lock.unlock();
     // Ended jobs are not touched any more.
     for (const std::size_t i : fresh) {
-      slots_[i]->reported = true;
-      if (watcher.ended) watcher.ended(jobs_[i], static_cast<std::uint32_t>(i + 1), slots_[i]->result, state);
+      slots_[i].reported = true;
+      if (watcher.ended) watcher.ended(jobs_[i], slots_[i].result, state);
     }
     if (watcher.progress) watcher.progress(state);
     lock.lock();
@@ -147,7 +144,7 @@ class Queue : public std::enable_shared_from_this<Queue> {
         continue;
       }
       const std::size_t i = next_++;
-      Slot& slot = *slots_[i];
+      Slot& slot = slots_[i];
       slot.state = Slot::State::kRunning;
       slot.begun = Clock::now();
       ++running_;
@@ -168,14 +165,14 @@ class Queue : public std::enable_shared_from_this<Queue> {
 
   /// With the lock.
   void end(std::size_t i, BatchResult result) {
-    Slot& slot = *slots_[i];
+    Slot& slot = slots_[i];
     slot.state = Slot::State::kEnded;
     --running_;
     need_ -= jobs_[i].need_bytes;
     const bool news = result.outcome != BatchOutcome::kStopped && (result.outcome != BatchOutcome::kKept || result.recognized);
     slot.result = std::move(result);
-    if (news) note(record_.ended(jobs_[i], static_cast<std::uint32_t>(i + 1), slot.result));
-    if (options_.fail_fast && has_failed(slot.result)) stop_all();
+    if (news) note(record_.ended(jobs_[i], slot.result));
+    if (options_.fail_fast && slot.result.failed()) stop_all();
     changed_.notify_all();
   }
 
@@ -186,20 +183,14 @@ class Queue : public std::enable_shared_from_this<Queue> {
   /// Without the lock.
   BatchResult run_job(std::size_t i) {
     const BatchJob& job = jobs_[i];
-    Slot& slot = *slots_[i];
-    BatchResult result;
-    if (job.refused) {
-      result.outcome = BatchOutcome::kFailed;
-      result.code = static_cast<int>(job.refused->fault);
-      result.reason = one_line(job.refused->message);
-      return result;
-    }
+    Slot& slot = slots_[i];
+    if (job.refused) return failed(*job.refused);
     const BatchRecord::Earlier* earlier = options_.resume ? record_.earlier(job) : nullptr;
     if (earlier != nullptr && earlier->ended && earlier->begun == job.id) {
-      Result<OutputDigest> now = job.output.empty() ? OutputDigest() : digest_output(job.output);
-      const OutputDigest& then = earlier->result.output;
+      const Result<TreeDigest> now = job.output.empty() ? TreeDigest() : digest_tree(job.output);
+      const TreeDigest& then = earlier->result.output;
       if (job.output.empty() || (now && now->files == then.files && now->hash == then.hash)) {
-        result = earlier->result;
+        BatchResult result = earlier->result;
         result.outcome = BatchOutcome::kKept;
         return result;
       }
@@ -207,18 +198,14 @@ class Queue : public std::enable_shared_from_this<Queue> {
     const bool foreign = !options_.overwrite && (earlier == nullptr || earlier->foreign) && holds_something(job.output);
     {
       const std::lock_guard lock(mutex_);
-      note(record_.begun(job, static_cast<std::uint32_t>(i + 1), foreign));
+      note(record_.begun(job, foreign));
     }
-    result = run_call(job, slot, {job.output, job.layer_bytes, earlier_of(job, earlier, foreign)});
+    BatchResult result = run_call(job, slot, {job.output, job.layer_bytes, earlier_of(job, earlier, foreign)});
     result.recognized = result.recognized && foreign && result.outcome == BatchOutcome::kDone;
     if (result.outcome == BatchOutcome::kDone && !job.output.empty()) {
-      if (Result<OutputDigest> digest = digest_output(job.output)) {
-        result.output = *digest;
-      } else {
-        result.outcome = BatchOutcome::kFailed;
-        result.code = static_cast<int>(Fault::kOutput);
-        result.reason = digest.error().message;
-      }
+      const Result<TreeDigest> digest = digest_tree(job.output);
+      if (!digest) return failed({Fault::kOutput, digest.error().message}, std::move(result));
+      result.output = *digest;
     }
     if (result.outcome == BatchOutcome::kDone && result.recognized) result.outcome = BatchOutcome::kKept;
     return result;
@@ -233,8 +220,19 @@ class Queue : public std::enable_shared_from_this<Queue> {
     return CallSettings::Earlier::kNone;
   }
 
-  std::string overdue_reason() const {
-    return fmt::format("took longer than its time limit of {} s", options_.time_limit_seconds);
+  static BatchResult failed(const Error& error, BatchResult result = {}) {
+    result.outcome = BatchOutcome::kFailed;
+    result.code = static_cast<int>(error.fault);
+    result.reason = one_line(error.message);
+    return result;
+  }
+
+  /// A job was stopped: by whoever stopped the batch, or because it took too long, which is told before `rest`.
+  void stopped_by(const Slot& slot, BatchResult& result, const std::string& rest = {}) const {
+    result.outcome = slot.overdue ? BatchOutcome::kTimeLimit : BatchOutcome::kStopped;
+    if (!slot.overdue) return;
+    result.code = static_cast<int>(kOverdue);
+    result.reason = fmt::format("took longer than its time limit of {} s{}", options_.time_limit_seconds, rest);
   }
 
   BatchResult run_call(const BatchJob& job, Slot& slot, const CallSettings& settings) const {
@@ -243,27 +241,15 @@ class Queue : public std::enable_shared_from_this<Queue> {
       slot.layers_done.store(event.done, std::memory_order_relaxed);
       slot.layers.store(event.total, std::memory_order_relaxed);
     };
-    CallResult ended = job.call.run(settings, progress, slot.cancel);
-    BatchResult result;
+    BatchResult result = job.call.run(settings, progress, slot.cancel);
     result.seconds = seconds_since(start);
-    result.code = ended.code;
-    result.reason = std::move(ended.reason);
-    result.value = std::move(ended.value);
-    result.recognized = ended.found_whole;
     result.outcome = result.code == 0 ? BatchOutcome::kDone : BatchOutcome::kFailed;
-    if (result.code == static_cast<int>(Fault::kInterrupted)) {
-      result.outcome = BatchOutcome::kStopped;
-      if (slot.overdue) {
-        result.outcome = BatchOutcome::kTimeLimit;
-        result.code = static_cast<int>(kOverdue);
-        result.reason = overdue_reason();
-      }
-    }
+    if (result.code == static_cast<int>(Fault::kInterrupted)) stopped_by(slot, result);
     return result;
   }
 
   std::vector<BatchJob> jobs_;
-  std::vector<std::unique_ptr<Slot>> slots_;
+  std::deque<Slot> slots_;
   BatchRecord record_;
   BatchOptions options_;
 

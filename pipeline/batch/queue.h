@@ -29,7 +29,6 @@ struct BatchOptions {
 
 /// A running job, for whoever watches.
 struct RunningJob {
-  std::uint32_t number = 0;  // from 1
   std::string name;
   std::uint32_t layers_done = 0, layers = 0;  // 0 of 0 before the first layer
 };
@@ -43,7 +42,7 @@ struct BatchWatcher {
   /// Several times a second.
   std::function<void(const BatchState&)> progress;
   /// Once for every job, as it ends. Both are called by the thread that called run_batch.
-  std::function<void(const BatchJob&, std::uint32_t number, const BatchResult&, const BatchState&)> ended;
+  std::function<void(const BatchJob&, const BatchResult&, const BatchState&)> ended;
 };
 
 struct BatchSummary {

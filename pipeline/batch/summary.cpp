@@ -6,9 +6,9 @@
 #include <cmath>
 
 #include "pipeline/plan/progress.h"
-#include "pipeline/text/json_text.h"
-#include "pipeline/text/readable.h"
-#include "pipeline/text/version.h"
+#include "stages/text/json_text.h"
+#include "stages/text/readable.h"
+#include "stages/text/version.h"
 
 namespace lamina::pipeline {
 namespace {
@@ -19,20 +19,21 @@ std::string cell(std::string_view text) {
   return line;
 }
 
-}  // namespace
+/// The numbers of the whole batch.
+struct BatchTotals {
+  std::uint32_t jobs = 0, done = 0, kept = 0, failed = 0, stopped = 0, not_run = 0;  // failed: time limit too
+  std::uint64_t files = 0, bytes = 0;
+  double job_seconds = 0;  // of all jobs that ran
+};
 
 BatchTotals totals_of(const std::vector<BatchResult>& results) {
-  BatchTotals totals;
+  using Totals = BatchTotals;
+  constexpr std::uint32_t Totals::*kCounts[] = {&Totals::done,   &Totals::kept,    &Totals::failed,
+                                                &Totals::failed, &Totals::stopped, &Totals::not_run};
+  Totals totals;
   totals.jobs = static_cast<std::uint32_t>(results.size());
   for (const BatchResult& result : results) {
-    switch (result.outcome) {
-      case BatchOutcome::kDone: ++totals.done; break;
-      case BatchOutcome::kKept: ++totals.kept; break;
-      case BatchOutcome::kFailed:
-      case BatchOutcome::kTimeLimit: ++totals.failed; break;
-      case BatchOutcome::kStopped: ++totals.stopped; break;
-      case BatchOutcome::kNotRun: ++totals.not_run; break;
-    }
+    ++(totals.*kCounts[static_cast<std::size_t>(result.outcome)]);
     totals.files += result.output.files;
     totals.bytes += result.output.bytes;
     if (result.outcome != BatchOutcome::kKept) totals.job_seconds += result.seconds;
@@ -40,16 +41,14 @@ BatchTotals totals_of(const std::vector<BatchResult>& results) {
   return totals;
 }
 
+}  // namespace
+
 int batch_code(const BatchSummary& summary) {
   if (summary.interrupted) return static_cast<int>(Fault::kInterrupted);
-  const auto failed = std::ranges::find_if(summary.results, has_failed);
+  const auto failed = std::ranges::find_if(summary.results, &BatchResult::failed);
   if (failed != summary.results.end()) return failed->code;
   const auto ended = [](const BatchResult& result) { return result.code == 0 && result.outcome != BatchOutcome::kNotRun; };
   return std::ranges::all_of(summary.results, ended) ? 0 : static_cast<int>(Fault::kInterrupted);
-}
-
-bool has_failed(const BatchResult& result) {
-  return result.outcome == BatchOutcome::kFailed || result.outcome == BatchOutcome::kTimeLimit;
 }
 
 std::string failure_line(const BatchJob& job, const BatchResult& result) {
@@ -81,7 +80,7 @@ Json batch_json(const std::vector<BatchJob>& jobs, const BatchSummary& summary, 
                {"peak_resident_bytes", peak_resident_bytes()}};
   Json& results = json["jobs"] = Json::array();
   for (std::size_t i = 0; i < jobs.size(); ++i) {
-    results.push_back(result_json(jobs[i], static_cast<std::uint32_t>(i + 1), summary.results[i]));
+    results.push_back(result_json(jobs[i], summary.results[i]));
   }
   return json;
 }
@@ -90,7 +89,7 @@ std::string batch_table(const std::vector<BatchJob>& jobs, const BatchSummary& s
   std::string text = "job\toutcome\tcode\tseconds\tfiles\tbytes\toutput\tsource\treason\n";
   for (std::size_t i = 0; i < jobs.size(); ++i) {
     const BatchResult& result = summary.results[i];
-    text += fmt::format("{}\t{}\t{}\t{:.3f}\t{}\t{}\t{}\t{}\t{}\n", i + 1, outcome_name(result.outcome), result.code,
+    text += fmt::format("{}\t{}\t{}\t{:.3f}\t{}\t{}\t{}\t{}\t{}\n", jobs[i].number, outcome_name(result.outcome), result.code,
                         result.seconds, result.output.files, result.output.bytes, cell(jobs[i].place),
                         cell(jobs[i].entry.source), cell(result.reason));
   }
@@ -130,7 +129,7 @@ std::string batch_text(const std::vector<BatchJob>& jobs, const BatchSummary& su
   line("jobs", counts);
   for (std::size_t i = 0; i < jobs.size(); ++i) {
     const BatchResult& result = summary.results[i];
-    if (has_failed(result)) line(outcome_name(result.outcome), failure_line(jobs[i], result));
+    if (result.failed()) line(outcome_name(result.outcome), failure_line(jobs[i], result));
   }
   line("files",
        fmt::format("{} of {} below {}", readable_count(totals.files), readable_bytes(totals.bytes), options.directory));

@@ -5,17 +5,9 @@
 #include <vector>
 
 #include "pipeline/batch/queue.h"
-#include "pipeline/text/json.h"
+#include "stages/text/json.h"
 
 namespace lamina::pipeline {
-
-/// The numbers of the whole batch.
-struct BatchTotals {
-  std::uint32_t jobs = 0, done = 0, kept = 0, failed = 0, stopped = 0, not_run = 0;  // failed: time limit too
-  std::uint64_t files = 0, bytes = 0;
-  double job_seconds = 0;  // of all jobs that ran
-};
-BatchTotals totals_of(const std::vector<BatchResult>& results);
 
 /// The exit code: 0 if every job is done or kept, 130 if the batch was interrupted, else that of the first job of the
 /// list that failed.
@@ -29,9 +21,6 @@ std::string batch_table(const std::vector<BatchJob>& jobs, const BatchSummary& s
 
 /// The line of a job as it ends: "[3/200] done     bracket: 51 files, 1.2 MB, 0.35 s".
 std::string job_line(const BatchJob& job, const BatchResult& result, std::uint32_t ended, std::uint32_t total);
-
-/// Whether it is the job's own fault that it is not done: not that of whoever stopped the batch.
-bool has_failed(const BatchResult& result);
 
 /// Where a job that failed was asked for and why it failed: "jobs.txt:3: part.stl: no such file".
 std::string failure_line(const BatchJob& job, const BatchResult& result);

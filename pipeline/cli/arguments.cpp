@@ -8,9 +8,10 @@
 #include <deque>
 
 #include "pipeline/cli/arguments.h"
-#include "pipeline/text/json_text.h"
-#include "pipeline/text/names.h"
-#include "pipeline/text/number_text.h"
+#include "stages/text/json_text.h"
+#include "stages/text/names.h"
+#include "stages/text/number_text.h"
+#include "stages/text/readable.h"
 
 namespace lamina::pipeline {
 
@@ -19,6 +20,11 @@ const OptionSpec* CommandSpec::find(std::string_view flag) const {
     if (const auto flags = split(option.flag, ","); std::ranges::find(flags, flag) != flags.end()) return &option;
   }
   return nullptr;
+}
+
+Status at_option(std::string_view flag, const std::string& wrong) {
+  if (wrong.empty()) return {};
+  return Error{Fault::kUsage, fmt::format("{}: {}", flag.substr(flag.rfind(',') + 1), wrong)};
 }
 
 bool Arguments::has(std::string_view flag) const {

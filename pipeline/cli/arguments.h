@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "stages/data/status.h"
+#include "stages/text/value.h"
 
 namespace lamina::pipeline {
 
@@ -32,6 +33,10 @@ struct CommandSpec {
   const OptionSpec* find(std::string_view flag) const;
 };
 
+/// What a reader (value.h, number_text.h) says of an option's text, behind the option's name; "" is no error.
+/// errors  kUsage
+Status at_option(std::string_view flag, const std::string& wrong);
+
 /// What stands on the command line, as text.
 struct Arguments {
   std::vector<std::string> operands;
@@ -42,6 +47,16 @@ struct Arguments {
   bool has(std::string_view flag) const;
   std::string text(std::string_view flag) const;  // last one given, or ""
   std::vector<std::string> all(std::string_view flag) const;
+
+  /// Sets a value by the text of an option, if it is there. errors  kUsage: "--jobs: ...", outside of the limits or no value
+  template <class T>
+  Status read(std::string_view flag, const Limits& limits, T& value) const {
+    return has(flag) ? at_option(flag, read_value(text(flag), limits, value)) : Status();
+  }
+  template <class T>
+  Status read(std::string_view flag, std::string (*reader)(std::string_view, T&), T& value) const {
+    return has(flag) ? at_option(flag, reader(text(flag), value)) : Status();
+  }
 };
 
 /// Reads the arguments behind the command's name. errors  kUsage: unknown option (and which one was probably meant),

@@ -1,5 +1,6 @@
 #include "pipeline/cli/command.h"
-#include "pipeline/text/version.h"
+#include "stages/text/readable.h"
+#include "stages/text/version.h"
 
 #include <fmt/format.h>
 #include <malloc.h>
@@ -11,8 +12,8 @@
 
 #include "pipeline/cli/console.h"
 #include "pipeline/cli/outputs.h"
-#include "pipeline/text/json_text.h"
-#include "pipeline/text/names.h"
+#include "stages/text/json_text.h"
+#include "stages/text/names.h"
 
 namespace lamina::pipeline {
 namespace {
@@ -36,30 +37,6 @@ std::string program_help() {
       "Exit codes: 0 done, 1 internal error, 2 wrong option or job, 3 bad part file, 4 output could not be written,\n"
       "5 verification failed, 130 interrupted.\n";
   return text;
-}
-
-int run_command(const std::vector<std::string>& words) {
-  if (words.empty()) {
-    say_text(program_help());
-    return static_cast<int>(Fault::kUsage);
-  }
-  const std::string& name = words.front();
-  Console console;
-  const auto end = [&](const Outcome& outcome) { return outcome.error ? console.complain(*outcome.error) : outcome.code; };
-  if (name == "-h" || name == "--help" || name == "help") return end(console.print(program_help()));
-  if (name == "--version" || name == "version") return end(console.print(fmt::format("lamina {}\n", version())));
-  const Command* command = find_command(name);
-  if (command == nullptr) return end(Error{Fault::kUsage, unknown_command(name)});
-  Arguments arguments;
-  arguments.given.assign(words.begin() + 1, words.end());
-  if (!command->reads_itself) {
-    Result<Arguments> read = read_arguments(spec_of(*command), arguments.given);
-    if (!read) return end(read.error());
-    if (read->help) return end(console.print(*read->help));
-    arguments = std::move(*read);
-  }
-  console.quiet = arguments.has("--quiet");
-  return end(run(*command, arguments, console));
 }
 
 /// What is freed shall go back to the system: left alone, glibc keeps up to 64 MiB after the first large buffer is freed,
@@ -107,14 +84,42 @@ Outcome run(const Command& command, const Arguments& arguments, Context& context
   }
 }
 
-int run_program(int argument_count, char** arguments) {
+Outcome run_command(const Command& command, const std::vector<std::string>& words, Console& console) {
+  Arguments arguments;
+  arguments.given = words;
+  if (!command.reads_itself) {
+    Result<Arguments> read = read_arguments(spec_of(command), words);
+    if (!read) return read.error();
+    if (read->help) return console.print(*read->help);
+    arguments = std::move(*read);
+  }
+  console.quiet = arguments.has("--quiet");
+  return run(command, arguments, console);
+}
+
+Outcome run_lamina(const std::vector<std::string>& words, Console& console) {
   bound_retained_memory();
+  if (words.empty()) {
+    console.say_text(program_help());
+    return static_cast<int>(Fault::kUsage);
+  }
+  const std::string& name = words.front();
+  if (name == "-h" || name == "--help" || name == "help") return console.print(program_help());
+  if (name == "--version" || name == "version") return console.print(fmt::format("lamina {}\n", version()));
+  const Command* command = find_command(name);
+  if (command == nullptr) return Error{Fault::kUsage, unknown_command(name)};
+  return run_command(*command, {words.begin() + 1, words.end()}, console);
+}
+
+int run_program(int argument_count, char** arguments, Program program) {
   std::signal(SIGPIPE, SIG_IGN);  // a closed reader is an error of write(), not the end
   std::signal(SIGXFSZ, SIG_IGN);  // and so is a limit on file sizes
+  Console console;
   try {
-    return run_command({arguments + std::min(argument_count, 1), arguments + argument_count});
+    const Outcome outcome = program({arguments + std::min(argument_count, 1), arguments + argument_count}, console);
+    return outcome.error ? console.complain(*outcome.error) : outcome.code;
   } catch (const std::exception& error) {  // reading the arguments has run out of memory
-    return fail({Fault::kInternal, fmt::format("internal error: {}", error.what())});
+    return console.complain({Fault::kInternal, fmt::format("internal error: {}", error.what())});
   }
 }
 

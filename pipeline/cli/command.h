@@ -80,10 +80,20 @@ std::string unknown_command(std::string_view name);
 /// Runs a command; exceptions become errors.
 Outcome run(const Command& command, const Arguments& arguments, Context& context);
 
-/// Runs the command that the arguments name and returns the exit code; errors are one line on stderr.
-int run_program(int argument_count, char** arguments);
+// --- programs
+class Console;
+using Program = Outcome (*)(const std::vector<std::string>& words, Console&);
 
-// --- one file each, in commands/
+/// Runs a program on the words behind its name. returns  the exit code; errors are one line on stderr
+int run_program(int argument_count, char** arguments, Program program);
+
+/// The program `lamina`: the command that the first word names.
+Outcome run_lamina(const std::vector<std::string>& words, Console& console);
+
+/// Reads words as the arguments of a command and runs it.
+Outcome run_command(const Command& command, const std::vector<std::string>& words, Console& console);
+
+// --- one file each, in commands/; plan.cpp has those that plan a job, manual.cpp completion_command too
 extern const Command jet_command, slice_command, heights_command, extrude_command, info_command, verify_command,
     calibrate_command, permeability_command, merge_command, machines_command, preview_command, report_command, batch_command,
     completion_command, manual_command;

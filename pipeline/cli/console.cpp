@@ -1,16 +1,15 @@
 #include "pipeline/cli/console.h"
 
 #include <fmt/format.h>
-#include <sys/ioctl.h>
 #include <unistd.h>
 
-#include <algorithm>
 #include <cerrno>
+#include <csignal>
 #include <cstring>
 
-#include "pipeline/cli/signals.h"
-#include "pipeline/text/json.h"
-#include "pipeline/text/json_text.h"
+#include "stages/text/json.h"
+#include "stages/text/json_text.h"
+#include "stages/text/terminal.h"
 #include "stages/write/file.h"
 
 namespace lamina::pipeline {
@@ -19,50 +18,66 @@ namespace {
 // 0 or the reason.
 int write_all(int file, std::string_view text) { return write::write_all(file, std::as_bytes(std::span(text))); }
 
+std::atomic<bool> interrupted{false}, keeping{false};
+static_assert(std::atomic<bool>::is_always_lock_free);  // a signal handler may touch nothing else
+
+void on_signal(int) {
+  if (!keeping) {
+    constexpr std::string_view kLine = "lamina: interrupted before the first layer\n";
+    if (::write(STDERR_FILENO, kLine.data(), kLine.size()) < 0) ::_exit(130);
+  }
+  if (interrupted.exchange(true) || !keeping) ::_exit(130);
+}
+
+/// From now on the first SIGINT, SIGTERM or SIGHUP sets the flag that is returned; the next one ends the program with 130.
+/// As long as nothing would be lost the first one ends it: reading a large part may take long, and no library that reads
+/// it looks at the flag. SIGHUP stays ignored if it is, as under nohup.
+const std::atomic<bool>& watch_for_signals() {
+  struct sigaction action {
+  }, before{};
+  action.sa_handler = on_signal;
+  action.sa_flags = SA_RESTART;
+  sigemptyset(&action.sa_mask);
+  sigaction(SIGINT, &action, nullptr);
+  sigaction(SIGTERM, &action, nullptr);
+  sigaction(SIGHUP, nullptr, &before);
+  if (before.sa_handler != SIG_IGN) sigaction(SIGHUP, &action, nullptr);
+  return interrupted;
+}
+
 }  // namespace
 
-void say(std::string_view line) { say_text(one_line(line) + "\n"); }
+void keep_on_signals() { keeping = true; }
 
-void say_text(std::string_view text) { write_all(STDERR_FILENO, text); }
+Console::~Console() { Console::say_text({}); }
 
-int fail(const Error& error) {
+void Console::say_text(std::string_view text) {
+  if (progress_) write_all(STDERR_FILENO, progress_->clear());
+  write_all(STDERR_FILENO, text);
+}
+
+int Console::complain(const Error& error) {
   say("lamina: " + error.message);
   return static_cast<int>(error.fault);
 }
 
-Status print(std::string_view text) {
+Status Console::print(std::string_view text) {
   const int reason = write_all(STDOUT_FILENO, text);
   if (reason == 0 || reason == EPIPE) return {};
   return Error{Fault::kOutput, fmt::format("standard output: {}", std::strerror(reason))};
 }
 
-bool is_terminal() { return ::isatty(STDERR_FILENO) == 1; }
-
-int terminal_columns() {
-  winsize size{};
-  return ::ioctl(STDERR_FILENO, TIOCGWINSZ, &size) == 0 && size.ws_col > 0 ? size.ws_col : 80;
-}
-
-void Console::say_text(std::string_view text) {
-  if (progress_) progress_->clear();
-  pipeline::say_text(text);
-}
-
-int Console::complain(const Error& error) {
-  if (progress_) progress_->clear();
-  return fail(error);
-}
-
-Status Console::print(std::string_view text) { return pipeline::print(text); }
-
-Status Console::give(const Json& value) { return pipeline::print(json_line(value)); }
+Status Console::give(const Json& value) { return print(json_line(value)); }
 
 void Console::progress(const ProgressEvent& event) {
-  if (event.stage == ProgressEvent::Stage::kLayers) keep_on_signals();
+  using Stage = ProgressEvent::Stage;
+  const bool counted = event.stage == Stage::kLayers;
+  if (counted) keep_on_signals();
   if (!progress_) {
     progress_.emplace(quiet ? Progress::Style::kSilent : is_terminal() ? Progress::Style::kBar : Progress::Style::kLines);
   }
-  (*progress_)(event);
+  write_all(STDERR_FILENO, counted ? progress_->tell(event.done, event.total)
+                                   : progress_->begin(event.stage == Stage::kLoading ? "loading parts" : "indexing"));
 }
 
 const std::atomic<bool>& Console::cancel() { return watch_for_signals(); }

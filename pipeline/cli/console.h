@@ -5,14 +5,15 @@
 #include <string_view>
 
 #include "pipeline/cli/command.h"
-#include "pipeline/cli/progress_bar.h"
 #include "stages/data/status.h"
+#include "stages/text/progress.h"
 
 namespace lamina::pipeline {
 
 /// The program's own context: stdout, stderr, signals, and a progress bar on a terminal.
 class Console : public Context {
  public:
+  ~Console() override;
   void say_text(std::string_view text) override;
   int complain(const Error& error) override;
   Status print(std::string_view text) override;
@@ -26,22 +27,7 @@ class Console : public Context {
   std::optional<Progress> progress_;
 };
 
-// --- the same without a context
-/// One line to stderr, line breaks and control characters taken out.
-void say(std::string_view line);
-
-/// Text to stderr as it is.
-void say_text(std::string_view text);
-
-/// Says an error, "lamina: ...", and gives the exit code that belongs to it.
-int fail(const Error& error);
-
-/// Results to stdout. errors  kOutput if they could not be written (a full disk); a reader that closed the pipe is none
-Status print(std::string_view text);
-
-/// Whether stderr is a terminal.
-bool is_terminal();
-/// Columns of the terminal at stderr, or 80.
-int terminal_columns();
+/// There is something to keep: the first signal only sets the flag from here on.
+void keep_on_signals();
 
 }  // namespace lamina::pipeline

@@ -12,18 +12,17 @@
 namespace lamina::pipeline {
 namespace {
 
-// The heading of the help under which the options of a section stand.
-std::string_view heading(std::string_view section) {
-  if (section == "part" || section == "place") return "Parts";
-  if (section == "slice") return "Contours and files";
-  if (section == "fill") return "Filling";
-  if (section == "segment") return "Segmented lines";
-  if (section == "extrude") return "Extrusion";
-  if (section == "machine" || section == "dose") return "Machine and binder";
-  if (section == "load") return "Repair";
-  if (section == "run") return "Run";
-  return "Bed and layers";
-}
+/// The headings of the help under which the options of a section stand; others under "Bed and layers".
+constexpr Word<std::string_view> kHeadings[] = {{"part", "Parts"},
+                                                {"place", "Parts"},
+                                                {"slice", "Contours and files"},
+                                                {"fill", "Filling"},
+                                                {"segment", "Segmented lines"},
+                                                {"extrude", "Extrusion"},
+                                                {"machine", "Machine and binder"},
+                                                {"dose", "Machine and binder"},
+                                                {"load", "Repair"},
+                                                {"run", "Run"}};
 
 template <class Target>
 void add_options(std::span<const Key<Target>> keys, const KeyChoice& choice, const Target& presets, CommandSpec& spec) {
@@ -31,18 +30,16 @@ void add_options(std::span<const Key<Target>> keys, const KeyChoice& choice, con
     if (key.flag.empty() || !choice.has(key.section, key.name)) continue;
     std::string preset = key.value.empty() ? std::string() : key.write(presets);
     if (key.section == "bed") std::ranges::replace(preset, ',', 'x');
+    std::string_view heading = "Bed and layers";
+    read_word(kHeadings, key.section, heading);
     spec.options.push_back(
-        {std::string(key.flag), std::string(key.value), std::string(key.meaning), preset, std::string(heading(key.section))});
+        {std::string(key.flag), std::string(key.value), std::string(key.meaning), preset, std::string(heading)});
   }
 }
 
 /// Whether a word of --fill is no pattern: it sets another key.
 bool is_word_of_other_key(std::string_view word) {
   return word == "segmented" || word == "nonzero" || word == "positive" || word == "evenodd";
-}
-
-Error at_option(std::string_view flag, const std::string& what) {
-  return {Fault::kUsage, fmt::format("{}: {}", flag.substr(flag.rfind(',') + 1), what)};
 }
 
 /// Options that leave each other without a meaning.
@@ -100,12 +97,6 @@ void add_key_options(const KeyChoice& choice, CommandSpec& spec) {
   std::ranges::stable_sort(spec.options, {}, [&](const OptionSpec& option) { return places[option.group]; });
 }
 
-void say_notes(const Job& job, Context& context) {
-  for (const std::string& note : job.notes) {
-    if (!job.quiet) context.say("note: " + note);
-  }
-}
-
 Result<Job> read_job_options(const KeyChoice& choice, const Arguments& arguments) {
   Job job;
   if (arguments.has("--job")) {
@@ -124,18 +115,17 @@ Result<Job> read_job_options(const KeyChoice& choice, const Arguments& arguments
   for (const JobKey& key : job_keys()) {
     if (key.flag.empty() || !choice.has(key.section, key.name) || !arguments.has(key.flag)) continue;
     const std::string text = key.value.empty() ? std::string(key.switch_text) : arguments.text(key.flag);
-    if (const std::string wrong = key.read(text, job); !wrong.empty()) return at_option(key.flag, wrong);
+    if (Status status = at_option(key.flag, key.read(text, job)); !status) return status.error();
   }
   for (const PartKey& key : part_keys()) {
     if (key.flag.empty() || !choice.has(key.section, key.name) || !arguments.has(key.flag)) continue;
     if (key.flag == "--at" && job.parts.size() > 1) {
       return at_option(key.flag, fmt::format("is for a single part, here are {}; set at_mm of each [[part]] in a job file",
-                                             job.parts.size()));
+                                             job.parts.size()))
+          .error();
     }
     PartRequest unused;
-    if (const std::string wrong = key.read(arguments.text(key.flag), unused); !wrong.empty()) {
-      return at_option(key.flag, wrong);
-    }
+    if (Status status = at_option(key.flag, key.read(arguments.text(key.flag), unused)); !status) return status.error();
     for (PartRequest& part : job.parts) key.read(arguments.text(key.flag), part);
   }
   if (Status status = check_together(choice, arguments, job); !status) return status.error();

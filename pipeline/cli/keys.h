@@ -26,9 +26,6 @@ class KeyChoice {
 /// chosen), under the headings of the help.
 void add_key_options(const KeyChoice& choice, CommandSpec& spec);
 
-/// Tells what was noticed when a job was read, unless it is to be quiet.
-void say_notes(const Job& job, Context& context);
-
 /// The job that a command line asks for: --job first, then operands as parts, then --set, then flags. Not checked yet:
 /// see check_job(). errors  kUsage, one line that begins with the option or file
 Result<Job> read_job_options(const KeyChoice& choice, const Arguments& arguments);

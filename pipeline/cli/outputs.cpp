@@ -1,20 +1,18 @@
 #include "pipeline/cli/outputs.h"
 
 #include <fmt/format.h>
-#include <sys/stat.h>
 
 #include <algorithm>
 #include <array>
 #include <filesystem>
-#include <fstream>
 #include <vector>
+
+#include "stages/write/replaceable.h"
 
 namespace lamina::pipeline {
 namespace {
 
 namespace fs = std::filesystem;
-
-constexpr std::size_t kHead = 4096;  // bytes of a file in which its mark stands
 
 struct InputOption {
   std::string_view flag, role;
@@ -47,25 +45,13 @@ constexpr OwnFile kOwnFiles[] = {
     {"machines", "--target", false, {"^orientation target"}},
 };
 
-bool same_file(const std::string& a, const std::string& b) {
-  struct stat first {
-  }, second{};
-  return ::stat(a.c_str(), &first) == 0 && ::stat(b.c_str(), &second) == 0 && first.st_dev == second.st_dev &&
-         first.st_ino == second.st_ino;
-}
-
-bool is_regular(const std::string& path) {
-  struct stat status {};
-  return ::stat(path.c_str(), &status) == 0 && S_ISREG(status.st_mode);
-}
-
 /// The operand whose directory, or whose layers or programs, a file lies in; nullptr for none.
 const std::string* directory_read(const std::string& file, const Arguments& arguments) {
   std::error_code ignored;
   const std::string place = fs::absolute(file, ignored).parent_path().string();
   const auto found = std::ranges::find_if(arguments.operands, [&](const std::string& operand) {
     return std::ranges::any_of(std::array{"", "/layers", "/program"},
-                               [&](const char* below) { return same_file(place, operand + below); });
+                               [&](const char* below) { return write::same_file(place, operand + below); });
   });
   return found == arguments.operands.end() ? nullptr : &*found;
 }
@@ -74,7 +60,7 @@ const std::string* directory_read(const std::string& file, const Arguments& argu
 bool lies_in_layers(const std::string& file, const std::string& directory) {
   std::error_code ignored;
   const std::string place = fs::weakly_canonical(fs::absolute(file, ignored), ignored).parent_path().string();
-  return same_file(place, directory + "/layers") || same_file(place, directory + "/program");
+  return write::same_file(place, directory + "/layers") || write::same_file(place, directory + "/program");
 }
 
 std::vector<InputFile> inputs_of(const Arguments& arguments, std::string_view operand_role) {
@@ -98,15 +84,6 @@ std::vector<std::string> outputs_of(const Arguments& arguments) {
   return outputs;
 }
 
-Status check_not_a_device(const OwnFile& own, const std::string& path) {
-  struct stat status {};
-  const bool there = ::stat(path.c_str(), &status) == 0;
-  const bool device = path == "-" || (there && !S_ISREG(status.st_mode) && !S_ISDIR(status.st_mode));
-  if (!device || own.stream) return {};
-  return Error{Fault::kOutput, fmt::format("{}: is {}, not a file; name another one", path,
-                                           path == "-" ? "standard output" : "a device or a pipe")};
-}
-
 }  // namespace
 
 bool is_input_option(std::string_view flag) {
@@ -116,9 +93,9 @@ bool is_output_option(std::string_view flag) { return std::ranges::find(kOutputs
 
 Status check_outputs(std::span<const InputFile> inputs, std::span<const std::string> outputs) {
   for (const InputFile& input : inputs) {
-    if (!is_regular(input.path)) continue;
+    if (!write::is_file(input.path)) continue;
     for (const std::string& output : outputs) {
-      if (same_file(input.path, output)) {
+      if (write::same_file(input.path, output)) {
         return Error{Fault::kUsage, fmt::format("{}: is read by this call as {}; name another output", output, input.role)};
       }
       if (lies_in_layers(input.path, output)) {
@@ -132,16 +109,7 @@ Status check_outputs(std::span<const InputFile> inputs, std::span<const std::str
 }
 
 Status check_own_file(const std::string& path, std::span<const std::string_view> marks) {
-  if (!is_regular(path)) return {};
-  std::string head(kHead, '\0');
-  std::ifstream file(path, std::ios::binary);
-  file.read(head.data(), static_cast<std::streamsize>(head.size()));
-  head.resize(static_cast<std::size_t>(file.gcount()));
-  const bool own = std::ranges::any_of(marks, [&](std::string_view mark) {
-    if (mark.empty()) return false;
-    return mark.front() == '^' ? head.starts_with(mark.substr(1)) : head.find(mark) != std::string::npos;
-  });
-  if (own || (head.empty() && file.eof())) return {};
+  if (write::is_replaceable(path, marks)) return {};
   return Error{Fault::kUsage,
                fmt::format("{}: is there already, and is no such file of lamina; name another one, or replace it "
                            "with --overwrite",
@@ -162,7 +130,10 @@ Status check_outputs(std::string_view command, const Arguments& arguments) {
   for (const OwnFile& own : kOwnFiles) {
     if ((!own.command.empty() && own.command != command) || !arguments.has(own.flag)) continue;
     const std::string path = arguments.text(own.flag);
-    if (Status status = check_not_a_device(own, path); !status) return status;
+    if (!own.stream && write::is_stream(path)) {
+      return Error{Fault::kOutput, fmt::format("{}: is {}, not a file; name another one", path,
+                                               path == "-" ? "standard output" : "a device or a pipe")};
+    }
     const Status status = check_own_file(path, own.marks);
     if (status) continue;
     if (const std::string* directory = directory_read(path, arguments)) {

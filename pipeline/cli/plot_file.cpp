@@ -4,9 +4,9 @@
 
 #include <filesystem>
 
-#include "pipeline/cli/preview_program.h"
-#include "pipeline/show/plot_json.h"
 #include "stages/write/file.h"
+#include "stages/write/other_program.h"
+#include "stages/write/plot.h"
 
 namespace lamina::pipeline {
 
@@ -23,9 +23,10 @@ Status check_plot_name(const std::string& path) {
                fmt::format("--plot {}: there is no folder {}; make it or choose another place", path, folder.string())};
 }
 
-Status write_plot(const std::string& path, const write::Plot& plot) {
-  const auto text = std::filesystem::path(path).extension() == ".svg" ? Result<std::string>(write::plot_svg(plot))
-                                                                      : filter_by_preview("--plot", plot_json(plot));
+Status write_plot(const std::string& path, const Plot& plot) {
+  const auto text = std::filesystem::path(path).extension() == ".svg"
+                        ? Result<std::string>(write::plot_svg(plot))
+                        : write::filter("lamina-preview", "--plot", write::plot_json(plot));
   if (!text) return Error{text.error().fault, fmt::format("--plot {}: {}", path, text.error().message)};
   return write::write_file(path, *text);
 }

@@ -3,8 +3,8 @@
 
 #include <string>
 
+#include "stages/data/picture/plot.h"
 #include "stages/data/status.h"
-#include "stages/write/plot.h"
 
 namespace lamina::pipeline {
 
@@ -12,6 +12,6 @@ namespace lamina::pipeline {
 Status check_plot_name(const std::string& path);
 
 /// Writes an .svg, or a .png that lamina-preview draws. errors  kOutput; kInternal: no such program
-Status write_plot(const std::string& path, const write::Plot& plot);
+Status write_plot(const std::string& path, const Plot& plot);
 
 }  // namespace lamina::pipeline

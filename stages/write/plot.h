@@ -1,42 +1,21 @@
-// stages/write/plot.h: a plot as shapes and lines of text, drawn as SVG (svg/) and as PNG (picture/).
+// stages/write/plot.h: plots as SVG, and as JSON for the program that draws them as PNG (picture/).
 #pragma once
 
-#include <array>
 #include <string>
-#include <vector>
+#include <string_view>
+
+#include "stages/data/picture/plot.h"
+#include "stages/data/status.h"
 
 namespace lamina::write {
 
-/// Places and sizes are pixels from the top left; colours are "rrggbb". Boxes lie below lines, lines below dots, text
-/// above all; within a kind later ones cover earlier ones. The ground is white.
-struct Plot {
-  struct Box {
-    double left = 0, top = 0, width = 0, height = 0;
-    std::string colour;
-  };
-  struct Line {
-    std::vector<std::array<double, 2>> points;  // a pixel wide
-    std::string colour;
-  };
-  struct Dot {
-    double x = 0, y = 0, radius = 0;
-    std::string colour;
-  };
-  enum class Anchor { kStart, kMiddle, kEnd };
-  struct Text {
-    double x = 0, baseline = 0;
-    int size = 0;
-    Anchor anchor = Anchor::kStart;
-    std::string colour, line;
-  };
-  int width = 0, height = 0;
-  std::vector<Box> boxes;
-  std::vector<Line> lines;
-  std::vector<Dot> dots;  // half transparent, so that many at one place are darker
-  std::vector<Text> texts;
-};
-
 /// An SVG file.
 std::string plot_svg(const Plot& plot);
+
+/// One JSON object.
+std::string plot_json(const Plot& plot);
+
+/// The same back. errors  kUsage
+Result<Plot> read_plot(std::string_view json);
 
 }  // namespace lamina::write

@@ -19,7 +19,6 @@
 #include <thread>
 #include <tuple>
 
-#include "pipeline/batch/list.h"
 #include "tests/commands/program.h"
 
 namespace lamina::test {
@@ -28,17 +27,6 @@ namespace {
 namespace fs = std::filesystem;
 using Json = nlohmann::json;
 using Words = std::vector<std::string>;
-
-TEST(BatchList, WordsAreSplitAsAShellSplitsThem) {
-  const auto words = [](std::string_view line) { return *pipeline::split_words(line); };
-  EXPECT_EQ(words("jet a.stl --dpi 600"), (Words{"jet", "a.stl", "--dpi", "600"}));
-  EXPECT_EQ(words("  jet\t'my part.stl'  \"b\\\"c\" d\\ e '' # rest\r"), (Words{"jet", "my part.stl", "b\"c", "d e", ""}));
-  EXPECT_EQ(words("jet a#b 'c'\"d\"e"), (Words{"jet", "a#b", "cde"}));
-  EXPECT_EQ(words("# only a comment 'with a quote"), Words{});
-  EXPECT_EQ(words(""), Words{});
-  EXPECT_FALSE(pipeline::split_words("jet 'a.stl").ok());
-  EXPECT_FALSE(pipeline::split_words("jet \"a.stl").ok());
-}
 
 class JobsInBatch : public ::testing::Test {
  protected:

@@ -9,8 +9,8 @@
 
 #include "pipeline/cli/command.h"
 #include "pipeline/cli/help/help.h"
-#include "pipeline/machine/printer_profile.h"
-#include "pipeline/text/number_text.h"
+#include "pipeline/machine/profiles.h"
+#include "stages/text/number_text.h"
 #include "tests/commands/program.h"
 
 namespace lamina::test {
@@ -23,7 +23,7 @@ const fs::path kRoot = fs::path(LAMINA_TEST_DIR).parent_path();
 std::set<std::string> long_flags(const pipeline::CommandSpec& spec) {
   std::set<std::string> flags;
   for (const pipeline::OptionSpec& option : spec.options) {
-    for (const std::string_view flag : pipeline::split(option.flag, ",")) {
+    for (const std::string_view flag : split(option.flag, ",")) {
       if (flag.starts_with("--")) flags.emplace(flag);
     }
   }
@@ -86,7 +86,7 @@ TEST(Documentation, EveryOptionThatItNamesExists) {
 TEST(Documentation, EveryKeyOfAMachineIsDocumented) {
   const std::string page = read_text(kRoot / "docs/machines.md");
   std::string section;
-  std::istringstream profile(pipeline::machine_text(Machine()));
+  std::istringstream profile(read::machine_text(Machine()));
   std::size_t checked = 0;
   for (std::string line; std::getline(profile, line);) {
     if (line.starts_with('[')) section = line.substr(1, line.find(']') - 1);

@@ -9,13 +9,14 @@
 
 #include "pipeline/batch/queue.h"
 #include "pipeline/batch/summary.h"
-#include "pipeline/cli/batch_call.h"
 #include "pipeline/cli/command.h"
 #include "pipeline/cli/console.h"
-#include "pipeline/cli/signals.h"
-#include "pipeline/text/json.h"
-#include "pipeline/text/json_text.h"
-#include "pipeline/text/number_text.h"
+#include "pipeline/job/file.h"
+#include "stages/text/json.h"
+#include "stages/text/number_text.h"
+#include "stages/text/readable.h"
+#include "stages/text/shell_words.h"
+#include "stages/text/terminal.h"
 #include "stages/write/file.h"
 
 namespace lamina::pipeline {
@@ -54,42 +55,137 @@ CommandSpec batch_spec() {
   return spec;
 }
 
-struct Request {
-  std::vector<std::string> lists, with;
-  BatchOptions options;
-  bool json = false, quiet = false;
+// --- a command line as a job
+
+/// Collects what a command gives and the first thing that it complains about; what it says to people is not heard.
+class CallContext : public Context {
+ public:
+  CallContext(const ProgressCallback& progress, const std::atomic<bool>& cancel) : progress_(progress), cancel_(cancel) {}
+  void say_text(std::string_view) override {}
+  int complain(const Error& error) override {
+    if (reason.empty()) reason = one_line(error.message);
+    return static_cast<int>(error.fault);
+  }
+  Status print(std::string_view text) override {
+    printed_ += text;
+    return {};
+  }
+  Status give(const Json& value) override {
+    values_.push_back(value);
+    return {};
+  }
+  void progress(const ProgressEvent& event) override { progress_(event); }
+  const std::atomic<bool>& cancel() override { return cancel_; }
+
+  /// The value, several as an array, or the text that was printed.
+  Json value() const {
+    if (values_.size() > 1) return values_;
+    if (!values_.empty()) return values_.front();
+    return printed_.empty() ? Json() : Json(printed_);
+  }
+  std::string reason;
+
+ private:
+  const ProgressCallback& progress_;
+  const std::atomic<bool>& cancel_;
+  std::vector<Json> values_;
+  std::string printed_;
 };
 
-Result<Request> resolve(const Arguments& arguments) {
-  Request request;
-  BatchOptions& options = request.options;
-  const auto wrong = [](std::string_view flag, const std::string& what) {
-    return Error{Fault::kUsage, fmt::format("{}: {}", flag, what)};
+/// The arguments with what the batch adds; the last one of an option counts.
+Arguments with_settings(Arguments arguments, const CommandSpec& spec, const CallSettings& settings) {
+  const auto add = [&](std::string_view name, const std::string& text = {}) {
+    if (const OptionSpec* option = spec.find(name)) arguments.options.emplace_back(option->flag, text);
   };
-  request.lists = arguments.operands;
-  if (request.lists.empty()) {
+  if (!settings.output.empty()) add("--output", settings.output);
+  if (!arguments.has("--memory")) add("--memory", fmt::format("{}", settings.layer_bytes));
+  // One pool for all: a job's own number of threads would hold for the whole program.
+  add("--threads", "0");
+  add("--json");
+  add("--quiet");
+  if (settings.earlier == CallSettings::Earlier::kContinue) add("--resume");
+  if (settings.earlier == CallSettings::Earlier::kReplace) add("--overwrite");
+  return arguments;
+}
+
+BatchResult run_call(const Command& command, const Arguments& arguments, const ProgressCallback& progress,
+                     const std::atomic<bool>& cancel) {
+  CallContext context(progress, cancel);
+  const Outcome outcome = run(command, arguments, context);
+  BatchResult result;
+  result.code = outcome.error ? context.complain(*outcome.error) : outcome.code;
+  if (result.code != 0) result.reason = context.reason;
+  result.value = context.value();
+  result.recognized = outcome.layers_planned == 0 && outcome.layers_kept > 0;
+  return result;
+}
+
+/// Reads a command line: any command but batch and preview. errors  kUsage: no such command, wrong arguments, a job file
+/// that cannot be read
+Result<Call> read_call(const std::vector<std::string>& words) {
+  const std::string& name = words.front();
+  const Command* command = find_command(name);
+  if (command == nullptr) return Error{Fault::kUsage, unknown_command(name)};
+  if (command == &batch_command || command->reads_itself) {
+    return Error{Fault::kUsage, fmt::format("'{}' cannot be a job of a batch; run it by itself", name)};
+  }
+  const CommandSpec spec = spec_of(*command);
+  const Result<Arguments> read = read_arguments(spec, {words.begin() + 1, words.end()});
+  if (!read) return read.error();
+  if (read->help) return Error{Fault::kUsage, "--help is no job"};
+  Job planned;
+  if (read->has("--job")) {
+    if (Status status = read_job(read->text("--job"), planned); !status) return status.error();
+  }
+
+  Call call;
+  if (const OptionSpec* option = spec.find("--output"); option != nullptr && !read->has("--dry-run")) {
+    call.output_of_job_file = !read->has(option->flag);
+    call.output = call.output_of_job_file ? planned.output : read->text(option->flag);
+    if (command->ending != nullptr) call.ending = command->ending(*read);
+    if (!call.ending && option->value.find("DIR") != std::string::npos) call.ending = "";
+  }
+  call.can_continue = spec.find("--resume") != nullptr && !read->has("--resume");
+  call.can_replace = spec.find("--overwrite") != nullptr && !read->has("--overwrite") && !read->has("--resume");
+  if (const OptionSpec* memory = spec.find("--memory")) {
+    call.layer_bytes = 0;
+    if (read->has(memory->flag)) read_bytes(read->text(memory->flag), *call.layer_bytes);  // the command says what is wrong
+  }
+  call.inputs = read->operands;
+  for (const auto& [flag, text] : read->options) {
+    if (flag.find("--output") == std::string::npos && !text.empty()) call.inputs.push_back(text);
+  }
+  if (read->operands.empty()) {
+    for (const PartRequest& part : planned.parts) call.inputs.push_back(part.path);
+  }
+  call.run = [command, spec, arguments = *read](const CallSettings& settings, const ProgressCallback& progress,
+                                                const std::atomic<bool>& cancel) {
+    return run_call(*command, with_settings(arguments, spec, settings), progress, cancel);
+  };
+  return call;
+}
+
+// --- the command
+
+/// What the options say, and the words for parts that come without any. errors  kUsage
+Result<BatchOptions> read_options(const Arguments& arguments, std::vector<std::string>& words) {
+  BatchOptions options;
+  if (arguments.operands.empty()) {
     return Error{Fault::kUsage, "no jobs; name a list, a directory of parts, or TOML job files"};
   }
   options.directory = arguments.text("-o,--output");
   if (options.directory.empty()) return Error{Fault::kUsage, "-o DIR is missing; name the directory of the batch"};
   const auto with = split_words(arguments.has("--with") ? arguments.text("--with") : "jet");
-  if (!with) return wrong("--with", with.error().message);
-  if (with->empty()) return wrong("--with", "no command; as in --with 'jet --dpi 600'");
-  request.with = *with;
-  std::int64_t jobs = 0;
-  if (arguments.has("--jobs")) {
-    if (const auto what = read_whole(arguments.text("--jobs"), 0, 1024, jobs); !what.empty()) return wrong("--jobs", what);
+  if (!with) return at_option("--with", with.error().message).error();
+  if (with->empty()) return at_option("--with", "no command; as in --with 'jet --dpi 600'").error();
+  words = *with;
+  options.jobs = 0;
+  for (const Status& status :
+       {arguments.read("--jobs", {0, 1024}, options.jobs), arguments.read("--memory", read_bytes, options.memory_bytes),
+        arguments.read("--time-limit", {0.001, 1e9, " s"}, options.time_limit_seconds)}) {
+    if (!status) return status.error();
   }
-  options.jobs =
-      jobs > 0 ? static_cast<std::uint32_t>(jobs) : static_cast<std::uint32_t>(std::max(tbb::info::default_concurrency(), 1));
-  if (arguments.has("--memory")) {
-    if (const auto what = read_bytes(arguments.text("--memory"), options.memory_bytes); !what.empty())
-      return wrong("--memory", what);
-  }
-  if (arguments.has("--time-limit")) {
-    const auto what = read_number(arguments.text("--time-limit"), 0.001, 1e9, " s", options.time_limit_seconds);
-    if (!what.empty()) return wrong("--time-limit", what);
-  }
+  if (options.jobs == 0) options.jobs = static_cast<std::uint32_t>(std::max(tbb::info::default_concurrency(), 1));
   options.fail_fast = arguments.has("--fail-fast");
   if (options.fail_fast && arguments.has("--keep-going")) {
     return Error{Fault::kUsage, "--keep-going and --fail-fast exclude each other"};
@@ -99,9 +195,7 @@ Result<Request> resolve(const Arguments& arguments) {
   if (options.resume && options.overwrite) {
     return Error{Fault::kUsage, "--resume and --overwrite exclude each other; --resume keeps what --overwrite replaces"};
   }
-  request.json = arguments.has("--json");
-  request.quiet = arguments.has("--quiet");
-  return request;
+  return options;
 }
 
 /// A line a job; on a terminal a line that is drawn again and again below them.
@@ -111,7 +205,7 @@ class BatchConsole {
 
   void ended(const BatchJob& job, const BatchResult& result, const BatchState& state) {
     if (quiet_) {
-      if (has_failed(result)) context_.complain({static_cast<Fault>(result.code), failure_line(job, result)});
+      if (result.failed()) context_.complain({static_cast<Fault>(result.code), failure_line(job, result)});
       return;
     }
     clear();
@@ -120,19 +214,17 @@ class BatchConsole {
 
   void progress(const BatchState& state) {
     if (quiet_ || !terminal_) return;
-    context_.say_text("\r\x1b[K" +
-                      progress_line(state).substr(0, static_cast<std::size_t>(std::max(terminal_columns() - 1, 1))));
-    drawn_ = true;
+    context_.say_text(line_.draw(progress_line(state), terminal_columns()));
   }
 
   void clear() {
-    if (drawn_) context_.say_text("\r\x1b[K");
-    drawn_ = false;
+    if (terminal_) context_.say_text(line_.clear());
   }
 
  private:
   Context& context_;
-  bool quiet_, terminal_, drawn_ = false;
+  bool quiet_, terminal_;
+  StatusLine line_;
   std::uint32_t ended_ = 0;
 };
 
@@ -140,9 +232,13 @@ Status write_text_file(const std::string& directory, const char* name, const std
   return write::write_file((std::filesystem::path(directory) / name).string(), std::as_bytes(std::span(text)));
 }
 
-Outcome run_request(const Request& request, Context& context) {
-  const BatchOptions& options = request.options;
-  Result<std::vector<BatchEntry>> entries = read_batch(request.lists, request.with);
+Outcome run_batch_command(const Arguments& arguments, Context& context) {
+  const bool quiet = arguments.has("--quiet");
+  std::vector<std::string> with;
+  const Result<BatchOptions> read = read_options(arguments, with);
+  if (!read) return read.error();
+  const BatchOptions& options = *read;
+  Result<std::vector<BatchEntry>> entries = read_batch(arguments.operands, with);
   if (!entries) return entries.error();
   const auto jobs =
       prepare_batch(std::move(*entries), {options.directory, layer_share(options.memory_bytes, options.jobs)}, read_call);
@@ -150,11 +246,11 @@ Outcome run_request(const Request& request, Context& context) {
   Result<BatchRecord> record = BatchRecord::open(options.directory, options.resume, options.overwrite);
   if (!record) return record.error();
 
-  BatchConsole console(request.quiet, context);
+  BatchConsole console(quiet, context);
   keep_on_signals();  // jobs that are done
   BatchWatcher watcher;
   watcher.progress = [&](const BatchState& state) { console.progress(state); };
-  watcher.ended = [&](const BatchJob& job, std::uint32_t, const BatchResult& result, const BatchState& state) {
+  watcher.ended = [&](const BatchJob& job, const BatchResult& result, const BatchState& state) {
     console.ended(job, result, state);
   };
   const Result<BatchSummary> summary = run_batch(*jobs, std::move(*record), options, watcher, context.cancel());
@@ -164,26 +260,20 @@ Outcome run_request(const Request& request, Context& context) {
   Status written = write_text_file(options.directory, "summary.json", json_line(json, 2));
   if (written) written = write_text_file(options.directory, "summary.tsv", batch_table(*jobs, *summary));
   int code = written ? batch_code(*summary) : context.complain(written.error());
-  if (!request.quiet) context.say_text(batch_text(*jobs, *summary, options));
+  if (!quiet) context.say_text(batch_text(*jobs, *summary, options));
   if (summary->interrupted) {
     context.complain({Fault::kInterrupted, "interrupted; what is done is kept, go on with the same command and --resume"});
   }
-  if (request.json) {
+  if (arguments.has("--json")) {
     if (Status status = context.give(json); !status) code = context.complain(status.error());
   }
   if (summary->abandoned) std::_Exit(code);  // a job that does not stop is still running
   return code;
 }
 
-Outcome run_command(const Arguments& arguments, Context& context) {
-  const Result<Request> request = resolve(arguments);
-  if (!request) return request.error();
-  return run_request(*request, context);
-}
-
 }  // namespace
 
 const Command batch_command = {"batch", "many jobs in one queue, sharing processors and memory, with one summary", batch_spec,
-                               run_command};
+                               run_batch_command};
 
 }  // namespace lamina::pipeline

@@ -1,12 +1,10 @@
 // lamina calibrate: test pieces for a printer, and the profile that follows from what was measured on them.
 #include <fmt/format.h>
 
-#include <nlohmann/json.hpp>
-
-#include "pipeline/calibrate/widths.h"
+#include "pipeline/calibrate/calibrate.h"
 #include "pipeline/cli/command.h"
-#include "pipeline/text/json_text.h"
-#include "pipeline/text/number_text.h"
+#include "stages/text/json.h"
+#include "stages/text/readable.h"
 #include "stages/write/file.h"
 
 namespace lamina::pipeline {
@@ -49,7 +47,6 @@ Outcome say_pieces(const std::vector<std::string>& names, const Arguments& argum
 }
 
 Outcome say_profile(const CalibratedProfile& made, const Arguments& arguments, Context& context) {
-  using Json = nlohmann::ordered_json;
   const std::string output = arguments.text("-o,--output");
   const segment::MeasuredMachine& found = made.found;
   const double flow = made.profile.machine.material.flow;
@@ -82,19 +79,14 @@ Outcome run_calibrate(const Arguments& arguments, Context& context) {
   if (!arguments.operands.empty())
     return usage(fmt::format("'{}' is no option; the pieces are made here", one_line(arguments.operands.front())));
   if (!arguments.has("--machine")) return usage("--machine is missing; name an extrusion printer, as lamina extrude takes it");
-  CalibrationRequest request = preset_calibration();
-  request.machine = arguments.text("--machine");
-  request.directory = arguments.text("-o,--output");
+  CalibrationRequest request{arguments.text("--machine"), arguments.text("-o,--output"), segment::preset_pieces()};
   if (request.directory.empty())
     return usage("-o is missing; name a directory for the test pieces, or with --measured the profile to be written");
   double gap = 0;
-  const auto number = [&](const char* flag, double low, double high, double& target) {
-    const std::string wrong = arguments.has(flag) ? read_number(arguments.text(flag), low, high, " mm", target) : std::string();
-    return wrong.empty() ? wrong : fmt::format("{}: {}", flag, wrong);
-  };
-  for (const std::string& wrong : {number("--bead", 0.01, 20, request.width_mm), number("--layer", 0.01, 20, request.height_mm),
-                                   number("--gap", -10, 10, gap)}) {
-    if (!wrong.empty()) return usage(wrong);
+  for (const Status& status : {arguments.read("--bead", {0.01, 20, " mm"}, request.pieces.width_mm),
+                               arguments.read("--layer", {0.01, 20, " mm"}, request.pieces.height_mm),
+                               arguments.read("--gap", {-10, 10, " mm"}, gap)}) {
+    if (!status) return status;
   }
   if (!arguments.has("--measured")) {
     const auto names = write_test_pieces(request, context.cancel());

@@ -1,20 +1,24 @@
 #include <fmt/format.h>
 
 #include <chrono>
-#include <nlohmann/json.hpp>
 
 #include "pipeline/cli/command.h"
 #include "pipeline/cli/keys.h"
 #include "pipeline/cli/plot_file.h"
 #include "pipeline/job/file.h"
+#include "pipeline/job/heights.h"
 #include "pipeline/plan/heights.h"
-#include "pipeline/show/heights_plot.h"
-#include "pipeline/show/heights_table.h"
-#include "pipeline/text/value.h"
+#include "stages/heights/study/study_plot.h"
+#include "stages/heights/study/study_text.h"
+#include "stages/text/value.h"
 #include "stages/write/file.h"
+#include "stages/write/manifest/manifest.h"  // title_of
+#include "stages/write/rp3/rp3.h"
 
 namespace lamina::pipeline {
 namespace {
+
+constexpr Bed kLargestBed{{kMostMm, kMostMm}};
 
 const KeyChoice kHeightsCommandKeys = {"layers", "heights", "load", "part"};
 
@@ -29,16 +33,14 @@ CommandSpec heights_spec() {
   spec.operand = "PART";
   spec.operand_meaning = "STL, OBJ or 3MF files, STL and OBJ gzipped too; they replace the parts of --job";
   add_key_options(kHeightsCommandKeys, spec);
-  for (const auto& [flag, value, meaning] :
-       {std::tuple{"--format", "FORMAT", "text, csv, json, or rp3 as in Lima (2009)"},
-        {"-o,--output", "FILE", "write the table there instead of to stdout"},
-        {"--compare", "", "all ways with these thicknesses and limits, one line each"},
-        {"--measure", "FILE", "measure layers that somebody else decided: tops in mm, one a line"},
-        {"--plot", "FILE", "draw thickness against height beside the part, as .svg or .png"}}) {
-    spec.options.push_back({flag, value, meaning, "", "Table"});
-  }
-  spec.options.push_back({"--overwrite", "", "replace a file that lamina did not write", "", "Table"});
-  spec.options.push_back({"--quiet", "", "say nothing but errors beside the table", "", "Table"});
+  spec.options.insert(spec.options.end(),
+                      {{"--format", "FORMAT", "text, csv, json, or rp3 as in Lima (2009)", "", "Table"},
+                       {"-o,--output", "FILE", "write the table there instead of to stdout", "", "Table"},
+                       {"--compare", "", "all ways with these thicknesses and limits, one line each", "", "Table"},
+                       {"--measure", "FILE", "measure layers that somebody else decided: tops in mm, one a line", "", "Table"},
+                       {"--plot", "FILE", "draw thickness against height beside the part, as .svg or .png", "", "Table"},
+                       {"--overwrite", "", "replace a file that lamina did not write", "", "Table"},
+                       {"--quiet", "", "say nothing but errors beside the table", "", "Table"}});
   spec.closing =
       "Examples:\n"
       "  lamina heights boat.3mf --heights optimal --thickness 0.05..0.3 --cusp 0.1\n"
@@ -57,7 +59,7 @@ Result<Job> job_of(const Arguments& arguments) {
   if (!read) return read;
   if (read->parts.empty()) return Error{Fault::kUsage, "no part to look at; name one or more STL, OBJ or 3MF files"};
   // Heights do not depend on where parts stand or whether the bed is large enough.
-  read->bed_mm = {kMostMm, kMostMm};
+  if (read->bed_mm || read->machine.profile.empty()) read->bed_mm = kLargestBed.size_mm;
   read->dry_run = true;
   // Comparing and measuring need no way of their own.
   const bool own_way = arguments.has("--compare") || arguments.has("--measure") || read->heights.per_part;
@@ -79,36 +81,50 @@ Status check_one_table(const Job& job, const Arguments& arguments) {
                                                       : "more than one --measure")};
 }
 
-std::string table_text(Form form, const Job& job, const Scene& scene, const std::vector<HeightsStudy>& studies) {
-  using Json = nlohmann::ordered_json;
-  switch (form) {
-    case Form::kJson: return heights_json(job, scene, studies).dump(-1, ' ', false, Json::error_handler_t::replace) + "\n";
-    case Form::kCsv: return heights_csv(scene, studies);
-    case Form::kRp3: {
-      write::rp3::Settings settings;
-      settings.shrink = job.parts.front().shrink;
-      settings.rotation_deg = job.parts.front().rotate_deg;
-      return heights_rp3(studies.back(), settings);
-    }
-    case Form::kText: break;
-  }
-  return studies.size() > 1 ? comparison_page(studies) : heights_page(job, scene, studies.back());
+std::string rp3_text(const Job& job, const heights::Study& study) {
+  std::vector<write::rp3::Layer> layers;
+  for (std::size_t i = 0; i < study.layers(); ++i) layers.push_back({mm(study.thickness(i)), heights::angle(study, i)});
+  write::rp3::Settings settings;
+  settings.shrink = job.parts.front().shrink;
+  settings.rotation_deg = job.parts.front().rotate_deg;
+  return write::rp3::text_of(layers, settings);
 }
 
-/// The tables that the options name, the last one of which is drawn.
-Result<std::vector<HeightsStudy>> studies_of(const Arguments& arguments, const Job& job, const Scene& scene) {
-  std::vector<HeightsStudy> studies;
+std::string table_text(Form form, const Job& job, const Scene& scene, const std::vector<heights::Study>& studies) {
+  heights::StudiedParts parts{{}, scene.height, heights_text(job), job.heights.cusp_mm};
+  for (const PartSummary& part : scene.parts) parts.paths.push_back(part.path);
+  switch (form) {
+    case Form::kJson: return study_json(parts, studies);
+    case Form::kCsv: return study_csv(parts, studies);
+    case Form::kRp3: return rp3_text(job, studies.back());
+    case Form::kText: break;
+  }
+  return studies.size() > 1 ? comparison_page(studies) : study_page(parts, studies.back());
+}
+
+/// The options of the tables; those of somebody else's alone need no thickness.
+Result<heights::Options> options_of(const Arguments& arguments, const Job& job) {
+  if (arguments.has("--compare") || job.heights.per_part || !arguments.has("--measure")) return heights_options(job);
+  Job measured = job;
+  if (job.heights.thickness_mm.empty()) measured.heights.mode = heights::Mode::kUniform;
+  return heights_options(measured);
+}
+
+/// The tables that the command's options name, the last one of which is drawn.
+Result<std::vector<heights::Study>> studies_of(const Arguments& arguments, const Job& job, const heights::SurfaceIndex& index,
+                                               const heights::Options& options) {
+  std::vector<heights::Study> studies;
   if (arguments.has("--compare") || job.heights.per_part) {
-    auto all = arguments.has("--compare") ? study_all_ways(job, scene) : study_per_part(job, scene);
+    auto all = arguments.has("--compare") ? study_all_ways(index, options) : study_per_part(index, options);
     if (!all) return all;
     studies = std::move(*all);
   } else if (!arguments.has("--measure")) {
-    auto study = study_heights(job, scene);
+    auto study = heights::study(index, options);
     if (!study) return study.error();
     studies.push_back(std::move(*study));
   }
   for (const std::string& path : arguments.all("--measure")) {
-    auto study = study_table(job, scene, path);
+    auto study = study_table(index, options, path);
     if (!study) return study.error();
     studies.push_back(std::move(*study));
   }
@@ -119,9 +135,7 @@ Outcome run_heights(const Arguments& arguments, Context& context) {
   const std::string output = arguments.text("-o,--output"), plot = arguments.text("--plot");
   Form form = Form::kText;
   if (arguments.has("--format")) {
-    if (const std::string wrong = read_word(kForms, arguments.text("--format"), form); !wrong.empty()) {
-      return Error{Fault::kUsage, "--format: " + wrong};
-    }
+    if (Status status = at_option("--format", read_word(kForms, arguments.text("--format"), form)); !status) return status;
   }
   if (const Status status = check_plot_name(plot); !status) return status.error();
   const Result<Job> job = job_of(arguments);
@@ -132,20 +146,26 @@ Outcome run_heights(const Arguments& arguments, Context& context) {
   if (arguments.has("--save-job")) {
     if (Status status = save_job(arguments.text("--save-job"), *job); !status) return status.error();
   }
-  const auto start = std::chrono::steady_clock::now();
-  const Result<Scene> scene = load_scene(*job);
-  const std::chrono::duration<double> load = std::chrono::steady_clock::now() - start;
+  using Clock = std::chrono::steady_clock;
+  const auto start = Clock::now();
+  const Result<Scene> scene = load_scene(*job, kLargestBed);
+  const std::chrono::duration<double> load = Clock::now() - start;
   if (!scene) return scene.error();
 
-  const auto studies = studies_of(arguments, *job, *scene);
+  const Result<heights::Options> options = options_of(arguments, *job);
+  if (!options) return options.error();
+  const heights::SurfaceIndex index = index_scene(*scene, *options);
+  const std::chrono::duration<double> surface = Clock::now() - start - load;
+  const auto studies = studies_of(arguments, *job, index, *options);
   if (!studies) return studies.error();
-  const HeightsStudy& last = studies->back();
+  const heights::Study& last = studies->back();
   if (Status status = tell(output, table_text(form, *job, *scene, *studies), context); !status) return status.error();
   if (studies->size() == 1 && !arguments.has("--quiet")) {
     context.say(fmt::format("time      load {:.4f} s, surface {:.4f} s, layers {:.4f} s, measuring them {:.4f} s", load.count(),
-                            last.index_seconds, last.plan_seconds, last.evaluate_seconds));
+                            surface.count(), last.plan_seconds, last.evaluate_seconds));
   }
-  return plot.empty() ? Status() : write_plot(plot, draw_study(*scene, last));
+  if (plot.empty()) return Status();
+  return write_plot(plot, draw_study(title_of(scene->parts), scene->meshes, scene->instances, last));
 }
 
 }  // namespace

@@ -3,10 +3,10 @@
 #include <algorithm>
 
 #include "pipeline/cli/command.h"
-#include "pipeline/job/keys.h"
+#include "pipeline/cli/keys.h"
 #include "pipeline/plan/scene.h"
-#include "pipeline/show/info.h"
-#include "pipeline/text/json.h"
+#include "stages/load/info/info.h"
+#include "stages/text/json.h"
 
 namespace lamina::pipeline {
 namespace {
@@ -32,34 +32,16 @@ CommandSpec info_spec() {
   return spec;
 }
 
-/// The keys of a job that the options stand for, read as lamina jet reads them.
-Status set_keys(const Arguments& arguments, Job& job) {
-  const auto refused = [](std::string_view flag, const std::string& wrong) {
-    return Error{Fault::kUsage, fmt::format("{}: {}", flag, wrong)};
-  };
-  for (const PartKey& key : part_keys()) {
-    if (key.flag.empty() || !arguments.has(key.flag)) continue;
-    const std::string wrong = key.read(arguments.text(key.flag), job.parts.front());
-    if (!wrong.empty()) return refused(key.flag, wrong);
-  }
-  for (const JobKey& key : job_keys()) {
-    if (key.flag.empty() || !arguments.has(key.flag)) continue;
-    const std::string wrong = key.read(key.value.empty() ? key.switch_text : arguments.text(key.flag), job);
-    if (!wrong.empty()) return refused(key.flag, wrong);
-  }
-  return {};
-}
-
 Outcome run_info(const Arguments& arguments, Context& context) {
   if (arguments.operands.empty()) return Error{Fault::kUsage, "no part to look at; name an STL, OBJ or 3MF file"};
+  // Read as lamina jet reads them.
+  const Result<Job> job = read_job_options({"part", "load"}, arguments);
+  if (!job) return job.error();
   int code = 0;
-  for (const std::string& path : arguments.operands) {
-    Job job;
-    job.parts.emplace_back().path = path;
-    if (Status status = set_keys(arguments, job); !status) return status.error();
-    const load::LoadOptions options = load_options(job, job.parts.front());
+  for (const PartRequest& part : job->parts) {
+    const load::LoadOptions options = load_options(*job, part);
     const Result<std::string> page =
-        arguments.has("--json") ? describe_part_json(path, options) : describe_part_text(path, options);
+        arguments.has("--json") ? describe_part_json(part.path, options) : describe_part_text(part.path, options);
     if (!page) {
       code = std::max(code, context.complain(page.error()));
       continue;

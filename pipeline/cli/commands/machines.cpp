@@ -1,11 +1,8 @@
 #include <fmt/format.h>
 
-#include <optional>
-
 #include "pipeline/cli/command.h"
-#include "pipeline/machine/extruder.h"
 #include "pipeline/machine/powder_printer.h"
-#include "pipeline/machine/printer_profile.h"
+#include "pipeline/machine/profiles.h"
 #include "stages/program/head_grid.h"
 #include "stages/program/orientation_target.h"
 #include "stages/write/file.h"
@@ -36,24 +33,6 @@ CommandSpec machines_spec() {
   return spec;
 }
 
-/// Printers by name or file: of powder, else of extrusion. errors  of a name that is neither, those of powder printers
-struct Printer {
-  std::optional<Machine> powder;
-  std::optional<ExtruderProfile> extrusion;
-};
-Result<Printer> find_printer(const std::string& name) {
-  Printer printer;
-  const Result<Machine> powder = find_machine(name);
-  if (powder) {
-    printer.powder = *powder;
-    return printer;
-  }
-  const auto extrusion = find_extruder(name);
-  if (!extrusion) return powder.error();
-  printer.extrusion = *extrusion;
-  return printer;
-}
-
 std::string explain(const ExtruderProfile& profile) {
   const Extruder& m = profile.machine;
   return fmt::format(
@@ -62,6 +41,21 @@ std::string explain(const ExtruderProfile& profile) {
       m.name, m.description, m.bed.size_mm[0], m.bed.size_mm[1], m.bed.build_height_mm, m.material.nozzle_mm,
       m.material.filament_mm, m.format == "sml" ? "SML" : "G-code",
       profile.own_calibration ? "measured on it" : "as published for an Anet A8; lamina calibrate measures them");
+}
+
+/// A printer by its name or file, of powder, else of extrusion: its whole profile, or what follows from it.
+/// errors  of a name that is neither, those of powder printers
+Result<std::string> printer_text(const std::string& name, bool whole) {
+  const Result<Machine> powder = find_machine(name);
+  if (!powder) {
+    const auto extrusion = find_extruder(name);
+    if (!extrusion) return powder.error();
+    return whole ? read::extruder_text(*extrusion) : explain(*extrusion);
+  }
+  if (whole) return read::machine_text(*powder);
+  const auto resolved = resolve_profile(*powder);
+  if (!resolved) return resolved.error();
+  return program::explain(resolved->machine, resolved->grid);
 }
 
 Outcome run_machines(const Arguments& arguments, Context& context) {
@@ -79,32 +73,25 @@ Outcome run_machines(const Arguments& arguments, Context& context) {
     for (const write::Dialect& dialect : write::dialects()) text += fmt::format("{:<12}{}\n", dialect.id, dialect.description);
   }
   for (const std::string& name : arguments.all("--show")) {
-    const Result<Printer> printer = find_printer(name);
-    if (!printer) return printer.error();
-    text += printer->powder ? machine_text(*printer->powder) : extruder_text(*printer->extrusion);
+    const auto profile = printer_text(name, true);
+    if (!profile) return profile.error();
+    text += *profile;
   }
   std::vector<std::string> checked = arguments.all("--check");
   checked.insert(checked.end(), arguments.operands.begin(), arguments.operands.end());
   for (const std::string& name : checked) {
-    const Result<Printer> printer = find_printer(name);
-    if (!printer) return printer.error();
-    if (!text.empty()) text += "\n";
-    if (printer->extrusion) {
-      text += explain(*printer->extrusion);
-      continue;
-    }
-    const auto resolved = resolve_profile(*printer->powder);
-    if (!resolved) return resolved.error();
-    text += program::explain(resolved->machine, resolved->grid);
+    const auto explained = printer_text(name, false);
+    if (!explained) return explained.error();
+    text += (text.empty() ? "" : "\n") + *explained;
   }
   if (text.empty()) {
-    for (const ShippedMachine& shipped : shipped_machines()) {
+    for (const ShippedProfile& shipped : shipped_machines()) {
       const Result<Machine> machine = read_machine(shipped.text, std::string(shipped.name));
       if (!machine) return machine.error();
       text += fmt::format("{:<16}{}\n", shipped.name, machine->description);
     }
     text += "\nlamina extrude:\n";
-    for (const ShippedExtruder& shipped : shipped_extruders()) {
+    for (const ShippedProfile& shipped : shipped_extruders()) {
       const auto profile = read_extruder(shipped.text, std::string(shipped.name));
       if (!profile) return profile.error();
       text += fmt::format("{:<16}{}\n", shipped.name, profile->machine.description);

@@ -1,3 +1,4 @@
+// lamina completion and lamina manual: what help.h makes, printed or written.
 #include <fmt/format.h>
 
 #include <filesystem>
@@ -13,6 +14,27 @@
 
 namespace lamina::pipeline {
 namespace {
+
+CommandSpec completion_spec() {
+  CommandSpec spec;
+  spec.summary = "Prints what makes a shell complete the commands and options of lamina; packages install it already.";
+  spec.operand = "SHELL";
+  spec.operand_meaning = "bash, zsh or fish";
+  spec.closing =
+      "Examples:\n"
+      "  lamina completion bash > ~/.local/share/bash-completion/completions/lamina\n"
+      "  lamina completion zsh > ~/.zfunc/_lamina\n"
+      "  lamina completion fish > ~/.config/fish/completions/lamina.fish";
+  return spec;
+}
+
+Outcome run_completion(const Arguments& arguments, Context& context) {
+  const std::string shell = arguments.operands.size() == 1 ? arguments.operands.front() : "";
+  if (shell == "bash") return context.print(bash_completion());
+  if (shell == "zsh") return context.print(zsh_completion());
+  if (shell == "fish") return context.print(fish_completion());
+  return Error{Fault::kUsage, "name one shell: bash, zsh or fish"};
+}
 
 CommandSpec manual_spec() {
   CommandSpec spec;
@@ -34,11 +56,8 @@ Status write_pages(const std::string& directory, bool markdown, bool overwrite) 
   std::vector<std::pair<std::string, std::string>> pages;  // path, text
   if (!markdown) pages.emplace_back(fmt::format("{}/lamina.1", directory), man_page());
   for (const Command* command : commands()) {
-    if (markdown) {
-      pages.emplace_back(fmt::format("{}/{}.md", directory, command->name), markdown_page(*command));
-    } else {
-      pages.emplace_back(fmt::format("{}/lamina-{}.1", directory, command->name), man_page(*command));
-    }
+    pages.emplace_back(fmt::format("{}/{}{}{}", directory, markdown ? "" : "lamina-", command->name, markdown ? ".md" : ".1"),
+                       markdown ? markdown_page(*command) : man_page(*command));
   }
   constexpr std::string_view kMarks[] = {"\"lamina ", "lamina manual --markdown"};
   for (const auto& [path, text] : pages) {
@@ -67,6 +86,8 @@ Outcome run_manual(const Arguments& arguments, Context& context) {
 
 }  // namespace
 
+const Command completion_command = {"completion", "makes a shell complete commands and options", completion_spec,
+                                    run_completion};
 const Command manual_command = {"manual", "manual pages", manual_spec, run_manual};
 
 }  // namespace lamina::pipeline

@@ -2,8 +2,8 @@
 
 #include "pipeline/cli/command.h"
 #include "pipeline/output/merge.h"
-#include "pipeline/text/json.h"
-#include "pipeline/text/readable.h"
+#include "stages/text/json.h"
+#include "stages/text/readable.h"
 
 namespace lamina::pipeline {
 namespace {

@@ -1,20 +1,19 @@
 // lamina permeability: k1 and k2 of measured pressure drops.
 #include <fmt/format.h>
 
-#include <nlohmann/json.hpp>
 #include <numbers>
 
-#include "pipeline/calibrate/permeability.h"
 #include "pipeline/cli/command.h"
 #include "pipeline/cli/plot_file.h"
-#include "pipeline/text/json_text.h"
-#include "pipeline/text/number_text.h"
+#include "stages/segment/flows.h"
+#include "stages/text/json.h"
+#include "stages/text/readable.h"
 
 namespace lamina::pipeline {
 namespace {
 
 struct Settings {
-  Medium medium;
+  segment::Medium medium;
   segment::Fluid fluid;
 };
 
@@ -55,17 +54,16 @@ Result<Settings> read_settings(const Arguments& arguments) {
   }
   const auto number = [&](const char* flag, double unit, double& target) {
     double value = 0;
-    if (!arguments.has(flag)) return std::string();
-    const std::string wrong = read_number(arguments.text(flag), 1e-12, 1e9, "", value);
-    if (wrong.empty()) target = value * unit;
-    return wrong.empty() ? wrong : fmt::format("{}: {}", flag, wrong);
+    const Status status = arguments.read(flag, {1e-12, 1e9}, value);
+    if (value > 0) target = value * unit;
+    return status;
   };
   double diameter = 0;
-  for (const std::string& wrong :
+  for (const Status& status :
        {number("--length", 1e-3, settings.medium.length_m), number("--area", 1e-6, settings.medium.area_m2),
         number("--diameter", 1e-3, diameter), number("--viscosity", 1, settings.fluid.viscosity_pa_s),
         number("--density", 1, settings.fluid.density_kg_m3)}) {
-    if (!wrong.empty()) return usage(wrong);
+    if (!status) return status.error();
   }
   if (diameter > 0) settings.medium.area_m2 = std::numbers::pi / 4 * diameter * diameter;
   if (!(settings.medium.length_m > 0)) return usage("--length is missing; give the medium's length along the flow in mm");
@@ -73,27 +71,17 @@ Result<Settings> read_settings(const Arguments& arguments) {
   return settings;
 }
 
-/// What is odd about a fluid; empty if nothing is.
-std::string warning_of(const segment::Fluid& fluid) {
-  if (fluid.density_kg_m3 <= 100 || fluid.viscosity_pa_s >= 1e-4) return {};
-  return fmt::format(
-      "a fluid of {:.4g} Pa.s and {:.4g} kg/m3 is neither a gas nor a liquid: the density is that of water; "
-      "k2 for air is {:.4g} times smaller",
-      fluid.viscosity_pa_s, fluid.density_kg_m3, fluid.density_kg_m3 / 1.2);
-}
-
 Outcome run_permeability(const Arguments& arguments, Context& context) {
-  using Json = nlohmann::ordered_json;
   if (arguments.operands.size() != 1) return Error{Fault::kUsage, "name one file of measurements"};
   const std::string &file = arguments.operands.front(), plot = arguments.text("--plot");
   if (Status status = check_plot_name(plot); !status) return status;
   const auto settings = read_settings(arguments);
   if (!settings) return settings.error();
-  const auto groups = read_flows(file, settings->medium);
+  const auto groups = segment::read_flows(file, settings->medium);
   if (!groups) return groups.error();
   Json json = {{"command", "permeability"}, {"fits", Json::array()}, {"warnings", Json::array()}};
   std::string text;
-  for (const FlowGroup& group : *groups) {
+  for (const segment::FlowGroup& group : *groups) {
     const auto fit = segment::fit_permeability(group.points, settings->fluid);
     if (!fit)
       return Error{fit.error().fault,
@@ -115,7 +103,7 @@ Outcome run_permeability(const Arguments& arguments, Context& context) {
     if (plot.empty() || &group != &groups->front()) continue;
     if (Status status = write_plot(plot, draw_fit(group, *fit)); !status) return status;
   }
-  if (const std::string warning = warning_of(settings->fluid); !warning.empty()) {
+  if (const std::string warning = segment::odd_about(settings->fluid); !warning.empty()) {
     context.say_text(fmt::format("warning   {}\n", warning));
     json["warnings"].push_back(warning);
   }

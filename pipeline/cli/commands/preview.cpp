@@ -1,5 +1,5 @@
 #include "pipeline/cli/command.h"
-#include "pipeline/cli/preview_program.h"
+#include "stages/write/other_program.h"
 
 namespace lamina::pipeline {
 namespace {
@@ -35,7 +35,7 @@ CommandSpec preview_spec() {
   return spec;
 }
 
-Outcome run_preview(const Arguments& arguments, Context&) { return hand_over_to_preview(arguments.given); }
+Outcome run_preview(const Arguments& arguments, Context&) { return write::hand_over("lamina-preview", arguments.given); }
 
 }  // namespace
 

@@ -1,12 +1,10 @@
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <filesystem>
 
 #include "pipeline/cli/command.h"
 #include "pipeline/show/report.h"
-#include "pipeline/text/number_text.h"
-#include "pipeline/text/readable.h"
+#include "stages/text/readable.h"
 #include "stages/write/file.h"
 
 namespace lamina::pipeline {
@@ -37,8 +35,7 @@ CommandSpec report_spec() {
 /// Whether a browser opens a file of this name as a page. A page under the name of a part, an image or a manifest would
 /// replace it.
 bool is_page_name(const std::string& path) {
-  std::string ending = std::filesystem::path(path).extension().string();
-  std::ranges::transform(ending, ending.begin(), [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  const std::string ending = lower_case(std::filesystem::path(path).extension().string());
   return ending == ".html" || ending == ".htm";
 }
 
@@ -51,10 +48,7 @@ Outcome run_report(const Arguments& arguments, Context& context) {
     return Error{Fault::kUsage, fmt::format("-o {}: the page is HTML; give it a name that ends in .html", output)};
   }
   ReportOptions options;
-  if (arguments.has("--most-bytes")) {
-    const std::string wrong = read_bytes(arguments.text("--most-bytes"), options.size_limit);
-    if (!wrong.empty()) return Error{Fault::kUsage, "--most-bytes: " + wrong};
-  }
+  if (Status status = arguments.read("--most-bytes", read_bytes, options.size_limit); !status) return status;
   options.parts = arguments.all("--parts");
   const Result<Report> report = make_report(arguments.operands.front(), options);
   if (!report) return report.error();

@@ -4,9 +4,9 @@
 
 #include "pipeline/check/verify.h"
 #include "pipeline/cli/command.h"
-#include "pipeline/text/json.h"
-#include "pipeline/text/json_text.h"
-#include "pipeline/text/readable.h"
+#include "stages/text/json.h"
+#include "stages/text/json_text.h"
+#include "stages/text/readable.h"
 
 namespace lamina::pipeline {
 namespace {
@@ -44,8 +44,8 @@ Json replay_json(const VerifyReport& report) {
           {"scan_mm", replay.scan_mm},
           {"travel_mm", replay.travel_mm},
           {"fed_mm", replay.fed_mm},
-          {"binder_mm3", report.binder_mm3},
-          {"powder_mm3", report.powder_mm3},
+          {"binder_mm3", report.material.binder_mm3},
+          {"powder_mm3", report.material.powder_mm3},
           {"farthest_along_um", replay.farthest_along_um},
           {"farthest_across_um", replay.farthest_across_um}};
 }
@@ -79,7 +79,7 @@ void say_replay(const VerifyReport& report, Context& context) {
     // Words for the head alone: whoever drives the axes decides the rest.
     context.say(fmt::format("machine   {:.1f} m scanned in {}; this dialect does not tell other movements nor powder",
                             replay.scan_mm / 1000, readable_seconds(replay.seconds)));
-    context.say(fmt::format("material  {:.3f} ml of binder", report.binder_mm3 / 1000));
+    context.say(fmt::format("material  {:.3f} ml of binder", report.material.binder_mm3 / 1000));
     return;
   }
   if (replay.seconds > 0) {
@@ -87,7 +87,8 @@ void say_replay(const VerifyReport& report, Context& context) {
                             replay.scan_mm / 1000, replay.travel_mm / 1000));
   }
   context.say(fmt::format("material  {:.3f} ml of binder, {:.2f} cm3 of powder fed (solid), {:.2f} and {:.2f} mm of the vats",
-                          report.binder_mm3 / 1000, report.powder_mm3 / 1000, replay.fed_mm[0], replay.fed_mm[1]));
+                          report.material.binder_mm3 / 1000, report.material.powder_mm3 / 1000, replay.fed_mm[0],
+                          replay.fed_mm[1]));
 }
 
 Outcome run_verify(const Arguments& arguments, Context& context) {

@@ -6,10 +6,9 @@
 #include <nlohmann/json.hpp>
 
 #include "pipeline/cli/console.h"
-#include "pipeline/cli/progress_bar.h"
 #include "pipeline/run/summary.h"
-#include "pipeline/text/json_text.h"
-#include "pipeline/text/readable.h"
+#include "stages/text/json_text.h"
+#include "stages/text/readable.h"
 #include "tests/commands/program.h"
 
 namespace lamina::pipeline {
@@ -46,24 +45,6 @@ TEST(Console, NumbersAreReadable) {
   EXPECT_EQ(readable_seconds(0.0123), "0.012 s");
   EXPECT_EQ(readable_seconds(200), "3 min 20 s");
   EXPECT_EQ(readable_seconds(7500), "2 h 05 min");
-}
-
-TEST(Progress, TellsRateAndTimeLeftOfTheLayersThatWerePlannedNow) {
-  const ProgressEvent event{ProgressEvent::Stage::kLayers, 60, 100};
-  EXPECT_EQ(Progress::text(event, 0, 6), "60/100 layers, 10.0 layers/s, 4.0 s left");
-  EXPECT_EQ(Progress::text(event, 50, 1), "60/100 layers, 10.0 layers/s, 4.0 s left") << "50 were kept by resume";
-  EXPECT_EQ(Progress::text(event, 60, 1), "60/100 layers");
-  EXPECT_EQ(Progress::text({ProgressEvent::Stage::kLayers, 100, 100}, 0, 10), "100/100 layers, 10.0 layers/s");
-  EXPECT_EQ(Progress::text({ProgressEvent::Stage::kLayers, 0, 0}, 0, 0), "0/0 layers");
-}
-
-TEST(Progress, MillionEventsCostNoMillionWrites) {
-  testing::internal::CaptureStderr();
-  Progress progress(Progress::Style::kBar);
-  for (std::uint32_t i = 0; i < 1'000'000; ++i) progress({ProgressEvent::Stage::kLayers, i, 1'000'000});
-  progress.clear();
-  const std::string told = testing::internal::GetCapturedStderr();
-  EXPECT_LT(std::count(told.begin(), told.end(), '\r'), 1000);
 }
 
 TEST(Summary, JsonHoldsWhatTheTextTells) {

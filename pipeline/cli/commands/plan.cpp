@@ -1,0 +1,287 @@
+// lamina jet, slice and extrude: the commands that plan a job, one way through, three rows of data.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <span>
+
+#include "pipeline/cli/command.h"
+#include "pipeline/cli/keys.h"
+#include "pipeline/cli/outputs.h"
+#include "pipeline/job/file.h"
+#include "pipeline/job/job.h"
+#include "pipeline/machine/extruder.h"
+#include "pipeline/machine/profiles.h"
+#include "pipeline/plan/plan.h"
+#include "pipeline/run/run.h"
+#include "stages/text/json.h"
+#include "stages/write/image_format.h"
+
+namespace lamina::pipeline {
+namespace {
+
+/// What differs between the commands.
+struct PlanCommand {
+  Product product;
+  KeyChoice keys;                         // of the job, as options
+  std::string_view summary;               // what it does, for the help
+  std::span<const OptionSpec> own;        // switches of the row: of --resume, --overwrite and --dry-run those that it has
+  std::span<const OptionSpec> overrides;  // words for keys that mean something else here: value, meaning, preset if not ""
+  std::string closing;                    // notes and examples
+  bool divided = false;                   // its layers can be divided among machines (--shard)
+  /// What the command line decides before the job is checked. errors  kUsage
+  Status (*complete)(const Arguments&, Job&);
+  /// What it leaves to the machine; nullptr: nothing.
+  void (*leave_to_machine)(const Arguments&, Resolved&) = nullptr;
+};
+
+/// Words of a row instead of those of the key.
+void override_words(std::span<const OptionSpec> overrides, CommandSpec& spec) {
+  for (const OptionSpec& other : overrides) {
+    const auto option = std::ranges::find(spec.options, other.flag, &OptionSpec::flag);
+    if (!other.value.empty()) option->value = other.value;
+    if (!other.meaning.empty()) option->meaning = other.meaning;
+    if (!other.preset.empty()) option->preset = other.preset;
+  }
+}
+
+CommandSpec plan_spec(const PlanCommand& row) {
+  CommandSpec spec;
+  spec.summary = row.summary;
+  spec.operand = "PART";
+  spec.operand_meaning = "STL, OBJ or 3MF files, STL and OBJ gzipped too; they replace the parts of --job";
+  add_key_options(row.keys, spec);
+  override_words(row.overrides, spec);
+  if (!row.divided) spec.absent = {{"--shard", kNoShards}};
+  spec.options.insert(spec.options.end(), row.own.begin(), row.own.end());
+  spec.options.push_back({"--json", "", "print the summary as one JSON object on stdout", "", "Run"});
+  spec.options.push_back({"--quiet", "", "say nothing but errors", "", "Run"});
+  spec.closing = row.closing;
+  return spec;
+}
+
+Outcome plan(const PlanCommand& row, const Arguments& arguments, Context& context) {
+  Result<Job> job = read_job_options(row.keys, arguments);
+  if (!job) return job.error();
+  job->resume = arguments.has("--resume");
+  job->overwrite = arguments.has("--overwrite");
+  job->dry_run = arguments.has("--dry-run");
+  job->json = arguments.has("--json");
+  job->quiet = arguments.has("--quiet");
+  if (Status status = row.complete(arguments, *job); !status) return status;
+  if (Status status = check_job(*job); !status) return status;
+  for (const std::string& note : job->notes) {
+    if (!job->quiet) context.say("note: " + note);
+  }
+  Result<Resolved> resolved = resolve(*job, row.product);
+  if (!resolved) return resolved.error();
+  if (row.leave_to_machine != nullptr) row.leave_to_machine(arguments, *resolved);
+  if (arguments.has("--save-job")) {
+    Job saved = resolved->job;
+    if (saved.bed_mm || saved.machine.profile.empty()) saved.bed_mm = resolved->bed.size_mm;
+    if (Status status = save_job(arguments.text("--save-job"), saved); !status) return status.error();
+  }
+  const auto progress = [&](const ProgressEvent& event) { context.progress(event); };
+  const Result<Summary> summary = run(std::move(*resolved), progress, context.cancel());
+  if (!summary) return summary.error();
+  if (!job->quiet) context.say_text(summary->text());
+  if (job->json) {
+    if (Status status = context.give(Json::parse(summary->json())); !status) return status.error();
+  }
+  Outcome outcome;
+  outcome.layers_planned = summary->layers_planned;
+  outcome.layers_kept = summary->layers_kept;
+  return outcome;
+}
+
+// --- lamina jet
+
+// clang-format off
+const KeyChoice kJetKeys = {"bed", "layers", "heights", "place", "image.format", "image.mirror", "machine", "dose", "fill", "segment.fill",
+                            "segment.rule", "segment.thick_mm", "segment.thin_mm", "segment.continuous_lines", "segment.spacing_sc_mm",
+                            "segment.spacing_cc_mm", "segment.gap_mm", "segment.shift_mm", "segment.thick_width_mm",
+                            "segment.thin_width_mm", "load", "run", "part"};
+// clang-format on
+
+const OptionSpec kJetSwitches[] = {
+    {"--material", "NAME|NAME,...", "powder of all parts, or of each in their order; two vats can hold two", "",
+     "Machine and binder"},
+    {"--resume", "", "go on with an interrupted job; finished layers whose hash holds are kept", "", "Run"},
+    {"--overwrite", "", "replace an earlier job in the directory", "", "Run"},
+    {"--dry-run", "", "load, place and index, tell what it would take, write nothing", "", "Run"}};
+
+std::string jet_closing() {
+  std::string text = "Formats:\n";
+  for (const auto& format : write::image_formats()) text += fmt::format("  {:<16}{}\n", format.id, format.description);
+  return text +
+         "\nLengths are mm, angles degrees. Part options hold for every part; a job file sets them for each.\n\n"
+         "Examples:\n"
+         "  lamina jet bracket.stl -o out                                  a part in the middle of the bed\n"
+         "  lamina jet a.stl b.3mf --bed 400x400 --dpi 600 --copies 12 -o out\n"
+         "  lamina jet part.obj --unit inch --rotate 0,0,90 --shrink 1.02,1.02,1.025 -o out\n"
+         "  lamina jet a.stl b.stl --material steel,bronze --machine nuferbj -o out\n"
+         "  lamina jet part.stl --layers 100:110 --format png -o look      ten layers only\n"
+         "  lamina jet part.stl --shard 1/4 -o out                         a quarter; then lamina merge out -o out\n"
+         "  lamina jet part.stl --fill segmented --thin 1.5 --shell 1 -o out   pores planned by the filling, in a solid shell\n"
+         "  lamina jet part.stl --dpi 600 --save-job job.toml --dry-run    write the job, plan nothing\n"
+         "  lamina jet --job job.toml -o out --resume";
+}
+
+Status complete_jet(const Arguments& arguments, Job& job) {
+  if (!arguments.has("--material")) return {};
+  const Status status = set_materials(arguments.text("--material"), job);
+  return status ? status : Error{Fault::kUsage, "--material: " + status.error().message};
+}
+
+PlanCommand jet_row() {
+  return {Product::kImages,
+          kJetKeys,
+          "Plans a binder-jet job: the exact 1-bit image of every layer of the bed, layers/000000.tif and up from the\n"
+          "bottom, and a manifest.json. The same parts and options give the same bytes on every machine.",
+          kJetSwitches,
+          {},
+          jet_closing(),
+          true,
+          complete_jet};
+}
+
+// --- lamina slice
+
+const KeyChoice kSliceKeys = {"bed.size_mm", "layers",     "heights",    "place", "image.fill", "load", "run.output",
+                              "run.threads", "run.memory", "run.layers", "slice", "fill",       "part"};
+
+const OptionSpec kSliceSwitches[] = {{"--resume", "", "go on with an interrupted job: whole layers are kept", "", "Run"},
+                                     {"--overwrite", "", "replace an earlier job in the directory", "", "Run"},
+                                     {"--dry-run", "", "load, place and index, write nothing", "", "Run"}};
+
+/// A sliced job keeps its job beside its manifest.
+Status complete_slice(const Arguments& arguments, Job& job) {
+  const InputFile asked = {arguments.text("--job"), "the job file"};
+  const std::string kept = job.output + "/job.toml";
+  return check_outputs({&asked, 1}, {&kept, 1});
+}
+
+PlanCommand slice_row() {
+  return {Product::kContours,
+          kSliceKeys,
+          "Cuts parts into layers: closed contours in exact nanometres, outer ones counter-clockwise, holes clockwise, as\n"
+          "SVG, CLI or 3MF slices, and fills them if a pattern or walls are asked for.",
+          kSliceSwitches,
+          {},
+          "Lengths are mm, angles degrees. Keys of a filling that have no option are set by --set fill.KEY=VALUE, between\n"
+          "heights by fill.range, for one part by part.fill; docs/filling.md has all of them.\n\n"
+          "Examples:\n"
+          "  lamina slice bracket.stl --layer 0.1 -o out                      out/bracket.svg\n"
+          "  lamina slice bracket.stl --layer 0.05 --format cli-binary -o out\n"
+          "  lamina slice a.stl b.stl --layer 0.2 --format 3mf -o out\n"
+          "  lamina slice part.stl --layer 0.3 --walls 1 --pattern raster --bead 0.4 --bead-gap 0.12 --angle 90 -o out\n"
+          "  lamina slice part.stl --layer 0.3 --pattern raster --stagger 0,0.26 --gap-formula '0.1+0.6*h' -o out",
+          false,
+          complete_slice};
+}
+
+// --- lamina extrude
+
+const KeyChoice kExtrudeKeys = {
+    "layers",     "heights",     "place",      "machine.profile", "fill", "segment", "extrude", "load", "slice.tolerance_um",
+    "run.output", "run.threads", "run.memory", "run.layers",      "part"};
+
+const OptionSpec kExtrudeSwitches[] = {{"--resume", "", "go on with an interrupted job: whole layers are kept", "", "Run"},
+                                       {"--overwrite", "", "replace an earlier file", "", "Run"},
+                                       {"--dry-run", "", "load, place and index, predict, write nothing", "", "Run"}};
+
+const OptionSpec kExtrudeWords[] = {
+    {"-o,--output", "FILE", "file for the toolpaths, as in part.gcode or part.sml", "", ""},
+    {"--machine", "", "extrusion printer: one of those below, or a profile as TOML", "marlin", ""},
+    {"--layer", "", "", "half of the nozzle; in a job file 0.05", ""},
+    {"--walls", "", "", "1; in a job file 0", ""}};
+
+std::string extrude_closing() {
+  std::string text = "Machines:\n";
+  for (const ShippedProfile& shipped : shipped_extruders()) {
+    const auto profile = read_extruder(shipped.text, std::string(shipped.name));
+    text += fmt::format("  {:<16}{}\n", shipped.name, profile ? profile->machine.description : "");
+  }
+  return text +
+         "\nWithout a job file one wall is laid and layers are half of the nozzle thick. Lengths are mm, angles degrees.\n"
+         "docs/extrude.md has the profiles and the file formats, docs/segmented.md the segmented filling.\n\n"
+         "Examples:\n"
+         "  lamina extrude bracket.stl --machine marlin --layer 0.2 --walls 2 --fill raster --bead-gap 1 -o bracket.gcode\n"
+         "  lamina extrude part.stl --machine anet-a8 --layer 0.3 --fill segmented --angle 90 --angle-step 0 -o part.gcode\n"
+         "  lamina extrude part.stl --machine anet-a8 --layer 0.3 --fill segmented --extrusion 125 --thin 2 -o part.gcode\n"
+         "  lamina extrude part.stl --machine fdm-2000 --layer 0.254 --bead 0.508 --fill raster -o part.sml";
+}
+
+bool sets(const Arguments& arguments, std::string_view key) {
+  return std::ranges::any_of(arguments.all("--set"), [&](const std::string& text) { return text.starts_with(key); });
+}
+
+/// A job file says everything; a command line leaves to the printer what a powder job has other defaults for.
+void leave_to_machine(const Arguments& arguments, Resolved& resolved) {
+  if (arguments.has("--job")) return;
+  Job& job = resolved.job;
+  const Extruder& machine = resolved.extruder->machine;
+  if (!arguments.has("--walls") && !sets(arguments, "fill.walls")) job.fill.all.walls = 1;
+  if (!arguments.has("--layer") && !sets(arguments, "layers.thickness_mm") && !sets(arguments, "heights.") &&
+      !arguments.has("--thickness")) {
+    job.layer_mm = machine.format == "sml" && !machine.sml.pd.empty() ? machine.sml.pd.front().thickness_mm
+                                                                      : machine.material.nozzle_mm / 2;
+  }
+}
+
+Status complete_extrude(const Arguments&, Job& job) {
+  if (job.segment.all.on && job.fill.all.pattern == infill::Pattern::kNone) job.fill.all.pattern = infill::Pattern::kRaster;
+  if (job.output.empty() && !job.dry_run) {
+    return Error{Fault::kUsage, "-o FILE is missing; name the file for the toolpaths, or use --dry-run"};
+  }
+  std::error_code ignored;
+  if (!std::filesystem::is_directory(job.output, ignored)) return {};
+  return Error{Fault::kUsage, fmt::format("-o {}: is a directory; name a file in it, as in {}", job.output,
+                                          (std::filesystem::path(job.output) / "part.gcode").string())};
+}
+
+/// Of the file that a batch names after its part.
+std::string extrude_ending(const Arguments& arguments) {
+  Job job;
+  job.machine.profile = arguments.text("--machine");
+  const auto profile = resolve_extruder(job);
+  return profile && profile->machine.format == "sml" ? ".sml" : ".gcode";
+}
+
+PlanCommand extrude_row() {
+  return {Product::kMoves,
+          kExtrudeKeys,
+          "Plans parts for a material extrusion printer: walls, filling and segmented lines as G-code or SML, with what the\n"
+          "pores will be. The same parts and options give the same bytes.",
+          kExtrudeSwitches,
+          kExtrudeWords,
+          extrude_closing(),
+          false,
+          complete_extrude,
+          leave_to_machine};
+}
+
+template <PlanCommand (*kRow)()>
+CommandSpec spec_of_row() {
+  return plan_spec(kRow());
+}
+
+template <PlanCommand (*kRow)()>
+Outcome plan_row(const Arguments& arguments, Context& context) {
+  return plan(kRow(), arguments, context);
+}
+
+}  // namespace
+
+const Command jet_command = {"jet", "binder jetting: exact 1-bit images of every layer of the bed, and a manifest",
+                             spec_of_row<jet_row>, plan_row<jet_row>};
+const Command slice_command = {"slice", "contours of every layer, and their filling: SVG, CLI, 3MF slices",
+                               spec_of_row<slice_row>, plan_row<slice_row>};
+const Command extrude_command = {"extrude",
+                                 "material extrusion: toolpaths as G-code or SML, with segmented lines and their pores",
+                                 spec_of_row<extrude_row>,
+                                 plan_row<extrude_row>,
+                                 false,
+                                 extrude_ending};
+
+}  // namespace lamina::pipeline

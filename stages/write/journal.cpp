@@ -1,0 +1,63 @@
+#include "stages/write/journal.h"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <sys/file.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <utility>
+
+#include "stages/write/file.h"
+
+namespace lamina::write {
+namespace {
+
+Error reason_of(const std::string& path, int code) {
+  return {Fault::kOutput, fmt::format("{}: {}", path, std::strerror(code))};
+}
+
+}  // namespace
+
+Result<Journal> Journal::open(const std::string& path, std::string_view held) {
+  const int file = ::open(path.c_str(), O_RDWR | O_CREAT | O_APPEND | O_CLOEXEC, 0666);
+  if (file < 0) return reason_of(path, errno);
+  Journal journal(path, file);
+  if (::flock(file, LOCK_EX | LOCK_NB) == 0) return journal;
+  if (errno != EWOULDBLOCK) return reason_of(path, errno);
+  return Error{Fault::kOutput, fmt::format("{}: {}", path, held)};
+}
+
+Journal::Journal(Journal&& other) noexcept
+    : path_(std::move(other.path_)), file_(std::exchange(other.file_, -1)), torn_(other.torn_) {}
+
+Journal::~Journal() {
+  if (file_ >= 0) ::close(file_);
+}
+
+bool Journal::empty() const {
+  std::error_code ignored;
+  return std::filesystem::file_size(path_, ignored) == 0;
+}
+
+Status Journal::clear() { return ::ftruncate(file_, 0) == 0 ? Status() : reason_of(path_, errno); }
+
+void Journal::read(const std::function<void(const std::string&)>& line) {
+  std::ifstream lines(path_, std::ios::binary);
+  for (std::string text; std::getline(lines, text);) {
+    torn_ = lines.eof();
+    line(text);
+  }
+}
+
+Status Journal::append(std::string line) {
+  if (torn_) line.insert(line.begin(), '\n');
+  const int reason = write_all(file_, std::as_bytes(std::span(line)));
+  torn_ = reason != 0;
+  return torn_ ? Status(write_failure(path_, reason)) : Status();
+}
+
+}  // namespace lamina::write

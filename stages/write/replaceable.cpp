@@ -1,0 +1,46 @@
+#include "stages/write/replaceable.h"
+
+#include <sys/stat.h>
+
+#include <algorithm>
+#include <fstream>
+
+namespace lamina::write {
+namespace {
+
+constexpr std::size_t kMarkedHead = 4096;  // bytes of a file in which its mark stands
+
+}  // namespace
+
+bool same_file(const std::string& a, const std::string& b) {
+  struct stat first {
+  }, second{};
+  return ::stat(a.c_str(), &first) == 0 && ::stat(b.c_str(), &second) == 0 && first.st_dev == second.st_dev &&
+         first.st_ino == second.st_ino;
+}
+
+bool is_file(const std::string& path) {
+  struct stat status {};
+  return ::stat(path.c_str(), &status) == 0 && S_ISREG(status.st_mode);
+}
+
+bool is_stream(const std::string& path) {
+  struct stat status {};
+  const bool there = ::stat(path.c_str(), &status) == 0;
+  return path == "-" || (there && !S_ISREG(status.st_mode) && !S_ISDIR(status.st_mode));
+}
+
+bool is_replaceable(const std::string& path, std::span<const std::string_view> marks) {
+  if (!is_file(path)) return true;
+  std::string head(kMarkedHead, '\0');
+  std::ifstream file(path, std::ios::binary);
+  file.read(head.data(), static_cast<std::streamsize>(head.size()));
+  head.resize(static_cast<std::size_t>(file.gcount()));
+  const bool marked = std::ranges::any_of(marks, [&](std::string_view mark) {
+    if (mark.empty()) return false;
+    return mark.front() == '^' ? head.starts_with(mark.substr(1)) : head.find(mark) != std::string::npos;
+  });
+  return marked || (head.empty() && file.eof());
+}
+
+}  // namespace lamina::write
