@@ -26,24 +26,32 @@ include(GNUInstallDirs)
 # --- stages: what is done
 lamina_sources(stage_sources "stages/*.cpp")
 list(FILTER stage_sources EXCLUDE REGEX "/stages/write/picture/")
+
 add_library(lamina_stages STATIC ${stage_sources})
 add_library(lamina::stages ALIAS lamina_stages)
 if(LAMINA_UNITE STREQUAL "all")
-  list(FILTER stage_sources EXCLUDE REGEX "/(load/stl_ascii|load/stl_binary|slice/order|slice/gaps)\\.cpp$")  # names of their own
+  list(FILTER stage_sources EXCLUDE REGEX "/(load/stl_ascii|load/stl_binary|read/profiles/printer|slice/order|slice/gaps)\\.cpp$")  # names of their own
   lamina_unite(lamina_stages ${stage_sources})
 endif()
 target_include_directories(lamina_stages PUBLIC $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}>
                                                 $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}/lamina>)
 target_link_libraries(lamina_stages PUBLIC TBB::tbb Eigen3::Eigen fmt::fmt embree
                       PRIVATE TIFF::TIFF PNG::PNG ZLIB::ZLIB PkgConfig::LIBZIP PkgConfig::LIB3MF
-                              PkgConfig::POLYCLIPPING PkgConfig::MUPARSER PkgConfig::XXHASH)
+                              PkgConfig::POLYCLIPPING PkgConfig::MUPARSER PkgConfig::XXHASH nlohmann_json::nlohmann_json)
+set_source_files_properties(${PROJECT_SOURCE_DIR}/stages/text/version.cpp PROPERTIES
+                            COMPILE_DEFINITIONS LAMINA_VERSION="${PROJECT_VERSION}" SKIP_PRECOMPILE_HEADERS ON)
+
+# Profiles are read once a job.
+set_source_files_properties(${PROJECT_SOURCE_DIR}/stages/read/profiles/extruder.cpp
+                            ${PROJECT_SOURCE_DIR}/stages/read/profiles/printer.cpp PROPERTIES
+                            COMPILE_OPTIONS $<$<NOT:$<CONFIG:Debug>>:-O1>)
 
 # --- pipeline: how work moves
 lamina_sources(pipeline_sources "pipeline/*.cpp")
 list(FILTER pipeline_sources EXCLUDE REGEX "/pipeline/(main|preview_main|show/sheet|show/swath)\\.cpp$")
 # What runs once a job is compiled to be compiled fast; what runs once a layer, and what decodes programs, is optimised.
 lamina_sources(once_a_job "pipeline/batch/*.cpp" "pipeline/calibrate/*.cpp" "pipeline/cli/*.cpp" "pipeline/job/*.cpp"
-               "pipeline/machine/*.cpp" "pipeline/show/*.cpp" "pipeline/text/*.cpp")
+               "pipeline/machine/*.cpp" "pipeline/show/*.cpp")
 list(FILTER once_a_job EXCLUDE REGEX "/show/(sheet|swath)\\.cpp$")
 list(REMOVE_ITEM pipeline_sources ${once_a_job})
 add_library(lamina_once_a_job OBJECT ${once_a_job})
@@ -51,16 +59,12 @@ target_link_libraries(lamina_once_a_job PRIVATE lamina::stages nlohmann_json::nl
 target_compile_options(lamina_once_a_job PRIVATE $<$<NOT:$<CONFIG:Debug>>:-O1>)
 if(LAMINA_UNITE)
   set(united ${once_a_job})
-  list(FILTER united EXCLUDE REGEX "/(machine/printer_profile|show/slice_series|cli/commands/(jet|slice|extrude)|job/extrude)\\.cpp$")
+  list(FILTER united EXCLUDE REGEX "/(cli/commands/plan|job/extrude)\\.cpp$")
   lamina_unite(lamina_once_a_job ${united})
 endif()
 
 add_library(lamina_pipeline STATIC ${pipeline_sources} $<TARGET_OBJECTS:lamina_once_a_job>)
 add_library(lamina::pipeline ALIAS lamina_pipeline)
-# toml++ is used as headers: job/file.cpp wants errors as values, and Debian's library was built with exceptions.
-foreach(library lamina_pipeline lamina_once_a_job)
-  target_compile_definitions(${library} PRIVATE LAMINA_VERSION="${PROJECT_VERSION}")
-endforeach()
 target_link_libraries(lamina_pipeline PUBLIC lamina::stages PRIVATE nlohmann_json::nlohmann_json)
 if(LAMINA_UNITE STREQUAL "all")
   list(FILTER pipeline_sources EXCLUDE REGEX "/plan/(plan|segment)\\.cpp$")

@@ -4,8 +4,8 @@
 // operands stay where they are, new corners are rounded to the nearest nm.
 #pragma once
 
+#include "stages/data/choices.h"
 #include "stages/data/contours.h"
-#include "stages/data/fill_rule.h"
 #include "stages/data/status.h"
 
 namespace lamina {

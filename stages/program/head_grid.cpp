@@ -262,6 +262,39 @@ Status Builder::check_speed() {
 
 Result<HeadGrid> make_head_grid(const Machine& machine) { return Builder(machine).build(); }
 
+Status ask_for_dpi(Machine& machine, const HeadGrid& grid, const std::array<std::int64_t, 2>& dpi) {
+  const auto refuse = [](const std::string& what) { return Error{Fault::kUsage, "bed.dpi: " + what}; };
+  const bool scan_x = machine.mounting.scan_axis == ScanAxis::kX;
+  const auto across = static_cast<double>(dpi[scan_x ? 1 : 0]), along = static_cast<double>(dpi[scan_x ? 0 : 1]);
+  const double head = kNmPerInch / (grid.line_nm * grid.passes);
+  const double passes = std::round(across / head);
+  // The last nozzle may be a quarter of a pixel off.
+  if (passes < 1 || passes > 64 || std::abs(across / head - passes) * grid.nozzles > 0.25) {
+    return refuse(
+        fmt::format("{:g} dpi across the scan: the head of {} reaches {:.2f} and its multiples; change the "
+                    "tilt or the asked dpi",
+                    across, machine.name, head));
+  }
+  machine.mounting.passes = static_cast<std::uint32_t>(passes);
+  if (machine.mounting.dpi != 0) machine.mounting.dpi = std::round(head * passes * 1e6) / 1e6;
+  const double square = kNmPerInch / grid.line_nm * passes / grid.passes;
+  if (machine.motion.ticks_per_pixel > 0) {
+    const double ticks = std::round(machine.motion.encoder_dpi / along);
+    if (ticks < 1 || std::abs(machine.motion.encoder_dpi / ticks - along) > 0.5) {
+      return refuse(
+          fmt::format("{:g} dpi along the scan: the encoder of {} has {:g} ticks an inch; ask for a "
+                      "whole fraction of it",
+                      along, machine.name, machine.motion.encoder_dpi));
+    }
+    machine.motion.ticks_per_pixel = static_cast<std::uint32_t>(ticks);
+  } else if (std::abs(along - square) > 0.5) {
+    machine.mounting.along_dpi = along;
+  } else {
+    machine.mounting.along_dpi = 0;
+  }
+  return {};
+}
+
 std::string explain(const Machine& machine, const HeadGrid& grid) {
   std::string text;
   const auto line = [&](std::string_view name, const std::string& value) { text += fmt::format("{:<12}{}\n", name, value); };

@@ -1,6 +1,9 @@
 // stages/program/head_grid.h: from the mounting of a head to the grid of pixels that it can reach.
 #pragma once
 
+#include <array>
+#include <cstdint>
+
 #include "stages/data/machine.h"
 #include "stages/data/program.h"
 #include "stages/data/status.h"
@@ -21,6 +24,12 @@ namespace lamina::program {
 /// errors  kUsage, "machine: key: what is wrong"; among them: no angle, no pitch, a dpi that the head cannot reach,
 ///         rows that do not land on lines, all nozzles blocked or one that does not exist, too fast for the nozzles
 Result<HeadGrid> make_head_grid(const Machine& machine);
+
+/// Changes a machine so that it prints at these dpi, along x and y, if its head can: across the scan by its number of
+/// interlaced passes, along it by the length of a pixel.
+/// grid    of the machine as it is
+/// errors  kUsage, "bed.dpi: what is wrong": dpi that the head or the encoder cannot reach
+Status ask_for_dpi(Machine& machine, const HeadGrid& grid, const std::array<std::int64_t, 2>& dpi);
 
 /// What follows from a profile, one fact a line, for people.
 std::string explain(const Machine& machine, const HeadGrid& grid);

@@ -2,8 +2,8 @@
 #pragma once
 
 #include "stages/data/buffer.h"
+#include "stages/data/choices.h"
 #include "stages/data/contours.h"
-#include "stages/data/fill_rule.h"
 #include "stages/data/status.h"
 
 namespace lamina::slice {

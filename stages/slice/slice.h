@@ -16,8 +16,8 @@
 #include <span>
 #include <vector>
 
+#include "stages/data/choices.h"
 #include "stages/data/contours.h"
-#include "stages/data/fill_rule.h"
 #include "stages/data/mesh.h"
 #include "stages/data/status.h"
 #include "stages/slice/chain.h"

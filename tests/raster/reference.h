@@ -3,7 +3,7 @@
 
 #include <span>
 
-#include "stages/data/fill_rule.h"
+#include "stages/data/choices.h"
 #include "stages/data/grid.h"
 #include "stages/data/mesh.h"
 #include "stages/data/runs.h"

@@ -10,7 +10,7 @@
 #include <regex>
 
 #include "pipeline/machine/powder_printer.h"
-#include "pipeline/machine/printer_profile.h"
+#include "pipeline/machine/profiles.h"
 #include "stages/load/load.h"
 #include "stages/program/compile.h"
 #include "stages/raster/raster.h"
@@ -69,23 +69,9 @@ ResolvedMachine shrunk(Machine machine, double columns, double rows) {
   return *small;
 }
 
-TEST(ShippedMachines, AreTheNineThatTheDocumentsNameAndTheirTextReadsBackTheSame) {
-  EXPECT_EQ(shipped_machines().size(), 9u);
-  for (const ShippedMachine& shipped : shipped_machines()) {
-    const auto machine = read_machine(shipped.text, std::string(shipped.name));
-    ASSERT_TRUE(machine.ok()) << machine.error().message;
-    EXPECT_EQ(machine->name, shipped.name);
-    const std::string text = machine_text(*machine);
-    const auto again = read_machine(text, "text");
-    ASSERT_TRUE(again.ok()) << again.error().message;
-    EXPECT_EQ(machine_text(*again), text);
-    EXPECT_TRUE(resolve_profile(*machine).ok()) << resolve_profile(*machine).error().message;
-  }
-}
-
-TEST(Replay, PrintsTheImageBitForBitOnEveryShippedMachine) {
+TEST(Replay, PrintsTheImageBitForBitOnEveryShippedProfile) {
   Random random(11);
-  for (const ShippedMachine& shipped : shipped_machines()) {
+  for (const ShippedProfile& shipped : shipped_machines()) {
     const auto machine = read_machine(shipped.text, std::string(shipped.name));
     for (int image_number = 0; image_number < 6; ++image_number) {
       const ResolvedMachine resolved = shrunk(*machine, 130 + random() % 200, 130 + random() % 200);
@@ -145,11 +131,11 @@ constexpr double kSideMm = 8;
 constexpr double kSideMm = 16;
 #endif
 
-TEST(Replay, EveryClosedModelIsPrintedBitForBitOnEveryShippedMachine) {
+TEST(Replay, EveryClosedModelIsPrintedBitForBitOnEveryShippedProfile) {
   const char* const folder = std::getenv("LAMINA_MODELS");
   if (folder == nullptr) GTEST_SKIP() << "LAMINA_MODELS is not set: NO real part was printed on all machines";
   std::vector<ResolvedMachine> machines;
-  for (const ShippedMachine& shipped : shipped_machines()) {
+  for (const ShippedProfile& shipped : shipped_machines()) {
     machines.push_back(*resolve_profile(*read_machine(shipped.text, std::string(shipped.name))));
   }
   std::vector<std::string> files;
@@ -237,7 +223,7 @@ TEST(Replay, ATruncatedOrEditedProgramFailsWithTheLayerTheSwathAndTheStep) {
     machine.dialect = dialect.id;
     machines.push_back(shrunk(machine, 80, 30));
   }
-  for (const ShippedMachine& shipped : shipped_machines()) {
+  for (const ShippedProfile& shipped : shipped_machines()) {
     machines.push_back(shrunk(*read_machine(shipped.text, std::string(shipped.name)), 160, 90));
   }
   for (std::size_t number = 0; number < machines.size(); ++number) {
@@ -284,20 +270,6 @@ TEST(Replay, ATruncatedOrEditedProgramFailsWithTheLayerTheSwathAndTheStep) {
     }
     EXPECT_LT(unnoticed * 3, tried) << name;  // numbers of speeds and of swaths print the same
   }
-}
-
-TEST(Reach, PartsOutsideOfTheBedOrAboveItAreRefusedWithTheirPlace) {
-  const auto nuferbj = find_machine("nuferbj");
-  ASSERT_TRUE(nuferbj.ok());
-  EXPECT_FALSE(find_machine("nuferbk").ok());
-  EXPECT_NE(find_machine("nuferbk").error().message.find("did you mean"), std::string::npos);
-  const auto wrong = read_machine("[machine]\nname = \"x\"\ndialect = \"klingon\"\n", "x.toml");
-  ASSERT_FALSE(wrong.ok());
-  EXPECT_NE(wrong.error().message.find("x.toml:3:11: machine.dialect: 'klingon' is none of"), std::string::npos);
-  const auto unknown = read_machine("[machine]\nname = \"x\"\n[head]\nnozzels = 3\n", "x.toml");
-  ASSERT_FALSE(unknown.ok());
-  EXPECT_TRUE(unknown.error().message.starts_with("x.toml:4:")) << unknown.error().message;
-  EXPECT_NE(unknown.error().message.find("head.nozzels: no such key"), std::string::npos) << unknown.error().message;
 }
 
 }  // namespace

@@ -4,7 +4,7 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
-#include "pipeline/machine/extruder.h"
+#include "pipeline/machine/profiles.h"
 #include "pipeline/plan/segment.h"
 #include "tests/commands/program.h"
 #include "tests/segment/gcode_reader.h"

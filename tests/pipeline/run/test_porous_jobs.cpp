@@ -174,14 +174,14 @@ TEST_F(PorousJob, PorosityOfTheBitmapIsThatOfThePlanWithinThePixelsOfItsEdges) {
   job.fill.all.angle_step_deg = 75;
   job.segment.all.on = true;
   job.segment.all.thin_width_mm = 0.15;
-  const PixelGrid grid = pipeline::grid_of(job);
+  const PixelGrid grid = pipeline::resolve_powder_printer(job)->grid;
   for (const auto& [ends, pattern] : {std::pair{raster::BeadEnds::kRound, infill::Pattern::kRaster},
                                       {raster::BeadEnds::kSquare, infill::Pattern::kRaster},
                                       {raster::BeadEnds::kRound, infill::Pattern::kContour}}) {
     job.dose.bead_ends = ends;
     job.fill.all.pattern = pattern;
     job.fill.all.walls = ends == raster::BeadEnds::kRound ? 1 : 0;
-    auto plan = test::plan_of(job, pipeline::Product::kImages);
+    auto plan = test::plan_of(job, Product::kImages);
     ASSERT_TRUE(plan.ok()) << plan.error().message;
     pipeline::Scene scene = *plan->scene;
     auto rasterizer = raster::Rasterizer::build(scene.meshes, scene.instances, grid, FillRule::kNonzero, false, true);

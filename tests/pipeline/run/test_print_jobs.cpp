@@ -12,7 +12,7 @@
 #include <nlohmann/json.hpp>
 
 #include "pipeline/check/verify.h"
-#include "pipeline/machine/printer_profile.h"
+#include "pipeline/machine/profiles.h"
 #include "pipeline/output/merge.h"
 #include "pipeline/run/run.h"
 
@@ -61,12 +61,12 @@ class PrintJobs : public ::testing::Test {
   fs::path directory_;
 };
 
-TEST_F(PrintJobs, ProgramsOfRealPartsPrintTheirImagesOnEveryShippedMachine) {
+TEST_F(PrintJobs, ProgramsOfRealPartsPrintTheirImagesOnEveryShippedProfile) {
   const std::pair<const char*, double> parts[] = {{"parameter_quality_nut.stl", 1},
                                                   {"dental_crown.stl", 2},
                                                   {"quad_knot.obj", 0.3},
                                                   {"rabbit_9_overlapping_shells.obj", 1}};
-  for (const ShippedMachine& machine : shipped_machines()) {
+  for (const ShippedProfile& machine : shipped_machines()) {
     for (const auto& [part, scale] : parts) {
       Job made = job(part, scale, std::string(machine.name), std::string(machine.name) + part);
       if (machine.name == "production-1200" || machine.name == "jet1000") made.layer_mm = 10;  // drops by the million
@@ -161,7 +161,7 @@ TEST_F(PrintJobs, APixelThatAWorkingNozzleLeavesOutIsToldWhereverOthersAreBlocke
   for (const char* const rule : {"report", "neighbour"}) {
     Job made = job("dental_crown.stl", 2, "nuferbj", rule);
     std::ofstream profile(directory_ / (std::string(rule) + ".toml"));
-    for (const ShippedMachine& shipped : shipped_machines()) {
+    for (const ShippedProfile& shipped : shipped_machines()) {
       if (shipped.name != "nuferbj") continue;
       std::string text(shipped.text);
       const std::size_t head = text.find("[head]\n");
@@ -285,11 +285,7 @@ TEST_F(PrintJobs, WhatTheMachineCannotDoIsRefusedInOneLine) {
       "is less than a step of nuferbj");
   refused([](Job& j) { j.machine.scan_speed_mm_s = 500; }, "fires a nozzle");
   refused([](Job& j) { j.machine.profile = "nuferbk"; }, "did you mean 'nuferbj'");
-  refused(
-      [](Job& j) {
-        j.dpi = {300, 300}, j.machine.dpi_given = true;
-      },
-      "300 dpi across the scan: the head of nuferbj reaches 262.01");
+  refused([](Job& j) { j.dpi = {300, 300}; }, "300 dpi across the scan: the head of nuferbj reaches 262.01");
   refused([](Job& j) { j.machine.blocked = std::vector<std::uint32_t>{128}; }, "there is no nozzle 128");
 }
 

@@ -7,8 +7,9 @@
 #include <sstream>
 #include <tuple>
 
+#include "pipeline/job/keys.h"
 #include "pipeline/plan/fill.h"
-#include "pipeline/text/toml.h"
+#include "stages/text/toml.h"
 #include "tests/commands/program.h"
 
 namespace lamina::test {
@@ -402,8 +403,8 @@ TEST(SliceProgram, PreviewsOfSeveralLayersAreASheetAndWhatIsForImagesIsOneLine) 
 
 pipeline::FillChanges changes_of(std::string_view table) {
   pipeline::FillChanges changes;
-  pipeline::Place at;
-  EXPECT_EQ(pipeline::read_fill_changes(*pipeline::read_toml_value(table), changes, at), "");
+  Place at;
+  EXPECT_EQ(pipeline::read_fill_changes(*read_toml_value(table), changes, at), "");
   return changes;
 }
 

@@ -12,13 +12,15 @@
 #include <nlohmann/json.hpp>
 
 #include "pipeline/check/verify.h"
+#include "pipeline/job/keys.h"
 #include "pipeline/machine/materials.h"
-#include "pipeline/output/manifest.h"
 #include "pipeline/output/merge.h"
 #include "pipeline/run/run.h"
-#include "pipeline/text/toml.h"
 #include "stages/raster/materials.h"
 #include "stages/read/image.h"
+#include "stages/read/profiles/printer.h"
+#include "stages/text/toml.h"
+#include "stages/write/manifest/manifest.h"
 
 namespace lamina::pipeline {
 namespace {
@@ -281,7 +283,7 @@ TEST_F(TwoPowders, WhatTheVatsDoNotHoldIsRefusedInOneLine) {
   refused({"a", "b"}, "hp45", "the parts are of 2 materials (a, b), hp45 has one vat");
   refused({"a", ""}, "nuferbj", "has none; name that of every part, or of none");
   refused({"a"}, profile("materials = [\"bronze\"]"), "powder.materials: 1 names for 2 vats");
-  EXPECT_NE(check_material("a/b").find("is no name of a material"), std::string::npos);
+  EXPECT_NE(read::check_material("a/b").find("is no name of a material"), std::string::npos);
   const auto wrong_ranges = [](const char* text) {
     std::vector<MaterialRange> ranges;
     Place at;

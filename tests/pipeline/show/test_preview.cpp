@@ -5,8 +5,8 @@
 #include <cstdio>
 #include <cstdlib>
 
-#include "pipeline/output/manifest.h"
 #include "stages/write/file.h"
+#include "stages/write/manifest/manifest.h"
 #include "tests/write/images.h"
 
 namespace lamina::write {
@@ -37,7 +37,7 @@ class Preview : public ::testing::Test {
 
   void make_job(const std::string& id) {
     const ImageFormat* format = find_image_format(id);
-    pipeline::ManifestHead head;
+    ManifestHead head;
     head.version = "0";
     head.format = id;
     head.extension = format->extension;
@@ -45,11 +45,11 @@ class Preview : public ::testing::Test {
     head.mirror = "none";
     head.grid = {PixelAxis(300, 25'400'000), PixelAxis(150, 12'700'000)};
     head.layer_count = head.last_layer = 20;
-    pipeline::PartSummary part;
+    PartSummary part;
     part.path = "some \xC3\xA9 part.stl";
     head.parts = {part};
     fs::create_directories(folder_ / "layers");
-    auto writer = pipeline::ManifestWriter::open(folder_ / "manifest.json", head, {});
+    auto writer = ManifestWriter::open(folder_ / "manifest.json", head, {});
     ASSERT_TRUE(writer.ok()) << writer.error().message;
     for (std::uint32_t k = 0; k < 20; ++k) {
       std::vector<testing::Row> rows(75);
@@ -57,9 +57,9 @@ class Preview : public ::testing::Test {
       const Runs runs = testing::image_of(300, rows);
       const Bytes file = testing::encoded(*format, runs, 300, 150);
       if (!head.extension.empty()) {
-        ASSERT_TRUE(write_file(folder_ / pipeline::layer_file_name(k, head.extension), file).ok());
+        ASSERT_TRUE(write_file(folder_ / layer_file_name(k, head.extension), file).ok());
       }
-      pipeline::LayerRecord record{};
+      LayerRecord record{};
       record.layer = {k, static_cast<Nm>(k * 100'000), 100'000};
       record.bytes = file.size();
       record.set_pixels = set_pixels(runs);

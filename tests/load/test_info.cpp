@@ -1,5 +1,5 @@
-// tests/pipeline/show/test_info.cpp: the report of `lamina info`.
-#include "pipeline/show/info.h"
+// tests/load/test_info.cpp: the report of `lamina info`.
+#include "stages/load/info/info.h"
 
 #include <nlohmann/json.hpp>
 
@@ -9,13 +9,13 @@ namespace lamina::test {
 namespace {
 
 std::string text_of(const std::string& path, const load::LoadOptions& options = {}) {
-  const Result<std::string> text = pipeline::describe_part_text(path, options);
+  const Result<std::string> text = load::describe_part_text(path, options);
   EXPECT_TRUE(text.ok()) << text.error().message;
   return text ? *text : "";
 }
 
 nlohmann::json json_of(const std::string& path) {
-  const Result<std::string> text = pipeline::describe_part_json(path, {});
+  const Result<std::string> text = load::describe_part_json(path, {});
   EXPECT_TRUE(text.ok()) << text.error().message;
   return text ? nlohmann::json::parse(*text) : nlohmann::json();
 }
@@ -59,10 +59,10 @@ TEST(Info, JsonHasTheSameNumbers) {
 }
 
 TEST(Info, AFileThatCannotBePlannedIsAnError) {
-  const Result<std::string> text = pipeline::describe_part_text(corpus("broken/plane_flat.stl"), {});
+  const Result<std::string> text = load::describe_part_text(corpus("broken/plane_flat.stl"), {});
   ASSERT_FALSE(text.ok());
   EXPECT_EQ(text.error().fault, Fault::kInput);
-  EXPECT_FALSE(pipeline::describe_part_json(corpus("broken/empty_file.stl"), {}).ok());
+  EXPECT_FALSE(load::describe_part_json(corpus("broken/empty_file.stl"), {}).ok());
 }
 
 TEST(Info, EveryPartOfTheCorpusIsDescribed) {

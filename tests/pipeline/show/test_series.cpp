@@ -1,5 +1,5 @@
-// tests/pipeline/show/test_gcode_series.cpp: layers of G-code, drawn.
-#include "pipeline/show/gcode_series.h"
+// tests/pipeline/show/test_series.cpp: layers of G-code, drawn.
+#include "pipeline/show/series.h"
 
 #include <gtest/gtest.h>
 
