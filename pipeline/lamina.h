@@ -8,7 +8,8 @@
 //      verify(job.output, {});                        are they what the manifest says: VerifyReport
 //      LayerSource::make(job);                        or layer by layer, without a file: images, contours
 //
-// What fails is a Result with one line and a Fault, which is the exit code of the program too. Nothing throws.
+// What fails is a Result with one line and a Fault, which is the exit code of the program too. Only what a library below
+// throws, as std::bad_alloc, passes through.
 #pragma once
 
 #include <string_view>

@@ -71,6 +71,13 @@ struct LayerEntry {
   std::uint8_t reason;
 };
 
+py::array table_of(const std::vector<Layer>& layers) {
+  py::array_t<LayerEntry> array(static_cast<py::ssize_t>(layers.size()));
+  LayerEntry* entry = array.mutable_data();
+  for (const Layer& layer : layers) *entry++ = {layer.bottom, layer.thickness, static_cast<std::uint8_t>(layer.reason)};
+  return array;
+}
+
 class Plan {
  public:
   explicit Plan(const Job& job) : source_(without_lock([&] { return pipeline::LayerSource::make(job); })) {}
@@ -101,13 +108,9 @@ class Plan {
   }
 
   py::array heights() const {
-    py::array_t<LayerEntry> array(of().layer_count());
-    LayerEntry* entry = array.mutable_data();
-    for (std::uint32_t i = 0; i < of().layer_count(); ++i) {
-      const Layer layer = of().layer(i);
-      *entry++ = {layer.bottom, layer.thickness, static_cast<std::uint8_t>(layer.reason)};
-    }
-    return array;
+    std::vector<Layer> layers;
+    for (std::uint32_t i = 0; i < of().layer_count(); ++i) layers.push_back(of().layer(i));
+    return table_of(layers);
   }
 
  private:
@@ -313,6 +316,15 @@ PYBIND11_MODULE(lamina, module) {
       "parts"_a = py::none(), "settings"_a = py::dict(), "job"_a = "", "materials"_a = py::none(),
       "A job ready to give its layers. parts: a path or several; job: a TOML job file, which settings override; materials: the "
       "powder of all parts, or a sequence with that of each.");
+  module.def(
+      "heights",
+      [](const py::object& parts, const py::dict& settings, const std::string& job) {
+        const pipeline::Job asked = make_job(parts, settings, py::none(), job);
+        return table_of(without_lock([&] { return pipeline::layers_of(asked); }));
+      },
+      "parts"_a = py::none(), "settings"_a = py::dict(), "job"_a = "",
+      "The layers alone, as lamina heights decides them: a structured array, a row a layer: bottom and thickness in nm (int32), "
+      "reason (index into lamina.reasons).");
   const auto def_product = [&](const char* name, auto function, const char* meaning) {
     module.def(name, function, "output"_a, "parts"_a = py::none(), "settings"_a = py::dict(), "job"_a = "", "resume"_a = false,
                "overwrite"_a = false, "materials"_a = py::none(), meaning);

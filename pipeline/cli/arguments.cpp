@@ -51,7 +51,7 @@ Result<Arguments> read_arguments(const CommandSpec& spec, const std::vector<std:
     return Error{Fault::kUsage, fmt::format("{}; see lamina {} --help", line, spec.name)};
   };
   CLI::App app(spec.summary + "\n", "lamina " + spec.name);
-  app.footer("\n" + spec.closing);
+  app.footer([&spec] { return "\n" + spec.end(); });
   app.get_formatter()->column_width(28);
   app.allow_extras();
 

@@ -27,10 +27,13 @@ struct CommandSpec {
   std::string operand, operand_meaning;  // "PART", "..."; as many as there are
   std::vector<OptionSpec> options;
   std::string closing;                                                // examples, at the end of the help
+  std::string (*more)() = nullptr;                                    // the same, made only where it is read
   std::vector<std::pair<std::string_view, std::string_view>> absent;  // options of other commands, and why this one has none
 
   /// The option that `flag`, "--output" or "-o", names, or nullptr.
   const OptionSpec* find(std::string_view flag) const;
+  /// All that stands at the end of the help.
+  std::string end() const { return more == nullptr ? closing : closing + more(); }
 };
 
 /// What a reader (value.h, number_text.h) says of an option's text, behind the option's name; "" is no error.

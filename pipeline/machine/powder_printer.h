@@ -9,6 +9,7 @@
 #include "stages/data/machine.h"
 #include "stages/data/program.h"
 #include "stages/data/status.h"
+#include "stages/text/value.h"  // kMostMm
 
 namespace lamina::pipeline {
 
@@ -18,6 +19,8 @@ struct Bed {
   bool of_machine = false;  // no other can be asked for
 };
 
+/// Of parts that are looked at without a printer.
+inline constexpr Bed kLargestBed{{kMostMm, kMostMm}};
 /// That of a job without a machine.
 inline Bed bare_bed(const Job& job) { return {job.bed_mm.value_or(kBareBedMm), false}; }
 

@@ -37,12 +37,14 @@ Result<Profile> find(const std::string& name_or_file, std::span<const ShippedPro
 }  // namespace
 
 Result<Machine> read_machine(std::string_view text, const std::string& where) {
+  count(Decision::kMachine);
   std::vector<std::string_view> dialects;
   for (const auto& dialect : write::dialects()) dialects.push_back(dialect.id);
   return read::read_machine(text, where, dialects);
 }
 
 Result<ExtruderProfile> read_extruder(std::string_view text, const std::string& where) {
+  count(Decision::kMachine);
   auto profile = read::read_extruder(text, where, {.machine = {}, .calibration = segment::anet_a8_calibration()});
   if (!profile) return profile;
   if (const Status status = segment::check(profile->calibration); !status) {
@@ -52,14 +54,12 @@ Result<ExtruderProfile> read_extruder(std::string_view text, const std::string& 
 }
 
 Result<Machine> find_machine(const std::string& name_or_file) {
-  count(Decision::kMachine);
   return find(name_or_file, shipped_machines(), read_machine, [&](const std::string& near, const std::string& names) {
     return fmt::format("no machine '{}'; name a profile (a file that ends in .toml) or one of {}{}", name_or_file, names, near);
   });
 }
 
 Result<ExtruderProfile> find_extruder(const std::string& name_or_file) {
-  count(Decision::kMachine);
   return find(name_or_file, shipped_extruders(), read_extruder, [&](const std::string& near, const std::string& names) {
     return fmt::format("no extrusion printer '{}'{}; name a profile (a file that ends in .toml) or one of {}",
                        one_line(name_or_file), near, names);

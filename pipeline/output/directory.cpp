@@ -134,16 +134,17 @@ bool read_program_file_name(std::string_view name, std::uint32_t& index, bool& p
   return std::ranges::any_of(write::dialects(), [&](const write::Dialect& one) { return extension == one.extension; });
 }
 
-Status check_output(const Job& job) {
-  count(Decision::kOutput);
-  std::error_code error;
-  const fs::file_status status = fs::status(job.output, error);
-  if (!fs::exists(status)) return {};
-  if (!fs::is_directory(status)) {
-    return Error{Fault::kOutput, fmt::format("{}: is a file, not a directory; name another one with -o", job.output)};
-  }
+namespace {
+
+/// What the manifests of a directory say of who else is or was there.
+struct Neighbours {
+  bool begun = false, shared = false;  // an earlier run of this job or shard; other shards of the same split
+};
+
+/// errors  kOutput: another run writes now; kUsage: what is there may not be replaced
+Result<Neighbours> check_manifests(const Job& job) {
   const std::string own = manifest_name(job);
-  bool shared = false, begun = false;
+  Neighbours found;
   for (const ManifestFile& file : find_manifests(job.output)) {
     const bool is_own = file.name == own || file.name == own + std::string(kPartial);
     const auto refuse = [&](std::string_view what, std::string_view advice) {
@@ -153,9 +154,9 @@ Status check_output(const Job& job) {
       const std::string path = fmt::format("{}/{}", job.output, file.name.substr(0, file.name.size() - kPartial.size()));
       if (Status busy = write::check_not_being_written(path); !busy) return busy;
     }
-    begun |= is_own;
+    found.begun |= is_own;
     if (joins(job, file)) {
-      shared = true;
+      found.shared = true;
     } else if (is_own && !job.resume && !job.overwrite) {
       if (file.partial) return refuse("an interrupted job", "go on with --resume, or start over with --overwrite");
       return refuse("a finished job",
@@ -166,7 +167,22 @@ Status check_output(const Job& job) {
                     job.shard ? "name another directory" : "replace it with --overwrite, or name another directory");
     }
   }
-  if (!(job.resume && begun) && !job.overwrite && !shared && !layer_files(job.output).empty()) {
+  return found;
+}
+
+}  // namespace
+
+Status check_output(const Job& job) {
+  count(Decision::kOutput);
+  std::error_code error;
+  const fs::file_status status = fs::status(job.output, error);
+  if (!fs::exists(status)) return {};
+  if (!fs::is_directory(status)) {
+    return Error{Fault::kOutput, fmt::format("{}: is a file, not a directory; name another one with -o", job.output)};
+  }
+  const auto found = check_manifests(job);
+  if (!found) return found.error();
+  if (!(job.resume && found->begun) && !job.overwrite && !found->shared && !layer_files(job.output).empty()) {
     return Error{Fault::kUsage, fmt::format("{}/layers: holds layers without a manifest; replace them with --overwrite, "
                                             "or name another directory",
                                             job.output)};
@@ -189,14 +205,8 @@ Status check_shard_replaces_itself(const Job& job, const ManifestHead& head) {
 }
 
 Status check_nobody_came(const Job& job) {
-  const std::string path = job.output + "/" + manifest_name(job);
-  if (Status busy = write::check_not_being_written(path); !busy) return busy;
-  if (job.resume || job.overwrite) return {};
-  for (const std::string& name : {path, path + std::string(kPartial)}) {
-    if (::access(name.c_str(), F_OK) != 0) continue;
-    return Error{Fault::kUsage, fmt::format("{}: another run has begun it meanwhile; name another directory", name)};
-  }
-  return {};
+  const auto found = check_manifests(job);
+  return found ? Status() : Status(found.error());
 }
 
 Status prepare_output(const Job& job) {

@@ -108,6 +108,11 @@ ToolpathFile::ToolpathFile(const Plan& plan)
 
 Status ToolpathFile::open() {
   const Job& job = plan_.job;
+  // Another run may have written it since check_toolpath_output, while this one loaded its parts.
+  std::error_code error;
+  if (!streams(job) && !job.resume && !job.overwrite && fs::exists(fs::symlink_status(job.output, error))) {
+    return Error{Fault::kUsage, fmt::format("{}: another run has written it meanwhile; name another file with -o", job.output)};
+  }
   ManifestHead head = plan_head(plan_);
   const Extruder& machine = plan_.moves->profile.machine;
   head.format = machine.format;

@@ -1,9 +1,13 @@
 #include "pipeline/run/layer_source.h"
 
+#include <tbb/task_arena.h>
+
 #include <mutex>
 #include <optional>
 #include <utility>
 
+#include "pipeline/plan/heights.h"
+#include "pipeline/plan/layers.h"
 #include "pipeline/run/image_maker.h"
 #include "stages/load/load.h"
 #include "stages/write/file.h"
@@ -11,9 +15,11 @@
 namespace lamina::pipeline {
 namespace {
 
-Result<Plan> plan_of(const Job& job, Product product) {
+/// bed  that the parts stand on, if it is decided already
+Result<Plan> plan_of(const Job& job, Product product, const Bed* bed = nullptr) {
   auto resolved = resolve(job, product);
   if (!resolved) return resolved.error();
+  if (bed != nullptr) resolved->bed = *bed;
   return make_plan(std::move(*resolved), [](const ProgressEvent&) {});
 }
 
@@ -22,30 +28,31 @@ Result<Plan> plan_of(const Job& job, Product product) {
 struct LayerSource::State {
   Plan plan;
   std::optional<LayerImager> imager;
-  std::mutex mutex;                  // of all below
-  std::optional<Plan> contour_plan;  // made when contours are read for the first time
+  std::mutex idle_mutex;
   std::vector<std::unique_ptr<ImageWork>> idle;
+  std::mutex contour_mutex;
+  std::optional<Plan> contour_plan;  // made when contours are read for the first time
 
   std::unique_ptr<ImageWork> take() {
-    const std::lock_guard lock(mutex);
+    const std::lock_guard lock(idle_mutex);
     if (idle.empty()) return std::make_unique<ImageWork>();
     std::unique_ptr<ImageWork> work = std::move(idle.back());
     idle.pop_back();
     return work;
   }
   void give_back(std::unique_ptr<ImageWork> work) {
-    const std::lock_guard lock(mutex);
+    const std::lock_guard lock(idle_mutex);
     idle.push_back(std::move(work));
   }
   Result<const Sections*> sections() {
-    const std::lock_guard lock(mutex);
-    if (!contour_plan) {
-      Job job = plan.job;
-      job.shard.reset();
-      auto made = plan_of(job, Product::kContours);
-      if (!made) return made.error();
-      contour_plan.emplace(std::move(*made));
-    }
+    const std::lock_guard lock(contour_mutex);
+    if (contour_plan) return contour_plan->sections.get();
+    Job job = plan.job;
+    job.shard.reset();
+    // Isolated: while it waits, this thread takes no work of the caller's, which may ask for contours too.
+    auto made = tbb::this_task_arena::isolate([&] { return plan_of(job, Product::kContours, &plan.bed); });
+    if (!made) return made.error();
+    contour_plan.emplace(std::move(*made));
     return contour_plan->sections.get();
   }
 };
@@ -101,6 +108,23 @@ Result<Contours> LayerSource::contours(std::uint32_t index) const {
   const auto report = (*sections)->slicer().layer(index, work.scratch, work.contours);
   if (!report) return report.error();
   return std::move(work.contours.contours);
+}
+
+Result<std::vector<Layer>> layers_of(const Job& job) {
+  if (Status status = check_job(job); !status) return status.error();
+  const auto scene = load_scene(job, kLargestBed);
+  if (!scene) return scene.error();
+  heights::Plan plan;
+  if (!job.heights.per_part) {
+    auto decided = decide_heights(job, *scene);
+    if (!decided) return decided.error();
+    plan = std::move(*decided);
+  }
+  const auto schedule = schedule_layers(job, *scene, plan.table);
+  if (!schedule) return schedule.error();
+  std::vector<Layer> layers;
+  for (const ScheduledLayer& scheduled : schedule->layers) layers.push_back(scheduled.layer);
+  return layers;
 }
 
 Result<Part> load_part(const Job& job, const PartRequest& part) { return load::load(part.path, load_options(job, part)); }

@@ -59,6 +59,11 @@ class LayerSource {
   std::unique_ptr<State> state_;
 };
 
+/// The layers of a job, decided as `lamina heights` does: for parts alone, wherever they would stand. Of layers of each part
+/// (heights.per_part) those of all parts by their tops.
+/// errors  of check_job; kInput; kUsage: [heights] is not whole
+Result<std::vector<Layer>> layers_of(const Job& job);
+
 /// Reads the file of a part as the job asks for: its unit, its turns, repair. errors  kInput
 Result<Part> load_part(const Job& job, const PartRequest& part);
 

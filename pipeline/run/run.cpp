@@ -13,10 +13,10 @@
 #include "pipeline/output/directory.h"
 #include "pipeline/output/slice_directory.h"
 #include "pipeline/output/toolpath_file.h"
-#include "pipeline/plan/plan.h"
 #include "pipeline/run/contour_maker.h"
 #include "pipeline/run/image_maker.h"
 #include "pipeline/run/move_maker.h"
+#include "pipeline/run/run_resolved.h"
 
 namespace lamina::pipeline {
 namespace {

@@ -13,8 +13,6 @@
 
 namespace lamina::pipeline {
 
-struct Resolved;
-
 /// Runs a job; writes job.output, unless it is a dry run, which ends before the first layer with the summary's
 /// estimates.
 /// job     checked (check_job)
@@ -23,8 +21,5 @@ struct Resolved;
 /// errors  of resolve and make_plan; kUsage: what is there may not be replaced; kOutput; kVerification if the engine is
 ///         kBoth and a pixel differs; the lowest failing layer decides
 Result<Summary> run(const Job& job, Product product, const ProgressCallback& progress, const std::atomic<bool>& cancel);
-
-/// The same of a job that is resolved.
-Result<Summary> run(Resolved resolved, const ProgressCallback& progress, const std::atomic<bool>& cancel);
 
 }  // namespace lamina::pipeline

@@ -48,7 +48,9 @@ Result<Runs> read_layer(const std::string& directory, const ManifestHead& head, 
     if (!digest) return digest.error();
     if (digest->bytes != file.record.bytes || digest->hash != file.record.hash) return changed(path);
   }
-  return picture_of_layer(directory, head, record);
+  auto picture = picture_of_layer(directory, head, record);
+  if (picture || !picture.error().message.starts_with("layers/")) return picture;
+  return Error{Fault::kVerification, fmt::format("{}/{}; lamina verify tells more", directory, picture.error().message)};
 }
 
 /// How long the machine takes for a layer, by its program; replayed as lamina verify does.

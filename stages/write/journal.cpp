@@ -23,7 +23,7 @@ Error reason_of(const std::string& path, int code) {
 }  // namespace
 
 Result<Journal> Journal::open(const std::string& path, std::string_view held) {
-  const int file = ::open(path.c_str(), O_RDWR | O_CREAT | O_APPEND | O_CLOEXEC, 0666);
+  const int file = ::open(path.c_str(), O_RDWR | O_CREAT | O_APPEND | O_CLOEXEC | O_NOFOLLOW, 0666);
   if (file < 0) return reason_of(path, errno);
   Journal journal(path, file);
   if (::flock(file, LOCK_EX | LOCK_NB) == 0) return journal;
@@ -43,7 +43,10 @@ bool Journal::empty() const {
   return std::filesystem::file_size(path_, ignored) == 0;
 }
 
-Status Journal::clear() { return ::ftruncate(file_, 0) == 0 ? Status() : reason_of(path_, errno); }
+Status Journal::clear() {
+  torn_ = false;
+  return ::ftruncate(file_, 0) == 0 ? Status() : reason_of(path_, errno);
+}
 
 void Journal::read(const std::function<void(const std::string&)>& line) {
   std::ifstream lines(path_, std::ios::binary);

@@ -112,6 +112,24 @@ class Module(unittest.TestCase):
         for layer, alone in zip(made, self.plan):
             np.testing.assert_array_equal(layer.change, alone.change)
 
+    def test_heights_alone_are_those_of_the_plan_and_of_each_part(self):
+        settings = {"heights.mode": "optimal", "heights.thickness_mm": "0.1..0.5"}
+        table = lamina.heights(PART, settings)
+        np.testing.assert_array_equal(table, lamina.plan(PART, {**SETTINGS, **settings}).heights)
+        alone = lamina.heights([PART, CROWN], {**settings, "heights.per_part": True})
+        tops = alone["bottom"].astype(int) + alone["thickness"]
+        self.assertTrue((np.diff(tops) >= 0).all())
+        self.assertEqual(len(alone), len(table) + len(lamina.heights(CROWN, settings)))
+
+    def test_contours_lie_where_the_images_of_a_machine_do(self):
+        plan = lamina.plan(CROWN, {"machine.profile": "nuferbj", "layers.thickness_mm": 0.5})
+        layer, index = plan[5], 5
+        x = np.concatenate([contour[:, 0] for contour in plan.contours(index)]) / 1e6
+        columns = np.flatnonzero(layer.pixels().any(axis=0))
+        pitch = 25.4 / plan.dpi[0]
+        self.assertLess(abs(columns[0] * pitch - x.min()), 2 * pitch)
+        self.assertLess(abs((columns[-1] + 1) * pitch - x.max()), 2 * pitch)
+
     def test_heights_add_up(self):
         plan = lamina.plan(PART, {**SETTINGS, "heights.mode": "optimal", "heights.thickness_mm": "0.1..0.5"})
         table = plan.heights

@@ -25,6 +25,28 @@ TEST(GcodeNumber, IsTheExactDecimalWithoutTrailingZeros) {
   EXPECT_EQ(text(12'500), "12.5");
   EXPECT_EQ(text(-120'000), "-120");
   EXPECT_EQ(text(INT64_MIN), "-9223372036854775.808");
+  for (std::uint64_t unit = 1; unit < 1'000'000'000'000'000'000; unit *= 10) {
+    for (const std::uint64_t value : {unit - 1, unit, unit + 1, 7 * unit + 3}) {
+      char buffer[kMostDecimal];
+      EXPECT_EQ(std::string(buffer, put_whole(value, buffer)), std::to_string(value));
+    }
+  }
+}
+
+TEST(Nearest, IsLlround) {
+  std::mt19937_64 random(5);
+  const double edges[] = {0,     0.5, 1.5, 2.5, 0.49999999999999994, 4503599627370495.5, 4503599627370496, 9007199254740993,
+                          9.2e18};
+  const auto check = [](double value) {
+    EXPECT_EQ(nearest(value), std::llround(value)) << value;
+    EXPECT_EQ(nearest(-value), std::llround(-value)) << value;
+  };
+  for (const double edge : edges) check(edge);
+  for (int i = 0; i < 100'000; ++i) {
+    const double value = std::ldexp(static_cast<double>(random() >> 11), static_cast<int>(random() % 60) - 50);
+    check(value);
+    check(std::floor(value) + 0.5);
+  }
 }
 
 struct Written {

@@ -18,8 +18,6 @@
 namespace lamina::pipeline {
 namespace {
 
-constexpr Bed kLargestBed{{kMostMm, kMostMm}};
-
 const KeyChoice kHeightsCommandKeys = {"layers", "heights", "load", "part"};
 
 enum class Form { kText, kCsv, kJson, kRp3 };

@@ -12,8 +12,7 @@
 #include "pipeline/job/job.h"
 #include "pipeline/machine/extruder.h"
 #include "pipeline/machine/profiles.h"
-#include "pipeline/plan/plan.h"
-#include "pipeline/run/run.h"
+#include "pipeline/run/run_resolved.h"
 #include "stages/text/json.h"
 #include "stages/write/image_format.h"
 
@@ -27,7 +26,7 @@ struct PlanCommand {
   std::string_view summary;               // what it does, for the help
   std::span<const OptionSpec> own;        // switches of the row: of --resume, --overwrite and --dry-run those that it has
   std::span<const OptionSpec> overrides;  // words for keys that mean something else here: value, meaning, preset if not ""
-  std::string closing;                    // notes and examples
+  std::string (*closing)();               // notes and examples
   bool divided = false;                   // its layers can be divided among machines (--shard)
   /// What the command line decides before the job is checked. errors  kUsage
   Status (*complete)(const Arguments&, Job&);
@@ -56,7 +55,7 @@ CommandSpec plan_spec(const PlanCommand& row) {
   spec.options.insert(spec.options.end(), row.own.begin(), row.own.end());
   spec.options.push_back({"--json", "", "print the summary as one JSON object on stdout", "", "Run"});
   spec.options.push_back({"--quiet", "", "say nothing but errors", "", "Run"});
-  spec.closing = row.closing;
+  spec.more = row.closing;
   return spec;
 }
 
@@ -75,7 +74,10 @@ Outcome plan(const PlanCommand& row, const Arguments& arguments, Context& contex
   }
   Result<Resolved> resolved = resolve(*job, row.product);
   if (!resolved) return resolved.error();
-  if (row.leave_to_machine != nullptr) row.leave_to_machine(arguments, *resolved);
+  if (row.leave_to_machine != nullptr) {
+    row.leave_to_machine(arguments, *resolved);
+    if (Status status = check_job(resolved->job); !status) return status;
+  }
   if (arguments.has("--save-job")) {
     Job saved = resolved->job;
     if (saved.bed_mm || saved.machine.profile.empty()) saved.bed_mm = resolved->bed.size_mm;
@@ -140,7 +142,7 @@ PlanCommand jet_row() {
           "bottom, and a manifest.json. The same parts and options give the same bytes on every machine.",
           kJetSwitches,
           {},
-          jet_closing(),
+          jet_closing,
           true,
           complete_jet};
 }
@@ -161,6 +163,17 @@ Status complete_slice(const Arguments& arguments, Job& job) {
   return check_outputs({&asked, 1}, {&kept, 1});
 }
 
+std::string slice_closing() {
+  return "Lengths are mm, angles degrees. Keys of a filling that have no option are set by --set fill.KEY=VALUE, between\n"
+         "heights by fill.range, for one part by part.fill; docs/filling.md has all of them.\n\n"
+         "Examples:\n"
+         "  lamina slice bracket.stl --layer 0.1 -o out                      out/bracket.svg\n"
+         "  lamina slice bracket.stl --layer 0.05 --format cli-binary -o out\n"
+         "  lamina slice a.stl b.stl --layer 0.2 --format 3mf -o out\n"
+         "  lamina slice part.stl --layer 0.3 --walls 1 --pattern raster --bead 0.4 --bead-gap 0.12 --angle 90 -o out\n"
+         "  lamina slice part.stl --layer 0.3 --pattern raster --stagger 0,0.26 --gap-formula '0.1+0.6*h' -o out";
+}
+
 PlanCommand slice_row() {
   return {Product::kContours,
           kSliceKeys,
@@ -168,14 +181,7 @@ PlanCommand slice_row() {
           "SVG, CLI or 3MF slices, and fills them if a pattern or walls are asked for.",
           kSliceSwitches,
           {},
-          "Lengths are mm, angles degrees. Keys of a filling that have no option are set by --set fill.KEY=VALUE, between\n"
-          "heights by fill.range, for one part by part.fill; docs/filling.md has all of them.\n\n"
-          "Examples:\n"
-          "  lamina slice bracket.stl --layer 0.1 -o out                      out/bracket.svg\n"
-          "  lamina slice bracket.stl --layer 0.05 --format cli-binary -o out\n"
-          "  lamina slice a.stl b.stl --layer 0.2 --format 3mf -o out\n"
-          "  lamina slice part.stl --layer 0.3 --walls 1 --pattern raster --bead 0.4 --bead-gap 0.12 --angle 90 -o out\n"
-          "  lamina slice part.stl --layer 0.3 --pattern raster --stagger 0,0.26 --gap-formula '0.1+0.6*h' -o out",
+          slice_closing,
           false,
           complete_slice};
 }
@@ -255,7 +261,7 @@ PlanCommand extrude_row() {
           "pores will be. The same parts and options give the same bytes.",
           kExtrudeSwitches,
           kExtrudeWords,
-          extrude_closing(),
+          extrude_closing,
           false,
           complete_extrude,
           leave_to_machine};

@@ -92,7 +92,7 @@ std::string man_page(const Command& command) {
                         option.value.empty() ? "" : " \\fI" + roff(option.value) + "\\fR", roff(option.meaning));
     text += option.preset.empty() ? "\n" : fmt::format(" (default {})\n", roff(option.preset));
   }
-  if (!spec.closing.empty()) text += fmt::format(".SH NOTES\n.nf\n{}\n.fi\n", roff(spec.closing));
+  if (const std::string end = spec.end(); !end.empty()) text += fmt::format(".SH NOTES\n.nf\n{}\n.fi\n", roff(end));
   return text + exit_status() + ".SH SEE ALSO\n.BR lamina (1)\n";
 }
 
@@ -117,8 +117,8 @@ std::string markdown_page(const Command& command) {
     text += fmt::format("| {} | {} | {} |\n", markdown_code(flags), markdown_cell(option.meaning),
                         option.preset.empty() ? "" : markdown_code(option.preset));
   }
-  if (!spec.closing.empty())
-    text += fmt::format("{}## Notes and examples\n\n```text\n{}\n```\n", spec.options.empty() ? "" : "\n", spec.closing);
+  if (const std::string end = spec.end(); !end.empty())
+    text += fmt::format("{}## Notes and examples\n\n```text\n{}\n```\n", spec.options.empty() ? "" : "\n", end);
   for (const More& more : kMore) {
     if (more.command == command.name) text += fmt::format("\nMore: {}.\n", more.pages);
   }

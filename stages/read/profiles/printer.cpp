@@ -153,7 +153,9 @@ Result<Machine> read_machine(std::string_view text, const std::string& where, st
   Machine machine;
   if (Status status = read_sections<Machine>(*file, where, kKeys, machine, machine.name); !status) return status.error();
   if (std::ranges::find(dialects, machine.dialect) != dialects.end()) return machine;
-  const Place at = file->find("machine")->find("dialect")->place;
+  const TomlValue* section = file->find("machine");
+  const TomlValue* named = section == nullptr ? nullptr : section->find("dialect");
+  const Place at = named == nullptr ? Place() : named->place;
   return Error{Fault::kUsage, fmt::format("{}machine.dialect: {}", at.text(where), not_one_of(machine.dialect, dialects))};
 }
 

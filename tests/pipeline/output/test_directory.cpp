@@ -1,0 +1,50 @@
+// What another run does to a directory while this one loads its parts is seen before anything is written.
+#include <gtest/gtest.h>
+
+#include <filesystem>
+
+#include "pipeline/output/directory.h"
+#include "stages/write/file.h"
+#include "tests/commands/program.h"
+
+namespace lamina::pipeline {
+namespace {
+
+struct LoadingMeanwhile : testing::Test {
+  test::Directory folder;
+  Job job;
+  void SetUp() override {
+    job.output = folder / "out";
+    ASSERT_TRUE(check_output(job).ok());
+    std::filesystem::create_directories(job.output + "/layers");
+  }
+  std::string refusal() {
+    const Status status = prepare_output(job);
+    return status ? "" : status.error().message;
+  }
+};
+
+TEST_F(LoadingMeanwhile, AShardThatIsWritingKeepsItsDirectoryEvenFromOverwrite) {
+  const auto shard = write::File::open(job.output + "/manifest-1-of-2.json", {.lock = true});
+  ASSERT_TRUE(shard.ok());
+  EXPECT_NE(refusal(), "");
+  job.overwrite = true;
+  EXPECT_NE(refusal(), "");
+  EXPECT_TRUE(std::filesystem::exists(job.output + "/manifest-1-of-2.json.part"));
+}
+
+TEST_F(LoadingMeanwhile, AFinishedJobIsNotReplaced) {
+  test::write_text(job.output + "/manifest.json", "{}");
+  EXPECT_NE(refusal().find("a finished job"), std::string::npos);
+}
+
+TEST_F(LoadingMeanwhile, AnotherSplitIsRefused) {
+  job.shard = {{0, 4}};
+  test::write_text(job.output + "/manifest-1-of-3.json", "{}");
+  EXPECT_NE(refusal().find("split otherwise"), std::string::npos);
+}
+
+TEST_F(LoadingMeanwhile, NobodyElseIsNoError) { EXPECT_EQ(refusal(), ""); }
+
+}  // namespace
+}  // namespace lamina::pipeline
