@@ -1,15 +1,15 @@
-// pipeline/lamina.h: lamina for other programs. All that is installed is this header and what it includes.
+// pipeline/lamina.h: the library interface. Only this header and its includes are installed.
 //
-//      Job job;                                       what is asked for, by its fields or by the keys of a job file
+//      Job job;                                       the request, set by fields or by the keys of a job file
 //      job.parts.push_back({.path = "part.stl"});
 //      set_key(job, "bed.dpi=600");
 //      check_job(job);
 //      run(job, Product::kImages, progress, cancel);  into files, with a manifest: Summary
-//      verify(job.output, {});                        are they what the manifest says: VerifyReport
+//      verify(job.output, {});                        compares files and manifest: VerifyReport
 //      LayerSource::make(job);                        or layer by layer, without a file: images, contours
 //
-// What fails is a Result with one line and a Fault, which is the exit code of the program too. Only what a library below
-// throws, as std::bad_alloc, passes through.
+// Errors are Results with one line of text and a Fault, which is also the program's exit code. Only exceptions of the libraries
+// below, such as std::bad_alloc, pass through.
 #pragma once
 
 #include <string_view>

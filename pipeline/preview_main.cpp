@@ -1,4 +1,4 @@
-// pipeline/preview_main.cpp: the program lamina-preview, which `lamina preview` hands over to.
+// pipeline/preview_main.cpp: the program lamina-preview, started by `lamina preview`.
 #include <fmt/format.h>
 
 #include <charconv>
@@ -15,7 +15,7 @@
 namespace lamina::pipeline {
 namespace {
 
-/// lamina-preview --plot: a plot on standard input becomes a PNG on standard output, or the reason why not.
+/// lamina-preview --plot: converts a plot on standard input to a PNG on standard output, or reports the error.
 Outcome draw_plot(Context& context) {
   const auto end = [&](std::string_view text, int code) {
     const Status status = context.print(text);
@@ -27,7 +27,7 @@ Outcome draw_plot(Context& context) {
   return end({reinterpret_cast<const char*>(picture->data()), picture->size()}, 0);
 }
 
-/// Sets `value` to the number behind a flag, if it is there.
+/// Sets `value` to the number after a flag, if present.
 Status read_whole(const Arguments& arguments, std::string_view flag, std::uint32_t least, std::uint32_t most,
                   std::optional<std::uint32_t>& value) {
   if (!arguments.has(flag)) return {};

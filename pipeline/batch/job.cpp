@@ -19,16 +19,16 @@ namespace fs = std::filesystem;
 
 constexpr std::uint64_t kMebibyte = 1ull << 20;
 
-/// What the batch writes in its directory; .part while they are written.
+/// The batch's own files in its directory; .part while being written.
 constexpr std::array kOwnFiles = {"batch.jsonl", "summary.json", "summary.json.part", "summary.tsv", "summary.tsv.part"};
 
-/// A path seen from the batch's directory, as it is written; empty if it is not below.
+/// A path relative to the batch's directory; empty if it is not below.
 fs::path below_batch(const fs::path& path, const std::string& directory) {
   const fs::path below = path.lexically_normal().lexically_relative(fs::path(directory).lexically_normal());
   return below.empty() || *below.begin() == ".." ? fs::path() : below;
 }
 
-/// Resolves entries one after the other; what is wrong with a job itself becomes job.refused.
+/// Resolves entries in order; an error of a single job becomes job.refused.
 class Preparation {
  public:
   explicit Preparation(const BatchShare& share) : share_(share) {}
@@ -88,14 +88,14 @@ class Preparation {
 
   const BatchShare& share_;
   std::map<std::string, Result<FileDigest>> digests_;                // many jobs read the same files
-  std::set<std::string> names_{kOwnFiles.begin(), kOwnFiles.end()};  // of outputs that are called as their jobs
+  std::set<std::string> names_{kOwnFiles.begin(), kOwnFiles.end()};  // of outputs named after their jobs
 };
 
 bool lies_within(const fs::path& inner, const fs::path& outer) {
   return std::mismatch(outer.begin(), outer.end(), inner.begin(), inner.end()).first == outer.end();
 }
 
-/// Refuses outputs out of place, and two jobs that would write over each other.
+/// Refuses misplaced outputs, and jobs whose outputs collide.
 /// Sorted by the parts of their paths, a directory stands right before what lies in it.
 Status check_apart(const std::vector<BatchJob>& jobs, const std::string& directory) {
   std::vector<std::pair<fs::path, const BatchJob*>> outputs;

@@ -1,4 +1,4 @@
-// pipeline/batch/job.h: a job of a batch made ready to run: what it writes, what it reads, what it needs.
+// pipeline/batch/job.h: a job of a batch, ready to run: its outputs, inputs and memory.
 #pragma once
 
 #include <atomic>
@@ -16,76 +16,76 @@
 
 namespace lamina::pipeline {
 
-/// What a batch adds to a command line as its job begins.
+/// What a batch adds to a job's command line when the job starts.
 struct CallSettings {
   std::string output;                                                          // "" if the command line has none
-  std::uint64_t layer_bytes = 0;                                               // for a job whose command line names no budget
-  enum class Earlier { kNone, kContinue, kReplace } earlier = Earlier::kNone;  // what an earlier run has left
+  std::uint64_t layer_bytes = 0;                                               // layer budget if the command line sets none
+  enum class Earlier { kNone, kContinue, kReplace } earlier = Earlier::kNone;  // output of an earlier run
 };
 
 enum class BatchOutcome {
   kDone,       // ended with exit code 0
-  kKept,       // done before, and its output is still what it was
+  kKept,       // done before, output unchanged
   kFailed,     // ended with another exit code
-  kTimeLimit,  // stopped because it took too long
-  kStopped,    // stopped because the batch was
-  kNotRun      // its turn never came
+  kTimeLimit,  // exceeded the time limit
+  kStopped,    // stopped with the batch
+  kNotRun      // never started
 };
 
 std::string_view outcome_name(BatchOutcome outcome);
 
 struct BatchResult {
   BatchOutcome outcome = BatchOutcome::kNotRun;
-  int code = 0;        // of the command; 3 beyond the time limit
-  std::string reason;  // one line, of what is not done
-  Json value;          // what the command gave; null if nothing
+  int code = 0;        // of the command; 3 on the time limit
+  std::string reason;  // one line, if the job is not done
+  Json value;          // result of the command; null if none
   double seconds = 0;
   TreeDigest output;
-  bool recognized = false;  // kept although no record knew of it: its directory holds the finished job
+  bool recognized = false;  // kept without a record: the directory holds the finished job
 
-  /// Whether it is the job's own fault that it is not done: not that of whoever stopped the batch.
+  /// Whether the job failed by itself, as opposed to being stopped with the batch.
   bool failed() const { return outcome == BatchOutcome::kFailed || outcome == BatchOutcome::kTimeLimit; }
 };
 
 /// A command line as a batch sees it.
 struct Call {
-  std::string output;               // that it names; "" if it names none
-  bool output_of_job_file = false;  // it is relative to the directory that the batch was started in, not to the batch's
-  /// Ending of the name that its output gets if it names none, "" for a directory. Absent: its result is what it gives.
+  std::string output;               // "" if the command line names none
+  bool output_of_job_file = false;  // relative to the working directory, not to the batch's directory
+  /// Extension of the default output name, "" for a directory. Absent: the command only returns a value.
   std::optional<std::string> ending;
-  bool can_continue = false, can_replace = false;  // what an earlier run has left
-  std::optional<std::uint64_t> layer_bytes;        // budget that it names; 0 if it takes one and names none
-  std::vector<std::string> inputs;                 // texts of the command line that may name files it reads
-  /// Runs it, from any thread. Progress comes from one thread at a time. returns  code, reason and value, and whether all
-  /// layers of the job were there already; the queue tells the rest
+  bool can_continue = false, can_replace = false;  // output of an earlier run
+  std::optional<std::uint64_t> layer_bytes;        // its layer budget; 0 if it accepts one and sets none
+  std::vector<std::string> inputs;                 // words of the command line that may be input files
+  /// Runs the command; callable from any thread. Progress is reported from one thread at a time.
+  /// returns  code, reason, value, and whether all layers existed already; the queue fills in the rest
   std::function<BatchResult(const CallSettings&, const ProgressCallback&, const std::atomic<bool>& cancel)> run;
 };
 
-/// Reads a command line, of one word or more. errors  kUsage: it is wrong in itself
+/// Parses a command line of at least one word. errors  kUsage: invalid command line
 using ReadCall = std::function<Result<Call>(const std::vector<std::string>& words)>;
 
 struct BatchJob {
   std::uint32_t number = 0;  // from 1
-  BatchEntry entry;          // its name is the output's, and unique, if it does not name one itself
+  BatchEntry entry;          // its name is unique and becomes the output's unless the job names one
   Call call;
-  std::string output;             // file or directory that it writes; empty if its result is what it gives
-  std::string place;              // the output for reports: below the batch's directory, else as it was given
-  bool relative_output = false;   // its output was given relative to the batch's directory
+  std::string output;             // file or directory; empty if the command only returns a value
+  std::string place;              // output as reported: below the batch's directory, else as given
+  bool relative_output = false;   // the output was given relative to the batch's directory
   std::uint64_t layer_bytes = 0;  // for the layers in flight
-  std::uint64_t need_bytes = 0;   // most memory that it is expected to hold
-  Hash128 id;                     // of the version, the words, the output's place and every file that it reads
-  std::optional<Error> refused;   // it is wrong in itself: it fails at its turn, the others run
+  std::uint64_t need_bytes = 0;   // expected peak memory
+  Hash128 id;                     // hash of version, words, output path and all input files
+  std::optional<Error> refused;   // invalid job: it fails at its turn, the others run
 };
 
 struct BatchShare {
   std::string directory;          // of the batch
-  std::uint64_t layer_bytes = 0;  // of every job that names no budget
+  std::uint64_t layer_bytes = 0;  // for each job without a budget of its own
 };
 
-/// Makes the jobs ready, in the order of the entries. Nothing is written.
-/// errors  kUsage: two jobs write into the same place, or one into the other's (both are named); a job writes where the
-///         batch keeps its own files; a relative output leads out of the batch's directory
-/// cost    reads every file that a job names once, to tell later whether it has changed
+/// Prepares the jobs in the order of the entries. Writes nothing.
+/// errors  kUsage: outputs of two jobs coincide or nest (both are named); an output collides with the batch's own files;
+///         a relative output leaves the batch's directory
+/// cost    reads every input file once, to detect later changes
 Result<std::vector<BatchJob>> prepare_batch(std::vector<BatchEntry> entries, const BatchShare& share, const ReadCall& read);
 
 }  // namespace lamina::pipeline

@@ -21,7 +21,7 @@ bool is_job_file(const fs::path& path) { return lower_case(path.extension().stri
 
 bool is_part(const fs::path& path) { return load::is_part_name(path.string()); }
 
-/// The file's name without what says its format; folders become part of it.
+/// The file's name without its extensions; folders become part of it.
 std::string name_of(const fs::path& path) {
   fs::path name = path;
   if (lower_case(name.extension().string()) == ".gz") name.replace_extension();
@@ -37,7 +37,7 @@ BatchEntry entry_of_file(const fs::path& path, const fs::path& below, const std:
     entry.words = {"jet", "--job", path.string()};
   } else {
     entry.words = with;
-    // A name that begins with a dash is a file all the same.
+    // A name that begins with a dash still means a file.
     entry.words.push_back(path.string().starts_with('-') ? "./" + path.string() : path.string());
   }
   return entry;
@@ -60,7 +60,7 @@ Status read_directory(const fs::path& directory, const std::vector<std::string>&
   return {};
 }
 
-/// A name for a job of a list: that of its first file.
+/// Name of a job in a list, from its first file.
 std::string name_of_words(const std::vector<std::string>& words) {
   for (std::size_t i = 1; i < words.size(); ++i) {
     const fs::path path = words[i];

@@ -1,4 +1,4 @@
-// pipeline/batch/list.h: what a batch is asked to do, from lists, directories and job files, before anything is looked at.
+// pipeline/batch/list.h: the jobs of a batch from lists, directories and job files, not yet checked.
 #pragma once
 
 #include <string>
@@ -9,10 +9,10 @@
 
 namespace lamina::pipeline {
 
-/// One job as somebody wrote it down.
+/// One job as written in its source.
 struct BatchEntry {
   std::string source;              // where: "jobs.txt:12", "parts/bracket.stl"
-  std::string name;                // what its output is called if it does not say; not unique yet
+  std::string name;                // default name of the output; not unique yet
   std::vector<std::string> words;  // command and arguments: "jet", "bracket.stl", "--dpi", "600"
 };
 
@@ -22,7 +22,7 @@ struct BatchEntry {
 ///   a directory                       all of the above in it and below it, by name
 ///   anything else                     a list: one command line a line, "jet bracket.stl --dpi 600 -o bracket"; the word
 ///                                     lamina in front, empty lines and comments are skipped
-/// errors  kUsage: an operand that is not there, cannot be read, or holds no job; a line that cannot be split
+/// errors  kUsage: an operand that is missing, unreadable or without jobs; a line that cannot be split
 Result<std::vector<BatchEntry>> read_batch(const std::vector<std::string>& operands, const std::vector<std::string>& with);
 
 }  // namespace lamina::pipeline

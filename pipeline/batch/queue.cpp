@@ -19,8 +19,8 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 using std::chrono::milliseconds;
-constexpr std::chrono::seconds kGrace{20};  // for a job that was told to stop
-constexpr Fault kOverdue = Fault::kInput;   // its part cannot be planned in the time that it was given
+constexpr std::chrono::seconds kGrace{20};  // for a cancelled job to stop
+constexpr Fault kOverdue = Fault::kInput;   // its part cannot be planned within the time limit
 
 double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
 
@@ -29,7 +29,7 @@ bool holds_something(const std::string& output) {
   return !output.empty() && std::filesystem::exists(output, error) && !std::filesystem::is_empty(output, error);
 }
 
-/// A job's place in the queue; lives until the last thread that knows it has ended.
+/// A job's place in the queue; shared with its thread, which may outlive the batch.
 struct Slot {
   enum class State { kWaiting, kRunning, kEnded } state = State::kWaiting;
   std::atomic<bool> cancel{false};
@@ -62,7 +62,7 @@ class Queue : public std::enable_shared_from_this<Queue> {
     report(watcher, lock);
     for (const Slot& slot : slots_) summary_.results.push_back(slot.result);
     summary_.seconds = seconds_since(start);
-    // Workers that wait see that nothing is left; they are gone before what they use is, which they hold themselves.
+    // Wakes idle workers so that they exit. A worker shares ownership of this object and may exit later.
     stopped_ = true;
     changed_.notify_all();
     changed_.wait_for(lock, kGrace, [&] { return workers_ == 0; });
@@ -71,7 +71,7 @@ class Queue : public std::enable_shared_from_this<Queue> {
   }
 
  private:
-  // A thread is on its own: one whose job cannot be stopped must not keep the batch from ending.
+  // Threads are detached: a job that ignores its stop must not keep the batch from ending.
   void start_worker() {
     ++workers_;
     std::thread([self = shared_from_this()] { self->work(); }).detach();
@@ -109,7 +109,7 @@ class Queue : public std::enable_shared_from_this<Queue> {
     }
   }
 
-  /// With the lock; it is let go for the watcher. returns how many have ended
+  /// Requires the lock and releases it during the observer's call. returns the number of ended jobs
   std::size_t report(const BatchWatcher& watcher, std::unique_lock<std::mutex>& lock) {
     BatchState state;
     state.total = static_cast<std::uint32_t>(jobs_.size());
@@ -125,7 +125,7 @@ class Queue : public std::enable_shared_from_this<Queue> {
       if (!slot.reported) fresh.push_back(i);
     }
     lock.unlock();
-    // Ended jobs are not touched any more.
+    // Ended jobs do not change any more.
     for (const std::size_t i : fresh) {
       slots_[i].reported = true;
       if (watcher.ended) watcher.ended(jobs_[i], slots_[i].result, state);
@@ -153,17 +153,17 @@ class Queue : public std::enable_shared_from_this<Queue> {
       summary_.most_need_bytes = std::max(summary_.most_need_bytes, need_);
       lock.unlock();
       BatchResult result = run_job(i);
-      // What the job has freed goes back to the system, so that the next one does not come on top of it.
+      // Returns freed memory to the system before the next job starts.
       ::malloc_trim(0);
       lock.lock();
-      if (slot.abandoned) break;  // its place has been taken
+      if (slot.abandoned) break;  // another job has its place
       end(i, std::move(result));
     }
     --workers_;
     changed_.notify_all();
   }
 
-  /// With the lock.
+  /// Requires the lock.
   void end(std::size_t i, BatchResult result) {
     Slot& slot = slots_[i];
     slot.state = Slot::State::kEnded;
@@ -180,7 +180,7 @@ class Queue : public std::enable_shared_from_this<Queue> {
     if (!status && record_status_) record_status_ = status;
   }
 
-  /// Without the lock.
+  /// Must be called without the lock.
   BatchResult run_job(std::size_t i) {
     const BatchJob& job = jobs_[i];
     Slot& slot = slots_[i];
@@ -211,8 +211,8 @@ class Queue : public std::enable_shared_from_this<Queue> {
     return result;
   }
 
-  /// What an earlier run of this batch left of the same job is continued; what it left of another one is replaced. What is
-  /// there without a record is for the command to recognize as its own, or to refuse.
+  /// Recorded output of the same job is continued, recorded output of another job is replaced. For unrecorded output the
+  /// command decides whether it is its own.
   CallSettings::Earlier earlier_of(const BatchJob& job, const BatchRecord::Earlier* earlier, bool foreign) const {
     const bool same = earlier != nullptr && earlier->begun == job.id;
     if (job.call.can_continue && (foreign ? options_.resume : same)) return CallSettings::Earlier::kContinue;
@@ -227,7 +227,7 @@ class Queue : public std::enable_shared_from_this<Queue> {
     return result;
   }
 
-  /// A job was stopped: by whoever stopped the batch, or because it took too long, which is told before `rest`.
+  /// Sets the result of a stopped job: stopped with the batch, or by its time limit, whose message ends with `rest`.
   void stopped_by(const Slot& slot, BatchResult& result, const std::string& rest = {}) const {
     result.outcome = slot.overdue ? BatchOutcome::kTimeLimit : BatchOutcome::kStopped;
     if (!slot.overdue) return;

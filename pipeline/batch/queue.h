@@ -1,9 +1,9 @@
-// pipeline/batch/queue.h: many jobs in one process: one pool of threads, one start, one budget of memory.
+// pipeline/batch/queue.h: many jobs in one process, sharing a thread pool and a memory budget.
 //
-// Jobs begin in the order of the list, so many at a time. A job begins when what it is expected to need fits beside what the
-// running jobs may hold, or when none is running: a job that alone exceeds the budget runs alone.
-// A job that fails is reported and the others go on. Whatever ends the program loses none of the finished jobs: each is
-// on record when it ends (record.h).
+// Jobs start in list order, up to a fixed number at a time. A job starts when its expected memory fits beside the running
+// jobs, or when none is running: a job that exceeds the budget runs alone.
+// A failed job is reported and the others continue. Each job is recorded as it ends (record.h), so a crash loses no
+// finished job.
 #pragma once
 
 #include <atomic>
@@ -23,11 +23,11 @@ struct BatchOptions {
   std::uint32_t jobs = 1;  // running at a time
   std::uint64_t memory_bytes = 1ull << 30;
   double time_limit_seconds = 0;  // of each job; 0: none
-  bool fail_fast = false;         // the first failure stops all
+  bool fail_fast = false;         // the first failure stops the batch
   bool resume = false, overwrite = false;
 };
 
-/// A running job, for whoever watches.
+/// A running job, for the observer.
 struct RunningJob {
   std::string name;
   std::uint32_t layers_done = 0, layers = 0;  // 0 of 0 before the first layer
@@ -41,25 +41,25 @@ struct BatchState {
 struct BatchWatcher {
   /// Several times a second.
   std::function<void(const BatchState&)> progress;
-  /// Once for every job, as it ends. Both are called by the thread that called run_batch.
+  /// Once per job, when it ends. The thread that called run_batch makes both calls.
   std::function<void(const BatchJob&, const BatchResult&, const BatchState&)> ended;
 };
 
 struct BatchSummary {
   std::vector<BatchResult> results;  // one a job
   std::uint32_t most_running = 0;
-  std::uint64_t most_need_bytes = 0;  // of the jobs that ran together
+  std::uint64_t most_need_bytes = 0;  // of jobs running at the same time
   double seconds = 0;
   bool interrupted = false;
-  /// A job that could not be stopped is still running: the program has to end without waiting for it.
+  /// A job that ignored its stop is still running: the program must exit without waiting for it.
   bool abandoned = false;
 };
 
-/// The layers' share of the budget for each of `jobs` jobs.
+/// Layer budget of each of `jobs` concurrent jobs.
 std::uint64_t layer_share(std::uint64_t memory_bytes, std::uint32_t jobs);
 
-/// Runs the jobs. `interrupt` stops the batch: running jobs are told to stop, and nothing new begins.
-/// errors  kOutput if the record could not be written; jobs that are done stay done
+/// Runs the jobs. `interrupt` stops the batch: running jobs are cancelled and no new job starts.
+/// errors  kOutput if the record cannot be written; finished jobs stay finished
 Result<BatchSummary> run_batch(std::vector<BatchJob> jobs, BatchRecord record, const BatchOptions& options,
                                const BatchWatcher& watcher, const std::atomic<bool>& interrupt);
 

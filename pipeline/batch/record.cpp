@@ -13,7 +13,7 @@ namespace {
 
 std::string key_of(const BatchJob& job) { return job.place.empty() ? hex(job.id) : job.place; }
 
-/// Reads one line of the file; what is not whole is nothing.
+/// Reads one line of the file; nothing if it is incomplete.
 void read_line(const std::string& line, std::map<std::string, BatchRecord::Earlier>& earlier) try {
   const Json json = Json::parse(line);
   const bool ended = json.contains("ended");

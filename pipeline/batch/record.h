@@ -1,7 +1,7 @@
-// pipeline/batch/record.h: what has happened in a batch so far, in a file that survives being killed at any moment.
+// pipeline/batch/record.h: the progress of a batch, in a file that survives a kill at any moment.
 //
 // batch.jsonl is a journal of JSON objects (stages/write/journal.h): {"begun":ID,...} when a job starts, {"ended":ID,...}
-// with its result when it is over. A line that a kill or a full disk has torn is skipped, and its job done again.
+// with its result when it ends. A line torn by a kill or a full disk is skipped, and its job runs again.
 #pragma once
 
 #include <map>
@@ -20,24 +20,24 @@ Json result_json(const BatchJob& job, const BatchResult& result);
 
 class BatchRecord {
  public:
-  /// What an earlier run of the batch has left of a place that jobs write into (or, for a job without one, of its id).
+  /// The record of an earlier run for one output path (or, for a job without output, for its id).
   struct Earlier {
-    Hash128 begun;         // the job that wrote there last
+    Hash128 begun;         // id of the last job that wrote there
     bool ended = false;    // with exit code 0
-    bool foreign = false;  // it found something there that no batch had written, and did not end well
-    BatchResult result;    // if it ended
+    bool foreign = false;  // it found files there that no batch had written, and did not finish
+    BatchResult result;    // set if it ended
   };
 
-  /// Opens directory/batch.jsonl, which is created with the directory. With `resume` what it says is read and it is
-  /// continued, else it begins anew.
-  /// errors  kUsage: there is one already, and neither `resume` nor `overwrite`. kOutput: another run holds it, or the
+  /// Opens directory/batch.jsonl and creates both if absent. `resume` reads and continues the record; otherwise it starts
+  /// empty.
+  /// errors  kUsage: a record exists, and neither `resume` nor `overwrite` is set. kOutput: another run holds it, or the
   ///         system's reason
   static Result<BatchRecord> open(const std::string& directory, bool resume, bool overwrite);
 
   const Earlier* earlier(const BatchJob& job) const;
 
   // --- from one thread at a time; errors  kOutput
-  /// foreign  what lies in its place is not on record: a later run must not take it for its own
+  /// foreign  the output path holds unrecorded files: a later run must not treat them as its own
   Status begun(const BatchJob& job, bool foreign);
   Status ended(const BatchJob& job, const BatchResult& result);
 

@@ -19,7 +19,7 @@ std::string cell(std::string_view text) {
   return line;
 }
 
-/// The numbers of the whole batch.
+/// Totals of the batch.
 struct BatchTotals {
   std::uint32_t jobs = 0, done = 0, kept = 0, failed = 0, stopped = 0, not_run = 0;  // failed: time limit too
   std::uint64_t files = 0, bytes = 0;

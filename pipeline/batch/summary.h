@@ -1,4 +1,4 @@
-// pipeline/batch/summary.h: what a batch did, for a person, for a table and for a script.
+// pipeline/batch/summary.h: the results of a batch as text, as a table and as JSON.
 #pragma once
 
 #include <string>
@@ -9,26 +9,26 @@
 
 namespace lamina::pipeline {
 
-/// The exit code: 0 if every job is done or kept, 130 if the batch was interrupted, else that of the first job of the
-/// list that failed.
+/// The exit code: 0 if every job is done or kept, 130 if the batch was interrupted, else the code of the first failed
+/// job in the list.
 int batch_code(const BatchSummary& summary);
 
 /// summary.json: one object.
 Json batch_json(const std::vector<BatchJob>& jobs, const BatchSummary& summary, const BatchOptions& options);
 
-/// summary.tsv: a line of names, then one a job: job, outcome, code, seconds, files, bytes, output, source, reason.
+/// summary.tsv: a header, then one line per job: job, outcome, code, seconds, files, bytes, output, source, reason.
 std::string batch_table(const std::vector<BatchJob>& jobs, const BatchSummary& summary);
 
-/// The line of a job as it ends: "[3/200] done     bracket: 51 files, 1.2 MB, 0.35 s".
+/// The line of a finished job: "[3/200] done     bracket: 51 files, 1.2 MB, 0.35 s".
 std::string job_line(const BatchJob& job, const BatchResult& result, std::uint32_t ended, std::uint32_t total);
 
-/// Where a job that failed was asked for and why it failed: "jobs.txt:3: part.stl: no such file".
+/// Source and reason of a failed job: "jobs.txt:3: part.stl: no such file".
 std::string failure_line(const BatchJob& job, const BatchResult& result);
 
-/// What stands behind the bar: "12/200 jobs, 1 failed; bracket 40/120 layers".
+/// The text after the progress bar: "12/200 jobs, 1 failed; bracket 40/120 layers".
 std::string progress_line(const BatchState& state);
 
-/// The end: totals, and each job that failed.
+/// The final text: totals and every failed job.
 std::string batch_text(const std::vector<BatchJob>& jobs, const BatchSummary& summary, const BatchOptions& options);
 
 }  // namespace lamina::pipeline

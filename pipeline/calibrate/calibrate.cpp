@@ -17,7 +17,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// The printer; a bead that the request leaves to it is set.
+/// Finds the printer and sets the request's default bead from it.
 Result<ExtruderProfile> machine_of(CalibrationRequest& request) {
   auto profile = find_extruder(request.machine);
   if (!profile) return Error{profile.error().fault, "--machine: " + profile.error().message};
@@ -27,7 +27,7 @@ Result<ExtruderProfile> machine_of(CalibrationRequest& request) {
   return profile;
 }
 
-/// The job of a piece whose files are named `stem` and something.
+/// The job of a piece; `stem` begins the names of its files.
 Job job_of(const segment::TestPiece& piece, const CalibrationRequest& request, const std::string& stem,
            std::string_view extension) {
   Job job;
@@ -38,7 +38,7 @@ Job job_of(const segment::TestPiece& piece, const CalibrationRequest& request, c
   job.quiet = true;
   job.parts = {{.path = stem + ".stl"}};
   job.output = fmt::format("{}{}", stem, extension);
-  job.overwrite = true;  // the pieces of an earlier call in this directory
+  job.overwrite = true;  // replaces pieces of an earlier call
   FillSettings& fill = job.fill.all;
   fill.width_mm = request.pieces.width_mm;
   fill.walls = piece.walls;

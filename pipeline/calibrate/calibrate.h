@@ -1,4 +1,4 @@
-// pipeline/calibrate/calibrate.h: a printer's test pieces (stages/segment/pieces.h), and its profile from what was measured.
+// pipeline/calibrate/calibrate.h: a printer's test pieces (stages/segment/pieces.h), and its profile from their measurements.
 #pragma once
 
 #include <atomic>
@@ -16,12 +16,12 @@ namespace lamina::pipeline {
 struct CalibrationRequest {
   std::string machine;           // as --machine takes it
   std::string directory;         // of the pieces
-  segment::PieceRequest pieces;  // a bead of 0: the nozzle, and three quarters of it
+  segment::PieceRequest pieces;  // a bead of 0: nozzle diameter wide, three quarters of it high
 };
 
-/// Writes DIR/<name>.stl, .toml and .gcode (or .sml) of each piece, DIR/widths.csv to be filled in, and DIR/STEPS.md.
+/// Writes DIR/<name>.stl, .toml and .gcode (or .sml) for each piece, DIR/widths.csv to fill in, and DIR/STEPS.md.
 /// returns names of the pieces
-/// errors  kUsage: the directory has a widths.csv already; kOutput; of run
+/// errors  kUsage: widths.csv exists already; kOutput; of run
 Result<std::vector<std::string>> write_test_pieces(CalibrationRequest request, const std::atomic<bool>& cancel);
 
 struct CalibratedProfile {
@@ -30,10 +30,10 @@ struct CalibratedProfile {
   segment::MeasuredMachine found;
 };
 
-/// The profile of request.machine with the spacings and speeds that follow from a filled in widths.csv.
+/// The profile of request.machine with the spacings and speeds computed from a completed widths.csv.
 /// gap_mm  between thick beads and their neighbours
-/// exact   spacings from the mean widths, not rounded to 0.01 mm as in the document
-/// errors  of read_widths and segment::calibrate; kUsage: no such machine; kInput: widths that make no valid profile
+/// exact   spacings use the unrounded mean widths; otherwise 0.01 mm as in the document
+/// errors  of read_widths and segment::calibrate; kUsage: no such machine; kInput: the widths give an invalid profile
 Result<CalibratedProfile> calibrate_profile(CalibrationRequest request, const std::string& widths, double gap_mm, bool exact);
 
 }  // namespace lamina::pipeline

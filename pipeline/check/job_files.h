@@ -1,4 +1,4 @@
-// pipeline/check/job_files.h: what a finished job left in its directory, read again.
+// pipeline/check/job_files.h: reads the files of a finished job back from its directory.
 #pragma once
 
 #include <string>
@@ -11,15 +11,15 @@
 
 namespace lamina::pipeline {
 
-/// The machine of program/machine.toml, which has to be the one that the manifest records.
-/// errors  kVerification: missing, changed, or not this job's; begins with the file's name within the directory
+/// The machine of program/machine.toml; it must match the manifest.
+/// errors  kVerification: missing, changed, or of another job; begins with the file's path in the directory
 Result<replay::VirtualMachine> machine_of_job(const std::string& directory, const ManifestHead& head);
 
-/// The text of a layer's print program, whatever it holds; "" if it cannot be read.
+/// The text of a layer's print program, unchecked; "" if it cannot be read.
 std::string program_of_layer(const std::string& directory, const ManifestHead& head, std::uint32_t layer);
 
-/// All materials of a layer as one image, of the manifest's grid.
-/// errors  kVerification, with the file: of read::image; of another size; two materials at one place
+/// All materials of a layer as one image on the manifest's grid.
+/// errors  kVerification, with the file: of read::image; wrong size; two materials in one pixel
 Result<Runs> picture_of_layer(const std::string& directory, const ManifestHead& head, const LayerRecord& record);
 
 }  // namespace lamina::pipeline

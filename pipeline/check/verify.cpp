@@ -22,7 +22,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// What all layers of a directory are compared by.
+// The context for comparing all layers of a directory.
 struct Inspection {
   std::string directory;
   const ManifestHead& head;
@@ -32,8 +32,8 @@ struct Inspection {
   VerifyReport& report;
 };
 
-// Empty, or what is wrong with a layer's print program. A program whose hash differs is replayed all the same, since
-// that tells where it differs.
+// Empty, or the fault of a layer's print program. A program with the wrong hash is still replayed, because the replay
+// locates the difference.
 std::string fault_of_program(Inspection& inspection, const LayerRecord& record, const RunsView* image) {
   const std::string name = program_file_name(record.layer.index, inspection.head.program_extension);
   if (name.empty()) return {};
@@ -70,7 +70,7 @@ std::string fault_of_program(Inspection& inspection, const LayerRecord& record, 
                             image != nullptr ? ", though it prints the same" : "");
 }
 
-// Empty, or what is wrong with an image; what it sets is added to `whole`.
+// Empty, or the fault of an image; its set pixels are added to `whole`.
 std::string fault_of_image(const Inspection& inspection, const LayerImageFile& file, Runs& whole) {
   const std::string& name = file.name;
   Result<read::Image> image = read::image((fs::path(inspection.directory) / name).string());
@@ -84,7 +84,7 @@ std::string fault_of_image(const Inspection& inspection, const LayerImageFile& f
 
 std::string fault_of_layer(Inspection& inspection, const LayerRecord& record) {
   if (inspection.head.extension.empty()) return fault_of_program(inspection, record, nullptr);  // a format without files
-  Runs whole;  // what is jetted, of whatever material
+  Runs whole;  // the set pixels of all materials together
   for (const LayerImageFile& file : layer_images(inspection.head, record)) {
     std::string fault = fault_of_file(inspection.directory, file.name, file.record.hash, file.record.bytes);
     if (!fault.empty()) return fault;
@@ -95,7 +95,7 @@ std::string fault_of_layer(Inspection& inspection, const LayerRecord& record) {
   return fault_of_program(inspection, record, inspection.quick ? nullptr : &view);
 }
 
-// Finds the machine again that the programs were written for.
+// Restores the machine that the programs were written for.
 void prepare_replay(Inspection& inspection) {
   auto built = machine_of_job(inspection.directory, inspection.head);
   if (!built) return inspection.report.add(built.error().message);
@@ -103,7 +103,7 @@ void prepare_replay(Inspection& inspection) {
   inspection.report.machine = inspection.machine->profile().name;
 }
 
-// The programs before the first and behind the last layer.
+// Checks the programs before the first and after the last layer.
 void check_frame(const std::string& directory, const ManifestHead& head, VerifyReport& report) {
   for (const auto& [stem, hash] : {std::pair{"start", head.program_start}, {"end", head.program_end}}) {
     const std::string name = fmt::format("program/{}{}", stem, head.program_extension);
@@ -126,7 +126,7 @@ void check_layers(const std::string& directory, const Manifest& manifest, bool q
     prepare_replay(inspection);
     check_frame(directory, manifest.head, report);
   }
-  // In pieces, so that messages stay in layer order and cost no string for each of a hundred thousand layers.
+  // In chunks, so that messages stay in layer order without a string for each of a hundred thousand layers.
   constexpr std::size_t kPiece = 1024;
   std::vector<std::string> faults(std::min(kPiece, manifest.layers.size()));
   for (std::size_t first = 0; first < manifest.layers.size(); first += kPiece) {
@@ -250,7 +250,7 @@ Result<VerifyReport> verify(const std::string& directory, const VerifyOptions& o
     manifests.push_back(std::move(*manifest));
   }
   for (const Manifest& manifest : manifests) check_layers(directory, manifest, options.quick, report);
-  // An interrupted run has finished layers that its manifest does not know of yet.
+  // An interrupted run may have finished layers without a line in its manifest.
   if (!interrupted) check_strays(directory, manifests, report);
   return report;
 }

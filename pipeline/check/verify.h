@@ -1,4 +1,4 @@
-// pipeline/check/verify.h: is a directory, or a file of toolpaths, what its manifest says.
+// pipeline/check/verify.h: compares a directory, or a file of toolpaths, with its manifest.
 #pragma once
 
 #include <cstdint>
@@ -16,25 +16,24 @@ struct VerifyOptions {
 /// Faults are in layer order, then stray files.
 struct VerifyReport : Faults {
   std::string directory;
-  std::uint64_t layers = 0;           // that the manifests name
+  std::uint64_t layers = 0;           // in the manifests
   std::uint64_t bytes = 0;            // of their files, as recorded
-  std::string machine;                // whose programs were replayed; empty if there are none
+  std::string machine;                // whose programs were replayed; empty without programs
   std::uint64_t replayed = 0;         // layers
-  replay::Count replay;               // of all of them
+  replay::Count replay;               // sum over the replayed layers
   std::uint64_t moved = 0, lost = 0;  // pixels of blocked nozzles
   replay::Material material;          // used up
-  double coverage = 0;                // drops / pixels of the layers replayed
+  double coverage = 0;                // drops / pixels of the replayed layers
 };
 
-/// Compares every file with the manifest (of the whole job, or of all shards that are there): present, of the recorded
-/// size and hash, and, unless quick, an image of the recorded columns, rows, resolution and number of set pixels; and the
-/// print program of each layer, carried out by a virtual machine, prints that image bit for bit. Files in
-/// layers/ and program/ that no manifest names are faults, and so is a job that was interrupted.
+/// Compares every file with the manifest of the whole job, or of all shards present: existence, size and hash. Unless
+/// quick, it also decodes each image and compares columns, rows, resolution and number of set pixels, and replays each
+/// layer's print program on a virtual machine, which must print that image bit for bit. Files in layers/ and program/
+/// without an entry in a manifest are faults, and so is an interrupted job.
 ///
-/// directory  or a file of toolpaths: its bytes and those of each layer (compare_paths), as of contours
-/// errors  kVerification if there is no manifest to compare with, or none that can be read; kUsage if there is no such
-///         directory or file
-/// cost    reads every file once, and once more to decode it; parallel over layers; memory of a few layers' runs
+/// directory  or a file of toolpaths; toolpaths and contours are compared by the bytes of file and layers (compare_paths)
+/// errors  kVerification: manifest missing or unreadable; kUsage: no such directory or file
+/// cost    reads every file once, and again to decode it; parallel over layers; memory of a few layers' runs
 Result<VerifyReport> verify(const std::string& directory, const VerifyOptions& options);
 
 }  // namespace lamina::pipeline

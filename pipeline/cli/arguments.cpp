@@ -1,4 +1,4 @@
-// The one file that knows the command line library.
+// Only this file depends on the command line library.
 #include <fmt/format.h>
 
 #include <CLI/App.hpp>
@@ -58,7 +58,7 @@ Result<Arguments> read_arguments(const CommandSpec& spec, const std::vector<std:
   Arguments read;
   read.given = arguments;
   std::vector<std::string_view> known = {"--help"};
-  std::deque<std::vector<std::string>> values;  // stay where they are
+  std::deque<std::vector<std::string>> values;  // addresses must not change
   std::vector<CLI::Option*> options;
   for (const OptionSpec& option : spec.options) {
     std::vector<std::string>& texts = values.emplace_back();
@@ -101,7 +101,7 @@ Result<Arguments> read_arguments(const CommandSpec& spec, const std::vector<std:
       continue;
     }
     for (std::string& text : values[i]) {
-      // -o --resume: an option that was left without its value.
+      // -o --resume: an option without its value.
       if (std::ranges::find(known, std::string_view(text)) != known.end()) {
         return wrong(fmt::format("{}: needs a value, {}, before {}", options[i]->get_name(), spec.options[i].value, text));
       }

@@ -1,4 +1,4 @@
-// pipeline/cli/arguments.h: what a command takes on the command line, and what stands there.
+// pipeline/cli/arguments.h: the options of a command, and the arguments of one call.
 #pragma once
 
 #include <optional>
@@ -12,7 +12,7 @@
 
 namespace lamina::pipeline {
 
-/// One option of a command. A switch has no value.
+/// One option of a command. A switch takes no value.
 struct OptionSpec {
   std::string flag;   // "-o,--output"
   std::string value;  // "MM"; empty for a switch
@@ -21,37 +21,37 @@ struct OptionSpec {
   std::string group;   // heading in the help
 };
 
-/// The arguments of a command: help, manual pages, shell completion and the documentation's tests are made from it.
+/// The arguments of a command: the source of help, manual pages, shell completion and the documentation's tests.
 struct CommandSpec {
   std::string name, summary;
-  std::string operand, operand_meaning;  // "PART", "..."; as many as there are
+  std::string operand, operand_meaning;  // "PART", "..."; any number
   std::vector<OptionSpec> options;
   std::string closing;                                                // examples, at the end of the help
-  std::string (*more)() = nullptr;                                    // the same, made only where it is read
-  std::vector<std::pair<std::string_view, std::string_view>> absent;  // options of other commands, and why this one has none
+  std::string (*more)() = nullptr;                                    // the same, made only when the help is read
+  std::vector<std::pair<std::string_view, std::string_view>> absent;  // other commands' options, and why they are missing here
 
-  /// The option that `flag`, "--output" or "-o", names, or nullptr.
+  /// The option named by `flag`, "--output" or "-o", or nullptr.
   const OptionSpec* find(std::string_view flag) const;
-  /// All that stands at the end of the help.
+  /// The end of the help, complete.
   std::string end() const { return more == nullptr ? closing : closing + more(); }
 };
 
-/// What a reader (value.h, number_text.h) says of an option's text, behind the option's name; "" is no error.
+/// The message of a reader (value.h, number_text.h) after the option's name; "" means no error.
 /// errors  kUsage
 Status at_option(std::string_view flag, const std::string& wrong);
 
-/// What stands on the command line, as text.
+/// The arguments of a call, as text.
 struct Arguments {
   std::vector<std::string> operands;
   std::vector<std::pair<std::string, std::string>> options;  // (spec flag, text); switches with an empty text
-  std::optional<std::string> help;                           // --help is there: nothing else is to be done
-  std::vector<std::string> given;                            // as they were typed, all of them
+  std::optional<std::string> help;                           // set by --help: show it and do nothing else
+  std::vector<std::string> given;                            // all words as typed
 
   bool has(std::string_view flag) const;
   std::string text(std::string_view flag) const;  // last one given, or ""
   std::vector<std::string> all(std::string_view flag) const;
 
-  /// Sets a value by the text of an option, if it is there. errors  kUsage: "--jobs: ...", outside of the limits or no value
+  /// Sets a value from an option's text, if present. errors  kUsage: "--jobs: ...", out of range or invalid
   template <class T>
   Status read(std::string_view flag, const Limits& limits, T& value) const {
     return has(flag) ? at_option(flag, read_value(text(flag), limits, value)) : Status();
@@ -62,8 +62,8 @@ struct Arguments {
   }
 };
 
-/// Reads the arguments behind the command's name. errors  kUsage: unknown option (and which one was probably meant),
-/// value missing
+/// Parses the arguments after the command's name.
+/// errors  kUsage: unknown option (with the nearest name), missing value
 Result<Arguments> read_arguments(const CommandSpec& spec, const std::vector<std::string>& arguments);
 
 }  // namespace lamina::pipeline

@@ -39,8 +39,8 @@ std::string program_help() {
   return text;
 }
 
-/// What is freed shall go back to the system: left alone, glibc keeps up to 64 MiB after the first large buffer is freed,
-/// and --memory would not be what is resident.
+/// Makes glibc return freed memory to the system: by default it keeps up to 64 MiB after the first large free, and
+/// resident memory would exceed --memory.
 void bound_retained_memory() {
 #ifdef __GLIBC__
   mallopt(M_MMAP_THRESHOLD, 2 << 20);
@@ -118,7 +118,7 @@ int run_program(int argument_count, char** arguments, Program program) {
   try {
     const Outcome outcome = program({arguments + std::min(argument_count, 1), arguments + argument_count}, console);
     return outcome.error ? console.complain(*outcome.error) : outcome.code;
-  } catch (const std::exception& error) {  // reading the arguments has run out of memory
+  } catch (const std::exception& error) {  // out of memory while reading the arguments
     return console.complain({Fault::kInternal, fmt::format("internal error: {}", error.what())});
   }
 }

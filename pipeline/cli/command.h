@@ -1,4 +1,4 @@
-// pipeline/cli/command.h: the program `lamina`: its commands as rows of a table, and what a command gets and gives.
+// pipeline/cli/command.h: the program `lamina`: a table of commands, and their input and output.
 #pragma once
 
 #include <atomic>
@@ -16,32 +16,32 @@
 
 namespace lamina::pipeline {
 
-/// Where a command's words and results go, and what tells it to stop: the console of the program, or a job of a batch.
+/// Receives a command's messages and results, and can cancel it. Implemented by the console and by a batch job.
 class Context {
  public:
   virtual ~Context() = default;
 
   // --- for people
-  /// Text as it is.
+  /// Text, unchanged.
   virtual void say_text(std::string_view text) = 0;
-  /// One line, line breaks and control characters taken out.
+  /// One line; line breaks and control characters are removed.
   void say(std::string_view line);
-  /// Something is wrong and the command goes on, as with its next operand. returns  the exit code that belongs to it
+  /// Reports an error after which the command continues, such as one bad operand. returns  the exit code of the error
   virtual int complain(const Error& error) = 0;
 
-  // --- for scripts; errors  kOutput if it could not be written; a reader that closed the pipe is none
+  // --- for scripts; errors  kOutput if writing fails; a closed pipe is not an error
   virtual Status print(std::string_view text) = 0;
-  /// A value, printed as one line of JSON.
+  /// Prints a value as one line of JSON.
   virtual Status give(const nlohmann::ordered_json& value) = 0;
 
   // --- while it runs
-  /// How far a job is. Layers that have begun are worth keeping: from then on cancel() is set rather than the program ended.
+  /// Reports progress. Once layers have started, a signal sets cancel() instead of ending the program, to keep them.
   virtual void progress(const ProgressEvent& event) = 0;
-  /// Set when the command has to stop. A command that never asks for it is ended by the first signal.
+  /// Set when the command must stop. The first signal ends a command that never calls this.
   virtual const std::atomic<bool>& cancel() = 0;
 };
 
-/// How a command ended. What it had to say and to give went into its context, all but the error that ended it.
+/// How a command ended. Messages and results go to the context; only the final error is here.
 struct Outcome {
   Outcome() = default;
   Outcome(int exit_code) : code(exit_code) {}
@@ -52,7 +52,7 @@ struct Outcome {
 
   int code = 0;
   std::optional<Error> error;
-  std::uint32_t layers_planned = 0, layers_kept = 0;  // of a job; kept: they were there already
+  std::uint32_t layers_planned = 0, layers_kept = 0;  // of a job; kept: already present
 };
 
 /// One command of the program.
@@ -60,8 +60,8 @@ struct Command {
   std::string_view name, summary;
   CommandSpec (*spec)();
   Outcome (*run)(const Arguments&, Context&);
-  bool reads_itself = false;  // another program reads its arguments, which are handed over as they were typed
-  /// Ending of the name that a batch gives its output, if that is a file; nullptr if it has no name of its own.
+  bool reads_itself = false;  // passes its arguments unread to another program
+  /// Extension of the output file that a batch names after the job; nullptr if the batch names no file.
   std::string (*ending)(const Arguments&) = nullptr;
 };
 
@@ -71,7 +71,7 @@ std::span<const Command* const> commands();
 /// The command of that name, or nullptr.
 const Command* find_command(std::string_view name);
 
-/// The definition of a command's arguments, under its name.
+/// A command's argument definition, with the command's name set.
 CommandSpec spec_of(const Command& command);
 
 /// "'jett' is no command, did you mean 'jet'? ..."
@@ -84,16 +84,16 @@ Outcome run(const Command& command, const Arguments& arguments, Context& context
 class Console;
 using Program = Outcome (*)(const std::vector<std::string>& words, Console&);
 
-/// Runs a program on the words behind its name. returns  the exit code; errors are one line on stderr
+/// Runs a program on the words after its name. returns  the exit code; errors are one line on stderr
 int run_program(int argument_count, char** arguments, Program program);
 
-/// The program `lamina`: the command that the first word names.
+/// The program `lamina`: runs the command named by the first word.
 Outcome run_lamina(const std::vector<std::string>& words, Console& console);
 
-/// Reads words as the arguments of a command and runs it.
+/// Parses words as the arguments of a command and runs it.
 Outcome run_command(const Command& command, const std::vector<std::string>& words, Console& console);
 
-// --- one file each, in commands/; plan.cpp has those that plan a job, manual.cpp completion_command too
+// --- one file each in commands/, except plan.cpp (all commands that plan a job) and manual.cpp (also completion)
 extern const Command jet_command, slice_command, heights_command, extrude_command, info_command, verify_command,
     calibrate_command, permeability_command, merge_command, machines_command, preview_command, report_command, batch_command,
     completion_command, manual_command;

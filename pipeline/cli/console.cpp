@@ -29,9 +29,9 @@ void on_signal(int) {
   if (interrupted.exchange(true) || !keeping) ::_exit(130);
 }
 
-/// From now on the first SIGINT, SIGTERM or SIGHUP sets the flag that is returned; the next one ends the program with 130.
-/// As long as nothing would be lost the first one ends it: reading a large part may take long, and no library that reads
-/// it looks at the flag. SIGHUP stays ignored if it is, as under nohup.
+/// From now on the first SIGINT, SIGTERM or SIGHUP sets the returned flag; the next one ends the program with 130.
+/// Before this call the first signal ends the program: nothing can be lost yet, loading a large part may take long, and
+/// the loading libraries do not read the flag. An ignored SIGHUP stays ignored, as under nohup.
 const std::atomic<bool>& watch_for_signals() {
   struct sigaction action {
   }, before{};

@@ -1,4 +1,4 @@
-// pipeline/cli/console.h: the terminal. A reader that has gone away is no reason to crash.
+// pipeline/cli/console.h: the terminal. A closed reader does not end the program.
 #pragma once
 
 #include <optional>
@@ -21,13 +21,13 @@ class Console : public Context {
   void progress(const ProgressEvent& event) override;
   const std::atomic<bool>& cancel() override;
 
-  bool quiet = false;  // no progress is told
+  bool quiet = false;  // suppresses progress
 
  private:
   std::optional<Progress> progress_;
 };
 
-/// There is something to keep: the first signal only sets the flag from here on.
+/// From here on the first signal only sets the cancel flag, so that finished work is kept.
 void keep_on_signals();
 
 }  // namespace lamina::pipeline

@@ -12,7 +12,7 @@
 namespace lamina::pipeline {
 namespace {
 
-/// The headings of the help under which the options of a section stand; others under "Bed and layers".
+/// The help headings for the options of a section; default "Bed and layers".
 constexpr Word<std::string_view> kHeadings[] = {{"part", "Parts"},
                                                 {"place", "Parts"},
                                                 {"slice", "Contours and files"},
@@ -37,12 +37,12 @@ void add_options(std::span<const Key<Target>> keys, const KeyChoice& choice, con
   }
 }
 
-/// Whether a word of --fill is no pattern: it sets another key.
+/// Whether a word of --fill sets a key other than fill.pattern.
 bool is_word_of_other_key(std::string_view word) {
   return word == "segmented" || word == "nonzero" || word == "positive" || word == "evenodd";
 }
 
-/// Options that leave each other without a meaning.
+/// Mutually exclusive options.
 Status check_together(const KeyChoice& choice, const Arguments& arguments, const Job& job) {
   const std::string fill = arguments.text("--fill"), pattern = arguments.text("--pattern");
   if (choice.has("segment", "fill") && !fill.empty() && !pattern.empty() && fill != pattern && !is_word_of_other_key(fill)) {
@@ -58,7 +58,7 @@ Status check_together(const KeyChoice& choice, const Arguments& arguments, const
   return {};
 }
 
-// What is wrong with the parts of a job file is told with the place in it, where their names alone would not say.
+// Errors in the parts of a job file include their place in the file.
 Status check_parts_of_file(const std::string& file, const Job& job) {
   if (job.parts.empty()) {
     return Error{Fault::kUsage,
@@ -91,7 +91,7 @@ void add_key_options(const KeyChoice& choice, CommandSpec& spec) {
        {"--set", "KEY=VALUE", "set any key of the job, as in --set bed.dpi=600; part.2.copies is of part 2", "", "Job"}});
   add_options<Job>(job_keys(), choice, Job(), spec);
   add_options<PartRequest>(part_keys(), choice, PartRequest(), spec);
-  // Each heading once, in the order in which they come first.
+  // Each heading once, in order of first occurrence.
   std::map<std::string, std::size_t> places;
   for (const OptionSpec& option : spec.options) places.try_emplace(option.group, places.size());
   std::ranges::stable_sort(spec.options, {}, [&](const OptionSpec& option) { return places[option.group]; });

@@ -1,4 +1,4 @@
-// pipeline/cli/keys.h: the keys of a job as options of a command, and the job that a command line asks for.
+// pipeline/cli/keys.h: the keys of a job as options of a command, and the job given by a command line.
 #pragma once
 
 #include <initializer_list>
@@ -11,8 +11,8 @@
 
 namespace lamina::pipeline {
 
-/// Which keys of a job a command takes as options: whole sections ("bed"), or single keys ("run.threads"). Keys that
-/// are not chosen can still be set by --job and --set, so that one job file serves all commands.
+/// The job keys that a command offers as options: whole sections ("bed") or single keys ("run.threads"). --job and --set
+/// accept all other keys too, so one job file serves all commands.
 class KeyChoice {
  public:
   KeyChoice(std::initializer_list<std::string_view> names) : names_(names) {}
@@ -26,8 +26,8 @@ class KeyChoice {
 /// chosen), under the headings of the help.
 void add_key_options(const KeyChoice& choice, CommandSpec& spec);
 
-/// The job that a command line asks for: --job first, then operands as parts, then --set, then flags. Not checked yet:
-/// see check_job(). errors  kUsage, one line that begins with the option or file
+/// The job given by a command line: --job first, then operands as parts, then --set, then flags. Unchecked: see
+/// check_job(). errors  kUsage, one line that begins with the option or file
 Result<Job> read_job_options(const KeyChoice& choice, const Arguments& arguments);
 
 }  // namespace lamina::pipeline

@@ -26,8 +26,8 @@ constexpr InputOption kInputs[] = {{"--job", "the job file"},
                                    {"--parts", "a part"}};
 constexpr std::string_view kOutputs[] = {"-o,--output", "--save-job", "--plot", "--target"};
 
-/// A file of its own that a command writes. Marks: one of them stands in the head of each that lamina wrote; a ^ before
-/// the first character: it begins with it.
+/// An output file of a command. Marks: every such file of lamina contains one of them in its head; a leading ^ means at
+/// the very start.
 struct OwnFile {
   std::string_view command, flag;
   bool stream;  // may go to a device, a pipe or standard output
@@ -45,7 +45,7 @@ constexpr OwnFile kOwnFiles[] = {
     {"machines", "--target", false, {"^orientation target"}},
 };
 
-/// The operand whose directory, or whose layers or programs, a file lies in; nullptr for none.
+/// The operand whose directory, layers or programs contain a file; nullptr for none.
 const std::string* directory_read(const std::string& file, const Arguments& arguments) {
   std::error_code ignored;
   const std::string place = fs::absolute(file, ignored).parent_path().string();
@@ -56,7 +56,7 @@ const std::string* directory_read(const std::string& file, const Arguments& argu
   return found == arguments.operands.end() ? nullptr : &*found;
 }
 
-/// Whether a file lies where a run in that directory removes and replaces what it finds.
+/// Whether a run in that directory would remove or replace a file.
 bool lies_in_layers(const std::string& file, const std::string& directory) {
   std::error_code ignored;
   const std::string place = fs::weakly_canonical(fs::absolute(file, ignored), ignored).parent_path().string();
@@ -72,7 +72,7 @@ std::vector<InputFile> inputs_of(const Arguments& arguments, std::string_view op
   return inputs;
 }
 
-/// An output, and what is written beside it.
+/// An output and the files written beside it.
 void add_output(const std::string& path, std::vector<std::string>& outputs) {
   if (path.empty()) return;
   for (const char* ending : {"", ".part", ".json", ".json.part"}) outputs.push_back(path + ending);

@@ -1,4 +1,4 @@
-// pipeline/cli/outputs.h: what a call writes against what it reads and what is there, before anything is loaded.
+// pipeline/cli/outputs.h: checks a call's outputs against its inputs and existing files, before loading.
 #pragma once
 
 #include <span>
@@ -11,28 +11,28 @@
 
 namespace lamina::pipeline {
 
-/// A file that a call reads, and as what: "the job file".
+/// An input file of a call, with its role: "the job file".
 struct InputFile {
   std::string path, role;
 };
 
-/// Refuses outputs that are inputs, under whatever names and links: files are compared by device and inode. Of an output
-/// that is a directory, what lies in its layers/ and program/ counts as written.
+/// Refuses outputs that are inputs under any name or link: files are compared by device and inode. An output directory
+/// includes the contents of its layers/ and program/.
 /// errors  kUsage
 Status check_outputs(std::span<const InputFile> inputs, std::span<const std::string> outputs);
 
-/// The same for all that the arguments of a command name. A study, a picture, a page or a saved job replaces a file only
-/// if lamina wrote it as one, or with --overwrite.
-/// errors  kUsage; kOutput for a device or a pipe where a file is written
+/// The same for every file in a command's arguments. A study, picture, page or saved job replaces a file only if lamina
+/// wrote that file as the same kind, or with --overwrite.
+/// errors  kUsage; kOutput for a device or a pipe in place of a file
 Status check_outputs(std::string_view command, const Arguments& arguments);
 
-/// The same for the files that a job names, in a job file or by --set.
+/// The same for the files named in a job, by a job file or --set.
 Status check_outputs(const Arguments& arguments, const Job& job);
 
-/// Whether a file of that name may be replaced: it is absent, empty or begins as lamina's own. errors  kUsage
+/// Allows a file to be replaced if it is absent, empty or carries one of lamina's marks. errors  kUsage
 Status check_own_file(const std::string& path, std::span<const std::string_view> marks);
 
-/// Whether the value of an option is a file that is read, or one that is written.
+/// Whether an option's value is an input file; whether it is an output file.
 bool is_input_option(std::string_view flag);
 bool is_output_option(std::string_view flag);
 

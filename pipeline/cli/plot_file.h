@@ -1,4 +1,4 @@
-// pipeline/cli/plot_file.h: --plot FILE of the commands that draw one.
+// pipeline/cli/plot_file.h: the option --plot FILE.
 #pragma once
 
 #include <string>
@@ -8,10 +8,10 @@
 
 namespace lamina::pipeline {
 
-/// Whether a plot can have this name: empty, or .svg or .png in a folder that there is. errors  kUsage, kOutput
+/// Checks a plot's name: empty, or .svg or .png in an existing folder. errors  kUsage, kOutput
 Status check_plot_name(const std::string& path);
 
-/// Writes an .svg, or a .png that lamina-preview draws. errors  kOutput; kInternal: no such program
+/// Writes an .svg, or a .png drawn by lamina-preview. errors  kOutput; kInternal: lamina-preview is missing
 Status write_plot(const std::string& path, const Plot& plot);
 
 }  // namespace lamina::pipeline

@@ -1,4 +1,4 @@
-// pipeline/flow/budget.h: lends out slots of scratch and the bytes that layers may need.
+// pipeline/flow/budget.h: lends scratch slots and a memory budget to layers.
 #pragma once
 
 #include <algorithm>
@@ -9,8 +9,8 @@
 
 namespace lamina::pipeline {
 
-/// Slots go out last in, first out, so that few of them grow large. What an idle slot holds on to counts as used and is
-/// freed where a layer would have to wait for it. Thread-compatible: callers hold a lock.
+/// Slots are lent last in, first out, so that few of them grow large. Memory of an idle slot counts as used and is freed
+/// before a layer would have to wait for it. Thread-compatible: callers hold a lock.
 class Budget {
  public:
   struct Scratch {
@@ -26,7 +26,7 @@ class Budget {
     std::uint64_t bytes = 0;
   };
 
-  /// A slot and `bytes` for a layer, or nothing: it has to wait. A layer that alone exceeds the budget gets it alone.
+  /// A slot and `bytes` for a layer, or nothing if it must wait. A layer larger than the budget runs alone.
   std::optional<Loan> take(std::uint64_t bytes) {
     if (in_flight_ > 0 && (idle_.empty() || used_ + bytes > budget_)) return std::nullopt;
     make_room(bytes);
@@ -42,13 +42,13 @@ class Budget {
 
   bool fits(std::uint64_t bytes) const { return used_ + bytes <= budget_; }
 
-  /// More bytes for a layer in flight, whether or not they fit.
+  /// Adds bytes to a layer in flight, even beyond the budget.
   void add(std::uint64_t bytes) {
     make_room(bytes);
     use(bytes);
   }
 
-  /// A layer turns out to hold `now` bytes instead of `before`.
+  /// Corrects a layer's bytes from `before` to `now`.
   void settle(std::uint64_t before, std::uint64_t now) {
     used_ -= before;
     use(now);
@@ -71,7 +71,7 @@ class Budget {
   }
 
   void make_room(std::uint64_t bytes) {
-    for (Loan& slot : idle_) {  // the last one goes out next: it is emptied last
+    for (Loan& slot : idle_) {  // the last slot is lent next, so it is emptied last
       if (used_ + idle_bytes_ + bytes <= budget_) return;
       if (slot.bytes == 0) continue;
       idle_bytes_ -= slot.bytes;
@@ -82,7 +82,7 @@ class Budget {
 
   std::uint64_t budget_;
   Scratch scratch_;
-  std::vector<Loan> idle_;  // with what each holds on to
+  std::vector<Loan> idle_;  // each with its retained bytes
   std::uint32_t in_flight_ = 0, most_in_flight_ = 0;
   std::uint64_t used_ = 0;        // by layers in flight
   std::uint64_t idle_bytes_ = 0;  // of idle slots

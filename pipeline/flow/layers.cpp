@@ -17,8 +17,8 @@ namespace flow = tbb::flow;
 using Node = flow::function_node<Ticket, Ticket>;
 using End = flow::function_node<Ticket, flow::continue_msg>;
 
-/// The steps as nodes of a graph, and what layers in flight have been lent. Node bodies are copied by the library and
-/// refer to this object, which stays where it is.
+/// The steps as nodes of a graph, and the loans of layers in flight. The library copies node bodies, which refer to this
+/// object, so its address must not change.
 class LayerGraph {
  public:
   LayerGraph(std::uint32_t count, const LayerSteps& steps, const FlowLimits& limits, const std::atomic<bool>& cancel)
@@ -50,11 +50,11 @@ class LayerGraph {
   }
 
  private:
-  /// A layer that was admitted and is not recorded; by slot of its record.
+  /// An admitted layer before it is recorded; indexed by record slot.
   struct Moving {
     Status status;
     Budget::Loan loan;
-    std::uint64_t more = 0;  // that it waits for at a gate
+    std::uint64_t more = 0;  // bytes that it waits for at a gate
   };
 
   void connect() {
@@ -141,7 +141,7 @@ class LayerGraph {
     }
   }
 
-  /// Behind the last step: what the layer holds from here on.
+  /// After the last step: sets the bytes that the layer holds from here on.
   void leave(const Ticket& ticket) {
     {
       const std::lock_guard lock(mutex_);
@@ -159,7 +159,7 @@ class LayerGraph {
 
   flow::continue_msg record(const Ticket& ticket) {
     Moving& moving = moving_[ticket.record];
-    if (result_) {  // else a lower layer failed, and this one is not recorded
+    if (result_) {  // otherwise an earlier layer failed, and this one is not recorded
       const auto start = Clock::now();
       result_ = moving.status ? steps_.record(ticket) : moving.status;
       count_time(steps_.steps.size(), start);
@@ -190,7 +190,7 @@ class LayerGraph {
   const FlowLimits& limits_;
   const std::atomic<bool>& cancel_;
 
-  std::mutex mutex_;  // over what follows, up to the nodes
+  std::mutex mutex_;  // guards the following members up to the nodes
   Budget budget_;
   std::vector<std::uint32_t> free_records_;
   std::map<std::uint32_t, Ticket> at_gate_;  // by position
@@ -199,7 +199,7 @@ class LayerGraph {
   std::uint32_t recorded_ = 0;
   bool stopped_ = false;  // no further admissions
 
-  std::vector<Moving> moving_;                      // a slot is its layer's, from step to step
+  std::vector<Moving> moving_;                      // a slot belongs to one layer through all steps
   std::vector<std::atomic<std::int64_t>> step_ns_;  // of each step, and of recording
   Status result_;                                   // of `record`, which runs once at a time
 

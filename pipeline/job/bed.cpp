@@ -6,7 +6,7 @@ namespace {
 
 constexpr Limits kSize{kLeastMm, kMostMm, " mm"}, kDpi{1, 25400, "", true};
 
-// A machine has its own bed and dpi, unless others are asked of it; jobs without one say those of a bare bed.
+// With a machine, absent bed and dpi come from the machine; jobs without one show the defaults of a bare bed.
 template <auto Member, const auto& Bare>
 JobKey of_bed(const KeyName& name, const Limits& limits) {
   JobKey key = field<Member>(name, limits);

@@ -1,4 +1,4 @@
-// pipeline/job/decisions.h: how often a process has decided what every job decides once; a test holds each run to once.
+// pipeline/job/decisions.h: counts decisions that a job makes once; a test checks that each run makes them once.
 #pragma once
 
 #include <atomic>
@@ -7,8 +7,8 @@
 
 namespace lamina::pipeline {
 
-/// The profile of the machine is found and read, what lies in the output is examined, the layers are decided, the filling
-/// of a part is read.
+/// In order: finding and reading the machine's profile, examining the output, deciding the layers, reading a part's
+/// filling.
 enum class Decision { kMachine, kOutput, kHeights, kFilling };
 
 inline std::atomic<std::uint64_t> decisions[4];

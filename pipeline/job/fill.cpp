@@ -1,4 +1,4 @@
-// Section [fill]: the keys of one filling, then what a job adds to them.
+// Section [fill]: the keys of one filling, then the keys of the whole section.
 #include "pipeline/job/fill.h"
 
 #include "pipeline/job/keys.h"
@@ -92,7 +92,7 @@ constexpr Key<FillSettings> kFillKeys[] = {
 
 constexpr std::string_view kDistanceKeys[] = {"distance_mm", "gap_formula", "gap_by_height", "gap_mm"};
 
-/// Two keys of one table that exclude each other.
+/// Two mutually exclusive keys of one table.
 std::string check_distances(const FillChanges& changes) {
   const auto keys = distance_keys(changes);
   if (keys.size() < 2) return {};

@@ -1,4 +1,4 @@
-// pipeline/job/fill.h: how layers are to be filled, as a job says it: section [fill], and fill of a [[part]].
+// pipeline/job/fill.h: the filling settings of a job: section [fill], and key fill of a [[part]].
 #pragma once
 
 #include <string_view>
@@ -20,19 +20,19 @@ struct FillRequest {
   std::vector<FillRange> ranges;  // none overlaps another
 };
 
-/// Sets the keys of changes. What these say of the distances between lines takes the place of what held before.
+/// Sets the changed keys. A changed distance between lines replaces every earlier setting of that distance.
 void apply(const FillChanges& changes, FillSettings& settings);
 
-/// Gives changes the distances between lines.
+/// Sets the distances between lines in `changes`.
 void set_distances(const std::vector<double>& distance_mm, FillChanges& changes);
 
-/// Whether any layer gets walls or a filling by these settings.
+/// Whether these settings produce walls or a filling in any layer.
 bool fills(const FillSettings& settings);
 
-/// The keys that say how far lines lie from each other and are not as they are without being set; at most one of
-/// distance_mm, gap_formula, gap_by_height and gap_mm can hold.
+/// The keys for the distance between lines whose values differ from their defaults; at most one of distance_mm,
+/// gap_formula, gap_by_height and gap_mm is valid.
 std::vector<std::string_view> distance_keys(const FillSettings& settings);
-/// The same of changes: those that are set, whatever to.
+/// The same for changes: every key that is set, to any value.
 std::vector<std::string_view> distance_keys(const FillChanges& changes);
 
 }  // namespace lamina::pipeline

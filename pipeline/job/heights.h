@@ -1,4 +1,4 @@
-// pipeline/job/heights.h: [heights] of a job: how its layers are decided.
+// pipeline/job/heights.h: section [heights] of a job: how its layers are decided.
 #pragma once
 
 #include <string>
@@ -14,10 +14,10 @@ namespace lamina::pipeline {
 
 struct Job;
 
-/// [heights] of a job as the stage takes it, checked. errors  kUsage, one line that begins with the key
+/// Section [heights] as checked options of the stage. errors  kUsage, one line that begins with the key
 Result<heights::Options> heights_options(const Job& job);
 
-/// What a person is told of [heights]: "of 0.05 mm", "of 0.05..0.3 mm, optimal, steps up to 0.1 mm".
+/// Section [heights] for messages: "of 0.05 mm", "of 0.05..0.3 mm, optimal, steps up to 0.1 mm".
 std::string heights_text(const Job& job);
 
 }  // namespace lamina::pipeline

@@ -1,6 +1,6 @@
-// pipeline/job/keys.h: every key of a job file, once: its name, its flag, how it is read and how it is written.
+// pipeline/job/keys.h: the table of all keys of a job file: name, flag, reader and writer.
 //
-// Options (cli/keys.h), job files, --set, --save-job, manifests and the help are made from these two tables.
+// Options (cli/keys.h), job files, --set, --save-job, manifests and the help are generated from these two tables.
 #pragma once
 
 #include <span>
@@ -15,13 +15,13 @@ namespace lamina::pipeline {
 using JobKey = Key<Job>;
 using PartKey = Key<PartRequest>;
 
-/// The products that a key decides: two jobs that differ there are different jobs.
+/// The products whose bytes depend on a key: a different value makes a different job.
 namespace decides {
 inline constexpr unsigned images = bit(Product::kImages), contours = bit(Product::kContours), moves = bit(Product::kMoves);
 inline constexpr unsigned all = images | contours | moves;
 }  // namespace decides
 
-/// All keys of a job, the groups below one after the other; keys of a section stand together.
+/// All keys of a job in the order of the groups below; the keys of a section are adjacent.
 std::span<const JobKey> job_keys();
 std::span<const PartKey> part_keys();
 
@@ -39,20 +39,20 @@ std::span<const JobKey> machine_keys();
 std::span<const JobKey> dose_keys();
 std::span<const JobKey> run_keys();
 
-// --- tables inside of sections
+// --- tables within sections
 std::span<const Key<FillSettings>> fill_settings_keys();
 std::span<const Key<SegmentSettings>> segment_settings_keys();
 
-/// Reads a table of keys of a filling. At most one of them may say how far lines lie from each other.
-/// returns "" or what is wrong; at  where
+/// Reads a table of filling keys. At most one of them may set the distance between lines.
+/// returns "" or an error message; at  its place
 std::string read_fill_changes(const TomlValue& table, FillChanges& changes, Place& at);
 std::string fill_changes_text(const FillChanges& changes);
 
-/// An array of tables { from_mm, to_mm, material }. returns "" or what is wrong; at  where
+/// Reads an array of tables { from_mm, to_mm, material }. returns "" or an error message; at  its place
 std::string read_material_ranges(const TomlValue& list, std::vector<MaterialRange>& ranges, Place& at);
 std::string material_ranges_text(const std::vector<MaterialRange>& ranges);
 
-/// Words that --fill of lamina extrude takes beside those of fill.pattern.
+/// Reads the words of lamina extrude --fill that fill.pattern does not have.
 std::string read_fill_rule(std::string_view text, FillRule& rule);
 
 }  // namespace lamina::pipeline

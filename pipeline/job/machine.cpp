@@ -35,7 +35,7 @@ const JobKey kDoseKeys[] = {
     field<&Job::dose, &DoseRequest::core>(
         {"dose", "core", "--core", "SHARE", "of the pixels inside of the shell that is jetted, 0 to 1", decides::images},
         {0, 1}),
-    // Jobs without beads are recorded as they were before there were any.
+    // The default is omitted, so that jobs without beads keep their earlier text.
     word<kBeadEnds, &Job::dose, &DoseRequest::bead_ends>(
         {"dose", "bead_ends", "--bead-ends", "round|square",
          "of the beads that fill a part, and of their thick and thin stretches", decides::images})

@@ -1,4 +1,4 @@
-// pipeline/job/old_forms.h: what job files said in strings before TOML said it: read for one version, with a note.
+// pipeline/job/old_forms.h: deprecated string forms of job files, accepted for one version with a note.
 #pragma once
 
 #include <string>
@@ -8,10 +8,10 @@
 
 namespace lamina::pipeline {
 
-/// Replaces the old forms of a job's tree by the tables that say the same: fill.by_height, segment.by_height,
+/// Replaces old forms in a job's tree by equivalent tables: fill.by_height, segment.by_height,
 /// part.material_by_height, part.fill, fill.gap_by_height and extrude.set as strings. notes  gets a line for each
-/// file  names the job file in them, or the option
-/// errors  kUsage: a string that is none of the old form
+/// file  the job file or option named in the notes
+/// errors  kUsage: a string that does not match the old form
 Status replace_old_forms(TomlValue& job, const std::string& file, std::vector<std::string>& notes);
 
 }  // namespace lamina::pipeline

@@ -10,7 +10,7 @@ using segment::CutRule;
 constexpr Word<CutRule> kRules[] = {
     {"aligned", CutRule::kAligned}, {"fukuda", CutRule::kGrid}, {"thick-ends", CutRule::kThickEnds}};
 
-// Lengths and percentages may be anything here: what can be laid is decided by segment::check, with reasons.
+// Wide limits for lengths and percentages: segment::check refuses invalid ones with a reason.
 constexpr Limits kAny{-1e6, 1e6};
 
 constexpr Key<SegmentSettings> kSegmentKeys[] = {
@@ -70,7 +70,7 @@ std::string segment_ranges_text(const std::vector<Range<SegmentSettings>>& range
   return ranges_text<SegmentSettings>(kSegmentKeys, ranges);
 }
 
-// The way to ask for a filling with one word; files hold fill.pattern, segment.on and image.fill.
+// Option --fill sets the filling with one word; files use fill.pattern, segment.on and image.fill.
 std::string read_filling(std::string_view word, Job& job) {
   if (word == "segmented") {
     job.segment.all.on = true;

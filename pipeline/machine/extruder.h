@@ -7,7 +7,7 @@
 
 namespace lamina::pipeline {
 
-/// Finds the printer that a job asks for, marlin if it names none, and changes it as the job says.
+/// Finds the job's printer (default: marlin) and applies the job's changes to it.
 /// errors  kUsage
 Result<ExtruderProfile> resolve_extruder(const Job& job);
 

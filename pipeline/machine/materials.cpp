@@ -17,7 +17,7 @@ std::string names_text(const std::vector<JobMaterial>& materials) {
   return text;
 }
 
-/// Adds a material that a part names. errors  a name that no vat has
+/// Adds the material of a part. errors  a name without a vat
 Status use(const std::string& name, const std::string& part, const Machine* machine, std::vector<JobMaterial>& used) {
   if (std::ranges::find(used, name, &JobMaterial::name) != used.end()) return {};
   JobMaterial material{name, static_cast<std::uint32_t>(used.size())};
@@ -66,7 +66,7 @@ Result<Materials> materials_of(const Job& job, const Machine* machine) {
                              names_text(result.used), machine->name,
                              machine->powder.vats == 1 ? "one vat" : fmt::format("{} vats", machine->powder.vats)));
   }
-  // In the order of the vats, whoever is named first.
+  // In the order of the vats, not of the parts.
   std::ranges::sort(result.used, {}, &JobMaterial::vat);
   const auto number_of = [&](const std::string& name) {
     return static_cast<std::uint32_t>(std::ranges::find(result.used, name, &JobMaterial::name) - result.used.begin());

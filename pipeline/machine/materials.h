@@ -1,4 +1,4 @@
-// pipeline/machine/materials.h: the powders of a job: which part is of which, in which vat it is, and which vat feeds a layer.
+// pipeline/machine/materials.h: the powders of a job: their parts, their vats, and the vats that feed a layer.
 #pragma once
 
 #include <cstdint>
@@ -14,7 +14,7 @@
 
 namespace lamina::pipeline {
 
-/// What a part is of, at each height.
+/// The material of a part at each height.
 struct PartMaterial {
   struct Range {
     std::int64_t from, to;  // nm above the bed, [from, to)
@@ -28,19 +28,19 @@ struct PartMaterial {
 };
 
 struct Materials {
-  std::vector<JobMaterial> used{{}};  // at least one; by vat, or without a machine in the order of the parts
+  std::vector<JobMaterial> used{{}};  // at least one; in the order of vats, or of parts without a machine
   std::vector<PartMaterial> part;     // one for each part of the job
   bool several() const { return used.size() > 1; }
 };
 
-/// The materials of a job. machine  null: it has none. No part, or every part names its own. They have to be
-/// those of the vats (powder.materials); vats without names take them in the order in which parts name them.
-/// errors  kUsage: a part without a material among others, a name that no vat has, more materials than vats
+/// The materials of a job. machine  null without one. Either all parts or none have a material. Materials must match the
+/// vats (powder.materials); unnamed vats receive them in the order of the parts.
+/// errors  kUsage: only some parts have a material, a name without a vat, more materials than vats
 Result<Materials> materials_of(const Job& job, const Machine* machine);
 
-/// The vats that feed a layer with so many pixels of each material: that of its only material; for a layer of several by
-/// the machine's rule, the first one on a tie; for an empty layer that of the job's first material.
-/// errors  kUsage by the rule `refuse`; what follows "layer 12"
+/// The vats that feed a layer with the given pixels of each material: for one material its vat; for several the machine's
+/// rule decides, the first vat on a tie; for an empty layer the vat of the job's first material.
+/// errors  kUsage by the rule `refuse`; the text continues "layer 12"
 Result<std::vector<std::uint32_t>> vats_of_layer(const Machine& machine, const Materials& materials,
                                                  std::span<const std::uint64_t> pixels);
 

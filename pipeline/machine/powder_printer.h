@@ -1,4 +1,4 @@
-// pipeline/machine/powder_printer.h: the machine of a job: found, changed as asked, checked.
+// pipeline/machine/powder_printer.h: finds, changes and checks the powder printer of a job.
 #pragma once
 
 #include <array>
@@ -13,18 +13,18 @@
 
 namespace lamina::pipeline {
 
-/// The bed that parts stand on.
+/// The bed under the parts.
 struct Bed {
   std::array<double, 2> size_mm = kBareBedMm;
-  bool of_machine = false;  // no other can be asked for
+  bool of_machine = false;  // fixed by the machine
 };
 
-/// Of parts that are looked at without a printer.
+/// For parts without a printer.
 inline constexpr Bed kLargestBed{{kMostMm, kMostMm}};
-/// That of a job without a machine.
+/// The bed of a job without a machine.
 inline Bed bare_bed(const Job& job) { return {job.bed_mm.value_or(kBareBedMm), false}; }
 
-/// A profile with the job's changes to it, and the grid that follows.
+/// A profile with the job's changes, and the resulting grid.
 struct ResolvedMachine {
   Machine machine;
   HeadGrid grid;
@@ -33,16 +33,16 @@ struct ResolvedMachine {
 /// A profile and its grid, with the dialect checked. errors  of make_head_grid and check_dialect
 Result<ResolvedMachine> resolve_profile(const Machine& machine);
 
-/// What the images of a job are planned for: its machine, or a bare bed.
+/// The target of a job's images: its machine, or a bare bed.
 struct PowderPrinter {
-  std::optional<ResolvedMachine> machine;  // absent: the job names none
+  std::optional<ResolvedMachine> machine;  // absent without a machine
   Bed bed;
   PixelGrid grid;  // of the images
 };
 
-/// Finds the machine that a job asks for; without one, the bed and the dpi are the job's. bed.dpi, if given, are asked of
-/// the head: across the scan the number of interlaced passes follows, along it the length of a pixel.
-/// errors  kUsage: no such machine, a dpi that the head cannot reach, another bed
+/// Finds the machine of a job; without one, bed and dpi are the job's. A given bed.dpi configures the head: the number of
+/// interlaced passes across the scan, and the pixel length along it.
+/// errors  kUsage: no such machine, a dpi that the head cannot reach, a bed that differs from the machine's
 Result<PowderPrinter> resolve_powder_printer(const Job& job);
 
 }  // namespace lamina::pipeline

@@ -16,7 +16,7 @@
 namespace lamina::pipeline {
 namespace {
 
-/// Reads a shipped profile or a file. unknown(suggestion, names)  says that there is none of that name
+/// Reads a shipped profile or a file. unknown(suggestion, names)  makes the error for an unknown name
 template <class Profile, class Unknown>
 Result<Profile> find(const std::string& name_or_file, std::span<const ShippedProfile> shipped,
                      Result<Profile> (*read)(std::string_view, const std::string&), const Unknown& unknown) {

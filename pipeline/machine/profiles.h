@@ -1,4 +1,4 @@
-// pipeline/machine/profiles.h: machine profiles by name or file: those shipped with the program, and people's own.
+// pipeline/machine/profiles.h: machine profiles by name or file, shipped or user-defined.
 #pragma once
 
 #include <span>
@@ -13,7 +13,7 @@
 
 namespace lamina::pipeline {
 
-/// A profile that is part of the program.
+/// A profile built into the program.
 struct ShippedProfile {
   std::string_view name, text;
 };
@@ -21,14 +21,14 @@ std::span<const ShippedProfile> shipped_machines();   // powder printers, stages
 std::span<const ShippedProfile> shipped_extruders();  // stages/write/machines/extrusion/*.toml
 
 /// Reads a profile. `where` names it in messages.
-/// errors  kUsage: place, key, what is wrong; an unknown dialect
+/// errors  kUsage: place, key, reason; an unknown dialect
 Result<Machine> read_machine(std::string_view text, const std::string& where);
 
-/// The same of an extrusion printer; without a calibration of its own it has the published one of the Anet A8.
-/// errors  kUsage: place, key, what is wrong; those of segment::check
+/// The same for an extrusion printer; the default calibration is the published one of the Anet A8.
+/// errors  kUsage: place, key, reason; those of segment::check
 Result<ExtruderProfile> read_extruder(std::string_view text, const std::string& where);
 
-/// The profile of that name, or in that file (anything with a slash or that ends in .toml).
+/// The profile with that name, or in that file (a text with a slash or ending in .toml).
 /// errors  kUsage, with the shipped names
 Result<Machine> find_machine(const std::string& name_or_file);
 Result<ExtruderProfile> find_extruder(const std::string& name_or_file);

@@ -51,7 +51,7 @@ void for_each_entry(const fs::path& directory, Visit visit) {
   for (fs::directory_iterator entry(directory, error), end; !error && entry != end; entry.increment(error)) visit(*entry);
 }
 
-// Layers' files of any earlier job, half-written ones too, and all that is in program/ of their print programs.
+// Layer files of any earlier job, including half-written ones, and their print programs in program/.
 std::vector<fs::path> layer_files(const std::string& directory) {
   std::vector<fs::path> found;
   for_each_entry(fs::path(directory) / "program", [&](const fs::directory_entry& entry) {
@@ -67,7 +67,7 @@ std::vector<fs::path> layer_files(const std::string& directory) {
   return found;
 }
 
-// What is in program/ beside the layers' programs, of whatever dialect.
+// The other files in program/, of any dialect.
 std::vector<fs::path> program_frames(const std::string& directory) {
   std::vector<fs::path> found;
   for_each_entry(fs::path(directory) / "program", [&](const fs::directory_entry& entry) {
@@ -84,7 +84,7 @@ Error cannot(const fs::path& path, int reason) {
   return {Fault::kOutput, fmt::format("{}: {}", path.string(), std::strerror(reason))};
 }
 
-// A shard beside shards of the same split: they share the directory.
+// Shards of the same split share the directory.
 bool joins(const Job& job, const ManifestFile& file) {
   return job.shard && file.shard && (*job.shard)[1] == (*file.shard)[1] && (*job.shard)[0] != (*file.shard)[0];
 }
@@ -240,7 +240,7 @@ Status prepare_output(const Job& job) {
     fs::remove(file, error);
     if (error) return cannot(file, error.value());
   }
-  if (job.machine.profile.empty()) fs::remove(directory / "program", error);  // unless something else is in it
+  if (job.machine.profile.empty()) fs::remove(directory / "program", error);  // fails if other files remain
   return {};
 }
 

@@ -1,5 +1,5 @@
-// pipeline/output/image_files.h: where the layers of a powder job go: a file for each image, the print program beside it,
-// and the manifest.
+// pipeline/output/image_files.h: writes the layers of a powder job: a file per image, the print program
+// beside it, and the manifest.
 #pragma once
 
 #include <cstdint>
@@ -19,44 +19,44 @@
 
 namespace lamina::pipeline {
 
-/// The manifest's head of a plan of images.
+/// The manifest head for a plan of images.
 ManifestHead image_head(const Plan& plan);
 
 class ImageFiles {
  public:
-  /// The plan has to outlive it.
+  /// The plan must outlive this object.
   explicit ImageFiles(const Plan& plan);
 
-  /// Makes the directory ready and begins its manifest.
-  /// errors  kUsage: what is there is of another job; kOutput
+  /// Prepares the directory and starts its manifest.
+  /// errors  kUsage: the directory holds another job; kOutput
   Status open();
-  /// Layers that are still to be made, in increasing order, once it is open.
+  /// Layers still to be made, in increasing order; valid after opening.
   const std::vector<std::uint32_t>& todo() const { return todo_; }
-  /// Layers that stand from an interrupted run.
+  /// Layers kept from an interrupted run.
   const std::vector<LayerRecord>& kept() const { return kept_; }
 
-  /// What a layer occupies on its way; reused by later layers.
+  /// Scratch of a layer in flight; reused by later layers.
   struct Work {
     std::unique_ptr<write::ImageEncoder> encoder;
     write::Bytes file;
-    std::vector<write::Bytes> files;  // one for each material, if the job has several
+    std::vector<write::Bytes> files;  // one per material, if the job has several
     ProgramWork program;
     std::uint64_t bytes() const;
   };
 
-  // --- from many threads at once, each with work of its own
+  // --- from many threads at once, each with its own work
   /// materials  empty unless the job has several
   Status encode(const Runs& whole, std::span<const Runs> materials, Work& work, LayerRecord& record) const;
   /// errors  kOutput; kUsage: the machine cannot feed the layer
   Status store(const Runs& whole, Work& work, LayerRecord& record) const;
-  /// Bytes that a layer may need whose image has so many changes.
+  /// Upper bound of the bytes for a layer whose image has that many changes.
   std::uint64_t bytes_bound(std::uint64_t changes) const;
 
   // --- from one thread at a time
-  /// In layer order; layers that stand are recorded where they belong.
+  /// In layer order; kept layers are recorded in their place.
   Status record(const LayerRecord& record);
   Status finish();
-  /// An interrupted or failed job: its finished layers stay on record.
+  /// Ends an interrupted or failed job; its finished layers stay recorded.
   Status keep();
 
  private:

@@ -39,7 +39,7 @@ Result<std::vector<Shard>> read_shards(const std::vector<std::string>& directori
     if (files.empty()) return unmatched(fmt::format("{}: holds no manifest of a shard", directory));
     for (const ManifestFile& file : files) {
       const std::string path = (fs::path(directory) / file.name).string();
-      // An earlier merge into this directory was stopped, or could not remove the shards' manifests.
+      // An earlier merge into this directory was interrupted, or failed to remove the shards' manifests.
       const bool of_merge = !file.shard && files.back().shard && fs::equivalent(directory, output, error);
       if (of_merge && file.partial) continue;
       if (file.partial) return unmatched(fmt::format("{}: this shard is not finished; run it again with --resume", path));
@@ -78,7 +78,7 @@ Status check_coverage(std::vector<Shard>& shards) {
   return {};
 }
 
-// One file under another name too, or a copy of it where that cannot be. The name appears when the file is whole.
+// Links a file to another name, or copies it if linking fails. The name appears once the file is complete.
 Status bring_file(const fs::path& from, const fs::path& to, MergeReport& report) {
   const fs::path fresh = to.string() + ".part";
   std::error_code error, ignored;
@@ -93,7 +93,7 @@ Status bring_file(const fs::path& from, const fs::path& to, MergeReport& report)
   return {};
 }
 
-// Every file of a shard at its place under `output`.
+// Links every file of a shard into `output`.
 Status bring_files(const Shard& shard, const std::string& output, MergeReport& report) {
   std::error_code error;
   const bool in_place = fs::equivalent(shard.directory, output, error);
@@ -117,7 +117,7 @@ Status bring_files(const Shard& shard, const std::string& output, MergeReport& r
     if (Status status = bring(program, record.program.bytes); !status) return status;
   }
   if (head.machine.empty() || in_place) return {};
-  // What all shards write alike.
+  // The files that all shards write identically.
   for (const std::string& name :
        {std::string("machine.toml"), "start" + head.program_extension, "end" + head.program_extension}) {
     const fs::path from = fs::path(shard.directory) / "program" / name;
@@ -134,7 +134,7 @@ Result<MergeReport> merge(const std::vector<std::string>& directories, const std
   if (shards->empty()) return unmatched(fmt::format("{}: holds no manifest of a shard", directories.front()));
   if (Status status = check_coverage(*shards); !status) return status.error();
 
-  // Nothing of another job is replaced.
+  // Never replaces files of another job.
   ManifestHead head = shards->front().manifest.head;
   for (const ManifestFile& file : find_manifests(output)) {
     const std::string path = (fs::path(output) / file.name).string();

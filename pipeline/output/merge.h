@@ -1,4 +1,4 @@
-// pipeline/output/merge.h: the shards of a job become the job.
+// pipeline/output/merge.h: merges the shards of a job.
 #pragma once
 
 #include <cstdint>
@@ -16,14 +16,13 @@ struct MergeReport {
   std::uint64_t linked = 0, copied = 0;  // files; the others were in place
 };
 
-/// Joins the shards (or ranges) of one job that lie in one or several directories into `output`, whose manifest.json is
-/// then byte for byte that of a run that was never divided. Files in other directories are linked, or copied where the
-/// file system cannot link; those directories stay as they are. In `output` itself the shards' manifests are removed
-/// once manifest.json is there.
+/// Merges the shards (or ranges) of one job from one or several directories into `output`. Its manifest.json equals that
+/// of an undivided run byte for byte. Files in other directories are linked, or copied where the file system cannot
+/// link; those directories do not change. In `output` the shards' manifests are removed once manifest.json exists.
 ///
-/// errors  kVerification, one line: a shard of another job, layers that no shard or that two shards hold, a shard that
-///         is not finished, a file that is missing or of the wrong size. kUsage if a directory does not exist or holds
-///         another job's manifest.json. kOutput
+/// errors  kVerification, one line: a shard of another job, missing or duplicate layers, an unfinished shard, a file
+///         that is missing or of the wrong size. kUsage if a directory does not exist or holds another job's
+///         manifest.json. kOutput
 Result<MergeReport> merge(const std::vector<std::string>& directories, const std::string& output);
 
 }  // namespace lamina::pipeline

@@ -1,4 +1,4 @@
-// pipeline/output/plan_head.h: what every manifest says of its plan.
+// pipeline/output/plan_head.h: the manifest keys common to all products.
 #pragma once
 
 #include "pipeline/plan/plan.h"
@@ -6,7 +6,7 @@
 
 namespace lamina::pipeline {
 
-/// The head of a plan's manifest, without what only its product has.
+/// The manifest head of a plan, without product-specific keys.
 ManifestHead plan_head(const Plan& plan);
 
 }  // namespace lamina::pipeline

@@ -71,7 +71,7 @@ Status PrintProgram::write_layer(const Layer& layer, const RunsView& image, cons
 
 std::uint64_t PrintProgram::bytes_bound(std::uint64_t changes) const {
   const HeadGrid& grid = resolved_.grid;
-  // A sweep's vectors and their text, at most three times as long; lines, sorted changes and their steps.
+  // A sweep's vectors with their text of at most three times the size, lines, sorted changes and their steps.
   const std::uint64_t vectors = grid.steps() * grid.words() * 8;
   const std::uint64_t turned = grid.scan_axis == ScanAxis::kX ? 4 * changes : 16 * changes;
   return 4 * vectors + 4 * grid.steps() + 16 * grid.lines + 2 * changes + turned + (512 << 10);

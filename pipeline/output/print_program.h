@@ -1,9 +1,9 @@
-// pipeline/output/print_program.h: the print program of a job, one file a layer beside the layer's image.
+// pipeline/output/print_program.h: the print program of a job, one file per layer beside its image.
 //
-// out/program/machine.toml   the machine as it was used: its profile with the job's changes
-//             start.<ext>    what stands before the first layer, and
-//             end.<ext>      behind the last one
-//             000000.<ext>   a layer; it depends on that layer alone, so that jobs can be resumed, sharded and merged
+// out/program/machine.toml   the profile with the job's changes
+//             start.<ext>    text before the first layer
+//             end.<ext>      text after the last layer
+//             000000.<ext>   a layer, independent of all others, so that jobs can be resumed, sharded and merged
 // The whole program is the concatenation: start, layers in order, end.
 #pragma once
 
@@ -23,7 +23,7 @@
 
 namespace lamina::pipeline {
 
-/// What a layer's program occupies while it is made; reused by later layers.
+/// Scratch for a layer's program; reused by later layers.
 struct ProgramWork {
   program::CompileScratch compile;
   std::unique_ptr<write::ProgramWriter> writer;
@@ -35,7 +35,7 @@ struct ProgramWork {
 /// The file of a layer's program in a job's directory, program/000042.gcode; "" without a machine.
 std::string program_file_name(std::uint32_t index, std::string_view extension);
 
-/// What the machine is told before the first layer and after the last one.
+/// The commands before the first layer and after the last one.
 struct ProgramFrame {
   write::ProgramBytes start, end;
 };
@@ -43,18 +43,18 @@ ProgramFrame program_frame(const ResolvedMachine& resolved, std::uint32_t layers
 
 class PrintProgram {
  public:
-  /// directory  of the job; the machine has to outlive it
+  /// directory  of the job; the machine must outlive this object
   PrintProgram(const ResolvedMachine& resolved, std::string directory, std::uint32_t layers);
 
   /// Writes machine.toml, start and end. errors  kOutput
   Status begin() const;
 
   /// Compiles a layer and writes its file, sweep by sweep. errors  kOutput
-  /// feeds  the vats that it needs
+  /// feeds  the vats that feed the layer
   Status write_layer(const Layer& layer, const RunsView& image, const std::vector<std::uint32_t>& feeds, ProgramWork& work,
                      ProgramRecord& record) const;
 
-  /// What write_layer may hold for an image of so many changes.
+  /// Upper bound of write_layer's memory, in bytes, for an image with that many changes.
   std::uint64_t bytes_bound(std::uint64_t changes) const;
 
  private:

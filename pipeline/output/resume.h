@@ -1,4 +1,4 @@
-// pipeline/output/resume.h: which layers of an interrupted job still stand.
+// pipeline/output/resume.h: finds the intact layers of an interrupted job.
 #pragma once
 
 #include <string>
@@ -9,10 +9,10 @@
 
 namespace lamina::pipeline {
 
-/// Reads the manifest of `directory` (finished, or as far as an interrupted run got) and hashes the files it names.
+/// Reads the manifest of `directory` (finished or partial) and hashes the files it names.
 ///
-/// returns  the records, in layer order, whose file is there, whole and unchanged; empty if there is no manifest
-/// errors   kUsage if the manifest belongs to another job (which key differs), or to layers that this one leaves out
+/// returns  the records, in layer order, of complete and unchanged files; empty without a manifest
+/// errors   kUsage if the manifest belongs to another job (names the key that differs) or covers layers outside this run
 /// cost     reads every finished file once, in parallel
 Result<std::vector<LayerRecord>> layers_that_hold(const std::string& directory, const std::string& manifest_name,
                                                   const ManifestHead& head);

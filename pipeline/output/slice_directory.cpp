@@ -14,7 +14,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Files of single layers, 000042.svg, that an earlier job left in any format.
+/// Per-layer files of an earlier job in any format, such as 000042.svg.
 std::vector<fs::path> layer_files(const Job& job) {
   std::vector<fs::path> files;
   std::error_code error;
@@ -68,7 +68,7 @@ Status check_slice_output(const Job& job) {
                      fmt::format("{}: is a part of the job and would be replaced; name another directory", file.string())};
       }
     }
-    // A job file that a person wrote is not ours to replace: ours stands beside a manifest.
+    // Never replaces a user's job file: a job file of lamina has a manifest beside it.
     if (name == "job.toml" && fs::exists(file, error) && (!replaces || manifests.empty())) {
       return Error{Fault::kUsage,
                    fmt::format("{}: is there already, and the job would be kept in it; name another directory", file.string())};

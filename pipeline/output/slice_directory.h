@@ -1,4 +1,4 @@
-// pipeline/output/slice_directory.h: the files of a sliced job, and what happens to those of an earlier one.
+// pipeline/output/slice_directory.h: the files of a sliced job, and the removal of an earlier job's.
 #pragma once
 
 #include <filesystem>
@@ -13,23 +13,23 @@ namespace lamina::pipeline {
 /// ".svg", ".cli" or ".3mf"
 std::string_view slice_extension(const Job& job);
 
-/// Of the one file: the first part's name with the format's ending.
+/// Name of the single file: the first part's name with the format's extension.
 std::string slice_file_name(const Job& job);
 
-/// Refuses a directory that holds another job, unless job.overwrite. errors  kUsage, kOutput
+/// Refuses a directory with another job unless job.overwrite is set. errors  kUsage, kOutput
 Status check_slice_output(const Job& job);
 
-/// Where layers in files of their own wait until all are written.
+/// Temporary directory of per-layer files until all are written.
 std::filesystem::path waiting_layers(const Job& job);
 
-/// After check_slice_output: makes the directory. What an earlier job left stays. errors  of check_nobody_came, kOutput
+/// Call after check_slice_output: creates the directory and keeps existing files. errors  of check_nobody_came, kOutput
 Status prepare_slice_directory(const Job& job);
 
-/// Called when the job is whole: what an earlier job left is removed, and layers that wait get their names.
+/// Call when the job is complete: removes an earlier job's files and renames the waiting layers.
 /// errors  kOutput
 Status replace_earlier_slices(const Job& job);
 
-/// Removes, when it goes, layers that still wait: those of a job that failed.
+/// Removes the waiting layers of a failed job on destruction.
 class WaitingLayers {
  public:
   explicit WaitingLayers(const Job& job) : job_(job) {}

@@ -69,8 +69,8 @@ Status SliceFiles::open() {
 }
 
 Sections::TextBytes SliceFiles::text_bytes() const {
-  // Two numbers of some 11 characters and what divides them. An element of SVG names kind, colour and width, one of CLI
-  // its part and count; both repeat the point that they share with the element before.
+  // Two numbers of about 11 characters and separators. An SVG element has kind, colour and width, a CLI element part and
+  // count; both repeat the last point of the previous element.
   if (!encoder_) return {};
   if (plan_.job.slice.format == "svg") return {26, 200, 0};
   if (plan_.job.slice.format == "cli-binary") return {16, 24, 0};
@@ -106,8 +106,8 @@ Status SliceFiles::record(const write::SliceLayer& layer, const Buffer<char>& te
   return manifest_->append(record);
 }
 
-/// For lamina preview, which plans a layer again: the job without what leaves the bytes alone. Parts whose names a job
-/// file cannot hold are sliced all the same.
+/// Saves the job for lamina preview, which plans layers again, without settings that do not affect bytes. Part names that
+/// a job file cannot hold are not an error.
 Status SliceFiles::save_plan() const {
   Job kept = plan_.job;
   kept.threads = 0;

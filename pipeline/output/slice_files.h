@@ -1,5 +1,5 @@
-// pipeline/output/slice_files.h: where the layers of a sliced job go: one file (SVG, CLI, 3MF) or a file a layer, and the
-// manifest beside them.
+// pipeline/output/slice_files.h: writes the layers of a sliced job into one file (SVG, CLI, 3MF) or one
+// per layer, and the manifest beside them.
 #pragma once
 
 #include <cstdint>
@@ -18,23 +18,23 @@ namespace lamina::pipeline {
 
 class SliceFiles {
  public:
-  /// The plan has to outlive it.
+  /// The plan must outlive this object.
   explicit SliceFiles(const Plan& plan);
-  /// Layers that wait for their names go with a job that does not finish.
+  /// Removes the waiting layers of an unfinished job.
   ~SliceFiles();
 
   /// errors  kUsage, kOutput
   Status open();
-  /// Of one file: what stands of it. Null for other kinds.
+  /// The single file, with its finished layers; null for other kinds.
   const LayeredFile* file() const { return file_ ? &*file_ : nullptr; }
-  /// What the summary names.
+  /// The output path for the summary.
   std::string output() const;
-  /// Bytes of text that points and paths take.
+  /// Bytes of text for points and paths.
   Sections::TextBytes text_bytes() const;
 
-  // --- from many threads at once, each with a text of its own
+  // --- from many threads at once, each with its own text
   void encode(const write::SliceLayer& layer, Buffer<char>& text) const;
-  /// Size and hash of the text into the record; of a file a layer: writes it. errors  kOutput
+  /// Stores size and hash of the text in the record; writes the file if layers have their own. errors  kOutput
   Status store(std::uint32_t index, const Buffer<char>& text, LayerRecord& record) const;
 
   // --- from one thread at a time, in layer order

@@ -25,7 +25,7 @@ namespace fs = std::filesystem;
 
 std::string manifest_path(const Job& job) { return job.output + ".json"; }
 
-/// The layer table that belongs to a file of toolpaths.
+/// The layer table of a toolpath file.
 std::string table_path(const Job& job) { return fs::path(job.output).replace_extension(".rp3").string(); }
 
 bool streams(const Job& job) {
@@ -43,7 +43,7 @@ std::string source_text(const Plan& plan) {
   return text;
 }
 
-/// The slopes that the layers were decided by, or else the flattest ones in them.
+/// The slopes that decided the layers, or else the flattest slopes in them.
 Result<std::string> layer_table(const Plan& plan) {
   const Job& job = plan.job;
   const auto options = heights_options(job);

@@ -1,5 +1,5 @@
-// pipeline/output/toolpath_file.h: where the layers of an extrusion job go: one file of moves, its manifest beside it, and
-// for SML its layer table (.rp3).
+// pipeline/output/toolpath_file.h: writes the layers of an extrusion job: one file of moves, its manifest,
+// and for SML its layer table (.rp3).
 #pragma once
 
 #include <cstdint>
@@ -15,12 +15,12 @@
 
 namespace lamina::pipeline {
 
-/// Refuses a file that is there, unless the job resumes or overwrites it; nothing is touched. errors  kUsage, kOutput
+/// Refuses an existing file unless the job resumes or overwrites it. Changes nothing. errors  kUsage, kOutput
 Status check_toolpath_output(const Job& job, const Extruder& machine);
 
 class ToolpathFile {
  public:
-  /// The plan has to outlive it.
+  /// The plan must outlive this object.
   explicit ToolpathFile(const Plan& plan);
 
   /// errors  of LayeredFile::open
@@ -28,7 +28,7 @@ class ToolpathFile {
   LayeredFile& file() { return *file_; }
   const LayeredFile& file() const { return *file_; }
 
-  /// Takes the moves of a layer as text; from many threads at once, each with a text of its own.
+  /// Encodes the moves of a layer as text; from many threads at once, each with its own text.
   std::unique_ptr<write::LayerMoves> layer(const Layer& layer, Buffer<char>& text) const;
 
   // --- from one thread at a time, in layer order

@@ -13,7 +13,7 @@ namespace {
 
 std::uint64_t bytes_of(const Runs& runs) { return bytes_held(runs.row_offset) + bytes_held(runs.change); }
 
-/// Widths of a powder's beads are what is asked for.
+/// Powder beads have exactly the requested widths.
 void set_widths(const FillSettings& fill, SegmentSettings& segment) {
   if (!segment.thick_width_mm) segment.thick_width_mm = fill.width_mm;
   if (!segment.continuous_width_mm) segment.continuous_width_mm = fill.width_mm;
@@ -96,7 +96,7 @@ void Beads::apply(Runs& image, Runs& scratch, BeadWork& work) const {
 std::uint64_t Beads::spans_expected(std::uint32_t index) const {
   const Layer layer = sections_->layers()[index].own();
   const double rows_per_mm = grid_.y.pixels_per_nm() * kNmPerMm;
-  // Of a cut the slicer needs some 140 bytes: so many corners have walls and closed curves.
+  // The slicer needs about 140 bytes per cut, which gives the number of corners in walls and closed curves.
   const double corners = static_cast<double>(sections_->slicer().layer_bytes_bound(index)) / 140;
   double spans = 0;
   for (const Sections::Area& area : sections_->areas()) {

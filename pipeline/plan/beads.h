@@ -1,11 +1,11 @@
-// pipeline/plan/beads.h: a powder job whose parts are beads instead of solid, so that planned pores are printed without
-// being modelled.
+// pipeline/plan/beads.h: a powder job whose parts consist of beads, which print planned pores
+// without modelling them.
 //
 //   section ─> contours ─> walls, filling ─> thick and thin stretches ─> pixels of beads ─┐
 //   part's exact image ─────────────────────────────────────────────────────────> both ──┴─> with its shell ─> image
 //
-// The filling is that of `lamina slice` and `lamina extrude`, key for key. Beads have the widths that the job gives:
-// no melt spreads, so a segmented line needs no calibration.
+// The filling uses the same keys as `lamina slice` and `lamina extrude`. Bead widths come from the job: powder beads do
+// not spread, so a segmented line needs no calibration.
 #pragma once
 
 #include <cstdint>
@@ -22,7 +22,7 @@
 
 namespace lamina::pipeline {
 
-/// What a layer of beads occupies while it is in flight.
+/// Scratch for a layer of beads in flight.
 struct BeadWork {
   explicit BeadWork(const PixelGrid& grid) : beads(grid) {}
   std::uint64_t bytes() const;
@@ -33,28 +33,28 @@ struct BeadWork {
   Runs inner;  // below the shell
 };
 
-/// Segmented lines of powder beads, and the distances between lines that follow, which `fill` gains. Absent widths of
-/// [segment] are: thick and continuous fill.width_mm, thin half of it.
-/// warnings  gains what a plan will not do well
-/// errors    kUsage: keys that have no meaning together with a filling; of plan_segments
+/// Plans segmented lines of powder beads and adds the resulting line distances to `fill`. Default widths of [segment]:
+/// thick and continuous fill.width_mm, thin half of it.
+/// warnings  receives the expected defects of the plan
+/// errors    kUsage: keys that conflict with a filling; of plan_segments
 Result<SegmentPlan> plan_bead_segments(const Job& job, FillRequest& fill, std::vector<std::string>& warnings);
 
-/// The beads of any layer; immutable, any thread may ask. Sections and segments outlive it.
+/// The beads of any layer; immutable, usable from any thread. Sections and segments must outlive it.
 class Beads {
  public:
   Beads(const Job& job, const PixelGrid& grid, const Sections& sections, const SegmentPlan& segments);
 
-  /// Walls and filling of a layer as pixels, into work.laid. work.sections holds the filled layer.
+  /// Rasterizes walls and filling of a layer into work.laid. work.sections holds the filled layer.
   /// errors  of layer_cut
   Status lay(const Layer& layer, BeadWork& work) const;
-  /// Leaves those pixels of the part that the laid beads cover or that lie in its shell; none is added.
+  /// Clears all pixels of the part outside the beads and the shell; sets none.
   /// image    the part's, row 0 at the back (before any mirror)
   /// scratch  of the image's kind
   void apply(Runs& image, Runs& scratch, BeadWork& work) const;
 
-  /// Pieces of bead rows that a layer is expected to have: an image has at most two changes for each.
+  /// Expected number of row spans of the beads in a layer: an image has at most two changes per span.
   std::uint64_t spans_expected(std::uint32_t layer) const;
-  /// What a layer is expected to need beside its images.
+  /// Expected bytes of a layer in addition to its images.
   std::uint64_t bytes_expected(std::uint32_t layer) const;
 
  private:

@@ -1,4 +1,4 @@
-// pipeline/plan/dose.h: how much binder a job's layers get where (stages/dose/).
+// pipeline/plan/dose.h: the distribution of binder in a job's layers (stages/dose/).
 #pragma once
 
 #include "pipeline/job/job.h"
@@ -12,13 +12,13 @@ class DosePlan {
  public:
   DosePlan(const Job& job, const PixelGrid& grid);
 
-  /// Whether a layer is changed at all.
+  /// Whether the dose changes any layer.
   bool any() const { return !bleed_.half_width.empty() || core_ < 1; }
 
-  /// Takes the bleed away from an image, then binder out of its core. `second` and `third` are scratch.
+  /// Removes the bleed from an image, then thins its core. `second` and `third` are scratch.
   void apply(std::uint32_t layer, Runs& image, Runs& second, Runs& third) const;
 
-  /// Changes that an image of so many, whose parts cover so many pixels at most, may have afterwards.
+  /// Upper bound of an image's changes after apply(), given those before and the most pixels that its parts cover.
   std::uint64_t changes_bound(std::uint64_t changes, std::uint64_t covered) const;
 
  private:

@@ -12,7 +12,7 @@
 namespace lamina::pipeline {
 namespace {
 
-/// A key as a job file and a command line name it.
+/// The name of a key in a job file and on a command line.
 std::string named(std::string_view name) {
   for (const auto& key : fill_settings_keys()) {
     if (key.name == name && !key.flag.empty()) return fmt::format("fill.{} ({})", name, key.flag);
@@ -20,7 +20,7 @@ std::string named(std::string_view name) {
   return fmt::format("fill.{}", name);
 }
 
-/// Keys that cannot both hold. returns "" or what is wrong
+/// Checks mutually exclusive keys. returns "" or an error message
 std::string contradiction(const FillSettings& settings) {
   const auto keys = distance_keys(settings);
   if (keys.size() > 1) {

@@ -1,4 +1,4 @@
-// pipeline/plan/fill.h: what fills a part at each height, decided from [fill] of a job.
+// pipeline/plan/fill.h: the filling of a part at each height, from section [fill] of a job.
 #pragma once
 
 #include <cstdint>
@@ -10,21 +10,21 @@
 
 namespace lamina::pipeline {
 
-/// What fills a part at each height.
+/// The filling of a part at each height.
 struct FillPlan {
   struct Range {
     std::int64_t from, to;  // nm above the part's bottom: layers whose middle is in [from, to)
     infill::FillParameters parameters;
   };
   infill::FillParameters base;
-  std::vector<Range> ranges;  // in order, none overlaps another
+  std::vector<Range> ranges;  // in order, disjoint
 
   const infill::FillParameters& at(std::int64_t height) const;
-  /// Whether any layer gets walls or a filling.
+  /// Whether any layer has walls or a filling.
   bool fills() const;
 };
 
-/// The plan of a part, from the job's section and the part's own changes.
+/// The plan of a part, from the job's section and the part's changes.
 /// errors  kUsage, one line that begins with the key
 Result<FillPlan> plan_filling(const FillRequest& request, const FillChanges& part_changes);
 

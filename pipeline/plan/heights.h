@@ -1,4 +1,4 @@
-// pipeline/plan/heights.h: the layers that a job decides on.
+// pipeline/plan/heights.h: decides the layers of a job.
 #pragma once
 
 #include "pipeline/job/job.h"
@@ -11,8 +11,8 @@ namespace lamina::pipeline {
 /// The index of a scene's surface.
 heights::SurfaceIndex index_scene(const Scene& scene, const heights::Options& options);
 
-/// The one table of all parts on the bed, and what can be said for it. Uniform layers cost nothing; other ways look at
-/// every facet once.
+/// The layer table shared by all parts on the bed, with its reasons. Uniform layers cost nothing; other modes read every
+/// facet once.
 /// errors  of heights_options and heights::plan_heights
 Result<heights::Plan> decide_heights(const Job& job, const Scene& scene);
 

@@ -1,4 +1,4 @@
-// pipeline/plan/layer_cut.h: the segmentation of a job, applied to a part in a layer.
+// pipeline/plan/layer_cut.h: applies the segmentation of a job to a part in a layer.
 #pragma once
 
 #include "pipeline/plan/sections.h"
@@ -8,12 +8,12 @@
 
 namespace lamina::pipeline {
 
-/// How the lines of a part in a layer are cut.
+/// The cut of a part's lines in a layer.
 /// errors  of infill::first_place
 Result<segment::LayerCut> layer_cut(const SegmentRange& range, const infill::FillParameters& filling, const Layer& layer,
                                     const Box& part);
 
-/// Whether thin stretches fit into the parts at all. errors  kUsage: longer than any line can be
+/// Checks that thin stretches fit into the parts. errors  kUsage: longer than any possible line
 Status check_thin_stretches(const SegmentPlan& segments, const Sections& plan);
 
 }  // namespace lamina::pipeline

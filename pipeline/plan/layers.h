@@ -1,5 +1,5 @@
-// pipeline/plan/layers.h: the layers of a file of contours or toolpaths in the order in which they are made, and the
-// planes that they are cut at.
+// pipeline/plan/layers.h: the layers of contours or toolpaths in the order of printing, and their
+// section planes.
 #pragma once
 
 #include <cstdint>
@@ -16,12 +16,12 @@ namespace lamina::pipeline {
 inline constexpr std::uint32_t kEveryPart = UINT32_MAX;
 
 struct ScheduledLayer {
-  Layer layer;              // its index is its place in the file; tops never go down
-  std::uint32_t part;       // whose it is, kEveryPart if all parts have the same layers
-  std::uint32_t number;     // which layer it is of those of its part, from 0: fillings turn by it
-  std::uint32_t low, high;  // into planes; the same one unless steps have to stay inside or outside of the surface
+  Layer layer;              // its index is its place in the file; tops never decrease
+  std::uint32_t part;       // owner, kEveryPart if all parts share the layers
+  std::uint32_t number;     // index among the layers of its part, from 0: it sets the filling's angle
+  std::uint32_t low, high;  // into planes; equal unless steps must stay inside or outside of the surface
 
-  /// As a filling sees it.
+  /// The layer with its number within the part, for the filling.
   Layer own() const { return {number, layer.bottom, layer.thickness, layer.reason}; }
 };
 
@@ -30,11 +30,11 @@ struct LayerSchedule {
   std::vector<Nm> planes;  // nm above the bed, strictly increasing
 };
 
-/// With job.heights.per_part every part has the best layers of its own between common slabs (stages/heights/per_part.h);
-/// they are made in the order of their tops, so that the nozzle never has to go below what is printed by more than a
-/// slab. Else all parts have those of the table.
+/// With job.heights.per_part every part has its own optimal layers between common slabs (stages/heights/per_part.h),
+/// printed in the order of their tops: the nozzle never moves more than one slab below printed material. Otherwise all
+/// parts share the layers of the table.
 /// errors  of heights_options and heights::plan_per_part
-/// cost    28 bytes a layer and 4 bytes a plane
+/// cost    28 bytes per layer and 4 bytes per plane
 Result<LayerSchedule> schedule_layers(const Job& job, const Scene& scene, const heights::LayerTable& table);
 
 }  // namespace lamina::pipeline

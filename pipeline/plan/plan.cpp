@@ -26,7 +26,7 @@ double seconds_since(Clock::time_point start) { return std::chrono::duration<dou
 
 Error usage(std::string what) { return {Fault::kUsage, std::move(what)}; }
 
-/// Puts a plan together, one step after the other.
+/// Builds a plan step by step.
 class Planner {
  public:
   Planner(Resolved resolved, const ProgressCallback& progress) : progress_(progress) {
@@ -48,11 +48,11 @@ class Planner {
  private:
   Job& job() { return plan_.job; }
   bool images() const { return plan_.product == Product::kImages; }
-  /// The powder printer; null if there is none.
+  /// The powder printer, or null.
   const Machine* machine() const { return printer_.machine ? &printer_.machine->machine : nullptr; }
   bool moves() const { return plan_.product == Product::kMoves; }
 
-  /// Segmentations come before fillings, whose lines lie as they ask.
+  /// Plans segmentations first, because they decide the line distances of fillings.
   Status read_fillings() {
     FillRequest fill = job().fill;
     if (images()) {
@@ -189,7 +189,7 @@ class Planner {
     return {};
   }
 
-  /// What a person is told of each range of heights before anything is printed.
+  /// Predicts the pores of each range of heights, for the summary.
   Status predict_pores() {
     if (!moves()) return {};
     if (!plan_.sections->fills()) {

@@ -1,8 +1,8 @@
-// pipeline/plan/plan.h: a job with its parts loaded and everything decided that its layers share.
+// pipeline/plan/plan.h: a job with its parts loaded and all decisions common to its layers made.
 //
-//      Job (asked) ──> resolve() ──> Resolved ──> make_plan() ──> Plan (const, any thread)
+//      Job (request) ──> resolve() ──> Resolved ──> make_plan() ──> Plan (const, any thread)
 //
-// Programs that embed lamina make a plan and ask it for layers; run() sends all of them to files.
+// Embedding programs make a plan and compute single layers; run() writes all layers to files.
 #pragma once
 
 #include <array>
@@ -32,32 +32,32 @@
 
 namespace lamina::pipeline {
 
-/// What only images need.
+/// Data for images only.
 struct ImagePlan {
   std::optional<ResolvedMachine> machine;  // absent: images alone
   PixelGrid grid;
   Materials materials;
   Solids solids;
   DosePlan dose;
-  std::optional<Beads> beads;        // where parts are beads instead of solid
-  std::uint64_t covered_pixels = 0;  // of the bed, by the boxes of all parts, at most
+  std::optional<Beads> beads;        // set if parts consist of beads
+  std::uint64_t covered_pixels = 0;  // upper bound from the boxes of all parts
 };
 
-/// What only toolpaths need.
+/// Data for toolpaths only.
 struct MovePlan {
   ExtruderProfile profile;
   std::vector<std::pair<std::string, segment::Pores>> pores;  // by heights, "" for all
 };
 
-/// Scene, sections and segments stay where they are when the plan moves: others refer to them.
+/// Scene, sections and segments keep their addresses when the plan moves, because other members refer to them.
 struct Plan {
   Job job;  // as asked
   Product product = Product::kImages;
   Bed bed;
   std::unique_ptr<Scene> scene;
-  heights::Plan heights;                  // the one table of all parts; empty where each has layers of its own
+  heights::Plan heights;                  // layer table of all parts; empty if each part has its own layers
   std::uint32_t layer_count = 0;          // of the whole job
-  std::array<std::uint32_t, 2> range{};   // [first, last) that this job makes
+  std::array<std::uint32_t, 2> range{};   // [first, last) made by this job
   std::unique_ptr<Sections> sections;     // null for images of solid parts
   std::unique_ptr<SegmentPlan> segments;  // null for contours, and for images of solid parts
   std::optional<ImagePlan> images;
@@ -66,11 +66,11 @@ struct Plan {
   std::uint64_t triangles = 0;  // with copies
   double load_seconds = 0, index_seconds = 0;
 
-  /// A layer as it is written and recorded.
+  /// A layer as written and recorded.
   Layer layer(std::uint32_t index) const { return sections ? sections->layers()[index].layer : heights.table[index]; }
 };
 
-/// A job with its machine found and changed as the job says.
+/// A job and its machine with the job's changes.
 struct Resolved {
   Job job;  // as asked
   Product product = Product::kImages;
@@ -79,12 +79,12 @@ struct Resolved {
   std::optional<ExtruderProfile> extruder;  // of toolpaths
 };
 
-/// Nothing is loaded, nothing is written. errors  kUsage: no such machine, keys that have no meaning for the product
+/// Loads no part and writes nothing. errors  kUsage: no such machine, keys that do not apply to the product
 Result<Resolved> resolve(const Job& job, Product product);
 
-/// The only way to a plan.
-/// errors  of load_scene, of the stages that build indices; kUsage: parts that the machine cannot reach, layers that it
-///         cannot make, fillings that contradict each other
+/// The only way to make a plan.
+/// errors  of load_scene and of the index builders; kUsage: parts outside the machine's reach, layers that it cannot
+///         make, contradictory fillings
 Result<Plan> make_plan(Resolved resolved, const ProgressCallback& progress);
 
 }  // namespace lamina::pipeline

@@ -1,4 +1,4 @@
-// pipeline/plan/progress.h: what a job tells while it runs.
+// pipeline/plan/progress.h: progress of a running job.
 #pragma once
 
 #include <cstdint>
@@ -6,14 +6,14 @@
 
 namespace lamina::pipeline {
 
-/// Told from time to time, from one thread at a time, while a job runs.
+/// Reported at intervals while a job runs, from one thread at a time.
 struct ProgressEvent {
   enum class Stage { kLoading, kIndexing, kLayers } stage;
   std::uint32_t done = 0, total = 0;  // layers
 };
 using ProgressCallback = std::function<void(const ProgressEvent&)>;
 
-/// Most memory that the process has held at once, bytes.
+/// Peak memory of the process, bytes.
 std::uint64_t peak_resident_bytes();
 
 }  // namespace lamina::pipeline

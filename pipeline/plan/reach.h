@@ -1,4 +1,4 @@
-// pipeline/plan/reach.h: whether a powder printer can print the parts of a job.
+// pipeline/plan/reach.h: checks that a powder printer can reach the parts of a job.
 #pragma once
 
 #include "pipeline/plan/scene.h"
@@ -7,8 +7,8 @@
 
 namespace lamina::pipeline {
 
-/// Whether all parts stand on the bed and below the build height.
-/// errors  kUsage with the part and its first place outside
+/// Checks that all parts lie on the bed and below the build height.
+/// errors  kUsage with the part and its first point outside
 Status check_reach(const Machine& machine, const Scene& scene);
 
 }  // namespace lamina::pipeline

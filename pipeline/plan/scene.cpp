@@ -23,7 +23,7 @@ double millimetres_of(const std::string& unit) {
   return 1;
 }
 
-// A file as it was loaded once for all [[part]] entries that ask for the same of it.
+// A file, loaded once for all [[part]] entries with equal options.
 struct Loaded {
   std::uint32_t first_mesh = 0;     // of its meshes in the scene
   std::vector<Instance> instances;  // mesh counts from first_mesh
@@ -91,7 +91,7 @@ Result<Loaded> load_part(const Job& job, const PartRequest& request, Scene& scen
   return loaded;
 }
 
-// Overlaps matter only where somebody asked for positions: arranged boxes cannot overlap each other.
+// Only parts with explicit positions can overlap: arranged boxes are disjoint.
 void note_overlaps(const Job& job, Scene& scene, const std::vector<std::pair<std::uint32_t, Box>>& boxes) {
   std::vector<std::uint32_t> order(boxes.size());
   for (std::uint32_t i = 0; i < order.size(); ++i) order[i] = i;
@@ -140,7 +140,7 @@ Result<std::vector<const Loaded*>> load_parts(const Job& job, std::map<LoadKey, 
   for (const PartRequest& part : job.parts) {
     std::error_code ignored;
     const std::filesystem::path file = std::filesystem::weakly_canonical(part.path, ignored);
-    // Parts of different materials are indexed apart (solids.h), so that each has meshes of its own.
+    // Parts of different materials have separate meshes, because solids.h indexes them separately.
     const std::string solid =
         part.material_ranges.empty()
             ? part.material
@@ -163,7 +163,7 @@ Result<std::vector<const Loaded*>> load_parts(const Job& job, std::map<LoadKey, 
   return loaded;
 }
 
-/// The room that a part takes.
+/// The space of a part.
 arrange::BoxRequest box_request(const PartRequest& part, const Loaded& loaded) {
   arrange::BoxRequest request;
   request.width = loaded.bounds.width();
@@ -196,7 +196,7 @@ Result<Scene> load_scene(const Job& job, const Bed& bed) {
     scene.parts.push_back(
         {job.parts[p].path, job.parts[p].copies, loaded[p]->triangles, loaded[p]->fingerprint, Box(), loaded[p]->notes});
   }
-  // Meshes far from the origin of their file, whose way to the bed is longer than 32 bits of nanometres.
+  // Meshes far from their file's origin, whose offset to the bed exceeds 32 bits of nanometres.
   std::map<std::uint32_t, Point3> rebased;
   std::vector<std::pair<std::uint32_t, Box>> boxes;
   bool positions_asked = false;
@@ -214,7 +214,7 @@ Result<Scene> load_scene(const Job& job, const Bed& bed) {
       if (base == rebased.end() && !(fits(x) && fits(y) && fits(z))) {
         base = rebased.emplace(mesh, scene.meshes[mesh].bounds.lo).first;
         rebase(scene.meshes[mesh]);
-        // Earlier instances of the mesh have to follow.
+        // Shifts earlier instances of the mesh as well.
         for (Instance& earlier : scene.instances) {
           if (earlier.mesh != mesh) continue;
           earlier.offset = {earlier.offset.x + base->second.x, earlier.offset.y + base->second.y,

@@ -1,4 +1,4 @@
-// pipeline/plan/scene.h: the parts of a job, loaded and standing on the bed.
+// pipeline/plan/scene.h: the parts of a job, loaded and placed on the bed.
 #pragma once
 
 #include <cstdint>
@@ -13,7 +13,7 @@
 
 namespace lamina::pipeline {
 
-/// Meshes in the coordinates of their file, and instances whose offset brings them into the frame of the bed:
+/// Meshes in the coordinates of their files, and instances with offsets into the frame of the bed:
 /// x from its left edge, y from its front edge, z from its surface; every coordinate within the bed and within int32.
 struct Scene {
   std::vector<Mesh> meshes;
@@ -23,15 +23,15 @@ struct Scene {
   std::int64_t height = 0;                      // nm, highest point of all; > 0
 };
 
-/// How a part of a job is to be read.
+/// The load options for a part of a job.
 load::LoadOptions load_options(const Job& job, const PartRequest& request);
 
 /// Loads the parts of a job (equal files with equal transforms once) and places them on the bed.
 ///
-/// Parts and copies with a given position stand there, copies of them stacked along x by their width and the gap.
-/// The others are arranged in rows from the front left, in the order of the job and gap_mm apart, and that block is
-/// centred on the bed, all in whole nm.
-/// errors  kUsage if a part does not fit the bed (by how much, and what would help); kInput from load
+/// A part with a position stays there; its copies follow along x at their width plus the gap. All other parts are
+/// arranged in rows from the front left, in job order and gap_mm apart; this block is centred on the bed. Positions are
+/// whole nm.
+/// errors  kUsage if a part does not fit the bed (with the excess and a remedy); kInput from load
 Result<Scene> load_scene(const Job& job, const Bed& bed);
 
 }  // namespace lamina::pipeline

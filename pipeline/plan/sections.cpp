@@ -39,7 +39,7 @@ Result<Sections> Sections::make(const Job& job, const Scene& scene, LayerSchedul
     made.bounds_.add(boxes.back());
   }
   if (job.slice.offset_mm > 0) made.grow_ = static_cast<Nm>(nm_of(job.slice.offset_mm));
-  std::vector<Box> reach;  // parts may meet only when they have grown
+  std::vector<Box> reach;  // offset boxes: parts may touch only after the offset
   for (const Box& box : boxes) reach.push_back(slice::grown(box, made.grow_));
   const std::vector<std::uint32_t> body = slice::group_bodies(reach);
   const std::vector<std::uint32_t> part_area = made.make_areas(job, boxes, body);
@@ -209,7 +209,7 @@ Error Sections::failed(const Area& area, const Error& error) const {
 }
 
 std::uint64_t Sections::bytes_bound(std::uint32_t index) const {
-  // Text of a contour's point is at most 50 bytes, and it is kept beside the contours.
+  // A contour point takes at most 50 bytes of text, which is kept beside the contours.
   const ScheduledLayer& scheduled = schedule_.layers[index];
   const auto bound = [&](const slice::Slicer& slicer) {
     return 3 * (slicer.layer_bytes_bound(scheduled.low) +
@@ -232,7 +232,7 @@ Result<std::uint64_t> Sections::fill_bytes_bound(std::uint32_t index, Work& work
     bytes += bound->points * (kOfPoint + text.point) + bound->stretches * text.stretch + bound->paths * (kOfPath + text.path);
     scratch = std::max(scratch, bound->scratch_bytes);
   }
-  // Buffers grow by half or double: twice what is in them.
+  // Buffers grow by half or double, so their capacity is at most twice their content.
   return 2 * bytes + scratch;
 }
 

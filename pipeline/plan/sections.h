@@ -1,4 +1,4 @@
-// pipeline/plan/sections.h: the contours of a job's layers, and what fills them.
+// pipeline/plan/sections.h: the contours and fillings of a job's layers.
 #pragma once
 
 #include <cstdint>
@@ -17,22 +17,22 @@
 
 namespace lamina::pipeline {
 
-/// The contours of any layer of a scene, and what fills them. Immutable; any thread may ask.
+/// The contours and fillings of any layer of a scene. Immutable; usable from any thread.
 class Sections {
  public:
-  /// scene     has to outlive it: the slicer refers to its meshes
+  /// scene     must outlive this object: the slicer refers to its meshes
   /// fillings  one for each part of the job
-  /// errors    of Slicer::build; kUsage: parts with layers of their own that touch
+  /// errors    of Slicer::build; kUsage: touching parts with separate layers
   static Result<Sections> make(const Job& job, const Scene& scene, LayerSchedule schedule, std::vector<FillPlan> fillings);
 
-  /// What a layer in flight occupies.
+  /// Scratch of a layer in flight.
   struct Work {
     slice::LayerScratch scratch;
     slice::LayerContours contours;
-    slice::LayerContours highest;   // where steps have to stay on one side: the section at the top of the layer
-    slice::LayerContours parts;     // of areas of bodies that several parts share, united part by part
-    std::vector<Contours> surface;  // of these areas: what no earlier part takes
-    std::vector<Contours> region;   // of each area: where centres of filling beads may lie
+    slice::LayerContours highest;   // section at the layer's top, if steps must stay on one side
+    slice::LayerContours parts;     // of areas in bodies with several parts, united part by part
+    std::vector<Contours> surface;  // of these areas: the region without earlier parts
+    std::vector<Contours> region;   // of each area: allowed centres of filling beads
     Toolpaths paths;
     Buffer<std::uint32_t> path_body;  // the paths of body b are [path_body[b], path_body[b + 1])
     Buffer<std::uint32_t> path_area;  // the same of areas
@@ -40,23 +40,23 @@ class Sections {
     slice::LayerReport report;
     Buffer<char> text;
 
-    std::uint64_t bytes() const;  // that its buffers hold on to
+    std::uint64_t bytes() const;  // capacity of its buffers
   };
-  /// Contours, and filling if the job asks for one. Pure: the same for any thread and order.
+  /// Contours, and the filling if the job has one. Pure: independent of thread and order.
   Status layer(std::uint32_t index, Work& work) const;
-  /// Its two halves: contours and regions, then what fills these. In between it is known what the filling may need.
+  /// The two halves of layer(): contours and regions, then their filling. The bound of the filling's memory needs the first.
   Status contours(std::uint32_t index, Work& work) const;
   Status fill(std::uint32_t index, Work& work) const;
 
-  /// What one [[part]] fills of a body, on its own: instances of the part that touch. Areas are in the order of bodies,
-  /// then of parts in the job; where parts share room it belongs to the first one.
+  /// The region of one [[part]] in a body: touching instances of the part. Areas are ordered by body, then by part; the
+  /// first part owns a shared region.
   struct Area {
     std::uint32_t body, part;
     Box box;                            // of its instances, before any offset
     std::uint32_t shared = UINT32_MAX;  // number among the areas of bodies with several parts
   };
   const std::vector<Area>& areas() const { return areas_; }
-  /// What fills an area in a layer.
+  /// The filling of an area in a layer.
   const infill::FillParameters& filling(const Area& area, const Layer& layer) const;
 
   const std::vector<ScheduledLayer>& layers() const { return schedule_.layers; }
@@ -64,13 +64,13 @@ class Sections {
   const std::vector<std::string>& names() const { return names_; }  // of bodies
   const Box& bounds() const { return bounds_; }                     // around all, as sliced
   bool fills() const { return fills_; }
-  /// Bytes that contours() may need at most, and text of them.
+  /// Upper bound of the bytes for contours() and their text.
   std::uint64_t bytes_bound(std::uint32_t index) const;
-  /// Bytes of text that a point of a path takes at most, and beside its points a stretch of one kind and a path.
+  /// Upper bounds of the text, in bytes: per point, and in addition per stretch of one kind and per path.
   struct TextBytes {
     std::uint64_t point = 0, stretch = 0, path = 0;
   };
-  /// Bytes that fill() and its text may need beside those. errors  of infill::bound_fill
+  /// Upper bound of the additional bytes for fill() and its text. errors  of infill::bound_fill
   Result<std::uint64_t> fill_bytes_bound(std::uint32_t index, Work& work, TextBytes text) const;
 
  private:
@@ -79,12 +79,12 @@ class Sections {
   LayerSchedule schedule_;
   Containment containment_ = Containment::kAcross;
   std::optional<slice::Slicer> slicer_;
-  std::vector<slice::Slicer> own_slicers_;  // by part, where each has layers of its own
+  std::vector<slice::Slicer> own_slicers_;  // by part, if each has its own layers
   std::vector<std::string> names_;
   std::vector<FillPlan> plans_;  // by [[part]]
   std::vector<Area> areas_;
   std::vector<std::uint32_t> body_area_;      // bodies + 1, into areas_
-  std::optional<slice::Slicer> part_slicer_;  // of the shared areas, if there are any to be filled
+  std::optional<slice::Slicer> part_slicer_;  // of the shared areas, if any has a filling
   Status make_own_slicers(const Job& job, const std::vector<std::uint32_t>& body);
   std::vector<std::uint32_t> make_areas(const Job& job, const std::vector<Box>& boxes, const std::vector<std::uint32_t>& body);
   Result<slice::LayerReport> section(const slice::Slicer& slicer, const ScheduledLayer& scheduled, Work& work,

@@ -10,10 +10,10 @@
 namespace lamina::pipeline {
 namespace {
 
-/// Whether a filling leaves the distances between its lines to the segmentation.
+/// Whether the segmentation decides the line distances of a filling.
 bool leaves_distances(const FillSettings& fill) { return distance_keys(fill).empty() && fill.group == 1; }
 
-/// Spacings of a segmentation beside distances that the filling gives itself.
+/// Refuses spacings of a segmentation if the filling sets its own line distances.
 Status check_spacings(const SegmentSettings& settings, const FillSettings& fill, const std::string& where) {
   if (!settings.on || leaves_distances(fill)) return {};
   const std::string_view key = settings.spacing_sc_mm   ? "spacing_sc_mm"

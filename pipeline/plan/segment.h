@@ -1,4 +1,4 @@
-// pipeline/plan/segment.h: which lines are segmented at each height, decided from [segment] of a job.
+// pipeline/plan/segment.h: the segmentation of lines at each height, from section [segment] of a job.
 #pragma once
 
 #include <cstdint>
@@ -13,23 +13,23 @@
 
 namespace lamina::pipeline {
 
-/// Segmentation of a range of heights, resolved.
+/// Resolved segmentation of a range of heights.
 struct SegmentRange {
   std::int64_t from = 0, to = INT64_MAX;  // nm above the part's bottom: layers whose middle is in [from, to)
   SegmentSettings settings;
   segment::Segmentation plan;
 };
 
-/// What is segmented at each height, and the fillings that this asks for.
+/// The segmentation at each height.
 struct SegmentPlan {
   SegmentRange base;
-  std::vector<SegmentRange> ranges;  // in order, none overlaps another
+  std::vector<SegmentRange> ranges;  // in order, disjoint
 
   const SegmentRange& at(std::int64_t height) const;
   bool any() const;
 };
 
-/// The plan; `fill` gets the distances between lines that follow from it, unless it gives them, and lines where it has none.
+/// Makes the plan and completes `fill`: line distances derived from the plan unless given, and lines where it has none.
 /// errors   kUsage, one line that begins with the key
 Result<SegmentPlan> plan_segments(const SegmentRequest& request, const segment::Calibration& calibration, FillRequest& fill);
 

@@ -10,8 +10,8 @@ bool overlap(const Box& a, const Box& b) {
   return a.lo.x < b.hi.x && b.lo.x < a.hi.x && a.lo.y < b.hi.y && b.lo.y < a.hi.y && a.lo.z < b.hi.z && b.lo.z < a.hi.z;
 }
 
-/// How many solids of other materials lie below each part, one upon the other: parts are laid in this order. By the boxes
-/// of all copies of a part, so that it may be more than needed.
+/// The number of stacked solids of other materials below each part, which gives the order of overwriting. Computed from
+/// the boxes of all copies of a part, so it may be too large.
 std::vector<std::uint32_t> levels_of(const Scene& scene, const Job& job, const Materials& materials) {
   std::vector<std::uint32_t> level(job.parts.size(), 0);
   if (std::ranges::none_of(job.parts, [](const PartRequest& part) { return part.at_mm.has_value(); })) return level;
@@ -40,7 +40,7 @@ struct Group {
   std::vector<std::uint32_t> own_mesh;  // by mesh of the scene; UINT32_MAX: not here yet
 };
 
-/// Moves meshes into the groups; one that two groups need is copied.
+/// Moves meshes into the groups; copies a mesh used by two groups.
 std::vector<Group> groups_of(Scene& scene, const Job& job, const Materials& materials) {
   const std::vector<std::uint32_t> level = levels_of(scene, job, materials);
   std::vector<Group> groups;

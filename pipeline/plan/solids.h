@@ -1,4 +1,4 @@
-// pipeline/plan/solids.h: the parts of a scene as solids of one material each.
+// pipeline/plan/solids.h: groups the parts of a scene into solids of one material each.
 #pragma once
 
 #include <cstdint>
@@ -14,16 +14,16 @@
 
 namespace lamina::pipeline {
 
-/// Instances that are filled together by the fill rule.
+/// Instances to which the fill rule applies together.
 struct Solid {
   PartMaterial material;
   raster::Rasterizer rasterizer;
-  std::vector<std::uint32_t> instance;  // of the scene, for each of its own; empty: all of them
+  std::vector<std::uint32_t> instance;  // scene index of each of its instances; empty: all in order
 };
 
-/// All solids of a scene. A scene of one material is one solid. Else parts that are of one material at all heights are one
-/// solid, unless a part lies in front of an earlier one of another material: later solids in the list are laid over
-/// earlier ones, so that where parts of different materials overlap, the later part of the job counts.
+/// All solids of a scene. A scene of one material is one solid. Otherwise parts with the same materials at all heights
+/// form one solid, unless a part covers an earlier one of another material: later solids overwrite earlier ones, so the
+/// later part of the job wins where different materials overlap.
 class Solids {
  public:
   /// Moves the triangles out of the scene's meshes.
@@ -32,7 +32,7 @@ class Solids {
 
   std::span<const Solid> all() const { return solids_; }
 
-  // Of all of them together, at a height.
+  // Sums over all solids, at a height.
   std::uint64_t layer_bytes_bound(Nm plane) const;
   std::uint64_t crossings_bound(Nm plane) const;
   std::uint64_t mesh_bytes() const;

@@ -1,4 +1,4 @@
-// pipeline/run/contour_maker.h: the layers of a sliced job: contours, and what fills them.
+// pipeline/run/contour_maker.h: makes the layers of a sliced job: contours and their filling.
 #pragma once
 
 #include <memory>

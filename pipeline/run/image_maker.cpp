@@ -10,7 +10,7 @@
 namespace lamina::pipeline {
 namespace {
 
-/// One line about rows that only repair closes, or that stay open, and where the first of them is.
+/// One line about rows that only repair closes, or that stay open, with the place of the first.
 class RowWarnings {
  public:
   void add(const Layer& layer, const raster::LayerReport& report, const PixelGrid& grid) {

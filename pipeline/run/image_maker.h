@@ -1,4 +1,4 @@
-// pipeline/run/image_maker.h: the layers of a powder job: exact images, one for each material, and what fires them.
+// pipeline/run/image_maker.h: makes the layers of a powder job: exact images per material, and print programs.
 #pragma once
 
 #include <memory>
@@ -14,47 +14,47 @@
 
 namespace lamina::pipeline {
 
-/// What the images of a layer occupy while they are made; reused by later layers.
+/// Scratch for the images of a layer; reused by later layers.
 struct ImageWork {
   raster::LayerScratch scratch;
   Runs runs;             // the image of all materials
-  Runs second;           // of the other engine, or mirrored, or before its dose
+  Runs second;           // of the other engine, mirrored, or before the dose
   Runs third;            // the core of a layer with a shell
-  Runs lowest, highest;  // sections at both ends of the layer, where steps have to lie inside or outside
+  Runs lowest, highest;  // sections at both ends of the layer, if steps must lie inside or outside
   Runs section;          // of one solid of a layer with several materials
   raster::MaterialImages materials;
-  std::unique_ptr<BeadWork> beads;  // where beads fill parts
+  std::unique_ptr<BeadWork> beads;  // if beads fill parts
 
-  /// Of its buffers.
+  /// Capacity of its buffers.
   std::uint64_t bytes() const;
 };
 
-/// What is noticed about a layer while it is made.
+/// Observations about a layer, for the summary.
 struct ImageNotes {
   raster::LayerReport report;
-  std::uint64_t solid_pixels = 0, bead_pixels = 0;  // of parts, and what beads and shells leave of them
+  std::uint64_t solid_pixels = 0, bead_pixels = 0;  // of parts, before and after clearing outside beads and shells
 };
 
-/// The steps of a layer's images; const, any thread, each with work of its own.
+/// The steps of a layer's images; const, usable from any thread with separate work objects.
 class LayerImager {
  public:
-  /// The plan has to outlive it.
+  /// The plan must outlive this object.
   explicit LayerImager(const Plan& plan) : plan_(plan) {}
 
-  // --- in this order; contours, fill and beads only where beads fill the parts
+  // --- in this order; contours, fill and beads only if beads fill the parts
   /// errors  kVerification: engines disagree
   Status raster(const Layer& layer, ImageWork& work, LayerRecord& record, ImageNotes& notes) const;
   Status contours(const Layer& layer, ImageWork& work) const;
   Status fill(const Layer& layer, ImageWork& work) const;
   Status beads(const Layer& layer, ImageWork& work, ImageNotes& notes) const;
-  /// Mirrors, takes bleed and core away, and counts what is left.
+  /// Mirrors the image, removes bleed, thins the core, and counts the remaining pixels.
   void dose(const Layer& layer, ImageWork& work, LayerRecord& record) const;
-  /// All of them.
+  /// Runs all steps.
   Status make(const Layer& layer, ImageWork& work, LayerRecord& record, ImageNotes& notes) const;
 
-  /// Scratch and runs of a layer, at most; a mirrored or second image counts as another one.
+  /// Upper bound of the bytes for scratch and runs of a layer; a mirrored or second image counts separately.
   std::uint64_t bytes_of(const Layer& layer) const;
-  /// Changes that the layer's image may have.
+  /// Upper bound of the changes in the layer's image.
   std::uint64_t changes_bound(const Layer& layer) const;
 
  private:
@@ -69,7 +69,7 @@ class LayerImager {
   const Plan& plan_;
 };
 
-/// The head of the summary of a plan of images.
+/// The head of the summary for a plan of images.
 void tell_images(const Plan& plan, Summary& summary);
 
 std::unique_ptr<Maker> make_image_maker(const Plan& plan, const FlowLimits& limits);

@@ -10,7 +10,7 @@
 namespace lamina::pipeline {
 namespace {
 
-/// Where two engines disagree first.
+/// The first difference between two engines.
 Error disagreement(const Layer& layer, const PixelGrid& grid, const RunsView& rays, const RunsView& contours) {
   std::uint32_t row = 0;
   while (row + 1 < rays.rows() && std::ranges::equal(rays.row(row), contours.row(row))) ++row;
@@ -24,7 +24,7 @@ Error disagreement(const Layer& layer, const PixelGrid& grid, const RunsView& ra
                       mm(layer.plane()))};
 }
 
-/// Sums of a layer's solids; the places are those of the first that has any.
+/// Sums over a layer's solids; places come from the first solid that has any.
 void add(const raster::LayerReport& solid, raster::LayerReport& all) {
   if (all.capped_rows == 0) {
     all.first_capped_row = solid.first_capped_row;
@@ -102,7 +102,7 @@ Status LayerImager::make(const Layer& layer, ImageWork& work, LayerRecord& recor
   return {};
 }
 
-/// The section of one solid; what was noticed goes to the record and the notes.
+/// The section of one solid; observations go to the record and the notes.
 Status LayerImager::section_of(const Solid& solid, const Layer& layer, ImageWork& work, Runs& image, LayerRecord& record,
                                ImageNotes& notes) const {
   const Engine engine = plan_.job.engine;
@@ -127,7 +127,7 @@ void LayerImager::mirror(Runs& image, Runs& scratch) const {
   std::swap(image, scratch);
 }
 
-/// The image of a layer: its middle plane, or what its lowest and highest sections have in common or together.
+/// The image of a layer: its middle section, or the intersection or union of its lowest and highest sections.
 raster::LayerReport LayerImager::section(const Solid& solid, raster::Engine engine, const Layer& layer, ImageWork& work,
                                          Runs& image) const {
   const raster::Rasterizer& rasterizer = solid.rasterizer;
@@ -155,7 +155,7 @@ std::uint64_t LayerImager::changes_bound(const Layer& layer) const {
 
 std::uint64_t LayerImager::bytes_of(const Layer& layer) const {
   if (plan_.job.heights.containment != Containment::kAcross) {
-    // Both sections, and an image that may have the crossings of both; twice with another engine or a mirror.
+    // Both sections, and an image with up to the crossings of both; doubled for a second engine or a mirror.
     return 2 * (bytes_of_section(layer.lowest_plane(), changes_of_section(layer.lowest_plane(), 0)) +
                 bytes_of_section(layer.highest_plane(), changes_of_section(layer.highest_plane(), 0)));
   }
@@ -169,7 +169,7 @@ std::uint64_t LayerImager::bytes_of_section(Nm plane, std::uint64_t changes) con
   const bool dosed = images.dose.any();
   const bool second = images.beads || plan_.job.engine == Engine::kBoth || plan_.job.mirror != Mirror::kNone || dosed;
   const std::uint64_t second_image = (second ? 8 * changes + 4 * rows : 0) * (dosed ? 3 : 1);
-  // The image of each material, of all, of one solid, and another one in the making.
+  // Images of each material, of all, of one solid, and one intermediate.
   const std::uint64_t materials = images.materials.several() ? images.materials.used.size() : 0;
   const std::uint64_t material_images = materials == 0 ? 0 : (materials + 3) * 2 * (4 * changes + 4 * rows);
   return images.solids.layer_bytes_bound(plane) + second_image + material_images;

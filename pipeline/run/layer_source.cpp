@@ -31,7 +31,7 @@ struct LayerSource::State {
   std::mutex idle_mutex;
   std::vector<std::unique_ptr<ImageWork>> idle;
   std::mutex contour_mutex;
-  std::optional<Plan> contour_plan;  // made when contours are read for the first time
+  std::optional<Plan> contour_plan;  // made by the first call of contours()
 
   std::unique_ptr<ImageWork> take() {
     const std::lock_guard lock(idle_mutex);
@@ -64,7 +64,7 @@ LayerSource::~LayerSource() = default;
 
 Result<LayerSource> LayerSource::make(const Job& asked) {
   Job job = asked;
-  job.dry_run = true;  // there is nothing to write into
+  job.dry_run = true;  // nothing is written
   if (Status status = check_job(job); !status) return status.error();
   auto plan = plan_of(job, Product::kImages);
   if (!plan) return plan.error();
@@ -94,7 +94,7 @@ Result<PlannedImages> LayerSource::images(std::uint32_t index) const {
   LayerRecord record;
   ImageNotes notes;
   const Status status = state_->imager->make(state_->plan.layer(index), *work, record, notes);
-  PlannedImages images{work->runs, {}};  // of their own sizes; the scratch stays warm
+  PlannedImages images{work->runs, {}};  // exact-size copies; the scratch keeps its capacity
   if (state_->plan.images->materials.several()) images.material = work->materials.image;
   state_->give_back(std::move(work));
   if (!status) return status.error();

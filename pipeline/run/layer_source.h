@@ -1,6 +1,6 @@
-// pipeline/run/layer_source.h: the layers of a powder job, without any file.
+// pipeline/run/layer_source.h: the layers of a powder job in memory.
 //
-// For programs that embed lamina: the images are those of the files that run() would write.
+// For embedding programs: the images equal those in the files of run().
 #pragma once
 
 #include <array>
@@ -20,10 +20,10 @@
 
 namespace lamina::pipeline {
 
-/// A layer's image, and what of it is of each material.
+/// A layer's image, whole and per material.
 struct PlannedImages {
   Runs whole;
-  std::vector<Runs> material;  // in the order of materials(), no pixel set in two; empty where the whole is of one
+  std::vector<Runs> material;  // in the order of materials(), disjoint; empty for a single material
 };
 
 /// Immutable; layers may be read in any order and from any number of threads.
@@ -36,21 +36,21 @@ class LayerSource {
   LayerSource& operator=(LayerSource&&) noexcept;
   ~LayerSource();
 
-  const Job& job() const;                // as asked
+  const Job& job() const;                // as requested
   std::array<double, 2> bed_mm() const;  // width (x) and depth (y)
   const PixelGrid& grid() const;
   const std::vector<PartSummary>& parts() const;
-  /// Names of the powders, as file names have them; empty if no part names one.
+  /// Names of the powders, as used in file names; empty if no part has one.
   std::vector<std::string> materials() const;
   std::uint32_t layer_count() const;
   /// index  below layer_count()
   Layer layer(std::uint32_t index) const;
 
-  /// The images of a layer. errors  kVerification: engine is kBoth and they differ
-  /// memory  the runs; scratch is kept for the next layer, one set for each layer that is made at the same time
+  /// The images of a layer. errors  kVerification: engine is kBoth and the images differ
+  /// memory  the runs; scratch is kept for later layers, one set per concurrent call
   Result<PlannedImages> images(std::uint32_t index) const;
   /// Closed contours of a layer, nm on the bed, outer ones counter-clockwise, as run() writes them for kContours.
-  /// cost  the first call loads the parts once more
+  /// cost  the first call loads the parts again
   Result<Contours> contours(std::uint32_t index) const;
 
  private:
@@ -59,15 +59,15 @@ class LayerSource {
   std::unique_ptr<State> state_;
 };
 
-/// The layers of a job, decided as `lamina heights` does: for parts alone, wherever they would stand. Of layers of each part
-/// (heights.per_part) those of all parts by their tops.
-/// errors  of check_job; kInput; kUsage: [heights] is not whole
+/// The layers of a job, decided as by `lamina heights`: for the parts alone, wherever they stand. With heights.per_part those of
+/// all parts, ordered by their tops.
+/// errors  of check_job; kInput; kUsage: [heights] is incomplete
 Result<std::vector<Layer>> layers_of(const Job& job);
 
-/// Reads the file of a part as the job asks for: its unit, its turns, repair. errors  kInput
+/// Loads a part's file with the job's options: unit, rotation, repair. errors  kInput
 Result<Part> load_part(const Job& job, const PartRequest& part);
 
-/// Writes an image as run() would; the file appears whole. errors  kOutput
+/// Writes an image in the same way as run(), atomically. errors  kOutput
 Status save_image(const std::string& path, const RunsView& image, double dpi_x, double dpi_y, const write::ImageFormat& format);
 
 }  // namespace lamina::pipeline

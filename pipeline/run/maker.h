@@ -1,7 +1,7 @@
-// pipeline/run/maker.h: what makes the layers of one product and sends them to its files.
+// pipeline/run/maker.h: makes the layers of one product and writes them to its files.
 //
-// A new product is a Maker, a new kind of file a sink in pipeline/output/. run() moves layers through a maker's steps;
-// the steps of one layer run one after the other, those of different layers at once.
+// A new product is a Maker; a new kind of file is a sink in pipeline/output/. run() moves layers through a maker's
+// steps: sequentially within a layer, concurrently across layers.
 #pragma once
 
 #include <cstdint>
@@ -16,7 +16,7 @@
 
 namespace lamina::pipeline {
 
-/// As Step of the flow, for a layer of the job instead of a position among those that are made.
+/// A Step of the flow with the layer's index in the job instead of its position in the flow.
 struct MakerStep {
   std::string_view name;
   std::function<Status(std::uint32_t layer, const Ticket&)> run;
@@ -27,32 +27,32 @@ class Maker {
  public:
   virtual ~Maker() = default;
 
-  /// Bytes that a layer may need before more is known of it; scratch, text and files.
+  /// First estimate of a layer's bytes: scratch, text and files.
   virtual std::uint64_t bytes_of(std::uint32_t layer) const = 0;
 
   // --- files: once, before the first layer
-  /// Begins the files. returns  the layers that are still to be made, in increasing order
-  /// errors  kUsage: what is there is of another job; kOutput
+  /// Starts the files. returns  the layers still to be made, in increasing order
+  /// errors  kUsage: existing output of another job; kOutput
   virtual Result<std::vector<std::uint32_t>> open() = 0;
-  /// Records of layers that stand from an interrupted run.
+  /// Records of the layers kept from an interrupted run.
   virtual std::vector<LayerRecord> kept() const = 0;
 
   // --- layers
   virtual std::vector<MakerStep> steps() = 0;
   virtual bool records_from_work() const = 0;
-  /// In layer order, one at a time: into the files, and into the summary's sums.
+  /// Adds a layer to the files and to the summary; called in layer order, one at a time.
   virtual Status record(std::uint32_t layer, const Ticket& ticket) = 0;
-  /// Adds a layer that stands.
+  /// Adds a kept layer.
   virtual void add_kept(const LayerRecord& record) = 0;
   virtual std::uint64_t bytes_held(std::uint32_t work) const = 0;
   virtual void let_go(std::uint32_t work) = 0;
 
   // --- the end
-  /// Closes the files. returns  bytes written in all
+  /// Closes the files. returns  total bytes written
   virtual Status finish() = 0;
-  /// Nothing more is recorded. keep  finished layers stay for a resumed run; else what was begun goes
+  /// Ends recording early. keep  true: finished layers stay for a resumed run; false: started files are removed
   virtual Status stop(bool keep) = 0;
-  /// What only this product tells.
+  /// Adds the product's own lines to the summary.
   virtual void tell(Summary& summary) const = 0;
 };
 

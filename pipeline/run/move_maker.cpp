@@ -14,10 +14,10 @@
 namespace lamina::pipeline {
 namespace {
 
-/// A point of stored toolpaths comes to some 40 bytes of text, a path to tags, the way to it and filament drawn back.
+/// A stored toolpath point takes about 40 bytes of text; a path adds tags, a travel move and retraction.
 constexpr std::size_t kTextOfPoint = 48, kTextOfPath = 128;
-/// A layer's text waits until those before it are written. What segmented lines come to beyond these bytes, and beyond
-/// what the plain filling takes, does not wait: such a layer is written a piece at a time when its turn comes.
+/// A layer's text waits until all earlier layers are written. If segmented lines exceed these bytes and the size of the
+/// plain filling, the text is not kept: the layer is written piece by piece in its turn.
 constexpr std::size_t kWaitingText = 1 << 17, kPieceOfText = 1 << 16;
 
 class MoveMaker : public Maker {
@@ -96,10 +96,10 @@ class MoveMaker : public Maker {
   struct Made {
     LayerRecord record;
     PathFacts facts;
-    bool waits = false;  // the layer's text is whole; else it is made when the layer is recorded
+    bool waits = false;  // the text is complete; otherwise recording makes it
   };
 
-  /// The layer's text, unless it becomes too long to wait.
+  /// Makes the layer's text unless it becomes too long to wait.
   Status lay_waiting(std::uint32_t layer, Sections::Work& work, Made& made) {
     made.facts = facts_of(work);
     work.text.clear();

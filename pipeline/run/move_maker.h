@@ -1,4 +1,4 @@
-// pipeline/run/move_maker.h: the layers of an extrusion job: walls and fillings as moves, thick and thin stretches.
+// pipeline/run/move_maker.h: makes the layers of an extrusion job: walls and fillings as moves, with thick and thin stretches.
 #pragma once
 
 #include <memory>
@@ -8,7 +8,7 @@
 
 namespace lamina::pipeline {
 
-/// What is known of the moves before any is laid: the printer and the pores.
+/// Adds what is known before the first move: the printer and the pores.
 void tell_moves(const Plan& plan, Summary& summary);
 
 std::unique_ptr<Maker> make_move_maker(const Plan& plan, const FlowLimits& limits);

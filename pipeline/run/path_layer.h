@@ -1,4 +1,4 @@
-// pipeline/run/path_layer.h: one layer's contours and toolpaths, and what is told of them.
+// pipeline/run/path_layer.h: one layer's contours and toolpaths, with their statistics.
 #pragma once
 
 #include <cstddef>
@@ -14,26 +14,26 @@
 
 namespace lamina::pipeline {
 
-/// What contours and stored paths of a layer come to; without the length of the paths.
+/// Statistics of a layer's contours and stored paths, without the length of the paths.
 PathFacts facts_of(const Sections::Work& work);
 
 /// Length of stored paths.
 double length_mm(const ToolpathsView& paths);
 
-/// The text that a writer appends to, and what happens when it has grown.
+/// The text buffer of a writer, with a callback at a size limit.
 struct TextRoom {
   Buffer<char>& text;
-  std::size_t most;             // bytes; `grown` is called after a move that leaves more
-  std::function<bool()> grown;  // whether to go on: text was taken out, or the layer is given up
+  std::size_t most;             // bytes; `grown` is called after each move beyond this size
+  std::function<bool()> grown;  // drains the text, or returns false to abandon the layer
 };
 
-/// The stored toolpaths of a layer become moves; stretches are expanded here and nowhere kept.
-/// facts    gains what was laid, if the layer was not given up
-/// returns  false if `room.grown` gave the layer up
+/// Converts the stored toolpaths of a layer to moves. Stretches are expanded one at a time and never stored.
+/// facts    receives the sums of the moves unless the layer is abandoned
+/// returns  false if `room.grown` abandons the layer
 Result<bool> lay_moves(const Plan& plan, std::uint32_t layer, const Sections::Work& work, const TextRoom& room,
                        write::LayerMoves& out, PathFacts& facts);
 
-/// The first layer of those that share a fault, and how many they are.
+/// Counts the layers with a fault and names the first.
 struct LayersTold {
   std::uint32_t count = 0;
   std::string first;  // "layer 12 at z 0.300 mm"

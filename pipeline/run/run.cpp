@@ -23,7 +23,7 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-/// Refuses what may not be replaced before parts are loaded.
+/// Refuses protected output before parts are loaded.
 Status check_output_of(const Resolved& resolved) {
   switch (resolved.product) {
     case Product::kImages: return check_output(resolved.job);
@@ -87,7 +87,7 @@ LayerSteps steps_of(Maker& maker, const std::vector<std::uint32_t>& todo, const 
   return steps;
 }
 
-/// What a job that ends early says, and what stays of it.
+/// Ends a job early: makes the error and keeps or removes its files.
 Error ended_early(Maker& maker, const Error& error, bool any_layer) {
   const bool interrupted = error.fault == Fault::kInterrupted;
   const bool keep = (any_layer || !maker.records_from_work()) && (interrupted || error.fault == Fault::kOutput);
@@ -100,7 +100,7 @@ Error ended_early(Maker& maker, const Error& error, bool any_layer) {
   return {Fault::kOutput, error.message + "; finished layers are kept, go on with --resume"};
 }
 
-/// Makes the layers that are still to be made. errors  of the lowest failing layer
+/// Makes the remaining layers. errors  of the lowest failing layer
 Status make_layers(const Plan& plan, Maker& maker, const FlowLimits& limits, Summary& summary, const ProgressCallback& progress,
                    const std::atomic<bool>& cancel) {
   auto todo = maker.open();
@@ -150,7 +150,7 @@ Result<Summary> run(Resolved resolved, const ProgressCallback& progress, const s
   FlowLimits limits;
   limits.budget_bytes = job.memory_bytes;
   limits.most_in_flight = layers_in_flight();
-  if (product != Product::kImages) limits.most_in_flight *= 2;  // some wait for their turn in the one file
+  if (product != Product::kImages) limits.most_in_flight *= 2;  // some layers wait for their turn in the single file
   Summary summary = summary_of(*plan);
   const std::unique_ptr<Maker> maker = make_maker(*plan, limits);
   if (job.dry_run) {

@@ -1,4 +1,4 @@
-// pipeline/run/run.h: a job from its parts to its files.
+// pipeline/run/run.h: runs a job from its parts to its files.
 //
 //      Job ──> Resolved ──> Plan ──> Maker ──> flow of its layers through named steps ──> files, Summary
 #pragma once
@@ -13,13 +13,12 @@
 
 namespace lamina::pipeline {
 
-/// Runs a job; writes job.output, unless it is a dry run, which ends before the first layer with the summary's
-/// estimates.
+/// Runs a job and writes job.output. A dry run ends before the first layer with the summary's estimates.
 /// job     checked (check_job)
-/// cancel  read between layers: when it is set, no new layer starts, the layers in flight are finished and kept for
-///         --resume, and the error is kInterrupted
-/// errors  of resolve and make_plan; kUsage: what is there may not be replaced; kOutput; kVerification if the engine is
-///         kBoth and a pixel differs; the lowest failing layer decides
+/// cancel  read between layers: once set, no new layer starts, the layers in flight finish and are kept for --resume, and
+///         the error is kInterrupted
+/// errors  of resolve and make_plan; kUsage: existing output must not be replaced; kOutput; kVerification if the engine
+///         is kBoth and a pixel differs; the lowest failing layer decides
 Result<Summary> run(const Job& job, Product product, const ProgressCallback& progress, const std::atomic<bool>& cancel);
 
 }  // namespace lamina::pipeline

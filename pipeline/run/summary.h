@@ -1,4 +1,4 @@
-// pipeline/run/summary.h: what a job did, for a person and for a script; one text and one object for all products.
+// pipeline/run/summary.h: the summary of a job, as text and as JSON, in one form for all products.
 #pragma once
 
 #include <cstdint>
@@ -22,7 +22,7 @@ struct Summary {
   double height_mm = 0;                 // of the highest layer's top
   std::uint32_t layers_total = 0, layers_planned = 0, layers_kept = 0;
   std::uint64_t triangles = 0;  // with copies
-  double volume_mm3 = 0;        // of set pixels, within contours, or of beads
+  double volume_mm3 = 0;        // of set pixels, contours or beads
   std::uint64_t bytes_written = 0;
   double load_seconds = 0, index_seconds = 0, layer_seconds = 0;  // wall
   std::vector<std::pair<std::string_view, double>> step_seconds;  // of each step, over all threads
@@ -31,12 +31,12 @@ struct Summary {
   std::vector<PartSummary> parts;
   std::vector<std::string> warnings;  // one line each
 
-  // --- what only this product tells
+  // --- specific to the product
   using Lines = std::vector<std::pair<std::string, std::string>>;  // name, text
-  Lines head, results, end;                                        // before the layers, behind them, after memory
+  Lines head, results, end;                                        // before the layers, after them, after memory
   std::shared_ptr<nlohmann::ordered_json> facts;                   // an object, or null
 
-  /// Aligned lines with units; ends with one line a warning.
+  /// Aligned lines with units, then one line per warning.
   std::string text() const;
   /// One JSON object on one line. Lengths in mm or nm, times in seconds and sizes in bytes, as the keys say.
   std::string json() const;

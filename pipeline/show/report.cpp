@@ -25,10 +25,10 @@ using write::report::LayersSeen;
 using write::report::PageData;
 using write::report::ShownView;
 
-constexpr std::uint32_t kChunk = 64;  // layers that are read together
+constexpr std::uint32_t kChunk = 64;  // layers read in parallel
 
-/// Calls `work(place, layer, slot)` for every layer on all processors, and then `gather(place, slot)` in order. The
-/// first layer that cannot be read ends it.
+/// Calls `work(place, layer, slot)` for every layer on all processors, then `gather(place, slot)` in order. Stops at the
+/// first unreadable layer.
 template <class Slot, class Work, class Gather>
 Status each_layer(const ReportSource& source, bool timed, Work work, Gather gather) {
   const auto count = static_cast<std::uint32_t>(source.manifest.layers.size());
@@ -52,7 +52,7 @@ Status each_layer(const ReportSource& source, bool timed, Work work, Gather gath
   return {};
 }
 
-/// The parts themselves, if their files can be found and are still those that were planned.
+/// Views of the parts from their files, if found and unchanged.
 Result<std::vector<ShownView>> views_of_parts(const fs::path& folder, const ManifestHead& head, const ReportOptions& options) {
   std::vector<std::string> folders = options.parts;
   folders.insert(folders.end(), {".", folder.string(), folder.parent_path().string()});
@@ -105,7 +105,7 @@ Result<LayersSeen> see_layers(const ReportSource& source, HeldLayers& held) {
   return seen;
 }
 
-/// The parts as their layers build them up, where their files are not at hand: a second pass over all layers.
+/// Views of the parts from their layers, for missing part files: a second pass over all layers.
 Result<std::vector<ShownView>> build_up(const ReportSource& source, const PixelWindow& window) {
   const std::vector<LayerRecord>& layers = source.manifest.layers;
   const Layer &lowest = layers.front().layer, &highest = layers.back().layer;
@@ -137,7 +137,7 @@ Result<Report> make_report(const std::string& path, const ReportOptions& options
     report.without_parts = shown.error().message;
   }
 
-  // What a layer's line and the rest of the page take is not the layers' own.
+  // Reserves room for the layers' lines and the rest of the page.
   std::uint64_t taken = (views.empty() ? 150'000 : 50'000) + 150 * manifest.layers.size();
   for (const ShownView& view : views) taken += view.deflated.size() / 3 * 4;
   HeldLayers held(options.size_limit > taken ? options.size_limit - taken : 0);

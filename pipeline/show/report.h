@@ -1,4 +1,4 @@
-// pipeline/show/report.h: a finished job as one page for people.
+// pipeline/show/report.h: a finished job as one HTML page.
 #pragma once
 
 #include <cstdint>
@@ -10,27 +10,27 @@
 namespace lamina::pipeline {
 
 struct ReportOptions {
-  std::uint64_t size_limit = 19'000'000;  // bytes of the page; layers are left out evenly to stay below it
-  std::vector<std::string> parts;         // folders, or files, where the parts may be; looked at first
+  std::uint64_t size_limit = 19'000'000;  // bytes of the page; layers are omitted evenly to stay below it
+  std::vector<std::string> parts;         // folders or files to search first for the parts
 };
 
 struct Report {
-  std::string page;                    // HTML that needs no other file and no network
-  std::uint32_t layers = 0, held = 0;  // of the job; that can be looked at
-  std::uint32_t stride = 1;            // every stride-th is held
-  std::string without_parts;           // why the parts are shown as their layers build them up; empty if they are themselves
+  std::string page;                    // self-contained HTML
+  std::uint32_t layers = 0, held = 0;  // of the job; included in the page
+  std::uint32_t stride = 1;            // every stride-th layer is included
+  std::string without_parts;           // why views use layers instead of part files; empty if the files are used
 };
 
-/// Reads a finished directory of lamina jet, or a G-code file of lamina extrude with its manifest beside it. Every file is read
-/// and has to be what the manifest says; print programs are carried out by the virtual machine, which gives the time of each
-/// layer. Toolpaths are shown as what their beads cover, in their true widths.
+/// Reads a finished directory of lamina jet, or a G-code file of lamina extrude with its manifest beside it. Every file is
+/// read and must match the manifest. The virtual machine replays print programs and computes the time of each layer.
+/// Toolpaths appear as the area of their beads at true width.
 ///
-/// The parts from three sides are ray-cast from their files, which are looked for in options.parts, the working directory,
-/// that of the manifest and the one above it. Where they are not found or have changed, the layers are shown from three sides
-/// instead; parts that were asked for have to be there.
-/// errors  kVerification: no manifest, a job that is not finished, no images, a file that is missing or has changed, a program
-///         that prints something else; kInput: options.parts do not hold the parts
-/// cost    decodes every layer, on all processors; memory is the page and the layers being read
+/// Three views of the parts are ray-cast from their files, searched in options.parts, the working directory, the manifest's
+/// directory and its parent. If files are missing or changed, the views use the layers instead; with options.parts this is
+/// an error.
+/// errors  kVerification: no manifest, an unfinished job, no images, a missing or changed file, a program that prints a
+///         different image; kInput: options.parts lacks the parts
+/// cost    decodes every layer, on all processors; memory of the page and the layers being read
 Result<Report> make_report(const std::string& path, const ReportOptions& options);
 
 }  // namespace lamina::pipeline

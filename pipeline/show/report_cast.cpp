@@ -12,7 +12,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// The file of that name in the first folder that has one; empty if none has.
+/// The file of that name in the first folder that contains it; empty if none does.
 std::string find_part(const std::string& name, const std::vector<std::string>& folders) {
   std::error_code ignored;
   for (const fs::path folder : folders) {
@@ -33,7 +33,7 @@ Result<std::array<view::Picture, 3>> cast_parts(const ManifestHead& head, const 
     part.path = find_part(name, folders);
     if (part.path.empty()) return Error{Fault::kInput, fmt::format("{}: not found; name its folder with --parts", name)};
   }
-  // The bed of images is what the manifest says, whatever has become of the machine's profile.
+  // The manifest decides the bed of images, because the machine's profile may have changed.
   Bed bed{{mm(head.grid.x.length), mm(head.grid.y.length)}};
   if (head.product != Product::kImages) {
     const auto resolved = resolve(job, head.product);

@@ -40,7 +40,7 @@ Result<Manifest> finished_manifest(const std::string& place, const std::string& 
   return manifest;
 }
 
-/// A layer's files into runs, if they are those of the manifest.
+/// Reads a layer's files into runs if they match the manifest.
 Result<Runs> read_layer(const std::string& directory, const ManifestHead& head, const LayerRecord& record) {
   for (const LayerImageFile& file : layer_images(head, record)) {
     const std::string path = directory + "/" + file.name;
@@ -53,7 +53,7 @@ Result<Runs> read_layer(const std::string& directory, const ManifestHead& head, 
   return Error{Fault::kVerification, fmt::format("{}/{}; lamina verify tells more", directory, picture.error().message)};
 }
 
-/// How long the machine takes for a layer, by its program; replayed as lamina verify does.
+/// Machine time of a layer, from replaying its program as lamina verify does.
 Result<double> seconds_of_layer(const std::string& directory, const ManifestHead& head, const replay::VirtualMachine& machine,
                                 const LayerRecord& record, const RunsView& image) {
   const std::string program = program_of_layer(directory, head, record.layer.index);

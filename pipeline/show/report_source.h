@@ -1,4 +1,4 @@
-// pipeline/show/report_source.h: what a report on a finished job reads: its manifest, and what its layers look like.
+// pipeline/show/report_source.h: the input of a report on a finished job: its manifest and the runs of its layers.
 #pragma once
 
 #include <cstdint>
@@ -13,8 +13,8 @@
 namespace lamina::pipeline {
 
 struct LayerSeen {
-  Runs runs;           // several materials are drawn as one; toolpaths as what their beads cover
-  double seconds = 0;  // of the machine, estimated, if there is one
+  Runs runs;           // all materials as one image; toolpaths as the area of their beads
+  double seconds = 0;  // estimated machine time; 0 without a machine
 };
 
 struct ReportSource {
@@ -22,13 +22,13 @@ struct ReportSource {
   Manifest manifest;
   PixelGrid grid;  // of the layers' runs
   /// A layer, by its place in the manifest; for any thread. timed: with the machine's seconds
-  /// errors  kVerification: a file that is missing or not what the manifest says, a program that prints something else
+  /// errors  kVerification: a file that is missing or differs from the manifest, a program that prints a different image
   std::function<Result<LayerSeen>(std::uint32_t place, bool timed)> layer;
 };
 
 /// path  a directory of lamina jet, or a G-code file of lamina extrude with its manifest beside it
-/// errors  kVerification: no manifest, a job that is not finished, one of contours, one without images, a G-code file that has
-///         changed; of the readers
+/// errors  kVerification: no manifest, an unfinished job, a job of contours, a job without images, a changed G-code file;
+///         of the readers
 Result<ReportSource> report_source(const std::string& path);
 
 }  // namespace lamina::pipeline

@@ -29,7 +29,7 @@ Result<LayerShapes> gcode_shapes(const read::GcodeFile& file, const std::string&
   return shapes;
 }
 
-/// What a sliced job is drawn from.
+/// The source of a sliced job's drawing.
 struct SlicedJob {
   std::string directory;
   Manifest manifest;

@@ -1,4 +1,4 @@
-// pipeline/show/series.h: the layers of a sliced job, or of a G-code file, as shapes to look at.
+// pipeline/show/series.h: the layers of a sliced job, or of a G-code file, as shapes to draw.
 #pragma once
 
 #include <string>
@@ -8,14 +8,12 @@
 
 namespace lamina::pipeline {
 
-/// Layers of a file that lamina extrude or another slicer wrote: beads by what they are for, in their true widths, wide
-/// and narrow ones of a kind in different shades.
+/// Layers of a file from lamina extrude or another slicer: beads by type, at true width, with a shade per width.
 /// errors  of read::GcodeFile
 Result<view::LayerSeries> gcode_series(const std::string& path);
 
-/// The job that lamina slice left in a directory (job.toml), planned again from its parts.
-/// errors  kUsage; kInput: a part that cannot be read. Of a layer: kUsage: there is none of that number; kVerification: a part
-///         that is not what it was
+/// The job of lamina slice in a directory (job.toml), planned again from its parts.
+/// errors  kUsage; kInput: an unreadable part. Of a layer: kUsage: no layer of that number; kVerification: a changed part
 Result<view::LayerSeries> slice_series(const std::string& directory);
 
 }  // namespace lamina::pipeline

@@ -1,4 +1,4 @@
-// A part of lamina-preview: it needs the libraries of pictures.
+// Part of lamina-preview, which links the picture libraries.
 #include "pipeline/show/sheet.h"
 
 #include <fmt/format.h>
@@ -70,7 +70,7 @@ Result<Preview> draw_series_sheet(const view::LayerSeries& series, const Preview
   return Preview{std::move(*picture), {said}};
 }
 
-/// One layer, or several side by side, of what comes as shapes.
+/// Draws one layer of shapes, or several side by side.
 Result<Preview> draw_series(const view::LayerSeries& series, const PreviewRequest& request, bool svg) {
   for (const auto& [given, option] :
        {std::pair{request.whole_bed, "--whole-bed"}, {request.swath, "--swath"}, {request.step.has_value(), "--step"}}) {
@@ -96,7 +96,7 @@ Result<Preview> draw_series(const view::LayerSeries& series, const PreviewReques
   return Preview{std::move(*picture), {said}};
 }
 
-/// A layer while it is jetted.
+/// Draws a layer at a step of its program.
 Result<Preview> draw_jetting(const Manifest& manifest, const PreviewRequest& request) {
   const std::uint32_t middle = manifest.layers[manifest.layers.size() / 2].layer.index;
   const replay::StepChoice choice{request.layers.layer.value_or(middle), request.swath_number, request.step};
@@ -106,7 +106,7 @@ Result<Preview> draw_jetting(const Manifest& manifest, const PreviewRequest& req
   return Preview{std::move(*picture), {said}};
 }
 
-/// Images side by side.
+/// Draws images side by side.
 Result<Preview> draw_images(const Manifest& manifest, const PreviewRequest& request) {
   std::vector<std::uint32_t> numbers;
   for (const LayerRecord& record : manifest.layers) numbers.push_back(record.layer.index);

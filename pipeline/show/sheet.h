@@ -17,17 +17,17 @@ struct PreviewRequest {
   std::string output;  // the picture's name: .png, or .svg for one layer of slices or G-code
   view::LayerChoice layers;
   std::optional<std::uint32_t> width;  // pixels
-  bool whole_bed = false;              // images: not only where they have something
-  bool swath = false;                  // images: the layer while its print program jets it
+  bool whole_bed = false;              // images: the whole bed instead of the set pixels' window
+  bool swath = false;                  // images: the layer during its print program
   std::optional<std::uint32_t> swath_number, step;
 };
 
 struct Preview {
   Buffer<std::byte> bytes;        // of the file
-  std::vector<std::string> said;  // of it, a line each
+  std::vector<std::string> said;  // messages, one line each
 };
 
-/// errors  kUsage: what cannot be drawn so; kVerification: files of the job that are missing or have changed; of the readers
+/// errors  kUsage: options that do not fit the source; kVerification: missing or changed files of the job; of the readers
 Result<Preview> draw_preview(const PreviewRequest& request);
 
 }  // namespace lamina::pipeline

@@ -1,4 +1,4 @@
-// A part of lamina-preview: it needs the libraries of pictures.
+// Part of lamina-preview, which links the picture libraries.
 #include "pipeline/show/swath.h"
 
 #include <fmt/format.h>

@@ -1,4 +1,4 @@
-// pipeline/show/swath.h: lamina preview --swath: a layer at a step of its print program.
+// pipeline/show/swath.h: lamina preview --swath, a layer at a step of its print program.
 #pragma once
 
 #include <cstdint>
@@ -11,8 +11,8 @@
 
 namespace lamina::pipeline {
 
-/// Replays the layer's program up to the step and draws what is jetted by then, `width` pixels wide. errors  kUsage: no such
-/// layer, swath, step; kVerification: files that are missing or are not what was written; kInternal
+/// Replays the layer's program up to the step and draws the pixels jetted so far, `width` pixels wide. errors  kUsage: no
+/// such layer, swath or step; kVerification: missing or changed files; kInternal
 Result<Buffer<std::byte>> draw_swath(const std::string& directory, const Manifest& manifest, const replay::StepChoice& choice,
                                      std::uint32_t width);
 

@@ -1,4 +1,4 @@
-// stages/replay/bytes.h: what binary dialects of print programs share.
+// stages/replay/bytes.h: readers shared by the binary dialects of print programs.
 #pragma once
 
 #include <fmt/format.h>
@@ -11,7 +11,7 @@
 
 namespace lamina::replay {
 
-/// Numbers out of a text of bytes, the lowest byte first; 0 at a fault.
+/// Reads little-endian numbers from bytes; 0 at a fault.
 class ByteReader {
  public:
   ByteReader(std::string_view bytes, Printing& printing) : left_(bytes), all_(bytes.size()), printing_(printing) {}
@@ -42,7 +42,7 @@ class ByteReader {
   Printing& printing_;
 };
 
-/// Movement that the data alone tells: from the first to the last step of a sweep.
+/// The scan length derived from the data: from the first to the last step of a sweep.
 class ScanLength {
  public:
   explicit ScanLength(Printing& printing) : printing_(printing) {}

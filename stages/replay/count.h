@@ -1,4 +1,4 @@
-// stages/replay/count.h: what programs did, and what that used up.
+// stages/replay/count.h: totals of replayed programs, and the material they use.
 #pragma once
 
 #include <array>
@@ -6,21 +6,21 @@
 
 namespace lamina::replay {
 
-/// What a program did.
+/// Totals of a program.
 struct Count {
   std::uint64_t drops = 0, vectors = 0;
   std::uint32_t sweeps = 0;
   double scan_mm = 0, travel_mm = 0;                     // of the head
   double seconds = 0;                                    // head, roller and vats, one after the other
   std::array<double, 2> fed_mm{0, 0};                    // by each vat
-  std::uint32_t vats = 0;                                // that feed, a bit each, by words or by movement
-  bool moves = false;                                    // whether the program moves the vats and the roller itself
-  double build_mm = 0;                                   // where the build vat stands at the end
-  double farthest_along_um = 0, farthest_across_um = 0;  // a drop from the centre of its pixel
+  std::uint32_t vats = 0;                                // one bit per vat that feeds, by command or by movement
+  bool moves = false;                                    // whether the program moves vats and roller
+  double build_mm = 0;                                   // final position of the build vat
+  double farthest_along_um = 0, farthest_across_um = 0;  // greatest distance of a drop from its pixel's centre
   void add(const Count& other);
 };
 
-/// Binder and powder that a program used up.
+/// Binder and powder used by a program.
 struct Material {
   double binder_mm3 = 0;  // drops x their volume
   double powder_mm3 = 0;  // solid: height fed x area of the bed x packing

@@ -1,4 +1,4 @@
-// stages/replay/dialects.h: readers of print programs, one a dialect; the formats are told in stages/write/program/.
+// stages/replay/dialects.h: readers of print programs, one per dialect; stages/write/program/ documents the formats.
 #pragma once
 
 #include <string_view>
@@ -7,7 +7,7 @@
 
 namespace lamina::replay {
 
-/// Each reads the program of a layer, the whole file. The printing has the fault if it is not one.
+/// Each reads a layer's program, the whole file. An invalid program sets the fault of the printing.
 void read_nuferbj(std::string_view text, Printing& printing);
 void read_raw(std::string_view text, Printing& printing);
 void read_planes(std::string_view text, Printing& printing);

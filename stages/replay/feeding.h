@@ -1,4 +1,4 @@
-// stages/replay/feeding.h: what a machine has to feed, and what it used up.
+// stages/replay/feeding.h: the vats that must feed a layer, and the material used.
 #pragma once
 
 #include <cstdint>
@@ -10,7 +10,7 @@
 
 namespace lamina::replay {
 
-/// Which vats have to feed a layer, a bit each, by the machine's rule; 0 where the rule refuses. An empty layer is of the
+/// One bit per vat that must feed a layer, by the machine's rule; 0 if the rule refuses. An empty layer counts as the
 /// first material.
 /// set  pixels of each material
 /// vat  of each material

@@ -1,4 +1,4 @@
-// stages/replay/gcode.h: lines of G-code, and the axes of a powder printer that they move.
+// stages/replay/gcode.h: lines of G-code, and the axes of a powder printer.
 #pragma once
 
 #include <charconv>
@@ -14,20 +14,20 @@ namespace lamina::replay {
 struct GcodeLine {
   std::string_view command;
   std::map<char, double> word;
-  std::string_view rest;  // all behind the command
+  std::string_view rest;  // text after the command
 
   bool has(char letter) const { return word.contains(letter); }
 };
 
-/// The lines of a program one after another, without comments and empty ones. Faults name them and end them.
+/// Iterates over the lines of a program without comments and empty lines. A fault names its line and ends the iteration.
 class GcodeReader {
  public:
   GcodeReader(std::string_view text, Printing& printing) : left_(text), printing_(printing) {}
 
   bool next(GcodeLine& line) { return take(line, true); }
-  /// The same, but words of M117, which is a text, are not read.
+  /// The same, without parsing words of M117, whose argument is text.
   bool next_comment(GcodeLine& line) { return take(line, false); }
-  /// A word that the line has to have; 0 at a fault.
+  /// A required word of the line; 0 at a fault.
   double number(const GcodeLine& line, char letter);
   std::uint32_t count(const GcodeLine& line, char letter);
   void fault(std::string_view what);
@@ -39,7 +39,7 @@ class GcodeReader {
   std::size_t number_ = 0;
 };
 
-/// Which axes carry the head along and across the scan.
+/// The axes that move the head along and across the scan.
 struct ScanAxes {
   std::string along, across;
   explicit ScanAxes(const Machine& machine) {
@@ -49,13 +49,13 @@ struct ScanAxes {
   }
 };
 
-/// The axes and what their moves mean: the head over the bed, the build vat, the feed vats, the roller.
+/// The axes and their functions: the head over the bed, the build vat, the feed vats, the roller.
 class Axes {
  public:
   Axes(Printing& printing, GcodeReader& reader) : printing_(printing), reader_(reader) {}
 
-  /// Carries out G0, G1, G90, G91; false for any other command. At a fault the axes may stay where they are.
-  /// The head's positions are in `at`; the build vat has to reach the depth of the layer before the head moves.
+  /// Executes G0, G1, G90, G91; false for any other command. A fault may leave the axes unmoved.
+  /// The head's positions are in `at`; the build vat must reach the depth of the layer before the head moves.
   bool take(const GcodeLine& line, bool scanning);
   double at(const std::string& axis) { return at_[axis[0]]; }
 

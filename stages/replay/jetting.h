@@ -1,4 +1,4 @@
-// stages/replay/jetting.h: a layer while its print program jets it.
+// stages/replay/jetting.h: a layer at a step of its print program.
 #pragma once
 
 #include <cstdint>
@@ -14,25 +14,25 @@
 
 namespace lamina::replay {
 
-/// The step that is looked at; the middle one of those that fire where nothing is chosen.
+/// The chosen step; default: the middle one of the steps that fire.
 struct StepChoice {
   std::uint32_t layer = 0;
   std::optional<std::uint32_t> swath, step;
 };
 
-/// A layer's program, carried out up to a step.
+/// The state of a layer's program after a step.
 struct Jetting {
-  std::uint32_t swath = 0, step = 0;  // what is looked at
-  std::size_t place = 0, sweeps = 0;  // of this sweep among those that fire, from 1; of all those
-  std::size_t fired = 0, drops = 0;   // drops by now; of the whole layer
-  Runs printed;                       // pixels by now
-  std::vector<SwathBand> bands;       // of the sweeps that fire, by their numbers
+  std::uint32_t swath = 0, step = 0;  // the chosen step
+  std::size_t place = 0, sweeps = 0;  // index of this sweep among those that fire, from 1; their number
+  std::size_t fired = 0, drops = 0;   // drops so far; of the whole layer
+  Runs printed;                       // pixels so far
+  std::vector<SwathBand> bands;       // of the sweeps that fire, in order of their numbers
   std::vector<NozzlePlace> nozzles;   // at this step
-  std::size_t firing = 0;             // of them
+  std::size_t firing = 0;             // number of nozzles that fire
 };
 
 /// grid    of the layer's image
-/// errors  kUsage: the program fires nothing, or not in that swath or at that step; of VirtualMachine::run
+/// errors  kUsage: the program does not fire at all, in that swath or at that step; of VirtualMachine::run
 /// cost    O(text + drops log drops)
 Result<Jetting> jet_until(const VirtualMachine& machine, std::string_view program, const StepChoice& choice,
                           const PixelGrid& grid);

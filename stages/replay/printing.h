@@ -1,4 +1,4 @@
-// stages/replay/printing.h: a layer that the virtual machine prints; what the readers of dialects drive.
+// stages/replay/printing.h: a layer on the virtual machine, driven by the readers of dialects.
 #pragma once
 
 #include <cmath>
@@ -10,8 +10,8 @@
 
 namespace lamina::replay {
 
-/// The first fault of a program ends it: ok() is false from then on, later faults are not recorded, and what is printed
-/// behind it means nothing. Readers return when they see it.
+/// The first fault of a program ends it: ok() becomes false, later faults are not recorded, and pixels printed after it
+/// are undefined. Readers return when ok() is false.
 class Printing {
  public:
   Printing(const VirtualMachine& machine, std::uint32_t layer, const VirtualMachine::Watch* watch);
@@ -19,7 +19,7 @@ class Printing {
   const Machine& profile() const { return machine_.machine_; }
   std::uint32_t layer() const { return layer_; }
   std::uint32_t nozzles() const { return static_cast<std::uint32_t>(machine_.nozzle_.size()); }
-  /// "layer 12, swath 3, step 417: what"; before the first swath or the first step of one, that is said instead.
+  /// "layer 12, swath 3, step 417: what"; before the first swath or its first step, the text says so instead.
   void fault(std::string_view what);
   bool ok() const { return fault_.empty(); }
   /// errors  kVerification: the first fault
@@ -27,12 +27,12 @@ class Printing {
 
   // --- sweeps
   void begin_sweep(std::uint32_t number, bool backward);
-  /// Where nozzle 0 goes, as a position of the carriage in mm.
+  /// Moves nozzle 0 to a carriage position, in mm.
   void go_across(double carriage_mm);
-  /// Carriage position in mm of a step, and the step nearest to a position, which has to be near; 0 where it is not.
+  /// Carriage position in mm of a step, and the step at a position; 0 if no step is near.
   double position_of(double step) const;
   std::int64_t step_at(double carriage_mm);
-  /// For messages: the sweep whose words are read before it begins, and the step of a vector that is not fired yet.
+  /// For messages: the sweep being read before its start, and the step of a vector before it fires.
   void reading_sweep(std::uint32_t number) {
     reading_sweep_ = number;
     reading_ = INT64_MIN;
@@ -40,17 +40,17 @@ class Printing {
   void reading_step(std::int64_t step) { reading_ = step; }
   void at_step(std::int64_t step);
   void fire(std::uint32_t nozzle);
-  /// All nozzles whose bits are set; bit 63 of the first word is nozzle 0.
+  /// Fires all nozzles with set bits; bit 63 of the first word is nozzle 0.
   void fire_words(const std::vector<std::uint64_t>& words);
 
-  // --- what moves
+  // --- movements
   void head_moves(double mm, double mm_s, bool scanning);
   void feeds(std::uint32_t vat, double mm, double mm_s);
   void build_vat_stands_at(double mm);
   void roller_stands_at(double mm);
   void takes(double seconds) { count.seconds += seconds; }
 
-  /// Whether the powder cycle was that of a layer; called at the end.
+  /// Checks the powder cycle of the layer; called at the end.
   void check_cycle(const Layer& layer);
   /// Compares with an image; see VirtualMachine::replay.
   void compare(const RunsView& image, std::uint64_t moved, std::uint64_t lost);
@@ -62,7 +62,7 @@ class Printing {
     std::uint32_t number;
     std::int64_t first_line;
   };
-  void fail(std::string what);  // the message is whole
+  void fail(std::string what);  // takes the complete message
   void coverage(std::vector<bool>& worked, std::vector<bool>& blocked) const;
   std::int64_t line_of(std::uint32_t column, std::uint32_t row) const;
   bool pixel(std::int64_t line, std::int64_t place, std::uint32_t& column, std::uint32_t& row) const;
@@ -77,7 +77,7 @@ class Printing {
   bool rolled_ = false;  // to the far end
   double roller_mm_ = 0;
   bool backward_ = false, sweeping_ = false, stepped_ = false, fired_here_ = false;
-  std::vector<std::uint64_t> fired_;  // a bit a pixel, the leftmost in bit 0
+  std::vector<std::uint64_t> fired_;  // one bit per pixel, the leftmost in bit 0
   std::vector<Sweep> sweeps_;
   std::string fault_;  // the first one
 };

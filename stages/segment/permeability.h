@@ -24,7 +24,7 @@ struct Fluid {
   double density_kg_m3 = 1.204;
 };
 
-/// What is odd about a fluid, one line; "" if nothing is.
+/// A warning about implausible properties of a fluid, one line; "" if none.
 std::string odd_about(const Fluid& fluid);
 
 struct Permeability {

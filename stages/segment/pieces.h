@@ -1,7 +1,7 @@
-// stages/segment/pieces.h: test pieces for a printer that nothing is known of; measured.h makes sense of their widths.
+// stages/segment/pieces.h: test pieces for an uncalibrated printer; measured.h evaluates their widths.
 //
 // The procedure is that of Di Nisio 2022, Appendix A: 1 parameters, 2 flow, 3 level, 4 widths of thick and thin stretches,
-// 5 spacings, 6 one layer, 7 the part. docs/calibrate.md tells it for people.
+// 5 spacings, 6 one layer, 7 the part. docs/calibrate.md describes it.
 #pragma once
 
 #include <array>
@@ -21,7 +21,7 @@ struct PieceRequest {
 /// The sweeps of the document's Tables 3 to 5; no bead.
 PieceRequest preset_pieces();
 
-/// A test piece: a block, and how it is filled.
+/// A test piece: a block and its filling.
 struct TestPiece {
   std::string name;  // of its files: 4-speed
   std::string task;  // what to do with it, one line

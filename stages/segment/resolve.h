@@ -1,4 +1,4 @@
-// stages/segment/resolve.h: a segmentation as it will be laid, from what is asked for and what was measured.
+// stages/segment/resolve.h: resolves a segmentation from its settings and the calibration.
 #pragma once
 
 #include <cstdint>
@@ -11,12 +11,12 @@
 
 namespace lamina::segment {
 
-/// Widths, speeds and spacings that the settings leave open are those of the calibration, in proportion to the bead.
+/// Absent widths, speeds and spacings come from the calibration, in proportion to the bead.
 /// bead_mm  width of the filling's beads, > 0
 /// errors   of check(): kUsage, one line that begins with the key's name
 Result<Segmentation> resolve(const Settings& settings, const Calibration& calibration, double bead_mm);
 
-/// Centre to centre, mm, from each line to the next one, in turn from line 0.
+/// Centre-to-centre distances, mm, from each line to the next, in turn from line 0.
 /// first  number of a segmented line
 std::vector<double> line_distances(const Segmentation& segmentation, std::int32_t first);
 

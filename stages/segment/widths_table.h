@@ -1,4 +1,4 @@
-// stages/segment/widths_table.h: widths.csv, which people fill in with what they measure on test pieces (pieces.h).
+// stages/segment/widths_table.h: widths.csv, the table of widths measured on test pieces (pieces.h).
 #pragma once
 
 #include <string>
@@ -10,10 +10,10 @@
 
 namespace lamina::segment {
 
-/// The table to be filled in: a row for each line of the pieces.
+/// The empty table: one row per line of the pieces.
 std::string widths_text(const PieceRequest& request);
 
-/// The rows of a filled in table. errors  kInput: file, line, column, what is wrong
+/// The rows of a completed table. errors  kInput: file, line, column, reason
 Result<std::vector<Measured>> read_widths(const std::string& path);
 
 }  // namespace lamina::segment

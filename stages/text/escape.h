@@ -1,6 +1,6 @@
-// stages/text/escape.h: text within the languages that manual pages, web pages and shells are written in.
+// stages/text/escape.h: escapes text for manual pages, Markdown and shells.
 //
-// Each function takes any text and gives what shows as that text; none has errors.
+// Each function accepts any text and returns its escaped form; none fails.
 // cost  one pass
 #pragma once
 
@@ -9,16 +9,16 @@
 
 namespace lamina {
 
-/// Within a page for man: backslashes, dashes, and dots and quotes at the beginning of a line.
+/// For a man page: backslashes, dashes, and dots and quotes at the start of a line.
 std::string roff(std::string_view text);
 
-/// Within a cell of a Markdown table, on one line.
+/// For a cell of a Markdown table, on one line.
 std::string markdown_cell(std::string_view text);
 
-/// As code within a cell of a Markdown table, in backticks.
+/// For code in a cell of a Markdown table, in backticks.
 std::string markdown_code(std::string_view text);
 
-/// Within [...] of an argument of zsh's _arguments, within single quotes.
+/// For [...] in a single-quoted argument of zsh's _arguments.
 std::string zsh_argument(std::string_view text);
 
 /// A word of fish, in single quotes.

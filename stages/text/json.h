@@ -1,4 +1,4 @@
-// stages/text/json.h: JSON values, their keys in the order in which they are set.
+// stages/text/json.h: JSON values with keys in insertion order.
 #pragma once
 
 #include <nlohmann/json.hpp>
@@ -8,7 +8,7 @@ namespace lamina {
 
 using Json = nlohmann::ordered_json;
 
-/// A value as text that ends with a line's end, on one line or indented; bytes that are not UTF-8 become U+FFFD.
+/// A value as text with a final line end, on one line or indented; bytes that are not UTF-8 become U+FFFD.
 std::string json_line(const Json& value, int indent = -1);
 
 }  // namespace lamina

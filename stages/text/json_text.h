@@ -1,4 +1,4 @@
-// stages/text/json_text.h: the few pieces of JSON that are written by hand, so that a line costs no document tree.
+// stages/text/json_text.h: JSON text without a document tree, for speed.
 #pragma once
 
 #include <string>

@@ -1,7 +1,7 @@
-// stages/text/key.h: a named, typed, ranged value of what people describe: a job, a part, a filling, a printer.
+// stages/text/key.h: a named, typed and ranged value of a job, part, filling or printer.
 //
-// A table of keys says everything once: options, files, --set, messages, the help and the canonical text follow from it.
-// Tables are made by helpers that name the member:
+// A table of keys is the single source of options, files, --set, messages, help and canonical text.
+// Helpers make the rows of a table from a member:
 //
 //   field<&Job::heights, &HeightsRequest::cusp_mm>({"heights", "cusp_mm", "--cusp", "MM", "highest step"}, {0, 10, " mm"})
 //   word<kModes, &Job::heights, &HeightsRequest::mode>({"heights", "mode", "--heights", "MODE", "how layers are decided"})
@@ -19,35 +19,35 @@
 
 namespace lamina {
 
-/// What is the same for a key of anything.
+/// The fields independent of the target's type.
 struct KeyName {
   std::string_view section, name;     // of the file
   std::string_view flag = {};         // option with the same meaning; empty if there is none
-  std::string_view value = {};        // what stands behind the option: "MM", "WIDTHxDEPTH"; empty for a switch
+  std::string_view value = {};        // placeholder after the option: "MM", "WIDTHxDEPTH"; empty for a switch
   std::string_view meaning = {};      // for the help, one line
-  unsigned decides = 0;               // products whose bytes follow from it (job/product.h)
-  std::string_view switch_text = {};  // what a flag without a value means, as in --no-repair: "false"
+  unsigned decides = 0;               // products whose bytes depend on it (job/product.h)
+  std::string_view switch_text = {};  // value of a flag without text, as in --no-repair: "false"
 };
 
-/// How a value looks in TOML; kToml: its text is TOML already.
+/// The form of a value in TOML; kToml: its text is TOML already.
 enum class Form : std::uint8_t { kBare, kString, kList, kStrings, kToml };
 
-/// Functions return "" or what is wrong, to stand behind the key's name; the target is then as it was.
+/// Functions return "" or an error message to follow the key's name; on an error the target is unchanged.
 template <class Target>
 struct Key : KeyName {
   /// Reads the value from the text of an option; lists are separated by commas.
   std::string read(std::string_view text, Target& target) const { return read_text(*this, text, target); }
-  /// Reads the value from a file. at  where it is wrong
+  /// Reads the value from a file. at  the place of an error
   std::string read(const TomlValue& tree, Target& target, Place& at) const {
     if (read_tree != nullptr) return read_tree(*this, tree, target, at);
     const auto text = flat_text(tree);
     return text ? read_text(*this, *text, target) : "is not a single value or a list of them";
   }
-  /// The value as read() takes it; "" if it is not set.
+  /// The value as text for read(); "" if unset.
   std::string write(const Target& target) const {
     return shown != nullptr && !shown(target) ? std::string() : write_text(*this, target);
   }
-  /// Whether the value is one that read() gives: numbers are compared with their limits, a text is read.
+  /// Checks that read() could produce the value: compares numbers with their limits, and reads texts.
   std::string check(const Target& target) const { return check_target(*this, target); }
   void copy(const Target& from, Target& to) const { copy_value(*this, from, to); }
 
@@ -68,7 +68,7 @@ struct Key : KeyName {
   bool (*shown)(const Target&) = nullptr;  // whether the value is written; always if null
 };
 
-/// The member of a target at the end of a path of members; the target itself if there is none.
+/// The member of a target at the end of a path of members; the target itself if the path is empty.
 template <auto... Path, class Target>
 auto& member(Target& target) {
   if constexpr (sizeof...(Path) == 0) {
@@ -148,7 +148,7 @@ constexpr auto word(const KeyName& name) {
   return key;
 }
 
-/// A value with a reader and a writer of its own: std::string Read(std::string_view, Value&) and
+/// A value with custom functions: std::string Read(std::string_view, Value&) and
 /// std::string Write(const Value&). Without a path the value is the whole target.
 template <class Target, auto Read, auto Write, auto... Path>
 constexpr Key<Target> custom(const KeyName& name, Form form) {
@@ -166,7 +166,7 @@ constexpr Key<Target> custom(const KeyName& name, Form form) {
   return key;
 }
 
-/// A text that Check(std::string_view) finds nothing wrong with.
+/// A text accepted by Check(std::string_view).
 template <auto Check, auto... Path>
 constexpr auto text(const KeyName& name) {
   constexpr auto read = [](std::string_view given, std::string& value) {
@@ -202,7 +202,7 @@ constexpr auto structure(const KeyName& name) {
   return key;
 }
 
-/// The key of a member's table as one of the target; the member's table has to outlive it.
+/// A key of a member's table as a key of the target; the member's table must outlive it.
 template <auto... Path, class Inner>
 auto inside(const Key<Inner>& inner, std::string_view section, unsigned decides) {
   using Target = key_detail::TargetOf<Path...>;
@@ -231,7 +231,7 @@ auto inside(const Key<Inner>& inner, std::string_view section, unsigned decides)
 
 // --- tables of keys
 
-/// What is wrong with a name that no key has: the nearest one, or all of the section.
+/// The message for an unknown name: the nearest key, or all keys of the section.
 std::string no_such_key(std::string_view section, std::string_view name, std::span<const std::string_view> names);
 std::string no_such_section(std::string_view section, std::span<const std::string_view> names);
 
@@ -244,7 +244,7 @@ std::vector<std::string_view> section_names(std::span<const Key<Target>> keys) {
   return names;
 }
 
-/// The key, or null and what is wrong with its name.
+/// The key, or null with the message for its name.
 template <class Target>
 const Key<Target>* find_key(std::span<const Key<Target>> keys, std::string_view section, std::string_view name,
                             std::string& wrong) {
@@ -258,8 +258,8 @@ const Key<Target>* find_key(std::span<const Key<Target>> keys, std::string_view 
   return nullptr;
 }
 
-/// Reads what a table says of a section's keys. returns "" or what is wrong, "name: what"; at  where
-/// read  gets the number of each key that was read, if it is not null
+/// Reads a table's values for a section's keys. returns "" or an error, "name: what"; at  its place
+/// read  receives the index of each key read, unless null
 template <class Target>
 std::string read_table(const TomlValue& table, std::string_view section, std::span<const Key<Target>> keys, Target& target,
                        Place& at, std::vector<std::size_t>* read = nullptr) {
@@ -274,8 +274,8 @@ std::string read_table(const TomlValue& table, std::string_view section, std::sp
   return {};
 }
 
-/// Reads a file of sections. file  names it in messages
-/// errors  kUsage: place, section and key, what is wrong
+/// Reads a file of sections. file  its name in messages
+/// errors  kUsage: place, section and key, reason
 template <class Target>
 Status read_section(const TomlValue& table, std::string_view section, const std::string& file,
                     std::span<const Key<Target>> keys, Target& target) {
@@ -295,7 +295,7 @@ Status read_section(const TomlValue& table, std::string_view section, const std:
 /// "name = value" in TOML, without a line break.
 std::string key_line(std::string_view name, Form form, std::string_view text);
 
-/// The sections of a file with the values that keep(key, text) keeps.
+/// The sections of a file with the values selected by keep(key, text).
 template <class Target, class Keep>
 std::string sections_text(std::span<const Key<Target>> keys, const Target& target, const Keep& keep) {
   std::string text;

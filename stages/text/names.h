@@ -1,4 +1,4 @@
-// stages/text/names.h: what somebody who mistyped a name probably meant.
+// stages/text/names.h: suggestions for mistyped names.
 #pragma once
 
 #include <span>
@@ -7,7 +7,7 @@
 
 namespace lamina {
 
-/// "; did you mean 'layer'?" for the known name that is the fewest edits away, or "" if none is near.
+/// "; did you mean 'layer'?" for the known name at the least edit distance, or "" if none is near.
 std::string suggest(std::string_view mistyped, std::span<const std::string_view> known);
 
 }  // namespace lamina

@@ -1,7 +1,7 @@
-// stages/text/number_text.h: numbers as people write them in options and job files, read strictly.
+// stages/text/number_text.h: strict parsing of numbers in options and job files.
 //
-// The whole text has to be a number, and it has to be finite: "12mm", "1e999", "nan" and "inf" are no numbers here.
-// Every reader returns an empty string, or what is wrong and what would be right, to stand behind the option's name.
+// The whole text must be one finite number: "12mm", "1e999", "nan" and "inf" are errors.
+// Every reader returns an empty string, or an error with the valid form, to follow the option's name.
 #pragma once
 
 #include <array>

@@ -1,4 +1,4 @@
-// stages/text/progress.h: how far the layers are, for a person who waits for them at stderr.
+// stages/text/progress.h: the progress display of the layers for stderr.
 #pragma once
 
 #include <chrono>
@@ -10,23 +10,23 @@
 
 namespace lamina {
 
-/// A bar on a terminal, redrawn at most every 100 ms; elsewhere a plain line every tenth of the layers, but not more
-/// often than once a second, and every 5 s. What is to be written is given as text, mostly none; nothing is written here.
-/// cost  a clock is read for every call
+/// A bar on a terminal, redrawn at most every 100 ms; elsewhere a plain line per tenth of the layers, at most once a
+/// second, and every 5 s. Returns the text to write, mostly empty, and writes nothing itself.
+/// cost  one clock reading per call
 class Progress {
  public:
   enum class Style { kSilent, kBar, kLines };
   explicit Progress(Style style) : style_(style) {}
 
-  /// Something begins that tells no numbers: "loading parts".
+  /// Starts a phase without numbers: "loading parts".
   std::string begin(std::string_view what);
-  /// So many layers are done; the first call tells how many were there before.
+  /// Sets the number of finished layers; the first call sets the number kept from before.
   std::string tell(std::uint32_t done, std::uint32_t total);
-  /// What takes the bar away, for a line that follows.
+  /// The text that erases the bar before another line.
   std::string clear() { return line_.clear(); }
 
-  /// What stands behind the bar and in the lines: "1200/4800 layers, 312.5 layers/s, 11.5 s left".
-  /// before  layers of those done that took none of the seconds
+  /// The text after the bar and in the lines: "1200/4800 layers, 312.5 layers/s, 11.5 s left".
+  /// before  finished layers from before, not counted in the seconds
   static std::string rate(std::uint32_t done, std::uint32_t total, std::uint32_t before, double seconds);
 
  private:

@@ -1,4 +1,4 @@
-// stages/text/ranges.h: how changes of keys, and those between two heights, are read, applied and written.
+// stages/text/ranges.h: reads, applies and writes changes of keys, with or without a range of heights.
 #pragma once
 
 #include <algorithm>
@@ -11,10 +11,10 @@ namespace lamina {
 /// "2.7:3", for messages.
 std::string range_name(double from_mm, double to_mm);
 
-/// Takes from_mm and to_mm out of a table. returns "" or what is wrong
+/// Removes from_mm and to_mm from a table into the arguments. returns "" or an error message
 std::string take_ends(TomlValue& table, double& from_mm, double& to_mm, Place& at);
 
-/// "is an array of tables; ...", if a value is none.
+/// "is an array of tables; ..." for any other value, else "".
 std::string check_tables(const TomlValue& value, std::string_view example);
 
 template <class Target>
@@ -43,7 +43,7 @@ std::string changes_text(std::span<const Key<Target>> keys, const Changes<Target
   return text;
 }
 
-/// Ranges in the order of their heights; none overlaps another.
+/// Ranges in the order of their heights, disjoint.
 template <class Target>
 std::string read_ranges(const TomlValue& list, std::span<const Key<Target>> keys, std::vector<Range<Target>>& ranges,
                         Place& at) {

@@ -1,4 +1,4 @@
-// stages/text/readable.h: sizes, times, counts and words of files as people read them.
+// stages/text/readable.h: human-readable sizes, times, counts and texts from files.
 #pragma once
 
 #include <cstdint>

@@ -9,9 +9,9 @@
 
 namespace lamina {
 
-/// The words of a line as a shell reads them: split at blanks; '...' and "..." hold blanks, a backslash takes the next
-/// character as it is (within '...' too it is an ordinary character), # begins a comment where a word could begin.
-/// Nothing is expanded. errors  kUsage: a quote that is not closed
+/// The words of a line as a shell splits them: at blanks outside '...' and "..."; a backslash makes the next character
+/// literal (within '...' the backslash itself is literal); # at the start of a word begins a comment.
+/// Nothing is expanded. errors  kUsage: an unclosed quote
 Result<std::vector<std::string>> split_words(std::string_view line);
 
 }  // namespace lamina

@@ -1,4 +1,4 @@
-// stages/text/table.h: lines of tables that people fill in: CSV by commas or semicolons, or tabs.
+// stages/text/table.h: lines of user-edited tables, separated by commas, semicolons or tabs.
 #pragma once
 
 #include <string>
@@ -9,12 +9,12 @@
 
 namespace lamina {
 
-/// What separates the columns of a table, by its first line.
+/// The column separator of a table, detected from its first line.
 inline char separator_of(std::string_view header) {
   return header.find('\t') != std::string_view::npos ? '\t' : header.find(';') != std::string_view::npos ? ';' : ',';
 }
 
-/// The cells of a line without blanks and quotes around them.
+/// The cells of a line without surrounding blanks and quotes.
 inline std::vector<std::string> cells_of(std::string_view line, char separator) {
   if (line.ends_with('\r')) line.remove_suffix(1);
   std::vector<std::string> cells;

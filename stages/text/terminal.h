@@ -1,6 +1,6 @@
-// stages/text/terminal.h: the terminal at stderr, and a line on it that is drawn again and again.
+// stages/text/terminal.h: the terminal at stderr, and a status line on it.
 //
-// What is to be drawn is given as text; nothing is written here. cost  a system call for the terminal, none for the text
+// Functions return the text to draw and write nothing. cost  a system call for the terminal, none for the text
 #pragma once
 
 #include <string>
@@ -13,16 +13,16 @@ bool is_terminal();
 /// Columns of the terminal at stderr, or 80.
 int terminal_columns();
 
-/// "[####......] what" for a share from 0 to 1, at most 40 wide and one column less than there are; `what` alone where there
-/// is no room for a bar.
+/// "[####......] what" for a fraction from 0 to 1. The bar is at most 40 wide, the line one column narrower than the
+/// terminal; only `what` if the bar does not fit.
 std::string progress_bar(double share, std::string_view what, int columns);
 
-/// The line that stands below all others.
+/// The status line below all other output.
 class StatusLine {
  public:
-  /// What draws a line in the place of the one before, cut to the columns.
+  /// The text that replaces the previous line, truncated to the columns.
   std::string draw(std::string_view line, int columns);
-  /// What takes the line away, for another one that follows; "" if none is drawn.
+  /// The text that erases the line before other output; "" if none is drawn.
   std::string clear();
 
  private:

@@ -11,10 +11,10 @@
 
 namespace lamina {
 
-/// Where a value begins in its file, from 1; 0 if it came from no file.
+/// The start of a value in its file, from 1; 0 without a file.
 struct Place {
   std::uint32_t line = 0, column = 0;
-  /// "job.toml:12:5: ", or "" if there is none.
+  /// "job.toml:12:5: ", or "" without a place.
   std::string text(const std::string& file) const;
 };
 
@@ -29,26 +29,26 @@ struct TomlValue {
   bool is_text() const { return kind == Kind::kText; }
   bool is_list() const { return kind == Kind::kList; }
   bool is_table() const { return kind == Kind::kTable; }
-  /// The value of that name in a table, or null.
+  /// The value with that name in a table, or null.
   const TomlValue* find(std::string_view wanted) const;
   TomlValue* find(std::string_view wanted);
   void add(std::string_view name_of_value, TomlValue added);
   void remove(std::string_view name_of_value);
 };
 
-/// A file. errors  kUsage: what is no TOML, "where:line:column: what"
+/// Parses a file. errors  kUsage: invalid TOML, "where:line:column: what"
 Result<TomlValue> read_toml(std::string_view text, const std::string& where);
 
-/// A value on its own, as in [1, 2] or { gap_mm = 0.1 }; none if it is no TOML.
+/// Parses a single value such as [1, 2] or { gap_mm = 0.1 }; nothing for invalid TOML.
 std::optional<TomlValue> read_toml_value(std::string_view text);
 
-/// A text, or the texts of a list with commas between; none of anything else.
+/// A text, or the texts of a list joined by commas; nothing for other kinds.
 std::optional<std::string> flat_text(const TomlValue& value);
 
 /// A basic string in quotes.
 std::string toml_string(std::string_view text);
 
-/// A text as the number or switch that it is, or in quotes.
+/// A text, bare if it is a number or a switch, otherwise in quotes.
 std::string toml_text(std::string_view text);
 
 }  // namespace lamina

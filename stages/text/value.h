@@ -1,6 +1,6 @@
-// stages/text/value.h: how a value of each type is read from text within its limits, checked, and written.
+// stages/text/value.h: reads, checks and writes values of each type within their limits.
 //
-// Readers and checks return an empty string, or what is wrong and what would be right, to stand behind the value's name.
+// Readers and checks return an empty string, or an error with the valid form, to follow the value's name.
 #pragma once
 
 #include <fmt/format.h>
@@ -18,13 +18,13 @@
 namespace lamina {
 
 inline constexpr double kLeastMm = 1e-6;  // 1 nm
-inline constexpr double kMostMm = 2147;   // what 32 bits of nanometres hold, in whole mm
+inline constexpr double kMostMm = 2147;   // the range of 32-bit nanometres, in whole mm
 
-/// What a number may be, and how many of them a list may hold.
+/// The limits of a number, and of the length of a list.
 struct Limits {
   double low = 0, high = 0;
   std::string_view unit = {};  // for messages, as in " mm"
-  bool one_for_all = false;    // a list of fixed length may be given as one number
+  bool one_for_all = false;    // one number may stand for a list of fixed length
   std::size_t least = 0, most = 100'000;
 };
 
@@ -123,7 +123,7 @@ std::string value_text(const std::optional<T>& value) {
   return value ? value_text(*value) : std::string();
 }
 
-// --- words of a fixed list, and what they stand for
+// --- words of a fixed list, and their values
 template <class Value>
 struct Word {
   std::string_view word;
@@ -146,7 +146,7 @@ std::string read_word(const Word<Value> (&words)[N], std::string_view text, Valu
   return not_one_of(text, names);
 }
 
-/// The word of a value; empty if no word stands for it.
+/// The word for a value; empty if none.
 template <class Value, std::size_t N>
 std::string write_word(const Word<Value> (&words)[N], Value value) {
   for (const auto& [word, meaning] : words) {

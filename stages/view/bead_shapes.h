@@ -1,4 +1,4 @@
-// stages/view/bead_shapes.h: what the beads of a layer cover, as shapes to look at.
+// stages/view/bead_shapes.h: the areas of a layer's beads, as shapes to draw.
 #pragma once
 
 #include <span>
@@ -10,17 +10,17 @@
 
 namespace lamina::view {
 
-/// Adds what planned beads cover to `shapes`, kind by kind. errors  kInternal if Clipper refuses them
+/// Adds the areas of planned beads to `shapes`, one per kind. errors  kInternal if Clipper refuses them
 Status add_paths(const ToolpathsView& paths, LayerShapes& shapes);
 
-/// Adds what the beads of a file cover, by what they are for, in the order in which that is first laid; wide and narrow beads
-/// of a type in different shades, four of them at most.
-/// types   names of the types of beads, in the words of any slicer: they decide on the ink; "" where it says nothing
+/// Adds the areas of a file's beads by type, in order of first occurrence. Beads of different widths within a type have
+/// different shades, four at most.
+/// types   names of the bead types as written by any slicer; they decide the ink; "" if unknown
 /// errors  kInternal if Clipper refuses them
 /// cost    O(beads * types) and the union of the beads
 Status add_beads(std::span<const LaidBead> beads, std::span<const std::string> types, LayerShapes& shapes);
 
-/// Millimetres of all beads together.
+/// Total length of all beads, mm.
 double length_mm(std::span<const LaidBead> beads);
 
 }  // namespace lamina::view

@@ -1,7 +1,7 @@
-// stages/view/cast.h: parts on the bed as they look from a side, by one Embree ray a sample.
+// stages/view/cast.h: views of parts on the bed, with one Embree ray per sample.
 //
-// For people only: a picture decides nothing, so coordinates are floats here. Rays are parallel (orthographic), four a
-// pixel; what is lit is the facet that a ray meets first, by the angle of its normal.
+// Pictures do not affect any output of a job, so coordinates are floats here. Rays are orthographic, four per pixel; the
+// first facet on a ray is shaded by the angle of its normal.
 #pragma once
 
 #include <cstdint>
@@ -20,7 +20,7 @@ enum class Side : std::uint8_t { kTop, kFront, kRight };
 struct Picture {
   std::uint32_t width = 0, height = 0;    // pixels
   double width_mm = 0, height_mm = 0;     // of all parts together
-  std::vector<std::uint8_t> light_cover;  // for each pixel, rows from the top: how light (255 white), how much of it is part
+  std::vector<std::uint8_t> light_cover;  // per pixel, rows from the top: lightness (255 white), coverage by parts
 };
 
 class Caster {
@@ -32,8 +32,8 @@ class Caster {
   Caster(Caster&&) noexcept;
   ~Caster();
 
-  /// What is seen, `most` pixels along the longest side of the box around all parts (the same scale for every side).
-  /// cost  4 rays a pixel, on all processors
+  /// The view, with `most` pixels along the longest side of the box around all parts (the same scale for every view).
+  /// cost  4 rays per pixel, on all processors
   Picture look(Side side, std::uint32_t most) const;
 
  private:

@@ -1,4 +1,4 @@
-// stages/view/choice.h: which layers of a job are drawn.
+// stages/view/choice.h: selects the layers of a job to draw.
 #pragma once
 
 #include <cstdint>
@@ -11,12 +11,12 @@ namespace lamina::view {
 
 inline constexpr std::uint32_t kMostCells = 400;  // of a picture
 
-/// One layer, every so many, or so many over the height (12 if nothing is chosen); at most one is set.
+/// One layer, every n-th layer, or a number of layers over the height (default 12); at most one is set.
 struct LayerChoice {
   std::optional<std::uint32_t> layer, every, count;
 };
 
-/// Places in the list of a job's layer numbers, which is not empty.
+/// Indices into the list of a job's layer numbers, which must not be empty.
 /// errors  kUsage: several choices, no such layer, too many for a picture
 /// cost    O(layers)
 Result<std::vector<std::size_t>> chosen_layers(const LayerChoice& choice, const std::vector<std::uint32_t>& layers);

@@ -1,4 +1,4 @@
-// stages/view/depth.h: parts from three sides, as their layers build them up.
+// stages/view/depth.h: three views of parts, computed from their layers.
 #pragma once
 
 #include <array>
@@ -13,7 +13,7 @@
 
 namespace lamina::view {
 
-/// How near the surface is in each direction of a view; 0 where nothing is. Rows from the top.
+/// Nearness of the surface in each pixel of a view; 0 without a surface. Rows from the top.
 struct DepthView {
   std::string name;  // top, front, side
   std::uint32_t width = 0, height = 0, most = 1;
@@ -21,8 +21,8 @@ struct DepthView {
   std::vector<std::uint16_t> depth;
 };
 
-/// Layers are looked at as coverage on a grid of at most 360 x 360 cells of the window that holds them all; a cell that
-/// is at least half set is solid.
+/// Layers are sampled as coverage on a grid of at most 360 x 360 cells over the window around all of them; a cell at
+/// least half set is solid.
 class ThreeViews {
  public:
   /// `window` not empty; heights in nm above the bed.
@@ -33,7 +33,7 @@ class ThreeViews {
 
   /// The coverage of a layer, columns() x rows() values; for any thread.
   void look(const RunsView& runs, std::vector<std::uint8_t>& cells) const;
-  /// Adds a layer that was looked at; in any order, from one thread at a time.
+  /// Adds a sampled layer; in any order, from one thread at a time.
   void add(const Layer& layer, const std::vector<std::uint8_t>& cells);
 
   const std::array<DepthView, 3>& views() const { return views_; }

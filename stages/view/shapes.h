@@ -1,4 +1,4 @@
-// stages/view/shapes.h: layers that can be drawn, and the inks of their beads.
+// stages/view/shapes.h: drawable layers, and the inks of their beads.
 #pragma once
 
 #include <cstdint>
@@ -11,16 +11,16 @@
 
 namespace lamina::view {
 
-/// The ink of a kind of bead, the same in every picture.
+/// The ink of a kind of bead, equal in all pictures.
 Ink ink_of(PathKind kind);
 
-/// The ink of one of several widths of a kind: the narrowest, step 0, is pale, the widest has the full ink.
+/// The ink for one of several widths of a kind: pale for the narrowest, step 0, and full for the widest.
 Ink shade(const Ink& ink, std::size_t step, std::size_t steps);
 
-/// Layers that can be drawn, one at a time.
+/// Drawable layers, read one at a time.
 struct LayerSeries {
   std::string name;                   // of the part or file
-  std::uint32_t first = 0, last = 0;  // those that there are: [first, last)
+  std::uint32_t first = 0, last = 0;  // available layers: [first, last)
   std::uint32_t count = 0;            // of the whole job
   std::function<Result<LayerShapes>(std::uint32_t)> layer;
 };

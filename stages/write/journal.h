@@ -1,8 +1,7 @@
-// stages/write/journal.h: a text file that grows by whole lines and survives being killed at any moment.
+// stages/write/journal.h: a text file that grows by whole lines and survives a kill at any moment.
 //
-// Each line is a single write. A line that a kill or a full disk has torn stays torn: the next one begins on a line of its
-// own, and whoever reads the file has to skip what is not whole. As long as the journal is open it holds a lock on the
-// file, which is gone with the process.
+// Each line is a single write. A line torn by a kill or a full disk stays torn: the next line starts after a line break,
+// and readers must skip incomplete lines. An open journal locks the file; the lock ends with the process.
 #pragma once
 
 #include <functional>
@@ -15,8 +14,8 @@ namespace lamina::write {
 
 class Journal {
  public:
-  /// Opens a file, which is created empty if it is absent. Nothing in it is changed.
-  /// held    what is said behind the path if another process holds it: "another batch is running here"
+  /// Opens a file without changing it, or creates it empty.
+  /// held    error text after the path if another process holds the file: "another batch is running here"
   /// errors  kOutput: another process holds it, or the system's reason
   static Result<Journal> open(const std::string& path, std::string_view held);
   Journal(Journal&& other) noexcept;
@@ -24,7 +23,7 @@ class Journal {
   ~Journal();
 
   bool empty() const;
-  /// Begins anew. errors  kOutput
+  /// Empties the file. errors  kOutput
   Status clear();
   /// Every line so far, in order, without its end; the last one may be torn. cost  reads the file once
   void read(const std::function<void(const std::string&)>& line);
@@ -36,7 +35,7 @@ class Journal {
 
   std::string path_;
   int file_;
-  bool torn_ = false;  // the file does not end with a line's end
+  bool torn_ = false;  // the file does not end with a line break
 };
 
 }  // namespace lamina::write

@@ -1,6 +1,6 @@
-// stages/write/other_program.h: another program that does what this one has no libraries for, as a filter or in its place.
+// stages/write/other_program.h: runs a helper program, as a filter or in place of this process.
 //
-// A program stands beside this one, or else somewhere in PATH.
+// A helper is searched beside this program, then in PATH.
 #pragma once
 
 #include <string>
@@ -11,12 +11,12 @@
 
 namespace lamina::write {
 
-/// Hands the process over to a program. Returns only if it cannot be started. errors  kInternal
+/// Replaces the process by a program. Returns only if the start fails. errors  kInternal
 Error hand_over(const std::string& program, const std::vector<std::string>& arguments);
 
 /// Runs a program as a filter: `input` on its standard input.
-/// returns  what it writes to standard output; if it fails, that is its error
-/// errors   its own, under its exit code; kInternal: it cannot be started, or a signal ended it
+/// returns  its standard output, which is the error text if it fails
+/// errors   its own, under its exit code; kInternal: the start failed, or a signal ended it
 /// cost     a process; input and output are held in memory
 Result<std::string> filter(const std::string& program, const std::string& argument, std::string_view input);
 

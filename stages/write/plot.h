@@ -1,4 +1,4 @@
-// stages/write/plot.h: plots as SVG, and as JSON for the program that draws them as PNG (picture/).
+// stages/write/plot.h: plots as SVG, and as JSON for the PNG renderer (picture/).
 #pragma once
 
 #include <string>
@@ -15,7 +15,7 @@ std::string plot_svg(const Plot& plot);
 /// One JSON object.
 std::string plot_json(const Plot& plot);
 
-/// The same back. errors  kUsage
+/// Parses that JSON. errors  kUsage
 Result<Plot> read_plot(std::string_view json);
 
 }  // namespace lamina::write

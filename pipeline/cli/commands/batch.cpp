@@ -57,7 +57,7 @@ CommandSpec batch_spec() {
 
 // --- a command line as a job
 
-/// Collects what a command gives and the first thing that it complains about; what it says to people is not heard.
+/// Collects a command's results and its first error; discards its messages.
 class CallContext : public Context {
  public:
   CallContext(const ProgressCallback& progress, const std::atomic<bool>& cancel) : progress_(progress), cancel_(cancel) {}
@@ -77,7 +77,7 @@ class CallContext : public Context {
   void progress(const ProgressEvent& event) override { progress_(event); }
   const std::atomic<bool>& cancel() override { return cancel_; }
 
-  /// The value, several as an array, or the text that was printed.
+  /// The single value, an array of several, or the printed text.
   Json value() const {
     if (values_.size() > 1) return values_;
     if (!values_.empty()) return values_.front();
@@ -92,14 +92,14 @@ class CallContext : public Context {
   std::string printed_;
 };
 
-/// The arguments with what the batch adds; the last one of an option counts.
+/// The arguments with the batch's additions; the last occurrence of an option counts.
 Arguments with_settings(Arguments arguments, const CommandSpec& spec, const CallSettings& settings) {
   const auto add = [&](std::string_view name, const std::string& text = {}) {
     if (const OptionSpec* option = spec.find(name)) arguments.options.emplace_back(option->flag, text);
   };
   if (!settings.output.empty()) add("--output", settings.output);
   if (!arguments.has("--memory")) add("--memory", fmt::format("{}", settings.layer_bytes));
-  // One pool for all: a job's own number of threads would hold for the whole program.
+  // All jobs share one pool, so a job's own thread count would apply to the whole program.
   add("--threads", "0");
   add("--json");
   add("--quiet");
@@ -149,7 +149,7 @@ Result<Call> read_call(const std::vector<std::string>& words) {
   call.can_replace = spec.find("--overwrite") != nullptr && !read->has("--overwrite") && !read->has("--resume");
   if (const OptionSpec* memory = spec.find("--memory")) {
     call.layer_bytes = 0;
-    if (read->has(memory->flag)) read_bytes(read->text(memory->flag), *call.layer_bytes);  // the command says what is wrong
+    if (read->has(memory->flag)) read_bytes(read->text(memory->flag), *call.layer_bytes);  // the command reports errors
   }
   call.inputs = read->operands;
   for (const auto& [flag, text] : read->options) {
@@ -167,7 +167,7 @@ Result<Call> read_call(const std::vector<std::string>& words) {
 
 // --- the command
 
-/// What the options say, and the words for parts that come without any. errors  kUsage
+/// The settings from the options, and the default words for parts. errors  kUsage
 Result<BatchOptions> read_options(const Arguments& arguments, std::vector<std::string>& words) {
   BatchOptions options;
   if (arguments.operands.empty()) {
@@ -198,7 +198,7 @@ Result<BatchOptions> read_options(const Arguments& arguments, std::vector<std::s
   return options;
 }
 
-/// A line a job; on a terminal a line that is drawn again and again below them.
+/// One line per job, with a status line below on a terminal.
 class BatchConsole {
  public:
   BatchConsole(bool quiet, Context& context) : context_(context), quiet_(quiet), terminal_(is_terminal()) {}

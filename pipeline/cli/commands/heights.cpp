@@ -56,10 +56,10 @@ Result<Job> job_of(const Arguments& arguments) {
   Result<Job> read = read_job_options(kHeightsCommandKeys, arguments);
   if (!read) return read;
   if (read->parts.empty()) return Error{Fault::kUsage, "no part to look at; name one or more STL, OBJ or 3MF files"};
-  // Heights do not depend on where parts stand or whether the bed is large enough.
+  // Heights do not depend on the parts' positions or on the size of the bed.
   if (read->bed_mm || read->machine.profile.empty()) read->bed_mm = kLargestBed.size_mm;
   read->dry_run = true;
-  // Comparing and measuring need no way of their own.
+  // Comparing and measuring need no mode.
   const bool own_way = arguments.has("--compare") || arguments.has("--measure") || read->heights.per_part;
   if (own_way && read->heights.mode == heights::Mode::kUniform && !read->heights.thickness_mm.empty()) {
     read->heights.mode = heights::Mode::kOptimal;
@@ -68,7 +68,7 @@ Result<Job> job_of(const Arguments& arguments) {
   return read;
 }
 
-/// A file of this form holds one table and no name for it.
+/// A file of this form holds one unnamed table.
 Status check_one_table(const Job& job, const Arguments& arguments) {
   const bool many = arguments.all("--measure").size() > 1;
   if (!arguments.has("--compare") && !job.heights.per_part && !many) return {};
@@ -100,7 +100,7 @@ std::string table_text(Form form, const Job& job, const Scene& scene, const std:
   return studies.size() > 1 ? comparison_page(studies) : study_page(parts, studies.back());
 }
 
-/// The options of the tables; those of somebody else's alone need no thickness.
+/// The options of the tables; given tables need no thickness.
 Result<heights::Options> options_of(const Arguments& arguments, const Job& job) {
   if (arguments.has("--compare") || job.heights.per_part || !arguments.has("--measure")) return heights_options(job);
   Job measured = job;
@@ -108,7 +108,7 @@ Result<heights::Options> options_of(const Arguments& arguments, const Job& job) 
   return heights_options(measured);
 }
 
-/// The tables that the command's options name, the last one of which is drawn.
+/// The tables selected by the command's options; the last one is drawn.
 Result<std::vector<heights::Study>> studies_of(const Arguments& arguments, const Job& job, const heights::SurfaceIndex& index,
                                                const heights::Options& options) {
   std::vector<heights::Study> studies;

@@ -43,8 +43,8 @@ std::string explain(const ExtruderProfile& profile) {
       profile.own_calibration ? "measured on it" : "as published for an Anet A8; lamina calibrate measures them");
 }
 
-/// A printer by its name or file, of powder, else of extrusion: its whole profile, or what follows from it.
-/// errors  of a name that is neither, those of powder printers
+/// A printer by name or file, first among powder printers, then extrusion: its profile or its derived values.
+/// errors  for an unknown name, those of powder printers
 Result<std::string> printer_text(const std::string& name, bool whole) {
   const Result<Machine> powder = find_machine(name);
   if (!powder) {

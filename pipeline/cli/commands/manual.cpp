@@ -1,4 +1,4 @@
-// lamina completion and lamina manual: what help.h makes, printed or written.
+// lamina completion and lamina manual: print or write the output of help.h.
 #include <fmt/format.h>
 
 #include <filesystem>
@@ -51,7 +51,7 @@ CommandSpec manual_spec() {
   return spec;
 }
 
-/// All pages, or none where one of them would replace somebody's file.
+/// Writes all pages, or none if one would replace a user's file.
 Status write_pages(const std::string& directory, bool markdown, bool overwrite) {
   std::vector<std::pair<std::string, std::string>> pages;  // path, text
   if (!markdown) pages.emplace_back(fmt::format("{}/lamina.1", directory), man_page());

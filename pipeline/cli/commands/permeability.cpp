@@ -42,7 +42,7 @@ CommandSpec permeability_spec() {
   return spec;
 }
 
-/// What the options say of medium and fluid. errors  kUsage
+/// Medium and fluid from the options. errors  kUsage
 Result<Settings> read_settings(const Arguments& arguments) {
   const auto usage = [](const std::string& what) { return Error{Fault::kUsage, what}; };
   Settings settings;

@@ -1,4 +1,4 @@
-// lamina jet, slice and extrude: the commands that plan a job, one way through, three rows of data.
+// lamina jet, slice and extrude: the commands that plan a job, as one function and three rows of data.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -19,22 +19,22 @@
 namespace lamina::pipeline {
 namespace {
 
-/// What differs between the commands.
+/// The differences between the commands.
 struct PlanCommand {
   Product product;
   KeyChoice keys;                         // of the job, as options
   std::string_view summary;               // what it does, for the help
-  std::span<const OptionSpec> own;        // switches of the row: of --resume, --overwrite and --dry-run those that it has
-  std::span<const OptionSpec> overrides;  // words for keys that mean something else here: value, meaning, preset if not ""
+  std::span<const OptionSpec> own;        // switches of the row, among --resume, --overwrite and --dry-run
+  std::span<const OptionSpec> overrides;  // help texts that replace those of keys: value, meaning, preset if not ""
   std::string (*closing)();               // notes and examples
-  bool divided = false;                   // its layers can be divided among machines (--shard)
-  /// What the command line decides before the job is checked. errors  kUsage
+  bool divided = false;                   // supports --shard
+  /// Applies the command line before the job is checked. errors  kUsage
   Status (*complete)(const Arguments&, Job&);
-  /// What it leaves to the machine; nullptr: nothing.
+  /// Takes absent values from the machine; nullptr: none.
   void (*leave_to_machine)(const Arguments&, Resolved&) = nullptr;
 };
 
-/// Words of a row instead of those of the key.
+/// Replaces a key's help texts by those of the row.
 void override_words(std::span<const OptionSpec> overrides, CommandSpec& spec) {
   for (const OptionSpec& other : overrides) {
     const auto option = std::ranges::find(spec.options, other.flag, &OptionSpec::flag);
@@ -156,7 +156,7 @@ const OptionSpec kSliceSwitches[] = {{"--resume", "", "go on with an interrupted
                                      {"--overwrite", "", "replace an earlier job in the directory", "", "Run"},
                                      {"--dry-run", "", "load, place and index, write nothing", "", "Run"}};
 
-/// A sliced job keeps its job beside its manifest.
+/// A slice job saves its job file beside its manifest.
 Status complete_slice(const Arguments& arguments, Job& job) {
   const InputFile asked = {arguments.text("--job"), "the job file"};
   const std::string kept = job.output + "/job.toml";
@@ -222,7 +222,7 @@ bool sets(const Arguments& arguments, std::string_view key) {
   return std::ranges::any_of(arguments.all("--set"), [&](const std::string& text) { return text.starts_with(key); });
 }
 
-/// A job file says everything; a command line leaves to the printer what a powder job has other defaults for.
+/// Replaces the defaults of powder jobs by the printer's, unless the job comes from a file.
 void leave_to_machine(const Arguments& arguments, Resolved& resolved) {
   if (arguments.has("--job")) return;
   Job& job = resolved.job;
@@ -246,7 +246,7 @@ Status complete_extrude(const Arguments&, Job& job) {
                                           (std::filesystem::path(job.output) / "part.gcode").string())};
 }
 
-/// Of the file that a batch names after its part.
+/// Extension of the output file named by a batch.
 std::string extrude_ending(const Arguments& arguments) {
   Job job;
   job.machine.profile = arguments.text("--machine");

@@ -32,8 +32,8 @@ CommandSpec report_spec() {
   return spec;
 }
 
-/// Whether a browser opens a file of this name as a page. A page under the name of a part, an image or a manifest would
-/// replace it.
+/// Whether a browser opens a file of this name as a page. Other names are refused, because the page could replace a part,
+/// an image or a manifest.
 bool is_page_name(const std::string& path) {
   const std::string ending = lower_case(std::filesystem::path(path).extension().string());
   return ending == ".html" || ending == ".htm";

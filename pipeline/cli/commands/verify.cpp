@@ -59,7 +59,7 @@ Json report_json(const VerifyReport& report) {
   return json;
 }
 
-// What the machine does, for people.
+// The machine's totals as text.
 void say_replay(const VerifyReport& report, Context& context) {
   if (report.machine.empty() || report.replayed == 0) return;
   const replay::Count& replay = report.replay;
@@ -76,7 +76,7 @@ void say_replay(const VerifyReport& report, Context& context) {
       fmt::format("places    drops land up to {:.2f} um along and {:.2f} um across the scan from the centre of their pixel",
                   replay.farthest_along_um, replay.farthest_across_um));
   if (replay.travel_mm == 0 && replay.fed_mm[0] == 0 && replay.fed_mm[1] == 0) {
-    // Words for the head alone: whoever drives the axes decides the rest.
+    // The program controls only the head; another controller drives the axes.
     context.say(fmt::format("machine   {:.1f} m scanned in {}; this dialect does not tell other movements nor powder",
                             replay.scan_mm / 1000, readable_seconds(replay.seconds)));
     context.say(fmt::format("material  {:.3f} ml of binder", report.material.binder_mm3 / 1000));

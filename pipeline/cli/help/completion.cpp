@@ -1,4 +1,4 @@
-// What makes shells complete: one walk over commands and options for each, in its own language.
+// Completion scripts for shells: one traversal of commands and options per shell language.
 #include <fmt/format.h>
 
 #include <string_view>

@@ -13,7 +13,7 @@
 namespace lamina::pipeline {
 namespace {
 
-/// Pages of docs/ that tell more about a command.
+/// Pages of docs/ related to a command.
 struct More {
   std::string_view command, pages;
 };

@@ -1,4 +1,4 @@
-// stages/heights/study/study_text.h: layers and what they do to the surface, as text, CSV and JSON.
+// stages/heights/study/study_text.h: layers and their effect on the surface, as text, CSV and JSON.
 #pragma once
 
 #include <string>
@@ -9,7 +9,7 @@
 
 namespace lamina::heights {
 
-/// What is told of the parts beside their studies.
+/// Facts about the parts, in addition to their studies.
 struct StudiedParts {
   std::vector<std::string> paths;  // of each part
   std::int64_t height = 0;         // nm, of all
@@ -17,17 +17,17 @@ struct StudiedParts {
   double cusp_limit_mm = 0;
 };
 
-/// "given" for somebody else's layers.
+/// The reason for a layer; "given" for a given table.
 std::string_view reason(const Study& study, std::size_t layer);
-/// Degrees: the slope that the layer looked at when it was decided, or else the flattest one in it.
+/// Degrees: the slope that decided the layer, or else the flattest slope in it.
 double angle(const Study& study, std::size_t layer);
 
 std::string study_page(const StudiedParts& parts, const Study& study);
-/// The layers of all studies, one after the other; the first column names the study.
+/// The layers of all studies in sequence; the first column names the study.
 std::string study_csv(const StudiedParts& parts, const std::vector<Study>& studies);
 /// One JSON object on a line.
 std::string study_json(const StudiedParts& parts, const std::vector<Study>& studies);
-/// One line a study.
+/// One line per study.
 std::string comparison_page(const std::vector<Study>& studies);
 
 }  // namespace lamina::heights

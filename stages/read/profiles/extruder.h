@@ -9,16 +9,16 @@
 
 namespace lamina::read {
 
-/// Reads a profile; unknown keys are refused. The tables of its calibration are not checked, see segment::check.
-/// where    names it in messages
-/// profile  the values of keys that the text does not give
-/// errors   kUsage: place, key, what is wrong; a powder printer's profile
+/// Reads a profile; refuses unknown keys. Does not check the tables of its calibration, see segment::check.
+/// where    its name in messages
+/// profile  the values of keys absent from the text
+/// errors   kUsage: place, key, reason; a powder printer's profile
 Result<ExtruderProfile> read_extruder(std::string_view text, const std::string& where, ExtruderProfile profile);
 
-/// Changes one key, as in material.flow to 0.85. returns "" or what is wrong
+/// Sets one key, such as material.flow to 0.85. returns "" or an error message
 std::string set_extruder_key(std::string_view name, std::string_view value, ExtruderProfile& profile);
 
-/// Every key of a profile; reading it back gives the same profile.
+/// The text with every key of a profile; reading it restores the profile.
 std::string extruder_text(const ExtruderProfile& profile);
 
 }  // namespace lamina::read

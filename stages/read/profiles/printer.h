@@ -10,16 +10,16 @@
 
 namespace lamina::read {
 
-/// Reads a profile. Every key has a default; unknown ones are refused.
-/// where     names it in messages
-/// dialects  that programs can be written in: the profile names one of them, or leaves it at the default
-/// errors    kUsage: place, key, what is wrong
+/// Reads a profile. Every key has a default; unknown keys are refused.
+/// where     its name in messages
+/// dialects  the available dialects of print programs: the profile names one or uses the default
+/// errors    kUsage: place, key, reason
 Result<Machine> read_machine(std::string_view text, const std::string& where, std::span<const std::string_view> dialects);
 
-/// Every key of a profile: equal machines have equal texts, and reading it back gives the same machine.
+/// The text with every key of a profile: equal machines have equal texts, and reading it restores the machine.
 std::string machine_text(const Machine& machine);
 
-/// What is wrong with the name of a material, or ""; it has letters, digits, - and _, as it stands in file names too.
+/// An error in the name of a material, or "". Names consist of letters, digits, - and _, because file names contain them.
 std::string check_material(std::string_view name);
 
 }  // namespace lamina::read

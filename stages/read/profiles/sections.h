@@ -1,4 +1,4 @@
-// stages/read/profiles/sections.h: what profiles of all kinds share: their sections, and how they name the machine.
+// stages/read/profiles/sections.h: the sections and the machine name common to all kinds of profiles.
 #pragma once
 
 #include <fmt/format.h>
@@ -20,8 +20,8 @@ inline std::string read_name(std::string_view text, std::string& name) {
 inline std::string read_line(std::string_view text, std::string& line) { return line = one_line(text), std::string(); }
 inline std::string same_text(const std::string& text) { return text; }
 
-/// Reads every section of a file. name  of the machine, which the file has to give
-/// errors  kUsage: place, key, what is wrong
+/// Reads every section of a file. name  of the machine; required
+/// errors  kUsage: place, key, reason
 template <class Profile>
 Status read_sections(const TomlValue& file, const std::string& where, std::span<const Key<Profile>> keys, Profile& profile,
                      const std::string& name) {

@@ -1,7 +1,7 @@
-// stages/write/manifest/layered_file.h: one file that holds all layers, and the manifest that grows with it.
+// stages/write/manifest/layered_file.h: a single file of all layers, and its manifest.
 //
-// While the job runs, NAME.part and the manifest's .part grow together: the lines that are whole say how far the file
-// stands. They stay after a signal or a kill, and a resumed job goes on behind the last layer whose bytes hold.
+// While the job runs, NAME.part and the manifest's .part grow together: the complete lines give the valid length of the
+// file. Both survive a signal or a kill, and a resumed job continues after the last intact layer.
 #pragma once
 
 #include <cstdint>
@@ -21,32 +21,32 @@ class LayeredFile {
   struct Options {
     std::string file, manifest;  // paths
     bool resume = false;
-    bool stream = false;  // the file may be a device, a pipe or "-": it is written as it comes, and leaves no manifest
+    bool stream = false;  // accepts a device, a pipe or "-": written directly, without a manifest
   };
 
-  /// start  what stands before the first layer
-  /// errors  kUsage: what is to be resumed is of another job; kOutput
+  /// start  text before the first layer
+  /// errors  kUsage: the files to resume belong to another job; kOutput
   static Result<LayeredFile> open(Options options, const ManifestHead& head, std::string_view start);
   LayeredFile(LayeredFile&&) noexcept;
   LayeredFile& operator=(LayeredFile&&) noexcept;
   ~LayeredFile();
 
-  /// Layers that stand, from the first one on.
+  /// The intact layers, from the first on.
   const std::vector<LayerRecord>& kept() const;
-  /// Nothing is left to do: file and manifest are finished and hold.
+  /// Whether file and manifest are already finished and intact.
   bool finished() const;
 
-  /// The layer that comes next; its record has its size and hash, gets its place and goes into the manifest.
+  /// Appends the next layer. The record has size and hash; its offset is set, and it is added to the manifest.
   Status append(std::string_view text, LayerRecord& record);
-  /// A piece of the layer that comes next, of many.
+  /// Appends one piece of the next layer.
   Status append_piece(std::string_view text);
-  /// Ends a layer of pieces: its place, size and hash go into the record, and that into the manifest.
+  /// Ends a layer of pieces: sets offset, size and hash of the record, and adds it to the manifest.
   Status end_pieces(LayerRecord& record);
-  /// Adds what stands behind the last layer and gives both files their names. returns  the file's size
+  /// Appends the text after the last layer and renames both files. returns  the file's size
   Result<std::uint64_t> finish(std::string_view end);
-  /// An interrupted or failed job: whole layers stay, for a resumed run.
+  /// Ends an interrupted or failed job; complete layers stay for a resumed run.
   Status keep();
-  /// Removes what was begun.
+  /// Removes the started files.
   void discard();
   std::uint64_t size() const;
 

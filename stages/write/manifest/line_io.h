@@ -1,7 +1,7 @@
-// stages/write/manifest/line_io.h: one line of JSON, written and read piece by piece through the same calls.
+// stages/write/manifest/line_io.h: writes and reads one line of JSON piece by piece through the same calls.
 //
-// A line is read exactly as it is written: a hundred thousand of them take a few hundredths of a second, and no other
-// spelling is accepted.
+// The reader accepts only the writer's exact spelling, for speed: a hundred thousand lines take a few hundredths of a
+// second.
 #pragma once
 
 #include <fmt/compile.h>
@@ -28,7 +28,7 @@ class LineWriter {
     char text[32];
     out_.append(text, fmt::format_to(text, FMT_COMPILE("{}"), value));
   }
-  /// A text that follows from the rest of the line.
+  /// A text determined by the rest of the line.
   void fixed(std::string_view key, std::string_view value) {
     begin(key);
     out_ += json_string(value);
@@ -39,7 +39,7 @@ class LineWriter {
     out_.append(text, fmt::format_to(text, FMT_COMPILE("\"{:016x}{:016x}\""), value.high, value.low));
   }
   void reason(std::string_view key, const LayerReason& value) { fixed(key, reason_name(value)); }
-  /// Opens an object or a list below a key; without a key it is an element of a list.
+  /// Opens an object or a list under a key, or as a list element if the key is empty.
   void open(std::string_view key, std::string_view bracket) {
     if (!key.empty()) {
       begin(key);
@@ -66,7 +66,7 @@ class LineWriter {
   bool first_ = true;
 };
 
-/// Takes the pieces of a line away from its front; what() says what is wrong with it.
+/// Consumes the pieces of a line from the front; what() describes its error.
 class LineReader {
  public:
   explicit LineReader(std::string_view line) : rest_(line) {}

@@ -1,4 +1,4 @@
-// stages/write/manifest/manifest_head.h: the text around the lines of a manifest, for its writer and its reader.
+// stages/write/manifest/manifest_head.h: the text before and after a manifest's lines, for writer and reader.
 #pragma once
 
 #include <string>
@@ -7,19 +7,19 @@
 
 namespace lamina {
 
-/// The head without what differs between shards of one job: what its id is the hash of.
+/// The head without the fields that differ between shards of a job; its hash is the job's id.
 std::string lasting_text(const ManifestHead& head);
 
-/// All up to the first layer, without a line end.
+/// The text up to the first layer, without a line end.
 std::string head_text(const ManifestHead& head);
 
-/// All behind the last layer. file  the one file of all layers, if the head names one
+/// The text after the last layer. file  the single file of all layers, if the head names one
 std::string tail_text(const ManifestHead& head, const FileDigest& file);
 
-/// Reads what head_text() wrote. errors  kVerification: what is wrong with it, without a place
+/// Reads the output of head_text(). errors  kVerification: the reason, without a place
 Result<ManifestHead> read_head(const std::string& text);
 
-/// Reads what tail_text() wrote, without its first line. errors  false if it is another text
+/// Reads the output of tail_text() without its first line. errors  false for any other text
 bool read_tail(const ManifestHead& head, const std::string& text, FileDigest& file);
 
 }  // namespace lamina

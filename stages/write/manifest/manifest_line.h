@@ -1,4 +1,4 @@
-// stages/write/manifest/manifest_line.h: the line of a layer in a manifest, described once for its writer and its reader.
+// stages/write/manifest/manifest_line.h: a layer's line in a manifest, described once for writer and reader.
 #pragma once
 
 #include <string_view>
@@ -75,7 +75,7 @@ void describe_images(Io& io, const ManifestHead& head, Record& record) {
   io.close("}");
 }
 
-/// images of a record that is read are there already, one for each material; `paths` is not used for images.
+/// When reading, record.images must already have one entry per material. `paths` is unused for images.
 template <class Io, class Record, class Paths>
 void describe_line(Io& io, const ManifestHead& head, Record& record, Paths& paths) {
   io.open("", "{");

@@ -1,4 +1,4 @@
-// stages/write/manifest/record.h: what a manifest says of one layer.
+// stages/write/manifest/record.h: the record of one layer in a manifest.
 #pragma once
 
 #include <cstdint>
@@ -39,21 +39,21 @@ struct PathFacts {
   SegmentCounts segments;
   PlannedPorosity porosity;
 
-  /// Sums; in layer order they are the same whoever adds them.
+  /// Sums the fields. Summed in layer order, the result is deterministic.
   void add(const PathFacts& other);
 };
 
 struct LayerRecord {
   Layer layer{};
-  std::uint64_t bytes = 0;   // of the layer's files, or of its stretch of the one file
-  std::uint64_t offset = 0;  // where that stretch begins
-  Hash128 hash;              // of the file or stretch; nothing where a layer has several images
+  std::uint64_t bytes = 0;   // of the layer's files, or of its range in the single file
+  std::uint64_t offset = 0;  // start of that range
+  Hash128 hash;              // of the file or range; zero if a layer has several images
 
   // --- images
   std::uint64_t set_pixels = 0;
-  std::uint32_t capped_rows = 0;    // rows that are closed only thanks to repair (stages/load)
+  std::uint32_t capped_rows = 0;    // rows closed only by repair (stages/load)
   ProgramRecord program;            // zeros without a machine
-  std::vector<ImageRecord> images;  // one for each material, if the job has several
+  std::vector<ImageRecord> images;  // one per material, if the job has several
 
   std::shared_ptr<const PathFacts> paths;  // null for images
 };

@@ -1,4 +1,4 @@
-// stages/write/report/head.h: what a page says of its job, as its script reads it.
+// stages/write/report/head.h: the data about a job in a report page, for the page's script.
 #pragma once
 
 #include <cstdint>
@@ -14,7 +14,7 @@
 
 namespace lamina::write::report {
 
-/// A view of the page: what its head says of it, and its pixels.
+/// A view in the page: its entry in the head, and its pixels.
 struct ShownView {
   std::string name;
   std::uint32_t width = 0, height = 0, most = 0;  // most: of a depth; 0 for light and cover
@@ -22,7 +22,7 @@ struct ShownView {
   Buffer<std::byte> deflated;
 };
 
-/// What one pass over all layers gives.
+/// The result of one pass over all layers.
 struct LayersSeen {
   PixelWindow window;
   std::vector<std::uint64_t> set;  // pixels of each
@@ -35,7 +35,7 @@ struct ManifestSeen {
   FileDigest digest;
 };
 
-/// What the job is called.
+/// The title of the job.
 std::string page_title(const ManifestHead& head);
 
 /// One JSON object on a line: the job, its parts and views, and a list of numbers for each column of its layers.

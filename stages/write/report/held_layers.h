@@ -1,4 +1,4 @@
-// stages/write/report/held_layers.h: the layers that a page has room for.
+// stages/write/report/held_layers.h: selects the layers that fit into a page.
 #pragma once
 
 #include <cstdint>
@@ -9,8 +9,8 @@
 
 namespace lamina::write::report {
 
-/// Codes of layers (run_code.h) that come in order and fit the page together: when they get too many, every second one is let
-/// go.
+/// Codes of layers (run_code.h), added in order and limited to the page's size: beyond the limit, every second one is
+/// dropped.
 class HeldLayers {
  public:
   /// limit  bytes of the page
