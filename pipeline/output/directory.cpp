@@ -152,7 +152,7 @@ Result<Neighbours> check_manifests(const Job& job) {
     };
     if (file.partial && !joins(job, file)) {
       const std::string path = fmt::format("{}/{}", job.output, file.name.substr(0, file.name.size() - kPartial.size()));
-      if (Status busy = write::check_not_being_written(path); !busy) return busy;
+      if (Status busy = write::check_not_being_written(path); !busy) return busy.error();
     }
     found.begun |= is_own;
     if (joins(job, file)) {

@@ -64,6 +64,7 @@ Status ImageFiles::open() {
     kept_ = std::move(*kept);
   }
   auto stands = kept_.begin();
+  todo_.reserve(head_.last_layer - head_.first_layer - kept_.size());
   for (std::uint32_t index = head_.first_layer; index < head_.last_layer; ++index) {
     if (stands != kept_.end() && stands->layer.index == index) {
       ++stands;

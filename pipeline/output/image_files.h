@@ -31,7 +31,7 @@ class ImageFiles {
   /// errors  kUsage: the directory holds another job; kOutput
   Status open();
   /// Layers still to be made, in increasing order; valid after opening.
-  const std::vector<std::uint32_t>& todo() const { return todo_; }
+  std::vector<std::uint32_t> take_todo() { return std::move(todo_); }
   /// Layers kept from an interrupted run.
   const std::vector<LayerRecord>& kept() const { return kept_; }
 

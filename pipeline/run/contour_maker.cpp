@@ -16,7 +16,7 @@ namespace {
 class ContourMaker : public Maker {
  public:
   ContourMaker(const Plan& plan, const FlowLimits& limits)
-      : plan_(plan), files_(plan), work_(limits.most_in_flight), made_(limits.record_slots) {}
+      : plan_(plan), files_(plan), work_(limits.most_in_flight), made_(limits.most_in_flight) {}
 
   std::uint64_t bytes_of(std::uint32_t layer) const override { return plan_.sections->bytes_bound(layer); }
 
@@ -35,8 +35,8 @@ class ContourMaker : public Maker {
     const Sections& sections = *plan_.sections;
     return {{"contours",
              [&](std::uint32_t layer, const Ticket& ticket) {
-               made_[ticket.record] = LayerRecord();
-               made_[ticket.record].layer = plan_.layer(layer);
+               made_[ticket.work] = LayerRecord();
+               made_[ticket.work].layer = plan_.layer(layer);
                return sections.contours(layer, work_[ticket.work]);
              }},
             {"fill", [&](std::uint32_t layer, const Ticket& ticket) { return sections.fill(layer, work_[ticket.work]); },
@@ -48,19 +48,19 @@ class ContourMaker : public Maker {
                Sections::Work& work = work_[ticket.work];
                PathFacts facts = facts_of(work);
                facts.bead_mm = length_mm(work.paths);
-               made_[ticket.record].paths = std::make_shared<const PathFacts>(facts);
-               files_.encode(view_of(made_[ticket.record].layer, work), work.text);
+               made_[ticket.work].paths = std::make_shared<const PathFacts>(facts);
+               files_.encode(view_of(made_[ticket.work].layer, work), work.text);
                return Status();
              }},
             {"store", [&](std::uint32_t layer, const Ticket& ticket) {
-               return files_.store(layer, work_[ticket.work].text, made_[ticket.record]);
+               return files_.store(layer, work_[ticket.work].text, made_[ticket.work]);
              }}};
   }
   bool records_from_work() const override { return true; }
 
   Status record(std::uint32_t, const Ticket& ticket) override {
     const Sections::Work& work = work_[ticket.work];
-    LayerRecord& record = made_[ticket.record];
+    LayerRecord& record = made_[ticket.work];
     if (Status status = files_.record(view_of(record.layer, work), work.text, record); !status) return status;
     cuts_ += work.report.cuts;
     gaps_closed_ += work.report.gaps.closed;

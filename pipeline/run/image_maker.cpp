@@ -68,7 +68,7 @@ class ImageMaker : public Maker {
 
   Result<std::vector<std::uint32_t>> open() override {
     if (Status status = files_.open(); !status) return status.error();
-    return files_.todo();
+    return files_.take_todo();
   }
   std::vector<LayerRecord> kept() const override { return files_.kept(); }
 

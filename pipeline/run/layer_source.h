@@ -59,9 +59,8 @@ class LayerSource {
   std::unique_ptr<State> state_;
 };
 
-/// The layers of a job, decided as by `lamina heights`: for the parts alone, wherever they stand. With heights.per_part those of
-/// all parts, ordered by their tops.
-/// errors  of check_job; kInput; kUsage: [heights] is incomplete
+/// The layers of a job, decided as by `lamina heights`: for the parts alone, wherever they stand. With heights.per_part those
+/// of all parts, ordered by their tops. errors  of check_job; kInput; kUsage: [heights] is incomplete
 Result<std::vector<Layer>> layers_of(const Job& job);
 
 /// Loads a part's file with the job's options: unit, rotation, repair. errors  kInput

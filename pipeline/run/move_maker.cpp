@@ -23,7 +23,7 @@ constexpr std::size_t kWaitingText = 1 << 17, kPieceOfText = 1 << 16;
 class MoveMaker : public Maker {
  public:
   MoveMaker(const Plan& plan, const FlowLimits& limits)
-      : plan_(plan), file_(plan), work_(limits.most_in_flight), made_(limits.record_slots) {}
+      : plan_(plan), file_(plan), work_(limits.most_in_flight), made_(limits.most_in_flight) {}
 
   std::uint64_t bytes_of(std::uint32_t layer) const override { return plan_.sections->bytes_bound(layer); }
 
@@ -40,8 +40,8 @@ class MoveMaker : public Maker {
     return {
         {"contours",
          [this](std::uint32_t layer, const Ticket& ticket) {
-           made_[ticket.record] = Made();
-           made_[ticket.record].record.layer = plan_.layer(layer);
+           made_[ticket.work] = Made();
+           made_[ticket.work].record.layer = plan_.layer(layer);
            return plan_.sections->contours(layer, work_[ticket.work]);
          }},
         {"fill", [this](std::uint32_t layer, const Ticket& ticket) { return plan_.sections->fill(layer, work_[ticket.work]); },
@@ -51,13 +51,13 @@ class MoveMaker : public Maker {
            return bytes;
          }},
         {"stretches", [this](std::uint32_t layer, const Ticket& ticket) {
-           return lay_waiting(layer, work_[ticket.work], made_[ticket.record]);
+           return lay_waiting(layer, work_[ticket.work], made_[ticket.work]);
          }}};
   }
   bool records_from_work() const override { return true; }
 
   Status record(std::uint32_t layer, const Ticket& ticket) override {
-    Made& made = made_[ticket.record];
+    Made& made = made_[ticket.work];
     Sections::Work& work = work_[ticket.work];
     if (!made.waits) {
       if (Status status = lay_pieces(layer, work, made); !status) return status;

@@ -35,7 +35,7 @@ TEST(GcodeNumber, IsTheExactDecimalWithoutTrailingZeros) {
 
 TEST(Nearest, IsLlround) {
   std::mt19937_64 random(5);
-  const double edges[] = {0,     0.5, 1.5, 2.5, 0.49999999999999994, 4503599627370495.5, 4503599627370496, 9007199254740993,
+  const double edges[] = {0,     0.5, 1.5, 2.5, 0.49999999999999994, 4503599627370495.5, 4503599627370496, 9007199254740994.0,
                           9.2e18};
   const auto check = [](double value) {
     EXPECT_EQ(nearest(value), std::llround(value)) << value;

@@ -83,7 +83,7 @@ void add_line(const LayerRecord& record, const ManifestHead& head, bool first, s
 }  // namespace
 
 struct ManifestWriter::State {
-  static constexpr std::uint32_t kLines = 64;
+  static constexpr std::uint32_t kLines = 16;
   static constexpr std::chrono::seconds kPatience{1};
 
   write::File file;

@@ -101,7 +101,7 @@ class ManifestWriter {
   ManifestWriter& operator=(ManifestWriter&&) noexcept;
   ~ManifestWriter();
 
-  /// Buffers the line; it reaches the file within one second or 64 lines, whichever is first.
+  /// Buffers the line; it reaches the file within one second or 16 lines, whichever is first.
   Status append(const LayerRecord& record);
   /// Flushes the buffer, for an interrupted job.
   Status flush();
