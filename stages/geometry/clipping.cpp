@@ -100,9 +100,7 @@ class MiteredCurve {
     put(in.end, distance_ * out.nx, distance_ * out.ny);
   }
 
-  void put(const clip::IntPoint& at, double x, double y) {
-    curve_.emplace_back(at.X + std::llround(x), at.Y + std::llround(y));
-  }
+  void put(const clip::IntPoint& at, double x, double y) { curve_.emplace_back(at.X + nearest(x), at.Y + nearest(y)); }
 
   static constexpr double kSharpest = 0.5;  // 1 + cosine of a turn whose miter is twice the distance from the corner
 

@@ -25,21 +25,31 @@ inline constexpr auto kDigitPairs = [] {
   return pairs;
 }();
 
-/// Writes the last `count` digits of a number before `end`, two at a time. Returns their begin.
-inline char* put_digits_before(std::uint64_t value, int count, char* end) {
-  for (; count >= 2; count -= 2, value /= 100) {
-    end -= 2;
-    std::memcpy(end, &kDigitPairs[2 * (value % 100)], 2);
-  }
-  if (count > 0) *--end = static_cast<char>('0' + value % 10);
-  return end;
+/// Writes the two digits of a number below 100. Returns the end.
+inline char* put_pair(std::uint32_t value, char* out) {
+  std::memcpy(out, &kDigitPairs[2 * value], 2);
+  return out + 2;
 }
 
 /// Writes a whole number. Returns the end.
 inline char* put_whole(std::uint64_t value, char* out) {
-  int count = 1;
-  for (std::uint64_t rest = value; rest >= 10; rest /= 10) ++count;
-  put_digits_before(value, count, out + count);
+  if (value < 1000) {
+    const auto small = static_cast<std::uint32_t>(value);
+    if (small >= 100) *out++ = static_cast<char>('0' + small / 100);
+    if (small >= 10) return put_pair(small % 100, out);
+    *out = static_cast<char>('0' + small);
+    return out + 1;
+  }
+  char digits[20];
+  char* first = digits + sizeof digits;
+  for (; value >= 100; value /= 100) put_pair(static_cast<std::uint32_t>(value % 100), first -= 2);
+  if (value >= 10) {
+    put_pair(static_cast<std::uint32_t>(value), first -= 2);
+  } else {
+    *--first = static_cast<char>('0' + value);
+  }
+  const auto count = static_cast<std::size_t>(digits + sizeof digits - first);
+  std::memcpy(out, first, count);
   return out + count;
 }
 
@@ -54,7 +64,15 @@ char* put_fixed(std::int64_t value, char* out) {
   const auto rest = static_cast<std::uint32_t>(size % kUnit[kDecimals]);
   if (rest == 0) return out;
   *out++ = '.';
-  put_digits_before(rest, kDecimals, out + kDecimals);
+  std::uint32_t left = rest;
+  for (int at = kDecimals; at > 0; left /= 100) {
+    at -= 2;
+    if (at >= 0) {
+      put_pair(left % 100, out + at);
+    } else {
+      out[0] = static_cast<char>('0' + left);
+    }
+  }
   int used = kDecimals;
   while (out[used - 1] == '0') --used;
   return out + used;
