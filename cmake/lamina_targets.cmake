@@ -38,7 +38,7 @@ target_include_directories(lamina_stages PUBLIC $<BUILD_INTERFACE:${PROJECT_SOUR
 target_link_libraries(lamina_stages PUBLIC TBB::tbb Eigen3::Eigen fmt::fmt embree
                       PRIVATE TIFF::TIFF PNG::PNG ZLIB::ZLIB PkgConfig::LIBZIP PkgConfig::LIB3MF
                               PkgConfig::POLYCLIPPING PkgConfig::MUPARSER PkgConfig::XXHASH nlohmann_json::nlohmann_json)
-set_source_files_properties(${PROJECT_SOURCE_DIR}/stages/text/version.cpp PROPERTIES
+set_source_files_properties(${PROJECT_SOURCE_DIR}/stages/data/text/version.cpp PROPERTIES
                             COMPILE_DEFINITIONS LAMINA_VERSION="${PROJECT_VERSION}" SKIP_PRECOMPILE_HEADERS ON)
 
 # Profiles are read once a job.

@@ -8,8 +8,8 @@
 #include <map>
 #include <set>
 
+#include "stages/data/text/version.h"
 #include "stages/load/load.h"
-#include "stages/text/version.h"
 #include "stages/write/replaceable.h"
 
 namespace lamina::pipeline {

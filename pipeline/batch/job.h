@@ -12,7 +12,7 @@
 #include "pipeline/plan/progress.h"
 #include "stages/data/hash.h"
 #include "stages/data/status.h"
-#include "stages/text/json.h"
+#include "stages/data/text/json.h"
 
 namespace lamina::pipeline {
 

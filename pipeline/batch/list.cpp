@@ -8,9 +8,9 @@
 #include <filesystem>
 #include <fstream>
 
+#include "stages/data/text/readable.h"
+#include "stages/data/text/shell_words.h"
 #include "stages/load/load.h"
-#include "stages/text/readable.h"
-#include "stages/text/shell_words.h"
 
 namespace lamina::pipeline {
 namespace {

@@ -12,7 +12,7 @@
 #include <mutex>
 #include <thread>
 
-#include "stages/text/readable.h"
+#include "stages/data/text/readable.h"
 
 namespace lamina::pipeline {
 namespace {

@@ -6,7 +6,7 @@
 #include <filesystem>
 #include <utility>
 
-#include "stages/text/json.h"
+#include "stages/data/text/json.h"
 
 namespace lamina::pipeline {
 namespace {

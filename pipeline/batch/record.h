@@ -10,7 +10,7 @@
 #include "pipeline/batch/job.h"
 #include "stages/data/hash.h"
 #include "stages/data/status.h"
-#include "stages/text/json.h"
+#include "stages/data/text/json.h"
 #include "stages/write/journal.h"
 
 namespace lamina::pipeline {

@@ -7,8 +7,8 @@
 
 #include "pipeline/job/file.h"
 #include "pipeline/run/run.h"
+#include "stages/data/text/readable.h"
 #include "stages/segment/widths_table.h"
-#include "stages/text/readable.h"
 #include "stages/write/file.h"
 #include "stages/write/stl/block.h"
 

@@ -8,10 +8,10 @@
 #include <deque>
 
 #include "pipeline/cli/arguments.h"
-#include "stages/text/json_text.h"
-#include "stages/text/names.h"
-#include "stages/text/number_text.h"
-#include "stages/text/readable.h"
+#include "stages/data/text/json_text.h"
+#include "stages/data/text/names.h"
+#include "stages/data/text/number_text.h"
+#include "stages/data/text/readable.h"
 
 namespace lamina::pipeline {
 

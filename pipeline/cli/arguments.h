@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "stages/data/status.h"
-#include "stages/text/value.h"
+#include "stages/data/text/value.h"
 
 namespace lamina::pipeline {
 

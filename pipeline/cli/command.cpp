@@ -1,6 +1,6 @@
 #include "pipeline/cli/command.h"
-#include "stages/text/readable.h"
-#include "stages/text/version.h"
+#include "stages/data/text/readable.h"
+#include "stages/data/text/version.h"
 
 #include <fmt/format.h>
 #include <malloc.h>
@@ -12,8 +12,8 @@
 
 #include "pipeline/cli/console.h"
 #include "pipeline/cli/outputs.h"
-#include "stages/text/json_text.h"
-#include "stages/text/names.h"
+#include "stages/data/text/json_text.h"
+#include "stages/data/text/names.h"
 
 namespace lamina::pipeline {
 namespace {

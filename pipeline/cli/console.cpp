@@ -7,9 +7,9 @@
 #include <csignal>
 #include <cstring>
 
-#include "stages/text/json.h"
-#include "stages/text/json_text.h"
-#include "stages/text/terminal.h"
+#include "pipeline/cli/terminal.h"
+#include "stages/data/text/json.h"
+#include "stages/data/text/json_text.h"
 #include "stages/write/file.h"
 
 namespace lamina::pipeline {

@@ -10,7 +10,7 @@
 
 #include "pipeline/job/keys.h"
 #include "pipeline/job/old_forms.h"
-#include "stages/text/json_text.h"
+#include "stages/data/text/json_text.h"
 #include "stages/write/file.h"
 
 namespace lamina::pipeline {

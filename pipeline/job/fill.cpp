@@ -2,7 +2,7 @@
 #include "pipeline/job/fill.h"
 
 #include "pipeline/job/keys.h"
-#include "stages/text/ranges.h"
+#include "stages/data/text/ranges.h"
 
 namespace lamina::pipeline {
 namespace {

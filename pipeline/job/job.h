@@ -13,9 +13,9 @@
 #include "stages/data/choices.h"
 #include "stages/data/grid.h"
 #include "stages/data/status.h"
+#include "stages/data/text/changes.h"
 #include "stages/heights/settings.h"
 #include "stages/segment/settings.h"
-#include "stages/text/changes.h"
 
 namespace lamina::pipeline {
 

@@ -8,7 +8,7 @@
 
 #include "pipeline/job/job.h"
 #include "stages/data/choices.h"
-#include "stages/text/key.h"
+#include "stages/data/text/key.h"
 
 namespace lamina::pipeline {
 

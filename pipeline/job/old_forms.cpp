@@ -2,7 +2,7 @@
 
 #include <fmt/format.h>
 
-#include "stages/text/number_text.h"
+#include "stages/data/text/number_text.h"
 
 namespace lamina::pipeline {
 namespace {

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "stages/text/toml.h"
+#include "stages/data/text/toml.h"
 
 namespace lamina::pipeline {
 

@@ -7,10 +7,10 @@
 #include <vector>
 
 #include "pipeline/machine/profiles.h"
-#include "stages/text/json_text.h"
-#include "stages/text/key.h"
-#include "stages/text/names.h"
-#include "stages/text/readable.h"
+#include "stages/data/text/json_text.h"
+#include "stages/data/text/key.h"
+#include "stages/data/text/names.h"
+#include "stages/data/text/readable.h"
 
 namespace lamina::pipeline {
 

@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-#include "stages/text/value.h"
+#include "stages/data/text/value.h"
 
 namespace lamina::pipeline {
 namespace {

@@ -9,7 +9,7 @@
 #include "stages/data/machine.h"
 #include "stages/data/program.h"
 #include "stages/data/status.h"
-#include "stages/text/value.h"  // kMostMm
+#include "stages/data/text/value.h"  // kMostMm
 
 namespace lamina::pipeline {
 

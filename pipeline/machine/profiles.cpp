@@ -7,10 +7,10 @@
 #include <vector>
 
 #include "pipeline/job/decisions.h"
+#include "stages/data/text/json_text.h"
+#include "stages/data/text/names.h"
+#include "stages/data/text/readable.h"
 #include "stages/segment/calibration.h"
-#include "stages/text/json_text.h"
-#include "stages/text/names.h"
-#include "stages/text/readable.h"
 #include "stages/write/program/dialect.h"
 
 namespace lamina::pipeline {

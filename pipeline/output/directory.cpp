@@ -11,7 +11,7 @@
 #include <tuple>
 
 #include "pipeline/job/decisions.h"
-#include "stages/text/number_text.h"
+#include "stages/data/text/number_text.h"
 #include "stages/write/file.h"
 #include "stages/write/image_format.h"
 #include "stages/write/manifest/manifest.h"

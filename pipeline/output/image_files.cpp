@@ -10,7 +10,7 @@
 #include "pipeline/machine/profiles.h"
 #include "pipeline/output/directory.h"
 #include "pipeline/output/resume.h"
-#include "stages/text/version.h"
+#include "stages/data/text/version.h"
 #include "stages/write/file.h"
 #include "stages/write/program/dialect.h"
 

@@ -3,7 +3,7 @@
 #include <filesystem>
 
 #include "pipeline/job/file.h"
-#include "stages/text/version.h"
+#include "stages/data/text/version.h"
 
 namespace lamina::pipeline {
 

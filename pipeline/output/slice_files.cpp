@@ -7,7 +7,7 @@
 #include "pipeline/job/file.h"
 #include "pipeline/output/plan_head.h"
 #include "pipeline/output/slice_directory.h"
-#include "stages/text/version.h"
+#include "stages/data/text/version.h"
 #include "stages/write/file.h"
 
 namespace lamina::pipeline {

@@ -13,8 +13,8 @@
 #include "pipeline/plan/layer_cut.h"
 #include "pipeline/plan/layers.h"
 #include "pipeline/plan/reach.h"
+#include "stages/data/text/number_text.h"
 #include "stages/heights/build_steps.h"
-#include "stages/text/number_text.h"
 #include "stages/write/extrusion_format.h"
 #include "stages/write/image_format.h"
 

@@ -4,8 +4,8 @@
 
 #include "pipeline/job/keys.h"
 #include "pipeline/plan/segment.h"
+#include "stages/data/text/ranges.h"
 #include "stages/segment/resolve.h"
-#include "stages/text/ranges.h"
 
 namespace lamina::pipeline {
 namespace {

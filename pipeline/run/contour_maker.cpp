@@ -7,8 +7,8 @@
 
 #include "pipeline/output/slice_files.h"
 #include "pipeline/run/path_layer.h"
-#include "stages/text/number_text.h"
-#include "stages/text/readable.h"
+#include "stages/data/text/number_text.h"
+#include "stages/data/text/readable.h"
 
 namespace lamina::pipeline {
 namespace {

@@ -4,8 +4,8 @@
 
 #include <nlohmann/json.hpp>
 
-#include "stages/text/number_text.h"
-#include "stages/text/readable.h"
+#include "stages/data/text/number_text.h"
+#include "stages/data/text/readable.h"
 
 namespace lamina::pipeline {
 namespace {

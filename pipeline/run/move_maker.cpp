@@ -8,7 +8,7 @@
 
 #include "pipeline/output/toolpath_file.h"
 #include "pipeline/run/path_layer.h"
-#include "stages/text/readable.h"
+#include "stages/data/text/readable.h"
 #include "stages/write/gcode/gcode.h"
 
 namespace lamina::pipeline {

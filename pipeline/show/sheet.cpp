@@ -8,8 +8,8 @@
 
 #include "pipeline/show/series.h"
 #include "pipeline/show/swath.h"
+#include "stages/data/text/readable.h"
 #include "stages/read/image.h"
-#include "stages/text/readable.h"
 #include "stages/write/manifest/manifest.h"
 #include "stages/write/picture/canvas.h"  // have_font
 #include "stages/write/picture/contact_sheet.h"

@@ -10,7 +10,7 @@
 #include <optional>
 #include <string_view>
 
-#include "stages/text/readable.h"
+#include "stages/data/text/readable.h"
 
 namespace lamina::read {
 namespace {

@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <fstream>
 
-#include "stages/text/number_text.h"
-#include "stages/text/table.h"
+#include "stages/data/text/number_text.h"
+#include "stages/data/text/table.h"
 
 namespace lamina::segment {
 namespace {

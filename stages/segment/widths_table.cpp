@@ -5,10 +5,10 @@
 #include <algorithm>
 #include <fstream>
 
-#include "stages/text/names.h"
-#include "stages/text/readable.h"
-#include "stages/text/table.h"
-#include "stages/text/value.h"
+#include "stages/data/text/names.h"
+#include "stages/data/text/readable.h"
+#include "stages/data/text/table.h"
+#include "stages/data/text/value.h"
 
 namespace lamina::segment {
 namespace {

@@ -10,7 +10,7 @@
 #include "pipeline/cli/command.h"
 #include "pipeline/cli/help/help.h"
 #include "pipeline/machine/profiles.h"
-#include "stages/text/number_text.h"
+#include "stages/data/text/number_text.h"
 #include "tests/commands/program.h"
 
 namespace lamina::test {

@@ -6,7 +6,7 @@
 #include "pipeline/job/file.h"
 #include "pipeline/machine/powder_printer.h"
 #include "stages/data/hash.h"
-#include "stages/text/version.h"
+#include "stages/data/text/version.h"
 #include "stages/write/manifest/manifest.h"
 #include "tests/commands/program.h"
 

@@ -11,12 +11,12 @@
 #include "pipeline/batch/summary.h"
 #include "pipeline/cli/command.h"
 #include "pipeline/cli/console.h"
+#include "pipeline/cli/terminal.h"
 #include "pipeline/job/file.h"
-#include "stages/text/json.h"
-#include "stages/text/number_text.h"
-#include "stages/text/readable.h"
-#include "stages/text/shell_words.h"
-#include "stages/text/terminal.h"
+#include "stages/data/text/json.h"
+#include "stages/data/text/number_text.h"
+#include "stages/data/text/readable.h"
+#include "stages/data/text/shell_words.h"
 #include "stages/write/file.h"
 
 namespace lamina::pipeline {

@@ -3,8 +3,8 @@
 
 #include "pipeline/calibrate/calibrate.h"
 #include "pipeline/cli/command.h"
-#include "stages/text/json.h"
-#include "stages/text/readable.h"
+#include "stages/data/text/json.h"
+#include "stages/data/text/readable.h"
 #include "stages/write/file.h"
 
 namespace lamina::pipeline {

@@ -8,9 +8,9 @@
 #include "pipeline/job/file.h"
 #include "pipeline/job/heights.h"
 #include "pipeline/plan/heights.h"
+#include "stages/data/text/value.h"
 #include "stages/heights/study/study_plot.h"
 #include "stages/heights/study/study_text.h"
-#include "stages/text/value.h"
 #include "stages/write/file.h"
 #include "stages/write/manifest/manifest.h"  // title_of
 #include "stages/write/rp3/rp3.h"

@@ -5,8 +5,8 @@
 #include "pipeline/cli/command.h"
 #include "pipeline/cli/keys.h"
 #include "pipeline/plan/scene.h"
+#include "stages/data/text/json.h"
 #include "stages/load/info/info.h"
-#include "stages/text/json.h"
 
 namespace lamina::pipeline {
 namespace {

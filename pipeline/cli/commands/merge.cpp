@@ -2,8 +2,8 @@
 
 #include "pipeline/cli/command.h"
 #include "pipeline/output/merge.h"
-#include "stages/text/json.h"
-#include "stages/text/readable.h"
+#include "stages/data/text/json.h"
+#include "stages/data/text/readable.h"
 
 namespace lamina::pipeline {
 namespace {

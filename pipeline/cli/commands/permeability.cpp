@@ -5,9 +5,9 @@
 
 #include "pipeline/cli/command.h"
 #include "pipeline/cli/plot_file.h"
+#include "stages/data/text/json.h"
+#include "stages/data/text/readable.h"
 #include "stages/segment/flows.h"
-#include "stages/text/json.h"
-#include "stages/text/readable.h"
 
 namespace lamina::pipeline {
 namespace {

@@ -13,7 +13,7 @@
 #include "pipeline/machine/extruder.h"
 #include "pipeline/machine/profiles.h"
 #include "pipeline/run/run_resolved.h"
-#include "stages/text/json.h"
+#include "stages/data/text/json.h"
 #include "stages/write/image_format.h"
 
 namespace lamina::pipeline {

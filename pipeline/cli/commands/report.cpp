@@ -4,7 +4,7 @@
 
 #include "pipeline/cli/command.h"
 #include "pipeline/show/report.h"
-#include "stages/text/readable.h"
+#include "stages/data/text/readable.h"
 #include "stages/write/file.h"
 
 namespace lamina::pipeline {

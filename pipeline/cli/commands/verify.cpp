@@ -4,9 +4,9 @@
 
 #include "pipeline/check/verify.h"
 #include "pipeline/cli/command.h"
-#include "stages/text/json.h"
-#include "stages/text/json_text.h"
-#include "stages/text/readable.h"
+#include "stages/data/text/json.h"
+#include "stages/data/text/json_text.h"
+#include "stages/data/text/readable.h"
 
 namespace lamina::pipeline {
 namespace {

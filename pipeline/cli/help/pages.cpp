@@ -6,9 +6,9 @@
 #include <string_view>
 
 #include "pipeline/cli/help/help.h"
-#include "stages/text/escape.h"
-#include "stages/text/number_text.h"
-#include "stages/text/version.h"
+#include "stages/data/text/escape.h"
+#include "stages/data/text/number_text.h"
+#include "stages/data/text/version.h"
 
 namespace lamina::pipeline {
 namespace {

@@ -6,8 +6,8 @@
 #include <fstream>
 #include <utility>
 
+#include "stages/data/text/number_text.h"
 #include "stages/heights/per_part.h"
-#include "stages/text/number_text.h"
 
 namespace lamina::heights {
 namespace {

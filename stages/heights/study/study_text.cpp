@@ -7,8 +7,8 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
-#include "stages/text/number_text.h"
-#include "stages/text/readable.h"
+#include "stages/data/text/number_text.h"
+#include "stages/data/text/readable.h"
 
 namespace lamina::heights {
 namespace {

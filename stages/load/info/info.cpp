@@ -8,9 +8,9 @@
 #include <nlohmann/json.hpp>
 #include <vector>
 
+#include "stages/data/text/json_text.h"
+#include "stages/data/text/readable.h"
 #include "stages/load/repair/diagnose.h"
-#include "stages/text/json_text.h"
-#include "stages/text/readable.h"
 
 namespace lamina::load {
 namespace {

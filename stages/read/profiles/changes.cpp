@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-#include "stages/text/number_text.h"
+#include "stages/data/text/number_text.h"
 
 namespace lamina::read {
 

@@ -6,7 +6,7 @@
 #include <utility>
 #include <vector>
 
-#include "stages/text/toml.h"
+#include "stages/data/text/toml.h"
 
 namespace lamina::read {
 

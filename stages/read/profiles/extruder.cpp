@@ -1,5 +1,5 @@
 #include "stages/read/profiles/extruder.h"
-#include "stages/text/readable.h"
+#include "stages/data/text/readable.h"
 
 #include <fmt/format.h>
 

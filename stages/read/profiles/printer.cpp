@@ -4,11 +4,11 @@
 
 #include <algorithm>
 
+#include "stages/data/text/json_text.h"
+#include "stages/data/text/key.h"
+#include "stages/data/text/names.h"
+#include "stages/data/text/readable.h"
 #include "stages/read/profiles/sections.h"
-#include "stages/text/json_text.h"
-#include "stages/text/key.h"
-#include "stages/text/names.h"
-#include "stages/text/readable.h"
 
 namespace lamina::read {
 namespace {

@@ -7,9 +7,9 @@
 #include <string>
 #include <string_view>
 
-#include "stages/text/json_text.h"
-#include "stages/text/key.h"
-#include "stages/text/readable.h"
+#include "stages/data/text/json_text.h"
+#include "stages/data/text/key.h"
+#include "stages/data/text/readable.h"
 
 namespace lamina::read {
 

@@ -14,7 +14,7 @@
 
 #include "stages/data/hash.h"
 #include "stages/data/layer.h"
-#include "stages/text/json_text.h"
+#include "stages/data/text/json_text.h"
 
 namespace lamina {
 

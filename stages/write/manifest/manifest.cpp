@@ -8,7 +8,7 @@
 #include <optional>
 #include <utility>
 
-#include "stages/text/number_text.h"
+#include "stages/data/text/number_text.h"
 #include "stages/write/file.h"
 #include "stages/write/manifest/manifest_head.h"
 #include "stages/write/manifest/manifest_line.h"

@@ -3,7 +3,7 @@
 
 #include <fstream>
 
-#include "stages/text/readable.h"
+#include "stages/data/text/readable.h"
 #include "stages/write/manifest/manifest.h"
 #include "stages/write/manifest/manifest_head.h"
 #include "stages/write/manifest/manifest_line.h"

@@ -9,7 +9,7 @@
 
 #include "pipeline/job/keys.h"
 #include "pipeline/plan/fill.h"
-#include "stages/text/toml.h"
+#include "stages/data/text/toml.h"
 #include "tests/commands/program.h"
 
 namespace lamina::test {

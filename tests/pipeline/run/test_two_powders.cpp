@@ -16,10 +16,10 @@
 #include "pipeline/machine/materials.h"
 #include "pipeline/output/merge.h"
 #include "pipeline/run/run.h"
+#include "stages/data/text/toml.h"
 #include "stages/raster/materials.h"
 #include "stages/read/image.h"
 #include "stages/read/profiles/printer.h"
-#include "stages/text/toml.h"
 #include "stages/write/manifest/manifest.h"
 
 namespace lamina::pipeline {

@@ -1,0 +1,45 @@
+#include "stages/data/text/names.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <vector>
+
+namespace lamina {
+namespace {
+
+// Levenshtein's distance.
+std::size_t edits(std::string_view a, std::string_view b) {
+  std::vector<std::size_t> row(b.size() + 1);
+  for (std::size_t j = 0; j <= b.size(); ++j) row[j] = j;
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    std::size_t diagonal = row[0];
+    row[0] = i + 1;
+    for (std::size_t j = 0; j < b.size(); ++j) {
+      const std::size_t replaced = diagonal + (a[i] == b[j] ? 0 : 1);
+      diagonal = row[j + 1];
+      row[j + 1] = std::min({replaced, row[j] + 1, row[j + 1] + 1});
+    }
+  }
+  return row.back();
+}
+
+}  // namespace
+
+std::string suggest(std::string_view mistyped, std::span<const std::string_view> known) {
+  if (mistyped.size() > 100) return {};
+  std::string_view nearest;
+  std::size_t distance = mistyped.size() / 3 + 2;
+  for (const std::string_view name : known) {
+    // Half a name counts as near: --lay, thickness.
+    const bool half = mistyped.size() >= 4 && name.find(mistyped) != std::string_view::npos;
+    const std::size_t edits_away = half ? 1 : edits(mistyped, name);
+    if (edits_away < distance && edits_away < name.size()) {
+      distance = edits_away;
+      nearest = name;
+    }
+  }
+  return nearest.empty() ? std::string() : fmt::format("; did you mean '{}'?", nearest);
+}
+
+}  // namespace lamina
