@@ -1,0 +1,229 @@
+"""Jobs of every command that writes: how each begins, how it goes on after a kill, and what it leaves."""
+import dataclasses
+import hashlib
+import json
+import os
+import shutil
+import subprocess
+import time
+
+ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
+CORPUS = os.path.join(ROOT, "tests", "corpus")
+NIST = os.path.join(CORPUS, "nist_am_test_artifact_v3b.stl")
+NUT = os.path.join(CORPUS, "parameter_quality_nut.stl")
+CROWN = os.path.join(CORPUS, "dental_crown.stl")
+LONGEST = 120  # seconds after which a command counts as hanging
+
+
+@dataclasses.dataclass
+class Job:
+    """A command that writes `out` or files that begin so, in the folder in which it runs."""
+    name: str
+    begin: list                # arguments of the first run
+    go_on: list                # of the run after a kill: --resume where the command has it, else --overwrite or nothing
+    other: list = None         # another job of the same command and output
+    before: list = dataclasses.field(default_factory=list)  # commands whose results the job reads
+    unlike: tuple = ()         # names of files that hold times, so that two runs differ in them
+    counts_layers: bool = False  # its --json names the layers that a second run keeps
+    ends: int = 0              # exit code of a whole run
+    when_done: int = None      # exit code of going on with what is finished, if it is another one
+    cut_short: list = dataclasses.field(default_factory=list)  # commands of `before` that are killed too
+
+
+def jet(name, arguments, other_part=NUT):
+    common = ["-o", "out", "--json"]
+    return Job(name, ["jet", *arguments, *common], ["jet", *arguments, *common, "--resume"],
+               other=["jet", other_part, *arguments[1:], *common], counts_layers=True)
+
+
+def over_another():
+    old = ["jet", NUT, "--dpi", "200", "--layer", "0.5", "-o", "out", "--quiet"]
+    new = ["jet", NIST, "--dpi", "300", "--layer", "0.1", "-o", "out", "--json"]
+    return Job("jet over an older job", [*new, "--overwrite"], [*new, "--overwrite"], before=[old])
+
+
+def again(name, arguments, other_part=NUT, out="out"):
+    """A command that starts anew."""
+    common = ["-o", out, "--quiet"]
+    return Job(name, [*arguments, *common], [*arguments, *common, "--overwrite"],
+               other=[arguments[0], other_part, *arguments[2:], *common])
+
+
+def resumed(name, arguments, other_part=NUT, out="out"):
+    common = ["-o", out, "--json"]
+    return Job(name, [*arguments, *common], [*arguments, *common, "--resume"],
+               other=[arguments[0], other_part, *arguments[2:], *common], counts_layers=out == "out")
+
+
+def merged():
+    shards = [["jet", NIST, "--dpi", "300", "--layer", "0.1", "--shard", f"{i}/4", "-o", f"s{i}", "--quiet"] for i in (1, 2, 3, 4)]
+    merge = ["merge", "s1", "s2", "s3", "s4", "-o", "out", "--quiet"]
+    return Job("merge of 4 shards", merge, merge, before=shards)
+
+
+def sharded():
+    """Shards in one directory, each cut short and begun again, then merged there."""
+    shards = [["jet", NIST, "--dpi", "300", "--layer", "0.1", "--shard", f"{i}/3", "-o", "out", "--quiet"] for i in (1, 2, 3)]
+    merge = ["merge", "out", "-o", "out", "--quiet"]
+    return Job("shards in one directory", merge, merge, cut_short=[[*shard, "--resume"] for shard in shards])
+
+
+def reported():
+    job = ["jet", NIST, "--dpi", "300", "--layer", "0.1", "-o", "job", "--quiet"]
+    report = ["report", "job", "-o", "out.html", "--quiet"]
+    return Job("report", report, report, before=[job])
+
+
+def calibrated():
+    begin = ["calibrate", "--machine", "anet-a8", "-o", "out", "--quiet"]
+    # Its widths.csv may hold measurements by now.
+    return Job("calibrate", begin, [*begin, "--overwrite"], other=["calibrate", "--machine", "marlin", "-o", "out", "--quiet"],
+               when_done=2)
+
+
+def batch():
+    begin = ["batch", os.path.join(CORPUS, "broken"), CROWN, NUT, "--with", "jet --dpi 100 --layer 0.5 --bed 600x600",
+             "-o", "out", "--quiet"]
+    return Job("batch of the corpus", begin, [*begin, "--resume"], unlike=("summary.json", "summary.tsv", "batch.jsonl"), ends=3)
+
+
+def plotted():
+    begin = ["heights", NIST, "--heights", "cusp", "--thickness", "0.05..0.3", "--cusp", "0.02", "-o", "out.tsv", "--quiet"]
+    return Job("heights", begin, begin)
+
+
+def previewed():
+    job = ["jet", NIST, "--dpi", "300", "--layer", "0.5", "-o", "job", "--quiet"]
+    draw = ["preview", "job", "--layer", "12", "-o", "out.png", "--quiet"]
+    return Job("preview", draw, draw, before=[job])
+
+
+def all_jobs():
+    nuferbj = ["--machine", "nuferbj", "--layer", "0.5"]
+    filled = ["--dpi", "300", "--layer", "0.25", "--fill", "segmented", "--shell", "1"]
+    lines = ["--layer", "0.3", "--pattern", "raster", "--bead", "0.4"]
+    return [
+        jet("jet, tiff", [NIST, "--dpi", "300", "--layer", "0.05"]),
+        jet("jet, print program", [NUT, *nuferbj], CROWN),
+        jet("jet, two materials", [NUT, CROWN, "--material", "steel,bronze", "--bed", "60x40", "--dpi", "600", "--layer", "0.05"], CROWN),
+        jet("jet, segmented with shell", [NUT, *filled, "--bed", "60x60"], CROWN),
+        over_another(),
+        resumed("slice, svg with filling", ["slice", NIST, *lines]),
+        resumed("slice, a file a layer", ["slice", NIST, "--layer", "0.1", "--file-a-layer"]),
+        resumed("slice, cli-binary", ["slice", NIST, *lines, "--format", "cli-binary"]),
+        again("slice, 3mf", ["slice", NIST, "--layer", "0.1", "--format", "3mf"]),
+        resumed("extrude, segmented", ["extrude", NUT, "--machine", "anet-a8", "--layer", "0.3", "--fill", "segmented",
+                                       "--scale", "2"], CROWN, "out.gcode"),
+        batch(), merged(), sharded(), reported(), calibrated(), plotted(), previewed(),
+    ]
+
+
+def going_on_ends(job, files, ref):
+    """The exit code that a run after these files has to have."""
+    return job.when_done if job.when_done is not None and files == ref.files else job.ends
+
+
+def tree(folder):
+    """Every file below a folder with its hash; links and pipes by their kind."""
+    found = {}
+    for base, _, names in os.walk(folder):
+        for name in names:
+            path = os.path.join(base, name)
+            key = os.path.relpath(path, folder)
+            if not os.path.isfile(path) or os.path.islink(path):
+                found[key] = "special"
+                continue
+            with open(path, "rb") as file:
+                found[key] = hashlib.md5(file.read()).hexdigest()
+    return found
+
+
+def outputs(folder, job):
+    """What the job wrote: `out`, `out.*` and whatever else lies there that none of its predecessors wrote."""
+    made = {word for words in (*job.before, *job.cut_short) for word in words} - {"out"}
+    return {name: value for name, value in tree(folder).items()
+            if name.split(os.sep)[0] not in made and os.path.basename(name) not in job.unlike}
+
+
+@dataclasses.dataclass
+class Ran:
+    code: int      # that of the program; negative for a signal; None if it hung and was killed
+    seconds: float
+    out: str
+    error: str
+
+    @property
+    def aborted(self):
+        return self.code is not None and (self.code in (-6, -11, -7, -4, -8, 1, 134, 139) or "terminate called" in self.error)
+
+    def summary(self):
+        try:
+            return json.loads(self.out)
+        except ValueError:
+            return {}
+
+
+class Program:
+    def __init__(self, path):
+        self.path = os.path.abspath(path)
+
+    def start(self, words, folder, **options):
+        return subprocess.Popen([self.path, *words], cwd=folder, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
+                                stderr=subprocess.PIPE, text=True, errors="replace", **options)
+
+    def end(self, process, since, longest=LONGEST):
+        try:
+            out, error = process.communicate(timeout=longest)
+            return Ran(process.returncode, time.monotonic() - since, out, error)
+        except subprocess.TimeoutExpired:
+            process.kill()
+            process.communicate()
+            return Ran(None, longest, "", "hangs")
+
+    def run(self, words, folder, longest=LONGEST, **options):
+        since = time.monotonic()
+        return self.end(self.start(words, folder, **options), since, longest)
+
+    def run_and_signal(self, words, folder, seconds, signal):
+        since = time.monotonic()
+        process = self.start(words, folder)
+        try:
+            process.wait(timeout=seconds)
+        except subprocess.TimeoutExpired:
+            process.send_signal(signal)
+        return self.end(process, since)
+
+
+def fresh(folder):
+    shutil.rmtree(folder, ignore_errors=True)
+    os.makedirs(folder)
+    return folder
+
+
+@dataclasses.dataclass
+class Reference:
+    files: dict        # of the uninterrupted run
+    seconds: float
+    in_flight: int     # layers at once at most, 0 where the command does not tell
+
+
+def reference(program, job, folder):
+    """The uninterrupted run, three times: their bytes have to agree."""
+    files, seconds, in_flight = None, [], 0
+    for _ in range(3):
+        fresh(folder)
+        for words in (*job.before, *job.cut_short):
+            ran = program.run(words, folder)
+            assert ran.code == 0, f"{job.name}: {' '.join(words)}: {ran.code} {ran.error}"
+        ran = program.run(job.begin, folder)
+        assert ran.code == job.ends, f"{job.name}: {' '.join(job.begin)}: {ran.code} {ran.error}"
+        now = outputs(folder, job)
+        assert files in (None, now), f"{job.name}: two whole runs differ"
+        files = now
+        seconds.append(ran.seconds)
+        in_flight = max(in_flight, ran.summary().get("most_layers_in_flight", 0))
+    return Reference(files, sorted(seconds)[1], in_flight)
+
+
+def layer_files(files):
+    return sum(1 for name in files if name.startswith(os.path.join("out", "layers")) and "." in os.path.basename(name))
