@@ -2,156 +2,147 @@
 
 #include <fmt/format.h>
 
-#include <array>
-#include <cstring>
+#include <utility>
 
-#include "stages/data/handles/lib3mf.h"
+#include "stages/write/decimal.h"
 #include "stages/write/file.h"
+#include "stages/write/package/threemf_package.h"
 
 namespace lamina::write {
 namespace {
 
-using Handle = Lib3mfHandle;
+constexpr std::size_t kEnoughText = std::size_t{64} << 10;
 
-Error refused(std::string_view what, const Handle& handle) {
-  return {Fault::kOutput, fmt::format("3MF: {} failed: {}", what, handle.last_error())};
+/// A polygon's segments lead from vertex to vertex, the last one back to the first.
+void put_polygon(std::uint64_t first, std::uint64_t count, Buffer<char>& text) {
+  append(text, "<s:polygon");
+  append_attribute(text, "startv", first);
+  append(text, ">");
+  for (std::uint64_t i = 1; i <= count; ++i) {
+    append(text, "<s:segment");
+    append_attribute(text, "v2", first + i % count);
+    append(text, "/>");
+  }
+  append(text, "</s:polygon>\n");
 }
-
-/// The library would draw random ones; the same slices shall give the same bytes. Version 8: of our own making (RFC 9562).
-std::string uuid(std::uint32_t kind, std::size_t number) {
-  return fmt::format("6c616d69-6e61-8000-8000-{:04x}{:08x}", kind, number);
-}
-
-float float_mm(std::int64_t nm) { return static_cast<float>(mm(nm)); }
 
 /// The box that stands for a body where slices say what it is (mesh resolution "lowres").
-Status set_box(const Handle& object, const Box& box, std::int64_t left, std::int64_t front) {
-  std::array<NMR::MODELMESHVERTEX, 8> vertices{};
-  for (std::size_t i = 0; i < 8; ++i) {
-    vertices[i].m_fPosition[0] = float_mm(((i & 1) != 0 ? box.hi.x : box.lo.x) - left);
-    vertices[i].m_fPosition[1] = float_mm(((i & 2) != 0 ? box.hi.y : box.lo.y) - front);
-    vertices[i].m_fPosition[2] = float_mm((i & 4) != 0 ? box.hi.z : box.lo.z);
+void put_box(const Box& box, std::int64_t left, std::int64_t front, Buffer<char>& text) {
+  append(text, "<mesh><vertices>\n");
+  for (std::uint32_t i = 0; i < 8; ++i) {
+    append(text, "<vertex");
+    append_attribute_mm(text, "x", ((i & 1) != 0 ? box.hi.x : box.lo.x) - left);
+    append_attribute_mm(text, "y", ((i & 2) != 0 ? box.hi.y : box.lo.y) - front);
+    append_attribute_mm(text, "z", (i & 4) != 0 ? box.hi.z : box.lo.z);
+    append(text, "/>\n");
   }
-  constexpr DWORD kFaces[12][3] = {{0, 2, 3}, {0, 3, 1}, {4, 5, 7}, {4, 7, 6}, {0, 1, 5}, {0, 5, 4},
-                                   {2, 6, 7}, {2, 7, 3}, {0, 4, 6}, {0, 6, 2}, {1, 3, 7}, {1, 7, 5}};
-  std::array<NMR::MODELMESHTRIANGLE, 12> triangles{};
-  for (std::size_t i = 0; i < 12; ++i) std::copy(std::begin(kFaces[i]), std::end(kFaces[i]), triangles[i].m_nIndices);
-  if (NMR::lib3mf_meshobject_setgeometry(object.get(), vertices.data(), 8, triangles.data(), 12) != LIB3MF_OK) {
-    return refused("a mesh", object);
+  append(text, "</vertices><triangles>\n");
+  constexpr std::uint8_t kFaces[12][3] = {{0, 2, 3}, {0, 3, 1}, {4, 5, 7}, {4, 7, 6}, {0, 1, 5}, {0, 5, 4},
+                                          {2, 6, 7}, {2, 7, 3}, {0, 4, 6}, {0, 6, 2}, {1, 3, 7}, {1, 7, 5}};
+  for (const auto& face : kFaces) {
+    append(text, "<triangle");
+    append_attribute(text, "v1", face[0]);
+    append_attribute(text, "v2", face[1]);
+    append_attribute(text, "v3", face[2]);
+    append(text, "/>\n");
   }
-  return {};
-}
-
-/// The package as the library writes it: it goes back to fill in lengths.
-struct Package {
-  Buffer<std::byte> bytes;
-  std::size_t at = 0;
-};
-
-std::uint32_t write_piece(const BYTE* data, std::uint32_t size, void* user) {
-  auto& package = *static_cast<Package*>(user);
-  if (package.bytes.size() < package.at + size) package.bytes.resize(package.at + size);
-  std::memcpy(package.bytes.data() + package.at, data, size);
-  package.at += size;
-  return 0;
-}
-
-std::uint32_t seek_piece(std::uint64_t position, void* user) {
-  static_cast<Package*>(user)->at = position;
-  return 0;
+  append(text, "</triangles></mesh>");
 }
 
 }  // namespace
 
-struct Slice3mfWriter::State {
-  Handle model;
-  std::int64_t left = 0, front = 0;  // nm, whole mm: where the items stand, and what their coordinates count from
-  std::vector<Handle> stacks;        // one for each body
-};
-
-Slice3mfWriter::Slice3mfWriter() : state_(std::make_unique<State>()) {}
-Slice3mfWriter::Slice3mfWriter(Slice3mfWriter&&) noexcept = default;
-Slice3mfWriter::~Slice3mfWriter() = default;
-
-Result<Slice3mfWriter> Slice3mfWriter::make(const SliceHead& head) {
-  Slice3mfWriter writer;
-  Handle& model = writer.state_->model;
-  if (NMR::lib3mf_createmodel(model.out()) != LIB3MF_OK) return refused("a model", model);
-  if (NMR::lib3mf_model_setunit(model.get(), NMR::MODELUNIT_MILLIMETER) != LIB3MF_OK) return refused("the unit", model);
-  if (NMR::lib3mf_model_setbuilduuidutf8(model.get(), uuid(0, 0).c_str()) != LIB3MF_OK) return refused("a UUID", model);
-  // The library writes six significant digits: the less they have to tell, the finer they are.
-  State& state = *writer.state_;
-  state.left = floor_div<std::int64_t>(head.bounds.lo.x, kNmPerMm) * kNmPerMm;
-  state.front = floor_div<std::int64_t>(head.bounds.lo.y, kNmPerMm) * kNmPerMm;
-  NMR::MODELTRANSFORM place{};
-  for (std::size_t i = 0; i < 3; ++i) place.m_fFields[i][i] = 1;
-  place.m_fFields[0][3] = float_mm(state.left);
-  place.m_fFields[1][3] = float_mm(state.front);
-  std::size_t number = 0;
-  for (const std::string& name : head.parts) {
-    ++number;
-    Handle stack, object, item;
-    if (NMR::lib3mf_model_addslicestack(model.get(), float_mm(head.first_bottom), stack.out()) != LIB3MF_OK) {
-      return refused("a slice stack", model);
-    }
-    if (NMR::lib3mf_model_addmeshobject(model.get(), object.out()) != LIB3MF_OK) return refused("an object", model);
-    if (auto status = set_box(object, head.bounds, state.left, state.front); !status) return status.error();
-    if (NMR::lib3mf_object_setnameutf8(object.get(), name.c_str()) != LIB3MF_OK) return refused("a name", object);
-    if (NMR::lib3mf_object_setuuidutf8(object.get(), uuid(1, number).c_str()) != LIB3MF_OK) return refused("a UUID", object);
-    if (NMR::lib3mf_meshobject_setslicestack(object.get(), stack.get()) != LIB3MF_OK) return refused("a stack", object);
-    if (NMR::lib3mf_meshobject_setslicesmeshresolution(object.get(), NMR::MODELSLICESMESHRESOLUTION_LOW) != LIB3MF_OK) {
-      return refused("the mesh resolution", object);
-    }
-    if (NMR::lib3mf_model_addbuilditem(model.get(), object.get(), &place, item.out()) != LIB3MF_OK) {
-      return refused("a build item", model);
-    }
-    if (NMR::lib3mf_builditem_setuuidutf8(item.get(), uuid(2, number).c_str()) != LIB3MF_OK) return refused("a UUID", item);
-    writer.state_->stacks.push_back(std::move(stack));
-  }
-  return writer;
+Slice3mfWriter::Slice3mfWriter(const SliceHead& head)
+    : bounds_(head.bounds),
+      first_bottom_(head.first_bottom),
+      left_(floor_div<std::int64_t>(head.bounds.lo.x, kNmPerMm) * kNmPerMm),
+      front_(floor_div<std::int64_t>(head.bounds.lo.y, kNmPerMm) * kNmPerMm) {
+  for (const std::string& name : head.parts) bodies_.push_back({name, {}, {}});
 }
 
+Result<Slice3mfWriter> Slice3mfWriter::make(const SliceHead& head) { return Slice3mfWriter(head); }
+
 Status Slice3mfWriter::add(const SliceLayer& layer) {
-  std::vector<NMR::MODELSLICEVERTEX> vertices;
-  std::vector<DWORD> indices;
-  for (std::size_t b = 0; b < state_->stacks.size(); ++b) {
-    const Handle& stack = state_->stacks[b];
-    Handle slice;
-    const float top = float_mm(std::int64_t{layer.layer.bottom} + layer.layer.thickness);
-    if (NMR::lib3mf_slicestack_addslice(stack.get(), top, slice.out()) != LIB3MF_OK) return refused("a slice", stack);
-    for (std::uint32_t c = layer.body[b]; c < layer.body[b + 1]; ++c) {
-      vertices.clear();
-      for (const Point2 p : layer.contours[c])
-        vertices.push_back({{float_mm(p.x - state_->left), float_mm(p.y - state_->front)}});
-      DWORD first = 0, polygon = 0;
-      const auto count = static_cast<DWORD>(vertices.size());
-      if (NMR::lib3mf_slice_addvertices(slice.get(), vertices.data(), count, &first) != LIB3MF_OK) {
-        return refused("vertices", slice);
-      }
-      indices.clear();
-      for (DWORD i = 0; i < count; ++i) indices.push_back(first + i);
-      indices.push_back(first);  // closed
-      if (NMR::lib3mf_slice_addpolygon(slice.get(), indices.data(), count + 1, &polygon) != LIB3MF_OK) {
-        return refused("a polygon", slice);
+  for (std::size_t b = 0; b < bodies_.size(); ++b) {
+    Buffer<char>& text = bodies_[b].waiting;
+    append(text, "<s:slice");
+    append_attribute_mm(text, "ztop", std::int64_t{layer.layer.bottom} + layer.layer.thickness);
+    const std::uint32_t begin = layer.body[b], end = layer.body[b + 1];
+    append(text, begin == end ? "/>\n" : "><s:vertices>\n");
+    for (std::uint32_t c = begin; c < end; ++c) {
+      for (const Point2 p : layer.contours[c]) {
+        append(text, "<s:vertex");
+        append_attribute_mm(text, "x", p.x - left_);
+        append_attribute_mm(text, "y", p.y - front_);
+        append(text, "/>\n");
       }
     }
+    if (begin < end) append(text, "</s:vertices>\n");
+    std::uint64_t first = 0;
+    for (std::uint32_t c = begin; c < end; ++c) {
+      const std::uint64_t count = layer.contours[c].size();
+      put_polygon(first, count, text);
+      first += count;
+    }
+    if (begin < end) append(text, "</s:slice>\n");
+    if (text.size() < kEnoughText) continue;
+    if (Status status = deflate_onto(bodies_[b].slices, {text.data(), text.size()}); !status) return status;
+    text.clear();
   }
   return {};
 }
 
-Status Slice3mfWriter::finish(const std::string& path) {
-  Handle writer;
-  if (NMR::lib3mf_model_querywriter(state_->model.get(), "3mf", writer.out()) != LIB3MF_OK) {
-    return refused("a writer", state_->model);
+std::string Slice3mfWriter::objects_and_build() const {
+  Buffer<char> text;
+  for (std::size_t b = 0; b < bodies_.size(); ++b) {
+    append(text, "<object");
+    append_attribute(text, "id", bodies_.size() + b + 1);
+    append(text, fmt::format(" type=\"model\" name=\"{}\"", xml_text(bodies_[b].name)));
+    append_attribute(text, "s:slicestackid", b + 1);
+    append(text, " s:meshresolution=\"lowres\">");
+    put_box(bounds_, left_, front_, text);
+    append(text, "</object>\n");
   }
-  // Into memory: the library ends the program where a disk is full.
-  Package package;
-  void* write = reinterpret_cast<void*>(write_piece);
-  void* seek = reinterpret_cast<void*>(seek_piece);
-  if (NMR::lib3mf_writer_writetocallback(writer.get(), write, seek, &package) != LIB3MF_OK) {
-    return Error{Fault::kOutput, fmt::format("{}: {}", path, refused("writing", writer).message)};
+  append(text, "</resources>\n<build>\n");
+  for (std::size_t b = 0; b < bodies_.size(); ++b) {
+    append(text, "<item");
+    append_attribute(text, "objectid", bodies_.size() + b + 1);
+    append(text, " transform=\"1 0 0 0 1 0 0 0 1 ");
+    append_mm(text, left_);
+    append(text, " ");
+    append_mm(text, front_);
+    append(text, " 0\"/>\n");
   }
-  return write_file(path, package.bytes);
+  append(text, "</build>\n</model>\n");
+  return {text.begin(), text.end()};
+}
+
+Status Slice3mfWriter::finish(const std::string& path, const FileOptions& options) {
+  std::vector<Deflated> pieces(1);
+  const auto put = [&](std::string_view text) { return deflate_onto(pieces.back(), text); };
+  Status status =
+      put(fmt::format("{}<model unit=\"millimeter\" xml:lang=\"en-US\" xmlns=\"{}\" xmlns:s=\"{}\" "
+                      "requiredextensions=\"s\">\n<resources>\n",
+                      kXmlDeclaration, kCore3mf, "http://schemas.microsoft.com/3dmanufacturing/slice/2015/07"));
+  for (std::size_t b = 0; status && b < bodies_.size(); ++b) {
+    Body& body = bodies_[b];
+    Buffer<char> head;
+    append(head, "<s:slicestack");
+    append_attribute(head, "id", b + 1);
+    append_attribute_mm(head, "zbottom", first_bottom_);
+    append(head, ">\n");
+    status = put({head.data(), head.size()});
+    if (status) status = deflate_onto(body.slices, {body.waiting.data(), body.waiting.size()});
+    pieces.push_back(std::move(body.slices));
+    pieces.emplace_back();
+    if (status) status = put("</s:slicestack>\n");
+  }
+  if (status) status = put(objects_and_build());
+  if (!status) return Error{Fault::kOutput, path + ": " + status.error().message};
+  auto file = File::open(path, options);
+  if (!file) return file.error();
+  if (status = write_3mf_package(*file, pieces); !status) return status;
+  const auto written = file->finish();
+  return written ? Status() : written.error();
 }
 
 }  // namespace lamina::write

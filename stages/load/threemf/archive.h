@@ -1,0 +1,59 @@
+// stages/load/threemf/archive.h: the entries of a ZIP file, inflated piece by piece; internal to load.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <memory>
+#include <string>
+#include <string_view>
+
+#include "stages/data/status.h"
+#include "stages/load/load.h"
+#include "stages/load/source.h"
+
+struct zip;
+
+namespace lamina::load {
+
+/// The name of a part of a package as it is compared: a leading slash, lower case, "%20" decoded, "." and ".." resolved.
+///
+/// folder  where a name without a leading slash is looked for, such as "/3d/"
+/// source  ISO/IEC 29500-2 (Open Packaging Conventions), 6.2 and 6.3
+std::string part_name(std::string_view name, std::string_view folder = "/");
+
+class Archive {
+ public:
+  /// What entries say of their sizes is checked, against options.expanded_limit and as expansion_is_absurd().
+  ///
+  /// source  has to outlive the archive
+  /// errors  kInput: not a ZIP file, cut short, encrypted, two entries of one name, too large
+  static Result<Archive> open(const Source& source, const LoadOptions& options);
+
+  bool has(const std::string& name) const { return entries_.count(name) > 0; }
+
+  /// Gives an entry's bytes to `take` in pieces of 64 KiB. What was inflated so far is bounded as in open().
+  /// name    as part_name() gives it; has to be there
+  /// errors  those of `take`; kInput: damaged, too large
+  Status read(const std::string& name, const std::function<Status(std::string_view)>& take);
+
+ private:
+  struct Entry {
+    std::uint64_t index, packed;
+  };
+  struct Discard {
+    void operator()(zip* archive) const;
+  };
+  Archive(const Source& source, const LoadOptions& options) : source_(&source), limit_(options.expanded_limit) {}
+  Status list();
+  Status check_sizes(std::uint64_t packed, std::uint64_t expanded, std::uint64_t total) const;
+
+  const Source* source_;
+  std::uint64_t limit_;
+  std::unique_ptr<std::uint64_t> place_;  // where libzip reads in the source
+  std::unique_ptr<zip, Discard> archive_;
+  std::map<std::string, Entry> entries_;
+  std::uint64_t inflated_ = 0;
+};
+
+}  // namespace lamina::load

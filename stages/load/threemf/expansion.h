@@ -1,0 +1,34 @@
+// stages/load/threemf/expansion.h: build items are followed down to meshes; internal to load.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "stages/load/reader.h"
+#include "stages/load/threemf/model.h"
+
+namespace lamina::load {
+
+inline constexpr std::uint64_t kMostObjects = 1u << 20;
+inline constexpr std::uint32_t kDeepestComponents = 1000;
+
+/// A mesh that is printed, and what happens to it: from its file's numbers, in the file's unit, to mm.
+struct Leaf {
+  std::uint32_t object;
+  Transform transform;
+};
+
+/// Finds the objects that build items and components name, and what all of it comes to, before anything is expanded.
+///
+/// errors  kInput: a name that leads to nothing; an object that contains itself; components nested more than
+///         kDeepestComponents deep; more than kMostObjects objects, or more triangles than the limit, in the build or in one
+///         object
+/// cost    linear in components
+Status resolve_references(const Source& source, ModelPackage& package, std::uint64_t triangle_limit);
+
+/// The meshes of the build in its order. Supports, surfaces and objects of type "other" are left out, with a note.
+///
+/// errors  kInput: a build item of type "other"; what only an extension could make a solid of
+Result<std::vector<Leaf>> expand_build(const Source& source, const ModelPackage& package, std::vector<Note>& notes);
+
+}  // namespace lamina::load

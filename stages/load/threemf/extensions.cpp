@@ -1,0 +1,73 @@
+#include "stages/load/threemf/extensions.h"
+
+#include <fmt/core.h>
+
+namespace lamina::load {
+namespace {
+
+struct ExtensionRow {
+  std::string_view space;  // its beginning: versions follow
+  std::string_view name, remedy;
+  Extension kind;
+};
+
+constexpr std::string_view kAsMesh = "export it with this geometry turned into triangles";
+
+/// source  https://3mf.io/spec/ and the specifications there
+constexpr ExtensionRow kExtensions[] = {
+    {kCoreNamespace, "core", "", Extension::kUnderstood},
+    {"http://schemas.microsoft.com/3dmanufacturing/2013/01", "core of 2013", "", Extension::kUnderstood},
+    {"http://schemas.microsoft.com/3dmanufacturing/material/", "materials and properties", "", Extension::kUnderstood},
+    {kProductionNamespace, "production", "", Extension::kUnderstood},
+    {"http://schemas.microsoft.com/3dmanufacturing/trianglesets/", "triangle sets", "", Extension::kUnderstood},
+    {"http://schemas.microsoft.com/3dmanufacturing/beamlattice/", "beam lattice", kAsMesh, Extension::kBeams},
+    {"http://schemas.microsoft.com/3dmanufacturing/slice/", "slice", "export it as a mesh", Extension::kSlices},
+    {"http://schemas.microsoft.com/3dmanufacturing/securecontent/", "secure content", "export it without encryption",
+     Extension::kUnknown},
+    {"http://schemas.microsoft.com/3dmanufacturing/volumetric/", "volumetric", kAsMesh, Extension::kUnknown},
+    {"http://schemas.3mf.io/3dmanufacturing/volumetric/", "volumetric", kAsMesh, Extension::kUnknown},
+    {"http://schemas.3mf.io/3dmanufacturing/implicit/", "implicit", kAsMesh, Extension::kUnknown},
+    {"http://schemas.microsoft.com/3dmanufacturing/displacement/", "displacement", kAsMesh, Extension::kUnknown},
+    {"http://schemas.3mf.io/3dmanufacturing/displacement/", "displacement", kAsMesh, Extension::kUnknown},
+    {"http://schemas.3mf.io/3dmanufacturing/booleanoperations/", "boolean operations", kAsMesh, Extension::kUnknown},
+    {"http://schemas.3mf.io/3dmanufacturing/production/alternatives/", "production alternatives",
+     "export it without alternatives", Extension::kUnknown},
+    {"http://schemas.microsoft.com/3dmanufacturing/mirroring/", "mirroring", kAsMesh, Extension::kUnknown},
+    {"http://software.ultimaker.com/", "Cura", "", Extension::kSettings},
+    {"http://schemas.slic3r.org/", "Slic3r", "", Extension::kSettings},
+    {"http://schemas.bambulab.com/", "Bambu Studio", "", Extension::kSettings},
+    {"http://www.w3.org/", "XML", "", Extension::kSettings},
+    {"http://schemas.openxmlformats.org/", "Open Packaging Conventions", "", Extension::kSettings},
+    {"http://purl.org/", "Dublin Core", "", Extension::kSettings},
+};
+
+const ExtensionRow* find_row(std::string_view space) {
+  for (const ExtensionRow& row : kExtensions) {
+    if (space.starts_with(row.space)) return &row;
+  }
+  return nullptr;
+}
+
+}  // namespace
+
+Extension extension_of(std::string_view space) {
+  const ExtensionRow* const row = find_row(space);
+  return row == nullptr ? Extension::kUnknown : row->kind;
+}
+
+std::string extension_name(std::string_view space) {
+  const ExtensionRow* const row = find_row(space);
+  return row == nullptr ? std::string(space) : fmt::format("{} ({})", row->name, space);
+}
+
+std::string_view extension_remedy(std::string_view space) {
+  const ExtensionRow* const row = find_row(space);
+  return row == nullptr || row->remedy.empty() ? "export it without this extension" : row->remedy;
+}
+
+bool is_core_too(std::string_view space) {
+  return space == kCoreNamespace || space == "http://schemas.microsoft.com/3dmanufacturing/2013/01" ||
+         space.starts_with("http://software.ultimaker.com/xml/cura/3mf/");
+}
+
+}  // namespace lamina::load

@@ -1,0 +1,34 @@
+// stages/load/threemf/extensions.h: the namespaces of 3MF, what they are called and what lamina makes of them; internal to
+// load.
+#pragma once
+
+#include <string>
+#include <string_view>
+
+namespace lamina::load {
+
+inline constexpr std::string_view kCoreNamespace = "http://schemas.microsoft.com/3dmanufacturing/core/2015/02",
+                                  kProductionNamespace = "http://schemas.microsoft.com/3dmanufacturing/production/2015/06",
+                                  kSliceNamespace = "http://schemas.microsoft.com/3dmanufacturing/slice/2015/07",
+                                  kBeamNamespace = "http://schemas.microsoft.com/3dmanufacturing/beamlattice/2017/02";
+
+enum class Extension {
+  kUnderstood,  // read, or of no meaning for geometry
+  kSettings,    // what a program keeps for itself
+  kBeams,       // refused where a package requires it and an object has them
+  kSlices,      // refused where nothing else says what an object is
+  kUnknown      // refused where a package requires it, told where it is used
+};
+Extension extension_of(std::string_view space);
+
+/// "beam lattice (http://...)", or the namespace alone where it has no name that is known.
+std::string extension_name(std::string_view space);
+
+/// What to do about a file that needs it.
+std::string_view extension_remedy(std::string_view space);
+
+/// Whether <model> may stand in this namespace instead of the core's: that of 3MF before 1.0, and that of Cura, whose projects
+/// have it as their default.
+bool is_core_too(std::string_view space);
+
+}  // namespace lamina::load

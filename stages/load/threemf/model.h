@@ -1,0 +1,64 @@
+// stages/load/threemf/model.h: what lamina takes from the models of a 3MF package; internal to load.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <map>
+#include <set>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "stages/data/buffer.h"
+#include "stages/load/load.h"
+
+namespace lamina::load {
+
+/// A build item or a component: an object, and what happens to it. Its transform is in mm.
+struct ObjectReference {
+  std::uint32_t file;    // index in ModelPackage::files, where the object is
+  std::uint64_t id;      // as the file counts
+  std::uint32_t object;  // index in ModelPackage::objects, once all are known
+  Transform transform;
+  std::uint64_t line;  // where it stands, for errors
+};
+
+struct ModelObject {
+  enum class Type { kModel, kSupport, kOther };  // kSupport: all kinds of supports and surfaces
+  std::uint32_t file = 0;
+  std::uint64_t id = 0;
+  std::string name;
+  Type type = Type::kModel;
+  Buffer<std::array<double, 3>> vertices;  // in the file's unit
+  Buffer<std::array<std::uint32_t, 3>> triangles;
+  std::vector<ObjectReference> components;
+  std::uint64_t beams = 0;      // of a lattice, which lamina does not plan
+  bool sliced = false;          // slices say what it is, too
+  bool low_resolution = false;  // slices alone say what it is
+  std::string content;          // namespace of what it consists of, where that is no mesh and no components
+};
+
+struct ModelFile {
+  std::string name;  // as part_name() gives it
+  double unit_mm = 1;
+};
+
+struct ModelPackage {
+  std::vector<ModelFile> files;  // the first one is where the build is
+  std::vector<ModelObject> objects;
+  std::map<std::pair<std::uint32_t, std::uint64_t>, std::uint32_t> object_of_id;  // (file, id)
+  std::vector<ObjectReference> items;                                             // of the build
+  std::uint64_t not_printable = 0;                                                // items that PrusaSlicer would leave out
+  std::uint64_t triangles = 0;                                                    // of all objects, once each
+  std::map<std::string, std::uint32_t> file_of_name;                              // index in files
+  std::set<std::string> extensions;     // namespaces of elements that were passed over, where these may be geometry
+  bool needs_beams = false;             // the package requires the extension to be understood
+  bool has_forward_references = false;  // a component stands before the object that it names
+
+  /// "object 3 "cap"", or with its file where that is not the first one.
+  std::string label(const ModelObject& object) const;
+  /// The index of a file, which is added if it is new.
+  std::uint32_t file_of(const std::string& name);
+};
+
+}  // namespace lamina::load

@@ -1,0 +1,153 @@
+#include "stages/load/threemf/placement.h"
+
+#include <fmt/core.h>
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+#include <tbb/parallel_reduce.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "stages/load/matrix.h"
+#include "stages/load/repair/diagnose.h"
+#include "stages/load/repair/geometry.h"
+#include "stages/load/threemf/snap_mesh.h"
+
+namespace lamina::load {
+namespace {
+
+using Range = tbb::blocked_range<std::size_t>;
+
+constexpr std::size_t kMostTried = 8;  // variants that a leaf is compared with before its vertices are snapped
+
+/// Of the triangles relative to their first corner: equal for copies, whatever their place.
+std::uint64_t relative_hash(const Buffer<Triangle>& triangles) {
+  std::uint64_t hash = triangles.size();
+  if (triangles.empty()) return hash;
+  const Point3 from = triangles.front().a;
+  for (const Triangle& t : triangles) {
+    for (const Point3& p : {t.a, t.b, t.c}) {
+      const auto x = static_cast<std::uint32_t>(std::int64_t{p.x} - from.x),
+                 y = static_cast<std::uint32_t>(std::int64_t{p.y} - from.y),
+                 z = static_cast<std::uint32_t>(std::int64_t{p.z} - from.z);
+      hash = (hash ^ x) * 0x9e3779b97f4a7c15ull;
+      hash = (hash ^ (std::uint64_t{y} << 32 | z)) * 0xd6e8feb86659fd93ull;
+      hash ^= hash >> 32;
+    }
+  }
+  return hash;
+}
+
+/// Whether two meshes are the same but for a translation, and which.
+bool is_moved_copy(const Facets& original, const Facets& copy, Point3& offset) {
+  if (original.triangles.size() != copy.triangles.size() || original.bounds.empty()) return false;
+  const std::int64_t x = std::int64_t{copy.bounds.lo.x} - original.bounds.lo.x,
+                     y = std::int64_t{copy.bounds.lo.y} - original.bounds.lo.y,
+                     z = std::int64_t{copy.bounds.lo.z} - original.bounds.lo.z;
+  if (std::max({std::abs(x), std::abs(y), std::abs(z)}) > kNmReach) return false;
+  offset = {static_cast<Nm>(x), static_cast<Nm>(y), static_cast<Nm>(z)};
+  const auto moved = [&](const Point3& p, const Point3& q) { return p.x + x == q.x && p.y + y == q.y && p.z + z == q.z; };
+  return std::equal(
+      original.triangles.begin(), original.triangles.end(), copy.triangles.begin(),
+      [&](const Triangle& p, const Triangle& q) { return moved(p.a, q.a) && moved(p.b, q.b) && moved(p.c, q.c); });
+}
+
+/// What the terms of a coordinate may come to, in nm, by axis.
+std::array<double, 3> reach_of(const ModelObject& object, const Matrix& linear) {
+  std::array<double, 3> largest{};
+  for (const auto& v : object.vertices) {
+    for (std::size_t axis = 0; axis < 3; ++axis) largest[axis] = std::max(largest[axis], std::fabs(v[axis]));
+  }
+  Matrix sizes = linear;
+  for (double& one : sizes) one = std::fabs(one);
+  std::array<double, 3> reach = lamina::load::apply(sizes, largest);
+  for (double& one : reach) one *= 1e6;
+  return reach;
+}
+
+bool moves_within_reach(Nm lo, Nm hi, std::int64_t by) {
+  return std::abs(by) <= kNmReach && lo + by >= -kNmReach && hi + by <= kNmReach;
+}
+
+}  // namespace
+
+/// Translations that differ by whole nanometres and a rest: no coordinate is rounded otherwise where the rest, and what
+/// arithmetic may add to it, stay below the margin.
+bool Placement::share_known(const Turned& turned, const Axes& translation) {
+  constexpr double kRounding = 4e-15;  // some 36 units in the last place of the sum of all terms
+  const std::size_t most = std::min(turned.variants.size(), kMostTried);
+  for (std::size_t i = 0; i < most; ++i) {
+    const Variant& variant = turned.variants[i];
+    PlacedObject& object = to_.objects[variant.object];
+    const Box& box = object.facets.bounds;
+    const std::array<Nm, 3> lo{box.lo.x, box.lo.y, box.lo.z}, hi{box.hi.x, box.hi.y, box.hi.z};
+    std::array<Nm, 3> offset{};
+    bool same = !box.empty();
+    for (std::size_t axis = 0; axis < 3 && same; ++axis) {
+      const double moved = translation[axis] - variant.translation[axis];
+      if (!(std::fabs(moved) < 4e9)) return false;
+      const std::int64_t whole = nearest(moved);
+      const double terms = variant.reach[axis] + std::fabs(translation[axis]) + std::fabs(variant.translation[axis]);
+      const double rest = std::fabs(moved - static_cast<double>(whole)) + kRounding * terms;
+      same = (moved == 0 || rest < variant.margin[axis]) && moves_within_reach(lo[axis], hi[axis], whole);
+      offset[axis] = static_cast<Nm>(same ? whole : 0);
+    }
+    if (!same) continue;
+    object.offsets.push_back({offset[0], offset[1], offset[2]});
+    return true;
+  }
+  return false;
+}
+
+bool Placement::share_equal(const Turned& turned, const Facets& facets, std::uint64_t hash) {
+  const auto [begin, end] = turned.by_hash.equal_range(hash);
+  for (auto at = begin; at != end; ++at) {
+    PlacedObject& object = to_.objects[turned.variants[at->second].object];
+    Point3 offset{};
+    if (!is_moved_copy(object.facets, facets, offset)) continue;
+    object.offsets.push_back(offset);
+    return true;
+  }
+  return false;
+}
+
+void Placement::turn_outside_out(std::uint32_t object, Facets& facets) {
+  const Point3 from = facets.bounds.lo;
+  const Int128 volume = tbb::parallel_reduce(
+      Range(0, facets.triangles.size(), 1 << 14), Int128{0},
+      [&](const Range& range, Int128 sum) {
+        for (std::size_t i = range.begin(); i != range.end(); ++i) sum += sixfold_volume(facets.triangles[i], from);
+        return sum;
+      },
+      [](Int128 one, Int128 other) { return one + other; });
+  if (volume >= 0 || !census(facets.triangles).balanced) return;
+  tbb::parallel_for(Range(0, facets.triangles.size(), 1 << 14), [&](const Range& range) {
+    for (std::size_t i = range.begin(); i != range.end(); ++i) std::swap(facets.triangles[i].b, facets.triangles[i].c);
+  });
+  told_.resize(model_.objects.size());
+  if (!told_[object])
+    to_.notes.push_back(
+        {true, model_.label(model_.objects[object]) + " is inside out and is turned over: its volume is negative"});
+  told_[object] = true;
+}
+
+Status Placement::add(const Leaf& leaf) {
+  const ModelObject& object = model_.objects[leaf.object];
+  const Transform transform = after(options_.transform, leaf.transform);
+  Axes translation = transform.translation;
+  for (double& axis : translation) axis *= 1e6;
+  Turned& turned = turns_[{leaf.object, transform.linear}];
+  if (share_known(turned, translation)) return {};
+  const std::string label = model_.label(object);
+  Result<SnappedMesh> mesh = snap_mesh(source_, object, label, transform, options_);
+  if (!mesh) return mesh.error();
+  turn_outside_out(leaf.object, mesh->facets);
+  const std::uint64_t hash = relative_hash(mesh->facets.triangles);
+  if (share_equal(turned, mesh->facets, hash)) return {};
+  turned.by_hash.emplace(hash, turned.variants.size());
+  turned.variants.push_back({to_.objects.size(), translation, mesh->margin, reach_of(object, transform.linear)});
+  to_.objects.push_back({label, std::move(mesh->facets), {{0, 0, 0}}});
+  return {};
+}
+
+}  // namespace lamina::load

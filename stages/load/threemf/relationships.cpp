@@ -1,0 +1,95 @@
+#include "stages/load/threemf/relationships.h"
+
+#include <fmt/core.h>
+
+#include <vector>
+
+#include "stages/load/text.h"
+#include "stages/load/threemf/xml.h"
+
+namespace lamina::load {
+namespace {
+
+constexpr std::string_view kModelRelationship = "http://schemas.microsoft.com/3dmanufacturing/2013/01/3dmodel";
+constexpr std::string_view kPrintTicketRelationship = "http://schemas.microsoft.com/3dmanufacturing/2013/01/printticket";
+constexpr std::string_view kThumbnailRelationship =
+    "http://schemas.openxmlformats.org/package/2006/relationships/metadata/thumbnail";
+
+struct Relationship {
+  std::string type, target;
+  bool external = false;
+};
+
+class RelationshipHandler : public XmlHandler {
+ public:
+  std::vector<Relationship> relationships;
+
+  void start(const XmlName& name, XmlAttributes attributes) override {
+    if (name.local != "Relationship") return;
+    Relationship& one = relationships.emplace_back();
+    for (; *attributes != nullptr; attributes += 2) {
+      const std::string_view attribute = attributes[0], value = attributes[1];
+      if (attribute == "Type") one.type = value;
+      if (attribute == "Target") one.target = value;
+      if (attribute == "TargetMode") one.external = value == "External";
+    }
+  }
+  void end() override {}
+};
+
+Result<std::vector<Relationship>> read_relationships(const Source& source, Archive& archive, const std::string& part) {
+  RelationshipHandler handler;
+  XmlReader reader(handler);
+  const auto faulty = [&] { return source.error(fmt::format("{}, {}", part.substr(1), reader.fault())); };
+  const Status read = archive.read(part, [&](std::string_view bytes) { return reader.feed(bytes) ? Status() : faulty(); });
+  if (!read) return read.error();
+  if (!reader.finish()) return faulty();
+  return std::move(handler.relationships);
+}
+
+/// "/3d/_rels/3dmodel.model.rels" of "/3d/3dmodel.model"
+std::string relationships_of(const std::string& part) {
+  const std::size_t slash = part.rfind('/') + 1;
+  return part.substr(0, slash) + "_rels/" + part.substr(slash) + ".rels";
+}
+
+/// A second print ticket makes a file invalid; what it asks for is not for lamina.
+Status check_print_tickets(const Source& source, Archive& archive, const std::string& model) {
+  const std::string part = relationships_of(model);
+  if (!archive.has(part)) return {};
+  const auto relationships = read_relationships(source, archive, part);
+  if (!relationships) return relationships.error();
+  std::size_t tickets = 0;
+  for (const Relationship& one : *relationships) tickets += one.type == kPrintTicketRelationship ? 1 : 0;
+  if (tickets > 1) return source.error("has more than one print ticket, which 3MF forbids; export it again");
+  return {};
+}
+
+}  // namespace
+
+Result<std::string> find_start_part(const Source& source, Archive& archive) {
+  const std::string root = "/_rels/.rels";
+  if (!archive.has(root)) return source.error("is a zip file, but no 3MF: it has no _rels/.rels; unzip it, or export it again");
+  const auto relationships = read_relationships(source, archive, root);
+  if (!relationships) return relationships.error();
+  std::string model;
+  for (const Relationship& one : *relationships) {
+    const bool is_model = one.type == kModelRelationship;
+    if (is_model && one.external)
+      return source.error(
+          fmt::format("its model lies outside of the file, at {}; export it again", quoted(std::string_view(one.target))));
+    const std::string target = part_name(one.target);
+    const bool needed = is_model || one.type == kThumbnailRelationship;  // what others lead to is not for lamina
+    if (needed && !one.external && !archive.has(target))
+      return source.error(fmt::format("_rels/.rels names {}, which the file does not hold; export it again",
+                                      quoted(std::string_view(one.target))));
+    if (is_model && !model.empty())
+      return source.error("names more than one 3D model to start from, which 3MF forbids; export it again");
+    if (is_model) model = target;
+  }
+  if (model.empty()) return source.error("is a zip file, but no 3MF: it names no 3D model; unzip it, or export it again");
+  if (const Status tickets = check_print_tickets(source, archive, model); !tickets) return tickets.error();
+  return model;
+}
+
+}  // namespace lamina::load

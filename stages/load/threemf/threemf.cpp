@@ -1,0 +1,73 @@
+// stages/load/threemf/threemf.cpp: a package is opened, its models are parsed, and what its build names becomes meshes.
+#include <fmt/core.h>
+
+#include "stages/load/reader.h"
+#include "stages/load/threemf/archive.h"
+#include "stages/load/threemf/expansion.h"
+#include "stages/load/threemf/extensions.h"
+#include "stages/load/threemf/model_parser.h"
+#include "stages/load/threemf/placement.h"
+#include "stages/load/threemf/relationships.h"
+
+namespace lamina::load {
+namespace {
+
+Status parse_model(const Source& source, Archive& archive, std::uint32_t file, std::uint64_t triangle_limit,
+                   ModelPackage& package) {
+  const std::string name = package.files[file].name;
+  if (!archive.has(name))
+    return source.error(fmt::format("names {}, which the file does not hold; export it again", name.substr(1)));
+  ModelParser parser(package, file, triangle_limit);
+  XmlReader reader(parser);
+  parser.attach(reader);
+  const auto faulty = [&] { return source.error(fmt::format("{}, {}", name.substr(1), reader.fault())); };
+  const Status read = archive.read(name, [&](std::string_view bytes) { return reader.feed(bytes) ? Status() : faulty(); });
+  if (!read) return read;
+  if (!reader.finish()) return faulty();
+  if (file == 0 && !parser.has_build()) return source.error(fmt::format("{} has no <build>; export it again", name.substr(1)));
+  return {};
+}
+
+/// What was passed over, for a person.
+void tell_of_model(const ModelPackage& model, std::vector<Note>& notes) {
+  for (const std::string& space : model.extensions) {
+    notes.push_back(
+        {false, fmt::format("holds elements of the extension {}, which lamina does not read and the file does not require",
+                            extension_name(space))});
+  }
+  if (model.has_forward_references)
+    notes.push_back({false, "names objects before it holds them, against the specification; they are planned all the same"});
+  if (model.not_printable > 0)
+    notes.push_back({false, fmt::format("{} build item{} marked as not printable and planned all the same", model.not_printable,
+                                        model.not_printable == 1 ? " is" : "s are")});
+}
+
+}  // namespace
+
+Result<Package> read_3mf(const Source& source, const LoadOptions& options) {
+  Result<Archive> archive = Archive::open(source, options);
+  if (!archive) return archive.error();
+  const Result<std::string> start = find_start_part(source, *archive);
+  if (!start) return start.error();
+  ModelPackage model;
+  model.file_of(*start);
+  // The parser adds the files that it finds named.
+  for (std::uint32_t file = 0; file < model.files.size(); ++file) {
+    if (const Status parsed = parse_model(source, *archive, file, options.triangle_limit, model); !parsed)
+      return parsed.error();
+  }
+  if (model.items.empty()) return source.error("has no build items: nothing is to be printed; export it again");
+  if (const Status known = resolve_references(source, model, options.triangle_limit); !known) return known.error();
+  Package package;
+  tell_of_model(model, package.notes);
+  const Result<std::vector<Leaf>> leaves = expand_build(source, model, package.notes);
+  if (!leaves) return leaves.error();
+  if (leaves->empty()) return source.error("its build items hold no triangles to print");
+  Placement placement(source, model, options, package);
+  for (const Leaf& leaf : *leaves) {
+    if (const Status placed = placement.add(leaf); !placed) return placed.error();
+  }
+  return package;
+}
+
+}  // namespace lamina::load

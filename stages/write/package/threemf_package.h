@@ -1,0 +1,34 @@
+// stages/write/package/threemf_package.h: what every 3MF file has around its model.
+#pragma once
+
+#include <span>
+#include <string>
+#include <string_view>
+
+#include "stages/data/buffer.h"
+#include "stages/data/status.h"
+#include "stages/write/file.h"
+#include "stages/write/package/deflate.h"
+
+namespace lamina::write {
+
+/// Writes [Content_Types].xml, _rels/.rels and 3D/3dmodel.model, in this order.
+///
+/// model   the text of the model in pieces
+/// errors  kOutput
+/// source  ISO/IEC 29500-2 (Open Packaging Conventions); 3MF Consortium, Core Specification 1.3, section 2
+Status write_3mf_package(File& file, std::span<const Deflated> model);
+
+inline constexpr std::string_view kXmlDeclaration = "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n";
+inline constexpr std::string_view kCore3mf = "http://schemas.microsoft.com/3dmanufacturing/core/2015/02";
+
+/// Text for an attribute of XML: markup is escaped; bytes that are no UTF-8, and control characters, which XML cannot hold,
+/// become question marks.
+std::string xml_text(std::string_view text);
+
+/// Appends ` name="number"`.
+void append_attribute(Buffer<char>& out, std::string_view name, std::uint64_t number);
+/// Appends ` name="mm"` with all digits of a nanometre.
+void append_attribute_mm(Buffer<char>& out, std::string_view name, std::int64_t nm);
+
+}  // namespace lamina::write
