@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <string_view>
 
+#include "stages/load/foreign/foreign.h"
 #include "stages/load/reader.h"
 #include "stages/load/text.h"
 
@@ -67,14 +68,16 @@ Result<Format> detect(const Source& source) {
   if (head.substr(0, 4) == "PK\x03\x04" || head.substr(0, 4) == std::string_view("PK\x05\x06", 4)) return Format::k3mf;
   if (head.substr(0, 2) == "\x1f\x8b") return Format::kGzip;
   if (has_binary_stl_size(source, head)) return Format::kBinaryStl;
+  if (std::string foreign = foreign_format(head); !foreign.empty()) return source.error(foreign);
   if (head.substr(0, 3) == "\xef\xbb\xbf") head.remove_prefix(3);
   std::string_view name = source.path();
   if (ends_with(name, ".gz")) name.remove_suffix(3);
   if (is_text(head)) {
     if (has_line_with(head, {"solid", "facet", "endsolid"}) && !ends_with(name, ".obj")) return Format::kAsciiStl;
     if (has_line_with(head, {"v", "f"})) return Format::kObj;
-    if (ends_with(name, ".obj")) return Format::kObj;
+    if (ends_with(name, ".obj") && !is_machine_program(head)) return Format::kObj;
     if (has_line_with(head, {"#", "o", "g", "mtllib", "vn", "vt"}) && !ends_with(name, ".stl")) return Format::kObj;
+    if (is_machine_program(head)) return source.error("is G-code, the moves of a machine; name the part that it was made of");
     return source.error("is text, but neither STL nor OBJ; export the part again");
   }
   if (ends_with(name, ".3mf")) return source.error("is not a zip file, as 3MF is; copy or export it again");

@@ -7,9 +7,8 @@
 #include <exception>
 
 #include "stages/load/reader.h"
-#include "stages/load/repair/diagnose.h"
+#include "stages/load/repair/finish.h"
 #include "stages/load/repair/geometry.h"
-#include "stages/load/repair/repair.h"
 
 namespace lamina::load {
 namespace {
@@ -40,56 +39,6 @@ Result<Facets> read_facets(const Source& source, Format format, const LoadOption
     case Format::kAsciiStl: return read_ascii_stl(source, snapper, options);
     default: return read_obj(source, snapper, options);
   }
-}
-
-std::string plural(std::uint64_t count, const char* what) { return fmt::format("{} {}{}", count, what, count == 1 ? "" : "s"); }
-
-std::string place(const Box& box) {
-  const auto middle = [](Nm lo, Nm hi) { return mm((std::int64_t{lo} + hi) / 2); };
-  return fmt::format("({:.3f}, {:.3f}, {:.3f}) mm", middle(box.lo.x, box.hi.x), middle(box.lo.y, box.hi.y),
-                     middle(box.lo.z, box.hi.z));
-}
-
-/// Repair notes end with the places of the file's own coordinates, so that they can be found in a modeller.
-void describe_repair(const RepairReport& report, const std::string& prefix, std::vector<Note>& notes) {
-  const auto note = [&](const std::string& text) { notes.push_back({true, prefix + text}); };
-  if (report.duplicates_dropped > 0) note(plural(report.duplicates_dropped, "duplicate facet") + " dropped");
-  if (report.vertices_welded > 0)
-    note(fmt::format("{} {} at open edges welded to a neighbour", report.vertices_welded,
-                     report.vertices_welded == 1 ? "vertex" : "vertices"));
-  if (report.facets_turned > 0) note(plural(report.facets_turned, "facet") + " turned over to agree with the neighbours");
-  if (report.sheets_dropped > 0)
-    note(fmt::format("{} with {} dropped (an open rim, hanging on the solid, enclosing nothing)",
-                     plural(report.sheets_dropped, "stray surface"), plural(report.sheet_facets_dropped, "facet")));
-  if (report.openings_capped > 0)
-    note(fmt::format("{} capped with {}, the largest {:.3g} mm wide near {}", plural(report.openings_capped, "opening"),
-                     plural(report.cap_triangles, "triangle"), report.largest_opening_mm, place(report.largest_opening)));
-}
-
-/// Facets of a file become a mesh that later stages can trust.
-Result<Mesh> finish(const Source& source, const std::string& name, const std::string& prefix, Facets facets,
-                    const LoadOptions& options, std::vector<Note>& notes) {
-  Mesh mesh;
-  mesh.name = name;
-  mesh.triangles = std::move(facets.triangles);
-  mesh.bounds = facets.bounds;
-  mesh.repaired_from = static_cast<std::uint32_t>(mesh.triangles.size());
-  for (Note& note : facets.notes) notes.push_back({note.repair, prefix + note.text});
-  Census found = census(mesh.triangles);
-  if (facets.doubt) {
-    if (!found.balanced) return source.error(facets.doubt->error);
-    notes.push_back({false, prefix + facets.doubt->note});
-  }
-  if (!found.balanced && options.repair) {
-    describe_repair(repair(mesh, options.weld_nm), prefix, notes);
-    found = census(mesh.triangles);
-    if (!found.balanced) return Error{Fault::kInternal, source.path() + ": repair left the mesh open; please report it"};
-  } else if (!found.balanced) {
-    mesh.closed = false;
-    notes.push_back({false, prefix + "the mesh is not closed and repair is off: rows of it may stay open"});
-  }
-  mesh.fingerprint = found.fingerprint;
-  return mesh;
 }
 
 /// Refuses what cannot leave a single pixel.
@@ -169,7 +118,7 @@ auto guarded(const std::string& path, const Work& work) -> decltype(work()) {
   try {
     return work();
   } catch (const std::bad_alloc&) {
-    return Error{Fault::kInput, path + ": does not fit into this machine's memory"};
+    return Error{Fault::kMemory, path + ": " + out_of_memory().message};
   } catch (const std::exception& problem) {
     return Error{Fault::kInternal, path + ": " + problem.what()};
   }

@@ -24,12 +24,16 @@ struct Transform {
 Transform make_transform(const std::array<double, 3>& scale, const std::array<double, 3>& rotate_deg,
                          const std::array<double, 3>& shrink);
 
+/// The distance that repair doubles until openings stop falling; any other is used as it is.
+inline constexpr std::int64_t kWeldByItself = 5'000;
+
 struct LoadOptions {
   Transform transform;
   double unit_mm = 1.0;                       // mm per unit of files that carry none (STL, OBJ); 3MF states its own
   bool drop_bad = false;                      // drop facets with coordinates that are not finite instead of refusing the file
   bool repair = true;                         // orient, remove duplicates, weld and cap a mesh that is not closed (repair.h)
-  std::int64_t weld_nm = 5'000;               // repair joins vertices at open edges that are at most this far apart
+  bool winding = false;                       // close such a mesh by its winding number instead of caps: approximate
+  std::int64_t weld_nm = kWeldByItself;       // repair joins open edges that are at most this far apart
   std::uint64_t triangle_limit = 1ull << 30;  // refused above; a header can lie, so sizes are checked against the file first
   std::uint64_t expanded_limit = 8ull << 30;  // bytes a compressed file may expand to
 };
@@ -40,7 +44,8 @@ struct LoadOptions {
 /// returns  meshes with repaired, closed triangle lists (unless options.repair is off), one instance per mesh object of
 ///          each build item (a single one for STL and OBJ); coordinates as in the file after the transform, not yet
 ///          placed on a bed. Copies in a 3MF file share a mesh where every vertex snaps to the same place but for a
-///          whole translation. Numbers in text (STL, OBJ) are read in double precision; lib3mf keeps floats.
+///          whole translation. Numbers in text (STL, OBJ, 3MF) are read in double precision. A closed object of a 3MF file
+///          whose volume is negative is turned over, with a note.
 /// errors   kInput, one line: the file, the place in it (facet and byte, or line), what to do
 /// cost     two passes over the triangles, parallel; 36 bytes a triangle, 150 more while a mesh is repaired, and the
 ///          inflated bytes while a compressed file is read

@@ -1,9 +1,10 @@
 // stages/load/stl_ascii.cpp: text STL.
 //
-// Tolerated, because programs write it: any case; LF, CRLF and CR; tabs; a byte order mark; several solids; solids
-// with names of any kind, or none; lines of remarks between facets; signed numbers; normals that are no numbers (they
-// are not used). Not tolerated, because it would lose facets in silence: words out of place within a facet, facets
-// that do not have three corners, numbers with a decimal comma.
+// Tolerated, because programs write it: any case; LF, CRLF and CR, or all in one line; tabs; a byte order mark; the end of
+// file of DOS (^Z); several solids; solids with names of any kind, or none; lines of remarks between facets; colours
+// between facets, behind corners and before "endfacet"; signed numbers; normals that are no numbers (they are not used). Not
+// tolerated, because it would lose facets in silence: words out of place within a facet, facets that do not have three corners,
+// numbers with a decimal comma.
 #include <fmt/core.h>
 #include <tbb/parallel_for.h>
 
@@ -45,11 +46,44 @@ class BlockParser {
         if (is_word(first, lost)) return fail(first, fmt::format("'{}' outside of a facet", lost));
       if (is_word(first, "solid")) ++block_.solids;
       if (is_word(first, "endsolid")) ++block_.ends;
-      while (at_ != end_ && !is_line_end(*at_)) ++at_;
+      skip_line();
     }
   }
 
  private:
+  /// To the end of the line, or to a facet that begins in it: some files are one line.
+  void skip_line() {
+    while (at_ != end_ && !is_line_end(*at_)) {
+      if (is_space(*at_)) {
+        ++at_;
+        continue;
+      }
+      const char* const begin = at_;
+      const std::string_view found = word_of_line();
+      if (!is_word(found, "facet") || !facet_follows()) continue;
+      at_ = begin;
+      return;
+    }
+  }
+
+  /// Whether the line goes on as a facet does behind its first word.
+  bool facet_follows() {
+    const char* const here = at_;
+    bool follows = is_word(word_of_line(), "normal");
+    for (int number = 0; number < 3; ++number) word_of_line();
+    follows = follows && is_word(word_of_line(), "outer");
+    at_ = here;
+    return follows;
+  }
+
+  /// The next word of the line; empty at its end.
+  std::string_view word_of_line() {
+    while (at_ != end_ && is_space(*at_) && !is_line_end(*at_)) ++at_;
+    const char* const begin = at_;
+    while (at_ != end_ && !is_space(*at_)) ++at_;
+    return {begin, static_cast<std::size_t>(at_ - begin)};
+  }
+
   std::string_view word() {
     while (at_ != end_ && is_space(*at_)) ++at_;
     const char* const begin = at_;
@@ -95,10 +129,34 @@ class BlockParser {
         return false;
       }
     }
+    pass_numbers();
     snapped = snapper_.snap(position[0], position[1], position[2], out);
     if (snapped == Snapped::kYes || (snapped == Snapped::kNotFinite && drop_bad_)) return true;
     fail(found, what_is_wrong(snapped));
     return false;
+  }
+
+  /// Numbers behind a corner's three: a colour.
+  void pass_numbers() {
+    for (double ignored = 0; at_ != end_ && !is_line_end(*at_);) {
+      const char* const begin = at_;
+      const std::string_view found = word_of_line();
+      if (!found.empty() && parse_number(found, ignored)) continue;
+      at_ = begin;
+      return;
+    }
+  }
+
+  /// Lines of words that the format does not have, such as colours, behind the loop.
+  bool end_of_facet() {
+    if (!expect("endloop")) return false;
+    for (std::string_view found = word();; found = word()) {
+      if (is_word(found, "endfacet")) return true;
+      const bool lost = found.empty() || is_word(found, "vertex") || is_word(found, "facet") || is_word(found, "outer");
+      if (!lost) continue;
+      fail(found, fmt::format("{} where 'endfacet' belongs", quoted(found)));
+      return false;
+    }
   }
 
   void facet() {
@@ -110,7 +168,7 @@ class BlockParser {
       if (!corner(point, snapped)) return;
       finite = finite && snapped == Snapped::kYes;
     }
-    if (!expect("endloop") || !expect("endfacet")) return;
+    if (!end_of_facet()) return;
     if (!finite) {
       ++block_.dropped;
       return;
@@ -127,7 +185,8 @@ class BlockParser {
   Block& block_;
 };
 
-/// Bytes up to behind the last "endfacet" that is the first word of its line (a solid may be called that); 0 if none.
+/// Bytes up to behind the last "endfacet" that is the first word of its line (a solid may be called that) or has another
+/// facet behind it; 0 if none.
 std::size_t behind_last_facet(const char* begin, const char* end) {
   constexpr std::string_view kWord = "endfacet";
   for (const char* at = end; at - begin >= static_cast<std::ptrdiff_t>(kWord.size()) + 1;) {
@@ -139,6 +198,12 @@ std::size_t behind_last_facet(const char* begin, const char* end) {
     const char* before = first;
     while (before != begin && is_space(before[-1]) && !is_line_end(before[-1])) --before;
     if (before == begin || is_line_end(before[-1])) return static_cast<std::size_t>(at + 1 - begin);
+    // Within a line, a facet has to follow.
+    const char* behind = at + 1;
+    while (behind != end && is_space(*behind)) ++behind;
+    constexpr std::string_view kNext = "facet normal ";
+    if (end - behind > static_cast<std::ptrdiff_t>(kNext.size()) && is_word({behind, kNext.size()}, kNext))
+      return static_cast<std::size_t>(at + 1 - begin);
   }
   return 0;
 }

@@ -159,6 +159,16 @@ Status read_carefully(const Source& source, const Snapper& snapper, const LoadOp
   return {};
 }
 
+std::string cut_short(const Source& source, std::uint64_t claimed, std::uint64_t held) {
+  return fmt::format(
+      "is cut short: the header says {} facets, the file ends at byte {} within facet {}; copy or export it again", claimed,
+      source.size(), held + 1);
+}
+
+std::string stray_bytes(std::uint64_t bytes, std::uint64_t facets) {
+  return fmt::format("{} stray bytes after the last of {} facets are ignored", bytes, facets);
+}
+
 /// How many facets to read, with what there is to say about it.
 Result<std::uint64_t> count_facets(const Source& source, const LoadOptions& options, Facets& facets) {
   std::array<char, 4> bytes;
@@ -166,23 +176,20 @@ Result<std::uint64_t> count_facets(const Source& source, const LoadOptions& opti
     return source.error(fmt::format("is {} bytes long, too short for an STL file", source.size()));
   const std::uint64_t claimed = little_endian(bytes.data());
   const std::uint64_t body = source.size() - kHeader, held = body / kFacet, stray = body % kFacet;
-  std::uint64_t count = claimed;
-  if (claimed == 0 && held > 0 && stray == 0) {
-    count = held;
+  const std::uint64_t count = held;
+  if (claimed > held && (held == 0 || stray > 0)) return source.error(cut_short(source, claimed, held));
+  if (held == 0 || (claimed == 0 && stray > 0)) return source.error("holds no facets");
+  if (claimed == 0) {
     facets.notes.push_back({false, fmt::format("the header says 0 facets, the file holds {}: all are read", held)});
-  } else if (claimed < held || (claimed == held && stray > 0)) {
-    facets.notes.push_back(
-        {false, fmt::format("{} stray bytes after the last of {} facets are ignored", body - claimed * kFacet, claimed)});
+  } else if (claimed == held && stray > 0) {
+    facets.notes.push_back({false, stray_bytes(stray, claimed)});
+  } else if (claimed < held) {
+    const std::string differ = fmt::format("the header says {} facets, the file holds {}", claimed, held);
+    facets.doubt = Doubt{differ + ", which close: all are read", "", claimed, stray_bytes(body - claimed * kFacet, claimed)};
   } else if (claimed > held) {
-    const std::string cut = fmt::format(
-        "is cut short: the header says {} facets, the file ends at byte {} within facet {}; copy or export it again", claimed,
-        source.size(), held + 1);
-    if (stray != 0 || held == 0) return source.error(cut);
-    count = held;
-    facets.doubt =
-        Doubt{fmt::format("the header says {} facets, the file holds {}, which close: all are read", claimed, held), cut};
+    facets.doubt = Doubt{fmt::format("the header says {} facets, the file holds {}, which close: all are read", claimed, held),
+                         cut_short(source, claimed, held), 0, ""};
   }
-  if (count == 0) return source.error("holds no facets");
   if (count > options.triangle_limit)
     return source.error(fmt::format("{} facets are more than the limit of {}", count, options.triangle_limit));
   return count;
@@ -202,13 +209,9 @@ struct Progress {
   Box transformed;
 };
 
-}  // namespace
-
-Result<Facets> read_binary_stl(const Source& source, const Snapper& snapper, const LoadOptions& options) {
-  Facets facets;
-  const Result<std::uint64_t> counted = count_facets(source, options, facets);
-  if (!counted) return counted.error();
-  const std::uint64_t count = *counted;
+/// Reads the first `count` facets.
+Status read_facets(const Source& source, const Snapper& snapper, const LoadOptions& options, std::uint64_t count,
+                   Facets& facets) {
   facets.triangles.reserve(count + kTriangleSlack);
   facets.triangles.resize(count);
   prefer_large_pages(facets.triangles);
@@ -242,11 +245,27 @@ Result<Facets> read_binary_stl(const Source& source, const Snapper& snapper, con
         return one;
       });
   if (unreadable) return source.changed_while_read();
-  if (bad) {
-    if (const Status careful = read_carefully(source, snapper, options, count, facets); !careful) return careful.error();
-  } else {
-    facets.bounds = plain ? snapped_box(progress.plain, snapper) : progress.transformed;
+  if (bad) return read_carefully(source, snapper, options, count, facets);
+  facets.bounds = plain ? snapped_box(progress.plain, snapper) : progress.transformed;
+  return {};
+}
+
+}  // namespace
+
+Result<Facets> read_binary_stl(const Source& source, const Snapper& snapper, const LoadOptions& options) {
+  Facets facets;
+  const Result<std::uint64_t> count = count_facets(source, options, facets);
+  if (!count) return count.error();
+  Status read = read_facets(source, snapper, options, *count, facets);
+  if (!read && facets.doubt && facets.doubt->claimed > 0) {
+    // What follows the claimed facets is none.
+    facets.notes.push_back({false, facets.doubt->rest_left_out});
+    read = read_facets(source, snapper, options, facets.doubt->claimed, facets);
+    facets.doubt.reset();
+  } else if (!read && facets.doubt) {
+    return source.error(facets.doubt->error);
   }
+  if (!read) return read.error();
   return facets;
 }
 

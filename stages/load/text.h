@@ -14,7 +14,8 @@
 namespace lamina::load {
 
 inline bool is_line_end(char c) { return c == '\n' || c == '\r'; }
-inline bool is_space(char c) { return c == ' ' || (c >= '\t' && c <= '\r') || c == '\0'; }
+/// ^Z, the end of a text in DOS, counts too.
+inline bool is_space(char c) { return c == ' ' || (c >= '\t' && c <= '\r') || c == '\0' || c == '\x1a'; }
 
 /// Whether a word is `lower_case`, in whatever case the file has it.
 inline bool is_word(std::string_view word, std::string_view lower_case) {

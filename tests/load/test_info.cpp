@@ -43,6 +43,17 @@ TEST(Info, ABrokenPartSaysWhereAndWhatWillBeDone) {
   EXPECT_CONTAINS(text_of(corpus("broken/cube_missing_corner.stl"), options), "since repair is off");
 }
 
+TEST(Info, TellsTheVolumeThatIsPlannedAndWhatHangsOnCaps) {
+  EXPECT_CONTAINS(text_of(corpus("nist_am_test_artifact_v3b.stl")), "planned volume       100981 mm3\n");
+  std::vector<FloatTriangle> open = unit_box();
+  open.resize(10);  // without the face at x = 10, 600 of 2200 mm2
+  const std::string path = write_file("open.stl", binary_stl(open));
+  EXPECT_CONTAINS(text_of(path), "planned volume       6000 mm3, 27.3 % of the surface is caps");
+  const nlohmann::json json = json_of(path);
+  EXPECT_NEAR(json["planned_volume_mm3"].get<double>(), 6000, 1e-6);
+  EXPECT_NEAR(json["capped_share"].get<double>(), 600.0 / 2200, 1e-9);
+}
+
 TEST(Info, JsonHasTheSameNumbers) {
   const nlohmann::json clean = json_of(corpus("cube_gears_17_items.3mf"));
   EXPECT_EQ(clean["format"], "3MF");

@@ -219,6 +219,54 @@ TEST(Repair, CornersMovedApartAreWeldedWithoutCaps) {
   EXPECT_NEAR(load::diagnose(mesh).volume_mm3, 100981, 5);
 }
 
+TEST(Repair, CornersFarApartAreWeldedOverGrowingDistances) {
+  const Mesh clean = as_in_file(corpus("dental_crown.stl"));
+  for (const Nm off : {4'000, 20'000}) {
+    std::mt19937 random(6);
+    Mesh mesh;
+    mesh.triangles = clean.triangles;
+    mesh.bounds = clean.bounds;
+    for (Triangle& t : mesh.triangles)
+      for (Nm* x : {&t.a.x, &t.a.y, &t.a.z, &t.b.x, &t.b.y, &t.b.z, &t.c.x, &t.c.y, &t.c.z})
+        *x += static_cast<Nm>(random() % static_cast<std::uint32_t>(2 * off)) - off;
+    const load::RepairReport report = load::repair(mesh, {5'000, 160'000});
+    EXPECT_GT(report.weld_nm, off);
+    EXPECT_LE(report.weld_nm, 8 * off);
+    EXPECT_NEAR(load::diagnose(mesh).volume_mm3, 526.449, 0.03 * 526.449) << off;
+    EXPECT_LT(load::capped_share(mesh), 0.02) << off;
+  }
+}
+
+TEST(Repair, TwoSidesOfAWallStayTwo) {
+  // Two plates of 20 um with an open rim each way: their sides are nearer to each other than the distance.
+  std::vector<FloatTriangle> facets = box_facets({0, 0, 0}, {10, 10, 0.02f});
+  facets.resize(4);  // bottom and top alone
+  Mesh mesh = mesh_of(facets);
+  const load::RepairReport report = load::repair(mesh, {5'000, 160'000});
+  EXPECT_EQ(report.vertices_welded, 0u);
+}
+
+TEST(Repair, LooseFacetsAreDroppedAndNotCapped) {
+  std::vector<FloatTriangle> facets = unit_box();
+  facets.push_back({20, 0, 0, 29, 0, 4, 20, 9, 2});
+  Mesh mesh = mesh_of(facets);
+  const load::RepairReport report = load::repair(mesh, 5000);
+  EXPECT_EQ(report.flat_dropped, 1u);
+  EXPECT_EQ(report.openings_capped, 0u);
+  EXPECT_EQ(canonical(mesh.triangles), canonical(mesh_of(unit_box()).triangles));
+}
+
+TEST(Repair, WhatIsInsideOutIsTurnedOver) {
+  std::vector<FloatTriangle> facets = unit_box();
+  for (FloatTriangle& f : facets) std::swap_ranges(f.begin(), f.begin() + 3, f.begin() + 3);
+  const Part part = loaded(write_file("inside_out.stl", binary_stl(facets)));
+  const Part clean = loaded(write_file("clean.stl", binary_stl(unit_box())));
+  EXPECT_EQ(placed(part), placed(clean));
+  EXPECT_EQ(part.meshes[0].fingerprint, clean.meshes[0].fingerprint);
+  EXPECT_NEAR(part.meshes[0].volume_mm3, 6000, 1e-6);
+  EXPECT_CONTAINS(notes_of(part), "inside out");
+}
+
 TEST(Repair, WeldingDoesNotTouchFineEdges) {
   // A missing facet with sides of 2 um is put back, not drawn together.
   std::vector<FloatTriangle> facets = box_facets({0, 0, 0}, {0.002f, 0.002f, 0.002f});

@@ -24,6 +24,8 @@ struct Description {
   std::vector<Diagnosis> diagnosis;   // of each mesh
   std::vector<std::uint32_t> copies;  // of each mesh
   std::vector<Note> notes;            // of the part as planned
+  std::vector<double> volume_mm3;     // of each mesh as planned
+  std::vector<double> capped_share;   // of each mesh as planned
   bool balanced = true;
   bool repairs = false;  // options.repair
 
@@ -33,7 +35,33 @@ struct Description {
     for (std::size_t i = 0; i < diagnosis.size(); ++i) sum += static_cast<Value>(copies[i]) * diagnosis[i].*member;
     return sum;
   }
+  double planned_mm3() const {
+    double sum = 0;
+    for (std::size_t i = 0; i < volume_mm3.size(); ++i) sum += copies[i] * volume_mm3[i];
+    return sum;
+  }
+  /// Of all meshes, by volume.
+  double planned_on_caps() const {
+    double sum = 0;
+    for (std::size_t i = 0; i < volume_mm3.size(); ++i) sum += copies[i] * volume_mm3[i] * capped_share[i];
+    const double volume = planned_mm3();
+    return volume > 0 ? sum / volume : 0;
+  }
+  void plan(const Part& loaded) {
+    volume_mm3.clear(), capped_share.clear();
+    for (const Mesh& mesh : loaded.meshes) {
+      volume_mm3.push_back(mesh.volume_mm3);
+      capped_share.push_back(mesh.capped_share);
+    }
+  }
 };
+
+/// Repair may change it, or refuse it.
+bool may_change(const Description& description) {
+  return !description.balanced || description.total(&Diagnosis::inverted_shells) > 0 ||
+         std::any_of(description.diagnosis.begin(), description.diagnosis.end(),
+                     [](const Diagnosis& found) { return found.volume_mm3 <= 0 || found.non_manifold_edges.count > 0; });
+}
 
 Result<Description> describe(const std::string& path, const LoadOptions& options) {
   const Result<std::string> format = format_of(path, options);
@@ -53,11 +81,13 @@ Result<Description> describe(const std::string& path, const LoadOptions& options
   }
   description.notes = part->notes;
   description.part = std::move(*part);
-  if (!description.balanced && options.repair) {
+  description.plan(description.part);
+  if (may_change(description) && options.repair) {
     for (Mesh& mesh : description.part.meshes) Buffer<Triangle>().swap(mesh.triangles);
     Result<Part> planned = load(path, options);
     if (!planned) return planned.error();
     description.notes = std::move(planned->notes);
+    if (planned->meshes.size() == description.copies.size()) description.plan(*planned);
   }
   return description;
 }
@@ -150,7 +180,7 @@ void describe_plan(const Description& description, std::string& text) {
   if (!remarks.empty()) text += "\n  notes\n";
   for (const Note* note : remarks) text += "    " + one_line(note->text) + "\n";
   text += "\n  lamina jet ";
-  if (repairs.empty() && description.balanced) {
+  if (repairs.empty() && (description.balanced || description.repairs)) {
     text += "plans it as it is.\n";
   } else if (!description.balanced && !description.repairs) {
     text += "plans it as it is, since repair is off; rows that stay open are reported.\n";
@@ -200,6 +230,10 @@ Result<std::string> describe_part_text(const std::string& path, const LoadOption
   row(text, "volume",
       fmt::format("{:.6g} mm3{}", d.total(&Diagnosis::volume_mm3), d.balanced ? "" : " (of an open mesh: an estimate)"));
   row(text, "closed", d.balanced ? "yes" : "no");
+  const double on_caps = d.planned_on_caps();
+  row(text, "planned volume",
+      fmt::format("{:.6g} mm3{}", d.planned_mm3(),
+                  on_caps > 0 ? fmt::format(", {:.3g} % of the surface is caps of openings: a guess", 100 * on_caps) : ""));
   if (d.diagnosis.size() > 1) describe_meshes(d, text);
   describe_findings(d, text);
   describe_plan(d, text);
@@ -221,6 +255,8 @@ Result<std::string> describe_part_json(const std::string& path, const LoadOption
   json["bounds_mm"] = {{"lo", as_json(d.part.bounds.lo)}, {"hi", as_json(d.part.bounds.hi)}};
   json["volume_mm3"] = d.total(&Diagnosis::volume_mm3);
   json["closed"] = d.balanced;
+  json["planned_volume_mm3"] = d.planned_mm3();
+  json["capped_share"] = d.planned_on_caps();
   json["notes"] = nlohmann::ordered_json::array();
   json["repairs"] = nlohmann::ordered_json::array();
   for (const Note& note : d.notes) json[note.repair ? "repairs" : "notes"].push_back(note.text);
@@ -229,6 +265,8 @@ Result<std::string> describe_part_json(const std::string& path, const LoadOption
     nlohmann::ordered_json mesh = as_json(d.diagnosis[i]);
     mesh["name"] = short_name(d, i);
     mesh["copies"] = d.copies[i];
+    mesh["planned_volume_mm3"] = d.volume_mm3[i];
+    mesh["capped_share"] = d.capped_share[i];
     json["meshes"].push_back(std::move(mesh));
   }
   // Names in a file may be bytes that are not UTF-8.

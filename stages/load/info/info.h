@@ -9,8 +9,9 @@
 namespace lamina::load {
 
 /// A page about a part, as in its file: format, counts, size in mm, volume, whether it is closed and where it is not,
-/// what was noticed, and what `lamina jet` will do about it. Lines end with LF, the last one too. Counts and volume are
-/// of all build items together.
+/// what was noticed, and what `lamina jet` will do about it: the volume that is planned, where shells that overlap count as
+/// often as they do, and the share of the surface that caps of openings are. Lines end with LF, the last one too. Counts and
+/// volume are of all build items together.
 ///
 /// options  as for a job; the mesh is diagnosed before any repair, even if options.repair is on
 /// errors   of load(): a file that cannot be planned

@@ -1,6 +1,9 @@
-// stages/load/repair/census.cpp: whether a mesh is closed, and which mesh it is, in one pass without sorting.
+// stages/load/repair/census.cpp: whether a mesh is closed, which mesh it is and how large, in one pass without sorting.
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_reduce.h>
+
+#include <algorithm>
+#include <vector>
 
 #include "stages/load/repair/diagnose.h"
 
@@ -28,12 +31,40 @@ inline std::uint64_t walked(std::uint64_t from, std::uint64_t to) { return fold(
 
 struct Sums {
   std::uint64_t boundary = 0, fingerprint = 0;  // sums modulo 2^64 do not depend on their order
+  double sixfold_volume = 0;                    // nm3; its order is fixed by splitting at places that threads do not decide
+  std::vector<std::uint64_t> sampled;           // facets without their orientation, which is the lowest bit
 };
+
+constexpr std::size_t kMostSampled = std::size_t{1} << 15;
+
+/// Whether two of the sampled facets differ in orientation alone. A full table forgets nothing: it is at most half full.
+bool any_reversed(std::span<const std::uint64_t> sampled) {
+  std::size_t size = 64;
+  while (size < 2 * sampled.size()) size *= 2;
+  std::vector<std::uint64_t> table(size, 0);
+  for (const std::uint64_t facet : sampled) {
+    std::size_t at = (facet >> 1) & (size - 1);
+    for (; table[at] != 0 && table[at] != facet; at = (at + 1) & (size - 1))
+      if (table[at] == (facet ^ 1)) return true;
+    table[at] = facet;
+  }
+  return false;
+}
+
+/// Six times the signed volume of the prism between a facet and the plane z = `from`; rounded.
+inline double sixfold_volume(const Triangle& t, std::int64_t from) {
+  const auto off = [](Nm one, Nm other) { return static_cast<double>(std::int64_t{one} - other); };
+  const double area = off(t.b.x, t.a.x) * off(t.c.y, t.a.y) - off(t.c.x, t.a.x) * off(t.b.y, t.a.y);
+  return area * static_cast<double>(std::int64_t{t.a.z} + t.b.z + t.c.z - 3 * from);
+}
 
 }  // namespace
 
-Census census(std::span<const Triangle> triangles) {
-  const Sums sums = tbb::parallel_reduce(
+Census census(std::span<const Triangle> triangles, Nm plane) {
+  // One facet in `share` is sampled, chosen by the sum of its corners' hashes.
+  const std::uint64_t share = std::max<std::uint64_t>(1, triangles.size() / kMostSampled);
+  const std::uint64_t below = UINT64_MAX / share;
+  const Sums sums = tbb::parallel_deterministic_reduce(
       tbb::blocked_range<std::size_t>(0, triangles.size(), 1 << 14), Sums{},
       [&](const tbb::blocked_range<std::size_t>& range, Sums so_far) {
         for (std::size_t i = range.begin(); i != range.end(); ++i) {
@@ -42,13 +73,21 @@ Census census(std::span<const Triangle> triangles) {
           const std::uint64_t backward = walked(b, a) + walked(c, b) + walked(a, c);
           so_far.boundary += forward - backward;
           so_far.fingerprint += fold(forward ^ kA, kD);
+          so_far.sixfold_volume += sixfold_volume(triangles[i], plane);
+          const std::uint64_t unordered = (a + b + c) * kD;
+          if (unordered > below || a == b || b == c || c == a) continue;
+          so_far.sampled.push_back((unordered * kB | 1) ^ ((a < b) ^ (b < c) ^ (c < a) ? 1u : 0u));
         }
         return so_far;
       },
-      [](const Sums& one, const Sums& other) {
-        return Sums{one.boundary + other.boundary, one.fingerprint + other.fingerprint};
+      [](Sums one, const Sums& other) {
+        one.boundary += other.boundary;
+        one.fingerprint += other.fingerprint;
+        one.sixfold_volume += other.sixfold_volume;
+        one.sampled.insert(one.sampled.end(), other.sampled.begin(), other.sampled.end());
+        return one;
       });
-  return {sums.boundary == 0, sums.fingerprint};
+  return {sums.boundary == 0, sums.fingerprint, sums.sixfold_volume / 6e18, any_reversed(sums.sampled)};
 }
 
 }  // namespace lamina::load

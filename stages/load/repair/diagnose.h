@@ -45,9 +45,16 @@ struct Census {
   /// Sum over all facets of a hash of their corners, the same for any order of the facets and any first corner.
   /// Tells `--resume` that a part is still the part it was.
   std::uint64_t fingerprint = 0;
+  /// Signed, of the prisms between all facets and a level plane: of the solid if the mesh is balanced, wherever the plane
+  /// is; an estimate if it is open and the plane crosses it. Rounded, the same for any number of threads.
+  double volume_mm3 = 0;
+  /// Some facet was seen to lie in the mesh twice, once turned over: shells may cancel each other (enclosed.h). All facets
+  /// are looked at in meshes of up to 32768, a share of them, decided by their corners, in larger ones.
+  bool reversed_twins = false;
 };
 
+/// plane: its height in nm; within the mesh, so that little cancels out.
 /// cost: O(T), parallel, no memory.
-Census census(std::span<const Triangle> triangles);
+Census census(std::span<const Triangle> triangles, Nm plane = 0);
 
 }  // namespace lamina::load

@@ -54,30 +54,17 @@ std::uint64_t drop(Work& work, std::span<const std::uint8_t> unwanted) {
   return dropped;
 }
 
-/// Welding is undone if it does not leave fewer edges open.
-std::uint64_t weld(Work& work, std::int64_t weld_nm) {
-  const Welding welding = find_welding(work.indexed, work.sides, weld_nm);
-  if (welding.moved == 0) return 0;
-  const auto odd_edges = [](std::span<const Side> sides) {
-    std::uint64_t count = 0;
-    for_each_edge(sides, [&](const Side* begin, const Side* end) { count += (end - begin) % 2; });
-    return count;
-  };
-  const Buffer<Facet> before = work.indexed.facet;
-  for (Facet& facet : work.indexed.facet)
-    for (std::uint32_t& corner : facet) corner = welding.target[corner];
-  Buffer<Side> sides = sorted_sides(work.indexed.facet);
-  if (odd_edges(sides) >= odd_edges(work.sides)) {
-    work.indexed.facet = before;
-    return 0;
-  }
-  work.sides = std::move(sides);
-  work.unmatched = imbalance(work.sides);
-  for (std::size_t i = 0; i < before.size(); ++i) {
+void weld(Work& work, const WeldRange& range, RepairReport& report) {
+  const Welding welding = weld(work.indexed, work.sides, range);
+  if (welding.joined == 0) return;
+  report.vertices_welded = welding.joined;
+  report.weld_nm = welding.distance_nm;
+  for (std::size_t i = 0; i < work.indexed.facet.size(); ++i) {
     const Facet& facet = work.indexed.facet[i];
     work.mesh.triangles[i] = {work.indexed.vertex[facet[0]], work.indexed.vertex[facet[1]], work.indexed.vertex[facet[2]]};
   }
-  return welding.moved;
+  work.indexed = index_mesh(work.mesh.triangles);
+  work.refresh();
 }
 
 /// Which facets to turn over so that neighbours agree. Neighbours are the two facets of an edge that has two.
@@ -165,25 +152,32 @@ void cap(Work& work, RepairReport& report) {
 
 }  // namespace
 
-RepairReport repair(Mesh& mesh, std::int64_t weld_nm) {
+RepairReport repair(Mesh& mesh, const WeldRange& range, bool caps) {
   RepairReport report;
   mesh.repaired_from = static_cast<std::uint32_t>(mesh.triangles.size());
   if (census(mesh.triangles).balanced) return report;
   Work work(mesh);
   if (work.unmatched > 0) report.duplicates_dropped = drop(work, repeats(work.indexed.facet));
-  if (work.unmatched > 0 && weld_nm > 0) report.vertices_welded = weld(work, weld_nm);
+  if (work.unmatched > 0 && range.start_nm > 0) weld(work, range, report);
+  if (work.unmatched > 0 && report.vertices_welded > 0) report.duplicates_dropped += drop(work, repeats(work.indexed.facet));
   if (work.unmatched > 0) report.facets_turned = orient(work);
-  if (work.unmatched > 0) {
+  if (work.unmatched > 0 && caps) {
     const StraySheets stray = find_stray_sheets(work.indexed.facet.size(), work.sides);
     report.sheets_dropped = stray.sheets;
     report.sheet_facets_dropped = drop(work, stray.drop);
   }
-  if (report.sheets_dropped > 0 || report.vertices_welded > 0) {
+  report.volume_before_mm3 = census(mesh.triangles, mesh.bounds.middle().z).volume_mm3;
+  if (work.unmatched > 0 && caps) {
+    const StraySheets flat = find_flat_pieces(work.indexed, work.sides, report.weld_nm);
+    report.flat_dropped = flat.sheets;
+    report.flat_facets_dropped = drop(work, flat.drop);
+  }
+  if (report.sheets_dropped + report.flat_dropped + report.vertices_welded > 0) {
     mesh.bounds = {};
     for (const Triangle& t : mesh.triangles) mesh.bounds.add(t.a), mesh.bounds.add(t.b), mesh.bounds.add(t.c);
   }
   mesh.repaired_from = static_cast<std::uint32_t>(mesh.triangles.size());
-  if (work.unmatched > 0) cap(work, report);
+  if (work.unmatched > 0 && caps) cap(work, report);
   return report;
 }
 

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "stages/data/mesh.h"
+#include "stages/load/repair/weld.h"
 
 namespace lamina::load {
 
@@ -13,23 +14,29 @@ struct RepairReport {
   std::uint64_t duplicates_dropped = 0;
   std::uint64_t facets_turned = 0;
   std::uint64_t vertices_welded = 0;
+  std::int64_t weld_nm = 0;          // the largest distance that closed something
   std::uint64_t sheets_dropped = 0;  // surfaces that hung on a solid and enclosed nothing
   std::uint64_t sheet_facets_dropped = 0;
+  std::uint64_t flat_dropped = 0;  // pieces that lie in a plane, and so enclose nothing
+  std::uint64_t flat_facets_dropped = 0;
+  double volume_before_mm3 = 0;       // an estimate (census), before flat pieces were dropped and openings capped
   std::uint64_t openings_capped = 0;  // loops of unmatched edges
   std::uint64_t cap_triangles = 0;
   Box capped;                     // around all caps
   double largest_opening_mm = 0;  // largest box diagonal of one loop
   Box largest_opening;            // around that loop
-  bool changed() const { return duplicates_dropped + facets_turned + vertices_welded + sheets_dropped + openings_capped > 0; }
+  bool changed() const {
+    return duplicates_dropped + facets_turned + vertices_welded + sheets_dropped + flat_dropped + openings_capped > 0;
+  }
 };
 
 /// Repairs a mesh that is not balanced (diagnose.h), in this order, each step only while the mesh is unbalanced:
 ///  1. a facet that repeats an earlier one (same corners, same orientation) is dropped;
-///  2. vertices on edges with an odd number of facets that are at most weld_nm apart become one (the lexicographically
-///     smallest of them; weld.h has the rule), unless that would leave as many such edges as before;
+///  2. open edges that were meant to be one are joined, over growing distances (weld.h has the rule);
 ///  3. facets are turned over so that neighbours across two-facet edges agree; per connected component the
 ///     orientation of the larger area wins; undone if it would leave more unmatched than before;
-///  4. stray sheets, which hang on a solid with a rim that is open, are dropped (sheets.h has the rule);
+///  4. stray sheets, which hang on a solid with a rim that is open, and loose flat pieces are dropped (sheets.h has the
+///     rules);
 ///  5. the edges that are still unmatched are walked into loops, smallest first come, and each loop is capped with a
 ///     fan of triangles from its smallest vertex.
 /// After step 5 every edge is balanced, whatever the input: the boundary of a chain of triangles is a set of cycles,
@@ -40,6 +47,17 @@ struct RepairReport {
 /// The result does not depend on threads. A balanced mesh is returned untouched. mesh.bounds is kept up to date,
 /// mesh.fingerprint is not.
 /// cost  a balanced mesh: one pass; else O(T log T), about 150 bytes a triangle on top of the mesh while it works
-RepairReport repair(Mesh& mesh, std::int64_t weld_nm);
+///
+/// caps  false: only the first three steps, for whoever closes the mesh otherwise
+RepairReport repair(Mesh& mesh, const WeldRange& weld, bool caps = true);
+
+/// Turns every facet over if the mesh is closed and its volume negative. Keeps mesh.volume_mm3 and mesh.fingerprint right,
+/// both of which must be up to date. The nonzero rule plans the same before and after.
+/// returns  whether it was inside out
+bool turn_over_if_inside_out(Mesh& mesh);
+
+/// Area of the triangles from mesh.repaired_from on over the area of all; 0 for a mesh without area.
+/// cost     O(T) where there are any, else nothing
+double capped_share(const Mesh& mesh);
 
 }  // namespace lamina::load

@@ -20,4 +20,10 @@ struct StraySheets {
 /// cost  O(T) after sorting
 StraySheets find_stray_sheets(std::size_t facet_count, std::span<const Side> sides);
 
+/// Pieces that cannot enclose anything: facets that hang together over vertices, with open edges, all of whose vertices
+/// lie within `tolerance_nm` or a thousandth of the piece's size of a plane. A loose facet is one. A cap would put a
+/// second sheet upon them.
+/// cost  O(T) after sorting
+StraySheets find_flat_pieces(const Indexed& mesh, std::span<const Side> sides, std::int64_t tolerance_nm);
+
 }  // namespace lamina::load

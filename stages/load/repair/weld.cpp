@@ -1,84 +1,178 @@
-// stages/load/repair/weld.cpp: a sweep along x over the vertices, which are sorted already.
+// stages/load/repair/weld.cpp: open edges joined, nearest first, over one distance after the other.
 #include "stages/load/repair/weld.h"
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <numeric>
+
+#include "stages/load/repair/matches.h"
 
 namespace lamina::load {
 namespace {
 
-bool within(const Point3& p, const Point3& q, std::int64_t distance) {
-  const std::int64_t dx = std::int64_t{p.x} - q.x, dy = std::int64_t{p.y} - q.y, dz = std::int64_t{p.z} - q.z;
-  if (std::abs(dx) > distance || std::abs(dy) > distance || std::abs(dz) > distance) return false;
-  // Each term is below 2^62 for distances within 1 m, which is far more than anybody welds.
-  return dx * dx + dy * dy + dz * dz <= distance * distance;
+/// Vertices in clusters that become one vertex each.
+class Clusters {
+ public:
+  explicit Clusters(const Indexed& mesh) : facets_(mesh.facet), sets_(mesh.vertex.size()), next_(mesh.vertex.size()) {
+    const std::size_t count = mesh.vertex.size();
+    std::iota(next_.begin(), next_.end(), 0u);
+    members_.resize(count);
+    std::fill(members_.begin(), members_.end(), 1u);
+    sum_.resize(count);
+    box_.resize(count);
+    for (std::size_t v = 0; v < count; ++v) {
+      const Point3& p = mesh.vertex[v];
+      sum_[v] = {p.x, p.y, p.z};
+      box_[v] = {};
+      box_[v].add(p);
+    }
+    // Which facets use a vertex, in one list.
+    first_.resize(count + 1);
+    std::fill(first_.begin(), first_.end(), 0u);
+    for (const Indexed::Facet& facet : facets_)
+      for (const std::uint32_t corner : facet) ++first_[corner + 1];
+    for (std::size_t v = 0; v < count; ++v) first_[v + 1] += first_[v];
+    user_.resize(3 * facets_.size());
+    Buffer<std::uint32_t> free = first_;
+    for (std::uint32_t f = 0; f < facets_.size(); ++f)
+      for (const std::uint32_t corner : facets_[f]) user_[free[corner]++] = f;
+  }
+
+  std::uint32_t find(std::uint32_t vertex) { return sets_.find(vertex); }
+  std::uint64_t joined() const { return joined_; }
+
+  /// Whether two vertices may become one: no facet has both, and together they spread no wider than the distance.
+  bool may_join(std::uint32_t one, std::uint32_t other, std::int64_t distance) {
+    one = find(one), other = find(other);
+    if (one == other) return true;
+    Box both = box_[one];
+    both.add(box_[other]);
+    if (std::max({both.width(), both.depth(), both.height()}) > distance) return false;
+    if (members_[one] > members_[other]) std::swap(one, other);
+    std::uint32_t member = one;
+    do {
+      for (std::uint32_t i = first_[member]; i < first_[member + 1]; ++i)
+        for (const std::uint32_t corner : facets_[user_[i]])
+          if (find(corner) == other) return false;
+      member = next_[member];
+    } while (member != one);
+    return true;
+  }
+
+  void join(std::uint32_t one, std::uint32_t other) {
+    one = find(one), other = find(other);
+    if (one == other) return;
+    sets_.join(one, other);
+    const std::uint32_t kept = std::min(one, other), gone = std::max(one, other);
+    members_[kept] += members_[gone];
+    box_[kept].add(box_[gone]);
+    for (std::size_t k = 0; k < 3; ++k) sum_[kept][k] += sum_[gone][k];
+    std::swap(next_[kept], next_[gone]);  // two rings become one
+    ++joined_;
+  }
+
+  /// The middle of a cluster's vertices, rounded down.
+  Point3 place(std::uint32_t representative) const {
+    const auto mean = [&](std::size_t k) {
+      return static_cast<Nm>(floor_div<std::int64_t>(sum_[representative][k], members_[representative]));
+    };
+    return {mean(0), mean(1), mean(2)};
+  }
+
+ private:
+  std::span<const Indexed::Facet> facets_;
+  DisjointSets sets_;
+  Buffer<std::uint32_t> next_, members_, first_, user_;
+  Buffer<std::array<std::int64_t, 3>> sum_;
+  Buffer<Box> box_;
+  std::uint64_t joined_ = 0;
+};
+
+Buffer<float> shortest_edges(const Indexed& mesh) {
+  Buffer<float> shortest(mesh.vertex.size());
+  std::fill(shortest.begin(), shortest.end(), 1e30f);
+  for (const Indexed::Facet& facet : mesh.facet) {
+    if (collapsed(facet)) continue;
+    for (std::size_t k = 0; k < 3; ++k) {
+      const std::uint32_t one = facet[k], other = facet[(k + 1) % 3];
+      const Point3 &p = mesh.vertex[one], &q = mesh.vertex[other];
+      const double x = static_cast<double>(p.x) - q.x, y = static_cast<double>(p.y) - q.y, z = static_cast<double>(p.z) - q.z;
+      const auto length = static_cast<float>(std::sqrt(x * x + y * y + z * z));
+      shortest[one] = std::min(shortest[one], length);
+      shortest[other] = std::min(shortest[other], length);
+    }
+  }
+  return shortest;
+}
+
+void join_matches(std::span<const OpenSide> open, std::span<const Match> matches, std::int64_t distance, Clusters& clusters) {
+  Buffer<std::uint8_t> from_used(open.size()), to_used(open.size());
+  std::fill(from_used.begin(), from_used.end(), std::uint8_t{0});
+  std::fill(to_used.begin(), to_used.end(), std::uint8_t{0});
+  for (const Match& match : matches) {
+    const OpenSide &one = open[match.first], &other = open[match.second];
+    const bool along = match.kind == MatchKind::kAlong, equal = match.kind == MatchKind::kEqual;
+    if (to_used[match.first] || from_used[match.second]) continue;
+    if (!along && (from_used[match.first] || to_used[match.second])) continue;
+    const std::uint32_t partner_of_to = equal ? other.to : other.from, partner_of_from = equal ? other.from : other.to;
+    if (!clusters.may_join(one.to, partner_of_to, distance)) continue;
+    if (!along && !clusters.may_join(one.from, partner_of_from, distance)) continue;
+    clusters.join(one.to, partner_of_to);
+    to_used[match.first] = from_used[match.second] = 1;
+    if (along) continue;
+    // The first joint may have changed what the second may do.
+    if (!clusters.may_join(one.from, partner_of_from, distance)) continue;
+    clusters.join(one.from, partner_of_from);
+    from_used[match.first] = to_used[match.second] = 1;
+  }
+}
+
+struct Faults {
+  std::uint64_t open = 0, crowded = 0;  // edges with one facet, with more than two
+};
+
+Faults faults(std::span<const Side> sides) {
+  Faults found;
+  for_each_edge(sides, [&](const Side* begin, const Side* end) {
+    found.open += end - begin == 1;
+    found.crowded += end - begin > 2;
+  });
+  return found;
 }
 
 }  // namespace
 
-Welding find_welding(const Indexed& mesh, std::span<const Side> sides, std::int64_t weld_nm) {
-  weld_nm = std::min<std::int64_t>(weld_nm, 1'000'000'000);
+Welding weld(Indexed& mesh, Buffer<Side>& sides, const WeldRange& range) {
   Welding welding;
-  welding.target.resize(mesh.vertex.size());
-  std::iota(welding.target.begin(), welding.target.end(), 0u);
-
-  Buffer<std::uint32_t> loose;
-  for_each_edge(sides, [&](const Side* begin, const Side* end) {
-    if ((end - begin) % 2 == 0) return;
-    loose.push_back(begin->low);
-    loose.push_back(begin->high);
-  });
-  std::sort(loose.begin(), loose.end());
-  loose.erase(std::unique(loose.begin(), loose.end()), loose.end());
-
-  const auto joined_by_edge = [&](std::uint32_t low, std::uint32_t high) {
-    const auto found = std::lower_bound(sides.begin(), sides.end(), std::array{low, high},
-                                        [](const Side& side, const std::array<std::uint32_t, 2>& edge) {
-                                          return std::array{side.low, side.high} < edge;
-                                        });
-    return found != sides.end() && found->low == low && found->high == high;
-  };
-
-  // Columns of cells in y and z, so that a vertex meets only those nearby: sorted by cell, then as before.
-  struct Placed {
-    std::int64_t y, z;
-    std::uint32_t vertex;
-  };
-  const auto cell = [&](const Point3& p) {
-    return std::array{floor_div<std::int64_t>(p.y, weld_nm), floor_div<std::int64_t>(p.z, weld_nm)};
-  };
-  Buffer<Placed> placed;
-  for (const std::uint32_t vertex : loose) {
-    const auto [y, z] = cell(mesh.vertex[vertex]);
-    placed.push_back({y, z, vertex});
-  }
-  const auto before = [&](const Placed& one, const Placed& other) {
-    return std::tie(one.y, one.z, one.vertex) < std::tie(other.y, other.z, other.vertex);
-  };
-  std::sort(placed.begin(), placed.end(), before);
-
-  Buffer<std::uint8_t> taken(mesh.vertex.size());
-  std::fill(taken.begin(), taken.end(), std::uint8_t{0});
-  for (const std::uint32_t leader : loose) {
-    if (taken[leader]) continue;
-    taken[leader] = 1;
-    const Point3& centre = mesh.vertex[leader];
-    const auto [y, z] = cell(centre);
-    for (std::int64_t dy = -1; dy <= 1; ++dy) {
-      for (std::int64_t dz = -1; dz <= 1; ++dz) {
-        // Vertices before the leader in x are leaders or taken, so only those after it are looked at.
-        auto at = std::lower_bound(placed.begin(), placed.end(), Placed{y + dy, z + dz, leader}, before);
-        for (; at != placed.end() && at->y == y + dy && at->z == z + dz; ++at) {
-          const Point3& point = mesh.vertex[at->vertex];
-          if (std::int64_t{point.x} - centre.x > weld_nm) break;
-          if (taken[at->vertex] || !within(point, centre, weld_nm) || joined_by_edge(leader, at->vertex)) continue;
-          taken[at->vertex] = 1;
-          welding.target[at->vertex] = leader;
-          ++welding.moved;
-        }
+  Faults now = faults(sides);
+  for (std::int64_t distance = range.start_nm; distance > 0 && now.open > 0;) {
+    const Buffer<OpenSide> open = open_sides(mesh, sides);
+    const Buffer<Match> matches = find_matches(mesh, open, shortest_edges(mesh), distance);
+    Clusters clusters(mesh);
+    join_matches(open, matches, distance, clusters);
+    if (clusters.joined() > 0) {
+      Buffer<Indexed::Facet> facets = mesh.facet;
+      for (Indexed::Facet& facet : facets)
+        for (std::uint32_t& corner : facet) corner = clusters.find(corner);
+      Buffer<Side> joined = sorted_sides(facets);
+      const Faults then = faults(joined);
+      const bool closes = then.open < now.open;
+      const bool crowds =
+          then.crowded > now.crowded && 8 * (then.crowded - now.crowded) > now.open - std::min(now.open, then.open);
+      if (crowds) break;
+      if (closes) {
+        for (std::uint32_t v = 0; v < mesh.vertex.size(); ++v)
+          if (clusters.find(v) == v) mesh.vertex[v] = clusters.place(v);
+        mesh.facet = std::move(facets);
+        sides = std::move(joined);
+        now = then;
+        welding.joined += clusters.joined();
+        welding.distance_nm = distance;
       }
     }
+    if (distance >= range.most_nm) break;
+    distance = std::min(2 * distance, range.most_nm);
   }
   return welding;
 }

@@ -1,4 +1,4 @@
-// stages/load/repair/weld.h: vertices at open edges that were meant to be one; internal to load.
+// stages/load/repair/weld.h: open edges that were meant to be one; internal to load.
 #pragma once
 
 #include <cstdint>
@@ -8,16 +8,32 @@
 
 namespace lamina::load {
 
-struct Welding {
-  Buffer<std::uint32_t> target;  // for each vertex the one that it becomes, mostly itself
-  std::uint64_t moved = 0;       // vertices that become another one
+/// Distances to try one after the other: start, twice that, and so on up to `most`; 0 joins nothing.
+struct WeldRange {
+  std::int64_t start_nm = 0, most_nm = 0;
+  WeldRange(std::int64_t only_nm) : WeldRange(only_nm, only_nm) {}  // NOLINT: a distance is a range
+  WeldRange(std::int64_t start, std::int64_t most) : start_nm(start), most_nm(most) {}
 };
 
-/// Looks only at vertices on edges with an odd number of facets, and takes them in lexicographic order: each that is
-/// not taken yet takes all the others within `weld_nm` (straight distance). So no vertex moves further than that,
-/// however many lie in a row. Two vertices with an edge between them are never joined: short edges of fine meshes
-/// stay, and a facet that is missing can be put back.
-/// cost  O(V log V) for V vertices on open edges
-Welding find_welding(const Indexed& mesh, std::span<const Side> sides, std::int64_t weld_nm);
+struct Welding {
+  std::uint64_t joined = 0;      // vertices that became one with another
+  std::int64_t distance_nm = 0;  // the largest distance that was tried and closed something
+};
+
+/// Joins vertices at open edges (edges with one facet) and moves them to the middle of those that become one. What is
+/// joined are edges, not points, nearest first:
+///  - two open edges whose ends lie within the distance become one; opposite directions before equal ones;
+///  - then the end of an open edge joins that of another which runs back along it, as at a vertex that only one side has.
+/// An edge is joined once. Refused, because it would harm what is sound: ends further apart than half of the shortest
+/// edge at either; facets that would lose a corner; vertices spread wider than the distance; facets that lie upon each
+/// other, such as the two sides of a wall (unless they are too small against the distance to tell).
+///
+/// Distances grow until no edge is open. A distance after which edges with more than two facets grow by more than an
+/// eighth of what it closes, or that closes nothing, is undone; the former ends the search.
+///
+/// mesh    facets and places are changed; places are then no longer in order: index again
+/// sides   of mesh.facet, sorted; kept up to date
+/// cost    per distance O(T) and the sorting of sides; parallel where it searches
+Welding weld(Indexed& mesh, Buffer<Side>& sides, const WeldRange& range);
 
 }  // namespace lamina::load

@@ -1,0 +1,231 @@
+// stages/load/repair/finish.cpp: census, repair, and what to say of them.
+#include "stages/load/repair/finish.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "stages/load/repair/diagnose.h"
+#include "stages/load/repair/enclosed.h"
+#include "stages/load/repair/geometry.h"
+#include "stages/load/repair/repair.h"
+#include "stages/load/winding/winding.h"
+
+namespace lamina::load {
+namespace {
+
+std::string plural(std::uint64_t count, const char* what) { return fmt::format("{} {}{}", count, what, count == 1 ? "" : "s"); }
+
+std::string place(const Box& box) {
+  const Point3 at = box.middle();
+  return fmt::format("({:.3f}, {:.3f}, {:.3f}) mm", mm(at.x), mm(at.y), mm(at.z));
+}
+
+double diagonal_nm(const Box& box) {
+  const auto width = static_cast<double>(box.width()), depth = static_cast<double>(box.depth()),
+             height = static_cast<double>(box.height());
+  return std::sqrt(width * width + depth * depth + height * height);
+}
+
+/// Repair notes end with the places of the file's own coordinates, so that they can be found in a modeller.
+void describe_repair(const RepairReport& report, const std::string& prefix, std::vector<Note>& notes) {
+  const auto note = [&](const std::string& text) { notes.push_back({true, prefix + text}); };
+  if (report.duplicates_dropped > 0) note(plural(report.duplicates_dropped, "duplicate facet") + " dropped");
+  if (report.vertices_welded > 0)
+    note(fmt::format("{} {} at open edges welded to a neighbour within {:.6g} um", report.vertices_welded,
+                     report.vertices_welded == 1 ? "vertex" : "vertices", static_cast<double>(report.weld_nm) / 1000));
+  if (report.facets_turned > 0) note(plural(report.facets_turned, "facet") + " turned over to agree with the neighbours");
+  if (report.sheets_dropped > 0)
+    note(fmt::format("{} with {} dropped (an open rim, hanging on the solid, enclosing nothing)",
+                     plural(report.sheets_dropped, "stray surface"), plural(report.sheet_facets_dropped, "facet")));
+  if (report.flat_dropped > 0)
+    note(fmt::format("{} with {} dropped (loose, and flat: enclosing nothing)", plural(report.flat_dropped, "surface"),
+                     plural(report.flat_facets_dropped, "facet")));
+  if (report.openings_capped > 0)
+    note(fmt::format("{} capped with {}, the largest {:.3g} mm wide near {}", plural(report.openings_capped, "opening"),
+                     plural(report.cap_triangles, "triangle"), report.largest_opening_mm, place(report.largest_opening)));
+}
+
+/// Sides that no other facet shares, over all sides.
+double open_share(std::span<const Triangle> triangles) {
+  const Indexed indexed = index_mesh(triangles);
+  const Buffer<Side> sides = sorted_sides(indexed.facet);
+  std::uint64_t open = 0;
+  for_each_edge(sides, [&](const Side* begin, const Side* end) { open += end - begin == 1; });
+  return sides.empty() ? 1 : static_cast<double>(open) / static_cast<double>(sides.size());
+}
+
+/// A plane, a line or a point.
+bool is_flat(const Mesh& mesh) {
+  return std::min({mesh.bounds.width(), mesh.bounds.depth(), mesh.bounds.height()}) <= 0 ||
+         std::none_of(mesh.triangles.begin(), mesh.triangles.end(), has_area);
+}
+
+/// Decides which facets of a file whose length contradicts its header are taken. `found` is kept up to date.
+/// errors  kInput: neither all of them nor those that the header speaks of
+Status settle_doubt(const Source& source, const Doubt& doubt, Mesh& mesh, Census& found, std::vector<Note>& notes) {
+  const std::span<const Triangle> all(mesh.triangles.data(), mesh.triangles.size());
+  if (doubt.claimed == 0 || doubt.claimed >= all.size()) {
+    if (!found.balanced) return source.error(doubt.error);
+    notes.push_back({false, doubt.note});
+    return {};
+  }
+  const Census first = census(all.first(doubt.claimed), mesh.bounds.middle().z);
+  // Behind a closed mesh, padding with zeros closes too, but encloses nothing.
+  const bool rest_counts = std::fabs(found.volume_mm3 - first.volume_mm3) > 1e-9 * std::fabs(first.volume_mm3);
+  bool whole = found.balanced && (!first.balanced || rest_counts);
+  if (!whole && !first.balanced) {
+    // Rubbish fits nowhere; facets fit as well as those before them.
+    whole = open_share(all) <= 1.001 * open_share(all.first(doubt.claimed));
+    if (whole)
+      notes.push_back({true, fmt::format("the header says {} facets, the file holds {}, which fit together: all are read",
+                                         doubt.claimed, all.size())});
+  } else if (whole) {
+    notes.push_back({true, doubt.note});
+  }
+  if (whole) return {};
+  notes.push_back({false, doubt.rest_left_out});
+  mesh.triangles.resize(doubt.claimed);
+  mesh.bounds = {};
+  for (const Triangle& t : mesh.triangles) mesh.bounds.add(t.a), mesh.bounds.add(t.b), mesh.bounds.add(t.c);
+  found = census(mesh.triangles, mesh.bounds.middle().z);
+  return {};
+}
+
+/// 5 um goes up to 160 um, or a hundredth of a small mesh's size; any other distance is taken as it is.
+WeldRange weld_range(const LoadOptions& options, const Box& bounds) {
+  if (options.weld_nm != kWeldByItself) return options.weld_nm;
+  const auto most = static_cast<std::int64_t>(std::min(160e3, diagonal_nm(bounds) / 100));
+  return {options.weld_nm, std::max(options.weld_nm, most)};
+}
+
+/// Why a repaired mesh is no solid; "" if it is one.
+std::string why_hollow(const Mesh& mesh, const RepairReport& report) {
+  if (mesh.triangles.empty()) return "its facets lie loose and enclose nothing";
+  const Enclosed held = enclosed(mesh);
+  if (held.nothing()) return "its facets enclose nothing";
+  const double before = std::fabs(report.volume_before_mm3);
+  if (held.volume_mm3 >= before / 2) return {};
+  return fmt::format("its facets lie apart: closing them leaves {:.4g} of some {:.4g} mm3", held.volume_mm3, before);
+}
+
+/// The smallest distance, doubled again and again, at which the facets become a solid that hardly hangs on caps; 0 if
+/// there is none up to a twentieth of the size.
+std::int64_t weld_that_closes(const Buffer<Triangle>& triangles, const Box& bounds, std::int64_t tried_nm) {
+  const auto most = static_cast<std::int64_t>(diagonal_nm(bounds) / 20);
+  for (std::int64_t distance = kWeldByItself; distance <= most; distance *= 2) {
+    if (distance <= tried_nm) continue;
+    Mesh mesh;
+    mesh.triangles = triangles;
+    mesh.bounds = bounds;
+    const RepairReport report = repair(mesh, distance);
+    if (why_hollow(mesh, report).empty() && capped_share(mesh) < 0.1) return distance;
+  }
+  return 0;
+}
+
+/// Closes a mesh by its winding number, after welding and turning facets over.
+/// errors  kInput: nothing is left
+Status close_by_winding(const Source& source, const std::string& prefix, const LoadOptions& options, Mesh& mesh, Census& found,
+                        std::vector<Note>& notes) {
+  describe_repair(repair(mesh, weld_range(options, mesh.bounds), false), prefix, notes);
+  found = census(mesh.triangles, mesh.bounds.middle().z);
+  if (!found.balanced) {
+    const std::size_t facets = mesh.triangles.size();
+    const Remeshed remeshed = remesh(mesh);
+    found = census(mesh.triangles, mesh.bounds.middle().z);
+    if (!found.balanced) return Error{Fault::kInternal, source.path() + ": remeshing left the mesh open; please report it"};
+    notes.push_back(
+        {true, fmt::format("{}approximate: {} facets became {} where the winding number is a half, found in cells of "
+                           "{:.4g} mm; what is thinner may be lost",
+                           prefix, facets, mesh.triangles.size(), remeshed.cell_mm)});
+  }
+  if (mesh.triangles.empty() || enclosed(mesh).nothing())
+    return source.error(prefix + "its facets enclose nothing, by their winding number too; export it as a solid");
+  return {};
+}
+
+/// errors  kInput: what is left is no solid
+Status close(const Source& source, const std::string& prefix, const LoadOptions& options, Mesh& mesh, Census& found,
+             std::vector<Note>& notes) {
+  const Buffer<Triangle> original = mesh.triangles;
+  const Box bounds = mesh.bounds;
+  const WeldRange range = weld_range(options, bounds);
+  const RepairReport report = repair(mesh, range);
+  found = census(mesh.triangles, mesh.bounds.middle().z);
+  if (!found.balanced) return Error{Fault::kInternal, source.path() + ": repair left the mesh open; please report it"};
+  if (std::string why = why_hollow(mesh, report); !why.empty()) {
+    const std::int64_t distance = weld_that_closes(original, bounds, range.most_nm);
+    return source.error(prefix + why +
+                        (distance > 0 ? fmt::format("; --weld {} closes it", distance / 1000)
+                                      : "; export it as a solid, or try --repair winding"));
+  }
+  describe_repair(report, prefix, notes);
+  return {};
+}
+
+/// Names shells that cancel each other in a closed mesh.
+/// errors  kInput: nothing else is there
+Status check_cancelled(const Source& source, const std::string& prefix, const Mesh& mesh, const Census& found,
+                       std::vector<Note>& notes) {
+  const double box = mm(mesh.bounds.width()) * mm(mesh.bounds.depth()) * mm(mesh.bounds.height());
+  const bool hardly_any = std::fabs(found.volume_mm3) <= 1e-6 * box;
+  if (found.reversed_twins) {
+    const Cancelled cancelled = find_cancelled(mesh);
+    if (cancelled.facets == mesh.triangles.size() && cancelled.facets > 0)
+      return source.error(prefix +
+                          "every facet is there twice, once turned over: all of it cancels out; delete one of the two");
+    if (cancelled.shells > 0)
+      notes.push_back({true, fmt::format("{}{} with {} out near {}: there twice, once inside out, and not solid; delete one of "
+                                         "each two",
+                                         prefix, plural(cancelled.shells, "shell"),
+                                         plural(cancelled.facets, "facet") + (cancelled.shells == 1 ? " cancels" : " cancel"),
+                                         place(cancelled.box))});
+  }
+  if ((hardly_any || found.reversed_twins) && enclosed(mesh).nothing())
+    return source.error(prefix + "its facets enclose nothing: nothing to print");
+  return {};
+}
+
+}  // namespace
+
+Result<Mesh> finish(const Source& source, const std::string& name, const std::string& prefix, Facets facets,
+                    const LoadOptions& options, std::vector<Note>& notes) {
+  Mesh mesh;
+  mesh.name = name;
+  mesh.triangles = std::move(facets.triangles);
+  mesh.bounds = facets.bounds;
+  mesh.repaired_from = static_cast<std::uint32_t>(mesh.triangles.size());
+  for (Note& note : facets.notes) notes.push_back({note.repair, prefix + note.text});
+  Census found = census(mesh.triangles, mesh.bounds.middle().z);
+  if (facets.doubt) {
+    const Status settled = settle_doubt(source, *facets.doubt, mesh, found, notes);
+    if (!settled) return settled.error();
+    mesh.repaired_from = static_cast<std::uint32_t>(mesh.triangles.size());
+  }
+  const bool flat = is_flat(mesh);
+  if (!found.balanced && options.repair && flat) {
+    mesh.triangles.clear();
+    found = census({});
+    notes.push_back({false, prefix + "lies in a plane: nothing of it is solid"});
+  } else if (!found.balanced && options.repair && options.winding) {
+    if (const Status closed = close_by_winding(source, prefix, options, mesh, found, notes); !closed) return closed.error();
+  } else if (!found.balanced && options.repair) {
+    if (const Status closed = close(source, prefix, options, mesh, found, notes); !closed) return closed.error();
+  } else if (!found.balanced) {
+    mesh.closed = false;
+    notes.push_back({false, prefix + "the mesh is not closed and repair is off: rows of it may stay open"});
+  }
+  if (mesh.closed && options.repair && !flat) {
+    if (const Status solid = check_cancelled(source, prefix, mesh, found, notes); !solid) return solid.error();
+  }
+  mesh.fingerprint = found.fingerprint;
+  mesh.volume_mm3 = found.volume_mm3;
+  mesh.capped_share = capped_share(mesh);
+  if (options.repair && turn_over_if_inside_out(mesh))
+    notes.push_back({true, prefix + "all of it was inside out: every facet turned over"});
+  return mesh;
+}
+
+}  // namespace lamina::load
