@@ -5,11 +5,11 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
-#include <fstream>
 #include <numbers>
 #include <optional>
 #include <string_view>
 
+#include "stages/data/input/file_reader.h"
 #include "stages/data/text/readable.h"
 
 namespace lamina::read {
@@ -18,7 +18,7 @@ namespace {
 using Place = GcodeFile::Place;
 
 constexpr double kFarthestMm = 2000;
-constexpr std::size_t kLongestLine = 65536;  // bytes
+constexpr ReadRules kRules{.fault = Fault::kUsage, .missing = "cannot be read; name a directory of a job or a G-code file"};
 
 struct RawBead {
   double from[2], to[2], z, fed, length;  // mm
@@ -27,13 +27,11 @@ struct RawBead {
 /// Carries out a file's lines one after another.
 class Walk {
  public:
-  Walk(const std::string& path, std::vector<std::string>& types) : path_(path), types_(types), file_(path, std::ios::binary) {}
+  Walk(FileReader& file, std::vector<std::string>& types) : path_(file.path()), types_(types), file_(file) {}
 
-  bool good() const { return static_cast<bool>(file_); }
   void go_to(const Place& place) {
     place_ = place;
-    file_.clear();
-    file_.seekg(static_cast<std::streamoff>(place.byte));
+    file_.go_to(place.byte, place.line);
   }
   const Place& place() const { return place_; }  // in front of the line that next() reads
   std::optional<std::string> fault;
@@ -55,16 +53,11 @@ class Walk {
  private:
   bool read_line() {
     before_ = place_;
-    file_.getline(buffer_.data(), static_cast<std::streamsize>(buffer_.size()));
-    const auto read = static_cast<std::size_t>(file_.gcount());  // with the end of the line
-    if (read == 0) return false;
-    ++place_.line;
-    place_.byte += read;
-    text_ = std::string_view(buffer_.data(), file_.eof() || file_.fail() ? read : read - 1);
-    // A line that does not fit: whatever it is, it is not read into memory.
-    if (file_.fail() || text_.find('\0') != std::string_view::npos) {
-      return fail("is no text of G-code; name a file that lamina extrude or a slicer wrote"), false;
-    }
+    const bool read = file_.next(text_);
+    place_.line += read || !file_.status() ? 1 : 0;
+    place_.byte = file_.offset();
+    if (!file_.status()) return fail("is no text of G-code; name a file that lamina extrude or a slicer wrote"), false;
+    if (!read) return false;
     while (!text_.empty() && (text_.front() == ' ' || text_.front() == '\t')) text_.remove_prefix(1);
     if (text_.ends_with('\r')) text_.remove_suffix(1);
     return true;
@@ -178,8 +171,7 @@ class Walk {
 
   const std::string& path_;
   std::vector<std::string>& types_;
-  std::ifstream file_;
-  std::vector<char> buffer_ = std::vector<char>(kLongestLine);
+  FileReader& file_;
   std::string_view text_;
   Place place_, before_;
 };
@@ -201,11 +193,15 @@ GcodeBead bead_of(const RawBead& raw, const Place& place, double filament_mm) {
 }  // namespace
 
 Result<GcodeFile> GcodeFile::open(const std::string& path) {
+  auto reader = FileReader::open(path, kRules);
+  return reader ? read(*reader) : Result<GcodeFile>(reader.error());
+}
+
+Result<GcodeFile> GcodeFile::read(FileReader& reader) {
+  const std::string& path = reader.path();
   GcodeFile file;
   file.path_ = path;
-  Walk walk(file.path_, file.types_);
-  if (!walk.good())
-    return Error{Fault::kUsage, fmt::format("{}: cannot be read; name a directory of a job or a G-code file", path)};
+  Walk walk(reader, file.types_);
   std::vector<Place> tags, rises;
   bool laid = false;
   double z = 0;
@@ -246,9 +242,10 @@ Result<GcodeFile> GcodeFile::open(const std::string& path) {
 Result<GcodeLayer> GcodeFile::layer(std::uint32_t index) const {
   if (index >= count()) return Error{Fault::kUsage, fmt::format("--layer {}: the file has layers 0 to {}", index, count() - 1)};
   std::vector<std::string> types = types_;
-  Walk walk(path_, types);
   const Error changed{Fault::kUsage, fmt::format("{}: has changed while it was drawn; draw it again", path_)};
-  if (!walk.good()) return changed;
+  auto reader = FileReader::open(path_, kRules);
+  if (!reader) return changed;
+  Walk walk(*reader, types);
   walk.go_to(layers_[index]);
   const std::uint64_t end = index + 1 < count() ? layers_[index + 1].line : UINT64_MAX;
   GcodeLayer layer;

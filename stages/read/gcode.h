@@ -12,6 +12,10 @@
 #include "stages/data/toolpaths.h"
 #include "stages/data/units.h"
 
+namespace lamina {
+class FileReader;
+}
+
 namespace lamina::read {
 
 /// One straight move that lays filament; its type is one of GcodeFile::types.
@@ -35,6 +39,8 @@ class GcodeFile {
   /// with the line
   /// cost    O(bytes)
   static Result<GcodeFile> open(const std::string& path);
+  /// The same of an open file, or of a text in memory, whose layers cannot be asked for then.
+  static Result<GcodeFile> read(FileReader& reader);
   std::uint32_t count() const { return static_cast<std::uint32_t>(layers_.size()); }
   const Box& box() const { return box_; }  // of all beads, with about their widths
   /// What the tags ;TYPE: call the beads; "" where they are silent.

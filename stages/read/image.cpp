@@ -1,8 +1,6 @@
 #include "stages/read/image.h"
 
-#include <fcntl.h>
 #include <fmt/format.h>
-#include <sys/stat.h>
 #include <unistd.h>
 
 #include <cerrno>
@@ -10,17 +8,11 @@
 #include <cstring>
 #include <new>
 
+#include "stages/data/input/file_reader.h"
 #include "stages/read/image_formats.h"
 
 namespace lamina::read {
 namespace {
-
-struct Descriptor {
-  int file;
-  ~Descriptor() {
-    if (file >= 0) ::close(file);
-  }
-};
 
 /// By the first bytes, whatever the name says.
 Result<Image> read_by_magic(int file, std::uint64_t bytes, const std::string& path) {
@@ -38,14 +30,10 @@ Result<Image> read_by_magic(int file, std::uint64_t bytes, const std::string& pa
 }  // namespace
 
 Result<Image> image(const std::string& path) {
-  const Descriptor descriptor{::open(path.c_str(), O_RDONLY | O_CLOEXEC)};
-  struct stat state;
-  if (descriptor.file < 0 || ::fstat(descriptor.file, &state) != 0) {
-    return Error{Fault::kVerification, fmt::format("{}: cannot open: {}", path, std::strerror(errno))};
-  }
-  if (!S_ISREG(state.st_mode)) return Error{Fault::kVerification, fmt::format("{}: not a file", path)};
+  const auto file = FileReader::open(path, {});
+  if (!file) return file.error();
   try {
-    return read_by_magic(descriptor.file, static_cast<std::uint64_t>(state.st_size), path);
+    return read_by_magic(file->descriptor(), file->size(), path);
   } catch (const std::bad_alloc&) {
     return Error{Fault::kVerification, fmt::format("{}: too many runs for the memory", path)};
   }

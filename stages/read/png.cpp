@@ -92,6 +92,10 @@ bool read_rows(png_structp png, png_infop info, Source& source) {
   png_set_user_limits(png, kMostPixelsASide, kMostPixelsASide);
   png_set_chunk_malloc_max(png, 1 << 20);
   png_set_crc_action(png, PNG_CRC_ERROR_QUIT, PNG_CRC_ERROR_QUIT);
+  // Comments and colours are passed over: libpng allocates whatever length they claim.
+  constexpr png_byte kResolution[] = "pHYs";
+  png_set_keep_unknown_chunks(png, PNG_HANDLE_CHUNK_NEVER, nullptr, -1);
+  png_set_keep_unknown_chunks(png, PNG_HANDLE_CHUNK_AS_DEFAULT, kResolution, 1);
   png_read_info(png, info);
   const std::uint32_t columns = png_get_image_width(png, info), rows = png_get_image_height(png, info);
   const int colour_type = png_get_color_type(png, info);

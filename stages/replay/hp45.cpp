@@ -18,14 +18,14 @@ int digit_of(char c) {
   return c == '+' ? 62 : c == '/' ? 63 : -1;
 }
 
-/// A whole number in base 64, the highest digit first.
+/// A whole number in base 64, the highest digit first; 0 at a fault.
 std::int64_t read_base64(std::string_view text, GcodeReader& reader) {
   const bool negative = text.starts_with('-');
   if (negative) text.remove_prefix(1);
   std::int64_t value = 0;
-  if (text.empty() || text.size() > 6) reader.fault("a position that is no number");
+  if (text.empty() || text.size() > 6) return reader.fault("a position that is no number"), 0;
   for (const char c : text) {
-    if (digit_of(c) < 0) reader.fault("a position that is no number in base 64");
+    if (digit_of(c) < 0) return reader.fault("a position that is no number in base 64"), 0;
     value = value * 64 + digit_of(c);
   }
   return negative ? -value : value;

@@ -28,7 +28,7 @@ std::string read_changes(const TomlValue& table, std::span<const Key<Target>> ke
   Changes<Target> read;
   auto wrong = read_table(table, keys.front().section, keys, read.values, at, &read.keys);
   std::ranges::sort(read.keys);
-  read.keys.erase(std::ranges::unique(read.keys).begin(), read.keys.end());
+  read.keys.erase(std::unique(read.keys.begin(), read.keys.end()), read.keys.end());
   if (wrong.empty()) changes = std::move(read);
   return wrong;
 }

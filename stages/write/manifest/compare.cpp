@@ -4,7 +4,8 @@
 
 #include <algorithm>
 #include <filesystem>
-#include <fstream>
+
+#include "stages/data/input/digest_range.h"
 
 namespace lamina {
 namespace {
@@ -29,7 +30,7 @@ class PathComparison {
     const fs::path path = directory_ / name;
     std::error_code error;
     if (!fs::is_regular_file(path, error)) return faults_.add(fmt::format("{}: is missing", name));
-    const auto digest = digest_file(path.string());
+    const auto digest = digest_file(path.string(), manifest_.file.bytes);
     if (!digest) return faults_.add(digest.error().message);
     bytes_ = digest->bytes;
     if (digest->bytes == manifest_.file.bytes && digest->hash == manifest_.file.hash) return check_places();
@@ -61,18 +62,13 @@ class PathComparison {
 
   void check_stretches(const fs::path& path) {
     if (!has_stretches()) return;
-    std::ifstream file(path, std::ios::binary);
-    std::error_code error;
-    const std::uint64_t size = fs::file_size(path, error);
-    std::string text;
+    const auto file = FileReader::open(path.string(), {});
+    if (!file) return faults_.add(file.error().message);
     for (const LayerRecord& record : manifest_.layers) {
-      if (record.bytes > size || record.offset > size - record.bytes) {
+      if (record.bytes > file->size() || record.offset > file->size() - record.bytes) {
         return faults_.add(fmt::format("{}: ends within layer {}", manifest_.head.file, record.layer.index));
       }
-      text.resize(record.bytes);
-      file.seekg(static_cast<std::streamoff>(record.offset));
-      file.read(text.data(), static_cast<std::streamsize>(text.size()));
-      if (file && hash_bytes(std::as_bytes(std::span(text))) == record.hash) continue;
+      if (digest_range(*file, record.offset, record.bytes) == record.hash) continue;
       faults_.add(fmt::format("{}: layer {} is not what was written", manifest_.head.file, record.layer.index));
     }
   }
@@ -105,7 +101,7 @@ std::string fault_of_file(const std::string& directory, const std::string& name,
   const std::string path = (fs::path(directory) / name).string();
   std::error_code error;
   if (!fs::is_regular_file(path, error)) return fmt::format("{}: is missing", name);
-  const Result<FileDigest> digest = digest_file(path);
+  const Result<FileDigest> digest = digest_file(path, bytes);
   if (!digest) return digest.error().message;
   if (bytes && digest->bytes != *bytes) return fmt::format("{}: {} bytes, the manifest says {}", name, digest->bytes, *bytes);
   return digest->hash == hash ? "" : fmt::format("{}: its content is not what was written", name);

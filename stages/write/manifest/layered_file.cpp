@@ -1,15 +1,17 @@
 #include "stages/write/manifest/layered_file.h"
 
 #include <fmt/format.h>
+#include <sys/stat.h>
 #include <unistd.h>
 #include <xxhash.h>
 
 #include <cstring>
-#include <fstream>
 #include <optional>
 #include <utility>
 
+#include "stages/data/input/digest_range.h"
 #include "stages/write/file.h"
+#include "stages/write/file_target.h"
 
 namespace lamina {
 namespace {
@@ -47,23 +49,13 @@ Status check_same_job(const std::string& path, const Manifest& manifest, const M
 /// The records, from the first on, whose bytes are in the file; none if it does not begin with `start`.
 std::vector<LayerRecord> records_that_hold(const std::string& path, const std::vector<LayerRecord>& recorded,
                                            std::string_view start) {
-  std::ifstream file(path, std::ios::binary);
   std::vector<LayerRecord> kept;
+  const auto file = FileReader::open(path, {});
   std::string bytes(start.size(), '\0');
-  if (!file.read(bytes.data(), static_cast<std::streamsize>(bytes.size())) || bytes != start) return kept;
+  if (!file || !file->read_at(0, bytes) || bytes != start) return kept;
   std::uint64_t end = start.size();
-  Hasher hasher;
-  std::vector<char> piece(1 << 20);
   for (const LayerRecord& record : recorded) {
-    if (record.offset != end) break;
-    std::uint64_t left = record.bytes;
-    while (left > 0) {
-      const auto size = static_cast<std::streamsize>(std::min<std::uint64_t>(left, piece.size()));
-      if (!file.read(piece.data(), size)) return kept;
-      hasher.add({piece.data(), static_cast<std::size_t>(size)});
-      left -= static_cast<std::uint64_t>(size);
-    }
-    if (hasher.take() != record.hash) break;
+    if (record.offset != end || digest_range(*file, record.offset, record.bytes) != record.hash) break;
     end += record.bytes;
     kept.push_back(record);
   }
@@ -80,6 +72,34 @@ struct LayeredFile::State {
   bool finished = false;
   std::uint64_t layer_begin = 0, size = 0;
   Hasher hasher;
+
+  /// Adds a layer to the manifest, after its text: a kill loses neither.
+  Status note(const LayerRecord& record) {
+    if (!manifest) return {};
+    if (Status status = file->flush(); !status) return status;
+    return manifest->append(record);
+  }
+
+  /// Opens the file, behind the kept layers or with `start`.
+  Status open_file(std::string_view start) {
+    write::FileOptions how{.stream = options.stream, .hash = true, .keep_part = true};
+    how.replace = options.replace || options.resume;
+    if (options.sync == Sync::kOff) how.durable = write::Durable::kNo;
+    auto opened = kept.empty() ? write::File::open(options.file, how) : write::File::reopen(options.file, size, how);
+    if (!opened) return opened.error();
+    file.emplace(std::move(*opened));
+    if (kept.empty()) {
+      if (Status status = file->append(start); !status) return status;
+      size = start.size();
+    }
+    layer_begin = size;
+    return {};
+  }
+
+  Status sync() {
+    const Status status = file->flush();
+    return status ? file->sync() : status;
+  }
 };
 
 LayeredFile::LayeredFile() : state_(std::make_unique<State>()) {}
@@ -87,43 +107,81 @@ LayeredFile::LayeredFile(LayeredFile&&) noexcept = default;
 LayeredFile& LayeredFile::operator=(LayeredFile&&) noexcept = default;
 LayeredFile::~LayeredFile() = default;
 
-Result<LayeredFile> LayeredFile::open(Options options, const ManifestHead& head, std::string_view start) {
+namespace {
+
+/// What a resumed job keeps, read into the state: all of a finished file, or the first records of a begun one.
+Status find_kept(LayeredFile::Options& options, const ManifestHead& head, std::string_view start, const std::string& target,
+                 std::vector<LayerRecord>& kept, std::uint64_t& whole_size) {
+  const std::string part = write::part_of(options.manifest);
+  const bool whole = is_there(target) && is_there(options.manifest);
+  if (!options.resume || (!whole && !has_manifest_head(part))) return {};
+  const std::string& recorded = whole ? options.manifest : part;
+  auto earlier = read_manifest(recorded);
+  if (!earlier) return earlier.error();
+  if (Status status = check_same_job(recorded, *earlier, head); !status) return status;
+  if (!whole) {
+    if (is_there(write::part_of(target))) kept = records_that_hold(write::part_of(target), earlier->layers, start);
+    return {};
+  }
+  const auto digest = digest_file(target);
+  if (!digest || digest->hash != earlier->file.hash) return {};
+  kept = std::move(earlier->layers);
+  whole_size = digest->bytes;
+  return {};
+}
+
+}  // namespace
+
+Status LayeredFile::check_part(const std::string& file, const std::string& manifest) {
+  const auto target = write::find_target(file);
+  if (!target || target->file.empty() || has_manifest_head(write::part_of(manifest))) return {};
+  const std::string part = write::part_of(target->file);
+  struct stat status {};
+  if (::lstat(part.c_str(), &status) != 0) return {};
+  return Error{Fault::kUsage, fmt::format("{}: is there already, without a record of lamina beside it; remove it, or name "
+                                          "another file",
+                                          part)};
+}
+
+Result<LayeredFile> LayeredFile::open(Options options, const ManifestHead& head, std::string_view start,
+                                      std::optional<write::Claim> claim) {
   LayeredFile made;
   State& state = *made.state_;
   state.options = std::move(options);
   const std::string &path = state.options.file, &manifest_path = state.options.manifest;
-  const bool whole = is_there(path) && is_there(manifest_path);
-  const std::string part = manifest_path + ".part";
-  if (state.options.resume && (whole || has_manifest_head(part))) {
-    auto earlier = read_manifest(whole ? manifest_path : part);
-    if (!earlier) return earlier.error();
-    if (Status status = check_same_job(whole ? manifest_path : part, *earlier, head); !status) return status.error();
-    if (whole) {
-      const auto digest = digest_file(path);
-      state.finished = digest && digest->hash == earlier->file.hash;
-      if (state.finished) {
-        state.kept = std::move(earlier->layers);
-        state.size = digest->bytes;
-        return made;
-      }
-    } else if (is_there(path + ".part")) {
-      state.kept = records_that_hold(path + ".part", earlier->layers, start);
+  const auto target = write::find_target(path);
+  if (!target) return target.error();
+  const bool streams = target->file.empty();
+  if (!streams) {
+    if (!claim) {
+      auto taken = write::Claim::take(manifest_path, path);
+      if (!taken) return taken.error();
+      claim.emplace(std::move(*taken));
     }
+    if (Status status = check_begun_manifest(write::part_of(manifest_path)); !status) return status.error();
+    if (Status status = check_part(path, manifest_path); !status) return status.error();
+    if (!state.options.resume && !state.options.replace && is_there(target->file)) {
+      return Error{Fault::kUsage,
+                   fmt::format("{}: another run has written it meanwhile; name another file, or use --overwrite", path)};
+    }
+    std::uint64_t whole = 0;
+    if (Status status = find_kept(state.options, head, start, target->file, state.kept, whole); !status) return status.error();
+    state.finished = whole > 0;
+    state.size = whole;
+    if (state.finished) return made;
   }
-  const write::FileOptions how{.stream = state.options.stream, .hash = true, .keep_part = true};
   state.size = state.kept.empty() ? 0 : state.kept.back().offset + state.kept.back().bytes;
-  auto file = state.kept.empty() ? write::File::open(path, how) : write::File::reopen(path, state.size, how);
-  if (!file) return file.error();
-  state.file.emplace(std::move(*file));
-  if (state.kept.empty()) {
-    if (Status status = state.file->append(start); !status) return status.error();
-    state.size = start.size();
+  // First the record: a NAME.part without one is somebody else's.
+  if (!streams) {
+    auto manifest = ManifestWriter::open(manifest_path, head, state.kept,
+                                         {state.options.sync, [&state] { return state.sync(); }}, std::move(claim));
+    if (!manifest) return manifest.error();
+    state.manifest.emplace(std::move(*manifest));
   }
-  state.layer_begin = state.size;
-  if (state.file->streams()) return made;
-  auto manifest = ManifestWriter::open(manifest_path, head, state.kept);
-  if (!manifest) return manifest.error();
-  state.manifest.emplace(std::move(*manifest));
+  if (Status status = state.open_file(start); !status) {
+    if (state.manifest && state.kept.empty()) state.manifest->discard();
+    return status.error();
+  }
   return made;
 }
 
@@ -136,7 +194,7 @@ Status LayeredFile::append(std::string_view text, LayerRecord& record) {
   record.offset = state.size;
   state.layer_begin = state.size += text.size();
   if (Status status = state.file->append(text); !status) return status;
-  return state.manifest ? state.manifest->append(record) : Status();
+  return state.note(record);
 }
 
 Status LayeredFile::append_piece(std::string_view text) {
@@ -151,7 +209,7 @@ Status LayeredFile::end_pieces(LayerRecord& record) {
   record.bytes = state.size - state.layer_begin;
   record.hash = state.hasher.take();
   state.layer_begin = state.size;
-  return state.manifest ? state.manifest->append(record) : Status();
+  return state.note(record);
 }
 
 Result<std::uint64_t> LayeredFile::finish(std::string_view end) {

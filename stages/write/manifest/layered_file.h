@@ -6,6 +6,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -21,12 +22,17 @@ class LayeredFile {
   struct Options {
     std::string file, manifest;  // paths
     bool resume = false;
+    bool replace = false;  // an earlier file of that name
+    Sync sync = Sync::kJob;
     bool stream = false;  // accepts a device, a pipe or "-": written directly, without a manifest
   };
 
-  /// start  text before the first layer
-  /// errors  kUsage: the files to resume belong to another job; kOutput
-  static Result<LayeredFile> open(Options options, const ManifestHead& head, std::string_view start);
+  /// start   text before the first layer
+  /// claim   of the manifest; none: it is taken here
+  /// errors  kUsage: the files to resume belong to another job; a file or NAME.part is there that must not be replaced;
+  ///         kOutput
+  static Result<LayeredFile> open(Options options, const ManifestHead& head, std::string_view start,
+                                  std::optional<write::Claim> claim = {});
   LayeredFile(LayeredFile&&) noexcept;
   LayeredFile& operator=(LayeredFile&&) noexcept;
   ~LayeredFile();
@@ -49,6 +55,9 @@ class LayeredFile {
   /// Removes the started files.
   void discard();
   std::uint64_t size() const;
+
+  /// Whether NAME.part, if there is one, has its record beside it. errors  kUsage: it is somebody else's
+  static Status check_part(const std::string& file, const std::string& manifest);
 
  private:
   LayeredFile();

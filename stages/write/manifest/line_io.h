@@ -9,8 +9,10 @@
 
 #include <algorithm>
 #include <charconv>
+#include <cmath>
 #include <string>
 #include <string_view>
+#include <type_traits>
 
 #include "stages/data/hash.h"
 #include "stages/data/layer.h"
@@ -75,6 +77,7 @@ class LineReader {
     begin(key);
     const auto [stop, error] = std::from_chars(rest_.data(), rest_.data() + rest_.size(), value);
     expect(error == std::errc());
+    if constexpr (std::is_floating_point_v<Number>) expect(std::isfinite(value));
     if (good()) rest_.remove_prefix(static_cast<std::size_t>(stop - rest_.data()));
   }
   void fixed(std::string_view key, std::string_view value) {

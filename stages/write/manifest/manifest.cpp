@@ -3,8 +3,8 @@
 
 #include <fmt/format.h>
 
-#include <chrono>
 #include <filesystem>
+#include <fstream>
 #include <optional>
 #include <utility>
 
@@ -54,6 +54,14 @@ std::string difference(const ManifestHead& now, const ManifestHead& earlier) {
   return "the parts have changed";
 }
 
+Status check_begun_manifest(const std::string& part) {
+  std::ifstream file(part, std::ios::binary);
+  const int first = file.get();  // 0 where a power cut has kept the size alone
+  if (!file || first == '{' || first == 0) return {};
+  return Error{Fault::kUsage,
+               fmt::format("{}: is there already, and is no record of lamina; remove it, or name another output", part)};
+}
+
 std::string layer_file_name(std::uint32_t index, std::string_view extension, std::string_view material) {
   if (extension.empty()) return {};
   return fmt::format("layers/{:06}{}{}{}", index, material.empty() ? "" : "-", material, extension);
@@ -83,30 +91,30 @@ void add_line(const LayerRecord& record, const ManifestHead& head, bool first, s
 }  // namespace
 
 struct ManifestWriter::State {
-  static constexpr std::uint32_t kLines = 16;
-  static constexpr std::chrono::seconds kPatience{1};
-
   write::File file;
   ManifestHead head;
+  Options options;
   std::string buffer;
-  std::uint32_t next_layer = 0, lines_buffered = 0;
+  std::uint32_t next_layer = 0;
   bool first_line = true;
-  std::chrono::steady_clock::time_point written = std::chrono::steady_clock::now();
 
-  State(write::File opened, const ManifestHead& of) : file(std::move(opened)), head(of), next_layer(of.first_layer) {}
+  State(write::File opened, const ManifestHead& of, Options chosen)
+      : file(std::move(opened)), head(of), options(std::move(chosen)), next_layer(of.first_layer) {}
 
   void add(const LayerRecord& record) {
     add_line(record, head, std::exchange(first_line, false), buffer);
     ++next_layer;
-    ++lines_buffered;
   }
 
   Status flush() {
+    const bool syncs = options.sync == Sync::kLayer && !buffer.empty();
+    if (syncs && options.sync_layers) {
+      if (Status status = options.sync_layers(); !status) return status;
+    }
     if (Status status = file.append(buffer); !status) return status;
     buffer.clear();
-    lines_buffered = 0;
-    written = std::chrono::steady_clock::now();
-    return file.flush();
+    if (Status status = file.flush(); !status) return status;
+    return syncs ? file.sync() : Status();
   }
 };
 
@@ -117,11 +125,8 @@ ManifestWriter::~ManifestWriter() = default;
 
 namespace {
 
-/// Head and kept records as `path`.part, which takes the place of an earlier one at once. returns  its size
-Result<std::uint64_t> begin_partial(const std::string& path, const ManifestHead& head, const std::vector<LayerRecord>& kept) {
-  if (Status status = write::check_not_being_written(path); !status) return status.error();
-  auto file = write::File::open(path + ".part");
-  if (!file) return file.error();
+/// Appends head and kept records.
+Status begin(write::File& file, const ManifestHead& head, const std::vector<LayerRecord>& kept) {
   std::string text = head_text(head);
   std::uint32_t next = head.first_layer;
   for (const LayerRecord& record : kept) {
@@ -130,25 +135,31 @@ Result<std::uint64_t> begin_partial(const std::string& path, const ManifestHead&
     }
     add_line(record, head, &record == &kept.front(), text);
     if (text.size() < (1u << 20)) continue;
-    if (Status status = file->append(std::string_view(text)); !status) return status.error();
+    if (Status status = file.append(std::string_view(text)); !status) return status;
     text.clear();
   }
-  if (Status status = file->append(std::string_view(text)); !status) return status.error();
-  const auto whole = file->finish();
-  if (!whole) return whole.error();
-  return whole->bytes;
+  return file.append(std::string_view(text));
 }
 
 }  // namespace
 
 Result<ManifestWriter> ManifestWriter::open(const std::string& path, const ManifestHead& head,
-                                            const std::vector<LayerRecord>& kept_prefix) {
-  const auto size = begin_partial(path, head, kept_prefix);
-  if (!size) return size.error();
-  auto file = write::File::reopen(path, *size, {.keep_part = true});
+                                            const std::vector<LayerRecord>& kept_prefix, Options options,
+                                            std::optional<write::Claim> claim) {
+  if (!claim) {
+    auto taken = write::Claim::take(path, path);
+    if (!taken) return taken.error();
+    claim.emplace(std::move(*taken));
+  }
+  write::FileOptions how{.lock = false, .follow = false};
+  if (options.sync == Sync::kOff) how.durable = write::Durable::kNo;
+  auto file = write::File::open(path, how);
   if (!file) return file.error();
+  if (Status status = begin(*file, head, kept_prefix); !status) return status.error();
+  claim->hand_over();
+  if (Status status = file->become_part(); !status) return status.error();
   ManifestWriter writer;
-  writer.state_ = std::make_unique<State>(std::move(*file), head);
+  writer.state_ = std::make_unique<State>(std::move(*file), head, std::move(options));
   writer.state_->next_layer = head.first_layer + static_cast<std::uint32_t>(kept_prefix.size());
   writer.state_->first_line = kept_prefix.empty();
   return writer;
@@ -161,9 +172,7 @@ Status ManifestWriter::append(const LayerRecord& record) {
                                                state.next_layer, state.head.last_layer)};
   }
   state.add(record);
-  const bool due =
-      state.lines_buffered >= State::kLines || std::chrono::steady_clock::now() - state.written >= State::kPatience;
-  return due ? state.flush() : Status();
+  return state.flush();
 }
 
 Status ManifestWriter::flush() { return state_->flush(); }

@@ -10,6 +10,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -23,8 +24,11 @@
 #include "stages/data/mesh.h"
 #include "stages/data/status.h"
 #include "stages/write/manifest/record.h"
+#include "stages/write/temporary.h"
 
 namespace lamina {
+
+class FileReader;
 
 /// Version of the manifest's lines and keys; readers refuse others.
 inline constexpr int kManifestVersion = 2;
@@ -82,9 +86,16 @@ std::vector<LayerImageFile> layer_images(const ManifestHead& head, const LayerRe
 /// Reads a manifest, or the complete lines of a .part.
 /// errors  kVerification with file and line; a specific message for earlier versions of lamina
 Result<Manifest> read_manifest(const std::string& path);
+Result<Manifest> read_manifest(FileReader& file);
+
+/// The head alone. errors  of read_manifest
+Result<ManifestHead> read_manifest_head(const std::string& path);
 
 /// Whether a file has a complete head; the .part of a run killed early may lack it.
 bool has_manifest_head(const std::string& path);
+
+/// Whether NAME.part may be replaced as the begun manifest of a run, however torn. errors  kUsage: it is somebody else's
+Status check_begun_manifest(const std::string& part);
 
 /// The product of a manifest, from its first lines; nothing if the file is absent or not a manifest of this version.
 std::optional<Product> product_of_manifest(const std::string& path);
@@ -92,16 +103,28 @@ std::optional<Product> product_of_manifest(const std::string& path);
 /// Appends layers in order; thread-compatible (the flow records one layer at a time).
 class ManifestWriter {
  public:
+  struct Options {
+    Sync sync = Sync::kJob;
+    /// With Sync::kLayer: makes what the next lines record survive a power cut, before they are written.
+    std::function<Status()> sync_layers = {};
+  };
+
   /// Starts `path`.part with the head and a resumed job's kept first records. It replaces an earlier .part atomically, so
   /// that a kill at any moment loses no kept record.
+  /// claim   of `path`; none: it is taken here
   /// errors  kOutput: cannot be written, or another run is writing it
   static Result<ManifestWriter> open(const std::string& path, const ManifestHead& head,
-                                     const std::vector<LayerRecord>& kept_prefix);
+                                     const std::vector<LayerRecord>& kept_prefix, Options options,
+                                     std::optional<write::Claim> claim = {});
+  static Result<ManifestWriter> open(const std::string& path, const ManifestHead& head,
+                                     const std::vector<LayerRecord>& kept_prefix) {
+    return open(path, head, kept_prefix, Options());
+  }
   ManifestWriter(ManifestWriter&&) noexcept;
   ManifestWriter& operator=(ManifestWriter&&) noexcept;
   ~ManifestWriter();
 
-  /// Buffers the line; it reaches the file within one second or 16 lines, whichever is first.
+  /// The line is in the file when this returns: a kill loses no layer that is on record.
   Status append(const LayerRecord& record);
   /// Flushes the buffer, for an interrupted job.
   Status flush();

@@ -7,6 +7,9 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
+#include "stages/data/input/text_shape.h"
+#include "stages/write/manifest/possible.h"
+
 namespace lamina {
 namespace {
 
@@ -53,10 +56,10 @@ Json dots_json(const PixelAxis& axis) {
 }
 
 PixelAxis axis_from(const Json& dots, std::int64_t length) {
-  if (!dots.is_string()) return PixelAxis(dots.get<std::int64_t>(), length);
+  if (!dots.is_string()) return possible_axis(dots.get<std::int64_t>(), length, kNmPerInch);
   long long in_span = 1, span = kNmPerInch;
   std::sscanf(dots.get<std::string>().c_str(), "%lld in %lld nm", &in_span, &span);
-  return PixelAxis(std::max(1LL, in_span), length, std::max(1LL, span));
+  return possible_axis(in_span, length, span);
 }
 
 Hash128 hash_from(const Json& json) {
@@ -142,6 +145,16 @@ ManifestHead head_from(const Json& json) {
   return head;
 }
 
+/// fraction  whether a number is none of the whole ones, of which heads and tails consist, or too large to be one
+Json parsed(const std::string& text, bool& fraction) {
+  fraction = false;
+  const auto look = [&](int, Json::parse_event_t, const Json& value) {
+    fraction = fraction || value.is_number_float();
+    return true;
+  };
+  return Json::parse(text, look, false);
+}
+
 /// An object of a key a line, without its end.
 std::string lines_of(const Json& json) {
   std::string text = "{\n";
@@ -168,7 +181,9 @@ std::string tail_text(const ManifestHead& head, const FileDigest& file) {
 
 Result<ManifestHead> read_head(const std::string& text) {
   const auto wrong = [](const std::string& what) { return Error{Fault::kVerification, what}; };
-  const Json json = Json::parse(text + "]}", nullptr, false);
+  if (!json_nests_within(text)) return wrong("is no manifest of lamina");
+  bool fraction = false;
+  const Json json = parsed(text + "]}", fraction);
   if (!json.is_object()) return wrong("is no manifest of lamina");
   if (!json.contains("manifest") || json["manifest"] != kManifestVersion) {
     if (!json.contains("lamina")) return wrong("is no manifest of lamina");
@@ -176,6 +191,7 @@ Result<ManifestHead> read_head(const std::string& text) {
         fmt::format("is of another version of lamina, whose manifests differ from those of this one; read it with that "
                     "version, or plan the job again with --overwrite"));
   }
+  if (fraction) return wrong("the head has a number that is not whole; it was changed");
   ManifestHead head;
   try {
     head = head_from(json);
@@ -185,13 +201,16 @@ Result<ManifestHead> read_head(const std::string& text) {
   // Written again it has to be the same text: then nothing in it was changed, its id holds, and all of it was read.
   if (head_text(head) != text) return wrong("the head is not what was written; it was changed");
   if (head.first_layer > head.last_layer || head.last_layer > head.layer_count) return wrong("the range is no range");
+  if (std::string what = what_is_impossible(head); !what.empty()) return wrong(what);
   return head;
 }
 
 bool read_tail(const ManifestHead& head, const std::string& text, FileDigest& file) {
   if (!head.file.empty()) {
-    const Json json = Json::parse("{" + text.substr(0, text.find('\n')) + "}", nullptr, false);
-    if (!json.is_object() || !json.contains("whole_file")) return false;
+    if (!json_nests_within(text)) return false;
+    bool fraction = false;
+    const Json json = parsed("{" + text.substr(0, text.find('\n')) + "}", fraction);
+    if (!json.is_object() || fraction || !json.contains("whole_file")) return false;
     try {
       file.bytes = json.at("whole_file").at("bytes");
       file.hash = hash_from(json.at("whole_file").at("xxh3_128"));

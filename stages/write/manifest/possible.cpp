@@ -1,0 +1,102 @@
+#include "stages/write/manifest/possible.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <set>
+#include <stdexcept>
+
+#include "stages/data/text/readable.h"
+#include "stages/write/image_format.h"
+#include "stages/write/program/dialect.h"
+
+namespace lamina {
+namespace {
+
+constexpr std::size_t kLongestName = 255, kLongestMaterial = 40;  // bytes
+constexpr std::int64_t kMostDots = 25'400, kMostSpan = 1'000'000'000'000, kLeastPixel = 1000;
+
+/// A format of contours, with the extension of its files.
+struct SliceExtension {
+  std::string_view format, extension;
+  bool layer_files;  // may have one for each layer
+};
+constexpr SliceExtension kSlices[] = {
+    {"svg", ".svg", true}, {"cli", ".cli", true}, {"cli-binary", ".cli", true}, {"3mf", ".3mf", false}, {"null", "", false}};
+
+/// As read::check_material allows.
+bool is_material(std::string_view name) {
+  return !name.empty() && name.size() <= kLongestMaterial && std::ranges::all_of(name, [](unsigned char c) {
+    return (c >= '0' && c <= '9') || (c >= 'A' && c <= 'Z') || (c >= 'a' && c <= 'z') || c == '-' || c == '_';
+  });
+}
+
+std::string no_such(std::string_view what, std::string_view value) {
+  return fmt::format("\"{}\" is {}, which lamina does not write", what, one_line(value.substr(0, 80)));
+}
+
+std::string fault_of_images(const ManifestHead& head) {
+  const auto* format = write::find_image_format(head.format);
+  if (format == nullptr) return no_such("format", head.format);
+  if (head.extension != format->extension) return no_such("extension", head.extension);
+  if (!head.file.empty()) return no_such("file", head.file);
+  std::set<std::string_view> names;
+  for (const JobMaterial& material : head.materials) {
+    if (!is_material(material.name) || !names.insert(material.name).second) return no_such("materials", material.name);
+  }
+  if (head.machine.empty()) return {};
+  const auto* dialect = write::find_dialect(head.dialect);
+  if (dialect == nullptr) return no_such("dialect", head.dialect);
+  return head.program_extension == dialect->extension ? "" : no_such("program_extension", head.program_extension);
+}
+
+std::string fault_of_contours(const ManifestHead& head) {
+  const auto* slice = std::ranges::find(kSlices, head.format, &SliceExtension::format);
+  if (slice == std::end(kSlices)) return no_such("format", head.format);
+  const bool layer_files = head.file.empty() && !slice->extension.empty();
+  if (head.extension != (layer_files && slice->layer_files ? slice->extension : ""))
+    return no_such("extension", head.extension);
+  if (head.file.empty()) return slice->layer_files || slice->extension.empty() ? "" : no_such("file", "absent");
+  const bool named = is_file_name(head.file) && !slice->extension.empty() && head.file.ends_with(slice->extension);
+  return named ? "" : no_such("file", head.file);
+}
+
+std::string fault_of_moves(const ManifestHead& head) {
+  if (head.format != "gcode" && head.format != "sml") return no_such("format", head.format);
+  if (!head.extension.empty()) return no_such("extension", head.extension);
+  return is_file_name(head.file) ? "" : no_such("file", head.file);
+}
+
+}  // namespace
+
+bool is_file_name(std::string_view name) {
+  return !name.empty() && name.size() <= kLongestName && name != "." && name != ".." &&
+         name.find_first_of(std::string_view("/\0", 2)) == std::string_view::npos;
+}
+
+PixelAxis possible_axis(std::int64_t dots, std::int64_t length, std::int64_t span) {
+  if (dots < 1 || dots > kMostDots || span < 1 || span > kMostSpan || span / dots < kLeastPixel || length < 1 ||
+      length > kNmReach) {
+    throw std::invalid_argument("its grid is none of a bed");
+  }
+  return PixelAxis(dots, length, span);
+}
+
+std::string what_is_impossible(const ManifestHead& head) {
+  for (const PartSummary& part : head.parts) {
+    if (!part.path.empty() && !is_file_name(part.path)) return no_such("path", part.path);
+  }
+  switch (head.product) {
+    case Product::kImages: return fault_of_images(head);
+    case Product::kContours: return fault_of_contours(head);
+    case Product::kMoves: break;
+  }
+  return fault_of_moves(head);
+}
+
+std::string what_is_impossible(const Layer& layer) {
+  const bool possible = layer.bottom >= 0 && layer.thickness > 0 && std::int64_t{layer.bottom} + layer.thickness <= kNmReach;
+  return possible ? "" : fmt::format("lies at {} nm and is {} nm thick", layer.bottom, layer.thickness);
+}
+
+}  // namespace lamina
