@@ -6,11 +6,13 @@
 #include <cerrno>
 #include <csignal>
 #include <cstring>
+#include <ctime>
 
 #include "pipeline/cli/terminal.h"
 #include "stages/data/text/json.h"
 #include "stages/data/text/json_text.h"
 #include "stages/write/file.h"
+#include "stages/write/leftovers.h"
 
 namespace lamina::pipeline {
 namespace {
@@ -21,15 +23,55 @@ int write_all(int file, std::string_view text) { return write::write_all(file, s
 std::atomic<bool> interrupted{false}, keeping{false};
 static_assert(std::atomic<bool>::is_always_lock_free);  // a signal handler may touch nothing else
 
-void on_signal(int) {
-  if (!keeping) {
-    constexpr std::string_view kLine = "lamina: interrupted before the first layer\n";
-    if (::write(STDERR_FILENO, kLine.data(), kLine.size()) < 0) ::_exit(130);
-  }
-  if (interrupted.exchange(true) || !keeping) ::_exit(130);
+[[noreturn]] void end() {
+  write::remove_watched();
+  ::_exit(130);
 }
 
-/// From now on the first SIGINT, SIGTERM or SIGHUP sets the returned flag; the next one ends the program with 130.
+/// Ends the program as the signal would, without temporary files.
+void end_by_signal(int signal) {
+  write::remove_watched();
+  ::raise(signal);  // handled as by default from the first time on, and not blocked
+}
+
+timer_t patience;  // runs out kPatience after the first signal
+std::atomic<bool> patient{false};
+constexpr itimerspec kPatience{{0, 0}, {0, 800'000'000}};
+
+/// Ends a program that works on in spite of a signal, within a layer or a library. Finished layers are on record, and files
+/// have their names only once they are whole.
+void on_patience(int) {
+  constexpr std::string_view kLine = "lamina: interrupted; finished layers are kept, run again with --resume to go on\n";
+  if (::write(STDERR_FILENO, kLine.data(), kLine.size()) < 0) end();
+  end();
+}
+
+/// From now on a signal ends the program within a second.
+void lose_patience() {
+  if (patient) return;
+  struct sigaction action {};
+  action.sa_handler = on_patience;
+  sigemptyset(&action.sa_mask);
+  sigaction(SIGRTMIN, &action, nullptr);
+  sigevent event{};
+  event.sigev_notify = SIGEV_SIGNAL;
+  event.sigev_signo = SIGRTMIN;
+  patient = timer_create(CLOCK_MONOTONIC, &event, &patience) == 0;
+}
+
+void on_signal(int signal) {
+  if (!keeping) {
+    constexpr std::string_view kLine = "lamina: interrupted before the first layer\n";
+    if (::write(STDERR_FILENO, kLine.data(), kLine.size()) < 0) end();
+  }
+  const bool again = interrupted.exchange(true);
+  if (again && signal == SIGXCPU) return;  // comes every second once the limit is reached
+  if (again || !keeping) end();
+  if (patient) timer_settime(patience, 0, &kPatience, nullptr);
+}
+
+/// From now on the first SIGINT, SIGTERM, SIGHUP or SIGXCPU sets the returned flag; the next one ends the program with 130,
+/// as does the lapse of kPatience.
 /// Before this call the first signal ends the program: nothing can be lost yet, loading a large part may take long, and
 /// the loading libraries do not read the flag. An ignored SIGHUP stays ignored, as under nohup.
 const std::atomic<bool>& watch_for_signals() {
@@ -40,6 +82,7 @@ const std::atomic<bool>& watch_for_signals() {
   sigemptyset(&action.sa_mask);
   sigaction(SIGINT, &action, nullptr);
   sigaction(SIGTERM, &action, nullptr);
+  sigaction(SIGXCPU, &action, nullptr);
   sigaction(SIGHUP, nullptr, &before);
   if (before.sa_handler != SIG_IGN) sigaction(SIGHUP, &action, nullptr);
   return interrupted;
@@ -48,6 +91,20 @@ const std::atomic<bool>& watch_for_signals() {
 }  // namespace
 
 void keep_on_signals() { keeping = true; }
+
+void handle_signals() {
+  std::signal(SIGPIPE, SIG_IGN);  // a closed reader is an error of write(), not the end
+  std::signal(SIGXFSZ, SIG_IGN);  // and so is a limit on file sizes
+  struct sigaction action {
+  }, before{};
+  action.sa_handler = end_by_signal;
+  action.sa_flags = static_cast<int>(SA_RESETHAND | SA_NODEFER);
+  sigemptyset(&action.sa_mask);
+  for (const int signal : {SIGHUP, SIGINT, SIGQUIT, SIGTERM, SIGXCPU, SIGALRM, SIGVTALRM, SIGUSR1, SIGUSR2}) {
+    sigaction(signal, nullptr, &before);
+    if (before.sa_handler != SIG_IGN) sigaction(signal, &action, nullptr);
+  }
+}
 
 Console::~Console() { Console::say_text({}); }
 
@@ -72,7 +129,10 @@ Status Console::give(const Json& value) { return print(json_line(value)); }
 void Console::progress(const ProgressEvent& event) {
   using Stage = ProgressEvent::Stage;
   const bool counted = event.stage == Stage::kLayers;
-  if (counted) keep_on_signals();
+  if (counted) {
+    lose_patience();
+    keep_on_signals();
+  }
   if (!progress_) {
     progress_.emplace(quiet ? Progress::Style::kSilent : is_terminal() ? Progress::Style::kBar : Progress::Style::kLines);
   }

@@ -27,6 +27,10 @@ class Console : public Context {
   std::optional<Progress> progress_;
 };
 
+/// Has every signal that ends the program remove its temporary files first, and closed pipes and limits on file sizes come
+/// as errors. Ignored signals stay ignored.
+void handle_signals();
+
 /// From here on the first signal only sets the cancel flag, so that finished work is kept.
 void keep_on_signals();
 

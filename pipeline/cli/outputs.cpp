@@ -72,16 +72,36 @@ std::vector<InputFile> inputs_of(const Arguments& arguments, std::string_view op
   return inputs;
 }
 
-/// An output and the files written beside it.
+/// An output and the files written beside it; toolpaths may have a table of layers.
 void add_output(const std::string& path, std::vector<std::string>& outputs) {
   if (path.empty()) return;
   for (const char* ending : {"", ".part", ".json", ".json.part"}) outputs.push_back(path + ending);
+  if (fs::path(path).has_filename()) outputs.push_back(fs::path(path).replace_extension(".rp3").string());
 }
 
 std::vector<std::string> outputs_of(const Arguments& arguments) {
   std::vector<std::string> outputs;
   for (const std::string_view flag : kOutputs) add_output(arguments.text(flag), outputs);
   return outputs;
+}
+
+/// Two outputs of one call are two files. errors  kUsage
+Status check_apart(const Arguments& arguments) {
+  std::vector<fs::path> places;
+  for (const std::string_view flag : kOutputs) {
+    const std::string path = arguments.text(flag);
+    std::error_code ignored;
+    if (path.empty() || write::is_stream(path)) continue;
+    for (const char* ending : {"", ".json"}) {
+      const fs::path place = fs::weakly_canonical(fs::absolute(path + ending, ignored), ignored);
+      if (std::ranges::find(places, place) == places.end()) continue;
+      return Error{Fault::kUsage, fmt::format("{}: is named for two outputs of this call; name another file", path)};
+    }
+    for (const char* ending : {"", ".json"}) {
+      places.push_back(fs::weakly_canonical(fs::absolute(path + ending, ignored), ignored));
+    }
+  }
+  return {};
 }
 
 }  // namespace
@@ -126,6 +146,7 @@ Status check_outputs(std::string_view command, const Arguments& arguments) {
     for (const char* name : {"batch.jsonl", "summary.json", "summary.tsv"})
       outputs.push_back(arguments.text("-o,--output") + "/" + name);
   }
+  if (Status status = check_apart(arguments); !status) return status;
   if (Status status = check_outputs(inputs_of(arguments, operands), outputs); !status) return status;
   for (const OwnFile& own : kOwnFiles) {
     if ((!own.command.empty() && own.command != command) || !arguments.has(own.flag)) continue;

@@ -12,8 +12,8 @@
 
 #include "pipeline/job/decisions.h"
 #include "stages/data/text/number_text.h"
-#include "stages/write/file.h"
 #include "stages/write/image_format.h"
+#include "stages/write/leftovers.h"
 #include "stages/write/manifest/manifest.h"
 #include "stages/write/program/dialect.h"
 
@@ -27,6 +27,14 @@ constexpr std::string_view kPartial = ".part";
 bool take_end(std::string_view& text, std::string_view end) {
   if (!text.ends_with(end)) return false;
   text.remove_suffix(end.size());
+  return true;
+}
+
+/// The same for the ending of a temporary file.
+bool take_temporary_end(std::string_view& name) {
+  const std::string_view named = write::named_by_temporary(name);
+  if (named.empty()) return take_end(name, kPartial);
+  name = named;
   return true;
 }
 
@@ -112,7 +120,7 @@ std::vector<ManifestFile> find_manifests(const std::string& directory) {
 }
 
 bool read_layer_file_name(std::string_view name, std::uint32_t& index, bool& partial) {
-  partial = take_end(name, kPartial);
+  partial = take_temporary_end(name);
   const std::size_t digits = std::min(name.find_first_not_of("0123456789"), name.size());
   if (digits < 6) return false;
   const auto [stop, error] = std::from_chars(name.data(), name.data() + digits, index);
@@ -125,7 +133,7 @@ bool read_layer_file_name(std::string_view name, std::uint32_t& index, bool& par
 }
 
 bool read_program_file_name(std::string_view name, std::uint32_t& index, bool& partial) {
-  partial = take_end(name, kPartial);
+  partial = take_temporary_end(name);
   const std::size_t digits = std::min(name.find_first_not_of("0123456789"), name.size());
   if (digits < 6) return false;
   const auto [stop, error] = std::from_chars(name.data(), name.data() + digits, index);
@@ -141,16 +149,19 @@ struct Neighbours {
   bool begun = false, shared = false;  // an earlier run of this job or shard; other shards of the same split
 };
 
+/// claim   of the job's own manifest, if it is held
 /// errors  kOutput: another run writes now; kUsage: what is there may not be replaced
-Result<Neighbours> check_manifests(const Job& job) {
+Result<Neighbours> check_manifests(const Job& job, const write::Claim* claim) {
   const std::string own = manifest_name(job);
   Neighbours found;
   for (const ManifestFile& file : find_manifests(job.output)) {
-    const bool is_own = file.name == own || file.name == own + std::string(kPartial);
+    const bool claimed = claim != nullptr && file.name == write::part_of(own);
+    if (claimed && !claim->found()) continue;
+    const bool is_own = file.name == own || file.name == write::part_of(own);
     const auto refuse = [&](std::string_view what, std::string_view advice) {
       return Error{Fault::kUsage, fmt::format("{}/{}: {}; {}", job.output, file.name, what, advice)};
     };
-    if (file.partial && !joins(job, file)) {
+    if (file.partial && !claimed && !joins(job, file)) {
       const std::string path = fmt::format("{}/{}", job.output, file.name.substr(0, file.name.size() - kPartial.size()));
       if (Status busy = write::check_not_being_written(path); !busy) return busy.error();
     }
@@ -180,7 +191,7 @@ Status check_output(const Job& job) {
   if (!fs::is_directory(status)) {
     return Error{Fault::kOutput, fmt::format("{}: is a file, not a directory; name another one with -o", job.output)};
   }
-  const auto found = check_manifests(job);
+  const auto found = check_manifests(job, nullptr);
   if (!found) return found.error();
   if (!(job.resume && found->begun) && !job.overwrite && !found->shared && !layer_files(job.output).empty()) {
     return Error{Fault::kUsage, fmt::format("{}/layers: holds layers without a manifest; replace them with --overwrite, "
@@ -190,27 +201,59 @@ Status check_output(const Job& job) {
   return {};
 }
 
-Status check_shard_replaces_itself(const Job& job, const ManifestHead& head) {
-  if (!job.shard || !job.overwrite) return {};
-  for (const std::string& name : {manifest_name(job), manifest_name(job) + std::string(kPartial)}) {
-    const std::string path = job.output + "/" + name;
-    if (::access(path.c_str(), F_OK) != 0) continue;
-    const Result<Manifest> earlier = read_manifest(path);
-    if (earlier && earlier->head.id() == head.id()) continue;
-    return Error{Fault::kUsage, fmt::format("{}: is of another job, whose layers a shard cannot clear away; remove {} first, "
-                                            "or name another directory",
-                                            path, job.output)};
+Status check_shard_fits(const Job& job, const ManifestHead& head) {
+  if (!job.shard) return {};
+  const std::string own = manifest_name(job);
+  for (const ManifestFile& file : find_manifests(job.output)) {
+    const bool is_own = file.name == own || file.name == own + std::string(kPartial);
+    if (is_own ? !job.overwrite : !joins(job, file)) continue;
+    const std::string path = job.output + "/" + file.name;
+    const auto earlier = read_manifest_head(path);
+    if (earlier && earlier->id() == head.id()) continue;
+    if (is_own) {
+      return Error{Fault::kUsage, fmt::format("{}: is of another job, whose layers a shard cannot clear away; remove {} "
+                                              "first, or name another directory",
+                                              path, job.output)};
+    }
+    if (!earlier && file.partial) continue;  // killed before its head was whole
+    if (!earlier) return earlier.error();
+    return Error{Fault::kUsage,
+                 fmt::format("{}: is a shard of another job ({}); name another directory", path, difference(head, *earlier))};
   }
   return {};
 }
 
-Status check_nobody_came(const Job& job) {
-  const auto found = check_manifests(job);
-  return found ? Status() : Status(found.error());
+Status check_stays_inside(const std::string& directory) {
+  for (const char* name : {"layers", "program"}) {
+    const fs::path place = fs::path(directory) / name;
+    std::error_code error;
+    if (!fs::is_symlink(place, error)) continue;
+    const fs::path target = fs::weakly_canonical(place, error), inside = fs::weakly_canonical(directory, error);
+    const fs::path near = target.lexically_relative(inside);
+    if (!near.empty() && *near.begin() != "..") continue;
+    return Error{Fault::kOutput, fmt::format("{}: is a link that leads out of {}; remove it", place.string(), directory)};
+  }
+  return {};
 }
 
-Status prepare_output(const Job& job) {
-  if (Status status = check_nobody_came(job); !status) return status;
+Result<write::Claim> claim_output(const Job& job) {
+  const fs::path directory = job.output;
+  std::error_code error;
+  fs::create_directories(directory, error);
+  if (error) return cannot(directory, error.value());
+  auto claim = write::Claim::take(job.output + "/" + manifest_name(job), job.output);
+  if (!claim) return claim.error();
+  if (Status status = check_begun_manifest(write::part_of(job.output + "/" + manifest_name(job))); !status)
+    return status.error();
+  const auto found = check_manifests(job, &*claim);
+  if (!found) return found.error();
+  return claim;
+}
+
+Result<write::Claim> prepare_output(const Job& job) {
+  auto claim = claim_output(job);
+  if (!claim) return claim.error();
+  if (Status status = check_stays_inside(job.output); !status) return status.error();
   const fs::path directory = job.output, layers = directory / "layers";
   std::error_code error;
   fs::create_directories(layers, error);
@@ -227,20 +270,31 @@ Status prepare_output(const Job& job) {
   }
   if (!job.overwrite) {
     if (!job.shard) sweep_partial_files(job.output);
-    return {};
+    return claim;
   }
   for (const ManifestFile& file : find_manifests(job.output)) {
-    if (!joins(job, file)) fs::remove(directory / file.name, error);
+    if (joins(job, file) || file.name == write::part_of(manifest_name(job))) continue;  // the claim is in that name
+    fs::remove(directory / file.name, error);
     if (error) return cannot(directory / file.name, error.value());
   }
-  if (job.shard) return {};
-  std::vector<fs::path> old = layer_files(job.output);
-  for (fs::path& file : program_frames(job.output)) old.push_back(std::move(file));
+  if (job.shard) return claim;
+  if (Status status = remove_layers(job.output); !status) return status.error();
+  if (job.machine.profile.empty()) fs::remove(directory / "program", error);  // fails if other files remain
+  return claim;
+}
+
+write::FileOptions layer_file_options(const Job& job) {
+  return {.lock = false, .follow = false, .durable = job.sync == Sync::kLayer ? write::Durable::kBytes : write::Durable::kNo};
+}
+
+Status remove_layers(const std::string& directory) {
+  std::error_code error;
+  std::vector<fs::path> old = layer_files(directory);
+  for (fs::path& file : program_frames(directory)) old.push_back(std::move(file));
   for (const fs::path& file : old) {
     fs::remove(file, error);
     if (error) return cannot(file, error.value());
   }
-  if (job.machine.profile.empty()) fs::remove(directory / "program", error);  // fails if other files remain
   return {};
 }
 
@@ -251,8 +305,7 @@ void sweep_partial_files(const std::string& directory, std::uint32_t first, std:
     if (!read_layer_file_name(file.filename().string(), index, partial)) {
       read_program_file_name(file.filename().string(), index, partial);
     }
-    std::error_code ignored;
-    if (partial && index >= first && index < last) fs::remove(file, ignored);
+    if (partial && index >= first && index < last) write::remove_or_note(file.string());
   }
 }
 

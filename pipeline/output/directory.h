@@ -10,7 +10,9 @@
 
 #include "pipeline/job/job.h"
 #include "stages/data/status.h"
+#include "stages/write/file.h"
 #include "stages/write/manifest/manifest.h"
+#include "stages/write/temporary.h"
 
 namespace lamina::pipeline {
 
@@ -27,7 +29,7 @@ std::string manifest_name(const Job& job);
 /// All manifests of a directory, the whole job's first, then by shard; empty if the directory is missing.
 std::vector<ManifestFile> find_manifests(const std::string& directory);
 
-/// Parses the name of a layer's file: 000042.tif, 000042-bronze.tif, or either with .part; false for other names.
+/// Parses the name of a layer's file: 000042.tif, 000042-bronze.tif, or of a temporary file of one; false for others.
 bool read_layer_file_name(std::string_view name, std::uint32_t& index, bool& partial);
 /// The same for the print program of a layer, 000042.gcode.
 bool read_program_file_name(std::string_view name, std::uint32_t& index, bool& partial);
@@ -38,18 +40,31 @@ bool read_program_file_name(std::string_view name, std::uint32_t& index, bool& p
 ///         of the same split. kOutput if the directory's path is a file, or another run is writing into it
 Status check_output(const Job& job);
 
-/// Fails if another run took the directory while this one loaded its parts. errors  kUsage, kOutput
-Status check_nobody_came(const Job& job);
+/// Creates the directory and claims it for the rest of the run, or for the job's shard of it. Fails if another run took it
+/// while this one loaded its parts. errors  kUsage, kOutput
+Result<write::Claim> claim_output(const Job& job);
 
-/// Fails if a shard's own manifest belongs to another job: a shard keeps all other layers and cannot distinguish other
-/// shards' layers from an earlier job's, so the user must clear the directory.
-/// errors  kUsage
-Status check_shard_replaces_itself(const Job& job, const ManifestHead& head);
+/// Fails if a manifest in a shard's directory belongs to another job. Of its own: a shard keeps all other layers and cannot
+/// distinguish other shards' layers from an earlier job's, so the user must clear the directory. Of another shard: the two
+/// would never be merged.
+/// errors  kUsage; those of read_manifest for a finished manifest
+Status check_shard_fits(const Job& job, const ManifestHead& head);
 
-/// Call after check_output. Creates the directory and its layers/. With --overwrite, removes the output of an earlier job
-/// (a shard: only its own manifest), otherwise the half-written files of an interrupted run.
-/// errors  those of check_nobody_came; kOutput with the system's reason
-Status prepare_output(const Job& job);
+/// Fails if layers/ or program/ of a job's directory is a link that leads out of it.
+/// errors  kOutput
+Status check_stays_inside(const std::string& directory);
+
+/// Call after check_output. Claims the directory and creates its layers/. With --overwrite, removes the output of an
+/// earlier job (a shard: only its own manifest), otherwise the half-written files of an interrupted run.
+/// errors  those of claim_output; kOutput with the system's reason
+Result<write::Claim> prepare_output(const Job& job);
+
+/// How a layer's file is written in a claimed directory.
+write::FileOptions layer_file_options(const Job& job);
+
+/// Removes all layers and print programs of a directory; its folders stay.
+/// errors  kOutput with the system's reason
+Status remove_layers(const std::string& directory);
 
 /// Removes half-written files of the layers [first, last), left by a killed run, from directory/layers.
 void sweep_partial_files(const std::string& directory, std::uint32_t first = 0, std::uint32_t last = UINT32_MAX);

@@ -51,13 +51,16 @@ ManifestHead image_head(const Plan& plan) {
 
 ImageFiles::ImageFiles(const Plan& plan)
     : plan_(plan), head_(image_head(plan)), format_(*write::find_image_format(plan.job.format)) {
-  if (plan.images->machine) program_.emplace(*plan.images->machine, plan.job.output, plan.layer_count);
+  if (plan.images->machine)
+    program_.emplace(*plan.images->machine, plan.job.output, plan.layer_count, layer_file_options(plan.job));
 }
 
 Status ImageFiles::open() {
   const Job& job = plan_.job;
-  if (Status status = check_shard_replaces_itself(job, head_); !status) return status;
-  if (Status status = prepare_output(job); !status) return status;
+  if (Status status = check_shard_fits(job, head_); !status) return status;
+  auto claim = prepare_output(job);
+  if (!claim) return claim.error();
+  if (job.shard) sweep_partial_files(job.output, head_.first_layer, head_.last_layer);
   if (job.resume) {
     auto kept = layers_that_hold(job.output, manifest_name(job), head_);
     if (!kept) return kept.error();
@@ -76,8 +79,18 @@ Status ImageFiles::open() {
   if (program_) {
     if (Status status = program_->begin(); !status) return status;
   }
+  std::vector<std::string> folders{job.output + "/layers"};
+  if (program_) folders.push_back(job.output + "/program");
+  sync_ = write::FolderSync::of(folders);
+  const auto sync_names = [folders] {
+    for (const std::string& folder : folders) {
+      if (const int reason = write::sync_folder(folder); reason != 0) return Status(write::write_failure(folder, reason));
+    }
+    return Status();
+  };
   auto manifest = ManifestWriter::open(job.output + "/" + manifest_name(job), head_,
-                                       {kept_.begin(), kept_.begin() + static_cast<std::ptrdiff_t>(next_kept_)});
+                                       {kept_.begin(), kept_.begin() + static_cast<std::ptrdiff_t>(next_kept_)},
+                                       {job.sync, sync_names}, std::move(*claim));
   if (!manifest) return manifest.error();
   manifest_.emplace(std::move(*manifest));
   return {};
@@ -116,11 +129,10 @@ Status ImageFiles::encode_one(const Runs& image, Work& work, const LayerRecord& 
 
 Status ImageFiles::store(const Runs& whole, Work& work, LayerRecord& record) const {
   const auto images = layer_images(head_, record);
+  const write::FileOptions how = layer_file_options(plan_.job);
   for (std::size_t m = 0; m < images.size() && !images[m].name.empty(); ++m) {
     const write::Bytes& file = head_.materials.empty() ? work.file : work.files[m];
-    if (Status status = write::write_file(plan_.job.output + "/" + images[m].name, file, {.lock = false}); !status) {
-      return status;
-    }
+    if (Status status = write::write_file(plan_.job.output + "/" + images[m].name, file, how); !status) return status;
   }
   if (!program_) return {};
   std::vector<std::uint64_t> pixels;
@@ -153,9 +165,22 @@ Status ImageFiles::record(const LayerRecord& record) {
 
 Status ImageFiles::finish() {
   if (Status status = record_kept_below(UINT32_MAX); !status) return status;
+  if (plan_.job.sync != Sync::kOff) {
+    if (Status status = sync_->sync(); !status) return status;
+  }
   return manifest_->finish();
 }
 
 Status ImageFiles::keep() { return manifest_->flush(); }
+
+void ImageFiles::discard() {
+  manifest_->discard();
+  if (!remove_layers(plan_.job.output)) return;
+  for (const char* folder : {"layers", "program"}) {
+    const std::filesystem::path path = std::filesystem::path(plan_.job.output) / folder;
+    std::error_code ignored;
+    if (!std::filesystem::is_symlink(path, ignored)) std::filesystem::remove(path, ignored);  // fails if other files remain
+  }
+}
 
 }  // namespace lamina::pipeline

@@ -16,6 +16,7 @@
 #include "stages/data/status.h"
 #include "stages/write/image_format.h"
 #include "stages/write/manifest/manifest.h"
+#include "stages/write/sync.h"
 
 namespace lamina::pipeline {
 
@@ -58,6 +59,8 @@ class ImageFiles {
   Status finish();
   /// Ends an interrupted or failed job; its finished layers stay recorded.
   Status keep();
+  /// Removes the manifest and all layers of the directory; only of a whole job.
+  void discard();
 
  private:
   Status record_kept_below(std::uint32_t layer);
@@ -68,6 +71,7 @@ class ImageFiles {
   const write::ImageFormat& format_;
   std::optional<PrintProgram> program_;
   std::optional<ManifestWriter> manifest_;
+  std::optional<write::FolderSync> sync_;
   std::vector<std::uint32_t> todo_;
   std::vector<LayerRecord> kept_;
   std::size_t next_kept_ = 0;

@@ -4,10 +4,13 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <optional>
 
 #include "pipeline/output/directory.h"
 #include "pipeline/output/print_program.h"
+#include "stages/write/leftovers.h"
 #include "stages/write/manifest/manifest.h"
+#include "stages/write/sync.h"
 
 namespace lamina::pipeline {
 namespace {
@@ -78,16 +81,24 @@ Status check_coverage(std::vector<Shard>& shards) {
   return {};
 }
 
+/// A link in a shard's folder may lead anywhere; what it leads to is no file of the job. errors  kVerification
+Status check_plain(const fs::path& file) {
+  std::error_code error;
+  const fs::file_status status = fs::symlink_status(file, error);
+  if (fs::is_regular_file(status)) return {};
+  return unmatched(fmt::format("{}: is {}; run its shard again with --resume", file.string(),
+                               fs::exists(status) ? "a link or a device, not a file" : "missing"));
+}
+
 // Links a file to another name, or copies it if linking fails. The name appears once the file is complete.
 Status bring_file(const fs::path& from, const fs::path& to, MergeReport& report) {
-  const fs::path fresh = to.string() + ".part";
-  std::error_code error, ignored;
-  fs::remove(fresh, ignored);
+  const fs::path fresh = write::temporary_name(to.string());
+  std::error_code error;
   fs::create_hard_link(from, fresh, error);
   const bool linked = !error;
   if (!linked) fs::copy_file(from, fresh, error);
   if (!error) fs::rename(fresh, to, error);
-  fs::remove(fresh, ignored);  // stays if `to` was a name of the same file already, and after an error
+  write::remove_or_note(fresh.string());  // stays if `to` was a name of the same file already, and after an error
   if (error) return Error{Fault::kOutput, fmt::format("{}: {}", to.string(), error.message())};
   ++(linked ? report.linked : report.copied);
   return {};
@@ -101,6 +112,7 @@ Status bring_files(const Shard& shard, const std::string& output, MergeReport& r
   const auto bring = [&](const std::string& name, std::uint64_t bytes) -> Status {
     if (name.empty()) return {};  // a format without files, a job without a machine
     const fs::path from = fs::path(shard.directory) / name;
+    if (Status status = check_plain(from); !status) return status;
     const std::uintmax_t size = fs::file_size(from, error);
     if (error) return unmatched(fmt::format("{}: is missing; run its shard again with --resume", from.string()));
     if (size != bytes) {
@@ -121,9 +133,39 @@ Status bring_files(const Shard& shard, const std::string& output, MergeReport& r
   for (const std::string& name :
        {std::string("machine.toml"), "start" + head.program_extension, "end" + head.program_extension}) {
     const fs::path from = fs::path(shard.directory) / "program" / name;
+    if (Status status = check_plain(from); !status) return status;
     if (Status status = bring_file(from, fs::path(output) / "program" / name, report); !status) return status;
   }
   return {};
+}
+
+Status remove_shard_manifests(const std::string& output) {
+  for (const ManifestFile& file : find_manifests(output)) {
+    const fs::path path = fs::path(output) / file.name;
+    std::error_code error;
+    if (file.shard) fs::remove(path, error);
+    if (error)
+      return Error{Fault::kOutput, fmt::format("{}: merged, and not needed any more, but cannot be removed: {}", path.string(),
+                                               error.message())};
+  }
+  return {};
+}
+
+/// What is there of a job that is whole already, if nothing but its directory is to be merged into it; an earlier merge may
+/// have been interrupted while it removed the shards' manifests.
+std::optional<Shard> whole_job(const std::vector<std::string>& directories, const std::vector<Shard>& shards,
+                               const std::string& output) {
+  const auto is_output = [&](const std::string& directory) {
+    std::error_code error;
+    return fs::equivalent(directory, output, error);
+  };
+  if (!std::ranges::all_of(directories, is_output)) return std::nullopt;
+  const std::string path = (fs::path(output) / "manifest.json").string();
+  auto manifest = read_manifest(path);
+  if (!manifest || manifest->head.product != Product::kImages || !covers_all(manifest->head)) return std::nullopt;
+  const Hash128 id = manifest->head.id();
+  if (!std::ranges::all_of(shards, [&](const Shard& shard) { return shard.manifest.head.id() == id; })) return std::nullopt;
+  return Shard{output, path, std::move(*manifest)};
 }
 
 }  // namespace
@@ -131,33 +173,48 @@ Status bring_files(const Shard& shard, const std::string& output, MergeReport& r
 Result<MergeReport> merge(const std::vector<std::string>& directories, const std::string& output) {
   Result<std::vector<Shard>> shards = read_shards(directories, output);
   if (!shards) return shards.error();
+  MergeReport report;
+  report.output = output;
+  if (const auto whole = whole_job(directories, *shards, output)) {
+    if (Status status = bring_files(*whole, output, report); !status) return status.error();
+    if (Status status = remove_shard_manifests(output); !status) return status.error();
+    report.layers = whole->manifest.layers.size();
+    return report;
+  }
   if (shards->empty()) return unmatched(fmt::format("{}: holds no manifest of a shard", directories.front()));
   if (Status status = check_coverage(*shards); !status) return status.error();
 
+  std::error_code error;
+  fs::create_directories(output, error);
+  if (error) return Error{Fault::kOutput, fmt::format("{}: {}", output, error.message())};
+  auto claim = write::Claim::take((fs::path(output) / "manifest.json").string(), output);
+  if (!claim) return claim.error();
+  sweep_partial_files(output);
   // Never replaces files of another job.
   ManifestHead head = shards->front().manifest.head;
   for (const ManifestFile& file : find_manifests(output)) {
     const std::string path = (fs::path(output) / file.name).string();
+    if (file.name == "manifest.json.part" && !claim->found()) continue;
     const Result<Manifest> present = read_manifest(path);
     if (!present || present->head.id() != head.id()) {
       return Error{Fault::kUsage, fmt::format("{}: is not of this job; name another directory with -o", path)};
     }
   }
-  std::error_code error;
+  if (Status status = check_stays_inside(output); !status) return status.error();
   fs::create_directories(fs::path(output) / "layers", error);
   if (error) return Error{Fault::kOutput, fmt::format("{}/layers: {}", output, error.message())};
   if (!head.machine.empty()) fs::create_directories(fs::path(output) / "program", error);
   if (error) return Error{Fault::kOutput, fmt::format("{}/program: {}", output, error.message())};
 
-  MergeReport report;
-  report.output = output;
+  const auto sync = write::FolderSync::of({(fs::path(output) / "layers").string(), (fs::path(output) / "program").string()});
   report.shards = static_cast<std::uint32_t>(shards->size());
   for (const Shard& shard : *shards) {
     if (Status status = bring_files(shard, output, report); !status) return status.error();
   }
   head.first_layer = 0;
   head.last_layer = head.layer_count;
-  Result<ManifestWriter> writer = ManifestWriter::open((fs::path(output) / "manifest.json").string(), head, {});
+  Result<ManifestWriter> writer =
+      ManifestWriter::open((fs::path(output) / "manifest.json").string(), head, {}, {}, std::move(*claim));
   if (!writer) return writer.error();
   for (const Shard& shard : *shards) {
     for (const LayerRecord& record : shard.manifest.layers) {
@@ -165,10 +222,9 @@ Result<MergeReport> merge(const std::vector<std::string>& directories, const std
     }
     report.layers += shard.manifest.layers.size();
   }
+  if (Status status = sync.sync(); !status) return status.error();
   if (Status status = writer->finish(); !status) return status.error();
-  for (const ManifestFile& file : find_manifests(output)) {
-    if (file.shard) fs::remove(fs::path(output) / file.name, error);
-  }
+  if (Status status = remove_shard_manifests(output); !status) return status.error();
   return report;
 }
 

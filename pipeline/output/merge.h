@@ -11,17 +11,18 @@ namespace lamina::pipeline {
 
 struct MergeReport {
   std::string output;
-  std::uint32_t shards = 0;
+  std::uint32_t shards = 0;  // 0 if the directory was whole already
   std::uint64_t layers = 0;
   std::uint64_t linked = 0, copied = 0;  // files; the others were in place
 };
 
 /// Merges the shards (or ranges) of one job from one or several directories into `output`. Its manifest.json equals that
 /// of an undivided run byte for byte. Files in other directories are linked, or copied where the file system cannot
-/// link; those directories do not change. In `output` the shards' manifests are removed once manifest.json exists.
+/// link; those directories do not change. In `output` the shards' manifests are removed once manifest.json exists. Where
+/// `output` alone is named and is whole already, of an earlier merge or undivided, only the sizes of its files are checked.
 ///
 /// errors  kVerification, one line: a shard of another job, missing or duplicate layers, an unfinished shard, a file
-///         that is missing or of the wrong size. kUsage if a directory does not exist or holds another job's
+///         that is missing, a link, or of the wrong size. kUsage if a directory does not exist or holds another job's
 ///         manifest.json. kOutput
 Result<MergeReport> merge(const std::vector<std::string>& directories, const std::string& output);
 

@@ -21,27 +21,32 @@ ProgramFrame program_frame(const ResolvedMachine& resolved, std::uint32_t layers
   return frame;
 }
 
-PrintProgram::PrintProgram(const ResolvedMachine& resolved, std::string directory, std::uint32_t layers)
+PrintProgram::PrintProgram(const ResolvedMachine& resolved, std::string directory, std::uint32_t layers,
+                           const write::FileOptions& files)
     : resolved_(resolved),
       dialect_(*write::find_dialect(resolved.machine.dialect)),
       directory_(std::move(directory)),
-      layers_(layers) {}
+      layers_(layers),
+      files_(files) {}
 
 std::string PrintProgram::path(std::string_view name) const { return fmt::format("{}/program/{}", directory_, name); }
 
 Status PrintProgram::begin() const {
   const std::string profile = read::machine_text(resolved_.machine);
-  if (Status status = write::write_file(path("machine.toml"), std::as_bytes(std::span(profile))); !status) return status;
+  if (Status status = write::write_file(path("machine.toml"), std::as_bytes(std::span(profile)), files_); !status) {
+    return status;
+  }
   const ProgramFrame frame = program_frame(resolved_, layers_);
-  if (Status status = write::write_file(path(fmt::format("start{}", dialect_.extension)), frame.start); !status) return status;
-  return write::write_file(path(fmt::format("end{}", dialect_.extension)), frame.end);
+  const Status status = write::write_file(path(fmt::format("start{}", dialect_.extension)), frame.start, files_);
+  return status ? write::write_file(path(fmt::format("end{}", dialect_.extension)), frame.end, files_) : status;
 }
 
 Status PrintProgram::write_layer(const Layer& layer, const RunsView& image, const std::vector<std::uint32_t>& feeds,
                                  ProgramWork& work, ProgramRecord& record) const {
   if (!work.writer) work.writer = dialect_.make_writer(resolved_.machine, resolved_.grid);
-  auto file =
-      write::File::open(directory_ + "/" + program_file_name(layer.index, dialect_.extension), {.hash = true, .lock = false});
+  write::FileOptions how = files_;
+  how.hash = true;
+  auto file = write::File::open(directory_ + "/" + program_file_name(layer.index, dialect_.extension), how);
   if (!file) return file.error();
   LayerCycle cycle;
   cycle.layer = layer.index;

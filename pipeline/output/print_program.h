@@ -18,6 +18,7 @@
 #include "stages/data/runs.h"
 #include "stages/data/status.h"
 #include "stages/program/compile.h"
+#include "stages/write/file.h"
 #include "stages/write/manifest/manifest.h"
 #include "stages/write/program/dialect.h"
 
@@ -44,7 +45,7 @@ ProgramFrame program_frame(const ResolvedMachine& resolved, std::uint32_t layers
 class PrintProgram {
  public:
   /// directory  of the job; the machine must outlive this object
-  PrintProgram(const ResolvedMachine& resolved, std::string directory, std::uint32_t layers);
+  PrintProgram(const ResolvedMachine& resolved, std::string directory, std::uint32_t layers, const write::FileOptions& files);
 
   /// Writes machine.toml, start and end. errors  kOutput
   Status begin() const;
@@ -63,6 +64,7 @@ class PrintProgram {
   const write::Dialect& dialect_;
   std::string directory_;
   std::uint32_t layers_;
+  write::FileOptions files_;
 };
 
 }  // namespace lamina::pipeline

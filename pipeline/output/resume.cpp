@@ -39,7 +39,7 @@ Result<std::vector<LayerRecord>> layers_that_hold(const std::string& directory, 
     const LayerRecord& record = recorded[i];
     const auto hold = [&](const std::string& file, std::uint64_t bytes, const Hash128& hash) {
       if (file.empty()) return true;  // a format without files, a job without a machine
-      const auto digest = digest_file(directory + "/" + file);
+      const auto digest = digest_file(directory + "/" + file, bytes);
       return digest.ok() && digest->bytes == bytes && digest->hash == hash;
     };
     holds[i] = std::ranges::all_of(

@@ -3,11 +3,15 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <optional>
 #include <system_error>
 #include <vector>
 
 #include "pipeline/job/decisions.h"
 #include "pipeline/output/directory.h"
+#include "stages/write/leftovers.h"
+#include "stages/write/manifest/manifest.h"
+#include "stages/write/replaceable.h"
 
 namespace lamina::pipeline {
 namespace {
@@ -27,6 +31,10 @@ std::vector<fs::path> layer_files(const Job& job) {
     }
   }
   return files;
+}
+
+Error cannot(const fs::path& path, const std::error_code& error) {
+  return {Fault::kOutput, fmt::format("{}: {}", path.string(), error.message())};
 }
 
 }  // namespace
@@ -52,6 +60,7 @@ Status check_slice_output(const Job& job) {
   if (!fs::is_directory(status)) {
     return Error{Fault::kOutput, fmt::format("{}: is a file, not a directory; name another one with -o", job.output)};
   }
+  if (Status busy = write::check_not_being_written(job.output + "/manifest.json"); !busy) return busy;
   const std::vector<ManifestFile> manifests = find_manifests(job.output);
   const bool replaces = job.overwrite || job.resume;
   if (!replaces && !manifests.empty()) {
@@ -87,41 +96,66 @@ Status check_slice_output(const Job& job) {
   return {};
 }
 
-fs::path waiting_layers(const Job& job) { return fs::path(job.output) / "layers.part"; }
+// Its name needs no random digits: the directory is claimed.
+fs::path waiting_layers(const Job& job) { return fs::path(job.output) / "layers.lamina.part"; }
 
-Status prepare_slice_directory(const Job& job) {
-  if (Status status = check_nobody_came(job); !status) return status;
+Result<write::Claim> prepare_slice_directory(const Job& job) {
+  auto claim = claim_output(job);
+  if (!claim) return claim;
+  if (Status status = check_stays_inside(job.output); !status) return status.error();
+  const fs::path waiting = waiting_layers(job);
   std::error_code error;
-  if (job.slice.file_a_layer) fs::remove_all(waiting_layers(job), error);  // of a run that was killed
-  fs::create_directories(job.slice.file_a_layer ? waiting_layers(job) : fs::path(job.output), error);
-  if (error) return Error{Fault::kOutput, fmt::format("{}: {}", job.output, error.message())};
-  return {};
+  fs::remove_all(waiting, error);  // of a run that was killed; a link goes, not what it leads to
+  if (!error && job.slice.file_a_layer && !fs::create_directory(waiting, error) && !error) {
+    error = std::make_error_code(std::errc::file_exists);
+  }
+  if (error) return cannot(waiting, error);
+  return claim;
 }
+
+namespace {
+
+/// The one file of an earlier job, if it has another name than that of this one and is no part of it.
+std::optional<fs::path> other_slice_file(const Job& job) {
+  const auto head = read_manifest_head(job.output + "/manifest.json");
+  if (!head || head->file.empty() || (!job.slice.file_a_layer && head->file == slice_file_name(job))) return std::nullopt;
+  const fs::path file = fs::path(job.output) / head->file;
+  for (const PartRequest& part : job.parts) {
+    if (write::same_file(file.string(), part.path)) return std::nullopt;
+  }
+  return file;
+}
+
+}  // namespace
 
 Status replace_earlier_slices(const Job& job) {
   std::error_code error;
   if (job.overwrite) {
-    for (const char* name : {"manifest.json", "job.toml"}) fs::remove(fs::path(job.output) / name, error);
-    for (const fs::path& file : layer_files(job)) fs::remove(file, error);
+    std::vector<fs::path> earlier = layer_files(job);
+    if (auto other = other_slice_file(job)) earlier.push_back(std::move(*other));
+    for (const char* name : {"manifest.json", "job.toml"}) earlier.push_back(fs::path(job.output) / name);
+    for (const fs::path& file : earlier) {
+      fs::remove(file, error);
+      if (error) return cannot(file, error);
+    }
   }
   if (!job.slice.file_a_layer) return {};
   const fs::path layers = fs::path(job.output) / "layers";
-  const auto failed = [&] { return Error{Fault::kOutput, fmt::format("{}: {}", layers.string(), error.message())}; };
   fs::rename(waiting_layers(job), layers, error);  // takes the place of an empty directory too
   if (!error) return {};
   error.clear();
   for (fs::directory_iterator entry(waiting_layers(job), error), end; !error && entry != end; entry.increment(error)) {
     fs::rename(entry->path(), layers / entry->path().filename(), error);
-    if (error) return failed();
+    if (error) return cannot(layers, error);
   }
-  if (error) return failed();
-  fs::remove(waiting_layers(job), error);
-  return {};
+  if (!error) fs::remove(waiting_layers(job), error);
+  return error ? Status(cannot(layers, error)) : Status();
 }
 
-WaitingLayers::~WaitingLayers() {
-  std::error_code ignored;
-  if (job_.slice.file_a_layer) fs::remove_all(waiting_layers(job_), ignored);
+void remove_waiting_layers(const Job& job) {
+  std::error_code error;
+  fs::remove_all(waiting_layers(job), error);
+  if (error) write::note_left_behind(waiting_layers(job).string(), error.value());
 }
 
 }  // namespace lamina::pipeline

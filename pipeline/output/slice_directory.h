@@ -7,6 +7,7 @@
 
 #include "pipeline/job/job.h"
 #include "stages/data/status.h"
+#include "stages/write/temporary.h"
 
 namespace lamina::pipeline {
 
@@ -22,22 +23,14 @@ Status check_slice_output(const Job& job);
 /// Temporary directory of per-layer files until all are written.
 std::filesystem::path waiting_layers(const Job& job);
 
-/// Call after check_slice_output: creates the directory and keeps existing files. errors  of check_nobody_came, kOutput
-Status prepare_slice_directory(const Job& job);
+/// Call after check_slice_output: claims the directory and keeps existing files. errors  of claim_output, kOutput
+Result<write::Claim> prepare_slice_directory(const Job& job);
 
 /// Call when the job is complete: removes an earlier job's files and renames the waiting layers.
 /// errors  kOutput
 Status replace_earlier_slices(const Job& job);
 
-/// Removes the waiting layers of a failed job on destruction.
-class WaitingLayers {
- public:
-  explicit WaitingLayers(const Job& job) : job_(job) {}
-  WaitingLayers(const WaitingLayers&) = delete;
-  ~WaitingLayers();
-
- private:
-  const Job& job_;
-};
+/// Of a job that has failed; what cannot be removed is noted (stages/write/leftovers.h).
+void remove_waiting_layers(const Job& job);
 
 }  // namespace lamina::pipeline

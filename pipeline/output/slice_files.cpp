@@ -5,6 +5,7 @@
 #include <filesystem>
 
 #include "pipeline/job/file.h"
+#include "pipeline/output/directory.h"
 #include "pipeline/output/plan_head.h"
 #include "pipeline/output/slice_directory.h"
 #include "stages/data/text/version.h"
@@ -30,8 +31,7 @@ SliceFiles::SliceFiles(const Plan& plan) : plan_(plan), file_a_layer_(plan.job.s
 }
 
 SliceFiles::~SliceFiles() {
-  std::error_code ignored;
-  if (manifest_ && file_a_layer_ && !finished_) fs::remove_all(waiting_layers(plan_.job), ignored);
+  if (manifest_ && file_a_layer_ && !finished_) remove_waiting_layers(plan_.job);
 }
 
 std::string SliceFiles::output() const {
@@ -42,7 +42,8 @@ std::string SliceFiles::output() const {
 
 Status SliceFiles::open() {
   const Job& job = plan_.job;
-  if (Status status = prepare_slice_directory(job); !status) return status;
+  auto claim = prepare_slice_directory(job);
+  if (!claim) return claim.error();
   ManifestHead head = plan_head(plan_);
   head.format = job.slice.format;
   const bool one_file = job.slice.format != "null" && !file_a_layer_;
@@ -52,7 +53,8 @@ Status SliceFiles::open() {
   if (one_file && encoder_) {
     Buffer<char> start;
     encoder_->head(head_, start);
-    auto file = LayeredFile::open({output(), manifest_path, job.resume, false}, head, {start.data(), start.size()});
+    auto file = LayeredFile::open({output(), manifest_path, job.resume, job.overwrite, job.sync}, head,
+                                  {start.data(), start.size()}, std::move(*claim));
     if (!file) return file.error();
     file_.emplace(std::move(*file));
     return {};
@@ -62,7 +64,16 @@ Status SliceFiles::open() {
     if (!package) return package.error();
     package_.emplace(std::move(*package));
   }
-  auto manifest = ManifestWriter::open(manifest_path, head, {});
+  ManifestWriter::Options options{job.sync};
+  if (file_a_layer_) {
+    const std::string waiting = waiting_layers(job).string();
+    sync_ = write::FolderSync::of({waiting});
+    options.sync_layers = [waiting] {
+      const int reason = write::sync_folder(waiting);
+      return reason == 0 ? Status() : Status(write::write_failure(waiting, reason));
+    };
+  }
+  auto manifest = ManifestWriter::open(manifest_path, head, {}, options, std::move(*claim));
   if (!manifest) return manifest.error();
   manifest_.emplace(std::move(*manifest));
   return {};
@@ -94,7 +105,7 @@ Status SliceFiles::store(std::uint32_t index, const Buffer<char>& text, LayerRec
   record.hash = hash_bytes(bytes);
   if (!file_a_layer_) return {};
   const std::string path = waiting_layers(plan_.job) / fmt::format("{:06}{}", index, slice_extension(plan_.job));
-  return write::write_file(path, bytes, {.lock = false});
+  return write::write_file(path, bytes, layer_file_options(plan_.job));
 }
 
 Status SliceFiles::record(const write::SliceLayer& layer, const Buffer<char>& text, LayerRecord& record) {
@@ -113,12 +124,15 @@ Status SliceFiles::save_plan() const {
   kept.threads = 0;
   kept.memory_bytes = Job().memory_bytes;
   kept.output.clear();
-  const Status status = save_job(plan_.job.output + "/job.toml", kept);
+  kept.sync = Job().sync;
+  const Status status = save_job(plan_.job.output + "/job.toml", kept, plan_.job.sync != Sync::kOff);
   return !status && status.error().fault == Fault::kOutput ? status : Status();
 }
 
 Result<FileDigest> SliceFiles::finish_package() {
-  if (Status status = package_->finish(output()); !status) return status.error();
+  write::FileOptions how{.replace = plan_.job.overwrite || plan_.job.resume};
+  if (plan_.job.sync == Sync::kOff) how.durable = write::Durable::kNo;
+  if (Status status = package_->finish(output(), how); !status) return status.error();
   const auto digest = digest_file(output());
   if (!digest) return Error{Fault::kOutput, digest.error().message};
   return digest;
@@ -137,6 +151,9 @@ Result<std::uint64_t> SliceFiles::finish() {
   if (Status status = save_plan(); !status) return status.error();
   finished_ = true;
   if (!file_) {
+    if (sync_ && plan_.job.sync != Sync::kOff) {
+      if (Status status = sync_->sync(); !status) return status.error();
+    }
     if (Status status = manifest_->finish(package); !status) return status.error();
     return bytes_;
   }

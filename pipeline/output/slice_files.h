@@ -13,6 +13,7 @@
 #include "stages/write/manifest/layered_file.h"
 #include "stages/write/slice3mf/slice3mf.h"
 #include "stages/write/slice_format.h"
+#include "stages/write/sync.h"
 
 namespace lamina::pipeline {
 
@@ -57,6 +58,7 @@ class SliceFiles {
   std::optional<write::Slice3mfWriter> package_;  // 3MF
   std::optional<LayeredFile> file_;               // of one text file
   std::optional<ManifestWriter> manifest_;        // of all others
+  std::optional<write::FolderSync> sync_;         // of files a layer
   std::uint64_t bytes_ = 0;
   bool finished_ = false;
 };

@@ -90,6 +90,7 @@ Status check_toolpath_output(const Job& job, const Extruder& machine) {
                                             sml ? "the layer table beside an SML file" : "--resume")};
   }
   if (Status status = write::check_not_being_written(job.output); !status) return status;
+  if (Status status = LayeredFile::check_part(job.output, manifest_path(job)); !status) return status;
   if (job.overwrite || job.resume) return {};
   std::vector<std::string> names{job.output, manifest_path(job)};
   if (sml) names.push_back(table_path(job));
@@ -108,11 +109,6 @@ ToolpathFile::ToolpathFile(const Plan& plan)
 
 Status ToolpathFile::open() {
   const Job& job = plan_.job;
-  // Another run may have written it since check_toolpath_output, while this one loaded its parts.
-  std::error_code error;
-  if (!streams(job) && !job.resume && !job.overwrite && fs::exists(fs::symlink_status(job.output, error))) {
-    return Error{Fault::kUsage, fmt::format("{}: another run has written it meanwhile; name another file with -o", job.output)};
-  }
   ManifestHead head = plan_head(plan_);
   const Extruder& machine = plan_.moves->profile.machine;
   head.format = machine.format;
@@ -122,7 +118,8 @@ Status ToolpathFile::open() {
   head.machine_profile = hash_bytes(std::as_bytes(std::span(profile)));
   Buffer<char> start;
   format_->head({fmt::format("lamina {}", version()), source_text(plan_), layers(), plan_.segments->any()}, start);
-  auto file = LayeredFile::open({job.output, manifest_path(job), job.resume, streams(job)}, head, {start.data(), start.size()});
+  auto file = LayeredFile::open({job.output, manifest_path(job), job.resume, job.overwrite, job.sync, streams(job)}, head,
+                                {start.data(), start.size()});
   if (!file) return file.error();
   file_.emplace(std::move(*file));
   return {};
@@ -137,7 +134,9 @@ Result<std::uint64_t> ToolpathFile::finish(const write::MoveTotals& totals) {
   if (plan_.moves->profile.machine.format == "sml") {
     const auto table = layer_table(plan_);
     if (!table) return table.error();
-    if (Status status = write::write_file(table_path(plan_.job), std::string_view(*table)); !status) return status.error();
+    write::FileOptions how{.replace = plan_.job.overwrite || plan_.job.resume};
+    if (plan_.job.sync == Sync::kOff) how.durable = write::Durable::kNo;
+    if (Status status = write::write_file(table_path(plan_.job), std::string_view(*table), how); !status) return status.error();
   }
   Buffer<char> end;
   format_->tail(totals, layers(), end);

@@ -11,6 +11,9 @@
 #include <utility>
 
 #include "stages/write/file_target.h"
+#include "stages/write/leftovers.h"
+#include "stages/write/sync.h"
+#include "stages/write/temporary.h"
 
 namespace lamina::write {
 
@@ -19,6 +22,8 @@ constexpr std::size_t kGathered = 64 << 10, kLarge = 16 << 10;  // bytes that wa
 struct File::State {
   std::string path;    // as named, for errors
   std::string target;  // the file that it leads to
+  std::string grows;   // the name until then; "" for a stream
+  int watched = -1;    // removed at a signal
   FileOptions options;
   bool streams = false;
   int file = -1;
@@ -35,13 +40,23 @@ struct File::State {
   State& operator=(const State&) = delete;
   ~State() {
     if (file < 0) return;
-    if (options.keep_part || streams) write_all(file, gathered);
-    // Under the lock: another run may not find the name of a file that is being removed.
-    if (!options.keep_part && !streams) ::unlink(part().c_str());
+    if (options.keep_part || streams) {
+      write_all(file, gathered);  // an error is found by whoever goes on
+    } else {
+      remove();
+    }
     ::close(file);
   }
 
-  std::string part() const { return part_of(target); }
+  void grow(std::string name) {
+    grows = std::move(name);
+    if (!options.keep_part) watched = watch(grows.c_str());
+  }
+  /// Under the lock: another run may not find the name of a file that is being removed.
+  void remove() {
+    forget(std::exchange(watched, -1));
+    remove_or_note(grows);
+  }
 
   Status put(std::span<const std::byte> bytes) {
     const int reason = write_all(file, bytes);
@@ -62,17 +77,31 @@ struct File::State {
     return 0;
   }
 
+  int rename_to_target() const {
+    if (options.replace) return std::rename(grows.c_str(), target.c_str()) == 0 ? 0 : errno;
+    // Not every file system can do that in one step.
+    if (::renameat2(AT_FDCWD, grows.c_str(), AT_FDCWD, target.c_str(), RENAME_NOREPLACE) == 0) return 0;
+    if (errno != EINVAL && errno != ENOSYS) return errno;
+    if (::faccessat(AT_FDCWD, target.c_str(), F_OK, AT_SYMLINK_NOFOLLOW) == 0) return EEXIST;
+    return std::rename(grows.c_str(), target.c_str()) == 0 ? 0 : errno;
+  }
+
   /// Network file systems report a full disk when a descriptor is closed: that of a locked file is closed twice, once
   /// before the file has its name, once, with its lock, behind. After EINTR a descriptor is closed all the same (Linux).
   int close_and_rename() {
+    int reason = options.durable == Durable::kNo ? 0 : sync_file(file);
     const bool held = options.lock;
     const int first = held ? ::fcntl(file, F_DUPFD_CLOEXEC, 3) : std::exchange(file, -1);
     if (first < 0) return errno;
-    int reason = ::close(first) != 0 && errno != EINTR ? errno : 0;
-    if (reason == 0 && std::rename(part().c_str(), target.c_str()) != 0) reason = errno;
-    if (reason != 0 && !options.keep_part) ::unlink(part().c_str());
+    if (::close(first) != 0 && errno != EINTR && reason == 0) reason = errno;
+    if (reason == 0) reason = rename_to_target();
+    if (reason == 0) {
+      forget(std::exchange(watched, -1));
+    } else if (!options.keep_part) {
+      remove();
+    }
     if (held) ::close(std::exchange(file, -1));
-    return reason;
+    return reason == 0 && options.durable == Durable::kAll ? sync_folder_of(target) : reason;
   }
 };
 
@@ -83,25 +112,37 @@ File::~File() = default;
 
 Result<File> File::open(const std::string& path, const FileOptions& options) {
   auto state = std::make_unique<State>(path, options);
-  const auto target = find_target(path, options.stream);
+  const auto target = find_target(path, options.follow);
   if (!target) return target.error();
   state->target = target->file;
-  state->streams = target->stream >= 0;
-  state->file = target->stream;
-  if (!state->streams) {
-    const auto part = create_part(path, state->part(), options.lock);
+  state->streams = target->file.empty();
+  if (state->streams) {
+    const auto stream = open_stream(path, *target, options.stream);
+    if (!stream) return stream.error();
+    state->file = *stream;
+  } else if (options.keep_part) {
+    const auto part = create_part(path, part_of(target->file));
     if (!part) return part.error();
     state->file = *part;
+    state->options.lock = true;
+    state->grow(part_of(target->file));
+  } else {
+    auto made = create_temporary(path, target->file, options.lock);
+    if (!made) return made.error();
+    state->file = made->file;
+    state->grow(std::move(made->name));
   }
   return File(std::move(state));
 }
 
 Result<File> File::reopen(const std::string& path, std::uint64_t size, const FileOptions& options) {
   auto state = std::make_unique<State>(path, options);
-  const auto target = find_target(path, false);
+  const auto target = find_target(path, options.follow);
   if (!target) return target.error();
+  if (target->file.empty()) return open_stream(path, *target, false).error();
   state->target = target->file;
-  const auto part = take_part(path, state->part(), size);
+  state->grows = part_of(target->file);
+  const auto part = take_part(path, state->grows, size);
   if (!part) return part.error();
   // A file that cannot be continued stays as it is.
   const bool keep = std::exchange(state->options.keep_part, true);
@@ -113,6 +154,7 @@ Result<File> File::reopen(const std::string& path, std::uint64_t size, const Fil
   if (reason != 0) return write_failure(path, reason);
   state->options.keep_part = keep;
   state->options.lock = true;
+  state->grow(state->grows);
   return File(std::move(state));
 }
 
@@ -135,6 +177,27 @@ Status File::flush() {
   return status;
 }
 
+Status File::sync() {
+  const int reason = state_->streams ? 0 : sync_file(state_->file);
+  return reason == 0 ? Status() : Status(write_failure(state_->path, reason));
+}
+
+Status File::become_part() {
+  State& state = *state_;
+  if (Status status = flush(); !status) return status;
+  if (state.options.durable != Durable::kNo) {
+    if (Status status = sync(); !status) return status;
+  }
+  // Nobody else knows its name yet; file systems without locks have one writer at a time.
+  if (!state.options.lock) ::flock(state.file, LOCK_EX | LOCK_NB);
+  const std::string part = part_of(state.target);
+  if (std::rename(state.grows.c_str(), part.c_str()) != 0) return write_failure(state.path, errno);
+  forget(std::exchange(state.watched, -1));
+  state.grows = part;
+  state.options.keep_part = state.options.lock = true;
+  return {};
+}
+
 Result<FileDigest> File::finish() {
   State& state = *state_;
   if (Status status = flush(); !status) return status.error();
@@ -150,7 +213,7 @@ Result<FileDigest> File::finish() {
 
 void File::discard() {
   state_->options.keep_part = false;
-  state_.reset();
+  state_.reset();  // of a finished file nothing is left
 }
 
 std::uint64_t File::size() const { return state_->size; }

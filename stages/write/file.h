@@ -1,8 +1,8 @@
 // stages/write/file.h: the one way to write a file. It appears under its name only when it is whole.
 //
-// NAME.part grows beside it and takes its name at the end. It is created exclusively, never through a link, and locked as
-// long as it grows, so that no two runs write one file. What the name leads to is decided when the file is opened: a link
-// is followed, dangling or not; a directory, a device or a pipe is never replaced.
+// It grows under a temporary name beside it (temporary.h), is synced, takes its name, and its folder is synced: a power cut
+// leaves the older file or this one. What the name leads to is decided once, when the file is opened: a link is followed,
+// dangling or not; a directory, a device or a pipe is never replaced.
 #pragma once
 
 #include <cstddef>
@@ -18,20 +18,30 @@
 
 namespace lamina::write {
 
+/// What of a file survives a power cut once finish() has returned.
+enum class Durable {
+  kNo,     // what the system has written by then
+  kBytes,  // the bytes; whoever calls syncs the folder
+  kAll
+};
+
 struct FileOptions {
   bool stream = false;     // devices, pipes and sockets take the bytes as they come; "-" is standard output
   bool hash = false;       // finish() returns the XXH3-128 of all bytes
-  bool keep_part = false;  // NAME.part stays, whatever ends the run, until reopen(), open() or discard()
-  bool lock = true;        // off for layers, whose directory is locked by its manifest: five system calls fewer
+  bool keep_part = false;  // grows as NAME.part, which stays, whatever ends the run, until reopen(), open() or discard()
+  bool lock = true;        // off where a Claim holds the file or its directory: five system calls fewer
+  bool follow = true;      // links; off for files of a job's directory, whose links are replaced
+  bool replace = true;     // off: a file that is there in the end is an error
+  Durable durable = Durable::kAll;
 };
 
 class File {
  public:
-  /// Begins a file. A NAME.part that a killed run left is replaced.
+  /// Begins a file. What killed runs left of it is removed, with keep_part also NAME.part.
   /// errors  kOutput, one line with the path and the system's reason; another run writes the same file; the name is that
-  ///         of a directory, or of a device or pipe without `stream`; NAME.part is a link or no file
+  ///         of a directory, or of a device or pipe without `stream`; NAME.part, if it is to be kept, is a link or no file
   static Result<File> open(const std::string& path, const FileOptions& options = {});
-  /// Goes on with NAME.part, which is cut to `size` bytes; with `hash` these are read again.
+  /// Goes on with NAME.part of an earlier run, which is cut to `size` bytes; with `hash` these are read again.
   /// errors  those of open(); kOutput if NAME.part is absent or shorter
   static Result<File> reopen(const std::string& path, std::uint64_t size, const FileOptions& options = {});
 
@@ -46,9 +56,14 @@ class File {
   Status append(const Buffer<char>& text) { return append(std::as_bytes(std::span(text))); }
   /// Gives the system what append() has gathered; a killed run then leaves it in NAME.part.
   Status flush();
-  /// Flushes, closes and gives the file its name. returns  its size, and its hash if it was taken
+  /// What has been flushed survives a power cut, unless the file is a stream.
+  Status sync();
+  /// Gives an unfinished file, which grew under another name, the name NAME.part, locked and kept from now on; it takes
+  /// the place of an older one at once.
+  Status become_part();
+  /// Flushes, syncs, closes and gives the file its name. returns  its size, and its hash if it was taken
   Result<FileDigest> finish();
-  /// Removes NAME.part, kept or not.
+  /// Removes what is not finished, kept or not.
   void discard();
 
   std::uint64_t size() const;  // bytes so far
@@ -64,9 +79,6 @@ class File {
 /// Writes a whole file. errors  those of File; an older file of that name stays as it was
 Status write_file(const std::string& path, std::span<const std::byte> bytes, const FileOptions& options = {});
 Status write_file(const std::string& path, std::string_view text, const FileOptions& options = {});
-
-/// errors  kOutput if another run holds NAME.part of this path
-Status check_not_being_written(const std::string& path);
 
 /// Writes all bytes to a descriptor, over interrupts and full pipes. returns  0 or the system's error number
 int write_all(int file, std::span<const std::byte> bytes);

@@ -3,18 +3,21 @@
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <sys/file.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <cerrno>
 #include <cstring>
 #include <filesystem>
-#include <fstream>
 #include <utility>
 
+#include "stages/data/input/file_reader.h"
 #include "stages/write/file.h"
 
 namespace lamina::write {
 namespace {
+
+constexpr std::size_t kLongestLine = 64 << 20;  // bytes
 
 Error reason_of(const std::string& path, int code) {
   return {Fault::kOutput, fmt::format("{}: {}", path, std::strerror(code))};
@@ -23,9 +26,12 @@ Error reason_of(const std::string& path, int code) {
 }  // namespace
 
 Result<Journal> Journal::open(const std::string& path, std::string_view held) {
-  const int file = ::open(path.c_str(), O_RDWR | O_CREAT | O_APPEND | O_CLOEXEC | O_NOFOLLOW, 0666);
+  const int file = ::open(path.c_str(), O_RDWR | O_CREAT | O_APPEND | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK, 0666);
   if (file < 0) return reason_of(path, errno);
   Journal journal(path, file);
+  struct stat status {};
+  if (::fstat(file, &status) != 0) return reason_of(path, errno);
+  if (!S_ISREG(status.st_mode)) return Error{Fault::kOutput, fmt::format("{}: is a device or a pipe, not a file", path)};
   if (::flock(file, LOCK_EX | LOCK_NB) == 0) return journal;
   if (errno != EWOULDBLOCK) return reason_of(path, errno);
   return Error{Fault::kOutput, fmt::format("{}: {}", path, held)};
@@ -48,12 +54,14 @@ Status Journal::clear() {
   return ::ftruncate(file_, 0) == 0 ? Status() : reason_of(path_, errno);
 }
 
-void Journal::read(const std::function<void(const std::string&)>& line) {
-  std::ifstream lines(path_, std::ios::binary);
-  for (std::string text; std::getline(lines, text);) {
-    torn_ = lines.eof();
-    line(text);
+Status Journal::read(const std::function<void(const std::string&)>& line) {
+  auto lines = FileReader::open(path_, {.fault = Fault::kOutput, .longest_line = kLongestLine, .any_bytes = true});
+  if (!lines) return lines.error();
+  for (std::string_view text; lines->next(text);) {
+    torn_ = !lines->ended_by_break();
+    line(std::string(text));
   }
+  return lines->status();
 }
 
 Status Journal::append(std::string line) {

@@ -16,7 +16,7 @@ class Journal {
  public:
   /// Opens a file without changing it, or creates it empty.
   /// held    error text after the path if another process holds the file: "another batch is running here"
-  /// errors  kOutput: another process holds it, or the system's reason
+  /// errors  kOutput: another process holds it, it is no file, or the system's reason
   static Result<Journal> open(const std::string& path, std::string_view held);
   Journal(Journal&& other) noexcept;
   Journal& operator=(Journal&&) = delete;
@@ -26,7 +26,8 @@ class Journal {
   /// Empties the file. errors  kOutput
   Status clear();
   /// Every line so far, in order, without its end; the last one may be torn. cost  reads the file once
-  void read(const std::function<void(const std::string&)>& line);
+  /// errors  kOutput: cannot be read, or a line of more than 64 MiB
+  Status read(const std::function<void(const std::string&)>& line);
   /// Adds a line, which ends with a line's end. errors  kOutput: one line with the path and the system's reason
   Status append(std::string line);
 

@@ -14,6 +14,8 @@
 #include <filesystem>
 #include <memory>
 
+#include "stages/write/file.h"
+
 namespace lamina::write {
 namespace {
 
@@ -55,7 +57,7 @@ Result<std::string> filter(const std::string& program, const std::string& argume
   const auto in = memory_file(program), out = memory_file(program);
   if (!in || !out) return not_started(program, errno);
   if (std::fwrite(input.data(), 1, input.size(), in.get()) != input.size() || std::fflush(in.get()) != 0)
-    return not_started(program, errno);
+    return write_failure("what " + program + " is to read", errno);  // a limit on file sizes holds in memory too
   std::rewind(in.get());
 
   std::string word = argument;
@@ -78,6 +80,7 @@ Result<std::string> filter(const std::string& program, const std::string& argume
   std::array<char, 1 << 16> piece;
   while (const std::size_t got = std::fread(piece.data(), 1, piece.size(), out.get())) text.append(piece.data(), got);
   if (WIFEXITED(state) && WEXITSTATUS(state) == 0) return text;
+  if (WIFEXITED(state) && text.empty()) text = fmt::format("{} could not tell its result", program);
   if (WIFEXITED(state)) return Error{static_cast<Fault>(WEXITSTATUS(state)), text};
   return Error{Fault::kInternal, fmt::format("{} was ended by signal {}", program, WTERMSIG(state))};
 }

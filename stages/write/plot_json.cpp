@@ -1,5 +1,6 @@
 #include <nlohmann/json.hpp>
 
+#include "stages/data/input/text_shape.h"
 #include "stages/write/plot.h"
 
 namespace lamina {
@@ -19,6 +20,7 @@ std::string plot_json(const Plot& plot) {
 }
 
 Result<Plot> read_plot(std::string_view json) {
+  if (!json_nests_within(json)) return Error{Fault::kUsage, "is no plot: it nests too deep"};
   try {
     return nlohmann::json::parse(json).get<Plot>();
   } catch (const nlohmann::json::exception& error) {

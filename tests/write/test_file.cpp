@@ -1,5 +1,8 @@
 #include "stages/write/file.h"
 
+#include "pipeline/cli/console.h"
+#include "stages/write/temporary.h"
+
 #include <fcntl.h>
 #include <gtest/gtest.h>
 #include <sys/resource.h>
@@ -168,21 +171,138 @@ TEST(File, WhatAKilledRunLeftIsReplaced) {
   for (const bool lock : {true, false}) {
     EXPECT_EQ(in_a_process([&] {
                 auto file = File::open(path, {.lock = lock});
-                return file && file->append(std::string(100'000, 'x')) ? 7 : 1;  // no destructor runs in a process that dies
+                if (file && file->append(std::string(100'000, 'x'))) ::kill(::getpid(), SIGKILL);
+                return 1;
               }),
-              7);
-    testing::save(path + ".part", bytes_of("left behind"));
-    ASSERT_TRUE(write_file(path, "whole", {.lock = lock}).ok());
-    EXPECT_EQ(testing::load(path), "whole");
-    EXPECT_EQ(folder.files(), 1u);
+              -1);
+    EXPECT_EQ(folder.files(), 1u) << "what the killed run left";
+    testing::save(path + ".part", bytes_of("somebody else's"));
+    ASSERT_TRUE(write_file(path, "whole").ok());
+    EXPECT_EQ(testing::load(path), "whole") << lock;
+    EXPECT_EQ(testing::load(path + ".part"), "somebody else's");
+    EXPECT_EQ(folder.files(), 2u);
+    std::filesystem::remove(path);
+    std::filesystem::remove(path + ".part");
   }
+}
+
+TEST(File, OnlyTemporaryFilesOfTheSameNameAreRemoved) {
+  const testing::Folder folder;
+  const std::string path = folder / "part.gcode", longest = folder / std::string(250, 'n');
+  const std::vector<std::string> others = {temporary_name(folder / "other.gcode"), path + ".lamina-short.part",
+                                           path + ".lamina-ABCDEFGHIJKLM.part", temporary_name(path) + ".part"};
+  for (const std::string& other : others) testing::save(other, bytes_of("stays"));
+  const std::string stale = temporary_name(path), of_longest = temporary_name(longest);
+  for (const std::string& name : {stale, of_longest}) testing::save(name, bytes_of("left"));
+  ASSERT_TRUE(write_file(path, "whole").ok());
+  ASSERT_TRUE(write_file(longest, "whole").ok());
+  for (const std::string& other : others) EXPECT_EQ(testing::load(other), "stays") << other;
+  EXPECT_FALSE(std::filesystem::exists(stale) || std::filesystem::exists(of_longest));
+  EXPECT_EQ(named_by_temporary("part.gcode.lamina-abcdefg234567.part"), "part.gcode");
+  EXPECT_EQ(named_by_temporary("part.gcode.part"), "");
+}
+
+TEST(File, ASignalThatEndsTheProgramLeavesNothingButWhatCanBeContinued) {
+  const testing::Folder folder;
+  for (const int signal : {SIGHUP, SIGINT, SIGQUIT, SIGTERM, SIGXCPU, SIGALRM, SIGUSR1}) {
+    const pid_t child = ::fork();
+    if (child == 0) {
+      const rlimit none{0, 0};
+      ::setrlimit(RLIMIT_CORE, &none);
+      for (const int one : {SIGHUP, SIGINT, SIGQUIT}) std::signal(one, SIG_DFL);  // not as the tests were started
+      pipeline::handle_signals();
+      const auto file = File::open(folder / "part.gcode"), layer = File::open(folder / "layer.tif", {.lock = false});
+      const auto kept = File::open(folder / "kept.gcode", {.keep_part = true});
+      const auto claim = Claim::take(folder / "manifest.json", "");
+      if (file && layer && kept && claim) ::raise(signal);
+      ::_exit(1);
+    }
+    int result = 0;
+    ASSERT_EQ(::waitpid(child, &result, 0), child);
+    EXPECT_TRUE(WIFSIGNALED(result) && WTERMSIG(result) == signal) << result;
+    EXPECT_EQ(folder.files(), 1u) << signal;
+    EXPECT_TRUE(std::filesystem::exists(folder / "kept.gcode.part"));
+  }
+}
+
+TEST(File, WhatCannotBeReplacedByAgreementIsAnErrorInTheEnd) {
+  const testing::Folder folder;
+  const std::string path = folder / "part.gcode";
+  auto file = File::open(path, {.keep_part = true, .replace = false});
+  ASSERT_TRUE(file.ok() && file->append("long work").ok());
+  testing::save(path, bytes_of("somebody was faster"));
+  const auto digest = file->finish();
+  ASSERT_FALSE(digest.ok());
+  EXPECT_EQ(digest.error().message, path + ": cannot write: File exists");
+  EXPECT_EQ(testing::load(path), "somebody was faster");
+  EXPECT_EQ(testing::load(path + ".part"), "long work");
+}
+
+TEST(File, InAJobsDirectoryLinksAreReplacedAndNotFollowed) {
+  const testing::Folder folder;
+  testing::save(folder / "archive", bytes_of("precious"));
+  std::filesystem::create_symlink("archive", folder / "layer.tif");
+  ASSERT_TRUE(write_file(folder / "layer.tif", "new", {.lock = false, .follow = false}).ok());
+  EXPECT_EQ(testing::load(folder / "archive"), "precious");
+  EXPECT_EQ(testing::load(folder / "layer.tif"), "new");
+  EXPECT_FALSE(std::filesystem::is_symlink(folder / "layer.tif"));
+}
+
+TEST(Claim, OfManyThatBeginAtOnceOneHoldsADirectory) {
+  const testing::Folder folder;
+  const std::string path = folder / "manifest.json";
+  for (int round = 0; round < 20; ++round) {
+    std::atomic<int> held{0}, most{0}, taken{0};
+    std::vector<std::thread> runs;
+    for (int t = 0; t < 8; ++t) {
+      runs.emplace_back([&] {
+        for (int k = 0; k < 5; ++k) {
+          const auto claim = Claim::take(path, "out");
+          if (!claim) continue;
+          ++taken;
+          most = std::max(most.load(), ++held);
+          std::this_thread::yield();
+          --held;
+        }
+      });
+    }
+    for (std::thread& run : runs) run.join();
+    EXPECT_GT(taken, 0);
+    EXPECT_EQ(most, 1);
+    EXPECT_EQ(folder.files(), 0u);
+  }
+}
+
+TEST(Claim, StaysWithTheFileThatTakesItsPlace) {
+  const testing::Folder folder;
+  const std::string path = folder / "manifest.json";
+  {
+    auto claim = Claim::take(path, "out");
+    ASSERT_TRUE(claim.ok());
+    EXPECT_FALSE(claim->found());
+    auto file = File::open(path, {.lock = false});
+    ASSERT_TRUE(file.ok() && file->append("head\n").ok());
+    claim->hand_over();
+    ASSERT_TRUE(file->become_part().ok());
+    { const auto dropped = std::move(*claim); }
+    EXPECT_EQ(testing::load(path + ".part"), "head\n");
+    const auto second = Claim::take(path, "out");
+    ASSERT_FALSE(second.ok());
+    EXPECT_EQ(second.error().message, "out: another run is writing here right now; wait for it or name another file");
+    EXPECT_FALSE(check_not_being_written(path).ok());
+  }
+  EXPECT_TRUE(check_not_being_written(path).ok());
+  const auto later = Claim::take(path, "out");
+  ASSERT_TRUE(later.ok());
+  EXPECT_TRUE(later->found());
+  EXPECT_EQ(folder.files(), 1u);
 }
 
 TEST(File, AFileOfSeveralNamesKeepsItsBytesUnderTheOtherOne) {
   const testing::Folder folder;
   testing::save(folder / "precious", bytes_of("precious"));
   std::filesystem::create_hard_link(folder / "precious", folder / "part.gcode.part");
-  ASSERT_TRUE(write_file(folder / "part.gcode", "whole").ok());
+  ASSERT_TRUE(write_file(folder / "part.gcode", "whole", {.keep_part = true}).ok());
   EXPECT_EQ(testing::load(folder / "precious"), "precious");
 }
 
@@ -190,15 +310,19 @@ TEST(File, NothingIsWrittenThroughALinkOfTheTemporaryFile) {
   const testing::Folder folder;
   testing::save(folder / "victim", bytes_of("precious"));
   std::filesystem::create_symlink("victim", folder / "part.gcode.part");
-  for (const bool lock : {true, false}) {
-    const auto file = File::open(folder / "part.gcode", {.lock = lock});
-    EXPECT_EQ(message_of(file), (folder / "part.gcode.part") + ": is a link where lamina writes its temporary file; remove it");
-  }
+  const std::string refusal = (folder / "part.gcode.part") + ": is a link where lamina writes its temporary file; remove it";
+  EXPECT_EQ(message_of(File::open(folder / "part.gcode", {.keep_part = true})), refusal);
+  EXPECT_EQ(Claim::take(folder / "part.gcode", "out").error().message, refusal);
   EXPECT_FALSE(File::reopen(folder / "part.gcode", 0).ok());
+  for (const bool lock : {true, false}) {
+    ASSERT_TRUE(write_file(folder / "part.gcode", "elsewhere", {.lock = lock}).ok());
+    EXPECT_TRUE(std::filesystem::is_symlink(folder / "part.gcode.part"));
+    std::filesystem::remove(folder / "part.gcode");
+  }
   EXPECT_EQ(testing::load(folder / "victim"), "precious");
   EXPECT_FALSE(std::filesystem::exists(folder / "part.gcode"));
   std::filesystem::create_directory(folder / "other.gcode.part");
-  EXPECT_TRUE(ends_with(message_of(File::open(folder / "other.gcode")),
+  EXPECT_TRUE(ends_with(message_of(File::open(folder / "other.gcode", {.keep_part = true})),
                         "other.gcode.part: is no file where lamina writes its temporary file; remove it"));
 }
 

@@ -10,7 +10,7 @@ namespace {
 
 std::vector<std::string> lines_of(write::Journal& journal) {
   std::vector<std::string> lines;
-  journal.read([&](const std::string& line) { lines.push_back(line); });
+  EXPECT_TRUE(journal.read([&](const std::string& line) { lines.push_back(line); }).ok());
   return lines;
 }
 

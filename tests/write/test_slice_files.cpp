@@ -315,9 +315,9 @@ TEST(Write3mfSlices, PackageHoldsStacksThatSayWhatTheSlicesAreAndIsTheSameEveryT
         const std::span<const Point2> expected = job.contours[layer][contour];
         ASSERT_EQ(indices.size(), expected.size() + 1);
         for (std::size_t i = 0; i < expected.size(); ++i) {
-          // lib3mf writes six significant digits, counted from the item's place on the bed.
-          EXPECT_NEAR(vertices[indices[i]][0] + 5, expected[i].x * 1e-6, 0.5e-5 * std::max(1.0, vertices[indices[i]][0]));
-          EXPECT_NEAR(vertices[indices[i]][1] + 7, expected[i].y * 1e-6, 0.5e-5 * std::max(1.0, vertices[indices[i]][1]));
+          // Counted from the item's place on the bed.
+          EXPECT_EQ(std::llround((vertices[indices[i]][0] + 5) * 1e6), expected[i].x);
+          EXPECT_EQ(std::llround((vertices[indices[i]][1] + 7) * 1e6), expected[i].y);
         }
       }
       EXPECT_EQ(contour, job.body[layer][stacks + 1]);

@@ -35,7 +35,7 @@ int type_of(PathKind kind) { return kind == PathKind::kOuter ? 0 : kind == PathK
 }  // namespace
 
 LayerWriter::LayerWriter(const Extruder& machine, const Layer& layer, std::uint32_t layers, Buffer<char>& out)
-    : machine_(machine), out_(out), layer_index_(layer.index), height_(layer.thickness) {
+    : machine_(machine), out_(out), height_(layer.thickness) {
   const double filament = machine.material.filament_mm;
   feed_per_volume_ = machine.material.flow / (std::numbers::pi / 4 * filament * filament);
   corner_x_ = nm_of(machine.bed.corner_mm[0]);

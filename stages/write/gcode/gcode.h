@@ -32,7 +32,6 @@ class LayerWriter final : public LayerMoves {
   const Extruder& machine_;
   Buffer<char>& out_;
   MoveTotals totals_;
-  std::uint32_t layer_index_;
   Nm height_;                    // of the layer
   double feed_per_volume_;       // mm of filament a mm3 of bead
   double fed_ = 0;               // mm of filament in this layer, exact

@@ -72,10 +72,15 @@ std::string head_json(const Manifest& manifest, const ManifestSeen& file, const 
                {"job", head.job_toml},
                {"manifest", {{"name", file.name}, {"bytes", file.digest.bytes}, {"hash", hex(file.digest.hash)}}},
                {"parts", Json::array()},
+               {"warnings", Json::array()},
                {"views", Json::object()},
                {"reasons", Json::array()},
                {"embedded", Json::array()}};
   for (const PartSummary& part : head.parts) json["parts"].push_back(part_json(part));
+  for (const Warning& warning : seen.warnings) {
+    json["warnings"].push_back({{"code", warning.code}, {"text", warning.text}});
+    if (warning.layer) json["warnings"].back()["layer"] = *warning.layer;
+  }
   for (const ShownView& view : views)
     json["views"][view.name] = {view.width, view.height, view.most, view.width_mm, view.height_mm};
   for (int reason = 0; reason <= static_cast<int>(LayerReason::kFlat); ++reason)

@@ -8,6 +8,7 @@
 #include "stages/data/buffer.h"
 #include "stages/data/grid.h"
 #include "stages/data/hash.h"
+#include "stages/data/status.h"
 #include "stages/geometry/coverage.h"  // PixelWindow
 #include "stages/write/manifest/manifest.h"
 #include "stages/write/report/held_layers.h"
@@ -27,6 +28,7 @@ struct LayersSeen {
   PixelWindow window;
   std::vector<std::uint64_t> set;  // pixels of each
   std::vector<double> seconds;     // of each, with a machine
+  std::vector<Warning> warnings;
 };
 
 /// The manifest's own file.

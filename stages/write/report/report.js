@@ -238,6 +238,7 @@ function fillTexts() {
     button.type = 'button';
     button.addEventListener('click', () => { showLayer(layer); view.scrollIntoView({ block: 'center' }); });
   };
+  for (const warning of head.warnings) warn(warning.text, warning.layer);
   for (const part of head.parts) for (const note of part.notes) warn(`${part.path}: ${note}`);
   let told = 0, more = 0;
   layers.capped.forEach((rows, i) => {
