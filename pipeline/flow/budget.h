@@ -2,12 +2,37 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cstdint>
 #include <functional>
 #include <optional>
 #include <vector>
 
 namespace lamina::pipeline {
+
+/// Corrects estimated bytes by what finished layers held. The largest ratio of the last layers counts, with a margin that
+/// shrinks as evidence grows. Small layers say little: both sides of a ratio are taken with 256 KiB more.
+class Correction {
+ public:
+  /// The estimate as experience has it: never above it, as it is before any layer has finished.
+  std::uint64_t operator()(std::uint64_t estimate) const {
+    if (learned_ == 0) return estimate;
+    double ratio = 0;
+    for (const double one : last_) ratio = std::max(ratio, one);
+    const double share = ratio * (1.5 + 4.0 / static_cast<double>(learned_));
+    return static_cast<std::uint64_t>(std::min(static_cast<double>(estimate), share * static_cast<double>(estimate + kSmall)));
+  }
+
+  void learn(std::uint64_t estimate, std::uint64_t held) {
+    const auto with_margin = [](std::uint64_t bytes) { return static_cast<double>(bytes + kSmall); };
+    last_[learned_++ % last_.size()] = with_margin(held) / with_margin(estimate);
+  }
+
+ private:
+  static constexpr std::uint64_t kSmall = 1 << 18;
+  std::array<double, 32> last_{};
+  std::uint64_t learned_ = 0;
+};
 
 /// Slots are lent last in, first out, so that few of them grow large. Memory of an idle slot counts as used and is freed
 /// before a layer would have to wait for it. Thread-compatible: callers hold a lock.
@@ -42,25 +67,23 @@ class Budget {
 
   bool fits(std::uint64_t bytes) const { return used_ + bytes <= budget_; }
 
-  /// Adds bytes to a layer in flight, even beyond the budget.
-  void add(std::uint64_t bytes) {
-    make_room(bytes);
+  /// Sets the bytes of a layer in flight, even beyond the budget.
+  void settle(Loan& loan, std::uint64_t bytes) {
+    if (bytes > loan.bytes) make_room(bytes - loan.bytes);
+    used_ -= loan.bytes;
+    loan.bytes = bytes;
     use(bytes);
   }
 
-  /// Corrects a layer's bytes from `before` to `now`.
-  void settle(std::uint64_t before, std::uint64_t now) {
-    used_ -= before;
-    use(now);
-  }
-
-  void give_back(const Loan& loan) {
+  /// retained  bytes of the slot's buffers
+  void give_back(const Loan& loan, std::uint64_t retained) {
     --in_flight_;
     used_ -= loan.bytes;
-    idle_.push_back({loan.slot, scratch_.bytes_held(loan.slot)});
-    idle_bytes_ += idle_.back().bytes;
+    idle_.push_back({loan.slot, retained});
+    idle_bytes_ += retained;
   }
 
+  std::uint64_t bytes() const { return budget_; }
   std::uint32_t most_in_flight() const { return most_in_flight_; }
   std::uint64_t most_bytes() const { return most_bytes_; }
 

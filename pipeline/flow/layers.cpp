@@ -4,44 +4,54 @@
 #include <tbb/global_control.h>
 
 #include <chrono>
-#include <map>
 #include <memory>
 #include <mutex>
+#include <new>
+#include <set>
 
 #include "pipeline/flow/budget.h"
 
 namespace lamina::pipeline {
 namespace {
 
-namespace flow = tbb::flow;
-using Node = flow::function_node<Ticket, Ticket>;
-using End = flow::function_node<Ticket, flow::continue_msg>;
+using Clock = std::chrono::steady_clock;
 
-/// The steps as nodes of a graph, and the loans of layers in flight. The library copies node bodies, which refer to this
-/// object, so its address must not change.
-class LayerGraph {
+namespace flow = tbb::flow;
+using Node = flow::function_node<flow::continue_msg, flow::continue_msg>;
+
+/// Layers in flight, their loans, and the graph, a node each step. The library starts the newest message of a node first, and
+/// whoever sends may have to wait for memory: so a message is a turn and names no layer, it is sent once a layer may go on,
+/// and the node takes the oldest layer that waits for its step. Later steps go before earlier ones. The library copies node
+/// bodies, which refer to this object, so its address must not change.
+class LayerFlow {
  public:
-  LayerGraph(std::uint32_t count, const LayerSteps& steps, const FlowLimits& limits, const std::atomic<bool>& cancel)
+  LayerFlow(std::uint32_t count, const LayerSteps& steps, const FlowLimits& limits, const std::atomic<bool>& cancel)
       : count_(count),
         steps_(steps),
-        limits_(limits),
         cancel_(cancel),
         budget_(limits.budget_bytes, limits.most_in_flight, {steps.bytes_held, steps.let_go}),
         moving_(limits.record_slots),
+        ready_(steps.steps.size()),
         step_ns_(steps.steps.size() + 1) {
-    for (std::uint32_t slot = limits.record_slots; slot-- > 0;) free_records_.push_back(slot);
-    connect();
+    for (std::size_t s = 0; s < steps.steps.size(); ++s) {
+      nodes_.push_back(std::make_unique<Node>(
+          graph_, flow::unlimited, [this, s](const flow::continue_msg&) { return take_turn(s); },
+          static_cast<flow::node_priority_t>(s + 1)));
+    }
   }
 
   Status run() {
-    admit();
+    {
+      const std::lock_guard lock(mutex_);
+      admit();
+    }
     graph_.wait_for_all();
     if (result_ && next_ < count_) return Error{Fault::kInterrupted, "interrupted"};
     return result_;
   }
 
   FlowReport report() const {
-    FlowReport report{budget_.most_in_flight(), budget_.most_bytes(), {}};
+    FlowReport report{budget_.most_in_flight(), budget_.most_bytes(), oversized_, {}};
     for (std::size_t s = 0; s < step_ns_.size(); ++s) {
       const bool is_record = s == steps_.steps.size();
       report.step_seconds.emplace_back(is_record ? "record" : steps_.steps[s].name, static_cast<double>(step_ns_[s]) * 1e-9);
@@ -50,174 +60,216 @@ class LayerGraph {
   }
 
  private:
-  /// An admitted layer before it is recorded; indexed by record slot.
+  /// A layer begun and not recorded. Only the thread that takes its step touches it, and under the lock whoever decides
+  /// about a layer that waits.
   struct Moving {
+    Ticket ticket;
     Status status;
     Budget::Loan loan;
-    std::uint64_t more = 0;  // bytes that it waits for at a gate
+    std::uint64_t estimate = 0, more = 0, held = 0;  // at its admission; from its gate on; the most so far
+    std::size_t step = 0;
+    bool asked = false;     // what the step needs is known
+    bool finished = false;  // all steps are taken
   };
+  Moving& at(std::uint32_t position) { return moving_[position % moving_.size()]; }
 
-  void connect() {
-    flow::sequencer_node<Ticket>& in_order = in_order_;
-    for (std::size_t s = 0; s < steps_.steps.size(); ++s) {
-      if (steps_.steps[s].needs) {
-        gated_ = s;
-        gate_ = std::make_unique<End>(graph_, flow::unlimited, [this](const Ticket& ticket) { return wait_at_gate(ticket); });
-        if (s > 0) flow::make_edge(*nodes_.back(), *gate_);
-      }
-      nodes_.push_back(std::make_unique<Node>(graph_, flow::unlimited, [this, s](const Ticket& ticket) {
-        take_step(s, ticket);
-        if (s + 1 == steps_.steps.size()) leave(ticket);
-        return ticket;
-      }));
-      if (s > 0 && !steps_.steps[s].needs) flow::make_edge(*nodes_[s - 1], *nodes_[s]);
-    }
-    flow::make_edge(*nodes_.back(), in_order);
-    flow::make_edge(in_order, record_);
+  // --- under the lock
+
+  /// Gives the node of a layer's step a turn.
+  void send(const Moving& moving) {
+    ready_[moving.step].insert(moving.ticket.position);
+    nodes_[moving.step]->try_put({});
   }
 
   void admit() {
     for (;;) {
-      Ticket ticket;
-      {
-        const std::lock_guard lock(mutex_);
-        stopped_ |= cancel_.load(std::memory_order_relaxed);
-        if (stopped_ || next_ == count_ || free_records_.empty()) return;
-        const auto loan = budget_.take(steps_.bytes_of(next_));
-        if (!loan) return;
-        ticket = {next_++, loan->slot, free_records_.back()};
-        free_records_.pop_back();
-        moving_[ticket.record] = {Status(), *loan, 0};
-      }
-      if (gate_ && gated_ == 0) {
-        gate_->try_put(ticket);
-      } else {
-        nodes_.front()->try_put(ticket);
-      }
+      stopped_ |= cancel_.load(std::memory_order_relaxed);
+      if (stopped_ || next_ == count_ || next_ - recorded_ == moving_.size()) return;
+      const std::uint64_t estimate = steps_.bytes_of(next_);
+      const auto loan = budget_.take(admission_(estimate));
+      if (!loan) return;
+      const auto slot = static_cast<std::uint32_t>(next_ % moving_.size());
+      moving_[slot] = {{next_, loan->slot, slot}, {}, *loan, estimate};
+      ++next_;
+      send(moving_[slot]);
     }
   }
 
-  void take_step(std::size_t step, const Ticket& ticket) {
-    Status& status = moving_[ticket.record].status;
-    if (!status) return;
-    const auto start = Clock::now();
-    status = steps_.steps[step].run(ticket);
-    count_time(step, start);
+  /// Whether a layer may take its next step now; raises its loan to what the step needs.
+  bool may_go(Moving& moving) {
+    const bool next_to_record = moving.ticket.position == recorded_;
+    std::uint64_t bytes = moving.loan.bytes;
+    if (moving.asked) bytes = std::max(moving.held, whole_(moving.estimate + moving.more));
+    const std::uint64_t added = bytes > moving.loan.bytes ? bytes - moving.loan.bytes : 0;
+    if (!next_to_record && moving.status && !budget_.fits(added)) return false;
+    if (moving.asked && moving.status) budget_.settle(moving.loan, bytes);
+    return true;
   }
 
-  flow::continue_msg wait_at_gate(const Ticket& ticket) {
-    Moving& moving = moving_[ticket.record];
+  /// Lets waiting layers go on, the oldest first. None that needs more overtakes an older one that does.
+  void wake() {
+    bool held_up = false;
+    for (auto position = waiting_.begin(); position != waiting_.end();) {
+      Moving& moving = at(*position);
+      if ((held_up && moving.asked) || !may_go(moving)) {
+        held_up = true;
+        ++position;
+        continue;
+      }
+      send(moving);
+      position = waiting_.erase(position);
+    }
+  }
+
+  /// After a step that did not finish the layer.
+  void go_on(Moving& moving) {
+    if (moving.held > moving.loan.bytes) budget_.settle(moving.loan, moving.held);
+    waiting_.insert(moving.ticket.position);
+    wake();
+  }
+
+  void leave(Moving& moving) {
     if (moving.status) {
-      const auto start = Clock::now();
-      const Result<std::uint64_t> more = steps_.steps[gated_].needs(ticket);
-      count_time(gated_, start);
-      moving.more = more ? *more : 0;
-      if (!more) moving.status = more.error();
+      admission_.learn(moving.estimate, moving.held);
+      whole_.learn(moving.estimate + moving.more, moving.held);
+      oversized_ += moving.held > budget_.bytes() ? 1 : 0;
     }
+    if (!steps_.records_from_work) {
+      budget_.give_back(moving.loan, held_now(moving));
+    } else {
+      budget_.settle(moving.loan, held_now(moving));
+    }
+    moving.finished = true;
+  }
+
+  // --- without the lock
+
+  std::uint64_t held_now(const Moving& moving) const { return steps_.bytes_held(moving.ticket.work); }
+
+  flow::continue_msg take_turn(std::size_t s) {
+    Moving* moving = nullptr;
     {
       const std::lock_guard lock(mutex_);
-      at_gate_.emplace(ticket.position, ticket);
+      moving = &at(*ready_[s].begin());
+      ready_[s].erase(ready_[s].begin());
+      // What cannot be recorded any more is not made.
+      if (moving->status && failed_) moving->status = Error{Fault::kInterrupted, "interrupted"};
     }
-    open_gate();
-    return {};
-  }
-
-  void open_gate() {
-    for (;;) {
-      Ticket ticket;
-      {
-        const std::lock_guard lock(mutex_);
-        const auto found = at_gate_.find(next_at_gate_);
-        if (found == at_gate_.end()) return;
-        ticket = found->second;
-        Moving& moving = moving_[ticket.record];
-        if (next_at_gate_ != recorded_ && !budget_.fits(moving.more)) return;
-        at_gate_.erase(found);
-        ++next_at_gate_;
-        budget_.add(moving.more);
-        moving.loan.bytes += moving.more;
-      }
-      nodes_[gated_]->try_put(ticket);
-    }
-  }
-
-  /// After the last step: sets the bytes that the layer holds from here on.
-  void leave(const Ticket& ticket) {
-    {
+    const Step& step = steps_.steps[s];
+    if (moving->status && given_up()) moving->status = Error{Fault::kInterrupted, "interrupted"};
+    const auto start = Clock::now();
+    if (step.needs && !moving->asked) {
+      if (moving->status) ask(step, *moving);
+      moving->asked = true;
+      count_time(moving->step, start);
       const std::lock_guard lock(mutex_);
-      Budget::Loan& loan = moving_[ticket.record].loan;
-      if (steps_.records_from_work) {
-        const std::uint64_t held = steps_.bytes_held(ticket.work);
-        budget_.settle(loan.bytes, held);
-        loan.bytes = held;
-        return;
-      }
-      budget_.give_back(loan);
+      go_on(*moving);
+      return {};
     }
-    after_room_was_given_back();
-  }
-
-  flow::continue_msg record(const Ticket& ticket) {
-    Moving& moving = moving_[ticket.record];
-    if (result_) {  // otherwise an earlier layer failed, and this one is not recorded
-      const auto start = Clock::now();
-      result_ = moving.status ? steps_.record(ticket) : moving.status;
-      count_time(steps_.steps.size(), start);
+    if (moving->status) moving->status = guarded([&] { return step.run(moving->ticket); });
+    count_time(moving->step, start);
+    moving->held = std::max(moving->held, held_now(*moving));
+    std::unique_lock lock(mutex_);
+    if (moving->status && ++moving->step < steps_.steps.size()) {
+      moving->asked = false;
+      go_on(*moving);
+      return {};
     }
-    {
-      const std::lock_guard lock(mutex_);
-      if (steps_.records_from_work) budget_.give_back(moving.loan);
-      free_records_.push_back(ticket.record);
-      ++recorded_;
-      stopped_ |= !result_;
-    }
-    after_room_was_given_back();
-    return {};
-  }
-
-  void after_room_was_given_back() {
-    if (gate_) open_gate();
+    leave(*moving);
+    record(lock);
+    wake();
     admit();
+    return {};
   }
 
-  using Clock = std::chrono::steady_clock;
+  void ask(const Step& step, Moving& moving) {
+    moving.status = guarded([&]() -> Status {
+      const Result<std::uint64_t> more = step.needs(moving.ticket);
+      if (!more) return more.error();
+      moving.more = *more;
+      return {};
+    });
+    moving.held = std::max(moving.held, held_now(moving));
+  }
+
+  /// Records all finished layers that are next; one thread at a time. The lock is released while it records.
+  void record(std::unique_lock<std::mutex>& lock) {
+    if (recording_) return;
+    recording_ = true;
+    while (recorded_ < next_ && at(recorded_).finished) {
+      Moving& moving = at(recorded_);
+      lock.unlock();
+      if (result_) {  // otherwise an earlier layer failed, and this one is not recorded
+        const auto start = Clock::now();
+        result_ = moving.status ? guarded([&] { return steps_.record(moving.ticket); }) : moving.status;
+        count_time(steps_.steps.size(), start);
+      }
+      const std::uint64_t retained = steps_.records_from_work ? held_now(moving) : 0;
+      lock.lock();
+      if (steps_.records_from_work) budget_.give_back(moving.loan, retained);
+      moving.finished = false;
+      ++recorded_;
+      failed_ |= !result_;
+      stopped_ |= failed_;
+      wake();
+      admit();
+    }
+    recording_ = false;
+  }
+
+  template <class Act>
+  static Status guarded(Act&& act) {
+    try {
+      return act();
+    } catch (const std::bad_alloc&) {
+      return out_of_memory();
+    }
+  }
+
+  /// Whether layers in flight are to be left: some time after the flow was told to stop.
+  bool given_up() {
+    if (!cancel_.load(std::memory_order_relaxed)) return false;
+    std::int64_t never = 0;
+    const std::int64_t now = Clock::now().time_since_epoch().count();
+    told_at_.compare_exchange_strong(never, now);
+    return Clock::duration(now - told_at_.load()) > kPatience;
+  }
+
   void count_time(std::size_t step, Clock::time_point start) {
     step_ns_[step] += std::chrono::duration_cast<std::chrono::nanoseconds>(Clock::now() - start).count();
   }
 
+  static constexpr std::chrono::milliseconds kPatience{300};
   const std::uint32_t count_;
   const LayerSteps& steps_;
-  const FlowLimits& limits_;
   const std::atomic<bool>& cancel_;
+  std::atomic<std::int64_t> told_at_{0};
 
-  std::mutex mutex_;  // guards the following members up to the nodes
+  std::mutex mutex_;  // guards the following members up to the times
   Budget budget_;
-  std::vector<std::uint32_t> free_records_;
-  std::map<std::uint32_t, Ticket> at_gate_;  // by position
-  std::uint32_t next_ = 0;                   // position of the next layer to admit
-  std::uint32_t next_at_gate_ = 0;
-  std::uint32_t recorded_ = 0;
-  bool stopped_ = false;  // no further admissions
+  Correction admission_, whole_;                // of the estimates before and after a gate
+  std::vector<Moving> moving_;                  // by position, round and round
+  std::vector<std::set<std::uint32_t>> ready_;  // positions, by step: one turn each is on its way
+  std::set<std::uint32_t> waiting_;             // for bytes
+  std::uint32_t next_ = 0;                      // position of the next layer to admit
+  std::uint32_t recorded_ = 0, oversized_ = 0;
+  bool recording_ = false, stopped_ = false;  // stopped: no further admissions
+  bool failed_ = false;                       // an earlier layer is not on record, so no later one can be
 
-  std::vector<Moving> moving_;                      // a slot belongs to one layer through all steps
   std::vector<std::atomic<std::int64_t>> step_ns_;  // of each step, and of recording
   Status result_;                                   // of `record`, which runs once at a time
 
   flow::graph graph_;
-  std::vector<std::unique_ptr<Node>> nodes_;
-  std::unique_ptr<End> gate_;
-  std::size_t gated_ = 0;
-  flow::sequencer_node<Ticket> in_order_{graph_, [](const Ticket& ticket) -> std::size_t { return ticket.position; }};
-  End record_{graph_, flow::serial, [this](const Ticket& ticket) { return record(ticket); }};
+  std::vector<std::unique_ptr<Node>> nodes_;  // of each step
 };
 
 }  // namespace
 
 Status flow_layers(std::uint32_t count, const LayerSteps& steps, const FlowLimits& limits, const std::atomic<bool>& cancel,
                    FlowReport& report) {
-  LayerGraph graph(count, steps, limits, cancel);
-  const Status status = graph.run();
-  report = graph.report();
+  LayerFlow layers(count, steps, limits, cancel);
+  const Status status = layers.run();
+  report = layers.report();
   return status;
 }
 

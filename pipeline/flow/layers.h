@@ -4,12 +4,14 @@
 //        ^                          │                     │
 //        └──── credits in bytes ────┴─────────────────────┘
 //
-// The graph moves indices and is independent of the job: the caller owns a layer's scratch (slot `work`) and its results
-// until they are recorded (slot `record`). Layers are admitted in order while their estimated bytes fit the budget.
-// A step may request more bytes for the rest of a layer: the layer then waits, again in order, until they fit. The next
-// layer to be recorded never waits, so credits exceed the budget by at most one layer.
-// Steps run for many layers at once; `record` receives every layer once and in order, which makes the first failure
-// well defined.
+// The flow moves indices and is independent of the job: the caller owns a layer's scratch (slot `work`) and its results
+// until they are recorded (slot `record`). Layers are admitted in order while their estimated bytes fit the budget; what
+// finished layers held corrects the estimates. A step may tell more exactly what the layer needs from there on: the layer
+// then waits until it fits. The next layer to be recorded never waits, so credits exceed the budget by at most one layer.
+//
+// Each step is a node of the graph. Steps run for many layers at once; later steps go before earlier ones, and each takes
+// its oldest layer. So what is finished is soon on record: at most FlowLimits::record_slots layers are begun and not recorded,
+// whatever ends the program. `record` receives every layer once and in order, which makes the first failure well defined.
 #pragma once
 
 #include <atomic>
@@ -50,19 +52,21 @@ struct LayerSteps {
 
 struct FlowLimits {
   std::uint64_t budget_bytes = 1ull << 30;
-  std::uint32_t most_in_flight = 1;  // layers with scratch; bounds the work lost by an interruption
-  std::uint32_t record_slots = 256;  // layers that may wait for a slow earlier one
+  std::uint32_t most_in_flight = 1;  // layers with scratch
+  std::uint32_t record_slots = 32;   // layers begun and not recorded: the most that an interruption loses
 };
 
 struct FlowReport {
   std::uint32_t most_in_flight = 0;
   std::uint64_t most_bytes = 0;                                   // peak of the credits, idle scratch included
+  std::uint32_t oversized = 0;                                    // layers that held more than the budget by themselves
   std::vector<std::pair<std::string_view, double>> step_seconds;  // of each step and of "record", over all threads
 };
 
 /// Moves layers 0 to count - 1.
-/// cancel  read before each admission: layers in flight finish and are recorded, then the error is kInterrupted
-/// errors  of the first failing layer in layer order, or kInterrupted
+/// cancel  once set, no layer is admitted; those in flight have 0.3 s to finish, then they are given up before their next
+///         step. The error is kInterrupted
+/// errors  of the first failing layer in layer order; kMemory: a step ran out of memory; kInterrupted
 Status flow_layers(std::uint32_t count, const LayerSteps& steps, const FlowLimits& limits, const std::atomic<bool>& cancel,
                    FlowReport& report);
 

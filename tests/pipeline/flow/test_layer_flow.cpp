@@ -1,9 +1,13 @@
 // Layers through steps and a record within a budget of bytes.
 #include <gtest/gtest.h>
+#include <tbb/global_control.h>
 
 #include <algorithm>
 #include <atomic>
+#include <chrono>
+#include <new>
 #include <random>
+#include <thread>
 
 #include "pipeline/flow/layers.h"
 
@@ -163,6 +167,124 @@ TEST(LayerFlow, ACancelledFlowRecordsWhatIsInFlight) {
   EXPECT_EQ(status.error().fault, Fault::kInterrupted);
   EXPECT_EQ(recorded, made);
   EXPECT_LT(recorded, 1000u);
+}
+
+TEST(LayerFlow, LaterLayersRunAheadOfASlowOneByTheRecordSlotsAtMost) {
+  const tbb::global_control threads(tbb::global_control::max_allowed_parallelism, 4);
+  for (const std::uint32_t slow : {0u, 1u, 50u}) {
+    FlowLimits limits;
+    limits.most_in_flight = 8;
+    limits.record_slots = 12;
+    LayerSteps steps = plain_steps();
+    std::atomic<std::uint32_t> stored{0}, recorded{0}, furthest{0};
+    const auto first = [&](const Ticket& ticket) -> Status {
+      // A slow layer waits until the others are as far ahead as they may be, or for a while where they may not.
+      for (int i = 0; ticket.position == slow && i < 200 && stored < slow + limits.record_slots - 1; ++i) {
+        std::this_thread::sleep_for(std::chrono::milliseconds(1));
+      }
+      return {};
+    };
+    const auto store = [&](const Ticket&) -> Status {
+      const std::uint32_t ahead = ++stored - recorded;
+      std::uint32_t before = furthest;
+      while (before < ahead && !furthest.compare_exchange_weak(before, ahead)) {
+      }
+      return {};
+    };
+    steps.steps = {{"first", first}, {"store", store}};
+    steps.record = [&](const Ticket&) -> Status { return ++recorded, Status(); };
+    FlowReport report;
+    const std::atomic<bool> cancel{false};
+    ASSERT_TRUE(flow_layers(200, steps, limits, cancel, report).ok());
+    EXPECT_EQ(recorded, 200u);
+    EXPECT_LE(furthest, limits.record_slots);
+    EXPECT_GE(furthest, 4u) << "others went on meanwhile";
+  }
+}
+
+TEST(LayerFlow, TheOldestLayerIsTakenFirst) {
+  const tbb::global_control one(tbb::global_control::max_allowed_parallelism, 1);
+  FlowLimits limits;
+  limits.most_in_flight = 8;
+  limits.record_slots = 16;
+  LayerSteps steps = plain_steps();
+  std::vector<std::uint32_t> taken;
+  const auto note = [&](const Ticket& ticket) -> Status { return taken.push_back(ticket.position), Status(); };
+  steps.steps = {{"first", note}, {"second", note}, {"third", note}};
+  FlowReport report;
+  const std::atomic<bool> cancel{false};
+  ASSERT_TRUE(flow_layers(100, steps, limits, cancel, report).ok());
+  EXPECT_EQ(taken.size(), 300u);
+  EXPECT_TRUE(std::ranges::is_sorted(taken)) << "one thread finishes a layer before it takes the next";
+}
+
+TEST(LayerFlow, EstimatesFollowWhatLayersHeld) {
+  const tbb::global_control threads(tbb::global_control::max_allowed_parallelism, 4);
+  constexpr std::uint64_t kMegabyte = 1 << 20;
+  for (const std::uint64_t held : {8 * kMegabyte, 70 * kMegabyte}) {
+    FlowLimits limits;
+    limits.budget_bytes = 100 * kMegabyte;
+    limits.most_in_flight = 8;
+    Slots slots(limits.most_in_flight);
+    Meter meter;
+    LayerSteps steps = plain_steps();
+    steps.bytes_of = [](std::uint32_t) { return 80 * kMegabyte; };
+    steps.steps = {{"only", [&](const Ticket& ticket) -> Status {
+                      slots.holds[ticket.work] = held;
+                      meter.add(static_cast<std::int64_t>(held));
+                      std::this_thread::sleep_for(std::chrono::milliseconds(1));
+                      meter.add(-static_cast<std::int64_t>(held));
+                      return {};
+                    }}};
+    steps.bytes_held = [&](std::uint32_t work) { return slots.holds[work]; };
+    steps.let_go = [&](std::uint32_t work) { slots.holds[work] = 0; };
+    FlowReport report;
+    const std::atomic<bool> cancel{false};
+    ASSERT_TRUE(flow_layers(60, steps, limits, cancel, report).ok());
+    EXPECT_LE(meter.most, static_cast<std::int64_t>(limits.budget_bytes));
+    EXPECT_GE(report.most_in_flight, held == 8 * kMegabyte ? 4u : 1u) << "80 MB were charged for 8";
+    EXPECT_EQ(report.oversized, 0u);
+  }
+}
+
+TEST(LayerFlow, AStepWithoutMemoryFailsItsLayerAndKeepsTheEarlierOnes) {
+  LayerSteps steps = plain_steps();
+  std::uint32_t recorded = 0;
+  steps.steps = {{"only", [](const Ticket& ticket) -> Status {
+                    if (ticket.position == 30) throw std::bad_alloc();
+                    return {};
+                  }}};
+  steps.record = [&](const Ticket&) -> Status { return ++recorded, Status(); };
+  FlowReport report;
+  FlowLimits limits;
+  limits.most_in_flight = 8;
+  const std::atomic<bool> cancel{false};
+  const Status status = flow_layers(100, steps, limits, cancel, report);
+  ASSERT_FALSE(status.ok());
+  EXPECT_EQ(status.error().fault, Fault::kMemory);
+  EXPECT_EQ(recorded, 30u);
+}
+
+TEST(LayerFlow, ALongLayerIsGivenUpBetweenItsStepsOnceCancelled) {
+  LayerSteps steps = plain_steps();
+  std::atomic<bool> cancel{false};
+  std::atomic<std::uint32_t> made{0};
+  const auto pause = [&](const Ticket&) -> Status {
+    cancel = true;
+    ++made;
+    std::this_thread::sleep_for(std::chrono::milliseconds(200));
+    return {};
+  };
+  for (int i = 0; i < 20; ++i) steps.steps.push_back({"pause", pause});
+  FlowReport report;
+  FlowLimits limits;
+  limits.most_in_flight = 4;
+  const auto start = std::chrono::steady_clock::now();
+  const Status status = flow_layers(2, steps, limits, cancel, report);
+  ASSERT_FALSE(status.ok());
+  EXPECT_EQ(status.error().fault, Fault::kInterrupted);
+  EXPECT_LT(made, 20u);
+  EXPECT_LT(std::chrono::steady_clock::now() - start, std::chrono::seconds(2));
 }
 
 }  // namespace
