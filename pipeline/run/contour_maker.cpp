@@ -15,8 +15,8 @@ namespace {
 
 class ContourMaker : public Maker {
  public:
-  ContourMaker(const Plan& plan, const FlowLimits& limits)
-      : plan_(plan), files_(plan), work_(limits.most_in_flight), made_(limits.most_in_flight) {}
+  ContourMaker(const Plan& plan, Sanity& sanity, const FlowLimits& limits)
+      : plan_(plan), sanity_(sanity), files_(plan), work_(limits.most_in_flight), made_(limits.most_in_flight) {}
 
   std::uint64_t bytes_of(std::uint32_t layer) const override { return plan_.sections->bytes_bound(layer); }
 
@@ -48,6 +48,7 @@ class ContourMaker : public Maker {
                Sections::Work& work = work_[ticket.work];
                PathFacts facts = facts_of(work);
                facts.bead_mm = length_mm(work.paths);
+               sanity_.add_contours(made_[ticket.work].layer, work.contours);
                made_[ticket.work].paths = std::make_shared<const PathFacts>(facts);
                files_.encode(view_of(made_[ticket.work].layer, work), work.text);
                return Status();
@@ -69,10 +70,15 @@ class ContourMaker : public Maker {
       emptied_.add(record.layer);
     }
     if (work.report.gaps.open > 0) open_.add(record.layer);
-    add_kept(record);
+    add(record);
+    sanity_.record(record.layer.index, record.paths->contours > 0);
     return {};
   }
   void add_kept(const LayerRecord& record) override {
+    add(record);
+    sanity_.keep(record.layer.index, record.paths->contours > 0);
+  }
+  void add(const LayerRecord& record) {
     sums_.add(*record.paths);
     volume_mm3_ += record.paths->area_mm2 * mm(record.layer.thickness);
   }
@@ -91,6 +97,8 @@ class ContourMaker : public Maker {
     files_.discard();
     return {};
   }
+  void discard() override { files_.discard(); }
+  void warn(const Summary& so_far, std::vector<Warning>& warnings) const override;
   void tell(Summary& summary) const override;
 
  private:
@@ -99,6 +107,7 @@ class ContourMaker : public Maker {
   }
 
   const Plan& plan_;
+  Sanity& sanity_;
   SliceFiles files_;
   std::vector<Sections::Work> work_;
   std::vector<LayerRecord> made_;
@@ -108,6 +117,32 @@ class ContourMaker : public Maker {
   std::uint64_t cuts_ = 0, gaps_closed_ = 0, bytes_written_ = 0;
   LayersTold open_, emptied_;  // emptied: solid before the offset
 };
+
+void ContourMaker::warn(const Summary& so_far, std::vector<Warning>& warnings) const {
+  if (open_.count > 0) {
+    open_.warn("chains-open",
+               fmt::format("{} chains of cuts stay open, first in {}: they bound nothing and are left out; leave out "
+                           "--no-repair to close the parts, or give a longer --bridge",
+                           sums_.open, open_.first),
+               warnings);
+  }
+  if (emptied_.count > 0) {
+    emptied_.warn("offset",
+                  fmt::format("--offset {} leaves nothing of {} of {} layers, first {}: they are thinner than twice that; "
+                              "give a smaller offset",
+                              number_text(plan_.job.slice.offset_mm), emptied_.count, so_far.layers_planned, emptied_.first),
+                  warnings);
+  }
+  if (plan_.sections->fills() && sums_.contours > 0 && sums_.paths == 0) {
+    warnings.push_back({"no-bead",
+                        "no bead of the filling fits into the parts: they are narrower than walls and filling ask "
+                        "for; give a smaller --bead"});
+  }
+  if (plan_.job.resume && !files_.keeps()) {
+    warnings.push_back(
+        {"planned-again", "--resume: files of this kind are finished at the end only; all layers were planned again"});
+  }
+}
 
 void ContourMaker::tell(Summary& summary) const {
   summary.output = files_.output();
@@ -125,20 +160,6 @@ void ContourMaker::tell(Summary& summary) const {
     result("gaps", fmt::format("{} closed by straight stretches, the longest {:.6f} mm; {} chains left open",
                                readable_count(gaps_closed_), largest_gap_mm_, readable_count(sums_.open)));
   }
-  if (open_.count > 0) {
-    summary.warnings.push_back(fmt::format(
-        "{} chains of cuts stay open, first in {}: they bound nothing and are left out; leave out --no-repair to close the "
-        "parts, or give a longer --bridge",
-        sums_.open, open_.first));
-  }
-  if (emptied_.count > 0) {
-    summary.warnings.push_back(fmt::format(
-        "--offset {} leaves nothing of {} of {} layers, first {}: they are thinner than twice that; give a smaller offset",
-        number_text(plan_.job.slice.offset_mm), emptied_.count, summary.layers_planned, emptied_.first));
-  }
-  if (plan_.job.resume && !files_.keeps()) {
-    summary.warnings.push_back("--resume: files of this kind are finished at the end only; all layers were planned again");
-  }
   nlohmann::ordered_json& facts = *summary.facts;
   facts["cuts"] = cuts_;
   facts["contours"] = sums_.contours;
@@ -154,8 +175,8 @@ void ContourMaker::tell(Summary& summary) const {
 
 }  // namespace
 
-std::unique_ptr<Maker> make_contour_maker(const Plan& plan, const FlowLimits& limits) {
-  return std::make_unique<ContourMaker>(plan, limits);
+std::unique_ptr<Maker> make_contour_maker(const Plan& plan, Sanity& sanity, const FlowLimits& limits) {
+  return std::make_unique<ContourMaker>(plan, sanity, limits);
 }
 
 }  // namespace lamina::pipeline

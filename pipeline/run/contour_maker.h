@@ -5,9 +5,10 @@
 
 #include "pipeline/plan/plan.h"
 #include "pipeline/run/maker.h"
+#include "pipeline/run/sanity.h"
 
 namespace lamina::pipeline {
 
-std::unique_ptr<Maker> make_contour_maker(const Plan& plan, const FlowLimits& limits);
+std::unique_ptr<Maker> make_contour_maker(const Plan& plan, Sanity& sanity, const FlowLimits& limits);
 
 }  // namespace lamina::pipeline

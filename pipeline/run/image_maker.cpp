@@ -18,18 +18,24 @@ class RowWarnings {
     note(open_, layer, report.open_rows, report.first_open_row, 0, grid);
   }
 
-  void tell(const Scene& scene, Summary& summary) const {
+  void tell(const Scene& scene, std::vector<Warning>& warnings) const {
     if (capped_.rows > 0) {
       const std::uint32_t part = scene.part_of_instance[capped_.instance];
-      summary.warnings.push_back(fmt::format(
-          "{}: {} rows in {} layers are closed only by the caps put over its openings, first {}; look at `lamina info`",
-          scene.parts[part].path, capped_.rows, capped_.layers, capped_.place));
+      const std::string& path = scene.parts[part].path;
+      warnings.push_back(
+          {"rows-capped",
+           fmt::format(
+               "{}: {} rows in {} layers are closed only by the caps put over its openings, first {}; look at `lamina info`",
+               path, capped_.rows, capped_.layers, capped_.place),
+           path, capped_.layer, capped_.z_mm});
     }
     if (open_.rows > 0) {
-      summary.warnings.push_back(
-          fmt::format("{} rows in {} layers stay open, first {}; each is drawn up to its last crossing; leave out "
-                      "--no-repair to close the parts",
-                      open_.rows, open_.layers, open_.place));
+      warnings.push_back(
+          {"rows-open",
+           fmt::format("{} rows in {} layers stay open, first {}; each is drawn up to its last crossing; leave out "
+                       "--no-repair to close the parts",
+                       open_.rows, open_.layers, open_.place),
+           "", open_.layer, open_.z_mm});
     }
   }
   std::uint64_t capped() const { return capped_.rows; }
@@ -37,7 +43,8 @@ class RowWarnings {
  private:
   struct Tally {
     std::uint64_t rows = 0;
-    std::uint32_t layers = 0, instance = 0;
+    std::uint32_t layers = 0, instance = 0, layer = 0;  // layer: the first
+    double z_mm = 0;
     std::string place;
   };
   static void note(Tally& tally, const Layer& layer, std::uint32_t rows, std::uint32_t first_row, std::uint32_t instance,
@@ -47,6 +54,8 @@ class RowWarnings {
       tally.place = fmt::format("in layer {} at y {:.3f} mm, z {:.3f} mm (image row {})", layer.index,
                                 mm(grid.y.centre(first_row)), mm(layer.plane()), grid.rows() - 1 - first_row);
       tally.instance = instance;
+      tally.layer = layer.index;
+      tally.z_mm = mm(layer.plane());
     }
     tally.rows += rows;
     ++tally.layers;
@@ -56,8 +65,8 @@ class RowWarnings {
 
 class ImageMaker : public Maker {
  public:
-  ImageMaker(const Plan& plan, const FlowLimits& limits)
-      : plan_(plan), imager_(plan), files_(plan), work_(limits.most_in_flight), made_(limits.record_slots) {
+  ImageMaker(const Plan& plan, Sanity& sanity, const FlowLimits& limits)
+      : plan_(plan), sanity_(sanity), imager_(plan), files_(plan), work_(limits.most_in_flight), made_(limits.record_slots) {
     for (const JobMaterial& material : plan.images->materials.used) materials_.emplace_back(material.name, 0);
   }
 
@@ -82,7 +91,9 @@ class ImageMaker : public Maker {
     add("raster", [this](const Layer& layer, Work& work, Made& made) {
       made = {};
       made.record.layer = layer;
-      return imager_.raster(layer, work.images, made.record, made.notes);
+      const Status status = imager_.raster(layer, work.images, made.record, made.notes);
+      if (status) sanity_.add_image(layer, work.images.runs);
+      return status;
     });
     if (plan_.images->beads) {
       add("contours", [this](const Layer& layer, Work& work, Made&) { return imager_.contours(layer, work.images); });
@@ -91,6 +102,8 @@ class ImageMaker : public Maker {
           [this](const Layer& layer, Work& work, Made& made) { return imager_.beads(layer, work.images, made.notes); });
     }
     add("dose", [this](const Layer& layer, Work& work, Made& made) {
+      imager_.bleed(work.images);
+      if (plan_.images->dose.bleeds()) sanity_.add_left(layer, work.images.runs);
       imager_.dose(layer, work.images, made.record);
       return Status();
     });
@@ -107,6 +120,7 @@ class ImageMaker : public Maker {
     const Made& made = made_[ticket.record];
     if (Status status = files_.record(made.record); !status) return status;
     add(made.record);
+    sanity_.record(made.record.layer.index, made.record.set_pixels > 0);
     warnings_.add(made.record.layer, made.notes.report, plan_.images->grid);
     capped_rows_ += made.notes.report.capped_rows;
     solid_pixels_ += made.notes.solid_pixels;
@@ -114,14 +128,19 @@ class ImageMaker : public Maker {
     bytes_written_ += made.record.bytes + made.record.program.bytes;
     return {};
   }
-  void add_kept(const LayerRecord& record) override { add(record); }
+  void add_kept(const LayerRecord& record) override {
+    add(record);
+    sanity_.keep(record.layer.index, record.set_pixels > 0);
+  }
 
   std::uint64_t bytes_held(std::uint32_t work) const override { return work_[work].images.bytes() + work_[work].files.bytes(); }
   void let_go(std::uint32_t work) override { work_[work] = Work(); }
 
   Status finish() override { return files_.finish(); }
   Status stop(bool) override { return files_.keep(); }
+  void discard() override { files_.discard(); }
 
+  void warn(const Summary&, std::vector<Warning>& warnings) const override;
   void tell(Summary& summary) const override;
 
  private:
@@ -145,6 +164,7 @@ class ImageMaker : public Maker {
   }
 
   const Plan& plan_;
+  Sanity& sanity_;
   LayerImager imager_;
   ImageFiles files_;
   std::vector<Work> work_;
@@ -156,6 +176,16 @@ class ImageMaker : public Maker {
   double volume_mm3_ = 0;
   std::vector<std::pair<std::string, std::uint64_t>> materials_;  // name, set pixels
 };
+
+void ImageMaker::warn(const Summary&, std::vector<Warning>& warnings) const {
+  if (lost_pixels_ > 0) {
+    warnings.push_back(
+        {"lost-pixels",
+         fmt::format("{} pixels of blocked nozzles are not fired at all; head.blocked_rule = \"second-pass\" fires them",
+                     readable_count(lost_pixels_))});
+  }
+  warnings_.tell(*plan_.scene, warnings);
+}
 
 void ImageMaker::tell(Summary& summary) const {
   const PixelGrid& grid = plan_.images->grid;
@@ -182,13 +212,7 @@ void ImageMaker::tell(Summary& summary) const {
   }
   if (moved_pixels_ > 0)
     end("blocked", fmt::format("{} pixels of blocked nozzles are fired by their neighbours", readable_count(moved_pixels_)));
-  if (lost_pixels_ > 0) {
-    end("warning",
-        fmt::format("{} pixels of blocked nozzles are not fired at all; head.blocked_rule = \"second-pass\" fires them",
-                    readable_count(lost_pixels_)));
-  }
   if (capped_rows_ > 0) end("repaired", fmt::format("{} rows are closed only thanks to repair", readable_count(capped_rows_)));
-  warnings_.tell(*plan_.scene, summary);
 
   nlohmann::ordered_json& facts = *summary.facts;
   facts["set_pixels"] = set_pixels_;
@@ -229,8 +253,8 @@ void tell_images(const Plan& plan, Summary& summary) {
   facts["dpi"] = {grid.x.dpi(), grid.y.dpi()};
 }
 
-std::unique_ptr<Maker> make_image_maker(const Plan& plan, const FlowLimits& limits) {
-  return std::make_unique<ImageMaker>(plan, limits);
+std::unique_ptr<Maker> make_image_maker(const Plan& plan, Sanity& sanity, const FlowLimits& limits) {
+  return std::make_unique<ImageMaker>(plan, sanity, limits);
 }
 
 }  // namespace lamina::pipeline

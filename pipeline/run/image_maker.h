@@ -8,6 +8,7 @@
 #include "pipeline/output/image_files.h"
 #include "pipeline/plan/plan.h"
 #include "pipeline/run/maker.h"
+#include "pipeline/run/sanity.h"
 #include "stages/data/runs.h"
 #include "stages/raster/materials.h"
 #include "stages/raster/raster.h"
@@ -47,7 +48,9 @@ class LayerImager {
   Status contours(const Layer& layer, ImageWork& work) const;
   Status fill(const Layer& layer, ImageWork& work) const;
   Status beads(const Layer& layer, ImageWork& work, ImageNotes& notes) const;
-  /// Mirrors the image, removes bleed, thins the core, and counts the remaining pixels.
+  /// Mirrors the image and removes its bleed.
+  void bleed(ImageWork& work) const;
+  /// Thins the core and counts the remaining pixels.
   void dose(const Layer& layer, ImageWork& work, LayerRecord& record) const;
   /// Runs all steps.
   Status make(const Layer& layer, ImageWork& work, LayerRecord& record, ImageNotes& notes) const;
@@ -72,6 +75,6 @@ class LayerImager {
 /// The head of the summary for a plan of images.
 void tell_images(const Plan& plan, Summary& summary);
 
-std::unique_ptr<Maker> make_image_maker(const Plan& plan, const FlowLimits& limits);
+std::unique_ptr<Maker> make_image_maker(const Plan& plan, Sanity& sanity, const FlowLimits& limits);
 
 }  // namespace lamina::pipeline

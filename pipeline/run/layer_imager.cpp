@@ -79,13 +79,17 @@ Status LayerImager::beads(const Layer& layer, ImageWork& work, ImageNotes& notes
   return {};
 }
 
-void LayerImager::dose(const Layer& layer, ImageWork& work, LayerRecord& record) const {
-  const ImagePlan& images = *plan_.images;
+void LayerImager::bleed(ImageWork& work) const {
   if (plan_.job.mirror != Mirror::kNone) {
     mirror(work.runs, work.second);
     for (Runs& image : work.materials.image) mirror(image, work.second);
   }
-  if (images.dose.any()) images.dose.apply(layer.index, work.runs, work.second, work.third);
+  plan_.images->dose.remove_bleed(work.runs, work.second);
+}
+
+void LayerImager::dose(const Layer& layer, ImageWork& work, LayerRecord& record) const {
+  const ImagePlan& images = *plan_.images;
+  images.dose.thin(layer.index, work.runs, work.second, work.third);
   if (images.materials.several() && (images.beads || images.dose.any())) work.materials.keep(work.runs);
   record.set_pixels = set_pixels(work.runs);
   for (const Runs& image : work.materials.image) record.images.push_back({0, set_pixels(image), {}});
@@ -98,6 +102,7 @@ Status LayerImager::make(const Layer& layer, ImageWork& work, LayerRecord& recor
     if (Status status = fill(layer, work); !status) return status;
     if (Status status = beads(layer, work, notes); !status) return status;
   }
+  bleed(work);
   dose(layer, work, record);
   return {};
 }

@@ -48,10 +48,14 @@ class Maker {
   virtual void let_go(std::uint32_t work) = 0;
 
   // --- the end
+  /// Adds the product's own warnings; before finish().
+  virtual void warn(const Summary& so_far, std::vector<Warning>& warnings) const = 0;
   /// Closes the files. returns  total bytes written
   virtual Status finish() = 0;
   /// Ends recording early. keep  true: finished layers stay for a resumed run; false: started files are removed
   virtual Status stop(bool keep) = 0;
+  /// Removes all files of the job, finished layers too.
+  virtual void discard() = 0;
   /// Adds the product's own lines to the summary.
   virtual void tell(Summary& summary) const = 0;
 };

@@ -22,8 +22,8 @@ constexpr std::size_t kWaitingText = 1 << 17, kPieceOfText = 1 << 16;
 
 class MoveMaker : public Maker {
  public:
-  MoveMaker(const Plan& plan, const FlowLimits& limits)
-      : plan_(plan), file_(plan), work_(limits.most_in_flight), made_(limits.most_in_flight) {}
+  MoveMaker(const Plan& plan, Sanity& sanity, const FlowLimits& limits)
+      : plan_(plan), sanity_(sanity), file_(plan), work_(limits.most_in_flight), made_(limits.most_in_flight) {}
 
   std::uint64_t bytes_of(std::uint32_t layer) const override { return plan_.sections->bytes_bound(layer); }
 
@@ -66,11 +66,16 @@ class MoveMaker : public Maker {
     const std::string_view text(work.text.data(), work.text.size());
     if (Status status = made.waits ? file_.file().append(text, made.record) : file_.file().end_pieces(made.record); !status)
       return status;
-    add_kept(made.record);
+    add(made.record);
+    sanity_.record(layer, made.facts.totals.moves > 0);
     if (made.facts.segments.lines > 0 && made.facts.segments.thin == 0) undivided_.add(made.record.layer);
     return {};
   }
   void add_kept(const LayerRecord& record) override {
+    add(record);
+    sanity_.keep(record.layer.index, record.paths->totals.moves > 0);
+  }
+  void add(const LayerRecord& record) {
     if (record.layer.index == plan_.range[0]) first_layer_points_ = record.paths->segments.points();
     if (record.paths->open > 0) open_.add(record.layer);
     sums_.add(*record.paths);
@@ -90,6 +95,8 @@ class MoveMaker : public Maker {
     file_.discard();
     return {};
   }
+  void discard() override { file_.discard(); }
+  void warn(const Summary& so_far, std::vector<Warning>& warnings) const override;
   void tell(Summary& summary) const override;
 
  private:
@@ -102,6 +109,7 @@ class MoveMaker : public Maker {
   /// Makes the layer's text unless it becomes too long to wait.
   Status lay_waiting(std::uint32_t layer, Sections::Work& work, Made& made) {
     made.facts = facts_of(work);
+    sanity_.add_contours(made.record.layer, work.contours);
     work.text.clear();
     const auto out = file_.layer(made.record.layer, work.text);
     const std::size_t most = plan_.segments->any() ? std::max(kWaitingText, kTextOfPoint * work.paths.point.size()) : SIZE_MAX;
@@ -133,6 +141,7 @@ class MoveMaker : public Maker {
   }
 
   const Plan& plan_;
+  Sanity& sanity_;
   ToolpathFile file_;
   std::vector<Sections::Work> work_;
   std::vector<Made> made_;
@@ -142,6 +151,26 @@ class MoveMaker : public Maker {
   std::uint64_t first_layer_points_ = 0, bytes_written_ = 0;
   LayersTold open_, undivided_;
 };
+
+void MoveMaker::warn(const Summary& so_far, std::vector<Warning>& warnings) const {
+  if (open_.count > 0) {
+    open_.warn("chains-open",
+               fmt::format("chains of cuts stay open in {} layers, first in {}: they bound nothing and are left out; leave "
+                           "out --no-repair to close the parts",
+                           open_.count, open_.first),
+               warnings);
+  }
+  if (undivided_.count > 0) {
+    undivided_.warn("undivided",
+                    fmt::format("segment.thin_mm: longer than every segmented line less its ends in {} of {} layers, first "
+                                "in {}: no pores there",
+                                undivided_.count, so_far.layers_planned, undivided_.first),
+                    warnings);
+  }
+  if (plan_.sections->fills() && sums_.totals.moves == 0) {
+    warnings.push_back({"no-bead", "no bead fits into the parts: they are narrower than the walls and the filling ask for"});
+  }
+}
 
 void MoveMaker::tell(Summary& summary) const {
   const write::MoveTotals& totals = sums_.totals;
@@ -170,20 +199,6 @@ void MoveMaker::tell(Summary& summary) const {
   }
   result("filament", fmt::format("{:.1f} mm, {:.2f} cm3, {:.2f} g", totals.filament_mm, filament_cm3, filament_g));
   result("printing", fmt::format("about {}", write::gcode::time_text(totals.seconds)));
-  if (open_.count > 0) {
-    summary.warnings.push_back(fmt::format(
-        "chains of cuts stay open in {} layers, first in {}: they bound nothing and are left out; leave out --no-repair to "
-        "close the parts",
-        open_.count, open_.first));
-  }
-  if (undivided_.count > 0) {
-    summary.warnings.push_back(fmt::format(
-        "segment.thin_mm: longer than every segmented line less its ends in {} of {} layers, first in {}: no pores there",
-        undivided_.count, summary.layers_planned, undivided_.first));
-  }
-  if (!summary.dry_run && plan_.sections->fills() && totals.moves == 0) {
-    summary.warnings.push_back("no bead fits into the parts: they are narrower than the walls and the filling ask for");
-  }
 
   nlohmann::ordered_json& facts = *summary.facts;
   facts["moves"] = totals.moves;
@@ -224,8 +239,8 @@ void tell_moves(const Plan& plan, Summary& summary) {
   (*summary.facts)["pores"] = pores;
 }
 
-std::unique_ptr<Maker> make_move_maker(const Plan& plan, const FlowLimits& limits) {
-  return std::make_unique<MoveMaker>(plan, limits);
+std::unique_ptr<Maker> make_move_maker(const Plan& plan, Sanity& sanity, const FlowLimits& limits) {
+  return std::make_unique<MoveMaker>(plan, sanity, limits);
 }
 
 }  // namespace lamina::pipeline

@@ -5,12 +5,13 @@
 
 #include "pipeline/plan/plan.h"
 #include "pipeline/run/maker.h"
+#include "pipeline/run/sanity.h"
 
 namespace lamina::pipeline {
 
 /// Adds what is known before the first move: the printer and the pores.
 void tell_moves(const Plan& plan, Summary& summary);
 
-std::unique_ptr<Maker> make_move_maker(const Plan& plan, const FlowLimits& limits);
+std::unique_ptr<Maker> make_move_maker(const Plan& plan, Sanity& sanity, const FlowLimits& limits);
 
 }  // namespace lamina::pipeline

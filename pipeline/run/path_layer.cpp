@@ -48,6 +48,7 @@ Result<bool> lay_moves(const Plan& plan, std::uint32_t index, const Sections::Wo
     segment::MoveTable table(range.plan, *cut, plan.moves->profile.machine, layer);
     ToolpathsView paths = all;
     paths.offset = all.offset.subspan(work.path_area[a], work.path_area[a + 1] - work.path_area[a] + 1);
+    if (Status status = check_stretch_count(range, *cut, paths, layer); !status) return status.error();
     const auto lay = [&](const BeadMove& move) -> std::optional<double> {
       const double length = out.lay(move);
       if (room.text.size() > room.most && !room.grown()) return std::nullopt;
@@ -62,7 +63,14 @@ Result<bool> lay_moves(const Plan& plan, std::uint32_t index, const Sections::Wo
 }
 
 void LayersTold::add(const Layer& layer) {
-  if (++count == 1) first = fmt::format("layer {} at z {:.3f} mm", layer.index, mm(layer.plane()));
+  if (++count > 1) return;
+  index = layer.index;
+  z_mm = mm(layer.plane());
+  first = fmt::format("layer {} at z {:.3f} mm", index, z_mm);
+}
+
+void LayersTold::warn(std::string_view code, std::string text, std::vector<Warning>& warnings) const {
+  warnings.push_back({std::string(code), std::move(text), "", index, z_mm});
 }
 
 }  // namespace lamina::pipeline

@@ -37,7 +37,10 @@ Result<bool> lay_moves(const Plan& plan, std::uint32_t layer, const Sections::Wo
 struct LayersTold {
   std::uint32_t count = 0;
   std::string first;  // "layer 12 at z 0.300 mm"
+  std::uint32_t index = 0;
+  double z_mm = 0;
   void add(const Layer& layer);
+  void warn(std::string_view code, std::string text, std::vector<Warning>& warnings) const;
 };
 
 }  // namespace lamina::pipeline

@@ -17,6 +17,7 @@
 #include "pipeline/run/image_maker.h"
 #include "pipeline/run/move_maker.h"
 #include "pipeline/run/run_resolved.h"
+#include "pipeline/run/sanity.h"
 
 namespace lamina::pipeline {
 namespace {
@@ -33,13 +34,13 @@ Status check_output_of(const Resolved& resolved) {
   return {};
 }
 
-std::unique_ptr<Maker> make_maker(const Plan& plan, const FlowLimits& limits) {
+std::unique_ptr<Maker> make_maker(const Plan& plan, Sanity& sanity, const FlowLimits& limits) {
   switch (plan.product) {
-    case Product::kImages: return make_image_maker(plan, limits);
-    case Product::kContours: return make_contour_maker(plan, limits);
+    case Product::kImages: return make_image_maker(plan, sanity, limits);
+    case Product::kContours: return make_contour_maker(plan, sanity, limits);
     case Product::kMoves: break;
   }
-  return make_move_maker(plan, limits);
+  return make_move_maker(plan, sanity, limits);
 }
 
 Summary summary_of(const Plan& plan) {
@@ -90,19 +91,35 @@ LayerSteps steps_of(Maker& maker, const std::vector<std::uint32_t>& todo, const 
 /// Ends a job early: makes the error and keeps or removes its files.
 Error ended_early(Maker& maker, const Error& error, bool any_layer) {
   const bool interrupted = error.fault == Fault::kInterrupted;
-  const bool keep = (any_layer || !maker.records_from_work()) && (interrupted || error.fault == Fault::kOutput);
+  const bool kept = interrupted || error.fault == Fault::kOutput || error.fault == Fault::kMemory;
+  const bool keep = kept && (any_layer || !maker.records_from_work());
   if (Status stopped = maker.stop(keep); !stopped && interrupted) return stopped.error();
   if (interrupted) {
     return {Fault::kInterrupted, keep ? "interrupted; finished layers are kept, run again with --resume to go on"
                                       : "interrupted before the first layer; nothing was written"};
   }
   if (!keep) return error;
-  return {Fault::kOutput, error.message + "; finished layers are kept, go on with --resume"};
+  return {error.fault, error.message + "; finished layers are kept, go on with --resume"};
+}
+
+/// Collects the warnings while the files are unfinished still, and refuses what is empty or, if strict, doubtful. Then
+/// nothing stays, unless an earlier run had made a part of it.
+Status judge(const Plan& plan, Maker& maker, const Sanity& sanity, bool resumed, Summary& summary) {
+  maker.warn(summary, summary.warnings);
+  Status status = sanity.end(summary.warnings);
+  if (status) status = check_strict(plan.job, summary.warnings);
+  if (status) return {};
+  if (resumed || plan.job.shard) {
+    static_cast<void>(maker.stop(true));
+  } else {
+    maker.discard();
+  }
+  return status;
 }
 
 /// Makes the remaining layers. errors  of the lowest failing layer
-Status make_layers(const Plan& plan, Maker& maker, const FlowLimits& limits, Summary& summary, const ProgressCallback& progress,
-                   const std::atomic<bool>& cancel) {
+Status make_layers(const Plan& plan, Maker& maker, const Sanity& sanity, const FlowLimits& limits, Summary& summary,
+                   const ProgressCallback& progress, const std::atomic<bool>& cancel) {
   auto todo = maker.open();
   if (!todo) return todo.error();
   const std::vector<LayerRecord> kept = maker.kept();
@@ -120,11 +137,13 @@ Status make_layers(const Plan& plan, Maker& maker, const FlowLimits& limits, Sum
   FlowReport report;
   const Status moved = flow_layers(static_cast<std::uint32_t>(todo->size()), steps, limits, cancel, report);
   if (!moved) return ended_early(maker, moved.error(), done > 0);
+  if (Status status = judge(plan, maker, sanity, !kept.empty(), summary); !status) return status;
   if (Status status = maker.finish(); !status) return ended_early(maker, status.error(), done > 0);
   summary.layer_seconds = std::chrono::duration<double>(Clock::now() - start).count();
   summary.step_seconds = report.step_seconds;
   summary.most_layers_in_flight = report.most_in_flight;
   summary.peak_layer_bytes = report.most_bytes;
+  summary.oversized_layers = report.oversized;
   return {};
 }
 
@@ -147,17 +166,20 @@ Result<Summary> run(Resolved resolved, const ProgressCallback& progress, const s
   if (cancel) return Error{Fault::kInterrupted, "interrupted before the first layer; nothing was written"};
 
   const Job& job = plan->job;
+  if (Status status = check_strict(job, plan->warnings); !status) return status.error();
   FlowLimits limits;
   limits.budget_bytes = job.memory_bytes;
   limits.most_in_flight = layers_in_flight();
-  if (product != Product::kImages) limits.most_in_flight *= 2;  // some layers wait for their turn in the single file
+  limits.record_slots = 2 * limits.most_in_flight;  // some layers wait for an older one, in a single file with their scratch
+  if (product != Product::kImages) limits.most_in_flight = limits.record_slots;
   Summary summary = summary_of(*plan);
-  const std::unique_ptr<Maker> maker = make_maker(*plan, limits);
+  Sanity sanity(*plan);
+  const std::unique_ptr<Maker> maker = make_maker(*plan, sanity, limits);
   if (job.dry_run) {
     for (std::uint32_t i = plan->range[0]; i < plan->range[1]; ++i) {
       summary.peak_layer_bytes = std::max(summary.peak_layer_bytes, maker->bytes_of(i));
     }
-  } else if (Status status = make_layers(*plan, *maker, limits, summary, progress, cancel); !status) {
+  } else if (Status status = make_layers(*plan, *maker, sanity, limits, summary, progress, cancel); !status) {
     return status.error();
   }
   maker->tell(summary);

@@ -18,7 +18,8 @@ namespace lamina::pipeline {
 /// cancel  read between layers: once set, no new layer starts, the layers in flight finish and are kept for --resume, and
 ///         the error is kInterrupted
 /// errors  of resolve and make_plan; kUsage: existing output must not be replaced; kOutput; kVerification if the engine
-///         is kBoth and a pixel differs; the lowest failing layer decides
+///         is kBoth and a pixel differs, or a strict job has warnings; kInput: a whole job comes out empty; the lowest failing
+///         layer decides
 Result<Summary> run(const Job& job, Product product, const ProgressCallback& progress, const std::atomic<bool>& cancel);
 
 }  // namespace lamina::pipeline

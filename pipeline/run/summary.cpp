@@ -18,30 +18,15 @@ double rate(double amount, double seconds) { return seconds > 0 ? amount / secon
 
 Json point_json(const Point3& p) { return {mm(p.x), mm(p.y), mm(p.z)}; }
 
-Json part_json(const PartSummary& part) {
-  Json notes = Json::array();
-  for (const Note& note : part.notes) notes.push_back({{"repair", note.repair}, {"text", note.text}});
-  return {{"path", part.path},
-          {"copies", part.copies},
-          {"triangles", part.triangles},
-          {"bounds_mm", {point_json(part.bounds.lo), point_json(part.bounds.hi)}},
-          {"notes", notes}};
+Json warning_json(const Warning& warning) {
+  Json json = {{"code", warning.code}, {"text", warning.text}};
+  if (!warning.part.empty()) json["part"] = warning.part;
+  if (warning.layer) json["layer"] = *warning.layer;
+  if (warning.z_mm) json["z_mm"] = *warning.z_mm;
+  return json;
 }
 
 using Line = std::pair<std::string, std::string>;
-
-void add_parts(const Summary& s, std::vector<Line>& lines) {
-  for (const PartSummary& part : s.parts) {
-    const Box& box = part.bounds;
-    lines.emplace_back(&part == &s.parts.front() ? "parts" : "",
-                       fmt::format("{}{}: {} triangles, {:.3f} x {:.3f} x {:.3f} mm at {:.3f}, {:.3f} mm", one_line(part.path),
-                                   part.copies > 1 ? fmt::format(" x {}", part.copies) : "", readable_count(part.triangles),
-                                   mm(box.width()), mm(box.depth()), mm(box.height()), mm(box.lo.x), mm(box.lo.y)));
-    for (const Note& note : part.notes) {
-      lines.emplace_back("", fmt::format("  {}{}", note.repair ? "repair: " : "", one_line(note.text)));
-    }
-  }
-}
 
 std::string layers_line(const Summary& s) {
   std::string text = fmt::format("{} {}", readable_count(s.layers_total), s.layer_text);
@@ -63,6 +48,10 @@ void add_costs(const Summary& s, std::vector<Line>& lines) {
                                            readable_bytes(s.peak_resident_bytes), readable_bytes(s.mesh_bytes),
                                            readable_bytes(s.index_bytes), readable_bytes(s.peak_layer_bytes),
                                            readable_bytes(s.memory_budget_bytes), s.most_layers_in_flight));
+  if (s.oversized_layers > 0) {
+    lines.emplace_back(
+        "", fmt::format("{} layers ran alone: each holds more than --memory by itself", readable_count(s.oversized_layers)));
+  }
 }
 
 void add_dry_run(const Summary& s, std::vector<Line>& lines) {
@@ -75,14 +64,44 @@ void add_dry_run(const Summary& s, std::vector<Line>& lines) {
 
 }  // namespace
 
+Summary::Lines part_lines(const std::vector<PartSummary>& parts) {
+  Summary::Lines lines;
+  for (const PartSummary& part : parts) {
+    const Box& box = part.bounds;
+    lines.emplace_back(&part == &parts.front() ? "parts" : "",
+                       fmt::format("{}{}: {} triangles, {:.3f} x {:.3f} x {:.3f} mm at {:.3f}, {:.3f} mm", one_line(part.path),
+                                   part.copies > 1 ? fmt::format(" x {}", part.copies) : "", readable_count(part.triangles),
+                                   mm(box.width()), mm(box.depth()), mm(box.height()), mm(box.lo.x), mm(box.lo.y)));
+    for (const Note& note : part.notes) {
+      lines.emplace_back("", fmt::format("  {}{}", note.repair ? "repair: " : "", one_line(note.text)));
+    }
+  }
+  return lines;
+}
+
+nlohmann::ordered_json part_json(const PartSummary& part) {
+  Json notes = Json::array();
+  for (const Note& note : part.notes) notes.push_back({{"repair", note.repair}, {"text", note.text}});
+  return {{"path", part.path},
+          {"copies", part.copies},
+          {"triangles", part.triangles},
+          {"bounds_mm", {point_json(part.bounds.lo), point_json(part.bounds.hi)}},
+          {"notes", notes}};
+}
+
+std::string text_of(const Summary::Lines& lines) {
+  std::string text;
+  for (const auto& [name, what] : lines) text += fmt::format("{:<10}{}\n", name, what);
+  return text;
+}
+
 std::string_view command_name(Product product) {
   constexpr std::string_view kNames[] = {"jet", "slice", "extrude"};
   return kNames[static_cast<std::size_t>(product)];
 }
 
 std::string Summary::text() const {
-  Lines lines;
-  add_parts(*this, lines);
+  Lines lines = part_lines(parts);
   if (!machine.empty()) lines.emplace_back("machine", machine);
   lines.insert(lines.end(), head.begin(), head.end());
   lines.emplace_back("layers", layers_line(*this));
@@ -95,16 +114,15 @@ std::string Summary::text() const {
     add_costs(*this, lines);
   }
   lines.insert(lines.end(), end.begin(), end.end());
-  for (const std::string& warning : warnings) lines.emplace_back("warning", one_line(warning));
-  std::string text;
-  for (const auto& [name, what] : lines) text += fmt::format("{:<10}{}\n", name, what);
-  return text;
+  for (const Warning& warning : warnings) lines.emplace_back("warning", one_line(warning.text));
+  return text_of(lines);
 }
 
 std::string Summary::json() const {
-  Json threads = Json::object(), part_list = Json::array();
+  Json threads = Json::object(), part_list = Json::array(), warning_list = Json::array();
   for (const auto& [name, value] : step_seconds) threads[std::string(name)] = value;
   for (const PartSummary& part : parts) part_list.push_back(part_json(part));
+  for (const Warning& warning : warnings) warning_list.push_back(warning_json(warning));
   Json all{{"command", command_name(product)},
            {"dry_run", dry_run},
            {"output", output},
@@ -125,8 +143,9 @@ std::string Summary::json() const {
            {"memory_budget_bytes", memory_budget_bytes},
            {"peak_resident_bytes", peak_resident_bytes},
            {"most_layers_in_flight", most_layers_in_flight},
+           {"oversized_layers", oversized_layers},
            {"parts", part_list},
-           {"warnings", warnings}};
+           {"warnings", warning_list}};
   if (facts) all.update(*facts);
   return text_of(all) + "\n";
 }

@@ -11,6 +11,7 @@
 
 #include "stages/data/choices.h"
 #include "stages/data/mesh.h"
+#include "stages/data/status.h"
 
 namespace lamina::pipeline {
 
@@ -28,8 +29,9 @@ struct Summary {
   std::vector<std::pair<std::string_view, double>> step_seconds;  // of each step, over all threads
   std::uint64_t mesh_bytes = 0, index_bytes = 0, peak_layer_bytes = 0, memory_budget_bytes = 0, peak_resident_bytes = 0;
   std::uint32_t most_layers_in_flight = 0;
+  std::uint32_t oversized_layers = 0;  // held more than the budget by themselves, and ran alone
   std::vector<PartSummary> parts;
-  std::vector<std::string> warnings;  // one line each
+  std::vector<Warning> warnings;
 
   // --- specific to the product
   using Lines = std::vector<std::pair<std::string, std::string>>;  // name, text
@@ -41,6 +43,12 @@ struct Summary {
   /// One JSON object on one line. Lengths in mm or nm, times in seconds and sizes in bytes, as the keys say.
   std::string json() const;
 };
+
+/// Each part on a line, its notes below it; as in a summary.
+Summary::Lines part_lines(const std::vector<PartSummary>& parts);
+nlohmann::ordered_json part_json(const PartSummary& part);
+/// Lines with their names aligned.
+std::string text_of(const Summary::Lines& lines);
 
 /// The command of a product: jet, slice, extrude.
 std::string_view command_name(Product product);

@@ -1,0 +1,166 @@
+#include "pipeline/run/sanity.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <set>
+#include <utility>
+
+#include "stages/data/text/readable.h"
+#include "stages/slice/bodies.h"
+
+namespace lamina::pipeline {
+namespace {
+
+/// Numbers boxes that touch seen from above, directly or through the box around those that do.
+std::vector<std::uint32_t> group_seen_from_above(std::vector<Box> boxes) {
+  for (Box& box : boxes) box.lo.z = box.hi.z = 0;
+  std::vector<std::uint32_t> group(boxes.size());
+  for (std::uint32_t i = 0; i < group.size(); ++i) group[i] = i;
+  for (std::size_t count = boxes.size() + 1; boxes.size() < count;) {
+    count = boxes.size();
+    const std::vector<std::uint32_t> next = slice::group_bodies(boxes);
+    std::vector<Box> around(next.empty() ? 0 : *std::ranges::max_element(next) + 1);
+    for (std::size_t i = 0; i < next.size(); ++i) around[next[i]].add(boxes[i]);
+    for (std::uint32_t& of : group) of = next[of];
+    boxes = std::move(around);
+  }
+  return group;
+}
+
+std::vector<sanity::Solid> solids_of(const Scene& scene) {
+  std::vector<sanity::Solid> solids;
+  for (std::size_t i = 0; i < scene.instances.size(); ++i) {
+    const Mesh& mesh = scene.meshes[scene.instances[i].mesh];
+    solids.push_back({box_of(scene, scene.instances[i]), scene.part_of_instance[i], 0, mesh.volume_mm3, mesh.closed});
+  }
+  return solids;
+}
+
+std::vector<sanity::Solid> solids_of(const Plan& plan) {
+  if (plan.images) return solids_from_above(*plan.scene);
+  std::vector<sanity::Solid> solids = solids_of(*plan.scene);
+  for (std::size_t i = 0; i < solids.size(); ++i) solids[i].group = plan.sections->body_of_instance()[i];
+  return solids;
+}
+
+}  // namespace
+
+std::vector<sanity::Solid> solids_from_above(const Scene& scene) {
+  std::vector<sanity::Solid> solids = solids_of(scene);
+  std::vector<Box> boxes;
+  for (const sanity::Solid& solid : solids) boxes.push_back(solid.box);
+  const std::vector<std::uint32_t> group = group_seen_from_above(std::move(boxes));
+  for (std::size_t i = 0; i < solids.size(); ++i) solids[i].group = group[i];
+  return solids;
+}
+
+sanity::Sampling sampling_of(const Job& job, const PixelGrid* grid) {
+  sanity::Sampling sampling;
+  sampling.one_sided = job.heights.containment != Containment::kAcross;
+  if (grid != nullptr) {
+    sampling.pixel_mm = {25.4 / grid->x.dpi(), 25.4 / grid->y.dpi()};
+    sampling.bleed_um = job.dose.bleed_um;
+  } else {
+    sampling.tolerance_um = job.slice.tolerance_um;
+    sampling.offset_mm = job.slice.offset_mm;
+  }
+  return sampling;
+}
+
+std::vector<std::uint8_t> crossed_planes(const Scene& scene, std::span<const Nm> planes) {
+  std::vector<std::uint8_t> crossed(planes.size(), 0);
+  std::set<std::pair<std::uint32_t, Nm>> seen;
+  for (const Instance& instance : scene.instances) {
+    if (!seen.emplace(instance.mesh, instance.offset.z).second) continue;
+    for (const Triangle& t : scene.meshes[instance.mesh].triangles) {
+      const std::int64_t lowest = std::int64_t{std::min({t.a.z, t.b.z, t.c.z})} + instance.offset.z,
+                         highest = std::int64_t{std::max({t.a.z, t.b.z, t.c.z})} + instance.offset.z;
+      auto plane = std::ranges::lower_bound(planes, lowest);
+      for (; plane != planes.end() && *plane < highest; ++plane) crossed[static_cast<std::size_t>(plane - planes.begin())] = 1;
+    }
+  }
+  return crossed;
+}
+
+Status check_strict(const Job& job, const std::vector<Warning>& warnings) {
+  if (!job.strict || warnings.empty()) return {};
+  std::string text = fmt::format("--strict: {} warning{}", warnings.size(), warnings.size() == 1 ? "" : "s");
+  for (const Warning& warning : warnings) text += fmt::format("; [{}] {}", warning.code, one_line(warning.text));
+  return Error{Fault::kVerification, text};
+}
+
+Sanity::Sanity(const Plan& plan)
+    : plan_(plan), tally_(std::make_unique<sanity::Tally>(solids_of(plan))), filled_(plan.layer_count) {
+  for (const PartSummary& part : plan.scene->parts) names_.push_back(one_line(part.path));
+  if (plan.images) tally_->look_through(plan.images->grid);
+  sampling_ = sampling_of(plan.job, plan.images ? &plan.images->grid : nullptr);
+  sampling_.part = names_;
+  for (std::uint32_t i = 0; i < plan.layer_count; ++i) {
+    sampling_.thickest_mm = std::max(sampling_.thickest_mm, mm(plan.layer(i).thickness));
+  }
+}
+
+void Sanity::add_left(const Layer& layer, const Runs& image) {
+  const Mirror mirror = plan_.job.mirror;
+  tally_->add_left(layer, image, mirror == Mirror::kX || mirror == Mirror::kXY, mirror == Mirror::kY || mirror == Mirror::kXY);
+}
+
+void Sanity::add_contours(const Layer& layer, const slice::LayerContours& contours) {
+  for (std::uint32_t b = 0; b + 1 < contours.body.size(); ++b) {
+    __int128 doubled = 0;
+    for (std::uint32_t c = contours.body[b]; c < contours.body[b + 1]; ++c) doubled += doubled_area(contours.contours[c]);
+    if (doubled != 0) tally_->add_area(b, layer, square_mm(doubled));
+  }
+}
+
+std::string Sanity::why_nothing() const {
+  const Job& job = plan_.job;
+  if (plan_.product == Product::kMoves && !plan_.sections->fills()) {
+    return "no walls and no filling are asked for: give --walls, --fill or both";
+  }
+  if (kept_) return "look at `lamina info`";
+  if (std::string why = sanity::why_nothing(*tally_, sampling_); !why.empty()) return why;
+  if (job.dose.core < 1) return "--core leaves no drop: give a greater share, or --shell";
+  return "no bead fits into the parts: they are narrower than walls and filling ask for";
+}
+
+/// Layers that something is in, or that may be empty: parts may have a gap in height, and beads and doses thin out what is.
+std::vector<std::uint8_t> Sanity::filled_or_rightly_empty() const {
+  std::vector<std::uint8_t> filled = filled_;
+  std::vector<Nm> planes;
+  for (std::uint32_t i = 0; i < filled.size(); ++i) {
+    if (filled[i] == 0) planes.push_back(plan_.layer(i).plane());
+  }
+  if (planes.empty()) return filled;
+  const bool thinned = plan_.images && (plan_.images->beads || plan_.job.dose.core < 1);
+  std::vector<std::uint8_t> crossed(planes.size(), 0);
+  if (!thinned) crossed = crossed_planes(*plan_.scene, planes);
+  std::size_t next = 0;
+  for (std::uint8_t& layer : filled) {
+    if (layer == 0) layer = crossed[next++] == 0 ? 1 : 0;
+  }
+  return filled;
+}
+
+Status Sanity::end(std::vector<Warning>& warnings) const {
+  const Job& job = plan_.job;
+  if (job.layers || job.shard) return {};
+  const bool nothing = std::ranges::find(filled_, 1) == filled_.end();
+  constexpr std::string_view kThings[] = {"pixel", "contour", "bead"};
+  if (nothing && !job.allow_empty) {
+    return Error{Fault::kInput,
+                 fmt::format("not one {} in {} layer{}, so nothing is kept: {}; --allow-empty plans it nevertheless",
+                             kThings[static_cast<std::size_t>(plan_.product)], plan_.layer_count,
+                             plan_.layer_count == 1 ? "" : "s", why_nothing())};
+  }
+  if (nothing) warnings.push_back({"empty", "the whole job is empty: " + why_nothing()});
+  if (!kept_ && !nothing) sanity::judge_solids(*tally_, sampling_, warnings);
+  sanity::judge_layers(
+      tally_->solids(), filled_or_rightly_empty(), [&](std::uint32_t i) { return plan_.layer(i); }, warnings);
+  sanity::judge_tolerance(tally_->solids(), sampling_, warnings);
+  if (plan_.product == Product::kMoves) sanity::judge_footing(tally_->solids(), sampling_, warnings);
+  return {};
+}
+
+}  // namespace lamina::pipeline

@@ -1,0 +1,65 @@
+// pipeline/run/sanity.h: looks at a whole job before it is finished: is what was planned what the parts hold?
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "pipeline/plan/plan.h"
+#include "stages/data/runs.h"
+#include "stages/data/status.h"
+#include "stages/sanity/judge.h"
+#include "stages/sanity/tally.h"
+
+namespace lamina::pipeline {
+
+/// The solids of a scene. Those whose boxes overlap seen from above, directly or through others, share a group.
+std::vector<sanity::Solid> solids_from_above(const Scene& scene);
+/// How images on a grid see the solids of a job, or contours if it is null. Names of parts are left to the caller.
+sanity::Sampling sampling_of(const Job& job, const PixelGrid* grid);
+
+/// Which of some rising planes a facet crosses. cost  O(T log P) for each instance of another mesh or height
+std::vector<std::uint8_t> crossed_planes(const Scene& scene, std::span<const Nm> planes);
+
+/// Refuses warnings of a strict job. errors  kVerification with all of them on one line
+Status check_strict(const Job& job, const std::vector<Warning>& warnings);
+
+/// Counts while layers are made. Layers that --resume keeps are known by their records alone: then solids are not judged.
+class Sanity {
+ public:
+  /// The plan must outlive this object.
+  explicit Sanity(const Plan& plan);
+
+  // --- from many threads at once
+  void add_image(const Layer& layer, const Runs& image) { tally_->add_image(layer, image); }
+  /// The image without its bleed, mirrored as the job asks.
+  void add_left(const Layer& layer, const Runs& image);
+  void add_contours(const Layer& layer, const slice::LayerContours& contours);
+
+  // --- from one thread at a time
+  /// filled  whether the layer has pixels, contours or moves
+  void record(std::uint32_t layer, bool filled) { filled_[layer] = filled ? 1 : 0; }
+  void keep(std::uint32_t layer, bool filled) {
+    record(layer, filled);
+    kept_ = true;
+  }
+
+  /// After the last layer of the run. Jobs of some layers only are not judged.
+  /// errors  kInput: a whole job that has nothing, unless that is allowed
+  Status end(std::vector<Warning>& warnings) const;
+
+ private:
+  std::string why_nothing() const;
+  std::vector<std::uint8_t> filled_or_rightly_empty() const;
+
+  const Plan& plan_;
+  std::unique_ptr<sanity::Tally> tally_;
+  std::vector<std::string> names_;
+  sanity::Sampling sampling_;
+  std::vector<std::uint8_t> filled_;  // by layer
+  bool kept_ = false;
+};
+
+}  // namespace lamina::pipeline
