@@ -36,7 +36,7 @@ endif()
 target_include_directories(lamina_stages PUBLIC $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}>
                                                 $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}/lamina>)
 target_link_libraries(lamina_stages PUBLIC TBB::tbb Eigen3::Eigen fmt::fmt embree
-                      PRIVATE TIFF::TIFF PNG::PNG ZLIB::ZLIB PkgConfig::LIBZIP PkgConfig::LIB3MF
+                      PRIVATE TIFF::TIFF PNG::PNG ZLIB::ZLIB EXPAT::EXPAT PkgConfig::LIBZIP
                               PkgConfig::POLYCLIPPING PkgConfig::MUPARSER PkgConfig::XXHASH nlohmann_json::nlohmann_json)
 set_source_files_properties(${PROJECT_SOURCE_DIR}/stages/data/text/version.cpp PROPERTIES
                             COMPILE_DEFINITIONS LAMINA_VERSION="${PROJECT_VERSION}" SKIP_PRECOMPILE_HEADERS ON)

@@ -19,6 +19,10 @@ target_compile_options(lamina_test_support PUBLIC $<$<NOT:$<CONFIG:Debug>>:-O1> 
                        -Wno-array-bounds -Wno-stringop-overflow)  # g++ 12 has them wrong for std::string at -O1
 target_precompile_headers(lamina_test_support PRIVATE tests/precompiled.h)
 
+# Loaded before the program, to see what it syncs and renames.
+add_library(lamina_call_log MODULE EXCLUDE_FROM_ALL tests/commands/call_log.cc)
+set_target_properties(lamina_call_log PROPERTIES PREFIX "" OUTPUT_NAME call_log)
+
 lamina_sources(all_test_sources "tests/*.cpp")
 list(TRANSFORM all_test_sources REPLACE "^${PROJECT_SOURCE_DIR}/tests/([^/]*)/.*$" "\\1" OUTPUT_VARIABLE folders)
 list(REMOVE_DUPLICATES folders)
@@ -27,7 +31,8 @@ foreach(folder ${folders})
     continue()
   endif()
   lamina_sources(test_sources "tests/${folder}/*.cpp")
-  list(REMOVE_ITEM test_sources ${PROJECT_SOURCE_DIR}/tests/commands/program.cpp)
+  list(REMOVE_ITEM test_sources ${PROJECT_SOURCE_DIR}/tests/commands/program.cpp
+                                ${PROJECT_SOURCE_DIR}/tests/fuzz/libfuzzer.cpp)
   if(LAMINA_TEST_ONLY)
     list(FILTER test_sources INCLUDE REGEX "${LAMINA_TEST_ONLY}")
     if(NOT test_sources)
@@ -40,7 +45,7 @@ foreach(folder ${folders})
   target_precompile_headers(test_${folder} REUSE_FROM lamina_test_support)
   add_dependencies(test_${folder} lamina)
   if(LAMINA_TEST_COMMANDS AND NOT LAMINA_TEST_ONLY)
-    add_dependencies(test_${folder} lamina-preview)
+    add_dependencies(test_${folder} lamina-preview lamina_call_log)
   endif()
   if(folder STREQUAL "picture")
     target_link_libraries(test_${folder} PRIVATE PkgConfig::OPENIMAGEIO)
@@ -58,6 +63,11 @@ add_test(NAME Installed.AnotherProjectFindsTheLibraryAndPlansAPart
 set_tests_properties(Installed.AnotherProjectFindsTheLibraryAndPlansAPart PROPERTIES TIMEOUT 900)
 add_test(NAME Documentation.EveryExampleOfEveryCommandRuns
          COMMAND ${PYTHON3} ${PROJECT_SOURCE_DIR}/tests/documentation/examples $<TARGET_FILE:lamina> ${PROJECT_SOURCE_DIR})
+add_test(NAME Threemf.FilesOfOtherProgramsEndAsTheTableSays
+         COMMAND ${PYTHON3} ${PROJECT_SOURCE_DIR}/scripts/threemf_outcomes ${PROJECT_SOURCE_DIR}/tests/corpus/3mf
+                 --program $<TARGET_FILE:lamina>)
+add_test(NAME Threemf.OtherProgramsOpenWhatLaminaWrites
+         COMMAND ${PYTHON3} ${PROJECT_SOURCE_DIR}/tests/write/threemf_judges $<TARGET_FILE:lamina>)
 add_test(NAME Golden.EveryJobWritesTheBytesOfTheTable
          COMMAND ${PYTHON3} ${PROJECT_SOURCE_DIR}/tests/golden/check $<TARGET_FILE:lamina>)
 add_test(NAME Cluster.SharesOnSlurmAreOneRunThoughAWorkerIsKilled
