@@ -2,12 +2,11 @@
 #include <fmt/format.h>
 
 #include <charconv>
-#include <iostream>
-#include <iterator>
 
 #include "pipeline/cli/command.h"
 #include "pipeline/cli/console.h"
 #include "pipeline/show/sheet.h"
+#include "stages/data/input/file_reader.h"
 #include "stages/write/file.h"
 #include "stages/write/picture/plot.h"
 #include "stages/write/plot.h"
@@ -21,7 +20,8 @@ Outcome draw_plot(Context& context) {
     const Status status = context.print(text);
     return status ? code : static_cast<int>(status.error().fault);
   };
-  const auto plot = write::read_plot(std::string(std::istreambuf_iterator<char>(std::cin), {}));
+  const auto text = read_file("-", {.fault = Fault::kUsage, .most_bytes = 1u << 30, .streams = true});
+  const auto plot = text ? write::read_plot(*text) : text.error();
   const auto picture = plot ? write::picture::plot_png(*plot) : plot.error();
   if (!picture) return end(picture.error().message, static_cast<int>(picture.error().fault));
   return end({reinterpret_cast<const char*>(picture->data()), picture->size()}, 0);

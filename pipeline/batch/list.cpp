@@ -3,11 +3,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cerrno>
-#include <cstring>
 #include <filesystem>
-#include <fstream>
 
+#include "stages/data/input/file_reader.h"
 #include "stages/data/text/readable.h"
 #include "stages/data/text/shell_words.h"
 #include "stages/load/load.h"
@@ -16,6 +14,8 @@ namespace lamina::pipeline {
 namespace {
 
 namespace fs = std::filesystem;
+
+constexpr std::size_t kLongestName = 80;  // of a job that names no file, bytes
 
 bool is_job_file(const fs::path& path) { return lower_case(path.extension().string()) == ".toml"; }
 
@@ -66,19 +66,19 @@ std::string name_of_words(const std::vector<std::string>& words) {
     const fs::path path = words[i];
     if (!words[i].starts_with('-') && (is_part(path) || is_job_file(path))) return name_of(path.filename());
   }
-  return words.front();
+  return words.front().substr(0, kLongestName);
 }
 
 Status read_list(const std::string& path, std::vector<BatchEntry>& entries) {
-  std::ifstream file(path, std::ios::binary);
-  if (!file) return Error{Fault::kUsage, fmt::format("{}: {}", path, std::strerror(errno))};
+  auto file = FileReader::open(path, {.fault = Fault::kUsage,
+                                      .no_text = "not a text; a list has one command line a line",
+                                      .most_bytes = kMostListBytes,
+                                      .longest_line = 1 << 20,
+                                      .streams = true});
+  if (!file) return file.error();
   const std::size_t before = entries.size();
-  std::string line;
-  for (std::uint32_t number = 1; std::getline(file, line); ++number) {
-    const std::string source = fmt::format("{}:{}", path, number);
-    if (line.find('\0') != std::string::npos) {
-      return Error{Fault::kUsage, fmt::format("{}: not a text; a list has one command line a line", source)};
-    }
+  for (std::string_view line; file->next(line);) {
+    const std::string source = fmt::format("{}:{}", path, file->line_number());
     Result<std::vector<std::string>> words = split_words(line);
     if (!words) return Error{Fault::kUsage, fmt::format("{}: {}", source, words.error().message)};
     if (!words->empty() && words->front() == "lamina") words->erase(words->begin());
@@ -86,6 +86,7 @@ Status read_list(const std::string& path, std::vector<BatchEntry>& entries) {
     std::string name = name_of_words(*words);
     entries.push_back({source, std::move(name), std::move(*words)});
   }
+  if (!file->status()) return file->status().error();
   if (entries.size() == before) {
     return Error{Fault::kUsage,
                  fmt::format("{}: no job in it; write one command line a line, as: jet part.stl --dpi 600", path)};
@@ -100,7 +101,7 @@ Result<std::vector<BatchEntry>> read_batch(const std::vector<std::string>& opera
   for (const std::string& operand : operands) {
     std::error_code error;
     const fs::file_status status = fs::status(operand, error);
-    if (!fs::exists(status))
+    if (operand != "-" && !fs::exists(status))
       return Error{
           Fault::kUsage,
           fmt::format("{}: no such file or directory; name a list, a part, a job file or a directory of them", operand)};

@@ -19,8 +19,9 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 using std::chrono::milliseconds;
-constexpr std::chrono::seconds kGrace{20};  // for a cancelled job to stop
-constexpr Fault kOverdue = Fault::kInput;   // its part cannot be planned within the time limit
+constexpr std::chrono::seconds kGrace{20};            // for a job to stop at its time limit
+constexpr std::chrono::milliseconds kLastGrace{600};  // with the batch: a signal is heard within a second
+constexpr Fault kOverdue = Fault::kInput;             // its part cannot be planned within the time limit
 
 double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
 
@@ -65,7 +66,7 @@ class Queue : public std::enable_shared_from_this<Queue> {
     // Wakes idle workers so that they exit. A worker shares ownership of this object and may exit later.
     stopped_ = true;
     changed_.notify_all();
-    changed_.wait_for(lock, kGrace, [&] { return workers_ == 0; });
+    changed_.wait_for(lock, grace(), [&] { return workers_ == 0; });
     if (!record_status_) return record_status_.error();
     return summary_;
   }
@@ -83,6 +84,8 @@ class Queue : public std::enable_shared_from_this<Queue> {
     changed_.notify_all();
   }
 
+  std::chrono::milliseconds grace() const { return summary_.interrupted ? kLastGrace : std::chrono::milliseconds(kGrace); }
+
   static void tell_to_stop(Slot& slot) {
     if (slot.state != Slot::State::kRunning || slot.cancel) return;
     slot.told_to_stop = Clock::now();
@@ -97,7 +100,7 @@ class Queue : public std::enable_shared_from_this<Queue> {
         slot.overdue = true;
         tell_to_stop(slot);
       }
-      if (!slot.cancel || Clock::now() - slot.told_to_stop < kGrace) continue;
+      if (!slot.cancel || Clock::now() - slot.told_to_stop < grace()) continue;
       slot.abandoned = summary_.abandoned = true;
       BatchResult result;
       result.code = static_cast<int>(Fault::kInterrupted);

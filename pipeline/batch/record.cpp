@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <utility>
 
+#include "stages/data/input/text_shape.h"
 #include "stages/data/text/json.h"
 
 namespace lamina::pipeline {
@@ -15,6 +16,7 @@ std::string key_of(const BatchJob& job) { return job.place.empty() ? hex(job.id)
 
 /// Reads one line of the file; nothing if it is incomplete.
 void read_line(const std::string& line, std::map<std::string, BatchRecord::Earlier>& earlier) try {
+  if (!json_nests_within(line)) return;
   const Json json = Json::parse(line);
   const bool ended = json.contains("ended");
   const std::string id = json.at(ended ? "ended" : "begun"), place = json.at("output");
@@ -27,6 +29,7 @@ void read_line(const std::string& line, std::map<std::string, BatchRecord::Earli
     entry.ended = read_hex(json.at("hash").get<std::string>(), result.output.hash) && done;
     result.outcome = BatchOutcome::kDone;
     result.seconds = json.at("seconds");
+    if (!json.at("files").is_number_unsigned() || !json.at("bytes").is_number_unsigned()) return;
     result.output.files = json.at("files");
     result.output.bytes = json.at("bytes");
     result.value = json.at("result");
@@ -70,7 +73,8 @@ Result<BatchRecord> BatchRecord::open(const std::string& directory, bool resume,
   }
   BatchRecord record(std::move(*journal));
   if (resume) {
-    record.journal_.read([&](const std::string& line) { read_line(line, record.earlier_); });
+    const Status status = record.journal_.read([&](const std::string& line) { read_line(line, record.earlier_); });
+    if (!status) return status.error();
   } else if (Status status = record.journal_.clear(); !status) {
     return status.error();
   }

@@ -19,10 +19,23 @@ std::string cell(std::string_view text) {
   return line;
 }
 
+/// Warnings of a job's own summary.
+std::size_t warnings_of(const BatchResult& result) {
+  if (!result.value.is_object() || !result.value.contains("warnings")) return 0;
+  return result.value["warnings"].size();
+}
+
+std::string first_warning(const BatchResult& result) {
+  const Json& first = result.value["warnings"].front();
+  return first.is_object() ? first.value("text", "") : first.get<std::string>();
+}
+
+std::string warnings_text(std::size_t count) { return fmt::format("{} warning{}", count, count == 1 ? "" : "s"); }
+
 /// Totals of the batch.
 struct BatchTotals {
   std::uint32_t jobs = 0, done = 0, kept = 0, failed = 0, stopped = 0, not_run = 0;  // failed: time limit too
-  std::uint64_t files = 0, bytes = 0;
+  std::uint64_t files = 0, bytes = 0, warnings = 0;
   double job_seconds = 0;  // of all jobs that ran
 };
 
@@ -36,6 +49,7 @@ BatchTotals totals_of(const std::vector<BatchResult>& results) {
     ++(totals.*kCounts[static_cast<std::size_t>(result.outcome)]);
     totals.files += result.output.files;
     totals.bytes += result.output.bytes;
+    totals.warnings += warnings_of(result);
     if (result.outcome != BatchOutcome::kKept) totals.job_seconds += result.seconds;
   }
   return totals;
@@ -70,6 +84,7 @@ Json batch_json(const std::vector<BatchJob>& jobs, const BatchSummary& summary, 
                {"failed", totals.failed},
                {"stopped", totals.stopped},
                {"not_run", totals.not_run},
+               {"warnings", totals.warnings},
                {"files", totals.files},
                {"bytes", totals.bytes},
                {"seconds", rounded(summary.seconds)},
@@ -103,7 +118,8 @@ std::string job_line(const BatchJob& job, const BatchResult& result, std::uint32
     line += fmt::format("{} {}, {}, ", result.output.files, result.output.files == 1 ? "file" : "files",
                         readable_bytes(result.output.bytes));
   }
-  return line + readable_seconds(result.seconds);
+  line += readable_seconds(result.seconds);
+  return warnings_of(result) > 0 ? line + ", " + warnings_text(warnings_of(result)) : line;
 }
 
 std::string progress_line(const BatchState& state) {
@@ -130,6 +146,9 @@ std::string batch_text(const std::vector<BatchJob>& jobs, const BatchSummary& su
   for (std::size_t i = 0; i < jobs.size(); ++i) {
     const BatchResult& result = summary.results[i];
     if (result.failed()) line(outcome_name(result.outcome), failure_line(jobs[i], result));
+    if (const std::size_t count = warnings_of(result); count > 0) {
+      line("warning", one_line(fmt::format("{}: {}; {}", jobs[i].entry.source, warnings_text(count), first_warning(result))));
+    }
   }
   line("files",
        fmt::format("{} of {} below {}", readable_count(totals.files), readable_bytes(totals.bytes), options.directory));

@@ -10,6 +10,7 @@
 #include "stages/data/text/readable.h"
 #include "stages/segment/widths_table.h"
 #include "stages/write/file.h"
+#include "stages/write/leftovers.h"
 #include "stages/write/stl/block.h"
 
 namespace lamina::pipeline {
@@ -38,7 +39,7 @@ Job job_of(const segment::TestPiece& piece, const CalibrationRequest& request, c
   job.quiet = true;
   job.parts = {{.path = stem + ".stl"}};
   job.output = fmt::format("{}{}", stem, extension);
-  job.overwrite = true;  // replaces pieces of an earlier call
+  job.overwrite = request.overwrite;
   FillSettings& fill = job.fill.all;
   fill.width_mm = request.pieces.width_mm;
   fill.walls = piece.walls;
@@ -65,38 +66,94 @@ Job job_of(const segment::TestPiece& piece, const CalibrationRequest& request, c
   return job;
 }
 
+/// What this call has written; removed unless all of it is done.
+class Written {
+ public:
+  explicit Written(bool overwrite) : options_{.replace = overwrite} {}
+  Written(const Written&) = delete;
+  Written& operator=(const Written&) = delete;
+  ~Written() {
+    for (const std::string& path : paths_) write::remove_or_note(path);
+  }
+  Status write(const std::string& path, std::string_view text) {
+    const Status status = write::write_file(path, text, options_);
+    if (status) paths_.push_back(path);
+    return status;
+  }
+  void add(const std::string& path) { paths_.push_back(path); }
+  void keep() { paths_.clear(); }
+
+ private:
+  write::FileOptions options_;
+  std::vector<std::string> paths_;
+};
+
+Status write_piece(const segment::TestPiece& piece, const CalibrationRequest& request, std::string_view extension,
+                   Written& written) {
+  const fs::path directory = request.directory;
+  const std::string stem = (directory / piece.name).string();
+  if (Status status = written.write(stem + ".stl", write::stl::block(piece.size_mm)); !status) return status;
+  const Job job = job_of(piece, request, stem, extension);
+  const std::string text =
+      fmt::format("# {}\n# lamina extrude --job {}.toml\n\n{}", piece.task, piece.name, job_text(job, directory.string()));
+  if (Status status = written.write(stem + ".toml", text); !status) return status;
+  const std::atomic<bool> never{false};  // a piece takes milliseconds
+  const auto summary = run(
+      job, Product::kMoves, [](const ProgressEvent&) {}, never);
+  if (!summary) return Error{summary.error().fault, fmt::format("{}: {}", piece.name, summary.error().message)};
+  for (const std::string& path : {job.output, job.output + ".json", stem + ".rp3"}) written.add(path);
+  return {};
+}
+
+/// errors  kUsage: a file is there
+Status check_absent(const std::vector<segment::TestPiece>& pieces, const fs::path& directory, std::string_view extension) {
+  std::vector<std::string> names{"STEPS.md"};
+  for (const segment::TestPiece& piece : pieces) {
+    for (const std::string& end : {std::string(".stl"), std::string(".toml"), std::string(extension)})
+      names.push_back(piece.name + end);
+  }
+  for (const std::string& name : names) {
+    std::error_code ignored;
+    if (!fs::exists(fs::symlink_status(directory / name, ignored))) continue;
+    return Error{Fault::kUsage, fmt::format("{}: is there already; replace it with --overwrite, or name another directory",
+                                            (directory / name).string())};
+  }
+  return {};
+}
+
 }  // namespace
 
 Result<std::vector<std::string>> write_test_pieces(CalibrationRequest request, const std::atomic<bool>& cancel) {
   const auto profile = machine_of(request);
   if (!profile) return profile.error();
-  const fs::path directory = request.directory;
+  const fs::path directory = request.directory, widths_path = directory / "widths.csv";
+  const std::vector<segment::TestPiece> pieces = segment::test_pieces(request.pieces);
+  const std::string extension = profile->machine.format == "sml" ? ".sml" : ".gcode";
   std::error_code failed;
-  if (fs::exists(directory / "widths.csv", failed)) {
+  fs::create_directories(directory, failed);
+  if (failed) return Error{Fault::kOutput, fmt::format("{}: {}", request.directory, failed.message())};
+  // Begun first and finished last: another run is refused meanwhile.
+  auto widths = write::File::open(widths_path.string(), {.replace = false});
+  if (!widths) return widths.error();
+  if (fs::exists(fs::symlink_status(widths_path, failed))) {
     return Error{Fault::kUsage, fmt::format("{}: has a widths.csv already, which may hold measurements; name another directory",
                                             request.directory)};
   }
-  fs::create_directories(directory, failed);
-  if (failed) return Error{Fault::kOutput, fmt::format("{}: {}", request.directory, failed.message())};
-  const std::vector<segment::TestPiece> pieces = segment::test_pieces(request.pieces);
-  const std::string extension = profile->machine.format == "sml" ? ".sml" : ".gcode";
+  if (!request.overwrite) {
+    if (Status status = check_absent(pieces, directory, extension); !status) return status.error();
+  }
+  Written written(request.overwrite);
   std::vector<std::string> names;
   for (const segment::TestPiece& piece : pieces) {
-    const std::string stem = (directory / piece.name).string();
-    if (Status status = write::write_file(stem + ".stl", write::stl::block(piece.size_mm)); !status) return status.error();
-    const Job job = job_of(piece, request, stem, extension);
-    const std::string text =
-        fmt::format("# {}\n# lamina extrude --job {}.toml\n\n{}", piece.task, piece.name, job_text(job, directory.string()));
-    if (Status status = write::write_file(stem + ".toml", text); !status) return status.error();
-    const auto summary = run(
-        job, Product::kMoves, [](const ProgressEvent&) {}, cancel);
-    if (!summary) return Error{summary.error().fault, fmt::format("{}: {}", piece.name, summary.error().message)};
+    if (cancel) return Error{Fault::kInterrupted, "interrupted; nothing was written"};
+    if (Status status = write_piece(piece, request, extension, written); !status) return status.error();
     names.push_back(piece.name);
   }
-  for (const auto& [name, text] : {std::pair{"STEPS.md", segment::steps_text(pieces, request.pieces, extension)},
-                                   {"widths.csv", segment::widths_text(request.pieces)}}) {
-    if (Status status = write::write_file((directory / name).string(), text); !status) return status.error();
-  }
+  const std::string steps = segment::steps_text(pieces, request.pieces, extension);
+  if (Status status = written.write((directory / "STEPS.md").string(), steps); !status) return status.error();
+  if (Status status = widths->append(segment::widths_text(request.pieces)); !status) return status.error();
+  if (const auto whole = widths->finish(); !whole) return whole.error();
+  written.keep();
   return names;
 }
 

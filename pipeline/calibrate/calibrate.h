@@ -17,11 +17,13 @@ struct CalibrationRequest {
   std::string machine;           // as --machine takes it
   std::string directory;         // of the pieces
   segment::PieceRequest pieces;  // a bead of 0: nozzle diameter wide, three quarters of it high
+  bool overwrite = false;        // pieces of an earlier call
 };
 
 /// Writes DIR/<name>.stl, .toml and .gcode (or .sml) for each piece, DIR/widths.csv to fill in, and DIR/STEPS.md.
 /// returns names of the pieces
-/// errors  kUsage: widths.csv exists already; kOutput; of run
+/// errors  kUsage: widths.csv exists already, or another of them without overwrite; kOutput; of run; what was written is
+///         removed again
 Result<std::vector<std::string>> write_test_pieces(CalibrationRequest request, const std::atomic<bool>& cancel);
 
 struct CalibratedProfile {

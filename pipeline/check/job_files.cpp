@@ -3,11 +3,10 @@
 #include <fmt/format.h>
 
 #include <filesystem>
-#include <fstream>
-#include <iterator>
 
 #include "pipeline/machine/profiles.h"
 #include "pipeline/output/print_program.h"
+#include "stages/data/input/file_reader.h"
 #include "stages/raster/materials.h"
 #include "stages/read/image.h"
 
@@ -16,9 +15,12 @@ namespace {
 
 namespace fs = std::filesystem;
 
-std::string whole_file(const fs::path& path) {
-  std::ifstream file(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
+constexpr std::uint64_t kMostProgramBytes = 4ull << 30;
+
+/// Empty if it cannot be read: what is missing or differs, its hash has told.
+std::string whole_file(const fs::path& path, std::uint64_t most_bytes) {
+  auto text = read_file(path.string(), {.most_bytes = most_bytes});
+  return text ? std::move(*text) : std::string();
 }
 
 }  // namespace
@@ -27,13 +29,13 @@ Result<replay::VirtualMachine> machine_of_job(const std::string& directory, cons
   const std::string name = "program/machine.toml";
   std::string fault = fault_of_file(directory, name, head.machine_profile);
   if (!fault.empty()) return Error{Fault::kVerification, std::move(fault)};
-  const Result<Machine> machine = read_machine(whole_file(fs::path(directory) / name), name);
+  const Result<Machine> machine = read_machine(whole_file(fs::path(directory) / name, kMostTomlBytes), name);
   if (!machine) return machine.error();
   return replay::VirtualMachine::build(*machine, head.grid.columns(), head.grid.rows());
 }
 
 std::string program_of_layer(const std::string& directory, const ManifestHead& head, std::uint32_t layer) {
-  return whole_file(fs::path(directory) / program_file_name(layer, head.program_extension));
+  return whole_file(fs::path(directory) / program_file_name(layer, head.program_extension), kMostProgramBytes);
 }
 
 Result<Runs> picture_of_layer(const std::string& directory, const ManifestHead& head, const LayerRecord& record) {

@@ -40,7 +40,7 @@ std::string fault_of_program(Inspection& inspection, const LayerRecord& record, 
   const std::string path = (fs::path(inspection.directory) / name).string();
   std::error_code error;
   if (!fs::is_regular_file(path, error)) return fmt::format("{}: is missing", name);
-  const Result<FileDigest> digest = digest_file(path);
+  const Result<FileDigest> digest = digest_file(path, record.program.bytes);
   if (!digest) return digest.error().message;
   const bool same = digest->bytes == record.program.bytes && digest->hash == record.program.hash;
   if (image != nullptr && inspection.machine) {
@@ -182,6 +182,28 @@ void check_strays(const std::string& directory, const std::vector<Manifest>& man
   for (const std::string& name : strays) report.add(fmt::format("{}: no manifest names it", name));
 }
 
+/// Faults for the shards that are missing; none where a manifest of the whole job is there. `files` are those of `manifests`.
+void check_shards(const std::vector<ManifestFile>& files, const std::vector<Manifest>& manifests, VerifyReport& report) {
+  if (manifests.empty() || std::ranges::any_of(files, [](const ManifestFile& file) { return !file.shard; })) return;
+  std::uint32_t next = 0, layer = 0;
+  const auto [ignored, count] = *files.front().shard;
+  const auto missing = [&, of = count](std::uint32_t last, std::uint32_t last_layer) {
+    if (next == last) return;
+    const std::string which = next + 1 == last ? fmt::format("shard {}/{} is", last, of)
+                                               : fmt::format("shards {}/{} to {}/{} are", next + 1, of, last, of);
+    report.add(fmt::format("layers: {} missing, with layers {} to {}; run what is missing, or join directories by lamina merge",
+                           which, layer, std::max(layer + 1, last_layer) - 1));
+  };
+  for (std::size_t i = 0; i < files.size(); ++i) {
+    const auto [index, of] = *files[i].shard;
+    if (of != count) return report.add(fmt::format("{}: is of another division than {}", files[i].name, files[0].name));
+    missing(index, manifests[i].head.first_layer);
+    next = std::max(next, index + 1);
+    layer = manifests[i].head.last_layer;
+  }
+  missing(count, manifests[0].head.layer_count);
+}
+
 VerifyReport verify_paths(const std::string& name, const std::string& directory, const Manifest& manifest) {
   VerifyReport report;
   report.directory = name;
@@ -231,6 +253,7 @@ Result<VerifyReport> verify(const std::string& directory, const VerifyOptions& o
     return Error{Fault::kVerification, fmt::format("{}: holds no manifest.json; it is no finished job", directory)};
   }
   std::vector<Manifest> manifests;
+  std::vector<ManifestFile> of_job;
   bool interrupted = false;
   for (const ManifestFile& file : files) {
     Result<Manifest> manifest = read_manifest((fs::path(directory) / file.name).string());
@@ -248,10 +271,12 @@ Result<VerifyReport> verify(const std::string& directory, const VerifyOptions& o
                                    manifest->layers.back().layer.index));
     }
     manifests.push_back(std::move(*manifest));
+    of_job.push_back(file);
   }
   for (const Manifest& manifest : manifests) check_layers(directory, manifest, options.quick, report);
   // An interrupted run may have finished layers without a line in its manifest.
   if (!interrupted) check_strays(directory, manifests, report);
+  check_shards(of_job, manifests, report);
   return report;
 }
 

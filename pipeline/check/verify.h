@@ -13,7 +13,7 @@ struct VerifyOptions {
   bool quick = false;  // sizes and hashes only; images are not decoded
 };
 
-/// Faults are in layer order, then stray files.
+/// Faults are in layer order, then stray files, then missing shards.
 struct VerifyReport : Faults {
   std::string directory;
   std::uint64_t layers = 0;           // in the manifests
@@ -29,7 +29,7 @@ struct VerifyReport : Faults {
 /// Compares every file with the manifest of the whole job, or of all shards present: existence, size and hash. Unless
 /// quick, it also decodes each image and compares columns, rows, resolution and number of set pixels, and replays each
 /// layer's print program on a virtual machine, which must print that image bit for bit. Files in layers/ and program/
-/// without an entry in a manifest are faults, and so is an interrupted job.
+/// without an entry in a manifest are faults, and so are an interrupted job and shards that are missing.
 ///
 /// directory  or a file of toolpaths; toolpaths and contours are compared by the bytes of file and layers (compare_paths)
 /// errors  kVerification: manifest missing or unreadable; kUsage: no such directory or file

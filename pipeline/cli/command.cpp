@@ -6,22 +6,24 @@
 #include <malloc.h>
 
 #include <algorithm>
-#include <csignal>
 #include <exception>
 #include <new>
+#include <system_error>
 
 #include "pipeline/cli/console.h"
 #include "pipeline/cli/outputs.h"
 #include "stages/data/text/json_text.h"
 #include "stages/data/text/names.h"
+#include "stages/write/file.h"
+#include "stages/write/leftovers.h"
 
 namespace lamina::pipeline {
 namespace {
 
-constexpr const Command* kCommands[] = {&jet_command,   &slice_command,      &heights_command,   &extrude_command,
-                                        &info_command,  &verify_command,     &calibrate_command, &permeability_command,
-                                        &merge_command, &machines_command,   &preview_command,   &report_command,
-                                        &batch_command, &completion_command, &manual_command};
+constexpr const Command* kCommands[] = {&jet_command,          &slice_command,  &heights_command,    &extrude_command,
+                                        &info_command,         &export_command, &verify_command,     &calibrate_command,
+                                        &permeability_command, &merge_command,  &machines_command,   &preview_command,
+                                        &report_command,       &batch_command,  &completion_command, &manual_command};
 
 std::string program_help() {
   std::string text =
@@ -34,8 +36,8 @@ std::string program_help() {
       "Example:\n"
       "  lamina jet bracket.stl --bed 490x380 --dpi 600 --layer 0.05 -o out\n"
       "  lamina verify out\n\n"
-      "Exit codes: 0 done, 1 internal error, 2 wrong option or job, 3 bad part file, 4 output could not be written,\n"
-      "5 verification failed, 130 interrupted.\n";
+      "Exit codes: 0 done, 1 internal error, 2 wrong option or job, 3 bad part file or an empty job, 4 output could not be\n"
+      "written, 5 verification failed or a warning with --strict, 6 out of memory, 130 interrupted.\n";
   return text;
 }
 
@@ -62,7 +64,7 @@ const Command* find_command(std::string_view name) {
 std::string unknown_command(std::string_view name) {
   std::vector<std::string_view> names;
   for (const Command* command : kCommands) names.push_back(command->name);
-  return fmt::format("'{}' is no command{}; lamina --help lists them", name, suggest(name, names));
+  return fmt::format("'{}' is no command{}; lamina --help lists them", name.substr(0, 80), suggest(name, names));
 }
 
 CommandSpec spec_of(const Command& command) {
@@ -76,7 +78,10 @@ Outcome run(const Command& command, const Arguments& arguments, Context& context
     if (Status status = check_outputs(command.name, arguments); !status) return status;
     return command.run(arguments, context);
   } catch (const std::bad_alloc&) {
-    return Error{Fault::kInternal, "out of memory; try a smaller --memory, fewer --threads or --jobs, or fewer triangles"};
+    return out_of_memory();
+  } catch (const std::system_error& error) {  // of a thread that cannot be started
+    if (error.code() == std::errc::resource_unavailable_try_again) return out_of_memory();
+    return Error{Fault::kInternal, fmt::format("internal error: {}", error.what())};
   } catch (const std::exception& error) {
     return Error{Fault::kInternal, fmt::format("internal error: {}", error.what())};
   } catch (...) {
@@ -111,14 +116,34 @@ Outcome run_lamina(const std::vector<std::string>& words, Console& console) {
   return run_command(*command, {words.begin() + 1, words.end()}, console);
 }
 
+namespace {
+
+/// Memory may run out where no exception may pass. Finished layers are on record by then.
+[[noreturn]] void end_without_memory() {
+  try {
+    if (const auto current = std::current_exception()) std::rethrow_exception(current);
+  } catch (const std::bad_alloc&) {
+    constexpr std::string_view kLine = "lamina: out of memory; give a smaller --memory or fewer --threads\n";
+    write::write_all(2, std::as_bytes(std::span(kLine)));
+    std::_Exit(static_cast<int>(Fault::kMemory));
+  } catch (...) {
+  }
+  std::abort();
+}
+
+}  // namespace
+
 int run_program(int argument_count, char** arguments, Program program) {
-  std::signal(SIGPIPE, SIG_IGN);  // a closed reader is an error of write(), not the end
-  std::signal(SIGXFSZ, SIG_IGN);  // and so is a limit on file sizes
+  handle_signals();
+  std::set_terminate(end_without_memory);
   Console console;
   try {
     const Outcome outcome = program({arguments + std::min(argument_count, 1), arguments + argument_count}, console);
+    for (const std::string& left : write::take_left_behind()) console.say("lamina: note: " + left);
     return outcome.error ? console.complain(*outcome.error) : outcome.code;
-  } catch (const std::exception& error) {  // out of memory while reading the arguments
+  } catch (const std::bad_alloc&) {
+    return console.complain(out_of_memory());
+  } catch (const std::exception& error) {
     return console.complain({Fault::kInternal, fmt::format("internal error: {}", error.what())});
   }
 }

@@ -4,12 +4,11 @@
 
 #include <algorithm>
 #include <filesystem>
-#include <fstream>
-#include <iterator>
 #include <vector>
 
 #include "pipeline/job/keys.h"
 #include "pipeline/job/old_forms.h"
+#include "stages/data/input/file_reader.h"
 #include "stages/data/text/json_text.h"
 #include "stages/write/file.h"
 
@@ -55,7 +54,7 @@ bool has_section(std::string_view section) {
 Status read_tree(Result<TomlValue> tree, const std::string& file, Job& job) {
   if (!tree) return tree.error();
   if (Status status = replace_old_forms(*tree, file, job.notes); !status) return status;
-  const fs::path directory = fs::path(file).parent_path();
+  const fs::path directory = names_stream(file) ? fs::path() : fs::path(file).parent_path();
   for (std::size_t i = 0; i < tree->value.size(); ++i) {
     const std::string& section = tree->name[i];
     if (section == "part") {
@@ -107,12 +106,9 @@ Status read_assigned(const TomlValue& table, std::string_view section, const std
 }  // namespace
 
 Status read_job(const std::string& path, Job& job) {
-  std::error_code error;
-  if (!fs::is_regular_file(path, error)) return Error{Fault::kUsage, fmt::format("{}: no such job file", path)};
-  std::ifstream file(path, std::ios::binary);
-  const std::string text{std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
-  if (!file) return Error{Fault::kUsage, fmt::format("{}: could not be read", path)};
-  return read_job_text(text, path, job);
+  const auto text =
+      read_file(path, {.fault = Fault::kUsage, .missing = "no such job file", .most_bytes = kMostTomlBytes, .streams = true});
+  return text ? read_job_text(*text, path, job) : Status(text.error());
 }
 
 Status read_job_text(std::string_view text, const std::string& path, Job& job) {
@@ -186,7 +182,7 @@ std::string canonical_job_text(const Job& job, Product product) {
   return text;
 }
 
-Status save_job(const std::string& path, const Job& job) {
+Status save_job(const std::string& path, const Job& job, bool durable) {
   for (const PartRequest& part : job.parts) {
     std::error_code absent;
     if (fs::equivalent(path, part.path, absent)) {
@@ -199,7 +195,7 @@ Status save_job(const std::string& path, const Job& job) {
   fs::path directory = fs::path(path).parent_path();
   if (directory.empty()) directory = ".";
   const std::string text = "# A job of lamina. Run it with: lamina jet --job FILE\n\n" + job_text(job, directory.string());
-  return write::write_file(path, std::as_bytes(std::span(text)));
+  return write::write_file(path, text, {.durable = durable ? write::Durable::kAll : write::Durable::kNo});
 }
 
 }  // namespace lamina::pipeline

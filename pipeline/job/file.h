@@ -41,6 +41,6 @@ std::string job_text(const Job& job, const std::string& directory);
 std::string canonical_job_text(const Job& job, Product product);
 
 /// Writes the resolved job in a form that read_job restores. errors  kOutput; kUsage if a path is not UTF-8
-Status save_job(const std::string& path, const Job& job);
+Status save_job(const std::string& path, const Job& job, bool durable = true);
 
 }  // namespace lamina::pipeline

@@ -52,8 +52,8 @@ bool fills(const Job& job) {
 
 Result<std::array<std::uint32_t, 2>> layer_range(const Job& job, std::uint32_t layer_count) {
   if (job.shard) {
-    const auto [index, shards] = *job.shard;
-    const auto share = [&](std::uint64_t i) { return static_cast<std::uint32_t>(layer_count * i / shards); };
+    const auto [index, of] = *job.shard;
+    const auto share = [&, shards = of](std::uint64_t i) { return static_cast<std::uint32_t>(layer_count * i / shards); };
     return std::array<std::uint32_t, 2>{share(index), share(std::uint64_t{index} + 1)};
   }
   if (!job.layers) return std::array<std::uint32_t, 2>{0, layer_count};

@@ -111,6 +111,7 @@ struct Job {
   SegmentRequest segment;
   ExtrudeRequest extrude;
   bool repair = true;
+  bool winding = false;  // close open meshes by their winding number; only with repair
   bool drop_bad = false;
   double weld_um = 5;
   MachineRequest machine;
@@ -121,11 +122,14 @@ struct Job {
   Engine engine = Engine::kRays;
   std::uint32_t threads = 0;                           // 0: all of the host
   std::uint64_t memory_bytes = 1ull << 30;             // budget of the layers in flight
+  Sync sync = Sync::kJob;                              // what survives a power cut
   std::optional<std::array<std::uint32_t, 2>> layers;  // [first, last) only
   std::optional<std::array<std::uint32_t, 2>> shard;   // i of n, i from 0
   bool resume = false;
   bool overwrite = false;  // allow a directory with another job's output
   bool dry_run = false;
+  bool strict = false;       // warnings are errors
+  bool allow_empty = false;  // a whole job may have nothing
   bool json = false;
   bool quiet = false;
   std::vector<std::string> notes;  // notes from reading it: old forms and their replacements

@@ -10,7 +10,7 @@
 namespace lamina::pipeline {
 namespace {
 
-constexpr double kMostFactor = 1e6;
+constexpr double kMostFactor = 1e6, kLeastScale = 1e-6, kLeastShrink = 0.1;
 constexpr std::string_view kUnits[] = {"mm", "cm", "m", "um", "inch", "foot"};
 
 std::string check_unit(std::string_view text) {
@@ -18,7 +18,8 @@ std::string check_unit(std::string_view text) {
 }
 
 // Factors of 0 flatten a part; of shrink, negative ones make no sense.
-template <double Low, bool Negative>
+// clang below 18 takes no double as a template's argument.
+template <const double& Low, bool Negative>
 std::string read_factors(std::string_view text, std::array<double, 3>& factors) {
   std::array<double, 3> read{};
   if (auto wrong = read_value(text, {Negative ? -kMostFactor : Low, kMostFactor, "", true}, read); !wrong.empty()) return wrong;
@@ -44,13 +45,13 @@ const PartKey kPartKeys[] = {
     field<&PartRequest::bottom_mm>(
         {"part", "bottom_mm", "--bottom", "MM", "height of the part's lowest point above the bed, in mm", decides::all},
         {0, kMostMm, " mm"}),
-    custom<PartRequest, read_factors<1e-6, true>, write_factors, &PartRequest::scale>(
+    custom<PartRequest, read_factors<kLeastScale, true>, write_factors, &PartRequest::scale>(
         {"part", "scale", "--scale", "S|X,Y,Z", "factors per axis of the file; a negative one mirrors", decides::all},
         Form::kList),
     field<&PartRequest::rotate_deg>(
         {"part", "rotate_deg", "--rotate", "X,Y,Z", "degrees about x, then y, then z, after scaling", decides::all},
         {-36000, 36000, " degrees"}),
-    custom<PartRequest, read_factors<0.1, false>, write_factors, &PartRequest::shrink>(
+    custom<PartRequest, read_factors<kLeastShrink, false>, write_factors, &PartRequest::shrink>(
         {"part", "shrink", "--shrink", "S|X,Y,Z", "factors per axis of the bed that make up for shrinkage, applied last",
          decides::all},
         Form::kList),

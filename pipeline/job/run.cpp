@@ -6,6 +6,8 @@ namespace {
 
 constexpr Word<Engine> kEngines[] = {{"rays", Engine::kRays}, {"contours", Engine::kContours}, {"both", Engine::kBoth}};
 
+constexpr Word<Sync> kSyncs[] = {{"layer", Sync::kLayer}, {"job", Sync::kJob}, {"off", Sync::kOff}};
+
 using Pair = std::optional<std::array<std::uint32_t, 2>>;
 
 std::string write_bytes(const std::uint64_t& bytes) {
@@ -32,14 +34,33 @@ std::string write_share(const Pair& share) {
   return share ? fmt::format("{}/{}", (*share)[0] + 1, (*share)[1]) : std::string();
 }
 
+// true and false are older words for auto and off; written still, so that jobs keep their text.
+std::string read_repair(std::string_view text, Job& job) {
+  const bool winding = text == "winding" || text == "\"winding\"", off = text == "off" || text == "false";
+  if (!winding && !off && text != "auto" && text != "true") return "has to be auto, winding or off";
+  job.repair = !off;
+  job.winding = winding;
+  return {};
+}
+std::string write_repair(const Job& job) { return !job.repair ? "false" : job.winding ? "\"winding\"" : "true"; }
+
+JobKey repair_key(const KeyName& name) {
+  JobKey key = custom<Job, read_repair, write_repair>(name, Form::kBare);
+  key.copy_value = [](const JobKey&, const Job& from, Job& to) { to.repair = from.repair, to.winding = from.winding; };
+  return key;
+}
+
 const JobKey kLoadKeys[] = {
-    field<&Job::repair>(
-        {"load", "repair", "--no-repair", "", "plan open meshes as they are instead of closing them", decides::all, "false"}),
+    repair_key({"load", "repair", "--repair", "MODE",
+                "how open meshes are closed: auto, winding (by winding number, approximate) or off", decides::all}),
+    // The row above decides; this one is an option only.
+    repair_key({"load", "repair", "--no-repair", "", "plan open meshes as they are instead of closing them", 0, "false"})
+        .shown_if([](const Job&) { return false; }),
     field<&Job::drop_bad>({"load", "drop_bad", "--drop-bad", "",
                            "drop facets with coordinates that are no numbers instead of refusing the file", decides::all,
                            "true"}),
     field<&Job::weld_um>({"load", "weld_um", "--weld", "UM",
-                          "repair joins open edges that are at most this far apart, in micrometres", decides::all},
+                          "repair joins open edges this far apart, in micrometres; 5 grows by itself", decides::all},
                          {0, 1e6, " um"}),
 };
 
@@ -50,9 +71,15 @@ const JobKey kRunKeys[] = {
     field<&Job::threads>({"run", "threads", "--threads", "N", "0 for all that the machine has"}, {0, 4096}),
     custom<Job, read_bytes, write_bytes, &Job::memory_bytes>(
         {"run", "memory", "--memory", "SIZE", "what the layers in flight may hold beside the mesh: 256M, 1G"}, Form::kString),
+    word<kSyncs, &Job::sync>({"run", "sync", "--sync", "WHEN",
+                              "what survives a power cut: job, all of it once it has ended, for some 0.1 s; layer, all but the "
+                              "layers in flight while it runs too, for some ms a layer; off, nothing for certain"}),
     custom<Job, read_pair<read_layer_range>, write_layers, &Job::layers>(
         {"run", "layers", "--layers", "A:B", "only layers A to B - 1, counted from 0 at the bottom; A: and :B are open"},
         Form::kString),
+    field<&Job::strict>({"run", "strict", "--strict", "", "warnings are errors: exit 5, and nothing is written", 0, "true"}),
+    field<&Job::allow_empty>({"run", "allow_empty", "--allow-empty", "",
+                              "finish a whole job without a single pixel, contour or bead instead of refusing it", 0, "true"}),
     custom<Job, read_pair<read_shard>, write_share, &Job::shard>(
         {"run", "shard", "--shard", "I/N", "only the I-th of N equal shares of the layers, I from 1; see lamina merge"},
         Form::kString),

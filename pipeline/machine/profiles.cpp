@@ -2,11 +2,10 @@
 
 #include <fmt/format.h>
 
-#include <fstream>
-#include <iterator>
 #include <vector>
 
 #include "pipeline/job/decisions.h"
+#include "stages/data/input/file_reader.h"
 #include "stages/data/text/json_text.h"
 #include "stages/data/text/names.h"
 #include "stages/data/text/readable.h"
@@ -28,10 +27,10 @@ Result<Profile> find(const std::string& name_or_file, std::span<const ShippedPro
     }
     return Error{Fault::kUsage, unknown(suggest(name_or_file, names), fmt::format("{}", fmt::join(names, ", ")))};
   }
-  std::ifstream file(name_or_file, std::ios::binary);
-  if (!file) return Error{Fault::kUsage, fmt::format("{}: no such machine profile", name_or_file)};
-  const std::string text{std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
-  return read(text, name_or_file);
+  const auto text =
+      read_file(name_or_file,
+                {.fault = Fault::kUsage, .missing = "no such machine profile", .most_bytes = kMostTomlBytes, .streams = true});
+  return text ? read(*text, name_or_file) : Result<Profile>(text.error());
 }
 
 }  // namespace

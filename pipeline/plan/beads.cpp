@@ -37,7 +37,7 @@ double mean_distance_mm(const infill::FillParameters& fill) {
 
 std::uint64_t BeadWork::bytes() const { return sections.bytes() + beads.bytes() + bytes_of(laid) + bytes_of(inner); }
 
-Result<SegmentPlan> plan_bead_segments(const Job& job, FillRequest& fill, std::vector<std::string>& warnings) {
+Result<SegmentPlan> plan_bead_segments(const Job& job, FillRequest& fill, std::vector<Warning>& warnings) {
   if (job.dose.core < 1) {
     return Error{Fault::kUsage,
                  "dose.core: a part that is filled by beads has no core to thin out; leave out --core or the filling"};
@@ -53,7 +53,7 @@ Result<SegmentPlan> plan_bead_segments(const Job& job, FillRequest& fill, std::v
   if (!segments) return segments.error();
   const auto warn = [&](const SegmentRange& range) {
     if (!range.settings.on) return;
-    for (std::string& warning : segment::warnings(range.plan, exact)) warnings.push_back(std::move(warning));
+    for (std::string& warning : segment::warnings(range.plan, exact)) warnings.push_back({"pores", std::move(warning)});
   };
   std::ranges::for_each(segments->ranges, warn);
   warn(segments->base);
@@ -77,6 +77,7 @@ Status Beads::lay(const Layer& layer, BeadWork& work) const {
     if (!cut) return cut.error();
     ToolpathsView paths = all;
     paths.offset = all.offset.subspan(path_area[a], path_area[a + 1] - path_area[a] + 1);
+    if (Status status = check_stretch_count(range, *cut, paths, layer); !status) return status;
     const auto width = [](double millimetres) { return static_cast<Nm>(nm_of(millimetres)); };
     const segment::Segmentation& of = range.plan;
     const raster::BeadWidths widths{cut->on, width(of.thick_width_mm), width(of.thin_width_mm), width(of.continuous_width_mm)};

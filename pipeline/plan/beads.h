@@ -37,7 +37,7 @@ struct BeadWork {
 /// thick and continuous fill.width_mm, thin half of it.
 /// warnings  receives the expected defects of the plan
 /// errors    kUsage: keys that conflict with a filling; of plan_segments
-Result<SegmentPlan> plan_bead_segments(const Job& job, FillRequest& fill, std::vector<std::string>& warnings);
+Result<SegmentPlan> plan_bead_segments(const Job& job, FillRequest& fill, std::vector<Warning>& warnings);
 
 /// The beads of any layer; immutable, usable from any thread. Sections and segments must outlive it.
 class Beads {

@@ -14,11 +14,13 @@ DosePlan::DosePlan(const Job& job, const PixelGrid& grid)
   if (core_ < 1) shell_ = dose::reach_of(grid, shell, shell);
 }
 
-void DosePlan::apply(std::uint32_t layer, Runs& image, Runs& second, Runs& third) const {
-  if (!bleed_.half_width.empty()) {
-    dose::erode(image, bleed_, second);
-    std::swap(image, second);
-  }
+void DosePlan::remove_bleed(Runs& image, Runs& second) const {
+  if (!bleeds()) return;
+  dose::erode(image, bleed_, second);
+  std::swap(image, second);
+}
+
+void DosePlan::thin(std::uint32_t layer, Runs& image, Runs& second, Runs& third) const {
   if (core_ >= 1) return;
   if (!shell_.half_width.empty()) dose::erode(image, shell_, third);
   dose::saturate(image, shell_.half_width.empty() ? image.view() : third.view(), core_, layer, second);

@@ -13,12 +13,16 @@ class DosePlan {
   DosePlan(const Job& job, const PixelGrid& grid);
 
   /// Whether the dose changes any layer.
-  bool any() const { return !bleed_.half_width.empty() || core_ < 1; }
+  bool any() const { return bleeds() || core_ < 1; }
 
-  /// Removes the bleed from an image, then thins its core. `second` and `third` are scratch.
-  void apply(std::uint32_t layer, Runs& image, Runs& second, Runs& third) const;
+  bool bleeds() const { return !bleed_.half_width.empty(); }
 
-  /// Upper bound of an image's changes after apply(), given those before and the most pixels that its parts cover.
+  /// Removes the bleed from an image. `second` is scratch.
+  void remove_bleed(Runs& image, Runs& second) const;
+  /// Thins the core of an image without bleed. `second` and `third` are scratch.
+  void thin(std::uint32_t layer, Runs& image, Runs& second, Runs& third) const;
+
+  /// Upper bound of an image's changes after both, given those before and the most pixels that its parts cover.
   std::uint64_t changes_bound(std::uint64_t changes, std::uint64_t covered) const;
 
  private:

@@ -6,6 +6,7 @@
 #include <chrono>
 #include <cmath>
 
+#include "pipeline/job/heights.h"
 #include "pipeline/machine/extruder.h"
 #include "pipeline/machine/powder_printer.h"
 #include "pipeline/plan/fill.h"
@@ -14,6 +15,7 @@
 #include "pipeline/plan/layers.h"
 #include "pipeline/plan/reach.h"
 #include "stages/data/text/number_text.h"
+#include "stages/data/text/readable.h"
 #include "stages/heights/build_steps.h"
 #include "stages/write/extrusion_format.h"
 #include "stages/write/image_format.h"
@@ -110,6 +112,7 @@ class Planner {
     if (machine() != nullptr) {
       if (Status status = check_reach(*machine(), *plan_.scene); !status) return status;
     }
+    if (Status status = check_layer_count(); !status) return status;
     if (!job().heights.per_part) {
       auto heights = decide_heights(job(), *plan_.scene);
       if (!heights) return heights.error();
@@ -125,11 +128,26 @@ class Planner {
     return {};
   }
 
+  /// Layers of one thickness are counted before there is a table of them. errors  kUsage: it does not fit into the memory
+  Status check_layer_count() {
+    const auto options = heights_options(job());
+    if (!options) return options.error();
+    const double bytes_of_layer = images() && !beads_ ? 32 : 96;  // in the table, the schedule, the planes and their index
+    const double count = static_cast<double>(plan_.scene->height) / static_cast<double>(options->set.least());
+    if (options->mode != heights::Mode::kUniform || count * bytes_of_layer <= static_cast<double>(job().memory_bytes))
+      return {};
+    return usage(
+        fmt::format("{:.0f} layers of {} mm take {} for their table alone, --memory is {}; give thicker layers or more "
+                    "memory",
+                    std::ceil(count), number_text(mm(options->set.least())),
+                    readable_bytes(static_cast<std::uint64_t>(count * bytes_of_layer)), readable_bytes(job().memory_bytes)));
+  }
+
   Status check_machine() {
     if (machine() != nullptr) {
       Result<std::string> steps = heights::check_build_steps(*machine(), plan_.heights.table);
       if (!steps) return steps.error();
-      if (!steps->empty()) plan_.warnings.push_back(std::move(*steps));
+      if (!steps->empty()) plan_.warnings.push_back({"build-steps", std::move(*steps)});
     }
     const auto range = layer_range(job(), plan_.layer_count);
     if (!range) return range.error();
@@ -165,8 +183,9 @@ class Planner {
     if (job().dose.core == 0 &&
         static_cast<double>(nm_of(job().dose.shell_mm)) * std::max(grid.x.pixels_per_nm(), grid.y.pixels_per_nm()) < 1) {
       plan_.warnings.push_back(
-          "dose.core: 0 without a shell of at least a pixel jets no drop, the parts stay loose powder; add --shell or "
-          "give a share above 0");
+          {"no-drop",
+           "dose.core: 0 without a shell of at least a pixel jets no drop, the parts stay loose powder; add --shell or "
+           "give a share above 0"});
     }
     double covered = 0;
     for (const Instance& instance : plan_.scene->instances) {
@@ -193,13 +212,13 @@ class Planner {
   Status predict_pores() {
     if (!moves()) return {};
     if (!plan_.sections->fills()) {
-      plan_.warnings.push_back("nothing is asked for: no walls and no filling; give --walls, --fill or both");
+      plan_.warnings.push_back({"no-bead", "nothing is asked for: no walls and no filling; give --walls, --fill or both"});
     }
     const ExtruderProfile& profile = plan_.moves->profile;
     const auto one = [&](const SegmentRange& range, const std::string& heights) {
       if (!range.settings.on) return;
       for (const std::string& warning : segment::warnings(range.plan, profile.calibration)) {
-        plan_.warnings.push_back(heights.empty() ? warning : heights + ": " + warning);
+        plan_.warnings.push_back({"pores", heights.empty() ? warning : heights + ": " + warning});
       }
       plan_.moves->pores.emplace_back(heights, segment::predict_pores(range.plan));
     };
@@ -209,9 +228,9 @@ class Planner {
     }
     if (plan_.segments->any() && !profile.own_calibration && profile.machine.name != "Anet A8") {
       plan_.warnings.push_back(
-          fmt::format("{} has no calibration of its own; widths and limits are those measured on an Anet A8: "
-                      "lamina calibrate makes one",
-                      profile.machine.name));
+          {"calibration", fmt::format("{} has no calibration of its own; widths and limits are those measured on an Anet A8: "
+                                      "lamina calibrate makes one",
+                                      profile.machine.name)});
     }
     return {};
   }

@@ -62,7 +62,7 @@ struct Plan {
   std::unique_ptr<SegmentPlan> segments;  // null for contours, and for images of solid parts
   std::optional<ImagePlan> images;
   std::optional<MovePlan> moves;
-  std::vector<std::string> warnings;
+  std::vector<Warning> warnings;
   std::uint64_t triangles = 0;  // with copies
   double load_seconds = 0, index_seconds = 0;
 

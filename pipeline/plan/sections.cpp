@@ -11,9 +11,9 @@
 #include "stages/slice/bodies.h"
 
 namespace lamina::pipeline {
-namespace {
 
 namespace fs = std::filesystem;
+
 Box box_of(const Scene& scene, const Instance& instance) {
   const Box& own = scene.meshes[instance.mesh].bounds;
   Box box;
@@ -23,8 +23,6 @@ Box box_of(const Scene& scene, const Instance& instance) {
   box.add(Point3{own.hi.x + by.x, own.hi.y + by.y, own.hi.z + by.z});
   return box;
 }
-
-}  // namespace
 
 Result<Sections> Sections::make(const Job& job, const Scene& scene, LayerSchedule schedule, std::vector<FillPlan> fillings) {
   Sections made;
@@ -41,7 +39,8 @@ Result<Sections> Sections::make(const Job& job, const Scene& scene, LayerSchedul
   if (job.slice.offset_mm > 0) made.grow_ = static_cast<Nm>(nm_of(job.slice.offset_mm));
   std::vector<Box> reach;  // offset boxes: parts may touch only after the offset
   for (const Box& box : boxes) reach.push_back(slice::grown(box, made.grow_));
-  const std::vector<std::uint32_t> body = slice::group_bodies(reach);
+  made.body_ = slice::group_bodies(reach);
+  const std::vector<std::uint32_t>& body = made.body_;
   const std::vector<std::uint32_t> part_area = made.make_areas(job, boxes, body);
   made.bounds_ = slice::grown(made.bounds_, made.grow_);
   slice::SliceOptions options;

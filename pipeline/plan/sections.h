@@ -17,6 +17,9 @@
 
 namespace lamina::pipeline {
 
+/// The box of an instance on the bed; empty if its mesh is.
+Box box_of(const Scene& scene, const Instance& instance);
+
 /// The contours and fillings of any layer of a scene. Immutable; usable from any thread.
 class Sections {
  public:
@@ -62,7 +65,8 @@ class Sections {
   const std::vector<ScheduledLayer>& layers() const { return schedule_.layers; }
   const slice::Slicer& slicer() const { return *slicer_; }
   const std::vector<std::string>& names() const { return names_; }  // of bodies
-  const Box& bounds() const { return bounds_; }                     // around all, as sliced
+  const std::vector<std::uint32_t>& body_of_instance() const { return body_; }
+  const Box& bounds() const { return bounds_; }  // around all, as sliced
   bool fills() const { return fills_; }
   /// Upper bound of the bytes for contours() and their text.
   std::uint64_t bytes_bound(std::uint32_t index) const;
@@ -81,7 +85,8 @@ class Sections {
   std::optional<slice::Slicer> slicer_;
   std::vector<slice::Slicer> own_slicers_;  // by part, if each has its own layers
   std::vector<std::string> names_;
-  std::vector<FillPlan> plans_;  // by [[part]]
+  std::vector<std::uint32_t> body_;  // by instance
+  std::vector<FillPlan> plans_;      // by [[part]]
   std::vector<Area> areas_;
   std::vector<std::uint32_t> body_area_;      // bodies + 1, into areas_
   std::optional<slice::Slicer> part_slicer_;  // of the shared areas, if any has a filling

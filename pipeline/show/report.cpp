@@ -7,7 +7,9 @@
 #include <filesystem>
 #include <span>
 
+#include "pipeline/job/file.h"
 #include "pipeline/show/report_cast.h"
+#include "pipeline/show/report_doubts.h"
 #include "pipeline/show/report_source.h"
 #include "stages/data/hash.h"
 #include "stages/geometry/coverage.h"
@@ -52,11 +54,15 @@ Status each_layer(const ReportSource& source, bool timed, Work work, Gather gath
   return {};
 }
 
-/// Views of the parts from their files, if found and unchanged.
-Result<std::vector<ShownView>> views_of_parts(const fs::path& folder, const ManifestHead& head, const ReportOptions& options) {
+/// The parts from their files, if found and unchanged.
+Result<Scene> parts_of(const fs::path& folder, const ManifestHead& head, const Job& job, const ReportOptions& options) {
   std::vector<std::string> folders = options.parts;
   folders.insert(folders.end(), {".", folder.string(), folder.parent_path().string()});
-  const auto pictures = cast_parts(head, folders, 360);
+  return find_parts(head, job, folders);
+}
+
+Result<std::vector<ShownView>> views_of_parts(const Scene& scene) {
+  const auto pictures = cast_parts(scene, 360);
   if (!pictures) return pictures.error();
   std::vector<ShownView> views;
   for (const auto& [name, picture] :
@@ -77,7 +83,7 @@ std::vector<ShownView> views_of_layers(const view::ThreeViews& views) {
 }
 
 /// Reads every layer; codes that fit the page go to `held`.
-Result<LayersSeen> see_layers(const ReportSource& source, HeldLayers& held) {
+Result<LayersSeen> see_layers(const ReportSource& source, ReportDoubts& doubts, HeldLayers& held) {
   struct First {
     PixelWindow window;
     Buffer<std::byte> code;
@@ -89,6 +95,7 @@ Result<LayersSeen> see_layers(const ReportSource& source, HeldLayers& held) {
       source, true,
       [&](std::uint32_t place, const LayerSeen& layer, First& first) {
         const RunsView runs = layer.runs.view();
+        doubts.look(source.manifest.layers[place].layer, runs);
         first.window = window_of(runs);
         if (held.wants(place)) first.code = write::report::pack_runs(runs);
         for (std::size_t i = 0; i < runs.change.size(); i += 2) first.set += runs.change[i + 1] - runs.change[i];
@@ -101,6 +108,7 @@ Result<LayersSeen> see_layers(const ReportSource& source, HeldLayers& held) {
         seen.seconds.push_back(first.seconds);
       });
   if (!status) return status.error();
+  seen.warnings = doubts.tell(seen.set);
   if (seen.window.empty()) seen.window = {0, source.grid.columns(), 0, source.grid.rows()};
   return seen;
 }
@@ -128,20 +136,25 @@ Result<Report> make_report(const std::string& path, const ReportOptions& options
   const Manifest& manifest = source->manifest;
   Report report;
   std::vector<ShownView> views;
-  if (auto shown =
-          views_of_parts(fs::absolute(source->manifest_path).lexically_normal().parent_path(), manifest.head, options)) {
+  Job job;
+  const Status read = read_job_text(manifest.head.job_toml, "manifest.json", job);
+  const fs::path folder = fs::absolute(source->manifest_path).lexically_normal().parent_path();
+  const auto parts = read ? parts_of(folder, manifest.head, job, options) : read.error();
+  auto shown = parts ? views_of_parts(*parts) : parts.error();
+  if (shown) {
     views = std::move(*shown);
   } else if (!options.parts.empty()) {
     return Error{Fault::kInput, shown.error().message};
   } else {
     report.without_parts = shown.error().message;
   }
+  ReportDoubts doubts(manifest, job, parts ? &*parts : nullptr);
 
   // Reserves room for the layers' lines and the rest of the page.
   std::uint64_t taken = (views.empty() ? 150'000 : 50'000) + 150 * manifest.layers.size();
   for (const ShownView& view : views) taken += view.deflated.size() / 3 * 4;
   HeldLayers held(options.size_limit > taken ? options.size_limit - taken : 0);
-  const auto seen = see_layers(*source, held);
+  const auto seen = see_layers(*source, doubts, held);
   if (!seen) return seen.error();
   if (views.empty()) {
     auto built = build_up(*source, seen->window);

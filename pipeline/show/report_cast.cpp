@@ -4,7 +4,6 @@
 
 #include <filesystem>
 
-#include "pipeline/job/file.h"
 #include "pipeline/plan/plan.h"
 
 namespace lamina::pipeline {
@@ -24,10 +23,8 @@ std::string find_part(const std::string& name, const std::vector<std::string>& f
 
 }  // namespace
 
-Result<std::array<view::Picture, 3>> cast_parts(const ManifestHead& head, const std::vector<std::string>& folders,
-                                                std::uint32_t most) {
-  Job job;
-  if (Status status = read_job_text(head.job_toml, "manifest.json", job); !status) return status.error();
+Result<Scene> find_parts(const ManifestHead& head, const Job& recorded, const std::vector<std::string>& folders) {
+  Job job = recorded;
   for (PartRequest& part : job.parts) {
     const std::string name = fs::path(part.path).filename().string();
     part.path = find_part(name, folders);
@@ -40,14 +37,18 @@ Result<std::array<view::Picture, 3>> cast_parts(const ManifestHead& head, const 
     if (!resolved) return resolved.error();
     bed = resolved->bed;
   }
-  const Result<Scene> scene = load_scene(job, bed);
-  if (!scene) return scene.error();
+  Result<Scene> scene = load_scene(job, bed);
+  if (!scene) return scene;
   for (std::size_t i = 0; i < scene->parts.size(); ++i) {
     if (i < head.parts.size() && scene->parts[i].fingerprint == head.parts[i].fingerprint) continue;
     return Error{Fault::kInput,
                  fmt::format("{}: is not the part that was planned, its triangles are others", job.parts[i].path)};
   }
-  const Result<view::Caster> caster = view::Caster::build(scene->meshes, scene->instances);
+  return scene;
+}
+
+Result<std::array<view::Picture, 3>> cast_parts(const Scene& scene, std::uint32_t most) {
+  const Result<view::Caster> caster = view::Caster::build(scene.meshes, scene.instances);
   if (!caster) return caster.error();
   return std::array{caster->look(view::Side::kTop, most), caster->look(view::Side::kFront, most),
                     caster->look(view::Side::kRight, most)};

@@ -6,17 +6,21 @@
 #include <string>
 #include <vector>
 
+#include "pipeline/job/job.h"
+#include "pipeline/plan/scene.h"
 #include "stages/data/status.h"
 #include "stages/view/cast.h"
 #include "stages/write/manifest/manifest.h"
 
 namespace lamina::pipeline {
 
-/// The job's parts from above, from the front and from the right, `most` pixels along the longest side of all.
+/// The job's parts where they stand.
 ///
 /// A manifest names parts without their folders. Each is searched in `folders` (entries may also be files) and accepted if
 /// its triangles match the recorded fingerprint. errors  kInput: a missing or changed part, with its name; of load_scene
-Result<std::array<view::Picture, 3>> cast_parts(const ManifestHead& head, const std::vector<std::string>& folders,
-                                                std::uint32_t most);
+Result<Scene> find_parts(const ManifestHead& head, const Job& job, const std::vector<std::string>& folders);
+
+/// Parts from above, from the front and from the right, `most` pixels along the longest side of all.
+Result<std::array<view::Picture, 3>> cast_parts(const Scene& scene, std::uint32_t most);
 
 }  // namespace lamina::pipeline

@@ -44,7 +44,7 @@ Result<Manifest> finished_manifest(const std::string& place, const std::string& 
 Result<Runs> read_layer(const std::string& directory, const ManifestHead& head, const LayerRecord& record) {
   for (const LayerImageFile& file : layer_images(head, record)) {
     const std::string path = directory + "/" + file.name;
-    const Result<FileDigest> digest = digest_file(path);
+    const Result<FileDigest> digest = digest_file(path, file.record.bytes);
     if (!digest) return digest.error();
     if (digest->bytes != file.record.bytes || digest->hash != file.record.hash) return changed(path);
   }

@@ -11,6 +11,9 @@ enum class Product { kImages, kContours, kMoves };
 /// The bit of a product in a set of them.
 constexpr unsigned bit(Product product) { return 1u << static_cast<unsigned>(product); }
 
+/// What survives a power cut: nothing for certain, a job that has ended, or all but the layers in flight of one that runs.
+enum class Sync : std::uint8_t { kOff, kJob, kLayer };
+
 /// Applied to the winding number of all facets together about a point.
 enum class FillRule : std::uint8_t {
   kNonzero,   // not zero: the union of overlapping shells; a shell turned inside out is still solid

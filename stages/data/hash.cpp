@@ -1,6 +1,5 @@
 #include "stages/data/hash.h"
 
-#include <fcntl.h>
 #include <fmt/format.h>
 #include <unistd.h>
 #include <xxhash.h>
@@ -12,6 +11,8 @@
 #include <filesystem>
 #include <memory>
 #include <vector>
+
+#include "stages/data/input/file_reader.h"
 
 namespace lamina {
 
@@ -34,27 +35,22 @@ bool read_hex(std::string_view text, Hash128& hash) {
   return half(0, hash.high) && half(16, hash.low);
 }
 
-Result<FileDigest> digest_file(const std::string& path) {
-  const auto failed = [&] { return Error{Fault::kVerification, fmt::format("{}: {}", path, std::strerror(errno))}; };
-  const int file = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
-  if (file < 0) return failed();
+Result<FileDigest> digest_file(const std::string& path, std::optional<std::uint64_t> expected) {
+  auto file = FileReader::open(path, {.missing = std::strerror(ENOENT)});
+  if (!file) return file.error();
+  if (expected && file->size() != *expected) return FileDigest{file->size(), {}};
   const std::unique_ptr<XXH3_state_t, XXH_errorcode (*)(XXH3_state_t*)> state(XXH3_createState(), XXH3_freeState);
   XXH3_128bits_reset(state.get());
-  std::vector<std::byte> piece(256 << 10);
+  std::vector<char> piece(256 << 10);
   FileDigest digest;
   while (true) {
-    const ssize_t got = ::read(file, piece.data(), piece.size());
+    const ssize_t got = ::read(file->descriptor(), piece.data(), piece.size());
     if (got < 0 && errno == EINTR) continue;
-    if (got < 0) {
-      const Error error = failed();
-      ::close(file);
-      return error;
-    }
+    if (got < 0) return Error{Fault::kVerification, fmt::format("{}: {}", path, std::strerror(errno))};
     if (got == 0) break;
     digest.bytes += static_cast<std::uint64_t>(got);
     XXH3_128bits_update(state.get(), piece.data(), static_cast<std::size_t>(got));
   }
-  ::close(file);
   const XXH128_hash_t hash = XXH3_128bits_digest(state.get());
   digest.hash = {hash.high64, hash.low64};
   return digest;

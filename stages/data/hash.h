@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -30,9 +31,9 @@ struct FileDigest {
   Hash128 hash;
 };
 
-/// Size and hash of a file, read in pieces of 256 KiB.
+/// Size and hash of a file, read in pieces of 256 KiB. A file of another size than `expected` is not read: its hash is zero.
 /// errors  kVerification with the file's name and the system's reason
-Result<FileDigest> digest_file(const std::string& path);
+Result<FileDigest> digest_file(const std::string& path, std::optional<std::uint64_t> expected = {});
 
 struct TreeDigest {
   std::uint64_t files = 0, bytes = 0;

@@ -43,6 +43,10 @@ struct Box {
   std::int64_t width() const { return std::int64_t{hi.x} - lo.x; }
   std::int64_t depth() const { return std::int64_t{hi.y} - lo.y; }
   std::int64_t height() const { return std::int64_t{hi.z} - lo.z; }
+  Point3 middle() const {
+    const auto half = [](Nm low, Nm high) { return static_cast<Nm>((std::int64_t{low} + high) / 2); };
+    return {half(lo.x, hi.x), half(lo.y, hi.y), half(lo.z, hi.z)};
+  }
 };
 
 /// Room that a loader leaves behind a list of triangles, so that later stages can pad it without moving it.
@@ -56,6 +60,12 @@ struct Mesh {
   bool closed = true;  // every edge is walked as often one way as the other; false only where repair was off
   Box bounds;
   std::uint64_t fingerprint = 0;  // of the triangles in any order (load/diagnose.h)
+  /// Volume of the triangles, caps included. Shells that overlap count as often as they overlap, hollows count
+  /// negative, so a part whose shells unite has less; never negative for a closed mesh, because a mesh that is inside
+  /// out as a whole is turned over. An estimate where the mesh is not closed.
+  double volume_mm3 = 0;
+  /// Area of the triangles that repair added over the area of all, 0 to 1: how much of the surface is a guess.
+  double capped_share = 0;
 };
 
 /// A mesh put somewhere by an integer translation: what copies share.

@@ -17,6 +17,7 @@ enum class Fault : int {
   kInput = 3,         // a part file that cannot be planned
   kOutput = 4,        // a result that could not be written
   kVerification = 5,  // outputs that are not what the manifest says, or engines that disagree
+  kMemory = 6,        // the system gives no more memory or threads
   kInterrupted = 130  // stopped by the user; finished layers are kept
 };
 
@@ -25,6 +26,13 @@ struct Error {
   Fault fault = Fault::kInternal;
   std::string message;
 };
+
+/// The answer to std::bad_alloc.
+inline Error out_of_memory() {
+  return {Fault::kMemory,
+          "out of memory; give a smaller --memory, fewer --threads or --jobs, or --engine contours, or run it where more "
+          "memory is free"};
+}
 
 /// A value or the error that kept it from being made.
 template <class T>
@@ -65,6 +73,16 @@ class [[nodiscard]] Result<void> {
 };
 
 using Status = Result<void>;
+
+/// A doubt about a result that was made nevertheless.
+struct Warning {
+  std::string code;  // short and stable, for scripts: "volume"
+  std::string text;  // one line for a person
+  // --- the place, where there is one
+  std::string part = {};                    // its file
+  std::optional<std::uint32_t> layer = {};  // the first
+  std::optional<double> z_mm = {};          // of that layer's plane
+};
 
 /// What is wrong with many files.
 struct Faults {

@@ -123,6 +123,10 @@ Error refusal(const char* why) {
   return {Fault::kInternal, fmt::format("contours of a layer cannot be combined: {}; please report this with the part", why)};
 }
 
+Error refusal(const std::exception& why) {
+  return dynamic_cast<const std::bad_alloc*>(&why) != nullptr ? out_of_memory() : refusal(why.what());
+}
+
 Result<Contours> combine(const ContoursView& contours, const ContoursView& with, clip::ClipType how) {
   Contours out;
   if (contours.size() == 0) return out;
@@ -137,7 +141,7 @@ Result<Contours> combine(const ContoursView& contours, const ContoursView& with,
     }
     append_tree(tree, by, out);
   } catch (const std::exception& exception) {
-    return refusal(exception.what());
+    return refusal(exception);
   }
   return out;
 }
@@ -158,7 +162,7 @@ Result<Contours> unite_contours(const ContoursView& contours, FillRule rule) {
     if (!clipper.Execute(clip::ctUnion, tree, type, type)) return refusal("the union failed");
     append_tree(tree, moved.by, out);
   } catch (const std::exception& exception) {
-    return refusal(exception.what());
+    return refusal(exception);
   }
   return out;
 }
@@ -186,7 +190,7 @@ Result<Contours> offset_contours(const ContoursView& contours, std::int64_t dist
     }
     append_tree(tree, moved.by, out);
   } catch (const std::exception& exception) {
-    return refusal(exception.what());
+    return refusal(exception);
   }
   return out;
 }
@@ -209,7 +213,7 @@ Result<Contours> clip_lines(const ContoursView& lines, const ContoursView& regio
       out.close();
     }
   } catch (const std::exception& exception) {
-    return refusal(exception.what());
+    return refusal(exception);
   }
   return out;
 }
@@ -225,7 +229,7 @@ Result<Contours> cover_lines(const ContoursView& lines, Nm width) {
     offsetter.Execute(tree, static_cast<double>(width) / 2);
     append_tree(tree, moved.by, out);
   } catch (const std::exception& exception) {
-    return refusal(exception.what());
+    return refusal(exception);
   }
   return out;
 }

@@ -110,7 +110,7 @@ MeshSlopes slopes_of(const Mesh& mesh, const Limits& limits) {
         levels += flat;
         block_area += flat ? 0 : mm2;
         // Rounded up; the cast cuts off, and what is cut off is put back.
-        const double scaled = counts & !flat ? up[k] * kHorizontal : 0;
+        const double scaled = (counts & !flat) ? up[k] * kHorizontal : 0;
         const auto whole = static_cast<std::int32_t>(scaled);
         to_steepness[first + k] = static_cast<Steepness>(whole + (whole < scaled));
       }

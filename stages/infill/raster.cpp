@@ -25,7 +25,7 @@ struct Stretch {
 
 class Scan {
  public:
-  Scan(const ContoursView& region, const LinePlaces& places) : region_(region), point_(region.point), at_(places.at) {
+  Scan(const ContoursView& region, const LinePlaces& places) : point_(region.point), at_(places.at) {
     next_.resize(point_.size());
     previous_.resize(point_.size());
     for (std::uint32_t c = 0; c < region.size(); ++c) {
@@ -163,7 +163,6 @@ class Scan {
     return kNone;
   }
 
-  const ContoursView& region_;
   std::span<const Point2> point_;
   const Buffer<std::int64_t>& at_;
   Buffer<std::uint32_t> next_, previous_;

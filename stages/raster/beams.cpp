@@ -43,6 +43,12 @@ void cluster_bounds(const RTCBoundsFunctionArguments* arguments) {
   bounds.upper_z = at(box.hi.z, move.z) + kRoundingRoom;
 }
 
+/// Embree reports its own lack of memory, or of threads, by a code.
+Error failed(RTCError code, const std::string& what) {
+  if (code == RTC_ERROR_OUT_OF_MEMORY) return {Fault::kMemory, "Embree: " + out_of_memory().message};
+  return {Fault::kInternal, fmt::format("Embree: {} (error {})", what, static_cast<int>(code))};
+}
+
 /// Notes the cluster and never reports a hit, so that the traversal goes on.
 void visit_cluster(const RTCIntersectFunctionNArguments* arguments) {
   if (arguments->valid[0] == 0) return;
@@ -63,6 +69,7 @@ struct BeamIndex::State {
   std::span<const PlacedMesh> placed;
   std::atomic<std::int64_t> bytes{0};
   std::string failure;
+  RTCError failure_code = RTC_ERROR_NONE;
 
   ~State() {
     for (RTCScene shared : shared_scenes) rtcReleaseScene(shared);
@@ -101,14 +108,13 @@ Result<BeamIndex> BeamIndex::build(std::span<const PlacedMesh> placed, const Pix
   state.placed = placed;
   state.device = rtcNewDevice("start_threads=0,set_affinity=0");
   if (state.device == nullptr) {
-    return Error{Fault::kInternal,
-                 fmt::format("Embree could not be started (error {})", static_cast<int>(rtcGetDeviceError(nullptr)))};
+    return failed(rtcGetDeviceError(nullptr), "could not be started");
   }
   rtcSetDeviceErrorFunction(
       state.device,
-      [](void* user, RTCError, const char* text) {
-        auto& failure = static_cast<State*>(user)->failure;
-        if (failure.empty()) failure = text;
+      [](void* user, RTCError code, const char* text) {
+        auto& embree = *static_cast<State*>(user);
+        if (embree.failure.empty()) embree.failure = text, embree.failure_code = code;
       },
       &state);
   rtcSetDeviceMemoryMonitorFunction(
@@ -155,7 +161,7 @@ Result<BeamIndex> BeamIndex::build(std::span<const PlacedMesh> placed, const Pix
     begin = end;
   }
   rtcCommitScene(state.scene);
-  if (!state.failure.empty()) return Error{Fault::kInternal, "Embree: " + state.failure};
+  if (!state.failure.empty()) return failed(state.failure_code, state.failure);
   return index;
 }
 

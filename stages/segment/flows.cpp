@@ -3,8 +3,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <fstream>
 
+#include "stages/data/input/file_reader.h"
 #include "stages/data/text/number_text.h"
 #include "stages/data/text/table.h"
 
@@ -84,21 +84,24 @@ std::string add_row(const Columns& columns, const std::vector<std::string>& cell
 }  // namespace
 
 Result<std::vector<FlowGroup>> read_flows(const std::string& path, const Medium& medium) {
-  std::ifstream file(path);
-  if (!file) return Error{Fault::kInput, path + ": no such file, or it cannot be read"};
+  auto file = FileReader::open(path, {.fault = Fault::kInput, .most_bytes = kMostTableBytes, .streams = true});
+  return file ? read_flows(*file, medium) : Result<std::vector<FlowGroup>>(file.error());
+}
+
+Result<std::vector<FlowGroup>> read_flows(FileReader& file, const Medium& medium) {
+  const std::string& path = file.path();
   Columns columns;
   char separator = ',';
   std::vector<FlowGroup> groups;
-  std::size_t number = 0;
-  for (std::string line; std::getline(file, line);) {
-    ++number;
+  for (std::string_view line; file.next(line);) {
     if (line.empty() || line[0] == '#' || line == "\r") continue;
     const bool header = columns.names.empty();
     if (header) separator = separator_of(line);
     auto cells = cells_of(line, separator);
     const std::string wrong = header ? columns.read(std::move(cells)) : add_row(columns, cells, medium, groups);
-    if (!wrong.empty()) return Error{Fault::kInput, fmt::format("{}:{}: {}", path, number, wrong)};
+    if (!wrong.empty()) return Error{Fault::kInput, fmt::format("{}:{}: {}", path, file.line_number(), wrong)};
   }
+  if (!file.status()) return file.status().error();
   if (!groups.empty()) return groups;
   return Error{Fault::kInput, path + ": holds no measurements; the first line names the columns, the others hold numbers"};
 }

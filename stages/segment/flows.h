@@ -8,6 +8,10 @@
 #include "stages/data/status.h"
 #include "stages/segment/permeability.h"
 
+namespace lamina {
+class FileReader;
+}
+
 namespace lamina::segment {
 
 /// What the fluid flows through.
@@ -23,6 +27,7 @@ struct FlowGroup {
 /// A table with a header: one column of flows or velocities, one or more of pressure drops; units by their endings.
 /// errors  kInput: file, line, column, what is wrong
 Result<std::vector<FlowGroup>> read_flows(const std::string& path, const Medium& medium);
+Result<std::vector<FlowGroup>> read_flows(FileReader& file, const Medium& medium);
 
 /// Points and parabola.
 Plot draw_fit(const FlowGroup& group, const Permeability& fit);

@@ -3,8 +3,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <fstream>
 
+#include "stages/data/input/file_reader.h"
 #include "stages/data/text/names.h"
 #include "stages/data/text/readable.h"
 #include "stages/data/text/table.h"
@@ -59,17 +59,20 @@ std::string widths_text(const PieceRequest& request) {
 }
 
 Result<std::vector<Measured>> read_widths(const std::string& path) {
+  auto file = FileReader::open(path, {.fault = Fault::kInput, .most_bytes = kMostTableBytes, .streams = true});
+  return file ? read_widths(*file) : Result<std::vector<Measured>>(file.error());
+}
+
+Result<std::vector<Measured>> read_widths(FileReader& file) {
+  const std::string& path = file.path();
   const auto wrong = [&](std::size_t line, const std::string& what) {
     return Error{Fault::kInput, line == 0 ? fmt::format("{}: {}", path, what) : fmt::format("{}:{}: {}", path, line, what)};
   };
-  std::ifstream file(path);
-  if (!file) return wrong(0, "no such file, or it cannot be read");
   std::vector<std::string> names;
   std::vector<Measured> rows;
   char separator = ',';
-  std::size_t number = 0;
-  for (std::string line; std::getline(file, line);) {
-    ++number;
+  for (std::string_view line; file.next(line);) {
+    const std::uint64_t number = file.line_number();
     if (line.empty() || line[0] == '#' || line == "\r") continue;
     if (names.empty()) {
       separator = separator_of(line);
@@ -99,6 +102,7 @@ Result<std::vector<Measured>> read_widths(const std::string& path) {
     }
     rows.push_back(std::move(row));
   }
+  if (!file.status()) return file.status().error();
   if (rows.empty()) return wrong(0, "holds no rows; lamina calibrate -o DIR writes a table to be filled in");
   return rows;
 }

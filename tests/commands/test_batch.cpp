@@ -77,7 +77,9 @@ Words batch_of(Words words, const Words& more = kSmall) {
 
 TEST_F(JobsInBatch, EveryFileOfTheCorpusEndsAsTheTableSaysAndAsItWouldAlone) {
   const fs::path corpus = fs::path(LAMINA_TEST_DIR) / "corpus";
-  ASSERT_EQ(lamina(batch_of({corpus, "-o", "out"}, {"--with", "jet --bed 400x400 --dpi 60 --layer 1", "--quiet"})).code, 3);
+  ASSERT_EQ(
+      lamina(batch_of({corpus, "-o", "out"}, {"--with", "jet --bed 400x400 --dpi 60 --layer 1 --allow-empty", "--quiet"})).code,
+      3);
   std::map<std::string, std::string> expected;
   std::ifstream table(corpus / "outcomes.tsv");
   for (std::string line; std::getline(table, line);) {
@@ -96,8 +98,8 @@ TEST_F(JobsInBatch, EveryFileOfTheCorpusEndsAsTheTableSaysAndAsItWouldAlone) {
     if (job["code"] != 0) continue;
     EXPECT_GT(job["result"]["layers_planned"], 0);
     if (done++ % 4 != 0) continue;
-    ASSERT_EQ(lamina({"jet", corpus / file, "--bed", "400x400", "--dpi", "60", "--layer", "1", "--quiet", "-o", "alone",
-                      "--overwrite"})
+    ASSERT_EQ(lamina({"jet", corpus / file, "--bed", "400x400", "--dpi", "60", "--layer", "1", "--allow-empty", "--quiet", "-o",
+                      "alone", "--overwrite"})
                   .code,
               0);
     EXPECT_EQ(tree_text(directory_ / "alone"), tree_text(directory_ / ("out/" + job["output"].get<std::string>()))) << file;

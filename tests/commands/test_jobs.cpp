@@ -126,6 +126,53 @@ TEST_F(Jobs, MergeSaysWhatIsMissing) {
   refused({"own1", "own2", "own3"}, "not finished");
 }
 
+TEST_F(Jobs, AShardOfAnotherJobIsRefusedBeforeItPlans) {
+  ASSERT_EQ(jet("out", {"--shard", "1/3"}).code, 0);
+  const std::string before = tree("out");
+  const Outcome outcome = jet("out", {"--shard", "2/3", "--dpi", "200"});
+  EXPECT_EQ(outcome.code, 2) << outcome.err;
+  EXPECT_EQ(outcome.error_lines(), 1u) << outcome.err;
+  EXPECT_NE(outcome.err.find("manifest-1-of-3.json: is a shard of another job (bed.dpi"), std::string::npos) << outcome.err;
+  EXPECT_EQ(tree("out"), before);
+}
+
+TEST_F(Jobs, VerifyNamesTheShardsThatAreMissing) {
+  const auto verified = [&](const std::string& words) {
+    const Outcome outcome = lamina({"verify", "out"});
+    EXPECT_EQ(outcome.code, words.empty() ? 0 : 5) << outcome.err;
+    EXPECT_NE(outcome.err.find(words), std::string::npos) << outcome.err;
+    if (!words.empty()) {
+      EXPECT_EQ(outcome.error_lines(), 1u) << outcome.err;
+    }
+  };
+  ASSERT_EQ(jet("out", {"--shard", "3/4"}).code, 0);
+  const Outcome both = lamina({"verify", "out"});
+  EXPECT_EQ(both.code, 5);
+  EXPECT_NE(both.err.find("shards 1/4 to 2/4 are missing, with layers 0 to 24"), std::string::npos) << both.err;
+  EXPECT_NE(both.err.find("shard 4/4 is missing, with layers 37 to 49"), std::string::npos) << both.err;
+  ASSERT_EQ(jet("out", {"--shard", "1/4"}).code, 0);
+  ASSERT_EQ(jet("out", {"--shard", "4/4"}).code, 0);
+  verified("shard 2/4 is missing");
+  ASSERT_EQ(jet("out", {"--shard", "2/4"}).code, 0);
+  verified("");
+}
+
+TEST_F(Jobs, AMergeThatIsDoneAlreadySaysSo) {
+  for (int i = 1; i <= 3; ++i) ASSERT_EQ(jet("out", {"--shard", std::to_string(i) + "/3"}).code, 0);
+  const std::string last = read_text(directory_ / "out/manifest-3-of-3.json");
+  ASSERT_EQ(lamina({"merge", "out", "-o", "out"}).code, 0);
+  const std::string merged = tree("out");
+  for (const bool interrupted : {false, true}) {
+    if (interrupted) write_text(directory_ / "out/manifest-3-of-3.json", last);  // killed while it removed them
+    const Outcome outcome = lamina({"merge", "out", "-o", "out"});
+    EXPECT_EQ(outcome.code, 0) << outcome.err;
+    EXPECT_NE(outcome.err.find("is whole already, 50 layers"), std::string::npos) << outcome.err;
+    EXPECT_EQ(tree("out"), merged);
+  }
+  fs::remove(directory_ / "out/layers/000020.tif");
+  EXPECT_EQ(lamina({"merge", "out", "-o", "out"}).code, 5);
+}
+
 TEST_F(Jobs, MergeReplacesNoOtherJob) {
   ASSERT_EQ(jet("own", {"--shard", "1/1"}).code, 0);
   ASSERT_EQ(jet("other", {"--dpi", "200"}).code, 0);

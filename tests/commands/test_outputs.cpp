@@ -91,6 +91,8 @@ TEST_F(Outputs, WhatACallReadsIsNeverReplaced) {
       {"extrude --job job.toml -o part.stl", "part.stl"},
       {"extrude part.stl --set run.output=part.stl", "part.stl"},
       {"extrude part.stl -o new.gcode --save-job part.stl", "part.stl"},
+      {"heights part.stl -o cut/job.toml --plot cut/../cut/job.toml --overwrite", "cut/job.toml"},
+      {"extrude part.stl -o cut/part.svg --save-job cut/part.svg --overwrite", "cut/part.svg"},
       {"heights part.stl -o part.stl", "part.stl"},
       {"heights part.stl -o part.stl --overwrite", "part.stl"},
       {"heights --job job.toml -o job.toml", "job.toml"},

@@ -33,7 +33,7 @@ std::vector<Fired> vectors_of(const HeadGrid& grid, const Image& image, ProgramC
     for (std::uint32_t s = 0; s < vectors.steps; ++s) {
       std::string bits;
       for (std::uint32_t i = 0; i < grid.nozzles; ++i)
-        bits += '0' + int(vectors.bits[s * vectors.words + i / 64] >> i % 64 & 1);
+        bits += (vectors.bits[s * vectors.words + i / 64] >> i % 64 & 1) != 0 ? '1' : '0';
       all.push_back({sweep, vectors.first_step + s, bits});
     }
     return {};

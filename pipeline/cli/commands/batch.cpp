@@ -13,11 +13,14 @@
 #include "pipeline/cli/console.h"
 #include "pipeline/cli/terminal.h"
 #include "pipeline/job/file.h"
+#include "pipeline/job/keys.h"
+#include "stages/data/input/file_reader.h"
 #include "stages/data/text/json.h"
 #include "stages/data/text/number_text.h"
 #include "stages/data/text/readable.h"
 #include "stages/data/text/shell_words.h"
 #include "stages/write/file.h"
+#include "stages/write/leftovers.h"
 
 namespace lamina::pipeline {
 namespace {
@@ -36,6 +39,8 @@ CommandSpec batch_spec() {
       {"--with", "WORDS", "command and options for parts that come without any, as in --with 'jet --dpi 600'", "jet", ""},
       {"--jobs", "N", "jobs running at a time; 0 for as many as there are processors", "0", "Run"},
       {"--memory", "SIZE", "what all running jobs may hold together: 512M, 4G", "1G", "Run"},
+      {"--sync", "WHEN", "what of the jobs and the summary survives a power cut, see lamina jet: layer, job, off", "job",
+       "Run"},
       {"--time-limit", "SECONDS", "stop a job that takes longer: it fails, with exit code 3", "", "Run"},
       {"--keep-going", "", "a job that fails does not stop the others; this is what happens anyway", "", "Run"},
       {"--fail-fast", "", "the first job that fails stops the batch", "", "Run"},
@@ -93,11 +98,12 @@ class CallContext : public Context {
 };
 
 /// The arguments with the batch's additions; the last occurrence of an option counts.
-Arguments with_settings(Arguments arguments, const CommandSpec& spec, const CallSettings& settings) {
+Arguments with_settings(Arguments arguments, const CommandSpec& spec, const CallSettings& settings, const std::string& sync) {
   const auto add = [&](std::string_view name, const std::string& text = {}) {
     if (const OptionSpec* option = spec.find(name)) arguments.options.emplace_back(option->flag, text);
   };
   if (!settings.output.empty()) add("--output", settings.output);
+  if (!sync.empty() && !arguments.has("--sync")) add("--sync", sync);
   if (!arguments.has("--memory")) add("--memory", fmt::format("{}", settings.layer_bytes));
   // All jobs share one pool, so a job's own thread count would apply to the whole program.
   add("--threads", "0");
@@ -122,7 +128,8 @@ BatchResult run_call(const Command& command, const Arguments& arguments, const P
 
 /// Reads a command line: any command but batch and preview. errors  kUsage: no such command, wrong arguments, a job file
 /// that cannot be read
-Result<Call> read_call(const std::vector<std::string>& words) {
+/// sync  of the batch, for jobs without one of their own; "" for none
+Result<Call> read_call(const std::vector<std::string>& words, const std::string& sync) {
   const std::string& name = words.front();
   const Command* command = find_command(name);
   if (command == nullptr) return Error{Fault::kUsage, unknown_command(name)};
@@ -135,6 +142,9 @@ Result<Call> read_call(const std::vector<std::string>& words) {
   if (read->help) return Error{Fault::kUsage, "--help is no job"};
   Job planned;
   if (read->has("--job")) {
+    if (names_stream(read->text("--job"))) {
+      return Error{Fault::kUsage, "--job: a job of a batch cannot read standard input; name a file"};
+    }
     if (Status status = read_job(read->text("--job"), planned); !status) return status.error();
   }
 
@@ -158,9 +168,9 @@ Result<Call> read_call(const std::vector<std::string>& words) {
   if (read->operands.empty()) {
     for (const PartRequest& part : planned.parts) call.inputs.push_back(part.path);
   }
-  call.run = [command, spec, arguments = *read](const CallSettings& settings, const ProgressCallback& progress,
-                                                const std::atomic<bool>& cancel) {
-    return run_call(*command, with_settings(arguments, spec, settings), progress, cancel);
+  call.run = [command, spec, sync, arguments = *read](const CallSettings& settings, const ProgressCallback& progress,
+                                                      const std::atomic<bool>& cancel) {
+    return run_call(*command, with_settings(arguments, spec, settings, sync), progress, cancel);
   };
   return call;
 }
@@ -228,20 +238,29 @@ class BatchConsole {
   std::uint32_t ended_ = 0;
 };
 
-Status write_text_file(const std::string& directory, const char* name, const std::string& text) {
-  return write::write_file((std::filesystem::path(directory) / name).string(), std::as_bytes(std::span(text)));
+/// Reads --sync. errors  kUsage
+Result<write::Durable> read_sync(const Arguments& arguments) {
+  Job job;
+  const auto key = std::ranges::find(job_keys(), "--sync", &JobKey::flag);
+  if (arguments.has(key->flag)) {
+    if (Status status = at_option(key->flag, key->read(arguments.text(key->flag), job)); !status) return status.error();
+  }
+  return job.sync == Sync::kOff ? write::Durable::kNo : write::Durable::kAll;
 }
 
 Outcome run_batch_command(const Arguments& arguments, Context& context) {
   const bool quiet = arguments.has("--quiet");
   std::vector<std::string> with;
+  const Result<write::Durable> durable = read_sync(arguments);
+  if (!durable) return durable.error();
   const Result<BatchOptions> read = read_options(arguments, with);
   if (!read) return read.error();
   const BatchOptions& options = *read;
   Result<std::vector<BatchEntry>> entries = read_batch(arguments.operands, with);
   if (!entries) return entries.error();
+  const auto read_words = [sync = arguments.text("--sync")](const auto& words) { return read_call(words, sync); };
   const auto jobs =
-      prepare_batch(std::move(*entries), {options.directory, layer_share(options.memory_bytes, options.jobs)}, read_call);
+      prepare_batch(std::move(*entries), {options.directory, layer_share(options.memory_bytes, options.jobs)}, read_words);
   if (!jobs) return jobs.error();
   Result<BatchRecord> record = BatchRecord::open(options.directory, options.resume, options.overwrite);
   if (!record) return record.error();
@@ -257,8 +276,9 @@ Outcome run_batch_command(const Arguments& arguments, Context& context) {
   console.clear();
   if (!summary) return summary.error();
   const Json json = batch_json(*jobs, *summary, options);
-  Status written = write_text_file(options.directory, "summary.json", json_line(json, 2));
-  if (written) written = write_text_file(options.directory, "summary.tsv", batch_table(*jobs, *summary));
+  const write::FileOptions how{.follow = false, .durable = *durable};
+  Status written = write::write_file(options.directory + "/summary.json", json_line(json, 2), how);
+  if (written) written = write::write_file(options.directory + "/summary.tsv", batch_table(*jobs, *summary), how);
   int code = written ? batch_code(*summary) : context.complain(written.error());
   if (!quiet) context.say_text(batch_text(*jobs, *summary, options));
   if (summary->interrupted) {
@@ -267,7 +287,10 @@ Outcome run_batch_command(const Arguments& arguments, Context& context) {
   if (arguments.has("--json")) {
     if (Status status = context.give(json); !status) code = context.complain(status.error());
   }
-  if (summary->abandoned) std::_Exit(code);  // a job that does not stop is still running
+  if (summary->abandoned) {  // a job that does not stop is still running
+    write::remove_watched();
+    std::_Exit(code);
+  }
   return code;
 }
 

@@ -3,6 +3,7 @@
 
 #include "pipeline/calibrate/calibrate.h"
 #include "pipeline/cli/command.h"
+#include "pipeline/cli/console.h"
 #include "stages/data/text/json.h"
 #include "stages/data/text/readable.h"
 #include "stages/write/file.h"
@@ -23,7 +24,7 @@ CommandSpec calibrate_spec() {
       {"--layer", "MM", "thickness of a layer; three quarters of the bead if absent", "", "Beads"},
       {"--gap", "MM", "wanted between thick beads and their neighbours; slightly negative bonds better", "0", "Beads"},
       {"--exact-spacing", "", "spacings from the mean widths, not rounded to 0.01 mm as in the document", "", "Measurements"},
-      {"--overwrite", "", "replace a file that lamina did not write", "", "Result"},
+      {"--overwrite", "", "replace a profile that lamina did not write, or the pieces of an earlier call", "", "Result"},
       {"--json", "", "print the result as one JSON object on stdout", "", "Result"},
       {"--quiet", "", "say nothing but errors", "", "Result"}};
   spec.closing =
@@ -79,7 +80,7 @@ Outcome run_calibrate(const Arguments& arguments, Context& context) {
   if (!arguments.operands.empty())
     return usage(fmt::format("'{}' is no option; the pieces are made here", one_line(arguments.operands.front())));
   if (!arguments.has("--machine")) return usage("--machine is missing; name an extrusion printer, as lamina extrude takes it");
-  CalibrationRequest request{arguments.text("--machine"), arguments.text("-o,--output"), segment::preset_pieces()};
+  CalibrationRequest request{arguments.text("--machine"), arguments.text("-o,--output"), segment::preset_pieces(), false};
   if (request.directory.empty())
     return usage("-o is missing; name a directory for the test pieces, or with --measured the profile to be written");
   double gap = 0;
@@ -89,7 +90,10 @@ Outcome run_calibrate(const Arguments& arguments, Context& context) {
     if (!status) return status;
   }
   if (!arguments.has("--measured")) {
-    const auto names = write_test_pieces(request, context.cancel());
+    const std::atomic<bool>& cancel = context.cancel();
+    keep_on_signals();
+    request.overwrite = arguments.has("--overwrite");
+    const auto names = write_test_pieces(request, cancel);
     if (!names) return names.error();
     return say_pieces(*names, arguments, context);
   }

@@ -22,7 +22,8 @@ CommandSpec info_spec() {
                   {"--scale", "S|X,Y,Z", "factors per axis of the file", "1", ""},
                   {"--rotate", "X,Y,Z", "degrees about x, then y, then z", "0,0,0", ""},
                   {"--drop-bad", "", "drop facets with coordinates that are no numbers", "", ""},
-                  {"--weld", "UM", "repair joins open edges that are at most this far apart, in micrometres", "5", ""},
+                  {"--repair", "MODE", "how open meshes are closed: auto, winding (approximate) or off", "auto", ""},
+                  {"--weld", "UM", "repair joins open edges this far apart, in micrometres; 5 grows by itself", "5", ""},
                   {"--json", "", "print one JSON object for each part on stdout", "", ""}};
   spec.closing =
       "Examples:\n"

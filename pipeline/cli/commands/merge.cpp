@@ -31,7 +31,10 @@ Outcome run_merge(const Arguments& arguments, Context& context) {
   if (output.empty()) return Error{Fault::kUsage, "-o OUT is missing; name the directory of the whole job"};
   const Result<MergeReport> report = merge(arguments.operands, output);
   if (!report) return report.error();
-  if (!arguments.has("--quiet")) {
+  if (!arguments.has("--quiet") && report->shards == 0) {
+    context.say(fmt::format("{}: is whole already, {} layers, nothing is left to merge", report->output,
+                            readable_count(report->layers)));
+  } else if (!arguments.has("--quiet")) {
     context.say(fmt::format("{}: {} layers of {} shards joined, {} files linked, {} copied", report->output,
                             readable_count(report->layers), report->shards, report->linked, report->copied));
   }

@@ -7,6 +7,7 @@
 
 #include "pipeline/cli/command.h"
 #include "pipeline/cli/keys.h"
+#include "pipeline/cli/needs.h"
 #include "pipeline/cli/outputs.h"
 #include "pipeline/job/file.h"
 #include "pipeline/job/job.h"
@@ -68,6 +69,7 @@ Outcome plan(const PlanCommand& row, const Arguments& arguments, Context& contex
   job->json = arguments.has("--json");
   job->quiet = arguments.has("--quiet");
   if (Status status = row.complete(arguments, *job); !status) return status;
+  if (Status status = check_needs(row.product, arguments, *job); !status) return status;
   if (Status status = check_job(*job); !status) return status;
   for (const std::string& note : job->notes) {
     if (!job->quiet) context.say("note: " + note);
@@ -149,8 +151,9 @@ PlanCommand jet_row() {
 
 // --- lamina slice
 
-const KeyChoice kSliceKeys = {"bed.size_mm", "layers",     "heights",    "place", "image.fill", "load", "run.output",
-                              "run.threads", "run.memory", "run.layers", "slice", "fill",       "part"};
+const KeyChoice kSliceKeys = {"bed.size_mm",     "layers",      "heights",    "place",    "image.fill", "load",
+                              "run.output",      "run.threads", "run.memory", "run.sync", "run.layers", "run.strict",
+                              "run.allow_empty", "slice",       "fill",       "part"};
 
 const OptionSpec kSliceSwitches[] = {{"--resume", "", "go on with an interrupted job: whole layers are kept", "", "Run"},
                                      {"--overwrite", "", "replace an earlier job in the directory", "", "Run"},
@@ -188,9 +191,10 @@ PlanCommand slice_row() {
 
 // --- lamina extrude
 
-const KeyChoice kExtrudeKeys = {
-    "layers",     "heights",     "place",      "machine.profile", "fill", "segment", "extrude", "load", "slice.tolerance_um",
-    "run.output", "run.threads", "run.memory", "run.layers",      "part"};
+const KeyChoice kExtrudeKeys = {"layers",          "heights",    "place",    "machine.profile",    "fill",
+                                "segment",         "extrude",    "load",     "slice.tolerance_um", "run.output",
+                                "run.threads",     "run.memory", "run.sync", "run.layers",         "run.strict",
+                                "run.allow_empty", "part"};
 
 const OptionSpec kExtrudeSwitches[] = {{"--resume", "", "go on with an interrupted job: whole layers are kept", "", "Run"},
                                        {"--overwrite", "", "replace an earlier file", "", "Run"},

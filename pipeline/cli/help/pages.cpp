@@ -27,6 +27,7 @@ constexpr More kMore[] = {
      "[extrusion](../extrude.md), [segmented lines](../segmented.md), [filling](../filling.md), [job files](../job.md)"},
     {"calibrate", "[the procedure](../calibrate.md), [segmented lines](../segmented.md)"},
     {"info", "[concepts](../concepts.md)"},
+    {"export", "[concepts](../concepts.md), [formats](../formats.md)"},
     {"verify", "[exactness](../exactness.md), [print programs](../print_program.md)"},
     {"permeability", "[segmented lines](../segmented.md)"},
     {"merge", "[more than one machine](../batch.md#more-than-one-machine)"},
@@ -45,8 +46,8 @@ std::string sentence(std::string_view text) {
 }
 
 std::string exit_status() {
-  return ".SH EXIT STATUS\n0 done, 1 internal error, 2 wrong option or job, 3 bad part file, 4 output could not be written, "
-         "5 verification failed, 130 interrupted.\n";
+  return ".SH EXIT STATUS\n0 done, 1 internal error, 2 wrong option or job, 3 bad part file or an empty job, 4 output could not be "
+         "written, 5 verification failed or a warning with --strict, 6 out of memory, 130 interrupted.\n";
 }
 
 std::string title(std::string_view name) {

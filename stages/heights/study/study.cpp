@@ -3,9 +3,9 @@
 #include <fmt/format.h>
 
 #include <chrono>
-#include <fstream>
 #include <utility>
 
+#include "stages/data/input/file_reader.h"
 #include "stages/data/text/number_text.h"
 #include "stages/heights/per_part.h"
 
@@ -43,16 +43,19 @@ Result<Study> study(const SurfaceIndex& index, const Options& options) {
 }
 
 Result<Study> study_table(const SurfaceIndex& index, const Options& options, const std::string& path) {
-  std::ifstream file(path);
-  if (!file) return Error{Fault::kInput, fmt::format("{}: cannot be read; name a file of heights", path)};
+  auto file = FileReader::open(path, {.fault = Fault::kInput,
+                                      .missing = "no such file; name a file of heights",
+                                      .most_bytes = kMostTableBytes,
+                                      .streams = true});
+  if (!file) return file.error();
   Study study;
   study.name = "from " + path;
   study.options = options;
   study.boundaries.push_back(0);
-  std::string line;
-  for (int number = 1; std::getline(file, line); ++number) {
+  for (std::string_view line; file->next(line);) {
+    const std::uint64_t number = file->line_number();
     line = line.substr(0, line.find('#'));
-    while (!line.empty() && (line.back() == ' ' || line.back() == '\r' || line.back() == '\t')) line.pop_back();
+    while (!line.empty() && (line.back() == ' ' || line.back() == '\r' || line.back() == '\t')) line.remove_suffix(1);
     if (line.empty()) continue;
     double millimetres = 0;
     if (const std::string wrong = read_number(line, 0, 2147, " mm", millimetres); !wrong.empty()) {
@@ -67,6 +70,7 @@ Result<Study> study_table(const SurfaceIndex& index, const Options& options, con
     }
     study.boundaries.push_back(height);
   }
+  if (!file->status()) return file->status().error();
   if (study.boundaries.size() < 2) return Error{Fault::kInput, fmt::format("{}: holds no layer; list their tops in mm", path)};
   study.evaluation = evaluate(index, study.boundaries, options);
   return study;

@@ -55,7 +55,7 @@ TEST(Summary, JsonHoldsWhatTheTextTells) {
   summary.parts[0].path = "p.stl";
   summary.parts[0].bounds = {{0, 0, 0}, {1'000'000, 2'000'000, 3'000'000}};
   summary.parts[0].notes = {{true, "one hole closed"}};
-  summary.warnings = {"first\nwarning", "second"};
+  summary.warnings = {{"volume", "first\nwarning"}, {"part-lost", "second", "part.stl", 7, 0.5}};
   const auto json = nlohmann::json::parse(summary.json());
   EXPECT_EQ(json["output"], "a \"b\"");
   EXPECT_EQ(json["layers_total"], 1'234'567);

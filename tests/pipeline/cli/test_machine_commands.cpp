@@ -118,14 +118,15 @@ TEST_F(MachineCommands, PreviewShowsALayerAtAStepOfASwath) {
 TEST_F(MachineCommands, WhatAJobCannotTellOrJetIsSaid) {
   const std::string nut = std::string(LAMINA_TEST_DIR) + "/corpus/parameter_quality_nut.stl ";
   expect_words(lamina("jet " + nut + "--machine jet1000 --layer 4 --core 0 --shell 1 -o " + at("shell")), {"layers"});
-  expect_words(lamina("jet " + nut + "--dpi 100 --layer 4 --core 0 --shell 0.2 -o " + at("thin")),
+  expect_words(lamina("jet " + nut + "--dpi 100 --layer 4 --core 0 --shell 0.2 --allow-empty -o " + at("thin")),
                {"dose.core: 0 without a shell", " 0 set"});
   const std::string words = lamina("verify " + at("shell"));
   expect_words(words, {"does not tell other movements nor powder", "ml of binder"});
   EXPECT_EQ(words.find("powder fed"), std::string::npos) << words;
   lamina("jet " + nut + "--machine hp45 --layer 4 -o " + at("hp45"));
   expect_words(lamina("verify " + at("hp45")), {" h, ", "powder fed"});
-  expect_words(lamina("jet " + nut + "--machine hp45 --layer 4 --core 0 -o " + at("none")), {"dose.core: 0 without a shell"});
+  expect_words(lamina("jet " + nut + "--machine hp45 --layer 4 --core 0 --allow-empty -o " + at("none")),
+               {"dose.core: 0 without a shell"});
   expect_words(lamina("jet " + nut + "--machine hp45 --layer 4 --scale 20 -o " + at("large"), 2),
                {"use another machine or a smaller --scale"});
   expect_words(lamina("extrude " + nut + "--scale 20 -o " + at("large.gcode"), 2),

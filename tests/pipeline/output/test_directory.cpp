@@ -19,13 +19,13 @@ struct LoadingMeanwhile : testing::Test {
     std::filesystem::create_directories(job.output + "/layers");
   }
   std::string refusal() {
-    const Status status = prepare_output(job);
-    return status ? "" : status.error().message;
+    const auto claim = prepare_output(job);
+    return claim ? "" : claim.error().message;
   }
 };
 
 TEST_F(LoadingMeanwhile, AShardThatIsWritingKeepsItsDirectoryEvenFromOverwrite) {
-  const auto shard = write::File::open(job.output + "/manifest-1-of-2.json", {.lock = true});
+  const auto shard = write::File::open(job.output + "/manifest-1-of-2.json", {.keep_part = true});
   ASSERT_TRUE(shard.ok());
   EXPECT_NE(refusal(), "");
   job.overwrite = true;

@@ -175,9 +175,10 @@ TEST_F(PorousJob, PorosityOfTheBitmapIsThatOfThePlanWithinThePixelsOfItsEdges) {
   job.segment.all.on = true;
   job.segment.all.thin_width_mm = 0.15;
   const PixelGrid grid = pipeline::resolve_powder_printer(job)->grid;
-  for (const auto& [ends, pattern] : {std::pair{raster::BeadEnds::kRound, infill::Pattern::kRaster},
-                                      {raster::BeadEnds::kSquare, infill::Pattern::kRaster},
-                                      {raster::BeadEnds::kRound, infill::Pattern::kContour}}) {
+  for (const auto& [bead_ends, pattern] : {std::pair{raster::BeadEnds::kRound, infill::Pattern::kRaster},
+                                           {raster::BeadEnds::kSquare, infill::Pattern::kRaster},
+                                           {raster::BeadEnds::kRound, infill::Pattern::kContour}}) {
+    const raster::BeadEnds ends = bead_ends;
     job.dose.bead_ends = ends;
     job.fill.all.pattern = pattern;
     job.fill.all.walls = ends == raster::BeadEnds::kRound ? 1 : 0;

@@ -300,9 +300,10 @@ TEST_F(PrintJobs, LayersThatEndBetweenStepsOfTheBuildVatAreTold) {
   summary = run(made);
   ASSERT_TRUE(summary.ok()) << summary.error().message;
   ASSERT_EQ(summary->warnings.size(), 1u);
-  EXPECT_NE(summary->warnings[0].find("first 0, end beside the 0.005 mm steps of nuferbj's build vat, by up to 0.002 mm"),
+  EXPECT_EQ(summary->warnings[0].code, "build-steps");
+  EXPECT_NE(summary->warnings[0].text.find("first 0, end beside the 0.005 mm steps of nuferbj's build vat, by up to 0.002 mm"),
             std::string::npos)
-      << summary->warnings[0];
+      << summary->warnings[0].text;
 }
 
 }  // namespace

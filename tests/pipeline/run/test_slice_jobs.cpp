@@ -123,6 +123,11 @@ TEST(SliceProgram, AnEarlierJobIsNotReplacedUnasked) {
   over.push_back("--overwrite");
   EXPECT_EQ(run_lamina(over, directory.path()).code, 0);
   EXPECT_EQ(tree_text(directory.path() / "out"), before);
+  // Nothing of a job of another name stays beside the one that replaces it.
+  over[1] = corpus("dental_crown.stl");
+  EXPECT_EQ(run_lamina(over, directory.path()).code, 0);
+  EXPECT_FALSE(std::filesystem::exists(directory / "out/parameter_quality_nut.svg"));
+  EXPECT_TRUE(std::filesystem::exists(directory / "out/dental_crown.svg"));
 }
 
 TEST(SliceProgram, NothingThatSomebodyElseWroteIsReplaced) {
@@ -320,8 +325,8 @@ TEST(SliceProgram, SvgHasOnePathForEachOuterContourWithItsHoles) {
 TEST(SliceProgram, AnOffsetThatLeavesNothingIsSaid) {
   const Directory directory;
   write_box(directory / "post.stl", {0, 0, 0}, {20, 3, 5});
-  const Outcome outcome =
-      run_lamina({"slice", "post.stl", "--layer", "1", "--offset", "-1.6", "-o", "out", "--json"}, directory.path());
+  const Outcome outcome = run_lamina(
+      {"slice", "post.stl", "--layer", "1", "--offset", "-1.6", "--allow-empty", "-o", "out", "--json"}, directory.path());
   EXPECT_EQ(outcome.code, 0);
   EXPECT_NE(outcome.err.find("--offset -1.6 leaves nothing of 5 of 5 layers, first layer 0"), std::string::npos) << outcome.err;
   EXPECT_EQ(nlohmann::json::parse(outcome.out)["emptied_layers"], 5);

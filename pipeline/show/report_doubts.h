@@ -1,0 +1,36 @@
+// pipeline/show/report_doubts.h: the sanity pass of a finished job, from its files.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "pipeline/job/job.h"
+#include "pipeline/plan/scene.h"
+#include "stages/data/runs.h"
+#include "stages/data/status.h"
+#include "stages/sanity/tally.h"
+#include "stages/write/manifest/manifest.h"
+
+namespace lamina::pipeline {
+
+class ReportDoubts {
+ public:
+  /// scene  the parts; null: their boxes as the manifest has them, without volumes. The manifest must outlive this object.
+  ReportDoubts(const Manifest& manifest, const Job& job, const Scene* scene);
+
+  /// An image as in its file; from many threads at once.
+  void look(const Layer& layer, const RunsView& image);
+
+  /// set  pixels of each layer. returns  none for a job of some layers only
+  std::vector<Warning> tell(const std::vector<std::uint64_t>& set) const;
+
+ private:
+  const Manifest& manifest_;
+  Job job_;
+  std::unique_ptr<sanity::Tally> tally_;
+  std::vector<std::uint8_t> crossed_;  // by layer: whether it may not be empty
+};
+
+}  // namespace lamina::pipeline
