@@ -8,9 +8,9 @@
 #include <cstring>
 #include <ctime>
 
-#include "pipeline/cli/terminal.h"
 #include "stages/data/text/json.h"
 #include "stages/data/text/json_text.h"
+#include "stages/data/text/terminal.h"
 #include "stages/write/file.h"
 #include "stages/write/leftovers.h"
 
@@ -41,7 +41,7 @@ constexpr itimerspec kPatience{{0, 0}, {0, 800'000'000}};
 /// Ends a program that works on in spite of a signal, within a layer or a library. Finished layers are on record, and files
 /// have their names only once they are whole.
 void on_patience(int) {
-  constexpr std::string_view kLine = "lamina: interrupted; finished layers are kept, run again with --resume to go on\n";
+  constexpr std::string_view kLine = "lamina: interrupted; layers on record stay for --resume\n";
   if (::write(STDERR_FILENO, kLine.data(), kLine.size()) < 0) end();
   end();
 }

@@ -6,7 +6,7 @@
 #include <string>
 #include <string_view>
 
-#include "pipeline/cli/terminal.h"
+#include "stages/data/text/terminal.h"
 
 namespace lamina::pipeline {
 

@@ -105,8 +105,11 @@ Result<write::Claim> prepare_slice_directory(const Job& job) {
   if (Status status = check_stays_inside(job.output); !status) return status.error();
   const fs::path waiting = waiting_layers(job);
   std::error_code error;
-  fs::remove_all(waiting, error);  // of a run that was killed; a link goes, not what it leads to
-  if (!error && job.slice.file_a_layer && !fs::create_directory(waiting, error) && !error) {
+  // Of a run that was killed; a link goes, not what it leads to.
+  std::error_code absent;
+  const bool stays = job.resume && job.slice.file_a_layer && fs::is_directory(fs::symlink_status(waiting, absent));
+  if (!stays) fs::remove_all(waiting, error);
+  if (!error && !stays && job.slice.file_a_layer && !fs::create_directory(waiting, error) && !error) {
     error = std::make_error_code(std::errc::file_exists);
   }
   if (error) return cannot(waiting, error);
@@ -130,7 +133,7 @@ std::optional<fs::path> other_slice_file(const Job& job) {
 
 Status replace_earlier_slices(const Job& job) {
   std::error_code error;
-  if (job.overwrite) {
+  if (job.overwrite || (job.resume && fs::exists(fs::path(job.output) / "manifest.json"))) {
     std::vector<fs::path> earlier = layer_files(job);
     if (auto other = other_slice_file(job)) earlier.push_back(std::move(*other));
     for (const char* name : {"manifest.json", "job.toml"}) earlier.push_back(fs::path(job.output) / name);

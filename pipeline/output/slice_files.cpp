@@ -10,6 +10,8 @@
 #include "pipeline/output/slice_directory.h"
 #include "stages/data/text/version.h"
 #include "stages/write/file.h"
+#include "stages/write/file_target.h"
+#include "stages/write/manifest/kept.h"
 
 namespace lamina::pipeline {
 
@@ -31,7 +33,7 @@ SliceFiles::SliceFiles(const Plan& plan) : plan_(plan), file_a_layer_(plan.job.s
 }
 
 SliceFiles::~SliceFiles() {
-  if (manifest_ && file_a_layer_ && !finished_) remove_waiting_layers(plan_.job);
+  if (manifest_ && file_a_layer_ && !finished_ && !waits_) remove_waiting_layers(plan_.job);
 }
 
 std::string SliceFiles::output() const {
@@ -66,6 +68,7 @@ Status SliceFiles::open() {
   }
   ManifestWriter::Options options{job.sync};
   if (file_a_layer_) {
+    if (Status status = find_kept(head); !status) return status;
     const std::string waiting = waiting_layers(job).string();
     sync_ = write::FolderSync::of({waiting});
     options.sync_layers = [waiting] {
@@ -73,10 +76,27 @@ Status SliceFiles::open() {
       return reason == 0 ? Status() : Status(write::write_failure(waiting, reason));
     };
   }
-  auto manifest = ManifestWriter::open(manifest_path, head, {}, options, std::move(*claim));
+  auto manifest = ManifestWriter::open(manifest_path, head, kept_, options, std::move(*claim));
   if (!manifest) return manifest.error();
   manifest_.emplace(std::move(*manifest));
   return {};
+}
+
+/// Files a layer wait beside the begun manifest until all are there.
+Status SliceFiles::find_kept(const ManifestHead& head) {
+  const std::string begun = write::part_of(plan_.job.output + "/manifest.json");
+  if (!plan_.job.resume || !has_manifest_head(begun)) return {};
+  const auto earlier = read_manifest(begun);
+  if (!earlier) return earlier.error();
+  if (Status status = check_same_job(begun, *earlier, head); !status) return status;
+  kept_ = records_with_files(waiting_layers(plan_.job).string(), *earlier);
+  for (const LayerRecord& record : kept_) bytes_ += record.bytes;
+  return {};
+}
+
+Status SliceFiles::keep() {
+  waits_ = true;
+  return file_ ? file_->keep() : manifest_->flush();
 }
 
 Sections::TextBytes SliceFiles::text_bytes() const {

@@ -26,8 +26,8 @@ class SliceFiles {
 
   /// errors  kUsage, kOutput
   Status open();
-  /// The single file, with its finished layers; null for other kinds.
-  const LayeredFile* file() const { return file_ ? &*file_ : nullptr; }
+  /// The finished layers of an interrupted job, from the first on.
+  const std::vector<LayerRecord>& kept() const { return file_ ? file_->kept() : kept_; }
   /// The output path for the summary.
   std::string output() const;
   /// Bytes of text for points and paths.
@@ -42,12 +42,13 @@ class SliceFiles {
   Status record(const write::SliceLayer& layer, const Buffer<char>& text, LayerRecord& record);
   /// returns  the bytes of all files
   Result<std::uint64_t> finish();
-  Status keep() { return file_ ? file_->keep() : Status(); }
+  Status keep();
   void discard();
   /// Whether an interrupted job can be resumed.
-  bool keeps() const { return file_.has_value(); }
+  bool keeps() const { return file_.has_value() || (file_a_layer_ && encoder_); }
 
  private:
+  Status find_kept(const ManifestHead& head);
   Status save_plan() const;
   Result<FileDigest> finish_package();
 
@@ -59,8 +60,9 @@ class SliceFiles {
   std::optional<LayeredFile> file_;               // of one text file
   std::optional<ManifestWriter> manifest_;        // of all others
   std::optional<write::FolderSync> sync_;         // of files a layer
+  std::vector<LayerRecord> kept_;                 // of files a layer
   std::uint64_t bytes_ = 0;
-  bool finished_ = false;
+  bool finished_ = false, waits_ = false;  // waits: files a layer stay where --resume finds them
 };
 
 }  // namespace lamina::pipeline

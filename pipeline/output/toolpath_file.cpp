@@ -16,6 +16,7 @@
 #include "stages/heights/evaluate.h"
 #include "stages/read/profiles/extruder.h"
 #include "stages/write/file.h"
+#include "stages/write/replaceable.h"
 #include "stages/write/rp3/rp3.h"
 
 namespace lamina::pipeline {
@@ -27,12 +28,6 @@ std::string manifest_path(const Job& job) { return job.output + ".json"; }
 
 /// The layer table of a toolpath file.
 std::string table_path(const Job& job) { return fs::path(job.output).replace_extension(".rp3").string(); }
-
-bool streams(const Job& job) {
-  std::error_code error;
-  const fs::file_status status = fs::status(job.output, error);
-  return job.output == "-" || (fs::exists(status) && !fs::is_regular_file(status) && !fs::is_directory(status));
-}
 
 std::string source_text(const Plan& plan) {
   std::string text;
@@ -84,7 +79,7 @@ Status check_toolpath_output(const Job& job, const Extruder& machine) {
     return Error{Fault::kUsage, fmt::format("-o {}: is a directory; name a file in it, as in {}", job.output,
                                             (fs::path(job.output) / "part.gcode").string())};
   }
-  if (streams(job)) {
+  if (write::is_stream(job.output)) {
     if (!job.resume && !sml) return {};
     return Error{Fault::kUsage, fmt::format("-o {}: is no file, which {} needs; name one", job.output,
                                             sml ? "the layer table beside an SML file" : "--resume")};
@@ -118,8 +113,9 @@ Status ToolpathFile::open() {
   head.machine_profile = hash_bytes(std::as_bytes(std::span(profile)));
   Buffer<char> start;
   format_->head({fmt::format("lamina {}", version()), source_text(plan_), layers(), plan_.segments->any()}, start);
-  auto file = LayeredFile::open({job.output, manifest_path(job), job.resume, job.overwrite, job.sync, streams(job)}, head,
-                                {start.data(), start.size()});
+  auto file =
+      LayeredFile::open({job.output, manifest_path(job), job.resume, job.overwrite, job.sync, write::is_stream(job.output)},
+                        head, {start.data(), start.size()});
   if (!file) return file.error();
   file_.emplace(std::move(*file));
   return {};

@@ -23,13 +23,10 @@ class ContourMaker : public Maker {
   Result<std::vector<std::uint32_t>> open() override {
     if (Status status = files_.open(); !status) return status.error();
     std::vector<std::uint32_t> todo;
-    const std::size_t stand = files_.file() == nullptr ? 0 : files_.file()->kept().size();
-    for (auto i = plan_.range[0] + static_cast<std::uint32_t>(stand); i < plan_.range[1]; ++i) todo.push_back(i);
+    for (auto i = plan_.range[0] + static_cast<std::uint32_t>(files_.kept().size()); i < plan_.range[1]; ++i) todo.push_back(i);
     return todo;
   }
-  std::vector<LayerRecord> kept() const override {
-    return files_.file() == nullptr ? std::vector<LayerRecord>() : files_.file()->kept();
-  }
+  std::vector<LayerRecord> kept() const override { return files_.kept(); }
 
   std::vector<MakerStep> steps() override {
     const Sections& sections = *plan_.sections;
@@ -92,8 +89,9 @@ class ContourMaker : public Maker {
     bytes_written_ = *bytes;
     return {};
   }
+  bool keeps() const override { return files_.keeps(); }
   Status stop(bool keep) override {
-    if (keep && files_.keeps()) return files_.keep();
+    if (keep) return files_.keep();
     files_.discard();
     return {};
   }
@@ -138,9 +136,8 @@ void ContourMaker::warn(const Summary& so_far, std::vector<Warning>& warnings) c
                         "no bead of the filling fits into the parts: they are narrower than walls and filling ask "
                         "for; give a smaller --bead"});
   }
-  if (plan_.job.resume && !files_.keeps()) {
-    warnings.push_back(
-        {"planned-again", "--resume: files of this kind are finished at the end only; all layers were planned again"});
+  if (plan_.job.resume && (!files_.keeps() || (plan_.job.slice.file_a_layer && files_.kept().empty()))) {
+    warnings.push_back({"planned-again", "--resume: no layer of an interrupted job was found; all were planned again"});
   }
 }
 

@@ -92,11 +92,12 @@ LayerSteps steps_of(Maker& maker, const std::vector<std::uint32_t>& todo, const 
 Error ended_early(Maker& maker, const Error& error, bool any_layer) {
   const bool interrupted = error.fault == Fault::kInterrupted;
   const bool kept = interrupted || error.fault == Fault::kOutput || error.fault == Fault::kMemory;
-  const bool keep = kept && (any_layer || !maker.records_from_work());
+  const bool keep = kept && maker.keeps() && (any_layer || !maker.records_from_work());
   if (Status stopped = maker.stop(keep); !stopped && interrupted) return stopped.error();
   if (interrupted) {
-    return {Fault::kInterrupted, keep ? "interrupted; finished layers are kept, run again with --resume to go on"
-                                      : "interrupted before the first layer; nothing was written"};
+    return {Fault::kInterrupted, keep        ? "interrupted; finished layers are kept, run again with --resume to go on"
+                                 : any_layer ? "interrupted; nothing of it is kept"
+                                             : "interrupted before the first layer; nothing was written"};
   }
   if (!keep) return error;
   return {error.fault, error.message + "; finished layers are kept, go on with --resume"};

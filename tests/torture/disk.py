@@ -53,12 +53,12 @@ def full(program, job, ref, folder, size_kb, tally):
     ran = program.run(job.begin, folder)
     judge(ran, job.begin, tally, job.name, job.ends)
     there = jobs.outputs(folder, job)
-    if "over an older job" not in job.name:
+    if not job.over:
         kill.check_whole(there, ref, tally, job.name)
     subprocess.run(["mount", "-o", f"remount,size={1 << 18}k", folder], check=True)
     on_disk = jobs.layer_files(set(there) & set(ref.files))
     ends = jobs.going_on_ends(job, jobs.outputs(folder, job), ref)
-    more = program.run(job.go_on, folder)
+    more = jobs.go_on(program, job, folder)
     if more.code != ends:
         tally.fault(job.name, "wrong", f"with room again: exit {more.code}: {more.error[-300:]}")
     elif job.counts_layers and "--resume" in job.go_on and ran.code == 4:
@@ -83,10 +83,10 @@ def limited(program, job, ref, folder, size_kb, tally):
 
     ran = program.run(job.begin, folder, preexec_fn=limit)
     judge(ran, job.begin, tally, job.name, job.ends)
-    if "over an older job" not in job.name:
+    if not job.over:
         kill.check_whole(jobs.outputs(folder, job), ref, tally, job.name)
     ends = jobs.going_on_ends(job, jobs.outputs(folder, job), ref)
-    more = program.run(job.go_on, folder)
+    more = jobs.go_on(program, job, folder)
     if more.code != ends:
         tally.fault(job.name, "wrong", f"without the limit: exit {more.code}: {more.error[-300:]}")
     kill.compare(jobs.outputs(folder, job), ref, tally, job.name)

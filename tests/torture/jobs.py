@@ -24,6 +24,7 @@ class Job:
     other: list = None         # another job of the same command and output
     before: list = dataclasses.field(default_factory=list)  # commands whose results the job reads
     unlike: tuple = ()         # names of files that hold times, so that two runs differ in them
+    over: bool = False         # an older job of another kind stands there at first
     counts_layers: bool = False  # its --json names the layers that a second run keeps
     ends: int = 0              # exit code of a whole run
     when_done: int = None      # exit code of going on with what is finished, if it is another one
@@ -36,10 +37,10 @@ def jet(name, arguments, other_part=NUT):
                other=["jet", other_part, *arguments[1:], *common], counts_layers=True)
 
 
-def over_another():
-    old = ["jet", NUT, "--dpi", "200", "--layer", "0.5", "-o", "out", "--quiet"]
-    new = ["jet", NIST, "--dpi", "300", "--layer", "0.1", "-o", "out", "--json"]
-    return Job("jet over an older job", [*new, "--overwrite"], [*new, "--overwrite"], before=[old])
+def over_another(name, old, new, out="out"):
+    """A run that replaces another job; killed, it goes on with --resume."""
+    new = [*new, "-o", out, "--json"]
+    return Job(name, [*new, "--overwrite"], [*new, "--resume"], before=[[*old, "-o", out, "--quiet"]], over=True)
 
 
 def again(name, arguments, other_part=NUT, out="out"):
@@ -107,7 +108,12 @@ def all_jobs():
         jet("jet, print program", [NUT, *nuferbj], CROWN),
         jet("jet, two materials", [NUT, CROWN, "--material", "steel,bronze", "--bed", "60x40", "--dpi", "600", "--layer", "0.05"], CROWN),
         jet("jet, segmented with shell", [NUT, *filled, "--bed", "60x60"], CROWN),
-        over_another(),
+        over_another("jet over an older job", ["jet", NUT, "--dpi", "200", "--layer", "0.5"],
+                     ["jet", NIST, "--dpi", "300", "--layer", "0.1"]),
+        over_another("slice over an older job", ["slice", NIST, "--layer", "0.5"], ["slice", NIST, *lines]),
+        over_another("extrude over an older job", ["extrude", CROWN, "--machine", "anet-a8", "--layer", "0.3"],
+                     ["extrude", NUT, "--machine", "anet-a8", "--layer", "0.3", "--fill", "segmented", "--scale", "2"],
+                     "out.gcode"),
         resumed("slice, svg with filling", ["slice", NIST, *lines]),
         resumed("slice, a file a layer", ["slice", NIST, "--layer", "0.1", "--file-a-layer"]),
         resumed("slice, cli-binary", ["slice", NIST, *lines, "--format", "cli-binary"]),
@@ -140,7 +146,7 @@ def tree(folder):
 
 def outputs(folder, job):
     """What the job wrote: `out`, `out.*` and whatever else lies there that none of its predecessors wrote."""
-    made = {word for words in (*job.before, *job.cut_short) for word in words} - {"out"}
+    made = {word for words in (*job.before, *job.cut_short) for word in words} - {"out", "out.gcode"}
     return {name: value for name, value in tree(folder).items()
             if name.split(os.sep)[0] not in made and os.path.basename(name) not in job.unlike}
 
@@ -192,6 +198,12 @@ class Program:
         except subprocess.TimeoutExpired:
             process.send_signal(signal)
         return self.end(process, since)
+
+
+def go_on(program, job, folder):
+    """The run after one that ended early. What ended before it replaced an older job leaves that, which --resume refuses."""
+    ran = program.run(job.go_on, folder)
+    return program.run(job.begin, folder) if job.over and ran.code == 2 else ran
 
 
 def fresh(folder):

@@ -39,13 +39,13 @@ def one_trial(program, job, ref, folder, tally, draw):
         ends = jobs.going_on_ends(job, jobs.outputs(folder, job), ref)
         kills += cut(program, words, folder, ref, tally, job.name, draw, ends)
         # Over an older job its files may still stand there.
-        if "over an older job" not in job.name:
+        if not job.over:
             check_whole(jobs.outputs(folder, job), ref, tally, job.name)
-        words = job.go_on
+        words = job.begin if job.over else job.go_on
     on_disk = jobs.layer_files(set(jobs.outputs(folder, job)) & set(ref.files))
     a_layer = max(1, round(jobs.layer_files(ref.files) / max(1, total_layers(ref))))
     ends = jobs.going_on_ends(job, jobs.outputs(folder, job), ref)
-    ran = program.run(job.go_on, folder)
+    ran = jobs.go_on(program, job, folder)
     finished = ran.code == ends
     if ran.code is None:
         tally.fault(job.name, "hangs", " ".join(job.go_on))

@@ -27,14 +27,14 @@ def one_trial(program, job, ref, number, folder, tally, draw):
     elif ran.code not in (job.ends, 130, -number):
         tally.fault(name, "aborts" if ran.aborted else "wrong", f"{job.name}: exit {ran.code}: {ran.error[-300:]}")
     there = jobs.outputs(folder, job)
-    if "over an older job" not in job.name:
+    if not job.over:
         kill.check_whole(there, ref, tally, name)
     if ran.code == 130:
         strays = [path for path in there if path not in ref.files and not may_stay(path, job)]
         if strays:
             tally.fault(name, "left", f"{job.name}: {', '.join(strays[:3])}")
     ends = jobs.going_on_ends(job, there, ref)
-    more = program.run(job.go_on, folder)
+    more = jobs.go_on(program, job, folder)
     if more.code != ends:
         tally.fault(name, "wrong", f"{job.name}, then: exit {more.code}: {more.error[-300:]}")
     kill.compare(jobs.outputs(folder, job), ref, tally, name)

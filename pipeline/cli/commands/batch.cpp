@@ -11,7 +11,6 @@
 #include "pipeline/batch/summary.h"
 #include "pipeline/cli/command.h"
 #include "pipeline/cli/console.h"
-#include "pipeline/cli/terminal.h"
 #include "pipeline/job/file.h"
 #include "pipeline/job/keys.h"
 #include "stages/data/input/file_reader.h"
@@ -19,6 +18,7 @@
 #include "stages/data/text/number_text.h"
 #include "stages/data/text/readable.h"
 #include "stages/data/text/shell_words.h"
+#include "stages/data/text/terminal.h"
 #include "stages/write/file.h"
 #include "stages/write/leftovers.h"
 

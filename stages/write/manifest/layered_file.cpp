@@ -12,6 +12,8 @@
 #include "stages/data/input/digest_range.h"
 #include "stages/write/file.h"
 #include "stages/write/file_target.h"
+#include "stages/write/leftovers.h"
+#include "stages/write/manifest/kept.h"
 
 namespace lamina {
 namespace {
@@ -33,34 +35,6 @@ class Hasher {
  private:
   std::unique_ptr<XXH3_state_t, decltype(&XXH3_freeState)> state_{XXH3_createState(), &XXH3_freeState};
 };
-
-/// Refuses records of another job. errors  kUsage
-Status check_same_job(const std::string& path, const Manifest& manifest, const ManifestHead& head) {
-  const std::string what = difference(head, manifest.head);
-  if (manifest.head.id() != head.id()) {
-    return Error{Fault::kUsage, fmt::format("{}: belongs to another job ({}); name another file, or use --overwrite", path,
-                                            what.empty() ? "its parts or keys differ" : what)};
-  }
-  if (manifest.head.first_layer == head.first_layer && manifest.head.last_layer == head.last_layer) return {};
-  return Error{Fault::kUsage, fmt::format("{}: is of layers {}:{}; resume with the same --layers, or use --overwrite", path,
-                                          manifest.head.first_layer, manifest.head.last_layer)};
-}
-
-/// The records, from the first on, whose bytes are in the file; none if it does not begin with `start`.
-std::vector<LayerRecord> records_that_hold(const std::string& path, const std::vector<LayerRecord>& recorded,
-                                           std::string_view start) {
-  std::vector<LayerRecord> kept;
-  const auto file = FileReader::open(path, {});
-  std::string bytes(start.size(), '\0');
-  if (!file || !file->read_at(0, bytes) || bytes != start) return kept;
-  std::uint64_t end = start.size();
-  for (const LayerRecord& record : recorded) {
-    if (record.offset != end || digest_range(*file, record.offset, record.bytes) != record.hash) break;
-    end += record.bytes;
-    kept.push_back(record);
-  }
-  return kept;
-}
 
 }  // namespace
 
@@ -109,24 +83,31 @@ LayeredFile::~LayeredFile() = default;
 
 namespace {
 
-/// What a resumed job keeps, read into the state: all of a finished file, or the first records of a begun one.
-Status find_kept(LayeredFile::Options& options, const ManifestHead& head, std::string_view start, const std::string& target,
-                 std::vector<LayerRecord>& kept, std::uint64_t& whole_size) {
-  const std::string part = write::part_of(options.manifest);
-  const bool whole = is_there(target) && is_there(options.manifest);
-  if (!options.resume || (!whole && !has_manifest_head(part))) return {};
-  const std::string& recorded = whole ? options.manifest : part;
-  auto earlier = read_manifest(recorded);
-  if (!earlier) return earlier.error();
-  if (Status status = check_same_job(recorded, *earlier, head); !status) return status;
-  if (!whole) {
-    if (is_there(write::part_of(target))) kept = records_that_hold(write::part_of(target), earlier->layers, start);
-    return {};
+/// What a resumed job keeps, read into the state: all of a finished file, or the first records of a begun one. A begun file
+/// may stand beside a finished one of another job, which it was to replace.
+Status find_kept(const LayeredFile::Options& options, const ManifestHead& head, std::string_view start,
+                 const std::string& target, std::vector<LayerRecord>& kept, std::uint64_t& whole_size) {
+  if (!options.resume) return {};
+  const std::string begun_file = write::part_of(target), begun_record = write::part_of(options.manifest);
+  const bool begun = has_manifest_head(begun_record);
+  if (is_there(target) && is_there(options.manifest)) {
+    auto finished = read_manifest(options.manifest);
+    if (!finished && !begun) return finished.error();
+    const Status same = finished ? check_same_job(options.manifest, *finished, head) : Status(finished.error());
+    if (!same && !begun) return same;
+    const auto digest = same ? digest_file(target) : Result<FileDigest>(same.error());
+    if (digest && digest->hash == finished->file.hash) {
+      for (const std::string& left : {begun_file, begun_record}) write::remove_or_note(left);
+      kept = std::move(finished->layers);
+      whole_size = digest->bytes;
+      return {};
+    }
   }
-  const auto digest = digest_file(target);
-  if (!digest || digest->hash != earlier->file.hash) return {};
-  kept = std::move(earlier->layers);
-  whole_size = digest->bytes;
+  if (!begun) return {};
+  auto earlier = read_manifest(begun_record);
+  if (!earlier) return earlier.error();
+  if (Status status = check_same_job(begun_record, *earlier, head); !status) return status;
+  if (is_there(begun_file)) kept = records_that_hold(begun_file, earlier->layers, start);
   return {};
 }
 

@@ -1,4 +1,4 @@
-// pipeline/cli/terminal.h: the terminal at stderr, and a status line on it.
+// stages/data/text/terminal.h: the terminal at stderr, and a status line on it.
 //
 // Functions return the text to draw and write nothing. cost  a system call for the terminal, none for the text
 #pragma once
@@ -6,7 +6,7 @@
 #include <string>
 #include <string_view>
 
-namespace lamina::pipeline {
+namespace lamina {
 
 /// Whether stderr is a terminal.
 bool is_terminal();
@@ -29,4 +29,4 @@ class StatusLine {
   bool drawn_ = false;
 };
 
-}  // namespace lamina::pipeline
+}  // namespace lamina

@@ -1,8 +1,8 @@
 #include <gtest/gtest.h>
 
-#include "pipeline/cli/terminal.h"
+#include "stages/data/text/terminal.h"
 
-namespace lamina::pipeline {
+namespace lamina {
 namespace {
 
 TEST(Terminal, BarsFitBesideTheirText) {
@@ -21,4 +21,4 @@ TEST(Terminal, ALineIsDrawnAgainAndTakenAwayOnce) {
 }
 
 }  // namespace
-}  // namespace lamina::pipeline
+}  // namespace lamina

@@ -1,4 +1,4 @@
-#include "pipeline/cli/terminal.h"
+#include "stages/data/text/terminal.h"
 
 #include <fmt/format.h>
 #include <sys/ioctl.h>
@@ -7,7 +7,7 @@
 #include <algorithm>
 #include <utility>
 
-namespace lamina::pipeline {
+namespace lamina {
 namespace {
 
 constexpr std::string_view kBegin = "\r\x1b[K";  // of the line, with nothing on it
@@ -36,4 +36,4 @@ std::string StatusLine::draw(std::string_view line, int columns) {
 
 std::string StatusLine::clear() { return std::string(std::exchange(drawn_, false) ? kBegin : ""); }
 
-}  // namespace lamina::pipeline
+}  // namespace lamina
