@@ -100,6 +100,18 @@ TEST_F(FileReaders, OnlyRegularFilesAreOpenedAndPipesByRequest) {
   ::close(ends[0]);
 }
 
+TEST_F(FileReaders, AStreamEndsAtItsBound) {
+  int ends[2];
+  ASSERT_EQ(::pipe(ends), 0);
+  ASSERT_EQ(::write(ends[1], "a\nb\n", 4), 4);
+  ::close(ends[1]);
+  auto stream = FileReader::open("/dev/fd/" + std::to_string(ends[0]), {.most_bytes = 3, .streams = true});
+  ASSERT_TRUE(stream.ok());
+  EXPECT_FALSE(stream->text());
+  EXPECT_FALSE(stream->status());
+  ::close(ends[0]);
+}
+
 TEST_F(FileReaders, PlacesAndStretches) {
   test::write_text(directory_ / "file", "one\ntwo\nthree\n");
   auto file = FileReader::open(directory_ / "file", {});
