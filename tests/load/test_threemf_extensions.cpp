@@ -172,6 +172,13 @@ TEST(Read3mfExtensions, AnObjectInsideOutIsTurnedOverAndNamed) {
   EXPECT_EQ(placed(part), placed(expected));
   EXPECT_CONTAINS(notes_of(part), "object 7 \"cube\" is inside out and is turned over");
   EXPECT_TRUE(expected.notes.empty()) << "mirrored items are not inside out";
+  const std::string told = notes_of(loaded(written(model(box, item(7) + item(7, "0 1 0 -1 0 0 0 0 1 0 50 0")))));
+  EXPECT_EQ(told.find("inside out"), told.rfind("inside out")) << "once, whichever way it stands: " << told;
+  load::LoadOptions as_it_is;
+  as_it_is.repair = false;
+  const Part unturned = loaded(written(model(box, item(7))), as_it_is);
+  EXPECT_LT(unturned.meshes[0].volume_mm3, 0);
+  EXPECT_TRUE(unturned.notes.empty()) << notes_of(unturned);
 }
 
 TEST(Read3mfExtensions, AHundredThousandItemsTakeASecond) {

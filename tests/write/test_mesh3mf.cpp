@@ -88,11 +88,25 @@ TEST_F(Mesh3mf, PackagesBeginWithTheirTypesAndHaveARealDate) {
   EXPECT_EQ(zipped.find("PK\x06\x06"), std::string::npos);
 }
 
+TEST_F(Mesh3mf, TheDateIsThatOfReproducibleBuilds) {
+  const auto date = [](int year, int month, int day, int hour, int minute, int second) {
+    return static_cast<ZipDate>(year - 1980) << 25 |
+           static_cast<ZipDate>(month << 21 | day << 16 | hour << 11 | minute << 5 | second / 2);
+  };
+  EXPECT_EQ(*zip_date(nullptr), date(1980, 1, 1, 0, 0, 0));
+  EXPECT_EQ(*zip_date(""), kFirstZipDate);
+  EXPECT_EQ(*zip_date("1709251199"), date(2024, 2, 29, 23, 59, 58)) << "date -u -d @1709251199";
+  EXPECT_EQ(*zip_date("0"), kFirstZipDate) << "before what a ZIP file knows";
+  EXPECT_EQ(*zip_date("99999999999"), date(2107, 12, 31, 23, 59, 58)) << "behind it";
+  EXPECT_FALSE(zip_date("yesterday").ok());
+  EXPECT_FALSE(zip_date("12x").ok());
+}
+
 TEST_F(Mesh3mf, LargeFilesAreZip64) {
   const std::string text(300'000, 'x');
   {
     auto file = File::open(path_);
-    ZipWriter zip(*file, 200);
+    ZipWriter zip(*file, kFirstZipDate, 200);
     for (const char* name : {"one", "two"}) {
       std::vector<Deflated> pieces(2);
       for (Deflated& piece : pieces) ASSERT_TRUE(deflate_onto(piece, text).ok());

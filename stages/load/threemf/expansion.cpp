@@ -6,6 +6,8 @@
 #include <utility>
 
 #include "stages/load/matrix.h"
+#include "stages/load/text.h"
+#include "stages/load/threemf/cavities.h"
 #include "stages/load/threemf/extensions.h"
 
 namespace lamina::load {
@@ -90,11 +92,18 @@ struct Expansion {
   const Source& source;
   const ModelPackage& package;
   std::vector<Leaf> leaves;
-  std::uint64_t supports = 0, others = 0;
+  std::uint64_t supports = 0, others = 0, modifiers = 0;
+  std::uint32_t item = 0;
   std::vector<bool> told;  // of objects
 
-  Status add(std::uint32_t index, const Transform& transform, std::vector<Note>& notes) {
+  Status add(const ObjectReference& reference, const Transform& transform, std::vector<Note>& notes) {
+    const std::uint32_t index = reference.object;
     const ModelObject& object = package.objects[index];
+    if (reference.role == Role::kNegative || object.role == Role::kNegative) return negative(object, "is");
+    if (reference.role == Role::kModifier || object.role == Role::kModifier) {
+      ++modifiers;
+      return {};
+    }
     const bool is_mesh = object.components.empty();  // the type of others is that of their components
     if (is_mesh && object.type != ModelObject::Type::kModel) {
       ++(object.type == ModelObject::Type::kSupport ? supports : others);
@@ -102,6 +111,10 @@ struct Expansion {
     }
     if (!told[index]) {
       if (const Status fits = check_content(source, package, object); !fits) return fits;
+      for (const Volume& volume : object.volumes) {
+        if (volume.role == Role::kNegative)
+          return negative(object, fmt::format("has {},", quoted(std::string_view(volume.name))));
+      }
       tell(object, notes);
       told[index] = true;
     }
@@ -109,15 +122,28 @@ struct Expansion {
     if (!object.triangles.empty()) {
       Transform scaled;
       scaled.linear = {unit, 0, 0, 0, unit, 0, 0, 0, unit};
-      leaves.push_back({index, after(transform, scaled)});
+      leaves.push_back({index, after(transform, scaled), item});
     }
     for (const ObjectReference& component : object.components) {
-      if (const Status added = add(component.object, after(transform, component.transform), notes); !added) return added;
+      if (const Status added = add(component, after(transform, component.transform), notes); !added) return added;
     }
     return {};
   }
 
+  Status negative(const ModelObject& object, std::string_view is) const {
+    return source.error(
+        fmt::format("{} {} a negative volume that takes material away, which lamina does not; export it as STL "
+                    "from the program that wrote it, which cuts it out",
+                    package.label(object), is));
+  }
+
   void tell(const ModelObject& object, std::vector<Note>& notes) const {
+    const auto count = std::count_if(object.volumes.begin(), object.volumes.end(),
+                                     [](const Volume& volume) { return volume.role == Role::kModifier; });
+    if (count > 0)
+      notes.push_back(
+          {false, fmt::format("{}: {} of its volumes, such as {}, are modifiers or support blockers and are not planned",
+                              package.label(object), count, quoted(std::string_view(object.volumes.front().name)))});
     if (object.beams > 0)
       notes.push_back(
           {false, fmt::format("{}: {} beams of a lattice, which the file does not require, are not planned; its mesh is",
@@ -156,19 +182,22 @@ Status resolve_references(const Source& source, ModelPackage& package, std::uint
 }
 
 Result<std::vector<Leaf>> expand_build(const Source& source, const ModelPackage& package, std::vector<Note>& notes) {
-  Expansion expansion{source, package, {}, 0, 0, std::vector<bool>(package.objects.size())};
+  Expansion expansion{source, package, {}, 0, 0, 0, 0, std::vector<bool>(package.objects.size())};
   for (const ObjectReference& item : package.items) {
     const ModelObject& object = package.objects[item.object];
     if (object.type == ModelObject::Type::kOther && object.components.empty())
       return source.error(fmt::format("the build names {}, which is of type \"other\", as 3MF forbids; export it again",
                                       package.label(object)));
-    if (const Status added = expansion.add(item.object, item.transform, notes); !added) return added.error();
+    if (const Status added = expansion.add(item, item.transform, notes); !added) return added.error();
+    ++expansion.item;
   }
   const auto left_out = [&](std::uint64_t count, const char* what) {
     if (count > 0) notes.push_back({false, fmt::format("{} objects are {} and are not planned", count, what)});
   };
   left_out(expansion.supports, "supports or surfaces");
+  left_out(expansion.modifiers, "modifiers or support blockers of the program that wrote them");
   left_out(expansion.others, "of type \"other\" (modifiers, say)");
+  find_cavities(package, expansion.leaves);
   return std::move(expansion.leaves);
 }
 

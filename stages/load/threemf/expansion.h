@@ -16,6 +16,9 @@ inline constexpr std::uint32_t kDeepestComponents = 1000;
 struct Leaf {
   std::uint32_t object;
   Transform transform;
+  std::uint32_t item = 0;            // of the build, from 0
+  std::uint32_t container = kSolid;  // the leaf in which it is a void
+  static constexpr std::uint32_t kSolid = UINT32_MAX;
 };
 
 /// Finds the objects that build items and components name, and what all of it comes to, before anything is expanded.
@@ -26,9 +29,9 @@ struct Leaf {
 /// cost    linear in components
 Status resolve_references(const Source& source, ModelPackage& package, std::uint64_t triangle_limit);
 
-/// The meshes of the build in its order. Supports, surfaces and objects of type "other" are left out, with a note.
+/// The meshes of the build in its order. Supports, surfaces, modifiers and objects of type "other" are left out, with a note.
 ///
-/// errors  kInput: a build item of type "other"; what only an extension could make a solid of
+/// errors  kInput: a build item of type "other"; what only an extension could make a solid of; what takes material away
 Result<std::vector<Leaf>> expand_build(const Source& source, const ModelPackage& package, std::vector<Note>& notes);
 
 }  // namespace lamina::load

@@ -65,6 +65,11 @@ std::string_view extension_remedy(std::string_view space) {
   return row == nullptr || row->remedy.empty() ? "export it without this extension" : row->remedy;
 }
 
+/// That of the extension's first version; there is no other yet.
+bool is_material(std::string_view space) { return space == "http://schemas.microsoft.com/3dmanufacturing/material/2015/02"; }
+
+bool is_slic3r(std::string_view space) { return space.starts_with("http://schemas.slic3r.org/"); }
+
 bool is_core_too(std::string_view space) {
   return space == kCoreNamespace || space == "http://schemas.microsoft.com/3dmanufacturing/2013/01" ||
          space.starts_with("http://software.ultimaker.com/xml/cura/3mf/");

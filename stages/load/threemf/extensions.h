@@ -27,6 +27,9 @@ std::string extension_name(std::string_view space);
 /// What to do about a file that needs it.
 std::string_view extension_remedy(std::string_view space);
 
+bool is_material(std::string_view space);
+bool is_slic3r(std::string_view space);
+
 /// Whether <model> may stand in this namespace instead of the core's: that of 3MF before 1.0, and that of Cura, whose projects
 /// have it as their default.
 bool is_core_too(std::string_view space);

@@ -2,7 +2,6 @@
 
 #include <fmt/core.h>
 
-#include <algorithm>
 #include <charconv>
 #include <cstring>
 
@@ -40,6 +39,8 @@ bool read_whole(std::string_view text, Number& number) {
 
 bool read_decimal(std::string_view text, double& number) { return parse_number(trimmed(text), number); }
 
+constexpr std::size_t kMostTold = 64;  // that are told of
+
 double unit_in_mm(std::string_view unit) {
   constexpr std::pair<std::string_view, double> kUnits[] = {{"micron", 0.001}, {"millimeter", 1}, {"centimeter", 10},
                                                             {"inch", 25.4},    {"foot", 304.8},   {"meter", 1000}};
@@ -50,18 +51,6 @@ double unit_in_mm(std::string_view unit) {
 
 }  // namespace
 
-std::string ModelPackage::label(const ModelObject& object) const {
-  std::string text = fmt::format("object {}", object.id);
-  if (!object.name.empty()) text += fmt::format(" \"{}\"", object.name);
-  return object.file == 0 ? text : fmt::format("{} in {}", text, files[object.file].name.substr(1));
-}
-
-std::uint32_t ModelPackage::file_of(const std::string& name) {
-  const auto [found, is_new] = file_of_name.emplace(name, static_cast<std::uint32_t>(files.size()));
-  if (is_new) files.push_back({name, 1});
-  return found->second;
-}
-
 /// What a name without a meaning may say is not known.
 XmlName ModelParser::attribute_name(const char* name) {
   const XmlName is = reader_->attribute_name(name);
@@ -71,11 +60,32 @@ XmlName ModelParser::attribute_name(const char* name) {
 
 void ModelParser::start(const XmlName& name, XmlAttributes attributes) {
   if (places_.empty()) return model(name, attributes);
-  places_.push_back(places_.back() == Place::kPassedOver ? Place::kPassedOver : place_of(name, attributes));
+  const Place around = places_.back();
+  const bool passed = around == Place::kPassedOver || around == Place::kMetadata;
+  places_.push_back(passed ? Place::kPassedOver : place_of(name, attributes));
+}
+
+void ModelParser::end() {
+  const Place place = places_.back();
+  places_.pop_back();
+  if (place == Place::kMetadata) {
+    reader_->want_text(false);
+    const bool of_object = places_.size() > 1 && places_[places_.size() - 2] == Place::kObject;
+    metadata_.back().end(of_object ? &current() : nullptr);
+  }
+  if (place == Place::kMetadataGroup) metadata_.pop_back();
+  if (place == Place::kResources) {
+    if (auto [what, line] = properties_.check_references(); !what.empty()) reader_->refuse(std::move(what), line);
+  }
 }
 
 ModelParser::Place ModelParser::place_of(const XmlName& name, XmlAttributes attributes) {
-  if (name.space == core_ || name.space == kCoreNamespace) return in_core(name.local, attributes);
+  const Place around = places_.back();
+  const bool is_core = name.space == core_ || name.space == kCoreNamespace;
+  if (around == Place::kProperties)
+    return is_core || is_material(name.space) ? property(name.local, attributes) : Place::kPassedOver;
+  if (is_core) return in_core(name.local, attributes);
+  if (around == Place::kItem || around == Place::kMetadataGroup) return Place::kPassedOver;
   if (!name.declared) refuse(fmt::format("the prefix of <{}> is not declared; export it again", name.local));
   return name.space.empty() ? Place::kPassedOver : in_extension(name, attributes);
 }
@@ -83,43 +93,97 @@ ModelParser::Place ModelParser::place_of(const XmlName& name, XmlAttributes attr
 ModelParser::Place ModelParser::in_core(std::string_view name, XmlAttributes attributes) {
   switch (places_.back()) {
     case Place::kVertices:
-      if (name == "vertex") vertex(attributes);
+      if (name != "vertex") break;
+      vertex(attributes);
       return Place::kPassedOver;
     case Place::kTriangles:
-      if (name == "triangle") triangle(attributes);
+      if (name != "triangle") break;
+      triangle(attributes);
       return Place::kPassedOver;
     case Place::kComponents:
-      if (name == "component") reference(name, attributes, current().components);
+      if (name != "component") break;
+      reference(name, attributes, current().components);
       return Place::kPassedOver;
     case Place::kBuild:
-      if (name == "item") reference(name, attributes, package_.items);
-      return Place::kPassedOver;
+      if (name != "item") break;
+      reference(name, attributes, package_.items);
+      return Place::kItem;
+    case Place::kItem:
+      if (name != "metadatagroup") break;
+      return metadata_group();
+    case Place::kMetadataGroup:
+      if (name == "metadata" || name == "setting") return metadata(name, attributes);
+      break;
     case Place::kModel: {
+      if (name == "metadata") return metadata(name, attributes);
       bool& there = name == "build" ? has_build_ : has_resources_;
       if (name != "build" && name != "resources") break;
       if (there) refuse(fmt::format("a second <{}>; export it again", name));
       there = true;
+      pass_over_attributes(attributes);
       // The build of a file that is only referred to does not count.
       return name == "resources" ? Place::kResources : file_ == 0 ? Place::kBuild : Place::kPassedOver;
     }
     case Place::kResources:
+      if (name == "basematerials") return property(name, attributes);
       if (name != "object") break;
       object(attributes);
       return Place::kObject;
     case Place::kObject:
+      if (name == "metadatagroup" || name == "settings") return metadata_group();
+      pass_over_attributes(attributes);
       if (name == "components") return Place::kComponents;
       if (name != "mesh") break;
       if (!current().vertices.empty()) refuse("a second mesh of an object; export it again");
       return Place::kMesh;
     case Place::kMesh:
+      pass_over_attributes(attributes);
       if (name == "vertices") return Place::kVertices;
       if (name == "triangles") return Place::kTriangles;
       break;
     default: break;
   }
+  return not_known(name, attributes);
+}
+
+ModelParser::Place ModelParser::not_known(std::string_view name, XmlAttributes attributes) {
   if (places_.back() == Place::kResources) resource(name, attributes);
   if (places_.back() == Place::kModel && name == "model") refuse("a model within a model; export it again");
+  if (core_ == kCoreNamespace) package_.depart("elements that it does not have, which are passed over", name);
   return Place::kPassedOver;
+}
+
+/// Groups of properties, and what stands in them.
+ModelParser::Place ModelParser::property(std::string_view name, XmlAttributes attributes) {
+  const bool is_resource = places_.back() == Place::kResources;
+  const std::uint64_t id = is_resource ? resource(name, attributes) : Properties::kNoId;
+  if (std::string what = properties_.add(name, attributes, id, reader_->line()); !what.empty()) refuse(std::move(what));
+  return is_resource ? Place::kProperties : Place::kPassedOver;
+}
+
+ModelParser::Place ModelParser::metadata_group() {
+  metadata_.emplace_back();
+  return Place::kMetadataGroup;
+}
+
+ModelParser::Place ModelParser::metadata(std::string_view name, XmlAttributes attributes) {
+  Metadata& of = metadata_.back();
+  if (name == "setting")
+    of.begin_setting(attributes);
+  else if (std::string what = of.begin(*reader_, attributes, package_); !what.empty())
+    refuse(std::move(what));
+  reader_->want_text(true);
+  return Place::kMetadata;
+}
+
+/// Of an element that has no attributes of its own that matter here.
+void ModelParser::pass_over_attributes(XmlAttributes attributes) {
+  for (; *attributes != nullptr; attributes += 2) pass_over_attribute(reader_->attribute_name(attributes[0]));
+}
+
+void ModelParser::pass_over_attribute(const XmlName& name) {
+  if (!name.space.empty() && extension_of(name.space) == Extension::kUnknown && package_.foreign.size() < kMostTold)
+    package_.foreign.emplace(name.space);
 }
 
 ModelParser::Place ModelParser::in_extension(const XmlName& name, XmlAttributes attributes) {
@@ -130,6 +194,12 @@ ModelParser::Place ModelParser::in_extension(const XmlName& name, XmlAttributes 
     return Place::kLattice;
   }
   if (place == Place::kMesh && kind == Extension::kBeams && name.local == "beamlattice") return Place::kLattice;
+  if (place == Place::kVolumes) {
+    if (name.local == "volume") volume(attributes);
+    return Place::kPassedOver;
+  }
+  if (place == Place::kMesh && name.local == "volumes" && is_slic3r(name.space)) return Place::kVolumes;
+  if (place == Place::kResources && is_material(name.space)) return property(name.local, attributes);
   if (place == Place::kResources) resource(name.local, attributes);
   if (place == Place::kObject && kind == Extension::kUnknown && current().content.empty()) current().content = name.space;
   if (kind == Extension::kUnknown) pass_over(name.space);
@@ -137,8 +207,7 @@ ModelParser::Place ModelParser::in_extension(const XmlName& name, XmlAttributes 
 }
 
 void ModelParser::pass_over(std::string_view space) {
-  constexpr std::size_t kMost = 64;
-  if (package_.extensions.size() < kMost) package_.extensions.emplace(space);
+  if (package_.extensions.size() < kMostTold) package_.extensions.emplace(space);
 }
 
 void ModelParser::model(const XmlName& name, XmlAttributes attributes) {
@@ -184,19 +253,32 @@ bool ModelParser::read_id(std::string_view text, std::uint64_t& id) {
 }
 
 /// All resources of a file share one count.
-void ModelParser::resource(std::string_view name, XmlAttributes attributes) {
+std::uint64_t ModelParser::resource(std::string_view name, XmlAttributes attributes) {
+  std::uint64_t id = Properties::kNoId;
   for (; *attributes != nullptr; attributes += 2) {
-    std::uint64_t id = 0;
     if (std::strcmp(attributes[0], "id") != 0) continue;
     if (read_id(attributes[1], id) && !ids_.insert(id).second)
       refuse(fmt::format("<{}>: a second resource of id {}; export it again", name, id));
   }
+  return id;
+}
+
+/// What Slic3r says of consecutive triangles.
+void ModelParser::volume(XmlAttributes attributes) {
+  Volume volume;
+  for (; *attributes != nullptr; attributes += 2) {
+    const std::string_view attribute = attributes[0], value = attributes[1];
+    if (attribute == "ts" && !read_whole(value, volume.first)) volume.first = UINT64_MAX;
+    if (attribute == "te" && !read_whole(value, volume.last)) volume.last = UINT64_MAX;
+    if (attribute == "modifier" && value != "0") volume.role = Role::kModifier;
+  }
+  if (volume.role != Role::kPart) current().volumes.push_back(std::move(volume));
 }
 
 void ModelParser::object(XmlAttributes attributes) {
   ModelObject object;
   object.file = file_;
-  bool has_id = false;
+  bool has_id = false, has_group = false, has_property = false;
   resource("object", attributes);
   for (; *attributes != nullptr; attributes += 2) {
     const std::string_view attribute = attributes[0], value = attributes[1];
@@ -204,6 +286,10 @@ void ModelParser::object(XmlAttributes attributes) {
       has_id = read_id(value, object.id);
     } else if (attribute == "name") {
       object.name = value;
+    } else if (attribute == "pid") {
+      has_group = true;
+    } else if (attribute == "pindex") {
+      has_property = true;
     } else if (attribute == "type") {
       if (value == "other")
         object.type = ModelObject::Type::kOther;
@@ -214,8 +300,11 @@ void ModelParser::object(XmlAttributes attributes) {
     } else if (const XmlName is = attribute_name(attributes[0]); extension_of(is.space) == Extension::kSlices) {
       object.sliced = object.sliced || is.local == "slicestackid";
       object.low_resolution = object.low_resolution || (is.local == "meshresolution" && value == "lowres");
+    } else {
+      pass_over_attribute(is);
     }
   }
+  if (has_property && !has_group) refuse("an object with a pindex and no pid, which 3MF requires (core 4); export it again");
   if (!has_id) refuse("an object without an id; export it again");
   package_.object_of_id.emplace(std::pair{file_, object.id}, static_cast<std::uint32_t>(package_.objects.size()));
   package_.objects.push_back(std::move(object));

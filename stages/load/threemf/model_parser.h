@@ -6,7 +6,9 @@
 #include <string_view>
 #include <vector>
 
+#include "stages/load/threemf/metadata.h"
 #include "stages/load/threemf/model.h"
+#include "stages/load/threemf/properties.h"
 #include "stages/load/threemf/xml.h"
 
 namespace lamina::load {
@@ -27,19 +29,43 @@ class ModelParser : public XmlHandler {
   void attach(XmlReader& reader) { reader_ = &reader; }
 
   void start(const XmlName& name, XmlAttributes attributes) override;
-  void end() override { places_.pop_back(); }
+  void end() override;
+  void text(std::string_view piece) override { metadata_.back().text(piece); }
 
   bool has_build() const { return has_build_; }
 
  private:
-  enum class Place { kModel, kResources, kObject, kMesh, kVertices, kTriangles, kComponents, kBuild, kLattice, kPassedOver };
+  enum class Place {
+    kModel,
+    kResources,
+    kProperties,
+    kObject,
+    kMesh,
+    kVertices,
+    kTriangles,
+    kComponents,
+    kBuild,
+    kItem,
+    kMetadataGroup,
+    kMetadata,
+    kLattice,
+    kVolumes,
+    kPassedOver
+  };
 
   Place place_of(const XmlName& name, XmlAttributes attributes);
   Place in_core(std::string_view name, XmlAttributes attributes);
   Place in_extension(const XmlName& name, XmlAttributes attributes);
+  Place not_known(std::string_view name, XmlAttributes attributes);
+  Place property(std::string_view name, XmlAttributes attributes);
+  Place metadata_group();
+  Place metadata(std::string_view name, XmlAttributes attributes);
+  void volume(XmlAttributes attributes);
+  void pass_over_attributes(XmlAttributes attributes);
+  void pass_over_attribute(const XmlName& name);
   void model(const XmlName& name, XmlAttributes attributes);
   void require(std::string_view prefixes);
-  void resource(std::string_view name, XmlAttributes attributes);
+  std::uint64_t resource(std::string_view name, XmlAttributes attributes);
   void object(XmlAttributes attributes);
   void vertex(XmlAttributes attributes);
   void triangle(XmlAttributes attributes);
@@ -58,6 +84,8 @@ class ModelParser : public XmlHandler {
   std::string core_;             // the namespace of <model>
   std::vector<Place> places_;    // of the elements that are open
   std::set<std::uint64_t> ids_;  // of all resources of this file
+  Properties properties_;
+  std::vector<Metadata> metadata_{1};  // of the model, and of the group that is open
   bool has_resources_ = false, has_build_ = false;
 };
 

@@ -2,11 +2,11 @@
 
 #include <fmt/core.h>
 #include <tbb/blocked_range.h>
-#include <tbb/parallel_for.h>
 #include <tbb/parallel_reduce.h>
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 
 #include "stages/load/matrix.h"
 #include "stages/load/repair/diagnose.h"
@@ -69,6 +69,19 @@ bool moves_within_reach(Nm lo, Nm hi, std::int64_t by) {
   return std::abs(by) <= kNmReach && lo + by >= -kNmReach && hi + by <= kNmReach;
 }
 
+/// Whether a mesh is closed and of negative volume.
+bool is_inside_out(const Facets& facets) {
+  const Point3 from = facets.bounds.lo;
+  const Int128 volume = tbb::parallel_reduce(
+      Range(0, facets.triangles.size(), 1 << 14), Int128{0},
+      [&](const Range& range, Int128 sum) {
+        for (std::size_t i = range.begin(); i != range.end(); ++i) sum += sixfold_volume(facets.triangles[i], from);
+        return sum;
+      },
+      [](Int128 one, Int128 other) { return one + other; });
+  return volume < 0 && census(facets.triangles).balanced;
+}
+
 }  // namespace
 
 /// Translations that differ by whole nanometres and a rest: no coordinate is rounded otherwise where the rest, and what
@@ -111,37 +124,71 @@ bool Placement::share_equal(const Turned& turned, const Facets& facets, std::uin
   return false;
 }
 
-void Placement::turn_outside_out(std::uint32_t object, Facets& facets) {
-  const Point3 from = facets.bounds.lo;
-  const Int128 volume = tbb::parallel_reduce(
-      Range(0, facets.triangles.size(), 1 << 14), Int128{0},
-      [&](const Range& range, Int128 sum) {
-        for (std::size_t i = range.begin(); i != range.end(); ++i) sum += sixfold_volume(facets.triangles[i], from);
-        return sum;
-      },
-      [](Int128 one, Int128 other) { return one + other; });
-  if (volume >= 0 || !census(facets.triangles).balanced) return;
-  tbb::parallel_for(Range(0, facets.triangles.size(), 1 << 14), [&](const Range& range) {
-    for (std::size_t i = range.begin(); i != range.end(); ++i) std::swap(facets.triangles[i].b, facets.triangles[i].c);
-  });
-  told_.resize(model_.objects.size());
-  if (!told_[object])
-    to_.notes.push_back(
-        {true, model_.label(model_.objects[object]) + " is inside out and is turned over: its volume is negative"});
-  told_[object] = true;
+void Placement::tell_once(std::uint32_t object, const char* what) {
+  if (told_.emplace(object, what).second) to_.notes.push_back({false, model_.label(model_.objects[object]) + what});
 }
 
-Status Placement::add(const Leaf& leaf) {
+Status Placement::add(std::span<const Leaf> leaves) {
+  std::vector<std::uint32_t> voids;  // by their containers
+  for (std::uint32_t i = 0; i < leaves.size(); ++i)
+    if (leaves[i].container != Leaf::kSolid) voids.push_back(i);
+  std::stable_sort(voids.begin(), voids.end(),
+                   [&](std::uint32_t one, std::uint32_t other) { return leaves[one].container < leaves[other].container; });
+  auto next = voids.begin();
+  for (std::uint32_t i = 0; i < leaves.size(); ++i) {
+    if (leaves[i].container != Leaf::kSolid) continue;
+    const auto end = std::find_if(next, voids.end(), [&](std::uint32_t inner) { return leaves[inner].container != i; });
+    const Status added = next == end ? add_solid(leaves[i]) : add_hollow(leaves[i], leaves, {next, end});
+    if (!added) return added;
+    next = end;
+  }
+  return {};
+}
+
+/// A mesh of the solid and of what is inside out within it, which is the same for copies of the whole.
+Status Placement::add_hollow(const Leaf& leaf, std::span<const Leaf> leaves, std::span<const std::uint32_t> voids) {
+  const Transform transform = after(options_.transform, leaf.transform);
+  const std::string label = model_.label(model_.objects[leaf.object]);
+  Result<SnappedMesh> mesh = snap_mesh(source_, model_.objects[leaf.object], label, transform, options_);
+  if (!mesh) return mesh.error();
+  Facets& facets = mesh->facets;
+  const bool is_closed = census(facets.triangles).balanced;
+  for (const std::uint32_t index : voids) {
+    const Leaf& inner = leaves[index];
+    const ModelObject& object = model_.objects[inner.object];
+    Result<SnappedMesh> hollow =
+        snap_mesh(source_, object, model_.label(object), after(options_.transform, inner.transform), options_);
+    if (!hollow) return hollow.error();
+    if (!is_closed || !is_inside_out(hollow->facets)) {
+      if (const Status added = add_solid(inner); !added) return added;
+      continue;
+    }
+    tell_once(inner.object, " is inside out within another object of its build item: it is a void, as 3MF has it");
+    const std::size_t count = facets.triangles.size();
+    facets.triangles.resize(count + hollow->facets.triangles.size());
+    std::copy(hollow->facets.triangles.begin(), hollow->facets.triangles.end(), facets.triangles.begin() + count);
+    facets.bounds.add(hollow->facets.bounds);
+    std::move(hollow->facets.notes.begin(), hollow->facets.notes.end(), std::back_inserter(facets.notes));
+  }
+  Turned& turned = turns_[{leaf.object, transform.linear, true}];
+  const std::uint64_t hash = relative_hash(facets.triangles);
+  if (share_equal(turned, facets, hash)) return {};
+  turned.by_hash.emplace(hash, turned.variants.size());
+  turned.variants.push_back({to_.objects.size(), {}, {}, {}});
+  to_.objects.push_back({label, std::move(facets), {{0, 0, 0}}});
+  return {};
+}
+
+Status Placement::add_solid(const Leaf& leaf) {
   const ModelObject& object = model_.objects[leaf.object];
   const Transform transform = after(options_.transform, leaf.transform);
   Axes translation = transform.translation;
   for (double& axis : translation) axis *= 1e6;
-  Turned& turned = turns_[{leaf.object, transform.linear}];
+  Turned& turned = turns_[{leaf.object, transform.linear, false}];
   if (share_known(turned, translation)) return {};
   const std::string label = model_.label(object);
   Result<SnappedMesh> mesh = snap_mesh(source_, object, label, transform, options_);
   if (!mesh) return mesh.error();
-  turn_outside_out(leaf.object, mesh->facets);
   const std::uint64_t hash = relative_hash(mesh->facets.triangles);
   if (share_equal(turned, mesh->facets, hash)) return {};
   turned.by_hash.emplace(hash, turned.variants.size());

@@ -4,6 +4,10 @@
 #include <array>
 #include <cstdint>
 #include <map>
+#include <set>
+#include <span>
+#include <string_view>
+#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -15,7 +19,7 @@ namespace lamina::load {
 
 /// Snaps leaf after leaf. One whose vertices all snap to the places of an earlier leaf but for a whole translation shares its
 /// mesh. Most need no look at their vertices: where translations differ by whole nanometres and less than it takes to round any
-/// coordinate otherwise, the rest follows. A closed mesh of negative volume is turned over, with a note.
+/// coordinate otherwise, the rest follows. One that is a void becomes a hollow of its container, with a note.
 ///
 /// cost  a leaf that is known to be a copy: nothing; any other one: three passes over its triangles, parallel
 class Placement {
@@ -24,7 +28,7 @@ class Placement {
       : source_(source), model_(model), options_(options), to_(to) {}
 
   /// errors  kInput: a coordinate is not finite or beyond reach
-  Status add(const Leaf& leaf);
+  Status add(std::span<const Leaf> leaves);
 
  private:
   using Axes = std::array<double, 3>;
@@ -39,18 +43,21 @@ class Placement {
     std::vector<Variant> variants;
     std::multimap<std::uint64_t, std::size_t> by_hash;  // of variants, by their triangles relative to the first corner
   };
-  using Turn = std::pair<std::uint32_t, std::array<double, 9>>;  // an object and its transform but for the translation
+  /// An object, its transform but for the translation, and whether it has voids.
+  using Turn = std::tuple<std::uint32_t, std::array<double, 9>, bool>;
 
+  Status add_solid(const Leaf& leaf);
+  Status add_hollow(const Leaf& leaf, std::span<const Leaf> leaves, std::span<const std::uint32_t> voids);
   bool share_known(const Turned& turned, const Axes& translation);
   bool share_equal(const Turned& turned, const Facets& facets, std::uint64_t hash);
-  void turn_outside_out(std::uint32_t object, Facets& facets);
+  void tell_once(std::uint32_t object, const char* what);
 
   const Source& source_;
   const ModelPackage& model_;
   const LoadOptions& options_;
   Package& to_;
   std::map<Turn, Turned> turns_;
-  std::vector<bool> told_;  // of objects: that they are inside out
+  std::set<std::pair<std::uint32_t, std::string_view>> told_;  // of objects
 };
 
 }  // namespace lamina::load

@@ -12,6 +12,7 @@ namespace {
 
 constexpr std::string_view kModelRelationship = "http://schemas.microsoft.com/3dmanufacturing/2013/01/3dmodel";
 constexpr std::string_view kPrintTicketRelationship = "http://schemas.microsoft.com/3dmanufacturing/2013/01/printticket";
+constexpr std::string_view kTextureRelationship = "http://schemas.microsoft.com/3dmanufacturing/2013/01/3dtexture";
 constexpr std::string_view kThumbnailRelationship =
     "http://schemas.openxmlformats.org/package/2006/relationships/metadata/thumbnail";
 
@@ -53,14 +54,32 @@ std::string relationships_of(const std::string& part) {
   return part.substr(0, slash) + "_rels/" + part.substr(slash) + ".rels";
 }
 
+/// Whether a target is a whole address, which nothing within a package has.
+bool leads_out(const Relationship& one) {
+  const std::size_t colon = one.target.find(':');
+  return one.external || (colon != 0 && colon < one.target.find_first_of("/?#"));
+}
+
+/// What a model consists of has to be in the package (core 2.1.1). Links to anything else are not for lamina.
+Status check_inside(const Source& source, std::string_view part, const Relationship& one) {
+  const bool of_payload = one.type == kModelRelationship || one.type == kPrintTicketRelationship ||
+                          one.type == kThumbnailRelationship || one.type == kTextureRelationship;
+  if (!of_payload || !leads_out(one)) return {};
+  return source.error(fmt::format("{} names {}, which lies outside of the file; 3MF forbids this (core 2.1.1): export it again",
+                                  part.substr(1), quoted(std::string_view(one.target))));
+}
+
 /// A second print ticket makes a file invalid; what it asks for is not for lamina.
-Status check_print_tickets(const Source& source, Archive& archive, const std::string& model) {
+Status check_model_relationships(const Source& source, Archive& archive, const std::string& model) {
   const std::string part = relationships_of(model);
   if (!archive.has(part)) return {};
   const auto relationships = read_relationships(source, archive, part);
   if (!relationships) return relationships.error();
   std::size_t tickets = 0;
-  for (const Relationship& one : *relationships) tickets += one.type == kPrintTicketRelationship ? 1 : 0;
+  for (const Relationship& one : *relationships) {
+    if (const Status inside = check_inside(source, part, one); !inside) return inside;
+    tickets += one.type == kPrintTicketRelationship ? 1 : 0;
+  }
   if (tickets > 1) return source.error("has more than one print ticket, which 3MF forbids; export it again");
   return {};
 }
@@ -75,12 +94,10 @@ Result<std::string> find_start_part(const Source& source, Archive& archive) {
   std::string model;
   for (const Relationship& one : *relationships) {
     const bool is_model = one.type == kModelRelationship;
-    if (is_model && one.external)
-      return source.error(
-          fmt::format("its model lies outside of the file, at {}; export it again", quoted(std::string_view(one.target))));
+    if (const Status inside = check_inside(source, root, one); !inside) return inside.error();
     const std::string target = part_name(one.target);
     const bool needed = is_model || one.type == kThumbnailRelationship;  // what others lead to is not for lamina
-    if (needed && !one.external && !archive.has(target))
+    if (needed && !archive.has(target))
       return source.error(fmt::format("_rels/.rels names {}, which the file does not hold; export it again",
                                       quoted(std::string_view(one.target))));
     if (is_model && !model.empty())
@@ -88,7 +105,7 @@ Result<std::string> find_start_part(const Source& source, Archive& archive) {
     if (is_model) model = target;
   }
   if (model.empty()) return source.error("is a zip file, but no 3MF: it names no 3D model; unzip it, or export it again");
-  if (const Status tickets = check_print_tickets(source, archive, model); !tickets) return tickets.error();
+  if (const Status known = check_model_relationships(source, archive, model); !known) return known.error();
   return model;
 }
 

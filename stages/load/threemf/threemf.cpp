@@ -2,12 +2,14 @@
 #include <fmt/core.h>
 
 #include "stages/load/reader.h"
+#include "stages/load/text.h"
 #include "stages/load/threemf/archive.h"
 #include "stages/load/threemf/expansion.h"
 #include "stages/load/threemf/extensions.h"
 #include "stages/load/threemf/model_parser.h"
 #include "stages/load/threemf/placement.h"
 #include "stages/load/threemf/relationships.h"
+#include "stages/load/threemf/roles.h"
 
 namespace lamina::load {
 namespace {
@@ -35,6 +37,15 @@ void tell_of_model(const ModelPackage& model, std::vector<Note>& notes) {
         {false, fmt::format("holds elements of the extension {}, which lamina does not read and the file does not require",
                             extension_name(space))});
   }
+  for (const std::string& space : model.foreign) {
+    notes.push_back({false, fmt::format("holds attributes of {}, which lamina does not read and the file does not require",
+                                        extension_name(space))});
+  }
+  for (const Departure& one : model.departures) {
+    const std::string more = one.count > 1 ? fmt::format(" and {} more", one.count - 1) : "";
+    notes.push_back({false, fmt::format("does not follow the 3MF specification, which does not change its geometry: {}: {}{}",
+                                        one.rule, quoted(std::string_view(one.first)), more)});
+  }
   if (model.has_forward_references)
     notes.push_back({false, "names objects before it holds them, against the specification; they are planned all the same"});
   if (model.not_printable > 0)
@@ -57,16 +68,15 @@ Result<Package> read_3mf(const Source& source, const LoadOptions& options) {
       return parsed.error();
   }
   if (model.items.empty()) return source.error("has no build items: nothing is to be printed; export it again");
-  if (const Status known = resolve_references(source, model, options.triangle_limit); !known) return known.error();
   Package package;
+  if (const Status given = apply_roles(source, *archive, model, package.notes); !given) return given.error();
+  if (const Status known = resolve_references(source, model, options.triangle_limit); !known) return known.error();
   tell_of_model(model, package.notes);
   const Result<std::vector<Leaf>> leaves = expand_build(source, model, package.notes);
   if (!leaves) return leaves.error();
   if (leaves->empty()) return source.error("its build items hold no triangles to print");
   Placement placement(source, model, options, package);
-  for (const Leaf& leaf : *leaves) {
-    if (const Status placed = placement.add(leaf); !placed) return placed.error();
-  }
+  if (const Status placed = placement.add(*leaves); !placed) return placed.error();
   return package;
 }
 

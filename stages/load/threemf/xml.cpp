@@ -39,6 +39,10 @@ struct XmlReader::Callbacks {
     --reader.depth_;
     reader.handler_.end();
   }
+  static void text(void* user, const char* text, int size) {
+    XmlReader& reader = *static_cast<XmlReader*>(user);
+    if (reader.fault_.empty()) reader.handler_.text({text, static_cast<std::size_t>(size)});
+  }
   static void document_type(void* user, const char*, const char*, const char*, int) {
     static_cast<XmlReader*>(user)->refuse("has a document type, which 3MF forbids; export it again");
   }
@@ -83,9 +87,11 @@ XmlName XmlReader::attribute_name(std::string_view name) const { return find(nam
 
 std::uint64_t XmlReader::line() const { return XML_GetCurrentLineNumber(parser_); }
 
-void XmlReader::refuse(std::string what) {
+void XmlReader::want_text(bool wanted) { XML_SetCharacterDataHandler(parser_, wanted ? Callbacks::text : nullptr); }
+
+void XmlReader::refuse(std::string what, std::uint64_t line) {
   if (!fault_.empty()) return;
-  fault_ = fmt::format("line {}: {}", line(), what);
+  fault_ = fmt::format("line {}: {}", line > 0 ? line : this->line(), what);
   XML_StopParser(parser_, XML_FALSE);
 }
 

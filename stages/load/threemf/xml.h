@@ -29,6 +29,8 @@ class XmlHandler {
   /// An element begins.
   virtual void start(const XmlName& name, XmlAttributes attributes) = 0;
   virtual void end() = 0;
+  /// A piece of the text of an element, which may come in several. Only where XmlReader::want_text() asks for it.
+  virtual void text(std::string_view) {}
 };
 
 /// Text that begins with a byte order mark or a declaration may be UTF-8, UTF-16 or Latin-1. Document types, and with them
@@ -48,7 +50,10 @@ class XmlReader {
   bool feed(std::string_view bytes);
   bool finish();
   /// Called by the handler: `what` is wrong here, and nothing more is read. The first reason counts.
-  void refuse(std::string what);
+  /// line  where, if not here
+  void refuse(std::string what, std::uint64_t line = 0);
+  /// Whether the handler gets text from here on. Not at first: most is white space.
+  void want_text(bool wanted);
 
   /// The name of an attribute, or the namespace of a prefix as "prefix:", as the handler's element has it.
   XmlName attribute_name(std::string_view name) const;

@@ -1,5 +1,7 @@
 #include "stages/write/package/threemf_package.h"
 
+#include <cstdlib>
+
 #include "stages/write/decimal.h"
 #include "stages/write/package/zip.h"
 
@@ -44,7 +46,9 @@ Status add_text(ZipWriter& zip, std::string_view name, std::string_view text) {
 }  // namespace
 
 Status write_3mf_package(File& file, std::span<const Deflated> model) {
-  ZipWriter zip(file);
+  const Result<ZipDate> date = zip_date(std::getenv("SOURCE_DATE_EPOCH"));
+  if (!date) return date.error();
+  ZipWriter zip(file, *date);
   if (Status status = add_text(zip, "[Content_Types].xml", kContentTypes); !status) return status;
   if (Status status = add_text(zip, "_rels/.rels", kRelationships); !status) return status;
   if (Status status = zip.add("3D/3dmodel.model", model); !status) return status;

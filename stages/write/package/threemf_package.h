@@ -12,10 +12,11 @@
 
 namespace lamina::write {
 
-/// Writes [Content_Types].xml, _rels/.rels and 3D/3dmodel.model, in this order.
+/// Writes [Content_Types].xml, _rels/.rels and 3D/3dmodel.model, in this order, of the date that the environment's
+/// SOURCE_DATE_EPOCH says, else of 1 January 1980.
 ///
 /// model   the text of the model in pieces
-/// errors  kOutput
+/// errors  kOutput; kUsage: that variable is no number
 /// source  ISO/IEC 29500-2 (Open Packaging Conventions); 3MF Consortium, Core Specification 1.3, section 2
 Status write_3mf_package(File& file, std::span<const Deflated> model);
 

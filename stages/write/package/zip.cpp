@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <array>
+#include <charconv>
+#include <chrono>
 
 namespace lamina::write {
 namespace {
@@ -15,6 +17,25 @@ void put_little(std::string& out, std::uint64_t number, int bytes) {
 }
 
 }  // namespace
+
+Result<ZipDate> zip_date(const char* text) {
+  const std::string_view digits = text == nullptr ? "" : text;
+  if (digits.empty()) return kFirstZipDate;
+  std::uint64_t seconds = 0;
+  const auto [end, status] = std::from_chars(digits.data(), digits.data() + digits.size(), seconds);
+  if (status != std::errc() || end != digits.data() + digits.size())
+    return Error{Fault::kUsage, "SOURCE_DATE_EPOCH is not a count of seconds since 1970, such as 1767225600; unset it"};
+  constexpr std::uint64_t kFirst = 315'532'800, kLast = 4'354'819'198;  // 1980-01-01 0:00:00, 2107-12-31 23:59:58
+  const std::chrono::sys_seconds time{std::chrono::seconds(std::clamp(seconds, kFirst, kLast))};
+  const auto day = std::chrono::floor<std::chrono::days>(time);
+  const std::chrono::year_month_day date(day);
+  const std::chrono::hh_mm_ss clock(time - day);
+  const auto years = static_cast<ZipDate>(static_cast<int>(date.year()) - 1980);
+  const ZipDate on = years << 9 | static_cast<unsigned>(date.month()) << 5 | static_cast<unsigned>(date.day());
+  const auto at =
+      static_cast<ZipDate>(clock.hours().count() << 11 | clock.minutes().count() << 5 | clock.seconds().count() / 2);
+  return on << 16 | at;
+}
 
 /// What stands before the data of an entry, and again in the directory, with the entry's place.
 std::string ZipWriter::record(const Entry& entry, bool in_directory) const {
@@ -31,9 +52,8 @@ std::string ZipWriter::record(const Entry& entry, bool in_directory) const {
   if (in_directory) put_little(out, version, 2);  // made by
   put_little(out, version, 2);                    // needed to extract
   put_little(out, 0, 2);
-  put_little(out, 8, 2);           // deflated
-  put_little(out, 0, 2);           // 0:00
-  put_little(out, 1 << 5 | 1, 2);  // 1 January 1980
+  put_little(out, 8, 2);  // deflated
+  put_little(out, date_, 4);
   put_little(out, entry.crc, 4);
   put_little(out, large_sizes ? UINT32_MAX : entry.packed, 4);
   put_little(out, large_sizes ? UINT32_MAX : entry.size, 4);

@@ -1,0 +1,113 @@
+#include "stages/load/threemf/properties.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <charconv>
+#include <cstring>
+
+namespace lamina::load {
+namespace {
+
+struct Required {
+  std::string_view element, attribute;
+  std::string_view where;  // in the specifications
+};
+
+constexpr Required kRequired[] = {
+    {"base", "name", "core 5.1"},
+    {"base", "displaycolor", "core 5.1"},
+    {"color", "color", "materials 2.1"},
+    {"texture2dgroup", "texid", "materials 3"},
+    {"tex2coord", "u", "materials 3.1"},
+    {"tex2coord", "v", "materials 3.1"},
+    {"compositematerials", "matid", "materials 4"},
+    {"compositematerials", "matindices", "materials 4"},
+    {"composite", "values", "materials 4.1"},
+    {"multiproperties", "pids", "materials 5"},
+    {"multi", "pindices", "materials 5.1"},
+    {"texture2d", "path", "materials 6"},
+    {"texture2d", "contenttype", "materials 6"},
+};
+
+const char* find_attribute(XmlAttributes attributes, std::string_view name) {
+  for (; *attributes != nullptr; attributes += 2) {
+    if (attributes[0] == name) return attributes[1];
+  }
+  return nullptr;
+}
+
+/// What is no number leads to nothing.
+std::vector<std::uint64_t> read_ids(std::string_view text) {
+  std::vector<std::uint64_t> ids;
+  for (std::size_t at = 0; (at = text.find_first_not_of(" \t\r\n", at)) != text.npos;) {
+    const std::string_view word = text.substr(at, text.find_first_of(" \t\r\n", at) - at);
+    std::uint64_t& id = ids.emplace_back(Properties::kNoId);
+    std::from_chars(word.data(), word.data() + word.size(), id);
+    at += word.size();
+  }
+  return ids;
+}
+
+}  // namespace
+
+Properties::Kind Properties::kind_of(std::string_view element) {
+  if (element == "basematerials") return Kind::kMaterials;
+  if (element == "compositematerials") return Kind::kComposites;
+  if (element == "colorgroup") return Kind::kColors;
+  if (element == "texture2d") return Kind::kTexture;
+  if (element == "texture2dgroup") return Kind::kTextureGroup;
+  return element == "multiproperties" ? Kind::kMulti : Kind::kNone;
+}
+
+Properties::Kind Properties::kind_of(std::uint64_t id) const {
+  const auto found = kinds_.find(id);
+  return found == kinds_.end() ? Kind::kNone : found->second;
+}
+
+std::string Properties::add(std::string_view element, XmlAttributes attributes, std::uint64_t id, std::uint64_t line) {
+  for (const Required& one : kRequired) {
+    if (one.element == element && find_attribute(attributes, one.attribute) == nullptr)
+      return fmt::format("<{}> lacks its {}, which 3MF requires ({}); export it again", element, one.attribute, one.where);
+  }
+  const Kind kind = kind_of(element);
+  if (kind == Kind::kNone) return {};
+  if (kind == Kind::kTexture && !std::string_view(find_attribute(attributes, "contenttype")).starts_with("image/"))
+    return "<texture2d>: the content type is neither image/png nor image/jpeg (materials 6); export it again";
+  if (id != kNoId) kinds_.emplace(id, kind);
+  const char* const to = find_attribute(attributes, kind == Kind::kTextureGroup ? "texid"
+                                                    : kind == Kind::kComposites ? "matid"
+                                                                                : "pids");
+  if (to != nullptr) references_.push_back({kind, read_ids(to), line});
+  return {};
+}
+
+std::string Properties::fault_of(const Reference& reference) const {
+  const auto count = [&](Kind kind) {
+    return std::count_if(reference.to.begin(), reference.to.end(), [&](std::uint64_t id) { return kind_of(id) == kind; });
+  };
+  switch (reference.from) {
+    case Kind::kTextureGroup:
+      return count(Kind::kTexture) == 1 ? "" : "<texture2dgroup>: its texid leads to no <texture2d> (materials 3)";
+    case Kind::kComposites:
+      return count(Kind::kMaterials) == 1 ? "" : "<compositematerials>: its matid leads to no <basematerials> (materials 4)";
+    case Kind::kMulti:
+      if (reference.to.empty()) return "<multiproperties>: its pids are empty (materials 5)";
+      if (count(Kind::kMulti) > 0) return "<multiproperties> refers to <multiproperties>, which 3MF forbids (materials 5)";
+      if (count(Kind::kMaterials) + count(Kind::kComposites) > 1)
+        return "<multiproperties> refers to more than one group of materials, which 3MF forbids (materials 5)";
+      return count(Kind::kColors) > 1
+                 ? "<multiproperties> refers to more than one <colorgroup>, which 3MF forbids (materials 5)"
+                 : "";
+    default: return {};
+  }
+}
+
+Properties::Fault Properties::check_references() const {
+  for (const Reference& reference : references_) {
+    if (std::string what = fault_of(reference); !what.empty()) return {what + "; export it again", reference.line};
+  }
+  return {};
+}
+
+}  // namespace lamina::load

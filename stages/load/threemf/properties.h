@@ -1,0 +1,50 @@
+// stages/load/threemf/properties.h: whether colours, textures and materials are as the specification wants them; internal to
+// load.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "stages/load/threemf/xml.h"
+
+namespace lamina::load {
+
+/// lamina prints none of them, but a file in which they contradict themselves is not what its program meant. Checked are the
+/// attributes that have to be there, and what groups of properties refer to; not the values.
+///
+/// source  3MF Consortium, Core Specification 1.3, chapters 4 and 5; Materials and Properties Extension 1.2, chapters 2 to 6
+class Properties {
+ public:
+  static constexpr std::uint64_t kNoId = UINT64_MAX;
+  struct Fault {
+    std::string what;  // empty if nothing is wrong
+    std::uint64_t line = 0;
+  };
+
+  /// An element of a namespace of 3MF: a resource, or what stands in one.
+  /// id  of the resource, or kNoId
+  /// errors  the first thing that it lacks
+  std::string add(std::string_view element, XmlAttributes attributes, std::uint64_t id, std::uint64_t line);
+
+  /// What refers to the wrong kind of resource, once all of a file are known.
+  Fault check_references() const;
+
+ private:
+  enum class Kind { kNone, kMaterials, kComposites, kColors, kTexture, kTextureGroup, kMulti };
+  struct Reference {
+    Kind from;
+    std::vector<std::uint64_t> to;
+    std::uint64_t line;
+  };
+  static Kind kind_of(std::string_view element);
+  Kind kind_of(std::uint64_t id) const;
+  std::string fault_of(const Reference& reference) const;
+
+  std::map<std::uint64_t, Kind> kinds_;  // of resources by their ids
+  std::vector<Reference> references_;
+};
+
+}  // namespace lamina::load
