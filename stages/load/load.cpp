@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <exception>
 
+#include "stages/data/shortage.h"
 #include "stages/load/reader.h"
 #include "stages/load/repair/finish.h"
 #include "stages/load/repair/geometry.h"
@@ -117,9 +118,8 @@ template <class Work>
 auto guarded(const std::string& path, const Work& work) -> decltype(work()) {
   try {
     return work();
-  } catch (const std::bad_alloc&) {
-    return Error{Fault::kMemory, path + ": " + out_of_memory().message};
   } catch (const std::exception& problem) {
+    if (is_shortage(problem)) return Error{Fault::kMemory, path + ": " + out_of_memory().message};
     return Error{Fault::kInternal, path + ": " + problem.what()};
   }
 }

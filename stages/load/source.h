@@ -2,9 +2,11 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 
 #include "stages/data/buffer.h"
+#include "stages/data/input/file_reader.h"
 #include "stages/data/status.h"
 
 namespace lamina::load {
@@ -14,11 +16,6 @@ namespace lamina::load {
 class Source {
  public:
   Source() = default;
-  Source(Source&& other) noexcept;
-  Source& operator=(Source&& other) noexcept;
-  Source(const Source&) = delete;
-  Source& operator=(const Source&) = delete;
-  ~Source();
 
   /// errors  kInput: missing, not readable, not a regular file
   static Result<Source> open(const std::string& path);
@@ -39,7 +36,7 @@ class Source {
 
  private:
   std::string path_;
-  int file_ = -1;
+  std::optional<FileReader> file_;  // else in memory
   Buffer<char> memory_;
   std::uint64_t size_ = 0;
 };

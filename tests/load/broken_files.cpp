@@ -187,6 +187,9 @@ void add_gaps(std::vector<BrokenFile>& files) {
   add("slivers.stl", with_slivers(nut, random, 0.3), nut, Ends::kSolid);
   add("nut, 30 % missing.stl", without(nut, random, 0.3), nut, Ends::kToldOr);
   add("ball, 60 % missing.stl", without(fine, random, 0.6), fine, Ends::kToldOr);
+  const Facets plate = scaled(box_facets({0, 0, 0}, {200, 200, 1}), 0.5f);
+  add("plate of 0.5 mm, jitter 4 um.stl", jittered(plate, random, 4), plate, Ends::kSolid);
+  add("plate of 0.5 mm, jitter 80 um.stl", jittered(plate, random, 80), plate, Ends::kToldOr);
 }
 
 }  // namespace
@@ -268,7 +271,9 @@ BrokenFile random_broken_file(std::uint32_t seed) {
   Facets facets = sound;
   for (auto left = 1 + random() % 3; left > 0; --left) {
     const auto& [what, break_it] = kBreaks[random() % kBreaks.size()];
-    facets = break_it(std::move(facets), random);
+    Facets broken = break_it(facets, random);
+    if (broken.empty()) continue;  // a hole as large as the solid
+    facets = std::move(broken);
     name += ", " + what;
   }
   const auto form = random() % 6;

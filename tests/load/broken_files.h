@@ -48,8 +48,9 @@ std::string obj_text(const Facets& facets);
 std::string utf16(const std::string& text);
 std::string replaced(std::string text, const std::string& what, const std::string& with);
 
-/// Volume by rays: the lengths within the solid (winding number not 0) of rows along x through a lattice of `rows` squared
-/// points of a box. Nothing of the loader's own arithmetic is in it.
+/// Volume by rays: the lengths within the solid (winding number not 0) of rows along x through `rows` squared points of a box,
+/// spread so that walls along the axes count by their thickness, not by how many rows they happen to meet. Nothing of the
+/// loader's own arithmetic is in it.
 double volume_by_rays(const std::vector<const Buffer<Triangle>*>& meshes, const Box& box, int rows);
 
 // --- the files

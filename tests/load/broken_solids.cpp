@@ -255,22 +255,25 @@ double volume_by_rays(const std::vector<const Buffer<Triangle>*>& meshes, const 
   std::vector<std::vector<Crossing>> lattice(static_cast<std::size_t>(rows) * rows);
   const double y0 = box.lo.y, z0 = box.lo.z, dy = static_cast<double>(box.depth()) / rows,
                dz = static_cast<double>(box.height()) / rows;
-  // Off the middle of the cells by an irrational share, so that no row meets an edge.
-  const double off = 0.5 + 0.0001 * std::numbers::sqrt2;
+  // Rows of one height stand at as many places across as there are others, by multiples of the golden section: walls along the
+  // axes are met in proportion to their thickness, however thin.
+  std::vector<double> within(static_cast<std::size_t>(rows));
+  for (std::size_t i = 0; i < within.size(); ++i) within[i] = std::fmod(0.5 + static_cast<double>(i) * std::numbers::phi, 1.0);
+  const auto range = [&](double lo, double hi, double from, double step) {
+    return std::array{std::max(0, static_cast<int>(std::floor((lo - from) / step))),
+                      std::min(rows - 1, static_cast<int>(std::floor((hi - from) / step)))};
+  };
   for (const Buffer<Triangle>* mesh : meshes) {
     for (const Triangle& t : *mesh) {
       const double ax = t.a.x, ay = t.a.y, az = t.a.z, bx = t.b.x, by = t.b.y, bz = t.b.z, cx = t.c.x, cy = t.c.y, cz = t.c.z;
       const double area = (by - ay) * (cz - az) - (bz - az) * (cy - ay);
       if (area == 0) continue;
-      const auto range = [&](double lo, double hi, double from, double step) {
-        return std::array{std::max(0, static_cast<int>(std::ceil((lo - from) / step - off))),
-                          std::min(rows - 1, static_cast<int>(std::floor((hi - from) / step - off)))};
-      };
       const auto ys = range(std::min({ay, by, cy}), std::max({ay, by, cy}), y0, dy);
       const auto zs = range(std::min({az, bz, cz}), std::max({az, bz, cz}), z0, dz);
       for (int j = ys[0]; j <= ys[1]; ++j) {
         for (int k = zs[0]; k <= zs[1]; ++k) {
-          const double y = y0 + (j + off) * dy, z = z0 + (k + off) * dz;
+          const double y = y0 + (j + within[static_cast<std::size_t>(k)]) * dy,
+                       z = z0 + (k + within[static_cast<std::size_t>(j)]) * dz;
           const double u = ((by - y) * (cz - z) - (bz - z) * (cy - y)) / area,
                        v = ((cy - y) * (az - z) - (cz - z) * (ay - y)) / area;
           const double w = 1 - u - v;

@@ -64,6 +64,20 @@ inline std::string find_model(const std::string& file) {
   return std::filesystem::exists(path) ? path : "";
 }
 
+/// The parts below a folder, in order; none if there is no such folder.
+inline std::vector<std::filesystem::path> part_files(const std::filesystem::path& folder) {
+  std::vector<std::filesystem::path> files;
+  if (!std::filesystem::is_directory(folder)) return files;
+  for (const auto& entry : std::filesystem::recursive_directory_iterator(folder)) {
+    const std::string name = entry.path().filename().string();
+    if (name.ends_with(".stl") || name.ends_with(".stl.gz") || name.ends_with(".obj") || name.ends_with(".3mf")) {
+      files.push_back(entry.path());
+    }
+  }
+  std::ranges::sort(files);
+  return files;
+}
+
 using FloatTriangle = std::array<float, 9>;
 
 /// A box of twelve triangles, outward.
@@ -162,6 +176,13 @@ inline Part loaded(const std::string& path, const load::LoadOptions& options = {
     return empty;
   }
   return std::move(*part);
+}
+
+/// These facets as a file has them, not repaired.
+inline Mesh mesh_of(const std::vector<FloatTriangle>& facets) {
+  load::LoadOptions options;
+  options.repair = false;
+  return std::move(loaded(write_file("facets.stl", binary_stl(facets)), options).meshes[0]);
 }
 
 /// The message of what has to be refused as input.

@@ -2,20 +2,23 @@
 #include "stages/load/info/info.h"
 
 #include <nlohmann/json.hpp>
+#include <numbers>
 
-#include "tests/load/files.h"
+#include "stages/slice/surplus.h"
+#include "tests/load/archives.h"
+#include "tests/load/broken_files.h"
 
 namespace lamina::test {
 namespace {
 
 std::string text_of(const std::string& path, const load::LoadOptions& options = {}) {
-  const Result<std::string> text = load::describe_part_text(path, options);
+  const Result<std::string> text = load::describe_part_text(path, options, slice::surplus_areas);
   EXPECT_TRUE(text.ok()) << text.error().message;
   return text ? *text : "";
 }
 
 nlohmann::json json_of(const std::string& path) {
-  const Result<std::string> text = load::describe_part_json(path, {});
+  const Result<std::string> text = load::describe_part_json(path, {}, slice::surplus_areas);
   EXPECT_TRUE(text.ok()) << text.error().message;
   return text ? nlohmann::json::parse(*text) : nlohmann::json();
 }
@@ -52,6 +55,50 @@ TEST(Info, TellsTheVolumeThatIsPlannedAndWhatHangsOnCaps) {
   const nlohmann::json json = json_of(path);
   EXPECT_NEAR(json["planned_volume_mm3"].get<double>(), 6000, 1e-6);
   EXPECT_NEAR(json["capped_share"].get<double>(), 600.0 / 2200, 1e-9);
+}
+
+/// What is planned of facets, and how well it is known.
+std::pair<double, std::string> planned(const Facets& facets) {
+  const nlohmann::json json = json_of(write_file("shells.stl", binary_stl(facets)));
+  EXPECT_EQ(json["meshes"][0]["planned_volume_mm3"], json["planned_volume_mm3"]);
+  return {json["planned_volume_mm3"].get<double>(), json["planned_volume_is"].get<std::string>()};
+}
+
+TEST(Info, ShellsThatOverlapArePlannedOnce) {
+  const Facets &box = unit_box(), inner = moved(scaled(box, 0.5f), 2, 2, 2);  // 10 x 20 x 30, and an eighth of it
+  const auto expect = [](const Facets& facets, double mm3, const char* known) {
+    const auto [volume, is] = planned(facets);
+    EXPECT_NEAR(volume, mm3, 1e-6 * mm3);
+    EXPECT_EQ(is, known);
+  };
+  expect(joined(box, moved(box, 5, 10, 15)), 12000 - 5 * 10 * 15, "integrated");
+  expect(joined(box, inner), 6000, "integrated");
+  expect(joined(joined(box, inner), inside_out(inner)), 6000, "exact");
+  expect(joined(box, inside_out(inner)), 6000 - 750, "exact");
+  expect(joined(box, moved(box, 10, 0, 0)), 12000, "exact");
+  expect(joined(box, inside_out(moved(inner, 40, 0, 0))), 6000 + 750, "exact");
+}
+
+TEST(Info, RoundShellsThatOverlapArePlannedOnce) {
+  // Two balls of radius 8 whose centres are 8 apart: 5 pi r^3 / 12 in common.
+  const double r = 8, alone = 4 * std::numbers::pi / 3 * r * r * r, common = 5 * std::numbers::pi / 12 * r * r * r;
+  for (const auto& [x, y, z] : {std::array{8.f, 0.f, 0.f}, std::array{0.f, 0.f, 8.f}}) {
+    const auto [volume, is] = planned(joined(ball(8, 48), moved(ball(8, 48), x, y, z)));
+    EXPECT_NEAR(volume, 2 * alone - common, 0.005 * alone) << "the balls have facets";
+    EXPECT_EQ(is, "integrated");
+  }
+}
+
+TEST(Info, ObjectsThatOverlapArePlannedOnce) {
+  const std::string path =
+      write_file("two.3mf", zip(package(model(box_object(1, 10, 20, 30), item(1) + item(1, "1 0 0 0 1 0 0 0 1 5 10 15")))));
+  const nlohmann::json json = json_of(path);
+  EXPECT_NEAR(json["planned_volume_mm3"].get<double>(), 12000 - 750, 0.01);
+  EXPECT_NEAR(json["meshes"][0]["planned_volume_mm3"].get<double>(), 6000, 1e-6);
+  EXPECT_CONTAINS(text_of(path), "planned volume       about 11250 mm3\n");
+  const Result<std::string> unsliced = load::describe_part_text(path, {});
+  ASSERT_TRUE(unsliced.ok());
+  EXPECT_CONTAINS(*unsliced, "planned volume       12000 mm3 (what overlaps counts as often as it does)\n");
 }
 
 TEST(Info, JsonHasTheSameNumbers) {

@@ -12,13 +12,6 @@
 namespace lamina::test {
 namespace {
 
-Mesh mesh_of(const std::vector<FloatTriangle>& facets) {
-  load::LoadOptions options;
-  options.repair = false;
-  Part part = loaded(write_file("mesh.stl", binary_stl(facets)), options);
-  return std::move(part.meshes[0]);
-}
-
 Mesh as_in_file(const std::string& path) {
   load::LoadOptions options;
   options.repair = false;
@@ -337,6 +330,29 @@ TEST(Repair, IsTheSameForOneAndEightThreads) {
     }
     EXPECT_TRUE(results[0] == results[1] && results[0] == results[2]) << file;
   }
+}
+
+TEST(Repair, AWeldThatMayChangeTheVolumeIsToldOrAskedFor) {
+  // Of a plate of 100 x 100 mm and 12 facets, corners off by up to 80 um move four facets of half a side each.
+  const std::vector<FloatTriangle> thin = box_facets({0, 0, 0}, {100, 100, 0.5f}), thick = box_facets({0, 0, 0}, {100, 100, 3});
+  std::mt19937 random(1);
+  const auto jittered = [&](std::vector<FloatTriangle> facets, float um) {
+    for (FloatTriangle& f : facets)
+      for (float& x : f) x += um * 1e-3f * (static_cast<float>(random() >> 8) / static_cast<float>(1 << 23) - 1);
+    return write_file("jittered.stl", binary_stl(facets));
+  };
+  EXPECT_EQ(notes_of(loaded(jittered(thick, 4))).find("may be off"), std::string::npos);
+  EXPECT_EQ(notes_of(loaded(jittered(thin, 1))).find("may be off"), std::string::npos);
+  EXPECT_CONTAINS(notes_of(loaded(jittered(thick, 80))), "um: the volume may be off by");
+  const std::string path = jittered(thin, 80), said = refusal(path);
+  EXPECT_CONTAINS(said, "joining them may change its volume by");
+  const std::size_t at = said.find("say --weld ");
+  ASSERT_NE(at, said.npos) << said;
+  load::LoadOptions options;
+  options.weld_nm = std::stoll(said.substr(at + 11)) * 1000;
+  const Part accepted = loaded(path, options);
+  EXPECT_CONTAINS(notes_of(accepted), "the volume may be off by");
+  EXPECT_NEAR(accepted.meshes[0].volume_mm3, 5000, 0.2 * 5000);
 }
 
 }  // namespace

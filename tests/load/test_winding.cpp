@@ -9,12 +9,6 @@
 namespace lamina::test {
 namespace {
 
-Mesh mesh_of(const Facets& facets) {
-  load::LoadOptions options;
-  options.repair = false;
-  return std::move(loaded(write_file("winding.stl", binary_stl(facets)), options).meshes[0]);
-}
-
 TEST(Winding, IsOneInsideAndZeroOutside) {
   const Mesh mesh = mesh_of(ball(8, 32));
   const load::WindingTree tree({mesh.triangles.data(), mesh.triangles.size()}, {0, 0, 0});

@@ -9,6 +9,7 @@
 #include "stages/load/load.h"
 #include "stages/raster/raster.h"
 #include "stages/slice/slice.h"
+#include "tests/load/files.h"
 #include "tests/slice/contour_laws.h"
 
 namespace lamina::test {
@@ -24,18 +25,6 @@ struct Checked {
   std::uint32_t parts = 0, layers = 0, united = 0;
   std::uint64_t pixels = 0, differing = 0;
 };
-
-std::vector<fs::path> part_files(const fs::path& folder) {
-  std::vector<fs::path> files;
-  for (const auto& entry : fs::recursive_directory_iterator(folder)) {
-    const std::string name = entry.path().filename().string();
-    if (name.ends_with(".stl") || name.ends_with(".stl.gz") || name.ends_with(".obj") || name.ends_with(".3mf")) {
-      files.push_back(entry.path());
-    }
-  }
-  std::sort(files.begin(), files.end());
-  return files;
-}
 
 void compare_with_bitmap(const ContoursView& contours, const Runs& bitmap, const PixelGrid& grid, Checked& checked) {
   const Runs own = rasterized(contours, grid);

@@ -24,8 +24,8 @@ struct Description {
   std::vector<Diagnosis> diagnosis;   // of each mesh
   std::vector<std::uint32_t> copies;  // of each mesh
   std::vector<Note> notes;            // of the part as planned
-  std::vector<double> volume_mm3;     // of each mesh as planned
-  std::vector<double> capped_share;   // of each mesh as planned
+  PlannedVolumes planned;
+  std::vector<double> capped_share;  // of each mesh as planned
   bool balanced = true;
   bool repairs = false;  // options.repair
 
@@ -35,24 +35,14 @@ struct Description {
     for (std::size_t i = 0; i < diagnosis.size(); ++i) sum += static_cast<Value>(copies[i]) * diagnosis[i].*member;
     return sum;
   }
-  double planned_mm3() const {
-    double sum = 0;
-    for (std::size_t i = 0; i < volume_mm3.size(); ++i) sum += copies[i] * volume_mm3[i];
-    return sum;
-  }
   /// Of all meshes, by volume.
   double planned_on_caps() const {
-    double sum = 0;
-    for (std::size_t i = 0; i < volume_mm3.size(); ++i) sum += copies[i] * volume_mm3[i] * capped_share[i];
-    const double volume = planned_mm3();
-    return volume > 0 ? sum / volume : 0;
-  }
-  void plan(const Part& loaded) {
-    volume_mm3.clear(), capped_share.clear();
-    for (const Mesh& mesh : loaded.meshes) {
-      volume_mm3.push_back(mesh.volume_mm3);
-      capped_share.push_back(mesh.capped_share);
+    double capped = 0, all = 0;
+    for (std::size_t i = 0; i < planned.of_mesh.size(); ++i) {
+      all += copies[i] * planned.of_mesh[i].mm3;
+      capped += copies[i] * planned.of_mesh[i].mm3 * capped_share[i];
     }
+    return all > 0 ? capped / all : 0;
   }
 };
 
@@ -63,7 +53,16 @@ bool may_change(const Description& description) {
                      [](const Diagnosis& found) { return found.volume_mm3 <= 0 || found.non_manifold_edges.count > 0; });
 }
 
-Result<Description> describe(const std::string& path, const LoadOptions& options) {
+/// The volumes of a part as planned.
+Status plan(const Part& part, std::span<const Diagnosis> diagnosis, const SurplusAreas& surplus, Description& description) {
+  Result<PlannedVolumes> volumes = planned_volumes(part.meshes, part.instances, diagnosis, surplus);
+  if (!volumes) return volumes.error();
+  description.planned = std::move(*volumes);
+  for (const Mesh& mesh : part.meshes) description.capped_share.push_back(mesh.capped_share);
+  return {};
+}
+
+Result<Description> describe(const std::string& path, const LoadOptions& options, const SurplusAreas& surplus) {
   const Result<std::string> format = format_of(path, options);
   if (!format) return format.error();
   LoadOptions as_is = options;
@@ -81,14 +80,19 @@ Result<Description> describe(const std::string& path, const LoadOptions& options
   }
   description.notes = part->notes;
   description.part = std::move(*part);
-  description.plan(description.part);
-  if (may_change(description) && options.repair) {
-    for (Mesh& mesh : description.part.meshes) Buffer<Triangle>().swap(mesh.triangles);
-    Result<Part> planned = load(path, options);
-    if (!planned) return planned.error();
-    description.notes = std::move(planned->notes);
-    if (planned->meshes.size() == description.copies.size()) description.plan(*planned);
+  if (!may_change(description) || !options.repair) {
+    if (const Status done = plan(description.part, description.diagnosis, surplus, description); !done) return done.error();
+    return description;
   }
+  for (Mesh& mesh : description.part.meshes) Buffer<Triangle>().swap(mesh.triangles);
+  Result<Part> planned = load(path, options);
+  if (!planned) return planned.error();
+  if (planned->meshes.size() != description.copies.size())
+    return Error{Fault::kInput, path + ": changed while it was read; run it again"};
+  description.notes = std::move(planned->notes);
+  std::vector<Diagnosis> diagnosis;
+  for (const Mesh& mesh : planned->meshes) diagnosis.push_back(diagnose(mesh, 0));
+  if (const Status done = plan(*planned, diagnosis, surplus, description); !done) return done.error();
   return description;
 }
 
@@ -190,6 +194,11 @@ void describe_plan(const Description& description, std::string& text) {
   for (const Note* note : repairs) text += "    " + one_line(note->text) + "\n";
 }
 
+/// How well a volume is known, for scripts.
+const char* name_of(Known known) {
+  return known == Known::kExactly ? "exact" : known == Known::kAbout ? "integrated" : "summed";
+}
+
 nlohmann::ordered_json as_json(const Point3& p) { return {mm(p.x), mm(p.y), mm(p.z)}; }
 
 nlohmann::ordered_json as_json(const Diagnosis& found) {
@@ -213,8 +222,8 @@ nlohmann::ordered_json as_json(const Diagnosis& found) {
 
 }  // namespace
 
-Result<std::string> describe_part_text(const std::string& path, const LoadOptions& options) {
-  const Result<Description> description = describe(path, options);
+Result<std::string> describe_part_text(const std::string& path, const LoadOptions& options, const SurplusAreas& surplus) {
+  const Result<Description> description = describe(path, options, surplus);
   if (!description) return description.error();
   const Description& d = *description;
   std::string text = one_line(path) + "\n";
@@ -232,7 +241,8 @@ Result<std::string> describe_part_text(const std::string& path, const LoadOption
   row(text, "closed", d.balanced ? "yes" : "no");
   const double on_caps = d.planned_on_caps();
   row(text, "planned volume",
-      fmt::format("{:.6g} mm3{}", d.planned_mm3(),
+      fmt::format("{}{:.6g} mm3{}{}", d.planned.all.known == Known::kAbout ? "about " : "", d.planned.all.mm3,
+                  d.planned.all.known == Known::kSummed && d.balanced ? " (what overlaps counts as often as it does)" : "",
                   on_caps > 0 ? fmt::format(", {:.3g} % of the surface is caps of openings: a guess", 100 * on_caps) : ""));
   if (d.diagnosis.size() > 1) describe_meshes(d, text);
   describe_findings(d, text);
@@ -240,8 +250,8 @@ Result<std::string> describe_part_text(const std::string& path, const LoadOption
   return text;
 }
 
-Result<std::string> describe_part_json(const std::string& path, const LoadOptions& options) {
-  const Result<Description> description = describe(path, options);
+Result<std::string> describe_part_json(const std::string& path, const LoadOptions& options, const SurplusAreas& surplus) {
+  const Result<Description> description = describe(path, options, surplus);
   if (!description) return description.error();
   const Description& d = *description;
   nlohmann::ordered_json json;
@@ -255,7 +265,8 @@ Result<std::string> describe_part_json(const std::string& path, const LoadOption
   json["bounds_mm"] = {{"lo", as_json(d.part.bounds.lo)}, {"hi", as_json(d.part.bounds.hi)}};
   json["volume_mm3"] = d.total(&Diagnosis::volume_mm3);
   json["closed"] = d.balanced;
-  json["planned_volume_mm3"] = d.planned_mm3();
+  json["planned_volume_mm3"] = d.planned.all.mm3;
+  json["planned_volume_is"] = name_of(d.planned.all.known);
   json["capped_share"] = d.planned_on_caps();
   json["notes"] = nlohmann::ordered_json::array();
   json["repairs"] = nlohmann::ordered_json::array();
@@ -265,7 +276,7 @@ Result<std::string> describe_part_json(const std::string& path, const LoadOption
     nlohmann::ordered_json mesh = as_json(d.diagnosis[i]);
     mesh["name"] = short_name(d, i);
     mesh["copies"] = d.copies[i];
-    mesh["planned_volume_mm3"] = d.volume_mm3[i];
+    mesh["planned_volume_mm3"] = d.planned.of_mesh[i].mm3;
     mesh["capped_share"] = d.capped_share[i];
     json["meshes"].push_back(std::move(mesh));
   }

@@ -4,22 +4,24 @@
 #include <string>
 
 #include "stages/data/status.h"
+#include "stages/load/info/planned.h"
 #include "stages/load/load.h"
 
 namespace lamina::load {
 
 /// A page about a part, as in its file: format, counts, size in mm, volume, whether it is closed and where it is not,
-/// what was noticed, and what `lamina jet` will do about it: the volume that is planned, where shells that overlap count as
-/// often as they do, and the share of the surface that caps of openings are. Lines end with LF, the last one too. Counts and
-/// volume are of all build items together.
+/// what was noticed, and what `lamina jet` will do about it: the volume that is planned (planned.h), and the share of the
+/// surface that caps of openings are. Lines end with LF, the last one too. Counts and volume are of all build items together.
 ///
 /// options  as for a job; the mesh is diagnosed before any repair, even if options.repair is on
-/// errors   of load(): a file that cannot be planned
-/// cost     a load, a diagnosis (sorting all edges), and a second load with repair if the mesh is not closed
-Result<std::string> describe_part_text(const std::string& path, const LoadOptions& options);
+/// surplus  slices where shells overlap; without it they count as often as they do
+/// errors   of load(): a file that cannot be planned; of surplus
+/// cost     a load, a diagnosis (sorting all edges), a second load and diagnosis with repair if the mesh is not closed, and
+///          some seconds of slicing where shells or objects overlap
+Result<std::string> describe_part_text(const std::string& path, const LoadOptions& options, const SurplusAreas& surplus = {});
 
 /// The same as one JSON object on a line. Places are in mm, in the coordinates of the file after options.transform; triangles
 /// count from 1.
-Result<std::string> describe_part_json(const std::string& path, const LoadOptions& options);
+Result<std::string> describe_part_json(const std::string& path, const LoadOptions& options, const SurplusAreas& surplus = {});
 
 }  // namespace lamina::load

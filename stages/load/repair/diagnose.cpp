@@ -5,6 +5,7 @@
 #include <array>
 
 #include "stages/load/repair/geometry.h"
+#include "stages/load/repair/overlaps.h"
 #include "stages/load/repair/topology.h"
 
 namespace lamina::load {
@@ -33,6 +34,39 @@ class Collector {
   Diagnosis::Finding& finding_;
   std::size_t places_;
 };
+
+struct Shell {
+  Int128 volume = 0;  // sixfold
+  Box box;
+  bool closed = true;
+};
+
+/// More ends than this say little.
+constexpr std::size_t kMostEnds = 64;
+
+void describe_shells(std::span<const Shell> shells, Diagnosis& result) {
+  result.shells = static_cast<std::uint32_t>(shells.size());
+  Int128 outward = 0;
+  std::vector<Box> boxes;
+  for (const Shell& shell : shells) {
+    if (shell.closed && shell.volume < 0) ++result.inverted_shells;
+    outward += shell.volume < 0 ? -shell.volume : shell.volume;
+    boxes.push_back(shell.box);
+  }
+  result.outward_mm3 = static_cast<double>(outward) / 6e18;
+  result.shells_apart = result.non_manifold_edges.count == 0;
+  const bool all_seen =
+      !result.shells_apart || for_each_overlap(boxes, [&](auto, auto) { return result.shells_apart = false; });
+  result.shells_apart = result.shells_apart && all_seen;
+  const bool many = 2 * boxes.size() > kMostEnds;
+  for (const Box& box : many ? std::span<const Box>(&result.bounds, 1) : std::span<const Box>(boxes)) {
+    result.shell_ends.push_back(box.lo.z);
+    result.shell_ends.push_back(box.hi.z);
+  }
+  std::ranges::sort(result.shell_ends);
+  const auto rest = std::ranges::unique(result.shell_ends);
+  result.shell_ends.erase(rest.begin(), rest.end());
+}
 
 }  // namespace
 
@@ -72,10 +106,6 @@ Diagnosis diagnose(const Mesh& mesh, std::size_t places) {
     }
   });
 
-  struct Shell {
-    Int128 volume = 0;
-    bool closed = true;
-  };
   std::vector<Shell> by_representative(triangles.size());
   Int128 volume = 0;
   for (std::uint32_t i = 0; i < triangles.size(); ++i) {
@@ -83,15 +113,13 @@ Diagnosis diagnose(const Mesh& mesh, std::size_t places) {
     Shell& shell = by_representative[shells.find(i)];
     const Int128 part = sixfold_volume(triangles[i], result.bounds.lo);
     shell.volume += part;
+    for (const Point3& corner : {triangles[i].a, triangles[i].b, triangles[i].c}) shell.box.add(corner);
     volume += part;
     if (unbalanced_facet[i]) shell.closed = false;
   }
-  for (std::uint32_t i = 0; i < triangles.size(); ++i) {
-    if (collapsed(indexed.facet[i]) || shells.find(i) != i) continue;
-    ++result.shells;
-    if (by_representative[i].closed && by_representative[i].volume < 0) ++result.inverted_shells;
-  }
+  std::erase_if(by_representative, [](const Shell& shell) { return shell.box.empty(); });
   result.volume_mm3 = static_cast<double>(volume) / 6e18;
+  describe_shells(by_representative, result);
   return result;
 }
 

@@ -24,6 +24,9 @@ struct Diagnosis {
   std::uint32_t inverted_shells = 0;  // closed shells with negative volume
   Box bounds;
   double volume_mm3 = 0;       // signed, exact sum rounded once
+  double outward_mm3 = 0;      // as if all shells were turned outward
+  bool shells_apart = true;    // no boxes of shells overlap, no edge has more than two facets
+  std::vector<Nm> shell_ends;  // heights at which shells begin and end, rising; those of the mesh if they are many
   Finding open_edges;          // used by one facet only
   Finding non_manifold_edges;  // used by more than two facets
   Finding misoriented_edges;   // two facets, both in the same direction

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "stages/load/repair/advice.h"
 #include "stages/load/repair/diagnose.h"
 #include "stages/load/repair/enclosed.h"
 #include "stages/load/repair/geometry.h"
@@ -17,24 +18,23 @@ namespace {
 
 std::string plural(std::uint64_t count, const char* what) { return fmt::format("{} {}{}", count, what, count == 1 ? "" : "s"); }
 
+/// Of a volume: what a weld may change without a word, and at all unless its distance is given.
+constexpr double kDoubtTold = 0.01, kMostDoubt = 0.03;
+
 std::string place(const Box& box) {
   const Point3 at = box.middle();
   return fmt::format("({:.3f}, {:.3f}, {:.3f}) mm", mm(at.x), mm(at.y), mm(at.z));
 }
 
-double diagonal_nm(const Box& box) {
-  const auto width = static_cast<double>(box.width()), depth = static_cast<double>(box.depth()),
-             height = static_cast<double>(box.height());
-  return std::sqrt(width * width + depth * depth + height * height);
-}
-
 /// Repair notes end with the places of the file's own coordinates, so that they can be found in a modeller.
-void describe_repair(const RepairReport& report, const std::string& prefix, std::vector<Note>& notes) {
+/// doubt  of the weld (advice.h)
+void describe_repair(const RepairReport& report, double doubt, const std::string& prefix, std::vector<Note>& notes) {
   const auto note = [&](const std::string& text) { notes.push_back({true, prefix + text}); };
   if (report.duplicates_dropped > 0) note(plural(report.duplicates_dropped, "duplicate facet") + " dropped");
   if (report.vertices_welded > 0)
-    note(fmt::format("{} {} at open edges welded to a neighbour within {:.6g} um", report.vertices_welded,
-                     report.vertices_welded == 1 ? "vertex" : "vertices", static_cast<double>(report.weld_nm) / 1000));
+    note(fmt::format("{} {} at open edges welded to a neighbour within {:.6g} um{}", report.vertices_welded,
+                     report.vertices_welded == 1 ? "vertex" : "vertices", static_cast<double>(report.weld_nm) / 1000,
+                     doubt >= kDoubtTold ? fmt::format(": the volume may be off by {:.2g} %", 100 * doubt) : ""));
   if (report.facets_turned > 0) note(plural(report.facets_turned, "facet") + " turned over to agree with the neighbours");
   if (report.sheets_dropped > 0)
     note(fmt::format("{} with {} dropped (an open rim, hanging on the solid, enclosing nothing)",
@@ -100,36 +100,12 @@ WeldRange weld_range(const LoadOptions& options, const Box& bounds) {
   return {options.weld_nm, std::max(options.weld_nm, most)};
 }
 
-/// Why a repaired mesh is no solid; "" if it is one.
-std::string why_hollow(const Mesh& mesh, const RepairReport& report) {
-  if (mesh.triangles.empty()) return "its facets lie loose and enclose nothing";
-  const Enclosed held = enclosed(mesh);
-  if (held.nothing()) return "its facets enclose nothing";
-  const double before = std::fabs(report.volume_before_mm3);
-  if (held.volume_mm3 >= before / 2) return {};
-  return fmt::format("its facets lie apart: closing them leaves {:.4g} of some {:.4g} mm3", held.volume_mm3, before);
-}
-
-/// The smallest distance, doubled again and again, at which the facets become a solid that hardly hangs on caps; 0 if
-/// there is none up to a twentieth of the size.
-std::int64_t weld_that_closes(const Buffer<Triangle>& triangles, const Box& bounds, std::int64_t tried_nm) {
-  const auto most = static_cast<std::int64_t>(diagonal_nm(bounds) / 20);
-  for (std::int64_t distance = kWeldByItself; distance <= most; distance *= 2) {
-    if (distance <= tried_nm) continue;
-    Mesh mesh;
-    mesh.triangles = triangles;
-    mesh.bounds = bounds;
-    const RepairReport report = repair(mesh, distance);
-    if (why_hollow(mesh, report).empty() && capped_share(mesh) < 0.1) return distance;
-  }
-  return 0;
-}
-
 /// Closes a mesh by its winding number, after welding and turning facets over.
 /// errors  kInput: nothing is left
 Status close_by_winding(const Source& source, const std::string& prefix, const LoadOptions& options, Mesh& mesh, Census& found,
                         std::vector<Note>& notes) {
-  describe_repair(repair(mesh, weld_range(options, mesh.bounds), false), prefix, notes);
+  const RepairReport report = repair(mesh, weld_range(options, mesh.bounds), false);
+  describe_repair(report, weld_doubt(mesh, report), prefix, notes);
   found = census(mesh.triangles, mesh.bounds.middle().z);
   if (!found.balanced) {
     const std::size_t facets = mesh.triangles.size();
@@ -146,7 +122,7 @@ Status close_by_winding(const Source& source, const std::string& prefix, const L
   return {};
 }
 
-/// errors  kInput: what is left is no solid
+/// errors  kInput: what is left is no solid, or may be another one
 Status close(const Source& source, const std::string& prefix, const LoadOptions& options, Mesh& mesh, Census& found,
              std::vector<Note>& notes) {
   const Buffer<Triangle> original = mesh.triangles;
@@ -161,7 +137,16 @@ Status close(const Source& source, const std::string& prefix, const LoadOptions&
                         (distance > 0 ? fmt::format("; --weld {} closes it", distance / 1000)
                                       : "; export it as a solid, or try --repair winding"));
   }
-  describe_repair(report, prefix, notes);
+  const double doubt = weld_doubt(mesh, report);
+  if (doubt > kMostDoubt && options.weld_nm == kWeldByItself) {
+    const std::int64_t distance = weld_that_closes(original, bounds, report.weld_nm - 1);
+    return source.error(
+        fmt::format("{}its open edges lie up to {:.6g} um apart: joining them may change its volume by {:.2g} %; "
+                    "export it as a solid{}",
+                    prefix, static_cast<double>(report.weld_nm) / 1000, 100 * doubt,
+                    distance > 0 ? fmt::format(", or say --weld {} if that will do", distance / 1000) : ""));
+  }
+  describe_repair(report, doubt, prefix, notes);
   return {};
 }
 
@@ -223,8 +208,13 @@ Result<Mesh> finish(const Source& source, const std::string& name, const std::st
   mesh.fingerprint = found.fingerprint;
   mesh.volume_mm3 = found.volume_mm3;
   mesh.capped_share = capped_share(mesh);
-  if (options.repair && turn_over_if_inside_out(mesh))
-    notes.push_back({true, prefix + "all of it was inside out: every facet turned over"});
+  if (options.repair && turn_over_if_inside_out(mesh)) {
+    const std::size_t file = source.path().size() + 2;
+    const std::string told =
+        (name.size() > file ? name.substr(file) : "all of it") + " is inside out and is turned over: its volume is negative";
+    // An object that stands turned in several ways is told once.
+    if (std::ranges::none_of(notes, [&](const Note& note) { return note.text == told; })) notes.push_back({true, told});
+  }
   return mesh;
 }
 

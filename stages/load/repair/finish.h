@@ -12,8 +12,9 @@ namespace lamina::load {
 /// out. Notes on all of it are appended, each after `prefix`.
 ///
 /// errors  kInput, one line: facets are missing, or they enclose nothing, or closing them would lose most of what they
-///         enclose; it names the --weld that would close them if there is one
-/// cost    a sound mesh: one pass; a broken one: repair(), and another repair for each distance that is tried for the message
+///         enclose, or joining edges that lie apart may change the volume by more than 3 % and no --weld is given; it names the
+///         --weld that would close them if there is one
+/// cost    a sound mesh: one pass; a broken one: repair(), and for the message weld_that_closes()
 Result<Mesh> finish(const Source& source, const std::string& name, const std::string& prefix, Facets facets,
                     const LoadOptions& options, std::vector<Note>& notes);
 

@@ -32,6 +32,12 @@ inline double doubled_area_length(const Triangle& t) {
   return std::sqrt(x * x + y * y + z * z);
 }
 
+inline double diagonal_nm(const Box& box) {
+  const auto width = static_cast<double>(box.width()), depth = static_cast<double>(box.depth()),
+             height = static_cast<double>(box.height());
+  return std::sqrt(width * width + depth * depth + height * height);
+}
+
 /// Six times the volume between the facet and a point; exact. Below 2^101, so 2^26 facets add up in 128 bits; sums
 /// over more facets stay within them as long as the volume itself is that of a body within reach.
 inline Int128 sixfold_volume(const Triangle& t, const Point3& from) {

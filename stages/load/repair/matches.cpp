@@ -10,6 +10,8 @@
 #include <array>
 #include <cmath>
 #include <tuple>
+#include <utility>
+#include <vector>
 
 namespace lamina::load {
 namespace {
@@ -43,32 +45,35 @@ Vector inward(const Indexed& mesh, const OpenSide& side) {
   return up;
 }
 
-/// `from` ends of open sides by the cell that they lie in.
+/// `from` ends of some open sides by the cell that they lie in.
 class Cells {
  public:
-  Cells(const Indexed& mesh, std::span<const OpenSide> open, std::int64_t distance)
-      : size_(2 * std::max<std::int64_t>(distance, 1)) {
+  /// reach  how far what is found may lie, nm
+  Cells(const Indexed& mesh, std::span<const OpenSide> open, Buffer<std::uint32_t> sides, std::int64_t reach)
+      : size_(2 * std::max<std::int64_t>(reach, 1)) {
     std::size_t buckets = 1;
-    while (buckets < open.size()) buckets *= 2;
+    while (buckets < sides.size()) buckets *= 2;
     mask_ = buckets - 1;
     first_.resize(buckets + 1);
     std::fill(first_.begin(), first_.end(), 0u);
-    side_.resize(open.size());
-    Buffer<std::uint32_t> bucket(open.size());
-    for (std::size_t i = 0; i < open.size(); ++i) {
-      const Point3& p = mesh.vertex[open[i].from];
+    side_.resize(sides.size());
+    Buffer<std::uint32_t> bucket(sides.size());
+    for (std::size_t i = 0; i < sides.size(); ++i) {
+      const Point3& p = mesh.vertex[open[sides[i]].from];
       bucket[i] = static_cast<std::uint32_t>(hash(cell(p.x), cell(p.y), cell(p.z)));
       ++first_[bucket[i] + 1];
     }
     for (std::size_t i = 1; i < first_.size(); ++i) first_[i] += first_[i - 1];
     Buffer<std::uint32_t> next = first_;
-    for (std::size_t i = 0; i < open.size(); ++i) side_[next[bucket[i]]++] = static_cast<std::uint32_t>(i);
+    for (std::size_t i = 0; i < sides.size(); ++i) side_[next[bucket[i]]++] = sides[i];
   }
 
-  /// Calls visit(side) for all sides that may begin within half of a cell's width of a point, each once, and for some others.
+  /// Calls visit(side) for all sides that may begin within `reach` of a point, and within that of the cells, each once, and for
+  /// some others.
   template <class Visit>
-  void near(const Point3& p, const Visit& visit) const {
-    const auto ends = [&](std::int64_t x) { return std::array{cell(x - size_ / 2), cell(x + size_ / 2)}; };
+  void near(const Point3& p, std::int64_t reach, const Visit& visit) const {
+    const std::int64_t off = std::min(reach, size_ / 2);
+    const auto ends = [&](std::int64_t x) { return std::array{cell(x - off), cell(x + off)}; };
     const std::array xs = ends(p.x), ys = ends(p.y), zs = ends(p.z);
     std::array<std::size_t, 8> seen{};
     std::size_t count = 0;
@@ -86,11 +91,15 @@ class Cells {
 
  private:
   std::int64_t cell(std::int64_t x) const { return floor_div<std::int64_t>(x, size_); }
+  /// Cells of a block of 8 lie side by side, so that neighbours are looked up where the processor's cache has them.
   std::size_t hash(std::int64_t x, std::int64_t y, std::int64_t z) const {
-    std::uint64_t h = static_cast<std::uint64_t>(x) * 0x9e3779b97f4a7c15 ^ static_cast<std::uint64_t>(y) * 0xc2b2ae3d27d4eb4f ^
-                      static_cast<std::uint64_t>(z) * 0x165667b19e3779f9;
+    std::uint64_t h = static_cast<std::uint64_t>(x >> 1) * 0x9e3779b97f4a7c15 ^
+                      static_cast<std::uint64_t>(y >> 1) * 0xc2b2ae3d27d4eb4f ^
+                      static_cast<std::uint64_t>(z >> 1) * 0x165667b19e3779f9;
     h ^= h >> 29;
-    return static_cast<std::size_t>(h * 0xbf58476d1ce4e5b9 >> 32) & mask_;
+    const std::uint64_t block = h * 0xbf58476d1ce4e5b9 >> 32;
+    const auto within = static_cast<std::uint64_t>((x & 1) | (y & 1) << 1 | (z & 1) << 2);
+    return static_cast<std::size_t>(block << 3 | within) & mask_;
   }
 
   std::int64_t size_;
@@ -98,14 +107,49 @@ class Cells {
   Buffer<std::uint32_t> first_, side_;
 };
 
+/// Open sides in cells as wide as their own edges let them be joined: what is found does not grow with the distance.
+class Levels {
+ public:
+  Levels(const Indexed& mesh, std::span<const OpenSide> open, std::span<const float> shortest, std::int64_t distance)
+      : mesh_(mesh), shortest_(shortest), distance_(distance) {
+    std::array<Buffer<std::uint32_t>, kLevels> sides;
+    for (std::uint32_t i = 0; i < open.size(); ++i) {
+      std::size_t level = 0;
+      while (level + 1 < kLevels && reach(open[i].from) <= distance >> (level + 1)) ++level;
+      sides[level].push_back(i);
+    }
+    for (std::size_t level = 0; level < kLevels; ++level)
+      if (!sides[level].empty()) cells_.emplace_back(mesh, open, std::move(sides[level]), distance >> level);
+  }
+
+  /// Calls visit(side) for all sides whose begin may be joined with a vertex, each once, and for some others.
+  template <class Visit>
+  void near(std::uint32_t vertex, const Visit& visit) const {
+    for (const Cells& cells : cells_) cells.near(mesh_.vertex[vertex], reach(vertex), visit);
+  }
+
+ private:
+  static constexpr std::size_t kLevels = 8;
+  /// Rounded up, nm.
+  std::int64_t reach(std::uint32_t vertex) const {
+    const double half = 0.5 * static_cast<double>(shortest_[vertex]);
+    return half < static_cast<double>(distance_) ? static_cast<std::int64_t>(half) + 1 : distance_;
+  }
+
+  const Indexed& mesh_;
+  std::span<const float> shortest_;
+  std::int64_t distance_;
+  std::vector<Cells> cells_;
+};
+
 class Search {
  public:
   Search(const Indexed& mesh, std::span<const OpenSide> open, std::span<const float> shortest, std::int64_t distance)
       : mesh_(mesh), open_(open), shortest_(shortest), distance_(static_cast<double>(distance)) {}
 
-  void from(std::uint32_t i, const Cells& cells, Buffer<Match>& found) const {
+  void from(std::uint32_t i, const Levels& levels, Buffer<Match>& found) const {
     const OpenSide& side = open_[i];
-    cells.near(mesh_.vertex[side.to], [&](std::uint32_t j) {
+    levels.near(side.to, [&](std::uint32_t j) {
       if (i == j) return;
       const OpenSide& other = open_[j];
       const double here = joint(side.to, other.from), there = joint(side.from, other.to);
@@ -116,7 +160,7 @@ class Search {
         found.push_back({here, MatchKind::kAlong, i, j});
       }
     });
-    cells.near(mesh_.vertex[side.from], [&](std::uint32_t j) {
+    levels.near(side.from, [&](std::uint32_t j) {
       if (i >= j) return;
       const OpenSide& other = open_[j];
       const double here = joint(side.from, other.from), there = joint(side.to, other.to);
@@ -173,12 +217,12 @@ Buffer<OpenSide> open_sides(const Indexed& mesh, std::span<const Side> sides) {
 
 Buffer<Match> find_matches(const Indexed& mesh, std::span<const OpenSide> open, std::span<const float> shortest,
                            std::int64_t distance_nm) {
-  const Cells cells(mesh, open, distance_nm);
+  const Levels levels(mesh, open, shortest, distance_nm);
   const Search search(mesh, open, shortest, distance_nm);
   tbb::enumerable_thread_specific<Buffer<Match>> found;
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, open.size(), 1024), [&](const auto& range) {
     Buffer<Match>& own = found.local();
-    for (std::size_t i = range.begin(); i != range.end(); ++i) search.from(static_cast<std::uint32_t>(i), cells, own);
+    for (std::size_t i = range.begin(); i != range.end(); ++i) search.from(static_cast<std::uint32_t>(i), levels, own);
   });
   Buffer<Match> all;
   for (const Buffer<Match>& own : found) all.insert(all.end(), own.begin(), own.end());

@@ -54,15 +54,32 @@ std::uint64_t drop(Work& work, std::span<const std::uint8_t> unwanted) {
   return dropped;
 }
 
+/// Volume between a facet and where it goes to, as far as the facet says, nm3.
+double moved_volume(const Triangle& from, const Triangle& to) {
+  const auto off = [](const Triangle& t, auto axis) {
+    return static_cast<double>(std::int64_t{t.a.*axis} + t.b.*axis + t.c.*axis);
+  };
+  const auto normal = doubled_area(from);
+  return (static_cast<double>(normal[0]) * (off(to, &Point3::x) - off(from, &Point3::x)) +
+          static_cast<double>(normal[1]) * (off(to, &Point3::y) - off(from, &Point3::y)) +
+          static_cast<double>(normal[2]) * (off(to, &Point3::z) - off(from, &Point3::z))) /
+         6;
+}
+
 void weld(Work& work, const WeldRange& range, RepairReport& report) {
   const Welding welding = weld(work.indexed, work.sides, range);
   if (welding.joined == 0) return;
   report.vertices_welded = welding.joined;
   report.weld_nm = welding.distance_nm;
+  double squares = 0;
   for (std::size_t i = 0; i < work.indexed.facet.size(); ++i) {
     const Facet& facet = work.indexed.facet[i];
-    work.mesh.triangles[i] = {work.indexed.vertex[facet[0]], work.indexed.vertex[facet[1]], work.indexed.vertex[facet[2]]};
+    const Triangle welded = {work.indexed.vertex[facet[0]], work.indexed.vertex[facet[1]], work.indexed.vertex[facet[2]]};
+    const double moved = moved_volume(work.mesh.triangles[i], welded) * 1e-18;
+    squares += moved * moved;
+    work.mesh.triangles[i] = welded;
   }
+  report.weld_moved_mm3 = std::sqrt(squares);
   work.indexed = index_mesh(work.mesh.triangles);
   work.refresh();
 }

@@ -15,6 +15,7 @@ struct RepairReport {
   std::uint64_t facets_turned = 0;
   std::uint64_t vertices_welded = 0;
   std::int64_t weld_nm = 0;          // the largest distance that closed something
+  double weld_moved_mm3 = 0;         // what welding moved each facet by, as volumes, added up as errors by chance do
   std::uint64_t sheets_dropped = 0;  // surfaces that hung on a solid and enclosed nothing
   std::uint64_t sheet_facets_dropped = 0;
   std::uint64_t flat_dropped = 0;  // pieces that lie in a plane, and so enclose nothing

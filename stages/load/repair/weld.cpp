@@ -143,37 +143,45 @@ Faults faults(std::span<const Side> sides) {
 
 }  // namespace
 
+std::int64_t farthest_weld(const Indexed& mesh) {
+  float farthest = 0;
+  for (const float length : shortest_edges(mesh))
+    if (length < 1e30f) farthest = std::max(farthest, length);
+  return static_cast<std::int64_t>(std::ceil(farthest / 2)) + 1;
+}
+
 Welding weld(Indexed& mesh, Buffer<Side>& sides, const WeldRange& range) {
   Welding welding;
   Faults now = faults(sides);
-  for (std::int64_t distance = range.start_nm; distance > 0 && now.open > 0;) {
+  Buffer<float> shortest = now.open > 0 ? shortest_edges(mesh) : Buffer<float>();
+  std::int64_t distance = range.start_nm;
+  /// returns  whether a larger distance may close more
+  const auto join_within = [&] {
     const Buffer<OpenSide> open = open_sides(mesh, sides);
-    const Buffer<Match> matches = find_matches(mesh, open, shortest_edges(mesh), distance);
+    const Buffer<Match> matches = find_matches(mesh, open, shortest, distance);
+    if (matches.empty()) return true;
     Clusters clusters(mesh);
     join_matches(open, matches, distance, clusters);
-    if (clusters.joined() > 0) {
-      Buffer<Indexed::Facet> facets = mesh.facet;
-      for (Indexed::Facet& facet : facets)
-        for (std::uint32_t& corner : facet) corner = clusters.find(corner);
-      Buffer<Side> joined = sorted_sides(facets);
-      const Faults then = faults(joined);
-      const bool closes = then.open < now.open;
-      const bool crowds =
-          then.crowded > now.crowded && 8 * (then.crowded - now.crowded) > now.open - std::min(now.open, then.open);
-      if (crowds) break;
-      if (closes) {
-        for (std::uint32_t v = 0; v < mesh.vertex.size(); ++v)
-          if (clusters.find(v) == v) mesh.vertex[v] = clusters.place(v);
-        mesh.facet = std::move(facets);
-        sides = std::move(joined);
-        now = then;
-        welding.joined += clusters.joined();
-        welding.distance_nm = distance;
-      }
-    }
-    if (distance >= range.most_nm) break;
+    if (clusters.joined() == 0) return true;
+    Buffer<Indexed::Facet> facets = mesh.facet;
+    for (Indexed::Facet& facet : facets)
+      for (std::uint32_t& corner : facet) corner = clusters.find(corner);
+    Buffer<Side> joined = sorted_sides(facets);
+    const Faults then = faults(joined);
+    if (then.crowded > now.crowded && 8 * (then.crowded - now.crowded) > now.open - std::min(now.open, then.open)) return false;
+    if (then.open >= now.open) return true;
+    for (std::uint32_t v = 0; v < mesh.vertex.size(); ++v)
+      if (clusters.find(v) == v) mesh.vertex[v] = clusters.place(v);
+    mesh.facet = std::move(facets);
+    sides = std::move(joined);
+    now = then;
+    shortest = shortest_edges(mesh);
+    welding.joined += clusters.joined();
+    welding.distance_nm = distance;
+    return true;
+  };
+  while (distance > 0 && now.open > 0 && join_within() && distance < range.most_nm)
     distance = std::min(2 * distance, range.most_nm);
-  }
   return welding;
 }
 

@@ -36,4 +36,8 @@ struct Welding {
 /// cost    per distance O(T) and the sorting of sides; parallel where it searches
 Welding weld(Indexed& mesh, Buffer<Side>& sides, const WeldRange& range);
 
+/// Half of the longest of all edges that are the shortest at a vertex, nm, rounded up: vertices further apart than this are
+/// never joined, whatever the distance.
+std::int64_t farthest_weld(const Indexed& mesh);
+
 }  // namespace lamina::load
