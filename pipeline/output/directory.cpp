@@ -119,13 +119,18 @@ std::vector<ManifestFile> find_manifests(const std::string& directory) {
   return found;
 }
 
+bool take_layer_index(std::string_view& name, std::uint32_t& index) {
+  const auto [stop, error] = std::from_chars(name.data(), name.data() + name.size(), index);
+  const auto digits = static_cast<std::size_t>(stop - name.data());
+  if (error != std::errc() || digits < 6 || (digits > 6 && name.front() == '0')) return false;
+  name.remove_prefix(digits);
+  return true;
+}
+
 bool read_layer_file_name(std::string_view name, std::uint32_t& index, bool& partial) {
   partial = take_temporary_end(name);
-  const std::size_t digits = std::min(name.find_first_not_of("0123456789"), name.size());
-  if (digits < 6) return false;
-  const auto [stop, error] = std::from_chars(name.data(), name.data() + digits, index);
-  if (error != std::errc()) return false;
-  std::string_view extension = name.substr(digits);
+  std::string_view& extension = name;
+  if (!take_layer_index(name, index)) return false;
   if (extension.starts_with('-')) extension.remove_prefix(std::min(extension.find('.'), extension.size()));  // a material
   return std::ranges::any_of(write::image_formats(), [&](const write::ImageFormat& format) {
     return !extension.empty() && extension == format.extension;
@@ -134,12 +139,8 @@ bool read_layer_file_name(std::string_view name, std::uint32_t& index, bool& par
 
 bool read_program_file_name(std::string_view name, std::uint32_t& index, bool& partial) {
   partial = take_temporary_end(name);
-  const std::size_t digits = std::min(name.find_first_not_of("0123456789"), name.size());
-  if (digits < 6) return false;
-  const auto [stop, error] = std::from_chars(name.data(), name.data() + digits, index);
-  if (error != std::errc()) return false;
-  const std::string_view extension = name.substr(digits);
-  return std::ranges::any_of(write::dialects(), [&](const write::Dialect& one) { return extension == one.extension; });
+  return take_layer_index(name, index) &&
+         std::ranges::any_of(write::dialects(), [&](const write::Dialect& one) { return name == one.extension; });
 }
 
 namespace {
@@ -183,14 +184,16 @@ Result<Neighbours> check_manifests(const Job& job, const write::Claim* claim) {
 
 }  // namespace
 
-Status check_output(const Job& job) {
+Result<bool> is_directory(const std::string& output) {
   count(Decision::kOutput);
   std::error_code error;
-  const fs::file_status status = fs::status(job.output, error);
-  if (!fs::exists(status)) return {};
-  if (!fs::is_directory(status)) {
-    return Error{Fault::kOutput, fmt::format("{}: is a file, not a directory; name another one with -o", job.output)};
-  }
+  const fs::file_status status = fs::status(output, error);
+  if (!fs::exists(status) || fs::is_directory(status)) return fs::exists(status);
+  return Error{Fault::kOutput, fmt::format("{}: is a file, not a directory; name another one with -o", output)};
+}
+
+Status check_output(const Job& job) {
+  if (const auto there = is_directory(job.output); !there || !*there) return there ? Status() : there.error();
   const auto found = check_manifests(job, nullptr);
   if (!found) return found.error();
   if (!(job.resume && found->begun) && !job.overwrite && !found->shared && !layer_files(job.output).empty()) {
@@ -236,11 +239,8 @@ Status check_stays_inside(const std::string& directory) {
   return {};
 }
 
-Result<write::Claim> claim_output(const Job& job) {
-  const fs::path directory = job.output;
-  std::error_code error;
-  fs::create_directories(directory, error);
-  if (error) return cannot(directory, error.value());
+Result<write::Claim> claim_output(const Job& job, write::MadeFolders& made) {
+  if (const std::error_code error = made.make(job.output)) return cannot(job.output, error.value());
   auto claim = write::Claim::take(job.output + "/" + manifest_name(job), job.output);
   if (!claim) return claim.error();
   if (Status status = check_begun_manifest(write::part_of(job.output + "/" + manifest_name(job))); !status)
@@ -250,8 +250,8 @@ Result<write::Claim> claim_output(const Job& job) {
   return claim;
 }
 
-Result<write::Claim> prepare_output(const Job& job) {
-  auto claim = claim_output(job);
+Result<write::Claim> prepare_output(const Job& job, write::MadeFolders& made) {
+  auto claim = claim_output(job, made);
   if (!claim) return claim.error();
   if (Status status = check_stays_inside(job.output); !status) return status.error();
   const fs::path directory = job.output, layers = directory / "layers";
@@ -269,6 +269,10 @@ Result<write::Claim> prepare_output(const Job& job) {
     if (::access(place.c_str(), W_OK | X_OK) != 0) return cannot(place, errno);
   }
   if (!job.overwrite) {
+    const std::string own = job.output + "/" + manifest_name(job);
+    // Without any record, layers are what a run with --overwrite was killed over.
+    const bool unknown = job.resume && !job.shard && !fs::exists(own, error) && !has_manifest_head(write::part_of(own));
+    if (Status status = unknown ? remove_layers(job.output) : Status(); !status) return status.error();
     if (!job.shard) sweep_partial_files(job.output);
     return claim;
   }

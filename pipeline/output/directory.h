@@ -11,6 +11,7 @@
 #include "pipeline/job/job.h"
 #include "stages/data/status.h"
 #include "stages/write/file.h"
+#include "stages/write/leftovers.h"
 #include "stages/write/manifest/manifest.h"
 #include "stages/write/temporary.h"
 
@@ -29,6 +30,8 @@ std::string manifest_name(const Job& job);
 /// All manifests of a directory, the whole job's first, then by shard; empty if the directory is missing.
 std::vector<ManifestFile> find_manifests(const std::string& directory);
 
+/// Takes the index off a layer's file name: the digits that lamina writes, 000042 or 1234567; false for other names.
+bool take_layer_index(std::string_view& name, std::uint32_t& index);
 /// Parses the name of a layer's file: 000042.tif, 000042-bronze.tif, or of a temporary file of one; false for others.
 bool read_layer_file_name(std::string_view name, std::uint32_t& index, bool& partial);
 /// The same for the print program of a layer, 000042.gcode.
@@ -40,9 +43,12 @@ bool read_program_file_name(std::string_view name, std::uint32_t& index, bool& p
 ///         of the same split. kOutput if the directory's path is a file, or another run is writing into it
 Status check_output(const Job& job);
 
+/// Whether an output directory is there. errors  kOutput if its path is a file
+Result<bool> is_directory(const std::string& output);
+
 /// Creates the directory and claims it for the rest of the run, or for the job's shard of it. Fails if another run took it
 /// while this one loaded its parts. errors  kUsage, kOutput
-Result<write::Claim> claim_output(const Job& job);
+Result<write::Claim> claim_output(const Job& job, write::MadeFolders& made);
 
 /// Fails if a manifest in a shard's directory belongs to another job. Of its own: a shard keeps all other layers and cannot
 /// distinguish other shards' layers from an earlier job's, so the user must clear the directory. Of another shard: the two
@@ -57,7 +63,7 @@ Status check_stays_inside(const std::string& directory);
 /// Call after check_output. Claims the directory and creates its layers/. With --overwrite, removes the output of an
 /// earlier job (a shard: only its own manifest), otherwise the half-written files of an interrupted run.
 /// errors  those of claim_output; kOutput with the system's reason
-Result<write::Claim> prepare_output(const Job& job);
+Result<write::Claim> prepare_output(const Job& job, write::MadeFolders& made);
 
 /// How a layer's file is written in a claimed directory.
 write::FileOptions layer_file_options(const Job& job);

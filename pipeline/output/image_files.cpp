@@ -58,7 +58,7 @@ ImageFiles::ImageFiles(const Plan& plan)
 Status ImageFiles::open() {
   const Job& job = plan_.job;
   if (Status status = check_shard_fits(job, head_); !status) return status;
-  auto claim = prepare_output(job);
+  auto claim = prepare_output(job, made_);
   if (!claim) return claim.error();
   if (job.shard) sweep_partial_files(job.output, head_.first_layer, head_.last_layer);
   if (job.resume) {
@@ -160,6 +160,7 @@ Status ImageFiles::record_kept_below(std::uint32_t layer) {
 
 Status ImageFiles::record(const LayerRecord& record) {
   if (Status status = record_kept_below(record.layer.index); !status) return status;
+  if (plan_.job.sync == Sync::kJob) sync_->wrote(record.bytes + record.program.bytes);
   return manifest_->append(record);
 }
 
@@ -181,6 +182,7 @@ void ImageFiles::discard() {
     std::error_code ignored;
     if (!std::filesystem::is_symlink(path, ignored)) std::filesystem::remove(path, ignored);  // fails if other files remain
   }
+  made_.take_back();
 }
 
 }  // namespace lamina::pipeline

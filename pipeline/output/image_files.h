@@ -15,6 +15,7 @@
 #include "stages/data/runs.h"
 #include "stages/data/status.h"
 #include "stages/write/image_format.h"
+#include "stages/write/leftovers.h"
 #include "stages/write/manifest/manifest.h"
 #include "stages/write/sync.h"
 
@@ -75,6 +76,7 @@ class ImageFiles {
   std::vector<std::uint32_t> todo_;
   std::vector<LayerRecord> kept_;
   std::size_t next_kept_ = 0;
+  write::MadeFolders made_;
 };
 
 }  // namespace lamina::pipeline

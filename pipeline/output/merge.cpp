@@ -5,11 +5,15 @@
 #include <algorithm>
 #include <filesystem>
 #include <optional>
+#include <span>
 
+#include "pipeline/job/file.h"
 #include "pipeline/output/directory.h"
 #include "pipeline/output/print_program.h"
-#include "stages/write/leftovers.h"
+#include "stages/sanity/records.h"
+#include "stages/write/bring.h"
 #include "stages/write/manifest/manifest.h"
+#include "stages/write/replaceable.h"
 #include "stages/write/sync.h"
 
 namespace lamina::pipeline {
@@ -43,7 +47,7 @@ Result<std::vector<Shard>> read_shards(const std::vector<std::string>& directori
     for (const ManifestFile& file : files) {
       const std::string path = (fs::path(directory) / file.name).string();
       // An earlier merge into this directory was interrupted, or failed to remove the shards' manifests.
-      const bool of_merge = !file.shard && files.back().shard && fs::equivalent(directory, output, error);
+      const bool of_merge = !file.shard && files.back().shard && write::same_file(directory, output);
       if (of_merge && file.partial) continue;
       if (file.partial) return unmatched(fmt::format("{}: this shard is not finished; run it again with --resume", path));
       Result<Manifest> manifest = read_manifest(path);
@@ -90,24 +94,17 @@ Status check_plain(const fs::path& file) {
                                fs::exists(status) ? "a link or a device, not a file" : "missing"));
 }
 
-// Links a file to another name, or copies it if linking fails. The name appears once the file is complete.
 Status bring_file(const fs::path& from, const fs::path& to, MergeReport& report) {
-  const fs::path fresh = write::temporary_name(to.string());
-  std::error_code error;
-  fs::create_hard_link(from, fresh, error);
-  const bool linked = !error;
-  if (!linked) fs::copy_file(from, fresh, error);
-  if (!error) fs::rename(fresh, to, error);
-  write::remove_or_note(fresh.string());  // stays if `to` was a name of the same file already, and after an error
-  if (error) return Error{Fault::kOutput, fmt::format("{}: {}", to.string(), error.message())};
-  ++(linked ? report.linked : report.copied);
+  const auto linked = write::bring_file(from.string(), to.string());
+  if (!linked) return linked.error();
+  ++(*linked ? report.linked : report.copied);
   return {};
 }
 
 // Links every file of a shard into `output`.
 Status bring_files(const Shard& shard, const std::string& output, MergeReport& report) {
   std::error_code error;
-  const bool in_place = fs::equivalent(shard.directory, output, error);
+  const bool in_place = write::same_file(shard.directory, output);
   const ManifestHead& head = shard.manifest.head;
   const auto bring = [&](const std::string& name, std::uint64_t bytes) -> Status {
     if (name.empty()) return {};  // a format without files, a job without a machine
@@ -155,10 +152,7 @@ Status remove_shard_manifests(const std::string& output) {
 /// have been interrupted while it removed the shards' manifests.
 std::optional<Shard> whole_job(const std::vector<std::string>& directories, const std::vector<Shard>& shards,
                                const std::string& output) {
-  const auto is_output = [&](const std::string& directory) {
-    std::error_code error;
-    return fs::equivalent(directory, output, error);
-  };
+  const auto is_output = [&](const std::string& directory) { return write::same_file(directory, output); };
   if (!std::ranges::all_of(directories, is_output)) return std::nullopt;
   const std::string path = (fs::path(output) / "manifest.json").string();
   auto manifest = read_manifest(path);
@@ -168,21 +162,41 @@ std::optional<Shard> whole_job(const std::vector<std::string>& directories, cons
   return Shard{output, path, std::move(*manifest)};
 }
 
+/// shards  that cover all layers, in their order
+Status judge(std::span<const Shard> shards, bool strict, bool allow_empty, std::vector<Warning>& warnings) {
+  const ManifestHead& head = shards.front().manifest.head;
+  if (head.product != Product::kImages) return {};
+  Job job;
+  if (Status status = read_job_text(head.job_toml, shards.front().path, job); !status) return unmatched(status.error().message);
+  sanity::LayerRecords records;
+  for (const Shard& shard : shards) {
+    for (const LayerRecord& record : shard.manifest.layers)
+      records.add(record.layer, record.set_pixels, record.program.lost, record.capped_rows);
+  }
+  const bool thins = fills(job) || job.dose.core < 1;
+  const Status status = records.judge(head.parts, thins, allow_empty, warnings);
+  return status && strict ? sanity::refuse_warnings(warnings) : status;
+}
+
 }  // namespace
 
-Result<MergeReport> merge(const std::vector<std::string>& directories, const std::string& output) {
-  Result<std::vector<Shard>> shards = read_shards(directories, output);
+Result<MergeReport> merge(const MergeRequest& request) {
+  const std::string& output = request.output;
+  Result<std::vector<Shard>> shards = read_shards(request.directories, output);
   if (!shards) return shards.error();
   MergeReport report;
   report.output = output;
-  if (const auto whole = whole_job(directories, *shards, output)) {
+  if (const auto whole = whole_job(request.directories, *shards, output)) {
+    if (Status status = judge({&*whole, 1}, request.strict, true, report.warnings); !status) return status.error();
     if (Status status = bring_files(*whole, output, report); !status) return status.error();
     if (Status status = remove_shard_manifests(output); !status) return status.error();
     report.layers = whole->manifest.layers.size();
     return report;
   }
-  if (shards->empty()) return unmatched(fmt::format("{}: holds no manifest of a shard", directories.front()));
+  if (shards->empty()) return unmatched(fmt::format("{}: holds no manifest of a shard", request.directories.front()));
   if (Status status = check_coverage(*shards); !status) return status.error();
+  const Status sane = judge(*shards, request.strict, request.allow_empty, report.warnings);
+  if (!sane) return sane.error();
 
   std::error_code error;
   fs::create_directories(output, error);

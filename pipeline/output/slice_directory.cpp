@@ -10,7 +10,7 @@
 #include "pipeline/job/decisions.h"
 #include "pipeline/output/directory.h"
 #include "stages/write/leftovers.h"
-#include "stages/write/manifest/manifest.h"
+#include "stages/write/manifest/kept.h"
 #include "stages/write/replaceable.h"
 
 namespace lamina::pipeline {
@@ -25,10 +25,9 @@ std::vector<fs::path> layer_files(const Job& job) {
   for (fs::directory_iterator entry(fs::path(job.output) / "layers", error), end; !error && entry != end;
        entry.increment(error)) {
     const std::string name = entry->path().filename().string();
-    const std::size_t digits = std::min(name.find_first_not_of("0123456789"), name.size());
-    if (digits >= 6 && (entry->path().extension() == ".svg" || entry->path().extension() == ".cli")) {
-      files.push_back(entry->path());
-    }
+    std::string_view rest = name;
+    std::uint32_t index = 0;
+    if (take_layer_index(rest, index) && (rest == ".svg" || rest == ".cli")) files.push_back(entry->path());
   }
   return files;
 }
@@ -53,16 +52,11 @@ std::string slice_file_name(const Job& job) {
 }
 
 Status check_slice_output(const Job& job) {
-  count(Decision::kOutput);
+  if (const auto there = is_directory(job.output); !there || !*there) return there ? Status() : there.error();
   std::error_code error;
-  const fs::file_status status = fs::status(job.output, error);
-  if (!fs::exists(status)) return {};
-  if (!fs::is_directory(status)) {
-    return Error{Fault::kOutput, fmt::format("{}: is a file, not a directory; name another one with -o", job.output)};
-  }
   if (Status busy = write::check_not_being_written(job.output + "/manifest.json"); !busy) return busy;
   const std::vector<ManifestFile> manifests = find_manifests(job.output);
-  const bool replaces = job.overwrite || job.resume;
+  const bool replaces = job.overwrite || (job.resume && !manifests.empty());
   if (!replaces && !manifests.empty()) {
     return Error{Fault::kUsage, fmt::format("{}: holds {}; {}, or name another directory", job.output,
                                             manifests.front().partial ? "an interrupted job" : "a job",
@@ -72,7 +66,7 @@ Status check_slice_output(const Job& job) {
   for (const std::string& name : {std::string("job.toml"), slice_file_name(job)}) {
     const fs::path file = fs::path(job.output) / name;
     for (const PartRequest& part : job.parts) {
-      if (fs::equivalent(file, part.path, error)) {
+      if (write::same_file(file.string(), part.path)) {
         return Error{Fault::kUsage,
                      fmt::format("{}: is a part of the job and would be replaced; name another directory", file.string())};
       }
@@ -99,21 +93,15 @@ Status check_slice_output(const Job& job) {
 // Its name needs no random digits: the directory is claimed.
 fs::path waiting_layers(const Job& job) { return fs::path(job.output) / "layers.lamina.part"; }
 
-Result<write::Claim> prepare_slice_directory(const Job& job) {
-  auto claim = claim_output(job);
-  if (!claim) return claim;
-  if (Status status = check_stays_inside(job.output); !status) return status.error();
+Status prepare_waiting_layers(const Job& job, bool keeps) {
   const fs::path waiting = waiting_layers(job);
+  if (keeps) return {};
   std::error_code error;
-  // Of a run that was killed; a link goes, not what it leads to.
-  std::error_code absent;
-  const bool stays = job.resume && job.slice.file_a_layer && fs::is_directory(fs::symlink_status(waiting, absent));
-  if (!stays) fs::remove_all(waiting, error);
-  if (!error && !stays && job.slice.file_a_layer && !fs::create_directory(waiting, error) && !error) {
+  fs::remove_all(waiting, error);  // of a run that was killed; a link goes, not what it leads to
+  if (!error && job.slice.file_a_layer && !fs::create_directory(waiting, error) && !error) {
     error = std::make_error_code(std::errc::file_exists);
   }
-  if (error) return cannot(waiting, error);
-  return claim;
+  return error ? Status(cannot(waiting, error)) : Status();
 }
 
 namespace {
@@ -131,28 +119,22 @@ std::optional<fs::path> other_slice_file(const Job& job) {
 
 }  // namespace
 
-Status replace_earlier_slices(const Job& job) {
+std::vector<fs::path> earlier_slices(const Job& job) {
+  if (!job.overwrite && !job.resume) return {};
+  std::vector<fs::path> earlier;
+  if (auto other = other_slice_file(job)) earlier.push_back(std::move(*other));  // while its manifest still tells of it
+  for (const char* name : {"manifest.json", "job.toml"}) earlier.push_back(fs::path(job.output) / name);
+  for (fs::path& file : layer_files(job)) earlier.push_back(std::move(file));
+  return earlier;
+}
+
+Status replace_slices(const Job& job, const std::vector<fs::path>& earlier) {
   std::error_code error;
-  if (job.overwrite || (job.resume && fs::exists(fs::path(job.output) / "manifest.json"))) {
-    std::vector<fs::path> earlier = layer_files(job);
-    if (auto other = other_slice_file(job)) earlier.push_back(std::move(*other));
-    for (const char* name : {"manifest.json", "job.toml"}) earlier.push_back(fs::path(job.output) / name);
-    for (const fs::path& file : earlier) {
-      fs::remove(file, error);
-      if (error) return cannot(file, error);
-    }
+  for (const fs::path& file : earlier) {
+    fs::remove(file, error);
+    if (error) return cannot(file, error);
   }
-  if (!job.slice.file_a_layer) return {};
-  const fs::path layers = fs::path(job.output) / "layers";
-  fs::rename(waiting_layers(job), layers, error);  // takes the place of an empty directory too
-  if (!error) return {};
-  error.clear();
-  for (fs::directory_iterator entry(waiting_layers(job), error), end; !error && entry != end; entry.increment(error)) {
-    fs::rename(entry->path(), layers / entry->path().filename(), error);
-    if (error) return cannot(layers, error);
-  }
-  if (!error) fs::remove(waiting_layers(job), error);
-  return error ? Status(cannot(layers, error)) : Status();
+  return job.slice.file_a_layer ? take_waiting(waiting_layers(job).string(), job.output + "/layers") : Status();
 }
 
 void remove_waiting_layers(const Job& job) {

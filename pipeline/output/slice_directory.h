@@ -4,10 +4,10 @@
 #include <filesystem>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "pipeline/job/job.h"
 #include "stages/data/status.h"
-#include "stages/write/temporary.h"
 
 namespace lamina::pipeline {
 
@@ -23,12 +23,14 @@ Status check_slice_output(const Job& job);
 /// Temporary directory of per-layer files until all are written.
 std::filesystem::path waiting_layers(const Job& job);
 
-/// Call after check_slice_output: claims the directory and keeps existing files. errors  of claim_output, kOutput
-Result<write::Claim> prepare_slice_directory(const Job& job);
+/// Makes the folder of waiting layers for a job that has them; of an earlier run it stays only if `keeps`. errors  kOutput
+Status prepare_waiting_layers(const Job& job, bool keeps);
 
-/// Call when the job is complete: removes an earlier job's files and renames the waiting layers.
-/// errors  kOutput
-Status replace_earlier_slices(const Job& job);
+/// The files that an earlier job leaves to this one; its manifest before those of layers, and before new ones are named.
+std::vector<std::filesystem::path> earlier_slices(const Job& job);
+
+/// Call when the job is complete: removes earlier files in their order, and renames the waiting layers. errors  kOutput
+Status replace_slices(const Job& job, const std::vector<std::filesystem::path>& earlier);
 
 /// Of a job that has failed; what cannot be removed is noted (stages/write/leftovers.h).
 void remove_waiting_layers(const Job& job);

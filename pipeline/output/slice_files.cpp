@@ -11,7 +11,6 @@
 #include "stages/data/text/version.h"
 #include "stages/write/file.h"
 #include "stages/write/file_target.h"
-#include "stages/write/manifest/kept.h"
 
 namespace lamina::pipeline {
 
@@ -44,23 +43,28 @@ std::string SliceFiles::output() const {
 
 Status SliceFiles::open() {
   const Job& job = plan_.job;
-  auto claim = prepare_slice_directory(job);
+  auto claim = claim_output(job, made_);
   if (!claim) return claim.error();
+  if (Status status = check_stays_inside(job.output); !status) return status;
   ManifestHead head = plan_head(plan_);
   head.format = job.slice.format;
   const bool one_file = job.slice.format != "null" && !file_a_layer_;
   if (file_a_layer_ && encoder_) head.extension = slice_extension(job);
   if (one_file) head.file = slice_file_name(job);
-  const std::string manifest_path = job.output + "/manifest.json";
-  if (one_file && encoder_) {
-    Buffer<char> start;
-    encoder_->head(head_, start);
-    auto file = LayeredFile::open({output(), manifest_path, job.resume, job.overwrite, job.sync}, head,
-                                  {start.data(), start.size()}, std::move(*claim));
-    if (!file) return file.error();
-    file_.emplace(std::move(*file));
+  if (one_file && encoder_) return open_single(head, std::move(*claim));
+  const std::string manifest_path = job.output + "/manifest.json", waiting = waiting_layers(job).string();
+  if (job.resume) {
+    auto kept = find_kept_job(job.output, waiting, head);
+    if (!kept) return kept.error();
+    kept_ = std::move(*kept);
+    bytes_ = kept_.bytes;
+  }
+  if (kept_.finished) {
+    write::remove_or_note(write::part_of(manifest_path));
+    remove_waiting_layers(job);
     return {};
   }
+  if (Status status = prepare_waiting_layers(job, !kept_.layers.empty()); !status) return status;
   if (one_file) {
     auto package = write::Slice3mfWriter::make(head_);
     if (!package) return package.error();
@@ -68,35 +72,35 @@ Status SliceFiles::open() {
   }
   ManifestWriter::Options options{job.sync};
   if (file_a_layer_) {
-    if (Status status = find_kept(head); !status) return status;
-    const std::string waiting = waiting_layers(job).string();
     sync_ = write::FolderSync::of({waiting});
     options.sync_layers = [waiting] {
       const int reason = write::sync_folder(waiting);
       return reason == 0 ? Status() : Status(write::write_failure(waiting, reason));
     };
   }
-  auto manifest = ManifestWriter::open(manifest_path, head, kept_, options, std::move(*claim));
+  auto manifest = ManifestWriter::open(manifest_path, head, kept_.layers, options, std::move(*claim));
   if (!manifest) return manifest.error();
   manifest_.emplace(std::move(*manifest));
   return {};
 }
 
-/// Files a layer wait beside the begun manifest until all are there.
-Status SliceFiles::find_kept(const ManifestHead& head) {
-  const std::string begun = write::part_of(plan_.job.output + "/manifest.json");
-  if (!plan_.job.resume || !has_manifest_head(begun)) return {};
-  const auto earlier = read_manifest(begun);
-  if (!earlier) return earlier.error();
-  if (Status status = check_same_job(begun, *earlier, head); !status) return status;
-  kept_ = records_with_files(waiting_layers(plan_.job).string(), *earlier);
-  for (const LayerRecord& record : kept_) bytes_ += record.bytes;
+/// One text file of all layers.
+Status SliceFiles::open_single(const ManifestHead& head, write::Claim claim) {
+  const Job& job = plan_.job;
+  Buffer<char> start;
+  encoder_->head(head_, start);
+  auto file = LayeredFile::open({output(), job.output + "/manifest.json", job.resume, job.overwrite, job.sync}, head,
+                                {start.data(), start.size()}, std::move(claim));
+  if (!file) return file.error();
+  remove_waiting_layers(job);  // of a run that was killed
+  file_.emplace(std::move(*file));
   return {};
 }
 
 Status SliceFiles::keep() {
   waits_ = true;
-  return file_ ? file_->keep() : manifest_->flush();
+  if (file_) return file_->keep();
+  return manifest_ ? manifest_->flush() : Status();
 }
 
 Sections::TextBytes SliceFiles::text_bytes() const {
@@ -134,57 +138,69 @@ Status SliceFiles::record(const write::SliceLayer& layer, const Buffer<char>& te
     if (Status status = package_->add(layer); !status) return status;
   }
   bytes_ += record.bytes;
+  if (sync_ && plan_.job.sync == Sync::kJob) sync_->wrote(record.bytes);
   return manifest_->append(record);
 }
 
-/// Saves the job for lamina preview, which plans layers again, without settings that do not affect bytes. Part names that
-/// a job file cannot hold are not an error.
-Status SliceFiles::save_plan() const {
-  Job kept = plan_.job;
+namespace {
+
+/// The job for lamina preview, which plans layers again, without settings that do not affect bytes.
+Result<write::File> write_plan(const Job& job) {
+  Job kept = job;
   kept.threads = 0;
   kept.memory_bytes = Job().memory_bytes;
   kept.output.clear();
   kept.sync = Job().sync;
-  const Status status = save_job(plan_.job.output + "/job.toml", kept, plan_.job.sync != Sync::kOff);
-  return !status && status.error().fault == Fault::kOutput ? status : Status();
+  return write_job(job.output + "/job.toml", kept, job.sync != Sync::kOff);
 }
 
-Result<FileDigest> SliceFiles::finish_package() {
-  write::FileOptions how{.replace = plan_.job.overwrite || plan_.job.resume};
+}  // namespace
+
+Result<write::File> SliceFiles::write_package() {
+  write::FileOptions how{.hash = true, .replace = plan_.job.overwrite || plan_.job.resume};
   if (plan_.job.sync == Sync::kOff) how.durable = write::Durable::kNo;
-  if (Status status = package_->finish(output(), how); !status) return status.error();
-  const auto digest = digest_file(output());
-  if (!digest) return Error{Fault::kOutput, digest.error().message};
-  return digest;
+  return package_->write(output(), how);
 }
 
+// All that needs space is written before anything of an earlier job goes.
 Result<std::uint64_t> SliceFiles::finish() {
+  if (kept_.finished) return bytes_;
   if (file_ && file_->finished()) return file_->size();
-  FileDigest package;
+  auto plan = write_plan(plan_.job);
+  // Part names that a job file cannot hold are no error.
+  if (!plan && plan.error().fault == Fault::kOutput) return plan.error();
+  std::optional<write::File> package;
   if (package_) {
-    auto digest = finish_package();
-    if (!digest) return digest.error();
-    package = *digest;
-    bytes_ = package.bytes;
+    auto written = write_package();
+    if (!written) return written.error();
+    package.emplace(std::move(*written));
   }
-  if (Status status = replace_earlier_slices(plan_.job); !status) return status.error();
-  if (Status status = save_plan(); !status) return status.error();
-  finished_ = true;
-  if (!file_) {
-    if (sync_ && plan_.job.sync != Sync::kOff) {
-      if (Status status = sync_->sync(); !status) return status.error();
+  const auto take_names = [&, earlier = earlier_slices(plan_.job)]() -> Status {
+    Status status = replace_slices(plan_.job, earlier);
+    for (write::File* file : {plan ? &*plan : nullptr, package ? &*package : nullptr}) {
+      if (!status || file == nullptr) continue;
+      const auto named = file->finish();
+      if (!named) status = named.error();
     }
-    if (Status status = manifest_->finish(package); !status) return status.error();
-    return bytes_;
+    return status && sync_ && plan_.job.sync != Sync::kOff ? sync_->sync() : status;
+  };
+  if (!file_) {
+    const FileDigest digest = package ? package->digest() : FileDigest();
+    bytes_ += digest.bytes;
+    const Status status = manifest_->finish(digest, take_names);
+    finished_ = status.ok();
+    return status ? Result<std::uint64_t>(bytes_) : status.error();
   }
   Buffer<char> end;
   encoder_->tail(head_, end);
-  return file_->finish({end.data(), end.size()});
+  return file_->finish({end.data(), end.size()}, take_names);
 }
 
 void SliceFiles::discard() {
   if (file_) file_->discard();
   if (manifest_) manifest_->discard();
+  if (manifest_) remove_waiting_layers(plan_.job);
+  made_.take_back();
 }
 
 }  // namespace lamina::pipeline

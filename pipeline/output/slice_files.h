@@ -10,6 +10,9 @@
 #include "pipeline/plan/plan.h"
 #include "stages/data/buffer.h"
 #include "stages/data/status.h"
+#include "stages/write/file.h"
+#include "stages/write/leftovers.h"
+#include "stages/write/manifest/kept.h"
 #include "stages/write/manifest/layered_file.h"
 #include "stages/write/slice3mf/slice3mf.h"
 #include "stages/write/slice_format.h"
@@ -27,7 +30,7 @@ class SliceFiles {
   /// errors  kUsage, kOutput
   Status open();
   /// The finished layers of an interrupted job, from the first on.
-  const std::vector<LayerRecord>& kept() const { return file_ ? file_->kept() : kept_; }
+  const std::vector<LayerRecord>& kept() const { return file_ ? file_->kept() : kept_.layers; }
   /// The output path for the summary.
   std::string output() const;
   /// Bytes of text for points and paths.
@@ -48,9 +51,8 @@ class SliceFiles {
   bool keeps() const { return file_.has_value() || (file_a_layer_ && encoder_); }
 
  private:
-  Status find_kept(const ManifestHead& head);
-  Status save_plan() const;
-  Result<FileDigest> finish_package();
+  Status open_single(const ManifestHead& head, write::Claim claim);
+  Result<write::File> write_package();
 
   const Plan& plan_;
   const bool file_a_layer_;
@@ -60,7 +62,8 @@ class SliceFiles {
   std::optional<LayeredFile> file_;               // of one text file
   std::optional<ManifestWriter> manifest_;        // of all others
   std::optional<write::FolderSync> sync_;         // of files a layer
-  std::vector<LayerRecord> kept_;                 // of files a layer
+  KeptJob kept_;                                  // of all others
+  write::MadeFolders made_;
   std::uint64_t bytes_ = 0;
   bool finished_ = false, waits_ = false;  // waits: files a layer stay where --resume finds them
 };

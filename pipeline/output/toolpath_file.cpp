@@ -127,16 +127,27 @@ std::unique_ptr<write::LayerMoves> ToolpathFile::layer(const Layer& layer, Buffe
 
 Result<std::uint64_t> ToolpathFile::finish(const write::MoveTotals& totals) {
   if (file_->finished()) return file_->size();
+  std::optional<write::File> beside;
   if (plan_.moves->profile.machine.format == "sml") {
     const auto table = layer_table(plan_);
     if (!table) return table.error();
     write::FileOptions how{.replace = plan_.job.overwrite || plan_.job.resume};
     if (plan_.job.sync == Sync::kOff) how.durable = write::Durable::kNo;
-    if (Status status = write::write_file(table_path(plan_.job), std::string_view(*table), how); !status) return status.error();
+    auto file = write::File::open(table_path(plan_.job), how);
+    Status status = file ? file->append(std::string_view(*table)) : Status(file.error());
+    if (status) status = file->flush();
+    if (!status) return status.error();
+    beside.emplace(std::move(*file));
   }
   Buffer<char> end;
   format_->tail(totals, layers(), end);
-  return file_->finish({end.data(), end.size()});
+  return file_->finish({end.data(), end.size()}, [&]() -> Status {
+    std::error_code error;  // the older manifest goes before anything that it speaks of
+    if (!write::is_stream(plan_.job.output)) fs::remove(manifest_path(plan_.job), error);
+    if (error) return Error{Fault::kOutput, fmt::format("{}: {}", manifest_path(plan_.job), error.message())};
+    const auto named = beside ? beside->finish() : FileDigest();
+    return named ? Status() : Status(named.error());
+  });
 }
 
 void ToolpathFile::discard() {

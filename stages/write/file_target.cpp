@@ -34,8 +34,9 @@ int descriptor_of(std::string_view name) {
   return -1;
 }
 
-Error not_a_file(const std::string& path, std::string_view what) {
-  return {Fault::kOutput, fmt::format("{}: is {}, not a file; name another one", path, what)};
+/// named  by the caller; the names of a directory's own files cannot be chosen
+Error not_a_file(const std::string& path, std::string_view what, bool named = true) {
+  return {Fault::kOutput, fmt::format("{}: is {}, not a file; {}", path, what, named ? "name another one" : "remove it")};
 }
 
 }  // namespace
@@ -78,7 +79,8 @@ Result<FileTarget> find_target(const std::string& path, bool follow) {
       return write_failure(path, errno);
     }
     if (S_ISREG(status.st_mode) || (S_ISLNK(status.st_mode) && !follow)) return FileTarget{name, {}, -1};
-    if (S_ISDIR(status.st_mode)) return not_a_file(path, "a directory");
+    if (S_ISDIR(status.st_mode)) return not_a_file(path, "a directory", follow);
+    if (!S_ISLNK(status.st_mode) && !follow) return not_a_file(path, "a device or a pipe", false);
     if (!S_ISLNK(status.st_mode)) return FileTarget{{}, name, -1};
     // The kernel refuses links that others planted in a shared directory.
     if (::stat(name.c_str(), &status) != 0 && errno != ENOENT) return write_failure(path, errno);

@@ -16,7 +16,7 @@ struct FileTarget {
 
 /// /dev/stdout, /dev/fd/3 and "-" are open descriptors. Opens nothing.
 /// follow  links, dangling or not; else a link is the file that is replaced
-/// errors  kOutput: a directory, too many links, the system's reason
+/// errors  kOutput: a directory, without `follow` a device or a pipe too, too many links, the system's reason
 Result<FileTarget> find_target(const std::string& path, bool follow = true);
 
 /// returns  a descriptor of a stream, to be closed. errors  kOutput: it is not allowed, or the system's reason

@@ -7,6 +7,7 @@
 #include <atomic>
 #include <cerrno>
 #include <cstring>
+#include <filesystem>
 #include <mutex>
 #include <utility>
 
@@ -22,6 +23,22 @@ std::mutex notes_mutex;
 std::vector<std::string> notes;
 
 }  // namespace
+
+std::error_code MadeFolders::make(const std::string& folder) {
+  namespace fs = std::filesystem;
+  std::error_code error;
+  std::vector<std::string> absent;
+  for (fs::path place = folder; !place.empty() && !fs::exists(fs::symlink_status(place, error)); place = place.parent_path()) {
+    if (place.has_filename()) absent.push_back(place.string());
+  }
+  fs::create_directories(folder, error);
+  if (!error) made_.insert(made_.end(), absent.rbegin(), absent.rend());
+  return error;
+}
+
+void MadeFolders::take_back() {
+  for (; !made_.empty(); made_.pop_back()) ::rmdir(made_.back().c_str());  // fails if something is in it
+}
 
 int watch(const char* name) {
   for (std::size_t i = 0; i < watched.size(); ++i) {

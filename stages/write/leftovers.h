@@ -1,10 +1,24 @@
-// stages/write/leftovers.h: what must not stay behind: temporary files at a signal, and what could not be removed.
+// stages/write/leftovers.h: what must not stay behind: temporary files at a signal, folders of a job that is
+// refused, and what could not be removed.
 #pragma once
 
 #include <string>
+#include <system_error>
 #include <vector>
 
 namespace lamina::write {
+
+/// The folders that a run has made itself.
+class MadeFolders {
+ public:
+  /// Makes a folder and those above it. returns  the system's reason if it cannot
+  std::error_code make(const std::string& folder);
+  /// Removes those that are empty.
+  void take_back();
+
+ private:
+  std::vector<std::string> made_;  // the deepest last
+};
 
 /// Has a file removed by remove_watched(). name  outlives forget(). returns  for forget(); -1 if too many are watched
 int watch(const char* name);

@@ -3,7 +3,8 @@
 #include <sys/stat.h>
 
 #include <algorithm>
-#include <fstream>
+
+#include "stages/data/input/file_reader.h"
 
 namespace lamina::write {
 namespace {
@@ -32,15 +33,14 @@ bool is_stream(const std::string& path) {
 
 bool is_replaceable(const std::string& path, std::span<const std::string_view> marks) {
   if (!is_file(path)) return true;
-  std::string head(kMarkedHead, '\0');
-  std::ifstream file(path, std::ios::binary);
-  file.read(head.data(), static_cast<std::streamsize>(head.size()));
-  head.resize(static_cast<std::size_t>(file.gcount()));
+  const auto file = FileReader::open(path, {});
+  std::string head(file ? static_cast<std::size_t>(std::min<std::uint64_t>(kMarkedHead, file->size())) : 0, '\0');
+  const bool read = file && file->read_at(0, head);
   const bool marked = std::ranges::any_of(marks, [&](std::string_view mark) {
     if (mark.empty()) return false;
     return mark.front() == '^' ? head.starts_with(mark.substr(1)) : head.find(mark) != std::string::npos;
   });
-  return marked || (head.empty() && file.eof());
+  return read && (marked || head.empty());
 }
 
 }  // namespace lamina::write

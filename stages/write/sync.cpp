@@ -6,12 +6,19 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <condition_variable>
 #include <filesystem>
+#include <mutex>
+#include <system_error>
+#include <thread>
+#include <utility>
 
 #include "stages/write/file.h"
 
 namespace lamina::write {
 namespace {
+
+constexpr std::uint64_t kEnough = 4 << 20;  // bytes that the thread waits for
 
 /// The reason of a failed sync, 0 if the file system only cannot do it.
 int failure() { return errno == EINVAL || errno == ENOTSUP || errno == ENOSYS || errno == EROFS || errno == EBADF ? 0 : errno; }
@@ -47,8 +54,47 @@ struct FolderSync::Folders {
     dev_t device;
   };
   std::vector<Folder> all;
+  std::thread early;
+  std::mutex mutex;  // guards what follows
+  std::condition_variable changed;
+  std::uint64_t waiting = 0;  // bytes
+  bool ends = false;
+  Status met;  // the first failure
+
   ~Folders() {
+    end_early();
     for (const Folder& folder : all) ::close(folder.file);
+  }
+
+  Status sync_all() const {
+    for (const Folder& folder : all) {
+      if (::syncfs(folder.file) == 0) continue;
+      if (const int reason = failure(); reason != 0) return write_failure(folder.name, reason);
+    }
+    return {};
+  }
+
+  void sync_early() {
+    std::unique_lock lock(mutex);
+    for (;;) {
+      changed.wait(lock, [this] { return ends || waiting >= kEnough; });
+      if (ends || !met) return;
+      waiting = 0;
+      lock.unlock();
+      Status status = sync_all();
+      lock.lock();
+      met = std::move(status);
+    }
+  }
+
+  void end_early() {
+    if (!early.joinable()) return;
+    {
+      const std::lock_guard lock(mutex);
+      ends = true;
+    }
+    changed.notify_one();
+    early.join();
   }
 };
 
@@ -74,12 +120,24 @@ FolderSync FolderSync::of(const std::vector<std::string>& folders) {
   return made;
 }
 
-Status FolderSync::sync() const {
-  for (const Folders::Folder& folder : folders_->all) {
-    if (::syncfs(folder.file) == 0) continue;
-    if (const int reason = failure(); reason != 0) return write_failure(folder.name, reason);
+void FolderSync::wrote(std::uint64_t bytes) const {
+  Folders& folders = *folders_;
+  {
+    const std::lock_guard lock(folders.mutex);
+    folders.waiting += bytes;
+    if (folders.waiting < kEnough) return;
   }
-  return {};
+  try {
+    if (!folders.early.joinable()) folders.early = std::thread([&folders] { folders.sync_early(); });
+  } catch (const std::system_error&) {
+    return;  // no room for a thread: all is left for the end
+  }
+  folders.changed.notify_one();
+}
+
+Status FolderSync::sync() const {
+  folders_->end_early();
+  return folders_->met ? folders_->sync_all() : folders_->met;
 }
 
 }  // namespace lamina::write

@@ -3,6 +3,7 @@
 // Whatever a file system cannot sync (a folder, a file without a disk) is not an error; a failing disk is.
 #pragma once
 
+#include <cstdint>
 #include <memory>
 #include <string>
 #include <vector>
@@ -24,8 +25,9 @@ int sync_folder_of(const std::string& file);
 ///
 /// The file systems of the folders are synced as a whole. 1,000 files of 8 kB take 0.01 s that way; synced one by one they
 /// take 1.7 s, each waiting for the disk, and writing them out early as each is closed doubles the time of small files
-/// (ext4 on a virtual disk). The price: bytes of other programs that wait for the same disk go first, at most those that
-/// the kernel lets wait. Files of an earlier run that this one keeps are included.
+/// (ext4 on a virtual disk). So a thread syncs what is there whenever some megabytes have come together: the disk works while
+/// layers are made, and little is left for the end. The price: bytes of other programs that wait for the same disk go first, at
+/// most those that the kernel lets wait. Files of an earlier run that this one keeps are included.
 class FolderSync {
  public:
   /// Opens folders that exist, before anything is written: an error of the disk is told to whoever had it open (Linux 5.8).
@@ -34,7 +36,9 @@ class FolderSync {
   FolderSync& operator=(FolderSync&&) noexcept;
   ~FolderSync();
 
-  /// errors  kOutput with the system's reason. cost  waits for the disk
+  /// Tells how many bytes have been written since it was told before. May begin the thread.
+  void wrote(std::uint64_t bytes) const;
+  /// Ends the thread. errors  kOutput with the system's reason, also of what the thread met. cost  waits for the disk
   Status sync() const;
 
  private:

@@ -280,8 +280,9 @@ TEST(Write3mfSlices, PackageHoldsStacksThatSayWhatTheSlicesAreAndIsTheSameEveryT
     auto writer = Slice3mfWriter::make(job.head);
     ASSERT_TRUE(writer.ok()) << writer.error().message;
     for (const SliceLayer& layer : job.layers) ASSERT_TRUE(writer->add(layer).ok());
-    const Status status = writer->finish((folder / "a.3mf").string());
-    ASSERT_TRUE(status.ok()) << status.error().message;
+    auto package = writer->write((folder / "a.3mf").string());
+    ASSERT_TRUE(package.ok()) << package.error().message;
+    ASSERT_TRUE(package->finish().ok());
     EXPECT_FALSE(fs::exists(folder / "a.3mf.part"));
     std::ifstream file(folder / "a.3mf", std::ios::binary);
     one.assign(std::istreambuf_iterator<char>(file), {});
@@ -339,8 +340,8 @@ TEST(Write3mfSlices, AFileThatMayNotGrowIsAnErrorAndLeavesNothing) {
     for (const SliceLayer& layer : job.layers) {
       if (!writer->add(layer)) ::_exit(1);
     }
-    const Status status = writer->finish(path);
-    ::_exit(!status && status.error().message.find("File too large") != std::string::npos ? 0 : 2);
+    const auto package = writer->write(path);
+    ::_exit(!package && package.error().message.find("File too large") != std::string::npos ? 0 : 2);
   }
   int result = -1;
   ASSERT_EQ(::waitpid(child, &result, 0), child);

@@ -2,6 +2,7 @@
 
 #include "pipeline/cli/command.h"
 #include "pipeline/output/merge.h"
+#include "pipeline/run/summary.h"
 #include "stages/data/text/json.h"
 #include "stages/data/text/readable.h"
 
@@ -16,6 +17,8 @@ CommandSpec merge_spec() {
   spec.operand = "DIR";
   spec.operand_meaning = "directories that lamina jet --shard or --layers wrote";
   spec.options = {{"-o,--output", "OUT", "directory of the whole job; may be one of DIR", "", ""},
+                  {"--strict", "", "warnings are errors: exit 5, and nothing is joined", "", ""},
+                  {"--allow-empty", "", "join a whole job without any pixel", "", ""},
                   {"--json", "", "print one JSON object on stdout", "", ""},
                   {"--quiet", "", "say nothing but errors", "", ""}};
   spec.closing =
@@ -29,7 +32,8 @@ Outcome run_merge(const Arguments& arguments, Context& context) {
   if (arguments.operands.empty()) return Error{Fault::kUsage, "no directory to merge; name those of the shards"};
   const std::string output = arguments.text("-o,--output");
   if (output.empty()) return Error{Fault::kUsage, "-o OUT is missing; name the directory of the whole job"};
-  const Result<MergeReport> report = merge(arguments.operands, output);
+  const Result<MergeReport> report =
+      merge({arguments.operands, output, arguments.has("--strict"), arguments.has("--allow-empty")});
   if (!report) return report.error();
   if (!arguments.has("--quiet") && report->shards == 0) {
     context.say(fmt::format("{}: is whole already, {} layers, nothing is left to merge", report->output,
@@ -38,13 +42,17 @@ Outcome run_merge(const Arguments& arguments, Context& context) {
     context.say(fmt::format("{}: {} layers of {} shards joined, {} files linked, {} copied", report->output,
                             readable_count(report->layers), report->shards, report->linked, report->copied));
   }
+  if (!arguments.has("--quiet")) {
+    for (const Warning& warning : report->warnings) context.say("warning: " + one_line(warning.text));
+  }
   if (!arguments.has("--json")) return {};
   return context.give({{"command", "merge"},
                        {"directory", report->output},
                        {"shards", report->shards},
                        {"layers", report->layers},
                        {"linked", report->linked},
-                       {"copied", report->copied}});
+                       {"copied", report->copied},
+                       {"warnings", warnings_json(report->warnings)}});
 }
 
 }  // namespace

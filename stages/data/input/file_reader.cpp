@@ -28,13 +28,12 @@ std::string too_long(std::uint64_t most) {
 
 /// Empty, or why a file of this kind is not read.
 std::string fault_of_kind(const struct stat& status, bool stream, const ReadRules& rules) {
-  if (S_ISDIR(status.st_mode)) return "is a directory, not a file";
+  if (S_ISDIR(status.st_mode)) return std::string(rules.directory);
   if (S_ISREG(status.st_mode)) {
     return static_cast<std::uint64_t>(status.st_size) > rules.most_bytes ? too_long(rules.most_bytes) : std::string();
   }
   if (stream) return {};
-  return rules.streams ? "is a device or a pipe, not a file; give what it holds to standard input and name it -"
-                       : "is a device or a pipe, not a file";
+  return std::string(rules.device) + (rules.streams ? "; give what it holds to standard input and name it -" : "");
 }
 
 }  // namespace

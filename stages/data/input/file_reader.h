@@ -1,4 +1,4 @@
-// stages/data/input/file_reader.h: the one way to open and read a file that is not a part.
+// stages/data/input/file_reader.h: the one way to open and read a file.
 //
 // A name leads to a regular file or to one line of error: a pipe that nobody writes to, a device, a directory or a file
 // without line ends costs neither time nor memory. Text in memory is read through the same calls, for tests and fuzzing.
@@ -18,7 +18,9 @@ namespace lamina {
 /// What a kind of file may be, and how its errors read.
 struct ReadRules {
   Fault fault = Fault::kVerification;
-  std::string_view missing = "no such file";     // of a name that leads nowhere
+  std::string_view missing = "no such file";  // of a name that leads nowhere
+  std::string_view directory = "is a directory, not a file";
+  std::string_view device = "is a device or a pipe, not a file";
   std::string_view no_text = "is no text file";  // of a line with a NUL byte, or that is too long
   std::uint64_t most_bytes = UINT64_MAX;         // of the file
   std::size_t longest_line = 64 << 10;           // bytes

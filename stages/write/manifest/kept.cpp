@@ -2,10 +2,12 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <filesystem>
 
 #include "stages/data/hash.h"
 #include "stages/data/input/digest_range.h"
+#include "stages/write/leftovers.h"
 
 namespace lamina {
 
@@ -35,17 +37,91 @@ std::vector<LayerRecord> records_that_hold(const std::string& path, const std::v
   return kept;
 }
 
-std::vector<LayerRecord> records_with_files(const std::string& folder, const Manifest& manifest) {
-  namespace fs = std::filesystem;
+namespace fs = std::filesystem;
+
+Status take_waiting(const std::string& waiting, const std::string& folder) {
+  std::error_code error;
+  fs::rename(waiting, folder, error);  // takes the place of an empty directory too
+  if (!error) return {};
+  error.clear();
+  for (fs::directory_iterator entry(waiting, error), end; !error && entry != end; entry.increment(error)) {
+    fs::rename(entry->path(), fs::path(folder) / entry->path().filename(), error);
+    if (error) break;
+  }
+  if (!error) fs::remove(waiting, error);
+  return error ? Status(Error{Fault::kOutput, fmt::format("{}: {}", folder, error.message())}) : Status();
+}
+
+namespace {
+
+bool is_plain(const fs::path& path, fs::file_type type) {
+  std::error_code ignored;
+  return fs::symlink_status(path, ignored).type() == type;
+}
+
+/// Whether a file is there as it was recorded.
+bool holds(const fs::path& file, std::uint64_t bytes, const Hash128& hash) {
+  if (!is_plain(file, fs::file_type::regular)) return false;
+  const auto digest = digest_file(file.string(), bytes);
+  return digest && digest->bytes == bytes && digest->hash == hash;
+}
+
+/// Whether all files of a finished job are there as they were recorded.
+bool is_whole(const std::string& directory, const Manifest& manifest) {
+  const ManifestHead& head = manifest.head;
+  const fs::path place = directory;
+  if (!head.file.empty()) return holds(place / head.file, manifest.file.bytes, manifest.file.hash);
+  return head.extension.empty() || std::ranges::all_of(manifest.layers, [&](const LayerRecord& record) {
+           return holds(place / layer_file_name(record.layer.index, head.extension), record.bytes, record.hash);
+         });
+}
+
+/// The records, from the first on, whose files wait.
+/// named  files may have their names already: those are brought back
+std::vector<LayerRecord> waiting_records(const fs::path& directory, const fs::path& waiting, const Manifest& begun,
+                                         bool named) {
   std::vector<LayerRecord> kept;
-  for (const LayerRecord& record : manifest.layers) {
-    std::error_code ignored;
-    const fs::path file = fs::path(folder) / fs::path(layer_file_name(record.layer.index, manifest.head.extension)).filename();
-    if (!fs::is_regular_file(fs::symlink_status(file, ignored))) break;
-    const auto digest = digest_file(file.string(), record.bytes);
-    if (!digest || digest->bytes != record.bytes || digest->hash != record.hash) break;
+  std::error_code error;
+  if (named) fs::create_directory(waiting, error);
+  if (begun.head.extension.empty() || !is_plain(waiting, fs::file_type::directory)) return kept;
+  for (const LayerRecord& record : begun.layers) {
+    const fs::path file = directory / layer_file_name(record.layer.index, begun.head.extension),
+                   fresh = waiting / file.filename();
+    if (!holds(fresh, record.bytes, record.hash)) {
+      if (!named || !holds(file, record.bytes, record.hash)) break;
+      fs::rename(file, fresh, error);
+      if (error) break;
+    }
     kept.push_back(record);
   }
+  for (fs::directory_iterator entry(waiting, error), end; !error && entry != end; entry.increment(error)) {
+    const std::string name = entry->path().filename().string();
+    if (!write::named_by_temporary(name).empty()) write::remove_or_note(entry->path().string());
+  }
+  return kept;
+}
+
+}  // namespace
+
+Result<KeptJob> find_kept_job(const std::string& directory, const std::string& waiting, const ManifestHead& head) {
+  const std::string path = (fs::path(directory) / "manifest.json").string(), begun_path = write::part_of(path);
+  const bool begun = has_manifest_head(begun_path), finished = is_plain(path, fs::file_type::regular);
+  KeptJob kept;
+  if (finished) {
+    auto manifest = read_manifest(path);
+    const Status same = manifest ? check_same_job(path, *manifest, head) : Status(manifest.error());
+    if (!same && !begun) return same.error();
+    kept.finished = same && is_whole(directory, *manifest);
+    if (kept.finished) kept.layers = std::move(manifest->layers);
+    if (kept.finished) kept.bytes = manifest->file.bytes;  // of a package; its layers have none of their own
+  }
+  if (begun && !kept.finished) {
+    const auto manifest = read_manifest(begun_path);
+    if (!manifest) return manifest.error();
+    if (Status status = check_same_job(begun_path, *manifest, head); !status) return status.error();
+    kept.layers = waiting_records(directory, waiting, *manifest, !finished);
+  }
+  for (const LayerRecord& record : kept.layers) kept.bytes += record.bytes;
   return kept;
 }
 

@@ -1,4 +1,7 @@
 // stages/write/manifest/kept.h: what an interrupted job of contours or toolpaths has on record, and still holds.
+//
+// Files a layer wait in a folder beside the begun manifest, until all are there. Then manifest.json of an earlier job goes,
+// they get their names, and the new manifest.json comes last: whenever a run is killed, one of the two records holds.
 #pragma once
 
 #include <string>
@@ -17,8 +20,20 @@ Status check_same_job(const std::string& path, const Manifest& manifest, const M
 std::vector<LayerRecord> records_that_hold(const std::string& file, const std::vector<LayerRecord>& recorded,
                                            std::string_view start);
 
-/// The records, from the first on, whose files 000000.ext and up are in a folder, with the size and hash on record. Links are
-/// no files of a job. cost  reads every file once
-std::vector<LayerRecord> records_with_files(const std::string& folder, const Manifest& manifest);
+/// Gives waiting files their places in another folder, which may be there. errors  kOutput
+Status take_waiting(const std::string& waiting, const std::string& folder);
+
+/// What a directory holds of a job that is to be resumed.
+struct KeptJob {
+  std::vector<LayerRecord> layers;  // from the first on
+  bool finished = false;            // all of the job, under its final names
+  std::uint64_t bytes = 0;          // of its files
+};
+
+/// Of a job with files a layer, with a package or without files. Layers of a run that was killed while they got their names
+/// are brought back to `waiting`, and its torn files go. Links are no files of a job.
+/// errors  kUsage: the directory belongs to another job; those of read_manifest
+/// cost    reads every file once
+Result<KeptJob> find_kept_job(const std::string& directory, const std::string& waiting, const ManifestHead& head);
 
 }  // namespace lamina

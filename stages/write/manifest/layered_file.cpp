@@ -5,6 +5,7 @@
 #include <unistd.h>
 #include <xxhash.h>
 
+#include <cstdio>
 #include <cstring>
 #include <optional>
 #include <utility>
@@ -83,6 +84,15 @@ LayeredFile::~LayeredFile() = default;
 
 namespace {
 
+/// A run that was killed between its last two names has left a whole file and the whole record of it.
+void take_last_name(const std::string& manifest, const std::string& target) {
+  const std::string record = write::part_of(manifest);
+  const auto begun = read_manifest(record);
+  if (!begun || begun->file.bytes == 0) return;
+  const auto digest = digest_file(target, begun->file.bytes);
+  if (digest && digest->hash == begun->file.hash) std::rename(record.c_str(), manifest.c_str());
+}
+
 /// What a resumed job keeps, read into the state: all of a finished file, or the first records of a begun one. A begun file
 /// may stand beside a finished one of another job, which it was to replace.
 Status find_kept(const LayeredFile::Options& options, const ManifestHead& head, std::string_view start,
@@ -90,13 +100,15 @@ Status find_kept(const LayeredFile::Options& options, const ManifestHead& head, 
   if (!options.resume) return {};
   const std::string begun_file = write::part_of(target), begun_record = write::part_of(options.manifest);
   const bool begun = has_manifest_head(begun_record);
-  if (is_there(target) && is_there(options.manifest)) {
+  if (begun && !is_there(begun_file) && is_there(target) && !is_there(options.manifest))
+    take_last_name(options.manifest, target);
+  if (is_there(options.manifest)) {
     auto finished = read_manifest(options.manifest);
     if (!finished && !begun) return finished.error();
     const Status same = finished ? check_same_job(options.manifest, *finished, head) : Status(finished.error());
     if (!same && !begun) return same;
-    const auto digest = same ? digest_file(target) : Result<FileDigest>(same.error());
-    if (digest && digest->hash == finished->file.hash) {
+    const auto digest = same && is_there(target) ? digest_file(target) : FileDigest();
+    if (same && digest && digest->bytes > 0 && digest->hash == finished->file.hash) {
       for (const std::string& left : {begun_file, begun_record}) write::remove_or_note(left);
       kept = std::move(finished->layers);
       whole_size = digest->bytes;
@@ -193,17 +205,19 @@ Status LayeredFile::end_pieces(LayerRecord& record) {
   return state.note(record);
 }
 
-Result<std::uint64_t> LayeredFile::finish(std::string_view end) {
+Result<std::uint64_t> LayeredFile::finish(std::string_view end, const std::function<Status()>& names) {
   State& state = *state_;
   if (state.finished) return state.size;
   if (Status status = state.file->append(end); !status) return status.error();
   state.size += end.size();
-  const auto digest = state.file->finish();
-  if (!digest) return digest.error();
-  if (state.manifest) {
-    if (Status status = state.manifest->finish(*digest); !status) return status.error();
-  }
-  return state.size;
+  const auto take_names = [&]() -> Status {
+    if (Status status = names ? names() : Status(); !status) return status;
+    const auto digest = state.file->finish();
+    return digest ? Status() : Status(digest.error());
+  };
+  if (Status status = state.file->flush(); !status) return status.error();
+  const Status status = state.manifest ? state.manifest->finish(state.file->digest(), take_names) : take_names();
+  return status ? Result<std::uint64_t>(state.size) : status.error();
 }
 
 Status LayeredFile::keep() {

@@ -5,6 +5,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -48,8 +49,10 @@ class LayeredFile {
   Status append_piece(std::string_view text);
   /// Ends a layer of pieces: sets offset, size and hash of the record, and adds it to the manifest.
   Status end_pieces(LayerRecord& record);
-  /// Appends the text after the last layer and renames both files. returns  the file's size
-  Result<std::uint64_t> finish(std::string_view end);
+  /// Appends the text after the last layer and renames both files.
+  /// names    as of ManifestWriter::finish, before the file takes its name: removes the manifest of an earlier job
+  /// returns  the file's size
+  Result<std::uint64_t> finish(std::string_view end, const std::function<Status()>& names = {});
   /// Ends an interrupted or failed job; complete layers stay for a resumed run.
   Status keep();
   /// Removes the started files.

@@ -4,10 +4,10 @@
 #include <fmt/format.h>
 
 #include <filesystem>
-#include <fstream>
 #include <optional>
 #include <utility>
 
+#include "stages/data/input/file_reader.h"
 #include "stages/data/text/number_text.h"
 #include "stages/write/file.h"
 #include "stages/write/manifest/manifest_head.h"
@@ -55,9 +55,9 @@ std::string difference(const ManifestHead& now, const ManifestHead& earlier) {
 }
 
 Status check_begun_manifest(const std::string& part) {
-  std::ifstream file(part, std::ios::binary);
-  const int first = file.get();  // 0 where a power cut has kept the size alone
-  if (!file || first == '{' || first == 0) return {};
+  const auto file = FileReader::open(part, {});
+  char first = 0;  // stays 0 where a power cut has kept the size alone
+  if (!file || !file->read_at(0, {&first, 1}) || first == '{' || first == 0) return {};
   return Error{Fault::kUsage,
                fmt::format("{}: is there already, and is no record of lamina; remove it, or name another output", part)};
 }
@@ -177,13 +177,14 @@ Status ManifestWriter::append(const LayerRecord& record) {
 
 Status ManifestWriter::flush() { return state_->flush(); }
 
-Status ManifestWriter::finish(const FileDigest& file) {
+Status ManifestWriter::finish(const FileDigest& file, const std::function<Status()>& names) {
   State& state = *state_;
   if (state.next_layer != state.head.last_layer) {
     return Error{Fault::kInternal, fmt::format("manifest: closed at layer {} of {}", state.next_layer, state.head.last_layer)};
   }
   state.buffer += tail_text(state.head, file);
   if (Status status = state.flush(); !status) return status;
+  if (Status status = names ? names() : Status(); !status) return status;
   const auto whole = state.file.finish();
   return whole ? Status() : Status(whole.error());
 }

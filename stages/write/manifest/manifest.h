@@ -128,8 +128,11 @@ class ManifestWriter {
   Status append(const LayerRecord& record);
   /// Flushes the buffer, for an interrupted job.
   Status flush();
-  /// Closes the JSON and gives it its final name. file  the single file of all layers, if any
-  Status finish(const FileDigest& file = {});
+  /// Closes the JSON and gives it its final name.
+  /// file   the single file of all layers, if any
+  /// names  once all that needs space is written, before the name is taken: removes what an earlier job left, gives the
+  ///        other files their names. After a failure or a kill in it the record of all layers stands as `path`.part
+  Status finish(const FileDigest& file = {}, const std::function<Status()>& names = {});
   /// Removes the started file.
   void discard();
 

@@ -116,7 +116,7 @@ std::string Slice3mfWriter::objects_and_build() const {
   return {text.begin(), text.end()};
 }
 
-Status Slice3mfWriter::finish(const std::string& path, const FileOptions& options) {
+Result<File> Slice3mfWriter::write(const std::string& path, const FileOptions& options) {
   std::vector<Deflated> pieces(1);
   const auto put = [&](std::string_view text) { return deflate_onto(pieces.back(), text); };
   Status status =
@@ -140,9 +140,10 @@ Status Slice3mfWriter::finish(const std::string& path, const FileOptions& option
   if (!status) return Error{Fault::kOutput, path + ": " + status.error().message};
   auto file = File::open(path, options);
   if (!file) return file.error();
-  if (status = write_3mf_package(*file, pieces); !status) return status;
-  const auto written = file->finish();
-  return written ? Status() : written.error();
+  status = write_3mf_package(*file, pieces);
+  if (status) status = file->flush();
+  if (!status) return status.error();
+  return file;
 }
 
 }  // namespace lamina::write

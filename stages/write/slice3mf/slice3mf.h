@@ -25,8 +25,8 @@ class Slice3mfWriter {
 
   /// Layers from the bottom up. errors  kOutput
   Status add(const SliceLayer& layer);
-  /// Writes the package; it appears under its name only when it is whole. errors  kOutput
-  Status finish(const std::string& path, const FileOptions& options = {});
+  /// Writes the package; it takes its name when the file is finished. errors  kOutput
+  Result<File> write(const std::string& path, const FileOptions& options = {});
 
  private:
   struct Body {
