@@ -35,7 +35,7 @@ double mean_distance_mm(const infill::FillParameters& fill) {
 
 }  // namespace
 
-std::uint64_t BeadWork::bytes() const { return sections.bytes() + beads.bytes() + bytes_of(laid) + bytes_of(inner); }
+std::uint64_t BeadWork::bytes() const { return sections.bytes() + beads.bytes() + bytes_of(inner); }
 
 Result<SegmentPlan> plan_bead_segments(const Job& job, FillRequest& fill, std::vector<Warning>& warnings) {
   if (job.dose.core < 1) {
@@ -84,22 +84,21 @@ Status Beads::lay(const Layer& layer, BeadWork& work) const {
     raster::BeadPen pen(work.beads, widths, ends_);
     segment::for_each_stretch(paths, *cut, [&](const Stretch& s) { pen.lay(s); });
   }
-  work.beads.runs(work.laid);
   return {};
 }
 
 void Beads::apply(Runs& image, Runs& scratch, BeadWork& work) const {
   const bool has_shell = !shell_.half_width.empty();
   if (has_shell) dose::erode(image, shell_, work.inner);
-  raster::keep_beads(image, work.laid, has_shell ? &work.inner : nullptr, scratch);
+  raster::keep_beads(image, work.beads, has_shell ? &work.inner : nullptr, scratch);
 }
 
-std::uint64_t Beads::spans_expected(std::uint32_t index) const {
+Beads::Expected Beads::expected(std::uint32_t index) const {
   const Layer layer = sections_->layers()[index].own();
   const double rows_per_mm = grid_.y.pixels_per_nm() * kNmPerMm;
   // The slicer needs about 140 bytes per cut, which gives the number of corners in walls and closed curves.
   const double corners = static_cast<double>(sections_->slicer().layer_bytes_bound(index)) / 140;
-  double spans = 0;
+  double beads = 1, spans = 1;
   for (const Sections::Area& area : sections_->areas()) {
     const Box& box = area.box;
     if (layer.plane() < box.lo.z || layer.plane() > box.hi.z) continue;
@@ -111,25 +110,30 @@ std::uint64_t Beads::spans_expected(std::uint32_t index) const {
     if (fill.pattern == infill::Pattern::kContour) loops += mm(std::min(box.width(), box.depth())) / 2 / distance;
     if (fill.pattern == infill::Pattern::kContourRaster) loops += fill.loops;
     spans += loops * corners * of_bead + 2 * loops * mm(box.width() + box.depth()) * rows_per_mm;
+    beads += loops * corners;
     if (fill.pattern == infill::Pattern::kNone) continue;
     const double length = mm(box.width()) * mm(box.depth()) / distance;
     double stretch = range.settings.on ? std::min(range.plan.thick_mm, range.plan.thin_mm) : INFINITY;
     if (fill.pattern == infill::Pattern::kContour) {
       spans += length / stretch * of_bead;  // closed curves are divided where they have no corner
+      beads += length / stretch;
       continue;
     }
     if (fill.pattern != infill::Pattern::kRaster && fill.pattern != infill::Pattern::kContourRaster)
       stretch = std::min(stretch, width);
-    spans += length * rows_per_mm + (length / stretch + 2 * mm(box.width() + box.depth()) / distance) * of_bead;
+    const double ends = length / stretch + 2 * mm(box.width() + box.depth()) / distance;
+    spans += length * rows_per_mm + ends * of_bead;
+    beads += ends;
   }
-  return static_cast<std::uint64_t>(spans) + 1;
+  return {static_cast<std::uint64_t>(beads), static_cast<std::uint64_t>(spans)};
 }
 
 std::uint64_t Beads::bytes_expected(std::uint32_t layer) const {
-  const std::uint64_t rows = grid_.rows(), spans = spans_expected(layer);
-  const std::uint64_t of_beads = 24 * spans + 4 * rows;        // spans, and in the order of rows
-  const std::uint64_t of_images = 2 * (8 * spans + 4 * rows);  // laid, inner
-  const std::uint64_t of_paths = 20 * spans;                   // a point of a toolpath is 17 bytes, and has a span or more
+  const std::uint64_t rows = grid_.rows();
+  const auto [beads, spans] = expected(layer);
+  const std::uint64_t of_beads = 64 * beads + 4 * rows;        // a bead and its place take 36 bytes
+  const std::uint64_t of_images = 2 * (8 * spans + 4 * rows);  // second, inner
+  const std::uint64_t of_paths = 34 * beads;                   // a point of a toolpath is 17 bytes, and begins a bead or more
   return sections_->bytes_bound(layer) + of_beads + of_images + of_paths;
 }
 

@@ -29,7 +29,6 @@ struct BeadWork {
 
   Sections::Work sections;
   raster::BeadRaster beads;
-  Runs laid;   // pixels of beads
   Runs inner;  // below the shell
 };
 
@@ -44,7 +43,7 @@ class Beads {
  public:
   Beads(const Job& job, const PixelGrid& grid, const Sections& sections, const SegmentPlan& segments);
 
-  /// Rasterizes walls and filling of a layer into work.laid. work.sections holds the filled layer.
+  /// Collects the walls and the filling of a layer in work.beads. work.sections holds the filled layer.
   /// errors  of layer_cut
   Status lay(const Layer& layer, BeadWork& work) const;
   /// Clears all pixels of the part outside the beads and the shell; sets none.
@@ -52,8 +51,11 @@ class Beads {
   /// scratch  of the image's kind
   void apply(Runs& image, Runs& scratch, BeadWork& work) const;
 
-  /// Expected number of row spans of the beads in a layer: an image has at most two changes per span.
-  std::uint64_t spans_expected(std::uint32_t layer) const;
+  /// Expected beads of a layer, and rows that they cover: an image has at most two changes for each of these.
+  struct Expected {
+    std::uint64_t beads = 0, spans = 0;
+  };
+  Expected expected(std::uint32_t layer) const;
   /// Expected bytes of a layer in addition to its images.
   std::uint64_t bytes_expected(std::uint32_t layer) const;
 

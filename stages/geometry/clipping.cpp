@@ -7,6 +7,8 @@
 #include <polyclipping/clipper.hpp>
 #include <vector>
 
+#include "stages/data/shortage.h"
+
 namespace lamina {
 namespace {
 
@@ -123,14 +125,28 @@ Error refusal(const char* why) {
   return {Fault::kInternal, fmt::format("contours of a layer cannot be combined: {}; please report this with the part", why)};
 }
 
-Error refusal(const std::exception& why) {
-  return dynamic_cast<const std::bad_alloc*>(&why) != nullptr ? out_of_memory() : refusal(why.what());
+Error refusal(const std::exception& why) { return is_shortage(why) ? out_of_memory() : refusal(why.what()); }
+
+/// What `act` leaves in `out`. Clipper swallows its own std::bad_alloc, and ClipperOffset then answers with less or nothing: so
+/// whatever came of an act during which memory ran out, in any thread, is not taken.
+template <class Act>
+Result<Contours> guarded(Act&& act) {
+  const std::uint64_t before = refused_allocations();
+  Contours out;
+  Status status;
+  try {
+    status = act(out);
+  } catch (const std::exception& exception) {
+    status = refusal(exception);
+  }
+  if (refused_allocations() != before) return out_of_memory();
+  if (!status) return status.error();
+  return out;
 }
 
 Result<Contours> combine(const ContoursView& contours, const ContoursView& with, clip::ClipType how) {
-  Contours out;
-  if (contours.size() == 0) return out;
-  try {
+  if (contours.size() == 0) return Contours();
+  return guarded([&](Contours& out) -> Status {
     const Point2 by = middle_of(contours);
     clip::Clipper clipper(clip::ioStrictlySimple);
     clipper.AddPaths(to_clipper(contours, by).paths, clip::ptSubject, true);
@@ -140,18 +156,15 @@ Result<Contours> combine(const ContoursView& contours, const ContoursView& with,
       return refusal("a difference or intersection failed");
     }
     append_tree(tree, by, out);
-  } catch (const std::exception& exception) {
-    return refusal(exception);
-  }
-  return out;
+    return {};
+  });
 }
 
 }  // namespace
 
 Result<Contours> unite_contours(const ContoursView& contours, FillRule rule) {
-  Contours out;
-  if (contours.size() == 0) return out;
-  try {
+  if (contours.size() == 0) return Contours();
+  return guarded([&](Contours& out) -> Status {
     const Moved moved = to_clipper(contours, middle_of(contours));
     clip::Clipper clipper(clip::ioStrictlySimple);
     clipper.AddPaths(moved.paths, clip::ptSubject, true);
@@ -161,10 +174,8 @@ Result<Contours> unite_contours(const ContoursView& contours, FillRule rule) {
     clip::PolyTree tree;
     if (!clipper.Execute(clip::ctUnion, tree, type, type)) return refusal("the union failed");
     append_tree(tree, moved.by, out);
-  } catch (const std::exception& exception) {
-    return refusal(exception);
-  }
-  return out;
+    return {};
+  });
 }
 
 Result<Contours> subtract_contours(const ContoursView& contours, const ContoursView& less) {
@@ -176,9 +187,8 @@ Result<Contours> intersect_contours(const ContoursView& one, const ContoursView&
 }
 
 Result<Contours> offset_contours(const ContoursView& contours, std::int64_t distance, OffsetJoin join) {
-  Contours out;
-  if (contours.size() == 0) return out;
-  try {
+  if (contours.size() == 0) return Contours();
+  return guarded([&](Contours& out) -> Status {
     const Moved moved = to_clipper(contours, middle_of(contours));
     clip::PolyTree tree;
     if (join == OffsetJoin::kMiter) {
@@ -189,16 +199,13 @@ Result<Contours> offset_contours(const ContoursView& contours, std::int64_t dist
       offsetter.Execute(tree, static_cast<double>(distance));
     }
     append_tree(tree, moved.by, out);
-  } catch (const std::exception& exception) {
-    return refusal(exception);
-  }
-  return out;
+    return {};
+  });
 }
 
 Result<Contours> clip_lines(const ContoursView& lines, const ContoursView& region) {
-  Contours out;
-  if (lines.size() == 0 || region.size() == 0) return out;
-  try {
+  if (lines.size() == 0 || region.size() == 0) return Contours();
+  return guarded([&](Contours& out) -> Status {
     const Point2 by = middle_of(region);
     clip::Clipper clipper;
     clipper.AddPaths(to_clipper(lines, by).paths, clip::ptSubject, false);
@@ -212,26 +219,21 @@ Result<Contours> clip_lines(const ContoursView& lines, const ContoursView& regio
       for (const clip::IntPoint& p : child->Contour) out.point.push_back({within_reach(p.X + by.x), within_reach(p.Y + by.y)});
       out.close();
     }
-  } catch (const std::exception& exception) {
-    return refusal(exception);
-  }
-  return out;
+    return {};
+  });
 }
 
 Result<Contours> cover_lines(const ContoursView& lines, Nm width) {
-  Contours out;
-  if (lines.size() == 0) return out;
-  try {
+  if (lines.size() == 0) return Contours();
+  return guarded([&](Contours& out) -> Status {
     const Moved moved = to_clipper(lines, middle_of(lines));
     clip::ClipperOffset offsetter(2.0, kArcTolerance);
     offsetter.AddPaths(moved.paths, clip::jtRound, clip::etOpenRound);
     clip::PolyTree tree;
     offsetter.Execute(tree, static_cast<double>(width) / 2);
     append_tree(tree, moved.by, out);
-  } catch (const std::exception& exception) {
-    return refusal(exception);
-  }
-  return out;
+    return {};
+  });
 }
 
 }  // namespace lamina

@@ -67,22 +67,30 @@ Interval estimate(const Bead& bead, double radius, double y) {
 }  // namespace
 
 void BeadRaster::add(Point2 a, Point2 b, Nm width, BeadEnds ends) {
+  const std::int64_t half = (std::int64_t{width} + 1) / 2;
+  const auto rows = static_cast<std::int64_t>(grid_.rows());
+  const std::int64_t first = std::max<std::int64_t>(0, grid_.y.first_at_or_beyond(std::min(a.y, b.y) - half));
+  const std::int64_t last = std::min(rows, grid_.y.first_at_or_beyond(std::max(a.y, b.y) + half + 1));
+  if (first >= last) return;
+  beads_.push_back({a, b, static_cast<std::uint32_t>(rows - last), static_cast<std::uint32_t>(rows - first), width, ends});
+}
+
+/// The spans of a bead in the image rows [first_row, last_row), which it may reach.
+void BeadRaster::cover(const Laid& laid, std::uint32_t first_row, std::uint32_t last_row) {
+  const Point2 a = laid.a, b = laid.b;
   Bead bead{a.x,
             a.y,
             std::int64_t{b.x} - a.x,
             std::int64_t{b.y} - a.y,
-            static_cast<Wide>(width) * width,
+            static_cast<Wide>(laid.width) * laid.width,
             0,
-            ends == BeadEnds::kSquare};
+            laid.ends == BeadEnds::kSquare};
   bead.length2 = static_cast<Wide>(bead.dx) * bead.dx + static_cast<Wide>(bead.dy) * bead.dy;
-  const std::int64_t half = (std::int64_t{width} + 1) / 2;
   const auto rows = static_cast<std::int64_t>(grid_.rows()), columns = static_cast<std::int64_t>(grid_.columns());
-  const std::int64_t first = std::max<std::int64_t>(0, grid_.y.first_at_or_beyond(std::min(a.y, b.y) - half));
-  const std::int64_t last = std::min(rows, grid_.y.first_at_or_beyond(std::max(a.y, b.y) + half + 1));
   // A guess is wrong by the rounding of doubles, and by the nanometre that a centre is rounded down: one pixel is ample.
-  const double radius = static_cast<double>(width) / 2;
-  for (std::int64_t row = first; row < last; ++row) {
-    const std::int64_t y = grid_.y.centre(row);
+  const double radius = static_cast<double>(laid.width) / 2;
+  for (std::uint32_t row = first_row; row < last_row; ++row) {
+    const std::int64_t y = grid_.y.centre(rows - 1 - row);
     Interval x = estimate(bead, radius, static_cast<double>(y - bead.ay));
     if (!(x.low <= x.high)) {
       // A row that only touches the bead's edge, as far as doubles can tell: look where it is widest.
@@ -97,23 +105,20 @@ void BeadRaster::add(Point2 a, Point2 b, Nm width, BeadEnds ends) {
     while (end > begin && !bead.holds(grid_.x.centre(end - 1), y)) --end;
     begin = std::max<std::int64_t>(begin, 0);
     end = std::min(end, columns);
-    if (begin >= end) continue;
-    spans_.push_back(
-        {static_cast<std::uint32_t>(rows - 1 - row), static_cast<std::uint32_t>(begin), static_cast<std::uint32_t>(end)});
+    if (begin < end) spans_.push_back({row, static_cast<std::uint32_t>(begin), static_cast<std::uint32_t>(end)});
   }
 }
 
-void BeadRaster::runs(Runs& out) {
-  const std::uint32_t rows = grid_.rows();
+/// Unites the spans of the image rows [first_row, last_row) in band_.
+void BeadRaster::unite(std::uint32_t first_row, std::uint32_t last_row) {
+  const std::uint32_t rows = last_row - first_row;
   start_.assign(std::size_t{rows} + 1, 0);
-  for (const Span& span : spans_) ++start_[span.row + 1];
+  for (const Span& span : spans_) ++start_[span.row - first_row + 1];
   for (std::uint32_t r = 0; r < rows; ++r) start_[r + 1] += start_[r];
   ordered_.resize(spans_.size());
-  for (const Span& span : spans_) ordered_[start_[span.row]++] = span;  // start_[r] becomes the end of row r
-  out.columns = grid_.columns();
-  out.row_offset.assign(1, 0);
-  out.row_offset.reserve(std::size_t{rows} + 1);
-  out.change.clear();
+  for (const Span& span : spans_) ordered_[start_[span.row - first_row]++] = span;  // start_[r] becomes the end of row r
+  band_.row_offset.assign(1, 0);
+  band_.change.clear();
   std::uint32_t begin = 0;
   for (std::uint32_t r = 0; r < rows; ++r) {
     const std::uint32_t end = start_[r];
@@ -121,13 +126,51 @@ void BeadRaster::runs(Runs& out) {
               [](const Span& s, const Span& t) { return s.begin != t.begin ? s.begin < t.begin : s.end < t.end; });
     for (std::uint32_t i = begin; i < end;) {
       std::uint32_t reach = ordered_[i].end;
-      out.change.push_back(ordered_[i].begin);
+      band_.change.push_back(ordered_[i].begin);
       for (++i; i < end && ordered_[i].begin <= reach; ++i) reach = std::max(reach, ordered_[i].end);
-      out.change.push_back(reach);
+      band_.change.push_back(reach);
     }
-    out.row_offset.push_back(static_cast<std::uint32_t>(out.change.size()));
+    band_.row_offset.push_back(static_cast<std::uint32_t>(band_.change.size()));
     begin = end;
   }
+}
+
+void BeadRaster::for_each_band(const std::function<void(std::uint32_t, const RunsView&)>& take) {
+  const std::uint32_t rows = grid_.rows(), bands = (rows + kBandRows - 1) / kBandRows;
+  // Beads by the band of their first row.
+  band_begin_.assign(std::size_t{bands} + 1, 0);
+  for (const Laid& bead : beads_) ++band_begin_[bead.first_row / kBandRows + 1];
+  for (std::uint32_t b = 0; b < bands; ++b) band_begin_[b + 1] += band_begin_[b];
+  by_band_.resize(beads_.size());
+  for (std::uint32_t i = 0; i < beads_.size(); ++i) by_band_[band_begin_[beads_[i].first_row / kBandRows]++] = i;
+  band_.columns = grid_.columns();
+  reaching_.clear();
+  for (std::uint32_t b = 0, next = 0; b < bands; ++b) {
+    const std::uint32_t first = b * kBandRows, last = std::min(rows, first + kBandRows);
+    for (; next < band_begin_[b]; ++next) reaching_.push_back(by_band_[next]);
+    spans_.clear();
+    std::size_t stay = 0;
+    for (const std::uint32_t i : reaching_) {
+      const Laid& bead = beads_[i];
+      cover(bead, std::max(first, bead.first_row), std::min(last, bead.last_row));
+      if (bead.last_row > last) reaching_[stay++] = i;
+    }
+    reaching_.resize(stay);
+    unite(first, last);
+    take(first, band_);
+  }
+}
+
+void BeadRaster::runs(Runs& out) {
+  out.columns = grid_.columns();
+  out.row_offset.assign(1, 0);
+  out.row_offset.reserve(std::size_t{grid_.rows()} + 1);
+  out.change.clear();
+  for_each_band([&](std::uint32_t, const RunsView& band) {
+    const auto before = static_cast<std::uint32_t>(out.change.size());
+    out.change.insert(out.change.end(), band.change.begin(), band.change.end());
+    for (const std::uint32_t offset : band.row_offset.subspan(1)) out.row_offset.push_back(before + offset);
+  });
 }
 
 }  // namespace lamina::raster

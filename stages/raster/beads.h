@@ -6,6 +6,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <span>
 
 #include "stages/data/buffer.h"
@@ -18,31 +19,52 @@
 
 namespace lamina::raster {
 
-/// Collects the beads of a layer, in any order. Keeps 12 bytes for each row that a bead covers; reused from layer to
-/// layer.
+/// Collects the beads of a layer, in any order; reused from layer to layer. Keeps 36 bytes a bead, and the rows of one band
+/// at a time: a bead may cover thousands of rows.
 class BeadRaster {
  public:
   explicit BeadRaster(const PixelGrid& grid) : grid_(grid) {}
 
-  void clear() { spans_.clear(); }
+  void clear() { beads_.clear(); }
   /// a, b   nm on the bed; equal for a dot (round ends only, square ends leave nothing)
   /// width  nm, > 0 and below 2^27 (134 mm)
-  /// cost   O(rows covered)
   void add(Point2 a, Point2 b, Nm width, BeadEnds ends);
   /// All beads of a layer, with round ends. origin  nm on the bed: the front left corner of the grid
   void add(std::span<const LaidBead> beads, Point2 origin);
-  /// The union of all beads, as image rows (row 0 at the back). cost  O(S log(S of a row) + rows)
+  /// Gives the union of all beads, as bands of image rows from row 0 (at the back) on; each serves until the next.
+  /// take  called with the image row that is the band's first
+  /// cost  O(S log(S of a row) + rows) for S rows that beads cover, each counted on its own
+  void for_each_band(const std::function<void(std::uint32_t first_row, const RunsView& band)>& take);
+  /// All bands as one image. cost  of for_each_band
   void runs(Runs& out);
 
-  std::uint64_t bytes() const { return bytes_held(spans_) + bytes_held(ordered_) + bytes_held(start_); }
+  std::uint64_t bytes() const {
+    return bytes_held(beads_) + bytes_held(by_band_) + bytes_held(reaching_) + bytes_held(band_begin_) + bytes_held(spans_) +
+           bytes_held(ordered_) + bytes_held(start_) + bytes_held(band_.row_offset) + bytes_held(band_.change);
+  }
 
  private:
+  static constexpr std::uint32_t kBandRows = 64;  // so that the spans of a band stay within a second-level cache
+
+  struct Laid {
+    Point2 a, b;
+    std::uint32_t first_row, last_row;  // image rows that it may reach
+    Nm width;
+    BeadEnds ends;
+  };
   struct Span {
     std::uint32_t row, begin, end;
   };
+  void cover(const Laid& laid, std::uint32_t first_row, std::uint32_t last_row);
+  void unite(std::uint32_t first_row, std::uint32_t last_row);
+
   PixelGrid grid_;
-  Buffer<Span> spans_, ordered_;
-  Buffer<std::uint32_t> start_;
+  Buffer<Laid> beads_;
+  Buffer<std::uint32_t> by_band_, band_begin_;  // beads by the band of their first row; where each band's end
+  Buffer<std::uint32_t> reaching_;              // into the band at work
+  Buffer<Span> spans_, ordered_;                // of the band, as they come and by row
+  Buffer<std::uint32_t> start_;                 // of its rows in ordered_
+  Runs band_;
 };
 
 /// A grid to look at the beads in a box: pixels of 50 um, larger ones where there were more than 20 000 along a side.

@@ -14,20 +14,49 @@ namespace {
 /// Spare room of every box, nm: float holds coordinates up to 2.1e9 nm to 128 nm, and an instance adds two roundings.
 constexpr float kRoundingRoom = 1024;
 
-/// What Embree hands back with a primitive.
+/// What Embree hands back with a cluster.
 struct Source {
   const PlacedMesh* placed = nullptr;  // the first, or only, instance of the mesh
-  bool shared = false;                 // several instances: the instance says which one
+  bool shared = false;                 // several instances: the beam says which one
   std::uint32_t instance = 0;          // if not shared
   float half_band = 0;
 };
 
-/// The context that a ray carries through the tree.
+/// Copies of meshes that stand several times: one primitive a copy, 8 bytes, where Embree's own instances are objects of
+/// hundreds of bytes each.
+struct Copies {
+  struct One {
+    std::uint32_t instance, scene;
+  };
+  std::span<const PlacedMesh> placed;
+  std::vector<RTCScene> scenes;  // of each mesh
+  Buffer<One> copies;
+};
+
+/// A ray towards +x, and what it carries through the tree. Its place is in nm, for copies see it from their own frames.
 struct Beam {
   RTCIntersectContext context;
-  const std::uint32_t* instance_of_geometry;
+  std::int64_t x, y, z;
+  std::uint32_t instance = 0;  // the copy in which it is
   ClusterVisits* visits;
 };
+
+/// Sends the beam through a scene whose origin is at `offset`.
+void shoot(Beam& beam, RTCScene scene, Point3 offset) {
+  RTCRayHit ray;
+  std::memset(&ray, 0, sizeof ray);
+  ray.ray.org_x = static_cast<float>(beam.x - offset.x);
+  ray.ray.org_y = static_cast<float>(beam.y - offset.y);
+  ray.ray.org_z = static_cast<float>(beam.z - offset.z);
+  ray.ray.dir_x = 1;
+  ray.ray.tnear = 0;
+  ray.ray.tfar = std::numeric_limits<float>::infinity();
+  ray.ray.mask = ~0u;
+  ray.hit.geomID = RTC_INVALID_GEOMETRY_ID;
+  ray.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
+  rtcInitIntersectContext(&beam.context);
+  rtcIntersect1(scene, &beam.context, &ray);
+}
 
 void cluster_bounds(const RTCBoundsFunctionArguments* arguments) {
   const auto& source = *static_cast<const Source*>(arguments->geometryUserPtr);
@@ -43,6 +72,20 @@ void cluster_bounds(const RTCBoundsFunctionArguments* arguments) {
   bounds.upper_z = at(box.hi.z, move.z) + kRoundingRoom;
 }
 
+void copy_bounds(const RTCBoundsFunctionArguments* arguments) {
+  const auto& all = *static_cast<const Copies*>(arguments->geometryUserPtr);
+  const Copies::One copy = all.copies[arguments->primID];
+  const Point3 move = all.placed[copy.instance].offset;
+  RTCBounds& bounds = *arguments->bounds_o;
+  rtcGetSceneBounds(all.scenes[copy.scene], &bounds);
+  bounds.lower_x += static_cast<float>(move.x) - kRoundingRoom;
+  bounds.lower_y += static_cast<float>(move.y) - kRoundingRoom;
+  bounds.lower_z += static_cast<float>(move.z) - kRoundingRoom;
+  bounds.upper_x += static_cast<float>(move.x) + kRoundingRoom;
+  bounds.upper_y += static_cast<float>(move.y) + kRoundingRoom;
+  bounds.upper_z += static_cast<float>(move.z) + kRoundingRoom;
+}
+
 /// Embree reports its own lack of memory, or of threads, by a code.
 Error failed(RTCError code, const std::string& what) {
   if (code == RTC_ERROR_OUT_OF_MEMORY) return {Fault::kMemory, "Embree: " + out_of_memory().message};
@@ -54,8 +97,17 @@ void visit_cluster(const RTCIntersectFunctionNArguments* arguments) {
   if (arguments->valid[0] == 0) return;
   const auto& source = *static_cast<const Source*>(arguments->geometryUserPtr);
   auto& beam = *reinterpret_cast<Beam*>(arguments->context);
-  beam.visits->push_back(
-      {arguments->primID, source.shared ? beam.instance_of_geometry[arguments->context->instID[0]] : source.instance});
+  beam.visits->push_back({arguments->primID, source.shared ? beam.instance : source.instance});
+}
+
+/// Goes on within a copy, and never reports a hit either.
+void visit_copy(const RTCIntersectFunctionNArguments* arguments) {
+  if (arguments->valid[0] == 0) return;
+  const auto& all = *static_cast<const Copies*>(arguments->geometryUserPtr);
+  const Copies::One copy = all.copies[arguments->primID];
+  Beam within = *reinterpret_cast<const Beam*>(arguments->context);
+  within.instance = copy.instance;
+  shoot(within, all.scenes[copy.scene], all.placed[copy.instance].offset);
 }
 
 }  // namespace
@@ -63,37 +115,38 @@ void visit_cluster(const RTCIntersectFunctionNArguments* arguments) {
 struct BeamIndex::State {
   RTCDevice device = nullptr;
   RTCScene scene = nullptr;
-  std::vector<RTCScene> shared_scenes;
-  std::vector<Source> sources;
-  std::vector<std::uint32_t> instance_of_geometry;  // by geometry id of the top scene
+  std::vector<Source> sources;  // of each mesh
+  Copies copies;
   std::span<const PlacedMesh> placed;
   std::atomic<std::int64_t> bytes{0};
   std::string failure;
   RTCError failure_code = RTC_ERROR_NONE;
 
   ~State() {
-    for (RTCScene shared : shared_scenes) rtcReleaseScene(shared);
+    for (RTCScene shared : copies.scenes) rtcReleaseScene(shared);
     if (scene != nullptr) rtcReleaseScene(scene);
     if (device != nullptr) rtcReleaseDevice(device);
   }
 
-  void attach(RTCScene parent, RTCGeometry geometry, std::uint32_t instance) {
+  void attach(RTCScene parent, std::size_t count, void* data, RTCBoundsFunction bounds, RTCIntersectFunctionN visit) const {
+    RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_USER);
+    rtcSetGeometryUserPrimitiveCount(geometry, static_cast<unsigned>(count));
+    rtcSetGeometryUserData(geometry, data);
+    rtcSetGeometryBoundsFunction(geometry, bounds, nullptr);
+    rtcSetGeometryIntersectFunction(geometry, visit);
     rtcCommitGeometry(geometry);
-    const std::uint32_t id = rtcAttachGeometry(parent, geometry);
+    rtcAttachGeometry(parent, geometry);
     rtcReleaseGeometry(geometry);
-    if (parent != scene) return;
-    if (instance_of_geometry.size() <= id) instance_of_geometry.resize(std::size_t{id} + 1);
-    instance_of_geometry[id] = instance;
   }
 
-  RTCGeometry cluster_geometry(Source& source) const {
-    RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_USER);
-    rtcSetGeometryUserPrimitiveCount(geometry, static_cast<unsigned>(source.placed->mesh->clusters.size()));
-    rtcSetGeometryUserData(geometry, &source);
-    rtcSetGeometryBoundsFunction(
-        geometry, [](const RTCBoundsFunctionArguments* a) { cluster_bounds(a); }, nullptr);
-    rtcSetGeometryIntersectFunction(geometry, visit_cluster);
-    return geometry;
+  void attach_clusters(RTCScene parent, Source& source) const {
+    attach(parent, source.placed->mesh->clusters.size(), &source, cluster_bounds, visit_cluster);
+  }
+
+  RTCScene new_scene() const {
+    RTCScene made = rtcNewScene(device);
+    rtcSetSceneFlags(made, RTC_SCENE_FLAG_ROBUST | RTC_SCENE_FLAG_COMPACT);
+    return made;
   }
 };
 
@@ -124,8 +177,7 @@ Result<BeamIndex> BeamIndex::build(std::span<const PlacedMesh> placed, const Pix
         return true;
       },
       &state);
-  state.scene = rtcNewScene(state.device);
-  rtcSetSceneFlags(state.scene, RTC_SCENE_FLAG_ROBUST | RTC_SCENE_FLAG_COMPACT);
+  state.scene = state.new_scene();
 
   const auto half_band = static_cast<float>((grid.y.centre(std::int64_t{band_rows} - 1) - grid.y.centre(0)) / 2 + 2);
 
@@ -134,31 +186,28 @@ Result<BeamIndex> BeamIndex::build(std::span<const PlacedMesh> placed, const Pix
   for (std::uint32_t i = 0; i < order.size(); ++i) order[i] = i;
   std::stable_sort(order.begin(), order.end(),
                    [&](std::uint32_t a, std::uint32_t b) { return placed[a].mesh < placed[b].mesh; });
-  state.sources.reserve(placed.size());
+  std::size_t meshes = 0;
+  for (std::size_t i = 0; i < order.size(); ++i) meshes += i == 0 || placed[order[i]].mesh != placed[order[i - 1]].mesh ? 1 : 0;
+  state.sources.reserve(meshes);  // Embree keeps their addresses
+  state.copies.placed = placed;
   for (std::size_t begin = 0; begin < order.size();) {
     std::size_t end = begin + 1;
     while (end < order.size() && placed[order[end]].mesh == placed[order[begin]].mesh) ++end;
     Source& source = state.sources.emplace_back();
     source = {&placed[order[begin]], end - begin > 1, order[begin], half_band};
     if (!source.shared) {
-      state.attach(state.scene, state.cluster_geometry(source), source.instance);
+      state.attach_clusters(state.scene, source);
     } else {
-      RTCScene shared = rtcNewScene(state.device);
-      state.shared_scenes.push_back(shared);
-      rtcSetSceneFlags(shared, RTC_SCENE_FLAG_ROBUST | RTC_SCENE_FLAG_COMPACT);
-      state.attach(shared, state.cluster_geometry(source), 0);
+      const auto number = static_cast<std::uint32_t>(state.copies.scenes.size());
+      const RTCScene shared = state.copies.scenes.emplace_back(state.new_scene());
+      state.attach_clusters(shared, source);
       rtcCommitScene(shared);
-      for (std::size_t i = begin; i < end; ++i) {
-        const Point3& offset = placed[order[i]].offset;
-        const float transform[12] = {1, 0, 0, static_cast<float>(offset.x), 0, 1, 0, static_cast<float>(offset.y),
-                                     0, 0, 1, static_cast<float>(offset.z)};
-        RTCGeometry geometry = rtcNewGeometry(state.device, RTC_GEOMETRY_TYPE_INSTANCE);
-        rtcSetGeometryInstancedScene(geometry, shared);
-        rtcSetGeometryTransform(geometry, 0, RTC_FORMAT_FLOAT3X4_ROW_MAJOR, transform);
-        state.attach(state.scene, geometry, order[i]);
-      }
+      for (std::size_t i = begin; i < end; ++i) state.copies.copies.push_back({order[i], number});
     }
     begin = end;
+  }
+  if (!state.copies.copies.empty()) {
+    state.attach(state.scene, state.copies.copies.size(), &state.copies, copy_bounds, visit_copy);
   }
   rtcCommitScene(state.scene);
   if (!state.failure.empty()) return failed(state.failure_code, state.failure);
@@ -167,26 +216,16 @@ Result<BeamIndex> BeamIndex::build(std::span<const PlacedMesh> placed, const Pix
 
 void BeamIndex::find_clusters(const PixelSampling& sampling, Nm plane, std::uint32_t first_row, std::uint32_t last_row,
                               ClusterVisits& out) const {
-  Beam beam;
-  rtcInitIntersectContext(&beam.context);
-  beam.instance_of_geometry = state_->instance_of_geometry.data();
+  Beam beam{};
+  beam.x = static_cast<std::int64_t>(-4 * kRoundingRoom);
+  beam.y = (sampling.y.centre(first_row) + sampling.y.centre(last_row - 1)) / 2;
+  beam.z = plane;
   beam.visits = &out;
-
-  RTCRayHit ray;
-  std::memset(&ray, 0, sizeof ray);
-  const std::int64_t y = (sampling.y.centre(first_row) + sampling.y.centre(last_row - 1)) / 2;
-  ray.ray.org_x = -4 * kRoundingRoom;
-  ray.ray.org_y = static_cast<float>(y);
-  ray.ray.org_z = static_cast<float>(plane);
-  ray.ray.dir_x = 1;
-  ray.ray.tnear = 0;
-  ray.ray.tfar = std::numeric_limits<float>::infinity();
-  ray.ray.mask = ~0u;
-  ray.hit.geomID = RTC_INVALID_GEOMETRY_ID;
-  ray.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
-  rtcIntersect1(state_->scene, &beam.context, &ray);
+  shoot(beam, state_->scene, {0, 0, 0});
 }
 
-std::uint64_t BeamIndex::bytes() const { return static_cast<std::uint64_t>(std::max<std::int64_t>(0, state_->bytes)); }
+std::uint64_t BeamIndex::bytes() const {
+  return static_cast<std::uint64_t>(std::max<std::int64_t>(0, state_->bytes)) + bytes_held(state_->copies.copies);
+}
 
 }  // namespace lamina::raster

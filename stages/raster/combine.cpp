@@ -4,10 +4,17 @@ namespace lamina::raster {
 
 void combine(const RunsView& a, const RunsView& b, SetOperation operation, Runs& out) {
   out.columns = a.columns;
-  out.row_offset.resize(std::size_t{a.rows()} + 1);
-  out.change.resize(a.change.size() + b.change.size());
-  out.row_offset[0] = 0;
-  std::uint32_t* next = out.change.data();
+  out.row_offset.assign(1, 0);
+  out.change.clear();
+  append_combined(a, b, operation, out);
+}
+
+void append_combined(const RunsView& a, const RunsView& b, SetOperation operation, Runs& out) {
+  const std::size_t row = out.row_offset.size(), there = out.change.size();
+  const auto changes = [](const RunsView& image) { return image.row_offset.back() - image.row_offset.front(); };
+  out.row_offset.resize(row + a.rows());
+  out.change.resize(there + changes(a) + changes(b));
+  std::uint32_t* next = out.change.data() + there;
   const auto wanted = [operation](std::size_t in_a, std::size_t in_b) {
     if (operation == SetOperation::kUnion) return (in_a | in_b) != 0;
     return operation == SetOperation::kIntersection ? (in_a & in_b) != 0 : in_a > in_b;
@@ -22,7 +29,7 @@ void combine(const RunsView& a, const RunsView& b, SetOperation operation, Runs&
       if (j < second.size() && second[j] == column) ++j;
       if (wanted(i & 1, j & 1) != before) *next++ = column;
     }
-    out.row_offset[r + 1] = static_cast<std::uint32_t>(next - out.change.data());
+    out.row_offset[row + r] = static_cast<std::uint32_t>(next - out.change.data());
   }
   out.change.resize(static_cast<std::size_t>(next - out.change.data()));
 }

@@ -13,4 +13,7 @@ enum class SetOperation : std::uint8_t { kUnion, kIntersection, kDifference };
 /// Pixels of a with those of b, row by row; both of the same size; `out` is neither. cost  O(changes + rows), no sorting
 void combine(const RunsView& a, const RunsView& b, SetOperation operation, Runs& out);
 
+/// The same, behind the rows that `out` has (its row_offset is not empty).
+void append_combined(const RunsView& a, const RunsView& b, SetOperation operation, Runs& out);
+
 }  // namespace lamina::raster

@@ -1,5 +1,4 @@
-// Beads of a toolpath file. Apart from beads.cpp: a second caller of BeadRaster::add() there keeps its helpers from being
-// inlined into it, which costs a filled powder job a quarter of its time.
+// Beads of a toolpath file, and the grid to look at them.
 #include <algorithm>
 
 #include "stages/raster/beads.h"

@@ -25,13 +25,21 @@ void BeadPen::lay(const Stretch& s) {
   last_kind_ = s.kind;
 }
 
-void keep_beads(Runs& image, Runs& laid, Runs* inner, Runs& scratch) {
-  combine(image, laid, SetOperation::kIntersection, scratch);
-  if (inner != nullptr) {
-    combine(image, *inner, SetOperation::kDifference, laid);
-    combine(scratch, laid, SetOperation::kUnion, *inner);
-    std::swap(scratch, *inner);
-  }
+void keep_beads(Runs& image, BeadRaster& beads, const Runs* inner, Runs& scratch) {
+  scratch.columns = image.columns;
+  scratch.row_offset.assign(1, 0);
+  scratch.change.clear();
+  Runs kept, shell;  // of a band
+  beads.for_each_band([&](std::uint32_t first, const RunsView& laid) {
+    const auto band_of = [&](const Runs& whole) {
+      return RunsView{whole.columns, std::span(whole.row_offset).subspan(first, std::size_t{laid.rows()} + 1), whole.change};
+    };
+    const RunsView part = band_of(image);
+    if (inner == nullptr) return append_combined(part, laid, SetOperation::kIntersection, scratch);
+    combine(part, laid, SetOperation::kIntersection, kept);
+    combine(part, band_of(*inner), SetOperation::kDifference, shell);
+    append_combined(kept, shell, SetOperation::kUnion, scratch);
+  });
   std::swap(image, scratch);
 }
 

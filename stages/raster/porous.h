@@ -33,9 +33,9 @@ class BeadPen {
 };
 
 /// Leaves those pixels of the image that beads cover or that lie in its shell; none is added.
-/// laid     pixels of beads; not kept
-/// inner    what of the image lies below the shell, or nullptr without a shell; not kept
+/// beads    all beads of the layer, on the grid of the image
+/// inner    what of the image lies below the shell, or nullptr without a shell
 /// scratch  of the image's kind
-void keep_beads(Runs& image, Runs& laid, Runs* inner, Runs& scratch);
+void keep_beads(Runs& image, BeadRaster& beads, const Runs* inner, Runs& scratch);
 
 }  // namespace lamina::raster

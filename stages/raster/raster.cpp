@@ -5,6 +5,7 @@
 
 #include "stages/raster/beams.h"
 #include "stages/raster/clusters.h"
+#include "stages/raster/crossed_planes.h"
 #include "stages/raster/height_buckets.h"
 #include "stages/raster/layer_bound.h"
 
@@ -14,6 +15,9 @@ namespace {
 /// Rows a ray answers for, at most: their crossings stay within a second-level cache, and few clusters lie across two
 /// bands. Measured from 256 to 4096 on a boat, a terrain and a bed of 96 parts: 1024 is the best or next to it.
 constexpr std::uint32_t kMostBandRows = 1024;
+
+/// Clusters that engine `contours` cuts at once, at most: up to 40 MB of segments.
+constexpr std::size_t kMostClusters = 1 << 16;
 
 /// Segments of all clusters that an engine found. A mesh is larger than the caches, so what comes next is fetched early.
 void cut_clusters(const PixelSampling& sampling, std::span<const PlacedMesh> placed, std::span<const ClusterVisit> visits,
@@ -101,29 +105,49 @@ LayerReport Rasterizer::layer(Engine engine, Nm plane, LayerScratch& scratch, Ru
   out.row_offset.reserve(std::size_t{rows} + 1);
   out.row_offset.resize(std::size_t{rows - state.last_row} + 1, 0);
 
-  const auto append = [&](std::uint32_t first_row, std::uint32_t last_row) {
+  const auto append = [&](const ClusterVisits& visits, std::uint32_t first_row, std::uint32_t last_row) {
     scratch.segments.clear();
-    cut_clusters(state.sampling, state.placed, scratch.visits, plane, first_row, last_row, scratch.segments);
+    cut_clusters(state.sampling, state.placed, visits, plane, first_row, last_row, scratch.segments);
     scratch.scan.append_rows(state.sampling, scratch.segments, state.placed, plane, state.rule, first_row, last_row, out,
                              report);
   };
-  if (engine == Engine::kRays) {
-    // Bands from the back of the bed to its front, the order of the image's rows.
+  // Bands from the back of the bed to its front, the order of the image's rows.
+  const auto each_band = [&](auto&& take) {
     for (std::uint32_t last = state.last_row; last > state.first_row;) {
       const std::uint32_t first = std::max(state.first_row, last - std::min(last, state.band_rows));
-      scratch.visits.clear();
-      state.beams.front().find_clusters(state.sampling, plane, first, last, scratch.visits);
-      append(first, last);
+      take(first, last);
       last = first;
     }
+  };
+  scratch.visits.clear();
+  if (engine == Engine::kRays) {
+    each_band([&](std::uint32_t first, std::uint32_t last) {
+      scratch.visits.clear();
+      state.beams.front().find_clusters(state.sampling, plane, first, last, scratch.visits);
+      append(scratch.visits, first, last);
+    });
   } else {
-    scratch.visits.clear();
     for (std::uint32_t i = 0; i < state.placed.size(); ++i) {
       const PlacedMesh& placed = state.placed[i];
       state.buckets[static_cast<std::size_t>(placed.mesh - state.meshes.data())].find_clusters(
           std::int64_t{plane} - placed.offset.z, i, scratch.visits);
     }
-    append(state.first_row, state.last_row);
+    if (scratch.visits.size() <= kMostClusters) {
+      append(scratch.visits, state.first_row, state.last_row);
+    } else {
+      each_band([&](std::uint32_t first, std::uint32_t last) {
+        const std::int64_t low = state.sampling.y.centre(first), high = state.sampling.y.centre(last - 1);
+        scratch.near.clear();
+        for (const ClusterVisit& visit : scratch.visits) {
+          const PlacedMesh& placed = state.placed[visit.instance];
+          const Box& box = placed.mesh->bounds[visit.cluster];
+          const bool reaches =
+              std::int64_t{box.hi.y} + placed.offset.y >= low && std::int64_t{box.lo.y} + placed.offset.y <= high;
+          if (reaches) scratch.near.push_back(visit);
+        }
+        append(scratch.near, first, last);
+      });
+    }
   }
   out.row_offset.resize(std::size_t{rows} + 1, static_cast<std::uint32_t>(out.change.size()));
   report.scratch_bytes = scratch.bytes();
@@ -143,6 +167,10 @@ std::uint64_t Rasterizer::layer_bytes_bound(Nm plane) const {
 
 std::uint64_t Rasterizer::crossings_bound(Nm plane) const { return state_->bound.front().at(plane).crossings; }
 
+void Rasterizer::mark_crossed(std::span<const Nm> planes, std::span<std::uint8_t> crossed) const {
+  raster::mark_crossed(state_->placed, planes, crossed);
+}
+
 std::uint64_t Rasterizer::mesh_bytes() const {
   std::uint64_t total = 0;
   for (const ClusteredMesh& mesh : state_->meshes) total += bytes_held(mesh.storage);
@@ -150,7 +178,7 @@ std::uint64_t Rasterizer::mesh_bytes() const {
 }
 
 std::uint64_t Rasterizer::index_bytes() const {
-  std::uint64_t total = bytes_held(state_->sampling.row_centre);
+  std::uint64_t total = bytes_held(state_->sampling.row_centre) + state_->placed.capacity() * sizeof(PlacedMesh);
   for (const ClusteredMesh& mesh : state_->meshes) total += bytes_held(mesh.bounds);
   for (const HeightBuckets& buckets : state_->buckets) total += buckets.bytes();
   for (const BeamIndex& beams : state_->beams) total += beams.bytes();

@@ -24,9 +24,10 @@ enum class Engine : std::uint8_t { kRays, kContours };
 /// Scratch memory of one layer in flight; any layer may follow any other in it.
 struct LayerScratch {
   ClusterVisits visits;
+  ClusterVisits near;  // those of a band of rows, where a layer has many
   Segments segments;
   ScanConverter scan;
-  std::uint64_t bytes() const { return bytes_held(visits) + bytes_held(segments) + scan.bytes(); }
+  std::uint64_t bytes() const { return bytes_held(visits) + bytes_held(near) + bytes_held(segments) + scan.bytes(); }
 };
 
 /// Immutable once built; layers may be asked for from any number of threads.
@@ -51,6 +52,9 @@ class Rasterizer {
   std::uint64_t layer_bytes_bound(Nm plane) const;
   /// Crossings that the layer at `plane` may have at most.
   std::uint64_t crossings_bound(Nm plane) const;
+
+  /// Sets the entry of every plane that a facet crosses (crossed_planes.h).
+  void mark_crossed(std::span<const Nm> planes, std::span<std::uint8_t> crossed) const;
 
   std::uint64_t mesh_bytes() const;
   std::uint64_t index_bytes() const;  // trees, boxes and buckets

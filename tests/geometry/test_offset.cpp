@@ -1,6 +1,7 @@
 // Mitered offsets against those of Clipper's own offset, which makes and resolves a loop at every corner.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <polyclipping/clipper.hpp>

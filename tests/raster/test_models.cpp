@@ -10,6 +10,7 @@
 
 #include "stages/load/load.h"
 #include "stages/raster/raster.h"
+#include "tests/load/files.h"
 #include "tests/raster/reference.h"
 
 namespace lamina::test {
@@ -17,19 +18,6 @@ namespace {
 
 namespace fs = std::filesystem;
 using raster::Engine;
-
-std::vector<fs::path> part_files(const fs::path& folder) {
-  std::vector<fs::path> files;
-  if (!fs::is_directory(folder)) return files;
-  for (const auto& entry : fs::recursive_directory_iterator(folder)) {
-    const std::string name = entry.path().filename().string();
-    if (name.ends_with(".stl") || name.ends_with(".stl.gz") || name.ends_with(".obj") || name.ends_with(".3mf")) {
-      files.push_back(entry.path());
-    }
-  }
-  std::sort(files.begin(), files.end());
-  return files;
-}
 
 /// All facets of a part where they stand, lowest corner of the box at `origin`.
 std::vector<Triangle> facets_at(const Part& part, const Point3& origin) {
