@@ -111,6 +111,8 @@ def all_jobs():
         over_another("jet over an older job", ["jet", NUT, "--dpi", "200", "--layer", "0.5"],
                      ["jet", NIST, "--dpi", "300", "--layer", "0.1"]),
         over_another("slice over an older job", ["slice", NIST, "--layer", "0.5"], ["slice", NIST, *lines]),
+        over_another("slice, a file a layer, over an older job", ["slice", NIST, "--layer", "0.3", "--file-a-layer"],
+                     ["slice", NIST, "--layer", "0.1", "--file-a-layer"]),
         over_another("extrude over an older job", ["extrude", CROWN, "--machine", "anet-a8", "--layer", "0.3"],
                      ["extrude", NUT, "--machine", "anet-a8", "--layer", "0.3", "--fill", "segmented", "--scale", "2"],
                      "out.gcode"),
@@ -204,6 +206,16 @@ def go_on(program, job, folder):
     """The run after one that ended early. What ended before it replaced an older job leaves that, which --resume refuses."""
     ran = program.run(job.go_on, folder)
     return program.run(job.begin, folder) if job.over and ran.code == 2 else ran
+
+
+def remove(path):
+    """A file or a folder, if there is one, and what else begins so."""
+    for name in os.listdir(os.path.dirname(path)):
+        whole = os.path.join(os.path.dirname(path), name)
+        if name.startswith(os.path.basename(path)) and os.path.isdir(whole):
+            shutil.rmtree(whole)
+        elif name.startswith(os.path.basename(path)):
+            os.remove(whole)
 
 
 def fresh(folder):

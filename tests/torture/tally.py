@@ -31,6 +31,9 @@ class Tally:
         if self.row(name)[kind] <= 3:
             self.examples.append(f"{self.title}, {name}: {kind}: {example}")
 
+    def most(self, name, column, value):
+        self.row(name)[column] = max(self.row(name)[column], value)
+
     def faults(self):
         return sum(row[kind] for row in self.rows.values() for kind in FAULTS)
 
@@ -41,7 +44,8 @@ class Tally:
         print("|---|" + "---:|" * len(columns))
         for name, row in self.rows.items():
             print(f"| {name} | " + " | ".join(str(row[column]) for column in columns) + " |")
-        total = {column: sum(row[column] for row in self.rows.values()) for column in columns}
+        total = {column: (max if column.startswith("slowest") else sum)([row[column] for row in self.rows.values()] or [0])
+                 for column in columns}
         print("| all | " + " | ".join(str(total[column]) for column in columns) + " |")
         for example in self.examples:
             print("  " + example)
