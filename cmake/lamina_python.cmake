@@ -24,6 +24,9 @@ endif()
 # What is linked into a module must be able to lie anywhere; hidden symbols keep calls within it direct.
 set_target_properties(lamina_stages lamina_once_a_job lamina_pipeline PROPERTIES POSITION_INDEPENDENT_CODE ON CXX_VISIBILITY_PRESET hidden)
 pybind11_add_module(lamina_python MODULE NO_EXTRAS python/module.cpp python/arrays.cpp)
+if(LAMINA_UNITE STREQUAL "all")
+  lamina_unite(lamina_python ${PROJECT_SOURCE_DIR}/python/module.cpp ${PROJECT_SOURCE_DIR}/python/arrays.cpp)
+endif()
 set_target_properties(lamina_python PROPERTIES OUTPUT_NAME lamina LIBRARY_OUTPUT_DIRECTORY ${PROJECT_BINARY_DIR}/python)
 target_link_libraries(lamina_python PRIVATE lamina::pipeline)
 # numpy is asked for when arrays are made; its headers are not needed. Size over speed: what is called is optimised.

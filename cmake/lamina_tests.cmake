@@ -43,6 +43,15 @@ foreach(folder ${folders})
   target_link_libraries(test_${folder} PRIVATE lamina_test_support GTest::gtest_main TIFF::TIFF PNG::PNG ZLIB::ZLIB
                         PkgConfig::XXHASH)
   target_precompile_headers(test_${folder} REUSE_FROM lamina_test_support)
+  if(LAMINA_UNITE_TESTS)
+    list(REMOVE_ITEM test_sources ${PROJECT_SOURCE_DIR}/tests/raster/reference.cpp)  # options of its own
+    lamina_unite(test_${folder} ${test_sources})
+    list(FILTER test_sources INCLUDE REGEX "/tests/pipeline/")
+    list(FILTER test_sources EXCLUDE REGEX "/tests/pipeline/(cli|run)/")  # the other rooms have a file or two each
+    if(test_sources)
+      set_source_files_properties(${test_sources} PROPERTIES UNITY_GROUP tests_pipeline)
+    endif()
+  endif()
   add_dependencies(test_${folder} lamina)
   if(LAMINA_TEST_COMMANDS AND NOT LAMINA_TEST_ONLY)
     add_dependencies(test_${folder} lamina-preview lamina_call_log)

@@ -44,7 +44,7 @@ bool set_keys(std::string_view lines) {
     any |= set.ok();
     at = end + 1;
   }
-  if (!any || Dice(lines).below(8) != 0) return all;  // a hundred times as long as setting a key
+  if (!any || Dice(lines).below(8) != 0) return all;                                // a hundred times as long as setting a key
   for (pipeline::PartRequest& part : job.parts) part.path = "/parts/" + part.path;  // a job file means paths from its folder
   check_round_trip(job);
   return all;
@@ -76,9 +76,9 @@ std::vector<std::string> key_seeds() {
       "heights.thickness_mm=0.05..0.3:0.01\nrun.memory=1.5G\nrun.layers=2:10"};
 }
 
-constexpr std::string_view kSources = "pipeline/job stages/data/text stages/read/profiles";
-const Registered kJob({"job", read_job, job_seeds, kSources, ".toml", "toml.dict", 4096});
-const Registered kKeys({"keys", set_keys, key_seeds, kSources, "", "toml.dict", 1024});
+constexpr std::string_view kJobSources = "pipeline/job stages/data/text stages/read/profiles";
+const Registered kJob({"job", read_job, job_seeds, kJobSources, ".toml", "toml.dict", 4096});
+const Registered kKeys({"keys", set_keys, key_seeds, kJobSources, "", "toml.dict", 1024});
 
 }  // namespace
 }  // namespace lamina::fuzz

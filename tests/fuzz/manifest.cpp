@@ -47,7 +47,7 @@ bool check(std::string_view text, bool partial) {
   return true;
 }
 
-bool read_whole(std::string_view text) { return check(text, false); }
+bool read_finished(std::string_view text) { return check(text, false); }
 bool read_partial(std::string_view text) { return check(text, true); }
 
 ManifestHead some_head(Product product) {
@@ -104,9 +104,9 @@ std::vector<std::string> seeds_of(bool ended) {
 std::vector<std::string> whole_seeds() { return seeds_of(true); }
 std::vector<std::string> partial_seeds() { return seeds_of(false); }
 
-constexpr std::string_view kSources = "stages/write/manifest stages/data/text stages/data/hash stages/data/layer";
-const Registered kWhole({"manifest", read_whole, whole_seeds, kSources, "", "manifest.dict", 6000});
-const Registered kPartial({"manifest_part", read_partial, partial_seeds, kSources, "", "manifest.dict", 6000});
+constexpr std::string_view kManifestSources = "stages/write/manifest stages/data/text stages/data/hash stages/data/layer";
+const Registered kWhole({"manifest", read_finished, whole_seeds, kManifestSources, "", "manifest.dict", 6000});
+const Registered kPartial({"manifest_part", read_partial, partial_seeds, kManifestSources, "", "manifest.dict", 6000});
 
 }  // namespace
 }  // namespace lamina::fuzz

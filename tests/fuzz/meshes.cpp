@@ -105,11 +105,11 @@ std::size_t mutate_binary(std::uint8_t* bytes, std::size_t size, std::size_t mos
   return 84 + 50 * facets;
 }
 
-constexpr std::string_view kSources = "stages/load stages/data";
-const Registered kBinary({"stl_binary", load_stl, binary_seeds, kSources, ".stl", {}, 1700, mutate_binary});
-const Registered kAscii({"stl_ascii", load_stl, ascii_seeds, kSources, ".stl", "stl.dict", 4000});
-const Registered kObj({"obj", load_obj, obj_seeds, kSources, ".obj", "obj.dict", 2000});
-const Registered kGzip({"gzip", load_gzip, gzip_seeds, kSources, ".gz", {}, 2000});
+constexpr std::string_view kMeshSources = "stages/load stages/data";
+const Registered kBinary({"stl_binary", load_stl, binary_seeds, kMeshSources, ".stl", {}, 1700, mutate_binary});
+const Registered kAscii({"stl_ascii", load_stl, ascii_seeds, kMeshSources, ".stl", "stl.dict", 4000});
+const Registered kObj({"obj", load_obj, obj_seeds, kMeshSources, ".obj", "obj.dict", 2000});
+const Registered kGzip({"gzip", load_gzip, gzip_seeds, kMeshSources, ".gz", {}, 2000});
 
 }  // namespace
 }  // namespace lamina::fuzz

@@ -59,10 +59,10 @@ std::vector<std::string> extruder_seeds() {
 
 std::vector<std::string> change_seeds() { return {"fan.from_layer=2; bed.corner_mm=-110,-110", "material.flow=0.85"}; }
 
-constexpr std::string_view kSources = "stages/read/profiles stages/data/text pipeline/machine stages/program/head_grid";
-const Registered kMachine({"machine", read_machine, machine_seeds, kSources, ".toml", "toml.dict", 8192});
-const Registered kExtruder({"extruder", read_extruder, extruder_seeds, kSources, ".toml", "toml.dict", 8192});
-const Registered kChanges({"profile_changes", read_changes, change_seeds, kSources, "", "toml.dict", 512});
+constexpr std::string_view kProfileSources = "stages/read/profiles stages/data/text pipeline/machine stages/program/head_grid";
+const Registered kMachine({"machine", read_machine, machine_seeds, kProfileSources, ".toml", "toml.dict", 8192});
+const Registered kExtruder({"extruder", read_extruder, extruder_seeds, kProfileSources, ".toml", "toml.dict", 8192});
+const Registered kChanges({"profile_changes", read_changes, change_seeds, kProfileSources, "", "toml.dict", 512});
 
 }  // namespace
 }  // namespace lamina::fuzz
