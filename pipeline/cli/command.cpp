@@ -4,14 +4,14 @@
 
 #include <fmt/format.h>
 #include <malloc.h>
+#include <sys/resource.h>
 
 #include <algorithm>
 #include <exception>
-#include <new>
-#include <system_error>
 
 #include "pipeline/cli/console.h"
 #include "pipeline/cli/outputs.h"
+#include "stages/data/shortage.h"
 #include "stages/data/text/json_text.h"
 #include "stages/data/text/names.h"
 #include "stages/write/file.h"
@@ -45,6 +45,9 @@ std::string program_help() {
 /// resident memory would exceed --memory.
 void bound_retained_memory() {
 #ifdef __GLIBC__
+  // Where address space is short, an arena a thread does not fit, and each allocation would try again in vain.
+  rlimit space{};
+  if (getrlimit(RLIMIT_AS, &space) == 0 && space.rlim_cur < 2ull << 30) mallopt(M_ARENA_MAX, 1);
   mallopt(M_MMAP_THRESHOLD, 2 << 20);
   mallopt(M_TRIM_THRESHOLD, 4 << 20);
 #endif
@@ -77,12 +80,8 @@ Outcome run(const Command& command, const Arguments& arguments, Context& context
   try {
     if (Status status = check_outputs(command.name, arguments); !status) return status;
     return command.run(arguments, context);
-  } catch (const std::bad_alloc&) {
-    return out_of_memory();
-  } catch (const std::system_error& error) {  // of a thread that cannot be started
-    if (error.code() == std::errc::resource_unavailable_try_again) return out_of_memory();
-    return Error{Fault::kInternal, fmt::format("internal error: {}", error.what())};
   } catch (const std::exception& error) {
+    if (is_shortage(error)) return out_of_memory();
     return Error{Fault::kInternal, fmt::format("internal error: {}", error.what())};
   } catch (...) {
     return Error{Fault::kInternal, "internal error"};
@@ -122,7 +121,8 @@ namespace {
 [[noreturn]] void end_without_memory() {
   try {
     if (const auto current = std::current_exception()) std::rethrow_exception(current);
-  } catch (const std::bad_alloc&) {
+  } catch (const std::exception& error) {
+    if (!is_shortage(error)) std::abort();
     constexpr std::string_view kLine = "lamina: out of memory; give a smaller --memory or fewer --threads\n";
     write::write_all(2, std::as_bytes(std::span(kLine)));
     std::_Exit(static_cast<int>(Fault::kMemory));
@@ -141,9 +141,8 @@ int run_program(int argument_count, char** arguments, Program program) {
     const Outcome outcome = program({arguments + std::min(argument_count, 1), arguments + argument_count}, console);
     for (const std::string& left : write::take_left_behind()) console.say("lamina: note: " + left);
     return outcome.error ? console.complain(*outcome.error) : outcome.code;
-  } catch (const std::bad_alloc&) {
-    return console.complain(out_of_memory());
   } catch (const std::exception& error) {
+    if (is_shortage(error)) return console.complain(out_of_memory());
     return console.complain({Fault::kInternal, fmt::format("internal error: {}", error.what())});
   }
 }

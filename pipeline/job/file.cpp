@@ -11,6 +11,7 @@
 #include "stages/data/input/file_reader.h"
 #include "stages/data/text/json_text.h"
 #include "stages/write/file.h"
+#include "stages/write/replaceable.h"
 
 namespace lamina::pipeline {
 namespace {
@@ -182,10 +183,9 @@ std::string canonical_job_text(const Job& job, Product product) {
   return text;
 }
 
-Status save_job(const std::string& path, const Job& job, bool durable) {
+Result<write::File> write_job(const std::string& path, const Job& job, bool durable) {
   for (const PartRequest& part : job.parts) {
-    std::error_code absent;
-    if (fs::equivalent(path, part.path, absent)) {
+    if (write::same_file(path, part.path)) {
       return Error{Fault::kUsage, fmt::format("--save-job {}: is a part of the job; name another file", path)};
     }
     if (!is_utf8(part.path)) {
@@ -195,7 +195,16 @@ Status save_job(const std::string& path, const Job& job, bool durable) {
   fs::path directory = fs::path(path).parent_path();
   if (directory.empty()) directory = ".";
   const std::string text = "# A job of lamina. Run it with: lamina jet --job FILE\n\n" + job_text(job, directory.string());
-  return write::write_file(path, text, {.durable = durable ? write::Durable::kAll : write::Durable::kNo});
+  auto file = write::File::open(path, {.durable = durable ? write::Durable::kAll : write::Durable::kNo});
+  Status status = file ? file->append(text) : Status(file.error());
+  if (status) status = file->flush();
+  return status ? std::move(file) : status.error();
+}
+
+Status save_job(const std::string& path, const Job& job) {
+  auto file = write_job(path, job, true);
+  const auto written = file ? file->finish() : file.error();
+  return written ? Status() : written.error();
 }
 
 }  // namespace lamina::pipeline

@@ -9,6 +9,10 @@
 #include "stages/data/choices.h"
 #include "stages/data/status.h"
 
+namespace lamina::write {
+class File;
+}
+
 namespace lamina::pipeline {
 
 /// Reads a job file into `job`: keys absent from the file keep their values; its parts replace the job's.
@@ -41,6 +45,8 @@ std::string job_text(const Job& job, const std::string& directory);
 std::string canonical_job_text(const Job& job, Product product);
 
 /// Writes the resolved job in a form that read_job restores. errors  kOutput; kUsage if a path is not UTF-8
-Status save_job(const std::string& path, const Job& job, bool durable = true);
+Status save_job(const std::string& path, const Job& job);
+/// The same, but the file takes its name when it is finished.
+Result<write::File> write_job(const std::string& path, const Job& job, bool durable);
 
 }  // namespace lamina::pipeline

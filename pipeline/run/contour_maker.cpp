@@ -117,26 +117,22 @@ class ContourMaker : public Maker {
 };
 
 void ContourMaker::warn(const Summary& so_far, std::vector<Warning>& warnings) const {
-  if (open_.count > 0) {
-    open_.warn("chains-open",
-               fmt::format("{} chains of cuts stay open, first in {}: they bound nothing and are left out; leave out "
-                           "--no-repair to close the parts, or give a longer --bridge",
-                           sums_.open, open_.first),
-               warnings);
-  }
-  if (emptied_.count > 0) {
-    emptied_.warn("offset",
-                  fmt::format("--offset {} leaves nothing of {} of {} layers, first {}: they are thinner than twice that; "
-                              "give a smaller offset",
-                              number_text(plan_.job.slice.offset_mm), emptied_.count, so_far.layers_planned, emptied_.first),
-                  warnings);
-  }
+  open_.warn("chains-open",
+             fmt::format("{} chains of cuts stay open, first in {}: they bound nothing and are left out; leave out "
+                         "--no-repair to close the parts, or give a longer --bridge",
+                         sums_.open, open_.first),
+             warnings);
+  emptied_.warn("offset",
+                fmt::format("--offset {} leaves nothing of {} of {} layers, first {}: they are thinner than twice that; "
+                            "give a smaller offset",
+                            number_text(plan_.job.slice.offset_mm), emptied_.count, so_far.layers_planned, emptied_.first),
+                warnings);
   if (plan_.sections->fills() && sums_.contours > 0 && sums_.paths == 0) {
     warnings.push_back({"no-bead",
                         "no bead of the filling fits into the parts: they are narrower than walls and filling ask "
                         "for; give a smaller --bead"});
   }
-  if (plan_.job.resume && (!files_.keeps() || (plan_.job.slice.file_a_layer && files_.kept().empty()))) {
+  if (plan_.job.resume && files_.kept().empty() && (!files_.keeps() || plan_.job.slice.file_a_layer)) {
     warnings.push_back({"planned-again", "--resume: no layer of an interrupted job was found; all were planned again"});
   }
 }

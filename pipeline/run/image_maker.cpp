@@ -6,62 +6,11 @@
 
 #include "stages/data/text/number_text.h"
 #include "stages/data/text/readable.h"
+#include "stages/sanity/records.h"
+#include "stages/sanity/rows.h"
 
 namespace lamina::pipeline {
 namespace {
-
-/// One line about rows that only repair closes, or that stay open, with the place of the first.
-class RowWarnings {
- public:
-  void add(const Layer& layer, const raster::LayerReport& report, const PixelGrid& grid) {
-    note(capped_, layer, report.capped_rows, report.first_capped_row, report.first_capped_instance, grid);
-    note(open_, layer, report.open_rows, report.first_open_row, 0, grid);
-  }
-
-  void tell(const Scene& scene, std::vector<Warning>& warnings) const {
-    if (capped_.rows > 0) {
-      const std::uint32_t part = scene.part_of_instance[capped_.instance];
-      const std::string& path = scene.parts[part].path;
-      warnings.push_back(
-          {"rows-capped",
-           fmt::format(
-               "{}: {} rows in {} layers are closed only by the caps put over its openings, first {}; look at `lamina info`",
-               path, capped_.rows, capped_.layers, capped_.place),
-           path, capped_.layer, capped_.z_mm});
-    }
-    if (open_.rows > 0) {
-      warnings.push_back(
-          {"rows-open",
-           fmt::format("{} rows in {} layers stay open, first {}; each is drawn up to its last crossing; leave out "
-                       "--no-repair to close the parts",
-                       open_.rows, open_.layers, open_.place),
-           "", open_.layer, open_.z_mm});
-    }
-  }
-  std::uint64_t capped() const { return capped_.rows; }
-
- private:
-  struct Tally {
-    std::uint64_t rows = 0;
-    std::uint32_t layers = 0, instance = 0, layer = 0;  // layer: the first
-    double z_mm = 0;
-    std::string place;
-  };
-  static void note(Tally& tally, const Layer& layer, std::uint32_t rows, std::uint32_t first_row, std::uint32_t instance,
-                   const PixelGrid& grid) {
-    if (rows == 0) return;
-    if (tally.rows == 0) {
-      tally.place = fmt::format("in layer {} at y {:.3f} mm, z {:.3f} mm (image row {})", layer.index,
-                                mm(grid.y.centre(first_row)), mm(layer.plane()), grid.rows() - 1 - first_row);
-      tally.instance = instance;
-      tally.layer = layer.index;
-      tally.z_mm = mm(layer.plane());
-    }
-    tally.rows += rows;
-    ++tally.layers;
-  }
-  Tally capped_, open_;
-};
 
 class ImageMaker : public Maker {
  public:
@@ -121,7 +70,10 @@ class ImageMaker : public Maker {
     if (Status status = files_.record(made.record); !status) return status;
     add(made.record);
     sanity_.record(made.record.layer.index, made.record.set_pixels > 0);
-    warnings_.add(made.record.layer, made.notes.report, plan_.images->grid);
+    const raster::LayerReport& report = made.notes.report;
+    rows_.add_capped(made.record.layer, report.capped_rows, report.first_capped_row, report.first_capped_instance,
+                     plan_.images->grid);
+    rows_.add_open(made.record.layer, report.open_rows, report.first_open_row, plan_.images->grid);
     capped_rows_ += made.notes.report.capped_rows;
     solid_pixels_ += made.notes.solid_pixels;
     bead_pixels_ += made.notes.bead_pixels;
@@ -170,7 +122,7 @@ class ImageMaker : public Maker {
   std::vector<Work> work_;
   std::vector<Made> made_;
 
-  RowWarnings warnings_;
+  sanity::RowWarnings rows_;
   std::uint64_t set_pixels_ = 0, moved_pixels_ = 0, lost_pixels_ = 0, solid_pixels_ = 0, bead_pixels_ = 0, capped_rows_ = 0;
   std::uint64_t bytes_written_ = 0;
   double volume_mm3_ = 0;
@@ -178,13 +130,9 @@ class ImageMaker : public Maker {
 };
 
 void ImageMaker::warn(const Summary&, std::vector<Warning>& warnings) const {
-  if (lost_pixels_ > 0) {
-    warnings.push_back(
-        {"lost-pixels",
-         fmt::format("{} pixels of blocked nozzles are not fired at all; head.blocked_rule = \"second-pass\" fires them",
-                     readable_count(lost_pixels_))});
-  }
-  warnings_.tell(*plan_.scene, warnings);
+  sanity::warn_of_lost_pixels(lost_pixels_, warnings);
+  const std::vector<std::uint32_t>& part = plan_.scene->part_of_instance;
+  rows_.tell(part.empty() ? std::string() : plan_.scene->parts[part[rows_.first_capped()]].path, warnings);
 }
 
 void ImageMaker::tell(Summary& summary) const {

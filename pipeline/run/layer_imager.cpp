@@ -155,7 +155,7 @@ std::uint64_t LayerImager::changes_bound(const Layer& layer) const {
   if (plan_.job.heights.containment != Containment::kAcross) {
     return changes_of_section(layer.lowest_plane(), 0) + changes_of_section(layer.highest_plane(), 0);
   }
-  return changes_of_section(layer.plane(), plan_.images->beads ? 2 * plan_.images->beads->spans_expected(layer.index) : 0);
+  return changes_of_section(layer.plane(), plan_.images->beads ? 2 * plan_.images->beads->expected(layer.index).spans : 0);
 }
 
 std::uint64_t LayerImager::bytes_of(const Layer& layer) const {

@@ -153,20 +153,16 @@ class MoveMaker : public Maker {
 };
 
 void MoveMaker::warn(const Summary& so_far, std::vector<Warning>& warnings) const {
-  if (open_.count > 0) {
-    open_.warn("chains-open",
-               fmt::format("chains of cuts stay open in {} layers, first in {}: they bound nothing and are left out; leave "
-                           "out --no-repair to close the parts",
-                           open_.count, open_.first),
-               warnings);
-  }
-  if (undivided_.count > 0) {
-    undivided_.warn("undivided",
-                    fmt::format("segment.thin_mm: longer than every segmented line less its ends in {} of {} layers, first "
-                                "in {}: no pores there",
-                                undivided_.count, so_far.layers_planned, undivided_.first),
-                    warnings);
-  }
+  open_.warn("chains-open",
+             fmt::format("chains of cuts stay open in {} layers, first in {}: they bound nothing and are left out; leave "
+                         "out --no-repair to close the parts",
+                         open_.count, open_.first),
+             warnings);
+  undivided_.warn("undivided",
+                  fmt::format("segment.thin_mm: longer than every segmented line less its ends in {} of {} layers, first "
+                              "in {}: no pores there",
+                              undivided_.count, so_far.layers_planned, undivided_.first),
+                  warnings);
   if (plan_.sections->fills() && sums_.totals.moves == 0) {
     warnings.push_back({"no-bead", "no bead fits into the parts: they are narrower than the walls and the filling ask for"});
   }

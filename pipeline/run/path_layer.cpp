@@ -70,7 +70,7 @@ void LayersTold::add(const Layer& layer) {
 }
 
 void LayersTold::warn(std::string_view code, std::string text, std::vector<Warning>& warnings) const {
-  warnings.push_back({std::string(code), std::move(text), "", index, z_mm});
+  if (count > 0) warnings.push_back({std::string(code), std::move(text), "", index, z_mm});
 }
 
 }  // namespace lamina::pipeline

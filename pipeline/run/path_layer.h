@@ -40,6 +40,7 @@ struct LayersTold {
   std::uint32_t index = 0;
   double z_mm = 0;
   void add(const Layer& layer);
+  /// Only if there are any.
   void warn(std::string_view code, std::string text, std::vector<Warning>& warnings) const;
 };
 

@@ -18,6 +18,7 @@
 #include "pipeline/run/move_maker.h"
 #include "pipeline/run/run_resolved.h"
 #include "pipeline/run/sanity.h"
+#include "stages/sanity/records.h"
 
 namespace lamina::pipeline {
 namespace {
@@ -108,7 +109,7 @@ Error ended_early(Maker& maker, const Error& error, bool any_layer) {
 Status judge(const Plan& plan, Maker& maker, const Sanity& sanity, bool resumed, Summary& summary) {
   maker.warn(summary, summary.warnings);
   Status status = sanity.end(summary.warnings);
-  if (status) status = check_strict(plan.job, summary.warnings);
+  if (status && plan.job.strict) status = sanity::refuse_warnings(summary.warnings);
   if (status) return {};
   if (resumed || plan.job.shard) {
     static_cast<void>(maker.stop(true));
@@ -167,7 +168,7 @@ Result<Summary> run(Resolved resolved, const ProgressCallback& progress, const s
   if (cancel) return Error{Fault::kInterrupted, "interrupted before the first layer; nothing was written"};
 
   const Job& job = plan->job;
-  if (Status status = check_strict(job, plan->warnings); !status) return status.error();
+  if (Status status = sanity::refuse_warnings(plan->warnings); job.strict && !status) return status.error();
   FlowLimits limits;
   limits.budget_bytes = job.memory_bytes;
   limits.most_in_flight = layers_in_flight();

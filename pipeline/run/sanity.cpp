@@ -3,11 +3,12 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <set>
-#include <utility>
 
 #include "stages/data/text/readable.h"
+#include "stages/load/info/planned.h"
+#include "stages/sanity/crossed.h"
 #include "stages/slice/bodies.h"
+#include "stages/slice/surplus.h"
 
 namespace lamina::pipeline {
 namespace {
@@ -68,26 +69,13 @@ sanity::Sampling sampling_of(const Job& job, const PixelGrid* grid) {
   return sampling;
 }
 
-std::vector<std::uint8_t> crossed_planes(const Scene& scene, std::span<const Nm> planes) {
-  std::vector<std::uint8_t> crossed(planes.size(), 0);
-  std::set<std::pair<std::uint32_t, Nm>> seen;
-  for (const Instance& instance : scene.instances) {
-    if (!seen.emplace(instance.mesh, instance.offset.z).second) continue;
-    for (const Triangle& t : scene.meshes[instance.mesh].triangles) {
-      const std::int64_t lowest = std::int64_t{std::min({t.a.z, t.b.z, t.c.z})} + instance.offset.z,
-                         highest = std::int64_t{std::max({t.a.z, t.b.z, t.c.z})} + instance.offset.z;
-      auto plane = std::ranges::lower_bound(planes, lowest);
-      for (; plane != planes.end() && *plane < highest; ++plane) crossed[static_cast<std::size_t>(plane - planes.begin())] = 1;
-    }
-  }
-  return crossed;
-}
-
-Status check_strict(const Job& job, const std::vector<Warning>& warnings) {
-  if (!job.strict || warnings.empty()) return {};
-  std::string text = fmt::format("--strict: {} warning{}", warnings.size(), warnings.size() == 1 ? "" : "s");
-  for (const Warning& warning : warnings) text += fmt::format("; [{}] {}", warning.code, one_line(warning.text));
-  return Error{Fault::kVerification, text};
+std::function<double(std::uint32_t)> united_in(const Scene& scene, const sanity::Tally& tally) {
+  return [&](std::uint32_t group) {
+    std::vector<Instance> members;
+    for (std::size_t i = 0; i < scene.instances.size(); ++i)
+      if (tally.solids()[i].group == group) members.push_back(scene.instances[i]);
+    return load::united_mm3(scene.meshes, members, slice::surplus_areas);
+  };
 }
 
 Sanity::Sanity(const Plan& plan)
@@ -96,6 +84,12 @@ Sanity::Sanity(const Plan& plan)
   if (plan.images) tally_->look_through(plan.images->grid);
   sampling_ = sampling_of(plan.job, plan.images ? &plan.images->grid : nullptr);
   sampling_.part = names_;
+  // The triangles of images are in clusters by then: their parts are read again.
+  sampling_.united_mm3 = [this](std::uint32_t group) {
+    if (!plan_.images) return united_in(*plan_.scene, *tally_)(group);
+    const Result<Scene> scene = load_scene(plan_.job, plan_.bed);
+    return scene ? united_in(*scene, *tally_)(group) : 0.0;
+  };
   for (std::uint32_t i = 0; i < plan.layer_count; ++i) {
     sampling_.thickest_mm = std::max(sampling_.thickest_mm, mm(plan.layer(i).thickness));
   }
@@ -135,7 +129,11 @@ std::vector<std::uint8_t> Sanity::filled_or_rightly_empty() const {
   if (planes.empty()) return filled;
   const bool thinned = plan_.images && (plan_.images->beads || plan_.job.dose.core < 1);
   std::vector<std::uint8_t> crossed(planes.size(), 0);
-  if (!thinned) crossed = crossed_planes(*plan_.scene, planes);
+  if (!thinned && plan_.images) {
+    for (const Solid& solid : plan_.images->solids.all()) solid.rasterizer.mark_crossed(planes, crossed);
+  } else if (!thinned) {
+    crossed = sanity::crossed_planes(plan_.scene->meshes, plan_.scene->instances, planes);
+  }
   std::size_t next = 0;
   for (std::uint8_t& layer : filled) {
     if (layer == 0) layer = crossed[next++] == 0 ? 1 : 0;

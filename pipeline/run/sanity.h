@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <span>
 #include <string>
@@ -20,11 +21,8 @@ std::vector<sanity::Solid> solids_from_above(const Scene& scene);
 /// How images on a grid see the solids of a job, or contours if it is null. Names of parts are left to the caller.
 sanity::Sampling sampling_of(const Job& job, const PixelGrid* grid);
 
-/// Which of some rising planes a facet crosses. cost  O(T log P) for each instance of another mesh or height
-std::vector<std::uint8_t> crossed_planes(const Scene& scene, std::span<const Nm> planes);
-
-/// Refuses warnings of a strict job. errors  kVerification with all of them on one line
-Status check_strict(const Job& job, const std::vector<Warning>& warnings);
+/// What the solids of a group hold together (stages/load/info/planned.h). Scene and tally must outlive it.
+std::function<double(std::uint32_t)> united_in(const Scene& scene, const sanity::Tally& tally);
 
 /// Counts while layers are made. Layers that --resume keeps are known by their records alone: then solids are not judged.
 class Sanity {

@@ -18,14 +18,6 @@ double rate(double amount, double seconds) { return seconds > 0 ? amount / secon
 
 Json point_json(const Point3& p) { return {mm(p.x), mm(p.y), mm(p.z)}; }
 
-Json warning_json(const Warning& warning) {
-  Json json = {{"code", warning.code}, {"text", warning.text}};
-  if (!warning.part.empty()) json["part"] = warning.part;
-  if (warning.layer) json["layer"] = *warning.layer;
-  if (warning.z_mm) json["z_mm"] = *warning.z_mm;
-  return json;
-}
-
 using Line = std::pair<std::string, std::string>;
 
 std::string layers_line(const Summary& s) {
@@ -89,6 +81,17 @@ nlohmann::ordered_json part_json(const PartSummary& part) {
           {"notes", notes}};
 }
 
+nlohmann::ordered_json warnings_json(const std::vector<Warning>& warnings) {
+  Json all = Json::array();
+  for (const Warning& warning : warnings) {
+    Json& json = all.emplace_back(Json{{"code", warning.code}, {"text", warning.text}});
+    if (!warning.part.empty()) json["part"] = warning.part;
+    if (warning.layer) json["layer"] = *warning.layer;
+    if (warning.z_mm) json["z_mm"] = *warning.z_mm;
+  }
+  return all;
+}
+
 std::string text_of(const Summary::Lines& lines) {
   std::string text;
   for (const auto& [name, what] : lines) text += fmt::format("{:<10}{}\n", name, what);
@@ -119,10 +122,9 @@ std::string Summary::text() const {
 }
 
 std::string Summary::json() const {
-  Json threads = Json::object(), part_list = Json::array(), warning_list = Json::array();
+  Json threads = Json::object(), part_list = Json::array();
   for (const auto& [name, value] : step_seconds) threads[std::string(name)] = value;
   for (const PartSummary& part : parts) part_list.push_back(part_json(part));
-  for (const Warning& warning : warnings) warning_list.push_back(warning_json(warning));
   Json all{{"command", command_name(product)},
            {"dry_run", dry_run},
            {"output", output},
@@ -145,7 +147,7 @@ std::string Summary::json() const {
            {"most_layers_in_flight", most_layers_in_flight},
            {"oversized_layers", oversized_layers},
            {"parts", part_list},
-           {"warnings", warning_list}};
+           {"warnings", warnings_json(warnings)}};
   if (facts) all.update(*facts);
   return text_of(all) + "\n";
 }

@@ -47,6 +47,7 @@ struct Summary {
 /// Each part on a line, its notes below it; as in a summary.
 Summary::Lines part_lines(const std::vector<PartSummary>& parts);
 nlohmann::ordered_json part_json(const PartSummary& part);
+nlohmann::ordered_json warnings_json(const std::vector<Warning>& warnings);
 /// Lines with their names aligned.
 std::string text_of(const Summary::Lines& lines);
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "pipeline/run/sanity.h"
+#include "stages/sanity/crossed.h"
 
 namespace lamina::pipeline {
 
@@ -23,7 +24,8 @@ ReportDoubts::ReportDoubts(const Manifest& manifest, const Job& job, const Scene
   for (const LayerRecord& record : manifest.layers) planes.push_back(record.layer.plane());
   crossed_.resize(planes.size(), 0);
   const bool thinned = head.product == Product::kImages && (fills(job) || job.dose.core < 1);
-  if (scene != nullptr && !thinned) crossed_ = crossed_planes(*scene, planes);
+  if (scene != nullptr && !thinned) crossed_ = sanity::crossed_planes(scene->meshes, scene->instances, planes);
+  if (scene != nullptr) united_mm3_ = united_in(*scene, *tally_);
   if (head.product == Product::kImages) tally_->look_through(head.grid);
 }
 
@@ -42,6 +44,7 @@ std::vector<Warning> ReportDoubts::tell(const std::vector<std::uint64_t>& set) c
   std::vector<std::string> names;
   for (const PartSummary& part : head.parts) names.push_back(part.path);
   sampling.part = names;
+  sampling.united_mm3 = united_mm3_;
   std::vector<std::uint8_t> filled;
   for (const std::uint64_t pixels : set) filled.push_back(pixels > 0 ? 1 : 0);
   for (const LayerRecord& record : manifest_.layers) {

@@ -270,15 +270,15 @@ class Solver {
   }
   template <class Cost>
   Buffer<std::uint32_t> least_steps_by_layers(const Buffer<Cost>& cost, const Buffer<double>& below, std::uint32_t end) const {
-    constexpr double kFar = std::numeric_limits<double>::infinity();
-    Buffer<double> steps(end + 1, kFar);  // mm2 nm, from a rung to the end
+    constexpr double kNowhere = std::numeric_limits<double>::infinity();
+    Buffer<double> steps(end + 1, kNowhere);  // mm2 nm, from a rung to the end
     Buffer<std::uint32_t> via(end + 1, kNone);
     steps[end] = 0;
     for (std::uint32_t rung = end; rung-- > 0;) {
       if (cost[rung] == unreached<Cost>() || is_last<Cost>(rung)) continue;
       const std::size_t flat = first_flat_above_if<Cost>(rung);
       for_each_layer(rung, [&](std::uint32_t i, std::uint32_t up) {
-        if (up > end || steps[up] == kFar || cost[rung] + weight<Cost>(rung, flat, up) != cost[up]) return;
+        if (up > end || steps[up] == kNowhere || cost[rung] + weight<Cost>(rung, flat, up) != cost[up]) return;
         const double value = steps[up] + set_.values[i] * (below[up] - below[rung]);
         if (value > steps[rung]) return;  // of equal ones the thickest
         steps[rung] = value;

@@ -74,18 +74,29 @@ double badness_of(const Group& group, double planned_mm3, const Sampling& sampli
   return 0;
 }
 
+/// The same, with what the group's solids hold together where their meshes speak against them. `group` is then that.
+double badness_as_united(std::uint32_t g, Group& group, double planned_mm3, const Sampling& sampling) {
+  const double badness = badness_of(group, planned_mm3, sampling);
+  if (badness <= 1 || !sampling.united_mm3) return badness;
+  const double united = sampling.united_mm3(g);
+  if (united <= 0) return badness;
+  group.least_mm3 = group.most_mm3 = united;
+  return badness_of(group, planned_mm3, sampling);
+}
+
 void judge_volumes(const Tally& tally, const Sampling& sampling, std::vector<Warning>& warnings) {
   WorstOfParts worst;
-  for (std::uint32_t g = 0; g < tally.groups().size(); ++g) {
-    const Group& group = tally.groups()[g];
+  std::vector<Group> groups(tally.groups().begin(), tally.groups().end());
+  for (std::uint32_t g = 0; g < groups.size(); ++g) {
+    Group& group = groups[g];
     // What has vanished as a whole is told as such.
     if (!group.closed || !tally.measured(g) || tally.planned_mm3(g) == 0) continue;
-    if (const double badness = badness_of(group, tally.planned_mm3(g), sampling); badness > 1)
+    if (const double badness = badness_as_united(g, group, tally.planned_mm3(g), sampling); badness > 1)
       note(worst, group.part, g, badness);
   }
   for (std::uint32_t part = 0; part < worst.size(); ++part) {
     if (worst[part].count == 0) continue;
-    const Group& group = tally.groups()[worst[part].at];
+    const Group& group = groups[worst[part].at];
     const double planned = tally.planned_mm3(worst[part].at);
     std::string why = too_coarse(group.box, sampling);
     if (why.empty()) why = "its walls are too thin, or its shells overlap, cancel or are inside out: look at `lamina info`";

@@ -31,6 +31,9 @@ struct Sampling {
   double offset_mm = 0;               // of contours
   bool one_sided = false;             // steps lie inside or outside of the parts, on purpose
   std::span<const std::string> part;  // names of files
+  /// What the solids of a group hold together, mm3, where shells overlap or lie inside out too; 0 if that is not known. Asked
+  /// only of groups that are doubted by the volumes of their meshes.
+  std::function<double(std::uint32_t group)> united_mm3 = {};
 };
 
 /// One warning for each part and kind at most; the worst of its copies is named.

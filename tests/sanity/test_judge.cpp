@@ -52,6 +52,21 @@ TEST(Judge, VolumesThatDiffer) {
   EXPECT_EQ(codes(judged(1300, shrunk)), Codes()) << "grown on purpose";
 }
 
+TEST(Judge, WhatShellsHoldTogetherCounts) {
+  using Codes = std::vector<std::string>;
+  Sampling sampling = fine();
+  int asked = 0;
+  sampling.united_mm3 = [&](std::uint32_t) { return ++asked, 400.0; };  // of 1000 by the signed sum
+  EXPECT_EQ(codes(judged(950, sampling)), Codes());
+  EXPECT_EQ(asked, 0) << "only where there is doubt";
+  EXPECT_EQ(codes(judged(400, sampling)), Codes());
+  EXPECT_EQ(asked, 1);
+  EXPECT_EQ(codes(judged(100, sampling)), Codes{"volume"});
+  EXPECT_NE(judged(100, sampling)[0].text.find("100 mm3 are planned where the mesh holds 400 mm3 (25 %)"), std::string::npos);
+  sampling.united_mm3 = [](std::uint32_t) { return 0.0; };
+  EXPECT_EQ(codes(judged(400, sampling)), Codes{"volume"}) << "not known";
+}
+
 TEST(Judge, EmptyLayersAmidASolidOnly) {
   const auto layer = [](std::uint32_t i) { return Layer{i, static_cast<Nm>(i) * 1'000'000, 1'000'000}; };
   const auto told = [&](const std::vector<Solid>& solids, const std::vector<std::uint8_t>& filled) {

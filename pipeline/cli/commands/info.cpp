@@ -7,6 +7,7 @@
 #include "pipeline/plan/scene.h"
 #include "stages/data/text/json.h"
 #include "stages/load/info/info.h"
+#include "stages/slice/surplus.h"
 
 namespace lamina::pipeline {
 namespace {
@@ -41,8 +42,8 @@ Outcome run_info(const Arguments& arguments, Context& context) {
   int code = 0;
   for (const PartRequest& part : job->parts) {
     const load::LoadOptions options = load_options(*job, part);
-    const Result<std::string> page =
-        arguments.has("--json") ? describe_part_json(part.path, options) : describe_part_text(part.path, options);
+    const Result<std::string> page = (arguments.has("--json") ? load::describe_part_json : load::describe_part_text)(
+        part.path, options, slice::surplus_areas);
     if (!page) {
       code = std::max(code, context.complain(page.error()));
       continue;
