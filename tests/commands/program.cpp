@@ -1,6 +1,7 @@
 #include "tests/commands/program.h"
 
 #include <fcntl.h>
+#include <gtest/gtest.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -9,6 +10,8 @@
 #include <cstdlib>
 #include <cstring>
 #include <fstream>
+#include <iterator>
+#include <sstream>
 #include <stdexcept>
 
 namespace lamina::test {
@@ -56,6 +59,34 @@ Outcome run_lamina(const std::vector<std::string>& arguments, const fs::path& di
   outcome.err = read_text(err);
   return outcome;
 }
+
+std::vector<std::string> words_of(const std::string& line) {
+  std::istringstream stream(line);
+  return {std::istream_iterator<std::string>(stream), {}};
+}
+
+void expect_refused(const std::string& line, int code, const std::string& words, const Directory& directory) {
+  const std::string before = tree_text(directory.path());
+  const Outcome outcome = run_lamina(words_of(line), directory.path());
+  EXPECT_EQ(outcome.code, code) << line << "\n" << outcome.err;
+  EXPECT_EQ(outcome.error_lines(), 1u) << line << "\n" << outcome.err;
+  EXPECT_NE(outcome.err.find(words), std::string::npos) << line << "\n" << outcome.err;
+  EXPECT_TRUE(tree_text(directory.path()) == before) << line;
+}
+
+void write_one_of_each_kind(const Directory& directory) {
+  const fs::path tests = LAMINA_TEST_DIR;
+  write_box(directory / "part.stl", {0, 0, 0}, {6, 4, 3});
+  fs::copy(tests / "reference/dinisio2022/table_18.tsv", directory / "drops.csv");
+  fs::copy(tests / ".." / "stages/write/machines/hp45.toml", directory / "powder.toml");
+  fs::copy(tests / ".." / "stages/write/machines/extrusion/anet-a8.toml", directory / "printer.toml");
+  write_text(directory / "job.toml", "[layers]\nthickness_mm = 1\n[[part]]\npath = \"part.stl\"\n");
+  write_text(directory / "tops.txt", "1\n2\n3\n");
+  write_text(directory / "widths.csv", "test,percent,thin_mm\nextrusion,90,0.3\n");
+  write_text(directory / "list.txt", "info part.stl\n");
+}
+
+std::string corpus_file(std::string_view name) { return std::string(LAMINA_TEST_DIR) + "/corpus/" + std::string(name); }
 
 std::string read_text(const fs::path& path) {
   std::ifstream file(path, std::ios::binary);

@@ -35,6 +35,19 @@ struct Outcome {
 Outcome run_lamina(const std::vector<std::string>& arguments, const std::filesystem::path& directory,
                    const std::function<void(int)>& watch = {});
 
+/// The arguments of a call, without quotes: what stands between blanks.
+std::vector<std::string> words_of(const std::string& line);
+
+/// The call ends with this code and one line that says `words`, and leaves every file of the directory as it is.
+void expect_refused(const std::string& line, int code, const std::string& words, const Directory& directory);
+
+/// One file of every kind that commands read: part.stl, drops.csv, powder.toml, printer.toml, job.toml, tops.txt, widths.csv,
+/// list.txt.
+void write_one_of_each_kind(const Directory& directory);
+
+/// The path of a file of tests/corpus.
+std::string corpus_file(std::string_view name);
+
 std::string read_text(const std::filesystem::path& path);
 void write_text(const std::filesystem::path& path, std::string_view text);
 

@@ -29,8 +29,7 @@ class Durability : public ::testing::Test {
 
   Outcome run(const std::string& line) {
     fs::remove(log_ / "calls");
-    std::istringstream stream(line);
-    return run_lamina({std::istream_iterator<std::string>(stream), {}}, directory_.path());
+    return run_lamina(words_of(line), directory_.path());
   }
   /// The calls of a run that ends well, one a line; paths below the directory, temporary names as NAME.~.
   std::vector<std::string> calls(const std::string& line) {

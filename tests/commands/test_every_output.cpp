@@ -11,7 +11,6 @@
 #include <cstring>
 #include <optional>
 #include <set>
-#include <sstream>
 #include <thread>
 
 #include "pipeline/cli/command.h"
@@ -98,10 +97,7 @@ class EveryOutput : public ::testing::Test {
     }
   }
 
-  Outcome run(const std::string& line) {
-    std::istringstream stream(line);
-    return run_lamina({std::istream_iterator<std::string>(stream), {}}, directory_.path());
-  }
+  Outcome run(const std::string& line) { return run_lamina(words_of(line), directory_.path()); }
   static std::string line_of(const Row& row, const std::string& name) {
     std::string line(row.call);
     return line.replace(line.find('@'), 1, name);

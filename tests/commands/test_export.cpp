@@ -5,7 +5,6 @@
 #include <array>
 #include <fstream>
 #include <nlohmann/json.hpp>
-#include <sstream>
 
 #include "stages/load/load.h"
 #include "tests/commands/program.h"
@@ -39,34 +38,23 @@ std::vector<Triangle> triangles_of(const std::string& path) {
 
 class Export : public ::testing::Test {
  protected:
-  Outcome run(const std::string& line) {
-    std::istringstream stream(line);
-    return run_lamina({std::istream_iterator<std::string>(stream), {}}, directory_.path());
-  }
+  Outcome run(const std::string& line) { return run_lamina(words_of(line), directory_.path()); }
   Json done(const std::string& line) {
     const Outcome outcome = run(line);
     EXPECT_EQ(outcome.code, 0) << line << "\n" << outcome.err;
     return Json::parse(outcome.out, nullptr, false);
   }
-  void refused(const std::string& line, int code, const std::string& words) {
-    const std::string before = tree_text(directory_.path());
-    const Outcome outcome = run(line);
-    EXPECT_EQ(outcome.code, code) << line << "\n" << outcome.err;
-    EXPECT_EQ(outcome.error_lines(), 1u) << line << "\n" << outcome.err;
-    EXPECT_NE(outcome.err.find(words), std::string::npos) << line << "\n" << outcome.err;
-    EXPECT_EQ(tree_text(directory_.path()), before) << line;
-  }
+  void refused(const std::string& line, int code, const std::string& words) { expect_refused(line, code, words, directory_); }
   std::string layers_of(const std::string& line, const std::string& directory) {
     done(line + " --bed 90x60 --dpi 300 --layer 0.5 --quiet -o " + directory);
     return tree_text(directory_.path() / directory / "layers");
   }
-  static std::string corpus(const std::string& name) { return std::string(LAMINA_TEST_DIR) + "/corpus/" + name; }
 
   Directory directory_;
 };
 
 TEST_F(Export, ThreeMfKeepsEveryTriangleAndEveryPixel) {
-  const std::string nut = corpus("parameter_quality_nut.stl");
+  const std::string nut = corpus_file("parameter_quality_nut.stl");
   const Json json = done("export " + nut + " --rotate 10,20,30 --shrink 1.02,1.01,1.03 --bed 90x60 -o nut.3mf --json --quiet");
   EXPECT_EQ(json["format"], "3mf");
   EXPECT_EQ(json["rounding_mm"], 0);

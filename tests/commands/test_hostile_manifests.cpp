@@ -3,7 +3,6 @@
 #include <gtest/gtest.h>
 
 #include <functional>
-#include <sstream>
 
 #include "stages/write/manifest/manifest.h"
 #include "tests/commands/program.h"
@@ -12,11 +11,6 @@ namespace lamina::test {
 namespace {
 
 namespace fs = std::filesystem;
-
-std::vector<std::string> words_of(const std::string& line) {
-  std::istringstream stream(line);
-  return {std::istream_iterator<std::string>(stream), {}};
-}
 
 struct Mutation {
   const char* name;

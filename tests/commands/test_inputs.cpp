@@ -1,17 +1,16 @@
 // tests/commands/test_inputs.cpp: whatever lies in place of a file that a command reads ends it in one line, soon and in
 // little memory: a pipe that nobody writes to, a folder, a device, a key of 100,000 parts, a line of 6 GiB.
 #include <gtest/gtest.h>
+#include <poll.h>
 #include <signal.h>
+#include <sys/resource.h>
 #include <sys/stat.h>
+#include <sys/syscall.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cstdlib>
-#include <fstream>
-#include <sstream>
-#include <thread>
 
 #include "tests/commands/program.h"
 
@@ -20,7 +19,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::chrono::seconds kPatience{20};
+constexpr int kPatienceMs = 20'000;
 constexpr std::uint64_t kMostKilobytes = 700'000;  // resident; the program itself takes some 60,000
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
 constexpr bool kMemoryTells = false;
@@ -28,25 +27,18 @@ constexpr bool kMemoryTells = false;
 constexpr bool kMemoryTells = true;
 #endif
 
-std::vector<std::string> words_of(const std::string& line) {
-  std::istringstream stream(line);
-  return {std::istream_iterator<std::string>(stream), {}};
-}
-
 /// Kills a program that goes on for too long. returns  kB that it held at most
 std::uint64_t watch_over(int process) {
-  const auto begin = std::chrono::steady_clock::now();
-  std::uint64_t most = 0;
-  siginfo_t ended{};
-  while (::waitid(P_PID, static_cast<id_t>(process), &ended, WEXITED | WNOHANG | WNOWAIT) == 0 && ended.si_pid == 0) {
-    std::ifstream status("/proc/" + std::to_string(process) + "/status");
-    for (std::string line; std::getline(status, line);) {
-      if (line.starts_with("VmHWM:")) most = std::max<std::uint64_t>(most, std::strtoull(line.c_str() + 6, nullptr, 10));
-    }
-    if (std::chrono::steady_clock::now() - begin > kPatience) ::kill(process, SIGKILL);
-    std::this_thread::sleep_for(std::chrono::milliseconds(2));
-  }
-  return most;
+  const auto handle = static_cast<int>(::syscall(SYS_pidfd_open, process, 0));
+  EXPECT_GE(handle, 0) << "a kernel since 5.3 has it";
+  pollfd ended{handle, POLLIN, 0};
+  if (::poll(&ended, 1, kPatienceMs) == 0) ::kill(process, SIGKILL);
+  ::close(handle);
+  // The library's waitid() keeps to itself what the kernel's says of the memory.
+  siginfo_t how{};
+  rusage usage{};
+  EXPECT_EQ(::syscall(SYS_waitid, P_PID, process, &how, WEXITED | WNOWAIT, &usage), 0);
+  return static_cast<std::uint64_t>(usage.ru_maxrss);
 }
 
 std::string dotted_key() {
@@ -77,17 +69,7 @@ const Thing kThings[] = {
 
 class Inputs : public ::testing::Test {
  protected:
-  Inputs() {
-    const fs::path tests = LAMINA_TEST_DIR;
-    write_box(directory_ / "part.stl", {0, 0, 0}, {6, 4, 3});
-    fs::copy(tests / "reference/dinisio2022/table_18.tsv", directory_ / "drops.csv");
-    fs::copy(tests / ".." / "stages/write/machines/hp45.toml", directory_ / "powder.toml");
-    fs::copy(tests / ".." / "stages/write/machines/extrusion/anet-a8.toml", directory_ / "printer.toml");
-    write_text(directory_ / "job.toml", "[layers]\nthickness_mm = 1\n[[part]]\npath = \"part.stl\"\n");
-    write_text(directory_ / "tops.txt", "1\n2\n3\n");
-    write_text(directory_ / "widths.csv", "test,percent,thin_mm\nextrusion,90,0.3\n");
-    write_text(directory_ / "list.txt", "info part.stl\n");
-  }
+  Inputs() { write_one_of_each_kind(directory_); }
 
   Outcome run(const std::string& line) {
     return run_lamina(words_of(line), directory_.path(), [&](int process) { kilobytes_ = watch_over(process); });

@@ -1,8 +1,6 @@
 // Options that would do nothing are refused with what they need.
 #include <gtest/gtest.h>
 
-#include <sstream>
-
 #include "tests/commands/program.h"
 
 namespace lamina::test {
@@ -27,10 +25,7 @@ TEST(Needs, OptionsWithoutEffectAreRefused) {
       {"slice", "--stagger 0,0.1", "--set fill.pattern=raster"},
       {"extrude", "--angle 45", "--fill segmented --machine anet-a8 --layer 0.2"},
   };
-  const auto run = [&](const std::string& line) {
-    std::istringstream stream(line);
-    return run_lamina({std::istream_iterator<std::string>(stream), {}}, directory.path());
-  };
+  const auto run = [&](const std::string& line) { return run_lamina(words_of(line), directory.path()); };
   for (const auto& row : rows) {
     const std::string line = std::string(row.call) + " part.stl --layer 1 --dry-run " + row.flag;
     const Outcome refused = run(line);

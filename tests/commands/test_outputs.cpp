@@ -4,7 +4,6 @@
 #include <sys/sysmacros.h>
 
 #include <algorithm>
-#include <sstream>
 
 #include "pipeline/cli/command.h"
 #include "pipeline/cli/outputs.h"
@@ -15,23 +14,10 @@ namespace {
 
 namespace fs = std::filesystem;
 
-std::vector<std::string> words_of(const std::string& line) {
-  std::istringstream stream(line);
-  return {std::istream_iterator<std::string>(stream), {}};
-}
-
 class Outputs : public ::testing::Test {
  protected:
   Outputs() {
-    const fs::path tests = LAMINA_TEST_DIR;
-    write_box(directory_ / "part.stl", {0, 0, 0}, {6, 4, 3});
-    fs::copy(tests / "reference/dinisio2022/table_18.tsv", directory_ / "drops.csv");
-    fs::copy(tests / ".." / "stages/write/machines/hp45.toml", directory_ / "powder.toml");
-    fs::copy(tests / ".." / "stages/write/machines/extrusion/anet-a8.toml", directory_ / "printer.toml");
-    write_text(directory_ / "job.toml", "[layers]\nthickness_mm = 1\n[[part]]\npath = \"part.stl\"\n");
-    write_text(directory_ / "tops.txt", "1\n2\n3\n");
-    write_text(directory_ / "widths.csv", "test,percent,thin_mm\nextrusion,90,0.3\n");
-    write_text(directory_ / "list.txt", "info part.stl\n");
+    write_one_of_each_kind(directory_);
     for (const char* name : {"mine", "mine.svg", "mine.png", "mine.html", "mine.toml", "mine.stl"})
       write_text(directory_ / name, "precious, and of somebody else\n");
     fs::create_symlink("part.stl", directory_ / "link.stl");
@@ -43,15 +29,7 @@ class Outputs : public ::testing::Test {
     const Outcome outcome = run(line);
     EXPECT_EQ(outcome.code, 0) << line << "\n" << outcome.err;
   }
-  /// The call ends in one line and leaves every file as it is.
-  void refused(const std::string& line, int code, const std::string& words) {
-    const std::string before = tree_text(directory_.path());
-    const Outcome outcome = run(line);
-    EXPECT_EQ(outcome.code, code) << line << "\n" << outcome.err;
-    EXPECT_EQ(outcome.error_lines(), 1u) << line << "\n" << outcome.err;
-    EXPECT_NE(outcome.err.find(words), std::string::npos) << line << "\n" << outcome.err;
-    EXPECT_TRUE(tree_text(directory_.path()) == before) << line;
-  }
+  void refused(const std::string& line, int code, const std::string& words) { expect_refused(line, code, words, directory_); }
 
   Directory directory_;
 };
@@ -63,6 +41,12 @@ TEST_F(Outputs, WhatACallReadsIsNeverReplaced) {
   done("extrude part.stl --machine anet-a8 --layer 0.3 -o part.gcode --quiet");
   fs::create_directory(directory_ / "own");
   fs::copy(fs::path(LAMINA_TEST_DIR) / "corpus/arrow_scaled_mirrored.3mf", directory_ / "own/arrow.3mf");
+  // A toolpath file of SML has its layer table beside it, under its own name but for the ending.
+  fs::create_directory(directory_ / "sml");
+  fs::copy(directory_ / "part.stl", directory_ / "sml/part.rp3");
+  fs::copy(fs::path(LAMINA_TEST_DIR) / "../stages/write/machines/extrusion/fdm-2000.toml", directory_ / "sml/printer.rp3");
+  write_text(directory_ / "sml/job.rp3", "[layers]\nthickness_mm = 0.254\n[[part]]\npath = \"../part.stl\"\n");
+  write_text(directory_ / "sml/named.toml", "[machine]\nprofile = \"printer.rp3\"\n[[part]]\npath = \"../part.stl\"\n");
   fs::create_directory(directory_ / "farm");
   fs::copy(directory_ / "list.txt", directory_ / "farm/summary.tsv");
 
@@ -91,6 +75,11 @@ TEST_F(Outputs, WhatACallReadsIsNeverReplaced) {
       {"extrude --job job.toml -o part.stl", "part.stl"},
       {"extrude part.stl --set run.output=part.stl", "part.stl"},
       {"extrude part.stl -o new.gcode --save-job part.stl", "part.stl"},
+      {"extrude sml/part.rp3 --machine fdm-2000 -o sml/part.sml --overwrite", "sml/part.rp3"},
+      {"extrude part.stl --machine sml/printer.rp3 -o sml/printer.sml --overwrite", "sml/printer.rp3"},
+      {"extrude --job sml/job.rp3 --machine fdm-2000 -o sml/job.sml --overwrite", "sml/job.rp3"},
+      {"extrude --job sml/named.toml -o sml/printer.sml --overwrite", "sml/printer.rp3"},
+      {"extrude --job sml/named.toml --set run.output=sml/printer.sml --overwrite", "sml/printer.rp3"},
       {"heights part.stl -o cut/job.toml --plot cut/../cut/job.toml --overwrite", "cut/job.toml"},
       {"extrude part.stl -o cut/part.svg --save-job cut/part.svg --overwrite", "cut/part.svg"},
       {"heights part.stl -o part.stl", "part.stl"},

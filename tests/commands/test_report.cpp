@@ -116,11 +116,9 @@ class JobsReported : public ::testing::Test {
   Directory directory_;
 };
 
-const fs::path kCorpus = fs::path(LAMINA_TEST_DIR) / "corpus";
-
 TEST_F(JobsReported, ToolpathsAreDrawnInTheirWidthsWithWhatTheirManifestSays) {
   const Outcome made =
-      lamina({"extrude", (kCorpus / "parameter_quality_nut.stl").string(), "--layer", "0.3", "--quiet", "-o", "part.gcode"});
+      lamina({"extrude", corpus_file("parameter_quality_nut.stl"), "--layer", "0.3", "--quiet", "-o", "part.gcode"});
   ASSERT_EQ(made.code, 0) << made.err;
   ASSERT_EQ(lamina({"report", "part.gcode", "-o", "part.html"}).code, 0);
   const std::string page = read_text(directory_ / "part.html");
@@ -160,7 +158,7 @@ TEST_F(JobsReported, ToolpathsAreDrawnInTheirWidthsWithWhatTheirManifestSays) {
 }
 
 TEST_F(JobsReported, EveryLayerOfThePageIsItsFile) {
-  jet(kCorpus / "nist_am_test_artifact_v3b.stl", {"--bed", "200x160", "--dpi", "300x200", "--layer", "0.5"});
+  jet(corpus_file("nist_am_test_artifact_v3b.stl"), {"--bed", "200x160", "--dpi", "300x200", "--layer", "0.5"});
   const Outcome outcome = lamina({"report", "out", "-o", "report.html"});
   ASSERT_EQ(outcome.code, 0) << outcome.err;
   const std::string page = read_text(directory_ / "report.html");
@@ -316,7 +314,7 @@ TEST_F(JobsReported, NamesOfPartsCannotBecomeMarkup) {
 // A page about 1,000 layers of 22 million pixels is used in Chromium: keys, buttons, mouse, a phone's width; its layer 500 is
 // the decoded TIFF.
 TEST_F(JobsReported, InABrowserItShowsTheLayersAndCanBeUsed) {
-  jet(kCorpus / "nist_part_feature_open.stl",
+  jet(corpus_file("nist_part_feature_open.stl"),
       {"--unit", "inch", "--bed", "160x64", "--dpi", "1200", "--layer", "0.0349", "--layers", "0:1000"});
   ASSERT_EQ(lamina({"report", "out", "-o", "report.html", "--quiet"}).code, 0);
   EXPECT_LT(fs::file_size(directory_ / "report.html"), 20'000'000u);

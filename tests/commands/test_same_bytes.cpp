@@ -16,8 +16,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-const std::string kCorpus = std::string(LAMINA_TEST_DIR) + "/corpus/";
-
 using Words = std::vector<std::string>;
 
 Words operator+(Words words, const Words& more) {
@@ -34,9 +32,9 @@ std::string bytes_of(const Directory& directory, const Words& job, const std::st
 
 TEST(SameBytes, ForAnyThreadsEngineAndMemory) {
   const Directory directory;
-  const Words job = {kCorpus + "nist_am_test_artifact_v3b.stl",
-                     kCorpus + "dental_crown.stl",
-                     kCorpus + "cube_gears_17_items.3mf",
+  const Words job = {corpus_file("nist_am_test_artifact_v3b.stl"),
+                     corpus_file("dental_crown.stl"),
+                     corpus_file("cube_gears_17_items.3mf"),
                      "--copies",
                      "2",
                      "--bed",
@@ -58,7 +56,7 @@ TEST(SameBytes, ForAnyThreadsEngineAndMemory) {
 TEST(SameBytes, CopiesAreThePartStandingWhereTheyStand) {
   // Three copies side by side, each an instance, against three parts with positions of their own.
   const Directory directory;
-  const std::string part = kCorpus + "parameter_quality_nut.stl";
+  const std::string part = corpus_file("parameter_quality_nut.stl");
   const Words bed = {"--bed", "80x40", "--dpi", "600", "--layer", "1"};
   const std::string copies = bytes_of(directory, Words{part, "--copies", "3", "--at", "1.25,2.5", "--gap", "3"} + bed, "c");
   std::string job = "[place]\ngap_mm = 3\n";
@@ -82,7 +80,7 @@ std::uint64_t peak_of(const Directory& directory, const Words& job) {
 TEST(BoundedMemory, TenThousandLayersNeedWhatAHundredNeed) {
   const Directory directory;
   const Words job = {
-      kCorpus + "nist_am_test_artifact_v3b.stl", "--bed", "150x150", "--dpi", "300", "--threads", "2", "--memory", "32M"};
+      corpus_file("nist_am_test_artifact_v3b.stl"), "--bed", "150x150", "--dpi", "300", "--threads", "2", "--memory", "32M"};
   const std::uint64_t hundred = peak_of(directory, job + Words{"--layer", "0.17"});
   const std::uint64_t many = peak_of(directory, job + Words{"--layer", "0.0017"});
   EXPECT_GT(hundred, 0u);
@@ -151,24 +149,24 @@ TEST(BoundedMemory, PeakIsMeshIndexAndBudgetWhateverLayersNeed) {
     }
   }
   for (const char* format : {"tiff-none", "pbm", "png", "tiff-packbits"}) {
-    check({kCorpus + "dental_crown.stl", "--copies", "40", "--bed", "200x200", "--dpi", "1200", "--layer", "1", "--memory",
+    check({corpus_file("dental_crown.stl"), "--copies", "40", "--bed", "200x200", "--dpi", "1200", "--layer", "1", "--memory",
            "40M", "--threads", "8", "--format", format});
   }
 }
 
-struct Row {
+struct Expected {
   std::string file, outcome, same_as;
   int code = 0;
 };
 
-std::vector<Row> outcome_table() {
-  std::ifstream table(kCorpus + "outcomes.tsv");
-  std::vector<Row> rows;
+std::vector<Expected> outcome_table() {
+  std::ifstream table(corpus_file("outcomes.tsv"));
+  std::vector<Expected> rows;
   std::string line;
   std::getline(table, line);
   while (std::getline(table, line)) {
     std::istringstream fields(line);
-    Row row;
+    Expected row;
     std::string code;
     std::getline(fields, row.file, '\t');
     std::getline(fields, row.outcome, '\t');
@@ -185,8 +183,8 @@ void check_outcomes(const std::string& folder, std::size_t least) {
   const Directory directory;
   std::map<std::string, std::string> images;
   std::size_t checked = 0;
-  const std::vector<Row> rows = outcome_table();
-  for (const Row& row : rows) {
+  const std::vector<Expected> rows = outcome_table();
+  for (const Expected& row : rows) {
     if (!fs::exists(folder + "/" + row.file)) continue;
     SCOPED_TRACE(row.file);
     const std::string output = "o" + std::to_string(checked++);
@@ -204,13 +202,13 @@ void check_outcomes(const std::string& folder, std::size_t least) {
     fs::remove_all(directory.path() / output);
   }
   EXPECT_GE(checked, least) << "too few of the table's files lie in " << folder;
-  for (const Row& row : rows) {
+  for (const Expected& row : rows) {
     if (row.same_as == "-" || !images.contains(row.file) || !images.contains(row.same_as)) continue;
     EXPECT_TRUE(images[row.file] == images[row.same_as]) << row.file << " and " << row.same_as;
   }
 }
 
-TEST(Outcomes, EveryFileOfTheCorpusIsPlannedOrRefusedAsTheTableSays) { check_outcomes(kCorpus, 20); }
+TEST(Outcomes, EveryFileOfTheCorpusIsPlannedOrRefusedAsTheTableSays) { check_outcomes(corpus_file(""), 20); }
 
 TEST(Outcomes, EveryFileOfTheModelFolderIsPlannedOrRefusedAsTheTableSays) {
   const char* folder = std::getenv("LAMINA_MODELS");

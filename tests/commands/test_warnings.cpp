@@ -1,8 +1,8 @@
 // Jobs that plan something else than their parts: told with a code, refused if empty, errors if strict.
 #include <gtest/gtest.h>
 
+#include <array>
 #include <nlohmann/json.hpp>
-#include <sstream>
 
 #include "tests/commands/program.h"
 
@@ -20,10 +20,7 @@ class Warnings : public ::testing::Test {
     write_box(directory_ / "pin.stl", {0, 0, 0}, {0.3f, 0.3f, 5});
   }
 
-  Outcome run(const std::string& line) {
-    std::istringstream stream(line);
-    return run_lamina({std::istream_iterator<std::string>(stream), {}}, directory_.path());
-  }
+  Outcome run(const std::string& line) { return run_lamina(words_of(line), directory_.path()); }
   /// The codes of a job that is done.
   Codes told(const std::string& line) {
     const Outcome outcome = run(line + " --json");
@@ -101,6 +98,62 @@ TEST_F(Warnings, StrictJobsEndAtAWarning) {
   refused("extrude part.stl --machine anet-a8 --bottom 5 --strict -o a.gcode", 5, {"[above-bed]"});
   refused("extrude part.stl --machine anet-a8 --walls 0 --dry-run --strict", 5, {"[no-bead]"});
   EXPECT_EQ(told("jet part.stl --layer 0.5 --dpi 100 --strict -o b"), Codes());
+}
+
+TEST_F(Warnings, NoFolderOfARefusedJobStays) {
+  fs::create_directory(directory_ / "mine");
+  refused("jet part.stl --layer 100 --dpi 60 -o deep/a/b", 3, {"not one pixel"});
+  refused("slice part.stl --layer 1 --offset -9 --file-a-layer -o deep/c", 3, {"not one contour"});
+  refused("jet part.stl --layer 0.5 --dpi 100 --bleed 2000 --strict -o mine/a", 5, {"[bleed]"});
+  refused("jet part.stl --layer 100 --dpi 60 -o mine", 3, {"not one pixel"});
+  EXPECT_FALSE(fs::exists(directory_ / "deep"));
+  EXPECT_TRUE(fs::is_empty(directory_ / "mine")) << "it was there before";
+}
+
+TEST_F(Warnings, AMergedJobIsJudgedAsAWhole) {
+  const auto shards = [&](const std::string& job, const std::string& out) {
+    for (const char* one : {" --shard 1/2 -o ", " --shard 2/2 -o "}) EXPECT_EQ(told(job + one + out), Codes());
+  };
+  shards("jet part.stl --layer 2.5 --dpi 60 --bleed 9000", "none");
+  refused("merge none -o none", 3, {"not one pixel in 2 layers", "--allow-empty"});
+  refused("merge none -o other", 3, {"not one pixel"});
+  EXPECT_FALSE(fs::exists(directory_ / "other"));
+  refused("merge none -o other --allow-empty --strict", 5, {"--strict: 1 warning; [empty]"});
+  EXPECT_EQ(told("merge none -o none --allow-empty"), Codes{"empty"});
+  EXPECT_EQ(told("merge none -o none"), Codes{"empty"}) << "whole already";
+
+  // The pin stands between two blocks, and is thinner than a pixel.
+  write_text(directory_ / "job.toml",
+             "[layers]\nthickness_mm = 1\n[bed]\ndpi = 20\n[[part]]\npath = \"neck.obj\"\nat_mm = [1, 1]\n");
+  std::string text;
+  auto block = [&, vertices = 0](double side, double low, double high) mutable {
+    for (const double z : {low, high}) {
+      for (const double y : {5 - side, 5 + side}) {
+        for (const double x : {5 - side, 5 + side})
+          text += "v " + std::to_string(x) + " " + std::to_string(y) + " " + std::to_string(z) + "\n";
+      }
+    }
+    for (const auto& [a, b, c, d] :
+         {std::array{1, 3, 4, 2}, {5, 6, 8, 7}, {1, 2, 6, 5}, {3, 7, 8, 4}, {1, 5, 7, 3}, {2, 4, 8, 6}}) {
+      text += "f";
+      for (const int corner : {a, b, c, d}) text += " " + std::to_string(vertices + corner);
+      text += "\n";
+    }
+    vertices += 8;
+  };
+  block(5, 0, 2);
+  block(0.1, 2, 5);
+  block(5, 5, 7);
+  write_text(directory_ / "neck.obj", text);
+  EXPECT_EQ(run("jet --job job.toml -o whole").code, 0);
+  EXPECT_EQ(told("jet --job job.toml --engine rays -o neck_rays"), Codes{"layers-empty"});
+  EXPECT_EQ(told("jet --job job.toml --engine contours -o neck_contours"), Codes{"layers-empty"});
+  shards("jet --job job.toml", "neck");
+  refused("merge neck -o neck --strict", 5, {"[layers-empty]"});
+  EXPECT_EQ(told("merge neck -o neck"), Codes{"layers-empty"});
+  EXPECT_EQ(summary_["warnings"][0]["layer"], 2);
+  EXPECT_EQ(summary_["warnings"][0]["z_mm"], 2.5);
+  EXPECT_EQ(tree_text(directory_ / "neck"), tree_text(directory_ / "whole"));
 }
 
 TEST_F(Warnings, NeitherKeyMakesAnotherJob) {

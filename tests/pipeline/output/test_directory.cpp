@@ -19,7 +19,8 @@ struct LoadingMeanwhile : testing::Test {
     std::filesystem::create_directories(job.output + "/layers");
   }
   std::string refusal() {
-    const auto claim = prepare_output(job);
+    write::MadeFolders made;
+    const auto claim = prepare_output(job, made);
     return claim ? "" : claim.error().message;
   }
 };
@@ -36,6 +37,16 @@ TEST_F(LoadingMeanwhile, AShardThatIsWritingKeepsItsDirectoryEvenFromOverwrite) 
 TEST_F(LoadingMeanwhile, AFinishedJobIsNotReplaced) {
   test::write_text(job.output + "/manifest.json", "{}");
   EXPECT_NE(refusal().find("a finished job"), std::string::npos);
+}
+
+TEST(LayerFiles, AreThoseOfNamesThatLaminaWrites) {
+  std::uint32_t index = 0;
+  bool partial = false;
+  for (const char* name : {"000042.tif", "999999.png", "1234567.tif", "4294967295.tif", "000042-bronze.tif"})
+    EXPECT_TRUE(read_layer_file_name(name, index, partial)) << name;
+  for (const char* name : {"42.tif", "00042.tif", "0000042.tif", "0000000042.tif", "4294967296.tif", "20240101123000.tif",
+                           "000042.tif.bak", "000042", "000042.txt", "000042a.tif", "-000042.tif", " 000042.tif"})
+    EXPECT_FALSE(read_layer_file_name(name, index, partial)) << name;
 }
 
 TEST_F(LoadingMeanwhile, AnotherSplitIsRefused) {

@@ -207,7 +207,7 @@ TEST_F(PrintJobs, ShardsMergedAndLayersResumedGiveTheBytesOfOneRun) {
     shard.shard = {{i, 3}};
     ASSERT_TRUE(run(shard).ok());
   }
-  ASSERT_TRUE(merge({shard.output}, shard.output).ok());
+  ASSERT_TRUE(merge({.directories = {shard.output}, .output = shard.output}).ok());
   EXPECT_EQ(tree(shard.output), tree(whole.output));
   // A layer's program that is damaged is written again.
   const auto before = tree(whole.output);

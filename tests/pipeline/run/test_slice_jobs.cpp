@@ -148,9 +148,13 @@ TEST(SliceProgram, NothingThatSomebodyElseWroteIsReplaced) {
   std::filesystem::create_directories(directory / "out/layers");
   write_text(directory / "out/layers/000003.svg", "mine");
   EXPECT_EQ(slice({"-o", "out", "--file-a-layer"}).code, 2);
+  EXPECT_EQ(slice({"-o", "out", "--file-a-layer", "--resume"}).code, 2);
+  const std::vector<std::string> kept = {"0000000007.svg", "20240131.svg.svg", "000001-front.svg", "000002.svg.bak"};
+  for (const std::string& name : kept) write_text(directory / ("out/layers/" + name), "mine");
   EXPECT_EQ(read_text(directory / "out/layers/000003.svg"), "mine");
   EXPECT_EQ(slice({"-o", "out", "--file-a-layer", "--overwrite"}).code, 0);
   EXPECT_EQ(slice({"-o", "out", "--format", "cli", "--overwrite"}).code, 0);
+  for (const std::string& name : kept) EXPECT_TRUE(fs::remove(directory / ("out/layers/" + name))) << name;
   EXPECT_EQ(files_below(directory / "out"), (std::vector<std::string>{"job.toml", "manifest.json", "part.cli"}));
 }
 

@@ -27,9 +27,9 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// A number of a summary that only images have.
-std::uint64_t fact(const Summary& summary, const char* key) { return (*summary.facts)[key]; }
-std::uint64_t fact(const Summary& summary, const char* key, std::size_t i) { return (*summary.facts)[key][i]["set_pixels"]; }
+/// The set pixels of a summary, all of them or of one material.
+std::uint64_t set_pixels_of(const Summary& summary) { return (*summary.facts)["set_pixels"]; }
+std::uint64_t set_pixels_of(const Summary& summary, std::size_t i) { return (*summary.facts)["materials"][i]["set_pixels"]; }
 
 class TwoPowders : public ::testing::Test {
  protected:
@@ -122,10 +122,10 @@ TEST_F(TwoPowders, ImagesAreDisjointAndTogetherThatOfOnePowderWhereverThePartsSt
     ASSERT_TRUE(summary.ok()) << summary.error().message;
     ASSERT_TRUE(one.ok() && alone.ok());
     ASSERT_EQ(summary->layers_total, one->layers_total);
-    EXPECT_EQ(fact(*summary, "set_pixels"), fact(*one, "set_pixels"));
+    EXPECT_EQ(set_pixels_of(*summary), set_pixels_of(*one));
     ASSERT_EQ((*summary->facts)["materials"].size(), 2u);
-    EXPECT_EQ(fact(*summary, "materials", 0) + fact(*summary, "materials", 1), fact(*summary, "set_pixels"));
-    EXPECT_GT(fact(*summary, "materials", 1), 0u);
+    EXPECT_EQ(set_pixels_of(*summary, 0) + set_pixels_of(*summary, 1), set_pixels_of(*summary));
+    EXPECT_GT(set_pixels_of(*summary, 1), 0u);
     for (std::uint32_t layer = 0; layer < summary->layers_total; ++layer) {
       Runs whole;
       const Runs steel = image(both, layer, "steel"), bronze = image(both, layer, "bronze");
@@ -227,7 +227,7 @@ TEST_F(TwoPowders, ShardsMergedResumedAndDamagedLayersBehaveAsThoseOfOnePowder) 
     shard.shard = {{i, 2}};
     ASSERT_TRUE(run(shard).ok());
   }
-  ASSERT_TRUE(merge({shard.output}, shard.output).ok());
+  ASSERT_TRUE(merge({.directories = {shard.output}, .output = shard.output}).ok());
   const auto before = tree(whole.output);
   EXPECT_EQ(tree(shard.output), before);
   // Images whose materials are exchanged are whole files, and wrong ones.
