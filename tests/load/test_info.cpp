@@ -1,6 +1,9 @@
 // tests/load/test_info.cpp: the report of `lamina info`.
 #include "stages/load/info/info.h"
 
+#include <algorithm>
+#include <array>
+#include <functional>
 #include <nlohmann/json.hpp>
 #include <numbers>
 
@@ -99,6 +102,73 @@ TEST(Info, ObjectsThatOverlapArePlannedOnce) {
   const Result<std::string> unsliced = load::describe_part_text(path, {});
   ASSERT_TRUE(unsliced.ok());
   EXPECT_CONTAINS(*unsliced, "planned volume       12000 mm3 (what overlaps counts as often as it does)\n");
+}
+
+/// So many boxes of 20 mm, each a little higher than the one before, as one mesh.
+Mesh stairs(std::int32_t boxes, load::Diagnosis& found) {
+  Mesh mesh;
+  const Nm side = 20'000'000;
+  for (std::int32_t i = 0; i < boxes; ++i) {
+    const Nm z = i * 1000;
+    const auto corner = [&](int at) { return Point3{at & 1 ? side : 0, at & 2 ? side : 0, at & 4 ? z + side : z}; };
+    for (const auto& [a, b, c] : {std::array{0, 2, 1},
+                                  {1, 2, 3},
+                                  {4, 5, 6},
+                                  {5, 7, 6},
+                                  {0, 1, 4},
+                                  {1, 5, 4},
+                                  {2, 6, 3},
+                                  {3, 6, 7},
+                                  {0, 4, 2},
+                                  {2, 4, 6},
+                                  {1, 3, 5},
+                                  {3, 7, 5}}) {
+      mesh.triangles.push_back({corner(a), corner(b), corner(c)});
+    }
+    found.shell_ends.insert(found.shell_ends.end(), {z, z + side});
+    found.volume_mm3 += 8000;
+  }
+  mesh.bounds = {{0, 0, 0}, {side, side, side + boxes * 1000}};
+  found.shells_apart = false;
+  return mesh;
+}
+
+TEST(Info, ManyShellsThatOverlapTakeBoundedWork) {
+  const Instance alone{0, {0, 0, 0}};
+  for (const std::int32_t boxes : {20, 2000}) {
+    load::Diagnosis found;
+    const Mesh mesh = stairs(boxes, found);
+    double crossed = 0;
+    std::size_t count = 0;
+    const load::SurplusAreas counting = [&](auto meshes, auto, std::span<const Nm> planes) -> Result<std::vector<double>> {
+      EXPECT_TRUE(std::ranges::adjacent_find(planes, std::ranges::greater_equal()) == planes.end()) << "they rise";
+      const auto below = [&](Nm z) { return std::ranges::lower_bound(planes, z) - planes.begin(); };
+      for (const Triangle& t : meshes[0].triangles) {
+        const auto [low, high] = std::minmax({t.a.z, t.b.z, t.c.z});
+        crossed += static_cast<double>(below(high) - below(low));
+      }
+      count = planes.size();
+      return std::vector<double>(planes.size(), -400.0);
+    };
+    for (const load::Effort effort : {load::Effort{}, load::Effort{1e6, 4}}) {
+      crossed = 0;
+      const auto volumes =
+          load::planned_volumes(std::span(&mesh, 1), std::span(&alone, 1), std::span(&found, 1), counting, effort);
+      ASSERT_TRUE(volumes.ok());
+      EXPECT_EQ(volumes->all.known, load::Known::kAbout);
+      EXPECT_LE(crossed, effort.most_crossed);
+      EXPECT_GE(static_cast<double>(count), effort.fewest_planes);
+      const double height_mm = 20 + (boxes - 1) * 1e-3;
+      EXPECT_NEAR(volumes->all.mm3, boxes * 8000.0 - 400 * height_mm, 1e-3) << "the weights add up to the height";
+    }
+  }
+  load::Diagnosis found;
+  const Mesh mesh = stairs(2000, found);
+  const auto none = [](auto, auto, auto) -> Result<std::vector<double>> { return Error{Fault::kInternal, "asked"}; };
+  const auto volumes =
+      load::planned_volumes(std::span(&mesh, 1), std::span(&alone, 1), std::span(&found, 1), none, load::Effort{1e5, 16});
+  ASSERT_TRUE(volumes.ok());
+  EXPECT_EQ(volumes->all.known, load::Known::kSummed);
 }
 
 TEST(Info, JsonHasTheSameNumbers) {

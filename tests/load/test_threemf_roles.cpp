@@ -1,6 +1,10 @@
 // tests/load/test_threemf_roles.cpp: modifiers, negative volumes and cavities of 3MF files are not planned as solids.
 #include <fmt/format.h>
 
+#include <cmath>
+#include <numbers>
+#include <tuple>
+
 #include "tests/load/archives.h"
 #include "tests/load/files.h"
 
@@ -170,6 +174,56 @@ TEST(Read3mfRoles, ACavityOfOneItemIsASolidOfAnother) {
   EXPECT_EQ(copies.meshes.size(), 2u) << "one for each turn";
   EXPECT_EQ(copies.instances.size(), 3u);
   EXPECT_EQ(cubic_mm(copies), 3 * (1000 - 64));
+}
+
+TEST(Read3mfRoles, AVoidStaysAVoidWhereItsContainerHasAnOpening) {
+  std::string outer = box_object(1, 10, 10, 10);
+  const std::size_t last = outer.rfind("<triangle ");
+  outer.erase(last, outer.find("/>", last) + 2 - last);
+  const std::string inner = turned_inside_out(box_object(2, 4, 4, 4));
+  const Part part =
+      loaded(roles_file(model(outer + inner + components(3, component(1) + component(2, "1 0 0 0 1 0 0 0 1 3 3 3")), item(3))));
+  EXPECT_EQ(cubic_mm(part), 1000 - 64);
+  EXPECT_EQ(part.meshes.size(), 1u);
+  EXPECT_CONTAINS(notes_of(part), "it is a void");
+  EXPECT_CONTAINS(notes_of(part), "1 opening capped");
+}
+
+TEST(Read3mfRoles, AVoidIsFoundInTurnedScaledAndMirroredCopies) {
+  const std::string inner = turned_inside_out(box_object(2, 4, 4, 4)), outer = box_object(1, 10, 10, 10);
+  for (const auto& [place, hole, volume] : std::vector<std::tuple<std::string, std::string, int>>{
+           {"0 1 0 -1 0 0 0 0 1 10 0 0", "1 0 0 0 1 0 0 0 1 3 3 3", 1000 - 64},
+           {"-1 0 0 0 1 0 0 0 1 10 0 0", "1 0 0 0 1 0 0 0 1 3 3 3", 1000 - 64},
+           {"20 0 0 0 2 0 0 0 1 50 0 0", "1 0 0 0 1 0 0 0 1 53 3 3", 40'000 - 64},
+           {"0.6 0.8 0 -0.8 0.6 0 0 0 1 0 0 0", "0.5 0 0 0 0.5 0 0 0 1 -2 6 3", 1000 - 16}}) {
+    const Part part =
+        loaded(roles_file(model(outer + inner + components(3, component(1, place) + component(2, hole)), item(3))));
+    EXPECT_EQ(cubic_mm(part), volume) << place;
+    EXPECT_CONTAINS(notes_of(part), "it is a void");
+  }
+}
+
+/// Copies of a large object at one place, none of which holds the void in the corner of its box, and one that does.
+TEST(Read3mfRoles, CopiesThatMightHoldAVoidCostNoTreeEach) {
+  constexpr int kSides = 1000, kCopies = 500;
+  std::string vertices = "<vertex x=\"0\" y=\"0\" z=\"0\"/><vertex x=\"0\" y=\"0\" z=\"10\"/>", triangles;
+  for (int i = 0; i < kSides; ++i) {
+    const double angle = 2 * std::numbers::pi * i / kSides;
+    vertices += fmt::format("<vertex x=\"{:.6f}\" y=\"{:.6f}\" z=\"0\"/>", 10 * std::cos(angle), 10 * std::sin(angle));
+    const int one = 2 + i, next = 2 + (i + 1) % kSides;
+    triangles +=
+        fmt::format("<triangle v1=\"0\" v2=\"{}\" v3=\"{}\"/><triangle v1=\"1\" v2=\"{}\" v3=\"{}\"/>", next, one, one, next);
+  }
+  const std::string cone = "<object id=\"1\"><mesh><vertices>" + vertices + "</vertices><triangles>" + triangles +
+                           "</triangles></mesh></object>",
+                    inner = turned_inside_out(box_object(2, 1, 1, 1)), outer = box_object(4, 2, 2, 2);
+  std::string many;
+  for (int i = 0; i < kCopies; ++i) many += component(1);
+  many += component(4, "1 0 0 0 1 0 0 0 1 -9.8 -9.8 7.5") + component(2, "1 0 0 0 1 0 0 0 1 -9.3 -9.3 8");
+  const Part part = loaded(roles_file(model(cone + inner + outer + components(3, many), item(3))));
+  EXPECT_CONTAINS(notes_of(part), "it is a void");
+  EXPECT_EQ(part.meshes.size(), 2u);
+  EXPECT_EQ(part.instances.size(), kCopies + 1u);
 }
 
 }  // namespace

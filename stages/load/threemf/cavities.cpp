@@ -2,12 +2,14 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <iterator>
 #include <limits>
 #include <map>
 #include <numeric>
 #include <optional>
 #include <tuple>
+#include <utility>
 #include <vector>
 
 #include "stages/load/matrix.h"
@@ -18,7 +20,9 @@ namespace {
 
 using Point = std::array<double, 3>;
 
-constexpr std::uint64_t kMostWork = std::uint64_t{1} << 28;  // boxes compared: more than objects that lie side by side need
+// What objects that lie side by side need, and a million voids at some 200 looks a point.
+constexpr std::uint64_t kMostWork = std::uint64_t{1} << 28;    // boxes compared
+constexpr std::uint64_t kMostLooked = std::uint64_t{1} << 29;  // facets, and boxes of facets, that points were held against
 
 struct Extent {
   Point lo, hi;
@@ -34,6 +38,8 @@ double dot(const Point& a, const Point& b) { return a[0] * b[0] + a[1] * b[1] + 
 Point cross(const Point& a, const Point& b) {
   return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
 }
+
+bool is_finite(const Point& at) { return std::isfinite(at[0]) && std::isfinite(at[1]) && std::isfinite(at[2]); }
 
 Point moved(const Transform& transform, const Point& at) {
   Point out = apply(transform.linear, at);
@@ -56,6 +62,7 @@ Extent extent_of(const ModelObject& object, const Transform& transform) {
   for (const auto& corners : object.triangles) {
     for (const std::uint32_t corner : corners) {
       const Point at = moved(transform, object.vertices[corner]);
+      if (!is_finite(at)) continue;
       for (std::size_t axis = 0; axis < 3; ++axis) {
         extent.lo[axis] = std::min(extent.lo[axis], at[axis]);
         extent.hi[axis] = std::max(extent.hi[axis], at[axis]);
@@ -65,29 +72,59 @@ Extent extent_of(const ModelObject& object, const Transform& transform) {
   return extent;
 }
 
-/// How often a closed mesh goes around points near it.
+/// The way back. nullopt: the transform flattens
+std::optional<Transform> inverse(const Transform& transform) {
+  const Matrix& m = transform.linear;
+  const Point x{m[0], m[3], m[6]}, y{m[1], m[4], m[7]}, z{m[2], m[5], m[8]};
+  const Point rows[] = {cross(y, z), cross(z, x), cross(x, y)};
+  const double determinant = dot(x, rows[0]);
+  Transform back;
+  for (std::size_t row = 0; row < 3; ++row)
+    for (std::size_t column = 0; column < 3; ++column) back.linear[3 * row + column] = rows[row][column] / determinant;
+  const Point start = lamina::load::apply(back.linear, transform.translation);
+  for (std::size_t axis = 0; axis < 3; ++axis) back.translation[axis] = -start[axis];
+  if (!std::all_of(back.linear.begin(), back.linear.end(), [](double one) { return std::isfinite(one); }) || !is_finite(start))
+    return std::nullopt;
+  return back;
+}
+
+/// How often an object goes around points near it, in its own coordinates: one for all of its copies.
 class Container {
  public:
-  Container(const ModelObject& object, const Transform& transform, const Extent& extent) : from_(extent.lo) {
+  Container(const ModelObject& object, double unit_mm) {
+    const Extent extent = extent_of(object, {});
+    from_ = extent.lo;
+    const Point sides = minus(extent.hi, extent.lo);
+    const double size = std::max({sides[0], sides[1], sides[2]});
+    if (!(size > 1e-100 && size < 1e100)) return;
+    // A nanometre is halved as often as the reach allows, so that what transforms enlarge is as fine.
+    const double reach = static_cast<double>(kNmReach);
+    scale_ = std::min(1e6 * unit_mm, reach / size);
+    while (2 * scale_ * size <= reach) scale_ *= 2;
     Buffer<Triangle> triangles;
     triangles.reserve(object.triangles.size());
-    const auto at = [&](std::uint32_t corner) {
-      const Point nm = in_nm(moved(transform, object.vertices[corner]));
-      return Point3{static_cast<Nm>(nm[0]), static_cast<Nm>(nm[1]), static_cast<Nm>(nm[2])};
+    const auto at = [&](const Point& corner) {
+      const Point steps = in_steps(corner);
+      return Point3{static_cast<Nm>(steps[0]), static_cast<Nm>(steps[1]), static_cast<Nm>(steps[2])};
     };
-    const bool mirrors = transform.mirrors();
-    for (const auto& [a, b, c] : object.triangles) triangles.push_back({at(a), at(mirrors ? c : b), at(mirrors ? b : c)});
+    for (const auto& corners : object.triangles) {
+      const Point &a = object.vertices[corners[0]], &b = object.vertices[corners[1]], &c = object.vertices[corners[2]];
+      if (is_finite(a) && is_finite(b) && is_finite(c)) triangles.push_back({at(a), at(b), at(c)});
+    }
     tree_.emplace(triangles, Point3{0, 0, 0});
   }
-  bool holds(const Point& point) const { return tree_->at(in_nm(point)) > 0.75; }
+  bool holds(const Point& point, std::uint64_t& looked_at) const {
+    return tree_ && is_finite(point) && tree_->at(in_steps(point), &looked_at) > 0.75;
+  }
 
  private:
-  Point in_nm(Point at) const {
+  Point in_steps(Point at) const {
     at = minus(at, from_);
-    for (double& axis : at) axis = std::min(static_cast<double>(kNmReach), 1e6 * axis);
+    for (double& axis : at) axis = std::min(static_cast<double>(kNmReach), std::round(scale_ * axis));
     return at;
   }
-  Point from_;
+  Point from_{};
+  double scale_ = 0;  // steps of the grid in the file's unit
   std::optional<WindingTree> tree_;
 };
 
@@ -101,37 +138,37 @@ class Search {
     return *volume < 0;
   }
 
+  /// Whether there was too much to compare.
+  bool gave_up() const { return work_ > kMostWork || looked_at_ > kMostLooked; }
+
   /// The leaves from `first` to `end` are of one item. Solids are met in the order of their left ends and kept up to the right.
   void item(std::vector<Leaf>& leaves, std::uint32_t first, std::uint32_t end) {
     const auto negative = [&](const Leaf& leaf) { return is_negative(leaf); };
-    if (end - first < 2 || std::none_of(leaves.begin() + first, leaves.begin() + end, negative)) return;
+    if (end - first < 2 || gave_up() || std::none_of(leaves.begin() + first, leaves.begin() + end, negative)) return;
     std::vector<Extent> extents;
-    for (std::uint32_t i = first; i < end; ++i)
-      extents.push_back(extent_of(package_.objects[leaves[i].object], leaves[i].transform));
-    const auto extent = [&](std::uint32_t i) -> const Extent& { return extents[i - first]; };
+    for (std::uint32_t i = first; i < end; ++i) extents.push_back(extent(leaves[i]));
+    const auto box = [&](std::uint32_t i) -> const Extent& { return extents[i - first]; };
     std::vector<std::uint32_t> order(end - first), open, around;
     std::iota(order.begin(), order.end(), first);
     std::sort(order.begin(), order.end(), [&](std::uint32_t one, std::uint32_t other) {
-      return std::tuple(extent(one).lo[0], is_negative(leaves[one]), one) <
-             std::tuple(extent(other).lo[0], is_negative(leaves[other]), other);
+      return std::tuple(box(one).lo[0], is_negative(leaves[one]), one) <
+             std::tuple(box(other).lo[0], is_negative(leaves[other]), other);
     });
-    std::map<std::uint32_t, Container> containers;
     for (const std::uint32_t inner : order) {
       if (!is_negative(leaves[inner])) {
         open.push_back(inner);
         continue;
       }
       work_ += open.size();
-      if (work_ > kMostWork) return;
-      std::erase_if(open, [&](std::uint32_t i) { return extent(i).hi[0] < extent(inner).lo[0]; });
+      if (gave_up()) return;
+      std::erase_if(open, [&](std::uint32_t i) { return box(i).hi[0] < box(inner).lo[0]; });
       around.clear();
       std::copy_if(open.begin(), open.end(), std::back_inserter(around),
-                   [&](std::uint32_t i) { return extent(i).holds(extent(inner)); });
+                   [&](std::uint32_t i) { return box(i).holds(box(inner)); });
       std::sort(around.begin(), around.end());
       for (const std::uint32_t outer : around) {
-        const Leaf& leaf = leaves[outer];
-        const auto found = containers.try_emplace(outer, package_.objects[leaf.object], leaf.transform, extent(outer)).first;
-        if (!is_within(leaves[inner], found->second)) continue;
+        if (gave_up()) return;
+        if (!is_within(leaves[inner], leaves[outer])) continue;
         leaves[inner].container = outer;
         break;
       }
@@ -139,30 +176,51 @@ class Search {
   }
 
  private:
+  /// Copies that are moved alone share a look at their triangles; sums are rounded the same either way.
+  Extent extent(const Leaf& leaf) {
+    const auto [found, is_new] = turned_.try_emplace({leaf.object, leaf.transform.linear});
+    if (is_new) found->second = extent_of(package_.objects[leaf.object], {leaf.transform.linear, {}});
+    Extent placed = found->second;
+    for (std::size_t axis = 0; axis < 3; ++axis)
+      placed.lo[axis] += leaf.transform.translation[axis], placed.hi[axis] += leaf.transform.translation[axis];
+    return placed;
+  }
+
   /// Some corners tell of all: a void that leaves the solid is none.
-  bool is_within(const Leaf& leaf, const Container& container) const {
-    const ModelObject& object = package_.objects[leaf.object];
+  bool is_within(const Leaf& leaf, const Leaf& outer) {
+    const std::optional<Transform> back = inverse(outer.transform);
+    if (!back) return false;
+    const ModelObject &object = package_.objects[leaf.object], &around = package_.objects[outer.object];
+    const Container& container =
+        containers_.try_emplace(outer.object, around, package_.files[around.file].unit_mm).first->second;
+    const Transform inward = after(*back, leaf.transform);
     const std::size_t last = object.triangles.size() - 1;
     for (std::size_t k = 0; k < 3; ++k) {
       const std::uint32_t corner = object.triangles[k * last / 2][k];
-      if (!container.holds(moved(leaf.transform, object.vertices[corner]))) return false;
+      if (!container.holds(moved(inward, object.vertices[corner]), looked_at_)) return false;
     }
     return true;
   }
 
   const ModelPackage& package_;
-  std::vector<std::optional<double>> volumes_;  // of objects, six times
-  std::uint64_t work_ = 0;
+  std::vector<std::optional<double>> volumes_;     // of objects, six times
+  std::map<std::uint32_t, Container> containers_;  // by object
+  std::map<std::pair<std::uint32_t, Matrix>, Extent> turned_;
+  std::uint64_t work_ = 0, looked_at_ = 0;
 };
 
 }  // namespace
 
-void find_cavities(const ModelPackage& package, std::vector<Leaf>& leaves) {
+void find_cavities(const ModelPackage& package, std::vector<Leaf>& leaves, std::vector<Note>& notes) {
   Search search(package);
   for (std::uint32_t begin = 0, end = 0; begin < leaves.size(); begin = end) {
     while (end < leaves.size() && leaves[end].item == leaves[begin].item) ++end;
     search.item(leaves, begin, end);
   }
+  if (search.gave_up())
+    notes.push_back({true,
+                     "has too many objects within each other to look for all that are voids: what is inside out and not "
+                     "called a void is planned as a solid"});
 }
 
 }  // namespace lamina::load

@@ -197,7 +197,7 @@ Result<std::vector<Leaf>> expand_build(const Source& source, const ModelPackage&
   left_out(expansion.supports, "supports or surfaces");
   left_out(expansion.modifiers, "modifiers or support blockers of the program that wrote them");
   left_out(expansion.others, "of type \"other\" (modifiers, say)");
-  find_cavities(package, expansion.leaves);
+  find_cavities(package, expansion.leaves, notes);
   return std::move(expansion.leaves);
 }
 

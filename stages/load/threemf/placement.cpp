@@ -152,14 +152,14 @@ Status Placement::add_hollow(const Leaf& leaf, std::span<const Leaf> leaves, std
   Result<SnappedMesh> mesh = snap_mesh(source_, model_.objects[leaf.object], label, transform, options_);
   if (!mesh) return mesh.error();
   Facets& facets = mesh->facets;
-  const bool is_closed = census(facets.triangles).balanced;
   for (const std::uint32_t index : voids) {
     const Leaf& inner = leaves[index];
     const ModelObject& object = model_.objects[inner.object];
     Result<SnappedMesh> hollow =
         snap_mesh(source_, object, model_.label(object), after(options_.transform, inner.transform), options_);
     if (!hollow) return hollow.error();
-    if (!is_closed || !is_inside_out(hollow->facets)) {
+    // What the container lacks is capped afterwards, around the void; a void that is open itself is no void for sure.
+    if (!is_inside_out(hollow->facets)) {
       if (const Status added = add_solid(inner); !added) return added;
       continue;
     }

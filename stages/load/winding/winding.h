@@ -24,7 +24,8 @@ class WindingTree {
 
   /// The solid angle of all facets seen from a point, over that of a sphere: 1 within a closed outward surface, 0 outside,
   /// in between near openings. Within some hundredths. Safe from any thread.
-  double at(const Point& point) const;
+  /// looked_at  boxes and facets that it took are added to it, if given
+  double at(const Point& point, std::uint64_t* looked_at = nullptr) const;
 
  private:
   struct Node {
