@@ -104,6 +104,10 @@ Error ended_early(Maker& maker, const Error& error, bool any_layer) {
   return {error.fault, error.message + "; finished layers are kept, go on with --resume"};
 }
 
+bool cut_short(const Status& status) {
+  return !status && (status.error().fault == Fault::kInterrupted || status.error().fault == Fault::kMemory);
+}
+
 /// Collects the warnings while the files are unfinished still, and refuses what is empty or, if strict, doubtful. Then
 /// nothing stays, unless an earlier run had made a part of it.
 Status judge(const Plan& plan, Maker& maker, const Sanity& sanity, bool resumed, Summary& summary) {
@@ -111,6 +115,7 @@ Status judge(const Plan& plan, Maker& maker, const Sanity& sanity, bool resumed,
   Status status = sanity.end(summary.warnings);
   if (status && plan.job.strict) status = sanity::refuse_warnings(summary.warnings);
   if (status) return {};
+  if (cut_short(status)) return status;
   if (resumed || plan.job.shard) {
     static_cast<void>(maker.stop(true));
   } else {
@@ -139,7 +144,9 @@ Status make_layers(const Plan& plan, Maker& maker, const Sanity& sanity, const F
   FlowReport report;
   const Status moved = flow_layers(static_cast<std::uint32_t>(todo->size()), steps, limits, cancel, report);
   if (!moved) return ended_early(maker, moved.error(), done > 0);
-  if (Status status = judge(plan, maker, sanity, !kept.empty(), summary); !status) return status;
+  if (Status status = judge(plan, maker, sanity, !kept.empty(), summary); !status) {
+    return cut_short(status) ? ended_early(maker, status.error(), done > 0) : status;
+  }
   if (Status status = maker.finish(); !status) return ended_early(maker, status.error(), done > 0);
   summary.layer_seconds = std::chrono::duration<double>(Clock::now() - start).count();
   summary.step_seconds = report.step_seconds;
@@ -175,7 +182,7 @@ Result<Summary> run(Resolved resolved, const ProgressCallback& progress, const s
   limits.record_slots = 2 * limits.most_in_flight;  // some layers wait for an older one, in a single file with their scratch
   if (product != Product::kImages) limits.most_in_flight = limits.record_slots;
   Summary summary = summary_of(*plan);
-  Sanity sanity(*plan);
+  Sanity sanity(*plan, cancel);
   const std::unique_ptr<Maker> maker = make_maker(*plan, sanity, limits);
   if (job.dry_run) {
     for (std::uint32_t i = plan->range[0]; i < plan->range[1]; ++i) {

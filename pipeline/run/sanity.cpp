@@ -13,22 +13,6 @@
 namespace lamina::pipeline {
 namespace {
 
-/// Numbers boxes that touch seen from above, directly or through the box around those that do.
-std::vector<std::uint32_t> group_seen_from_above(std::vector<Box> boxes) {
-  for (Box& box : boxes) box.lo.z = box.hi.z = 0;
-  std::vector<std::uint32_t> group(boxes.size());
-  for (std::uint32_t i = 0; i < group.size(); ++i) group[i] = i;
-  for (std::size_t count = boxes.size() + 1; boxes.size() < count;) {
-    count = boxes.size();
-    const std::vector<std::uint32_t> next = slice::group_bodies(boxes);
-    std::vector<Box> around(next.empty() ? 0 : *std::ranges::max_element(next) + 1);
-    for (std::size_t i = 0; i < next.size(); ++i) around[next[i]].add(boxes[i]);
-    for (std::uint32_t& of : group) of = next[of];
-    boxes = std::move(around);
-  }
-  return group;
-}
-
 std::vector<sanity::Solid> solids_of(const Scene& scene) {
   std::vector<sanity::Solid> solids;
   for (std::size_t i = 0; i < scene.instances.size(); ++i) {
@@ -51,7 +35,7 @@ std::vector<sanity::Solid> solids_from_above(const Scene& scene) {
   std::vector<sanity::Solid> solids = solids_of(scene);
   std::vector<Box> boxes;
   for (const sanity::Solid& solid : solids) boxes.push_back(solid.box);
-  const std::vector<std::uint32_t> group = group_seen_from_above(std::move(boxes));
+  const std::vector<std::uint32_t> group = slice::group_seen_from_above(std::move(boxes));
   for (std::size_t i = 0; i < solids.size(); ++i) solids[i].group = group[i];
   return solids;
 }
@@ -69,27 +53,30 @@ sanity::Sampling sampling_of(const Job& job, const PixelGrid* grid) {
   return sampling;
 }
 
-std::function<double(std::uint32_t)> united_in(const Scene& scene, const sanity::Tally& tally) {
-  return [&](std::uint32_t group) {
-    std::vector<Instance> members;
-    for (std::size_t i = 0; i < scene.instances.size(); ++i)
-      if (tally.solids()[i].group == group) members.push_back(scene.instances[i]);
-    return load::united_mm3(scene.meshes, members, slice::surplus_areas);
+std::function<Result<double>(std::uint32_t)> united_in(const Scene& scene, const sanity::Tally& tally,
+                                                       const std::atomic<bool>* cancel, sanity::United::Again again) {
+  const auto volume = [cancel](std::span<const Mesh> meshes, std::span<const Instance> members) -> Result<double> {
+    const Error interrupted{Fault::kInterrupted, "interrupted"};
+    if (cancel != nullptr && *cancel) return interrupted;
+    const double mm3 = load::united_mm3(meshes, members, slice::surplus_areas);
+    return cancel != nullptr && *cancel ? Result<double>(interrupted) : mm3;
   };
+  const auto united = std::make_shared<sanity::United>(scene.meshes, scene.instances, tally.solids(), volume, std::move(again));
+  return [united](std::uint32_t group) { return united->mm3(group); };
 }
 
-Sanity::Sanity(const Plan& plan)
+Sanity::Sanity(const Plan& plan, const std::atomic<bool>& cancel)
     : plan_(plan), tally_(std::make_unique<sanity::Tally>(solids_of(plan))), filled_(plan.layer_count) {
   for (const PartSummary& part : plan.scene->parts) names_.push_back(one_line(part.path));
   if (plan.images) tally_->look_through(plan.images->grid);
   sampling_ = sampling_of(plan.job, plan.images ? &plan.images->grid : nullptr);
   sampling_.part = names_;
   // The triangles of images are in clusters by then: their parts are read again.
-  sampling_.united_mm3 = [this](std::uint32_t group) {
-    if (!plan_.images) return united_in(*plan_.scene, *tally_)(group);
-    const Result<Scene> scene = load_scene(plan_.job, plan_.bed);
-    return scene ? united_in(*scene, *tally_)(group) : 0.0;
+  sanity::United::Again again = [this]() -> Result<std::vector<Mesh>> {
+    Result<Scene> scene = load_scene(plan_.job, plan_.bed);
+    return scene ? Result<std::vector<Mesh>>(std::move(scene->meshes)) : scene.error();
   };
+  sampling_.united_mm3 = united_in(*plan.scene, *tally_, &cancel, plan.images ? again : nullptr);
   for (std::uint32_t i = 0; i < plan.layer_count; ++i) {
     sampling_.thickest_mm = std::max(sampling_.thickest_mm, mm(plan.layer(i).thickness));
   }
@@ -153,7 +140,9 @@ Status Sanity::end(std::vector<Warning>& warnings) const {
                              plan_.layer_count == 1 ? "" : "s", why_nothing())};
   }
   if (nothing) warnings.push_back({"empty", "the whole job is empty: " + why_nothing()});
-  if (!kept_ && !nothing) sanity::judge_solids(*tally_, sampling_, warnings);
+  if (!kept_ && !nothing) {
+    if (Status status = sanity::judge_solids(*tally_, sampling_, warnings); !status) return status;
+  }
   sanity::judge_layers(
       tally_->solids(), filled_or_rightly_empty(), [&](std::uint32_t i) { return plan_.layer(i); }, warnings);
   sanity::judge_tolerance(tally_->solids(), sampling_, warnings);

@@ -1,6 +1,7 @@
 // pipeline/run/sanity.h: looks at a whole job before it is finished: is what was planned what the parts hold?
 #pragma once
 
+#include <atomic>
 #include <cstdint>
 #include <functional>
 #include <memory>
@@ -13,6 +14,7 @@
 #include "stages/data/status.h"
 #include "stages/sanity/judge.h"
 #include "stages/sanity/tally.h"
+#include "stages/sanity/united.h"
 
 namespace lamina::pipeline {
 
@@ -21,14 +23,16 @@ std::vector<sanity::Solid> solids_from_above(const Scene& scene);
 /// How images on a grid see the solids of a job, or contours if it is null. Names of parts are left to the caller.
 sanity::Sampling sampling_of(const Job& job, const PixelGrid* grid);
 
-/// What the solids of a group hold together (stages/load/info/planned.h). Scene and tally must outlive it.
-std::function<double(std::uint32_t)> united_in(const Scene& scene, const sanity::Tally& tally);
+/// What the solids of a group hold together (stages/sanity/united.h). Scene, tally and cancel must outlive it.
+std::function<Result<double>(std::uint32_t)> united_in(const Scene& scene, const sanity::Tally& tally,
+                                                       const std::atomic<bool>* cancel = nullptr,
+                                                       sanity::United::Again again = {});
 
 /// Counts while layers are made. Layers that --resume keeps are known by their records alone: then solids are not judged.
 class Sanity {
  public:
-  /// The plan must outlive this object.
-  explicit Sanity(const Plan& plan);
+  /// The plan and `cancel` must outlive this object.
+  Sanity(const Plan& plan, const std::atomic<bool>& cancel);
 
   // --- from many threads at once
   void add_image(const Layer& layer, const Runs& image) { tally_->add_image(layer, image); }
@@ -45,7 +49,7 @@ class Sanity {
   }
 
   /// After the last layer of the run. Jobs of some layers only are not judged.
-  /// errors  kInput: a whole job that has nothing, unless that is allowed
+  /// errors  kInput: a whole job that has nothing, unless that is allowed; kInterrupted and kMemory
   Status end(std::vector<Warning>& warnings) const;
 
  private:

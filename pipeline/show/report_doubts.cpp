@@ -55,7 +55,7 @@ std::vector<Warning> ReportDoubts::tell(const std::vector<std::uint64_t>& set) c
   for (std::size_t i = 0; !nothing && i < filled.size(); ++i) {
     if (crossed_[i] == 0) filled[i] = 1;
   }
-  if (images && !nothing) sanity::judge_solids(*tally_, sampling, warnings);
+  if (images && !nothing) static_cast<void>(sanity::judge_solids(*tally_, sampling, warnings));
   sanity::judge_layers(
       tally_->solids(), filled, [&](std::uint32_t i) { return manifest_.layers[i].layer; }, warnings);
   sanity::judge_tolerance(tally_->solids(), sampling, warnings);

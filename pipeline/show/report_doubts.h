@@ -30,8 +30,8 @@ class ReportDoubts {
   const Manifest& manifest_;
   Job job_;
   std::unique_ptr<sanity::Tally> tally_;
-  std::vector<std::uint8_t> crossed_;                // by layer: whether it may not be empty
-  std::function<double(std::uint32_t)> united_mm3_;  // of a group; empty without the parts
+  std::vector<std::uint8_t> crossed_;                        // by layer: whether it may not be empty
+  std::function<Result<double>(std::uint32_t)> united_mm3_;  // of a group; empty without the parts
 };
 
 }  // namespace lamina::pipeline

@@ -75,24 +75,30 @@ double badness_of(const Group& group, double planned_mm3, const Sampling& sampli
 }
 
 /// The same, with what the group's solids hold together where their meshes speak against them. `group` is then that.
-double badness_as_united(std::uint32_t g, Group& group, double planned_mm3, const Sampling& sampling) {
+Result<double> badness_as_united(std::uint32_t g, Group& group, double planned_mm3, const Sampling& sampling) {
   const double badness = badness_of(group, planned_mm3, sampling);
   if (badness <= 1 || !sampling.united_mm3) return badness;
-  const double united = sampling.united_mm3(g);
-  if (united <= 0) return badness;
-  group.least_mm3 = group.most_mm3 = united;
+  const Result<double> united = sampling.united_mm3(g);
+  if (!united) {
+    const Fault fault = united.error().fault;
+    if (fault == Fault::kInterrupted || fault == Fault::kMemory) return united.error();
+    return 0.0;
+  }
+  if (*united <= 0) return badness;
+  group.least_mm3 = group.most_mm3 = *united;
   return badness_of(group, planned_mm3, sampling);
 }
 
-void judge_volumes(const Tally& tally, const Sampling& sampling, std::vector<Warning>& warnings) {
+Status judge_volumes(const Tally& tally, const Sampling& sampling, std::vector<Warning>& warnings) {
   WorstOfParts worst;
   std::vector<Group> groups(tally.groups().begin(), tally.groups().end());
   for (std::uint32_t g = 0; g < groups.size(); ++g) {
     Group& group = groups[g];
     // What has vanished as a whole is told as such.
     if (!group.closed || !tally.measured(g) || tally.planned_mm3(g) == 0) continue;
-    if (const double badness = badness_as_united(g, group, tally.planned_mm3(g), sampling); badness > 1)
-      note(worst, group.part, g, badness);
+    const Result<double> badness = badness_as_united(g, group, tally.planned_mm3(g), sampling);
+    if (!badness) return badness.error();
+    if (*badness > 1) note(worst, group.part, g, *badness);
   }
   for (std::uint32_t part = 0; part < worst.size(); ++part) {
     if (worst[part].count == 0) continue;
@@ -106,6 +112,7 @@ void judge_volumes(const Tally& tally, const Sampling& sampling, std::vector<War
                                     volume_text(planned), volume_text(mesh), 100 * planned / mesh, and_more(worst[part]), why),
                         sampling.part[part]});
   }
+  return {};
 }
 
 void judge_lost(const Tally& tally, const Sampling& sampling, std::vector<Warning>& warnings) {
@@ -145,10 +152,13 @@ void judge_bleed(const Tally& tally, const Sampling& sampling, std::vector<Warni
 
 }  // namespace
 
-void judge_solids(const Tally& tally, const Sampling& sampling, std::vector<Warning>& warnings) {
+Status judge_solids(const Tally& tally, const Sampling& sampling, std::vector<Warning>& warnings) {
   judge_lost(tally, sampling, warnings);
-  if (!sampling.one_sided) judge_volumes(tally, sampling, warnings);
+  if (!sampling.one_sided) {
+    if (Status status = judge_volumes(tally, sampling, warnings); !status) return status;
+  }
   if (tally.looked_at_bleed()) judge_bleed(tally, sampling, warnings);
+  return {};
 }
 
 void judge_layers(std::span<const Solid> solids, std::span<const std::uint8_t> filled,

@@ -31,13 +31,14 @@ struct Sampling {
   double offset_mm = 0;               // of contours
   bool one_sided = false;             // steps lie inside or outside of the parts, on purpose
   std::span<const std::string> part;  // names of files
-  /// What the solids of a group hold together, mm3, where shells overlap or lie inside out too; 0 if that is not known. Asked
-  /// only of groups that are doubted by the volumes of their meshes.
-  std::function<double(std::uint32_t group)> united_mm3 = {};
+  /// What the solids of a group hold together, mm3, where shells overlap or lie inside out too; 0: the volumes of the meshes
+  /// count. Asked only of groups that are doubted by those; where it fails, no volume is doubted (united.h).
+  std::function<Result<double>(std::uint32_t group)> united_mm3 = {};
 };
 
 /// One warning for each part and kind at most; the worst of its copies is named.
-void judge_solids(const Tally& tally, const Sampling& sampling, std::vector<Warning>& warnings);
+/// errors  kInterrupted and kMemory of sampling.united_mm3
+Status judge_solids(const Tally& tally, const Sampling& sampling, std::vector<Warning>& warnings);
 
 /// filled  by layer: whether it has anything; of the whole job
 void judge_layers(std::span<const Solid> solids, std::span<const std::uint8_t> filled,

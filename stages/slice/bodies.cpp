@@ -47,4 +47,19 @@ std::vector<std::uint32_t> group_bodies(std::span<const Box> boxes) {
   return body;
 }
 
+std::vector<std::uint32_t> group_seen_from_above(std::vector<Box> boxes) {
+  for (Box& box : boxes) box.lo.z = box.hi.z = 0;
+  std::vector<std::uint32_t> group(boxes.size());
+  for (std::uint32_t i = 0; i < group.size(); ++i) group[i] = i;
+  for (std::size_t count = boxes.size() + 1; boxes.size() < count;) {
+    count = boxes.size();
+    const std::vector<std::uint32_t> next = group_bodies(boxes);
+    std::vector<Box> around(next.empty() ? 0 : *std::ranges::max_element(next) + 1);
+    for (std::size_t i = 0; i < next.size(); ++i) around[next[i]].add(boxes[i]);
+    for (std::uint32_t& of : group) of = next[of];
+    boxes = std::move(around);
+  }
+  return group;
+}
+
 }  // namespace lamina::slice

@@ -31,7 +31,7 @@ std::vector<Warning> judged(double planned_mm3, const Sampling& sampling, bool c
   Tally tally({{box(10, 10, 0, 10), 0, 0, 1000, closed}});
   tally.add_area(0, {0, 0, 1'000'000}, planned_mm3);
   std::vector<Warning> warnings;
-  judge_solids(tally, sampling, warnings);
+  EXPECT_TRUE(judge_solids(tally, sampling, warnings).ok());
   return warnings;
 }
 

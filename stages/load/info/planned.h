@@ -17,7 +17,7 @@ using SurplusAreas =
 
 enum class Known {
   kExactly,
-  kAbout,   // integrated over some 256 planes; less than a hundredth off as a rule
+  kAbout,   // integrated over some 256 planes, or as many as shells ask for; less than a hundredth off as a rule
   kSummed,  // overlaps count as often as they overlap: nothing to slice with, an open mesh, or more than can be sliced soon
 };
 
@@ -31,19 +31,28 @@ struct PlannedVolumes {
   std::vector<PlannedVolume> of_mesh;  // each alone
 };
 
+/// How much may be sliced for one volume.
+struct Effort {
+  double most_crossed = 1.5e7;  // facets that all planes together may cross: some seconds
+  double fewest_planes = 16;    // with less than these it is not integrated
+};
+
 /// Volume by the rule `nonzero`. Shells that lie apart add up, exactly. What overlaps, or may, is the signed volume and the
-/// integral of the surplus over the height, by Gauss's rule of two points between the heights at which shells begin and end.
+/// integral of the surplus over the height, by Gauss's rule of two points between the heights at which shells begin and end;
+/// where these are too many for `effort`, only some of them bound its stretches.
 ///
 /// instances  where meshes stand
 /// diagnosis  of each mesh that does
 /// surplus    may be empty: then overlaps count as often as they overlap
 /// errors     of surplus
-/// cost       nothing where shells and objects lie apart; else that of slicing up to 256 planes, fewer for large meshes
+/// cost       nothing where shells and objects lie apart; else that of slicing some 256 planes, more where many shells begin
+///            and end, fewer for large meshes: a mesh, or objects that overlap, take `effort` at most
 Result<PlannedVolumes> planned_volumes(std::span<const Mesh> meshes, std::span<const Instance> instances,
-                                       std::span<const Diagnosis> diagnosis, const SurplusAreas& surplus);
+                                       std::span<const Diagnosis> diagnosis, const SurplusAreas& surplus,
+                                       const Effort& effort = {});
 
 /// The same for meshes that nobody has diagnosed. returns  mm3; 0 if it cannot be told
-/// cost  a diagnosis of each mesh besides
+/// cost  a diagnosis of each mesh, and slicing for about a second
 double united_mm3(std::span<const Mesh> meshes, std::span<const Instance> instances, const SurplusAreas& surplus);
 
 }  // namespace lamina::load
