@@ -75,11 +75,12 @@ std::vector<fs::path> layer_files(const std::string& directory) {
   return found;
 }
 
-// The other files in program/, of any dialect.
+// The other files in program/, of any dialect, and their temporary ones.
 std::vector<fs::path> program_frames(const std::string& directory) {
   std::vector<fs::path> found;
   for_each_entry(fs::path(directory) / "program", [&](const fs::directory_entry& entry) {
-    const std::string name = entry.path().filename().string();
+    const std::string file = entry.path().filename().string();
+    const std::string_view named = write::named_by_temporary(file), name = named.empty() ? file : named;
     const bool frame = std::ranges::any_of(write::dialects(), [&](const write::Dialect& one) {
       return name == fmt::format("start{}", one.extension) || name == fmt::format("end{}", one.extension);
     });
@@ -196,12 +197,17 @@ Status check_output(const Job& job) {
   if (const auto there = is_directory(job.output); !there || !*there) return there ? Status() : there.error();
   const auto found = check_manifests(job, nullptr);
   if (!found) return found.error();
-  if (!(job.resume && found->begun) && !job.overwrite && !found->shared && !layer_files(job.output).empty()) {
-    return Error{Fault::kUsage, fmt::format("{}/layers: holds layers without a manifest; replace them with --overwrite, "
-                                            "or name another directory",
-                                            job.output)};
+  const bool known = job.resume && has_record(job.output + "/" + manifest_name(job));
+  if (!known && !job.overwrite && !found->shared && !layer_files(job.output).empty()) {
+    return Error{Fault::kUsage,
+                 fmt::format("{}/layers: holds layers {}; replace them with --overwrite, or name another directory", job.output,
+                             found->begun ? "beside a record without its head" : "without a manifest")};
   }
   return {};
+}
+
+bool holds_layers(const std::string& directory) {
+  return !layer_files(directory).empty() || !program_frames(directory).empty();
 }
 
 Status check_shard_fits(const Job& job, const ManifestHead& head) {
@@ -269,10 +275,6 @@ Result<write::Claim> prepare_output(const Job& job, write::MadeFolders& made) {
     if (::access(place.c_str(), W_OK | X_OK) != 0) return cannot(place, errno);
   }
   if (!job.overwrite) {
-    const std::string own = job.output + "/" + manifest_name(job);
-    // Without any record, layers are what a run with --overwrite was killed over.
-    const bool unknown = job.resume && !job.shard && !fs::exists(own, error) && !has_manifest_head(write::part_of(own));
-    if (Status status = unknown ? remove_layers(job.output) : Status(); !status) return status.error();
     if (!job.shard) sweep_partial_files(job.output);
     return claim;
   }
@@ -310,6 +312,11 @@ void sweep_partial_files(const std::string& directory, std::uint32_t first, std:
       read_program_file_name(file.filename().string(), index, partial);
     }
     if (partial && index >= first && index < last) write::remove_or_note(file.string());
+  }
+  for (const fs::path& file : program_frames(directory)) {
+    // Another shard may be writing its own right now.
+    const bool whole = first == 0 && last == UINT32_MAX;
+    if (whole && !write::named_by_temporary(file.filename().string()).empty()) write::remove_or_note(file.string());
   }
 }
 

@@ -43,6 +43,9 @@ bool read_program_file_name(std::string_view name, std::uint32_t& index, bool& p
 ///         of the same split. kOutput if the directory's path is a file, or another run is writing into it
 Status check_output(const Job& job);
 
+/// Whether layers or print programs are there, whosever they are.
+bool holds_layers(const std::string& directory);
+
 /// Whether an output directory is there. errors  kOutput if its path is a file
 Result<bool> is_directory(const std::string& output);
 
@@ -61,7 +64,7 @@ Status check_shard_fits(const Job& job, const ManifestHead& head);
 Status check_stays_inside(const std::string& directory);
 
 /// Call after check_output. Claims the directory and creates its layers/. With --overwrite, removes the output of an
-/// earlier job (a shard: only its own manifest), otherwise the half-written files of an interrupted run.
+/// earlier job (a shard: only its own manifest), otherwise only the half-written files of an interrupted run.
 /// errors  those of claim_output; kOutput with the system's reason
 Result<write::Claim> prepare_output(const Job& job, write::MadeFolders& made);
 

@@ -160,8 +160,8 @@ Status ImageFiles::record_kept_below(std::uint32_t layer) {
 
 Status ImageFiles::record(const LayerRecord& record) {
   if (Status status = record_kept_below(record.layer.index); !status) return status;
-  if (plan_.job.sync == Sync::kJob) sync_->wrote(record.bytes + record.program.bytes);
-  return manifest_->append(record);
+  Status status = manifest_->append(record);
+  return status && plan_.job.sync == Sync::kJob ? sync_->wrote(record.bytes + record.program.bytes) : status;
 }
 
 Status ImageFiles::finish() {

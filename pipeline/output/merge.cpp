@@ -52,6 +52,9 @@ Result<std::vector<Shard>> read_shards(const std::vector<std::string>& directori
       if (file.partial) return unmatched(fmt::format("{}: this shard is not finished; run it again with --resume", path));
       Result<Manifest> manifest = read_manifest(path);
       if (!manifest) return manifest.error();
+      if (manifest->head.product != Product::kImages)
+        return unmatched(
+            fmt::format("{}: is of no images, and only their shards are merged; plan all layers in one run", path));
       if (!of_merge || !covers_all(manifest->head)) shards.push_back({directory, path, std::move(*manifest)});
     }
   }
@@ -85,15 +88,6 @@ Status check_coverage(std::vector<Shard>& shards) {
   return {};
 }
 
-/// A link in a shard's folder may lead anywhere; what it leads to is no file of the job. errors  kVerification
-Status check_plain(const fs::path& file) {
-  std::error_code error;
-  const fs::file_status status = fs::symlink_status(file, error);
-  if (fs::is_regular_file(status)) return {};
-  return unmatched(fmt::format("{}: is {}; run its shard again with --resume", file.string(),
-                               fs::exists(status) ? "a link or a device, not a file" : "missing"));
-}
-
 Status bring_file(const fs::path& from, const fs::path& to, MergeReport& report) {
   const auto linked = write::bring_file(from.string(), to.string());
   if (!linked) return linked.error();
@@ -103,19 +97,12 @@ Status bring_file(const fs::path& from, const fs::path& to, MergeReport& report)
 
 // Links every file of a shard into `output`.
 Status bring_files(const Shard& shard, const std::string& output, MergeReport& report) {
-  std::error_code error;
   const bool in_place = write::same_file(shard.directory, output);
   const ManifestHead& head = shard.manifest.head;
   const auto bring = [&](const std::string& name, std::uint64_t bytes) -> Status {
     if (name.empty()) return {};  // a format without files, a job without a machine
     const fs::path from = fs::path(shard.directory) / name;
-    if (Status status = check_plain(from); !status) return status;
-    const std::uintmax_t size = fs::file_size(from, error);
-    if (error) return unmatched(fmt::format("{}: is missing; run its shard again with --resume", from.string()));
-    if (size != bytes) {
-      return unmatched(
-          fmt::format("{}: {} bytes, the manifest says {}; run its shard again with --resume", from.string(), size, bytes));
-    }
+    if (Status status = write::check_plain(from.string(), bytes); !status) return status;
     return in_place ? Status() : bring_file(from, fs::path(output) / name, report);
   };
   for (const LayerRecord& record : shard.manifest.layers) {
@@ -130,10 +117,28 @@ Status bring_files(const Shard& shard, const std::string& output, MergeReport& r
   for (const std::string& name :
        {std::string("machine.toml"), "start" + head.program_extension, "end" + head.program_extension}) {
     const fs::path from = fs::path(shard.directory) / "program" / name;
-    if (Status status = check_plain(from); !status) return status;
+    if (Status status = write::check_plain(from.string()); !status) return status;
     if (Status status = bring_file(from, fs::path(output) / "program" / name, report); !status) return status;
   }
   return {};
+}
+
+/// Never replaces files of another job, nor of none: a merge that was killed left its begun manifest.
+/// returns  whether a finished manifest says so, of a shard or of all
+Result<bool> check_place(const std::string& output, const ManifestHead& head, const write::Claim& claim) {
+  bool known = false, finished = false;
+  for (const ManifestFile& file : find_manifests(output)) {
+    const std::string path = (fs::path(output) / file.name).string();
+    if (file.name == "manifest.json.part" && !claim.found()) continue;
+    const Result<Manifest> present = read_manifest(path);
+    if (!present || present->head.id() != head.id()) {
+      return Error{Fault::kUsage, fmt::format("{}: is not of this job; name another directory with -o", path)};
+    }
+    known = true;
+    finished |= !file.partial;
+  }
+  if (known || !holds_layers(output)) return finished;
+  return Error{Fault::kUsage, fmt::format("{}: holds layers without a manifest; name another directory with -o", output)};
 }
 
 Status remove_shard_manifests(const std::string& output) {
@@ -146,6 +151,13 @@ Status remove_shard_manifests(const std::string& output) {
                                                error.message())};
   }
   return {};
+}
+
+/// Of a whole job, whose directory may be one to read only.
+Status end_earlier_merge(const std::string& output) {
+  if (std::ranges::none_of(find_manifests(output), [](const ManifestFile& file) { return file.shard.has_value(); })) return {};
+  auto claim = write::Claim::take((fs::path(output) / "manifest.json").string(), output);
+  return claim ? remove_shard_manifests(output) : Status(claim.error());
 }
 
 /// What is there of a job that is whole already, if nothing but its directory is to be merged into it; an earlier merge may
@@ -165,7 +177,6 @@ std::optional<Shard> whole_job(const std::vector<std::string>& directories, cons
 /// shards  that cover all layers, in their order
 Status judge(std::span<const Shard> shards, bool strict, bool allow_empty, std::vector<Warning>& warnings) {
   const ManifestHead& head = shards.front().manifest.head;
-  if (head.product != Product::kImages) return {};
   Job job;
   if (Status status = read_job_text(head.job_toml, shards.front().path, job); !status) return unmatched(status.error().message);
   sanity::LayerRecords records;
@@ -189,7 +200,7 @@ Result<MergeReport> merge(const MergeRequest& request) {
   if (const auto whole = whole_job(request.directories, *shards, output)) {
     if (Status status = judge({&*whole, 1}, request.strict, true, report.warnings); !status) return status.error();
     if (Status status = bring_files(*whole, output, report); !status) return status.error();
-    if (Status status = remove_shard_manifests(output); !status) return status.error();
+    if (Status status = end_earlier_merge(output); !status) return status.error();
     report.layers = whole->manifest.layers.size();
     return report;
   }
@@ -203,17 +214,10 @@ Result<MergeReport> merge(const MergeRequest& request) {
   if (error) return Error{Fault::kOutput, fmt::format("{}: {}", output, error.message())};
   auto claim = write::Claim::take((fs::path(output) / "manifest.json").string(), output);
   if (!claim) return claim.error();
-  sweep_partial_files(output);
-  // Never replaces files of another job.
   ManifestHead head = shards->front().manifest.head;
-  for (const ManifestFile& file : find_manifests(output)) {
-    const std::string path = (fs::path(output) / file.name).string();
-    if (file.name == "manifest.json.part" && !claim->found()) continue;
-    const Result<Manifest> present = read_manifest(path);
-    if (!present || present->head.id() != head.id()) {
-      return Error{Fault::kUsage, fmt::format("{}: is not of this job; name another directory with -o", path)};
-    }
-  }
+  const auto is_known = check_place(output, head, *claim);
+  if (!is_known) return is_known.error();
+  sweep_partial_files(output);
   if (Status status = check_stays_inside(output); !status) return status.error();
   fs::create_directories(fs::path(output) / "layers", error);
   if (error) return Error{Fault::kOutput, fmt::format("{}/layers: {}", output, error.message())};
@@ -222,14 +226,18 @@ Result<MergeReport> merge(const MergeRequest& request) {
 
   const auto sync = write::FolderSync::of({(fs::path(output) / "layers").string(), (fs::path(output) / "program").string()});
   report.shards = static_cast<std::uint32_t>(shards->size());
-  for (const Shard& shard : *shards) {
-    if (Status status = bring_files(shard, output, report); !status) return status.error();
-  }
   head.first_layer = 0;
   head.last_layer = head.layer_count;
-  Result<ManifestWriter> writer =
-      ManifestWriter::open((fs::path(output) / "manifest.json").string(), head, {}, {}, std::move(*claim));
+  // Begun before any file comes: it tells a later merge whose files they are.
+  auto writer = ManifestWriter::open((fs::path(output) / "manifest.json").string(), head, {}, {}, std::move(*claim));
   if (!writer) return writer.error();
+  for (const Shard& shard : *shards) {
+    Status status = bring_files(shard, output, report);
+    if (status) continue;
+    // It is needed to know files by; in a shard's directory it would be in the way of --resume.
+    if (*is_known || report.linked + report.copied == 0) writer->discard();
+    return status.error();
+  }
   for (const Shard& shard : *shards) {
     for (const LayerRecord& record : shard.manifest.layers) {
       if (Status status = writer->append(record); !status) return status.error();

@@ -29,9 +29,9 @@ struct MergeRequest {
 /// `output` alone is named and is whole already, of an earlier merge or undivided, only the sizes of its files are checked.
 /// The whole job is judged by its records before anything is written (stages/sanity/records.h).
 ///
-/// errors  kVerification, one line: a shard of another job, missing or duplicate layers, an unfinished shard, a file
-///         that is missing, a link, or of the wrong size, a strict job with warnings. kUsage if a directory does not exist
-///         or holds another job's manifest.json. kInput: no layer has a pixel. kOutput
+/// errors  kVerification, one line: a shard of another job or of contours, missing or duplicate layers, an unfinished
+///         shard, a file that is missing, a link, or of the wrong size, a strict job with warnings. kUsage: no such directory;
+///         `output` holds another job's manifest, or layers without one. kInput: no layer has a pixel. kOutput
 Result<MergeReport> merge(const MergeRequest& request);
 
 }  // namespace lamina::pipeline

@@ -56,13 +56,15 @@ Status check_slice_output(const Job& job) {
   std::error_code error;
   if (Status busy = write::check_not_being_written(job.output + "/manifest.json"); !busy) return busy;
   const std::vector<ManifestFile> manifests = find_manifests(job.output);
-  const bool replaces = job.overwrite || (job.resume && !manifests.empty());
-  if (!replaces && !manifests.empty()) {
+  const OnRecord record = find_on_record(job.output);
+  const bool replaces = job.overwrite || (job.resume && (record.finished || record.begun));
+  if (!job.overwrite && !job.resume && !manifests.empty()) {
     return Error{Fault::kUsage, fmt::format("{}: holds {}; {}, or name another directory", job.output,
                                             manifests.front().partial ? "an interrupted job" : "a job",
                                             manifests.front().partial ? "go on with --resume, start over with --overwrite"
                                                                       : "replace it with --overwrite")};
   }
+  const bool knows_plan = job.overwrite || job.slice.file_a_layer || record.finished || record.all_made;
   for (const std::string& name : {std::string("job.toml"), slice_file_name(job)}) {
     const fs::path file = fs::path(job.output) / name;
     for (const PartRequest& part : job.parts) {
@@ -72,12 +74,14 @@ Status check_slice_output(const Job& job) {
       }
     }
     // Never replaces a user's job file: a job file of lamina has a manifest beside it.
-    if (name == "job.toml" && fs::exists(file, error) && (!replaces || manifests.empty())) {
+    if (name == "job.toml" && fs::exists(file, error) && (!replaces || manifests.empty() || !knows_plan)) {
       return Error{Fault::kUsage,
                    fmt::format("{}: is there already, and the job would be kept in it; name another directory", file.string())};
     }
   }
-  if (replaces) return {};
+  const bool asks = !job.overwrite && record.begun && job.slice.file_a_layer == record.finished;
+  const auto known = [&](const fs::path& file) { return is_on_record(record, file.filename().string()); };
+  if (replaces && (!asks || std::ranges::all_of(layer_files(job), known))) return {};
   if (!layer_files(job).empty()) {
     return Error{Fault::kUsage,
                  fmt::format("{}/layers: holds layers; replace them with --overwrite, or name another directory", job.output)};
@@ -123,8 +127,12 @@ std::vector<fs::path> earlier_slices(const Job& job) {
   if (!job.overwrite && !job.resume) return {};
   std::vector<fs::path> earlier;
   if (auto other = other_slice_file(job)) earlier.push_back(std::move(*other));  // while its manifest still tells of it
-  for (const char* name : {"manifest.json", "job.toml"}) earlier.push_back(fs::path(job.output) / name);
-  for (fs::path& file : layer_files(job)) earlier.push_back(std::move(file));
+  const OnRecord record = find_on_record(job.output);
+  const bool all = job.overwrite || (job.slice.file_a_layer && !record.finished);
+  for (fs::path& file : layer_files(job)) {
+    if (all || is_on_record(record, file.filename().string())) earlier.push_back(std::move(file));
+  }
+  for (const char* name : {"job.toml", "manifest.json"}) earlier.push_back(fs::path(job.output) / name);
   return earlier;
 }
 

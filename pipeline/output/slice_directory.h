@@ -17,7 +17,7 @@ std::string_view slice_extension(const Job& job);
 /// Name of the single file: the first part's name with the format's extension.
 std::string slice_file_name(const Job& job);
 
-/// Refuses a directory with another job unless job.overwrite is set. errors  kUsage, kOutput
+/// Refuses a directory with another job, or files that no record tells of, unless job.overwrite is set. errors  kUsage, kOutput
 Status check_slice_output(const Job& job);
 
 /// Temporary directory of per-layer files until all are written.
@@ -26,7 +26,8 @@ std::filesystem::path waiting_layers(const Job& job);
 /// Makes the folder of waiting layers for a job that has them; of an earlier run it stays only if `keeps`. errors  kOutput
 Status prepare_waiting_layers(const Job& job, bool keeps);
 
-/// The files that an earlier job leaves to this one; its manifest before those of layers, and before new ones are named.
+/// The files that an earlier job leaves to this one, its manifest last: what is left of a killed removal is on record. Without
+/// job.overwrite, no layers that no record tells of.
 std::vector<std::filesystem::path> earlier_slices(const Job& job);
 
 /// Call when the job is complete: removes earlier files in their order, and renames the waiting layers. errors  kOutput

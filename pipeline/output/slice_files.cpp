@@ -64,6 +64,7 @@ Status SliceFiles::open() {
     remove_waiting_layers(job);
     return {};
   }
+  if (Status status = file_a_layer_ ? check_takes_layers(output()) : Status(); !status) return status;
   if (Status status = prepare_waiting_layers(job, !kept_.layers.empty()); !status) return status;
   if (one_file) {
     auto package = write::Slice3mfWriter::make(head_);
@@ -138,8 +139,8 @@ Status SliceFiles::record(const write::SliceLayer& layer, const Buffer<char>& te
     if (Status status = package_->add(layer); !status) return status;
   }
   bytes_ += record.bytes;
-  if (sync_ && plan_.job.sync == Sync::kJob) sync_->wrote(record.bytes);
-  return manifest_->append(record);
+  Status status = manifest_->append(record);
+  return status && sync_ && plan_.job.sync == Sync::kJob ? sync_->wrote(record.bytes) : status;
 }
 
 namespace {

@@ -86,7 +86,7 @@ Status check_toolpath_output(const Job& job, const Extruder& machine) {
   }
   if (Status status = write::check_not_being_written(job.output); !status) return status;
   if (Status status = LayeredFile::check_part(job.output, manifest_path(job)); !status) return status;
-  if (job.overwrite || job.resume) return {};
+  if (job.overwrite || (job.resume && has_record(manifest_path(job)))) return {};
   std::vector<std::string> names{job.output, manifest_path(job)};
   if (sml) names.push_back(table_path(job));
   for (const std::string& name : names) {
@@ -94,7 +94,7 @@ Status check_toolpath_output(const Job& job, const Extruder& machine) {
     return Error{Fault::kUsage,
                  fmt::format("{}: is there already; replace it with --overwrite, or name another file with -o", name)};
   }
-  if (!fs::exists(manifest_path(job) + ".part", error)) return {};
+  if (job.resume || !fs::exists(manifest_path(job) + ".part", error)) return {};
   return Error{Fault::kUsage,
                fmt::format("{}.part: an interrupted job; go on with --resume, or start over with --overwrite", job.output)};
 }

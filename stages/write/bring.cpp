@@ -9,6 +9,20 @@
 
 namespace lamina::write {
 
+Status check_plain(const std::string& file, std::optional<std::uint64_t> bytes) {
+  namespace fs = std::filesystem;
+  const auto refuse = [&](const std::string& what) {
+    return Error{Fault::kVerification, fmt::format("{}: {}; run its shard again with --resume", file, what)};
+  };
+  std::error_code error;
+  const fs::file_status status = fs::symlink_status(file, error);
+  if (!fs::is_regular_file(status)) return refuse(fs::exists(status) ? "is a link or a device, not a file" : "is missing");
+  if (!bytes) return {};
+  const std::uintmax_t size = fs::file_size(file, error);
+  if (error) return refuse("is missing");
+  return size == *bytes ? Status() : Status(refuse(fmt::format("{} bytes, the manifest says {}", size, *bytes)));
+}
+
 Result<bool> bring_file(const std::string& from, const std::string& to) {
   namespace fs = std::filesystem;
   const std::string fresh = temporary_name(to);

@@ -120,19 +120,20 @@ FolderSync FolderSync::of(const std::vector<std::string>& folders) {
   return made;
 }
 
-void FolderSync::wrote(std::uint64_t bytes) const {
+Status FolderSync::wrote(std::uint64_t bytes) const {
   Folders& folders = *folders_;
   {
     const std::lock_guard lock(folders.mutex);
     folders.waiting += bytes;
-    if (folders.waiting < kEnough) return;
+    if (!folders.met || folders.waiting < kEnough) return folders.met;
   }
   try {
     if (!folders.early.joinable()) folders.early = std::thread([&folders] { folders.sync_early(); });
   } catch (const std::system_error&) {
-    return;  // no room for a thread: all is left for the end
+    return {};  // no room for a thread: all is left for the end
   }
   folders.changed.notify_one();
+  return {};
 }
 
 Status FolderSync::sync() const {

@@ -37,7 +37,8 @@ class FolderSync {
   ~FolderSync();
 
   /// Tells how many bytes have been written since it was told before. May begin the thread.
-  void wrote(std::uint64_t bytes) const;
+  /// errors  of sync, as soon as the thread has met one
+  Status wrote(std::uint64_t bytes) const;
   /// Ends the thread. errors  kOutput with the system's reason, also of what the thread met. cost  waits for the disk
   Status sync() const;
 

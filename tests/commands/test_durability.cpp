@@ -147,5 +147,15 @@ TEST_F(Durability, ADiskThatFailsIsExitCode4AndAFileSystemThatCannotSyncIsNone) 
   }
 }
 
+TEST_F(Durability, ADiskThatFailsEndsALongJobAtOnce) {
+  ::setenv("LAMINA_FAIL_SYNC", "out/layers", 1);
+  // 150 layers of 0.5 MB, none of which would be on the disk.
+  const Outcome outcome = run("jet part.stl --layer 0.02 --dpi 120 --format pbm --threads 1 --quiet -o out");
+  EXPECT_EQ(outcome.code, 4) << outcome.err;
+  EXPECT_EQ(outcome.error_lines(), 1u) << outcome.err;
+  EXPECT_NE(outcome.err.find("Input/output error"), std::string::npos) << outcome.err;
+  EXPECT_LT(files_below(directory_ / "out/layers").size(), 150u);
+}
+
 }  // namespace
 }  // namespace lamina::test

@@ -169,6 +169,11 @@ TEST_F(Jobs, AMergeThatIsDoneAlreadySaysSo) {
     EXPECT_NE(outcome.err.find("is whole already, 50 layers"), std::string::npos) << outcome.err;
     EXPECT_EQ(tree("out"), merged);
   }
+  if (::geteuid() != 0) {
+    fs::permissions(directory_ / "out", fs::perms::owner_read | fs::perms::owner_exec);
+    EXPECT_EQ(lamina({"merge", "out", "-o", "out"}).code, 0) << "nothing is to be written";
+    fs::permissions(directory_ / "out", fs::perms::owner_all);
+  }
   fs::remove(directory_ / "out/layers/000020.tif");
   EXPECT_EQ(lamina({"merge", "out", "-o", "out"}).code, 5);
 }
@@ -179,6 +184,60 @@ TEST_F(Jobs, MergeReplacesNoOtherJob) {
   const std::string before = tree("other");
   EXPECT_EQ(lamina({"merge", "own", "-o", "other"}).code, 2);
   EXPECT_EQ(tree("other"), before);
+}
+
+TEST_F(Jobs, MergeReplacesNoLayersOfUnknownOrigin) {
+  for (const std::string i : {"1", "2"}) {
+    ASSERT_EQ(lamina(words_of("jet part.stl --layer 1 --machine hp45 --quiet --shard " + i + "/2 -o own" + i)).code, 0);
+  }
+  for (const std::string name : {"layers/000000.tif", "layers/000900.png", "program/machine.toml"}) {
+    fs::remove_all(directory_ / "mine");
+    fs::create_directories((directory_.path() / "mine" / name).parent_path());
+    write_text(directory_.path() / "mine" / name, "precious");
+    expect_refused("merge own1 own2 -o mine", 2, "mine: holds layers without a manifest; name another directory", directory_);
+  }
+  fs::remove_all(directory_ / "mine");
+  fs::create_directories(directory_ / "mine/layers");
+  write_text(directory_ / "mine/notes.txt", "mine");
+  EXPECT_EQ(lamina({"merge", "own1", "own2", "-o", "mine"}).code, 0) << "other files are no layers";
+}
+
+TEST_F(Jobs, AMergeThatWasCutShortGoesOn) {
+  ASSERT_EQ(jet("whole").code, 0);
+  for (const std::string i : {"1", "2"}) ASSERT_EQ(jet("own" + i, {"--shard", i + "/2"}).code, 0);
+  // The second shard lacks a file: all of the first is there by then.
+  const fs::path lost = directory_ / "own2/layers/000040.tif", kept = directory_ / "kept.tif";
+  fs::rename(lost, kept);
+  EXPECT_EQ(lamina({"merge", "own1", "own2", "-o", "joined"}).code, 5);
+  EXPECT_TRUE(fs::exists(directory_ / "joined/layers/000000.tif"));
+  EXPECT_TRUE(fs::exists(directory_ / "joined/manifest.json.part")) << "as after a kill";
+  EXPECT_EQ(lamina({"merge", "own1", "own2", "-o", "joined"}).code, 5) << "and again";
+  const std::string before = tree("own1");
+  EXPECT_EQ(lamina({"merge", "own1", "own2", "-o", "own1"}).code, 5);
+  EXPECT_FALSE(fs::exists(directory_ / "own1/manifest.json.part")) << "the shard can go on";
+  EXPECT_NE(tree("own1"), before);
+  fs::rename(kept, lost);
+  for (const std::string output : {"joined", "own1"}) {
+    const Outcome outcome = lamina({"merge", "own1", "own2", "-o", output});
+    EXPECT_EQ(outcome.code, 0) << outcome.err;
+    EXPECT_EQ(tree(output), tree("whole"));
+  }
+}
+
+TEST_F(Jobs, SharesOfContoursAreNotMerged) {
+  const auto refused_by = [&](const std::vector<std::string>& more) {
+    for (const auto& [output, layers] : {std::pair<std::string, std::string>{"a", ":5"}, {"b", "5:"}}) {
+      std::vector<std::string> slice{"slice", "part.stl", "--layer", "0.5", "--layers", layers, "-o", output, "--quiet"};
+      slice.insert(slice.end(), more.begin(), more.end());
+      ASSERT_EQ(lamina(slice).code, 0);
+    }
+    for (const std::string output : {"joined", "a"}) {
+      expect_refused("merge a b -o " + output, 5, "plan all layers in one run", directory_);
+    }
+  };
+  refused_by({});
+  refused_by({"--file-a-layer", "--overwrite"});
+  EXPECT_FALSE(fs::exists(directory_ / "joined"));
 }
 
 TEST_F(Jobs, VerifyFindsEveryKindOfDamage) {

@@ -171,8 +171,97 @@ TEST_F(Resume, ImagesOfAnOlderJobDoNotMixWithThoseOfTheNewOne) {
   fs::remove(directory_ / "out/manifest.json");
   write_text(directory_ / "out/manifest.json.part", "");  // killed while the older job was removed
   EXPECT_EQ(run(job + "out").code, 2);
-  EXPECT_EQ(planned(job + "out"), 3);
+  refused(job + "out --resume", 2, "a record without its head; replace them with --overwrite");
+  done(job + "out --overwrite");
   EXPECT_EQ(tree("out"), tree("whole"));
+}
+
+TEST_F(Resume, ToolpathsThatNoRecordTellsOfAreKept) {
+  const std::string job = "extrude part.stl --walls 1 --quiet --resume ";
+  for (const char* head : {"absent", "torn"}) {
+    if (std::string_view(head) == "torn") {
+      for (const char* name : {"u.gcode", "u.sml", "v.sml"}) write_text(directory_ / (std::string(name) + ".json.part"), "");
+    }
+    for (const char* name : {"u.gcode", "u.sml", "v.rp3"}) write_text(directory_ / name, "precious");
+    refused(job + "--machine anet-a8 --layer 0.3 -o u.gcode", 2, "u.gcode: is there already");
+    refused(job + "--machine fdm-2000 --layer 0.254 -o u.sml", 2, "u.sml: is there already");
+    refused(job + "--machine fdm-2000 --layer 0.254 -o v.sml", 2, "v.rp3: is there already");
+  }
+  fs::remove(directory_ / "u.gcode");
+  done(job + "--machine anet-a8 --layer 0.3 -o u.gcode");  // killed before its head
+}
+
+TEST_F(Resume, ContoursThatNoRecordTellsOfAreKept) {
+  for (const char* format : {"svg", "3mf"}) {
+    const std::string job = std::string("slice part.stl --layer 0.5 --quiet -o out --format ") + format;
+    done(job);
+    const std::string whole = tree("out"), manifest = read_text(directory_ / "out/manifest.json");
+    const std::string file = std::string("out/part.") + format;
+    fs::create_directory(directory_ / "out/layers");
+    write_text(directory_ / "out/layers/000007.svg", "precious");
+    EXPECT_EQ(planned(job), 0) << format;  // beside a finished job
+    fs::remove(directory_ / file);
+    EXPECT_EQ(planned(job), 6) << format;  // made anew
+    EXPECT_EQ(read_text(directory_ / "out/layers/000007.svg"), "precious");
+
+    for (const std::string& head : {std::string(), begun(manifest, 2)}) {
+      fs::remove_all(directory_ / "out");
+      fs::create_directories(directory_ / "out/layers");
+      write_text(directory_ / "out/manifest.json.part", head);
+      write_text(directory_ / "out/layers/000007.svg", "precious");
+      refused(job + " --resume", 2, "out/layers: holds layers");
+      fs::remove_all(directory_ / "out/layers");
+      write_text(directory_ / "out/job.toml", "precious");
+      refused(job + " --resume", 2, "job.toml: is there already");
+      fs::remove(directory_ / "out/job.toml");
+      if (head.empty()) {
+        write_text(directory_ / file, "precious");
+        refused(job + " --resume", 2, "is there already");
+        fs::remove(directory_ / file);
+      }
+      EXPECT_EQ(planned(job), 6) << format;
+      EXPECT_EQ(tree("out"), whole) << format;
+    }
+    fs::remove_all(directory_ / "out");
+  }
+}
+
+TEST_F(Resume, FilesALayerThatNoRecordTellsOfAreKept) {
+  const std::string job = "slice part.stl --layer 0.5 --file-a-layer --quiet -o out";
+  done(job);
+  const std::string manifest = read_text(directory_ / "out/manifest.json");
+  fs::remove_all(directory_ / "out");
+  done("slice tall.stl --layer 0.5 --quiet -o out");
+  fs::create_directory(directory_ / "out/layers");
+  write_text(directory_ / "out/layers/000003.svg", "precious");
+  write_text(directory_ / "out/manifest.json.part", begun(manifest, 2));
+  refused(job + " --resume", 2, "out/layers: holds layers");
+  fs::remove(directory_ / "out/manifest.json");
+  write_text(directory_ / "out/manifest.json.part", "");
+  fs::remove(directory_ / "out/job.toml");
+  refused(job + " --resume", 2, "out/layers: holds layers");
+}
+
+TEST_F(Resume, ImagesThatNoRecordTellsOfAreKept) {
+  fs::create_directories(directory_ / "out/layers");
+  write_text(directory_ / "out/layers/000000.tif", "precious");
+  for (const bool torn : {false, true}) {
+    if (torn) write_text(directory_ / "out/manifest.json.part", "");
+    refused("jet part.stl --layer 1 --dpi 60 --quiet -o out --resume", 2, "out/layers: holds layers");
+  }
+  fs::remove(directory_ / "out/layers/000000.tif");
+  EXPECT_EQ(planned("jet part.stl --layer 1 --dpi 60 --quiet -o out"), 3);  // killed before its head
+}
+
+TEST_F(Resume, AFileInPlaceOfTheFolderOfLayersIsToldBeforeTheyAreMade) {
+  fs::create_directory(directory_ / "out");
+  write_text(directory_ / "out/layers", "");
+  const Outcome outcome = run("slice part.stl --layer 1 --file-a-layer --quiet -o out");
+  EXPECT_EQ(outcome.code, 4);
+  EXPECT_NE(outcome.err.find("out/layers: is a file, not a directory; remove it"), std::string::npos) << outcome.err;
+  EXPECT_FALSE(fs::exists(directory_ / "out/layers.lamina.part"));
+  fs::remove(directory_ / "out/layers");
+  done("slice part.stl --layer 1 --file-a-layer --quiet -o out");
 }
 
 TEST_F(Resume, APipeInPlaceOfALayerIsToldWithWhatHelps) {

@@ -271,6 +271,13 @@ std::string zip_member(const std::string& path, const char* name) {
   return text;
 }
 
+TEST(Write3mfSlices, ADateThatIsNoneIsToldBeforeAnythingIsMade) {
+  ::setenv("SOURCE_DATE_EPOCH", "yesterday", 1);
+  const bool made = Slice3mfWriter::make(Job().head).ok();
+  ::unsetenv("SOURCE_DATE_EPOCH");
+  EXPECT_FALSE(made);
+}
+
 TEST(Write3mfSlices, PackageHoldsStacksThatSayWhatTheSlicesAreAndIsTheSameEveryTime) {
   const Job job;
   const fs::path folder = fs::temp_directory_path() / ("lamina_slices_" + std::to_string(::getpid()));

@@ -11,6 +11,7 @@
 #include "stages/data/text/readable.h"
 #include "stages/data/text/version.h"
 #include "stages/write/mesh3mf/mesh3mf.h"
+#include "stages/write/package/threemf_package.h"
 #include "stages/write/replaceable.h"
 #include "stages/write/stl/mesh_stl.h"
 
@@ -136,6 +137,7 @@ Outcome run_export(const Arguments& arguments, Context& context) {
   const std::string& output = job->output;
   const Result<MeshFormat> format = format_of(output);
   if (!format) return format.error();
+  if (Status status = *format == MeshFormat::k3mf ? write::check_3mf_date() : Status(); !status) return status;
   if (Status status = check_job(*job); !status) return status;
   if (write::is_file(output) && !arguments.has("--overwrite")) {
     return Error{Fault::kUsage, fmt::format("{}: is there already; replace it with --overwrite, or name another file", output)};

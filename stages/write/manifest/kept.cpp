@@ -1,8 +1,11 @@
 #include "stages/write/manifest/kept.h"
 
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include <algorithm>
+#include <cerrno>
+#include <cstring>
 #include <filesystem>
 
 #include "stages/data/hash.h"
@@ -38,6 +41,35 @@ std::vector<LayerRecord> records_that_hold(const std::string& path, const std::v
 }
 
 namespace fs = std::filesystem;
+
+OnRecord find_on_record(const std::string& directory) {
+  const std::string path = (fs::path(directory) / "manifest.json").string();
+  std::error_code error;
+  OnRecord found{fs::exists(path, error), has_manifest_head(write::part_of(path)), false, {}};
+  if (const auto begun = found.begun ? read_manifest(write::part_of(path)) : Result<Manifest>(Manifest()); begun) {
+    found.all_made = found.begun && begun->layers.size() == begun->head.last_layer - begun->head.first_layer;
+  }
+  if (!found.finished) return found;
+  const auto manifest = read_manifest(path);
+  if (!manifest || manifest->head.extension.empty()) return found;
+  for (const LayerRecord& record : manifest->layers)
+    found.layers.push_back(layer_file_name(record.layer.index, manifest->head.extension));
+  std::ranges::sort(found.layers);
+  return found;
+}
+
+bool is_on_record(const OnRecord& record, std::string_view name) {
+  return std::ranges::binary_search(record.layers, fmt::format("layers/{}", name));
+}
+
+Status check_takes_layers(const std::string& folder) {
+  std::error_code error;
+  const fs::file_status status = fs::status(folder, error);
+  if (!fs::exists(status)) return {};
+  if (!fs::is_directory(status)) return Error{Fault::kOutput, fmt::format("{}: is a file, not a directory; remove it", folder)};
+  if (::access(folder.c_str(), W_OK | X_OK) == 0) return {};
+  return Error{Fault::kOutput, fmt::format("{}: {}", folder, std::strerror(errno))};
+}
 
 Status take_waiting(const std::string& waiting, const std::string& folder) {
   std::error_code error;

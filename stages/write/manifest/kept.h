@@ -5,6 +5,7 @@
 #pragma once
 
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "stages/data/status.h"
@@ -20,8 +21,21 @@ Status check_same_job(const std::string& path, const Manifest& manifest, const M
 std::vector<LayerRecord> records_that_hold(const std::string& file, const std::vector<LayerRecord>& recorded,
                                            std::string_view start);
 
+/// What the records of a directory of contours account for.
+struct OnRecord {
+  bool finished = false, begun = false;  // manifest.json, and the head of its .part, are there
+  bool all_made = false;                 // the begun one has all its layers: the job may have given names
+  std::vector<std::string> layers;       // files of manifest.json with the folder, sorted as text
+};
+OnRecord find_on_record(const std::string& directory);
+/// Whether a file of layers/ is one of them. name  without the folder
+bool is_on_record(const OnRecord& record, std::string_view name);
+
 /// Gives waiting files their places in another folder, which may be there. errors  kOutput
 Status take_waiting(const std::string& waiting, const std::string& folder);
+
+/// Checks, before layers are made, that they will get their places: the folder is absent, or can be written. errors  kOutput
+Status check_takes_layers(const std::string& folder);
 
 /// What a directory holds of a job that is to be resumed.
 struct KeptJob {

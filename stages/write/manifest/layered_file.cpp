@@ -153,6 +153,8 @@ Result<LayeredFile> LayeredFile::open(Options options, const ManifestHead& head,
     }
     if (Status status = check_begun_manifest(write::part_of(manifest_path)); !status) return status.error();
     if (Status status = check_part(path, manifest_path); !status) return status.error();
+    // A file without any record is none of an interrupted job.
+    state.options.resume = state.options.resume && has_record(manifest_path);
     if (!state.options.resume && !state.options.replace && is_there(target->file)) {
       return Error{Fault::kUsage,
                    fmt::format("{}: another run has written it meanwhile; name another file, or use --overwrite", path)};

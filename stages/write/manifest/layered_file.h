@@ -22,8 +22,8 @@ class LayeredFile {
  public:
   struct Options {
     std::string file, manifest;  // paths
-    bool resume = false;
-    bool replace = false;  // an earlier file of that name
+    bool resume = false;         // replaces an earlier file too, if a record of it is there
+    bool replace = false;        // an earlier file of that name
     Sync sync = Sync::kJob;
     bool stream = false;  // accepts a device, a pipe or "-": written directly, without a manifest
   };

@@ -54,6 +54,11 @@ std::string difference(const ManifestHead& now, const ManifestHead& earlier) {
   return "the parts have changed";
 }
 
+bool has_record(const std::string& path) {
+  std::error_code error;
+  return std::filesystem::exists(path, error) || has_manifest_head(write::part_of(path));
+}
+
 Status check_begun_manifest(const std::string& part) {
   const auto file = FileReader::open(part, {});
   char first = 0;  // stays 0 where a power cut has kept the size alone

@@ -94,6 +94,9 @@ Result<ManifestHead> read_manifest_head(const std::string& path);
 /// Whether a file has a complete head; the .part of a run killed early may lack it.
 bool has_manifest_head(const std::string& path);
 
+/// Whether a job is on record: its finished manifest is there, or the begun one with its head. path  of the finished one
+bool has_record(const std::string& path);
+
 /// Whether NAME.part may be replaced as the begun manifest of a run, however torn. errors  kUsage: it is somebody else's
 Status check_begun_manifest(const std::string& part);
 

@@ -45,6 +45,11 @@ Status add_text(ZipWriter& zip, std::string_view name, std::string_view text) {
 
 }  // namespace
 
+Status check_3mf_date() {
+  const Result<ZipDate> date = zip_date(std::getenv("SOURCE_DATE_EPOCH"));
+  return date ? Status() : Status(date.error());
+}
+
 Status write_3mf_package(File& file, std::span<const Deflated> model) {
   const Result<ZipDate> date = zip_date(std::getenv("SOURCE_DATE_EPOCH"));
   if (!date) return date.error();

@@ -12,6 +12,9 @@
 
 namespace lamina::write {
 
+/// Checks the date of the packages, before anything is made for one. errors  kUsage: SOURCE_DATE_EPOCH is no number
+Status check_3mf_date();
+
 /// Writes [Content_Types].xml, _rels/.rels and 3D/3dmodel.model, in this order, of the date that the environment's
 /// SOURCE_DATE_EPOCH says, else of 1 January 1980.
 ///

@@ -59,7 +59,10 @@ Slice3mfWriter::Slice3mfWriter(const SliceHead& head)
   for (const std::string& name : head.parts) bodies_.push_back({name, {}, {}});
 }
 
-Result<Slice3mfWriter> Slice3mfWriter::make(const SliceHead& head) { return Slice3mfWriter(head); }
+Result<Slice3mfWriter> Slice3mfWriter::make(const SliceHead& head) {
+  if (Status status = check_3mf_date(); !status) return status.error();
+  return Slice3mfWriter(head);
+}
 
 Status Slice3mfWriter::add(const SliceLayer& layer) {
   for (std::size_t b = 0; b < bodies_.size(); ++b) {

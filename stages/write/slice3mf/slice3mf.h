@@ -21,6 +21,7 @@ namespace lamina::write {
 class Slice3mfWriter {
  public:
   /// head  one object for each body, with a box as its mesh where none is given: the extension wants one
+  /// errors  of check_3mf_date
   static Result<Slice3mfWriter> make(const SliceHead& head);
 
   /// Layers from the bottom up. errors  kOutput

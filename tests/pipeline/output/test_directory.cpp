@@ -5,6 +5,7 @@
 
 #include "pipeline/output/directory.h"
 #include "stages/write/file.h"
+#include "stages/write/temporary.h"
 #include "tests/commands/program.h"
 
 namespace lamina::pipeline {
@@ -47,6 +48,22 @@ TEST(LayerFiles, AreThoseOfNamesThatLaminaWrites) {
   for (const char* name : {"42.tif", "00042.tif", "0000042.tif", "0000000042.tif", "4294967296.tif", "20240101123000.tif",
                            "000042.tif.bak", "000042", "000042.txt", "000042a.tif", "-000042.tif", " 000042.tif"})
     EXPECT_FALSE(read_layer_file_name(name, index, partial)) << name;
+}
+
+TEST(LayerFiles, WhatAKilledJobLeftBesideThemGoesAndNothingElse) {
+  const test::Directory directory;
+  std::filesystem::create_directories(directory.path() / "program");
+  const std::string ours = write::temporary_name("start.gcode"), theirs = write::temporary_name("notes.txt");
+  for (const std::string& name : {ours, theirs, std::string("start.gcode"), std::string("start.gcode.part")}) {
+    test::write_text(directory.path() / "program" / name, "x");
+  }
+  sweep_partial_files(directory.path().string(), 0, 4);
+  EXPECT_TRUE(std::filesystem::exists(directory.path() / "program" / ours)) << "another shard may be writing it";
+  sweep_partial_files(directory.path().string());
+  EXPECT_FALSE(std::filesystem::exists(directory.path() / "program" / ours));
+  for (const std::string& name : {theirs, std::string("start.gcode"), std::string("start.gcode.part")}) {
+    EXPECT_TRUE(std::filesystem::exists(directory.path() / "program" / name)) << name;
+  }
 }
 
 TEST_F(LoadingMeanwhile, AnotherSplitIsRefused) {
