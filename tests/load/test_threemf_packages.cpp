@@ -17,7 +17,8 @@ enum class Packing { kStored, kDescribedBehind, kZip64 };
 std::string packed_as(const Entries& entries, Packing how) {
   std::string file, directory;
   const bool behind = how == Packing::kDescribedBehind, large = how == Packing::kZip64;
-  for (const auto& [name, bytes] : entries) {
+  for (const auto& entry : entries) {
+    const std::string &name = entry.first, &bytes = entry.second;
     const std::string data = how == Packing::kStored ? bytes : deflated(bytes, -MAX_WBITS);
     const auto crc =
         static_cast<std::uint32_t>(crc32(0, reinterpret_cast<const Bytef*>(bytes.data()), static_cast<uInt>(bytes.size())));

@@ -23,10 +23,10 @@ double crossed_by(std::span<const Mesh> meshes, std::span<const Instance> instan
   for (const Instance& instance : instances) ++copies[{instance.mesh, instance.offset.z}];
   double crossed = 0;
   for (const auto& [where, count] : copies) {
-    const auto& [mesh, z] = where;
-    const auto below = [&](Nm height) { return std::ranges::lower_bound(planes, std::int64_t{height} + z) - planes.begin(); };
+    const std::int64_t z = where.second;
+    const auto below = [&](Nm height) { return std::ranges::lower_bound(planes, height + z) - planes.begin(); };
     std::int64_t once = 0;
-    for (const Triangle& t : meshes[mesh].triangles)
+    for (const Triangle& t : meshes[where.first].triangles)
       once += below(std::max({t.a.z, t.b.z, t.c.z})) - below(std::min({t.a.z, t.b.z, t.c.z}));
     crossed += count * static_cast<double>(once);
   }
@@ -104,8 +104,7 @@ bool find_rule(std::span<const Mesh> meshes, std::span<const Instance> instances
 Result<PlannedVolume> united(std::span<const Mesh> meshes, std::span<const Instance> instances, std::vector<Nm> ends,
                              double signed_mm3, const SurplusAreas& surplus, const Effort& effort) {
   std::ranges::sort(ends);
-  const auto rest = std::ranges::unique(ends);
-  ends.erase(rest.begin(), rest.end());
+  ends.erase(std::unique(ends.begin(), ends.end()), ends.end());
   if (!surplus || ends.size() < 2) return PlannedVolume{std::fabs(signed_mm3), Known::kSummed};
   Rule rule;
   bool exact = false;

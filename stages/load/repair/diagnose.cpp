@@ -64,8 +64,7 @@ void describe_shells(std::span<const Shell> shells, Diagnosis& result) {
     result.shell_ends.push_back(box.hi.z);
   }
   std::ranges::sort(result.shell_ends);
-  const auto rest = std::ranges::unique(result.shell_ends);
-  result.shell_ends.erase(rest.begin(), rest.end());
+  result.shell_ends.erase(std::unique(result.shell_ends.begin(), result.shell_ends.end()), result.shell_ends.end());
 }
 
 }  // namespace
