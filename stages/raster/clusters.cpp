@@ -2,68 +2,91 @@
 
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
-#include <tbb/parallel_reduce.h>
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstring>
-
-#include "stages/raster/morton.h"
+#include <limits>
 
 namespace lamina::raster {
 namespace {
 
 constexpr std::uint32_t kBlock = 4096;  // triangles sorted together: 144 KiB, twice of which fits a core's cache
 
-/// Expected visits of a box by the planes and beams of a job: its height times its depth, the latter blurred by what
-/// a beam is deep.
-double visits(const Box& box) {
-  constexpr double kBeam = 2e6;
-  return static_cast<double>(box.height()) * (static_cast<double>(box.depth()) + kBeam);
-}
-
-/// How large clusters are, and how large the triangles in them.
-struct Spread {
-  double clusters = 0, triangles = 0;
-
-  /// Clusters of real files in their own order come to 10 to 25 times a triangle, those of a shuffled file to thousands.
-  /// Up to here, ordering the whole mesh costs more than it saves in a job of some hundred layers (measured).
-  bool is_poor() const { return clusters > 40 * triangles; }
-  friend Spread operator+(const Spread& a, const Spread& b) { return {a.clusters + b.clusters, a.triangles + b.triangles}; }
-};
-
 /// Writes 16 triangles as a cluster; where there are fewer, the last ones' places are points.
-void write_cluster(const Triangle* triangles, std::uint32_t count, Triangle* place, Box& bounds, Spread& spread) {
+void write_cluster(const Triangle* triangles, std::uint32_t count, Triangle* place, Box& bounds) {
   Cluster cluster;
   bounds = {};
   for (std::uint32_t lane = 0; lane < kClusterSize; ++lane) {
     Triangle t = triangles[std::min(lane, count - 1)];
     if (lane >= count) t.b = t.c = t.a;
     const Point3 corners[3] = {t.a, t.b, t.c};
-    Box box;
     for (std::uint32_t k = 0; k < 3; ++k) {
       cluster.x[k][lane] = corners[k].x;
       cluster.y[k][lane] = corners[k].y;
       cluster.z[k][lane] = corners[k].z;
-      box.add(corners[k]);
+      bounds.add(corners[k]);
     }
-    bounds.add(box);
-    spread.triangles += visits(box) / kClusterSize;
   }
-  spread.clusters += visits(bounds);
   std::memcpy(static_cast<void*>(place), &cluster, sizeof cluster);
 }
 
-/// Orders the triangles of one block along a curve through its own box: 15 bits, two passes of a radix sort.
+/// Twice the height of the middle of a facet, nm.
+std::int64_t doubled_middle(const Triangle& t) {
+  const auto [lo, hi] = std::minmax({t.a.z, t.b.z, t.c.z});
+  return std::int64_t{lo} + hi;
+}
+
+/// Where a triangle stands in the order of its block: by height in steps, then along y. 15 bits.
+///
+/// A job's planes and beams visit a cluster as often as its height times its depth says, the latter blurred by what a beam is
+/// deep; how wide it is costs nothing. Of mean facets h high in a block H high and D deep, that is least at the step below.
+class BlockOrder {
+ public:
+  explicit BlockOrder(std::span<const Triangle> block) {
+    std::int64_t highest = std::numeric_limits<std::int64_t>::min(), heights = 0;
+    Nm deepest = std::numeric_limits<Nm>::min();
+    for (const Triangle& t : block) {
+      const auto [lo, hi] = std::minmax({t.a.z, t.b.z, t.c.z});
+      lowest_ = std::min(lowest_, std::int64_t{lo} + hi);
+      highest = std::max(highest, std::int64_t{lo} + hi);
+      heights += std::int64_t{hi} - lo;
+      front_ = std::min(front_, t.a.y);
+      deepest = std::max(deepest, t.a.y);
+    }
+    const double height = static_cast<double>(highest - lowest_),
+                 mean = static_cast<double>(heights) / static_cast<double>(block.size());
+    const double depth = static_cast<double>(std::int64_t{deepest} - front_);
+    const double clusters = static_cast<double>(block.size()) / kClusterSize;
+    const double step = std::max(std::sqrt(2 * height * depth * mean / (clusters * kBeam)), mean / 2);
+    steps_a_nm_ = 1 / std::max(step, height / (kSteps - 1) + 1);
+    rows_a_nm_ = kAlmostRows / std::max(1.0, depth);
+  }
+
+  std::uint16_t operator()(const Triangle& t) const {
+    const auto step = static_cast<std::uint32_t>(static_cast<double>(doubled_middle(t) - lowest_) * steps_a_nm_);
+    const auto row = static_cast<std::uint32_t>(static_cast<double>(std::int64_t{t.a.y} - front_) * rows_a_nm_);
+    return static_cast<std::uint16_t>(step << 6 | row);
+  }
+
+ private:
+  static constexpr double kSteps = 1 << 9;
+  static constexpr double kAlmostRows = 63.99;                      // so that the last row is 63
+  static constexpr double kBeam = 2e6;                              // nm
+  std::int64_t lowest_ = std::numeric_limits<std::int64_t>::max();  // heights are doubled
+  Nm front_ = std::numeric_limits<Nm>::max();
+  double steps_a_nm_, rows_a_nm_;
+};
+
+/// Orders the triangles of one block: two passes of a radix sort.
 void sort_block(std::span<const Triangle> block, std::span<Triangle> sorted) {
-  Box box;
-  for (const Triangle& t : block) box.add(t.a);
-  const MortonCurve<5> curve(box);
+  const BlockOrder place(block);
   std::array<std::uint16_t, kBlock> key, first_order, order;
   std::array<std::uint16_t, 257> low{}, high{};
   const auto count = static_cast<std::uint32_t>(block.size());
   for (std::uint32_t i = 0; i < count; ++i) {
-    key[i] = static_cast<std::uint16_t>(curve(block[i].a));
+    key[i] = place(block[i]);
     ++low[(key[i] & 255) + 1u];
     ++high[(key[i] >> 8) + 1u];
   }
@@ -77,26 +100,23 @@ void sort_block(std::span<const Triangle> block, std::span<Triangle> sorted) {
 }
 
 /// Turns `count` triangles, a whole number of clusters' room, into clusters where they lie.
-Spread cluster_in_place(Triangle* triangles, std::uint32_t count, Box* bounds, bool sorted_already) {
-  return tbb::parallel_reduce(
-      tbb::blocked_range<std::uint32_t>(0, (count + kBlock - 1) / kBlock), Spread{},
-      [&](const tbb::blocked_range<std::uint32_t>& range, Spread spread) {
-        Buffer<Triangle> copy(kBlock);
-        for (std::uint32_t b = range.begin(); b != range.end(); ++b) {
-          const std::uint32_t first = b * kBlock, size = std::min(kBlock, count - first);
-          if (sorted_already) {
-            std::copy_n(triangles + first, size, copy.data());
-          } else {
-            sort_block({triangles + first, size}, {copy.data(), size});
-          }
-          for (std::uint32_t i = 0; i < size; i += kClusterSize) {
-            write_cluster(copy.data() + i, std::min(kClusterSize, size - i), triangles + first + i,
-                          bounds[(first + i) / kClusterSize], spread);
-          }
-        }
-        return spread;
-      },
-      std::plus<Spread>{});
+void cluster_in_place(Triangle* triangles, std::uint32_t count, Box* bounds, bool sorted_already) {
+  tbb::parallel_for(tbb::blocked_range<std::uint32_t>(0, (count + kBlock - 1) / kBlock),
+                    [&](const tbb::blocked_range<std::uint32_t>& range) {
+                      Buffer<Triangle> copy(kBlock);
+                      for (std::uint32_t b = range.begin(); b != range.end(); ++b) {
+                        const std::uint32_t first = b * kBlock, size = std::min(kBlock, count - first);
+                        if (sorted_already) {
+                          std::copy_n(triangles + first, size, copy.data());
+                        } else {
+                          sort_block({triangles + first, size}, {copy.data(), size});
+                        }
+                        for (std::uint32_t i = 0; i < size; i += kClusterSize) {
+                          write_cluster(copy.data() + i, std::min(kClusterSize, size - i), triangles + first + i,
+                                        bounds[(first + i) / kClusterSize]);
+                        }
+                      }
+                    });
 }
 
 std::uint32_t clusters_for(std::uint32_t triangles) { return (triangles + kClusterSize - 1) / kClusterSize; }
@@ -120,20 +140,9 @@ ClusteredMesh make_clusters(Mesh& mesh) {
     std::copy_backward(out.storage.begin() + own, out.storage.begin() + total, out.storage.begin() + first_cap_at + caps);
   }
   out.bounds.resize(clusters);
-  const Spread spread = cluster_in_place(out.storage.data(), own, out.bounds.data(), false);
+  cluster_in_place(out.storage.data(), own, out.bounds.data(), false);
   cluster_in_place(out.storage.data() + first_cap_at, caps, out.bounds.data() + out.first_cap, true);
   out.clusters = {reinterpret_cast<const Cluster*>(out.storage.data()), clusters};
-
-  if (spread.is_poor() && own > kBlock) {
-    const auto triangle_at = [&](std::uint32_t i) { return out.clusters[i / kClusterSize].triangle(i % kClusterSize); };
-    const Buffer<std::uint32_t> order = morton_order(own, mesh.bounds, triangle_at);
-    Buffer<Triangle> ordered(out.storage.size());
-    tbb::parallel_for(0u, own, [&](std::uint32_t i) { ordered[i] = triangle_at(order[i]); });
-    std::copy(out.storage.begin() + first_cap_at, out.storage.end(), ordered.begin() + first_cap_at);
-    out.storage = std::move(ordered);
-    cluster_in_place(out.storage.data(), own, out.bounds.data(), true);
-    out.clusters = {reinterpret_cast<const Cluster*>(out.storage.data()), clusters};
-  }
   return out;
 }
 

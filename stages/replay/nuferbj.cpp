@@ -2,6 +2,8 @@
 #include <fmt/format.h>
 
 #include <charconv>
+#include <span>
+#include <vector>
 
 #include "stages/replay/dialects.h"
 #include "stages/replay/gcode.h"
@@ -9,33 +11,85 @@
 namespace lamina::replay {
 namespace {
 
-/// J<step> and words of eight hexadecimal digits, read from left to right as nozzles 0, 1, 2, ...
+/// J<step> fired there and, after R<repeats>, at as many steps behind it.
 struct Vector {
   std::int64_t step = 0;
-  std::vector<std::uint64_t> words;
+  std::uint32_t repeats = 0;
 };
 
-/// At a fault the vector may be of other words than the head.
-Vector read_vector(const GcodeLine& line, GcodeReader& reader, std::uint32_t nozzles) {
-  Vector vector;
-  const std::string_view number = line.command.substr(1);
-  const auto [stop, error] = std::from_chars(number.data(), number.data() + number.size(), vector.step);
-  if (error != std::errc() || stop != number.data() + number.size()) reader.fault("a vector without a step");
-  const std::uint32_t groups = (nozzles + 31) / 32;
-  if (line.rest.size() != std::size_t{groups} * 9 - 1) {
-    reader.fault(fmt::format("a vector of {} characters where {} nozzles have {}", line.rest.size(), nozzles, groups * 9 - 1));
-    return vector;
+/// What a swath loads. A program of one line may repeat a vector a hundred million times: they are counted, not written out.
+class Loaded {
+ public:
+  explicit Loaded(std::uint32_t nozzles) : nozzles_(nozzles), words_a_vector_((nozzles + 63) / 64) {}
+
+  /// Words of eight hexadecimal digits, read from left to right as nozzles 0, 1, 2, ... returns  the step
+  std::int64_t add(const GcodeLine& line, GcodeReader& reader) {
+    Vector vector;
+    const std::string_view number = line.command.substr(1);
+    const auto [stop, error] = std::from_chars(number.data(), number.data() + number.size(), vector.step);
+    if (error != std::errc() || stop != number.data() + number.size()) reader.fault("a vector without a step");
+    const std::size_t place = words_.size();
+    words_.resize(place + words_a_vector_, 0);
+    vectors_.push_back(vector);
+    read_words(line.rest, std::span(words_).subspan(place), reader);
+    return vector.step;
   }
-  vector.words.assign((groups + 1) / 2, 0);
-  for (std::uint32_t group = 0; group < groups; ++group) {
-    const char* digits = line.rest.data() + std::size_t{group} * 9;
-    std::uint32_t bits = 0;
-    const auto [end, wrong] = std::from_chars(digits, digits + 8, bits, 16);
-    if (wrong != std::errc() || end != digits + 8 || (group > 0 && digits[-1] != ' '))
-      reader.fault("a word that is no hexadecimal number");
-    vector.words[group / 2] |= std::uint64_t{bits} << (group % 2 == 0 ? 32 : 0);
+
+  /// Repeats the last vector. returns  whether there is one, and a number that can be
+  bool repeat(std::string_view number) {
+    std::uint32_t repeats = 0;
+    const auto [stop, error] = std::from_chars(number.data(), number.data() + number.size(), repeats);
+    if (vectors_.empty() || error != std::errc() || stop != number.data() + number.size()) return false;
+    if (repeats > kMostRepeats - vectors_.back().repeats) return false;
+    vectors_.back().repeats += repeats;
+    return true;
   }
-  return vector;
+
+  std::span<const Vector> vectors() const { return vectors_; }
+  std::span<const std::uint64_t> words(std::size_t vector) const {
+    return std::span(words_).subspan(vector * words_a_vector_, words_a_vector_);
+  }
+  void clear() { vectors_.clear(), words_.clear(); }
+
+ private:
+  static constexpr std::uint32_t kMostRepeats = 100'000'000;
+
+  void read_words(std::string_view text, std::span<std::uint64_t> words, GcodeReader& reader) const {
+    const std::uint32_t groups = (nozzles_ + 31) / 32;
+    if (text.size() != std::size_t{groups} * 9 - 1) {
+      reader.fault(fmt::format("a vector of {} characters where {} nozzles have {}", text.size(), nozzles_, groups * 9 - 1));
+      return;
+    }
+    for (std::uint32_t group = 0; group < groups; ++group) {
+      const char* digits = text.data() + std::size_t{group} * 9;
+      std::uint32_t bits = 0;
+      const auto [end, wrong] = std::from_chars(digits, digits + 8, bits, 16);
+      if (wrong != std::errc() || end != digits + 8 || (group > 0 && digits[-1] != ' '))
+        reader.fault("a word that is no hexadecimal number");
+      words[group / 2] |= std::uint64_t{bits} << (group % 2 == 0 ? 32 : 0);
+    }
+  }
+
+  std::uint32_t nozzles_;
+  std::size_t words_a_vector_;
+  std::vector<Vector> vectors_;
+  std::vector<std::uint64_t> words_;
+};
+
+/// Fires what is loaded while the head goes from one place to another, mm.
+void fire(const Loaded& loaded, bool backward, double from, double to, Printing& printing) {
+  const double low = std::min(from, to), high = std::max(from, to);
+  const auto vectors = loaded.vectors();
+  for (std::size_t v = 0; v < vectors.size(); ++v) {
+    for (std::uint32_t k = 0; k <= vectors[v].repeats; ++k) {
+      const std::int64_t step = vectors[v].step + (backward ? -std::int64_t{k} : std::int64_t{k});
+      printing.at_step(step);
+      const double at = printing.position_of(static_cast<double>(step));
+      if (at < low - 1e-3 || at > high + 1e-3) return printing.fault("the head does not come over this step");
+      printing.fire_words(loaded.words(v));
+      if (!printing.ok()) return;
+    }
+  }
 }
 
 }  // namespace
@@ -48,7 +102,7 @@ void read_nuferbj(std::string_view text, Printing& printing) {
     return printing.fault("the program does not begin with M811 of this layer");
   }
   const ScanAxes scan(printing.profile());
-  std::vector<Vector> loaded;  // fired by the next G1 along the scan
+  Loaded loaded(printing.nozzles());  // fired by the next G1 along the scan
   bool in_sweep = false, backward = false, ended = false;
   while (reader.next(line)) {
     if (ended) return reader.fault("goes on behind M813");
@@ -59,31 +113,15 @@ void read_nuferbj(std::string_view text, Printing& printing) {
       in_sweep = true;
     } else if (line.command[0] == 'J') {
       if (!in_sweep) return reader.fault("a vector outside of a swath");
-      loaded.push_back(read_vector(line, reader, printing.nozzles()));
-      printing.reading_step(loaded.back().step);
+      printing.reading_step(loaded.add(line, reader));
     } else if (line.command[0] == 'R') {
-      std::uint32_t repeats = 0;
-      const std::string_view number = line.command.substr(1);
-      const auto [stop, error] = std::from_chars(number.data(), number.data() + number.size(), repeats);
-      if (loaded.empty() || error != std::errc() || stop != number.data() + number.size() || repeats > 100'000'000) {
-        return reader.fault("R repeats no vector");
-      }
-      for (std::uint32_t k = 0; k < repeats; ++k) {
-        loaded.push_back(loaded.back());
-        loaded.back().step += backward ? -1 : 1;
-      }
+      if (!loaded.repeat(line.command.substr(1))) return reader.fault("R repeats no vector");
     } else if (line.command == "G1" && in_sweep && line.has(scan.along[0])) {
       const double from = axes.at(scan.along);
       printing.go_across(axes.at(scan.across));
       axes.take(line, true);
-      const double to = axes.at(scan.along), low = std::min(from, to), high = std::max(from, to);
-      for (const Vector& vector : loaded) {
-        printing.at_step(vector.step);
-        const double at = printing.position_of(static_cast<double>(vector.step));
-        if (at < low - 1e-3 || at > high + 1e-3) return printing.fault("the head does not come over this step");
-        printing.fire_words(vector.words);
-        if (!printing.ok()) return;
-      }
+      fire(loaded, backward, from, axes.at(scan.along), printing);
+      if (!printing.ok()) return;
       loaded.clear();
       in_sweep = false;
     } else if (line.command == "M813") {

@@ -130,7 +130,7 @@ void Printing::fire(std::uint32_t number) {
   if (watch_ != nullptr) (*watch_)({column, row, sweep_, static_cast<std::uint32_t>(step_), number, first_line_});
 }
 
-void Printing::fire_words(const std::vector<std::uint64_t>& words) {
+void Printing::fire_words(std::span<const std::uint64_t> words) {
   for (std::size_t w = 0; w < words.size(); ++w) {
     for (std::uint64_t left = words[w]; left != 0 && ok();) {
       const int bit = std::countl_zero(left);

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cmath>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -41,7 +42,7 @@ class Printing {
   void at_step(std::int64_t step);
   void fire(std::uint32_t nozzle);
   /// Fires all nozzles with set bits; bit 63 of the first word is nozzle 0.
-  void fire_words(const std::vector<std::uint64_t>& words);
+  void fire_words(std::span<const std::uint64_t> words);
 
   // --- movements
   void head_moves(double mm, double mm_s, bool scanning);
