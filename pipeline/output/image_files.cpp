@@ -166,10 +166,8 @@ Status ImageFiles::record(const LayerRecord& record) {
 
 Status ImageFiles::finish() {
   if (Status status = record_kept_below(UINT32_MAX); !status) return status;
-  if (plan_.job.sync != Sync::kOff) {
-    if (Status status = sync_->sync(); !status) return status;
-  }
-  return manifest_->finish();
+  // Once for layers and manifest: each wait for the disk takes some milliseconds.
+  return manifest_->finish({}, [this] { return plan_.job.sync == Sync::kOff ? Status() : sync_->sync(); });
 }
 
 Status ImageFiles::keep() { return manifest_->flush(); }

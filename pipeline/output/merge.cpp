@@ -244,8 +244,7 @@ Result<MergeReport> merge(const MergeRequest& request) {
     }
     report.layers += shard.manifest.layers.size();
   }
-  if (Status status = sync.sync(); !status) return status.error();
-  if (Status status = writer->finish(); !status) return status.error();
+  if (Status status = writer->finish({}, [&sync] { return sync.sync(); }); !status) return status.error();
   if (Status status = remove_shard_manifests(output); !status) return status.error();
   return report;
 }
