@@ -93,7 +93,9 @@ void Printing::compare(const RunsView& image, std::uint64_t moved, std::uint64_t
       }
     }
   }
-  if (!first.empty()) return fail(first);
+  if (!first.empty()) {
+    return fail(fmt::format("{}; in all {} pixels are not fired and {} fired too many", first, missing, added));
+  }
   if (added != moved || missing != moved + lost) {
     if (first_of_all.empty()) first_of_all = fmt::format("layer {}", layer_);  // the manifest alone speaks of such pixels
     fail(fmt::format("{}: {} pixels are not fired and {} fired instead; the manifest says {} and {}", first_of_all, missing,

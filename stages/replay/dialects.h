@@ -12,6 +12,7 @@ void read_nuferbj(std::string_view text, Printing& printing);
 void read_raw(std::string_view text, Printing& printing);
 void read_planes(std::string_view text, Printing& printing);
 void read_hp45(std::string_view text, Printing& printing);
+void read_oasis(std::string_view text, Printing& printing);
 void read_brundlefab(std::string_view text, Printing& printing);
 void read_m578(std::string_view text, Printing& printing);
 

@@ -17,9 +17,9 @@ struct DialectReader {
   std::string_view id;
   void (*read)(std::string_view, Printing&);
 };
-constexpr DialectReader kReaders[] = {{"nuferbj", read_nuferbj},       {"raw", read_raw},
-                                      {"planes", read_planes},         {"hp45", read_hp45},
-                                      {"brundlefab", read_brundlefab}, {"m578", read_m578}};
+constexpr DialectReader kReaders[] = {{"nuferbj", read_nuferbj}, {"raw", read_raw},     {"planes", read_planes},
+                                      {"hp45", read_hp45},       {"oasis", read_oasis}, {"brundlefab", read_brundlefab},
+                                      {"m578", read_m578}};
 
 /// Reads a program with the reader of its dialect. errors  kVerification
 Status read(std::string_view dialect, std::string_view program, Printing& printing) {

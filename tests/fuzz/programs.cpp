@@ -105,6 +105,7 @@ const Registered kNuferbj(target<"nuferbj">("program_nuferbj"));
 const Registered kRaw(target<"raw">("program_raw"));
 const Registered kPlanes(target<"planes">("program_planes"));
 const Registered kHp45(target<"hp45">("program_hp45"));
+const Registered kOasis(target<"oasis">("program_oasis"));
 const Registered kBrundlefab(target<"brundlefab">("program_brundlefab"));
 const Registered kM578(target<"m578">("program_m578"));
 

@@ -39,7 +39,7 @@ std::string explain(const ExtruderProfile& profile) {
       "machine   {}: {}\nbed       {:g} x {:g} mm, {:g} mm high\nnozzle    {:g} mm, filament {:g} mm\nfile      {}\n"
       "widths    {}\n",
       m.name, m.description, m.bed.size_mm[0], m.bed.size_mm[1], m.bed.build_height_mm, m.material.nozzle_mm,
-      m.material.filament_mm, m.format == "sml" ? "SML" : "G-code",
+      m.material.filament_mm, m.format == "sml" ? "SML; its path words are our own, no public reader knows them" : "G-code",
       profile.own_calibration ? "measured on it" : "as published for an Anet A8; lamina calibrate measures them");
 }
 

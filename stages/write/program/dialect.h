@@ -41,6 +41,8 @@ struct Dialect {
   bool has_motion;          // the text moves axes and vats; else it is the data of the head alone
   /// A writer for one thread. machine and grid have to live as long as it does.
   std::unique_ptr<ProgramWriter> (*make_writer)(const Machine& machine, const HeadGrid& grid);
+  /// What it cannot say beside the number of nozzles. errors  kUsage
+  Status (*check)(const Machine& machine, const HeadGrid& grid) = nullptr;
 };
 
 std::span<const Dialect> dialects();

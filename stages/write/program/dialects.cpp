@@ -5,23 +5,28 @@
 
 #include "stages/write/program/brundlefab/brundlefab.h"
 #include "stages/write/program/dialect.h"
+#include "stages/write/program/hp45/head.h"
 #include "stages/write/program/hp45/hp45.h"
 #include "stages/write/program/m578/m578.h"
 #include "stages/write/program/nuferbj/nuferbj.h"
+#include "stages/write/program/oasis/oasis.h"
 #include "stages/write/program/planes/planes.h"
 #include "stages/write/program/raw/raw.h"
 
 namespace lamina::write {
 namespace {
 
-constexpr std::array<Dialect, 6> kDialects = {{
-    {"nuferbj", ".gcode", "G-code with vectors as hexadecimal words, powder cycle and counters", 65'535, 0, true,
-     nuferbj::make_writer},
-    {"raw", ".raw", "128-bit words as a Xaar XJ128 takes them, with binary swath heads", 65'535, 120, false, raw::make_writer},
-    {"planes", ".planes", "32-bit padded planes of a swath, as drive electronics of production heads take them", 65'535, 31,
+constexpr std::array<Dialect, 7> kDialects = {{
+    {"nuferbj", ".gcode", "G-code with vectors as hexadecimal words, powder cycle and counters; our own definition", 65'535, 0,
+     true, nuferbj::make_writer},
+    {"raw", ".raw", "128-bit words as a Xaar XJ128 takes them, with swath heads; our own definition", 65'535, 120, false,
+     raw::make_writer},
+    {"planes", ".planes", "32-bit padded planes of a swath, as production heads take them; our own definition", 65'535, 31,
      false, planes::make_writer},
-    {"hp45", ".hp45", "lines of the HP45 controller: SBR, position and 300 nozzles in base 64", 300, 0, true,
-     hp45::make_writer},
+    {"hp45", ".hp45", "HP45 controller V4, firmware 0.08: SBR lines for it, G-code for a motion controller beside it", 300, 0,
+     true, hp45::make_writer, hp45::check},
+    {"oasis", ".oasis", "Oasis: an HP45 controller V4 and GRBL, with the new layer of the Oasis controller", 300, 0, true,
+     oasis::make_writer, hp45::check},
     {"brundlefab", ".gcode", "BrundleFab's T1 P Q R S with up to 72 nozzles", 72, 0, true, brundlefab::make_writer},
     {"m578", ".gcode", "RepRapFirmware's M578, 32 nozzles a head number", 1024, 0, true, m578::make_writer},
 }};
@@ -36,7 +41,7 @@ const Dialect* find_dialect(std::string_view id) {
 }
 
 Status check_dialect(const Dialect& dialect, const Machine& machine, const HeadGrid& grid) {
-  if (grid.nozzles <= dialect.most_nozzles) return {};
+  if (grid.nozzles <= dialect.most_nozzles) return dialect.check != nullptr ? dialect.check(machine, grid) : Status();
   return Error{Fault::kUsage, fmt::format("{}: machine.dialect: {} speaks to at most {} nozzles, the head has {}", machine.name,
                                           dialect.id, dialect.most_nozzles, grid.nozzles)};
 }

@@ -1,0 +1,265 @@
+#include "stages/replay/hp45/controller.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+namespace lamina::replay::hp45 {
+namespace {
+
+constexpr std::int32_t kBufferSize = 4003;                  // Buffer.cpp: BUFFER_SIZE
+constexpr std::int32_t kRowGapUm = 4050;                    // Position.ino: ROW_GAP
+constexpr std::uint32_t kSpeedPulses = 50;                  // Position.ino: POSITION_STEP_COUNT
+constexpr std::size_t kRawCharacters = 50;                  // Serialcom.cpp: serialRaw
+constexpr std::size_t kLongestLine = 64;                    // Serialcom.cpp: a line with its end
+constexpr std::size_t kLongestNumber = 5;                   // Serialcom.cpp: digits that 32 bits hold with their sign
+constexpr std::int32_t kFullDpi = 600;                      // DMAPrint.cpp: SetDPI
+constexpr std::uint64_t kEvenBits = 0x5555'5555'5555'5555;  // of a word of a burst: nozzles with even numbers
+
+// Serialcom.cpp: B64Lookup.
+int digit_of(char c) {
+  if (c >= 'A' && c <= 'Z') return c - 'A';
+  if (c >= 'a' && c <= 'z') return c - 'a' + 26;
+  if (c >= '0' && c <= '9') return c - '0' + 52;
+  return c == '+' ? 62 : c == '/' ? 63 : -1;
+}
+
+bool base64(std::string_view text) {
+  return std::ranges::all_of(text, [](char c) { return digit_of(c) >= 0; });
+}
+
+void put(Burst& burst, std::uint32_t nozzle) {
+  const std::uint32_t place = kCartridgeNozzles - 1 - nozzle;
+  burst[place / 64] |= std::uint64_t{1} << (63 - place % 64);
+}
+
+// Buffer.cpp: the overlays. Nozzles of odd primitives are the odd ones (NewNozzleTable.ino), side 0 of the buffer. Place 0 of
+// a burst is nozzle 299, so that bit 63 of each word is an odd nozzle's.
+Burst share(const Burst& burst, std::uint32_t side) {
+  Burst shared;
+  for (std::size_t w = 0; w < burst.size(); ++w) shared[w] = burst[w] & (side == 1 ? kEvenBits : ~kEvenBits);
+  return shared;
+}
+
+bool nothing(const Burst& burst) {
+  return std::ranges::all_of(burst, [](std::uint64_t word) { return word == 0; });
+}
+
+}  // namespace
+
+Controller::Controller() : burst_(kBufferSize), position_(kBufferSize) {}
+
+std::string Controller::execute(std::string_view command, std::string_view rest) {
+  if (command.size() + 1 + rest.size() + 1 > kLongestLine) return "the line is longer than the controller's block";
+  const std::size_t blank = rest.find(' ');
+  std::string_view small = rest.substr(0, blank);
+  const std::string_view raw = blank == std::string_view::npos ? std::string_view() : rest.substr(blank + 1);
+  const bool negative = small.starts_with('-');
+  if (negative) small.remove_prefix(1);
+  if (!base64(small) || !base64(raw)) return "the controller drops the line: a character is not of base 64";
+  if (small.size() > kLongestNumber) return "a number that the controller cannot hold";
+  if (raw.size() > kRawCharacters) return "more characters than the controller holds";
+  std::int32_t value = 0;
+  for (const char c : small) value = value * 64 + digit_of(c);
+  if (negative) value = -value;
+  if (command == "SBR") return add(value, raw);
+  if (command == "BCL") {  // BufferClear
+    if (unread() > 0) return fmt::format("{} lines that the head has not come to are cleared", unread());
+    clear_buffer();
+    first_ = {true, true};
+    update();
+    return {};
+  }
+  if (command == "BRES") {  // BufferReset: the lines are read again
+    read_ = {0, 0};
+    first_ = {true, true};
+    update();
+    return {};
+  }
+  return set(command, value);
+}
+
+std::string Controller::set(std::string_view command, std::int32_t value) {
+  if (command == "SEP") {
+    set_encoder(value);
+  } else if (command == "SER") {
+    if (value < 1 || value > 25'400) return "an encoder of 1 to 25400 counts an inch";
+    counts_per_inch_ = value;
+    zeroed_ = false;
+    raw_zero_ = raw_;
+    zero_um_ = at_um_;
+  } else if (command == "SDP" || command == "SDPI") {  // DMAPrint::SetDPI
+    if (value < 1) return "SDP has the nozzles an inch, 1 to 600";
+    if (value <= kFullDpi) repeat_ = kFullDpi / value;
+  } else if (command == "SDN") {
+    density_ = value;
+  } else if (command == "SSID") {  // Buffer::SetPrintMode
+    if (value >= 0 && value <= 2) print_mode_ = value;
+  } else if (command == "BMOD") {
+    if (value != 0) return "BMOD has to be A: lines are read once";
+  } else if (command != "SPME" && command != "BRL") {
+    return fmt::format("'{}' is no command of the dialect", command);
+  }
+  return {};
+}
+
+// DMAPrint::ConvertB6RawToBurst, from the last character on, and Buffer::Add.
+std::string Controller::add(std::int32_t position, std::string_view raw) {
+  if (write_left() <= 0) return fmt::format("the controller's buffer is full with {} lines: this one is lost", unread());
+  Burst burst{};
+  std::uint32_t nozzle = 0;
+  for (std::size_t character = raw.size(); character-- > 0;) {
+    const int six = digit_of(raw[character]);
+    for (int bit = 0; bit < 6; ++bit) {
+      for (std::int32_t r = 0; r < repeat_ && nozzle < kCartridgeNozzles; ++r, ++nozzle) {
+        if ((six >> bit & 1) != 0) put(burst, nozzle);
+      }
+    }
+  }
+  last_ = static_cast<std::uint32_t>(write_);
+  burst_[last_] = burst;
+  position_[last_] = position;
+  write_ = (write_ + 1) % kBufferSize;
+  update();
+  return {};
+}
+
+// Buffer::ClearAll. What the rows have come to (nextState) stays as it is.
+void Controller::clear_buffer() {
+  std::ranges::fill(burst_, Burst{});
+  std::ranges::fill(position_, 0);
+  read_ = {0, 0};
+  write_ = 1;
+}
+
+// Buffer::ReadLeftSide.
+std::int32_t Controller::read_left(std::uint32_t side) const { return (kBufferSize + write_ - read_[side]) % kBufferSize - 1; }
+
+// Buffer::WriteLeft in the mode of clearing.
+std::int32_t Controller::write_left() const {
+  const auto left = [&](std::uint32_t side) { return (kBufferSize - write_ + read_[side]) % kBufferSize - 2; };
+  return std::min(left(0), left(1));
+}
+
+// PositionSetBaseEncoderPositionMicrons: map() rounds towards zero. Position.ino takes the jump at its next turn.
+void Controller::set_encoder(std::int32_t position_um) {
+  raw_ = static_cast<std::int32_t>(std::int64_t{position_um} * counts_per_inch_ / 25'400);
+  raw_zero_ = raw_;
+  zero_um_ = at_um_;
+  zeroed_ = true;
+  new_row_positions();
+  update();
+}
+
+// PositionUpdate: micrometres of the count, and of both rows.
+void Controller::new_row_positions() {
+  float um = static_cast<float>(raw_) * 25'400.0f;
+  um /= static_cast<float>(counts_per_inch_);
+  base_um_ = static_cast<std::int32_t>(um);
+  current_[1] = static_cast<std::int32_t>(static_cast<float>(kRowGapUm) / 2.0f + static_cast<float>(base_um_));
+  current_[0] = current_[1] - kRowGapUm;
+}
+
+// PositionUpdate: every 50 pulses the direction and the speed.
+void Controller::update_position(int direction) {
+  raw_ += direction;
+  new_row_positions();
+  if (++pulses_ < kSpeedPulses) return;
+  pulses_ = 0;
+  ++measures_;
+  direction_ = (base_um_ > history_um_) - (base_um_ < history_um_);
+  history_um_ = base_um_;
+}
+
+// UpdateAll, as often as lines can follow each other at one place.
+void Controller::update() {
+  for (std::int32_t turn = 0; turn < kBufferSize; ++turn) {
+    const bool changed = update_values();
+    update_burst();
+    if (!changed) return;
+  }
+}
+
+// BufferUpdateValues.
+bool Controller::update_values() {
+  bool changed = false;
+  for (std::uint32_t s = 0; s < 2; ++s) {
+    const bool passed = required_[s] == -1 ? current_[s] < target_[s] : current_[s] > target_[s];
+    if (first_[s] || passed) changed |= update_side(s);
+  }
+  return changed;
+}
+
+bool Controller::update_side(std::uint32_t s) {
+  bool changed = false;
+  if (read_left(s) > 0 && !next_state_[s]) {  // Buffer::Next
+    next_state_[s] = true;
+    read_[s] = (read_[s] + 1) % kBufferSize;
+    get_burst();
+    changed = true;
+  }
+  if (read_left(s) > 0 && next_state_[s]) {  // Buffer::LookAheadPosition
+    const std::int32_t ahead = position_[static_cast<std::uint32_t>((read_[s] + 1) % kBufferSize)];
+    if (first_[s]) {
+      target_[s] = current_[s];
+      first_[s] = false;
+    }
+    required_[s] = ahead - target_[s] >= 0 ? 1 : -1;
+    least_[s] = std::min(ahead, target_[s]);
+    most_[s] = std::max(ahead, target_[s]);
+    target_[s] = ahead;
+    next_state_[s] = false;
+    changed = true;
+  }
+  if (read_left(0) == 0 && read_left(1) == 0) first_ = {true, true};
+  return changed;
+}
+
+// InkjetUpdateBurst: which rows fire, and what.
+void Controller::update_burst() {
+  bool changed = false;
+  for (std::uint32_t s = 0; s < 2; ++s) {
+    const bool on = required_[s] == direction_ && current_[s] > least_[s] && current_[s] < most_[s] && measures_ > 0;
+    changed |= on != active_[s];
+    active_[s] = on;  // Buffer::SetActive
+  }
+  if (changed) get_burst();
+}
+
+// Buffer::GetBurst.
+void Controller::get_burst() {
+  for (std::uint32_t s = 0; s < 2; ++s) {
+    const bool on = active_[s] && print_mode_ != (s == 0 ? 2 : 1);
+    now_[s] = on ? share(burst_[static_cast<std::uint32_t>(read_[s])], s) : Burst{};
+  }
+}
+
+void Controller::fire(double from_um, double to_um, const Watch& watch) const {
+  for (std::uint32_t s = 0; s < 2; ++s) {
+    if (nothing(now_[s])) continue;
+    const double row = s == 1 ? kHalfRowGapUm : -kHalfRowGapUm;
+    watch({s, static_cast<std::uint32_t>(read_[s]), from_um + row, to_um + row, &now_[s], measures_ > 1});
+  }
+}
+
+// Lines of the encoder's strip are taken to lie half a count beside the place where SEP was given.
+void Controller::move(double to_um, const Watch& watch) {
+  const int direction = to_um < at_um_ ? -1 : 1;
+  const auto count_at = [&](double um) { return raw_zero_ + std::llround((um - zero_um_) / count_um()); };
+  const std::int64_t last = count_at(to_um);
+  for (double from = at_um_;;) {
+    update();
+    const bool done = direction > 0 ? raw_ >= last : raw_ <= last;
+    const double until = done ? to_um : zero_um_ + (raw_ - raw_zero_ + 0.5 * direction) * count_um();
+    fire(from, until, watch);
+    if (done) break;
+    from = until;
+    update_position(direction);
+  }
+  at_um_ = to_um;
+  measures_ = 0;  // the speed is 0 after POSITION_STEP_TIMEOUT
+  update();
+}
+
+}  // namespace lamina::replay::hp45

@@ -1,0 +1,250 @@
+// Programs of the dialects hp45 and oasis (stages/write/program/): a host sends G-code to the motion controller and the rest
+// to the HP45 controller, and waits at G4.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <vector>
+
+#include "stages/replay/dialects.h"
+#include "stages/replay/gcode.h"
+#include "stages/replay/hp45/controller.h"
+
+namespace lamina::replay {
+namespace {
+
+constexpr double kFarthestMm = 5000;  // that a head may stand from zero
+constexpr double kBurstsPerInch = 600;
+
+class Hp45Reader {
+ public:
+  Hp45Reader(std::string_view text, Printing& printing, bool oasis)
+      : printing_(printing), reader_(text, printing), axes_(printing, reader_), scan_(printing.profile()), oasis_(oasis) {
+    const double pitch = printing.position_of(1) - printing.position_of(0);
+    step_um_ = std::abs(pitch) * 1000;
+    grows_ = pitch > 0;
+    const double repeat = printing.profile().head.pitch_um * kBurstsPerInch / 25'400;
+    const bool fits =
+        std::abs(repeat - std::round(repeat)) < 1e-3 && printing.nozzles() * repeat < hp45::kCartridgeNozzles + 0.5;
+    repeat_ = repeat > 1.5 && fits ? static_cast<std::uint32_t>(std::lround(repeat)) : 1;
+    words_ = (printing.nozzles() + 63) / 64;
+  }
+
+  void read();
+
+ private:
+  void command(const GcodeLine& line);
+  void move(const GcodeLine& line);
+  void spread(const GcodeLine& line);
+  bool ready();
+  void take_burst();
+  void take_firing(const hp45::Controller::Firing& firing);
+  void end_stretch(std::uint32_t row);
+  void drop(bool sweeping, bool upwards);
+  std::uint64_t drops() const;
+  double step_of(double um) const { return (um / 1000 - printing_.position_of(0)) / (grows_ ? step_um_ : -step_um_) * 1000; }
+
+  Printing& printing_;
+  GcodeReader reader_;
+  Axes axes_;
+  const ScanAxes scan_;
+  hp45::Controller controller_;
+  bool oasis_, grows_ = true, moving_ = false, ended_ = false, spreading_ = false;
+  double step_um_ = 0;
+  std::uint32_t repeat_ = 1, words_ = 1, sweep_ = 0, lines_ = 0;
+  struct Shot {  // of a row: the profile's nozzles, as Printing::fire_words takes them
+    std::int64_t step;
+    hp45::Burst words;
+  };
+  std::vector<Shot> shots_[2];  // of a movement, in its order
+  std::uint64_t hurried_ = 0;   // bursts before the speed was measured
+  struct Stretch {              // of one line of a row
+    std::uint32_t line = 0, steps = 0;
+    double from_um = 0, to_um = 0;
+    bool any = false;
+  } stretch_[2];
+};
+
+void Hp45Reader::read() {
+  GcodeLine line;
+  while (reader_.next(line)) {
+    if (ended_) return reader_.fault("goes on behind BRL");
+    if (line.command == "G4") {
+      if (reader_.number(line, 'P') != 0) return reader_.fault("G4 has P0: the host waits until nothing moves");
+      moving_ = false;
+    } else if (oasis_ && (line.command == "M4" || line.command == "M5")) {
+      spread(line);
+    } else if (line.command[0] == 'G') {
+      move(line);
+    } else {
+      command(line);
+    }
+  }
+  if (!ended_) printing_.fault("the program ends before BRL");
+}
+
+void Hp45Reader::command(const GcodeLine& line) {
+  if (line.command == "SBR" && lines_ == 0) printing_.reading_sweep(sweep_);
+  if (moving_) return reader_.fault(fmt::format("{} is sent while the head may still move; G4 P0 waits for it", line.command));
+  if (line.command == "SBR" && !ready()) return;
+  const std::string wrong = controller_.execute(line.command, line.rest);
+  if (!wrong.empty()) return reader_.fault(wrong);
+  if (line.command == "SBR") {
+    ++lines_;
+    take_burst();
+  } else if (line.command == "BRL") {
+    if (controller_.unread() > 0) {
+      return reader_.fault(fmt::format("{} lines are left that the head has not come to", controller_.unread()));
+    }
+    ended_ = true;
+  }
+}
+
+// Whether lines can be fired as the profile has it: where the head stands, how fine the encoder, how many bursts.
+bool Hp45Reader::ready() {
+  const double encoder = printing_.profile().motion.encoder_dpi, counts = controller_.counts_per_inch();
+  const double density = 100 * 25'400 / (kBurstsPerInch * step_um_);
+  if (!controller_.zeroed()) {
+    reader_.fault("lines come before SEP tells where the head stands");
+  } else if (encoder > 0 && counts != encoder) {
+    reader_.fault(fmt::format("SER has {:g} counts an inch, the machine's encoder {:g}", counts, encoder));
+  } else if (controller_.density() != std::max<std::int64_t>(1, std::llround(density))) {
+    reader_.fault(fmt::format("SDN has {} %, where {:.0f} give a burst a pixel", controller_.density(), density));
+  } else {
+    return true;
+  }
+  return false;
+}
+
+// A line's nozzles have to be those of the profile, all of a group together.
+void Hp45Reader::take_burst() {
+  const hp45::Burst& burst = controller_.last_burst();
+  printing_.reading_step(std::llround(step_of(controller_.true_um(controller_.last_position_um()))));
+  for (std::uint32_t place = 0; place < hp45::kCartridgeNozzles; ++place) {
+    const auto bit = [&](std::uint32_t at) { return (burst[at / 64] >> (63 - at % 64) & 1) != 0; };
+    if (!bit(place)) continue;
+    const std::uint32_t nozzle = place / repeat_;
+    if (nozzle >= printing_.nozzles()) return reader_.fault(fmt::format("nozzle {} does not exist", nozzle));
+    for (std::uint32_t r = 0; r < repeat_; ++r) {
+      if (!bit(nozzle * repeat_ + r)) return reader_.fault(fmt::format("nozzle {} is set in part; SDP is wrong", nozzle));
+    }
+  }
+}
+
+void Hp45Reader::move(const GcodeLine& line) {
+  const bool sweeping = lines_ > 0;
+  const double from = axes_.at(scan_.along), beside = axes_.at(scan_.across);
+  if (!axes_.take(line, sweeping)) {
+    return reader_.fault(fmt::format("'{}' is no command of the dialect {}", line.command, oasis_ ? "oasis" : "hp45"));
+  }
+  if (line.command != "G0" && line.command != "G1") return;
+  moving_ = true;
+  const double to = axes_.at(scan_.along);
+  if (to == from || !printing_.ok()) return;
+  if (std::abs(to) > kFarthestMm) return reader_.fault("moves out of the machine");
+  const bool upwards = (to > from) == grows_;
+  if (sweeping) {
+    printing_.begin_sweep(sweep_++, !upwards);
+    if (axes_.at(scan_.across) != beside) return reader_.fault("moves across while it fires");
+    printing_.go_across(axes_.at(scan_.across));
+  }
+  for (auto& shots : shots_) shots.clear();
+  hurried_ = 0;
+  controller_.move(to * 1000, [&](const hp45::Controller::Firing& firing) { take_firing(firing); });
+  end_stretch(0);
+  end_stretch(1);
+  drop(sweeping, upwards);
+  lines_ = 0;
+}
+
+// The steps whose places a row passes, once each.
+void Hp45Reader::take_firing(const hp45::Controller::Firing& firing) {
+  Stretch& now = stretch_[firing.row];
+  if (now.any && (now.line != firing.line || std::abs(firing.from_um - now.to_um) > 1e-3)) end_stretch(firing.row);
+  if (!now.any) now = {firing.line, 0, firing.from_um, firing.to_um, true};
+  now.to_um = firing.to_um;
+  if (!firing.steady) ++hurried_;
+  const double from = step_of(firing.from_um), to = step_of(firing.to_um);
+  const auto first = static_cast<std::int64_t>(std::ceil(std::min(from, to)));
+  const auto end = static_cast<std::int64_t>(std::ceil(std::max(from, to)));
+  const bool upwards = to > from;
+  for (std::int64_t k = 0; k < end - first; ++k, ++now.steps) {
+    const std::int64_t step = upwards ? first + k : end - 1 - k;
+    Shot shot{step, {}};
+    if (repeat_ == 1) shot.words = *firing.burst;
+    for (std::uint32_t place = 0; repeat_ > 1 && place < printing_.nozzles() * repeat_; ++place) {
+      const std::uint32_t nozzle = place / repeat_;
+      shot.words[nozzle / 64] |= ((*firing.burst)[place / 64] >> (63 - place % 64) & 1) << (63 - nozzle % 64);
+    }
+    shots_[firing.row].push_back(shot);
+  }
+}
+
+// A line that is on for less than a step may fire or not: the firmware's bursts come by the clock.
+void Hp45Reader::end_stretch(std::uint32_t row) {
+  Stretch& now = stretch_[row];
+  if (now.any && now.steps == 0) {
+    printing_.reading_step(std::llround(step_of(now.from_um)));
+    printing_.fault(fmt::format("nozzles are on for {:.0f} um, between two steps", std::abs(now.to_um - now.from_um)));
+  }
+  now = {};
+}
+
+std::uint64_t Hp45Reader::drops() const {
+  std::uint64_t all = 0;
+  for (const auto& shots : shots_) {
+    for (const Shot& shot : shots) {
+      for (const std::uint64_t word : shot.words) all += static_cast<std::uint64_t>(std::popcount(word));
+    }
+  }
+  return all;
+}
+
+void Hp45Reader::drop(bool sweeping, bool upwards) {
+  if (!printing_.ok()) return;
+  if (!sweeping) {
+    if (const std::uint64_t all = drops(); all > 0) printing_.fault(fmt::format("{} drops fall while the head travels", all));
+    return;
+  }
+  if (hurried_ > 0) {
+    return printing_.fault(
+        "nozzles are on before the encoder has told the speed, 100 counts after rest; the run-up is too short");
+  }
+  std::vector<std::uint64_t> words(words_);
+  for (std::size_t odd = 0, even = 0; printing_.ok() && odd + even < shots_[0].size() + shots_[1].size();) {
+    const Shot* const a = odd < shots_[0].size() ? &shots_[0][odd] : nullptr;
+    const Shot* const b = even < shots_[1].size() ? &shots_[1][even] : nullptr;
+    const std::int64_t step = a == nullptr   ? b->step
+                              : b == nullptr ? a->step
+                              : upwards      ? std::min(a->step, b->step)
+                                             : std::max(a->step, b->step);
+    const bool has_a = a != nullptr && a->step == step, has_b = b != nullptr && b->step == step;
+    for (std::uint32_t w = 0; w < words_; ++w) words[w] = (has_a ? a->words[w] : 0) | (has_b ? b->words[w] : 0);
+    odd += has_a;
+    even += has_b;
+    printing_.at_step(step);
+    printing_.fire_words(words);
+  }
+}
+
+// The spreader turns on the gantry, which spreads on its way to the far end.
+void Hp45Reader::spread(const GcodeLine& line) {
+  const auto& powder = printing_.profile().powder;
+  if (line.command == "M5") {
+    if (!spreading_) return reader_.fault("M5 stops a spreader that does not turn");
+    printing_.roller_stands_at(axes_.at(powder.roller_axis));
+    printing_.roller_stands_at(powder.roller_mm[0]);  // it does not touch the powder on the way back
+  } else if (std::abs(axes_.at(powder.roller_axis) - powder.roller_mm[0]) > 1e-3) {
+    return reader_.fault(
+        fmt::format("the spreader starts at {:g} mm, not at {:g}", axes_.at(powder.roller_axis), powder.roller_mm[0]));
+  }
+  spreading_ = line.command == "M4";
+}
+
+}  // namespace
+
+void read_hp45(std::string_view text, Printing& printing) { Hp45Reader(text, printing, false).read(); }
+void read_oasis(std::string_view text, Printing& printing) { Hp45Reader(text, printing, true).read(); }
+
+}  // namespace lamina::replay

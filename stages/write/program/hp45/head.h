@@ -1,0 +1,35 @@
+// stages/write/program/hp45/head.h: lines for the HP45 controller V4, as its hosts send them; see the README here.
+#pragma once
+
+#include "stages/write/program/dialect.h"
+#include "stages/write/program/program_text.h"
+
+namespace lamina::write::hp45 {
+
+/// Whether the controller can jet the machine's images.
+/// errors  kUsage: rows of its own, lags in ticks, more steps than its buffer holds, an encoder too coarse for its pixels
+Status check(const Machine& machine, const HeadGrid& grid);
+
+/// Spells what the controller needs; the motion between is G-code.
+class Head {
+ public:
+  Head(const Machine& machine, const HeadGrid& grid);
+
+  /// Mode of position, encoder, resolution, density, sides and buffer: whatever a layer needs, so that it can be sent alone.
+  void settings(ProgramBytes& out) const;
+  /// Moves to the start, waits, sends the lines and moves over them.
+  void sweep(const Sweep& sweep, const SweepVectors& vectors, ProgramBytes& out) const;
+  /// The host goes on when all movements have ended.
+  static void wait(ProgramBytes& out) { put(out, "G4 P0\n"); }
+
+ private:
+  void line(double encoder_um, const std::uint64_t* words, std::uint32_t count, ProgramBytes& out) const;
+
+  const Machine& machine_;
+  const HeadGrid& grid_;
+  Carriage carriage_;
+  std::uint32_t counts_;  // of the encoder, an inch
+  std::uint32_t repeat_;  // nozzles of the cartridge a nozzle of the profile
+};
+
+}  // namespace lamina::write::hp45

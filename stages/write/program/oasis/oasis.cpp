@@ -1,0 +1,74 @@
+#include "stages/write/program/oasis/oasis.h"
+
+#include "stages/write/program/hp45/head.h"
+#include "stages/write/program/program_text.h"
+
+namespace lamina::write::oasis {
+namespace {
+
+// SerialGRBL.py: how far pistons go down before they come up, and how far they stay below the spreader's way afterwards.
+constexpr double kHysteresisMm = 1, kClearanceMm = 0.25;
+
+class Writer final : public ProgramWriter {
+ public:
+  Writer(const Machine& machine, const HeadGrid& grid) : machine_(machine), head_(machine, grid) {}
+
+  void start(std::uint32_t, ProgramBytes& out) override {
+    const auto& motion = machine_.motion;
+    put(out, "$h\nG92 {}{} {}{}\n", motion.x_axis, mm_text(motion.safe_mm[0]), motion.y_axis, mm_text(motion.safe_mm[1]));
+    put(out, "G21\nG90\nG92 {}0 {}0\n", machine_.powder.build_axis, machine_.powder.feed_axes[0]);
+  }
+  void begin_layer(const LayerCycle& cycle, ProgramBytes& out) override;
+  void sweep(const Sweep& sweep, const SweepVectors& vectors, ProgramBytes& out) override { head_.sweep(sweep, vectors, out); }
+  void end_layer(const LayerCycle&, ProgramBytes& out) override { put(out, "BRL\n"); }
+  void end(ProgramBytes& out) override {
+    const auto& motion = machine_.motion;
+    put(out, "BCL\nG1 {}{} {}{} F{}\n", motion.x_axis, mm_text(motion.safe_mm[0]), motion.y_axis, mm_text(motion.safe_mm[1]),
+        feed_text(motion.travel_speed_mm_s));
+  }
+
+ private:
+  void build_to(double mm, ProgramBytes& out) const {
+    put(out, "G1 {}{} F{}\n", machine_.powder.build_axis, mm_text(machine_.powder.build_sign * mm),
+        feed_text(machine_.powder.vat_speed_mm_s));
+  }
+  void feed_by(double up_mm, ProgramBytes& out) const {
+    put(out, "G1 {}{} F{}\n", machine_.powder.feed_axes[0], mm_text(machine_.powder.feed_sign * up_mm),
+        feed_text(machine_.powder.vat_speed_mm_s));
+  }
+  const Machine& machine_;
+  hp45::Head head_;
+};
+
+// SerialGRBL.py, NewLayer: the gantry to the back, pistons to their places, the spreader to the front, pistons down clear.
+// The build piston's places are absolute here, so that a layer does not depend on those before it.
+void Writer::begin_layer(const LayerCycle& cycle, ProgramBytes& out) {
+  const auto& powder = machine_.powder;
+  const auto& motion = machine_.motion;
+  const auto mm_of = [](std::int64_t nm) { return static_cast<double>(nm) / kNmPerMm; };
+  const double bottom = mm_of(cycle.bottom_nm), top = mm_of(cycle.bottom_nm + cycle.thickness_nm);
+  head_.settings(out);
+  put(out, "G1 {}{} {}{} F{}\n", powder.roller_axis, mm_text(powder.roller_mm[0]), motion.y_axis,
+      mm_text(motion.safe_mm[1] - 5), feed_text(motion.travel_speed_mm_s));
+  build_to(bottom + kHysteresisMm, out);
+  build_to(top - kClearanceMm, out);
+  put(out, "G91\n");
+  feed_by(-kHysteresisMm, out);
+  feed_by(powder.dose * mm_of(cycle.thickness_nm) + kClearanceMm + kHysteresisMm, out);
+  put(out, "G90\nM4\nG1 {}{} F{}\nM5\n", powder.roller_axis, mm_text(powder.roller_mm[1]), feed_text(powder.roller_speed_mm_s));
+  build_to(top - kClearanceMm + kHysteresisMm, out);
+  build_to(top, out);
+  put(out, "G91\n");
+  feed_by(-kHysteresisMm, out);
+  feed_by(kHysteresisMm - kClearanceMm, out);
+  put(out, "G90\n");
+  hp45::Head::wait(out);
+}
+
+}  // namespace
+
+std::unique_ptr<ProgramWriter> make_writer(const Machine& machine, const HeadGrid& grid) {
+  return std::make_unique<Writer>(machine, grid);
+}
+
+}  // namespace lamina::write::oasis
