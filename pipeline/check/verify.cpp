@@ -4,8 +4,8 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <cstdlib>
 #include <filesystem>
-#include <mutex>
 #include <optional>
 
 #include "pipeline/check/job_files.h"
@@ -28,13 +28,19 @@ struct Inspection {
   const ManifestHead& head;
   bool quick;
   std::optional<replay::VirtualMachine> machine;  // if there are programs to replay
-  std::mutex adding;
   VerifyReport& report;
+};
+
+/// What is found in a layer.
+struct Finding {
+  std::string fault;                   // empty, or the first one
+  std::optional<replay::Count> count;  // of its replayed program
 };
 
 // Empty, or the fault of a layer's print program. A program with the wrong hash is still replayed, because the replay
 // locates the difference.
-std::string fault_of_program(Inspection& inspection, const LayerRecord& record, const RunsView* image) {
+std::string fault_of_program(const Inspection& inspection, const LayerRecord& record, const RunsView* image,
+                             std::optional<replay::Count>& count) {
   const std::string name = program_file_name(record.layer.index, inspection.head.program_extension);
   if (name.empty()) return {};
   const std::string path = (fs::path(inspection.directory) / name).string();
@@ -50,6 +56,10 @@ std::string fault_of_program(Inspection& inspection, const LayerRecord& record, 
     if (same && replay->drops != record.program.drops) {
       return fmt::format("{}: {} drops, the manifest says {}", name, replay->drops, record.program.drops);
     }
+    const std::int64_t told = record.program.microseconds;
+    if (same && told > 0 && std::abs(replay->microseconds - told) > 1) {
+      return fmt::format("{}: takes {:.6f} s, the manifest says {:.6f}", name, replay->seconds(), 1e-6 * static_cast<double>(told));
+    }
     if (same && !inspection.head.materials.empty()) {
       std::vector<std::uint64_t> set;
       std::vector<std::uint32_t> vats;
@@ -61,9 +71,7 @@ std::string fault_of_program(Inspection& inspection, const LayerRecord& record, 
                            replay::vats_text(wanted));
       }
     }
-    const std::lock_guard lock(inspection.adding);
-    inspection.report.replay.add(*replay);
-    ++inspection.report.replayed;
+    count = *replay;
   }
   return same ? std::string()
               : fmt::format("{}: layer {}: its content is not what was written{}", name, record.layer.index,
@@ -82,8 +90,8 @@ std::string fault_of_image(const Inspection& inspection, const LayerImageFile& f
   return {};
 }
 
-std::string fault_of_layer(Inspection& inspection, const LayerRecord& record) {
-  if (inspection.head.extension.empty()) return fault_of_program(inspection, record, nullptr);  // a format without files
+std::string fault_of_layer(const Inspection& inspection, const LayerRecord& record, std::optional<replay::Count>& count) {
+  if (inspection.head.extension.empty()) return fault_of_program(inspection, record, nullptr, count);  // a format without files
   Runs whole;  // the set pixels of all materials together
   for (const LayerImageFile& file : layer_images(inspection.head, record)) {
     std::string fault = fault_of_file(inspection.directory, file.name, file.record.hash, file.record.bytes);
@@ -92,7 +100,7 @@ std::string fault_of_layer(Inspection& inspection, const LayerRecord& record) {
     if (std::string what = fault_of_image(inspection, file, whole); !what.empty()) return what;
   }
   const RunsView view = whole;
-  return fault_of_program(inspection, record, inspection.quick ? nullptr : &view);
+  return fault_of_program(inspection, record, inspection.quick ? nullptr : &view, count);
 }
 
 // Restores the machine that the programs were written for.
@@ -121,24 +129,28 @@ void finish_replay(const Inspection& inspection) {
 }
 
 void check_layers(const std::string& directory, const Manifest& manifest, bool quick, VerifyReport& report) {
-  Inspection inspection{directory, manifest.head, quick, std::nullopt, {}, report};
+  Inspection inspection{directory, manifest.head, quick, std::nullopt, report};
   if (!manifest.head.machine.empty()) {
     prepare_replay(inspection);
     check_frame(directory, manifest.head, report);
   }
-  // In chunks, so that messages stay in layer order without a string for each of a hundred thousand layers.
+  // In chunks, so that messages and sums stay in layer order without a string for each of a hundred thousand layers.
   constexpr std::size_t kPiece = 1024;
-  std::vector<std::string> faults(std::min(kPiece, manifest.layers.size()));
+  std::vector<Finding> found(std::min(kPiece, manifest.layers.size()));
   for (std::size_t first = 0; first < manifest.layers.size(); first += kPiece) {
     const std::size_t count = std::min(kPiece, manifest.layers.size() - first);
-    tbb::parallel_for(std::size_t{0}, count,
-                      [&](std::size_t i) { faults[i] = fault_of_layer(inspection, manifest.layers[first + i]); });
+    tbb::parallel_for(std::size_t{0}, count, [&](std::size_t i) {
+      found[i].count.reset();
+      found[i].fault = fault_of_layer(inspection, manifest.layers[first + i], found[i].count);
+    });
     for (std::size_t i = 0; i < count; ++i) {
       const LayerRecord& record = manifest.layers[first + i];
       report.bytes += record.bytes + record.program.bytes;
       report.moved += record.program.moved;
       report.lost += record.program.lost;
-      if (!faults[i].empty()) report.add(std::move(faults[i]));
+      if (found[i].count) report.replay.add(*found[i].count);
+      report.replayed += found[i].count.has_value();
+      if (!found[i].fault.empty()) report.add(std::move(found[i].fault));
     }
   }
   report.layers += manifest.layers.size();
@@ -180,28 +192,6 @@ void check_strays(const std::string& directory, const std::vector<Manifest>& man
   });
   std::sort(strays.begin(), strays.end());
   for (const std::string& name : strays) report.add(fmt::format("{}: no manifest names it", name));
-}
-
-/// Faults for the shards that are missing; none where a manifest of the whole job is there. `files` are those of `manifests`.
-void check_shards(const std::vector<ManifestFile>& files, const std::vector<Manifest>& manifests, VerifyReport& report) {
-  if (manifests.empty() || std::ranges::any_of(files, [](const ManifestFile& file) { return !file.shard; })) return;
-  std::uint32_t next = 0, layer = 0;
-  const auto [ignored, count] = *files.front().shard;
-  const auto missing = [&, of = count](std::uint32_t last, std::uint32_t last_layer) {
-    if (next == last) return;
-    const std::string which = next + 1 == last ? fmt::format("shard {}/{} is", last, of)
-                                               : fmt::format("shards {}/{} to {}/{} are", next + 1, of, last, of);
-    report.add(fmt::format("layers: {} missing, with layers {} to {}; run what is missing, or join directories by lamina merge",
-                           which, layer, std::max(layer + 1, last_layer) - 1));
-  };
-  for (std::size_t i = 0; i < files.size(); ++i) {
-    const auto [index, of] = *files[i].shard;
-    if (of != count) return report.add(fmt::format("{}: is of another division than {}", files[i].name, files[0].name));
-    missing(index, manifests[i].head.first_layer);
-    next = std::max(next, index + 1);
-    layer = manifests[i].head.last_layer;
-  }
-  missing(count, manifests[0].head.layer_count);
 }
 
 VerifyReport verify_paths(const std::string& name, const std::string& directory, const Manifest& manifest) {
@@ -253,7 +243,8 @@ Result<VerifyReport> verify(const std::string& directory, const VerifyOptions& o
     return Error{Fault::kVerification, fmt::format("{}: holds no manifest.json; it is no finished job", directory)};
   }
   std::vector<Manifest> manifests;
-  std::vector<ManifestFile> of_job;
+  std::vector<ShardRange> shards;
+  bool whole_job = false;  // a manifest of it is there
   bool interrupted = false;
   for (const ManifestFile& file : files) {
     Result<Manifest> manifest = read_manifest((fs::path(directory) / file.name).string());
@@ -270,13 +261,14 @@ Result<VerifyReport> verify(const std::string& directory, const VerifyOptions& o
                      : fmt::format("{}: job was interrupted after layer {}; run again with --resume", file.name,
                                    manifest->layers.back().layer.index));
     }
+    whole_job |= !file.shard;
+    if (file.shard) shards.push_back({file.name, *file.shard, manifest->head.first_layer, manifest->head.last_layer});
     manifests.push_back(std::move(*manifest));
-    of_job.push_back(file);
   }
   for (const Manifest& manifest : manifests) check_layers(directory, manifest, options.quick, report);
   // An interrupted run may have finished layers without a line in its manifest.
   if (!interrupted) check_strays(directory, manifests, report);
-  check_shards(of_job, manifests, report);
+  if (!whole_job && !manifests.empty()) check_shards(shards, manifests[0].head.layer_count, report);
   return report;
 }
 

@@ -52,7 +52,8 @@ ManifestHead image_head(const Plan& plan) {
 ImageFiles::ImageFiles(const Plan& plan)
     : plan_(plan), head_(image_head(plan)), format_(*write::find_image_format(plan.job.format)) {
   if (plan.images->machine)
-    program_.emplace(*plan.images->machine, plan.job.output, plan.layer_count, layer_file_options(plan.job));
+    program_.emplace(*plan.images->machine, plan.job.dry_run ? "" : plan.job.output, plan.layer_count,
+                     layer_file_options(plan.job));
 }
 
 Status ImageFiles::open() {
@@ -134,9 +135,13 @@ Status ImageFiles::store(const Runs& whole, Work& work, LayerRecord& record) con
     const write::Bytes& file = head_.materials.empty() ? work.file : work.files[m];
     if (Status status = write::write_file(plan_.job.output + "/" + images[m].name, file, how); !status) return status;
   }
+  return program(whole, work, record);
+}
+
+Status ImageFiles::program(const Runs& whole, Work& work, LayerRecord& record) const {
   if (!program_) return {};
   std::vector<std::uint64_t> pixels;
-  for (const LayerImageFile& image : images) pixels.push_back(image.record.set_pixels);
+  for (const LayerImageFile& image : layer_images(head_, record)) pixels.push_back(image.record.set_pixels);
   const auto feeds = vats_of_layer(plan_.images->machine->machine, plan_.images->materials, pixels);
   if (!feeds) {
     return Error{feeds.error().fault, fmt::format("layer {} (z {:.3f} mm): {}", record.layer.index, mm(record.layer.plane()),

@@ -51,6 +51,8 @@ class ImageFiles {
   Status encode(const Runs& whole, std::span<const Runs> materials, Work& work, LayerRecord& record) const;
   /// errors  kOutput; kUsage: the machine cannot feed the layer
   Status store(const Runs& whole, Work& work, LayerRecord& record) const;
+  /// The print program alone; of a dry run it is only timed.
+  Status program(const Runs& whole, Work& work, LayerRecord& record) const;
   /// Upper bound of the bytes for a layer whose image has that many changes.
   std::uint64_t bytes_bound(std::uint64_t changes) const;
 

@@ -175,18 +175,20 @@ std::optional<Shard> whole_job(const std::vector<std::string>& directories, cons
 }
 
 /// shards  that cover all layers, in their order
-Status judge(std::span<const Shard> shards, bool strict, bool allow_empty, std::vector<Warning>& warnings) {
+Status judge(std::span<const Shard> shards, bool strict, bool allow_empty, MergeReport& report) {
   const ManifestHead& head = shards.front().manifest.head;
   Job job;
   if (Status status = read_job_text(head.job_toml, shards.front().path, job); !status) return unmatched(status.error().message);
   sanity::LayerRecords records;
   for (const Shard& shard : shards) {
-    for (const LayerRecord& record : shard.manifest.layers)
+    for (const LayerRecord& record : shard.manifest.layers) {
       records.add(record.layer, record.set_pixels, record.program.lost, record.capped_rows);
+      report.microseconds += record.program.microseconds;
+    }
   }
   const bool thins = fills(job) || job.dose.core < 1;
-  const Status status = records.judge(head.parts, thins, allow_empty, warnings);
-  return status && strict ? sanity::refuse_warnings(warnings) : status;
+  const Status status = records.judge(head.parts, thins, allow_empty, report.warnings);
+  return status && strict ? sanity::refuse_warnings(report.warnings) : status;
 }
 
 }  // namespace
@@ -198,7 +200,7 @@ Result<MergeReport> merge(const MergeRequest& request) {
   MergeReport report;
   report.output = output;
   if (const auto whole = whole_job(request.directories, *shards, output)) {
-    if (Status status = judge({&*whole, 1}, request.strict, true, report.warnings); !status) return status.error();
+    if (Status status = judge({&*whole, 1}, request.strict, true, report); !status) return status.error();
     if (Status status = bring_files(*whole, output, report); !status) return status.error();
     if (Status status = end_earlier_merge(output); !status) return status.error();
     report.layers = whole->manifest.layers.size();
@@ -206,7 +208,7 @@ Result<MergeReport> merge(const MergeRequest& request) {
   }
   if (shards->empty()) return unmatched(fmt::format("{}: holds no manifest of a shard", request.directories.front()));
   if (Status status = check_coverage(*shards); !status) return status.error();
-  const Status sane = judge(*shards, request.strict, request.allow_empty, report.warnings);
+  const Status sane = judge(*shards, request.strict, request.allow_empty, report);
   if (!sane) return sane.error();
 
   std::error_code error;

@@ -6,6 +6,7 @@
 
 #include "pipeline/machine/profiles.h"
 #include "stages/write/file.h"
+#include "stages/write/program/binary_program.h"
 
 namespace lamina::pipeline {
 
@@ -27,7 +28,8 @@ PrintProgram::PrintProgram(const ResolvedMachine& resolved, std::string director
       dialect_(*write::find_dialect(resolved.machine.dialect)),
       directory_(std::move(directory)),
       layers_(layers),
-      files_(files) {}
+      files_(files),
+      machine_(replay::VirtualMachine::build(resolved.machine, resolved.grid.image.columns(), resolved.grid.image.rows())) {}
 
 std::string PrintProgram::path(std::string_view name) const { return fmt::format("{}/program/{}", directory_, name); }
 
@@ -43,34 +45,49 @@ Status PrintProgram::begin() const {
 
 Status PrintProgram::write_layer(const Layer& layer, const RunsView& image, const std::vector<std::uint32_t>& feeds,
                                  ProgramWork& work, ProgramRecord& record) const {
+  if (!machine_) return machine_.error();
   if (!work.writer) work.writer = dialect_.make_writer(resolved_.machine, resolved_.grid);
-  write::FileOptions how = files_;
-  how.hash = true;
-  auto file = write::File::open(directory_ + "/" + program_file_name(layer.index, dialect_.extension), how);
-  if (!file) return file.error();
-  LayerCycle cycle;
-  cycle.layer = layer.index;
-  cycle.layers = layers_;
-  cycle.bottom_nm = layer.bottom;
-  cycle.thickness_nm = layer.thickness;
-  cycle.feeds = feeds;
+  if (!work.timer) work.timer.emplace(*machine_);
+  std::optional<write::File> file;  // none: the layer is only timed
+  if (!directory_.empty()) {
+    write::FileOptions how = files_;
+    how.hash = true;
+    auto opened = write::File::open(directory_ + "/" + program_file_name(layer.index, dialect_.extension), how);
+    if (!opened) return opened.error();
+    file.emplace(std::move(*opened));
+  }
+  const LayerCycle cycle{layer.index, layers_, layer.bottom, layer.thickness, feeds};
+  const auto flush = [&]() -> Status {
+    if (dialect_.has_motion) work.timer->read(work.text);
+    Status status = file ? file->append(work.text) : Status();
+    work.text.clear();
+    return status;
+  };
   work.text.clear();
+  work.timer->begin(layer);
   work.writer->begin_layer(cycle, work.text);
   constexpr std::size_t kPiece = 256 << 10;
   const auto count =
       program::compile(resolved_.grid, image, work.compile, [&](const Sweep& sweep, const SweepVectors& vectors) -> Status {
-        work.writer->sweep(sweep, vectors, work.text);
-        if (work.text.size() < kPiece) return {};
-        Status status = file->append(work.text);
-        work.text.clear();
-        return status;
+        if (!dialect_.has_motion) {
+          const std::int64_t low = vectors.first_step, high = low + vectors.steps - 1;
+          work.timer->sweep(static_cast<double>(write::across_nm(resolved_.machine, resolved_.grid, sweep.first_line)) / 1e6,
+                            sweep.backward, sweep.backward ? high : low, sweep.backward ? low : high);
+        }
+        if (file || dialect_.has_motion) work.writer->sweep(sweep, vectors, work.text);
+        return work.text.size() < kPiece ? Status() : flush();
       });
   if (!count) return count.error();
   work.writer->end_layer(cycle, work.text);
-  if (Status status = file->append(work.text); !status) return status;
+  if (Status status = flush(); !status) return status;
+  const auto taken = work.timer->end();
+  if (!taken) return taken.error();
+  record = {0, {}, count->sweeps - count->skipped, count->drops, count->moved, count->lost, *taken};
+  if (!file) return {};
   const auto digest = file->finish();
   if (!digest) return digest.error();
-  record = {digest->bytes, digest->hash, count->sweeps - count->skipped, count->drops, count->moved, count->lost};
+  record.bytes = digest->bytes;
+  record.hash = digest->hash;
   return {};
 }
 
@@ -79,7 +96,9 @@ std::uint64_t PrintProgram::bytes_bound(std::uint64_t changes) const {
   // A sweep's vectors with their text of at most three times the size, lines, sorted changes and their steps.
   const std::uint64_t vectors = grid.steps() * grid.words() * 8;
   const std::uint64_t turned = grid.scan_axis == ScanAxis::kX ? 4 * changes : 16 * changes;
-  return 4 * vectors + 4 * grid.steps() + 16 * grid.lines + 2 * changes + turned + (512 << 10);
+  // The timer keeps a layer's text, but for vectors of nuferbj.
+  const std::uint64_t kept = !dialect_.has_motion || dialect_.id == "nuferbj" ? 0 : grid.swaths(0) * grid.passes * 3 * vectors;
+  return 4 * vectors + 4 * grid.steps() + 16 * grid.lines + 2 * changes + turned + kept + (512 << 10);
 }
 
 }  // namespace lamina::pipeline

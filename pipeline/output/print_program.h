@@ -9,6 +9,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
 
@@ -18,6 +19,7 @@
 #include "stages/data/runs.h"
 #include "stages/data/status.h"
 #include "stages/program/compile.h"
+#include "stages/replay/time/timer.h"
 #include "stages/write/file.h"
 #include "stages/write/manifest/manifest.h"
 #include "stages/write/program/dialect.h"
@@ -29,8 +31,9 @@ struct ProgramWork {
   program::CompileScratch compile;
   std::unique_ptr<write::ProgramWriter> writer;
   write::ProgramBytes text;
+  std::optional<replay::Timer> timer;
 
-  std::uint64_t bytes() const { return compile.bytes() + bytes_held(text); }
+  std::uint64_t bytes() const { return compile.bytes() + bytes_held(text) + (timer ? timer->bytes() : 0); }
 };
 
 /// The file of a layer's program in a job's directory, program/000042.gcode; "" without a machine.
@@ -44,13 +47,13 @@ ProgramFrame program_frame(const ResolvedMachine& resolved, std::uint32_t layers
 
 class PrintProgram {
  public:
-  /// directory  of the job; the machine must outlive this object
+  /// directory  of the job, empty to time layers without writing them; the machine must outlive this object
   PrintProgram(const ResolvedMachine& resolved, std::string directory, std::uint32_t layers, const write::FileOptions& files);
 
   /// Writes machine.toml, start and end. errors  kOutput
   Status begin() const;
 
-  /// Compiles a layer and writes its file, sweep by sweep. errors  kOutput
+  /// Compiles a layer, times it and writes its file, sweep by sweep. errors  kOutput
   /// feeds  the vats that feed the layer
   Status write_layer(const Layer& layer, const RunsView& image, const std::vector<std::uint32_t>& feeds, ProgramWork& work,
                      ProgramRecord& record) const;
@@ -65,6 +68,7 @@ class PrintProgram {
   std::string directory_;
   std::uint32_t layers_;
   write::FileOptions files_;
+  Result<replay::VirtualMachine> machine_;  // tells the time
 };
 
 }  // namespace lamina::pipeline

@@ -3,9 +3,11 @@
 #include <fmt/format.h>
 
 #include <nlohmann/json.hpp>
+#include <numeric>
 
 #include "stages/data/text/number_text.h"
 #include "stages/data/text/readable.h"
+#include "stages/replay/time/totals.h"
 #include "stages/sanity/records.h"
 #include "stages/sanity/rows.h"
 
@@ -25,6 +27,11 @@ class ImageMaker : public Maker {
   }
 
   Result<std::vector<std::uint32_t>> open() override {
+    if (plan_.job.dry_run) {
+      std::vector<std::uint32_t> all(plan_.range[1] - plan_.range[0]);
+      std::iota(all.begin(), all.end(), plan_.range[0]);
+      return all;
+    }
     if (Status status = files_.open(); !status) return status.error();
     return files_.take_todo();
   }
@@ -56,6 +63,12 @@ class ImageMaker : public Maker {
       imager_.dose(layer, work.images, made.record);
       return Status();
     });
+    if (plan_.job.dry_run) {
+      add("program", [this](const Layer&, Work& work, Made& made) {
+        return files_.program(work.images.runs, work.files, made.record);
+      });
+      return steps;
+    }
     add("encode", [this](const Layer&, Work& work, Made& made) {
       return files_.encode(work.images.runs, work.images.materials.image, work.files, made.record);
     });
@@ -67,7 +80,9 @@ class ImageMaker : public Maker {
 
   Status record(std::uint32_t, const Ticket& ticket) override {
     const Made& made = made_[ticket.record];
-    if (Status status = files_.record(made.record); !status) return status;
+    if (!plan_.job.dry_run) {
+      if (Status status = files_.record(made.record); !status) return status;
+    }
     add(made.record);
     sanity_.record(made.record.layer.index, made.record.set_pixels > 0);
     const raster::LayerReport& report = made.notes.report;
@@ -88,9 +103,13 @@ class ImageMaker : public Maker {
   std::uint64_t bytes_held(std::uint32_t work) const override { return work_[work].images.bytes() + work_[work].files.bytes(); }
   void let_go(std::uint32_t work) override { work_[work] = Work(); }
 
-  Status finish() override { return files_.finish(); }
-  Status stop(bool) override { return files_.keep(); }
-  void discard() override { files_.discard(); }
+  bool times_dry_runs() const override { return plan_.images->machine.has_value(); }
+  bool keeps() const override { return !plan_.job.dry_run; }
+  Status finish() override { return plan_.job.dry_run ? Status() : files_.finish(); }
+  Status stop(bool) override { return plan_.job.dry_run ? Status() : files_.keep(); }
+  void discard() override {
+    if (!plan_.job.dry_run) files_.discard();
+  }
 
   void warn(const Summary&, std::vector<Warning>& warnings) const override;
   void tell(Summary& summary) const override;
@@ -110,6 +129,7 @@ class ImageMaker : public Maker {
     set_pixels_ += record.set_pixels;
     moved_pixels_ += record.program.moved;
     lost_pixels_ += record.program.lost;
+    microseconds_ += record.program.microseconds;
     for (std::size_t m = 0; m < record.images.size(); ++m) materials_[m].second += record.images[m].set_pixels;
     const double pixel_mm2 = 25.4 * 25.4 / (grid.x.dpi() * grid.y.dpi());
     volume_mm3_ += static_cast<double>(record.set_pixels) * pixel_mm2 * mm(record.layer.thickness);
@@ -125,6 +145,7 @@ class ImageMaker : public Maker {
   sanity::RowWarnings rows_;
   std::uint64_t set_pixels_ = 0, moved_pixels_ = 0, lost_pixels_ = 0, solid_pixels_ = 0, bead_pixels_ = 0, capped_rows_ = 0;
   std::uint64_t bytes_written_ = 0;
+  std::int64_t microseconds_ = 0;  // of the machine
   double volume_mm3_ = 0;
   std::vector<std::pair<std::string, std::uint64_t>> materials_;  // name, set pixels
 };
@@ -141,6 +162,7 @@ void ImageMaker::tell(Summary& summary) const {
   const double pixels = static_cast<double>(grid.columns()) * grid.rows() * summary.layers_planned;
   const double pixels_a_second = summary.layer_seconds > 0 ? pixels / summary.layer_seconds : 0;
   const bool several = plan_.images->materials.several();
+  const double print_seconds = static_cast<double>(microseconds_) * 1e-6;
   summary.bytes_written = bytes_written_;
   summary.volume_mm3 = volume_mm3_;
 
@@ -154,6 +176,7 @@ void ImageMaker::tell(Summary& summary) const {
   if (several) {
     for (const auto& [name, count] : materials_) result("", fmt::format("{} of {}", readable_count(count), name));
   }
+  if (microseconds_ > 0) result("printing", replay::time_text(print_seconds, plan_.images->machine->machine.name));
   if (!summary.dry_run) {
     end("rate", fmt::format("{:.2f} Gpx/s, {:.1f} layers/s", pixels_a_second / 1e9,
                             summary.layer_seconds > 0 ? summary.layers_planned / summary.layer_seconds : 0));
@@ -172,6 +195,7 @@ void ImageMaker::tell(Summary& summary) const {
     facts["porosity"] = porosity;
   }
   if (plan_.images->machine) {
+    facts["print_seconds"] = print_seconds;
     facts["moved_pixels"] = moved_pixels_;
     facts["lost_pixels"] = lost_pixels_;
   }

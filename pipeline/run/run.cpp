@@ -184,7 +184,7 @@ Result<Summary> run(Resolved resolved, const ProgressCallback& progress, const s
   Summary summary = summary_of(*plan);
   Sanity sanity(*plan, cancel);
   const std::unique_ptr<Maker> maker = make_maker(*plan, sanity, limits);
-  if (job.dry_run) {
+  if (job.dry_run && !maker->times_dry_runs()) {
     for (std::uint32_t i = plan->range[0]; i < plan->range[1]; ++i) {
       summary.peak_layer_bytes = std::max(summary.peak_layer_bytes, maker->bytes_of(i));
     }

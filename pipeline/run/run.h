@@ -13,7 +13,8 @@
 
 namespace lamina::pipeline {
 
-/// Runs a job and writes job.output. A dry run ends before the first layer with the summary's estimates.
+/// Runs a job and writes job.output. A dry run ends before the first layer with the summary's estimates;
+/// with a powder printer it makes the layers and tells their time, and writes nothing.
 /// job     checked (check_job)
 /// cancel  read between layers: once set, no new layer starts, the layers in flight finish and are kept for --resume, and
 ///         the error is kInterrupted

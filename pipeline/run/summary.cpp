@@ -108,10 +108,10 @@ std::string Summary::text() const {
   if (!machine.empty()) lines.emplace_back("machine", machine);
   lines.insert(lines.end(), head.begin(), head.end());
   lines.emplace_back("layers", layers_line(*this));
+  if (!dry_run || layers_planned > 0) lines.insert(lines.end(), results.begin(), results.end());
   if (dry_run) {
     add_dry_run(*this, lines);
   } else {
-    lines.insert(lines.end(), results.begin(), results.end());
     lines.emplace_back(product == Product::kImages ? "files" : "file",
                        fmt::format("{} in {}", readable_bytes(bytes_written), one_line(output)));
     add_costs(*this, lines);

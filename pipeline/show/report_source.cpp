@@ -59,7 +59,7 @@ Result<double> seconds_of_layer(const std::string& directory, const ManifestHead
   const std::string program = program_of_layer(directory, head, record.layer.index);
   if (hash_bytes(std::as_bytes(std::span(program))) == record.program.hash) {
     const auto replay = machine.replay(program, record.layer, image, record.program.moved, record.program.lost);
-    if (replay) return replay->seconds;
+    if (replay) return replay->seconds();
     return Error{Fault::kVerification, fmt::format("{}: {}", directory, replay.error().message)};
   }
   return changed(directory + "/" + program_file_name(record.layer.index, head.program_extension));

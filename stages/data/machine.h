@@ -69,6 +69,7 @@ struct Machine {
     double ramp_mm = 5;        // before the first and behind the last step of a sweep
     double layer_step_um = 1;  // of the build vat
     std::array<double, 2> safe_mm{0, 0};
+    double acceleration_mm_s2 = 0;  // of the head, for the time of moves from rest to rest; 0: even speed
     std::string x_axis = "X", y_axis = "Y";
   } motion;
 
@@ -83,6 +84,8 @@ struct Machine {
     double dose = 1.2;                        // height fed / height of the layer
     std::array<double, 2> roller_mm{0, 200};  // home and far end
     double roller_speed_mm_s = 50, vat_speed_mm_s = 5;
+    double spread_s = 0;   // a layer's powder cycle that the program does not spell; 0: by the movements above
+    double pause_s = 0;    // a layer, beside all movements: drying, wiping
     double packing = 0.6;  // share of the powder bed that is solid, for the report
   } powder;
 };

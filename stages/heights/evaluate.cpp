@@ -29,7 +29,9 @@ Evaluation evaluate(const SurfaceIndex& index, std::span<const std::int64_t> bou
     }
   }
   const Buffer<double> below = projected_below(index, index.parts, ladder, Sign::kBoth);
-  const Buffer<double> section = options.time.on() ? section_at_rungs(index, ladder, tolerance) : Buffer<double>();
+  const bool timed = options.time.on() || options.tells_time;
+  const TimeModel& time = options.time.on() ? options.time : kPlainTime;
+  const Buffer<double> section = timed ? section_at_rungs(index, ladder, tolerance) : Buffer<double>();
   double steps = 0;
   for (std::uint32_t i = 0; i < count; ++i) {
     LayerFacts& layer = result.layers[i];
@@ -41,7 +43,7 @@ Evaluation evaluate(const SurfaceIndex& index, std::span<const std::int64_t> bou
     }
     result.above_limit += layer.cusp > options.cusp;
     steps += static_cast<double>(thickness) * (below[i + 1] - below[i]);
-    if (options.time.on()) result.seconds += seconds_of_layer(options.time, section[i]);
+    if (timed) result.seconds += seconds_of_layer(time, section[i]);
   }
   if (index.area_mm2 > 0) result.mean_cusp = steps / index.area_mm2;
 

@@ -31,7 +31,7 @@ struct Evaluation {
   std::uint32_t flats_missed = 0;  // by more than the tolerance
   std::int64_t largest_miss = 0;   // nm, of those
   std::int64_t top_miss = 0;       // nm: end of the last layer minus top of the parts
-  double seconds = 0;              // by the time model
+  double seconds = 0;              // by the time model; 0 without one
 };
 
 /// boundaries  nm, strictly increasing, the first is the bottom of the lowest layer; n layers have n + 1

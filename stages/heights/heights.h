@@ -28,6 +28,9 @@ struct TimeModel {
   bool on() const { return seconds_per_layer > 0 || seconds_per_mm2 > 0; }
 };
 
+/// What comparisons tell time by where no model is given: a section filled with beads of 0.4 mm at 40 mm/s, and 2 s to lift.
+inline constexpr TimeModel kPlainTime{2, 1 / (0.4 * 40)};
+
 struct Options {
   Mode mode = Mode::kUniform;
   ThicknessSet set;             // all modes; uniform has exactly one
@@ -38,6 +41,7 @@ struct Options {
   double least_flat_mm2 = 1;       // smaller flats are not aimed at
   bool flats = true;               // optimal: end layers on flats and on tops and bottoms of parts
   TimeModel time;                  // optimal
+  bool tells_time = false;         // evaluate: by kPlainTime if no model is given
   std::int64_t slab = 0;           // nm, optimal: if not 0, every multiple of it is a boundary, but for one that is
                                    // nearer below the top than the least thickness
 };

@@ -303,8 +303,9 @@ std::string explain(const Machine& machine, const HeadGrid& grid) {
   const double sweep_mm = static_cast<double>(grid.steps()) * grid.step_nm() / kNmPerMm + 2 * machine.motion.ramp_mm;
   const double scan_s = sweeps * sweep_mm / machine.motion.scan_speed_mm_s;
   const double back_s = machine.motion.both_directions ? 0 : sweeps * sweep_mm / machine.motion.travel_speed_mm_s;
-  const double roll_s =
-      2 * std::abs(machine.powder.roller_mm[1] - machine.powder.roller_mm[0]) / machine.powder.roller_speed_mm_s;
+  const double roll_s = machine.powder.spread_s > 0 ? machine.powder.spread_s
+                                                    : 2 * std::abs(machine.powder.roller_mm[1] - machine.powder.roller_mm[0]) /
+                                                          machine.powder.roller_speed_mm_s;
   line("machine", fmt::format("{}: {}", machine.name, machine.description));
   line("bed", machine.bed.shape == BedShape::kRound
                   ? fmt::format("round, {:g} mm, parts up to {:g} mm high", machine.bed.size_mm[0], machine.bed.build_height_mm)
@@ -333,8 +334,8 @@ std::string explain(const Machine& machine, const HeadGrid& grid) {
                    swaths, sweeps, grid.steps(), std::uint64_t{sweeps} * grid.steps() * ((grid.nozzles + 7) / 8)));
   line("speed", fmt::format("{:g} mm/s, at most {:.1f} mm/s at {:g} Hz", machine.motion.scan_speed_mm_s,
                             machine.head.highest_frequency_hz * grid.place_nm / kNmPerMm, machine.head.highest_frequency_hz));
-  line("time", fmt::format("{:.1f} s a full layer: scan {:.1f} s, return {:.1f} s, roller {:.1f} s", scan_s + back_s + roll_s,
-                           scan_s, back_s, roll_s));
+  line("time", fmt::format("{:.1f} s a full layer: scan {:.1f} s, return {:.1f} s, roller {:.1f} s, pause {:.1f} s",
+                           scan_s + back_s + roll_s + machine.powder.pause_s, scan_s, back_s, roll_s, machine.powder.pause_s));
   line("dialect", machine.dialect);
   return text;
 }

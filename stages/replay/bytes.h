@@ -42,28 +42,59 @@ class ByteReader {
   Printing& printing_;
 };
 
-/// The scan length derived from the data: from the first to the last step of a sweep.
-class ScanLength {
+/// The head's way in dialects that hold vectors alone, where the machine moves by its profile: from where it waits to the
+/// ramp before a sweep's first step that fires, over its last one to the ramp behind, to the next sweep, and back.
+class Passes {
  public:
-  explicit ScanLength(Printing& printing) : printing_(printing) {}
-  void begin() { end(), any_ = false; }
+  explicit Passes(Printing& printing) : printing_(printing), along_(printing.profile().mounting.scan_axis == ScanAxis::kX) {
+    const Standing stand = printing.standing();
+    at_along_ = along_ ? stand.x_mm : stand.y_mm;
+    at_across_ = along_ ? stand.y_mm : stand.x_mm;
+  }
+
+  /// Ends the sweep before. across_mm  of the carriage
+  void begin(double across_mm, bool backward) {
+    make();
+    across_ = across_mm;
+    backward_ = backward;
+  }
+  /// A step that fires, in the order of the movement.
   void at(std::int64_t step) {
     if (!any_) first_ = step;
     last_ = step;
     any_ = true;
   }
+  /// Ends the last sweep; the head goes back.
   void end() {
-    if (!any_) return;
-    const double mm =
-        std::abs(printing_.position_of(static_cast<double>(last_)) - printing_.position_of(static_cast<double>(first_)));
-    printing_.head_moves(mm + 2 * printing_.profile().motion.ramp_mm, printing_.profile().motion.scan_speed_mm_s, true);
-    any_ = false;
+    make();
+    const Standing stand = printing_.standing();
+    go(along_ ? stand.x_mm : stand.y_mm, along_ ? stand.y_mm : stand.x_mm);
   }
 
  private:
+  void make() {
+    if (!any_) return;
+    const auto& motion = printing_.profile().motion;
+    const bool grows = (printing_.position_of(1) > printing_.position_of(0)) != backward_;
+    const double ramp = grows ? motion.ramp_mm : -motion.ramp_mm;
+    const double from = printing_.position_of(static_cast<double>(first_)) - ramp;
+    const double to = printing_.position_of(static_cast<double>(last_)) + ramp;
+    go(from, across_);
+    printing_.head_moves(to - from, motion.scan_speed_mm_s, true);
+    at_along_ = to;
+    any_ = false;
+  }
+  void go(double along, double across) {
+    printing_.head_moves(std::hypot(along - at_along_, across - at_across_), printing_.profile().motion.travel_speed_mm_s, false);
+    at_along_ = along;
+    at_across_ = across;
+  }
+
   Printing& printing_;
+  bool along_;  // the scan is along x
+  double at_along_ = 0, at_across_ = 0, across_ = 0;
   std::int64_t first_ = 0, last_ = 0;
-  bool any_ = false;
+  bool backward_ = false, any_ = false;
 };
 
 }  // namespace lamina::replay

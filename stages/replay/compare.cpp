@@ -26,10 +26,10 @@ std::string Printing::place_of(std::uint32_t column, std::uint32_t row) const {
   for (const Sweep& sweep : sweeps_) {
     for (const VirtualMachine::Nozzle& nozzle : machine_.nozzle_) {
       if (nozzle.blocked || sweep.first_line + nozzle.line != line) continue;
-      return fmt::format("layer {}, swath {}, step {}", layer_, sweep.number, place * machine_.ticks_ + nozzle.step_offset);
+      return fmt::format("layer {}, swath {}, step {}", layer_.index, sweep.number, place * machine_.ticks_ + nozzle.step_offset);
     }
   }
-  return fmt::format("layer {}, line {} across, place {} along, which no swath comes over", layer_, line, place);
+  return fmt::format("layer {}, line {} across, place {} along, which no swath comes over", layer_.index, line, place);
 }
 
 // Lines that a nozzle which works comes over, and those of blocked ones: only these may lose pixels. A sweep in which
@@ -97,7 +97,7 @@ void Printing::compare(const RunsView& image, std::uint64_t moved, std::uint64_t
     return fail(fmt::format("{}; in all {} pixels are not fired and {} fired too many", first, missing, added));
   }
   if (added != moved || missing != moved + lost) {
-    if (first_of_all.empty()) first_of_all = fmt::format("layer {}", layer_);  // the manifest alone speaks of such pixels
+    if (first_of_all.empty()) first_of_all = fmt::format("layer {}", layer_.index);  // the manifest alone speaks of such pixels
     fail(fmt::format("{}: {} pixels are not fired and {} fired instead; the manifest says {} and {}", first_of_all, missing,
                      added, moved + lost, moved));
   }

@@ -6,17 +6,21 @@
 
 namespace lamina::replay {
 
-/// Totals of a program.
+/// A layer that is said to take longer takes so long: a program may say anything, and sums must hold.
+inline constexpr double kMostSeconds = 1e6;
+
+/// Totals of a program. Time is that of head, roller and vats one after the other, and of the layer's pause.
 struct Count {
   std::uint64_t drops = 0, vectors = 0;
   std::uint32_t sweeps = 0;
   double scan_mm = 0, travel_mm = 0;                     // of the head
-  double seconds = 0;                                    // head, roller and vats, one after the other
+  std::int64_t microseconds = 0;                         // of the machine; whole, so that sums of layers are exact
   std::array<double, 2> fed_mm{0, 0};                    // by each vat
   std::uint32_t vats = 0;                                // one bit per vat that feeds, by command or by movement
   bool moves = false;                                    // whether the program moves vats and roller
   double build_mm = 0;                                   // final position of the build vat
   double farthest_along_um = 0, farthest_across_um = 0;  // greatest distance of a drop from its pixel's centre
+  double seconds() const { return static_cast<double>(microseconds) * 1e-6; }
   void add(const Count& other);
 };
 

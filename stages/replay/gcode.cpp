@@ -58,6 +58,15 @@ std::uint32_t GcodeReader::count(const GcodeLine& line, char letter) {
   return static_cast<std::uint32_t>(value);
 }
 
+Axes::Axes(Printing& printing, GcodeReader& reader) : printing_(printing), reader_(reader) {
+  const auto& profile = printing.profile();
+  const Standing stand = printing.standing();
+  at_[profile.powder.build_axis[0]] = stand.build_mm;
+  at_[profile.powder.roller_axis[0]] = stand.roller_mm;
+  at_[profile.motion.x_axis[0]] = stand.x_mm;
+  at_[profile.motion.y_axis[0]] = stand.y_mm;
+}
+
 bool Axes::take(const GcodeLine& line, bool scanning) {
   if (line.command == "G90" || line.command == "G91") {
     relative_ = line.command == "G91";
@@ -65,7 +74,7 @@ bool Axes::take(const GcodeLine& line, bool scanning) {
   }
   if (line.command != "G0" && line.command != "G1") return false;
   const auto& profile = printing_.profile();
-  double head_squared = 0;
+  double head_squared = 0, all_squared = 0, alone = 0;  // alone: the ways of the other axes, one after the other
   if (line.has('F')) feed_mm_s_ = line.word.at('F') / 60;
   if (!(feed_mm_s_ > 0)) {
     reader_.fault("moves at no speed");
@@ -76,11 +85,13 @@ bool Axes::take(const GcodeLine& line, bool scanning) {
     double& at = at_[letter];
     const double way = relative_ ? value : value - at;
     at += way;
+    all_squared += way * way;
     const std::string axis(1, letter);
     if (axis == profile.motion.x_axis || axis == profile.motion.y_axis) {
       head_squared += way * way;
     } else if (axis == profile.powder.build_axis || axis == profile.powder.roller_axis) {
       printing_.takes(std::abs(way) / feed_mm_s_);
+      alone += std::abs(way);
       if (axis == profile.powder.build_axis) {
         printing_.build_vat_stands_at(at);
       } else {
@@ -88,12 +99,18 @@ bool Axes::take(const GcodeLine& line, bool scanning) {
       }
     } else if (axis == profile.powder.feed_axes[0] || axis == profile.powder.feed_axes[1]) {
       printing_.feeds(axis == profile.powder.feed_axes[0] ? 0 : 1, way * profile.powder.feed_sign, feed_mm_s_);
+      alone += std::abs(way);
     } else {
       reader_.fault(fmt::format("the machine has no axis {}", letter));
       return true;
     }
   }
-  if (head_squared > 0) printing_.head_moves(std::sqrt(head_squared), feed_mm_s_, scanning);
+  // Vats and roller of one line move together: F is the speed along their common way.
+  printing_.takes((std::sqrt(all_squared - head_squared) - alone) / feed_mm_s_);
+  if (head_squared > 0) {
+    printing_.head_moves(std::sqrt(head_squared), feed_mm_s_, scanning);
+    printing_.head_stands_at(at_[profile.motion.x_axis[0]], at_[profile.motion.y_axis[0]]);
+  }
   return true;
 }
 

@@ -52,7 +52,8 @@ struct ScanAxes {
 /// The axes and their functions: the head over the bed, the build vat, the feed vats, the roller.
 class Axes {
  public:
-  Axes(Printing& printing, GcodeReader& reader) : printing_(printing), reader_(reader) {}
+  /// They stand as the layer before left them.
+  Axes(Printing& printing, GcodeReader& reader);
 
   /// Executes G0, G1, G90, G91; false for any other command. A fault may leave the axes unmoved.
   /// The head's positions are in `at`; the build vat must reach the depth of the layer before the head moves.

@@ -39,7 +39,7 @@ void Count::add(const Count& other) {
   sweeps += other.sweeps;
   scan_mm += other.scan_mm;
   travel_mm += other.travel_mm;
-  seconds += other.seconds;
+  microseconds += other.microseconds;
   fed_mm[0] += other.fed_mm[0];
   fed_mm[1] += other.fed_mm[1];
   vats |= other.vats;
@@ -120,16 +120,22 @@ std::array<double, 2> VirtualMachine::nozzle_at(std::int64_t first_line, double 
 
 Result<Count> VirtualMachine::replay(std::string_view program, const Layer& layer, const RunsView& image, std::uint64_t moved,
                                      std::uint64_t lost) const {
-  Printing printing(*this, layer.index, nullptr);
+  Printing printing(*this, layer, Purpose::kPrint);
   if (Status status = read(machine_.dialect, program, printing); !status) return status.error();
-  printing.check_cycle(layer);
+  printing.check_cycle();
   if (printing.ok()) printing.compare(image, moved, lost);
   if (!printing.ok()) return printing.status().error();
-  return printing.count;
+  return printing.finish();
+}
+
+Result<std::int64_t> VirtualMachine::microseconds(std::string_view program, const Layer& layer) const {
+  Printing printing(*this, layer, Purpose::kTime);
+  if (Status status = read(machine_.dialect, program, printing); !status) return status.error();
+  return printing.finish().microseconds;
 }
 
 Result<Count> VirtualMachine::run(std::string_view program, std::uint32_t layer, const Watch& watch) const {
-  Printing printing(*this, layer, &watch);
+  Printing printing(*this, {layer, 0, 1}, Purpose::kPrint, &watch);
   if (Status status = read(machine_.dialect, program, printing); !status) return status.error();
   return printing.count;
 }

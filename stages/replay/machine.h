@@ -37,10 +37,16 @@ class VirtualMachine {
   ///           a nozzle that does not exist, is blocked or fires twice on a pixel, a set pixel that a working nozzle passes
   ///           without firing, a fired pixel that is not set, wrong numbers of moved or lost pixels, a scan speed above the
   ///           nozzles' firing rate; if the dialect moves the machine: a wrong height of the build vat, a wrong dose, a
-  ///           roller that does not go to its far end and back
+  ///           roller that does not go to its far end and back, a head that does not wait where the next layer finds it
   /// cost      O(text + drops); one bit per pixel
   Result<Count> replay(std::string_view program, const Layer& layer, const RunsView& image, std::uint64_t moved,
                        std::uint64_t lost) const;
+
+  /// How long a layer's program takes, by its movements alone. The machine stands where the layer below left it, so that
+  /// layers can be timed in any order and their times add up to that of the job.
+  /// program  of a dialect with motion; vectors may be left out of those of nuferbj
+  /// errors   kVerification: a word unknown to the dialect
+  Result<std::int64_t> microseconds(std::string_view program, const Layer& layer) const;
 
   /// A drop, by column and row of the image, sweep and step.
   struct Drop {
@@ -49,7 +55,7 @@ class VirtualMachine {
   };
   /// Called with each drop in the order of the program.
   using Watch = std::function<void(const Drop&)>;
-  /// Runs a program without comparing. errors  as replay
+  /// Runs a program without comparing; nothing of it is timed. errors  as replay
   Result<Count> run(std::string_view program, std::uint32_t layer, const Watch& watch) const;
 
   /// Position of a nozzle at a step of a sweep, in fractional columns and rows of the image.

@@ -8,7 +8,7 @@ namespace lamina::replay {
 
 void read_planes(std::string_view text, Printing& printing) {
   ByteReader reader(text, printing);
-  ScanLength length(printing);
+  Passes passes(printing);
   const std::uint32_t words = (printing.nozzles() + 31) / 32;
   std::uint32_t sweep = UINT32_MAX;
   const bool layer = reader.word() == 0x4C01;
@@ -22,7 +22,7 @@ void read_planes(std::string_view text, Printing& printing) {
     if (command == 0x4C03) {
       if (size != 1 || reader.word() != printing.layer() || !reader.done())
         return reader.fault("the end is not of this layer, or not the end");
-      length.end();
+      passes.end();
       return;
     }
     if (command != 0x4C02) return reader.fault("neither a plane nor the end");
@@ -31,9 +31,9 @@ void read_planes(std::string_view text, Printing& printing) {
     const bool backward = reader.word() == 1;
     const auto across = static_cast<std::int32_t>(reader.word());
     if (number != sweep) {
-      length.begin();
       printing.begin_sweep(number, backward);
       printing.go_across(across / 1e6);
+      passes.begin(across / 1e6, backward);
       sweep = number;
     }
     const std::int64_t first = reader.word();
@@ -54,7 +54,7 @@ void read_planes(std::string_view text, Printing& printing) {
       }
       if (!any) continue;
       printing.at_step(first + place);
-      length.at(first + place);
+      passes.at(first + place);
       printing.fire_words(vector);
     }
   }

@@ -9,12 +9,19 @@
 
 namespace lamina::replay {
 
-Printing::Printing(const VirtualMachine& machine, std::uint32_t layer, const VirtualMachine::Watch* watch)
+Printing::Printing(const VirtualMachine& machine, const Layer& layer, Purpose purpose, const VirtualMachine::Watch* watch)
     : machine_(machine),
       watch_(watch),
       layer_(layer),
+      purpose_(purpose),
       row_words_((machine.columns_ + 63) / 64),
-      fired_(std::size_t{row_words_} * machine.rows_, 0) {}
+      roller_mm_(machine.machine_.powder.roller_mm[0]),
+      fired_(purpose == Purpose::kPrint ? std::size_t{row_words_} * machine.rows_ : 0, 0) {}
+
+Standing Printing::standing() const {
+  const auto& motion = profile().motion;
+  return {motion.safe_mm[0], motion.safe_mm[1], profile().powder.build_sign * mm(layer_.bottom), profile().powder.roller_mm[0]};
+}
 
 void Printing::fail(std::string what) {
   if (ok()) fault_ = std::move(what);
@@ -23,7 +30,7 @@ void Printing::fail(std::string what) {
 void Printing::fault(std::string_view what) {
   if (!ok()) return;
   const bool ahead = reading_sweep_ != INT64_MIN;  // its words are read, and it has not begun
-  std::string place = fmt::format("layer {}", layer_);
+  std::string place = fmt::format("layer {}", layer_.index);
   if (ahead || sweeping_) {
     place += fmt::format(", swath {}", ahead ? reading_sweep_ : std::int64_t{sweep_});
     if (reading_ != INT64_MIN) {
@@ -108,6 +115,7 @@ bool Printing::pixel(std::int64_t line, std::int64_t place, std::uint32_t& colum
 }
 
 void Printing::fire(std::uint32_t number) {
+  if (purpose_ == Purpose::kTime) return;
   if (number >= machine_.nozzle_.size()) return fault(fmt::format("nozzle {} does not exist", number));
   const VirtualMachine::Nozzle& nozzle = machine_.nozzle_[number];
   if (nozzle.blocked) return fault(fmt::format("nozzle {} fires, which is blocked", number));
@@ -131,6 +139,7 @@ void Printing::fire(std::uint32_t number) {
 }
 
 void Printing::fire_words(std::span<const std::uint64_t> words) {
+  if (purpose_ == Purpose::kTime) return;
   for (std::size_t w = 0; w < words.size(); ++w) {
     for (std::uint64_t left = words[w]; left != 0 && ok();) {
       const int bit = std::countl_zero(left);
@@ -147,29 +156,41 @@ void Printing::head_moves(double mm, double mm_s, bool scanning) {
                              profile().head.highest_frequency_hz));
   }
   (scanning ? count.scan_mm : count.travel_mm) += std::abs(mm);
-  count.seconds += std::abs(mm) / mm_s;
+  const double way = std::abs(mm), a = profile().motion.acceleration_mm_s2;
+  if (a == 0) return takes(way / mm_s);
+  takes(way < mm_s * mm_s / a ? 2 * std::sqrt(way / a) : way / mm_s + mm_s / a);
 }
+
+void Printing::head_stands_at(double x_mm, double y_mm) { head_mm_ = {x_mm, y_mm}; }
 
 void Printing::feeds(std::uint32_t vat, double mm, double mm_s) {
   count.fed_mm[vat] += mm;
   if (mm > 0) count.vats |= 1u << vat;
-  count.seconds += std::abs(mm) / mm_s;
+  tells_powder_ = true;
+  takes(std::abs(mm) / mm_s);
 }
 
 void Printing::build_vat_stands_at(double mm) {
-  count.moves = true;
+  count.moves = tells_powder_ = true;
   count.build_mm = mm * profile().powder.build_sign;
 }
 
 void Printing::roller_stands_at(double mm) {
+  tells_powder_ = true;
   rolled_ = rolled_ || std::abs(mm - profile().powder.roller_mm[1]) < 1e-3;
   roller_mm_ = mm;
 }
 
-void Printing::check_cycle(const Layer& layer) {
-  if (!count.moves) return;
+void Printing::check_cycle() {
   const auto& powder = profile().powder;
-  const auto wrong = [&](const std::string& what) { fail(fmt::format("layer {}, powder cycle: {}", layer_, what)); };
+  const Layer& layer = layer_;
+  const auto wrong = [&](const std::string& what) { fail(fmt::format("layer {}, powder cycle: {}", layer_.index, what)); };
+  if (const Standing next = standing();
+      head_mm_ && std::hypot((*head_mm_)[0] - next.x_mm, (*head_mm_)[1] - next.y_mm) > 1e-3) {
+    wrong(fmt::format("the head stays at {:g}, {:g} mm, and the next layer finds it at {:g}, {:g}", (*head_mm_)[0],
+                      (*head_mm_)[1], next.x_mm, next.y_mm));
+  }
+  if (!count.moves) return;
   // Numbers are written to a tenth of a micrometre.
   if (const double top = mm(std::int64_t{layer.bottom} + layer.thickness); std::abs(count.build_mm - top) > 1e-3) {
     wrong(fmt::format("the build vat stands at {:g} mm where {:g} have to", count.build_mm, top));
@@ -180,6 +201,18 @@ void Printing::check_cycle(const Layer& layer) {
   if (std::abs(roller_mm_ - powder.roller_mm[0]) > 1e-3) {
     wrong(fmt::format("the roller stays at {:g} mm, not at {:g}", roller_mm_, powder.roller_mm[0]));
   }
+}
+
+const Count& Printing::finish() {
+  const auto& powder = profile().powder;
+  takes(powder.pause_s);
+  if (!tells_powder_) {
+    const double by_moves = (1 + powder.dose) * mm(layer_.thickness) / powder.vat_speed_mm_s +
+                            2 * std::abs(powder.roller_mm[1] - powder.roller_mm[0]) / powder.roller_speed_mm_s;
+    takes(powder.spread_s > 0 ? powder.spread_s : by_moves);
+  }
+  count.microseconds = std::llround((seconds_ < kMostSeconds ? seconds_ : kMostSeconds) * 1e6);
+  return count;
 }
 
 }  // namespace lamina::replay

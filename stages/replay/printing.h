@@ -1,7 +1,10 @@
 // stages/replay/printing.h: a layer on the virtual machine, driven by the readers of dialects.
 #pragma once
 
+#include <array>
 #include <cmath>
+#include <cstdint>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -11,14 +14,29 @@
 
 namespace lamina::replay {
 
+/// What a program is carried out for.
+enum class Purpose : std::uint8_t {
+  kPrint,  // its drops
+  kTime    // its movements alone: nothing fires, and no image is held
+};
+
+/// Where the axes stand between two layers, as programs count them: the head waits at its safe place, the roller at home,
+/// the build vat at the top of the layer below. Each layer's program begins and ends so (check_cycle), so that a layer is
+/// carried out without those before it.
+struct Standing {
+  double x_mm = 0, y_mm = 0, build_mm = 0, roller_mm = 0;
+};
+
 /// The first fault of a program ends it: ok() becomes false, later faults are not recorded, and pixels printed after it
 /// are undefined. Readers return when ok() is false.
 class Printing {
  public:
-  Printing(const VirtualMachine& machine, std::uint32_t layer, const VirtualMachine::Watch* watch);
+  Printing(const VirtualMachine& machine, const Layer& layer, Purpose purpose, const VirtualMachine::Watch* watch = nullptr);
 
   const Machine& profile() const { return machine_.machine_; }
-  std::uint32_t layer() const { return layer_; }
+  std::uint32_t layer() const { return layer_.index; }
+  /// Where the program finds the machine.
+  Standing standing() const;
   std::uint32_t nozzles() const { return static_cast<std::uint32_t>(machine_.nozzle_.size()); }
   /// "layer 12, swath 3, step 417: what"; before the first swath or its first step, the text says so instead.
   void fault(std::string_view what);
@@ -44,15 +62,19 @@ class Printing {
   /// Fires all nozzles with set bits; bit 63 of the first word is nozzle 0.
   void fire_words(std::span<const std::uint64_t> words);
 
-  // --- movements
+  // --- movements; each takes its time
+  /// From rest to rest if the profile knows the head's acceleration.
   void head_moves(double mm, double mm_s, bool scanning);
+  void head_stands_at(double x_mm, double y_mm);
   void feeds(std::uint32_t vat, double mm, double mm_s);
   void build_vat_stands_at(double mm);
   void roller_stands_at(double mm);
-  void takes(double seconds) { count.seconds += seconds; }
+  void takes(double seconds) { seconds_ += seconds; }
 
-  /// Checks the powder cycle of the layer; called at the end.
-  void check_cycle(const Layer& layer);
+  /// Checks the powder cycle of the layer, and that it leaves the machine as the next one expects it; called at the end.
+  void check_cycle();
+  /// Ends the layer: adds the time of what the profile knows and the program does not spell.
+  const Count& finish();
   /// Compares with an image; see VirtualMachine::replay.
   void compare(const RunsView& image, std::uint64_t moved, std::uint64_t lost);
 
@@ -71,12 +93,17 @@ class Printing {
 
   const VirtualMachine& machine_;
   const VirtualMachine::Watch* watch_;
-  std::uint32_t layer_, row_words_;
+  Layer layer_;
+  Purpose purpose_;
+  std::uint32_t row_words_;
   std::uint32_t sweep_ = 0;
   std::int64_t first_line_ = 0, step_ = 0, previous_step_ = 0;
   std::int64_t reading_ = INT64_MIN, reading_sweep_ = INT64_MIN;
   bool rolled_ = false;  // to the far end
   double roller_mm_ = 0;
+  std::optional<std::array<double, 2>> head_mm_;  // if the program says where
+  bool tells_powder_ = false;                     // moves a vat or the roller
+  double seconds_ = 0;
   bool backward_ = false, sweeping_ = false, stepped_ = false, fired_here_ = false;
   std::vector<std::uint64_t> fired_;  // one bit per pixel, the leftmost in bit 0
   std::vector<Sweep> sweeps_;

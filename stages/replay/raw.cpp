@@ -6,7 +6,7 @@ namespace lamina::replay {
 
 void read_raw(std::string_view text, Printing& printing) {
   ByteReader reader(text, printing);
-  ScanLength length(printing);
+  Passes passes(printing);
   if (reader.take(4) != "LAYR" || reader.word() != printing.layer()) return reader.fault("does not begin with this layer");
   reader.take(3 * 4);
   printing.count.vats = reader.word();
@@ -16,16 +16,17 @@ void read_raw(std::string_view text, Printing& printing) {
     if (tag == "LEND") {
       if (reader.word() != printing.layer() || !reader.done())
         return reader.fault("the end is not of this layer, or not the end");
-      length.end();
+      passes.end();
       return;
     }
     if (tag != "SWTH") return reader.fault("neither a swath nor the end");
     const std::uint32_t number = reader.word();
     reader.word();
     const bool backward = reader.word() == 1;
-    length.begin();
     printing.begin_sweep(number, backward);
-    printing.go_across(static_cast<double>(static_cast<std::int64_t>(reader.number(8))) / 1e6);
+    const double across = static_cast<double>(static_cast<std::int64_t>(reader.number(8))) / 1e6;
+    printing.go_across(across);
+    passes.begin(across, backward);
     for (std::uint32_t segments = reader.word(); segments > 0 && printing.ok(); --segments) {
       std::int64_t step = reader.word();
       for (std::uint32_t left = reader.word(); left > 0; --left, step += backward ? -1 : 1) {
@@ -35,7 +36,7 @@ void read_raw(std::string_view text, Printing& printing) {
         for (const char c : bytes) any = any || c != 0;
         if (!any) continue;
         printing.at_step(step);
-        length.at(step);
+        passes.at(step);
         // Each word is a number of 128 bits, the highest byte first; bit i is nozzle i of the word.
         for (std::uint32_t nozzle = 0; nozzle < words * 128; ++nozzle) {
           const auto byte = static_cast<std::uint8_t>(bytes[nozzle / 128 * 16 + 15 - nozzle % 128 / 8]);

@@ -1,4 +1,5 @@
 // The page about a job: what it shows is what the files hold, in the bytes and in a browser.
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <sys/wait.h>
 #include <zlib.h>
@@ -293,7 +294,18 @@ TEST_F(JobsReported, TimesOfLayersAddUpToThatOfTheReplayedProgram) {
   double sum = 0;
   for (const Json& layer : seconds) sum += layer.get<double>();
   EXPECT_EQ(seconds.size(), 10u);
-  EXPECT_NEAR(sum, Json::parse(verified.out)["replay"]["seconds"].get<double>(), 1e-3 * sum);
+  EXPECT_NEAR(sum, Json::parse(verified.out)["replay"]["seconds"].get<double>(), 1e-9 * sum);
+  const std::vector<std::string> words = {"jet", "part.stl", "--machine", "nuferbj", "--layer", "0.1", "--dry-run"};
+  const auto told = [&](const std::vector<std::string>& more) {
+    std::vector<std::string> call = words;
+    call.insert(call.end(), more.begin(), more.end());
+    return lamina(call);
+  };
+  EXPECT_NEAR(sum, Json::parse(told({"--json", "--quiet"}).out)["print_seconds"].get<double>(), 1e-9 * sum);
+  const std::string text = fmt::format("({:.1f} s) on nuferbj", sum);
+  for (const Outcome& outcome : {told({}), lamina({"verify", "out"})}) {
+    EXPECT_NE((outcome.out + outcome.err).find(text), std::string::npos) << outcome.out << outcome.err;
+  }
   EXPECT_GT(sum, 1);
   const std::string program = read_text(directory_ / "out/program/000004.gcode");
   write_text(directory_ / "out/program/000004.gcode", program + "\n");

@@ -150,8 +150,9 @@ Outcome run_heights(const Arguments& arguments, Context& context) {
   const std::chrono::duration<double> load = Clock::now() - start;
   if (!scene) return scene.error();
 
-  const Result<heights::Options> options = options_of(arguments, *job);
+  Result<heights::Options> options = options_of(arguments, *job);
   if (!options) return options.error();
+  options->tells_time = arguments.has("--compare");
   const heights::SurfaceIndex index = index_scene(*scene, *options);
   const std::chrono::duration<double> surface = Clock::now() - start - load;
   const auto studies = studies_of(arguments, *job, index, *options);

@@ -52,6 +52,7 @@ Outcome run_merge(const Arguments& arguments, Context& context) {
                        {"layers", report->layers},
                        {"linked", report->linked},
                        {"copied", report->copied},
+                       {"print_seconds", 1e-6 * static_cast<double>(report->microseconds)},
                        {"warnings", warnings_json(report->warnings)}});
 }
 

@@ -7,6 +7,7 @@
 #include "stages/data/text/json.h"
 #include "stages/data/text/json_text.h"
 #include "stages/data/text/readable.h"
+#include "stages/replay/time/totals.h"
 
 namespace lamina::pipeline {
 namespace {
@@ -30,24 +31,8 @@ CommandSpec verify_spec() {
   return spec;
 }
 
-Json replay_json(const VerifyReport& report) {
-  const replay::Count& replay = report.replay;
-  return {{"machine", report.machine},
-          {"layers", report.replayed},
-          {"drops", replay.drops},
-          {"vectors", replay.vectors},
-          {"sweeps", replay.sweeps},
-          {"moved", report.moved},
-          {"lost", report.lost},
-          {"coverage", report.coverage},
-          {"seconds", replay.seconds},
-          {"scan_mm", replay.scan_mm},
-          {"travel_mm", replay.travel_mm},
-          {"fed_mm", replay.fed_mm},
-          {"binder_mm3", report.material.binder_mm3},
-          {"powder_mm3", report.material.powder_mm3},
-          {"farthest_along_um", replay.farthest_along_um},
-          {"farthest_across_um", replay.farthest_across_um}};
+replay::Totals totals_of(const VerifyReport& report) {
+  return {report.machine, report.replayed, report.replay, report.moved, report.lost, report.material, report.coverage};
 }
 
 Json report_json(const VerifyReport& report) {
@@ -55,40 +40,8 @@ Json report_json(const VerifyReport& report) {
   for (const std::string& fault : report.faults) faults.push_back(one_line(fault));
   Json json = {{"command", "verify"},   {"directory", report.directory},     {"ok", report.ok()}, {"layers", report.layers},
                {"bytes", report.bytes}, {"fault_count", report.fault_count}, {"faults", faults}};
-  if (!report.machine.empty()) json["replay"] = replay_json(report);
+  if (!report.machine.empty()) json["replay"] = replay::totals_json(totals_of(report));
   return json;
-}
-
-// The machine's totals as text.
-void say_replay(const VerifyReport& report, Context& context) {
-  if (report.machine.empty() || report.replayed == 0) return;
-  const replay::Count& replay = report.replay;
-  context.say(fmt::format(
-      "programs  {} layers replayed on {}: {}, {} drops in {} sweeps, {:.3f} % of the bed", readable_count(report.replayed),
-      report.machine,
-      report.moved + report.lost > 0 ? "every pixel fired once but those of blocked nozzles" : "every pixel fired once",
-      readable_count(replay.drops), readable_count(replay.sweeps), 100 * report.coverage));
-  if (report.moved + report.lost > 0) {
-    context.say(fmt::format("blocked   {} pixels fired by a neighbouring nozzle, {} not at all, as recorded",
-                            readable_count(report.moved), readable_count(report.lost)));
-  }
-  context.say(
-      fmt::format("places    drops land up to {:.2f} um along and {:.2f} um across the scan from the centre of their pixel",
-                  replay.farthest_along_um, replay.farthest_across_um));
-  if (replay.travel_mm == 0 && replay.fed_mm[0] == 0 && replay.fed_mm[1] == 0) {
-    // The program controls only the head; another controller drives the axes.
-    context.say(fmt::format("machine   {:.1f} m scanned in {}; this dialect does not tell other movements nor powder",
-                            replay.scan_mm / 1000, readable_seconds(replay.seconds)));
-    context.say(fmt::format("material  {:.3f} ml of binder", report.material.binder_mm3 / 1000));
-    return;
-  }
-  if (replay.seconds > 0) {
-    context.say(fmt::format("machine   {:.2f} h, {:.1f} m scanned, {:.1f} m other travel", replay.seconds / 3600,
-                            replay.scan_mm / 1000, replay.travel_mm / 1000));
-  }
-  context.say(fmt::format("material  {:.3f} ml of binder, {:.2f} cm3 of powder fed (solid), {:.2f} and {:.2f} mm of the vats",
-                          report.material.binder_mm3 / 1000, report.material.powder_mm3 / 1000, replay.fed_mm[0],
-                          replay.fed_mm[1]));
 }
 
 Outcome run_verify(const Arguments& arguments, Context& context) {
@@ -111,7 +64,9 @@ Outcome run_verify(const Arguments& arguments, Context& context) {
     if (report->ok() && !arguments.has("--quiet")) {
       context.say(fmt::format("{}: {} layers, {}, all as the manifest says", directory, readable_count(report->layers),
                               readable_bytes(report->bytes)));
-      say_replay(*report, context);
+      if (report->replayed > 0) {
+        for (const std::string& line : replay::totals_text(totals_of(*report))) context.say(line);
+      }
     }
     if (arguments.has("--json")) {
       if (Status status = context.give(report_json(*report)); !status) return status.error();

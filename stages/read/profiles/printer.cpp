@@ -119,6 +119,7 @@ constexpr Key<Machine> kKeys[] = {
     field<kMotion, &Motion::ramp_mm>({"motion", "ramp_mm"}, {0, 1e4, " mm"}),
     field<kMotion, &Motion::layer_step_um>({"motion", "layer_step_um"}, {1e-3, 1e6, " um"}),
     field<kMotion, &Motion::safe_mm>({"motion", "safe_mm"}, kAny),
+    field<kMotion, &Motion::acceleration_mm_s2>({"motion", "acceleration_mm_s2"}, {0, 1e6, " mm/s2"}),
     text<check_axis, kMotion, &Motion::x_axis>({"motion", "x_axis"}),
     text<check_axis, kMotion, &Motion::y_axis>({"motion", "y_axis"}),
 
@@ -134,6 +135,8 @@ constexpr Key<Machine> kKeys[] = {
     field<kPowder, &Powder::roller_mm>({"powder", "roller_mm"}, kAny),
     field<kPowder, &Powder::roller_speed_mm_s>({"powder", "roller_speed_mm_s"}, kSpeed),
     field<kPowder, &Powder::vat_speed_mm_s>({"powder", "vat_speed_mm_s"}, kSpeed),
+    field<kPowder, &Powder::spread_s>({"powder", "spread_s"}, {0, 1e5, " s"}),
+    field<kPowder, &Powder::pause_s>({"powder", "pause_s"}, {0, 1e5, " s"}),
     field<kPowder, &Powder::packing>({"powder", "packing"}, {0.01, 1}),
 };
 

@@ -111,4 +111,24 @@ std::uint64_t compare_paths(const std::string& directory, const Manifest& manife
   return PathComparison(directory, manifest, faults).run();
 }
 
+void check_shards(const std::vector<ShardRange>& shards, std::uint32_t layers, Faults& faults) {
+  std::uint32_t next = 0, layer = 0;
+  const auto [ignored, count] = shards.front().shard;
+  const auto missing = [&, of = count](std::uint32_t last, std::uint32_t last_layer) {
+    if (next == last) return;
+    const std::string which = next + 1 == last ? fmt::format("shard {}/{} is", last, of)
+                                               : fmt::format("shards {}/{} to {}/{} are", next + 1, of, last, of);
+    faults.add(fmt::format("layers: {} missing, with layers {} to {}; run what is missing, or join directories by lamina merge",
+                           which, layer, std::max(layer + 1, last_layer) - 1));
+  };
+  for (const ShardRange& one : shards) {
+    const auto [index, of] = one.shard;
+    if (of != count) return faults.add(fmt::format("{}: is of another division than {}", one.name, shards[0].name));
+    missing(index, one.first_layer);
+    next = std::max(next, index + 1);
+    layer = one.last_layer;
+  }
+  missing(count, layers);
+}
+
 }  // namespace lamina

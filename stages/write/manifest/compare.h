@@ -1,9 +1,11 @@
 // stages/write/manifest/compare.h: compares a job's files with its manifest.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "stages/data/hash.h"
 #include "stages/data/status.h"
@@ -23,5 +25,14 @@ std::string fault_of_file(const std::string& directory, const std::string& name,
 /// returns    bytes of the files
 /// cost       reads every file once, a single file of all layers twice
 std::uint64_t compare_paths(const std::string& directory, const Manifest& manifest, Faults& faults);
+
+/// The manifest of a share of a job.
+struct ShardRange {
+  std::string name;                    // of its file
+  std::array<std::uint32_t, 2> shard;  // i of n, i from 0
+  std::uint32_t first_layer = 0, last_layer = 0;
+};
+/// Faults for the shares that are missing. shards  in order, not empty; layers  of the job
+void check_shards(const std::vector<ShardRange>& shards, std::uint32_t layers, Faults& faults);
 
 }  // namespace lamina

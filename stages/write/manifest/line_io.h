@@ -30,6 +30,11 @@ class LineWriter {
     char text[32];
     out_.append(text, fmt::format_to(text, FMT_COMPILE("{}"), value));
   }
+  /// A number that lines of earlier builds lack.
+  template <class Number>
+  void added(std::string_view key, const Number& value) {
+    number(key, value);
+  }
   /// A text determined by the rest of the line.
   void fixed(std::string_view key, std::string_view value) {
     begin(key);
@@ -79,6 +84,10 @@ class LineReader {
     expect(error == std::errc());
     if constexpr (std::is_floating_point_v<Number>) expect(std::isfinite(value));
     if (good()) rest_.remove_prefix(static_cast<std::size_t>(stop - rest_.data()));
+  }
+  template <class Number>
+  void added(std::string_view key, Number& value) {
+    if (rest_.starts_with(fmt::format("{}\"{}\": ", first_ ? "" : ", ", key))) number(key, value);
   }
   void fixed(std::string_view key, std::string_view value) {
     begin(key);

@@ -71,6 +71,7 @@ void describe_images(Io& io, const ManifestHead& head, Record& record) {
   io.number("drops", record.program.drops);
   io.number("moved", record.program.moved);
   io.number("lost", record.program.lost);
+  io.added("microseconds", record.program.microseconds);
   io.hash("xxh3_128", record.program.hash);
   io.close("}");
 }

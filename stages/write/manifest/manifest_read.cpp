@@ -48,7 +48,9 @@ std::string read_line(std::string_view line, const ManifestHead& head, std::uint
   if (io.good() && !io.ended()) return "is not the line of a layer";
   if (!io.good()) return fmt::format("layer {}: {}", index, io.what());
   if (record.layer.index != index) return fmt::format("layer {} stands where {} is next", record.layer.index, index);
-  if (const std::string what = what_is_impossible(record.layer); !what.empty()) return fmt::format("layer {}: {}", index, what);
+  for (const std::string& what : {what_is_impossible(record.layer), what_is_impossible(record.program)}) {
+    if (!what.empty()) return fmt::format("layer {}: {}", index, what);
+  }
   if (head.product != Product::kImages) record.paths = std::make_shared<const PathFacts>(paths);
   for (const ImageRecord& image : record.images) {
     record.bytes += image.bytes;

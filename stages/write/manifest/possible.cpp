@@ -14,6 +14,7 @@ namespace lamina {
 namespace {
 
 constexpr std::size_t kLongestName = 255, kLongestMaterial = 40;  // bytes
+constexpr std::int64_t kMostMicroseconds = 1'000'000'000'000;  // of a layer, as a replay counts them
 constexpr std::int64_t kMostDots = 25'400, kMostSpan = 1'000'000'000'000, kLeastPixel = 1000;
 
 /// A format of contours, with the extension of its files.
@@ -97,6 +98,11 @@ std::string what_is_impossible(const ManifestHead& head) {
 std::string what_is_impossible(const Layer& layer) {
   const bool possible = layer.bottom >= 0 && layer.thickness > 0 && std::int64_t{layer.bottom} + layer.thickness <= kNmReach;
   return possible ? "" : fmt::format("lies at {} nm and is {} nm thick", layer.bottom, layer.thickness);
+}
+
+std::string what_is_impossible(const ProgramRecord& program) {
+  const bool possible = program.microseconds >= 0 && program.microseconds <= kMostMicroseconds;
+  return possible ? "" : fmt::format("takes {} microseconds", program.microseconds);
 }
 
 }  // namespace lamina

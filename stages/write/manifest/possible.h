@@ -15,8 +15,9 @@ namespace lamina {
 /// have names that files can have, the grid is one of a bed.
 std::string what_is_impossible(const ManifestHead& head);
 
-/// The same of a layer.
+/// The same of a layer, and of its print program.
 std::string what_is_impossible(const Layer& layer);
+std::string what_is_impossible(const ProgramRecord& program);
 
 /// The name of a file in a folder: no folder in it, and not the folder itself or the one above.
 bool is_file_name(std::string_view name);

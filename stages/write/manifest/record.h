@@ -19,6 +19,7 @@ struct ProgramRecord {
   std::uint32_t sweeps = 0;  // that fire
   std::uint64_t drops = 0;
   std::uint64_t moved = 0, lost = 0;  // pixels of blocked nozzles (stages/program/compile.h)
+  std::int64_t microseconds = 0;      // that the machine takes (stages/replay/time/timer.h); 0: of an earlier build
 };
 
 /// The image of one material, where a job has several.

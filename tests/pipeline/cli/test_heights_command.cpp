@@ -86,6 +86,26 @@ TEST(HeightsCommand, LayersOfOthersAreMeasuredByTheSameRules) {
   EXPECT_NE(wrong.err.find("tops.txt:2: "), std::string::npos) << wrong.err;
 }
 
+// A box of 10 x 10 x 3 mm: 30 layers of 0.1 mm or 10 of 0.3 take 2 s each and 100 mm2 / (0.4 mm x 40 mm/s) = 6.25 s, 247.5
+// and 82.5 s together: 66.7 % saved.
+TEST(HeightsCommand, AComparisonTellsTimeAndWhatIsSavedBesideThinLayers) {
+  const Directory directory;
+  write_box(directory.path() / "box.stl", {0, 0, 0}, {10, 10, 3});
+  const std::vector<std::string> call = {"heights", "box.stl", "--thickness", "0.1,0.3", "--compare", "--quiet"};
+  const std::string text = run_lamina(call, directory.path()).out;
+  EXPECT_NE(text.find("4 min 07 s     0.0 %\n"), std::string::npos) << text;
+  EXPECT_NE(text.find("1 min 22 s    66.7 %\n"), std::string::npos) << text;
+  EXPECT_NE(text.find("\ntime: 2 s a layer and 0.0625 s a mm2 of its section, as beads"), std::string::npos) << text;
+  auto more = call;
+  more.insert(more.end(), {"--format", "json"});
+  auto tables = nlohmann::json::parse(run_lamina(more, directory.path()).out)["tables"];
+  EXPECT_NEAR(tables[0]["seconds"].get<double>(), 247.5, 1e-3);
+  EXPECT_NEAR(tables[1]["seconds"].get<double>(), 82.5, 1e-3);
+  more.insert(more.end(), {"--time-model", "12"});
+  tables = nlohmann::json::parse(run_lamina(more, directory.path()).out)["tables"];
+  EXPECT_NEAR(tables[0]["seconds"].get<double>(), 360, 1e-3);
+}
+
 TEST(HeightsCommand, WrongUseIsOneLineThatNamesTheOption) {
   const Directory directory;
   write_ledge(directory);

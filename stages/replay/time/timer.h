@@ -1,0 +1,46 @@
+// stages/replay/time/timer.h: how long a machine takes for a layer, found out while its program is written.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "stages/data/layer.h"
+#include "stages/data/status.h"
+#include "stages/replay/machine.h"
+
+namespace lamina::replay {
+
+/// Times layers by the same movements as a replay of their programs, whose drops do not matter here. Kept from layer to layer
+/// for its memory; one for each thread.
+class Timer {
+ public:
+  /// machine  outlives this object
+  explicit Timer(const VirtualMachine& machine) : machine_(&machine) {}
+
+  void begin(const Layer& layer);
+  /// Dialects with motion: the next lines of the program, whole ones. Memory: the layer's text, without the vectors of nuferbj.
+  void read(std::span<const std::byte> lines);
+  /// Dialects without: the next sweep, by its first and last step that fire, in the order of the movement.
+  /// across_mm  of the carriage
+  void sweep(double across_mm, bool backward, std::int64_t first, std::int64_t last);
+  /// Microseconds of the layer. errors  kInternal: the machine's reader does not take the program
+  Result<std::int64_t> end();
+
+  std::uint64_t bytes() const { return text_.capacity() + sweeps_.capacity() * sizeof(Sweep); }
+
+ private:
+  struct Sweep {
+    double across_mm;
+    bool backward;
+    std::int64_t first, last;
+  };
+  const VirtualMachine* machine_;
+  Layer layer_{};
+  std::string text_;
+  std::vector<Sweep> sweeps_;
+};
+
+}  // namespace lamina::replay
