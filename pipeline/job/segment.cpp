@@ -60,7 +60,7 @@ constexpr Key<SegmentSettings> kSegmentKeys[] = {
                                       {-1000, 1000, " mm", false, 1}),
     field<&SegmentSettings::across>(
         {"segment", "across", "", "",
-         "pores of layers turned by 90 degrees lie over each other (thick_mm + thin_mm twice the spacing)"}),
+         "thin stretches have their middles on the segmented lines of the turned layer (thick_mm + thin_mm a multiple of their distance)"}),
 };
 
 std::string read_segment_ranges(const TomlValue& list, std::vector<Range<SegmentSettings>>& ranges, Place& at) {

@@ -20,19 +20,6 @@ void set_widths(const FillSettings& fill, SegmentSettings& segment) {
   if (!segment.thin_width_mm) segment.thin_width_mm = fill.width_mm / 2;
 }
 
-/// The mean distance of a filling's lines, mm; for estimates.
-double mean_distance_mm(const infill::FillParameters& fill) {
-  if (fill.pattern == infill::Pattern::kHoneycomb || fill.pattern == infill::Pattern::kQuatrefoil) return mm(fill.cell) / 2;
-  double sum = 0;
-  if (!fill.distances.empty()) {
-    for (const Nm distance : fill.distances) sum += mm(distance);
-    return std::max(sum / static_cast<double>(fill.distances.size()), mm(fill.width) / 4);
-  }
-  for (const Nm gap : fill.gaps) sum += mm(gap);
-  const double mean = sum / static_cast<double>(std::max<std::size_t>(fill.gaps.size(), 1)) / fill.group;
-  return std::max(mm(fill.width) + mean, mm(fill.width) / 4);
-}
-
 }  // namespace
 
 std::uint64_t BeadWork::bytes() const { return sections.bytes() + beads.bytes() + bytes_of(inner); }
@@ -77,7 +64,7 @@ Status Beads::lay(const Layer& layer, BeadWork& work) const {
     if (!cut) return cut.error();
     ToolpathsView paths = all;
     paths.offset = all.offset.subspan(path_area[a], path_area[a + 1] - path_area[a] + 1);
-    if (Status status = check_stretch_count(range, *cut, paths, layer); !status) return status;
+    if (Status status = segment::check_stretch_count(range.plan, *cut, paths, layer.index); !status) return status;
     const auto width = [](double millimetres) { return static_cast<Nm>(nm_of(millimetres)); };
     const segment::Segmentation& of = range.plan;
     const raster::BeadWidths widths{cut->on, width(of.thick_width_mm), width(of.thin_width_mm), width(of.continuous_width_mm)};
@@ -104,7 +91,7 @@ Beads::Expected Beads::expected(std::uint32_t index) const {
     if (layer.plane() < box.lo.z || layer.plane() > box.hi.z) continue;
     const infill::FillParameters& fill = sections_->filling(area, layer);
     const SegmentRange& range = segments_->at(std::int64_t{layer.plane()} - box.lo.z);
-    const double width = mm(fill.width), distance = mean_distance_mm(fill);
+    const double width = mm(fill.width), distance = infill::mean_distance_mm(fill);
     const double of_bead = width * rows_per_mm + 2;  // rows of a bead along x
     double loops = fill.walls;
     if (fill.pattern == infill::Pattern::kContour) loops += mm(std::min(box.width(), box.depth())) / 2 / distance;

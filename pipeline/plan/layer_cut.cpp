@@ -43,25 +43,6 @@ Result<segment::LayerCut> layer_cut(const SegmentRange& range, const infill::Fil
   return segment::layer_cut(range.plan, place, part);
 }
 
-Status check_stretch_count(const SegmentRange& range, const segment::LayerCut& cut, const ToolpathsView& paths,
-                           const Layer& layer) {
-  constexpr double kMostStretches = 1e7;
-  if (!cut.on) return {};
-  double length = 0;  // nm of segmented lines
-  for (std::uint32_t p = 0; p < paths.size(); ++p) {
-    for (std::uint32_t i = paths.offset[p]; i + 1 < paths.offset[p + 1]; ++i) {
-      if (!cut.segments(paths.kind[i], paths.line[i])) continue;
-      const Point2 a = paths.point[i], b = paths.point[i + 1];
-      length += std::hypot(static_cast<double>(b.x) - a.x, static_cast<double>(b.y) - a.y);
-    }
-  }
-  if (2 * length / static_cast<double>(kNmPerMm) <= kMostStretches * (range.plan.thick_mm + range.plan.thin_mm)) return {};
-  return Error{Fault::kUsage,
-               fmt::format("layer {}: lines of {:.0f} mm come to more than 10000000 thick and thin stretches; give a "
-                           "longer segment.thick_mm or thin_mm",
-                           layer.index, length * 1e-6)};
-}
-
 Status check_thin_stretches(const SegmentPlan& segments, const Sections& plan) {
   // No straight line is longer than the parts are across; closed curves are.
   const double across =

@@ -13,11 +13,6 @@ namespace lamina::pipeline {
 Result<segment::LayerCut> layer_cut(const SegmentRange& range, const infill::FillParameters& filling, const Layer& layer,
                                     const Box& part);
 
-/// Refuses a layer whose lines would be cut into more than 10,000,000 stretches. errors  kUsage
-/// paths  of one part
-Status check_stretch_count(const SegmentRange& range, const segment::LayerCut& cut, const ToolpathsView& paths,
-                           const Layer& layer);
-
 /// Checks that thin stretches fit into the parts. errors  kUsage: longer than any possible line
 Status check_thin_stretches(const SegmentPlan& segments, const Sections& plan);
 

@@ -66,4 +66,13 @@ Result<LayerSchedule> schedule_layers(const Job& job, const Scene& scene, const 
   return schedule;
 }
 
+std::uint32_t drop_empty_top(const Scene& scene, LayerSchedule& schedule) {
+  std::uint32_t dropped = 0;
+  while (schedule.layers.size() > 1 && schedule.planes[schedule.layers.back().low] >= scene.height) {
+    schedule.layers.pop_back();
+    ++dropped;
+  }
+  return dropped;
+}
+
 }  // namespace lamina::pipeline

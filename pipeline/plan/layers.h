@@ -37,4 +37,8 @@ struct LayerSchedule {
 /// cost    28 bytes per layer and 4 bytes per plane
 Result<LayerSchedule> schedule_layers(const Job& job, const Scene& scene, const heights::LayerTable& table);
 
+/// Removes the last layers if they lie above all parts but for less than their half: nothing would be laid in them.
+/// returns  how many
+std::uint32_t drop_empty_top(const Scene& scene, LayerSchedule& schedule);
+
 }  // namespace lamina::pipeline

@@ -36,12 +36,12 @@ class Planner {
     plan_.product = resolved.product;
     plan_.bed = resolved.bed;
     if (resolved.printer) printer_ = std::move(*resolved.printer);
-    if (resolved.extruder) plan_.moves.emplace(MovePlan{std::move(*resolved.extruder), {}});
+    if (resolved.extruder) plan_.moves.emplace(MovePlan{std::move(*resolved.extruder)});
   }
 
   Result<Plan> make() {
     for (const auto step : {&Planner::read_fillings, &Planner::load, &Planner::decide_layers, &Planner::check_machine,
-                            &Planner::index_sections, &Planner::index_images, &Planner::predict_pores}) {
+                            &Planner::index_sections, &Planner::index_images, &Planner::foresee_beads}) {
       if (Status status = (this->*step)(); !status) return status.error();
     }
     return std::move(plan_);
@@ -122,9 +122,10 @@ class Planner {
       auto schedule = schedule_layers(job(), *plan_.scene, plan_.heights.table);
       if (!schedule) return schedule.error();
       schedule_ = std::move(*schedule);
+      if (moves()) plan_.moves->left_out = drop_empty_top(*plan_.scene, schedule_);
     }
     plan_.layer_count =
-        job().heights.per_part ? static_cast<std::uint32_t>(schedule_.layers.size()) : plan_.heights.table.size();
+        job().heights.per_part || moves() ? static_cast<std::uint32_t>(schedule_.layers.size()) : plan_.heights.table.size();
     return {};
   }
 
@@ -208,23 +209,17 @@ class Planner {
     return {};
   }
 
-  /// Predicts the pores of each range of heights, for the summary.
-  Status predict_pores() {
+  /// What can be said of the beads before any is laid.
+  Status foresee_beads() {
     if (!moves()) return {};
     if (!plan_.sections->fills()) {
       plan_.warnings.push_back({"no-bead", "nothing is asked for: no walls and no filling; give --walls, --fill or both"});
     }
     const ExtruderProfile& profile = plan_.moves->profile;
-    const auto one = [&](const SegmentRange& range, const std::string& heights) {
-      if (!range.settings.on) return;
-      for (const std::string& warning : segment::warnings(range.plan, profile.calibration)) {
+    for (const auto& [heights, range] : plan_.segments->segmented()) {
+      for (const std::string& warning : segment::warnings(range->plan, profile.calibration)) {
         plan_.warnings.push_back({"pores", heights.empty() ? warning : heights + ": " + warning});
       }
-      plan_.moves->pores.emplace_back(heights, segment::predict_pores(range.plan));
-    };
-    one(plan_.segments->base, "");
-    for (const SegmentRange& range : plan_.segments->ranges) {
-      one(range, fmt::format("{} to {} mm", number_text(mm(range.from)), number_text(mm(range.to))));
     }
     if (plan_.segments->any() && !profile.own_calibration && profile.machine.name != "Anet A8") {
       plan_.warnings.push_back(

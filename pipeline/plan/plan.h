@@ -10,7 +10,6 @@
 #include <memory>
 #include <optional>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "pipeline/job/job.h"
@@ -46,7 +45,7 @@ struct ImagePlan {
 /// Data for toolpaths only.
 struct MovePlan {
   ExtruderProfile profile;
-  std::vector<std::pair<std::string, segment::Pores>> pores;  // by heights, "" for all
+  std::uint32_t left_out = 0;  // layers whose middles lie above their parts: nothing would be laid there
 };
 
 /// Scene, sections and segments keep their addresses when the plan moves, because other members refer to them.

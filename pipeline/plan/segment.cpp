@@ -4,6 +4,7 @@
 
 #include "pipeline/job/keys.h"
 #include "pipeline/plan/segment.h"
+#include "stages/data/text/number_text.h"
 #include "stages/data/text/ranges.h"
 #include "stages/segment/resolve.h"
 
@@ -57,6 +58,21 @@ bool SegmentPlan::any() const {
   return base.settings.on || std::ranges::any_of(ranges, [](const SegmentRange& range) { return range.settings.on; });
 }
 
+bool SegmentPlan::crosses() const {
+  const auto does = [](const SegmentRange& range) { return range.settings.on && range.settings.across; };
+  return does(base) || std::ranges::any_of(ranges, does);
+}
+
+std::vector<std::pair<std::string, const SegmentRange*>> SegmentPlan::segmented() const {
+  std::vector<std::pair<std::string, const SegmentRange*>> all;
+  if (base.settings.on) all.emplace_back("", &base);
+  for (const SegmentRange& range : ranges) {
+    if (range.settings.on)
+      all.emplace_back(fmt::format("{} to {} mm", number_text(mm(range.from)), number_text(mm(range.to))), &range);
+  }
+  return all;
+}
+
 Result<SegmentPlan> plan_segments(const SegmentRequest& request, const segment::Calibration& calibration, FillRequest& fill) {
   SegmentPlan plan;
   const auto base = segment::resolve(request.all, calibration, fill.all.width_mm);
@@ -66,6 +82,7 @@ Result<SegmentPlan> plan_segments(const SegmentRequest& request, const segment::
   if (fill.all.pattern == infill::Pattern::kNone) fill.all.pattern = infill::Pattern::kRaster;
   const bool spaced = leaves_distances(fill.all);
   if (Status status = check_spacings(request.all, fill.all, ""); !status) return status.error();
+  plan.base.spaces_lines = spaced;
   if (plan.base.settings.on && spaced) fill.all.distance_mm = segment::line_distances(*base, request.all.first);
 
   for (const auto& asked : request.ranges) {
@@ -77,11 +94,12 @@ Result<SegmentPlan> plan_segments(const SegmentRequest& request, const segment::
     if (!resolved) return Error{Fault::kUsage, fmt::format("segment.range: {}: {}", name, resolved.error().message)};
     const auto filling = filling_of(asked, fill);
     if (!filling) return filling.error();
-    if (spaced && distance_keys((*filling)->changes).empty()) {
+    const bool spaces = spaced && distance_keys((*filling)->changes).empty();
+    if (spaces) {
       set_distances(settings.on ? segment::line_distances(*resolved, settings.first) : std::vector{fill.all.width_mm},
                     (*filling)->changes);
     }
-    plan.ranges.push_back({nm_of(asked.from_mm), nm_of(asked.to_mm), settings, *resolved});
+    plan.ranges.push_back({nm_of(asked.from_mm), nm_of(asked.to_mm), settings, *resolved, spaces});
   }
   std::ranges::sort(plan.ranges, {}, &SegmentRange::from);
   return plan;

@@ -2,6 +2,8 @@
 #pragma once
 
 #include <cstdint>
+#include <string>
+#include <utility>
 #include <vector>
 
 #include "pipeline/job/fill.h"
@@ -18,6 +20,7 @@ struct SegmentRange {
   std::int64_t from = 0, to = INT64_MAX;  // nm above the part's bottom: layers whose middle is in [from, to)
   SegmentSettings settings;
   segment::Segmentation plan;
+  bool spaces_lines = false;  // else the filling says itself how far lines lie apart
 };
 
 /// The segmentation at each height.
@@ -27,6 +30,9 @@ struct SegmentPlan {
 
   const SegmentRange& at(std::int64_t height) const;
   bool any() const;
+  bool crosses() const;  // whether pores of layers are to lie over each other
+  /// Ranges with segmented lines, by heights: "3 to 5.7 mm", "" for the base.
+  std::vector<std::pair<std::string, const SegmentRange*>> segmented() const;
 };
 
 /// Makes the plan and completes `fill`: line distances derived from the plan unless given, and lines where it has none.

@@ -4,11 +4,11 @@
 
 #include <algorithm>
 #include <nlohmann/json.hpp>
-#include <numbers>
 
 #include "pipeline/output/toolpath_file.h"
 #include "pipeline/run/path_layer.h"
 #include "stages/data/text/readable.h"
+#include "stages/segment/laid/told.h"
 #include "stages/write/gcode/gcode.h"
 
 namespace lamina::pipeline {
@@ -23,7 +23,10 @@ constexpr std::size_t kWaitingText = 1 << 17, kPieceOfText = 1 << 16;
 class MoveMaker : public Maker {
  public:
   MoveMaker(const Plan& plan, Sanity& sanity, const FlowLimits& limits)
-      : plan_(plan), sanity_(sanity), file_(plan), work_(limits.most_in_flight), made_(limits.most_in_flight) {}
+      : plan_(plan), sanity_(sanity), file_(plan), work_(limits.most_in_flight), made_(limits.most_in_flight) {
+    segmented_ = plan.segments->segmented();
+    for (const auto& [heights, range] : segmented_) ranges_.push_back({heights, {}});
+  }
 
   std::uint64_t bytes_of(std::uint32_t layer) const override { return plan_.sections->bytes_bound(layer); }
 
@@ -48,6 +51,7 @@ class MoveMaker : public Maker {
          [this](std::uint32_t layer, const Ticket& ticket) {
            auto bytes = plan_.sections->fill_bytes_bound(layer, work_[ticket.work], {kTextOfPoint, 0, kTextOfPath});
            if (bytes && plan_.segments->any()) *bytes += 2 * kWaitingText;
+           if (bytes && plan_.segments->crosses()) *bytes += *bytes + plan_.sections->bytes_bound(layer);  // the next layer too
            return bytes;
          }},
         {"stretches", [this](std::uint32_t layer, const Ticket& ticket) {
@@ -68,7 +72,7 @@ class MoveMaker : public Maker {
       return status;
     add(made.record);
     sanity_.record(layer, made.facts.totals.moves > 0);
-    if (made.facts.segments.lines > 0 && made.facts.segments.thin == 0) undivided_.add(made.record.layer);
+    if (made.facts.laid.segments.lines > 0 && made.facts.laid.segments.thin == 0) undivided_.add(made.record.layer);
     return {};
   }
   void add_kept(const LayerRecord& record) override {
@@ -76,9 +80,16 @@ class MoveMaker : public Maker {
     sanity_.keep(record.layer.index, record.paths->totals.moves > 0);
   }
   void add(const LayerRecord& record) {
-    if (record.layer.index == plan_.range[0]) first_layer_points_ = record.paths->segments.points();
+    if (record.layer.index == plan_.range[0]) first_layer_points_ = record.paths->laid.segments.points();
     if (record.paths->open > 0) open_.add(record.layer);
     sums_.add(*record.paths);
+    const auto& areas = plan_.sections->areas();
+    const SegmentRange& in = plan_.segments->at(record.layer.plane() - (areas.empty() ? 0 : areas.front().box.lo.z));
+    for (std::size_t i = 0; i < ranges_.size(); ++i) {
+      if (segmented_[i].second != &in) continue;
+      ranges_[i].pores.add(record.paths->laid.pores);
+      ranges_[i].area_mm2 += record.paths->area_mm2;
+    }
   }
 
   std::uint64_t bytes_held(std::uint32_t work) const override { return work_[work].bytes(); }
@@ -148,6 +159,8 @@ class MoveMaker : public Maker {
   Buffer<char> piece_;
 
   PathFacts sums_;
+  decltype(std::declval<SegmentPlan>().segmented()) segmented_;
+  std::vector<segment::LaidRange> ranges_;  // of segmented_
   std::uint64_t first_layer_points_ = 0, bytes_written_ = 0;
   LayersTold open_, undivided_;
 };
@@ -163,6 +176,8 @@ void MoveMaker::warn(const Summary& so_far, std::vector<Warning>& warnings) cons
                               "in {}: no pores there",
                               undivided_.count, so_far.layers_planned, undivided_.first),
                   warnings);
+  std::string slow = segment::speed_warning(sums_.laid.shorts, plan_.moves->profile.machine);
+  if (!slow.empty()) warnings.push_back({"acceleration", std::move(slow)});
   if (plan_.sections->fills() && sums_.totals.moves == 0) {
     warnings.push_back({"no-bead", "no bead fits into the parts: they are narrower than the walls and the filling ask for"});
   }
@@ -170,13 +185,9 @@ void MoveMaker::warn(const Summary& so_far, std::vector<Warning>& warnings) cons
 
 void MoveMaker::tell(Summary& summary) const {
   const write::MoveTotals& totals = sums_.totals;
-  const SegmentCounts& segments = sums_.segments;
-  const PlannedPorosity& porosity = sums_.porosity;
   const Extruder& machine = plan_.moves->profile.machine;
-  const double filament_cm3 =
-      totals.filament_mm * std::numbers::pi / 4 * machine.material.filament_mm * machine.material.filament_mm / 1000;
+  const double filament_cm3 = totals.filament_mm * machine.material.mm3_of_e() / 1000;
   const double filament_g = filament_cm3 * machine.material.density_g_cm3;
-  const bool solid = porosity.solid_mm3 > 0;
   summary.volume_mm3 = totals.volume_mm3;
   summary.bytes_written = bytes_written_;
 
@@ -184,15 +195,7 @@ void MoveMaker::tell(Summary& summary) const {
   result("beads",
          fmt::format("{} moves, {:.2f} m, {:.3f} cm3; {} travels, {:.2f} m", readable_count(totals.moves),
                      totals.bead_mm / 1000, totals.volume_mm3 / 1000, readable_count(totals.travels), totals.travel_mm / 1000));
-  if (segments.stretches > 0) {
-    result("segments", fmt::format("{} lines, {} thick and {} thin stretches, {} points", readable_count(segments.lines),
-                                   readable_count(segments.stretches - segments.thin), readable_count(segments.thin),
-                                   readable_count(segments.points())));
-  }
-  if (solid) {
-    result("porosity", fmt::format("{:.2f} % by what is extruded, {:.2f} % with elliptic beads, {:.2f} % by measured widths",
-                                   100 * porosity.by_extrusion(), 100 * porosity.by_ellipses(), 100 * porosity.by_widths()));
-  }
+  segment::tell_laid(sums_.laid, ranges_, machine, first_layer_points_, summary.results, *summary.facts);
   result("filament", fmt::format("{:.1f} mm, {:.2f} cm3, {:.2f} g", totals.filament_mm, filament_cm3, filament_g));
   result("printing", fmt::format("about {}", write::gcode::time_text(totals.seconds)));
 
@@ -206,12 +209,7 @@ void MoveMaker::tell(Summary& summary) const {
   facts["filament_mm"] = totals.filament_mm;
   facts["filament_g"] = filament_g;
   facts["print_seconds"] = totals.seconds;
-  facts["segments"] = {{"lines", segments.lines}, {"pieces", segments.pieces},   {"stretches", segments.stretches},
-                       {"thin", segments.thin},   {"points", segments.points()}, {"points_first_layer", first_layer_points_}};
-  facts["solid_mm3"] = porosity.solid_mm3;
-  facts["porosity"] = {{"by_extrusion", solid ? porosity.by_extrusion() : 0},
-                       {"by_ellipses", solid ? porosity.by_ellipses() : 0},
-                       {"by_widths", solid ? porosity.by_widths() : 0}};
+  facts["beside_mm3"] = totals.beside_mm3;
 }
 
 }  // namespace
@@ -221,18 +219,10 @@ void tell_moves(const Plan& plan, Summary& summary) {
   summary.machine = plan.moves->profile.machine.name;
   summary.format = plan.moves->profile.machine.format;
   summary.index_bytes = plan.sections->slicer().index_bytes();
-  nlohmann::ordered_json pores = nlohmann::ordered_json::array();
-  for (const auto& [heights, p] : plan.moves->pores) {
-    summary.head.emplace_back(
-        "pores", fmt::format("{}{:.2f} mm long, {:.3f} mm wide (ratio {:.2f}), {:.2f} a mm2 of layer",
-                             heights.empty() ? "" : heights + ": ", p.length_mm, p.width_mm, p.aspect, p.density_mm2));
-    pores.push_back({{"heights", heights},
-                     {"length_mm", p.length_mm},
-                     {"width_mm", p.width_mm},
-                     {"aspect", p.aspect},
-                     {"density_mm2", p.density_mm2}});
+  segment::tell_bead(plan.moves->profile.machine, plan.moves->left_out, summary.head, *summary.facts);
+  for (const auto& [heights, range] : plan.segments->segmented()) {
+    if (plan.job.dry_run && range->spaces_lines) segment::tell_foreseen(range->plan, heights, summary.head);
   }
-  (*summary.facts)["pores"] = pores;
 }
 
 std::unique_ptr<Maker> make_move_maker(const Plan& plan, Sanity& sanity, const FlowLimits& limits) {

@@ -6,19 +6,48 @@
 #include <optional>
 
 #include "pipeline/plan/layer_cut.h"
+#include "stages/segment/laid/crossing.h"
 #include "stages/segment/moves.h"
 
 namespace lamina::pipeline {
-double length_mm(const ToolpathsView& paths) {
-  double sum = 0;
-  for (std::uint32_t p = 0; p < paths.size(); ++p) {
-    for (std::uint32_t i = paths.offset[p]; i + 1 < paths.offset[p + 1]; ++i) {
-      const Point2 a = paths.point[i], b = paths.point[i + 1];
-      sum += std::hypot(static_cast<double>(b.x) - a.x, static_cast<double>(b.y) - a.y);
-    }
-  }
-  return sum * 1e-6;
+namespace {
+
+ToolpathsView paths_of(const Sections::Work& work, std::uint32_t area) {
+  ToolpathsView paths = work.paths;
+  paths.offset = paths.offset.subspan(work.path_area[area], work.path_area[area + 1] - work.path_area[area] + 1);
+  return paths;
 }
+
+/// The segmentation of an area at a layer, and its cut. errors  of layer_cut
+struct AreaCut {
+  const SegmentRange& range;
+  Result<segment::LayerCut> cut;
+};
+AreaCut cut_of(const Plan& plan, std::uint32_t area_number, const Layer& layer) {
+  const Sections::Area& area = plan.sections->areas()[area_number];
+  const SegmentRange& range = plan.segments->at(std::int64_t{layer.plane()} - area.box.lo.z);
+  return {range, layer_cut(range, plan.sections->filling(area, layer), layer, area.box)};
+}
+
+/// Counts pores that cross those of the part's next layer, which is made for it. errors  of Sections::layer and layer_cut
+Status count_crossed(const Plan& plan, std::uint32_t index, const Sections::Work& work, PoreCounts& pores) {
+  const std::vector<ScheduledLayer>& layers = plan.sections->layers();
+  std::uint32_t next = index + 1;
+  while (next < layers.size() && layers[next].part != layers[index].part) ++next;
+  if (next >= layers.size()) return {};
+  Sections::Work above;
+  if (Status status = plan.sections->layer(next, above); !status) return status;
+  for (std::uint32_t a = 0; a + 1 < work.path_area.size(); ++a) {
+    const AreaCut below = cut_of(plan, a, layers[index].own()), over = cut_of(plan, a, layers[next].own());
+    if (!below.cut) return below.cut.error();
+    if (!over.cut) return over.cut.error();
+    if (!below.range.settings.across || !over.range.settings.across) continue;
+    segment::count_crossed(paths_of(work, a), *below.cut, paths_of(above, a), *over.cut, pores);
+  }
+  return {};
+}
+
+}  // namespace
 
 PathFacts facts_of(const Sections::Work& work) {
   PathFacts facts;
@@ -35,30 +64,27 @@ PathFacts facts_of(const Sections::Work& work) {
 
 Result<bool> lay_moves(const Plan& plan, std::uint32_t index, const Sections::Work& work, const TextRoom& room,
                        write::LayerMoves& out, PathFacts& facts) {
-  const Sections& sections = *plan.sections;
-  const Layer layer = sections.layers()[index].own();
-  const ToolpathsView all = work.paths;
-  PathFacts laid;
+  const Layer layer = plan.sections->layers()[index].own();
+  LaidSums laid;
   laid.porosity.solid_mm3 = facts.area_mm2 * mm(layer.thickness);
   for (std::uint32_t a = 0; a + 1 < work.path_area.size(); ++a) {
-    const Sections::Area& area = sections.areas()[a];
-    const SegmentRange& range = plan.segments->at(std::int64_t{layer.plane()} - area.box.lo.z);
-    const auto cut = layer_cut(range, sections.filling(area, layer), layer, area.box);
+    const auto& [range, cut] = cut_of(plan, a, layer);
     if (!cut) return cut.error();
     segment::MoveTable table(range.plan, *cut, plan.moves->profile.machine, layer);
-    ToolpathsView paths = all;
-    paths.offset = all.offset.subspan(work.path_area[a], work.path_area[a + 1] - work.path_area[a] + 1);
-    if (Status status = check_stretch_count(range, *cut, paths, layer); !status) return status.error();
+    const ToolpathsView paths = paths_of(work, a);
+    if (Status status = segment::check_stretch_count(range.plan, *cut, paths, layer.index); !status) return status.error();
     const auto lay = [&](const BeadMove& move) -> std::optional<double> {
       const double length = out.lay(move);
       if (room.text.size() > room.most && !room.grown()) return std::nullopt;
       return length;
     };
-    if (!segment::for_each_move(paths, *cut, table, laid.segments, laid.porosity, lay)) return false;
+    if (!segment::for_each_move(paths, *cut, table, laid, lay)) return false;
   }
   facts.totals = out.finish();
-  facts.segments = laid.segments;
-  facts.porosity = laid.porosity;
+  if (plan.segments->crosses()) {
+    if (Status status = count_crossed(plan, index, work, laid.pores); !status) return status.error();
+  }
+  facts.laid = laid;
   return true;
 }
 

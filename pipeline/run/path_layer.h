@@ -17,9 +17,6 @@ namespace lamina::pipeline {
 /// Statistics of a layer's contours and stored paths, without the length of the paths.
 PathFacts facts_of(const Sections::Work& work);
 
-/// Length of stored paths.
-double length_mm(const ToolpathsView& paths);
-
 /// The text buffer of a writer, with a callback at a size limit.
 struct TextRoom {
   Buffer<char>& text;

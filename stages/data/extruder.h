@@ -4,10 +4,16 @@
 
 #include <array>
 #include <cstdint>
+#include <numbers>
+#include <optional>
 #include <string>
 #include <vector>
 
 namespace lamina {
+
+/// The cross-section of a bead of a width and height. A stadium is a rectangle with half circles at both sides, what
+/// PrusaSlicer and Slic3r take (their `Flow`). An ellipse has the same width and height and is narrower at the bottom.
+enum class BeadShape : std::uint8_t { kStadium, kRectangle, kEllipse };
 
 /// Everything that a profile says; what a job may change is changed here before anything is planned.
 struct Extruder {
@@ -24,9 +30,16 @@ struct Extruder {
     double nozzle_mm = 0.4;
     double filament_mm = 1.75;
     double density_g_cm3 = 1.24;
-    double flow = 1;  // factor on all that is extruded, found by measuring walls
+    // 100 % lays bead_area x flow: the shape of the bead, all of it in the volume. Absent: a stadium.
+    std::optional<BeadShape> bead_area;
+    double flow = 1;        // found by measuring walls
+    double feed_ratio = 1;  // the machine's error: filament that is fed / filament that E asks for
     double nozzle_degc = 200, bed_degc = 60;
     double first_nozzle_degc = 200, first_bed_degc = 60;  // while the first layer is laid
+
+    BeadShape shape() const { return bead_area.value_or(BeadShape::kStadium); }
+    /// What a millimetre of E lays, mm3.
+    double mm3_of_e() const { return feed_ratio * std::numbers::pi / 4 * filament_mm * filament_mm; }
   } material;
 
   struct Speed {

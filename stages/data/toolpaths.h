@@ -2,6 +2,8 @@
 // their way to a file: these are never stored, only passed on.
 #pragma once
 
+#include <algorithm>
+#include <cmath>
 #include <cstdint>
 #include <span>
 
@@ -75,6 +77,18 @@ struct Toolpaths {
   void close() { offset.push_back(static_cast<std::uint32_t>(point.size())); }
 };
 
+/// Length of all paths, mm.
+inline double length_mm(const ToolpathsView& paths) {
+  double sum = 0;
+  for (std::uint32_t p = 0; p < paths.size(); ++p) {
+    for (std::uint32_t i = paths.offset[p]; i + 1 < paths.offset[p + 1]; ++i) {
+      const Point2 a = paths.point[i], b = paths.point[i + 1];
+      sum += std::hypot(static_cast<double>(b.x) - a.x, static_cast<double>(b.y) - a.y);
+    }
+  }
+  return sum * 1e-6;
+}
+
 enum class Thickness : std::uint8_t {
   kReference,  // as wide as walls and continuous lines
   kThick,      // wide enough to touch the neighbouring lines
@@ -86,9 +100,10 @@ struct Stretch {
   Point2 from, to;  // nm; never equal
   PathKind kind;
   Thickness thickness;
-  Nm width;           // of the stored path: the reference width
-  std::int32_t line;  // kNoLine if none
-  bool jump;          // the nozzle travels to `from`, which is not where the stretch before ended
+  Nm width;               // of the stored path: the reference width
+  std::int32_t line;      // kNoLine if none
+  bool jump;              // the nozzle travels to `from`, which is not where the stretch before ended
+  std::uint32_t run = 0;  // index of the stored point where its line, curve or wall begins
 };
 
 /// What a machine is told of a stretch.
@@ -97,7 +112,7 @@ struct BeadMove {
   PathKind kind;
   bool jump;
   Nm width;         // nm, that the bead is expected to have: a tag for viewers
-  double area_mm2;  // cross-section of what is extruded: volume / length
+  double area_mm2;  // cross-section of what is laid: volume / length
   double speed_mm_s;
 };
 
@@ -117,21 +132,74 @@ struct SegmentCounts {
   }
 };
 
-/// Void share of what was planned: of the volume within the contours, by three ways to know what beads are.
+/// The pores beside thin stretches as they were laid. A side of a thin stretch is a pore where a line lies beside all of it,
+/// where the thick stretches at both of its ends reach that line, and where something stays open between.
+struct PoreCounts {
+  std::uint64_t closed = 0;            // pores
+  std::uint64_t open = 0;              // sides whose thick stretches do not reach the line beside them: a channel
+  std::uint64_t filled = 0;            // sides without room: round ends meet, or the thin stretch touches its neighbour
+  std::uint64_t edges = 0;             // sides along walls, and at ends of lines without a thick stretch
+  double length_mm = 0, width_mm = 0;  // sums over `closed`
+  double distance_mm = 0;              // centre to centre, sum over `open`
+  std::uint64_t crossing = 0;          // thin stretches with a turned layer above them, if pores are to cross
+  std::uint64_t crossed = 0;           // those that lie under a thin stretch of that layer
+
+  void add(const PoreCounts& other) {
+    closed += other.closed;
+    open += other.open;
+    filled += other.filled;
+    edges += other.edges;
+    length_mm += other.length_mm;
+    width_mm += other.width_mm;
+    distance_mm += other.distance_mm;
+    crossing += other.crossing;
+    crossed += other.crossed;
+  }
+};
+
+/// Stretches that end before the machine has reached their speed.
+struct ShortStretches {
+  std::uint64_t count = 0;
+  double shortest_mm = 0;                  // of them; 0 without any
+  double reached_mm_s = 0, told_mm_s = 0;  // of the one that becomes fastest: its speed, and the one it is told
+
+  void add(const ShortStretches& other) {
+    if (other.count == 0) return;
+    shortest_mm = count == 0 ? other.shortest_mm : std::min(shortest_mm, other.shortest_mm);
+    count += other.count;
+    if (other.reached_mm_s <= reached_mm_s) return;
+    reached_mm_s = other.reached_mm_s;
+    told_mm_s = other.told_mm_s;
+  }
+};
+
+/// Void share of what was planned: of the volume within the contours.
 struct PlannedPorosity {
   double solid_mm3 = 0;     // area within the contours x thickness, over all layers
-  double extruded_mm3 = 0;  // rounded rectangles: what is fed
-  double ellipses_mm3 = 0;  // the same beads as ellipses
-  double measured_mm3 = 0;  // rounded rectangles with the widths that were measured
+  double extruded_mm3 = 0;  // of the parts' beads: what the machine lays, its declared error included
+  double measured_mm3 = 0;  // stadia of the widths that were measured
   double by_extrusion() const { return 1 - extruded_mm3 / solid_mm3; }
-  double by_ellipses() const { return 1 - ellipses_mm3 / solid_mm3; }
   double by_widths() const { return 1 - measured_mm3 / solid_mm3; }
 
   void add(const PlannedPorosity& other) {
     solid_mm3 += other.solid_mm3;
     extruded_mm3 += other.extruded_mm3;
-    ellipses_mm3 += other.ellipses_mm3;
     measured_mm3 += other.measured_mm3;
+  }
+};
+
+/// All that is counted while the moves of a layer are laid.
+struct LaidSums {
+  SegmentCounts segments;
+  PlannedPorosity porosity;
+  PoreCounts pores;
+  ShortStretches shorts;
+
+  void add(const LaidSums& other) {
+    segments.add(other.segments);
+    porosity.add(other.porosity);
+    pores.add(other.pores);
+    shorts.add(other.shorts);
   }
 };
 

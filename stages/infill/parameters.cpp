@@ -1,5 +1,6 @@
 #include "stages/infill/parameters.h"
 
+#include <algorithm>
 #include <cmath>
 #include <numeric>
 
@@ -58,6 +59,18 @@ Nm layer_stagger(const FillParameters& parameters, std::uint32_t layer) {
     turn = layer / parameters.build_layers / period;
   }
   return parameters.stagger.empty() ? 0 : parameters.stagger[turn % parameters.stagger.size()];
+}
+
+double mean_distance_mm(const FillParameters& fill) {
+  if (fill.pattern == Pattern::kHoneycomb || fill.pattern == Pattern::kQuatrefoil) return mm(fill.cell) / 2;
+  double sum = 0;
+  if (!fill.distances.empty()) {
+    for (const Nm distance : fill.distances) sum += mm(distance);
+    return std::max(sum / static_cast<double>(fill.distances.size()), mm(fill.width) / 4);
+  }
+  for (const Nm gap : fill.gaps) sum += mm(gap);
+  const double mean = sum / static_cast<double>(std::max<std::size_t>(fill.gaps.size(), 1)) / fill.group;
+  return std::max(mm(fill.width) + mean, mm(fill.width) / 4);
 }
 
 }  // namespace lamina::infill

@@ -59,6 +59,9 @@ struct FillParameters {
 /// Settings as the stage takes them, in nm and micro-degrees; not checked, see check() in fill.h.
 FillParameters parameters_of(const Settings& settings);
 
+/// The mean distance of lines, mm; for estimates: tables and expressions of gaps do not count.
+double mean_distance_mm(const FillParameters& fill);
+
 /// Where a layer stands in its part.
 struct FillContext {
   Layer layer;

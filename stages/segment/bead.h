@@ -5,14 +5,12 @@
 #include <cmath>
 #include <numbers>
 
+#include "stages/data/extruder.h"
+
 namespace lamina::segment {
 
-/// kRoundedRectangle is what PrusaSlicer and Slic3r take (their `Flow`): a rectangle with half circles at both sides.
-/// kEllipse has the same width and height and is narrower at the bottom.
-enum class BeadShape { kRoundedRectangle, kEllipse, kRectangle };
-
-/// mm2. A bead no wider than it is high is taken as a round one with its width as the diameter.
-inline double bead_area(double width, double height, BeadShape shape = BeadShape::kRoundedRectangle) {
+/// mm2. A stadium no wider than it is high is round, with its width as the diameter.
+inline double bead_area(double width, double height, BeadShape shape = BeadShape::kStadium) {
   constexpr double kCircle = std::numbers::pi / 4;
   if (shape == BeadShape::kRectangle) return width * height;
   if (shape == BeadShape::kEllipse) return kCircle * width * height;
@@ -21,7 +19,7 @@ inline double bead_area(double width, double height, BeadShape shape = BeadShape
 }
 
 /// The width of a bead of that cross-section; the inverse of bead_area().
-inline double bead_width(double area, double height, BeadShape shape = BeadShape::kRoundedRectangle) {
+inline double bead_width(double area, double height, BeadShape shape = BeadShape::kStadium) {
   constexpr double kCircle = std::numbers::pi / 4;
   if (shape == BeadShape::kRectangle) return area / height;
   if (shape == BeadShape::kEllipse) return area / (kCircle * height);

@@ -182,7 +182,7 @@ class Expander {
 
   void give(Point2 from, Point2 to, std::uint32_t i, Thickness thickness) {
     if (from == to) return;
-    visit_(Stretch{from, to, paths_.kind[i], thickness, paths_.width[i], paths_.line[i], jump_});
+    visit_(Stretch{from, to, paths_.kind[i], thickness, paths_.width[i], paths_.line[i], jump_, i});
     jump_ = false;
   }
 

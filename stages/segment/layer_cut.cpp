@@ -1,5 +1,7 @@
 #include "stages/segment/layer_cut.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -50,6 +52,22 @@ LayerCut layer_cut(const Segmentation& plan, const CutPlace& place, const Box& p
   cut.shift = nm_of(place.shift_mm);
   cut.line.origin += cut.shift;
   return cut;
+}
+
+Status check_stretch_count(const Segmentation& plan, const LayerCut& cut, const ToolpathsView& paths, std::uint32_t layer) {
+  constexpr double kMostStretches = 1e7;
+  if (!cut.on) return {};
+  double length = 0;  // nm of segmented lines
+  for (std::uint32_t p = 0; p < paths.size(); ++p) {
+    for (std::uint32_t i = paths.offset[p]; i + 1 < paths.offset[p + 1]; ++i) {
+      if (cut.segments(paths.kind[i], paths.line[i])) length += expand_detail::distance(paths.point[i], paths.point[i + 1]);
+    }
+  }
+  if (2 * length / static_cast<double>(kNmPerMm) <= kMostStretches * (plan.thick_mm + plan.thin_mm)) return {};
+  return Error{Fault::kUsage,
+               fmt::format("layer {}: lines of {:.0f} mm come to more than 10000000 thick and thin stretches; give a "
+                           "longer segment.thick_mm or thin_mm",
+                           layer, length * 1e-6)};
 }
 
 }  // namespace lamina::segment

@@ -8,6 +8,8 @@
 
 #include "stages/data/angle.h"
 #include "stages/data/mesh.h"  // Box
+#include "stages/data/status.h"
+#include "stages/data/toolpaths.h"
 #include "stages/segment/expand.h"
 #include "stages/segment/predict.h"
 
@@ -36,5 +38,9 @@ std::array<double, 2> reach(const Box& part, const std::array<double, 2>& along)
 
 /// The cut of a layer. part  nm on the bed: grids of all its layers begin at its side
 LayerCut layer_cut(const Segmentation& plan, const CutPlace& place, const Box& part);
+
+/// Refuses a layer whose lines would be cut into more than 10,000,000 stretches. errors  kUsage
+/// paths  of one part. layer  its number, for the message
+Status check_stretch_count(const Segmentation& plan, const LayerCut& cut, const ToolpathsView& paths, std::uint32_t layer);
 
 }  // namespace lamina::segment

@@ -8,7 +8,7 @@
 namespace lamina::segment {
 
 MoveTable::MoveTable(const Segmentation& plan, const LayerCut& cut, const Extruder& machine, const Layer& layer)
-    : plan_(plan), cut_(cut), height_(mm(layer.thickness)) {
+    : plan_(plan), cut_(cut), machine_(machine), height_(mm(layer.thickness)) {
   const double limit = layer.index == 0 ? machine.speed.first_layer_mm_s : INFINITY;
   reference_ = std::min(machine.speed.print_mm_s, limit);
   wall_ = std::min(machine.speed.wall_mm_s, limit);
@@ -16,7 +16,11 @@ MoveTable::MoveTable(const Segmentation& plan, const LayerCut& cut, const Extrud
 }
 
 void MoveTable::make(const Stretch& s, Entry& entry) const {
-  const double width = mm(s.width), full = bead_area(width, height_);
+  const auto& material = machine_.material;
+  const double full = bead_area(mm(s.width), height_, material.shape()) * material.flow;
+  // What is laid is as wide as a bead of that volume; only an ellipse is another shape in truth.
+  const BeadShape laid = material.shape() == BeadShape::kEllipse ? BeadShape::kEllipse : BeadShape::kStadium;
+  const double width = bead_width(full, height_, laid);
   const bool fills = s.kind != PathKind::kOuter && s.kind != PathKind::kInner;
   double share = 1, speed = 100, bead = fills && cut_.on ? plan_.continuous_width_mm : width;
   if (s.thickness == Thickness::kThick)
@@ -26,10 +30,9 @@ void MoveTable::make(const Stretch& s, Entry& entry) const {
     share = thin.extrusion / 100, speed = thin.speed, bead = thin.width_mm;
   }
   entry.stored = s.width;
-  entry.width = s.thickness == Thickness::kReference ? s.width : static_cast<Nm>(nm_of(bead));
+  entry.width = static_cast<Nm>(nm_of(s.thickness == Thickness::kReference ? width : bead));
   entry.area = full * share;
-  entry.ellipse = bead_area(width, height_, BeadShape::kEllipse) * share;
-  entry.measured = bead_area(bead, height_);
+  entry.measured = bead_area(bead, height_, laid);
   const double reference = s.kind == PathKind::kOuter ? wall_ : s.kind == PathKind::kInner ? inner_ : reference_;
   entry.speed = reference * speed / 100;
 }

@@ -1,8 +1,13 @@
 // stages/segment/moves.h: the stored toolpaths of a layer become moves of a machine, one at a time: widths, cross-sections
 // and speeds of walls, continuous lines, thick and thin stretches. Stretches are expanded here and nowhere kept.
+//
+// There is one volume: what the machine lays at 100 % is the profile's bead_area x flow, times the extrusion of the stretch.
+// E, grams, porosity and the widths of walls and continuous lines follow from it.
 #pragma once
 
+#include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
@@ -11,6 +16,7 @@
 #include "stages/data/layer.h"
 #include "stages/data/toolpaths.h"
 #include "stages/segment/expand.h"
+#include "stages/segment/laid/pores.h"
 #include "stages/segment/predict.h"
 
 namespace lamina::segment {
@@ -18,13 +24,15 @@ namespace lamina::segment {
 /// What a machine does for each kind of stretch in a layer; made anew only where the stored width changes.
 class MoveTable {
  public:
-  /// plan, cut  have to outlive it
+  /// plan, cut, machine  have to outlive it
   MoveTable(const Segmentation& plan, const LayerCut& cut, const Extruder& machine, const Layer& layer);
 
   struct Entry {
-    Nm stored = -1, width = 0;                              // nm, of the path and of the bead
-    double area = 0, ellipse = 0, measured = 0, speed = 0;  // mm2, mm2, mm2, mm/s
+    Nm stored = -1, width = 0;                 // nm, of the path and of the bead
+    double area = 0, measured = 0, speed = 0;  // mm2, mm2, mm/s
   };
+  const Segmentation& plan() const { return plan_; }
+  const Extruder& machine() const { return machine_; }
 
   const Entry& of(const Stretch& s) {
     if (s.thickness == Thickness::kThin && !plan_.sweep.empty()) {
@@ -41,6 +49,7 @@ class MoveTable {
 
   const Segmentation& plan_;
   const LayerCut& cut_;
+  const Extruder& machine_;
   double height_, reference_, wall_, inner_;  // mm, mm/s
   std::array<Entry, 15> table_;
   Entry swept_;  // of a line of its own kind: not kept
@@ -79,15 +88,59 @@ class SegmentCounter {
   Thickness before_ = Thickness::kReference;
 };
 
+/// Counts thick and thin stretches that end before the machine has reached their speed. A planner makes the change of speed
+/// from one stretch of a line to the next within the faster of the two; at the ends of a line it begins and ends with half of
+/// the speed that the machine changes at once.
+class SpeedCounter {
+ public:
+  SpeedCounter(const Extruder& machine, ShortStretches& counts)
+      : acceleration_(machine.speed.acceleration_mm_s2), end_speed_(machine.speed.corner_mm_s / 2), counts_(counts) {}
+
+  void add(const Stretch& s, double length_mm, double speed_mm_s) {
+    const bool follows = s.run == run_ && s.from == at_ && before_ != Thickness::kReference;
+    if (follows && s.thickness == before_) {
+      length_ += length_mm;
+    } else {
+      if (before_ != Thickness::kReference) finish(follows ? speed_mm_s : end_speed_);
+      entry_ = follows ? speed_ : end_speed_;
+      length_ = length_mm;
+      speed_ = speed_mm_s;
+    }
+    run_ = s.run;
+    at_ = s.to;
+    before_ = s.thickness;
+  }
+  void end() {
+    if (before_ != Thickness::kReference) finish(end_speed_);
+    before_ = Thickness::kReference;
+  }
+
+ private:
+  void finish(double exit) {
+    const double from = std::min(entry_, speed_), to = std::min(exit, speed_);
+    const double reached = std::max({from, to, std::sqrt((from * from + to * to) / 2 + acceleration_ * length_)});
+    if (reached < speed_ * (1 - 1e-9)) counts_.add({1, length_, reached, speed_});
+  }
+
+  double acceleration_, end_speed_;
+  ShortStretches& counts_;
+  std::uint32_t run_ = UINT32_MAX;
+  Point2 at_{};
+  Thickness before_ = Thickness::kReference;
+  double entry_ = 0, length_ = 0, speed_ = 0;
+};
+
 /// Calls lay(const BeadMove&) for every move of the paths of a part in a layer; it gives the move's length in mm, or nothing
 /// to stop: no further move is laid.
-/// counts, volume  what was laid is added
-/// returns         false if `lay` stopped
+/// sums     what was laid is added
+/// returns  false if `lay` stopped
 template <class Lay>
-bool for_each_move(const ToolpathsView& paths, const LayerCut& cut, MoveTable& table, SegmentCounts& counts,
-                   PlannedPorosity& volume, Lay&& lay) {
+bool for_each_move(const ToolpathsView& paths, const LayerCut& cut, MoveTable& table, LaidSums& sums, Lay&& lay) {
   bool goes_on = true;
-  SegmentCounter counter(cut, counts);
+  SegmentCounter counter(cut, sums.segments);
+  SpeedCounter speeds(table.machine(), sums.shorts);
+  std::optional<PoreCounter> pores;
+  if (cut.on) pores.emplace(paths, cut, table.plan(), sums.pores);
   for_each_stretch(paths, cut, [&](const Stretch& s) {
     if (!goes_on) return;
     const MoveTable::Entry& entry = table.of(s);
@@ -96,11 +149,17 @@ bool for_each_move(const ToolpathsView& paths, const LayerCut& cut, MoveTable& t
       goes_on = false;
       return;
     }
-    volume.extruded_mm3 += *length * entry.area;
-    volume.ellipses_mm3 += *length * entry.ellipse;
-    volume.measured_mm3 += *length * entry.measured;
+    sums.porosity.extruded_mm3 += *length * entry.area;
+    sums.porosity.measured_mm3 += *length * entry.measured;
+    if (!pores) return;
     counter.add(s);
+    speeds.add(s, *length, entry.speed);
+    pores->add(s);
   });
+  if (pores && goes_on) {
+    speeds.end();
+    pores->end();
+  }
   return goes_on;
 }
 

@@ -95,7 +95,7 @@ std::vector<std::string> warnings(const Segmentation& s, const Calibration& cali
     }
   }
   const double gap = s.spacing_sc_mm - (s.thick_width_mm + s.continuous_width_mm) / 2;
-  if (gap > 0.02) {
+  if (gap > kBondGap) {
     lines.push_back(
         fmt::format("segment.spacing_sc_mm: thick stretches and continuous lines will be {:.3f} mm apart and not bond; "
                     "give {:.3f} mm",

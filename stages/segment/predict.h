@@ -42,6 +42,9 @@ Status check(const Segmentation& segmentation, double bead_width_mm);
 /// What a user should know: a pore that closes, speeds outside of what was measured, beads that do not touch.
 std::vector<std::string> warnings(const Segmentation& segmentation, const Calibration& calibration);
 
+/// Beads that are no further apart than this, mm, bond: they spread by as much.
+inline constexpr double kBondGap = 0.02;
+
 /// A pore beside a thin stretch. Beads are laid as by a round pen: thick stretches end in half circles that reach into
 /// the thin one, so a pore is shorter than the thin stretch by one thick width; across, it is what the spacing leaves
 /// between the thin stretch and the continuous line.

@@ -18,8 +18,9 @@ namespace lamina::write {
 struct MoveTotals {
   std::uint64_t moves = 0, travels = 0, retractions = 0;
   double bead_mm = 0, travel_mm = 0;
-  double volume_mm3 = 0;   // of beads, before the flow factor
-  double filament_mm = 0;  // fed, with the flow factor; what is drawn back comes again and does not count
+  double volume_mm3 = 0;   // of all that is laid: filament_mm x the filament's area x the machine's declared error
+  double beside_mm3 = 0;   // the share of volume_mm3 that lies beside the parts: prime lines, skirts
+  double filament_mm = 0;  // sum of E; what is drawn back comes again and does not count
   double seconds = 0;      // estimated: changes of speed take the profile's acceleration, corners its corner speed
   std::int64_t lo_x = INT64_MAX, lo_y = INT64_MAX, hi_x = INT64_MIN, hi_y = INT64_MIN;  // nm, of beads' centres
 
@@ -30,6 +31,7 @@ struct MoveTotals {
     bead_mm += other.bead_mm;
     travel_mm += other.travel_mm;
     volume_mm3 += other.volume_mm3;
+    beside_mm3 += other.beside_mm3;
     filament_mm += other.filament_mm;
     seconds += other.seconds;
     lo_x = std::min(lo_x, other.lo_x);

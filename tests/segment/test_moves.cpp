@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <numbers>
 #include <vector>
 
 #include "stages/segment/bead.h"
@@ -79,12 +80,11 @@ TEST(Moves, AreAllThatIsLaidWithTheSpeedAndAreaOfTheirKind) {
   Extruder machine;
   const Layer layer{4, 1'000'000, 300'000};
   MoveTable table(plan, cut, machine, layer);
-  SegmentCounts counts;
-  PlannedPorosity volume;
+  LaidSums sums;
   std::vector<BeadMove> moves;
   double length_mm = 0;
   const Toolpaths all = paths();
-  const bool whole = for_each_move(all, cut, table, counts, volume, [&](const BeadMove& move) -> std::optional<double> {
+  const bool whole = for_each_move(all, cut, table, sums, [&](const BeadMove& move) -> std::optional<double> {
     moves.push_back(move);
     const double length = std::hypot(mm(move.to.x - move.from.x), mm(move.to.y - move.from.y));
     length_mm += length;
@@ -92,10 +92,10 @@ TEST(Moves, AreAllThatIsLaidWithTheSpeedAndAreaOfTheirKind) {
   });
   EXPECT_TRUE(whole);
   EXPECT_NEAR(length_mm, 80, 1e-9);
-  EXPECT_EQ(counts.lines, 2u);
-  EXPECT_EQ(counts.pieces, 2u);
-  EXPECT_GT(counts.thin, 0u);
-  EXPECT_EQ(counts.stretches, 2 * counts.thin + 2);  // thick at both ends
+  EXPECT_EQ(sums.segments.lines, 2u);
+  EXPECT_EQ(sums.segments.pieces, 2u);
+  EXPECT_GT(sums.segments.thin, 0u);
+  EXPECT_EQ(sums.segments.stretches, 2 * sums.segments.thin + 2);  // thick at both ends
   const double full = bead_area(0.4, 0.3);
   EXPECT_EQ(moves.front().speed_mm_s, machine.speed.wall_mm_s);
   EXPECT_EQ(moves.front().width, 400'000);
@@ -107,12 +107,12 @@ TEST(Moves, AreAllThatIsLaidWithTheSpeedAndAreaOfTheirKind) {
     const double share = move.speed_mm_s / machine.speed.print_mm_s * 100;
     EXPECT_TRUE(share == 100 || share == plan.thick_speed || share == plan.thin_speed) << share;
   }
-  EXPECT_NEAR(volume.extruded_mm3, fed, 1e-9);
+  EXPECT_NEAR(sums.porosity.extruded_mm3, fed, 1e-9);
 
   // A first layer is laid no faster than its limit, and a sink that stops is given nothing more.
   MoveTable first(plan, cut, machine, {0, 0, 300'000});
   std::size_t laid = 0;
-  EXPECT_FALSE(for_each_move(all, cut, first, counts, volume, [&](const BeadMove& move) -> std::optional<double> {
+  EXPECT_FALSE(for_each_move(all, cut, first, sums, [&](const BeadMove& move) -> std::optional<double> {
     if (move.kind == PathKind::kOuter) {
       EXPECT_EQ(move.speed_mm_s, machine.speed.first_layer_mm_s);
     }
@@ -120,6 +120,71 @@ TEST(Moves, AreAllThatIsLaidWithTheSpeedAndAreaOfTheirKind) {
     return 1.0;
   }));
   EXPECT_EQ(laid, 3u);
+}
+
+/// What is laid of 1 mm of wall of 0.4 x 0.3 mm, and how wide it is told to be.
+MoveTable::Entry wall_of(const Extruder& machine) {
+  const Segmentation plan;
+  const LayerCut cut;
+  MoveTable table(plan, cut, machine, {4, 1'000'000, 300'000});
+  return table.of({{0, 0}, {kMm, 0}, PathKind::kOuter, Thickness::kReference, 400'000, kNoLine, true});
+}
+
+TEST(Moves, OneVolumeIsTheProfilesAreaTimesItsFlowAndTheWidthsAreThoseOfThatVolume) {
+  Extruder machine;
+  EXPECT_NEAR(wall_of(machine).area, 0.3 * 0.1 + std::numbers::pi / 4 * 0.09, 1e-12);
+  EXPECT_EQ(wall_of(machine).width, 400'000);
+  machine.material.flow = 0.9;  // of a profile without bead_area: a share of the stadium, as E always was
+  EXPECT_NEAR(wall_of(machine).area, 0.9 * (0.3 * 0.1 + std::numbers::pi / 4 * 0.09), 1e-12);
+  machine.material.bead_area = BeadShape::kRectangle;
+  machine.material.flow = 0.85;
+  EXPECT_NEAR(wall_of(machine).area, 0.102, 1e-12);
+  EXPECT_EQ(wall_of(machine).width, 404'381);  // 0.102 / 0.3 + 0.3 (1 - pi / 4), where two walls measured 0.80
+  machine.material.feed_ratio = 1.1;           // of the machine: it changes E, not what is laid
+  EXPECT_NEAR(wall_of(machine).area, 0.102, 1e-12);
+  EXPECT_NEAR(machine.material.mm3_of_e(), 1.1 * std::numbers::pi / 4 * 1.75 * 1.75, 1e-12);
+  machine.material.bead_area = BeadShape::kEllipse;
+  machine.material.flow = 1;
+  EXPECT_NEAR(wall_of(machine).area, std::numbers::pi / 4 * 0.12, 1e-12);
+  EXPECT_EQ(wall_of(machine).width, 400'000);
+}
+
+TEST(Moves, StretchesThatAccelerationCannotFollowAreCountedWithTheSpeedThatTheyReach) {
+  Extruder machine;
+  machine.speed.acceleration_mm_s2 = 400;
+  machine.speed.corner_mm_s = 8;
+  ShortStretches shorts;
+  SpeedCounter counter(machine, shorts);
+  Nm at = 0;
+  const auto lay = [&](Thickness thickness, double length, double speed) {
+    const Nm to = at + static_cast<Nm>(nm_of(length));
+    counter.add({{at, 0}, {to, 0}, PathKind::kRaster, thickness, 400'000, 0, false, 7}, length, speed);
+    at = to;
+  };
+  // Half of 1.5 mm is left to speed up from 7.5 mm/s: sqrt(7.5^2 + 2 x 400 x 0.75) = 25.6 of 30 mm/s.
+  for (int i = 0; i < 5; ++i) {
+    lay(Thickness::kThick, 1.5, 7.5);
+    lay(Thickness::kThin, i == 4 ? 1.7 : 1.5, 30);
+  }
+  lay(Thickness::kThick, 1.5, 7.5);
+  counter.end();
+  EXPECT_EQ(shorts.count, 5u);
+  EXPECT_NEAR(shorts.shortest_mm, 1.5, 1e-12);
+  EXPECT_NEAR(shorts.reached_mm_s, std::sqrt(7.5 * 7.5 + 400 * 1.7), 1e-9);
+  EXPECT_NEAR(shorts.told_mm_s, 30, 1e-12);
+  // 2.2 mm are enough: 30^2 - 7.5^2 = 843.75 = 400 x 2.11. Corners of a curve do not divide a stretch.
+  shorts = {};
+  lay(Thickness::kThick, 1.5, 7.5);
+  lay(Thickness::kThin, 1.1, 30);
+  lay(Thickness::kThin, 1.1, 30);
+  lay(Thickness::kThick, 1.5, 7.5);
+  counter.end();
+  EXPECT_EQ(shorts.count, 0u);
+  // What ends in the air begins or ends with half of the speed of a corner.
+  lay(Thickness::kThin, 1, 30);
+  counter.end();
+  EXPECT_EQ(shorts.count, 1u);
+  EXPECT_NEAR(shorts.reached_mm_s, std::sqrt(4 * 4 + 400 * 1), 1e-9);
 }
 
 }  // namespace

@@ -26,6 +26,16 @@ std::string read_source(Text text, Profile& profile) {
 }
 std::string write_source(const Profile& profile) { return profile.calibration.source; }
 
+constexpr Word<BeadShape> kShapes[] = {
+    {"stadium", BeadShape::kStadium}, {"rectangle", BeadShape::kRectangle}, {"ellipse", BeadShape::kEllipse}};
+std::string read_shape(Text text, std::optional<BeadShape>& shape) {
+  BeadShape read;
+  std::string wrong = read_word(kShapes, text, read);
+  if (wrong.empty()) shape = read;
+  return wrong;
+}
+std::string write_shape(const std::optional<BeadShape>& shape) { return shape ? write_word(kShapes, *shape) : std::string(); }
+
 /// A list with an entry a line, as files of many rows are written.
 std::string lines_text(const std::vector<std::string>& entries) {
   std::string text = "[\n";
@@ -121,7 +131,10 @@ constexpr Key<Profile> kKeys[] = {
     field<kMachine, &Extruder::material, &Material::nozzle_mm>({"material", "nozzle_mm"}, {0.01, 20, " mm"}),
     field<kMachine, &Extruder::material, &Material::filament_mm>({"material", "filament_mm"}, {0.1, 20, " mm"}),
     field<kMachine, &Extruder::material, &Material::density_g_cm3>({"material", "density_g_cm3"}, {0.01, 30, " g/cm3"}),
+    custom<Profile, read_shape, write_shape, kMachine, &Extruder::material, &Material::bead_area>({"material", "bead_area"},
+                                                                                                  Form::kString),
     field<kMachine, &Extruder::material, &Material::flow>({"material", "flow"}, {0.01, 10}),
+    field<kMachine, &Extruder::material, &Material::feed_ratio>({"material", "feed_ratio"}, {0.1, 10}),
     field<kMachine, &Extruder::material, &Material::nozzle_degc>({"material", "nozzle_degc"}, kNozzle),
     field<kMachine, &Extruder::material, &Material::bed_degc>({"material", "bed_degc"}, kPlate),
     field<kMachine, &Extruder::material, &Material::first_nozzle_degc>({"material", "first_nozzle_degc"}, kNozzle),
@@ -198,7 +211,8 @@ std::string set_extruder_key(std::string_view name, std::string_view value, Extr
 }
 
 std::string extruder_text(const ExtruderProfile& profile) {
-  return sections_text<Profile>(kKeys, profile, [&](const Key<Profile>& key, const std::string&) {
+  return sections_text<Profile>(kKeys, profile, [&](const Key<Profile>& key, const std::string& value) {
+    if (key.name == "bead_area" && value.empty()) return false;
     return key.section != "calibration" || profile.own_calibration;
   });
 }

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <string_view>
 
 #include "stages/data/units.h"
@@ -36,8 +35,7 @@ int type_of(PathKind kind) { return kind == PathKind::kOuter ? 0 : kind == PathK
 
 LayerWriter::LayerWriter(const Extruder& machine, const Layer& layer, std::uint32_t layers, Buffer<char>& out)
     : machine_(machine), out_(out), height_(layer.thickness) {
-  const double filament = machine.material.filament_mm;
-  feed_per_volume_ = machine.material.flow / (std::numbers::pi / 4 * filament * filament);
+  feed_per_volume_ = 1 / machine.material.mm3_of_e();
   corner_x_ = nm_of(machine.bed.corner_mm[0]);
   corner_y_ = nm_of(machine.bed.corner_mm[1]);
   retracted_ = machine.retraction.length_mm > 0;
@@ -264,8 +262,7 @@ std::string time_text(double seconds) {
 
 void append_tail(const Extruder& machine, const MoveTotals& totals, std::uint32_t layers, Buffer<char>& out) {
   append(out, fill_code(machine.code.end, machine, layers, layers == 0 ? 0 : layers - 1, 0));
-  const double filament = machine.material.filament_mm;
-  const double cm3 = totals.filament_mm * std::numbers::pi / 4 * filament * filament / 1000;
+  const double cm3 = totals.filament_mm * machine.material.mm3_of_e() / 1000;
   append(out, fmt::format("; filament used [mm] = {:.2f}\n; filament used [cm3] = {:.2f}\n; filament used [g] = {:.2f}\n"
                           "; estimated printing time (normal mode) = {}\n",
                           totals.filament_mm, cm3, cm3 * machine.material.density_g_cm3, time_text(totals.seconds)));

@@ -30,11 +30,13 @@ class LineWriter {
     char text[32];
     out_.append(text, fmt::format_to(text, FMT_COMPILE("{}"), value));
   }
-  /// A number that lines of earlier builds lack.
+  /// A number that older manifests lack.
   template <class Number>
   void added(std::string_view key, const Number& value) {
     number(key, value);
   }
+  /// A number that only older manifests have.
+  void retired(std::string_view) {}
   /// A text determined by the rest of the line.
   void fixed(std::string_view key, std::string_view value) {
     begin(key);
@@ -87,7 +89,11 @@ class LineReader {
   }
   template <class Number>
   void added(std::string_view key, Number& value) {
-    if (rest_.starts_with(fmt::format("{}\"{}\": ", first_ ? "" : ", ", key))) number(key, value);
+    if (follows(key)) number(key, value);
+  }
+  void retired(std::string_view key) {
+    double unused = 0;
+    if (follows(key)) number(key, unused);
   }
   void fixed(std::string_view key, std::string_view value) {
     begin(key);
@@ -132,6 +138,10 @@ class LineReader {
     if (!first_) expect(take(", "));
     expect(take("\"") && take(key) && take("\": "));
     first_ = false;
+  }
+  /// Whether a number under that key comes next in an object that has begun.
+  bool follows(std::string_view key) const {
+    return rest_.starts_with(", \"") && rest_.substr(3).starts_with(key) && rest_.substr(3 + key.size()).starts_with("\": ");
   }
   bool take(std::string_view piece) {
     if (!rest_.starts_with(piece)) return false;

@@ -18,20 +18,35 @@ void describe_moves(Io& io, Paths& paths) {
   io.number("laid_mm", t.bead_mm);
   io.number("travel_mm", t.travel_mm);
   io.number("volume_mm3", t.volume_mm3);
+  io.added("beside_mm3", t.beside_mm3);
   io.number("filament_mm", t.filament_mm);
   io.number("seconds", t.seconds);
   io.number("low_x_nm", t.lo_x);
   io.number("low_y_nm", t.lo_y);
   io.number("high_x_nm", t.hi_x);
   io.number("high_y_nm", t.hi_y);
-  io.number("segmented_lines", paths.segments.lines);
-  io.number("pieces", paths.segments.pieces);
-  io.number("stretches", paths.segments.stretches);
-  io.number("thin", paths.segments.thin);
-  io.number("solid_mm3", paths.porosity.solid_mm3);
-  io.number("extruded_mm3", paths.porosity.extruded_mm3);
-  io.number("ellipses_mm3", paths.porosity.ellipses_mm3);
-  io.number("measured_mm3", paths.porosity.measured_mm3);
+  auto& laid = paths.laid;
+  io.number("segmented_lines", laid.segments.lines);
+  io.number("pieces", laid.segments.pieces);
+  io.number("stretches", laid.segments.stretches);
+  io.number("thin", laid.segments.thin);
+  io.number("solid_mm3", laid.porosity.solid_mm3);
+  io.number("extruded_mm3", laid.porosity.extruded_mm3);
+  io.retired("ellipses_mm3");
+  io.number("measured_mm3", laid.porosity.measured_mm3);
+  io.added("pores", laid.pores.closed);
+  io.added("pores_open", laid.pores.open);
+  io.added("pores_filled", laid.pores.filled);
+  io.added("pores_at_edges", laid.pores.edges);
+  io.added("pores_length_mm", laid.pores.length_mm);
+  io.added("pores_width_mm", laid.pores.width_mm);
+  io.added("pores_distance_mm", laid.pores.distance_mm);
+  io.added("crossing", laid.pores.crossing);
+  io.added("crossed", laid.pores.crossed);
+  io.added("too_short", laid.shorts.count);
+  io.added("shortest_mm", laid.shorts.shortest_mm);
+  io.added("reached_mm_s", laid.shorts.reached_mm_s);
+  io.added("told_mm_s", laid.shorts.told_mm_s);
 }
 
 template <class Io, class Paths>

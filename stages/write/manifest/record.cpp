@@ -12,8 +12,7 @@ void PathFacts::add(const PathFacts& other) {
   bead_mm += other.bead_mm;
   stored_points += other.stored_points;
   totals.add(other.totals);
-  segments.add(other.segments);
-  porosity.add(other.porosity);
+  laid.add(other.laid);
 }
 
 }  // namespace lamina

@@ -37,8 +37,7 @@ struct PathFacts {
   // --- toolpaths of an extrusion printer
   std::uint64_t stored_points = 0;
   write::MoveTotals totals;
-  SegmentCounts segments;
-  PlannedPorosity porosity;
+  LaidSums laid;
 
   /// Sums the fields. Summed in layer order, the result is deterministic.
   void add(const PathFacts& other);

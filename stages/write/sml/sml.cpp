@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
 #include "stages/data/units.h"
 #include "stages/write/decimal.h"
@@ -39,8 +38,7 @@ class SmlLayer final : public LayerMoves {
     std::string height = machine.sml.height;
     replace_all(height, "{z}", mils(std::int64_t{layer.bottom} + layer.thickness));
     append(out_, height + "\n");
-    const double filament = machine.material.filament_mm;
-    feed_per_volume_ = machine.material.flow / (std::numbers::pi / 4 * filament * filament);
+    feed_per_volume_ = 1 / machine.material.mm3_of_e();
   }
 
   double lay(const BeadMove& move) override {

@@ -202,9 +202,8 @@ TEST_F(ExtrudeProgram, VolumesPlacesAndLayersOfAFileAreThoseOfThePlan) {
     EXPECT_EQ(json["moves"], beads);
     EXPECT_GE(gcode.lo_x, 0);
     EXPECT_LE(gcode.hi_x, 220);
-    const double flow = machine == "anet-a8" ? 0.85 : 1;
     const double volume = filament * std::numbers::pi / 4 * 1.75 * 1.75;
-    EXPECT_NEAR(volume / (json["volume_mm3"].get<double>() * flow), 1, 0.001);
+    EXPECT_NEAR(volume / json["volume_mm3"].get<double>(), 1, 1e-5);
     EXPECT_GT(json["print_seconds"].get<double>(), 0);
   }
 }
@@ -267,7 +266,7 @@ TEST_F(ExtrudeProgram, ClosedCurvesAreSegmentedFromTheOutsideInWithThickSeams) {
   EXPECT_EQ(json["segments"]["pieces"], segmented);
   EXPECT_GE(segmented, 4 * 2 * 3);
   const double volume = filament * std::numbers::pi / 4 * 1.75 * 1.75;
-  EXPECT_NEAR(volume / (json["volume_mm3"].get<double>() * 0.85), 1, 0.001);
+  EXPECT_NEAR(volume / json["volume_mm3"].get<double>(), 1, 1e-5);
 }
 
 TEST_F(ExtrudeProgram, AFileIsNotReplacedUnaskedItsManifestVouchesForItAndWhatIsInterruptedGoesOn) {

@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <filesystem>
+#include <map>
 #include <nlohmann/json.hpp>
 #include <set>
 
@@ -77,6 +78,24 @@ void expect_thick_ends(const test::GcodeLayer& layer, double thin_feed, const st
   }
   EXPECT_GT(segmented, 0) << name;
   EXPECT_EQ(ways.size(), 1) << name;
+}
+
+/// Nothing is fitted: 100 % is 0.85 of the rectangle of bead and layer, as the document prints its flow.
+void expect_porosity_of_table_17(const std::map<std::string, double>& planned) {
+  int near = 0, count = 0;
+  double squares = 0;
+  for (const auto& row : test::table(17)) {
+    const std::string name = row.at("configuration");
+    ASSERT_EQ(planned.count(name), 1u) << name;
+    const double error = 100 * planned.at(name) - number(row, "effective_porosity_percent");
+    testing::Test::RecordProperty(name, std::to_string(error));
+    near += std::abs(error) <= 2 ? 1 : 0;
+    squares += error * error;
+    ++count;
+  }
+  EXPECT_EQ(count, 7);
+  EXPECT_GE(near, 6);
+  EXPECT_LE(std::sqrt(squares / count), 1.4);
 }
 
 TEST_F(Samples, SpeedsOfTable3AndExtrusionsOfTable4GoFromLineToLine) {
@@ -163,9 +182,11 @@ TEST_F(Samples, RepeatedStretchesOfTables5To7HaveTheirSpeedsExtrusionsAndSpacing
 
 TEST_F(Samples, CylindersOfTable8Have85LayersAndTheirSpacings) {
   const std::string part = cylinder(25.4, 25.4);
+  std::map<std::string, double> porosity;
   for (const auto& row : test::table(8)) {
     const std::string name = row.at("configuration");
     const auto sample = plan(name, part);
+    porosity[name] = sample.json["porosity"]["by_extrusion"].get<double>();
     ASSERT_EQ(sample.gcode.layers.size(), 85) << name;
     EXPECT_NEAR(sample.gcode.layers.back().z, 25.5, 1e-9);
     for (const std::size_t n : {0, 42, 84}) expect_thick_ends(sample.gcode.layers[n], 1800, name);
@@ -200,7 +221,10 @@ TEST_F(Samples, CylindersOfTable8Have85LayersAndTheirSpacings) {
     }
     EXPECT_GT(segmented, 8) << name;
   }
-  EXPECT_EQ(plan("Raster", part).gcode.layers.size(), 85);
+  const auto raster = plan("Raster", part);
+  EXPECT_EQ(raster.gcode.layers.size(), 85);
+  porosity["Raster"] = raster.json["porosity"]["by_extrusion"].get<double>();
+  expect_porosity_of_table_17(porosity);
 }
 
 TEST_F(Samples, TheTomographyCylinderHasThreeFillingsByHeightAndDenseLayersAt90DegreesBetween) {
@@ -242,23 +266,46 @@ TEST_F(Samples, TheTomographyCylinderHasThreeFillingsByHeightAndDenseLayersAt90D
   }
 }
 
+/// The thin stretches of the first layer, along x or y, that meet one of the second, which is turned.
+void expect_crossed_as_told(const test::GcodeFile& gcode, const nlohmann::json& told) {
+  const auto is_thin = [](const GcodeBead& b) { return b.feed == 1800 && b.type == "Internal infill"; };
+  const auto between = [](double a, double at, double b) { return std::min(a, b) <= at && at <= std::max(a, b); };
+  int thin = 0, meet = 0;
+  for (const GcodeBead& a : gcode.layers[0].beads) {
+    if (!is_thin(a)) continue;
+    ++thin;
+    meet += std::ranges::any_of(gcode.layers[1].beads, [&](const GcodeBead& b) {
+      if (!is_thin(b)) return false;
+      const bool along_x = std::abs(a.y1 - a.y0) < 1e-9;
+      return along_x ? between(a.x0, b.x0, a.x1) && between(b.y0, a.y0, b.y1)
+                     : between(a.y0, b.y0, a.y1) && between(b.x0, a.x0, b.x1);
+    });
+  }
+  EXPECT_EQ(told["crossing"], thin);
+  EXPECT_EQ(told["crossed"], meet);
+  // One in (thick + thin) / distance of segmented lines meets one, and the outermost have fewer to meet.
+  EXPECT_GT(meet, thin / 5);
+  EXPECT_LT(meet, thin * 2 / 5);
+}
+
 TEST_F(Samples, PoresOfLayersTurnedBy90DegreesLieOverEachOther) {
-  const auto outcome = test::run_lamina({"extrude",         block(21, 17, 0.6f),
-                                         "--machine",       "anet-a8",
-                                         "--layer",         "0.3",
-                                         "--fill",          "segmented",
-                                         "--angle",         "90",
-                                         "--angle-step",    "90",
-                                         "--spacing-sc",    "0.5",
-                                         "--thin",          "1.5",
-                                         "--thick",         "1.5",
-                                         "--set",           "segment.across=true",
-                                         "--quiet",         "-o",
-                                         folder / "a.gcode"},
+  const auto outcome = test::run_lamina({"extrude",      block(21, 17, 0.6f),
+                                         "--machine",    "anet-a8",
+                                         "--layer",      "0.3",
+                                         "--fill",       "segmented",
+                                         "--angle",      "90",
+                                         "--angle-step", "90",
+                                         "--spacing-sc", "0.5",
+                                         "--thin",       "1.5",
+                                         "--thick",      "1.5",
+                                         "--set",        "segment.across=true",
+                                         "--json",       "--quiet",
+                                         "-o",           folder / "a.gcode"},
                                         folder.path());
   ASSERT_EQ(outcome.code, 0) << outcome.err;
   const auto gcode = test::read_gcode(test::read_text(folder / "a.gcode"));
   ASSERT_EQ(gcode.error, "");
+  expect_crossed_as_told(gcode, nlohmann::json::parse(outcome.out, nullptr, false)["pores"][0]);
   // Middles of thin stretches lie on the segmented lines of the other layer, which are 1 mm apart.
   const auto thin_of = [&](std::size_t layer) {
     std::vector<std::array<double, 2>> middles;

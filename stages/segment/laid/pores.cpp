@@ -1,0 +1,135 @@
+#include "stages/segment/laid/pores.h"
+
+#include <algorithm>
+#include <cmath>
+#include <tuple>
+
+namespace lamina::segment {
+namespace {
+
+constexpr double kNear = 10;  // nm: places are rounded, and so are the ends of lines
+
+double distance_to(Point2 p, Point2 a, Point2 b) {
+  const double dx = static_cast<double>(b.x) - a.x, dy = static_cast<double>(b.y) - a.y;
+  const double px = static_cast<double>(p.x) - a.x, py = static_cast<double>(p.y) - a.y;
+  const double square = dx * dx + dy * dy;
+  const double share = square > 0 ? std::clamp((px * dx + py * dy) / square, 0.0, 1.0) : 0;
+  return std::hypot(px - share * dx, py - share * dy);
+}
+
+}  // namespace
+
+LineNeighbours::LineNeighbours(const ToolpathsView& paths, const LayerCut& cut) : paths_(paths), cut_(cut) {
+  for (std::uint32_t p = 0; p < paths.size(); ++p) {
+    const std::uint32_t last = paths.offset[p + 1] - 1;
+    for (std::uint32_t i = paths.offset[p]; i < last;) {
+      std::uint32_t end = i + 1;
+      while (end < last && paths.kind[end] == paths.kind[i] && paths.line[end] == paths.line[i]) ++end;
+      if (paths.line[i] != kNoLine) {
+        const Point2 a = paths.point[i], b = paths.point[end];
+        const auto [low, high] = std::minmax({along(a), along(b)});
+        const double across = cut.along_x * a.y - cut.along_y * a.x;
+        lines_.push_back({paths.kind[i], end == i + 1, paths.line[i], i, end, low, high, across});
+      }
+      i = end;
+    }
+  }
+  std::ranges::sort(lines_, {}, [](const Line& l) { return std::tuple(l.kind, l.number, l.low, l.run); });
+  order_.resize(lines_.size());
+  for (std::uint32_t i = 0; i < order_.size(); ++i) order_[i] = i;
+  std::ranges::sort(order_, {}, [&](std::uint32_t i) { return lines_[i].run; });
+}
+
+void LineNeighbours::look_up(std::uint32_t run) {
+  run_ = run;
+  line_ = nullptr;
+  const auto at = std::ranges::lower_bound(order_, run, {}, [&](std::uint32_t i) { return lines_[i].run; });
+  if (at == order_.end() || lines_[*at].run != run) return;
+  line_ = &lines_[*at];
+  const auto before = [](const Line& a, const Line& b) { return std::tuple(a.kind, a.number) < std::tuple(b.kind, b.number); };
+  for (std::size_t side = 0; side < 2; ++side) {
+    Line wanted = *line_;
+    wanted.number += side == 0 ? -1 : 1;
+    const auto found = std::equal_range(lines_.begin(), lines_.end(), wanted, before);
+    beside_[side] = {found.first, found.second};
+    if (!line_->straight) curve_[side] = curve_at(beside_[side]);
+  }
+}
+
+std::optional<double> LineNeighbours::curve_at(std::span<const Line> beside) const {
+  std::uint32_t longest = line_->run;
+  double most = -1;
+  for (std::uint32_t i = line_->run; i < line_->end; ++i) {
+    const double length = expand_detail::distance(paths_.point[i], paths_.point[i + 1]);
+    if (length > most) most = length, longest = i;
+  }
+  const Point2 middle = expand_detail::between(paths_.point[longest], paths_.point[longest + 1], 0, 2, 1);
+  double nearest = INFINITY;
+  for (const Line& line : beside) {
+    for (std::uint32_t i = line.run; i < line.end; ++i) {
+      nearest = std::min(nearest, distance_to(middle, paths_.point[i], paths_.point[i + 1]));
+    }
+  }
+  if (nearest == INFINITY) return std::nullopt;
+  return nearest * 1e-6;
+}
+
+std::optional<double> LineNeighbours::straight_at(std::span<const Line> beside, double low, double high) const {
+  std::size_t at = beside.size();  // the piece that begins last at or before `low` is the one before
+  while (at > 0 && beside[at - 1].low > low + kNear) --at;
+  if (at == 0 || !beside[at - 1].straight || beside[at - 1].high < high - kNear) return std::nullopt;
+  return std::abs(beside[at - 1].across - line_->across) * 1e-6;
+}
+
+std::array<std::optional<double>, 2> LineNeighbours::of(std::uint32_t run, double low, double high) {
+  if (run != run_) look_up(run);
+  if (line_ == nullptr) return {};
+  if (!line_->straight) return curve_;
+  return {straight_at(beside_[0], low, high), straight_at(beside_[1], low, high)};
+}
+
+PoreCounter::PoreCounter(const ToolpathsView& paths, const LayerCut& cut, const Segmentation& plan, PoreCounts& counts)
+    : cut_(cut), plan_(plan), counts_(counts), neighbours_(paths, cut) {}
+
+void PoreCounter::extend(const Stretch& s, bool follows) {
+  if (!follows || before_ != Thickness::kThin) {
+    thick_before_ = follows && before_ == Thickness::kThick;
+    kind_ = s.kind;
+    line_ = s.line;
+    from_ = s.from;
+    length_mm_ = 0;
+  }
+  length_mm_ += expand_detail::distance(s.from, s.to) * 1e-6;
+}
+
+void PoreCounter::finish(bool thick_after) {
+  const auto [low, high] = std::minmax({neighbours_.along(from_), neighbours_.along(at_)});
+  const auto distances = neighbours_.of(run_, low, high);
+  thin_mm_ = plan_.thin_of(cut_.ordinal(line_)).width_mm;
+  for (std::size_t side = 0; side < 2; ++side) {
+    const bool segmented = cut_.segments(kind_, line_ + (side == 0 ? -1 : 1));
+    judge(distances[side], segmented ? plan_.thick_width_mm : plan_.continuous_width_mm, thick_before_ && thick_after);
+  }
+}
+
+void PoreCounter::judge(const std::optional<double>& distance_mm, double other_mm, bool thick_ends) {
+  if (!distance_mm || !thick_ends) {
+    ++counts_.edges;
+    return;
+  }
+  if (*distance_mm - (plan_.thick_width_mm + other_mm) / 2 > kBondGap + 2 * kNear * 1e-6) {
+    ++counts_.open;
+    counts_.distance_mm += *distance_mm;
+    return;
+  }
+  const double length = length_mm_ - plan_.thick_width_mm, width = *distance_mm - (thin_mm_ + other_mm) / 2;
+  if (length <= 0 || width <= 0) {
+    ++counts_.filled;
+    return;
+  }
+  ++counts_.closed;
+  counts_.length_mm += length;
+  counts_.width_mm += width;
+}
+
+}  // namespace lamina::segment

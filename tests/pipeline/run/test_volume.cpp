@@ -1,0 +1,163 @@
+// One volume: grams, filament, porosity and E of the written file are the same material, for every printer and filling.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <numbers>
+#include <string>
+#include <vector>
+
+#include "pipeline/cli/command.h"
+#include "pipeline/cli/console.h"
+#include "pipeline/machine/profiles.h"
+#include "tests/commands/program.h"
+#include "tests/segment/gcode_reader.h"
+
+namespace lamina::pipeline {
+namespace {
+
+struct Made {
+  nlohmann::json json;
+  std::string text;
+};
+
+/// Keeps what is printed.
+class Listener final : public Console {
+ public:
+  Status print(std::string_view text) override { return said += text, Status(); }
+  Status give(const nlohmann::ordered_json& value) override { return said += value.dump(), Status(); }
+  std::string said;
+};
+
+/// Plans a block of 14 x 11 mm with a hole through it, four layers high.
+class Volume : public testing::Test {
+ protected:
+  Made extrude(const std::string& options, const std::string& part = "") {
+    if (part.empty()) test::write_box(folder / "part.stl", {0, 0, 0}, {14, 11, 1.2f});
+    std::vector<std::string> words = test::words_of(options);
+    for (const std::string& word : {part.empty() ? folder / "part.stl" : part, std::string("--overwrite"),
+                                    std::string("--json"), std::string("--quiet"), std::string("-o"), folder / "a.gcode"}) {
+      words.push_back(word);
+    }
+    Listener console;
+    const Outcome outcome = run_command(*find_command("extrude"), words, console);
+    EXPECT_EQ(outcome.code, 0) << options << ": " << (outcome.error ? outcome.error->message : "");
+    return {nlohmann::json::parse(console.said, nullptr, false), test::read_text(folder / "a.gcode")};
+  }
+  test::Directory folder;
+};
+
+/// The material of a summary in mm3: of grams, of E and of the porosity.
+void expect_one_volume(const nlohmann::json& json, const Extruder& machine, const std::string& what) {
+  const auto& material = machine.material;
+  const double by_grams = json["filament_g"].get<double>() / material.density_g_cm3 * 1000;
+  const double filament = std::numbers::pi / 4 * material.filament_mm * material.filament_mm;
+  const double by_e = json["filament_mm"].get<double>() * filament * material.feed_ratio;
+  const double by_porosity = (1 - json["porosity"]["by_extrusion"].get<double>()) * json["solid_mm3"].get<double>();
+  const double beside = json["beside_mm3"].get<double>();
+  ASSERT_GT(by_grams, 1) << what;
+  EXPECT_NEAR(by_e / by_grams, 1, 1e-6) << what;
+  EXPECT_NEAR((by_grams - beside) / by_porosity, 1, 1e-6) << what;
+  EXPECT_NEAR(json["volume_mm3"].get<double>() / by_grams, 1, 1e-6) << what;
+}
+
+double fed_mm(const std::string& gcode) {
+  const test::GcodeFile file = test::read_gcode(gcode);
+  EXPECT_EQ(file.error, "");
+  double fed = 0;
+  for (const auto& layer : file.layers) {
+    for (const auto& bead : layer.beads) fed += bead.filament;
+  }
+  return fed;
+}
+
+TEST_F(Volume, GramsFilamentAndPorosityAreOneForEveryPrinterAndFilling) {
+  const std::string fillings[] = {"--fill raster --bead-gap 0.6",
+                                  "--fill raster --bead-gap 0.1,0.5 --angle-step 60 --walls 2",
+                                  "--fill contour --bead-gap 0.3",
+                                  "--fill honeycomb --line-distance 2",
+                                  "--fill quatrefoil --line-distance 2",
+                                  "--fill none --walls 3",
+                                  "--fill segmented",
+                                  "--fill segmented --extrusion 125 --continuous 2 --segment-rule thick-ends",
+                                  "--fill segmented --pattern contour"};
+  for (const ShippedProfile& shipped : shipped_extruders()) {
+    const auto profile = read_extruder(shipped.text, std::string(shipped.name));
+    ASSERT_TRUE(profile.ok());
+    for (const std::string& filling : fillings) {
+      const bool sml = profile->machine.format == "sml";
+      const std::string what = std::string(shipped.name) + " " + filling;
+      const Made made = extrude("--machine " + std::string(shipped.name) + " --layer " + (sml ? "0.254 " : "0.3 ") + filling);
+      expect_one_volume(made.json, profile->machine, what);
+      if (sml) continue;  // its flow is in the PD lines
+      EXPECT_NEAR(fed_mm(made.text) / made.json["filament_mm"].get<double>(), 1, 1e-5) << what;
+    }
+  }
+}
+
+TEST_F(Volume, ADeclaredErrorOfTheMachineChangesEAndNothingElse) {
+  auto profile = *find_extruder("anet-a8");
+  const std::string job = "--machine anet-a8 --layer 0.3 --fill segmented";
+  const Made plain = extrude(job), declared = extrude(job + " --machine-set material.feed_ratio=1.05");
+  profile.machine.material.feed_ratio = 1.05;
+  expect_one_volume(declared.json, profile.machine, "feed_ratio");
+  EXPECT_NEAR(fed_mm(plain.text) / fed_mm(declared.text), 1.05, 1e-5);
+  for (const char* key : {"filament_g", "porosity", "volume_mm3"}) {
+    EXPECT_EQ(plain.json[key], declared.json[key]) << key;  // to the last digit that is told, but for rounding
+  }
+}
+
+// A profile of before: E stays what it was, and the porosity is now that of what E feeds.
+TEST_F(Volume, AProfileWithAFlowAloneMeansAShareOfAStadium) {
+  const auto old = find_extruder("marlin");
+  ASSERT_TRUE(old.ok());
+  std::string text = read::extruder_text(*old);
+  const auto take = [&](const std::string& from, const std::string& to) { text.replace(text.find(from), from.size(), to); };
+  take("bead_area = \"stadium\"\n", "");
+  take("flow = 1\n", "flow = 0.9\n");
+  test::write_text(folder / "old.toml", text);
+  const std::string filling = " --layer 0.3 --fill raster --bead-gap 0.5";
+  const Made plain = extrude("--machine marlin" + filling), share = extrude("--machine " + (folder / "old.toml") + filling);
+  EXPECT_EQ(share.json["bead"]["area"], "stadium");
+  EXPECT_NEAR(share.json["filament_mm"].get<double>() / plain.json["filament_mm"].get<double>(), 0.9, 1e-6);
+  EXPECT_NEAR(
+      (1 - share.json["porosity"]["by_extrusion"].get<double>()) / (1 - plain.json["porosity"]["by_extrusion"].get<double>()),
+      0.9, 1e-6);
+  EXPECT_NE(share.text.find(";WIDTH:0.368"), std::string::npos) << "as wide as what is fed: 0.9 x 0.1007 / 0.3 + 0.064";
+  const auto wrong = read_extruder("[machine]\nname = \"x\"\n[material]\nbead_area = \"oval\"\n", "x.toml");
+  ASSERT_FALSE(wrong.ok());
+  EXPECT_NE(wrong.error().message.find("material.bead_area: 'oval' is none of stadium, rectangle, ellipse"), std::string::npos)
+      << wrong.error().message;
+}
+
+// 10 mm at 0.3: the 34th plane is at 10.05. 92 mm at 0.254: the 363rd layer would end at 92.202, its middle is at 92.075.
+TEST_F(Volume, AnEmptyLayerAtTheTopIsNotLaidAndIsTold) {
+  for (const auto& [height, layer, count] : {std::tuple{10.0f, "0.3", 33}, {92.0f, "0.254", 362}, {9.9f, "0.3", 33}}) {
+    test::write_box(folder / "cube.stl", {0, 0, 0}, {4, 4, height});
+    const Made made = extrude(std::string("--fill none --walls 1 --layer ") + layer, folder / "cube.stl");
+    EXPECT_EQ(made.json["layers_total"], count);
+    EXPECT_EQ(made.json["layers_left_out"], height == 9.9f ? 0 : 1);
+    const test::GcodeFile gcode = test::read_gcode(made.text);
+    ASSERT_EQ(gcode.layers.size(), static_cast<std::size_t>(count));
+    EXPECT_FALSE(gcode.layers.back().beads.empty());
+  }
+}
+
+TEST_F(Volume, PoresToldAreThoseThatAreLaid) {
+  const std::string examples = std::string(LAMINA_TEST_DIR) + "/../docs/examples/dinisio2022/";
+  test::write_box(folder / "speed.stl", {0, 0, 0}, {62, 50, 0.3f});
+  const Made speed = extrude("--job " + examples + "speed.toml", folder / "speed.stl");
+  ASSERT_EQ(speed.json["pores"].size(), 1u);
+  EXPECT_EQ(speed.json["pores"][0]["closed"], 0);
+  EXPECT_EQ(speed.json["pores"][0]["open"], 24);  // both sides of 12 thin stretches
+  test::write_box(folder / "b.stl", {0, 0, 0}, {50, 28, 0.3f});
+  const auto pores = extrude("--job " + examples + "B100.toml", folder / "b.stl").json["pores"][0];
+  EXPECT_GT(pores["closed"], 800);
+  EXPECT_EQ(pores["open"], 0);
+  EXPECT_NEAR(pores["width_mm"].get<double>(), 0.077, 0.001);
+  EXPECT_NEAR(pores["length_mm"].get<double>(), 1.053, 0.001);
+  EXPECT_EQ(extrude("--job " + examples + "A100.toml", folder / "b.stl").json["pores"][0]["closed"], 0);
+}
+
+}  // namespace
+}  // namespace lamina::pipeline
