@@ -13,6 +13,11 @@ bool fits_heights(Product, const Job& job) { return job.heights.mode != Mode::kU
 bool by_angle(Product, const Job& job) { return job.heights.mode == Mode::kAngle; }
 bool by_steps(Product product, const Job& job) { return fits_heights(product, job) && !by_angle(product, job); }
 bool optimal(Product, const Job& job) { return job.heights.mode == Mode::kOptimal; }
+bool may_end_below(Product product, const Job& job) { return by_angle(product, job) || optimal(product, job); }
+bool shrinks(Product product, const Job& job) {
+  const auto nominal = [](const PartRequest& part) { return part.shrink == std::array<double, 3>{1, 1, 1}; };
+  return by_steps(product, job) && !std::ranges::all_of(job.parts, nominal);
+}
 bool thins(Product, const Job& job) { return job.dose.core < 1 || fills(job); }
 /// Printers of filament lay a wall where nothing else is asked for.
 bool lays_beads(Product product, const Job& job) { return product == Product::kMoves || fills(job); }
@@ -30,11 +35,16 @@ struct Need {
 constexpr std::string_view kUniform = "is of layers that fit the part, and these are uniform; add --heights and --thickness",
                            kSteps = "is of --heights cusp, stepwise and optimal; add one of them",
                            kAngle = "is of --heights angle; add it", kOptimal = "is of --heights optimal; add it",
+                           kCovered = "is of --heights angle and optimal, the others reach the top; add one of them",
+                           kShrinks = "is of steps on parts that shrink; add --shrink, and --heights cusp, stepwise or optimal",
                            kBeads = "is of beads, and none are asked for; add --fill, --pattern or --walls",
                            kLines = "is of lines, and no pattern is asked for; add --fill or --pattern";
 constexpr Need kNeeds[] = {
     {"--cusp", by_steps, kSteps},
+    {"--cusp-of", shrinks, kShrinks},
     {"--adapt-angle", by_angle, kAngle},
+    {"--peaks", by_angle, kAngle},
+    {"--cover-top", may_end_below, kCovered},
     {"--peak-angle", fits_heights, kUniform},
     {"--facets", fits_heights, kUniform},
     {"--facet-area", fits_heights, kUniform},

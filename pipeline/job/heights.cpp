@@ -1,8 +1,6 @@
 // Section [heights].
 #include "pipeline/job/heights.h"
 
-#include <fmt/format.h>
-
 #include "pipeline/job/keys.h"
 #include "stages/data/units.h"
 #include "stages/heights/heights.h"
@@ -19,6 +17,8 @@ constexpr Word<Mode> kModes[] = {{"uniform", Mode::kUniform},
                                  {"stepwise", Mode::kStepwise},
                                  {"optimal", Mode::kOptimal}};
 constexpr Word<Facets> kFacets[] = {{"range", Facets::kRange}, {"plane", Facets::kPlane}};
+constexpr Word<heights::CuspOf> kCuspsOf[] = {{"printed", heights::CuspOf::kPrinted}, {"nominal", heights::CuspOf::kNominal}};
+constexpr Word<heights::Peaks> kPeaks[] = {{"flats", heights::Peaks::kFlats}, {"facets", heights::Peaks::kFacets}};
 constexpr Word<Containment> kContainments[] = {
     {"across", Containment::kAcross}, {"inside", Containment::kInside}, {"outside", Containment::kOutside}};
 
@@ -56,9 +56,13 @@ const JobKey kHeightsKeys[] = {
     field<kHeights, &Request::cusp_mm>(
         {"heights", "cusp_mm", "--cusp", "MM", "highest step on a slope, for cusp, stepwise and optimal", decides::all},
         kLength),
+    word<kCuspsOf, kHeights, &Request::cusp_of>(
+        {"heights", "cusp_of", "--cusp-of", "printed|nominal",
+         "with --shrink: the steps that are printed, or those of the part once it has shrunk", decides::all}),
     field<kHeights, &Request::adapt_angle_deg>(
         {"heights", "adapt_angle_deg", "--adapt-angle", "DEG",
-         "angle: slopes at least this flat get thinner layers; 0 is a wall, 90 a horizontal face", decides::all},
+         "angle: slopes at least this flat, before --shrink, get thinner layers; 0 is a wall, 90 a horizontal face",
+         decides::all},
         {0, 90, " degrees"}),
     field<kHeights, &Request::peak_angle_deg>({"heights", "peak_angle_deg", "--peak-angle", "DEG",
                                                "facets at least this flat, and level, are horizontal faces", decides::all},
@@ -73,6 +77,12 @@ const JobKey kHeightsKeys[] = {
          decides::all}),
     field<kHeights, &Request::least_facet_mm2>(
         {"heights", "facet_mm2", "--facet-area", "MM2", "facets smaller than this ask for nothing", decides::all}, kArea),
+    word<kPeaks, kHeights, &Request::peaks>(
+        {"heights", "peaks", "--peaks", "flats|facets",
+         "angle: peaks are faces of at least --flat-area, or every horizontal facet as in Lima (2009)", decides::all}),
+    field<kHeights, &Request::cover_top>(
+        {"heights", "cover_top", "--cover-top", "",
+         "angle and optimal: the last layer ends at the top or above it, never below", decides::all, "true"}),
     field<kHeights, &Request::flats>({"heights", "flats", "--no-flats", "",
                                       "optimal: do not aim at horizontal faces and tops, only keep the step", decides::all,
                                       "false"}),
@@ -99,33 +109,6 @@ const JobKey kHeightsKeys[] = {
 
 std::span<const JobKey> heights_keys() { return kHeightsKeys; }
 
-Result<heights::Options> heights_options(const Job& job) {
-  const HeightsRequest& request = job.heights;
-  heights::Options options = heights::options_of(request);
-  if (!request.thickness_mm.empty()) {
-    if (const std::string wrong = heights::read_thicknesses(request.thickness_mm, options.set); !wrong.empty()) {
-      return Error{Fault::kUsage, "heights.thickness_mm: " + wrong};
-    }
-  } else if (request.mode == heights::Mode::kUniform) {
-    options.set.values = {static_cast<Nm>(nm_of(job.layer_mm))};
-  } else {
-    return Error{Fault::kUsage, fmt::format("--heights {}: needs thicknesses to choose from; add --thickness with a set as "
-                                            "0.178,0.254 or a range as 0.05..0.3",
-                                            mode_name(request.mode))};
-  }
-  if (Status status = heights::check_options(options); !status) return status.error();
-  return options;
-}
-
-std::string heights_text(const Job& job) {
-  const HeightsRequest& request = job.heights;
-  const std::string thickness = request.thickness_mm.empty() ? number_text(job.layer_mm) : request.thickness_mm;
-  std::string text = fmt::format("of {} mm", thickness);
-  if (request.mode == heights::Mode::kUniform) return text;
-  text += fmt::format(", {}", mode_name(request.mode));
-  if (request.mode == heights::Mode::kAngle)
-    return text + fmt::format(", from {} degrees", number_text(request.adapt_angle_deg));
-  return text + fmt::format(", steps up to {} mm", number_text(request.cusp_mm));
-}
+Result<heights::Options> heights_options(const Job& job) { return heights::options_of(job.heights, job.layer_mm); }
 
 }  // namespace lamina::pipeline

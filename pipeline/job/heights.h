@@ -17,7 +17,4 @@ struct Job;
 /// Section [heights] as checked options of the stage. errors  kUsage, one line that begins with the key
 Result<heights::Options> heights_options(const Job& job);
 
-/// Section [heights] for messages: "of 0.05 mm", "of 0.05..0.3 mm, optimal, steps up to 0.1 mm".
-std::string heights_text(const Job& job);
-
 }  // namespace lamina::pipeline

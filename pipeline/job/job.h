@@ -53,7 +53,7 @@ using HeightsRequest = heights::Settings;
 
 /// Section [slice]: contours and their files.
 struct SliceRequest {
-  std::string format = "svg";      // svg, cli, cli-binary, 3mf
+  std::string format = "svg";      // of write::slice_formats()
   bool file_a_layer = false;       // layers/000000.svg ... in place of one file
   bool empty_first_layer = false;  // CLI
   double tolerance_um = 0;         // simplification: greatest displacement of the contour

@@ -1,22 +1,24 @@
 // Section [slice].
-#include <algorithm>
+#include <vector>
 
 #include "pipeline/job/keys.h"
+#include "stages/write/slice_format.h"
 
 namespace lamina::pipeline {
 namespace {
 
-constexpr std::string_view kFormats[] = {"svg", "cli", "cli-binary", "3mf", "null"};
-
 std::string check_slice_format(std::string_view text) {
-  return std::ranges::find(kFormats, text) == std::end(kFormats) ? not_one_of(text, kFormats) : std::string();
+  if (write::find_slice_format(text) != nullptr) return {};
+  std::vector<std::string_view> words;
+  for (const write::SliceFormat& format : write::slice_formats()) words.push_back(format.id);
+  return not_one_of(text, words);
 }
 
 constexpr unsigned kContour = decides::contours | decides::moves;
 
 const JobKey kSliceKeys[] = {
     text<check_slice_format, &Job::slice, &SliceRequest::format>(
-        {"slice", "format", "--format", "FORMAT", "svg, cli, cli-binary, 3mf, or null to write none", decides::contours}),
+        {"slice", "format", "--format", "FORMAT", "svg, svg-polygon, cli, cli-binary, cli-16, 3mf, or null to write none", decides::contours}),
     field<&Job::slice, &SliceRequest::file_a_layer>({"slice", "file_a_layer", "--file-a-layer", "",
                                                      "one file for each layer, layers/000000.svg and up", decides::contours,
                                                      "true"}),

@@ -50,7 +50,10 @@ ManifestHead image_head(const Plan& plan) {
 }
 
 ImageFiles::ImageFiles(const Plan& plan)
-    : plan_(plan), head_(image_head(plan)), format_(*write::find_image_format(plan.job.format)) {
+    : plan_(plan),
+      head_(image_head(plan)),
+      title_(title_of(head_.parts)),
+      format_(*write::find_image_format(plan.job.format)) {
   if (plan.images->machine)
     program_.emplace(*plan.images->machine, plan.job.dry_run ? "" : plan.job.output, plan.layer_count,
                      layer_file_options(plan.job));
@@ -105,6 +108,10 @@ std::uint64_t ImageFiles::Work::bytes() const {
 
 Status ImageFiles::encode(const Runs& whole, std::span<const Runs> materials, Work& work, LayerRecord& record) const {
   if (!work.encoder) work.encoder = format_.make_encoder();
+  const Layer& layer = record.layer;
+  write::LayerTags tags{title_, {}, {}, layer.index, plan_.layer_count, layer.bottom, layer.bottom + layer.thickness};
+  if (head_.mirror != "none") tags.mirror = head_.mirror;
+  work.encoder->tag(tags);
   if (head_.materials.empty()) {
     if (Status status = encode_one(whole, work, record, work.file); !status) return status;
     record.bytes = work.file.size();
@@ -113,6 +120,8 @@ Status ImageFiles::encode(const Runs& whole, std::span<const Runs> materials, Wo
   }
   work.files.resize(materials.size());
   for (std::size_t m = 0; m < materials.size(); ++m) {
+    tags.material = head_.materials[m].name;
+    work.encoder->tag(tags);
     if (Status status = encode_one(materials[m], work, record, work.files[m]); !status) return status;
     record.images[m].bytes = work.files[m].size();
     record.images[m].hash = hash_bytes(work.files[m]);

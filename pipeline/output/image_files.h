@@ -71,6 +71,7 @@ class ImageFiles {
 
   const Plan& plan_;
   ManifestHead head_;
+  const std::string title_;  // of the files' tags
   const write::ImageFormat& format_;
   std::optional<PrintProgram> program_;
   std::optional<ManifestWriter> manifest_;

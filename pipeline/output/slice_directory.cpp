@@ -12,6 +12,7 @@
 #include "stages/write/leftovers.h"
 #include "stages/write/manifest/kept.h"
 #include "stages/write/replaceable.h"
+#include "stages/write/slice_format.h"
 
 namespace lamina::pipeline {
 namespace {
@@ -39,8 +40,8 @@ Error cannot(const fs::path& path, const std::error_code& error) {
 }  // namespace
 
 std::string_view slice_extension(const Job& job) {
-  const std::string_view format = job.slice.format;
-  return format == "svg" ? ".svg" : format == "3mf" ? ".3mf" : ".cli";
+  const std::string_view extension = write::find_slice_format(job.slice.format)->extension;
+  return extension.empty() ? ".cli" : extension;
 }
 
 std::string slice_file_name(const Job& job) {

@@ -16,19 +16,17 @@ namespace lamina::pipeline {
 
 namespace fs = std::filesystem;
 
-SliceFiles::SliceFiles(const Plan& plan) : plan_(plan), file_a_layer_(plan.job.slice.file_a_layer) {
+SliceFiles::SliceFiles(const Plan& plan)
+    : plan_(plan), format_(*write::find_slice_format(plan.job.slice.format)), file_a_layer_(plan.job.slice.file_a_layer) {
   const SliceRequest& slice = plan.job.slice;
   head_.parts = plan.sections->names();
   head_.bounds = plan.sections->bounds();
   head_.layers = plan.range[1] - plan.range[0];
   head_.first_bottom = head_.layers > 0 ? plan.layer(plan.range[0]).bottom : 0;
   head_.program = fmt::format("lamina {}", version());
-  if (slice.format == "svg") encoder_ = write::make_svg_encoder();
-  if (slice.format.starts_with("cli")) {
-    write::SliceFormatOptions options;
-    options.empty_first_layer = slice.empty_first_layer;
-    encoder_ = write::make_cli_encoder(slice.format == "cli-binary", options);
-  }
+  const Layer last = plan.layer_count > 0 ? plan.layer(plan.layer_count - 1) : Layer{};
+  head_.top = std::int64_t{last.bottom} + last.thickness;
+  if (format_.make != nullptr) encoder_ = format_.make({slice.empty_first_layer});
 }
 
 SliceFiles::~SliceFiles() {
@@ -104,23 +102,16 @@ Status SliceFiles::keep() {
   return manifest_ ? manifest_->flush() : Status();
 }
 
-Sections::TextBytes SliceFiles::text_bytes() const {
-  // Two numbers of about 11 characters and separators. An SVG element has kind, colour and width, a CLI element part and
-  // count; both repeat the last point of the previous element.
-  if (!encoder_) return {};
-  if (plan_.job.slice.format == "svg") return {26, 200, 0};
-  if (plan_.job.slice.format == "cli-binary") return {16, 24, 0};
-  return {48, 64, 0};
-}
-
-void SliceFiles::encode(const write::SliceLayer& layer, Buffer<char>& text) const {
+Status SliceFiles::encode(const write::SliceLayer& layer, Buffer<char>& text) const {
   text.clear();
-  if (!encoder_) return;
+  if (!encoder_) return {};
+  if (Status status = encoder_->check(head_, layer); !status) return status;
   if (file_a_layer_) {
     write::encode_alone(*encoder_, head_, layer, text);
   } else {
     encoder_->layer(head_, layer, text);
   }
+  return {};
 }
 
 Status SliceFiles::store(std::uint32_t index, const Buffer<char>& text, LayerRecord& record) const {

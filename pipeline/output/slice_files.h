@@ -34,10 +34,11 @@ class SliceFiles {
   /// The output path for the summary.
   std::string output() const;
   /// Bytes of text for points and paths.
-  Sections::TextBytes text_bytes() const;
+  Sections::TextBytes text_bytes() const { return {format_.point_bytes, format_.stretch_bytes, 0}; }
 
   // --- from many threads at once, each with its own text
-  void encode(const write::SliceLayer& layer, Buffer<char>& text) const;
+  /// errors  kUsage: the format cannot hold the layer
+  Status encode(const write::SliceLayer& layer, Buffer<char>& text) const;
   /// Stores size and hash of the text in the record; writes the file if layers have their own. errors  kOutput
   Status store(std::uint32_t index, const Buffer<char>& text, LayerRecord& record) const;
 
@@ -55,6 +56,7 @@ class SliceFiles {
   Result<write::File> write_package();
 
   const Plan& plan_;
+  const write::SliceFormat& format_;
   const bool file_a_layer_;
   write::SliceHead head_;
   std::unique_ptr<write::SliceEncoder> encoder_;  // of text formats

@@ -48,7 +48,7 @@ Result<std::string> layer_table(const Plan& plan) {
   const heights::Plan& of = job.heights.per_part ? *own : plan.heights;
   heights::Evaluation evaluation;
   if (of.looked_at.empty()) {
-    evaluation = heights::evaluate(index_scene(*plan.scene, *options), heights::boundaries_of(of.table), *options);
+    evaluation = heights::evaluate(index_scene(job, *plan.scene, *options), heights::boundaries_of(of.table), *options);
   }
   std::vector<write::rp3::Layer> layers;
   for (std::uint32_t i = plan.range[0]; i < std::min(plan.range[1], of.table.size()); ++i) {

@@ -8,8 +8,8 @@
 
 namespace lamina::pipeline {
 
-/// The index of a scene's surface.
-heights::SurfaceIndex index_scene(const Scene& scene, const heights::Options& options);
+/// The index of a scene's surface; angles are those of the parts before --shrink.
+heights::SurfaceIndex index_scene(const Job& job, const Scene& scene, const heights::Options& options);
 
 /// The layer table shared by all parts on the bed, with its reasons. Uniform layers cost nothing; other modes read every
 /// facet once.

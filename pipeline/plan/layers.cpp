@@ -17,7 +17,7 @@ Status add_layers_of_parts(const Job& job, const Scene& scene, std::vector<Sched
   count(Decision::kHeights);
   const Result<heights::Options> options = heights_options(job);
   if (!options) return options.error();
-  const heights::SurfaceIndex index = index_scene(scene, *options);
+  const heights::SurfaceIndex index = index_scene(job, scene, *options);
   const Result<heights::PerPartPlan> plan = heights::plan_per_part(index, *options);
   if (!plan) return plan.error();
   for (std::uint32_t part = 0; part < plan->parts.size(); ++part) {

@@ -19,6 +19,7 @@
 #include "stages/heights/build_steps.h"
 #include "stages/write/extrusion_format.h"
 #include "stages/write/image_format.h"
+#include "stages/write/slice_format.h"
 
 namespace lamina::pipeline {
 namespace {
@@ -257,6 +258,11 @@ Result<Resolved> resolve(const Job& job, Product product) {
   }
   if (job.shard) return usage(fmt::format("run.shard: {}", kNoShards));
   if (product == Product::kContours) {
+    const auto* format = write::find_slice_format(job.slice.format);
+    if (format == nullptr) return usage(fmt::format("unknown format '{}'", job.slice.format));
+    if (!format->paths && fills(job)) {
+      return usage(fmt::format("--format {}: holds contours only; leave out the filling, or choose svg", format->id));
+    }
     if (job.slice.format == "3mf" && job.slice.file_a_layer) {
       return usage("--file-a-layer: a 3MF package holds all slices; choose svg or cli, or leave it out");
     }

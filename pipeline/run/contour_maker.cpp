@@ -47,8 +47,7 @@ class ContourMaker : public Maker {
                facts.bead_mm = length_mm(work.paths);
                sanity_.add_contours(made_[ticket.work].layer, work.contours);
                made_[ticket.work].paths = std::make_shared<const PathFacts>(facts);
-               files_.encode(view_of(made_[ticket.work].layer, work), work.text);
-               return Status();
+               return files_.encode(view_of(made_[ticket.work].layer, work), work.text);
              }},
             {"store", [&](std::uint32_t layer, const Ticket& ticket) {
                return files_.store(layer, work_[ticket.work].text, made_[ticket.work]);

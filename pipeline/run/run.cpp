@@ -49,7 +49,9 @@ Summary summary_of(const Plan& plan) {
   summary.product = plan.product;
   summary.dry_run = plan.job.dry_run;
   summary.output = plan.job.output;
-  summary.layer_text = heights_text(plan.job);
+  summary.layer_text = text_of(plan.job.heights, plan.job.layer_mm);
+  const std::string small = small_peaks_text(plan.heights, plan.job.heights.least_flat_mm2);
+  if (!small.empty()) summary.layer_text += "; " + small;
   summary.layers_total = plan.layer_count;
   summary.triangles = plan.triangles;
   summary.load_seconds = plan.load_seconds;

@@ -20,11 +20,17 @@ Evaluation evaluate(const SurfaceIndex& index, std::span<const std::int64_t> bou
   const Ladder ladder = Ladder::listed({boundaries.begin(), boundaries.end()});
   const Nm tolerance = options.surface.flat_tolerance;
   result.layers.resize(count);
+  const bool nominal = index.has_nominal();
+  Buffer<Steepness> of_steps(count, 0);
   for (std::uint32_t part = 0; part < index.parts.size(); ++part) {
-    const Buffer<Steepness> cells = steepest_in_cells(index, std::span(index.parts).subspan(part, 1), ladder);
+    const auto own = std::span(index.parts).subspan(part, 1);
+    const Buffer<Steepness> cells = steepest_in_cells(index, own, ladder);
+    const Buffer<Steepness> angles = nominal ? steepest_in_cells(index, own, ladder, Slope::kAngles) : Buffer<Steepness>();
     for (std::size_t i = 0; i < count; ++i) {
-      if (cells[i] <= result.layers[i].flattest) continue;
-      result.layers[i].flattest = cells[i];
+      of_steps[i] = std::max(of_steps[i], cells[i]);
+      const Steepness slope = nominal ? angles[i] : cells[i];
+      if (slope <= result.layers[i].flattest) continue;
+      result.layers[i].flattest = slope;
       result.layers[i].part = part;
     }
   }
@@ -36,7 +42,7 @@ Evaluation evaluate(const SurfaceIndex& index, std::span<const std::int64_t> bou
   for (std::uint32_t i = 0; i < count; ++i) {
     LayerFacts& layer = result.layers[i];
     const std::int64_t thickness = boundaries[i + 1] - boundaries[i];
-    layer.cusp = cusp_of(thickness, layer.flattest);
+    layer.cusp = cusp_of(thickness, of_steps[i]);
     if (layer.cusp > result.largest_cusp) {
       result.largest_cusp = layer.cusp;
       result.largest_cusp_layer = i;

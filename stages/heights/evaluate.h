@@ -15,7 +15,7 @@ inline constexpr std::uint32_t kNoPart = UINT32_MAX;
 
 /// One layer. Steps are those on the sloped facets that reach into it.
 struct LayerFacts {
-  Steepness flattest = 0;
+  Steepness flattest = 0;        // for angles: of the parts before they are stretched
   std::uint32_t part = kNoPart;  // the one with the flattest slope, the first if several
   std::int64_t cusp = 0;         // nm
   bool hits_flat = false;        // its top lies on a flat, within the tolerance
@@ -27,7 +27,7 @@ struct Evaluation {
   std::int64_t largest_cusp = 0;  // nm
   std::uint32_t largest_cusp_layer = 0;
   std::uint32_t above_limit = 0;   // layers with a step above the limit that was given
-  double mean_cusp = 0;            // nm, over the area of all facets that are not horizontal
+  double mean_cusp = 0;            // nm, over the area of all facets that are not horizontal, as printed or nominal
   std::uint32_t flats_missed = 0;  // by more than the tolerance
   std::int64_t largest_miss = 0;   // nm, of those
   std::int64_t top_miss = 0;       // nm: end of the last layer minus top of the parts

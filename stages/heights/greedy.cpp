@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
 #include <numbers>
 
 #include "stages/heights/steepest.h"
@@ -12,10 +13,11 @@ namespace {
 // The slopes that a layer looks at, by rungs: those in its cells, or those that the plane on top of it cuts.
 class Slopes {
  public:
-  Slopes(const SurfaceIndex& index, const Options& options, const Ladder& ladder)
+  Slopes(const SurfaceIndex& index, const Options& options, const Ladder& ladder, Slope slope)
       : ladder_(ladder),
         plane_(options.facets == Facets::kPlane),
-        values_(plane_ ? steepest_at_rungs(index, index.parts, ladder) : steepest_in_cells(index, index.parts, ladder)) {}
+        values_(plane_ ? steepest_at_rungs(index, index.parts, ladder, slope)
+                       : steepest_in_cells(index, index.parts, ladder, slope)) {}
 
   std::uint32_t rung_of(std::int64_t height) const { return ladder_.rungs_up_to(height) - 1; }
   bool plane() const { return plane_; }
@@ -52,18 +54,75 @@ std::uint32_t covering(const ThicknessSet& set, std::int64_t left, std::uint32_t
   return most;
 }
 
+// The peaks, and how many more the documents' rule has.
+std::vector<Flat> find_peaks(const SurfaceIndex& index, const Options& options, std::uint32_t& small) {
+  std::vector<Flat> peaks = find_flats(index, options.surface.flat_tolerance, 0);
+  std::erase_if(peaks, [](const Flat& flat) { return flat.up_mm2 + flat.down_mm2 <= 0; });
+  if (options.peaks == Peaks::kFacets) return peaks;
+  const std::size_t all = peaks.size();
+  std::erase_if(peaks, [&](const Flat& flat) { return flat.up_mm2 + flat.down_mm2 < options.least_flat_mm2; });
+  small = static_cast<std::uint32_t>(all - peaks.size());
+  return peaks;
+}
+
+// The end of a part that the rule leaves less than the least thickness below its top.
+struct End {
+  const Slopes& slopes;
+  const ThicknessSet& set;
+  Steepness steep;
+  std::int64_t top;
+  Nm tolerance;
+
+  Steepness flattest(std::int64_t bottom, std::int64_t thickness) const {
+    return Slopes::Growing(slopes, bottom).up_to(bottom + thickness);
+  }
+  /// Whether the rule allows a layer.
+  bool allows(std::int64_t bottom, std::int64_t thickness) const {
+    return thickness == set.least() || flattest(bottom, thickness) < steep;
+  }
+};
+
+// Covers the end: one layer or two in place of the last one that reach the least above the top and whose last has its middle,
+// where it is sampled, in the part; else, or if the last layer ends on a peak, a layer more.
+void cover(const End& end, bool keep, Plan& plan) {
+  const Layer last = plan.table[plan.table.size() - 1];
+  const std::int64_t bottom = last.bottom, height = end.top - bottom;
+  std::int64_t lower = last.thickness, upper = end.set.least(), least_above = INT64_MAX;
+  const auto try_stack = [&](std::int64_t below) {
+    const auto covering = std::ranges::lower_bound(end.set.values, height - below - end.tolerance);
+    if (covering == end.set.values.end()) return;
+    const std::int64_t above = below + *covering - height;
+    const bool allowed = (below == 0 || end.allows(bottom, below)) && end.allows(bottom + below, *covering);
+    if (!allowed || below + *covering / 2 >= height || above >= least_above) return;
+    least_above = above, lower = below, upper = *covering;
+  };
+  if (!keep) try_stack(0);
+  for (const Nm below : end.set.values) {
+    if (below < height && !keep) try_stack(below);
+  }
+  plan.table.drop_last();
+  plan.looked_at.pop_back();
+  LayerReason reason = lower == last.thickness ? last.reason : LayerReason::kFlat;
+  for (const std::int64_t thickness : {lower, upper}) {
+    if (thickness > 0) {
+      plan.looked_at.push_back(end.flattest(plan.table.top(), thickness));
+      plan.table.add(static_cast<Nm>(thickness), reason);
+    }
+    reason = LayerReason::kFlat;
+  }
+}
+
 }  // namespace
 
 Plan plan_by_angle(const SurfaceIndex& index, const Options& options, const Ladder& ladder) {
-  const Slopes slopes(index, options, ladder);
-  std::vector<Flat> peaks = find_flats(index, options.surface.flat_tolerance, options.least_flat_mm2);
-  std::erase_if(peaks, [&](const Flat& flat) { return flat.up_mm2 + flat.down_mm2 < options.least_flat_mm2; });
+  const Slopes slopes(index, options, ladder, Slope::kAngles);
+  Plan plan;
+  const std::vector<Flat> peaks = find_peaks(index, options, plan.small_peaks);
   const double limit = std::sin(options.adapt_angle_deg * std::numbers::pi / 180) - options.surface.normal_tolerance;
   const auto steep = static_cast<Steepness>(std::clamp(std::ceil(limit * kHorizontal), 0.0, 2.0 * kHorizontal));
   const ThicknessSet& set = options.set;
   const std::int64_t top = index.top;
 
-  Plan plan;
   std::vector<Steepness> flattest(set.size());
   for (std::int64_t bottom = 0; bottom + set.least() <= top; bottom = plan.table.top()) {
     Slopes::Growing growing(slopes, bottom);
@@ -90,11 +149,16 @@ Plan plan_by_angle(const SurfaceIndex& index, const Options& options, const Ladd
     plan.table.add(set.least(), LayerReason::kUniform);
     plan.looked_at.push_back(slopes.at(0));
   }
+  if (options.cover_top && top - plan.table.top() > options.surface.flat_tolerance) {
+    const Nm tolerance = options.surface.flat_tolerance;
+    const bool keep = std::ranges::any_of(peaks, [&](const Flat& p) { return std::abs(p.height - plan.table.top()) <= tolerance; });
+    cover({slopes, set, steep, top, tolerance}, keep, plan);
+  }
   return plan;
 }
 
 Plan plan_by_cusp(const SurfaceIndex& index, const Options& options, const Ladder& ladder) {
-  const Slopes slopes(index, options, ladder);
+  const Slopes slopes(index, options, ladder, Slope::kSteps);
   const ThicknessSet& set = options.set;
   Plan plan;
   for (std::int64_t bottom = 0; bottom < index.top; bottom = plan.table.top()) {
@@ -120,7 +184,7 @@ Plan plan_by_cusp(const SurfaceIndex& index, const Options& options, const Ladde
 }
 
 Plan plan_stepwise(const SurfaceIndex& index, const Options& options, const Ladder& ladder) {
-  const Slopes slopes(index, options, ladder);
+  const Slopes slopes(index, options, ladder, Slope::kSteps);
   const std::int64_t slab = options.set.most();
   const std::int64_t most = slab / options.set.least();
   Plan plan;

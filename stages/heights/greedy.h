@@ -9,7 +9,8 @@ namespace lamina::heights {
 /// Figure 3.5 of M. V. A. de Lima, "Modelo de fatiamento adaptativo para prototipagem rapida", UTFPR, 2009. A layer
 /// starts with the greatest thickness and gets the next thinner one while a slope is at least as flat as the angle, or
 /// else while a flat lies in it or on top of it and the least thickness still fits below that flat, or it leaves the
-/// part. What is left at the top is not built if it is less than the least thickness.
+/// part. What is left at the top is not built if it is less than the least thickness; with cover_top it is, by another
+/// division of the last layer or by one layer more.
 Plan plan_by_angle(const SurfaceIndex& index, const Options& options, const Ladder& ladder);
 
 /// A. Dolenc and I. Makela, "Slicing procedures for layered manufacturing techniques", Computer-Aided Design 26 (1994):

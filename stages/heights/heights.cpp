@@ -2,13 +2,14 @@
 
 #include <fmt/format.h>
 
+#include "stages/data/text/number_text.h"
 #include "stages/heights/greedy.h"
 #include "stages/heights/ladder.h"
 #include "stages/heights/optimal.h"
 
 namespace lamina::heights {
 
-Options options_of(const Settings& settings) {
+Result<Options> options_of(const Settings& settings, double layer_mm) {
   Options options;
   options.mode = settings.mode;
   options.cusp = static_cast<Nm>(nm_of(settings.cusp_mm));
@@ -17,11 +18,42 @@ Options options_of(const Settings& settings) {
   options.surface.normal_tolerance = settings.normal_tolerance;
   options.surface.flat_tolerance = static_cast<Nm>(nm_of(settings.flat_tolerance_um / 1000));
   options.surface.least_facet_mm2 = settings.least_facet_mm2;
+  options.surface.nominal_cusps = settings.cusp_of == CuspOf::kNominal;
+  options.peaks = settings.peaks;
+  options.cover_top = settings.cover_top;
   options.facets = settings.facets;
   options.flats = settings.flats;
   options.least_flat_mm2 = settings.least_flat_mm2;
   options.time = {settings.time_model[0], settings.time_model[1]};
+  if (!settings.thickness_mm.empty()) {
+    if (const std::string wrong = read_thicknesses(settings.thickness_mm, options.set); !wrong.empty()) {
+      return Error{Fault::kUsage, "heights.thickness_mm: " + wrong};
+    }
+  } else if (settings.mode == Mode::kUniform) {
+    options.set.values = {static_cast<Nm>(nm_of(layer_mm))};
+  } else {
+    return Error{Fault::kUsage, fmt::format("--heights {}: needs thicknesses to choose from; add --thickness with a set as "
+                                            "0.178,0.254 or a range as 0.05..0.3",
+                                            mode_name(settings.mode))};
+  }
+  if (Status status = check_options(options); !status) return status.error();
   return options;
+}
+
+std::string text_of(const Settings& settings, double layer_mm) {
+  std::string text = fmt::format("of {} mm", settings.thickness_mm.empty() ? number_text(layer_mm) : settings.thickness_mm);
+  if (settings.mode == Mode::kUniform) return text;
+  text += fmt::format(", {}", mode_name(settings.mode));
+  if (settings.mode == Mode::kAngle) return text + fmt::format(", from {} degrees", number_text(settings.adapt_angle_deg));
+  return text + fmt::format(", steps up to {} mm", number_text(settings.cusp_mm));
+}
+
+std::string small_peaks_text(const Plan& plan, double least_flat_mm2) {
+  if (plan.small_peaks == 0) return {};
+  return fmt::format("{} with horizontal facets below {} mm2 in all {} no peak{}; --peaks facets counts every one, as Lima (2009) does",
+                     plan.small_peaks == 1 ? "a height" : fmt::format("{} heights", plan.small_peaks),
+                     number_text(least_flat_mm2), plan.small_peaks == 1 ? "is" : "are",
+                     plan.small_peaks == 1 ? "" : "s");
 }
 
 Status check_options(const Options& options) {

@@ -39,6 +39,8 @@ struct Options {
   SurfaceOptions surface;
   Facets facets = Facets::kRange;  // angle, cusp, stepwise
   double least_flat_mm2 = 1;       // smaller flats are not aimed at
+  Peaks peaks = Peaks::kFlats;     // angle
+  bool cover_top = false;          // angle, optimal: the last layer ends at or above the top, within the flat tolerance
   bool flats = true;               // optimal: end layers on flats and on tops and bottoms of parts
   TimeModel time;                  // optimal
   bool tells_time = false;         // evaluate: by kPlainTime if no model is given
@@ -57,14 +59,22 @@ struct Plan {
   LayerTable table;
   std::vector<Steepness> looked_at;  // angle: of each layer, the flattest slope that decided; else empty
   std::vector<bool> stepped_back;    // cusp: thinner than the slopes at its bottom ask for
+  std::uint32_t small_peaks = 0;     // angle: heights with horizontal facets that are peaks in the documents, but no flats
   /// optimal: no table of one layer less (or, with a time model, of less time) that ends as near to the flats and keeps
   /// the step gets higher than this, nm; -1 if there is no such statement
   std::int64_t one_less_reaches = -1;
   std::int64_t largest_miss = 0;  // optimal: nm, the smallest that any table can have
 };
 
-/// Settings as the stage takes them, without the thicknesses; not checked.
-Options options_of(const Settings& settings);
+/// What a person has to know of the peaks that were passed over, as "2 horizontal faces ..."; empty if there are none.
+std::string small_peaks_text(const Plan& plan, double least_flat_mm2);
+
+/// Settings as the stage takes them. layer_mm is the thickness where settings name none.
+/// errors  kUsage, one line that begins with the key: no thicknesses to choose from; of read_thicknesses and check_options
+Result<Options> options_of(const Settings& settings, double layer_mm);
+
+/// The same for messages: "of 0.05 mm", "of 0.05..0.3 mm, optimal, steps up to 0.1 mm".
+std::string text_of(const Settings& settings, double layer_mm);
 
 /// Whether options make sense together. errors  kUsage, one line that begins with the key
 Status check_options(const Options& options);

@@ -98,8 +98,9 @@ class Solver {
   bool is_end(std::uint32_t rung) const {
     const std::int64_t height = ladder_[rung];
     if (rung == 0) return false;
-    return options_.flats ? std::abs(height - index_.top) <= allowed_ : height >= index_.top;
+    return options_.flats ? covers(height) && std::abs(height - index_.top) <= allowed_ : height >= index_.top;
   }
+  bool covers(std::int64_t height) const { return !options_.cover_top || height >= index_.top - hit_; }
   std::int64_t counted(std::int64_t distance) const { return distance > hit_ ? distance : 0; }
 
   // Calls visit(thickness index, upper rung) for every thickness from a rung, thin to thick.
@@ -240,7 +241,7 @@ class Solver {
     for (std::uint32_t rung = 0; rung < ladder_.rungs(); ++rung) {
       if (worst[rung] == unreached<std::int64_t>()) continue;
       const std::int64_t bottom = ladder_[rung];
-      if (rung > 0) best = std::min(best, std::max(worst[rung], counted(std::abs(bottom - index_.top))));
+      if (rung > 0 && covers(bottom)) best = std::min(best, std::max(worst[rung], counted(std::abs(bottom - index_.top))));
       if (bottom >= index_.top) continue;
       const std::size_t flat = first_flat_above(bottom);
       for_each_layer(rung, [&](std::uint32_t, std::uint32_t up) {

@@ -34,16 +34,26 @@ constexpr std::string_view mode_name(Mode mode) {
 /// do. The latter can miss whatever lies between two planes.
 enum class Facets : std::uint8_t { kRange, kPlane };
 
+/// Which horizontal faces are peaks for kAngle: those that are flats, or every horizontal facet as in the documents.
+enum class Peaks : std::uint8_t { kFlats, kFacets };
+
+/// Of a part that is stretched to make up for its shrinkage: the steps that are printed, or those that are left on it once it
+/// has shrunk to its nominal size.
+enum class CuspOf : std::uint8_t { kPrinted, kNominal };
+
 /// Lengths in mm, angles in degrees.
 struct Settings {
   Mode mode = Mode::kUniform;
   std::string thickness_mm;  // "0.178,0.254" or "0.05..0.3:0.01"; empty: one thickness, which stands elsewhere
   double cusp_mm = 0.1;
+  CuspOf cusp_of = CuspOf::kPrinted;
   double adapt_angle_deg = 45;
   double peak_angle_deg = 90;
   double normal_tolerance = 1e-3;
   Facets facets = Facets::kRange;
   double least_facet_mm2 = 0;
+  Peaks peaks = Peaks::kFlats;
+  bool cover_top = false;
   bool flats = true;
   double least_flat_mm2 = 1;
   double flat_tolerance_um = 1;

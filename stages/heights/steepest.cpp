@@ -78,17 +78,16 @@ struct Range {
 // larger of two is the same in any order.
 template <class RangeOf>
 Buffer<Steepness> steepest_by(const SurfaceIndex& index, std::span<const PartSurface> parts, std::uint32_t entries,
-                              const RangeOf& range_of) {
+                              Slope slope, const RangeOf& range_of) {
   const std::uint32_t shares = worthwhile_shares(index, parts, RangeRaiser::kLevels * entries);
   std::vector<Buffer<Steepness>> found(shares);
   tbb::parallel_for(0u, shares, [&](std::uint32_t share) {
     RangeRaiser raiser(entries);
-    for (const PartSurface& part : parts) {
-      for_each_slope(index, part, share, shares, [&](Nm lo, Nm hi, Steepness steepness, double) {
-        const Range range = range_of(lo, hi);
-        if (range.first < range.last) raiser.raise(range.first, range.last, steepness);
-      });
-    }
+    const auto raise = [&](Nm lo, Nm hi, Steepness steepness, double) {
+      const Range range = range_of(lo, hi);
+      if (range.first < range.last) raiser.raise(range.first, range.last, steepness);
+    };
+    for (const PartSurface& part : parts) for_each_slope(index, part, share, shares, raise, slope);
     found[share] = raiser.finish();
   });
   for (std::uint32_t share = 1; share < shares; ++share) {
@@ -130,15 +129,17 @@ struct Spread {
 
 }  // namespace
 
-Buffer<Steepness> steepest_in_cells(const SurfaceIndex& index, std::span<const PartSurface> parts, const Ladder& ladder) {
-  return steepest_by(index, parts, ladder.cells(), [&](Nm lo, Nm hi) {
+Buffer<Steepness> steepest_in_cells(const SurfaceIndex& index, std::span<const PartSurface> parts, const Ladder& ladder,
+                                    Slope slope) {
+  return steepest_by(index, parts, ladder.cells(), slope, [&](Nm lo, Nm hi) {
     const auto [first, last] = ladder.cells_between(lo, hi);
     return Range{first, last};
   });
 }
 
-Buffer<Steepness> steepest_at_rungs(const SurfaceIndex& index, std::span<const PartSurface> parts, const Ladder& ladder) {
-  return steepest_by(index, parts, ladder.rungs(), [&](Nm lo, Nm hi) {
+Buffer<Steepness> steepest_at_rungs(const SurfaceIndex& index, std::span<const PartSurface> parts, const Ladder& ladder,
+                                    Slope slope) {
+  return steepest_by(index, parts, ladder.rungs(), slope, [&](Nm lo, Nm hi) {
     return Range{ladder.rungs_up_to(lo), ladder.rungs_up_to(hi)};
   });
 }
@@ -149,9 +150,12 @@ Buffer<double> projected_below(const SurfaceIndex& index, std::span<const PartSu
   tbb::parallel_for(0u, shares, [&](std::uint32_t share) {
     Spread& spread = spreads[share].emplace(ladder.rungs());
     for (const PartSurface& part : parts) {
-      for_each_slope(index, part, share, shares, [&](Nm lo, Nm hi, Steepness, double projected) {
-        spread.add(ladder, lo, hi, sign == Sign::kBoth ? std::abs(projected) : projected);
-      });
+      for (const Standing& standing : part.standing) {
+        const MeshSlopes& mesh = index.meshes[standing.mesh];
+        for_each_slope(mesh, standing, share, shares, [&](Nm lo, Nm hi, Steepness, double projected) {
+          spread.add(ladder, lo, hi, sign == Sign::kBoth ? std::abs(projected) * mesh.step_share : projected);
+        });
+      }
     }
   });
   Spread& all = *spreads[0];

@@ -14,7 +14,7 @@ namespace lamina::heights {
 namespace {
 
 constexpr std::size_t kBlock = 1 << 14;  // facets; fixed, so that sums do not depend on the threads
-constexpr std::size_t kGroup = 256;      // facets whose roots and quotients are taken together, two and more at a time
+constexpr std::size_t kGroup = 256;      // facets
 
 struct Normal {
   double x, y, z;  // length: twice the area, nm2
@@ -39,6 +39,7 @@ struct Limits {
   double horizontal;  // |n_z| from which a facet is horizontal
   Nm tolerance;
   double least_mm2;
+  bool nominal_cusps;
 };
 
 // Joins facets at the same height that come soon after each other: a terrain of whole metres has a hundred thousand of
@@ -72,51 +73,90 @@ class FlatJoiner {
   std::array<FlatFacet, 1 << kBits> places_{};
 };
 
-MeshSlopes slopes_of(const Mesh& mesh, const Limits& limits) {
+// Facets whose roots and quotients are taken together, two and more at a time.
+struct Group {
+  double x[kGroup], y[kGroup], z[kGroup], length[kGroup];
+  double up[kGroup];     // |n_z| of the unit normal; no number for a facet without area
+  double angle[kGroup];  // the same before a stretch, and
+  double whole[kGroup];  // length of the normal there
+  Nm lo[kGroup], hi[kGroup];
+
+  void measure(const Triangle* facets, std::size_t count) {
+    for (std::size_t k = 0; k < count; ++k) {
+      const Triangle& t = facets[k];
+      const Normal n = normal_of(t);
+      x[k] = n.x, y[k] = n.y, z[k] = n.z;
+      lo[k] = std::min(std::min(t.a.z, t.b.z), t.c.z);
+      hi[k] = std::max(std::max(t.a.z, t.b.z), t.c.z);
+    }
+    for (std::size_t k = 0; k < count; ++k) {
+      length[k] = std::sqrt(x[k] * x[k] + y[k] * y[k] + z[k] * z[k]);
+      up[k] = std::abs(z[k]) / length[k];
+    }
+  }
+  // A stretch by s turns a normal n, as long as twice the area, into (n_x / s_x, n_y / s_y, n_z / s_z) s_x s_y s_z.
+  void undo(const Stretch& by, std::size_t count) {
+    const double volume = by[0] * by[1] * by[2];
+    for (std::size_t k = 0; k < count; ++k) {
+      const double nx = x[k] * by[0], ny = y[k] * by[1], nz = z[k] * by[2], size = std::sqrt(nx * nx + ny * ny + nz * nz);
+      whole[k] = size / volume;
+      angle[k] = std::abs(nz) / size;
+    }
+  }
+};
+
+// In units of the header, rounded up; the cast cuts off, and what is cut off is put back.
+Steepness rounded_up(double up) {
+  const double scaled = up * kHorizontal;
+  const auto whole = static_cast<std::int32_t>(scaled);
+  return static_cast<Steepness>(whole + (whole < scaled));
+}
+
+// A mesh that is stretched by factors other than 1 gets angles of its own, and with Limits::nominal_cusps also steps.
+MeshSlopes slopes_of(const Mesh& mesh, const Limits& limits, const Stretch& stretch) {
+  const bool stretched = stretch != Stretch{1, 1, 1}, steps = stretched && limits.nominal_cusps;
   MeshSlopes slopes;
   const std::size_t count = mesh.triangles.size();
   slopes.facets = mesh.triangles;
   slopes.steepness.resize(count);
+  if (stretched) slopes.nominal.resize(count);
+  if (steps) slopes.step_share = 1 / (stretch[0] * stretch[1] * stretch[2]);
   const std::size_t blocks = (count + kBlock - 1) / kBlock;
   std::vector<std::vector<FlatFacet>> flats(blocks);
   std::vector<double> areas(blocks);
   const Triangle* triangles = mesh.triangles.data();
   Steepness* to_steepness = slopes.steepness.data();
+  Steepness* to_nominal = slopes.nominal.data();
   tbb::parallel_for(std::size_t{0}, blocks, [&](std::size_t block) {
     double block_area = 0;
     FlatJoiner joiner(flats[block]);
+    Group g;
     const std::size_t block_end = std::min(count, (block + 1) * kBlock);
     for (std::size_t first = block * kBlock; first < block_end; first += kGroup) {
       const std::size_t group = std::min(kGroup, block_end - first);
-      double x[kGroup], y[kGroup], z[kGroup], length[kGroup], up[kGroup];
-      Nm lo[kGroup], hi[kGroup];
-      for (std::size_t k = 0; k < group; ++k) {
-        const Triangle& t = triangles[first + k];
-        const Normal n = normal_of(t);
-        x[k] = n.x, y[k] = n.y, z[k] = n.z;
-        lo[k] = std::min(std::min(t.a.z, t.b.z), t.c.z);
-        hi[k] = std::max(std::max(t.a.z, t.b.z), t.c.z);
-      }
-      for (std::size_t k = 0; k < group; ++k) {
-        length[k] = std::sqrt(x[k] * x[k] + y[k] * y[k] + z[k] * z[k]);
-        up[k] = std::abs(z[k]) / length[k];  // no number for a facet without area
-      }
+      g.measure(triangles + first, group);
+      if (stretched) g.undo(stretch, group);
+      const double* angle = stretched ? g.angle : g.up;
+      const double* surface = steps ? g.whole : g.length;
       std::uint32_t level[kGroup], levels = 0;
       for (std::size_t k = 0; k < group; ++k) {
-        const double mm2 = length[k] * 0.5e-12;
-        const bool counts = (z[k] != 0) & (mm2 >= limits.least_mm2);
-        const bool flat = counts & (up[k] >= limits.horizontal) & (std::int64_t{hi[k]} - lo[k] <= limits.tolerance);
+        const bool counts = (g.z[k] != 0) & (g.length[k] * 0.5e-12 >= limits.least_mm2);
+        const bool flat = counts & (angle[k] >= limits.horizontal) & (std::int64_t{g.hi[k]} - g.lo[k] <= limits.tolerance);
         level[levels] = static_cast<std::uint32_t>(k);
         levels += flat;
-        block_area += flat ? 0 : mm2;
-        // Rounded up; the cast cuts off, and what is cut off is put back.
-        const double scaled = (counts & !flat) ? up[k] * kHorizontal : 0;
-        const auto whole = static_cast<std::int32_t>(scaled);
-        to_steepness[first + k] = static_cast<Steepness>(whole + (whole < scaled));
+        block_area += flat ? 0 : surface[k] * 0.5e-12;
+        to_steepness[first + k] = rounded_up((counts & !flat) ? g.up[k] : 0);
+      }
+      for (std::size_t k = 0; stretched && k < group; ++k) {
+        const bool slope = to_steepness[first + k] != 0;
+        to_nominal[first + k] = rounded_up(slope ? angle[k] : 0);
+        // The step of a layer that shrinks with the part; factors below a half are no shrinkage.
+        if (steps) to_steepness[first + k] = rounded_up(slope ? std::min(angle[k] / stretch[2], 1.999) : 0);
       }
       for (std::uint32_t l = 0; l < levels; ++l) {
         const std::size_t k = level[l];
-        joiner.add({static_cast<Nm>(lo[k] + (std::int64_t{hi[k]} - lo[k]) / 2), z[k] > 0, length[k] * 0.5e-12});
+        const auto middle = static_cast<Nm>(g.lo[k] + (std::int64_t{g.hi[k]} - g.lo[k]) / 2);
+        joiner.add({middle, g.z[k] > 0, g.length[k] * 0.5e-12});
       }
     }
     areas[block] = block_area;
@@ -145,12 +185,14 @@ std::uint32_t worthwhile_shares(const SurfaceIndex& index, std::span<const PartS
 
 SurfaceIndex index_surface(std::span<const Mesh> meshes, std::span<const Instance> instances,
                            std::span<const std::uint32_t> part_of_instance, std::uint32_t part_count,
-                           const SurfaceOptions& options) {
+                           const SurfaceOptions& options, std::span<const Stretch> stretch) {
   const Limits limits{std::sin(options.peak_angle_deg * std::numbers::pi / 180) - options.normal_tolerance,
-                      options.flat_tolerance, options.least_facet_mm2};
+                      options.flat_tolerance, options.least_facet_mm2, options.nominal_cusps};
   SurfaceIndex index;
   index.meshes.reserve(meshes.size());
-  for (const Mesh& mesh : meshes) index.meshes.push_back(slopes_of(mesh, limits));
+  for (std::size_t m = 0; m < meshes.size(); ++m) {
+    index.meshes.push_back(slopes_of(meshes[m], limits, stretch.empty() ? Stretch{1, 1, 1} : stretch[m]));
+  }
 
   std::map<std::tuple<std::uint32_t, std::uint32_t, Nm>, std::uint32_t> copies;  // (part, mesh, raise)
   for (std::size_t i = 0; i < instances.size(); ++i) {

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -40,7 +41,11 @@ struct SurfaceOptions {
   double normal_tolerance = 1e-3;  // of |n_z|, for all comparisons of angles
   Nm flat_tolerance = 1000;        // nm: a horizontal facet may be that much out of level
   double least_facet_mm2 = 0;      // smaller facets ask for nothing
+  bool nominal_cusps = false;      // steps as they are left on the part once it has shrunk, not as printed
 };
+
+/// Factors per axis of the bed by which a mesh was stretched to make up for shrinkage.
+using Stretch = std::array<double, 3>;
 
 /// A horizontal facet, or several at the same height that face the same way.
 struct FlatFacet {
@@ -50,14 +55,19 @@ struct FlatFacet {
 };
 
 /// The facets of one mesh, in its own coordinates. Those that are vertical, horizontal, degenerate or too small have
-/// steepness 0 and are to be passed over. 4 bytes a facet: heights and areas are read from the mesh again, which costs
-/// less than memory for them.
+/// steepness 0 and are to be passed over. 4 bytes a facet, 8 where the mesh is stretched: heights and areas are read from
+/// the mesh again, which costs less than memory for them.
 struct MeshSlopes {
   std::span<const Triangle> facets;  // of the mesh, which has to outlive the index
-  Buffer<Steepness> steepness;       // of each facet
+  Buffer<Steepness> steepness;       // of each facet; a layer's thickness times it is its step
+  Buffer<Steepness> nominal;         // of each facet before the stretch, for angles; empty where that is the same
   std::vector<FlatFacet> flats;      // in no order; the same for any number of threads
-  double area_mm2 = 0;               // of all facets that are not horizontal
+  double area_mm2 = 0;               // of all facets that are not horizontal, where steps are looked at
+  double step_share = 1;             // of a facet's projected area in sums of steps; 1 but for steps of a part that has shrunk
 };
+
+/// Which steepness of a facet is asked for.
+enum class Slope { kSteps, kAngles };
 
 /// A mesh at a height; copies that stand on the same level count as one with a larger area.
 struct Standing {
@@ -77,6 +87,11 @@ struct SurfaceIndex {
   std::vector<PartSurface> parts;
   double area_mm2 = 0;  // of all copies, horizontal facets left out
   Nm top = 0;           // of all parts
+
+  /// Whether angles differ from the slopes that leave steps.
+  bool has_nominal() const {
+    return std::ranges::any_of(meshes, [](const MeshSlopes& mesh) { return !mesh.nominal.empty(); });
+  }
 };
 
 /// Looks at every facet once, in parallel; the result does not depend on the number of threads.
@@ -84,31 +99,41 @@ struct SurfaceIndex {
 /// instances, part_of_instance  of equal length; the offset's z is the height above the bed
 /// angles come from the corners of the facets, never from the normals that a file may hold
 /// meshes       are referred to by the index
-/// cost  O(facets); 4 bytes a facet
+/// stretch      of each mesh, or empty if none is stretched. Angles, and whether a facet is horizontal, are those of the mesh
+///              before it; heights and areas of flats are those of the mesh as it stands there
+/// source  M. V. A. de Lima (2009), Appendix B: the angles of a job with factors 1.007, 1.007, 1 are those of the STL file
+/// cost  O(facets); 4 bytes a facet, 8 of a stretched mesh
 SurfaceIndex index_surface(std::span<const Mesh> meshes, std::span<const Instance> instances,
                            std::span<const std::uint32_t> part_of_instance, std::uint32_t part_count,
-                           const SurfaceOptions& options);
+                           const SurfaceOptions& options, std::span<const Stretch> stretch = {});
 
 /// Into how many shares a pass over the sloped facets of these parts may be cut whose every share fills `entries` numbers
 /// of its own: 1 where filling them would cost more than the facets. The same for any number of threads.
 std::uint32_t worthwhile_shares(const SurfaceIndex& index, std::span<const PartSurface> parts, std::size_t entries);
 
-/// Calls visit(lo, hi, steepness, projected) for each sloped facet of one of `shares` shares of a part: heights in nm
-/// above the bed, mm2 of all copies, negative where the facet looks down.
+/// Calls visit(lo, hi, steepness, projected) for each sloped facet of one of `shares` shares of a mesh that stands
+/// somewhere: heights in nm above the bed, mm2 of all copies, negative where the facet looks down.
+template <class Visit>
+void for_each_slope(const MeshSlopes& mesh, const Standing& standing, std::uint32_t share, std::uint32_t shares,
+                    const Visit& visit, Slope slope = Slope::kSteps) {
+  const Triangle* facets = mesh.facets.data();
+  const bool nominal = slope == Slope::kAngles && !mesh.nominal.empty();
+  const Steepness* steepness = nominal ? mesh.nominal.data() : mesh.steepness.data();
+  const std::size_t count = mesh.steepness.size(), end = count * (share + 1) / shares;
+  for (std::size_t i = count * share / shares; i < end; ++i) {
+    if (steepness[i] == 0) continue;
+    const Triangle& t = facets[i];
+    const Nm lo = std::min(std::min(t.a.z, t.b.z), t.c.z), hi = std::max(std::max(t.a.z, t.b.z), t.c.z);
+    visit(lo + standing.raise, hi + standing.raise, steepness[i], projected_mm2(t) * standing.copies);
+  }
+}
+
+/// The same for all meshes of a part.
 template <class Visit>
 void for_each_slope(const SurfaceIndex& index, const PartSurface& part, std::uint32_t share, std::uint32_t shares,
-                    const Visit& visit) {
+                    const Visit& visit, Slope slope = Slope::kSteps) {
   for (const Standing& standing : part.standing) {
-    const MeshSlopes& mesh = index.meshes[standing.mesh];
-    const Triangle* facets = mesh.facets.data();
-    const Steepness* steepness = mesh.steepness.data();
-    const std::size_t count = mesh.steepness.size(), end = count * (share + 1) / shares;
-    for (std::size_t i = count * share / shares; i < end; ++i) {
-      if (steepness[i] == 0) continue;
-      const Triangle& t = facets[i];
-      const Nm lo = std::min(std::min(t.a.z, t.b.z), t.c.z), hi = std::max(std::max(t.a.z, t.b.z), t.c.z);
-      visit(lo + standing.raise, hi + standing.raise, steepness[i], projected_mm2(t) * standing.copies);
-    }
+    for_each_slope(index.meshes[standing.mesh], standing, share, shares, visit, slope);
   }
 }
 

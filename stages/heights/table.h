@@ -27,6 +27,12 @@ class LayerTable {
     ++count_;
   }
 
+  /// Takes the last layer away; not of a uniform table.
+  void drop_last() {
+    entries_.pop_back();
+    --count_;
+  }
+
   std::uint32_t size() const { return count_; }
   Layer operator[](std::uint32_t index) const {
     if (thickness_ > 0) {

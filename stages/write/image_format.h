@@ -16,6 +16,15 @@ namespace lamina::write {
 
 using Bytes = Buffer<std::byte>;
 
+/// What a file may say of its layer beside the pixels.
+struct LayerTags {
+  std::string_view job;       // what people call it; no path
+  std::string_view material;  // empty if the job has one
+  std::string_view mirror;    // axes, "x", "y" or "xy"; empty if the image is not mirrored
+  std::uint32_t layer = 0, layers = 0;
+  Nm bottom = 0, top = 0;  // nm above the bed
+};
+
 /// Encodes layers one after another and keeps its scratch memory between them. One encoder per thread at a time.
 class ImageEncoder {
  public:
@@ -26,6 +35,9 @@ class ImageEncoder {
   /// errors        kOutput if the format cannot hold the image (its limits are named in the message)
   /// Set pixels are printed as 1 = jet: min-is-white in TIFF, black in PBM, 1 in PNG's palette (see the format's README).
   virtual Status encode(const RunsView& runs, double dpi_x, double dpi_y, Bytes& file) = 0;
+
+  /// What the next files say of their layers; nothing until it is called. Formats without a place for it ignore it.
+  virtual void tag(const LayerTags&) {}
 };
 
 /// One row of the registry.

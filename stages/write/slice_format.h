@@ -23,7 +23,8 @@ struct SliceHead {
   std::vector<std::string> parts;  // names, one for each body
   Box bounds;                      // nm on the bed, around all that is sliced
   std::uint32_t layers = 0;
-  Nm first_bottom = 0;  // nm, bottom of the first layer that is written
+  Nm first_bottom = 0;   // nm, bottom of the first layer that is written
+  std::int64_t top = 0;  // nm, of the last layer of the whole file; 0: that of the box
   std::string program;  // "lamina 0.1.0"
 };
 
@@ -45,13 +46,31 @@ struct SliceFormatOptions {
 class SliceEncoder {
  public:
   virtual ~SliceEncoder() = default;
+  /// Whether the format can hold a layer; call it before layer(). errors  kUsage
+  virtual Status check(const SliceHead&, const SliceLayer&) const { return {}; }
   virtual void head(const SliceHead& head, Buffer<char>& out) const = 0;
   virtual void layer(const SliceHead& head, const SliceLayer& layer, Buffer<char>& out) const = 0;
   virtual void tail(const SliceHead& head, Buffer<char>& out) const = 0;
 };
 
 std::unique_ptr<SliceEncoder> make_svg_encoder();
+/// Polygons as Slic3r's --export-svg writes them; no filling.
+std::unique_ptr<SliceEncoder> make_svg_polygon_encoder();
 std::unique_ptr<SliceEncoder> make_cli_encoder(bool binary, const SliceFormatOptions& options);
+/// CLI with commands of 16 bits.
+std::unique_ptr<SliceEncoder> make_cli_16_encoder(const SliceFormatOptions& options);
+
+/// One row of the registry.
+struct SliceFormat {
+  std::string_view id, extension;
+  bool layer_files;  // may have one for each layer
+  bool paths;        // refuses no filling
+  std::unique_ptr<SliceEncoder> (*make)(const SliceFormatOptions&);  // null: none, or a package
+  std::uint32_t point_bytes, stretch_bytes;                          // of its text, at most: per point, and per element of a path
+};
+std::span<const SliceFormat> slice_formats();
+/// The format with this id, or nullptr.
+const SliceFormat* find_slice_format(std::string_view id);
 
 /// A file of one layer on its own.
 void encode_alone(const SliceEncoder& encoder, const SliceHead& head, const SliceLayer& layer, Buffer<char>& out);

@@ -64,6 +64,54 @@ TEST(TiffTags, SayOneBitMinIsWhiteTopLeftAndTheResolutionInDpi) {
   }
 }
 
+/// The description, the page and the first strip of a file; "" and -1 where tags are absent.
+struct LayerTagsRead {
+  std::string description, strip;
+  int page = -1, pages = -1;
+
+  explicit LayerTagsRead(const std::string& path) {
+    TIFF* tiff = TIFFOpen(path.c_str(), "r");
+    if (tiff == nullptr) return;
+    const char* text = nullptr;
+    if (TIFFGetField(tiff, TIFFTAG_IMAGEDESCRIPTION, &text) == 1) description = text;
+    std::uint16_t number = 0, of = 0;
+    if (TIFFGetField(tiff, TIFFTAG_PAGENUMBER, &number, &of) == 1) page = number, pages = of;
+    strip.resize(static_cast<std::size_t>(TIFFRawStripSize64(tiff, 0)));
+    EXPECT_EQ(TIFFReadRawStrip(tiff, 0, strip.data(), static_cast<tmsize_t>(strip.size())), static_cast<tmsize_t>(strip.size()));
+    TIFFClose(tiff);
+  }
+};
+
+TEST(TiffTags, TellJobLayerAndHeightAndLeaveThePixelsAsTheyAre) {
+  const testing::Folder folder;
+  const std::string path = folder / "tags.tif";
+  for (const char* id : {"tiff-g4", "tiff-packbits", "tiff-none"}) {
+    SCOPED_TRACE(id);
+    const auto encoder = find_image_format(id)->make_encoder();
+    const auto read = [&] {
+      Bytes file;
+      EXPECT_TRUE(encoder->encode(small_image(), 1200, 600, file).ok());
+      testing::save(path, file);
+      return LayerTagsRead(path);
+    };
+    const LayerTagsRead bare = read();
+    EXPECT_EQ(bare.description, "");
+    EXPECT_EQ(bare.page, -1);
+    encoder->tag({"crown.stl and 2 more", {}, {}, 11, 120, 550'000, 600'000});
+    const LayerTagsRead told = read();
+    EXPECT_EQ(told.description, "crown.stl and 2 more, layer 12 of 120, z 0.55 to 0.6 mm");
+    EXPECT_EQ(told.page, 11);
+    EXPECT_EQ(told.pages, 120);
+    EXPECT_EQ(told.strip, bare.strip);
+    encoder->tag({"K\xc3\xb6rper\n" + std::string(500, 'x'), "steel", "xy", 69'999, 70'000, 0, 1});
+    const LayerTagsRead odd = read();
+    EXPECT_TRUE(odd.description.starts_with("K??rper?x")) << odd.description;
+    EXPECT_TRUE(odd.description.ends_with("x, layer 70000 of 70000, z 0 to 0.000001 mm, steel, mirrored in xy")) << odd.description;
+    EXPECT_EQ(odd.page, -1) << "beyond 16 bits";
+    EXPECT_EQ(odd.strip, bare.strip);
+  }
+}
+
 TEST(TiffStrips, HoldAtMostAQuarterMegabyteUnlessARowIsLonger) {
   const testing::Folder folder;
   const std::string path = folder / "strips.tif";

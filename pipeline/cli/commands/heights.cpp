@@ -89,7 +89,7 @@ std::string rp3_text(const Job& job, const heights::Study& study) {
 }
 
 std::string table_text(Form form, const Job& job, const Scene& scene, const std::vector<heights::Study>& studies) {
-  heights::StudiedParts parts{{}, scene.height, heights_text(job), job.heights.cusp_mm};
+  heights::StudiedParts parts{{}, scene.height, text_of(job.heights, job.layer_mm), job.heights.cusp_mm};
   for (const PartSummary& part : scene.parts) parts.paths.push_back(part.path);
   switch (form) {
     case Form::kJson: return study_json(parts, studies);
@@ -153,7 +153,7 @@ Outcome run_heights(const Arguments& arguments, Context& context) {
   Result<heights::Options> options = options_of(arguments, *job);
   if (!options) return options.error();
   options->tells_time = arguments.has("--compare");
-  const heights::SurfaceIndex index = index_scene(*scene, *options);
+  const heights::SurfaceIndex index = index_scene(*job, *scene, *options);
   const std::chrono::duration<double> surface = Clock::now() - start - load;
   const auto studies = studies_of(arguments, *job, index, *options);
   if (!studies) return studies.error();

@@ -67,6 +67,7 @@ std::string study_page(const StudiedParts& parts, const Study& study) {
     line("", fmt::format("{} layers are thinner than the slopes at their bottom ask for: what lies above is flatter", back));
   }
   line("flats", flats_line(study));
+  if (const std::string small = small_peaks_text(study.plan, study.options.least_flat_mm2); !small.empty()) line("peaks", small);
   if (study.plan.one_less_reaches >= 0) {
     line("proof", fmt::format("{} that keeps these steps and flats gets higher than {:.4f} mm",
                               study.options.time.on() ? "no table of less time" : "no table of a layer less",
@@ -123,6 +124,7 @@ std::string study_json(const StudiedParts& parts, const std::vector<Study>& stud
                   {"flats", e.flats.size()},
                   {"flats_missed", e.flats_missed},
                   {"largest_miss_mm", mm(e.largest_miss)}};
+    if (study.plan.small_peaks > 0) table["small_peaks"] = study.plan.small_peaks;
     if (study.plan.one_less_reaches >= 0) table["one_less_reaches_mm"] = mm(study.plan.one_less_reaches);
     if (e.seconds > 0) table["seconds"] = rounded(e.seconds, 3);
     table["flat"] = Json::array();

@@ -9,6 +9,7 @@
 #include "stages/data/text/readable.h"
 #include "stages/write/image_format.h"
 #include "stages/write/program/dialect.h"
+#include "stages/write/slice_format.h"
 
 namespace lamina {
 namespace {
@@ -16,14 +17,6 @@ namespace {
 constexpr std::size_t kLongestName = 255, kLongestMaterial = 40;  // bytes
 constexpr std::int64_t kMostMicroseconds = 1'000'000'000'000;  // of a layer, as a replay counts them
 constexpr std::int64_t kMostDots = 25'400, kMostSpan = 1'000'000'000'000, kLeastPixel = 1000;
-
-/// A format of contours, with the extension of its files.
-struct SliceExtension {
-  std::string_view format, extension;
-  bool layer_files;  // may have one for each layer
-};
-constexpr SliceExtension kSlices[] = {
-    {"svg", ".svg", true}, {"cli", ".cli", true}, {"cli-binary", ".cli", true}, {"3mf", ".3mf", false}, {"null", "", false}};
 
 /// As read::check_material allows.
 bool is_material(std::string_view name) {
@@ -52,8 +45,8 @@ std::string fault_of_images(const ManifestHead& head) {
 }
 
 std::string fault_of_contours(const ManifestHead& head) {
-  const auto* slice = std::ranges::find(kSlices, head.format, &SliceExtension::format);
-  if (slice == std::end(kSlices)) return no_such("format", head.format);
+  const auto* slice = write::find_slice_format(head.format);
+  if (slice == nullptr) return no_such("format", head.format);
   const bool layer_files = head.file.empty() && !slice->extension.empty();
   if (head.extension != (layer_files && slice->layer_files ? slice->extension : ""))
     return no_such("extension", head.extension);

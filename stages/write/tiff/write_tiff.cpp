@@ -8,6 +8,7 @@
 
 #include "stages/data/units.h"
 #include "stages/geometry/bits.h"
+#include "stages/write/decimal.h"
 #include "stages/write/g4/encode.h"
 #include "stages/write/tiff/memory_file.h"
 #include "stages/write/tiff/tiff.h"
@@ -53,6 +54,35 @@ void set_tags(TIFF* tiff, const RunsView& runs, double dpi_x, double dpi_y, std:
   TIFFSetField(tiff, TIFFTAG_SOFTWARE, "lamina");  // without a version: releases do not change the bytes of layers
 }
 
+/// Keeps what files say of their layers, without an allocation a layer.
+class TiffEncoder : public ImageEncoder {
+ public:
+  void tag(const LayerTags& tags) override {
+    constexpr std::size_t kLongestName = 128;
+    char bottom[kMostDecimal], top[kMostDecimal];
+    *put_mm(tags.bottom, bottom) = *put_mm(tags.top, top) = 0;
+    const auto put = fmt::format_to_n(text_, sizeof text_ - 1, "{}, layer {} of {}, z {} to {} mm{}{}{}{}",
+                                      tags.job.substr(0, kLongestName), tags.layer + 1, tags.layers, bottom, top,
+                                      tags.material.empty() ? "" : ", ", tags.material,
+                                      tags.mirror.empty() ? "" : ", mirrored in ", tags.mirror);
+    for (char* c = text_; c != put.out; ++c) *c = *c >= ' ' && *c <= '~' ? *c : '?';  // 7-bit ASCII, TIFF 6.0 section 2
+    *put.out = 0;
+    page_ = tags.layer;
+    pages_ = tags.layers;
+  }
+
+ protected:
+  void set_layer_tags(TIFF* tiff) const {
+    if (pages_ == 0) return;
+    TIFFSetField(tiff, TIFFTAG_IMAGEDESCRIPTION, text_);
+    if (pages_ <= UINT16_MAX) TIFFSetField(tiff, TIFFTAG_PAGENUMBER, static_cast<int>(page_), static_cast<int>(pages_));
+  }
+
+ private:
+  char text_[256] = "";
+  std::uint32_t page_ = 0, pages_ = 0;
+};
+
 /// Writes the directory; after this the file is whole or the error says why not.
 Status finish(TiffHandle tiff, bool strips_written, MemoryFile& memory, const RunsView& runs, const std::string& message) {
   const bool directory_written = strips_written && TIFFFlush(tiff.get()) != 0;
@@ -67,7 +97,7 @@ Status finish(TiffHandle tiff, bool strips_written, MemoryFile& memory, const Ru
   return {};
 }
 
-class G4Encoder : public ImageEncoder {
+class G4Encoder : public TiffEncoder {
  public:
   Status encode(const RunsView& runs, double dpi_x, double dpi_y, Bytes& file) override {
     if (Status status = check_size(runs); !status) return status;
@@ -81,6 +111,7 @@ class G4Encoder : public ImageEncoder {
     TiffHandle tiff = open_for_writing(memory, message);
     if (tiff == nullptr) return cannot_hold(runs, message);
     set_tags(tiff.get(), runs, dpi_x, dpi_y, COMPRESSION_CCITTFAX4, runs.rows());
+    set_layer_tags(tiff.get());
     const auto length = static_cast<tmsize_t>(end - kHeaderBytes);
     const bool written = TIFFWriteRawStrip(tiff.get(), 0, file.data() + kHeaderBytes, length) == length;
     return finish(std::move(tiff), written, memory, runs, message);
@@ -90,7 +121,7 @@ class G4Encoder : public ImageEncoder {
   g4::Encoder encoder_;
 };
 
-class StripEncoder : public ImageEncoder {
+class StripEncoder : public TiffEncoder {
  public:
   explicit StripEncoder(std::uint16_t compression) : compression_(compression) {}
 
@@ -112,6 +143,7 @@ class StripEncoder : public ImageEncoder {
     TiffHandle tiff = open_for_writing(memory, message);
     if (tiff == nullptr) return cannot_hold(runs, message);
     set_tags(tiff.get(), runs, dpi_x, dpi_y, compression_, rows_per_strip);
+    set_layer_tags(tiff.get());
 
     bool written = true;
     bits_.resize(stride * rows_per_strip);

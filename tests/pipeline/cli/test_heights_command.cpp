@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <filesystem>
 #include <nlohmann/json.hpp>
+#include <sstream>
 
 #include "tests/commands/program.h"
 
@@ -44,6 +45,62 @@ TEST(HeightsCommand, TellsTheTableInEveryForm) {
   EXPECT_TRUE(read_text(directory / "table.rp3").ends_with("----- fim do arquivo -----\n"));
   EXPECT_EQ(run({"--plot", "plot.svg"}).code, 0);
   EXPECT_TRUE(read_text(directory / "plot.svg").ends_with("</svg>\n"));
+}
+
+// The job of the document had the factors 1.007, 1.007 and 1, and lists the slopes of the STL file.
+TEST(HeightsCommand, AppendixBIsPrintedWithItsShrinkFactors) {
+  const std::string reference = std::string(LAMINA_TEST_DIR) + "/reference/lima2009/";
+  const Directory directory;
+  const Outcome outcome =
+      run_lamina({"heights", reference + "case1_plane.stl", "--heights", "angle", "--thickness", "0.178,0.254", "--facets",
+                  "plane", "--shrink", "1.007,1.007,1", "--format", "rp3", "--quiet"},
+                 directory.path());
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  std::istringstream file(outcome.out), published(read_text(reference + "appendix_b.rp3.tsv"));
+  std::vector<std::string> rows;
+  for (std::string row; std::getline(file, row);) {
+    if (row.find("\t0.508\t") != std::string::npos) rows.push_back(row);
+  }
+  ASSERT_EQ(rows.size(), 59u) << "a row for the last layer comes first";
+  std::size_t equal = 0, count = 0;
+  for (std::string row; std::getline(published, row);) {
+    if (row.find("\t0.508\t") == std::string::npos) continue;
+    if (const std::size_t wall = row.find("-0.00"); wall != std::string::npos) row.erase(wall, 1);
+    if (++count < rows.size()) equal += rows[count] == row ? 1 : 0;
+  }
+  EXPECT_EQ(count, 58u);
+  EXPECT_EQ(equal, 58u) << outcome.out;
+}
+
+TEST(HeightsCommand, TheTopIsCoveredAndSmallPeaksAreTold) {
+  const Directory directory;
+  write_box(directory / "box.stl", {0, 0, 0}, {5, 5, 4.892f});  // 19 layers of 0.254 and 66 um
+  const auto heights = [&](std::vector<std::string> more) {
+    std::vector<std::string> call = {"heights", "box.stl", "--heights", "angle", "--thickness", "0.178,0.254", "--format", "json",
+                                     "--quiet"};
+    call.insert(call.end(), more.begin(), more.end());
+    const Outcome outcome = run_lamina(call, directory.path());
+    EXPECT_EQ(outcome.code, 0) << outcome.err;
+    return nlohmann::json::parse(outcome.out)["tables"][0];
+  };
+  EXPECT_NEAR(heights({})["top_miss_mm"].get<double>(), -0.066, 1e-6);
+  EXPECT_NEAR(heights({"--cover-top"})["top_miss_mm"].get<double>(), 0.036, 1e-6);
+  EXPECT_EQ(heights({"--flat-area", "30"})["small_peaks"], 1) << "the top is smaller than that";
+  EXPECT_FALSE(heights({"--flat-area", "30", "--peaks", "facets"}).contains("small_peaks"));
+  const Outcome jet = run_lamina({"jet", "box.stl", "--bed", "10x10", "--dpi", "200", "--heights", "angle", "--thickness",
+                                  "0.178,0.254", "--flat-area", "30", "--cover-top", "-o", "out"},
+                                 directory.path());
+  EXPECT_EQ(jet.code, 0) << jet.err;
+  EXPECT_NE((jet.out + jet.err).find("a height with horizontal facets below 30 mm2 in all is no peak; --peaks facets"),
+            std::string::npos)
+      << jet.out << jet.err;
+  const auto layers = nlohmann::json::parse(read_text(directory / "out/manifest.json"))["layers"];
+  ASSERT_EQ(layers.size(), 20u);
+  EXPECT_EQ(layers[19]["set_pixels"], layers[0]["set_pixels"]) << "the last layer is printed";
+  expect_refused("jet box.stl --cover-top -o no", 2, "--cover-top: is of --heights angle and optimal", directory);
+  expect_refused("jet box.stl --heights cusp --thickness 0.1,0.2 --cusp-of nominal -o no", 2, "add --shrink", directory);
+  expect_refused("jet box.stl --heights optimal --thickness 0.1,0.2 --peaks facets -o no", 2, "--peaks: is of --heights angle",
+                 directory);
 }
 
 // Pictures are drawn by lamina-preview.

@@ -1,8 +1,11 @@
 // tests/pipeline/run/test_slice_jobs.cpp: lamina slice as a program: same bytes, right and wrong use, what is left behind.
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
 #include <filesystem>
 #include <fstream>
+#include <map>
 #include <nlohmann/json.hpp>
 #include <sstream>
 #include <tuple>
@@ -85,6 +88,71 @@ TEST(SliceProgram, SameBytesForEveryPatternFormatThreadsAndMemory) {
       }
     }
   }
+}
+
+// The hosts' readers are those of tests/write/test_slice_hosts.cpp; here the areas are compared.
+TEST(SliceProgram, PolygonsAndShortCommandsHoldTheAreasOfTheOthers) {
+  const Directory directory;
+  std::map<std::string, std::string> files;
+  for (const std::string format : {"cli", "svg-polygon", "cli-16"}) {
+    const Outcome outcome = run_lamina({"slice", corpus("parameter_quality_nut.stl"), "--layer", "2", "--format", format, "--quiet",
+                                        "-o", format, "--bed", "60x60"},
+                                       directory.path());
+    ASSERT_EQ(outcome.code, 0) << outcome.err;
+    EXPECT_EQ(run_lamina({"verify", format}, directory.path()).code, 0);
+    files[format] = read_text(directory / (format + "/parameter_quality_nut" + (format[0] == 's' ? ".svg" : ".cli")));
+  }
+  const auto area = [](const std::vector<double>& xy) {
+    double doubled = 0;
+    for (std::size_t i = 0, j = xy.size() - 2; i < xy.size(); j = i, i += 2) doubled += xy[j] * xy[i + 1] - xy[i] * xy[j + 1];
+    return doubled / 2;
+  };
+  const auto numbers = [](std::string text) {
+    std::ranges::replace(text, ',', ' ');
+    std::istringstream stream(text);
+    std::vector<double> found;
+    for (double value; stream >> value;) found.push_back(value);
+    return found;
+  };
+  double text = 0, polygons = 0, shorts = 0, perimeter = 0;
+  std::istringstream cli(files["cli"]), svg(files["svg-polygon"]);
+  for (std::string line; std::getline(cli, line);) {
+    if (!line.starts_with("$$POLYLINE/")) continue;
+    std::vector<double> xy = numbers(line.substr(11));
+    xy.erase(xy.begin(), xy.begin() + 3);
+    text += area(xy);
+    for (std::size_t i = 2; i < xy.size(); i += 2) perimeter += std::hypot(xy[i] - xy[i - 2], xy[i + 1] - xy[i - 1]);
+  }
+  for (std::string line; std::getline(svg, line);) {
+    const std::size_t points = line.find("points=\"");
+    if (line.starts_with("    <polygon ") && points != std::string::npos)
+      polygons += area(numbers(line.substr(points + 8, line.find('"', points + 8) - points - 8)));
+  }
+  const std::string& binary = files["cli-16"];
+  const double unit = std::stod(binary.substr(binary.find("$$UNITS/") + 8));
+  std::size_t at = binary.find("$$HEADEREND") + 11;
+  const auto take = [&] {
+    at += 2;
+    return static_cast<std::uint8_t>(binary[at - 2]) | static_cast<std::uint8_t>(binary[at - 1]) << 8;
+  };
+  while (at < binary.size()) {
+    if (take() == 128) {
+      take();
+      continue;
+    }
+    take(), take();
+    std::vector<double> xy(2 * static_cast<std::size_t>(take()));
+    for (double& value : xy) value = take() * unit;
+    shorts += area(xy);
+  }
+  EXPECT_GT(text, 1000);
+  EXPECT_NEAR(polygons, text, 1e-6 * text);
+  EXPECT_NEAR(shorts, text, perimeter * unit / 2);
+  const Outcome filled = run_lamina({"slice", corpus("parameter_quality_nut.stl"), "--format", "svg-polygon", "--walls", "1", "-o",
+                                     "filled"},
+                                    directory.path());
+  EXPECT_EQ(filled.code, 2);
+  EXPECT_NE(filled.err.find("--format svg-polygon: holds contours only"), std::string::npos) << filled.err;
 }
 
 TEST(SliceProgram, ManifestSaysWhereEveryLayerLiesInTheFile) {
