@@ -90,7 +90,7 @@ class SegmentCounter {
 
 /// Counts thick and thin stretches that end before the machine has reached their speed. A planner makes the change of speed
 /// from one stretch of a line to the next within the faster of the two; at the ends of a line it begins and ends with half of
-/// the speed that the machine changes at once.
+/// the speed that the machine changes at once. Lines that are not divided do not count.
 class SpeedCounter {
  public:
   SpeedCounter(const Extruder& machine, ShortStretches& counts)
@@ -101,8 +101,9 @@ class SpeedCounter {
     if (follows && s.thickness == before_) {
       length_ += length_mm;
     } else {
-      if (before_ != Thickness::kReference) finish(follows ? speed_mm_s : end_speed_);
+      if (before_ != Thickness::kReference) finish(follows, follows ? speed_mm_s : end_speed_);
       entry_ = follows ? speed_ : end_speed_;
+      divided_ = follows;
       length_ = length_mm;
       speed_ = speed_mm_s;
     }
@@ -111,12 +112,13 @@ class SpeedCounter {
     before_ = s.thickness;
   }
   void end() {
-    if (before_ != Thickness::kReference) finish(end_speed_);
+    if (before_ != Thickness::kReference) finish(false, end_speed_);
     before_ = Thickness::kReference;
   }
 
  private:
-  void finish(double exit) {
+  void finish(bool goes_on, double exit) {
+    if (!goes_on && !divided_) return;
     const double from = std::min(entry_, speed_), to = std::min(exit, speed_);
     const double reached = std::max({from, to, std::sqrt((from * from + to * to) / 2 + acceleration_ * length_)});
     if (reached < speed_ * (1 - 1e-9)) counts_.add({1, length_, reached, speed_});
@@ -127,6 +129,7 @@ class SpeedCounter {
   std::uint32_t run_ = UINT32_MAX;
   Point2 at_{};
   Thickness before_ = Thickness::kReference;
+  bool divided_ = false;
   double entry_ = 0, length_ = 0, speed_ = 0;
 };
 

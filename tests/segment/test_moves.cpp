@@ -180,11 +180,15 @@ TEST(Moves, StretchesThatAccelerationCannotFollowAreCountedWithTheSpeedThatTheyR
   lay(Thickness::kThick, 1.5, 7.5);
   counter.end();
   EXPECT_EQ(shorts.count, 0u);
-  // What ends in the air begins or ends with half of the speed of a corner.
+  // A line begins and ends with half of the speed of a corner; one that is not divided does not count.
   lay(Thickness::kThin, 1, 30);
+  lay(Thickness::kThick, 1.5, 7.5);
   counter.end();
   EXPECT_EQ(shorts.count, 1u);
-  EXPECT_NEAR(shorts.reached_mm_s, std::sqrt(4 * 4 + 400 * 1), 1e-9);
+  EXPECT_NEAR(shorts.reached_mm_s, std::sqrt((4 * 4 + 7.5 * 7.5) / 2 + 400 * 1), 1e-9);
+  lay(Thickness::kThick, 0.01, 7.5);
+  counter.end();
+  EXPECT_EQ(shorts.count, 1u);
 }
 
 }  // namespace
