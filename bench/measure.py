@@ -62,10 +62,10 @@ def build(*targets):
     subprocess.run(["cmake", "--build", "--preset", "release", "--target", *targets], cwd=ROOT, check=True)
 
 
-def comparison(arguments, about, turns, name, targets, cases=()):
+def comparison(arguments, about, turns, name, targets, cases=(), runs=3):
     """Options of a comparison with other programs, the folder of ours, built if it was not named, and a folder to work in."""
     parser = argparse.ArgumentParser(description=about, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--runs", type=int, default=3, help="turns: " + turns)
+    parser.add_argument("--runs", type=int, default=runs, help="turns: " + turns)
     if cases:
         parser.add_argument("--case", action="append", choices=sorted(cases))
     parser.add_argument("--models", default=models_default())

@@ -43,6 +43,9 @@ std::span<const JobKey> extrude_keys() {
       number<&Request::fan_percent>("fan_percent", "--fan", "%", 0, 100, "of the part's fan"),
       field<&Job::extrude, &Request::relative_extrusion>({"extrude", "relative_extrusion", "--relative-extrusion", "true|false",
                                                           "count filament from move to move", decides::moves}),
+      field<&Job::extrude, &Request::skirt_loops>(
+          {"extrude", "skirt_loops", "--skirt", "LOOPS", "laid around all parts before the first bead; 0: none", decides::moves},
+          {0, 100}),
       machine_key()};
   return keys;
 }

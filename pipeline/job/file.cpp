@@ -172,7 +172,9 @@ std::string job_text(const Job& job, const std::string& directory) {
 
 std::string canonical_job_text(const Job& job, Product product) {
   const bool filled = product == Product::kImages && fills(job);  // by beads, which [fill] and [segment] decide
-  std::string text = sections_text(job_keys(), job, [&](const JobKey& key, const std::string& value) {
+  Job whole = job;
+  whole.slice.tolerance_um = tolerance_um_of(job, product);
+  std::string text = sections_text(job_keys(), whole, [&](const JobKey& key, const std::string& value) {
     const bool of_filling = key.section == "fill" || key.section == "segment";
     return !value.empty() && ((key.decides & bit(product)) != 0 || (filled && of_filling));
   });

@@ -37,6 +37,10 @@ Status check_job(const Job& job) {
   return {};
 }
 
+double tolerance_um_of(const Job& job, Product product) {
+  return job.slice.tolerance_um.value_or(product == Product::kMoves ? 10 : 0);
+}
+
 bool fills(const Job& job) {
   if (job.segment.any()) return true;
   return std::ranges::any_of(job.parts, [&](const PartRequest& part) {

@@ -56,7 +56,7 @@ struct SliceRequest {
   std::string format = "svg";      // of write::slice_formats()
   bool file_a_layer = false;       // layers/000000.svg ... in place of one file
   bool empty_first_layer = false;  // CLI
-  double tolerance_um = 0;         // simplification: greatest displacement of the contour
+  std::optional<double> tolerance_um;  // simplification: greatest displacement of contours; absent: tolerance_um_of()
   double bridge_mm = 0.1;          // longest gap in an open mesh that a straight segment closes
   double offset_mm = 0;            // offset of the contours, positive outwards
 };
@@ -77,6 +77,7 @@ struct ExtrudeRequest {
   std::optional<double> flow, nozzle_degc, bed_degc, print_mm_s, wall_mm_s, first_layer_mm_s, travel_mm_s, retraction_mm,
       fan_percent;
   std::optional<bool> relative_extrusion;
+  std::optional<std::uint32_t> skirt_loops;
   std::vector<std::pair<std::string, std::string>> machine;  // other profile keys with values: fan.from_layer, 2
 };
 
@@ -138,6 +139,9 @@ struct Job {
 /// Checks every value of a job against its limits and against the others; for jobs from any source.
 /// errors  kUsage, one line that begins with the key
 Status check_job(const Job& job);
+
+/// The job's slice.tolerance_um; if absent 10 for toolpaths, whose planners look ahead over a few dozen moves, else 0.
+double tolerance_um_of(const Job& job, Product product);
 
 /// Sets the materials of the parts: "steel" for all, or "steel,bronze" one per part in order.
 /// errors  kUsage: wrong number of names, or an invalid name

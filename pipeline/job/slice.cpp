@@ -26,7 +26,7 @@ const JobKey kSliceKeys[] = {
         {"slice", "empty_first_layer", "--empty-first-layer", "",
          "CLI: begin with an empty layer at the bottom, from which readers infer the thickness", decides::contours, "true"}),
     field<&Job::slice, &SliceRequest::tolerance_um>(
-        {"slice", "tolerance_um", "--tolerance", "UM", "points are dropped if the contour moves by no more, in micrometres",
+        {"slice", "tolerance_um", "--tolerance", "UM", "points are left out if the contour moves by no more, in micrometres",
          kContour},
         {0, 1e6, " um"}),
     field<&Job::slice, &SliceRequest::bridge_mm>(

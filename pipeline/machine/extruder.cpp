@@ -34,6 +34,7 @@ Result<ExtruderProfile> resolve_extruder(const Job& job) {
   if (r.travel_mm_s) m.speed.travel_mm_s = *r.travel_mm_s;
   if (r.retraction_mm) m.retraction.length_mm = *r.retraction_mm;
   if (r.fan_percent) m.fan.percent = *r.fan_percent;
+  if (r.skirt_loops) m.skirt.loops = *r.skirt_loops;
   if (r.relative_extrusion) m.code.relative_extrusion = *r.relative_extrusion;
   return found;
 }

@@ -245,6 +245,7 @@ class Planner {
 
 Result<Resolved> resolve(const Job& job, Product product) {
   Resolved resolved{job, product, bare_bed(job), std::nullopt, std::nullopt};
+  resolved.job.slice.tolerance_um = tolerance_um_of(job, product);
   if (product == Product::kImages) {
     if (job.heights.per_part) {
       return usage("--per-part: a powder bed has one table of layers for all parts; leave it out");

@@ -45,7 +45,9 @@ Result<Sections> Sections::make(const Job& job, const Scene& scene, LayerSchedul
   made.bounds_ = slice::grown(made.bounds_, made.grow_);
   slice::SliceOptions options;
   options.fill_rule = job.fill_rule;
-  options.tolerance = static_cast<Nm>(nm_of(job.slice.tolerance_um / 1000));
+  const auto tolerance = static_cast<Nm>(nm_of(job.slice.tolerance_um.value_or(0) / 1000));
+  // Two planes of a layer are combined at full resolution: where they cross at a small angle, corners would move further.
+  (job.heights.containment == Containment::kAcross ? options.tolerance : made.tolerance_) = tolerance;
   options.gap = static_cast<Nm>(nm_of(job.slice.bridge_mm));
   options.offset = nm_of(job.slice.offset_mm);
   auto slicer = slice::Slicer::build(scene.meshes, scene.instances, body, made.schedule_.planes, options);
@@ -134,6 +136,7 @@ Result<slice::LayerReport> Sections::section(const slice::Slicer& slicer, const 
       region = unite_contours(all, FillRule::kNonzero);
     }
     if (!region) return region.error();
+    slice::simplify(*region, tolerance_, work.scratch.simplify);
     both.contours.append(*region);
     both.body.push_back(both.contours.size());
   }
@@ -242,7 +245,8 @@ std::uint64_t Sections::Work::bytes() const {
   for (const Contours& c : surface) total += of(c);
   for (const Contours& c : region) total += of(c);
   for (const Contours& c : scratch.of_source) total += of(c);
-  total += scratch.cuts.bytes() + scratch.chain.bytes() + scratch.contact.bytes() + bytes_held(scratch.facets);
+  total += scratch.cuts.bytes() + scratch.chain.bytes() + scratch.contact.bytes() + scratch.simplify.bytes() +
+           bytes_held(scratch.facets);
   return total + bytes_held(paths.point) + bytes_held(paths.kind) + bytes_held(paths.width) + bytes_held(paths.line) +
          bytes_held(paths.offset);
 }

@@ -97,7 +97,8 @@ class Sections {
   ContoursView contours_of(const Area& area, Work& work) const;
   Error failed(const Area& area, const Error& error) const;
   Box bounds_;
-  Nm grow_ = 0;  // of an offset outwards
+  Nm grow_ = 0;       // of an offset outwards
+  Nm tolerance_ = 0;  // of layers made of two planes
   bool fills_ = false;
 };
 

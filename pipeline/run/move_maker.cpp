@@ -7,6 +7,7 @@
 
 #include "pipeline/output/toolpath_file.h"
 #include "pipeline/run/path_layer.h"
+#include "stages/data/text/number_text.h"
 #include "stages/data/text/readable.h"
 #include "stages/segment/laid/told.h"
 #include "stages/write/gcode/gcode.h"
@@ -71,13 +72,13 @@ class MoveMaker : public Maker {
     if (Status status = made.waits ? file_.file().append(text, made.record) : file_.file().end_pieces(made.record); !status)
       return status;
     add(made.record);
-    sanity_.record(layer, made.facts.totals.moves > 0);
+    sanity_.record(layer, made.facts.totals.part_moves() > 0);
     if (made.facts.laid.segments.lines > 0 && made.facts.laid.segments.thin == 0) undivided_.add(made.record.layer);
     return {};
   }
   void add_kept(const LayerRecord& record) override {
     add(record);
-    sanity_.keep(record.layer.index, record.paths->totals.moves > 0);
+    sanity_.keep(record.layer.index, record.paths->totals.part_moves() > 0);
   }
   void add(const LayerRecord& record) {
     if (record.layer.index == plan_.range[0]) first_layer_points_ = record.paths->laid.segments.points();
@@ -178,7 +179,7 @@ void MoveMaker::warn(const Summary& so_far, std::vector<Warning>& warnings) cons
                   warnings);
   std::string slow = segment::speed_warning(sums_.laid.shorts, plan_.moves->profile.machine);
   if (!slow.empty()) warnings.push_back({"acceleration", std::move(slow)});
-  if (plan_.sections->fills() && sums_.totals.moves == 0) {
+  if (plan_.sections->fills() && sums_.totals.part_moves() == 0) {
     warnings.push_back({"no-bead", "no bead fits into the parts: they are narrower than the walls and the filling ask for"});
   }
 }
@@ -188,28 +189,35 @@ void MoveMaker::tell(Summary& summary) const {
   const Extruder& machine = plan_.moves->profile.machine;
   const double filament_cm3 = totals.filament_mm * machine.material.mm3_of_e() / 1000;
   const double filament_g = filament_cm3 * machine.material.density_g_cm3;
-  summary.volume_mm3 = totals.volume_mm3;
+  summary.volume_mm3 = totals.volume_mm3 - totals.beside_mm3;
   summary.bytes_written = bytes_written_;
 
   const auto result = [&](std::string_view name, std::string text) { summary.results.emplace_back(name, std::move(text)); };
   result("beads",
-         fmt::format("{} moves, {:.2f} m, {:.3f} cm3; {} travels, {:.2f} m", readable_count(totals.moves),
-                     totals.bead_mm / 1000, totals.volume_mm3 / 1000, readable_count(totals.travels), totals.travel_mm / 1000));
+         fmt::format("{} moves, {:.2f} m, {:.3f} cm3; {} travels, {:.2f} m", readable_count(totals.part_moves()),
+                     (totals.bead_mm - totals.beside_mm) / 1000, summary.volume_mm3 / 1000, readable_count(totals.travels),
+                     totals.travel_mm / 1000));
+  result("skirt", totals.beside_moves == 0 ? std::string(machine.skirt.loops == 0 ? "none" : "none: no room, or no first layer")
+                                           : fmt::format("{:.1f} mm, {:.1f} mm3, {:.1f} mm of filament, beside the parts",
+                                                         totals.beside_mm, totals.beside_mm3, totals.beside_filament_mm));
   segment::tell_laid(sums_.laid, ranges_, machine, first_layer_points_, summary.results, *summary.facts);
   result("filament", fmt::format("{:.1f} mm, {:.2f} cm3, {:.2f} g", totals.filament_mm, filament_cm3, filament_g));
   result("printing", fmt::format("about {}", write::gcode::time_text(totals.seconds)));
 
   nlohmann::ordered_json& facts = *summary.facts;
-  facts["moves"] = totals.moves;
+  facts["moves"] = totals.part_moves();
   facts["travels"] = totals.travels;
   facts["retractions"] = totals.retractions;
   facts["stored_points"] = sums_.stored_points;
-  facts["bead_mm"] = totals.bead_mm;
+  facts["bead_mm"] = totals.bead_mm - totals.beside_mm;
   facts["travel_mm"] = totals.travel_mm;
   facts["filament_mm"] = totals.filament_mm;
   facts["filament_g"] = filament_g;
+  facts["skirt"] = {{"moves", totals.beside_moves},
+                    {"bead_mm", totals.beside_mm},
+                    {"volume_mm3", totals.beside_mm3},
+                    {"filament_mm", totals.beside_filament_mm}};
   facts["print_seconds"] = totals.seconds;
-  facts["beside_mm3"] = totals.beside_mm3;
 }
 
 }  // namespace
@@ -220,6 +228,11 @@ void tell_moves(const Plan& plan, Summary& summary) {
   summary.format = plan.moves->profile.machine.format;
   summary.index_bytes = plan.sections->slicer().index_bytes();
   segment::tell_bead(plan.moves->profile.machine, plan.moves->left_out, summary.head, *summary.facts);
+  const double tolerance_um = tolerance_um_of(plan.job, plan.product);
+  summary.head.emplace_back("contours", tolerance_um > 0
+                                            ? fmt::format("points are left out that move them by at most {} um", number_text(tolerance_um))
+                                            : "all their points");
+  (*summary.facts)["tolerance_um"] = tolerance_um;
   for (const auto& [heights, range] : plan.segments->segmented()) {
     if (plan.job.dry_run && range->spaces_lines) segment::tell_foreseen(range->plan, heights, summary.head);
   }

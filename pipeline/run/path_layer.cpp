@@ -6,11 +6,35 @@
 #include <optional>
 
 #include "pipeline/plan/layer_cut.h"
+#include "stages/infill/skirt.h"
 #include "stages/segment/laid/crossing.h"
 #include "stages/segment/moves.h"
 
 namespace lamina::pipeline {
 namespace {
+
+/// Lays the skirt, as fast and as wide as a wall. The first layer of a job that begins at the bed has one.
+void lay_skirt(const Plan& plan, const Layer& layer, write::LayerMoves& out) {
+  const Extruder& machine = plan.moves->profile.machine;
+  const FillSettings& fill = plan.job.fill.all;
+  const auto width = static_cast<Nm>(nm_of(fill.wall_width_mm > 0 ? fill.wall_width_mm : fill.width_mm));
+  const Contours skirt = infill::skirt_around(plan.sections->bounds(), machine.skirt, width,
+                                              {nm_of(machine.bed.size_mm[0]), nm_of(machine.bed.size_mm[1])});
+  const segment::LayerCut uncut{};
+  segment::MoveTable table(plan.segments->base.plan, uncut, machine, layer);
+  for (std::uint32_t c = 0; c < skirt.size(); ++c) {
+    for (std::size_t i = 0; i + 1 < skirt[c].size(); ++i) {
+      Stretch stretch{};
+      stretch.from = skirt[c][i];
+      stretch.to = skirt[c][i + 1];
+      stretch.kind = PathKind::kOuter;
+      stretch.width = width;
+      stretch.line = kNoLine;
+      const segment::MoveTable::Entry& entry = table.of(stretch);
+      out.lay({stretch.from, stretch.to, PathKind::kSkirt, i == 0, entry.width, entry.area, entry.speed});
+    }
+  }
+}
 
 ToolpathsView paths_of(const Sections::Work& work, std::uint32_t area) {
   ToolpathsView paths = work.paths;
@@ -67,6 +91,7 @@ Result<bool> lay_moves(const Plan& plan, std::uint32_t index, const Sections::Wo
   const Layer layer = plan.sections->layers()[index].own();
   LaidSums laid;
   laid.porosity.solid_mm3 = facts.area_mm2 * mm(layer.thickness);
+  if (index == 0 && work.paths.size() > 0) lay_skirt(plan, layer, out);
   for (std::uint32_t a = 0; a + 1 < work.path_area.size(); ++a) {
     const auto& [range, cut] = cut_of(plan, a, layer);
     if (!cut) return cut.error();

@@ -47,7 +47,7 @@ sanity::Sampling sampling_of(const Job& job, const PixelGrid* grid) {
     sampling.pixel_mm = {25.4 / grid->x.dpi(), 25.4 / grid->y.dpi()};
     sampling.bleed_um = job.dose.bleed_um;
   } else {
-    sampling.tolerance_um = job.slice.tolerance_um;
+    sampling.tolerance_um = job.slice.tolerance_um.value_or(0);
     sampling.offset_mm = job.slice.offset_mm;
   }
   return sampling;

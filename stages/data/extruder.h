@@ -56,12 +56,20 @@ struct Extruder {
     double least_travel_mm = 1.5;  // shorter travels are made without it
   } retraction;
 
+  /// Beads before the first one of the part: the nozzle has oozed while it was heated and the axes were homed.
+  struct Skirt {
+    std::uint32_t loops = 1;  // around all parts; 0: none
+    double distance_mm = 5;   // from the parts' box to the nearest loop
+    double least_mm = 100;    // loops are added until they are so long in all
+  } skirt;
+
   struct Fan {
     double percent = 100;
     std::uint32_t from_layer = 1;  // counted from 0
   } fan;
 
   struct Code {
+    std::string flavor = "Marlin";  // told to viewers: Marlin, RepRap (RepRapFirmware), Repetier or Klipper
     bool relative_extrusion = true;
     // In start, end and layer: {nozzle_degc} {bed_degc} {first_nozzle_degc} {first_bed_degc} {layer} {z} {layers}
     std::string start, end, layer;

@@ -19,7 +19,8 @@ enum class PathKind : std::uint8_t {
   kInner,    // further walls inside it
   kRaster,   // a line of a raster, or of another pattern of open lines
   kContour,  // a closed curve that fills: concentric offsets
-  kLink      // short way from the end of one raster line to the start of the next, along the edge of the filled region
+  kLink,     // short way from the end of one raster line to the start of the next, along the edge of the filled region
+  kSkirt     // around all parts, before the first bead of any: never stored, only moved
 };
 
 /// Line number of walls and links.

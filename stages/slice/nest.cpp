@@ -160,4 +160,20 @@ Result<std::uint32_t> nest(Contours& contours, FillRule rule, const Buffer<std::
   return 0u;
 }
 
+bool same_nesting(const Contours& contours, const Contours& others) {
+  const auto outlines_of = [](const Contours& of) {
+    std::vector<Outline> outlines(of.size());
+    for (std::uint32_t c = 0; c < of.size(); ++c) outlines[c] = outline_of(of[c]);
+    return outlines;
+  };
+  const std::vector<Outline> outlines = outlines_of(others);
+  const std::vector<std::int32_t> outside = windings_outside(others, outlines, {});
+  const auto clean = [&](std::uint32_t c) { return outside[c] == (outlines[c].counter_clockwise ? 0 : 1); };
+  bool all = true;
+  for (std::uint32_t c = 0; c < others.size(); ++c) all = all && clean(c);
+  if (all) return true;
+  // Contours that touch each other wind otherwise, before as after.
+  return outside == windings_outside(contours, outlines_of(contours), {});
+}
+
 }  // namespace lamina::slice

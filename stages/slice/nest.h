@@ -18,4 +18,9 @@ namespace lamina::slice {
 /// cost     O(P) and, for C contours, C log C and the points of the contours whose boxes lie around each
 Result<std::uint32_t> nest(Contours& contours, FillRule rule, const Buffer<std::uint32_t>& group);
 
+/// Whether each of `others` turns as the contour of its number does, and all the rest wind as often about it.
+/// contours  clean
+/// cost      as nest
+bool same_nesting(const Contours& contours, const Contours& others);
+
 }  // namespace lamina::slice

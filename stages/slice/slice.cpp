@@ -8,6 +8,7 @@
 #include "stages/geometry/clipping.h"
 #include "stages/slice/nest.h"
 #include "stages/slice/order.h"
+#include "stages/slice/simplify.h"
 #include "stages/slice/tidy.h"
 
 namespace lamina::slice {
@@ -99,18 +100,19 @@ void Slicer::loops_of(const Source& source, std::uint32_t plane, LayerScratch& s
 }
 
 Status Slicer::clean(Contours& contours, LayerScratch& scratch, LayerReport& report) const {
-  tidy(contours, options_.tolerance);
+  tidy(contours);
   if (!find_contacts(contours, scratch.contact, scratch.group)) scratch.group.clear();
   const auto united = nest(contours, options_.fill_rule, scratch.group);
   if (!united) return united.error();
   report.united += *united;
   if (options_.offset == 0) {
     order_by_outer(contours);
-    return {};
+  } else {
+    auto moved = offset_contours(contours, options_.offset);
+    if (!moved) return moved.error();
+    contours = std::move(*moved);
   }
-  auto moved = offset_contours(contours, options_.offset);
-  if (!moved) return moved.error();
-  contours = std::move(*moved);
+  simplify(contours, options_.tolerance, scratch.simplify);
   return {};
 }
 
@@ -158,13 +160,14 @@ std::uint64_t Slicer::index_bytes() const {
 }
 
 std::uint64_t Slicer::layer_bytes_bound(std::uint32_t plane) const {
-  // Of a cut: its two edges, hashes and point; slots, links and states; its edge in the grid; its points before and after.
-  constexpr std::uint64_t kOfCut = 48 + 16 + 8 + 16 + 5 + 24 + 24;
+  // Of a cut: its two edges, hashes and point; slots, links and states; its edge in the grid; its points before and after,
+  // and once more while points are left out.
+  const std::uint64_t of_cut = 48 + 16 + 8 + 16 + 5 + 24 + 24 + (options_.tolerance > 0 ? 48 : 0);
   std::uint64_t most = 0;
   std::vector<std::uint8_t> seen(sources_->size(), 0);
   for (const Placed& placed : placed_) seen[placed.source] = 1;
   for (std::size_t s = 0; s < seen.size(); ++s) {
-    if (seen[s] != 0) most += (*sources_)[s].index.most_facets(plane) * kOfCut;
+    if (seen[s] != 0) most += (*sources_)[s].index.most_facets(plane) * of_cut;
   }
   std::uint64_t points = 0;
   for (const Placed& placed : placed_) points += (*sources_)[placed.source].index.most_facets(plane);

@@ -1,6 +1,6 @@
 // stages/slice/slice.h: meshes standing on the bed -> clean contours of any layer.
 //
-//   PlaneIndex ─> cut ─> chain ─> tidy ─> find_contacts ─> nest ─> order_by_outer ─> contours
+//   PlaneIndex ─> cut ─> chain ─> tidy ─> find_contacts ─> nest ─> order_by_outer ─> simplify ─> contours
 //                          └─> close_gaps (open meshes)      └─ unite what is in contact
 //
 // The plane rule is that of the bitmaps: a corner at the plane is below it. What is solid where shells overlap is
@@ -25,14 +25,15 @@
 #include "stages/slice/cut.h"
 #include "stages/slice/gaps.h"
 #include "stages/slice/plane_index.h"
+#include "stages/slice/simplify.h"
 
 namespace lamina::slice {
 
 struct SliceOptions {
   FillRule fill_rule = FillRule::kNonzero;
-  Nm tolerance = 0;         // nm by which dropping points may move a contour; 0 drops only points on straight lines
+  Nm tolerance = 0;         // nm by which leaving out points may move a contour; 0: only points on straight lines go
   Nm gap = 100'000;         // nm, longest gap of an open mesh that is bridged
-  std::int64_t offset = 0;  // nm by which contours are grown (shrunk if negative), last
+  std::int64_t offset = 0;  // nm by which contours are grown (shrunk if negative), before points are left out
 };
 
 /// One layer. The contours of body b are [body[b], body[b + 1]).
@@ -56,6 +57,7 @@ struct LayerScratch {
   ChainScratch chain;
   ContactScratch contact;
   Buffer<std::uint32_t> group;
+  SimplifyScratch simplify;
   Contours closed, open;
   std::vector<Contours> of_source;  // clean contours of what copies share
   std::vector<std::uint8_t> source_done;

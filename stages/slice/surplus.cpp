@@ -67,7 +67,7 @@ Result<double> surplus_area(std::span<const Source> sources, std::span<const Nm>
     }
   }
   const __int128 wound = doubled_area(scratch.all);
-  tidy(scratch.all, 0);
+  tidy(scratch.all);
   if (!find_contacts(scratch.all, scratch.contact, scratch.group)) scratch.group.clear();
   if (const auto united = nest(scratch.all, FillRule::kNonzero, scratch.group); !united) return united.error();
   return square_mm(doubled_area(scratch.all) - wound);

@@ -52,7 +52,8 @@ PathKind kind_of(const std::string& type) {
   std::string word = type;
   std::ranges::transform(word, word.begin(), [](char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c + 32) : c; });
   const auto has = [&](std::string_view part) { return word.find(part) != std::string::npos; };
-  if (has("skirt") || has("brim") || has("support") || has("prime") || has("wipe") || has("custom")) return PathKind::kLink;
+  if (has("skirt") || has("brim")) return PathKind::kSkirt;
+  if (has("support") || has("prime") || has("wipe") || has("custom")) return PathKind::kLink;
   if (has("infill") || has("fill") || has("skin") || has("surface") || word.empty()) return PathKind::kRaster;
   if (has("external") || has("outer")) return PathKind::kOuter;
   return PathKind::kInner;

@@ -3,7 +3,7 @@
 namespace lamina::view {
 
 Ink ink_of(PathKind kind) {
-  constexpr Ink kInks[] = {{176, 58, 46}, {214, 137, 16}, {36, 113, 163}, {17, 120, 100}, {142, 68, 173}};
+  constexpr Ink kInks[] = {{176, 58, 46}, {214, 137, 16}, {36, 113, 163}, {17, 120, 100}, {142, 68, 173}, {127, 140, 141}};
   return kInks[static_cast<std::size_t>(kind)];
 }
 

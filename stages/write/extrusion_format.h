@@ -19,10 +19,13 @@ struct MoveTotals {
   std::uint64_t moves = 0, travels = 0, retractions = 0;
   double bead_mm = 0, travel_mm = 0;
   double volume_mm3 = 0;   // of all that is laid: filament_mm x the filament's area x the machine's declared error
-  double beside_mm3 = 0;   // the share of volume_mm3 that lies beside the parts: prime lines, skirts
   double filament_mm = 0;  // sum of E; what is drawn back comes again and does not count
   double seconds = 0;      // estimated: changes of speed take the profile's acceleration, corners its corner speed
   std::int64_t lo_x = INT64_MAX, lo_y = INT64_MAX, hi_x = INT64_MIN, hi_y = INT64_MIN;  // nm, of beads' centres
+  // The share of moves, beads, volume and filament that lies beside the parts: skirts and prime lines.
+  std::uint64_t beside_moves = 0;
+  double beside_mm = 0, beside_mm3 = 0, beside_filament_mm = 0;
+  std::uint64_t part_moves() const { return moves - beside_moves; }
 
   void add(const MoveTotals& other) {
     moves += other.moves;
@@ -31,13 +34,36 @@ struct MoveTotals {
     bead_mm += other.bead_mm;
     travel_mm += other.travel_mm;
     volume_mm3 += other.volume_mm3;
-    beside_mm3 += other.beside_mm3;
     filament_mm += other.filament_mm;
     seconds += other.seconds;
     lo_x = std::min(lo_x, other.lo_x);
     lo_y = std::min(lo_y, other.lo_y);
     hi_x = std::max(hi_x, other.hi_x);
     hi_y = std::max(hi_y, other.hi_y);
+    beside_moves += other.beside_moves;
+    beside_mm += other.beside_mm;
+    beside_mm3 += other.beside_mm3;
+    beside_filament_mm += other.beside_filament_mm;
+  }
+  /// Adds a bead. feed  mm of filament a mm3
+  void lay(const BeadMove& move, double length_mm, double feed) {
+    const double volume = length_mm * move.area_mm2;
+    ++moves;
+    bead_mm += length_mm;
+    volume_mm3 += volume;
+    filament_mm += volume * feed;
+    if (move.kind == PathKind::kSkirt) {
+      ++beside_moves;
+      beside_mm += length_mm;
+      beside_mm3 += volume;
+      beside_filament_mm += volume * feed;
+    }
+    for (const Point2 p : {move.from, move.to}) {
+      lo_x = std::min<std::int64_t>(lo_x, p.x);
+      lo_y = std::min<std::int64_t>(lo_y, p.y);
+      hi_x = std::max<std::int64_t>(hi_x, p.x);
+      hi_y = std::max<std::int64_t>(hi_y, p.y);
+    }
   }
 };
 

@@ -24,6 +24,7 @@ struct GcodeLayer {
 struct GcodeFile {
   std::string error;
   std::vector<GcodeLayer> layers;
+  std::vector<GcodeBead> skirt;  // beside the parts; in no layer
   double drawn_back = 0, widest_retraction = 0;
   double lo_x = 1e9, lo_y = 1e9, hi_x = -1e9, hi_y = -1e9, hi_z = 0;  // of all moves within layers
   std::uint64_t lines = 0;
@@ -95,7 +96,8 @@ inline GcodeFile read_gcode(const std::string& text) {
         if (fed < 0) wrong("a bead that draws filament back");
         if (file.drawn_back > 1e-9) wrong("a bead with the filament drawn back");
         if (feed <= 0) wrong("a bead before any speed");
-        file.layers.back().beads.push_back({x, y, at[0], at[1], at[2], fed, feed, width, file.layers.back().height, type});
+        auto& beads = type.rfind("Skirt", 0) == 0 ? file.skirt : file.layers.back().beads;
+        beads.push_back({x, y, at[0], at[1], at[2], fed, feed, width, file.layers.back().height, type});
       }
       for (const auto& [px, py] : {std::pair{at[0], at[1]}}) {
         file.lo_x = std::min(file.lo_x, px);

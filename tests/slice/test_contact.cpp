@@ -70,7 +70,7 @@ TEST(ContactGroups, AreThoseOfAllPairsOfEdgesForSmoothRoughAndTouchingContours) 
     const Nm span = turn % 5 == 0 ? 200 : 10'000'000;  // a grid so coarse that contours touch in points
     const double rough = turn % 3 == 0 ? 0 : turn % 3 == 1 ? 0.05 : 0.9;
     for (int c = 0; c < 1 + turn % 7; ++c) add_curve(random, span, rough, contours);
-    slice::tidy(contours, 0);
+    slice::tidy(contours);
     const bool any = slice::find_contacts(contours, scratch, group);
     const auto expected = groups_of(contours);
     ASSERT_EQ(std::vector<std::uint32_t>(group.begin(), group.end()), expected) << "turn " << turn;

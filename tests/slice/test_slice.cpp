@@ -5,6 +5,7 @@
 
 #include "stages/geometry/clipping.h"
 #include "stages/slice/nest.h"
+#include "stages/slice/simplify.h"
 #include "stages/slice/slice.h"
 #include "stages/slice/tidy.h"
 #include "tests/raster/shapes.h"
@@ -216,9 +217,10 @@ TEST(Tidy, DroppedPointsLieWithinTheToleranceAndStraightOnesAlwaysGo) {
     circle.point.push_back({static_cast<Nm>(r * std::cos(turn)), static_cast<Nm>(r * std::sin(turn))});
   }
   circle.close();
+  slice::SimplifyScratch scratch;
   for (const Nm tolerance : {1000, 10'000, 100'000}) {
     Contours less = circle;
-    slice::tidy(less, tolerance);
+    slice::simplify(less, tolerance, scratch);
     EXPECT_LT(less.point.size(), circle.point.size());
     for (const Point2 p : circle.point) ASSERT_LE(distance_to(less, p.x, p.y), tolerance + 1e-3);
   }
@@ -230,7 +232,7 @@ TEST(Tidy, DroppedPointsLieWithinTheToleranceAndStraightOnesAlwaysGo) {
   square.close();
   for (const Point2 p : {Point2{0, 0}, {5, 5}, {9, 9}, {3, 3}}) square.point.push_back(p);  // no area
   square.close();
-  slice::tidy(square, 0);
+  slice::tidy(square);
   ASSERT_EQ(square.size(), 1u);
   EXPECT_EQ(square.point.size(), 4u);
   EXPECT_TRUE(doubled_area(square) == 200);
@@ -248,7 +250,7 @@ TEST(Contact, IsFoundExactlyWhereAnyTwoEdgesMeet) {
       for (int k = 0; k < 3 + i % 3; ++k) contours.point.push_back({pick(random), pick(random)});
       contours.close();
     }
-    slice::tidy(contours, 0);
+    slice::tidy(contours);
     bool expected = false;
     const auto side = [](Point2 a, Point2 b, Point2 p) {
       const std::int64_t area =

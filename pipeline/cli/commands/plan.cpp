@@ -159,6 +159,8 @@ const OptionSpec kSliceSwitches[] = {{"--resume", "", "go on with an interrupted
                                      {"--overwrite", "", "replace an earlier job in the directory", "", "Run"},
                                      {"--dry-run", "", "load, place and index, write nothing", "", "Run"}};
 
+const OptionSpec kSliceWords[] = {{"--tolerance", "", "", "0", ""}};
+
 /// A slice job saves its job file beside its manifest.
 Status complete_slice(const Arguments& arguments, Job& job) {
   const InputFile asked = {arguments.text("--job"), "the job file"};
@@ -183,7 +185,7 @@ PlanCommand slice_row() {
           "Cuts parts into layers: closed contours in exact nanometres, outer ones counter-clockwise, holes clockwise, as\n"
           "SVG, CLI or 3MF slices, and fills them if a pattern or walls are asked for.",
           kSliceSwitches,
-          {},
+          kSliceWords,
           slice_closing,
           false,
           complete_slice};
@@ -204,6 +206,7 @@ const OptionSpec kExtrudeWords[] = {
     {"-o,--output", "FILE", "file for the toolpaths, as in part.gcode or part.sml", "", ""},
     {"--machine", "", "extrusion printer: one of those below, or a profile as TOML", "marlin", ""},
     {"--layer", "", "", "half of the nozzle; in a job file 0.05", ""},
+    {"--tolerance", "", "", "10", ""},
     {"--walls", "", "", "1; in a job file 0", ""}};
 
 std::string extrude_closing() {

@@ -15,9 +15,13 @@ namespace {
 using Text = std::string_view;
 using Profile = ExtruderProfile;
 
-constexpr Text kFormats[] = {"gcode", "sml"}, kUses[] = {"raster", "contour", "support"};
+constexpr Text kFormats[] = {"gcode", "sml"}, kUses[] = {"raster", "contour", "support"},
+               kFlavors[] = {"Marlin", "RepRap", "Repetier", "Klipper"};
 
 std::string check_format(Text text) { return text == "gcode" || text == "sml" ? std::string() : not_one_of(text, kFormats); }
+std::string check_flavor(Text text) {
+  return std::ranges::find(kFlavors, text) != std::end(kFlavors) ? std::string() : not_one_of(text, kFlavors);
+}
 std::string check_nothing(Text) { return {}; }
 std::string read_source(Text text, Profile& profile) {
   profile.own_calibration = true;
@@ -108,6 +112,7 @@ using Bed = decltype(Extruder::bed);
 using Material = decltype(Extruder::material);
 using Speed = decltype(Extruder::speed);
 using Retraction = decltype(Extruder::retraction);
+using Skirt = decltype(Extruder::skirt);
 using Fan = decltype(Extruder::fan);
 using Code = decltype(Extruder::code);
 using Sml = decltype(Extruder::sml);
@@ -153,9 +158,14 @@ constexpr Key<Profile> kKeys[] = {
     field<kMachine, &Extruder::retraction, &Retraction::speed_mm_s>({"retraction", "speed_mm_s"}, {0.1, 1000, " mm/s"}),
     field<kMachine, &Extruder::retraction, &Retraction::least_travel_mm>({"retraction", "least_travel_mm"}, {0, 1000, " mm"}),
 
+    field<kMachine, &Extruder::skirt, &Skirt::loops>({"skirt", "loops"}, {0, 100}),
+    field<kMachine, &Extruder::skirt, &Skirt::distance_mm>({"skirt", "distance_mm"}, {0, 100, " mm"}),
+    field<kMachine, &Extruder::skirt, &Skirt::least_mm>({"skirt", "least_mm"}, {0, 10'000, " mm"}),
+
     field<kMachine, &Extruder::fan, &Fan::percent>({"fan", "percent"}, {0, 100, " %"}),
     field<kMachine, &Extruder::fan, &Fan::from_layer>({"fan", "from_layer"}, {0, 1'000'000}),
 
+    text<check_flavor, kMachine, &Extruder::code, &Code::flavor>({"code", "flavor"}),
     field<kMachine, &Extruder::code, &Code::relative_extrusion>({"code", "relative_extrusion"}),
     code<&Extruder::code, &Code::start>("code", "start"),
     code<&Extruder::code, &Code::end>("code", "end"),

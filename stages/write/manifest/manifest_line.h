@@ -25,6 +25,9 @@ void describe_moves(Io& io, Paths& paths) {
   io.number("low_y_nm", t.lo_y);
   io.number("high_x_nm", t.hi_x);
   io.number("high_y_nm", t.hi_y);
+  io.added("beside_moves", t.beside_moves);
+  io.added("beside_mm", t.beside_mm);
+  io.added("beside_filament_mm", t.beside_filament_mm);
   auto& laid = paths.laid;
   io.number("segmented_lines", laid.segments.lines);
   io.number("pieces", laid.segments.pieces);

@@ -42,7 +42,7 @@ class SmlLayer final : public LayerMoves {
   }
 
   double lay(const BeadMove& move) override {
-    const bool contour = move.kind == PathKind::kOuter || move.kind == PathKind::kInner;
+    const bool contour = move.kind == PathKind::kOuter || move.kind == PathKind::kInner || move.kind == PathKind::kSkirt;
     if (!begun_ || contour != contour_) {
       if (const auto* pd = find_pd(machine_, layer_.thickness, contour ? "contour" : "raster")) append(out_, pd->line + "\n");
       contour_ = contour;
@@ -61,17 +61,8 @@ class SmlLayer final : public LayerMoves {
     moved_ = true;
     at_ = move.to;
     const double length = std::hypot(mm(std::int64_t{move.to.x} - move.from.x), mm(std::int64_t{move.to.y} - move.from.y));
-    ++totals_.moves;
-    totals_.bead_mm += length;
-    totals_.volume_mm3 += length * move.area_mm2;
-    totals_.filament_mm += length * move.area_mm2 * feed_per_volume_;
+    totals_.lay(move, length, feed_per_volume_);
     totals_.seconds += length / move.speed_mm_s;
-    for (const Point2 p : {move.from, move.to}) {
-      totals_.lo_x = std::min<std::int64_t>(totals_.lo_x, p.x);
-      totals_.lo_y = std::min<std::int64_t>(totals_.lo_y, p.y);
-      totals_.hi_x = std::max<std::int64_t>(totals_.hi_x, p.x);
-      totals_.hi_y = std::max<std::int64_t>(totals_.hi_y, p.y);
-    }
     return length;
   }
 

@@ -15,6 +15,7 @@ std::string_view colour_of(PathKind kind) {
     case PathKind::kRaster: return "#2980b9";
     case PathKind::kContour: return "#16a085";
     case PathKind::kLink: return "#8e44ad";
+    case PathKind::kSkirt: return "#7f8c8d";
   }
   return "#000000";
 }
@@ -26,6 +27,7 @@ std::string_view name_of(PathKind kind) {
     case PathKind::kRaster: return "raster";
     case PathKind::kContour: return "contour";
     case PathKind::kLink: return "link";
+    case PathKind::kSkirt: return "skirt";
   }
   return "";
 }

@@ -54,11 +54,11 @@ void expect_one_volume(const nlohmann::json& json, const Extruder& machine, cons
   const double filament = std::numbers::pi / 4 * material.filament_mm * material.filament_mm;
   const double by_e = json["filament_mm"].get<double>() * filament * material.feed_ratio;
   const double by_porosity = (1 - json["porosity"]["by_extrusion"].get<double>()) * json["solid_mm3"].get<double>();
-  const double beside = json["beside_mm3"].get<double>();
+  const double beside = json["skirt"]["volume_mm3"].get<double>();
   ASSERT_GT(by_grams, 1) << what;
   EXPECT_NEAR(by_e / by_grams, 1, 1e-6) << what;
   EXPECT_NEAR((by_grams - beside) / by_porosity, 1, 1e-6) << what;
-  EXPECT_NEAR(json["volume_mm3"].get<double>() / by_grams, 1, 1e-6) << what;
+  EXPECT_NEAR((json["volume_mm3"].get<double>() + beside) / by_grams, 1, 1e-6) << what;
 }
 
 double fed_mm(const std::string& gcode) {

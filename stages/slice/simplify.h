@@ -1,0 +1,51 @@
+// stages/slice/simplify.h: contours with fewer points, moved by no more than a tolerance.
+//
+// The points that stay are points of the full contour, so a stretch between two of them replaces those between. A stretch
+// may do so if all of them lie within the tolerance of it, by squares of whole numbers. They reach both its ends, so none of
+// its points is further from the full contour either: the two are never further apart than the tolerance.
+//
+//   split      at the furthest point, until every stretch may stand for its points (Douglas and Peucker 1973), from the two
+//              ends of the contour that lie furthest apart along x
+//   thin out   points whose two stretches may be one, until there is none: no point stays for nothing
+//   compare    a contour that would touch another one or itself, turn over or vanish keeps all its points, and so do all
+//              contours of a layer in which one would lie inside others than before
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <utility>
+#include <vector>
+
+#include "stages/data/buffer.h"
+#include "stages/data/contours.h"
+#include "stages/slice/contact.h"
+
+namespace lamina::slice {
+
+/// Reused from layer to layer.
+struct SimplifyScratch {
+  Contours thinned;             // what the contours become unless they meet
+  Buffer<std::uint8_t> kept;    // of each point
+  Buffer<std::uint8_t> whole;   // of each contour: all its points stay
+  Buffer<std::uint32_t> index;  // of a contour's points that stay: numbers, the next one and the one before
+  Buffer<std::uint32_t> next, before;
+  std::vector<std::pair<std::size_t, std::size_t>> open;
+  ContactScratch contact;
+  Buffer<std::uint32_t> group;
+
+  std::uint64_t bytes() const {
+    return bytes_held(thinned.point) + bytes_held(thinned.offset) + bytes_held(kept) + bytes_held(whole) + bytes_held(index) +
+           bytes_held(next) + bytes_held(before) + open.capacity() * sizeof(open[0]) + contact.bytes() + bytes_held(group);
+  }
+};
+
+/// Leaves out points of clean contours. As many contours as before stay, in their order, clean, each within the tolerance of
+/// what it was, both ways. The same for any thread.
+///
+/// tolerance  nm, 0 <= tolerance <= 10^9; 0 changes nothing
+/// cost       O(P log P) as a rule for P points
+/// source     D. Douglas, T. Peucker, "Algorithms for the reduction of the number of points required to represent a
+///            digitized line or its caricature", Cartographica 10 (1973)
+void simplify(Contours& contours, Nm tolerance, SimplifyScratch& scratch);
+
+}  // namespace lamina::slice

@@ -1,0 +1,112 @@
+// tests/pipeline/run/test_toolpath_defaults.cpp: what lamina extrude does unasked: points left out, a skirt, the firmware's name.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <numbers>
+
+#include "tests/commands/program.h"
+#include "tests/segment/gcode_reader.h"
+
+namespace lamina::test {
+namespace {
+
+const std::string kToothFile = std::string(LAMINA_TEST_DIR) + "/corpus/dental_crown.stl";
+
+struct Extruded {
+  std::string text;
+  nlohmann::json summary;
+  GcodeFile file;
+};
+
+Extruded extruded(const Directory& directory, const std::string& options) {
+  const Outcome outcome =
+      run_lamina(words_of("extrude " + options + " --overwrite --quiet --json -o a.gcode"), directory.path());
+  EXPECT_EQ(outcome.code, 0) << outcome.err;
+  Extruded made{read_text(directory / "a.gcode"), nlohmann::json::parse(outcome.out, nullptr, false), {}};
+  made.file = read_gcode(made.text);
+  EXPECT_EQ(made.file.error, "");
+  return made;
+}
+
+double filament_of(const std::vector<GcodeBead>& beads) {
+  double sum = 0;
+  for (const GcodeBead& bead : beads) sum += bead.filament;
+  return sum;
+}
+
+TEST(ToolpathDefaults, LeaveOutPointsUnlessAskedAndTheSameInAJobFile) {
+  const Directory directory;
+  const std::string job = kToothFile + " --layer 0.2 --walls 2 --fill raster --bead-gap 1 --skirt 0";
+  const Extruded unasked = extruded(directory, job), asked = extruded(directory, job + " --tolerance 10");
+  const Extruded all = extruded(directory, job + " --tolerance 0");
+  EXPECT_EQ(unasked.summary["tolerance_um"], 10);
+  EXPECT_EQ(all.summary["tolerance_um"], 0);
+  EXPECT_TRUE(unasked.text == asked.text);
+  EXPECT_LT(unasked.summary["moves"].get<double>(), 0.5 * all.summary["moves"].get<double>());
+  EXPECT_NEAR(unasked.summary["volume_mm3"].get<double>() / all.summary["volume_mm3"].get<double>(), 1, 0.01);
+  // The saved job says what was done, and does it again.
+  const Outcome saved =
+      run_lamina(words_of("extrude " + job + " --save-job job.toml --quiet -o b.gcode"), directory.path());
+  ASSERT_EQ(saved.code, 0) << saved.err;
+  EXPECT_NE(read_text(directory / "job.toml").find("tolerance_um = 10\n"), std::string::npos);
+  const Outcome again = run_lamina(words_of("extrude --job job.toml --quiet -o c.gcode"), directory.path());
+  ASSERT_EQ(again.code, 0) << again.err;
+  EXPECT_TRUE(read_text(directory / "c.gcode") == unasked.text);
+  // Contours keep their points.
+  const Outcome sliced = run_lamina(words_of("slice " + kToothFile + " --layer 1 --quiet -o out"), directory.path());
+  ASSERT_EQ(sliced.code, 0) << sliced.err;
+  EXPECT_NE(read_text(directory / "out/job.toml").find("tolerance_um = 0\n"), std::string::npos);
+}
+
+TEST(ToolpathDefaults, SkirtComesFirstAndIsToldApart) {
+  for (const std::string machine : {"anet-a8", "marlin"}) {  // absolute and relative extrusion
+    SCOPED_TRACE(machine);
+    const Directory directory;
+    const std::string job = kToothFile + " --machine " + machine + " --layer 0.3 --fill raster --bead-gap 1";
+    const Extruded with = extruded(directory, job), without = extruded(directory, job + " --skirt 0");
+    EXPECT_EQ(without.file.skirt.size(), 0u);
+    ASSERT_EQ(with.file.skirt.size(), 8u) << "two loops: one is shorter than 100 mm";
+    const auto type = with.text.find(";TYPE:"), wall = with.text.find(";TYPE:External perimeter");
+    EXPECT_EQ(with.text.compare(type, 17, ";TYPE:Skirt/Brim\n"), 0);
+    EXPECT_LT(type, wall);
+    double lowest = 1e9, length = 0;
+    for (const GcodeBead& bead : with.file.skirt) {
+      EXPECT_NEAR(bead.z, 0.3, 1e-9);
+      length += std::hypot(bead.x1 - bead.x0, bead.y1 - bead.y0);
+      lowest = std::min(lowest, bead.x0);
+    }
+    EXPECT_GE(lowest, 0);
+    const nlohmann::json& told = with.summary["skirt"];
+    EXPECT_EQ(told["moves"], with.file.skirt.size());
+    EXPECT_NEAR(told["bead_mm"].get<double>(), length, 0.01);
+    EXPECT_NEAR(told["filament_mm"].get<double>(), filament_of(with.file.skirt), 1e-4);
+    EXPECT_EQ(without.summary["skirt"]["moves"], 0);
+    // Of the parts nothing changes; the filament of the file holds both.
+    EXPECT_EQ(with.summary["moves"], without.summary["moves"]);
+    EXPECT_EQ(with.summary["porosity"], without.summary["porosity"]);
+    for (const char* name : {"bead_mm", "volume_mm3"}) {
+      EXPECT_NEAR(with.summary[name].get<double>() / without.summary[name].get<double>(), 1, 1e-9) << name;
+    }
+    EXPECT_NEAR(with.summary["filament_mm"].get<double>() - without.summary["filament_mm"].get<double>(),
+                told["filament_mm"].get<double>(), 1e-6);
+    double fed = filament_of(with.file.skirt);
+    for (const GcodeLayer& layer : with.file.layers) fed += filament_of(layer.beads);
+    EXPECT_NEAR(fed, with.summary["filament_mm"].get<double>(), 1e-5 * static_cast<double>(with.file.layers.size()));
+    EXPECT_EQ(extruded(directory, job + " --layers 2:4").file.skirt.size(), 0u) << "not in the air";
+  }
+}
+
+TEST(ToolpathDefaults, FlavorIsTheFirmwareOfTheProfile) {
+  const Directory directory;
+  for (const auto& [machine, flavor] : {std::pair<std::string, std::string>{"anet-a8", "Marlin"},
+                                        {"marlin", "Marlin"},
+                                        {"klipper", "Klipper"},
+                                        {"reprapfirmware", "RepRap"}}) {
+    const Extruded made = extruded(directory, kToothFile + " --machine " + machine + " --layer 0.3");
+    EXPECT_NE(made.text.find("\n;FLAVOR:" + flavor + "\n"), std::string::npos) << machine;
+  }
+}
+
+}  // namespace
+}  // namespace lamina::test
