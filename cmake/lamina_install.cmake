@@ -29,7 +29,10 @@ else()
   install(DIRECTORY stages pipeline DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/lamina COMPONENT development
           FILES_MATCHING PATTERN "*.h")
 endif()
-install(FILES LICENSE README.md DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT program)
+install(FILES LICENSE README.md CHANGELOG.md DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT program)
+# The pages that the help and the manual pages name.
+install(DIRECTORY docs DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT program FILES_MATCHING PATTERN "*.md"
+        PATTERN "*.png" PATTERN "*.svg" PATTERN "*.toml")
 
 set(package_dir ${CMAKE_INSTALL_LIBDIR}/cmake/lamina)
 install(EXPORT lamina-targets NAMESPACE lamina:: DESTINATION ${package_dir} COMPONENT development)

@@ -42,8 +42,9 @@ target_link_libraries(lamina_stages PUBLIC TBB::tbb Eigen3::Eigen fmt::fmt embre
 set_source_files_properties(${PROJECT_SOURCE_DIR}/stages/data/text/version.cpp PROPERTIES
                             COMPILE_DEFINITIONS LAMINA_VERSION="${PROJECT_VERSION}" SKIP_PRECOMPILE_HEADERS ON)
 
-# Profiles are read once a job.
-set_source_files_properties(${PROJECT_SOURCE_DIR}/stages/read/profiles/extruder.cpp
+# Profiles are read once a job, and arguments once a call.
+lamina_sources(terminal_sources "stages/terminal/*.cpp")
+set_source_files_properties(${terminal_sources} ${PROJECT_SOURCE_DIR}/stages/read/profiles/extruder.cpp
                             ${PROJECT_SOURCE_DIR}/stages/read/profiles/printer.cpp PROPERTIES
                             COMPILE_OPTIONS $<$<NOT:$<CONFIG:Debug>>:-O1>)
 

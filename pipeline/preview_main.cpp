@@ -61,6 +61,10 @@ Result<PreviewRequest> read_request(const Arguments& arguments) {
                                               : read_whole(arguments, "--swath", 0, UINT32_MAX, request.swath_number)}) {
     if (!status) return status.error();
   }
+  if (request.step && !request.swath) return at_option("--step", "is of a swath; add --swath").error();
+  if (request.swath && (request.layers.every || request.layers.count)) {
+    return at_option("--swath", "is drawn in one layer; choose it by --layer, and leave out --count and --every").error();
+  }
   return request;
 }
 
@@ -70,9 +74,10 @@ Outcome draw(const Arguments& arguments, Context& context) {
   const auto preview = draw_preview(*request);
   if (!preview) return preview.error();
   if (Status status = write::write_file(request->output, preview->bytes); !status) return status;
-  if (arguments.has("--quiet")) return {};
-  for (const std::string& line : preview->said) context.say(line);
-  return {};
+  if (!arguments.has("--quiet") && !preview->missing.empty()) context.say(preview->missing);
+  Answer answer(arguments, context);
+  answer.say(preview->said);
+  return answer.status();
 }
 
 Outcome run_preview(const std::vector<std::string>& words, Console& console) {

@@ -8,13 +8,15 @@
 #include <string>
 #include <vector>
 
-#include "pipeline/batch/list.h"
 #include "pipeline/plan/progress.h"
 #include "stages/data/hash.h"
 #include "stages/data/status.h"
 #include "stages/data/text/json.h"
+#include "stages/read/jobs/batch_list.h"
 
 namespace lamina::pipeline {
+
+using read::BatchEntry;
 
 /// What a batch adds to a job's command line when the job starts.
 struct CallSettings {

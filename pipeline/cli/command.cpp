@@ -29,13 +29,14 @@ std::string program_help() {
   std::string text =
       "lamina plans additive-manufacturing jobs: meshes in, what a machine needs for every layer out.\n\n"
       "Usage: lamina COMMAND [OPTIONS] ...\n\nCommands:\n";
-  for (const Command* command : kCommands) text += fmt::format("  {:<13}{}\n", command->name, command->summary);
+  for (const Command* command : kCommands) text += fmt::format("  {:<14}{}\n", command->name, command->summary);
   text +=
-      "\nOptions:\n  -h, --help     this text; lamina COMMAND --help tells all about a command\n"
-      "  --version      the version\n\n"
+      "\nOptions:\n  -h, --help      this text; lamina COMMAND --help tells all about a command\n"
+      "  --version       the version\n\n"
       "Example:\n"
       "  lamina jet bracket.stl --bed 490x380 --dpi 600 --layer 0.05 -o out\n"
-      "  lamina verify out\n\n"
+      "  lamina verify out\n"
+      "  lamina extrude bracket.stl --machine marlin --walls 2 --fill raster --line-distance 2 -o bracket.gcode\n\n"
       "Exit codes: 0 done, 1 internal error, 2 wrong option or job, 3 bad part file or an empty job, 4 output could not be\n"
       "written, 5 verification failed or a warning with --strict, 6 out of memory, 130 interrupted.\n";
   return text;
@@ -57,6 +58,12 @@ void bound_retained_memory() {
 
 void Context::say(std::string_view line) { say_text(one_line(line) + "\n"); }
 
+void Answer::say(std::string_view line) {
+  if (arguments_.has("--quiet") || !status_) return;
+  if (arguments_.has("--json")) return context_.say(line);
+  status_ = context_.print(one_line(line) + "\n");
+}
+
 std::span<const Command* const> commands() { return kCommands; }
 
 const Command* find_command(std::string_view name) {
@@ -73,7 +80,14 @@ std::string unknown_command(std::string_view name) {
 CommandSpec spec_of(const Command& command) {
   CommandSpec spec = command.spec();
   spec.name = command.name;
+  spec.brief = command.summary;
   return spec;
+}
+
+std::vector<CommandSpec> all_specs() {
+  std::vector<CommandSpec> specs;
+  for (const Command* command : kCommands) specs.push_back(spec_of(*command));
+  return specs;
 }
 
 Outcome run(const Command& command, const Arguments& arguments, Context& context) {
@@ -92,7 +106,7 @@ Outcome run_command(const Command& command, const std::vector<std::string>& word
   Arguments arguments;
   arguments.given = words;
   if (!command.reads_itself) {
-    Result<Arguments> read = read_arguments(spec_of(command), words);
+    Result<Arguments> read = terminal::read_arguments(spec_of(command), words);
     if (!read) return read.error();
     if (read->help) return console.print(*read->help);
     arguments = std::move(*read);

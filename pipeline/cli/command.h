@@ -10,11 +10,16 @@
 #include <string_view>
 #include <vector>
 
-#include "pipeline/cli/arguments.h"
 #include "pipeline/plan/progress.h"
 #include "stages/data/status.h"
+#include "stages/terminal/arguments.h"
 
 namespace lamina::pipeline {
+
+using terminal::Arguments;
+using terminal::at_option;
+using terminal::CommandSpec;
+using terminal::OptionSpec;
 
 /// Receives a command's messages and results, and can cancel it. Implemented by the console and by a batch job.
 class Context {
@@ -39,6 +44,20 @@ class Context {
   virtual void progress(const ProgressEvent& event) = 0;
   /// Set when the command must stop. The first signal ends a command that never calls this.
   virtual const std::atomic<bool>& cancel() = 0;
+};
+
+/// Lines that a call asked for: on stdout, or on stderr where stdout is for JSON; none with --quiet.
+class Answer {
+ public:
+  Answer(const Arguments& arguments, Context& context) : context_(context), arguments_(arguments) {}
+  void say(std::string_view line);
+  /// errors  kOutput: a line was not written
+  Status status() const { return status_; }
+
+ private:
+  Context& context_;
+  const Arguments& arguments_;
+  Status status_;
 };
 
 /// How a command ended. Messages and results go to the context; only the final error is here.
@@ -71,8 +90,9 @@ std::span<const Command* const> commands();
 /// The command of that name, or nullptr.
 const Command* find_command(std::string_view name);
 
-/// A command's argument definition, with the command's name set.
+/// A command's argument definition, with its name and summary set; those of all commands in the order of the help.
 CommandSpec spec_of(const Command& command);
+std::vector<CommandSpec> all_specs();
 
 /// "'jett' is no command, did you mean 'jet'? ..."
 std::string unknown_command(std::string_view name);

@@ -134,7 +134,8 @@ void Console::progress(const ProgressEvent& event) {
     keep_on_signals();
   }
   if (!progress_) {
-    progress_.emplace(quiet ? Progress::Style::kSilent : is_terminal() ? Progress::Style::kBar : Progress::Style::kLines);
+    using Style = terminal::Progress::Style;
+    progress_.emplace(quiet ? Style::kSilent : is_terminal() ? Style::kBar : Style::kLines);
   }
   write_all(STDERR_FILENO, counted ? progress_->tell(event.done, event.total)
                                    : progress_->begin(event.stage == Stage::kLoading ? "loading parts" : "indexing"));

@@ -5,8 +5,8 @@
 #include <string_view>
 
 #include "pipeline/cli/command.h"
-#include "pipeline/cli/progress.h"
 #include "stages/data/status.h"
+#include "stages/terminal/progress.h"
 
 namespace lamina::pipeline {
 
@@ -24,7 +24,7 @@ class Console : public Context {
   bool quiet = false;  // suppresses progress
 
  private:
-  std::optional<Progress> progress_;
+  std::optional<terminal::Progress> progress_;
 };
 
 /// Has every signal that ends the program remove its temporary files first, and closed pipes and limits on file sizes come

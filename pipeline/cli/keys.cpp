@@ -32,20 +32,15 @@ void add_options(std::span<const Key<Target>> keys, const KeyChoice& choice, con
     if (key.section == "bed") std::ranges::replace(preset, ',', 'x');
     std::string_view heading = "Bed and layers";
     read_word(kHeadings, key.section, heading);
-    spec.options.push_back(
-        {std::string(key.flag), std::string(key.value), std::string(key.meaning), preset, std::string(heading)});
+    spec.options.push_back({std::string(key.flag), std::string(key.value), std::string(key.meaning), preset,
+                            std::string(heading), key.words == nullptr ? std::vector<std::string_view>() : key.words()});
   }
-}
-
-/// Whether a word of --fill sets a key other than fill.pattern.
-bool is_word_of_other_key(std::string_view word) {
-  return word == "segmented" || word == "nonzero" || word == "positive" || word == "evenodd";
 }
 
 /// Mutually exclusive options.
 Status check_together(const KeyChoice& choice, const Arguments& arguments, const Job& job) {
   const std::string fill = arguments.text("--fill"), pattern = arguments.text("--pattern");
-  if (choice.has("segment", "fill") && !fill.empty() && !pattern.empty() && fill != pattern && !is_word_of_other_key(fill)) {
+  if (choice.has("segment", "fill") && !fill.empty() && !pattern.empty() && fill != pattern && fill != "segmented") {
     return at_option("--fill", fmt::format("{}, but --pattern {}: two patterns; give one of them", fill, pattern));
   }
   if (job.segment.any()) return {};

@@ -1,5 +1,7 @@
 #include "pipeline/cli/needs.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 
 #include "pipeline/job/keys.h"
@@ -27,6 +29,18 @@ bool lays_lines(Product, const Job& job) {
          !std::ranges::all_of(job.parts, plain);
 }
 
+/// Closed curves have no direction.
+bool lays_straight(Product, const Job& job) {
+  const auto plain = [](const PartRequest& part) { return part.fill.empty(); };
+  return job.fill.all.pattern != infill::Pattern::kContour || !job.fill.ranges.empty() ||
+         !std::ranges::all_of(job.parts, plain);
+}
+bool repairs(Product, const Job& job) { return job.repair; }
+bool arranges(Product, const Job& job) {
+  return std::ranges::any_of(job.parts, [](const PartRequest& part) { return !part.at_mm || part.copies > 1; });
+}
+bool writes_cli(Product, const Job& job) { return job.slice.format.starts_with("cli"); }
+
 struct Need {
   std::string_view flag;
   bool (*met)(Product, const Job&);
@@ -38,7 +52,8 @@ constexpr std::string_view kUniform = "is of layers that fit the part, and these
                            kCovered = "is of --heights angle and optimal, the others reach the top; add one of them",
                            kShrinks = "is of steps on parts that shrink; add --shrink, and --heights cusp, stepwise or optimal",
                            kBeads = "is of beads, and none are asked for; add --fill, --pattern or --walls",
-                           kLines = "is of lines, and no pattern is asked for; add --fill or --pattern";
+                           kLines = "is of lines, and no pattern is asked for; add --fill or --pattern",
+                           kStraight = "is of straight lines, and the pattern is of closed curves; leave it out";
 constexpr Need kNeeds[] = {
     {"--cusp", by_steps, kSteps},
     {"--cusp-of", shrinks, kShrinks},
@@ -61,20 +76,48 @@ constexpr Need kNeeds[] = {
     {"--angle", lays_lines, kLines},
     {"--angle-step", lays_lines, kLines},
     {"--stagger", lays_lines, kLines},
+    {"--angle", lays_straight, kStraight},
+    {"--angle-step", lays_straight, kStraight},
+    {"--stagger", lays_straight, kStraight},
+    {"--weld", repairs, "is of repair, which is off; leave out one of the two"},
+    {"--gap", arranges, "is between parts that are arranged, and --at places this one; leave out one of the two"},
+    {"--empty-first-layer", writes_cli, "is of CLI files; add --format cli or cli-binary"},
 };
+
+/// Options that files of a printer without heaters and fans that obey a program do not carry.
+constexpr std::string_view kOfGcode[] = {"--nozzle-temperature", "--bed-temperature", "--retraction", "--fan",
+                                         "--relative-extrusion"};
 
 }  // namespace
 
-Status check_needs(Product product, const Arguments& arguments, const Job& job) {
+Status check_needs(Product product, const Arguments& arguments, const Job& job, bool study) {
   // Whoever names the pattern none knows that there are no lines.
   const bool named = arguments.has("--pattern") || arguments.has("--fill");
   for (const Need& need : kNeeds) {
-    const bool beads = need.met == lays_lines || need.met == lays_beads;
-    if (arguments.has(need.flag) && !need.met(product, job) && !(beads && named)) {
-      return at_option(std::string(need.flag), std::string(need.unmet));
+    const bool beads = need.met == lays_lines || need.met == lays_beads, of_mode = need.met == by_angle || need.met == optimal;
+    if (!arguments.has(need.flag) || need.met(product, job) || (beads && named) || (study && !of_mode)) continue;
+    return terminal::at_option(need.flag, std::string(need.unmet));
+  }
+  if (arguments.has("--no-repair") && arguments.has("--repair") && arguments.text("--repair") != "off") {
+    return Error{Fault::kUsage, "--no-repair and --repair exclude each other; give one of them"};
+  }
+  return {};
+}
+
+Status check_machine_needs(const Extruder& machine, const Arguments& arguments) {
+  if (machine.format != "sml") return {};
+  for (const std::string_view flag : kOfGcode) {
+    if (arguments.has(flag)) {
+      return terminal::at_option(flag, fmt::format("is not in SML, which {} reads; set it at the printer", machine.name));
     }
   }
   return {};
+}
+
+std::string note_on_needs(Product product, const Arguments& arguments, const Job& job) {
+  const bool hollow = product == Product::kImages && fills(job) && !lays_lines(product, job);
+  if (!hollow || arguments.has("--pattern") || arguments.has("--fill")) return {};
+  return "inside of the walls nothing is asked for, powder stays loose there; add --fill raster, or --fill none if it is meant";
 }
 
 }  // namespace lamina::pipeline

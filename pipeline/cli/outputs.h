@@ -5,11 +5,13 @@
 #include <string>
 #include <string_view>
 
-#include "pipeline/cli/arguments.h"
 #include "pipeline/job/job.h"
 #include "stages/data/status.h"
+#include "stages/terminal/arguments.h"
 
 namespace lamina::pipeline {
+
+using terminal::Arguments;
 
 /// An input file of a call, with its role: "the job file".
 struct InputFile {

@@ -42,7 +42,10 @@ std::span<const JobKey> extrude_keys() {
       number<&Request::retraction_mm>("retraction_mm", "--retraction", "MM", 0, 50, "of filament, before long travels"),
       number<&Request::fan_percent>("fan_percent", "--fan", "%", 0, 100, "of the part's fan"),
       field<&Job::extrude, &Request::relative_extrusion>({"extrude", "relative_extrusion", "--relative-extrusion", "true|false",
-                                                          "count filament from move to move", decides::moves}),
+                                                          "count filament from move to move", decides::moves})
+          .with_words([] {
+            return std::vector<std::string_view>{"true", "false"};
+          }),
       field<&Job::extrude, &Request::skirt_loops>(
           {"extrude", "skirt_loops", "--skirt", "LOOPS", "laid around all parts before the first bead; 0: none", decides::moves},
           {0, 100}),

@@ -7,9 +7,9 @@
 #include <vector>
 
 #include "pipeline/job/keys.h"
-#include "pipeline/job/old_forms.h"
 #include "stages/data/input/file_reader.h"
 #include "stages/data/text/json_text.h"
+#include "stages/read/jobs/old_forms.h"
 #include "stages/write/file.h"
 #include "stages/write/replaceable.h"
 
@@ -54,7 +54,7 @@ bool has_section(std::string_view section) {
 
 Status read_tree(Result<TomlValue> tree, const std::string& file, Job& job) {
   if (!tree) return tree.error();
-  if (Status status = replace_old_forms(*tree, file, job.notes); !status) return status;
+  if (Status status = read::replace_old_forms(*tree, file, job.notes); !status) return status;
   const fs::path directory = names_stream(file) ? fs::path() : fs::path(file).parent_path();
   for (std::size_t i = 0; i < tree->value.size(); ++i) {
     const std::string& section = tree->name[i];
@@ -67,6 +67,7 @@ Status read_tree(Result<TomlValue> tree, const std::string& file, Job& job) {
     const std::string output = std::exchange(job.output, {});
     if (Status status = read_section(tree->value[i], section, file, job_keys(), job); !status) return status;
     job.output = job.output.empty() ? output : beside(directory, job.output);
+    for (const std::string& name : tree->value[i].name) job.named.push_back(section + "." + name);
   }
   return {};
 }
@@ -133,15 +134,17 @@ Status set_key(Job& job, std::string_view assignment) {
   table.add(names.back(), assigned_value(assignment.substr(equals + 1)));
   root.add(names[0], std::move(table));
   const std::size_t notes_before = job.notes.size();
-  if (Status status = replace_old_forms(root, {}, job.notes); !status) return wrong(status.error().message);
+  if (Status status = read::replace_old_forms(root, {}, job.notes); !status) return wrong(status.error().message);
   for (std::size_t i = notes_before; i < job.notes.size(); ++i) job.notes[i] = "--set " + job.notes[i];
+  job.named.emplace_back(assignment.substr(0, equals));
   const TomlValue& set = root.value.front();
   if (names[0] != "part") return read_assigned(set, names[0], option, job_keys(), job);
   std::size_t first = 0, last = job.parts.size();
-  if (names.size() == 3) {
+  if (names.size() == 3 && last > 0) {
     std::int64_t number = 0;
-    if (const std::string what = read_whole(names[1], 1, static_cast<std::int64_t>(last), number); !what.empty()) {
-      return wrong(what);
+    if (!read_whole(names[1], 1, static_cast<std::int64_t>(last), number).empty()) {
+      return wrong(last == 1 ? "there is one part; write part.1"
+                             : fmt::format("there are {} parts; write part.1 to part.{}", last, last));
     }
     first = static_cast<std::size_t>(number - 1);
     last = first + 1;

@@ -9,16 +9,21 @@ constexpr Word<FillRule> kFillRules[] = {
     {"nonzero", FillRule::kNonzero}, {"positive", FillRule::kPositive}, {"evenodd", FillRule::kEvenOdd}};
 constexpr Word<Mirror> kMirrors[] = {{"none", Mirror::kNone}, {"x", Mirror::kX}, {"y", Mirror::kY}, {"xy", Mirror::kXY}};
 
-std::string check_image_format(std::string_view text) {
+std::vector<std::string_view> image_formats() {
   std::vector<std::string_view> ids;
   for (const auto& format : write::image_formats()) ids.push_back(format.id);
-  return write::find_image_format(text) == nullptr ? not_one_of(text, ids) : std::string();
+  return ids;
+}
+
+std::string check_image_format(std::string_view text) {
+  return write::find_image_format(text) == nullptr ? not_one_of(text, image_formats()) : std::string();
 }
 
 const JobKey kImageKeys[] = {
-    text<check_image_format, &Job::format>({"image", "format", "--format", "FORMAT", "of the layer files", decides::images}),
+    text<check_image_format, &Job::format>({"image", "format", "--format", "FORMAT", "of the layer files", decides::images})
+        .with_words(image_formats),
     word<kFillRules, &Job::fill_rule>(
-        {"image", "fill", "--fill", "RULE",
+        {"image", "fill", "--fill-rule", "RULE",
          "what is solid where shells overlap: nonzero (any), positive (drops shells turned inside out), evenodd",
          decides::all}),
     word<kMirrors, &Job::mirror>({"image", "mirror", "--mirror", "x|y|xy|none",

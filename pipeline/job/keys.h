@@ -52,7 +52,7 @@ std::string fill_changes_text(const FillChanges& changes);
 std::string read_material_ranges(const TomlValue& list, std::vector<MaterialRange>& ranges, Place& at);
 std::string material_ranges_text(const std::vector<MaterialRange>& ranges);
 
-/// Reads the words of lamina extrude --fill that fill.pattern does not have.
+/// Reads a rule for shells that overlap.
 std::string read_fill_rule(std::string_view text, FillRule& rule);
 
 }  // namespace lamina::pipeline

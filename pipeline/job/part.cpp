@@ -36,7 +36,8 @@ const PartKey kPartKeys[] = {
     text<check_path, &PartRequest::path>(
         {"part", "path", "", "FILE", "STL, OBJ or 3MF file; in a job file, relative to that file", decides::all}),
     text<check_unit, &PartRequest::unit>(
-        {"part", "unit", "--unit", "UNIT", "of STL and OBJ, which carry none: mm, cm, m, um, inch, foot", decides::all}),
+        {"part", "unit", "--unit", "UNIT", "of STL and OBJ, which carry none: mm, cm, m, um, inch, foot", decides::all})
+        .with_words([] { return std::vector<std::string_view>(std::begin(kUnits), std::end(kUnits)); }),
     field<&PartRequest::copies>({"part", "copies", "--copies", "N", "of each part, 1 to 1000000", decides::all},
                                 {1, 1'000'000}),
     field<&PartRequest::at_mm>({"part", "at_mm", "--at", "X,Y",

@@ -52,7 +52,10 @@ JobKey repair_key(const KeyName& name) {
 
 const JobKey kLoadKeys[] = {
     repair_key({"load", "repair", "--repair", "MODE",
-                "how open meshes are closed: auto, winding (by winding number, approximate) or off", decides::all}),
+                "how open meshes are closed: auto, winding (by winding number, approximate) or off", decides::all})
+        .with_words([] {
+          return std::vector<std::string_view>{"auto", "winding", "off"};
+        }),
     // The row above decides; this one is an option only.
     repair_key({"load", "repair", "--no-repair", "", "plan open meshes as they are instead of closing them", 0, "false"})
         .shown_if([](const Job&) { return false; }),

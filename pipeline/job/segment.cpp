@@ -70,15 +70,22 @@ std::string segment_ranges_text(const std::vector<Range<SegmentSettings>>& range
   return ranges_text<SegmentSettings>(kSegmentKeys, ranges);
 }
 
-// Option --fill sets the filling with one word; files use fill.pattern, segment.on and image.fill.
+// Option --fill sets the filling with one word; files use fill.pattern and segment.on.
 std::string read_filling(std::string_view word, Job& job) {
   if (word == "segmented") {
     job.segment.all.on = true;
     return {};
   }
-  if (read_fill_rule(word, job.fill_rule).empty()) return {};
+  if (FillRule rule{}; read_fill_rule(word, rule).empty()) {
+    return fmt::format("'{}' is a rule for shells that overlap; give --fill-rule {} (image.fill in a file)", word, word);
+  }
   const std::string wrong = fill_settings_keys().front().read(word, job.fill.all);
   return wrong.empty() ? wrong : wrong + "; or segmented";
+}
+std::vector<std::string_view> fillings() {
+  auto words = fill_settings_keys().front().words();
+  words.push_back("segmented");
+  return words;
 }
 std::string write_no_filling(const Job&) { return {}; }
 
@@ -94,11 +101,12 @@ std::span<const JobKey> segment_keys() {
     all.push_back(structure<read_segment_ranges, segment_ranges_text, &Job::segment, &SegmentRequest::ranges>(
         {"segment", "range", "", "[{...}]", "other keys between two heights: from_mm, to_mm and the keys that differ",
          decides::moves}));
-    all.push_back(custom<Job, read_filling, write_no_filling>(
-        {"segment", "fill", "--fill", "FILLING",
-         "segmented, or a pattern: none, raster, contour, contour+raster, honeycomb, quatrefoil; or image.fill: nonzero, "
-         "positive, evenodd"},
-        Form::kString));
+    all.push_back(
+        custom<Job, read_filling, write_no_filling>(
+            {"segment", "fill", "--fill", "FILLING",
+             "what is laid inside: segmented, or a pattern: none, raster, contour, contour+raster, honeycomb, quatrefoil"},
+            Form::kString)
+            .with_words(fillings));
     return all;
   }();
   return keys;

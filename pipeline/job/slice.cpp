@@ -7,18 +7,22 @@
 namespace lamina::pipeline {
 namespace {
 
-std::string check_slice_format(std::string_view text) {
-  if (write::find_slice_format(text) != nullptr) return {};
+std::vector<std::string_view> slice_format_words() {
   std::vector<std::string_view> words;
   for (const write::SliceFormat& format : write::slice_formats()) words.push_back(format.id);
-  return not_one_of(text, words);
+  return words;
+}
+
+std::string check_slice_format(std::string_view text) {
+  return write::find_slice_format(text) != nullptr ? "" : not_one_of(text, slice_format_words());
 }
 
 constexpr unsigned kContour = decides::contours | decides::moves;
 
 const JobKey kSliceKeys[] = {
     text<check_slice_format, &Job::slice, &SliceRequest::format>(
-        {"slice", "format", "--format", "FORMAT", "svg, svg-polygon, cli, cli-binary, cli-16, 3mf, or null to write none", decides::contours}),
+        {"slice", "format", "--format", "FORMAT", "svg, svg-polygon, cli, cli-binary, cli-16, 3mf, or null to write none", decides::contours})
+        .with_words(slice_format_words),
     field<&Job::slice, &SliceRequest::file_a_layer>({"slice", "file_a_layer", "--file-a-layer", "",
                                                      "one file for each layer, layers/000000.svg and up", decides::contours,
                                                      "true"}),

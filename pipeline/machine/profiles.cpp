@@ -20,11 +20,10 @@ template <class Profile, class Unknown>
 Result<Profile> find(const std::string& name_or_file, std::span<const ShippedProfile> shipped,
                      Result<Profile> (*read)(std::string_view, const std::string&), const Unknown& unknown) {
   if (name_or_file.find('/') == std::string::npos && !name_or_file.ends_with(".toml")) {
-    std::vector<std::string_view> names;
     for (const auto& [name, text] : shipped) {
       if (name == name_or_file) return read(text, std::string(name) + ".toml");
-      names.push_back(name);
     }
+    const std::vector<std::string_view> names = names_of(shipped);
     return Error{Fault::kUsage, unknown(suggest(name_or_file, names), fmt::format("{}", fmt::join(names, ", ")))};
   }
   const auto text =
@@ -34,6 +33,12 @@ Result<Profile> find(const std::string& name_or_file, std::span<const ShippedPro
 }
 
 }  // namespace
+
+std::vector<std::string_view> names_of(std::span<const ShippedProfile> profiles) {
+  std::vector<std::string_view> names;
+  for (const ShippedProfile& profile : profiles) names.push_back(profile.name);
+  return names;
+}
 
 Result<Machine> read_machine(std::string_view text, const std::string& where) {
   count(Decision::kMachine);

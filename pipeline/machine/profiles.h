@@ -4,6 +4,7 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "stages/data/extruder.h"
 #include "stages/data/machine.h"
@@ -19,6 +20,7 @@ struct ShippedProfile {
 };
 std::span<const ShippedProfile> shipped_machines();   // powder printers, stages/write/machines/*.toml
 std::span<const ShippedProfile> shipped_extruders();  // stages/write/machines/extrusion/*.toml
+std::vector<std::string_view> names_of(std::span<const ShippedProfile> profiles);
 
 /// Reads a profile. `where` names it in messages.
 /// errors  kUsage: place, key, reason; an unknown dialect

@@ -67,7 +67,7 @@ Result<Preview> draw_series_sheet(const view::LayerSeries& series, const Preview
   if (!picture) return picture.error();
   const std::string said =
       fmt::format("{}: {} of {} layers, {}", request.output, chosen->size(), series.count, readable_bytes(picture->size()));
-  return Preview{std::move(*picture), {said}};
+  return Preview{std::move(*picture), said};
 }
 
 /// Draws one layer of shapes, or several side by side.
@@ -89,11 +89,11 @@ Result<Preview> draw_series(const view::LayerSeries& series, const PreviewReques
   if (svg) {
     const std::string text = write::svg::drawing(*shapes);
     const auto bytes = std::as_bytes(std::span(text));
-    return Preview{{bytes.begin(), bytes.end()}, {said}};
+    return Preview{{bytes.begin(), bytes.end()}, said};
   }
   auto picture = write::picture::plan_view(*shapes, request.width.value_or(kSheetWidth));
   if (!picture) return picture.error();
-  return Preview{std::move(*picture), {said}};
+  return Preview{std::move(*picture), said};
 }
 
 /// Draws a layer at a step of its program.
@@ -103,7 +103,7 @@ Result<Preview> draw_jetting(const Manifest& manifest, const PreviewRequest& req
   auto picture = draw_swath(request.source, manifest, choice, request.width.value_or(kSwathWidth));
   if (!picture) return picture.error();
   const std::string said = fmt::format("{}: layer {}, {}", request.output, choice.layer, readable_bytes(picture->size()));
-  return Preview{std::move(*picture), {said}};
+  return Preview{std::move(*picture), said};
 }
 
 /// Draws images side by side.
@@ -134,11 +134,12 @@ Result<Preview> draw_images(const Manifest& manifest, const PreviewRequest& requ
   };
   auto picture = write::picture::contact_sheet(sheet, read_runs);
   if (!picture) return picture.error();
-  std::vector<std::string> said;
-  if (!write::picture::have_font()) said.emplace_back("lamina: no captions: no font; install fonts-dejavu-core");
-  said.push_back(fmt::format("{}: {} of {} layers, {}", request.output, chosen->size(), manifest.head.layer_count,
-                             readable_bytes(picture->size())));
-  return Preview{std::move(*picture), std::move(said)};
+  const std::size_t made = manifest.layers.size(), all = manifest.head.layer_count;
+  Preview preview{std::move(*picture), fmt::format("{}: {} of {} layers{}, ", request.output, chosen->size(), made,
+                                                   made == all ? "" : fmt::format(" that are there, of {}", all))};
+  preview.said += readable_bytes(preview.bytes.size());
+  if (!write::picture::have_font()) preview.missing = "lamina: no captions: no font; install fonts-dejavu-core";
+  return preview;
 }
 
 }  // namespace
@@ -153,6 +154,7 @@ Result<Preview> draw_preview(const PreviewRequest& request) {
     return series ? draw_series(*series, request, ending == ".svg") : Result<Preview>(series.error());
   }
   if (ending != ".png") {
+    if (!std::filesystem::exists(request.source, ignored)) return manifest_of(request.source).error();
     return Error{Fault::kUsage,
                  fmt::format("-o {}: pictures are PNG, of slices and G-code SVG too; end the name with .png", request.output)};
   }

@@ -23,8 +23,9 @@ struct PreviewRequest {
 };
 
 struct Preview {
-  Buffer<std::byte> bytes;        // of the file
-  std::vector<std::string> said;  // messages, one line each
+  Buffer<std::byte> bytes;   // of the file
+  std::string said;          // what is drawn, one line
+  std::string missing = {};  // what it lacks and why, one line; empty if nothing
 };
 
 /// errors  kUsage: options that do not fit the source; kVerification: missing or changed files of the job; of the readers

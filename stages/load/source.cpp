@@ -15,6 +15,7 @@ constexpr ReadRules kRules{.fault = Fault::kInput,
 }  // namespace
 
 Result<Source> Source::open(const std::string& path) {
+  if (path == "-") return Error{Fault::kInput, "-: parts are not read from standard input; write it to a file first"};
   auto file = FileReader::open(path, kRules);
   if (!file) return file.error();
   Source source;

@@ -29,7 +29,7 @@ nlohmann::json json_of(const std::string& path) {
 TEST(Info, ACleanPartIsPlannedAsItIs) {
   const std::string text = text_of(corpus("nist_am_test_artifact_v3b.stl"));
   EXPECT_CONTAINS(text, "format               binary STL");
-  EXPECT_CONTAINS(text, "triangles            7,392");
+  EXPECT_CONTAINS(text, "triangles            7 392");
   EXPECT_CONTAINS(text, "size                 141.421 x 141.421 x 17.000 mm");
   EXPECT_CONTAINS(text, "volume               100981 mm3");
   EXPECT_CONTAINS(text, "closed               yes");

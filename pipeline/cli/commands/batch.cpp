@@ -19,11 +19,15 @@
 #include "stages/data/text/readable.h"
 #include "stages/data/text/shell_words.h"
 #include "stages/data/text/terminal.h"
+#include "stages/load/load.h"
+#include "stages/read/jobs/batch_list.h"
 #include "stages/write/file.h"
 #include "stages/write/leftovers.h"
 
 namespace lamina::pipeline {
 namespace {
+
+constexpr std::uint64_t kLeastBatchBytes = 48ull << 20;  // the layers of one job, and what it holds beside them
 
 CommandSpec batch_spec() {
   CommandSpec spec;
@@ -39,8 +43,12 @@ CommandSpec batch_spec() {
       {"--with", "WORDS", "command and options for parts that come without any, as in --with 'jet --dpi 600'", "jet", ""},
       {"--jobs", "N", "jobs running at a time; 0 for as many as there are processors", "0", "Run"},
       {"--memory", "SIZE", "what all running jobs may hold together: 512M, 4G", "1G", "Run"},
-      {"--sync", "WHEN", "what of the jobs and the summary survives a power cut, see lamina jet: layer, job, off", "job",
-       "Run"},
+      {"--sync",
+       "WHEN",
+       "what of the jobs and the summary survives a power cut, see lamina jet: layer, job, off",
+       "job",
+       "Run",
+       {"layer", "job", "off"}},
       {"--time-limit", "SECONDS", "stop a job that takes longer: it fails, with exit code 3", "", "Run"},
       {"--keep-going", "", "a job that fails does not stop the others; this is what happens anyway", "", "Run"},
       {"--fail-fast", "", "the first job that fails stops the batch", "", "Run"},
@@ -137,7 +145,7 @@ Result<Call> read_call(const std::vector<std::string>& words, const std::string&
     return Error{Fault::kUsage, fmt::format("'{}' cannot be a job of a batch; run it by itself", name)};
   }
   const CommandSpec spec = spec_of(*command);
-  const Result<Arguments> read = read_arguments(spec, {words.begin() + 1, words.end()});
+  const Result<Arguments> read = terminal::read_arguments(spec, {words.begin() + 1, words.end()});
   if (!read) return read.error();
   if (read->help) return Error{Fault::kUsage, "--help is no job"};
   Job planned;
@@ -194,6 +202,11 @@ Result<BatchOptions> read_options(const Arguments& arguments, std::vector<std::s
        {arguments.read("--jobs", {0, 1024}, options.jobs), arguments.read("--memory", read_bytes, options.memory_bytes),
         arguments.read("--time-limit", {0.001, 1e9, " s"}, options.time_limit_seconds)}) {
     if (!status) return status.error();
+  }
+  if (options.memory_bytes < kLeastBatchBytes) {
+    return at_option("--memory", fmt::format("{} is less than any job takes; give {}M or more", arguments.text("--memory"),
+                                             kLeastBatchBytes >> 20))
+        .error();
   }
   if (options.jobs == 0) options.jobs = static_cast<std::uint32_t>(std::max(tbb::info::default_concurrency(), 1));
   options.fail_fast = arguments.has("--fail-fast");
@@ -256,7 +269,7 @@ Outcome run_batch_command(const Arguments& arguments, Context& context) {
   const Result<BatchOptions> read = read_options(arguments, with);
   if (!read) return read.error();
   const BatchOptions& options = *read;
-  Result<std::vector<BatchEntry>> entries = read_batch(arguments.operands, with);
+  Result<std::vector<BatchEntry>> entries = read::read_batch(arguments.operands, with, load::is_part_name);
   if (!entries) return entries.error();
   const auto read_words = [sync = arguments.text("--sync")](const auto& words) { return read_call(words, sync); };
   const auto jobs =

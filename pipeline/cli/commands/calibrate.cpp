@@ -17,7 +17,8 @@ CommandSpec calibrate_spec() {
       "Test pieces for segmented lines on a printer, as job files and toolpaths with a table to be filled in; then, from\n"
       "the measured widths, the printer's profile with its spacings and speeds.";
   spec.options = {
-      {"--machine", "NAME|FILE", "extrusion printer; lamina extrude --help lists them", "", "Machine"},
+      {"--machine", "NAME|FILE", "extrusion printer; lamina extrude --help lists them", "", "Machine",
+       names_of(shipped_extruders())},
       {"-o,--output", "DIR|FILE", "directory for the pieces; with --measured, the profile to be written", "", "Machine"},
       {"--measured", "FILE", "the widths.csv of the pieces, filled in", "", "Measurements"},
       {"--bead", "MM", "width of a bead at 100 %; the nozzle if absent", "", "Beads"},
@@ -90,6 +91,9 @@ Outcome run_calibrate(const Arguments& arguments, Context& context) {
     if (!status) return status;
   }
   if (!arguments.has("--measured")) {
+    for (const char* flag : {"--gap", "--exact-spacing"}) {
+      if (arguments.has(flag)) return at_option(flag, "is of the profile that follows from widths; add --measured");
+    }
     const std::atomic<bool>& cancel = context.cancel();
     keep_on_signals();
     request.overwrite = arguments.has("--overwrite");

@@ -4,6 +4,7 @@
 
 #include "pipeline/cli/command.h"
 #include "pipeline/cli/keys.h"
+#include "pipeline/cli/needs.h"
 #include "pipeline/cli/plot_file.h"
 #include "pipeline/job/file.h"
 #include "pipeline/job/heights.h"
@@ -18,7 +19,9 @@
 namespace lamina::pipeline {
 namespace {
 
-const KeyChoice kHeightsCommandKeys = {"layers", "heights", "load", "part"};
+// Of [[part]] what changes its shape or height.
+const KeyChoice kHeightsCommandKeys = {"layers",     "heights",         "load",       "part.unit", "part.bottom_mm",
+                                       "part.scale", "part.rotate_deg", "part.shrink"};
 
 enum class Form { kText, kCsv, kJson, kRp3 };
 constexpr Word<Form> kForms[] = {{"text", Form::kText}, {"csv", Form::kCsv}, {"json", Form::kJson}, {"rp3", Form::kRp3}};
@@ -32,7 +35,7 @@ CommandSpec heights_spec() {
   spec.operand_meaning = "STL, OBJ or 3MF files, STL and OBJ gzipped too; they replace the parts of --job";
   add_key_options(kHeightsCommandKeys, spec);
   spec.options.insert(spec.options.end(),
-                      {{"--format", "FORMAT", "text, csv, json, or rp3 as in Lima (2009)", "", "Table"},
+                      {{"--format", "FORMAT", "text, csv, json, or rp3 as in Lima (2009)", "", "Table", words_of(kForms)},
                        {"-o,--output", "FILE", "write the table there instead of to stdout", "", "Table"},
                        {"--compare", "", "all ways with these thicknesses and limits, one line each", "", "Table"},
                        {"--measure", "FILE", "measure layers that somebody else decided: tops in mm, one a line", "", "Table"},
@@ -63,6 +66,9 @@ Result<Job> job_of(const Arguments& arguments) {
   const bool own_way = arguments.has("--compare") || arguments.has("--measure") || read->heights.per_part;
   if (own_way && read->heights.mode == heights::Mode::kUniform && !read->heights.thickness_mm.empty()) {
     read->heights.mode = heights::Mode::kOptimal;
+  }
+  if (!arguments.has("--compare") && !arguments.has("--measure")) {
+    if (Status status = check_needs(Product::kContours, arguments, *read, true); !status) return status.error();
   }
   if (Status status = check_job(*read); !status) return status.error();
   return read;

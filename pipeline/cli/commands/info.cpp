@@ -19,11 +19,21 @@ CommandSpec info_spec() {
       "lamina jet will do about that. Nothing is written.";
   spec.operand = "PART";
   spec.operand_meaning = "STL, OBJ or 3MF file, also gzipped STL and OBJ; as many as you like";
-  spec.options = {{"--unit", "UNIT", "of STL and OBJ, which carry none: mm, cm, m, um, inch, foot", "mm", ""},
+  spec.options = {{"--unit",
+                   "UNIT",
+                   "of STL and OBJ, which carry none: mm, cm, m, um, inch, foot",
+                   "mm",
+                   "",
+                   {"mm", "cm", "m", "um", "inch", "foot"}},
                   {"--scale", "S|X,Y,Z", "factors per axis of the file", "1", ""},
                   {"--rotate", "X,Y,Z", "degrees about x, then y, then z", "0,0,0", ""},
                   {"--drop-bad", "", "drop facets with coordinates that are no numbers", "", ""},
-                  {"--repair", "MODE", "how open meshes are closed: auto, winding (approximate) or off", "auto", ""},
+                  {"--repair",
+                   "MODE",
+                   "how open meshes are closed: auto, winding (approximate) or off",
+                   "auto",
+                   "",
+                   {"auto", "winding", "off"}},
                   {"--weld", "UM", "repair joins open edges this far apart, in micrometres; 5 grows by itself", "5", ""},
                   {"--json", "", "print one JSON object for each part on stdout", "", ""}};
   spec.closing =

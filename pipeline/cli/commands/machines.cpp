@@ -19,8 +19,11 @@ CommandSpec machines_spec() {
       "extrusion printers of lamina extrude.";
   spec.operand = "NAME|FILE";
   spec.operand_meaning = "machines to explain, the same as --check";
-  spec.options = {{"--check", "NAME|FILE", "explain this machine; a profile is a TOML file", "", ""},
-                  {"--show", "NAME|FILE", "print the whole profile, every key of it, to be changed and saved", "", ""},
+  spec.operand_words = names_of(shipped_machines());
+  for (const std::string_view name : names_of(shipped_extruders())) spec.operand_words.push_back(name);
+  const auto& names = spec.operand_words;
+  spec.options = {{"--check", "NAME|FILE", "explain this machine; a profile is a TOML file", "", "", names},
+                  {"--show", "NAME|FILE", "print the whole profile, every key of it, to be changed and saved", "", "", names},
                   {"--dialects", "", "list the dialects that programs can be written in", "", ""},
                   {"--target", "STL", "write a part whose print shows which way x, y and up are", "", ""},
                   {"--overwrite", "", "replace a file that lamina did not write", "", ""}};

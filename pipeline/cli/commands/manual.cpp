@@ -1,4 +1,4 @@
-// lamina completion and lamina manual: print or write the output of help.h.
+// lamina completion and lamina manual.
 #include <fmt/format.h>
 
 #include <filesystem>
@@ -8,8 +8,9 @@
 #include <vector>
 
 #include "pipeline/cli/command.h"
-#include "pipeline/cli/help/help.h"
 #include "pipeline/cli/outputs.h"
+#include "stages/terminal/completion.h"
+#include "stages/terminal/pages.h"
 #include "stages/write/file.h"
 
 namespace lamina::pipeline {
@@ -17,9 +18,11 @@ namespace {
 
 CommandSpec completion_spec() {
   CommandSpec spec;
-  spec.summary = "Prints what makes a shell complete the commands and options of lamina; packages install it already.";
+  spec.summary =
+      "Prints what makes a shell complete the commands of lamina, their options and values; packages install it already.";
   spec.operand = "SHELL";
   spec.operand_meaning = "bash, zsh or fish";
+  spec.operand_words = {"bash", "zsh", "fish"};
   spec.closing =
       "Examples:\n"
       "  lamina completion bash > ~/.local/share/bash-completion/completions/lamina\n"
@@ -30,9 +33,9 @@ CommandSpec completion_spec() {
 
 Outcome run_completion(const Arguments& arguments, Context& context) {
   const std::string shell = arguments.operands.size() == 1 ? arguments.operands.front() : "";
-  if (shell == "bash") return context.print(bash_completion());
-  if (shell == "zsh") return context.print(zsh_completion());
-  if (shell == "fish") return context.print(fish_completion());
+  if (shell == "bash") return context.print(terminal::bash_completion(all_specs()));
+  if (shell == "zsh") return context.print(terminal::zsh_completion(all_specs()));
+  if (shell == "fish") return context.print(terminal::fish_completion(all_specs()));
   return Error{Fault::kUsage, "name one shell: bash, zsh or fish"};
 }
 
@@ -41,6 +44,7 @@ CommandSpec manual_spec() {
   spec.summary = "Prints the manual page of lamina, or of one of its commands, as man reads it.";
   spec.operand = "COMMAND";
   spec.operand_meaning = "a command; none for the page of the program";
+  for (const Command* command : commands()) spec.operand_words.push_back(command->name);
   spec.options = {{"-o,--output", "DIR", "write all pages into a directory instead, as packages do", "", ""},
                   {"--markdown", "", "pages of commands as Markdown: docs/commands is made by this", "", ""},
                   {"--overwrite", "", "replace a file that lamina did not write", "", ""}};
@@ -51,13 +55,18 @@ CommandSpec manual_spec() {
   return spec;
 }
 
+std::string page_of(const CommandSpec& spec, bool markdown) {
+  return markdown ? terminal::markdown_page(spec) : terminal::man_page(spec);
+}
+
 /// Writes all pages, or none if one would replace a user's file.
 Status write_pages(const std::string& directory, bool markdown, bool overwrite) {
   std::vector<std::pair<std::string, std::string>> pages;  // path, text
-  if (!markdown) pages.emplace_back(fmt::format("{}/lamina.1", directory), man_page());
-  for (const Command* command : commands()) {
-    pages.emplace_back(fmt::format("{}/{}{}{}", directory, markdown ? "" : "lamina-", command->name, markdown ? ".md" : ".1"),
-                       markdown ? markdown_page(*command) : man_page(*command));
+  const std::vector<CommandSpec> specs = all_specs();
+  if (!markdown) pages.emplace_back(fmt::format("{}/lamina.1", directory), terminal::man_page(specs));
+  for (const CommandSpec& spec : specs) {
+    pages.emplace_back(fmt::format("{}/{}{}{}", directory, markdown ? "" : "lamina-", spec.name, markdown ? ".md" : ".1"),
+                       page_of(spec, markdown));
   }
   constexpr std::string_view kMarks[] = {"\"lamina ", "lamina manual --markdown"};
   for (const auto& [path, text] : pages) {
@@ -77,11 +86,11 @@ Outcome run_manual(const Arguments& arguments, Context& context) {
   if (arguments.has("-o,--output")) return write_pages(arguments.text("-o,--output"), markdown, arguments.has("--overwrite"));
   if (arguments.operands.empty()) {
     if (markdown) return Error{Fault::kUsage, "--markdown: name a command, or -o DIR for all of them"};
-    return context.print(man_page());
+    return context.print(terminal::man_page(all_specs()));
   }
   const Command* command = arguments.operands.size() == 1 ? find_command(arguments.operands.front()) : nullptr;
   if (command == nullptr) return Error{Fault::kUsage, unknown_command(arguments.operands.front())};
-  return context.print(markdown ? markdown_page(*command) : man_page(*command));
+  return context.print(page_of(spec_of(*command), markdown));
 }
 
 }  // namespace

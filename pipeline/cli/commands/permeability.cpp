@@ -25,20 +25,21 @@ CommandSpec permeability_spec() {
   spec.operand = "FILE";
   spec.operand_meaning =
       "a table with a header: flow_l_min (or velocity_m_s) and drop_mbar (or _pa, _kpa, _bar, _psi), any number of drop columns";
-  spec.options = {{"--length", "MM", "of the medium along the flow", "", "Medium"},
-                  {"--diameter", "MM", "of a round medium", "", "Medium"},
-                  {"--area", "MM2", "cross-section, in place of a diameter", "", "Medium"},
-                  {"--viscosity", "PA.S", "of the fluid", "1.81e-05", "Fluid"},
-                  {"--density", "KG/M3", "of the fluid", "1.204", "Fluid"},
-                  {"--convention", "NAME", "dinisio2022: what reproduces Table 25 of that document", "", "Fluid"},
-                  {"--plot", "FILE", "draw points and parabola, as .svg or .png", "", "Result"},
-                  {"--overwrite", "", "replace a file that lamina did not write", "", "Result"},
-                  {"--json", "", "print the result as one JSON object on stdout", "", "Result"}};
+  spec.options = {
+      {"--length", "MM", "of the medium along the flow", "", "Medium"},
+      {"--diameter", "MM", "of a round medium", "", "Medium"},
+      {"--area", "MM2", "cross-section, in place of a diameter", "", "Medium"},
+      {"--viscosity", "PA.S", "of the fluid", "1.81e-05", "Fluid"},
+      {"--density", "KG/M3", "of the fluid", "1.204", "Fluid"},
+      {"--convention", "NAME", "dinisio2022: what reproduces Table 25 of that document", "", "Fluid", {"dinisio2022"}},
+      {"--plot", "FILE", "draw points and parabola, as .svg or .png", "", "Result"},
+      {"--overwrite", "", "replace a file that lamina did not write", "", "Result"},
+      {"--json", "", "print the result as one JSON object on stdout", "", "Result"}};
   spec.closing =
       "Rows of one column `configuration` are fitted group by group. The convention dinisio2022 is L = 25.5 mm, v = Q / 28 in\n"
       "m/s of L/min (466.67 mm2), 1.87e-5 Pa.s and 998.2 kg/m3, which is water: its k2 is 832 times that of air.\n\n"
       "Examples:\n  lamina permeability drops.csv --length 25.4 --diameter 25.4\n"
-      "  lamina permeability table_18.tsv --convention dinisio2022 --plot fit.svg";
+      "  lamina permeability drops.csv --convention dinisio2022 --plot fit.svg";
   return spec;
 }
 
@@ -58,6 +59,8 @@ Result<Settings> read_settings(const Arguments& arguments) {
     if (value > 0) target = value * unit;
     return status;
   };
+  if (arguments.has("--area") && arguments.has("--diameter"))
+    return usage("--area and --diameter exclude each other; give one");
   double diameter = 0;
   for (const Status& status :
        {number("--length", 1e-3, settings.medium.length_m), number("--area", 1e-6, settings.medium.area_m2),

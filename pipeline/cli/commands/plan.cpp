@@ -52,6 +52,9 @@ CommandSpec plan_spec(const PlanCommand& row) {
   spec.operand_meaning = "STL, OBJ or 3MF files, STL and OBJ gzipped too; they replace the parts of --job";
   add_key_options(row.keys, spec);
   override_words(row.overrides, spec);
+  if (const auto machine = std::ranges::find(spec.options, "--machine", &OptionSpec::flag); machine != spec.options.end()) {
+    machine->words = names_of(row.product == Product::kMoves ? shipped_extruders() : shipped_machines());
+  }
   if (!row.divided) spec.absent = {{"--shard", kNoShards}};
   spec.options.insert(spec.options.end(), row.own.begin(), row.own.end());
   spec.options.push_back({"--json", "", "print the summary as one JSON object on stdout", "", "Run"});
@@ -71,12 +74,14 @@ Outcome plan(const PlanCommand& row, const Arguments& arguments, Context& contex
   if (Status status = row.complete(arguments, *job); !status) return status;
   if (Status status = check_needs(row.product, arguments, *job); !status) return status;
   if (Status status = check_job(*job); !status) return status;
+  if (const std::string note = note_on_needs(row.product, arguments, *job); !note.empty()) job->notes.push_back(note);
   for (const std::string& note : job->notes) {
     if (!job->quiet) context.say("note: " + note);
   }
   Result<Resolved> resolved = resolve(*job, row.product);
   if (!resolved) return resolved.error();
   if (row.leave_to_machine != nullptr) {
+    if (Status status = check_machine_needs(resolved->extruder->machine, arguments); !status) return status;
     row.leave_to_machine(arguments, *resolved);
     if (Status status = check_job(resolved->job); !status) return status;
   }
@@ -101,8 +106,7 @@ Outcome plan(const PlanCommand& row, const Arguments& arguments, Context& contex
 // --- lamina jet
 
 // clang-format off
-const KeyChoice kJetKeys = {"bed", "layers", "heights", "place", "image.format", "image.mirror", "machine", "dose", "fill", "segment.fill",
-                            "segment.rule", "segment.thick_mm", "segment.thin_mm", "segment.continuous_lines", "segment.spacing_sc_mm",
+const KeyChoice kJetKeys = {"bed", "layers", "heights", "place", "image", "machine", "dose", "fill", "segment.fill", "segment.rule", "segment.thick_mm", "segment.thin_mm", "segment.continuous_lines", "segment.spacing_sc_mm",
                             "segment.spacing_cc_mm", "segment.gap_mm", "segment.shift_mm", "segment.thick_width_mm",
                             "segment.thin_width_mm", "load", "run", "part"};
 // clang-format on
@@ -151,9 +155,9 @@ PlanCommand jet_row() {
 
 // --- lamina slice
 
-const KeyChoice kSliceKeys = {"bed.size_mm",     "layers",      "heights",    "place",    "image.fill", "load",
-                              "run.output",      "run.threads", "run.memory", "run.sync", "run.layers", "run.strict",
-                              "run.allow_empty", "slice",       "fill",       "part"};
+const KeyChoice kSliceKeys = {"bed.size_mm",     "layers",      "heights",    "place",        "image.fill", "load",
+                              "run.output",      "run.threads", "run.memory", "run.sync",     "run.layers", "run.strict",
+                              "run.allow_empty", "slice",       "fill",       "segment.fill", "part"};
 
 const OptionSpec kSliceSwitches[] = {{"--resume", "", "go on with an interrupted job: whole layers are kept", "", "Run"},
                                      {"--overwrite", "", "replace an earlier job in the directory", "", "Run"},
@@ -163,6 +167,8 @@ const OptionSpec kSliceWords[] = {{"--tolerance", "", "", "0", ""}};
 
 /// A slice job saves its job file beside its manifest.
 Status complete_slice(const Arguments& arguments, Job& job) {
+  if (arguments.text("--fill") == "segmented")
+    return at_option("--fill", "segmented lines are of lamina extrude and lamina jet");
   const InputFile asked = {arguments.text("--job"), "the job file"};
   const std::string kept = job.output + "/job.toml";
   return check_outputs({&asked, 1}, {&kept, 1});
@@ -193,10 +199,24 @@ PlanCommand slice_row() {
 
 // --- lamina extrude
 
-const KeyChoice kExtrudeKeys = {"layers",          "heights",    "place",    "machine.profile",    "fill",
-                                "segment",         "extrude",    "load",     "slice.tolerance_um", "run.output",
-                                "run.threads",     "run.memory", "run.sync", "run.layers",         "run.strict",
-                                "run.allow_empty", "part"};
+const KeyChoice kExtrudeKeys = {"layers",
+                                "heights",
+                                "place",
+                                "machine.profile",
+                                "fill",
+                                "image.fill",
+                                "segment",
+                                "extrude",
+                                "load",
+                                "slice.tolerance_um",
+                                "run.output",
+                                "run.threads",
+                                "run.memory",
+                                "run.sync",
+                                "run.layers",
+                                "run.strict",
+                                "run.allow_empty",
+                                "part"};
 
 const OptionSpec kExtrudeSwitches[] = {{"--resume", "", "go on with an interrupted job: whole layers are kept", "", "Run"},
                                        {"--overwrite", "", "replace an earlier file", "", "Run"},
@@ -205,9 +225,9 @@ const OptionSpec kExtrudeSwitches[] = {{"--resume", "", "go on with an interrupt
 const OptionSpec kExtrudeWords[] = {
     {"-o,--output", "FILE", "file for the toolpaths, as in part.gcode or part.sml", "", ""},
     {"--machine", "", "extrusion printer: one of those below, or a profile as TOML", "marlin", ""},
-    {"--layer", "", "", "half of the nozzle; in a job file 0.05", ""},
+    {"--layer", "", "", "half of the nozzle", ""},
     {"--tolerance", "", "", "10", ""},
-    {"--walls", "", "", "1; in a job file 0", ""}};
+      {"--walls", "", "", "1", ""}};
 
 std::string extrude_closing() {
   std::string text = "Machines:\n";
@@ -216,7 +236,8 @@ std::string extrude_closing() {
     text += fmt::format("  {:<16}{}\n", shipped.name, profile ? profile->machine.description : "");
   }
   return text +
-         "\nWithout a job file one wall is laid and layers are half of the nozzle thick. Lengths are mm, angles degrees.\n"
+         "\nOne wall is laid, and layers are half of the nozzle thick, unless options or a job file say otherwise. Lengths are\n"
+         "mm, angles degrees.\n"
          "docs/extrude.md has the profiles and the file formats, docs/segmented.md the segmented filling.\n\n"
          "Examples:\n"
          "  lamina extrude bracket.stl --machine marlin --layer 0.2 --walls 2 --fill raster --bead-gap 1 -o bracket.gcode\n"
@@ -225,18 +246,15 @@ std::string extrude_closing() {
          "  lamina extrude part.stl --machine fdm-2000 --layer 0.254 --bead 0.508 --fill raster -o part.sml";
 }
 
-bool sets(const Arguments& arguments, std::string_view key) {
-  return std::ranges::any_of(arguments.all("--set"), [&](const std::string& text) { return text.starts_with(key); });
-}
-
-/// Replaces the defaults of powder jobs by the printer's, unless the job comes from a file.
+/// Replaces the defaults of powder jobs by the printer's where neither options nor a file name a value.
 void leave_to_machine(const Arguments& arguments, Resolved& resolved) {
-  if (arguments.has("--job")) return;
   Job& job = resolved.job;
   const Extruder& machine = resolved.extruder->machine;
-  if (!arguments.has("--walls") && !sets(arguments, "fill.walls")) job.fill.all.walls = 1;
-  if (!arguments.has("--layer") && !sets(arguments, "layers.thickness_mm") && !sets(arguments, "heights.") &&
-      !arguments.has("--thickness")) {
+  const auto named = [&](std::string_view flag, std::string_view key) {
+    return arguments.has(flag) || std::ranges::find(job.named, key) != job.named.end();
+  };
+  if (!named("--walls", "fill.walls")) job.fill.all.walls = 1;
+  if (!named("--layer", "layers.thickness_mm") && job.heights.thickness_mm.empty()) {
     job.layer_mm = machine.format == "sml" && !machine.sml.pd.empty() ? machine.sml.pd.front().thickness_mm
                                                                       : machine.material.nozzle_mm / 2;
   }

@@ -53,12 +53,11 @@ Outcome run_report(const Arguments& arguments, Context& context) {
   const Result<Report> report = make_report(arguments.operands.front(), options);
   if (!report) return report.error();
   if (Status status = write::write_file(output, report->page); !status) return status.error();
-  if (!arguments.has("--quiet")) {
-    context.say(fmt::format("{}: {} of {} layers to look at, {}", output, report->held, report->layers,
-                            readable_bytes(report->page.size())));
-    if (!report->without_parts.empty()) context.say("views are of the layers: " + report->without_parts);
-  }
-  return 0;
+  Answer answer(arguments, context);
+  answer.say(fmt::format("{}: {} of {} layers to look at, {}", output, report->held, report->layers,
+                         readable_bytes(report->page.size())));
+  if (!report->without_parts.empty()) answer.say("views are of the layers: " + report->without_parts);
+  return answer.status();
 }
 
 }  // namespace

@@ -19,8 +19,9 @@ CommandSpec verify_spec() {
       "decodes to the recorded pixels; the print program of each layer, carried out by a virtual machine, prints exactly\n"
       "that image; nothing else lies in layers/ and program/. Contours: every layer's bytes have the recorded hash.\n"
       "Exit code 5 if anything differs.";
-  spec.operand = "DIR";
-  spec.operand_meaning = "directory that lamina jet or lamina slice wrote; several are verified one after another";
+  spec.operand = "DIR|GCODE";
+  spec.operand_meaning =
+      "directory that lamina jet or lamina slice wrote, or G-code file of lamina extrude; several are verified in turn";
   spec.options = {{"--quick", "", "sizes and hashes only, images are not decoded", "", ""},
                   {"--json", "", "print one JSON object for each directory on stdout", "", ""},
                   {"--quiet", "", "say nothing but faults", "", ""}};
@@ -48,6 +49,7 @@ Outcome run_verify(const Arguments& arguments, Context& context) {
   if (arguments.operands.empty())
     return Error{Fault::kUsage, "no directory to verify; name one that lamina jet or lamina slice wrote"};
   int code = 0;
+  Answer answer(arguments, context);
   for (const std::string& directory : arguments.operands) {
     const Result<VerifyReport> report = verify(directory, {.quick = arguments.has("--quick")});
     if (!report) {
@@ -61,12 +63,13 @@ Outcome run_verify(const Arguments& arguments, Context& context) {
           {Fault::kVerification, fmt::format("{}: and {} more", directory, report->fault_count - report->faults.size())});
     }
     if (!report->ok()) code = std::max(code, static_cast<int>(Fault::kVerification));
-    if (report->ok() && !arguments.has("--quiet")) {
-      context.say(fmt::format("{}: {} layers, {}, all as the manifest says", directory, readable_count(report->layers),
-                              readable_bytes(report->bytes)));
+    if (report->ok()) {
+      answer.say(fmt::format("{}: {} layers, {}, all as the manifest says", directory, readable_count(report->layers),
+                             readable_bytes(report->bytes)));
       if (report->replayed > 0) {
-        for (const std::string& line : replay::totals_text(totals_of(*report))) context.say(line);
+        for (const std::string& line : replay::totals_text(totals_of(*report))) answer.say(line);
       }
+      if (Status status = answer.status(); !status) return status;
     }
     if (arguments.has("--json")) {
       if (Status status = context.give(report_json(*report)); !status) return status.error();

@@ -51,6 +51,12 @@ struct Key : KeyName {
   std::string check(const Target& target) const { return check_target(*this, target); }
   void copy(const Target& from, Target& to) const { copy_value(*this, from, to); }
 
+  /// The words that it takes, for completion.
+  constexpr Key with_words(std::vector<std::string_view> (*all)()) const {
+    Key key = *this;
+    key.words = all;
+    return key;
+  }
   constexpr Key shown_if(bool (*condition)(const Target&)) const {
     Key key = *this;
     key.shown = condition;
@@ -65,7 +71,8 @@ struct Key : KeyName {
   std::string (*write_text)(const Key&, const Target&) = nullptr;
   std::string (*check_target)(const Key&, const Target&) = nullptr;
   void (*copy_value)(const Key&, const Target&, Target&) = nullptr;
-  bool (*shown)(const Target&) = nullptr;  // whether the value is written; always if null
+  bool (*shown)(const Target&) = nullptr;              // whether the value is written; always if null
+  std::vector<std::string_view> (*words)() = nullptr;  // of static storage; null if it takes other values
 };
 
 /// The member of a target at the end of a path of members; the target itself if the path is empty.
@@ -145,6 +152,7 @@ constexpr auto word(const KeyName& name) {
   key.check_target = [](const K& self, const Target& target) {
     return std::string(self.write_text(self, target).empty() ? "is none of its values" : "");
   };
+  key.words = [] { return words_of(Words); };
   return key;
 }
 
@@ -211,6 +219,7 @@ auto inside(const Key<Inner>& inner, std::string_view section, unsigned decides)
   key.section = section;
   key.decides = decides;
   key.inner = &inner;
+  key.words = inner.words;
   key.read_text = [](const K& self, std::string_view text, Target& target) {
     return key_detail::inner_of<Inner>(self).read(text, member<Path...>(target));
   };

@@ -29,15 +29,16 @@ std::size_t edits(std::string_view a, std::string_view b) {
 std::string suggest(std::string_view mistyped, std::span<const std::string_view> known) {
   if (mistyped.size() > 100) return {};
   std::string_view nearest;
-  std::size_t distance = mistyped.size() / 3 + 2;
+  std::size_t distance = mistyped.size() / 3 + 2, between_equals = 0;
   for (const std::string_view name : known) {
-    // Half a name counts as near: --lay, thickness.
+    // Half a name counts as near: --lay, thickness. Of two names that hold it, the shorter one is nearer.
     const bool half = mistyped.size() >= 4 && name.find(mistyped) != std::string_view::npos;
-    const std::size_t edits_away = half ? 1 : edits(mistyped, name);
-    if (edits_away < distance && edits_away < name.size()) {
-      distance = edits_away;
-      nearest = name;
-    }
+    const std::size_t all_edits = edits(mistyped, name), edits_away = half ? 1 : all_edits;
+    if (edits_away >= name.size() || edits_away > distance) continue;
+    if (edits_away == distance && (nearest.empty() || all_edits >= between_equals)) continue;
+    distance = edits_away;
+    between_equals = all_edits;
+    nearest = name;
   }
   return nearest.empty() ? std::string() : fmt::format("; did you mean '{}'?", nearest);
 }

@@ -146,6 +146,13 @@ std::string read_word(const Word<Value> (&words)[N], std::string_view text, Valu
   return not_one_of(text, names);
 }
 
+template <class Value, std::size_t N>
+std::vector<std::string_view> words_of(const Word<Value> (&words)[N]) {
+  std::vector<std::string_view> names;
+  for (const Word<Value>& row : words) names.push_back(row.word);
+  return names;
+}
+
 /// The word for a value; empty if none.
 template <class Value, std::size_t N>
 std::string write_word(const Word<Value> (&words)[N], Value value) {

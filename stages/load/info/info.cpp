@@ -116,13 +116,6 @@ std::uint64_t count_of(const Description& description, const Kind& kind) {
   return count;
 }
 
-/// 1234567 as 1,234,567.
-std::string grouped(std::uint64_t number) {
-  std::string text = std::to_string(number);
-  for (std::size_t at = text.size(); at > 3;) text.insert(at -= 3, 1, ',');
-  return text;
-}
-
 std::string size_of(const Box& box) {
   return fmt::format("{:.3f} x {:.3f} x {:.3f} mm", mm(box.width()), mm(box.depth()), mm(box.height()));
 }
@@ -157,8 +150,9 @@ void describe_meshes(const Description& description, std::string& text) {
   text += "\n  mesh  copies   triangles  closed  size, name\n";
   for (std::size_t i = 0; i < description.diagnosis.size() && i < kMeshesShown; ++i) {
     const Diagnosis& found = description.diagnosis[i];
-    text += fmt::format("  {:>4}  {:>6}  {:>10}  {:<6}  {}, {}\n", i + 1, description.copies[i], grouped(found.triangles),
-                        found.balanced ? "yes" : "no", size_of(found.bounds), short_name(description, i));
+    text +=
+        fmt::format("  {:>4}  {:>6}  {:>10}  {:<6}  {}, {}\n", i + 1, description.copies[i], readable_count(found.triangles),
+                    found.balanced ? "yes" : "no", size_of(found.bounds), short_name(description, i));
   }
   if (description.diagnosis.size() > kMeshesShown)
     text += fmt::format("  and {} more\n", description.diagnosis.size() - kMeshesShown);
@@ -172,7 +166,7 @@ void describe_findings(const Description& description, std::string& text) {
   text += "\n  found                     count  first places, mm\n";
   for (const Kind& kind : kKinds)
     if (const std::uint64_t count = count_of(description, kind); count > 0)
-      text += fmt::format("  {:<20} {:>10}  {}\n", kind.name, grouped(count), first_places(description, kind));
+      text += fmt::format("  {:<20} {:>10}  {}\n", kind.name, readable_count(count), first_places(description, kind));
   if (inverted > 0)
     text +=
         fmt::format("  {:<20} {:>10}  a hollow within a shell, or a shell turned inside out\n", "inverted shells", inverted);
@@ -230,9 +224,9 @@ Result<std::string> describe_part_text(const std::string& path, const LoadOption
   row(text, "format", d.format);
   if (d.part.instances.size() > 1 || d.part.meshes.size() > 1)
     row(text, "meshes", fmt::format("{}, placed {} times", d.part.meshes.size(), d.part.instances.size()));
-  row(text, "triangles", grouped(d.total(&Diagnosis::triangles)));
-  row(text, "vertices", grouped(d.total(&Diagnosis::vertices)));
-  row(text, "shells", grouped(d.total(&Diagnosis::shells)));
+  row(text, "triangles", readable_count(d.total(&Diagnosis::triangles)));
+  row(text, "vertices", readable_count(d.total(&Diagnosis::vertices)));
+  row(text, "shells", readable_count(d.total(&Diagnosis::shells)));
   row(text, "size", size_of(d.part.bounds));
   row(text, "from", point(d.part.bounds.lo) + " mm");
   row(text, "to", point(d.part.bounds.hi) + " mm");

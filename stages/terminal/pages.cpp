@@ -1,16 +1,15 @@
-// Pages about commands: for man, and as Markdown for docs/commands.
+#include "stages/terminal/pages.h"
+
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cctype>
-#include <string_view>
 
-#include "pipeline/cli/help/help.h"
 #include "stages/data/text/escape.h"
 #include "stages/data/text/number_text.h"
 #include "stages/data/text/version.h"
 
-namespace lamina::pipeline {
+namespace lamina::terminal {
 namespace {
 
 /// Pages of docs/ related to a command.
@@ -56,31 +55,38 @@ std::string title(std::string_view name) {
   return fmt::format(".TH {} 1 \"\" \"lamina {}\" \"User Commands\"\n", roff(upper), version());
 }
 
+/// What every page ends with. The variables are those that the program reads.
+std::string files_and_environment() {
+  return ".SH FILES\n.TP\n.I /usr/share/doc/lamina/docs\nwhere packages install the pages that are named docs/NAME.md here\n"
+         ".TP\n.I manifest.json\nin the directory of a job, or NAME.json beside a file of toolpaths: the job as it was resolved, and "
+         "the size and hash of every file\n.TP\n.I NAME.part\na file that is being written; it takes its name when it is whole\n"
+         ".SH ENVIRONMENT\n.TP\n.B SOURCE_DATE_EPOCH\nseconds since 1970 that date the 3MF files which are written\n";
+}
+
 /// "-o, --output".
 std::string flags_of(const OptionSpec& option) { return fmt::format("{}", fmt::join(split(option.flag, ","), ", ")); }
 
 }  // namespace
 
-std::string man_page() {
+std::string man_page(std::span<const CommandSpec> commands) {
   std::string text =
       title("lamina") +
       ".SH NAME\nlamina \\- plans additive\\-manufacturing jobs\n.SH SYNOPSIS\n.B lamina\n.I COMMAND\n[OPTIONS] ...\n"
       ".SH DESCRIPTION\nMeshes go in; what a machine needs for every layer comes out. Each command has a page of its "
       "own.\n.SH COMMANDS\n";
   std::string also;
-  for (const Command* command : commands()) {
-    text += fmt::format(".TP\n.B {}\n{}\n", roff(command->name), roff(command->summary));
-    also += fmt::format("{}.BR lamina\\-{} (1)", also.empty() ? "" : ",\n", command->name);
+  for (const CommandSpec& command : commands) {
+    text += fmt::format(".TP\n.B {}\n{}\n", roff(command.name), roff(command.brief));
+    also += fmt::format("{}.BR lamina\\-{} (1)", also.empty() ? "" : ",\n", command.name);
   }
   return text + ".SH OPTIONS\n.TP\n.BR \\-h ,\\  \\-\\-help\nwhat there is\n.TP\n.B \\-\\-version\nthe version\n" +
-         exit_status() + ".SH SEE ALSO\n" + also + "\n";
+         exit_status() + files_and_environment() + ".SH SEE ALSO\n" + also + "\n";
 }
 
-std::string man_page(const Command& command) {
-  const CommandSpec spec = spec_of(command);
-  std::string text = title(fmt::format("lamina-{}", command.name));
-  text += fmt::format(".SH NAME\nlamina\\-{} \\- {}\n.SH SYNOPSIS\n.B lamina {}\n[OPTIONS]", command.name,
-                      roff(command.summary), command.name);
+std::string man_page(const CommandSpec& spec) {
+  std::string text = title(fmt::format("lamina-{}", spec.name));
+  text += fmt::format(".SH NAME\nlamina\\-{} \\- {}\n.SH SYNOPSIS\n.B lamina {}\n[OPTIONS]", spec.name, roff(spec.brief),
+                      spec.name);
   if (!spec.operand.empty()) text += fmt::format("\n.IR {} \\ ...", roff(spec.operand));
   text += fmt::format("\n.SH DESCRIPTION\n{}\n", roff(spec.summary));
   if (!spec.operand.empty()) text += fmt::format(".TP\n.I {}\n{}\n", roff(spec.operand), roff(spec.operand_meaning));
@@ -94,17 +100,16 @@ std::string man_page(const Command& command) {
     text += option.preset.empty() ? "\n" : fmt::format(" (default {})\n", roff(option.preset));
   }
   if (const std::string end = spec.end(); !end.empty()) text += fmt::format(".SH NOTES\n.nf\n{}\n.fi\n", roff(end));
-  return text + exit_status() + ".SH SEE ALSO\n.BR lamina (1)\n";
+  return text + exit_status() + files_and_environment() + ".SH SEE ALSO\n.BR lamina (1)\n";
 }
 
-std::string markdown_page(const Command& command) {
-  const CommandSpec spec = spec_of(command);
+std::string markdown_page(const CommandSpec& spec) {
   std::string text = fmt::format(
       "<!-- Made from the definition of the command: lamina manual --markdown -o docs/commands -->\n"
       "# lamina {}\n\n{}\n\n",
-      command.name, sentence(command.summary));
-  text += fmt::format("    lamina {} [OPTIONS]{}\n\n{}\n\n", command.name,
-                      spec.operand.empty() ? "" : " " + spec.operand + " ...", spec.summary);
+      spec.name, sentence(spec.brief));
+  text += fmt::format("    lamina {} [OPTIONS]{}\n\n{}\n\n", spec.name, spec.operand.empty() ? "" : " " + spec.operand + " ...",
+                      spec.summary);
   if (!spec.operand.empty())
     text += fmt::format("{}: {}.\n\n", markdown_code(spec.operand), markdown_cell(spec.operand_meaning));
   std::string group = "-";
@@ -121,9 +126,9 @@ std::string markdown_page(const Command& command) {
   if (const std::string end = spec.end(); !end.empty())
     text += fmt::format("{}## Notes and examples\n\n```text\n{}\n```\n", spec.options.empty() ? "" : "\n", end);
   for (const More& more : kMore) {
-    if (more.command == command.name) text += fmt::format("\nMore: {}.\n", more.pages);
+    if (more.command == spec.name) text += fmt::format("\nMore: {}.\n", more.pages);
   }
   return text + "\nExit codes are those of [every command](../../README.md#use).\n";
 }
 
-}  // namespace lamina::pipeline
+}  // namespace lamina::terminal

@@ -2,9 +2,9 @@
 
 #include <algorithm>
 
-#include "pipeline/cli/progress.h"
+#include "stages/terminal/progress.h"
 
-namespace lamina::pipeline {
+namespace lamina::terminal {
 namespace {
 
 TEST(Progress, TellsRateAndTimeLeftOfTheLayersThatWerePlannedNow) {
@@ -24,4 +24,4 @@ TEST(Progress, MillionEventsCostNoMillionWrites) {
 }
 
 }  // namespace
-}  // namespace lamina::pipeline
+}  // namespace lamina::terminal

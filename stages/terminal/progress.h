@@ -1,4 +1,4 @@
-// pipeline/cli/progress.h: the progress display of the layers for stderr.
+// stages/terminal/progress.h: the progress display of the layers for stderr.
 #pragma once
 
 #include <chrono>
@@ -8,7 +8,7 @@
 
 #include "stages/data/text/terminal.h"
 
-namespace lamina::pipeline {
+namespace lamina::terminal {
 
 /// A bar on a terminal, redrawn at most every 100 ms; elsewhere a plain line per tenth of the layers, at most once a
 /// second, and every 5 s. Returns the text to write, mostly empty, and writes nothing itself.
@@ -41,4 +41,4 @@ class Progress {
   Clock::time_point started_ = Clock::now(), told_ = started_;
 };
 
-}  // namespace lamina::pipeline
+}  // namespace lamina::terminal

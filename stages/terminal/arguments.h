@@ -1,4 +1,4 @@
-// pipeline/cli/arguments.h: the options of a command, and the arguments of one call.
+// stages/terminal/arguments.h: the options of a command, and the arguments of one call.
 #pragma once
 
 #include <optional>
@@ -10,21 +10,23 @@
 #include "stages/data/status.h"
 #include "stages/data/text/value.h"
 
-namespace lamina::pipeline {
+namespace lamina::terminal {
 
 /// One option of a command. A switch takes no value.
 struct OptionSpec {
   std::string flag;   // "-o,--output"
   std::string value;  // "MM"; empty for a switch
   std::string meaning;
-  std::string preset;  // shown in the help; empty if there is none
-  std::string group;   // heading in the help
+  std::string preset;                        // shown in the help; empty if there is none
+  std::string group;                         // heading in the help
+  std::vector<std::string_view> words = {};  // that it takes; of static storage
 };
 
 /// The arguments of a command: the source of help, manual pages, shell completion and the documentation's tests.
 struct CommandSpec {
-  std::string name, summary;
-  std::string operand, operand_meaning;  // "PART", "..."; any number
+  std::string name, brief, summary;             // brief: on one line
+  std::string operand, operand_meaning;         // "PART", "..."; any number
+  std::vector<std::string_view> operand_words;  // that it takes; of static storage
   std::vector<OptionSpec> options;
   std::string closing;                                                // examples, at the end of the help
   std::string (*more)() = nullptr;                                    // the same, made only when the help is read
@@ -62,8 +64,11 @@ struct Arguments {
   }
 };
 
+/// The help of a command, in lines of `columns`; notes and examples stay as they are.
+std::string help_text(const CommandSpec& spec, int columns);
+
 /// Parses the arguments after the command's name.
 /// errors  kUsage: unknown option (with the nearest name), missing value
 Result<Arguments> read_arguments(const CommandSpec& spec, const std::vector<std::string>& arguments);
 
-}  // namespace lamina::pipeline
+}  // namespace lamina::terminal

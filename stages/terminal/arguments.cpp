@@ -1,4 +1,6 @@
 // Only this file depends on the command line library.
+#include "stages/terminal/arguments.h"
+
 #include <fmt/format.h>
 
 #include <CLI/App.hpp>
@@ -7,13 +9,14 @@
 #include <algorithm>
 #include <deque>
 
-#include "pipeline/cli/arguments.h"
 #include "stages/data/text/json_text.h"
 #include "stages/data/text/names.h"
 #include "stages/data/text/number_text.h"
 #include "stages/data/text/readable.h"
+#include "stages/data/text/terminal.h"
+#include "stages/terminal/foreign_words.h"
 
-namespace lamina::pipeline {
+namespace lamina::terminal {
 
 const OptionSpec* CommandSpec::find(std::string_view flag) const {
   for (const OptionSpec& option : options) {
@@ -50,9 +53,7 @@ Result<Arguments> read_arguments(const CommandSpec& spec, const std::vector<std:
     if (line.ends_with('?')) return Error{Fault::kUsage, line};
     return Error{Fault::kUsage, fmt::format("{}; see lamina {} --help", line, spec.name)};
   };
-  CLI::App app(spec.summary + "\n", "lamina " + spec.name);
-  app.footer([&spec] { return "\n" + spec.end(); });
-  app.get_formatter()->column_width(28);
+  CLI::App app("", "lamina " + spec.name);
   app.allow_extras();
 
   Arguments read;
@@ -62,25 +63,19 @@ Result<Arguments> read_arguments(const CommandSpec& spec, const std::vector<std:
   std::vector<CLI::Option*> options;
   for (const OptionSpec& option : spec.options) {
     std::vector<std::string>& texts = values.emplace_back();
-    const std::string meaning =
-        option.preset.empty() ? option.meaning : fmt::format("{} (default {})", option.meaning, option.preset);
-    CLI::Option* added = option.value.empty() ? app.add_flag(option.flag, meaning)
-                                              : app.add_option(option.flag, texts, meaning)
-                                                    ->type_name(option.value)
-                                                    ->expected(1)
-                                                    ->allow_extra_args(false)
-                                                    ->take_all();
-    if (!option.group.empty()) added->group(option.group);
-    options.push_back(added);
+    options.push_back(
+        option.value.empty()
+            ? app.add_flag(option.flag)
+            : app.add_option(option.flag, texts)->type_name(option.value)->expected(1)->allow_extra_args(false)->take_all());
     for (const std::string_view name : split(option.flag, ",")) known.push_back(name);
   }
   if (!spec.operand.empty()) {
-    app.add_option(spec.operand, read.operands, spec.operand_meaning)->type_name("")->expected(0, 1 << 29);
+    app.add_option(spec.operand, read.operands)->type_name("")->expected(0, 1 << 29);
   }
   try {
     app.parse(std::vector<std::string>(arguments.rbegin(), arguments.rend()));
   } catch (const CLI::CallForHelp&) {
-    read.help = app.help();
+    read.help = help_text(spec, std::clamp(terminal_columns(), 40, 120));
     return read;
   } catch (const CLI::Error& error) {
     return wrong(error.what());
@@ -91,8 +86,9 @@ Result<Arguments> read_arguments(const CommandSpec& spec, const std::vector<std:
     for (const auto& [flag, why] : spec.absent) {
       if (name == flag) return wrong(fmt::format("{}: {}", flag, why));
     }
-    return wrong(extra.starts_with('-') ? fmt::format("{}: no such option{}", name, suggest(name, known))
-                                        : fmt::format("'{}': not expected here", extra));
+    if (!extra.starts_with('-')) return wrong(fmt::format("'{}': not expected here", extra));
+    const std::string hint = foreign_word(name, spec);
+    return wrong(fmt::format("{}: no such option{}", name, hint.empty() ? suggest(name, known) : hint));
   }
   for (std::size_t i = 0; i < options.size(); ++i) {
     const std::string& flag = spec.options[i].flag;
@@ -111,4 +107,4 @@ Result<Arguments> read_arguments(const CommandSpec& spec, const std::vector<std:
   return read;
 }
 
-}  // namespace lamina::pipeline
+}  // namespace lamina::terminal

@@ -1,10 +1,10 @@
-#include "pipeline/cli/progress.h"
+#include "stages/terminal/progress.h"
 
 #include <fmt/format.h>
 
 #include "stages/data/text/readable.h"
 
-namespace lamina::pipeline {
+namespace lamina::terminal {
 
 std::string Progress::rate(std::uint32_t done, std::uint32_t total, std::uint32_t before, double seconds) {
   std::string text = fmt::format("{}/{} layers", done, total);
@@ -45,4 +45,4 @@ std::string Progress::tell(std::uint32_t done, std::uint32_t total) {
   return bar ? draw(text, total > 0 ? static_cast<double>(done) / total : 1) : text + "\n";
 }
 
-}  // namespace lamina::pipeline
+}  // namespace lamina::terminal

@@ -1,4 +1,4 @@
-// pipeline/job/old_forms.h: deprecated string forms of job files, accepted for one version with a note.
+// stages/read/jobs/old_forms.h: deprecated string forms of job files, accepted for one version with a note.
 #pragma once
 
 #include <string>
@@ -6,7 +6,7 @@
 
 #include "stages/data/text/toml.h"
 
-namespace lamina::pipeline {
+namespace lamina::read {
 
 /// Replaces old forms in a job's tree by equivalent tables: fill.by_height, segment.by_height,
 /// part.material_by_height, part.fill, fill.gap_by_height and extrude.set as strings. notes  gets a line for each
@@ -14,4 +14,4 @@ namespace lamina::pipeline {
 /// errors  kUsage: a string that does not match the old form
 Status replace_old_forms(TomlValue& job, const std::string& file, std::vector<std::string>& notes);
 
-}  // namespace lamina::pipeline
+}  // namespace lamina::read

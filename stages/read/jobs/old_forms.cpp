@@ -1,10 +1,10 @@
-#include "pipeline/job/old_forms.h"
+#include "stages/read/jobs/old_forms.h"
 
 #include <fmt/format.h>
 
 #include "stages/data/text/number_text.h"
 
-namespace lamina::pipeline {
+namespace lamina::read {
 namespace {
 
 using Text = std::string_view;
@@ -121,4 +121,4 @@ Status replace_old_forms(TomlValue& job, const std::string& file, std::vector<st
   return {};
 }
 
-}  // namespace lamina::pipeline
+}  // namespace lamina::read

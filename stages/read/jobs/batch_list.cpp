@@ -1,4 +1,4 @@
-#include "pipeline/batch/list.h"
+#include "stages/read/jobs/batch_list.h"
 
 #include <fmt/format.h>
 
@@ -8,9 +8,8 @@
 #include "stages/data/input/file_reader.h"
 #include "stages/data/text/readable.h"
 #include "stages/data/text/shell_words.h"
-#include "stages/load/load.h"
 
-namespace lamina::pipeline {
+namespace lamina::read {
 namespace {
 
 namespace fs = std::filesystem;
@@ -18,8 +17,6 @@ namespace fs = std::filesystem;
 constexpr std::size_t kLongestName = 80;  // of a job that names no file, bytes
 
 bool is_job_file(const fs::path& path) { return lower_case(path.extension().string()) == ".toml"; }
-
-bool is_part(const fs::path& path) { return load::is_part_name(path.string()); }
 
 /// The file's name without its extensions; folders become part of it.
 std::string name_of(const fs::path& path) {
@@ -43,12 +40,13 @@ BatchEntry entry_of_file(const fs::path& path, const fs::path& below, const std:
   return entry;
 }
 
-Status read_directory(const fs::path& directory, const std::vector<std::string>& with, std::vector<BatchEntry>& entries) {
+Status read_directory(const fs::path& directory, const std::vector<std::string>& with, const IsPart& is_part,
+                      std::vector<BatchEntry>& entries) {
   std::vector<fs::path> files;
   std::error_code error;
   for (fs::recursive_directory_iterator at(directory, error), end; !error && at != end; at.increment(error)) {
     std::error_code ignored;
-    if (at->is_regular_file(ignored) && (is_job_file(at->path()) || is_part(at->path()))) files.push_back(at->path());
+    if (at->is_regular_file(ignored) && (is_job_file(at->path()) || is_part(at->path().string()))) files.push_back(at->path());
   }
   if (error) return Error{Fault::kUsage, fmt::format("{}: {}", directory.string(), error.message())};
   if (files.empty()) {
@@ -61,15 +59,15 @@ Status read_directory(const fs::path& directory, const std::vector<std::string>&
 }
 
 /// Name of a job in a list, from its first file.
-std::string name_of_words(const std::vector<std::string>& words) {
+std::string name_of_words(const std::vector<std::string>& words, const IsPart& is_part) {
   for (std::size_t i = 1; i < words.size(); ++i) {
     const fs::path path = words[i];
-    if (!words[i].starts_with('-') && (is_part(path) || is_job_file(path))) return name_of(path.filename());
+    if (!words[i].starts_with('-') && (is_part(words[i]) || is_job_file(path))) return name_of(path.filename());
   }
   return words.front().substr(0, kLongestName);
 }
 
-Status read_list(const std::string& path, std::vector<BatchEntry>& entries) {
+Status read_list(const std::string& path, const IsPart& is_part, std::vector<BatchEntry>& entries) {
   auto file = FileReader::open(path, {.fault = Fault::kUsage,
                                       .no_text = "not a text; a list has one command line a line",
                                       .most_bytes = kMostListBytes,
@@ -83,7 +81,7 @@ Status read_list(const std::string& path, std::vector<BatchEntry>& entries) {
     if (!words) return Error{Fault::kUsage, fmt::format("{}: {}", source, words.error().message)};
     if (!words->empty() && words->front() == "lamina") words->erase(words->begin());
     if (words->empty()) continue;
-    std::string name = name_of_words(*words);
+    std::string name = name_of_words(*words, is_part);
     entries.push_back({source, std::move(name), std::move(*words)});
   }
   if (!file->status()) return file->status().error();
@@ -96,7 +94,8 @@ Status read_list(const std::string& path, std::vector<BatchEntry>& entries) {
 
 }  // namespace
 
-Result<std::vector<BatchEntry>> read_batch(const std::vector<std::string>& operands, const std::vector<std::string>& with) {
+Result<std::vector<BatchEntry>> read_batch(const std::vector<std::string>& operands, const std::vector<std::string>& with,
+                                           const IsPart& is_part) {
   std::vector<BatchEntry> entries;
   for (const std::string& operand : operands) {
     std::error_code error;
@@ -106,14 +105,14 @@ Result<std::vector<BatchEntry>> read_batch(const std::vector<std::string>& opera
           Fault::kUsage,
           fmt::format("{}: no such file or directory; name a list, a part, a job file or a directory of them", operand)};
     if (fs::is_directory(status)) {
-      if (Status read = read_directory(operand, with, entries); !read) return read.error();
+      if (Status read = read_directory(operand, with, is_part, entries); !read) return read.error();
     } else if (is_job_file(operand) || is_part(operand)) {
       entries.push_back(entry_of_file(operand, fs::path(operand).filename(), with));
-    } else if (Status read = read_list(operand, entries); !read) {
+    } else if (Status read = read_list(operand, is_part, entries); !read) {
       return read.error();
     }
   }
   return entries;
 }
 
-}  // namespace lamina::pipeline
+}  // namespace lamina::read

@@ -1,0 +1,172 @@
+// One word means one thing: on a command line and in a file, in every command, and in what is answered where.
+#include <gtest/gtest.h>
+
+#include <nlohmann/json.hpp>
+
+#include "tests/commands/program.h"
+
+namespace lamina::test {
+namespace {
+
+struct OneMeaning : testing::Test {
+  Directory folder;
+  void SetUp() override { write_box(folder / "part.stl", {0, 0, 0}, {12, 10, 4}); }
+  Outcome run(const std::string& line) const { return run_lamina(words_of(line), folder.path()); }
+  /// The call ends well.
+  Outcome done(const std::string& line) const {
+    Outcome outcome = run(line);
+    EXPECT_EQ(outcome.code, 0) << line << "\n" << outcome.err;
+    return outcome;
+  }
+};
+
+TEST_F(OneMeaning, AJobFileAndACommandLineOfTheSameWordsGiveTheSameToolpaths) {
+  const struct {
+    const char *words, *file;  // beside the part
+  } rows[] = {
+      {"", ""},
+      {"--machine anet-a8", "[machine]\nprofile = 'anet-a8'\n"},
+      {"--layer 0.05", "[layers]\nthickness_mm = 0.05\n"},
+      {"--walls 0 --pattern raster", "[fill]\nwalls = 0\npattern = 'raster'\n"},
+      {"--pattern raster --line-distance 2", "[fill]\npattern = 'raster'\ndistance_mm = 2\n"},
+      {"--fill segmented --machine anet-a8", "[machine]\nprofile = 'anet-a8'\n[segment]\non = true\n"},
+      {"--heights cusp --thickness 0.1,0.2", "[heights]\nmode = 'cusp'\nthickness_mm = '0.1,0.2'\n"},
+  };
+  for (const auto& row : rows) {
+    write_text(folder / "job.toml", std::string("[[part]]\npath = 'part.stl'\n") + row.file);
+    done(std::string("extrude part.stl --quiet --overwrite -o a.gcode ") + row.words);
+    done("extrude --job job.toml --quiet --overwrite -o b.gcode");
+    EXPECT_EQ(read_text(folder / "a.gcode"), read_text(folder / "b.gcode")) << row.words;
+    EXPECT_NE(read_text(folder / "b.gcode").find("G1"), std::string::npos);
+  }
+  const auto layers = [&](const std::string& line) {
+    return nlohmann::json::parse(done("extrude --dry-run --quiet --json " + line).out)["layers_total"].get<int>();
+  };
+  EXPECT_EQ(layers("part.stl"), 20) << "4 mm in layers of half of the nozzle";
+  EXPECT_EQ(layers("part.stl --set layers.thickness_mm=0.1"), 40);
+}
+
+TEST_F(OneMeaning, FillIsWhatIsLaidInside) {
+  for (const std::string command : {"jet", "slice", "extrude"}) {
+    const std::string call = command + " part.stl --layer 0.3 --dry-run --quiet ";
+    done(call + "--fill raster");
+    done(call + "--fill-rule evenodd");
+    const Outcome refused = run(call + "--fill evenodd");
+    EXPECT_EQ(refused.code, 2);
+    EXPECT_NE(refused.err.find("--fill-rule evenodd"), std::string::npos) << refused.err;
+  }
+  done("jet part.stl --layer 1 --dry-run --quiet --fill segmented");
+  EXPECT_NE(run("slice part.stl --layer 1 --dry-run --fill segmented").err.find("lamina extrude and lamina jet"),
+            std::string::npos);
+  EXPECT_NE(run("jet part.stl --fill sparkle --dry-run").err.find("raster, contour"), std::string::npos);
+}
+
+TEST_F(OneMeaning, OptionsThatDoNothingHereAreRefused) {
+  done("jet part.stl --bed 60x60 --dpi 100 --layer 1 --quiet -o out");
+  const struct {
+    const char *line, *words;
+  } rows[] = {
+      {"jet part.stl --dry-run --no-repair --weld 5", "--weld: is of repair"},
+      {"jet part.stl --dry-run --no-repair --repair winding", "--no-repair and --repair exclude each other"},
+      {"jet part.stl --dry-run --at 1,1 --gap 3", "--gap: is between parts"},
+      {"slice part.stl --dry-run --layer 1 --empty-first-layer", "--empty-first-layer: is of CLI files"},
+      {"slice part.stl --dry-run --layer 1 --pattern contour --angle 30", "--angle: is of straight lines"},
+      {"extrude part.stl --dry-run --machine fdm-2000 --layer 0.254 --fan 50", "--fan: is not in SML"},
+      {"extrude part.stl --dry-run --machine fdm-2000 --layer 0.254 --nozzle-temperature 200",
+       "--nozzle-temperature: is not in SML"},
+      {"heights part.stl --layer 1 --adapt-angle 30", "--adapt-angle: is of --heights angle"},
+      {"heights part.stl --layer 1 --time-model 3", "--time-model: is of --heights optimal"},
+      {"calibrate --machine anet-a8 --gap 0.1 -o pieces", "--gap: is of the profile"},
+      {"calibrate --machine anet-a8 --exact-spacing -o pieces", "--exact-spacing: is of the profile"},
+      {"preview out --step 3 -o a.png", "--step: is of a swath"},
+      {"preview out --swath 1 --count 3 -o a.png", "--swath: is drawn in one layer"},
+      {"permeability drops.csv --length 5 --area 3 --diameter 3", "--area and --diameter exclude each other"},
+  };
+  for (const auto& row : rows) {
+    const Outcome refused = run(row.line);
+    EXPECT_EQ(refused.code, 2) << row.line << "\n" << refused.err;
+    EXPECT_EQ(refused.error_lines(), 1u) << refused.err;
+    EXPECT_NE(refused.err.find(row.words), std::string::npos) << row.line << "\n" << refused.err;
+  }
+  for (const char* line :
+       {"jet part.stl --dry-run --quiet --repair winding --weld 5", "jet part.stl --dry-run --quiet --copies 2 --gap 3",
+        "slice part.stl --dry-run --quiet --layer 1 --format cli --empty-first-layer",
+        "heights part.stl --compare --thickness 0.5,1 --time-model 3",
+        "slice part.stl --dry-run --quiet --layer 1 --pattern contour+raster --angle 30",
+        "extrude part.stl --dry-run --quiet --fan 50"}) {
+    done(line);
+  }
+  EXPECT_NE(done("jet part.stl --layer 1 --dry-run --walls 3").err.find("note: inside of the walls nothing is asked for"),
+            std::string::npos);
+  EXPECT_EQ(done("jet part.stl --layer 1 --dry-run --walls 3 --fill none").err.find("note:"), std::string::npos);
+}
+
+TEST_F(OneMeaning, WhatWasAskedForIsAnsweredOnStdout) {
+  done("jet part.stl --bed 60x60 --dpi 100 --layer 1 --quiet -o out");
+  done("extrude part.stl --quiet -o part.gcode");
+  const struct {
+    const char *line, *words;
+  } rows[] = {
+      {"verify out", "out: 4 layers"},
+      {"verify part.gcode", "part.gcode: 20 layers"},
+      {"preview out -o sheet.png", "sheet.png: 4 of 4 layers"},
+      {"preview part.gcode -o layer.svg", "layer.svg: "},
+      {"report out -o page.html", "page.html: 4 of 4 layers to look at"},
+  };
+  for (const auto& row : rows) {
+    const Outcome outcome = done(row.line);
+    EXPECT_NE(outcome.out.find(row.words), std::string::npos) << row.line << "\n" << outcome.err;
+    EXPECT_EQ(outcome.err.find(row.words), std::string::npos) << row.line;
+    const bool writes = !std::string(row.line).starts_with("verify");
+    EXPECT_EQ(done(std::string(row.line) + " --quiet" + (writes ? " --overwrite" : "")).out, "") << row.line;
+  }
+  const Outcome json = done("verify out --json");
+  EXPECT_TRUE(nlohmann::json::parse(json.out)["ok"]);
+  EXPECT_NE(json.err.find("out: 4 layers"), std::string::npos) << "beside the object";
+}
+
+TEST_F(OneMeaning, OutputsHaveTheNamesAndFoldersThatTheirReadersExpect) {
+  std::filesystem::create_directory(folder / "parts");
+  std::filesystem::rename(folder / "part.stl", folder / "parts/part.stl");
+  const Outcome batch = run_lamina({"batch", "parts", "--with", "extrude --layer 0.4", "-o", "out", "--quiet"}, folder.path());
+  EXPECT_EQ(batch.code, 0) << batch.err;
+  EXPECT_TRUE(std::filesystem::exists(folder / "out/part.gcode"));
+  done("manual -o pages/man1");
+  EXPECT_TRUE(std::filesystem::exists(folder / "pages/man1/lamina-jet.1"));
+}
+
+TEST_F(OneMeaning, WordsThatAreWrongAreAnsweredByWhatIsRight) {
+  const struct {
+    const char* line;
+    int code;
+    const char* words;
+  } rows[] = {
+      {"jet part.stl --machine nuferb --dry-run", 2, "did you mean 'nuferbj'?"},
+      {"jet part.stl --layer-height 0.1 --dry-run", 2, "did you mean '--layer'?"},
+      {"jet part.stl --set part.3.copies=2 --dry-run", 2, "there is one part"},
+      {"jet part.stl part.stl --set part.3.copies=2 --dry-run", 2, "there are 2 parts"},
+      {"jet - --dry-run", 3, "parts are not read from standard input"},
+      {"preview nosuchdir -o x.svg", 2, "no such directory"},
+      {"batch part.stl --memory 1K -o out", 2, "give 48M or more"},
+      {"machines --check nosuch", 2, "no machine 'nosuch'"},
+  };
+  for (const auto& row : rows) {
+    const Outcome outcome = run(row.line);
+    EXPECT_EQ(outcome.code, row.code) << row.line << "\n" << outcome.err;
+    EXPECT_EQ(outcome.error_lines(), 1u) << outcome.err;
+    EXPECT_NE(outcome.err.find(row.words), std::string::npos) << outcome.err;
+  }
+}
+
+TEST_F(OneMeaning, PrintersOfFilamentAreListedShownAndCheckedAsThoseOfPowder) {
+  const std::string list = done("machines").out;
+  for (const std::string name : {"nuferbj", "hp45", "anet-a8", "fdm-2000"}) {
+    EXPECT_NE(list.find(name), std::string::npos);
+    EXPECT_NE(done("machines --check " + name).out.find("machine   "), std::string::npos) << name;
+    write_text(folder / "shown.toml", done("machines --show " + name).out);
+    done("machines --check shown.toml");
+  }
+}
+
+}  // namespace
+}  // namespace lamina::test
