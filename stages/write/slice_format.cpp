@@ -9,7 +9,7 @@ using Options = SliceFormatOptions;
 
 // Two numbers of about 11 characters and separators. An SVG element has kind, colour and width, a CLI element part and count;
 // both repeat the last point of the element before.
-constexpr SliceFormat kFormats[] = {
+constexpr SliceFormat kSliceFormats[] = {
     {"svg", ".svg", true, true, [](const Options&) { return make_svg_encoder(); }, 26, 200},
     {"svg-polygon", ".svg", true, false, [](const Options&) { return make_svg_polygon_encoder(); }, 26, 0},
     {"cli", ".cli", true, true, [](const Options& options) { return make_cli_encoder(false, options); }, 48, 64},
@@ -21,11 +21,11 @@ constexpr SliceFormat kFormats[] = {
 
 }  // namespace
 
-std::span<const SliceFormat> slice_formats() { return kFormats; }
+std::span<const SliceFormat> slice_formats() { return kSliceFormats; }
 
 const SliceFormat* find_slice_format(std::string_view id) {
-  const auto* found = std::ranges::find(kFormats, id, &SliceFormat::id);
-  return found == std::end(kFormats) ? nullptr : found;
+  const auto* found = std::ranges::find(kSliceFormats, id, &SliceFormat::id);
+  return found == std::end(kSliceFormats) ? nullptr : found;
 }
 
 void encode_alone(const SliceEncoder& encoder, const SliceHead& head, const SliceLayer& layer, Buffer<char>& out) {
