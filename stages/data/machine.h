@@ -29,6 +29,7 @@ enum class VatRule : std::uint8_t { kFirst, kSecond, kMajority, kBoth, kRefuse }
 struct Machine {
   std::string name, description;
   std::string dialect = "nuferbj";
+  std::string firmware;  // its version, such as 2.03; empty: any that has what the dialect needs
 
   struct Bed {
     BedShape shape = BedShape::kRectangle;

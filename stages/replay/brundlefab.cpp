@@ -1,62 +1,258 @@
-// stages/write/program/brundlefab/README.md tells the format.
+// A layer's program as the BrundleFab's firmware carries it out (github.com/ezrec/BrundleFab-firmware at 96cc39e), with its
+// printhead's (BrundleFab-printhead at a2da357). stages/write/program/brundlefab/README.md tells the format.
+//
+// Commands of motion and tools wait until all axes and the bar stand (GCode::update), so that each is carried out alone;
+// within one command all axes move at a time (CNC::target_set).
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <string>
+#include <utility>
 #include <vector>
 
+#include "stages/replay/brundlefab/block.h"
+#include "stages/replay/brundlefab/ink_bar.h"
 #include "stages/replay/dialects.h"
-#include "stages/replay/gcode.h"
 
 namespace lamina::replay {
+namespace brundle {
+namespace {
 
-void read_brundlefab(std::string_view text, Printing& printing) {
-  GcodeReader reader(text, printing);
-  Axes axes(printing, reader);
-  GcodeLine line;
-  const ScanAxes scan(printing.profile());
-  std::vector<std::uint64_t> words;  // of T1; empty: no ink
-  std::uint32_t sweep = 0;
-  bool in_sweep = false, begun = false, ended = false;
-  while (reader.next_comment(line)) {
-    if (ended) return reader.fault("goes on behind its end");
-    if (line.command == "M117") {
-      const std::string_view want = begun ? "Done" : "Slice";
-      if (!line.rest.starts_with(fmt::format("{} {}", want, printing.layer() + 1)))
-        return reader.fault("M117 is not of this layer");
-      ended = begun;
-      begun = true;
-    } else if (line.command == "T0" || line.command == "T21") {
-      words.clear();
-      in_sweep = false;
-    } else if (line.command == "T1") {
-      if (!in_sweep) printing.reading_sweep(sweep);
-      std::uint64_t bits[3] = {reader.count(line, 'P'), reader.count(line, 'Q'), reader.count(line, 'R')};
-      words.assign((printing.nozzles() + 63) / 64, 0);
-      for (std::uint32_t nozzle = 0; nozzle < 72; ++nozzle) {
-        if ((bits[nozzle / 24] >> (nozzle % 24) & 1) == 0) continue;
-        if (nozzle >= printing.nozzles()) return reader.fault(fmt::format("nozzle {} does not exist", nozzle));
-        words[nozzle / 64] |= std::uint64_t{1} << (63 - nozzle % 64);
-      }
-    } else if (line.command == "G1" && !words.empty()) {
-      const std::int64_t from = printing.step_at(axes.at(scan.along));
-      axes.take(line, true);
-      const std::int64_t to = printing.step_at(axes.at(scan.along));
-      if (!in_sweep) {
-        printing.begin_sweep(sweep++, to < from);
-        printing.go_across(axes.at(scan.across));
-        in_sweep = true;
-      }
-      if (to == from) return reader.fault("jets without moving");
-      const std::int64_t ahead = to > from ? 1 : -1;
-      for (std::int64_t step = from + ahead;; step += ahead) {
-        printing.at_step(step);
-        printing.fire_words(words);
-        if (step == to || !printing.ok()) break;
-      }
-    } else if (!axes.take(line, false)) {
-      return reader.fault(fmt::format("'{}' is no command of the dialect brundlefab", line.command));
+constexpr double kDotMm = 25.4 / 96;
+constexpr double kPenMm = 195;                     // fab/brundle.py, X_OFFSET_PEN: where the pen is, whatever G10 says
+constexpr double kMostXMm = 650;                   // X_MM_MAX
+constexpr double kMostMmPerMinute = 2000;          // Axis::target_set: the most if a stepper is made without a limit
+constexpr std::array kTools = {0, 1, 20, 21, 22};  // BrundleFab.ino, setup()
+constexpr int kInk = 1, kRecoater = 21;
+enum Axis : std::size_t { kX, kY, kZ, kE };
+
+class Firmware {
+ public:
+  explicit Firmware(Printing& printing) : printing_(printing) {
+    const auto& powder = printing.profile().powder;
+    axis_x_ = powder.roller_mm[0];  // the layer before ends there, with the recoater
+    position_[kX] = static_cast<float>(axis_x_);
+  }
+
+  void line(std::string_view text, std::size_t number) {
+    number_ = number;
+    Block block;
+    if (const std::string wrong = brundle::read_block(text, unit_mm_, block); !wrong.empty()) return fault(wrong);
+    if (ended_) return fault("goes on behind its end");
+    switch (block.code) {
+      case 'M': return message(block);
+      case 'T': return tool(block);
+      case 'G': return motion(block);
+      default:
+        if (text.find_first_not_of(" \t\r") < text.find(';')) fault(fmt::format("'{}' is no command of the firmware", text));
     }
   }
-  if (!ended) return printing.fault("the program ends before its last line");
+  void end_of_program() {
+    if (!ended_) return printing_.fault("the program ends before its last line");
+    printing_.build_vat_goes_down(moved_mm_[kZ]);
+    for (const auto& [axis, name] : {std::pair{kZ, "part"}, {kE, "feed"}}) {
+      if (std::abs(spread_mm_[axis] - moved_mm_[axis]) < 1e-3) continue;
+      printing_.fault(fmt::format("the {} bin is at {:g} mm when powder is spread, and at {:g} when the layer ends", name,
+                                  spread_mm_[axis], moved_mm_[axis]));
+    }
+  }
+
+ private:
+  void fault(std::string_view what) { printing_.fault(fmt::format("line {}: {}", number_, what)); }
+  void unknown(const Block& block) { fault(fmt::format("'{}{}' is no command that a layer has", block.code, block.command)); }
+
+  // M117 is carried out at once (GCode::_process_block); it marks where a layer begins and ends.
+  void message(const Block& block) {
+    if (block.command != 117) return unknown(block);
+    const std::string want = fmt::format("{} {}", begun_ ? "Done" : "Slice", printing_.layer() + 1);
+    if (!block.text.starts_with(want) || (block.text.size() > want.size() && block.text[want.size()] != ' ')) {
+      return fault("M117 is not of this layer");
+    }
+    ended_ = begun_;
+    begun_ = true;
+  }
+
+  // GCode::_block_do, 'T': stop, select, parameters, start.
+  void tool(const Block& block) {
+    if (std::ranges::find(kTools, block.command) == kTools.end())
+      return fault(fmt::format("there is no tool {}", block.command));
+    const bool change = block.command != tool_;
+    if (change && tool_ == kInk) carry_out(bar_.deselect(), false);
+    tool_ = block.command;
+    parameters(block, tool_);
+    if (change && tool_ == kInk) bar_.select();
+  }
+
+  // tool_parms. InkBar::parm_set knows P and S; Q and R are stored and used by nobody.
+  void parameters(const Block& block, int tool) {
+    if (tool != kInk) return;
+    if (block.has('Q') || block.has('R')) return fault("the ink bar knows no Q and no R: it has 12 nozzles, those of P");
+    if (block.has('P')) {
+      if (!(block['P'] >= 0 && block['P'] <= InkBar::kNozzles)) return fault("P has bits of more than 12 nozzles");
+      bar_.set_pattern(block['P']);
+    }
+    if (block.has('S')) bar_.set_sprays(block['S']);
+  }
+
+  void motion(const Block& block) {
+    switch (block.command) {
+      case 0: return move(block, 0);
+      case 1:
+        if (const double feed = block['F'] * unit_mm_; block.has('F') && feed > 10) feed_mm_min_ = feed;  // converted twice
+        return move(block, feed_mm_min_);
+      case 10: return tool_table(block);
+      case 20:
+      case 21: unit_mm_ = block.command == 20 ? 25.4f : 1.0f; return;
+      case 28: return home(block);
+      case 90:
+      case 91: relative_ = block.command == 91; return;
+      default: unknown(block);
+    }
+  }
+
+  // G10 L1: at once, before up to four commands that wait; P is the tool, and its parameter too.
+  void tool_table(const Block& block) {
+    if (!block.has('L') || block['L'] != 1 || !block.has('P')) return unknown(block);
+    if (moved_) return fault("G10 behind the first move of a layer overtakes moves that wait");
+    const auto tool = static_cast<int>(block['P']);
+    const auto found = std::ranges::find(kTools, tool);
+    if (found == kTools.end()) return fault(fmt::format("there is no tool {}", tool));
+    if (block.has('Y') || block.has('Z') || block.has('E')) return fault("sets a tool's offset along another axis than X");
+    if (block.has('X')) offset_mm_[static_cast<std::size_t>(found - kTools.begin())] = block['X'];
+    parameters(block, tool);
+  }
+
+  // CNC::home. InkBar::home(float) does not override Axis::home(): the bar is not homed, but moved to Y. A layer may ask
+  // for nothing else, since homing X or a bin loses where they stand.
+  void home(const Block& block) {
+    if (!block.has('Y') || block.has('X') || block.has('Z') || block.has('E')) return unknown(block);
+    position_[kY] = block['Y'];
+    go(0);
+  }
+
+  void move(const Block& block, double mm_min) {
+    double squares = 0;
+    std::array<double, 4> way{};
+    for (std::size_t i = 0; i < 4; ++i) {
+      if ((block.words >> i & 1) == 0) continue;
+      const float before = position_[i];
+      position_[i] = relative_ ? before + block.value[i] : block.value[i];
+      way[i] = relative_ ? double{block.value[i]} : double{position_[i]} - before;
+      squares += way[i] * way[i];
+    }
+    if ((block.has('Z') || block.has('E')) && !relative_) return fault("moves a bin to a height, which nothing homes");
+    const double seconds = mm_min > 0 ? std::sqrt(squares) / mm_min * 60 : 0;
+    if (way[kE] != 0 || way[kZ] != 0) bins(way[kE], way[kZ], seconds);
+    go(seconds);
+  }
+
+  // The bins move at a time, each as fast as the common way wants, at most as their axes can.
+  void bins(double feed, double part, double seconds) {
+    moved_ = true;
+    const double longest = std::max(std::abs(feed), std::abs(part));
+    const double time = std::max(seconds, longest / kMostMmPerMinute * 60);
+    if (feed != 0) printing_.feeds(0, feed, std::abs(feed) / time);
+    if (feed == 0) printing_.takes(time);
+    moved_mm_[kE] += feed;
+    moved_mm_[kZ] += part;
+  }
+
+  // CNC::target_set: every move sets all four targets, each less the offset of the tool that is selected now.
+  void go(double seconds) {
+    const auto tool = static_cast<std::size_t>(std::ranges::find(kTools, tool_) - kTools.begin());
+    const double from = axis_x_;
+    axis_x_ = std::clamp<double>(position_[kX] - offset_mm_[tool], 0, kMostXMm);
+    const double way = axis_x_ - from;
+    carry_out(bar_.move(position_[kY]), std::abs(way) > 1e-4);
+    if (way != 0) carriage(way, std::max(seconds, std::abs(way) / kMostMmPerMinute * 60));
+    if (position_[kY] > 0 && !bar_told_) read_ahead();
+    bar_told_ = position_[kY] > 0;
+  }
+
+  void carriage(double way, double seconds) {
+    moved_ = true;
+    printing_.head_moves(std::abs(way), std::abs(way) / seconds, false);
+    if (tool_ == kRecoater) printing_.roller_stands_at(position_[kX]);
+    if (way > 0 && tool_ == kRecoater) spread_mm_ = moved_mm_;
+    if (way < 0 && moved_mm_[kZ] < spread_mm_[kZ] + 1e-3)
+      fault("the carriage goes back over powder that does not give way to it");
+  }
+
+  /// For messages: the band that is being loaded, before it is inked.
+  void read_ahead() { printing_.reading_sweep(sweep_); }
+
+  // What the bar does in one command. Both ways go over the same dots if the carriage has not moved between them.
+  void carry_out(const InkBar::Run& run, bool moving) {
+    if (!run.fault.empty()) return fault(run.fault);
+    for (int i = 0; i < run.passes && printing_.ok(); ++i) {
+      const Pass& pass = run.pass[static_cast<std::size_t>(i)];
+      printing_.head_moves(pass.dots * kDotMm, kDotMm * 1000 / bar_.sprays(), true);
+      if (moving) return fault("inks while the carriage moves along X");
+      if (bar_.sprays() < 3) return fault(fmt::format("S{} is so fast that dots are left out", bar_.sprays()));
+      if (pass.forward || std::abs(axis_x_ - inked_x_) > 1e-4) ink(pass);
+      if (pass.forward) inked_x_ = axis_x_;
+    }
+  }
+
+  void ink(const Pass& pass) {
+    const auto drops = drops_of(pass);
+    if (drops.empty()) return;
+    const bool against = printing_.position_of(1) < printing_.position_of(0);
+    printing_.begin_sweep(sweep_++, against == pass.forward);
+    printing_.go_across(axis_x_ + kPenMm);
+    std::vector<std::uint64_t> words((printing_.nozzles() + 63) / 64);
+    for (std::size_t i = 0; i < drops.size() && printing_.ok(); ++i) {
+      const std::int32_t dot = pass.forward ? drops[i] : drops[drops.size() - 1 - i];
+      printing_.at_step(printing_.step_at((dot + 0.5) * kDotMm));
+      words.assign(words.size(), 0);
+      for (std::uint32_t nozzle = 0; nozzle < 12; ++nozzle) {
+        if ((bar_.dot(dot) >> nozzle & 1) == 0) continue;
+        if (nozzle >= printing_.nozzles()) return fault(fmt::format("nozzle {} does not exist", nozzle));
+        words[0] |= std::uint64_t{1} << (63 - nozzle);
+      }
+      printing_.fire_words(words);
+    }
+  }
+  std::vector<std::int32_t> drops_of(const Pass& pass) const {
+    std::vector<std::int32_t> drops;
+    for (std::int32_t dot = pass.begin; dot < pass.end; ++dot) {
+      if (bar_.dot(dot) != 0) drops.push_back(dot);
+    }
+    return drops;
+  }
+
+  Printing& printing_;
+  InkBar bar_;
+  std::size_t number_ = 0;
+  float unit_mm_ = 1;
+  bool relative_ = false;
+  double feed_mm_min_ = 3000;        // GCode::begin
+  std::array<float, 4> position_{};  // CNC::_pos: X of the tool
+  std::array<double, kTools.size()> offset_mm_{};
+  int tool_ = kRecoater;               // the layer before ends with it
+  double axis_x_ = 0, inked_x_ = -1;   // of the carriage
+  std::array<double, 4> moved_mm_{};   // of the bins since the layer began
+  std::array<double, 4> spread_mm_{};  // the same when powder was spread
+  std::uint32_t sweep_ = 0;
+  bool begun_ = false, ended_ = false, moved_ = false, bar_told_ = false;
+};
+
+}  // namespace
+}  // namespace brundle
+
+void read_brundlefab(std::string_view text, Printing& printing) {
+  brundle::Firmware firmware(printing);
+  std::size_t number = 0;
+  while (!text.empty() && printing.ok()) {
+    const std::size_t end = text.find('\n');
+    ++number;
+    if (end == std::string_view::npos) return printing.fault(fmt::format("line {}: the program ends within a line", number));
+    firmware.line(text.substr(0, end), number);
+    text.remove_prefix(end + 1);
+  }
+  if (printing.ok()) firmware.end_of_program();
 }
 
 }  // namespace lamina::replay

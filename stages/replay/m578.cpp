@@ -1,10 +1,49 @@
-// stages/write/program/m578/README.md tells the format.
+// A layer's program as RepRapFirmware carries it out (github.com/Duet3D/RepRapFirmware, tags 1.09r to 3.4.6; taken out in
+// c781c362). stages/write/program/m578/README.md tells the format.
 #include <fmt/format.h>
+
+#include <bit>
+#include <charconv>
 
 #include "stages/replay/dialects.h"
 #include "stages/replay/gcode.h"
 
 namespace lamina::replay {
+namespace {
+
+constexpr std::uint32_t kInkjetBits = 12;    // INKJET_BITS of Platform.h, a constant in all versions
+constexpr double kSecondsOfNozzle = 805e-6;  // INKJET_FIRE_MICROSECONDS + INKJET_DELAY_MICROSECONDS, one after the other
+
+/// Whether a version has the case 578 of GCodes::HandleMcode.
+bool has_m578(std::string_view version) {
+  const auto number = [](std::string_view digits) {
+    int value = 0;
+    std::from_chars(digits.data(), digits.data() + digits.size(), value);
+    return value;
+  };
+  const std::size_t dot = version.find('.');
+  const int major = number(version), minor = dot == std::string_view::npos ? 0 : number(version.substr(dot + 1));
+  return major < 3 || (major == 3 && minor < 5);
+}
+
+/// Waits for standstill, reads S and no P (GCodes::HandleMcode), and fires the nozzles of its lowest bits one after the
+/// other (Platform::Inkjet).
+void fire_inkjet(const GcodeLine& line, GcodeReader& reader, Printing& printing) {
+  if (!has_m578(printing.profile().firmware)) {
+    return reader.fault(fmt::format("RepRapFirmware {} has no M578", printing.profile().firmware));
+  }
+  if (line.has('P')) return reader.fault("M578 reads no P: whatever head is meant, the first one fires");
+  const std::uint32_t bits = reader.count(line, 'S');
+  if (bits >> kInkjetBits != 0) {
+    return reader.fault(fmt::format("M578 S{} fires nozzles 0 to {} alone", bits, kInkjetBits - 1));
+  }
+  for (std::uint32_t bit = 0; bit < kInkjetBits; ++bit) {
+    if ((bits >> bit & 1) != 0) printing.fire(bit);
+  }
+  printing.takes(std::popcount(bits) * kSecondsOfNozzle);
+}
+
+}  // namespace
 
 void read_m578(std::string_view text, Printing& printing) {
   GcodeReader reader(text, printing);
@@ -30,10 +69,7 @@ void read_m578(std::string_view text, Printing& printing) {
       }
       if (now != step) printing.at_step(now);
       step = now;
-      const std::uint32_t head = reader.count(line, 'P'), bits = reader.count(line, 'S');
-      for (std::uint32_t bit = 0; bit < 32; ++bit) {
-        if ((bits >> bit & 1) != 0) printing.fire(head * 32 + bit);
-      }
+      fire_inkjet(line, reader, printing);
     } else if (line.command == "M400") {
       ended = true;
     } else {

@@ -175,6 +175,11 @@ void Printing::build_vat_stands_at(double mm) {
   count.build_mm = mm * profile().powder.build_sign;
 }
 
+void Printing::build_vat_goes_down(double mm) {
+  count.moves = tells_powder_ = true;
+  lowered_mm_ = mm;
+}
+
 void Printing::roller_stands_at(double mm) {
   tells_powder_ = true;
   rolled_ = rolled_ || std::abs(mm - profile().powder.roller_mm[1]) < 1e-3;
@@ -190,6 +195,7 @@ void Printing::check_cycle() {
     wrong(fmt::format("the head stays at {:g}, {:g} mm, and the next layer finds it at {:g}, {:g}", (*head_mm_)[0],
                       (*head_mm_)[1], next.x_mm, next.y_mm));
   }
+  if (lowered_mm_) count.build_mm = mm(layer.bottom) + *lowered_mm_;
   if (!count.moves) return;
   // Numbers are written to a tenth of a micrometre.
   if (const double top = mm(std::int64_t{layer.bottom} + layer.thickness); std::abs(count.build_mm - top) > 1e-3) {

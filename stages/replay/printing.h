@@ -68,6 +68,8 @@ class Printing {
   void head_stands_at(double x_mm, double y_mm);
   void feeds(std::uint32_t vat, double mm, double mm_s);
   void build_vat_stands_at(double mm);
+  /// The same, where a program tells but how far from where the layer before left it.
+  void build_vat_goes_down(double mm);
   void roller_stands_at(double mm);
   void takes(double seconds) { seconds_ += seconds; }
 
@@ -100,6 +102,7 @@ class Printing {
   std::int64_t first_line_ = 0, step_ = 0, previous_step_ = 0;
   std::int64_t reading_ = INT64_MIN, reading_sweep_ = INT64_MIN;
   bool rolled_ = false;  // to the far end
+  std::optional<double> lowered_mm_;
   double roller_mm_ = 0;
   std::optional<std::array<double, 2>> head_mm_;  // if the program says where
   bool tells_powder_ = false;                     // moves a vat or the roller

@@ -55,6 +55,18 @@ inline Machine small_machine(std::uint32_t nozzles, double tilt_deg, double colu
   return machine;
 }
 
+/// Gives a machine what the firmware of its dialect can do, beside nozzles: the dots, axes and place of its head.
+inline void fit_firmware(Machine& machine) {
+  if (machine.dialect != "brundlefab") return;
+  const bool x = machine.mounting.scan_axis == ScanAxis::kX;
+  machine.mounting.along_dpi = 96;
+  machine.mounting.offset_mm = {x ? 20 * 25.4 / 96 : 300, x ? 300 : 20 * 25.4 / 96};
+  machine.motion.x_axis = x ? "Y" : "X";
+  machine.motion.y_axis = x ? "X" : "Y";
+  machine.powder.feed_axes = {"E", "A"};
+  machine.powder.roller_axis = "X";
+}
+
 /// Kinds: sparse dots, solid blocks, half of all pixels, empty, full.
 inline Image random_image(Random& random, std::uint32_t columns, std::uint32_t rows) {
   Image image(rows, std::vector<int>(columns, 0));

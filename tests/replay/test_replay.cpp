@@ -198,6 +198,7 @@ TEST(Replay, EveryDialectSpeaksForAnyMountingDirectionAndBlockedNozzle) {
     machine.motion.both_directions = random() % 2;
     machine.head.blocked = {random() % machine.head.nozzles};
     machine.head.blocked_rule = static_cast<BlockedRule>(random() % 3);
+    program::testing::fit_firmware(machine);
     const ResolvedMachine resolved = shrunk(machine, 60 + random() % 100, 60 + random() % 100);
     const Image image = random_image(random, resolved.grid.image.columns(), resolved.grid.image.rows());
     const Runs runs = runs_of(image);
@@ -221,6 +222,7 @@ TEST(Replay, ATruncatedOrEditedProgramFailsWithTheLayerTheSwathAndTheStep) {
   for (const write::Dialect& dialect : write::dialects()) {
     Machine machine = program::testing::small_machine(12, 90, 100, 100);
     machine.dialect = dialect.id;
+    program::testing::fit_firmware(machine);
     machines.push_back(shrunk(machine, 80, 30));
   }
   for (const ShippedProfile& shipped : shipped_machines()) {

@@ -85,6 +85,7 @@ constexpr Key<Machine> kKeys[] = {
     custom<Machine, read_name, same_text, &Machine::name>({"machine", "name"}, Form::kString),
     custom<Machine, read_line, same_text, &Machine::description>({"machine", "description"}, Form::kString),
     text<check_nothing, &Machine::dialect>({"machine", "dialect"}),
+    text<check_nothing, &Machine::firmware>({"machine", "firmware"}),
 
     word<kShapes, kBed, &Bed::shape>({"bed", "shape"}),
     field<kBed, &Bed::size_mm>({"bed", "size_mm"}, kLength),

@@ -27,8 +27,10 @@ constexpr std::array<Dialect, 7> kDialects = {{
      true, hp45::make_writer, hp45::check},
     {"oasis", ".oasis", "Oasis: an HP45 controller V4 and GRBL, with the new layer of the Oasis controller", 300, 0, true,
      oasis::make_writer, hp45::check},
-    {"brundlefab", ".gcode", "BrundleFab's T1 P Q R S with up to 72 nozzles", 72, 0, true, brundlefab::make_writer},
-    {"m578", ".gcode", "RepRapFirmware's M578, 32 nozzles a head number", 1024, 0, true, m578::make_writer},
+    {"brundlefab", ".gcode", "G-code of the BrundleFab, whose Y loads an ink bar of 840 dots: T1 P, 12 nozzles", 12, 0, true,
+     brundlefab::make_writer, brundlefab::check},
+    {"m578", ".gcode", "M578 S of RepRapFirmware 1.09r to 3.4 built with inkjet support: one head, 12 nozzles, a stop a pixel",
+     12, 0, true, m578::make_writer, m578::check},
 }};
 
 }  // namespace

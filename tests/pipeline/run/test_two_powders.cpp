@@ -180,7 +180,7 @@ TEST_F(TwoPowders, TheVatsThatFeedALayerFollowTheRuleOfTheProfileAndAreChecked) 
 
 TEST_F(TwoPowders, EveryDialectSaysWhichVatFeeds) {
   for (const std::string machine : {"nuferbj", "nuferbj-31", "nuferbj-360dpi", "xaar128-raw", "production-1200", "jet1000",
-                                    "brundlefab", "reprap-inkjet"}) {
+                                    "reprap-inkjet", "brundlefab"}) {
     std::vector<PartRequest> parts = {part("parameter_quality_nut.stl", 0.5, "steel"), part("dental_crown.stl", 2, "bronze")};
     Job made = job(parts, machine);
     // Shipped machines of one vat, with a second one.
@@ -194,6 +194,11 @@ TEST_F(TwoPowders, EveryDialectSaysWhichVatFeeds) {
     std::ofstream(made.machine.profile) << profile;
     made.layer_mm = 4;
     const auto summary = run(made);
+    if (machine == "brundlefab") {  // its firmware has an axis for one feed bin
+      ASSERT_FALSE(summary.ok());
+      EXPECT_EQ(summary.error().message, "brundlefab: powder.vats: a BrundleFab has one feed bin");
+      continue;
+    }
     ASSERT_TRUE(summary.ok()) << machine << ": " << summary.error().message;
     expect_good(made);
   }

@@ -1,75 +1,178 @@
 #include "stages/write/program/brundlefab/brundlefab.h"
 
 #include <algorithm>
+#include <array>
+#include <cmath>
 
 #include "stages/write/program/program_text.h"
 
 namespace lamina::write::brundlefab {
 namespace {
 
+// fab/brundle.py: where the tools stand on the carriage, and how far the bins give way to it.
+constexpr double kPenMm = 195, kBladeMm = 0, kFuserMm = 45, kThermometerMm = 95, kGiveWayMm = 2;
+constexpr double kPartBinMm = 198, kWasteBinMm = 385;
+// BrundleInk.ino: SCAN_WIDTH_DOT; Axis_DCEncoder.h: ink stops 9 ticks before a target, 1.44 dots.
+constexpr std::int64_t kBarDots = 840, kBrakeDots = 2, kLastDot = kBarDots - 2 * kBrakeDots - 1;
+constexpr double kDotMm = 25.4 / 96, kLongestXMm = 650, kLongestNumber = 32'767;
+// Dots that are sooner passed over, there and back, than the bar is wiped.
+constexpr std::int64_t kWorthWiping = 24;
+
+// BrundleInk.ino sprays in every second millisecond (time_after is strict); three a dot leave no dot out.
+constexpr std::int64_t kFewestSprays = 3;
+
+/// The S of T1: the firmware has no speed of the bar, but spends so many milliseconds on a dot.
+std::int64_t sprays(const Machine& machine) {
+  return std::max<std::int64_t>(1, std::llround(kDotMm * 1000 / machine.motion.scan_speed_mm_s));
+}
+
 class Writer final : public ProgramWriter {
  public:
   Writer(const Machine& machine, const HeadGrid& grid) : machine_(machine), carriage_(machine, grid) {}
 
-  void start(std::uint32_t, ProgramBytes& out) override { put(out, "G21\nG90\nT0\nG28 X0 Y0\n"); }
-
-  void begin_layer(const LayerCycle& cycle, ProgramBytes& out) override {
-    put(out, "M117 Slice {} of {}\nT21\n", cycle.layer + 1, cycle.layers);
-    put_powder_cycle(machine_, cycle, out);
+  void start(std::uint32_t layers, ProgramBytes& out) override {
+    const std::string speed = feed_text(machine_.powder.roller_speed_mm_s);
+    put(out, "M117 {} layers\n", layers);
+    state(out);
+    put(out, "G10 L1 P20 X{}\nG10 L1 P22 X{}\nM117 Ready to home\nM0\nG28 X0 Y0 E0\n", mm_text(kFuserMm),
+        mm_text(kThermometerMm));
+    put(out, "M117 Prep part\nT21\nM0\nG0 X{}\nM117 Levelling\nG1 X{} F{}\nM117 Fill feed bin\nM0\nM117\nT21\nG1 X{}\n",
+        mm_text(kWasteBinMm), mm_text(kPartBinMm), speed, mm_text(machine_.powder.roller_mm[0]));
   }
 
-  // A move with T1 jets its dots at every step that it ends on or passes, not at the one where it begins.
+  void begin_layer(const LayerCycle& cycle, ProgramBytes& out) override {
+    put(out, "M117 Slice {} of {}\n", cycle.layer + 1, cycle.layers);
+    state(out);
+    put(out, "T21\n");
+    wipe(out);
+    put_powder(cycle, out);
+  }
+
   void sweep(const Sweep& sweep, const SweepVectors& vectors, ProgramBytes& out) override {
-    const std::string& along = carriage_.scan_axis();
-    const int ahead = sweep.backward ? -1 : 1;
-    put(out, "T0\nG0 {}{} {}{} F{}\n", along, mm_text(carriage_.begin(sweep, vectors)), carriage_.line_axis(),
-        mm_text(carriage_.across(sweep.first_line)), feed_text(machine_.motion.travel_speed_mm_s));
-    std::int64_t at = INT64_MIN / 2;         // the step where the head is; far from all at first
-    const std::uint64_t* pending = nullptr;  // jetted by the move to `at`, which is not written yet
-    std::uint64_t now[2] = {0, 0};
-    const auto flush = [&] {
-      if (pending != nullptr) put(out, "G1 {}{} F{}\n", along, mm_text(carriage_.along(static_cast<double>(at))), speed());
-      pending = nullptr;
-    };
+    dots_.fill(0);
+    std::int64_t last = 0;
     for_each_vector(sweep, vectors, [&](std::uint32_t step, const std::uint64_t* words) {
-      const std::int64_t next = step;
-      const std::uint64_t two[2] = {words[0], vectors.words > 1 ? words[1] : 0};
-      if (pending != nullptr && next == at + ahead && two[0] == now[0] && two[1] == now[1]) {
-        at = next;
-        return;
-      }
-      flush();
-      if (next != at + ahead) {
-        put(out, "G0 {}{}\n", along, mm_text(carriage_.along(static_cast<double>(next - ahead))));
-      }
-      now[0] = two[0];
-      now[1] = two[1];
-      const std::uint64_t mask = (1u << 24) - 1;
-      put(out, "T1 P{} Q{} R{} S1\n", now[0] & mask, now[0] >> 24 & mask, (now[0] >> 48 | now[1] << 16) & mask);
-      pending = words;
-      at = next;
+      const auto dot = std::llround(carriage_.along(step) / kDotMm - 0.5);
+      if (dot < 0 || dot >= kBarDots) return;  // check() holds dots on the bar
+      dots_[static_cast<std::size_t>(dot)] = static_cast<std::uint16_t>(words[0] & 0xFFF);
+      last = std::max<std::int64_t>(last, dot);
     });
-    flush();
-    put(out, "T0\nG0 {}{}\n", along, mm_text(carriage_.end(sweep, vectors)));
+    put(out, "T0\n");
+    std::int64_t end = last + 1 + kBrakeDots;
+    if (longest_ - end > kWorthWiping) wipe(out);
+    end = std::max(end, longest_);
+    longest_ = end;
+    put(out, "T1 P0\nG1 X{} F{}\n", mm_text(carriage_.across(sweep.first_line)), feed_text(machine_.motion.travel_speed_mm_s));
+    load(end, out);
+    put(out, "T0\nT1 P0\nG0 Y0\n");
   }
 
   void end_layer(const LayerCycle& cycle, ProgramBytes& out) override {
-    put(out, "T0\nG0 {}{} {}{} F{}\nM117 Done {}\n", machine_.motion.x_axis, mm_text(machine_.motion.safe_mm[0]),
-        machine_.motion.y_axis, mm_text(machine_.motion.safe_mm[1]), feed_text(machine_.motion.travel_speed_mm_s),
-        cycle.layer + 1);
+    put(out, "T21\nG0 X{}\nG91\nG1 E{} Z{} F{}\nG90\nM117 Done {}\n", mm_text(machine_.powder.roller_mm[0]),
+        mm_text(kGiveWayMm), mm_text(-kGiveWayMm), vat_speed(), cycle.layer + 1);
   }
   void end(ProgramBytes& out) override { put(out, "T0\nM117 Done\n"); }
 
  private:
-  std::string speed() const { return feed_text(machine_.motion.scan_speed_mm_s); }
+  /// What a layer needs to know of the machine, whoever used it before. G10 L1 P1 sets tool 1 and, P being its pattern too,
+  /// the pattern 1: T1 P0 follows.
+  void state(ProgramBytes& out) const {
+    put(out, "G21\nG90\nG10 L1 P0 X{}\nG10 L1 P1 X{}\nG10 L1 P21 X{}\nT1 P0 S{}\nG28 Y0\n", mm_text(kPenMm), mm_text(kPenMm),
+        mm_text(kBladeMm), sprays(machine_));
+  }
+
+  // The bins give way by whole millimetres: the firmware reads -1.5 as -0.5 (GCode::_line_parse).
+  void put_powder(const LayerCycle& cycle, ProgramBytes& out) const {
+    const double thickness = static_cast<double>(cycle.thickness_nm) / kNmPerMm;
+    put(out, "G91\nG1 E{} Z{} F{}\nG90\n", mm_text(machine_.powder.dose * thickness), mm_text(thickness), vat_speed());
+    put(out, "G1 X{} F{}\n", mm_text(machine_.powder.roller_mm[1]), feed_text(machine_.powder.roller_speed_mm_s));
+    put(out, "G91\nG1 E{} Z{} F{}\nG90\n", mm_text(-kGiveWayMm), mm_text(kGiveWayMm), vat_speed());
+  }
+
+  // Overwrites what earlier bands left in the printhead's buffer, which 'k' does not clear: with no ink tool selected the
+  // bar is loaded and discarded without moving.
+  void wipe(ProgramBytes& out) {
+    put(out, "G1 Y{}\nG0 Y0\n", y_text(kBarDots));
+    longest_ = 0;
+  }
+
+  // Dots that fire are loaded one by one, and never two blank ones at a time: dotline_set_range of the printhead packs what
+  // it repeats wrongly, and repeats nothing at an even dot.
+  void load(std::int64_t end, ProgramBytes& out) const {
+    std::uint16_t pattern = 0;
+    for (std::int64_t dot = 0; dot < end;) {
+      const std::uint16_t next = at(dot);
+      std::int64_t behind = dot + 1;
+      while (next == 0 && behind < end && at(behind) == 0) ++behind;
+      if (next != pattern) put(out, "T1 P{}\n", next);
+      pattern = next;
+      if (behind - dot == 2) put(out, "G1 Y{}\n", y_text(dot + 1));
+      put(out, "G1 Y{}\n", y_text(behind));
+      dot = behind;
+    }
+  }
+  std::uint16_t at(std::int64_t dot) const { return dots_[static_cast<std::size_t>(dot)]; }
+
+  // The middle of a dot, since InkBar::target_set cuts off what is behind the point.
+  static std::string y_text(std::int64_t dot) { return fmt::format("{:.2f}", (static_cast<double>(dot) + 0.5) * kDotMm); }
+  std::string vat_speed() const { return feed_text(machine_.powder.vat_speed_mm_s); }
+
   const Machine& machine_;
   Carriage carriage_;
+  std::array<std::uint16_t, kBarDots + kBrakeDots + 1> dots_{};
+  std::int64_t longest_ = 0;  // the dots loaded since the bar was wiped
 };
 
 }  // namespace
 
 std::unique_ptr<ProgramWriter> make_writer(const Machine& machine, const HeadGrid& grid) {
   return std::make_unique<Writer>(machine, grid);
+}
+
+Status check(const Machine& machine, const HeadGrid& grid) {
+  const auto wrong = [&](std::string_view key, const std::string& what) -> Status {
+    return Error{Fault::kUsage, fmt::format("{}: {}: {}", machine.name, key, what)};
+  };
+  const Carriage carriage(machine, grid);
+  const auto& powder = machine.powder;
+  if (carriage.scan_axis() != "Y" || carriage.line_axis() != "X" || powder.build_axis != "Z" || powder.feed_axes[0] != "E" ||
+      powder.roller_axis != "X" || powder.build_sign != 1 || powder.feed_sign != 1) {
+    return wrong("motion, powder",
+                 "a BrundleFab has the axes X (bands, recoater), Y (ink bar), +Z (part bin) and +E (feed bin)");
+  }
+  if (const double most = std::max({machine.motion.travel_speed_mm_s, powder.roller_speed_mm_s, powder.vat_speed_mm_s});
+      most * 60 > kLongestNumber) {
+    return wrong("motion.travel_speed_mm_s",
+                 fmt::format("F{:.0f} is more than the 16 bits of the firmware's numbers", most * 60));
+  }
+  if (powder.vats != 1) return wrong("powder.vats", "a BrundleFab has one feed bin");
+  if (std::abs(grid.step_nm() / kNmPerMm / kDotMm - 1) > 1e-4) {
+    return wrong("mounting.along_dpi",
+                 fmt::format("the ink bar has 96 dots an inch, the profile {:g} steps", 25.4 * kNmPerMm / grid.step_nm()));
+  }
+  const double first = carriage.along(0) / kDotMm - 0.5,
+               last = carriage.along(static_cast<double>(grid.steps()) - 1) / kDotMm - 0.5;
+  if (std::abs(first - std::round(first)) > 0.02) {
+    return wrong("mounting.offset_mm", fmt::format("the ink bar's dots begin at its home, {:.2f} of one beside the image's",
+                                                   first - std::round(first)));
+  }
+  if (std::llround(std::min(first, last)) < kBrakeDots || std::llround(std::max(first, last)) > kLastDot) {
+    return wrong("bed.size_mm", fmt::format("dots {:.0f} to {:.0f} of the ink bar are needed, {} to {} can be inked: it has "
+                                            "{}, and needs some to brake and turn over",
+                                            std::min(first, last), std::max(first, last), kBrakeDots, kLastDot, kBarDots));
+  }
+  const double ends[] = {carriage.across(-std::int64_t{grid.swath_lines()}),
+                         carriage.across(std::int64_t{grid.lines} + grid.swath_lines())};
+  if (std::min(ends[0], ends[1]) < kPenMm || std::max(ends[0], ends[1]) >= kPenMm + kLongestXMm) {
+    return wrong("mounting.offset_mm",
+                 fmt::format("the pen reaches x {:g} to {:g} mm, the bands want {:.1f} to {:.1f}", kPenMm, kPenMm + kLongestXMm,
+                             std::min(ends[0], ends[1]), std::max(ends[0], ends[1])));
+  }
+  if (sprays(machine) < kFewestSprays) {
+    return wrong("motion.scan_speed_mm_s", fmt::format("the head sprays every 2 ms, and meets each dot at {:.1f} mm/s or less",
+                                                       kDotMm * 1000 / kFewestSprays));
+  }
+  return {};
 }
 
 }  // namespace lamina::write::brundlefab

@@ -1,5 +1,7 @@
 #include "stages/write/program/m578/m578.h"
 
+#include <charconv>
+
 #include "stages/write/program/program_text.h"
 
 namespace lamina::write::m578 {
@@ -7,10 +9,11 @@ namespace {
 
 class Writer final : public ProgramWriter {
  public:
-  Writer(const Machine& machine, const HeadGrid& grid) : machine_(machine), grid_(grid), carriage_(machine, grid) {}
+  Writer(const Machine& machine, const HeadGrid& grid) : machine_(machine), carriage_(machine, grid) {}
 
   void start(std::uint32_t layers, ProgramBytes& out) override {
-    put(out, "; print program of {}, {} layers\nG21\nG90\n", machine_.name, layers);
+    put(out, "; print program of {}, {} layers, for RepRapFirmware 1.09r to 3.4 built with SUPPORT_INKJET\nG21\nG90\n",
+        machine_.name, layers);
   }
   void begin_layer(const LayerCycle& cycle, ProgramBytes& out) override {
     put(out, "; layer {} of {}\n", cycle.layer, cycle.layers);
@@ -24,10 +27,7 @@ class Writer final : public ProgramWriter {
     const std::string speed = feed_text(machine_.motion.scan_speed_mm_s);
     for_each_vector(sweep, vectors, [&](std::uint32_t step, const std::uint64_t* words) {
       put(out, "G1 {}{} F{}\n", carriage_.scan_axis(), mm_text(carriage_.along(step)), speed);
-      for (std::uint32_t head = 0; head * 32 < grid_.nozzles; ++head) {
-        const auto bits = static_cast<std::uint32_t>(words[head / 2] >> (head % 2 * 32));
-        if (bits != 0) put(out, "M578 P{} S{}\n", head, bits);
-      }
+      put(out, "M578 S{}\n", words[0] & 0xFFF);  // 12 nozzles: INKJET_BITS
     });
     put(out, "G1 {}{} F{}\n", carriage_.scan_axis(), mm_text(carriage_.end(sweep, vectors)), speed);
   }
@@ -40,7 +40,6 @@ class Writer final : public ProgramWriter {
 
  private:
   const Machine& machine_;
-  const HeadGrid& grid_;
   Carriage carriage_;
 };
 
@@ -48,6 +47,16 @@ class Writer final : public ProgramWriter {
 
 std::unique_ptr<ProgramWriter> make_writer(const Machine& machine, const HeadGrid& grid) {
   return std::make_unique<Writer>(machine, grid);
+}
+
+Status check(const Machine& machine, const HeadGrid&) {
+  int major = 0, minor = 0;
+  const char* const end = machine.firmware.data() + machine.firmware.size();
+  const auto dot = std::from_chars(machine.firmware.data(), end, major).ptr;
+  if (dot != end && *dot == '.') std::from_chars(dot + 1, end, minor);
+  if (major < 3 || (major == 3 && minor < 5)) return {};
+  return Error{Fault::kUsage, fmt::format("{}: machine.firmware: RepRapFirmware {} has no M578; it was removed for 3.5",
+                                          machine.name, machine.firmware)};
 }
 
 }  // namespace lamina::write::m578

@@ -7,4 +7,7 @@ namespace lamina::write::m578 {
 
 std::unique_ptr<ProgramWriter> make_writer(const Machine& machine, const HeadGrid& grid);
 
+/// errors  kUsage: a version of the firmware that has no M578
+Status check(const Machine& machine, const HeadGrid& grid);
+
 }  // namespace lamina::write::m578
