@@ -23,9 +23,10 @@ endif()
 
 # What is linked into a module must be able to lie anywhere; hidden symbols keep calls within it direct.
 set_target_properties(lamina_stages lamina_once_a_job lamina_pipeline PROPERTIES POSITION_INDEPENDENT_CODE ON CXX_VISIBILITY_PRESET hidden)
-pybind11_add_module(lamina_python MODULE NO_EXTRAS python/module.cpp python/arrays.cpp)
+pybind11_add_module(lamina_python MODULE NO_EXTRAS python/module.cpp python/arrays.cpp python/words.cpp)
 if(LAMINA_UNITE STREQUAL "all")
-  lamina_unite(lamina_python ${PROJECT_SOURCE_DIR}/python/module.cpp ${PROJECT_SOURCE_DIR}/python/arrays.cpp)
+  lamina_unite(lamina_python ${PROJECT_SOURCE_DIR}/python/module.cpp ${PROJECT_SOURCE_DIR}/python/arrays.cpp
+               ${PROJECT_SOURCE_DIR}/python/words.cpp)
 endif()
 set_target_properties(lamina_python PROPERTIES OUTPUT_NAME lamina LIBRARY_OUTPUT_DIRECTORY ${PROJECT_BINARY_DIR}/python)
 target_link_libraries(lamina_python PRIVATE lamina::pipeline)

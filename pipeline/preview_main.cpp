@@ -7,6 +7,7 @@
 #include "pipeline/cli/console.h"
 #include "pipeline/show/sheet.h"
 #include "stages/data/input/file_reader.h"
+#include "stages/data/text/number_text.h"
 #include "stages/write/file.h"
 #include "stages/write/picture/plot.h"
 #include "stages/write/plot.h"
@@ -41,6 +42,13 @@ Status read_whole(const Arguments& arguments, std::string_view flag, std::uint32
   return {};
 }
 
+/// Sets `value` to the length after a flag, if present; mm.
+Status read_length(const Arguments& arguments, std::string_view flag, double least, double most, double& value) {
+  if (!arguments.has(flag)) return {};
+  const std::string fault = read_number(arguments.text(flag), least, most, " mm", value);
+  return fault.empty() ? Status() : Error{Fault::kUsage, fmt::format("{} {}: {}", flag, arguments.text(flag), fault)};
+}
+
 Result<PreviewRequest> read_request(const Arguments& arguments) {
   if (arguments.operands.size() != 1) {
     return Error{Fault::kUsage, "name one directory that lamina jet or lamina slice wrote, or one G-code file"};
@@ -57,6 +65,8 @@ Result<PreviewRequest> read_request(const Arguments& arguments) {
         read_whole(arguments, "--every", 1, UINT32_MAX, request.layers.every),
         read_whole(arguments, "--count", 1, view::kMostCells, request.layers.count),
         read_whole(arguments, "--step", 0, UINT32_MAX, request.step),
+        read_length(arguments, "--filament", 0.5, 10, request.gcode.filament_mm),
+        read_length(arguments, "--layer-height", 0.01, 100, request.gcode.layer_height_mm),
         arguments.text("--swath") == "middle" ? Status()
                                               : read_whole(arguments, "--swath", 0, UINT32_MAX, request.swath_number)}) {
     if (!status) return status.error();

@@ -8,6 +8,8 @@
 #include <filesystem>
 #include <memory>
 
+#include "words.h"
+
 namespace lamina::python {
 namespace {
 
@@ -85,7 +87,7 @@ void raise(const Error& error) {
   for (std::size_t i = 0; i < std::size(kKinds); ++i) {
     if (kKinds[i].fault == error.fault) type = errors[i];
   }
-  py::object exception = py::handle(type)(error.message);
+  py::object exception = py::handle(type)(in_python(error.message));
   exception.attr("code") = static_cast<int>(error.fault);
   PyErr_SetObject(type, exception.ptr());
   throw py::error_already_set();

@@ -117,11 +117,33 @@ class Plan {
   pipeline::LayerSource source_;
 };
 
+/// Some layers of a plan in an order, as plan[2:9:3] and its reverse: each is planned when it is asked for, and none is kept.
+struct PlanSlice {
+  std::shared_ptr<Plan> plan;
+  std::int64_t first = 0, step = 1, count = 0;
+
+  std::uint32_t layer(std::int64_t place) const { return static_cast<std::uint32_t>(first + place * step); }
+  PlannedLayer at(std::int64_t asked) const {
+    const std::int64_t place = asked < 0 ? asked + count : asked;
+    if (place < 0 || place >= count) throw py::index_error(fmt::format("layer {} of a slice: it has {}", asked, count));
+    return plan->layer(layer(place));
+  }
+  PlanSlice part(const py::slice& asked) const {
+    py::ssize_t start = 0, stop = 0, stride = 0, length = 0;
+    if (!asked.compute(static_cast<py::ssize_t>(count), &start, &stop, &stride, &length)) throw py::error_already_set();
+    return {plan, first + start * step, step * stride, length};
+  }
+};
+
 /// Plans a layer when it is asked for the next one, and keeps none.
 struct LayerIterator {
-  std::shared_ptr<Plan> plan;
-  std::uint32_t next, end;
+  PlanSlice of;
+  std::int64_t next = 0;
 };
+
+LayerIterator iterate(const std::shared_ptr<Plan>& plan, std::int64_t first, std::int64_t end) {
+  return {{plan, first, 1, std::max<std::int64_t>(end - first, 0)}};
+}
 
 /// Runs on a thread of its own, so that Ctrl-C stops it: finished layers are kept then. returns  the summary of --json
 py::object run_job(const Job& job, Product product) {
@@ -216,11 +238,33 @@ void define_layer(py::module_& module) {
       .def_property_readonly("area_mm2", [](const Contours& c) { return square_mm(doubled_area(c)); });
   py::class_<LayerIterator>(module, "LayerIterator")
       .def("__iter__", [](LayerIterator& self) -> LayerIterator& { return self; })
-      .def("__length_hint__", [](const LayerIterator& self) { return self.end - self.next; })
+      .def("__length_hint__", [](const LayerIterator& self) { return self.of.count - self.next; })
       .def("__next__", [](LayerIterator& self) {
-        if (self.next >= self.end) throw py::stop_iteration();
-        return self.plan->layer(self.next++);
+        if (self.next >= self.of.count) throw py::stop_iteration();
+        return self.of.at(self.next++);
       });
+  py::class_<PlanSlice>(module, "PlanSlice",
+                        "Some layers of a plan, as plan[10:20]: a sequence whose layers are planned when they are asked for.")
+      .def("__len__", [](const PlanSlice& self) { return self.count; })
+      .def("__getitem__", &PlanSlice::at)
+      .def("__getitem__", &PlanSlice::part)
+      .def("__iter__", [](const PlanSlice& self) { return LayerIterator{self}; })
+      .def("__repr__", [](const PlanSlice& self) {
+        return self.count == 0 ? std::string("<lamina.PlanSlice: no layers>")
+                               : fmt::format("<lamina.PlanSlice: {} layers, {} to {}>", self.count, self.layer(0),
+                                             self.layer(self.count - 1));
+      });
+}
+
+/// What repr(plan) says.
+std::string described(const Plan& plan) {
+  const std::uint32_t count = plan.of().layer_count();
+  const Layer top = count == 0 ? Layer() : plan.of().layer(count - 1);
+  std::string parts;
+  for (const auto& part : plan.of().parts()) parts += (parts.empty() ? "" : ", ") + part.path;
+  return fmt::format("<lamina.Plan of {}: {} layers, {:g} mm high, {} x {} pixels at {:g} x {:g} dpi>", parts, count,
+                     mm(std::int64_t{top.bottom} + top.thickness), plan.grid().columns(), plan.grid().rows(),
+                     plan.grid().x.dpi(), plan.grid().y.dpi());
 }
 
 void define_plan(py::module_& module) {
@@ -230,15 +274,19 @@ void define_plan(py::module_& module) {
       "for. Threads may ask at the same time; the interpreter's lock is free meanwhile.")
       .def("__len__", [](const Plan& plan) { return plan.of().layer_count(); })
       .def("__getitem__", [](const Plan& plan, std::int64_t asked) { return plan.layer(plan.index(asked)); })
-      .def("__iter__",
-           [](const std::shared_ptr<Plan>& plan) {
-             return LayerIterator{plan, 0, plan->of().layer_count()};
-           })
+      .def(
+          "__getitem__",
+          [](const std::shared_ptr<Plan>& plan, const py::slice& asked) {
+            return PlanSlice{plan, 0, 1, plan->of().layer_count()}.part(asked);
+          },
+          "A layer, or with plan[10:20] a sequence of layers, each planned when it is asked for.")
+      .def("__repr__", &described)
+      .def("__iter__", [](const std::shared_ptr<Plan>& plan) { return iterate(plan, 0, plan->of().layer_count()); })
       .def(
           "layers",
           [](const std::shared_ptr<Plan>& plan, std::uint32_t first, std::optional<std::uint32_t> end) {
             const std::uint32_t count = plan->of().layer_count();
-            return LayerIterator{plan, first, std::min(end.value_or(count), count)};
+            return iterate(plan, first, std::min(end.value_or(count), count));
           },
           "first"_a = 0, "end"_a = py::none(),
           "Layers first to end, each planned when it is asked for and kept by nobody else.")

@@ -8,7 +8,6 @@
 #include "pipeline/job/file.h"
 #include "pipeline/plan/plan.h"
 #include "stages/geometry/clipping.h"
-#include "stages/read/gcode.h"
 #include "stages/view/bead_shapes.h"
 #include "stages/write/manifest/manifest.h"
 
@@ -69,12 +68,13 @@ Result<LayerShapes> slice_shapes(const SlicedJob& job, std::uint32_t index) {
 
 }  // namespace
 
-Result<view::LayerSeries> gcode_series(const std::string& path) {
-  auto file = read::GcodeFile::open(path);
+Result<view::LayerSeries> gcode_series(const std::string& path, const read::GcodeOptions& options) {
+  auto file = read::GcodeFile::open(path, options);
   if (!file) return file.error();
   view::LayerSeries series;
   series.name = std::filesystem::path(path).filename().string();
   series.last = series.count = file->count();
+  series.notes = file->notes();
   series.layer = [file = std::make_shared<const read::GcodeFile>(std::move(*file)), name = series.name](std::uint32_t index) {
     return gcode_shapes(*file, name, index);
   };
@@ -91,8 +91,12 @@ Result<view::LayerSeries> slice_series(const std::string& directory) {
   auto plan = make_plan(std::move(*resolved), [](const ProgressEvent&) {});
   if (!plan) return plan.error();
   const auto sliced = std::make_shared<const SlicedJob>(SlicedJob{directory, std::move(*manifest), std::move(*plan)});
-  return view::LayerSeries{sliced->name(), sliced->plan.range[0], sliced->plan.range[1], sliced->plan.layer_count,
-                           [sliced](std::uint32_t index) { return slice_shapes(*sliced, index); }};
+  return view::LayerSeries{sliced->name(),
+                           sliced->plan.range[0],
+                           sliced->plan.range[1],
+                           sliced->plan.layer_count,
+                           [sliced](std::uint32_t index) { return slice_shapes(*sliced, index); },
+                           {}};
 }
 
 }  // namespace lamina::pipeline

@@ -148,10 +148,18 @@ Result<Preview> draw_preview(const PreviewRequest& request) {
   const std::string ending = std::filesystem::path(request.output).extension().string();
   std::error_code ignored;
   const bool toolpaths = std::filesystem::is_regular_file(request.source, ignored);
+  if (!toolpaths && (request.gcode.filament_mm > 0 || request.gcode.layer_height_mm > 0)) {
+    return Error{Fault::kUsage, "--filament, --layer-height: are for G-code files; leave them out"};
+  }
   if ((ending == ".png" || ending == ".svg") &&
       (toolpaths || product_of_manifest(request.source + "/manifest.json") == Product::kContours)) {
-    const auto series = toolpaths ? gcode_series(request.source) : slice_series(request.source);
-    return series ? draw_series(*series, request, ending == ".svg") : Result<Preview>(series.error());
+    const auto series = toolpaths ? gcode_series(request.source, request.gcode) : slice_series(request.source);
+    if (!series) return series.error();
+    auto preview = draw_series(*series, request, ending == ".svg");
+    for (const std::string& note : series->notes) {
+      if (preview) preview->said.push_back(request.source + ": " + note);
+    }
+    return preview;
   }
   if (ending != ".png") {
     if (!std::filesystem::exists(request.source, ignored)) return manifest_of(request.source).error();

@@ -8,6 +8,7 @@
 
 #include "stages/data/buffer.h"
 #include "stages/data/status.h"
+#include "stages/read/gcode.h"
 #include "stages/view/choice.h"
 
 namespace lamina::pipeline {
@@ -20,6 +21,7 @@ struct PreviewRequest {
   bool whole_bed = false;              // images: the whole bed instead of the set pixels' window
   bool swath = false;                  // images: the layer during its print program
   std::optional<std::uint32_t> swath_number, step;
+  read::GcodeOptions gcode;  // for G-code alone
 };
 
 struct Preview {

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <functional>
 #include <string>
+#include <vector>
 
 #include "stages/data/picture/layer_shapes.h"
 #include "stages/data/status.h"
@@ -23,6 +24,7 @@ struct LayerSeries {
   std::uint32_t first = 0, last = 0;  // available layers: [first, last)
   std::uint32_t count = 0;            // of the whole job
   std::function<Result<LayerShapes>(std::uint32_t)> layer;
+  std::vector<std::string> notes;  // for a person, one line each
 };
 
 }  // namespace lamina::view

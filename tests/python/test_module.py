@@ -263,6 +263,41 @@ class Module(unittest.TestCase):
             self.assertIsInstance(caught.exception, lamina.Error)
         self.assertTrue(issubclass(lamina.OutputError, OSError) and issubclass(lamina.UsageError, ValueError))
 
+    def test_errors_speak_of_keys_and_arguments(self):
+        again = str(self.directory / "spoken")
+        lamina.jet(again, CROWN, {"bed.dpi": 100, "layers.thickness_mm": 1})
+        for call, words, never in (
+                (lambda: lamina.plan(PART, {"bed.dpy": 3}), "bed.dpy", "--set"),
+                (lambda: lamina.plan(PART, {"heights.mode": "optimal"}), "'heights.thickness_mm'", "--"),
+                (lambda: lamina.jet(again, CROWN, {"bed.dpi": 200, "layers.thickness_mm": 1}), "overwrite=True", "--overwrite"),
+                (lambda: lamina.read_image(PART), "lamina.load reads parts", "plan the layer again")):
+            with self.assertRaises(lamina.Error) as caught:
+                call()
+            self.assertIn(words, str(caught.exception))
+            self.assertNotIn(never, str(caught.exception))
+
+    def test_slices_of_a_plan_are_sequences_that_plan_on_demand(self):
+        indices = list(range(len(self.plan)))
+        for asked in (slice(0, 3), slice(None), slice(-2, None), slice(5, 2), slice(None, None, -4), slice(3, 1000, 2)):
+            some = self.plan[asked]
+            self.assertEqual([layer.index for layer in some], indices[asked])
+            self.assertEqual(len(some), len(indices[asked]))
+        some = self.plan[2:20:3]
+        self.assertEqual((some[1].index, some[-1].index), (5, 17))
+        self.assertEqual([layer.index for layer in some[::-2]], indices[2:20:3][::-2])
+        np.testing.assert_array_equal(some[1].change, self.plan[5].change)
+        with self.assertRaises(IndexError):
+            some[6]
+        with self.assertRaises(TypeError):
+            self.plan["first"]
+        self.assertIn("6 layers, 2 to 17", repr(some))
+
+    def test_a_plan_describes_itself(self):
+        said = repr(self.plan)
+        for words in ("nist_am_test_artifact_v3b.stl", f"{len(self.plan)} layers", f"{self.plan.columns} x {self.plan.rows} pixels",
+                      "300 x 200 dpi"):
+            self.assertIn(words, said)
+
     def test_keys_are_those_of_job_files_and_everything_is_described(self):
         saved = self.directory / "job.toml"
         self.assertEqual(run("jet", PART, "--save-job", saved, "--dry-run", "--quiet").returncode, 0)

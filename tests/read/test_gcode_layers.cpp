@@ -119,7 +119,7 @@ TEST(GcodeLayers, WhatCannotBeDrawnIsOneLineThatNamesThePlace) {
       {"solid nut\nfacet normal 0 0 0\n", "no move in it lays filament"},
       {std::string("GIF89a\0\0\0", 9), "line 1: is no text of G-code"},
       {"G28\n" + std::string(1 << 17, 'x'), "line 2: is no text of G-code"},
-      {"G1 X1 E1\nG2 X1 Y1 I1 E2\n", "line 2: arcs (G2, G3) are not drawn"},
+      {"G1 X1 E1\nG18\nG2 X1 Y1 I1 E2\n", "line 3: an arc in the plane of G18"},
       {"M83\nG1 Xnan E1\n", "line 2: 'nan' is not a number"},
       {"G1 X1..2 E1\n", "line 1: '.2 E1' is no word of a move"},
       {"G1 X1e9 E1\n", "line 1: a bead at 1e+09 mm; beds are at most 2000 mm wide"},

@@ -69,5 +69,25 @@ TEST(PreviewGcode, DrawsLayersOfAPlanAsPngAndSvg) {
   EXPECT_EQ(bed.error_lines(), 1u) << bed.err;
 }
 
+TEST(PreviewGcode, FilamentAndLayerHeightAreForGcodeAndNotesAreSaid) {
+  const Directory directory;
+  test::write_text(directory.path() / "thick.gcode", "M83\nG1 Z0.2\nG1 X10 E0.12\nG1 X0 Y9 Z0.3 E0.12\n");
+  const auto preview = [&](const std::string& line) { return run_lamina(test::words_of("preview " + line), directory.path()); };
+  const Outcome thin = preview("thick.gcode -o a.svg --layer 0");
+  ASSERT_EQ(thin.code, 0) << thin.err;
+  EXPECT_NE((thin.out + thin.err).find("thick.gcode: beads are 0.1"), std::string::npos) << thin.err;
+  const Outcome wide = preview("thick.gcode -o b.svg --layer 0 --filament 2.85 --layer-height 0.5");
+  ASSERT_EQ(wide.code, 0) << wide.err;
+  EXPECT_EQ((wide.out + wide.err).find("beads are"), std::string::npos) << wide.err;
+  EXPECT_NE((wide.out + wide.err).find("layer 0 of 1 "), std::string::npos) << wide.err;
+  for (const auto& [line, told] : std::vector<std::pair<std::string, std::string>>{
+           {"thick.gcode -o c.png --filament 0", "--filament 0: "},
+           {"thick.gcode -o c.png --filament thick", "--filament thick: "},
+           {"thick.gcode -o c.png --layer-height 1e9", "--layer-height 1e9: "},
+           {". -o c.png --filament 2.85", "--filament, --layer-height: are for G-code files"}}) {
+    test::expect_refused("preview " + line, 2, told, directory);
+  }
+}
+
 }  // namespace
 }  // namespace lamina::pipeline
