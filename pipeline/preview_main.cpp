@@ -84,7 +84,9 @@ Outcome draw(const Arguments& arguments, Context& context) {
   const auto preview = draw_preview(*request);
   if (!preview) return preview.error();
   if (Status status = write::write_file(request->output, preview->bytes); !status) return status;
-  if (!arguments.has("--quiet") && !preview->missing.empty()) context.say(preview->missing);
+  for (const std::string& doubt : preview->doubts) {
+    if (!arguments.has("--quiet")) context.say(doubt);
+  }
   Answer answer(arguments, context);
   answer.say(preview->said);
   return answer.status();

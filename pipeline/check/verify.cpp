@@ -58,7 +58,8 @@ std::string fault_of_program(const Inspection& inspection, const LayerRecord& re
     }
     const std::int64_t told = record.program.microseconds;
     if (same && told > 0 && std::abs(replay->microseconds - told) > 1) {
-      return fmt::format("{}: takes {:.6f} s, the manifest says {:.6f}", name, replay->seconds(), 1e-6 * static_cast<double>(told));
+      return fmt::format("{}: takes {:.6f} s, the manifest says {:.6f}", name, replay->seconds(),
+                         1e-6 * static_cast<double>(told));
     }
     if (same && !inspection.head.materials.empty()) {
       std::vector<std::uint64_t> set;

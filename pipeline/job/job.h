@@ -53,12 +53,12 @@ using HeightsRequest = heights::Settings;
 
 /// Section [slice]: contours and their files.
 struct SliceRequest {
-  std::string format = "svg";      // of write::slice_formats()
-  bool file_a_layer = false;       // layers/000000.svg ... in place of one file
-  bool empty_first_layer = false;  // CLI
+  std::string format = "svg";          // of write::slice_formats()
+  bool file_a_layer = false;           // layers/000000.svg ... in place of one file
+  bool empty_first_layer = false;      // CLI
   std::optional<double> tolerance_um;  // simplification: greatest displacement of contours; absent: tolerance_um_of()
-  double bridge_mm = 0.1;          // longest gap in an open mesh that a straight segment closes
-  double offset_mm = 0;            // offset of the contours, positive outwards
+  double bridge_mm = 0.1;              // longest gap in an open mesh that a straight segment closes
+  double offset_mm = 0;                // offset of the contours, positive outwards
 };
 
 /// The keys of one segmentation.

@@ -21,7 +21,8 @@ constexpr unsigned kContour = decides::contours | decides::moves;
 
 const JobKey kSliceKeys[] = {
     text<check_slice_format, &Job::slice, &SliceRequest::format>(
-        {"slice", "format", "--format", "FORMAT", "svg, svg-polygon, cli, cli-binary, cli-16, 3mf, or null to write none", decides::contours})
+        {"slice", "format", "--format", "FORMAT", "svg, svg-polygon, cli, cli-binary, cli-16, 3mf, or null to write none",
+         decides::contours})
         .with_words(slice_format_words),
     field<&Job::slice, &SliceRequest::file_a_layer>({"slice", "file_a_layer", "--file-a-layer", "",
                                                      "one file for each layer, layers/000000.svg and up", decides::contours,

@@ -50,10 +50,7 @@ ManifestHead image_head(const Plan& plan) {
 }
 
 ImageFiles::ImageFiles(const Plan& plan)
-    : plan_(plan),
-      head_(image_head(plan)),
-      title_(title_of(head_.parts)),
-      format_(*write::find_image_format(plan.job.format)) {
+    : plan_(plan), head_(image_head(plan)), title_(title_of(head_.parts)), format_(*write::find_image_format(plan.job.format)) {
   if (plan.images->machine)
     program_.emplace(*plan.images->machine, plan.job.dry_run ? "" : plan.job.output, plan.layer_count,
                      layer_file_options(plan.job));

@@ -64,9 +64,8 @@ class ImageMaker : public Maker {
       return Status();
     });
     if (plan_.job.dry_run) {
-      add("program", [this](const Layer&, Work& work, Made& made) {
-        return files_.program(work.images.runs, work.files, made.record);
-      });
+      add("program",
+          [this](const Layer&, Work& work, Made& made) { return files_.program(work.images.runs, work.files, made.record); });
       return steps;
     }
     add("encode", [this](const Layer&, Work& work, Made& made) {

@@ -193,10 +193,9 @@ void MoveMaker::tell(Summary& summary) const {
   summary.bytes_written = bytes_written_;
 
   const auto result = [&](std::string_view name, std::string text) { summary.results.emplace_back(name, std::move(text)); };
-  result("beads",
-         fmt::format("{} moves, {:.2f} m, {:.3f} cm3; {} travels, {:.2f} m", readable_count(totals.part_moves()),
-                     (totals.bead_mm - totals.beside_mm) / 1000, summary.volume_mm3 / 1000, readable_count(totals.travels),
-                     totals.travel_mm / 1000));
+  result("beads", fmt::format("{} moves, {:.2f} m, {:.3f} cm3; {} travels, {:.2f} m", readable_count(totals.part_moves()),
+                              (totals.bead_mm - totals.beside_mm) / 1000, summary.volume_mm3 / 1000,
+                              readable_count(totals.travels), totals.travel_mm / 1000));
   result("skirt", totals.beside_moves == 0 ? std::string(machine.skirt.loops == 0 ? "none" : "none: no room, or no first layer")
                                            : fmt::format("{:.1f} mm, {:.1f} mm3, {:.1f} mm of filament, beside the parts",
                                                          totals.beside_mm, totals.beside_mm3, totals.beside_filament_mm));
@@ -229,9 +228,9 @@ void tell_moves(const Plan& plan, Summary& summary) {
   summary.index_bytes = plan.sections->slicer().index_bytes();
   segment::tell_bead(plan.moves->profile.machine, plan.moves->left_out, summary.head, *summary.facts);
   const double tolerance_um = tolerance_um_of(plan.job, plan.product);
-  summary.head.emplace_back("contours", tolerance_um > 0
-                                            ? fmt::format("points are left out that move them by at most {} um", number_text(tolerance_um))
-                                            : "all their points");
+  summary.head.emplace_back("contours", tolerance_um > 0 ? fmt::format("points are left out that move them by at most {} um",
+                                                                       number_text(tolerance_um))
+                                                         : "all their points");
   (*summary.facts)["tolerance_um"] = tolerance_um;
   for (const auto& [heights, range] : plan.segments->segmented()) {
     if (plan.job.dry_run && range->spaces_lines) segment::tell_foreseen(range->plan, heights, summary.head);

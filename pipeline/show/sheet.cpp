@@ -138,7 +138,7 @@ Result<Preview> draw_images(const Manifest& manifest, const PreviewRequest& requ
   Preview preview{std::move(*picture), fmt::format("{}: {} of {} layers{}, ", request.output, chosen->size(), made,
                                                    made == all ? "" : fmt::format(" that are there, of {}", all))};
   preview.said += readable_bytes(preview.bytes.size());
-  if (!write::picture::have_font()) preview.missing = "lamina: no captions: no font; install fonts-dejavu-core";
+  if (!write::picture::have_font()) preview.doubts.push_back("lamina: no captions: no font; install fonts-dejavu-core");
   return preview;
 }
 
@@ -157,7 +157,7 @@ Result<Preview> draw_preview(const PreviewRequest& request) {
     if (!series) return series.error();
     auto preview = draw_series(*series, request, ending == ".svg");
     for (const std::string& note : series->notes) {
-      if (preview) preview->said.push_back(request.source + ": " + note);
+      if (preview) preview->doubts.push_back(request.source + ": " + note);
     }
     return preview;
   }

@@ -25,9 +25,9 @@ struct PreviewRequest {
 };
 
 struct Preview {
-  Buffer<std::byte> bytes;   // of the file
-  std::string said;          // what is drawn, one line
-  std::string missing = {};  // what it lacks and why, one line; empty if nothing
+  Buffer<std::byte> bytes;               // of the file
+  std::string said;                      // what is drawn, one line
+  std::vector<std::string> doubts = {};  // what it lacks, or may have wrong, and why; a line each
 };
 
 /// errors  kUsage: options that do not fit the source; kVerification: missing or changed files of the job; of the readers

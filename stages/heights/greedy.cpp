@@ -151,7 +151,8 @@ Plan plan_by_angle(const SurfaceIndex& index, const Options& options, const Ladd
   }
   if (options.cover_top && top - plan.table.top() > options.surface.flat_tolerance) {
     const Nm tolerance = options.surface.flat_tolerance;
-    const bool keep = std::ranges::any_of(peaks, [&](const Flat& p) { return std::abs(p.height - plan.table.top()) <= tolerance; });
+    const bool keep =
+        std::ranges::any_of(peaks, [&](const Flat& p) { return std::abs(p.height - plan.table.top()) <= tolerance; });
     cover({slopes, set, steep, top, tolerance}, keep, plan);
   }
   return plan;

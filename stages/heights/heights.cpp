@@ -50,10 +50,10 @@ std::string text_of(const Settings& settings, double layer_mm) {
 
 std::string small_peaks_text(const Plan& plan, double least_flat_mm2) {
   if (plan.small_peaks == 0) return {};
-  return fmt::format("{} with horizontal facets below {} mm2 in all {} no peak{}; --peaks facets counts every one, as Lima (2009) does",
-                     plan.small_peaks == 1 ? "a height" : fmt::format("{} heights", plan.small_peaks),
-                     number_text(least_flat_mm2), plan.small_peaks == 1 ? "is" : "are",
-                     plan.small_peaks == 1 ? "" : "s");
+  return fmt::format(
+      "{} with horizontal facets below {} mm2 in all {} no peak{}; --peaks facets counts every one, as Lima (2009) does",
+      plan.small_peaks == 1 ? "a height" : fmt::format("{} heights", plan.small_peaks), number_text(least_flat_mm2),
+      plan.small_peaks == 1 ? "is" : "are", plan.small_peaks == 1 ? "" : "s");
 }
 
 Status check_options(const Options& options) {

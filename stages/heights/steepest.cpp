@@ -77,8 +77,8 @@ struct Range {
 // The largest |n_z| of all facets by the range of entries that each covers. Every share raises entries of its own; the
 // larger of two is the same in any order.
 template <class RangeOf>
-Buffer<Steepness> steepest_by(const SurfaceIndex& index, std::span<const PartSurface> parts, std::uint32_t entries,
-                              Slope slope, const RangeOf& range_of) {
+Buffer<Steepness> steepest_by(const SurfaceIndex& index, std::span<const PartSurface> parts, std::uint32_t entries, Slope slope,
+                              const RangeOf& range_of) {
   const std::uint32_t shares = worthwhile_shares(index, parts, RangeRaiser::kLevels * entries);
   std::vector<Buffer<Steepness>> found(shares);
   tbb::parallel_for(0u, shares, [&](std::uint32_t share) {

@@ -85,7 +85,8 @@ class Passes {
     any_ = false;
   }
   void go(double along, double across) {
-    printing_.head_moves(std::hypot(along - at_along_, across - at_across_), printing_.profile().motion.travel_speed_mm_s, false);
+    printing_.head_moves(std::hypot(along - at_along_, across - at_across_), printing_.profile().motion.travel_speed_mm_s,
+                         false);
     at_along_ = along;
     at_across_ = across;
   }

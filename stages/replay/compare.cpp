@@ -26,7 +26,8 @@ std::string Printing::place_of(std::uint32_t column, std::uint32_t row) const {
   for (const Sweep& sweep : sweeps_) {
     for (const VirtualMachine::Nozzle& nozzle : machine_.nozzle_) {
       if (nozzle.blocked || sweep.first_line + nozzle.line != line) continue;
-      return fmt::format("layer {}, swath {}, step {}", layer_.index, sweep.number, place * machine_.ticks_ + nozzle.step_offset);
+      return fmt::format("layer {}, swath {}, step {}", layer_.index, sweep.number,
+                         place * machine_.ticks_ + nozzle.step_offset);
     }
   }
   return fmt::format("layer {}, line {} across, place {} along, which no swath comes over", layer_.index, line, place);

@@ -190,8 +190,7 @@ void Printing::check_cycle() {
   const auto& powder = profile().powder;
   const Layer& layer = layer_;
   const auto wrong = [&](const std::string& what) { fail(fmt::format("layer {}, powder cycle: {}", layer_.index, what)); };
-  if (const Standing next = standing();
-      head_mm_ && std::hypot((*head_mm_)[0] - next.x_mm, (*head_mm_)[1] - next.y_mm) > 1e-3) {
+  if (const Standing next = standing(); head_mm_ && std::hypot((*head_mm_)[0] - next.x_mm, (*head_mm_)[1] - next.y_mm) > 1e-3) {
     wrong(fmt::format("the head stays at {:g}, {:g} mm, and the next layer finds it at {:g}, {:g}", (*head_mm_)[0],
                       (*head_mm_)[1], next.x_mm, next.y_mm));
   }

@@ -182,8 +182,8 @@ void simplify(Contours& contours, Nm tolerance, SimplifyScratch& scratch) {
   };
   for (std::uint32_t c = 0; c < contours.size(); ++c) {
     scratch.whole[c] = 0;
-    const bool stands = contours[c].size() > 3 &&
-                        Ring(contours[c], scratch.kept.data() + contours.offset[c], tolerance, scratch).mark();
+    const bool stands =
+        contours[c].size() > 3 && Ring(contours[c], scratch.kept.data() + contours.offset[c], tolerance, scratch).mark();
     if (!stands) keep_whole(c);
   }
   // Contours that became whole again may meet others that did not.

@@ -25,7 +25,7 @@ struct SliceHead {
   std::uint32_t layers = 0;
   Nm first_bottom = 0;   // nm, bottom of the first layer that is written
   std::int64_t top = 0;  // nm, of the last layer of the whole file; 0: that of the box
-  std::string program;  // "lamina 0.1.0"
+  std::string program;   // "lamina 0.1.0"
 };
 
 /// One layer. The contours of body b are [body[b], body[b + 1]).
@@ -63,10 +63,10 @@ std::unique_ptr<SliceEncoder> make_cli_16_encoder(const SliceFormatOptions& opti
 /// One row of the registry.
 struct SliceFormat {
   std::string_view id, extension;
-  bool layer_files;  // may have one for each layer
-  bool paths;        // refuses no filling
+  bool layer_files;                                                  // may have one for each layer
+  bool paths;                                                        // refuses no filling
   std::unique_ptr<SliceEncoder> (*make)(const SliceFormatOptions&);  // null: none, or a package
-  std::uint32_t point_bytes, stretch_bytes;                          // of its text, at most: per point, and per element of a path
+  std::uint32_t point_bytes, stretch_bytes;  // of its text, at most: per point, and per element of a path
 };
 std::span<const SliceFormat> slice_formats();
 /// The format with this id, or nullptr.

@@ -54,7 +54,8 @@ TEST(NominalSlopes, HeightsAndFlatsAreThoseOfThePlacedPart) {
   ASSERT_EQ(flats.size(), 2u);
   EXPECT_EQ(flats[0].height, nm(1.02));
   EXPECT_NEAR(flats[0].up_mm2, 20, 1e-9);
-  // A face is as horizontal as it was before: sin 60 degrees is 0.866, the slopes are 0.861 (0.881 as printed) and 0.873 (0.849).
+  // A face is as horizontal as it was before: sin 60 degrees is 0.866, the slopes are 0.861 (0.881 as printed) and 0.873
+  // (0.849).
   SurfaceOptions options;
   options.peak_angle_deg = 60;
   options.flat_tolerance = nm(0.5);
@@ -130,7 +131,9 @@ void expect_covered(const SurfaceIndex& index, const Options& options) {
 }
 
 TEST(CoverTop, WhatIsLeftBelowTheTopIsBuilt) {
-  const auto box = [](double height) { return test::index_of(test::strip({{0, 0}, {5, 0}, {5, height}, {0, height}, {0, 0}})); };
+  const auto box = [](double height) {
+    return test::index_of(test::strip({{0, 0}, {5, 0}, {5, height}, {0, height}, {0, 0}}));
+  };
   // 19 layers of 0.254 end 66 um below the top: two of 0.178 in place of the last one end 36 um above it.
   const SurfaceIndex low = box(19 * 0.254 + 0.066);
   expect_covered(low, by_angle({0.178, 0.254}));

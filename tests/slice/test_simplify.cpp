@@ -153,7 +153,8 @@ TEST(Simplify, ToleranceCountsToTheNanometre) {
   EXPECT_EQ(simplified(full, 9'999).point.size(), 4u);
   // At the reach of beds, where squares need 128 bits.
   Contours wide;
-  add(wide, {{-1'000'000'000, -1'000'000'000}, {999, -1'000'000'000 - 10'000}, {1'000'000'000, -1'000'000'000}, {0, 1'000'000'000}});
+  add(wide,
+      {{-1'000'000'000, -1'000'000'000}, {999, -1'000'000'000 - 10'000}, {1'000'000'000, -1'000'000'000}, {0, 1'000'000'000}});
   EXPECT_EQ(simplified(wide, 10'000).point.size(), 3u);
   EXPECT_EQ(simplified(wide, 9'999).point.size(), 4u);
   EXPECT_TRUE(simplified(wide, 0).point == wide.point);
@@ -174,8 +175,16 @@ TEST(Simplify, WhatWouldBreakStaysAsItIs) {
   EXPECT_TRUE(less.point == behind.point);
   // A slit of 5 um between two combs of one contour.
   Contours slit;
-  add(slit, {{0, 0}, {3'000'000, 0}, {3'000'000, 1'000'000}, {2'000'000, 1'006'000}, {1'000'000, 1'000'000}, {1'000'000, 1'005'000},
-             {2'000'000, 1'011'000}, {3'000'000, 1'005'000}, {3'000'000, 2'000'000}, {0, 2'000'000}});
+  add(slit, {{0, 0},
+             {3'000'000, 0},
+             {3'000'000, 1'000'000},
+             {2'000'000, 1'006'000},
+             {1'000'000, 1'000'000},
+             {1'000'000, 1'005'000},
+             {2'000'000, 1'011'000},
+             {3'000'000, 1'005'000},
+             {3'000'000, 2'000'000},
+             {0, 2'000'000}});
   ASSERT_FALSE(any_meet(slit));
   const Contours kept = simplified(slit, 8'000);
   EXPECT_FALSE(any_meet(kept));
@@ -225,8 +234,8 @@ void compare_parts(const fs::path& folder, std::span<const char* const> names, s
   for (const char* name : names) compare_part(folder / name, layers, found);
   const Measured& m = found.measured;
   EXPECT_LT(m.left, m.full);
-  std::cout << found.layers << " layers, " << m.contours << " contours: " << m.left << " of " << m.full << " points stay; " << m.whole
-            << " contours keep all their " << m.of_whole << '\n';
+  std::cout << found.layers << " layers, " << m.contours << " contours: " << m.left << " of " << m.full << " points stay; "
+            << m.whole << " contours keep all their " << m.of_whole << '\n';
 }
 
 TEST(Simplify, ContoursOfTheCorpusAreWithin10MicrometresOfTheFullOnes) {
@@ -238,9 +247,15 @@ TEST(Simplify, ContoursOfTheCorpusAreWithin10MicrometresOfTheFullOnes) {
 TEST(Simplify, ContoursOfRealModelsAreWithin10MicrometresOfTheFullOnes) {
   const char* folder = std::getenv("LAMINA_MODELS");
   if (folder == nullptr) GTEST_SKIP() << "LAMINA_MODELS is not set: large real parts were NOT simplified";
-  constexpr const char* kParts[] = {"3DBenchy.3mf", "stanford_bunny.stl", "nefertiti.obj", "spiral_lattice_cone_1.stl",
-                                    "herringbone_wheels_x4.stl", "screw_cap_insert_threads.stl", "am_coin_embossed_text.stl",
-                                    "gyroid_sheet_cyl_247k.stl.gz", "st_helens_terrain_645k.stl.gz"};
+  constexpr const char* kParts[] = {"3DBenchy.3mf",
+                                    "stanford_bunny.stl",
+                                    "nefertiti.obj",
+                                    "spiral_lattice_cone_1.stl",
+                                    "herringbone_wheels_x4.stl",
+                                    "screw_cap_insert_threads.stl",
+                                    "am_coin_embossed_text.stl",
+                                    "gyroid_sheet_cyl_247k.stl.gz",
+                                    "st_helens_terrain_645k.stl.gz"};
   compare_parts(folder, kParts, 60);
 }
 

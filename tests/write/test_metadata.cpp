@@ -77,7 +77,8 @@ struct LayerTagsRead {
     std::uint16_t number = 0, of = 0;
     if (TIFFGetField(tiff, TIFFTAG_PAGENUMBER, &number, &of) == 1) page = number, pages = of;
     strip.resize(static_cast<std::size_t>(TIFFRawStripSize64(tiff, 0)));
-    EXPECT_EQ(TIFFReadRawStrip(tiff, 0, strip.data(), static_cast<tmsize_t>(strip.size())), static_cast<tmsize_t>(strip.size()));
+    EXPECT_EQ(TIFFReadRawStrip(tiff, 0, strip.data(), static_cast<tmsize_t>(strip.size())),
+              static_cast<tmsize_t>(strip.size()));
     TIFFClose(tiff);
   }
 };
@@ -106,7 +107,8 @@ TEST(TiffTags, TellJobLayerAndHeightAndLeaveThePixelsAsTheyAre) {
     encoder->tag({"K\xc3\xb6rper\n" + std::string(500, 'x'), "steel", "xy", 69'999, 70'000, 0, 1});
     const LayerTagsRead odd = read();
     EXPECT_TRUE(odd.description.starts_with("K??rper?x")) << odd.description;
-    EXPECT_TRUE(odd.description.ends_with("x, layer 70000 of 70000, z 0 to 0.000001 mm, steel, mirrored in xy")) << odd.description;
+    EXPECT_TRUE(odd.description.ends_with("x, layer 70000 of 70000, z 0 to 0.000001 mm, steel, mirrored in xy"))
+        << odd.description;
     EXPECT_EQ(odd.page, -1) << "beyond 16 bits";
     EXPECT_EQ(odd.strip, bare.strip);
   }

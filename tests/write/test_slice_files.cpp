@@ -214,9 +214,9 @@ TEST(WriteCli, TextAndBinaryAreReadBackWithBothConventionsOfZ) {
   for (const bool binary : {false, true}) {
     for (const bool empty_first : {false, true}) {
       const std::string file = job.file(*make_cli_encoder(binary, {empty_first}));
-      EXPECT_TRUE(
-          file.starts_with(binary ? "$$HEADERSTART\n$$BINARY\n$$UNITS/1.000000\n$$VERSION/200\n$$LABEL/1,a_b_c __x <&\"> -- .stl\n"
-                                  : "$$HEADERSTART\n$$ASCII\n$$UNITS/1.000000\n$$VERSION/200\n$$LABEL/1,a_b_c __x <&\"> -- .stl\n"));
+      EXPECT_TRUE(file.starts_with(
+          binary ? "$$HEADERSTART\n$$BINARY\n$$UNITS/1.000000\n$$VERSION/200\n$$LABEL/1,a_b_c __x <&\"> -- .stl\n"
+                 : "$$HEADERSTART\n$$ASCII\n$$UNITS/1.000000\n$$VERSION/200\n$$LABEL/1,a_b_c __x <&\"> -- .stl\n"));
       EXPECT_NE(
           file.find("\n$$DIMENSION/5,7,0,40,27,0.600001\n$$LAYERS/" + std::to_string(empty_first ? 3 : 2) + "\n$$HEADEREND"),
           std::string::npos);

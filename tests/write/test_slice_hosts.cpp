@@ -1,5 +1,5 @@
-// tests/write/test_slice_hosts.cpp: slices as the hosts of powder printers and old controllers read them. The readers follow the
-// hosts' sources, not our description of the format.
+// tests/write/test_slice_hosts.cpp: slices as the hosts of powder printers and old controllers read them. The readers follow
+// the hosts' sources, not our description of the format.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -225,7 +225,8 @@ TEST(SvgPolygon, BrundleFabsHostReadsContoursAndHoles) {
   EXPECT_NEAR(shoelace(host.groups[0].holes[0]), -196, 1e-9);
 }
 
-/// CLI 2.0, binary: u16 commands 128 (z), 129 (id, dir, n, n points) and 131 (id, n, n lines), all of unsigned 16 bits in units.
+/// CLI 2.0, binary: u16 commands 128 (z), 129 (id, dir, n, n points) and 131 (id, n, n lines), all of unsigned 16 bits in
+/// units.
 struct ShortCli {
   double unit = 0;
   std::vector<double> z;
@@ -305,7 +306,8 @@ TEST(Cli16, PointsThatFallTogetherAndContoursThatVanishAreLeftOut) {
 }
 
 TEST(Cli16, UnitsReachTheFarthestPointAndNoFarther) {
-  for (const auto& [far, unit] : {std::pair{65.535, "0.001000"}, {65.536, "0.002000"}, {200.0, "0.005000"}, {2000.0, "0.050000"}}) {
+  for (const auto& [far, unit] :
+       {std::pair{65.535, "0.001000"}, {65.536, "0.002000"}, {200.0, "0.005000"}, {2000.0, "0.050000"}}) {
     Slices slices;
     slices.head.bounds.hi.x = static_cast<Nm>(std::llround(far * 1e6));
     Buffer<char> out;
@@ -317,7 +319,8 @@ TEST(Cli16, UnitsReachTheFarthestPointAndNoFarther) {
 TEST(Cli16, FillingsBecomeCommandsOfAtMost65535Lines) {
   Slices slices;
   Toolpaths paths;
-  for (int i = 0; i < 70'001; ++i) paths.add({30 * kMillimetre + (i % 2) * kMillimetre, 40 * kMillimetre + i * 100}, PathKind::kRaster, 400'000, 1);
+  for (int i = 0; i < 70'001; ++i)
+    paths.add({30 * kMillimetre + (i % 2) * kMillimetre, 40 * kMillimetre + i * 100}, PathKind::kRaster, 400'000, 1);
   paths.close();
   SliceLayer layer = slices.layer(0);
   const std::vector<std::uint32_t> path_body{0, 1, 1};

@@ -227,7 +227,7 @@ const OptionSpec kExtrudeWords[] = {
     {"--machine", "", "extrusion printer: one of those below, or a profile as TOML", "marlin", ""},
     {"--layer", "", "", "half of the nozzle", ""},
     {"--tolerance", "", "", "10", ""},
-      {"--walls", "", "", "1", ""}};
+    {"--walls", "", "", "1", ""}};
 
 std::string extrude_closing() {
   std::string text = "Machines:\n";

@@ -67,7 +67,8 @@ std::string study_page(const StudiedParts& parts, const Study& study) {
     line("", fmt::format("{} layers are thinner than the slopes at their bottom ask for: what lies above is flatter", back));
   }
   line("flats", flats_line(study));
-  if (const std::string small = small_peaks_text(study.plan, study.options.least_flat_mm2); !small.empty()) line("peaks", small);
+  if (const std::string small = small_peaks_text(study.plan, study.options.least_flat_mm2); !small.empty())
+    line("peaks", small);
   if (study.plan.one_less_reaches >= 0) {
     line("proof", fmt::format("{} that keeps these steps and flats gets higher than {:.4f} mm",
                               study.options.time.on() ? "no table of less time" : "no table of a layer less",
@@ -156,9 +157,11 @@ std::string comparison_page(const std::vector<Study>& studies) {
   const Study& first = studies.front();
   const double whole = first.evaluation.seconds;
   const bool saves = first.options.tells_time;  // beside the first
-  std::string text =
-      fmt::format("{:<24} {:>7} {:>12} {:>10} {:>12} {:>12} {:>10}{}\n", "way", "layers", "largest step", "mean step",
-                  "flats missed", "largest miss", "top", saves ? "        time    saved" : whole > 0 ? "        time" : "");
+  std::string text = fmt::format("{:<24} {:>7} {:>12} {:>10} {:>12} {:>12} {:>10}{}\n", "way", "layers", "largest step",
+                                 "mean step", "flats missed", "largest miss", "top",
+                                 saves       ? "        time    saved"
+                                 : whole > 0 ? "        time"
+                                             : "");
   for (const Study& study : studies) {
     const Evaluation& e = study.evaluation;
     text += fmt::format("{:<24} {:>7} {:>9.4f} mm {:>7.4f} mm {:>12} {:>9.4f} mm {:>+7.3f} mm", study.name, study.layers(),

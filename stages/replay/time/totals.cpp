@@ -15,11 +15,11 @@ std::string time_text(double seconds, const std::string& machine) {
 std::vector<std::string> totals_text(const Totals& totals) {
   const Count& count = totals.count;
   std::vector<std::string> lines;
-  lines.push_back(fmt::format("programs  {} layers replayed on {}: {}, {} drops in {} sweeps, {:.3f} % of the bed",
-                              readable_count(totals.layers), totals.machine,
-                              totals.moved + totals.lost > 0 ? "every pixel fired once but those of blocked nozzles"
-                                                             : "every pixel fired once",
-                              readable_count(count.drops), readable_count(count.sweeps), 100 * totals.coverage));
+  lines.push_back(fmt::format(
+      "programs  {} layers replayed on {}: {}, {} drops in {} sweeps, {:.3f} % of the bed", readable_count(totals.layers),
+      totals.machine,
+      totals.moved + totals.lost > 0 ? "every pixel fired once but those of blocked nozzles" : "every pixel fired once",
+      readable_count(count.drops), readable_count(count.sweeps), 100 * totals.coverage));
   if (totals.moved + totals.lost > 0) {
     lines.push_back(fmt::format("blocked   {} pixels fired by a neighbouring nozzle, {} not at all, as recorded",
                                 readable_count(totals.moved), readable_count(totals.lost)));

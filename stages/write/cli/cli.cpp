@@ -34,8 +34,7 @@ constexpr std::int64_t kMostShort = 65535;
 /// nm of a unit: of 1, 2 and 5 times a power of ten, in which heights of layers come out even, the least of which 16 bits
 /// reach every coordinate.
 std::int64_t short_unit(const SliceHead& head) {
-  const std::int64_t most =
-      std::max<std::int64_t>({head.bounds.hi.x, head.bounds.hi.y, head.bounds.hi.z, head.top, 1});
+  const std::int64_t most = std::max<std::int64_t>({head.bounds.hi.x, head.bounds.hi.y, head.bounds.hi.z, head.top, 1});
   for (std::int64_t decade = 1;; decade *= 10) {
     for (const std::int64_t unit : {decade, 2 * decade, 5 * decade}) {
       if (ceil_div(most, unit) <= kMostShort) return unit;
@@ -223,9 +222,10 @@ Status CliEncoder::check(const SliceHead& head, const SliceLayer& layer) const {
   if (head.parts.size() > kMostShort) return refuse("16 bits count up to 65535 bodies; give fewer parts");
   const std::int64_t bottom = layer.layer.bottom, top = bottom + layer.layer.thickness;
   if (in_units(bottom, unit) == in_units(top, unit)) {
-    return refuse(fmt::format("{} mm of thickness are lost in the unit of {} mm, which 16 bits need to reach all; give thicker "
-                              "layers, or place the parts nearer to the bed's corner with --at",
-                              mm(layer.layer.thickness), mm(unit)));
+    return refuse(
+        fmt::format("{} mm of thickness are lost in the unit of {} mm, which 16 bits need to reach all; give thicker "
+                    "layers, or place the parts nearer to the bed's corner with --at",
+                    mm(layer.layer.thickness), mm(unit)));
   }
   const auto outside = [&](Point2 p) {
     const std::int64_t low = std::min(p.x, p.y), high = std::max(p.x, p.y);
@@ -234,9 +234,10 @@ Status CliEncoder::check(const SliceHead& head, const SliceLayer& layer) const {
   for (const std::span<const Point2> points : {layer.contours.point, layer.paths.point}) {
     const auto found = std::ranges::find_if(points, outside);
     if (found == points.end()) continue;
-    return refuse(fmt::format("a point at {}, {} mm is none of the 65536 units of {} mm from the bed's corner; move the parts "
-                              "with --at",
-                              mm(found->x), mm(found->y), mm(unit)));
+    return refuse(
+        fmt::format("a point at {}, {} mm is none of the 65536 units of {} mm from the bed's corner; move the parts "
+                    "with --at",
+                    mm(found->x), mm(found->y), mm(unit)));
   }
   for (std::uint32_t c = 0; c < layer.contours.size(); ++c) {
     if (layer.contours[c].size() < kMostShort) continue;

@@ -1,7 +1,7 @@
 // stages/write/manifest/manifest.h: the manifest of a finished job, in one form for all products.
 //
-// A manifest is JSON with one line per layer, in layer order. It is identical for all runs of a job: it holds no times of a run,
-// thread counts, engine or host. While a job runs it grows as NAME.json.part, so that an interrupted job can resume from
+// A manifest is JSON with one line per layer, in layer order. It is identical for all runs of a job: it holds no times of a
+// run, thread counts, engine or host. While a job runs it grows as NAME.json.part, so that an interrupted job can resume from
 // the complete lines; it gets its final name after the last layer.
 //
 //   images        DIR/manifest.json, or DIR/manifest-2-of-5.json of a shard

@@ -15,7 +15,7 @@ namespace lamina {
 namespace {
 
 constexpr std::size_t kLongestName = 255, kLongestMaterial = 40;  // bytes
-constexpr std::int64_t kMostMicroseconds = 1'000'000'000'000;  // of a layer, as a replay counts them
+constexpr std::int64_t kMostMicroseconds = 1'000'000'000'000;     // of a layer, as a replay counts them
 constexpr std::int64_t kMostDots = 25'400, kMostSpan = 1'000'000'000'000, kLeastPixel = 1000;
 
 /// As read::check_material allows.

@@ -1,6 +1,6 @@
-// stages/write/svg/polygons.cpp: slices as Slic3r 1.3 writes them with --export-svg, byte for byte but for the comment, since the
-// hosts of powder printers that read them look at lines; see README.md for each.
-// source  slic3r/Slic3r, tag 1.3.0 (3ba8e0f), lib/Slic3r/Print.pm, export_svg
+// stages/write/svg/polygons.cpp: slices as Slic3r 1.3 writes them with --export-svg, byte for byte but for the comment, since
+// the hosts of powder printers that read them look at lines; see README.md for each. source  slic3r/Slic3r, tag 1.3.0
+// (3ba8e0f), lib/Slic3r/Print.pm, export_svg
 #include <fmt/format.h>
 
 #include <cstdlib>

@@ -61,10 +61,10 @@ class TiffEncoder : public ImageEncoder {
     constexpr std::size_t kLongestName = 128;
     char bottom[kMostDecimal], top[kMostDecimal];
     *put_mm(tags.bottom, bottom) = *put_mm(tags.top, top) = 0;
-    const auto put = fmt::format_to_n(text_, sizeof text_ - 1, "{}, layer {} of {}, z {} to {} mm{}{}{}{}",
-                                      tags.job.substr(0, kLongestName), tags.layer + 1, tags.layers, bottom, top,
-                                      tags.material.empty() ? "" : ", ", tags.material,
-                                      tags.mirror.empty() ? "" : ", mirrored in ", tags.mirror);
+    const auto put =
+        fmt::format_to_n(text_, sizeof text_ - 1, "{}, layer {} of {}, z {} to {} mm{}{}{}{}", tags.job.substr(0, kLongestName),
+                         tags.layer + 1, tags.layers, bottom, top, tags.material.empty() ? "" : ", ", tags.material,
+                         tags.mirror.empty() ? "" : ", mirrored in ", tags.mirror);
     for (char* c = text_; c != put.out; ++c) *c = *c >= ' ' && *c <= '~' ? *c : '?';  // 7-bit ASCII, TIFF 6.0 section 2
     *put.out = 0;
     page_ = tags.layer;

@@ -76,8 +76,8 @@ TEST(HeightsCommand, TheTopIsCoveredAndSmallPeaksAreTold) {
   const Directory directory;
   write_box(directory / "box.stl", {0, 0, 0}, {5, 5, 4.892f});  // 19 layers of 0.254 and 66 um
   const auto heights = [&](std::vector<std::string> more) {
-    std::vector<std::string> call = {"heights", "box.stl", "--heights", "angle", "--thickness", "0.178,0.254", "--format", "json",
-                                     "--quiet"};
+    std::vector<std::string> call = {"heights",     "box.stl",  "--heights", "angle",  "--thickness",
+                                     "0.178,0.254", "--format", "json",      "--quiet"};
     call.insert(call.end(), more.begin(), more.end());
     const Outcome outcome = run_lamina(call, directory.path());
     EXPECT_EQ(outcome.code, 0) << outcome.err;

@@ -59,7 +59,8 @@ class PrintTimes : public ::testing::Test {
 //            from (133.26, 58.33) back 145.5, at 400 mm/s: 0.298 + 0.134 + 0.364 s
 //   a layer  8.712 + 0.299 + 0.796 = 9.807 s
 TEST_F(PrintTimes, NuferbjOfTwoHeightsByHand) {
-  const Job low = prism({20, 10, 3}, {39, 44}, "nuferbj", 0.1, "low"), high = prism({20, 10, 6}, {39, 44}, "nuferbj", 0.1, "high");
+  const Job low = prism({20, 10, 3}, {39, 44}, "nuferbj", 0.1, "low"),
+            high = prism({20, 10, 6}, {39, 44}, "nuferbj", 0.1, "high");
   const double thirty = print_seconds(low), sixty = print_seconds(high);
   EXPECT_NEAR(thirty, 30 * 9.807, 0.002 * thirty);
   EXPECT_NEAR(sixty, 60 * 9.807, 0.002 * sixty);

@@ -95,8 +95,8 @@ TEST(SliceProgram, PolygonsAndShortCommandsHoldTheAreasOfTheOthers) {
   const Directory directory;
   std::map<std::string, std::string> files;
   for (const std::string format : {"cli", "svg-polygon", "cli-16"}) {
-    const Outcome outcome = run_lamina({"slice", corpus("parameter_quality_nut.stl"), "--layer", "2", "--format", format, "--quiet",
-                                        "-o", format, "--bed", "60x60"},
+    const Outcome outcome = run_lamina({"slice", corpus("parameter_quality_nut.stl"), "--layer", "2", "--format", format,
+                                        "--quiet", "-o", format, "--bed", "60x60"},
                                        directory.path());
     ASSERT_EQ(outcome.code, 0) << outcome.err;
     EXPECT_EQ(run_lamina({"verify", format}, directory.path()).code, 0);
@@ -148,9 +148,9 @@ TEST(SliceProgram, PolygonsAndShortCommandsHoldTheAreasOfTheOthers) {
   EXPECT_GT(text, 1000);
   EXPECT_NEAR(polygons, text, 1e-6 * text);
   EXPECT_NEAR(shorts, text, perimeter * unit / 2);
-  const Outcome filled = run_lamina({"slice", corpus("parameter_quality_nut.stl"), "--format", "svg-polygon", "--walls", "1", "-o",
-                                     "filled"},
-                                    directory.path());
+  const Outcome filled =
+      run_lamina({"slice", corpus("parameter_quality_nut.stl"), "--format", "svg-polygon", "--walls", "1", "-o", "filled"},
+                 directory.path());
   EXPECT_EQ(filled.code, 2);
   EXPECT_NE(filled.err.find("--format svg-polygon: holds contours only"), std::string::npos) << filled.err;
 }

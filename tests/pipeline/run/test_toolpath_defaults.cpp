@@ -1,4 +1,5 @@
-// tests/pipeline/run/test_toolpath_defaults.cpp: what lamina extrude does unasked: points left out, a skirt, the firmware's name.
+// tests/pipeline/run/test_toolpath_defaults.cpp: what lamina extrude does unasked: points left out, a skirt, the firmware's
+// name.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -46,8 +47,7 @@ TEST(ToolpathDefaults, LeaveOutPointsUnlessAskedAndTheSameInAJobFile) {
   EXPECT_LT(unasked.summary["moves"].get<double>(), 0.5 * all.summary["moves"].get<double>());
   EXPECT_NEAR(unasked.summary["volume_mm3"].get<double>() / all.summary["volume_mm3"].get<double>(), 1, 0.01);
   // The saved job says what was done, and does it again.
-  const Outcome saved =
-      run_lamina(words_of("extrude " + job + " --save-job job.toml --quiet -o b.gcode"), directory.path());
+  const Outcome saved = run_lamina(words_of("extrude " + job + " --save-job job.toml --quiet -o b.gcode"), directory.path());
   ASSERT_EQ(saved.code, 0) << saved.err;
   EXPECT_NE(read_text(directory / "job.toml").find("tolerance_um = 10\n"), std::string::npos);
   const Outcome again = run_lamina(words_of("extrude --job job.toml --quiet -o c.gcode"), directory.path());
