@@ -94,6 +94,7 @@ TEST(LayersOfParts, PartsThatTouchShareTheirLayersOrAreRefused) {
 TEST(Containment, StepsOfContoursLieInsideOrOutsideOfBothSectionsOfALayer) {
   Job job = job_of({kCrown});
   job.heights.cusp_mm = 0.3;
+  job.slice.tolerance_um = 0;  // exact
   const Result<Plan> across = plan_of(job);
   job.heights.containment = Containment::kInside;
   const Result<Plan> inside = plan_of(job);
