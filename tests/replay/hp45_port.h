@@ -27,6 +27,7 @@ class Hp45Port {
     int row = 0;
     double along_um = 0, across_mm = 0;
     Nozzles nozzles;
+    bool steady = false;  // the speed was measured twice since the head rested
   };
 
   /// along, across  letters of the axes
@@ -46,7 +47,8 @@ class Hp45Port {
         motion(line);
       } else {
         serial(line);
-        for (int turn = 0; turn < 4; ++turn) loop();
+        for (int turn = 0; turn < 100; ++turn) loop();
+        measures_ = 0;
       }
     }
   }
@@ -89,6 +91,7 @@ class Hp45Port {
     rest(400'000);
   }
   void rest(double us) {
+    measures_ = 0;
     clock_ += us;
     loop();
   }
@@ -145,6 +148,7 @@ class Hp45Port {
       um_ = static_cast<long>(static_cast<double>(counted) * 25'400 / static_cast<double>(per_inch_));
       if (++pulses_ >= 50) {
         pulses_ = 0;
+        ++measures_;
         const double per_us = static_cast<double>(um_ - measured_um_) / (clock_ - measured_at_);
         velocity_ = static_cast<long>(per_us * 1000);
         direction_ = velocity_ > 0 ? 1 : velocity_ < 0 ? -1 : 0;
@@ -201,7 +205,7 @@ class Hp45Port {
     if (clocked && (rows_[0].on || rows_[1].on)) keep(fired, 0), keep(fired, 1);
   }
   void keep(std::vector<Seen>& into, int s) {
-    if (rows_[s].now.any()) into.push_back({s, x_ + (s == 1 ? 2025 : -2025), place_[across_], rows_[s].now});
+    if (rows_[s].now.any()) into.push_back({s, x_ + (s == 1 ? 2025 : -2025), place_[across_], rows_[s].now, measures_ > 1});
   }
   void look() {
     for (int s = 0; s < 2; ++s) {
@@ -221,7 +225,7 @@ class Hp45Port {
   int repeat_ = 1;
   long per_inch_ = 600, density_ = 100, counts_ = 0, base_ = 0, seen_ = 0, um_ = 0, measured_um_ = 0, velocity_ = 0,
        direction_ = 0;
-  int pulses_ = 0;
+  int pulses_ = 0, measures_ = 0;
   double zero_ = 0, measured_at_ = 0, delay_ = 0, burst_at_ = 0;
 };
 

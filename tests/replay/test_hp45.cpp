@@ -1,4 +1,5 @@
 // Programs for the HP45 controller against its firmware: the decoder of stages/replay/hp45 and the port beside this file.
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -8,12 +9,14 @@
 #include <optional>
 #include <set>
 #include <sstream>
+#include <tuple>
 
 #include "pipeline/machine/powder_printer.h"
 #include "pipeline/machine/profiles.h"
 #include "stages/load/load.h"
 #include "stages/program/compile.h"
 #include "stages/raster/raster.h"
+#include "stages/replay/hp45/controller.h"
 #include "stages/replay/machine.h"
 #include "stages/write/program/dialect.h"
 #include "tests/program/machines.h"
@@ -97,7 +100,7 @@ firmware::Hp45Port port_of(const ResolvedMachine& resolved) {
   const double offset = resolved.machine.mounting.offset_mm[x ? 0 : 1];
   firmware::Hp45Port port(x ? motion.x_axis[0] : motion.y_axis[0], x ? motion.y_axis[0] : motion.x_axis[0],
                           grid.step_position_nm(0) / 1000 + offset * 1000, grid.step_nm() / 1000);
-  port.tick_us = 1250 / motion.scan_speed_mm_s;  // 1.25 um
+  port.tick_us = 2500 / motion.scan_speed_mm_s;  // 2.5 um
   return port;
 }
 
@@ -107,14 +110,17 @@ Difference port_difference(const ResolvedMachine& resolved, const RunsView& imag
   firmware::Hp45Port port = port_of(resolved);
   port.run(text);
   EXPECT_EQ(port.unknown, 0u);
-  std::set<Pixel> once;
+  std::vector<bool> once(std::size_t{grid.columns()} * grid.rows());
   Difference difference;
   for (const auto& seen : port.shown) {
     for (std::uint32_t n = 0; n < 300; ++n) {
       if (!seen.nozzles[n]) continue;
       const Pixel pixel = pixel_of(resolved, machine, seen, 299 - n);
       ++difference.fired;
-      difference.added += !is_set(image, pixel) || !once.insert(pixel).second;
+      const bool wanted = is_set(image, pixel);
+      const std::size_t place = wanted ? static_cast<std::size_t>(pixel.second * grid.columns() + pixel.first) : 0;
+      difference.added += !wanted || once[place];
+      if (wanted) once[place] = true;
     }
   }
   difference.missing = set_pixels(image) - (difference.fired - difference.added);
@@ -179,10 +185,10 @@ TEST(Hp45, TwelveLayersOfFivePartsAreFiredExactlyByTheDecoderAndByThePort) {
     const char* file;
     const Machine& machine;
     double side_mm, margin_mm;
-  } cases[] = {{"parameter_quality_nut.stl", plain, 30, 0},
-               {"dental_crown.stl", both, 26, 3},
-               {"nist_am_test_artifact_v3b.stl", oasis, 30, 0},
-               {"quad_knot.obj", blocked, 18, 0},
+  } cases[] = {{"parameter_quality_nut.stl", plain, 16, 0},
+               {"dental_crown.stl", both, 15, 2},
+               {"nist_am_test_artifact_v3b.stl", oasis, 26, 0},
+               {"quad_knot.obj", blocked, 14, 0},
                {"rabbit_9_overlapping_shells.obj", turned, 12, 1}};
   std::uint64_t drops = 0, layers = 0;
   for (const auto& one : cases) {
@@ -203,7 +209,7 @@ TEST(Hp45, TwelveLayersOfFivePartsAreFiredExactlyByTheDecoderAndByThePort) {
     }
   }
   EXPECT_EQ(layers, 60u);
-  EXPECT_GT(drops, 1'000'000u);
+  EXPECT_GT(drops, 500'000u);
 }
 
 Lines lines_of(const std::string& text) {
@@ -378,6 +384,86 @@ TEST(Hp45, AuthorsExampleFiresAQuarterOfTheNozzlesForTenMillimetresEach) {
     if (std::abs(at / 10 - std::round(at / 10)) < 0.005) continue;  // a count of the encoder
     EXPECT_EQ(nozzles.count(step) != 0 ? nozzles[step].size() : 0u, at > 10 && at < 50 ? 75u : 0u) << at;
   }
+}
+
+/// What a row shows at a point between the counts of the encoder: row, point, nozzles.
+using Shown = std::tuple<int, std::int64_t, std::string>;
+
+/// The decoder's controller, fed as the port is; lines that it refuses are left out of the text.
+class Hp45Stream {
+ public:
+  std::string text = "SER JY\n";
+  std::vector<Shown> shown;
+
+  void say(const std::string& command, const std::string& rest) {
+    if (controller_.execute(command, rest).empty()) text += command + " " + rest + "\n";
+  }
+  void go(std::int64_t counts) {
+    text += fmt::format("G1 X{:.6f} F15000\nG4 P0\n", static_cast<double>(counts) * 25.4 / 600);
+    controller_.move(static_cast<double>(counts) * kCountUm, [&](const replay::hp45::Controller::Firing& firing) {
+      const double least = std::min(firing.from_um, firing.to_um), most = std::max(firing.from_um, firing.to_um);
+      for (auto k = static_cast<std::int64_t>(std::ceil(least / kCountUm));
+           firing.steady && static_cast<double>(k) * kCountUm < most; ++k) {
+        std::string nozzles;
+        for (std::uint32_t place = 0; place < 300; ++place) {
+          nozzles += ((*firing.burst)[place / 64] >> (63 - place % 64) & 1) != 0 ? '1' : '0';
+        }
+        shown.emplace_back(static_cast<int>(firing.row), k, nozzles);
+      }
+    });
+  }
+  static constexpr double kCountUm = 25'400.0 / 600;
+
+ private:
+  replay::hp45::Controller controller_;
+};
+
+std::string in_base64(std::int64_t value) {
+  static const std::string digits = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+  std::string text;
+  for (std::int64_t left = std::abs(value); left != 0 || text.empty(); left /= 64)
+    text.insert(0, 1, digits[static_cast<std::size_t>(left % 64)]);
+  return (value < 0 ? "-" : "") + text;
+}
+
+// Lines in any order, rewinds, clearings and movements to and fro: what no host sends either.
+TEST(Hp45, DecoderAndPortAgreeOnRandomStreams) {
+  std::size_t points = 0;
+  for (std::uint32_t seed = 0; seed < 60; ++seed) {
+    program::testing::Random random(seed);
+    const auto below = [&](std::uint32_t most) { return static_cast<std::int64_t>(random() % most); };
+    Hp45Stream stream;
+    stream.go(below(800) - 400);
+    for (int turn = 0; turn < 6; ++turn) {
+      if (turn == 0 || below(3) == 0) stream.say("SEP", in_base64((below(600) - 300) * 127));  // a whole count is every 127 um
+      if (below(2) == 0) stream.say("BCL", "");
+      std::int64_t at = below(40'000) - 20'000;
+      const std::int64_t pace = below(2) == 0 ? 1 : -1;
+      for (std::int64_t line = below(12); line-- > 0; at += pace * below(4000) - (below(5) == 0 ? 3000 : 0)) {
+        std::string nozzles(50, 'A');
+        for (int set = 0; set < 4; ++set) nozzles[random() % 50] = static_cast<char>('B' + below(20));
+        stream.say("SBR", in_base64(at) + " " + (below(4) == 0 ? std::string(50, 'A') : nozzles));
+      }
+      if (below(4) == 0) stream.say(below(2) == 0 ? "BRES" : "BCL", "");
+      stream.go(below(1600) - 800);
+    }
+    firmware::Hp45Port port('X', 'Y', 0, Hp45Stream::kCountUm);
+    port.tick_us = 10;
+    port.run(stream.text);
+    std::vector<Shown> shown;
+    for (const auto& seen : port.shown) {
+      if (seen.steady)
+        shown.emplace_back(seen.row, std::llround(seen.along_um / Hp45Stream::kCountUm), seen.nozzles.to_string());
+    }
+    for (auto* one : {&shown, &stream.shown}) {
+      std::stable_sort(one->begin(), one->end(),
+                       [](const Shown& a, const Shown& b) { return std::get<0>(a) < std::get<0>(b); });
+    }
+    ASSERT_EQ(shown.size(), stream.shown.size()) << seed << "\n" << stream.text;
+    EXPECT_TRUE(shown == stream.shown) << seed << "\n" << stream.text;
+    points += shown.size();
+  }
+  EXPECT_GT(points, 10'000u);
 }
 
 // The firmware's bursts come by the clock: the numbers of drops are those of the image to a percent or so, and none falls more

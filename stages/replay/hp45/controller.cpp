@@ -142,29 +142,27 @@ std::int32_t Controller::write_left() const {
   return std::min(left(0), left(1));
 }
 
-// PositionSetBaseEncoderPositionMicrons: map() rounds towards zero. Position.ino takes the jump at its next turn.
+// PositionSetBaseEncoderPositionMicrons: map() rounds towards zero. The jump counts as a pulse; the head is at rest.
 void Controller::set_encoder(std::int32_t position_um) {
-  raw_ = static_cast<std::int32_t>(std::int64_t{position_um} * counts_per_inch_ / 25'400);
+  const auto raw = static_cast<std::int32_t>(std::int64_t{position_um} * counts_per_inch_ / 25'400);
+  if (raw != raw_) {
+    raw_ = raw;
+    update_position();
+  }
+  measures_ = 0;
   raw_zero_ = raw_;
   zero_um_ = at_um_;
   zeroed_ = true;
-  new_row_positions();
   update();
 }
 
-// PositionUpdate: micrometres of the count, and of both rows.
-void Controller::new_row_positions() {
+// PositionUpdate after a new count: micrometres, positions of both rows, and every 50 pulses the direction and the speed.
+void Controller::update_position() {
   float um = static_cast<float>(raw_) * 25'400.0f;
   um /= static_cast<float>(counts_per_inch_);
   base_um_ = static_cast<std::int32_t>(um);
   current_[1] = static_cast<std::int32_t>(static_cast<float>(kRowGapUm) / 2.0f + static_cast<float>(base_um_));
   current_[0] = current_[1] - kRowGapUm;
-}
-
-// PositionUpdate: every 50 pulses the direction and the speed.
-void Controller::update_position(int direction) {
-  raw_ += direction;
-  new_row_positions();
   if (++pulses_ < kSpeedPulses) return;
   pulses_ = 0;
   ++measures_;
@@ -255,7 +253,8 @@ void Controller::move(double to_um, const Watch& watch) {
     fire(from, until, watch);
     if (done) break;
     from = until;
-    update_position(direction);
+    raw_ += direction;
+    update_position();
   }
   at_um_ = to_um;
   measures_ = 0;  // the speed is 0 after POSITION_STEP_TIMEOUT

@@ -59,8 +59,7 @@ class Controller {
   std::string set(std::string_view command, std::int32_t value);
   std::string add(std::int32_t position, std::string_view raw);
   void set_encoder(std::int32_t position_um);
-  void update_position(int direction);
-  void new_row_positions();
+  void update_position();
   void clear_buffer();
   std::int32_t read_left(std::uint32_t side) const;
   std::int32_t write_left() const;

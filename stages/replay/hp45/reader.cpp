@@ -162,7 +162,12 @@ void Hp45Reader::move(const GcodeLine& line) {
 void Hp45Reader::take_firing(const hp45::Controller::Firing& firing) {
   Stretch& now = stretch_[firing.row];
   if (now.any && (now.line != firing.line || std::abs(firing.from_um - now.to_um) > 1e-3)) end_stretch(firing.row);
-  if (!now.any) now = {firing.line, 0, firing.from_um, firing.to_um, true};
+  if (!now.any) {
+    now = {firing.line, 0, firing.from_um, firing.to_um, true};
+    // The encoder's counts put the line's begin beside the edge of its step.
+    const double begin = step_of(firing.from_um), beside = std::abs(begin - std::floor(begin) - 0.5) * step_um_;
+    printing_.count.farthest_along_um = std::max(printing_.count.farthest_along_um, beside);
+  }
   now.to_um = firing.to_um;
   if (!firing.steady) ++hurried_;
   const double from = step_of(firing.from_um), to = step_of(firing.to_um);

@@ -26,7 +26,7 @@ constexpr std::array<Dialect, 7> kDialects = {{
     {"hp45", ".hp45", "HP45 controller V4, firmware 0.08: SBR lines for it, G-code for a motion controller beside it", 300, 0,
      true, hp45::make_writer, hp45::check},
     {"oasis", ".oasis", "Oasis: an HP45 controller V4 and GRBL, with the new layer of the Oasis controller", 300, 0, true,
-     oasis::make_writer, hp45::check},
+     oasis::make_writer, oasis::check},
     {"brundlefab", ".gcode", "G-code of the BrundleFab, whose Y loads an ink bar of 840 dots: T1 P, 12 nozzles", 12, 0, true,
      brundlefab::make_writer, brundlefab::check},
     {"m578", ".gcode", "M578 S of RepRapFirmware 1.09r to 3.4 built with inkjet support: one head, 12 nozzles, a stop a pixel",

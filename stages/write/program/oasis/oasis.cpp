@@ -1,5 +1,7 @@
 #include "stages/write/program/oasis/oasis.h"
 
+#include <fmt/format.h>
+
 #include "stages/write/program/hp45/head.h"
 #include "stages/write/program/program_text.h"
 
@@ -66,6 +68,11 @@ void Writer::begin_layer(const LayerCycle& cycle, ProgramBytes& out) {
 }
 
 }  // namespace
+
+Status check(const Machine& machine, const HeadGrid& grid) {
+  if (machine.powder.vats == 1) return hp45::check(machine, grid);
+  return Error{Fault::kUsage, fmt::format("{}: powder.vats: Oasis has one feed piston; give 1", machine.name)};
+}
 
 std::unique_ptr<ProgramWriter> make_writer(const Machine& machine, const HeadGrid& grid) {
   return std::make_unique<Writer>(machine, grid);

@@ -5,6 +5,8 @@
 
 namespace lamina::write::oasis {
 
+/// errors  kUsage: those of hp45, and two vats
+Status check(const Machine& machine, const HeadGrid& grid);
 std::unique_ptr<ProgramWriter> make_writer(const Machine& machine, const HeadGrid& grid);
 
 }  // namespace lamina::write::oasis
