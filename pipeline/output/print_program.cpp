@@ -96,8 +96,9 @@ std::uint64_t PrintProgram::bytes_bound(std::uint64_t changes) const {
   // A sweep's vectors with their text of at most three times the size, lines, sorted changes and their steps.
   const std::uint64_t vectors = grid.steps() * grid.words() * 8;
   const std::uint64_t turned = grid.scan_axis == ScanAxis::kX ? 4 * changes : 16 * changes;
-  // The timer keeps a layer's text, but for vectors of nuferbj.
-  const std::uint64_t kept = !dialect_.has_motion || dialect_.id == "nuferbj" ? 0 : grid.swaths(0) * grid.passes * 3 * vectors;
+  // The timer keeps a layer's text, but for vectors of nuferbj, hp45 and oasis.
+  const std::uint64_t kept =
+      !dialect_.has_motion || replay::Timer::keeps_no_vectors(dialect_.id) ? 0 : grid.swaths(0) * grid.passes * 3 * vectors;
   return 4 * vectors + 4 * grid.steps() + 16 * grid.lines + 2 * changes + turned + kept + (512 << 10);
 }
 

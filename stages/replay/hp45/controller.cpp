@@ -48,7 +48,7 @@ bool nothing(const Burst& burst) {
 
 }  // namespace
 
-Controller::Controller() : burst_(kBufferSize), position_(kBufferSize) {}
+Controller::Controller(double at_um) : burst_(kBufferSize), position_(kBufferSize), at_um_(at_um), zero_um_(at_um) {}
 
 std::string Controller::execute(std::string_view command, std::string_view rest) {
   if (command.size() + 1 + rest.size() + 1 > kLongestLine) return "the line is longer than the controller's block";

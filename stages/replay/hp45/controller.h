@@ -23,7 +23,8 @@ using Burst = std::array<std::uint64_t, 5>;
 
 class Controller {
  public:
-  Controller();
+  /// at_um  where the head stands along the scan
+  explicit Controller(double at_um = 0);
 
   /// Carries out a line, as SerialCommand::Update and SerialExecute do, with the head at rest.
   /// command  letters before the first blank; rest: what follows it

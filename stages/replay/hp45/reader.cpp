@@ -20,7 +20,12 @@ constexpr double kBurstsPerInch = 600;
 class Hp45Reader {
  public:
   Hp45Reader(std::string_view text, Printing& printing, bool oasis)
-      : printing_(printing), reader_(text, printing), axes_(printing, reader_), scan_(printing.profile()), oasis_(oasis) {
+      : printing_(printing),
+        reader_(text, printing),
+        axes_(printing, reader_),
+        scan_(printing.profile()),
+        controller_(axes_.at(scan_.along) * 1000),
+        oasis_(oasis) {
     const double pitch = printing.position_of(1) - printing.position_of(0);
     step_um_ = std::abs(pitch) * 1000;
     grows_ = pitch > 0;
@@ -239,7 +244,9 @@ void Hp45Reader::spread(const GcodeLine& line) {
   if (line.command == "M5") {
     if (!spreading_) return reader_.fault("M5 stops a spreader that does not turn");
     printing_.roller_stands_at(axes_.at(powder.roller_axis));
-    printing_.roller_stands_at(powder.roller_mm[0]);  // it does not touch the powder on the way back
+    // On the gantry it does not touch the powder on the way back.
+    if (powder.roller_axis == scan_.along || powder.roller_axis == scan_.across)
+      printing_.roller_stands_at(powder.roller_mm[0]);
   } else if (std::abs(axes_.at(powder.roller_axis) - powder.roller_mm[0]) > 1e-3) {
     return reader_.fault(
         fmt::format("the spreader starts at {:g} mm, not at {:g}", axes_.at(powder.roller_axis), powder.roller_mm[0]));

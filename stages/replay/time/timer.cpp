@@ -10,17 +10,26 @@
 namespace lamina::replay {
 namespace {
 
-/// Appends the lines but for those that load vectors, J<step> and R<count>.
-void add_without_vectors(std::string_view lines, std::string& text) {
+/// Whether a line loads vectors: J<step> and R<count> of nuferbj, SBR of the HP45 controller.
+bool loads(std::string_view line, bool nuferbj) {
+  return nuferbj ? line[0] == 'J' || line[0] == 'R' : line.starts_with("SBR ");
+}
+
+/// Appends the lines but for those that load vectors.
+void add_without_vectors(std::string_view lines, bool nuferbj, std::string& text) {
   while (!lines.empty()) {
     const std::size_t end = lines.find('\n');
     const std::string_view line = lines.substr(0, end == std::string_view::npos ? end : end + 1);
-    if (line[0] != 'J' && line[0] != 'R') text += line;
+    if (!loads(line, nuferbj)) text += line;
     lines.remove_prefix(line.size());
   }
 }
 
 }  // namespace
+
+bool Timer::keeps_no_vectors(std::string_view dialect) {
+  return dialect == "nuferbj" || dialect == "hp45" || dialect == "oasis";
+}
 
 void Timer::begin(const Layer& layer) {
   layer_ = layer;
@@ -30,8 +39,9 @@ void Timer::begin(const Layer& layer) {
 
 void Timer::read(std::span<const std::byte> lines) {
   const std::string_view text(reinterpret_cast<const char*>(lines.data()), lines.size());
-  if (machine_->profile().dialect == "nuferbj") {
-    add_without_vectors(text, text_);
+  const std::string& dialect = machine_->profile().dialect;
+  if (keeps_no_vectors(dialect)) {
+    add_without_vectors(text, dialect == "nuferbj", text_);
   } else {
     text_ += text;
   }

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "stages/data/layer.h"
@@ -20,8 +21,11 @@ class Timer {
   /// machine  outlives this object
   explicit Timer(const VirtualMachine& machine) : machine_(&machine) {}
 
+  /// Whether read() leaves the lines out that load vectors.
+  static bool keeps_no_vectors(std::string_view dialect);
   void begin(const Layer& layer);
-  /// Dialects with motion: the next lines of the program, whole ones. Memory: the layer's text, without the vectors of nuferbj.
+  /// Dialects with motion: the next lines of the program, whole ones. Memory: the layer's text, without the vectors of nuferbj,
+  /// hp45 and oasis.
   void read(std::span<const std::byte> lines);
   /// Dialects without: the next sweep, by its first and last step that fire, in the order of the movement.
   /// across_mm  of the carriage

@@ -10,6 +10,8 @@ namespace {
 
 // SerialGRBL.py: how far pistons go down before they come up, and how far they stay below the spreader's way afterwards.
 constexpr double kHysteresisMm = 1, kClearanceMm = 0.25;
+// Where homing leaves the gantry.
+constexpr double kHomeMm[] = {5, 245};
 
 class Writer final : public ProgramWriter {
  public:
@@ -17,19 +19,27 @@ class Writer final : public ProgramWriter {
 
   void start(std::uint32_t, ProgramBytes& out) override {
     const auto& motion = machine_.motion;
-    put(out, "$h\nG92 {}{} {}{}\n", motion.x_axis, mm_text(motion.safe_mm[0]), motion.y_axis, mm_text(motion.safe_mm[1]));
+    put(out, "$h\nG92 {}{} {}{}\n", motion.x_axis, mm_text(kHomeMm[0]), motion.y_axis, mm_text(kHomeMm[1]));
     put(out, "G21\nG90\nG92 {}0 {}0\n", machine_.powder.build_axis, machine_.powder.feed_axes[0]);
+    go(motion.safe_mm[0], motion.safe_mm[1], out);
   }
   void begin_layer(const LayerCycle& cycle, ProgramBytes& out) override;
   void sweep(const Sweep& sweep, const SweepVectors& vectors, ProgramBytes& out) override { head_.sweep(sweep, vectors, out); }
-  void end_layer(const LayerCycle&, ProgramBytes& out) override { put(out, "BRL\n"); }
+  void end_layer(const LayerCycle&, ProgramBytes& out) override {
+    go(machine_.motion.safe_mm[0], machine_.motion.safe_mm[1], out);
+    hp45::Head::wait(out);
+    put(out, "BRL\n");
+  }
   void end(ProgramBytes& out) override {
-    const auto& motion = machine_.motion;
-    put(out, "BCL\nG1 {}{} {}{} F{}\n", motion.x_axis, mm_text(motion.safe_mm[0]), motion.y_axis, mm_text(motion.safe_mm[1]),
-        feed_text(motion.travel_speed_mm_s));
+    put(out, "BCL\n");
+    go(kHomeMm[0], kHomeMm[1], out);
   }
 
  private:
+  void go(double x_mm, double y_mm, ProgramBytes& out) const {
+    put(out, "G1 {}{} {}{} F{}\n", machine_.motion.x_axis, mm_text(x_mm), machine_.motion.y_axis, mm_text(y_mm),
+        feed_text(machine_.motion.travel_speed_mm_s));
+  }
   void build_to(double mm, ProgramBytes& out) const {
     put(out, "G1 {}{} F{}\n", machine_.powder.build_axis, mm_text(machine_.powder.build_sign * mm),
         feed_text(machine_.powder.vat_speed_mm_s));
@@ -42,16 +52,13 @@ class Writer final : public ProgramWriter {
   hp45::Head head_;
 };
 
-// SerialGRBL.py, NewLayer: the gantry to the back, pistons to their places, the spreader to the front, pistons down clear.
-// The build piston's places are absolute here, so that a layer does not depend on those before it.
+// SerialGRBL.py, NewLayer, from the back, where each layer ends: pistons to their places, the spreader to the front, pistons
+// down clear. The build piston's places are absolute here, so that a layer does not depend on those before it.
 void Writer::begin_layer(const LayerCycle& cycle, ProgramBytes& out) {
   const auto& powder = machine_.powder;
-  const auto& motion = machine_.motion;
   const auto mm_of = [](std::int64_t nm) { return static_cast<double>(nm) / kNmPerMm; };
   const double bottom = mm_of(cycle.bottom_nm), top = mm_of(cycle.bottom_nm + cycle.thickness_nm);
   head_.settings(out);
-  put(out, "G1 {}{} {}{} F{}\n", powder.roller_axis, mm_text(powder.roller_mm[0]), motion.y_axis,
-      mm_text(motion.safe_mm[1] - 5), feed_text(motion.travel_speed_mm_s));
   build_to(bottom + kHysteresisMm, out);
   build_to(top - kClearanceMm, out);
   put(out, "G91\n");
@@ -64,6 +71,9 @@ void Writer::begin_layer(const LayerCycle& cycle, ProgramBytes& out) {
   feed_by(-kHysteresisMm, out);
   feed_by(kHysteresisMm - kClearanceMm, out);
   put(out, "G90\n");
+  if (powder.roller_axis != machine_.motion.x_axis && powder.roller_axis != machine_.motion.y_axis) {  // not on the gantry
+    put(out, "G1 {}{} F{}\n", powder.roller_axis, mm_text(powder.roller_mm[0]), feed_text(powder.roller_speed_mm_s));
+  }
   hp45::Head::wait(out);
 }
 
