@@ -116,7 +116,7 @@ const OptionSpec kJetSwitches[] = {
      "Machine and binder"},
     {"--resume", "", "go on with an interrupted job; finished layers whose hash holds are kept", "", "Run"},
     {"--overwrite", "", "replace an earlier job in the directory", "", "Run"},
-    {"--dry-run", "", "load, place and index, tell what it would take, write nothing", "", "Run"}};
+    {"--dry-run", "", "load, place and index, tell what it takes and how long it prints, write nothing", "", "Run"}};
 
 std::string jet_closing() {
   std::string text = "Formats:\n";
