@@ -113,9 +113,10 @@ Status ToolpathFile::open() {
   head.machine_profile = hash_bytes(std::as_bytes(std::span(profile)));
   Buffer<char> start;
   format_->head({fmt::format("lamina {}", version()), source_text(plan_), layers(), plan_.segments->any()}, start);
-  auto file =
-      LayeredFile::open({job.output, manifest_path(job), job.resume, job.overwrite, job.sync, write::is_stream(job.output)},
-                        head, {start.data(), start.size()});
+  const bool streams = job.dry_run || write::is_stream(job.output);
+  auto file = LayeredFile::open({job.dry_run ? "/dev/null" : job.output, manifest_path(job), job.resume && !job.dry_run,
+                                 job.overwrite, job.sync, streams},
+                                head, {start.data(), start.size()});
   if (!file) return file.error();
   file_.emplace(std::move(*file));
   return {};
@@ -128,7 +129,7 @@ std::unique_ptr<write::LayerMoves> ToolpathFile::layer(const Layer& layer, Buffe
 Result<std::uint64_t> ToolpathFile::finish(const write::MoveTotals& totals) {
   if (file_->finished()) return file_->size();
   std::optional<write::File> beside;
-  if (plan_.moves->profile.machine.format == "sml") {
+  if (plan_.moves->profile.machine.format == "sml" && !plan_.job.dry_run) {
     const auto table = layer_table(plan_);
     if (!table) return table.error();
     write::FileOptions how{.replace = plan_.job.overwrite || plan_.job.resume};
@@ -143,7 +144,7 @@ Result<std::uint64_t> ToolpathFile::finish(const write::MoveTotals& totals) {
   format_->tail(totals, layers(), end);
   return file_->finish({end.data(), end.size()}, [&]() -> Status {
     std::error_code error;  // the older manifest goes before anything that it speaks of
-    if (!write::is_stream(plan_.job.output)) fs::remove(manifest_path(plan_.job), error);
+    if (!plan_.job.dry_run && !write::is_stream(plan_.job.output)) fs::remove(manifest_path(plan_.job), error);
     if (error) return Error{Fault::kOutput, fmt::format("{}: {}", manifest_path(plan_.job), error.message())};
     const auto named = beside ? beside->finish() : FileDigest();
     return named ? Status() : Status(named.error());

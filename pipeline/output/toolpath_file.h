@@ -23,7 +23,7 @@ class ToolpathFile {
   /// The plan must outlive this object.
   explicit ToolpathFile(const Plan& plan);
 
-  /// errors  of LayeredFile::open
+  /// A dry run writes to nowhere. errors  of LayeredFile::open
   Status open();
   LayeredFile& file() { return *file_; }
   const LayeredFile& file() const { return *file_; }

@@ -96,10 +96,12 @@ class MoveMaker : public Maker {
   std::uint64_t bytes_held(std::uint32_t work) const override { return work_[work].bytes(); }
   void let_go(std::uint32_t work) override { work_[work] = Sections::Work(); }
 
+  bool times_dry_runs() const override { return true; }
+  bool keeps() const override { return !plan_.job.dry_run; }
   Status finish() override {
     const auto bytes = file_.finish(sums_.totals);
     if (!bytes) return bytes.error();
-    bytes_written_ = *bytes;
+    bytes_written_ = plan_.job.dry_run ? 0 : *bytes;
     return {};
   }
   Status stop(bool keep) override {

@@ -208,6 +208,20 @@ TEST_F(ExtrudeProgram, VolumesPlacesAndLayersOfAFileAreThoseOfThePlan) {
   }
 }
 
+TEST_F(ExtrudeProgram, ADryRunTellsTheTimeAndTheMaterialOfTheRunAndWritesNothing) {
+  const std::string call = "extrude " + block(12, 9, 1.2, 2) + " --machine marlin --layer 0.3 --quiet --json";
+  const auto dry = run(call + " --dry-run"), real = run(call + " -o " + file("a.gcode"));
+  ASSERT_EQ(dry.code, 0) << dry.err;
+  ASSERT_EQ(real.code, 0) << real.err;
+  for (const char* key : {"print_seconds", "filament_mm", "moves", "travel_mm", "volume_mm3"}) {
+    EXPECT_EQ(dry.json()[key], real.json()[key]) << key;
+  }
+  EXPECT_GT(dry.json()["print_seconds"].get<double>(), 10);
+  EXPECT_EQ(dry.json()["bytes_written"], 0);
+  EXPECT_EQ(run(call + " --dry-run -o " + file("b.gcode")).code, 0);
+  EXPECT_FALSE(fs::exists(file("b.gcode")));
+}
+
 TEST_F(ExtrudeProgram, ClosedCurvesAreSegmentedFromTheOutsideInWithThickSeams) {
   const std::string part = block(30, 20, 1.2, 4);
   const Outcome result = run("extrude --overwrite " + part +
