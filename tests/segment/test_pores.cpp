@@ -79,7 +79,7 @@ TEST(Pores, NeedALineBesideAllOfThemAndRoom) {
   plan.rule = CutRule::kGrid;
   const PoreCounts grid = pores_of(parallel_lines(0.43, 3), cut_along_x(plan), plan);
   EXPECT_EQ(grid.closed, 2 * 6);
-  EXPECT_EQ(grid.edges, 2 * 6 + 2);
+  EXPECT_EQ(grid.edges, 2 * 6 + 2 * 2);
 }
 
 TEST(Pores, LieBesideClosedCurvesToo) {
