@@ -23,12 +23,12 @@ std::string label_of(std::string_view name) {
 bool is_hatch(const ToolpathsView& paths, std::uint32_t stretch) { return paths.kind[stretch] == PathKind::kRaster; }
 
 // Text; commands of 32 bits with floats; commands of 16 bits with whole units.
-enum class Form { kText, kLong, kShort };
+enum class CliForm { kText, kLong, kShort };
 
-struct Codes {
+struct CommandCodes {
   std::uint16_t layer, polyline, hatches;
 };
-constexpr Codes kLongCodes{127, 130, 132}, kShortCodes{128, 129, 131};
+constexpr CommandCodes kLongCodes{127, 130, 132}, kShortCodes{128, 129, 131};
 constexpr std::int64_t kMostShort = 65535;
 
 /// nm of a unit: of 1, 2 and 5 times a power of ten, in which heights of layers come out even, the least of which 16 bits
@@ -45,14 +45,14 @@ std::int64_t in_units(std::int64_t nm, std::int64_t unit) { return nm < 0 ? -1 :
 
 class CliEncoder : public SliceEncoder {
  public:
-  CliEncoder(Form form, bool empty_first_layer) : form_(form), empty_first_(empty_first_layer) {}
+  CliEncoder(CliForm form, bool empty_first_layer) : form_(form), empty_first_(empty_first_layer) {}
 
   Status check(const SliceHead& head, const SliceLayer& layer) const override;
 
   // The number of units has six decimals in every form, which costs nothing: a reader in the field cuts its line two
   // characters short.
   void head(const SliceHead& head, Buffer<char>& out) const override {
-    const std::int64_t unit = form_ == Form::kShort ? short_unit(head) : kNmPerMm;
+    const std::int64_t unit = form_ == CliForm::kShort ? short_unit(head) : kNmPerMm;
     append(out, fmt::format("$$HEADERSTART\n$${}\n$$UNITS/{:.6f}\n$$VERSION/200\n", text() ? "ASCII" : "BINARY", mm(unit)));
     for (std::size_t b = 0; b < head.parts.size(); ++b) {
       append(out, fmt::format("$$LABEL/{},{}\n", b + 1, label_of(head.parts[b])));
@@ -70,7 +70,7 @@ class CliEncoder : public SliceEncoder {
   }
 
   void layer(const SliceHead& head, const SliceLayer& layer, Buffer<char>& out) const override {
-    File file{form_, form_ == Form::kShort ? short_unit(head) : kNmPerMm, out};
+    File file{form_, form_ == CliForm::kShort ? short_unit(head) : kNmPerMm, out};
     file.begin_layer(std::int64_t{layer.layer.bottom} + layer.layer.thickness);
     for (std::size_t b = 0; b + 1 < layer.body.size(); ++b) {
       const auto id = static_cast<std::uint32_t>(b + 1);
@@ -90,11 +90,11 @@ class CliEncoder : public SliceEncoder {
   }
 
  private:
-  bool text() const { return form_ == Form::kText; }
+  bool text() const { return form_ == CliForm::kText; }
 
   /// The commands of a file.
   struct File {
-    Form form;
+    CliForm form;
     std::int64_t unit;  // nm
     Buffer<char>& out;
 
@@ -103,17 +103,17 @@ class CliEncoder : public SliceEncoder {
       for (std::size_t i = 0; i < sizeof value; ++i) out.push_back(static_cast<char>(value >> (8 * i) & 0xFF));
     }
     void put_number(std::uint32_t value) {
-      if (form == Form::kShort) return put_little_endian(static_cast<std::uint16_t>(value));
+      if (form == CliForm::kShort) return put_little_endian(static_cast<std::uint16_t>(value));
       put_little_endian(value);
     }
     void put_length(std::int64_t nm) {
-      if (form == Form::kShort) return put_little_endian(static_cast<std::uint16_t>(in_units(nm, unit)));
+      if (form == CliForm::kShort) return put_little_endian(static_cast<std::uint16_t>(in_units(nm, unit)));
       put_little_endian(std::bit_cast<std::uint32_t>(static_cast<float>(mm(nm))));
     }
-    const Codes& codes() const { return form == Form::kShort ? kShortCodes : kLongCodes; }
+    const CommandCodes& codes() const { return form == CliForm::kShort ? kShortCodes : kLongCodes; }
 
     void begin_layer(std::int64_t top) {
-      if (form != Form::kText) {
+      if (form != CliForm::kText) {
         put_little_endian(codes().layer);
         return put_length(top);
       }
@@ -123,7 +123,7 @@ class CliEncoder : public SliceEncoder {
     }
 
     void points(std::span<const Point2> points) {
-      if (form != Form::kText) {
+      if (form != CliForm::kText) {
         for (const Point2 p : points) {
           put_length(p.x);
           put_length(p.y);
@@ -143,9 +143,9 @@ class CliEncoder : public SliceEncoder {
 
     /// A closed one ends with its first point.
     void polyline(std::uint32_t id, Direction direction, std::span<const Point2> line, bool closed) {
-      if (form == Form::kShort) return short_polyline(id, direction, line, closed);
+      if (form == CliForm::kShort) return short_polyline(id, direction, line, closed);
       const auto count = static_cast<std::uint32_t>(line.size() + (closed ? 1 : 0));
-      if (form == Form::kLong) {
+      if (form == CliForm::kLong) {
         put_little_endian(codes().polyline);
         for (const std::uint32_t field : {id, static_cast<std::uint32_t>(direction), count}) put_number(field);
       } else {
@@ -153,7 +153,7 @@ class CliEncoder : public SliceEncoder {
       }
       points(line);
       if (closed) points(line.first(1));
-      if (form == Form::kText) out.push_back('\n');
+      if (form == CliForm::kText) out.push_back('\n');
     }
 
     /// Points that fall on the one before are left out, and contours of which less than three are left. Open lines beyond
@@ -194,7 +194,7 @@ class CliEncoder : public SliceEncoder {
         if (!hatch) {
           polyline(id, kOpen, paths.point.subspan(begin, end - begin + 1), false);
         } else {
-          if (form != Form::kText) {
+          if (form != CliForm::kText) {
             put_little_endian(codes().hatches);
             put_number(id);
             put_number(end - begin);
@@ -202,19 +202,19 @@ class CliEncoder : public SliceEncoder {
             append(out, fmt::format("$$HATCHES/{},{}", id, end - begin));
           }
           for (std::uint32_t i = begin; i < end; ++i) points(paths.point.subspan(i, 2));
-          if (form == Form::kText) out.push_back('\n');
+          if (form == CliForm::kText) out.push_back('\n');
         }
         begin = end;
       }
     }
   };
 
-  Form form_;
+  CliForm form_;
   bool empty_first_;
 };
 
 Status CliEncoder::check(const SliceHead& head, const SliceLayer& layer) const {
-  if (form_ != Form::kShort) return {};
+  if (form_ != CliForm::kShort) return {};
   const std::int64_t unit = short_unit(head);
   const auto refuse = [&](const std::string& what) {
     return Error{Fault::kUsage, fmt::format("layer {}: --format cli-16: {}, or choose cli-binary", layer.layer.index, what)};
@@ -250,10 +250,10 @@ Status CliEncoder::check(const SliceHead& head, const SliceLayer& layer) const {
 }  // namespace
 
 std::unique_ptr<SliceEncoder> make_cli_encoder(bool binary, const SliceFormatOptions& options) {
-  return std::make_unique<CliEncoder>(binary ? Form::kLong : Form::kText, options.empty_first_layer);
+  return std::make_unique<CliEncoder>(binary ? CliForm::kLong : CliForm::kText, options.empty_first_layer);
 }
 std::unique_ptr<SliceEncoder> make_cli_16_encoder(const SliceFormatOptions& options) {
-  return std::make_unique<CliEncoder>(Form::kShort, options.empty_first_layer);
+  return std::make_unique<CliEncoder>(CliForm::kShort, options.empty_first_layer);
 }
 
 }  // namespace lamina::write
