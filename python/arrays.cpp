@@ -54,8 +54,9 @@ const write::ImageFormat& format_of(const std::string& path, const std::string& 
 write::Bytes encode(const Image& image, const write::ImageFormat& format) {
   return without_lock([&]() -> Result<write::Bytes> {
     write::Bytes file;
-    if (Status status = format.make_encoder()->encode(image.runs, image.dpi_x, image.dpi_y, file); !status)
-      return status.error();
+    const auto encoder = format.make_encoder();
+    encoder->tag(image.tags);
+    if (Status status = encoder->encode(image.runs, image.dpi_x, image.dpi_y, file); !status) return status.error();
     return file;
   });
 }
@@ -200,7 +201,7 @@ void define_image(py::module_& module) {
           "save",
           [](const Image& image, const std::string& path, const std::string& format) {
             const write::ImageFormat& as = format_of(path, format);
-            without_lock([&] { return pipeline::save_image(path, image.runs, image.dpi_x, image.dpi_y, as); });
+            without_lock([&] { return pipeline::save_image(path, image.runs, image.dpi_x, image.dpi_y, as, image.tags); });
           },
           py::arg("path"), py::arg("format") = "",
           "Writes the image; the format follows from the name (.tif is tiff-g4) if none is given. The file appears whole.");

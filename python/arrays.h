@@ -47,10 +47,11 @@ py::array boolean_pixels(const RunsView& runs, std::uint32_t top, std::uint32_t 
 void define_part(py::module_& module);
 void define_image(py::module_& module);
 
-/// An image and the resolution that its files get.
+/// An image, and the resolution and the tags that its files get.
 struct Image {
   Runs runs;
   double dpi_x = 0, dpi_y = 0;
+  write::LayerTags tags = {};
 };
 
 }  // namespace lamina::python

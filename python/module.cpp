@@ -98,7 +98,11 @@ class Plan {
     made.dpi_x = grid().x.dpi();
     made.dpi_y = grid().y.dpi();
     made.materials = source_.materials();
-    for (Runs& image : images.material) made.images.push_back({std::move(image), made.dpi_x, made.dpi_y});
+    made.tags = source_.tags(index);
+    for (Runs& image : images.material) {
+      made.images.push_back({std::move(image), made.dpi_x, made.dpi_y, made.tags});
+      made.images.back().tags.material = made.materials[made.images.size() - 1];
+    }
     made.layer = of().layer(index);
     return made;
   }

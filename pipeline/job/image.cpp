@@ -19,6 +19,8 @@ std::string check_image_format(std::string_view text) {
   return write::find_image_format(text) == nullptr ? not_one_of(text, image_formats()) : std::string();
 }
 
+std::string check_title(std::string_view) { return {}; }
+
 const JobKey kImageKeys[] = {
     text<check_image_format, &Job::format>({"image", "format", "--format", "FORMAT", "of the layer files", decides::images})
         .with_words(image_formats),
@@ -28,6 +30,8 @@ const JobKey kImageKeys[] = {
          decides::all}),
     word<kMirrors, &Job::mirror>({"image", "mirror", "--mirror", "x|y|xy|none",
                                   "turn the image over: x swaps left and right, y back and front", decides::images}),
+    text<check_title, &Job::title>(
+        {"image", "title", "--title", "TEXT", "of the job, in the tags of TIFF layers beside layer and z", decides::images}),
 };
 
 }  // namespace

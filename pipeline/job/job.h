@@ -107,6 +107,7 @@ struct Job {
   FillRule fill_rule = FillRule::kNonzero;
   Mirror mirror = Mirror::kNone;
   std::string format = "tiff-g4";
+  std::string title;  // of the job, in tags of its images
   SliceRequest slice;
   FillRequest fill;
   SegmentRequest segment;

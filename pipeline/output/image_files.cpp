@@ -49,8 +49,14 @@ ManifestHead image_head(const Plan& plan) {
   return head;
 }
 
+write::LayerTags tags_of(const Plan& plan, const Layer& layer) {
+  constexpr std::string_view kAxes[] = {"", "x", "y", "xy"};
+  const std::string_view axes = kAxes[static_cast<std::size_t>(plan.job.mirror)];
+  return {plan.job.title, {}, axes, layer.index, plan.layer_count, layer.bottom, layer.bottom + layer.thickness};
+}
+
 ImageFiles::ImageFiles(const Plan& plan)
-    : plan_(plan), head_(image_head(plan)), title_(title_of(head_.parts)), format_(*write::find_image_format(plan.job.format)) {
+    : plan_(plan), head_(image_head(plan)), format_(*write::find_image_format(plan.job.format)) {
   if (plan.images->machine)
     program_.emplace(*plan.images->machine, plan.job.dry_run ? "" : plan.job.output, plan.layer_count,
                      layer_file_options(plan.job));
@@ -105,9 +111,7 @@ std::uint64_t ImageFiles::Work::bytes() const {
 
 Status ImageFiles::encode(const Runs& whole, std::span<const Runs> materials, Work& work, LayerRecord& record) const {
   if (!work.encoder) work.encoder = format_.make_encoder();
-  const Layer& layer = record.layer;
-  write::LayerTags tags{title_, {}, {}, layer.index, plan_.layer_count, layer.bottom, layer.bottom + layer.thickness};
-  if (head_.mirror != "none") tags.mirror = head_.mirror;
+  write::LayerTags tags = tags_of(plan_, record.layer);
   work.encoder->tag(tags);
   if (head_.materials.empty()) {
     if (Status status = encode_one(whole, work, record, work.file); !status) return status;

@@ -21,8 +21,9 @@
 
 namespace lamina::pipeline {
 
-/// The manifest head for a plan of images.
+/// The manifest head for a plan of images, and what the files of a layer say of it.
 ManifestHead image_head(const Plan& plan);
+write::LayerTags tags_of(const Plan& plan, const Layer& layer);
 
 class ImageFiles {
  public:
@@ -71,7 +72,6 @@ class ImageFiles {
 
   const Plan& plan_;
   ManifestHead head_;
-  const std::string title_;  // of the files' tags
   const write::ImageFormat& format_;
   std::optional<PrintProgram> program_;
   std::optional<ManifestWriter> manifest_;

@@ -49,6 +49,8 @@ class LayerSource {
   /// The images of a layer. errors  kVerification: engine is kBoth and the images differ
   /// memory  the runs; scratch is kept for later layers, one set per concurrent call
   Result<PlannedImages> images(std::uint32_t index) const;
+  /// What run() has the files of a layer say, but for their material.
+  write::LayerTags tags(std::uint32_t index) const;
   /// Closed contours of a layer, nm on the bed, outer ones counter-clockwise, as run() writes them for kContours.
   /// cost  the first call loads the parts again
   Result<Contours> contours(std::uint32_t index) const;
@@ -67,6 +69,7 @@ Result<std::vector<Layer>> layers_of(const Job& job);
 Result<Part> load_part(const Job& job, const PartRequest& part);
 
 /// Writes an image in the same way as run(), atomically. errors  kOutput
-Status save_image(const std::string& path, const RunsView& image, double dpi_x, double dpi_y, const write::ImageFormat& format);
+Status save_image(const std::string& path, const RunsView& image, double dpi_x, double dpi_y, const write::ImageFormat& format,
+                  const write::LayerTags& tags = {});
 
 }  // namespace lamina::pipeline

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <memory>
 #include <span>
+#include <string>
 #include <string_view>
 
 #include "stages/data/buffer.h"
@@ -16,13 +17,14 @@ namespace lamina::write {
 
 using Bytes = Buffer<std::byte>;
 
-/// What a file may say of its layer beside the pixels.
+/// What a file may say of its layer beside the pixels. No name of a file, so that equal layers are equal files.
 struct LayerTags {
-  std::string_view job;       // what people call it; no path
-  std::string_view material;  // empty if the job has one
-  std::string_view mirror;    // axes, "x", "y" or "xy"; empty if the image is not mirrored
-  std::uint32_t layer = 0, layers = 0;
-  Nm bottom = 0, top = 0;  // nm above the bed
+  std::string title;         // of the job, if its owner gave it one
+  std::string material;      // empty if the job has one
+  std::string_view mirror;   // axes, "x", "y" or "xy"; empty if the image is not mirrored
+  std::uint32_t layer = 0;   // from 0
+  std::uint32_t layers = 0;  // of the whole job; 0: nothing is to be said
+  Nm bottom = 0, top = 0;    // nm above the bed
 };
 
 /// Encodes layers one after another and keeps its scratch memory between them. One encoder per thread at a time.
@@ -36,7 +38,7 @@ class ImageEncoder {
   /// Set pixels are printed as 1 = jet: min-is-white in TIFF, black in PBM, 1 in PNG's palette (see the format's README).
   virtual Status encode(const RunsView& runs, double dpi_x, double dpi_y, Bytes& file) = 0;
 
-  /// What the next files say of their layers; nothing until it is called. Formats without a place for it ignore it.
+  /// What the next files say of their layer; nothing until it is called. Formats without a place for it ignore it.
   virtual void tag(const LayerTags&) {}
 };
 

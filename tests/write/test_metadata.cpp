@@ -98,9 +98,9 @@ TEST(TiffTags, TellJobLayerAndHeightAndLeaveThePixelsAsTheyAre) {
     const LayerTagsRead bare = read();
     EXPECT_EQ(bare.description, "");
     EXPECT_EQ(bare.page, -1);
-    encoder->tag({"crown.stl and 2 more", {}, {}, 11, 120, 550'000, 600'000});
+    encoder->tag({"order 4711", {}, {}, 11, 120, 550'000, 600'000});
     const LayerTagsRead told = read();
-    EXPECT_EQ(told.description, "crown.stl and 2 more, layer 12 of 120, z 0.55 to 0.6 mm");
+    EXPECT_EQ(told.description, "order 4711, layer 12 of 120, z 0.55 to 0.6 mm");
     EXPECT_EQ(told.page, 11);
     EXPECT_EQ(told.pages, 120);
     EXPECT_EQ(told.strip, bare.strip);

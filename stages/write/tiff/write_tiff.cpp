@@ -58,11 +58,12 @@ void set_tags(TIFF* tiff, const RunsView& runs, double dpi_x, double dpi_y, std:
 class TiffEncoder : public ImageEncoder {
  public:
   void tag(const LayerTags& tags) override {
-    constexpr std::size_t kLongestName = 128;
+    constexpr std::size_t kLongestTitle = 128;
     char bottom[kMostDecimal], top[kMostDecimal];
     *put_mm(tags.bottom, bottom) = *put_mm(tags.top, top) = 0;
+    const std::string_view title = std::string_view(tags.title).substr(0, kLongestTitle);
     const auto put =
-        fmt::format_to_n(text_, sizeof text_ - 1, "{}, layer {} of {}, z {} to {} mm{}{}{}{}", tags.job.substr(0, kLongestName),
+        fmt::format_to_n(text_, sizeof text_ - 1, "{}{}layer {} of {}, z {} to {} mm{}{}{}{}", title, title.empty() ? "" : ", ",
                          tags.layer + 1, tags.layers, bottom, top, tags.material.empty() ? "" : ", ", tags.material,
                          tags.mirror.empty() ? "" : ", mirrored in ", tags.mirror);
     for (char* c = text_; c != put.out; ++c) *c = *c >= ' ' && *c <= '~' ? *c : '?';  // 7-bit ASCII, TIFF 6.0 section 2

@@ -88,12 +88,14 @@ TEST(HeightsCommand, TheTopIsCoveredAndSmallPeaksAreTold) {
   EXPECT_EQ(heights({"--flat-area", "30"})["small_peaks"], 1) << "the top is smaller than that";
   EXPECT_FALSE(heights({"--flat-area", "30", "--peaks", "facets"}).contains("small_peaks"));
   const Outcome jet = run_lamina({"jet", "box.stl", "--bed", "10x10", "--dpi", "200", "--heights", "angle", "--thickness",
-                                  "0.178,0.254", "--flat-area", "30", "--cover-top", "-o", "out"},
+                                  "0.178,0.254", "--flat-area", "30", "--cover-top", "--title", "order 7", "-o", "out"},
                                  directory.path());
   EXPECT_EQ(jet.code, 0) << jet.err;
   EXPECT_NE((jet.out + jet.err).find("a height with horizontal facets below 30 mm2 in all is no peak; --peaks facets"),
             std::string::npos)
       << jet.out << jet.err;
+  EXPECT_NE(read_text(directory / "out/layers/000019.tif").find("order 7, layer 20 of 20, z 4.75 to 4.928 mm"),
+            std::string::npos);
   const auto layers = nlohmann::json::parse(read_text(directory / "out/manifest.json"))["layers"];
   ASSERT_EQ(layers.size(), 20u);
   EXPECT_EQ(layers[19]["set_pixels"], layers[0]["set_pixels"]) << "the last layer is printed";
