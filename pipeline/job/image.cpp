@@ -31,7 +31,7 @@ const JobKey kImageKeys[] = {
     word<kMirrors, &Job::mirror>({"image", "mirror", "--mirror", "x|y|xy|none",
                                   "turn the image over: x swaps left and right, y back and front", decides::images}),
     text<check_title, &Job::title>(
-        {"image", "title", "--title", "TEXT", "of the job, in the tags of TIFF layers beside layer and z", decides::images}),
+        {"image", "title", "--title", "NAME", "of the job, in the tags of TIFF layers beside layer and z", decides::images}),
 };
 
 }  // namespace
