@@ -30,8 +30,8 @@ const JobKey kImageKeys[] = {
          decides::all}),
     word<kMirrors, &Job::mirror>({"image", "mirror", "--mirror", "x|y|xy|none",
                                   "turn the image over: x swaps left and right, y back and front", decides::images}),
-    text<check_title, &Job::title>(
-        {"image", "title", "--title", "NAME", "of the job, in the tags of TIFF layers beside layer and z", decides::images}),
+    text<check_title, &Job::title>({"image", "title", "--title", "NAME",
+                                    "of the job: TIFF layers then tell it, the layer and z in their tags", decides::images}),
 };
 
 }  // namespace

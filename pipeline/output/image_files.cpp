@@ -52,7 +52,9 @@ ManifestHead image_head(const Plan& plan) {
 write::LayerTags tags_of(const Plan& plan, const Layer& layer) {
   constexpr std::string_view kAxes[] = {"", "x", "y", "xy"};
   const std::string_view axes = kAxes[static_cast<std::size_t>(plan.job.mirror)];
-  return {plan.job.title, {}, axes, layer.index, plan.layer_count, layer.bottom, layer.bottom + layer.thickness};
+  // A job without a title is told by its pixels alone: the same image is the same file in any job and any place of it.
+  const std::uint32_t layers = plan.job.title.empty() ? 0 : plan.layer_count;
+  return {plan.job.title, {}, axes, layer.index, layers, layer.bottom, layer.bottom + layer.thickness};
 }
 
 ImageFiles::ImageFiles(const Plan& plan)

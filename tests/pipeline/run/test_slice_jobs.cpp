@@ -67,15 +67,15 @@ TEST(SliceProgram, SameBytesForEveryPatternFormatThreadsAndMemory) {
       std::string first;
       for (const auto& [threads, memory] : {std::pair{"1", "1G"}, {"2", "1M"}, {"8", "16M"}}) {
         const std::string out = "o" + std::to_string(number++);
-        std::vector<std::string> arguments = {"slice",        corpus("parameter_quality_nut.stl"),
-                                              "near.stl",     "--layer",
-                                              "1.9",          "--quiet",
-                                              "-o",           out,
-                                              "--walls",      "1",
-                                              "--bead-gap",   "0.3,0.1",
-                                              "--pattern",    pattern,
-                                              "--threads",    threads,
-                                              "--memory",     memory,
+        std::vector<std::string> arguments = {"slice",      corpus("parameter_quality_nut.stl"),
+                                              "near.stl",   "--layer",
+                                              "1.9",        "--quiet",
+                                              "-o",         out,
+                                              "--walls",    "1",
+                                              "--bead-gap", "0.3,0.1",
+                                              "--pattern",  pattern,
+                                              "--threads",  threads,
+                                              "--memory",   memory,
                                               "--format"};
         arguments.insert(arguments.end(), format.begin(), format.end());
         if (std::string_view(pattern) != "contour") {  // whose curves have no direction
