@@ -46,9 +46,9 @@ std::span<const JobKey> extrude_keys() {
           .with_words([] {
             return std::vector<std::string_view>{"true", "false"};
           }),
-      field<&Job::extrude, &Request::skirt_loops>({"extrude", "skirt_loops", "--skirt", "LOOPS",
-                                                   "laid around all parts before the first bead; 0: none", decides::moves},
-                                                  {0, 100}),
+      field<&Job::extrude, &Request::skirt_loops>(
+          {"extrude", "skirt_loops", "--skirt", "N", "loops around all parts before the first bead; 0: none", decides::moves},
+          {0, 100}),
       machine_key()};
   return keys;
 }
