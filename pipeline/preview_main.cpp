@@ -1,7 +1,7 @@
 // pipeline/preview_main.cpp: the program lamina-preview, started by `lamina preview`.
 #include <fmt/format.h>
 
-#include <charconv>
+#include <type_traits>
 
 #include "pipeline/cli/command.h"
 #include "pipeline/cli/console.h"
@@ -28,25 +28,16 @@ Outcome draw_plot(Context& context) {
   return end({reinterpret_cast<const char*>(picture->data()), picture->size()}, 0);
 }
 
-/// Sets `value` to the number after a flag, if present.
-Status read_whole(const Arguments& arguments, std::string_view flag, std::uint32_t least, std::uint32_t most,
-                  std::optional<std::uint32_t>& value) {
+/// Sets `value` to the number after a flag, if present: a length in mm, or a whole number.
+template <class Value, class Number = std::conditional_t<std::is_same_v<Value, double>, double, std::uint32_t>>
+Status read_flag(const Arguments& arguments, std::string_view flag, double least, double most, Value& value) {
   if (!arguments.has(flag)) return {};
-  const std::string text = arguments.text(flag);
-  std::uint32_t number = 0;
-  const auto [end, code] = std::from_chars(text.data(), text.data() + text.size(), number);
-  if (code != std::errc() || end != text.data() + text.size() || number < least || number > most) {
-    return Error{Fault::kUsage, fmt::format("{} {}: give a whole number from {} to {}", flag, text, least, most)};
-  }
-  value = number;
+  double number = 0;
+  std::string fault = read_number(arguments.text(flag), least, most, "", number);
+  if (fault.empty() && static_cast<Number>(number) != number) fault = "give a whole number";
+  if (!fault.empty()) return Error{Fault::kUsage, fmt::format("{} {}: {}", flag, arguments.text(flag), fault)};
+  value = static_cast<Number>(number);
   return {};
-}
-
-/// Sets `value` to the length after a flag, if present; mm.
-Status read_length(const Arguments& arguments, std::string_view flag, double least, double most, double& value) {
-  if (!arguments.has(flag)) return {};
-  const std::string fault = read_number(arguments.text(flag), least, most, " mm", value);
-  return fault.empty() ? Status() : Error{Fault::kUsage, fmt::format("{} {}: {}", flag, arguments.text(flag), fault)};
 }
 
 Result<PreviewRequest> read_request(const Arguments& arguments) {
@@ -60,15 +51,15 @@ Result<PreviewRequest> read_request(const Arguments& arguments) {
   request.whole_bed = arguments.has("--whole-bed");
   request.swath = arguments.has("--swath");
   for (const Status& status :
-       {read_whole(arguments, "--width", 200, 20'000, request.width),
-        read_whole(arguments, "--layer", 0, UINT32_MAX, request.layers.layer),
-        read_whole(arguments, "--every", 1, UINT32_MAX, request.layers.every),
-        read_whole(arguments, "--count", 1, view::kMostCells, request.layers.count),
-        read_whole(arguments, "--step", 0, UINT32_MAX, request.step),
-        read_length(arguments, "--filament", 0.5, 10, request.gcode.filament_mm),
-        read_length(arguments, "--layer-height", 0.01, 100, request.gcode.layer_height_mm),
+       {read_flag(arguments, "--width", 200, 20'000, request.width),
+        read_flag(arguments, "--layer", 0, UINT32_MAX, request.layers.layer),
+        read_flag(arguments, "--every", 1, UINT32_MAX, request.layers.every),
+        read_flag(arguments, "--count", 1, view::kMostCells, request.layers.count),
+        read_flag(arguments, "--step", 0, UINT32_MAX, request.step),
+        read_flag(arguments, "--filament", 0.5, 10, request.gcode.filament_mm),
+        read_flag(arguments, "--layer-height", 0.01, 100, request.gcode.layer_height_mm),
         arguments.text("--swath") == "middle" ? Status()
-                                              : read_whole(arguments, "--swath", 0, UINT32_MAX, request.swath_number)}) {
+                                              : read_flag(arguments, "--swath", 0, UINT32_MAX, request.swath_number)}) {
     if (!status) return status.error();
   }
   if (request.step && !request.swath) return at_option("--step", "is of a swath; add --swath").error();

@@ -74,7 +74,7 @@ Result<view::LayerSeries> gcode_series(const std::string& path, const read::Gcod
   view::LayerSeries series;
   series.name = std::filesystem::path(path).filename().string();
   series.last = series.count = file->count();
-  series.notes = file->notes();
+  for (const std::string& note : file->notes()) series.notes.push_back(path + ": " + note);
   series.layer = [file = std::make_shared<const read::GcodeFile>(std::move(*file)), name = series.name](std::uint32_t index) {
     return gcode_shapes(*file, name, index);
   };
@@ -91,12 +91,8 @@ Result<view::LayerSeries> slice_series(const std::string& directory) {
   auto plan = make_plan(std::move(*resolved), [](const ProgressEvent&) {});
   if (!plan) return plan.error();
   const auto sliced = std::make_shared<const SlicedJob>(SlicedJob{directory, std::move(*manifest), std::move(*plan)});
-  return view::LayerSeries{sliced->name(),
-                           sliced->plan.range[0],
-                           sliced->plan.range[1],
-                           sliced->plan.layer_count,
-                           [sliced](std::uint32_t index) { return slice_shapes(*sliced, index); },
-                           {}};
+  return view::LayerSeries{sliced->name(), sliced->plan.range[0], sliced->plan.range[1], sliced->plan.layer_count,
+                           [sliced](std::uint32_t index) { return slice_shapes(*sliced, index); }};
 }
 
 }  // namespace lamina::pipeline

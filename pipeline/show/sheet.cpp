@@ -156,9 +156,7 @@ Result<Preview> draw_preview(const PreviewRequest& request) {
     const auto series = toolpaths ? gcode_series(request.source, request.gcode) : slice_series(request.source);
     if (!series) return series.error();
     auto preview = draw_series(*series, request, ending == ".svg");
-    for (const std::string& note : series->notes) {
-      if (preview) preview->doubts.push_back(request.source + ": " + note);
-    }
+    if (preview) preview->doubts.insert(preview->doubts.end(), series->notes.begin(), series->notes.end());
     return preview;
   }
   if (ending != ".png") {

@@ -74,7 +74,7 @@ void GcodeSurvey::add_to_box(const RawBead& raw) {
   const GcodeFile::Place& place = walk_.place();
   const bool slope = raw.from[2] != raw.to[2];  // the pitch of a climb is not known yet
   const double below = slope ? raw.to[2] : cutter_.layers().back().place.below;
-  const double height = height_of(raw, place.height, options_.layer_height_mm, below);
+  const double height = height_of(raw, place.height, 0, below);
   const double unit = volume_of_unit(raw.volumetric, file_.filament_mm_);
   const GcodeBead bead = bead_of(raw, place.width > 0 ? place.width : width_of(raw, height, unit), place.type);
   const Nm half = bead.width / 2, top = static_cast<Nm>(nm_of(raw.to[2]));
@@ -144,8 +144,7 @@ void GcodeSurvey::note_widths() {
 void GcodeSurvey::note_climbs() {
   if (cutter_.tagged() || options_.layer_height_mm > 0) return;
   if (cutter_.turns() > 0) {
-    file_.notes_.push_back(
-        fmt::format("beads climb in a spiral: {} layers are its turns; --layer-height MM cuts it by height", cutter_.turns()));
+    file_.notes_.emplace_back("beads climb in a spiral: layers are its turns; --layer-height MM cuts it by height");
   }
   if (cutter_.turnless() > 0) {
     file_.notes_.emplace_back("beads climb without a turn: layers are 5 mm high; --layer-height MM makes them thinner");

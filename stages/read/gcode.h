@@ -38,9 +38,9 @@ struct GcodeOptions {
 /// - in a file without them wherever a bead lies at another height than the one before; and where beads climb (spirals), after
 ///   each turn of their direction, or after 5 mm without one.
 /// Arcs (G2, G3) are chords within 5 um. Widths are those of ;WIDTH: tags; without them those of a rectangle with half circles
-/// at its sides whose volume is the filament that is fed, in a layer as high as ;HEIGHT:, the given layer height, the climb of
-/// a turn, or the distance to the beads below. The filament's diameter is the given one, or the one that comments tell
-/// (stages/read/gcode/comments.h), or 1.75 mm.
+/// at its sides whose volume is the filament that is fed, in a layer as high as ;HEIGHT:, the climb of a turn, or the distance
+/// to the beads below. The filament's diameter is the given one, or the one that comments tell (stages/read/gcode/comments.h),
+/// or 1.75 mm.
 ///
 /// memory  of the layers' places in the file; beads are read when they are asked for
 class GcodeFile {

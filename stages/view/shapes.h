@@ -24,7 +24,7 @@ struct LayerSeries {
   std::uint32_t first = 0, last = 0;  // available layers: [first, last)
   std::uint32_t count = 0;            // of the whole job
   std::function<Result<LayerShapes>(std::uint32_t)> layer;
-  std::vector<std::string> notes;  // for a person, one line each
+  std::vector<std::string> notes = {};  // for a person, one line each
 };
 
 }  // namespace lamina::view

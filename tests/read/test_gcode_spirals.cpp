@@ -90,12 +90,31 @@ TEST(GcodeSpirals, AGivenHeightCutsThem) {
     ASSERT_TRUE(file) << file.error().message;
     EXPECT_EQ(file->count(), static_cast<std::uint32_t>(std::ceil(8.2 / height - 1e-9) - std::floor(0.2 / height + 1e-9)));
     EXPECT_TRUE(file->notes().empty());
+    const auto layer = file->layer(3);
+    ASSERT_TRUE(layer);
+    for (const read::GcodeBead& bead : layer->beads) ASSERT_NEAR(mm(bead.width), 0.4, 0.02) << "turns are 0.2 mm high";
   }
   // Of a file with tags as well, without what start code lays.
   const auto tagged = gcode_file(directory, "M83\nG1 Z5\nG1 X9 E1\n;LAYER:0\n" + text, {.layer_height_mm = 2});
   ASSERT_TRUE(tagged);
   EXPECT_EQ(tagged->count(), 5u);
   EXPECT_GT(tagged->box().lo.x, 60'000'000);
+}
+
+TEST(GcodeSpirals, FlatLayersWithinAGivenHeightKeepTheirOwn) {
+  const Directory directory;
+  std::string text = "M83\n";
+  for (int k = 1; k <= 20; ++k) {
+    text += fmt::format("G0 X0 Y0 Z{:.1f}\nG1 X50 E{:.6f}\n", 0.2 * k, filament_for(50, 0.4, 0.2));
+  }
+  const auto file = gcode_file(directory, text, {.layer_height_mm = 1});
+  ASSERT_TRUE(file) << file.error().message;
+  ASSERT_EQ(file->count(), 4u);
+  for (std::uint32_t k = 0; k < 4; ++k) {
+    const auto layer = file->layer(k);
+    ASSERT_TRUE(layer && layer->beads.size() == 5);
+    for (const read::GcodeBead& bead : layer->beads) EXPECT_EQ(bead.width, 400'000);
+  }
 }
 
 TEST(GcodeSpirals, AFlatBottomIsLayersOfItsOwn) {

@@ -23,10 +23,8 @@ CommandSpec preview_spec() {
        "", ""},
       {"--step", "N", "of the swath, else the middle one", "", ""},
       {"--width", "PIXELS", "width of the picture, 200 to 20000", "2400", ""},
-      {"--filament", "MM", "G-code: diameter of the filament, by which beads are as wide as what is fed",
-       "what the file says, else 1.75", ""},
-      {"--layer-height", "MM", "G-code: a layer every MM of height, for spirals and files without tags of layers",
-       "by tags, heights or turns", ""},
+      {"--filament", "MM", "diameter of the filament of G-code", "what the file says, else 1.75", ""},
+      {"--layer-height", "MM", "cut G-code, as a spiral, every MM of height", "by tags, heights or turns", ""},
       {"--whole-bed", "", "show all of the bed, not only where the layers have something", "", ""},
       {"--overwrite", "", "replace a file that lamina did not write", "", ""},
       {"--quiet", "", "say nothing but errors", "", ""}};

@@ -14,6 +14,7 @@ constexpr double kAlmost = 0.02;      // rad: ends of beads are rounded to micro
 constexpr double kJump = 0.1;         // mm of z without a bead that end a climb
 constexpr double kTurnless = 5;       // mm of climb without a turn that are a layer
 constexpr double kLeastLayer = 0.04;  // mm: a slope that high leads to a new flat layer if a long flat way follows
+constexpr double kLeastRise = 0.02;   // mm from a layer to the next
 constexpr double kSame = 1e-6;        // mm
 
 double heading_of(const RawBead& bead) { return std::atan2(bead.to[1] - bead.from[1], bead.to[0] - bead.from[0]); }
@@ -32,7 +33,6 @@ void LayerCutter::begin(const GcodeFile::Place& before, bool climb_goes_on) {
   layers_.emplace_back();
   layers_.back().place.start = before;
   layers_.back().place.below = below;
-  layers_.back().place.height = step_;
   layers_.back().low = layers_.back().top = below;  // of a layer in which nothing is laid
   climbs_ = climbs_ && climb_goes_on;
   slope_length_ = flat_length_ = 0;
@@ -83,7 +83,11 @@ LayerCutter::Cut LayerCutter::cut_at(const RawBead& bead) {
 /// Keeps what the next bead is compared with.
 void LayerCutter::follow(const RawBead& bead) {
   const double heading = heading_of(bead), length = bead.length();
-  if (climbs_) turned_ += std::remainder(heading - heading_, kRound);
+  if (climbs_) {
+    const double turn = std::remainder(heading - heading_, kRound);
+    turned_ += turn;
+    layers_.back().turn += turn;
+  }
   if (bead.from[2] != bead.to[2]) {
     if (!climbs_) {
       turned_ = 0;
@@ -118,13 +122,30 @@ void LayerCutter::add(const RawBead& bead, const GcodeFile::Place& before, const
     layer.untagged_length += length;
     layer.untagged_fed += bead.fed;
   }
+  const double rise = bead.from[2] - z_;
+  if (rise > kLeastRise && (layer.least_rise == 0 || rise < layer.least_rise)) layer.least_rise = rise;
   layer.tag_height = now.height;
   layer.volumetric = bead.volumetric;
   follow(bead);
 }
 
+/// Layers by a given height hold several turns, or heights, or less than one.
+void LayerCutter::finish_steps() {
+  double climbed = 0, turned = 0;
+  for (const Layer& layer : layers_) {
+    if (!(layer.sloped > layer.length / 2)) continue;
+    climbed += layer.top - layer.low;
+    turned += std::abs(layer.turn);
+  }
+  const double pitch = turned >= kRound ? climbed / turned * kRound : step_;
+  for (Layer& layer : layers_) {
+    const bool climbs = layer.sloped > layer.length / 2;
+    layer.place.height = climbs ? pitch : layer.least_rise > 0 ? layer.least_rise : step_;
+  }
+}
+
 void LayerCutter::finish() {
-  if (step_ > 0) return;
+  if (step_ > 0) return finish_steps();
   double pitch = 0;
   for (Layer& layer : layers_) {
     if (!(layer.sloped > layer.length / 2)) {

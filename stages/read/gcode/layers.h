@@ -20,6 +20,8 @@ class LayerCutter {
     double low = 0, top = 0;                       // of the beads; top: of the highest end
     double length = 0, sloped = 0;                 // mm, all beads and those that climb or fall
     double untagged_length = 0, untagged_fed = 0;  // of beads without ;WIDTH:
+    double turn = 0;                               // rad: of the direction of beads that climb
+    double least_rise = 0;                         // mm between heights of flat beads, 0 if there is one height
     double tag_height = 0;                         // ;HEIGHT: of the last bead
     bool volumetric = false;                       // of the last bead
     bool turned = false;                           // ends with a turn
@@ -39,6 +41,7 @@ class LayerCutter {
  private:
   enum class Cut { kNone, kLayer, kClimb };  // kClimb: a layer within a climb that goes on
   Cut cut_at(const RawBead& bead);
+  void finish_steps();
   bool begins_step(const RawBead& bead);
   bool ends_turn(const RawBead& bead);
   void start_turn(const RawBead& bead);
