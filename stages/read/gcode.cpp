@@ -21,7 +21,7 @@ constexpr ReadRules kRules{.fault = Fault::kUsage, .missing = "cannot be read; n
 
 GcodeBead bead_of(const RawBead& raw, double width_mm, std::uint32_t type) {
   const auto nm = [](double millimetres) { return static_cast<Nm>(nm_of(millimetres)); };
-  return {{nm(raw.from[0]), nm(raw.from[1])}, {nm(raw.to[0]), nm(raw.to[1])}, nm(width_mm), type};
+  return {{nm(raw.from[0]), nm(raw.from[1])}, {nm(raw.to[0]), nm(raw.to[1])}, std::max<Nm>(nm(width_mm), 1), type};
 }
 
 /// Why a file is none of text, if its first bytes tell.

@@ -49,9 +49,10 @@ TEST(GcodeSpirals, EachTurnIsALayerOfItsWidth) {
   struct Case {
     std::function<SpiralPoint(double)> place;
     int steps;
+    double pitch;
   };
-  for (const Case& it : {Case{circle, 64}, {circle, 400}, {wavy, 300}, {square, 4}, {cone, 90}}) {
-    const auto file = gcode_file(directory, spiral(40, it.steps, 0.2, 0.2, it.place));
+  for (const Case& it : {Case{circle, 64, 0.2}, {circle, 400, 0.1}, {wavy, 300, 0.35}, {square, 4, 0.3}, {cone, 90, 0.3}}) {
+    const auto file = gcode_file(directory, spiral(40, it.steps, it.pitch, 0.2, it.place));
     ASSERT_TRUE(file) << file.error().message;
     EXPECT_NEAR(file->count(), 40, 1) << it.steps;
     ASSERT_EQ(file->notes().size(), 1u);
@@ -60,7 +61,7 @@ TEST(GcodeSpirals, EachTurnIsALayerOfItsWidth) {
       const auto layer = file->layer(k);
       ASSERT_TRUE(layer);
       EXPECT_NEAR(static_cast<double>(layer->beads.size()), it.steps, 0.04 * it.steps);
-      EXPECT_NEAR(mm(layer->z), 0.2 + 0.2 * k, 0.06);
+      EXPECT_NEAR(mm(layer->z), 0.2 + it.pitch * k, 0.3 * it.pitch);
       for (const read::GcodeBead& bead : layer->beads) ASSERT_NEAR(mm(bead.width), 0.4, 0.025) << k;
     }
     // Nothing is lost: all beads are in some layer.

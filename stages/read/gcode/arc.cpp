@@ -10,6 +10,7 @@ namespace {
 constexpr double kTurn = 2 * std::numbers::pi;
 constexpr double kNear = 1e-6;                         // mm or radians: NEAR() and NEAR_ZERO() of Marlin
 constexpr double kDeviation = Arc::kTolerance - 1e-5;  // leaves room for ends on whole nanometres
+constexpr double kLongest = 1e150;                     // mm: a radius that can be squared
 constexpr double kMostChords = 1e9;                    // of an arc that leaves every bed with its first one
 
 }  // namespace
@@ -33,7 +34,9 @@ bool Arc::plan(Place from, Place to, const ArcWords& words) {
   spoke_ = {-i, -j};
 
   // The spoke of the end is that of the start plus the way: written so, long radii cost no digits.
-  const double radius = std::hypot(i, j), along = spoke_.x * dx + spoke_.y * dy, across = spoke_.x * dy - spoke_.y * dx;
+  const double radius = std::hypot(i, j);
+  if (!(radius < kLongest)) return false;
+  const double along = spoke_.x * dx + spoke_.y * dy, across = spoke_.x * dy - spoke_.y * dx;
   const double angle = std::atan2(across, radius * radius + along);
   const bool near = std::abs(dx) <= kNear && std::abs(dy) <= kNear;
   travel_ = angle;

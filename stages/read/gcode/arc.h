@@ -31,6 +31,7 @@ class Arc {
 
   /// False where Marlin prints an error and stays where it is (Klipper and RepRapFirmware end the print): neither R nor I and
   /// J; R with an end at the start; or, without a word of Marlin, an end in the direction of the start, counter-clockwise.
+  /// Also of radii beyond all numbers of a firmware.
   bool plan(Place from, Place to, const ArcWords& words);
   /// At least 1. The chords within a bed of some metres are a few thousand, whatever the radius.
   std::uint64_t chords() const { return chords_; }

@@ -155,7 +155,7 @@ bool GcodeCommands::run_command(std::optional<RawBead>& bead) {
 }
 
 bool GcodeCommands::within_reach(const RawBead& bead) {
-  for (const double at : {bead.from[0], bead.from[1], bead.to[0], bead.to[1], bead.to[2]}) {
+  for (const double at : {bead.from[0], bead.from[1], bead.from[2], bead.to[0], bead.to[1], bead.to[2]}) {
     if (std::abs(at) <= kFarthestMm) continue;
     fail(fmt::format("a bead at {:g} mm; beds are at most {:g} mm wide", at, kFarthestMm));
     return false;
