@@ -77,9 +77,7 @@ std::string fish_values(std::span<const std::string_view> words, std::string_vie
   if (files == kDirectory) {
     add("(__fish_complete_directories)");
   } else if (!files.empty()) {
-    std::string endings;
-    for (const std::string_view ending : split(files, " ")) endings += fmt::format(" .{}", ending);
-    add(fmt::format("(__fish_complete_suffix{})", endings));
+    add(fmt::format("(__lamina_files {})", files));
   }
   return all.empty() ? " -f" : fmt::format(" -f -k -a {}", fish_word(all));
 }
@@ -181,7 +179,12 @@ _lamina "$@"
 }
 
 std::string fish_completion(std::span<const CommandSpec> commands) {
-  std::string script = "# fish completion for lamina, made by: lamina completion fish\n";
+  std::string script = R"(# fish completion for lamina, made by: lamina completion fish
+function __lamina_files
+  set -l endings (string join '|' -- $argv)
+  __fish_complete_path (string replace -r '^-[^=]*=' '' -- (commandline -ct)) | string match -ri "^[^\t]*(?:/|\.(?:$endings))(?:\t.*)?\$"
+end
+)";
   for (const CommandSpec& command : commands) {
     script +=
         fmt::format("complete -c lamina -n __fish_use_subcommand -f -a {} -d {}\n", command.name, fish_word(command.brief));
