@@ -30,10 +30,13 @@ void add_options(std::span<const Key<Target>> keys, const KeyChoice& choice, con
     if (key.flag.empty() || !choice.has(key.section, key.name)) continue;
     std::string preset = key.value.empty() ? std::string() : key.write(presets);
     if (key.section == "bed") std::ranges::replace(preset, ',', 'x');
+    const auto words = key.words == nullptr ? std::vector<std::string_view>() : key.words();
+    // Files may keep an older word for the default.
+    if (!preset.empty() && !words.empty() && std::ranges::find(words, preset) == words.end()) preset = words.front();
     std::string_view heading = "Bed and layers";
     read_word(kHeadings, key.section, heading);
-    spec.options.push_back({std::string(key.flag), std::string(key.value), std::string(key.meaning), preset,
-                            std::string(heading), key.words == nullptr ? std::vector<std::string_view>() : key.words()});
+    spec.options.push_back(
+        {std::string(key.flag), std::string(key.value), std::string(key.meaning), preset, std::string(heading), words});
   }
 }
 

@@ -29,12 +29,6 @@ bool lays_lines(Product, const Job& job) {
          !std::ranges::all_of(job.parts, plain);
 }
 
-/// Closed curves have no direction.
-bool lays_straight(Product, const Job& job) {
-  const auto plain = [](const PartRequest& part) { return part.fill.empty(); };
-  return job.fill.all.pattern != infill::Pattern::kContour || !job.fill.ranges.empty() ||
-         !std::ranges::all_of(job.parts, plain);
-}
 bool repairs(Product, const Job& job) { return job.repair; }
 bool arranges(Product, const Job& job) {
   return std::ranges::any_of(job.parts, [](const PartRequest& part) { return !part.at_mm || part.copies > 1; });
@@ -52,8 +46,7 @@ constexpr std::string_view kUniform = "is of layers that fit the part, and these
                            kCovered = "is of --heights angle and optimal, the others reach the top; add one of them",
                            kShrinks = "is of steps on parts that shrink; add --shrink, and --heights cusp, stepwise or optimal",
                            kBeads = "is of beads, and none are asked for; add --fill, --pattern or --walls",
-                           kLines = "is of lines, and no pattern is asked for; add --fill or --pattern",
-                           kStraight = "is of straight lines, and the pattern is of closed curves; leave it out";
+                           kLines = "is of lines, and no pattern is asked for; add --fill or --pattern";
 constexpr Need kNeeds[] = {
     {"--cusp", by_steps, kSteps},
     {"--cusp-of", shrinks, kShrinks},
@@ -76,9 +69,6 @@ constexpr Need kNeeds[] = {
     {"--angle", lays_lines, kLines},
     {"--angle-step", lays_lines, kLines},
     {"--stagger", lays_lines, kLines},
-    {"--angle", lays_straight, kStraight},
-    {"--angle-step", lays_straight, kStraight},
-    {"--stagger", lays_straight, kStraight},
     {"--weld", repairs, "is of repair, which is off; leave out one of the two"},
     {"--gap", arranges, "is between parts that are arranged, and --at places this one; leave out one of the two"},
     {"--empty-first-layer", writes_cli, "is of CLI files; add --format cli or cli-binary"},

@@ -70,7 +70,6 @@ TEST_F(OneMeaning, OptionsThatDoNothingHereAreRefused) {
       {"jet part.stl --dry-run --no-repair --repair winding", "--no-repair and --repair exclude each other"},
       {"jet part.stl --dry-run --at 1,1 --gap 3", "--gap: is between parts"},
       {"slice part.stl --dry-run --layer 1 --empty-first-layer", "--empty-first-layer: is of CLI files"},
-      {"slice part.stl --dry-run --layer 1 --pattern contour --angle 30", "--angle: is of straight lines"},
       {"extrude part.stl --dry-run --machine fdm-2000 --layer 0.254 --fan 50", "--fan: is not in SML"},
       {"extrude part.stl --dry-run --machine fdm-2000 --layer 0.254 --nozzle-temperature 200",
        "--nozzle-temperature: is not in SML"},
@@ -92,7 +91,7 @@ TEST_F(OneMeaning, OptionsThatDoNothingHereAreRefused) {
        {"jet part.stl --dry-run --quiet --repair winding --weld 5", "jet part.stl --dry-run --quiet --copies 2 --gap 3",
         "slice part.stl --dry-run --quiet --layer 1 --format cli --empty-first-layer",
         "heights part.stl --compare --thickness 0.5,1 --time-model 3",
-        "slice part.stl --dry-run --quiet --layer 1 --pattern contour+raster --angle 30",
+        "slice part.stl --dry-run --quiet --layer 1 --pattern contour --angle 30",
         "extrude part.stl --dry-run --quiet --fan 50"}) {
     done(line);
   }

@@ -121,10 +121,10 @@ TEST_F(MachineCommands, WhatAJobCannotTellOrJetIsSaid) {
   expect_words(lamina("jet " + nut + "--dpi 100 --layer 4 --core 0 --shell 0.2 --allow-empty -o " + at("thin")),
                {"dose.core: 0 without a shell", " 0 set"});
   const std::string words = lamina("verify " + at("shell"));
-  expect_words(words, {"does not tell other movements nor powder", "ml of binder"});
+  expect_words(words, {"the program does not move powder, its time is the profile's", "ml of binder"});
   EXPECT_EQ(words.find("powder fed"), std::string::npos) << words;
   lamina("jet " + nut + "--machine hp45 --layer 4 -o " + at("hp45"));
-  expect_words(lamina("verify " + at("hp45")), {" h, ", "powder fed"});
+  expect_words(lamina("verify " + at("hp45")), {" s) on hp45: ", " m other travel", "powder fed"});
   expect_words(lamina("jet " + nut + "--machine hp45 --layer 4 --core 0 --allow-empty -o " + at("none")),
                {"dose.core: 0 without a shell"});
   expect_words(lamina("jet " + nut + "--machine hp45 --layer 4 --scale 20 -o " + at("large"), 2),

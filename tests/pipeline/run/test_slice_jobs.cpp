@@ -459,7 +459,7 @@ TEST(SliceProgram, PreviewsOfSeveralLayersAreASheetAndWhatIsForImagesIsOneLine) 
   const Outcome every = preview("every.png", {"--every", "3"}), count = preview("count.png", {"--count", "3"}),
                 one = preview("one.png", {"--layer", "2"});
   for (const Outcome* outcome : {&every, &count, &one}) ASSERT_EQ(outcome->code, 0) << outcome->err;
-  EXPECT_NE(every.err.find("every.png: 3 of 12 layers"), std::string::npos) << every.err;
+  EXPECT_NE(every.out.find("every.png: 3 of 12 layers"), std::string::npos) << every.out;
   const std::string pictures[] = {read_text(directory / "every.png"), read_text(directory / "count.png"),
                                   read_text(directory / "one.png")};
   for (const std::string& picture : pictures) EXPECT_EQ(picture.substr(0, 8), "\x89PNG\r\n\x1a\n");
