@@ -152,8 +152,8 @@ TEST(HeightsCommand, AComparisonTellsTimeAndWhatIsSavedBesideThinLayers) {
   write_box(directory.path() / "box.stl", {0, 0, 0}, {10, 10, 3});
   const std::vector<std::string> call = {"heights", "box.stl", "--thickness", "0.1,0.3", "--compare", "--quiet"};
   const std::string text = run_lamina(call, directory.path()).out;
-  EXPECT_NE(text.find("4 min 07 s     0.0 %\n"), std::string::npos) << text;
-  EXPECT_NE(text.find("1 min 22 s    66.7 %\n"), std::string::npos) << text;
+  EXPECT_NE(text.find("4 min 07 s    0.0 %\n"), std::string::npos) << text;
+  EXPECT_NE(text.find("1 min 22 s   66.7 %\n"), std::string::npos) << text;
   EXPECT_NE(text.find("\ntime: 2 s a layer and 0.0625 s a mm2 of its section, as beads"), std::string::npos) << text;
   auto more = call;
   more.insert(more.end(), {"--format", "json"});
