@@ -182,13 +182,19 @@ class Hp45Port {
     }
   }
   void load() {
+    // DMAPrint.cpp: two nozzles on one address and primitive, of which the later one is written last.
+    static const Nozzles lost = [] {
+      Nozzles made;
+      for (const std::size_t n : {8, 43, 132, 172, 184, 243, 293}) made.set(n);
+      return made;
+    }();
     static const Nozzles even = [] {
       Nozzles made;
       for (std::size_t n = 0; n < 300; n += 2) made.set(n);
       return made;
     }();
     for (int s = 0; s < 2; ++s)
-      rows_[s].now = rows_[s].on ? buffer_[rows_[s].read].nozzles & (s == 1 ? even : ~even) : Nozzles();
+      rows_[s].now = rows_[s].on ? buffer_[rows_[s].read].nozzles & ~lost & (s == 1 ? even : ~even) : Nozzles();
   }
   void bursts() {
     bool changed = false;

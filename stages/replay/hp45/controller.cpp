@@ -8,13 +8,16 @@
 namespace lamina::replay::hp45 {
 namespace {
 
-constexpr std::int32_t kBufferSize = 4003;                  // Buffer.cpp: BUFFER_SIZE
-constexpr std::int32_t kRowGapUm = 4050;                    // Position.ino: ROW_GAP
-constexpr std::uint32_t kSpeedPulses = 50;                  // Position.ino: POSITION_STEP_COUNT
-constexpr std::size_t kRawCharacters = 50;                  // Serialcom.cpp: serialRaw
-constexpr std::size_t kLongestLine = 64;                    // Serialcom.cpp: a line with its end
-constexpr std::size_t kLongestNumber = 5;                   // Serialcom.cpp: digits that 32 bits hold with their sign
-constexpr std::int32_t kFullDpi = 600;                      // DMAPrint.cpp: SetDPI
+constexpr std::int32_t kBufferSize = 4003;  // Buffer.cpp: BUFFER_SIZE
+constexpr std::int32_t kRowGapUm = 4050;    // Position.ino: ROW_GAP
+constexpr std::uint32_t kSpeedPulses = 50;  // Position.ino: POSITION_STEP_COUNT
+constexpr std::size_t kRawCharacters = 50;  // Serialcom.cpp: serialRaw
+constexpr std::size_t kLongestLine = 64;    // Serialcom.cpp: a line with its end
+constexpr std::size_t kLongestNumber = 5;   // Serialcom.cpp: digits that 32 bits hold with their sign
+constexpr std::int32_t kFullDpi = 600;      // DMAPrint.cpp: SetDPI
+// DMAPrint.cpp: seven pairs of nozzles have one address and primitive in the tables; ConvertB6RawToBurst writes the second one
+// of a pair over the first, which so never fires: 8 (36), 43 (69), 132 (170), 172 (178), 184 (196), 243 (255), 293 (299).
+constexpr std::uint32_t kOverwritten[] = {8, 43, 132, 172, 184, 243, 293};
 constexpr std::uint64_t kEvenBits = 0x5555'5555'5555'5555;  // of a word of a burst: nozzles with even numbers
 
 // Serialcom.cpp: B64Lookup.
@@ -37,8 +40,13 @@ void put(Burst& burst, std::uint32_t nozzle) {
 // Buffer.cpp: the overlays. Nozzles of odd primitives are the odd ones (NewNozzleTable.ino), side 0 of the buffer. Place 0 of
 // a burst is nozzle 299, so that bit 63 of each word is an odd nozzle's.
 Burst share(const Burst& burst, std::uint32_t side) {
+  static const Burst lost = [] {
+    Burst made{};
+    for (const std::uint32_t nozzle : kOverwritten) put(made, nozzle);
+    return made;
+  }();
   Burst shared;
-  for (std::size_t w = 0; w < burst.size(); ++w) shared[w] = burst[w] & (side == 1 ? kEvenBits : ~kEvenBits);
+  for (std::size_t w = 0; w < burst.size(); ++w) shared[w] = burst[w] & ~lost[w] & (side == 1 ? kEvenBits : ~kEvenBits);
   return shared;
 }
 

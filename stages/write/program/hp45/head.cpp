@@ -17,6 +17,9 @@ constexpr double kHalfRowGapUm = 2025;      // from the centre to either row (Po
 constexpr std::uint32_t kSpeedCounts = 50;  // of the encoder that one measure of speed takes; the first after rest is wrong
 constexpr std::uint32_t kLines = 3950;      // the host stops at 50 free lines of 4000
 
+// Of the profile: the firmware's tables (DMAPrint.cpp) give them the address and primitive of another one.
+constexpr std::uint32_t kWithoutChannel[] = {6, 56, 115, 127, 167, 256, 291};
+
 /// A whole number in base 64, the highest digit first, a minus before it if it is negative.
 std::string number(std::int64_t value) {
   std::string digits;
@@ -65,6 +68,13 @@ Status check(const Machine& machine, const HeadGrid& grid) {
   const auto& rows = machine.head.row_offset_um;
   if (std::ranges::any_of(rows, [](double offset) { return offset != 0; })) {
     return wrong("head.row_offset_um", "the HP45 controller fires its rows where they belong; give [0]");
+  }
+  for (const std::uint32_t nozzle : kWithoutChannel) {
+    if (repeat_of(machine) > 1 || nozzle >= grid.nozzles || std::ranges::binary_search(grid.blocked, nozzle)) continue;
+    return wrong("head.blocked",
+                 fmt::format("the HP45 controller cannot fire nozzle {}, its tables give it another one's channel; "
+                             "name 6, 56, 115, 127, 167, 256, 291 as far as the head has them",
+                             nozzle));
   }
   if (grid.steps_per_pixel != 1) return wrong("motion.lag_unit", "the HP45 controller fires by pixels; give pixel");
   if (grid.steps() + 2 > kLines) {
