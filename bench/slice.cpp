@@ -86,7 +86,7 @@ void slice_part(benchmark::State& state, Until until, const std::string& path) {
       slice::chain(cuts, stack.own[p], scratch, closed, open);
       benchmark::DoNotOptimize(closed.point.data());
       if (until == Until::kChain) continue;
-      slice::tidy(closed, 0);
+      slice::tidy(closed);
       if (!slice::find_contacts(closed, contact, group)) group.clear();
       if (!slice::nest(closed, FillRule::kNonzero, group)) return state.SkipWithError("contours could not be united");
     }
