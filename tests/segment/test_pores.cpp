@@ -11,7 +11,7 @@
 namespace lamina::segment {
 namespace {
 
-constexpr Nm kMm = 1'000'000;
+constexpr Nm kNmAMm = 1'000'000;
 
 double mean(double sum, std::uint64_t count) { return sum / static_cast<double>(count); }
 
@@ -19,7 +19,7 @@ double mean(double sum, std::uint64_t count) { return sum / static_cast<double>(
 Toolpaths parallel_lines(double distance_mm, int count, double cut_off_mm = 0) {
   Toolpaths paths;
   for (int n = 0; n < count; ++n) {
-    const Nm y = static_cast<Nm>(nm_of(n * distance_mm)), to = 20 * kMm - (n % 2 == 1 ? static_cast<Nm>(nm_of(cut_off_mm)) : 0);
+    const Nm y = static_cast<Nm>(nm_of(n * distance_mm)), to = 20 * kNmAMm - (n % 2 == 1 ? static_cast<Nm>(nm_of(cut_off_mm)) : 0);
     paths.add({0, y}, PathKind::kRaster, 400'000, n);
     paths.add({to, y}, PathKind::kRaster, 400'000, n);
     paths.close();
@@ -86,7 +86,7 @@ TEST(Pores, LieBesideClosedCurvesToo) {
   Toolpaths paths;
   for (const int n : {0, 1, 2}) {
     const Nm in = n * 430'000;
-    const Nm lo = in, hi = 20 * kMm - in;
+    const Nm lo = in, hi = 20 * kNmAMm - in;
     for (const Point2 p : {Point2{lo, lo}, {hi, lo}, {hi, hi}, {lo, hi}, {lo, lo}})
       paths.add(p, PathKind::kContour, 400'000, n);
     paths.close();
