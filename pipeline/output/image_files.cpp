@@ -97,12 +97,14 @@ Status ImageFiles::open() {
     }
     return Status();
   };
+  // A new job's record reaches the disk beside the first layers, which nobody waits for.
+  const bool at_once = job.sync != Sync::kJob || !kept_.empty();
   auto manifest = ManifestWriter::open(job.output + "/" + manifest_name(job), head_,
                                        {kept_.begin(), kept_.begin() + static_cast<std::ptrdiff_t>(next_kept_)},
-                                       {job.sync, sync_names}, std::move(*claim));
+                                       {job.sync, at_once, sync_names}, std::move(*claim));
   if (!manifest) return manifest.error();
   manifest_.emplace(std::move(*manifest));
-  return {};
+  return at_once ? Status() : sync_->begin();
 }
 
 std::uint64_t ImageFiles::Work::bytes() const {

@@ -182,17 +182,15 @@ Status File::sync() {
   return reason == 0 ? Status() : Status(write_failure(state_->path, reason));
 }
 
-Status File::become_part() {
+Status File::become_part(bool synced) {
   State& state = *state_;
   if (Status status = flush(); !status) return status;
-  const std::string part = part_of(state.target);
-  // A power cut may take the begun file, but not what stood there.
-  const bool replaces = ::faccessat(AT_FDCWD, part.c_str(), F_OK, AT_SYMLINK_NOFOLLOW) == 0;
-  if (replaces && state.options.durable != Durable::kNo) {
+  if (synced && state.options.durable != Durable::kNo) {
     if (Status status = sync(); !status) return status;
   }
   // Nobody else knows its name yet; file systems without locks have one writer at a time.
   if (!state.options.lock) ::flock(state.file, LOCK_EX | LOCK_NB);
+  const std::string part = part_of(state.target);
   if (std::rename(state.grows.c_str(), part.c_str()) != 0) return write_failure(state.path, errno);
   forget(std::exchange(state.watched, -1));
   state.grows = part;

@@ -59,8 +59,9 @@ class File {
   /// What has been flushed survives a power cut, unless the file is a stream.
   Status sync();
   /// Gives an unfinished file, which grew under another name, the name NAME.part, locked and kept from now on; it takes
-  /// the place of an older one at once, synced.
-  Status become_part();
+  /// the place of an older one at once.
+  /// synced  its bytes are on the disk before; false: whoever calls sees to that, and nothing is lost until then
+  Status become_part(bool synced = true);
   /// Flushes, syncs, closes and gives the file its name. returns  its size, and its hash if it was taken
   Result<FileDigest> finish();
   /// Removes what is not finished, kept or not.

@@ -18,7 +18,8 @@
 namespace lamina::write {
 namespace {
 
-constexpr std::uint64_t kEnough = 4 << 20;  // bytes that the thread waits for
+// Bytes that the thread waits for: few at first, so that a small job has less to wait for at its end, then twice as many.
+constexpr std::uint64_t kFirst = 512 << 10, kMost = 4 << 20;
 
 /// The reason of a failed sync, 0 if the file system only cannot do it.
 int failure() { return errno == EINVAL || errno == ENOTSUP || errno == ENOSYS || errno == EROFS || errno == EBADF ? 0 : errno; }
@@ -57,7 +58,7 @@ struct FolderSync::Folders {
   std::thread early;
   std::mutex mutex;  // guards what follows
   std::condition_variable changed;
-  std::uint64_t waiting = 0;  // bytes
+  std::uint64_t waiting = 0, enough = kFirst;  // bytes
   bool ends = false;
   Status met;  // the first failure
 
@@ -77,9 +78,10 @@ struct FolderSync::Folders {
   void sync_early() {
     std::unique_lock lock(mutex);
     for (;;) {
-      changed.wait(lock, [this] { return ends || waiting >= kEnough; });
+      changed.wait(lock, [this] { return ends || waiting >= enough; });
       if (ends || !met) return;
       waiting = 0;
+      enough = std::min(2 * enough, kMost);
       lock.unlock();
       Status status = sync_all();
       lock.lock();
@@ -120,12 +122,14 @@ FolderSync FolderSync::of(const std::vector<std::string>& folders) {
   return made;
 }
 
+Status FolderSync::begin() const { return wrote(kFirst); }
+
 Status FolderSync::wrote(std::uint64_t bytes) const {
   Folders& folders = *folders_;
   {
     const std::lock_guard lock(folders.mutex);
     folders.waiting += bytes;
-    if (!folders.met || folders.waiting < kEnough) return folders.met;
+    if (!folders.met || folders.waiting < folders.enough) return folders.met;
   }
   try {
     if (!folders.early.joinable()) folders.early = std::thread([&folders] { folders.sync_early(); });

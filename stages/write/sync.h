@@ -36,6 +36,9 @@ class FolderSync {
   FolderSync& operator=(FolderSync&&) noexcept;
   ~FolderSync();
 
+  /// Begins the thread with what is there by now: a file that names the job reaches the disk while the first layers are made.
+  /// errors  as wrote()
+  Status begin() const;
   /// Tells how many bytes have been written since it was told before. May begin the thread.
   /// errors  of sync, as soon as the thread has met one
   Status wrote(std::uint64_t bytes) const;

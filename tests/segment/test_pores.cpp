@@ -19,7 +19,8 @@ double mean(double sum, std::uint64_t count) { return sum / static_cast<double>(
 Toolpaths parallel_lines(double distance_mm, int count, double cut_off_mm = 0) {
   Toolpaths paths;
   for (int n = 0; n < count; ++n) {
-    const Nm y = static_cast<Nm>(nm_of(n * distance_mm)), to = 20 * kNmAMm - (n % 2 == 1 ? static_cast<Nm>(nm_of(cut_off_mm)) : 0);
+    const Nm y = static_cast<Nm>(nm_of(n * distance_mm)),
+             to = 20 * kNmAMm - (n % 2 == 1 ? static_cast<Nm>(nm_of(cut_off_mm)) : 0);
     paths.add({0, y}, PathKind::kRaster, 400'000, n);
     paths.add({to, y}, PathKind::kRaster, 400'000, n);
     paths.close();

@@ -19,21 +19,34 @@ double distance_to(Point2 p, Point2 a, Point2 b) {
 
 }  // namespace
 
-LineNeighbours::LineNeighbours(const ToolpathsView& paths, const LayerCut& cut) : paths_(paths), cut_(cut) {
+namespace {
+
+/// Calls use(path points i .. end) for every run of one line or curve.
+template <class Use>
+void for_each_run(const ToolpathsView& paths, Use use) {
   for (std::uint32_t p = 0; p < paths.size(); ++p) {
     const std::uint32_t last = paths.offset[p + 1] - 1;
     for (std::uint32_t i = paths.offset[p]; i < last;) {
       std::uint32_t end = i + 1;
       while (end < last && paths.kind[end] == paths.kind[i] && paths.line[end] == paths.line[i]) ++end;
-      if (paths.line[i] != kNoLine) {
-        const Point2 a = paths.point[i], b = paths.point[end];
-        const auto [low, high] = std::minmax({along(a), along(b)});
-        const double across = cut.along_x * a.y - cut.along_y * a.x;
-        lines_.push_back({paths.kind[i], end == i + 1, paths.line[i], i, end, low, high, across});
-      }
+      if (paths.line[i] != kNoLine) use(i, end);
       i = end;
     }
   }
+}
+
+}  // namespace
+
+LineNeighbours::LineNeighbours(const ToolpathsView& paths, const LayerCut& cut) : paths_(paths), cut_(cut) {
+  std::size_t runs = 0;
+  for_each_run(paths, [&](std::uint32_t, std::uint32_t) { ++runs; });
+  lines_.reserve(runs);
+  for_each_run(paths, [&](std::uint32_t i, std::uint32_t end) {
+    const Point2 a = paths.point[i], b = paths.point[end];
+    const auto [low, high] = std::minmax({along(a), along(b)});
+    const double across = cut.along_x * a.y - cut.along_y * a.x;
+    lines_.push_back({paths.kind[i], end == i + 1, paths.line[i], i, end, low, high, across});
+  });
   std::ranges::sort(lines_, {}, [](const Line& l) { return std::tuple(l.kind, l.number, l.low, l.run); });
   order_.resize(lines_.size());
   for (std::uint32_t i = 0; i < order_.size(); ++i) order_[i] = i;

@@ -169,7 +169,7 @@ Result<LayeredFile> LayeredFile::open(Options options, const ManifestHead& head,
   // First the record: a NAME.part without one is somebody else's.
   if (!streams) {
     auto manifest = ManifestWriter::open(manifest_path, head, state.kept,
-                                         {state.options.sync, [&state] { return state.sync(); }}, std::move(claim));
+                                         {state.options.sync, true, [&state] { return state.sync(); }}, std::move(claim));
     if (!manifest) return manifest.error();
     state.manifest.emplace(std::move(*manifest));
   }

@@ -162,7 +162,7 @@ Result<ManifestWriter> ManifestWriter::open(const std::string& path, const Manif
   if (!file) return file.error();
   if (Status status = begin(*file, head, kept_prefix); !status) return status.error();
   claim->hand_over();
-  if (Status status = file->become_part(); !status) return status.error();
+  if (Status status = file->become_part(options.sync_head); !status) return status.error();
   ManifestWriter writer;
   writer.state_ = std::make_unique<State>(std::move(*file), head, std::move(options));
   writer.state_->next_layer = head.first_layer + static_cast<std::uint32_t>(kept_prefix.size());

@@ -108,6 +108,7 @@ class ManifestWriter {
  public:
   struct Options {
     Sync sync = Sync::kJob;
+    bool sync_head = true;  // before the record has its name; false if the folder is synced at once, and nothing is replaced
     /// With Sync::kLayer: makes what the next lines record survive a power cut, before they are written.
     std::function<Status()> sync_layers = {};
   };
