@@ -295,17 +295,11 @@ Status ask_for_dpi(Machine& machine, const HeadGrid& grid, const std::array<std:
   return {};
 }
 
-std::string explain(const Machine& machine, const HeadGrid& grid) {
+std::string explain(const Machine& machine, const HeadGrid& grid, const std::optional<FullLayer>& full) {
   std::string text;
   const auto line = [&](std::string_view name, const std::string& value) { text += fmt::format("{:<12}{}\n", name, value); };
   const auto dpi = [](double nm) { return kNmPerInch / nm; };
-  const std::uint32_t swaths = grid.swaths(0), sweeps = swaths * grid.passes;
-  const double sweep_mm = static_cast<double>(grid.steps()) * grid.step_nm() / kNmPerMm + 2 * machine.motion.ramp_mm;
-  const double scan_s = sweeps * sweep_mm / machine.motion.scan_speed_mm_s;
-  const double back_s = machine.motion.both_directions ? 0 : sweeps * sweep_mm / machine.motion.travel_speed_mm_s;
-  const double roll_s = machine.powder.spread_s > 0 ? machine.powder.spread_s
-                                                    : 2 * std::abs(machine.powder.roller_mm[1] - machine.powder.roller_mm[0]) /
-                                                          machine.powder.roller_speed_mm_s;
+  const std::uint64_t sweeps = full ? full->sweeps : std::uint64_t{grid.swaths(0)} * grid.passes;
   line("machine", fmt::format("{}: {}", machine.name, machine.description));
   line("bed", machine.bed.shape == BedShape::kRound
                   ? fmt::format("round, {:g} mm, parts up to {:g} mm high", machine.bed.size_mm[0], machine.bed.build_height_mm)
@@ -329,13 +323,14 @@ std::string explain(const Machine& machine, const HeadGrid& grid) {
   line("swath", fmt::format("{} lines, {:.3f} mm wide{}", grid.swath_lines(), grid.swath_lines() * grid.line_nm / kNmPerMm,
                             grid.overlap > 0 ? fmt::format(", {} of them shared with the next", grid.overlap) : ""));
   line("layer",
-       fmt::format("{} x {} pixels, {} bytes as bits; {} swaths, {} sweeps of {} steps, {} bytes of vectors",
+       fmt::format("{} x {} pixels, {} bytes as bits; {} swaths, {} sweeps of up to {} steps, {} bytes of vectors",
                    grid.image.columns(), grid.image.rows(), (std::uint64_t{grid.image.columns()} + 7) / 8 * grid.image.rows(),
-                   swaths, sweeps, grid.steps(), std::uint64_t{sweeps} * grid.steps() * ((grid.nozzles + 7) / 8)));
+                   grid.swaths(0), sweeps, grid.steps(), sweeps * grid.steps() * ((grid.nozzles + 7) / 8)));
   line("speed", fmt::format("{:g} mm/s, at most {:.1f} mm/s at {:g} Hz", machine.motion.scan_speed_mm_s,
                             machine.head.highest_frequency_hz * grid.place_nm / kNmPerMm, machine.head.highest_frequency_hz));
-  line("time", fmt::format("{:.1f} s a full layer: scan {:.1f} s, return {:.1f} s, roller {:.1f} s, pause {:.1f} s",
-                           scan_s + back_s + roll_s + machine.powder.pause_s, scan_s, back_s, roll_s, machine.powder.pause_s));
+  line("time", full ? fmt::format("{:.1f} s a full layer of {:g} mm, {:.1f} s an empty one (powder, pauses)", full->seconds,
+                                  full->thickness_mm, full->empty_seconds)
+                    : "not told: the program of a full layer is too long");
   line("dialect", machine.dialect);
   return text;
 }

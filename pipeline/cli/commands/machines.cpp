@@ -1,8 +1,13 @@
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
 #include "pipeline/cli/command.h"
 #include "pipeline/machine/powder_printer.h"
 #include "pipeline/machine/profiles.h"
+#include "pipeline/output/print_program.h"
 #include "stages/program/head_grid.h"
 #include "stages/program/orientation_target.h"
 #include "stages/write/file.h"
@@ -46,6 +51,53 @@ std::string explain(const ExtruderProfile& profile) {
       profile.own_calibration ? "measured on it" : "as published for an Anet A8; lamina calibrate measures them");
 }
 
+/// The image of a layer that sets every pixel whose centre lies on the bed.
+Runs image_of_bed(const Machine& machine, const PixelGrid& grid) {
+  const bool round = machine.bed.shape == BedShape::kRound;
+  const double width = machine.bed.size_mm[0] * kNmPerMm, radius = width / 2;
+  // The first pixel whose centre does not lie before a place.
+  const auto pixel = [](const PixelAxis& axis, double nm) {
+    return static_cast<std::uint32_t>(std::clamp(std::ceil(nm * axis.pixels_per_nm() - 0.5), 0.0, double(axis.count)));
+  };
+  const std::uint32_t rows = grid.rows(), behind = rows - pixel(grid.y, machine.bed.size_mm[1] * kNmPerMm);
+  Runs runs;
+  runs.columns = grid.columns();
+  runs.row_offset.push_back(0);
+  for (std::uint32_t r = 0; r < rows; ++r) {
+    const double y = static_cast<double>(grid.y.centre(rows - 1 - r)) - radius;
+    const double half = round ? std::sqrt(std::max(0.0, radius * radius - y * y)) : radius;
+    const std::uint32_t begin = pixel(grid.x, radius - half), end = pixel(grid.x, radius + half);
+    if (r >= behind && begin < end) runs.change.insert(runs.change.end(), {begin, end});
+    runs.row_offset.push_back(static_cast<std::uint32_t>(runs.change.size()));
+  }
+  return runs;
+}
+
+/// Compiles and times a full layer and an empty one; none if the vectors of the full one take more than 256 MiB, six times
+/// those of the largest shipped machine, or its program more than 1 GiB.
+Result<std::optional<program::FullLayer>> time_full_layer(const ResolvedMachine& resolved) {
+  const HeadGrid& grid = resolved.grid;
+  const PrintProgram program(resolved, "", 1, {});
+  const double vectors = double(grid.swaths(0)) * grid.passes * static_cast<double>(grid.steps()) * grid.words() * 8;
+  if (vectors > (256 << 20) || program.bytes_bound(2 * std::uint64_t{grid.image.rows()}) > (1u << 30)) {
+    return std::optional<program::FullLayer>();
+  }
+  program::FullLayer full;
+  full.thickness_mm = std::max(0.1, resolved.machine.motion.layer_step_um / 1000);
+  const Layer layer{0, 0, static_cast<Nm>(nm_of(full.thickness_mm))};
+  Runs image = image_of_bed(resolved.machine, grid.image);
+  ProgramWork work;
+  ProgramRecord record;
+  if (Status status = program.write_layer(layer, image, {0}, work, record); !status) return status.error();
+  full.sweeps = record.sweeps;
+  full.seconds = static_cast<double>(record.microseconds) / 1e6;
+  image.change.clear();
+  std::fill(image.row_offset.begin(), image.row_offset.end(), 0u);
+  if (Status status = program.write_layer(layer, image, {0}, work, record); !status) return status.error();
+  full.empty_seconds = static_cast<double>(record.microseconds) / 1e6;
+  return std::optional(full);
+}
+
 /// A printer by name or file, first among powder printers, then extrusion: its profile or its derived values.
 /// errors  for an unknown name, those of powder printers
 Result<std::string> printer_text(const std::string& name, bool whole) {
@@ -58,7 +110,9 @@ Result<std::string> printer_text(const std::string& name, bool whole) {
   if (whole) return read::machine_text(*powder);
   const auto resolved = resolve_profile(*powder);
   if (!resolved) return resolved.error();
-  return program::explain(resolved->machine, resolved->grid);
+  const auto full = time_full_layer(*resolved);
+  if (!full) return full.error();
+  return program::explain(resolved->machine, resolved->grid, *full);
 }
 
 Outcome run_machines(const Arguments& arguments, Context& context) {

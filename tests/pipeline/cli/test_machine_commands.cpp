@@ -57,6 +57,60 @@ TEST_F(MachineCommands, CheckTellsWhatFollowsFromAProfile) {
   EXPECT_EQ(lamina("machines --check nuferbk", 2).find('\n'), lamina("machines --check nuferbk", 2).size() - 1);
 }
 
+/// The number before a word of a printed text.
+double number_before(const std::string& text, const std::string& word) {
+  const std::size_t end = text.find(word);
+  if (end == std::string::npos) return -1;
+  const std::size_t before = text.find_last_of(" \n", end - 1);
+  return std::strtod(text.c_str() + before + 1, nullptr);
+}
+
+// Beds of 30 x 24 mm, and of 30 mm: each pixel stops the head (reprap-inkjet), second passes for blocked nozzles (oasis, hp45),
+// ink to be fetched (brundlefab), a round bed (nuferbj).
+TEST_F(MachineCommands, CheckTellsTheTimeThatTheProgramOfAFullLayerTakes) {
+  for (const std::string machine : {"reprap-inkjet", "oasis", "hp45", "brundlefab", "nuferbj"}) {
+    const bool round = machine == "nuferbj";
+    const double width = 30, depth = round ? 30 : 24;
+    std::string profile = lamina("machines --show " + machine);
+    const std::size_t size = profile.find("size_mm = ");
+    profile.replace(size, profile.find('\n', size) - size, "size_mm = [30, " + std::to_string(depth) + "]");
+    std::ofstream(at("m.toml")) << profile;
+    // A prism over the bed, one layer high: a rectangle, or a circle of 720 corners within 2 um of its edge.
+    const int corners = round ? 720 : 4;
+    const auto corner = [&](int i, double z) {
+      const double turn = 2 * 3.14159265358979323846 * i / corners;
+      const double x = round ? 15 + 14.999 * std::cos(turn) : i % 4 == 1 || i % 4 == 2 ? width : 0;
+      const double y = round ? 15 + 14.999 * std::sin(turn) : i % 4 >= 2 ? depth : 0;
+      return "vertex " + std::to_string(x) + " " + std::to_string(y) + " " + std::to_string(z) + "\n";
+    };
+    std::ofstream part(at("full.stl"));
+    part << "solid full\n";
+    const auto facet = [&](const std::string& vertices) {
+      part << "facet normal 0 0 0\nouter loop\n" << vertices << "endloop\nendfacet\n";
+    };
+    for (int i = 0; i < corners; ++i) {
+      facet(corner(i, 0) + corner(i + 1, 0) + corner(i + 1, 0.1));
+      facet(corner(i, 0) + corner(i + 1, 0.1) + corner(i, 0.1));
+      if (i < 1 || i + 1 == corners) continue;
+      facet(corner(0, 0) + corner(i + 1, 0) + corner(i, 0));
+      facet(corner(0, 0.1) + corner(i, 0.1) + corner(i + 1, 0.1));
+    }
+    part << "endsolid full\n";
+    part.close();
+    fs::remove_all(at("full"));
+    lamina("jet " + at("full.stl") + " --machine " + at("m.toml") + " --layer 0.1 -o " + at("full"));
+    const std::string replayed = lamina("verify " + at("full") + " --json");
+    const std::string told = lamina("machines --check " + at("m.toml"));
+    const std::size_t seconds = replayed.find("\"seconds\":"), sweeps = replayed.find("\"sweeps\":");
+    ASSERT_NE(seconds, std::string::npos) << replayed;
+    ASSERT_NE(sweeps, std::string::npos) << replayed;
+    EXPECT_NEAR(number_before(told, " s a full layer of 0.1 mm"), std::strtod(replayed.c_str() + seconds + 10, nullptr), 0.051)
+        << machine << "\n"
+        << told;
+    EXPECT_EQ(number_before(told, " sweeps of up to"), std::strtod(replayed.c_str() + sweeps + 9, nullptr)) << machine;
+  }
+}
+
 TEST_F(MachineCommands, TheOrientationTargetIsAnFThatReadsRightOnEveryMounting) {
   lamina("machines --target " + at("f.stl"));
   for (const std::string machine : {"nuferbj", "nuferbj-31", "brundlefab", "xaar128-raw"}) {
