@@ -190,7 +190,7 @@ TEST(Brundlefab, PlantedFaultsAreFound) {
     by_port += other;
   }
   EXPECT_EQ(found, std::size(faults));
-  EXPECT_GE(found, 28u);
+  EXPECT_GE(found, 30u);
   EXPECT_GE(by_port, 15u);
 }
 
