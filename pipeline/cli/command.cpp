@@ -8,6 +8,7 @@
 
 #include <algorithm>
 #include <exception>
+#include <map>
 
 #include "pipeline/cli/console.h"
 #include "pipeline/cli/outputs.h"
@@ -81,6 +82,10 @@ CommandSpec spec_of(const Command& command) {
   CommandSpec spec = command.spec();
   spec.name = command.name;
   spec.brief = command.summary;
+  // Each heading once, in order of first occurrence; options without one come first.
+  std::map<std::string, std::size_t> places{{"", 0}};
+  for (const OptionSpec& option : spec.options) places.try_emplace(option.group, places.size());
+  std::ranges::stable_sort(spec.options, {}, [&](const OptionSpec& option) { return places[option.group]; });
   return spec;
 }
 

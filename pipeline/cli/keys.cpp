@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <filesystem>
-#include <map>
 
 #include "pipeline/cli/outputs.h"
 #include "pipeline/job/file.h"
@@ -89,10 +88,6 @@ void add_key_options(const KeyChoice& choice, CommandSpec& spec) {
        {"--set", "KEY=VALUE", "set any key of the job, as in --set bed.dpi=600; part.2.copies is of part 2", "", "Job"}});
   add_options<Job>(job_keys(), choice, Job(), spec);
   add_options<PartRequest>(part_keys(), choice, PartRequest(), spec);
-  // Each heading once, in order of first occurrence.
-  std::map<std::string, std::size_t> places;
-  for (const OptionSpec& option : spec.options) places.try_emplace(option.group, places.size());
-  std::ranges::stable_sort(spec.options, {}, [&](const OptionSpec& option) { return places[option.group]; });
 }
 
 Result<Job> read_job_options(const KeyChoice& choice, const Arguments& arguments) {

@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <set>
 #include <sstream>
 
 #include "pipeline/cli/command.h"
@@ -33,6 +34,29 @@ TEST(Help, IsAsWideAsTheTerminalAndNamesEveryOption) {
     }
     EXPECT_EQ(text.find("\n\n\n"), std::string::npos) << spec.name;
     EXPECT_EQ(text.find('\1'), std::string::npos) << spec.name;
+  }
+}
+
+TEST(Help, HasEachHeadingOnce) {
+  for (CommandSpec spec : pipeline::all_specs()) {
+    spec.summary.clear();
+    spec.closing.clear();
+    spec.more = nullptr;
+    std::multiset<std::string> headings;
+    std::istringstream lines(help_text(spec, 100) + man_page(spec) + markdown_page(spec));
+    for (std::string line; std::getline(lines, line);) {
+      const bool of_help = !line.starts_with(' ') && line.ends_with(':');
+      if (of_help || line.starts_with(".SS ") || line.starts_with("## ")) headings.insert(line);
+    }
+    for (const std::string& heading : headings) EXPECT_EQ(headings.count(heading), 1u) << spec.name << ": " << heading;
+    EXPECT_TRUE(headings.contains("Options:")) << spec.name;
+    if (spec.name == "jet") {
+      EXPECT_TRUE(headings.contains("Machine and binder:"));
+    }
+    if (spec.name == "extrude") {
+      EXPECT_TRUE(headings.contains("Machine:"));
+      EXPECT_FALSE(headings.contains("Machine and binder:"));
+    }
   }
 }
 

@@ -54,6 +54,7 @@ CommandSpec plan_spec(const PlanCommand& row) {
   override_words(row.overrides, spec);
   if (const auto machine = std::ranges::find(spec.options, "--machine", &OptionSpec::flag); machine != spec.options.end()) {
     machine->words = names_of(row.product == Product::kMoves ? shipped_extruders() : shipped_machines());
+    if (row.product == Product::kMoves) machine->group = "Machine";
   }
   if (!row.divided) spec.absent = {{"--shard", kNoShards}};
   spec.options.insert(spec.options.end(), row.own.begin(), row.own.end());
