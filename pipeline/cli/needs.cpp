@@ -14,6 +14,8 @@ using heights::Mode;
 bool fits_heights(Product, const Job& job) { return job.heights.mode != Mode::kUniform; }
 bool by_angle(Product, const Job& job) { return job.heights.mode == Mode::kAngle; }
 bool by_steps(Product product, const Job& job) { return fits_heights(product, job) && !by_angle(product, job); }
+/// Optimal tables look at all slopes in a layer.
+bool by_slopes(Product product, const Job& job) { return fits_heights(product, job) && job.heights.mode != Mode::kOptimal; }
 bool optimal(Product, const Job& job) { return job.heights.mode == Mode::kOptimal; }
 bool may_end_below(Product product, const Job& job) { return by_angle(product, job) || optimal(product, job); }
 bool shrinks(Product product, const Job& job) {
@@ -28,11 +30,20 @@ bool lays_lines(Product, const Job& job) {
   return job.fill.all.pattern != infill::Pattern::kNone || job.segment.any() || !job.fill.ranges.empty() ||
          !std::ranges::all_of(job.parts, plain);
 }
+/// Only curves that are not closed, and lines, are cut by a rule.
+bool cuts_lines(Product, const Job& job) {
+  const auto plain = [](const PartRequest& part) { return part.fill.empty(); };
+  return job.fill.all.pattern != infill::Pattern::kContour || !job.fill.ranges.empty() ||
+         !std::ranges::all_of(job.parts, plain);
+}
+bool lies_in_pairs(Product, const Job& job) { return job.segment.all.continuous > 1 || !job.segment.ranges.empty(); }
 
 bool repairs(Product, const Job& job) { return job.repair; }
+bool leaves_open(Product, const Job& job) { return !job.repair; }
 bool arranges(Product, const Job& job) {
   return std::ranges::any_of(job.parts, [](const PartRequest& part) { return !part.at_mm || part.copies > 1; });
 }
+bool writes_tiff(Product, const Job& job) { return job.format.starts_with("tiff"); }
 bool writes_cli(Product, const Job& job) { return job.slice.format.starts_with("cli"); }
 
 struct Need {
@@ -42,6 +53,7 @@ struct Need {
 };
 constexpr std::string_view kUniform = "is of layers that fit the part, and these are uniform; add --heights and --thickness",
                            kSteps = "is of --heights cusp, stepwise and optimal; add one of them",
+                           kSlopes = "is of --heights angle, cusp and stepwise; add one of them",
                            kAngle = "is of --heights angle; add it", kOptimal = "is of --heights optimal; add it",
                            kCovered = "is of --heights angle and optimal, the others reach the top; add one of them",
                            kShrinks = "is of steps on parts that shrink; add --shrink, and --heights cusp, stepwise or optimal",
@@ -54,7 +66,7 @@ constexpr Need kNeeds[] = {
     {"--peaks", by_angle, kAngle},
     {"--cover-top", may_end_below, kCovered},
     {"--peak-angle", fits_heights, kUniform},
-    {"--facets", fits_heights, kUniform},
+    {"--facets", by_slopes, kSlopes},
     {"--facet-area", fits_heights, kUniform},
     {"--no-flats", optimal, kOptimal},
     {"--flat-area", fits_heights, kUniform},
@@ -69,14 +81,21 @@ constexpr Need kNeeds[] = {
     {"--angle", lays_lines, kLines},
     {"--angle-step", lays_lines, kLines},
     {"--stagger", lays_lines, kLines},
+    {"--print-speed", lays_lines, "is of lines that fill, and no pattern is asked for; add --fill, or give --wall-speed"},
+    {"--segment-rule", cuts_lines, "is of lines; closed curves are cut by their length under every rule, leave it out"},
+    {"--spacing-cc", lies_in_pairs,
+     "is between continuous lines, and one lies alone between segmented ones; add --continuous 2"},
+    {"--bridge", leaves_open, "is of open meshes, and repair closes them; add --no-repair"},
+    {"--title", writes_tiff, "is of TIFF, other images have no place for it; leave it out, or add --format tiff-g4"},
     {"--weld", repairs, "is of repair, which is off; leave out one of the two"},
     {"--gap", arranges, "is between parts that are arranged, and --at places this one; leave out one of the two"},
     {"--empty-first-layer", writes_cli, "is of CLI files; add --format cli or cli-binary"},
 };
 
-/// Options that files of a printer without heaters and fans that obey a program do not carry.
+/// Options of what a printer that reads SML decides by itself: its files carry no heat, fans and speeds.
 constexpr std::string_view kOfGcode[] = {"--nozzle-temperature", "--bed-temperature", "--retraction", "--fan",
-                                         "--relative-extrusion"};
+                                         "--relative-extrusion", "--print-speed",     "--wall-speed", "--first-layer-speed",
+                                         "--travel-speed"};
 
 }  // namespace
 
@@ -84,7 +103,8 @@ Status check_needs(Product product, const Arguments& arguments, const Job& job, 
   // Whoever names the pattern none knows that there are no lines.
   const bool named = arguments.has("--pattern") || arguments.has("--fill");
   for (const Need& need : kNeeds) {
-    const bool beads = need.met == lays_lines || need.met == lays_beads, of_mode = need.met == by_angle || need.met == optimal;
+    const bool beads = need.met == lays_lines || need.met == lays_beads,
+               of_mode = need.met == by_angle || need.met == optimal || need.met == by_slopes;
     if (!arguments.has(need.flag) || need.met(product, job) || (beads && named) || (study && !of_mode)) continue;
     return terminal::at_option(need.flag, std::string(need.unmet));
   }
@@ -104,10 +124,17 @@ Status check_machine_needs(const Extruder& machine, const Arguments& arguments) 
   return {};
 }
 
-std::string note_on_needs(Product product, const Arguments& arguments, const Job& job) {
+std::vector<std::string> notes_on_needs(Product product, const Arguments& arguments, const Job& job) {
+  std::vector<std::string> notes;
+  if (arguments.has("--layer") && !job.heights.thickness_mm.empty()) {
+    notes.emplace_back("--layer does nothing here, layers are as thick as --thickness says; leave it out");
+  }
   const bool hollow = product == Product::kImages && fills(job) && !lays_lines(product, job);
-  if (!hollow || arguments.has("--pattern") || arguments.has("--fill")) return {};
-  return "inside of the walls nothing is asked for, powder stays loose there; add --fill raster, or --fill none if it is meant";
+  if (hollow && !arguments.has("--pattern") && !arguments.has("--fill")) {
+    notes.emplace_back(
+        "inside of the walls nothing is asked for, powder stays loose there; add --fill raster, or --fill none if it is meant");
+  }
+  return notes;
 }
 
 }  // namespace lamina::pipeline

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include "pipeline/job/job.h"
 #include "stages/data/choices.h"
@@ -19,7 +20,7 @@ using terminal::Arguments;
 Status check_needs(Product product, const Arguments& arguments, const Job& job, bool study = false);
 /// The same for options that the printer's files do not carry.
 Status check_machine_needs(const Extruder& machine, const Arguments& arguments);
-/// What an option leaves open, in one line; "" if nothing.
-std::string note_on_needs(Product product, const Arguments& arguments, const Job& job);
+/// What options leave open, and those that do nothing but are harmless, a line each.
+std::vector<std::string> notes_on_needs(Product product, const Arguments& arguments, const Job& job);
 
 }  // namespace lamina::pipeline

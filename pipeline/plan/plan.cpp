@@ -212,6 +212,10 @@ class Planner {
 
   /// What can be said of the beads before any is laid.
   Status foresee_beads() {
+    if (plan_.product == Product::kContours && job().slice.format == "3mf" && plan_.sections->fills()) {
+      plan_.warnings.push_back(
+          {"not-written", "--format 3mf: slices of 3MF hold contours only, the filling is not in the file; choose svg or cli"});
+    }
     if (!moves()) return {};
     if (!plan_.sections->fills()) {
       plan_.warnings.push_back({"no-bead", "nothing is asked for: no walls and no filling; give --walls, --fill or both"});

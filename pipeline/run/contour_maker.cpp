@@ -146,7 +146,8 @@ void ContourMaker::tell(Summary& summary) const {
   result("contours", fmt::format("{} with {} points, {:.3f} cm3; {} layers needed a union", readable_count(sums_.contours),
                                  readable_count(sums_.points), volume_mm3_ / 1000, readable_count(sums_.united)));
   if (sums_.paths > 0) {
-    result("filling", fmt::format("{} paths, {:.2f} m of bead", readable_count(sums_.paths), sums_.bead_mm / 1000));
+    const std::string_view written = plan_.job.slice.format == "3mf" ? ", not in the file" : "";
+    result("filling", fmt::format("{} paths, {:.2f} m of bead{}", readable_count(sums_.paths), sums_.bead_mm / 1000, written));
   }
   if (gaps_closed_ > 0 || sums_.open > 0) {
     result("gaps", fmt::format("{} closed by straight stretches, the longest {:.6f} mm; {} chains left open",

@@ -73,6 +73,21 @@ TEST_F(OneMeaning, OptionsThatDoNothingHereAreRefused) {
       {"extrude part.stl --dry-run --machine fdm-2000 --layer 0.254 --fan 50", "--fan: is not in SML"},
       {"extrude part.stl --dry-run --machine fdm-2000 --layer 0.254 --nozzle-temperature 200",
        "--nozzle-temperature: is not in SML"},
+      {"extrude part.stl --dry-run --machine fdm-2000 --layer 0.254 --fill raster --print-speed 9",
+       "--print-speed: is not in SML"},
+      {"extrude part.stl --dry-run --machine fdm-2000 --layer 0.254 --wall-speed 9", "--wall-speed: is not in SML"},
+      {"extrude part.stl --dry-run --machine fdm-2000 --layer 0.254 --travel-speed 9", "--travel-speed: is not in SML"},
+      {"extrude part.stl --dry-run --machine fdm-2000 --layer 0.254 --first-layer-speed 9",
+       "--first-layer-speed: is not in SML"},
+      {"slice part.stl --dry-run --heights optimal --thickness 0.5,1 --facets plane", "--facets: is of --heights angle, cusp"},
+      {"heights part.stl --heights optimal --thickness 0.5,1 --facets plane", "--facets: is of --heights angle, cusp"},
+      {"slice part.stl --dry-run --layer 1 --bridge 0.5", "--bridge: is of open meshes"},
+      {"extrude part.stl --dry-run --walls 3 --print-speed 50", "--print-speed: is of lines that fill"},
+      {"extrude part.stl --dry-run --machine anet-a8 --layer 0.3 --fill segmented --spacing-cc 0.5",
+       "--spacing-cc: is between continuous lines"},
+      {"extrude part.stl --dry-run --machine anet-a8 --fill segmented --pattern contour --segment-rule fukuda",
+       "--segment-rule: is of lines"},
+      {"jet part.stl --dry-run --layer 1 --format png --title order", "--title: is of TIFF"},
       {"heights part.stl --layer 1 --adapt-angle 30", "--adapt-angle: is of --heights angle"},
       {"heights part.stl --layer 1 --time-model 3", "--time-model: is of --heights optimal"},
       {"calibrate --machine anet-a8 --gap 0.1 -o pieces", "--gap: is of the profile"},
@@ -92,12 +107,33 @@ TEST_F(OneMeaning, OptionsThatDoNothingHereAreRefused) {
         "slice part.stl --dry-run --quiet --layer 1 --format cli --empty-first-layer",
         "heights part.stl --compare --thickness 0.5,1 --time-model 3",
         "slice part.stl --dry-run --quiet --layer 1 --pattern contour --angle 30",
-        "extrude part.stl --dry-run --quiet --fan 50"}) {
+        "extrude part.stl --dry-run --quiet --fan 50", "extrude part.stl --dry-run --quiet --wall-speed 50",
+        "extrude part.stl --dry-run --quiet --fill raster --print-speed 50",
+        "extrude part.stl --dry-run --quiet --machine fdm-2000 --layer 0.254 --machine-set speed.wall_mm_s=9",
+        "extrude part.stl --dry-run --quiet --machine anet-a8 --layer 0.3 --fill segmented --continuous 2 --spacing-cc 0.5",
+        "jet part.stl --dry-run --quiet --layer 1 --fill segmented --pattern honeycomb --segment-rule fukuda",
+        "jet part.stl --dry-run --quiet --layer 1 --title order",
+        "slice part.stl --dry-run --quiet --layer 1 --no-repair --bridge 0.5",
+        "slice part.stl --dry-run --quiet --heights cusp --thickness 0.5,1 --facets plane"}) {
     done(line);
   }
   EXPECT_NE(done("jet part.stl --layer 1 --dry-run --walls 3").err.find("note: inside of the walls nothing is asked for"),
             std::string::npos);
   EXPECT_EQ(done("jet part.stl --layer 1 --dry-run --walls 3 --fill none").err.find("note:"), std::string::npos);
+}
+
+TEST_F(OneMeaning, WhatIsHarmlessButDoesNothingIsTold) {
+  const std::string fitted = "jet part.stl --dry-run --heights cusp --thickness 0.5,1";
+  EXPECT_NE(done(fitted + " --layer 1").err.find("note: --layer does nothing here"), std::string::npos);
+  EXPECT_EQ(done(fitted).err.find("note:"), std::string::npos);
+  const std::string slices = "slice part.stl --layer 1 --walls 1 --overwrite -o out --format ";
+  const Outcome dropped = done(slices + "3mf"), drawn = done(slices + "svg");
+  EXPECT_NE(dropped.err.find("slices of 3MF hold contours only"), std::string::npos) << dropped.err;
+  EXPECT_NE(dropped.err.find("m of bead, not in the file"), std::string::npos) << dropped.err;
+  EXPECT_NE(drawn.err.find("m of bead\n"), std::string::npos) << drawn.err;
+  EXPECT_EQ(drawn.err.find("contours only"), std::string::npos) << drawn.err;
+  EXPECT_EQ(run(slices + "3mf --strict").code, 5);
+  EXPECT_EQ(done("slice part.stl --layer 1 --overwrite -o out --format 3mf").err.find("contours only"), std::string::npos);
 }
 
 TEST_F(OneMeaning, WhatWasAskedForIsAnsweredOnStdout) {

@@ -75,7 +75,7 @@ Outcome plan(const PlanCommand& row, const Arguments& arguments, Context& contex
   if (Status status = row.complete(arguments, *job); !status) return status;
   if (Status status = check_needs(row.product, arguments, *job); !status) return status;
   if (Status status = check_job(*job); !status) return status;
-  if (const std::string note = note_on_needs(row.product, arguments, *job); !note.empty()) job->notes.push_back(note);
+  for (std::string& note : notes_on_needs(row.product, arguments, *job)) job->notes.push_back(std::move(note));
   for (const std::string& note : job->notes) {
     if (!job->quiet) context.say("note: " + note);
   }
