@@ -24,14 +24,17 @@ struct Slices {
   std::vector<std::uint32_t> body;
 
   Slices() {
-    head.parts = {"first.stl", "second.stl"};
-    head.layers = 2;
-    head.program = "lamina <test>";
     square(30, 40, 20, true);
     square(33, 43, 14, false);
     square(38, 48, 4, true);
     square(51, 40, 5, true);
     body = {0, 3, 4};
+    finish();
+  }
+  void finish() {
+    head.parts = {"first.stl", "second.stl"};
+    head.layers = 2;
+    head.program = "lamina <test>";
     for (const Point2 p : contours.point) head.bounds.add(Point3{p.x, p.y, 0});
     head.bounds.add(Point3{30 * kMillimetre, 40 * kMillimetre, 300'000});
     head.top = 300'000;
@@ -189,9 +192,9 @@ TEST(SvgPolygon, LinesAreThoseOfSlic3rsExport) {
       "  <g id=\"layer0\" slic3r:z=\"7.5e-08\">\n"
       "    <polygon slic3r:type=\"contour\" points=\"7e-06,0 20,0 20,20 0,20\" style=\"fill: white\" />\n"
       "    <polygon slic3r:type=\"hole\" points=\"3,3 3,17 17,17 17,3\" style=\"fill: black\" />\n"
-      "    <polygon slic3r:type=\"contour\" points=\"8,8 12,8 12,12 8,12\" style=\"fill: white\" />\n"))
+      "    <polygon slic3r:type=\"contour\" points=\"21,0 26,0 26,5 21,5\" style=\"fill: white\" />\n"))
       << file;
-  EXPECT_TRUE(file.ends_with("points=\"21,0 26,0 26,5 21,5\" style=\"fill: white\" />\n  </g>\n</svg>\n"));
+  EXPECT_TRUE(file.ends_with("points=\"8,8 12,8 12,12 8,12\" style=\"fill: white\" />\n  </g>\n</svg>\n"));
   EXPECT_NE(file.find("  <g id=\"layer1\" slic3r:z=\"2.25e-07\">\n"), std::string::npos);
 }
 
@@ -223,6 +226,39 @@ TEST(SvgPolygon, BrundleFabsHostReadsContoursAndHoles) {
   ASSERT_EQ(host.groups[0].holes.size(), 1u);
   EXPECT_NEAR(shoelace(host.groups[0].contours[0]), 400, 1e-9);
   EXPECT_NEAR(shoelace(host.groups[0].holes[0]), -196, 1e-9);
+}
+
+/// Whether a reader that paints one polygon over the other ends with white at x, y.
+bool painted_white(const std::string& file, double x, double y) {
+  const Oasis host(file);  // the polygons in the order of the file
+  bool white = false;
+  for (const auto& polygon : host.polygons[0]) {
+    bool inside = false;
+    for (std::size_t i = 0; i < polygon.size(); ++i) {
+      const auto &a = polygon[i], &b = polygon[(i + 1) % polygon.size()];
+      if ((a[1] <= y) != (b[1] <= y) && x < a[0] + (b[0] - a[0]) * (y - a[1]) / (b[1] - a[1])) inside = !inside;
+    }
+    if (inside) white = shoelace(polygon) > 0;
+  }
+  return white;
+}
+
+TEST(SvgPolygon, IslandsSurviveReadersThatPaintInOrder) {
+  Slices slices;
+  slices.contours.clear();
+  slices.square(38, 48, 4, true);  // the island first, as shells stand in a part
+  slices.square(34, 44, 12, true);
+  slices.square(36, 46, 8, false);
+  slices.square(30, 40, 20, true);
+  slices.square(33, 43, 14, false);
+  slices.body = {0, 1, 5};
+  slices.finish();
+  const std::string file = slices.file(*make_svg_polygon_encoder());
+  EXPECT_TRUE(painted_white(file, 1.5, 1.5)) << "the outer wall";
+  EXPECT_FALSE(painted_white(file, 3.5, 3.5));
+  EXPECT_TRUE(painted_white(file, 5, 5)) << "the wall in its hole";
+  EXPECT_FALSE(painted_white(file, 7, 7));
+  EXPECT_TRUE(painted_white(file, 10, 10)) << "the island in that one's hole";
 }
 
 /// CLI 2.0, binary: u16 commands 128 (z), 129 (id, dir, n, n points) and 131 (id, n, n lines), all of unsigned 16 bits in

@@ -3,7 +3,9 @@
 // (3ba8e0f), lib/Slic3r/Print.pm, export_svg
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cstdlib>
+#include <vector>
 
 #include "stages/write/decimal.h"
 #include "stages/write/slice_format.h"
@@ -23,6 +25,31 @@ std::string perl_mm(std::int64_t nm) {
   return {text, put_perl_mm(nm, text)};
 }
 
+/// An outer contour and the holes in it, contours [first, end).
+struct Outline {
+  __int128 area;  // doubled, nm^2, of the outer contour
+  std::uint32_t first, end;
+};
+
+/// The outlines of all bodies, those around others first: readers that paint in order would clear islands with the hole
+/// that they lie in. What lies within a hole has less area. A layer without holes keeps its order. cost  O(points + n log n)
+std::vector<Outline> outermost_first(const ContoursView& contours) {
+  std::vector<Outline> outlines;
+  bool holes = false;
+  for (std::uint32_t c = 0; c < contours.size(); ++c) {
+    const __int128 area = doubled_area(contours[c]);
+    if (area > 0 || outlines.empty()) {
+      outlines.push_back({area, c, c + 1});
+    } else {
+      outlines.back().end = c + 1;
+      holes = true;
+    }
+  }
+  const auto larger = [](const Outline& a, const Outline& b) { return a.area > b.area; };
+  if (holes) std::stable_sort(outlines.begin(), outlines.end(), larger);
+  return outlines;
+}
+
 class SvgPolygonEncoder : public SliceEncoder {
  public:
   void head(const SliceHead& head, Buffer<char>& out) const override {
@@ -38,7 +65,9 @@ class SvgPolygonEncoder : public SliceEncoder {
   void layer(const SliceHead& head, const SliceLayer& layer, Buffer<char>& out) const override {
     // The height of the plane in kilometres: Slic3r turns it into mm once too often, and readers undo that.
     append(out, fmt::format("  <g id=\"layer{}\" slic3r:z=\"{:.15g}\">\n", layer.layer.index, mm(layer.layer.plane()) * 1e-6));
-    for (std::uint32_t c = 0; c < layer.contours.size(); ++c) put_polygon(head.bounds, layer.contours[c], out);
+    for (const Outline& outline : outermost_first(layer.contours)) {
+      for (std::uint32_t c = outline.first; c < outline.end; ++c) put_polygon(head.bounds, layer.contours[c], out);
+    }
     append(out, "  </g>\n");
   }
 
