@@ -127,6 +127,13 @@ TEST(Manifest, IdIsTheSameForEveryRangeAndAnotherForEveryOtherJob) {
   job.parts.resize(1);
   head = head_of(job, {}, 1, 0, 1);
   EXPECT_NE(difference(head, some_head()).find("layers.thickness_mm = 0.1, was 0.05"), std::string::npos);
+
+  // A key that one of them lacks is named, wherever it stands.
+  ManifestHead younger = some_head();
+  younger.job_toml.insert(younger.job_toml.find("cusp_mm"), "sort = \"b\"\n");
+  EXPECT_EQ(difference(younger, some_head()),
+            "heights.sort = \"b\", of which it says nothing: it was not set, or another build of lamina wrote it");
+  EXPECT_EQ(difference(some_head(), younger), "heights.sort is set no more, or another build of lamina wrote it");
 }
 
 TEST(Manifest, EveryTruncationOfAPartialOneGivesItsWholeLines) {

@@ -3,9 +3,13 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <array>
 #include <filesystem>
+#include <map>
 #include <optional>
 #include <utility>
+#include <vector>
 
 #include "stages/data/input/file_reader.h"
 #include "stages/data/text/number_text.h"
@@ -26,31 +30,64 @@ std::string title_of(const std::vector<PartSummary>& parts) {
   return parts.size() == 1 ? name : name + " and " + std::to_string(parts.size() - 1) + " more";
 }
 
+namespace {
+
+constexpr std::string_view kOtherBuild = "another build of lamina wrote it";
+
+/// The keys of a job's text, "section.name", with their values; those of part n begin with "part.n.".
+std::vector<std::array<std::string, 2>> said_by(std::string_view job) {
+  std::vector<std::array<std::string, 2>> said;
+  std::string section;
+  std::size_t parts = 0;
+  for (const std::string_view line : split(job, "\n")) {
+    const std::size_t equals = std::min(line.find(" = "), line.size());
+    if (line.starts_with("[[")) {
+      section = fmt::format("part.{}", ++parts);
+    } else if (line.starts_with('[')) {
+      section = line.substr(1, line.find(']') - 1);
+    } else if (!line.empty()) {
+      said.push_back(
+          {fmt::format("{}.{}", section, line.substr(0, equals)), std::string(line.substr(std::min(equals + 3, line.size())))});
+    }
+  }
+  return said;
+}
+
+/// The first key that differs; "" if none does.
+std::string difference_of_jobs(std::string_view now, std::string_view earlier) {
+  std::map<std::string, std::string> said;
+  for (const auto& [key, value] : said_by(earlier)) said[key] = value;
+  for (const auto& [key, value] : said_by(now)) {
+    const auto before = said.find(key);
+    if (before == said.end()) {
+      return fmt::format("{} = {}, of which it says nothing: it was not set, or {}", key, value, kOtherBuild);
+    }
+    if (value != before->second) return fmt::format("{} = {}, was {}", key, value, before->second);
+    said.erase(before);
+  }
+  return said.empty() ? "" : fmt::format("{} is set no more, or {}", said.begin()->first, kOtherBuild);
+}
+
+}  // namespace
+
 std::string difference(const ManifestHead& now, const ManifestHead& earlier) {
   if (now.id() == earlier.id()) return {};
   if (now.version != earlier.version) return fmt::format("lamina is {}, was {}", now.version, earlier.version);
-  const auto lines = split(now.job_toml, "\n"), lines_before = split(earlier.job_toml, "\n");
-  std::string_view section;
-  for (std::size_t i = 0; i < std::max(lines.size(), lines_before.size()); ++i) {
-    const std::string_view line = i < lines.size() ? lines[i] : "";
-    const std::string_view before = i < lines_before.size() ? lines_before[i] : "";
-    if (line == before) {
-      if (line.starts_with('[')) section = line;
-      continue;
-    }
-    const std::size_t name_end = line.find(" = "), name_end_before = before.find(" = ");
-    if (name_end == std::string_view::npos || line.substr(0, name_end) != before.substr(0, name_end_before)) {
-      return "the parts, or which of their keys are set, are others";
-    }
-    section = section.substr(section.find_first_not_of('['));
-    return fmt::format("{}.{}, was {}", section.substr(0, section.find(']')), line, before.substr(name_end_before + 3));
+  if (std::string what = difference_of_jobs(now.job_toml, earlier.job_toml); !what.empty()) {
+    return what.starts_with("part.") && now.parts.size() != earlier.parts.size() ? "the parts are others" : what;
   }
   for (std::size_t i = 0; i < std::min(now.parts.size(), earlier.parts.size()); ++i) {
     if (now.parts[i].fingerprint != earlier.parts[i].fingerprint) {
       return fmt::format("the geometry of {} has changed", now.parts[i].path);
     }
   }
-  if (now.machine_profile != earlier.machine_profile) return "the machine, or its profile, has changed";
+  if (now.machine != earlier.machine) return fmt::format("machine {}, was {}", now.machine, earlier.machine);
+  if (now.machine_profile != earlier.machine_profile) {
+    return fmt::format("the machine's profile has changed, or {}", kOtherBuild);
+  }
+  if (now.program_start != earlier.program_start || now.program_end != earlier.program_end) {
+    return fmt::format("{}, with other print programs", kOtherBuild);
+  }
   return "the parts have changed";
 }
 
