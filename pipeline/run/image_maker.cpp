@@ -129,6 +129,7 @@ class ImageMaker : public Maker {
     moved_pixels_ += record.program.moved;
     lost_pixels_ += record.program.lost;
     microseconds_ += record.program.microseconds;
+    timed_ = timed_ && (record.program.bytes == 0 || record.program.microseconds > 0);
     for (std::size_t m = 0; m < record.images.size(); ++m) materials_[m].second += record.images[m].set_pixels;
     const double pixel_mm2 = 25.4 * 25.4 / (grid.x.dpi() * grid.y.dpi());
     volume_mm3_ += static_cast<double>(record.set_pixels) * pixel_mm2 * mm(record.layer.thickness);
@@ -145,6 +146,7 @@ class ImageMaker : public Maker {
   std::uint64_t set_pixels_ = 0, moved_pixels_ = 0, lost_pixels_ = 0, solid_pixels_ = 0, bead_pixels_ = 0, capped_rows_ = 0;
   std::uint64_t bytes_written_ = 0;
   std::int64_t microseconds_ = 0;  // of the machine
+  bool timed_ = true;              // layers that an earlier build left are not
   double volume_mm3_ = 0;
   std::vector<std::pair<std::string, std::uint64_t>> materials_;  // name, set pixels
 };
@@ -161,7 +163,7 @@ void ImageMaker::tell(Summary& summary) const {
   const double pixels = static_cast<double>(grid.columns()) * grid.rows() * summary.layers_planned;
   const double pixels_a_second = summary.layer_seconds > 0 ? pixels / summary.layer_seconds : 0;
   const bool several = plan_.images->materials.several();
-  const double print_seconds = static_cast<double>(microseconds_) * 1e-6;
+  const double print_seconds = timed_ ? static_cast<double>(microseconds_) * 1e-6 : 0;
   summary.bytes_written = bytes_written_;
   summary.volume_mm3 = volume_mm3_;
 
@@ -175,7 +177,7 @@ void ImageMaker::tell(Summary& summary) const {
   if (several) {
     for (const auto& [name, count] : materials_) result("", fmt::format("{} of {}", readable_count(count), name));
   }
-  if (microseconds_ > 0) result("printing", replay::time_text(print_seconds, plan_.images->machine->machine.name));
+  if (print_seconds > 0) result("printing", replay::time_text(print_seconds, plan_.images->machine->machine.name));
   if (!summary.dry_run) {
     end("rate", fmt::format("{:.2f} Gpx/s, {:.1f} layers/s", pixels_a_second / 1e9,
                             summary.layer_seconds > 0 ? summary.layers_planned / summary.layer_seconds : 0));
