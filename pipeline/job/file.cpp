@@ -82,6 +82,15 @@ std::string part_text(const PartRequest& part) {
   return text;
 }
 
+/// Whether a job's bytes are other ones than those of 77c7a2d, which wrote texts without the keys that are unsaid.
+bool bytes_are_new(const Job& job, Product product) {
+  const bool shrinks =
+      std::ranges::any_of(job.parts, [](const PartRequest& part) { return part.shrink != PartRequest().shrink; });
+  if (job.heights.mode == heights::Mode::kAngle && shrinks) return true;            // angles are those before the shrinkage
+  if (product != Product::kContours) return product == Product::kMoves;             // with a skirt
+  return job.slice.format.starts_with("cli") || tolerance_um_of(job, product) > 0;  // units; points left out last
+}
+
 /// The value of an assignment: text, or TOML in quotes, brackets or braces.
 TomlValue assigned_value(std::string_view text) {
   const bool toml = !text.empty() && (text.front() == '"' || text.front() == '[' || text.front() == '{');
@@ -175,10 +184,12 @@ std::string job_text(const Job& job, const std::string& directory) {
 
 std::string canonical_job_text(const Job& job, Product product) {
   const bool filled = product == Product::kImages && fills(job);  // by beads, which [fill] and [segment] decide
+  const bool is_new = bytes_are_new(job, product);
   Job whole = job;
   whole.slice.tolerance_um = tolerance_um_of(job, product);
   std::string text = sections_text(job_keys(), whole, [&](const JobKey& key, const std::string& value) {
     const bool of_filling = key.section == "fill" || key.section == "segment";
+    if (key.unsaid == value && !is_new) return false;
     return !value.empty() && ((key.decides & bit(product)) != 0 || (filled && of_filling));
   });
   for (PartRequest part : job.parts) {

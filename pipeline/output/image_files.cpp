@@ -41,7 +41,7 @@ ManifestHead image_head(const Plan& plan) {
   head.machine = machine.name;
   head.dialect = machine.dialect;
   if (const auto* dialect = write::find_dialect(machine.dialect)) head.program_extension = dialect->extension;
-  const std::string profile = read::machine_text(machine);
+  const std::string profile = read::kept_machine_text(machine);
   head.machine_profile = hash_bytes(std::as_bytes(std::span(profile)));
   const ProgramFrame frame = program_frame(*plan.images->machine, plan.layer_count);
   head.program_start = hash_bytes(frame.start);

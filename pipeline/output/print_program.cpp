@@ -34,7 +34,7 @@ PrintProgram::PrintProgram(const ResolvedMachine& resolved, std::string director
 std::string PrintProgram::path(std::string_view name) const { return fmt::format("{}/program/{}", directory_, name); }
 
 Status PrintProgram::begin() const {
-  const std::string profile = read::machine_text(resolved_.machine);
+  const std::string profile = read::kept_machine_text(resolved_.machine);
   if (Status status = write::write_file(path("machine.toml"), std::as_bytes(std::span(profile)), files_); !status) {
     return status;
   }

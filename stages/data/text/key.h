@@ -7,6 +7,7 @@
 //   word<kModes, &Job::heights, &HeightsRequest::mode>({"heights", "mode", "--heights", "MODE", "how layers are decided"})
 #pragma once
 
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -21,12 +22,13 @@ namespace lamina {
 
 /// The fields independent of the target's type.
 struct KeyName {
-  std::string_view section, name;     // of the file
-  std::string_view flag = {};         // option with the same meaning; empty if there is none
-  std::string_view value = {};        // placeholder after the option: "MM", "WIDTHxDEPTH"; empty for a switch
-  std::string_view meaning = {};      // for the help, one line
-  unsigned decides = 0;               // products whose bytes depend on it (job/product.h)
-  std::string_view switch_text = {};  // value of a flag without text, as in --no-repair: "false"
+  std::string_view section, name;               // of the file
+  std::string_view flag = {};                   // option with the same meaning; empty if there is none
+  std::string_view value = {};                  // placeholder after the option: "MM", "WIDTHxDEPTH"; empty for a switch
+  std::string_view meaning = {};                // for the help, one line
+  unsigned decides = 0;                         // products whose bytes depend on it (job/product.h)
+  std::string_view switch_text = {};            // value of a flag without text, as in --no-repair: "false"
+  std::optional<std::string_view> unsaid = {};  // value that kept texts leave out, of a key that came after them
 };
 
 /// The form of a value in TOML; kToml: its text is TOML already.
@@ -55,6 +57,12 @@ struct Key : KeyName {
   constexpr Key with_words(std::vector<std::string_view> (*all)()) const {
     Key key = *this;
     key.words = all;
+    return key;
+  }
+  /// At this value all bytes are those of a lamina without the key, so that its jobs go on: their texts lack it.
+  constexpr Key unsaid_at(std::string_view same) const {
+    Key key = *this;
+    key.unsaid = same;
     return key;
   }
   constexpr Key shown_if(bool (*condition)(const Target&)) const {

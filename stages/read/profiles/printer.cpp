@@ -85,7 +85,7 @@ constexpr Key<Machine> kKeys[] = {
     custom<Machine, read_name, same_text, &Machine::name>({"machine", "name"}, Form::kString),
     custom<Machine, read_line, same_text, &Machine::description>({"machine", "description"}, Form::kString),
     text<check_nothing, &Machine::dialect>({"machine", "dialect"}),
-    text<check_nothing, &Machine::firmware>({"machine", "firmware"}),
+    text<check_nothing, &Machine::firmware>({"machine", "firmware"}).unsaid_at(""),
 
     word<kShapes, kBed, &Bed::shape>({"bed", "shape"}),
     field<kBed, &Bed::size_mm>({"bed", "size_mm"}, kLength),
@@ -120,7 +120,7 @@ constexpr Key<Machine> kKeys[] = {
     field<kMotion, &Motion::ramp_mm>({"motion", "ramp_mm"}, {0, 1e4, " mm"}),
     field<kMotion, &Motion::layer_step_um>({"motion", "layer_step_um"}, {1e-3, 1e6, " um"}),
     field<kMotion, &Motion::safe_mm>({"motion", "safe_mm"}, kAny),
-    field<kMotion, &Motion::acceleration_mm_s2>({"motion", "acceleration_mm_s2"}, {0, 1e6, " mm/s2"}),
+    field<kMotion, &Motion::acceleration_mm_s2>({"motion", "acceleration_mm_s2"}, {0, 1e6, " mm/s2"}).unsaid_at("0"),
     text<check_axis, kMotion, &Motion::x_axis>({"motion", "x_axis"}),
     text<check_axis, kMotion, &Motion::y_axis>({"motion", "y_axis"}),
 
@@ -136,8 +136,8 @@ constexpr Key<Machine> kKeys[] = {
     field<kPowder, &Powder::roller_mm>({"powder", "roller_mm"}, kAny),
     field<kPowder, &Powder::roller_speed_mm_s>({"powder", "roller_speed_mm_s"}, kSpeed),
     field<kPowder, &Powder::vat_speed_mm_s>({"powder", "vat_speed_mm_s"}, kSpeed),
-    field<kPowder, &Powder::spread_s>({"powder", "spread_s"}, {0, 1e5, " s"}),
-    field<kPowder, &Powder::pause_s>({"powder", "pause_s"}, {0, 1e5, " s"}),
+    field<kPowder, &Powder::spread_s>({"powder", "spread_s"}, {0, 1e5, " s"}).unsaid_at("0"),
+    field<kPowder, &Powder::pause_s>({"powder", "pause_s"}, {0, 1e5, " s"}).unsaid_at("0"),
     field<kPowder, &Powder::packing>({"powder", "packing"}, {0.01, 1}),
 };
 
@@ -166,6 +166,12 @@ Result<Machine> read_machine(std::string_view text, const std::string& where, st
 std::string machine_text(const Machine& machine) {
   return sections_text<Machine>(kKeys, machine, [](const Key<Machine>& key, const std::string& value) {
     return key.name != "materials" || !value.empty();  // profiles without names of vats say nothing of them
+  });
+}
+
+std::string kept_machine_text(const Machine& machine) {
+  return sections_text<Machine>(kKeys, machine, [](const Key<Machine>& key, const std::string& value) {
+    return key.unsaid != value && (key.name != "materials" || !value.empty());
   });
 }
 

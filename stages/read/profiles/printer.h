@@ -19,6 +19,9 @@ Result<Machine> read_machine(std::string_view text, const std::string& where, st
 /// The text with every key of a profile: equal machines have equal texts, and reading it restores the machine.
 std::string machine_text(const Machine& machine);
 
+/// The same as jobs keep it, without younger keys at their defaults: equal machines have equal texts in older jobs too.
+std::string kept_machine_text(const Machine& machine);
+
 /// An error in the name of a material, or "". Names consist of letters, digits, - and _, because file names contain them.
 std::string check_material(std::string_view name);
 

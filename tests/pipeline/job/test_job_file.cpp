@@ -140,6 +140,35 @@ TEST(JobFile, CanonicalTextHasNoPathsAndNothingThatLeavesBytesAlone) {
   EXPECT_EQ(canonical_job_text(job, Product::kImages), text);
 }
 
+// Jobs that were kept before a key came go on where their bytes are still the same.
+TEST(JobFile, CanonicalTextLacksYoungerKeysAtTheirDefaultsWhereBytesAreThoseOfBefore) {
+  const auto says = [](const Job& job, Product product) {
+    const std::string text = canonical_job_text(job, product);
+    const bool cusp = text.find("cusp_of") != text.npos, peaks = text.find("\npeaks") != text.npos;
+    EXPECT_EQ(cusp, peaks);
+    return cusp && peaks && text.find("cover_top = false") != text.npos;
+  };
+  Job job;
+  job.parts.emplace_back();
+  EXPECT_FALSE(says(job, Product::kImages));
+  EXPECT_FALSE(says(job, Product::kContours));
+  EXPECT_TRUE(says(job, Product::kMoves)) << "G-code has a skirt and a tolerance";
+  job.heights.mode = heights::Mode::kAngle;
+  EXPECT_FALSE(says(job, Product::kImages));
+  job.parts[0].shrink = {1.007, 1.007, 1};
+  EXPECT_TRUE(says(job, Product::kImages)) << "angles are those of the nominal part";
+  job = Job();
+  job.slice.format = "cli-binary";
+  EXPECT_TRUE(says(job, Product::kContours)) << "$$UNITS/1.000000";
+  EXPECT_FALSE(says(job, Product::kImages));
+  job.slice.format = "svg";
+  job.slice.tolerance_um = 20;
+  EXPECT_TRUE(says(job, Product::kContours)) << "points are left out after the offset";
+  job = Job();
+  job.heights.cover_top = true;
+  EXPECT_NE(canonical_job_text(job, Product::kImages).find("cover_top = true"), std::string::npos);
+}
+
 TEST(JobFile, EveryKeyThatDecidesBytesChangesTheCanonicalText) {
   const Directory directory;
   const Job usual, unusual = unusual_job(directory);

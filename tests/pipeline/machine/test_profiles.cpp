@@ -18,6 +18,9 @@ TEST(ShippedProfiles, AreTheTenThatTheDocumentsNameAndTheirTextReadsBackTheSame)
     const auto again = read_machine(text, "text");
     ASSERT_TRUE(again.ok()) << again.error().message;
     EXPECT_EQ(read::machine_text(*again), text);
+    const auto kept = read_machine(read::kept_machine_text(*machine), "kept");
+    ASSERT_TRUE(kept.ok()) << kept.error().message;
+    EXPECT_EQ(read::machine_text(*kept), text) << "what the kept text leaves out has its default";
     EXPECT_TRUE(resolve_profile(*machine).ok()) << resolve_profile(*machine).error().message;
   }
 }
