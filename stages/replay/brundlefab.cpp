@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 #include <string>
 #include <utility>
@@ -22,9 +23,11 @@ namespace {
 
 constexpr double kDotMm = 25.4 / 96;
 constexpr double kPenMm = 195;                     // fab/brundle.py, X_OFFSET_PEN: where the pen is, whatever G10 says
+constexpr double kBladeMm = 0;                     // X_OFFSET_BLADE: where the recoater is
 constexpr double kMostXMm = 650;                   // X_MM_MAX
 constexpr double kMostMmPerMinute = 2000;          // Axis::target_set: the most if a stepper is made without a limit
 constexpr std::array kTools = {0, 1, 20, 21, 22};  // BrundleFab.ino, setup()
+constexpr std::array kPlaceMm = {kPenMm, kPenMm, 45.0, kBladeMm, 95.0};  // of each tool on the carriage
 constexpr int kInk = 1, kRecoater = 21;
 enum Axis : std::size_t { kX, kY, kZ, kE };
 
@@ -52,6 +55,7 @@ class Firmware {
   void end_of_program() {
     if (!ended_) return printing_.fault("the program ends before its last line");
     printing_.build_vat_goes_down(moved_mm_[kZ]);
+    end_of_bar();
     for (const auto& [axis, name] : {std::pair{kZ, "part"}, {kE, "feed"}}) {
       if (std::abs(spread_mm_[axis] - moved_mm_[axis]) < 1e-3) continue;
       printing_.fault(fmt::format("the {} bin is at {:g} mm when powder is spread, and at {:g} when the layer ends", name,
@@ -61,6 +65,15 @@ class Firmware {
 
  private:
   void fault(std::string_view what) { printing_.fault(fmt::format("line {}: {}", number_, what)); }
+  /// What the next layer relies on.
+  void end_of_bar() {
+    if (!bar_.is_empty() || inked_[0] != inked_[1]) {
+      printing_.fault(fmt::format("the bar holds {} dots when the layer ends, and inked {} drops on the way there, {} back",
+                                  bar_.loaded(), inked_[0], inked_[1]));
+    }
+    if (tool_ != kRecoater) printing_.fault(fmt::format("the layer ends with tool {}, not with the recoater", tool_));
+    if (relative_) printing_.fault("the layer ends in relative moves");
+  }
   void unknown(const Block& block) { fault(fmt::format("'{}{}' is no command that a layer has", block.code, block.command)); }
 
   // M117 is carried out at once (GCode::_process_block); it marks where a layer begins and ends.
@@ -93,7 +106,13 @@ class Firmware {
       if (!(block['P'] >= 0 && block['P'] <= InkBar::kNozzles)) return fault("P has bits of more than 12 nozzles");
       bar_.set_pattern(block['P']);
     }
-    if (block.has('S')) bar_.set_sprays(block['S']);
+    if (!block.has('S')) return;
+    bar_.set_sprays(block['S']);
+    const double dots_s = printing_.profile().motion.scan_speed_mm_s / kDotMm;
+    if (const auto want = std::max<std::int64_t>(1, std::llround(1000 / dots_s)); bar_.sprays() != want) {
+      fault(fmt::format("S{} is {:.2f} mm/s, and the scan speed asks for S{}", bar_.sprays(), kDotMm * 1000 / bar_.sprays(),
+                        want));
+    }
   }
 
   void motion(const Block& block) {
@@ -120,7 +139,12 @@ class Firmware {
     const auto found = std::ranges::find(kTools, tool);
     if (found == kTools.end()) return fault(fmt::format("there is no tool {}", tool));
     if (block.has('Y') || block.has('Z') || block.has('E')) return fault("sets a tool's offset along another axis than X");
-    if (block.has('X')) offset_mm_[static_cast<std::size_t>(found - kTools.begin())] = block['X'];
+    const auto row = static_cast<std::size_t>(found - kTools.begin());
+    if (block.has('X')) offset_mm_[row] = block['X'];
+    if (std::abs(offset_mm_[row] - kPlaceMm[row]) > 1e-3) {
+      return fault(fmt::format("sets tool {} at {:g} mm of the carriage, where {:g} is its place", tool, offset_mm_[row],
+                               kPlaceMm[row]));
+    }
     parameters(block, tool);
   }
 
@@ -174,7 +198,7 @@ class Firmware {
   void carriage(double way, double seconds) {
     moved_ = true;
     printing_.head_moves(std::abs(way), std::abs(way) / seconds, false);
-    if (tool_ == kRecoater) printing_.roller_stands_at(position_[kX]);
+    if (tool_ == kRecoater) printing_.roller_stands_at(axis_x_ + kBladeMm);
     if (way > 0 && tool_ == kRecoater) spread_mm_ = moved_mm_;
     if (way < 0 && moved_mm_[kZ] < spread_mm_[kZ] + 1e-3)
       fault("the carriage goes back over powder that does not give way to it");
@@ -193,6 +217,9 @@ class Firmware {
       if (bar_.sprays() < 3) return fault(fmt::format("S{} is so fast that dots are left out", bar_.sprays()));
       if (pass.forward || std::abs(axis_x_ - inked_x_) > 1e-4) ink(pass);
       if (pass.forward) inked_x_ = axis_x_;
+      for (std::int32_t dot = pass.begin; dot < pass.end; ++dot) {
+        inked_[pass.forward ? 0 : 1] += static_cast<std::uint64_t>(std::popcount(bar_.dot(dot)));
+      }
     }
   }
 
@@ -231,10 +258,11 @@ class Firmware {
   double feed_mm_min_ = 3000;        // GCode::begin
   std::array<float, 4> position_{};  // CNC::_pos: X of the tool
   std::array<double, kTools.size()> offset_mm_{};
-  int tool_ = kRecoater;               // the layer before ends with it
-  double axis_x_ = 0, inked_x_ = -1;   // of the carriage
-  std::array<double, 4> moved_mm_{};   // of the bins since the layer began
-  std::array<double, 4> spread_mm_{};  // the same when powder was spread
+  int tool_ = kRecoater;                  // the layer before ends with it
+  double axis_x_ = 0, inked_x_ = -1;      // of the carriage
+  std::array<double, 4> moved_mm_{};      // of the bins since the layer began
+  std::array<double, 4> spread_mm_{};     // the same when powder was spread
+  std::array<std::uint64_t, 2> inked_{};  // drops, on the way there and back
   std::uint32_t sweep_ = 0;
   bool begun_ = false, ended_ = false, moved_ = false, bar_told_ = false;
 };

@@ -171,6 +171,12 @@ TEST(Brundlefab, PlantedFaultsAreFound) {
       {"a tool that is not there", "T21\nG0", "T2\nG0", 0, false},
       {"homing X in a layer", "G28 Y0", "G28 X0 Y0", 0, false},
       {"the last dots are not followed by blank ones", "T1 P0\nG1 Y14.16\nG1 Y14.42\nT0", "T0", 0, true},
+      {"ten times the ink", "T1 P0 S6", "T1 P0 S60", 0, false},
+      {"the blade is said to be where the pen is", "G10 L1 P21 X0.0000", "G10 L1 P21 X195.0000", 0, false},
+      {"the last band's way back is left out", "T0\nT1 P0\nG0 Y0\nT21\nG0 X0", "T0\nT21\nG0 X0", 0, true},
+      {"the last band stays on the bar", "G0 Y0\nT21\nG0 X0", "T21\nG0 X0", 0, true},
+      {"the layer ends in relative moves", "G90\nM117 Done", "M117 Done", 0, false},
+      {"the layer ends with the pen", "G90\nM117 Done", "G90\nT0\nM117 Done", 0, false},
       {"a bar faster than its sprays", "T1 P0 S6", "T1 P0 S2", 0, false},
   };
   std::size_t found = 0, by_port = 0;

@@ -50,6 +50,8 @@ class InkBar {
   Run move(float mm);
 
   std::int32_t loaded() const { return loaded_; }
+  /// Nothing is loaded, and the head is at home.
+  bool is_empty() const { return loaded_ == 0 && filled_ == 0 && head_ == 0; }
   /// What is fired at a dot; of memory that nobody wrote, nothing.
   std::uint16_t dot(std::int32_t at) const {
     return at < 0 || at >= kDots || memory_[index(at)] == kUnknown ? 0 : memory_[index(at)];
