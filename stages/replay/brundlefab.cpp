@@ -28,6 +28,7 @@ constexpr double kMostXMm = 650;                   // X_MM_MAX
 constexpr double kMostMmPerMinute = 2000;          // Axis::target_set: the most if a stepper is made without a limit
 constexpr std::array kTools = {0, 1, 20, 21, 22};  // BrundleFab.ino, setup()
 constexpr std::array kPlaceMm = {kPenMm, kPenMm, 45.0, kBladeMm, 95.0};  // of each tool on the carriage
+constexpr double kBinMm = 140, kLiftedMm = 2;  // Z_MM_MAX, E_MM_MAX; the feed bin before the first layer
 constexpr int kInk = 1, kRecoater = 21;
 enum Axis : std::size_t { kX, kY, kZ, kE };
 
@@ -181,6 +182,14 @@ class Firmware {
     if (feed == 0) printing_.takes(time);
     moved_mm_[kE] += feed;
     moved_mm_[kZ] += part;
+    const double below = std::abs(printing_.standing().build_mm);
+    bin_stands_at("feed", kLiftedMm + printing_.profile().powder.dose * below + moved_mm_[kE]);
+    bin_stands_at("part", below + moved_mm_[kZ]);
+  }
+  /// Axis_Stepper::update cuts what is beyond.
+  void bin_stands_at(std::string_view name, double mm) {
+    if (mm > -1e-3 && mm < kBinMm + 1e-3) return;
+    fault(fmt::format("moves the {} bin to {:g} mm, and the firmware stops it at 0 and {:g}", name, mm, kBinMm));
   }
 
   // CNC::target_set: every move sets all four targets, each less the offset of the tool that is selected now.

@@ -200,6 +200,21 @@ TEST(Brundlefab, PlantedFaultsAreFound) {
   EXPECT_GE(by_port, 15u);
 }
 
+TEST(Brundlefab, BinsStayWithinTheirTravel) {
+  const auto resolved = bar_machine(40, 60);
+  const Runs runs = program::testing::runs_of(program::testing::Image(60, std::vector<int>(40, 0)));
+  const Program program = printed_parts::program_of(resolved, runs);
+  const auto machine = replay::VirtualMachine::build(resolved.machine, 40, 60);
+  ASSERT_TRUE(machine.ok());
+  const auto verified_above = [&](Nm bottom) {
+    const Layer layer{7, bottom, 100'000, LayerReason::kUniform};
+    return machine->replay(program.text, layer, runs, 0, 0).ok();
+  };
+  EXPECT_TRUE(verified_above(0));
+  EXPECT_TRUE(verified_above(124'900'000));
+  EXPECT_FALSE(verified_above(126'000'000));  // the feed bin would have to go to 140.7 mm
+}
+
 TEST(Brundlefab, NumbersAreReadAsTheFirmwareReadsThem) {
   using replay::brundle::Block;
   using replay::brundle::read_block;
@@ -259,6 +274,8 @@ TEST(Brundlefab, WhatTheMachineDoesNotHaveIsRefusedInALine) {
   EXPECT_NE(refused([](Machine& m) { m.head.nozzles = 13; }).find("at most 12 nozzles"), std::string::npos);
   EXPECT_NE(refused([](Machine& m) { m.powder.roller_axis = "U"; }).find("has the axes X"), std::string::npos);
   EXPECT_NE(refused([](Machine& m) { m.powder.vats = 2; }).find("one feed bin"), std::string::npos);
+  EXPECT_NE(refused([](Machine& m) { m.bed.build_height_mm = 140; }).find("142 of the part bin"), std::string::npos);
+  EXPECT_NE(refused([](Machine& m) { m.powder.dose = 1.2; }).find("152 of the feed bin"), std::string::npos);
   EXPECT_NE(refused([](Machine& m) { m.mounting.along_dpi = 192; }).find("96 dots an inch"), std::string::npos);
   EXPECT_NE(refused([](Machine& m) { m.mounting.offset_mm[1] = 0; }).find("can be inked"), std::string::npos);
   EXPECT_NE(refused([](Machine& m) { m.mounting.offset_mm[1] = 0.65; }).find("begin at its home"), std::string::npos);

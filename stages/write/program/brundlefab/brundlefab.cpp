@@ -15,6 +15,8 @@ constexpr double kPartBinMm = 198, kWasteBinMm = 385;
 // BrundleInk.ino: SCAN_WIDTH_DOT; Axis_DCEncoder.h: ink stops 9 ticks before a target, 1.44 dots.
 constexpr std::int64_t kBarDots = 840, kBrakeDots = 2, kLastDot = kBarDots - 2 * kBrakeDots - 1;
 constexpr double kDotMm = 25.4 / 96, kLongestXMm = 650, kLongestNumber = 32'767;
+// config.h, Z_MM_MAX and E_MM_MAX: Axis_Stepper::update stops there, and at 0, without a word.
+constexpr double kBinMm = 140;
 // Dots that are sooner passed over, there and back, than the bar is wiped.
 constexpr std::int64_t kWorthWiping = 24;
 
@@ -36,6 +38,8 @@ class Writer final : public ProgramWriter {
     state(out);
     put(out, "G10 L1 P20 X{}\nG10 L1 P22 X{}\nM117 Ready to home\nM0\nG28 X0 Y0 E0\n", mm_text(kFuserMm),
         mm_text(kThermometerMm));
+    // The feed bin does not go below 0, and gives way to the carriage in the first layer already.
+    put(out, "G1 E{} F{}\n", mm_text(kGiveWayMm), vat_speed());
     put(out, "M117 Prep part\nT21\nM0\nG0 X{}\nM117 Levelling\nG1 X{} F{}\nM117 Fill feed bin\nM0\nM117\nT21\nG1 X{}\n",
         mm_text(kWasteBinMm), mm_text(kPartBinMm), speed, mm_text(machine_.powder.roller_mm[0]));
   }
@@ -123,6 +127,15 @@ class Writer final : public ProgramWriter {
   std::int64_t longest_ = 0;  // the dots loaded since the bar was wiped
 };
 
+/// Whether the bins reach the last layer. returns  what does not fit, empty if all does
+std::string wrong_bins(const Machine& machine) {
+  const double part = machine.bed.build_height_mm + kGiveWayMm,
+               feed = machine.powder.dose * machine.bed.build_height_mm + kGiveWayMm;
+  if (std::max(part, feed) <= kBinMm) return {};
+  return fmt::format("the bins move by {:g} mm, and parts of {:g} mm take {:g} of the part bin and {:g} of the feed bin",
+                     kBinMm, machine.bed.build_height_mm, part, feed);
+}
+
 }  // namespace
 
 std::unique_ptr<ProgramWriter> make_writer(const Machine& machine, const HeadGrid& grid) {
@@ -145,6 +158,7 @@ Status check(const Machine& machine, const HeadGrid& grid) {
     return wrong("motion.travel_speed_mm_s",
                  fmt::format("F{:.0f} is more than the 16 bits of the firmware's numbers", most * 60));
   }
+  if (const std::string bins = wrong_bins(machine); !bins.empty()) return wrong("bed.build_height_mm, powder.dose", bins);
   if (powder.vats != 1) return wrong("powder.vats", "a BrundleFab has one feed bin");
   if (std::abs(grid.step_nm() / kNmPerMm / kDotMm - 1) > 1e-4) {
     return wrong("mounting.along_dpi",
