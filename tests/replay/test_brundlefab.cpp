@@ -274,7 +274,7 @@ TEST(Brundlefab, WhatTheMachineDoesNotHaveIsRefusedInALine) {
   EXPECT_NE(refused([](Machine& m) { m.head.nozzles = 13; }).find("at most 12 nozzles"), std::string::npos);
   EXPECT_NE(refused([](Machine& m) { m.powder.roller_axis = "U"; }).find("has the axes X"), std::string::npos);
   EXPECT_NE(refused([](Machine& m) { m.powder.vats = 2; }).find("one feed bin"), std::string::npos);
-  EXPECT_NE(refused([](Machine& m) { m.bed.build_height_mm = 140; }).find("142 of the part bin"), std::string::npos);
+  EXPECT_NE(refused([](Machine& m) { m.bed.build_height_mm = 140; }).find("143 of the part bin"), std::string::npos);
   EXPECT_NE(refused([](Machine& m) { m.powder.dose = 1.2; }).find("152 of the feed bin"), std::string::npos);
   EXPECT_NE(refused([](Machine& m) { m.mounting.along_dpi = 192; }).find("96 dots an inch"), std::string::npos);
   EXPECT_NE(refused([](Machine& m) { m.mounting.offset_mm[1] = 0; }).find("can be inked"), std::string::npos);

@@ -129,8 +129,9 @@ class Writer final : public ProgramWriter {
 
 /// Whether the bins reach the last layer. returns  what does not fit, empty if all does
 std::string wrong_bins(const Machine& machine) {
-  const double part = machine.bed.build_height_mm + kGiveWayMm,
-               feed = machine.powder.dose * machine.bed.build_height_mm + kGiveWayMm;
+  constexpr double kLastLayerMm = 1;  // may end above the part
+  const double height = machine.bed.build_height_mm + kLastLayerMm;
+  const double part = height + kGiveWayMm, feed = machine.powder.dose * height + kGiveWayMm;
   if (std::max(part, feed) <= kBinMm) return {};
   return fmt::format("the bins move by {:g} mm, and parts of {:g} mm take {:g} of the part bin and {:g} of the feed bin",
                      kBinMm, machine.bed.build_height_mm, part, feed);
