@@ -96,9 +96,13 @@ std::uint64_t PrintProgram::bytes_bound(std::uint64_t changes) const {
   // A sweep's vectors with their text of at most three times the size, lines, sorted changes and their steps.
   const std::uint64_t vectors = grid.steps() * grid.words() * 8;
   const std::uint64_t turned = grid.scan_axis == ScanAxis::kX ? 4 * changes : 16 * changes;
-  // The timer keeps a layer's text, but for vectors of nuferbj, hp45 and oasis.
-  const std::uint64_t kept =
-      !dialect_.has_motion || replay::Timer::keeps_no_vectors(dialect_.id) ? 0 : grid.swaths(0) * grid.passes * 3 * vectors;
+  // The timer keeps a layer's text, but for vectors of nuferbj, hp45 and oasis: at most 32 bytes a step (m578), twice while the
+  // text grows.
+  constexpr std::uint64_t kStepText = 32, kSweepText = 256;
+  const std::uint64_t further = grid.blocked_rule == BlockedRule::kSecondPass ? grid.blocked.size() : 0;
+  const std::uint64_t sweeps = std::uint64_t{grid.swaths(0)} * grid.passes * (1 + further);
+  const bool keeps = dialect_.has_motion && !replay::Timer::keeps_no_vectors(dialect_.id);
+  const std::uint64_t kept = keeps ? 2 * sweeps * (kStepText * grid.steps() + kSweepText) : 0;
   return 4 * vectors + 4 * grid.steps() + 16 * grid.lines + 2 * changes + turned + kept + (512 << 10);
 }
 
