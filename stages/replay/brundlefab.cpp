@@ -22,8 +22,10 @@ namespace brundle {
 namespace {
 
 constexpr double kDotMm = 25.4 / 96;
-constexpr double kPenMm = 195;                     // fab/brundle.py, X_OFFSET_PEN: where the pen is, whatever G10 says
-constexpr double kBladeMm = 0;                     // X_OFFSET_BLADE: where the recoater is
+constexpr double kPenMm = 195;  // fab/brundle.py, X_OFFSET_PEN: where the pen is, whatever G10 says
+constexpr double kBladeMm = 0;  // X_OFFSET_BLADE: where the recoater is
+// Axis_DCEncoder spreads 5250 ticks of 600 dpi and the 10 before home over 222.25 mm (_mm_to_position): its dots are longer.
+constexpr double kLongerDots = 5260.0 / 5250 - 1;
 constexpr double kMostXMm = 650;                   // X_MM_MAX
 constexpr double kMostMmPerMinute = 2000;          // Axis::target_set: the most if a stepper is made without a limit
 constexpr std::array kTools = {0, 1, 20, 21, 22};  // BrundleFab.ino, setup()
@@ -248,6 +250,8 @@ class Firmware {
         if (nozzle >= printing_.nozzles()) return fault(fmt::format("nozzle {} does not exist", nozzle));
         words[0] |= std::uint64_t{1} << (63 - nozzle);
       }
+      const double late_um = (dot + 0.5) * kDotMm * 1000 * kLongerDots;
+      printing_.count.farthest_along_um = std::max(printing_.count.farthest_along_um, late_um);
       printing_.fire_words(words);
     }
   }

@@ -275,6 +275,7 @@ TEST(Brundlefab, WhatTheMachineDoesNotHaveIsRefusedInALine) {
   EXPECT_NE(refused([](Machine& m) { m.powder.roller_axis = "U"; }).find("has the axes X"), std::string::npos);
   EXPECT_NE(refused([](Machine& m) { m.powder.vats = 2; }).find("one feed bin"), std::string::npos);
   EXPECT_NE(refused([](Machine& m) { m.bed.build_height_mm = 140; }).find("143 of the part bin"), std::string::npos);
+  EXPECT_NE(refused([](Machine& m) { m.powder.roller_mm[1] = 700; }).find("the recoater reaches"), std::string::npos);
   EXPECT_NE(refused([](Machine& m) { m.powder.dose = 1.2; }).find("152 of the feed bin"), std::string::npos);
   EXPECT_NE(refused([](Machine& m) { m.mounting.along_dpi = 192; }).find("96 dots an inch"), std::string::npos);
   EXPECT_NE(refused([](Machine& m) { m.mounting.offset_mm[1] = 0; }).find("can be inked"), std::string::npos);
@@ -313,6 +314,8 @@ TEST(Brundlefab, TheTimeIsThatOfTheBarAndTheCarriage) {
   ASSERT_TRUE(count.ok()) << count.error().message;
   EXPECT_NEAR(seconds_of(*count), 0.192 + 24 + 1.1611, 0.001);
   EXPECT_EQ(count->sweeps, 1u);
+  // The last of these dots is number 13, whose middle is 3.572 mm from home; the firmware's is 10 / 5250 further.
+  EXPECT_NEAR(count->farthest_along_um, 6.80, 0.01);
 }
 
 }  // namespace

@@ -183,6 +183,9 @@ Status check(const Machine& machine, const HeadGrid& grid) {
                  fmt::format("the pen reaches x {:g} to {:g} mm, the bands want {:.1f} to {:.1f}", kPenMm, kPenMm + kLongestXMm,
                              std::min(ends[0], ends[1]), std::max(ends[0], ends[1])));
   }
+  if (const auto& [home, far] = powder.roller_mm; std::min(home, far) < 0 || std::max(home, far) >= kLongestXMm) {
+    return wrong("powder.roller_mm", fmt::format("the recoater reaches x 0 to {:g} mm", kLongestXMm));
+  }
   if (sprays(machine) < kFewestSprays) {
     return wrong("motion.scan_speed_mm_s", fmt::format("the head sprays every 2 ms, and meets each dot at {:.1f} mm/s or less",
                                                        kDotMm * 1000 / kFewestSprays));
