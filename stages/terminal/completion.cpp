@@ -20,10 +20,10 @@ struct FileKind {
 constexpr FileKind kByFlag[] = {{"--job", "toml"},     {"--save-job", "toml"},       {"--machine", "toml"},
                                 {"--check", "toml"},   {"--show", "toml"},           {"--plot", "svg png"},
                                 {"--measured", "csv"}, {"--parts", "stl obj 3mf gz"}};
-constexpr FileKind kByValue[] = {{"PART", "stl obj 3mf gz"},   {"STL", "stl"},       {"DIR", kDirectory},
-                                 {"OUT", kDirectory},          {"PNG", "png svg"},   {"HTML", "html"},
-                                 {"DIR|GCODE", "gcode gco g"}, {"FILE", kAnyFile},   {"DIR|FILE", kAnyFile},
-                                 {"LIST", kAnyFile},           {"NAME|FILE", "toml"}};
+constexpr FileKind kByValue[] = {{"PART", "stl obj 3mf gz"},   {"STL", "stl"},        {"DIR", kDirectory},
+                                 {"OUT", kDirectory},          {"PNG", "png svg"},    {"HTML", "html"},
+                                 {"DIR|GCODE", "gcode gco g"}, {"FILE", kAnyFile},    {"DIR|FILE", kAnyFile},
+                                 {"LIST", kAnyFile},           {"NAME|FILE", "toml"}, {"DIR|GCODE|SML", "gcode gco g sml"}};
 
 std::string_view find(std::span<const FileKind> kinds, std::string_view name) {
   for (const FileKind& kind : kinds) {
@@ -63,7 +63,8 @@ std::string zsh_action(std::span<const std::string_view> words, std::string_view
   if (files.empty() || (!words.empty() && files == kAnyFile)) return words.empty() ? " " : fmt::format("({})", joined(words));
   if (files == kDirectory) return "_files -/";
   if (files == kAnyFile) return "_files";
-  const std::string pattern = fmt::format("*.(#i)({})", fmt::join(split(files, " "), "|"));
+  // The empty ending makes a group of one: without a | zsh takes it as qualifiers.
+  const std::string pattern = fmt::format("*.(#i)({}|)", fmt::join(split(files, " "), "|"));
   if (words.empty()) return fmt::format("_files -g \"{}\"", pattern);
   return fmt::format(" _lamina_words_and_files \"{}\" {}", pattern, joined(words));
 }
@@ -103,10 +104,10 @@ std::string bash_completion(std::span<const CommandSpec> commands) {
   }
   return fmt::format(R"(# bash completion for lamina, made by: lamina completion bash
 _lamina_files() {{
-  local name end
+  local name real end
   while IFS= read -r name; do
-    end=${{name##*.}}
-    if [[ $2 == '*' || -d $name || " $2 " == *" ${{end,,}} "* ]]; then COMPREPLY+=("$name"); fi
+    real=${{name/#\~\//$HOME/}} end=${{name##*.}}
+    if [[ $2 == '*' || -d $real || " $2 " == *" ${{end,,}} "* ]]; then COMPREPLY+=("$name"); fi
   done < <(compgen -f -- "$1")
 }}
 _lamina() {{
@@ -143,7 +144,9 @@ std::string zsh_completion(std::span<const CommandSpec> commands) {
           option.value.empty() ? ""
                                : fmt::format(":{}:{}", zsh_argument(option.value), zsh_action(option.words, files_of(option)));
       for (const std::string_view flag : split(option.flag, ",")) {
-        cases += fmt::format(" \\\n        '*{}[{}]{}'", flag, zsh_argument(option.meaning), value);
+        // With = the value may be the next word or follow the option in its own.
+        const std::string_view equals = !value.empty() && flag.starts_with("--") ? "=" : "";
+        cases += fmt::format(" \\\n        '*{}{}[{}]{}'", flag, equals, zsh_argument(option.meaning), value);
       }
     }
     if (!command.operand.empty()) {

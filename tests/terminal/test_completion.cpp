@@ -15,14 +15,14 @@ struct Completion : testing::Test {
   Directory folder;
   void SetUp() override {
     write_text(folder / "lamina.bash", run_lamina({"completion", "bash"}, folder.path()).out);
-    for (const char* name : {"bracket.stl", "LID.STL", "job.toml", "notes.txt", "widths.csv", "beads.gcode"}) {
+    for (const char* name : {"bracket.stl", "LID.STL", "job.toml", "notes.txt", "widths.csv", "beads.gcode", "beads.sml"}) {
       write_text(folder / name, "x");
     }
     std::filesystem::create_directory(folder / "parts");
   }
   /// The candidates for the last word of a line.
   std::vector<std::string> candidates(const std::string& line) const {
-    const std::string script = "cd '" + folder.path().string() + "'; source ./lamina.bash; COMP_WORDS=(" + line +
+    const std::string script = "cd '" + folder.path().string() + "'; HOME=$PWD; source ./lamina.bash; COMP_WORDS=(" + line +
                                "); COMP_CWORD=$((${#COMP_WORDS[@]} - 1)); _lamina; printf '%s\\n' \"${COMPREPLY[@]}\" > told";
     write_text(folder / "ask.bash", script);
     EXPECT_EQ(std::system(("bash '" + (folder / "ask.bash") + "'").c_str()), 0) << line;
@@ -79,9 +79,20 @@ TEST_F(Completion, FilesAreThoseOfTheRightEnding) {
   EXPECT_EQ(candidates("lamina jet -o ''"), Words{"parts"});
   EXPECT_EQ(candidates("lamina calibrate --measured ''"), (Words{"parts", "widths.csv"}));
   EXPECT_EQ(candidates("lamina preview ''"), (Words{"beads.gcode", "parts"}));
+  EXPECT_EQ(candidates("lamina verify ''"), (Words{"beads.gcode", "beads.sml", "parts"}));
+  EXPECT_EQ(candidates("lamina jet '~/par'"), Words{"~/parts"}) << "below the home folder, which is this one";
   EXPECT_EQ(candidates("lamina jet --machine j"), (Words{"jet1000", "job.toml"}));
   EXPECT_TRUE(holds(candidates("lamina batch ''"), "notes.txt"));
   EXPECT_TRUE(holds(candidates("lamina jet --d"), "--dpi"));
+}
+
+// zsh takes a last group without a | as qualifiers of files, and --option=value only where the option's row has the =.
+TEST_F(Completion, ZshGetsGroupsOfOneAndOptionsWithEquals) {
+  const std::string script = run_lamina({"completion", "zsh"}, folder.path()).out;
+  for (const char* part :
+       {"'*--job=[", "'*--format=[", "'*-o[", "'*--quiet[", "_files -g \"*.(#i)(toml|)\"", "(stl|obj|3mf|gz|)"}) {
+    EXPECT_NE(script.find(part), std::string::npos) << part;
+  }
 }
 
 TEST_F(Completion, EveryScriptIsOneThatItsShellReads) {

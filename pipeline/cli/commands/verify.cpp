@@ -19,9 +19,9 @@ CommandSpec verify_spec() {
       "decodes to the recorded pixels; the print program of each layer, carried out by a virtual machine, prints exactly\n"
       "that image; nothing else lies in layers/ and program/. Contours: every layer's bytes have the recorded hash.\n"
       "Exit code 5 if anything differs.";
-  spec.operand = "DIR|GCODE";
+  spec.operand = "DIR|GCODE|SML";
   spec.operand_meaning =
-      "directory that lamina jet or lamina slice wrote, or G-code file of lamina extrude; several are verified in turn";
+      "directory that lamina jet or lamina slice wrote, or G-code or SML file of lamina extrude; several are verified in turn";
   spec.options = {{"--quick", "", "sizes and hashes only, images are not decoded", "", ""},
                   {"--json", "", "print one JSON object for each directory on stdout", "", ""},
                   {"--quiet", "", "say nothing but faults", "", ""}};
