@@ -199,7 +199,7 @@ std::string canonical_job_text(const Job& job, Product product) {
   return text;
 }
 
-Result<write::File> write_job(const std::string& path, const Job& job, bool durable) {
+Result<write::File> write_job(const std::string& path, const Job& job, bool durable, std::string_view command) {
   for (const PartRequest& part : job.parts) {
     if (write::same_file(path, part.path)) {
       return Error{Fault::kUsage, fmt::format("--save-job {}: is a part of the job; name another file", path)};
@@ -210,15 +210,16 @@ Result<write::File> write_job(const std::string& path, const Job& job, bool dura
   }
   fs::path directory = fs::path(path).parent_path();
   if (directory.empty()) directory = ".";
-  const std::string text = "# A job of lamina. Run it with: lamina jet --job FILE\n\n" + job_text(job, directory.string());
+  const std::string text =
+      fmt::format("# A job of lamina. Run it with: lamina {} --job FILE\n\n{}", command, job_text(job, directory.string()));
   auto file = write::File::open(path, {.durable = durable ? write::Durable::kAll : write::Durable::kNo});
   Status status = file ? file->append(text) : Status(file.error());
   if (status) status = file->flush();
   return status ? std::move(file) : status.error();
 }
 
-Status save_job(const std::string& path, const Job& job) {
-  auto file = write_job(path, job, true);
+Status save_job(const std::string& path, const Job& job, std::string_view command) {
+  auto file = write_job(path, job, true, command);
   const auto written = file ? file->finish() : file.error();
   return written ? Status() : written.error();
 }

@@ -44,9 +44,10 @@ std::string job_text(const Job& job, const std::string& directory);
 /// independent of host and source.
 std::string canonical_job_text(const Job& job, Product product);
 
-/// Writes the resolved job in a form that read_job restores. errors  kOutput; kUsage if a path is not UTF-8
-Status save_job(const std::string& path, const Job& job);
+/// Writes the resolved job in a form that read_job restores, with the command that runs it in its first line.
+/// errors  kOutput; kUsage if a path is not UTF-8
+Status save_job(const std::string& path, const Job& job, std::string_view command = "jet");
 /// The same, but the file takes its name when it is finished.
-Result<write::File> write_job(const std::string& path, const Job& job, bool durable);
+Result<write::File> write_job(const std::string& path, const Job& job, bool durable, std::string_view command);
 
 }  // namespace lamina::pipeline

@@ -143,7 +143,7 @@ Result<write::File> write_plan(const Job& job) {
   kept.memory_bytes = Job().memory_bytes;
   kept.output.clear();
   kept.sync = Job().sync;
-  return write_job(job.output + "/job.toml", kept, job.sync != Sync::kOff);
+  return write_job(job.output + "/job.toml", kept, job.sync != Sync::kOff, "slice");
 }
 
 }  // namespace

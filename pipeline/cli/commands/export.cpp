@@ -145,7 +145,7 @@ Outcome run_export(const Arguments& arguments, Context& context) {
   const Result<Bed> bed = bed_of(*job);
   if (!bed) return bed.error();
   if (arguments.has("--save-job")) {
-    if (Status status = save_job(arguments.text("--save-job"), *job); !status) return status;
+    if (Status status = save_job(arguments.text("--save-job"), *job, "export"); !status) return status;
   }
   const Result<Scene> scene = load_scene(*job, *bed);
   if (!scene) return scene.error();

@@ -148,7 +148,7 @@ Outcome run_heights(const Arguments& arguments, Context& context) {
     if (Status status = check_one_table(*job, arguments); !status) return status.error();
   }
   if (arguments.has("--save-job")) {
-    if (Status status = save_job(arguments.text("--save-job"), *job); !status) return status.error();
+    if (Status status = save_job(arguments.text("--save-job"), *job, "heights"); !status) return status.error();
   }
   using Clock = std::chrono::steady_clock;
   const auto start = Clock::now();

@@ -20,6 +20,8 @@
 namespace lamina::pipeline {
 namespace {
 
+constexpr std::string_view kNames[] = {"jet", "slice", "extrude"};  // by product
+
 /// The differences between the commands.
 struct PlanCommand {
   Product product;
@@ -89,7 +91,8 @@ Outcome plan(const PlanCommand& row, const Arguments& arguments, Context& contex
   if (arguments.has("--save-job")) {
     Job saved = resolved->job;
     if (saved.bed_mm || saved.machine.profile.empty()) saved.bed_mm = resolved->bed.size_mm;
-    if (Status status = save_job(arguments.text("--save-job"), saved); !status) return status.error();
+    if (Status status = save_job(arguments.text("--save-job"), saved, kNames[static_cast<int>(row.product)]); !status)
+      return status.error();
   }
   const auto progress = [&](const ProgressEvent& event) { context.progress(event); };
   const Result<Summary> summary = run(std::move(*resolved), progress, context.cancel());

@@ -50,6 +50,7 @@ TEST(ToolpathDefaults, LeaveOutPointsUnlessAskedAndTheSameInAJobFile) {
   const Outcome saved = run_lamina(words_of("extrude " + job + " --save-job job.toml --quiet -o b.gcode"), directory.path());
   ASSERT_EQ(saved.code, 0) << saved.err;
   EXPECT_NE(read_text(directory / "job.toml").find("tolerance_um = 10\n"), std::string::npos);
+  EXPECT_NE(read_text(directory / "job.toml").find("lamina extrude --job FILE\n"), std::string::npos);
   const Outcome again = run_lamina(words_of("extrude --job job.toml --quiet -o c.gcode"), directory.path());
   ASSERT_EQ(again.code, 0) << again.err;
   EXPECT_TRUE(read_text(directory / "c.gcode") == unasked.text);
@@ -57,6 +58,7 @@ TEST(ToolpathDefaults, LeaveOutPointsUnlessAskedAndTheSameInAJobFile) {
   const Outcome sliced = run_lamina(words_of("slice " + kToothFile + " --layer 1 --quiet -o out"), directory.path());
   ASSERT_EQ(sliced.code, 0) << sliced.err;
   EXPECT_NE(read_text(directory / "out/job.toml").find("tolerance_um = 0\n"), std::string::npos);
+  EXPECT_NE(read_text(directory / "out/job.toml").find("lamina slice --job FILE\n"), std::string::npos);
 }
 
 TEST(ToolpathDefaults, SkirtComesFirstAndIsToldApart) {
