@@ -180,6 +180,7 @@ py::object plan_into(const std::string& output, const py::object& parts, const p
   Job job = make_job(parts, settings, materials, file, output);
   job.resume = resume;
   job.overwrite = overwrite;
+  job.leave_to_machine = true;
   return run_job(job, product);
 }
 
@@ -387,8 +388,10 @@ PYBIND11_MODULE(lamina, module) {
       "resume=True goes on.");
   def_product("slice", &plan_into<Product::kContours>,
               "Contours and fillings of all layers into a directory, as lamina slice does; returns its summary.");
-  def_product("extrude", &plan_into<Product::kMoves>,
-              "Toolpaths of all layers into a file, as lamina extrude --job does; returns its summary.");
+  def_product(
+      "extrude", &plan_into<Product::kMoves>,
+      "Toolpaths of all layers into a file, as lamina extrude --job does, with its defaults (one wall, layers of half of the nozzle); "
+      "returns its summary.");
   module.def(
       "keys",
       [] {

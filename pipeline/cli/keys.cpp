@@ -109,6 +109,7 @@ Result<Job> read_job_options(const KeyChoice& choice, const Arguments& arguments
     if (key.flag.empty() || !choice.has(key.section, key.name) || !arguments.has(key.flag)) continue;
     const std::string text = key.value.empty() ? std::string(key.switch_text) : arguments.text(key.flag);
     if (Status status = at_option(key.flag, key.read(text, job)); !status) return status.error();
+    job.named.push_back(fmt::format("{}.{}", key.section, key.name));
   }
   for (const PartKey& key : part_keys()) {
     if (key.flag.empty() || !choice.has(key.section, key.name) || !arguments.has(key.flag)) continue;

@@ -135,7 +135,8 @@ struct Job {
   bool json = false;
   bool quiet = false;
   std::vector<std::string> notes;  // notes from reading it: old forms and their replacements
-  std::vector<std::string> named;  // keys that a file or --set gave, as in "fill.walls"; products differ in their defaults
+  std::vector<std::string> named;  // keys that a file, an option or --set gave, as in "fill.walls"
+  bool leave_to_machine = false;   // toolpaths: walls and layers that nobody named are the extruder's, not those here
 };
 
 /// Checks every value of a job against its limits and against the others; for jobs from any source.

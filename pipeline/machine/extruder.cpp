@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <fstream>
 #include <iterator>
 #include <vector>
@@ -37,6 +38,15 @@ Result<ExtruderProfile> resolve_extruder(const Job& job) {
   if (r.skirt_loops) m.skirt.loops = *r.skirt_loops;
   if (r.relative_extrusion) m.code.relative_extrusion = *r.relative_extrusion;
   return found;
+}
+
+bool is_named(const Job& job, std::string_view key) { return std::ranges::find(job.named, key) != job.named.end(); }
+
+void leave_to_machine(const Extruder& machine, Job& job) {
+  if (!is_named(job, "fill.walls")) job.fill.all.walls = 1;
+  if (is_named(job, "layers.thickness_mm") || !job.heights.thickness_mm.empty()) return;
+  const bool listed = machine.format == "sml" && !machine.sml.pd.empty();
+  job.layer_mm = listed ? machine.sml.pd.front().thickness_mm : machine.material.nozzle_mm / 2;
 }
 
 }  // namespace lamina::pipeline

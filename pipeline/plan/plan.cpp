@@ -280,6 +280,10 @@ Result<Resolved> resolve(const Job& job, Product product) {
   if (!profile) return profile.error();
   resolved.bed = {profile->machine.bed.size_mm, true};
   resolved.extruder = std::move(*profile);
+  if (job.leave_to_machine) {
+    leave_to_machine(resolved.extruder->machine, resolved.job);
+    if (Status status = check_job(resolved.job); !status) return status.error();
+  }
   return resolved;
 }
 

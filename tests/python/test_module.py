@@ -182,6 +182,8 @@ class Module(unittest.TestCase):
         self.assertEqual(one.read_bytes(), two.read_bytes())
         with self.assertRaises(lamina.UsageError):
             lamina.extrude(str(two), CROWN, settings)
+        lamina.extrude(str(two), CROWN, {"machine.profile": "marlin"}, overwrite=True)
+        self.assertEqual(one.read_bytes(), two.read_bytes(), "the defaults of the command")
 
     def test_each_powder_of_a_layer_is_the_decoded_file_of_its_own(self):
         rabbit, nut = (str(ROOT / "tests/corpus" / name) for name in ("rabbit_9_overlapping_shells.obj", "parameter_quality_nut.stl"))

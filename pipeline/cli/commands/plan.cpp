@@ -33,8 +33,6 @@ struct PlanCommand {
   bool divided = false;                   // supports --shard
   /// Applies the command line before the job is checked. errors  kUsage
   Status (*complete)(const Arguments&, Job&);
-  /// Takes absent values from the machine; nullptr: none.
-  void (*leave_to_machine)(const Arguments&, Resolved&) = nullptr;
 };
 
 /// Replaces a key's help texts by those of the row.
@@ -66,6 +64,16 @@ CommandSpec plan_spec(const PlanCommand& row) {
   return spec;
 }
 
+/// What a job file leaves to the printer, one line for each: files of earlier versions meant other defaults.
+std::vector<std::string> notes_on_defaults(const std::string& file, const Job& job) {
+  std::vector<std::string> notes;
+  if (!is_named(job, "fill.walls")) notes.push_back(file + " names no fill.walls: 1 is laid; write walls = 0 for none");
+  if (!is_named(job, "layers.thickness_mm") && job.heights.thickness_mm.empty()) {
+    notes.push_back(fmt::format("{} names no layers.thickness_mm: layers are {:g} mm, by the printer", file, job.layer_mm));
+  }
+  return notes;
+}
+
 Outcome plan(const PlanCommand& row, const Arguments& arguments, Context& context) {
   Result<Job> job = read_job_options(row.keys, arguments);
   if (!job) return job.error();
@@ -74,6 +82,7 @@ Outcome plan(const PlanCommand& row, const Arguments& arguments, Context& contex
   job->dry_run = arguments.has("--dry-run");
   job->json = arguments.has("--json");
   job->quiet = arguments.has("--quiet");
+  job->leave_to_machine = true;
   if (Status status = row.complete(arguments, *job); !status) return status;
   if (Status status = check_needs(row.product, arguments, *job); !status) return status;
   if (Status status = check_job(*job); !status) return status;
@@ -83,10 +92,12 @@ Outcome plan(const PlanCommand& row, const Arguments& arguments, Context& contex
   }
   Result<Resolved> resolved = resolve(*job, row.product);
   if (!resolved) return resolved.error();
-  if (row.leave_to_machine != nullptr) {
+  if (resolved->extruder) {
     if (Status status = check_machine_needs(resolved->extruder->machine, arguments); !status) return status;
-    row.leave_to_machine(arguments, *resolved);
-    if (Status status = check_job(resolved->job); !status) return status;
+    const std::string file = arguments.text("--job");
+    for (const std::string& note : notes_on_defaults(file == "-" ? "the job" : file, resolved->job)) {
+      if (!file.empty() && !job->quiet) context.say("note: " + note);
+    }
   }
   if (arguments.has("--save-job")) {
     Job saved = resolved->job;
@@ -250,20 +261,6 @@ std::string extrude_closing() {
          "  lamina extrude part.stl --machine fdm-2000 --layer 0.254 --bead 0.508 --fill raster -o part.sml";
 }
 
-/// Replaces the defaults of powder jobs by the printer's where neither options nor a file name a value.
-void leave_to_machine(const Arguments& arguments, Resolved& resolved) {
-  Job& job = resolved.job;
-  const Extruder& machine = resolved.extruder->machine;
-  const auto named = [&](std::string_view flag, std::string_view key) {
-    return arguments.has(flag) || std::ranges::find(job.named, key) != job.named.end();
-  };
-  if (!named("--walls", "fill.walls")) job.fill.all.walls = 1;
-  if (!named("--layer", "layers.thickness_mm") && job.heights.thickness_mm.empty()) {
-    job.layer_mm = machine.format == "sml" && !machine.sml.pd.empty() ? machine.sml.pd.front().thickness_mm
-                                                                      : machine.material.nozzle_mm / 2;
-  }
-}
-
 Status complete_extrude(const Arguments&, Job& job) {
   if (job.segment.all.on && job.fill.all.pattern == infill::Pattern::kNone) job.fill.all.pattern = infill::Pattern::kRaster;
   if (job.output.empty() && !job.dry_run) {
@@ -292,8 +289,7 @@ PlanCommand extrude_row() {
           kExtrudeWords,
           extrude_closing,
           false,
-          complete_extrude,
-          leave_to_machine};
+          complete_extrude};
 }
 
 template <PlanCommand (*kRow)()>

@@ -6,6 +6,8 @@
 #include <nlohmann/json.hpp>
 #include <numbers>
 
+#include "pipeline/job/file.h"
+#include "pipeline/plan/plan.h"
 #include "tests/commands/program.h"
 #include "tests/segment/gcode_reader.h"
 
@@ -59,6 +61,38 @@ TEST(ToolpathDefaults, LeaveOutPointsUnlessAskedAndTheSameInAJobFile) {
   ASSERT_EQ(sliced.code, 0) << sliced.err;
   EXPECT_NE(read_text(directory / "out/job.toml").find("tolerance_um = 0\n"), std::string::npos);
   EXPECT_NE(read_text(directory / "out/job.toml").find("lamina slice --job FILE\n"), std::string::npos);
+}
+
+TEST(ToolpathDefaults, AJobFileIsToldWhatItLeavesToThePrinter) {
+  const Directory directory;
+  write_text(directory / "job.toml", "[[part]]\npath = '" + kToothFile + "'\n");
+  const auto said = [&](const std::string& more) {
+    const Outcome outcome =
+        run_lamina(words_of("extrude --job job.toml --machine marlin --dry-run -o a.gcode" + more), directory.path());
+    EXPECT_EQ(outcome.code, 0) << outcome.err;
+    return outcome.err + outcome.out;
+  };
+  const std::string walls = "job.toml names no fill.walls: 1 is laid",
+                    layers = "names no layers.thickness_mm: layers are 0.2 mm";
+  EXPECT_NE(said("").find(walls), std::string::npos);
+  EXPECT_NE(said("").find(layers), std::string::npos);
+  const std::string named = said(" --set fill.walls=2 --layer 0.3");
+  EXPECT_EQ(named.find("job.toml names no"), std::string::npos) << named;
+}
+
+TEST(ToolpathDefaults, OfALibrariesJobAreThePrintersOnlyIfItLeavesThem) {
+  pipeline::Job job;
+  job.layer_mm = 0.3;
+  job.machine.profile = "marlin";
+  EXPECT_EQ(pipeline::resolve(job, Product::kMoves)->job.layer_mm, 0.3);
+  job.leave_to_machine = job.dry_run = true;
+  job.parts.emplace_back();
+  job.parts[0].path = kToothFile;
+  ASSERT_TRUE(pipeline::set_key(job, "fill.walls=0").ok());
+  const auto resolved = pipeline::resolve(job, Product::kMoves);
+  ASSERT_TRUE(resolved.ok());
+  EXPECT_EQ(resolved->job.layer_mm, 0.2);
+  EXPECT_EQ(resolved->job.fill.all.walls, 0u);
 }
 
 TEST(ToolpathDefaults, SkirtComesFirstAndIsToldApart) {
