@@ -18,10 +18,11 @@ bool by_steps(Product product, const Job& job) { return fits_heights(product, jo
 bool by_slopes(Product product, const Job& job) { return fits_heights(product, job) && job.heights.mode != Mode::kOptimal; }
 bool optimal(Product, const Job& job) { return job.heights.mode == Mode::kOptimal; }
 bool may_end_below(Product product, const Job& job) { return by_angle(product, job) || optimal(product, job); }
-bool shrinks(Product product, const Job& job) {
+bool stretched(Product, const Job& job) {
   const auto nominal = [](const PartRequest& part) { return part.shrink == std::array<double, 3>{1, 1, 1}; };
-  return by_steps(product, job) && !std::ranges::all_of(job.parts, nominal);
+  return !std::ranges::all_of(job.parts, nominal);
 }
+bool shrinks(Product product, const Job& job) { return by_steps(product, job) && stretched(product, job); }
 bool thins(Product, const Job& job) { return job.dose.core < 1 || fills(job); }
 /// Printers of filament lay a wall where nothing else is asked for.
 bool lays_beads(Product product, const Job& job) { return product == Product::kMoves || fills(job); }
@@ -50,6 +51,7 @@ struct Need {
   std::string_view flag;
   bool (*met)(Product, const Job&);
   std::string_view unmet;
+  bool (*in_study)(Product, const Job&) = nullptr;  // of layers alone; nullptr: it tells something about any
 };
 constexpr std::string_view kUniform = "is of layers that fit the part, and these are uniform; add --heights and --thickness",
                            kSteps = "is of --heights cusp, stepwise and optimal; add one of them",
@@ -61,17 +63,17 @@ constexpr std::string_view kUniform = "is of layers that fit the part, and these
                            kLines = "is of lines, and no pattern is asked for; add --fill or --pattern";
 constexpr Need kNeeds[] = {
     {"--cusp", by_steps, kSteps},
-    {"--cusp-of", shrinks, kShrinks},
-    {"--adapt-angle", by_angle, kAngle},
-    {"--peaks", by_angle, kAngle},
-    {"--cover-top", may_end_below, kCovered},
+    {"--cusp-of", shrinks, kShrinks, stretched},
+    {"--adapt-angle", by_angle, kAngle, by_angle},
+    {"--peaks", by_angle, kAngle, by_angle},
+    {"--cover-top", may_end_below, kCovered, may_end_below},
     {"--peak-angle", fits_heights, kUniform},
-    {"--facets", by_slopes, kSlopes},
+    {"--facets", by_slopes, kSlopes, by_slopes},
     {"--facet-area", fits_heights, kUniform},
-    {"--no-flats", optimal, kOptimal},
+    {"--no-flats", optimal, kOptimal, optimal},
     {"--flat-area", fits_heights, kUniform},
     {"--flat-tolerance", fits_heights, kUniform},
-    {"--time-model", optimal, kOptimal},
+    {"--time-model", optimal, kOptimal, optimal},
     {"--shell", thins, "is the depth that is not thinned, and nothing is; add --core or --fill"},
     {"--bead-ends", lays_beads, kBeads},
     {"--bead", lays_beads, kBeads},
@@ -103,9 +105,9 @@ Status check_needs(Product product, const Arguments& arguments, const Job& job, 
   // Whoever names the pattern none knows that there are no lines.
   const bool named = arguments.has("--pattern") || arguments.has("--fill");
   for (const Need& need : kNeeds) {
-    const bool beads = need.met == lays_lines || need.met == lays_beads,
-               of_mode = need.met == by_angle || need.met == optimal || need.met == by_slopes;
-    if (!arguments.has(need.flag) || need.met(product, job) || (beads && named) || (study && !of_mode)) continue;
+    const bool beads = need.met == lays_lines || need.met == lays_beads;
+    const auto met = study ? need.in_study : need.met;
+    if (!arguments.has(need.flag) || met == nullptr || met(product, job) || (beads && named)) continue;
     return terminal::at_option(need.flag, std::string(need.unmet));
   }
   if (arguments.has("--no-repair") && arguments.has("--repair") && arguments.text("--repair") != "off") {
