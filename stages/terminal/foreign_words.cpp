@@ -10,7 +10,7 @@ namespace {
 struct ForeignWord {
   std::string_view theirs, ours, differs = {};
 };
-// Of two rows of a word, the first whose option the command has counts.
+// Of two rows of a word, the first whose option the command has counts. Without an option of ours, lamina has nothing of it.
 constexpr ForeignWord kForeignWords[] = {
     {"--layer-height", "--layer"},
     {"--fill-density", "--line-distance", "it is the width of a bead over the density, as 2 for 0.4 mm and 20 %"},
@@ -64,6 +64,15 @@ constexpr ForeignWord kForeignWords[] = {
     {"--printer-profile", "--machine"},
     {"--output-dir", "--output"},
     {"--loglevel", "--quiet"},
+    {"--support", "", "lamina makes no supports"},
+    {"--supports", "", "lamina makes no supports"},
+    {"--support-material", "", "lamina makes no supports"},
+    {"--support-enable", "", "lamina makes no supports"},
+    {"--brim", "", "lamina lays no brim"},
+    {"--brim-width", "", "lamina lays no brim"},
+    {"--brim-line-count", "", "lamina lays no brim"},
+    {"--raft", "", "lamina lays no raft"},
+    {"--raft-layers", "", "lamina lays no raft"},
 };
 
 }  // namespace
@@ -72,7 +81,9 @@ std::string foreign_word(std::string_view flag, const CommandSpec& spec) {
   std::string word(flag);
   std::ranges::replace(word, '_', '-');
   for (const ForeignWord& row : kForeignWords) {
-    if (row.theirs != word || spec.find(row.ours) == nullptr) continue;
+    if (row.theirs != word) continue;
+    if (row.ours.empty()) return fmt::format("; {}", row.differs);
+    if (spec.find(row.ours) == nullptr) continue;
     return row.differs.empty() ? fmt::format("; did you mean '{}'?", row.ours)
                                : fmt::format("; did you mean '{}' ({})?", row.ours, row.differs);
   }

@@ -9,7 +9,8 @@
 namespace lamina::terminal {
 
 /// "; did you mean '--layer'?" for an option of PrusaSlicer, Slic3r or CuraEngine whose counterpart the command has, with
-/// what differs; else "". Sources: PrusaSlicer src/libslic3r/PrintConfig.cpp, Cura fdmprinter.def.json.
+/// what differs; "; lamina lays no brim" for what lamina does not make; else "". Sources: PrusaSlicer
+/// src/libslic3r/PrintConfig.cpp, Cura fdmprinter.def.json.
 std::string foreign_word(std::string_view flag, const CommandSpec& spec);
 
 }  // namespace lamina::terminal

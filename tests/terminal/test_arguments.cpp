@@ -89,6 +89,10 @@ TEST(ForeignWords, OfOtherSlicersAreAnsweredWithOurs) {
       {"extrude", "--temperature", "'--nozzle-temperature'"},
       {"jet", "--duplicate", "'--copies'"},
       {"extrude", "--rotate-x", "'--rotate'"},
+      {"extrude", "--support", "lamina makes no supports"},
+      {"jet", "--support_material", "lamina makes no supports"},
+      {"extrude", "--brim", "lamina lays no brim"},
+      {"extrude", "--raft-layers", "lamina lays no raft"},
   };
   for (const auto& row : rows) EXPECT_NE(asked(row.command, row.flag).find(row.ours), std::string::npos) << row.flag;
   EXPECT_EQ(asked("info", "--layer-height"), "") << "info has no layers";
@@ -102,6 +106,17 @@ TEST(Suggestions, TheShorterOfTwoNamesThatHoldTheWordIsNearer) {
   const std::vector<std::string_view> names = {"nuferbj-31", "nuferbj-360dpi", "nuferbj"};
   EXPECT_EQ(suggest("nuferb", names), "; did you mean 'nuferbj'?");
   EXPECT_EQ(suggest("360dpi", names), "; did you mean 'nuferbj-360dpi'?");
+}
+
+TEST(Suggestions, AThirdOfTheLettersMayBeWrong) {
+  const std::vector<std::string_view> names = {"--skirt", "--walls", "--nozzle-temperature", "--at", "-o"};
+  EXPECT_EQ(suggest("--support", names), "");
+  EXPECT_EQ(suggest("--raft", names), "");
+  EXPECT_EQ(suggest("--wall", names), "; did you mean '--walls'?");
+  EXPECT_EQ(suggest("--skrit", names), "; did you mean '--skirt'?");
+  EXPECT_EQ(suggest("--wlals", names), "; did you mean '--walls'?");
+  EXPECT_EQ(suggest("--nozle-temprature", names), "; did you mean '--nozzle-temperature'?");
+  EXPECT_EQ(suggest("--zzz", names), "");
 }
 
 }  // namespace
