@@ -66,6 +66,19 @@ Result<std::string> layer_table(const Plan& plan) {
   return write::rp3::text_of(layers, settings);
 }
 
+/// The layer of the file before which every part on the bed has laid its first `count` layers.
+std::uint32_t after_first(const Plan& plan, std::uint32_t count) {
+  if (!plan.job.heights.per_part) return count;
+  const std::vector<ScheduledLayer>& layers = plan.sections->layers();
+  std::vector<bool> stands(plan.scene->instances.size());  // parts in the air have no first layer that has to stick
+  std::uint32_t after = 0;
+  for (std::uint32_t i = 0; i < layers.size(); ++i) {
+    if (layers[i].number == 0) stands[layers[i].part] = layers[i].layer.bottom == 0;
+    if (layers[i].number < count && stands[layers[i].part]) after = i + 1;
+  }
+  return after;
+}
+
 }  // namespace
 
 Status check_toolpath_output(const Job& job, const Extruder& machine) {
@@ -100,7 +113,9 @@ Status check_toolpath_output(const Job& job, const Extruder& machine) {
 }
 
 ToolpathFile::ToolpathFile(const Plan& plan)
-    : plan_(plan), format_(write::make_extrusion_format(plan.moves->profile.machine)) {}
+    : plan_(plan),
+      format_(write::make_extrusion_format(plan.moves->profile.machine,
+                                           {after_first(plan, 1), after_first(plan, plan.moves->profile.machine.fan.from_layer)})) {}
 
 Status ToolpathFile::open() {
   const Job& job = plan_.job;

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "stages/data/buffer.h"
@@ -74,6 +75,12 @@ struct ExtrusionHead {
   bool segmented = false;
 };
 
+/// The layers of the file, from 0, with which settings of first layers end: parts with layers of their own have several.
+struct Switches {
+  std::uint32_t temperatures = 1;    // the later ones
+  std::optional<std::uint32_t> fan;  // absent: the machine's from_layer
+};
+
 /// Takes the moves of one layer, one after the other.
 class LayerMoves {
  public:
@@ -97,11 +104,11 @@ class ExtrusionFormat {
 };
 
 /// `machine` has to outlive them.
-std::unique_ptr<ExtrusionFormat> make_gcode_format(const Extruder& machine);
+std::unique_ptr<ExtrusionFormat> make_gcode_format(const Extruder& machine, const Switches& switches = {});
 std::unique_ptr<ExtrusionFormat> make_sml_format(const Extruder& machine);
 /// The one that the machine reads.
-inline std::unique_ptr<ExtrusionFormat> make_extrusion_format(const Extruder& machine) {
-  return machine.format == "sml" ? make_sml_format(machine) : make_gcode_format(machine);
+inline std::unique_ptr<ExtrusionFormat> make_extrusion_format(const Extruder& machine, const Switches& switches = {}) {
+  return machine.format == "sml" ? make_sml_format(machine) : make_gcode_format(machine, switches);
 }
 
 }  // namespace lamina::write

@@ -36,7 +36,8 @@ int type_of(PathKind kind) {
 
 }  // namespace
 
-LayerWriter::LayerWriter(const Extruder& machine, const Layer& layer, std::uint32_t layers, Buffer<char>& out)
+LayerWriter::LayerWriter(const Extruder& machine, const Layer& layer, std::uint32_t layers, Buffer<char>& out,
+                         const Switches& switches)
     : machine_(machine), out_(out), height_(layer.thickness) {
   feed_per_volume_ = 1 / machine.material.mm3_of_e();
   corner_x_ = nm_of(machine.bed.corner_mm[0]);
@@ -55,12 +56,12 @@ LayerWriter::LayerWriter(const Extruder& machine, const Layer& layer, std::uint3
     *text++ = '\n';
     return text;
   });
-  if (layer.index == 1) {
+  if (layer.index == switches.temperatures) {
     const auto& m = machine.material;
     if (m.nozzle_degc != m.first_nozzle_degc) append(out_, fmt::format("M104 S{:.0f}\n", m.nozzle_degc));
     if (m.bed_degc != m.first_bed_degc) append(out_, fmt::format("M140 S{:.0f}\n", m.bed_degc));
   }
-  if (layer.index == machine.fan.from_layer && machine.fan.percent > 0) {
+  if (layer.index == switches.fan.value_or(machine.fan.from_layer) && machine.fan.percent > 0) {
     append(out_, fmt::format("M106 S{:.0f}\n", machine.fan.percent * 2.55));
   }
   if (!machine.code.layer.empty()) {
@@ -266,7 +267,7 @@ namespace {
 
 class GcodeFormat final : public ExtrusionFormat {
  public:
-  explicit GcodeFormat(const Extruder& machine) : machine_(machine) {}
+  GcodeFormat(const Extruder& machine, const Switches& switches) : machine_(machine), switches_(switches) {}
   Status check(const Layer& layer) const override {
     if (mm(layer.thickness) <= machine_.material.nozzle_mm) return {};
     return Error{Fault::kUsage, fmt::format("layer {}: {} mm is thicker than the nozzle of {} mm is wide; take thinner layers",
@@ -274,7 +275,7 @@ class GcodeFormat final : public ExtrusionFormat {
   }
   void head(const ExtrusionHead& head, Buffer<char>& out) const override { append_head(machine_, head, out); }
   std::unique_ptr<LayerMoves> layer(const Layer& layer, std::uint32_t layers, Buffer<char>& out) const override {
-    return std::make_unique<LayerWriter>(machine_, layer, layers, out);
+    return std::make_unique<LayerWriter>(machine_, layer, layers, out, switches_);
   }
   void tail(const MoveTotals& totals, std::uint32_t layers, Buffer<char>& out) const override {
     append_tail(machine_, totals, layers, out);
@@ -282,13 +283,14 @@ class GcodeFormat final : public ExtrusionFormat {
 
  private:
   const Extruder& machine_;
+  Switches switches_;
 };
 
 }  // namespace
 }  // namespace lamina::write::gcode
 
 namespace lamina::write {
-std::unique_ptr<ExtrusionFormat> make_gcode_format(const Extruder& machine) {
-  return std::make_unique<gcode::GcodeFormat>(machine);
+std::unique_ptr<ExtrusionFormat> make_gcode_format(const Extruder& machine, const Switches& switches) {
+  return std::make_unique<gcode::GcodeFormat>(machine, switches);
 }
 }  // namespace lamina::write

@@ -19,7 +19,8 @@ namespace lamina::write::gcode {
 class LayerWriter final : public LayerMoves {
  public:
   /// out  appended to
-  LayerWriter(const Extruder& machine, const Layer& layer, std::uint32_t layers, Buffer<char>& out);
+  LayerWriter(const Extruder& machine, const Layer& layer, std::uint32_t layers, Buffer<char>& out,
+              const Switches& switches = {});
   double lay(const BeadMove& move) override;
   const MoveTotals& finish() override;
 

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <numbers>
+#include <sstream>
 
 #include "pipeline/job/file.h"
 #include "pipeline/plan/plan.h"
@@ -36,6 +37,41 @@ double filament_of(const std::vector<GcodeBead>& beads) {
   double sum = 0;
   for (const GcodeBead& bead : beads) sum += bead.filament;
   return sum;
+}
+
+/// The layers, from 0, before which a line of the file comes, and those that lie on the bed.
+struct LayersOfText {
+  std::vector<int> on_bed, fan, cooler;
+};
+LayersOfText layers_of_text(const std::string& text) {
+  LayersOfText found;
+  std::istringstream lines(text);
+  int layer = -1;
+  double top = 0;
+  for (std::string line; std::getline(lines, line);) {
+    if (line == ";LAYER_CHANGE") ++layer;
+    if (line.rfind(";Z:", 0) == 0) top = std::stod(line.substr(3));
+    if (line.rfind(";HEIGHT:", 0) == 0 && std::abs(top - std::stod(line.substr(8))) < 1e-6) found.on_bed.push_back(layer);
+    if (layer >= 0 && line.rfind("M106 S", 0) == 0 && line != "M106 S0") found.fan.push_back(layer);
+    if (layer >= 0 && line == "M104 S190") found.cooler.push_back(layer);
+  }
+  return found;
+}
+
+TEST(ToolpathDefaults, PartsWithOwnLayersKeepTheSettingsOfFirstLayersUntilAllLieOnTheBed) {
+  const Directory directory;
+  write_box(directory / "a.stl", {0, 0, 0}, {5, 5, 1});
+  write_box(directory / "b.stl", {0, 0, 0}, {6, 6, 1});
+  const std::string job = "a.stl b.stl --layer 0.2 --walls 1 --machine-set "
+                          "material.nozzle_degc=190;material.first_nozzle_degc=205";
+  const LayersOfText together = layers_of_text(extruded(directory, job).text);
+  EXPECT_EQ(together.on_bed, std::vector<int>({0}));
+  EXPECT_EQ(together.fan, std::vector<int>({1}));
+  EXPECT_EQ(together.cooler, std::vector<int>({1}));
+  const LayersOfText own = layers_of_text(extruded(directory, job + " --per-part").text);
+  EXPECT_EQ(own.on_bed, std::vector<int>({0, 1}));
+  EXPECT_EQ(own.fan, std::vector<int>({2}));
+  EXPECT_EQ(own.cooler, std::vector<int>({2}));
 }
 
 TEST(ToolpathDefaults, LeaveOutPointsUnlessAskedAndTheSameInAJobFile) {
