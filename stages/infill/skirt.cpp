@@ -23,8 +23,10 @@ void append_line(const Box& box, std::int64_t away, std::size_t side, std::int64
   const bool upright = side % 2 == 0;  // left, front, right, back
   const std::int64_t lo = upright ? box.lo.y : box.lo.x, hi = upright ? box.hi.y : box.hi.x;
   const std::int64_t more = std::max<std::int64_t>(0, (length - (hi - lo) + 1) / 2);
-  const std::int64_t from = std::max<std::int64_t>(lo - more, width / 2);
-  const std::int64_t to = std::min(hi + more, bed[upright ? 1 : 0] - width / 2);
+  const std::int64_t least = width / 2, most = bed[upright ? 1 : 0] - width / 2;
+  std::int64_t from = std::max(lo - more, least);
+  const std::int64_t to = std::min(std::max(hi + more, from + length), most);  // what one end lacks, the other adds
+  from = std::max(std::min(from, to - length), least);
   if (to <= from) return;
   const std::int64_t across[4] = {box.lo.x - away, box.lo.y - away, box.hi.x + away, box.hi.y + away};
   for (const std::int64_t along : {from, to}) {

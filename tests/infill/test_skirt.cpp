@@ -63,8 +63,16 @@ TEST(Skirt, KeepsToTheBedAndClearOfTheParts) {
   ASSERT_EQ(line.size(), 1u);
   ASSERT_EQ(line[0].size(), 2u);
   EXPECT_EQ(line[0][0].x, 35'000'000 + kWidth / 2);
-  EXPECT_GE(line[0][1].y - line[0][0].y, 59'000'000);
+  EXPECT_EQ(line[0][0].y, kWidth / 2);
+  EXPECT_EQ(line[0][1].y - line[0][0].y, 100'000'000) << "what the lower end lacks, the upper one adds";
   expect_free(line, corner, 5'000'000);
+  const Contours last = infill::skirt_around(box_at(190, 180, 220, 200), {1, 5, 100}, kWidth, kBed);
+  ASSERT_EQ(last.size(), 1u);
+  EXPECT_EQ(last[0][1].y, kBed[1] - kWidth / 2);
+  EXPECT_EQ(last[0][1].y - last[0][0].y, 100'000'000);
+  const Contours whole = infill::skirt_around(corner, {1, 5, 1000}, kWidth, kBed);
+  ASSERT_EQ(whole.size(), 1u);
+  EXPECT_EQ(whole[0][1].y - whole[0][0].y, kBed[1] - kWidth) << "as long as the bed";
   EXPECT_EQ(infill::skirt_around(box_at(0, 0, 219, 199), {1, 5, 100}, kWidth, kBed).size(), 0u);
   const Box wide = box_at(0.5, 0.5, 219.5, 190);
   const Contours behind = infill::skirt_around(wide, {1, 5, 100}, kWidth, kBed);
