@@ -70,7 +70,7 @@ Result<std::string> layer_table(const Plan& plan) {
 std::uint32_t after_first(const Plan& plan, std::uint32_t count) {
   if (!plan.job.heights.per_part) return count;
   const std::vector<ScheduledLayer>& layers = plan.sections->layers();
-  std::vector<bool> stands(plan.scene->instances.size());  // parts in the air have no first layer that has to stick
+  std::vector<bool> stands(plan.scene->parts.size());  // parts in the air have no first layer that has to stick
   std::uint32_t after = 0;
   for (std::uint32_t i = 0; i < layers.size(); ++i) {
     if (layers[i].number == 0) stands[layers[i].part] = layers[i].layer.bottom == 0;

@@ -198,7 +198,10 @@ void MoveMaker::tell(Summary& summary) const {
   result("beads", fmt::format("{} moves, {:.2f} m, {:.3f} cm3; {} travels, {:.2f} m", readable_count(totals.part_moves()),
                               (totals.bead_mm - totals.beside_mm) / 1000, summary.volume_mm3 / 1000,
                               readable_count(totals.travels), totals.travel_mm / 1000));
-  result("skirt", totals.beside_moves == 0 ? std::string(machine.skirt.loops == 0 ? "none" : "none: no room, or no first layer")
+  const char* none = machine.skirt.loops == 0 || !plan_.sections->fills() ? "none"
+                     : plan_.range[0] > 0                                 ? "none: --layers leaves the first layer out"
+                                                                          : "none: no room on the bed";
+  result("skirt", totals.beside_moves == 0 ? std::string(none)
                                            : fmt::format("{:.1f} mm, {:.1f} mm3, {:.1f} mm of filament, beside the parts",
                                                          totals.beside_mm, totals.beside_mm3, totals.beside_filament_mm));
   segment::tell_laid(sums_.laid, ranges_, machine, first_layer_points_, summary.results, *summary.facts);

@@ -13,7 +13,7 @@
 namespace lamina::pipeline {
 namespace {
 
-/// Lays the skirt, as fast and as wide as a wall. The first layer of a job that begins at the bed has one.
+/// Lays the skirt, as fast and as wide as a wall. The first layer of a job that begins at the bed has one, with beads or not.
 void lay_skirt(const Plan& plan, const Layer& layer, write::LayerMoves& out) {
   const Extruder& machine = plan.moves->profile.machine;
   const FillSettings& fill = plan.job.fill.all;
@@ -91,7 +91,7 @@ Result<bool> lay_moves(const Plan& plan, std::uint32_t index, const Sections::Wo
   const Layer layer = plan.sections->layers()[index].own();
   LaidSums laid;
   laid.porosity.solid_mm3 = facts.area_mm2 * mm(layer.thickness);
-  if (index == 0 && work.paths.size() > 0) lay_skirt(plan, layer, out);
+  if (index == 0 && plan.sections->fills()) lay_skirt(plan, layer, out);
   for (std::uint32_t a = 0; a + 1 < work.path_area.size(); ++a) {
     const auto& [range, cut] = cut_of(plan, a, layer);
     if (!cut) return cut.error();

@@ -74,6 +74,34 @@ TEST(ToolpathDefaults, PartsWithOwnLayersKeepTheSettingsOfFirstLayersUntilAllLie
   EXPECT_EQ(own.cooler, std::vector<int>({2}));
 }
 
+TEST(ToolpathDefaults, ASkirtFillsTheNozzleThoughTheFirstLayerHoldsNoBead) {
+  const Directory directory;
+  std::string tip = "solid tip\n";  // a tetrahedron on its tip
+  for (const char* facet : {"0 0 8|10 0 8|5 10 8", "5 5 0|10 0 8|0 0 8", "5 5 0|5 10 8|10 0 8", "5 5 0|0 0 8|5 10 8"}) {
+    tip += "facet normal 0 0 0\nouter loop\nvertex ";
+    for (const char* c = facet; *c != 0; ++c) tip += *c == '|' ? std::string("\nvertex ") : std::string(1, *c);
+    tip += "\nendloop\nendfacet\n";
+  }
+  write_text(directory / "tip.stl", tip + "endsolid tip\n");
+  const Extruded made = extruded(directory, "tip.stl --layer 0.2 --walls 1");
+  ASSERT_GT(made.file.layers.size(), 30u);
+  EXPECT_TRUE(made.file.layers[0].beads.empty());
+  EXPECT_EQ(made.file.skirt.size(), made.summary["skirt"]["moves"]);
+  EXPECT_EQ(made.file.skirt.front().z, 0.2);
+  EXPECT_GT(made.summary["skirt"]["bead_mm"], 40) << "a loop 5 mm around the widest layer";
+  write_box(directory / "needle.stl", {0, 0, 0}, {0.1f, 0.1f, 1});  // no bead fits into it
+  write_box(directory / "head.stl", {0, 0, 0}, {4, 4, 1});
+  const Extruded needle = extruded(directory, "needle.stl --layer 0.2 --walls 1 --allow-empty");
+  EXPECT_EQ(needle.summary["moves"], 0);
+  EXPECT_GT(needle.summary["skirt"]["bead_mm"], 0);
+  const auto told = [&](const std::string& options) {
+    return run_lamina(words_of("extrude " + options + " --layer 0.2 --walls 1 --overwrite -o a.gcode"), directory.path()).err;
+  };
+  EXPECT_NE(told("head.stl --layers 1:3").find("--layers leaves the first layer out"), std::string::npos);
+  write_box(directory / "bed.stl", {0, 0, 0}, {220, 220, 0.4f});
+  EXPECT_NE(told("bed.stl").find("none: no room on the bed"), std::string::npos);
+}
+
 TEST(ToolpathDefaults, LeaveOutPointsUnlessAskedAndTheSameInAJobFile) {
   const Directory directory;
   const std::string job = kToothFile + " --layer 0.2 --walls 2 --fill raster --bead-gap 1 --skirt 0";
