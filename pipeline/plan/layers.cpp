@@ -66,9 +66,10 @@ Result<LayerSchedule> schedule_layers(const Job& job, const Scene& scene, const 
   return schedule;
 }
 
-std::uint32_t drop_empty_top(const Scene& scene, LayerSchedule& schedule) {
+std::uint32_t drop_empty_top(const Scene& scene, Containment containment, LayerSchedule& schedule) {
   std::uint32_t dropped = 0;
-  while (schedule.layers.size() > 1 && schedule.planes[schedule.layers.back().low] >= scene.height) {
+  const auto plane = containment == Containment::kInside ? &ScheduledLayer::high : &ScheduledLayer::low;
+  while (schedule.layers.size() > 1 && schedule.planes[schedule.layers.back().*plane] >= scene.height) {
     schedule.layers.pop_back();
     ++dropped;
   }

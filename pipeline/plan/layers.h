@@ -37,8 +37,9 @@ struct LayerSchedule {
 /// cost    28 bytes per layer and 4 bytes per plane
 Result<LayerSchedule> schedule_layers(const Job& job, const Scene& scene, const heights::LayerTable& table);
 
-/// Removes the last layers if they lie above all parts but for less than their half: nothing would be laid in them.
+/// Removes the last layers if all parts end below the planes that they are cut by: nothing would be laid in them. That is the
+/// middle, or with kInside the top, and with kOutside the bottom.
 /// returns  how many
-std::uint32_t drop_empty_top(const Scene& scene, LayerSchedule& schedule);
+std::uint32_t drop_empty_top(const Scene& scene, Containment containment, LayerSchedule& schedule);
 
 }  // namespace lamina::pipeline

@@ -123,7 +123,7 @@ class Planner {
       auto schedule = schedule_layers(job(), *plan_.scene, plan_.heights.table);
       if (!schedule) return schedule.error();
       schedule_ = std::move(*schedule);
-      if (moves()) plan_.moves->left_out = drop_empty_top(*plan_.scene, schedule_);
+      if (moves()) plan_.moves->left_out = drop_empty_top(*plan_.scene, job().heights.containment, schedule_);
     }
     plan_.layer_count =
         job().heights.per_part || moves() ? static_cast<std::uint32_t>(schedule_.layers.size()) : plan_.heights.table.size();

@@ -231,7 +231,8 @@ void tell_moves(const Plan& plan, Summary& summary) {
   summary.machine = plan.moves->profile.machine.name;
   summary.format = plan.moves->profile.machine.format;
   summary.index_bytes = plan.sections->slicer().index_bytes();
-  segment::tell_bead(plan.moves->profile.machine, plan.moves->left_out, summary.head, *summary.facts);
+  segment::tell_bead(plan.moves->profile.machine, plan.moves->left_out,
+                     plan.job.heights.containment == Containment::kInside ? "top" : "middle", summary.head, *summary.facts);
   const double tolerance_um = tolerance_um_of(plan.job, plan.product);
   summary.head.emplace_back("contours", tolerance_um > 0 ? fmt::format("points are left out that move them by at most {} um",
                                                                        number_text(tolerance_um))

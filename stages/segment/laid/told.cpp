@@ -97,7 +97,8 @@ void tell_laid(const LaidSums& sums, const std::vector<LaidRange>& ranges, const
                         {"told_mm_s", shorts.told_mm_s}};
 }
 
-void tell_bead(const Extruder& machine, std::uint32_t left_out, Lines& lines, nlohmann::ordered_json& facts) {
+void tell_bead(const Extruder& machine, std::uint32_t left_out, std::string_view cut_at, Lines& lines,
+               nlohmann::ordered_json& facts) {
   constexpr std::array<std::string_view, 3> kShapes{"stadium", "rectangle", "ellipse"};
   const auto& material = machine.material;
   const std::string_view shape = kShapes[static_cast<std::size_t>(material.shape())];
@@ -109,8 +110,8 @@ void tell_bead(const Extruder& machine, std::uint32_t left_out, Lines& lines, nl
   facts["bead"] = {{"area", shape}, {"flow", material.flow}, {"feed_ratio", material.feed_ratio}};
   facts["layers_left_out"] = left_out;
   if (left_out == 0) return;
-  lines.emplace_back("top", fmt::format("{} more layer{} left out: empty, the middle lies above the parts", left_out,
-                                        left_out == 1 ? " is" : "s are"));
+  lines.emplace_back("top", fmt::format("{} more layer{} left out: empty, the {} lies above the parts", left_out,
+                                        left_out == 1 ? " is" : "s are", cut_at));
 }
 
 void tell_foreseen(const Segmentation& plan, const std::string& heights, Lines& lines) {

@@ -3,6 +3,7 @@
 
 #include <nlohmann/json_fwd.hpp>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -28,7 +29,9 @@ void tell_laid(const LaidSums& sums, const std::vector<LaidRange>& ranges, const
                std::uint64_t points_first_layer, Lines& lines, nlohmann::ordered_json& facts);
 
 /// What 100 % of extrusion is, and how many layers are left out at the top, before anything is laid; as above.
-void tell_bead(const Extruder& machine, std::uint32_t left_out, Lines& lines, nlohmann::ordered_json& facts);
+/// cut_at  "middle" or "top", the place of a layer that decides whether it is empty
+void tell_bead(const Extruder& machine, std::uint32_t left_out, std::string_view cut_at, Lines& lines,
+               nlohmann::ordered_json& facts);
 /// The pores that the spacing of a segmentation leads to; as above.
 void tell_foreseen(const Segmentation& plan, const std::string& heights, Lines& lines);
 

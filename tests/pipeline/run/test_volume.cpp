@@ -157,6 +157,21 @@ TEST_F(Volume, AnEmptyLayerAtTheTopIsNotLaidAndIsTold) {
   }
 }
 
+TEST_F(Volume, StepsInsideLeaveOutALayerThatEndsAboveTheParts) {
+  test::write_box(folder / "cube.stl", {0, 0, 0}, {4, 4, 1});
+  for (const auto& [containment, count] : {std::pair{"across", 3}, {"inside", 3}, {"outside", 4}}) {
+    const std::string job = "--fill none --walls 1 --layer 0.3 --containment ";
+    const Made made = extrude(job + containment, folder / "cube.stl");
+    EXPECT_EQ(made.json["layers_total"], count) << containment;
+    EXPECT_EQ(made.json["layers_left_out"], 4 - count) << containment;
+    const test::GcodeFile gcode = test::read_gcode(made.text);
+    ASSERT_EQ(gcode.layers.size(), static_cast<std::size_t>(count)) << containment;
+    EXPECT_FALSE(gcode.layers.back().beads.empty()) << containment;
+  }
+  const Made tall = extrude("--fill none --walls 1 --layer 0.2 --containment inside", folder / "cube.stl");
+  EXPECT_EQ(tall.json["layers_left_out"], 0) << "the last one ends at the top";
+}
+
 TEST_F(Volume, PoresToldAreThoseThatAreLaid) {
   const std::string examples = std::string(LAMINA_TEST_DIR) + "/../docs/examples/dinisio2022/";
   test::write_box(folder / "speed.stl", {0, 0, 0}, {62, 50, 0.3f});
