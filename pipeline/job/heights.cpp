@@ -83,7 +83,7 @@ const JobKey kHeightsKeys[] = {
          "angle: peaks are faces of at least --flat-area, or every horizontal facet as in Lima (2009)", decides::all})
         .unsaid_at("flats"),
     field<kHeights, &Request::cover_top>({"heights", "cover_top", "--cover-top", "",
-                                          "angle and optimal: the last layer ends at the top or above it, never below",
+                                          "angle and optimal: the last layer ends at the top or above it (extrude: unless empty)",
                                           decides::all, "true"})
         .unsaid_at("false"),
     field<kHeights, &Request::flats>({"heights", "flats", "--no-flats", "",

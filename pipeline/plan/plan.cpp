@@ -123,11 +123,23 @@ class Planner {
       auto schedule = schedule_layers(job(), *plan_.scene, plan_.heights.table);
       if (!schedule) return schedule.error();
       schedule_ = std::move(*schedule);
-      if (moves()) plan_.moves->left_out = drop_empty_top(*plan_.scene, job().heights.containment, schedule_);
+      if (moves()) leave_out_empty_top();
     }
     plan_.layer_count =
         job().heights.per_part || moves() ? static_cast<std::uint32_t>(schedule_.layers.size()) : plan_.heights.table.size();
     return {};
+  }
+
+  void leave_out_empty_top() {
+    plan_.moves->left_out = drop_empty_top(*plan_.scene, job().heights.containment, schedule_);
+    if (plan_.moves->left_out == 0 || !job().heights.cover_top) return;
+    const Layer& last = schedule_.layers.back().layer;
+    const double missing_mm = mm(std::int64_t{plan_.scene->height} - last.bottom - last.thickness);
+    if (missing_mm <= 0) return;
+    plan_.warnings.push_back(
+        {"cover-top", fmt::format("--cover-top: the layer that covers the top would be empty and is left out, the topmost {:.3f} mm "
+                                  "are not built; let --thickness have a thinner layer",
+                                  missing_mm)});
   }
 
   /// Layers of one thickness are counted before there is a table of them. errors  kUsage: it does not fit into the memory

@@ -172,6 +172,21 @@ TEST_F(Volume, StepsInsideLeaveOutALayerThatEndsAboveTheParts) {
   EXPECT_EQ(tall.json["layers_left_out"], 0) << "the last one ends at the top";
 }
 
+TEST_F(Volume, ACoveringLayerThatIsLeftOutIsWarnedOf) {
+  test::write_box(folder / "cube.stl", {0, 0, 0}, {4, 4, 1.05f});
+  const std::string job = "--fill none --walls 1 --heights angle --cover-top --thickness ";
+  const nlohmann::json thick = extrude(job + "0.2", folder / "cube.stl").json, thin = extrude(job + "0.05,0.2", folder / "cube.stl").json;
+  EXPECT_EQ(thick["layers_left_out"], 1);
+  const auto warned = [](const nlohmann::json& json) {
+    std::string text;
+    for (const auto& warning : json["warnings"]) text += warning["code"] == "cover-top" ? warning["text"].get<std::string>() : "";
+    return text;
+  };
+  EXPECT_NE(warned(thick).find("the topmost 0.050 mm are not built"), std::string::npos) << thick;
+  EXPECT_EQ(thin["layers_left_out"], 0);
+  EXPECT_EQ(warned(thin), "");
+}
+
 TEST_F(Volume, PoresToldAreThoseThatAreLaid) {
   const std::string examples = std::string(LAMINA_TEST_DIR) + "/../docs/examples/dinisio2022/";
   test::write_box(folder / "speed.stl", {0, 0, 0}, {62, 50, 0.3f});
