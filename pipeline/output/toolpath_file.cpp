@@ -114,8 +114,9 @@ Status check_toolpath_output(const Job& job, const Extruder& machine) {
 
 ToolpathFile::ToolpathFile(const Plan& plan)
     : plan_(plan),
-      format_(write::make_extrusion_format(plan.moves->profile.machine,
-                                           {after_first(plan, 1), after_first(plan, plan.moves->profile.machine.fan.from_layer)})) {}
+      format_(write::make_extrusion_format(
+          plan.moves->profile.machine, {after_first(plan, 1), after_first(plan, plan.moves->profile.machine.fan.from_layer)})) {
+}
 
 Status ToolpathFile::open() {
   const Job& job = plan_.job;

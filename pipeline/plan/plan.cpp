@@ -137,9 +137,10 @@ class Planner {
     const double missing_mm = mm(std::int64_t{plan_.scene->height} - last.bottom - last.thickness);
     if (missing_mm <= 0) return;
     plan_.warnings.push_back(
-        {"cover-top", fmt::format("--cover-top: the layer that covers the top would be empty and is left out, the topmost {:.3f} mm "
-                                  "are not built; let --thickness have a thinner layer",
-                                  missing_mm)});
+        {"cover-top",
+         fmt::format("--cover-top: the layer that covers the top would be empty and is left out, the topmost {:.3f} mm "
+                     "are not built; let --thickness have a thinner layer",
+                     missing_mm)});
   }
 
   /// Layers of one thickness are counted before there is a table of them. errors  kUsage: it does not fit into the memory
@@ -181,7 +182,9 @@ class Planner {
 
   Status index_sections() {
     if (images() && !beads_) return {};
-    auto sections = Sections::make(job(), *plan_.scene, std::move(schedule_), std::move(fillings_));
+    Job cut = job();  // the job itself stays as asked, so that a file of it means the same in another command
+    cut.slice.tolerance_um = tolerance_um_of(cut, plan_.product);
+    auto sections = Sections::make(cut, *plan_.scene, std::move(schedule_), std::move(fillings_));
     if (!sections) return sections.error();
     plan_.sections = std::make_unique<Sections>(std::move(*sections));
     if (plan_.segments) {
@@ -261,7 +264,6 @@ class Planner {
 
 Result<Resolved> resolve(const Job& job, Product product) {
   Resolved resolved{job, product, bare_bed(job), std::nullopt, std::nullopt};
-  resolved.job.slice.tolerance_um = tolerance_um_of(job, product);
   if (product == Product::kImages) {
     if (job.heights.per_part) {
       return usage("--per-part: a powder bed has one table of layers for all parts; leave it out");

@@ -70,6 +70,7 @@ Sanity::Sanity(const Plan& plan, const std::atomic<bool>& cancel)
   for (const PartSummary& part : plan.scene->parts) names_.push_back(one_line(part.path));
   if (plan.images) tally_->look_through(plan.images->grid);
   sampling_ = sampling_of(plan.job, plan.images ? &plan.images->grid : nullptr);
+  if (!plan.images) sampling_.tolerance_um = tolerance_um_of(plan.job, plan.product);
   sampling_.part = names_;
   // The triangles of images are in clusters by then: their parts are read again.
   sanity::United::Again again = [this]() -> Result<std::vector<Mesh>> {

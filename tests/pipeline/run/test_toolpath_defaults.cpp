@@ -62,8 +62,9 @@ TEST(ToolpathDefaults, PartsWithOwnLayersKeepTheSettingsOfFirstLayersUntilAllLie
   const Directory directory;
   write_box(directory / "a.stl", {0, 0, 0}, {5, 5, 1});
   write_box(directory / "b.stl", {0, 0, 0}, {6, 6, 1});
-  const std::string job = "a.stl b.stl --layer 0.2 --walls 1 --machine-set "
-                          "material.nozzle_degc=190;material.first_nozzle_degc=205";
+  const std::string job =
+      "a.stl b.stl --layer 0.2 --walls 1 --machine-set "
+      "material.nozzle_degc=190;material.first_nozzle_degc=205";
   const LayersOfText together = layers_of_text(extruded(directory, job).text);
   EXPECT_EQ(together.on_bed, std::vector<int>({0}));
   EXPECT_EQ(together.fan, std::vector<int>({1}));
@@ -112,10 +113,10 @@ TEST(ToolpathDefaults, LeaveOutPointsUnlessAskedAndTheSameInAJobFile) {
   EXPECT_TRUE(unasked.text == asked.text);
   EXPECT_LT(unasked.summary["moves"].get<double>(), 0.5 * all.summary["moves"].get<double>());
   EXPECT_NEAR(unasked.summary["volume_mm3"].get<double>() / all.summary["volume_mm3"].get<double>(), 1, 0.01);
-  // The saved job says what was done, and does it again.
+  // The saved job does it again, and says what was asked.
   const Outcome saved = run_lamina(words_of("extrude " + job + " --save-job job.toml --quiet -o b.gcode"), directory.path());
   ASSERT_EQ(saved.code, 0) << saved.err;
-  EXPECT_NE(read_text(directory / "job.toml").find("tolerance_um = 10\n"), std::string::npos);
+  EXPECT_EQ(read_text(directory / "job.toml").find("\ntolerance_um"), std::string::npos);
   EXPECT_NE(read_text(directory / "job.toml").find("lamina extrude --job FILE\n"), std::string::npos);
   const Outcome again = run_lamina(words_of("extrude --job job.toml --quiet -o c.gcode"), directory.path());
   ASSERT_EQ(again.code, 0) << again.err;
@@ -123,8 +124,17 @@ TEST(ToolpathDefaults, LeaveOutPointsUnlessAskedAndTheSameInAJobFile) {
   // Contours keep their points.
   const Outcome sliced = run_lamina(words_of("slice " + kToothFile + " --layer 1 --quiet -o out"), directory.path());
   ASSERT_EQ(sliced.code, 0) << sliced.err;
-  EXPECT_NE(read_text(directory / "out/job.toml").find("tolerance_um = 0\n"), std::string::npos);
   EXPECT_NE(read_text(directory / "out/job.toml").find("lamina slice --job FILE\n"), std::string::npos);
+  EXPECT_EQ(read_text(directory / "out/job.toml").find("\ntolerance_um"), std::string::npos);
+  // A job means in each command what that command does unasked; what was asked stays.
+  EXPECT_EQ(extruded(directory, "--job out/job.toml --layer 0.2 --walls 1").summary["tolerance_um"], 10);
+  for (const auto& [asked_um, kept] : {std::pair{"0", "\ntolerance_um = 0\n"}, {"25", "\ntolerance_um = 25\n"}}) {
+    const std::string save = std::string(" --layer 1 --overwrite --save-job kept.toml --quiet -o out --tolerance ") + asked_um;
+    const Outcome outcome = run_lamina(words_of("slice " + kToothFile + save), directory.path());
+    ASSERT_EQ(outcome.code, 0) << outcome.err;
+    EXPECT_NE(read_text(directory / "kept.toml").find(kept), std::string::npos);
+    EXPECT_NE(read_text(directory / "out/job.toml").find(kept), std::string::npos);
+  }
 }
 
 TEST(ToolpathDefaults, AJobFileIsToldWhatItLeavesToThePrinter) {

@@ -175,11 +175,13 @@ TEST_F(Volume, StepsInsideLeaveOutALayerThatEndsAboveTheParts) {
 TEST_F(Volume, ACoveringLayerThatIsLeftOutIsWarnedOf) {
   test::write_box(folder / "cube.stl", {0, 0, 0}, {4, 4, 1.05f});
   const std::string job = "--fill none --walls 1 --heights angle --cover-top --thickness ";
-  const nlohmann::json thick = extrude(job + "0.2", folder / "cube.stl").json, thin = extrude(job + "0.05,0.2", folder / "cube.stl").json;
+  const nlohmann::json thick = extrude(job + "0.2", folder / "cube.stl").json,
+                       thin = extrude(job + "0.05,0.2", folder / "cube.stl").json;
   EXPECT_EQ(thick["layers_left_out"], 1);
   const auto warned = [](const nlohmann::json& json) {
     std::string text;
-    for (const auto& warning : json["warnings"]) text += warning["code"] == "cover-top" ? warning["text"].get<std::string>() : "";
+    for (const auto& warning : json["warnings"])
+      text += warning["code"] == "cover-top" ? warning["text"].get<std::string>() : "";
     return text;
   };
   EXPECT_NE(warned(thick).find("the topmost 0.050 mm are not built"), std::string::npos) << thick;
