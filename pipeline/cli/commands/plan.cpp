@@ -65,7 +65,8 @@ CommandSpec plan_spec(const PlanCommand& row) {
 }
 
 /// What a job file leaves to the printer, one line for each: files of earlier versions meant other defaults.
-std::vector<std::string> notes_on_defaults(const std::string& file, const Job& job) {
+std::vector<std::string> notes_on_defaults(const std::string& path, const Job& job) {
+  const std::string file = path == "-" ? "the job" : path;
   std::vector<std::string> notes;
   if (!is_named(job, "fill.walls")) notes.push_back(file + " names no fill.walls: 1 is laid; write walls = 0 for none");
   if (!is_named(job, "layers.thickness_mm") && job.heights.thickness_mm.empty()) {
@@ -92,12 +93,10 @@ Outcome plan(const PlanCommand& row, const Arguments& arguments, Context& contex
   }
   Result<Resolved> resolved = resolve(*job, row.product);
   if (!resolved) return resolved.error();
+  std::vector<std::string> left;
   if (resolved->extruder) {
     if (Status status = check_machine_needs(resolved->extruder->machine, arguments); !status) return status;
-    const std::string file = arguments.text("--job");
-    for (const std::string& note : notes_on_defaults(file == "-" ? "the job" : file, resolved->job)) {
-      if (!file.empty() && !job->quiet) context.say("note: " + note);
-    }
+    if (arguments.has("--job")) left = notes_on_defaults(arguments.text("--job"), resolved->job);
   }
   if (arguments.has("--save-job")) {
     Job saved = resolved->job;
@@ -108,7 +107,10 @@ Outcome plan(const PlanCommand& row, const Arguments& arguments, Context& contex
   const auto progress = [&](const ProgressEvent& event) { context.progress(event); };
   const Result<Summary> summary = run(std::move(*resolved), progress, context.cancel());
   if (!summary) return summary.error();
-  if (!job->quiet) context.say_text(summary->text());
+  if (!job->quiet) {
+    for (const std::string& note : left) context.say("note: " + note);
+    context.say_text(summary->text());
+  }
   if (job->json) {
     if (Status status = context.give(Json::parse(summary->json())); !status) return status.error();
   }
