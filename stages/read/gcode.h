@@ -63,12 +63,15 @@ class GcodeFile {
   /// errors  kUsage: no such layer, the file has changed
   Result<GcodeLayer> layer(std::uint32_t index) const;
 
+  /// Decides what G90 and G91 mean for E.
+  enum class Firmware : std::uint8_t { kUntold, kMarlin, kRepRap };
   /// Where the printer stands in front of a line.
   struct Place {
     std::uint64_t byte = 0, line = 0;
     double at[4] = {};                             // x, y, z, e: in the file's own units
     double unit = 1;                               // mm
     bool relative = false, relative_feed = false;  // G91, M83
+    Firmware firmware = Firmware::kUntold;         // of the tag ;FLAVOR:
     bool volumetric = false;                       // M200: E counts mm3
     std::uint8_t plane = 17;                       // of arcs: G17, G18, G19
     double width = 0, height = 0;                  // mm: tags, 0 without

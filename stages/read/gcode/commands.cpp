@@ -21,6 +21,12 @@ std::optional<std::string_view> behind_tag(std::string_view line, std::string_vi
   return std::nullopt;
 }
 
+/// CuraEngine's words: gcodeExport.cpp, GCodeExport::flavorToString().
+GcodeFile::Firmware firmware_of(std::string_view flavor) {
+  if (flavor.starts_with("Marlin")) return GcodeFile::Firmware::kMarlin;
+  return flavor.starts_with("RepRap") ? GcodeFile::Firmware::kRepRap : GcodeFile::Firmware::kUntold;
+}
+
 }  // namespace
 
 double RawBead::length() const { return std::hypot(to[0] - from[0], to[1] - from[1]); }
@@ -84,6 +90,7 @@ bool GcodeCommands::read_tag() {
   } else if (const auto type = behind_tag(text_, ";TYPE:", "; FEATURE: ")) {
     name_type(*type);
   } else {
+    if (text_.starts_with(";FLAVOR:")) place_.firmware = firmware_of(text_.substr(8));
     facts.read(text_);
   }
   return false;
@@ -118,6 +125,18 @@ bool GcodeCommands::read_words(std::string_view left, Words& words) {
   return true;
 }
 
+/// Marlin's G90 and G91 replace what M82 and M83 said (MarlinFirmware/Marlin, GcodeSuite::set_relative_mode()).
+void GcodeCommands::set_relative(bool relative) {
+  place_.relative = relative;
+  if (place_.firmware == GcodeFile::Firmware::kMarlin) place_.relative_feed = relative;
+}
+
+/// Of E. G91 or M83 makes it relative in Klipper (klippy/extras/gcode_move.py, GCodeMove.cmd_G1) and in PrusaSlicer's view
+/// of its own files (GCodeProcessor::process_G1); in RepRapFirmware M83 alone does.
+bool GcodeCommands::feeds_relative() const {
+  return place_.relative_feed || (place_.relative && place_.firmware == GcodeFile::Firmware::kUntold);
+}
+
 /// Whether the line is no move.
 bool GcodeCommands::set_mode(char letter, double code, std::string_view left) {
   if (letter == 'M') {
@@ -133,8 +152,7 @@ bool GcodeCommands::set_mode(char letter, double code, std::string_view left) {
   if (code == 17 || code == 18 || code == 19) place_.plane = static_cast<std::uint8_t>(code);
   if (code == 20) place_.unit = 25.4;
   if (code == 21) place_.unit = 1;
-  if (code == 90) place_.relative = false;
-  if (code == 91) place_.relative = true;
+  if (code == 90 || code == 91) set_relative(code == 91);
   if (code == 90.1) fail("G90.1: firmwares of printers take centres of arcs from the start; export them so");
   if (code == 5) fail("splines (G5) are not drawn; export lines or arcs");
   return code != 0 && code != 1 && code != 2 && code != 3 && code != 92;
@@ -167,7 +185,7 @@ bool GcodeCommands::move(double code, const Words& words, std::optional<RawBead>
   constexpr char kAxes[] = {'X', 'Y', 'Z', 'E'};
   double to[4];
   for (std::size_t k = 0; k < 4; ++k) {
-    const bool relative = code != 92 && (k == 3 ? place_.relative_feed : place_.relative);
+    const bool relative = code != 92 && (k == 3 ? feeds_relative() : place_.relative);
     to[k] = place_.at[k];
     if (words.has(kAxes[k])) to[k] = (relative ? place_.at[k] : 0) + words[kAxes[k]] * place_.unit;
   }

@@ -65,6 +65,8 @@ class GcodeCommands {
   bool read_words(std::string_view left, Words& words);
   bool run_command(std::optional<RawBead>& bead);
   bool set_mode(char letter, double code, std::string_view left);
+  void set_relative(bool relative);
+  bool feeds_relative() const;
   bool move(double code, const Words& words, std::optional<RawBead>& bead);
   bool begin_arc(bool clockwise, const Words& words, const double (&to)[4], double fed);
   bool next_chord(std::optional<RawBead>& bead);

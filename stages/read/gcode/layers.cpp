@@ -72,7 +72,7 @@ LayerCutter::Cut LayerCutter::cut_at(const RawBead& bead) {
   if (layers_.empty()) return Cut::kLayer;
   const bool slope = bead.from[2] != bead.to[2];
   const double jump = std::abs(bead.from[2] - z_);
-  if (!slope && (!climbs_ || jump > kSame)) return bead.to[2] != z_ ? Cut::kLayer : Cut::kNone;
+  if (!slope && (!climbs_ || jump > kSame)) return jump > kSame ? Cut::kLayer : Cut::kNone;
   if (!climbs_ || jump > kJump) return Cut::kLayer;
   const Layer& now = layers_.back();
   const bool flat = flat_length_ > 4 * slope_length_ && now.top - now.place.below >= kLeastLayer;
