@@ -57,6 +57,7 @@ class GcodeSurvey {
 
  private:
   Status read_all();
+  Status check_limits() const;
   void add_to_box(const RawBead& raw);
   void take_filament();
   void note_widths();
@@ -84,22 +85,32 @@ void GcodeSurvey::add_to_box(const RawBead& raw) {
   }
 }
 
+Status GcodeSurvey::check_limits() const {
+  const std::vector<LayerCutter::Layer>& layers = cutter_.layers();
+  if (layers.size() > options_.most_layers) {
+    return Error{Fault::kUsage, fmt::format("{}: line {}: more than {} layers; --layer-height MM cuts thicker ones",
+                                            file_.path_, walk_.place().line, options_.most_layers)};
+  }
+  if (!layers.empty() && layers.back().place.beads > options_.most_beads) {
+    return Error{Fault::kUsage,
+                 fmt::format("{}: line {}: a layer of more than {} beads; --layer-height MM makes thinner layers", file_.path_,
+                             walk_.place().line, options_.most_beads)};
+  }
+  return {};
+}
+
 Status GcodeSurvey::read_all() {
   std::optional<RawBead> raw;
   while (walk_.next(raw)) {
     if (walk_.layer_tag) {
       if (!cutter_.tagged()) file_.box_ = Box();  // what start code lays belongs to no layer
       cutter_.tag(walk_.before());
-      continue;
+    } else {
+      cutter_.add(*raw, walk_.before(), walk_.place());
+      file_.tells_widths_ |= walk_.place().width > 0;
+      add_to_box(*raw);
     }
-    cutter_.add(*raw, walk_.before(), walk_.place());
-    file_.tells_widths_ |= walk_.place().width > 0;
-    add_to_box(*raw);
-    if (cutter_.layers().back().place.beads > options_.most_beads) {
-      return Error{Fault::kUsage,
-                   fmt::format("{}: line {}: a layer of more than {} beads; --layer-height MM makes thinner layers",
-                               file_.path_, walk_.place().line, options_.most_beads)};
-    }
+    if (Status status = check_limits(); !status) return status;
   }
   if (walk_.fault) return Error{Fault::kUsage, *walk_.fault};
   if (file_.box_.empty()) {

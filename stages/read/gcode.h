@@ -30,6 +30,7 @@ struct GcodeOptions {
   double filament_mm = 0;                 // diameter; 0: what the file tells, else 1.75
   double layer_height_mm = 0;             // begins layers at its multiples; 0: at tags, heights or turns
   std::uint32_t most_beads = 10'000'000;  // of a layer, 24 bytes each
+  std::uint32_t most_layers = 400'000;    // a bed's height in steps of 5 um, some 400 bytes each
 };
 
 /// A file of Marlin, Klipper or RepRapFirmware, by lamina or another slicer. Layers begin
@@ -46,7 +47,7 @@ struct GcodeOptions {
 class GcodeFile {
  public:
   /// Reads the file once. errors  kUsage: cannot be read, is no text of G-code, lays nothing, does what is not drawn (arcs
-  /// out of the bed's plane, splines), or lays more than most_beads in a layer; with the line
+  /// out of the bed's plane, splines), lays more than most_beads in a layer, or has more than most_layers; with the line
   /// cost    O(bytes + chords)
   static Result<GcodeFile> open(const std::string& path, const GcodeOptions& options = {});
   /// The same of an open file, or of a text in memory, whose layers cannot be asked for then.

@@ -135,5 +135,20 @@ TEST(GcodeLayers, WhatCannotBeDrawnIsOneLineThatNamesThePlace) {
   EXPECT_FALSE(read::GcodeFile::open(directory / "none.gcode"));
 }
 
+TEST(GcodeLayers, TagsWithoutEndAreRefusedWithTheLine) {
+  const Directory directory;
+  std::string text = "M83\n";
+  for (int i = 0; i < 6; ++i) text += ";LAYER:0\nG1 X" + std::to_string(i + 1) + " E1\n";
+  test::write_text(directory.path() / "part.gcode", text + "M107\n");
+  for (const std::uint32_t most : {5u, 6u}) {
+    read::GcodeOptions options;
+    options.most_layers = most;
+    const auto file = read::GcodeFile::open(directory / "part.gcode", options);
+    EXPECT_EQ(file.ok(), most == 6u);
+    if (file) continue;
+    EXPECT_NE(file.error().message.find("line 12: more than 5 layers"), std::string::npos) << file.error().message;
+  }
+}
+
 }  // namespace
 }  // namespace lamina::pipeline
