@@ -84,32 +84,50 @@ std::map<Nm, Contours> lines_by_width(std::span<const LaidBead> beads, std::uint
   return lines;
 }
 
+/// Widths that a shade stands for.
+struct WidthRange {
+  Nm narrow, wide;
+};
+
+/// The ranges of one shade each, from narrow to wide: widths that differ by what rounding does (0.03 mm or 5 % of the
+/// narrowest) are one; equal parts of all where that leaves more than kMostShades.
+std::vector<WidthRange> shades_of(const std::map<Nm, Contours>& lines) {
+  std::vector<WidthRange> ranges;
+  for (const auto& [width, line] : lines) {
+    if (ranges.empty() || width > ranges.back().narrow + std::max<Nm>(ranges.back().narrow / 20, 30'000)) {
+      ranges.push_back({width, width});
+    }
+    ranges.back().wide = width;
+  }
+  if (ranges.size() <= kMostShades) return ranges;
+  const Nm least = lines.begin()->first, most = lines.rbegin()->first;
+  ranges.assign(kMostShades, {INT32_MAX, 0});
+  for (const auto& [width, line] : lines) {
+    const std::int64_t part = (width - least) * static_cast<std::int64_t>(kMostShades) / (most - least);
+    WidthRange& range = ranges[std::min(kMostShades - 1, static_cast<std::size_t>(part))];
+    range = {std::min(range.narrow, width), width};
+  }
+  return ranges;
+}
+
 Status add_type(std::span<const LaidBead> laid, std::uint32_t type, const std::string& name, LayerShapes& shapes) {
   const std::map<Nm, Contours> lines = lines_by_width(laid, type);
-  if (lines.empty()) return {};
-  const Nm least = lines.begin()->first, most = lines.rbegin()->first;
-  const std::size_t steps = std::min(lines.size(), kMostShades);
-  const auto step_of = [&](Nm width, std::size_t place) {
-    if (lines.size() <= kMostShades) return place;
-    return std::min(steps - 1, static_cast<std::size_t>((width - least) * static_cast<std::int64_t>(steps) / (most - least)));
-  };
-  std::vector<LayerShapes::Beads> beads(steps);
-  std::vector<std::pair<Nm, Nm>> range(steps, {INT32_MAX, 0});
-  std::size_t place = 0;
-  for (const auto& [width, line] : lines) {
-    const auto covered = cover_lines(line, width);
-    if (!covered) return covered.error();
-    const std::size_t step = step_of(width, place++);
-    beads[step].outline.append(*covered);
-    range[step] = {std::min(range[step].first, width), std::max(range[step].second, width)};
-  }
-  for (std::size_t step = 0; step < steps; ++step) {
-    if (beads[step].outline.size() == 0) continue;
-    const auto& [narrow, wide] = range[step];
-    beads[step].ink = shade(ink_of(kind_of(name)), step, steps);
-    beads[step].name = fmt::format("{} {:.3g}{} mm", name.empty() ? "bead" : name, mm(narrow),
-                                   wide > narrow ? fmt::format(" to {:.3g}", mm(wide)) : "");
-    shapes.beads.push_back(std::move(beads[step]));
+  const std::vector<WidthRange> ranges = shades_of(lines);
+  auto line = lines.begin();
+  for (std::size_t step = 0; step < ranges.size(); ++step) {
+    const auto [narrow, wide] = ranges[step];
+    LayerShapes::Beads beads;
+    for (; line != lines.end() && line->first <= wide; ++line) {
+      const auto covered = cover_lines(line->second, line->first);
+      if (!covered) return covered.error();
+      beads.outline.append(*covered);
+    }
+    if (beads.outline.size() == 0) continue;
+    beads.ink = shade(ink_of(kind_of(name)), step, ranges.size());
+    beads.type = name.empty() ? "bead" : name;
+    beads.name =
+        fmt::format("{} {:.3g}{} mm", beads.type, mm(narrow), wide > narrow ? fmt::format(" to {:.3g}", mm(wide)) : "");
+    shapes.beads.push_back(std::move(beads));
   }
   return {};
 }
@@ -120,7 +138,7 @@ Status add_paths(const ToolpathsView& paths, LayerShapes& shapes) {
   for (const auto& [kind, name] : kKinds) {
     auto outline = outline_of(paths, kind);
     if (!outline) return outline.error();
-    if (outline->size() > 0) shapes.beads.push_back({ink_of(kind), std::string(name), std::move(*outline)});
+    if (outline->size() > 0) shapes.beads.push_back({ink_of(kind), std::string(name), std::move(*outline), ""});
   }
   return {};
 }

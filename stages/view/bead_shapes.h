@@ -14,7 +14,7 @@ namespace lamina::view {
 Status add_paths(const ToolpathsView& paths, LayerShapes& shapes);
 
 /// Adds the areas of a file's beads by type, in order of first occurrence. Beads of different widths within a type have
-/// different shades, four at most.
+/// different shades, four at most; widths within 0.03 mm or 5 % are one.
 /// types   names of the bead types as written by any slicer; they decide the ink; "" if unknown
 /// errors  kInternal if Clipper refuses them
 /// cost    O(beads * types) and the union of the beads

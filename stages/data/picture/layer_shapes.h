@@ -24,6 +24,7 @@ struct LayerShapes {
     Ink ink;
     std::string name;  // for the legend
     Contours outline;  // all that these beads cover, nonzero
+    std::string type;  // that shades share; "" if this is all of it
   };
   std::vector<Beads> beads;  // each drawn over those before it
 };

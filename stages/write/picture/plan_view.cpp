@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <utility>
+#include <vector>
 
 #include "stages/data/grid.h"
 #include "stages/write/picture/canvas.h"
@@ -24,11 +25,38 @@ void paint(Canvas& canvas, const LayerShapes& shapes, const Scale& scale, int le
     canvas.paint(left, top, width, contour_shares(beads.outline, scale, width, height), colour_of(beads.ink));
 }
 
-/// A square of each ink and what it is for, from `left` on, as many as there is room for up to `right`.
-void legend(Canvas& canvas, const std::vector<std::pair<Colour, std::string>>& inks, int left, int right, int baseline,
-            int size) {
+struct LegendEntry {
+  Colour ink;
+  std::string name, type;
+};
+
+void add_entries(std::vector<LegendEntry>& entries, const LayerShapes& shapes) {
+  for (const LayerShapes::Beads& beads : shapes.beads) {
+    if (std::ranges::none_of(entries, [&](const LegendEntry& entry) { return entry.name == beads.name; }))
+      entries.push_back({colour_of(beads.ink), beads.name, beads.type.empty() ? beads.name : beads.type});
+  }
+}
+
+/// The last shade of each type, then the others.
+void put_types_first(std::vector<LegendEntry>& entries) {
+  std::vector<LegendEntry> firsts, others;
+  for (std::size_t i = 0; i < entries.size(); ++i) {
+    const bool later = std::any_of(entries.begin() + static_cast<std::ptrdiff_t>(i) + 1, entries.end(),
+                                   [&](const LegendEntry& entry) { return entry.type == entries[i].type; });
+    (later ? others : firsts).push_back(entries[i]);
+  }
+  firsts.insert(firsts.end(), others.begin(), others.end());
+  entries = std::move(firsts);
+}
+
+/// A square of each ink and what it is for, from `left` on. Where there is no room for all up to `right`, each type has one
+/// before any has a second.
+void legend(Canvas& canvas, std::vector<LegendEntry> entries, int left, int right, int baseline, int size) {
   if (!have_font()) return;
-  for (const auto& [ink, name] : inks) {
+  int end = left - size * 4 / 3;
+  for (const LegendEntry& entry : entries) end += size + text_width(entry.name, size) + size * 4 / 3;
+  if (end > right) put_types_first(entries);
+  for (const auto& [ink, name, type] : entries) {
     if (left + size + text_width(name, size) > right) return canvas.text(left, baseline, size, "...", kText);
     canvas.fill_box(left, baseline - size * 3 / 4, size * 3 / 4, size * 3 / 4, ink);
     canvas.text(left + size, baseline, size, name, kText);
@@ -51,7 +79,7 @@ Result<Buffer<std::byte>> plan_sheet(const std::string& title, std::size_t layer
   const double pixels_per_nm = layout.picture_width / static_cast<double>(shown);
   const Scale scale{(static_cast<double>(box.lo.x) + box.hi.x) / 2 - static_cast<double>(shown) / 2,
                     (static_cast<double>(box.lo.y) + box.hi.y) / 2 + static_cast<double>(tall) / 2, pixels_per_nm};
-  std::vector<std::pair<Colour, std::string>> inks;
+  std::vector<LegendEntry> inks;
   for (std::size_t i = 0; i < layers; ++i) {
     const Result<LayerShapes> shapes = shapes_of(i);
     if (!shapes) return shapes.error();
@@ -63,10 +91,7 @@ Result<Buffer<std::byte>> plan_sheet(const std::string& title, std::size_t layer
     if (text_width(shapes->title, size) + size / 2 + remark <= layout.cell_width) {
       canvas.text(left + layout.cell_width - remark, baseline, size, shapes->caption, kText);
     }
-    for (const LayerShapes::Beads& beads : shapes->beads) {
-      if (std::ranges::none_of(inks, [&](const auto& ink) { return ink.second == beads.name; }))
-        inks.emplace_back(colour_of(beads.ink), beads.name);
-    }
+    add_entries(inks, *shapes);
   }
   canvas.text(layout.margin, layout.margin + layout.title_size, layout.title_size, title, kText);
   legend(canvas, inks, layout.margin + text_width(title, layout.title_size) + layout.title_size, layout.width,
@@ -91,8 +116,8 @@ Result<Buffer<std::byte>> plan_view(const LayerShapes& shapes, std::uint32_t pic
   const int small = size * 3 / 4, line = 2 * size + size / 2 + size / 4;
   canvas.text(left, line, small, shapes.caption, kText);
   left += text_width(shapes.caption, small) + size;
-  std::vector<std::pair<Colour, std::string>> inks;
-  for (const LayerShapes::Beads& beads : shapes.beads) inks.emplace_back(colour_of(beads.ink), beads.name);
+  std::vector<LegendEntry> inks;
+  add_entries(inks, shapes);
   legend(canvas, inks, left, width, line, small);
   return canvas.png();
 }

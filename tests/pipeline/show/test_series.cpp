@@ -42,6 +42,21 @@ TEST(PreviewGcode, BeadsCoverTheirLengthTimesTheirWidthAndRoundEnds) {
   EXPECT_FALSE(series->layer(1));
 }
 
+TEST(PreviewGcode, WidthsThatRoundingPartsAreOneShade) {
+  const Directory directory;
+  std::string text = "M83\n;TYPE:Internal infill\n;HEIGHT:0.2\nG1 X0 Y0 Z0.2\n";
+  for (const std::string width : {"0.44", "0.45", "0.44", "0.6", "0.45"}) text += ";WIDTH:" + width + "\nG91\nG1 X10 E1\nG90\n";
+  test::write_text(directory.path() / "part.gcode", text);
+  const auto series = gcode_series(directory / "part.gcode");
+  ASSERT_TRUE(series) << series.error().message;
+  const auto shapes = series->layer(0);
+  ASSERT_TRUE(shapes) << shapes.error().message;
+  ASSERT_EQ(shapes->beads.size(), 2u);
+  EXPECT_EQ(shapes->beads[0].name, "Internal infill 0.44 to 0.45 mm");
+  EXPECT_EQ(shapes->beads[1].name, "Internal infill 0.6 mm");
+  EXPECT_EQ(shapes->beads[0].type, shapes->beads[1].type);
+}
+
 TEST(PreviewGcode, DrawsLayersOfAPlanAsPngAndSvg) {
   const Directory directory;
   ASSERT_EQ(
