@@ -82,7 +82,6 @@ Result<SegmentPlan> plan_segments(const SegmentRequest& request, const segment::
   if (fill.all.pattern == infill::Pattern::kNone) fill.all.pattern = infill::Pattern::kRaster;
   const bool spaced = leaves_distances(fill.all);
   if (Status status = check_spacings(request.all, fill.all, ""); !status) return status.error();
-  plan.base.spaces_lines = spaced;
   if (plan.base.settings.on && spaced) fill.all.distance_mm = segment::line_distances(*base, request.all.first);
 
   for (const auto& asked : request.ranges) {
@@ -94,12 +93,11 @@ Result<SegmentPlan> plan_segments(const SegmentRequest& request, const segment::
     if (!resolved) return Error{Fault::kUsage, fmt::format("segment.range: {}: {}", name, resolved.error().message)};
     const auto filling = filling_of(asked, fill);
     if (!filling) return filling.error();
-    const bool spaces = spaced && distance_keys((*filling)->changes).empty();
-    if (spaces) {
+    if (spaced && distance_keys((*filling)->changes).empty()) {
       set_distances(settings.on ? segment::line_distances(*resolved, settings.first) : std::vector{fill.all.width_mm},
                     (*filling)->changes);
     }
-    plan.ranges.push_back({nm_of(asked.from_mm), nm_of(asked.to_mm), settings, *resolved, spaces});
+    plan.ranges.push_back({nm_of(asked.from_mm), nm_of(asked.to_mm), settings, *resolved});
   }
   std::ranges::sort(plan.ranges, {}, &SegmentRange::from);
   return plan;

@@ -20,7 +20,6 @@ struct SegmentRange {
   std::int64_t from = 0, to = INT64_MAX;  // nm above the part's bottom: layers whose middle is in [from, to)
   SegmentSettings settings;
   segment::Segmentation plan;
-  bool spaces_lines = false;  // else the filling says itself how far lines lie apart
 };
 
 /// The segmentation at each height.

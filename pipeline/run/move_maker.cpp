@@ -238,9 +238,6 @@ void tell_moves(const Plan& plan, Summary& summary) {
                                                                        number_text(tolerance_um))
                                                          : "all their points");
   (*summary.facts)["tolerance_um"] = tolerance_um;
-  for (const auto& [heights, range] : plan.segments->segmented()) {
-    if (plan.job.dry_run && range->spaces_lines) segment::tell_foreseen(range->plan, heights, summary.head);
-  }
 }
 
 std::unique_ptr<Maker> make_move_maker(const Plan& plan, Sanity& sanity, const FlowLimits& limits) {

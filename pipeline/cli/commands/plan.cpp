@@ -235,9 +235,10 @@ const KeyChoice kExtrudeKeys = {"layers",
                                 "run.allow_empty",
                                 "part"};
 
-const OptionSpec kExtrudeSwitches[] = {{"--resume", "", "go on with an interrupted job: whole layers are kept", "", "Run"},
-                                       {"--overwrite", "", "replace an earlier file", "", "Run"},
-                                       {"--dry-run", "", "load, place and index, predict, write nothing", "", "Run"}};
+const OptionSpec kExtrudeSwitches[] = {
+    {"--resume", "", "go on with an interrupted job: whole layers are kept", "", "Run"},
+    {"--overwrite", "", "replace an earlier file", "", "Run"},
+    {"--dry-run", "", "slice and lay every layer, tell what it takes and how long it prints, write nothing", "", "Run"}};
 
 const OptionSpec kExtrudeWords[] = {
     {"-o,--output", "FILE", "file for the toolpaths, as in part.gcode or part.sml", "", ""},

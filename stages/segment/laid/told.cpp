@@ -114,12 +114,6 @@ void tell_bead(const Extruder& machine, std::uint32_t left_out, std::string_view
                                         left_out == 1 ? " is" : "s are", cut_at));
 }
 
-void tell_foreseen(const Segmentation& plan, const std::string& heights, Lines& lines) {
-  const Pores p = predict_pores(plan);
-  lines.emplace_back("pores", fmt::format("{}{}{:.2f} x {:.3f} mm, by the spacing", heights, heights.empty() ? "" : ": ",
-                                          p.length_mm, p.width_mm));
-}
-
 std::string speed_warning(const ShortStretches& shorts, const Extruder& machine) {
   return shorts.reached_mm_s < kNearTold * shorts.told_mm_s ? short_text(shorts, machine) : std::string();
 }

@@ -32,8 +32,6 @@ void tell_laid(const LaidSums& sums, const std::vector<LaidRange>& ranges, const
 /// cut_at  "middle" or "top", the place of a layer that decides whether it is empty
 void tell_bead(const Extruder& machine, std::uint32_t left_out, std::string_view cut_at, Lines& lines,
                nlohmann::ordered_json& facts);
-/// The pores that the spacing of a segmentation leads to; as above.
-void tell_foreseen(const Segmentation& plan, const std::string& heights, Lines& lines);
 
 /// "612 stretches are too short for 400 mm/s2: ..." if most of the speed is missed; else "".
 std::string speed_warning(const ShortStretches& shorts, const Extruder& machine);

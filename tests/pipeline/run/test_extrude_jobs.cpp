@@ -222,6 +222,20 @@ TEST_F(ExtrudeProgram, ADryRunTellsTheTimeAndTheMaterialOfTheRunAndWritesNothing
   EXPECT_FALSE(fs::exists(file("b.gcode")));
 }
 
+TEST_F(ExtrudeProgram, ADryRunCountsThePoresOfTheRunAndTellsThemOnce) {
+  const std::string call = "extrude " + block(12, 9, 1.2, 2) + " --machine anet-a8 --layer 0.3 --fill segmented";
+  const auto pores_told = [&](const Outcome& outcome) {
+    std::vector<std::string> told;
+    for (std::size_t at = outcome.err.find("pores "); at != std::string::npos; at = outcome.err.find("pores ", at + 1)) {
+      if (at == 0 || outcome.err[at - 1] == '\n') told.push_back(outcome.err.substr(at, outcome.err.find('\n', at) - at));
+    }
+    return told;
+  };
+  const auto dry = pores_told(run(call + " --dry-run"));
+  EXPECT_EQ(dry.size(), 1u);
+  EXPECT_EQ(dry, pores_told(run(call + " -o " + file("a.gcode"))));
+}
+
 TEST_F(ExtrudeProgram, ClosedCurvesAreSegmentedFromTheOutsideInWithThickSeams) {
   const std::string part = block(30, 20, 1.2, 4);
   const Outcome result = run("extrude --overwrite " + part +
