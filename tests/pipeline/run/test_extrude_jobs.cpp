@@ -236,6 +236,23 @@ TEST_F(ExtrudeProgram, ADryRunCountsThePoresOfTheRunAndTellsThemOnce) {
   EXPECT_EQ(dry, pores_told(run(call + " -o " + file("a.gcode"))));
 }
 
+TEST_F(ExtrudeProgram, PoresAreOneCountWherePartsHaveTheirRangesAtDifferentHeights) {
+  const std::string part = "[[part]]\npath = \"" + block(20, 20, 6, 0) + "\"\nbottom_mm = ";
+  const auto pores = [&](const std::string& parts) {
+    std::ofstream(file("job.toml")) << "[layers]\nthickness_mm = 0.3\n[machine]\nprofile = \"anet-a8\"\n[fill]\nangle_deg = 0\n"
+                                       "[segment]\non = true\n[[segment.range]]\nfrom_mm = 0\nto_mm = 3\nthin_mm = 3\n"
+                                    << parts;
+    return run("extrude --dry-run --quiet --json --job " + file("job.toml")).json()["pores"];
+  };
+  const auto alone = pores(part + "0\n");
+  ASSERT_EQ(alone.size(), 2u);
+  EXPECT_EQ(pores(part + "0\n" + part + "0\n").size(), 2u);
+  const auto staggered = pores(part + "0\n" + part + "3\n");
+  ASSERT_EQ(staggered.size(), 1u);
+  EXPECT_EQ(staggered[0]["heights"], "all ranges");
+  EXPECT_EQ(staggered[0]["closed"], 2 * (alone[0]["closed"].get<int>() + alone[1]["closed"].get<int>()));
+}
+
 TEST_F(ExtrudeProgram, ClosedCurvesAreSegmentedFromTheOutsideInWithThickSeams) {
   const std::string part = block(30, 20, 1.2, 4);
   const Outcome result = run("extrude --overwrite " + part +
