@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <cmath>
+
 namespace lamina::replay {
 
 void GcodeReader::fault(std::string_view what) { printing_.fault(fmt::format("line {}: {}", number_, what)); }
@@ -30,7 +32,7 @@ bool GcodeReader::take(GcodeLine& line, bool all_words) {
       const std::size_t gap = std::min(rest.find(' '), rest.size());
       double value = 0;
       const auto [stop, error] = std::from_chars(rest.data() + 1, rest.data() + gap, value);
-      if (rest[0] < 'A' || rest[0] > 'Z' || error != std::errc() || stop != rest.data() + gap) {
+      if (rest[0] < 'A' || rest[0] > 'Z' || error != std::errc() || stop != rest.data() + gap || !std::isfinite(value)) {
         fault(fmt::format("'{}' is no word", rest.substr(0, gap)));
         return false;
       }
@@ -98,6 +100,10 @@ bool Axes::take(const GcodeLine& line, bool scanning) {
         printing_.roller_stands_at(at);
       }
     } else if (axis == profile.powder.feed_axes[0] || axis == profile.powder.feed_axes[1]) {
+      if (!relative_) {
+        reader_.fault(fmt::format("{} feeds to a height, which depends on the layers before; G91 stands before it", letter));
+        return true;
+      }
       printing_.feeds(axis == profile.powder.feed_axes[0] ? 0 : 1, way * profile.powder.feed_sign, feed_mm_s_);
       alone += std::abs(way);
     } else {
@@ -112,6 +118,10 @@ bool Axes::take(const GcodeLine& line, bool scanning) {
     printing_.head_stands_at(at_[profile.motion.x_axis[0]], at_[profile.motion.y_axis[0]]);
   }
   return true;
+}
+
+void Axes::end() {
+  if (relative_) reader_.fault("the layer ends in G91, and the next one goes to places");
 }
 
 }  // namespace lamina::replay

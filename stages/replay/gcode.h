@@ -55,9 +55,11 @@ class Axes {
   /// They stand as the layer before left them.
   Axes(Printing& printing, GcodeReader& reader);
 
-  /// Executes G0, G1, G90, G91; false for any other command. A fault may leave the axes unmoved.
+  /// Executes G0, G1, G90, G91; false for any other command. Vats feed by G91 alone. A fault may leave the axes unmoved.
   /// The head's positions are in `at`; the build vat must reach the depth of the layer before the head moves.
   bool take(const GcodeLine& line, bool scanning);
+  /// The layer ends: faults what the next one does not expect.
+  void end();
   double at(const std::string& axis) { return at_[axis[0]]; }
 
  private:

@@ -71,6 +71,7 @@ void read_m578(std::string_view text, Printing& printing) {
       step = now;
       fire_inkjet(line, reader, printing);
     } else if (line.command == "M400") {
+      axes.end();
       ended = true;
     } else {
       if (line.command == "G0") in_sweep = false;

@@ -126,6 +126,7 @@ void read_nuferbj(std::string_view text, Printing& printing) {
       in_sweep = false;
     } else if (line.command == "M813") {
       if (in_sweep || reader.count(line, 'L') != printing.layer()) return reader.fault("the layer ends within a swath");
+      axes.end();
       ended = true;
     } else if (!axes.take(line, false)) {
       return reader.fault(fmt::format("'{}' is no command of the dialect nuferbj", line.command));

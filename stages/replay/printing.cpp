@@ -195,7 +195,8 @@ void Printing::check_cycle() {
                       (*head_mm_)[1], next.x_mm, next.y_mm));
   }
   if (lowered_mm_) count.build_mm = mm(layer.bottom) + *lowered_mm_;
-  if (!count.moves) return;
+  if (profile().dialect == "raw" || profile().dialect == "planes") return;  // the head alone
+  if (!count.moves) return wrong("the build vat does not move");
   // Numbers are written to a tenth of a micrometre.
   if (const double top = mm(std::int64_t{layer.bottom} + layer.thickness); std::abs(count.build_mm - top) > 1e-3) {
     wrong(fmt::format("the build vat stands at {:g} mm where {:g} have to", count.build_mm, top));

@@ -102,6 +102,7 @@ void Hp45Reader::command(const GcodeLine& line) {
     if (controller_.unread() > 0) {
       return reader_.fault(fmt::format("{} lines are left that the head has not come to", controller_.unread()));
     }
+    axes_.end();
     ended_ = true;
   }
 }
