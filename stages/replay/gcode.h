@@ -60,6 +60,7 @@ class Axes {
   bool take(const GcodeLine& line, bool scanning);
   /// The layer ends: faults what the next one does not expect.
   void end();
+  double speed_mm_s() const { return feed_mm_s_; }  // the last F
   double at(const std::string& axis) { return at_[axis[0]]; }
 
  private:

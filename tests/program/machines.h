@@ -58,7 +58,8 @@ inline Machine small_machine(std::uint32_t nozzles, double tilt_deg, double colu
 /// Gives a machine what the firmware of its dialect can do, beside nozzles: the dots, axes and place of its head.
 inline void fit_firmware(Machine& machine) {
   if (machine.dialect == "hp45" || machine.dialect == "oasis") {
-    for (const std::uint32_t nozzle : {6u, 56u, 115u, 127u, 167u, 256u, 291u}) {
+    machine.motion.scan_speed_mm_s = 30;
+    for (const std::uint32_t nozzle : {0u, 6u, 56u, 115u, 127u, 129u, 167u, 256u, 263u, 291u}) {
       if (nozzle < machine.head.nozzles) machine.head.blocked.push_back(nozzle);
     }
   }

@@ -320,6 +320,9 @@ TEST(Hp45, PlantedFaultsAreFound) {
          std::rotate(l.begin() + static_cast<std::ptrdiff_t>(first) - 4, l.begin() + static_cast<std::ptrdiff_t>(first),
                      l.begin() + static_cast<std::ptrdiff_t>(sweep_1));
        }},
+      {"a sweep in parts of mm/s", [&](Lines& l) { l[sweep_1].replace(l[sweep_1].find(" F"), 7, " F14990"); }},
+      // 20 mm/s are 472 counts a second.
+      {"a sweep that the controller takes for rest", [&](Lines& l) { l[sweep_1].replace(l[sweep_1].find(" F"), 7, " F1200"); }},
       {"the sweep ends early", [&](Lines& l) { l[sweep_1] = "G1 X40.0000 F15000"; }},
       {"the head goes over the lines backwards",
        [&](Lines& l) {
@@ -378,8 +381,8 @@ TEST(Hp45, AuthorsExampleFiresAQuarterOfTheNozzlesForTenMillimetresEach) {
       off + "\nG1 X70 F15000\nG4 P0\nBRL\n";
   const auto virtual_machine = *replay::VirtualMachine::build(bare, resolved.grid.image.columns(), resolved.grid.image.rows());
   std::map<std::uint32_t, std::set<std::uint32_t>> nozzles;  // at each step
-  // 75 less those that have no channel of their own: 243 and 293, 172 and 184, 132, 8 and 43.
-  constexpr std::size_t kFire[] = {0, 73, 73, 74, 73};
+  // 75 less those that have no channel of their own: 243, 293 and 299, 170, 172 and 184, 132, 8, 36 and 43.
+  constexpr std::size_t kFire[] = {0, 72, 72, 74, 72};
   const auto count = virtual_machine.run(
       program, 7, [&](const replay::VirtualMachine::Drop& drop) { nozzles[drop.step].insert(drop.nozzle); });
   ASSERT_TRUE(count.ok()) << count.error().message;
@@ -508,6 +511,14 @@ TEST(Hp45, WhatTheControllerCannotDoIsRefusedWithTheKey) {
   };
   refused([](Machine& m) { m.head.row_offset_um = {0, 4050}; }, "head.row_offset_um");
   refused([](Machine& m) { m.head.blocked = {6, 56, 115, 127, 167, 256}; }, "head.blocked");
+  for (const std::uint32_t nozzle : {0u, 6u, 56u, 115u, 127u, 129u, 167u, 256u, 263u, 291u}) {
+    refused([&](Machine& m) { std::erase(m.head.blocked, nozzle); }, fmt::format("cannot fire nozzle {},", nozzle));
+  }
+  // 600 counts a second of a strip of 600 an inch are 25.4 mm/s.
+  for (const double speed : {1.0, 25.0, 50.5, 249.99}) {
+    refused([&](Machine& m) { m.motion.scan_speed_mm_s = speed; }, "motion.scan_speed_mm_s");
+  }
+  refused([](Machine& m) { m.motion.encoder_dpi = 1200, m.motion.scan_speed_mm_s = 12; }, "give 13 or a higher whole number");
   refused([](Machine& m) { m.bed.size_mm = {170, 100}; }, "bed.size_mm");
   refused([](Machine& m) { m.motion.encoder_dpi = 300; }, "motion.encoder_dpi");
   refused([](Machine& m) { m.motion.encoder_dpi = 650; }, "motion.encoder_dpi");

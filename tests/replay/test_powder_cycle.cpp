@@ -14,7 +14,9 @@ struct CycleBench {
   printed_parts::Program program;
 
   explicit CycleBench(const std::string& machine)
-      : resolved(printed_parts::shipped(machine, [](Machine& m) { m.bed.size_mm = {12, 12}; })) {
+      : resolved(printed_parts::shipped(machine, [](Machine& m) {
+          m.bed.size_mm = {12, 12};
+        })) {
     const PixelGrid& grid = resolved.grid.image;
     image = program::testing::runs_of(program::testing::Image(grid.rows(), std::vector<int>(grid.columns(), 1)));
     program = printed_parts::program_of(resolved, image);

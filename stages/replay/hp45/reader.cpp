@@ -16,6 +16,11 @@ namespace {
 
 constexpr double kFarthestMm = 5000;  // that a head may stand from zero
 constexpr double kBurstsPerInch = 600;
+// PositionUpdate measures the speed every 50 counts (POSITION_STEP_COUNT); 100 ms behind the last measure it is 0
+// (POSITION_STEP_TIMEOUT), and bursts need one. It is held in whole mm/s.
+constexpr double kLeastCountsPerSecond = 500;
+// Of the profile: DMAPrint.cpp gives them another one's address and primitive, so that their drops fall on its line.
+constexpr std::uint32_t kMisplaced[] = {0, 129, 263};
 
 class Hp45Reader {
  public:
@@ -46,6 +51,7 @@ class Hp45Reader {
   void take_burst();
   void take_firing(const hp45::Controller::Firing& firing);
   void end_stretch(std::uint32_t row);
+  bool keeps_speed();
   void drop(bool sweeping, bool upwards);
   std::uint64_t drops() const;
   double step_of(double um) const { return (um / 1000 - printing_.position_of(0)) / (grows_ ? step_um_ : -step_um_) * 1000; }
@@ -154,6 +160,7 @@ void Hp45Reader::move(const GcodeLine& line) {
     printing_.begin_sweep(sweep_++, !upwards);
     if (axes_.at(scan_.across) != beside) return reader_.fault("moves across while it fires");
     printing_.go_across(axes_.at(scan_.across));
+    if (!keeps_speed()) return;
   }
   for (auto& shots : shots_) shots.clear();
   hurried_ = 0;
@@ -162,6 +169,20 @@ void Hp45Reader::move(const GcodeLine& line) {
   end_stretch(1);
   drop(sweeping, upwards);
   lines_ = 0;
+}
+
+// Whether the firmware knows the sweep's speed all the way.
+bool Hp45Reader::keeps_speed() {
+  const double speed = axes_.speed_mm_s(), counts = speed / 25.4 * controller_.counts_per_inch();
+  if (std::abs(speed - std::round(speed)) > 1e-3) {
+    reader_.fault(fmt::format("sweeps at {:g} mm/s, which the controller cuts to whole mm/s", speed));
+  } else if (counts < kLeastCountsPerSecond) {
+    reader_.fault(fmt::format("sweeps at {:g} mm/s, {:.0f} counts a second: below {:.0f} the controller takes the head to rest",
+                              speed, counts, kLeastCountsPerSecond));
+  } else {
+    return true;
+  }
+  return false;
 }
 
 // The steps whose places a row passes, once each.
@@ -183,7 +204,10 @@ void Hp45Reader::take_firing(const hp45::Controller::Firing& firing) {
   for (std::int64_t k = 0; k < end - first; ++k, ++now.steps) {
     const std::int64_t step = upwards ? first + k : end - 1 - k;
     Shot shot{step, {}};
-    if (repeat_ == 1) shot.words = *firing.burst;
+    if (repeat_ == 1) {
+      shot.words = *firing.burst;
+      for (const std::uint32_t nozzle : kMisplaced) shot.words[nozzle / 64] &= ~(std::uint64_t{1} << (63 - nozzle % 64));
+    }
     for (std::uint32_t place = 0; repeat_ > 1 && place < printing_.nozzles() * repeat_; ++place) {
       const std::uint32_t nozzle = place / repeat_;
       shot.words[nozzle / 64] |= ((*firing.burst)[place / 64] >> (63 - place % 64) & 1) << (63 - nozzle % 64);

@@ -15,10 +15,13 @@ constexpr double kDpi = 600;                // of the cartridge's nozzles, and o
 constexpr std::uint32_t kNozzles = 300;     // of the cartridge
 constexpr double kHalfRowGapUm = 2025;      // from the centre to either row (Position.ino: ROW_GAP)
 constexpr std::uint32_t kSpeedCounts = 50;  // of the encoder that one measure of speed takes; the first after rest is wrong
-constexpr std::uint32_t kLines = 3950;      // the host stops at 50 free lines of 4000
+// Position.ino forgets the speed 100 ms after its last measure, of 50 counts: nothing fires below 500 counts a second.
+constexpr double kLeastCountsPerSecond = 600;
+constexpr std::uint32_t kLines = 3950;  // the host stops at 50 free lines of 4000
 
-// Of the profile: the firmware's tables (DMAPrint.cpp) give them the address and primitive of another one.
-constexpr std::uint32_t kWithoutChannel[] = {6, 56, 115, 127, 167, 256, 291};
+// Of the profile: the firmware's tables (DMAPrint.cpp) give them the address and primitive of another one. Seven never fire;
+// drops of 0, 129 and 263 fall on lines of others.
+constexpr std::uint32_t kWithoutChannel[] = {0, 6, 56, 115, 127, 129, 167, 256, 263, 291};
 
 /// A whole number in base 64, the highest digit first, a minus before it if it is negative.
 std::string number(std::int64_t value) {
@@ -73,7 +76,7 @@ Status check(const Machine& machine, const HeadGrid& grid) {
     if (repeat_of(machine) > 1 || nozzle >= grid.nozzles || std::ranges::binary_search(grid.blocked, nozzle)) continue;
     return wrong("head.blocked",
                  fmt::format("the HP45 controller cannot fire nozzle {}, its tables give it another one's channel; "
-                             "name 6, 56, 115, 127, 167, 256, 291 as far as the head has them",
+                             "name 0, 6, 56, 115, 127, 129, 167, 256, 263, 291 as far as the head has them",
                              nozzle));
   }
   if (grid.steps_per_pixel != 1) return wrong("motion.lag_unit", "the HP45 controller fires by pixels; give pixel");
@@ -86,6 +89,14 @@ Status check(const Machine& machine, const HeadGrid& grid) {
         "motion.encoder_dpi",
         fmt::format("{:g} counts an inch do not tell pixels of {:.2f} um apart; give whole counts, one or more a pixel", counts,
                     pixel_um));
+  }
+  const double speed = machine.motion.scan_speed_mm_s,
+               least = kLeastCountsPerSecond * kUmPerInch / 1000 / encoder_counts(machine, pixel_um);
+  if (speed < least || !whole(speed)) {
+    return wrong("motion.scan_speed_mm_s",
+                 fmt::format("{:g} mm/s; the HP45 controller takes speeds in whole mm/s and forgets those below {:.0f} with "
+                             "this encoder, where nothing fires; give {:.0f} or a higher whole number",
+                             speed, least, std::ceil(std::max(speed, least))));
   }
   return {};
 }

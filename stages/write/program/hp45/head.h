@@ -7,7 +7,8 @@
 namespace lamina::write::hp45 {
 
 /// Whether the controller can jet the machine's images.
-/// errors  kUsage: rows of its own, lags in ticks, more steps than its buffer holds, an encoder too coarse for its pixels
+/// errors  kUsage: rows of its own, lags in ticks, more steps than its buffer holds, an encoder too coarse for its pixels,
+///         nozzles without a channel of their own, a scan speed that it cannot tell
 Status check(const Machine& machine, const HeadGrid& grid);
 
 /// Spells what the controller needs; the motion between is G-code.
