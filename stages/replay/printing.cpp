@@ -186,6 +186,18 @@ void Printing::roller_stands_at(double mm) {
   roller_mm_ = mm;
 }
 
+void Printing::spreads(double build_mm, double fed_mm, double clearance_mm) {
+  const auto& powder = profile().powder;
+  const double build = build_mm * powder.build_sign, top = mm(std::int64_t{layer_.bottom} + layer_.thickness) - clearance_mm;
+  const double fed = powder.dose * mm(layer_.thickness) + clearance_mm;
+  if (!spread_wrong_.empty()) return;
+  if (std::abs(build - top) > 1e-3) {
+    spread_wrong_ = fmt::format("powder is spread with the build vat at {:g} mm where {:g} have to be", build, top);
+  } else if (std::abs(fed_mm - fed) > 1e-3) {
+    spread_wrong_ = fmt::format("powder is spread with {:g} mm fed where {:g} have to be", fed_mm, fed);
+  }
+}
+
 void Printing::check_cycle() {
   const auto& powder = profile().powder;
   const Layer& layer = layer_;
@@ -197,6 +209,7 @@ void Printing::check_cycle() {
   if (lowered_mm_) count.build_mm = mm(layer.bottom) + *lowered_mm_;
   if (profile().dialect == "raw" || profile().dialect == "planes") return;  // the head alone
   if (!count.moves) return wrong("the build vat does not move");
+  if (!spread_wrong_.empty()) return wrong(spread_wrong_);
   // Numbers are written to a tenth of a micrometre.
   if (const double top = mm(std::int64_t{layer.bottom} + layer.thickness); std::abs(count.build_mm - top) > 1e-3) {
     wrong(fmt::format("the build vat stands at {:g} mm where {:g} have to", count.build_mm, top));

@@ -71,6 +71,9 @@ class Printing {
   /// The same, where a program tells but how far from where the layer before left it.
   void build_vat_goes_down(double mm);
   void roller_stands_at(double mm);
+  /// Powder is spread now: the build vat stands where it is told, vats have fed so much, and the spreader goes so far above
+  /// both.
+  void spreads(double build_mm, double fed_mm, double clearance_mm);
   void takes(double seconds) { seconds_ += seconds; }
 
   /// Checks the powder cycle of the layer, and that it leaves the machine as the next one expects it; called at the end.
@@ -110,7 +113,8 @@ class Printing {
   bool backward_ = false, sweeping_ = false, stepped_ = false, fired_here_ = false;
   std::vector<std::uint64_t> fired_;  // one bit per pixel, the leftmost in bit 0
   std::vector<Sweep> sweeps_;
-  std::string fault_;  // the first one
+  std::string fault_;         // the first one
+  std::string spread_wrong_;  // the first fault of spreading; only check_cycle knows the layer's heights for true
 };
 
 }  // namespace lamina::replay

@@ -323,6 +323,17 @@ TEST(Hp45, PlantedFaultsAreFound) {
       {"a sweep in parts of mm/s", [&](Lines& l) { l[sweep_1].replace(l[sweep_1].find(" F"), 7, " F14990"); }},
       // 20 mm/s are 472 counts a second.
       {"a sweep that the controller takes for rest", [&](Lines& l) { l[sweep_1].replace(l[sweep_1].find(" F"), 7, " F1200"); }},
+      // 25,400 counts an inch and moves of metres would keep verify busy.
+      {"another encoder behind the sweeps", [&](Lines& l) { l.insert(l.end() - 1, "SER GM4"); }},
+      {"the head leaves the machine",
+       [&](Lines& l) {
+         l.insert(l.end() - 3, {"G1 X5000 F15000", "G1 X-5000 F15000"});
+       }},
+      {"the head goes to and fro over lines that are not done",
+       [&](Lines& l) {
+         l.insert(l.end() - 3, {"SBR ///// " + std::string(50, 'A'), "G1 X60 F15000"});
+         for (int i = 0; i < 9; ++i) l.insert(l.end() - 3, i % 2 == 0 ? "G1 X10" : "G1 X60");
+       }},
       {"the sweep ends early", [&](Lines& l) { l[sweep_1] = "G1 X40.0000 F15000"; }},
       {"the head goes over the lines backwards",
        [&](Lines& l) {
@@ -432,6 +443,33 @@ std::string in_base64(std::int64_t value) {
   for (std::int64_t left = std::abs(value); left != 0 || text.empty(); left /= 64)
     text.insert(0, 1, digits[static_cast<std::size_t>(left % 64)]);
   return (value < 0 ? "-" : "") + text;
+}
+
+// Ways of an idle controller are not walked count by count: 4,000 of 2 km, which are 1.9e11 counts. Behind them it fires as
+// behind a short one of the same counts, modulo the 50 that a measure of speed takes.
+TEST(Hp45, LongWaysOfAnIdleControllerChangeNothing) {
+  const auto fired = [](std::int64_t counts, int times) {
+    replay::hp45::Controller controller;
+    std::string seen;
+    const auto watch = [&](const replay::hp45::Controller::Firing& firing) {
+      seen += fmt::format("{} {} {:.3f} {:.3f} {}\n", firing.row, firing.line, firing.from_um, firing.to_um, firing.steady);
+    };
+    for (int i = 0; i < times; ++i) {
+      controller.move(static_cast<double>(counts) * Hp45Stream::kCountUm, watch);
+      controller.move(0, watch);
+    }
+    EXPECT_EQ(controller.execute("SER", "JY"), "");
+    EXPECT_EQ(controller.execute("SEP", "A"), "");
+    for (const char* line : {"B9A ", "D6A ", "F3A "}) {
+      const char nozzles = line[0] == 'D' ? 'B' : 'A';
+      EXPECT_EQ(controller.execute("SBR", line + std::string(50, nozzles)), "");
+    }
+    controller.move(60'000, watch);
+    return seen;
+  };
+  const std::string once = fired(150, 1);
+  EXPECT_NE(once, "");
+  EXPECT_EQ(fired(150 + 47'000'000, 2'000), once);
 }
 
 // Lines in any order, rewinds, clearings and movements to and fro: what no host sends either.

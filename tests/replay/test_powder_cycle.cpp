@@ -50,7 +50,7 @@ TEST(PowderCycle, LayerThatGetsNoPowderIsFound) {
     const auto without = [&](const std::string& axes) {
       return bench.fault(bench.edited([&](const std::string& line) {
         const bool moves = line.starts_with("G1 ") && axes.find(line[3]) != std::string::npos;
-        return moves || line == "M4" || line == "M5" ? std::string() : line;
+        return moves ? std::string() : line;
       }));
     };
     const std::string vats = powder.build_axis + powder.feed_axes[0] + powder.feed_axes[1];
@@ -70,6 +70,31 @@ TEST(PowderCycle, FeedingToAHeightAndALayerThatEndsRelativeAreFound) {
     relative.insert(relative.rfind(last), "G91\n");
     EXPECT_NE(bench.fault(relative).find("ends in G91"), std::string::npos) << name << bench.fault(relative);
   }
+}
+
+// SerialGRBL.py, NewLayer: 0.25 mm below the top of a layer from 0.7 to 0.8 mm, and 0.25 mm beside 1.1 layers fed.
+TEST(PowderCycle, WherePistonsStandWhilePowderIsSpreadIsHeld) {
+  const CycleBench bench("oasis");
+  ASSERT_EQ(bench.fault(bench.program.text), "");
+  const auto replaced = [&](const std::string& from, const std::string& to) {
+    std::string text = bench.program.text;
+    const std::size_t at = text.find(from);
+    EXPECT_NE(at, std::string::npos) << from;
+    return at == std::string::npos ? std::string() : bench.fault(text.replace(at, from.size(), to));
+  };
+  EXPECT_NE(replaced("G1 Z0.5500", "G1 Z0.8000").find("spread with the build vat at 0.8 mm where 0.55 have to be"),
+            std::string::npos);
+  // The dose of the whole layer is right, but 0.1 mm of it come behind the spreader.
+  const std::string late = bench.edited([](const std::string& line) {
+    if (line.starts_with("G1 A-1.3600")) return std::string("G1 A-1.2600 F150");
+    return line.starts_with("G1 A-0.7500") ? std::string("G1 A-0.8500 F150") : line;
+  });
+  ASSERT_NE(late, bench.program.text);
+  EXPECT_NE(bench.fault(late).find("spread with 0.26 mm fed where 0.36 have to be"), std::string::npos) << bench.fault(late);
+  EXPECT_NE(replaced("M4\n", "M4\nG1 Z3 F150\nG1 Z0.55 F150\n").find("a piston moves while powder is spread"),
+            std::string::npos);
+  EXPECT_NE(replaced("M4\n", "").find("M5 stops"), std::string::npos);
+  EXPECT_NE(replaced("M5\n", "").find("no powder spread"), std::string::npos);
 }
 
 TEST(PowderCycle, NumbersThatAreNoneAreFound) {

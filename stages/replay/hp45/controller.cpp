@@ -249,11 +249,29 @@ void Controller::fire(double from_um, double to_um, const Watch& watch) const {
   }
 }
 
+bool Controller::idle() const {
+  if (unread() > 0 || !nothing(now_[0]) || !nothing(now_[1])) return false;
+  return std::ranges::all_of(read_, [&](std::int32_t line) { return nothing(burst_[static_cast<std::uint32_t>(line)]); });
+}
+
+// Whole measures of speed of an idle controller change no state but the count of them; the last two, which set direction and
+// history, are walked.
+void Controller::skip(std::int64_t last, int direction) {
+  constexpr std::int64_t kWalked = 2 * kSpeedPulses;
+  const std::int64_t way = direction > 0 ? last - raw_ : raw_ - last;
+  if (way < 2 * kWalked || !idle()) return;
+  const std::int64_t measures = (way - kWalked) / kSpeedPulses;
+  raw_ += static_cast<std::int32_t>(direction * measures * kSpeedPulses);
+  measures_ += static_cast<std::uint32_t>(measures);
+}
+
 // Lines of the encoder's strip are taken to lie half a count beside the place where SEP was given.
 void Controller::move(double to_um, const Watch& watch) {
   const int direction = to_um < at_um_ ? -1 : 1;
   const auto count_at = [&](double um) { return raw_zero_ + std::llround((um - zero_um_) / count_um()); };
   const std::int64_t last = count_at(to_um);
+  update();
+  skip(last, direction);
   for (double from = at_um_;;) {
     update();
     const bool done = direction > 0 ? raw_ >= last : raw_ <= last;

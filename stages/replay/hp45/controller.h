@@ -41,7 +41,7 @@ class Controller {
   };
   using Watch = std::function<void(const Firing&)>;
   /// Moves the centre of the head; rows that fire nothing are left out. The head rests at the end until the firmware knows it.
-  /// cost  O(counts of the encoder)
+  /// cost  O(counts of the encoder), of an idle controller O(1)
   void move(double to_um, const Watch& watch);
 
   bool zeroed() const { return zeroed_; }
@@ -49,6 +49,8 @@ class Controller {
   std::int32_t density() const { return density_; }
   /// Lines that a row has not come to.
   std::int32_t unread() const { return std::max(read_left(0), read_left(1)); }
+  /// Whether nothing can fire until another line comes: every line is read, and the last one is all off.
+  bool idle() const;
   /// Burst and position of the line that came last.
   const Burst& last_burst() const { return burst_[last_]; }
   /// True position along the scan at which a position of the encoder in um stands.
@@ -69,6 +71,7 @@ class Controller {
   bool update_side(std::uint32_t side);
   void update_burst();
   void get_burst();
+  void skip(std::int64_t last, int direction);
   void fire(double from_um, double to_um, const Watch& watch) const;
 
   // Buffer.cpp

@@ -14,7 +14,10 @@
 namespace lamina::replay {
 namespace {
 
-constexpr double kFarthestMm = 5000;  // that a head may stand from zero
+constexpr double kClearanceMm =
+    0.25;                            // SerialGRBL.py, NewLayer: the pistons stand so far nearer to the spreader than layers say
+constexpr double kRoomMm = 100;      // beside the bed, besides ramps
+constexpr int kMostBusyTravels = 8;  // over lines that are not done; hosts have none
 constexpr double kBurstsPerInch = 600;
 // PositionUpdate measures the speed every 50 counts (POSITION_STEP_COUNT); 100 ms behind the last measure it is 0
 // (POSITION_STEP_TIMEOUT), and bursts need one. It is held in whole mm/s.
@@ -48,10 +51,12 @@ class Hp45Reader {
   void move(const GcodeLine& line);
   void spread(const GcodeLine& line);
   bool ready();
+  bool right_encoder();
   void take_burst();
   void take_firing(const hp45::Controller::Firing& firing);
   void end_stretch(std::uint32_t row);
   bool keeps_speed();
+  bool reaches(double mm);
   void drop(bool sweeping, bool upwards);
   std::uint64_t drops() const;
   double step_of(double um) const { return (um / 1000 - printing_.position_of(0)) / (grows_ ? step_um_ : -step_um_) * 1000; }
@@ -61,9 +66,10 @@ class Hp45Reader {
   Axes axes_;
   const ScanAxes scan_;
   hp45::Controller controller_;
-  bool oasis_, grows_ = true, moving_ = false, ended_ = false, spreading_ = false;
+  bool oasis_, grows_ = true, moving_ = false, ended_ = false, spreading_ = false, spread_ = false;
   double step_um_ = 0;
   std::uint32_t repeat_ = 1, words_ = 1, sweep_ = 0, lines_ = 0;
+  int busy_travels_ = 0;
   struct Shot {  // of a row: the profile's nozzles, as Printing::fire_words takes them
     std::int64_t step;
     hp45::Burst words;
@@ -104,10 +110,13 @@ void Hp45Reader::command(const GcodeLine& line) {
   if (line.command == "SBR") {
     ++lines_;
     take_burst();
+  } else if (line.command == "SER") {
+    right_encoder();
   } else if (line.command == "BRL") {
     if (controller_.unread() > 0) {
       return reader_.fault(fmt::format("{} lines are left that the head has not come to", controller_.unread()));
     }
+    if (oasis_ && (spreading_ || !spread_)) return reader_.fault("the layer has no powder spread between M4 and M5");
     axes_.end();
     ended_ = true;
   }
@@ -115,17 +124,23 @@ void Hp45Reader::command(const GcodeLine& line) {
 
 // Whether lines can be fired as the profile has it: where the head stands, how fine the encoder, how many bursts.
 bool Hp45Reader::ready() {
-  const double encoder = printing_.profile().motion.encoder_dpi, counts = controller_.counts_per_inch();
   const double density = 100 * 25'400 / (kBurstsPerInch * step_um_);
   if (!controller_.zeroed()) {
     reader_.fault("lines come before SEP tells where the head stands");
-  } else if (encoder > 0 && counts != encoder) {
-    reader_.fault(fmt::format("SER has {:g} counts an inch, the machine's encoder {:g}", counts, encoder));
+  } else if (!right_encoder()) {
+    return false;
   } else if (controller_.density() != std::max<std::int64_t>(1, std::llround(density))) {
     reader_.fault(fmt::format("SDN has {} %, where {:.0f} give a burst a pixel", controller_.density(), density));
   } else {
     return true;
   }
+  return false;
+}
+
+bool Hp45Reader::right_encoder() {
+  const double encoder = printing_.profile().motion.encoder_dpi, counts = controller_.counts_per_inch();
+  if (encoder <= 0 || counts == encoder) return true;
+  reader_.fault(fmt::format("SER has {:g} counts an inch, the machine's encoder {:g}", counts, encoder));
   return false;
 }
 
@@ -151,10 +166,17 @@ void Hp45Reader::move(const GcodeLine& line) {
     return reader_.fault(fmt::format("'{}' is no command of the dialect {}", line.command, oasis_ ? "oasis" : "hp45"));
   }
   if (line.command != "G0" && line.command != "G1") return;
+  const auto& powder = printing_.profile().powder;
+  if (spreading_ && (line.has(powder.build_axis[0]) || line.has(powder.feed_axes[0][0]))) {
+    return reader_.fault("a piston moves while powder is spread");
+  }
   moving_ = true;
   const double to = axes_.at(scan_.along);
   if (to == from || !printing_.ok()) return;
-  if (std::abs(to) > kFarthestMm) return reader_.fault("moves out of the machine");
+  if (!reaches(to)) return reader_.fault(fmt::format("moves to {:g} mm, out of the machine", to));
+  if (!sweeping && !controller_.idle() && ++busy_travels_ > kMostBusyTravels) {
+    return reader_.fault("travels to and fro over lines that are not done");
+  }
   const bool upwards = (to > from) == grows_;
   if (sweeping) {
     printing_.begin_sweep(sweep_++, !upwards);
@@ -169,6 +191,22 @@ void Hp45Reader::move(const GcodeLine& line) {
   end_stretch(1);
   drop(sweeping, upwards);
   lines_ = 0;
+}
+
+// Along the scan: the bed with ramps and room, where the head waits, and the spreader's ends if the gantry has it.
+bool Hp45Reader::reaches(double mm) {
+  const auto& profile = printing_.profile();
+  const bool x = profile.mounting.scan_axis == ScanAxis::kX;
+  const double begin = profile.mounting.offset_mm[x ? 0 : 1], stand = x ? printing_.standing().x_mm : printing_.standing().y_mm;
+  double low = std::min(begin, stand), high = std::max(begin + profile.bed.size_mm[x ? 0 : 1], stand);
+  if (profile.powder.roller_axis == scan_.along) {
+    low = std::min({low, profile.powder.roller_mm[0], profile.powder.roller_mm[1]});
+    high = std::max({high, profile.powder.roller_mm[0], profile.powder.roller_mm[1]});
+  }
+  // The run-up takes two measures of speed, of 50 counts each.
+  const double row_mm = printing_.nozzles() * profile.head.pitch_um / 1000;  // of a tilted head
+  const double room = kRoomMm + row_mm + profile.motion.ramp_mm + 110 * 25.4 / controller_.counts_per_inch();
+  return mm >= low - room && mm <= high + room;
 }
 
 // Whether the firmware knows the sweep's speed all the way.
@@ -266,8 +304,10 @@ void Hp45Reader::drop(bool sweeping, bool upwards) {
 // The spreader turns on the gantry, which spreads on its way to the far end.
 void Hp45Reader::spread(const GcodeLine& line) {
   const auto& powder = printing_.profile().powder;
+  printing_.spreads(axes_.at(powder.build_axis), printing_.count.fed_mm[0] + printing_.count.fed_mm[1], kClearanceMm);
   if (line.command == "M5") {
     if (!spreading_) return reader_.fault("M5 stops a spreader that does not turn");
+    spread_ = true;
     printing_.roller_stands_at(axes_.at(powder.roller_axis));
     // On the gantry it does not touch the powder on the way back.
     if (powder.roller_axis == scan_.along || powder.roller_axis == scan_.across)
