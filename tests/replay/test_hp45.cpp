@@ -356,6 +356,22 @@ TEST(Hp45, PlantedFaultsAreFound) {
   }
 }
 
+TEST(Hp45, EncoderFarFinerThanPixelsIsFoundWhereTheProfileNamesNone) {
+  Machine machine = shipped_by_name("hp45");
+  machine.bed.size_mm = {20, 10};
+  machine.motion.encoder_dpi = 0;
+  const ResolvedMachine resolved = *resolve_profile(machine);
+  const Runs image = slotted_disc(resolved.grid.image);
+  const LayerProgram program = program_of(resolved, image);
+  const auto sound = verdict(resolved, image, program.text, program.count);
+  ASSERT_TRUE(sound.ok()) << sound.error().message;
+  Lines lines = lines_of(program.text);
+  lines[place_of_line(lines, "SER")] = "SER GM4";  // 25,400
+  const auto printed = verdict(resolved, image, text_of(lines), program.count);
+  ASSERT_FALSE(printed.ok());
+  EXPECT_NE(printed.error().message.find("far more than pixels of 42.3 um need"), std::string::npos) << printed.error().message;
+}
+
 TEST(Hp45, DropsThatFallWhileTheHeadTravelsAreCounted) {
   Machine machine = shipped_by_name("hp45");
   machine.bed.size_mm = {20, 10};

@@ -139,7 +139,12 @@ bool Hp45Reader::ready() {
 
 bool Hp45Reader::right_encoder() {
   const double encoder = printing_.profile().motion.encoder_dpi, counts = controller_.counts_per_inch();
-  if (encoder <= 0 || counts == encoder) return true;
+  if (counts == encoder) return true;
+  if (encoder <= 0) {  // 600, or what pixels need
+    if (counts <= 600 + 2 * 25'400 / step_um_) return true;
+    reader_.fault(fmt::format("SER has {:g} counts an inch, far more than pixels of {:.1f} um need", counts, step_um_));
+    return false;
+  }
   reader_.fault(fmt::format("SER has {:g} counts an inch, the machine's encoder {:g}", counts, encoder));
   return false;
 }
