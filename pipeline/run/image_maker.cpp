@@ -196,7 +196,7 @@ void ImageMaker::tell(Summary& summary) const {
     facts["porosity"] = porosity;
   }
   if (plan_.images->machine) {
-    facts["print_seconds"] = print_seconds;
+    if (timed_) facts["print_seconds"] = print_seconds;
     facts["moved_pixels"] = moved_pixels_;
     facts["lost_pixels"] = lost_pixels_;
   }

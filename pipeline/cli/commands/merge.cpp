@@ -46,14 +46,11 @@ Outcome run_merge(const Arguments& arguments, Context& context) {
     for (const Warning& warning : report->warnings) context.say("warning: " + one_line(warning.text));
   }
   if (!arguments.has("--json")) return {};
-  return context.give({{"command", "merge"},
-                       {"directory", report->output},
-                       {"shards", report->shards},
-                       {"layers", report->layers},
-                       {"linked", report->linked},
-                       {"copied", report->copied},
-                       {"print_seconds", 1e-6 * static_cast<double>(report->microseconds)},
-                       {"warnings", warnings_json(report->warnings)}});
+  Json told = {{"command", "merge"},       {"directory", report->output}, {"shards", report->shards},
+               {"layers", report->layers}, {"linked", report->linked},    {"copied", report->copied}};
+  if (report->microseconds > 0) told["print_seconds"] = 1e-6 * static_cast<double>(report->microseconds);
+  told["warnings"] = warnings_json(report->warnings);
+  return context.give(told);
 }
 
 }  // namespace
