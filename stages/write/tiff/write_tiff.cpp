@@ -10,6 +10,7 @@
 #include "stages/geometry/bits.h"
 #include "stages/write/decimal.h"
 #include "stages/write/g4/encode.h"
+#include "stages/write/tiff/ending.h"
 #include "stages/write/tiff/memory_file.h"
 #include "stages/write/tiff/tiff.h"
 
@@ -73,6 +74,7 @@ class TiffEncoder : public ImageEncoder {
   }
 
  protected:
+  bool tagged() const { return pages_ != 0; }
   void set_layer_tags(TIFF* tiff) const {
     if (pages_ == 0) return;
     TIFFSetField(tiff, TIFFTAG_IMAGEDESCRIPTION, text_);
@@ -105,6 +107,8 @@ class G4Encoder : public TiffEncoder {
     file.resize(file.capacity());
     const std::size_t end = encoder_.encode(runs, file, kHeaderBytes);
     if (end > kMostClassicBytes - kDirectoryBytes) return cannot_hold(runs, "the file would exceed 4 GiB");
+    const Ending::Image image{runs.columns, runs.rows(), dpi_x, dpi_y, end - kHeaderBytes > UINT16_MAX};
+    if (!tagged() && ending_.put(image, end, file)) return {};
     if (file.size() < end + kDirectoryBytes) file.resize(end + kDirectoryBytes);
 
     MemoryFile memory{file};
@@ -115,11 +119,14 @@ class G4Encoder : public TiffEncoder {
     set_layer_tags(tiff.get());
     const auto length = static_cast<tmsize_t>(end - kHeaderBytes);
     const bool written = TIFFWriteRawStrip(tiff.get(), 0, file.data() + kHeaderBytes, length) == length;
-    return finish(std::move(tiff), written, memory, runs, message);
+    Status status = finish(std::move(tiff), written, memory, runs, message);
+    if (status && !tagged()) ending_.take(image, file, end);
+    return status;
   }
 
  private:
   g4::Encoder encoder_;
+  Ending ending_;  // of the layer before
 };
 
 class StripEncoder : public TiffEncoder {
