@@ -21,6 +21,7 @@
 #include "stages/write/program/dialect.h"
 #include "tests/program/machines.h"
 #include "tests/replay/hp45_port.h"
+#include "tests/replay/printed_parts.h"
 
 namespace lamina::pipeline {
 namespace {
@@ -34,30 +35,8 @@ Machine shipped_by_name(std::string_view name) {
   throw std::logic_error("no such machine");
 }
 
-struct LayerProgram {
-  std::string text;
-  ProgramCount count;
-};
-
-LayerProgram program_of(const ResolvedMachine& resolved, const RunsView& image) {
-  const auto writer = write::find_dialect(resolved.machine.dialect)->make_writer(resolved.machine, resolved.grid);
-  LayerCycle cycle;
-  cycle.layer = 7;
-  cycle.layers = 9;
-  cycle.bottom_nm = 700'000;
-  cycle.thickness_nm = 100'000;
-  write::ProgramBytes bytes;
-  writer->begin_layer(cycle, bytes);
-  program::CompileScratch scratch;
-  const auto count =
-      program::compile(resolved.grid, image, scratch, [&](const Sweep& sweep, const SweepVectors& vectors) -> Status {
-        writer->sweep(sweep, vectors, bytes);
-        return {};
-      });
-  EXPECT_TRUE(count.ok());
-  writer->end_layer(cycle, bytes);
-  return {std::string(reinterpret_cast<const char*>(bytes.data()), bytes.size()), *count};
-}
+using LayerProgram = printed_parts::Program;
+using printed_parts::program_of;
 
 Result<replay::Count> verdict(const ResolvedMachine& resolved, const RunsView& image, const std::string& text,
                               const ProgramCount& count) {

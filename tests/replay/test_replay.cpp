@@ -16,6 +16,7 @@
 #include "stages/raster/raster.h"
 #include "stages/write/program/dialect.h"
 #include "tests/program/machines.h"
+#include "tests/replay/printed_parts.h"
 
 namespace lamina::pipeline {
 namespace {
@@ -25,38 +26,7 @@ using program::testing::Random;
 using program::testing::random_image;
 using program::testing::runs_of;
 
-struct Written {
-  std::string text;
-  ProgramCount count;
-};
-
-Written write_layer(const ResolvedMachine& resolved, const RunsView& image) {
-  const write::Dialect* dialect = write::find_dialect(resolved.machine.dialect);
-  const auto writer = dialect->make_writer(resolved.machine, resolved.grid);
-  LayerCycle cycle;
-  cycle.layer = 7;
-  cycle.layers = 9;
-  cycle.bottom_nm = 700'000;
-  cycle.thickness_nm = 100'000;
-  write::ProgramBytes bytes;
-  writer->begin_layer(cycle, bytes);
-  program::CompileScratch scratch;
-  const auto count =
-      program::compile(resolved.grid, image, scratch, [&](const Sweep& sweep, const SweepVectors& vectors) -> Status {
-        writer->sweep(sweep, vectors, bytes);
-        return {};
-      });
-  EXPECT_TRUE(count.ok());
-  writer->end_layer(cycle, bytes);
-  return {std::string(reinterpret_cast<const char*>(bytes.data()), bytes.size()), *count};
-}
-
-Result<replay::Count> replay(const ResolvedMachine& resolved, const RunsView& image, const Written& program) {
-  const auto machine =
-      replay::VirtualMachine::build(resolved.machine, resolved.grid.image.columns(), resolved.grid.image.rows());
-  if (!machine) return machine.error();
-  return machine->replay(program.text, {7, 700'000, 100'000}, image, program.count.moved, program.count.lost);
-}
+using Written = printed_parts::Program;
 
 /// The machine with a bed of so many of its own pixels.
 ResolvedMachine shrunk(Machine machine, double columns, double rows) {
@@ -77,8 +47,8 @@ TEST(Replay, PrintsTheImageBitForBitOnEveryShippedProfile) {
       const ResolvedMachine resolved = shrunk(*machine, 130 + random() % 200, 130 + random() % 200);
       const Image image = random_image(random, resolved.grid.image.columns(), resolved.grid.image.rows());
       const Runs runs = runs_of(image);
-      const Written program = write_layer(resolved, runs);
-      const auto printed = replay(resolved, runs, program);
+      const Written program = printed_parts::program_of(resolved, runs);
+      const auto printed = printed_parts::verified(resolved, runs, program);
       ASSERT_TRUE(printed.ok()) << shipped.name << ": " << printed.error().message;
       EXPECT_EQ(printed->drops, set_pixels(runs));
       EXPECT_EQ(printed->vectors, program.count.vectors) << shipped.name;
@@ -167,8 +137,8 @@ TEST(Replay, EveryClosedModelIsPrintedBitForBitOnEveryShippedProfile) {
       for (const double share : {0.07, 0.46, 0.83}) {
         const auto plane = static_cast<Nm>(static_cast<double>(standing.bounds.height()) * share);
         rasterizer->layer(raster::Engine::kContours, plane, scratch, runs);
-        const Written program = write_layer(resolved, runs);
-        const auto printed = replay(resolved, runs, program);
+        const Written program = printed_parts::program_of(resolved, runs);
+        const auto printed = printed_parts::verified(resolved, runs, program);
         ASSERT_TRUE(printed.ok()) << resolved.machine.name << " " << files[file] << ": " << printed.error().message;
         EXPECT_EQ(printed->drops, set_pixels(runs)) << files[file];
         layers += printed->drops > 0;
@@ -204,8 +174,8 @@ TEST(Replay, EveryDialectSpeaksForAnyMountingDirectionAndBlockedNozzle) {
     const ResolvedMachine resolved = shrunk(machine, 60 + random() % 100, 60 + random() % 100);
     const Image image = random_image(random, resolved.grid.image.columns(), resolved.grid.image.rows());
     const Runs runs = runs_of(image);
-    const Written program = write_layer(resolved, runs);
-    const auto printed = replay(resolved, runs, program);
+    const Written program = printed_parts::program_of(resolved, runs);
+    const auto printed = printed_parts::verified(resolved, runs, program);
     ASSERT_TRUE(printed.ok()) << dialect.id << " seed " << seed << ": " << printed.error().message;
     EXPECT_EQ(printed->drops, set_pixels(runs) - program.count.lost);
   }
@@ -239,11 +209,11 @@ TEST(Replay, ATruncatedOrEditedProgramFailsWithTheLayerTheSwathAndTheStep) {
       for (std::size_t c = 5; c + 5 < row.size(); ++c) row[c] = random() % 2;
     }
     const Runs runs = runs_of(image);
-    const Written program = write_layer(resolved, runs);
-    ASSERT_TRUE(replay(resolved, runs, program).ok());
+    const Written program = printed_parts::program_of(resolved, runs);
+    ASSERT_TRUE(printed_parts::verified(resolved, runs, program).ok());
     std::size_t before_all = 0, cuts = 0;
     for (std::size_t length = 0; length < program.text.size(); length += 1 + program.text.size() / 97, ++cuts) {
-      const auto printed = replay(resolved, runs, {program.text.substr(0, length), program.count});
+      const auto printed = printed_parts::verified(resolved, runs, {program.text.substr(0, length), program.count});
       ASSERT_FALSE(printed.ok()) << name << " cut to " << length;
       EXPECT_EQ(printed.error().fault, Fault::kVerification);
       EXPECT_TRUE(tells_the_place(printed.error().message)) << name << ": " << printed.error().message;
@@ -253,7 +223,7 @@ TEST(Replay, ATruncatedOrEditedProgramFailsWithTheLayerTheSwathAndTheStep) {
     // A pixel that the program does not know of: the place where it should have fired.
     Image other = image;
     other[20][40] ^= 1;
-    const auto printed = replay(resolved, runs_of(other), program);
+    const auto printed = printed_parts::verified(resolved, runs_of(other), program);
     ASSERT_FALSE(printed.ok());
     EXPECT_TRUE(tells_the_place(printed.error().message)) << printed.error().message;
     EXPECT_NE(printed.error().message.find("column 40, row 20"), std::string::npos) << name << ": " << printed.error().message;
@@ -266,7 +236,7 @@ TEST(Replay, ATruncatedOrEditedProgramFailsWithTheLayerTheSwathAndTheStep) {
     for (std::size_t at = program.text.size() / 4; at < program.text.size() * 3 / 4; at += stride, ++tried) {
       Written edited = program;
       edited.text[at] = static_cast<char>(edited.text[at] ^ 1);
-      const auto replayed = replay(resolved, runs, edited);
+      const auto replayed = printed_parts::verified(resolved, runs, edited);
       unnoticed += replayed.ok();
       if (!replayed.ok()) {
         EXPECT_TRUE(tells_the_place(replayed.error().message)) << name << " byte " << at << ": " << replayed.error().message;
