@@ -19,7 +19,8 @@ struct Job {
 constexpr Job kJobs[] = {
     {"terrain", "terrain.stl", 100'000'000, 100'000},     {"benchy", "benchy15.stl", 100'000'000, 100'000},
     {"crowns-20", "crowns96.stl", 400'000'000, 480'000},  {"crowns-96", "crowns96.stl", 400'000'000, 100'000},
-    {"benchies", "benchies72.stl", 400'000'000, 100'000},
+    {"benchies", "benchies72.stl", 400'000'000, 100'000}, {"knot800k", "knot800k.stl", 100'000'000, 50'000},
+    {"scan680k", "scan680k.stl", 100'000'000, 100'000},
 };
 
 /// Two passes over all changes of colour of all layers, as memory holds them: one writes them, one reads them.

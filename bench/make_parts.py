@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Makes the parts of scripts/bench from the models folder. Python's standard library only; the same bytes every time.
 
-    bench/make_parts.py MODELS CACHE [--large]
+    bench/make_parts.py MODELS CACHE [--made] [--large]
 
 A part that is in the cache already is not made again. Every part is a closed mesh in an uncompressed binary STL, where it
 shall stand on the bed; parts.json says where that is, in nanometres:
@@ -12,13 +12,17 @@ shall stand on the bed; parts.json says where that is, in nanometres:
     crown.stl         a dental crown made 27.8 x 29.6 x 9.6 mm: 3,878 triangles, 96 layers of 0.1 mm, 20 of 0.48 mm
     gyroid.stl        a gyroid sheet of 24 mm: 246,820 triangles, for the runs that measure memory
     crowns96.stl      96 of them in one mesh, 12 x 8 on 400 x 400 mm
+    knot800k.stl      a torus knot by formula: 800,000 triangles, 472 layers of 0.05 mm (--knot, --large)
+    scan680k.stl      a bumpy ball of 42 mm whose 683,280 triangles lie in disorder: 425 layers of 0.1 mm (--made)
     benchies72.stl    72 Benchies in one mesh, 6 x 12 on 400 x 400 mm: 811 MB, 480 layers of 0.1 mm (--large)
 """
 import argparse
 import array
 import gzip
 import json
+import math
 import os
+import random
 import struct
 import sys
 import zipfile
@@ -117,11 +121,66 @@ def grid(axes, columns, rows, side):
             for row in range(rows) for column in range(columns)]
 
 
+def torus_knot(around, along, p=2, q=3):
+    """A tube along a (p, q) torus knot, 2 x around x along facets: its middle winds p times about z and q times about the
+    middle of the torus."""
+    def point(s):
+        angle, radius = 2 * math.pi * s, 15 + 7 * math.cos(q * 2 * math.pi * s)
+        return radius * math.cos(p * angle), radius * math.sin(p * angle), 7 * math.sin(q * angle)
+
+    def crossed(a, b):
+        return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+
+    def unit(a):
+        length = math.sqrt(sum(v * v for v in a))
+        return tuple(v / length for v in a)
+
+    rings = []
+    for i in range(along):
+        middle, ahead, behind = point(i / along), point((i + 1) / along), point((i - 1) / along)
+        forward = unit([a - b for a, b in zip(ahead, behind)])
+        side = unit(crossed(forward, (middle[0], middle[1], 0)))
+        other = crossed(side, forward)
+        rings.append([[m + 4.8 * (math.cos(t) * u + math.sin(t) * v) for m, u, v in zip(middle, side, other)]
+                      for t in (2 * math.pi * j / around for j in range(around))])
+    axes = [array.array("d") for _ in range(3)]
+    for i in range(along):
+        here, there = rings[i], rings[(i + 1) % along]
+        for j in range(around):
+            k = (j + 1) % around
+            for corner in (here[j], there[k], here[k], here[j], there[j], there[k]):
+                for axis in range(3):
+                    axes[axis].append(corner[axis])
+    return axes
+
+
+def bumpy_ball(across):
+    """As a scanner leaves a surface: fine waves, and facets in no order."""
+    def point(i, j):
+        a, b = math.pi * (i + 0.5) / (across + 1), 2 * math.pi * j / across
+        radius = (20 + 1.5 * math.sin(5 * a) * math.sin(7 * b) + 0.4 * math.sin(31 * a + 3) * math.sin(29 * b)
+                  + 0.05 * math.sin(173 * a) * math.sin(191 * b))
+        return radius * math.sin(a) * math.cos(b), radius * math.sin(a) * math.sin(b), radius * math.cos(a)
+
+    rings = [[point(i, j) for j in range(across)] for i in range(across + 1)]
+    facets = []
+    for here, there in zip(rings, rings[1:]):
+        for j in range(across):
+            k = (j + 1) % across
+            facets += [(here[j], there[j], there[k]), (here[j], there[k], here[k])]
+    for ring in (rings[0], rings[-1][::-1]):
+        middle = tuple(sum(point[axis] for point in ring) / across for axis in range(3))
+        facets += [(middle, ring[j], ring[(j + 1) % across]) for j in range(across)]
+    random.Random(1).shuffle(facets)
+    return [array.array("d", [corner[axis] for facet in facets for corner in facet]) for axis in range(3)]
+
+
 def main():
     parser = argparse.ArgumentParser()
     parser.add_argument("models")
     parser.add_argument("cache")
     parser.add_argument("--large", action="store_true")
+    parser.add_argument("--made", action="store_true")
     options = parser.parse_args()
     os.makedirs(options.cache, exist_ok=True)
     index = os.path.join(options.cache, "parts.json")
@@ -175,6 +234,9 @@ def main():
     make("crown.stl", lambda: one(crown()))
     make("gyroid.stl", lambda: one(placed(model("gyroid_sheet_cyl_247k.stl.gz"), (1, 1, 1)), 30.0))
     make("crowns96.stl", lambda: many(crown(), 12, 8))
+    if options.made:
+        make("knot800k.stl", lambda: one(placed(torus_knot(200, 2000), (1, 1, 1))))
+        make("scan680k.stl", lambda: one(placed(bumpy_ball(584), (1, 1, 1))))
     if options.large:
         make("benchies72.stl", lambda: many(benchy(1.0), 6, 12))
 

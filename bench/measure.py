@@ -43,6 +43,23 @@ def measured(command, log):
     return {"wall": wall, "processor": own, "peak_mib": int(peak) / 1024, "others": others}
 
 
+# A small interpreter of its own: the peak of a process counts that of the one it was started from.
+STARTER = """import posix, sys, time
+null = [(posix.POSIX_SPAWN_OPEN, fd, "/dev/null", posix.O_RDWR, 0) for fd in (0, 1)]
+start = time.perf_counter()
+_, status, usage = posix.wait4(posix.posix_spawn(sys.argv[1], sys.argv[1:], posix.environ, file_actions=null), 0)
+print(time.perf_counter() - start, usage.ru_utime + usage.ru_stime, usage.ru_maxrss, posix.waitstatus_to_exitcode(status))"""
+
+
+def started(command):
+    """Runs a program: wall seconds, processor seconds, peak resident bytes. Any failure ends the benchmark."""
+    done = subprocess.run([sys.executable, "-I", "-S", "-c", STARTER] + command, check=True, stdout=subprocess.PIPE)
+    wall, processor, peak, code = map(float, done.stdout.split())
+    if code != 0:
+        sys.exit(f"bench: exit code {code:.0f} of: {' '.join(command)}")
+    return wall, processor, peak * 1024
+
+
 def median_of(runs):
     walls = [run["wall"] for run in runs]
     return {"wall": statistics.median(walls), "fastest": min(walls), "slowest": max(walls),
