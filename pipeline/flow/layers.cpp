@@ -10,6 +10,7 @@
 #include <set>
 
 #include "pipeline/flow/budget.h"
+#include "stages/data/handles/clocks.h"
 
 namespace lamina::pipeline {
 namespace {
@@ -32,7 +33,8 @@ class LayerFlow {
         budget_(limits.budget_bytes, limits.most_in_flight, {steps.bytes_held, steps.let_go}),
         moving_(limits.record_slots),
         ready_(steps.steps.size()),
-        step_ns_(steps.steps.size() + 1) {
+        step_ns_(steps.steps.size() + 1),
+        step_processor_ns_(steps.steps.size() + 1) {
     for (std::size_t s = 0; s < steps.steps.size(); ++s) {
       nodes_.push_back(std::make_unique<Node>(
           graph_, flow::unlimited, [this, s](const flow::continue_msg&) { return take_turn(s); },
@@ -51,10 +53,11 @@ class LayerFlow {
   }
 
   FlowReport report() const {
-    FlowReport report{budget_.most_in_flight(), budget_.most_bytes(), oversized_, {}};
+    FlowReport report{budget_.most_in_flight(), budget_.most_bytes(), oversized_, {}, {}, static_cast<double>(lock_ns_) * 1e-9};
     for (std::size_t s = 0; s < step_ns_.size(); ++s) {
       const bool is_record = s == steps_.steps.size();
       report.step_seconds.emplace_back(is_record ? "record" : steps_.steps[s].name, static_cast<double>(step_ns_[s]) * 1e-9);
+      report.step_processor_seconds.push_back(static_cast<double>(step_processor_ns_[s]) * 1e-9);
     }
     return report;
   }
@@ -146,10 +149,20 @@ class LayerFlow {
 
   std::uint64_t held_now(const Moving& moving) const { return steps_.bytes_held(moving.ticket.work); }
 
+  /// Takes the lock, and counts the time until it has it.
+  std::unique_lock<std::mutex> lock() {
+    std::unique_lock held(mutex_, std::try_to_lock);
+    if (held) return held;
+    const auto start = Clock::now();
+    held.lock();
+    lock_ns_ += std::chrono::duration_cast<std::chrono::nanoseconds>(Clock::now() - start).count();
+    return held;
+  }
+
   flow::continue_msg take_turn(std::size_t s) {
     Moving* moving = nullptr;
     {
-      const std::lock_guard lock(mutex_);
+      const auto held = lock();
       moving = &at(*ready_[s].begin());
       ready_[s].erase(ready_[s].begin());
       // What cannot be recorded any more is not made.
@@ -157,26 +170,26 @@ class LayerFlow {
     }
     const Step& step = steps_.steps[s];
     if (moving->status && given_up()) moving->status = Error{Fault::kInterrupted, "interrupted"};
-    const auto start = Clock::now();
+    const Turn turn;
     if (step.needs && !moving->asked) {
       if (moving->status) ask(step, *moving);
       moving->asked = true;
-      count_time(moving->step, start);
-      const std::lock_guard lock(mutex_);
+      count_time(moving->step, turn);
+      const auto held = lock();
       go_on(*moving);
       return {};
     }
     if (moving->status) moving->status = guarded([&] { return step.run(moving->ticket); });
-    count_time(moving->step, start);
+    count_time(moving->step, turn);
     moving->held = std::max(moving->held, held_now(*moving));
-    std::unique_lock lock(mutex_);
+    std::unique_lock held = lock();
     if (moving->status && ++moving->step < steps_.steps.size()) {
       moving->asked = false;
       go_on(*moving);
       return {};
     }
     leave(*moving);
-    record(lock);
+    record(held);
     wake();
     admit();
     return {};
@@ -193,19 +206,19 @@ class LayerFlow {
   }
 
   /// Records all finished layers that are next; one thread at a time. The lock is released while it records.
-  void record(std::unique_lock<std::mutex>& lock) {
+  void record(std::unique_lock<std::mutex>& held) {
     if (recording_) return;
     recording_ = true;
     while (recorded_ < next_ && at(recorded_).finished) {
       Moving& moving = at(recorded_);
-      lock.unlock();
+      held.unlock();
       if (result_) {  // otherwise an earlier layer failed, and this one is not recorded
-        const auto start = Clock::now();
+        const Turn turn;
         result_ = moving.status ? guarded([&] { return steps_.record(moving.ticket); }) : moving.status;
-        count_time(steps_.steps.size(), start);
+        count_time(steps_.steps.size(), turn);
       }
       const std::uint64_t retained = steps_.records_from_work ? held_now(moving) : 0;
-      lock.lock();
+      held = lock();
       if (steps_.records_from_work) budget_.give_back(moving.loan, retained);
       moving.finished = false;
       ++recorded_;
@@ -235,8 +248,14 @@ class LayerFlow {
     return Clock::duration(now - told_at_.load()) > kPatience;
   }
 
-  void count_time(std::size_t step, Clock::time_point start) {
-    step_ns_[step] += std::chrono::duration_cast<std::chrono::nanoseconds>(Clock::now() - start).count();
+  /// A step of one layer, from here on.
+  struct Turn {
+    Clock::time_point start = Clock::now();
+    double processor = thread_seconds();
+  };
+  void count_time(std::size_t step, const Turn& turn) {
+    step_ns_[step] += std::chrono::duration_cast<std::chrono::nanoseconds>(Clock::now() - turn.start).count();
+    step_processor_ns_[step] += static_cast<std::int64_t>(1e9 * (thread_seconds() - turn.processor));
   }
 
   static constexpr std::chrono::milliseconds kPatience{300};
@@ -256,8 +275,9 @@ class LayerFlow {
   bool recording_ = false, stopped_ = false;  // stopped: no further admissions
   bool failed_ = false;                       // an earlier layer is not on record, so no later one can be
 
-  std::vector<std::atomic<std::int64_t>> step_ns_;  // of each step, and of recording
-  Status result_;                                   // of `record`, which runs once at a time
+  std::vector<std::atomic<std::int64_t>> step_ns_, step_processor_ns_;  // of each step, and of recording
+  std::atomic<std::int64_t> lock_ns_{0};
+  Status result_;  // of `record`, which runs once at a time
 
   flow::graph graph_;
   std::vector<std::unique_ptr<Node>> nodes_;  // of each step

@@ -61,6 +61,8 @@ struct FlowReport {
   std::uint64_t most_bytes = 0;                                   // peak of the credits, idle scratch included
   std::uint32_t oversized = 0;                                    // layers that held more than the budget by themselves
   std::vector<std::pair<std::string_view, double>> step_seconds;  // of each step and of "record", over all threads
+  std::vector<double> step_processor_seconds;                     // of the threads that took them
+  double lock_seconds = 0;                                        // waited for the flow's own lock, over all threads
 };
 
 /// Moves layers 0 to count - 1.

@@ -132,6 +132,7 @@ struct Job {
   bool dry_run = false;
   bool strict = false;       // warnings are errors
   bool allow_empty = false;  // a whole job may have nothing
+  bool timing = false;       // tell where the time goes
   bool json = false;
   bool quiet = false;
   std::vector<std::string> notes;  // notes from reading it: old forms and their replacements

@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 
 #include "pipeline/job/heights.h"
@@ -14,6 +13,7 @@
 #include "pipeline/plan/layer_cut.h"
 #include "pipeline/plan/layers.h"
 #include "pipeline/plan/reach.h"
+#include "stages/data/handles/clocks.h"
 #include "stages/data/text/number_text.h"
 #include "stages/data/text/readable.h"
 #include "stages/heights/build_steps.h"
@@ -23,9 +23,6 @@
 
 namespace lamina::pipeline {
 namespace {
-
-using Clock = std::chrono::steady_clock;
-double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
 
 Error usage(std::string what) { return {Fault::kUsage, std::move(what)}; }
 
@@ -95,7 +92,7 @@ class Planner {
   }
 
   Status load() {
-    const auto start = Clock::now();
+    const Stopwatch loading;
     progress_({ProgressEvent::Stage::kLoading});
     auto scene = load_scene(job(), plan_.bed);
     if (!scene) return scene.error();
@@ -103,12 +100,14 @@ class Planner {
     for (const Instance& instance : plan_.scene->instances) {
       plan_.triangles += plan_.scene->meshes[instance.mesh].triangles.size();
     }
-    plan_.load_seconds = seconds_since(start);
+    const Elapsed took = loading.elapsed();
+    plan_.load_seconds = took.wall;
+    plan_.load_processor_seconds = took.processor;
     return {};
   }
 
   Status decide_layers() {
-    index_start_ = Clock::now();
+    indexing_ = Stopwatch();
     progress_({ProgressEvent::Stage::kIndexing});
     if (machine() != nullptr) {
       if (Status status = check_reach(*machine(), *plan_.scene); !status) return status;
@@ -180,6 +179,12 @@ class Planner {
     return {};
   }
 
+  void end_indexing() {
+    const Elapsed took = indexing_.elapsed();
+    plan_.index_seconds = took.wall;
+    plan_.index_processor_seconds = took.processor;
+  }
+
   Status index_sections() {
     if (images() && !beads_) return {};
     Job cut = job();  // the job itself stays as asked, so that a file of it means the same in another command
@@ -190,7 +195,7 @@ class Planner {
     if (plan_.segments) {
       if (Status status = check_thin_stretches(*plan_.segments, *plan_.sections); !status) return status;
     }
-    plan_.index_seconds = seconds_since(index_start_);
+    end_indexing();
     return {};
   }
 
@@ -221,7 +226,7 @@ class Planner {
     plan_.images.emplace(ImagePlan{std::move(printer_.machine), grid, std::move(materials_), std::move(*solids),
                                    DosePlan(job(), grid), std::move(beads),
                                    static_cast<std::uint64_t>(std::min(covered, bed))});
-    plan_.index_seconds = seconds_since(index_start_);
+    end_indexing();
     return {};
   }
 
@@ -257,7 +262,7 @@ class Planner {
   std::vector<FillPlan> fillings_;
   LayerSchedule schedule_;
   bool beads_ = false;  // fill the parts of an image
-  Clock::time_point index_start_;
+  Stopwatch indexing_;
 };
 
 }  // namespace

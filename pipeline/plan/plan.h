@@ -62,8 +62,9 @@ struct Plan {
   std::optional<ImagePlan> images;
   std::optional<MovePlan> moves;
   std::vector<Warning> warnings;
-  std::uint64_t triangles = 0;  // with copies
-  double load_seconds = 0, index_seconds = 0;
+  std::uint64_t triangles = 0;                                     // with copies
+  double load_seconds = 0, index_seconds = 0;                      // wall
+  double load_processor_seconds = 0, index_processor_seconds = 0;  // of all threads
 
   /// A layer as written and recorded.
   Layer layer(std::uint32_t index) const { return sections ? sections->layers()[index].layer : heights.table[index]; }

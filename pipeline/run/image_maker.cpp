@@ -88,6 +88,7 @@ class ImageMaker : public Maker {
     rows_.add_capped(made.record.layer, report.capped_rows, report.first_capped_row, report.first_capped_instance,
                      plan_.images->grid);
     rows_.add_open(made.record.layer, report.open_rows, report.first_open_row, plan_.images->grid);
+    crossings_ += report.crossings;
     capped_rows_ += made.notes.report.capped_rows;
     solid_pixels_ += made.notes.solid_pixels;
     bead_pixels_ += made.notes.bead_pixels;
@@ -102,6 +103,7 @@ class ImageMaker : public Maker {
   std::uint64_t bytes_held(std::uint32_t work) const override { return work_[work].images.bytes() + work_[work].files.bytes(); }
   void let_go(std::uint32_t work) override { work_[work] = Work(); }
 
+  std::uint64_t crossings() const override { return crossings_; }
   bool times_dry_runs() const override { return plan_.images->machine.has_value(); }
   bool keeps() const override { return !plan_.job.dry_run; }
   Status finish() override { return plan_.job.dry_run ? Status() : files_.finish(); }
@@ -144,7 +146,7 @@ class ImageMaker : public Maker {
 
   sanity::RowWarnings rows_;
   std::uint64_t set_pixels_ = 0, moved_pixels_ = 0, lost_pixels_ = 0, solid_pixels_ = 0, bead_pixels_ = 0, capped_rows_ = 0;
-  std::uint64_t bytes_written_ = 0;
+  std::uint64_t bytes_written_ = 0, crossings_ = 0;
   std::int64_t microseconds_ = 0;  // of the machine
   bool timed_ = true;              // layers that an earlier build left are not
   double volume_mm3_ = 0;

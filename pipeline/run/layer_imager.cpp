@@ -31,6 +31,7 @@ void add(const raster::LayerReport& solid, raster::LayerReport& all) {
     all.first_capped_instance = solid.first_capped_instance;
   }
   if (all.open_rows == 0) all.first_open_row = solid.first_open_row;
+  all.crossings += solid.crossings;
   all.capped_rows += solid.capped_rows;
   all.open_rows += solid.open_rows;
 }

@@ -60,6 +60,8 @@ class Maker {
   virtual Status stop(bool keep) = 0;
   /// Removes all files of the job, finished layers too.
   virtual void discard() = 0;
+  /// Crossings of rows with surfaces in all layers made; 0 where there are no rows.
+  virtual std::uint64_t crossings() const { return 0; }
   /// Adds the product's own lines to the summary.
   virtual void tell(Summary& summary) const = 0;
 };

@@ -4,7 +4,6 @@
 #include <tbb/global_control.h>
 
 #include <algorithm>
-#include <chrono>
 #include <nlohmann/json.hpp>
 #include <optional>
 
@@ -18,12 +17,11 @@
 #include "pipeline/run/move_maker.h"
 #include "pipeline/run/run_resolved.h"
 #include "pipeline/run/sanity.h"
+#include "pipeline/run/timing.h"
 #include "stages/sanity/records.h"
 
 namespace lamina::pipeline {
 namespace {
-
-using Clock = std::chrono::steady_clock;
 
 /// Refuses protected output before parts are loaded.
 Status check_output_of(const Resolved& resolved) {
@@ -106,6 +104,14 @@ Error ended_early(Maker& maker, const Error& error, bool any_layer) {
   return {error.fault, error.message + "; finished layers are kept, go on with --resume"};
 }
 
+void tell_flow(const FlowReport& report, const Elapsed& layers, Timing& timing) {
+  timing.phases.push_back({"layers", layers});
+  timing.lock_seconds = report.lock_seconds;
+  for (std::size_t s = 0; s < report.step_seconds.size(); ++s) {
+    timing.steps.push_back({report.step_seconds[s].first, report.step_seconds[s].second, report.step_processor_seconds[s]});
+  }
+}
+
 bool cut_short(const Status& status) {
   return !status && (status.error().fault == Fault::kInterrupted || status.error().fault == Fault::kMemory);
 }
@@ -137,7 +143,7 @@ Status make_layers(const Plan& plan, Maker& maker, const Sanity& sanity, const F
   const std::uint32_t layers = plan.range[1] - plan.range[0];
   std::uint32_t done = layers - static_cast<std::uint32_t>(todo->size());
   progress({ProgressEvent::Stage::kLayers, done, layers});
-  const auto start = Clock::now();
+  const Stopwatch moving;
   const std::function<void()> recorded = [&] {
     ++summary.layers_planned;
     progress({ProgressEvent::Stage::kLayers, ++done, layers});
@@ -150,12 +156,35 @@ Status make_layers(const Plan& plan, Maker& maker, const Sanity& sanity, const F
     return cut_short(status) ? ended_early(maker, status.error(), done > 0) : status;
   }
   if (Status status = maker.finish(); !status) return ended_early(maker, status.error(), done > 0);
-  summary.layer_seconds = std::chrono::duration<double>(Clock::now() - start).count();
+  const Elapsed moved_in = moving.elapsed();
+  summary.layer_seconds = moved_in.wall;
   summary.step_seconds = report.step_seconds;
   summary.most_layers_in_flight = report.most_in_flight;
   summary.peak_layer_bytes = report.most_bytes;
   summary.oversized_layers = report.oversized;
+  if (summary.timing) tell_flow(report, moved_in, *summary.timing);
   return {};
+}
+
+/// What the plan took, to be completed by what follows.
+std::shared_ptr<Timing> timing_of(const Plan& plan, const Elapsed& before) {
+  auto timing = std::make_shared<Timing>();
+  timing->threads = layers_in_flight() / 2;
+  timing->phases = {{"start", before},
+                    {"load", {plan.load_seconds, plan.load_processor_seconds}},
+                    {"index", {plan.index_seconds, plan.index_processor_seconds}}};
+  return timing;
+}
+
+/// Measures the least that any program would need for the same.
+void tell_floor(const Plan& plan, const Maker& maker, const Summary& summary, Timing& timing) {
+  std::vector<std::string> parts;
+  for (const PartSummary& part : plan.scene->parts) parts.push_back(part.path);
+  timing.floor.bytes_written = summary.bytes_written;
+  timing.floor.files = summary.bytes_written == 0 ? 0 : plan.product == Product::kImages ? summary.layers_planned : 1;
+  timing.floor.crossings = maker.crossings();
+  if (Status status = write::measure_floor(parts, plan.job.output, timing.floor); !status)
+    timing.not_measured = status.error().message;
 }
 
 }  // namespace
@@ -167,6 +196,7 @@ Result<Summary> run(const Job& job, Product product, const ProgressCallback& pro
 
 Result<Summary> run(Resolved resolved, const ProgressCallback& progress, const std::atomic<bool>& cancel) {
   const Product product = resolved.product;
+  const double before = process_seconds();
   std::optional<tbb::global_control> threads;
   if (resolved.job.threads > 0) threads.emplace(tbb::global_control::max_allowed_parallelism, resolved.job.threads);
   if (!resolved.job.dry_run) {
@@ -184,6 +214,7 @@ Result<Summary> run(Resolved resolved, const ProgressCallback& progress, const s
   limits.record_slots = 2 * limits.most_in_flight;  // some layers wait for an older one, in a single file with their scratch
   if (product != Product::kImages) limits.most_in_flight = limits.record_slots;
   Summary summary = summary_of(*plan);
+  if (job.timing) summary.timing = timing_of(*plan, {before, before});
   Sanity sanity(*plan, cancel);
   const std::unique_ptr<Maker> maker = make_maker(*plan, sanity, limits);
   if (job.dry_run && !maker->times_dry_runs()) {
@@ -194,6 +225,7 @@ Result<Summary> run(Resolved resolved, const ProgressCallback& progress, const s
     return status.error();
   }
   maker->tell(summary);
+  if (summary.timing) tell_floor(*plan, *maker, summary, *summary.timing);
   summary.peak_resident_bytes = peak_resident_bytes();
   return summary;
 }

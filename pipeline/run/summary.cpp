@@ -4,6 +4,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "pipeline/run/timing.h"
 #include "stages/data/text/json_text.h"
 #include "stages/data/text/readable.h"
 
@@ -116,6 +117,10 @@ std::string Summary::text() const {
                        fmt::format("{} in {}", readable_bytes(bytes_written), one_line(output)));
     add_costs(*this, lines);
   }
+  if (timing) {
+    const Lines timed = timing_lines(*timing);
+    lines.insert(lines.end(), timed.begin(), timed.end());
+  }
   lines.insert(lines.end(), end.begin(), end.end());
   for (const Warning& warning : warnings) lines.emplace_back("warning", one_line(warning.text));
   return text_of(lines);
@@ -148,6 +153,7 @@ std::string Summary::json() const {
            {"oversized_layers", oversized_layers},
            {"parts", part_list},
            {"warnings", warnings_json(warnings)}};
+  if (timing) all["timing"] = timing_json(*timing);
   if (facts) all.update(*facts);
   return text_of(all) + "\n";
 }

@@ -58,6 +58,7 @@ CommandSpec plan_spec(const PlanCommand& row) {
   }
   if (!row.divided) spec.absent = {{"--shard", kNoShards}};
   spec.options.insert(spec.options.end(), row.own.begin(), row.own.end());
+  spec.options.push_back({"--timing", "", "tell where the time goes, beside what no program could go below", "", "Run"});
   spec.options.push_back({"--json", "", "print the summary as one JSON object on stdout", "", "Run"});
   spec.options.push_back({"--quiet", "", "say nothing but errors", "", "Run"});
   spec.more = row.closing;
@@ -81,6 +82,7 @@ Outcome plan(const PlanCommand& row, const Arguments& arguments, Context& contex
   job->resume = arguments.has("--resume");
   job->overwrite = arguments.has("--overwrite");
   job->dry_run = arguments.has("--dry-run");
+  job->timing = arguments.has("--timing");
   job->json = arguments.has("--json");
   job->quiet = arguments.has("--quiet");
   job->leave_to_machine = true;

@@ -1,0 +1,43 @@
+// pipeline/run/timing.h: where the time of a run went, beside what no program could go below. `--timing`
+#pragma once
+
+#include <cstdint>
+#include <nlohmann/json_fwd.hpp>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "stages/data/handles/clocks.h"
+#include "stages/write/null/floor.h"
+
+namespace lamina::pipeline {
+
+struct Timing {
+  struct Phase {
+    std::string_view name;
+    Elapsed took;
+  };
+  struct StepTime {
+    std::string_view name;
+    double busy = 0, processor = 0;  // seconds, over all threads
+  };
+  std::uint32_t threads = 1;
+  std::vector<Phase> phases;    // one after the other; together the run
+  std::vector<StepTime> steps;  // of layers, at the same time
+  double lock_seconds = 0;      // waited for other threads' turns, over all threads
+  write::Floor floor;
+  std::string not_measured;  // why the limit is not; else empty
+
+  Elapsed whole() const;
+};
+
+/// The share of a phase's wall time in which one thread works, if all others have an equal part of the rest; 0 with one
+/// thread. As by Amdahl, "Validity of the single processor approach", 1967.
+double serial_share(const Elapsed& took, std::uint32_t threads);
+
+using Lines = std::vector<std::pair<std::string, std::string>>;
+Lines timing_lines(const Timing& timing);
+nlohmann::ordered_json timing_json(const Timing& timing);
+
+}  // namespace lamina::pipeline

@@ -1,0 +1,24 @@
+// stages/write/null/floor.h: the least time that any program would need for a job's files and rows, measured.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "stages/data/status.h"
+
+namespace lamina::write {
+
+/// What any program has to do for a job, on one thread: read the parts, write as many bytes in as many files, and touch each
+/// crossing of a row with a surface once.
+struct Floor {
+  std::uint64_t bytes_read = 0, bytes_written = 0, files = 0, crossings = 0;
+  double read = 0, write = 0, touch = 0;  // seconds
+  double seconds() const { return read + write + touch; }
+};
+
+/// Fills in the seconds and the bytes read. What is written goes into a folder beside `output` that is gone afterwards.
+/// errors  kInput, kOutput
+Status measure_floor(const std::vector<std::string>& parts, const std::string& output, Floor& floor);
+
+}  // namespace lamina::write
