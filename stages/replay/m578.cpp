@@ -14,8 +14,18 @@ namespace {
 constexpr std::uint32_t kInkjetBits = 12;    // INKJET_BITS of Platform.h, a constant in all versions
 constexpr double kSecondsOfNozzle = 805e-6;  // INKJET_FIRE_MICROSECONDS + INKJET_DELAY_MICROSECONDS, one after the other
 
+/// Whether the next movement along the scan goes to greater places; false if none follows before the next sweep.
+bool goes_up(GcodeReader ahead, char along, double from) {
+  GcodeLine line;
+  while (ahead.next(line) && line.command != "G0") {
+    if (line.command == "G1" && line.has(along) && line.word.at(along) != from) return line.word.at(along) > from;
+  }
+  return false;
+}
+
 /// Whether a version has the case 578 of GCodes::HandleMcode.
 bool has_m578(std::string_view version) {
+  if (!version.empty() && (version[0] < '0' || version[0] > '9')) return false;
   const auto number = [](std::string_view digits) {
     int value = 0;
     std::from_chars(digits.data(), digits.data() + digits.size(), value);
@@ -62,7 +72,9 @@ void read_m578(std::string_view text, Printing& printing) {
       const std::int64_t now = printing.step_at(at);
       if (!in_sweep) {
         const bool towards_end = printing.position_of(1) > printing.position_of(0);
-        printing.begin_sweep(sweep++, (at > begin) != towards_end);
+        // Without a ramp the first drop falls where the sweep begins.
+        const bool up = at != begin ? at > begin : goes_up(reader, scan.along[0], at);
+        printing.begin_sweep(sweep++, up != towards_end);
         printing.go_across(axes.at(scan.across));
         in_sweep = true;
         step = INT64_MIN;

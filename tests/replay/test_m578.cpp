@@ -75,6 +75,34 @@ TEST(M578, TwelveLayersOfFivePartsAreFiredAndNothingElse) {
   EXPECT_GT(drops, 50'000u);
 }
 
+// Without a ramp a sweep's first drop falls where its movement begins.
+TEST(M578, SweepsWithoutARampAreFiredEitherWay) {
+  for (const Side from : {Side::kLeft, Side::kRight}) {
+    const auto resolved = printed_parts::shipped("reprap-inkjet", [&](Machine& machine) {
+      machine.bed.size_mm = {40 * 25.4 / 96 - 1e-4, 50 * 25.4 / 96 - 1e-4};
+      machine.mounting.scan_from = from;
+      machine.motion.both_directions = true;
+      machine.motion.ramp_mm = 0;
+    });
+    program::testing::Image image(50, std::vector<int>(40, 0));
+    for (std::size_t r = 3; r < 40; ++r) {
+      for (std::size_t c = r; c < 40; ++c) image[r][c] = 1;  // one column in the last row
+    }
+    const Runs runs = program::testing::runs_of(image);
+    const auto count = printed_parts::verified(resolved, runs, printed_parts::program_of(resolved, runs));
+    ASSERT_TRUE(count.ok()) << count.error().message;
+    EXPECT_EQ(count->drops, set_pixels(runs));
+  }
+}
+
+TEST(M578, ProgramsTellTheFirmwareThatTheyAreFor) {
+  const auto resolved = printed_parts::shipped("reprap-inkjet", [](Machine&) {});
+  write::ProgramBytes bytes;
+  write::find_dialect("m578")->make_writer(resolved.machine, resolved.grid)->start(9, bytes);
+  const std::string text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+  EXPECT_NE(text.find("for RepRapFirmware 1.09r to 3.4 built with SUPPORT_INKJET\n"), std::string::npos) << text;
+}
+
 TEST(M578, AnotherHeadMoreNozzlesAndALaterFirmwareAreFound) {
   const auto resolved = printed_parts::shipped("reprap-inkjet", [](Machine& machine) {
     machine.bed.size_mm = {40 * 25.4 / 96 - 1e-4, 30 * 25.4 / 96 - 1e-4};
@@ -112,6 +140,12 @@ TEST(M578, AnotherHeadMoreNozzlesAndALaterFirmwareAreFound) {
   for (const std::string version : {"3.5", "3.5.0", "3.6", "4"}) {
     EXPECT_NE(refused([&](Machine& m) { m.firmware = version; }).find("has no M578; it was removed for 3.5"),
               std::string::npos);
+  }
+  for (const std::string version : {"v3.5.1", "RepRapFirmware 3.5"}) {
+    EXPECT_NE(refused([&](Machine& m) { m.firmware = version; }).find("give RepRapFirmware's version alone"),
+              std::string::npos);
+    later.machine.firmware = version;
+    EXPECT_NE(found(later, "M578 S4095", "M578 S4095").find("has no M578"), std::string::npos);
   }
   for (const std::string version : {"", "1.09r", "2.03", "3.4.6"}) {
     EXPECT_EQ(refused([&](Machine& m) { m.firmware = version; }), "");

@@ -50,8 +50,14 @@ std::unique_ptr<ProgramWriter> make_writer(const Machine& machine, const HeadGri
 }
 
 Status check(const Machine& machine, const HeadGrid&) {
+  if (machine.firmware.empty()) return {};
   int major = 0, minor = 0;
   const char* const end = machine.firmware.data() + machine.firmware.size();
+  if (machine.firmware[0] < '0' || machine.firmware[0] > '9') {
+    return Error{Fault::kUsage, fmt::format("{}: machine.firmware: '{}' begins with no number; give RepRapFirmware's version "
+                                            "alone, as 2.03",
+                                            machine.name, machine.firmware)};
+  }
   const auto dot = std::from_chars(machine.firmware.data(), end, major).ptr;
   if (dot != end && *dot == '.') std::from_chars(dot + 1, end, minor);
   if (major < 3 || (major == 3 && minor < 5)) return {};
