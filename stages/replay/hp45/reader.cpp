@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <iterator>
 #include <vector>
 
 #include "stages/replay/dialects.h"
@@ -18,6 +19,7 @@ constexpr double kClearanceMm =
     0.25;                            // SerialGRBL.py, NewLayer: the pistons stand so far nearer to the spreader than layers say
 constexpr double kRoomMm = 100;      // beside the bed, besides ramps
 constexpr int kMostBusyTravels = 8;  // over lines that are not done; hosts have none
+constexpr int kMostRewinds = 8;      // BRES reads up to 4000 lines again; hosts have none
 constexpr double kBurstsPerInch = 600;
 // PositionUpdate measures the speed every 50 counts (POSITION_STEP_COUNT); 100 ms behind the last measure it is 0
 // (POSITION_STEP_TIMEOUT), and bursts need one. It is held in whole mm/s.
@@ -69,7 +71,7 @@ class Hp45Reader {
   bool oasis_, grows_ = true, moving_ = false, ended_ = false, spreading_ = false, spread_ = false;
   double step_um_ = 0;
   std::uint32_t repeat_ = 1, words_ = 1, sweep_ = 0, lines_ = 0;
-  int busy_travels_ = 0;
+  int busy_travels_ = 0, rewinds_ = 0;
   struct Shot {  // of a row: the profile's nozzles, as Printing::fire_words takes them
     std::int64_t step;
     hp45::Burst words;
@@ -105,6 +107,7 @@ void Hp45Reader::command(const GcodeLine& line) {
   if (line.command == "SBR" && lines_ == 0) printing_.reading_sweep(sweep_);
   if (moving_) return reader_.fault(fmt::format("{} is sent while the head may still move; G4 P0 waits for it", line.command));
   if (line.command == "SBR" && !ready()) return;
+  if (line.command == "BRES" && ++rewinds_ > kMostRewinds) return reader_.fault("rewinds the buffer again and again");
   const std::string wrong = controller_.execute(line.command, line.rest);
   if (!wrong.empty()) return reader_.fault(wrong);
   if (line.command == "SBR") {
@@ -149,7 +152,7 @@ bool Hp45Reader::right_encoder() {
   return false;
 }
 
-// A line's nozzles have to be those of the profile, all of a group together.
+// A line's nozzles have to be those of the profile, all of a group together, and none whose drops fall on another's line.
 void Hp45Reader::take_burst() {
   const hp45::Burst& burst = controller_.last_burst();
   printing_.reading_step(std::llround(step_of(controller_.true_um(controller_.last_position_um()))));
@@ -160,6 +163,10 @@ void Hp45Reader::take_burst() {
     if (nozzle >= printing_.nozzles()) return reader_.fault(fmt::format("nozzle {} does not exist", nozzle));
     for (std::uint32_t r = 0; r < repeat_; ++r) {
       if (!bit(nozzle * repeat_ + r)) return reader_.fault(fmt::format("nozzle {} is set in part; SDP is wrong", nozzle));
+    }
+    const auto& blocked = printing_.profile().head.blocked;
+    if (std::ranges::find(kMisplaced, place) != std::end(kMisplaced) && std::ranges::find(blocked, nozzle) != blocked.end()) {
+      return reader_.fault(fmt::format("nozzle {} is set, which is blocked: its drops fall on another one's line", nozzle));
     }
   }
 }

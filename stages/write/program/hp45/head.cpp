@@ -17,11 +17,13 @@ constexpr double kHalfRowGapUm = 2025;      // from the centre to either row (Po
 constexpr std::uint32_t kSpeedCounts = 50;  // of the encoder that one measure of speed takes; the first after rest is wrong
 // Position.ino forgets the speed 100 ms after its last measure, of 50 counts: nothing fires below 500 counts a second.
 constexpr double kLeastCountsPerSecond = 600;
-constexpr std::uint32_t kLines = 3950;  // the host stops at 50 free lines of 4000
+constexpr std::int64_t kMostProduct = 2'000'000'000;  // of micrometres and counts an inch in 32 bits
+constexpr std::uint32_t kLines = 3950;                // the host stops at 50 free lines of 4000
 
-// Of the profile: the firmware's tables (DMAPrint.cpp) give them the address and primitive of another one. Seven never fire;
-// drops of 0, 129 and 263 fall on lines of others.
-constexpr std::uint32_t kWithoutChannel[] = {0, 6, 56, 115, 127, 129, 167, 256, 263, 291};
+// Of the profile: the firmware's tables (DMAPrint.cpp) give them the address and primitive of another one. Drops of the first
+// three fall on lines of others; seven never fire, and where nozzles fire as one, the others of their group do.
+constexpr std::uint32_t kWithoutChannel[] = {0, 129, 263, 6, 56, 115, 127, 167, 256, 291};
+constexpr std::size_t kMisplaced = 3;
 
 /// A whole number in base 64, the highest digit first, a minus before it if it is negative.
 std::string number(std::int64_t value) {
@@ -33,10 +35,11 @@ std::string number(std::int64_t value) {
   return negative ? "-" + digits : digits;
 }
 
-/// Micrometres that the controller turns into exactly so many counts: it rounds towards zero.
+/// Micrometres that the controller turns into exactly so many counts, 0 or more: its map() rounds towards zero in Arduino's
+/// core and to the nearest in Teensy's (PaulStoffregen/cores @9beda59, teensy3/wiring.h), which is wrong below 0 and beyond 32
+/// bits.
 std::int64_t um_of_counts(std::int64_t counts, std::uint32_t per_inch) {
-  const double um = static_cast<double>(counts) * kUmPerInch / per_inch;
-  return static_cast<std::int64_t>(um < 0 ? std::floor(um - 1e-9) : std::ceil(um - 1e-9));
+  return static_cast<std::int64_t>(std::ceil(static_cast<double>(counts) * kUmPerInch / per_inch - 1e-9));
 }
 
 bool whole(double value) { return std::abs(value - std::round(value)) < 1e-6; }
@@ -53,6 +56,15 @@ std::uint32_t encoder_counts(const Machine& machine, double pixel_um) {
   std::uint32_t counts = 600;
   while (!resolves(counts, pixel_um) && counts < 24'000) counts += 600;
   return counts;
+}
+
+/// A nozzle that has to be blocked and is not; kNozzles if there is none.
+std::uint32_t fires_elsewhere(const HeadGrid& grid, std::uint32_t repeat) {
+  for (std::size_t i = 0; i < (repeat > 1 ? kMisplaced : std::size(kWithoutChannel)); ++i) {
+    const std::uint32_t nozzle = kWithoutChannel[i] / repeat;
+    if (nozzle < grid.nozzles && !std::ranges::binary_search(grid.blocked, nozzle)) return nozzle;
+  }
+  return kNozzles;
 }
 
 /// Nozzles of the cartridge that fire as one, for profiles of 300, 200, 150, ... npi.
@@ -72,12 +84,15 @@ Status check(const Machine& machine, const HeadGrid& grid) {
   if (std::ranges::any_of(rows, [](double offset) { return offset != 0; })) {
     return wrong("head.row_offset_um", "the HP45 controller fires its rows where they belong; give [0]");
   }
-  for (const std::uint32_t nozzle : kWithoutChannel) {
-    if (repeat_of(machine) > 1 || nozzle >= grid.nozzles || std::ranges::binary_search(grid.blocked, nozzle)) continue;
+  const std::uint32_t repeat = repeat_of(machine);
+  if (const std::uint32_t nozzle = fires_elsewhere(grid, repeat); nozzle < kNozzles) {
     return wrong("head.blocked",
-                 fmt::format("the HP45 controller cannot fire nozzle {}, its tables give it another one's channel; "
-                             "name 0, 6, 56, 115, 127, 129, 167, 256, 263, 291 as far as the head has them",
-                             nozzle));
+                 fmt::format("the HP45 controller cannot fire nozzle {}, its tables give it another one's channel; name {} as "
+                             "far as the head has them",
+                             nozzle,
+                             repeat > 1 ? fmt::format("{}, {} and {}", kWithoutChannel[0] / repeat, kWithoutChannel[1] / repeat,
+                                                      kWithoutChannel[2] / repeat)
+                                        : "0, 6, 56, 115, 127, 129, 167, 256, 263, 291"));
   }
   if (grid.steps_per_pixel != 1) return wrong("motion.lag_unit", "the HP45 controller fires by pixels; give pixel");
   if (grid.steps() + 2 > kLines) {
@@ -96,7 +111,7 @@ Status check(const Machine& machine, const HeadGrid& grid) {
     return wrong("motion.scan_speed_mm_s",
                  fmt::format("{:g} mm/s; the HP45 controller takes speeds in whole mm/s and forgets those below {:.0f} with "
                              "this encoder, where nothing fires; give {:.0f} or a higher whole number",
-                             speed, least, std::ceil(std::max(speed, least))));
+                             speed, std::ceil(least), std::ceil(std::max(speed, least))));
   }
   return {};
 }
@@ -141,7 +156,8 @@ void Head::sweep(const Sweep& sweep, const SweepVectors& vectors, ProgramBytes& 
   const double start = first_edge - ahead * std::ceil(run_um / count_um) * count_um;
   const double end =
       after(sweep.backward ? vectors.first_step : last) + ahead * (std::max(ramp_um, 2 * count_um) + kHalfRowGapUm);
-  const auto zero = static_cast<std::int64_t>(std::llround(start / count_um));
+  auto zero = static_cast<std::int64_t>(std::llround(start / count_um));
+  if (zero < 0 || um_of_counts(zero, counts_) > kMostProduct / counts_) zero = 0;  // any count does that all lines start from
   const auto encoder = [&](double um) { return static_cast<double>(zero) * count_um + um - start; };
 
   put(out, "G1 {}{} {}{} F{}\n", carriage_.scan_axis(), mm_text(start / 1000), carriage_.line_axis(),

@@ -80,8 +80,19 @@ void Writer::begin_layer(const LayerCycle& cycle, ProgramBytes& out) {
 }  // namespace
 
 Status check(const Machine& machine, const HeadGrid& grid) {
-  if (machine.powder.vats == 1) return hp45::check(machine, grid);
-  return Error{Fault::kUsage, fmt::format("{}: powder.vats: Oasis has one feed piston; give 1", machine.name)};
+  const auto& powder = machine.powder;
+  if (powder.vats != 1) {
+    return Error{Fault::kUsage, fmt::format("{}: powder.vats: Oasis has one feed piston; give 1", machine.name)};
+  }
+  const auto& motion = machine.motion;
+  const bool x = powder.roller_axis == motion.x_axis, y = powder.roller_axis == motion.y_axis;
+  if (const double waits = motion.safe_mm[x ? 0 : 1]; (x || y) && waits != powder.roller_mm[0]) {
+    return Error{Fault::kUsage,
+                 fmt::format("{}: powder.roller_mm: the spreader on the gantry starts at {:g} mm, and the gantry "
+                             "waits at {:g} (motion.safe_mm); give the same",
+                             machine.name, powder.roller_mm[0], waits)};
+  }
+  return hp45::check(machine, grid);
 }
 
 std::unique_ptr<ProgramWriter> make_writer(const Machine& machine, const HeadGrid& grid) {
