@@ -23,6 +23,10 @@ bool GcodeReader::take(GcodeLine& line, bool all_words) {
     while (now_.ends_with(' ')) now_.remove_suffix(1);
     if (now_.empty()) continue;
     const std::size_t space = now_.find(' ');
+    if (space == 0) {
+      fault("begins with a blank");
+      return false;
+    }
     line.command = now_.substr(0, space);
     line.rest = space == std::string_view::npos ? std::string_view() : now_.substr(space + 1);
     line.word.clear();
@@ -31,8 +35,10 @@ bool GcodeReader::take(GcodeLine& line, bool all_words) {
     for (std::string_view rest = line.rest; !rest.empty();) {
       const std::size_t gap = std::min(rest.find(' '), rest.size());
       double value = 0;
-      const auto [stop, error] = std::from_chars(rest.data() + 1, rest.data() + gap, value);
-      if (rest[0] < 'A' || rest[0] > 'Z' || error != std::errc() || stop != rest.data() + gap || !std::isfinite(value)) {
+      const bool letter = rest[0] >= 'A' && rest[0] <= 'Z';
+      const char *const from = rest.data() + (letter ? 1 : 0), *const to = rest.data() + gap;
+      const auto [stop, error] = std::from_chars(from, to, value);
+      if (!letter || error != std::errc() || stop != to || !std::isfinite(value)) {
         fault(fmt::format("'{}' is no word", rest.substr(0, gap)));
         return false;
       }
@@ -67,6 +73,9 @@ Axes::Axes(Printing& printing, GcodeReader& reader) : printing_(printing), reade
   at_[profile.powder.roller_axis[0]] = stand.roller_mm;
   at_[profile.motion.x_axis[0]] = stand.x_mm;
   at_[profile.motion.y_axis[0]] = stand.y_mm;
+  // Oasis's spreader spreads where it turns, which its reader sees.
+  const std::string& roller = profile.powder.roller_axis;
+  roller_on_gantry_ = profile.dialect != "oasis" && (roller == profile.motion.x_axis || roller == profile.motion.y_axis);
 }
 
 bool Axes::take(const GcodeLine& line, bool scanning) {
@@ -91,6 +100,7 @@ bool Axes::take(const GcodeLine& line, bool scanning) {
     const std::string axis(1, letter);
     if (axis == profile.motion.x_axis || axis == profile.motion.y_axis) {
       head_squared += way * way;
+      if (roller_on_gantry_ && axis == profile.powder.roller_axis) printing_.roller_stands_at(at);
     } else if (axis == profile.powder.build_axis || axis == profile.powder.roller_axis) {
       printing_.takes(std::abs(way) / feed_mm_s_);
       alone += std::abs(way);
@@ -99,7 +109,7 @@ bool Axes::take(const GcodeLine& line, bool scanning) {
       } else {
         printing_.roller_stands_at(at);
       }
-    } else if (axis == profile.powder.feed_axes[0] || axis == profile.powder.feed_axes[1]) {
+    } else if (axis == profile.powder.feed_axes[0] || (profile.powder.vats > 1 && axis == profile.powder.feed_axes[1])) {
       if (!relative_) {
         reader_.fault(fmt::format("{} feeds to a height, which depends on the layers before; G91 stands before it", letter));
         return true;
@@ -122,6 +132,7 @@ bool Axes::take(const GcodeLine& line, bool scanning) {
 
 void Axes::end() {
   if (relative_) reader_.fault("the layer ends in G91, and the next one goes to places");
+  if (roller_on_gantry_) printing_.roller_stands_at(printing_.profile().powder.roller_mm[0]);  // where the head waits for it
 }
 
 }  // namespace lamina::replay

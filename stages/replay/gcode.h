@@ -56,7 +56,7 @@ class Axes {
   Axes(Printing& printing, GcodeReader& reader);
 
   /// Executes G0, G1, G90, G91; false for any other command. Vats feed by G91 alone. A fault may leave the axes unmoved.
-  /// The head's positions are in `at`; the build vat must reach the depth of the layer before the head moves.
+  /// A roller on the gantry is where the head is; there it spreads on its way to the far end.
   bool take(const GcodeLine& line, bool scanning);
   /// The layer ends: faults what the next one does not expect.
   void end();
@@ -67,7 +67,7 @@ class Axes {
   Printing& printing_;
   GcodeReader& reader_;
   std::map<char, double> at_;
-  bool relative_ = false;
+  bool relative_ = false, roller_on_gantry_ = false;
   double feed_mm_s_ = 0;
 };
 

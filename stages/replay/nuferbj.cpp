@@ -1,6 +1,7 @@
 // stages/write/program/nuferbj/README.md tells the format.
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <charconv>
 #include <span>
 #include <vector>
@@ -27,7 +28,10 @@ class Loaded {
     Vector vector;
     const std::string_view number = line.command.substr(1);
     const auto [stop, error] = std::from_chars(number.data(), number.data() + number.size(), vector.step);
-    if (error != std::errc() || stop != number.data() + number.size()) reader.fault("a vector without a step");
+    if (error != std::errc() || stop != number.data() + number.size() || vector.step < -kMostStep || vector.step > kMostStep) {
+      reader.fault("a vector without a step");
+      return 0;
+    }
     const std::size_t place = words_.size();
     words_.resize(place + words_a_vector_, 0);
     vectors_.push_back(vector);
@@ -53,6 +57,7 @@ class Loaded {
 
  private:
   static constexpr std::uint32_t kMostRepeats = 100'000'000;
+  static constexpr std::int64_t kMostStep = UINT32_MAX;
 
   void read_words(std::string_view text, std::span<std::uint64_t> words, GcodeReader& reader) const {
     const std::uint32_t groups = (nozzles_ + 31) / 32;
@@ -81,12 +86,16 @@ void fire(const Loaded& loaded, bool backward, double from, double to, Printing&
   const double low = std::min(from, to), high = std::max(from, to);
   const auto vectors = loaded.vectors();
   for (std::size_t v = 0; v < vectors.size(); ++v) {
-    for (std::uint32_t k = 0; k <= vectors[v].repeats; ++k) {
-      const std::int64_t step = vectors[v].step + (backward ? -std::int64_t{k} : std::int64_t{k});
+    // Of one that fires nothing the first and the last repeat tell all.
+    const auto words = loaded.words(v);
+    const bool blank = std::ranges::all_of(words, [](std::uint64_t word) { return word == 0; });
+    const std::uint32_t stride = blank ? std::max(1u, vectors[v].repeats) : 1;
+    for (std::uint64_t k = 0; k <= vectors[v].repeats; k += stride) {
+      const std::int64_t step = vectors[v].step + (backward ? -static_cast<std::int64_t>(k) : static_cast<std::int64_t>(k));
       printing.at_step(step);
       const double at = printing.position_of(static_cast<double>(step));
       if (at < low - 1e-3 || at > high + 1e-3) return printing.fault("the head does not come over this step");
-      printing.fire_words(loaded.words(v));
+      printing.fire_words(words);
       if (!printing.ok()) return;
     }
   }

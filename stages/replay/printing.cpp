@@ -8,6 +8,11 @@
 #include <utility>
 
 namespace lamina::replay {
+namespace {
+
+constexpr double kHalfMmPerMinute = 0.5 / 60;  // in mm/s
+
+}  // namespace
 
 Printing::Printing(const VirtualMachine& machine, const Layer& layer, Purpose purpose, const VirtualMachine::Watch* watch)
     : machine_(machine),
@@ -52,6 +57,7 @@ void Printing::begin_sweep(std::uint32_t number, bool backward) {
     }
   }
   sweep_ = number;
+  fires_on_old_ = fires_on_old_ || !rolled_;
   reading_sweep_ = INT64_MIN;
   backward_ = backward;
   sweeping_ = true;
@@ -151,7 +157,8 @@ void Printing::fire_words(std::span<const std::uint64_t> words) {
 
 void Printing::head_moves(double mm, double mm_s, bool scanning) {
   const double hertz = mm_s * 1000 / machine_.place_um_;
-  if (scanning && hertz > profile().head.highest_frequency_hz * (1 + 1e-4)) {  // speeds are written rounded
+  const double rounded = kHalfMmPerMinute * 1000 / machine_.place_um_;  // speeds are written so
+  if (scanning && hertz > profile().head.highest_frequency_hz * (1 + 1e-4) + rounded) {
     return fault(fmt::format("scans at {:g} mm/s, where nozzles fire {:.0f} times a second; they can {:.0f}", mm_s, hertz,
                              profile().head.highest_frequency_hz));
   }
@@ -217,6 +224,7 @@ void Printing::check_cycle() {
   const double fed = count.fed_mm[0] + count.fed_mm[1], dose = powder.dose * mm(layer.thickness);
   if (std::abs(fed - dose) > 1e-3) wrong(fmt::format("{:g} mm are fed where {:g} have to", fed, dose));
   if (!rolled_) wrong(fmt::format("the roller does not reach its far end at {:g} mm", powder.roller_mm[1]));
+  if (fires_on_old_) wrong("the first sweep begins before powder is spread");
   if (std::abs(roller_mm_ - powder.roller_mm[0]) > 1e-3) {
     wrong(fmt::format("the roller stays at {:g} mm, not at {:g}", roller_mm_, powder.roller_mm[0]));
   }

@@ -104,7 +104,8 @@ class Printing {
   std::uint32_t sweep_ = 0;
   std::int64_t first_line_ = 0, step_ = 0, previous_step_ = 0;
   std::int64_t reading_ = INT64_MIN, reading_sweep_ = INT64_MIN;
-  bool rolled_ = false;  // to the far end
+  bool rolled_ = false;        // to the far end
+  bool fires_on_old_ = false;  // a sweep begins before that
   std::optional<double> lowered_mm_;
   double roller_mm_ = 0;
   std::optional<std::array<double, 2>> head_mm_;  // if the program says where

@@ -1,6 +1,11 @@
 // What a layer's program does with the powder, beside its drops: edited programs of the dialects that move axes by G-code.
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
+#include <chrono>
+#include <functional>
+
+#include "stages/write/program/program_text.h"
 #include "tests/program/machines.h"
 #include "tests/replay/printed_parts.h"
 
@@ -13,9 +18,10 @@ struct CycleBench {
   Runs image;
   printed_parts::Program program;
 
-  explicit CycleBench(const std::string& machine)
-      : resolved(printed_parts::shipped(machine, [](Machine& m) {
+  explicit CycleBench(const std::string& machine, const std::function<void(Machine&)>& change = nullptr)
+      : resolved(printed_parts::shipped(machine, [&](Machine& m) {
           m.bed.size_mm = {12, 12};
+          if (change) change(m);
         })) {
     const PixelGrid& grid = resolved.grid.image;
     image = program::testing::runs_of(program::testing::Image(grid.rows(), std::vector<int>(grid.columns(), 1)));
@@ -57,6 +63,101 @@ TEST(PowderCycle, LayerThatGetsNoPowderIsFound) {
     EXPECT_NE(without(vats).find("powder cycle: the build vat does not move"), std::string::npos) << name << without(vats);
     EXPECT_NE(without(powder.feed_axes[0] + powder.feed_axes[1]).find("powder cycle: "), std::string::npos) << name;
   }
+}
+
+TEST(PowderCycle, PowderThatIsSpreadOverTheDropsIsFound) {
+  for (const char* name : {"nuferbj", "hp45", "reprap-inkjet"}) {
+    const CycleBench bench(name);
+    LayerCycle cycle;
+    cycle.bottom_nm = printed_parts::kLayer.bottom;
+    cycle.thickness_nm = printed_parts::kLayer.thickness;
+    write::ProgramBytes bytes;
+    write::put_powder_cycle(bench.resolved.machine, cycle, bytes);
+    const std::string moves(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+    std::string text = bench.program.text;
+    const std::size_t at = text.find(moves);
+    ASSERT_NE(at, std::string::npos) << name << "\n" << moves << text.substr(0, 300);
+    text.erase(at, moves.size());
+    // Before the head goes back to where it waits: behind the last sweep.
+    text.insert(text.rfind(bench.resolved.machine.motion.x_axis + "0.0000 "), moves);
+    const std::size_t inserted = text.find(moves), line = text.rfind('\n', inserted) + 1;
+    text.erase(inserted, moves.size()).insert(line, moves);
+    EXPECT_NE(bench.fault(text).find("the first sweep begins before powder is spread"), std::string::npos)
+        << name << bench.fault(text);
+  }
+}
+
+TEST(PowderCycle, AVatThatTheMachineDoesNotHaveIsFound) {
+  const CycleBench bench("hp45");
+  const std::string other =
+      bench.edited([](const std::string& line) { return line.starts_with("G1 A") ? "G1 B" + line.substr(4) : line; });
+  ASSERT_NE(other, bench.program.text);
+  EXPECT_NE(bench.fault(other).find("the machine has no axis B"), std::string::npos) << bench.fault(other);
+}
+
+// A roller on the gantry moves as the head's axis does.
+TEST(PowderCycle, RollersOnTheGantryAreSeen) {
+  for (const char* name : {"nuferbj", "hp45", "reprap-inkjet"}) {
+    const CycleBench bench(name, [](Machine& m) { m.powder.roller_axis = m.motion.x_axis; });
+    EXPECT_EQ(bench.fault(bench.program.text), "") << name;
+    const std::string far = "G1 X" + fmt::format("{:.4f}", bench.resolved.machine.powder.roller_mm[1]);
+    const std::string stays =
+        bench.edited([&](const std::string& line) { return line.starts_with(far) ? std::string() : line; });
+    ASSERT_NE(stays, bench.program.text) << name;
+    EXPECT_NE(bench.fault(stays).find("the roller does not reach its far end"), std::string::npos) << name;
+  }
+}
+
+// 100 times a second are 9.694 mm/s, which F582 says: 9.7.
+TEST(PowderCycle, ScansAtTheNozzlesFastestAreNoFaultWhereTheirSpeedIsRounded) {
+  const CycleBench bench("nuferbj", [](Machine& m) {
+    m.head.highest_frequency_hz = 100;
+    m.motion.scan_speed_mm_s = 100 * 0.0969443;
+  });
+  EXPECT_EQ(bench.fault(bench.program.text), "");
+  const std::string faster = bench.edited([](const std::string& line) {
+    const std::size_t speed = line.find("F582");
+    return speed == std::string::npos ? line : line.substr(0, speed) + "F584";
+  });
+  EXPECT_NE(bench.fault(faster).find("they can 100"), std::string::npos) << bench.fault(faster);
+}
+
+// 0.48 mm a minute.
+TEST(PowderCycle, VerySlowVatsMove) {
+  const CycleBench bench("nuferbj", [](Machine& m) { m.powder.vat_speed_mm_s = 0.008; });
+  EXPECT_NE(bench.program.text.find(" F0.48\n"), std::string::npos);
+  EXPECT_EQ(bench.fault(bench.program.text), "");
+}
+
+TEST(PowderCycle, BlanksAreInNoProgram) {
+  for (const char* name : kCycleMachines) {
+    const CycleBench bench(name);
+    const std::string before =
+        bench.edited([](const std::string& line) { return line.starts_with("G1 ") ? " " + line : line; });
+    EXPECT_NE(bench.fault(before).find("begins with a blank"), std::string::npos) << name << bench.fault(before);
+    const std::string twice =
+        bench.edited([](const std::string& line) { return line.starts_with("G1 ") ? "G1 " + line.substr(2) : line; });
+    EXPECT_NE(bench.fault(twice).find("'' is no word"), std::string::npos) << name << bench.fault(twice);
+  }
+}
+
+// Forty vectors of no nozzle, a hundred million times each, under a head that goes round the world.
+TEST(PowderCycle, RepeatsOfNothingTakeNoTime) {
+  const CycleBench bench("nuferbj");
+  std::string loads;
+  for (std::int64_t i = 1; i < 41; ++i) {
+    loads += fmt::format("\nJ{} 00000000 00000000 00000000 00000000\nR99999998", i * 100'000'000);
+  }
+  bool sweeping = false;
+  const std::string text = bench.edited([&](const std::string& line) {
+    const bool loaded = line.starts_with("M812"), scans = sweeping && line.starts_with("G1 X");
+    sweeping = loaded || (sweeping && !scans);
+    return loaded ? line : scans ? loads.substr(1) + "\nG1 X9e9 F18000" : line;
+  });
+  ASSERT_NE(text, bench.program.text);
+  const auto begin = std::chrono::steady_clock::now();
+  EXPECT_EQ(bench.fault(text), "");
+  EXPECT_LT(std::chrono::steady_clock::now() - begin, std::chrono::seconds(5));
 }
 
 TEST(PowderCycle, FeedingToAHeightAndALayerThatEndsRelativeAreFound) {

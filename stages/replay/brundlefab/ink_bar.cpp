@@ -21,7 +21,8 @@ InkBar::Run InkBar::deselect() {
 
 InkBar::Run InkBar::move(float mm) {
   Run run;
-  const float dots = mm * kDotsPerMm;
+  // Sums of relative moves can pass any number.
+  const float dots = std::clamp(mm * kDotsPerMm, -1e6f, 1e6f);
   const auto to = static_cast<std::int32_t>(dots);  // cut off, not rounded
   const float behind = dots - static_cast<float>(to);
   if (to < loaded_) {

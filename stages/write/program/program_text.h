@@ -28,8 +28,10 @@ inline std::string mm_text(double millimetres) {
   return fmt::format("{:.4f}", rounded == 0 ? 0.0 : rounded);
 }
 
-/// mm a minute, as F words have it.
-inline std::string feed_text(double mm_s) { return fmt::format("{:.0f}", mm_s * 60); }
+/// mm a minute, as F words have it: whole ones but below 1, never 0.
+inline std::string feed_text(double mm_s) {
+  return mm_s * 60 < 1 ? fmt::format("{:.2f}", mm_s * 60) : fmt::format("{:.0f}", mm_s * 60);
+}
 
 /// Positions of the carriage for sweeps, in mm.
 class Carriage {
