@@ -87,6 +87,19 @@ TEST(PowderCycle, PowderThatIsSpreadOverTheDropsIsFound) {
   }
 }
 
+TEST(PowderCycle, AHeadThatWaitsBesideItsPlaceIsFound) {
+  for (const char* name : kCycleMachines) {
+    const CycleBench bench(name);
+    const double waits = bench.resolved.machine.motion.safe_mm[0];
+    const std::string there = fmt::format("X{:.4f} ", waits), beside = fmt::format("X{:.4f} ", waits + 1);
+    std::string text = bench.program.text;
+    const std::size_t last = text.rfind(there);
+    ASSERT_NE(last, std::string::npos) << name;
+    text.replace(last, there.size(), beside);
+    EXPECT_NE(bench.fault(text).find("and the next layer finds it at"), std::string::npos) << name << bench.fault(text);
+  }
+}
+
 TEST(PowderCycle, AVatThatTheMachineDoesNotHaveIsFound) {
   const CycleBench bench("hp45");
   const std::string other =
