@@ -1,6 +1,7 @@
 #include "stages/slice/simplify.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <cstdlib>
 #include <span>
@@ -53,6 +54,10 @@ class Reach {
   std::int64_t most_;  // across is whole: it is at most tolerance x length if it is at most the root of that squared
 };
 
+/// So many looks at each point for every halving of the contour are enough for the furthest ones to be taken; contours of real
+/// parts take a quarter of that.
+constexpr std::size_t kLooksAPoint = 8;
+
 /// A contour's points in a circle, and which of them stay.
 class Ring {
  public:
@@ -80,9 +85,12 @@ class Ring {
 
   void split(std::size_t from, std::size_t to) {
     scratch_.open.assign(1, {from, to});
+    std::size_t looked_at = 0;
+    const std::size_t enough = kLooksAPoint * (to - from) * static_cast<std::size_t>(std::bit_width(to - from));
     while (!scratch_.open.empty()) {
       const auto [first, last] = scratch_.open.back();
       scratch_.open.pop_back();
+      looked_at += last - first;
       const Reach reach(at(first), at(last), tolerance_);
       std::size_t furthest = first;
       std::int64_t most = -1;
@@ -93,6 +101,9 @@ class Ring {
         if (place.apart > most) most = place.apart, furthest = i;
       }
       if (!beyond) continue;
+      // The teeth of a comb are split off one by one: a stretch that has been looked at often is split near its middle.
+      const std::size_t near_end = looked_at > enough ? (last - first) / 8 : 0;
+      if (furthest - first < near_end || last - furthest < near_end) furthest = first + (last - first) / 2;
       kept_[furthest < points_.size() ? furthest : furthest - points_.size()] = 1;
       scratch_.open.emplace_back(first, furthest);
       scratch_.open.emplace_back(furthest, last);

@@ -5,7 +5,8 @@
 // its points is further from the full contour either: the two are never further apart than the tolerance.
 //
 //   split      at the furthest point, until every stretch may stand for its points (Douglas and Peucker 1973), from the two
-//              ends of the contour that lie furthest apart along x
+//              ends of the contour that lie furthest apart along x; where that splits off little too often, as in combs, in the
+//              middle
 //   thin out   points whose two stretches may be one, until there is none: no point stays for nothing
 //   compare    a contour that would touch another one or itself, turn over or vanish keeps all its points, and so do all
 //              contours of a layer in which one would lie inside others than before
@@ -43,7 +44,7 @@ struct SimplifyScratch {
 /// what it was, both ways. The same for any thread.
 ///
 /// tolerance  nm, 0 <= tolerance <= 10^9; 0 changes nothing
-/// cost       O(P log P) as a rule for P points
+/// cost       O(P log P) for P points but for thinning out and contacts, which are linear as a rule
 /// source     D. Douglas, T. Peucker, "Algorithms for the reduction of the number of points required to represent a
 ///            digitized line or its caricature", Cartographica 10 (1973)
 void simplify(Contours& contours, Nm tolerance, SimplifyScratch& scratch);

@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 #include <tbb/parallel_for.h>
 
+#include <chrono>
 #include <cstdlib>
 #include <filesystem>
 #include <iostream>
@@ -158,6 +159,30 @@ TEST(Simplify, ToleranceCountsToTheNanometre) {
   EXPECT_EQ(simplified(wide, 10'000).point.size(), 3u);
   EXPECT_EQ(simplified(wide, 9'999).point.size(), 4u);
   EXPECT_TRUE(simplified(wide, 0).point == wide.point);
+}
+
+// Teeth that differ by less than 1 um, 10 mm high and 40 um wide at their feet: the furthest points split them off one by one.
+TEST(Simplify, ACombOfManyTeethTakesNoLongerThanItsPoints) {
+  for (const int teeth : {500, 50'000}) {
+    Contours full;
+    for (int i = 0; i < teeth; ++i) {
+      const Nm x = i * 40'000;
+      full.point.push_back({x, 0});
+      full.point.push_back({x + 10'000, i % 7});  // says little, and goes
+      full.point.push_back({x + 20'000, 10'000'000 - i % 1'000});
+    }
+    full.point.push_back({teeth * 40'000, 0});
+    full.point.push_back({teeth * 40'000, -1'000'000});
+    full.point.push_back({0, -1'000'000});
+    full.close();
+    const auto start = std::chrono::steady_clock::now();
+    const Contours less = simplified(full, 10'000);
+    EXPECT_LT(std::chrono::steady_clock::now() - start, std::chrono::seconds(5)) << "quadratic: minutes";
+    EXPECT_EQ(less.point.size(), static_cast<std::size_t>(2 * teeth + 1));
+    Measured measured;
+    compare(full, less, 10'000, measured);
+    if (teeth == 500) EXPECT_FALSE(any_meet(less));
+  }
 }
 
 TEST(Simplify, WhatWouldBreakStaysAsItIs) {
