@@ -9,6 +9,7 @@
 #include "pipeline/job/keys.h"
 #include "stages/data/input/file_reader.h"
 #include "stages/data/text/json_text.h"
+#include "stages/read/jobs/job_command.h"
 #include "stages/read/jobs/old_forms.h"
 #include "stages/write/file.h"
 #include "stages/write/replaceable.h"
@@ -210,8 +211,7 @@ Result<write::File> write_job(const std::string& path, const Job& job, bool dura
   }
   fs::path directory = fs::path(path).parent_path();
   if (directory.empty()) directory = ".";
-  const std::string text =
-      fmt::format("# A job of lamina. Run it with: lamina {} --job FILE\n\n{}", command, job_text(job, directory.string()));
+  const std::string text = read::job_command_line(command) + "\n\n" + job_text(job, directory.string());
   auto file = write::File::open(path, {.durable = durable ? write::Durable::kAll : write::Durable::kNo});
   Status status = file ? file->append(text) : Status(file.error());
   if (status) status = file->flush();

@@ -280,7 +280,8 @@ Status complete_extrude(const Arguments&, Job& job) {
 /// Extension of the output file named by a batch.
 std::string extrude_ending(const Arguments& arguments) {
   Job job;
-  job.machine.profile = arguments.text("--machine");
+  if (arguments.has("--job")) static_cast<void>(read_job(arguments.text("--job"), job));  // the command tells what is wrong
+  if (arguments.has("--machine")) job.machine.profile = arguments.text("--machine");
   const auto profile = resolve_extruder(job);
   return profile && profile->machine.format == "sml" ? ".sml" : ".gcode";
 }

@@ -8,6 +8,7 @@
 #include "stages/data/input/file_reader.h"
 #include "stages/data/text/readable.h"
 #include "stages/data/text/shell_words.h"
+#include "stages/read/jobs/job_command.h"
 
 namespace lamina::read {
 namespace {
@@ -28,10 +29,20 @@ std::string name_of(const fs::path& path) {
   return text;
 }
 
+/// The command that a saved job names in its leading comments, "jet" if none does. Reading the job tells what is wrong with it.
+std::string command_of(const fs::path& path) {
+  auto file = FileReader::open(path.string(), {.fault = Fault::kUsage, .most_bytes = kMostTomlBytes, .longest_line = 1 << 16});
+  if (!file) return "jet";
+  for (std::string_view line; file->next(line) && (line.empty() || line.starts_with('#') || line == "\r");) {
+    if (const std::string_view command = command_in(line); !command.empty()) return std::string(command);
+  }
+  return "jet";
+}
+
 BatchEntry entry_of_file(const fs::path& path, const fs::path& below, const std::vector<std::string>& with) {
   BatchEntry entry{path.string(), name_of(below), {}};
   if (is_job_file(path)) {
-    entry.words = {"jet", "--job", path.string()};
+    entry.words = {command_of(path), "--job", path.string()};
   } else {
     entry.words = with;
     // A name that begins with a dash still means a file.

@@ -20,7 +20,9 @@ struct BatchEntry {
 using IsPart = std::function<bool(std::string_view name)>;
 
 /// The jobs of all operands, in order:
-///   NAME.toml                         a job file: jet --job NAME.toml
+///   NAME.toml                         a job file: COMMAND --job NAME.toml, of the command in its first lines (job_command.h),
+///   else
+///                                     of jet
 ///   NAME.stl .obj .3mf (.gz)          a part: `with` and the file
 ///   a directory                       all of the above in it and below it, by name
 ///   anything else                     a list: one command line a line, "jet bracket.stl --dpi 600 -o bracket"; the word

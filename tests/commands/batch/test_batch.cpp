@@ -69,6 +69,36 @@ TEST_F(JobsInBatch, ListsJobFilesAndDirectoriesMakeOneQueueInOrder) {
   EXPECT_EQ(std::ranges::count(table, '\n'), 9);
 }
 
+TEST_F(JobsInBatch, ASavedJobIsRunByTheCommandThatSavedIt) {
+  write_boxes(1);
+  fs::create_directories(directory_ / "jobs");
+  const Words part = {"part10.stl", "--layer", "0.25", "--quiet", "--save-job"};
+  const auto save = [&](Words words, const std::string& name, const Words& more) {
+    words.insert(words.end(), part.begin(), part.end());
+    words.push_back("jobs/" + name);
+    words.insert(words.end(), more.begin(), more.end());
+    const Outcome outcome = lamina(words);
+    EXPECT_EQ(outcome.code, 0) << outcome.err;
+  };
+  save({"extrude"}, "beads.toml", {"--dry-run"});
+  save({"extrude", "--machine", "fdm-2000"}, "lines.toml", {"--dry-run"});
+  save({"slice", "--format", "cli"}, "cuts.toml", {"--dry-run"});
+  save({"jet", "--dpi", "100", "--bed", "40x40"}, "images.toml", {"--dry-run"});
+  write_text(directory_ / "jobs/other.toml",
+             "# A job of lamina. Run it with: lamina frobnicate --job FILE\n\n[bed]\ndpi = 100\n");
+  const Outcome outcome = lamina({"batch", "jobs", "-o", "out", "--quiet"});
+  EXPECT_EQ(outcome.code, 2) << outcome.err;
+  const Json json = summary("out");
+  ASSERT_EQ(json["jobs"].size(), 5u);
+  for (const auto& [place, output] : {std::pair{0, "beads.gcode"}, {1, "cuts"}, {2, "images"}, {3, "lines.sml"}}) {
+    const Json& job = json["jobs"][static_cast<std::size_t>(place)];
+    EXPECT_EQ(job["outcome"], "done") << job;
+    EXPECT_EQ(job["output"], output);
+  }
+  EXPECT_NE(json["jobs"][4]["reason"].get<std::string>().find("frobnicate"), std::string::npos) << json["jobs"][4];
+  EXPECT_TRUE(read_text(directory_ / "out/beads.gcode").starts_with(";FLAVOR:"));
+}
+
 TEST_F(JobsInBatch, AnyCommandIsAJobAndGivesItsValue) {
   write_boxes(2);
   write_text(directory_ / "list.txt",
