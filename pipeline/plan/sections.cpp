@@ -114,6 +114,16 @@ ContoursView Sections::contours_of(const Area& area, Work& work) const {
   return area.shared == UINT32_MAX ? work.contours.of(area.body, work.rebased) : ContoursView(work.surface[area.shared]);
 }
 
+double Sections::area_mm2(const Area& area, const Work& work) const {
+  if (area.shared != UINT32_MAX) return square_mm(doubled_area(work.surface[area.shared]));
+  const slice::LayerContours& all = work.contours;
+  double sum = 0;
+  for (std::uint32_t c = all.body[area.body]; c < all.body[area.body + 1]; ++c) {
+    sum += square_mm(doubled_area(ContoursView(all.contours)[c]));
+  }
+  return sum;
+}
+
 Result<slice::LayerReport> Sections::section(const slice::Slicer& slicer, const ScheduledLayer& scheduled, Work& work,
                                              slice::LayerContours& out) const {
   auto report = slicer.layer(scheduled.low, work.scratch, out);

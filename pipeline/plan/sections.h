@@ -59,6 +59,8 @@ class Sections {
     std::uint32_t shared = UINT32_MAX;  // number among the areas of bodies with several parts
   };
   const std::vector<Area>& areas() const { return areas_; }
+  /// Within the contours of an area, mm2. work  of contours()
+  double area_mm2(const Area& area, const Work& work) const;
   /// The filling of an area in a layer.
   const infill::FillParameters& filling(const Area& area, const Layer& layer) const;
 

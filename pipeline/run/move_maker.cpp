@@ -21,28 +21,13 @@ constexpr std::size_t kTextOfPoint = 48, kTextOfPath = 128;
 /// plain filling, the text is not kept: the layer is written piece by piece in its turn.
 constexpr std::size_t kWaitingText = 1 << 17, kPieceOfText = 1 << 16;
 
-/// Whether ranges of heights above the bottoms of parts lie at different heights above the bed.
-bool bottoms_differ(const Plan& plan) {
-  const auto& areas = plan.sections->areas();
-  return std::ranges::any_of(areas, [&](const Sections::Area& area) { return area.box.lo.z != areas.front().box.lo.z; });
-}
-
-void add_pores(const LayerRecord& record, segment::LaidRange& range) {
-  range.pores.add(record.paths->laid.pores);
-  range.area_mm2 += record.paths->area_mm2;
-}
-
 class MoveMaker : public Maker {
  public:
   MoveMaker(const Plan& plan, Sanity& sanity, const FlowLimits& limits)
       : plan_(plan), sanity_(sanity), file_(plan), work_(limits.most_in_flight), made_(limits.most_in_flight) {
     segmented_ = plan.segments->segmented();
-    one_count_ = !segmented_.empty() && !plan.segments->ranges.empty() && bottoms_differ(plan);
-    if (one_count_) {
-      ranges_.push_back({"all ranges", {}});
-    } else {
-      for (const auto& [heights, range] : segmented_) ranges_.push_back({heights, {}});
-    }
+    by_range_ = tells_ranges(plan);
+    for (const auto& [heights, range] : segmented_) ranges_.push_back({heights, {}});
   }
 
   std::uint64_t bytes_of(std::uint32_t layer) const override { return plan_.sections->bytes_bound(layer); }
@@ -100,15 +85,23 @@ class MoveMaker : public Maker {
     if (record.layer.index == plan_.range[0]) first_layer_points_ = record.paths->laid.segments.points();
     if (record.paths->open > 0) open_.add(record.layer);
     sums_.add(*record.paths);
-    if (one_count_) {
-      if (record.paths->laid.segments.lines > 0) add_pores(record, ranges_.front());
-      return;
-    }
+    const std::vector<RangePores>& by_range = record.paths->by_range;
     const auto& areas = plan_.sections->areas();
     const SegmentRange& in = plan_.segments->at(record.layer.plane() - (areas.empty() ? 0 : areas.front().box.lo.z));
-    for (std::size_t i = 0; i < ranges_.size(); ++i) {
-      if (segmented_[i].second == &in) add_pores(record, ranges_[i]);
+    const auto add_to = [&](segment::LaidRange& range, const PoreCounts& pores, double area_mm2) {
+      range.pores.add(pores);
+      range.area_mm2 += area_mm2;
+    };
+    for (std::size_t i = 0; i < segmented_.size(); ++i) {
+      if (by_range_) {
+        if (i < by_range.size()) add_to(ranges_[i], by_range[i].pores, by_range[i].area_mm2);
+      } else if (segmented_[i].second == &in) {
+        add_to(ranges_[i], record.paths->laid.pores, record.paths->area_mm2);
+      }
     }
+    if (!by_range_ || !by_range.empty() || record.paths->laid.segments.lines == 0) return;
+    if (ranges_.size() == segmented_.size()) ranges_.push_back({"all ranges, layers of an earlier build", {}});
+    add_to(ranges_.back(), record.paths->laid.pores, record.paths->area_mm2);
   }
 
   std::uint64_t bytes_held(std::uint32_t work) const override { return work_[work].bytes(); }
@@ -181,8 +174,8 @@ class MoveMaker : public Maker {
 
   PathFacts sums_;
   decltype(std::declval<SegmentPlan>().segmented()) segmented_;
-  std::vector<segment::LaidRange> ranges_;  // of segmented_, or one of all
-  bool one_count_ = false;                  // a layer holds several ranges, and its record one count
+  std::vector<segment::LaidRange> ranges_;  // of segmented_, and one of layers of an earlier build
+  bool by_range_ = false;                   // records hold the pores of each range
   std::uint64_t first_layer_points_ = 0, bytes_written_ = 0;
   LayersTold open_, undivided_;
 };

@@ -2,8 +2,11 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <optional>
+#include <utility>
+#include <vector>
 
 #include "pipeline/plan/layer_cut.h"
 #include "stages/infill/skirt.h"
@@ -53,8 +56,40 @@ AreaCut cut_of(const Plan& plan, std::uint32_t area_number, const Layer& layer) 
   return {range, layer_cut(range, plan.sections->filling(area, layer), layer, area.box)};
 }
 
+/// The pores of a layer by segmented range, in a job that tells them so.
+class PoresByRange {
+ public:
+  explicit PoresByRange(const Plan& plan) {
+    if (tells_ranges(plan)) segmented_ = plan.segments->segmented();
+    ranges.resize(segmented_.size());
+  }
+  /// What `count` adds to `all` is added to the range too. returns  what it returns
+  template <class Count>
+  auto take(const SegmentRange& range, PoreCounts& all, Count count) {
+    if (ranges.empty()) return count();
+    const PoreCounts before = std::exchange(all, {});
+    const auto result = count();
+    if (RangePores* of = find(range)) of->pores.add(all);
+    PoreCounts sum = before;
+    sum.add(all);
+    all = sum;
+    return result;
+  }
+  RangePores* find(const SegmentRange& range) {
+    for (std::size_t i = 0; i < ranges.size(); ++i) {
+      if (segmented_[i].second == &range) return &ranges[i];
+    }
+    return nullptr;
+  }
+  std::vector<RangePores> ranges;
+
+ private:
+  decltype(std::declval<SegmentPlan>().segmented()) segmented_;
+};
+
 /// Counts pores that cross those of the part's next layer, which is made for it. errors  of Sections::layer and layer_cut
-Status count_crossed(const Plan& plan, std::uint32_t index, const Sections::Work& work, PoreCounts& pores) {
+Status count_crossed(const Plan& plan, std::uint32_t index, const Sections::Work& work, PoreCounts& all,
+                     PoresByRange& by_range) {
   const std::vector<ScheduledLayer>& layers = plan.sections->layers();
   std::uint32_t next = index + 1;
   while (next < layers.size() && layers[next].part != layers[index].part) ++next;
@@ -66,12 +101,21 @@ Status count_crossed(const Plan& plan, std::uint32_t index, const Sections::Work
     if (!below.cut) return below.cut.error();
     if (!over.cut) return over.cut.error();
     if (!below.range.settings.across || !over.range.settings.across) continue;
-    segment::count_crossed(paths_of(work, a), *below.cut, paths_of(above, a), *over.cut, pores);
+    by_range.take(below.range, all, [&] {
+      segment::count_crossed(paths_of(work, a), *below.cut, paths_of(above, a), *over.cut, all);
+      return true;
+    });
   }
   return {};
 }
 
 }  // namespace
+
+bool tells_ranges(const Plan& plan) {
+  if (plan.segments->ranges.empty() || !plan.segments->any()) return false;
+  const auto& areas = plan.sections->areas();
+  return std::ranges::any_of(areas, [&](const Sections::Area& area) { return area.box.lo.z != areas.front().box.lo.z; });
+}
 
 PathFacts facts_of(const Sections::Work& work) {
   PathFacts facts;
@@ -91,9 +135,12 @@ Result<bool> lay_moves(const Plan& plan, std::uint32_t index, const Sections::Wo
   const Layer layer = plan.sections->layers()[index].own();
   LaidSums laid;
   laid.porosity.solid_mm3 = facts.area_mm2 * mm(layer.thickness);
+  PoresByRange by_range(plan);
   if (index == 0 && plan.sections->fills()) lay_skirt(plan, layer, out);
   for (std::uint32_t a = 0; a + 1 < work.path_area.size(); ++a) {
-    const auto& [range, cut] = cut_of(plan, a, layer);
+    const AreaCut of = cut_of(plan, a, layer);
+    const SegmentRange& range = of.range;
+    const Result<segment::LayerCut>& cut = of.cut;
     if (!cut) return cut.error();
     segment::MoveTable table(range.plan, *cut, plan.moves->profile.machine, layer);
     const ToolpathsView paths = paths_of(work, a);
@@ -103,13 +150,15 @@ Result<bool> lay_moves(const Plan& plan, std::uint32_t index, const Sections::Wo
       if (room.text.size() > room.most && !room.grown()) return std::nullopt;
       return length;
     };
-    if (!segment::for_each_move(paths, *cut, table, laid, lay)) return false;
+    if (!by_range.take(range, laid.pores, [&] { return segment::for_each_move(paths, *cut, table, laid, lay); })) return false;
+    if (RangePores* told = by_range.find(range)) told->area_mm2 += plan.sections->area_mm2(plan.sections->areas()[a], work);
   }
   facts.totals = out.finish();
   if (plan.segments->crosses()) {
-    if (Status status = count_crossed(plan, index, work, laid.pores); !status) return status.error();
+    if (Status status = count_crossed(plan, index, work, laid.pores, by_range); !status) return status.error();
   }
   facts.laid = laid;
+  facts.by_range = std::move(by_range.ranges);
   return true;
 }
 

@@ -14,6 +14,9 @@
 
 namespace lamina::pipeline {
 
+/// Whether layers hold several segmented ranges of heights, because parts stand at different heights.
+bool tells_ranges(const Plan& plan);
+
 /// Statistics of a layer's contours and stored paths, without the length of the paths.
 PathFacts facts_of(const Sections::Work& work);
 

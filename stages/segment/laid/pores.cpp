@@ -17,10 +17,6 @@ double distance_to(Point2 p, Point2 a, Point2 b) {
   return std::hypot(px - share * dx, py - share * dy);
 }
 
-}  // namespace
-
-namespace {
-
 /// Calls use(path points i .. end) for every run of one line or curve.
 template <class Use>
 void for_each_run(const ToolpathsView& paths, Use use) {
@@ -88,8 +84,8 @@ std::optional<double> LineNeighbours::curve_at(std::span<const Line> beside) con
 }
 
 std::optional<double> LineNeighbours::straight_at(std::span<const Line> beside, double low, double high) const {
-  std::size_t at = beside.size();  // the piece that begins last at or before `low` is the one before
-  while (at > 0 && beside[at - 1].low > low + kNear) --at;
+  // The piece that begins last at or before `low` is the one before.
+  const auto at = static_cast<std::size_t>(std::ranges::upper_bound(beside, low + kNear, {}, &Line::low) - beside.begin());
   if (at == 0 || !beside[at - 1].straight || beside[at - 1].high < high - kNear) return std::nullopt;
   return std::abs(beside[at - 1].across - line_->across) * 1e-6;
 }

@@ -15,7 +15,7 @@ namespace lamina::segment {
 
 /// The layers of a range of heights with segmented lines.
 struct LaidRange {
-  std::string heights;  // "3 to 5.7 mm", "" for all, "all ranges" if parts stand at different heights
+  std::string heights;  // "3 to 5.7 mm", above the bottoms of parts, "" for all
   PoreCounts pores;
   double area_mm2 = 0;  // within the contours, over all layers
 };

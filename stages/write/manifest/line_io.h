@@ -48,6 +48,18 @@ class LineWriter {
     out_.append(text, fmt::format_to(text, FMT_COMPILE("\"{:016x}{:016x}\""), value.high, value.low));
   }
   void reason(std::string_view key, const LayerReason& value) { fixed(key, reason_name(value)); }
+  /// A list of objects, left out if it is empty. describe(item) writes the numbers of one.
+  template <class List, class Describe>
+  void list(std::string_view key, const List& items, Describe describe) {
+    if (items.empty()) return;
+    open(key, "[");
+    for (const auto& item : items) {
+      open("", "{");
+      describe(item);
+      close("}");
+    }
+    close("]");
+  }
   /// Opens an object or a list under a key, or as a list element if the key is empty.
   void open(std::string_view key, std::string_view bracket) {
     if (!key.empty()) {
@@ -115,6 +127,17 @@ class LineReader {
       return;
     }
     if (good()) what_ = "has a reason that is none";
+  }
+  template <class List, class Describe>
+  void list(std::string_view key, List& items, Describe describe) {
+    if (!follows(key)) return;
+    open(key, "[");
+    while (good() && !rest_.starts_with(']')) {
+      open("", "{");
+      describe(items.emplace_back());
+      close("}");
+    }
+    close("]");
   }
   void open(std::string_view key, std::string_view bracket) {
     if (!key.empty()) {

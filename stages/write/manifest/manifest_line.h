@@ -8,6 +8,19 @@
 
 namespace lamina {
 
+template <class Io, class Pores>
+void describe_pores(Io& io, Pores& pores) {
+  io.added("pores", pores.closed);
+  io.added("pores_open", pores.open);
+  io.added("pores_filled", pores.filled);
+  io.added("pores_at_edges", pores.edges);
+  io.added("pores_length_mm", pores.length_mm);
+  io.added("pores_width_mm", pores.width_mm);
+  io.added("pores_distance_mm", pores.distance_mm);
+  io.added("crossing", pores.crossing);
+  io.added("crossed", pores.crossed);
+}
+
 template <class Io, class Paths>
 void describe_moves(Io& io, Paths& paths) {
   auto& t = paths.totals;
@@ -37,19 +50,15 @@ void describe_moves(Io& io, Paths& paths) {
   io.number("extruded_mm3", laid.porosity.extruded_mm3);
   io.retired("ellipses_mm3");
   io.number("measured_mm3", laid.porosity.measured_mm3);
-  io.added("pores", laid.pores.closed);
-  io.added("pores_open", laid.pores.open);
-  io.added("pores_filled", laid.pores.filled);
-  io.added("pores_at_edges", laid.pores.edges);
-  io.added("pores_length_mm", laid.pores.length_mm);
-  io.added("pores_width_mm", laid.pores.width_mm);
-  io.added("pores_distance_mm", laid.pores.distance_mm);
-  io.added("crossing", laid.pores.crossing);
-  io.added("crossed", laid.pores.crossed);
+  describe_pores(io, laid.pores);
   io.added("too_short", laid.shorts.count);
   io.added("shortest_mm", laid.shorts.shortest_mm);
   io.added("reached_mm_s", laid.shorts.reached_mm_s);
   io.added("told_mm_s", laid.shorts.told_mm_s);
+  io.list("ranges", paths.by_range, [&](auto& range) {
+    io.number("area_mm2", range.area_mm2);
+    describe_pores(io, range.pores);
+  });
 }
 
 template <class Io, class Paths>

@@ -28,6 +28,12 @@ struct ImageRecord {
   Hash128 hash;
 };
 
+/// The pores of a layer in the areas that lie in one range of heights.
+struct RangePores {
+  double area_mm2 = 0;  // within their contours
+  PoreCounts pores;
+};
+
 /// Contours and toolpaths of a layer.
 struct PathFacts {
   std::uint64_t contours = 0, points = 0, paths = 0, united = 0, open = 0;  // united: bodies that needed a union
@@ -38,6 +44,8 @@ struct PathFacts {
   std::uint64_t stored_points = 0;
   write::MoveTotals totals;
   LaidSums laid;
+  /// By segmented range of heights, in a job whose parts stand at different heights; else empty, and not summed.
+  std::vector<RangePores> by_range;
 
   /// Sums the fields. Summed in layer order, the result is deterministic.
   void add(const PathFacts& other);
