@@ -37,7 +37,7 @@ std::span<const JobKey> extrude_keys() {
                                    "of filling lines; 100 % of segmented ones"),
       number<&Request::wall_mm_s>("wall_mm_s", "--wall-speed", "MM/S", 0.1, 2000, "of walls"),
       number<&Request::first_layer_mm_s>("first_layer_mm_s", "--first-layer-speed", "MM/S", 0.1, 2000,
-                                         "nothing of the first layer is laid faster"),
+                                         "nothing of the first layer is laid faster, but thin stretches by their share"),
       number<&Request::travel_mm_s>("travel_mm_s", "--travel-speed", "MM/S", 0.1, 2000, "of moves without a bead"),
       number<&Request::retraction_mm>("retraction_mm", "--retraction", "MM", 0, 50, "of filament, before long travels"),
       number<&Request::fan_percent>("fan_percent", "--fan", "%", 0, 100, "of the part's fan"),

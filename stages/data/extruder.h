@@ -45,7 +45,7 @@ struct Extruder {
   struct Speed {
     double print_mm_s = 40;  // raster and closed curves that fill: the reference of segmented lines
     double wall_mm_s = 30, inner_wall_mm_s = 40;
-    double first_layer_mm_s = 15;  // nothing of the first layer is laid faster
+    double first_layer_mm_s = 15;  // nothing of the first layer is laid faster, but thin stretches by their share
     double travel_mm_s = 120, lift_mm_s = 10;
     double acceleration_mm_s2 = 1000;  // for the estimate of time
     double corner_mm_s = 8;            // change of speed that the machine makes at once
