@@ -82,9 +82,9 @@ const JobKey kHeightsKeys[] = {
         {"heights", "peaks", "--peaks", "flats|facets",
          "angle: peaks are faces of at least --flat-area, or every horizontal facet as in Lima (2009)", decides::all})
         .unsaid_at("flats"),
-    field<kHeights, &Request::cover_top>(
-        {"heights", "cover_top", "--cover-top", "",
-         "angle and optimal: the last layer ends at the top or above it (extrude: unless empty)", decides::all, "true"})
+    field<kHeights, &Request::cover_top>({"heights", "cover_top", "--cover-top", "",
+                                          "angle and optimal: the last layer ends at the top or above it", decides::all,
+                                          "true"})
         .unsaid_at("false"),
     field<kHeights, &Request::flats>({"heights", "flats", "--no-flats", "",
                                       "optimal: do not aim at horizontal faces and tops, only keep the step", decides::all,

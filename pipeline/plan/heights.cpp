@@ -5,6 +5,15 @@
 
 namespace lamina::pipeline {
 
+bool covers_top(const Job& job) {
+  const bool by_rule = job.heights.mode == heights::Mode::kAngle || job.heights.mode == heights::Mode::kOptimal;
+  return job.heights.cover_top && (by_rule || job.heights.per_part);
+}
+
+Nm plane_of(const Job& job, const Layer& layer, std::int64_t top) {
+  return covers_top(job) ? layer.plane_below(top) : layer.plane();
+}
+
 heights::SurfaceIndex index_scene(const Job& job, const Scene& scene, const heights::Options& options) {
   std::vector<heights::Stretch> stretch(scene.meshes.size(), {1, 1, 1});
   for (std::size_t i = 0; i < scene.instances.size(); ++i) {

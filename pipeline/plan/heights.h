@@ -11,6 +11,12 @@ namespace lamina::pipeline {
 /// The index of a scene's surface; angles are those of the parts before --shrink.
 heights::SurfaceIndex index_scene(const Job& job, const Scene& scene, const heights::Options& options);
 
+/// Whether layers that cover a part are to be laid wherever their middle lies.
+bool covers_top(const Job& job);
+
+/// The height at which a layer samples the parts, nm; `top` is that of the highest one.
+Nm plane_of(const Job& job, const Layer& layer, std::int64_t top);
+
 /// The layer table shared by all parts on the bed, with its reasons. Uniform layers cost nothing; other modes read every
 /// facet once.
 /// errors  of heights_options and heights::plan_heights

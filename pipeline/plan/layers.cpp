@@ -13,6 +13,17 @@ namespace {
 
 std::int64_t top(const ScheduledLayer& scheduled) { return std::int64_t{scheduled.layer.bottom} + scheduled.layer.thickness; }
 
+/// The tops of the parts, nm above the bed.
+std::vector<Nm> tops_of(const Scene& scene) {
+  std::vector<Nm> tops(scene.parts.size());
+  for (std::size_t i = 0; i < scene.instances.size(); ++i) {
+    const Instance& instance = scene.instances[i];
+    Nm& top = tops[scene.part_of_instance[i]];
+    top = std::max(top, scene.meshes[instance.mesh].bounds.hi.z + instance.offset.z);
+  }
+  return tops;
+}
+
 Status add_layers_of_parts(const Job& job, const Scene& scene, std::vector<ScheduledLayer>& layers) {
   count(Decision::kHeights);
   const Result<heights::Options> options = heights_options(job);
@@ -46,13 +57,17 @@ Result<LayerSchedule> schedule_layers(const Job& job, const Scene& scene, const 
     for (std::uint32_t i = 0; i < table.size(); ++i) schedule.layers.push_back({table[i], kEveryPart, i, 0, 0});
   }
   const bool across = job.heights.containment == Containment::kAcross;
-  const auto lowest = [&](const Layer& layer) { return across ? layer.plane() : layer.lowest_plane(); };
-  const auto highest = [&](const Layer& layer) { return across ? layer.plane() : layer.highest_plane(); };
+  const std::vector<Nm> tops = tops_of(scene);
+  const auto middle = [&](const ScheduledLayer& s) {
+    return plane_of(job, s.layer, s.part == kEveryPart ? scene.height : tops[s.part]);
+  };
+  const auto lowest = [&](const ScheduledLayer& s) { return across ? middle(s) : s.layer.lowest_plane(); };
+  const auto highest = [&](const ScheduledLayer& s) { return across ? middle(s) : s.layer.highest_plane(); };
   std::vector<Nm>& planes = schedule.planes;
   planes.reserve(schedule.layers.size() * (across ? 1 : 2));
   for (const ScheduledLayer& scheduled : schedule.layers) {
-    planes.push_back(lowest(scheduled.layer));
-    if (!across) planes.push_back(highest(scheduled.layer));
+    planes.push_back(lowest(scheduled));
+    if (!across) planes.push_back(highest(scheduled));
   }
   std::ranges::sort(planes);
   planes.erase(std::unique(planes.begin(), planes.end()), planes.end());
@@ -60,20 +75,20 @@ Result<LayerSchedule> schedule_layers(const Job& job, const Scene& scene, const 
     return static_cast<std::uint32_t>(std::ranges::lower_bound(planes, plane) - planes.begin());
   };
   for (ScheduledLayer& scheduled : schedule.layers) {
-    scheduled.low = place(lowest(scheduled.layer));
-    scheduled.high = place(highest(scheduled.layer));
+    scheduled.low = place(lowest(scheduled));
+    scheduled.high = place(highest(scheduled));
   }
   return schedule;
 }
 
 std::uint32_t drop_empty_top(const Scene& scene, Containment containment, LayerSchedule& schedule) {
-  std::uint32_t dropped = 0;
   const auto plane = containment == Containment::kInside ? &ScheduledLayer::high : &ScheduledLayer::low;
-  while (schedule.layers.size() > 1 && schedule.planes[schedule.layers.back().*plane] >= scene.height) {
-    schedule.layers.pop_back();
-    ++dropped;
-  }
-  return dropped;
+  const std::vector<Nm> tops = tops_of(scene);
+  const auto dropped = std::erase_if(schedule.layers, [&](const ScheduledLayer& s) {
+    return s.number > 0 && schedule.planes[s.*plane] >= (s.part == kEveryPart ? scene.height : tops[s.part]);
+  });
+  for (std::uint32_t i = 0; i < schedule.layers.size(); ++i) schedule.layers[i].layer.index = i;
+  return static_cast<std::uint32_t>(dropped);
 }
 
 }  // namespace lamina::pipeline

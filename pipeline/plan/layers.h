@@ -32,13 +32,13 @@ struct LayerSchedule {
 
 /// With job.heights.per_part every part has its own optimal layers between common slabs (stages/heights/per_part.h),
 /// printed in the order of their tops: the nozzle never moves more than one slab below printed material. Otherwise all
-/// parts share the layers of the table.
+/// parts share the layers of the table. Planes are those of plane_of(), each part with its own top.
 /// errors  of heights_options and heights::plan_per_part
 /// cost    28 bytes per layer and 4 bytes per plane
 Result<LayerSchedule> schedule_layers(const Job& job, const Scene& scene, const heights::LayerTable& table);
 
-/// Removes the last layers if all parts end below the planes that they are cut by: nothing would be laid in them. That is the
-/// middle, or with kInside the top, and with kOutside the bottom.
+/// Removes layers at the tops of parts that end below the planes that they are cut by: nothing would be laid in them. That is
+/// the middle, or with kInside the top, and with kOutside the bottom. A part keeps its first layer.
 /// returns  how many
 std::uint32_t drop_empty_top(const Scene& scene, Containment containment, LayerSchedule& schedule);
 

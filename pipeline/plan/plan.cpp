@@ -122,24 +122,24 @@ class Planner {
       auto schedule = schedule_layers(job(), *plan_.scene, plan_.heights.table);
       if (!schedule) return schedule.error();
       schedule_ = std::move(*schedule);
-      if (moves()) leave_out_empty_top();
     }
+    warn_of_open_top();
+    if (moves()) plan_.moves->left_out = drop_empty_top(*plan_.scene, job().heights.containment, schedule_);
     plan_.layer_count =
         job().heights.per_part || moves() ? static_cast<std::uint32_t>(schedule_.layers.size()) : plan_.heights.table.size();
     return {};
   }
 
-  void leave_out_empty_top() {
-    plan_.moves->left_out = drop_empty_top(*plan_.scene, job().heights.containment, schedule_);
-    if (plan_.moves->left_out == 0 || !job().heights.cover_top) return;
-    const Layer& last = schedule_.layers.back().layer;
-    const double missing_mm = mm(std::int64_t{plan_.scene->height} - last.bottom - last.thickness);
-    if (missing_mm <= 0) return;
+  /// Steps inside of a part and a layer that ends above it exclude each other.
+  void warn_of_open_top() {
+    if (!covers_top(job()) || job().heights.containment != Containment::kInside) return;
+    const heights::LayerTable& table = plan_.heights.table;
+    const Layer last = job().heights.per_part ? schedule_.layers.back().layer : table[table.size() - 1];
+    if (last.highest_plane() < plan_.scene->height) return;
     plan_.warnings.push_back(
-        {"cover-top",
-         fmt::format("--cover-top: the layer that covers the top would be empty and is left out, the topmost {:.3f} mm "
-                     "are not built; let --thickness have a thinner layer",
-                     missing_mm)});
+        {"cover-top", fmt::format("--cover-top: the layer that covers the top is empty with --containment inside, the "
+                                  "topmost {:.3f} mm are not built; leave out one of the two",
+                                  mm(std::int64_t{plan_.scene->height} - last.bottom))});
   }
 
   /// Layers of one thickness are counted before there is a table of them. errors  kUsage: it does not fit into the memory

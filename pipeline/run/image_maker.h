@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "pipeline/output/image_files.h"
+#include "pipeline/plan/heights.h"
 #include "pipeline/plan/plan.h"
 #include "pipeline/run/maker.h"
 #include "pipeline/run/sanity.h"
@@ -61,6 +62,7 @@ class LayerImager {
   std::uint64_t changes_bound(const Layer& layer) const;
 
  private:
+  Nm plane(const Layer& layer) const { return plane_of(plan_.job, layer, plan_.scene->height); }
   Status section_of(const Solid& solid, const Layer& layer, ImageWork& work, Runs& image, LayerRecord& record,
                     ImageNotes& notes) const;
   raster::LayerReport section(const Solid& solid, raster::Engine engine, const Layer& layer, ImageWork& work,

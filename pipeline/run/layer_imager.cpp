@@ -58,7 +58,7 @@ Status LayerImager::raster(const Layer& layer, ImageWork& work, LayerRecord& rec
   for (const Solid& solid : images.solids.all()) {
     Runs& image = several ? work.section : work.runs;
     if (Status status = section_of(solid, layer, work, image, record, notes); !status) return status;
-    if (several) work.materials.lay(solid.material.at(layer.plane()), image, work.runs);
+    if (several) work.materials.lay(solid.material.at(plane(layer)), image, work.runs);
   }
   return {};
 }
@@ -138,7 +138,7 @@ raster::LayerReport LayerImager::section(const Solid& solid, raster::Engine engi
                                          Runs& image) const {
   const raster::Rasterizer& rasterizer = solid.rasterizer;
   const Containment containment = plan_.job.heights.containment;
-  if (containment == Containment::kAcross) return rasterizer.layer(engine, layer.plane(), work.scratch, image);
+  if (containment == Containment::kAcross) return rasterizer.layer(engine, plane(layer), work.scratch, image);
   const raster::LayerReport low = rasterizer.layer(engine, layer.lowest_plane(), work.scratch, work.lowest);
   const raster::LayerReport high = rasterizer.layer(engine, layer.highest_plane(), work.scratch, work.highest);
   const bool inside = containment == Containment::kInside;
@@ -156,7 +156,7 @@ std::uint64_t LayerImager::changes_bound(const Layer& layer) const {
   if (plan_.job.heights.containment != Containment::kAcross) {
     return changes_of_section(layer.lowest_plane(), 0) + changes_of_section(layer.highest_plane(), 0);
   }
-  return changes_of_section(layer.plane(), plan_.images->beads ? 2 * plan_.images->beads->expected(layer.index).spans : 0);
+  return changes_of_section(plane(layer), plan_.images->beads ? 2 * plan_.images->beads->expected(layer.index).spans : 0);
 }
 
 std::uint64_t LayerImager::bytes_of(const Layer& layer) const {
@@ -165,7 +165,7 @@ std::uint64_t LayerImager::bytes_of(const Layer& layer) const {
     return 2 * (bytes_of_section(layer.lowest_plane(), changes_of_section(layer.lowest_plane(), 0)) +
                 bytes_of_section(layer.highest_plane(), changes_of_section(layer.highest_plane(), 0)));
   }
-  const std::uint64_t of_section = bytes_of_section(layer.plane(), changes_bound(layer));
+  const std::uint64_t of_section = bytes_of_section(plane(layer), changes_bound(layer));
   return plan_.images->beads ? of_section + plan_.images->beads->bytes_expected(layer.index) : of_section;
 }
 

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "pipeline/plan/heights.h"
 #include "stages/data/text/readable.h"
 #include "stages/load/info/planned.h"
 #include "stages/sanity/crossed.h"
@@ -112,7 +113,7 @@ std::vector<std::uint8_t> Sanity::filled_or_rightly_empty() const {
   std::vector<std::uint8_t> filled = filled_;
   std::vector<Nm> planes;
   for (std::uint32_t i = 0; i < filled.size(); ++i) {
-    if (filled[i] == 0) planes.push_back(plan_.layer(i).plane());
+    if (filled[i] == 0) planes.push_back(plane_of(plan_.job, plan_.layer(i), plan_.scene->height));
   }
   if (planes.empty()) return filled;
   const bool thinned = plan_.images && (plan_.images->beads || plan_.job.dose.core < 1);

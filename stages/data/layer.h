@@ -40,6 +40,11 @@ struct Layer {
 
   /// Height at which the part is sampled: the middle of the layer, rounded down.
   Nm plane() const { return bottom + thickness / 2; }
+  /// The same of a layer that covers a part of which it holds only what lies below `top`: where the layer's middle lies above
+  /// the part, the middle of that.
+  Nm plane_below(std::int64_t top) const {
+    return plane() < top || top <= bottom ? plane() : static_cast<Nm>(bottom + (top - bottom) / 2);
+  }
   /// The planes that see the section at the layer's very bottom and at its very top. Vertices on a plane count as below
   /// it, so the upper one lies 1 nm under the top: a face that ends the layer is still cut.
   Nm lowest_plane() const { return bottom; }

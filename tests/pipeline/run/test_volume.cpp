@@ -172,9 +172,40 @@ TEST_F(Volume, StepsInsideLeaveOutALayerThatEndsAboveTheParts) {
   EXPECT_EQ(tall.json["layers_left_out"], 0) << "the last one ends at the top";
 }
 
-TEST_F(Volume, ACoveringLayerThatIsLeftOutIsWarnedOf) {
+TEST_F(Volume, ALayerThatCoversTheTopIsLaidAlsoIfItsMiddleLiesAboveThePart) {
   test::write_box(folder / "cube.stl", {0, 0, 0}, {4, 4, 1.05f});
-  const std::string job = "--fill none --walls 1 --heights angle --cover-top --thickness ";
+  const std::string walls = "--fill none --walls 1 ", job = walls + "--heights angle --cover-top --thickness ";
+  const Made covered = extrude(job + "0.2", folder / "cube.stl");
+  EXPECT_EQ(covered.json["layers_left_out"], 0);
+  EXPECT_EQ(covered.json["warnings"].dump().find("cover-top"), std::string::npos);
+  const test::GcodeFile gcode = test::read_gcode(covered.text);
+  ASSERT_EQ(gcode.layers.size(), 6u);
+  const auto length = [](const auto& layer) {
+    double sum = 0;
+    for (const auto& bead : layer.beads) sum += std::hypot(bead.x1 - bead.x0, bead.y1 - bead.y0);
+    return sum;
+  };
+  EXPECT_NEAR(length(gcode.layers[5]), length(gcode.layers[4]), 1e-6);
+  // A pyramid 1.05 mm high is cut at 1.025 mm, in the middle of its last 0.05: 0.476 mm wide of 20.
+  test::write_text(folder / "top.obj",
+                   "v 0 0 0\nv 20 0 0\nv 20 20 0\nv 0 20 0\nv 10 10 1.05\nf 4 3 2 1\nf 1 2 5\nf 2 3 5\nf 3 4 5\nf 4 1 5\n");
+  const auto volume_mm3 = [&](const std::string& command, const std::string& options) {
+    Listener console;
+    const auto words =
+        test::words_of(options + " --json --quiet --overwrite " + (folder / "top.obj") + " -o " + (folder / "top"));
+    EXPECT_EQ(run_command(*find_command(command), words, console).code, 0) << options;
+    return nlohmann::json::parse(console.said, nullptr, false)["volume_mm3"].get<double>();
+  };
+  const std::string all = "--heights angle --cover-top --thickness 0.2", five = "--layer 0.2 --layers 0:5";
+  const double side = 20 * 0.025 / 1.05, top_mm3 = 0.2 * side * side;
+  EXPECT_NEAR(volume_mm3("slice", all) - volume_mm3("slice", five), top_mm3, 1e-4);
+  const std::string bed = " --bed 25x25 --dpi 2540";
+  EXPECT_NEAR(volume_mm3("jet", all + bed) - volume_mm3("jet", five + bed), top_mm3, 2e-3);
+}
+
+TEST_F(Volume, StepsInsideAndACoveredTopExcludeEachOther) {
+  test::write_box(folder / "cube.stl", {0, 0, 0}, {4, 4, 1.05f});
+  const std::string job = "--fill none --walls 1 --heights angle --cover-top --containment inside --thickness ";
   const nlohmann::json thick = extrude(job + "0.2", folder / "cube.stl").json,
                        thin = extrude(job + "0.05,0.2", folder / "cube.stl").json;
   EXPECT_EQ(thick["layers_left_out"], 1);
