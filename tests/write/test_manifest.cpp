@@ -8,6 +8,7 @@
 #include "stages/data/hash.h"
 #include "stages/data/text/version.h"
 #include "stages/write/manifest/manifest.h"
+#include "stages/write/manifest/manifest_line.h"
 #include "tests/commands/program.h"
 
 namespace lamina::pipeline {
@@ -102,6 +103,38 @@ TEST(Manifest, IsJsonForEverybody) {
   EXPECT_EQ(json["layers"].size(), kLayers);
   EXPECT_EQ(json["layers"][42]["file"], "layers/000042.tif");
   EXPECT_EQ(json["parts"][0]["path"], "bracket \"x\" \\ \xef\xbf\xbd.stl");
+}
+
+TEST(Manifest, PoresOfRangesAreReadAsTheyAreWritten) {
+  ManifestHead head;
+  head.product = Product::kMoves;
+  head.file = "a.gcode";
+  PathFacts facts;
+  facts.laid.pores.closed = 9;
+  facts.by_range.resize(2);
+  facts.by_range[0] = {12.5, {.closed = 7, .length_mm = 7.25, .crossing = 4, .crossed = 1}};
+  facts.by_range[1] = {100.0 / 3, {.closed = 2, .edges = 5}};
+  const auto line_of = [&](const PathFacts& paths) {
+    std::string line;
+    LineWriter out(line);
+    const LayerRecord written = record(3);
+    describe_line(out, head, written, paths);
+    return line;
+  };
+  LayerRecord layer;
+  PathFacts read;
+  const std::string line = line_of(facts);
+  LineReader in(line);
+  describe_line(in, head, layer, read);
+  ASSERT_TRUE(in.good() && in.ended()) << in.what() << line;
+  EXPECT_EQ(nlohmann::json::parse(line, nullptr, false)["ranges"].size(), 2u);
+  ASSERT_EQ(read.by_range.size(), 2u);
+  EXPECT_EQ(read.by_range[1].area_mm2, facts.by_range[1].area_mm2);
+  EXPECT_EQ(read.by_range[1].pores.edges, 5u);
+  EXPECT_EQ(read.by_range[0].pores.length_mm, 7.25);
+  EXPECT_EQ(line_of(read), line);
+  facts.by_range.clear();
+  EXPECT_EQ(line_of(facts).find("ranges"), std::string::npos) << "records of other jobs are as before";
 }
 
 TEST(Manifest, ShardWithoutLayersIsWhole) {
