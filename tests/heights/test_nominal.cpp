@@ -130,6 +130,25 @@ void expect_covered(const SurfaceIndex& index, const Options& options) {
   for (std::uint32_t i = 0; i + 1 < plain->table.size(); ++i) EXPECT_EQ(covered->table[i].thickness, plain->table[i].thickness);
 }
 
+TEST(CoverTop, LayersOnFlatSlopesKeepTheLeastThickness) {
+  Options covering = by_angle({0.178, 0.254});
+  covering.cover_top = true;
+  int covered = 0;
+  for (int i = 0; i < 40; ++i) {
+    const double height = 3 + 0.01 * i;
+    const SurfaceIndex index =
+        test::index_of(test::strip({{0, 0}, {5, 0}, {5, height - 0.6}, {3, height}, {0, height}, {0, 0}}));
+    const Result<Plan> plan = plan_heights(index, covering);
+    EXPECT_GE(plan->table.top() + covering.surface.flat_tolerance, index.top);
+    covered += plan->table.top() > index.top ? 1 : 0;
+    for (std::uint32_t k = 0; k < plan->table.size(); ++k) {
+      if (angle_of(plan->looked_at[k]) < 45) continue;
+      EXPECT_EQ(plan->table[k].thickness, 178'000) << height << " mm, layer " << k;
+    }
+  }
+  EXPECT_GT(covered, 30);
+}
+
 TEST(CoverTop, WhatIsLeftBelowTheTopIsBuilt) {
   const auto box = [](double height) {
     return test::index_of(test::strip({{0, 0}, {5, 0}, {5, height}, {0, height}, {0, 0}}));

@@ -2,8 +2,8 @@
 #include <gtest/gtest.h>
 #include <tbb/parallel_for.h>
 
-#include <chrono>
 #include <cstdlib>
+#include <ctime>
 #include <filesystem>
 #include <iostream>
 #include <numbers>
@@ -161,7 +161,7 @@ TEST(Simplify, ToleranceCountsToTheNanometre) {
   EXPECT_TRUE(simplified(wide, 0).point == wide.point);
 }
 
-// Teeth that differ by less than 1 um, 10 mm high and 40 um wide at their feet: the furthest points split them off one by one.
+// Teeth 10 mm high and 40 um wide at their feet, each a little lower: the furthest points split them off one by one.
 TEST(Simplify, ACombOfManyTeethTakesNoLongerThanItsPoints) {
   for (const int teeth : {500, 50'000}) {
     Contours full;
@@ -169,15 +169,15 @@ TEST(Simplify, ACombOfManyTeethTakesNoLongerThanItsPoints) {
       const Nm x = i * 40'000;
       full.point.push_back({x, 0});
       full.point.push_back({x + 10'000, i % 7});  // says little, and goes
-      full.point.push_back({x + 20'000, 10'000'000 - i % 1'000});
+      full.point.push_back({x + 20'000, 10'000'000 - i / 50});
     }
     full.point.push_back({teeth * 40'000, 0});
     full.point.push_back({teeth * 40'000, -1'000'000});
     full.point.push_back({0, -1'000'000});
     full.close();
-    const auto start = std::chrono::steady_clock::now();
+    const std::clock_t start = std::clock();
     const Contours less = simplified(full, 10'000);
-    EXPECT_LT(std::chrono::steady_clock::now() - start, std::chrono::seconds(5)) << "quadratic: minutes";
+    EXPECT_LT(std::clock() - start, 3 * CLOCKS_PER_SEC) << "processor time; all teeth looked at for each: some 50 s";
     EXPECT_EQ(less.point.size(), static_cast<std::size_t>(2 * teeth + 1));
     Measured measured;
     compare(full, less, 10'000, measured);
