@@ -72,7 +72,7 @@ TEST_F(JobsInBatch, ListsJobFilesAndDirectoriesMakeOneQueueInOrder) {
 TEST_F(JobsInBatch, ASavedJobIsRunByTheCommandThatSavedIt) {
   write_boxes(1);
   fs::create_directories(directory_ / "jobs");
-  const Words part = {"part10.stl", "--layer", "0.25", "--quiet", "--save-job"};
+  const Words part = {"part10.stl", "--layer", "0.254", "--quiet", "--save-job"};
   const auto save = [&](Words words, const std::string& name, const Words& more) {
     words.insert(words.end(), part.begin(), part.end());
     words.push_back("jobs/" + name);

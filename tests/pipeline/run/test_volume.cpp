@@ -203,6 +203,25 @@ TEST_F(Volume, ALayerThatCoversTheTopIsLaidAlsoIfItsMiddleLiesAboveThePart) {
   EXPECT_NEAR(volume_mm3("jet", all + bed) - volume_mm3("jet", five + bed), top_mm3, 2e-3);
 }
 
+// 2.3 mm in layers of 0.3 end at 2.4: inside of the part there is no eighth one.
+TEST_F(Volume, EveryPartWithLayersOfItsOwnLosesItsEmptyTop) {
+  test::write_box(folder / "low.stl", {0, 0, 0}, {4, 4, 2.3f});
+  test::write_box(folder / "high.stl", {0, 0, 0}, {4, 4, 5.5f});
+  const Made made = extrude((folder / "low.stl") + " --fill none --walls 1 --heights optimal --thickness 0.3 --per-part " +
+                                "--containment inside",
+                            folder / "high.stl");
+  EXPECT_EQ(made.json["layers_total"], 7 + 18);
+  EXPECT_EQ(made.json["layers_left_out"], 1);
+}
+
+// One stadium of 0.4 x 0.3 mm along a wall of 48.4 mm, in 14 x 11 mm.
+TEST_F(Volume, PorosityIsTheShareOfTheVolumeWithinTheContours) {
+  const auto json = extrude("--machine marlin --layer 0.3 --bead 0.4 --fill none --walls 1").json;
+  EXPECT_NEAR(json["solid_mm3"].get<double>(), 14 * 11 * 1.2, 1e-6);
+  EXPECT_NEAR(json["porosity"]["by_extrusion"].get<double>(), 1 - 48.4 * (0.03 + std::numbers::pi / 4 * 0.09) / (14 * 11 * 0.3),
+              1e-6);
+}
+
 TEST_F(Volume, StepsInsideAndACoveredTopExcludeEachOther) {
   test::write_box(folder / "cube.stl", {0, 0, 0}, {4, 4, 1.05f});
   const std::string job = "--fill none --walls 1 --heights angle --cover-top --containment inside --thickness ";
