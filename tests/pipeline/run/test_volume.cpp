@@ -207,9 +207,9 @@ TEST_F(Volume, ALayerThatCoversTheTopIsLaidAlsoIfItsMiddleLiesAboveThePart) {
 TEST_F(Volume, EveryPartWithLayersOfItsOwnLosesItsEmptyTop) {
   test::write_box(folder / "low.stl", {0, 0, 0}, {4, 4, 2.3f});
   test::write_box(folder / "high.stl", {0, 0, 0}, {4, 4, 5.5f});
-  const Made made = extrude((folder / "low.stl") + " --fill none --walls 1 --heights optimal --thickness 0.3 --per-part " +
-                                "--containment inside",
-                            folder / "high.stl");
+  const Made made = extrude(
+      (folder / "low.stl") + " --fill none --walls 1 --heights optimal --thickness 0.3 --per-part " + "--containment inside",
+      folder / "high.stl");
   EXPECT_EQ(made.json["layers_total"], 7 + 18);
   EXPECT_EQ(made.json["layers_left_out"], 1);
 }
