@@ -124,11 +124,24 @@ class LayerFlow {
     }
   }
 
-  /// After a step that did not finish the layer.
-  void go_on(Moving& moving) {
+  /// What cannot be recorded any more is not made.
+  void begin_turn(Moving& moving) const {
+    if (moving.status && failed_) moving.status = Error{Fault::kInterrupted, "interrupted"};
+  }
+
+  /// After a step that did not finish the layer. returns  whether this thread takes the next one, too: its turn would be the
+  /// first, and the graph takes longer to say so than some steps take
+  bool go_on(Moving& moving) {
     if (moving.held > moving.loan.bytes) budget_.settle(moving.loan, moving.held);
+    bool first = waiting_.empty();
+    for (std::size_t s = moving.step; first && s < ready_.size(); ++s) first = ready_[s].empty();
+    if (first && may_go(moving)) {
+      begin_turn(moving);
+      return true;
+    }
     waiting_.insert(moving.ticket.position);
     wake();
+    return false;
   }
 
   void leave(Moving& moving) {
@@ -165,34 +178,38 @@ class LayerFlow {
       const auto held = lock();
       moving = &at(*ready_[s].begin());
       ready_[s].erase(ready_[s].begin());
-      // What cannot be recorded any more is not made.
-      if (moving->status && failed_) moving->status = Error{Fault::kInterrupted, "interrupted"};
+      begin_turn(*moving);
     }
-    const Step& step = steps_.steps[s];
-    if (moving->status && given_up()) moving->status = Error{Fault::kInterrupted, "interrupted"};
+    while (take_step(*moving)) {
+    }
+    return {};
+  }
+
+  /// returns  whether this thread takes the layer's next step
+  bool take_step(Moving& moving) {
+    const Step& step = steps_.steps[moving.step];
+    if (moving.status && given_up()) moving.status = Error{Fault::kInterrupted, "interrupted"};
     const Turn turn;
-    if (step.needs && !moving->asked) {
-      if (moving->status) ask(step, *moving);
-      moving->asked = true;
-      count_time(moving->step, turn);
+    if (step.needs && !moving.asked) {
+      if (moving.status) ask(step, moving);
+      moving.asked = true;
+      count_time(moving.step, turn);
       const auto held = lock();
-      go_on(*moving);
-      return {};
+      return go_on(moving);
     }
-    if (moving->status) moving->status = guarded([&] { return step.run(moving->ticket); });
-    count_time(moving->step, turn);
-    moving->held = std::max(moving->held, held_now(*moving));
+    if (moving.status) moving.status = guarded([&] { return step.run(moving.ticket); });
+    count_time(moving.step, turn);
+    moving.held = std::max(moving.held, held_now(moving));
     std::unique_lock held = lock();
-    if (moving->status && ++moving->step < steps_.steps.size()) {
-      moving->asked = false;
-      go_on(*moving);
-      return {};
+    if (moving.status && ++moving.step < steps_.steps.size()) {
+      moving.asked = false;
+      return go_on(moving);
     }
-    leave(*moving);
+    leave(moving);
     record(held);
     wake();
     admit();
-    return {};
+    return false;
   }
 
   void ask(const Step& step, Moving& moving) {
