@@ -45,7 +45,7 @@ class ContourMaker : public Maker {
                Sections::Work& work = work_[ticket.work];
                PathFacts facts = facts_of(work);
                facts.bead_mm = length_mm(work.paths);
-               sanity_.add_contours(made_[ticket.work].layer, work.contours);
+               facts.area_mm2 = sanity_.add_contours(made_[ticket.work].layer, work.contours);
                made_[ticket.work].paths = std::make_shared<const PathFacts>(facts);
                return files_.encode(view_of(made_[ticket.work].layer, work), work.text);
              }},

@@ -134,7 +134,7 @@ class MoveMaker : public Maker {
   /// Makes the layer's text unless it becomes too long to wait.
   Status lay_waiting(std::uint32_t layer, Sections::Work& work, Made& made) {
     made.facts = facts_of(work);
-    sanity_.add_contours(made.record.layer, work.contours);
+    made.facts.area_mm2 = sanity_.add_contours(made.record.layer, work.contours);
     work.text.clear();
     const auto out = file_.layer(made.record.layer, work.text);
     const std::size_t most = plan_.segments->any() ? std::max(kWaitingText, kTextOfPoint * work.paths.point.size()) : SIZE_MAX;

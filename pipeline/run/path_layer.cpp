@@ -125,7 +125,6 @@ PathFacts facts_of(const Sections::Work& work) {
   facts.paths = work.paths.size();
   facts.united = work.report.united;
   facts.open = work.report.gaps.open;
-  facts.area_mm2 = square_mm(doubled_area(contours));
   facts.stored_points = work.paths.point.size();
   return facts;
 }

@@ -17,7 +17,7 @@ namespace lamina::pipeline {
 /// Whether layers hold several segmented ranges of heights, because parts stand at different heights.
 bool tells_ranges(const Plan& plan);
 
-/// Statistics of a layer's contours and stored paths, without the length of the paths.
+/// Statistics of a layer's contours and stored paths, without area and the length of the paths.
 PathFacts facts_of(const Sections::Work& work);
 
 /// The text buffer of a writer, with a callback at a size limit.

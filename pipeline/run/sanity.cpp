@@ -89,12 +89,15 @@ void Sanity::add_left(const Layer& layer, const Runs& image) {
   tally_->add_left(layer, image, mirror == Mirror::kX || mirror == Mirror::kXY, mirror == Mirror::kY || mirror == Mirror::kXY);
 }
 
-void Sanity::add_contours(const Layer& layer, const slice::LayerContours& contours) {
+double Sanity::add_contours(const Layer& layer, const slice::LayerContours& contours) {
+  __int128 all = 0;
   for (std::uint32_t b = 0; b + 1 < contours.body.size(); ++b) {
     __int128 doubled = 0;
     for (std::uint32_t c = contours.body[b]; c < contours.body[b + 1]; ++c) doubled += doubled_area(contours.contours[c]);
     if (doubled != 0) tally_->add_area(b, layer, square_mm(doubled));
+    all += doubled;
   }
+  return square_mm(all);
 }
 
 std::string Sanity::why_nothing() const {

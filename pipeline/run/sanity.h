@@ -38,7 +38,8 @@ class Sanity {
   void add_image(const Layer& layer, const Runs& image) { tally_->add_image(layer, image); }
   /// The image without its bleed, mirrored as the job asks.
   void add_left(const Layer& layer, const Runs& image);
-  void add_contours(const Layer& layer, const slice::LayerContours& contours);
+  /// returns  mm2 between the contours
+  double add_contours(const Layer& layer, const slice::LayerContours& contours);
 
   // --- from one thread at a time
   /// filled  whether the layer has pixels, contours or moves
