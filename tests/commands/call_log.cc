@@ -1,6 +1,6 @@
 // tests/commands/call_log.cc: loaded before the program (LD_PRELOAD), logs what it syncs and renames, in order.
 //
-// LAMINA_CALL_LOG    the log: "fsync PATH", "syncfs PATH", "rename FROM TO"
+// LAMINA_CALL_LOG    the log: "fsync PATH", "syncfs PATH", "begin PATH" (sync_file_range), "rename FROM TO"
 // LAMINA_FAIL_SYNC   syncs of paths that contain this text fail
 // LAMINA_SYNC_ERRNO  with this error number
 #include <dlfcn.h>
@@ -50,6 +50,11 @@ extern "C" {
 int fsync(int file) { return sync_call("fsync", file); }
 int fdatasync(int file) { return sync_call("fdatasync", file); }
 int syncfs(int file) noexcept { return sync_call("syncfs", file); }
+
+int sync_file_range(int file, off64_t offset, off64_t bytes, unsigned flags) {
+  log_line("begin " + path_of(file));
+  return pass_on<int(int, off64_t, off64_t, unsigned)>("sync_file_range", file, offset, bytes, flags);
+}
 
 int rename(const char* from, const char* to) noexcept {
   log_line(std::string("rename ") + from + " " + to);

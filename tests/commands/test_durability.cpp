@@ -96,6 +96,14 @@ TEST_F(Durability, WithLayerEachFileIsSyncedBeforeItsNameAndTheNamesBeforeTheirR
       count(calls("extrude part.stl --machine anet-a8 --layer 0.1 --quiet -o x.gcode --sync layer"), "fsync x.gcode.part"), 2u);
 }
 
+TEST_F(Durability, TheDiskBeginsWithALargeFileWhileItGrows) {
+  const std::string line = "slice part.stl --layer 0.0004 --quiet -o ";  // 7,500 layers of some 400 bytes
+  const Lines lines = calls(line + "out");
+  const auto begins = std::ranges::find(lines, "begin out/part.svg.part");
+  EXPECT_LT(begins, std::ranges::find(lines, "fsync out/part.svg.part"));
+  EXPECT_EQ(count(calls(line + "off --sync off"), "begin"), 0u);
+}
+
 TEST_F(Durability, OffSyncsNothingAndGivesTheSameBytes) {
   for (const std::string line :
        {"jet part.stl --layer 0.5 --machine hp45 --quiet -o ", "slice part.stl --layer 0.5 --quiet -o ",
