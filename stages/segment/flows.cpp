@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "stages/data/input/file_reader.h"
+#include "stages/data/picture/ticks.h"
 #include "stages/data/text/number_text.h"
 #include "stages/data/text/table.h"
 
@@ -106,32 +107,66 @@ Result<std::vector<FlowGroup>> read_flows(FileReader& file, const Medium& medium
   return Error{Fault::kInput, path + ": holds no measurements; the first line names the columns, the others hold numbers"};
 }
 
+namespace {
+
+constexpr const char *kInk = "000000", *kPale = "dddddd";
+constexpr double kPlotLeft = 80, kPlotTop = 50, kPlotWidth = 520, kPlotHeight = 320;
+
+/// Pressure gradients in a unit that keeps their numbers short.
+struct GradientUnit {
+  double pa_m;
+  const char* name;
+};
+GradientUnit unit_of(double most_pa_m) {
+  return most_pa_m >= 1e6   ? GradientUnit{1e6, "MPa/m"}
+         : most_pa_m >= 1e3 ? GradientUnit{1e3, "kPa/m"}
+                            : GradientUnit{1, "Pa/m"};
+}
+
+/// Grid lines with their numbers, from 0 to the largest value of each axis.
+void draw_axes(double most_v, double most_y, const GradientUnit& unit, Plot& plot) {
+  const double bottom = kPlotTop + kPlotHeight, v_step = tick_step(most_v, 6), y_step = tick_step(most_y / unit.pa_m, 6);
+  for (int i = 0; i * v_step <= most_v * (1 + 1e-9); ++i) {
+    const double x = kPlotLeft + kPlotWidth * i * v_step / most_v;
+    plot.boxes.push_back({x, kPlotTop, 1, kPlotHeight, kPale});
+    plot.texts.push_back({x, bottom + 18, 12, Plot::Anchor::kMiddle, kInk, fmt::format("{:.4g}", i * v_step)});
+  }
+  for (int i = 0; i * y_step * unit.pa_m <= most_y * (1 + 1e-9); ++i) {
+    const double y = bottom - kPlotHeight * i * y_step * unit.pa_m / most_y;
+    plot.boxes.push_back({kPlotLeft, y, kPlotWidth, 1, kPale});
+    plot.texts.push_back({kPlotLeft - 8, y + 4, 12, Plot::Anchor::kEnd, kInk, fmt::format("{:.4g}", i * y_step)});
+  }
+  plot.lines.push_back({{{kPlotLeft, kPlotTop}, {kPlotLeft, bottom}, {kPlotLeft + kPlotWidth, bottom}}, kInk});
+  plot.texts.push_back(
+      {kPlotLeft + kPlotWidth / 2, bottom + 40, 13, Plot::Anchor::kMiddle, kInk, "superficial velocity (m/s)"});
+  plot.texts.push_back(
+      {10, kPlotTop - 10, 13, Plot::Anchor::kStart, kInk, fmt::format("pressure drop / length ({})", unit.name)});
+}
+
+}  // namespace
+
 Plot draw_fit(const FlowGroup& group, const Permeability& fit) {
-  constexpr const char* kInk = "000000";
   double most_v = 0, most_y = 0;
   for (const auto& p : group.points) {
     most_v = std::max(most_v, p.velocity_m_s);
     most_y = std::max(most_y, p.gradient_pa_m);
   }
-  const auto x = [&](double v) { return 60 + 520 * v / most_v; };
-  const auto y = [&](double g) { return 360 - 320 * g / most_y; };
+  const auto x = [&](double v) { return kPlotLeft + kPlotWidth * v / most_v; };
+  const auto y = [&](double g) { return kPlotTop + kPlotHeight - kPlotHeight * g / most_y; };
   Plot plot;
-  plot.width = 620;
-  plot.height = 420;
-  plot.lines.push_back({{{60, 30}, {60, 360}, {590, 360}}, kInk});
+  plot.width = 640;
+  plot.height = 430;
+  // No axis where nothing flows or no pressure drops.
+  if (most_v > 0 && most_y > 0) draw_axes(most_v, most_y, unit_of(most_y), plot);
   auto& curve = plot.lines.emplace_back(Plot::Line{{}, "cc3333"});
   for (int i = 0; i <= 100; ++i) {
     const double v = most_v * i / 100;
     curve.points.push_back({x(v), y(fit.linear * v + fit.quadratic * v * v)});
   }
   for (const auto& p : group.points) plot.dots.push_back({x(p.velocity_m_s), y(p.gradient_pa_m), 2.5, "2266cc"});
-  const auto put = [&](double left, double baseline, std::string line) {
-    plot.texts.push_back({left, baseline, 12, Plot::Anchor::kStart, kInk, std::move(line)});
-  };
-  put(300, 400, fmt::format("velocity, 0 to {:.4g} m/s", most_v));
-  put(10, 20,
-      fmt::format("pressure drop / length, 0 to {:.4g} Pa/m; k1 {:.2f} D, k2 {:.4g} m, R2 {:.5f} {}", most_y,
-                  fit.k1_m2 / kDarcy, fit.k2_m, fit.r_squared, group.name));
+  plot.texts.push_back({10, 20, 13, Plot::Anchor::kStart, kInk,
+                        fmt::format("{}k1 {:.2f} D, k2 {:.4g} m, R2 {:.5f}", group.name.empty() ? "" : group.name + ": ",
+                                    fit.k1_m2 / kDarcy, fit.k2_m, fit.r_squared)});
   return plot;
 }
 

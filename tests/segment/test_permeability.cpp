@@ -1,8 +1,10 @@
 // Tables 18 to 25 of Di Nisio 2022.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
+#include "stages/segment/flows.h"
 #include "stages/segment/permeability.h"
 #include "tests/segment/table.h"
 
@@ -61,6 +63,26 @@ TEST(Permeability, ExactParabolasComeBackExactlyAndBadDataIsRefused) {
   EXPECT_FALSE(fit_permeability(std::span(points).first(2), {}).ok());
   for (auto& p : points) p.velocity_m_s = 0.3;
   EXPECT_FALSE(fit_permeability(points, {}).ok());
+}
+
+TEST(Permeability, ThePlotHasRoundNumbersWhereTheirValuesLie) {
+  FlowGroup group{"C3", {}};
+  for (int i = 1; i <= 6; ++i) group.points.push_back({0.1 * i, 3e5 * 0.1 * i + 2e4 * 0.01 * i * i});
+  const auto fit = fit_permeability(group.points, {2e-5, 1.2});
+  ASSERT_TRUE(fit.ok());
+  const Plot plot = draw_fit(group, *fit);
+  const auto text = [&](const std::string& line) {
+    const auto found = std::ranges::find(plot.texts, line, &Plot::Text::line);
+    return found == plot.texts.end() ? Plot::Text() : *found;
+  };
+  EXPECT_NEAR(text("0.4").x, plot.dots[3].x, 1e-9);
+  EXPECT_NEAR(text("0.6").x, plot.dots[5].x, 1e-9);
+  // 187.2 kPa/m at most: 0, 50, 100, 150.
+  const double per_kpa = (text("150").baseline - text("50").baseline) / 100;
+  EXPECT_NEAR(text("100").baseline, text("50").baseline + 50 * per_kpa, 1e-9);
+  EXPECT_NEAR(plot.dots[5].y - plot.dots[0].y, (187.2 - 30.2) * per_kpa, 1e-9);
+  EXPECT_EQ(text("pressure drop / length (kPa/m)").size, 13);
+  EXPECT_EQ(text("superficial velocity (m/s)").size, 13);
 }
 
 }  // namespace

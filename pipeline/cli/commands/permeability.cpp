@@ -106,6 +106,9 @@ Outcome run_permeability(const Arguments& arguments, Context& context) {
     if (plot.empty() || &group != &groups->front()) continue;
     if (Status status = write_plot(plot, draw_fit(group, *fit)); !status) return status;
   }
+  if (!plot.empty() && groups->size() > 1) {
+    context.say(fmt::format("note: {} is of {}, the first of {} configurations", plot, groups->front().name, groups->size()));
+  }
   if (const std::string warning = segment::odd_about(settings->fluid); !warning.empty()) {
     context.say_text(fmt::format("warning   {}\n", warning));
     json["warnings"].push_back(warning);

@@ -6,6 +6,8 @@
 #include <cmath>
 #include <utility>
 
+#include "stages/data/picture/ticks.h"
+
 namespace lamina::heights {
 namespace {
 
@@ -63,15 +65,6 @@ std::vector<std::pair<double, double>> outline(const Parts& parts, double top_nm
     }
   }
   return reach;
-}
-
-/// 1, 2 or 5 times a power of ten, so that about `count` steps cover `span`.
-double tick_step(double span, int count) {
-  const double raw = span / count, power = std::pow(10, std::floor(std::log10(raw)));
-  for (const double factor : {1.0, 2.0, 5.0}) {
-    if (factor * power >= raw) return factor * power;
-  }
-  return 10 * power;
 }
 
 double y_of(double nm, double top_nm) { return kTop + kPlotHeight * (1 - nm / top_nm); }
