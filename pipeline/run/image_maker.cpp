@@ -2,9 +2,11 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <nlohmann/json.hpp>
 #include <numeric>
 
+#include "pipeline/machine/materials.h"
 #include "stages/data/text/number_text.h"
 #include "stages/data/text/readable.h"
 #include "stages/replay/time/totals.h"
@@ -18,7 +20,10 @@ class ImageMaker : public Maker {
  public:
   ImageMaker(const Plan& plan, Sanity& sanity, const FlowLimits& limits)
       : plan_(plan), sanity_(sanity), imager_(plan), files_(plan), work_(limits.most_in_flight), made_(limits.record_slots) {
-    for (const JobMaterial& material : plan.images->materials.used) materials_.emplace_back(material.name, 0);
+    for (const JobMaterial& material : plan.images->materials.used) {
+      materials_.emplace_back(material.name, 0);
+      unfed_.push_back({material.name});
+    }
   }
 
   std::uint64_t bytes_of(std::uint32_t layer) const override {
@@ -125,7 +130,21 @@ class ImageMaker : public Maker {
     ImageNotes notes;
   };
 
+  /// Counts what lies in the powder of another vat.
+  void add_unfed(const LayerRecord& record) {
+    std::vector<std::uint64_t> pixels;
+    for (const ImageRecord& image : record.images) pixels.push_back(image.set_pixels);
+    const Materials& materials = plan_.images->materials;
+    const auto fed = vats_of_layer(plan_.images->machine->machine, materials, pixels);
+    for (std::size_t m = 0; fed && m < pixels.size(); ++m) {
+      if (pixels[m] == 0 || std::ranges::find(*fed, materials.used[m].vat) != fed->end()) continue;
+      if (unfed_[m].layers++ == 0) unfed_[m].first = record.layer;
+      unfed_[m].pixels += pixels[m];
+    }
+  }
+
   void add(const LayerRecord& record) {
+    if (plan_.images->machine && record.images.size() > 1) add_unfed(record);
     const PixelGrid& grid = plan_.images->grid;
     set_pixels_ += record.set_pixels;
     moved_pixels_ += record.program.moved;
@@ -151,10 +170,12 @@ class ImageMaker : public Maker {
   bool timed_ = true;              // layers that an earlier build left are not
   double volume_mm3_ = 0;
   std::vector<std::pair<std::string, std::uint64_t>> materials_;  // name, set pixels
+  std::vector<sanity::UnfedPowder> unfed_;                        // by material
 };
 
 void ImageMaker::warn(const Summary&, std::vector<Warning>& warnings) const {
   sanity::warn_of_lost_pixels(lost_pixels_, warnings);
+  for (const sanity::UnfedPowder& powder : unfed_) sanity::warn_of_unfed(powder, warnings);
   const std::vector<std::uint32_t>& part = plan_.scene->part_of_instance;
   rows_.tell(part.empty() ? std::string() : plan_.scene->parts[part[rows_.first_capped()]].path, warnings);
 }

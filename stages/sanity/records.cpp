@@ -53,6 +53,17 @@ void warn_of_lost_pixels(std::uint64_t pixels, std::vector<Warning>& warnings) {
                    readable_count(pixels))});
 }
 
+void warn_of_unfed(const UnfedPowder& powder, std::vector<Warning>& warnings) {
+  if (powder.pixels == 0) return;
+  const double z = mm(powder.first.plane());
+  warnings.push_back(
+      {"mixed-powders",
+       fmt::format("{} pixels of {} in {} layers lie in another powder, whose vat feeds those layers, first in layer {} at z "
+                   "{:.3f} mm; powder.vat_rule says which vat feeds, refuse ends such a job",
+                   readable_count(powder.pixels), one_line(powder.name), powder.layers, powder.first.index, z),
+       "", powder.first.index, z});
+}
+
 Status refuse_warnings(std::span<const Warning> warnings) {
   if (warnings.empty()) return {};
   std::string text = fmt::format("--strict: {} warning{}", warnings.size(), warnings.size() == 1 ? "" : "s");

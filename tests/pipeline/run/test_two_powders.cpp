@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <atomic>
 #include <cstdlib>
 #include <filesystem>
@@ -168,6 +169,12 @@ TEST_F(TwoPowders, TheVatsThatFeedALayerFollowTheRuleOfTheProfileAndAreChecked) 
     }
     EXPECT_GT(mixed, 0u);
     EXPECT_GT(single, 0u);
+    // Whose binder falls into the other powder is told.
+    const auto told = std::ranges::find(summary->warnings, "mixed-powders", &Warning::code);
+    EXPECT_EQ(told == summary->warnings.end(), rule == "both") << rule;
+    if (rule == "first" || rule == "second") {
+      EXPECT_NE(told->text.find(fmt::format(" in {} layers", mixed)), std::string::npos) << told->text;
+    }
   }
   Job made = job(parts, "refused", profile("vat_rule = \"refuse\""));
   const auto refused = run(made);
