@@ -188,6 +188,7 @@ class Planner {
   Status index_sections() {
     if (images() && !beads_) return {};
     Job cut = job();  // the job itself stays as asked, so that a file of it means the same in another command
+    if (images()) cut.slice = SliceRequest();  // of contours and toolpaths
     cut.slice.tolerance_um = tolerance_um_of(cut, plan_.product);
     auto sections = Sections::make(cut, *plan_.scene, std::move(schedule_), std::move(fillings_));
     if (!sections) return sections.error();
