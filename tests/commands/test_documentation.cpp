@@ -131,5 +131,13 @@ TEST(Documentation, EveryCommandLineInItCanBeTyped) {
   EXPECT_GT(checked, 10u);
 }
 
+// Wrong options (2) and bad parts (3) fail in every share and every time.
+TEST(Documentation, KubernetesDoesNotTryAgainWhatCannotSucceed) {
+  const std::string page = read_text(kRoot / "scripts/cluster/kubernetes_jet.yaml");
+  const std::regex rule("action: FailJob\\s+onExitCodes: \\{containerName: (share|merge), operator: In, values: \\[2, 3[,\\]]");
+  EXPECT_EQ(std::distance(std::sregex_iterator(page.begin(), page.end(), rule), std::sregex_iterator()), 2);
+  EXPECT_NE(read_text(kRoot / "scripts/cluster/Containerfile").find("lamina"), std::string::npos);
+}
+
 }  // namespace
 }  // namespace lamina::test

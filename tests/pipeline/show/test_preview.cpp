@@ -4,6 +4,7 @@
 
 #include <cstdio>
 #include <cstdlib>
+#include <fstream>
 
 #include "stages/write/file.h"
 #include "stages/write/manifest/manifest.h"
@@ -110,6 +111,14 @@ TEST_F(Preview, ASingleLayerIsNeverWiderThanAskedFor) {
 TEST_F(Preview, AnInterruptedJobIsDrawnAsFarAsItIs) {
   fs::rename(folder_ / "manifest.json", folder_ / "manifest.json.part");
   EXPECT_EQ(preview(directory() + " -o " + sheet()).code, 0);
+  // Of layers that are not there yet none is counted as drawn.
+  std::ifstream whole(folder_ / "manifest.json.part");
+  std::string text;
+  for (std::string line; std::getline(whole, line) && line.find("000013.tif") == std::string::npos;) text += line + "\n";
+  std::ofstream(folder_ / "manifest.json.part") << text;
+  const Outcome part = preview(directory() + " -o " + sheet());
+  EXPECT_EQ(part.code, 0);
+  EXPECT_NE(part.output.find("12 of 13 layers that are there, of 20"), std::string::npos) << part.output;
 }
 
 TEST_F(Preview, WrongUseIsExitCodeTwoAndOneLine) {
