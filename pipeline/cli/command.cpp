@@ -75,7 +75,8 @@ const Command* find_command(std::string_view name) {
 std::string unknown_command(std::string_view name) {
   std::vector<std::string_view> names;
   for (const Command* command : kCommands) names.push_back(command->name);
-  return fmt::format("'{}' is no command{}; lamina --help lists them", name.substr(0, 80), suggest(name, names));
+  const std::string near = suggest(name, names);
+  return fmt::format("'{}' is no command{}", name.substr(0, 80), near.empty() ? "; lamina --help lists them" : near);
 }
 
 CommandSpec spec_of(const Command& command) {

@@ -45,6 +45,9 @@ Status check_together(const KeyChoice& choice, const Arguments& arguments, const
   if (choice.has("segment", "fill") && !fill.empty() && !pattern.empty() && fill != pattern && fill != "segmented") {
     return at_option("--fill", fmt::format("{}, but --pattern {}: two patterns; give one of them", fill, pattern));
   }
+  if (pattern == "none" && job.segment.all.on) {
+    return at_option("--pattern", "none, but lines are segmented; leave it out, or add --fill none");
+  }
   if (job.segment.any()) return {};
   for (const JobKey& key : job_keys()) {
     if (key.section != "segment" || key.name == "fill" || key.name == "on" || key.flag.empty()) continue;

@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "pipeline/job/keys.h"
+#include "pipeline/machine/extruder.h"
 
 namespace lamina::pipeline {
 namespace {
@@ -99,6 +100,12 @@ constexpr std::string_view kOfGcode[] = {"--nozzle-temperature", "--bed-temperat
                                          "--relative-extrusion", "--print-speed",     "--wall-speed", "--first-layer-speed",
                                          "--travel-speed"};
 
+/// Whether a key has an effect on this product; images are filled by beads.
+bool decides_in(Product product, const JobKey& key, const Job& job) {
+  if (key.decides == 0 || (key.decides & bit(product)) != 0) return true;
+  return product == Product::kImages && fills(job) && (key.section == "fill" || key.section == "segment");
+}
+
 }  // namespace
 
 Status check_needs(Product product, const Arguments& arguments, const Job& job, bool study) {
@@ -132,9 +139,17 @@ std::vector<std::string> notes_on_needs(Product product, const Arguments& argume
     notes.emplace_back("--layer does nothing here, layers are as thick as --thickness says; leave it out");
   }
   const bool hollow = product == Product::kImages && fills(job) && !lays_lines(product, job);
-  if (hollow && !arguments.has("--pattern") && !arguments.has("--fill")) {
+  if (hollow && !is_named(job, "fill.pattern") && !is_named(job, "segment.fill")) {
     notes.emplace_back(
         "inside of the walls nothing is asked for, powder stays loose there; add --fill raster, or --fill none if it is meant");
+  }
+  for (const std::string& assignment : arguments.all("--set")) {
+    const auto key = std::ranges::find_if(job_keys(), [&](const JobKey& k) {
+      return assignment.starts_with(fmt::format("{}.{}=", k.section, k.name)) && !decides_in(product, k, job);
+    });
+    if (key != job_keys().end()) {
+      notes.push_back(fmt::format("--set {}: {}.{} decides nothing here; leave it out", assignment, key->section, key->name));
+    }
   }
   return notes;
 }

@@ -80,6 +80,7 @@ std::string read_filling(std::string_view word, Job& job) {
     return fmt::format("'{}' is a rule for shells that overlap; give --fill-rule {} (image.fill in a file)", word, word);
   }
   const std::string wrong = fill_settings_keys().front().read(word, job.fill.all);
+  if (wrong.empty()) job.segment.all.on = false;  // a pattern instead of the segmented lines of a file
   return wrong.empty() ? wrong : wrong + "; or segmented";
 }
 std::vector<std::string_view> fillings() {

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <vector>
 
 #include "pipeline/job/decisions.h"
@@ -32,6 +33,15 @@ Result<Profile> find(const std::string& name_or_file, std::span<const ShippedPro
   return text ? read(*text, name_or_file) : Result<Profile>(text.error());
 }
 
+bool is_one_of(std::span<const ShippedProfile> shipped, std::string_view name) {
+  return std::ranges::find(shipped, name, &ShippedProfile::name) != shipped.end();
+}
+
+/// Whether a profile has a section.
+bool has_section(std::string_view text, std::string_view section) {
+  return text.starts_with(section) || text.find(fmt::format("\n{}", section)) != std::string_view::npos;
+}
+
 }  // namespace
 
 std::vector<std::string_view> names_of(std::span<const ShippedProfile> profiles) {
@@ -41,6 +51,11 @@ std::vector<std::string_view> names_of(std::span<const ShippedProfile> profiles)
 }
 
 Result<Machine> read_machine(std::string_view text, const std::string& where) {
+  if (has_section(text, "[material]") && !has_section(text, "[head]")) {
+    const auto other = read_extruder(text, where);
+    return Error{Fault::kUsage,
+                 other ? where + ": is the profile of an extrusion printer; lamina extrude takes it" : other.error().message};
+  }
   count(Decision::kMachine);
   std::vector<std::string_view> dialects;
   for (const auto& dialect : write::dialects()) dialects.push_back(dialect.id);
@@ -48,6 +63,9 @@ Result<Machine> read_machine(std::string_view text, const std::string& where) {
 }
 
 Result<ExtruderProfile> read_extruder(std::string_view text, const std::string& where) {
+  if (has_section(text, "[head]") && !has_section(text, "[material]")) {
+    return Error{Fault::kUsage, where + ": is the profile of a powder printer; lamina jet takes it"};
+  }
   count(Decision::kMachine);
   auto profile = read::read_extruder(text, where, {.machine = {}, .calibration = segment::anet_a8_calibration()});
   if (!profile) return profile;
@@ -59,12 +77,16 @@ Result<ExtruderProfile> read_extruder(std::string_view text, const std::string& 
 
 Result<Machine> find_machine(const std::string& name_or_file) {
   return find(name_or_file, shipped_machines(), read_machine, [&](const std::string& near, const std::string& names) {
+    if (is_one_of(shipped_extruders(), name_or_file))
+      return fmt::format("'{}' is an extrusion printer, of lamina extrude; name a profile or one of {}", name_or_file, names);
     return fmt::format("no machine '{}'; name a profile (a file that ends in .toml) or one of {}{}", name_or_file, names, near);
   });
 }
 
 Result<ExtruderProfile> find_extruder(const std::string& name_or_file) {
   return find(name_or_file, shipped_extruders(), read_extruder, [&](const std::string& near, const std::string& names) {
+    if (is_one_of(shipped_machines(), name_or_file))
+      return fmt::format("'{}' is a powder printer, of lamina jet; name a profile or one of {}", name_or_file, names);
     return fmt::format("no extrusion printer '{}'{}; name a profile (a file that ends in .toml) or one of {}",
                        one_line(name_or_file), near, names);
   });

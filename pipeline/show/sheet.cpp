@@ -83,6 +83,9 @@ Result<Preview> draw_series(const view::LayerSeries& series, const PreviewReques
     if (!svg) return draw_series_sheet(series, request);
     return Error{Fault::kUsage, "-o: an SVG shows one layer, choose it by --layer K; several are drawn as PNG"};
   }
+  if (svg && request.width) {
+    return Error{Fault::kUsage, "--width: is of pictures of pixels, an SVG is in mm; leave it out, or name a .png"};
+  }
   Result<LayerShapes> shapes = series.layer(request.layers.layer.value_or(series.count / 2));
   if (!shapes) return shapes.error();
   const std::string said = fmt::format("{}: {}", request.output, shapes->title);

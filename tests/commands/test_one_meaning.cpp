@@ -46,6 +46,80 @@ TEST_F(OneMeaning, AJobFileAndACommandLineOfTheSameWordsGiveTheSameToolpaths) {
   EXPECT_EQ(layers("part.stl --set layers.thickness_mm=0.1"), 40);
 }
 
+// The same words for bitmaps, slices and tables; saved jobs give them once more.
+TEST_F(OneMeaning, AJobFileACommandLineAndASavedJobAgreeInEveryCommand) {
+  const struct {
+    const char *command, *words, *file;
+  } rows[] = {
+      {"jet", "--bed 60x50 --dpi 100x200 --layer 1 --mirror x --format png",
+       "[bed]\nsize_mm = [60, 50]\ndpi = [100, 200]\n[layers]\nthickness_mm = 1\n[image]\nmirror = 'x'\nformat = 'png'\n"},
+      {"jet", "--bed 40x40 --dpi 200 --layer 1 --fill segmented --thin 2 --shell 1",
+       "[bed]\nsize_mm = [40, 40]\ndpi = 200\n[layers]\nthickness_mm = 1\n[segment]\non = true\nthin_mm = 2\n"
+       "[dose]\nshell_mm = 1\n"},
+      {"jet", "--machine nuferbj --layer 1 --blocked 3,4 --bleed 50x80",
+       "[machine]\nprofile = 'nuferbj'\nblocked = [3, 4]\n[layers]\nthickness_mm = 1\n[dose]\nbleed_um = [50, 80]\n"},
+      {"slice", "--layer 1 --format cli --empty-first-layer --fill raster --bead-gap 0.3,0.1 --angle 30",
+       "[layers]\nthickness_mm = 1\n[slice]\nformat = 'cli'\nempty_first_layer = true\n[fill]\npattern = 'raster'\n"
+       "gap_mm = [0.3, 0.1]\nangle_deg = 30\n"},
+      {"slice", "--layer 1 --walls 2 --fill none --offset 0.1 --tolerance 5",
+       "[layers]\nthickness_mm = 1\n[fill]\nwalls = 2\n[slice]\noffset_mm = 0.1\ntolerance_um = 5\n"},
+      {"heights", "--heights angle --thickness 0.5,1 --adapt-angle 30 --cover-top",
+       "[heights]\nmode = 'angle'\nthickness_mm = '0.5,1'\nadapt_angle_deg = 30\ncover_top = true\n"},
+  };
+  for (const auto& row : rows) {
+    const std::string command = row.command, words = std::string(" ") + row.words;
+    const bool table = command == "heights";
+    const std::string end = table ? ".txt" : "";
+    write_text(folder / "job.toml", std::string("[[part]]\npath = 'part.stl'\n") + row.file);
+    done(command + " part.stl --quiet --overwrite -o a" + end + words);
+    done(command + " --job job.toml --quiet --overwrite -o b" + end);
+    done(command + " part.stl --quiet --save-job saved.toml" + (table ? " -o x.txt --overwrite" : " --dry-run") + words);
+    done(command + " --job saved.toml --quiet --overwrite -o c" + end);
+    const auto bytes = [&](const std::string& name) {
+      if (table) return read_text(folder / (name + end));
+      std::filesystem::remove(folder.path() / name / "job.toml");
+      return tree_text(folder.path() / name);
+    };
+    EXPECT_EQ(bytes("a"), bytes("b")) << command << words;
+    EXPECT_EQ(bytes("a"), bytes("c")) << command << words << ", saved";
+  }
+}
+
+TEST_F(OneMeaning, ASavedJobOfHeightsIsTheOneAskedFor) {
+  done("heights part.stl --compare --thickness 0.5,1 --quiet -o table --save-job saved.toml");
+  const std::string saved = read_text(folder / "saved.toml");
+  EXPECT_NE(saved.find("size_mm = [490, 380]"), std::string::npos) << saved;
+  EXPECT_NE(saved.find("mode = \"uniform\""), std::string::npos) << saved;
+}
+
+TEST_F(OneMeaning, AFillingOfTheCommandLineTakesThePlaceOfSegmentedLinesOfAFile) {
+  write_text(folder / "job.toml", "[machine]\nprofile = 'anet-a8'\n[segment]\non = true\n[[part]]\npath = 'part.stl'\n");
+  const auto summary = [&](const std::string& words) {
+    return done("extrude --job job.toml --layer 0.3 --dry-run " + words).err;
+  };
+  EXPECT_NE(summary("").find("segments  "), std::string::npos);
+  EXPECT_EQ(summary("--fill raster").find("segments  "), std::string::npos);
+  EXPECT_EQ(summary("--fill none").find("segments  "), std::string::npos);
+  EXPECT_NE(summary("--fill segmented").find("segments  "), std::string::npos);
+  for (const char* line : {"extrude --job job.toml --dry-run --pattern none",
+                           "jet part.stl --layer 1 --dry-run --fill segmented --pattern none"}) {
+    const Outcome refused = run(line);
+    EXPECT_EQ(refused.code, 2) << line;
+    EXPECT_NE(refused.err.find("--pattern: none, but lines are segmented"), std::string::npos) << refused.err;
+  }
+}
+
+// [slice] is of contours and toolpaths; a manifest of images does not hold it, so that it must not change them.
+TEST_F(OneMeaning, KeysOfContoursDoNotMoveFilledImages) {
+  const std::string call = "jet part.stl --bed 40x40 --dpi 200 --layer 1 --fill raster --bead-gap 0.3 --quiet -o ";
+  done(call + "plain");
+  const Outcome moved = done(call + "moved --set slice.offset_mm=0.5");
+  EXPECT_EQ(tree_text(folder.path() / "plain"), tree_text(folder.path() / "moved"));
+  const Outcome told = done("jet part.stl --layer 1 --dry-run --set slice.offset_mm=0.5");
+  EXPECT_NE(told.err.find("note: --set slice.offset_mm=0.5: slice.offset_mm decides nothing here"), std::string::npos)
+      << told.err;
+}
+
 TEST_F(OneMeaning, FillIsWhatIsLaidInside) {
   for (const std::string command : {"jet", "slice", "extrude"}) {
     const std::string call = command + " part.stl --layer 0.3 --dry-run --quiet ";
@@ -63,6 +137,7 @@ TEST_F(OneMeaning, FillIsWhatIsLaidInside) {
 
 TEST_F(OneMeaning, OptionsThatDoNothingHereAreRefused) {
   done("jet part.stl --bed 60x60 --dpi 100 --layer 1 --quiet -o out");
+  done("extrude part.stl --quiet -o beads.gcode");
   const struct {
     const char *line, *words;
   } rows[] = {
@@ -95,6 +170,12 @@ TEST_F(OneMeaning, OptionsThatDoNothingHereAreRefused) {
       {"preview out --step 3 -o a.png", "--step: is of a swath"},
       {"preview out --swath 1 --count 3 -o a.png", "--swath: is drawn in one layer"},
       {"permeability drops.csv --length 5 --area 3 --diameter 3", "--area and --diameter exclude each other"},
+      {"info part.stl --repair off --weld 3", "--weld: is of repair"},
+      {"export part.stl --no-repair --weld 3 -o x.stl", "--weld: is of repair"},
+      {"export part.stl --at 1,1 --gap 3 -o x.stl", "--gap: is between parts"},
+      {"report beads.gcode --parts part.stl -o a.html", "--parts: is of jobs of images"},
+      {"preview beads.gcode --layer 2 --width 500 -o a.svg", "--width: is of pictures of pixels"},
+      {"manual jet -o pages", "--output: is for the pages of all commands"},
   };
   for (const auto& row : rows) {
     const Outcome refused = run(row.line);
@@ -126,6 +207,13 @@ TEST_F(OneMeaning, WhatIsHarmlessButDoesNothingIsTold) {
   const std::string fitted = "jet part.stl --dry-run --heights cusp --thickness 0.5,1";
   EXPECT_NE(done(fitted + " --layer 1").err.find("note: --layer does nothing here"), std::string::npos);
   EXPECT_EQ(done(fitted).err.find("note:"), std::string::npos);
+  EXPECT_NE(done("extrude part.stl --dry-run --set bed.dpi=600").err.find("note: --set bed.dpi=600: bed.dpi decides nothing"),
+            std::string::npos);
+  EXPECT_EQ(done("extrude part.stl --dry-run --set fill.walls=2 --set run.threads=1").err.find("note:"), std::string::npos);
+  EXPECT_EQ(done("jet part.stl --layer 1 --dry-run --fill raster --set fill.loops=2").err.find("note:"), std::string::npos);
+  write_text(folder / "walls.toml", "[layers]\nthickness_mm = 1\n[fill]\nwalls = 2\n[[part]]\npath = 'part.stl'\n");
+  EXPECT_NE(done("jet --job walls.toml --dry-run").err.find("note: inside of the walls"), std::string::npos);
+  EXPECT_EQ(done("jet --job walls.toml --dry-run --set fill.pattern=none").err.find("note:"), std::string::npos);
   const std::string slices = "slice part.stl --layer 1 --walls 1 --overwrite -o out --format ";
   const Outcome dropped = done(slices + "3mf"), drawn = done(slices + "svg");
   EXPECT_NE(dropped.err.find("slices of 3MF hold contours only"), std::string::npos) << dropped.err;
@@ -166,6 +254,10 @@ TEST_F(OneMeaning, OutputsHaveTheNamesAndFoldersThatTheirReadersExpect) {
   const Outcome batch = run_lamina({"batch", "parts", "--with", "extrude --layer 0.4", "-o", "out", "--quiet"}, folder.path());
   EXPECT_EQ(batch.code, 0) << batch.err;
   EXPECT_TRUE(std::filesystem::exists(folder / "out/part.gcode"));
+  // A saved job is of the command that saved it.
+  done("extrude parts/part.stl --layer 0.4 --dry-run --quiet --save-job parts/tube.toml");
+  done("batch parts/tube.toml -o saved --quiet");
+  EXPECT_TRUE(std::filesystem::exists(folder / "saved/tube.gcode"));
   done("manual -o pages/man1");
   EXPECT_TRUE(std::filesystem::exists(folder / "pages/man1/lamina-jet.1"));
 }
@@ -184,7 +276,17 @@ TEST_F(OneMeaning, WordsThatAreWrongAreAnsweredByWhatIsRight) {
       {"preview nosuchdir -o x.svg", 2, "no such directory"},
       {"batch part.stl --memory 1K -o out", 2, "give 48M or more"},
       {"machines --check nosuch", 2, "no machine 'nosuch'"},
+      {"jet part.stl --machine marlin --dry-run", 2, "'marlin' is an extrusion printer, of lamina extrude"},
+      {"extrude part.stl --machine nuferbj --dry-run", 2, "'nuferbj' is a powder printer, of lamina jet"},
+      {"jet part.stl --machine filament.toml --dry-run", 2, "filament.toml: is the profile of an extrusion printer"},
+      {"extrude part.stl --machine powder.toml --dry-run", 2, "powder.toml: is the profile of a powder printer"},
+      {"machines --check wrong.toml", 2, "wrong.toml:2:14: material.nozzle_mmm: no such key; did you mean 'nozzle_mm'?"},
+      {"manual jet slice", 2, "name one command"},
+      {"jett part.stl", 2, "'jett' is no command; did you mean 'jet'?\n"},
   };
+  write_text(folder / "filament.toml", done("machines --show marlin").out);
+  write_text(folder / "powder.toml", done("machines --show nuferbj").out);
+  write_text(folder / "wrong.toml", "[material]\nnozzle_mmm = 0.4\n");
   for (const auto& row : rows) {
     const Outcome outcome = run(row.line);
     EXPECT_EQ(outcome.code, row.code) << row.line << "\n" << outcome.err;

@@ -4,6 +4,7 @@
 
 #include "pipeline/cli/command.h"
 #include "pipeline/cli/keys.h"
+#include "pipeline/cli/needs.h"
 #include "pipeline/job/file.h"
 #include "pipeline/plan/plan.h"
 #include "pipeline/run/summary.h"
@@ -138,6 +139,7 @@ Outcome run_export(const Arguments& arguments, Context& context) {
   const Result<MeshFormat> format = format_of(output);
   if (!format) return format.error();
   if (Status status = *format == MeshFormat::k3mf ? write::check_3mf_date() : Status(); !status) return status;
+  if (Status status = check_needs(Product::kContours, arguments, *job); !status) return status;
   if (Status status = check_job(*job); !status) return status;
   if (write::is_file(output) && !arguments.has("--overwrite")) {
     return Error{Fault::kUsage, fmt::format("{}: is there already; replace it with --overwrite, or name another file", output)};

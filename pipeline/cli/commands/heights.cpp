@@ -55,9 +55,15 @@ Status tell(const std::string& path, const std::string& text, Context& context) 
   return path.empty() ? context.print(text) : write::write_file(path, text, {.stream = true});
 }
 
-Result<Job> job_of(const Arguments& arguments) {
+/// The job as asked, and with what the command sets by itself.
+struct AskedJob {
+  Job asked, studied;
+};
+
+Result<AskedJob> job_of(const Arguments& arguments) {
   Result<Job> read = read_job_options(kHeightsCommandKeys, arguments);
-  if (!read) return read;
+  if (!read) return read.error();
+  const Job asked = *read;
   if (read->parts.empty()) return Error{Fault::kUsage, "no part to look at; name one or more STL, OBJ or 3MF files"};
   // Heights do not depend on the parts' positions or on the size of the bed.
   if (read->bed_mm || read->machine.profile.empty()) read->bed_mm = kLargestBed.size_mm;
@@ -71,7 +77,7 @@ Result<Job> job_of(const Arguments& arguments) {
     if (Status status = check_needs(Product::kContours, arguments, *read, true); !status) return status.error();
   }
   if (Status status = check_job(*read); !status) return status.error();
-  return read;
+  return AskedJob{asked, std::move(*read)};
 }
 
 /// A file of this form holds one unnamed table.
@@ -142,13 +148,14 @@ Outcome run_heights(const Arguments& arguments, Context& context) {
     if (Status status = at_option("--format", read_word(kForms, arguments.text("--format"), form)); !status) return status;
   }
   if (const Status status = check_plot_name(plot); !status) return status.error();
-  const Result<Job> job = job_of(arguments);
-  if (!job) return job.error();
+  const Result<AskedJob> read = job_of(arguments);
+  if (!read) return read.error();
+  const Job* const job = &read->studied;
   if (form == Form::kRp3) {
     if (Status status = check_one_table(*job, arguments); !status) return status.error();
   }
   if (arguments.has("--save-job")) {
-    if (Status status = save_job(arguments.text("--save-job"), *job, "heights"); !status) return status.error();
+    if (Status status = save_job(arguments.text("--save-job"), read->asked, "heights"); !status) return status.error();
   }
   using Clock = std::chrono::steady_clock;
   const auto start = Clock::now();

@@ -4,6 +4,7 @@
 
 #include "pipeline/cli/command.h"
 #include "pipeline/cli/keys.h"
+#include "pipeline/cli/needs.h"
 #include "pipeline/plan/scene.h"
 #include "stages/data/text/json.h"
 #include "stages/load/info/info.h"
@@ -49,6 +50,7 @@ Outcome run_info(const Arguments& arguments, Context& context) {
   // Read as lamina jet reads them.
   const Result<Job> job = read_job_options({"part", "load"}, arguments);
   if (!job) return job.error();
+  if (Status status = check_needs(Product::kImages, arguments, *job); !status) return status;
   int code = 0;
   for (const PartRequest& part : job->parts) {
     const load::LoadOptions options = load_options(*job, part);

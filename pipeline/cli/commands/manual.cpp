@@ -9,6 +9,7 @@
 
 #include "pipeline/cli/command.h"
 #include "pipeline/cli/outputs.h"
+#include "stages/data/text/readable.h"
 #include "stages/terminal/completion.h"
 #include "stages/terminal/pages.h"
 #include "stages/write/file.h"
@@ -83,12 +84,17 @@ Status write_pages(const std::string& directory, bool markdown, bool overwrite) 
 
 Outcome run_manual(const Arguments& arguments, Context& context) {
   const bool markdown = arguments.has("--markdown");
+  if (arguments.operands.size() > 1) return Error{Fault::kUsage, "name one command, or -o DIR for the pages of all"};
+  if (arguments.has("-o,--output") && !arguments.operands.empty()) {
+    return at_option("--output", fmt::format("is for the pages of all commands; leave out '{}', or print that page to a file",
+                                             one_line(arguments.operands.front())));
+  }
   if (arguments.has("-o,--output")) return write_pages(arguments.text("-o,--output"), markdown, arguments.has("--overwrite"));
   if (arguments.operands.empty()) {
     if (markdown) return Error{Fault::kUsage, "--markdown: name a command, or -o DIR for all of them"};
     return context.print(terminal::man_page(all_specs()));
   }
-  const Command* command = arguments.operands.size() == 1 ? find_command(arguments.operands.front()) : nullptr;
+  const Command* command = find_command(arguments.operands.front());
   if (command == nullptr) return Error{Fault::kUsage, unknown_command(arguments.operands.front())};
   return context.print(page_of(spec_of(*command), markdown));
 }

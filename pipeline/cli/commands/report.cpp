@@ -50,6 +50,10 @@ Outcome run_report(const Arguments& arguments, Context& context) {
   ReportOptions options;
   if (Status status = arguments.read("--most-bytes", read_bytes, options.size_limit); !status) return status;
   options.parts = arguments.all("--parts");
+  std::error_code ignored;
+  if (!options.parts.empty() && std::filesystem::is_regular_file(arguments.operands.front(), ignored)) {
+    return at_option("--parts", "is of jobs of images; a page of toolpaths has no views of the parts, leave it out");
+  }
   const Result<Report> report = make_report(arguments.operands.front(), options);
   if (!report) return report.error();
   if (Status status = write::write_file(output, report->page); !status) return status.error();
