@@ -97,7 +97,7 @@ TEST_F(Durability, WithLayerEachFileIsSyncedBeforeItsNameAndTheNamesBeforeTheirR
 }
 
 TEST_F(Durability, TheDiskBeginsWithALargeFileWhileItGrows) {
-  const std::string line = "slice part.stl --layer 0.0004 --quiet -o ";  // 7,500 layers of some 400 bytes
+  const std::string line = "slice part.stl --layer 0.0003 --quiet -o ";  // 10,000 layers of some 250 bytes
   const Lines lines = calls(line + "out");
   const auto begins = std::ranges::find(lines, "begin out/part.svg.part");
   EXPECT_LT(begins, std::ranges::find(lines, "fsync out/part.svg.part"));
