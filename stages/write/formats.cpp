@@ -28,9 +28,12 @@ constexpr Count most_strips(Count columns, Count rows, Count changes) {
 constexpr Count most_packbits(Count columns, Count rows, Count changes) {
   return std::min((columns / 512 + 3) * rows + 4 * changes, (columns / 8 + columns / 1024 + 2) * rows) + kFileRoom;
 }
-/// Deflate never adds more than a thousandth to what it cannot compress; a row's filter is a byte.
+/// No byte takes more than 13 bits (png/tables.cpp). White takes at most 5 bits for 258 bytes; a change two bytes of its own
+/// and the end and the beginning of equal ones, in its row and in the row below; a row its filter's byte.
 constexpr Count most_png(Count columns, Count rows, Count changes) {
-  return most_bits(columns, rows, changes) / 1000 * 1001 + 2 * rows + kFileRoom;
+  const Count bytes = most_bits(columns, rows, changes) + rows;
+  const Count data = std::min(bytes / 256 + 8 * rows + 18 * changes, bytes / 8 * 13);
+  return data + data / 4096 + kFileRoom;
 }
 constexpr Count most_null(Count, Count, Count) { return 0; }
 

@@ -55,6 +55,11 @@ inline constexpr std::array<Code, 4096> kFourVertical = [] {
 /// Longest run with a make-up code of its own. Longer ones start with this code as often as it fits.
 inline constexpr std::uint32_t kLongestMakeUp = 2560;
 
+/// Two of them: the entries of the table above that have 7 in the third and fourth place.
+constexpr Code two_vertical(std::uint32_t first, std::uint32_t second) {
+  return kFourVertical[first | second << 3 | 7u << 6 | 7u << 9];
+}
+
 /// One colour: a run of n < 2624 is make_up[n / 64] (no bits at all for 0), then terminating[n % 64].
 struct RunCodes {
   std::array<Code, 64> terminating;

@@ -7,6 +7,7 @@
 
 #include "stages/write/g4/bit_writer.h"
 #include "stages/write/g4/codes.h"
+#include "stages/write/g4/empty_rows.h"
 
 namespace lamina::write::g4 {
 namespace {
@@ -32,20 +33,6 @@ std::uint64_t changes_to_code(std::span<const std::uint32_t> row, std::uint32_t 
 /// No row takes more bytes: at most 53 bits for two changes, 4 bits for two changes above, 12 bits for 2560 columns.
 std::size_t most_bytes(std::size_t changes, std::size_t changes_above, std::uint32_t columns) {
   return 4 * changes + changes_above + columns / 1024 + 64;
-}
-
-/// The row after `row` and all empty rows that follow it. Offsets never fall, so a search by doubling finds the end.
-std::uint32_t end_of_empty_rows(std::span<const std::uint32_t> row_offset, std::uint32_t row) {
-  const std::uint32_t offset = row_offset[row];
-  const std::size_t last = row_offset.size() - 1;
-  std::size_t known = row + 1, step = 1;
-  while (known + step <= last && row_offset[known + step] == offset) {
-    known += step;
-    step *= 2;
-  }
-  const auto limit = row_offset.begin() + static_cast<std::ptrdiff_t>(std::min(known + step, last + 1));
-  const auto past = std::upper_bound(row_offset.begin() + static_cast<std::ptrdiff_t>(known), limit, offset);
-  return static_cast<std::uint32_t>(past - row_offset.begin() - 1);
 }
 
 struct RunWord {
@@ -146,6 +133,58 @@ void put_row(BitWriter& writer, const std::uint32_t* a, const std::uint32_t* b, 
   }
 }
 
+/// Rows of so many changes at most are tried without a copy.
+constexpr std::uint32_t kFewChanges = 8;
+constexpr std::uint32_t kRowsAtOnce = 64;
+constexpr std::size_t kFewRowsBytes = kRowsAtOnce * 16 + 16;  // vertical modes of 7 bits, and a last store
+
+/// One row of `changes` at `a`, those of the row above before them. True, and the row is written, if each change follows
+/// the one above it by a vertical mode. Where changes above are more than 3 columns apart, one that is at most 3 from its
+/// own comes before the next one and behind the one before, so that T.6's b1 is always the change of the same number;
+/// where any are nearer, the row takes the way of all rows.
+inline bool put_few_changes(BitWriter& writer, const std::uint32_t* a, std::uint32_t changes, std::uint32_t columns) {
+  const std::uint32_t* b = a - changes;
+  const std::uint32_t* const last = a - 2;  // two of the row above
+  BitWriter trial = writer;
+  std::uint64_t bits = 0;
+  std::uint32_t length = 0;
+  unsigned stops = 0;
+  for (;; a += 2, b += 2) {
+    const std::uint32_t mode = a[0] - b[0] + 3, next_mode = a[1] - b[1] + 3;
+    const std::uint32_t beyond = b == last ? columns : b[2];
+    stops |= unsigned{mode > 6} | unsigned{next_mode > 6} | unsigned{b[1] - b[0] <= 3} | unsigned{beyond - b[1] <= 3};
+    const Code code = two_vertical(mode & 7, next_mode & 7);
+    bits = bits << code.length() | code.bits();
+    length += code.length();
+    if (b == last) break;
+    if (length <= 40) continue;
+    trial.put(bits, length);
+    bits = 0;
+    length = 0;
+  }
+  if ((stops | unsigned{a[1] == columns}) != 0) return false;
+  trial.put(bits << 1 | 1, length + 1);  // the end of the row, as above
+  writer = trial;
+  return true;
+}
+
+/// Rows from `r` on, straight from the runs, as long as they are of few changes and follow those above: nearly all rows of
+/// parts with few edges. Changes of all rows lie behind each other, so that a pointer into them is all that moves on.
+/// needs    a row above and kFewRowsBytes of room
+/// returns  the first row that is not written, r + kRowsAtOnce at most
+std::uint32_t put_few_rows(BitWriter& writer, const RunsView& runs, std::uint32_t r) {
+  const std::uint32_t* const offset = runs.row_offset.data();
+  const std::uint32_t changes = offset[r] - offset[r - 1];
+  const std::uint32_t end = std::min(runs.rows(), r + kRowsAtOnce);
+  BitWriter out = writer;
+  const std::uint32_t* row = runs.change.data() + offset[r];
+  for (; r < end && offset[r + 1] - offset[r] == changes; ++r, row += changes) {
+    if (!(changes == 2 ? put_few_changes(out, row, 2, runs.columns) : put_few_changes(out, row, changes, runs.columns))) break;
+  }
+  writer = out;
+  return r;
+}
+
 }  // namespace
 
 std::size_t Encoder::encode(const RunsView& runs, Buffer<std::byte>& file, std::size_t start) {
@@ -161,8 +200,19 @@ std::size_t Encoder::encode(const RunsView& runs, Buffer<std::byte>& file, std::
 
   std::span<const std::uint32_t> above;  // T.6: the row above the first one is white
   copy_row(above, columns, reference_);
+  bool copied = true;  // reference_ holds `above`
   for (std::uint32_t r = 0; r < rows;) {
     const std::span<const std::uint32_t> row = runs.row(r);
+    if (row.size() == above.size() && row.size() - 1 < kFewChanges) {
+      make_room(kFewRowsBytes);
+      const std::uint32_t next = put_few_rows(writer, runs, r);
+      if (next != r) {
+        copied = false;
+        above = runs.row(next - 1);
+        r = next;
+        continue;
+      }
+    }
     if (std::equal(row.begin(), row.end(), above.begin(), above.end())) {
       const std::uint32_t next = row.empty() ? end_of_empty_rows(runs.row_offset, r) : r + 1;
       const std::uint64_t ones = changes_to_code(row, columns) * (next - r);
@@ -172,6 +222,8 @@ std::size_t Encoder::encode(const RunsView& runs, Buffer<std::byte>& file, std::
       continue;
     }
     make_room(most_bytes(row.size(), above.size(), columns));
+    if (!copied) copy_row(above, columns, reference_);
+    copied = true;
     copy_row(row, columns, coding_);
     put_row(writer, coding_.data() + kHead, reference_.data() + kHead, columns);
     std::swap(coding_, reference_);
