@@ -1,11 +1,15 @@
-// bench/write_g4.cpp: the G4 encoder alone, on rows of known kinds; what it writes is first decoded by libtiff.
+// bench/write_g4.cpp: the G4 and PNG encoders alone, on rows of known kinds; what they write is first decoded by libtiff and
+// libpng. PNG's time is told beside that of zlib at its fastest for the same rows of bits.
 #include <benchmark/benchmark.h>
+#include <zlib.h>
 
+#include <chrono>
 #include <filesystem>
 #include <random>
 #include <string>
 
 #include "bench/named_parts.h"
+#include "stages/geometry/bits.h"
 #include "stages/read/image.h"
 #include "stages/write/file.h"
 #include "stages/write/g4/encode.h"
@@ -16,8 +20,9 @@ namespace {
 
 constexpr std::uint32_t kEdges = 40;
 
-enum class Kind { kSlopes, kParts, kRandom, kSame, kEmpty };
+enum class Kind { kFew, kSlopes, kParts, kRandom, kSame, kEmpty };
 
+/// kFew     2 changes a row, each up to 2 pixels from the one above: a slender part
 /// kSlopes  40 changes a row, each up to 2 pixels from the one above: walls of a part
 /// kParts   the same, with runs that begin and end: features of a part
 /// kRandom  about 40 changes a row that have nothing to do with the row above
@@ -35,7 +40,7 @@ Runs image_of(Kind kind, std::uint32_t side) {
   }
   for (std::uint32_t row = 0; row < side && kind != Kind::kEmpty; ++row) {
     std::uint32_t column = 0;
-    for (std::uint32_t i = 0; i < kEdges; ++i) {
+    for (std::uint32_t i = 0; i < (kind == Kind::kFew ? 2 : kEdges); ++i) {
       if (kind == Kind::kRandom) {
         column += 1 + static_cast<std::uint32_t>(random() % static_cast<unsigned>(2 * spacing - 2));
         if (column > side || (i == kEdges - 1 && runs.change.size() % 2 == 0)) break;
@@ -55,39 +60,90 @@ Runs image_of(Kind kind, std::uint32_t side) {
   return runs;
 }
 
-/// Empty if libtiff decodes the encoder's strip to the runs.
-std::string wrong_with(const Runs& runs) {
+/// Empty if the format's library decodes the file to the runs.
+std::string wrong_with(std::string_view id, const Runs& runs) {
+  const write::ImageFormat& format = *write::find_image_format(id);
   write::Bytes file;
-  if (auto encoded = write::find_image_format("tiff-g4")->make_encoder()->encode(runs, 1200, 1200, file); !encoded) {
-    return encoded.error().message;
-  }
-  const std::string path = (std::filesystem::temp_directory_path() / "lamina-bench-g4.tif").string();
+  if (auto encoded = format.make_encoder()->encode(runs, 1200, 1200, file); !encoded) return encoded.error().message;
+  const auto path = (std::filesystem::temp_directory_path() / "lamina-bench-runs").string() + std::string(format.extension);
   if (auto written = write::write_file(path, file); !written) return written.error().message;
   const auto image = read::image(path);
   std::filesystem::remove(path);
   if (!image) return image.error().message;
-  return same_runs(image->runs, runs) ? "" : "libtiff decodes other pixels";
+  return same_runs(image->runs, runs) ? "" : "other pixels are decoded";
+}
+
+double seconds_since(std::chrono::steady_clock::time_point start) {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+/// Rows of bits without a filter through zlib, level 1 and run lengths.
+double zlib_seconds(const Runs& runs) {
+  const auto start = std::chrono::steady_clock::now();
+  z_stream stream{};
+  if (deflateInit2(&stream, 1, Z_DEFLATED, MAX_WBITS, 8, Z_RLE) != Z_OK) return 0;
+  write::Bytes row(1 + row_bytes(runs.columns)), room(64 * 1024);
+  for (std::uint32_t r = 0; r < runs.view().rows(); ++r) {
+    row[0] = std::byte{0};
+    expand_row(runs.view().row(r), std::span(row).subspan(1));
+    stream.next_in = reinterpret_cast<Bytef*>(row.data());
+    stream.avail_in = static_cast<uInt>(row.size());
+    do {
+      stream.next_out = reinterpret_cast<Bytef*>(room.data());
+      stream.avail_out = static_cast<uInt>(room.size());
+      deflate(&stream, r + 1 == runs.view().rows() ? Z_FINISH : Z_NO_FLUSH);
+    } while (stream.avail_out == 0);
+  }
+  deflateEnd(&stream);
+  return seconds_since(start);
+}
+
+void set_counters(benchmark::State& state, const Runs& runs, std::size_t bytes) {
+  using benchmark::Counter;
+  const auto kPer = Counter::kIsIterationInvariantRate | Counter::kInvert;  // seconds, in units of which is told
+  const double rows = runs.view().rows(), changes = static_cast<double>(runs.change.size());
+  state.counters["px/s"] = Counter(rows * runs.columns, Counter::kIsIterationInvariantRate);
+  state.counters["a_row"] = Counter(rows, kPer);
+  if (changes > 0) state.counters["a_change"] = Counter(changes, kPer);
+  state.counters["file_bytes"] = static_cast<double>(bytes);
 }
 
 void encode_g4(benchmark::State& state, Kind kind, std::uint32_t side) {
   const Runs runs = image_of(kind, side);
-  const std::string wrong = wrong_with(runs);
+  const std::string wrong = wrong_with("tiff-g4", runs);
   if (!wrong.empty()) return state.SkipWithError(wrong.c_str());
   write::g4::Encoder encoder;
   write::Bytes file;
   std::size_t bytes = 0;
   for (auto _ : state) benchmark::DoNotOptimize(bytes = encoder.encode(runs, file, 0));
-  using benchmark::Counter;
-  state.counters["px/s"] = Counter(double{1} * side * side, Counter::kIsIterationInvariantRate);
-  state.counters["changes/s"] = Counter(static_cast<double>(runs.change.size()), Counter::kIsIterationInvariantRate);
-  state.counters["file_bytes"] = static_cast<double>(bytes);
+  set_counters(state, runs, bytes);
 }
 
+void encode_png(benchmark::State& state, Kind kind, std::uint32_t side) {
+  const Runs runs = image_of(kind, side);
+  const std::string wrong = wrong_with("png", runs);
+  if (!wrong.empty()) return state.SkipWithError(wrong.c_str());
+  const double by_zlib = zlib_seconds(runs);
+  const auto encoder = write::find_image_format("png")->make_encoder();
+  write::Bytes file;
+  const auto start = std::chrono::steady_clock::now();
+  for (auto _ : state) benchmark::DoNotOptimize(encoder->encode(runs, 1200, 1200, file));
+  state.counters["zlib_times"] = by_zlib * static_cast<double>(state.iterations()) / seconds_since(start);
+  set_counters(state, runs, file.size());
+}
+
+BENCHMARK_CAPTURE(encode_g4, few, Kind::kFew, 4725u)->Unit(benchmark::kMicrosecond);
 BENCHMARK_CAPTURE(encode_g4, slopes, Kind::kSlopes, 4725u)->Unit(benchmark::kMicrosecond);
 BENCHMARK_CAPTURE(encode_g4, parts, Kind::kParts, 4725u)->Unit(benchmark::kMicrosecond);
 BENCHMARK_CAPTURE(encode_g4, random, Kind::kRandom, 4725u)->Unit(benchmark::kMicrosecond);
 BENCHMARK_CAPTURE(encode_g4, same, Kind::kSame, 4725u)->Unit(benchmark::kMicrosecond);
 BENCHMARK_CAPTURE(encode_g4, empty, Kind::kEmpty, 18898u)->Unit(benchmark::kMicrosecond);
+BENCHMARK_CAPTURE(encode_png, few, Kind::kFew, 4725u)->Unit(benchmark::kMicrosecond);
+BENCHMARK_CAPTURE(encode_png, slopes, Kind::kSlopes, 4725u)->Unit(benchmark::kMicrosecond);
+BENCHMARK_CAPTURE(encode_png, parts, Kind::kParts, 4725u)->Unit(benchmark::kMicrosecond);
+BENCHMARK_CAPTURE(encode_png, random, Kind::kRandom, 4725u)->Unit(benchmark::kMicrosecond);
+BENCHMARK_CAPTURE(encode_png, same, Kind::kSame, 4725u)->Unit(benchmark::kMicrosecond);
+BENCHMARK_CAPTURE(encode_png, empty, Kind::kEmpty, 18898u)->Unit(benchmark::kMicrosecond);
 
 }  // namespace
 }  // namespace lamina::bench

@@ -169,41 +169,79 @@ TEST(G4, EveryPairOfNeighbouringRowsOfNinePixelsComesBack) {
   EXPECT_TRUE(same(*image, runs));
 }
 
+/// The strip that libtiff's own encoder makes of the runs.
+std::vector<std::byte> strip_by_libtiff(const std::string& path, const RunsView& runs) {
+  TIFF* tiff = TIFFOpen(path.c_str(), "w");
+  if (tiff == nullptr) return {};
+  TIFFSetField(tiff, TIFFTAG_IMAGEWIDTH, runs.columns);
+  TIFFSetField(tiff, TIFFTAG_IMAGELENGTH, runs.rows());
+  TIFFSetField(tiff, TIFFTAG_BITSPERSAMPLE, 1);
+  TIFFSetField(tiff, TIFFTAG_SAMPLESPERPIXEL, 1);
+  TIFFSetField(tiff, TIFFTAG_COMPRESSION, COMPRESSION_CCITTFAX4);
+  TIFFSetField(tiff, TIFFTAG_PHOTOMETRIC, PHOTOMETRIC_MINISWHITE);
+  TIFFSetField(tiff, TIFFTAG_ROWSPERSTRIP, runs.rows());
+  for (std::uint32_t r = 0; r < runs.rows(); ++r) {
+    std::vector<unsigned char> bits((runs.columns + 7) / 8);
+    const auto row = runs.row(r);
+    for (std::size_t i = 0; i < row.size(); i += 2) {
+      for (std::uint32_t column = row[i]; column < row[i + 1]; ++column)
+        bits[column / 8] |= static_cast<unsigned char>(0x80 >> (column % 8));
+    }
+    EXPECT_EQ(TIFFWriteScanline(tiff, bits.data(), r, 0), 1);
+  }
+  TIFFClose(tiff);
+  tiff = TIFFOpen(path.c_str(), "r");
+  if (tiff == nullptr) return {};
+  std::vector<std::byte> strip(TIFFGetStrileByteCount(tiff, 0));
+  EXPECT_EQ(TIFFReadRawStrip(tiff, 0, strip.data(), static_cast<tmsize_t>(strip.size())), static_cast<tmsize_t>(strip.size()));
+  TIFFClose(tiff);
+  return strip;
+}
+
+bool is_as_by_libtiff(const std::string& path, const Runs& runs) {
+  Bytes ours;
+  g4::Encoder encoder;
+  ours.resize(encoder.encode(runs, ours, 0));
+  return std::ranges::equal(ours, strip_by_libtiff(path, runs));
+}
+
 TEST(G4, TheBytesAreThoseOfLibtiffsOwnEncoder) {
   const testing::Folder folder;
   for (std::uint32_t seed = 0; seed < 60; ++seed) {
     const std::uint32_t columns = seed < 40 ? 1 + seed * 7 : seed * 100;
-    const Runs runs = testing::random_image(1000 + seed, columns, 30);
-    const std::string path = folder / "peer.tif";
-    TIFF* tiff = TIFFOpen(path.c_str(), "w");
-    ASSERT_NE(tiff, nullptr);
-    TIFFSetField(tiff, TIFFTAG_IMAGEWIDTH, columns);
-    TIFFSetField(tiff, TIFFTAG_IMAGELENGTH, 30);
-    TIFFSetField(tiff, TIFFTAG_BITSPERSAMPLE, 1);
-    TIFFSetField(tiff, TIFFTAG_SAMPLESPERPIXEL, 1);
-    TIFFSetField(tiff, TIFFTAG_COMPRESSION, COMPRESSION_CCITTFAX4);
-    TIFFSetField(tiff, TIFFTAG_PHOTOMETRIC, PHOTOMETRIC_MINISWHITE);
-    TIFFSetField(tiff, TIFFTAG_ROWSPERSTRIP, 30);
-    for (std::uint32_t r = 0; r < 30; ++r) {
-      std::vector<unsigned char> bits((columns + 7) / 8);
-      const auto row = runs.view().row(r);
-      for (std::size_t i = 0; i < row.size(); i += 2) {
-        for (std::uint32_t column = row[i]; column < row[i + 1]; ++column)
-          bits[column / 8] |= static_cast<unsigned char>(0x80 >> (column % 8));
-      }
-      ASSERT_EQ(TIFFWriteScanline(tiff, bits.data(), r, 0), 1);
-    }
-    TIFFClose(tiff);
-    tiff = TIFFOpen(path.c_str(), "r");
-    ASSERT_NE(tiff, nullptr);
-    std::vector<std::byte> peer(TIFFGetStrileByteCount(tiff, 0));
-    ASSERT_EQ(TIFFReadRawStrip(tiff, 0, peer.data(), static_cast<tmsize_t>(peer.size())), static_cast<tmsize_t>(peer.size()));
-    TIFFClose(tiff);
+    EXPECT_TRUE(is_as_by_libtiff(folder / "peer.tif", testing::random_image(1000 + seed, columns, 30)))
+        << columns << ", seed " << seed;
+  }
+}
 
-    Bytes ours;
-    g4::Encoder encoder;
-    ours.resize(encoder.encode(runs, ours, 0));
-    EXPECT_TRUE(std::equal(ours.begin(), ours.end(), peer.begin(), peer.end())) << columns << " columns, seed " << seed;
+/// Rows of one number of changes that wander by up to `step` columns a row, through each other's neighbourhood and both sides.
+Runs wandering_edges(std::uint32_t seed, std::uint32_t columns, std::uint32_t changes, std::uint32_t step) {
+  std::mt19937 random(seed);
+  std::vector<Row> rows;
+  Row row;
+  for (std::uint32_t i = 0; i < changes; ++i) row.push_back((2 * i + 1) * columns / (2 * changes));
+  for (int r = 0; r < 400; ++r) {
+    for (std::size_t i = 0; i < row.size(); ++i) {
+      const std::int64_t low = i == 0 ? 0 : row[i - 1] + 1, high = i + 1 == row.size() ? columns : row[i + 1] - 1;
+      const std::int64_t moved = std::int64_t{row[i]} + testing::below(random, 2 * step + 1) - step;
+      row[i] = static_cast<std::uint32_t>(std::clamp(moved, low, high));
+    }
+    rows.push_back(row);
+    if (testing::below(random, 40) == 0) rows.push_back(testing::neighbour(random, columns, row));  // of more or fewer changes
+  }
+  return testing::image_of(columns, rows);
+}
+
+TEST(G4, RowsOfFewEdgesThatWanderAreAsByLibtiff) {
+  const testing::Folder folder;
+  for (const std::uint32_t changes : {2u, 4u, 6u, 8u, 10u}) {
+    for (const std::uint32_t columns : {5 * changes, 16 * changes, 500u}) {
+      for (const std::uint32_t step : {1u, 3u, 5u}) {
+        const Runs runs = wandering_edges(columns + step, columns, changes, step);
+        EXPECT_TRUE(is_as_by_libtiff(folder / "peer.tif", runs))
+            << changes << " changes, " << columns << " columns, step " << step;
+      }
+    }
   }
 }
 
