@@ -140,7 +140,7 @@ struct BeamIndex::State {
   }
 
   void attach_clusters(RTCScene parent, Source& source) const {
-    attach(parent, source.placed->mesh->clusters.size(), &source, cluster_bounds, visit_cluster);
+    attach(parent, source.placed->mesh->cluster_count(), &source, cluster_bounds, visit_cluster);
   }
 
   RTCScene new_scene() const {

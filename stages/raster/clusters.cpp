@@ -8,6 +8,7 @@
 #include <cmath>
 #include <cstring>
 #include <limits>
+#include <span>
 
 namespace lamina::raster {
 namespace {
@@ -132,17 +133,16 @@ ClusteredMesh make_clusters(Mesh& mesh) {
   const std::uint32_t clusters = out.first_cap + clusters_for(caps);
   const std::uint32_t first_cap_at = out.first_cap * kClusterSize;
 
-  out.storage = std::move(mesh.triangles);
+  out.storage_ = std::move(mesh.triangles);
   mesh.triangles = {};
-  out.storage.reserve(std::size_t{clusters} * kClusterSize);  // nothing moves if the loader left kTriangleSlack
-  out.storage.resize(std::size_t{clusters} * kClusterSize);
+  out.storage_.reserve(std::size_t{clusters} * kClusterSize);  // nothing moves if the loader left kTriangleSlack
+  out.storage_.resize(std::size_t{clusters} * kClusterSize);
   if (first_cap_at != own) {
-    std::copy_backward(out.storage.begin() + own, out.storage.begin() + total, out.storage.begin() + first_cap_at + caps);
+    std::copy_backward(out.storage_.begin() + own, out.storage_.begin() + total, out.storage_.begin() + first_cap_at + caps);
   }
   out.bounds.resize(clusters);
-  cluster_in_place(out.storage.data(), own, out.bounds.data(), false);
-  cluster_in_place(out.storage.data() + first_cap_at, caps, out.bounds.data() + out.first_cap, true);
-  out.clusters = {reinterpret_cast<const Cluster*>(out.storage.data()), clusters};
+  cluster_in_place(out.storage_.data(), own, out.bounds.data(), false);
+  cluster_in_place(out.storage_.data() + first_cap_at, caps, out.bounds.data() + out.first_cap, true);
   return out;
 }
 

@@ -2,7 +2,6 @@
 #pragma once
 
 #include <cstdint>
-#include <span>
 
 #include "stages/data/buffer.h"
 #include "stages/data/mesh.h"
@@ -25,12 +24,34 @@ struct alignas(16) Cluster {
 static_assert(sizeof(Cluster) == kClusterSize * sizeof(Triangle));
 
 /// A mesh in clusters: 36 bytes a triangle, in the memory of the list that it was made from.
-struct ClusteredMesh {
-  Buffer<Triangle> storage;  // whose bytes are the clusters; moves with its heap block, so `clusters` stays valid
-  std::span<const Cluster> clusters;
+class ClusteredMesh {
+ public:
+  std::uint32_t cluster_count() const { return static_cast<std::uint32_t>(bounds.size()); }
+
+  /// A cluster, where it is stored or expanded into `room`; the reference lives as long as both.
+  const Cluster& cluster(std::uint32_t index, [[maybe_unused]] Cluster& room) const { return clusters()[index]; }
+
+  /// One triangle of a cluster, for the few that integers decide.
+  Triangle triangle(std::uint32_t cluster, std::uint32_t lane) const { return clusters()[cluster].triangle(lane); }
+
+  /// Asks the processor for the memory that cluster() will read.
+  void prefetch(std::uint32_t index) const {
+    constexpr std::size_t kLine = 64;
+    const char* const bytes = reinterpret_cast<const char*>(&clusters()[index]);
+    for (std::size_t line = 0; line < sizeof(Cluster); line += kLine) __builtin_prefetch(bytes + line);
+  }
+
+  std::size_t bytes() const { return bytes_held(storage_); }  // of the triangles, without boxes
+
   Buffer<Box> bounds;           // nm, of each cluster
   std::uint32_t first_cap = 0;  // clusters from here on hold only triangles that repair added
   bool closed = true;           // as Mesh::closed
+
+ private:
+  friend ClusteredMesh make_clusters(Mesh& mesh);
+  const Cluster* clusters() const { return reinterpret_cast<const Cluster*>(storage_.data()); }
+
+  Buffer<Triangle> storage_;  // whose bytes are the clusters
 };
 
 /// Groups the triangles of a mesh into clusters, in place, and takes them out of the mesh.

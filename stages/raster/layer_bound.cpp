@@ -26,11 +26,11 @@ LayerBound::LayerBound(std::span<const PlacedMesh> placed, const PixelGrid& grid
     const ClusteredMesh& mesh = *key.first;
     const Nm lift = key.second;
     const Differences sum = tbb::parallel_reduce(
-        tbb::blocked_range<std::uint32_t>(0, static_cast<std::uint32_t>(mesh.clusters.size()), 4096),
-        Differences(kSlabs + 1, {0, 0}),
+        tbb::blocked_range<std::uint32_t>(0, mesh.cluster_count(), 4096), Differences(kSlabs + 1, {0, 0}),
         [&](const tbb::blocked_range<std::uint32_t>& range, Differences difference) {
+          Cluster room;
           for (std::uint32_t c = range.begin(); c != range.end(); ++c) {
-            const Cluster& cluster = mesh.clusters[c];
+            const Cluster& cluster = mesh.cluster(c, room);
             for (std::uint32_t i = 0; i < kClusterSize; ++i) {
               const auto [lo_z, hi_z] = std::minmax({cluster.z[0][i], cluster.z[1][i], cluster.z[2][i]});
               if (lo_z == hi_z) continue;

@@ -22,17 +22,17 @@ constexpr std::size_t kMostClusters = 1 << 16;
 /// Segments of all clusters that an engine found. A mesh is larger than the caches, so what comes next is fetched early.
 void cut_clusters(const PixelSampling& sampling, std::span<const PlacedMesh> placed, std::span<const ClusterVisit> visits,
                   Nm plane, std::uint32_t first_row, std::uint32_t last_row, Segments& out) {
-  constexpr std::size_t kAhead = 4, kLine = 64;
+  constexpr std::size_t kAhead = 4;
+  Cluster room;
   for (std::size_t i = 0; i < visits.size(); ++i) {
     if (i + kAhead < visits.size()) {
       const ClusterVisit& later = visits[i + kAhead];
-      const char* bytes = reinterpret_cast<const char*>(&placed[later.instance].mesh->clusters[later.cluster]);
-      for (std::size_t line = 0; line < sizeof(Cluster); line += kLine) __builtin_prefetch(bytes + line);
+      placed[later.instance].mesh->prefetch(later.cluster);
     }
     const auto [cluster, instance] = visits[i];
     const PlacedMesh& source = placed[instance];
     append_segments(sampling,
-                    {&source.mesh->clusters[cluster], cluster, instance, source.offset, cluster >= source.mesh->first_cap},
+                    {&source.mesh->cluster(cluster, room), cluster, instance, source.offset, cluster >= source.mesh->first_cap},
                     plane, first_row, last_row, out);
   }
 }
@@ -173,7 +173,7 @@ void Rasterizer::mark_crossed(std::span<const Nm> planes, std::span<std::uint8_t
 
 std::uint64_t Rasterizer::mesh_bytes() const {
   std::uint64_t total = 0;
-  for (const ClusteredMesh& mesh : state_->meshes) total += bytes_held(mesh.storage);
+  for (const ClusteredMesh& mesh : state_->meshes) total += mesh.bytes();
   return total;
 }
 

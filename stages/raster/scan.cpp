@@ -78,10 +78,9 @@ void ScanConverter::fill_crossings(const PixelSampling& sampling, const Segment&
   const std::uint32_t enters = (segment.flags & Segment::kEnters) != 0 ? 1 : 0;
   const auto exact = [&](std::uint32_t row) {
     const PlacedMesh& source = placed[segment.instance];
-    const Cluster& cluster = source.mesh->clusters[segment.cluster];
-    const std::uint32_t lane = segment.flags & Segment::kLane;
-    const ExactTriangle triangle(corner_on_bed(cluster, 0, lane, source.offset), corner_on_bed(cluster, 1, lane, source.offset),
-                                 corner_on_bed(cluster, 2, lane, source.offset));
+    const Triangle facet = source.mesh->triangle(segment.cluster, segment.flags & Segment::kLane);
+    const ExactTriangle triangle(on_bed(facet.a, source.offset), on_bed(facet.b, source.offset),
+                                 on_bed(facet.c, source.offset));
     return static_cast<std::uint32_t>(exact_column(sampling.x, triangle, centre[row], plane));
   };
   const auto put = [&](std::uint32_t row, std::uint32_t column) { crossing[place[row - first_row]++] = column * 2 + enters; };

@@ -65,6 +65,9 @@ struct ExactTriangle {
 };
 
 /// A corner on the bed.
+inline Point3 on_bed(const Point3& corner, const Point3& offset) {
+  return {corner.x + offset.x, corner.y + offset.y, corner.z + offset.z};
+}
 inline Point3 corner_on_bed(const Cluster& cluster, std::uint32_t corner, std::uint32_t lane, const Point3& offset) {
   return {cluster.x[corner][lane] + offset.x, cluster.y[corner][lane] + offset.y, cluster.z[corner][lane] + offset.z};
 }
