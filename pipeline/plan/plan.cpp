@@ -16,6 +16,7 @@
 #include "stages/data/handles/clocks.h"
 #include "stages/data/text/number_text.h"
 #include "stages/data/text/readable.h"
+#include "stages/geometry/blocks/mesh_blocks.h"
 #include "stages/heights/build_steps.h"
 #include "stages/write/extrusion_format.h"
 #include "stages/write/image_format.h"
@@ -91,14 +92,22 @@ class Planner {
     return any;
   }
 
-  Status load() {
+  /// Images of layers of one thickness need no list of triangles.
+  bool takes_blocks() {
+    const auto options = heights_options(job());
+    return images() && !beads_ && options && options->mode == heights::Mode::kUniform;
+  }
+
+  Status load() { return read_parts_as(takes_blocks()); }
+  Status read_parts_as(bool blocks) {
     const Stopwatch loading;
     progress_({ProgressEvent::Stage::kLoading});
-    auto scene = load_scene(job(), plan_.bed);
+    auto scene = load_scene(job(), plan_.bed, blocks);
     if (!scene) return scene.error();
     plan_.scene = std::make_unique<Scene>(std::move(*scene));
+    plan_.triangles = 0;
     for (const Instance& instance : plan_.scene->instances) {
-      plan_.triangles += plan_.scene->meshes[instance.mesh].triangles.size();
+      plan_.triangles += triangle_count(plan_.scene->meshes[instance.mesh]);
     }
     const Elapsed took = loading.elapsed();
     plan_.load_seconds = took.wall;
@@ -110,7 +119,12 @@ class Planner {
     indexing_ = Stopwatch();
     progress_({ProgressEvent::Stage::kIndexing});
     if (machine() != nullptr) {
-      if (Status status = check_reach(*machine(), *plan_.scene); !status) return status;
+      Status status = check_reach(*machine(), *plan_.scene);
+      if (!status && takes_blocks()) {  // which of equal places is told follows the order of the file
+        if (Status listed = read_parts_as(false); !listed) return listed;
+        status = check_reach(*machine(), *plan_.scene);
+      }
+      if (!status) return status;
     }
     if (Status status = check_layer_count(); !status) return status;
     if (!job().heights.per_part) {

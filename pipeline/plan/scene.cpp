@@ -9,6 +9,7 @@
 
 #include "pipeline/job/keys.h"
 #include "stages/arrange/placement.h"
+#include "stages/geometry/blocks/mesh_blocks.h"
 #include "stages/load/load.h"
 
 namespace lamina::pipeline {
@@ -54,6 +55,7 @@ std::uint64_t fingerprint_of(const Instance& instance, const Mesh& mesh) {
 Point3 rebase(Mesh& mesh) {
   const Point3 from = mesh.bounds.lo;
   const auto shift = [&](Point3& p) { p = {p.x - from.x, p.y - from.y, p.z - from.z}; };
+  if (mesh.blocks) mesh.blocks->shift({-from.x, -from.y, -from.z});
   for (Triangle& t : mesh.triangles) {
     shift(t.a);
     shift(t.b);
@@ -67,8 +69,10 @@ Point3 rebase(Mesh& mesh) {
 
 bool fits(std::int64_t nm) { return nm >= INT32_MIN && nm <= INT32_MAX; }
 
-Result<Loaded> load_part(const Job& job, const PartRequest& request, Scene& scene) {
-  Result<Part> part = load::load(request.path, load_options(job, request));
+Result<Loaded> load_part(const Job& job, const PartRequest& request, bool blocks, Scene& scene) {
+  load::LoadOptions options = load_options(job, request);
+  options.blocks = blocks;
+  Result<Part> part = load::load(request.path, options);
   if (!part) return part.error();
   if (part->bounds.empty() || part->instances.empty()) {
     return Error{Fault::kInput, fmt::format("{}: holds no triangles; nothing to plan", request.path)};
@@ -84,7 +88,7 @@ Result<Loaded> load_part(const Job& job, const PartRequest& request, Scene& scen
   loaded.notes = std::move(part->notes);
   for (const Instance& instance : loaded.instances) {
     const Mesh& mesh = part->meshes[instance.mesh];
-    loaded.triangles += mesh.triangles.size();
+    loaded.triangles += triangle_count(mesh);
     loaded.fingerprint += fingerprint_of(instance, mesh);
   }
   for (Mesh& mesh : part->meshes) scene.meshes.push_back(std::move(mesh));
@@ -136,7 +140,7 @@ namespace {
 
 /// The file of each [[part]]; equal files with equal transforms are loaded once. A map's values stay where they are.
 /// errors  of load_part; kUsage: a part that reaches beyond what nm can say
-Result<std::vector<const Loaded*>> load_parts(const Job& job, std::map<LoadKey, Loaded>& files, Scene& scene) {
+Result<std::vector<const Loaded*>> load_parts(const Job& job, bool blocks, std::map<LoadKey, Loaded>& files, Scene& scene) {
   std::vector<const Loaded*> loaded;
   for (const PartRequest& part : job.parts) {
     std::error_code ignored;
@@ -149,7 +153,7 @@ Result<std::vector<const Loaded*>> load_parts(const Job& job, std::map<LoadKey, 
     const LoadKey key{file.empty() ? part.path : file.string(), part.unit, part.scale, part.rotate_deg, part.shrink, solid};
     auto found = files.find(key);
     if (found == files.end()) {
-      Result<Loaded> fresh = load_part(job, part, scene);
+      Result<Loaded> fresh = load_part(job, part, blocks, scene);
       if (!fresh) return fresh.error();
       found = files.emplace(key, std::move(*fresh)).first;
     }
@@ -180,10 +184,10 @@ arrange::BoxRequest box_request(const PartRequest& part, const Loaded& loaded) {
 
 }  // namespace
 
-Result<Scene> load_scene(const Job& job, const Bed& bed) {
+Result<Scene> load_scene(const Job& job, const Bed& bed, bool blocks) {
   Scene scene;
   std::map<LoadKey, Loaded> files;
-  const auto parts = load_parts(job, files, scene);
+  const auto parts = load_parts(job, blocks, files, scene);
   if (!parts) return parts.error();
   const std::vector<const Loaded*>& loaded = *parts;
   std::vector<arrange::BoxRequest> requests;

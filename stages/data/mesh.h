@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -52,6 +53,8 @@ struct Box {
 /// Room that a loader leaves behind a list of triangles, so that later stages can pad it without moving it.
 inline constexpr std::size_t kTriangleSlack = 32;
 
+class MeshBlocks;  // stages/geometry/blocks/mesh_blocks.h
+
 /// One solid. Triangles T from `repaired_from` on were added by repair (caps over openings).
 struct Mesh {
   std::string name;  // file, and the object in it where a file holds several
@@ -66,6 +69,9 @@ struct Mesh {
   double volume_mm3 = 0;
   /// Area of the triangles that repair added over the area of all, 0 to 1: how much of the surface is a guess.
   double capped_share = 0;
+  /// Where whoever reads the file asked for blocks (load::LoadOptions::blocks), the triangles may be here in place of the list,
+  /// which is empty then. Copies share them.
+  std::shared_ptr<MeshBlocks> blocks;
 };
 
 /// A mesh put somewhere by an integer translation: what copies share.

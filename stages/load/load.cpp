@@ -45,7 +45,8 @@ Result<Facets> read_facets(const Source& source, Format format, const LoadOption
 /// Refuses what cannot leave a single pixel.
 Status check_extent(const Source& source, const Part& part) {
   const bool any_area = std::any_of(part.meshes.begin(), part.meshes.end(), [](const Mesh& mesh) {
-    return std::any_of(mesh.triangles.begin(), mesh.triangles.end(), has_area);
+    // Blocks come of meshes that enclose something.
+    return mesh.blocks != nullptr || std::any_of(mesh.triangles.begin(), mesh.triangles.end(), has_area);
   });
   if (part.bounds.empty()) return source.error("holds no facets");
   if (part.bounds.height() == 0)
@@ -100,11 +101,18 @@ Result<Part> load_unguarded(const std::string& path, const LoadOptions& options)
       part.meshes.push_back(std::move(*mesh));
     }
   } else {
-    Result<Facets> facets = read_facets(*source, format, options);
-    if (!facets) return facets.error();
-    Result<Mesh> mesh = finish(*source, path, "", std::move(*facets), options, part.notes);
-    if (!mesh) return mesh.error();
-    part.meshes.push_back(std::move(*mesh));
+    std::optional<Mesh> sound;
+    if (options.blocks && format == Format::kBinaryStl) {
+      sound = read_sound_stl(*source, Snapper(options.transform, options.unit_mm), options, part.notes);
+    }
+    if (!sound) {
+      Result<Facets> facets = read_facets(*source, format, options);
+      if (!facets) return facets.error();
+      Result<Mesh> mesh = finish(*source, path, "", std::move(*facets), options, part.notes);
+      if (!mesh) return mesh.error();
+      sound = std::move(*mesh);
+    }
+    part.meshes.push_back(std::move(*sound));
     part.instances.push_back({0, {0, 0, 0}});
   }
   if (const Status within = add_bounds(*source, part); !within) return within.error();

@@ -22,6 +22,9 @@ struct Doubt {
   std::string rest_left_out = {};  // note if only those are taken
 };
 
+/// A closed mesh whose volume is at most this share of its box may enclose nothing: its pieces are looked at (enclosed.h).
+inline constexpr double kHardlyAny = 1e-6;
+
 /// The triangles of a file in its order, turned over if the transform mirrors.
 struct Facets {
   Buffer<Triangle> triangles;
@@ -40,6 +43,11 @@ Result<Format> detect(const Source& source);
 /// cost    one pass, parallel; 256 KiB a thread besides the triangles
 /// source  3D Systems, "StereoLithography Interface Specification" (1989)
 Result<Facets> read_binary_stl(const Source& source, const Snapper& snapper, const LoadOptions& options);
+
+/// The same in one pass, where the mesh is sound: closed, as long as its header says, and enclosing something. As blocks, with
+/// what load() has to say of it. returns  nothing where the list of triangles is needed to judge, to repair or to refuse
+std::optional<Mesh> read_sound_stl(const Source& source, const Snapper& snapper, const LoadOptions& options,
+                                   std::vector<Note>& notes);
 
 /// Text, a word after the other; see stl_ascii.cpp for what is tolerated.
 /// cost    one pass, parallel over blocks of 1 MiB; 32 MiB of text at a time

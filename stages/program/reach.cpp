@@ -2,6 +2,8 @@
 
 #include <cmath>
 
+#include "stages/geometry/blocks/mesh_blocks.h"
+
 namespace lamina::program {
 
 std::optional<Outside> first_outside(const Machine& machine, const Mesh& mesh, const Point3& offset) {
@@ -30,11 +32,7 @@ std::optional<Outside> first_outside(const Machine& machine, const Mesh& mesh, c
       worst = Outside{place, false, mm(beyond)};
     }
   };
-  for (const Triangle& triangle : mesh.triangles) {
-    look(triangle.a);
-    look(triangle.b);
-    look(triangle.c);
-  }
+  each_vertex(mesh, look);
   return worst;
 }
 

@@ -22,12 +22,16 @@ constexpr std::size_t kMostClusters = 1 << 16;
 /// Segments of all clusters that an engine found. A mesh is larger than the caches, so what comes next is fetched early.
 void cut_clusters(const PixelSampling& sampling, std::span<const PlacedMesh> placed, std::span<const ClusterVisit> visits,
                   Nm plane, std::uint32_t first_row, std::uint32_t last_row, Segments& out) {
-  constexpr std::size_t kAhead = 4;
+  constexpr std::size_t kAhead = 4;  // clusters, and as many again for what names their vertices
   Cluster room;
   for (std::size_t i = 0; i < visits.size(); ++i) {
-    if (i + kAhead < visits.size()) {
-      const ClusterVisit& later = visits[i + kAhead];
+    if (i + 2 * kAhead < visits.size()) {
+      const ClusterVisit& later = visits[i + 2 * kAhead];
       placed[later.instance].mesh->prefetch(later.cluster);
+    }
+    if (i + kAhead < visits.size()) {
+      const ClusterVisit& next = visits[i + kAhead];
+      placed[next.instance].mesh->prefetch_vertices(next.cluster);
     }
     const auto [cluster, instance] = visits[i];
     const PlacedMesh& source = placed[instance];
@@ -179,7 +183,7 @@ std::uint64_t Rasterizer::mesh_bytes() const {
 
 std::uint64_t Rasterizer::index_bytes() const {
   std::uint64_t total = bytes_held(state_->sampling.row_centre) + state_->placed.capacity() * sizeof(PlacedMesh);
-  for (const ClusteredMesh& mesh : state_->meshes) total += bytes_held(mesh.bounds);
+  for (const ClusteredMesh& mesh : state_->meshes) total += mesh.bounds_bytes();
   for (const HeightBuckets& buckets : state_->buckets) total += buckets.bytes();
   for (const BeamIndex& beams : state_->beams) total += beams.bytes();
   return total;

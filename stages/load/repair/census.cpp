@@ -1,4 +1,5 @@
-// stages/load/repair/census.cpp: whether a mesh is closed, which mesh it is and how large, in one pass without sorting.
+#include "stages/load/repair/census.h"
+
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_reduce.h>
 
@@ -29,15 +30,47 @@ inline std::uint64_t hash(const Point3& p) {
 /// Hash of an edge as walked; depends on the direction.
 inline std::uint64_t walked(std::uint64_t from, std::uint64_t to) { return fold(from ^ kC, to ^ kB); }
 
-struct Sums {
-  std::uint64_t boundary = 0, fingerprint = 0;  // sums modulo 2^64 do not depend on their order
-  double sixfold_volume = 0;                    // nm3; its order is fixed by splitting at places that threads do not decide
-  std::vector<std::uint64_t> sampled;           // facets without their orientation, which is the lowest bit
-};
-
 constexpr std::size_t kMostSampled = std::size_t{1} << 15;
 
-/// Whether two of the sampled facets differ in orientation alone. A full table forgets nothing: it is at most half full.
+/// Twice the signed area of a facet seen from above, rounded.
+inline double shadow_of(const Triangle& t) {
+  const double ax = t.a.x, ay = t.a.y;
+  return (t.b.x - ax) * (t.c.y - ay) - (t.c.x - ax) * (t.b.y - ay);
+}
+
+/// Three times the height of a facet's middle above a plane, of whose height `below` is three times.
+inline double threefold_height(const Triangle& t, double below) { return static_cast<double>(t.a.z) + t.b.z + t.c.z - below; }
+
+struct Sums {
+  CensusSums facets;
+  double sixfold_volume = 0;  // nm3; its order is fixed by splitting at places that threads do not decide
+};
+
+}  // namespace
+
+void CensusSums::add(std::span<const Triangle> facets, std::uint64_t share) {
+  const std::uint64_t below = UINT64_MAX / share;
+  for (const Triangle& t : facets) {
+    const std::uint64_t a = hash(t.a), b = hash(t.b), c = hash(t.c);
+    const std::uint64_t forward = walked(a, b) + walked(b, c) + walked(c, a);
+    const std::uint64_t backward = walked(b, a) + walked(c, b) + walked(a, c);
+    boundary += forward - backward;
+    fingerprint += fold(forward ^ kA, kD);
+    const std::uint64_t unordered = (a + b + c) * kD;
+    if (unordered > below || a == b || b == c || c == a) continue;
+    sampled.push_back((unordered * kB | 1) ^ ((a < b) ^ (b < c) ^ (c < a) ? 1u : 0u));
+  }
+}
+
+void CensusSums::add(const CensusSums& other) {
+  boundary += other.boundary;
+  fingerprint += other.fingerprint;
+  sampled.insert(sampled.end(), other.sampled.begin(), other.sampled.end());
+}
+
+// One facet in `share` is sampled, chosen by the sum of its corners' hashes.
+std::uint64_t sampled_share(std::size_t triangles) { return std::max<std::uint64_t>(1, triangles / kMostSampled); }
+
 bool any_reversed(std::span<const std::uint64_t> sampled) {
   std::size_t size = 64;
   while (size < 2 * sampled.size()) size *= 2;
@@ -51,44 +84,32 @@ bool any_reversed(std::span<const std::uint64_t> sampled) {
   return false;
 }
 
-/// Six times the signed volume of the prism between a facet and a plane, of whose height `below` is three times; rounded.
-inline double sixfold_volume(const Triangle& t, double below) {
-  const double ax = t.a.x, ay = t.a.y;
-  const double area = (t.b.x - ax) * (t.c.y - ay) - (t.c.x - ax) * (t.b.y - ay);
-  return area * (static_cast<double>(t.a.z) + t.b.z + t.c.z - below);
+Prisms Prisms::of(std::span<const Triangle> facets, Nm plane) {
+  Prisms sum{0, 0, plane};
+  for (const Triangle& t : facets) {
+    const double shadow = shadow_of(t);
+    sum.doubled_shadow += shadow;
+    sum.sixfold_volume += shadow * threefold_height(t, 3.0 * plane);
+  }
+  return sum;
 }
 
-}  // namespace
-
 Census census(std::span<const Triangle> triangles, Nm plane) {
-  // One facet in `share` is sampled, chosen by the sum of its corners' hashes.
-  const std::uint64_t share = std::max<std::uint64_t>(1, triangles.size() / kMostSampled);
-  const std::uint64_t below = UINT64_MAX / share;
+  const std::uint64_t share = sampled_share(triangles.size());
   const Sums sums = tbb::parallel_deterministic_reduce(
       tbb::blocked_range<std::size_t>(0, triangles.size(), 1 << 14), Sums{},
       [&](const tbb::blocked_range<std::size_t>& range, Sums so_far) {
         const auto facets = triangles.subspan(range.begin(), range.size());
-        for (const Triangle& t : facets) so_far.sixfold_volume += sixfold_volume(t, 3.0 * plane);  // apart: registers are few
-        for (const Triangle& t : facets) {
-          const std::uint64_t a = hash(t.a), b = hash(t.b), c = hash(t.c);
-          const std::uint64_t forward = walked(a, b) + walked(b, c) + walked(c, a);
-          const std::uint64_t backward = walked(b, a) + walked(c, b) + walked(a, c);
-          so_far.boundary += forward - backward;
-          so_far.fingerprint += fold(forward ^ kA, kD);
-          const std::uint64_t unordered = (a + b + c) * kD;
-          if (unordered > below || a == b || b == c || c == a) continue;
-          so_far.sampled.push_back((unordered * kB | 1) ^ ((a < b) ^ (b < c) ^ (c < a) ? 1u : 0u));
-        }
+        for (const Triangle& t : facets) so_far.sixfold_volume += shadow_of(t) * threefold_height(t, 3.0 * plane);
+        so_far.facets.add(facets, share);
         return so_far;
       },
       [](Sums one, const Sums& other) {
-        one.boundary += other.boundary;
-        one.fingerprint += other.fingerprint;
+        one.facets.add(other.facets);
         one.sixfold_volume += other.sixfold_volume;
-        one.sampled.insert(one.sampled.end(), other.sampled.begin(), other.sampled.end());
         return one;
       });
-  return {sums.boundary == 0, sums.fingerprint, sums.sixfold_volume / 6e18, any_reversed(sums.sampled)};
+  return {sums.facets.boundary == 0, sums.facets.fingerprint, sums.sixfold_volume / 6e18, any_reversed(sums.facets.sampled)};
 }
 
 }  // namespace lamina::load

@@ -155,7 +155,7 @@ Status close(const Source& source, const std::string& prefix, const LoadOptions&
 Status check_cancelled(const Source& source, const std::string& prefix, const Mesh& mesh, const Census& found,
                        std::vector<Note>& notes) {
   const double box = mm(mesh.bounds.width()) * mm(mesh.bounds.depth()) * mm(mesh.bounds.height());
-  const bool hardly_any = std::fabs(found.volume_mm3) <= 1e-6 * box;
+  const bool hardly_any = std::fabs(found.volume_mm3) <= kHardlyAny * box;
   if (found.reversed_twins) {
     const Cancelled cancelled = find_cancelled(mesh);
     if (cancelled.facets == mesh.triangles.size() && cancelled.facets > 0)

@@ -1,0 +1,148 @@
+#include "stages/geometry/blocks/block_maker.h"
+
+#include <tbb/blocked_range.h>
+#include <tbb/enumerable_thread_specific.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <numeric>
+
+namespace lamina {
+namespace {
+
+/// 15 bits of a vertex, each of which depends on every bit of its coordinates.
+inline std::uint32_t hash(const Point3& p) {
+  __extension__ using Wide = unsigned __int128;
+  constexpr std::uint64_t kXy = 0x2d358dccaa6c78a5, kZ = 0x9e3779b97f4a7c15, kOdd = 0x8bb84b93962eacc9;
+  const std::uint64_t xy = static_cast<std::uint32_t>(p.x) | std::uint64_t{static_cast<std::uint32_t>(p.y)} << 32;
+  const Wide product = static_cast<Wide>(xy ^ kXy) * ((static_cast<std::uint32_t>(p.z) * kZ) ^ kOdd);
+  return static_cast<std::uint32_t>((static_cast<std::uint64_t>(product) ^ static_cast<std::uint64_t>(product >> 64)) >> 49);
+}
+
+inline bool same(const Point3& p, const Point3& q) { return ((p.x ^ q.x) | (p.y ^ q.y) | (p.z ^ q.z)) == 0; }
+
+}  // namespace
+
+/// Gives each vertex of the block a number, in the order of the file. returns  whether there are few enough
+///
+/// Whether a corner is a new vertex cannot be foreseen by a processor either, so nothing branches on it: every corner is
+/// written where the next new vertex would be.
+bool BlockMaker::number_vertices(std::span<const Triangle> triangles) {
+  const auto most = static_cast<std::uint32_t>(triangles.size() * 3 / 2);
+  slot_.fill(kNone);
+  std::uint32_t vertices = 0;
+  std::uint16_t* corner = corner_.data();
+  for (const Triangle& t : triangles) {
+    if (vertices > most) return false;
+    for (const Point3* const p : {&t.a, &t.b, &t.c}) {
+      std::uint32_t at = hash(*p);
+      std::uint32_t number = slot_[at];
+      while (((number != kNone) & !same(vertex_[number], *p)) != 0) [[unlikely]] {
+          at = (at + 1) % kSlots;
+          number = slot_[at];
+        }
+      const bool is_new = number == kNone;
+      number = is_new ? vertices : number;
+      vertex_[vertices] = *p;
+      vertices += is_new ? 1 : 0;
+      slot_[at] = static_cast<std::uint16_t>(number);
+      *corner++ = static_cast<std::uint16_t>(number);
+    }
+  }
+  vertices_ = vertices;
+  return vertices <= most;
+}
+
+void BlockMaker::write_indexed(std::span<const Triangle> triangles, MeshBlocks::Block& block) {
+  auto* const clusters = reinterpret_cast<IndexedCluster*>(block.bytes);
+  auto* const vertex = const_cast<Point3*>(block.vertex());
+  std::fill_n(number_.begin(), vertices_, kNone);
+  const auto count = static_cast<std::uint32_t>(triangles.size());
+  std::uint32_t named = 0;
+  for (std::uint32_t i = 0; i < count; ++i) {
+    const std::uint16_t* const corner = corner_.data() + 3 * std::size_t{order_[i]};
+    for (std::uint32_t k = 0; k < 3; ++k) {
+      const std::uint32_t known = number_[corner[k]];
+      const bool is_new = known == kNone;
+      const auto number = static_cast<std::uint16_t>(is_new ? named : known);
+      vertex[named] = vertex_[corner[k]];
+      named += is_new ? 1 : 0;
+      number_[corner[k]] = number;
+      clusters[i / kClusterSize].corner[k][i % kClusterSize] = number;
+    }
+  }
+  const std::uint16_t point = clusters[(count - 1) / kClusterSize].corner[0][(count - 1) % kClusterSize];
+  for (std::uint32_t i = count; i % kClusterSize != 0; ++i) {
+    for (auto& corner : clusters[i / kClusterSize].corner) corner[i % kClusterSize] = point;
+  }
+}
+
+void BlockMaker::write_plain(std::span<const Triangle> triangles, MeshBlocks::Block& block) const {
+  auto* const clusters = reinterpret_cast<Cluster*>(block.bytes);
+  const auto count = static_cast<std::uint32_t>(triangles.size());
+  for (std::uint32_t i = 0; i < block.clusters * kClusterSize; ++i) {
+    Triangle t = triangles[order_[std::min(i, count - 1)]];
+    if (i >= count) t.b = t.c = t.a;
+    Cluster& cluster = clusters[i / kClusterSize];
+    const std::uint32_t lane = i % kClusterSize;
+    const Point3 corners[3] = {t.a, t.b, t.c};
+    for (std::uint32_t k = 0; k < 3; ++k) {
+      cluster.x[k][lane] = corners[k].x;
+      cluster.y[k][lane] = corners[k].y;
+      cluster.z[k][lane] = corners[k].z;
+    }
+  }
+}
+
+void BlockMaker::make(std::span<const Triangle> triangles, MeshBlocks& mesh, std::uint32_t number) {
+  MeshBlocks::Block& block = mesh.blocks_[number];
+  const auto count = static_cast<std::uint32_t>(triangles.size());
+  const std::span<std::uint16_t> order(order_.data(), count);
+  if (mesh.is_added(number)) {
+    std::iota(order.begin(), order.end(), std::uint16_t{0});
+  } else {
+    order_block(triangles, order);
+  }
+  const bool few = number_vertices(triangles);
+  block.clusters = (count + kClusterSize - 1) / kClusterSize;
+  block.vertices = few ? vertices_ : 0;
+  if (few) {
+    block.bytes = mesh.pages_.take(block.clusters * sizeof(IndexedCluster) + (vertices_ + 1) * sizeof(Point3) + 4);
+    write_indexed(triangles, block);
+  } else {
+    block.bytes = mesh.pages_.take(block.clusters * sizeof(Cluster));
+    write_plain(triangles, block);
+  }
+  Box* const bounds = mesh.bounds_.data() + mesh.first_cluster(number);
+  for (std::uint32_t c = 0; c < block.clusters; ++c) {
+    bounds[c] = few ? bounds_of(block.indexed()[c], block.vertex()) : bounds_of(block.plain()[c]);
+  }
+}
+
+std::shared_ptr<MeshBlocks> take_blocks(Mesh& mesh) {
+  if (mesh.blocks) return std::move(mesh.blocks);
+  const auto total = static_cast<std::uint32_t>(mesh.triangles.size()), own = std::min(mesh.repaired_from, total);
+  Buffer<Triangle> list = std::move(mesh.triangles);
+  mesh.triangles = {};
+  auto blocks = std::make_shared<MeshBlocks>(own, total - own);
+  constexpr std::uint32_t kTogether = 16;  // blocks, 2.25 MiB of the list
+  tbb::enumerable_thread_specific<std::unique_ptr<BlockMaker>> makers([] { return std::make_unique<BlockMaker>(); });
+  tbb::parallel_for(
+      tbb::blocked_range<std::uint32_t>(0, blocks->block_count(), kTogether),
+      [&](const tbb::blocked_range<std::uint32_t>& range) {
+        BlockMaker& maker = *makers.local();
+        Triangle* const begin = list.data() + blocks->first_triangle(range.begin());
+        Triangle* end = begin;
+        for (std::uint32_t b = range.begin(); b != range.end(); ++b) {
+          const std::uint32_t count = blocks->triangles_in(b);
+          maker.make({end, count}, *blocks, b);
+          end += count;
+        }
+        if (blocks->block_count() > kTogether) forget_pages(begin, end);
+      },
+      tbb::simple_partitioner());
+  blocks->seal();
+  return blocks;
+}
+
+}  // namespace lamina

@@ -1,0 +1,38 @@
+// stages/geometry/blocks/cluster.h: 16 neighbouring triangles, the shape that every kernel reads.
+#pragma once
+
+#include <cstdint>
+
+#include "stages/data/mesh.h"
+
+namespace lamina {
+
+inline constexpr std::uint32_t kClusterSize = 16;
+
+/// 16 triangles, coordinate by coordinate, so that one plane is compared with 16 facets at a time. Corner k of
+/// triangle i is (x[k][i], y[k][i], z[k][i]), nm, frame of the mesh. Unused lanes hold a point, which no plane crosses.
+struct alignas(16) Cluster {
+  Nm z[3][kClusterSize];
+  Nm y[3][kClusterSize];
+  Nm x[3][kClusterSize];
+
+  Triangle triangle(std::uint32_t lane) const {
+    return {{x[0][lane], y[0][lane], z[0][lane]}, {x[1][lane], y[1][lane], z[1][lane]}, {x[2][lane], y[2][lane], z[2][lane]}};
+  }
+};
+static_assert(sizeof(Cluster) == kClusterSize * sizeof(Triangle));
+
+/// 16 triangles as numbers of vertices in the table of their block: corner k of triangle i is vertex corner[k][i].
+struct alignas(32) IndexedCluster {
+  std::uint16_t corner[3][kClusterSize];
+};
+static_assert(sizeof(IndexedCluster) == 96);
+
+/// Writes all corners of an indexed cluster. 4 bytes behind the last vertex of the table must be readable.
+void expand_cluster(const IndexedCluster& from, const Point3* vertices, Cluster& out);
+
+/// The box around a cluster, nm; of an indexed one under the condition of expand_cluster().
+Box bounds_of(const IndexedCluster& cluster, const Point3* vertices);
+Box bounds_of(const Cluster& cluster);
+
+}  // namespace lamina

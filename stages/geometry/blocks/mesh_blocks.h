@@ -1,0 +1,147 @@
+// stages/geometry/blocks/mesh_blocks.h: a mesh as blocks of triangles whose vertices are stored once.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <span>
+
+#include "stages/data/buffer.h"
+#include "stages/data/mesh.h"
+#include "stages/geometry/blocks/block_order.h"
+#include "stages/geometry/blocks/cluster.h"
+#include "stages/geometry/blocks/pages.h"
+
+namespace lamina {
+
+/// Triangles in clusters of 16, 256 clusters a block. A block holds each of its vertices once, 12 bytes, and three numbers of
+/// 16 bits a triangle: 11 to 24 bytes a triangle. A block with more than 1.5 vertices a triangle, of a file in disorder, holds
+/// its clusters as they are read, 36 bytes a triangle. Vertices lie in the order in which clusters name them first, so
+/// those of a cluster are near each other. A box a cluster is 1.5 bytes a triangle on top.
+///
+/// Blocks are made by any number of threads (block_maker.h), each once; from then on nothing changes but shift().
+class MeshBlocks {
+ public:
+  static constexpr std::uint32_t kClusters = kBlockSize / kClusterSize;  // a block
+
+  /// own, added  triangles of the file, and of those the ones that repair added: they begin a cluster and a block
+  MeshBlocks(std::uint32_t own, std::uint32_t added);
+
+  std::uint32_t triangle_count() const { return own_ + added_; }
+  std::uint32_t cluster_count() const { return static_cast<std::uint32_t>(bounds_.size()); }
+  /// Clusters from here on hold only triangles that repair added.
+  std::uint32_t first_cap() const { return first_cap_; }
+  /// Of each cluster, nm.
+  std::span<const Box> bounds() const { return bounds_; }
+
+  /// A cluster, where it is stored or expanded into `room`; the reference lives as long as both.
+  const Cluster& cluster(std::uint32_t index, Cluster& room) const {
+    const Place place = place_of(index);
+    if (place.block.vertices == 0) return place.block.plain()[place.cluster];
+    expand_cluster(place.block.indexed()[place.cluster], place.block.vertex(), room);
+    return room;
+  }
+
+  /// One triangle of a cluster.
+  Triangle triangle(std::uint32_t cluster, std::uint32_t lane) const {
+    const Place place = place_of(cluster);
+    if (place.block.vertices == 0) return place.block.plain()[place.cluster].triangle(lane);
+    const Point3* const vertex = place.block.vertex();
+    const auto& corner = place.block.indexed()[place.cluster].corner;
+    return {vertex[corner[0][lane]], vertex[corner[1][lane]], vertex[corner[2][lane]]};
+  }
+
+  /// Asks the processor for what cluster() reads first; then, some time later, for the vertices that are named there.
+  void prefetch(std::uint32_t index) const {
+    const Place place = place_of(index);
+    const bool plain = place.block.vertices == 0;
+    const char* const bytes = place.block.bytes + place.cluster * (plain ? sizeof(Cluster) : sizeof(IndexedCluster));
+    for (std::size_t line = 0; line < (plain ? sizeof(Cluster) : sizeof(IndexedCluster)); line += kLine) {
+      __builtin_prefetch(bytes + line);
+    }
+  }
+  void prefetch_vertices(std::uint32_t index) const {
+    const Place place = place_of(index);
+    if (place.block.vertices == 0) return;
+    const auto& corner = place.block.indexed()[place.cluster].corner;
+    for (std::uint32_t lane = 0; lane < kClusterSize; lane += 4) {
+      for (const auto& numbers : corner) __builtin_prefetch(place.block.vertex() + numbers[lane]);
+    }
+  }
+
+  /// Calls `see` for each vertex at least once, in no order of the file.
+  template <class See>
+  void each_vertex(See&& see) const {
+    for (std::uint32_t b = 0; b < blocks_.size(); ++b) {
+      const Block& block = blocks_[b];
+      for (std::uint32_t v = 0; v < block.vertices; ++v) see(block.vertex()[v]);
+      if (block.vertices > 0) continue;
+      for (std::uint32_t i = 0; i < triangles_in(b); ++i) {
+        const Triangle t = block.plain()[i / kClusterSize].triangle(i % kClusterSize);
+        see(t.a), see(t.b), see(t.c);
+      }
+    }
+  }
+
+  /// Moves every vertex. Not while others read.
+  void shift(const Point3& by);
+
+  std::uint64_t bytes() const { return pages_.bytes() + bytes_held(blocks_); }  // of triangles
+  std::uint64_t bounds_bytes() const { return bytes_held(bounds_); }
+
+  std::uint32_t block_count() const { return static_cast<std::uint32_t>(blocks_.size()); }
+  /// Which triangles of the list a block holds: own ones first, then those added.
+  std::uint32_t first_triangle(std::uint32_t block) const {
+    return block < first_cap_block_ ? block * kBlockSize : own_ + (block - first_cap_block_) * kBlockSize;
+  }
+  std::uint32_t triangles_in(std::uint32_t block) const;
+  bool is_added(std::uint32_t block) const { return block >= first_cap_block_; }
+
+  /// Gives back what blocks did not need; once all are made.
+  void seal() { pages_.give_back_rest(); }
+
+ private:
+  friend class BlockMaker;
+  static constexpr std::size_t kLine = 64;
+
+  struct Block {
+    char* bytes = nullptr;       // the clusters, and behind indexed ones the vertices and 16 bytes to spare
+    std::uint32_t clusters = 0;  // in the block
+    std::uint32_t vertices = 0;  // 0: the clusters are stored as they are read
+
+    const Cluster* plain() const { return reinterpret_cast<const Cluster*>(bytes); }
+    const IndexedCluster* indexed() const { return reinterpret_cast<const IndexedCluster*>(bytes); }
+    const Point3* vertex() const { return reinterpret_cast<const Point3*>(bytes + clusters * sizeof(IndexedCluster)); }
+  };
+  struct Place {
+    const Block& block;
+    std::uint32_t cluster;  // in the block
+  };
+
+  Place place_of(std::uint32_t cluster) const {
+    if (cluster < first_cap_) return {blocks_[cluster / kClusters], cluster % kClusters};
+    const std::uint32_t cap = cluster - first_cap_;
+    return {blocks_[first_cap_block_ + cap / kClusters], cap % kClusters};
+  }
+  std::uint32_t first_cluster(std::uint32_t block) const {
+    return block < first_cap_block_ ? block * kClusters : first_cap_ + (block - first_cap_block_) * kClusters;
+  }
+
+  std::uint32_t own_, added_, first_cap_, first_cap_block_;
+  Buffer<Block> blocks_;
+  Buffer<Box> bounds_;
+  Pages pages_;
+};
+
+/// Of a list or of blocks.
+inline std::uint64_t triangle_count(const Mesh& mesh) {
+  return mesh.blocks ? mesh.blocks->triangle_count() : mesh.triangles.size();
+}
+
+/// Calls `see` for each vertex at least once: in the order of a list, in no order of blocks.
+template <class See>
+void each_vertex(const Mesh& mesh, See&& see) {
+  for (const Triangle& t : mesh.triangles) see(t.a), see(t.b), see(t.c);
+  if (mesh.blocks) mesh.blocks->each_vertex(see);
+}
+
+}  // namespace lamina

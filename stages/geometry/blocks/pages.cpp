@@ -1,0 +1,47 @@
+#include "stages/geometry/blocks/pages.h"
+
+#include <sys/mman.h>
+
+#include <cassert>
+#include <new>
+
+namespace lamina {
+namespace {
+
+constexpr std::uint64_t kPiece = 64, kPage = 4096;
+
+std::uint64_t rounded_up(std::uint64_t bytes, std::uint64_t to) { return (bytes + to - 1) / to * to; }
+
+}  // namespace
+
+Pages::Pages(std::uint64_t most_bytes) : mapped_(rounded_up(most_bytes, kPage)) {
+  if (mapped_ == 0) return;
+  void* const place = ::mmap(nullptr, mapped_, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE, -1, 0);
+  if (place == MAP_FAILED) throw std::bad_alloc();
+  begin_ = static_cast<char*>(place);
+  ::madvise(begin_, mapped_, MADV_HUGEPAGE);  // where the system has none to give, nothing changes
+}
+
+Pages::~Pages() {
+  if (mapped_ > 0) ::munmap(begin_, mapped_);
+}
+
+char* Pages::take(std::size_t bytes) {
+  const std::uint64_t rounded = rounded_up(bytes, kPiece), at = taken_.fetch_add(rounded);
+  assert(at + rounded <= mapped_);
+  return begin_ + at;
+}
+
+void Pages::give_back_rest() {
+  const std::uint64_t used = rounded_up(taken_, kPage);
+  if (used < mapped_) ::munmap(begin_ + used, mapped_ - used);
+  mapped_ = used;
+}
+
+void forget_pages(void* begin, void* end) {
+  const std::uint64_t first = rounded_up(reinterpret_cast<std::uintptr_t>(begin), kPage);
+  const std::uint64_t last = reinterpret_cast<std::uintptr_t>(end) / kPage * kPage;
+  if (first < last) ::madvise(reinterpret_cast<void*>(first), last - first, MADV_DONTNEED);
+}
+
+}  // namespace lamina

@@ -1,0 +1,37 @@
+// stages/geometry/blocks/pages.h: memory that is taken piece by piece, by many threads, and never moves.
+#pragma once
+
+#include <atomic>
+#include <cstddef>
+#include <cstdint>
+
+namespace lamina {
+
+/// Addresses for as much as may be needed; memory only for what is written. Pieces lie side by side, so that large pages
+/// serve them, which are faulted in 500 times as fast as small ones.
+class Pages {
+ public:
+  /// throws  std::bad_alloc: the system has no such room
+  explicit Pages(std::uint64_t most_bytes);
+  ~Pages();
+  Pages(const Pages&) = delete;
+  Pages& operator=(const Pages&) = delete;
+
+  /// A piece at a multiple of 64 bytes, unset. All pieces together, each rounded up to 64, stay within most_bytes.
+  char* take(std::size_t bytes);
+
+  /// Gives addresses behind the last piece back; nothing may be taken afterwards.
+  void give_back_rest();
+
+  std::uint64_t bytes() const { return taken_; }
+
+ private:
+  char* begin_ = nullptr;
+  std::uint64_t mapped_ = 0;
+  std::atomic<std::uint64_t> taken_{0};
+};
+
+/// Gives the memory of whole pages within [begin, end) back to the system; what they held is lost, the addresses stay.
+void forget_pages(void* begin, void* end);
+
+}  // namespace lamina

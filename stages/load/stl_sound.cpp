@@ -1,0 +1,90 @@
+// stages/load/stl_sound.cpp: a sound binary STL becomes blocks in one pass, each read, snapped, judged and stored in a core's
+// cache. The list of triangles never exists.
+#include <tbb/blocked_range.h>
+#include <tbb/enumerable_thread_specific.h>
+#include <tbb/parallel_for.h>
+
+#include <atomic>
+#include <memory>
+
+#include "stages/geometry/blocks/block_maker.h"
+#include "stages/load/repair/census.h"
+#include "stages/load/stl_facets.h"
+
+namespace lamina::load {
+namespace {
+
+/// What a thread needs for a block, and what it found in all of its blocks.
+struct Worker {
+  std::array<char, kBlockSize * kFacetBytes> bytes;
+  std::array<Triangle, kBlockSize> facets;
+  BlockMaker maker;
+  CensusSums sums;
+  FacetBox box;
+};
+using Workers = tbb::enumerable_thread_specific<std::unique_ptr<Worker>>;
+
+/// Reads one block. false  it cannot be read or snapped
+bool read_block(const Source& source, const Snapper& snapper, std::uint32_t block, std::uint64_t share, Worker& worker,
+                MeshBlocks& blocks, Prisms& prisms) {
+  const std::uint64_t first = blocks.first_triangle(block), count = blocks.triangles_in(block);
+  if (!source.read(kHeaderBytes + first * kFacetBytes, worker.bytes.data(), count * kFacetBytes)) return false;
+  if (!snap_facets(worker.bytes.data(), count, snapper, worker.facets.data(), worker.box)) return false;
+  const std::span<const Triangle> facets(worker.facets.data(), count);
+  worker.sums.add(facets, share);
+  prisms = Prisms::of(facets, facets.front().a.z);
+  worker.maker.make(facets, blocks, block);
+  return true;
+}
+
+/// Of all facets, nm3; the sum is taken in the order of blocks, whichever thread read them.
+double sixfold_volume(const Buffer<Prisms>& pieces, Nm plane) {
+  double sum = 0;
+  for (const Prisms& piece : pieces) sum += piece.sixfold_volume_above(plane);
+  return sum;
+}
+
+}  // namespace
+
+std::optional<Mesh> read_sound_stl(const Source& source, const Snapper& snapper, const LoadOptions& options,
+                                   std::vector<Note>& notes) {
+  Facets header;
+  const Result<std::uint64_t> count = count_facets(source, options, header);
+  if (!count || header.doubt) return std::nullopt;
+  const auto triangles = static_cast<std::uint32_t>(*count);
+  const auto blocks = std::make_shared<MeshBlocks>(triangles, 0);
+  Buffer<Prisms> pieces(blocks->block_count());
+  const std::uint64_t share = sampled_share(triangles);
+  Workers workers([] { return std::make_unique<Worker>(); });
+  std::atomic<bool> failed{false};
+  tbb::parallel_for(tbb::blocked_range<std::uint32_t>(0, blocks->block_count()),
+                    [&](const tbb::blocked_range<std::uint32_t>& range) {
+                      Worker& worker = *workers.local();
+                      for (std::uint32_t b = range.begin(); b != range.end() && !failed; ++b) {
+                        if (!read_block(source, snapper, b, share, worker, *blocks, pieces[b])) failed = true;
+                      }
+                    });
+  if (failed) return std::nullopt;
+  blocks->seal();
+
+  CensusSums sums;
+  FacetBox box;
+  for (const auto& worker : workers) {
+    sums.add(worker->sums);
+    box.add(worker->box);
+  }
+  Mesh mesh;
+  mesh.bounds = box.nm(snapper);
+  mesh.fingerprint = sums.fingerprint;
+  mesh.volume_mm3 = sixfold_volume(pieces, mesh.bounds.middle().z) / 6e18;
+  const double of_box = mm(mesh.bounds.width()) * mm(mesh.bounds.depth()) * mm(mesh.bounds.height());
+  const bool sound = sums.boundary == 0 && mesh.volume_mm3 > kHardlyAny * of_box && !any_reversed(sums.sampled);
+  if (!sound) return std::nullopt;
+  mesh.name = source.path();
+  mesh.repaired_from = triangles;
+  mesh.blocks = blocks;
+  notes.insert(notes.end(), header.notes.begin(), header.notes.end());
+  return mesh;
+}
+
+}  // namespace lamina::load

@@ -1,0 +1,190 @@
+// tests/geometry/test_blocks.cpp: blocks hold what the list held, whatever it is.
+#include <gtest/gtest.h>
+#include <tbb/global_control.h>
+
+#include <algorithm>
+#include <random>
+#include <tuple>
+#include <vector>
+
+#include "stages/geometry/blocks/block_maker.h"
+
+namespace lamina::test {
+namespace {
+
+std::vector<Triangle> in_order(std::vector<Triangle> triangles) {
+  std::sort(triangles.begin(), triangles.end(), [](const Triangle& one, const Triangle& other) {
+    return std::tie(one.a, one.b, one.c) < std::tie(other.a, other.b, other.c);
+  });
+  return triangles;
+}
+
+/// Facets over the cells of a grid, row by row: neighbours share vertices, two facets a vertex.
+std::vector<Triangle> grid_of_facets(std::uint32_t count) {
+  constexpr std::uint32_t kCells = 40;
+  const auto corner = [](std::uint32_t x, std::uint32_t y) {
+    return Point3{static_cast<Nm>(x * 1000), static_cast<Nm>(y * 1000), static_cast<Nm>((x * 7 + y * 13) % 31 * 500)};
+  };
+  std::vector<Triangle> out;
+  for (std::uint32_t cell = 0; out.size() < count; ++cell) {
+    const std::uint32_t x = cell % kCells, y = cell / kCells;
+    out.push_back({corner(x, y), corner(x + 1, y), corner(x, y + 1)});
+    out.push_back({corner(x + 1, y), corner(x + 1, y + 1), corner(x, y + 1)});
+  }
+  out.resize(count);
+  return out;
+}
+
+/// Facets none of which shares a vertex with another, from the whole range of coordinates.
+std::vector<Triangle> facets_apart(std::uint32_t count) {
+  std::mt19937 random(7);
+  std::uniform_int_distribution<Nm> anywhere(-INT32_MAX, INT32_MAX);
+  const auto corner = [&] { return Point3{anywhere(random), anywhere(random), anywhere(random)}; };
+  std::vector<Triangle> out;
+  for (std::uint32_t i = 0; i < count; ++i) out.push_back({corner(), corner(), corner()});
+  return out;
+}
+
+Mesh mesh_of_list(const std::vector<Triangle>& triangles, std::uint32_t repaired_from = UINT32_MAX) {
+  Mesh mesh;
+  mesh.triangles.assign(triangles.begin(), triangles.end());
+  mesh.repaired_from = repaired_from;
+  return mesh;
+}
+
+/// The triangles of clusters [begin, end), read in both ways; lanes beyond `count` have to be points within the cluster's box.
+std::vector<Triangle> triangles_in(const MeshBlocks& blocks, std::uint32_t begin, std::uint32_t end, std::uint32_t count) {
+  std::vector<Triangle> all;
+  Cluster room;
+  for (std::uint32_t c = begin; c < end; ++c) {
+    Box box;
+    for (std::uint32_t lane = 0; lane < kClusterSize; ++lane) {
+      const Triangle t = blocks.cluster(c, room).triangle(lane);
+      EXPECT_EQ(t, blocks.triangle(c, lane)) << c << " " << lane;
+      for (const Point3& corner : {t.a, t.b, t.c}) box.add(corner);
+      if (all.size() < count) {
+        all.push_back(t);
+      } else {
+        EXPECT_TRUE(t.a == t.b && t.b == t.c) << c << " " << lane;
+      }
+    }
+    EXPECT_EQ(blocks.bounds()[c].lo, box.lo) << c;
+    EXPECT_EQ(blocks.bounds()[c].hi, box.hi) << c;
+  }
+  return all;
+}
+
+void expect_same_triangles(const std::vector<Triangle>& list, std::uint32_t own) {
+  SCOPED_TRACE(std::to_string(list.size()) + " triangles, own: " + std::to_string(own));
+  Mesh mesh = mesh_of_list(list, own);
+  const auto blocks = take_blocks(mesh);
+  EXPECT_TRUE(mesh.triangles.empty());
+  const auto count = static_cast<std::uint32_t>(list.size());
+  own = std::min(own, count);
+  EXPECT_EQ(blocks->triangle_count(), count);
+  EXPECT_EQ(triangle_count(mesh_of_list(list)), count);
+  EXPECT_EQ(blocks->first_cap(), (own + kClusterSize - 1) / kClusterSize);
+  const auto middle = list.begin() + own;
+  EXPECT_EQ(in_order(triangles_in(*blocks, 0, blocks->first_cap(), own)), in_order({list.begin(), middle}));
+  EXPECT_EQ(triangles_in(*blocks, blocks->first_cap(), blocks->cluster_count(), count - own),
+            std::vector<Triangle>(middle, list.end()));
+}
+
+TEST(Blocks, HoldTheTrianglesOfTheListForEveryLength) {
+  for (const std::uint32_t count : {0u, 1u, 2u, 15u, 16u, 17u, 4095u, 4096u, 4097u, 12'345u}) {
+    expect_same_triangles(grid_of_facets(count), UINT32_MAX);
+    expect_same_triangles(facets_apart(count), UINT32_MAX);
+  }
+}
+
+TEST(Blocks, KeepWhatRepairAddedInItsOrderInClustersOfItsOwn) {
+  for (const std::uint32_t own : {0u, 1u, 16u, 4090u, 4096u, 9000u, 9999u}) {
+    expect_same_triangles(grid_of_facets(10'000), own);
+    expect_same_triangles(facets_apart(10'000), own);
+  }
+}
+
+TEST(Blocks, OfRandomMeshesOverFewAndManyVerticesHoldTheSame) {
+  std::mt19937 random(3);
+  for (const std::uint32_t vertices : {1u, 5u, 1000u, 5000u, 7000u, 12'000u}) {
+    std::vector<Point3> vertex = {{0, 0, -1}, {-1, -1, -1}, {INT32_MAX, -INT32_MAX, 0}};
+    for (std::uint32_t v = 0; v < vertices; ++v) {  // many equal in two coordinates
+      const auto any = [&](std::uint32_t of) { return static_cast<Nm>(random() % of) - static_cast<Nm>(of / 2); };
+      vertex.push_back({any(50), any(50) * 65'536, any(1000)});
+    }
+    std::vector<Triangle> list;
+    const auto pick = [&] { return vertex[random() % vertex.size()]; };
+    for (int i = 0; i < 9000; ++i) list.push_back({pick(), pick(), pick()});
+    expect_same_triangles(list, UINT32_MAX);
+  }
+}
+
+TEST(Blocks, TakeTwentyBytesATriangleWithTheirBoxesWhereVerticesAreShared) {
+  constexpr std::uint32_t kCount = 50'000;
+  Mesh mesh = mesh_of_list(grid_of_facets(kCount));
+  const auto blocks = take_blocks(mesh);
+  EXPECT_LT(blocks->bytes() + blocks->bounds_bytes(), 15 * kCount);
+}
+
+TEST(Blocks, FullOfDifferentVerticesTakeNoMoreThanTheList) {
+  constexpr std::uint32_t kCount = 3 * kBlockSize;
+  Mesh mesh = mesh_of_list(facets_apart(kCount));
+  const auto blocks = take_blocks(mesh);
+  EXPECT_LE(blocks->bytes(), kCount * sizeof(Triangle) + 1024);
+  EXPECT_EQ(blocks->cluster_count(), kCount / kClusterSize);
+}
+
+TEST(Blocks, AreTheSameForEveryNumberOfThreads) {
+  std::vector<Triangle> list = grid_of_facets(150'000), apart = facets_apart(30'000);
+  list.insert(list.end(), apart.begin(), apart.end());
+  const auto made = [&](std::size_t threads) {
+    const tbb::global_control control(tbb::global_control::max_allowed_parallelism, threads);
+    Mesh mesh = mesh_of_list(list, 170'000);
+    return take_blocks(mesh);
+  };
+  const auto one = made(1), eight = made(8);
+  const auto all = [](const MeshBlocks& blocks) { return triangles_in(blocks, 0, blocks.cluster_count(), UINT32_MAX); };
+  EXPECT_EQ(all(*one), all(*eight));
+  EXPECT_EQ(one->bytes(), eight->bytes());
+}
+
+TEST(Blocks, AreOrderedByHeightSoThatAPlaneMeetsFewClusters) {
+  std::vector<Triangle> list = grid_of_facets(kBlockSize);
+  std::shuffle(list.begin(), list.end(), std::mt19937(5));
+  Mesh mesh = mesh_of_list(list);
+  const auto blocks = take_blocks(mesh);
+  std::int64_t heights = 0;
+  for (const Box& box : blocks->bounds()) heights += box.height();
+  EXPECT_LT(heights, std::int64_t{blocks->cluster_count()} * 31 * 500 * 2 / 3);
+}
+
+TEST(Blocks, MoveAsAWhole) {
+  const Point3 by{5, -7, 1'000'000};
+  for (std::vector<Triangle> list : {grid_of_facets(5000), grid_of_facets(10)}) {
+    Mesh mesh = mesh_of_list(list);
+    const auto blocks = take_blocks(mesh);
+    blocks->shift(by);
+    for (Triangle& t : list) {
+      for (Point3* p : {&t.a, &t.b, &t.c}) *p = {p->x + by.x, p->y + by.y, p->z + by.z};
+    }
+    const auto count = static_cast<std::uint32_t>(list.size());
+    EXPECT_EQ(in_order(triangles_in(*blocks, 0, blocks->cluster_count(), count)), in_order(list));
+  }
+}
+
+TEST(Blocks, NameEveryVertex) {
+  for (const std::vector<Triangle>& list : {grid_of_facets(5000), facets_apart(5000)}) {
+    Box expected, seen;
+    for (const Triangle& t : list) expected.add(t.a), expected.add(t.b), expected.add(t.c);
+    Mesh mesh = mesh_of_list(list);
+    mesh.blocks = take_blocks(mesh);
+    std::size_t vertices = 0;
+    each_vertex(mesh, [&](const Point3& p) { seen.add(p), ++vertices; });
+    EXPECT_EQ(seen.lo, expected.lo);
+    EXPECT_EQ(seen.hi, expected.hi);
+    EXPECT_LE(vertices, 3 * list.size());
+  }
+}
+
+}  // namespace
+}  // namespace lamina::test
