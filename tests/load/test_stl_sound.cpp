@@ -58,14 +58,15 @@ bool expect_same_either_way(const std::string& path, const load::LoadOptions& op
 TEST(ReadSoundStl, AClosedFileComesAsBlocks) {
   EXPECT_TRUE(expect_same_either_way(write_file("box.stl", binary_stl(unit_box()))));
   EXPECT_TRUE(expect_same_either_way(write_file("solid.stl", binary_stl(unit_box(), "solid"))));
-  EXPECT_TRUE(expect_same_either_way(write_file("stray.stl", binary_stl(unit_box()) + std::string(777, 'x'))));
+  EXPECT_TRUE(expect_same_either_way(write_file("stray.stl", binary_stl(unit_box()) + std::string(7, 'x'))));
   EXPECT_TRUE(expect_same_either_way(write_file("zero.stl", binary_stl(unit_box(), "", 0))));
 }
 
-TEST(ReadSoundStl, EveryFileOfTheCorpusIsTheSameEitherWay) {
+TEST(ReadSoundStl, EveryStlOfTheCorpusIsTheSameEitherWay) {
   int blocks = 0;
-  for (const auto& file : part_files(std::filesystem::path(LAMINA_TEST_DIR) / "corpus"))
-    blocks += expect_same_either_way(file.string());
+  for (const auto& file : part_files(std::filesystem::path(LAMINA_TEST_DIR) / "corpus")) {
+    if (file.extension() == ".stl") blocks += expect_same_either_way(file.string());
+  }
   EXPECT_GE(blocks, 3);
 }
 
@@ -100,6 +101,7 @@ TEST(ReadSoundStl, WhatIsNotSoundIsReadAgainForItsList) {
     EXPECT_FALSE(expect_same_either_way(file(unit_box(), 20), options)) << "the header says more";
     EXPECT_FALSE(expect_same_either_way(file(beside, 12), options)) << "the header says less";
     EXPECT_FALSE(expect_same_either_way(file({}), options));
+    EXPECT_FALSE(expect_same_either_way(write_file("rest.stl", binary_stl(unit_box()) + std::string(777, 'x')), options));
     EXPECT_FALSE(expect_same_either_way(write_file("short.stl", binary_stl(unit_box()).substr(0, 300)), options));
   }
 }
