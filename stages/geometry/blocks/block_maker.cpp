@@ -10,44 +10,48 @@
 namespace lamina {
 namespace {
 
-/// 15 bits of a vertex, each of which depends on every bit of its coordinates.
+/// 16 bits of a vertex, each of which depends on every bit of its coordinates.
 inline std::uint32_t hash(const Point3& p) {
   __extension__ using Wide = unsigned __int128;
   constexpr std::uint64_t kXy = 0x2d358dccaa6c78a5, kZ = 0x9e3779b97f4a7c15, kOdd = 0x8bb84b93962eacc9;
   const std::uint64_t xy = static_cast<std::uint32_t>(p.x) | std::uint64_t{static_cast<std::uint32_t>(p.y)} << 32;
   const Wide product = static_cast<Wide>(xy ^ kXy) * ((static_cast<std::uint32_t>(p.z) * kZ) ^ kOdd);
-  return static_cast<std::uint32_t>((static_cast<std::uint64_t>(product) ^ static_cast<std::uint64_t>(product >> 64)) >> 49);
+  return static_cast<std::uint32_t>((static_cast<std::uint64_t>(product) ^ static_cast<std::uint64_t>(product >> 64)) >> 48);
 }
 
-inline bool same(const Point3& p, const Point3& q) { return ((p.x ^ q.x) | (p.y ^ q.y) | (p.z ^ q.z)) == 0; }
+/// 0 if two vertices are one.
+inline std::uint32_t difference(const Point3& p, const Point3& q) {
+  return static_cast<std::uint32_t>((p.x ^ q.x) | (p.y ^ q.y) | (p.z ^ q.z));
+}
+
+/// All bits or none.
+inline std::uint32_t mask_of(bool yes) { return -static_cast<std::uint32_t>(yes); }
 
 }  // namespace
 
 /// Gives each vertex of the block a number, in the order of the file. returns  whether there are few enough
 ///
-/// Whether a corner is a new vertex cannot be foreseen by a processor either, so nothing branches on it: every corner is
-/// written where the next new vertex would be.
+/// No processor foresees whether a corner is a new vertex, so nothing branches on it: every corner is written where the next
+/// new vertex would be, and masks choose.
 bool BlockMaker::number_vertices(std::span<const Triangle> triangles) {
-  const auto most = static_cast<std::uint32_t>(triangles.size() * 3 / 2);
+  const std::uint32_t corners = 3 * static_cast<std::uint32_t>(triangles.size()), most = corners / 2;
+  const Point3* const point = corners == 0 ? nullptr : &triangles.front().a;
+  for (std::uint32_t i = 0; i < corners; ++i) corner_[i] = static_cast<std::uint16_t>(hash(point[i]) % kSlots);
   slot_.fill(kNone);
   std::uint32_t vertices = 0;
-  std::uint16_t* corner = corner_.data();
-  for (const Triangle& t : triangles) {
-    if (vertices > most) return false;
-    for (const Point3* const p : {&t.a, &t.b, &t.c}) {
-      std::uint32_t at = hash(*p);
-      std::uint32_t number = slot_[at];
-      while (((number != kNone) & !same(vertex_[number], *p)) != 0) [[unlikely]] {
-          at = (at + 1) % kSlots;
-          number = slot_[at];
-        }
-      const bool is_new = number == kNone;
-      number = is_new ? vertices : number;
-      vertex_[vertices] = *p;
-      vertices += is_new ? 1 : 0;
-      slot_[at] = static_cast<std::uint16_t>(number);
-      *corner++ = static_cast<std::uint16_t>(number);
-    }
+  for (std::uint32_t i = 0; i < corners && vertices <= most; ++i) {
+    const Point3 p = point[i];
+    std::uint32_t at = corner_[i], number = slot_[at], is_new = mask_of(number == kNone);
+    while ((difference(vertex_[number], p) & ~is_new) != 0) [[unlikely]] {
+        at = (at + 1) % kSlots;
+        number = slot_[at];
+        is_new = mask_of(number == kNone);
+      }
+    number ^= (number ^ vertices) & is_new;
+    vertex_[vertices] = p;
+    vertices -= is_new;  // which is -1 or 0
+    slot_[at] = static_cast<std::uint16_t>(number);
+    corner_[i] = static_cast<std::uint16_t>(number);
   }
   vertices_ = vertices;
   return vertices <= most;
@@ -62,13 +66,13 @@ void BlockMaker::write_indexed(std::span<const Triangle> triangles, MeshBlocks::
   for (std::uint32_t i = 0; i < count; ++i) {
     const std::uint16_t* const corner = corner_.data() + 3 * std::size_t{order_[i]};
     for (std::uint32_t k = 0; k < 3; ++k) {
-      const std::uint32_t known = number_[corner[k]];
-      const bool is_new = known == kNone;
-      const auto number = static_cast<std::uint16_t>(is_new ? named : known);
+      std::uint32_t number = number_[corner[k]];
+      const std::uint32_t is_new = mask_of(number == kNone);
+      number ^= (number ^ named) & is_new;
       vertex[named] = vertex_[corner[k]];
-      named += is_new ? 1 : 0;
-      number_[corner[k]] = number;
-      clusters[i / kClusterSize].corner[k][i % kClusterSize] = number;
+      named -= is_new;
+      number_[corner[k]] = static_cast<std::uint16_t>(number);
+      clusters[i / kClusterSize].corner[k][i % kClusterSize] = static_cast<std::uint16_t>(number);
     }
   }
   const std::uint16_t point = clusters[(count - 1) / kClusterSize].corner[0][(count - 1) % kClusterSize];

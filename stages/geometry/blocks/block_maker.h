@@ -19,7 +19,7 @@ class BlockMaker {
   void make(std::span<const Triangle> triangles, MeshBlocks& mesh, std::uint32_t block);
 
  private:
-  static constexpr std::uint32_t kSlots = 1 << 15;                    // more than twice the corners of a block
+  static constexpr std::uint32_t kSlots = 1 << 14;                    // more than twice the vertices of a block
   static constexpr std::uint32_t kMostVertices = kBlockSize * 3 / 2;  // of a block whose vertices are stored once
   static constexpr std::uint16_t kNone = kMostVertices + 3;           // no vertex; a triangle more than the most is numbered
 
