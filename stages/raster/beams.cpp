@@ -8,17 +8,20 @@
 #include <limits>
 #include <vector>
 
+#include "stages/raster/height_runs.h"
+
 namespace lamina::raster {
 namespace {
 
 /// Spare room of every box, nm: float holds coordinates up to 2.1e9 nm to 128 nm, and an instance adds two roundings.
 constexpr float kRoundingRoom = 1024;
 
-/// What Embree hands back with a cluster.
+/// What Embree hands back with a run of clusters.
 struct Source {
-  const PlacedMesh* placed = nullptr;  // the first, or only, instance of the mesh
-  bool shared = false;                 // several instances: the beam says which one
-  std::uint32_t instance = 0;          // if not shared
+  const PlacedMesh* placed;  // the first, or only, instance of the mesh
+  HeightRuns runs;
+  bool shared = false;         // several instances: the beam says which one
+  std::uint32_t instance = 0;  // if not shared
   float half_band = 0;
 };
 
@@ -37,7 +40,9 @@ struct Copies {
 struct Beam {
   RTCIntersectContext context;
   std::int64_t x, y, z;
+  std::int64_t low, high;      // y of the first and the last row of the band
   std::uint32_t instance = 0;  // the copy in which it is
+  std::span<const PlacedMesh> placed;
   ClusterVisits* visits;
 };
 
@@ -58,9 +63,9 @@ void shoot(Beam& beam, RTCScene scene, Point3 offset) {
   rtcIntersect1(scene, &beam.context, &ray);
 }
 
-void cluster_bounds(const RTCBoundsFunctionArguments* arguments) {
+void run_bounds(const RTCBoundsFunctionArguments* arguments) {
   const auto& source = *static_cast<const Source*>(arguments->geometryUserPtr);
-  const Box& box = source.placed->mesh->bounds[arguments->primID];
+  const Box& box = source.runs.box(arguments->primID);
   const Point3 move = source.shared ? Point3{0, 0, 0} : source.placed->offset;
   const auto at = [](Nm coordinate, Nm offset) { return static_cast<float>(std::int64_t{coordinate} + offset); };
   RTCBounds& bounds = *arguments->bounds_o;
@@ -92,12 +97,15 @@ Error failed(RTCError code, const std::string& what) {
   return {Fault::kInternal, fmt::format("Embree: {} (error {})", what, static_cast<int>(code))};
 }
 
-/// Notes the cluster and never reports a hit, so that the traversal goes on.
-void visit_cluster(const RTCIntersectFunctionNArguments* arguments) {
+/// Notes the run's clusters and never reports a hit, so that the traversal goes on.
+void visit_run(const RTCIntersectFunctionNArguments* arguments) {
   if (arguments->valid[0] == 0) return;
   const auto& source = *static_cast<const Source*>(arguments->geometryUserPtr);
   auto& beam = *reinterpret_cast<Beam*>(arguments->context);
-  beam.visits->push_back({arguments->primID, source.shared ? beam.instance : source.instance});
+  const std::uint32_t instance = source.shared ? beam.instance : source.instance;
+  const Point3& offset = beam.placed[instance].offset;
+  source.runs.find_clusters(arguments->primID, beam.z - offset.z, beam.low - offset.y, beam.high - offset.y, instance,
+                            *beam.visits);
 }
 
 /// Goes on within a copy, and never reports a hit either.
@@ -139,8 +147,8 @@ struct BeamIndex::State {
     rtcReleaseGeometry(geometry);
   }
 
-  void attach_clusters(RTCScene parent, Source& source) const {
-    attach(parent, source.placed->mesh->cluster_count(), &source, cluster_bounds, visit_cluster);
+  void attach_runs(RTCScene parent, Source& source) const {
+    attach(parent, source.runs.count(), &source, run_bounds, visit_run);
   }
 
   RTCScene new_scene() const {
@@ -193,14 +201,15 @@ Result<BeamIndex> BeamIndex::build(std::span<const PlacedMesh> placed, const Pix
   for (std::size_t begin = 0; begin < order.size();) {
     std::size_t end = begin + 1;
     while (end < order.size() && placed[order[end]].mesh == placed[order[begin]].mesh) ++end;
-    Source& source = state.sources.emplace_back();
-    source = {&placed[order[begin]], end - begin > 1, order[begin], half_band};
+    const PlacedMesh& first = placed[order[begin]];
+    Source& source =
+        state.sources.emplace_back(Source{&first, HeightRuns(first.mesh->bounds), end - begin > 1, order[begin], half_band});
     if (!source.shared) {
-      state.attach_clusters(state.scene, source);
+      state.attach_runs(state.scene, source);
     } else {
       const auto number = static_cast<std::uint32_t>(state.copies.scenes.size());
       const RTCScene shared = state.copies.scenes.emplace_back(state.new_scene());
-      state.attach_clusters(shared, source);
+      state.attach_runs(shared, source);
       rtcCommitScene(shared);
       for (std::size_t i = begin; i < end; ++i) state.copies.copies.push_back({order[i], number});
     }
@@ -218,14 +227,20 @@ void BeamIndex::find_clusters(const PixelSampling& sampling, Nm plane, std::uint
                               ClusterVisits& out) const {
   Beam beam{};
   beam.x = static_cast<std::int64_t>(-4 * kRoundingRoom);
-  beam.y = (sampling.y.centre(first_row) + sampling.y.centre(last_row - 1)) / 2;
+  beam.low = sampling.y.centre(first_row);
+  beam.high = sampling.y.centre(last_row - 1);
+  beam.y = (beam.low + beam.high) / 2;
   beam.z = plane;
+  beam.placed = state_->placed;
   beam.visits = &out;
   shoot(beam, state_->scene, {0, 0, 0});
 }
 
 std::uint64_t BeamIndex::bytes() const {
-  return static_cast<std::uint64_t>(std::max<std::int64_t>(0, state_->bytes)) + bytes_held(state_->copies.copies);
+  std::uint64_t total =
+      static_cast<std::uint64_t>(std::max<std::int64_t>(0, state_->bytes)) + bytes_held(state_->copies.copies);
+  for (const Source& source : state_->sources) total += source.runs.bytes();
+  return total;
 }
 
 }  // namespace lamina::raster

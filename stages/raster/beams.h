@@ -1,10 +1,11 @@
 // stages/raster/beams.h: engine `rays`: Embree finds the clusters that a band of rows can meet.
 //
-// One ray a band runs along the middle of its rows, in the plane of the layer, towards +x. Each cluster of 16 triangles
-// is one user primitive whose box is grown by half a band in y, and by more than float rounding everywhere. So the ray
-// passes the box of every cluster that any row of the band could cross: nothing is lost to rounding. A cluster that
-// is met without need is only looked at in vain: whether, in which rows and where a triangle is crossed is decided in
-// integers from its corners (segment.h). And a traversal reports a primitive once, so nothing is counted twice.
+// One ray a band runs along the middle of its rows, in the plane of the layer, towards +x. Each run of 256 clusters
+// (height_runs.h) is one user primitive whose box is grown by half a band in y, and by more than float rounding everywhere.
+// So the ray passes the box of every run that any row of the band could cross: nothing is lost to rounding. The run's own
+// table then tells which of its clusters the plane can meet. A cluster that is met without need is only looked at in vain:
+// whether, in which rows and where a triangle is crossed is decided in integers from its corners (segment.h). And a traversal
+// reports a primitive once, so nothing is counted twice.
 //
 // Source: I. Wald, S. Woop, C. Benthin, G. S. Johnson, M. Ernst, "Embree: A Kernel Framework for Efficient CPU Ray
 // Tracing", ACM Transactions on Graphics 33(4), 2014, for the tree; growing boxes in place of rays is ours.

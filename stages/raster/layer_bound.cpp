@@ -1,76 +1,220 @@
 #include "stages/raster/layer_bound.h"
 
 #include <tbb/blocked_range.h>
-#include <tbb/parallel_reduce.h>
+#include <tbb/enumerable_thread_specific.h>
+#include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <cstring>
 #include <map>
-#include <vector>
 
 namespace lamina::raster {
+namespace {
 
-LayerBound::LayerBound(std::span<const PlacedMesh> placed, const PixelGrid& grid) {
-  std::int64_t top = 1;
-  // Copies at one height differ only in x and y: they are looked at once and counted as often as they stand.
-  std::map<std::pair<const ClusteredMesh*, Nm>, std::uint64_t> copies;
-  for (const PlacedMesh& one : placed) {
-    ++copies[{one.mesh, one.offset.z}];
-    for (const Box& box : one.mesh->bounds) top = std::max(top, std::int64_t{box.hi.z} + one.offset.z);
-  }
-  slab_height_ = top / kSlabs + 1;
+/// Four numbers that are worked on at once, on any processor that compilers know.
+using Four = std::int32_t __attribute__((vector_size(16)));
+using FourFloat = float __attribute__((vector_size(16)));
 
-  using Differences = std::vector<std::array<std::int64_t, 2>>;  // segments, crossings
-  const double rows_per_nm = grid.y.pixels_per_nm();
-  const double slabs_per_nm = 1.0 / static_cast<double>(slab_height_);
-  for (const auto& [key, count] : copies) {
-    const ClusteredMesh& mesh = *key.first;
-    const Nm lift = key.second;
-    const Differences sum = tbb::parallel_reduce(
-        tbb::blocked_range<std::uint32_t>(0, mesh.cluster_count(), 4096), Differences(kSlabs + 1, {0, 0}),
-        [&](const tbb::blocked_range<std::uint32_t>& range, Differences difference) {
-          Cluster room;
-          for (std::uint32_t c = range.begin(); c != range.end(); ++c) {
-            const Cluster& cluster = mesh.cluster(c, room);
-            for (std::uint32_t i = 0; i < kClusterSize; ++i) {
-              const auto [lo_z, hi_z] = std::minmax({cluster.z[0][i], cluster.z[1][i], cluster.z[2][i]});
-              if (lo_z == hi_z) continue;
-              const auto [lo_y, hi_y] = std::minmax({cluster.y[0][i], cluster.y[1][i], cluster.y[2][i]});
-              const auto rows = static_cast<std::int64_t>(static_cast<double>(std::int64_t{hi_y} - lo_y) * rows_per_nm) + 2;
-              const auto slab_of = [&](Nm z) {
-                return std::clamp(static_cast<std::int32_t>((static_cast<double>(z) + lift) * slabs_per_nm), 0,
-                                  static_cast<std::int32_t>(kSlabs) - 1);
-              };
-              auto& begin = difference[static_cast<std::size_t>(slab_of(lo_z))];
-              auto& end = difference[static_cast<std::size_t>(slab_of(hi_z)) + 1];
-              begin[0] += 1, begin[1] += rows;
-              end[0] -= 1, end[1] -= rows;
-            }
-          }
-          return difference;
-        },
-        [](Differences a, const Differences& b) {
-          for (std::size_t i = 0; i < a.size(); ++i) a[i] = {a[i][0] + b[i][0], a[i][1] + b[i][1]};
-          return a;
-        });
-    std::int64_t segments = 0, crossings = 0;
-    for (std::uint32_t slab = 0; slab < kSlabs; ++slab) {
-      segments += sum[slab][0];
-      crossings += sum[slab][1];
-      slab_[slab].segments += static_cast<std::uint64_t>(segments) * count;
-      slab_[slab].crossings += static_cast<std::uint64_t>(crossings) * count;
+Four pick(Four where, Four a, Four b) { return (a & where) | (b & ~where); }
+Four least(Four a, Four b) { return pick(a < b, a, b); }
+Four most(Four a, Four b) { return pick(a < b, b, a); }
+FourFloat in_float(Four a) { return __builtin_convertvector(a, FourFloat); }
+FourFloat unsigned_of(FourFloat a) { return reinterpret_cast<FourFloat>(reinterpret_cast<Four>(a) & INT32_MAX); }
+
+/// The tents of a cluster's facets: slabs of their ends and slopes. Facets that no plane cuts have neither height nor count.
+struct Tents {
+  static constexpr std::uint32_t kFours = kClusterSize / 4;
+  Four begin[kFours], last[kFours];    // slabs that the facet reaches
+  Four rise[kFours], fall[kFours];     // slabs over which it rises and falls, at least 1
+  FourFloat up[kFours], down[kFours];  // nm a slab
+  Four count[kFours];
+
+  /// In float: rounding moves a tent's height by less than 2^-22 of the facet's depth, of which twice as much is added.
+  Tents(const Cluster& cluster, std::uint32_t shift, std::int32_t first) {
+    constexpr float kRounding = 1.0f / (1 << 21), kUp = 1 + 1.0f / (1 << 20);
+    const auto four_of = [](const Nm* lanes, std::uint32_t four) {
+      Four numbers;
+      std::memcpy(&numbers, lanes + 4 * four, sizeof numbers);
+      return numbers;
+    };
+    const auto bits = static_cast<int>(shift);
+    for (std::uint32_t i = 0; i < kFours; ++i) {
+      const Four za = four_of(cluster.z[0], i), zb = four_of(cluster.z[1], i), zc = four_of(cluster.z[2], i);
+      const Four lower = least(za, zb), upper = most(za, zb);
+      const Four lo = least(lower, zc), hi = most(upper, zc), middle = most(lower, least(upper, zc));
+      const Four cut = lo < hi;  // -1 where it is
+      const Four ya = four_of(cluster.y[0], i);
+      const FourFloat uy = in_float(four_of(cluster.y[1], i) - ya), vy = in_float(four_of(cluster.y[2], i) - ya);
+      const FourFloat area = unsigned_of(uy * in_float(zc - za) - in_float(zb - za) * vy);
+      const FourFloat depth = unsigned_of(uy) + unsigned_of(vy);
+      const FourFloat top = (area / in_float(most(hi - lo, Four{} + 1)) + depth * kRounding) * kUp;
+      const FourFloat height = reinterpret_cast<FourFloat>(reinterpret_cast<Four>(top) & cut);
+      begin[i] = (lo >> bits) - first;
+      last[i] = ((hi + cut) >> bits) - first;
+      const Four peak = least((middle >> bits) - first, last[i]);
+      rise[i] = most(peak - begin[i], Four{} + 1);
+      fall[i] = most(last[i] - peak, Four{} + 1);
+      up[i] = height / in_float(rise[i]);
+      down[i] = height / in_float(fall[i]);
+      count[i] = -cut;
     }
+  }
+};
+
+}  // namespace
+
+void CrossingSums::cover(std::int64_t lowest, std::int64_t highest) {
+  std::int64_t begin = 0, end = 0;
+  for (;; join_pairs()) {
+    begin = lowest >> shift_, end = (highest >> shift_) + 1;
+    if (slabs() > 0) begin = std::min(begin, first_), end = std::max(end, first_ + slabs());
+    if (end - begin <= kMostSlabs) break;
+  }
+  if (slabs() == end - begin) return;
+  // Some room beyond, so that a mesh that grows cluster by cluster is moved rarely.
+  const std::int64_t spare = (kMostSlabs - (end - begin)) / 2, room = std::min<std::int64_t>(spare, 256);
+  if (slabs() == 0 || begin < first_) begin -= room;
+  if (slabs() == 0 || end > first_ + slabs()) end += room;
+  std::vector<Change> wider(static_cast<std::size_t>(end - begin) + kBeyond);
+  if (slabs() > 0) std::ranges::copy(change_, wider.begin() + (first_ - begin));
+  change_ = std::move(wider);
+  first_ = begin;
+}
+
+void CrossingSums::join_pairs() {
+  const Table fine = table();
+  ++shift_;
+  if (fine.slab.empty()) return;
+  first_ = fine.first >> 1;
+  const std::int64_t last = (fine.first + static_cast<std::int64_t>(fine.slab.size()) - 1) >> 1;
+  change_.assign(static_cast<std::size_t>(last - first_ + 1) + kBeyond, {});
+  std::vector<Slab> joined(change_.size());
+  for (std::size_t i = 0; i < fine.slab.size(); ++i) {
+    Slab& slab = joined[static_cast<std::size_t>(((fine.first + static_cast<std::int64_t>(i)) >> 1) - first_)];
+    slab = {std::max(slab.depth, fine.slab[i].depth), std::max(slab.segments, fine.slab[i].segments),
+            std::max(slab.clusters, fine.slab[i].clusters)};
+  }
+  for (std::size_t i = 0; i < joined.size(); ++i) {
+    const Slab below = i > 0 ? joined[i - 1] : Slab(), two_below = i > 1 ? joined[i - 2] : Slab();
+    change_[i] = {joined[i].depth - 2 * below.depth + two_below.depth,
+                  static_cast<std::int32_t>(joined[i].segments - below.segments),
+                  static_cast<std::int32_t>(joined[i].clusters - below.clusters)};
   }
 }
 
-LayerBound::Count LayerBound::at(Nm plane) const {
-  // Doubles may put a facet's end one slab off; the neighbours cover that.
-  const std::int64_t slab = std::clamp<std::int64_t>(plane / slab_height_, 0, kSlabs - 1);
-  Count most;
-  for (std::int64_t s = std::max<std::int64_t>(0, slab - 1); s <= std::min<std::int64_t>(kSlabs - 1, slab + 1); ++s) {
-    most.segments = std::max(most.segments, slab_[static_cast<std::size_t>(s)].segments);
-    most.crossings = std::max(most.crossings, slab_[static_cast<std::size_t>(s)].crossings);
+void CrossingSums::add(const Cluster& cluster, const Box& bounds) {
+  if (bounds.height() == 0) return;
+  const std::int64_t begin = bounds.lo.z >> shift_, last = bounds.hi.z >> shift_;
+  if (begin < first_ || last >= first_ + slabs()) cover(bounds.lo.z, bounds.hi.z);
+  const Tents tents(cluster, shift_, static_cast<std::int32_t>(first_));
+  for (std::uint32_t i = 0; i < Tents::kFours; ++i) {
+    for (std::uint32_t lane = 0; lane < 4; ++lane) {
+      const double up = tents.up[i][lane], down = tents.down[i][lane];
+      Change* const from = change_.data() + tents.begin[i][lane];
+      Change* const last_slab = change_.data() + tents.last[i][lane];
+      from->bend += up;
+      from->segments += tents.count[i][lane];
+      from[tents.rise[i][lane]].bend -= up;
+      (last_slab + 2 - tents.fall[i][lane])->bend -= down;
+      last_slab[1].segments -= tents.count[i][lane];
+      last_slab[2].bend += down;
+    }
   }
-  return most;
+  ++change_[static_cast<std::size_t>((bounds.lo.z >> shift_) - first_)].clusters;
+  --change_[static_cast<std::size_t>(((bounds.hi.z - 1) >> shift_) - first_) + 1].clusters;
+}
+
+void CrossingSums::merge(const CrossingSums& other) {
+  if (other.slabs() == 0) return;
+  CrossingSums added = other;
+  const auto lowest = [&] { return added.first_ << added.shift_; };
+  const auto highest = [&] { return ((added.first_ + added.slabs()) << added.shift_) - 1; };
+  do {
+    while (shift_ < added.shift_) join_pairs();
+    cover(lowest(), highest());
+    while (added.shift_ < shift_) added.join_pairs();
+  } while (lowest() >> shift_ < first_ || highest() >> shift_ >= first_ + slabs());
+  Change* to = change_.data() + (added.first_ - first_);
+  for (const Change& change : added.change_) {
+    to->bend += change.bend;
+    to->segments += change.segments;
+    to->clusters += change.clusters;
+    ++to;
+  }
+}
+
+CrossingSums::Table CrossingSums::table() const {
+  Table table{shift_, first_, std::vector<Slab>(static_cast<std::size_t>(slabs()))};
+  double slope = 0;
+  Slab sum;
+  for (std::size_t i = 0; i < table.slab.size(); ++i) {
+    slope += change_[i].bend;
+    sum.depth += slope;
+    sum.segments += change_[i].segments;
+    sum.clusters += change_[i].clusters;
+    table.slab[i] = sum;
+    if (sum.segments == 0) slope = sum.depth = 0;  // nothing is cut here, whatever rounding left
+    table.slab[i].depth = std::max(0.0, sum.depth);
+  }
+  return table;
+}
+
+const CrossingSums::Slab* CrossingSums::Table::at(std::int64_t plane) const {
+  const std::int64_t number = (plane >> shift) - first;
+  return number < 0 || number >= static_cast<std::int64_t>(slab.size()) ? nullptr : &slab[static_cast<std::size_t>(number)];
+}
+
+LayerBound::LayerBound(std::span<const PlacedMesh> placed, const PixelGrid& grid) : rows_per_nm_(grid.y.pixels_per_nm()) {
+  std::map<const ClusteredMesh*, std::uint32_t> number;
+  std::map<std::pair<std::uint32_t, Nm>, std::uint64_t> count;
+  for (const PlacedMesh& one : placed) {
+    const auto [found, is_new] = number.emplace(one.mesh, static_cast<std::uint32_t>(number.size()));
+    ++count[{found->second, one.offset.z}];
+    if (!is_new) continue;
+    const ClusteredMesh& mesh = *one.mesh;
+    tbb::enumerable_thread_specific<CrossingSums> sums;
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, mesh.cluster_count(), 1024),
+                      [&](const tbb::blocked_range<std::size_t>& range) {
+                        CrossingSums& own = sums.local();
+                        Cluster room;
+                        for (auto c = static_cast<std::uint32_t>(range.begin()); c != range.end(); ++c) {
+                          own.add(mesh.cluster(c, room), mesh.bounds[c]);
+                        }
+                      });
+    CrossingSums all;
+    for (const CrossingSums& one_thread : sums) all.merge(one_thread);
+    tables_.push_back(all.table());
+  }
+  for (const auto& [key, copies] : count) copies_.push_back({key.first, key.second, copies});
+}
+
+LayerBound::Count LayerBound::of(const CrossingSums::Slab& slab, std::uint64_t copies) const {
+  // A cut of n rows' depth crosses less than n + 1 of them. Sums in double are known to far better than a millionth.
+  const auto segments = static_cast<std::uint64_t>(slab.segments);
+  const auto rows = static_cast<std::uint64_t>(slab.depth * rows_per_nm_ * (1 + 1e-6)) + 1;
+  return {segments * copies, segments == 0 ? 0 : (rows + segments) * copies,
+          static_cast<std::uint64_t>(slab.clusters) * copies};
+}
+
+LayerBound::Count LayerBound::at(Nm plane) const {
+  Count total;
+  for (const Copies& one : copies_) {
+    const CrossingSums::Slab* slab = tables_[one.table].at(std::int64_t{plane} - one.lift);
+    if (slab == nullptr) continue;
+    const Count count = of(*slab, one.count);
+    total = {total.segments + count.segments, total.crossings + count.crossings, total.clusters + count.clusters};
+  }
+  return total;
+}
+
+std::uint64_t LayerBound::most_crossings() const {
+  std::uint64_t total = 0;
+  for (const Copies& one : copies_) {
+    std::uint64_t most = 0;
+    for (const CrossingSums::Slab& slab : tables_[one.table].slab) most = std::max(most, of(slab, one.count).crossings);
+    total += most;
+  }
+  return total;
 }
 
 }  // namespace lamina::raster

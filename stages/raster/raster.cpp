@@ -12,9 +12,9 @@
 namespace lamina::raster {
 namespace {
 
-/// Rows a ray answers for, at most: their crossings stay within a second-level cache, and few clusters lie across two
-/// bands. Measured from 256 to 4096 on a boat, a terrain and a bed of 96 parts: 1024 is the best or next to it.
-constexpr std::uint32_t kMostBandRows = 1024;
+/// Crossings of the band that a ray answers for, about: they stay within a second-level cache. Bands are few all the same,
+/// since clusters that lie across two of them are cut twice.
+constexpr std::uint64_t kBandCrossings = 1 << 18;
 
 /// Clusters that engine `contours` cuts at once, at most: up to 40 MB of segments.
 constexpr std::size_t kMostClusters = 1 << 16;
@@ -39,6 +39,18 @@ void cut_clusters(const PixelSampling& sampling, std::span<const PlacedMesh> pla
                     {&source.mesh->cluster(cluster, room), cluster, instance, source.offset, cluster >= source.mesh->first_cap},
                     plane, first_row, last_row, out);
   }
+}
+
+/// Elements that a buffer for `count` of them gets: an eighth more, so that layers that need ever more move it rarely.
+std::uint64_t with_spare(std::uint64_t count) { return count + count / 8; }
+
+/// Empties the buffer and makes room. A bound is told beforehand, so buffers never double as they fill.
+template <class T>
+void make_room(Buffer<T>& buffer, std::uint64_t count) {
+  buffer.clear();
+  if (count <= buffer.capacity()) return;
+  buffer = {};
+  buffer.reserve(with_spare(count));
 }
 
 }  // namespace
@@ -79,14 +91,14 @@ Result<Rasterizer> Rasterizer::build(std::span<Mesh> meshes, std::span<const Ins
   state.first_row = row_at(lowest);
   state.last_row = std::max(state.first_row, row_at(highest));
 
-  const std::uint32_t rows = std::max(1u, state.last_row - state.first_row);
-  state.band_rows = ceil_div(rows, ceil_div(rows, kMostBandRows));
-
   for (Mesh& mesh : meshes) state.meshes.push_back(make_clusters(mesh));
   for (const Instance& instance : instances) {
     state.placed.push_back({&state.meshes[instance.mesh], instance.offset});
   }
   state.bound.emplace_back(state.placed, grid);
+  const std::uint32_t rows = std::max(1u, state.last_row - state.first_row);
+  const std::uint64_t bands = std::clamp<std::uint64_t>(state.bound.front().most_crossings() / kBandCrossings, 1, rows);
+  state.band_rows = ceil_div(rows, static_cast<std::uint32_t>(bands));
   if (contours) {
     for (const ClusteredMesh& mesh : state.meshes) state.buckets.emplace_back(mesh);
   }
@@ -101,16 +113,17 @@ Result<Rasterizer> Rasterizer::build(std::span<Mesh> meshes, std::span<const Ins
 LayerReport Rasterizer::layer(Engine engine, Nm plane, LayerScratch& scratch, Runs& out) const {
   const State& state = *state_;
   LayerReport report;
-  out.columns = state.grid.columns();
-  out.change.clear();
-  out.row_offset.clear();
-  out.row_offset.push_back(0);
+  const LayerBound::Count bound = state.bound.front().at(plane);
   const std::uint32_t rows = state.grid.rows();
+  out.columns = state.grid.columns();
+  make_room(out.change, bound.crossings);
   out.row_offset.reserve(std::size_t{rows} + 1);
+  out.row_offset.assign(1, 0);
   out.row_offset.resize(std::size_t{rows - state.last_row} + 1, 0);
 
   const auto append = [&](const ClusterVisits& visits, std::uint32_t first_row, std::uint32_t last_row) {
-    scratch.segments.clear();
+    make_room(scratch.segments, std::min(bound.segments, kClusterSize * std::uint64_t{visits.size()}) + kClusterSize);
+    scratch.scan.make_room(bound.crossings);
     cut_clusters(state.sampling, state.placed, visits, plane, first_row, last_row, scratch.segments);
     scratch.scan.append_rows(state.sampling, scratch.segments, state.placed, plane, state.rule, first_row, last_row, out,
                              report);
@@ -123,7 +136,7 @@ LayerReport Rasterizer::layer(Engine engine, Nm plane, LayerScratch& scratch, Ru
       last = first;
     }
   };
-  scratch.visits.clear();
+  make_room(scratch.visits, bound.clusters);
   if (engine == Engine::kRays) {
     each_band([&](std::uint32_t first, std::uint32_t last) {
       scratch.visits.clear();
@@ -160,13 +173,15 @@ LayerReport Rasterizer::layer(Engine engine, Nm plane, LayerScratch& scratch, Ru
 
 std::uint64_t Rasterizer::layer_bytes_bound(Nm plane) const {
   const LayerBound::Count count = state_->bound.front().at(plane);
-  const std::uint64_t rows = state_->grid.rows();
-  // Segments of open parts are held twice, and close at most as many crossings as they have.
+  const std::uint64_t rows = state_->grid.rows(), places = state_->last_row - state_->first_row;
+  // Segments of open parts are held twice, and close at most as many crossings as they have; buffers double for these.
   const bool open = !std::ranges::all_of(state_->meshes, &ClusteredMesh::closed);
-  const std::uint64_t closing = open ? 2 * count.segments * sizeof(Segment) + 3 * 8 * count.crossings : 0;
-  // Buffers may hold up to twice what they need, crossings and changes take 4 bytes each.
-  return 2 * count.segments * (sizeof(Segment) + sizeof(ClusterVisit)) + 2 * (count.crossings + rows) * 4 * 2 + rows * 8 +
-         closing;
+  const bool caps = std::ranges::any_of(state_->meshes, [](const ClusteredMesh& m) { return m.first_cap < m.clusters.size(); });
+  const std::uint64_t closing = open ? 2 * count.segments * sizeof(Segment) + 5 * 8 * count.crossings : 0;
+  const std::uint64_t visits = (count.clusters > kMostClusters ? 3 : 1) * count.clusters * sizeof(ClusterVisit);
+  // Crossings and changes; the place of each row, its offset, and whether it is capped.
+  return with_spare(visits + (count.segments + kClusterSize) * sizeof(Segment) + 2 * 4 * count.crossings) +
+         4 * (places + rows + 2) + (open || caps ? places : 0) + closing;
 }
 
 std::uint64_t Rasterizer::crossings_bound(Nm plane) const { return state_->bound.front().at(plane).crossings; }

@@ -48,7 +48,7 @@ class Rasterizer {
   /// cost  O(facets near the plane + crossings log(crossings of a row)); no allocation once the scratch is warm
   LayerReport layer(Engine engine, Nm plane, LayerScratch& scratch, Runs& out) const;
 
-  /// Bytes that the layer at `plane` may need at most: scratch and runs. From a table of 1024 heights, made once.
+  /// Bytes that the layer at `plane` may need at most: scratch and runs. From tables of heights, made once (layer_bound.h).
   std::uint64_t layer_bytes_bound(Nm plane) const;
   /// Crossings that the layer at `plane` may have at most.
   std::uint64_t crossings_bound(Nm plane) const;

@@ -1,0 +1,49 @@
+// stages/raster/height_runs.h: clusters of a mesh in runs, each with a table of heights and depths to be searched.
+//
+// Clusters that follow each other are neighbours in the file and ordered by height (clusters.h). So a run of them is one box
+// that a tree holds cheaply, and a plane meets few of its clusters, which a search of the run's table finds: heights and
+// depths in steps of 1/65536 of the run, rounded down on both sides of every comparison, so that none is missed. A cluster
+// that is found without need is only looked at in vain.
+#pragma once
+
+#include <cstdint>
+#include <span>
+
+#include "stages/data/buffer.h"
+#include "stages/raster/scan.h"
+
+namespace lamina::raster {
+
+class HeightRuns {
+ public:
+  static constexpr std::uint32_t kRun = 256;  // clusters: a block of 4096 triangles, as ordered by make_clusters()
+
+  /// bounds  of each cluster, nm
+  /// cost    O(clusters), parallel; 8 bytes a cluster
+  explicit HeightRuns(std::span<const Box> bounds);
+
+  std::uint32_t count() const { return static_cast<std::uint32_t>(runs_.size()); }
+  const Box& box(std::uint32_t run) const { return runs_[run]; }
+
+  /// Appends every cluster of the run that the plane may cut somewhere between y = low and y = high, both included; each
+  /// once. Nm in the frame of the mesh.
+  void find_clusters(std::uint32_t run, std::int64_t plane, std::int64_t low, std::int64_t high, std::uint32_t instance,
+                     ClusterVisits& out) const;
+
+  std::uint64_t bytes() const { return bytes_held(runs_) + bytes_held(groups_); }
+
+ private:
+  static constexpr std::uint32_t kLanes = 16;
+  /// 16 clusters, side by side so that they are compared at once. A lane without a cluster begins above its end.
+  struct alignas(16) Group {
+    std::uint16_t z_begin[kLanes], z_last[kLanes];  // a plane cuts none but from the lowest corner to 1 nm below the highest
+    std::uint16_t y_begin[kLanes], y_last[kLanes];
+  };
+  static std::uint32_t lanes_met(const Group& group, std::uint16_t z, std::uint16_t y_low, std::uint16_t y_high);
+  void build_run(std::span<const Box> bounds, std::uint32_t run);
+
+  Buffer<Box> runs_;
+  Buffer<Group> groups_;  // kRun / kLanes a run, fewer in the last
+};
+
+}  // namespace lamina::raster

@@ -1,0 +1,167 @@
+// What a layer is said to need at most against what it has and takes.
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+#include <numbers>
+#include <random>
+
+#include "stages/load/load.h"
+#include "stages/raster/height_buckets.h"
+#include "stages/raster/layer_bound.h"
+#include "stages/raster/raster.h"
+#include "tests/raster/shapes.h"
+
+namespace lamina::test {
+namespace {
+
+using raster::CrossingSums;
+using raster::LayerBound;
+
+/// Random heights, and every kind of corner's height with its neighbours.
+std::vector<Nm> heights_of(const Triangles& triangles, Nm top, std::mt19937& random) {
+  std::vector<Nm> heights;
+  for (int i = 0; i < 30; ++i) {
+    heights.push_back(static_cast<Nm>(random() % static_cast<unsigned>(top)));
+    const Triangle& t = triangles[random() % triangles.size()];
+    for (Nm z : {t.a.z, t.b.z, t.c.z}) heights.insert(heights.end(), {z - 1, z, z + 1});
+  }
+  return heights;
+}
+
+TEST(LayerBound, IsNeverBelowWhatRandomSolidsHave) {
+  std::uint64_t crossings = 0;
+  for (unsigned seed = 0; seed < 48; ++seed) {
+    std::mt19937 random(seed);
+    const Nm scale = std::array<Nm, 4>{30'000, 800'000, 9'000'000, 60'000'000}[seed % 4];
+    const Nm size = seed % 3 == 0 ? scale : scale / 20 + 1;  // of a solid; the others are small and many
+    Triangles triangles;
+    for (int i = 0; i < (seed % 3 == 0 ? 12 : 150); ++i) {
+      const auto any = [&](Nm most) { return static_cast<Nm>(random() % static_cast<unsigned>(most)); };
+      const Point3 at{any(scale), any(scale), any(scale)};
+      const auto pick = [&] { return Point3{at.x + any(size), at.y + any(seed % 5 == 0 ? 50 : size), at.z + any(size)}; };
+      for (const Triangle& t : random_tetrahedra(1, pick)) triangles.push_back(t);
+    }
+    const std::vector<Instance> instances{{0, {0, 0, 0}}, {0, {1'234, 777'777, 0}}, {0, {99, 3, 500'001}}};
+    const PixelGrid grid{{1200, 130'000'000}, {static_cast<std::int64_t>(100 + random() % 2400), 130'000'000}};
+    Mesh mesh = make_mesh(triangles), again = mesh;
+    const raster::ClusteredMesh clusters = raster::make_clusters(again);
+    std::vector<raster::PlacedMesh> placed;
+    for (const Instance& instance : instances) placed.push_back({&clusters, instance.offset});
+    const LayerBound bound(placed, grid);
+    auto rasterizer = raster::Rasterizer::build({&mesh, 1}, instances, grid, FillRule::kNonzero, false, true);
+    ASSERT_TRUE(rasterizer.ok());
+    for (const Nm plane : heights_of(triangles, scale + size, random)) {
+      raster::LayerScratch scratch;
+      Runs runs;
+      const raster::LayerReport report = rasterizer->layer(raster::Engine::kContours, plane, scratch, runs);
+      const LayerBound::Count most = bound.at(plane);
+      ASSERT_LE(report.segments, most.segments) << "seed " << seed << " at " << plane << " nm";
+      ASSERT_LE(report.crossings, most.crossings) << "seed " << seed << " at " << plane << " nm";
+      ASSERT_LE(scratch.visits.size(), most.clusters) << "seed " << seed << " at " << plane << " nm";
+      ASSERT_LE(most.crossings, bound.most_crossings());
+      ASSERT_LE(report.scratch_bytes + bytes_held(runs.change) + bytes_held(runs.row_offset), rasterizer->layer_bytes_bound(plane));
+      crossings += report.crossings;
+    }
+  }
+  EXPECT_GT(crossings, 0u);
+}
+
+TEST(CrossingSums, OfPartsOfAMeshBoundTheWholeInAnyOrder) {
+  std::mt19937 random(17);
+  const auto pick = [&] {
+    const auto any = [&](unsigned most) { return static_cast<Nm>(random() % most); };
+    return Point3{any(50'000'000), any(50'000'000), any(1'000'000) + 1'000'000 * any(150) - 40'000'000};
+  };
+  Triangles triangles = random_tetrahedra(900, pick);
+  Mesh mesh = make_mesh(triangles);
+  const raster::ClusteredMesh clusters = raster::make_clusters(mesh);
+  std::vector<CrossingSums> parts(7);
+  CrossingSums whole, all;
+  for (std::size_t c = 0; c < clusters.clusters.size(); ++c) {
+    whole.add(clusters.clusters[c], clusters.bounds[c]);
+    parts[c * c % 7].add(clusters.clusters[c], clusters.bounds[c]);
+  }
+  for (const CrossingSums& part : parts) all.merge(part);
+  const CrossingSums::Table merged = all.table(), direct = whole.table();
+  EXPECT_EQ(merged.shift, direct.shift);
+  for (int i = 0; i < 2000; ++i) {
+    const std::int64_t plane = -45'000'000 + 100'003 * std::int64_t{i};
+    std::int64_t cut = 0;
+    double depth = 0;
+    for (const Triangle& t : triangles) {
+      const Point3 corner[3] = {t.a, t.b, t.c};
+      double low = 1e18, high = -1e18;
+      for (int k = 0; k < 3; ++k) {
+        const Point3 &from = corner[k], &to = corner[(k + 1) % 3];
+        if ((from.z > plane) == (to.z > plane)) continue;
+        const double y = from.y + (static_cast<double>(plane) - from.z) / (static_cast<double>(to.z) - from.z) * (to.y - from.y);
+        low = std::min(low, y);
+        high = std::max(high, y);
+      }
+      cut += low <= high ? 1 : 0;
+      depth += low <= high ? high - low : 0;
+    }
+    const CrossingSums::Slab none, *at = merged.at(plane), *of = direct.at(plane);
+    ASSERT_GE((at != nullptr ? at : &none)->segments, cut) << plane;
+    ASSERT_GE((at != nullptr ? at : &none)->depth, depth - 1) << plane;
+    ASSERT_GE((of != nullptr ? of : &none)->depth, depth - 1) << plane;
+    if (cut > 50) {
+      EXPECT_LT(static_cast<double>(at->segments), 1.2 * static_cast<double>(cut)) << plane;
+      EXPECT_LT(at->depth, 1.3 * depth) << plane;
+    }
+  }
+}
+
+/// A torus of rings x sides x 2 facets, standing askew.
+Triangles torus(int rings, int sides) {
+  const auto at = [&](int ring, int side) {
+    const double u = 2 * std::numbers::pi * ring / rings, v = 2 * std::numbers::pi * side / sides;
+    const double r = 9e6 + 3e6 * std::cos(v), x = r * std::cos(u), y = r * std::sin(u), z = 3e6 * std::sin(v);
+    return Point3{static_cast<Nm>(14e6 + x), static_cast<Nm>(14e6 + 0.8 * y - 0.6 * z), static_cast<Nm>(11e6 + 0.6 * y + 0.8 * z)};
+  };
+  Triangles out;
+  for (int i = 0; i < rings; ++i) {
+    for (int j = 0; j < sides; ++j) {
+      const Point3 a = at(i, j), b = at((i + 1) % rings, j), c = at((i + 1) % rings, (j + 1) % sides), d = at(i, (j + 1) % sides);
+      out.insert(out.end(), {{a, b, c}, {a, c, d}});
+    }
+  }
+  return out;
+}
+
+/// A layer writes its segments, crossings and changes once, and three numbers a row or fewer.
+void expect_true_within_two(Mesh mesh, std::int64_t dpi, const std::string& name) {
+  const Point3 lo = mesh.bounds.lo;
+  const Instance instance{0, {1'000'000 - lo.x, 1'000'000 - lo.y, -lo.z}};
+  const PixelGrid grid{{dpi, mesh.bounds.width() + 2'000'000}, {dpi, mesh.bounds.depth() + 2'000'000}};
+  const auto top = static_cast<Nm>(mesh.bounds.height());
+  auto rasterizer = raster::Rasterizer::build({&mesh, 1}, {&instance, 1}, grid, FillRule::kNonzero, true, true);
+  ASSERT_TRUE(rasterizer.ok());
+  for (const raster::Engine engine : {raster::Engine::kRays, raster::Engine::kContours}) {
+    std::uint64_t claimed = 0, taken = 0;
+    for (Nm plane = 25'000; plane < top; plane += top / 40) {
+      raster::LayerScratch scratch;
+      Runs runs;
+      const raster::LayerReport report = rasterizer->layer(engine, plane, scratch, runs);
+      const std::uint64_t bound = rasterizer->layer_bytes_bound(plane);
+      EXPECT_GE(bound, report.scratch_bytes + bytes_held(runs.change) + bytes_held(runs.row_offset)) << name << " at " << plane;
+      claimed += bound;
+      taken += scratch.visits.size() * sizeof(raster::ClusterVisit) + report.segments * sizeof(raster::Segment) +
+               4 * (report.crossings + runs.change.size() + 2 * runs.row_offset.size());
+    }
+    EXPECT_LE(claimed, 2 * taken) << name;
+  }
+}
+
+TEST(LayerBound, ClaimsAtMostTwiceWhatLayersOfPartsTake) {
+  expect_true_within_two(make_mesh(torus(40, 16)), 1200, "a coarse torus");
+  expect_true_within_two(make_mesh(torus(400, 120)), 1200, "a fine torus");
+  auto crown = load::load(std::string(LAMINA_TEST_DIR) + "/corpus/dental_crown.stl", {});
+  ASSERT_TRUE(crown.ok());
+  expect_true_within_two(crown->meshes[0], 600, "a crown");
+  expect_true_within_two(crown->meshes[0], 2400, "a crown");
+}
+
+}  // namespace
+}  // namespace lamina::test
