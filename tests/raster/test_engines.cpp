@@ -182,6 +182,25 @@ TEST(Engines, ManySmallFacetsThroughEveryClusterAndBand) {
   EXPECT_GT(expect_exact(part, grid, {0, 999'999, 1'000'000, 1'400'000, 1'900'000}), 0u);
 }
 
+TEST(Engines, AgreeWhereALayerHasSoManyCrossingsThatRaysTakeItInBands) {
+  const PixelGrid grid{{1200, 22'000'000}, {2400, 22'000'000}};
+  std::mt19937 random(23);
+  const auto pick = [&] {
+    const auto any = [&](unsigned most) { return static_cast<Nm>(random() % most); };
+    return Point3{any(22'000'000), any(22'000'000), any(1'000'000)};
+  };
+  Mesh mesh = make_mesh(random_tetrahedra(1000, pick));
+  const Instance instance{0, {0, 0, 0}};
+  auto rasterizer = raster::Rasterizer::build({&mesh, 1}, {&instance, 1}, grid, FillRule::kPositive, true, true);
+  raster::LayerScratch scratch;
+  Runs rays, contours;
+  const auto report = rasterizer->layer(Engine::kRays, 500'000, scratch, rays);
+  EXPECT_GT(report.crossings, 1u << 19);
+  EXPECT_GT(report.segments, rasterizer->layer(Engine::kContours, 500'000, scratch, contours).segments);  // cut again in each
+  EXPECT_EQ(first_difference(rays, contours), "");
+  EXPECT_GT(set_pixels(rays), 0u);
+}
+
 TEST(Scan, ARowThatStaysOpenEndsAtItsLastCrossingAndIsReported) {
   const PixelGrid grid{{254, 10'000'000}, {254, 8'000'000}};
   Triangles part = box({1'000'000, 1'000'000, 0}, {4'000'000, 3'000'000, 1'000'000});
