@@ -123,7 +123,6 @@ LayerReport Rasterizer::layer(Engine engine, Nm plane, LayerScratch& scratch, Ru
 
   const auto append = [&](const ClusterVisits& visits, std::uint32_t first_row, std::uint32_t last_row) {
     make_room(scratch.segments, std::min(bound.segments, kClusterSize * std::uint64_t{visits.size()}) + kClusterSize);
-    scratch.scan.make_room(bound.crossings);
     cut_clusters(state.sampling, state.placed, visits, plane, first_row, last_row, scratch.segments);
     scratch.scan.append_rows(state.sampling, scratch.segments, state.placed, plane, state.rule, first_row, last_row, out,
                              report);

@@ -67,7 +67,7 @@ void ScanConverter::place_segments(std::span<const Segment> segments, std::uint3
     total += in_row;
   }
   place_[rows] = total;
-  crossing_.resize(total);
+  set_crossings(total);
 }
 
 void ScanConverter::fill_crossings(const PixelSampling& sampling, const Segment& segment, std::span<const PlacedMesh> placed,

@@ -47,13 +47,6 @@ class ScanConverter {
   void append_rows(const PixelSampling& sampling, std::span<const Segment> segments, std::span<const PlacedMesh> placed,
                    Nm plane, FillRule rule, std::uint32_t first_row, std::uint32_t last_row, Runs& out, LayerReport& report);
 
-  /// Room for the crossings of a band, an eighth more where it has to grow.
-  void make_room(std::uint64_t crossings) {
-    if (crossings <= crossing_.capacity()) return;
-    crossing_ = {};
-    crossing_.reserve(crossings + crossings / 8);
-  }
-
   std::uint64_t bytes() const {
     return bytes_held(place_) + bytes_held(crossing_) + bytes_held(capped_) + bytes_held(of_open_parts_) + bytes_held(closing_);
   }
@@ -65,6 +58,14 @@ class ScanConverter {
     std::uint32_t crossing;  // column * 2 + (1 if it enters)
   };
 
+  /// Unset crossings of a band; an eighth more room where it has to grow, so that bytes() follows what bands need.
+  void set_crossings(std::size_t count) {
+    if (count > crossing_.capacity()) {
+      crossing_ = {};
+      crossing_.reserve(count + count / 8);
+    }
+    crossing_.resize(count);
+  }
   void place_segments(std::span<const Segment> segments, std::uint32_t first_row, std::uint32_t rows);
   void close_open_parts(const PixelSampling& sampling, std::span<const Segment> segments, std::span<const PlacedMesh> placed,
                         Nm plane, std::uint32_t first_row, std::uint32_t rows, LayerReport& report);
