@@ -6,6 +6,7 @@
 
 #include "pipeline/job/heights.h"
 #include "pipeline/job/keys.h"
+#include "stages/geometry/isa.h"
 #include "stages/heights/heights.h"
 
 namespace lamina::pipeline {
@@ -25,6 +26,7 @@ Status check_job(const Job& job) {
     }
   }
   if (const auto options = heights_options(job); !options) return options.error();
+  if (const auto isa = usable_isa(job.isa); !isa) return isa.error();
   if (job.layers && job.shard) {
     return Error{Fault::kUsage, "--layers and --shard exclude each other; a shard is a share of all layers"};
   }

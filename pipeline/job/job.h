@@ -122,6 +122,7 @@ struct Job {
   // --- no effect on the bytes of any layer
   std::string output;  // directory
   Engine engine = Engine::kRays;
+  Isa isa = Isa::kAuto;                                // widest instructions of the kernels
   std::uint32_t threads = 0;                           // 0: all of the host
   std::uint64_t memory_bytes = 1ull << 30;             // budget of the layers in flight
   Sync sync = Sync::kJob;                              // what survives a power cut

@@ -6,6 +6,8 @@ namespace {
 
 constexpr Word<Engine> kEngines[] = {{"rays", Engine::kRays}, {"contours", Engine::kContours}, {"both", Engine::kBoth}};
 
+constexpr Word<Isa> kIsas[] = {{"auto", Isa::kAuto}, {"plain", Isa::kPlain}, {"avx2", Isa::kAvx2}, {"avx512", Isa::kAvx512}};
+
 constexpr Word<Sync> kSyncs[] = {{"layer", Sync::kLayer}, {"job", Sync::kJob}, {"off", Sync::kOff}};
 
 using Pair = std::optional<std::array<std::uint32_t, 2>>;
@@ -71,6 +73,9 @@ const JobKey kRunKeys[] = {
     text<check_path, &Job::output>({"run", "output", "-o,--output", "DIR", "directory for the layers and the manifest"}),
     word<kEngines, &Job::engine>(
         {"run", "engine", "--engine", "ENGINE", "rays, contours, or both to compare them; all give the same bytes"}),
+    word<kIsas, &Job::isa>({"run", "isa", "--isa", "SET",
+                            "instructions of the inner loops: auto for the processor's widest, plain, avx2 or avx512; all give "
+                            "the same bytes"}),
     field<&Job::threads>({"run", "threads", "--threads", "N", "0 for all that the machine has"}, {0, 4096}),
     custom<Job, read_bytes, write_bytes, &Job::memory_bytes>(
         {"run", "memory", "--memory", "SIZE", "what the layers in flight may hold beside the mesh: 256M, 1G"}, Form::kString),

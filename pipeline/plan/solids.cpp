@@ -78,7 +78,7 @@ Result<Solids> Solids::build(Scene& scene, const Job& job, const PixelGrid& grid
   const bool rays = job.engine != Engine::kContours, contours = job.engine != Engine::kRays;
   const auto add = [&](std::span<Mesh> meshes, std::span<const Instance> instances, PartMaterial material,
                        std::vector<std::uint32_t> instance) -> Status {
-    auto built = raster::Rasterizer::build(meshes, instances, grid, job.fill_rule, rays, contours);
+    auto built = raster::Rasterizer::build(meshes, instances, grid, job.fill_rule, rays, contours, job.isa);
     if (!built) return built.error();
     result.solids_.push_back({std::move(material), std::move(*built), std::move(instance)});
     return {};

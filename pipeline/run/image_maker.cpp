@@ -9,6 +9,7 @@
 #include "pipeline/machine/materials.h"
 #include "stages/data/text/number_text.h"
 #include "stages/data/text/readable.h"
+#include "stages/geometry/isa.h"
 #include "stages/replay/time/totals.h"
 #include "stages/sanity/records.h"
 #include "stages/sanity/rows.h"
@@ -186,6 +187,7 @@ void ImageMaker::tell(Summary& summary) const {
   const double pixels = static_cast<double>(grid.columns()) * grid.rows() * summary.layers_planned;
   const double pixels_a_second = summary.layer_seconds > 0 ? pixels / summary.layer_seconds : 0;
   const bool several = plan_.images->materials.several();
+  const std::string_view isa = isa_name(*usable_isa(plan_.job.isa));
   const double print_seconds = timed_ ? static_cast<double>(microseconds_) * 1e-6 : 0;
   summary.bytes_written = bytes_written_;
   summary.volume_mm3 = volume_mm3_;
@@ -202,8 +204,8 @@ void ImageMaker::tell(Summary& summary) const {
   }
   if (print_seconds > 0) result("printing", replay::time_text(print_seconds, plan_.images->machine->machine.name));
   if (!summary.dry_run) {
-    end("rate", fmt::format("{:.2f} Gpx/s, {:.1f} layers/s", pixels_a_second / 1e9,
-                            summary.layer_seconds > 0 ? summary.layers_planned / summary.layer_seconds : 0));
+    end("rate", fmt::format("{:.2f} Gpx/s, {:.1f} layers/s ({})", pixels_a_second / 1e9,
+                            summary.layer_seconds > 0 ? summary.layers_planned / summary.layer_seconds : 0, isa));
   }
   if (moved_pixels_ > 0)
     end("blocked", fmt::format("{} pixels of blocked nozzles are fired by their neighbours", readable_count(moved_pixels_)));
@@ -213,6 +215,7 @@ void ImageMaker::tell(Summary& summary) const {
   facts["set_pixels"] = set_pixels_;
   facts["capped_rows"] = capped_rows_;
   facts["pixels_per_second"] = pixels_a_second;
+  facts["isa"] = isa;
   if (solid_pixels_ > 0) {
     facts["solid_pixels"] = solid_pixels_;
     facts["bead_pixels"] = bead_pixels_;

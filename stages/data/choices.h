@@ -14,6 +14,9 @@ constexpr unsigned bit(Product product) { return 1u << static_cast<unsigned>(pro
 /// What survives a power cut: nothing for certain, a job that has ended, or all but the layers in flight of one that runs.
 enum class Sync : std::uint8_t { kOff, kJob, kLayer };
 
+/// The widest instructions that kernels use; auto: the processor's. The bytes are the same.
+enum class Isa : std::uint8_t { kAuto, kPlain, kAvx2, kAvx512 };
+
 /// Applied to the winding number of all facets together about a point.
 enum class FillRule : std::uint8_t {
   kNonzero,   // not zero: the union of overlapping shells; a shell turned inside out is still solid

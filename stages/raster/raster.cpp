@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <vector>
 
+#include "stages/geometry/isa.h"
 #include "stages/raster/beams.h"
 #include "stages/raster/clusters.h"
 #include "stages/raster/crossed_planes.h"
@@ -19,11 +20,16 @@ constexpr std::uint64_t kBandCrossings = 1 << 18;
 /// Clusters that engine `contours` cuts at once, at most: up to 40 MB of segments.
 constexpr std::size_t kMostClusters = 1 << 16;
 
+/// Segments that a kernel may write behind those of a layer.
+constexpr std::uint64_t kMoreSegments = CutFacets::kRoom + kClusterSize;
+
 /// Segments of all clusters that an engine found. A mesh is larger than the caches, so what comes next is fetched early.
-void cut_clusters(const PixelSampling& sampling, std::span<const PlacedMesh> placed, std::span<const ClusterVisit> visits,
-                  Nm plane, std::uint32_t first_row, std::uint32_t last_row, Segments& out) {
+void cut_clusters(const Kernels& kernels, const PixelSampling& sampling, std::span<const PlacedMesh> placed,
+                  std::span<const ClusterVisit> visits, Nm plane, std::uint32_t first_row, std::uint32_t last_row,
+                  Segments& out) {
   constexpr std::size_t kAhead = 4;  // clusters, and as many again for what names their vertices
   Cluster room;
+  CutFacets facets;
   for (std::size_t i = 0; i < visits.size(); ++i) {
     if (i + 2 * kAhead < visits.size()) {
       const ClusterVisit& later = visits[i + 2 * kAhead];
@@ -35,10 +41,10 @@ void cut_clusters(const PixelSampling& sampling, std::span<const PlacedMesh> pla
     }
     const auto [cluster, instance] = visits[i];
     const PlacedMesh& source = placed[instance];
-    append_segments(sampling,
-                    {&source.mesh->cluster(cluster, room), cluster, instance, source.offset, cluster >= source.mesh->first_cap},
-                    plane, first_row, last_row, out);
+    if (facets.is_full()) kernels.cut(sampling, facets, plane, first_row, last_row, out);
+    kernels.gather({&source.mesh->cluster(cluster, room), cluster * kClusterSize, instance, source.offset}, plane, facets);
   }
+  kernels.cut(sampling, facets, plane, first_row, last_row, out);
 }
 
 /// Elements that a buffer for `count` of them gets: an eighth more, so that layers that need ever more move it rarely.
@@ -59,6 +65,7 @@ struct Rasterizer::State {
   PixelGrid grid;
   PixelSampling sampling;
   FillRule rule;
+  const Kernels& kernels;
   std::vector<ClusteredMesh> meshes;
   std::vector<PlacedMesh> placed;
   std::uint32_t first_row = 0, last_row = 0;  // geometry rows that any part can reach
@@ -67,7 +74,8 @@ struct Rasterizer::State {
   std::vector<HeightBuckets> buckets;         // one a mesh, or none
   std::vector<LayerBound> bound;              // one
 
-  State(const PixelGrid& pixel_grid, FillRule fill_rule) : grid(pixel_grid), sampling(pixel_grid), rule(fill_rule) {}
+  State(const PixelGrid& pixel_grid, FillRule fill_rule, Isa isa)
+      : grid(pixel_grid), sampling(pixel_grid), rule(fill_rule), kernels(kernels_for(isa)) {}
 };
 
 Rasterizer::Rasterizer(Rasterizer&&) noexcept = default;
@@ -75,9 +83,11 @@ Rasterizer& Rasterizer::operator=(Rasterizer&&) noexcept = default;
 Rasterizer::~Rasterizer() = default;
 
 Result<Rasterizer> Rasterizer::build(std::span<Mesh> meshes, std::span<const Instance> instances, const PixelGrid& grid,
-                                     FillRule rule, bool rays, bool contours) {
+                                     FillRule rule, bool rays, bool contours, Isa isa) {
+  const Result<Isa> usable = usable_isa(isa);
+  if (!usable) return usable.error();
   Rasterizer rasterizer;
-  rasterizer.state_ = std::make_unique<State>(grid, rule);
+  rasterizer.state_ = std::make_unique<State>(grid, rule, *usable);
   State& state = *rasterizer.state_;
   std::int64_t lowest = grid.y.length, highest = 0;
   for (const Instance& instance : instances) {
@@ -116,16 +126,17 @@ LayerReport Rasterizer::layer(Engine engine, Nm plane, LayerScratch& scratch, Ru
   const LayerBound::Count bound = state.bound.front().at(plane);
   const std::uint32_t rows = state.grid.rows();
   out.columns = state.grid.columns();
-  make_room(out.change, bound.crossings);
+  make_room(out.change, bound.crossings + RowsTask::kMoreCrossings);
   out.row_offset.reserve(std::size_t{rows} + 1);
   out.row_offset.assign(1, 0);
   out.row_offset.resize(std::size_t{rows - state.last_row} + 1, 0);
 
   const auto append = [&](const ClusterVisits& visits, std::uint32_t first_row, std::uint32_t last_row) {
-    make_room(scratch.segments, std::min(bound.segments, kClusterSize * std::uint64_t{visits.size()}) + kClusterSize);
-    cut_clusters(state.sampling, state.placed, visits, plane, first_row, last_row, scratch.segments);
-    scratch.scan.append_rows(state.sampling, scratch.segments, state.placed, plane, state.rule, first_row, last_row, out,
-                             report);
+    scratch.segments.size = 0;
+    scratch.segments.make_room(std::min(bound.segments, kClusterSize * std::uint64_t{visits.size()}) + kMoreSegments);
+    cut_clusters(state.kernels, state.sampling, state.placed, visits, plane, first_row, last_row, scratch.segments);
+    scratch.scan.append_rows(state.kernels, state.sampling, scratch.segments, state.placed, plane, state.rule, first_row,
+                             last_row, out, report);
   };
   // Bands from the back of the bed to its front, the order of the image's rows.
   const auto each_band = [&](auto&& take) {
@@ -175,12 +186,14 @@ std::uint64_t Rasterizer::layer_bytes_bound(Nm plane) const {
   const std::uint64_t rows = state_->grid.rows(), places = state_->last_row - state_->first_row;
   // Segments of open parts are held twice, and close at most as many crossings as they have; buffers double for these.
   const bool open = !std::ranges::all_of(state_->meshes, &ClusteredMesh::closed);
-  const bool caps = std::ranges::any_of(state_->meshes, [](const ClusteredMesh& m) { return m.first_cap < m.clusters.size(); });
-  const std::uint64_t closing = open ? 2 * count.segments * sizeof(Segment) + 5 * 8 * count.crossings : 0;
+  const bool caps =
+      std::ranges::any_of(state_->meshes, [](const ClusteredMesh& m) { return m.first_cap < m.cluster_count(); });
+  const std::uint64_t closing = open ? 2 * count.segments * (Segments::kBytes + 4) + 5 * 8 * count.crossings : 0;
   const std::uint64_t visits = (count.clusters > kMostClusters ? 3 : 1) * count.clusters * sizeof(ClusterVisit);
   // Crossings and changes; the place of each row, its offset, and whether it is capped.
-  return with_spare(visits + (count.segments + kClusterSize) * sizeof(Segment) + 2 * 4 * count.crossings) +
-         4 * (places + rows + 2) + (open || caps ? places : 0) + closing;
+  return with_spare(visits + (count.segments + kMoreSegments) * Segments::kBytes +
+                    2 * 4 * (count.crossings + RowsTask::kMoreCrossings)) +
+         4 * (places + rows + 2 + FillTask::kMorePlaces) + (open || caps ? places : 0) + closing;
 }
 
 std::uint64_t Rasterizer::crossings_bound(Nm plane) const { return state_->bound.front().at(plane).crossings; }
@@ -188,6 +201,8 @@ std::uint64_t Rasterizer::crossings_bound(Nm plane) const { return state_->bound
 void Rasterizer::mark_crossed(std::span<const Nm> planes, std::span<std::uint8_t> crossed) const {
   raster::mark_crossed(state_->placed, planes, crossed);
 }
+
+Isa Rasterizer::isa() const { return state_->kernels.isa; }
 
 std::uint64_t Rasterizer::mesh_bytes() const {
   std::uint64_t total = 0;

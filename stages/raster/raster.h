@@ -27,7 +27,7 @@ struct LayerScratch {
   ClusterVisits near;  // those of a band of rows, where a layer has many
   Segments segments;
   ScanConverter scan;
-  std::uint64_t bytes() const { return bytes_held(visits) + bytes_held(near) + bytes_held(segments) + scan.bytes(); }
+  std::uint64_t bytes() const { return bytes_held(visits) + bytes_held(near) + segments.bytes() + scan.bytes(); }
 };
 
 /// Immutable once built; layers may be asked for from any number of threads.
@@ -36,10 +36,11 @@ class Rasterizer {
   /// meshes     triangles are moved out of them, into blocks: 11 to 36 bytes a triangle (mesh_blocks.h)
   /// instances  where copies stand; every corner within the grid's bed (0 <= x <= length) and below kNmReach
   /// rays, contours  which indices to build; an engine that was not built must not be asked for
-  /// errors     kInternal if Embree fails
+  /// isa        instructions of the kernels; no effect on any layer
+  /// errors     kInternal if Embree fails; kUsage if the processor has no such instructions
   /// cost       O(T); Embree's tree is one primitive a cluster of 16 triangles, copies share it
   static Result<Rasterizer> build(std::span<Mesh> meshes, std::span<const Instance> instances, const PixelGrid& grid,
-                                  FillRule rule, bool rays, bool contours);
+                                  FillRule rule, bool rays, bool contours, Isa isa = Isa::kAuto);
   Rasterizer(Rasterizer&&) noexcept;
   Rasterizer& operator=(Rasterizer&&) noexcept;
   ~Rasterizer();
@@ -56,6 +57,7 @@ class Rasterizer {
   /// Sets the entry of every plane that a facet crosses (crossed_planes.h).
   void mark_crossed(std::span<const Nm> planes, std::span<std::uint8_t> crossed) const;
 
+  Isa isa() const;  // that kernels use, not kAuto
   std::uint64_t mesh_bytes() const;
   std::uint64_t index_bytes() const;  // trees, boxes and buckets
   const PixelGrid& grid() const;

@@ -8,15 +8,10 @@
 #include "stages/data/choices.h"
 #include "stages/data/runs.h"
 #include "stages/raster/clusters.h"
+#include "stages/raster/kernels/kernels.h"
 #include "stages/raster/segment.h"
 
 namespace lamina::raster {
-
-/// A mesh on the bed, as far as exact columns need it.
-struct PlacedMesh {
-  const ClusteredMesh* mesh;
-  Point3 offset;  // nm
-};
 
 /// What an engine finds: a cluster that a plane may cut.
 struct ClusterVisit {
@@ -44,11 +39,13 @@ struct LayerReport {
 class ScanConverter {
  public:
   /// Appends rows last_row - 1 down to first_row (image order) to `out`; `segments` lie within these rows.
-  void append_rows(const PixelSampling& sampling, std::span<const Segment> segments, std::span<const PlacedMesh> placed,
-                   Nm plane, FillRule rule, std::uint32_t first_row, std::uint32_t last_row, Runs& out, LayerReport& report);
+  void append_rows(const Kernels& kernels, const PixelSampling& sampling, const Segments& segments,
+                   std::span<const PlacedMesh> placed, Nm plane, FillRule rule, std::uint32_t first_row, std::uint32_t last_row,
+                   Runs& out, LayerReport& report);
 
   std::uint64_t bytes() const {
-    return bytes_held(place_) + bytes_held(crossing_) + bytes_held(capped_) + bytes_held(of_open_parts_) + bytes_held(closing_);
+    return bytes_held(place_) + bytes_held(crossing_) + bytes_held(capped_) + bytes_held(of_open_parts_) + of_part_.bytes() +
+           bytes_held(closing_);
   }
 
  private:
@@ -66,18 +63,23 @@ class ScanConverter {
     }
     crossing_.resize(count);
   }
-  void place_segments(std::span<const Segment> segments, std::uint32_t first_row, std::uint32_t rows);
-  void close_open_parts(const PixelSampling& sampling, std::span<const Segment> segments, std::span<const PlacedMesh> placed,
-                        Nm plane, std::uint32_t first_row, std::uint32_t rows, LayerReport& report);
-  void fill_crossings(const PixelSampling& sampling, const Segment& segment, std::span<const PlacedMesh> placed, Nm plane,
-                      std::uint32_t first_row);
-  void report_caps(std::span<const Segment> segments, std::uint32_t first_row, std::uint32_t rows, LayerReport& report);
+  void place_segments(const Segments& segments, std::uint32_t first_row, std::uint32_t rows);
+  void fill(const Kernels& kernels, const PixelSampling& sampling, const Segments& segments, std::span<const PlacedMesh> placed,
+            Nm plane, std::uint32_t first_row);
+  void close_open_parts(const Kernels& kernels, const PixelSampling& sampling, const Segments& segments,
+                        std::span<const PlacedMesh> placed, Nm plane, std::uint32_t first_row, std::uint32_t rows,
+                        LayerReport& report);
+  void close_part(std::uint32_t first_row, std::uint32_t rows, Buffer<Closing>& closings) const;
+  void report_caps(const Segments& segments, std::span<const PlacedMesh> placed, std::uint32_t first_row, std::uint32_t rows,
+                   LayerReport& report);
 
-  Buffer<std::uint32_t> place_;     // per geometry row of the band: where its next crossing goes
-  Buffer<std::uint32_t> crossing_;  // column * 2 + (1 if it enters), row by row
-  Buffer<std::uint8_t> capped_;     // per geometry row of the band
-  Buffer<Segment> of_open_parts_;   // of the band, by part
-  Buffer<Closing> closing_;         // of the band
+  Buffer<std::uint32_t> place_;          // per geometry row of the band: where its next crossing goes
+  Buffer<std::uint32_t> crossing_;       // column * 2 + (1 if it enters), row by row
+  std::size_t crossings_ = 0;            // of the band; crossing_ is longer
+  Buffer<std::uint8_t> capped_;          // per geometry row of the band
+  Buffer<std::uint32_t> of_open_parts_;  // segments of the band, by part
+  Segments of_part_;                     // of one of them
+  Buffer<Closing> closing_;              // of the band
 };
 
 }  // namespace lamina::raster

@@ -13,8 +13,8 @@
 //    of the triangle, so a crossing is left of a pixel for all engines or for none.
 #pragma once
 
-#include <cmath>
 #include <cstdint>
+#include <span>
 
 #include "stages/data/buffer.h"
 #include "stages/data/grid.h"
@@ -22,31 +22,63 @@
 
 namespace lamina::raster {
 
-/// The cut of one triangle, as wide as its rows. 40 bytes; crossings are expanded from it row by row.
-struct Segment {
-  double column;            // of the crossing in row `first_row`, + 1 + PixelSampling::near, in pixels
-  double columns_per_nm;    // slope over y
-  std::uint32_t first_row;  // geometry rows [first_row, last_row)
-  std::uint32_t last_row;
-  std::uint32_t cluster;   // in its mesh
-  std::uint32_t instance;  // in the scene
-  std::uint32_t flags;     // lane in the low 4 bits, then kEnters, kExact, kUpright, kCap
+/// Geometry rows [first, first + count()) of the cut of one triangle, and how it stands.
+struct SegmentRows {
+  std::uint32_t first;
+  std::uint32_t count_and_flags;
 
-  static constexpr std::uint32_t kLane = 15;
-  static constexpr std::uint32_t kEnters = 16;   // a ray towards +x goes into the solid
-  static constexpr std::uint32_t kExact = 32;    // too flat against the row for doubles
-  static constexpr std::uint32_t kUpright = 64;  // x does not change with y
-  static constexpr std::uint32_t kCap = 128;     // of a triangle that repair added
+  static constexpr std::uint32_t kEnters = 1;   // a ray towards +x goes into the solid
+  static constexpr std::uint32_t kExact = 2;    // too flat against the row for doubles
+  static constexpr std::uint32_t kUpright = 4;  // x does not change with y
+  static constexpr std::uint32_t kFlagBits = 3;
+
+  std::uint32_t count() const { return count_and_flags >> kFlagBits; }
+  std::uint32_t end() const { return first + count(); }
+  bool is(std::uint32_t flag) const { return (count_and_flags & flag) != 0; }
 };
 
-using Segments = Buffer<Segment>;
+/// The triangle that was cut.
+struct SegmentOrigin {
+  std::uint32_t facet;     // cluster * kClusterSize + lane, in its mesh
+  std::uint32_t instance;  // in the scene
+};
+
+/// Cuts of triangles in the plane of a layer; crossings are expanded from them row by row. An array a property: what expands
+/// crossings reads 24 bytes a segment, and where it came from only if integers have to decide.
+///
+/// In geometry row r the crossing is near column[i] + columns_per_nm[i] * row_centre[r], which is the first column at or
+/// beyond it, + 1 + PixelSampling::near_x, in pixels.
+struct Segments {
+  Buffer<double> column, columns_per_nm;
+  Buffer<SegmentRows> rows;
+  Buffer<SegmentOrigin> origin;
+  std::size_t size = 0;  // the arrays may be longer
+
+  static constexpr std::size_t kBytes = 2 * sizeof(double) + sizeof(SegmentRows) + sizeof(SegmentOrigin);  // a segment
+
+  /// Makes all arrays so long that `more` segments can be written behind those that are there.
+  void make_room(std::size_t more);
+  /// Appends one of another list's.
+  void append(const Segments& other, std::size_t i);
+  std::uint64_t bytes() const {
+    return bytes_held(column) + bytes_held(columns_per_nm) + bytes_held(rows) + bytes_held(origin);
+  }
+};
+
+/// A mesh on the bed, as far as exact columns need it.
+struct PlacedMesh {
+  const ClusteredMesh* mesh;
+  Point3 offset;  // nm
+};
 
 /// The pixel grid as the kernels use it.
 struct PixelSampling {
   PixelAxis x, y;
   double columns_per_nm, rows_per_nm;
   double near_x, near_y;  // pixels; a guess closer than this to a whole number is decided in integers
-  Buffer<Nm> row_centre;  // nm, of each geometry row, one more at the end
+  Buffer<Nm> row_centre;  // nm, of each geometry row, kMoreCentres more at the end
+
+  static constexpr std::uint32_t kMoreCentres = 8;
 
   explicit PixelSampling(const PixelGrid& grid);
 };
@@ -64,13 +96,8 @@ struct ExactTriangle {
   }
 };
 
-/// A corner on the bed.
-inline Point3 on_bed(const Point3& corner, const Point3& offset) {
-  return {corner.x + offset.x, corner.y + offset.y, corner.z + offset.z};
-}
-inline Point3 corner_on_bed(const Cluster& cluster, std::uint32_t corner, std::uint32_t lane, const Point3& offset) {
-  return {cluster.x[corner][lane] + offset.x, cluster.y[corner][lane] + offset.y, cluster.z[corner][lane] + offset.z};
-}
+/// The triangle that was cut, on the bed.
+ExactTriangle exact_triangle(const SegmentOrigin& origin, std::span<const PlacedMesh> placed);
 
 /// The first column whose centre is at or beyond the crossing of the triangle's plane with row centre y at height z.
 /// Needs nx != 0. Integers only: the crossing is a.x - (ny (y - a.y) + nz (z - a.z)) / nx, and a whole-numbered
@@ -80,19 +107,5 @@ std::int64_t exact_column(const PixelAxis& axis, const ExactTriangle& triangle, 
 /// The first row whose centre is at or beyond the point in which the edge from -> to meets height z. The edge must
 /// cross z: exactly one of its ends has z' <= z.
 std::int64_t exact_row(const PixelAxis& axis, const Point3& from, const Point3& to, Nm z);
-
-/// A cluster as it stands on the bed.
-struct SegmentSource {
-  const Cluster* cluster;
-  std::uint32_t cluster_index;
-  std::uint32_t instance;
-  Point3 offset;  // of the instance
-  bool cap;
-};
-
-/// Appends the segments of the cluster's triangles that the plane cuts, restricted to geometry rows
-/// [row_begin, row_end); a triangle cut in none of these rows leaves none.
-void append_segments(const PixelSampling& sampling, const SegmentSource& source, Nm plane, std::uint32_t row_begin,
-                     std::uint32_t row_end, Segments& out);
 
 }  // namespace lamina::raster

@@ -4,6 +4,7 @@
 #include <random>
 #include <set>
 
+#include "stages/geometry/isa.h"
 #include "stages/raster/raster.h"
 #include "tests/raster/reference.h"
 #include "tests/raster/shapes.h"
@@ -27,6 +28,12 @@ std::string first_difference(const RunsView& a, const RunsView& b) {
   return {};
 }
 
+/// The kernels to test a rule with: each of those that this processor has is somebody's.
+Isa isa_for(FillRule rule) {
+  const Isa wanted = rule == FillRule::kNonzero ? Isa::kAvx512 : rule == FillRule::kPositive ? Isa::kAvx2 : Isa::kPlain;
+  return std::min(wanted, widest_isa());
+}
+
 /// Compares both engines with the reference at every plane and under every rule. Returns the pixels set in all.
 std::uint64_t expect_exact(const Triangles& triangles, const PixelGrid& grid, const std::vector<Nm>& planes,
                            const std::vector<Point3>& copies = {{0, 0, 0}}) {
@@ -40,7 +47,7 @@ std::uint64_t expect_exact(const Triangles& triangles, const PixelGrid& grid, co
   }
   for (FillRule rule : {FillRule::kNonzero, FillRule::kPositive, FillRule::kEvenOdd}) {
     Mesh mesh = make_mesh(triangles);
-    auto rasterizer = raster::Rasterizer::build({&mesh, 1}, instances, grid, rule, true, true);
+    auto rasterizer = raster::Rasterizer::build({&mesh, 1}, instances, grid, rule, true, true, isa_for(rule));
     EXPECT_TRUE(rasterizer.ok());
     raster::LayerScratch scratch;
     Runs runs;

@@ -1,0 +1,27 @@
+// stages/geometry/isa.h: which instruction sets kernels may use on this processor.
+#pragma once
+
+#include <string_view>
+
+#include "stages/data/choices.h"
+#include "stages/data/status.h"
+
+namespace lamina {
+
+/// auto, plain, avx2, avx512
+std::string_view isa_name(Isa isa);
+
+/// The widest set that the processor and its operating system have; of x86-64's baseline, or of another processor, kPlain.
+/// The environment variable LAMINA_ISA, a name as above, caps it. Looked up once.
+///
+/// kAvx2 means AVX2, BMI 1 and 2 and POPCNT; kAvx512 these and AVX-512 F, BW, DQ and VL.
+Isa widest_isa();
+
+/// `isa`, or what a name as above caps it to; nullptr and other texts cap nothing.
+Isa capped_isa(Isa isa, const char* cap);
+
+/// The set to use where `wanted` is wished for; kAuto is the widest.
+/// errors  kUsage if the processor does not have it
+Result<Isa> usable_isa(Isa wanted);
+
+}  // namespace lamina

@@ -1,0 +1,128 @@
+// Cutting, for any processor.
+#if defined(__SSE2__)
+#include <emmintrin.h>
+#endif
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+
+#include "stages/raster/kernels/bodies.h"
+
+namespace lamina::raster::plain {
+namespace {
+
+/// Which corners of the 16 triangles are above the plane, a bit a triangle.
+struct Above {
+  std::uint32_t corner[3];
+  std::uint32_t crossed() const { return (corner[0] ^ corner[1]) | (corner[1] ^ corner[2]); }
+};
+
+Above corners_above(const Cluster& cluster, Nm z) {
+  Above above{};
+#if defined(__SSE2__)
+  const __m128i plane = _mm_set1_epi32(z);
+  for (std::uint32_t k = 0; k < 3; ++k) {
+    const auto* corner = reinterpret_cast<const __m128i*>(cluster.z[k]);
+    const auto four = [&](int group) { return _mm_cmpgt_epi32(_mm_load_si128(corner + group), plane); };
+    const __m128i bytes = _mm_packs_epi16(_mm_packs_epi32(four(0), four(1)), _mm_packs_epi32(four(2), four(3)));
+    above.corner[k] = static_cast<std::uint32_t>(_mm_movemask_epi8(bytes));
+  }
+#else
+  for (std::uint32_t k = 0; k < 3; ++k) {
+    for (std::uint32_t lane = 0; lane < kClusterSize; ++lane) {
+      above.corner[k] |= static_cast<std::uint32_t>(cluster.z[k][lane] > z) << lane;
+    }
+  }
+#endif
+  return above;
+}
+
+/// What floating point says of all facets: where their left edges meet the plane, and the rows that their ends begin.
+struct Ends {
+  double share[CutFacets::kRoom], y[CutFacets::kRoom];
+  std::int32_t left[CutFacets::kRoom], right[CutFacets::kRoom];
+};
+
+/// Simple loops over all facets, of which compilers make pairs. An end near a whole number is decided in integers.
+void find_ends(const PixelSampling& sampling, const CutFacets& facets, Nm plane, Ends& ends) {
+  const std::uint32_t size = std::min(facets.size, CutFacets::kRoom);
+  const double rows_per_nm = sampling.rows_per_nm, near = sampling.near_y;
+  const CutFacets::Corner &tip = facets.tip, &left = facets.left, &right = facets.right;
+  std::int32_t is_near[CutFacets::kRoom];
+  std::int32_t any = 0;
+  for (std::uint32_t i = 0; i < size; ++i) {
+    const double up = plane - tip.z[i];
+    const double to_left = up / (left.z[i] - tip.z[i]), to_right = up / (right.z[i] - tip.z[i]);
+    const double y = tip.y[i] + to_left * (left.y[i] - tip.y[i]), other_y = tip.y[i] + to_right * (right.y[i] - tip.y[i]);
+    ends.share[i] = to_left;
+    ends.y[i] = y;
+    const double row = y * rows_per_nm + 0.5 + near, other_row = other_y * rows_per_nm + 0.5 + near;  // + 1 + near; y >= 0
+    ends.left[i] = static_cast<std::int32_t>(row);
+    ends.right[i] = static_cast<std::int32_t>(other_row);
+    is_near[i] = (row - ends.left[i] < 2 * near ? 1 : 0) | (other_row - ends.right[i] < 2 * near ? 2 : 0);
+    any |= is_near[i];
+  }
+  if (any == 0) return;
+  for (std::uint32_t i = 0; i < size; ++i) {
+    if ((is_near[i] & 1) != 0) ends.left[i] = static_cast<std::int32_t>(exact_end(sampling, facets, left, i, plane));
+    if ((is_near[i] & 2) != 0) ends.right[i] = static_cast<std::int32_t>(exact_end(sampling, facets, right, i, plane));
+  }
+}
+
+}  // namespace
+
+void gather(const ClusterSource& source, Nm plane, CutFacets& facets) {
+  const Cluster& cluster = *source.cluster;
+  const Above above = corners_above(cluster, plane_in_mesh(plane, source.offset));
+  std::uint32_t i = facets.size;
+  for (std::uint32_t lanes = above.crossed(); lanes != 0; lanes &= lanes - 1) {
+    const auto lane = static_cast<std::uint32_t>(std::countr_zero(lanes));
+    const std::uint32_t a = above.corner[0] >> lane & 1, b = above.corner[1] >> lane & 1, c = above.corner[2] >> lane & 1;
+    const std::uint32_t tip = 2 * (a ^ b ^ 1) + ((a ^ b) & (a ^ c ^ 1));  // 2 if a = b, else 1 if a = c, else 0
+    const auto put = [&](CutFacets::Corner& corner, std::uint32_t k) {
+      corner.x[i] = cluster.x[k][lane] + source.offset.x;
+      corner.y[i] = cluster.y[k][lane] + source.offset.y;
+      corner.z[i] = cluster.z[k][lane] + source.offset.z;
+    };
+    put(facets.tip, tip);
+    put(facets.left, tip == 2 ? 0 : tip + 1);
+    put(facets.right, tip == 0 ? 2 : tip - 1);
+    facets.facet[i] = source.first_facet + lane;
+    facets.instance[i] = source.instance;
+    ++i;
+  }
+  facets.size = i;
+}
+
+void cut(const PixelSampling& sampling, CutFacets& facets, Nm plane, std::uint32_t row_begin, std::uint32_t row_end,
+         Segments& out) {
+  out.make_room(facets.size + 1);  // one more is written and not counted
+  Ends ends;
+  find_ends(sampling, facets, plane, ends);
+  double* const column = out.column.data();
+  double* const columns_per_nm = out.columns_per_nm.data();
+  SegmentRows* const rows = out.rows.data();
+  SegmentOrigin* const origin = out.origin.data();
+  const double per_nm = sampling.columns_per_nm, near = sampling.near_x;
+  std::size_t to = out.size;
+  for (std::uint32_t i = 0; i < facets.size; ++i) {
+    const Point3 tip = facets.tip.at(i), left = facets.left.at(i), right = facets.right.at(i);
+    const ExactTriangle triangle(tip, left, right);
+    const double slope = -static_cast<double>(triangle.ny) / static_cast<double>(triangle.nx);
+    const double x = (tip.x + ends.share[i] * (left.x - tip.x)) - slope * ends.y[i];
+    column[to] = x * per_nm + 0.5 + near;
+    columns_per_nm[to] = slope * per_nm;
+    const std::int32_t first = std::max(std::min(ends.left[i], ends.right[i]), static_cast<std::int32_t>(row_begin));
+    const std::int32_t last = std::min(std::max(ends.left[i], ends.right[i]), static_cast<std::int32_t>(row_end));
+    const std::uint32_t flags = (triangle.nx < 0 ? SegmentRows::kEnters : 0) | (triangle.ny == 0 ? SegmentRows::kUpright : 0) |
+                                (std::abs(slope) <= kSteepest ? 0 : SegmentRows::kExact);
+    rows[to] = {static_cast<std::uint32_t>(first), static_cast<std::uint32_t>(last - first) << SegmentRows::kFlagBits | flags};
+    origin[to] = {facets.facet[i], facets.instance[i]};
+    to += first < last ? 1 : 0;
+  }
+  out.size = to;
+  facets.size = 0;
+}
+
+}  // namespace lamina::raster::plain

@@ -1,0 +1,70 @@
+#include "stages/raster/kernels/kernels.h"
+
+#include "stages/raster/kernels/bodies.h"
+
+namespace lamina::raster {
+namespace {
+
+template <FillRule kRule>
+std::uint32_t* changes_by(const std::uint32_t* crossing, const std::uint32_t* end, std::uint32_t* change) {
+  const std::uint32_t* const row_begin = change;
+  std::int32_t winding = 0;
+  bool solid = false;
+  for (; crossing != end; ++crossing) {
+    winding += (*crossing & 1) != 0 ? 1 : -1;
+    if (is_solid(kRule, winding) == solid) continue;
+    solid = !solid;
+    const std::uint32_t column = *crossing >> 1;
+    if (change != row_begin && change[-1] == column) {
+      --change;
+    } else {
+      *change++ = column;
+    }
+  }
+  return change;
+}
+
+}  // namespace
+
+const Kernels& kernels_for(Isa isa) {
+  static constexpr Kernels kPlain{Isa::kPlain, plain::gather, plain::cut, plain::fill, plain::rows};
+#if defined(LAMINA_WIDE_KERNELS)
+  static constexpr Kernels kAvx2{Isa::kAvx2, avx2::gather, avx2::cut, avx2::fill, avx2::rows};
+  static constexpr Kernels kAvx512{Isa::kAvx512, avx512::gather, avx512::cut, avx2::fill, avx512::rows};
+  if (isa == Isa::kAvx512) return kAvx512;
+  if (isa == Isa::kAvx2) return kAvx2;
+#endif
+  return kPlain;
+}
+
+std::uint32_t exact_end(const PixelSampling& sampling, const CutFacets& facets, const CutFacets::Corner& other, std::uint32_t i,
+                        Nm plane) {
+  return static_cast<std::uint32_t>(exact_row(sampling.y, facets.tip.at(i), other.at(i), plane));
+}
+
+std::uint32_t exact_crossing(const FillTask& task, std::size_t segment, std::uint32_t row) {
+  const ExactTriangle triangle = exact_triangle(task.segments.origin[segment], task.placed);
+  const std::int64_t column = exact_column(task.sampling.x, triangle, task.sampling.row_centre[row], task.plane);
+  return static_cast<std::uint32_t>(column) * 2 + (task.segments.rows[segment].is(SegmentRows::kEnters) ? 1 : 0);
+}
+
+std::uint32_t* write_changes(FillRule rule, const std::uint32_t* crossing, const std::uint32_t* end, std::uint32_t* change) {
+  std::uint32_t* last = change;
+  switch (rule) {
+    case FillRule::kNonzero: last = changes_by<FillRule::kNonzero>(crossing, end, change); break;
+    case FillRule::kPositive: last = changes_by<FillRule::kPositive>(crossing, end, change); break;
+    case FillRule::kEvenOdd: last = changes_by<FillRule::kEvenOdd>(crossing, end, change); break;
+  }
+  return last - ((last - change) & 1);  // an open mesh that says it is closed: runs stay pairs all the same
+}
+
+void fill_exactly(const FillTask& task, std::size_t segment) {
+  const SegmentRows rows = task.segments.rows[segment];
+  std::uint32_t value = exact_crossing(task, segment, rows.first);
+  for (std::uint32_t row = rows.first; row < rows.end(); ++row) {
+    if (!rows.is(SegmentRows::kUpright)) value = exact_crossing(task, segment, row);
+    task.crossing[task.place[row - task.first_row]++] = value;
+  }
+}
+
+}  // namespace lamina::raster
