@@ -16,7 +16,13 @@ namespace {
 struct Above {
   std::uint32_t corner[3];
   std::uint32_t crossed() const { return (corner[0] ^ corner[1]) | (corner[1] ^ corner[2]); }
+  // Of those that are crossed, whose tip is corner 1 or 2.
+  std::uint32_t tip_is_1() const { return (corner[0] ^ corner[1]) & ~(corner[0] ^ corner[2]); }
+  std::uint32_t tip_is_2() const { return ~(corner[0] ^ corner[1]); }
 };
+
+/// The corner behind one.
+constexpr std::uint32_t kNextCorner[] = {1, 2, 0, 1};
 
 Above corners_above(const Cluster& cluster, Nm z) {
   Above above{};
@@ -44,29 +50,33 @@ struct Ends {
   std::int32_t left[CutFacets::kRoom], right[CutFacets::kRoom];
 };
 
-/// Simple loops over all facets, of which compilers make pairs. An end near a whole number is decided in integers.
+/// Loops so simple that compilers do two facets at once. An end near a whole number is decided in integers.
 void find_ends(const PixelSampling& sampling, const CutFacets& facets, Nm plane, Ends& ends) {
-  const std::uint32_t size = std::min(facets.size, CutFacets::kRoom);
+  const std::uint32_t size = facets.size;
   const double rows_per_nm = sampling.rows_per_nm, near = sampling.near_y;
   const CutFacets::Corner &tip = facets.tip, &left = facets.left, &right = facets.right;
-  std::int32_t is_near[CutFacets::kRoom];
-  std::int32_t any = 0;
+  double row[CutFacets::kRoom], other_row[CutFacets::kRoom];  // + 1 + near; no end lies before the bed
   for (std::uint32_t i = 0; i < size; ++i) {
-    const double up = plane - tip.z[i];
+    const double up = plane - tip.z[i], tip_y = tip.y[i];
     const double to_left = up / (left.z[i] - tip.z[i]), to_right = up / (right.z[i] - tip.z[i]);
-    const double y = tip.y[i] + to_left * (left.y[i] - tip.y[i]), other_y = tip.y[i] + to_right * (right.y[i] - tip.y[i]);
+    const double y = tip_y + to_left * (left.y[i] - tip.y[i]), other_y = tip_y + to_right * (right.y[i] - tip.y[i]);
     ends.share[i] = to_left;
     ends.y[i] = y;
-    const double row = y * rows_per_nm + 0.5 + near, other_row = other_y * rows_per_nm + 0.5 + near;  // + 1 + near; y >= 0
-    ends.left[i] = static_cast<std::int32_t>(row);
-    ends.right[i] = static_cast<std::int32_t>(other_row);
-    is_near[i] = (row - ends.left[i] < 2 * near ? 1 : 0) | (other_row - ends.right[i] < 2 * near ? 2 : 0);
-    any |= is_near[i];
+    row[i] = y * rows_per_nm + 0.5 + near;
+    other_row[i] = other_y * rows_per_nm + 0.5 + near;
   }
-  if (any == 0) return;
   for (std::uint32_t i = 0; i < size; ++i) {
-    if ((is_near[i] & 1) != 0) ends.left[i] = static_cast<std::int32_t>(exact_end(sampling, facets, left, i, plane));
-    if ((is_near[i] & 2) != 0) ends.right[i] = static_cast<std::int32_t>(exact_end(sampling, facets, right, i, plane));
+    ends.left[i] = static_cast<std::int32_t>(row[i]);
+    ends.right[i] = static_cast<std::int32_t>(other_row[i]);
+    row[i] -= ends.left[i];
+    other_row[i] -= ends.right[i];
+  }
+  bool any = false;
+  for (std::uint32_t i = 0; i < size; ++i) any |= (row[i] < 2 * near) | (other_row[i] < 2 * near);
+  if (!any) return;
+  for (std::uint32_t i = 0; i < size; ++i) {
+    if (row[i] < 2 * near) ends.left[i] = static_cast<std::int32_t>(exact_end(sampling, facets, left, i, plane));
+    if (other_row[i] < 2 * near) ends.right[i] = static_cast<std::int32_t>(exact_end(sampling, facets, right, i, plane));
   }
 }
 
@@ -75,21 +85,24 @@ void find_ends(const PixelSampling& sampling, const CutFacets& facets, Nm plane,
 void gather(const ClusterSource& source, Nm plane, CutFacets& facets) {
   const Cluster& cluster = *source.cluster;
   const Above above = corners_above(cluster, plane_in_mesh(plane, source.offset));
+  const auto* const coordinates = reinterpret_cast<const Nm*>(&cluster);  // three of z, three of y, three of x
+  const std::uint32_t tip_is_1 = above.tip_is_1(), tip_is_2 = above.tip_is_2();
+  const Nm offset_x = source.offset.x, offset_y = source.offset.y, offset_z = source.offset.z;
+  const auto put = [&](CutFacets::Corner& corner, std::uint32_t i, std::uint32_t k, std::uint32_t lane) {
+    const Nm* const z = coordinates + k * kClusterSize + lane;
+    corner.z[i] = z[0] + offset_z;
+    corner.y[i] = z[3 * kClusterSize] + offset_y;
+    corner.x[i] = z[6 * kClusterSize] + offset_x;
+  };
   std::uint32_t i = facets.size;
   for (std::uint32_t lanes = above.crossed(); lanes != 0; lanes &= lanes - 1) {
     const auto lane = static_cast<std::uint32_t>(std::countr_zero(lanes));
-    const std::uint32_t a = above.corner[0] >> lane & 1, b = above.corner[1] >> lane & 1, c = above.corner[2] >> lane & 1;
-    const std::uint32_t tip = 2 * (a ^ b ^ 1) + ((a ^ b) & (a ^ c ^ 1));  // 2 if a = b, else 1 if a = c, else 0
-    const auto put = [&](CutFacets::Corner& corner, std::uint32_t k) {
-      corner.x[i] = cluster.x[k][lane] + source.offset.x;
-      corner.y[i] = cluster.y[k][lane] + source.offset.y;
-      corner.z[i] = cluster.z[k][lane] + source.offset.z;
-    };
-    put(facets.tip, tip);
-    put(facets.left, tip == 2 ? 0 : tip + 1);
-    put(facets.right, tip == 0 ? 2 : tip - 1);
     facets.facet[i] = source.first_facet + lane;
     facets.instance[i] = source.instance;
+    const std::uint32_t tip = (tip_is_1 >> lane & 1) | (tip_is_2 >> lane & 1) << 1;
+    put(facets.tip, i, tip, lane);
+    put(facets.left, i, kNextCorner[tip], lane);
+    put(facets.right, i, kNextCorner[tip + 1], lane);
     ++i;
   }
   facets.size = i;

@@ -76,8 +76,31 @@ void merge_any(const std::uint32_t* a, const std::uint32_t* a_end, const std::ui
   std::copy(b, b_end, std::copy(a, a_end, out));
 }
 
+/// Whether few crossings are more than a place or two away from where they belong, as in rows of many parts side by side.
+bool is_nearly_sorted(const std::uint32_t* row, std::size_t count) {
+  constexpr std::size_t kFar = 4;
+  std::int32_t wrong = 0;
+  for (std::size_t i = kFar; i < count; ++i) {
+    wrong += static_cast<std::int32_t>(row[i - kFar]) > static_cast<std::int32_t>(row[i]) ? 1 : 0;
+  }
+  return wrong <= static_cast<std::int32_t>(count / 8);
+}
+
+void insert_all(std::uint32_t* row, std::size_t count) {
+  for (std::uint32_t* i = row + 1; i < row + count; ++i) {
+    const std::uint32_t value = *i;
+    std::uint32_t* hole = i;
+    for (; hole != row && hole[-1] > value; --hole) *hole = hole[-1];
+    *hole = value;
+  }
+}
+
 /// Sorts blocks and merges them, from one of two buffers into the other. returns  where the row is then
 std::uint32_t* sort_long(std::uint32_t* row, std::size_t count, std::uint32_t* other) {
+  if (is_nearly_sorted(row, count)) {
+    insert_all(row, count);
+    return row;
+  }
   const std::size_t padded = (count + kBlockSize - 1) / kBlockSize * kBlockSize;
   std::fill(row + count, row + padded, kBeyondAll);
   for (std::size_t i = 0; i < padded; i += kBlockSize) sort_block<kBlockSize>(row + i);
