@@ -186,8 +186,7 @@ std::uint64_t Rasterizer::layer_bytes_bound(Nm plane) const {
   const std::uint64_t rows = state_->grid.rows(), places = state_->last_row - state_->first_row;
   // Segments of open parts are held twice, and close at most as many crossings as they have; buffers double for these.
   const bool open = !std::ranges::all_of(state_->meshes, &ClusteredMesh::closed);
-  const bool caps =
-      std::ranges::any_of(state_->meshes, [](const ClusteredMesh& m) { return m.first_cap < m.cluster_count(); });
+  const bool caps = std::ranges::any_of(state_->meshes, [](const ClusteredMesh& m) { return m.first_cap < m.cluster_count(); });
   const std::uint64_t closing = open ? 2 * count.segments * (Segments::kBytes + 4) + 5 * 8 * count.crossings : 0;
   const std::uint64_t visits = (count.clusters > kMostClusters ? 3 : 1) * count.clusters * sizeof(ClusterVisit);
   // Crossings and changes; the place of each row, its offset, and whether it is capped.
