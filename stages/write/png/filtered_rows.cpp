@@ -1,6 +1,7 @@
 #include "stages/write/png/filtered_rows.h"
 
 #include <algorithm>
+#include <cstring>
 
 #include "stages/geometry/bits.h"
 
@@ -109,18 +110,14 @@ inline std::uint32_t take_byte(std::span<const std::uint32_t> changes, std::size
   return state;
 }
 
-/// The next change of both rows, which have one colour before it and different columns, where it is an edge that moves a
-/// little and no other change is near. returns  false if the change is another one
-[[gnu::always_inline]] inline bool put_edge(State& state, const Row& row) {
-  const std::uint32_t* const change = row.changes.data() + state.next;
-  const std::uint32_t* const above = row.above.data() + state.next_above;
-  const std::uint32_t shift = *change - *above + kMostShift;
-  if (shift > 2 * kMostShift) return false;
-  const std::uint32_t last = (std::max(*change, *above) - 1) | 7;  // of the last byte that differs
-  if (state.next + 1 != row.changes.size() && change[1] <= last) return false;
-  if (state.next_above + 1 != row.above.size() && above[1] <= last) return false;
-  const EdgeWord& word = row.codes.edge[edge_index(state.next % 2 == 0, *above, shift)];
-  const std::uint32_t at = std::min(*change, *above) / 8;
+/// An edge that moves: its first byte that differs, and its edge_index() in the lowest 8 bits.
+using MovedEdge = std::uint32_t;
+
+constexpr MovedEdge moved_edge(std::uint32_t at, std::size_t index) { return at << 8 | static_cast<std::uint32_t>(index); }
+
+[[gnu::always_inline]] inline void put_moved(State& state, const Row& row, MovedEdge moved) {
+  const EdgeWord& word = row.codes.edge[moved & 0xFF];
+  const std::uint32_t at = moved >> 8;
   const std::uint64_t zeros = row.begin + at - state.written;
   if (zeros < kShortZeros) [[likely]] {
     const Word before = row.codes.zeros[zeros];
@@ -133,8 +130,86 @@ inline std::uint32_t take_byte(std::span<const std::uint32_t> changes, std::size
   const std::uint32_t values = std::uint32_t{word.edge.first} + word.edge.second;
   state.values += values;
   state.moments += std::uint64_t{values} * (at + 1) + word.edge.second;
+}
+
+/// The next change of both rows, which have one colour before it and different columns, where it is an edge that moves a
+/// little and no other change is near. returns  false if the change is another one
+[[gnu::always_inline]] inline bool put_edge(State& state, const Row& row) {
+  const std::uint32_t* const change = row.changes.data() + state.next;
+  const std::uint32_t* const above = row.above.data() + state.next_above;
+  const std::uint32_t shift = *change - *above + kMostShift;
+  if (shift > 2 * kMostShift) return false;
+  const std::uint32_t last = (std::max(*change, *above) - 1) | 7;  // of the last byte that differs
+  if (state.next + 1 != row.changes.size() && change[1] <= last) return false;
+  if (state.next_above + 1 != row.above.size() && above[1] <= last) return false;
+  const std::uint32_t at = std::min(*change, *above) / 8;
+  put_moved(state, row, moved_edge(at, edge_index(state.next % 2 == 0, *above, shift)));
   ++state.next, ++state.next_above;
   return true;
+}
+
+using FourInts [[gnu::vector_size(16)]] = std::int32_t;
+
+FourInts four(const std::uint32_t* at) {
+  FourInts value;
+  std::memcpy(&value, at, sizeof value);
+  return value;
+}
+FourInts less_of(FourInts a, FourInts b) { return (a & (a < b)) | (b & (a >= b)); }
+FourInts more_of(FourInts a, FourInts b) { return (a & (a > b)) | (b & (a <= b)); }
+
+constexpr std::size_t kChangesAtOnce = 32;
+constexpr std::size_t kFewChanges = 16;  // less than that are taken one by one
+constexpr std::size_t kNotEdges = kChangesAtOnce + 1;
+
+/// Finds the edges that move among the next `count` changes of both rows, which have one colour before them. Edges that
+/// move and edges that stand are mixed at random, so there is no branch between them: four are looked at at once, and what
+/// is found is kept by how far the place for it moves on.
+/// count    a multiple of 4, less than there are left in both rows
+/// moved    room for as many
+/// returns  how many move; kNotEdges if one moves too far or the change behind it is near
+[[gnu::always_inline]] inline std::size_t find_moved(const State& state, const Row& row, std::size_t count, MovedEdge* moved) {
+  const std::uint32_t* const change = row.changes.data() + state.next;
+  const std::uint32_t* const above = row.above.data() + state.next_above;
+  const std::int32_t even = state.next % 2 == 0 ? 1 << 7 : 0, odd = even ^ 1 << 7;
+  const FourInts begins = {even, odd, even, odd};
+  FourInts stops = {0, 0, 0, 0};
+  std::size_t found = 0;
+  for (std::size_t i = 0; i < count; i += 4) {
+    const FourInts a = four(change + i), b = four(above + i);
+    const FourInts shift = a - b + kMostShift, moves = a != b;
+    const FourInts behind = (more_of(a, b) + 7) >> 3, next = less_of(four(change + i + 1), four(above + i + 1)) >> 3;
+    stops |= (shift < 0) | (shift > 2 * kMostShift) | (moves & (next < behind));
+    const FourInts edges = (less_of(a, b) >> 3) << 8 | begins | (b & 7) << 4 | (shift & 15);
+    for (int lane = 0; lane < 4; ++lane) {
+      moved[found] = static_cast<MovedEdge>(edges[lane]);
+      found += static_cast<std::uint32_t>(-moves[lane]);
+    }
+  }
+  std::uint64_t halves[2];
+  std::memcpy(halves, &stops, sizeof halves);
+  return (halves[0] | halves[1]) == 0 ? found : kNotEdges;
+}
+
+/// The next changes of both rows, up to kChangesAtOnce, if all are edges that stand or move a little; or else none.
+[[gnu::noinline]] State put_at_once(State state, const Row& row, std::size_t count) {
+  MovedEdge moved[kChangesAtOnce + 1];
+  const std::size_t found = find_moved(state, row, count, moved);
+  if (found == kNotEdges) return state;
+  for (std::size_t i = 0; i < found; ++i) put_moved(state, row, moved[i]);
+  state.next += count, state.next_above += count;
+  return state;
+}
+
+/// Changes of both rows one by one, up to number `end` of this row or the end of one of both.
+[[gnu::always_inline]] inline void put_one_by_one(State& state, const Row& row, std::size_t end) {
+  while (state.next < end && state.next_above < row.above.size()) {
+    if (row.changes[state.next] == row.above[state.next_above]) {
+      ++state.next, ++state.next_above;
+    } else if (!put_edge(state, row)) {
+      state = put_bytes(state, row);
+    }
+  }
 }
 
 }  // namespace
@@ -156,13 +231,14 @@ void FilteredRows::put(BitWriter& out, std::uint32_t r, std::span<const std::uin
     put_at(state, codes_, start, codes_.byte[kUp], 1);
     state.values = kUp;
   }
-  while (state.next < changes.size() && state.next_above < above.size()) {
-    if (changes[state.next] == above[state.next_above]) {
-      ++state.next, ++state.next_above;
-    } else if (!put_edge(state, row)) {
-      state = put_bytes(state, row);
-    }
+  for (;;) {
+    const std::size_t left = std::min(changes.size() - state.next, above.size() - state.next_above);
+    if (left < kFewChanges) break;
+    const std::size_t next = state.next, count = std::min(left - 1, kChangesAtOnce) & ~std::size_t{3};
+    state = put_at_once(state, row, count);
+    if (state.next == next) put_one_by_one(state, row, next + count);
   }
+  put_one_by_one(state, row, changes.size());
   while (state.next < changes.size() || state.next_above < above.size()) state = put_bytes(state, row);
   check_.add(state.values, state.moments, rows_ - r);
   written_ = state.written;
