@@ -18,6 +18,7 @@ namespace {
 struct Worker {
   std::array<char, kBlockSize * kFacetBytes> bytes;
   std::array<Triangle, kBlockSize> facets;
+  std::array<std::uint16_t, 3 * kBlockSize> hashes;
   BlockMaker maker;
   CensusSums sums;
   FacetBox box;
@@ -31,9 +32,9 @@ bool read_block(const Source& source, const Snapper& snapper, std::uint32_t bloc
   if (!source.read(kHeaderBytes + first * kFacetBytes, worker.bytes.data(), count * kFacetBytes)) return false;
   if (!snap_facets(worker.bytes.data(), count, snapper, worker.facets.data(), worker.box)) return false;
   const std::span<const Triangle> facets(worker.facets.data(), count);
-  worker.sums.add(facets, share);
+  worker.sums.add(facets, share, worker.hashes.data());
   prisms = Prisms::of(facets, facets.front().a.z);
-  worker.maker.make(facets, blocks, block);
+  worker.maker.make(facets, {worker.hashes.data(), 3 * facets.size()}, blocks, block);
   return true;
 }
 

@@ -5,18 +5,19 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <cstring>
 #include <numeric>
 
 namespace lamina {
 namespace {
 
 /// 16 bits of a vertex, each of which depends on every bit of its coordinates.
-inline std::uint32_t hash(const Point3& p) {
+inline std::uint16_t hash(const Point3& p) {
   __extension__ using Wide = unsigned __int128;
   constexpr std::uint64_t kXy = 0x2d358dccaa6c78a5, kZ = 0x9e3779b97f4a7c15, kOdd = 0x8bb84b93962eacc9;
   const std::uint64_t xy = static_cast<std::uint32_t>(p.x) | std::uint64_t{static_cast<std::uint32_t>(p.y)} << 32;
   const Wide product = static_cast<Wide>(xy ^ kXy) * ((static_cast<std::uint32_t>(p.z) * kZ) ^ kOdd);
-  return static_cast<std::uint32_t>((static_cast<std::uint64_t>(product) ^ static_cast<std::uint64_t>(product >> 64)) >> 48);
+  return static_cast<std::uint16_t>((static_cast<std::uint64_t>(product) ^ static_cast<std::uint64_t>(product >> 64)) >> 48);
 }
 
 /// 0 if two vertices are one.
@@ -29,55 +30,42 @@ inline std::uint32_t mask_of(bool yes) { return -static_cast<std::uint32_t>(yes)
 
 }  // namespace
 
-/// Gives each vertex of the block a number, in the order of the file. returns  whether there are few enough
+/// Numbers vertices in the order in which clusters name them. returns  whether there are few enough
 ///
 /// No processor foresees whether a corner is a new vertex, so nothing branches on it: every corner is written where the next
 /// new vertex would be, and masks choose.
-bool BlockMaker::number_vertices(std::span<const Triangle> triangles) {
-  const std::uint32_t corners = 3 * static_cast<std::uint32_t>(triangles.size()), most = corners / 2;
-  const Point3* const point = corners == 0 ? nullptr : &triangles.front().a;
-  for (std::uint32_t i = 0; i < corners; ++i) corner_[i] = static_cast<std::uint16_t>(hash(point[i]) % kSlots);
+bool BlockMaker::number_vertices(std::span<const Triangle> triangles, std::span<const std::uint16_t> hashes) {
+  const auto count = static_cast<std::uint32_t>(triangles.size()), most = count * 3 / 2;
   slot_.fill(kNone);
   std::uint32_t vertices = 0;
-  for (std::uint32_t i = 0; i < corners && vertices <= most; ++i) {
-    const Point3 p = point[i];
-    std::uint32_t at = corner_[i], number = slot_[at], is_new = mask_of(number == kNone);
-    while ((difference(vertex_[number], p) & ~is_new) != 0) [[unlikely]] {
-        at = (at + 1) % kSlots;
-        number = slot_[at];
-        is_new = mask_of(number == kNone);
-      }
-    number ^= (number ^ vertices) & is_new;
-    vertex_[vertices] = p;
-    vertices -= is_new;  // which is -1 or 0
-    slot_[at] = static_cast<std::uint16_t>(number);
-    corner_[i] = static_cast<std::uint16_t>(number);
+  for (std::uint32_t i = 0; i < count && vertices <= most; ++i) {
+    const Point3* const corner = &triangles[order_[i]].a;
+    const std::uint16_t* const corner_hash = &hashes[3 * std::size_t{order_[i]}];
+    std::uint16_t* const out = &cluster_[i / kClusterSize].corner[0][i % kClusterSize];
+    for (std::uint32_t k = 0; k < 3; ++k) {
+      const Point3 p = corner[k];
+      std::uint32_t at = corner_hash[k] % kSlots, number = slot_[at], is_new = mask_of(number == kNone);
+      while ((difference(vertex_[number], p) & ~is_new) != 0) [[unlikely]] {
+          at = (at + 1) % kSlots;
+          number = slot_[at];
+          is_new = mask_of(number == kNone);
+        }
+      number ^= (number ^ vertices) & is_new;
+      vertex_[vertices] = p;
+      vertices -= is_new;  // which is -1 or 0
+      slot_[at] = static_cast<std::uint16_t>(number);
+      out[k * kClusterSize] = static_cast<std::uint16_t>(number);
+    }
   }
   vertices_ = vertices;
   return vertices <= most;
 }
 
-void BlockMaker::write_indexed(std::span<const Triangle> triangles, MeshBlocks::Block& block) {
-  auto* const clusters = reinterpret_cast<IndexedCluster*>(block.bytes);
-  auto* const vertex = const_cast<Point3*>(block.vertex());
-  std::fill_n(number_.begin(), vertices_, kNone);
-  const auto count = static_cast<std::uint32_t>(triangles.size());
-  std::uint32_t named = 0;
-  for (std::uint32_t i = 0; i < count; ++i) {
-    const std::uint16_t* const corner = corner_.data() + 3 * std::size_t{order_[i]};
-    for (std::uint32_t k = 0; k < 3; ++k) {
-      std::uint32_t number = number_[corner[k]];
-      const std::uint32_t is_new = mask_of(number == kNone);
-      number ^= (number ^ named) & is_new;
-      vertex[named] = vertex_[corner[k]];
-      named -= is_new;
-      number_[corner[k]] = static_cast<std::uint16_t>(number);
-      clusters[i / kClusterSize].corner[k][i % kClusterSize] = static_cast<std::uint16_t>(number);
-    }
-  }
-  const std::uint16_t point = clusters[(count - 1) / kClusterSize].corner[0][(count - 1) % kClusterSize];
+/// Makes points of the lanes of the last cluster that are left.
+void BlockMaker::fill_up(std::uint32_t count) {
+  const std::uint16_t point = cluster_[(count - 1) / kClusterSize].corner[0][(count - 1) % kClusterSize];
   for (std::uint32_t i = count; i % kClusterSize != 0; ++i) {
-    for (auto& corner : clusters[i / kClusterSize].corner) corner[i % kClusterSize] = point;
+    for (auto& corner : cluster_[i / kClusterSize].corner) corner[i % kClusterSize] = point;
   }
 }
 
@@ -98,7 +86,8 @@ void BlockMaker::write_plain(std::span<const Triangle> triangles, MeshBlocks::Bl
   }
 }
 
-void BlockMaker::make(std::span<const Triangle> triangles, MeshBlocks& mesh, std::uint32_t number) {
+void BlockMaker::make(std::span<const Triangle> triangles, std::span<const std::uint16_t> hashes, MeshBlocks& mesh,
+                      std::uint32_t number) {
   MeshBlocks::Block& block = mesh.blocks_[number];
   const auto count = static_cast<std::uint32_t>(triangles.size());
   const std::span<std::uint16_t> order(order_.data(), count);
@@ -107,20 +96,30 @@ void BlockMaker::make(std::span<const Triangle> triangles, MeshBlocks& mesh, std
   } else {
     order_block(triangles, order);
   }
-  const bool few = number_vertices(triangles);
+  const bool few = number_vertices(triangles, hashes);
   block.clusters = (count + kClusterSize - 1) / kClusterSize;
   block.vertices = few ? vertices_ : 0;
+  Box* const bounds = mesh.bounds_.data() + mesh.first_cluster(number);
   if (few) {
-    block.bytes = mesh.pages_.take(block.clusters * sizeof(IndexedCluster) + (vertices_ + 1) * sizeof(Point3) + 4);
-    write_indexed(triangles, block);
+    fill_up(count);
+    const std::size_t clusters = block.clusters * sizeof(IndexedCluster), vertices = vertices_ * sizeof(Point3);
+    block.bytes = mesh.pages_.take(clusters + vertices + 4);
+    std::memcpy(block.bytes, cluster_.data(), clusters);
+    std::memcpy(block.bytes + clusters, vertex_.data(), vertices);
+    for (std::uint32_t c = 0; c < block.clusters; ++c) bounds[c] = bounds_of(cluster_[c], vertex_.data());
   } else {
     block.bytes = mesh.pages_.take(block.clusters * sizeof(Cluster));
     write_plain(triangles, block);
+    for (std::uint32_t c = 0; c < block.clusters; ++c) bounds[c] = bounds_of(block.plain()[c]);
   }
-  Box* const bounds = mesh.bounds_.data() + mesh.first_cluster(number);
-  for (std::uint32_t c = 0; c < block.clusters; ++c) {
-    bounds[c] = few ? bounds_of(block.indexed()[c], block.vertex()) : bounds_of(block.plain()[c]);
+}
+
+void BlockMaker::make(std::span<const Triangle> triangles, MeshBlocks& mesh, std::uint32_t block) {
+  std::uint16_t* next = hash_.data();
+  for (const Triangle& t : triangles) {
+    for (const Point3* const p : {&t.a, &t.b, &t.c}) *next++ = hash(*p);
   }
+  make(triangles, {hash_.data(), next}, mesh, block);
 }
 
 std::shared_ptr<MeshBlocks> take_blocks(Mesh& mesh) {

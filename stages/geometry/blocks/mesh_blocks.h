@@ -104,7 +104,7 @@ class MeshBlocks {
   static constexpr std::size_t kLine = 64;
 
   struct Block {
-    char* bytes = nullptr;       // the clusters, and behind indexed ones the vertices and 16 bytes to spare
+    char* bytes = nullptr;       // the clusters, and behind indexed ones the vertices and 4 bytes to spare
     std::uint32_t clusters = 0;  // in the block
     std::uint32_t vertices = 0;  // 0: the clusters are stored as they are read
 

@@ -46,19 +46,31 @@ struct Sums {
   double sixfold_volume = 0;  // nm3; its order is fixed by splitting at places that threads do not decide
 };
 
-}  // namespace
-
-void CensusSums::add(std::span<const Triangle> facets, std::uint64_t share) {
+template <bool kHashes>
+inline void add_facets(std::span<const Triangle> facets, std::uint64_t share, CensusSums& sums, std::uint16_t* hashes) {
   const std::uint64_t below = UINT64_MAX / share;
   for (const Triangle& t : facets) {
     const std::uint64_t a = hash(t.a), b = hash(t.b), c = hash(t.c);
+    if constexpr (kHashes) {
+      for (const std::uint64_t corner : {a, b, c}) *hashes++ = static_cast<std::uint16_t>(corner >> 48);
+    }
     const std::uint64_t forward = walked(a, b) + walked(b, c) + walked(c, a);
     const std::uint64_t backward = walked(b, a) + walked(c, b) + walked(a, c);
-    boundary += forward - backward;
-    fingerprint += fold(forward ^ kA, kD);
+    sums.boundary += forward - backward;
+    sums.fingerprint += fold(forward ^ kA, kD);
     const std::uint64_t unordered = (a + b + c) * kD;
     if (unordered > below || a == b || b == c || c == a) continue;
-    sampled.push_back((unordered * kB | 1) ^ ((a < b) ^ (b < c) ^ (c < a) ? 1u : 0u));
+    sums.sampled.push_back((unordered * kB | 1) ^ ((a < b) ^ (b < c) ^ (c < a) ? 1u : 0u));
+  }
+}
+
+}  // namespace
+
+void CensusSums::add(std::span<const Triangle> facets, std::uint64_t share, std::uint16_t* hashes) {
+  if (hashes == nullptr) {
+    add_facets<false>(facets, share, *this, hashes);
+  } else {
+    add_facets<true>(facets, share, *this, hashes);
   }
 }
 

@@ -15,8 +15,9 @@ struct CensusSums {
   std::uint64_t fingerprint = 0;       // Census::fingerprint
   std::vector<std::uint64_t> sampled;  // facets without their orientation, which is the lowest bit
 
-  /// share  of sampled_share()
-  void add(std::span<const Triangle> facets, std::uint64_t share);
+  /// share   of sampled_share()
+  /// hashes  null, or gets 16 bits for each corner of each facet: equal where vertices are
+  void add(std::span<const Triangle> facets, std::uint64_t share, std::uint16_t* hashes = nullptr);
   void add(const CensusSums& other);
 };
 
