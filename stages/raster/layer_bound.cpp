@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cstring>
 #include <map>
+#include <utility>
 
 namespace lamina::raster {
 namespace {
@@ -164,27 +165,26 @@ const CrossingSums::Slab* CrossingSums::Table::at(std::int64_t plane) const {
   return number < 0 || number >= static_cast<std::int64_t>(slab.size()) ? nullptr : &slab[static_cast<std::size_t>(number)];
 }
 
-LayerBound::LayerBound(std::span<const PlacedMesh> placed, const PixelGrid& grid) : rows_per_nm_(grid.y.pixels_per_nm()) {
-  std::map<const ClusteredMesh*, std::uint32_t> number;
+CrossingSums sum_crossings(const ClusteredMesh& mesh) {
+  tbb::enumerable_thread_specific<CrossingSums> sums;
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, mesh.cluster_count(), 1024),
+                    [&](const tbb::blocked_range<std::size_t>& range) {
+                      CrossingSums& own = sums.local();
+                      Cluster room;
+                      for (auto c = static_cast<std::uint32_t>(range.begin()); c != range.end(); ++c) {
+                        own.add(mesh.cluster(c, room), mesh.bounds[c]);
+                      }
+                    });
+  CrossingSums all;
+  for (const CrossingSums& one_thread : sums) all.merge(one_thread);
+  return all;
+}
+
+LayerBound::LayerBound(std::span<const PlacedMesh> placed, std::span<const ClusteredMesh> meshes,
+                       std::vector<CrossingSums::Table> tables, const PixelGrid& grid)
+    : rows_per_nm_(grid.y.pixels_per_nm()), tables_(std::move(tables)) {
   std::map<std::pair<std::uint32_t, Nm>, std::uint64_t> count;
-  for (const PlacedMesh& one : placed) {
-    const auto [found, is_new] = number.emplace(one.mesh, static_cast<std::uint32_t>(number.size()));
-    ++count[{found->second, one.offset.z}];
-    if (!is_new) continue;
-    const ClusteredMesh& mesh = *one.mesh;
-    tbb::enumerable_thread_specific<CrossingSums> sums;
-    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, mesh.cluster_count(), 1024),
-                      [&](const tbb::blocked_range<std::size_t>& range) {
-                        CrossingSums& own = sums.local();
-                        Cluster room;
-                        for (auto c = static_cast<std::uint32_t>(range.begin()); c != range.end(); ++c) {
-                          own.add(mesh.cluster(c, room), mesh.bounds[c]);
-                        }
-                      });
-    CrossingSums all;
-    for (const CrossingSums& one_thread : sums) all.merge(one_thread);
-    tables_.push_back(all.table());
-  }
+  for (const PlacedMesh& one : placed) ++count[{static_cast<std::uint32_t>(one.mesh - meshes.data()), one.offset.z}];
   for (const auto& [key, copies] : count) copies_.push_back({key.first, key.second, copies});
 }
 

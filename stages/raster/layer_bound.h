@@ -57,14 +57,18 @@ class CrossingSums {
   std::vector<Change> change_ = std::vector<Change>(kBeyond);
 };
 
+/// Counts all clusters of a mesh. cost: one parallel pass over its facets
+CrossingSums sum_crossings(const ClusteredMesh& mesh);
+
 /// The same of everything on the bed.
 class LayerBound {
  public:
   struct Count {
     std::uint64_t segments = 0, crossings = 0, clusters = 0;
   };
-  /// cost: one parallel pass over the facets of every mesh
-  LayerBound(std::span<const PlacedMesh> placed, const PixelGrid& grid);
+  /// tables  of each of `meshes`, to which `placed` refers
+  LayerBound(std::span<const PlacedMesh> placed, std::span<const ClusteredMesh> meshes, std::vector<CrossingSums::Table> tables,
+             const PixelGrid& grid);
 
   Count at(Nm plane) const;
   /// Crossings of the layer that may have the most.

@@ -105,7 +105,9 @@ Result<Rasterizer> Rasterizer::build(std::span<Mesh> meshes, std::span<const Ins
   for (const Instance& instance : instances) {
     state.placed.push_back({&state.meshes[instance.mesh], instance.offset});
   }
-  state.bound.emplace_back(state.placed, grid);
+  std::vector<CrossingSums::Table> crossings;
+  for (const ClusteredMesh& mesh : state.meshes) crossings.push_back(sum_crossings(mesh).table());
+  state.bound.emplace_back(state.placed, state.meshes, std::move(crossings), grid);
   const std::uint32_t rows = std::max(1u, state.last_row - state.first_row);
   const std::uint64_t bands = std::clamp<std::uint64_t>(state.bound.front().most_crossings() / kBandCrossings, 1, rows);
   state.band_rows = ceil_div(rows, static_cast<std::uint32_t>(bands));

@@ -48,7 +48,7 @@ TEST(LayerBound, IsNeverBelowWhatRandomSolidsHave) {
     const raster::ClusteredMesh clusters = raster::make_clusters(again);
     std::vector<raster::PlacedMesh> placed;
     for (const Instance& instance : instances) placed.push_back({&clusters, instance.offset});
-    const LayerBound bound(placed, grid);
+    const LayerBound bound(placed, {&clusters, 1}, {raster::sum_crossings(clusters).table()}, grid);
     auto rasterizer = raster::Rasterizer::build({&mesh, 1}, instances, grid, FillRule::kNonzero, false, true);
     ASSERT_TRUE(rasterizer.ok());
     for (const Nm plane : heights_of(triangles, scale + size, random)) {
