@@ -1,12 +1,11 @@
 // Sections [load] and [run].
 #include "pipeline/job/keys.h"
+#include "stages/geometry/isa.h"
 
 namespace lamina::pipeline {
 namespace {
 
 constexpr Word<Engine> kEngines[] = {{"rays", Engine::kRays}, {"contours", Engine::kContours}, {"both", Engine::kBoth}};
-
-constexpr Word<Isa> kIsas[] = {{"auto", Isa::kAuto}, {"plain", Isa::kPlain}, {"avx2", Isa::kAvx2}, {"avx512", Isa::kAvx512}};
 
 constexpr Word<Sync> kSyncs[] = {{"layer", Sync::kLayer}, {"job", Sync::kJob}, {"off", Sync::kOff}};
 
@@ -17,6 +16,22 @@ std::string write_bytes(const std::uint64_t& bytes) {
     if (bytes % (1ull << shift) == 0) return fmt::format("{}{}", bytes >> shift, letter);
   }
   return fmt::format("{}", bytes);
+}
+
+constexpr Isa kIsas[] = {Isa::kAuto, Isa::kPlain, Isa::kAvx2, Isa::kAvx512};
+
+std::string read_isa(std::string_view text, Isa& isa) {
+  for (Isa one : kIsas) {
+    if (isa_name(one) == text) return isa = one, std::string();
+  }
+  return "has to be auto, plain, avx2 or avx512";
+}
+/// Jobs are saved for any processor unless one was meant.
+std::string write_isa(const Isa& isa) { return std::string(isa == Isa::kAuto ? std::string_view() : isa_name(isa)); }
+std::vector<std::string_view> isa_words() {
+  std::vector<std::string_view> words;
+  for (Isa isa : kIsas) words.push_back(isa_name(isa));
+  return words;
 }
 
 template <std::string (*Read)(std::string_view, std::array<std::uint32_t, 2>&)>
@@ -73,9 +88,11 @@ const JobKey kRunKeys[] = {
     text<check_path, &Job::output>({"run", "output", "-o,--output", "DIR", "directory for the layers and the manifest"}),
     word<kEngines, &Job::engine>(
         {"run", "engine", "--engine", "ENGINE", "rays, contours, or both to compare them; all give the same bytes"}),
-    word<kIsas, &Job::isa>({"run", "isa", "--isa", "SET",
-                            "instructions of the inner loops: auto for the processor's widest, plain, avx2 or avx512; all give "
-                            "the same bytes"}),
+    custom<Job, read_isa, write_isa, &Job::isa>(
+        {"run", "isa", "--isa", "SET",
+         "instructions of the inner loops: auto for the processor's widest, plain, avx2 or avx512; all give the same bytes"},
+        Form::kString)
+        .with_words(isa_words),
     field<&Job::threads>({"run", "threads", "--threads", "N", "0 for all that the machine has"}, {0, 4096}),
     custom<Job, read_bytes, write_bytes, &Job::memory_bytes>(
         {"run", "memory", "--memory", "SIZE", "what the layers in flight may hold beside the mesh: 256M, 1G"}, Form::kString),

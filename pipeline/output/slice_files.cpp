@@ -139,6 +139,7 @@ namespace {
 /// The job for lamina preview, which plans layers again, without settings that do not affect bytes.
 Result<write::File> write_plan(const Job& job) {
   Job kept = job;
+  kept.isa = Isa::kAuto;
   kept.threads = 0;
   kept.memory_bytes = Job().memory_bytes;
   kept.output.clear();

@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
+#include "stages/geometry/isa.h"
 #include "tests/commands/program.h"
 
 namespace lamina::test {
@@ -30,7 +31,7 @@ std::string bytes_of(const Directory& directory, const Words& job, const std::st
   return tree_text(directory.path() / output);
 }
 
-TEST(SameBytes, ForAnyThreadsEngineAndMemory) {
+TEST(SameBytes, ForAnyThreadsEngineInstructionsAndMemory) {
   const Directory directory;
   const Words job = {corpus_file("nist_am_test_artifact_v3b.stl"),
                      corpus_file("dental_crown.stl"),
@@ -46,9 +47,11 @@ TEST(SameBytes, ForAnyThreadsEngineAndMemory) {
   const std::string expected = bytes_of(directory, job, "one");
   EXPECT_GT(expected.size(), 10'000u);
   int variant = 0;
+  const std::string avx2(isa_name(std::min(widest_isa(), Isa::kAvx2)));
   for (const Words& how :
-       {Words{"--threads", "1"}, Words{"--threads", "2", "--engine", "contours"}, Words{"--threads", "8", "--memory", "64K"},
-        Words{"--threads", "8", "--engine", "both"}, Words{"--memory", "8M", "--engine", "contours", "--threads", "1"}}) {
+       {Words{"--threads", "1", "--isa", "plain"}, Words{"--threads", "2", "--engine", "contours", "--isa", avx2},
+        Words{"--threads", "8", "--memory", "64K"}, Words{"--threads", "8", "--engine", "both"},
+        Words{"--memory", "8M", "--engine", "contours", "--threads", "1", "--isa", "plain"}}) {
     EXPECT_TRUE(bytes_of(directory, job + how, "v" + std::to_string(++variant)) == expected) << "variant " << variant;
   }
 }

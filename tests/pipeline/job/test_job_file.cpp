@@ -60,6 +60,7 @@ Job unusual_job(const Directory& directory) {
   job.dose = {{20, 30}, 0.5, 0.75, raster::BeadEnds::kSquare};
   job.output = directory / "out";
   job.engine = Engine::kBoth;
+  job.isa = Isa::kPlain;
   job.threads = 3;
   job.memory_bytes = 1234567;
   job.layers = {4, UINT32_MAX};
@@ -131,6 +132,7 @@ TEST(JobFile, CanonicalTextHasNoPathsAndNothingThatLeavesBytesAlone) {
   EXPECT_EQ(text.find(directory.path().string()), std::string::npos);
   job.output = "elsewhere";
   job.engine = Engine::kContours;
+  job.isa = Isa::kAvx2;
   job.threads = 8;
   job.memory_bytes = 1;
   job.layers.reset();
