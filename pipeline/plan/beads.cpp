@@ -59,7 +59,7 @@ Status Beads::lay(const Layer& layer, BeadWork& work) const {
   const std::span<const std::uint32_t> path_area = work.sections.path_area;
   for (std::uint32_t a = 0; a + 1 < path_area.size(); ++a) {
     const Sections::Area& area = sections_->areas()[a];
-    const SegmentRange& range = segments_->at(std::int64_t{layer.plane()} - area.box.lo.z);
+    const SegmentRange& range = segments_->at(Sections::height_in(area, layer));
     const auto cut = layer_cut(range, sections_->filling(area, layer), layer, area.box);
     if (!cut) return cut.error();
     ToolpathsView paths = all;
@@ -88,9 +88,10 @@ Beads::Expected Beads::expected(std::uint32_t index) const {
   double beads = 1, spans = 1;
   for (const Sections::Area& area : sections_->areas()) {
     const Box& box = area.box;
-    if (layer.plane() < box.lo.z || layer.plane() > box.hi.z) continue;
+    const std::int64_t height = Sections::height_in(area, layer);
+    if (height < 0 || height > std::int64_t{box.hi.z} - box.lo.z) continue;
     const infill::FillParameters& fill = sections_->filling(area, layer);
-    const SegmentRange& range = segments_->at(std::int64_t{layer.plane()} - box.lo.z);
+    const SegmentRange& range = segments_->at(height);
     const double width = mm(fill.width), distance = infill::mean_distance_mm(fill);
     const double of_bead = width * rows_per_mm + 2;  // rows of a bead along x
     double loops = fill.walls;

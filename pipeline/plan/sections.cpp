@@ -107,7 +107,7 @@ std::vector<std::uint32_t> Sections::make_areas(const Job& job, const std::vecto
 }
 
 const infill::FillParameters& Sections::filling(const Area& area, const Layer& layer) const {
-  return plans_[area.part].at(std::int64_t{layer.plane()} - area.box.lo.z);
+  return plans_[area.part].at(height_in(area, layer));
 }
 
 ContoursView Sections::contours_of(const Area& area, Work& work) const {

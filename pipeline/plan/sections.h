@@ -61,6 +61,10 @@ class Sections {
   const std::vector<Area>& areas() const { return areas_; }
   /// Within the contours of an area, mm2. work  of contours()
   double area_mm2(const Area& area, const Work& work) const;
+  /// The height above its bottom that ranges see of an area in a layer: the middle of what the layer holds of it, nm.
+  static std::int64_t height_in(const Area& area, const Layer& layer) {
+    return std::int64_t{layer.plane_below(area.box.hi.z)} - area.box.lo.z;
+  }
   /// The filling of an area in a layer.
   const infill::FillParameters& filling(const Area& area, const Layer& layer) const;
 

@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "pipeline/plan/heights.h"
 #include "pipeline/plan/layer_cut.h"
 #include "stages/infill/skirt.h"
 #include "stages/segment/laid/crossing.h"
@@ -52,7 +53,7 @@ struct AreaCut {
 };
 AreaCut cut_of(const Plan& plan, std::uint32_t area_number, const Layer& layer) {
   const Sections::Area& area = plan.sections->areas()[area_number];
-  const SegmentRange& range = plan.segments->at(std::int64_t{layer.plane()} - area.box.lo.z);
+  const SegmentRange& range = plan.segments->at(Sections::height_in(area, layer));
   return {range, layer_cut(range, plan.sections->filling(area, layer), layer, area.box)};
 }
 
@@ -113,6 +114,8 @@ Status count_crossed(const Plan& plan, std::uint32_t index, const Sections::Work
 
 bool tells_ranges(const Plan& plan) {
   if (plan.segments->ranges.empty() || !plan.segments->any()) return false;
+  // A layer that goes on above a part is in that part's topmost range, whatever range others are in.
+  if (covers_top(plan.job) || plan.job.heights.containment == Containment::kOutside) return true;
   const auto& areas = plan.sections->areas();
   return std::ranges::any_of(areas, [&](const Sections::Area& area) { return area.box.lo.z != areas.front().box.lo.z; });
 }

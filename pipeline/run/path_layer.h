@@ -14,7 +14,8 @@
 
 namespace lamina::pipeline {
 
-/// Whether layers hold several segmented ranges of heights, because parts stand at different heights.
+/// Whether layers can hold several segmented ranges of heights: parts stand at different heights, or layers go on above the
+/// top of one.
 bool tells_ranges(const Plan& plan);
 
 /// Statistics of a layer's contours and stored paths, without area and the length of the paths.

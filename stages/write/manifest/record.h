@@ -44,7 +44,7 @@ struct PathFacts {
   std::uint64_t stored_points = 0;
   write::MoveTotals totals;
   LaidSums laid;
-  /// By segmented range of heights, in a job whose parts stand at different heights; else empty, and not summed.
+  /// By segmented range of heights, in a job whose layers can hold several; else empty, and not summed.
   std::vector<RangePores> by_range;
 
   /// Sums the fields. Summed in layer order, the result is deterministic.

@@ -186,6 +186,9 @@ TEST_F(Volume, ALayerThatCoversTheTopIsLaidAlsoIfItsMiddleLiesAboveThePart) {
     return sum;
   };
   EXPECT_NEAR(length(gcode.layers[5]), length(gcode.layers[4]), 1e-6);
+  // Ranges of heights end at the part's top, above which lies the middle of the layer.
+  const Made ranged = extrude(job + "0.2 --set fill.range=[{from_mm=1,to_mm=1.05,walls=2}]", folder / "cube.stl");
+  EXPECT_GT(length(test::read_gcode(ranged.text).layers[5]), 1.5 * length(gcode.layers[5]));
   // A pyramid 1.05 mm high is cut at 1.025 mm, in the middle of its last 0.05: 0.476 mm wide of 20.
   test::write_text(folder / "top.obj",
                    "v 0 0 0\nv 20 0 0\nv 20 20 0\nv 0 20 0\nv 10 10 1.05\nf 4 3 2 1\nf 1 2 5\nf 2 3 5\nf 3 4 5\nf 4 1 5\n");
