@@ -85,8 +85,8 @@ class Ring {
 
   void split(std::size_t from, std::size_t to) {
     scratch_.open.assign(1, {from, to});
-    std::size_t looked_at = 0;
-    const std::size_t enough = kLooksAPoint * (to - from) * static_cast<std::size_t>(std::bit_width(to - from));
+    std::uint64_t looked_at = 0;
+    const std::uint64_t enough = kLooksAPoint * (to - from) * static_cast<std::uint64_t>(std::bit_width(to - from));
     while (!scratch_.open.empty()) {
       const auto [first, last] = scratch_.open.back();
       scratch_.open.pop_back();
@@ -108,6 +108,7 @@ class Ring {
       scratch_.open.emplace_back(first, furthest);
       scratch_.open.emplace_back(furthest, last);
     }
+    scratch_.looks += looked_at;
   }
 
   /// Whether one stretch may stand for the two at `middle`.
