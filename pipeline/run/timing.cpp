@@ -57,19 +57,18 @@ nlohmann::ordered_json timing_json(const Timing& timing) {
     steps[std::string(name)] = {{"busy", busy}, {"processor", processor}};
   }
   const write::Floor& floor = timing.floor;
+  Json limit = {{"read_bytes", floor.bytes_read}, {"read_seconds", floor.read},   {"write_bytes", floor.bytes_written},
+                {"write_files", floor.files},     {"write_seconds", floor.write}, {"crossings", floor.crossings},
+                {"touch_seconds", floor.touch},   {"seconds", floor.seconds()}};
+  if (!timing.not_measured.empty()) {
+    limit = Json::object();
+    limit["not_measured"] = timing.not_measured;
+  }
   return {{"threads", timing.threads},
           {"phases", phases},
           {"steps", steps},
           {"lock_wait_seconds", timing.lock_seconds},
-          {"limit",
-           {{"read_bytes", floor.bytes_read},
-            {"read_seconds", floor.read},
-            {"write_bytes", floor.bytes_written},
-            {"write_files", floor.files},
-            {"write_seconds", floor.write},
-            {"crossings", floor.crossings},
-            {"touch_seconds", floor.touch},
-            {"seconds", floor.seconds()}}}};
+          {"limit", limit}};
 }
 
 }  // namespace lamina::pipeline

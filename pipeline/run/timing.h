@@ -23,7 +23,8 @@ struct Timing {
     double busy = 0, processor = 0;  // seconds, over all threads
   };
   std::uint32_t threads = 1;
-  std::vector<Phase> phases;    // one after the other; together the run
+  std::vector<Phase> phases;    // one after the other; together the run. Of "start", what the process did before, the
+                                // processor's time stands for both, in a batch with that of other jobs
   std::vector<StepTime> steps;  // of layers, at the same time
   double lock_seconds = 0;      // waited for other threads' turns, over all threads
   write::Floor floor;

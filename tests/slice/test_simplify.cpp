@@ -182,7 +182,9 @@ TEST(Simplify, ACombOfManyTeethTakesNoLongerThanItsPoints) {
     EXPECT_EQ(less.point.size(), static_cast<std::size_t>(2 * teeth + 1));
     Measured measured;
     compare(full, less, 10'000, measured);
-    if (teeth == 500) EXPECT_FALSE(any_meet(less));
+    if (teeth == 500) {
+      EXPECT_FALSE(any_meet(less));
+    }
   }
 }
 
