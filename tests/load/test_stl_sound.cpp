@@ -29,11 +29,9 @@ Buffer<Triangle> all_triangles(const Mesh& mesh) {
 bool expect_same_either_way(const std::string& path, const load::LoadOptions& options = {}) {
   SCOPED_TRACE(path);
   const Result<Part> list = load::load(path, options), blocks = load::load(path, as_blocks(options));
-  EXPECT_EQ(list.ok(), blocks.ok());
-  if (!list || !blocks) {
-    if (!list && !blocks) EXPECT_EQ(list.error().message, blocks.error().message);
-    return false;
-  }
+  const auto message = [](const Result<Part>& part) { return part ? std::string() : part.error().message; };
+  EXPECT_EQ(message(list), message(blocks));
+  if (!list || !blocks) return false;
   EXPECT_EQ(notes_of(*list), notes_of(*blocks));
   EXPECT_EQ(list->bounds.lo, blocks->bounds.lo);
   EXPECT_EQ(list->bounds.hi, blocks->bounds.hi);
