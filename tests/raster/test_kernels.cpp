@@ -9,6 +9,7 @@
 
 #include "stages/geometry/isa.h"
 #include "stages/raster/kernels/kernels.h"
+#include "tests/raster/shapes.h"
 
 namespace lamina::test {
 namespace {
@@ -78,23 +79,37 @@ Cluster random_cluster(Kind kind, const Bed& bed, const Point3& offset, std::mt1
   return cluster;
 }
 
+/// A mesh of random clusters; the frame of the mesh is that of the bed less an offset.
+raster::ClusteredMesh random_mesh(Kind kind, const Bed& bed, const Point3& offset, std::uint32_t count, std::mt19937& random) {
+  Triangles triangles;
+  for (std::uint32_t i = 0; i < count; ++i) {
+    const Cluster cluster = random_cluster(kind, bed, offset, random);
+    for (std::uint32_t lane = 0; lane < kClusterSize; ++lane) triangles.push_back(cluster.triangle(lane));
+  }
+  Mesh mesh = make_mesh(triangles);
+  return raster::make_clusters(mesh);
+}
+
 /// Clusters on a bed that they do not leave, as one part.
-struct Part {
+struct PlacedClusters {
+  Point3 offset;
+  std::mt19937 random;
   raster::ClusteredMesh mesh;
   std::vector<Cluster> clusters;
   std::vector<raster::PlacedMesh> placed;
 
-  Part(Kind kind, const Bed& bed, unsigned seed, std::uint32_t count) {
-    std::mt19937 random(seed);
-    const Point3 offset = seed % 2 == 0 ? Point3{0, 0, 0} : Point3{1'234'567, 7'654'321, 111'111};
-    for (std::uint32_t i = 0; i < count; ++i) clusters.push_back(random_cluster(kind, bed, offset, random));
-    mesh.clusters = clusters;
-    mesh.first_cap = count;
-    placed = {{&mesh, offset}};
+  PlacedClusters(Kind kind, const Bed& bed, unsigned seed, std::uint32_t count)
+      : offset(seed % 2 == 0 ? Point3{0, 0, 0} : Point3{1'234'567, 7'654'321, 111'111}),
+        random(seed),
+        mesh(random_mesh(kind, bed, offset, count, random)),
+        placed{{&mesh, offset}} {
+    Cluster room;
+    for (std::uint32_t i = 0; i < mesh.cluster_count(); ++i) clusters.push_back(mesh.cluster(i, room));
   }
+  PlacedClusters(const PlacedClusters&) = delete;
 };
 
-Segments cut(const Kernels& kernels, const raster::PixelSampling& sampling, const Part& part, Nm plane,
+Segments cut(const Kernels& kernels, const raster::PixelSampling& sampling, const PlacedClusters& part, Nm plane,
              std::array<std::uint32_t, 2> rows) {
   Segments segments;
   CutFacets facets;
@@ -110,7 +125,7 @@ Segments cut(const Kernels& kernels, const raster::PixelSampling& sampling, cons
 using Crossings = std::vector<std::tuple<std::uint32_t, std::uint32_t, bool>>;
 
 /// Facet by facet and row by row, in integers alone.
-Crossings exact_crossings(const raster::PixelSampling& sampling, const Part& part, Nm plane,
+Crossings exact_crossings(const raster::PixelSampling& sampling, const PlacedClusters& part, Nm plane,
                           std::array<std::uint32_t, 2> rows) {
   Crossings all;
   for (std::uint32_t facet = 0; facet < part.clusters.size() * kClusterSize; ++facet) {
@@ -133,8 +148,8 @@ Crossings exact_crossings(const raster::PixelSampling& sampling, const Part& par
   return all;
 }
 
-Crossings filled(const Kernels& kernels, const raster::PixelSampling& sampling, const Part& part, const Segments& segments,
-                 Nm plane, std::array<std::uint32_t, 2> rows) {
+Crossings filled(const Kernels& kernels, const raster::PixelSampling& sampling, const PlacedClusters& part,
+                 const Segments& segments, Nm plane, std::array<std::uint32_t, 2> rows) {
   const std::uint32_t count = rows[1] - rows[0];
   std::vector<std::uint32_t> place(count + raster::FillTask::kMorePlaces), in_row(count);
   for (std::size_t i = 0; i < segments.size; ++i) {
@@ -168,7 +183,7 @@ TEST(Kernels, CutAndFillAsIntegersDoAndWithTheSameBitsInEveryBody) {
     const std::uint32_t rows = bed.grid.rows();
     std::size_t crossings = 0;
     for (unsigned seed = 0; seed < 4; ++seed) {
-      const Part part(kind, bed, seed, seed < 2 ? 1 : 12);
+      const PlacedClusters part(kind, bed, seed, seed < 2 ? 1 : 12);
       for (const std::array<std::uint32_t, 2> band : {std::array{0u, rows}, std::array{rows / 3, rows / 3 + rows / 5}}) {
         const Crossings expected = exact_crossings(sampling, part, bed.plane, band);
         const Segments plain = cut(raster::kernels_for(Isa::kPlain), sampling, part, bed.plane, band);

@@ -79,9 +79,11 @@ TEST(CrossingSums, OfPartsOfAMeshBoundTheWholeInAnyOrder) {
   const raster::ClusteredMesh clusters = raster::make_clusters(mesh);
   std::vector<CrossingSums> parts(7);
   CrossingSums whole, all;
-  for (std::size_t c = 0; c < clusters.clusters.size(); ++c) {
-    whole.add(clusters.clusters[c], clusters.bounds[c]);
-    parts[c * c % 7].add(clusters.clusters[c], clusters.bounds[c]);
+  raster::Cluster room;
+  for (std::uint32_t c = 0; c < clusters.cluster_count(); ++c) {
+    const raster::Cluster& cluster = clusters.cluster(c, room);
+    whole.add(cluster, clusters.bounds[c]);
+    parts[std::size_t{c} * c % 7].add(cluster, clusters.bounds[c]);
   }
   for (const CrossingSums& part : parts) all.merge(part);
   const CrossingSums::Table merged = all.table(), direct = whole.table();
@@ -151,7 +153,7 @@ void expect_true_within_two(Mesh mesh, std::int64_t dpi, const std::string& name
       const std::uint64_t bound = rasterizer->layer_bytes_bound(plane);
       EXPECT_GE(bound, report.scratch_bytes + bytes_held(runs.change) + bytes_held(runs.row_offset)) << name << " at " << plane;
       claimed += bound;
-      taken += scratch.visits.size() * sizeof(raster::ClusterVisit) + report.segments * sizeof(raster::Segment) +
+      taken += scratch.visits.size() * sizeof(raster::ClusterVisit) + report.segments * raster::Segments::kBytes +
                4 * (report.crossings + runs.change.size() + 2 * runs.row_offset.size());
     }
     EXPECT_LE(claimed, 2 * taken) << name;
