@@ -5,6 +5,7 @@
 #include <tbb/parallel_sort.h>
 
 #include <algorithm>
+#include <atomic>
 #include <numeric>
 #include <tuple>
 
@@ -74,17 +75,26 @@ Buffer<std::uint8_t> repeats(std::span<const Indexed::Facet> facets) {
 
 DisjointSets::DisjointSets(std::size_t count) : parent_(count) { std::iota(parent_.begin(), parent_.end(), 0u); }
 
+// A member that is no representative never becomes one again, and all that is written over its parent is another ancestor.
 std::uint32_t DisjointSets::find(std::uint32_t member) {
-  while (parent_[member] != member) {
-    parent_[member] = parent_[parent_[member]];
-    member = parent_[member];
+  const auto parent_of = [&](std::uint32_t of) {
+    return std::atomic_ref<std::uint32_t>(parent_[of]).load(std::memory_order_relaxed);
+  };
+  for (std::uint32_t parent = parent_of(member); parent != member;) {
+    const std::uint32_t above = parent_of(parent);
+    if (above == parent) return parent;
+    std::atomic_ref<std::uint32_t>(parent_[member]).store(above, std::memory_order_relaxed);
+    member = above, parent = parent_of(member);
   }
   return member;
 }
 
 void DisjointSets::join(std::uint32_t one, std::uint32_t other) {
-  one = find(one), other = find(other);
-  parent_[std::max(one, other)] = std::min(one, other);
+  while ((one = find(one)) != (other = find(other))) {
+    std::uint32_t larger = std::max(one, other);
+    const std::atomic_ref<std::uint32_t> parent(parent_[larger]);
+    if (parent.compare_exchange_strong(larger, std::min(one, other), std::memory_order_relaxed)) return;
+  }
 }
 
 }  // namespace lamina::load

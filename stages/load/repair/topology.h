@@ -57,12 +57,16 @@ inline std::int64_t surplus(const Side* begin, const Side* end) {
 /// cost  O(T log T), parallel; 16 bytes a triangle
 Buffer<std::uint8_t> repeats(std::span<const Indexed::Facet> facets);
 
-/// Facets in sets that are joined one by one.
+/// Facets in sets that are joined one by one, by several threads at a time if need be: each set's representative is its
+/// smallest member, whoever joined first.
+/// source  R. J. Anderson, H. Woll, "Wait-free parallel algorithms for the union-find problem", STOC 1991
 class DisjointSets {
  public:
   explicit DisjointSets(std::size_t count);
   std::uint32_t find(std::uint32_t member);
-  void join(std::uint32_t one, std::uint32_t other);  // the smaller representative stays
+  void join(std::uint32_t one, std::uint32_t other);
+  /// Ancestors of members, none larger than its member: representatives are their own. For when all are joined.
+  std::span<std::uint32_t> parents() { return parent_; }
 
  private:
   Buffer<std::uint32_t> parent_;

@@ -1,0 +1,141 @@
+// tests/load/test_diagnose.cpp: diagnose() against one that looks everything up in ordered maps.
+#include <gtest/gtest.h>
+
+#include <map>
+#include <random>
+#include <set>
+#include <tuple>
+
+#include "stages/load/repair/diagnose.h"
+
+namespace lamina {
+namespace {
+
+using Walk = std::pair<std::uint32_t, bool>;  // a facet, and whether it goes from the lower point to the higher
+using Places = std::vector<std::pair<std::uint32_t, Point3>>;
+
+struct SlowKind {
+  std::vector<std::tuple<std::uint32_t, Point3, Point3>> all;
+  Places first(std::size_t most) {
+    std::sort(all.begin(), all.end());
+    Places places;
+    for (const auto& [triangle, p, q] : all)
+      if (places.size() < most) places.push_back({triangle, {(p.x + q.x) / 2, (p.y + q.y) / 2, (p.z + q.z) / 2}});
+    return places;
+  }
+};
+
+struct SlowDiagnosis {
+  SlowKind open, non_manifold, misoriented, duplicate;
+  std::size_t vertices = 0, edges = 0, shells = 0;
+  bool balanced = true;
+};
+
+bool uses_a_point_twice(const Triangle& t) { return t.a == t.b || t.b == t.c || t.c == t.a; }
+
+/// The corners from the least on; of those that use a point twice, in order.
+std::array<Point3, 3> turned(const Triangle& t) {
+  std::array<Point3, 3> corners{t.a, t.b, t.c};
+  if (uses_a_point_twice(t))
+    std::sort(corners.begin(), corners.end());
+  else
+    std::rotate(corners.begin(), std::min_element(corners.begin(), corners.end()), corners.end());
+  return corners;
+}
+
+SlowDiagnosis slow(const std::vector<Triangle>& triangles) {
+  SlowDiagnosis result;
+  std::set<Point3> points;
+  std::set<std::array<Point3, 3>> seen;
+  std::map<std::pair<Point3, Point3>, std::vector<Walk>> edges;
+  std::vector<std::uint32_t> shell(triangles.size());
+  for (std::uint32_t i = 0; i < triangles.size(); ++i) {
+    const Triangle& t = triangles[i];
+    shell[i] = i;
+    points.insert({t.a, t.b, t.c});
+    if (!seen.insert(turned(t)).second) result.duplicate.all.push_back({i, t.a, t.a});
+    if (uses_a_point_twice(t)) continue;
+    for (const auto& [p, q] : {std::pair{t.a, t.b}, {t.b, t.c}, {t.c, t.a}}) edges[std::minmax(p, q)].push_back({i, p < q});
+  }
+  result.vertices = points.size(), result.edges = edges.size();
+  for (const auto& [edge, walks] : edges) {
+    int surplus = 0;
+    for (const Walk& walk : walks) surplus += walk.second ? 1 : -1;
+    result.balanced = result.balanced && surplus == 0;
+    const std::tuple place{walks[0].first, edge.first, edge.second};
+    if (walks.size() == 1) result.open.all.push_back(place);
+    if (walks.size() > 2) result.non_manifold.all.push_back(place);
+    if (walks.size() == 2 && surplus != 0) result.misoriented.all.push_back(place);
+    for (const Walk& walk : walks) {
+      const std::uint32_t from = shell[walk.first], to = shell[walks[0].first];
+      for (std::uint32_t& number : shell) number = number == from ? to : number;
+    }
+  }
+  std::set<std::uint32_t> shells;
+  for (std::uint32_t i = 0; i < triangles.size(); ++i)
+    if (!uses_a_point_twice(triangles[i])) shells.insert(shell[i]);
+  result.shells = shells.size();
+  return result;
+}
+
+Places places_of(const load::Diagnosis::Finding& finding) {
+  Places places;
+  for (const auto& place : finding.first) places.push_back({place.triangle, place.at});
+  return places;
+}
+
+/// Facets between points of a small lattice, so that everything that may be wrong with a mesh is.
+TEST(Diagnose, FindsInFacetsAtRandomWhatOrderedMapsFind) {
+  std::mt19937 random(5);
+  for (int round = 0; round < 60; ++round) {
+    const auto side = static_cast<unsigned>(2 + random() % 4), count = static_cast<unsigned>(1 + random() % 200);
+    const auto coordinate = [&] { return static_cast<Nm>(1000 * (random() % side)) - 1000; };
+    const auto point = [&] { return Point3{coordinate(), coordinate(), coordinate()}; };
+    std::vector<Triangle> triangles;
+    for (unsigned i = 0; i < count; ++i) {
+      const Triangle t{point(), point(), point()};
+      triangles.push_back(t);
+      if (random() % 3 == 0) triangles.push_back({t.b, t.c, t.a});
+      if (random() % 3 == 0) triangles.push_back({t.c, t.b, t.a});
+    }
+    Mesh mesh;
+    mesh.triangles.assign(triangles.begin(), triangles.end());
+    SlowDiagnosis expected = slow(triangles);
+    const load::Diagnosis found = load::diagnose(mesh, 4);
+    EXPECT_EQ(found.vertices, expected.vertices);
+    EXPECT_EQ(found.edges, expected.edges);
+    EXPECT_EQ(found.shells, expected.shells);
+    EXPECT_EQ(found.balanced, expected.balanced);
+    for (auto [finding, kind] : {std::pair{&found.open_edges, &expected.open},
+                                 {&found.non_manifold_edges, &expected.non_manifold},
+                                 {&found.misoriented_edges, &expected.misoriented},
+                                 {&found.duplicate_facets, &expected.duplicate}}) {
+      EXPECT_EQ(finding->count, kind->all.size()) << round;
+      EXPECT_EQ(places_of(*finding), kind->first(4)) << round;
+    }
+  }
+}
+
+/// A strip of steps that is longer than what one task looks at, and a fan whose middle is in all of its facets.
+TEST(Diagnose, StripsAndFansOfManyFacetsAreOneShell) {
+  Mesh strip, fan;
+  constexpr Nm kFacets = 60'000;
+  for (Nm i = 0; i < kFacets; ++i) {
+    const Point3 p{i, i % 2, 0}, q{i + 1, (i + 1) % 2, 0}, r{i + 2, i % 2, 0};
+    strip.triangles.push_back(i % 2 == 0 ? Triangle{p, q, r} : Triangle{q, p, r});
+    fan.triangles.push_back({{0, 0, 1000}, {i, 1, 0}, {i + 1, 1, 0}});
+  }
+  load::Diagnosis found = load::diagnose(strip);
+  EXPECT_EQ(found.shells, 1u);
+  EXPECT_EQ(found.vertices, kFacets + 2u);
+  EXPECT_EQ(found.edges, 2u * kFacets + 1);
+  EXPECT_EQ(found.open_edges.count, kFacets + 2u);
+  EXPECT_EQ(found.misoriented_edges.count, 0u);
+  found = load::diagnose(fan);
+  EXPECT_EQ(found.shells, 1u);
+  EXPECT_EQ(found.open_edges.count, kFacets + 2u);
+  EXPECT_EQ(found.misoriented_edges.count + found.non_manifold_edges.count, 0u);
+}
+
+}  // namespace
+}  // namespace lamina
