@@ -225,8 +225,8 @@ Result<Summary> run(Resolved resolved, const ProgressCallback& progress, const s
     return status.error();
   }
   maker->tell(summary);
-  if (summary.timing) tell_floor(*plan, *maker, summary, *summary.timing);
   summary.peak_resident_bytes = peak_resident_bytes();
+  if (summary.timing) tell_floor(*plan, *maker, summary, *summary.timing);
   return summary;
 }
 
