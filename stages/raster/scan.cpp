@@ -58,6 +58,8 @@ void ScanConverter::close_open_parts(const Kernels& kernels, const PixelSampling
     if (!placed[instance_of(i)].mesh->closed) of_open_parts_.push_back(i);
   }
   std::ranges::sort(of_open_parts_, {}, instance_of);
+  of_part_.size = 0;
+  of_part_.make_room(of_open_parts_.size());
   Buffer<Closing> closings;  // closing_ stays empty while the crossings of single parts are placed
   for (auto i = of_open_parts_.begin(); i != of_open_parts_.end();) {
     const std::uint32_t instance = instance_of(*i);

@@ -27,11 +27,14 @@ PixelSampling::PixelSampling(const PixelGrid& grid)
 
 void Segments::make_room(std::size_t more) {
   if (column.size() - size >= more) return;
-  const std::size_t room = std::max({std::size_t{1024}, column.size() + column.size() / 8, size + more});
-  column.resize(room);
-  columns_per_nm.resize(room);
-  rows.resize(room);
-  origin.resize(room);
+  const std::size_t room = size + more + (size + more) / 8;
+  const auto lengthen = [&](auto& array) {
+    if (size == 0) array.clear();  // nothing is worth moving
+    array.reserve(room);           // resize() alone would double, beyond what layers are said to need
+    array.resize(room);
+  };
+  lengthen(origin), lengthen(rows), lengthen(columns_per_nm);
+  lengthen(column);  // last: its length stands for all
 }
 
 void Segments::append(const Segments& other, std::size_t i) {

@@ -56,7 +56,8 @@ struct Segments {
 
   static constexpr std::size_t kBytes = 2 * sizeof(double) + sizeof(SegmentRows) + sizeof(SegmentOrigin);  // a segment
 
-  /// Makes all arrays so long that `more` segments can be written behind those that are there.
+  /// Makes all arrays so long that `more` segments can be written behind those that are there, and an eighth more where they
+  /// have to grow.
   void make_room(std::size_t more);
   /// Appends one of another list's.
   void append(const Segments& other, std::size_t i);

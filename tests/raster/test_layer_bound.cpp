@@ -145,13 +145,18 @@ void expect_true_within_two(Mesh mesh, std::int64_t dpi, const std::string& name
   auto rasterizer = raster::Rasterizer::build({&mesh, 1}, {&instance, 1}, grid, FillRule::kNonzero, true, true);
   ASSERT_TRUE(rasterizer.ok());
   for (const raster::Engine engine : {raster::Engine::kRays, raster::Engine::kContours}) {
-    std::uint64_t claimed = 0, taken = 0;
+    std::uint64_t claimed = 0, taken = 0, most = 0;
+    raster::LayerScratch kept;  // from layer to layer, as a thread does
+    Runs kept_runs;
     for (Nm plane = 25'000; plane < top; plane += top / 40) {
       raster::LayerScratch scratch;
       Runs runs;
       const raster::LayerReport report = rasterizer->layer(engine, plane, scratch, runs);
       const std::uint64_t bound = rasterizer->layer_bytes_bound(plane);
       EXPECT_GE(bound, report.scratch_bytes + bytes_held(runs.change) + bytes_held(runs.row_offset)) << name << " at " << plane;
+      most = std::max(most, bound);
+      const std::uint64_t holds = rasterizer->layer(engine, plane, kept, kept_runs).scratch_bytes;
+      EXPECT_GE(most, holds + bytes_held(kept_runs.change) + bytes_held(kept_runs.row_offset)) << name << " up to " << plane;
       claimed += bound;
       taken += scratch.visits.size() * sizeof(raster::ClusterVisit) + report.segments * raster::Segments::kBytes +
                4 * (report.crossings + runs.change.size() + 2 * runs.row_offset.size());
