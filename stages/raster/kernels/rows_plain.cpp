@@ -86,21 +86,24 @@ bool is_nearly_sorted(const std::uint32_t* row, std::size_t count) {
   return wrong <= static_cast<std::int32_t>(count / 8);
 }
 
-void insert_all(std::uint32_t* row, std::size_t count) {
-  for (std::uint32_t* i = row + 1; i < row + count; ++i) {
+/// Sorts by insertion, and gives up where crossings are far from their places all the same, as in a row of two parts one
+/// inside the other: each of them is in order, and half of all crossings would pass the other half.
+bool insert_all(std::uint32_t* row, std::size_t count) {
+  constexpr std::ptrdiff_t kMoves = 16;  // a crossing, as many as merging costs
+  std::ptrdiff_t moves = static_cast<std::ptrdiff_t>(count) * kMoves;
+  for (std::uint32_t* i = row + 1; i < row + count && moves >= 0; ++i) {
     const std::uint32_t value = *i;
     std::uint32_t* hole = i;
     for (; hole != row && hole[-1] > value; --hole) *hole = hole[-1];
     *hole = value;
+    moves -= i - hole;
   }
+  return moves >= 0;
 }
 
 /// Sorts blocks and merges them, from one of two buffers into the other. returns  where the row is then
 std::uint32_t* sort_long(std::uint32_t* row, std::size_t count, std::uint32_t* other) {
-  if (is_nearly_sorted(row, count)) {
-    insert_all(row, count);
-    return row;
-  }
+  if (is_nearly_sorted(row, count) && insert_all(row, count)) return row;
   const std::size_t padded = (count + kBlockSize - 1) / kBlockSize * kBlockSize;
   std::fill(row + count, row + padded, kBeyondAll);
   for (std::size_t i = 0; i < padded; i += kBlockSize) sort_block<kBlockSize>(row + i);
