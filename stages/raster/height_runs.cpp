@@ -23,7 +23,9 @@ std::uint16_t step_of(std::int64_t distance, std::uint32_t shift) { return stati
 }  // namespace
 
 HeightRuns::HeightRuns(std::span<const Box> bounds)
-    : runs_(ceil_div(bounds.size(), std::size_t{kRun})), groups_(ceil_div(bounds.size(), std::size_t{kLanes})) {
+    : bounds_(bounds),
+      runs_(ceil_div(bounds.size(), std::size_t{kRun})),
+      groups_(ceil_div(bounds.size(), std::size_t{kLanes})) {
   constexpr std::uint32_t kAtOnce = 16;
   tbb::parallel_for(tbb::blocked_range<std::uint32_t>(0, count(), kAtOnce),
                     [&](const tbb::blocked_range<std::uint32_t>& range) {
@@ -91,7 +93,11 @@ void HeightRuns::find_clusters(std::uint32_t run, std::int64_t plane, std::int64
   const auto last = static_cast<std::uint32_t>(std::min<std::size_t>(first + kRun / kLanes, groups_.size()));
   for (std::uint32_t group = first; group < last; ++group) {
     for (std::uint32_t lanes = lanes_met(groups_[group], z, y_low, y_high); lanes != 0; lanes &= lanes - 1) {
-      out.push_back({group * kLanes + static_cast<std::uint32_t>(std::countr_zero(lanes)), instance});
+      const auto lane = static_cast<std::uint32_t>(std::countr_zero(lanes));
+      const std::uint32_t cluster = group * kLanes + lane;
+      const bool ends_here = groups_[group].z_begin[lane] == z || groups_[group].z_last[lane] == z;
+      if (ends_here && (bounds_[cluster].lo.z > plane || bounds_[cluster].hi.z <= plane)) continue;
+      out.push_back({cluster, instance});
     }
   }
 }

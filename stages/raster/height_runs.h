@@ -3,7 +3,8 @@
 // Clusters that follow each other are neighbours in the file and ordered by height (clusters.h). So a run of them is one box
 // that a tree holds cheaply, and a plane meets few of its clusters, which a search of the run's table finds: heights and
 // depths in steps of 1/65536 of the run, rounded down on both sides of every comparison, so that none is missed. A cluster
-// that is found without need is only looked at in vain.
+// that begins or ends in the plane's own step is asked for its box, so that no more are found than a layer's bound counts; one
+// that is found without need beside the rows is only looked at in vain.
 #pragma once
 
 #include <cstdint>
@@ -18,7 +19,7 @@ class HeightRuns {
  public:
   static constexpr std::uint32_t kRun = 256;  // clusters: a block of 4096 triangles, as ordered by make_clusters()
 
-  /// bounds  of each cluster, nm
+  /// bounds  of each cluster, nm; must outlive the runs
   /// cost    O(clusters), parallel; 8 bytes a cluster
   explicit HeightRuns(std::span<const Box> bounds);
 
@@ -42,6 +43,7 @@ class HeightRuns {
   static std::uint32_t lanes_met(const Group& group, std::uint16_t z, std::uint16_t y_low, std::uint16_t y_high);
   void build_run(std::span<const Box> bounds, std::uint32_t run);
 
+  std::span<const Box> bounds_;
   Buffer<Box> runs_;
   Buffer<Group> groups_;  // kRun / kLanes a run, fewer in the last
 };

@@ -62,6 +62,7 @@ TEST(HeightRuns, FindEveryClusterWhoseBoxThePlaneMeetsBetweenTwoRowsOnce) {
           const bool met = sought.met_by(boxes[c], {0, 0, 0});
           const auto times = count.contains({5, c}) ? count.at({5, c}) : 0;
           ASSERT_TRUE(times == 1 || (times == 0 && !met)) << "cluster " << c << " of " << clusters << " within " << reach;
+          EXPECT_TRUE(times == 0 || (boxes[c].lo.z <= sought.plane && boxes[c].hi.z > sought.plane));
           found += met ? 1 : 0;
           in_vain += times > 0 && !met ? 1 : 0;
           const bool exact = reach <= 30'000;  // steps of 1 nm
