@@ -36,9 +36,28 @@ if(LAMINA_UNITE STREQUAL "all")
 endif()
 target_include_directories(lamina_stages PUBLIC $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}>
                                                 $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}/lamina>)
-target_link_libraries(lamina_stages PUBLIC TBB::tbb Eigen3::Eigen fmt::fmt embree
-                      PRIVATE TIFF::TIFF PNG::PNG ZLIB::ZLIB EXPAT::EXPAT PkgConfig::LIBZIP
-                              PkgConfig::POLYCLIPPING PkgConfig::MUPARSER PkgConfig::XXHASH nlohmann_json::nlohmann_json)
+target_link_libraries(lamina_stages PUBLIC TBB::tbb Eigen3::Eigen fmt::fmt
+                      PRIVATE PNG::PNG ZLIB::ZLIB EXPAT::EXPAT PkgConfig::POLYCLIPPING PkgConfig::MUPARSER
+                              PkgConfig::XXHASH nlohmann_json::nlohmann_json ${CMAKE_DL_LIBS})
+
+# Embree, libtiff and libzip are loaded when a job first needs them (stages/data/handles/late.h), by the names that linking
+# would have written down.
+set(lamina_late_files)
+foreach(name embree tiff zip)
+  string(REPLACE "embree" "embree3" library ${name})
+  find_library(lamina_${name}_file ${library} REQUIRED)
+  mark_as_advanced(lamina_${name}_file)
+  execute_process(COMMAND ${CMAKE_OBJDUMP} -p ${lamina_${name}_file} OUTPUT_VARIABLE sections COMMAND_ERROR_IS_FATAL ANY)
+  if(NOT sections MATCHES "SONAME +([^ \n]+)")
+    message(FATAL_ERROR "${lamina_${name}_file} is no shared library; lamina loads it when a job first needs it")
+  endif()
+  string(TOUPPER ${name} upper)
+  set_source_files_properties(${PROJECT_SOURCE_DIR}/stages/data/handles/${name}.cpp PROPERTIES
+                              COMPILE_DEFINITIONS LAMINA_${upper}_FILE="${CMAKE_MATCH_1}" SKIP_PRECOMPILE_HEADERS ON)
+  list(APPEND lamina_late_files ${lamina_${name}_file})
+endforeach()
+set(lamina_late_headers $<TARGET_PROPERTY:embree,INTERFACE_INCLUDE_DIRECTORIES> ${TIFF_INCLUDE_DIRS} ${LIBZIP_INCLUDE_DIRS})
+target_include_directories(lamina_stages SYSTEM PRIVATE ${lamina_late_headers})
 set_source_files_properties(${PROJECT_SOURCE_DIR}/stages/data/text/version.cpp PROPERTIES
                             COMPILE_DEFINITIONS LAMINA_VERSION="${PROJECT_VERSION}" SKIP_PRECOMPILE_HEADERS ON)
 

@@ -1,6 +1,5 @@
 #include "stages/raster/beams.h"
 
-#include <embree3/rtcore.h>
 #include <fmt/core.h>
 
 #include <atomic>
@@ -8,6 +7,7 @@
 #include <limits>
 #include <vector>
 
+#include "stages/data/handles/embree.h"
 #include "stages/raster/height_runs.h"
 
 namespace lamina::raster {
@@ -163,6 +163,8 @@ BeamIndex& BeamIndex::operator=(BeamIndex&&) noexcept = default;
 BeamIndex::~BeamIndex() = default;
 
 Result<BeamIndex> BeamIndex::build(std::span<const PlacedMesh> placed, const PixelGrid& grid, std::uint32_t band_rows) {
+  if (const Status loaded = load_embree(); !loaded)
+    return Error{loaded.error().fault, loaded.error().message + ", or use --engine contours"};
   BeamIndex index;
   index.state_ = std::make_unique<State>();
   State& state = *index.state_;

@@ -1,5 +1,4 @@
 #include <fmt/format.h>
-#include <tiffio.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -54,7 +53,10 @@ Result<Image> tiff(int file, std::uint64_t bytes, const std::string& path) {
   };
   const auto options = strict_tiff_options(message);
   const int own_file = ::dup(file);
-  if (options == nullptr || own_file < 0) return failure("out of memory or files");
+  if (options == nullptr || own_file < 0) {
+    if (own_file >= 0) ::close(own_file);
+    return failure(message.empty() ? "out of memory or files" : message);
+  }
   TIFFOpenOptionsSetMaxSingleMemAlloc(options.get(), 64 << 20);
   const TiffHandle handle(TIFFFdOpenExt(own_file, path.c_str(), "rC", options.get()));
   if (handle == nullptr) {

@@ -1,6 +1,5 @@
 #include "stages/view/cast.h"
 
-#include <embree3/rtcore.h>
 #include <fmt/core.h>
 #include <tbb/parallel_for.h>
 
@@ -8,6 +7,8 @@
 #include <array>
 #include <cmath>
 #include <limits>
+
+#include "stages/data/handles/embree.h"
 
 namespace lamina::view {
 namespace {
@@ -116,6 +117,7 @@ Caster::Caster(Caster&&) noexcept = default;
 Caster::~Caster() = default;
 
 Result<Caster> Caster::build(std::span<const Mesh> meshes, std::span<const Instance> instances) {
+  if (const Status loaded = load_embree(); !loaded) return loaded.error();
   Caster caster;
   State& state = *caster.state_;
   state.device = rtcNewDevice(nullptr);

@@ -82,12 +82,12 @@ Mesh random_facets(Kind kind, const Bed& bed, const Point3& offset, unsigned see
 }
 
 /// Clusters on a bed that they do not leave, as one part.
-struct Part {
+struct PlacedClusters {
   Point3 offset;
   raster::ClusteredMesh mesh;
   std::vector<raster::PlacedMesh> placed;
 
-  Part(Kind kind, const Bed& bed, unsigned seed, std::uint32_t clusters)
+  PlacedClusters(Kind kind, const Bed& bed, unsigned seed, std::uint32_t clusters)
       : offset(seed % 2 == 0 ? Point3{0, 0, 0} : Point3{1'234'567, 7'654'321, 111'111}),
         mesh(clusters_of(random_facets(kind, bed, offset, seed, clusters * kClusterSize))),
         placed{{&mesh, offset}} {}
@@ -95,7 +95,7 @@ struct Part {
   static raster::ClusteredMesh clusters_of(Mesh facets) { return raster::make_clusters(facets); }
 };
 
-Segments cut(const Kernels& kernels, const raster::PixelSampling& sampling, const Part& part, Nm plane,
+Segments cut(const Kernels& kernels, const raster::PixelSampling& sampling, const PlacedClusters& part, Nm plane,
              std::array<std::uint32_t, 2> rows) {
   Segments segments;
   CutFacets facets;
@@ -112,7 +112,7 @@ Segments cut(const Kernels& kernels, const raster::PixelSampling& sampling, cons
 using Crossings = std::vector<std::tuple<std::uint32_t, std::uint32_t, bool>>;
 
 /// Facet by facet and row by row, in integers alone.
-Crossings exact_crossings(const raster::PixelSampling& sampling, const Part& part, Nm plane,
+Crossings exact_crossings(const raster::PixelSampling& sampling, const PlacedClusters& part, Nm plane,
                           std::array<std::uint32_t, 2> rows) {
   Crossings all;
   for (std::uint32_t facet = 0; facet < part.mesh.cluster_count() * kClusterSize; ++facet) {
@@ -135,7 +135,7 @@ Crossings exact_crossings(const raster::PixelSampling& sampling, const Part& par
   return all;
 }
 
-Crossings filled(const Kernels& kernels, const raster::PixelSampling& sampling, const Part& part, const Segments& segments,
+Crossings filled(const Kernels& kernels, const raster::PixelSampling& sampling, const PlacedClusters& part, const Segments& segments,
                  Nm plane, std::array<std::uint32_t, 2> rows) {
   const std::uint32_t count = rows[1] - rows[0];
   std::vector<std::uint32_t> place(count + raster::FillTask::kMorePlaces), in_row(count);
@@ -170,7 +170,7 @@ TEST(Kernels, CutAndFillAsIntegersDoAndWithTheSameBitsInEveryBody) {
     const std::uint32_t rows = bed.grid.rows();
     std::size_t crossings = 0;
     for (unsigned seed = 0; seed < 4; ++seed) {
-      const Part part(kind, bed, seed, seed < 2 ? 1 : 12);
+      const PlacedClusters part(kind, bed, seed, seed < 2 ? 1 : 12);
       for (const std::array<std::uint32_t, 2> band : {std::array{0u, rows}, std::array{rows / 3, rows / 3 + rows / 5}}) {
         const Crossings expected = exact_crossings(sampling, part, bed.plane, band);
         const Segments plain = cut(raster::kernels_for(Isa::kPlain), sampling, part, bed.plane, band);

@@ -5,6 +5,9 @@
 #include <cstring>
 
 namespace lamina {
+
+LAMINA_TIFF(LAMINA_LATE_DEFINED)
+
 namespace {
 
 int keep_first_message(TIFF*, void* user, const char*, const char* format, va_list arguments) {
@@ -24,6 +27,12 @@ int keep_warning_of_damage(TIFF* tiff, void* user, const char* module, const cha
 }  // namespace
 
 TiffOptions strict_tiff_options(std::string& message) {
+  static const Status loaded =
+      load_library(LAMINA_TIFF_FILE, std::initializer_list<LateFunction>{LAMINA_TIFF(LAMINA_LATE_NAMED)});
+  if (!loaded) {
+    message = loaded.error().message;
+    return nullptr;
+  }
   TiffOptions options(TIFFOpenOptionsAlloc());
   if (options == nullptr) return nullptr;
   TIFFOpenOptionsSetErrorHandlerExtR(options.get(), keep_first_message, &message);

@@ -1,13 +1,13 @@
 #include "stages/load/threemf/archive.h"
 
 #include <fmt/core.h>
-#include <zip.h>
 
 #include <algorithm>
 #include <utility>
 #include <vector>
 
 #include "stages/data/buffer.h"
+#include "stages/data/handles/zip.h"
 #include "stages/load/text.h"
 
 namespace lamina::load {
@@ -106,6 +106,7 @@ std::string part_name(std::string_view name, std::string_view folder) {
 void Archive::Discard::operator()(zip* archive) const { zip_discard(archive); }
 
 Result<Archive> Archive::open(const Source& source, const LoadOptions& options) {
+  if (const Status loaded = load_zip(); !loaded) return source.error(loaded.error().message);
   Archive archive(source, options);
   archive.place_ = std::make_unique<std::uint64_t>(0);
   zip_error_t why;

@@ -1,5 +1,4 @@
 #include <fmt/format.h>
-#include <tiffio.h>
 
 #include <algorithm>
 #include <cstddef>
