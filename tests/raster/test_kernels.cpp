@@ -135,8 +135,8 @@ Crossings exact_crossings(const raster::PixelSampling& sampling, const PlacedClu
   return all;
 }
 
-Crossings filled(const Kernels& kernels, const raster::PixelSampling& sampling, const PlacedClusters& part, const Segments& segments,
-                 Nm plane, std::array<std::uint32_t, 2> rows) {
+Crossings filled(const Kernels& kernels, const raster::PixelSampling& sampling, const PlacedClusters& part,
+                 const Segments& segments, Nm plane, std::array<std::uint32_t, 2> rows) {
   const std::uint32_t count = rows[1] - rows[0];
   std::vector<std::uint32_t> place(count + raster::FillTask::kMorePlaces), in_row(count);
   for (std::size_t i = 0; i < segments.size; ++i) {
