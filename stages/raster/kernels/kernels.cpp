@@ -26,7 +26,7 @@ std::uint32_t* changes_by(const std::uint32_t* crossing, const std::uint32_t* en
 
 }  // namespace
 
-const Kernels& kernels_for(Isa isa) {
+const Kernels& kernels_for([[maybe_unused]] Isa isa) {
   static constexpr Kernels kPlain{Isa::kPlain, plain::gather, plain::cut, plain::fill, plain::rows};
 #if defined(LAMINA_WIDE_KERNELS)
   static constexpr Kernels kAvx2{Isa::kAvx2, avx2::gather, avx2::cut, avx2::fill, avx2::rows};
