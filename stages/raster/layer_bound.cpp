@@ -165,6 +165,29 @@ const CrossingSums::Slab* CrossingSums::Table::at(std::int64_t plane) const {
   return number < 0 || number >= static_cast<std::int64_t>(slab.size()) ? nullptr : &slab[static_cast<std::size_t>(number)];
 }
 
+void CrossingSums::Table::fit(std::size_t most) {
+  const auto holds = [](const Slab& one) { return one.depth > 0 || one.segments != 0 || one.clusters != 0; };
+  while (!slab.empty() && !holds(slab.back())) slab.pop_back();
+  const auto lowest = std::find_if(slab.begin(), slab.end(), holds);
+  first += lowest - slab.begin();
+  slab.erase(slab.begin(), lowest);
+  for (; slab.size() > most; ++shift) {
+    const std::int64_t begin = first >> 1, last = (first + static_cast<std::int64_t>(slab.size()) - 1) >> 1;
+    for (std::size_t i = 0; i < slab.size(); ++i) {
+      const std::int64_t number = first + static_cast<std::int64_t>(i);
+      Slab& to = slab[static_cast<std::size_t>((number >> 1) - begin)];  // never behind slab i
+      const Slab from = slab[i];
+      const bool is_first = i == 0 || number % 2 == 0;
+      to = is_first ? from
+                    : Slab{std::max(to.depth, from.depth), std::max(to.segments, from.segments),
+                           std::max(to.clusters, from.clusters)};
+    }
+    slab.resize(static_cast<std::size_t>(last - begin + 1));
+    first = begin;
+  }
+  slab.shrink_to_fit();
+}
+
 CrossingSums sum_crossings(const ClusteredMesh& mesh) {
   tbb::enumerable_thread_specific<CrossingSums> sums;
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, mesh.cluster_count(), 1024),
@@ -214,6 +237,12 @@ std::uint64_t LayerBound::most_crossings() const {
     for (const CrossingSums::Slab& slab : tables_[one.table].slab) most = std::max(most, of(slab, one.count).crossings);
     total += most;
   }
+  return total;
+}
+
+std::uint64_t LayerBound::bytes() const {
+  std::uint64_t total = tables_.capacity() * sizeof(CrossingSums::Table) + copies_.capacity() * sizeof(Copies);
+  for (const CrossingSums::Table& table : tables_) total += table.slab.capacity() * sizeof(CrossingSums::Slab);
   return total;
 }
 

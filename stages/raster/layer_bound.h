@@ -37,6 +37,9 @@ class CrossingSums {
     std::int64_t first = 0;   // number of the lowest
     std::vector<Slab> slab;
     const Slab* at(std::int64_t plane) const;  // nullptr: nothing is there
+    /// Leaves out slabs without anything at both ends, and joins the others in pairs, of which the larger counts, until there
+    /// are no more than `most`, at least 2.
+    void fit(std::size_t most);
   };
   Table table() const;
 
@@ -57,6 +60,9 @@ class CrossingSums {
   std::vector<Change> change_ = std::vector<Change>(kBeyond);
 };
 
+/// Slabs that are kept of a mesh at most: 6 bytes a triangle, so that thousands of small parts take little beside their meshes.
+constexpr std::size_t most_slabs_of(std::uint32_t clusters) { return std::size_t{64} + 4 * std::size_t{clusters}; }
+
 /// Counts all clusters of a mesh. cost: one parallel pass over its facets
 CrossingSums sum_crossings(const ClusteredMesh& mesh);
 
@@ -73,6 +79,7 @@ class LayerBound {
   Count at(Nm plane) const;
   /// Crossings of the layer that may have the most.
   std::uint64_t most_crossings() const;
+  std::uint64_t bytes() const;
 
  private:
   /// Copies at one height differ only in x and y.

@@ -106,7 +106,10 @@ Result<Rasterizer> Rasterizer::build(std::span<Mesh> meshes, std::span<const Ins
     state.placed.push_back({&state.meshes[instance.mesh], instance.offset});
   }
   std::vector<CrossingSums::Table> crossings;
-  for (const ClusteredMesh& mesh : state.meshes) crossings.push_back(sum_crossings(mesh).table());
+  for (const ClusteredMesh& mesh : state.meshes) {
+    crossings.push_back(sum_crossings(mesh).table());
+    crossings.back().fit(most_slabs_of(mesh.cluster_count()));
+  }
   state.bound.emplace_back(state.placed, state.meshes, std::move(crossings), grid);
   const std::uint32_t rows = std::max(1u, state.last_row - state.first_row);
   const std::uint64_t bands = std::clamp<std::uint64_t>(state.bound.front().most_crossings() / kBandCrossings, 1, rows);
@@ -213,6 +216,7 @@ std::uint64_t Rasterizer::mesh_bytes() const {
 
 std::uint64_t Rasterizer::index_bytes() const {
   std::uint64_t total = bytes_held(state_->sampling.row_centre) + state_->placed.capacity() * sizeof(PlacedMesh);
+  total += state_->bound.front().bytes();
   for (const ClusteredMesh& mesh : state_->meshes) total += mesh.bounds_bytes();
   for (const HeightBuckets& buckets : state_->buckets) total += buckets.bytes();
   for (const BeamIndex& beams : state_->beams) total += beams.bytes();

@@ -165,6 +165,34 @@ void expect_true_within_two(Mesh mesh, std::int64_t dpi, const std::string& name
   }
 }
 
+TEST(CrossingSums, FewerSlabsHoldAtLeastAsMuchAndNoMoreThanTheLargestOfThoseJoined) {
+  std::mt19937 random(8);
+  for (int round = 0; round < 50; ++round) {
+    CrossingSums::Table fine{12, static_cast<std::int64_t>(random() % 400) - 200, {}};
+    fine.slab.resize(random() % 300);
+    for (std::size_t i = fine.slab.size() / 4; i < fine.slab.size() * 3 / 4; ++i) {
+      fine.slab[i] = {static_cast<double>(random() % 50), static_cast<std::int64_t>(random() % 9),
+                      static_cast<std::int64_t>(random() % 3)};
+    }
+    CrossingSums::Table few = fine;
+    few.fit(2 + random() % 90);
+    for (std::size_t i = 0; i < fine.slab.size(); ++i) {
+      const CrossingSums::Slab none, *found = few.at((fine.first + static_cast<std::int64_t>(i)) << fine.shift);
+      EXPECT_GE((found != nullptr ? *found : none).depth, fine.slab[i].depth);
+      EXPECT_GE((found != nullptr ? *found : none).segments, fine.slab[i].segments);
+      EXPECT_GE((found != nullptr ? *found : none).clusters, fine.slab[i].clusters);
+    }
+    for (std::size_t j = 0; j < few.slab.size(); ++j) {
+      double depth = 0;
+      const std::int64_t begin = (few.first + static_cast<std::int64_t>(j)) << few.shift;
+      for (std::int64_t z = begin; z < begin + (std::int64_t{1} << few.shift); z += std::int64_t{1} << fine.shift) {
+        if (const CrossingSums::Slab* slab = fine.at(z)) depth = std::max(depth, slab->depth);
+      }
+      EXPECT_EQ(few.slab[j].depth, depth);
+    }
+  }
+}
+
 TEST(LayerBound, ClaimsAtMostTwiceWhatLayersOfPartsTake) {
   expect_true_within_two(make_mesh(torus(40, 16)), 1200, "a coarse torus");
   expect_true_within_two(make_mesh(torus(400, 120)), 1200, "a fine torus");
