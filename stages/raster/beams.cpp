@@ -163,8 +163,10 @@ BeamIndex& BeamIndex::operator=(BeamIndex&&) noexcept = default;
 BeamIndex::~BeamIndex() = default;
 
 Result<BeamIndex> BeamIndex::build(std::span<const PlacedMesh> placed, const PixelGrid& grid, std::uint32_t band_rows) {
-  if (const Status loaded = load_embree(); !loaded)
+  if (const Status loaded = load_embree(); !loaded) {
+    if (loaded.error().fault == Fault::kMemory) return loaded.error();
     return Error{loaded.error().fault, loaded.error().message + ", or use --engine contours"};
+  }
   BeamIndex index;
   index.state_ = std::make_unique<State>();
   State& state = *index.state_;

@@ -40,7 +40,7 @@ TEST_F(Memory, RunningOutOfItIsOneLineWithItsOwnCode) {
     ASSERT_EQ(run(writes ? command + "whole" : command, 0).code, 0);
     const std::string whole = tree_text(directory_ / "whole");
     int done = 0, short_of_memory = 0;
-    for (const rlim_t megabytes : {70, 78, 90, 1000}) {
+    for (const rlim_t megabytes : {16, 22, 27, 40, 78, 1000}) {
       const Outcome outcome = run(writes ? command + "out" : command, megabytes);
       const std::string what = command + std::to_string(megabytes) + " MB: " + outcome.err;
       if (outcome.code == 127) continue;  // no room for the program's libraries

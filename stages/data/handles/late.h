@@ -19,7 +19,7 @@ struct LateFunction {
 /// Loads a library for good and finds its functions; whoever else loads or links it shares it.
 ///
 /// file    as linking would have written it down: libzip.so.4
-/// errors  kInternal: it is not installed, or another one than was compiled with
+/// errors  kInternal: it is not installed, or another one than was compiled with; kMemory
 Status load_library(const char* file, std::span<const LateFunction> functions);
 
 }  // namespace lamina

@@ -30,7 +30,7 @@ TiffOptions strict_tiff_options(std::string& message) {
   static const Status loaded =
       load_library(LAMINA_TIFF_FILE, std::initializer_list<LateFunction>{LAMINA_TIFF(LAMINA_LATE_NAMED)});
   if (!loaded) {
-    message = loaded.error().message;
+    if (loaded.error().fault != Fault::kMemory) message = loaded.error().message;
     return nullptr;
   }
   TiffOptions options(TIFFOpenOptionsAlloc());

@@ -106,7 +106,7 @@ std::string part_name(std::string_view name, std::string_view folder) {
 void Archive::Discard::operator()(zip* archive) const { zip_discard(archive); }
 
 Result<Archive> Archive::open(const Source& source, const LoadOptions& options) {
-  if (const Status loaded = load_zip(); !loaded) return source.error(loaded.error().message);
+  if (const Status loaded = load_zip(); !loaded) return loaded.error();
   Archive archive(source, options);
   archive.place_ = std::make_unique<std::uint64_t>(0);
   zip_error_t why;
