@@ -13,7 +13,7 @@ constexpr std::size_t kAhead = 16;
 
 inline std::uint64_t hash_of(const Point3& p) {
   const std::uint64_t xy = static_cast<std::uint32_t>(p.x) | std::uint64_t{static_cast<std::uint32_t>(p.y)} << 32;
-  const std::uint64_t mixed = (xy ^ xy >> 29) * 0x9e3779b97f4a7c15 + static_cast<std::uint32_t>(p.z) * 0x2d358dccaa6c78a5;
+  const std::uint64_t mixed = (xy ^ xy >> 29) * 0x9e3779b97f4a7c15u + static_cast<std::uint32_t>(p.z) * 0x2d358dccaa6c78a5u;
   return (mixed ^ mixed >> 32) * 0x8bb84b93962eacc9;
 }
 
