@@ -9,8 +9,8 @@
 
 namespace lamina::write {
 
-/// What any program has to do for a job, on one thread: read the parts, write as many bytes in as many files, and touch each
-/// crossing of a row with a surface once.
+/// What any program has to do for a job, on one thread: read the parts, write as many bytes in as many files under another name
+/// and rename them, and touch each crossing of a row with a surface once, in memory that is in use already.
 struct Floor {
   std::uint64_t bytes_read = 0, bytes_written = 0, files = 0, crossings = 0;
   double read = 0, write = 0, touch = 0;  // seconds
@@ -18,6 +18,7 @@ struct Floor {
 };
 
 /// Fills in the seconds and the bytes read. What is written goes into a folder beside `output` that is gone afterwards.
+/// Reading and writing count with the middle of three times, where once takes less than 0.1 s. At most 128 MiB of memory.
 /// errors  kInput, kOutput
 Status measure_floor(const std::vector<std::string>& parts, const std::string& output, Floor& floor);
 
