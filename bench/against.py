@@ -25,7 +25,7 @@ import time
 ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
 sys.path.insert(0, os.path.join(ROOT, "bench"))
 import figures  # noqa: E402
-from measure import build, busy_and_total, models_default, say, started  # noqa: E402
+from measure import build, busy_and_total, instruction_sets, models_default, say, started  # noqa: E402
 
 # part, side of the bed (mm), layer (mm); names as in bench/jet.py and bench/limits.cpp
 CASES = {
@@ -48,18 +48,12 @@ PNG = ("knot800k", "crowns-96")
 INFO = ("knot800k", "benchy", "terrain")
 
 
-def widest():
-    with open("/proc/cpuinfo", encoding="ascii") as file:
-        flags = file.read()
-    return "avx512" if "avx512vl" in flags else "avx2" if "avx2" in flags else "plain"
-
-
 def kinds_of(case):
     """Name: (program, options) of each kind of run of a case."""
     kinds = {"old default": ("old", []), "old contours": ("old", ["--engine", "contours"]), "default": ("new", []),
              "contours": ("new", ["--engine", "contours"]), "plain": ("new", ["--isa", "plain"]),
              "contours plain": ("new", ["--engine", "contours", "--isa", "plain"])}
-    if widest() == "avx512":
+    if "avx512" in instruction_sets():
         kinds["avx2"] = ("new", ["--isa", "avx2"])
     if case in PNG:
         kinds["png"] = ("new", ["--format", "png"])
@@ -210,7 +204,7 @@ def page(options, found, touch):
     yield ""
     yield (f"Written by `scripts/bench against`, {time.strftime('%Y-%m-%d')}, commit {figures.commit(ROOT)} beside {options.name}: "
            f"{machine['cores']} cores of {machine['processor']}, {machine['memory_gib']} GiB, {machine['system']}; widest "
-           f"instructions: {widest()}; part files in the page cache, outputs in memory. Other programs used "
+           f"instructions: {instruction_sets()[-1]}; part files in the page cache, outputs in memory. Other programs used "
            f"{100 * found['others']:.0f} % of the processors.")
     yield ""
     yield ("Medians of wall milliseconds by turns. The limit: read the part, write files of the same sizes, touch each crossing "

@@ -1,34 +1,16 @@
 // bench/limits.cpp: the least that a job of scripts/bench could do: touch each crossing of a row with the surface once.
-// The parts are those of bench/make_parts.py, in the folder that LAMINA_BENCH_PARTS names.
-#include <cstdlib>
-#include <filesystem>
-#include <numeric>
-
+// The parts are those of bench/make_parts.py (bench/named_parts.h).
 #include "bench/named_parts.h"
 #include "stages/heights/table.h"
 
 namespace lamina::bench {
 namespace {
 
-struct Job {
-  const char* name;
-  const char* file;
-  std::int64_t bed;  // nm
-  Nm layer;          // nm
-};
-constexpr Job kJobs[] = {
-    {"terrain", "terrain.stl", 100'000'000, 100'000},     {"benchy", "benchy15.stl", 100'000'000, 100'000},
-    {"crowns-20", "crowns96.stl", 400'000'000, 480'000},  {"crowns-96", "crowns96.stl", 400'000'000, 100'000},
-    {"benchies", "benchies72.stl", 400'000'000, 100'000}, {"knot800k", "knot800k.stl", 100'000'000, 50'000},
-    {"scan680k", "scan680k.stl", 100'000'000, 100'000},
-};
-
 /// Two passes over all changes of colour of all layers, as memory holds them: one writes them, one reads them.
-void touch_crossings(benchmark::State& state, const Job& job, const std::string& path) {
+void touch_crossings(benchmark::State& state, const NamedJob& job, const std::string& path) {
   Part part;
   if (!load_on_bed(state, path, 0, 0, part)) return;
-  const PixelGrid grid{{1200, job.bed}, {1200, job.bed}};
-  auto rasterizer = raster::Rasterizer::build(part.meshes, part.instances, grid, FillRule::kNonzero, false, true);
+  auto rasterizer = raster::Rasterizer::build(part.meshes, part.instances, job.grid(), FillRule::kNonzero, false, true);
   if (!rasterizer) return state.SkipWithError(rasterizer.error().message.c_str());
   raster::LayerScratch scratch;
   Runs runs;
@@ -53,10 +35,9 @@ void touch_crossings(benchmark::State& state, const Job& job, const std::string&
 }
 
 [[maybe_unused]] const bool limits_registered = [] {
-  const char* folder = std::getenv("LAMINA_BENCH_PARTS");
-  for (const Job& job : kJobs) {
-    const std::string path = folder == nullptr ? std::string() : std::string(folder) + "/" + job.file;
-    if (path.empty() || !std::filesystem::exists(path)) continue;
+  for (const NamedJob& job : named_jobs()) {
+    const std::string path = job_path(job);
+    if (path.empty()) continue;
     benchmark::RegisterBenchmark((std::string("limits/") + job.name).c_str(), touch_crossings, job, path)
         ->Unit(benchmark::kMillisecond);
   }

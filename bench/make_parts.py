@@ -12,7 +12,7 @@ shall stand on the bed; parts.json says where that is, in nanometres:
     crown.stl         a dental crown made 27.8 x 29.6 x 9.6 mm: 3,878 triangles, 96 layers of 0.1 mm, 20 of 0.48 mm
     gyroid.stl        a gyroid sheet of 24 mm: 246,820 triangles, for the runs that measure memory
     crowns96.stl      96 of them in one mesh, 12 x 8 on 400 x 400 mm
-    knot800k.stl      a torus knot by formula: 800,000 triangles, 472 layers of 0.05 mm (--knot, --large)
+    knot800k.stl      a torus knot by formula: 800,000 triangles, 472 layers of 0.05 mm (--made)
     scan680k.stl      a bumpy ball of 42 mm whose 683,280 triangles lie in disorder: 425 layers of 0.1 mm (--made)
     benchies72.stl    72 Benchies in one mesh, 6 x 12 on 400 x 400 mm: 811 MB, 480 layers of 0.1 mm (--large)
 """
@@ -27,6 +27,8 @@ import struct
 import sys
 import zipfile
 import xml.etree.ElementTree as xml
+
+from shapes import knot_rings
 
 RECORD = 50  # bytes of a facet: normal, three corners (12 floats), attribute word
 HEADER = b"binary STL made by bench/make_parts.py".ljust(80, b" ")
@@ -82,8 +84,8 @@ def placed(axes, factors):
     return result
 
 
-def write_stl(path, axes, offsets=((0.0, 0.0),)):
-    """One binary STL with a copy of the part at every (x, y) of `offsets`."""
+def write_stl(path, axes, offsets=((0.0, 0.0),), told=True):
+    """One binary STL with a copy of the part at every (x, y) of `offsets`; `told` says so."""
     facets = len(axes[0]) // 3
     records = bytearray(RECORD * facets)  # normals and attributes stay zero
 
@@ -107,7 +109,8 @@ def write_stl(path, axes, offsets=((0.0, 0.0),)):
             last = offset
             file.write(records)
     os.replace(path + ".part", path)
-    print(f"{path}: {facets * len(offsets)} triangles, {os.path.getsize(path)} bytes", flush=True)
+    if told:
+        print(f"{path}: {facets * len(offsets)} triangles, {os.path.getsize(path)} bytes", flush=True)
 
 
 def grid(axes, columns, rows, side):
@@ -121,28 +124,9 @@ def grid(axes, columns, rows, side):
             for row in range(rows) for column in range(columns)]
 
 
-def torus_knot(around, along, p=2, q=3):
-    """A tube along a (p, q) torus knot, 2 x around x along facets: its middle winds p times about z and q times about the
-    middle of the torus."""
-    def point(s):
-        angle, radius = 2 * math.pi * s, 15 + 7 * math.cos(q * 2 * math.pi * s)
-        return radius * math.cos(p * angle), radius * math.sin(p * angle), 7 * math.sin(q * angle)
-
-    def crossed(a, b):
-        return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
-
-    def unit(a):
-        length = math.sqrt(sum(v * v for v in a))
-        return tuple(v / length for v in a)
-
-    rings = []
-    for i in range(along):
-        middle, ahead, behind = point(i / along), point((i + 1) / along), point((i - 1) / along)
-        forward = unit([a - b for a, b in zip(ahead, behind)])
-        side = unit(crossed(forward, (middle[0], middle[1], 0)))
-        other = crossed(side, forward)
-        rings.append([[m + 4.8 * (math.cos(t) * u + math.sin(t) * v) for m, u, v in zip(middle, side, other)]
-                      for t in (2 * math.pi * j / around for j in range(around))])
+def torus_knot(around, along):
+    """A tube along a torus knot, 2 x around x along facets."""
+    rings = list(knot_rings(around, along))
     axes = [array.array("d") for _ in range(3)]
     for i in range(along):
         here, there = rings[i], rings[(i + 1) % along]
@@ -155,7 +139,7 @@ def torus_knot(around, along, p=2, q=3):
 
 
 def bumpy_ball(across):
-    """As a scanner leaves a surface: fine waves, and facets in no order."""
+    """As a scanner leaves a surface: fine waves, and facets in no order. 2 x across x (across + 1) facets."""
     def point(i, j):
         a, b = math.pi * (i + 0.5) / (across + 1), 2 * math.pi * j / across
         radius = (20 + 1.5 * math.sin(5 * a) * math.sin(7 * b) + 0.4 * math.sin(31 * a + 3) * math.sin(29 * b)

@@ -68,6 +68,19 @@ def median_of(runs):
             "others": sum(run["others"] * run["wall"] for run in runs) / sum(walls)}
 
 
+def instruction_sets():
+    """Those that this processor has and kernels have bodies for, as --isa names them (stages/geometry/isa.cpp), up to the one
+    that LAMINA_ISA names."""
+    with open("/proc/cpuinfo", encoding="ascii") as file:
+        flags = set(next((line for line in file if line.startswith("flags")), "").split())
+    sets = ["plain"]
+    for name, needed in (("avx2", {"avx2", "bmi1", "bmi2", "popcnt"}), ("avx512", {"avx512f", "avx512bw", "avx512dq", "avx512vl"})):
+        if sets[-1] == os.environ.get("LAMINA_ISA") or not needed <= flags:
+            break
+        sets.append(name)
+    return sets
+
+
 def models_default():
     return os.environ.get("LAMINA_MODELS", os.path.join(ROOT, "../shared/models"))
 

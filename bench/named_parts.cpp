@@ -21,16 +21,30 @@ constexpr std::array kNamedParts{
     NamedPart{"terrain_gz", "st_helens_terrain_645k.stl.gz", 645364},
 };
 
+constexpr NamedJob kNamedJobs[] = {
+    {"terrain", "terrain.stl", 100'000'000, 100'000},     {"benchy", "benchy15.stl", 100'000'000, 100'000},
+    {"crowns-20", "crowns96.stl", 400'000'000, 480'000},  {"crowns-96", "crowns96.stl", 400'000'000, 100'000},
+    {"benchies", "benchies72.stl", 400'000'000, 100'000}, {"knot800k", "knot800k.stl", 100'000'000, 50'000},
+    {"scan680k", "scan680k.stl", 100'000'000, 100'000},
+};
+
+/// Path of a file in the folder that an environment variable names; empty without either.
+std::string path_in(const char* variable, const char* file) {
+  const char* folder = std::getenv(variable);
+  if (folder == nullptr) return {};
+  const std::string path = std::string(folder) + "/" + file;
+  return std::filesystem::exists(path) ? path : std::string();
+}
+
 }  // namespace
 
 std::span<const NamedPart> named_parts() { return kNamedParts; }
 
-std::string model_path(const NamedPart& part) {
-  const char* models = std::getenv("LAMINA_MODELS");
-  if (models == nullptr) return {};
-  const std::string path = std::string(models) + "/" + part.file;
-  return std::filesystem::exists(path) ? path : std::string();
-}
+std::string model_path(const NamedPart& part) { return path_in("LAMINA_MODELS", part.file); }
+
+std::span<const NamedJob> named_jobs() { return kNamedJobs; }
+
+std::string job_path(const NamedJob& job) { return path_in("LAMINA_BENCH_PARTS", job.file); }
 
 bool load_on_bed(benchmark::State& state, const std::string& path, std::int64_t x, std::int64_t y, Part& part) {
   auto loaded = load::load(path, {});

@@ -23,6 +23,19 @@ struct NamedPart {
 /// Easy, typical and nasty ones; all closed.
 std::span<const NamedPart> named_parts();
 
+/// A job of scripts/bench: a part of bench/make_parts.py on a square bed at 1200 dpi.
+struct NamedJob {
+  const char* name;
+  const char* file;  // in the folder that LAMINA_BENCH_PARTS names
+  std::int64_t bed;  // nm
+  Nm layer;          // nm
+  PixelGrid grid() const { return {{1200, bed}, {1200, bed}}; }
+};
+std::span<const NamedJob> named_jobs();
+
+/// Path of a job's part; empty if LAMINA_BENCH_PARTS is not set or has no such file.
+std::string job_path(const NamedJob& job);
+
 /// Path of a part in the models folder; empty if LAMINA_MODELS is not set or has no such file.
 std::string model_path(const NamedPart& part);
 
