@@ -9,7 +9,8 @@
 Every kind of run is taken once to warm up, and its layers are compared with those of the old build, byte for byte, before
 any clock starts. Then kinds take turns, in an order that turns with the round; printed are medians of wall seconds. Outputs
 lie in memory (/dev/shm) where there is one. The limit is measured in the same run on one thread: reading the part's file,
-writing files of the same sizes, and touching each crossing once (bench/limits.cpp).
+writing files of the same sizes, and touching each crossing once (bench/limits.cpp); `lamina jet --timing` measures the same by
+itself. What the rays' tree costs, and the bound of what layers need, are of bench/index.cpp.
 """
 import argparse
 import hashlib
@@ -107,7 +108,8 @@ class Against:
         return runs, {name: size for name, (_, size) in answers.items()}
 
     def limit(self, case):
-        """Seconds of reading the part and of writing files of the layers' sizes, one thread."""
+        """Seconds of reading the part and of writing files of the layers' sizes, one thread; and what --timing has for the
+        limit, touching included."""
         self.run(case, "new", [])
         folder = os.path.join(self.work, "out", "layers")
         sizes = [os.path.getsize(os.path.join(folder, name)) for name in os.listdir(folder)]
@@ -129,15 +131,29 @@ class Against:
                 os.close(file)
                 os.rename(name + ".part", name)
             writes.append(time.perf_counter() - start)
-        return statistics.median(reads) + statistics.median(writes)
+        return {"read": statistics.median(reads), "write": statistics.median(writes), "told": self.told_limit(case)}
 
-    def touch(self):
-        """Seconds of touching each crossing once, of each case that lamina_bench knows."""
-        if not self.options.bench:
-            return {}
-        output = subprocess.run([self.options.bench, "--benchmark_filter=^limits/", "--benchmark_format=json"], check=True,
-                                stdout=subprocess.PIPE, env=dict(os.environ, LAMINA_BENCH_PARTS=self.parts)).stdout
-        return {entry["name"].split("/")[1]: entry["real_time"] / 1e3 for entry in json.loads(output)["benchmarks"]}
+    def told_limit(self, case):
+        told = []
+        for _ in range(5):
+            out = os.path.join(self.work, "out")
+            shutil.rmtree(out, ignore_errors=True)
+            done = subprocess.run(self.command(case, "new", ["--timing", "--json", "-o", out]), check=True, stdout=subprocess.PIPE)
+            told.append(json.loads(done.stdout)["timing"]["limit"]["seconds"])
+        return statistics.median(told)
+
+    def benchmarks(self, cases):
+        """What lamina_bench says of the parts: touching each crossing once (limits), the rays' tree, the bound of layers. By
+        kind and case."""
+        found = {"limits": {}, "tree": {}, "bound": {}}
+        if self.options.bench:
+            wanted = f"^({'|'.join(found)})/({'|'.join(cases)})(/|$)"
+            output = subprocess.run([self.options.bench, f"--benchmark_filter={wanted}", "--benchmark_format=json"], check=True,
+                                    stdout=subprocess.PIPE, env=dict(os.environ, LAMINA_BENCH_PARTS=self.parts)).stdout
+            for entry in json.loads(output)["benchmarks"]:
+                kind, case = entry["name"].split("/")[:2]
+                found[kind][case] = dict(entry, seconds=entry["real_time"] / 1e3)
+        return found
 
     def info(self, case):
         """`info` beside a dry run of the job, by turns."""
@@ -198,7 +214,36 @@ def png_lines(cases):
     yield ""
 
 
-def page(options, found, touch):
+def limit_lines(cases, bench):
+    """The limit in its parts, as measured here and as --timing has it."""
+    rows = []
+    for case, (*_, limit) in cases.items():
+        touch = bench["limits"].get(case, {}).get("seconds")
+        rows.append([f"`{case}`", f"{1e3 * limit['read']:.1f}", f"{1e3 * limit['write']:.1f}", f"{1e3 * touch:.1f}" if touch else "-",
+                     f"{1e3 * (limit['read'] + limit['write'] + touch):.1f}" if touch else "-", f"{1e3 * limit['told']:.1f}"])
+    yield "The limit, ms, and what `--timing` has for it:"
+    yield ""
+    yield from figures.table(["job", "read", "write", "touch each crossing", "limit", "`--timing`"], rows)
+
+
+def index_lines(bench):
+    """What the rays' tree costs, and the bound of what layers need."""
+    if not bench["tree"]:
+        return
+    yield ("The tree of the rays, and the bound of what layers need beside what they take (clusters, segments, crossings, changes "
+           "and rows, each written once; every 16th layer):")
+    yield ""
+    rows = []
+    for case, tree in bench["tree"].items():
+        bound = bench["bound"][case]
+        rows.append([f"`{case}`", f"{tree['primitives']:,.0f}", f"{tree['bytes'] / 1e6:.2f}", f"{1e3 * tree['seconds']:.1f}",
+                     f"{bound['claimed'] / 1e6:.1f} / {bound['needed'] / 1e6:.1f}", at_most(bound["claimed"] / bound["needed"], 2),
+                     f"{bound['worst']:.2f}"])
+    yield from figures.table(["job", "rays' tree: primitives", "MB", "ms", "layer bound: claimed / needed, MB", "ratio",
+                              "of the worst layer"], rows)
+
+
+def page(options, found, bench):
     machine = figures.machine(options.cache)
     yield "# This build beside an older one, and beside the limit of the machine"
     yield ""
@@ -212,14 +257,17 @@ def page(options, found, touch):
     yield ""
     rows = []
     for case, (runs, _, limit) in found["cases"].items():
-        rows += rows_of(case, runs, limit + touch[case] if case in touch else None)
+        touch = bench["limits"].get(case)
+        rows += rows_of(case, runs, limit["read"] + limit["write"] + touch["seconds"] if touch else None)
     yield from figures.table(["job", "engine", "old, ms", "new, ms", "times as fast", "processor time", "times the limit", "old MiB",
                               "new MiB"], rows)
+    yield from limit_lines(found["cases"], bench)
     yield "Without wide instructions (`--isa plain`), with AVX2 only, and the two engines beside each other:"
     yield ""
     yield from figures.table(["job", "plain, times as fast", "the same, contours", "avx2, times as fast",
                               "default engine, part of contours' time"],
                              [wide_row(case, runs) for case, (runs, *_) in found["cases"].items()])
+    yield from index_lines(bench)
     yield from png_lines(found["cases"])
     if found["info"]:
         yield from figures.table(["part", "`info`, ms", "dry run, ms", "time", "memory"], [
@@ -266,7 +314,7 @@ def main(arguments):
             own += sum(run[1] for kinds in (runs, found["info"].get(case, {})) for taken in kinds.values() for run in taken)
         after = busy_and_total()
         found["others"] = max(0.0, after[0] - before[0] - own) / (after[1] - before[1])
-        text = "\n".join(page(options, found, against.touch())).rstrip() + "\n"
+        text = "\n".join(page(options, found, against.benchmarks(cases))).rstrip() + "\n"
     print(text)
     if not options.case:
         with open(os.path.join(ROOT, "bench", "against.md"), "w", encoding="utf-8") as file:

@@ -5,6 +5,9 @@ import platform
 import re
 import subprocess
 
+import growth_page
+from tables import seconds, table
+
 
 def commit(root):
     """Short name of the commit, with + where sources differ from it."""
@@ -50,18 +53,6 @@ def load(root, name):
             return json.load(file)
     except FileNotFoundError:
         return None
-
-
-def table(head, rows):
-    yield "| " + " | ".join(head) + " |"
-    yield "|" + "---|" * len(head)
-    for row in rows:
-        yield "| " + " | ".join(row) + " |"
-    yield ""
-
-
-def seconds(value):
-    return f"{value:.0f}" if value >= 100 else f"{value:.1f}" if value >= 10 else f"{value:.2f}" if value >= 1 else f"{value:.3f}"
 
 
 def spread(entry):
@@ -211,6 +202,7 @@ def lines(root, cases):
     yield ""
     yield from table(["job", "read", "write", "touch each crossing", "the whole job, rays"], limit_rows(root, results))
     yield from memory_text(root)
+    yield from growth_page.readme(load(root, "growth"))
     yield "## Again"
     yield ""
     yield "    scripts/bench             # an hour on two slow cores; nearly all of it is the peer's"
@@ -221,7 +213,7 @@ def lines(root, cases):
            "Google Benchmark: `LAMINA_MODELS=... build/release/lamina_bench`.")
 
 
-def write_readme(root, cases):
+def write_readme(root, cases=tuple(DESCRIPTION)):
     text = "\n".join(lines(root, cases)).rstrip() + "\n"
     with open(os.path.join(root, "bench", "README.md"), "w", encoding="utf-8") as file:
         file.write(text)

@@ -1,0 +1,99 @@
+"""bench/growth_page.py: the page of scripts/bench growth, and its lines for bench/README.md."""
+from tables import seconds, table
+
+ABOUT = {
+    "triangles": ("triangles", "a torus knot, 236 layers of 22.3 million pixels"),
+    "layers": ("layers", "a knot of 100,000 triangles, 5.6 million pixels a layer"),
+    "pixels": ("pixels a layer", "the same, 100 layers"),
+    "copies": ("copies", "of one part of 1,000 triangles, 20 layers of 89 million pixels"),
+    "meshes": ("different parts", "of 1,000 triangles each in files of their own, 20 layers of 89 million pixels"),
+    "threads": ("threads", "knot800k: 800,000 triangles, 472 layers of 22.3 million pixels"),
+}
+
+
+def slope_text(value):
+    return "flat" if value is None else f"{value:.2f}"
+
+
+def verdict(found):
+    if found["worse"]:
+        return "**WORSE THAN LINEAR**: " + "; ".join(found["worse"]) + "."
+    return f"No term is worse than linear: no slope of processor time or memory is above {found['steepest']}."
+
+
+def slope_rows(found):
+    for name, series in found["series"].items():
+        if series["slopes"]:
+            entries = series["entries"]
+            yield [ABOUT[name][0], f"{entries[0]['x']:,} to {entries[-1]['x']:,}", ABOUT[name][1],
+                   *(slope_text(series["slopes"][measure]) for measure in ("wall", "processor", "peak"))]
+
+
+def slopes(found):
+    yield from table(["against", "from, to", "job", "wall time", "processor time", "peak memory"], slope_rows(found))
+    yield verdict(found)
+    yield ""
+
+
+def bounds(found):
+    shares = found["shares"]
+    if not shares:
+        return
+    threads = next(iter(shares.values()))["threads"]
+    if threads < 2:
+        yield "Serial shares are not known: they need two threads."
+        yield ""
+        return
+    rows = []
+    for case, share in shares.items():
+        phases = share["phases"]
+        wall, serial = (sum(span[key] for span in phases.values()) for key in ("wall", "serial"))
+        longest = max(phases, key=lambda name: phases[name]["serial"])
+        least = {int(n): least_seconds for n, least_seconds in share["bounds"].items()}
+        rows.append([f"`{case}`", f"{1e3 * wall:.0f}", f"{1e3 * serial:.0f}", f"{longest}, {1e3 * phases[longest]['serial']:.0f}",
+                     *(f"{1e3 * least[n]:.0f} ({wall / least[n]:.1f} x)" for n in (16, 64)), f"{1e3 * share['limit']:.0f}"])
+    yield (f"At least so many milliseconds on more cores, from the processor time and the seconds of one thread alone in each "
+           f"phase of runs on {threads} threads (`--timing`, `bench/amdahl.py`): the bound of Amdahl, which memory and files "
+           "that cores share make longer. Beside it the limit of one thread: reading, writing, touching each crossing once.")
+    yield ""
+    yield from table(["job", f"{threads} threads, ms", "of it one thread alone", "most of that", "16 cores", "64 cores",
+                      "limit, ms"], rows)
+
+
+def lines(found):
+    about = found["machine"]
+    yield "# Growth"
+    yield ""
+    yield "Written by `scripts/bench growth` (`bench/growth.py`); edits are lost."
+    yield ""
+    yield (f"{about['processor']}, {about['cores']} cores, {about['memory_gib']} GiB; {about['system']}, kernel {about['kernel']}. Commit "
+           f"{found['commit']} on {found['date']}. The least of {found['runs']} runs of whole processes; parts in the page cache, "
+           f"outputs in memory. Other programs used {100 * found['others']:.0f} % of the processors.")
+    yield ""
+    yield ("A slope is that of least squares in log-log over the upper two decades: of what a job takes beyond the smallest of its "
+           "series against what it has beyond it. 1 is linear; what grows by less than a tenth is flat.")
+    yield ""
+    yield from slopes(found)
+    for name, series in found["series"].items():
+        yield f"## {ABOUT[name][0].capitalize()}: {ABOUT[name][1]}"
+        yield ""
+        yield from table([ABOUT[name][0], "wall, s", "processor, s", "peak, MiB"], [
+            [f"{entry['x']:,}", seconds(entry["wall"]), seconds(entry["processor"]), f"{entry['peak'] / 2**20:.1f}"]
+            for entry in series["entries"]])
+    if found["shares"]:
+        yield "## More cores"
+        yield ""
+        yield from bounds(found)
+
+
+def readme(found):
+    """A section of bench/README.md."""
+    if not found:
+        return
+    yield "## Growth"
+    yield ""
+    yield (f"Slopes in log-log over the upper two decades (1 is linear), commit {found['commit']}, {found['date']}; all figures in "
+           "[growth.md](growth.md).")
+    yield ""
+    yield from slopes(found)
+    yield from bounds(found)
