@@ -70,7 +70,22 @@ DESCRIPTION = {
 }
 
 
+def touched_jobs(root):
+    """What lamina_bench says of touching each crossing once, by job."""
+    return {entry["name"].split("/")[1]: entry for entry in (load(root, "limits") or {}).get("benchmarks", [])}
+
+
+def times_the_limit(touched, name, result, wall):
+    """Wall seconds beside reading, writing and touching each crossing once; - where one of them was not measured."""
+    if name not in touched:
+        return "-"
+    limit = result["limits"]
+    touch = touched[name]["real_time"] * {"ns": 1e-9, "us": 1e-6, "ms": 1e-3, "s": 1}[touched[name]["time_unit"]]
+    return f"{wall / (limit['read'] + limit['write'] + touch):.1f}"
+
+
 def time_rows(root, results):
+    touched = touched_jobs(root)
     for name, result in results:
         rays, contours = result["lamina"]["rays-tiff-g4"], result["lamina"]["contours-tiff-g4"]
         peer = result.get("prusa")
@@ -78,6 +93,7 @@ def time_rows(root, results):
         yield [f"`{name}`: {DESCRIPTION[name]}", f"{result['layers']} of {result['columns']} x {result['rows']}",
                spread(peer) if peer else "-", spread(rays), f"{peer['wall'] / rays['wall']:.1f}" if peer else "-",
                spread(contours), f"{peer['wall'] / contours['wall']:.1f}" if peer else "-", str(result["target"]),
+               times_the_limit(touched, name, result, rays["wall"]), times_the_limit(touched, name, result, contours["wall"]),
                f"{pixels / rays['wall'] / 1e9:.1f}"]
 
 
@@ -86,7 +102,13 @@ def memory_rows(results):
         rays, peer = result["lamina"]["rays-tiff-g4"], result.get("prusa")
         yield [f"`{name}`", f"{peer['peak_mib']:.0f} MiB" if peer else "-", f"{rays['peak_mib']:.0f} MiB",
                f"{rays['peak_mib'] / peer['peak_mib']:.2f}" if peer else "-",
+               f"{seconds(peer['processor'])} s" if peer else "-",
+               *(f"{seconds(result['lamina'][key]['processor'])} s" for key in ("rays-tiff-g4", "contours-tiff-g4")),
                f"{peer['processor'] / rays['processor']:.1f}" if peer else "-"]
+
+
+# Steps of layers in summaries, and as those until 2026-11-21 name them.
+STEPS = (("raster", "raster_threads"), ("encode", "encode_threads"), ("store", "write_threads"))
 
 
 def stage_rows(results):
@@ -97,11 +119,11 @@ def stage_rows(results):
                 continue
             yield [f"`{name}`", variant.replace("-", ", ", 1), seconds(result["lamina"][variant]["wall"])] + [
                 f"{1000 * value:.0f}" for value in [part.get(key, 0) for key in ("load", "index", "layers")] +
-                [part.get("threads", {}).get(step, 0) for step in ("raster", "encode", "store")]]
+                [part.get("threads", {}).get(step, part.get(older, 0)) for step, older in STEPS]]
 
 
 def limit_rows(root, results):
-    touched = {entry["name"].split("/")[1]: entry for entry in (load(root, "limits") or {}).get("benchmarks", [])}
+    touched = touched_jobs(root)
     for name, result in results:
         limit = result["limits"]
         case = touched.get(name)
@@ -109,6 +131,30 @@ def limit_rows(root, results):
                f"{limit['write_files']} files, {limit['write_bytes'] / 1e6:.1f} MB in {1000 * limit['write']:.0f} ms",
                f"{case['crossings'] / 1e6:.1f} million in {case['real_time']:.1f} {case['time_unit']}" if case else "-",
                seconds(result["lamina"]["rays-tiff-g4"]["wall"]) + " s"]
+
+
+def mslicer_text(root, results):
+    """mslicer beside ours, where it was run: wrong pixels beside the time."""
+    touched, rows = touched_jobs(root), []
+    for name, result in results:
+        if "mslicer" not in result:
+            continue
+        peer, ours = result["mslicer"], result["lamina"]["rays-tiff-g4"]
+        rows.append([f"`{name}`", spread(peer), f"{seconds(peer['processor'])} s", times_the_limit(touched, name, result, peer["wall"]),
+                     f"{peer['peak_mib']:.0f} MiB", f"{peer['pixels_different']} of {peer['images_compared']} layers", spread(ours),
+                     f"{seconds(ours['processor'])} s", times_the_limit(touched, name, result, ours["wall"]),
+                     f"{peer['wall'] / ours['wall']:.1f}"])
+    yield "## mslicer"
+    yield ""
+    yield ("The jobs of its published benchmark: [race.md](race.md)." if os.path.exists(os.path.join(root, "bench/race.md"))
+           else "The jobs of its published benchmark: `scripts/bench race`.")
+    yield ""
+    if rows:
+        yield ("mslicer (`bench/mslicer.py`) writes one `.goo` of grey runs, ours 1-bit TIFF files; by turns, the part files in the "
+               "page cache. Wrong are pixels whose centre lies on the other side of the surface.")
+        yield ""
+        yield from table(["job", "mslicer", "processor time", "times the limit", "peak memory", "wrong pixels", "lamina, rays",
+                          "processor time", "times the limit", "times as fast"], rows)
 
 
 def pixel_rows(results):
@@ -175,11 +221,11 @@ def lines(root, cases):
     yield "## Time"
     yield ""
     yield from table(["job", "layers", "PrusaSlicer", "lamina, rays", "times as fast", "lamina, contours", "times as fast",
-                      "meant", "Gpx/s, rays"], time_rows(root, results))
+                      "meant", "times the limit, rays", "the same, contours", "Gpx/s, rays"], time_rows(root, results))
     yield "## Peak resident memory and processor time"
     yield ""
-    yield from table(["job", "PrusaSlicer", "lamina, rays", "part of it", "processor time, PrusaSlicer / lamina"],
-                     memory_rows(results))
+    yield from table(["job", "PrusaSlicer", "lamina, rays", "part of it", "processor time, PrusaSlicer", "rays", "contours",
+                      "PrusaSlicer / rays"], memory_rows(results))
     rows = list(pixel_rows(results))
     if rows:
         yield "## Pixels"
@@ -188,6 +234,7 @@ def lines(root, cases):
                "rounded on the way, so single pixels at edges differ.")
         yield ""
         yield from table(["job", "layers", "compared", "pixels that differ, all", "in the worst layer", "pixels a layer"], rows)
+    yield from mslicer_text(root, results)
     yield "## Where the time goes"
     yield ""
     yield ("Wall time of the process; then milliseconds from the last run's summary: load, index and layers follow each "
@@ -208,6 +255,7 @@ def lines(root, cases):
     yield "    scripts/bench             # an hour on two slow cores; nearly all of it is the peer's"
     yield "    scripts/bench --large     # and the 811 MB plate"
     yield "    scripts/bench --alone     # ours only, a few minutes"
+    yield "    scripts/bench --mslicer PROGRAM    # and mslicer's command line by turns"
     yield ""
     yield ("The parts are made by `bench/make_parts.py` from the models folder (`LAMINA_MODELS`). Single stages are timed by "
            "Google Benchmark: `LAMINA_MODELS=... build/release/lamina_bench`.")

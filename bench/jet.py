@@ -4,6 +4,7 @@
     scripts/bench                 all jobs but the largest (an hour on two slow cores, nearly all of it PrusaSlicer's)
     scripts/bench --large         and 72 Benchies in one STL of 811 MB
     scripts/bench --case NAME     this one only (can be repeated); --runs N turns (default 3); --alone without PrusaSlicer
+    scripts/bench --mslicer PROGRAM    and mslicer's command line by turns, its pixels compared with ours (bench/mslicer.py)
     scripts/bench --memory        the runs that measure memory only
     scripts/bench --report        only writes bench/README.md again from bench/results/*.json
 
@@ -23,8 +24,9 @@ import time
 
 ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
 sys.path.insert(0, os.path.join(ROOT, "bench"))
-import prusa  # noqa: E402
 import figures  # noqa: E402
+import mslicer  # noqa: E402
+import prusa  # noqa: E402
 from measure import build, measured, median_of, models_default, say  # noqa: E402
 
 # name, part, copies, side of the bed (mm), layer (mm), how many times as fast as PrusaSlicer we mean to be
@@ -88,6 +90,15 @@ class Bench:
             os.remove(archive)
         return prusa.command(settings, os.path.join(self.parts_folder, part), archive), archive
 
+    def other_peer(self, case):
+        """The command line of mslicer's run, and its file."""
+        part, _, bed, layer, _ = CASES[case]
+        path, goo = os.path.join(self.parts_folder, part), os.path.join(self.work, f"{case}.goo")
+        if os.path.exists(goo):
+            os.remove(goo)
+        side = -(-bed * DPI * 5 // 127)
+        return mslicer.command(self.options.mslicer, path, goo, [side * 25.4 / DPI] * 2, [side] * 2, layer, mslicer.box_of(path)), goo
+
     def run_case(self, case):
         part, copies, bed, layer, target = CASES[case]
         side = -(-bed * DPI * 5 // 127)  # ceil(bed * dpi / 25.4)
@@ -99,7 +110,13 @@ class Bench:
         runs = {variant: [] for variant in variants}
         peer_runs, archive, summary, digest, out_g4 = [], None, {}, None, None
         peer_turns = 0 if self.options.alone else 1 if case in LARGE else self.options.runs
+        other_runs, goo = [], None
+        other_command = self.other_peer(case) if self.options.mslicer and copies == 1 else None
         for turn in range(self.options.runs):
+            if other_command:
+                command, goo = other_command
+                other_runs.append(measured(command, os.path.join(self.work, "mslicer.log")))
+                say(f"  mslicer           {other_runs[-1]['wall']:8.3f} s {other_runs[-1]['peak_mib']:7.0f} MiB")
             if turn < peer_turns:
                 command, archive = self.peer(case)
                 peer_runs.append(measured(command, os.path.join(self.work, "prusa.log")))
@@ -127,6 +144,9 @@ class Bench:
             result["prusa"] = median_of(peer_runs)
             result["prusa"]["version"] = prusa.version()
             result["prusa"].update(self.check_peer(case, archive, layers, side))
+        if other_runs:
+            result["mslicer"] = dict(median_of(other_runs), version=mslicer.version(self.options.mslicer),
+                                     **self.check_other_peer(case, goo, layers))
         result["limits"] = self.limits(os.path.join(self.parts_folder, part), out_g4)
         figures.save(ROOT, case, result)
 
@@ -141,17 +161,29 @@ class Bench:
         found = {"layers": len(images), "images_compared": 0, "pixels_different": 0, "pixels_different_most": 0}
         if CASES[case][1] > 1:  # our copies stand elsewhere than the one mesh's
             return found
-        for index in sorted({0, layers // 4, layers // 2, 3 * layers // 4, min(layers, len(images)) - 1}):
-            command, out = self.job(case, "rays", "pbm", ["--layers", f"{index}:{index + 1}"])
-            measured(command, os.path.join(self.work, "pbm.log"))
-            name = os.listdir(os.path.join(out, "layers"))[0]
-            different = prusa.different_pixels(archive, images[index], os.path.join(out, "layers", name))
-            found["images_compared"] += 1
-            found["pixels_different"] += different
-            found["pixels_different_most"] = max(found["pixels_different_most"], different)
-            shutil.rmtree(out)
+        different = [prusa.different_pixels(archive, images[index], pbm)
+                     for index, pbm in self.some_layers(case, min(layers, len(images)))]
+        found.update(images_compared=len(different), pixels_different=sum(different), pixels_different_most=max(different))
         say(f"  {found['pixels_different']} pixels of {found['images_compared']} layers differ from PrusaSlicer's")
         return found
+
+    def some_layers(self, case, layers):
+        """Number and PBM file of five of our layers, one after the other."""
+        for index in sorted({0, layers // 4, layers // 2, 3 * layers // 4, layers - 1}):
+            command, out = self.job(case, "rays", "pbm", ["--layers", f"{index}:{index + 1}"])
+            measured(command, os.path.join(self.work, "pbm.log"))
+            yield index, os.path.join(out, "layers", os.listdir(os.path.join(out, "layers"))[0])
+            shutil.rmtree(out)
+
+    def check_other_peer(self, case, path, layers):
+        """Number and size of mslicer's images, and pixels that differ from ours in five layers."""
+        goo = mslicer.Goo(path)
+        if abs(goo.layers - layers) > 1:
+            sys.exit(f"bench: {case}: mslicer has {goo.layers} layers, ours {layers}")
+        different = [mslicer.different_pixels(goo, index, pbm) for index, pbm in self.some_layers(case, min(layers, goo.layers))]
+        say(f"  {sum(different)} pixels of {len(different)} layers differ from mslicer's")
+        return {"layers": goo.layers, "images_compared": len(different), "pixels_different": sum(different),
+                "pixels_different_most": max(different)}
 
     def limits(self, part, out):
         """What any program has to do for this job: read the part's bytes, write the layers' files."""
@@ -247,6 +279,7 @@ def main(arguments):
     parser.add_argument("--runs", type=int, default=3, help="turns: PrusaSlicer, ours, PrusaSlicer, ours, ...")
     parser.add_argument("--repeat", type=int, default=3, help="runs of ours a turn")
     parser.add_argument("--alone", action="store_true", help="without PrusaSlicer")
+    parser.add_argument("--mslicer", metavar="PROGRAM")
     parser.add_argument("--memory", action="store_true")
     parser.add_argument("--report", action="store_true")
     parser.add_argument("--models", default=models_default())

@@ -67,12 +67,13 @@ def strip(here, there):
         zip(zero, here, there_next, here_next, end, zero, here, there, there_next, end)))
 
 
-def write_knot(path, triangles, scale=1.0):
-    """A torus knot of about so many triangles; how many."""
+def write_knot(path, triangles, scale=1.0, place=None):
+    """A torus knot of about so many triangles; how many. place: where a corner goes, if not where it is; scaled after that"""
     around, along = knot_size(triangles)
 
     def blocks():
-        rings = (packed(ring, scale) for ring in knot_rings(around, along))
+        rings = (packed(ring if place is None else [place(*point) for point in ring], scale)
+                 for ring in knot_rings(around, along))
         first = here = next(rings)
         for there in itertools.chain(rings, [first]):
             yield strip(here, there)
