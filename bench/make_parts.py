@@ -28,7 +28,8 @@ import sys
 import zipfile
 import xml.etree.ElementTree as xml
 
-from shapes import knot_rings
+sys.dont_write_bytecode = True
+from shapes import knot_rings  # noqa: E402
 
 RECORD = 50  # bytes of a facet: normal, three corners (12 floats), attribute word
 HEADER = b"binary STL made by bench/make_parts.py".ljust(80, b" ")
