@@ -46,8 +46,7 @@ void bound(benchmark::State& state, const NamedJob& job, const std::string& path
     for (std::uint32_t i = kStep / 2; i < table.size(); i += kStep) {
       raster::LayerScratch scratch;
       Runs runs;
-      const raster::LayerReport report =
-          rasterizer->layer(raster::Engine::kContours, table[i].plane(), scratch, runs);
+      const raster::LayerReport report = rasterizer->layer(raster::Engine::kContours, table[i].plane(), scratch, runs);
       const auto said = static_cast<double>(rasterizer->layer_bytes_bound(table[i].plane()));
       const auto taken = static_cast<double>(scratch.visits.size() * sizeof(raster::ClusterVisit) +
                                              report.segments * raster::Segments::kBytes +
