@@ -203,3 +203,4 @@ def main(arguments):
     print(text)
     with open(os.path.join(ROOT, "bench/race.md"), "w", encoding="utf-8") as file:
         file.write(text)
+    figures.write_readme(ROOT)

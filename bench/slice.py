@@ -6,7 +6,7 @@
 Whole programs run in turn on the same binary STL: Slic3r's --export-svg and lamina slice to SVG; admesh's load and check,
 and lamina slice on one thread with nothing written but its manifest. Before a figure is kept, the answers are compared:
 the number of layers, and the area of all contours of every layer. Stages are timed by lamina_bench (bench/slice.cpp),
-which checks its own answers. Writes bench/results/slice.json and bench/slice.md.
+which checks its own answers. Writes bench/results/slice.json and bench/slice.md, unless only some cases are asked for.
 """
 import json
 import os
@@ -189,6 +189,9 @@ def main(arguments):
         result["cases"][case] = run_case(case, options, os.path.join(programs, "lamina"), parts, work)
     result["stages"] = stages(os.path.join(programs, "lamina_bench"), options)
     shutil.rmtree(work)
+    if options.case:
+        print(json.dumps(result, indent=1))
+        return
     figures.save(ROOT, "slice", result)
     page(result)
 
