@@ -4,6 +4,7 @@
 #include <tbb/global_control.h>
 
 #include <algorithm>
+#include <filesystem>
 #include <nlohmann/json.hpp>
 #include <optional>
 
@@ -177,13 +178,16 @@ std::shared_ptr<Timing> timing_of(const Plan& plan, const Elapsed& before) {
 }
 
 /// Measures the least that any program would need for the same.
-void tell_floor(const Plan& plan, const Maker& maker, const Summary& summary, Timing& timing) {
+void tell_floor(const Plan& plan, const Maker& maker, const std::atomic<bool>& cancel, const Summary& summary, Timing& timing) {
   std::vector<std::string> parts;
   for (const PartSummary& part : plan.scene->parts) parts.push_back(part.path);
   timing.floor.bytes_written = summary.bytes_written;
   timing.floor.files = summary.bytes_written == 0 ? 0 : plan.product == Product::kImages ? summary.layers_planned : 1;
   timing.floor.crossings = maker.crossings();
-  if (Status status = write::measure_floor(parts, plan.job.output, timing.floor); !status)
+  std::error_code error;
+  const bool is_folder = std::filesystem::is_directory(plan.job.output, error);
+  const std::string beside = is_folder ? plan.job.output + "/" + manifest_name(plan.job) : plan.job.output;
+  if (Status status = write::measure_floor(parts, beside, cancel, timing.floor); !status)
     timing.not_measured = status.error().message;
 }
 
@@ -226,7 +230,7 @@ Result<Summary> run(Resolved resolved, const ProgressCallback& progress, const s
   }
   maker->tell(summary);
   summary.peak_resident_bytes = peak_resident_bytes();
-  if (summary.timing) tell_floor(*plan, *maker, summary, *summary.timing);
+  if (summary.timing) tell_floor(*plan, *maker, cancel, summary, *summary.timing);
   return summary;
 }
 

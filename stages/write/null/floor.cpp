@@ -1,21 +1,24 @@
 #include "stages/write/null/floor.h"
 
 #include <fcntl.h>
-#include <fmt/format.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <array>
 #include <cerrno>
+#include <cstddef>
+#include <cstdio>
 #include <cstring>
-#include <filesystem>
+#include <span>
 
 #include "stages/data/handles/clocks.h"
+#include "stages/write/file.h"
+#include "stages/write/file_target.h"
+#include "stages/write/leftovers.h"
+#include "stages/write/temporary.h"
 
 namespace lamina::write {
 namespace {
-
-namespace fs = std::filesystem;
 
 /// A descriptor that closes itself.
 class Descriptor {
@@ -33,28 +36,50 @@ class Descriptor {
 };
 
 Error system_error(Fault fault, const std::string& path) { return {fault, path + ": " + std::strerror(errno)}; }
+Error interrupted() { return {Fault::kInterrupted, "interrupted"}; }
 
-Status read_file(const std::string& path, std::vector<char>& block, std::uint64_t& bytes) {
+Status read_file(const std::string& path, const std::atomic<bool>& cancel, std::vector<std::byte>& block, std::uint64_t& bytes) {
   const Descriptor file(open(path.c_str(), O_RDONLY | O_CLOEXEC));
   if (file.get() < 0) return system_error(Fault::kInput, path);
-  for (;;) {
+  while (!cancel) {
     const ssize_t got = read(file.get(), block.data(), block.size());
+    if (got < 0 && errno == EINTR) continue;
     if (got < 0) return system_error(Fault::kInput, path);
     if (got == 0) return {};
     bytes += static_cast<std::uint64_t>(got);
   }
+  return interrupted();
 }
 
-Status write_file(const std::string& name, const std::vector<char>& block, std::uint64_t bytes) {
-  const std::string unnamed = name + ".part";
-  const Descriptor file(open(unnamed.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0600));
-  if (file.get() < 0) return system_error(Fault::kOutput, unnamed);
-  while (bytes > 0) {
-    const ssize_t put = ::write(file.get(), block.data(), std::min<std::uint64_t>(bytes, block.size()));
-    if (put <= 0) return system_error(Fault::kOutput, unnamed);
-    bytes -= static_cast<std::uint64_t>(put);
+/// The names of two temporary files: of the one that grows, and of the last whole one. Both go at the end and at a
+/// signal; what a killed run leaves goes with the next run that writes the same file.
+class Names {
+ public:
+  explicit Names(const std::string& target) : growing(temporary_name(target)), whole(temporary_name(target)) {}
+  Names(const Names&) = delete;
+  Names& operator=(const Names&) = delete;
+  ~Names() {
+    for (const int which : watched_) forget(which);
+    for (const std::string& name : {growing, whole}) remove_or_note(name);
   }
-  return rename(unnamed.c_str(), name.c_str()) == 0 ? Status() : system_error(Fault::kOutput, name);
+
+  const std::string growing, whole;
+
+ private:
+  int watched_[2] = {watch(growing.c_str()), watch(whole.c_str())};
+};
+
+Status write_file(const Names& names, const std::atomic<bool>& cancel, std::span<const std::byte> block, std::uint64_t bytes) {
+  const Descriptor file(open(names.growing.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0600));
+  if (file.get() < 0) return system_error(Fault::kOutput, names.growing);
+  while (bytes > 0) {
+    if (cancel) return interrupted();
+    const auto piece = block.first(std::min<std::uint64_t>(bytes, block.size()));
+    if (const int reason = write_all(file.get(), piece); reason != 0) return write_failure(names.growing, reason);
+    bytes -= piece.size();
+  }
+  const bool renamed = rename(names.growing.c_str(), names.whole.c_str()) == 0;
+  return renamed ? Status() : system_error(Fault::kOutput, names.whole);
 }
 
 /// The middle of three, where one takes less than a tenth of a second; else the first. measure  its seconds, at each call
@@ -72,41 +97,39 @@ Result<double> middle_seconds(Measure&& measure) {
   return seconds[1];
 }
 
-Result<double> read_all(const std::vector<std::string>& parts, std::vector<char>& block, std::uint64_t& bytes) {
+Result<double> read_files(const std::vector<std::string>& parts, const std::atomic<bool>& cancel, std::vector<std::byte>& block,
+                          std::uint64_t& bytes) {
   const Stopwatch reading;
   bytes = 0;
   for (const std::string& part : parts) {
-    if (Status status = read_file(part, block, bytes); !status) return status.error();
+    if (Status status = read_file(part, cancel, block, bytes); !status) return status.error();
   }
   return reading.elapsed().wall;
 }
 
-/// Files of equal size, into a new folder. It is removed afterwards, which no longer counts.
-Result<double> write_all(const std::string& beside, const std::vector<char>& block, const Floor& floor) {
-  const fs::path parent = fs::absolute(beside).parent_path();
-  std::string folder = (parent / ".lamina-timing-XXXXXX").string();
-  if (mkdtemp(folder.data()) == nullptr) return system_error(Fault::kOutput, folder);
-  const Stopwatch writing;
-  Status status;
-  for (std::uint64_t i = 0; status && i < floor.files; ++i) {
+/// Files of equal size, of which no more than two are there at a time. Removing them does not count.
+Result<double> write_files(const Names& names, const std::atomic<bool>& cancel, std::span<const std::byte> block,
+                           const Floor& floor) {
+  double seconds = 0;
+  for (std::uint64_t i = 0; i < floor.files; ++i) {
     const std::uint64_t bytes = floor.bytes_written / floor.files + (i < floor.bytes_written % floor.files ? 1 : 0);
-    status = write_file(fmt::format("{}/{}", folder, i), block, bytes);
+    unlink(names.whole.c_str());  // where there is none yet, there is nothing to remove
+    const Stopwatch writing;
+    if (Status status = write_file(names, cancel, block, bytes); !status) return status.error();
+    seconds += writing.elapsed().wall;
   }
-  const double seconds = writing.elapsed().wall;
-  std::error_code ignored;
-  fs::remove_all(folder, ignored);
-  if (!status) return status.error();
   return seconds;
 }
 
 /// Reads one number a crossing and writes it, 64 MiB at a time. Both places have been written to before: fresh memory costs a
 /// system several times as much, and a program may use what it has again. bench/limits.cpp does the same with real crossings.
-double touch_all(std::uint64_t crossings) {
+Result<double> touch_all(std::uint64_t crossings, const std::atomic<bool>& cancel) {
   const std::size_t block = std::min<std::uint64_t>(crossings, 1u << 24);
   std::vector<std::uint32_t> all(block, 1), copy(block, 2);
   std::uint32_t sum = 0;
   const Stopwatch touching;
   for (std::uint64_t done = 0; done < crossings; done += block) {
+    if (cancel) return interrupted();
     const std::size_t count = std::min<std::uint64_t>(block, crossings - done);
     for (std::size_t i = 0; i < count; ++i) {
       copy[i] = all[i];
@@ -122,17 +145,24 @@ double touch_all(std::uint64_t crossings) {
 
 }  // namespace
 
-Status measure_floor(const std::vector<std::string>& parts, const std::string& output, Floor& floor) {
-  std::vector<char> block(1 << 18, 'x');
-  const Result<double> read = middle_seconds([&] { return read_all(parts, block, floor.bytes_read); });
+Status measure_floor(const std::vector<std::string>& parts, const std::string& beside, const std::atomic<bool>& cancel,
+                     Floor& floor) {
+  std::vector<std::byte> block(1 << 18, std::byte{'x'});
+  const Result<double> read = middle_seconds([&] { return read_files(parts, cancel, block, floor.bytes_read); });
   if (!read) return read.error();
   floor.read = *read;
   if (floor.files > 0) {
-    const Result<double> written = middle_seconds([&] { return write_all(output, block, floor); });
+    const Result<FileTarget> target = find_target(beside);
+    if (!target) return target.error();
+    if (target->file.empty()) return Error{Fault::kOutput, beside + ": is no file; the limit is measured beside one"};
+    const Names names(target->file);
+    const Result<double> written = middle_seconds([&] { return write_files(names, cancel, block, floor); });
     if (!written) return written.error();
     floor.write = *written;
   }
-  floor.touch = touch_all(floor.crossings);
+  const Result<double> touched = touch_all(floor.crossings, cancel);
+  if (!touched) return touched.error();
+  floor.touch = *touched;
   return {};
 }
 

@@ -1,6 +1,7 @@
 // stages/write/null/floor.h: the least time that any program would need for a job's files and rows, measured.
 #pragma once
 
+#include <atomic>
 #include <cstdint>
 #include <string>
 #include <vector>
@@ -17,9 +18,11 @@ struct Floor {
   double seconds() const { return read + write + touch; }
 };
 
-/// Fills in the seconds and the bytes read. What is written goes into a folder beside `output` that is gone afterwards.
+/// Fills in the seconds and the bytes read. What is written are temporary files of `beside` (temporary.h), two at a time, that
+/// are gone afterwards and at a signal; what a killed run leaves, the next one that writes `beside` removes.
 /// Reading and writing count with the middle of three times, where once takes less than 0.1 s. At most 128 MiB of memory.
-/// errors  kInput, kOutput
-Status measure_floor(const std::vector<std::string>& parts, const std::string& output, Floor& floor);
+/// errors  kInput; kOutput: `beside` is a stream, or the system's reason; kInterrupted: `cancel` was set
+Status measure_floor(const std::vector<std::string>& parts, const std::string& beside, const std::atomic<bool>& cancel,
+                     Floor& floor);
 
 }  // namespace lamina::write

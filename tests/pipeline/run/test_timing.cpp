@@ -1,13 +1,68 @@
 // tests/pipeline/run/test_timing.cpp: where the time of a run goes, and the least that it could be.
 #include <gtest/gtest.h>
+#include <sys/resource.h>
+#include <sys/time.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
+#include <atomic>
+#include <chrono>
+#include <csignal>
 #include <nlohmann/json.hpp>
+#include <thread>
 
+#include "pipeline/cli/console.h"
 #include "pipeline/run/timing.h"
+#include "stages/write/file.h"
+#include "stages/write/temporary.h"
 #include "tests/commands/program.h"
 
 namespace lamina::pipeline {
 namespace {
+
+const std::atomic<bool> never{false};
+
+/// So much to write that nobody sees the end of it, in files of 1 MB.
+write::Floor endless_floor() {
+  write::Floor floor;
+  floor.bytes_written = std::uint64_t{1} << 50;
+  floor.files = std::uint64_t{1} << 30;
+  return floor;
+}
+
+/// Waits until a temporary file of `target` is there. returns  false if `give_up` comes first
+template <class GiveUp>
+bool wait_for_temporary(const test::Directory& folder, const std::string& target, const GiveUp& give_up) {
+  for (;;) {
+    for (const std::string& name : test::files_below(folder.path())) {
+      if (write::named_by_temporary(name) == target) return true;
+    }
+    if (give_up()) return false;
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  }
+}
+
+/// Measures the endless limit in a process of its own, which a signal ends. returns  the signal
+int ended_while_measuring(const test::Directory& folder, int signal) {
+  const pid_t child = ::fork();
+  if (child == 0) {
+    const rlimit none{0, 0};
+    ::setrlimit(RLIMIT_CORE, &none);
+    for (const int one : {SIGHUP, SIGINT, SIGQUIT}) std::signal(one, SIG_DFL);  // not as the tests were started
+    handle_signals();
+    write::Floor floor = endless_floor();
+    static_cast<void>(write::measure_floor({}, folder / "part.gcode", never, floor));
+    ::_exit(1);
+  }
+  int result = 0;
+  const bool measures =
+      wait_for_temporary(folder, "part.gcode", [&] { return ::waitpid(child, &result, WNOHANG) == child; });
+  EXPECT_TRUE(measures) << result;
+  if (!measures) return 0;
+  ::kill(child, signal);
+  ::waitpid(child, &result, 0);
+  return WIFSIGNALED(result) ? WTERMSIG(result) : 0;
+}
 
 // Amdahl: a share s alone and the rest on n threads take s + (1 - s) / n of the time of one.
 TEST(Timing, TheShareOfOneThreadFollowsFromWallAndProcessor) {
@@ -28,11 +83,63 @@ TEST(Timing, TheLimitReadsThePartsAndLeavesNothing) {
   floor.bytes_written = 1001;
   floor.files = 3;
   floor.crossings = 100;
-  const Status status = write::measure_floor({folder / "part.stl"}, folder / "out", floor);
+  const Status status = write::measure_floor({folder / "part.stl"}, folder / "out", never, floor);
   ASSERT_TRUE(status.ok()) << status.error().message;
   EXPECT_EQ(floor.bytes_read, 1000u);
   EXPECT_GT(floor.write, 0);
   EXPECT_EQ(test::files_below(folder.path()).size(), 1u);
+}
+
+TEST(Timing, ASignalWhileTheLimitIsMeasuredLeavesNothing) {
+  const test::Directory folder;
+  for (const int signal : {SIGINT, SIGTERM, SIGHUP}) {
+    EXPECT_EQ(ended_while_measuring(folder, signal), signal);
+    EXPECT_EQ(test::tree_text(folder.path()), "") << signal;
+  }
+}
+
+TEST(Timing, WhatAKilledRunLeavesGoesWithTheNextThatWritesTheFile) {
+  const test::Directory folder;
+  ASSERT_EQ(ended_while_measuring(folder, SIGKILL), SIGKILL);
+  ASSERT_TRUE(write::write_file(folder / "part.gcode", "whole").ok());
+  const std::vector<std::string> files = test::files_below(folder.path());
+  EXPECT_EQ(files, std::vector<std::string>{"part.gcode"});
+}
+
+TEST(Timing, AMeasurementThatIsCancelledEndsAndLeavesNothing) {
+  const test::Directory folder;
+  std::atomic<bool> cancel{false};
+  Status status;
+  std::thread measures([&] {
+    write::Floor floor = endless_floor();
+    status = write::measure_floor({}, folder / "part.gcode", cancel, floor);
+  });
+  wait_for_temporary(folder, "part.gcode", [] { return false; });
+  cancel = true;
+  measures.join();
+  ASSERT_FALSE(status.ok());
+  EXPECT_EQ(status.error().fault, Fault::kInterrupted);
+  EXPECT_EQ(test::tree_text(folder.path()), "");
+}
+
+// A timer interrupts every call that may be interrupted; its handler does not have calls started again.
+TEST(Timing, InterruptedCallsGoOn) {
+  const test::Directory folder;
+  test::write_text(folder / "part.stl", std::string(1 << 20, 'x'));
+  struct sigaction action {
+  }, before{};
+  action.sa_handler = [](int) {};
+  sigaction(SIGALRM, &action, &before);
+  const itimerval often{{0, 100}, {0, 100}}, off{};
+  ::setitimer(ITIMER_REAL, &often, nullptr);
+  write::Floor floor;
+  floor.bytes_written = 50 << 20;
+  floor.files = 5;
+  const Status status = write::measure_floor({folder / "part.stl"}, folder / "out", never, floor);
+  ::setitimer(ITIMER_REAL, &off, nullptr);
+  sigaction(SIGALRM, &before, nullptr);
+  ASSERT_TRUE(status.ok()) << status.error().message;
+  EXPECT_EQ(floor.bytes_read, std::uint64_t{1} << 20);
 }
 
 TEST(Timing, ALimitThatWasNotMeasuredHasNoNumbers) {
@@ -40,7 +147,7 @@ TEST(Timing, ALimitThatWasNotMeasuredHasNoNumbers) {
   timing.phases = {{"layers", {2, 3}}};
   timing.floor.bytes_written = 10;
   const test::Directory folder;
-  timing.not_measured = write::measure_floor({folder / "missing.stl"}, folder / "out", timing.floor).error().message;
+  timing.not_measured = write::measure_floor({folder / "missing.stl"}, folder / "out", never, timing.floor).error().message;
   EXPECT_NE(timing.not_measured.find("missing.stl: "), std::string::npos);
   const nlohmann::ordered_json limit = timing_json(timing)["limit"];
   EXPECT_EQ(limit.size(), 1u) << limit;
