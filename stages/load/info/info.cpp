@@ -74,8 +74,9 @@ Result<Description> describe(const std::string& path, const LoadOptions& options
   description.repairs = options.repair;
   description.copies.resize(part->meshes.size(), 0);
   for (const Instance& instance : part->instances) ++description.copies[instance.mesh];
-  for (const Mesh& mesh : part->meshes) {
-    description.diagnosis.push_back(diagnose(mesh, kPlaces));
+  const bool alone = part->instances.size() == 1;  // the lists of others may be sliced together
+  for (Mesh& mesh : part->meshes) {
+    description.diagnosis.push_back(alone ? diagnose_alone(mesh, kPlaces) : diagnose(mesh, kPlaces));
     description.balanced = description.balanced && description.diagnosis.back().balanced;
   }
   description.notes = part->notes;
@@ -91,7 +92,7 @@ Result<Description> describe(const std::string& path, const LoadOptions& options
     return Error{Fault::kInput, path + ": changed while it was read; run it again"};
   description.notes = std::move(planned->notes);
   std::vector<Diagnosis> diagnosis;
-  for (const Mesh& mesh : planned->meshes) diagnosis.push_back(diagnose(mesh, 0));
+  for (Mesh& mesh : planned->meshes) diagnosis.push_back(alone ? diagnose_alone(mesh, 0) : diagnose(mesh, 0));
   if (const Status done = plan(*planned, diagnosis, surplus, description); !done) return done.error();
   return description;
 }

@@ -140,7 +140,7 @@ struct SeenEdges {
   std::uint64_t count = 0;
   bool balanced = true;
 
-  void look(std::span<const Triangle> triangles, const Numbered& mesh, const Stars& stars, const Range& range, Joined& joined) {
+  void look(const Numbered& mesh, const Stars& stars, const Range& range, Joined& joined) {
     Buffer<Side> sides;
     std::vector<std::uint32_t> repeats;
     for (std::uint32_t vertex = range.begin(); vertex != range.end(); ++vertex) {
@@ -151,17 +151,15 @@ struct SeenEdges {
         if (end - begin == 2 && begin[0].forward != begin[1].forward) return;
         odd = odd || end - begin > 1;
         balanced = balanced && surplus(begin, end) == 0;
-        const Indexed::Facet& facet = mesh.facet[begin->facet];
-        const auto at = [&](std::uint32_t number) {
-          const Triangle& t = triangles[begin->facet];
-          return facet[0] == number ? t.a : facet[1] == number ? t.b : t.c;
-        };
         Collector& kind = end - begin == 1 ? open : end - begin == 2 ? misoriented : non_manifold;
-        kind.add(begin->facet, at(begin->low), at(begin->high));
+        kind.add(begin->facet, mesh.vertices()[begin->low], mesh.vertices()[begin->high]);
       });
       if (odd) stars.repeats_of(vertex, repeats);
     }
-    for (const std::uint32_t i : repeats) duplicate.add(i, triangles[i].a, triangles[i].a);
+    for (const std::uint32_t i : repeats) {
+      const Point3 corner = mesh.triangle(i).a;
+      duplicate.add(i, corner, corner);
+    }
   }
   void add(const SeenEdges& other) {
     open.add(other.open);
@@ -194,7 +192,7 @@ Buffer<std::uint32_t> numbered_shells(const Numbered& mesh, std::span<const std:
   Buffer<std::uint32_t> shell_of(parents.size());
   shells = 0;
   for (std::uint32_t i = 0; i < parents.size(); ++i)
-    shell_of[i] = parents[i] != i ? shell_of[parents[i]] : collapsed(mesh.facet[i]) ? UINT32_MAX : shells++;
+    shell_of[i] = parents[i] != i ? shell_of[parents[i]] : collapsed(mesh.facets()[i]) ? UINT32_MAX : shells++;
   return shell_of;
 }
 
@@ -202,11 +200,11 @@ Buffer<std::uint32_t> numbered_shells(const Numbered& mesh, std::span<const std:
 struct SeenShells {
   std::vector<Shell> shell;
 
-  void look(std::span<const Triangle> triangles, std::span<const std::uint32_t> shell_of,
-            std::span<const std::uint8_t> unbalanced, const Point3& from, const Range& range) {
+  void look(const Numbered& mesh, std::span<const std::uint32_t> shell_of, std::span<const std::uint8_t> unbalanced,
+            const Point3& from, const Range& range) {
     for (std::uint32_t i = range.begin(); i != range.end(); ++i) {
       if (shell_of[i] == UINT32_MAX) continue;
-      const Triangle& t = triangles[i];
+      const Triangle t = mesh.triangle(i);
       Shell& one = shell[shell_of[i]];
       one.volume += load::sixfold_volume(t, from);
       for (const Point3& corner : {t.a, t.b, t.c}) one.box.add(corner);
@@ -221,25 +219,27 @@ struct SeenShells {
 /// Every task has a list of all shells of its own: where they are many, one task does it all.
 constexpr std::uint32_t kManyShells = 1024;
 
-}  // namespace
-
-Diagnosis diagnose(const Mesh& mesh, std::size_t places) {
+/// What facets show one by one.
+Diagnosis diagnose_facets(std::span<const Triangle> triangles, std::size_t places) {
   Diagnosis result;
-  const std::span<const Triangle> triangles = mesh.triangles;
   result.triangles = triangles.size();
   const SeenFacets facets = seen_in(all_of(triangles.size()), SeenFacets{Collector(places), {}},
                                     [&](const Range& range, SeenFacets& seen) { seen.look(triangles, range); });
   result.bounds = facets.box;
   result.degenerate_facets = facets.degenerate.finding();
+  return result;
+}
 
-  const Numbered numbered = number_vertices(triangles);
-  result.vertices = numbered.vertices;
-  Joined joined(triangles.size());
+/// What edges and shells show.
+void diagnose_edges(const Numbered& mesh, std::size_t places, Diagnosis& result) {
+  const std::size_t triangles = mesh.facets().size();
+  result.vertices = mesh.vertices().size();
+  Joined joined(triangles);
   {
-    const Stars stars(numbered);
-    const SeenEdges edges = seen_in(all_of(stars.vertices()), SeenEdges(places), [&](const Range& range, SeenEdges& seen) {
-      seen.look(triangles, numbered, stars, range, joined);
-    });
+    const Stars stars(mesh);
+    const SeenEdges edges =
+        seen_in(all_of(stars.vertices()), SeenEdges(places),
+                [&](const Range& range, SeenEdges& seen) { seen.look(mesh, stars, range, joined); });
     result.edges = edges.count;
     result.balanced = edges.balanced;
     result.open_edges = edges.open.finding();
@@ -248,19 +248,34 @@ Diagnosis diagnose(const Mesh& mesh, std::size_t places) {
     result.duplicate_facets = edges.duplicate.finding();
   }
   std::uint32_t count = 0;
-  const Buffer<std::uint32_t> shell_of = numbered_shells(numbered, joined.sets.parents(), count);
+  const Buffer<std::uint32_t> shell_of = numbered_shells(mesh, joined.sets.parents(), count);
   SeenShells shells{std::vector<Shell>(count)};
   const auto measure = [&](const Range& range, SeenShells& seen) {
-    seen.look(triangles, shell_of, joined.unbalanced, result.bounds.lo, range);
+    seen.look(mesh, shell_of, joined.unbalanced, result.bounds.lo, range);
   };
   if (count > kManyShells)
-    measure(all_of(triangles.size()), shells);
+    measure(all_of(triangles), shells);
   else
-    shells = seen_in(all_of(triangles.size()), shells, measure);
+    shells = seen_in(all_of(triangles), shells, measure);
   Int128 volume = 0;
   for (const Shell& shell : shells.shell) volume += shell.volume;
   result.volume_mm3 = static_cast<double>(volume) / 6e18;
   describe_shells(shells.shell, result);
+}
+
+}  // namespace
+
+Diagnosis diagnose(const Mesh& mesh, std::size_t places) {
+  Diagnosis result = diagnose_facets(mesh.triangles, places);
+  diagnose_edges(Numbered(mesh.triangles), places, result);
+  return result;
+}
+
+Diagnosis diagnose_alone(Mesh& mesh, std::size_t places) {
+  Diagnosis result = diagnose_facets(mesh.triangles, places);
+  Numbered numbered(std::move(mesh.triangles));
+  diagnose_edges(numbered, places, result);
+  mesh.triangles = result.shells_apart ? Buffer<Triangle>() : numbered.give_back_list();
   return result;
 }
 

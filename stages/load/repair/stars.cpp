@@ -22,9 +22,9 @@ void sort_sides(Buffer<Side>& sides) {
 
 }  // namespace
 
-Stars::Stars(const Numbered& mesh) : mesh_(mesh), begin_(mesh.vertices + std::size_t{1}) {
+Stars::Stars(const Numbered& mesh) : mesh_(mesh), begin_(mesh.vertices().size() + 1) {
   std::fill(begin_.begin(), begin_.end(), 0u);
-  for (const Indexed::Facet& facet : mesh.facet) {
+  for (const Indexed::Facet& facet : mesh.facets()) {
     const Rising corners = rising(facet);
     ++begin_[corners.low];
     if (!collapsed(facet)) ++begin_[corners.mid];
@@ -33,10 +33,10 @@ Stars::Stars(const Numbered& mesh) : mesh_(mesh), begin_(mesh.vertices + std::si
   std::uint32_t end = 0;
   for (std::uint32_t& list : begin_) list = end += list;
   facets_.resize(end);
-  for (std::size_t f = mesh.facet.size(); f-- > 0;) {
-    const Rising corners = rising(mesh.facet[f]);
+  for (std::size_t f = mesh.facets().size(); f-- > 0;) {
+    const Rising corners = rising(mesh.facets()[f]);
     facets_[--begin_[corners.low]] = static_cast<std::uint32_t>(f);
-    if (!collapsed(mesh.facet[f])) facets_[--begin_[corners.mid]] = static_cast<std::uint32_t>(f);
+    if (!collapsed(mesh.facets()[f])) facets_[--begin_[corners.mid]] = static_cast<std::uint32_t>(f);
   }
 }
 
@@ -44,7 +44,7 @@ bool Stars::sides_of(std::uint32_t vertex, Buffer<Side>& sides) const {
   sides.clear();
   bool all = true;
   for (const std::uint32_t f : of(vertex)) {
-    const Indexed::Facet& facet = mesh_.facet[f];
+    const Indexed::Facet& facet = mesh_.facets()[f];
     if (collapsed(facet)) {
       all = false;
       continue;
@@ -68,9 +68,9 @@ void Stars::repeats_of(std::uint32_t vertex, std::vector<std::uint32_t>& repeats
   };
   std::vector<Key> keys;
   for (const std::uint32_t f : of(vertex)) {
-    Rising corners = rising(mesh_.facet[f]);
+    Rising corners = rising(mesh_.facets()[f]);
     if (corners.low != vertex) continue;
-    if (collapsed(mesh_.facet[f])) corners.forward = true;  // it has no orientation
+    if (collapsed(mesh_.facets()[f])) corners.forward = true;  // it has no orientation
     keys.push_back({corners, f});
   }
   const auto shape = [](const Key& key) { return std::tuple(key.corners.mid, key.corners.high, key.corners.forward); };

@@ -3,6 +3,9 @@
 
 #include <algorithm>
 #include <array>
+#include <cstring>
+
+#include "stages/geometry/blocks/pages.h"
 
 namespace lamina::load {
 namespace {
@@ -10,6 +13,8 @@ namespace {
 constexpr std::uint32_t kFree = UINT32_MAX;
 /// So many facets are hashed before the first of them is looked up: the table's lines are on their way meanwhile.
 constexpr std::size_t kAhead = 16;
+/// So many triangles are read before their memory goes back to the system.
+constexpr std::size_t kTogether = std::size_t{1} << 14;
 
 inline std::uint64_t hash_of(const Point3& p) {
   const std::uint64_t xy = static_cast<std::uint32_t>(p.x) | std::uint64_t{static_cast<std::uint32_t>(p.y)} << 32;
@@ -28,6 +33,7 @@ class Table {
     clear(slots);
   }
   std::uint32_t size() const { return static_cast<std::uint32_t>(points_.size()); }
+  Buffer<Point3> take_points() { return std::move(points_); }
   void prefetch(std::uint64_t hashed) const { __builtin_prefetch(&slots_[hashed >> shift_]); }
 
   std::uint32_t number_of(const Point3& p, std::uint64_t hashed) {
@@ -66,11 +72,9 @@ class Table {
   int shift_ = 64;  // the upper bits of a hash are the slot: they depend on all of the point
 };
 
-}  // namespace
-
-Numbered number_vertices(std::span<const Triangle> triangles) {
-  Numbered mesh;
-  mesh.facet.resize(triangles.size());
+/// Calls put(i, facet) for each triangle in order, once nothing of it is read any more. returns  the vertices
+template <class Put>
+Buffer<Point3> number_vertices(std::span<const Triangle> triangles, const Put& put) {
   Table table(triangles.size() / 2 + triangles.size() / 16);  // a closed mesh has half as many vertices as facets
   std::array<std::uint64_t, 3 * kAhead> hashes;
   for (std::size_t first = 0; first < triangles.size(); first += kAhead) {
@@ -82,14 +86,48 @@ Numbered number_vertices(std::span<const Triangle> triangles) {
     }
     for (std::size_t i = 0; i < count; ++i) {
       const Triangle& t = triangles[first + i];
-      Indexed::Facet& facet = mesh.facet[first + i];
+      Indexed::Facet facet;
       facet[0] = table.number_of(t.a, hashes[3 * i]);
       facet[1] = table.number_of(t.b, hashes[3 * i + 1]);
       facet[2] = table.number_of(t.c, hashes[3 * i + 2]);
+      put(first + i, facet);
     }
   }
-  mesh.vertices = table.size();
-  return mesh;
+  return table.take_points();
+}
+
+char* place_of(Indexed::Facet* facets, std::size_t facet) { return reinterpret_cast<char*>(facets + facet); }
+
+}  // namespace
+
+Numbered::Numbered(std::span<const Triangle> triangles) : own_(triangles.size()), facets_(own_) {
+  vertices_ = number_vertices(triangles, [&](std::size_t i, const Indexed::Facet& facet) { own_[i] = facet; });
+}
+
+// Facet i lies where triangle i / 3 was, which has been read by then.
+Numbered::Numbered(Buffer<Triangle>&& triangles) : taken_(std::move(triangles)) {
+  const std::size_t count = taken_.size();
+  auto* const facets = reinterpret_cast<Indexed::Facet*>(taken_.data());
+  char* unused = place_of(facets, count);  // from here on; what is read of it goes back
+  vertices_ = number_vertices(taken_, [&](std::size_t i, const Indexed::Facet& facet) {
+    std::memcpy(place_of(facets, i), &facet, sizeof facet);
+    if ((i + 1) % kTogether != 0 && i + 1 != count) return;
+    char* const read = reinterpret_cast<char*>(taken_.data() + i + 1);
+    if (read <= unused) return;
+    forget_pages(unused, read);
+    unused = read;
+  });
+  facets_ = {facets, count};
+}
+
+// From the end: triangle i covers facets from 3 i on, which have been read by then.
+Buffer<Triangle> Numbered::give_back_list() {
+  for (std::size_t i = taken_.size(); i-- > 0;) {
+    const Triangle t = triangle(static_cast<std::uint32_t>(i));
+    std::memcpy(static_cast<void*>(taken_.data() + i), &t, sizeof t);
+  }
+  facets_ = {};
+  return std::move(taken_);
 }
 
 }  // namespace lamina::load
