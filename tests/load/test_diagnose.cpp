@@ -1,12 +1,14 @@
 // tests/load/test_diagnose.cpp: diagnose() against one that looks everything up in ordered maps.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <map>
 #include <random>
 #include <set>
 #include <tuple>
 
 #include "stages/load/repair/diagnose.h"
+#include "stages/load/repair/geometry.h"
 
 namespace lamina {
 namespace {
@@ -113,6 +115,47 @@ TEST(Diagnose, FindsInFacetsAtRandomWhatOrderedMapsFind) {
       EXPECT_EQ(finding->count, kind->all.size()) << round;
       EXPECT_EQ(places_of(*finding), kind->first(4)) << round;
     }
+    const load::Diagnosis alone = load::diagnose_alone(mesh, 4);
+    EXPECT_EQ(places_of(alone.open_edges), places_of(found.open_edges));
+    EXPECT_EQ(places_of(alone.duplicate_facets), places_of(found.duplicate_facets));
+    EXPECT_EQ(alone.volume_mm3, found.volume_mm3);
+    EXPECT_EQ(alone.shells_apart, found.shells_apart);
+    if (alone.shells_apart) triangles.clear();
+    EXPECT_TRUE(std::ranges::equal(mesh.triangles, triangles)) << round;
+  }
+}
+
+/// Lists of more than a task looks at, whose memory goes back piece by piece.
+TEST(Diagnose, InTheMemoryOfTheListFindsTheSameAndGivesItBackWhereShellsMayOverlap) {
+  for (const Nm rise : {0, 5}) {
+    Mesh mesh;
+    for (Nm i = 0; i < 50'000; ++i) {  // tetrahedra side by side, or each a little higher within the next one's box
+      const Nm x = rise == 0 ? 20 * i : i, z = rise * i;
+      const Point3 p{x, 0, z}, q{x + 10, 0, z}, r{x, 10, z}, s{x, 0, z + 10};
+      for (const Triangle& t : {Triangle{p, r, q}, {p, q, s}, {q, r, s}, {r, p, s}}) mesh.triangles.push_back(t);
+    }
+    const Buffer<Triangle> list = mesh.triangles;
+    const load::Diagnosis found = load::diagnose(mesh), alone = load::diagnose_alone(mesh);
+    EXPECT_EQ(found.shells, 50'000u);
+    EXPECT_EQ(alone.shells, found.shells);
+    EXPECT_EQ(alone.edges, found.edges);
+    EXPECT_EQ(alone.vertices, found.vertices);
+    EXPECT_EQ(alone.volume_mm3, found.volume_mm3);
+    EXPECT_EQ(alone.shells_apart, rise == 0);
+    EXPECT_TRUE(rise == 0 ? mesh.triangles.empty() : std::ranges::equal(mesh.triangles, list));
+  }
+}
+
+/// Where the numbers of a normal begin to need more than 64 bits.
+TEST(Diagnose, AreasAndVolumesOfTheLargestFacetsAreExact) {
+  constexpr Nm kHigh = 2'147'000'000;
+  for (const Nm lo : {-kHigh, 0, 300'000'000}) {
+    const Triangle t{{lo, lo, 0}, {kHigh, lo, 1}, {lo, kHigh, -1}};
+    const load::Int128 side = load::Int128{kHigh} - lo;
+    EXPECT_TRUE(load::doubled_area(t) == (std::array<load::Int128, 3>{-side, side, side * side})) << lo;
+    EXPECT_TRUE(load::has_area(t));
+    EXPECT_FALSE(load::has_area({t.a, t.b, t.a}));
+    EXPECT_TRUE(load::sixfold_volume(t, {lo, lo, -kHigh}) == side * side * kHigh) << lo;
   }
 }
 
