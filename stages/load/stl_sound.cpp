@@ -56,7 +56,7 @@ std::optional<Mesh> read_sound_stl(const Source& source, const Snapper& snapper,
   const auto blocks = std::make_shared<MeshBlocks>(triangles, 0);
   Buffer<Prisms> pieces(blocks->block_count());
   const std::uint64_t share = sampled_share(triangles);
-  Workers workers([] { return std::make_unique<Worker>(); });
+  Workers workers([] { return std::make_unique_for_overwrite<Worker>(); });
   std::atomic<bool> failed{false};
   tbb::parallel_for(tbb::blocked_range<std::uint32_t>(0, blocks->block_count()),
                     [&](const tbb::blocked_range<std::uint32_t>& range) {

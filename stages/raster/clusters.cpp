@@ -4,6 +4,12 @@
 
 namespace lamina::raster {
 
-ClusteredMesh make_clusters(Mesh& mesh) { return {take_blocks(mesh), mesh.closed}; }
+std::vector<ClusteredMesh> make_clusters(std::span<Mesh> meshes) {
+  std::vector<std::shared_ptr<MeshBlocks>> blocks = take_blocks(meshes);
+  std::vector<ClusteredMesh> clustered;
+  clustered.reserve(meshes.size());
+  for (std::size_t i = 0; i < meshes.size(); ++i) clustered.emplace_back(std::move(blocks[i]), meshes[i].closed);
+  return clustered;
+}
 
 }  // namespace lamina::raster

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <memory>
 #include <span>
+#include <vector>
 
 #include "stages/data/mesh.h"
 #include "stages/geometry/blocks/mesh_blocks.h"
@@ -42,8 +43,9 @@ class ClusteredMesh {
   std::shared_ptr<const MeshBlocks> blocks_;
 };
 
-/// Groups the triangles of a mesh into clusters and takes them out of the mesh (block_maker.h).
+/// Groups the triangles of meshes into clusters and takes them out of the meshes (block_maker.h).
 /// cost: O(T), parallel; nothing where the loader has made blocks
-ClusteredMesh make_clusters(Mesh& mesh);
+std::vector<ClusteredMesh> make_clusters(std::span<Mesh> meshes);
+inline ClusteredMesh make_clusters(Mesh& mesh) { return make_clusters(std::span(&mesh, 1)).front(); }
 
 }  // namespace lamina::raster

@@ -189,18 +189,31 @@ void CrossingSums::Table::fit(std::size_t most) {
 }
 
 CrossingSums sum_crossings(const ClusteredMesh& mesh) {
-  tbb::enumerable_thread_specific<CrossingSums> sums;
-  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, mesh.cluster_count(), 1024),
-                    [&](const tbb::blocked_range<std::size_t>& range) {
-                      CrossingSums& own = sums.local();
-                      Cluster room;
-                      for (auto c = static_cast<std::uint32_t>(range.begin()); c != range.end(); ++c) {
-                        own.add(mesh.cluster(c, room), mesh.bounds[c]);
-                      }
-                    });
+  using Range = tbb::blocked_range<std::uint32_t>;
+  constexpr std::uint32_t kTogether = 1024;  // clusters
+  const Range clusters(0, mesh.cluster_count(), kTogether);
+  const auto add = [&](const Range& range, CrossingSums& to) {
+    Cluster room;
+    for (std::uint32_t c = range.begin(); c != range.end(); ++c) to.add(mesh.cluster(c, room), mesh.bounds[c]);
+  };
   CrossingSums all;
+  if (clusters.size() <= kTogether) {
+    add(clusters, all);
+    return all;
+  }
+  tbb::enumerable_thread_specific<CrossingSums> sums;
+  tbb::parallel_for(clusters, [&](const Range& range) { add(range, sums.local()); });
   for (const CrossingSums& one_thread : sums) all.merge(one_thread);
   return all;
+}
+
+std::vector<CrossingSums::Table> crossing_tables(std::span<const ClusteredMesh> meshes) {
+  std::vector<CrossingSums::Table> tables(meshes.size());
+  tbb::parallel_for(std::size_t{0}, meshes.size(), [&](std::size_t i) {
+    tables[i] = sum_crossings(meshes[i]).table();
+    tables[i].fit(most_slabs_of(meshes[i].cluster_count()));
+  });
+  return tables;
 }
 
 LayerBound::LayerBound(std::span<const PlacedMesh> placed, std::span<const ClusteredMesh> meshes,

@@ -66,6 +66,9 @@ constexpr std::size_t most_slabs_of(std::uint32_t clusters) { return std::size_t
 /// Counts all clusters of a mesh. cost: one parallel pass over its facets
 CrossingSums sum_crossings(const ClusteredMesh& mesh);
 
+/// What is kept of each mesh. cost: as above; small meshes side by side
+std::vector<CrossingSums::Table> crossing_tables(std::span<const ClusteredMesh> meshes);
+
 /// The same of everything on the bed.
 class LayerBound {
  public:

@@ -3,6 +3,8 @@
 #include <tbb/global_control.h>
 
 #include <algorithm>
+#include <fstream>
+#include <iterator>
 #include <random>
 #include <tuple>
 #include <vector>
@@ -146,6 +148,31 @@ TEST(Blocks, AreTheSameForEveryNumberOfThreads) {
   const auto all = [](const MeshBlocks& blocks) { return triangles_in(blocks, 0, blocks.cluster_count(), UINT32_MAX); };
   EXPECT_EQ(all(*one), all(*eight));
   EXPECT_EQ(one->bytes(), eight->bytes());
+}
+
+/// Stretches of addresses that the process has.
+std::size_t mappings() {
+  std::ifstream maps("/proc/self/maps");
+  return static_cast<std::size_t>(std::count(std::istreambuf_iterator<char>(maps), {}, '\n'));
+}
+
+TEST(Blocks, OfManySmallMeshesAreThoseOfEachAloneAndHaveNoPagesOfTheirOwn) {
+  const std::vector<Triangle> list = grid_of_facets(2000), apart = facets_apart(9000);
+  std::vector<Mesh> meshes;
+  for (std::uint32_t i = 0; i < 1500; ++i) meshes.push_back(mesh_of_list({list.begin(), list.begin() + 1 + i}));
+  meshes.push_back(mesh_of_list(apart));
+  std::vector<Mesh> again = meshes;
+  const std::size_t before = mappings();
+  const auto blocks = take_blocks(meshes);
+  EXPECT_LT(mappings(), before + 200);
+  ASSERT_EQ(blocks.size(), meshes.size());
+  for (std::size_t i = 0; i < meshes.size(); i += 25) {
+    const auto alone = take_blocks(again[i]);
+    const auto all = [](const MeshBlocks& one) { return triangles_in(one, 0, one.cluster_count(), UINT32_MAX); };
+    EXPECT_EQ(all(*blocks[i]), all(*alone)) << i;
+    EXPECT_EQ(blocks[i]->bytes(), alone->bytes());
+    EXPECT_TRUE(meshes[i].triangles.empty());
+  }
 }
 
 TEST(Blocks, AreOrderedByHeightSoThatAPlaneMeetsFewClusters) {

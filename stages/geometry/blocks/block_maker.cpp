@@ -5,6 +5,7 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <bit>
 #include <cstring>
 #include <numeric>
 
@@ -36,7 +37,10 @@ inline std::uint32_t mask_of(bool yes) { return -static_cast<std::uint32_t>(yes)
 /// new vertex would be, and masks choose.
 bool BlockMaker::number_vertices(std::span<const Triangle> triangles, std::span<const std::uint16_t> hashes) {
   const auto count = static_cast<std::uint32_t>(triangles.size()), most = count * 3 / 2;
-  slot_.fill(kNone);
+  // Few vertices take few slots, which are emptied in no time.
+  const std::uint32_t slots = std::min(kSlots, std::bit_ceil(4 * count));
+  std::fill_n(slot_.begin(), slots, kNone);
+  vertex_[kNone] = {};
   std::uint32_t vertices = 0;
   for (std::uint32_t i = 0; i < count && vertices <= most; ++i) {
     const Point3* const corner = &triangles[order_[i]].a;
@@ -44,9 +48,9 @@ bool BlockMaker::number_vertices(std::span<const Triangle> triangles, std::span<
     std::uint16_t* const out = &cluster_[i / kClusterSize].corner[0][i % kClusterSize];
     for (std::uint32_t k = 0; k < 3; ++k) {
       const Point3 p = corner[k];
-      std::uint32_t at = corner_hash[k] % kSlots, number = slot_[at], is_new = mask_of(number == kNone);
+      std::uint32_t at = corner_hash[k] & (slots - 1), number = slot_[at], is_new = mask_of(number == kNone);
       while ((difference(vertex_[number], p) & ~is_new) != 0) [[unlikely]] {
-          at = (at + 1) % kSlots;
+          at = (at + 1) & (slots - 1);
           number = slot_[at];
           is_new = mask_of(number == kNone);
         }
@@ -122,14 +126,17 @@ void BlockMaker::make(std::span<const Triangle> triangles, MeshBlocks& mesh, std
   make(triangles, {hash_.data(), next}, mesh, block);
 }
 
-std::shared_ptr<MeshBlocks> take_blocks(Mesh& mesh) {
+namespace {
+
+using Makers = tbb::enumerable_thread_specific<std::unique_ptr<BlockMaker>>;
+
+std::shared_ptr<MeshBlocks> take_blocks_of(Mesh& mesh, Makers& makers) {
   if (mesh.blocks) return std::move(mesh.blocks);
   const auto total = static_cast<std::uint32_t>(mesh.triangles.size()), own = std::min(mesh.repaired_from, total);
   Buffer<Triangle> list = std::move(mesh.triangles);
   mesh.triangles = {};
   auto blocks = std::make_shared<MeshBlocks>(own, total - own);
   constexpr std::uint32_t kTogether = 16;  // blocks, 2.25 MiB of the list
-  tbb::enumerable_thread_specific<std::unique_ptr<BlockMaker>> makers([] { return std::make_unique<BlockMaker>(); });
   tbb::parallel_for(
       tbb::blocked_range<std::uint32_t>(0, blocks->block_count(), kTogether),
       [&](const tbb::blocked_range<std::uint32_t>& range) {
@@ -147,5 +154,16 @@ std::shared_ptr<MeshBlocks> take_blocks(Mesh& mesh) {
   blocks->seal();
   return blocks;
 }
+
+}  // namespace
+
+std::vector<std::shared_ptr<MeshBlocks>> take_blocks(std::span<Mesh> meshes) {
+  std::vector<std::shared_ptr<MeshBlocks>> blocks(meshes.size());
+  Makers makers(new_block_maker);
+  tbb::parallel_for(std::size_t{0}, meshes.size(), [&](std::size_t i) { blocks[i] = take_blocks_of(meshes[i], makers); });
+  return blocks;
+}
+
+std::shared_ptr<MeshBlocks> take_blocks(Mesh& mesh) { return std::move(take_blocks(std::span(&mesh, 1)).front()); }
 
 }  // namespace lamina

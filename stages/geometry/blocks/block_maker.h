@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <memory>
 #include <span>
+#include <vector>
 
 #include "stages/geometry/blocks/mesh_blocks.h"
 
@@ -34,12 +35,18 @@ class BlockMaker {
   std::array<std::uint16_t, kBlockSize> order_;
   std::array<std::uint16_t, kSlots> slot_;  // numbers of vertices, by hash
   std::array<std::uint16_t, 3 * kBlockSize> hash_;
-  std::uint32_t vertices_ = 0;
+  std::uint32_t vertices_;
 };
+
+/// A maker whose scratch memory is unset until it is used: blocks of few triangles touch little of it.
+inline std::unique_ptr<BlockMaker> new_block_maker() { return std::make_unique_for_overwrite<BlockMaker>(); }
 
 /// Takes the triangles out of a mesh and makes blocks of them; a mesh that has blocks already gives these. The list's
 /// memory goes back to the system while blocks are made.
 /// cost  O(T), parallel; no more memory than the list and a block a thread
 std::shared_ptr<MeshBlocks> take_blocks(Mesh& mesh);
+
+/// The same of many meshes at once: those of few triangles by one thread each.
+std::vector<std::shared_ptr<MeshBlocks>> take_blocks(std::span<Mesh> meshes);
 
 }  // namespace lamina

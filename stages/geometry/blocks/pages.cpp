@@ -14,7 +14,12 @@ std::uint64_t rounded_up(std::uint64_t bytes, std::uint64_t to) { return (bytes 
 
 }  // namespace
 
-Pages::Pages(std::uint64_t most_bytes) : mapped_(rounded_up(most_bytes, kPage)) {
+/// The head of a piece, whose bytes follow.
+struct alignas(kPiece) Pages::HeapPiece {
+  HeapPiece* before;
+};
+
+Pages::Pages(std::uint64_t most_bytes) : mapped_(most_bytes <= kLittle ? 0 : rounded_up(most_bytes, kPage)) {
   if (mapped_ == 0) return;
   void* const place = ::mmap(nullptr, mapped_, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE, -1, 0);
   if (place == MAP_FAILED) throw std::bad_alloc();
@@ -24,15 +29,30 @@ Pages::Pages(std::uint64_t most_bytes) : mapped_(rounded_up(most_bytes, kPage)) 
 
 Pages::~Pages() {
   if (mapped_ > 0) ::munmap(begin_, mapped_);
+  for (HeapPiece* piece = last_; piece != nullptr;) {
+    HeapPiece* const before = piece->before;
+    ::operator delete (piece, std::align_val_t{kPiece});
+    piece = before;
+  }
+}
+
+char* Pages::take_from_heap(std::uint64_t bytes) {
+  auto* const piece = static_cast<HeapPiece*>(::operator new (sizeof(HeapPiece) + bytes, std::align_val_t{kPiece}));
+  piece->before = last_;
+  while (!last_.compare_exchange_weak(piece->before, piece)) {
+  }
+  return reinterpret_cast<char*>(piece + 1);
 }
 
 char* Pages::take(std::size_t bytes) {
   const std::uint64_t rounded = rounded_up(bytes, kPiece), at = taken_.fetch_add(rounded);
+  if (begin_ == nullptr) return take_from_heap(rounded);
   assert(at + rounded <= mapped_);
   return begin_ + at;
 }
 
 void Pages::give_back_rest() {
+  if (begin_ == nullptr) return;
   const std::uint64_t used = rounded_up(taken_, kPage);
   if (used < mapped_) ::munmap(begin_ + used, mapped_ - used);
   mapped_ = used;

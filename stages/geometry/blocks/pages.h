@@ -8,7 +8,8 @@
 namespace lamina {
 
 /// Addresses for as much as may be needed; memory only for what is written. Pieces lie side by side, so that large pages
-/// serve them, which are faulted in 500 times as fast as small ones.
+/// serve them, which are faulted in 500 times as fast as small ones. Where little may be needed, each piece comes from the
+/// heap instead: of thousands of small meshes none has pages of its own.
 class Pages {
  public:
   /// throws  std::bad_alloc: the system has no such room
@@ -26,8 +27,13 @@ class Pages {
   std::uint64_t bytes() const { return taken_; }
 
  private:
-  char* begin_ = nullptr;
+  static constexpr std::uint64_t kLittle = 256 << 10;
+  struct HeapPiece;
+  char* take_from_heap(std::uint64_t bytes);
+
+  char* begin_ = nullptr;  // null: pieces come from the heap
   std::uint64_t mapped_ = 0;
+  std::atomic<HeapPiece*> last_{nullptr};
   std::atomic<std::uint64_t> taken_{0};
 };
 
