@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <filesystem>
+#include <optional>
 #include <vector>
 
 #include "stages/write/replaceable.h"
@@ -56,11 +57,29 @@ const std::string* directory_read(const std::string& file, const Arguments& argu
   return found == arguments.operands.end() ? nullptr : &*found;
 }
 
-/// Whether a run in that directory would remove or replace a file.
-bool lies_in_layers(const std::string& file, const std::string& directory) {
+/// What no input may be, or lie in: an output that is there, and the folders in which a run would remove or replace files.
+struct Taken {
+  const std::string* output;
+  write::FileId id;
+  bool folder;
+};
+
+std::vector<Taken> taken_by(std::span<const std::string> outputs) {
+  std::vector<Taken> taken;
+  for (const std::string& output : outputs) {
+    if (const auto id = write::file_id(output)) taken.push_back({&output, *id, false});
+    for (const char* below : {"/layers", "/program"}) {
+      if (const auto id = write::file_id(output + below)) taken.push_back({&output, *id, true});
+    }
+  }
+  return taken;
+}
+
+/// The folder of a file, or of what a link leads to.
+std::optional<write::FileId> folder_id(const std::string& file) {
   std::error_code ignored;
-  const std::string place = fs::weakly_canonical(fs::absolute(file, ignored), ignored).parent_path().string();
-  return write::same_file(place, directory + "/layers") || write::same_file(place, directory + "/program");
+  const fs::path place = fs::is_symlink(file, ignored) ? fs::weakly_canonical(file, ignored) : fs::absolute(file, ignored);
+  return write::file_id(place.parent_path().string());
 }
 
 std::vector<InputFile> inputs_of(const Arguments& arguments, std::string_view operand_role) {
@@ -112,18 +131,20 @@ bool is_input_option(std::string_view flag) {
 bool is_output_option(std::string_view flag) { return std::ranges::find(kOutputs, flag) != std::end(kOutputs); }
 
 Status check_outputs(std::span<const InputFile> inputs, std::span<const std::string> outputs) {
+  const std::vector<Taken> taken = taken_by(outputs);  // looked up once, for there may be thousands of inputs
+  if (taken.empty()) return {};
   for (const InputFile& input : inputs) {
     if (!write::is_file(input.path)) continue;
-    for (const std::string& output : outputs) {
-      if (write::same_file(input.path, output)) {
-        return Error{Fault::kUsage, fmt::format("{}: is read by this call as {}; name another output", output, input.role)};
-      }
-      if (lies_in_layers(input.path, output)) {
-        return Error{Fault::kUsage, fmt::format("{}: is read by this call as {}, and lies among the layers of the output {}; "
-                                                "name another output",
-                                                input.path, input.role, output)};
-      }
+    const auto file = write::file_id(input.path), folder = folder_id(input.path);
+    const auto found = std::ranges::find_if(taken, [&](const Taken& one) { return (one.folder ? folder : file) == one.id; });
+    if (found == taken.end()) continue;
+    if (!found->folder) {
+      return Error{Fault::kUsage,
+                   fmt::format("{}: is read by this call as {}; name another output", *found->output, input.role)};
     }
+    return Error{Fault::kUsage, fmt::format("{}: is read by this call as {}, and lies among the layers of the output {}; "
+                                            "name another output",
+                                            input.path, input.role, *found->output)};
   }
   return {};
 }

@@ -13,11 +13,15 @@ constexpr std::size_t kMarkedHead = 4096;  // bytes of a file in which its mark 
 
 }  // namespace
 
+std::optional<FileId> file_id(const std::string& path) {
+  struct stat status {};
+  if (::stat(path.c_str(), &status) != 0) return std::nullopt;
+  return FileId{status.st_dev, status.st_ino};
+}
+
 bool same_file(const std::string& a, const std::string& b) {
-  struct stat first {
-  }, second{};
-  return ::stat(a.c_str(), &first) == 0 && ::stat(b.c_str(), &second) == 0 && first.st_dev == second.st_dev &&
-         first.st_ino == second.st_ino;
+  const std::optional<FileId> first = file_id(a);
+  return first && first == file_id(b);
 }
 
 bool is_file(const std::string& path) {

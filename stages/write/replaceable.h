@@ -3,11 +3,21 @@
 // Names are followed through links. cost  a system call or two; is_replaceable reads at most 4 KiB
 #pragma once
 
+#include <cstdint>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
 
 namespace lamina::write {
+
+/// What tells files and directories apart, whatever their names.
+struct FileId {
+  std::uint64_t device = 0, inode = 0;
+  friend bool operator==(const FileId&, const FileId&) = default;
+};
+/// Of what a name leads to; nothing if it is absent.
+std::optional<FileId> file_id(const std::string& path);
 
 /// Whether two names lead to the same file or directory, by device and inode; false if one of them is absent.
 bool same_file(const std::string& a, const std::string& b);
