@@ -23,6 +23,12 @@ Isa of_processor() {
 #endif
 }
 
+/// The variable as it was first seen.
+const char* cap() {
+  static const char* const value = std::getenv("LAMINA_ISA");
+  return value;
+}
+
 }  // namespace
 
 std::string_view isa_name(Isa isa) { return kNames[static_cast<std::size_t>(isa)]; }
@@ -36,18 +42,28 @@ Isa capped_isa(Isa isa, const char* cap) {
 }
 
 Isa widest_isa() {
-  static const Isa isa = capped_isa(of_processor(), std::getenv("LAMINA_ISA"));
+  static const Isa isa = capped_isa(of_processor(), cap());
   return isa;
 }
 
-Result<Isa> usable_isa(Isa wanted) {
-  const Isa widest = widest_isa();
+Result<Isa> usable_isa(Isa wanted, Isa of_processor, const char* cap) {
+  const Isa widest = capped_isa(of_processor, cap);
   if (wanted == Isa::kAuto) return widest;
-  if (wanted > widest) {
+  if (wanted > of_processor) {
     return Error{Fault::kUsage, fmt::format("run.isa: {} is more than this processor has; use auto, or {} at most",
                                             isa_name(wanted), isa_name(widest))};
   }
+  if (wanted > widest) {
+    return Error{Fault::kUsage, fmt::format("run.isa: {} is more than the environment variable LAMINA_ISA={} allows; unset "
+                                            "it, or use auto, or {} at most",
+                                            isa_name(wanted), cap, isa_name(widest))};
+  }
   return wanted;
+}
+
+Result<Isa> usable_isa(Isa wanted) {
+  static const Isa processor = of_processor();
+  return usable_isa(wanted, processor, cap());
 }
 
 }  // namespace lamina

@@ -21,7 +21,10 @@ Isa widest_isa();
 Isa capped_isa(Isa isa, const char* cap);
 
 /// The set to use where `wanted` is wished for; kAuto is the widest.
-/// errors  kUsage if the processor does not have it
+/// errors  kUsage if the processor does not have it, or LAMINA_ISA does not allow it
 Result<Isa> usable_isa(Isa wanted);
+
+/// The same for a processor and a value of LAMINA_ISA; nullptr: it is not set.
+Result<Isa> usable_isa(Isa wanted, Isa of_processor, const char* cap);
 
 }  // namespace lamina

@@ -16,11 +16,23 @@ TEST(Isa, WhatTheProcessorHasIsUsedAndWhatItLacksIsRefusedInALine) {
       EXPECT_EQ(*usable, isa);
     } else {
       EXPECT_EQ(usable.error().fault, Fault::kUsage);
-      EXPECT_EQ(usable.error().message, "run.isa: " + std::string(isa_name(isa)) +
-                                            " is more than this processor has; use auto, or " + std::string(isa_name(widest)) +
-                                            " at most");
+      const std::string& told = usable.error().message;
+      EXPECT_TRUE(told.starts_with("run.isa: " + std::string(isa_name(isa)) + " is more than ")) << told;
+      EXPECT_TRUE(told.ends_with("use auto, or " + std::string(isa_name(widest)) + " at most")) << told;
     }
   }
+}
+
+TEST(Isa, WhoeverIsInTheWayIsNamed) {
+  EXPECT_EQ(usable_isa(Isa::kAvx512, Isa::kAvx2, nullptr).error().message,
+            "run.isa: avx512 is more than this processor has; use auto, or avx2 at most");
+  EXPECT_EQ(usable_isa(Isa::kAvx512, Isa::kAvx2, "plain").error().message,
+            "run.isa: avx512 is more than this processor has; use auto, or plain at most");
+  EXPECT_EQ(usable_isa(Isa::kAvx512, Isa::kAvx512, "avx2").error().message,
+            "run.isa: avx512 is more than the environment variable LAMINA_ISA=avx2 allows; unset it, or use auto, or avx2 at "
+            "most");
+  EXPECT_EQ(*usable_isa(Isa::kAuto, Isa::kAvx512, "plain"), Isa::kPlain);
+  EXPECT_EQ(*usable_isa(Isa::kAvx2, Isa::kAvx512, "avx2"), Isa::kAvx2);
 }
 
 TEST(Isa, ACapTakesInstructionsAwayAndGivesNone) {
