@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "stages/geometry/blocks/block_maker.h"
+
 namespace lamina::pipeline {
 namespace {
 
@@ -40,7 +42,7 @@ struct Group {
   std::vector<std::uint32_t> own_mesh;  // by mesh of the scene; UINT32_MAX: not here yet
 };
 
-/// Moves meshes into the groups; copies a mesh used by two groups.
+/// Moves meshes into the groups; two that use the same share its blocks.
 std::vector<Group> groups_of(Scene& scene, const Job& job, const Materials& materials) {
   const std::vector<std::uint32_t> level = levels_of(scene, job, materials);
   std::vector<Group> groups;
@@ -83,6 +85,12 @@ Result<Solids> Solids::build(Scene& scene, const Job& job, const PixelGrid& grid
     result.solids_.push_back({std::move(material), std::move(*built), std::move(instance)});
     return {};
   };
+  // Made here, so that a mesh in two groups is there once.
+  std::vector<std::shared_ptr<MeshBlocks>> blocks = take_blocks(scene.meshes);
+  for (std::size_t i = 0; i < blocks.size(); ++i) {
+    result.mesh_bytes_ += blocks[i]->bytes();
+    scene.meshes[i].blocks = std::move(blocks[i]);
+  }
   if (!materials.several()) {
     if (Status status = add(scene.meshes, scene.instances, {}, {}); !status) return status.error();
     return result;
@@ -104,12 +112,6 @@ std::uint64_t Solids::layer_bytes_bound(Nm plane) const {
 std::uint64_t Solids::crossings_bound(Nm plane) const {
   std::uint64_t total = 0;
   for (const Solid& solid : solids_) total += solid.rasterizer.crossings_bound(plane);
-  return total;
-}
-
-std::uint64_t Solids::mesh_bytes() const {
-  std::uint64_t total = 0;
-  for (const Solid& solid : solids_) total += solid.rasterizer.mesh_bytes();
   return total;
 }
 

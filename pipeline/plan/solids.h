@@ -35,11 +35,13 @@ class Solids {
   // Sums over all solids, at a height.
   std::uint64_t layer_bytes_bound(Nm plane) const;
   std::uint64_t crossings_bound(Nm plane) const;
-  std::uint64_t mesh_bytes() const;
   std::uint64_t index_bytes() const;
+
+  std::uint64_t mesh_bytes() const { return mesh_bytes_; }  // each mesh once
 
  private:
   std::vector<Solid> solids_;
+  std::uint64_t mesh_bytes_ = 0;
 };
 
 }  // namespace lamina::pipeline
