@@ -2,12 +2,6 @@
 
 namespace lamina {
 
-LAMINA_EMBREE(LAMINA_LATE_DEFINED)
-
-Status load_embree() {
-  static const Status loaded =
-      load_library(LAMINA_EMBREE_FILE, std::initializer_list<LateFunction>{LAMINA_EMBREE(LAMINA_LATE_NAMED)});
-  return loaded;
-}
+LAMINA_LATE_LIBRARY(LAMINA_EMBREE, LAMINA_EMBREE_FILE, load_embree)
 
 }  // namespace lamina

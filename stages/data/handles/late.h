@@ -5,6 +5,7 @@
 // function that is used, of the function's own name: calls within the namespace mean it, and read as if it were linked.
 #pragma once
 
+#include <initializer_list>
 #include <span>
 
 #include "stages/data/status.h"
@@ -29,3 +30,10 @@ Status load_library(const char* file, std::span<const LateFunction> functions);
 #define LAMINA_LATE_DEFINED(function) decltype(&::function) function = nullptr;
 #define LAMINA_LATE_NAMED(function) \
   {#function, [](void* address) { function = reinterpret_cast<decltype(&::function)>(address); }},
+
+/// For a list of functions: the definition of their pointers, and of the function that loads the library, once.
+#define LAMINA_LATE_LIBRARY(functions, file, load)                                                                      \
+  functions(LAMINA_LATE_DEFINED) Status load() {                                                                        \
+    static const Status loaded = load_library(file, std::initializer_list<LateFunction>{functions(LAMINA_LATE_NAMED)}); \
+    return loaded;                                                                                                      \
+  }

@@ -6,7 +6,8 @@
 
 namespace lamina {
 
-LAMINA_TIFF(LAMINA_LATE_DEFINED)
+static Status load_tiff();
+LAMINA_LATE_LIBRARY(LAMINA_TIFF, LAMINA_TIFF_FILE, load_tiff)
 
 namespace {
 
@@ -27,9 +28,7 @@ int keep_warning_of_damage(TIFF* tiff, void* user, const char* module, const cha
 }  // namespace
 
 TiffOptions strict_tiff_options(std::string& message) {
-  static const Status loaded =
-      load_library(LAMINA_TIFF_FILE, std::initializer_list<LateFunction>{LAMINA_TIFF(LAMINA_LATE_NAMED)});
-  if (!loaded) {
+  if (const Status loaded = load_tiff(); !loaded) {
     if (loaded.error().fault != Fault::kMemory) message = loaded.error().message;
     return nullptr;
   }

@@ -2,12 +2,6 @@
 
 namespace lamina {
 
-LAMINA_ZIP(LAMINA_LATE_DEFINED)
-
-Status load_zip() {
-  static const Status loaded =
-      load_library(LAMINA_ZIP_FILE, std::initializer_list<LateFunction>{LAMINA_ZIP(LAMINA_LATE_NAMED)});
-  return loaded;
-}
+LAMINA_LATE_LIBRARY(LAMINA_ZIP, LAMINA_ZIP_FILE, load_zip)
 
 }  // namespace lamina
