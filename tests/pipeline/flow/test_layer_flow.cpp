@@ -272,19 +272,18 @@ TEST(LayerFlow, ALongLayerIsGivenUpBetweenItsStepsOnceCancelled) {
   const auto pause = [&](const Ticket&) -> Status {
     cancel = true;
     ++made;
-    std::this_thread::sleep_for(std::chrono::milliseconds(200));
+    std::this_thread::sleep_for(std::chrono::milliseconds(200));  // at least, however busy the machine is
     return {};
   };
   for (int i = 0; i < 20; ++i) steps.steps.push_back({"pause", pause});
   FlowReport report;
   FlowLimits limits;
   limits.most_in_flight = 4;
-  const auto start = std::chrono::steady_clock::now();
   const Status status = flow_layers(2, steps, limits, cancel, report);
   ASSERT_FALSE(status.ok());
   EXPECT_EQ(status.error().fault, Fault::kInterrupted);
-  EXPECT_LT(made, 20u);
-  EXPECT_LT(std::chrono::steady_clock::now() - start, std::chrono::seconds(2));
+  // Layers have 300 ms from the first look at the flag, which is behind a first step at the latest: two steps more.
+  EXPECT_LE(made, 2u * 3u);
 }
 
 }  // namespace
