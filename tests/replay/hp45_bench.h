@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <sstream>
 #include <string>
@@ -94,5 +95,32 @@ inline Runs slotted_disc(const PixelGrid& grid) {
   }
   return program::testing::runs_of(image);
 }
+
+/// The slotted disc on a machine like hp45 with a small bed, and its program.
+struct SlottedDisc {
+  ResolvedMachine resolved;
+  Runs image;
+  LayerProgram program;
+  Lines lines = lines_of(program.text);
+
+  /// bed  mm
+  explicit SlottedDisc(const std::array<double, 2>& bed) : SlottedDisc(bed, [](Machine&) {}) {}
+  /// change  of the machine
+  template <class Change>
+  SlottedDisc(const std::array<double, 2>& bed, const Change& change)
+      : resolved(resolve(bed, change)), image(slotted_disc(resolved.grid.image)), program(program_of(resolved, image)) {}
+
+  /// What verify says of other lines.
+  Result<replay::Count> verdict_of(const Lines& other) const { return verdict(resolved, image, text_of(other), program.count); }
+
+ private:
+  template <class Change>
+  static ResolvedMachine resolve(const std::array<double, 2>& bed, const Change& change) {
+    Machine machine = shipped_by_name("hp45");
+    machine.bed.size_mm = bed;
+    change(machine);
+    return *resolve_profile(machine);
+  }
+};
 
 }  // namespace lamina::hp45_bench

@@ -154,19 +154,16 @@ TEST(Hp45, BurstsOfTheClockFallWithinAPixelOfTheImage) {
 }
 
 TEST(Hp45, HeadsOfHalfTheResolutionFireTwoNozzlesAsOne) {
-  Machine machine = shipped_by_name("hp45");
-  machine.head.nozzles = 150;
-  machine.head.blocked = {0, 64, 131};  // the pairs of 0, 129 and 263, whose drops fall on other lines
-  machine.head.pitch_um = 25'400.0 / 300;
-  machine.mounting.dpi = 300;
-  machine.bed.size_mm = {15, 20};
-  const ResolvedMachine resolved = *resolve_profile(machine);
-  const Runs image = slotted_disc(resolved.grid.image);
-  const LayerProgram program = program_of(resolved, image);
-  EXPECT_NE(program.text.find("SDP Es\nSDN y\n"), std::string::npos);
-  const auto printed = verdict(resolved, image, program.text, program.count);
+  const SlottedDisc disc({15, 20}, [](Machine& machine) {
+    machine.head.nozzles = 150;
+    machine.head.blocked = {0, 64, 131};  // the pairs of 0, 129 and 263, whose drops fall on other lines
+    machine.head.pitch_um = 25'400.0 / 300;
+    machine.mounting.dpi = 300;
+  });
+  EXPECT_NE(disc.program.text.find("SDP Es\nSDN y\n"), std::string::npos);
+  const auto printed = disc.verdict_of(disc.lines);
   ASSERT_TRUE(printed.ok()) << printed.error().message;
-  EXPECT_EQ(printed->drops, set_pixels(image));
+  EXPECT_EQ(printed->drops, set_pixels(disc.image));
 }
 
 // The map() of Teensy's core is wrong below 0, and that of a fine encoder beyond 32 bits: there sweeps start at 0.

@@ -13,13 +13,9 @@ namespace lamina::hp45_bench {
 namespace {
 
 TEST(Hp45, PlantedFaultsAreFound) {
-  Machine machine = shipped_by_name("hp45");
-  machine.bed.size_mm = {20, 20};
-  const ResolvedMachine resolved = *resolve_profile(machine);
-  const Runs image = slotted_disc(resolved.grid.image);
-  const LayerProgram program = program_of(resolved, image);
-  ASSERT_TRUE(verdict(resolved, image, program.text, program.count).ok());
-  const Lines sound = lines_of(program.text);
+  const SlottedDisc disc({20, 20});
+  const Lines& sound = disc.lines;
+  ASSERT_TRUE(disc.verdict_of(sound).ok());
   const std::size_t first = place_of_line(sound, "SBR"), second_sweep = place_of_line(sound, "BCL", 1);
   const std::size_t sweep_1 =
       first + static_cast<std::size_t>(std::find_if(sound.begin() + static_cast<std::ptrdiff_t>(first), sound.end(),
@@ -115,54 +111,41 @@ TEST(Hp45, PlantedFaultsAreFound) {
     Lines lines = sound;
     plant(lines);
     ASSERT_NE(lines, sound) << name;
-    const auto printed = verdict(resolved, image, text_of(lines), program.count);
+    const auto printed = disc.verdict_of(lines);
     EXPECT_FALSE(printed.ok()) << name << " is not found";
     if (!printed.ok() && std::getenv("LAMINA_SHOW") != nullptr) std::printf("%s: %s\n", name, printed.error().message.c_str());
   }
 }
 
 TEST(Hp45, EncoderFarFinerThanPixelsIsFoundWhereTheProfileNamesNone) {
-  Machine machine = shipped_by_name("hp45");
-  machine.bed.size_mm = {20, 10};
-  machine.motion.encoder_dpi = 0;
-  const ResolvedMachine resolved = *resolve_profile(machine);
-  const Runs image = slotted_disc(resolved.grid.image);
-  const LayerProgram program = program_of(resolved, image);
-  const auto sound = verdict(resolved, image, program.text, program.count);
+  const SlottedDisc disc({20, 10}, [](Machine& machine) { machine.motion.encoder_dpi = 0; });
+  Lines lines = disc.lines;
+  const auto sound = disc.verdict_of(lines);
   ASSERT_TRUE(sound.ok()) << sound.error().message;
-  Lines lines = lines_of(program.text);
   lines[place_of_line(lines, "SER")] = "SER GM4";  // 25,400
-  const auto printed = verdict(resolved, image, text_of(lines), program.count);
+  const auto printed = disc.verdict_of(lines);
   ASSERT_FALSE(printed.ok());
   EXPECT_NE(printed.error().message.find("far more than pixels of 42.3 um need"), std::string::npos) << printed.error().message;
 }
 
 TEST(Hp45, RewindsThatWouldKeepVerifyBusyAreFound) {
-  Machine machine = shipped_by_name("hp45");
-  machine.bed.size_mm = {20, 10};
-  const ResolvedMachine resolved = *resolve_profile(machine);
-  const Runs image = slotted_disc(resolved.grid.image);
-  const LayerProgram program = program_of(resolved, image);
-  Lines lines = lines_of(program.text);
+  const SlottedDisc disc({20, 10});
+  Lines lines = disc.lines;
   for (int i = 0; i < 9; ++i) lines.insert(lines.end() - 1, "BRES");
-  const auto printed = verdict(resolved, image, text_of(lines), program.count);
+  const auto printed = disc.verdict_of(lines);
   ASSERT_FALSE(printed.ok());
   EXPECT_NE(printed.error().message.find("again and again"), std::string::npos) << printed.error().message;
 }
 
 TEST(Hp45, DropsThatFallWhileTheHeadTravelsAreCounted) {
-  Machine machine = shipped_by_name("hp45");
-  machine.bed.size_mm = {20, 10};
-  machine.head.blocked_rule = BlockedRule::kReport;  // a single sweep
-  const ResolvedMachine resolved = *resolve_profile(machine);
-  const Runs image = slotted_disc(resolved.grid.image);
-  const LayerProgram program = program_of(resolved, image);
-  Lines lines = lines_of(program.text);
+  const SlottedDisc disc({20, 10},
+                         [](Machine& machine) { machine.head.blocked_rule = BlockedRule::kReport; });  // a single sweep
+  Lines lines = disc.lines;
   // The lines again behind the sweep: the head passes them on its way to where it waits, from X 50 to 0.
   lines.insert(lines.end() - 3, {"BRES", "G1 X10.0000 F15000", "G4 P0", "G1 X60.0000 F15000", "G4 P0"});
-  const auto printed = verdict(resolved, image, text_of(lines), program.count);
+  const auto printed = disc.verdict_of(lines);
   ASSERT_FALSE(printed.ok());
-  EXPECT_NE(printed.error().message.find(std::to_string(program.count.drops) + " drops fall while the head travels"),
+  EXPECT_NE(printed.error().message.find(std::to_string(disc.program.count.drops) + " drops fall while the head travels"),
             std::string::npos)
       << printed.error().message;
 }
