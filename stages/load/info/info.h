@@ -16,7 +16,7 @@ namespace lamina::load {
 /// options  as for a job; the mesh is diagnosed before any repair, even if options.repair is on
 /// surplus  slices where shells overlap; without it they count as often as they do
 /// errors   of load(): a file that cannot be planned; of surplus
-/// cost     a load, a diagnosis (sorting all edges), a second load and diagnosis with repair if the mesh is not closed, and
+/// cost     a load, a diagnosis (diagnose.h), a second load and diagnosis with repair if the mesh is not closed, and
 ///          some seconds of slicing where shells or objects overlap
 Result<std::string> describe_part_text(const std::string& path, const LoadOptions& options, const SurplusAreas& surplus = {});
 

@@ -237,9 +237,8 @@ void diagnose_edges(const Numbered& mesh, std::size_t places, Diagnosis& result)
   Joined joined(triangles);
   {
     const Stars stars(mesh);
-    const SeenEdges edges =
-        seen_in(all_of(stars.vertices()), SeenEdges(places),
-                [&](const Range& range, SeenEdges& seen) { seen.look(mesh, stars, range, joined); });
+    const SeenEdges edges = seen_in(all_of(stars.vertices()), SeenEdges(places),
+                                    [&](const Range& range, SeenEdges& seen) { seen.look(mesh, stars, range, joined); });
     result.edges = edges.count;
     result.balanced = edges.balanced;
     result.open_edges = edges.open.finding();

@@ -55,8 +55,7 @@ int ended_while_measuring(const test::Directory& folder, int signal) {
     ::_exit(1);
   }
   int result = 0;
-  const bool measures =
-      wait_for_temporary(folder, "part.gcode", [&] { return ::waitpid(child, &result, WNOHANG) == child; });
+  const bool measures = wait_for_temporary(folder, "part.gcode", [&] { return ::waitpid(child, &result, WNOHANG) == child; });
   EXPECT_TRUE(measures) << result;
   if (!measures) return 0;
   ::kill(child, signal);
