@@ -192,7 +192,7 @@ std::uint64_t Rasterizer::layer_bytes_bound(Nm plane) const {
   // Crossings and changes; the place of each row, its offset, and whether it is capped.
   return with_spare(visits + (count.segments + kMoreSegments) * Segments::kBytes +
                     2 * 4 * (count.crossings + RowsTask::kMoreCrossings)) +
-         4 * (places + rows + 2 + FillTask::kMorePlaces) + (open || caps ? places : 0) + closing;
+         4 * (places + rows + 2) + (open || caps ? places : 0) + closing;
 }
 
 std::uint64_t Rasterizer::crossings_bound(Nm plane) const { return state_->bound.front().at(plane).crossings; }

@@ -6,7 +6,7 @@
 
 namespace lamina::raster {
 void ScanConverter::place_segments(const Segments& segments, std::uint32_t first_row, std::uint32_t rows) {
-  place_.assign(std::size_t{rows} + 1 + FillTask::kMorePlaces, 0);
+  place_.assign(std::size_t{rows} + 1, 0);
   std::uint32_t* const place = place_.data();
   for (std::size_t i = 0; i < segments.size; ++i) {
     const SegmentRows segment = segments.rows[i];
@@ -29,8 +29,7 @@ void ScanConverter::place_segments(const Segments& segments, std::uint32_t first
 
 void ScanConverter::fill(const Kernels& kernels, const PixelSampling& sampling, const Segments& segments,
                          std::span<const PlacedMesh> placed, Nm plane, std::uint32_t first_row) {
-  kernels.fill(
-      {sampling, segments, placed, plane, first_row, place_.data(), crossing_.data(), static_cast<std::uint32_t>(crossings_)});
+  kernels.fill({sampling, segments, placed, plane, first_row, place_.data(), crossing_.data()});
 }
 
 /// The crossings that close the part whose crossings are filled in.

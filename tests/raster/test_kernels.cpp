@@ -138,7 +138,7 @@ Crossings exact_crossings(const raster::PixelSampling& sampling, const PlacedClu
 Crossings filled(const Kernels& kernels, const raster::PixelSampling& sampling, const PlacedClusters& part,
                  const Segments& segments, Nm plane, std::array<std::uint32_t, 2> rows) {
   const std::uint32_t count = rows[1] - rows[0];
-  std::vector<std::uint32_t> place(count + raster::FillTask::kMorePlaces), in_row(count);
+  std::vector<std::uint32_t> place(count), in_row(count);
   for (std::size_t i = 0; i < segments.size; ++i) {
     for (std::uint32_t row = segments.rows[i].first; row < segments.rows[i].end(); ++row) ++in_row[row - rows[0]];
   }
@@ -147,8 +147,8 @@ Crossings filled(const Kernels& kernels, const raster::PixelSampling& sampling, 
     place[row] = total;
     total += in_row[row];
   }
-  std::vector<std::uint32_t> crossing(total + 1, UINT32_MAX);
-  kernels.fill({sampling, segments, part.placed, plane, rows[0], place.data(), crossing.data(), total});
+  std::vector<std::uint32_t> crossing(total, UINT32_MAX);
+  kernels.fill({sampling, segments, part.placed, plane, rows[0], place.data(), crossing.data()});
   Crossings all;
   for (std::uint32_t row = 0, i = 0; row < count; ++row) {
     EXPECT_EQ(place[row], i + in_row[row]) << "row " << row;

@@ -3,7 +3,9 @@
 #pragma once
 
 #include <algorithm>
+#include <bit>
 #include <cstdint>
+#include <cstring>
 #include <limits>
 
 #include "stages/raster/kernels/kernels.h"
@@ -33,23 +35,44 @@ std::uint32_t exact_end(const PixelSampling& sampling, const CutFacets& facets, 
 /// The crossing of a segment with a row, decided in integers.
 std::uint32_t exact_crossing(const FillTask& task, std::size_t segment, std::uint32_t row);
 
-/// Writes the crossings of the first four of `left` rows of a segment, or of all, and no branch depends on how many: what is
-/// too much goes to the unused crossing.
-inline void put_four(const FillTask& task, std::uint32_t* place, std::uint32_t left, const std::uint32_t* value) {
-  static constexpr std::uint32_t kIsRow[5][4] = {{0, 0, 0, 0},
-                                                 {UINT32_MAX, 0, 0, 0},
-                                                 {UINT32_MAX, UINT32_MAX, 0, 0},
-                                                 {UINT32_MAX, UINT32_MAX, UINT32_MAX, 0},
-                                                 {UINT32_MAX, UINT32_MAX, UINT32_MAX, UINT32_MAX}};
-  const std::uint32_t* const is_row = kIsRow[std::min(left, 4u)];
-  for (std::uint32_t k = 0; k < 4; ++k) {
-    const std::uint32_t at = place[k];
-    place[k] = at - is_row[k];
-    task.crossing[task.unused ^ ((task.unused ^ at) & is_row[k])] = value[k];
+/// Four numbers side by side, on any processor that compilers know.
+using FourWords = std::uint32_t __attribute__((vector_size(16)));
+
+/// Writes the crossings of the first four of `left` rows of a segment, or of all. Of four rows all places are moved on, two a
+/// word, before any crossing is written: no load has to wait for the address of a store.
+inline void put_rows(std::uint32_t* crossing, std::uint32_t* place, std::uint32_t left, FourWords value) {
+  if (left >= 4) {
+    constexpr std::uint64_t kOneEach = std::uint64_t{1} << 32 | 1;  // no place is 2^32 - 1
+    constexpr std::uint32_t kSecond = std::endian::native == std::endian::little ? 32 : 0, kFirst = 32 - kSecond;
+    std::uint64_t at[2], next[2];
+    std::memcpy(at, place, sizeof at);
+    next[0] = at[0] + kOneEach;
+    next[1] = at[1] + kOneEach;
+    std::memcpy(place, next, sizeof next);
+    crossing[static_cast<std::uint32_t>(at[0] >> kFirst)] = value[0];
+    crossing[static_cast<std::uint32_t>(at[0] >> kSecond)] = value[1];
+    crossing[static_cast<std::uint32_t>(at[1] >> kFirst)] = value[2];
+    crossing[static_cast<std::uint32_t>(at[1] >> kSecond)] = value[3];
+    return;
   }
+  // One, two or three rows, which no processor guesses: a row that is not there is the one before, written again.
+  const std::uint32_t second = left / 2, third = left - 1;
+  std::uint32_t of_row[4];
+  std::memcpy(of_row, &value, sizeof of_row);
+  const std::uint32_t at = place[0], at_second = place[second], at_third = place[third];
+  place[0] = at + 1;
+  place[second] = at_second + 1;
+  place[third] = at_third + 1;
+  crossing[at] = of_row[0];
+  crossing[at_second] = of_row[second];
+  crossing[at_third] = of_row[third];
 }
 
-/// Writes all crossings of an upright segment, which have one column, or of one that is exact in every row.
+/// The crossings of four rows from `row` on, of which those of the lanes in `near` are decided in integers.
+[[gnu::cold]] FourWords decide_near(const FillTask& task, std::size_t segment, std::uint32_t row, std::uint32_t left,
+                                    std::uint32_t near, FourWords value);
+
+/// Writes all crossings of a segment that is exact in every row, or of an upright one, which have one column.
 void fill_exactly(const FillTask& task, std::size_t segment);
 
 /// Writes the changes of a row whose crossings are sorted behind `change`, by any rule; they may be the crossings' own places.
@@ -77,6 +100,7 @@ namespace avx512 {
 LAMINA_AVX512 void gather(const ClusterSource& source, Nm plane, CutFacets& facets);
 LAMINA_AVX512 void cut(const PixelSampling& sampling, CutFacets& facets, Nm plane, std::uint32_t row_begin,
                        std::uint32_t row_end, Segments& out);
+LAMINA_AVX512 void fill(const FillTask& task);
 LAMINA_AVX512 std::uint32_t* rows(const RowsTask& task);
 }  // namespace avx512
 #endif

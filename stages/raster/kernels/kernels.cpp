@@ -30,7 +30,7 @@ const Kernels& kernels_for([[maybe_unused]] Isa isa) {
   static constexpr Kernels kPlain{Isa::kPlain, plain::gather, plain::cut, plain::fill, plain::rows};
 #if defined(LAMINA_WIDE_KERNELS)
   static constexpr Kernels kAvx2{Isa::kAvx2, avx2::gather, avx2::cut, avx2::fill, avx2::rows};
-  static constexpr Kernels kAvx512{Isa::kAvx512, avx512::gather, avx512::cut, avx2::fill, avx512::rows};
+  static constexpr Kernels kAvx512{Isa::kAvx512, avx512::gather, avx512::cut, avx512::fill, avx512::rows};
   if (isa == Isa::kAvx512) return kAvx512;
   if (isa == Isa::kAvx2) return kAvx2;
 #endif
@@ -46,6 +46,14 @@ std::uint32_t exact_crossing(const FillTask& task, std::size_t segment, std::uin
   const ExactTriangle triangle = exact_triangle(task.segments.origin[segment], task.placed);
   const std::int64_t column = exact_column(task.sampling.x, triangle, task.sampling.row_centre[row], task.plane);
   return static_cast<std::uint32_t>(column) * 2 + (task.segments.rows[segment].is(SegmentRows::kEnters) ? 1 : 0);
+}
+
+FourWords decide_near(const FillTask& task, std::size_t segment, std::uint32_t row, std::uint32_t left, std::uint32_t near,
+                      FourWords value) {
+  for (std::uint32_t k = 0; k < std::min(left, 4u); ++k) {
+    if ((near >> k & 1) != 0) value[k] = exact_crossing(task, segment, row + k);
+  }
+  return value;
 }
 
 std::uint32_t* write_changes(FillRule rule, const std::uint32_t* crossing, const std::uint32_t* end, std::uint32_t* change) {

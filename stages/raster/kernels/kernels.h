@@ -44,11 +44,8 @@ struct FillTask {
   std::span<const PlacedMesh> placed;
   Nm plane;
   std::uint32_t first_row;  // of the band
-  std::uint32_t* place;     // of each row, where its next crossing goes; kMorePlaces more at the end
+  std::uint32_t* place;     // of each row, where its next crossing goes
   std::uint32_t* crossing;  // column * 2 + (1 if it enters)
-  std::uint32_t unused;     // index of a crossing that may be overwritten
-
-  static constexpr std::uint32_t kMorePlaces = 8;
 };
 
 /// A band of rows whose crossings become changes.
