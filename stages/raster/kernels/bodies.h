@@ -75,6 +75,14 @@ inline void put_rows(std::uint32_t* crossing, std::uint32_t* place, std::uint32_
 /// Writes all crossings of a segment that is exact in every row, or of an upright one, which have one column.
 void fill_exactly(const FillTask& task, std::size_t segment);
 
+/// Writes a row of two crossings, in any order, if they are its two changes; false if they are not.
+inline bool put_pair(const std::uint32_t* row, bool positive, std::uint32_t* change) {
+  const std::uint32_t low = std::min(row[0], row[1]), both = row[0] ^ row[1];
+  change[0] = low >> 1;
+  change[1] = (low ^ both) >> 1;
+  return both >= 2 && (both & (positive ? low : 1) & 1) != 0;
+}
+
 /// Writes the changes of a row whose crossings are sorted behind `change`, by any rule; they may be the crossings' own places.
 /// returns  their end
 std::uint32_t* write_changes(FillRule rule, const std::uint32_t* crossing, const std::uint32_t* end, std::uint32_t* change);

@@ -170,7 +170,10 @@ std::uint32_t* rows(const RowsTask& task) {
     if (count != 0) {
       std::uint32_t* sorted = task.crossing + first;
       bool done;
-      if (count <= kLanes) {
+      if (count == 2) {
+        done = put_pair(sorted, positive, change);
+        if (!done && sorted[1] < sorted[0]) std::swap(sorted[0], sorted[1]);
+      } else if (count <= kLanes) {
         done = sort_in_registers<1>(sorted, count, positive, change);
       } else if (count <= 2 * kLanes) {
         done = sort_in_registers<2>(sorted, count, positive, change);

@@ -70,6 +70,24 @@ LAMINA_INLINE void merge_four(__m512i (&v)[4]) {
   v[3] = merge_bitonic(_mm512_max_epu32(high, high_2));
 }
 
+/// The same in half a register, in six steps instead of ten.
+template <int kBit, int kFalls>
+LAMINA_INLINE __m256i step_half(__m256i v) {
+  constexpr auto kGreater = [] {
+    unsigned lanes = 0;
+    for (unsigned i = 0; i < kLanes / 2; ++i) lanes |= ((i & kBit) != 0) == ((i & kFalls) == 0) ? 1u << i : 0;
+    return static_cast<__mmask8>(lanes);
+  }();
+  const __m256i other = kBit == 1   ? _mm256_shuffle_epi32(v, _MM_PERM_CDAB)
+                        : kBit == 2 ? _mm256_shuffle_epi32(v, _MM_PERM_BADC)
+                                    : _mm256_permute4x64_epi64(v, 0x4E);
+  return _mm256_mask_max_epu32(_mm256_min_epu32(v, other), kGreater, v, other);
+}
+LAMINA_INLINE __m256i sort_half(__m256i v) {
+  const __m256i fours = step_half<1, 4>(step_half<2, 4>(step_half<1, 2>(v)));
+  return step_half<1, 8>(step_half<2, 8>(step_half<4, 8>(fours)));
+}
+
 /// Which of a register's crossings and their followers are not two changes, as are_changes() in rows_plain.cpp has it.
 LAMINA_INLINE __mmask16 bad_pairs(__m512i v, __m512i next) {
   const __m512i both = _mm512_xor_si512(v, next);
@@ -79,6 +97,19 @@ LAMINA_INLINE __mmask16 bad_pairs(__m512i v, __m512i next) {
 
 /// The lowest `count` lanes.
 LAMINA_INLINE __mmask16 lowest(std::uint32_t count) { return static_cast<__mmask16>(_bzhi_u32(0xFFFF, count)); }
+
+/// Sorts up to eight crossings and writes the row if it is its own changes; else puts it back, sorted.
+LAMINA_AVX512 bool sort_eight(std::uint32_t* row, std::uint32_t count, bool positive, std::uint32_t* change) {
+  const __m256i none = _mm256_set1_epi32(-1);
+  const __m256i v = sort_half(_mm256_mask_loadu_epi32(none, static_cast<__mmask8>(lowest(count)), row));
+  const __m256i both = _mm256_xor_si256(v, _mm256_alignr_epi32(none, v, 1));
+  std::uint32_t bad = _mm256_testn_epi32_mask(both, _mm256_set1_epi32(1)) | _mm256_cmplt_epu32_mask(both, _mm256_set1_epi32(2));
+  bad = _bzhi_u32(bad, count - 1) | (count & 1);
+  if (positive) bad |= ~static_cast<std::uint32_t>(_mm256_cvtsi256_si32(v)) & 1;
+  const bool done = bad == 0;
+  _mm256_storeu_si256(reinterpret_cast<__m256i*>(done ? change : row), done ? _mm256_srli_epi32(v, 1) : v);
+  return done;
+}
 
 /// Sorts up to 16 * kRegisters crossings and writes the row if it is its own changes; else puts it back, sorted.
 template <std::uint32_t kRegisters>
@@ -90,7 +121,7 @@ LAMINA_AVX512 bool sort_in_registers(std::uint32_t* row, std::uint32_t count, bo
     v[k] = _mm512_mask_loadu_epi32(none, lowest(count > from ? std::min(count - from, kLanes) : 0), row + from);
   }
   if constexpr (kRegisters == 1) {
-    v[0] = count <= 4 ? sort_fours(v[0]) : sort_register(v[0]);
+    v[0] = sort_register(v[0]);
   } else {
     for (__m512i& one : v) one = sort_register(one);
     for (std::uint32_t k = 0; k < kRegisters; k += 2) merge_two(v[k], v[k + 1]);
@@ -180,7 +211,12 @@ std::uint32_t* rows(const RowsTask& task) {
     if (count != 0) {
       std::uint32_t* sorted = task.crossing + first;
       bool done;
-      if (count <= kLanes) {
+      if (count == 2) {
+        done = put_pair(sorted, positive, change);
+        if (!done && sorted[1] < sorted[0]) std::swap(sorted[0], sorted[1]);
+      } else if (count <= kLanes / 2) {
+        done = sort_eight(sorted, count, positive, change);
+      } else if (count <= kLanes) {
         done = sort_in_registers<1>(sorted, count, positive, change);
       } else if (count <= 2 * kLanes) {
         done = sort_in_registers<2>(sorted, count, positive, change);

@@ -1,51 +1,13 @@
 // Rows of crossings become changes, for any processor: short rows by networks of comparisons, which have no branch to guess,
 // long ones by merging blocks of 16.
-#include <array>
-#include <utility>
-
 #include "stages/raster/kernels/bodies.h"
+#include "stages/raster/kernels/sort_block.h"
 
 namespace lamina::raster::plain {
 namespace {
 
 constexpr std::uint32_t kBlockSize = 16;
 constexpr std::uint32_t kBeyondAll = UINT32_MAX;  // no crossing is as large
-
-/// Batcher's merge-exchange network for 2^n values: pairs to put in order, one after the other.
-template <std::size_t kSize>
-constexpr auto comparisons() {
-  struct List {
-    std::array<std::pair<std::size_t, std::size_t>, kSize * 4> pair{};
-    std::size_t count = 0;
-  } list;
-  for (std::size_t p = 1; p < kSize; p *= 2) {
-    for (std::size_t k = p; k >= 1; k /= 2) {
-      for (std::size_t j = k % p; j + k < kSize; j += 2 * k) {
-        for (std::size_t i = 0; i < k && i + j + k < kSize; ++i) {
-          if ((i + j) / (2 * p) == (i + j + k) / (2 * p)) list.pair[list.count++] = {i + j, i + j + k};
-        }
-      }
-    }
-  }
-  return list;
-}
-
-template <std::size_t kSize>
-void sort_block(std::uint32_t* at) {
-  static constexpr auto kNetwork = comparisons<kSize>();
-  std::uint32_t value[kSize];
-  std::copy_n(at, kSize, value);
-  [&]<std::size_t... i>(std::index_sequence<i...>) {
-    const auto in_order = [](std::uint32_t& a, std::uint32_t& b) {
-      const std::uint32_t low = b < a ? b : a;
-      b ^= a ^ low;  // g++ 12 forgets to exchange two values at -O3 if this is a maximum
-      a = low;
-    };
-    (in_order(value[kNetwork.pair[i].first], value[kNetwork.pair[i].second]), ...);
-  }
-  (std::make_index_sequence<kNetwork.count>());
-  std::copy_n(value, kSize, at);
-}
 
 /// Merges two sorted lists of one length from both ends at once: each end writes as many as a list has, so neither of them
 /// leaves its list.
@@ -120,22 +82,23 @@ std::uint32_t* sort_long(std::uint32_t* row, std::size_t count, std::uint32_t* o
   return row;
 }
 
-/// Sorts one row; what lies behind it, up to kMoreCrossings, is overwritten. returns  where it is then
-std::uint32_t* sort_row(std::uint32_t* row, std::uint32_t count, std::uint32_t* other) {
-  if (count > kBlockSize) return sort_long(row, count, other);
-  if (count == 2) {
-    sort_block<2>(row);
-    return row;
+/// Sorts up to kSize crossings and writes the row if it is its own changes, as are_changes() has it; else puts it back, sorted.
+/// No branch depends on how many they are.
+template <std::size_t kSize>
+bool sort_short(std::uint32_t* row, std::uint32_t count, bool positive, std::uint32_t* change) {
+  std::uint32_t value[kSize];
+  for (std::uint32_t i = 0; i < kSize; ++i) value[i] = i < count ? row[i] : kBeyondAll;
+  sort_block<kSize>(value);
+  std::uint32_t bad = (count & 1) | (positive ? ~value[0] & 1 : 0);
+  for (std::uint32_t i = 0; i + 1 < kSize; ++i) {
+    const std::uint32_t both = value[i] ^ value[i + 1];
+    bad |= (i + 1 < count ? 1 : 0) & (~both | (both < 2 ? 1 : 0));
   }
-  std::fill(row + count, row + kBlockSize, kBeyondAll);
-  if (count <= 4) {
-    sort_block<4>(row);
-  } else if (count <= 8) {
-    sort_block<8>(row);
-  } else {
-    sort_block<kBlockSize>(row);
-  }
-  return row;
+  const bool done = (bad & 1) == 0;
+  std::uint32_t* const to = done ? change : row;
+  const std::uint32_t shift = done ? 1 : 0;
+  for (std::uint32_t i = 0; i < kSize; ++i) to[i] = value[i] >> shift;
+  return done;
 }
 
 /// Whether directions alternate and no two crossings of a sorted row share a column: each of them is a change then, unless
@@ -155,16 +118,27 @@ bool are_changes(const std::uint32_t* row, std::uint32_t count) {
 std::uint32_t* rows(const RowsTask& task) {
   std::uint32_t* change = task.change;
   std::uint32_t* row_end = task.row_end;
+  const bool positive = task.rule == FillRule::kPositive;
   for (std::uint32_t row = task.rows; row-- > 0;) {
     const std::uint32_t first = row == 0 ? 0 : task.end[row - 1], count = task.end[row] - first;
     if (count != 0) {
-      const std::uint32_t* const sorted = sort_row(task.crossing + first, count, change);
-      if (are_changes(sorted, count) && (task.rule != FillRule::kPositive || (*sorted & 1) != 0)) [[likely]] {
-        for (std::uint32_t i = 0; i < count; ++i) change[i] = sorted[i] >> 1;
-        change += count;
+      std::uint32_t* sorted = task.crossing + first;
+      bool done;
+      if (count == 2) {
+        done = put_pair(sorted, positive, change);
+        if (!done && sorted[1] < sorted[0]) std::swap(sorted[0], sorted[1]);
+      } else if (count <= 4) {
+        done = sort_short<4>(sorted, count, positive, change);
+      } else if (count <= 8) {
+        done = sort_short<8>(sorted, count, positive, change);
+      } else if (count <= kBlockSize) {
+        done = sort_short<kBlockSize>(sorted, count, positive, change);
       } else {
-        change = write_changes(task.rule, sorted, sorted + count, change);
+        sorted = sort_long(sorted, count, change);
+        done = are_changes(sorted, count) && (!positive || (*sorted & 1) != 0);
+        if (done) std::transform(sorted, sorted + count, change, [](std::uint32_t crossing) { return crossing >> 1; });
       }
+      change = done ? change + count : write_changes(task.rule, sorted, sorted + count, change);
     }
     *row_end++ = static_cast<std::uint32_t>(change - task.changes);
   }
