@@ -1,5 +1,9 @@
 #include "stages/write/g4/encode.h"
 
+#if defined(__SSE2__)
+#include <emmintrin.h>
+#endif
+
 #include <algorithm>
 #include <cstring>
 #include <span>
@@ -13,16 +17,22 @@ namespace lamina::write::g4 {
 namespace {
 
 // A scratch row is: one 0, the changes, and `columns` this many times. The 0 is read as the change before the first
-// one; the tail stands for T.6's imaginary change after the last pixel and is as long as four changes read at once
+// one; the tail stands for T.6's imaginary change after the last pixel and is as long as eight changes read at once
 // from beyond the last one need.
 constexpr std::size_t kHead = 1;
-constexpr std::size_t kTail = 8;
+constexpr std::size_t kTail = 12;
 
 void copy_row(std::span<const std::uint32_t> row, std::uint32_t columns, Buffer<std::uint32_t>& scratch) {
   if (scratch.size() < kHead + row.size() + kTail) scratch.resize((kHead + row.size() + kTail) * 2);
   scratch[0] = 0;
   std::uint32_t* end = std::copy(row.begin(), row.end(), scratch.data() + kHead);
   std::fill_n(end, kTail, columns);
+}
+
+/// Rows that differ mostly do in their first change or their last.
+bool is_same(std::span<const std::uint32_t> a, std::span<const std::uint32_t> b) {
+  if (a.size() != b.size()) return false;
+  return a.empty() || (a.front() == b.front() && a.back() == b.back() && std::equal(a.begin(), a.end(), b.begin()));
 }
 
 /// Vertical modes with shift 0 that say that a row is like the one above: one a change, the end of the row included.
@@ -45,10 +55,11 @@ RunWord run_word(const RunCodes& codes, std::uint32_t run) {
   return {std::uint64_t{make_up.bits()} << terminating.length() | terminating.bits(), make_up.length() + terminating.length()};
 }
 
-void put_long_run(BitWriter& writer, const RunCodes& codes, std::uint32_t run) {
+BitWriter put_long_run(BitWriter writer, const RunCodes& codes, std::uint32_t run) {
   for (; run >= kLongestMakeUp + 64; run -= kLongestMakeUp) writer.put(codes.make_up[kLongestMakeUp / 64]);
   const RunWord word = run_word(codes, run);
   writer.put(word.bits, word.length);
+  return writer;
 }
 
 /// `first` in the colour `black`, then `second` in the other.
@@ -60,8 +71,7 @@ inline void put_horizontal(BitWriter& writer, unsigned black, std::uint32_t firs
     writer.put(bits, kHorizontal.length() + one.length + two.length);
   } else {
     writer.put(kHorizontal);
-    put_long_run(writer, codes, first);
-    put_long_run(writer, other, second);
+    writer = put_long_run(put_long_run(writer, codes, first), other, second);
   }
 }
 
@@ -93,18 +103,60 @@ inline bool put_four_vertical(BitWriter& writer, const std::uint32_t* a, const s
   return true;
 }
 
+#if defined(__SSE2__)
+/// Writes the words of the next eight changes if they are all coded by vertical modes and keep step with the changes above, as
+/// put_four_vertical() has it, or of the next four. returns  how many it wrote: 8, 4 or 0
+inline std::uint32_t put_eight_vertical(BitWriter& writer, const std::uint32_t* a, const std::uint32_t* b) {
+  const auto load = [](const std::uint32_t* at) { return _mm_loadu_si128(reinterpret_cast<const __m128i*>(at)); };
+  const __m128i low = load(a), high = load(a + 4);
+  const __m128i shift = _mm_packs_epi32(_mm_sub_epi32(low, load(b)), _mm_sub_epi32(high, load(b + 4)));  // far off stays far
+  const __m128i mode = _mm_add_epi16(shift, _mm_set1_epi16(3));
+  const __m128i keeps_low = _mm_andnot_si128(_mm_cmpgt_epi32(load(b - 1), low), _mm_cmpgt_epi32(load(b + 1), low));
+  const __m128i keeps_high = _mm_andnot_si128(_mm_cmpgt_epi32(load(b + 3), high), _mm_cmpgt_epi32(load(b + 5), high));
+  const __m128i in_reach = _mm_cmpeq_epi16(_mm_subs_epu16(mode, _mm_set1_epi16(6)), _mm_setzero_si128());
+  const int good = _mm_movemask_epi8(_mm_and_si128(in_reach, _mm_packs_epi32(keeps_low, keeps_high)));
+  const __m128i part = _mm_madd_epi16(mode, _mm_set_epi16(512, 64, 8, 1, 512, 64, 8, 1));
+  const auto first = static_cast<std::uint64_t>(_mm_cvtsi128_si64(part));
+  const auto last = static_cast<std::uint64_t>(_mm_cvtsi128_si64(_mm_unpackhi_epi64(part, part)));
+  if (good != 0xFFFF) {
+    if ((good & 0xFF) != 0xFF) return 0;
+    writer.put(kFourVertical[static_cast<std::uint32_t>(first + (first >> 32))]);
+    return 4;
+  }
+  const Code one = kFourVertical[static_cast<std::uint32_t>(first + (first >> 32))];
+  const Code two = kFourVertical[static_cast<std::uint32_t>(last + (last >> 32))];
+  writer.put(std::uint64_t{one.bits()} << two.length() | two.bits(), one.length() + two.length());
+  return 8;
+}
+#endif
+
+/// Writes the words of the next changes as long as they keep step, by eights and fours, but not of the last one of the row.
+/// returns  how many they are
+inline std::uint32_t put_in_step(BitWriter& writer, const std::uint32_t* a, const std::uint32_t* b, std::uint32_t columns) {
+  std::uint32_t done = 0;
+#if defined(__SSE2__)
+  while (a[done + 7] < columns) {
+    const std::uint32_t more = put_eight_vertical(writer, a + done, b + done);
+    if (more != 8) return done + more;
+    done += 8;
+  }
+#endif
+  while (a[done + 3] < columns && put_four_vertical(writer, a + done, b + done)) done += 4;
+  return done;
+}
+
 /// One row; `a` and `b` point to the first changes of the row and of the one above, in scratch rows.
 /// Names as in T.6: a0 is where coding stands, a[0] is a1, b[0] is b1. a and b move in step, so that both are at
 /// changes to black or both at changes to white.
-void put_row(BitWriter& writer, const std::uint32_t* a, const std::uint32_t* b, std::uint32_t columns) {
+/// The writer is a value: what it writes are bytes, which might be its own if anybody had its address.
+BitWriter put_row(BitWriter writer, const std::uint32_t* a, const std::uint32_t* b, std::uint32_t columns) {
   const std::uint32_t* const a_start = a;
   std::uint32_t a0 = 0;
   for (;;) {
-    while (a[3] < columns && put_four_vertical(writer, a, b)) {
-      a += 4;
-      b += 4;
-      a0 = a[-1];
-    }
+    const std::uint32_t in_step = put_in_step(writer, a, b, columns);
+    a += in_step;
+    b += in_step;
+    if (in_step != 0) a0 = a[-1];
     // The way of all rows: it ends a row, and takes a few changes where four do not keep step.
     for (const std::uint32_t* const a_enough = a + 4; a < a_enough;) {
       const std::uint32_t a1 = *a;
@@ -117,7 +169,7 @@ void put_row(BitWriter& writer, const std::uint32_t* a, const std::uint32_t* b, 
       }
       if (shift <= 6) {
         writer.put(kVertical[shift]);
-        if (a1 == columns) return;
+        if (a1 == columns) return writer;
         ++a;
         b += b[-1] > a1 ? -1 : b[1] > a1 ? 1 : 3;
         a0 = a1;
@@ -125,7 +177,7 @@ void put_row(BitWriter& writer, const std::uint32_t* a, const std::uint32_t* b, 
       }
       const std::uint32_t a2 = a[1];
       put_horizontal(writer, static_cast<unsigned>(a - a_start) & 1, a1 - a0, a2 - a1);
-      if (a2 == columns) return;
+      if (a2 == columns) return writer;
       a += 2;
       a0 = a2;
       while (*b <= a0) b += 2;
@@ -213,7 +265,7 @@ std::size_t Encoder::encode(const RunsView& runs, Buffer<std::byte>& file, std::
         continue;
       }
     }
-    if (std::equal(row.begin(), row.end(), above.begin(), above.end())) {
+    if (is_same(row, above)) {
       const std::uint32_t next = row.empty() ? end_of_empty_rows(runs.row_offset, r) : r + 1;
       const std::uint64_t ones = changes_to_code(row, columns) * (next - r);
       make_room(ones / 8 + 64);
@@ -225,7 +277,7 @@ std::size_t Encoder::encode(const RunsView& runs, Buffer<std::byte>& file, std::
     if (!copied) copy_row(above, columns, reference_);
     copied = true;
     copy_row(row, columns, coding_);
-    put_row(writer, coding_.data() + kHead, reference_.data() + kHead, columns);
+    writer = put_row(writer, coding_.data() + kHead, reference_.data() + kHead, columns);
     std::swap(coding_, reference_);
     above = row;
     ++r;
