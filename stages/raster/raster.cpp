@@ -15,7 +15,7 @@ namespace {
 
 /// Crossings of the band that a ray answers for, about: they stay within a second-level cache. Bands are few all the same,
 /// since clusters that lie across two of them are cut twice.
-constexpr std::uint64_t kBandCrossings = 1 << 18;
+constexpr std::uint64_t kBandCrossings = 1 << 17;
 
 /// Clusters that engine `contours` cuts at once, at most: up to 40 MB of segments.
 constexpr std::size_t kMostClusters = 1 << 16;
