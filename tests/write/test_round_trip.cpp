@@ -245,6 +245,22 @@ TEST(G4, RowsOfFewEdgesThatWanderAreAsByLibtiff) {
   }
 }
 
+/// Edges so far from those above that 16 bits do not hold it, by nearly a multiple of 2^16.
+TEST(G4, EdgesThatJumpFarAreAsByLibtiff) {
+  const testing::Folder folder;
+  std::mt19937 random(16);
+  std::vector<Row> rows;
+  for (int r = 0; r < 12; ++r) {
+    Row row;
+    for (std::uint32_t i = 0; i < 10; ++i) {
+      const std::uint32_t jump = testing::below(random, 3) == 0 ? 65'536 * (1 + testing::below(random, 2)) : 0;
+      row.push_back(1000 + 150'000 * i + jump + testing::below(random, 3));
+    }
+    rows.push_back(row);
+  }
+  EXPECT_TRUE(is_as_by_libtiff(folder / "peer.tif", testing::image_of(1'600'000, rows)));
+}
+
 TEST(G4, ManyEmptyRowsAreOneBitEach) {
   for (const std::uint32_t empty : {0u, 1u, 2u, 3u, 7u, 8u, 9u, 127u, 128u, 129u, 1000u, 18898u}) {
     std::vector<Row> rows(empty);
