@@ -5,9 +5,9 @@
 #include <cmath>
 
 #include "bench/named_parts.h"
-#include "stages/slice/nest.h"
+#include "stages/geometry/contours/nest.h"
+#include "stages/geometry/contours/tidy.h"
 #include "stages/slice/slice.h"
-#include "stages/slice/tidy.h"
 
 namespace lamina::bench {
 namespace {
@@ -67,7 +67,7 @@ void slice_part(benchmark::State& state, Until until, const std::string& path) {
   Buffer<std::uint32_t> facets, group;
   slice::Cuts cuts;
   slice::ChainScratch scratch;
-  slice::ContactScratch contact;
+  ContactScratch contact;
   Contours closed, open;
   for (auto _ : state) {
     if (until == Until::kIndex) {
@@ -86,9 +86,9 @@ void slice_part(benchmark::State& state, Until until, const std::string& path) {
       slice::chain(cuts, stack.own[p], scratch, closed, open);
       benchmark::DoNotOptimize(closed.point.data());
       if (until == Until::kChain) continue;
-      slice::tidy(closed);
-      if (!slice::find_contacts(closed, contact, group)) group.clear();
-      if (!slice::nest(closed, FillRule::kNonzero, group)) return state.SkipWithError("contours could not be united");
+      tidy(closed);
+      if (!find_contacts(closed, contact, group)) group.clear();
+      if (!nest(closed, FillRule::kNonzero, group)) return state.SkipWithError("contours could not be united");
     }
   }
   const double amount = until == Until::kIndex ? static_cast<double>(triangles.size()) : static_cast<double>(stack.cuts);

@@ -146,7 +146,7 @@ Result<slice::LayerReport> Sections::section(const slice::Slicer& slicer, const 
       region = unite_contours(all, FillRule::kNonzero);
     }
     if (!region) return region.error();
-    slice::simplify(*region, tolerance_, work.scratch.simplify);
+    simplify(*region, tolerance_, work.scratch.simplify);
     both.contours.append(*region);
     both.body.push_back(both.contours.size());
   }

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "stages/data/shortage.h"
+#include "stages/geometry/contours/offset.h"
 
 namespace lamina {
 namespace {
@@ -56,69 +57,6 @@ void append_tree(const clip::PolyNode& node, Point2 by, Contours& out) {
     for (const clip::PolyNode* hole : outer->Childs) append_contour(hole->Contour, by, out);
     for (const clip::PolyNode* hole : outer->Childs) append_tree(*hole, by, out);
   }
-}
-
-/// The offset curve of a closed path, edge by edge, with mitered corners. Where a corner turns towards the offset and its
-/// edges are long enough, they meet in one point; Clipper's own offset makes a loop at every such corner, and spends
-/// most of its time on resolving them. Shorter edges get that loop, which the union resolves.
-class MiteredCurve {
- public:
-  explicit MiteredCurve(double distance) : distance_(distance) {}
-
-  const clip::Path& of(const clip::Path& path) {
-    edges_.clear();
-    curve_.clear();
-    for (std::size_t i = 0; i < path.size(); ++i) {
-      const clip::IntPoint &a = path[i], &b = path[i + 1 < path.size() ? i + 1 : 0];
-      const double dx = static_cast<double>(b.X - a.X), dy = static_cast<double>(b.Y - a.Y);
-      const double length = std::sqrt(dx * dx + dy * dy);
-      if (length > 0) edges_.push_back({dy / length, -dx / length, length, b});
-    }
-    for (std::size_t i = 0; i < edges_.size(); ++i) corner(edges_[i], edges_[i + 1 < edges_.size() ? i + 1 : 0]);
-    return curve_;
-  }
-
- private:
-  struct Edge {
-    double nx, ny, length;  // unit normal to the outside
-    clip::IntPoint end;
-  };
-
-  void corner(const Edge& in, const Edge& out) {
-    const double sine = in.nx * out.ny - in.ny * out.nx, cosine = in.nx * out.nx + in.ny * out.ny;
-    const bool opens = sine * distance_ >= 0;
-    const double reach = std::abs(distance_ * sine) / (1 + cosine);  // along both edges, from the corner
-    if (opens ? 1 + cosine >= kSharpest : cosine > -0.5 && reach <= 0.5 * std::min(in.length, out.length)) {
-      const double share = distance_ / (1 + cosine);
-      return put(in.end, (in.nx + out.nx) * share, (in.ny + out.ny) * share);
-    }
-    if (opens) {  // cut off square at the distance
-      const double cut = std::tan(std::atan2(sine, cosine) / 4) * distance_;
-      put(in.end, distance_ * in.nx - cut * in.ny, distance_ * in.ny + cut * in.nx);
-      return put(in.end, distance_ * out.nx + cut * out.ny, distance_ * out.ny - cut * out.nx);
-    }
-    put(in.end, distance_ * in.nx, distance_ * in.ny);
-    put(in.end, 0, 0);
-    put(in.end, distance_ * out.nx, distance_ * out.ny);
-  }
-
-  void put(const clip::IntPoint& at, double x, double y) { curve_.emplace_back(at.X + nearest(x), at.Y + nearest(y)); }
-
-  static constexpr double kSharpest = 0.5;  // 1 + cosine of a turn whose miter is twice the distance from the corner
-
-  double distance_;
-  std::vector<Edge> edges_;
-  clip::Path curve_;
-};
-
-/// The region within curves that went round it once.
-bool unite_curves(const clip::Paths& paths, double distance, clip::PolyTree& tree) {
-  MiteredCurve curve(distance);
-  clip::Clipper clipper;
-  bool any = false;
-  for (const clip::Path& path : paths) any |= clipper.AddPath(curve.of(path), clip::ptSubject, true);
-  if (!any) return true;  // all of them shrank to points or lines, which Clipper does not take
-  return clipper.Execute(clip::ctUnion, tree, clip::pftPositive, clip::pftPositive);
 }
 
 Error refusal(const char* why) {
@@ -178,6 +116,20 @@ Result<Contours> unite_contours(const ContoursView& contours, FillRule rule) {
   });
 }
 
+Result<Contours> unite_curves(const ContoursView& curves) {
+  return guarded([&](Contours& out) -> Status {
+    const Moved moved = to_clipper(curves, middle_of(curves));
+    clip::Clipper clipper;
+    bool any = false;
+    for (const clip::Path& path : moved.paths) any |= clipper.AddPath(path, clip::ptSubject, true);
+    if (!any) return {};  // all of them shrank to points or lines, which Clipper does not take
+    clip::PolyTree tree;
+    if (!clipper.Execute(clip::ctUnion, tree, clip::pftPositive, clip::pftPositive)) return refusal("the offset failed");
+    append_tree(tree, moved.by, out);
+    return {};
+  });
+}
+
 Result<Contours> subtract_contours(const ContoursView& contours, const ContoursView& less) {
   return combine(contours, less, clip::ctDifference);
 }
@@ -188,16 +140,13 @@ Result<Contours> intersect_contours(const ContoursView& one, const ContoursView&
 
 Result<Contours> offset_contours(const ContoursView& contours, std::int64_t distance, OffsetJoin join) {
   if (contours.size() == 0) return Contours();
+  if (join == OffsetJoin::kMiter) return offset_mitered(contours, distance);
   return guarded([&](Contours& out) -> Status {
     const Moved moved = to_clipper(contours, middle_of(contours));
     clip::PolyTree tree;
-    if (join == OffsetJoin::kMiter) {
-      if (!unite_curves(moved.paths, static_cast<double>(distance), tree)) return refusal("the offset failed");
-    } else {
-      clip::ClipperOffset offsetter(2.0, kArcTolerance);
-      offsetter.AddPaths(moved.paths, clip::jtRound, clip::etClosedPolygon);
-      offsetter.Execute(tree, static_cast<double>(distance));
-    }
+    clip::ClipperOffset offsetter(2.0, kArcTolerance);
+    offsetter.AddPaths(moved.paths, clip::jtRound, clip::etClosedPolygon);
+    offsetter.Execute(tree, static_cast<double>(distance));
     append_tree(tree, moved.by, out);
     return {};
   });

@@ -22,6 +22,10 @@ enum class OffsetJoin : std::uint8_t {
 /// cost    O((P + X) log P) for P points and X crossings
 Result<Contours> unite_contours(const ContoursView& contours, FillRule rule);
 
+/// The region that curves, which may cross themselves, go round counter-clockwise more often than clockwise. As unite_contours
+/// in less time, but contours of the result may touch at corners.
+Result<Contours> unite_curves(const ContoursView& curves);
+
 /// The region of clean contours less that of others, which may overlap each other: where they share an edge nothing is
 /// left of it. In the order of unite_contours.
 /// errors  kInternal if Clipper refuses them

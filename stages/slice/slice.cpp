@@ -6,10 +6,10 @@
 #include <map>
 
 #include "stages/geometry/clipping.h"
-#include "stages/slice/nest.h"
-#include "stages/slice/order.h"
-#include "stages/slice/simplify.h"
-#include "stages/slice/tidy.h"
+#include "stages/geometry/contours/nest.h"
+#include "stages/geometry/contours/order.h"
+#include "stages/geometry/contours/simplify.h"
+#include "stages/geometry/contours/tidy.h"
 
 namespace lamina::slice {
 namespace {
@@ -105,9 +105,8 @@ Status Slicer::clean(Contours& contours, LayerScratch& scratch, LayerReport& rep
   const auto united = nest(contours, options_.fill_rule, scratch.group);
   if (!united) return united.error();
   report.united += *united;
-  if (options_.offset == 0) {
-    order_by_outer(contours);
-  } else {
+  order_by_outer(contours);
+  if (options_.offset != 0) {
     auto moved = offset_contours(contours, options_.offset);
     if (!moved) return moved.error();
     contours = std::move(*moved);

@@ -20,12 +20,12 @@
 #include "stages/data/contours.h"
 #include "stages/data/mesh.h"
 #include "stages/data/status.h"
+#include "stages/geometry/contours/contact.h"
+#include "stages/geometry/contours/simplify.h"
 #include "stages/slice/chain.h"
-#include "stages/slice/contact.h"
 #include "stages/slice/cut.h"
 #include "stages/slice/gaps.h"
 #include "stages/slice/plane_index.h"
-#include "stages/slice/simplify.h"
 
 namespace lamina::slice {
 

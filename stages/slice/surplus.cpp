@@ -7,12 +7,12 @@
 #include <map>
 #include <utility>
 
+#include "stages/geometry/contours/contact.h"
+#include "stages/geometry/contours/nest.h"
+#include "stages/geometry/contours/tidy.h"
 #include "stages/slice/chain.h"
-#include "stages/slice/contact.h"
 #include "stages/slice/cut.h"
-#include "stages/slice/nest.h"
 #include "stages/slice/plane_index.h"
-#include "stages/slice/tidy.h"
 
 namespace lamina::slice {
 namespace {

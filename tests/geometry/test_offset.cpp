@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <initializer_list>
 #include <numbers>
 #include <polyclipping/clipper.hpp>
 #include <random>
@@ -76,6 +77,41 @@ TEST(OffsetContours, RegionIsThatOfClippersOffsetToWithinItsRounding) {
     }
   }
   EXPECT_GT(pieces, 1500);
+}
+
+/// Squares in one another around a point, half as wide as told, mm, outer contours and holes by turns.
+Contours squares(std::initializer_list<int> halves) {
+  Contours out;
+  bool hole = false;
+  for (const int half : halves) {
+    const Nm a = half * 1'000'000;
+    const Point2 corner[4] = {{-a, -a}, {a, -a}, {a, a}, {-a, a}};
+    for (int k = 0; k < 4; ++k) out.point.push_back(corner[hole ? 3 - k : k]);
+    out.close();
+    hole = !hole;
+  }
+  return out;
+}
+
+TEST(OffsetContours, IslandsInHolesShrinkByThemselvesAndGrowTogether) {
+  const Contours nested = squares({12, 9, 6, 3});
+  struct Case {
+    std::int64_t distance;
+    double area_mm2;
+    std::uint32_t contours;
+  };
+  for (const auto& [distance, area, contours] : {Case{-500'000, 23 * 23 - 19 * 19 + 11 * 11 - 7 * 7, 4},
+                                                 {500'000, 25 * 25 - 17 * 17 + 13 * 13 - 5 * 5, 4},
+                                                 {2'000'000, 28 * 28 - 2 * 2, 2},  // the island meets what is around it
+                                                 {4'000'000, 32 * 32, 1},
+                                                 {-1'500'000, 0, 0},
+                                                 {-2'000'000, 0, 0}}) {
+    const auto moved = offset_contours(nested, distance);
+    ASSERT_TRUE(moved.ok());
+    EXPECT_EQ(moved->size(), contours) << distance;
+    EXPECT_DOUBLE_EQ(square_mm(doubled_area(*moved)), area) << distance;
+    for (std::uint32_t c = 0; c < moved->size(); ++c) EXPECT_EQ(doubled_area((*moved)[c]) > 0, c % 2 == 0) << distance;
+  }
 }
 
 }  // namespace

@@ -7,9 +7,9 @@
 #include <random>
 #include <vector>
 
-#include "stages/slice/contact.h"
-#include "stages/slice/meet.h"
-#include "stages/slice/tidy.h"
+#include "stages/geometry/contours/contact.h"
+#include "stages/geometry/contours/meet.h"
+#include "stages/geometry/contours/tidy.h"
 
 namespace lamina::test {
 namespace {
@@ -17,7 +17,7 @@ namespace {
 /// Group of each contour by comparing every edge with every other.
 std::vector<std::uint32_t> groups_of(const Contours& contours) {
   const std::uint32_t count = contours.size();
-  std::vector<std::uint32_t> root(count), group(count, slice::kNoContact);
+  std::vector<std::uint32_t> root(count), group(count, kNoContact);
   for (std::uint32_t c = 0; c < count; ++c) root[c] = c;
   const auto find = [&](std::uint32_t c) {
     while (root[c] != c) c = root[c];
@@ -30,7 +30,7 @@ std::vector<std::uint32_t> groups_of(const Contours& contours) {
       for (std::size_t i = 0; i < n; ++i) {
         for (std::size_t j = c == d ? i + 1 : 0; j < m; ++j) {
           if (c == d && ((i + 1) % n == j || (j + 1) % n == i)) continue;
-          if (!slice::stretches_meet(one[i], one[(i + 1) % n], other[j], other[(j + 1) % m])) continue;
+          if (!stretches_meet(one[i], one[(i + 1) % n], other[j], other[(j + 1) % m])) continue;
           group[c] = group[d] = 0;
           const std::uint32_t a = find(c), b = find(d);
           root[std::max(a, b)] = std::min(a, b);
@@ -39,7 +39,7 @@ std::vector<std::uint32_t> groups_of(const Contours& contours) {
     }
   }
   for (std::uint32_t c = 0; c < count; ++c) {
-    if (group[c] != slice::kNoContact) group[c] = find(c);
+    if (group[c] != kNoContact) group[c] = find(c);
   }
   return group;
 }
@@ -62,7 +62,7 @@ void add_curve(std::mt19937& random, Nm span, double rough, Contours& out) {
 
 TEST(ContactGroups, AreThoseOfAllPairsOfEdgesForSmoothRoughAndTouchingContours) {
   std::mt19937 random(5);
-  slice::ContactScratch scratch;
+  ContactScratch scratch;
   Buffer<std::uint32_t> group;
   int by_halving = 0, by_grid = 0, apart = 0;
   for (int turn = 0; turn < 400; ++turn) {
@@ -70,12 +70,12 @@ TEST(ContactGroups, AreThoseOfAllPairsOfEdgesForSmoothRoughAndTouchingContours) 
     const Nm span = turn % 5 == 0 ? 200 : 10'000'000;  // a grid so coarse that contours touch in points
     const double rough = turn % 3 == 0 ? 0 : turn % 3 == 1 ? 0.05 : 0.9;
     for (int c = 0; c < 1 + turn % 7; ++c) add_curve(random, span, rough, contours);
-    slice::tidy(contours);
-    const bool any = slice::find_contacts(contours, scratch, group);
+    tidy(contours);
+    const bool any = find_contacts(contours, scratch, group);
     const auto expected = groups_of(contours);
     ASSERT_EQ(std::vector<std::uint32_t>(group.begin(), group.end()), expected) << "turn " << turn;
-    ASSERT_EQ(any, std::ranges::any_of(expected, [](std::uint32_t g) { return g != slice::kNoContact; }));
-    (slice::find_monotone_contacts(contours, scratch.monotone) ? by_halving : by_grid) += 1;
+    ASSERT_EQ(any, std::ranges::any_of(expected, [](std::uint32_t g) { return g != kNoContact; }));
+    (find_monotone_contacts(contours, scratch.monotone) ? by_halving : by_grid) += 1;
     apart += any ? 0 : 1;
   }
   EXPECT_GT(by_halving, 100);

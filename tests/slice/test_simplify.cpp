@@ -8,9 +8,9 @@
 #include <numbers>
 #include <random>
 
+#include "stages/geometry/contours/meet.h"
+#include "stages/geometry/contours/simplify.h"
 #include "stages/load/load.h"
-#include "stages/slice/meet.h"
-#include "stages/slice/simplify.h"
 #include "stages/slice/slice.h"
 #include "tests/slice/contour_laws.h"
 
@@ -90,7 +90,7 @@ bool any_meet(const ContoursView& contours) {
   }
   for (std::size_t i = 0; i < edge.size(); ++i) {
     for (std::size_t j = i + 1; j < edge.size(); ++j) {
-      if (next[i] != j && next[j] != i && slice::stretches_meet(edge[i][0], edge[i][1], edge[j][0], edge[j][1])) return true;
+      if (next[i] != j && next[j] != i && stretches_meet(edge[i][0], edge[i][1], edge[j][0], edge[j][1])) return true;
     }
   }
   return false;
@@ -98,8 +98,8 @@ bool any_meet(const ContoursView& contours) {
 
 Contours simplified(const Contours& full, Nm tolerance) {
   Contours less = full;
-  slice::SimplifyScratch scratch;
-  slice::simplify(less, tolerance, scratch);
+  SimplifyScratch scratch;
+  simplify(less, tolerance, scratch);
   return less;
 }
 
@@ -175,8 +175,8 @@ TEST(Simplify, ACombOfManyTeethTakesNoLongerThanItsPoints) {
     full.point.push_back({0, -1'000'000});
     full.close();
     Contours less = full;
-    slice::SimplifyScratch scratch;
-    slice::simplify(less, 10'000, scratch);
+    SimplifyScratch scratch;
+    simplify(less, 10'000, scratch);
     // 8 x 18 looks a point, then stretches of at most 7/8: 89 levels. All teeth looked at for each are 25,000 a point.
     EXPECT_LT(scratch.looks, 400 * full.point.size());
     EXPECT_EQ(less.point.size(), static_cast<std::size_t>(2 * teeth + 1));

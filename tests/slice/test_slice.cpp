@@ -4,10 +4,10 @@
 #include <random>
 
 #include "stages/geometry/clipping.h"
-#include "stages/slice/nest.h"
-#include "stages/slice/simplify.h"
+#include "stages/geometry/contours/nest.h"
+#include "stages/geometry/contours/simplify.h"
+#include "stages/geometry/contours/tidy.h"
 #include "stages/slice/slice.h"
-#include "stages/slice/tidy.h"
 #include "tests/raster/shapes.h"
 #include "tests/slice/contour_laws.h"
 
@@ -217,10 +217,10 @@ TEST(Tidy, DroppedPointsLieWithinTheToleranceAndStraightOnesAlwaysGo) {
     circle.point.push_back({static_cast<Nm>(r * std::cos(turn)), static_cast<Nm>(r * std::sin(turn))});
   }
   circle.close();
-  slice::SimplifyScratch scratch;
+  SimplifyScratch scratch;
   for (const Nm tolerance : {1000, 10'000, 100'000}) {
     Contours less = circle;
-    slice::simplify(less, tolerance, scratch);
+    simplify(less, tolerance, scratch);
     EXPECT_LT(less.point.size(), circle.point.size());
     for (const Point2 p : circle.point) ASSERT_LE(distance_to(less, p.x, p.y), tolerance + 1e-3);
   }
@@ -232,7 +232,7 @@ TEST(Tidy, DroppedPointsLieWithinTheToleranceAndStraightOnesAlwaysGo) {
   square.close();
   for (const Point2 p : {Point2{0, 0}, {5, 5}, {9, 9}, {3, 3}}) square.point.push_back(p);  // no area
   square.close();
-  slice::tidy(square);
+  tidy(square);
   ASSERT_EQ(square.size(), 1u);
   EXPECT_EQ(square.point.size(), 4u);
   EXPECT_TRUE(doubled_area(square) == 200);
@@ -240,7 +240,7 @@ TEST(Tidy, DroppedPointsLieWithinTheToleranceAndStraightOnesAlwaysGo) {
 
 TEST(Contact, IsFoundExactlyWhereAnyTwoEdgesMeet) {
   std::mt19937 random(17);
-  slice::ContactScratch scratch;
+  ContactScratch scratch;
   Buffer<std::uint32_t> group;
   int with = 0;
   for (int i = 0; i < 3000; ++i) {
@@ -250,7 +250,7 @@ TEST(Contact, IsFoundExactlyWhereAnyTwoEdgesMeet) {
       for (int k = 0; k < 3 + i % 3; ++k) contours.point.push_back({pick(random), pick(random)});
       contours.close();
     }
-    slice::tidy(contours);
+    tidy(contours);
     bool expected = false;
     const auto side = [](Point2 a, Point2 b, Point2 p) {
       const std::int64_t area =
@@ -278,7 +278,7 @@ TEST(Contact, IsFoundExactlyWhereAnyTwoEdgesMeet) {
       }
     }
     with += expected ? 1 : 0;
-    ASSERT_EQ(slice::find_contacts(contours, scratch, group), expected) << "case " << i;
+    ASSERT_EQ(find_contacts(contours, scratch, group), expected) << "case " << i;
   }
   EXPECT_GT(with, 500);
   EXPECT_LT(with, 2900);

@@ -1,4 +1,4 @@
-#include "stages/slice/order.h"
+#include "stages/geometry/contours/order.h"
 
 #include <algorithm>
 #include <numeric>
@@ -6,18 +6,18 @@
 #include <utility>
 #include <vector>
 
-namespace lamina::slice {
+namespace lamina {
 namespace {
 
 constexpr std::uint32_t kNone = UINT32_MAX;
 
-struct Outline {
+struct Bounds {
   Point2 lo, hi;
   bool outer;
 };
 
-Outline outline_of(std::span<const Point2> points) {
-  Outline outline{points.front(), points.front(), false};
+Bounds bounds_of(std::span<const Point2> points) {
+  Bounds outline{points.front(), points.front(), false};
   std::size_t smallest = 0;
   for (std::size_t i = 0; i < points.size(); ++i) {
     const Point2 p = points[i];
@@ -59,14 +59,14 @@ bool is_around(std::span<const Point2> outer, std::span<const Point2> hole) {
 }
 
 /// For each hole the innermost outer contour around it.
-std::vector<std::uint32_t> outers_of(const Contours& contours, const std::vector<Outline>& outlines) {
+std::vector<std::uint32_t> outers_of(const Contours& contours, const std::vector<Bounds>& outlines) {
   const std::uint32_t count = contours.size();
   std::vector<std::uint32_t> by_left(count), open, outer_of(count, kNone);
   std::iota(by_left.begin(), by_left.end(), 0u);
   // At equal sides an outer contour comes before the holes that touch it there.
   std::ranges::sort(by_left, {}, [&](std::uint32_t c) { return std::tuple(outlines[c].lo.x, !outlines[c].outer, c); });
   for (const std::uint32_t c : by_left) {
-    const Outline& own = outlines[c];
+    const Bounds& own = outlines[c];
     std::erase_if(open, [&](std::uint32_t other) { return outlines[other].hi.x < own.lo.x; });
     if (own.outer) {
       open.push_back(c);
@@ -74,7 +74,7 @@ std::vector<std::uint32_t> outers_of(const Contours& contours, const std::vector
     }
     // Of nested outer contours the inner one begins further right, and so came later.
     for (auto other = open.rbegin(); other != open.rend() && outer_of[c] == kNone; ++other) {
-      const Outline& around = outlines[*other];
+      const Bounds& around = outlines[*other];
       if (around.lo.y <= own.lo.y && own.hi.y <= around.hi.y && own.hi.x <= around.hi.x &&
           is_around(contours[*other], contours[c])) {
         outer_of[c] = *other;
@@ -89,10 +89,10 @@ std::vector<std::uint32_t> outers_of(const Contours& contours, const std::vector
 void order_by_outer(Contours& contours) {
   const std::uint32_t count = contours.size();
   if (count < 2) return;
-  std::vector<Outline> outlines(count);
+  std::vector<Bounds> outlines(count);
   std::uint32_t outers = 0, an_outer = kNone;
   for (std::uint32_t c = 0; c < count; ++c) {
-    outlines[c] = outline_of(contours[c]);
+    outlines[c] = bounds_of(contours[c]);
     if (outlines[c].outer) ++outers, an_outer = c;
   }
   if (outers == count || (outers == 1 && an_outer == 0)) return;
@@ -114,4 +114,4 @@ void order_by_outer(Contours& contours) {
   contours = std::move(ordered);
 }
 
-}  // namespace lamina::slice
+}  // namespace lamina

@@ -1,4 +1,4 @@
-// stages/slice/meet.h: whether two straight stretches share a point, exactly.
+// stages/geometry/contours/meet.h: whether two straight stretches share a point, exactly.
 #pragma once
 
 #include <algorithm>
@@ -6,7 +6,7 @@
 
 #include "stages/data/contours.h"
 
-namespace lamina::slice {
+namespace lamina {
 
 /// 1: p lies left of the line from a to b, -1: right of it, 0: on it
 inline int side_of(Point2 a, Point2 b, Point2 p) {
@@ -28,4 +28,4 @@ inline bool stretches_meet(Point2 a, Point2 b, Point2 c, Point2 d) {
   return boxes_meet(a, b, c, d) && side_of(a, b, c) * side_of(a, b, d) <= 0 && side_of(c, d, a) * side_of(c, d, b) <= 0;
 }
 
-}  // namespace lamina::slice
+}  // namespace lamina

@@ -1,9 +1,9 @@
-// stages/slice/order.h: clean contours in the order in which formats with regions want them.
+// stages/geometry/contours/order.h: clean contours in the order in which formats with regions want them.
 #pragma once
 
 #include "stages/data/contours.h"
 
-namespace lamina::slice {
+namespace lamina {
 
 /// Puts behind each outer contour the holes in it: those for which it is the innermost outer contour around them. Outer
 /// contours, and the holes of one, keep their order; no point moves within its contour.
@@ -13,4 +13,4 @@ namespace lamina::slice {
 ///           whose boxes lie around it
 void order_by_outer(Contours& contours);
 
-}  // namespace lamina::slice
+}  // namespace lamina

@@ -1,4 +1,4 @@
-// stages/slice/monotone.h: contacts between contours that wind smoothly, found by halving.
+// stages/geometry/contours/monotone.h: contacts between contours that wind smoothly, found by halving.
 //
 // A stretch of a contour along which x and y never turn back (a monotone chain) meets itself nowhere, and the box of any
 // part of it is that of the part's two ends. So two chains are compared by halving them where their boxes meet, and what
@@ -11,7 +11,7 @@
 #include "stages/data/buffer.h"
 #include "stages/data/contours.h"
 
-namespace lamina::slice {
+namespace lamina {
 
 struct MonotoneChain {
   std::uint32_t contour, begin, edges;  // from point `begin` of all on, wrapping at the contour's end
@@ -33,4 +33,4 @@ struct MonotoneScratch {
 /// cost     O(P) for P points, else gives up after a few comparisons a point
 bool find_monotone_contacts(const ContoursView& contours, MonotoneScratch& scratch);
 
-}  // namespace lamina::slice
+}  // namespace lamina

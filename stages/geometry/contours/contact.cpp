@@ -1,12 +1,12 @@
-#include "stages/slice/contact.h"
+#include "stages/geometry/contours/contact.h"
 
 #include <algorithm>
 #include <cmath>
 #include <utility>
 
-#include "stages/slice/meet.h"
+#include "stages/geometry/contours/meet.h"
 
-namespace lamina::slice {
+namespace lamina {
 namespace {
 
 /// Square cells of 2^shift nm over the box of all points.
@@ -136,4 +136,4 @@ bool find_contacts(const ContoursView& contours, ContactScratch& scratch, Buffer
   return any;
 }
 
-}  // namespace lamina::slice
+}  // namespace lamina

@@ -1,4 +1,4 @@
-// stages/slice/simplify.h: contours with fewer points, moved by no more than a tolerance.
+// stages/geometry/contours/simplify.h: contours with fewer points, moved by no more than a tolerance.
 //
 // The points that stay are points of the full contour, so a stretch between two of them replaces those between. A stretch
 // may do so if all of them lie within the tolerance of it, by squares of whole numbers. They reach both its ends, so none of
@@ -19,9 +19,9 @@
 
 #include "stages/data/buffer.h"
 #include "stages/data/contours.h"
-#include "stages/slice/contact.h"
+#include "stages/geometry/contours/contact.h"
 
-namespace lamina::slice {
+namespace lamina {
 
 /// Reused from layer to layer.
 struct SimplifyScratch {
@@ -50,4 +50,4 @@ struct SimplifyScratch {
 ///            digitized line or its caricature", Cartographica 10 (1973)
 void simplify(Contours& contours, Nm tolerance, SimplifyScratch& scratch);
 
-}  // namespace lamina::slice
+}  // namespace lamina

@@ -1,13 +1,13 @@
-// stages/slice/tidy.h: points of contours that say nothing are dropped.
+// stages/geometry/contours/tidy.h: points of contours that say nothing are dropped.
 #pragma once
 
 #include "stages/data/contours.h"
 
-namespace lamina::slice {
+namespace lamina {
 
 /// Drops points that lie exactly on the line through their neighbours: spikes that run back on themselves and repeated
 /// points among them. Contours that have no area left are dropped.
 /// cost  O(P)
 void tidy(Contours& contours);
 
-}  // namespace lamina::slice
+}  // namespace lamina

@@ -1,4 +1,4 @@
-// stages/slice/nest.h: which contours bound the solid, and on which side.
+// stages/geometry/contours/nest.h: which contours bound the solid, and on which side.
 #pragma once
 
 #include "stages/data/buffer.h"
@@ -6,7 +6,7 @@
 #include "stages/data/contours.h"
 #include "stages/data/status.h"
 
-namespace lamina::slice {
+namespace lamina {
 
 /// Contours of any orientation and nesting become clean: those with solid, by the fill rule, on both sides or on none
 /// are dropped, the others are turned so that it lies on their left. Only those that are in contact with others or with
@@ -23,4 +23,4 @@ Result<std::uint32_t> nest(Contours& contours, FillRule rule, const Buffer<std::
 /// cost      as nest
 bool same_nesting(const Contours& contours, const Contours& others);
 
-}  // namespace lamina::slice
+}  // namespace lamina

@@ -1,10 +1,10 @@
-#include "stages/slice/monotone.h"
+#include "stages/geometry/contours/monotone.h"
 
 #include <algorithm>
 
-#include "stages/slice/meet.h"
+#include "stages/geometry/contours/meet.h"
 
-namespace lamina::slice {
+namespace lamina {
 namespace {
 
 int sign(std::int64_t v) { return v > 0 ? 1 : v < 0 ? -1 : 0; }
@@ -113,4 +113,4 @@ class Search {
 
 bool find_monotone_contacts(const ContoursView& contours, MonotoneScratch& scratch) { return Search(contours, scratch).run(); }
 
-}  // namespace lamina::slice
+}  // namespace lamina

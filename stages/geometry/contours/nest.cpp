@@ -1,4 +1,4 @@
-#include "stages/slice/nest.h"
+#include "stages/geometry/contours/nest.h"
 
 #include <algorithm>
 #include <cstdlib>
@@ -7,9 +7,9 @@
 #include <vector>
 
 #include "stages/geometry/clipping.h"
-#include "stages/slice/contact.h"
+#include "stages/geometry/contours/contact.h"
 
-namespace lamina::slice {
+namespace lamina {
 namespace {
 
 struct Outline {
@@ -176,4 +176,4 @@ bool same_nesting(const Contours& contours, const Contours& others) {
   return outside == windings_outside(contours, outlines_of(contours), {});
 }
 
-}  // namespace lamina::slice
+}  // namespace lamina

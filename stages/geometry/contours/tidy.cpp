@@ -1,8 +1,8 @@
-#include "stages/slice/tidy.h"
+#include "stages/geometry/contours/tidy.h"
 
 #include <algorithm>
 
-namespace lamina::slice {
+namespace lamina {
 namespace {
 
 std::int64_t cross(Point2 a, Point2 b, Point2 c) {
@@ -56,4 +56,4 @@ void tidy(Contours& contours) {
   contours.point.resize(kept_points);
 }
 
-}  // namespace lamina::slice
+}  // namespace lamina

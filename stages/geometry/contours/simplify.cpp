@@ -1,4 +1,4 @@
-#include "stages/slice/simplify.h"
+#include "stages/geometry/contours/simplify.h"
 
 #include <algorithm>
 #include <bit>
@@ -6,9 +6,9 @@
 #include <cstdlib>
 #include <span>
 
-#include "stages/slice/nest.h"
+#include "stages/geometry/contours/nest.h"
 
-namespace lamina::slice {
+namespace lamina {
 namespace {
 
 using UInt128 = unsigned __int128;
@@ -212,4 +212,4 @@ void simplify(Contours& contours, Nm tolerance, SimplifyScratch& scratch) {
   if (same_nesting(contours, scratch.thinned)) std::swap(contours, scratch.thinned);
 }
 
-}  // namespace lamina::slice
+}  // namespace lamina

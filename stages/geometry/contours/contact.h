@@ -1,11 +1,11 @@
-// stages/slice/contact.h: do contours keep clear of each other and of themselves?
+// stages/geometry/contours/contact.h: do contours keep clear of each other and of themselves?
 #pragma once
 
 #include "stages/data/buffer.h"
 #include "stages/data/contours.h"
-#include "stages/slice/monotone.h"
+#include "stages/geometry/contours/monotone.h"
 
-namespace lamina::slice {
+namespace lamina {
 
 inline constexpr std::uint32_t kNoContact = UINT32_MAX;
 
@@ -34,4 +34,4 @@ struct ContactScratch {
 ///          grid about as fine as they are long
 bool find_contacts(const ContoursView& contours, ContactScratch& scratch, Buffer<std::uint32_t>& group);
 
-}  // namespace lamina::slice
+}  // namespace lamina
