@@ -45,7 +45,10 @@ Result<Sections> Sections::make(const Job& job, const Scene& scene, LayerSchedul
   made.bounds_ = slice::grown(made.bounds_, made.grow_);
   slice::SliceOptions options;
   options.fill_rule = job.fill_rule;
-  const auto tolerance = static_cast<Nm>(nm_of(job.slice.tolerance_um.value_or(0) / 1000));
+  auto tolerance = static_cast<Nm>(nm_of(job.slice.tolerance_um.value_or(0) / 1000));
+  // What is filled moves twice: its contours, and a tenth of that the walls made of them.
+  if (made.fills_) made.of_walls_ = tolerance / 10;
+  tolerance -= made.of_walls_;
   // Two planes of a layer are combined at full resolution: where they cross at a small angle, corners would move further.
   (job.heights.containment == Containment::kAcross ? options.tolerance : made.tolerance_) = tolerance;
   options.gap = static_cast<Nm>(nm_of(job.slice.bridge_mm));
@@ -183,12 +186,12 @@ Status Sections::contours(std::uint32_t index, Work& work) const {
       work.surface[area.shared] = std::move(*rest);
     }
   }
-  work.region.resize(areas_.size());
+  work.outlines.resize(areas_.size());
   for (std::size_t a = 0; a < areas_.size(); ++a) {
     const Area& area = areas_[a];
-    auto region = infill::fill_region(contours_of(area, work), {own, area.box}, filling(area, own));
-    if (!region) return failed(area, region.error());
-    work.region[a] = std::move(*region);
+    auto outlines = infill::outlines_of(contours_of(area, work), {own, area.box, of_walls_}, filling(area, own));
+    if (!outlines) return failed(area, outlines.error());
+    work.outlines[a] = std::move(*outlines);
   }
   return {};
 }
@@ -200,10 +203,9 @@ Status Sections::fill(std::uint32_t index, Work& work) const {
   work.path_area.push_back(0);
   for (std::size_t a = 0; a < areas_.size(); ++a) {
     const Area& area = areas_[a];
-    const Status status = infill::append_fill(contours_of(area, work), std::move(work.region[a]), {layer, area.box},
-                                              filling(area, layer), work.paths);
+    const Status status = infill::append_fill(std::move(work.outlines[a]), {layer, area.box}, filling(area, layer), work.paths);
     if (!status) return failed(area, status.error());
-    work.region[a] = Contours();
+    work.outlines[a] = {};
     work.path_area.push_back(work.paths.size());
     if (a + 1 == body_area_[area.body + 1]) work.path_body.push_back(work.paths.size());
   }
@@ -229,7 +231,9 @@ std::uint64_t Sections::bytes_bound(std::uint32_t index) const {
   };
   std::uint64_t contours = bound(own_slicers_.empty() ? *slicer_ : own_slicers_[scheduled.part]);
   if (part_slicer_) contours += bound(*part_slicer_);
-  return (fills_ ? 2 : 1) * contours + (1 << 14);
+  std::uint64_t walls = 0;
+  for (const Area& area : areas_) walls = std::max<std::uint64_t>(walls, filling(area, scheduled.own()).walls);
+  return (fills_ ? 2 + walls : 1) * contours + (1 << 14);
 }
 
 Result<std::uint64_t> Sections::fill_bytes_bound(std::uint32_t index, Work& work, TextBytes text) const {
@@ -239,7 +243,8 @@ Result<std::uint64_t> Sections::fill_bytes_bound(std::uint32_t index, Work& work
   std::uint64_t bytes = 0, scratch = 0;
   for (std::size_t a = 0; a < areas_.size(); ++a) {
     const Area& area = areas_[a];
-    const auto bound = infill::bound_fill(contours_of(area, work), work.region[a], {own, area.box}, filling(area, own));
+    const auto bound =
+        infill::bound_fill(contours_of(area, work), work.outlines[a].region, {own, area.box}, filling(area, own));
     if (!bound) return failed(area, bound.error());
     bytes += bound->points * (kOfPoint + text.point) + bound->stretches * text.stretch + bound->paths * (kOfPath + text.path);
     scratch = std::max(scratch, bound->scratch_bytes);
@@ -253,7 +258,7 @@ std::uint64_t Sections::Work::bytes() const {
   std::uint64_t total = of(contours.contours) + of(highest.contours) + of(parts.contours) + of(scratch.closed) +
                         of(scratch.open) + bytes_held(text);
   for (const Contours& c : surface) total += of(c);
-  for (const Contours& c : region) total += of(c);
+  for (const infill::Outlines& o : outlines) total += o.bytes();
   for (const Contours& c : scratch.of_source) total += of(c);
   total += scratch.cuts.bytes() + scratch.chain.bytes() + scratch.contact.bytes() + scratch.simplify.bytes() +
            bytes_held(scratch.facets);

@@ -13,6 +13,7 @@
 #include "stages/data/layer.h"
 #include "stages/data/status.h"
 #include "stages/data/toolpaths.h"
+#include "stages/infill/fill.h"
 #include "stages/slice/slice.h"
 
 namespace lamina::pipeline {
@@ -32,10 +33,10 @@ class Sections {
   struct Work {
     slice::LayerScratch scratch;
     slice::LayerContours contours;
-    slice::LayerContours highest;   // section at the layer's top, if steps must stay on one side
-    slice::LayerContours parts;     // of areas in bodies with several parts, united part by part
-    std::vector<Contours> surface;  // of these areas: the region without earlier parts
-    std::vector<Contours> region;   // of each area: allowed centres of filling beads
+    slice::LayerContours highest;            // section at the layer's top, if steps must stay on one side
+    slice::LayerContours parts;              // of areas in bodies with several parts, united part by part
+    std::vector<Contours> surface;           // of these areas: the region without earlier parts
+    std::vector<infill::Outlines> outlines;  // of each area: where the centres of beads lie
     Toolpaths paths;
     Buffer<std::uint32_t> path_body;  // the paths of body b are [path_body[b], path_body[b + 1])
     Buffer<std::uint32_t> path_area;  // the same of areas
@@ -105,6 +106,7 @@ class Sections {
   Box bounds_;
   Nm grow_ = 0;       // of an offset outwards
   Nm tolerance_ = 0;  // of layers made of two planes
+  Nm of_walls_ = 0;   // of what is made of filled contours
   bool fills_ = false;
 };
 

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "stages/geometry/clipping.h"
+#include "stages/geometry/contours/merge.h"
 #include "stages/infill/expression.h"
 #include "stages/infill/layout.h"
 #include "stages/infill/raster.h"
@@ -13,6 +14,9 @@
 
 namespace lamina::infill {
 namespace {
+
+/// Beads below this are of no use: planners of printers look ahead over a few dozen moves.
+constexpr Nm kShortest = 50'000;
 
 /// A closed path: the first point comes again at the end.
 void append_closed(const ContoursView& contours, PathKind kind, Nm width, Toolpaths& out, std::int32_t number = kNoLine) {
@@ -142,11 +146,38 @@ Status check(const FillParameters& parameters) {
   return {};
 }
 
-Result<Contours> fill_region(const ContoursView& contours, const FillContext& context, const FillParameters& parameters) {
-  if (parameters.pattern == Pattern::kNone) return Contours();
+Result<Outlines> outlines_of(const ContoursView& contours, const FillContext& context, const FillParameters& parameters) {
+  Outlines made;
+  MergeScratch scratch;
+  Contours innermost;  // with all its points: what merging moves does not add up
+  ContoursView from = contours;
+  std::int64_t at = 0;
+  for (std::uint32_t wall = 0; wall < parameters.walls; ++wall) {
+    const std::int64_t centre = (2 * std::int64_t{wall} + 1) * parameters.wall_width / 2;
+    auto moved = offset_contours(from, at - centre);
+    if (!moved) return moved.error();
+    if (moved->size() == 0) break;  // and so are all further in
+    innermost = std::move(*moved);
+    from = innermost;
+    at = centre;
+    made.walls.push_back(innermost);
+    merge_short_edges(made.walls.back(), kShortest, context.tolerance, scratch);
+  }
+  if (parameters.pattern == Pattern::kNone) return made;
   const auto depth = region_depth(context, parameters);
   if (!depth) return depth.error();
-  return offset_contours(contours, -*depth);
+  if (*depth < at) from = contours, at = 0;
+  auto region = offset_contours(from, at - *depth);
+  if (!region) return region.error();
+  made.region = std::move(*region);
+  merge_short_edges(made.region, kShortest, context.tolerance, scratch);
+  return made;
+}
+
+Result<Contours> fill_region(const ContoursView& contours, const FillContext& context, const FillParameters& parameters) {
+  auto made = outlines_of(contours, context, parameters);
+  if (!made) return made.error();
+  return std::move(made->region);
 }
 
 Result<FillBound> bound_fill(const ContoursView& contours, const ContoursView& region, const FillContext& context,
@@ -195,15 +226,11 @@ Result<FillBound> bound_fill(const ContoursView& contours, const ContoursView& r
   return bound;
 }
 
-Status append_fill(const ContoursView& contours, Contours region, const FillContext& context, const FillParameters& parameters,
-                   Toolpaths& out) {
-  if (contours.size() == 0) return {};
-  for (std::uint32_t wall = 0; wall < parameters.walls; ++wall) {
-    auto moved = offset_contours(contours, -(2 * std::int64_t{wall} + 1) * parameters.wall_width / 2);
-    if (!moved) return moved.error();
-    if (moved->size() == 0) break;  // and so are all further in
-    append_closed(*moved, wall == 0 ? PathKind::kOuter : PathKind::kInner, parameters.wall_width, out);
+Status append_fill(Outlines outlines, const FillContext& context, const FillParameters& parameters, Toolpaths& out) {
+  for (std::size_t wall = 0; wall < outlines.walls.size(); ++wall) {
+    append_closed(outlines.walls[wall], wall == 0 ? PathKind::kOuter : PathKind::kInner, parameters.wall_width, out);
   }
+  Contours& region = outlines.region;
   if (region.size() == 0) return {};
   if (parameters.pattern == Pattern::kContour) return append_curves(region, context, parameters, UINT32_MAX, out);
   if (parameters.pattern == Pattern::kContourRaster) {
@@ -215,9 +242,9 @@ Status append_fill(const ContoursView& contours, Contours region, const FillCont
 
 Status append_fill(const ContoursView& contours, const FillContext& context, const FillParameters& parameters, Toolpaths& out) {
   if (contours.size() == 0) return {};
-  auto region = fill_region(contours, context, parameters);
-  if (!region) return region.error();
-  return append_fill(contours, std::move(*region), context, parameters, out);
+  auto outlines = outlines_of(contours, context, parameters);
+  if (!outlines) return outlines.error();
+  return append_fill(std::move(*outlines), context, parameters, out);
 }
 
 }  // namespace lamina::infill

@@ -6,6 +6,9 @@
 // any number of threads.
 #pragma once
 
+#include <vector>
+
+#include "stages/data/buffer.h"
 #include "stages/data/contours.h"
 #include "stages/data/status.h"
 #include "stages/data/toolpaths.h"
@@ -22,12 +25,27 @@ Status check(const FillParameters& parameters);
 /// errors    kUsage: a distance between lines that is not positive, a formula that fails; kInternal of Clipper
 Status append_fill(const ContoursView& contours, const FillContext& context, const FillParameters& parameters, Toolpaths& out);
 
-/// The same, with the region (fill_region) made beforehand.
-Status append_fill(const ContoursView& contours, Contours region, const FillContext& context, const FillParameters& parameters,
-                   Toolpaths& out);
+/// Where the centres of beads lie, or may lie: what is laid is made of these alone.
+struct Outlines {
+  std::vector<Contours> walls;  // from the surface inwards; one that would hold nothing ends them
+  Contours region;              // of filling beads: the contours moved inwards past the walls; nothing for kNone
 
-/// Where the centres of filling beads may lie: the contours moved inwards past the walls; nothing for kNone.
+  std::uint64_t bytes() const {
+    std::uint64_t sum = bytes_held(region.point) + bytes_held(region.offset);
+    for (const Contours& wall : walls) sum += bytes_held(wall.point) + bytes_held(wall.offset);
+    return sum;
+  }
+};
+
+/// Each outline is the one before moved inwards, which is the contours moved so far; then ends of edges shorter than 0.05 mm
+/// are merged where that moves it by no more than the tolerance of the context.
 /// errors  as append_fill
+Result<Outlines> outlines_of(const ContoursView& contours, const FillContext& context, const FillParameters& parameters);
+
+/// The same, with the outlines made beforehand.
+Status append_fill(Outlines outlines, const FillContext& context, const FillParameters& parameters, Toolpaths& out);
+
+/// The region of outlines_of().
 Result<Contours> fill_region(const ContoursView& contours, const FillContext& context, const FillParameters& parameters);
 
 /// What append_fill may come to, counted before anything is laid: lines are placed and their crossings with the region

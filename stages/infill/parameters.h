@@ -65,7 +65,8 @@ double mean_distance_mm(const FillParameters& fill);
 /// Where a layer stands in its part.
 struct FillContext {
   Layer layer;
-  Box part;  // nm on the bed: lines are placed from its sides, so that they lie the same in every layer
+  Box part;          // nm on the bed: lines are placed from its sides, so that they lie the same in every layer
+  Nm tolerance = 0;  // nm by which merging points may move walls and the edge of what is filled
 };
 
 /// Direction of the lines of a layer, 0 .. kTurn - 1.

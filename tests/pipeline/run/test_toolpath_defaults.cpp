@@ -2,6 +2,7 @@
 // name.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <numbers>
@@ -135,6 +136,37 @@ TEST(ToolpathDefaults, LeaveOutPointsUnlessAskedAndTheSameInAJobFile) {
     EXPECT_NE(read_text(directory / "kept.toml").find(kept), std::string::npos);
     EXPECT_NE(read_text(directory / "out/job.toml").find(kept), std::string::npos);
   }
+}
+
+/// mm from a point to the nearest bead of a type.
+double to_nearest_bead(const GcodeLayer& layer, const std::string& type, double x, double y) {
+  double nearest = 1e9;
+  for (const GcodeBead& bead : layer.beads) {
+    if (bead.type != type) continue;
+    const double ux = bead.x1 - bead.x0, uy = bead.y1 - bead.y0, length2 = ux * ux + uy * uy;
+    const double share = length2 > 0 ? std::clamp(((x - bead.x0) * ux + (y - bead.y0) * uy) / length2, 0.0, 1.0) : 0;
+    nearest = std::min(nearest, std::hypot(x - bead.x0 - share * ux, y - bead.y0 - share * uy));
+  }
+  return nearest;
+}
+
+TEST(ToolpathDefaults, NoWallIsFurtherFromThatOfAllPointsThanTheToleranceTold) {
+  const Directory directory;
+  const std::string job = kToothFile + " --layer 0.8 --walls 2 --skirt 0";
+  const Extruded less = extruded(directory, job), all = extruded(directory, job + " --tolerance 0");
+  ASSERT_EQ(less.file.layers.size(), all.file.layers.size());
+  const double most = less.summary["tolerance_um"].get<double>() / 1000 + 0.0015;  // files have three decimals
+  std::size_t places = 0;
+  for (std::size_t k = 0; k < less.file.layers.size(); ++k) {
+    for (const GcodeBead& bead : less.file.layers[k].beads) {
+      for (const double share : {0.0, 0.5}) {
+        const double x = bead.x0 + share * (bead.x1 - bead.x0), y = bead.y0 + share * (bead.y1 - bead.y0);
+        ASSERT_LE(to_nearest_bead(all.file.layers[k], bead.type, x, y), most) << "layer " << k << ", " << bead.type;
+        ++places;
+      }
+    }
+  }
+  EXPECT_GT(places, 1000u);
 }
 
 TEST(ToolpathDefaults, AJobFileIsToldWhatItLeavesToThePrinter) {
