@@ -233,7 +233,7 @@ std::uint64_t Sections::bytes_bound(std::uint32_t index) const {
   if (part_slicer_) contours += bound(*part_slicer_);
   std::uint64_t walls = 0;
   for (const Area& area : areas_) walls = std::max<std::uint64_t>(walls, filling(area, scheduled.own()).walls);
-  return (fills_ ? 2 + walls : 1) * contours + (1 << 14);
+  return (fills_ ? 2 : 1) * contours + walls * contours / 16 + (1 << 14);  // walls hold few of a contour's bytes
 }
 
 Result<std::uint64_t> Sections::fill_bytes_bound(std::uint32_t index, Work& work, TextBytes text) const {
