@@ -72,6 +72,7 @@ bool fits(std::int64_t nm) { return nm >= INT32_MIN && nm <= INT32_MAX; }
 Result<Loaded> load_part(const Job& job, const PartRequest& request, bool blocks, Scene& scene) {
   load::LoadOptions options = load_options(job, request);
   options.blocks = blocks;
+  options.isa = job.isa;
   Result<Part> part = load::load(request.path, options);
   if (!part) return part.error();
   if (part->bounds.empty() || part->instances.empty()) {

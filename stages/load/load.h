@@ -6,6 +6,7 @@
 #include <string>
 #include <string_view>
 
+#include "stages/data/choices.h"
 #include "stages/data/mesh.h"
 #include "stages/data/status.h"
 
@@ -33,6 +34,7 @@ struct LoadOptions {
   bool drop_bad = false;                 // drop facets with coordinates that are not finite instead of refusing the file
   bool repair = true;                    // orient, remove duplicates, weld and cap a mesh that is not closed (repair.h)
   bool blocks = false;                   // closed meshes may come as Mesh::blocks, which are read in one pass, not as lists
+  Isa isa = Isa::kAuto;                  // widest instructions of the loops that make blocks; no mesh depends on it
   bool winding = false;                  // close such a mesh by its winding number instead of caps: approximate
   std::int64_t weld_nm = kWeldByItself;  // repair joins open edges that are at most this far apart
   std::uint64_t triangle_limit = 1ull << 30;  // refused above; a header can lie, so sizes are checked against the file first

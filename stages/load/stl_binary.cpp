@@ -91,7 +91,7 @@ Status read_facets(const Source& source, const Snapper& snapper, const LoadOptio
           const auto in_block = static_cast<std::size_t>(std::min<std::uint64_t>(kBlock, count - first));
           if (!source.read(kHeaderBytes + first * kFacetBytes, block, in_block * kFacetBytes)) {
             unreadable = true;
-          } else if (!snap_facets(block, in_block, snapper, out + first, so_far)) {
+          } else if (!snap_facets(block, in_block, snapper, options.isa, out + first, so_far)) {
             bad = true;
           }
         }

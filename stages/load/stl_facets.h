@@ -13,7 +13,7 @@ inline constexpr std::uint64_t kHeaderBytes = 84, kFacetBytes = 50;
 
 /// Lowest and highest coordinate of each axis as the file has them; snapping keeps the order.
 struct CoordinateBox {
-  std::array<float, 12> lo, hi;  // four corners side by side, for the processor's vectors
+  std::array<float, 3> lo, hi;
   CoordinateBox() {
     lo.fill(3e38f);
     hi.fill(-3e38f);
@@ -35,8 +35,9 @@ inline bool is_plain(const Snapper& snapper) { return snapper.plain() && !snappe
 /// Snaps one facet, turned over if the transform mirrors.
 Snapped snap_facet(const char* facet, const Snapper& snapper, Triangle& out);
 
-/// Snaps facets that follow each other, and grows the box by them. false  one of them cannot be snapped
-bool snap_facets(const char* facets, std::size_t count, const Snapper& snapper, Triangle* out, FacetBox& box);
+/// Snaps facets that follow each other, and grows the box by them. isa  the widest instruction set to use
+/// false  one of them cannot be snapped
+bool snap_facets(const char* facets, std::size_t count, const Snapper& snapper, Isa isa, Triangle* out, FacetBox& box);
 
 /// How many facets a file holds, with what there is to say about it in `facets`.
 /// errors  kInput: the header and the length of the file contradict each other, or there are more than the limit

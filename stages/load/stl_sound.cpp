@@ -8,6 +8,8 @@
 #include <memory>
 
 #include "stages/geometry/blocks/block_maker.h"
+#include "stages/geometry/isa.h"
+#include "stages/load/kernels/kernels.h"
 #include "stages/load/repair/census.h"
 #include "stages/load/stl_facets.h"
 
@@ -18,10 +20,12 @@ namespace {
 struct Worker {
   std::array<char, kBlockSize * kFacetBytes> bytes;
   std::array<Triangle, kBlockSize> facets;
-  std::array<std::uint16_t, 3 * kBlockSize> hashes;
+  const LoadKernels& kernels;
   BlockMaker maker;
   CensusSums sums;
   FacetBox box;
+
+  explicit Worker(Isa isa) : kernels(load_kernels_for(isa)), maker(isa) {}
 };
 using Workers = tbb::enumerable_thread_specific<std::unique_ptr<Worker>>;
 
@@ -30,11 +34,11 @@ bool read_block(const Source& source, const Snapper& snapper, std::uint32_t bloc
                 MeshBlocks& blocks, Prisms& prisms) {
   const std::uint64_t first = blocks.first_triangle(block), count = blocks.triangles_in(block);
   if (!source.read(kHeaderBytes + first * kFacetBytes, worker.bytes.data(), count * kFacetBytes)) return false;
-  if (!snap_facets(worker.bytes.data(), count, snapper, worker.facets.data(), worker.box)) return false;
-  const std::span<const Triangle> facets(worker.facets.data(), count);
-  worker.sums.add(facets, share, worker.hashes.data());
-  prisms = Prisms::of(facets, facets.front().a.z);
-  worker.maker.make(facets, {worker.hashes.data(), 3 * facets.size()}, blocks, block);
+  if (!snap_facets(worker.bytes.data(), count, snapper, worker.kernels.isa, worker.facets.data(), worker.box)) return false;
+  SortedBlock& sorted = worker.maker.sort({worker.facets.data(), count}, blocks, block);
+  worker.kernels.census(sorted, share, worker.sums);
+  prisms = worker.kernels.prisms(sorted, worker.facets.front().a.z);
+  worker.maker.store(blocks, block);
   return true;
 }
 
@@ -56,7 +60,7 @@ std::optional<Mesh> read_sound_stl(const Source& source, const Snapper& snapper,
   const auto blocks = std::make_shared<MeshBlocks>(triangles, 0);
   Buffer<Prisms> pieces(blocks->block_count());
   const std::uint64_t share = sampled_share(triangles);
-  Workers workers([] { return std::make_unique_for_overwrite<Worker>(); });
+  Workers workers([isa = isa_at_most(options.isa)] { return std::make_unique<Worker>(isa); });
   std::atomic<bool> failed{false};
   tbb::parallel_for(tbb::blocked_range<std::uint32_t>(0, blocks->block_count()),
                     [&](const tbb::blocked_range<std::uint32_t>& range) {

@@ -8,6 +8,7 @@
 
 #include "stages/data/mesh.h"
 #include "stages/geometry/blocks/mesh_blocks.h"
+#include "stages/geometry/isa.h"
 
 namespace lamina::raster {
 
@@ -45,7 +46,7 @@ class ClusteredMesh {
 
 /// Groups the triangles of meshes into clusters and takes them out of the meshes (block_maker.h).
 /// cost: O(T), parallel; nothing where the loader has made blocks
-std::vector<ClusteredMesh> make_clusters(std::span<Mesh> meshes);
-inline ClusteredMesh make_clusters(Mesh& mesh) { return make_clusters(std::span(&mesh, 1)).front(); }
+std::vector<ClusteredMesh> make_clusters(std::span<Mesh> meshes, Isa isa = Isa::kAuto);
+inline ClusteredMesh make_clusters(Mesh& mesh, Isa isa = Isa::kAuto) { return make_clusters(std::span(&mesh, 1), isa).front(); }
 
 }  // namespace lamina::raster

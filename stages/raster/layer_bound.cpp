@@ -5,65 +5,10 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
-#include <cstring>
 #include <map>
 #include <utility>
 
 namespace lamina::raster {
-namespace {
-
-/// Four numbers that are worked on at once, on any processor that compilers know.
-using Four = std::int32_t __attribute__((vector_size(16)));
-using FourFloat = float __attribute__((vector_size(16)));
-
-Four pick(Four where, Four a, Four b) { return (a & where) | (b & ~where); }
-Four least(Four a, Four b) { return pick(a < b, a, b); }
-Four most(Four a, Four b) { return pick(a < b, b, a); }
-FourFloat in_float(Four a) { return __builtin_convertvector(a, FourFloat); }
-FourFloat unsigned_of(FourFloat a) { return reinterpret_cast<FourFloat>(reinterpret_cast<Four>(a) & INT32_MAX); }
-
-/// The tents of a cluster's facets: slabs of their ends and slopes. Facets that no plane cuts have neither height nor count.
-struct Tents {
-  static constexpr std::uint32_t kFours = kClusterSize / 4;
-  Four begin[kFours], last[kFours];    // slabs that the facet reaches
-  Four rise[kFours], fall[kFours];     // slabs over which it rises and falls, at least 1
-  FourFloat up[kFours], down[kFours];  // nm a slab
-  Four count[kFours];
-
-  /// In float: rounding moves a tent's height by less than 2^-22 of the facet's depth, of which twice as much is added.
-  Tents(const Cluster& cluster, std::uint32_t shift, std::int32_t first) {
-    constexpr float kRounding = 1.0f / (1 << 21), kUp = 1 + 1.0f / (1 << 20);
-    const auto four_of = [](const Nm* lanes, std::uint32_t four) {
-      Four numbers;
-      std::memcpy(&numbers, lanes + 4 * four, sizeof numbers);
-      return numbers;
-    };
-    const auto bits = static_cast<int>(shift);
-    for (std::uint32_t i = 0; i < kFours; ++i) {
-      const Four za = four_of(cluster.z[0], i), zb = four_of(cluster.z[1], i), zc = four_of(cluster.z[2], i);
-      const Four lower = least(za, zb), upper = most(za, zb);
-      const Four lo = least(lower, zc), hi = most(upper, zc), middle = most(lower, least(upper, zc));
-      const Four cut = lo < hi;  // -1 where it is
-      const Four ya = four_of(cluster.y[0], i);
-      const FourFloat uy = in_float(four_of(cluster.y[1], i) - ya), vy = in_float(four_of(cluster.y[2], i) - ya);
-      const FourFloat area = unsigned_of(uy * in_float(zc - za) - in_float(zb - za) * vy);
-      const FourFloat depth = unsigned_of(uy) + unsigned_of(vy);
-      const FourFloat top = (area / in_float(most(hi - lo, Four{} + 1)) + depth * kRounding) * kUp;
-      const FourFloat height = reinterpret_cast<FourFloat>(reinterpret_cast<Four>(top) & cut);
-      begin[i] = (lo >> bits) - first;
-      last[i] = ((hi + cut) >> bits) - first;
-      const Four peak = least((middle >> bits) - first, last[i]);
-      rise[i] = most(peak - begin[i], Four{} + 1);
-      fall[i] = most(last[i] - peak, Four{} + 1);
-      up[i] = height / in_float(rise[i]);
-      down[i] = height / in_float(fall[i]);
-      count[i] = -cut;
-    }
-  }
-};
-
-}  // namespace
-
 void CrossingSums::cover(std::int64_t lowest, std::int64_t highest) {
   std::int64_t begin = 0, end = 0;
   for (;; join_pairs()) {
@@ -107,19 +52,18 @@ void CrossingSums::add(const Cluster& cluster, const Box& bounds) {
   if (bounds.height() == 0) return;
   const std::int64_t begin = bounds.lo.z >> shift_, last = bounds.hi.z >> shift_;
   if (begin < first_ || last >= first_ + slabs()) cover(bounds.lo.z, bounds.hi.z);
-  const Tents tents(cluster, shift_, static_cast<std::int32_t>(first_));
-  for (std::uint32_t i = 0; i < Tents::kFours; ++i) {
-    for (std::uint32_t lane = 0; lane < 4; ++lane) {
-      const double up = tents.up[i][lane], down = tents.down[i][lane];
-      Change* const from = change_.data() + tents.begin[i][lane];
-      Change* const last_slab = change_.data() + tents.last[i][lane];
-      from->bend += up;
-      from->segments += tents.count[i][lane];
-      from[tents.rise[i][lane]].bend -= up;
-      (last_slab + 2 - tents.fall[i][lane])->bend -= down;
-      last_slab[1].segments -= tents.count[i][lane];
-      last_slab[2].bend += down;
-    }
+  Tents tents;
+  raise_tents_(cluster, shift_, static_cast<std::int32_t>(first_), tents);
+  for (std::uint32_t i = 0; i < kClusterSize; ++i) {
+    const double up = tents.up[i], down = tents.down[i];
+    Change* const from = change_.data() + tents.begin[i];
+    Change* const last_slab = change_.data() + tents.last[i];
+    from->bend += up;
+    from->segments += tents.count[i];
+    from[tents.rise[i]].bend -= up;
+    (last_slab + 2 - tents.fall[i])->bend -= down;
+    last_slab[1].segments -= tents.count[i];
+    last_slab[2].bend += down;
   }
   ++change_[static_cast<std::size_t>((bounds.lo.z >> shift_) - first_)].clusters;
   --change_[static_cast<std::size_t>(((bounds.hi.z - 1) >> shift_) - first_) + 1].clusters;
@@ -188,7 +132,7 @@ void CrossingSums::Table::fit(std::size_t most) {
   slab.shrink_to_fit();
 }
 
-CrossingSums sum_crossings(const ClusteredMesh& mesh) {
+CrossingSums sum_crossings(const ClusteredMesh& mesh, Isa isa) {
   using Range = tbb::blocked_range<std::uint32_t>;
   constexpr std::uint32_t kTogether = 1024;  // clusters
   const Range clusters(0, mesh.cluster_count(), kTogether);
@@ -196,21 +140,21 @@ CrossingSums sum_crossings(const ClusteredMesh& mesh) {
     Cluster room;
     for (std::uint32_t c = range.begin(); c != range.end(); ++c) to.add(mesh.cluster(c, room), mesh.bounds[c]);
   };
-  CrossingSums all;
+  CrossingSums all(isa);
   if (clusters.size() <= kTogether) {
     add(clusters, all);
     return all;
   }
-  tbb::enumerable_thread_specific<CrossingSums> sums;
+  tbb::enumerable_thread_specific<CrossingSums> sums([isa] { return CrossingSums(isa); });
   tbb::parallel_for(clusters, [&](const Range& range) { add(range, sums.local()); });
   for (const CrossingSums& one_thread : sums) all.merge(one_thread);
   return all;
 }
 
-std::vector<CrossingSums::Table> crossing_tables(std::span<const ClusteredMesh> meshes) {
+std::vector<CrossingSums::Table> crossing_tables(std::span<const ClusteredMesh> meshes, Isa isa) {
   std::vector<CrossingSums::Table> tables(meshes.size());
   tbb::parallel_for(std::size_t{0}, meshes.size(), [&](std::size_t i) {
-    tables[i] = sum_crossings(meshes[i]).table();
+    tables[i] = sum_crossings(meshes[i], isa).table();
     tables[i].fit(most_slabs_of(meshes[i].cluster_count()));
   });
   return tables;

@@ -6,6 +6,8 @@
 #include <vector>
 
 #include "stages/data/grid.h"
+#include "stages/geometry/isa.h"
+#include "stages/raster/kernels/tents.h"
 #include "stages/raster/scan.h"
 
 namespace lamina::raster {
@@ -22,6 +24,9 @@ namespace lamina::raster {
 /// of both counts. Copyable; about 20 bytes a slab.
 class CrossingSums {
  public:
+  /// isa  the widest instruction set to use; sums are the same with any
+  explicit CrossingSums(Isa isa = Isa::kAuto) : raise_tents_(tents_for(isa_at_most(isa))) {}
+
   /// Counts a cluster. cost: 16 facets side by side, some nanoseconds each
   void add(const Cluster& cluster, const Box& bounds);
   /// Adds what another sum counted, at the coarser slabs of both.
@@ -55,6 +60,7 @@ class CrossingSums {
   void cover(std::int64_t lowest, std::int64_t highest);
   void join_pairs();
 
+  RaiseTents* raise_tents_;
   std::uint32_t shift_ = kFinest;
   std::int64_t first_ = 0;
   std::vector<Change> change_ = std::vector<Change>(kBeyond);
@@ -64,10 +70,10 @@ class CrossingSums {
 constexpr std::size_t most_slabs_of(std::uint32_t clusters) { return std::size_t{64} + 4 * std::size_t{clusters}; }
 
 /// Counts all clusters of a mesh. cost: one parallel pass over its facets
-CrossingSums sum_crossings(const ClusteredMesh& mesh);
+CrossingSums sum_crossings(const ClusteredMesh& mesh, Isa isa = Isa::kAuto);
 
 /// What is kept of each mesh. cost: as above; small meshes side by side
-std::vector<CrossingSums::Table> crossing_tables(std::span<const ClusteredMesh> meshes);
+std::vector<CrossingSums::Table> crossing_tables(std::span<const ClusteredMesh> meshes, Isa isa = Isa::kAuto);
 
 /// The same of everything on the bed.
 class LayerBound {

@@ -101,11 +101,11 @@ Result<Rasterizer> Rasterizer::build(std::span<Mesh> meshes, std::span<const Ins
   state.first_row = row_at(lowest);
   state.last_row = std::max(state.first_row, row_at(highest));
 
-  state.meshes = make_clusters(meshes);
+  state.meshes = make_clusters(meshes, *usable);
   for (const Instance& instance : instances) {
     state.placed.push_back({&state.meshes[instance.mesh], instance.offset});
   }
-  state.bound.emplace_back(state.placed, state.meshes, crossing_tables(state.meshes), grid);
+  state.bound.emplace_back(state.placed, state.meshes, crossing_tables(state.meshes, *usable), grid);
   const std::uint32_t rows = std::max(1u, state.last_row - state.first_row);
   const std::uint64_t bands = std::clamp<std::uint64_t>(state.bound.front().most_crossings() / kBandCrossings, 1, rows);
   state.band_rows = ceil_div(rows, static_cast<std::uint32_t>(bands));

@@ -5,7 +5,9 @@
 #include <algorithm>
 #include <fstream>
 #include <iterator>
+#include <memory>
 #include <random>
+#include <string>
 #include <tuple>
 #include <vector>
 
@@ -185,6 +187,56 @@ TEST(Blocks, AreOrderedByHeightSoThatAPlaneMeetsFewClusters) {
   std::int64_t heights = 0;
   for (const Box& box : blocks->bounds()) heights += box.height();
   EXPECT_LT(heights, 4 * kHigh) << "of 256 clusters, each of which is as high as all where there is no order";
+}
+
+TEST(Blocks, AreTheSameWithEveryInstructionSet) {
+  std::mt19937 random(9);
+  std::vector<std::vector<Triangle>> lists;
+  for (const std::uint32_t count : {1u, 3u, 17u, 100u, 4095u, 4096u}) {
+    lists.push_back(grid_of_facets(count));
+    lists.push_back(facets_apart(count));
+    std::shuffle(lists.front().begin(), lists.front().end(), random);
+    lists.push_back({});
+    for (std::uint32_t i = 0; i < count; ++i) {  // a vertex has many facets, and some facets are points
+      const auto any = [&] { return Point3{static_cast<Nm>(random() % 9) - 4, INT32_MAX, static_cast<Nm>(random() % 200)}; };
+      lists.back().push_back({any(), any(), any()});
+    }
+  }
+  for (const std::vector<Triangle>& list : lists) {
+    const auto count = static_cast<std::uint32_t>(list.size());
+    const auto made = [&](Isa isa) {
+      auto blocks = std::make_unique<MeshBlocks>(count, 0);
+      std::make_unique<BlockMaker>(isa)->make(list, *blocks, 0);
+      return blocks;
+    };
+    const auto plain = made(Isa::kPlain);
+    const std::vector<Triangle> expected = triangles_in(*plain, 0, plain->cluster_count(), count);
+    EXPECT_EQ(in_order(expected), in_order(list));
+    for (const Isa isa : {Isa::kAvx2, Isa::kAvx512}) {
+      if (isa > widest_isa()) continue;
+      SCOPED_TRACE(std::string(isa_name(isa)) + ", " + std::to_string(count) + " triangles");
+      const auto wide = made(isa);
+      EXPECT_EQ(triangles_in(*wide, 0, wide->cluster_count(), count), expected);
+      EXPECT_EQ(wide->bytes(), plain->bytes());
+    }
+  }
+}
+
+TEST(Blocks, AreRightWhateverHashesAreEqual) {
+  const std::vector<Triangle> list = grid_of_facets(900);
+  for (const unsigned mask : {0u, 1u, 0x3fu}) {
+    for (const Isa isa : {Isa::kPlain, Isa::kAvx2, Isa::kAvx512}) {
+      if (isa > widest_isa()) continue;
+      MeshBlocks blocks(900, 0);
+      const auto maker = std::make_unique<BlockMaker>(isa);
+      SortedBlock& sorted = maker->sort(list, blocks, 0);
+      sorted.hash_corners();
+      for (std::uint16_t& hash : sorted.hash) hash = static_cast<std::uint16_t>(hash & mask);
+      maker->store(blocks, 0);
+      EXPECT_EQ(in_order(triangles_in(blocks, 0, blocks.cluster_count(), 900)), in_order(list));
+      EXPECT_LT(blocks.bytes(), 900 * 14u) << "each vertex is stored once";
+    }
+  }
 }
 
 /// Facets that share no vertex, near the origin.

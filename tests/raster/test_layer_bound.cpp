@@ -165,6 +165,34 @@ void expect_true_within_two(Mesh mesh, std::int64_t dpi, const std::string& name
   }
 }
 
+TEST(CrossingSums, AreTheSameBitsWithEveryInstructionSet) {
+  std::mt19937 random(23);
+  const auto any = [&](std::uint32_t of) { return static_cast<Nm>(random() % of) - static_cast<Nm>(of / 2); };
+  CrossingSums plain(Isa::kPlain), avx2(Isa::kAvx2), avx512(Isa::kAvx512);
+  for (int i = 0; i < 300; ++i) {
+    raster::Cluster cluster{};
+    Box box;
+    for (std::uint32_t lane = 0; lane < raster::kClusterSize; ++lane) {
+      const Nm steep = any(1 << 28), low = lane % 3 == 0 ? 7 : any(1 << 22);
+      for (std::uint32_t k = 0; k < 3; ++k) {
+        cluster.y[k][lane] = any(UINT32_MAX);
+        cluster.z[k][lane] = lane % 4 == 0 ? steep : lane % 2 == 0 ? any(1 << 20) : low;
+        box.add(Point3{0, 0, cluster.z[k][lane]});
+      }
+    }
+    for (CrossingSums* sums : {&plain, &avx2, &avx512}) sums->add(cluster, box);
+  }
+  const CrossingSums::Table expected = plain.table();
+  for (const CrossingSums& sums : {avx2, avx512}) {
+    const CrossingSums::Table table = sums.table();
+    ASSERT_EQ(table.slab.size(), expected.slab.size());
+    for (std::size_t i = 0; i < table.slab.size(); ++i) {
+      ASSERT_EQ(table.slab[i].depth, expected.slab[i].depth) << i;
+      ASSERT_EQ(table.slab[i].segments, expected.slab[i].segments) << i;
+    }
+  }
+}
+
 TEST(CrossingSums, FewerSlabsHoldAtLeastAsMuchAndNoMoreThanTheLargestOfThoseJoined) {
   std::mt19937 random(8);
   for (int round = 0; round < 50; ++round) {

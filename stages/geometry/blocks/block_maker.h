@@ -7,46 +7,43 @@
 #include <span>
 #include <vector>
 
+#include "stages/geometry/blocks/kernels/kernels.h"
 #include "stages/geometry/blocks/mesh_blocks.h"
+#include "stages/geometry/blocks/sorted_block.h"
+#include "stages/geometry/blocks/vertex_numbers.h"
+#include "stages/geometry/isa.h"
 
 namespace lamina {
 
-/// Makes one block after the other, in scratch memory of its own: 200 KiB, which stays in a core's cache.
+/// Makes one block after the other, in scratch memory of its own: 300 KiB, which stays in a core's cache. It is unset until it
+/// is used: blocks of few triangles touch little of it.
 class BlockMaker {
  public:
-  /// Stores a block of `mesh` and the boxes of its clusters. Other threads may make other blocks meanwhile.
-  /// triangles  those of the block, in the order of the file; those that repair added stay in it
-  /// hashes     of each corner, three a triangle; equal where vertices are, and of many values where they are not
-  void make(std::span<const Triangle> triangles, std::span<const std::uint16_t> hashes, MeshBlocks& mesh, std::uint32_t block);
-  /// The same, with hashes of its own.
+  /// isa  the widest instruction set to use; blocks are the same with any
+  explicit BlockMaker(Isa isa = Isa::kAuto) : kernels_(block_kernels_for(isa_at_most(isa))) {}
+
+  /// The triangles of a block of `mesh`, sorted; whoever calls hashes the corners: equal where vertices are, and of many values
+  /// where they are not.
+  /// triangles  at least one, in the order of the file; those that repair added stay in it
+  SortedBlock& sort(std::span<const Triangle> triangles, const MeshBlocks& mesh, std::uint32_t block);
+  /// Stores them and the boxes of their clusters. Other threads may make other blocks meanwhile.
+  void store(MeshBlocks& mesh, std::uint32_t block);
+  /// Both, with hashes of its own.
   void make(std::span<const Triangle> triangles, MeshBlocks& mesh, std::uint32_t block);
 
  private:
-  static constexpr std::uint32_t kSlots = 1 << 14;                    // more than twice the vertices of a block
-  static constexpr std::uint32_t kMostVertices = kBlockSize * 3 / 2;  // of a block whose vertices are stored once
-  static constexpr std::uint16_t kNone = kMostVertices + 3;           // no vertex; a triangle more than the most is numbered
-
-  bool number_vertices(std::span<const Triangle> triangles, std::span<const std::uint16_t> hashes);
-  void fill_up(std::uint32_t count);
-  void write_plain(std::span<const Triangle> triangles, MeshBlocks::Block& block) const;
-
-  std::array<IndexedCluster, MeshBlocks::kClusters> cluster_;
-  std::array<Point3, kNone + 1> vertex_;  // in the order of clusters
+  const BlockKernels& kernels_;
+  SortedBlock sorted_;
+  VertexNumbers vertices_;
   std::array<std::uint16_t, kBlockSize> order_;
-  std::array<std::uint16_t, kSlots> slot_;  // numbers of vertices, by hash
-  std::array<std::uint16_t, 3 * kBlockSize> hash_;
-  std::uint32_t vertices_;
 };
-
-/// A maker whose scratch memory is unset until it is used: blocks of few triangles touch little of it.
-inline std::unique_ptr<BlockMaker> new_block_maker() { return std::make_unique_for_overwrite<BlockMaker>(); }
 
 /// Takes the triangles out of a mesh and makes blocks of them; a mesh that has blocks already gives these. The list's
 /// memory goes back to the system while blocks are made.
 /// cost  O(T), parallel; no more memory than the list and a block a thread
-std::shared_ptr<MeshBlocks> take_blocks(Mesh& mesh);
+std::shared_ptr<MeshBlocks> take_blocks(Mesh& mesh, Isa isa = Isa::kAuto);
 
 /// The same of many meshes at once: those of few triangles by one thread each.
-std::vector<std::shared_ptr<MeshBlocks>> take_blocks(std::span<Mesh> meshes);
+std::vector<std::shared_ptr<MeshBlocks>> take_blocks(std::span<Mesh> meshes, Isa isa = Isa::kAuto);
 
 }  // namespace lamina

@@ -31,8 +31,4 @@ static_assert(sizeof(IndexedCluster) == 96);
 /// Writes all corners of an indexed cluster. 4 bytes behind the last vertex of the table must be readable.
 void expand_cluster(const IndexedCluster& from, const Point3* vertices, Cluster& out);
 
-/// The box around a cluster, nm; of an indexed one under the condition of expand_cluster().
-Box bounds_of(const IndexedCluster& cluster, const Point3* vertices);
-Box bounds_of(const Cluster& cluster);
-
 }  // namespace lamina

@@ -6,29 +6,11 @@
 #include <algorithm>
 #include <vector>
 
+#include "stages/load/kernels/census_hash.h"
 #include "stages/load/repair/diagnose.h"
 
 namespace lamina::load {
 namespace {
-
-constexpr std::uint64_t kA = 0x2d358dccaa6c78a5, kB = 0x8bb84b93962eacc9, kC = 0x4b33a62ed433d4a3, kD = 0x9e3779b97f4a7c15;
-
-__extension__ using Wide = unsigned __int128;
-
-/// Both halves of the full product: every bit of the result depends on every bit of both factors. (The folded
-/// multiplication of Wang Yi, "wyhash", 2019.)
-inline std::uint64_t fold(std::uint64_t a, std::uint64_t b) {
-  const Wide product = static_cast<Wide>(a) * b;
-  return static_cast<std::uint64_t>(product) ^ static_cast<std::uint64_t>(product >> 64);
-}
-
-inline std::uint64_t hash(const Point3& p) {
-  const std::uint64_t xy = static_cast<std::uint32_t>(p.x) | std::uint64_t{static_cast<std::uint32_t>(p.y)} << 32;
-  return fold(xy ^ kA, (static_cast<std::uint32_t>(p.z) * kD) ^ kB);
-}
-
-/// Hash of an edge as walked; depends on the direction.
-inline std::uint64_t walked(std::uint64_t from, std::uint64_t to) { return fold(from ^ kC, to ^ kB); }
 
 constexpr std::size_t kMostSampled = std::size_t{1} << 15;
 
@@ -46,32 +28,11 @@ struct Sums {
   double sixfold_volume = 0;  // nm3; its order is fixed by splitting at places that threads do not decide
 };
 
-template <bool kHashes>
-inline void add_facets(std::span<const Triangle> facets, std::uint64_t share, CensusSums& sums, std::uint16_t* hashes) {
-  const std::uint64_t below = UINT64_MAX / share;
-  for (const Triangle& t : facets) {
-    const std::uint64_t a = hash(t.a), b = hash(t.b), c = hash(t.c);
-    if constexpr (kHashes) {
-      for (const std::uint64_t corner : {a, b, c}) *hashes++ = static_cast<std::uint16_t>(corner >> 48);
-    }
-    const std::uint64_t forward = walked(a, b) + walked(b, c) + walked(c, a);
-    const std::uint64_t backward = walked(b, a) + walked(c, b) + walked(a, c);
-    sums.boundary += forward - backward;
-    sums.fingerprint += fold(forward ^ kA, kD);
-    const std::uint64_t unordered = (a + b + c) * kD;
-    if (unordered > below || a == b || b == c || c == a) continue;
-    sums.sampled.push_back((unordered * kB | 1) ^ ((a < b) ^ (b < c) ^ (c < a) ? 1u : 0u));
-  }
-}
-
 }  // namespace
 
-void CensusSums::add(std::span<const Triangle> facets, std::uint64_t share, std::uint16_t* hashes) {
-  if (hashes == nullptr) {
-    add_facets<false>(facets, share, *this, hashes);
-  } else {
-    add_facets<true>(facets, share, *this, hashes);
-  }
+void CensusSums::add(std::span<const Triangle> facets, std::uint64_t share) {
+  const std::uint64_t below = UINT64_MAX / share;
+  for (const Triangle& t : facets) add_facet(hash(t.a), hash(t.b), hash(t.c), below, *this);
 }
 
 void CensusSums::add(const CensusSums& other) {
@@ -94,16 +55,6 @@ bool any_reversed(std::span<const std::uint64_t> sampled) {
     table[at] = facet;
   }
   return false;
-}
-
-Prisms Prisms::of(std::span<const Triangle> facets, Nm plane) {
-  Prisms sum{0, 0, plane};
-  for (const Triangle& t : facets) {
-    const double shadow = shadow_of(t);
-    sum.doubled_shadow += shadow;
-    sum.sixfold_volume += shadow * threefold_height(t, 3.0 * plane);
-  }
-  return sum;
 }
 
 Census census(std::span<const Triangle> triangles, Nm plane) {

@@ -15,9 +15,8 @@ struct CensusSums {
   std::uint64_t fingerprint = 0;       // Census::fingerprint
   std::vector<std::uint64_t> sampled;  // facets without their orientation, which is the lowest bit
 
-  /// share   of sampled_share()
-  /// hashes  null, or gets 16 bits for each corner of each facet: equal where vertices are
-  void add(std::span<const Triangle> facets, std::uint64_t share, std::uint16_t* hashes = nullptr);
+  /// share  of sampled_share()
+  void add(std::span<const Triangle> facets, std::uint64_t share);
   void add(const CensusSums& other);
 };
 
@@ -31,10 +30,8 @@ bool any_reversed(std::span<const std::uint64_t> sampled);
 /// above, nm2, by which the volume changes where the plane is another: sums of pieces that were taken at planes of their own.
 struct Prisms {
   double sixfold_volume = 0, doubled_shadow = 0;
-  Nm plane = 0;
+  Nm plane = 0;  // within the facets or near them, so that little cancels out
 
-  /// plane  within the facets or near them, so that little cancels out
-  static Prisms of(std::span<const Triangle> facets, Nm plane);
   double sixfold_volume_above(Nm other) const {
     return sixfold_volume + 3 * (static_cast<double>(plane) - other) * doubled_shadow;
   }

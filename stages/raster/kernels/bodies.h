@@ -8,13 +8,8 @@
 #include <cstring>
 #include <limits>
 
+#include "stages/geometry/targets.h"
 #include "stages/raster/kernels/kernels.h"
-
-#if defined(__x86_64__)
-#define LAMINA_WIDE_KERNELS 1
-#define LAMINA_AVX2 __attribute__((target("avx2,bmi,bmi2,popcnt")))
-#define LAMINA_AVX512 __attribute__((target("avx512f,avx512dq,avx512vl,avx512bw,bmi,bmi2,popcnt")))
-#endif
 
 namespace lamina::raster {
 

@@ -38,7 +38,8 @@ class Descriptor {
 Error system_error(Fault fault, const std::string& path) { return {fault, path + ": " + std::strerror(errno)}; }
 Error interrupted() { return {Fault::kInterrupted, "interrupted"}; }
 
-Status read_file(const std::string& path, const std::atomic<bool>& cancel, std::vector<std::byte>& block, std::uint64_t& bytes) {
+Status read_file(const std::string& path, const std::atomic<bool>& cancel, std::vector<std::byte>& block,
+                 std::uint64_t& bytes) {
   const Descriptor file(open(path.c_str(), O_RDONLY | O_CLOEXEC));
   if (file.get() < 0) return system_error(Fault::kInput, path);
   while (!cancel) {

@@ -1,0 +1,43 @@
+// Corners find the first corner that is the same vertex through a table in which the first corner of each hash stands: it is
+// written from the last corner to the first, so nothing asks what it held. Vertices whose slot another one has are few, and
+// are found by probing.
+#include "stages/geometry/blocks/vertex_numbers.h"
+
+namespace lamina {
+
+bool VertexNumbers::number(const SortedBlock& block, const BlockKernels& kernels) {
+  const std::uint32_t corners = block.clusters() * SortedBlock::kCorners, most = block.triangles * 3 / 2;
+  for (std::uint32_t i = corners; i-- > 0;) {
+    matches_.slot[block.hash[i] % CornerMatches::kSlots] = static_cast<std::uint16_t>(i);
+  }
+  kernels.match(block, matches_);
+  if (matches_.found > most) return false;
+  if (matches_.unmatched > 0) match_rest(block);
+  count_ = kernels.number(corners, matches_);
+  return count_ <= most;
+}
+
+/// By open addressing. Hashes decide only where the search begins.
+void VertexNumbers::match_rest(const SortedBlock& block) {
+  constexpr std::uint16_t kNone = UINT16_MAX;
+  auto& slot = matches_.slot;
+  slot.fill(kNone);
+  for (std::uint32_t r = 0; r < matches_.unmatched; ++r) {
+    const std::uint16_t i = matches_.rest[r];
+    const Nm* const corner = corner_at(block, i);
+    std::uint32_t at = block.hash[i] % CornerMatches::kSlots;
+    while (slot[at] != kNone && difference(corner, corner_at(block, slot[at])) != 0) at = (at + 1) % CornerMatches::kSlots;
+    if (slot[at] == kNone) slot[at] = i;
+    matches_.first[i] = slot[at];
+  }
+}
+
+void VertexNumbers::write(const SortedBlock& block, Point3* to) const {
+  constexpr std::uint32_t kY = SortedBlock::kCorners, kX = 2 * SortedBlock::kCorners;
+  for (std::uint32_t v = 0; v < count_; ++v) {
+    const Nm* const corner = corner_at(block, matches_.vertex[v]);
+    to[v] = {corner[kX], corner[kY], corner[0]};
+  }
+}
+
+}  // namespace lamina

@@ -1,0 +1,101 @@
+// The census of eight facets at a time with AVX-512.
+//
+// Whole numbers modulo 2^64 only, the same in each lane as plain::census() takes; full products are put together from four of
+// half the width.
+#include "stages/load/kernels/census_hash.h"
+#include "stages/load/kernels/kernels.h"
+
+#if defined(LAMINA_WIDE_KERNELS)
+#include <immintrin.h>
+
+#define LAMINA_INLINE LAMINA_AVX512 __attribute__((always_inline)) inline
+
+#if defined(__GNUC__) && !defined(__clang__)
+#pragma GCC diagnostic push
+#pragma GCC diagnostic ignored "-Wuninitialized"  // g++ 12 blames its own header
+#pragma GCC diagnostic ignored "-Wmaybe-uninitialized"
+#endif
+
+namespace lamina::load::avx512 {
+namespace {
+
+LAMINA_INLINE __m512i all(std::uint64_t v) { return _mm512_set1_epi64(static_cast<long long>(v)); }
+
+LAMINA_INLINE __m512i fold_eight(__m512i a, __m512i b) {
+  const __m512i a_high = _mm512_srli_epi64(a, 32), b_high = _mm512_srli_epi64(b, 32), low_half = all(UINT32_MAX);
+  const __m512i low = _mm512_mul_epu32(a, b), one = _mm512_mul_epu32(a_high, b), other = _mm512_mul_epu32(a, b_high);
+  const __m512i middle = _mm512_add_epi64(one, _mm512_srli_epi64(low, 32));
+  const __m512i carried = _mm512_add_epi64(other, _mm512_and_si512(middle, low_half));
+  const __m512i high = _mm512_add_epi64(_mm512_add_epi64(_mm512_mul_epu32(a_high, b_high), _mm512_srli_epi64(middle, 32)),
+                                        _mm512_srli_epi64(carried, 32));
+  const __m512i low_word = _mm512_or_si512(_mm512_slli_epi64(carried, 32), _mm512_and_si512(low, low_half));
+  return _mm512_xor_si512(low_word, high);
+}
+
+LAMINA_INLINE __m512i words(const Nm* from) {
+  return _mm512_cvtepu32_epi64(_mm256_loadu_si256(reinterpret_cast<const __m256i*>(from)));
+}
+
+LAMINA_INLINE __m512i hash_eight(const Nm* x, const Nm* y, const Nm* z) {
+  const __m512i xy = _mm512_or_si512(words(x), _mm512_slli_epi64(words(y), 32));
+  return fold_eight(_mm512_xor_si512(xy, all(kA)), _mm512_xor_si512(_mm512_mullo_epi64(words(z), all(kD)), all(kB)));
+}
+
+/// As hashed_area(): differences of 31 bits have a sign in 32.
+LAMINA_INLINE __m512i areas(__m512i a, __m512i b, __m512i c) {
+  const __m512i bits = all(0x7fffffff);
+  const __m512i ax = _mm512_and_si512(a, bits), ay = _mm512_srli_epi64(a, 33);
+  const __m512i ux = _mm512_sub_epi64(_mm512_and_si512(b, bits), ax), uy = _mm512_sub_epi64(_mm512_srli_epi64(b, 33), ay);
+  const __m512i vx = _mm512_sub_epi64(_mm512_and_si512(c, bits), ax), vy = _mm512_sub_epi64(_mm512_srli_epi64(c, 33), ay);
+  return _mm512_sub_epi64(_mm512_mul_epi32(ux, vy), _mm512_mul_epi32(vx, uy));
+}
+
+void sample_lanes(unsigned lanes, const std::uint64_t (&corner)[3][8], CensusSums& sums) {
+  for (unsigned i = 0; i < 8; ++i) {
+    if ((lanes >> i & 1) != 0) sample(corner[0][i], corner[1][i], corner[2][i], sums);
+  }
+}
+
+}  // namespace
+
+void census(SortedBlock& block, std::uint64_t share, CensusSums& sums) {
+  const __m512i below = all(UINT64_MAX / share), to_b = all(kB), to_c = all(kC);
+  __m512i boundary = _mm512_setzero_si512(), fingerprint = boundary;
+  for (std::uint32_t first = 0; first < block.clusters() * kClusterSize; first += 8) {
+    const std::uint32_t lane = first % kClusterSize, left = block.triangles - std::min(block.triangles, first);
+    const auto used = static_cast<__mmask8>(left >= 8 ? 255u : (1u << left) - 1);
+    const auto& [z, y, x] = block.cluster[first / kClusterSize];
+    __m512i corner[3];
+    for (std::uint32_t k = 0; k < 3; ++k) {
+      corner[k] = hash_eight(x[k] + lane, y[k] + lane, z[k] + lane);
+      std::uint16_t* const to = block.hash.data() + first / kClusterSize * SortedBlock::kCorners + k * kClusterSize + lane;
+      _mm_storeu_si128(reinterpret_cast<__m128i*>(to), _mm512_cvtepi64_epi16(_mm512_srli_epi64(corner[k], 48)));
+    }
+    const __m512i a = corner[0], b = corner[1], c = corner[2];
+    const __m512i from_a = _mm512_xor_si512(a, to_c), from_b = _mm512_xor_si512(b, to_c), from_c = _mm512_xor_si512(c, to_c);
+    const __m512i to_a = _mm512_xor_si512(a, to_b), at_b = _mm512_xor_si512(b, to_b), at_c = _mm512_xor_si512(c, to_b);
+    const __m512i forward =
+        _mm512_add_epi64(_mm512_add_epi64(fold_eight(from_a, at_b), fold_eight(from_b, at_c)), fold_eight(from_c, to_a));
+    boundary = _mm512_add_epi64(boundary, areas(a, b, c));
+    fingerprint =
+        _mm512_mask_add_epi64(fingerprint, used, fingerprint, fold_eight(_mm512_xor_si512(forward, all(kA)), all(kD)));
+    const __m512i facet = _mm512_mullo_epi64(_mm512_add_epi64(_mm512_add_epi64(a, b), c), all(kD));
+    const __mmask8 sampled = _mm512_mask_cmple_epu64_mask(used, facet, below);
+    if (sampled != 0) [[unlikely]] {
+      std::uint64_t hashes[3][8];
+      for (std::uint32_t k = 0; k < 3; ++k) _mm512_storeu_si512(hashes[k], corner[k]);
+      sample_lanes(sampled, hashes, sums);
+    }
+  }
+  sums.boundary += static_cast<std::uint64_t>(_mm512_reduce_add_epi64(boundary));
+  sums.fingerprint += static_cast<std::uint64_t>(_mm512_reduce_add_epi64(fingerprint));
+}
+
+}  // namespace lamina::load::avx512
+
+#if defined(__GNUC__) && !defined(__clang__)
+#pragma GCC diagnostic pop
+#endif
+
+#undef LAMINA_INLINE
+#endif
