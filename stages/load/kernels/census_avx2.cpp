@@ -24,14 +24,15 @@ LAMINA_INLINE __m256i product(__m256i a, __m256i b) {
   return _mm256_add_epi64(_mm256_mul_epu32(a, b), _mm256_slli_epi64(crossed, 32));
 }
 
+/// Shuffles take the upper halves where shifts would do, too: they do not wait for the multiplier.
 LAMINA_INLINE __m256i fold_four(__m256i a, __m256i b) {
-  const __m256i a_high = _mm256_srli_epi64(a, 32), b_high = _mm256_srli_epi64(b, 32), low_half = all(UINT32_MAX);
+  const __m256i a_high = _mm256_shuffle_epi32(a, 0xF5), b_high = _mm256_shuffle_epi32(b, 0xF5);
   const __m256i low = _mm256_mul_epu32(a, b), one = _mm256_mul_epu32(a_high, b), other = _mm256_mul_epu32(a, b_high);
   const __m256i middle = _mm256_add_epi64(one, _mm256_srli_epi64(low, 32));
-  const __m256i carried = _mm256_add_epi64(other, _mm256_and_si256(middle, low_half));
+  const __m256i carried = _mm256_add_epi64(other, _mm256_and_si256(middle, all(UINT32_MAX)));
   const __m256i high = _mm256_add_epi64(_mm256_add_epi64(_mm256_mul_epu32(a_high, b_high), _mm256_srli_epi64(middle, 32)),
                                         _mm256_srli_epi64(carried, 32));
-  return _mm256_xor_si256(_mm256_blend_epi32(low, _mm256_slli_epi64(carried, 32), 0xAA), high);
+  return _mm256_xor_si256(_mm256_blend_epi32(low, _mm256_shuffle_epi32(carried, 0xA0), 0xAA), high);
 }
 
 LAMINA_INLINE __m256i words(const Nm* from) {

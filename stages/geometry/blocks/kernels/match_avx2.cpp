@@ -33,6 +33,14 @@ LAMINA_INLINE __m256i unlike(const Nm* own, __m256i place, const Nm* coordinates
 
 LAMINA_INLINE unsigned bits_of(__m256i mask) { return static_cast<unsigned>(_mm256_movemask_ps(_mm256_castsi256_ps(mask))); }
 
+/// Writes the numbers of the lanes that are set, counted from `first`, and something behind them.
+LAMINA_INLINE void put_lanes(unsigned lanes, std::uint32_t first, std::uint16_t* to) {
+  const std::uint64_t bytes = _pdep_u64(lanes, 0x0101010101010101) * 0xFF;
+  const __m128i numbers = _mm_cvtsi64_si128(static_cast<long long>(_pext_u64(0x0706050403020100, bytes)));
+  _mm_storeu_si128(reinterpret_cast<__m128i*>(to),
+                   _mm_add_epi16(_mm_cvtepu8_epi16(numbers), _mm_set1_epi16(static_cast<short>(first))));
+}
+
 }  // namespace
 
 void match(const SortedBlock& block, CornerMatches& matches) {
@@ -53,10 +61,8 @@ void match(const SortedBlock& block, CornerMatches& matches) {
       const __m256i packed = _mm256_permute4x64_epi64(_mm256_packus_epi32(first, first), 0x08);
       _mm_storeu_si128(reinterpret_cast<__m128i*>(matches.first.data() + i), _mm256_castsi256_si128(packed));
       const unsigned other = bits_of(_mm256_cmpeq_epi32(difference, _mm256_setzero_si256())) ^ 0xFF;
-      for (std::uint32_t lane = 0; lane < kLanes; ++lane) {
-        matches.rest[rest] = static_cast<std::uint16_t>(i + lane);
-        rest += other >> lane & 1;
-      }
+      put_lanes(other, i, matches.rest.data() + rest);
+      rest += static_cast<std::uint32_t>(std::popcount(other));
       found += static_cast<std::uint32_t>(std::popcount(bits_of(_mm256_cmpeq_epi32(first, own))));
     }
   }
