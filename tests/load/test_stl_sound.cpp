@@ -104,7 +104,7 @@ TEST(ReadSoundStl, WhatIsNotSoundIsReadAgainForItsList) {
   }
 }
 
-TEST(ReadSoundStl, ManyBlocksAreTheSameForEveryNumberOfThreads) {
+TEST(ReadSoundStl, ManyBlocksAreTheSameForEveryNumberOfThreadsAndEveryInstructionSet) {
   std::mt19937 random(11);
   std::vector<FloatTriangle> facets;
   for (int i = 0; i < 1500; ++i) {
@@ -122,6 +122,14 @@ TEST(ReadSoundStl, ManyBlocksAreTheSameForEveryNumberOfThreads) {
     EXPECT_EQ(parts.back().meshes[0].volume_mm3, parts[0].meshes[0].volume_mm3);
     EXPECT_EQ(parts.back().meshes[0].fingerprint, parts[0].meshes[0].fingerprint);
     EXPECT_TRUE(all_triangles(parts.back().meshes[0]) == all_triangles(parts[0].meshes[0]));
+  }
+  for (const Isa isa : {Isa::kPlain, Isa::kAvx2, Isa::kAvx512}) {
+    load::LoadOptions options = as_blocks();
+    options.isa = isa;  // at most what the processor has
+    const Mesh mesh = loaded(path, options).meshes[0];
+    EXPECT_EQ(mesh.volume_mm3, parts[0].meshes[0].volume_mm3);
+    EXPECT_EQ(mesh.fingerprint, parts[0].meshes[0].fingerprint);
+    EXPECT_TRUE(all_triangles(mesh) == all_triangles(parts[0].meshes[0]));
   }
 }
 
