@@ -214,11 +214,11 @@ TEST_F(TwoPowders, EveryDialectSaysWhichVatFeeds) {
 // A nut that stands on another powder is of a group of its own, which shares the mesh with the nut beside it.
 TEST_F(TwoPowders, AMeshOfTwoGroupsIsThereOnce) {
   const auto at = [](PartRequest one, double x, double bottom) {
-    one.at_mm = {{x, 5}};
+    one.at_mm = {{x, 50}};
     one.bottom_mm = bottom;
     return one;
   };
-  const PartRequest nut = part("parameter_quality_nut.stl", 1, "steel"), crown = part("dental_crown.stl", 1, "bronze");
+  const PartRequest nut = part("parameter_quality_nut.stl", 0.3, "steel"), crown = part("dental_crown.stl", 1, "bronze");
   const auto mesh_bytes = [&](std::vector<PartRequest> parts) {
     Job made = job(std::move(parts), "out");
     made.dry_run = true;
@@ -226,9 +226,9 @@ TEST_F(TwoPowders, AMeshOfTwoGroupsIsThereOnce) {
     EXPECT_TRUE(summary.ok()) << summary.error().message;
     return summary.ok() ? summary->mesh_bytes : 0;
   };
-  const std::uint64_t once = mesh_bytes({at(nut, 5, 0), at(crown, 55, 0)});
+  const std::uint64_t once = mesh_bytes({at(nut, 40, 0), at(crown, 60, 0)});
   EXPECT_GT(once, 0u);
-  EXPECT_EQ(mesh_bytes({at(nut, 5, 0), at(crown, 55, 0), at(nut, 55, 0)}), once);
+  EXPECT_EQ(mesh_bytes({at(nut, 40, 0), at(crown, 60, 0), at(nut, 60, 0)}), once);
 }
 
 TEST_F(TwoPowders, APartCanChangeItsPowderWithTheHeight) {
