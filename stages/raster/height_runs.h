@@ -1,10 +1,10 @@
 // stages/raster/height_runs.h: clusters of a mesh in runs, each with a table of heights and depths to be searched.
 //
 // Clusters that follow each other are neighbours in the file and ordered by height (clusters.h). So a run of them is one box
-// that a tree holds cheaply, and a plane meets few of its clusters, which a search of the run's table finds: heights and
-// depths in steps of 1/65536 of the run, rounded down on both sides of every comparison, so that none is missed. A cluster
-// that begins or ends in the plane's own step is asked for its box, so that no more are found than a layer's bound counts; one
-// that is found without need beside the rows is only looked at in vain.
+// that a tree holds cheaply, and a plane meets few of its clusters, which a search of the run's table finds, first of 16 groups
+// and then of theirs: heights and depths in steps of 1/65536 of the run, rounded down on both sides of every comparison, so
+// that none is missed. A cluster that begins or ends in the plane's own step is asked for its box, so that no more are found
+// than a layer's bound counts; one that is found without need beside the rows is only looked at in vain.
 #pragma once
 
 #include <cstdint>
@@ -20,7 +20,7 @@ class HeightRuns {
   static constexpr std::uint32_t kRun = 256;  // clusters: a block of 4096 triangles, as ordered by make_clusters()
 
   /// bounds  of each cluster, nm; must outlive the runs
-  /// cost    O(clusters), parallel; 8 bytes a cluster
+  /// cost    O(clusters), parallel; 9 bytes a cluster
   explicit HeightRuns(std::span<const Box> bounds);
 
   std::uint32_t count() const { return static_cast<std::uint32_t>(runs_.size()); }
@@ -31,21 +31,33 @@ class HeightRuns {
   void find_clusters(std::uint32_t run, std::int64_t plane, std::int64_t low, std::int64_t high, std::uint32_t instance,
                      ClusterVisits& out) const;
 
-  std::uint64_t bytes() const { return bytes_held(runs_) + bytes_held(groups_); }
+  std::uint64_t bytes() const { return bytes_held(runs_) + bytes_held(groups_) + bytes_held(tops_); }
 
  private:
   static constexpr std::uint32_t kLanes = 16;
-  /// 16 clusters, side by side so that they are compared at once. A lane without a cluster begins above its end.
-  struct alignas(16) Group {
+  /// 16 clusters or groups of them, side by side so that they are compared at once. A lane without a cluster begins above its
+  /// end.
+  struct alignas(64) Group {
     std::uint16_t z_begin[kLanes], z_last[kLanes];  // a plane cuts none but from the lowest corner to 1 nm below the highest
     std::uint16_t y_begin[kLanes], y_last[kLanes];
+
+    void clear();
+    /// Makes a lane hold what all lanes of another group do.
+    void join(std::size_t lane, const Group& group);
   };
-  static std::uint32_t lanes_met(const Group& group, std::uint16_t z, std::uint16_t y_low, std::uint16_t y_high);
+  /// Planes and rows in steps of a run.
+  struct Search {
+    std::uint16_t z, y_low, y_high;
+    bool all_rows;  // that the run reaches
+  };
+  static std::uint32_t lanes_met(const Group& group, const Search& search);
   void build_run(std::span<const Box> bounds, std::uint32_t run);
 
   std::span<const Box> bounds_;
   Buffer<Box> runs_;
   Buffer<Group> groups_;  // kRun / kLanes a run, fewer in the last
+  Buffer<Group> tops_;    // of each run: its groups
+  static_assert(kRun == kLanes * kLanes);
 };
 
 }  // namespace lamina::raster
