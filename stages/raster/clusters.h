@@ -26,12 +26,15 @@ class ClusteredMesh {
   /// A cluster, where it is stored or expanded into `room`; the reference lives as long as both.
   const Cluster& cluster(std::uint32_t index, Cluster& room) const { return blocks_->cluster(index, room); }
 
+  /// What names a cluster's corners, or the cluster itself (mesh_blocks.h).
+  MeshBlocks::Indexed indexed(std::uint32_t index) const { return blocks_->indexed(index); }
+  const Cluster& listed(std::uint32_t index) const { return blocks_->listed(index); }
+
   /// One triangle of a cluster, for the few that integers decide.
   Triangle triangle(std::uint32_t cluster, std::uint32_t lane) const { return blocks_->triangle(cluster, lane); }
 
-  /// Asks the processor for the memory that cluster() will read: the first well before the second.
-  void prefetch(std::uint32_t index) const { blocks_->prefetch(index); }
-  void prefetch_vertices(std::uint32_t index) const { blocks_->prefetch_vertices(index); }
+  /// The memory that indexed() or listed() points to.
+  std::span<const char> stored(std::uint32_t index) const { return blocks_->stored(index); }
 
   std::uint64_t bytes() const { return blocks_->bytes(); }  // of the triangles
   std::uint64_t bounds_bytes() const { return blocks_->bounds_bytes(); }

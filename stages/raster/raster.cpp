@@ -7,6 +7,7 @@
 #include "stages/raster/beams.h"
 #include "stages/raster/clusters.h"
 #include "stages/raster/crossed_planes.h"
+#include "stages/raster/cut_clusters.h"
 #include "stages/raster/height_buckets.h"
 #include "stages/raster/layer_bound.h"
 
@@ -22,30 +23,6 @@ constexpr std::size_t kMostClusters = 1 << 16;
 
 /// Segments that a kernel may write behind those of a layer.
 constexpr std::uint64_t kMoreSegments = CutFacets::kRoom + kClusterSize;
-
-/// Segments of all clusters that an engine found. A mesh is larger than the caches, so what comes next is fetched early.
-void cut_clusters(const Kernels& kernels, const PixelSampling& sampling, std::span<const PlacedMesh> placed,
-                  std::span<const ClusterVisit> visits, Nm plane, std::uint32_t first_row, std::uint32_t last_row,
-                  Segments& out) {
-  constexpr std::size_t kAhead = 4;  // clusters, and as many again for what names their vertices
-  Cluster room;
-  CutFacets facets;
-  for (std::size_t i = 0; i < visits.size(); ++i) {
-    if (i + 2 * kAhead < visits.size()) {
-      const ClusterVisit& later = visits[i + 2 * kAhead];
-      placed[later.instance].mesh->prefetch(later.cluster);
-    }
-    if (i + kAhead < visits.size()) {
-      const ClusterVisit& next = visits[i + kAhead];
-      placed[next.instance].mesh->prefetch_vertices(next.cluster);
-    }
-    const auto [cluster, instance] = visits[i];
-    const PlacedMesh& source = placed[instance];
-    if (facets.is_full()) kernels.cut(sampling, facets, plane, first_row, last_row, out);
-    kernels.gather({&source.mesh->cluster(cluster, room), cluster * kClusterSize, instance, source.offset}, plane, facets);
-  }
-  kernels.cut(sampling, facets, plane, first_row, last_row, out);
-}
 
 /// Elements that a buffer for `count` of them gets: an eighth more, so that layers that need ever more move it rarely.
 std::uint64_t with_spare(std::uint64_t count) { return count + count / 8; }

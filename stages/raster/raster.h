@@ -33,7 +33,7 @@ struct LayerScratch {
 /// Immutable once built; layers may be asked for from any number of threads.
 class Rasterizer {
  public:
-  /// meshes     triangles are moved out of them, into blocks: 11 to 36 bytes a triangle (mesh_blocks.h)
+  /// meshes     triangles are moved out of them, into blocks: 13 to 36 bytes a triangle (mesh_blocks.h)
   /// instances  where copies stand; every corner within the grid's bed (0 <= x <= length) and below kNmReach
   /// rays, contours  which indices to build; an engine that was not built must not be asked for
   /// isa        instructions of the kernels; no effect on any layer

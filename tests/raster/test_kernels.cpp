@@ -8,14 +8,13 @@
 #include <tuple>
 
 #include "stages/geometry/isa.h"
+#include "stages/raster/cut_clusters.h"
 #include "stages/raster/kernels/kernels.h"
 #include "tests/raster/shapes.h"
 
 namespace lamina::test {
 namespace {
 
-using raster::Cluster;
-using raster::CutFacets;
 using raster::ExactTriangle;
 using raster::kClusterSize;
 using raster::Kernels;
@@ -81,30 +80,43 @@ Mesh random_facets(Kind kind, const Bed& bed, const Point3& offset, unsigned see
   return make_mesh(facets);
 }
 
-/// Clusters on a bed that they do not leave, as one part.
+/// The same corners, but each is the first of one facet, the second of another and the third of another again: blocks store
+/// vertices once.
+Mesh as_strip(const Mesh& apart) {
+  std::vector<Point3> corners;
+  for (const Triangle& t : apart.triangles) corners.insert(corners.end(), {t.a, t.b, t.c});
+  Triangles facets;
+  for (std::size_t i = 0; i < apart.triangles.size(); ++i) facets.push_back({corners[i], corners[i + 1], corners[i + 2]});
+  return make_mesh(facets);
+}
+
+/// Clusters on a bed that they do not leave, as parts at one place: instances take turns.
 struct PlacedClusters {
   Point3 offset;
   raster::ClusteredMesh mesh;
   std::vector<raster::PlacedMesh> placed;
+  raster::ClusterVisits visits;
 
-  PlacedClusters(Kind kind, const Bed& bed, unsigned seed, std::uint32_t clusters)
+  PlacedClusters(Kind kind, const Bed& bed, unsigned seed, std::uint32_t clusters, bool strip)
       : offset(seed % 2 == 0 ? Point3{0, 0, 0} : Point3{1'234'567, 7'654'321, 111'111}),
-        mesh(clusters_of(random_facets(kind, bed, offset, seed, clusters * kClusterSize))),
-        placed{{&mesh, offset}} {}
+        mesh(clusters_of(random_facets(kind, bed, offset, seed, clusters * kClusterSize), strip)),
+        placed(strip ? 2 : 1, {&mesh, offset}) {
+    EXPECT_EQ(mesh.indexed(0).cluster != nullptr, strip);
+    for (std::uint32_t i = 0; i < mesh.cluster_count(); ++i) {
+      for (std::uint32_t k = 0; k < placed.size(); ++k) visits.push_back({i, (i / 3 + k) % 2 * (strip ? 1 : 0)});
+    }
+  }
 
-  static raster::ClusteredMesh clusters_of(Mesh facets) { return raster::make_clusters(facets); }
+  static raster::ClusteredMesh clusters_of(Mesh facets, bool strip) {
+    if (strip) facets = as_strip(facets);
+    return raster::make_clusters(facets);
+  }
 };
 
 Segments cut(const Kernels& kernels, const raster::PixelSampling& sampling, const PlacedClusters& part, Nm plane,
              std::array<std::uint32_t, 2> rows) {
   Segments segments;
-  CutFacets facets;
-  Cluster room;
-  for (std::uint32_t i = 0; i < part.mesh.cluster_count(); ++i) {
-    if (facets.is_full()) kernels.cut(sampling, facets, plane, rows[0], rows[1], segments);
-    kernels.gather({&part.mesh.cluster(i, room), i * kClusterSize, 0, part.offset}, plane, facets);
-  }
-  kernels.cut(sampling, facets, plane, rows[0], rows[1], segments);
+  raster::cut_clusters(kernels, sampling, part.placed, part.visits, plane, rows[0], rows[1], segments);
   return segments;
 }
 
@@ -115,8 +127,9 @@ using Crossings = std::vector<std::tuple<std::uint32_t, std::uint32_t, bool>>;
 Crossings exact_crossings(const raster::PixelSampling& sampling, const PlacedClusters& part, Nm plane,
                           std::array<std::uint32_t, 2> rows) {
   Crossings all;
-  for (std::uint32_t facet = 0; facet < part.mesh.cluster_count() * kClusterSize; ++facet) {
-    const ExactTriangle t = raster::exact_triangle({facet, 0}, part.placed);
+  const std::uint32_t facets = part.mesh.cluster_count() * kClusterSize;
+  for (std::uint32_t i = 0; i < facets * part.placed.size(); ++i) {
+    const ExactTriangle t = raster::exact_triangle({i % facets, i / facets}, part.placed);
     std::vector<std::int64_t> ends;
     const Point3 corners[] = {t.a, t.b, t.c, t.a};
     for (int k = 0; k < 3; ++k) {
@@ -169,8 +182,8 @@ TEST(Kernels, CutAndFillAsIntegersDoAndWithTheSameBitsInEveryBody) {
     const raster::PixelSampling sampling(bed.grid);
     const std::uint32_t rows = bed.grid.rows();
     std::size_t crossings = 0;
-    for (unsigned seed = 0; seed < 4; ++seed) {
-      const PlacedClusters part(kind, bed, seed, seed < 2 ? 1 : 12);
+    for (unsigned seed = 0; seed < 6; ++seed) {
+      const PlacedClusters part(kind, bed, seed, seed < 2 ? 1 : 12, seed >= 4);
       for (const std::array<std::uint32_t, 2> band : {std::array{0u, rows}, std::array{rows / 3, rows / 3 + rows / 5}}) {
         const Crossings expected = exact_crossings(sampling, part, bed.plane, band);
         const Segments plain = cut(raster::kernels_for(Isa::kPlain), sampling, part, bed.plane, band);

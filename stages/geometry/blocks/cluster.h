@@ -22,13 +22,27 @@ struct alignas(16) Cluster {
 };
 static_assert(sizeof(Cluster) == kClusterSize * sizeof(Triangle));
 
+/// What heights the 16 triangles of a cluster reach, in steps that their block tells, modulo 256: enough to pass over nearly
+/// all that a plane does not cut, without a look at any vertex.
+struct FacetSteps {
+  std::uint8_t low[kClusterSize];   // the step of the lowest corner
+  std::uint8_t span[kClusterSize];  // steps from there to the one 1 nm below the highest corner, or 255: any plane may cut it
+};
+
 /// 16 triangles as numbers of vertices in the table of their block: corner k of triangle i is vertex corner[k][i].
-struct alignas(32) IndexedCluster {
+struct alignas(64) IndexedCluster {
+  FacetSteps steps;
   std::uint16_t corner[3][kClusterSize];
 };
-static_assert(sizeof(IndexedCluster) == 96);
+static_assert(sizeof(IndexedCluster) == 128);
 
 /// Writes all corners of an indexed cluster. 4 bytes behind the last vertex of the table must be readable.
 void expand_cluster(const IndexedCluster& from, const Point3* vertices, Cluster& out);
+
+/// Of its triangles together, from the lowest corner of each to the highest, nm.
+std::int64_t heights_of(const Cluster& cluster);
+
+/// Steps of 2^shift nm, counted from 0.
+FacetSteps steps_of(const Cluster& cluster, std::uint32_t shift);
 
 }  // namespace lamina

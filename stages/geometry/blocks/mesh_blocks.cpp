@@ -30,7 +30,8 @@ std::uint32_t MeshBlocks::triangles_in(std::uint32_t block) const {
 
 void MeshBlocks::shift(const Point3& by) {
   const auto move = [&](Point3& p) { p = {p.x + by.x, p.y + by.y, p.z + by.z}; };
-  for (const Block& block : blocks_) {
+  for (Block& block : blocks_) {
+    block.step_0 += by.z;
     auto* const vertex = const_cast<Point3*>(block.vertex());
     for (std::uint32_t v = 0; v < block.vertices; ++v) move(vertex[v]);
     for (std::uint32_t c = 0; block.vertices == 0 && c < block.clusters; ++c) {

@@ -14,9 +14,9 @@
 namespace lamina {
 
 /// Triangles in clusters of 16, 256 clusters a block. A block holds each of its vertices once, 12 bytes, and three numbers of
-/// 16 bits a triangle: 11 to 24 bytes a triangle. A block with more than 1.5 vertices a triangle, of a file in disorder, holds
-/// its clusters as they are read, 36 bytes a triangle. Vertices lie in the order in which clusters name them first, so
-/// those of a cluster are near each other. A box a cluster is 1.5 bytes a triangle on top.
+/// 16 bits and two of 8 a triangle: 13 to 26 bytes a triangle. A block with more than 1.5 vertices a triangle, of a file in
+/// disorder, holds its clusters as they are read, 36 bytes a triangle. Vertices lie in the order in which clusters name them
+/// first, so those of a cluster are near each other. A box a cluster is 1.5 bytes a triangle on top.
 ///
 /// Blocks are made by any number of threads (block_maker.h), each once; from then on nothing changes but shift().
 class MeshBlocks {
@@ -41,6 +41,26 @@ class MeshBlocks {
     return room;
   }
 
+  /// What names a cluster's corners.
+  struct Indexed {
+    const IndexedCluster* cluster;  // null: its block stores clusters as they are read
+    const Point3* vertex;           // of the block; 4 bytes behind the last one can be read
+    std::uint32_t shift;            // a step is 2^shift nm
+    Nm step_0;                      // where steps are counted from
+    /// Of a height, in the frame of the mesh.
+    std::uint8_t step_of(std::int64_t z) const { return static_cast<std::uint8_t>((z - step_0) >> shift); }
+  };
+  Indexed indexed(std::uint32_t index) const {
+    const Place place = place_of(index);
+    if (place.block.vertices == 0) return {};
+    return {place.block.indexed() + place.cluster, place.block.vertex(), place.block.shift, place.block.step_0};
+  }
+  /// A cluster of a block that stores them as they are read.
+  const Cluster& listed(std::uint32_t index) const {
+    const Place place = place_of(index);
+    return place.block.plain()[place.cluster];
+  }
+
   /// One triangle of a cluster.
   Triangle triangle(std::uint32_t cluster, std::uint32_t lane) const {
     const Place place = place_of(cluster);
@@ -50,22 +70,12 @@ class MeshBlocks {
     return {vertex[corner[0][lane]], vertex[corner[1][lane]], vertex[corner[2][lane]]};
   }
 
-  /// Asks the processor for what cluster() reads first; then, some time later, for the vertices that are named there.
-  void prefetch(std::uint32_t index) const {
+  /// Where indexed() or listed() points to, to be fetched early. Nothing here fetches it: compilers take a function that does
+  /// nothing else for one without effect, and leave calls of it out.
+  std::span<const char> stored(std::uint32_t index) const {
     const Place place = place_of(index);
-    const bool plain = place.block.vertices == 0;
-    const char* const bytes = place.block.bytes + place.cluster * (plain ? sizeof(Cluster) : sizeof(IndexedCluster));
-    for (std::size_t line = 0; line < (plain ? sizeof(Cluster) : sizeof(IndexedCluster)); line += kLine) {
-      __builtin_prefetch(bytes + line);
-    }
-  }
-  void prefetch_vertices(std::uint32_t index) const {
-    const Place place = place_of(index);
-    if (place.block.vertices == 0) return;
-    const auto& corner = place.block.indexed()[place.cluster].corner;
-    for (std::uint32_t lane = 0; lane < kClusterSize; lane += 4) {
-      for (const auto& numbers : corner) __builtin_prefetch(place.block.vertex() + numbers[lane]);
-    }
+    const std::size_t size = place.block.vertices == 0 ? sizeof(Cluster) : sizeof(IndexedCluster);
+    return {place.block.bytes + place.cluster * size, size};
   }
 
   /// Calls `see` for each vertex at least once, in no order of the file.
@@ -101,12 +111,13 @@ class MeshBlocks {
 
  private:
   friend class BlockMaker;
-  static constexpr std::size_t kLine = 64;
 
   struct Block {
     char* bytes = nullptr;       // the clusters, and behind indexed ones the vertices and 4 bytes to spare
     std::uint32_t clusters = 0;  // in the block
     std::uint32_t vertices = 0;  // 0: the clusters are stored as they are read
+    std::uint32_t shift = 0;     // of the steps of indexed clusters
+    Nm step_0 = 0;
 
     const Cluster* plain() const { return reinterpret_cast<const Cluster*>(bytes); }
     const IndexedCluster* indexed() const { return reinterpret_cast<const IndexedCluster*>(bytes); }

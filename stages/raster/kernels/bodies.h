@@ -83,7 +83,9 @@ inline bool put_pair(const std::uint32_t* row, bool positive, std::uint32_t* cha
 std::uint32_t* write_changes(FillRule rule, const std::uint32_t* crossing, const std::uint32_t* end, std::uint32_t* change);
 
 namespace plain {
-void gather(const ClusterSource& source, Nm plane, CutFacets& facets);
+void find(const IndexedSource& source, FoundFacets& found);
+void gather(FoundFacets& found, std::uint32_t instance, const Point3& offset, Nm plane, CutFacets& facets);
+void gather_listed(const ListedSource& source, Nm plane, CutFacets& facets);
 void cut(const PixelSampling& sampling, CutFacets& facets, Nm plane, std::uint32_t row_begin, std::uint32_t row_end,
          Segments& out);
 void fill(const FillTask& task);
@@ -92,7 +94,9 @@ std::uint32_t* rows(const RowsTask& task);
 
 #if defined(LAMINA_WIDE_KERNELS)
 namespace avx2 {
-LAMINA_AVX2 void gather(const ClusterSource& source, Nm plane, CutFacets& facets);
+LAMINA_AVX2 void find(const IndexedSource& source, FoundFacets& found);
+LAMINA_AVX2 void gather(FoundFacets& found, std::uint32_t instance, const Point3& offset, Nm plane, CutFacets& facets);
+LAMINA_AVX2 void gather_listed(const ListedSource& source, Nm plane, CutFacets& facets);
 LAMINA_AVX2 void cut(const PixelSampling& sampling, CutFacets& facets, Nm plane, std::uint32_t row_begin, std::uint32_t row_end,
                      Segments& out);
 LAMINA_AVX2 void fill(const FillTask& task);
@@ -100,7 +104,9 @@ LAMINA_AVX2 std::uint32_t* rows(const RowsTask& task);
 }  // namespace avx2
 
 namespace avx512 {
-LAMINA_AVX512 void gather(const ClusterSource& source, Nm plane, CutFacets& facets);
+LAMINA_AVX512 void find(const IndexedSource& source, FoundFacets& found);
+LAMINA_AVX512 void gather(FoundFacets& found, std::uint32_t instance, const Point3& offset, Nm plane, CutFacets& facets);
+LAMINA_AVX512 void gather_listed(const ListedSource& source, Nm plane, CutFacets& facets);
 LAMINA_AVX512 void cut(const PixelSampling& sampling, CutFacets& facets, Nm plane, std::uint32_t row_begin,
                        std::uint32_t row_end, Segments& out);
 LAMINA_AVX512 void fill(const FillTask& task);

@@ -61,6 +61,23 @@ LAMINA_INLINE void put_turned(const Turn& turn, __m256i a, __m256i b, __m256i c,
   put(c, a, b, right);
 }
 
+/// Eight points, coordinate by coordinate.
+struct Points {
+  __m256i x, y, z;
+};
+
+/// Corner k of eight facets: four loads for each half of the registers, which are then turned from rows into columns. A gather
+/// of each coordinate would be three loads a corner.
+LAMINA_INLINE Points corners_at(const Nm* const* table, const std::uint32_t* corner) {
+  const auto two = [&](std::uint32_t i) LAMINA_AVX2 {
+    return _mm256_inserti128_si256(_mm256_castsi128_si256(four(table[i] + corner[i])), four(table[i + 4] + corner[i + 4]), 1);
+  };
+  const __m256i a = two(0), b = two(1), c = two(2), d = two(3);
+  const __m256i xy_ab = _mm256_unpacklo_epi32(a, b), xy_cd = _mm256_unpacklo_epi32(c, d);
+  const __m256i z_ab = _mm256_unpackhi_epi32(a, b), z_cd = _mm256_unpackhi_epi32(c, d);
+  return {_mm256_unpacklo_epi64(xy_ab, xy_cd), _mm256_unpackhi_epi64(xy_ab, xy_cd), _mm256_unpacklo_epi64(z_ab, z_cd)};
+}
+
 /// To the nearest double, as the processor rounds a single whole number: both halves are exact, their sum rounds once.
 LAMINA_INLINE __m256d doubles(__m256i whole) {
   const __m256i low = _mm256_blend_epi32(whole, _mm256_set1_epi64x(0x4330000000000000), 0xAA);  // 2^52 + low half
@@ -110,7 +127,54 @@ LAMINA_INLINE __m256i flag(__m256i where, std::uint32_t bit) {
 
 }  // namespace
 
-void gather(const ClusterSource& source, Nm plane, CutFacets& facets) {
+void find(const IndexedSource& source, FoundFacets& found) {
+  const IndexedCluster& cluster = *source.cluster;
+  const __m128i up = _mm_sub_epi8(_mm_set1_epi8(static_cast<char>(source.step)), four(cluster.steps.low));
+  const __m128i met = _mm_cmpeq_epi8(_mm_subs_epu8(up, four(cluster.steps.span)), _mm_setzero_si128());
+  const auto lanes = static_cast<unsigned>(_mm_movemask_epi8(met));
+  const __m256i table = _mm256_set1_epi64x(reinterpret_cast<long long>(source.vertex));
+  std::uint32_t n = found.size;
+  for (std::uint32_t first = 0; first < kClusterSize; first += 8) {
+    const unsigned of_eight = lanes >> first & 255;
+    const __m256i order = _mm256_cvtepu8_epi32(_mm_cvtsi64_si128(static_cast<long long>(kLanesOfEight[of_eight])));
+    for (std::uint32_t k = 0; k < 3; ++k) {
+      const __m256i number = _mm256_permutevar8x32_epi32(_mm256_cvtepu16_epi32(four(cluster.corner[k] + first)), order);
+      store(found.corner[k] + n, _mm256_add_epi32(number, _mm256_add_epi32(number, number)));
+    }
+    store(found.facet + n, _mm256_add_epi32(order, _mm256_set1_epi32(static_cast<int>(source.first_facet + first))));
+    store(found.table + n, table);
+    store(found.table + n + 4, table);
+    n += static_cast<std::uint32_t>(std::popcount(of_eight));
+  }
+  found.size = n;
+}
+
+void gather(FoundFacets& found, std::uint32_t instance, const Point3& offset, Nm plane, CutFacets& facets) {
+  const __m256i z = _mm256_set1_epi32(plane_in_mesh(plane, offset)), ones = _mm256_set1_epi32(-1);
+  for (auto& corner : found.corner) store(corner + found.size, _mm256_setzero_si256());
+  std::fill_n(found.table + found.size, 8, found.table[0]);  // whole registers are read
+  std::uint32_t n = facets.size;
+  for (std::uint32_t i = 0; i < found.size; i += 8) {
+    const unsigned live = found.size - i >= 8 ? 255u : (1u << (found.size - i)) - 1;
+    const Points p = corners_at(found.table + i, found.corner[0] + i), q = corners_at(found.table + i, found.corner[1] + i),
+                 r = corners_at(found.table + i, found.corner[2] + i);
+    const __m256i a = _mm256_cmpgt_epi32(p.z, z), b = _mm256_cmpgt_epi32(q.z, z), c = _mm256_cmpgt_epi32(r.z, z);
+    const __m256i a_b = _mm256_xor_si256(a, b), a_c = _mm256_xor_si256(a, c);
+    const unsigned crossed = live & static_cast<unsigned>(_mm256_movemask_ps(_mm256_castsi256_ps(_mm256_or_si256(a_b, a_c))));
+    const __m256i order = _mm256_cvtepu8_epi32(_mm_cvtsi64_si128(static_cast<long long>(kLanesOfEight[crossed])));
+    const Turn turn{_mm256_andnot_si256(a_c, a_b), _mm256_xor_si256(a_b, ones), order};
+    put_turned(turn, p.z, q.z, r.z, _mm256_set1_epi32(offset.z), facets.tip.z + n, facets.left.z + n, facets.right.z + n);
+    put_turned(turn, p.y, q.y, r.y, _mm256_set1_epi32(offset.y), facets.tip.y + n, facets.left.y + n, facets.right.y + n);
+    put_turned(turn, p.x, q.x, r.x, _mm256_set1_epi32(offset.x), facets.tip.x + n, facets.left.x + n, facets.right.x + n);
+    store(facets.facet + n, _mm256_permutevar8x32_epi32(eight(found.facet + i), order));
+    store(facets.instance + n, _mm256_set1_epi32(static_cast<int>(instance)));
+    n += static_cast<std::uint32_t>(std::popcount(crossed));
+  }
+  facets.size = n;
+  found.size = 0;
+}
+
+void gather_listed(const ListedSource& source, Nm plane, CutFacets& facets) {
   const Cluster& cluster = *source.cluster;
   const __m256i z = _mm256_set1_epi32(plane_in_mesh(plane, source.offset));
   const __m256i ones = _mm256_set1_epi32(-1);

@@ -28,9 +28,7 @@ struct Turns {
 };
 
 /// One coordinate of tip, left and right, of the facets that are crossed.
-LAMINA_INLINE void put_coordinate(const Turns& turn, const Nm (&corner)[3][kClusterSize], Nm offset, Nm* tip, Nm* left,
-                                  Nm* right) {
-  const __m512i a = _mm512_loadu_si512(corner[0]), b = _mm512_loadu_si512(corner[1]), c = _mm512_loadu_si512(corner[2]);
+LAMINA_INLINE void put_coordinate(const Turns& turn, __m512i a, __m512i b, __m512i c, Nm offset, Nm* tip, Nm* left, Nm* right) {
   const auto put = [&](__m512i if_0, __m512i if_1, __m512i if_2, Nm* at) LAMINA_AVX512 {
     const __m512i turned = _mm512_mask_mov_epi32(_mm512_mask_mov_epi32(if_0, turn.tip_is_1, if_1), turn.tip_is_2, if_2);
     _mm512_storeu_si512(at, _mm512_add_epi32(_mm512_maskz_compress_epi32(turn.crossed, turned), _mm512_set1_epi32(offset)));
@@ -38,6 +36,32 @@ LAMINA_INLINE void put_coordinate(const Turns& turn, const Nm (&corner)[3][kClus
   put(a, b, c, tip);
   put(b, c, a, left);
   put(c, a, b, right);
+}
+LAMINA_INLINE void put_coordinate(const Turns& turn, const Nm (&corner)[3][kClusterSize], Nm offset, Nm* tip, Nm* left,
+                                  Nm* right) {
+  put_coordinate(turn, _mm512_loadu_si512(corner[0]), _mm512_loadu_si512(corner[1]), _mm512_loadu_si512(corner[2]), offset, tip,
+                 left, right);
+}
+
+/// 16 points, coordinate by coordinate.
+struct Points {
+  __m512i x, y, z;
+};
+
+/// Corner k of 16 facets: four loads for each quarter of the registers, which are then turned from rows into columns. A gather
+/// of each coordinate would be three loads a corner.
+LAMINA_INLINE Points corners_at(const Nm* const* table, const std::uint32_t* corner) {
+  const auto four = [&](std::uint32_t i) LAMINA_AVX512 {
+    const auto at = [&](std::uint32_t k)
+                        LAMINA_AVX512 { return _mm_loadu_si128(reinterpret_cast<const __m128i*>(table[k] + corner[k])); };
+    const __m256i low = _mm256_inserti128_si256(_mm256_castsi128_si256(at(i)), at(i + 4), 1);
+    const __m256i high = _mm256_inserti128_si256(_mm256_castsi128_si256(at(i + 8)), at(i + 12), 1);
+    return _mm512_inserti64x4(_mm512_castsi256_si512(low), high, 1);
+  };
+  const __m512i a = four(0), b = four(1), c = four(2), d = four(3);
+  const __m512i xy_ab = _mm512_unpacklo_epi32(a, b), xy_cd = _mm512_unpacklo_epi32(c, d);
+  const __m512i z_ab = _mm512_unpackhi_epi32(a, b), z_cd = _mm512_unpackhi_epi32(c, d);
+  return {_mm512_unpacklo_epi64(xy_ab, xy_cd), _mm512_unpackhi_epi64(xy_ab, xy_cd), _mm512_unpacklo_epi64(z_ab, z_cd)};
 }
 
 /// The rows of eight ends at y, which lie on the edges from the tips to `other`.
@@ -80,7 +104,51 @@ LAMINA_INLINE __m512i or_flag(__m512i word, __mmask8 where, std::uint32_t bit) {
 
 }  // namespace
 
-void gather(const ClusterSource& source, Nm plane, CutFacets& facets) {
+void find(const IndexedSource& source, FoundFacets& found) {
+  const IndexedCluster& cluster = *source.cluster;
+  const auto sixteen = [](const std::uint8_t* bytes)
+                           LAMINA_AVX512 { return _mm_load_si128(reinterpret_cast<const __m128i*>(bytes)); };
+  const __m128i up = _mm_sub_epi8(_mm_set1_epi8(static_cast<char>(source.step)), sixteen(cluster.steps.low));
+  const __mmask16 met = _mm_cmple_epu8_mask(up, sixteen(cluster.steps.span));
+  const std::uint32_t n = found.size;
+  for (std::uint32_t k = 0; k < 3; ++k) {
+    const __m512i number = _mm512_maskz_compress_epi32(met, _mm512_cvtepu16_epi32(load8(cluster.corner[k])));
+    _mm512_storeu_si512(found.corner[k] + n, _mm512_add_epi32(number, _mm512_add_epi32(number, number)));
+  }
+  const __m512i lanes = _mm512_set_epi32(15, 14, 13, 12, 11, 10, 9, 8, 7, 6, 5, 4, 3, 2, 1, 0);
+  _mm512_storeu_si512(found.facet + n, _mm512_add_epi32(_mm512_maskz_compress_epi32(met, lanes),
+                                                        _mm512_set1_epi32(static_cast<int>(source.first_facet))));
+  const __m512i table = _mm512_set1_epi64(reinterpret_cast<long long>(source.vertex));
+  _mm512_storeu_si512(found.table + n, table);
+  _mm512_storeu_si512(found.table + n + 8, table);
+  found.size = n + static_cast<std::uint32_t>(std::popcount(static_cast<unsigned>(met)));
+}
+
+void gather(FoundFacets& found, std::uint32_t instance, const Point3& offset, Nm plane, CutFacets& facets) {
+  const __m512i z = _mm512_set1_epi32(plane_in_mesh(plane, offset));
+  for (auto& corner : found.corner) _mm512_storeu_si512(corner + found.size, _mm512_setzero_si512());
+  std::fill_n(found.table + found.size, kClusterSize, found.table[0]);  // whole registers are read
+  std::uint32_t n = facets.size;
+  for (std::uint32_t i = 0; i < found.size; i += kClusterSize) {
+    const unsigned live = found.size - i >= kClusterSize ? 0xFFFFu : (1u << (found.size - i)) - 1;
+    const Points p = corners_at(found.table + i, found.corner[0] + i), q = corners_at(found.table + i, found.corner[1] + i),
+                 r = corners_at(found.table + i, found.corner[2] + i);
+    const unsigned a = _mm512_cmpgt_epi32_mask(p.z, z), b = _mm512_cmpgt_epi32_mask(q.z, z),
+                   c = _mm512_cmpgt_epi32_mask(r.z, z);
+    const unsigned a_b = a ^ b, a_c = a ^ c, crossed = (a_b | a_c) & live;
+    const Turns turn{static_cast<__mmask16>(crossed), static_cast<__mmask16>(a_b & ~a_c), static_cast<__mmask16>(~a_b)};
+    put_coordinate(turn, p.z, q.z, r.z, offset.z, facets.tip.z + n, facets.left.z + n, facets.right.z + n);
+    put_coordinate(turn, p.y, q.y, r.y, offset.y, facets.tip.y + n, facets.left.y + n, facets.right.y + n);
+    put_coordinate(turn, p.x, q.x, r.x, offset.x, facets.tip.x + n, facets.left.x + n, facets.right.x + n);
+    _mm512_storeu_si512(facets.facet + n, _mm512_maskz_compress_epi32(turn.crossed, _mm512_loadu_si512(found.facet + i)));
+    _mm512_storeu_si512(facets.instance + n, _mm512_set1_epi32(static_cast<int>(instance)));
+    n += static_cast<std::uint32_t>(std::popcount(crossed));
+  }
+  facets.size = n;
+  found.size = 0;
+}
+
+void gather_listed(const ListedSource& source, Nm plane, CutFacets& facets) {
   const Cluster& cluster = *source.cluster;
   const __m512i z = _mm512_set1_epi32(plane_in_mesh(plane, source.offset));
   const unsigned a = _mm512_cmpgt_epi32_mask(_mm512_loadu_si512(cluster.z[0]), z),

@@ -44,6 +44,22 @@ Above corners_above(const Cluster& cluster, Nm z) {
   return above;
 }
 
+/// Which facets reach the step, a bit a facet.
+std::uint32_t facets_met(const FacetSteps& steps, std::uint8_t step) {
+#if defined(__SSE2__)
+  const auto sixteen = [](const std::uint8_t* bytes) { return _mm_load_si128(reinterpret_cast<const __m128i*>(bytes)); };
+  const __m128i up = _mm_sub_epi8(_mm_set1_epi8(static_cast<char>(step)), sixteen(steps.low));
+  const __m128i beyond = _mm_subs_epu8(up, sixteen(steps.span));  // stops at zero
+  return static_cast<std::uint32_t>(_mm_movemask_epi8(_mm_cmpeq_epi8(beyond, _mm_setzero_si128())));
+#else
+  std::uint32_t met = 0;
+  for (std::uint32_t lane = 0; lane < kClusterSize; ++lane) {
+    met |= static_cast<std::uint32_t>(static_cast<std::uint8_t>(step - steps.low[lane]) <= steps.span[lane]) << lane;
+  }
+  return met;
+#endif
+}
+
 /// What floating point says of all facets: where their left edges meet the plane, and the rows that their ends begin.
 struct Ends {
   double share[CutFacets::kRoom], y[CutFacets::kRoom];
@@ -82,7 +98,46 @@ void find_ends(const PixelSampling& sampling, const CutFacets& facets, Nm plane,
 
 }  // namespace
 
-void gather(const ClusterSource& source, Nm plane, CutFacets& facets) {
+void find(const IndexedSource& source, FoundFacets& found) {
+  const IndexedCluster& cluster = *source.cluster;
+  std::uint32_t i = found.size;
+  for (std::uint32_t lanes = facets_met(cluster.steps, source.step); lanes != 0; lanes &= lanes - 1) {
+    const auto lane = static_cast<std::uint32_t>(std::countr_zero(lanes));
+    found.table[i] = &source.vertex->x;
+    for (std::uint32_t k = 0; k < 3; ++k) found.corner[k][i] = 3u * cluster.corner[k][lane];
+    found.facet[i] = source.first_facet + lane;
+    ++i;
+  }
+  found.size = i;
+}
+
+void gather(FoundFacets& found, std::uint32_t instance, const Point3& offset, Nm plane, CutFacets& facets) {
+  const Nm z = plane_in_mesh(plane, offset), offset_x = offset.x, offset_y = offset.y, offset_z = offset.z;
+  const auto put = [&](CutFacets::Corner& corner, std::uint32_t i, const Nm* xyz) {
+    corner.x[i] = xyz[0] + offset_x;
+    corner.y[i] = xyz[1] + offset_y;
+    corner.z[i] = xyz[2] + offset_z;
+  };
+  std::uint32_t to = facets.size;
+  for (std::uint32_t i = 0; i < found.size; ++i) {
+    const Nm* const table = found.table[i];
+    const Nm *const a = table + found.corner[0][i], *const b = table + found.corner[1][i],
+                    *const c = table + found.corner[2][i];
+    const Nm* const corner[] = {a, b, c, a, b};
+    const bool a_b = (a[2] > z) != (b[2] > z), a_c = (a[2] > z) != (c[2] > z);
+    const unsigned tip = a_b ? (a_c ? 0 : 1) : 2;
+    facets.facet[to] = found.facet[i];
+    facets.instance[to] = instance;
+    put(facets.tip, to, corner[tip]);
+    put(facets.left, to, corner[tip + 1]);
+    put(facets.right, to, corner[tip + 2]);
+    to += a_b || a_c ? 1 : 0;  // no processor foresees it, so all are written and those that are not cut written over
+  }
+  facets.size = to;
+  found.size = 0;
+}
+
+void gather_listed(const ListedSource& source, Nm plane, CutFacets& facets) {
   const Cluster& cluster = *source.cluster;
   const Above above = corners_above(cluster, plane_in_mesh(plane, source.offset));
   const auto* const coordinates = reinterpret_cast<const Nm*>(&cluster);  // three of z, three of y, three of x

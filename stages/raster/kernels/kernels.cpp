@@ -27,10 +27,12 @@ std::uint32_t* changes_by(const std::uint32_t* crossing, const std::uint32_t* en
 }  // namespace
 
 const Kernels& kernels_for([[maybe_unused]] Isa isa) {
-  static constexpr Kernels kPlain{Isa::kPlain, plain::gather, plain::cut, plain::fill, plain::rows};
+  static constexpr Kernels kPlain{Isa::kPlain, plain::find, plain::gather, plain::gather_listed,
+                                  plain::cut,  plain::fill, plain::rows};
 #if defined(LAMINA_WIDE_KERNELS)
-  static constexpr Kernels kAvx2{Isa::kAvx2, avx2::gather, avx2::cut, avx2::fill, avx2::rows};
-  static constexpr Kernels kAvx512{Isa::kAvx512, avx512::gather, avx512::cut, avx512::fill, avx512::rows};
+  static constexpr Kernels kAvx2{Isa::kAvx2, avx2::find, avx2::gather, avx2::gather_listed, avx2::cut, avx2::fill, avx2::rows};
+  static constexpr Kernels kAvx512{Isa::kAvx512, avx512::find, avx512::gather, avx512::gather_listed,
+                                   avx512::cut,  avx512::fill, avx512::rows};
   if (isa == Isa::kAvx512) return kAvx512;
   if (isa == Isa::kAvx2) return kAvx2;
 #endif

@@ -13,18 +13,39 @@
 
 namespace lamina::raster {
 
-/// A cluster as it stands on the bed.
-struct ClusterSource {
+/// A cluster whose corners are stored in it, as it stands on the bed.
+struct ListedSource {
   const Cluster* cluster;
   std::uint32_t first_facet;  // of its mesh
   std::uint32_t instance;
   Point3 offset;  // of the instance, nm
 };
 
+/// A cluster whose corners are named, and the step of the plane.
+struct IndexedSource {
+  const IndexedCluster* cluster;
+  const Point3* vertex;       // of its block
+  std::uint32_t first_facet;  // of its mesh
+  std::uint8_t step;
+};
+
+/// Facets that a plane may cut, by the names of their corners. Behind each array room for the widest store; what is
+/// fetched early may lie behind the last facet.
+struct alignas(64) FoundFacets {
+  static constexpr std::uint32_t kRoom = 128;
+
+  const Nm* table[kRoom + kClusterSize] = {};          // of the facet's block
+  std::uint32_t corner[3][kRoom + kClusterSize] = {};  // where in the table x is; y and z follow
+  std::uint32_t facet[kRoom + kClusterSize];
+  std::uint32_t size = 0;
+
+  bool is_full() const { return size > kRoom - kClusterSize; }
+};
+
 /// Facets that a plane cuts, on the bed, turned so that the tip is alone on its side of the plane: it cuts the two edges
 /// that start there. A coordinate an array, and behind each room for the widest store.
 struct alignas(64) CutFacets {
-  static constexpr std::uint32_t kRoom = 128;
+  static constexpr std::uint32_t kRoom = FoundFacets::kRoom;
 
   struct Corner {
     Nm x[kRoom + kClusterSize], y[kRoom + kClusterSize], z[kRoom + kClusterSize];
@@ -64,8 +85,15 @@ struct RowsTask {
 struct Kernels {
   Isa isa;
 
+  /// Appends the facets of a cluster whose steps meet the plane's; `found` must not be full.
+  void (*find)(const IndexedSource& source, FoundFacets& found);
+
+  /// Appends those that the plane cuts, all of one instance, for which `facets` must have room. Empties `found`. The height is
+  /// on the bed.
+  void (*gather)(FoundFacets& found, std::uint32_t instance, const Point3& offset, Nm plane, CutFacets& facets);
+
   /// Appends the facets of a cluster that the plane cuts; `facets` must not be full. The height is on the bed.
-  void (*gather)(const ClusterSource& source, Nm plane, CutFacets& facets);
+  void (*gather_listed)(const ListedSource& source, Nm plane, CutFacets& facets);
 
   /// Appends the segments of the facets in geometry rows [row_begin, row_end); a facet cut in none of these rows leaves
   /// none. Empties `facets`.
