@@ -86,7 +86,7 @@ Result<Solids> Solids::build(Scene& scene, const Job& job, const PixelGrid& grid
     return {};
   };
   // Made here, so that a mesh in two groups is there once.
-  std::vector<std::shared_ptr<MeshBlocks>> blocks = take_blocks(scene.meshes);
+  std::vector<std::shared_ptr<MeshBlocks>> blocks = take_blocks(scene.meshes, job.isa);
   for (std::size_t i = 0; i < blocks.size(); ++i) {
     result.mesh_bytes_ += blocks[i]->bytes();
     scene.meshes[i].blocks = std::move(blocks[i]);

@@ -21,6 +21,14 @@ namespace {
 
 LAMINA_INLINE __m512i all(std::uint64_t v) { return _mm512_set1_epi64(static_cast<long long>(v)); }
 
+/// Of all lanes, which wrap as unsigned numbers do; the compiler's own sum adds signed ones.
+LAMINA_INLINE std::uint64_t total(__m512i v) {
+  std::uint64_t lane[8], sum = 0;
+  _mm512_storeu_si512(lane, v);
+  for (const std::uint64_t one : lane) sum += one;
+  return sum;
+}
+
 /// Shuffles take the upper halves where shifts would do, too: they do not wait for the multiplier.
 LAMINA_INLINE __m512i fold_eight(__m512i a, __m512i b) {
   const __m512i a_high = _mm512_shuffle_epi32(a, _MM_PERM_DDBB), b_high = _mm512_shuffle_epi32(b, _MM_PERM_DDBB);
@@ -87,8 +95,8 @@ void census(SortedBlock& block, std::uint64_t share, CensusSums& sums) {
       sample_lanes(sampled, hashes, sums);
     }
   }
-  sums.boundary += static_cast<std::uint64_t>(_mm512_reduce_add_epi64(boundary));
-  sums.fingerprint += static_cast<std::uint64_t>(_mm512_reduce_add_epi64(fingerprint));
+  sums.boundary += total(boundary);
+  sums.fingerprint += total(fingerprint);
 }
 
 }  // namespace lamina::load::avx512

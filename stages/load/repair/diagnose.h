@@ -48,8 +48,8 @@ Diagnosis diagnose_alone(Mesh& mesh, std::size_t places = 3);
 
 /// What every job pays for, in one pass.
 struct Census {
-  /// Every edge is walked as often one way as the other, up to a chance of 2^-64 that is the same on every machine:
-  /// the sum over all facets of a hash of their directed edges that changes sign with direction is zero.
+  /// Every edge is walked as often one way as the other, up to a chance of 2^-57 that is the same on every machine: the
+  /// area that the facets' boundary encloses, with hashes of the vertices as coordinates, is zero.
   bool balanced = false;
   /// Sum over all facets of a hash of their corners, the same for any order of the facets and any first corner.
   /// Tells `--resume` that a part is still the part it was.
