@@ -7,6 +7,7 @@
 
 #include "pipeline/plan/sections.h"
 #include "stages/geometry/clipping.h"
+#include "stages/geometry/contours/order.h"
 #include "stages/infill/fill.h"
 #include "stages/slice/bodies.h"
 
@@ -149,6 +150,7 @@ Result<slice::LayerReport> Sections::section(const slice::Slicer& slicer, const 
       region = unite_contours(all, FillRule::kNonzero);
     }
     if (!region) return region.error();
+    order_by_outer(*region);
     simplify(*region, tolerance_, work.scratch.simplify);
     both.contours.append(*region);
     both.body.push_back(both.contours.size());
@@ -183,6 +185,7 @@ Status Sections::contours(std::uint32_t index, Work& work) const {
       }
       auto rest = subtract_contours(surface, earlier);
       if (!rest) return rest.error();
+      order_by_outer(*rest);
       work.surface[area.shared] = std::move(*rest);
     }
   }

@@ -7,8 +7,11 @@
 #include <numbers>
 #include <polyclipping/clipper.hpp>
 #include <random>
+#include <span>
+#include <vector>
 
 #include "stages/geometry/clipping.h"
+#include "stages/geometry/contours/order.h"
 
 namespace lamina {
 namespace {
@@ -112,6 +115,66 @@ TEST(OffsetContours, IslandsInHolesShrinkByThemselvesAndGrowTogether) {
     EXPECT_DOUBLE_EQ(square_mm(doubled_area(*moved)), area) << distance;
     for (std::uint32_t c = 0; c < moved->size(); ++c) EXPECT_EQ(doubled_area((*moved)[c]) > 0, c % 2 == 0) << distance;
   }
+}
+
+/// A box from (x0, y0) to (x1, y1), mm; turned round, a hole.
+struct BoxMm {
+  int x0, y0, x1, y1;
+  bool hole = false;
+};
+
+Contours boxes(std::span<const BoxMm> all) {
+  constexpr Nm kMm = 1'000'000;
+  Contours out;
+  for (const BoxMm& b : all) {
+    const Point2 corner[4] = {
+        {b.x0 * kMm, b.y0 * kMm}, {b.x1 * kMm, b.y0 * kMm}, {b.x1 * kMm, b.y1 * kMm}, {b.x0 * kMm, b.y1 * kMm}};
+    for (int k = 0; k < 4; ++k) out.point.push_back(corner[b.hole ? 3 - k : k]);
+    out.close();
+  }
+  return out;
+}
+
+double clippers_area_mm2(const Contours& contours, double distance) {
+  clip::ClipperOffset offsetter(2.0, 1000);
+  offsetter.AddPaths(paths_of(contours), clip::jtMiter, clip::etClosedPolygon);
+  clip::Paths expected;
+  offsetter.Execute(expected, distance);
+  double area = 0;
+  for (const clip::Path& path : expected) area += clip::Area(path);
+  return area * 1e-12;
+}
+
+// Where boxes share edges, boolean operations leave spikes and put holes behind outer contours beside theirs.
+TEST(OffsetContours, HolesCountWhereverTheyStandInTheList) {
+  const std::vector<std::vector<BoxMm>> known = {
+      {{0, 6, 1, 12}, {6, 1, 8, 6}, {1, 2, 7, 8}, {3, 3, 5, 7, true}, {5, 1, 9, 6, true}},
+      {{2, 5, 4, 8}, {2, 5, 6, 8}, {3, 5, 5, 9}, {1, 4, 3, 5}},
+      {{3, 1, 8, 7}, {5, 4, 11, 8}, {7, 4, 10, 8}},
+  };
+  std::mt19937 random(5);
+  const auto at_most = [&](int most) { return static_cast<int>(random() % static_cast<unsigned>(most)); };
+  int unordered = 0;
+  for (std::size_t round = 0; round < 600; ++round) {
+    std::vector<BoxMm> set;
+    if (round < known.size()) {
+      set = known[round];
+    } else {
+      for (int n = 3 + at_most(6); n > 0; --n) {
+        const int x = at_most(9), y = at_most(9);
+        set.push_back({x, y, x + 1 + at_most(6), y + 1 + at_most(6), at_most(3) == 0});
+      }
+    }
+    for (const FillRule rule : {FillRule::kNonzero, FillRule::kPositive, FillRule::kEvenOdd}) {
+      const auto united = unite_contours(boxes(set), rule);
+      ASSERT_TRUE(united.ok());
+      unordered += is_ordered_by_outer(*united) ? 0 : 1;
+      const auto moved = offset_contours(*united, -200'000);
+      ASSERT_TRUE(moved.ok());
+      EXPECT_NEAR(square_mm(doubled_area(*moved)), clippers_area_mm2(*united, -200'000), 1e-3) << "round " << round;
+    }
+  }
+  EXPECT_GE(unordered, 2);
 }
 
 }  // namespace

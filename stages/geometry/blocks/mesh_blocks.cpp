@@ -9,6 +9,7 @@ std::uint32_t clusters_for(std::uint32_t triangles) { return (triangles + kClust
 std::uint32_t blocks_for(std::uint32_t triangles) { return (triangles + kBlockSize - 1) / kBlockSize; }
 
 /// No block takes more than its clusters do as they are read.
+static_assert(sizeof(IndexedCluster) + kClusterSize * 3 / 2 * sizeof(Point3) + 4 + 63 <= sizeof(Cluster));
 std::uint64_t most_bytes(std::uint32_t triangles) { return clusters_for(triangles) * std::uint64_t{sizeof(Cluster)}; }
 
 }  // namespace

@@ -14,7 +14,7 @@
 namespace lamina {
 
 /// Triangles in clusters of 16, 256 clusters a block. A block holds each of its vertices once, 12 bytes, and three numbers of
-/// 16 bits and two of 8 a triangle: 13 to 26 bytes a triangle. A block with more than 1.5 vertices a triangle, of a file in
+/// 16 bits and two of 8 a triangle: 14 to 26 bytes a triangle. A block with more than 1.5 vertices a triangle, of a file in
 /// disorder, holds its clusters as they are read, 36 bytes a triangle. Vertices lie in the order in which clusters name them
 /// first, so those of a cluster are near each other. A box a cluster is 1.5 bytes a triangle on top.
 ///

@@ -8,6 +8,7 @@
 
 #include "stages/geometry/clipping.h"
 #include "stages/geometry/contours/contact.h"
+#include "stages/geometry/contours/tidy.h"
 
 namespace lamina {
 namespace {
@@ -105,8 +106,9 @@ Status unite_group(const Contours& contours, std::uint32_t group_number, const B
   const Point2 a{within(lo.x - kAway), within(lo.y - kAway)}, b{within(hi.x + kAway), within(hi.y + kAway)};
   const Point2 frame[4] = {a, {b.x, a.y}, b, {a.x, b.y}};
   for (std::int32_t i = 0; i < std::abs(outside); ++i) append(frame, outside < 0, own);
-  const auto united = unite_contours(own, rule);
+  auto united = unite_contours(own, rule);
   if (!united) return united.error();
+  tidy(*united);  // edges that contours share may leave spikes
   for (std::uint32_t c = 0; c < united->size(); ++c) {
     const auto points = (*united)[c];
     const bool is_frame = std::ranges::any_of(points, [&](Point2 p) { return p.x == a.x || p.x == b.x; });

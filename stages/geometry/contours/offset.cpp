@@ -17,12 +17,12 @@ struct Scratch {
   Buffer<std::uint32_t> group;
 };
 
-/// Appends the region of contours [begin, end), whose curves meet those of no other contour.
-Status append_piece(const ContoursView& contours, std::uint32_t begin, std::uint32_t end, OffsetCurve& curve, Scratch& scratch,
-                    Contours& out) {
+/// Appends the region of contours [begin, end), whose curves meet those of no other contour. clean  so are the contours
+Status append_piece(const ContoursView& contours, std::uint32_t begin, std::uint32_t end, bool clean, OffsetCurve& curve,
+                    Scratch& scratch, Contours& out) {
   Contours& curves = scratch.curves;
   curves.clear();
-  bool plain = true;
+  bool plain = clean;
   for (std::uint32_t c = begin; c < end; ++c) plain &= curve.append(contours[c], curves);
   if (plain) tidy(curves);
   if (!plain || find_contacts(curves, scratch.contact, scratch.group)) {
@@ -44,11 +44,12 @@ Result<Contours> offset_mitered(const ContoursView& contours, std::int64_t dista
   OffsetCurve curve(static_cast<double>(distance));
   Scratch scratch;
   Contours out;
+  const bool ordered = is_ordered_by_outer(contours);
   for (std::uint32_t begin = 0, end = 0; begin < contours.size(); begin = end) {
     // Outer contours that shrink, each with its holes, stay apart.
-    end = distance < 0 ? begin + 1 : contours.size();
+    end = distance < 0 && ordered ? begin + 1 : contours.size();
     while (end < contours.size() && doubled_area(contours[end]) < 0) ++end;
-    if (Status status = append_piece(contours, begin, end, curve, scratch, out); !status) return status.error();
+    if (Status status = append_piece(contours, begin, end, ordered, curve, scratch, out); !status) return status.error();
   }
   return out;
 }

@@ -28,7 +28,9 @@ Bounds bounds_of(std::span<const Point2> points) {
   // A simple contour turns at its smallest point as it does on the whole.
   const std::size_t n = points.size();
   const Point2 a = points[(smallest + n - 1) % n], b = points[smallest], c = points[(smallest + 1) % n];
-  outline.outer = (std::int64_t{b.x} - a.x) * (std::int64_t{c.y} - b.y) > (std::int64_t{b.y} - a.y) * (std::int64_t{c.x} - b.x);
+  const std::int64_t right = (std::int64_t{b.x} - a.x) * (std::int64_t{c.y} - b.y);
+  const std::int64_t left = (std::int64_t{b.y} - a.y) * (std::int64_t{c.x} - b.x);
+  outline.outer = right == left ? doubled_area(points) > 0 : right > left;  // the tip of a spike does not tell
   return outline;
 }
 
@@ -112,6 +114,25 @@ void order_by_outer(Contours& contours) {
     ordered.close();
   }
   contours = std::move(ordered);
+}
+
+bool is_ordered_by_outer(const ContoursView& contours) {
+  std::uint32_t outer = kNone;
+  Bounds around{};
+  for (std::uint32_t c = 0; c < contours.size(); ++c) {
+    const Bounds own = bounds_of(contours[c]);
+    const __int128 area = doubled_area(contours[c]);
+    if (area == 0) return false;
+    if (area > 0) {
+      outer = c;
+      around = own;
+      continue;
+    }
+    const bool within = outer != kNone && around.lo.x <= own.lo.x && around.lo.y <= own.lo.y && own.hi.x <= around.hi.x &&
+                        own.hi.y <= around.hi.y;
+    if (!within || !is_around(contours[outer], contours[c])) return false;
+  }
+  return true;
 }
 
 }  // namespace lamina

@@ -13,4 +13,9 @@ namespace lamina {
 ///           whose boxes lie around it
 void order_by_outer(Contours& contours);
 
+/// Whether they are in that order, as far as one place of each hole tells. Boolean operations of contours that share edges may
+/// leave spikes, or a hole behind an outer contour beside it.
+/// cost  O(P), and for each hole the points of the outer contour before it
+bool is_ordered_by_outer(const ContoursView& contours);
+
 }  // namespace lamina
