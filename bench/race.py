@@ -156,7 +156,7 @@ def page(found, others, options):
                      figures.spread(ours),
                      f"{figures.seconds(ours['processor'])} s", f"{one['layers_seconds']:.3f} s", f"{ours['wall'] / one['limit']:.1f}",
                      f"{ours['peak_mib']:.0f} MiB"])
-    yield from figures.table(["published job", "mslicer", "fastest of the others", "ours", "wall", "processor", "of it layers, wall",
+    yield from figures.table(["published job", "mslicer", "fastest of the others", "ours", "wall", "processor", "layers, in runs with `--timing`",
                               "times the limit", "peak memory"], rows)
     warm = min(one["resident"] for one in found.values())
     cold = ", ".join(f"{name} {one['cold']:.2f} s" for name, one in found.items() if one["cold"])
