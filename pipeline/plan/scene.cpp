@@ -69,10 +69,12 @@ Point3 rebase(Mesh& mesh) {
 
 bool fits(std::int64_t nm) { return nm >= INT32_MIN && nm <= INT32_MAX; }
 
-Result<Loaded> load_part(const Job& job, const PartRequest& request, bool blocks, Scene& scene) {
+Result<Loaded> load_part(const Job& job, const PartRequest& request, bool blocks, const std::shared_ptr<load::Scratch>& scratch,
+                         Scene& scene) {
   load::LoadOptions options = load_options(job, request);
   options.blocks = blocks;
   options.isa = job.isa;
+  options.scratch = scratch;
   Result<Part> part = load::load(request.path, options);
   if (!part) return part.error();
   if (part->bounds.empty() || part->instances.empty()) {
@@ -143,6 +145,7 @@ namespace {
 /// errors  of load_part; kUsage: a part that reaches beyond what nm can say
 Result<std::vector<const Loaded*>> load_parts(const Job& job, bool blocks, std::map<LoadKey, Loaded>& files, Scene& scene) {
   std::vector<const Loaded*> loaded;
+  const auto scratch = load::make_scratch(job.isa);
   for (const PartRequest& part : job.parts) {
     std::error_code ignored;
     const std::filesystem::path file = std::filesystem::weakly_canonical(part.path, ignored);
@@ -154,7 +157,7 @@ Result<std::vector<const Loaded*>> load_parts(const Job& job, bool blocks, std::
     const LoadKey key{file.empty() ? part.path : file.string(), part.unit, part.scale, part.rotate_deg, part.shrink, solid};
     auto found = files.find(key);
     if (found == files.end()) {
-      Result<Loaded> fresh = load_part(job, part, blocks, scene);
+      Result<Loaded> fresh = load_part(job, part, blocks, scratch, scene);
       if (!fresh) return fresh.error();
       found = files.emplace(key, std::move(*fresh)).first;
     }

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstdint>
+#include <memory>
 #include <string>
 #include <string_view>
 
@@ -28,6 +29,11 @@ Transform make_transform(const std::array<double, 3>& scale, const std::array<do
 /// The distance that repair doubles until openings stop falling; any other is used as it is.
 inline constexpr std::int64_t kWeldByItself = 5'000;
 
+/// Memory that readers work in, 700 KB a thread, of which small files touch little. Who reads many files keeps it from one to
+/// the next: taken anew for each, it would leave holes between the meshes that stay, larger than these. One file at a time.
+struct Scratch;
+std::shared_ptr<Scratch> make_scratch(Isa isa = Isa::kAuto);
+
 struct LoadOptions {
   Transform transform;
   double unit_mm = 1.0;                  // mm per unit of files that carry none (STL, OBJ); 3MF states its own
@@ -35,6 +41,7 @@ struct LoadOptions {
   bool repair = true;                    // orient, remove duplicates, weld and cap a mesh that is not closed (repair.h)
   bool blocks = false;                   // closed meshes may come as Mesh::blocks, which are read in one pass, not as lists
   Isa isa = Isa::kAuto;                  // widest instructions of the loops that make blocks; no mesh depends on it
+  std::shared_ptr<Scratch> scratch;      // none: each file takes its own
   bool winding = false;                  // close such a mesh by its winding number instead of caps: approximate
   std::int64_t weld_nm = kWeldByItself;  // repair joins open edges that are at most this far apart
   std::uint64_t triangle_limit = 1ull << 30;  // refused above; a header can lie, so sizes are checked against the file first

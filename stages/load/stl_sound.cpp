@@ -14,23 +14,31 @@
 #include "stages/load/stl_facets.h"
 
 namespace lamina::load {
+
+struct Scratch {
+  /// What a thread needs for a block, and what it found in all of its blocks.
+  struct Worker {
+    std::array<char, kBlockSize * kFacetBytes> bytes;
+    std::array<Triangle, kBlockSize> facets;
+    const LoadKernels& kernels;
+    BlockMaker maker;
+    CensusSums sums;
+    FacetBox box;
+
+    explicit Worker(Isa isa) : kernels(load_kernels_for(isa)), maker(isa) {}
+  };
+
+  tbb::enumerable_thread_specific<std::unique_ptr<Worker>> workers;
+
+  explicit Scratch(Isa isa) : workers([isa] { return std::make_unique<Worker>(isa); }) {}
+};
+
+std::shared_ptr<Scratch> make_scratch(Isa isa) { return std::make_shared<Scratch>(isa_at_most(isa)); }
+
 namespace {
 
-/// What a thread needs for a block, and what it found in all of its blocks.
-struct Worker {
-  std::array<char, kBlockSize * kFacetBytes> bytes;
-  std::array<Triangle, kBlockSize> facets;
-  const LoadKernels& kernels;
-  BlockMaker maker;
-  CensusSums sums;
-  FacetBox box;
-
-  explicit Worker(Isa isa) : kernels(load_kernels_for(isa)), maker(isa) {}
-};
-using Workers = tbb::enumerable_thread_specific<std::unique_ptr<Worker>>;
-
 /// Reads one block. false  it cannot be read or snapped
-bool read_block(const Source& source, const Snapper& snapper, std::uint32_t block, std::uint64_t share, Worker& worker,
+bool read_block(const Source& source, const Snapper& snapper, std::uint32_t block, std::uint64_t share, Scratch::Worker& worker,
                 MeshBlocks& blocks, Prisms& prisms) {
   const std::uint64_t first = blocks.first_triangle(block), count = blocks.triangles_in(block);
   if (!source.read(kHeaderBytes + first * kFacetBytes, worker.bytes.data(), count * kFacetBytes)) return false;
@@ -60,11 +68,16 @@ std::optional<Mesh> read_sound_stl(const Source& source, const Snapper& snapper,
   const auto blocks = std::make_shared<MeshBlocks>(triangles, 0);
   Buffer<Prisms> pieces(blocks->block_count());
   const std::uint64_t share = sampled_share(triangles);
-  Workers workers([isa = isa_at_most(options.isa)] { return std::make_unique<Worker>(isa); });
+  const std::shared_ptr<Scratch> scratch = options.scratch ? options.scratch : make_scratch(options.isa);
+  auto& workers = scratch->workers;
+  for (auto& worker : workers) {  // of the file before
+    worker->sums = {};
+    worker->box = {};
+  }
   std::atomic<bool> failed{false};
   tbb::parallel_for(tbb::blocked_range<std::uint32_t>(0, blocks->block_count()),
                     [&](const tbb::blocked_range<std::uint32_t>& range) {
-                      Worker& worker = *workers.local();
+                      Scratch::Worker& worker = *workers.local();
                       for (std::uint32_t b = range.begin(); b != range.end() && !failed; ++b) {
                         if (!read_block(source, snapper, b, share, worker, *blocks, pieces[b])) failed = true;
                       }
