@@ -133,5 +133,19 @@ TEST(ReadSoundStl, ManyBlocksAreTheSameForEveryNumberOfThreadsAndEveryInstructio
   }
 }
 
+// What a reader knew of one file is forgotten at the next: its box, its fingerprint, and that it was open.
+TEST(ReadSoundStl, FilesThatShareMemoryAreEachAsIfReadAlone) {
+  std::vector<FloatTriangle> open = box_facets({-50, -60, -70}, {80, 90, 99});
+  open.pop_back();
+  const std::string first = write_file("first.stl", binary_stl(box_facets({0, 0, 0}, {30, 20, 10})));
+  const std::string hole = write_file("hole.stl", binary_stl(open));
+  const std::string last = write_file("last.stl", binary_stl(unit_box()));
+  load::LoadOptions options;
+  options.scratch = load::make_scratch();
+  EXPECT_TRUE(expect_same_either_way(first, options));
+  EXPECT_FALSE(expect_same_either_way(hole, options));
+  EXPECT_TRUE(expect_same_either_way(last, options));
+}
+
 }  // namespace
 }  // namespace lamina::test
