@@ -2,6 +2,7 @@
 // every part of the models ends as its row in tests/corpus/outcomes.tsv says.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cstdlib>
 #include <cstring>
 #include <fstream>
@@ -84,12 +85,17 @@ TEST(BoundedMemory, TenThousandLayersNeedWhatAHundredNeed) {
   const Directory directory;
   const Words job = {
       corpus_file("nist_am_test_artifact_v3b.stl"), "--bed", "150x150", "--dpi", "300", "--threads", "2", "--memory", "32M"};
-  const std::uint64_t hundred = peak_of(directory, job + Words{"--layer", "0.17"});
-  const std::uint64_t many = peak_of(directory, job + Words{"--layer", "0.0017"});
-  EXPECT_GT(hundred, 0u);
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+  peak_of(directory, job + Words{"--layer", "0.0017"});
   GTEST_SKIP() << "a sanitizer keeps freed memory: peaks were NOT compared";
 #endif
+  // The least of three runs each: the system counts a process's pages late, by some hundred kilobytes.
+  std::uint64_t hundred = ~std::uint64_t{0}, many = hundred;
+  for (int turn = 0; turn < 3; ++turn) {
+    hundred = std::min(hundred, peak_of(directory, job + Words{"--layer", "0.17"}));
+    many = std::min(many, peak_of(directory, job + Words{"--layer", "0.0017"}));
+  }
+  EXPECT_GT(hundred, 0u);
   EXPECT_LE(static_cast<double>(many), 1.05 * static_cast<double>(hundred)) << hundred << " bytes, then " << many;
 }
 
