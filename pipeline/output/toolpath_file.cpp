@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 
@@ -66,15 +67,16 @@ Result<std::string> layer_table(const Plan& plan) {
   return write::rp3::text_of(layers, settings);
 }
 
-/// The layer of the file before which every part on the bed has laid its first `count` layers.
+/// The layer of the file before which every part on the bed has laid its first `count` layers; the file's first one if it
+/// begins above them.
 std::uint32_t after_first(const Plan& plan, std::uint32_t count) {
-  if (!plan.job.heights.per_part) return count;
+  if (!plan.job.heights.per_part) return std::max(count, plan.range[0]);
   const std::vector<ScheduledLayer>& layers = plan.sections->layers();
   std::vector<bool> stands(plan.scene->parts.size());  // parts in the air have no first layer that has to stick
-  std::uint32_t after = 0;
+  std::uint32_t after = plan.range[0];
   for (std::uint32_t i = 0; i < layers.size(); ++i) {
     if (layers[i].number == 0) stands[layers[i].part] = layers[i].layer.bottom == 0;
-    if (layers[i].number < count && stands[layers[i].part]) after = i + 1;
+    if (layers[i].number < count && stands[layers[i].part]) after = std::max(after, i + 1);
   }
   return after;
 }

@@ -76,6 +76,23 @@ TEST(ToolpathDefaults, PartsWithOwnLayersKeepTheSettingsOfFirstLayersUntilAllLie
   EXPECT_EQ(own.cooler, std::vector<int>({2}));
 }
 
+TEST(ToolpathDefaults, AFileThatBeginsAboveTheFirstLayersHasLaterSettingsFromItsFirstOne) {
+  const Directory directory;
+  write_box(directory / "a.stl", {0, 0, 0}, {5, 5, 2});
+  write_box(directory / "b.stl", {0, 0, 0}, {6, 6, 2});
+  const std::string job =
+      "a.stl b.stl --layer 0.2 --walls 1 --machine-set "
+      "material.nozzle_degc=190;material.first_nozzle_degc=205;fan.from_layer=3 ";
+  for (const char* layers : {"--layers 5:9", "--layers 7:9 --per-part"}) {
+    const LayersOfText above = layers_of_text(extruded(directory, job + layers).text);
+    EXPECT_EQ(above.fan, std::vector<int>({0})) << layers;
+    EXPECT_EQ(above.cooler, std::vector<int>({0})) << layers;
+  }
+  const LayersOfText between = layers_of_text(extruded(directory, job + "--layers 2:6").text);
+  EXPECT_EQ(between.fan, std::vector<int>({1}));  // layer 3 of the part
+  EXPECT_EQ(between.cooler, std::vector<int>({0}));
+}
+
 TEST(ToolpathDefaults, ASkirtFillsTheNozzleThoughTheFirstLayerHoldsNoBead) {
   const Directory directory;
   std::string tip = "solid tip\n";  // a tetrahedron on its tip
