@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <future>
 
 #include "pipeline/job/heights.h"
 #include "pipeline/machine/extruder.h"
@@ -18,6 +19,7 @@
 #include "stages/data/text/readable.h"
 #include "stages/geometry/blocks/mesh_blocks.h"
 #include "stages/heights/build_steps.h"
+#include "stages/raster/beams.h"
 #include "stages/write/extrusion_format.h"
 #include "stages/write/image_format.h"
 #include "stages/write/slice_format.h"
@@ -102,6 +104,8 @@ class Planner {
   Status read_parts_as(bool blocks) {
     const Stopwatch loading;
     progress_({ProgressEvent::Stage::kLoading});
+    std::future<void> beside;  // without a thread to spare it is never run, and the index does it
+    if (images() && job().engine != Engine::kContours) beside = std::async(raster::BeamIndex::prepare);
     auto scene = load_scene(job(), plan_.bed, blocks);
     if (!scene) return scene.error();
     plan_.scene = std::make_unique<Scene>(std::move(*scene));

@@ -162,6 +162,8 @@ BeamIndex::BeamIndex(BeamIndex&&) noexcept = default;
 BeamIndex& BeamIndex::operator=(BeamIndex&&) noexcept = default;
 BeamIndex::~BeamIndex() = default;
 
+void BeamIndex::prepare() { static_cast<void>(load_embree()); }
+
 Result<BeamIndex> BeamIndex::build(std::span<const PlacedMesh> placed, const PixelGrid& grid, std::uint32_t band_rows) {
   if (const Status loaded = load_embree(); !loaded) {
     if (loaded.error().fault == Fault::kMemory) return loaded.error();

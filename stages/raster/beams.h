@@ -22,6 +22,9 @@ namespace lamina::raster {
 
 class BeamIndex {
  public:
+  /// Loads Embree, which build() takes a millisecond for: any thread can do so while parts are read. build() tells errors.
+  static void prepare();
+
   /// placed     outlives the index
   /// band_rows  most rows that one ray answers for: few, and clusters are met again by the next ray; many, and the
   ///            crossings of a band no longer fit the processor's cache
