@@ -3,100 +3,70 @@
 #include <tbb/blocked_range.h>
 #include <tbb/enumerable_thread_specific.h>
 #include <tbb/parallel_for.h>
+#include <tbb/parallel_reduce.h>
 
 #include <algorithm>
+#include <cstring>
 #include <map>
 #include <utility>
 
 namespace lamina::raster {
-void CrossingSums::cover(std::int64_t lowest, std::int64_t highest) {
-  std::int64_t begin = 0, end = 0;
-  for (;; join_pairs()) {
-    begin = lowest >> shift_, end = (highest >> shift_) + 1;
-    if (slabs() > 0) begin = std::min(begin, first_), end = std::max(end, first_ + slabs());
-    if (end - begin <= kMostSlabs) break;
-  }
-  if (slabs() == end - begin) return;
-  // Some room beyond, so that a mesh that grows cluster by cluster is moved rarely.
-  const std::int64_t spare = (kMostSlabs - (end - begin)) / 2, room = std::min<std::int64_t>(spare, 256);
-  if (slabs() == 0 || begin < first_) begin -= room;
-  if (slabs() == 0 || end > first_ + slabs()) end += room;
-  std::vector<Change> wider(static_cast<std::size_t>(end - begin) + kBeyond);
-  if (slabs() > 0) std::ranges::copy(change_, wider.begin() + (first_ - begin));
-  change_ = std::move(wider);
-  first_ = begin;
+
+CrossingSums::CrossingSums(Nm lowest, Nm highest, std::size_t most, Isa isa) : kernels_(tents_for(isa_at_most(isa))) {
+  const auto slabs_between = [&] { return (std::int64_t{highest} >> shift_) - (lowest >> shift_) + 1; };
+  while (slabs_between() > static_cast<std::int64_t>(most)) ++shift_;
+  first_ = lowest >> shift_;
+  bend_.resize(static_cast<std::size_t>(slabs_between()) + kBeyond);
+  segments_.resize(bend_.size());
+  clusters_.resize(bend_.size());
 }
 
-void CrossingSums::join_pairs() {
-  const Table fine = table();
-  ++shift_;
-  if (fine.slab.empty()) return;
-  first_ = fine.first >> 1;
-  const std::int64_t last = (fine.first + static_cast<std::int64_t>(fine.slab.size()) - 1) >> 1;
-  change_.assign(static_cast<std::size_t>(last - first_ + 1) + kBeyond, {});
-  std::vector<Slab> joined(change_.size());
-  for (std::size_t i = 0; i < fine.slab.size(); ++i) {
-    Slab& slab = joined[static_cast<std::size_t>(((fine.first + static_cast<std::int64_t>(i)) >> 1) - first_)];
-    slab = {std::max(slab.depth, fine.slab[i].depth), std::max(slab.segments, fine.slab[i].segments),
-            std::max(slab.clusters, fine.slab[i].clusters)};
-  }
-  for (std::size_t i = 0; i < joined.size(); ++i) {
-    const Slab below = i > 0 ? joined[i - 1] : Slab(), two_below = i > 1 ? joined[i - 2] : Slab();
-    change_[i] = {joined[i].depth - 2 * below.depth + two_below.depth,
-                  static_cast<std::int32_t>(joined[i].segments - below.segments),
-                  static_cast<std::int32_t>(joined[i].clusters - below.clusters)};
-  }
-}
-
-void CrossingSums::add(const Cluster& cluster, const Box& bounds) {
+void CrossingSums::add(const ClusteredMesh& mesh, std::uint32_t cluster) {
+  const Box& bounds = mesh.bounds[cluster];
   if (bounds.height() == 0) return;
-  const std::int64_t begin = bounds.lo.z >> shift_, last = bounds.hi.z >> shift_;
-  if (begin < first_ || last >= first_ + slabs()) cover(bounds.lo.z, bounds.hi.z);
+  Sides sides;
+  const MeshBlocks::Indexed indexed = mesh.indexed(cluster);
+  if (indexed.cluster != nullptr) {
+    kernels_.look_up(*indexed.cluster, indexed.vertex, sides);
+  } else {
+    const Cluster& listed = mesh.listed(cluster);
+    std::memcpy(sides.z, listed.z, sizeof sides.z);
+    std::memcpy(sides.y, listed.y, sizeof sides.y);
+  }
   Tents tents;
-  raise_tents_(cluster, shift_, static_cast<std::int32_t>(first_), tents);
+  kernels_.raise(sides, shift_, first_, tents);
+  double* const bend = bend_.data();
+  std::int32_t* const segments = segments_.data();
   for (std::uint32_t i = 0; i < kClusterSize; ++i) {
     const double up = tents.up[i], down = tents.down[i];
-    Change* const from = change_.data() + tents.begin[i];
-    Change* const last_slab = change_.data() + tents.last[i];
-    from->bend += up;
-    from->segments += tents.count[i];
-    from[tents.rise[i]].bend -= up;
-    (last_slab + 2 - tents.fall[i])->bend -= down;
-    last_slab[1].segments -= tents.count[i];
-    last_slab[2].bend += down;
+    bend[tents.begin[i]] += up;
+    bend[tents.top[i]] -= up;
+    bend[tents.fall[i]] -= down;
+    bend[tents.end[i] + 1] += down;
+    segments[tents.begin[i]] += tents.count[i];
+    segments[tents.end[i]] -= tents.count[i];
   }
-  ++change_[static_cast<std::size_t>((bounds.lo.z >> shift_) - first_)].clusters;
-  --change_[static_cast<std::size_t>(((bounds.hi.z - 1) >> shift_) - first_) + 1].clusters;
+  ++clusters_[static_cast<std::size_t>((bounds.lo.z >> shift_) - first_)];
+  --clusters_[static_cast<std::size_t>(((bounds.hi.z - 1) >> shift_) - first_) + 1];
 }
 
 void CrossingSums::merge(const CrossingSums& other) {
-  if (other.slabs() == 0) return;
-  CrossingSums added = other;
-  const auto lowest = [&] { return added.first_ << added.shift_; };
-  const auto highest = [&] { return ((added.first_ + added.slabs()) << added.shift_) - 1; };
-  do {
-    while (shift_ < added.shift_) join_pairs();
-    cover(lowest(), highest());
-    while (added.shift_ < shift_) added.join_pairs();
-  } while (lowest() >> shift_ < first_ || highest() >> shift_ >= first_ + slabs());
-  Change* to = change_.data() + (added.first_ - first_);
-  for (const Change& change : added.change_) {
-    to->bend += change.bend;
-    to->segments += change.segments;
-    to->clusters += change.clusters;
-    ++to;
+  for (std::size_t i = 0; i < bend_.size(); ++i) {
+    bend_[i] += other.bend_[i];
+    segments_[i] += other.segments_[i];
+    clusters_[i] += other.clusters_[i];
   }
 }
 
 CrossingSums::Table CrossingSums::table() const {
-  Table table{shift_, first_, std::vector<Slab>(static_cast<std::size_t>(slabs()))};
+  Table table{shift_, first_, std::vector<Slab>(bend_.size() - kBeyond)};
   double slope = 0;
   Slab sum;
   for (std::size_t i = 0; i < table.slab.size(); ++i) {
-    slope += change_[i].bend;
+    slope += bend_[i];
     sum.depth += slope;
-    sum.segments += change_[i].segments;
-    sum.clusters += change_[i].clusters;
+    sum.segments += segments_[i];
+    sum.clusters += clusters_[i];
     table.slab[i] = sum;
     if (sum.segments == 0) slope = sum.depth = 0;  // nothing is cut here, whatever rounding left
     table.slab[i].depth = std::max(0.0, sum.depth);
@@ -132,21 +102,44 @@ void CrossingSums::Table::fit(std::size_t most) {
   slab.shrink_to_fit();
 }
 
-CrossingSums sum_crossings(const ClusteredMesh& mesh, Isa isa) {
-  using Range = tbb::blocked_range<std::uint32_t>;
-  constexpr std::uint32_t kTogether = 1024;  // clusters
-  const Range clusters(0, mesh.cluster_count(), kTogether);
-  const auto add = [&](const Range& range, CrossingSums& to) {
-    Cluster room;
-    for (std::uint32_t c = range.begin(); c != range.end(); ++c) to.add(mesh.cluster(c, room), mesh.bounds[c]);
+namespace {
+
+using Clusters = tbb::blocked_range<std::uint32_t>;
+
+struct Heights {
+  Nm lowest = INT32_MAX, highest = INT32_MIN;
+  Heights with(const Heights& more) const { return {std::min(lowest, more.lowest), std::max(highest, more.highest)}; }
+};
+
+Heights heights_of(const ClusteredMesh& mesh) {
+  const auto add = [&](const Clusters& range, Heights sum) {
+    for (std::uint32_t c = range.begin(); c != range.end(); ++c) sum = sum.with({mesh.bounds[c].lo.z, mesh.bounds[c].hi.z});
+    return sum;
   };
-  CrossingSums all(isa);
+  constexpr std::uint32_t kTogether = 16384;
+  return tbb::parallel_reduce(Clusters(0, mesh.cluster_count(), kTogether), Heights(), add,
+                              [](const Heights& a, const Heights& b) { return a.with(b); });
+}
+
+}  // namespace
+
+CrossingSums sum_crossings(const ClusteredMesh& mesh, Isa isa) {
+  if (mesh.cluster_count() == 0) return {0, 0, 1, isa};
+  constexpr std::uint32_t kTogether = 1024;  // clusters
+  constexpr std::size_t kFiner = 16;         // times as many slabs as are kept
+  const Heights heights = heights_of(mesh);
+  const std::size_t most = std::min(CrossingSums::kMostSlabs, kFiner * most_slabs_of(mesh.cluster_count()));
+  const Clusters clusters(0, mesh.cluster_count(), kTogether);
+  const auto add = [&](const Clusters& range, CrossingSums& to) {
+    for (std::uint32_t c = range.begin(); c != range.end(); ++c) to.add(mesh, c);
+  };
+  CrossingSums all(heights.lowest, heights.highest, most, isa);
   if (clusters.size() <= kTogether) {
     add(clusters, all);
     return all;
   }
-  tbb::enumerable_thread_specific<CrossingSums> sums([isa] { return CrossingSums(isa); });
-  tbb::parallel_for(clusters, [&](const Range& range) { add(range, sums.local()); });
+  tbb::enumerable_thread_specific<CrossingSums> sums(all);
+  tbb::parallel_for(clusters, [&](const Clusters& range) { add(range, sums.local()); });
   for (const CrossingSums& one_thread : sums) all.merge(one_thread);
   return all;
 }

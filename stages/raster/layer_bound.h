@@ -19,19 +19,21 @@ namespace lamina::raster {
 /// corner and falls again: a tent. Its height is the facet's area seen along x, doubled, over its height. A tent over slabs is
 /// four changes of slope, so the sums of all facets take four additions each and are read by adding twice.
 ///
-/// Slabs are 2^k nm high, counted from height 0 of the mesh: sums of parts of a mesh can be made by many threads, in any order
-/// and before the height of the whole is known. Where there would be more than kMostSlabs, slabs join in pairs, and the larger
-/// of both counts. Copyable; about 20 bytes a slab.
+/// Slabs are 2^k nm high, counted from height 0 of the mesh, and no more than kMostSlabs. Sums are made by many threads, in any
+/// order: slopes are rounded up so that doubles add them exactly. Copyable; 16 bytes a slab.
 class CrossingSums {
  public:
-  /// isa  the widest instruction set to use; sums are the same with any
-  explicit CrossingSums(Isa isa = Isa::kAuto) : raise_tents_(tents_for(isa_at_most(isa))) {}
+  /// lowest, highest  between which clusters lie, nm
+  /// most             slabs at most, within kMostSlabs
+  /// isa              the widest instruction set to use; sums are the same with any
+  CrossingSums(Nm lowest, Nm highest, std::size_t most = kMostSlabs, Isa isa = Isa::kAuto);
 
-  /// Counts a cluster. cost: 16 facets side by side, some nanoseconds each
-  void add(const Cluster& cluster, const Box& bounds);
-  /// Adds what another sum counted, at the coarser slabs of both.
+  /// Counts a cluster of the mesh. cost: 16 facets side by side, some nanoseconds each
+  void add(const ClusteredMesh& mesh, std::uint32_t cluster);
+  /// Adds what another sum of the same heights counted.
   void merge(const CrossingSums& other);
 
+  static constexpr std::size_t kMostSlabs = 8192;
   struct Slab {
     double depth = 0;  // nm, of all cuts together
     std::int64_t segments = 0, clusters = 0;
@@ -49,21 +51,15 @@ class CrossingSums {
   Table table() const;
 
  private:
-  static constexpr std::int64_t kMostSlabs = 8192;
   static constexpr std::uint32_t kFinest = 12;  // 4 micrometres
   static constexpr std::size_t kBeyond = 3;     // changes up to three slabs above the highest facet
-  struct Change {
-    double bend = 0;  // of the slope of the depth
-    std::int32_t segments = 0, clusters = 0;
-  };
-  std::int64_t slabs() const { return static_cast<std::int64_t>(change_.size()) - static_cast<std::int64_t>(kBeyond); }
-  void cover(std::int64_t lowest, std::int64_t highest);
-  void join_pairs();
 
-  RaiseTents* raise_tents_;
+  const TentKernels& kernels_;
   std::uint32_t shift_ = kFinest;
-  std::int64_t first_ = 0;
-  std::vector<Change> change_ = std::vector<Change>(kBeyond);
+  std::int32_t first_ = 0;
+  // How much more than in the slab below: of the slope of the depth, and of counts.
+  std::vector<double> bend_;
+  std::vector<std::int32_t> segments_, clusters_;
 };
 
 /// Slabs that are kept of a mesh at most: 6 bytes a triangle, so that thousands of small parts take little beside their meshes.

@@ -1,5 +1,7 @@
 #include "stages/raster/raster.h"
 
+#include <tbb/parallel_invoke.h>
+
 #include <algorithm>
 #include <vector>
 
@@ -82,13 +84,20 @@ Result<Rasterizer> Rasterizer::build(std::span<Mesh> meshes, std::span<const Ins
   for (const Instance& instance : instances) {
     state.placed.push_back({&state.meshes[instance.mesh], instance.offset});
   }
-  state.bound.emplace_back(state.placed, state.meshes, crossing_tables(state.meshes, *usable), grid);
+  const auto sum_up = [&] {
+    state.bound.emplace_back(state.placed, state.meshes, crossing_tables(state.meshes, *usable), grid);
+  };
+  const auto sort_by_height = [&] {
+    for (const ClusteredMesh& mesh : state.meshes) state.buckets.emplace_back(mesh);
+  };
+  if (contours) {
+    tbb::parallel_invoke(sum_up, sort_by_height);
+  } else {
+    sum_up();
+  }
   const std::uint32_t rows = std::max(1u, state.last_row - state.first_row);
   const std::uint64_t bands = std::clamp<std::uint64_t>(state.bound.front().most_crossings() / kBandCrossings, 1, rows);
   state.band_rows = ceil_div(rows, static_cast<std::uint32_t>(bands));
-  if (contours) {
-    for (const ClusteredMesh& mesh : state.meshes) state.buckets.emplace_back(mesh);
-  }
   if (rays) {
     auto beams = BeamIndex::build(state.placed, grid, state.band_rows);
     if (!beams) return beams.error();

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cmath>
+#include <cstring>
 #include <numbers>
 #include <random>
 
@@ -77,17 +78,21 @@ TEST(CrossingSums, OfPartsOfAMeshBoundTheWholeInAnyOrder) {
   Triangles triangles = random_tetrahedra(900, pick);
   Mesh mesh = make_mesh(triangles);
   const raster::ClusteredMesh clusters = raster::make_clusters(mesh);
-  std::vector<CrossingSums> parts(7);
-  CrossingSums whole, all;
-  raster::Cluster room;
+  const CrossingSums none_yet(mesh.bounds.lo.z, mesh.bounds.hi.z);
+  std::vector<CrossingSums> parts(7, none_yet);
+  CrossingSums whole = none_yet, all = none_yet;
   for (std::uint32_t c = 0; c < clusters.cluster_count(); ++c) {
-    const raster::Cluster& cluster = clusters.cluster(c, room);
-    whole.add(cluster, clusters.bounds[c]);
-    parts[std::size_t{c} * c % 7].add(cluster, clusters.bounds[c]);
+    whole.add(clusters, c);
+    parts[std::size_t{c} * c % 7].add(clusters, clusters.cluster_count() - 1 - c);
   }
   for (const CrossingSums& part : parts) all.merge(part);
-  const CrossingSums::Table merged = all.table(), direct = whole.table();
-  EXPECT_EQ(merged.shift, direct.shift);
+  const CrossingSums::Table merged = all.table(), direct = whole.table(), threads = raster::sum_crossings(clusters).table();
+  ASSERT_EQ(merged.slab.size(), direct.slab.size());
+  for (std::size_t i = 0; i < direct.slab.size(); ++i) {
+    ASSERT_EQ(merged.slab[i].depth, direct.slab[i].depth) << i;
+    ASSERT_EQ(merged.slab[i].segments, direct.slab[i].segments) << i;
+    ASSERT_EQ(merged.slab[i].clusters, direct.slab[i].clusters) << i;
+  }
   double claimed = 0, had = 0;
   for (int i = 0; i < 1000; ++i) {
     const std::int64_t plane = -45'000'000 + 200'003 * std::int64_t{i};
@@ -107,7 +112,7 @@ TEST(CrossingSums, OfPartsOfAMeshBoundTheWholeInAnyOrder) {
       cut += low <= high ? 1 : 0;
       depth += low <= high ? high - low : 0;
     }
-    const CrossingSums::Slab none, *at = merged.at(plane), *of = direct.at(plane);
+    const CrossingSums::Slab none, *at = merged.at(plane), *of = threads.at(plane);
     ASSERT_GE((at != nullptr ? at : &none)->segments, cut) << plane;
     ASSERT_GE((at != nullptr ? at : &none)->depth, depth - 1) << plane;
     ASSERT_GE((of != nullptr ? of : &none)->depth, depth - 1) << plane;
@@ -165,30 +170,44 @@ void expect_true_within_two(Mesh mesh, std::int64_t dpi, const std::string& name
   }
 }
 
-TEST(CrossingSums, AreTheSameBitsWithEveryInstructionSet) {
+TEST(Tents, AreTheSameBitsWithEveryInstructionSetAndReturnToNothing) {
   std::mt19937 random(23);
   const auto any = [&](std::uint32_t of) { return static_cast<Nm>(random() % of) - static_cast<Nm>(of / 2); };
-  CrossingSums plain(Isa::kPlain), avx2(Isa::kAvx2), avx512(Isa::kAvx512);
-  for (int i = 0; i < 300; ++i) {
-    raster::Cluster cluster{};
-    Box box;
-    for (std::uint32_t lane = 0; lane < raster::kClusterSize; ++lane) {
-      const Nm steep = any(1 << 28), low = lane % 3 == 0 ? 7 : any(1 << 22);
-      for (std::uint32_t k = 0; k < 3; ++k) {
-        cluster.y[k][lane] = any(UINT32_MAX);
-        cluster.z[k][lane] = lane % 4 == 0 ? steep : lane % 2 == 0 ? any(1 << 20) : low;
-        box.add(Point3{0, 0, cluster.z[k][lane]});
-      }
+  std::vector<Point3> vertices(5000);
+  for (std::uint32_t i = 0; i < 300; ++i) {
+    const std::uint32_t shift = 15 + i % 4;
+    const Nm low = any(1 << 22);
+    for (Point3& vertex : vertices) {
+      const std::uint32_t kind = random() % 4;
+      vertex = {any(UINT32_MAX), i % 5 == 0 ? any(UINT32_MAX) : any(1 << 20),
+                kind == 0   ? any(1 << 28)
+                : kind == 1 ? any(1 << 20)
+                            : low};
     }
-    for (CrossingSums* sums : {&plain, &avx2, &avx512}) sums->add(cluster, box);
-  }
-  const CrossingSums::Table expected = plain.table();
-  for (const CrossingSums& sums : {avx2, avx512}) {
-    const CrossingSums::Table table = sums.table();
-    ASSERT_EQ(table.slab.size(), expected.slab.size());
-    for (std::size_t i = 0; i < table.slab.size(); ++i) {
-      ASSERT_EQ(table.slab[i].depth, expected.slab[i].depth) << i;
-      ASSERT_EQ(table.slab[i].segments, expected.slab[i].segments) << i;
+    IndexedCluster cluster{};
+    for (auto& corners : cluster.corner) {
+      for (std::uint16_t& corner : corners) corner = static_cast<std::uint16_t>(random() % vertices.size());
+    }
+    raster::Sides plain_sides, sides;
+    raster::Tents plain, tents;
+    raster::tents_for(Isa::kPlain).look_up(cluster, vertices.data(), plain_sides);
+    raster::tents_for(Isa::kPlain).raise(plain_sides, shift, -(1 << (27 - shift)), plain);
+    for (std::uint32_t lane = 0; lane < raster::kClusterSize; ++lane) {
+      EXPECT_EQ(plain_sides.z[1][lane], vertices[cluster.corner[1][lane]].z);
+      EXPECT_EQ(plain_sides.y[2][lane], vertices[cluster.corner[2][lane]].y);
+      EXPECT_GE(plain.begin[lane], 0);
+      EXPECT_LE(plain.end[lane], 1 << (28 - shift));
+      // The sum of the depth behind its end.
+      const double up = plain.up[lane], down = plain.down[lane];
+      EXPECT_EQ(up * (plain.top[lane] - plain.begin[lane]), down * (plain.end[lane] + 1 - plain.fall[lane])) << i;
+      EXPECT_EQ(std::ldexp(up, 12), std::floor(std::ldexp(up, 12)));
+    }
+    for (const Isa isa : {Isa::kAvx2, Isa::kAvx512}) {
+      const raster::TentKernels& kernels = raster::tents_for(isa_at_most(isa));
+      kernels.look_up(cluster, vertices.data(), sides);
+      kernels.raise(sides, shift, -(1 << (27 - shift)), tents);
+      ASSERT_EQ(std::memcmp(&sides, &plain_sides, sizeof sides), 0) << i;
+      ASSERT_EQ(std::memcmp(&tents, &plain, sizeof tents), 0) << i;
     }
   }
 }

@@ -2,7 +2,9 @@
 // operations lane by lane, none of them fused (-ffp-contract=off), so that every width gives the same bits.
 #include "stages/raster/kernels/tents.h"
 
-#include "stages/geometry/targets.h"
+#if defined(__SSE2__)
+#include <emmintrin.h>
+#endif
 
 namespace lamina::raster {
 namespace {
@@ -15,55 +17,95 @@ LAMINA_BODY std::int32_t less(std::int32_t a, std::int32_t b) {
   return static_cast<std::int32_t>(static_cast<std::uint32_t>(a) - static_cast<std::uint32_t>(b));
 }
 
-/// In float: rounding moves a tent's height by less than 2^-22 of the facet's depth, of which twice as much is added.
-LAMINA_BODY void tents_body(const Cluster& __restrict cluster, std::uint32_t shift, std::int32_t first,
-                            Tents& __restrict tents) {
+/// In float: rounding moves a tent's height by less than 2^-22 of the facet's depth, of which twice as much is added, and by
+/// ten operations more, of 2^-24 each, for which 2^-20 is added. Parts are rounded to multiples of 2^-12, of which one is
+/// added.
+LAMINA_BODY void tents_body(const Sides& __restrict sides, std::uint32_t shift, std::int32_t first, Tents& __restrict tents) {
   constexpr float kRounding = 1.0f / (1 << 21), kUp = 1 + 1.0f / (1 << 20);
+  constexpr float kStep = 1.0f / (1 << 12);
+  constexpr double kWhole = 3LL << 39;  // between 2^40 and 2^41, where doubles are 2^-12 apart
   const auto bits = static_cast<int>(shift);
+  alignas(64) float part[kClusterSize];
+  alignas(64) std::int32_t rises[kClusterSize], falls[kClusterSize];
   for (std::uint32_t i = 0; i < kClusterSize; ++i) {
-    const Nm za = cluster.z[0][i], zb = cluster.z[1][i], zc = cluster.z[2][i], ya = cluster.y[0][i];
+    const Nm za = sides.z[0][i], zb = sides.z[1][i], zc = sides.z[2][i], ya = sides.y[0][i];
     const Nm lower = lesser(za, zb), upper = greater(za, zb);
     const Nm lo = lesser(lower, zc), hi = greater(upper, zc), middle = greater(lower, lesser(upper, zc));
     const std::int32_t count = lo < hi ? 1 : 0;
-    const auto uy = static_cast<float>(less(cluster.y[1][i], ya)), vy = static_cast<float>(less(cluster.y[2][i], ya));
+    const auto uy = static_cast<float>(less(sides.y[1][i], ya)), vy = static_cast<float>(less(sides.y[2][i], ya));
     const float area = __builtin_fabsf(uy * static_cast<float>(less(zc, za)) - static_cast<float>(less(zb, za)) * vy);
     const float depth = __builtin_fabsf(uy) + __builtin_fabsf(vy);
-    const float top = (area / static_cast<float>(greater(less(hi, lo), 1)) + depth * kRounding) * kUp;
-    const float height = top * static_cast<float>(count);
     const std::int32_t begin = (lo >> bits) - first, last = ((hi - count) >> bits) - first;
     const std::int32_t peak = lesser((middle >> bits) - first, last);
     const std::int32_t rise = greater(peak - begin, 1), fall = greater(last - peak, 1);
+    const auto height = static_cast<float>(greater(less(hi, lo), 1));
+    const float top = (area + depth * height * kRounding) * kUp;  // times the facet's height
+    part[i] = (top / (height * static_cast<float>(rise * fall)) + kStep) * static_cast<float>(count);
+    rises[i] = rise;
+    falls[i] = fall;
     tents.begin[i] = begin;
-    tents.last[i] = last;
-    tents.rise[i] = rise;
-    tents.fall[i] = fall;
-    tents.up[i] = height / static_cast<float>(rise);
-    tents.down[i] = height / static_cast<float>(fall);
+    tents.end[i] = last + 1;
+    tents.top[i] = begin + rise;
+    tents.fall[i] = last + 2 - fall;
     tents.count[i] = count;
+  }
+  for (std::uint32_t i = 0; i < kClusterSize; ++i) {
+    const double whole = static_cast<double>(part[i]) + kWhole - kWhole;
+    tents.up[i] = whole * falls[i];
+    tents.down[i] = whole * rises[i];
   }
 }
 
-void tents_plain(const Cluster& cluster, std::uint32_t shift, std::int32_t first, Tents& tents) {
-  tents_body(cluster, shift, first, tents);
+#if defined(__SSE2__)
+/// y and z of two vertices.
+inline __m128 two_at(const std::uint16_t* corner, const Point3* vertices) {
+  const __m128i one = _mm_loadl_epi64(reinterpret_cast<const __m128i*>(&vertices[corner[0]].y));
+  const auto* const other = reinterpret_cast<const double*>(&vertices[corner[1]].y);
+  return _mm_castpd_ps(_mm_loadh_pd(_mm_castsi128_pd(one), other));
+}
+#endif
+
+void look_up(const IndexedCluster& cluster, const Point3* vertices, Sides& sides) {
+  for (std::uint32_t k = 0; k < 3; ++k) {
+#if defined(__SSE2__)
+    for (std::uint32_t i = 0; i < kClusterSize; i += 4) {
+      const __m128 low = two_at(cluster.corner[k] + i, vertices), high = two_at(cluster.corner[k] + i + 2, vertices);
+      _mm_store_ps(reinterpret_cast<float*>(sides.y[k] + i), _mm_shuffle_ps(low, high, _MM_SHUFFLE(2, 0, 2, 0)));
+      _mm_store_ps(reinterpret_cast<float*>(sides.z[k] + i), _mm_shuffle_ps(low, high, _MM_SHUFFLE(3, 1, 3, 1)));
+    }
+#else
+    for (std::uint32_t i = 0; i < kClusterSize; ++i) {
+      const Point3& vertex = vertices[cluster.corner[k][i]];
+      sides.y[k][i] = vertex.y;
+      sides.z[k][i] = vertex.z;
+    }
+#endif
+  }
+}
+
+void raise_plain(const Sides& sides, std::uint32_t shift, std::int32_t first, Tents& tents) {
+  tents_body(sides, shift, first, tents);
 }
 #if defined(LAMINA_WIDE_KERNELS)
-LAMINA_AVX2 void tents_avx2(const Cluster& cluster, std::uint32_t shift, std::int32_t first, Tents& tents) {
-  tents_body(cluster, shift, first, tents);
+LAMINA_AVX2 void raise_avx2(const Sides& sides, std::uint32_t shift, std::int32_t first, Tents& tents) {
+  tents_body(sides, shift, first, tents);
 }
-LAMINA_AVX512 void tents_avx512(const Cluster& cluster, std::uint32_t shift, std::int32_t first, Tents& tents) {
-  tents_body(cluster, shift, first, tents);
+LAMINA_AVX512 void raise_avx512(const Sides& sides, std::uint32_t shift, std::int32_t first, Tents& tents) {
+  tents_body(sides, shift, first, tents);
 }
 #endif
 
 }  // namespace
 
-RaiseTents* tents_for(Isa isa) {
+const TentKernels& tents_for(Isa isa) {
+  static constexpr TentKernels kPlain{look_up, raise_plain};
 #if defined(LAMINA_WIDE_KERNELS)
-  if (isa == Isa::kAvx512) return tents_avx512;
-  if (isa == Isa::kAvx2) return tents_avx2;
+  static constexpr TentKernels kAvx2{look_up, raise_avx2}, kAvx512{avx512::look_up_sides, raise_avx512};
+  if (isa == Isa::kAvx512) return kAvx512;
+  if (isa == Isa::kAvx2) return kAvx2;
 #endif
   static_cast<void>(isa);
-  return tents_plain;
+  return kPlain;
 }
 
 }  // namespace lamina::raster

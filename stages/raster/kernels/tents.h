@@ -5,22 +5,42 @@
 
 #include "stages/data/choices.h"
 #include "stages/geometry/blocks/cluster.h"
+#include "stages/geometry/targets.h"
 
 namespace lamina::raster {
 
-/// The tents of a cluster's facets (layer_bound.h): slabs of their ends and slopes. Facets that no plane cuts have neither
-/// height nor count.
-struct alignas(64) Tents {
-  std::int32_t begin[kClusterSize], last[kClusterSize];  // slabs that the facet reaches
-  std::int32_t rise[kClusterSize], fall[kClusterSize];   // slabs over which it rises and falls, at least 1
-  float up[kClusterSize], down[kClusterSize];            // nm a slab
-  std::int32_t count[kClusterSize];                      // 1 where a plane cuts it
+/// A cluster as it is seen along x.
+struct alignas(64) Sides {
+  Nm z[3][kClusterSize];
+  Nm y[3][kClusterSize];
 };
 
-/// Raises the tents of a cluster. Slabs are 2^shift nm high and counted from `first`.
-using RaiseTents = void(const Cluster& cluster, std::uint32_t shift, std::int32_t first, Tents& tents);
+/// The tents of a cluster's facets (layer_bound.h). Facets that no plane cuts have neither slopes nor count.
+struct alignas(64) Tents {
+  std::int32_t begin[kClusterSize], end[kClusterSize];  // slabs that the facet reaches, the latter beyond the last
+  std::int32_t top[kClusterSize], fall[kClusterSize];   // from here on it no longer rises, and it falls
+  /// nm a slab. Multiples of 2^-12: their sums are the same in any order as long as they stay below 2^41. Each is the same
+  /// number of 32 bits or fewer times the slabs of the other slope, which double holds, so that a tent returns to exactly
+  /// nothing.
+  double up[kClusterSize], down[kClusterSize];
+  std::int32_t count[kClusterSize];  // 1 where a plane cuts it
+};
 
-/// The body for an instruction set that this processor has (geometry/isa.h), not kAuto. All give the same bits.
-RaiseTents* tents_for(Isa isa);
+/// The loops for an instruction set.
+struct TentKernels {
+  /// Looks up an indexed cluster's corners.
+  void (*look_up)(const IndexedCluster& cluster, const Point3* vertices, Sides& sides);
+  /// Slabs are 2^shift nm high and counted from `first`, and at most 2^13.
+  void (*raise)(const Sides& sides, std::uint32_t shift, std::int32_t first, Tents& tents);
+};
+
+/// The bodies for an instruction set that this processor has (geometry/isa.h), not kAuto. All give the same bits.
+const TentKernels& tents_for(Isa isa);
+
+#if defined(LAMINA_WIDE_KERNELS)
+namespace avx512 {
+LAMINA_AVX512 void look_up_sides(const IndexedCluster& cluster, const Point3* vertices, Sides& sides);
+}  // namespace avx512
+#endif
 
 }  // namespace lamina::raster
