@@ -190,6 +190,14 @@ TEST(Blocks, AreOrderedByHeightSoThatAPlaneMeetsFewClusters) {
   EXPECT_LT(heights, 4 * kHigh) << "of 256 clusters, each of which is as high as all where there is no order";
 }
 
+/// How a cluster names its corners, as bytes; nothing where it is stored as it is read.
+std::string named_corners(const MeshBlocks& blocks, std::uint32_t cluster) {
+  const MeshBlocks::Indexed indexed = blocks.indexed(cluster);
+  if (indexed.cluster == nullptr) return {};
+  const std::string steps = std::to_string(indexed.shift) + " " + std::to_string(indexed.step_0) + " ";
+  return steps + std::string(reinterpret_cast<const char*>(indexed.cluster), sizeof(IndexedCluster));
+}
+
 TEST(Blocks, AreTheSameWithEveryInstructionSet) {
   std::mt19937 random(9);
   std::vector<std::vector<Triangle>> lists;
@@ -219,6 +227,9 @@ TEST(Blocks, AreTheSameWithEveryInstructionSet) {
       const auto wide = made(isa);
       EXPECT_EQ(triangles_in(*wide, 0, wide->cluster_count(), count), expected);
       EXPECT_EQ(wide->bytes(), plain->bytes());
+      for (std::uint32_t c = 0; c < plain->cluster_count(); ++c) {
+        ASSERT_EQ(named_corners(*wide, c), named_corners(*plain, c)) << c;
+      }
     }
   }
 }

@@ -14,10 +14,8 @@ namespace {
 
 /// Of a step of a 16th to a 32nd of the mean height of facets: up to 8 times as high ones fit, still higher ones are never
 /// passed over.
-std::uint32_t step_shift(std::span<const Cluster> clusters) {
-  std::int64_t sum = 0;
-  for (const Cluster& cluster : clusters) sum += heights_of(cluster);
-  const auto mean = static_cast<std::uint64_t>(sum) / (clusters.size() * kClusterSize);
+std::uint32_t step_shift(std::uint64_t heights, std::size_t clusters) {
+  const std::uint64_t mean = heights / (clusters * kClusterSize);
   return static_cast<std::uint32_t>(std::max(0, static_cast<int>(std::bit_width(mean)) - 5));
 }
 
@@ -39,21 +37,18 @@ void BlockMaker::store(MeshBlocks& mesh, std::uint32_t number) {
   const bool few = vertices_.number(sorted_, kernels_);
   block.clusters = sorted_.clusters();
   block.vertices = few ? vertices_.count() : 0;
+  const std::span<const Cluster> clusters(sorted_.cluster.data(), block.clusters);
+  const std::uint64_t heights = kernels_.bounds(clusters, mesh.bounds_.data() + mesh.first_cluster(number));
   if (few) {
-    const std::size_t clusters = block.clusters * sizeof(IndexedCluster), vertices = block.vertices * sizeof(Point3);
-    block.bytes = mesh.pages_.take(clusters + vertices + 4);
-    block.shift = step_shift({sorted_.cluster.data(), block.clusters});
-    auto* const indexed = reinterpret_cast<IndexedCluster*>(block.bytes);
-    for (std::uint32_t c = 0; c < block.clusters; ++c) {
-      indexed[c].steps = steps_of(sorted_.cluster[c], block.shift);
-      std::memcpy(indexed[c].corner, vertices_.corners() + c * SortedBlock::kCorners, sizeof indexed[c].corner);
-    }
-    vertices_.write(sorted_, reinterpret_cast<Point3*>(block.bytes + clusters));
+    const std::size_t indexed = block.clusters * sizeof(IndexedCluster), vertices = block.vertices * sizeof(Point3);
+    block.bytes = mesh.pages_.take(indexed + vertices + 4);
+    block.shift = step_shift(heights, block.clusters);
+    kernels_.index(clusters, vertices_.corners(), block.shift, reinterpret_cast<IndexedCluster*>(block.bytes));
+    kernels_.write(sorted_, vertices_.matches(), block.vertices, reinterpret_cast<Point3*>(block.bytes + indexed));
   } else {
-    block.bytes = mesh.pages_.take(block.clusters * sizeof(Cluster));
-    std::memcpy(block.bytes, sorted_.cluster.data(), block.clusters * sizeof(Cluster));
+    block.bytes = mesh.pages_.take(clusters.size_bytes());
+    std::memcpy(block.bytes, clusters.data(), clusters.size_bytes());
   }
-  kernels_.bounds({sorted_.cluster.data(), block.clusters}, mesh.bounds_.data() + mesh.first_cluster(number));
 }
 
 void BlockMaker::make(std::span<const Triangle> triangles, MeshBlocks& mesh, std::uint32_t block) {

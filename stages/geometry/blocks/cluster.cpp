@@ -4,8 +4,6 @@
 #include <emmintrin.h>
 #endif
 
-#include <algorithm>
-
 namespace lamina {
 namespace {
 
@@ -48,28 +46,6 @@ void expand_cluster(const IndexedCluster& from, const Point3* vertices, Cluster&
       expand_four(from.corner[k] + i, vertices, out.x[k] + i, out.y[k] + i, out.z[k] + i);
     }
   }
-}
-
-std::int64_t heights_of(const Cluster& cluster) {
-  const auto& z = cluster.z;
-  std::int64_t sum = 0;
-  for (std::uint32_t i = 0; i < kClusterSize; ++i) {
-    sum += std::int64_t{std::max(z[0][i], std::max(z[1][i], z[2][i]))} - std::min(z[0][i], std::min(z[1][i], z[2][i]));
-  }
-  return sum;
-}
-
-FacetSteps steps_of(const Cluster& cluster, std::uint32_t shift) {
-  const auto& z = cluster.z;
-  FacetSteps steps;
-  for (std::uint32_t i = 0; i < kClusterSize; ++i) {
-    const Nm lowest = std::min(z[0][i], std::min(z[1][i], z[2][i])), highest = std::max(z[0][i], std::max(z[1][i], z[2][i]));
-    const Nm low = lowest >> shift, last = std::max(lowest, highest - 1) >> shift;
-    const std::uint32_t span = static_cast<std::uint32_t>(last) - static_cast<std::uint32_t>(low);
-    steps.low[i] = static_cast<std::uint8_t>(low);
-    steps.span[i] = static_cast<std::uint8_t>(std::min(span, 255u));
-  }
-  return steps;
 }
 
 }  // namespace lamina

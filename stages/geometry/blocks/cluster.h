@@ -39,10 +39,4 @@ static_assert(sizeof(IndexedCluster) == 128);
 /// Writes all corners of an indexed cluster. 4 bytes behind the last vertex of the table must be readable.
 void expand_cluster(const IndexedCluster& from, const Point3* vertices, Cluster& out);
 
-/// Of its triangles together, from the lowest corner of each to the highest, nm.
-std::int64_t heights_of(const Cluster& cluster);
-
-/// Steps of 2^shift nm, counted from 0.
-FacetSteps steps_of(const Cluster& cluster, std::uint32_t shift);
-
 }  // namespace lamina

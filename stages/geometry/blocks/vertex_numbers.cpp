@@ -7,8 +7,14 @@ namespace lamina {
 
 bool VertexNumbers::number(const SortedBlock& block, const BlockKernels& kernels) {
   const std::uint32_t corners = block.clusters() * SortedBlock::kCorners, most = block.triangles * 3 / 2;
-  for (std::uint32_t i = corners; i-- > 0;) {
-    matches_.slot[block.hash[i] % CornerMatches::kSlots] = static_cast<std::uint16_t>(i);
+  // A fixed number of corners a round, so that compilers unroll it.
+  constexpr std::uint32_t kRound = 16;
+  static_assert(SortedBlock::kCorners % kRound == 0);
+  for (std::uint32_t end = corners; end > 0; end -= kRound) {
+    const std::uint16_t* const hash = block.hash.data() + end;
+    for (std::uint32_t i = 1; i <= kRound; ++i) {
+      matches_.slot[*(hash - i) % CornerMatches::kSlots] = static_cast<std::uint16_t>(end - i);
+    }
   }
   kernels.match(block, matches_);
   if (matches_.found > most) return false;
@@ -29,14 +35,6 @@ void VertexNumbers::match_rest(const SortedBlock& block) {
     while (slot[at] != kNone && difference(corner, corner_at(block, slot[at])) != 0) at = (at + 1) % CornerMatches::kSlots;
     if (slot[at] == kNone) slot[at] = i;
     matches_.first[i] = slot[at];
-  }
-}
-
-void VertexNumbers::write(const SortedBlock& block, Point3* to) const {
-  constexpr std::uint32_t kY = SortedBlock::kCorners, kX = 2 * SortedBlock::kCorners;
-  for (std::uint32_t v = 0; v < count_; ++v) {
-    const Nm* const corner = corner_at(block, matches_.vertex[v]);
-    to[v] = {corner[kX], corner[kY], corner[0]};
   }
 }
 

@@ -15,8 +15,8 @@ class VertexNumbers {
   std::uint32_t count() const { return count_; }
   /// Of each corner, in the shape of the clusters: IndexedCluster::corner.
   const std::uint16_t* corners() const { return matches_.number.data(); }
-  /// Writes all vertices.
-  void write(const SortedBlock& block, Point3* to) const;
+  /// For BlockKernels::write.
+  const CornerMatches& matches() const { return matches_; }
 
  private:
   void match_rest(const SortedBlock& block);

@@ -97,7 +97,7 @@ void census(SortedBlock& block, std::uint64_t share, CensusSums& sums) {
         _mm256_add_epi64(_mm256_add_epi64(fold_four(from_a, at_b), fold_four(from_b, at_c)), fold_four(from_c, at_a));
     boundary = _mm256_add_epi64(boundary, areas(a, b, c));
     fingerprint = _mm256_add_epi64(fingerprint, _mm256_and_si256(used, fold_four(_mm256_xor_si256(forward, all(kA)), all(kD))));
-    const __m256i facet = product(_mm256_add_epi64(_mm256_add_epi64(a, b), c), all(kD));
+    const __m256i facet = _mm256_add_epi64(_mm256_add_epi64(a, b), c);
     const __m256i beyond = _mm256_cmpgt_epi64(_mm256_xor_si256(facet, sign), bound);
     if (_mm256_movemask_epi8(beyond) != -1) [[unlikely]] {
       std::uint64_t hashes[3][kLanes];

@@ -8,6 +8,8 @@
 #if defined(LAMINA_WIDE_KERNELS)
 #include <immintrin.h>
 
+#include <bit>
+
 #define LAMINA_INLINE LAMINA_AVX512 __attribute__((always_inline)) inline
 
 #if defined(__GNUC__) && !defined(__clang__)
@@ -58,10 +60,18 @@ LAMINA_INLINE __m512i areas(__m512i a, __m512i b, __m512i c) {
   return _mm512_sub_epi64(_mm512_mul_epi32(ux, vy), _mm512_mul_epi32(vx, uy));
 }
 
-void sample_lanes(unsigned lanes, const std::uint64_t (&corner)[3][8], CensusSums& sums) {
-  for (unsigned i = 0; i < 8; ++i) {
-    if ((lanes >> i & 1) != 0) sample(corner[0][i], corner[1][i], corner[2][i], sums);
-  }
+LAMINA_INLINE __mmask8 either(__mmask8 one, __mmask8 other) { return static_cast<__mmask8>(one ^ other); }
+
+/// As sample() of those lanes. returns  how many are facets
+LAMINA_INLINE std::uint32_t sample_lanes(__mmask8 lanes, __m512i facet, const __m512i (&corner)[3], std::uint64_t* to) {
+  const __m512i a = corner[0], b = corner[1], c = corner[2];
+  const __mmask8 apart =
+      _mm512_mask_cmpneq_epi64_mask(_mm512_mask_cmpneq_epi64_mask(_mm512_mask_cmpneq_epi64_mask(lanes, a, b), b, c), c, a);
+  const __mmask8 turned =
+      either(either(_mm512_cmplt_epu64_mask(a, b), _mm512_cmplt_epu64_mask(b, c)), _mm512_cmplt_epu64_mask(c, a));
+  const __m512i odd = _mm512_or_si512(_mm512_mullo_epi64(facet, all(kB)), all(1));
+  _mm512_storeu_si512(to, _mm512_maskz_compress_epi64(apart, _mm512_mask_xor_epi64(odd, turned, odd, all(1))));
+  return static_cast<std::uint32_t>(std::popcount(static_cast<unsigned>(apart)));
 }
 
 }  // namespace
@@ -69,6 +79,8 @@ void sample_lanes(unsigned lanes, const std::uint64_t (&corner)[3][8], CensusSum
 void census(SortedBlock& block, std::uint64_t share, CensusSums& sums) {
   const __m512i below = all(UINT64_MAX / share), to_b = all(kB), to_c = all(kC);
   __m512i boundary = _mm512_setzero_si512(), fingerprint = boundary;
+  std::uint64_t sampled[kBlockSize + 8];  // unset; a store writes 8
+  std::uint32_t samples = 0;
   for (std::uint32_t first = 0; first < block.clusters() * kClusterSize; first += 8) {
     const std::uint32_t lane = first % kClusterSize, left = block.triangles - std::min(block.triangles, first);
     const auto used = static_cast<__mmask8>(left >= 8 ? 255u : (1u << left) - 1);
@@ -87,14 +99,11 @@ void census(SortedBlock& block, std::uint64_t share, CensusSums& sums) {
     boundary = _mm512_add_epi64(boundary, areas(a, b, c));
     fingerprint =
         _mm512_mask_add_epi64(fingerprint, used, fingerprint, fold_eight(_mm512_xor_si512(forward, all(kA)), all(kD)));
-    const __m512i facet = _mm512_mullo_epi64(_mm512_add_epi64(_mm512_add_epi64(a, b), c), all(kD));
-    const __mmask8 sampled = _mm512_mask_cmple_epu64_mask(used, facet, below);
-    if (sampled != 0) [[unlikely]] {
-      std::uint64_t hashes[3][8];
-      for (std::uint32_t k = 0; k < 3; ++k) _mm512_storeu_si512(hashes[k], corner[k]);
-      sample_lanes(sampled, hashes, sums);
-    }
+    const __m512i facet = _mm512_add_epi64(_mm512_add_epi64(a, b), c);
+    const __mmask8 chosen = _mm512_mask_cmple_epu64_mask(used, facet, below);
+    if (chosen != 0) samples += sample_lanes(chosen, facet, corner, sampled + samples);
   }
+  sums.sampled.insert(sums.sampled.end(), sampled, sampled + samples);
   sums.boundary += total(boundary);
   sums.fingerprint += total(fingerprint);
 }

@@ -36,8 +36,9 @@ inline std::uint64_t hashed_area(std::uint64_t a, std::uint64_t b, std::uint64_t
   return static_cast<std::uint64_t>((x(b) - x(a)) * (y(c) - y(a))) - static_cast<std::uint64_t>((x(c) - x(a)) * (y(b) - y(a)));
 }
 
-/// The hash of a facet without its orientation by which it is sampled: those up to a bound are.
-inline std::uint64_t unordered(std::uint64_t a, std::uint64_t b, std::uint64_t c) { return (a + b + c) * kD; }
+/// The hash of a facet without its orientation by which it is sampled: those up to a bound are. Sums of hashes are as evenly
+/// spread as hashes.
+inline std::uint64_t unordered(std::uint64_t a, std::uint64_t b, std::uint64_t c) { return a + b + c; }
 
 /// Samples a facet, if it is one.
 inline void sample(std::uint64_t a, std::uint64_t b, std::uint64_t c, CensusSums& sums) {

@@ -48,8 +48,12 @@ struct BlockKernels {
   void (*match)(const SortedBlock& block, CornerMatches& matches);
   /// Numbers vertices in the order of their first corners. returns  how many there are
   std::uint32_t (*number)(std::uint32_t corners, CornerMatches& matches);
-  /// The boxes of clusters.
-  void (*bounds)(std::span<const Cluster> clusters, Box* out);
+  /// Writes `count` vertices by their first corners.
+  void (*write)(const SortedBlock& block, const CornerMatches& matches, std::uint32_t count, Point3* to);
+  /// The boxes of clusters. returns  the heights of all facets together, from the lowest corner of each to its highest, nm
+  std::uint64_t (*bounds)(std::span<const Cluster> clusters, Box* out);
+  /// Clusters by the numbers of their corners, with steps of 2^shift nm, counted from 0.
+  void (*index)(std::span<const Cluster> clusters, const std::uint16_t* corners, std::uint32_t shift, IndexedCluster* out);
   /// Orders at most kBlockSize triangles by height, and among equals by place: order[i] is the i-th of them.
   ///
   /// Clusters of neighbours in this order are low: a plane meets few of them, and many facets in each. Most exporters write
@@ -64,21 +68,28 @@ const BlockKernels& block_kernels_for(Isa isa);
 namespace plain {
 void match(const SortedBlock& block, CornerMatches& matches);
 std::uint32_t number(std::uint32_t corners, CornerMatches& matches);
-void bounds(std::span<const Cluster> clusters, Box* out);
+void write(const SortedBlock& block, const CornerMatches& matches, std::uint32_t count, Point3* to);
+std::uint64_t bounds(std::span<const Cluster> clusters, Box* out);
+void index(std::span<const Cluster> clusters, const std::uint16_t* corners, std::uint32_t shift, IndexedCluster* out);
 void order(std::span<const Triangle> block, std::uint16_t* order);
 }  // namespace plain
 
 #if defined(LAMINA_WIDE_KERNELS)
 namespace avx2 {
 LAMINA_AVX2 void match(const SortedBlock& block, CornerMatches& matches);
-LAMINA_AVX2 void bounds(std::span<const Cluster> clusters, Box* out);
+LAMINA_AVX2 std::uint64_t bounds(std::span<const Cluster> clusters, Box* out);
+LAMINA_AVX2 void index(std::span<const Cluster> clusters, const std::uint16_t* corners, std::uint32_t shift,
+                       IndexedCluster* out);
 LAMINA_AVX2 void order(std::span<const Triangle> block, std::uint16_t* order);
 }  // namespace avx2
 
 namespace avx512 {
 LAMINA_AVX512 void match(const SortedBlock& block, CornerMatches& matches);
 LAMINA_AVX512 std::uint32_t number(std::uint32_t corners, CornerMatches& matches);
-LAMINA_AVX512 void bounds(std::span<const Cluster> clusters, Box* out);
+LAMINA_AVX512 void write(const SortedBlock& block, const CornerMatches& matches, std::uint32_t count, Point3* to);
+LAMINA_AVX512 std::uint64_t bounds(std::span<const Cluster> clusters, Box* out);
+LAMINA_AVX512 void index(std::span<const Cluster> clusters, const std::uint16_t* corners, std::uint32_t shift,
+                         IndexedCluster* out);
 LAMINA_AVX512 void order(std::span<const Triangle> block, std::uint16_t* order);
 }  // namespace avx512
 #endif

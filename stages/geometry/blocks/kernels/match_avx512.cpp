@@ -6,6 +6,7 @@
 #if defined(LAMINA_WIDE_KERNELS)
 #include <immintrin.h>
 
+#include <algorithm>
 #include <bit>
 
 #define LAMINA_INLINE LAMINA_AVX512 __attribute__((always_inline)) inline
@@ -50,6 +51,22 @@ LAMINA_INLINE __mmask16 other_than(const Nm* own, __m512i place, const Nm* coord
   return _mm512_cmpneq_epi32_mask(_mm512_loadu_si512(own), _mm512_i32gather_epi32(place, coordinates, 4));
 }
 
+/// Where the numbers of 16 vertices in a row come from, 16 at a time: x and y are lanes 0 to 15 and 16 to 31 of two registers.
+struct Weave {
+  alignas(64) std::int32_t of_xy[3][kLanes] = {};
+  alignas(64) std::int32_t of_z[3][kLanes] = {};
+  std::uint16_t is_z[3] = {};
+
+  constexpr Weave() {
+    for (std::uint32_t n = 0; n < 3 * kLanes; ++n) {
+      const std::uint32_t part = n / kLanes, lane = n % kLanes, vertex = n / 3;
+      of_xy[part][lane] = static_cast<std::int32_t>(n % 3 == 1 ? vertex + kLanes : vertex);
+      of_z[part][lane] = static_cast<std::int32_t>(vertex);
+      if (n % 3 == 2) is_z[part] = static_cast<std::uint16_t>(is_z[part] | 1u << lane);
+    }
+  }
+};
+
 }  // namespace
 
 void match(const SortedBlock& block, CornerMatches& matches) {
@@ -87,6 +104,25 @@ std::uint32_t number(std::uint32_t corners, CornerMatches& matches) {
     store_shorts(matches.number.data() + i, gather_shorts(matches.number.data(), load_shorts(matches.first.data() + i)));
   }
   return count;
+}
+
+void write(const SortedBlock& block, const CornerMatches& matches, std::uint32_t count, Point3* to) {
+  constexpr std::uint32_t kY = SortedBlock::kCorners, kX = 2 * SortedBlock::kCorners;
+  static constexpr Weave kWeave;
+  const Nm* const base = corner_at(block, 0);
+  for (std::uint32_t v = 0; v < count; v += kLanes) {
+    const std::uint32_t here = std::min(count - v, kLanes);
+    const auto used = static_cast<__mmask16>((1u << here) - 1);  // behind them nothing is set
+    const __m512i place = places_of(_mm512_maskz_mov_epi32(used, load_shorts(matches.vertex.data() + v)));
+    const __m512i x = _mm512_i32gather_epi32(place, base + kX, 4), y = _mm512_i32gather_epi32(place, base + kY, 4),
+                  z = _mm512_i32gather_epi32(place, base, 4);
+    const std::uint64_t numbers = (std::uint64_t{1} << 3 * here) - 1;
+    for (std::uint32_t part = 0; part < 3; ++part) {
+      const __m512i xy = _mm512_permutex2var_epi32(x, _mm512_load_si512(kWeave.of_xy[part]), y);
+      _mm512_mask_storeu_epi32(&to[v].x + part * kLanes, static_cast<__mmask16>(numbers >> part * kLanes),
+                               _mm512_mask_permutexvar_epi32(xy, kWeave.is_z[part], _mm512_load_si512(kWeave.of_z[part]), z));
+    }
+  }
 }
 
 }  // namespace lamina::avx512

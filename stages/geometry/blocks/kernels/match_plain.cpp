@@ -31,4 +31,12 @@ std::uint32_t number(std::uint32_t corners, CornerMatches& matches) {
   return count;
 }
 
+void write(const SortedBlock& block, const CornerMatches& matches, std::uint32_t count, Point3* to) {
+  constexpr std::uint32_t kY = SortedBlock::kCorners, kX = 2 * SortedBlock::kCorners;
+  for (std::uint32_t v = 0; v < count; ++v) {
+    const Nm* const corner = corner_at(block, matches.vertex[v]);
+    to[v] = {corner[kX], corner[kY], corner[0]};
+  }
+}
+
 }  // namespace lamina::plain

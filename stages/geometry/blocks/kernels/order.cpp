@@ -1,6 +1,6 @@
 // The order of triangles within a block, and one body for each instruction set.
 //
-// Heights are whole numbers and their sums exact in double, in any order; the rest is rounded triangle by triangle.
+// Heights are whole numbers, and so is their sum, which is below 2^44; the rest is rounded triangle by triangle.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -12,14 +12,15 @@ namespace lamina {
 namespace {
 
 using Four = Nm __attribute__((vector_size(16)));
-using FourDouble = double __attribute__((vector_size(32)));
+using FourHeights = std::uint32_t __attribute__((vector_size(16)));
+using FourSums = std::uint64_t __attribute__((vector_size(32)));
 
 /// The height of the middle of each facet and where its first corner lies, and what the order needs to know of all, nm.
 struct Heights {
   std::array<Nm, kBlockSize> middle, y;
   Nm lowest = INT32_MAX, highest = INT32_MIN;  // of the middles
   Nm front = INT32_MAX, back = INT32_MIN;      // y of the first corners
-  double sum = 0;                              // of the facets' own heights
+  std::uint64_t sum = 0;                       // of the facets' own heights
 };
 
 LAMINA_BODY Nm least(const Four& v) { return std::min(std::min(v[0], v[1]), std::min(v[2], v[3])); }
@@ -33,12 +34,12 @@ LAMINA_BODY void see_one(const Triangle& t, std::uint32_t i, Heights& heights) {
   heights.highest = std::max(heights.highest, heights.middle[i]);
   heights.front = std::min(heights.front, t.a.y);
   heights.back = std::max(heights.back, t.a.y);
-  heights.sum += static_cast<double>(hi) - lo;
+  heights.sum += static_cast<std::uint32_t>(hi) - static_cast<std::uint32_t>(lo);
 }
 
 LAMINA_BODY void see(std::span<const Triangle> block, Heights& heights) {
   Four lowest = {INT32_MAX, INT32_MAX, INT32_MAX, INT32_MAX}, highest = ~lowest, front = lowest, back = highest;
-  FourDouble sum = {};
+  FourSums sum = {};
   const auto count = static_cast<std::uint32_t>(block.size()), whole = count / 4 * 4;
   for (std::uint32_t i = 0; i < whole; i += 4) {
     Four early[4], late[4];  // numbers 1 to 4 and 5 to 8 of each triangle
@@ -61,7 +62,7 @@ LAMINA_BODY void see(std::span<const Triangle> block, Heights& heights) {
     highest = middle > highest ? middle : highest;
     front = y < front ? y : front;
     back = y > back ? y : back;
-    sum += __builtin_convertvector(hi, FourDouble) - __builtin_convertvector(lo, FourDouble);
+    sum += __builtin_convertvector((FourHeights)hi - (FourHeights)lo, FourSums);
   }
   heights.lowest = least(lowest), heights.highest = most(highest);
   heights.front = least(front), heights.back = most(back);
@@ -81,7 +82,7 @@ struct BlockOrder {
 
   LAMINA_BODY BlockOrder(const Heights& heights, std::size_t count) : lowest(heights.lowest), front(heights.front) {
     const double height = heights.highest - lowest, depth = heights.back - front;
-    const double mean = heights.sum / static_cast<double>(count);
+    const double mean = static_cast<double>(heights.sum) / static_cast<double>(count);
     const double clusters = static_cast<double>(count) / kClusterSize;
     const double step = std::max(std::sqrt(height * depth * mean / (clusters * kBeam)), mean / 4);
     steps_a_nm = static_cast<float>(1 / std::max(step, height / (kSteps - 2) + 1));
