@@ -114,7 +114,7 @@ std::uint64_t ImageFiles::Work::bytes() const {
 }
 
 Status ImageFiles::encode(const Runs& whole, std::span<const Runs> materials, Work& work, LayerRecord& record) const {
-  if (!work.encoder) work.encoder = format_.make_encoder();
+  if (!work.encoder) (work.encoder = format_.make_encoder())->use(plan_.job.isa);
   write::LayerTags tags = tags_of(plan_, record.layer);
   work.encoder->tag(tags);
   if (head_.materials.empty()) {

@@ -9,6 +9,7 @@
 #include <string_view>
 
 #include "stages/data/buffer.h"
+#include "stages/data/choices.h"
 #include "stages/data/grid.h"
 #include "stages/data/runs.h"
 #include "stages/data/status.h"
@@ -37,6 +38,9 @@ class ImageEncoder {
   /// errors        kOutput if the format cannot hold the image (its limits are named in the message)
   /// Set pixels are printed as 1 = jet: min-is-white in TIFF, black in PBM, 1 in PNG's palette (see the format's README).
   virtual Status encode(const RunsView& runs, double dpi_x, double dpi_y, Bytes& file) = 0;
+
+  /// The widest instructions to use, if the processor has them; the bytes are the same with any. Else it chooses itself.
+  virtual void use(Isa) {}
 
   /// What the next files say of their layer; nothing until it is called. Formats without a place for it ignore it.
   virtual void tag(const LayerTags&) {}

@@ -9,9 +9,12 @@
 #include <span>
 #include <utility>
 
+#include "stages/geometry/isa.h"
 #include "stages/write/g4/bit_writer.h"
 #include "stages/write/g4/codes.h"
 #include "stages/write/g4/empty_rows.h"
+#include "stages/write/g4/horizontal.h"
+#include "stages/write/g4/steady_rows.h"
 
 namespace lamina::write::g4 {
 namespace {
@@ -43,36 +46,6 @@ std::uint64_t changes_to_code(std::span<const std::uint32_t> row, std::uint32_t 
 /// No row takes more bytes: at most 53 bits for two changes, 4 bits for two changes above, 12 bits for 2560 columns.
 std::size_t most_bytes(std::size_t changes, std::size_t changes_above, std::uint32_t columns) {
   return 4 * changes + changes_above + columns / 1024 + 64;
-}
-
-struct RunWord {
-  std::uint64_t bits;
-  std::uint32_t length;
-};
-
-RunWord run_word(const RunCodes& codes, std::uint32_t run) {
-  const Code make_up = codes.make_up[run >> 6], terminating = codes.terminating[run & 63];
-  return {std::uint64_t{make_up.bits()} << terminating.length() | terminating.bits(), make_up.length() + terminating.length()};
-}
-
-BitWriter put_long_run(BitWriter writer, const RunCodes& codes, std::uint32_t run) {
-  for (; run >= kLongestMakeUp + 64; run -= kLongestMakeUp) writer.put(codes.make_up[kLongestMakeUp / 64]);
-  const RunWord word = run_word(codes, run);
-  writer.put(word.bits, word.length);
-  return writer;
-}
-
-/// `first` in the colour `black`, then `second` in the other.
-inline void put_horizontal(BitWriter& writer, unsigned black, std::uint32_t first, std::uint32_t second) {
-  const RunCodes &codes = kRunCodes[black], &other = kRunCodes[black ^ 1];
-  if ((first | second) < kLongestMakeUp) [[likely]] {
-    const RunWord one = run_word(codes, first), two = run_word(other, second);
-    const std::uint64_t bits = (std::uint64_t{kHorizontal.bits()} << one.length | one.bits) << two.length | two.bits;
-    writer.put(bits, kHorizontal.length() + one.length + two.length);
-  } else {
-    writer.put(kHorizontal);
-    writer = put_long_run(put_long_run(writer, codes, first), other, second);
-  }
 }
 
 using FourInts [[gnu::vector_size(16)]] = std::int32_t;
@@ -145,13 +118,16 @@ inline std::uint32_t put_in_step(BitWriter& writer, const std::uint32_t* a, cons
   return done;
 }
 
-/// One row; `a` and `b` point to the first changes of the row and of the one above, in scratch rows.
+/// One row from its change number `done` on; `a` and `b` point to the first changes of the row and of the one above, in scratch
+/// rows. Those before are coded, and b[done] is b1 then.
 /// Names as in T.6: a0 is where coding stands, a[0] is a1, b[0] is b1. a and b move in step, so that both are at
 /// changes to black or both at changes to white.
 /// The writer is a value: what it writes are bytes, which might be its own if anybody had its address.
-BitWriter put_row(BitWriter writer, const std::uint32_t* a, const std::uint32_t* b, std::uint32_t columns) {
+BitWriter put_row(BitWriter writer, const std::uint32_t* a, const std::uint32_t* b, std::uint32_t done, std::uint32_t columns) {
   const std::uint32_t* const a_start = a;
-  std::uint32_t a0 = 0;
+  a += done;
+  b += done;
+  std::uint32_t a0 = a[-1];
   for (;;) {
     const std::uint32_t in_step = put_in_step(writer, a, b, columns);
     a += in_step;
@@ -237,7 +213,21 @@ std::uint32_t put_few_rows(BitWriter& writer, const RunsView& runs, std::uint32_
   return r;
 }
 
+/// Rows from `r` on that have as many changes as that one, as many as need little room.
+SteadyRows steady_rows(const RunsView& runs, std::uint32_t r) {
+  constexpr std::size_t kRoom = 8192;
+  const std::uint32_t* const offset = runs.row_offset.data();
+  const std::uint32_t changes = offset[r + 1] - offset[r];
+  const auto most =
+      static_cast<std::uint32_t>(std::min<std::size_t>(kRoom / most_bytes(changes, changes, runs.columns), runs.rows() - r));
+  std::uint32_t end = r + 1;
+  while (end < r + most && offset[end + 1] - offset[end] == changes) ++end;
+  return {runs.change.data() + offset[r], changes, end - r, runs.columns};
+}
+
 }  // namespace
+
+Encoder::Encoder(Isa isa) : body_(steps_body(isa_at_most(isa))) {}
 
 std::size_t Encoder::encode(const RunsView& runs, Buffer<std::byte>& file, std::size_t start) {
   const std::uint32_t columns = runs.columns, rows = runs.rows();
@@ -254,8 +244,23 @@ std::size_t Encoder::encode(const RunsView& runs, Buffer<std::byte>& file, std::
   copy_row(above, columns, reference_);
   bool copied = true;  // reference_ holds `above`
   for (std::uint32_t r = 0; r < rows;) {
-    const std::span<const std::uint32_t> row = runs.row(r);
-    if (row.size() == above.size() && row.size() - 1 < kFewChanges) {
+    std::span<const std::uint32_t> row = runs.row(r);
+    std::uint32_t coded = 0;  // changes of the row
+    const bool same = row.size() > kFewChanges && is_same(row, above);
+    if (body_ != nullptr && row.size() == above.size() && row.size() - 1 < body_->most_changes && !same) {
+      const SteadyRows steady = steady_rows(runs, r);
+      make_room(steady.rows * most_bytes(row.size(), row.size(), columns));
+      const std::uint32_t done = put_steady_rows(writer, steady, *body_);
+      const std::uint32_t whole = done / steady.changes;
+      coded = done - whole * steady.changes;
+      if (whole != 0) {
+        copied = false;
+        r += whole;
+        above = runs.row(r - 1);
+        if (whole == steady.rows) continue;
+        row = runs.row(r);
+      }
+    } else if (row.size() == above.size() && row.size() - 1 < kFewChanges) {
       make_room(kFewRowsBytes);
       const std::uint32_t next = put_few_rows(writer, runs, r);
       if (next != r) {
@@ -265,7 +270,7 @@ std::size_t Encoder::encode(const RunsView& runs, Buffer<std::byte>& file, std::
         continue;
       }
     }
-    if (is_same(row, above)) {
+    if (coded == 0 && (same || is_same(row, above))) {
       const std::uint32_t next = row.empty() ? end_of_empty_rows(runs.row_offset, r) : r + 1;
       const std::uint64_t ones = changes_to_code(row, columns) * (next - r);
       make_room(ones / 8 + 64);
@@ -277,7 +282,7 @@ std::size_t Encoder::encode(const RunsView& runs, Buffer<std::byte>& file, std::
     if (!copied) copy_row(above, columns, reference_);
     copied = true;
     copy_row(row, columns, coding_);
-    writer = put_row(writer, coding_.data() + kHead, reference_.data() + kHead, columns);
+    writer = put_row(writer, coding_.data() + kHead, reference_.data() + kHead, coded, columns);
     std::swap(coding_, reference_);
     above = row;
     ++r;

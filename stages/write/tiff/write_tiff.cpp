@@ -101,6 +101,8 @@ Status finish(TiffHandle tiff, bool strips_written, MemoryFile& memory, const Ru
 
 class G4Encoder : public TiffEncoder {
  public:
+  void use(Isa isa) override { encoder_ = g4::Encoder(isa); }
+
   Status encode(const RunsView& runs, double dpi_x, double dpi_y, Bytes& file) override {
     if (Status status = check_size(runs); !status) return status;
     file.resize(file.capacity());
