@@ -1,47 +1,72 @@
 #include "stages/raster/cut_clusters.h"
 
-namespace lamina::raster {
+#include <algorithm>
 
-/// A mesh is larger than the caches, so clusters are fetched early, and what they name as soon as it is found: it is gathered
-/// when many facets are. Fetched are the first corners of as many facets as most clusters have: no processor foresees the end
-/// of a loop over those that there are.
+namespace lamina::raster {
+namespace {
+
+constexpr std::size_t kAhead = 8, kLine = 64;  // visits, bytes
+
+/// Visits from the first on to clusters of one block (mesh_blocks.h).
+std::size_t visits_of_block(std::span<const PlacedMesh> placed, std::span<const ClusterVisit> visits) {
+  constexpr std::uint32_t kClusters = MeshBlocks::kClusters;
+  const ClusterVisit first = visits.front();
+  const std::uint32_t first_cap = placed[first.instance].mesh->first_cap;
+  const bool is_cap = first.cluster >= first_cap;
+  const std::uint32_t before = is_cap ? first_cap : 0;
+  const std::uint32_t begin = before + (first.cluster - before) / kClusters * kClusters;
+  const std::uint32_t size = is_cap ? kClusters : std::min(kClusters, first_cap - begin);
+  std::size_t count = 1;
+  while (count < visits.size() && visits[count].instance == first.instance && visits[count].cluster - begin < size) ++count;
+  return count;
+}
+
+}  // namespace
+
+/// A mesh is larger than the caches, so clusters are fetched early, those of a block while those of the block before are
+/// looked at.
 void cut_clusters(const Kernels& kernels, const PixelSampling& sampling, std::span<const PlacedMesh> placed,
                   std::span<const ClusterVisit> visits, Nm plane, std::uint32_t first_row, std::uint32_t last_row,
                   Segments& out) {
-  constexpr std::size_t kAhead = 8, kLine = 64;  // clusters, bytes
-  constexpr std::uint32_t kCorners = kClusterSize / 2;
+  const CutTask task{sampling, plane, first_row, last_row, out};
   FoundFacets found;
   CutFacets facets;
   std::uint32_t instance = 0;  // of those found
-  const auto cut = [&] { kernels.cut(sampling, facets, plane, first_row, last_row, out); };
-  const auto gather = [&] {
-    if (found.size == 0) return;
-    if (facets.size + found.size > CutFacets::kRoom) cut();
-    kernels.gather(found, instance, placed[instance].offset, plane, facets);
+  const auto cut_found = [&] {
+    if (found.size > 0) kernels.cut_found(task, instance, placed[instance].offset, found);
   };
-  for (std::size_t i = 0; i < visits.size(); ++i) {
-    if (i + kAhead < visits.size()) {
-      const ClusterVisit& later = visits[i + kAhead];
-      const std::span<const char> stored = placed[later.instance].mesh->stored(later.cluster);
-      for (std::size_t line = 0; line < stored.size(); line += kLine) __builtin_prefetch(stored.data() + line);
-    }
+  const auto fetch = [&](std::size_t i) __attribute__((always_inline)) {
+    if (i >= visits.size()) return;
+    const std::span<const char> stored = placed[visits[i].instance].mesh->stored(visits[i].cluster);
+    for (std::size_t line = 0; line < stored.size(); line += kLine) __builtin_prefetch(stored.data() + line);
+  };
+  for (std::size_t i = 0; i < visits.size();) {
     const ClusterVisit visit = visits[i];
     const PlacedMesh& source = placed[visit.instance];
-    const std::uint32_t first_facet = visit.cluster * kClusterSize;
     const MeshBlocks::Indexed indexed = source.mesh->indexed(visit.cluster);
     if (indexed.cluster == nullptr) {
-      if (facets.is_full()) cut();
-      kernels.gather_listed({&source.mesh->listed(visit.cluster), first_facet, visit.instance, source.offset}, plane, facets);
+      fetch(i + kAhead);
+      if (facets.is_full()) kernels.cut(task, facets);
+      kernels.gather_listed({&source.mesh->listed(visit.cluster), visit.cluster * kClusterSize, visit.instance, source.offset},
+                            plane, facets);
+      ++i;
       continue;
     }
-    if (found.is_full() || visit.instance != instance) gather();
+    std::span<const ClusterVisit> of_block = visits.subspan(i, visits_of_block(placed, visits.subspan(i)));
+    i += of_block.size();
+    for (std::size_t k = 0; k < kAhead; ++k) fetch(i + k);
+    if (visit.instance != instance || !found.reaches(indexed.vertex)) cut_found();
     instance = visit.instance;
-    const std::uint32_t first = found.size;
-    kernels.find({indexed.cluster, indexed.vertex, first_facet, indexed.step_of(std::int64_t{plane} - source.offset.z)}, found);
-    for (std::uint32_t k = first; k < first + kCorners; ++k) __builtin_prefetch(found.table[k] + found.corner[0][k]);
+    found.reaches(indexed.vertex);
+    const IndexedSource block{indexed.cluster, visit.cluster, indexed.vertex,
+                              indexed.step_of(std::int64_t{plane} - source.offset.z)};
+    while (!of_block.empty()) {
+      if (found.is_full()) cut_found(), found.reaches(indexed.vertex);
+      of_block = of_block.subspan(kernels.find(block, of_block, found));
+    }
   }
-  gather();
-  cut();
+  cut_found();
+  kernels.cut(task, facets);
 }
 
 }  // namespace lamina::raster

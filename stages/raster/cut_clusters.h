@@ -10,7 +10,7 @@
 namespace lamina::raster {
 
 /// Appends the segments of the clusters' facets in geometry rows [first_row, last_row) at height `plane`, nm on the bed.
-/// out  needs room for as many and CutFacets::kRoom + kClusterSize more, else it grows
+/// out  needs room for as many as there are facets that the plane cuts and kClusterSize more, else it grows
 void cut_clusters(const Kernels& kernels, const PixelSampling& sampling, std::span<const PlacedMesh> placed,
                   std::span<const ClusterVisit> visits, Nm plane, std::uint32_t first_row, std::uint32_t last_row,
                   Segments& out);

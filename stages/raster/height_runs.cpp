@@ -71,7 +71,7 @@ void HeightRuns::Group::join(std::size_t lane, const Group& group) {
   y_last[lane] = std::ranges::max(group.y_last);
 }
 
-std::uint32_t HeightRuns::lanes_met(const Group& group, const Search& search) {
+inline std::uint32_t HeightRuns::lanes_met(const Group& group, const Search& search) {
 #if defined(__SSE2__)
   // Differences of unsigned numbers that stop at zero: a <= b exactly if a - b does.
   const auto all = [](std::uint16_t value) { return _mm_set1_epi16(static_cast<short>(value)); };
@@ -111,8 +111,14 @@ void HeightRuns::find_clusters(std::uint32_t run, std::int64_t plane, std::int64
   const Search search{step_of(plane - box.lo.z, shift_for(box.height())),
                       step_of(std::max<std::int64_t>(0, low - box.lo.y), y_shift),
                       step_of(std::min(box.depth(), high - box.lo.y), y_shift), low <= box.lo.y && high >= box.hi.y};
-  const std::uint32_t first = run * (kRun / kLanes);
-  for (std::uint32_t groups = lanes_met(tops_[run], search); groups != 0; groups &= groups - 1) {
+  const std::uint32_t first = run * (kRun / kLanes), met = lanes_met(tops_[run], search);
+  for (std::uint32_t groups = met; groups != 0; groups &= groups - 1) {  // no cache holds the tables of a large mesh
+    const auto* const group =
+        reinterpret_cast<const char*>(&groups_[first + static_cast<std::uint32_t>(std::countr_zero(groups))]);
+    __builtin_prefetch(group);
+    __builtin_prefetch(group + sizeof(Group) / 2);
+  }
+  for (std::uint32_t groups = met; groups != 0; groups &= groups - 1) {
     const std::uint32_t number = first + static_cast<std::uint32_t>(std::countr_zero(groups));
     const Group& group = groups_[number];
     for (std::uint32_t lanes = lanes_met(group, search); lanes != 0; lanes &= lanes - 1) {

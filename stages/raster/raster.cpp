@@ -24,7 +24,7 @@ constexpr std::uint64_t kBandCrossings = 1 << 17;
 constexpr std::size_t kMostClusters = 1 << 16;
 
 /// Segments that a kernel may write behind those of a layer.
-constexpr std::uint64_t kMoreSegments = CutFacets::kRoom + kClusterSize;
+constexpr std::uint64_t kMoreSegments = kClusterSize;
 
 /// Elements that a buffer for `count` of them gets: an eighth more, so that layers that need ever more move it rarely.
 std::uint64_t with_spare(std::uint64_t count) { return count + count / 8; }

@@ -13,11 +13,6 @@
 
 namespace lamina::raster {
 
-/// What an engine finds: a cluster that a plane may cut.
-struct ClusterVisit {
-  std::uint32_t cluster;   // in its mesh
-  std::uint32_t instance;  // in the scene
-};
 using ClusterVisits = Buffer<ClusterVisit>;
 
 /// What a layer told besides its runs.

@@ -1,4 +1,4 @@
-// Cutting with AVX-512: facets are found 16 at a time and cut eight at a time.
+// Cutting with AVX-512: facets are found and cut 16 at a time, doubles eight at a time.
 //
 // The bits are those of plain::cut(): corners are moved, and the same operations of IEEE 754 are done in the same order in
 // each lane; ends near a whole number go to the same integers.
@@ -21,26 +21,29 @@ namespace lamina::raster::avx512 {
 namespace {
 
 LAMINA_INLINE __m256i load8(const void* at) { return _mm256_loadu_si256(static_cast<const __m256i*>(at)); }
+LAMINA_INLINE __m512i load16(const void* at) { return _mm512_loadu_si512(at); }
 
-/// What turns the facets of a cluster: those that the plane crosses, and which of them have corner 1 or 2 as tip.
+/// What turns 16 facets: those that the plane crosses, and which of them have corner 1 or 2 as tip.
 struct Turns {
   __mmask16 crossed, tip_is_1, tip_is_2;
+  LAMINA_INLINE __m512i tip(__m512i a, __m512i b, __m512i c) const {
+    return _mm512_mask_mov_epi32(_mm512_mask_mov_epi32(a, tip_is_1, b), tip_is_2, c);
+  }
 };
-
-/// One coordinate of tip, left and right, of the facets that are crossed.
-LAMINA_INLINE void put_coordinate(const Turns& turn, __m512i a, __m512i b, __m512i c, Nm offset, Nm* tip, Nm* left, Nm* right) {
-  const auto put = [&](__m512i if_0, __m512i if_1, __m512i if_2, Nm* at) LAMINA_AVX512 {
-    const __m512i turned = _mm512_mask_mov_epi32(_mm512_mask_mov_epi32(if_0, turn.tip_is_1, if_1), turn.tip_is_2, if_2);
-    _mm512_storeu_si512(at, _mm512_add_epi32(_mm512_maskz_compress_epi32(turn.crossed, turned), _mm512_set1_epi32(offset)));
-  };
-  put(a, b, c, tip);
-  put(b, c, a, left);
-  put(c, a, b, right);
+LAMINA_INLINE Turns turns_of(__m512i a_z, __m512i b_z, __m512i c_z, __m512i plane) {
+  const unsigned a = _mm512_cmpgt_epi32_mask(a_z, plane), b = _mm512_cmpgt_epi32_mask(b_z, plane),
+                 c = _mm512_cmpgt_epi32_mask(c_z, plane);
+  const unsigned a_b = a ^ b, a_c = a ^ c;
+  return {static_cast<__mmask16>(a_b | a_c), static_cast<__mmask16>(a_b & ~a_c), static_cast<__mmask16>(~a_b)};
 }
-LAMINA_INLINE void put_coordinate(const Turns& turn, const Nm (&corner)[3][kClusterSize], Nm offset, Nm* tip, Nm* left,
-                                  Nm* right) {
-  put_coordinate(turn, _mm512_loadu_si512(corner[0]), _mm512_loadu_si512(corner[1]), _mm512_loadu_si512(corner[2]), offset, tip,
-                 left, right);
+
+/// One coordinate of 16 facets, turned.
+struct Turned {
+  __m512i tip, left, right;  // edges from the tip
+};
+LAMINA_INLINE Turned turned(const Turns& turn, __m512i a, __m512i b, __m512i c) {
+  const __m512i tip = turn.tip(a, b, c);
+  return {tip, _mm512_sub_epi32(turn.tip(b, c, a), tip), _mm512_sub_epi32(turn.tip(c, a, b), tip)};
 }
 
 /// 16 points, coordinate by coordinate.
@@ -50,13 +53,12 @@ struct Points {
 
 /// Corner k of 16 facets: four loads for each quarter of the registers, which are then turned from rows into columns. A gather
 /// of each coordinate would be three loads a corner.
-LAMINA_INLINE Points corners_at(const Nm* const* table, const std::uint32_t* corner) {
+LAMINA_INLINE Points corners_at(const Nm* base, const std::int32_t* corner) {
+  const auto at = [&](std::uint32_t k)
+                      LAMINA_AVX512 { return _mm_loadu_si128(reinterpret_cast<const __m128i*>(base + corner[k])); };
   const auto four = [&](std::uint32_t i) LAMINA_AVX512 {
-    const auto at = [&](std::uint32_t k)
-                        LAMINA_AVX512 { return _mm_loadu_si128(reinterpret_cast<const __m128i*>(table[k] + corner[k])); };
-    const __m256i low = _mm256_inserti128_si256(_mm256_castsi128_si256(at(i)), at(i + 4), 1);
-    const __m256i high = _mm256_inserti128_si256(_mm256_castsi128_si256(at(i + 8)), at(i + 12), 1);
-    return _mm512_inserti64x4(_mm512_castsi256_si512(low), high, 1);
+    const __m512i two = _mm512_inserti32x4(_mm512_castsi128_si512(at(i)), at(i + 4), 1);
+    return _mm512_inserti32x4(_mm512_inserti32x4(two, at(i + 8), 2), at(i + 12), 3);
   };
   const __m512i a = four(0), b = four(1), c = four(2), d = four(3);
   const __m512i xy_ab = _mm512_unpacklo_epi32(a, b), xy_cd = _mm512_unpacklo_epi32(c, d);
@@ -64,156 +66,235 @@ LAMINA_INLINE Points corners_at(const Nm* const* table, const std::uint32_t* cor
   return {_mm512_unpacklo_epi64(xy_ab, xy_cd), _mm512_unpackhi_epi64(xy_ab, xy_cd), _mm512_unpacklo_epi64(z_ab, z_cd)};
 }
 
-/// The rows of eight ends at y, which lie on the edges from the tips to `other`.
-LAMINA_INLINE __m256i end_rows(const PixelSampling& sampling, const CutFacets& facets, const CutFacets::Corner& other,
-                               std::uint32_t i, __mmask8 live, Nm plane, __m512d y) {
-  const __m512d guess =
-      _mm512_add_pd(_mm512_add_pd(_mm512_mul_pd(y, _mm512_set1_pd(sampling.rows_per_nm)), _mm512_set1_pd(0.5)),
-                    _mm512_set1_pd(sampling.near_y));
+/// Numbers of 16 facets (CutFacets::Number), each kStride behind the one before.
+template <std::uint32_t kStride>
+struct Sixteen {
+  const Nm* number;
+  LAMINA_INLINE const Nm* at(std::uint32_t which) const { return number + which * kStride; }
+  LAMINA_INLINE __m512i whole(std::uint32_t which) const { return _mm512_loadu_si512(at(which)); }
+  LAMINA_INLINE __m512d real(std::uint32_t which, std::uint32_t first) const {
+    return _mm512_cvtepi32_pd(load8(at(which) + first));
+  }
+};
+
+/// What all facets of a task share, and where the next segment goes: kept in registers, since what is written could be anything
+/// for all that compilers know.
+struct Cutter {
+  const PixelSampling& sampling;
+  double *column, *columns_per_nm;
+  SegmentRows* rows;
+  SegmentOrigin* origin;
+  std::size_t to;
+  __m512d rows_in_nm, row_shift, near_rows, columns_in_nm, column_shift;
+  __m512i row_begin, row_end;
+};
+LAMINA_INLINE Cutter cutter_for(const CutTask& task) {
+  const PixelSampling& sampling = task.sampling;
+  Segments& out = task.out;
+  return {sampling,
+          out.column.data(),
+          out.columns_per_nm.data(),
+          out.rows.data(),
+          out.origin.data(),
+          out.size,
+          _mm512_set1_pd(sampling.rows_per_nm),
+          _mm512_set1_pd(0.5 + sampling.near_y),
+          _mm512_set1_pd(2 * sampling.near_y),
+          _mm512_set1_pd(sampling.columns_per_nm),
+          _mm512_set1_pd(0.5 + sampling.near_x),
+          _mm512_set1_epi32(static_cast<int>(task.row_begin)),
+          _mm512_set1_epi32(static_cast<int>(task.row_end))};
+}
+
+/// The rows of eight ends at y, which lie on the edges whose y and z follow `edge_x`.
+template <std::uint32_t kStride>
+LAMINA_INLINE __m256i end_rows(const Cutter& cutter, Sixteen<kStride> of, std::uint32_t edge_x, std::uint32_t i, __mmask8 live,
+                               __m512d y) {
+  const __m512d guess = _mm512_add_pd(_mm512_mul_pd(y, cutter.rows_in_nm), cutter.row_shift);
   const __m256i row = _mm512_cvttpd_epi32(guess);
   const __m512d beyond = _mm512_sub_pd(guess, _mm512_cvtepi32_pd(row));
-  const __mmask8 near = _mm512_mask_cmp_pd_mask(live, beyond, _mm512_set1_pd(2 * sampling.near_y), _CMP_LT_OQ);
+  const __mmask8 near = _mm512_mask_cmp_pd_mask(live, beyond, cutter.near_rows, _CMP_LT_OQ);
   if (near == 0) [[likely]]
     return row;
   alignas(32) std::uint32_t rows[8];
   _mm256_store_si256(reinterpret_cast<__m256i*>(rows), row);
   for (std::uint32_t k = 0; k < 8; ++k) {
-    if ((near >> k & 1) != 0) rows[k] = exact_end(sampling, facets, other, i + k, plane);
+    if ((near >> k & 1) == 0) continue;
+    const auto number = [&](std::uint32_t which) LAMINA_AVX512 { return of.at(which)[i + k]; };
+    rows[k] =
+        exact_end(cutter.sampling, number(CutFacets::kTipY), number(CutFacets::kUp), number(edge_x + 1), number(edge_x + 2));
   }
   return _mm256_load_si256(reinterpret_cast<const __m256i*>(rows));
 }
 
-/// Where eight edges from the tips meet the plane, 0 to 1 and in y.
-struct Meetings {
-  __m512d share, y;
+/// Where the plane cuts eight facets.
+struct Cuts {
+  __m256i row, other_row;
+  __m512d column, columns_per_nm;
+  __mmask8 flat;
 };
-LAMINA_INLINE Meetings meet(__m512d up, __m256i edge_z, __m256i tip_y, __m256i edge_y) {
-  const __m512d share = _mm512_div_pd(up, _mm512_cvtepi32_pd(edge_z));
-  return {share, _mm512_add_pd(_mm512_cvtepi32_pd(tip_y), _mm512_mul_pd(share, _mm512_cvtepi32_pd(edge_y)))};
+template <std::uint32_t kStride>
+LAMINA_INLINE Cuts cut_eight(const Cutter& cutter, Sixteen<kStride> of, std::uint32_t i, __mmask8 live) {
+  const __m512d left_z = of.real(CutFacets::kLeftZ, i), right_z = of.real(CutFacets::kRightZ, i);
+  const __m512d share = _mm512_div_pd(of.real(CutFacets::kUp, i), _mm512_mul_pd(left_z, right_z));
+  const __m512d to_left = _mm512_mul_pd(share, right_z), to_right = _mm512_mul_pd(share, left_z);
+  const __m512d left_y = _mm512_mul_pd(to_left, of.real(CutFacets::kLeftY, i)),
+                right_y = _mm512_mul_pd(to_right, of.real(CutFacets::kRightY, i));
+  const __m512d left_x = _mm512_mul_pd(to_left, of.real(CutFacets::kLeftX, i)),
+                right_x = _mm512_mul_pd(to_right, of.real(CutFacets::kRightX, i));
+  const __m512d slope = _mm512_div_pd(_mm512_sub_pd(right_x, left_x), _mm512_sub_pd(right_y, left_y));
+  const __m512d tip_y = of.real(CutFacets::kTipY, i), y = _mm512_add_pd(tip_y, left_y);
+  const __m512d x = _mm512_sub_pd(_mm512_add_pd(of.real(CutFacets::kTipX, i), left_x), _mm512_mul_pd(slope, y));
+  return {end_rows(cutter, of, CutFacets::kLeftX, i, live, y),
+          end_rows(cutter, of, CutFacets::kRightX, i, live, _mm512_add_pd(tip_y, right_y)),
+          _mm512_add_pd(_mm512_mul_pd(x, cutter.columns_in_nm), cutter.column_shift),
+          _mm512_mul_pd(slope, cutter.columns_in_nm),
+          _mm512_cmp_pd_mask(_mm512_abs_pd(slope), _mm512_set1_pd(kSteepest), _CMP_NLE_UQ)};
 }
 
-/// Eight products of two whole numbers of 32 bits, less eight others.
-LAMINA_INLINE __m512i less(__m256i a, __m256i b, __m256i c, __m256i d) {
-  return _mm512_sub_epi64(_mm512_mul_epi32(_mm512_cvtepi32_epi64(a), _mm512_cvtepi32_epi64(b)),
-                          _mm512_mul_epi32(_mm512_cvtepi32_epi64(c), _mm512_cvtepi32_epi64(d)));
+LAMINA_INLINE __m512i both(__m256i low, __m256i high) { return _mm512_inserti64x4(_mm512_castsi256_si512(low), high, 1); }
+LAMINA_INLINE __m512i or_flag(__m512i word, __mmask16 where, std::uint32_t bit) {
+  return _mm512_mask_or_epi32(word, where, word, _mm512_set1_epi32(static_cast<int>(bit)));
+}
+/// 16 pairs of numbers.
+LAMINA_INLINE void put_pairs(void* to, __m512i first, __m512i second) {
+  const __m512i low = _mm512_set_epi32(23, 7, 22, 6, 21, 5, 20, 4, 19, 3, 18, 2, 17, 1, 16, 0);
+  const __m512i high = _mm512_add_epi32(low, _mm512_set1_epi32(8));
+  _mm512_storeu_si512(to, _mm512_permutex2var_epi32(first, low, second));
+  _mm512_storeu_si512(static_cast<__m512i*>(to) + 1, _mm512_permutex2var_epi32(first, high, second));
 }
 
-LAMINA_INLINE __m512i or_flag(__m512i word, __mmask8 where, std::uint32_t bit) {
-  return _mm512_mask_or_epi64(word, where, word, _mm512_set1_epi64(static_cast<long long>(std::uint64_t{bit} << 32)));
+/// Appends the segments of the live ones of 16 facets; room is there.
+template <std::uint32_t kStride>
+LAMINA_INLINE void cut_sixteen(Cutter& cutter, Sixteen<kStride> of, __mmask16 live, __m512i facet, __m512i instance) {
+  const Cuts low = cut_eight(cutter, of, 0, static_cast<__mmask8>(live)),
+             high = cut_eight(cutter, of, 8, static_cast<__mmask8>(live >> 8));
+  const __m512i row = both(low.row, high.row), other_row = both(low.other_row, high.other_row);
+  const __m512i first = _mm512_max_epi32(_mm512_min_epi32(row, other_row), cutter.row_begin);
+  const __m512i last = _mm512_min_epi32(_mm512_max_epi32(row, other_row), cutter.row_end);
+  const unsigned valid = _mm512_mask_cmplt_epi32_mask(live, first, last);
+
+  const __m512i down = _mm512_xor_si512(_mm512_sub_epi32(row, other_row), of.whole(CutFacets::kLeftZ));
+  const __m512i edges_x = _mm512_or_si512(of.whole(CutFacets::kLeftX), of.whole(CutFacets::kRightX));
+  __m512i count = _mm512_or_si512(_mm512_slli_epi32(_mm512_sub_epi32(last, first), SegmentRows::kFlagBits),
+                                  _mm512_srli_epi32(down, 31));  // SegmentRows::kEnters
+  count = or_flag(count, _mm512_testn_epi32_mask(edges_x, edges_x), SegmentRows::kUpright);
+  count = or_flag(count, static_cast<__mmask16>(low.flat | high.flat << 8), SegmentRows::kExact);
+
+  const auto to_low = static_cast<__mmask8>(valid), to_high = static_cast<__mmask8>(valid >> 8);
+  const std::size_t to = cutter.to, middle = to + static_cast<std::size_t>(std::popcount(valid & 255));
+  const auto put = [&](double* at, __m512d if_low, __m512d if_high) LAMINA_AVX512 {
+    _mm512_storeu_pd(at + to, _mm512_maskz_compress_pd(to_low, if_low));
+    _mm512_storeu_pd(at + middle, _mm512_maskz_compress_pd(to_high, if_high));
+  };
+  put(cutter.column, low.column, high.column);
+  put(cutter.columns_per_nm, low.columns_per_nm, high.columns_per_nm);
+  const auto compressed = [&](__m512i v)
+                              LAMINA_AVX512 { return _mm512_maskz_compress_epi32(static_cast<__mmask16>(valid), v); };
+  put_pairs(cutter.rows + to, compressed(first), compressed(count));
+  put_pairs(cutter.origin + to, compressed(facet), compressed(instance));
+  cutter.to = to + static_cast<std::size_t>(std::popcount(valid));
 }
 
 }  // namespace
 
-void find(const IndexedSource& source, FoundFacets& found) {
-  const IndexedCluster& cluster = *source.cluster;
+std::size_t find(const IndexedSource& source, std::span<const ClusterVisit> visits, FoundFacets& found) {
   const auto sixteen = [](const std::uint8_t* bytes)
                            LAMINA_AVX512 { return _mm_load_si128(reinterpret_cast<const __m128i*>(bytes)); };
-  const __m128i up = _mm_sub_epi8(_mm_set1_epi8(static_cast<char>(source.step)), sixteen(cluster.steps.low));
-  const __mmask16 met = _mm_cmple_epu8_mask(up, sixteen(cluster.steps.span));
-  const std::uint32_t n = found.size;
-  for (std::uint32_t k = 0; k < 3; ++k) {
-    const __m512i number = _mm512_maskz_compress_epi32(met, _mm512_cvtepu16_epi32(load8(cluster.corner[k])));
-    _mm512_storeu_si512(found.corner[k] + n, _mm512_add_epi32(number, _mm512_add_epi32(number, number)));
-  }
+  const __m128i step = _mm_set1_epi8(static_cast<char>(source.step));
   const __m512i lanes = _mm512_set_epi32(15, 14, 13, 12, 11, 10, 9, 8, 7, 6, 5, 4, 3, 2, 1, 0);
-  _mm512_storeu_si512(found.facet + n, _mm512_add_epi32(_mm512_maskz_compress_epi32(met, lanes),
-                                                        _mm512_set1_epi32(static_cast<int>(source.first_facet))));
-  const __m512i table = _mm512_set1_epi64(reinterpret_cast<long long>(source.vertex));
-  _mm512_storeu_si512(found.table + n, table);
-  _mm512_storeu_si512(found.table + n + 8, table);
-  found.size = n + static_cast<std::uint32_t>(std::popcount(static_cast<unsigned>(met)));
+  const __m512i first = _mm512_set1_epi32(found.first_of(source.vertex));
+  std::uint32_t n = found.size;
+  std::size_t i = 0;
+  for (; i < visits.size() && n <= FoundFacets::kRoom - kClusterSize; ++i) {
+    const IndexedCluster& cluster = source.at(visits[i]);
+    const __mmask16 met = _mm_cmple_epu8_mask(_mm_sub_epi8(step, sixteen(cluster.steps.low)), sixteen(cluster.steps.span));
+    for (std::uint32_t k = 0; k < 3; ++k) {
+      const __m512i number = _mm512_maskz_compress_epi32(met, _mm512_cvtepu16_epi32(load8(cluster.corner[k])));
+      const __m512i place = _mm512_add_epi32(_mm512_madd_epi16(number, _mm512_set1_epi32(3)), first);  // number < 2^15
+      _mm512_storeu_si512(found.corner[k] + n, place);
+    }
+    _mm512_storeu_si512(found.facet + n,
+                        _mm512_add_epi32(_mm512_maskz_compress_epi32(met, lanes),
+                                         _mm512_set1_epi32(static_cast<int>(visits[i].cluster * kClusterSize))));
+    for (std::uint32_t k = n; k < n + kCornersAhead; ++k) __builtin_prefetch(found.base + found.corner[0][k]);
+    n += static_cast<std::uint32_t>(std::popcount(static_cast<unsigned>(met)));
+  }
+  found.size = n;
+  return i;
 }
 
-void gather(FoundFacets& found, std::uint32_t instance, const Point3& offset, Nm plane, CutFacets& facets) {
-  const __m512i z = _mm512_set1_epi32(plane_in_mesh(plane, offset));
-  for (auto& corner : found.corner) _mm512_storeu_si512(corner + found.size, _mm512_setzero_si512());
-  std::fill_n(found.table + found.size, kClusterSize, found.table[0]);  // whole registers are read
-  std::uint32_t n = facets.size;
+void cut_found(const CutTask& task, std::uint32_t instance, const Point3& offset, FoundFacets& found) {
+  CutFacets facets;
+  __mmask16 crossed[CutFacets::kRoom / kClusterSize];
+  std::uint32_t count = 0;
+  for (auto& corner : found.corner) _mm512_storeu_si512(corner + found.size, _mm512_setzero_si512());  // whole registers
+  const __m512i z = _mm512_set1_epi32(plane_in_mesh(task.plane, offset));
   for (std::uint32_t i = 0; i < found.size; i += kClusterSize) {
     const unsigned live = found.size - i >= kClusterSize ? 0xFFFFu : (1u << (found.size - i)) - 1;
-    const Points p = corners_at(found.table + i, found.corner[0] + i), q = corners_at(found.table + i, found.corner[1] + i),
-                 r = corners_at(found.table + i, found.corner[2] + i);
-    const unsigned a = _mm512_cmpgt_epi32_mask(p.z, z), b = _mm512_cmpgt_epi32_mask(q.z, z),
-                   c = _mm512_cmpgt_epi32_mask(r.z, z);
-    const unsigned a_b = a ^ b, a_c = a ^ c, crossed = (a_b | a_c) & live;
-    const Turns turn{static_cast<__mmask16>(crossed), static_cast<__mmask16>(a_b & ~a_c), static_cast<__mmask16>(~a_b)};
-    put_coordinate(turn, p.z, q.z, r.z, offset.z, facets.tip.z + n, facets.left.z + n, facets.right.z + n);
-    put_coordinate(turn, p.y, q.y, r.y, offset.y, facets.tip.y + n, facets.left.y + n, facets.right.y + n);
-    put_coordinate(turn, p.x, q.x, r.x, offset.x, facets.tip.x + n, facets.left.x + n, facets.right.x + n);
-    _mm512_storeu_si512(facets.facet + n, _mm512_maskz_compress_epi32(turn.crossed, _mm512_loadu_si512(found.facet + i)));
-    _mm512_storeu_si512(facets.instance + n, _mm512_set1_epi32(static_cast<int>(instance)));
-    n += static_cast<std::uint32_t>(std::popcount(crossed));
+    const Points p = corners_at(found.base, found.corner[0] + i), q = corners_at(found.base, found.corner[1] + i),
+                 r = corners_at(found.base, found.corner[2] + i);
+    const Turns turn = turns_of(p.z, q.z, r.z, z);
+    crossed[i / kClusterSize] = static_cast<__mmask16>(turn.crossed & live);
+    count += static_cast<std::uint32_t>(std::popcount(turn.crossed & live));
+    const auto put = [&](std::uint32_t which, __m512i v) LAMINA_AVX512 { _mm512_store_si512(facets.number[which] + i, v); };
+    const Turned in_z = turned(turn, p.z, q.z, r.z);
+    put(CutFacets::kUp, _mm512_sub_epi32(z, in_z.tip));
+    put(CutFacets::kLeftZ, in_z.left), put(CutFacets::kRightZ, in_z.right);
+    const Turned in_y = turned(turn, p.y, q.y, r.y);
+    put(CutFacets::kTipY, _mm512_add_epi32(in_y.tip, _mm512_set1_epi32(offset.y)));
+    put(CutFacets::kLeftY, in_y.left), put(CutFacets::kRightY, in_y.right);
+    const Turned in_x = turned(turn, p.x, q.x, r.x);
+    put(CutFacets::kTipX, _mm512_add_epi32(in_x.tip, _mm512_set1_epi32(offset.x)));
+    put(CutFacets::kLeftX, in_x.left), put(CutFacets::kRightX, in_x.right);
   }
-  facets.size = n;
+  task.out.make_room(count + kClusterSize);  // 16 are written, whatever counts
+  const __m512i of_instance = _mm512_set1_epi32(static_cast<int>(instance));
+  Cutter cutter = cutter_for(task);
+  for (std::uint32_t i = 0; i < found.size; i += kClusterSize) {
+    cut_sixteen(cutter, Sixteen<CutFacets::kStride>{facets.number[0] + i}, crossed[i / kClusterSize],
+                _mm512_loadu_si512(found.facet + i), of_instance);
+  }
+  task.out.size = cutter.to;
   found.size = 0;
 }
 
 void gather_listed(const ListedSource& source, Nm plane, CutFacets& facets) {
   const Cluster& cluster = *source.cluster;
   const __m512i z = _mm512_set1_epi32(plane_in_mesh(plane, source.offset));
-  const unsigned a = _mm512_cmpgt_epi32_mask(_mm512_loadu_si512(cluster.z[0]), z),
-                 b = _mm512_cmpgt_epi32_mask(_mm512_loadu_si512(cluster.z[1]), z),
-                 c = _mm512_cmpgt_epi32_mask(_mm512_loadu_si512(cluster.z[2]), z);
-  const unsigned a_b = a ^ b, a_c = a ^ c, crossed = a_b | a_c;
-  if (crossed == 0) return;
-  const Turns turn{static_cast<__mmask16>(crossed), static_cast<__mmask16>(a_b & ~a_c), static_cast<__mmask16>(~a_b)};
+  const Turns turn = turns_of(load16(cluster.z[0]), load16(cluster.z[1]), load16(cluster.z[2]), z);
+  if (turn.crossed == 0) return;
   const std::uint32_t n = facets.size;
-  put_coordinate(turn, cluster.z, source.offset.z, facets.tip.z + n, facets.left.z + n, facets.right.z + n);
-  put_coordinate(turn, cluster.y, source.offset.y, facets.tip.y + n, facets.left.y + n, facets.right.y + n);
-  put_coordinate(turn, cluster.x, source.offset.x, facets.tip.x + n, facets.left.x + n, facets.right.x + n);
+  const auto put = [&](std::uint32_t which, __m512i v) LAMINA_AVX512 {
+    _mm512_storeu_si512(facets.number[which] + n, _mm512_maskz_compress_epi32(turn.crossed, v));
+  };
+  const auto put_turned = [&](const Nm(&of)[3][kClusterSize], std::uint32_t left, std::uint32_t right) LAMINA_AVX512 {
+    const Turned v = turned(turn, load16(of[0]), load16(of[1]), load16(of[2]));
+    put(left, v.left), put(right, v.right);
+    return v.tip;
+  };
+  put(CutFacets::kUp, _mm512_sub_epi32(z, put_turned(cluster.z, CutFacets::kLeftZ, CutFacets::kRightZ)));
+  put(CutFacets::kTipY,
+      _mm512_add_epi32(put_turned(cluster.y, CutFacets::kLeftY, CutFacets::kRightY), _mm512_set1_epi32(source.offset.y)));
+  put(CutFacets::kTipX,
+      _mm512_add_epi32(put_turned(cluster.x, CutFacets::kLeftX, CutFacets::kRightX), _mm512_set1_epi32(source.offset.x)));
   const __m512i lanes = _mm512_set_epi32(15, 14, 13, 12, 11, 10, 9, 8, 7, 6, 5, 4, 3, 2, 1, 0);
   _mm512_storeu_si512(facets.facet + n, _mm512_add_epi32(_mm512_maskz_compress_epi32(turn.crossed, lanes),
                                                          _mm512_set1_epi32(static_cast<int>(source.first_facet))));
   _mm512_storeu_si512(facets.instance + n, _mm512_set1_epi32(static_cast<int>(source.instance)));
-  facets.size = n + static_cast<std::uint32_t>(std::popcount(crossed));
+  facets.size = n + static_cast<std::uint32_t>(std::popcount(static_cast<unsigned>(turn.crossed)));
 }
 
-void cut(const PixelSampling& sampling, CutFacets& facets, Nm plane, std::uint32_t row_begin, std::uint32_t row_end,
-         Segments& out) {
-  out.make_room(facets.size + 8);  // eight are written, whatever counts
-  std::size_t to = out.size;
-  const __m512d columns_per_nm = _mm512_set1_pd(sampling.columns_per_nm);
-  for (std::uint32_t i = 0; i < facets.size; i += 8) {
-    const auto live = static_cast<__mmask8>(facets.size - i >= 8 ? 255u : (1u << (facets.size - i)) - 1);
-    const __m256i tip_x = load8(facets.tip.x + i), tip_y = load8(facets.tip.y + i), tip_z = load8(facets.tip.z + i);
-    const __m256i ux = _mm256_sub_epi32(load8(facets.left.x + i), tip_x),
-                  uy = _mm256_sub_epi32(load8(facets.left.y + i), tip_y),
-                  uz = _mm256_sub_epi32(load8(facets.left.z + i), tip_z),
-                  vx = _mm256_sub_epi32(load8(facets.right.x + i), tip_x),
-                  vy = _mm256_sub_epi32(load8(facets.right.y + i), tip_y),
-                  vz = _mm256_sub_epi32(load8(facets.right.z + i), tip_z);
-    const __m512d up = _mm512_cvtepi32_pd(_mm256_sub_epi32(_mm256_set1_epi32(plane), tip_z));
-    const Meetings left = meet(up, uz, tip_y, uy), right = meet(up, vz, tip_y, vy);
-    const __m256i row = end_rows(sampling, facets, facets.left, i, live, plane, left.y);
-    const __m256i other_row = end_rows(sampling, facets, facets.right, i, live, plane, right.y);
-    const __m256i first = _mm256_max_epi32(_mm256_min_epi32(row, other_row), _mm256_set1_epi32(static_cast<int>(row_begin)));
-    const __m256i last = _mm256_min_epi32(_mm256_max_epi32(row, other_row), _mm256_set1_epi32(static_cast<int>(row_end)));
-    const __mmask8 valid = _mm256_mask_cmplt_epi32_mask(live, first, last);
-
-    const __m512i nx = less(uy, vz, uz, vy), ny = less(uz, vx, ux, vz);
-    const __m512d slope = _mm512_div_pd(_mm512_xor_pd(_mm512_cvtepi64_pd(ny), _mm512_set1_pd(-0.0)), _mm512_cvtepi64_pd(nx));
-    const __m512d x = _mm512_sub_pd(_mm512_add_pd(_mm512_cvtepi32_pd(tip_x), _mm512_mul_pd(left.share, _mm512_cvtepi32_pd(ux))),
-                                    _mm512_mul_pd(slope, left.y));
-    const __m512d column =
-        _mm512_add_pd(_mm512_add_pd(_mm512_mul_pd(x, columns_per_nm), _mm512_set1_pd(0.5)), _mm512_set1_pd(sampling.near_x));
-    const __mmask8 flat = _mm512_cmp_pd_mask(_mm512_abs_pd(slope), _mm512_set1_pd(kSteepest), _CMP_NLE_UQ);
-
-    // One word a segment: its first row in the low half, count and flags in the high half.
-    __m512i rows =
-        _mm512_or_si512(_mm512_cvtepu32_epi64(first),
-                        _mm512_slli_epi64(_mm512_cvtepu32_epi64(_mm256_sub_epi32(last, first)), 32 + SegmentRows::kFlagBits));
-    rows = or_flag(rows, _mm512_movepi64_mask(nx), SegmentRows::kEnters);
-    rows = or_flag(rows, _mm512_testn_epi64_mask(ny, ny), SegmentRows::kUpright);
-    rows = or_flag(rows, flat, SegmentRows::kExact);
-    const __m512i origin = _mm512_or_si512(_mm512_cvtepu32_epi64(load8(facets.facet + i)),
-                                           _mm512_slli_epi64(_mm512_cvtepu32_epi64(load8(facets.instance + i)), 32));
-    _mm512_storeu_pd(out.column.data() + to, _mm512_maskz_compress_pd(valid, column));
-    _mm512_storeu_pd(out.columns_per_nm.data() + to, _mm512_maskz_compress_pd(valid, _mm512_mul_pd(slope, columns_per_nm)));
-    _mm512_storeu_si512(out.rows.data() + to, _mm512_maskz_compress_epi64(valid, rows));
-    _mm512_storeu_si512(out.origin.data() + to, _mm512_maskz_compress_epi64(valid, origin));
-    to += static_cast<std::size_t>(std::popcount(static_cast<unsigned>(valid)));
+void cut(const CutTask& task, CutFacets& facets) {
+  task.out.make_room(facets.size + kClusterSize);
+  Cutter cutter = cutter_for(task);
+  for (std::uint32_t i = 0; i < facets.size; i += kClusterSize) {
+    const unsigned live = facets.size - i >= kClusterSize ? 0xFFFFu : (1u << (facets.size - i)) - 1;
+    const __m512i instance = _mm512_loadu_si512(facets.instance + i);
+    cut_sixteen(cutter, Sixteen<CutFacets::kStride>{facets.number[0] + i}, static_cast<__mmask16>(live),
+                _mm512_loadu_si512(facets.facet + i), instance);
   }
-  out.size = to;
+  task.out.size = cutter.to;
   facets.size = 0;
 }
 

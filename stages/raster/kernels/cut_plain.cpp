@@ -60,26 +60,33 @@ std::uint32_t facets_met(const FacetSteps& steps, std::uint8_t step) {
 #endif
 }
 
-/// What floating point says of all facets: where their left edges meet the plane, and the rows that their ends begin.
+/// That of a facet which the plane does not cut may have no room in 32 bits; it is not used.
+Nm less(Nm a, Nm b) { return static_cast<Nm>(static_cast<std::uint32_t>(a) - static_cast<std::uint32_t>(b)); }
+
+/// What floating point says of all facets: the rows that their ends begin, and the lines through both.
 struct Ends {
-  double share[CutFacets::kRoom], y[CutFacets::kRoom];
   std::int32_t left[CutFacets::kRoom], right[CutFacets::kRoom];
+  double x[CutFacets::kRoom], slope[CutFacets::kRoom];  // nm, where y = 0
 };
 
 /// Loops so simple that compilers do two facets at once. An end near a whole number is decided in integers.
-void find_ends(const PixelSampling& sampling, const CutFacets& facets, Nm plane, Ends& ends) {
+void find_ends(const PixelSampling& sampling, const CutFacets& facets, Ends& ends) {
   const std::uint32_t size = facets.size;
   const double rows_per_nm = sampling.rows_per_nm, near = sampling.near_y;
-  const CutFacets::Corner &tip = facets.tip, &left = facets.left, &right = facets.right;
+  const auto& of = facets.number;
   double row[CutFacets::kRoom], other_row[CutFacets::kRoom];  // + 1 + near; no end lies before the bed
   for (std::uint32_t i = 0; i < size; ++i) {
-    const double up = plane - tip.z[i], tip_y = tip.y[i];
-    const double to_left = up / (left.z[i] - tip.z[i]), to_right = up / (right.z[i] - tip.z[i]);
-    const double y = tip_y + to_left * (left.y[i] - tip.y[i]), other_y = tip_y + to_right * (right.y[i] - tip.y[i]);
-    ends.share[i] = to_left;
-    ends.y[i] = y;
-    row[i] = y * rows_per_nm + 0.5 + near;
-    other_row[i] = other_y * rows_per_nm + 0.5 + near;
+    const double left_z = of[CutFacets::kLeftZ][i], right_z = of[CutFacets::kRightZ][i];
+    const double share = of[CutFacets::kUp][i] / (left_z * right_z);
+    const double to_left = share * right_z, to_right = share * left_z;
+    const double left_y = to_left * of[CutFacets::kLeftY][i], right_y = to_right * of[CutFacets::kRightY][i];
+    const double left_x = to_left * of[CutFacets::kLeftX][i], right_x = to_right * of[CutFacets::kRightX][i];
+    const double slope = (right_x - left_x) / (right_y - left_y);
+    const double tip_y = of[CutFacets::kTipY][i], y = tip_y + left_y;
+    ends.x[i] = (of[CutFacets::kTipX][i] + left_x) - slope * y;
+    ends.slope[i] = slope;
+    row[i] = y * rows_per_nm + (0.5 + near);
+    other_row[i] = (tip_y + right_y) * rows_per_nm + (0.5 + near);
   }
   for (std::uint32_t i = 0; i < size; ++i) {
     ends.left[i] = static_cast<std::int32_t>(row[i]);
@@ -90,100 +97,118 @@ void find_ends(const PixelSampling& sampling, const CutFacets& facets, Nm plane,
   bool any = false;
   for (std::uint32_t i = 0; i < size; ++i) any |= (row[i] < 2 * near) | (other_row[i] < 2 * near);
   if (!any) return;
+  const auto exact = [&](std::uint32_t i, std::uint32_t edge_x) {
+    return static_cast<std::int32_t>(
+        exact_end(sampling, of[CutFacets::kTipY][i], of[CutFacets::kUp][i], of[edge_x + 1][i], of[edge_x + 2][i]));
+  };
   for (std::uint32_t i = 0; i < size; ++i) {
-    if (row[i] < 2 * near) ends.left[i] = static_cast<std::int32_t>(exact_end(sampling, facets, left, i, plane));
-    if (other_row[i] < 2 * near) ends.right[i] = static_cast<std::int32_t>(exact_end(sampling, facets, right, i, plane));
+    if (row[i] < 2 * near) ends.left[i] = exact(i, CutFacets::kLeftX);
+    if (other_row[i] < 2 * near) ends.right[i] = exact(i, CutFacets::kRightX);
   }
 }
 
 }  // namespace
 
-void find(const IndexedSource& source, FoundFacets& found) {
-  const IndexedCluster& cluster = *source.cluster;
+std::size_t find(const IndexedSource& source, std::span<const ClusterVisit> visits, FoundFacets& found) {
+  const std::int32_t first = found.first_of(source.vertex);
   std::uint32_t i = found.size;
-  for (std::uint32_t lanes = facets_met(cluster.steps, source.step); lanes != 0; lanes &= lanes - 1) {
-    const auto lane = static_cast<std::uint32_t>(std::countr_zero(lanes));
-    found.table[i] = &source.vertex->x;
-    for (std::uint32_t k = 0; k < 3; ++k) found.corner[k][i] = 3u * cluster.corner[k][lane];
-    found.facet[i] = source.first_facet + lane;
-    ++i;
+  std::size_t taken = 0;
+  for (; taken < visits.size() && i <= FoundFacets::kRoom - kClusterSize; ++taken) {
+    const IndexedCluster& cluster = source.at(visits[taken]);
+    const std::uint32_t before = i;
+    for (std::uint32_t lanes = facets_met(cluster.steps, source.step); lanes != 0; lanes &= lanes - 1) {
+      const auto lane = static_cast<std::uint32_t>(std::countr_zero(lanes));
+      for (std::uint32_t k = 0; k < 3; ++k) found.corner[k][i] = first + 3 * std::int32_t{cluster.corner[k][lane]};
+      found.facet[i] = visits[taken].cluster * kClusterSize + lane;
+      ++i;
+    }
+    for (std::uint32_t k = before; k < before + kCornersAhead; ++k) __builtin_prefetch(found.base + found.corner[0][k]);
   }
   found.size = i;
+  return taken;
 }
 
-void gather(FoundFacets& found, std::uint32_t instance, const Point3& offset, Nm plane, CutFacets& facets) {
-  const Nm z = plane_in_mesh(plane, offset), offset_x = offset.x, offset_y = offset.y, offset_z = offset.z;
-  const auto put = [&](CutFacets::Corner& corner, std::uint32_t i, const Nm* xyz) {
-    corner.x[i] = xyz[0] + offset_x;
-    corner.y[i] = xyz[1] + offset_y;
-    corner.z[i] = xyz[2] + offset_z;
-  };
-  std::uint32_t to = facets.size;
+void cut_found(const CutTask& task, std::uint32_t instance, const Point3& offset, FoundFacets& found) {
+  CutFacets facets;
+  const Nm z = plane_in_mesh(task.plane, offset), offset_x = offset.x, offset_y = offset.y;
+  auto& of = facets.number;
+  std::uint32_t to = 0;
   for (std::uint32_t i = 0; i < found.size; ++i) {
-    const Nm* const table = found.table[i];
-    const Nm *const a = table + found.corner[0][i], *const b = table + found.corner[1][i],
-                    *const c = table + found.corner[2][i];
+    const Nm *const a = found.base + found.corner[0][i], *const b = found.base + found.corner[1][i],
+                    *const c = found.base + found.corner[2][i];
     const Nm* const corner[] = {a, b, c, a, b};
     const bool a_b = (a[2] > z) != (b[2] > z), a_c = (a[2] > z) != (c[2] > z);
-    const unsigned tip = a_b ? (a_c ? 0 : 1) : 2;
+    const unsigned turn = a_b ? (a_c ? 0 : 1) : 2;
+    const Nm *const tip = corner[turn], *const left = corner[turn + 1], *const right = corner[turn + 2];
     facets.facet[to] = found.facet[i];
     facets.instance[to] = instance;
-    put(facets.tip, to, corner[tip]);
-    put(facets.left, to, corner[tip + 1]);
-    put(facets.right, to, corner[tip + 2]);
+    of[CutFacets::kTipX][to] = tip[0] + offset_x;
+    of[CutFacets::kTipY][to] = tip[1] + offset_y;
+    of[CutFacets::kUp][to] = less(z, tip[2]);
+    for (std::uint32_t k = 0; k < 3; ++k) {
+      of[CutFacets::kLeftX + k][to] = less(left[k], tip[k]);
+      of[CutFacets::kRightX + k][to] = less(right[k], tip[k]);
+    }
     to += a_b || a_c ? 1 : 0;  // no processor foresees it, so all are written and those that are not cut written over
   }
   facets.size = to;
+  cut(task, facets);
   found.size = 0;
 }
 
 void gather_listed(const ListedSource& source, Nm plane, CutFacets& facets) {
   const Cluster& cluster = *source.cluster;
-  const Above above = corners_above(cluster, plane_in_mesh(plane, source.offset));
+  const Nm plane_z = plane_in_mesh(plane, source.offset), offset_x = source.offset.x, offset_y = source.offset.y;
+  const Above above = corners_above(cluster, plane_z);
   const auto* const coordinates = reinterpret_cast<const Nm*>(&cluster);  // three of z, three of y, three of x
   const std::uint32_t tip_is_1 = above.tip_is_1(), tip_is_2 = above.tip_is_2();
-  const Nm offset_x = source.offset.x, offset_y = source.offset.y, offset_z = source.offset.z;
-  const auto put = [&](CutFacets::Corner& corner, std::uint32_t i, std::uint32_t k, std::uint32_t lane) {
-    const Nm* const z = coordinates + k * kClusterSize + lane;
-    corner.z[i] = z[0] + offset_z;
-    corner.y[i] = z[3 * kClusterSize] + offset_y;
-    corner.x[i] = z[6 * kClusterSize] + offset_x;
-  };
+  auto& of = facets.number;
   std::uint32_t i = facets.size;
   for (std::uint32_t lanes = above.crossed(); lanes != 0; lanes &= lanes - 1) {
     const auto lane = static_cast<std::uint32_t>(std::countr_zero(lanes));
     facets.facet[i] = source.first_facet + lane;
     facets.instance[i] = source.instance;
-    const std::uint32_t tip = (tip_is_1 >> lane & 1) | (tip_is_2 >> lane & 1) << 1;
-    put(facets.tip, i, tip, lane);
-    put(facets.left, i, kNextCorner[tip], lane);
-    put(facets.right, i, kNextCorner[tip + 1], lane);
+    const std::uint32_t turn = (tip_is_1 >> lane & 1) | (tip_is_2 >> lane & 1) << 1;
+    const auto corner = [&](std::uint32_t k) { return coordinates + k * kClusterSize + lane; };
+    const Nm *const tip = corner(turn), *const left = corner(kNextCorner[turn]), *const right = corner(kNextCorner[turn + 1]);
+    constexpr std::uint32_t kX = 6 * kClusterSize, kY = 3 * kClusterSize;  // behind z
+    of[CutFacets::kTipX][i] = tip[kX] + offset_x;
+    of[CutFacets::kTipY][i] = tip[kY] + offset_y;
+    of[CutFacets::kUp][i] = plane_z - tip[0];
+    of[CutFacets::kLeftX][i] = left[kX] - tip[kX];
+    of[CutFacets::kLeftY][i] = left[kY] - tip[kY];
+    of[CutFacets::kLeftZ][i] = left[0] - tip[0];
+    of[CutFacets::kRightX][i] = right[kX] - tip[kX];
+    of[CutFacets::kRightY][i] = right[kY] - tip[kY];
+    of[CutFacets::kRightZ][i] = right[0] - tip[0];
     ++i;
   }
   facets.size = i;
 }
 
-void cut(const PixelSampling& sampling, CutFacets& facets, Nm plane, std::uint32_t row_begin, std::uint32_t row_end,
-         Segments& out) {
+void cut(const CutTask& task, CutFacets& facets) {
+  Segments& out = task.out;
   out.make_room(facets.size + 1);  // one more is written and not counted
   Ends ends;
-  find_ends(sampling, facets, plane, ends);
+  find_ends(task.sampling, facets, ends);
   double* const column = out.column.data();
   double* const columns_per_nm = out.columns_per_nm.data();
   SegmentRows* const rows = out.rows.data();
   SegmentOrigin* const origin = out.origin.data();
-  const double per_nm = sampling.columns_per_nm, near = sampling.near_x;
+  const double per_nm = task.sampling.columns_per_nm, near = task.sampling.near_x;
+  const auto& of = facets.number;
+  const auto row_begin = static_cast<std::int32_t>(task.row_begin), row_end = static_cast<std::int32_t>(task.row_end);
   std::size_t to = out.size;
   for (std::uint32_t i = 0; i < facets.size; ++i) {
-    const Point3 tip = facets.tip.at(i), left = facets.left.at(i), right = facets.right.at(i);
-    const ExactTriangle triangle(tip, left, right);
-    const double slope = -static_cast<double>(triangle.ny) / static_cast<double>(triangle.nx);
-    const double x = (tip.x + ends.share[i] * (left.x - tip.x)) - slope * ends.y[i];
-    column[to] = x * per_nm + 0.5 + near;
+    const double slope = ends.slope[i];
+    const std::int32_t left = ends.left[i], right = ends.right[i];
+    column[to] = ends.x[i] * per_nm + (0.5 + near);
     columns_per_nm[to] = slope * per_nm;
-    const std::int32_t first = std::max(std::min(ends.left[i], ends.right[i]), static_cast<std::int32_t>(row_begin));
-    const std::int32_t last = std::min(std::max(ends.left[i], ends.right[i]), static_cast<std::int32_t>(row_end));
-    const std::uint32_t flags = (triangle.nx < 0 ? SegmentRows::kEnters : 0) | (triangle.ny == 0 ? SegmentRows::kUpright : 0) |
+    const std::int32_t first = std::max(std::min(left, right), row_begin);
+    const std::int32_t last = std::min(std::max(left, right), row_end);
+    const bool enters = (left < right) != (of[CutFacets::kLeftZ][i] < 0);
+    const bool upright = (of[CutFacets::kLeftX][i] | of[CutFacets::kRightX][i]) == 0;
+    const std::uint32_t flags = (enters ? SegmentRows::kEnters : 0) | (upright ? SegmentRows::kUpright : 0) |
                                 (std::abs(slope) <= kSteepest ? 0 : SegmentRows::kExact);
     rows[to] = {static_cast<std::uint32_t>(first), static_cast<std::uint32_t>(last - first) << SegmentRows::kFlagBits | flags};
     origin[to] = {facets.facet[i], facets.instance[i]};

@@ -24,14 +24,20 @@ std::uint32_t* changes_by(const std::uint32_t* crossing, const std::uint32_t* en
   return change;
 }
 
+std::uint32_t crossing_of(const FillTask& task, std::size_t segment, const ExactTriangle& triangle, std::uint32_t row) {
+  const std::int64_t column = exact_column(task.sampling.x, triangle, task.sampling.row_centre[row], task.plane);
+  return static_cast<std::uint32_t>(column) * 2 + (task.segments.rows[segment].is(SegmentRows::kEnters) ? 1 : 0);
+}
+
 }  // namespace
 
 const Kernels& kernels_for([[maybe_unused]] Isa isa) {
-  static constexpr Kernels kPlain{Isa::kPlain, plain::find, plain::gather, plain::gather_listed,
+  static constexpr Kernels kPlain{Isa::kPlain, plain::find, plain::cut_found, plain::gather_listed,
                                   plain::cut,  plain::fill, plain::rows};
 #if defined(LAMINA_WIDE_KERNELS)
-  static constexpr Kernels kAvx2{Isa::kAvx2, avx2::find, avx2::gather, avx2::gather_listed, avx2::cut, avx2::fill, avx2::rows};
-  static constexpr Kernels kAvx512{Isa::kAvx512, avx512::find, avx512::gather, avx512::gather_listed,
+  static constexpr Kernels kAvx2{Isa::kAvx2, avx2::find, avx2::cut_found, avx2::gather_listed,
+                                 avx2::cut,  avx2::fill, avx2::rows};
+  static constexpr Kernels kAvx512{Isa::kAvx512, avx512::find, avx512::cut_found, avx512::gather_listed,
                                    avx512::cut,  avx512::fill, avx512::rows};
   if (isa == Isa::kAvx512) return kAvx512;
   if (isa == Isa::kAvx2) return kAvx2;
@@ -39,21 +45,22 @@ const Kernels& kernels_for([[maybe_unused]] Isa isa) {
   return kPlain;
 }
 
-std::uint32_t exact_end(const PixelSampling& sampling, const CutFacets& facets, const CutFacets::Corner& other, std::uint32_t i,
-                        Nm plane) {
-  return static_cast<std::uint32_t>(exact_row(sampling.y, facets.tip.at(i), other.at(i), plane));
+std::uint32_t exact_end(const PixelSampling& sampling, Nm tip_y, Nm up, Nm edge_y, Nm edge_z) {
+  return static_cast<std::uint32_t>(exact_row(sampling.y, {0, tip_y, 0}, {0, tip_y + edge_y, edge_z}, up));
 }
 
 std::uint32_t exact_crossing(const FillTask& task, std::size_t segment, std::uint32_t row) {
-  const ExactTriangle triangle = exact_triangle(task.segments.origin[segment], task.placed);
-  const std::int64_t column = exact_column(task.sampling.x, triangle, task.sampling.row_centre[row], task.plane);
-  return static_cast<std::uint32_t>(column) * 2 + (task.segments.rows[segment].is(SegmentRows::kEnters) ? 1 : 0);
+  return crossing_of(task, segment, exact_triangle(task.segments.origin[segment], task.placed), row);
 }
 
+/// A facet whose x does not change with y has one column for all rows.
 FourWords decide_near(const FillTask& task, std::size_t segment, std::uint32_t row, std::uint32_t left, std::uint32_t near,
                       FourWords value) {
+  const ExactTriangle triangle = exact_triangle(task.segments.origin[segment], task.placed);
+  const std::uint32_t in_first = triangle.ny == 0 ? crossing_of(task, segment, triangle, row) : 0;
   for (std::uint32_t k = 0; k < std::min(left, 4u); ++k) {
-    if ((near >> k & 1) != 0) value[k] = exact_crossing(task, segment, row + k);
+    if ((near >> k & 1) == 0) continue;
+    value[k] = triangle.ny == 0 ? in_first : crossing_of(task, segment, triangle, row + k);
   }
   return value;
 }

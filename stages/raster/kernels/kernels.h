@@ -21,41 +21,65 @@ struct ListedSource {
   Point3 offset;  // of the instance, nm
 };
 
-/// A cluster whose corners are named, and the step of the plane.
-struct IndexedSource {
-  const IndexedCluster* cluster;
-  const Point3* vertex;       // of its block
-  std::uint32_t first_facet;  // of its mesh
-  std::uint8_t step;
+/// What an engine finds: a cluster that a plane may cut.
+struct ClusterVisit {
+  std::uint32_t cluster;   // in its mesh
+  std::uint32_t instance;  // in the scene
 };
 
-/// Facets that a plane may cut, by the names of their corners. Behind each array room for the widest store; what is
-/// fetched early may lie behind the last facet.
-struct alignas(64) FoundFacets {
-  static constexpr std::uint32_t kRoom = 128;
+/// Clusters of one block whose corners are named, and the step of the plane.
+struct IndexedSource {
+  const IndexedCluster* cluster;  // one of them
+  std::uint32_t number;           // of that one in its mesh
+  const Point3* vertex;           // of the block
+  std::uint8_t step;
 
-  const Nm* table[kRoom + kClusterSize] = {};          // of the facet's block
-  std::uint32_t corner[3][kRoom + kClusterSize] = {};  // where in the table x is; y and z follow
+  const IndexedCluster& at(const ClusterVisit& visit) const {
+    return cluster[std::int64_t{visit.cluster} - std::int64_t{number}];
+  }
+};
+
+/// Facets of one instance that a plane may cut, by the places of their corners. Behind each array room for the widest store;
+/// what is fetched early may lie behind the last facet.
+struct alignas(64) FoundFacets {
+  static constexpr std::uint32_t kRoom = 256;
+
+  std::int32_t corner[3][kRoom + kClusterSize] = {};  // where x is, counted from `base`; y and z follow
   std::uint32_t facet[kRoom + kClusterSize];
+  const Nm* base = nullptr;  // a vertex of the mesh
   std::uint32_t size = 0;
 
   bool is_full() const { return size > kRoom - kClusterSize; }
+  /// Whether vertices of a block can be named; counting starts anew where no facet is left.
+  bool reaches(const Point3* vertex) {
+    if (size == 0) base = &vertex->x;
+    const std::int64_t away = &vertex->x - base;
+    return away >= INT32_MIN / 2 && away <= INT32_MAX / 2;
+  }
+  std::int32_t first_of(const Point3* vertex) const { return static_cast<std::int32_t>(&vertex->x - base); }
 };
 
 /// Facets that a plane cuts, on the bed, turned so that the tip is alone on its side of the plane: it cuts the two edges
-/// that start there. A coordinate an array, and behind each room for the widest store.
+/// that start there. A number an array, and behind each room for the widest store.
 struct alignas(64) CutFacets {
   static constexpr std::uint32_t kRoom = FoundFacets::kRoom;
+  static constexpr std::uint32_t kStride = kRoom + kClusterSize;
 
-  struct Corner {
-    Nm x[kRoom + kClusterSize], y[kRoom + kClusterSize], z[kRoom + kClusterSize];
-    Point3 at(std::uint32_t i) const { return {x[i], y[i], z[i]}; }
-  };
-  Corner tip, left, right;
-  std::uint32_t facet[kRoom + kClusterSize], instance[kRoom + kClusterSize];
+  /// What is known of a facet. Up is from the tip to the plane; the others are edges from the tip.
+  enum Number : std::uint32_t { kTipX, kTipY, kUp, kLeftX, kLeftY, kLeftZ, kRightX, kRightY, kRightZ, kNumbers };
+  Nm number[kNumbers][kStride];
+  std::uint32_t facet[kStride], instance[kStride];
   std::uint32_t size = 0;
 
   bool is_full() const { return size > kRoom - kClusterSize; }
+};
+
+/// What of a layer all cuts share.
+struct CutTask {
+  const PixelSampling& sampling;
+  Nm plane;                          // on the bed
+  std::uint32_t row_begin, row_end;  // geometry rows
+  Segments& out;
 };
 
 /// A band of rows that crossings are written to.
@@ -85,20 +109,20 @@ struct RowsTask {
 struct Kernels {
   Isa isa;
 
-  /// Appends the facets of a cluster whose steps meet the plane's; `found` must not be full.
-  void (*find)(const IndexedSource& source, FoundFacets& found);
+  /// Appends the facets whose steps meet the plane's, of visits to one block that `found` reaches, until it is full or none
+  /// is left.
+  /// returns  how many visits were taken
+  std::size_t (*find)(const IndexedSource& source, std::span<const ClusterVisit> visits, FoundFacets& found);
 
-  /// Appends those that the plane cuts, all of one instance, for which `facets` must have room. Empties `found`. The height is
-  /// on the bed.
-  void (*gather)(FoundFacets& found, std::uint32_t instance, const Point3& offset, Nm plane, CutFacets& facets);
+  /// Appends the segments of those that the plane cuts, all of one instance. Empties `found`. A facet cut in none of the
+  /// task's rows leaves none.
+  void (*cut_found)(const CutTask& task, std::uint32_t instance, const Point3& offset, FoundFacets& found);
 
   /// Appends the facets of a cluster that the plane cuts; `facets` must not be full. The height is on the bed.
   void (*gather_listed)(const ListedSource& source, Nm plane, CutFacets& facets);
 
-  /// Appends the segments of the facets in geometry rows [row_begin, row_end); a facet cut in none of these rows leaves
-  /// none. Empties `facets`.
-  void (*cut)(const PixelSampling& sampling, CutFacets& facets, Nm plane, std::uint32_t row_begin, std::uint32_t row_end,
-              Segments& out);
+  /// Appends the segments of the facets as cut_found() does. Empties `facets`.
+  void (*cut)(const CutTask& task, CutFacets& facets);
 
   /// Writes the crossings of all segments.
   void (*fill)(const FillTask& task);
