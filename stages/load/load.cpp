@@ -81,7 +81,7 @@ Status add_bounds(const Source& source, Part& part) {
   return {};
 }
 
-Result<Part> load_unguarded(const std::string& path, const LoadOptions& options) {
+Result<Part> load_unguarded(const std::string& path, const LoadOptions& options, const SeeTriangles& see) {
   Part part;
   part.path = path;
   Format format{};
@@ -103,7 +103,7 @@ Result<Part> load_unguarded(const std::string& path, const LoadOptions& options)
   } else {
     std::optional<Mesh> sound;
     if (options.blocks && format == Format::kBinaryStl) {
-      sound = read_sound_stl(*source, Snapper(options.transform, options.unit_mm), options, part.notes);
+      sound = read_sound_stl(*source, Snapper(options.transform, options.unit_mm), options, see, part.notes);
     }
     if (!sound) {
       Result<Facets> facets = read_facets(*source, format, options);
@@ -134,8 +134,10 @@ auto guarded(const std::string& path, const Work& work) -> decltype(work()) {
 
 }  // namespace
 
-Result<Part> load(const std::string& path, const LoadOptions& options) {
-  return guarded(path, [&] { return load_unguarded(path, options); });
+Result<Part> load(const std::string& path, const LoadOptions& options) { return load_and_see(path, options, {}); }
+
+Result<Part> load_and_see(const std::string& path, const LoadOptions& options, const SeeTriangles& see) {
+  return guarded(path, [&] { return load_unguarded(path, options, see); });
 }
 
 Result<std::string> format_of(const std::string& path, const LoadOptions& options) {

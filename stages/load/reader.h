@@ -1,7 +1,9 @@
 // stages/load/reader.h: what each format's reader gives back; internal to load.
 #pragma once
 
+#include <functional>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -44,10 +46,18 @@ Result<Format> detect(const Source& source);
 /// source  3D Systems, "StereoLithography Interface Specification" (1989)
 Result<Facets> read_binary_stl(const Source& source, const Snapper& snapper, const LoadOptions& options);
 
+/// Is shown the triangles of a file in pieces, each in the order of the file, by any thread. first  the number of the first
+using SeeTriangles = std::function<void(std::uint32_t first, std::span<const Triangle>)>;
+
 /// The same in one pass, where the mesh is sound: closed, as long as its header says, and enclosing something. As blocks, with
 /// what load() has to say of it. returns  nothing where the list of triangles is needed to judge, to repair or to refuse
+/// see  may be empty; is shown triangles, all of them where a mesh is returned. For who looks, nothing is returned either where
+///      neighbours are far apart in the file
 std::optional<Mesh> read_sound_stl(const Source& source, const Snapper& snapper, const LoadOptions& options,
-                                   std::vector<Note>& notes);
+                                   const SeeTriangles& see, std::vector<Note>& notes);
+
+/// As load(), and `see` is shown all triangles of a mesh that comes as blocks, while they are in a core's cache.
+Result<Part> load_and_see(const std::string& path, const LoadOptions& options, const SeeTriangles& see);
 
 /// Text, a word after the other; see stl_ascii.cpp for what is tolerated.
 /// cost    one pass, parallel over blocks of 1 MiB; 32 MiB of text at a time

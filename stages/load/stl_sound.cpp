@@ -38,17 +38,32 @@ std::shared_ptr<Scratch> make_scratch(Isa isa) { return std::make_shared<Scratch
 namespace {
 
 /// Reads one block. false  it cannot be read or snapped
-bool read_block(const Source& source, const Snapper& snapper, std::uint32_t block, std::uint64_t share, Scratch::Worker& worker,
-                MeshBlocks& blocks, Prisms& prisms) {
+bool read_block(const Source& source, const Snapper& snapper, std::uint32_t block, std::uint64_t share, const SeeTriangles& see,
+                Scratch::Worker& worker, MeshBlocks& blocks, Prisms& prisms) {
   const std::uint64_t first = blocks.first_triangle(block), count = blocks.triangles_in(block);
   if (!source.read(kHeaderBytes + first * kFacetBytes, worker.bytes.data(), count * kFacetBytes)) return false;
   if (!snap_facets(worker.bytes.data(), count, snapper, worker.kernels.isa, worker.facets.data(), worker.box)) return false;
+  if (see) see(static_cast<std::uint32_t>(first), {worker.facets.data(), count});
   SortedBlock& sorted = worker.maker.sort({worker.facets.data(), count}, blocks, block);
   worker.kernels.census(sorted, share, worker.sums);
   prisms = worker.kernels.prisms(sorted, worker.facets.front().a.z);
   worker.maker.store(blocks, block);
   return true;
 }
+
+/// Whether too many blocks are in disorder for who looks at edges: a file of such is better read as a list.
+class Disorder {
+ public:
+  bool is_found(const MeshBlocks& blocks, std::uint32_t block) {
+    constexpr std::uint32_t kFew = 8;
+    const std::uint32_t seen = ++seen_;
+    if (blocks.indexed(block * MeshBlocks::kClusters).cluster != nullptr) return false;
+    return ++listed_ > kFew + seen / 4;
+  }
+
+ private:
+  std::atomic<std::uint32_t> seen_{0}, listed_{0};
+};
 
 /// Of all facets, nm3; the sum is taken in the order of blocks, whichever thread read them.
 double sixfold_volume(const Buffer<Prisms>& pieces, Nm plane) {
@@ -60,7 +75,7 @@ double sixfold_volume(const Buffer<Prisms>& pieces, Nm plane) {
 }  // namespace
 
 std::optional<Mesh> read_sound_stl(const Source& source, const Snapper& snapper, const LoadOptions& options,
-                                   std::vector<Note>& notes) {
+                                   const SeeTriangles& see, std::vector<Note>& notes) {
   Facets header;
   const Result<std::uint64_t> count = count_facets(source, options, header);
   if (!count || header.doubt) return std::nullopt;
@@ -75,11 +90,13 @@ std::optional<Mesh> read_sound_stl(const Source& source, const Snapper& snapper,
     worker->box = {};
   }
   std::atomic<bool> failed{false};
+  Disorder disorder;
   tbb::parallel_for(tbb::blocked_range<std::uint32_t>(0, blocks->block_count()),
                     [&](const tbb::blocked_range<std::uint32_t>& range) {
                       Scratch::Worker& worker = *workers.local();
                       for (std::uint32_t b = range.begin(); b != range.end() && !failed; ++b) {
-                        if (!read_block(source, snapper, b, share, worker, *blocks, pieces[b])) failed = true;
+                        if (!read_block(source, snapper, b, share, see, worker, *blocks, pieces[b])) failed = true;
+                        if (see && !failed && disorder.is_found(*blocks, b)) failed = true;
                       }
                     });
   if (failed) return std::nullopt;

@@ -2,11 +2,13 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <map>
 #include <random>
 #include <set>
 #include <tuple>
 
+#include "stages/geometry/blocks/block_maker.h"
 #include "stages/load/repair/diagnose.h"
 #include "stages/load/repair/geometry.h"
 
@@ -143,6 +145,76 @@ TEST(Diagnose, InTheMemoryOfTheListFindsTheSameAndGivesItBackWhereShellsMayOverl
     EXPECT_EQ(alone.volume_mm3, found.volume_mm3);
     EXPECT_EQ(alone.shells_apart, rise == 0);
     EXPECT_TRUE(rise == 0 ? mesh.triangles.empty() : std::ranges::equal(mesh.triangles, list));
+  }
+}
+
+/// A torus, strip after strip: several chunks, most of whose edges lie within one.
+std::vector<Triangle> torus_in_order(int around, int across) {
+  const auto point = [&](int i, int j) {
+    const double u = 6.283185307179586 * (i % around) / around, v = 6.283185307179586 * (j % across) / across;
+    const double r = 20e6 + 5e6 * std::cos(v);
+    return Point3{static_cast<Nm>(r * std::cos(u)), static_cast<Nm>(r * std::sin(u)), static_cast<Nm>(5e6 * std::sin(v))};
+  };
+  std::vector<Triangle> triangles;
+  for (int i = 0; i < around; ++i) {
+    for (int j = 0; j < across; ++j) {
+      const Point3 a = point(i, j), b = point(i + 1, j), c = point(i + 1, j + 1), d = point(i, j + 1);
+      triangles.push_back({a, b, c});
+      triangles.push_back({a, c, d});
+    }
+  }
+  return triangles;
+}
+
+load::Diagnosis diagnosis_of(const std::vector<Triangle>& triangles) {
+  Mesh mesh;
+  mesh.triangles.assign(triangles.begin(), triangles.end());
+  return load::diagnose(mesh);
+}
+
+void expect_same_counts(const load::Diagnosis& one, const load::Diagnosis& other) {
+  EXPECT_EQ(one.vertices, other.vertices);
+  EXPECT_EQ(one.edges, other.edges);
+  EXPECT_EQ(one.shells, other.shells);
+  EXPECT_EQ(one.inverted_shells, other.inverted_shells);
+  EXPECT_EQ(one.volume_mm3, other.volume_mm3);
+  EXPECT_EQ(one.outward_mm3, other.outward_mm3);
+  EXPECT_EQ(one.shells_apart, other.shells_apart);
+  EXPECT_EQ(one.shell_ends, other.shell_ends);
+  EXPECT_EQ(one.balanced, other.balanced);
+  EXPECT_EQ(one.bounds.lo, other.bounds.lo);
+  EXPECT_EQ(one.bounds.hi, other.bounds.hi);
+  for (const auto kind : {&load::Diagnosis::open_edges, &load::Diagnosis::non_manifold_edges,
+                          &load::Diagnosis::misoriented_edges, &load::Diagnosis::duplicate_facets})
+    EXPECT_EQ((one.*kind).count, (other.*kind).count);
+}
+
+/// Where the list is in no order, edges are found vertex by vertex and not chunk by chunk; blocks bring vertices of their own.
+TEST(Diagnose, ChunksVerticesAndBlocksFindTheSame) {
+  std::mt19937 random(8);
+  for (int faults = 0; faults < 3; ++faults) {
+    std::vector<Triangle> triangles = torus_in_order(250, 40);
+    for (int i = 0; i < 40 * faults; ++i) {
+      const auto any = [&] { return static_cast<std::size_t>(random() % triangles.size()); };
+      const std::size_t at = any(), near = std::min(at + random() % 3, triangles.size() - 1);
+      switch (random() % 5) {
+        case 0: std::swap(triangles[at].b, triangles[at].c); break;
+        case 1: triangles[at] = triangles[near]; break;
+        case 2: triangles[at].b = triangles[any()].a; break;
+        case 3: triangles[at].b = triangles[at].a; break;
+        default: triangles.insert(triangles.begin() + static_cast<std::ptrdiff_t>(near), triangles[at]); break;
+      }
+    }
+    const load::Diagnosis in_order = diagnosis_of(triangles);
+    EXPECT_EQ(in_order.balanced, faults == 0);
+    std::vector<Triangle> shuffled = triangles;
+    std::shuffle(shuffled.begin(), shuffled.end(), random);
+    expect_same_counts(in_order, diagnosis_of(shuffled));
+    for (const std::vector<Triangle>& list : {triangles, shuffled}) {
+      Mesh mesh;
+      mesh.triangles.assign(list.begin(), list.end());
+      expect_same_counts(in_order, load::diagnose_blocks(*take_blocks(mesh)));
+    }
   }
 }
 

@@ -6,10 +6,13 @@
 #include <algorithm>
 #include <array>
 #include <nlohmann/json.hpp>
+#include <utility>
 #include <vector>
 
 #include "stages/data/text/json_text.h"
 #include "stages/data/text/readable.h"
+#include "stages/load/diagnosis/collector.h"
+#include "stages/load/reader.h"
 #include "stages/load/repair/diagnose.h"
 
 namespace lamina::load {
@@ -62,26 +65,54 @@ Status plan(const Part& part, std::span<const Diagnosis> diagnosis, const Surplu
   return {};
 }
 
-Result<Description> describe(const std::string& path, const LoadOptions& options, const SurplusAreas& surplus) {
-  const Result<std::string> format = format_of(path, options);
-  if (!format) return format.error();
+/// Nothing is wrong but that facets may be degenerate.
+bool is_sound(const Diagnosis& found) {
+  return found.balanced && found.open_edges.count + found.non_manifold_edges.count + found.misoriented_edges.count == 0 &&
+         found.duplicate_facets.count == 0;
+}
+
+/// Loads a part as it is in the file and diagnoses it. A sound mesh that comes as blocks is diagnosed as such: where shells lie
+/// apart, its list is never made. `sound` is true then: repair would change nothing.
+Result<Part> load_and_diagnose(const std::string& path, const LoadOptions& options, Description& description, bool& sound) {
+  DegenerateFacets degenerate(kPlaces);
   LoadOptions as_is = options;
   as_is.repair = false;
-  Result<Part> part = load(path, as_is);
-  if (!part) return part.error();
-  Description description;
-  description.format = *format;
-  description.repairs = options.repair;
+  as_is.blocks = true;
+  Result<Part> part = load_and_see(path, as_is, [&](std::uint32_t first, auto facets) { degenerate.look(first, facets); });
+  if (!part) return part;
+  as_is.blocks = false;
+  sound = false;
+  if (part->meshes.size() == 1 && part->meshes.front().blocks) {
+    Diagnosis found = diagnose_blocks(*std::exchange(part->meshes.front().blocks, nullptr));
+    found.degenerate_facets = degenerate.finding();
+    sound = is_sound(found);
+    if (!sound || !found.shells_apart) part = load(path, as_is);
+    if (!part) return part;
+    if (sound) description.diagnosis.push_back(std::move(found));
+  }
   description.copies.resize(part->meshes.size(), 0);
   for (const Instance& instance : part->instances) ++description.copies[instance.mesh];
+  if (sound) return part;
   const bool alone = part->instances.size() == 1;  // the lists of others may be sliced together
   for (Mesh& mesh : part->meshes) {
     description.diagnosis.push_back(alone ? diagnose_alone(mesh, kPlaces) : diagnose(mesh, kPlaces));
     description.balanced = description.balanced && description.diagnosis.back().balanced;
   }
+  return part;
+}
+
+Result<Description> describe(const std::string& path, const LoadOptions& options, const SurplusAreas& surplus) {
+  const Result<std::string> format = format_of(path, options);
+  if (!format) return format.error();
+  Description description;
+  description.format = *format;
+  description.repairs = options.repair;
+  bool sound = false;
+  Result<Part> part = load_and_diagnose(path, options, description, sound);
+  if (!part) return part.error();
   description.notes = part->notes;
   description.part = std::move(*part);
-  if (!may_change(description) || !options.repair) {
+  if (sound || !may_change(description) || !options.repair) {
     if (const Status done = plan(description.part, description.diagnosis, surplus, description); !done) return done.error();
     return description;
   }
@@ -92,6 +123,7 @@ Result<Description> describe(const std::string& path, const LoadOptions& options
     return Error{Fault::kInput, path + ": changed while it was read; run it again"};
   description.notes = std::move(planned->notes);
   std::vector<Diagnosis> diagnosis;
+  const bool alone = planned->instances.size() == 1;
   for (Mesh& mesh : planned->meshes) diagnosis.push_back(alone ? diagnose_alone(mesh, 0) : diagnose(mesh, 0));
   if (const Status done = plan(*planned, diagnosis, surplus, description); !done) return done.error();
   return description;

@@ -2,11 +2,16 @@
 #include "stages/load/repair/diagnose.h"
 
 #include <tbb/blocked_range.h>
+#include <tbb/enumerable_thread_specific.h>
+#include <tbb/parallel_for.h>
 #include <tbb/parallel_reduce.h>
 
 #include <algorithm>
 #include <atomic>
+#include <memory>
 
+#include "stages/load/diagnosis/chunk_edges.h"
+#include "stages/load/diagnosis/collector.h"
 #include "stages/load/repair/geometry.h"
 #include "stages/load/repair/overlaps.h"
 #include "stages/load/repair/stars.h"
@@ -15,48 +20,6 @@
 
 namespace lamina::load {
 namespace {
-
-Point3 middle(const Point3& p, const Point3& q) {
-  const auto half = [](Nm one, Nm other) { return static_cast<Nm>((std::int64_t{one} + other) / 2); };
-  return {half(p.x, q.x), half(p.y, q.y), half(p.z, q.z)};
-}
-
-/// Counts, and keeps the `places` with the smallest triangles, of one triangle the lowest edges.
-class Collector {
- public:
-  explicit Collector(std::size_t places) : places_(places) {}
-
-  /// At an edge between two points, or at a point.
-  void add(std::uint32_t triangle, const Point3& p, const Point3& q) {
-    ++count_;
-    keep({triangle, std::min(p, q), std::max(p, q)});
-  }
-  void add(const Collector& other) {
-    count_ += other.count_;
-    for (const Found& found : other.first_) keep(found);
-  }
-  Diagnosis::Finding finding() const {
-    Diagnosis::Finding result{count_, {}};
-    for (const Found& found : first_) result.first.push_back({found.triangle, middle(found.low, found.high)});
-    return result;
-  }
-
- private:
-  struct Found {
-    std::uint32_t triangle;
-    Point3 low, high;
-    friend auto operator<=>(const Found&, const Found&) = default;
-  };
-  void keep(const Found& found) {
-    if (first_.size() == places_ && (places_ == 0 || first_.back() <= found)) return;
-    if (first_.size() == places_) first_.pop_back();
-    first_.insert(std::upper_bound(first_.begin(), first_.end(), found), found);
-  }
-
-  std::size_t places_;
-  std::uint64_t count_ = 0;
-  std::vector<Found> first_;
-};
 
 struct Shell {
   Int128 volume = 0;  // sixfold
@@ -101,22 +64,14 @@ constexpr std::size_t kGrain = std::size_t{1} << 13;  // facets or vertices a ta
 using Range = tbb::blocked_range<std::uint32_t>;
 Range all_of(std::size_t count) { return {0, static_cast<std::uint32_t>(count), kGrain}; }
 
-/// What facets show one by one.
-struct SeenFacets {
-  Collector degenerate;
+/// The box around points.
+struct SeenPoints {
   Box box;
 
-  void look(std::span<const Triangle> triangles, const Range& range) {
-    for (std::uint32_t i = range.begin(); i != range.end(); ++i) {
-      const Triangle& t = triangles[i];
-      for (const Point3& corner : {t.a, t.b, t.c}) box.add(corner);
-      if (!has_area(t)) degenerate.add(i, t.a, t.a);
-    }
+  void look(std::span<const Point3> points, const Range& range) {
+    for (std::uint32_t i = range.begin(); i != range.end(); ++i) box.add(points[i]);
   }
-  void add(const SeenFacets& other) {
-    degenerate.add(other.degenerate);
-    box.add(other.box);
-  }
+  void add(const SeenPoints& other) { box.add(other.box); }
 };
 
 /// What several tasks write while edges are looked at.
@@ -140,25 +95,43 @@ struct SeenEdges {
   std::uint64_t count = 0;
   bool balanced = true;
 
+  std::vector<std::uint32_t> may_repeat;  // facets
+
+  /// Looks at all sides of an edge. returns  whether facets at it may be there twice
+  bool look(const Numbered& mesh, const Side* begin, const Side* end, Joined& joined) {
+    ++count;
+    joined.join(begin, end);
+    if (end - begin == 2 && begin[0].forward != begin[1].forward) return false;
+    balanced = balanced && surplus(begin, end) == 0;
+    Collector& kind = end - begin == 1 ? open : end - begin == 2 ? misoriented : non_manifold;
+    kind.add(begin->facet, mesh.vertices()[begin->low], mesh.vertices()[begin->high]);
+    return end - begin > 1;
+  }
+  void add_repeats(const Numbered& mesh, std::span<const std::uint32_t> repeats) {
+    for (const std::uint32_t i : repeats) {
+      const Point3 corner = mesh.triangle(i).a;
+      duplicate.add(i, corner, corner);
+    }
+  }
+
+  /// Of vertices of a list in any order.
   void look(const Numbered& mesh, const Stars& stars, const Range& range, Joined& joined) {
     Buffer<Side> sides;
     std::vector<std::uint32_t> repeats;
     for (std::uint32_t vertex = range.begin(); vertex != range.end(); ++vertex) {
       bool odd = stars.sides_of(vertex, sides);  // where facets may be there twice
-      for_each_edge(sides, [&](const Side* begin, const Side* end) {
-        ++count;
-        joined.join(begin, end);
-        if (end - begin == 2 && begin[0].forward != begin[1].forward) return;
-        odd = odd || end - begin > 1;
-        balanced = balanced && surplus(begin, end) == 0;
-        Collector& kind = end - begin == 1 ? open : end - begin == 2 ? misoriented : non_manifold;
-        kind.add(begin->facet, mesh.vertices()[begin->low], mesh.vertices()[begin->high]);
-      });
+      for_each_edge(sides, [&](const Side* begin, const Side* end) { odd = look(mesh, begin, end, joined) || odd; });
       if (odd) stars.repeats_of(vertex, repeats);
     }
-    for (const std::uint32_t i : repeats) {
-      const Point3 corner = mesh.triangle(i).a;
-      duplicate.add(i, corner, corner);
+    add_repeats(mesh, repeats);
+  }
+  /// Of sides that chunks could not settle.
+  void look(const Numbered& mesh, const SideLists& lists, const Range& range, Joined& joined) {
+    for (std::uint32_t vertex = range.begin(); vertex != range.end(); ++vertex) {
+      for_each_edge(lists.of(vertex), [&](const Side* begin, const Side* end) {
+        if (!look(mesh, begin, end, joined)) return;
+        for (const Side* side = begin; side != end; ++side) may_repeat.push_back(side->facet);
+      });
     }
   }
   void add(const SeenEdges& other) {
@@ -168,6 +141,7 @@ struct SeenEdges {
     duplicate.add(other.duplicate);
     count += other.count;
     balanced = balanced && other.balanced;
+    may_repeat.insert(may_repeat.end(), other.may_repeat.begin(), other.may_repeat.end());
   }
 };
 
@@ -186,13 +160,53 @@ Seen seen_in(const Range& range, const Seen& nothing, const Look& look) {
       });
 }
 
+/// Vertex by vertex.
+SeenEdges edges_of_any(const Numbered& mesh, std::size_t places, Joined& joined) {
+  const Stars stars(mesh);
+  return seen_in(all_of(stars.vertices()), SeenEdges(places),
+                 [&](const Range& range, SeenEdges& seen) { seen.look(mesh, stars, range, joined); });
+}
+
+/// Chunk by chunk, and then the sides that several chunks share.
+SeenEdges edges_in_order(const Numbered& mesh, std::size_t places, Joined& joined) {
+  struct Worker {
+    ChunkEdges edges;
+    ChunkPieces pieces;
+    Buffer<Side> rest;
+    Buffer<std::uint32_t> collapsed;
+    std::uint64_t count = 0;
+  };
+  tbb::enumerable_thread_specific<std::unique_ptr<Worker>> workers([] { return std::make_unique<Worker>(); });
+  tbb::parallel_for(std::size_t{0}, mesh.chunks(), [&](std::size_t chunk) {
+    Worker& worker = *workers.local();
+    const auto first = static_cast<std::uint32_t>(chunk * Numbered::kChunk);
+    const std::span<const ChunkEdges::Pair> pairs = worker.edges.find(mesh, chunk, worker.rest, worker.collapsed);
+    worker.pieces.join(pairs, joined.sets.parents().subspan(first, mesh.local_facets(chunk).size()), first);
+    worker.count += pairs.size();
+  });
+  std::vector<Buffer<Side>> rest;
+  SeenEdges within(places);
+  for (const std::unique_ptr<Worker>& worker : workers) {
+    rest.push_back(std::move(worker->rest));
+    within.count += worker->count;
+    within.may_repeat.insert(within.may_repeat.end(), worker->collapsed.begin(), worker->collapsed.end());
+  }
+  const auto vertices = static_cast<std::uint32_t>(mesh.vertices().size());
+  const SideLists lists(vertices, rest);
+  SeenEdges seen = seen_in(all_of(vertices), SeenEdges(places),
+                           [&](const Range& range, SeenEdges& some) { some.look(mesh, lists, range, joined); });
+  seen.add(within);
+  seen.add_repeats(mesh, repeats_among(mesh, seen.may_repeat));
+  return seen;
+}
+
 /// The number of each facet's shell, by the smallest facets; those that use a vertex twice belong to none: UINT32_MAX.
 /// shells: how many
 Buffer<std::uint32_t> numbered_shells(const Numbered& mesh, std::span<const std::uint32_t> parents, std::uint32_t& shells) {
   Buffer<std::uint32_t> shell_of(parents.size());
   shells = 0;
   for (std::uint32_t i = 0; i < parents.size(); ++i)
-    shell_of[i] = parents[i] != i ? shell_of[parents[i]] : collapsed(mesh.facets()[i]) ? UINT32_MAX : shells++;
+    shell_of[i] = parents[i] != i ? shell_of[parents[i]] : mesh.collapsed(i) ? UINT32_MAX : shells++;
   return shell_of;
 }
 
@@ -200,19 +214,48 @@ Buffer<std::uint32_t> numbered_shells(const Numbered& mesh, std::span<const std:
 struct SeenShells {
   std::vector<Shell> shell;
 
+  /// Of chunks.
   void look(const Numbered& mesh, std::span<const std::uint32_t> shell_of, std::span<const std::uint8_t> unbalanced,
-            const Point3& from, const Range& range) {
-    for (std::uint32_t i = range.begin(); i != range.end(); ++i) {
-      if (shell_of[i] == UINT32_MAX) continue;
-      const Triangle t = mesh.triangle(i);
-      Shell& one = shell[shell_of[i]];
-      one.volume += load::sixfold_volume(t, from);
-      for (const Point3& corner : {t.a, t.b, t.c}) one.box.add(corner);
-      one.closed = one.closed && unbalanced[i] == 0;
+            const Point3& from, const Range& chunks) {
+    Buffer<Point3> points;
+    for (std::size_t c = chunks.begin(); c != chunks.end(); ++c) {
+      points.clear();
+      for (const std::uint32_t vertex : mesh.numbers_of(c)) points.push_back(mesh.vertices()[vertex]);
+      const std::span<const Numbered::Local> facets = mesh.local_facets(c);
+      const std::size_t first = c * Numbered::kChunk;
+      look(points, facets, shell_of.subspan(first, facets.size()), unbalanced.subspan(first, facets.size()), from);
     }
   }
   void add(const SeenShells& other) {
     for (std::size_t s = 0; s < shell.size(); ++s) shell[s].add(other.shell[s]);
+  }
+
+ private:
+  static Triangle triangle(std::span<const Point3> points, const Numbered::Local& facet) {
+    return {points[facet[0]], points[facet[1]], points[facet[2]]};
+  }
+
+  void look(std::span<const Point3> points, std::span<const Numbered::Local> facets, std::span<const std::uint32_t> shell_of,
+            std::span<const std::uint8_t> unbalanced, const Point3& from) {
+    const std::uint32_t only = shell_of.front();
+    const bool all_in_one =
+        only != UINT32_MAX && std::all_of(shell_of.begin(), shell_of.end(), [&](auto s) { return s == only; });
+    if (!all_in_one) {
+      for (std::size_t i = 0; i < facets.size(); ++i) {
+        if (shell_of[i] == UINT32_MAX) continue;
+        const Triangle t = triangle(points, facets[i]);
+        Shell& one = shell[shell_of[i]];
+        one.volume += load::sixfold_volume(t, from);
+        for (const Point3& corner : {t.a, t.b, t.c}) one.box.add(corner);
+        one.closed = one.closed && unbalanced[i] == 0;
+      }
+      return;
+    }
+    Shell here;
+    for (const Numbered::Local& facet : facets) here.volume += load::sixfold_volume(triangle(points, facet), from);
+    for (const Point3& point : points) here.box.add(point);
+    here.closed = std::all_of(unbalanced.begin(), unbalanced.end(), [](std::uint8_t is) { return is == 0; });
+    shell[only].add(here);
   }
 };
 
@@ -223,22 +266,23 @@ constexpr std::uint32_t kManyShells = 1024;
 Diagnosis diagnose_facets(std::span<const Triangle> triangles, std::size_t places) {
   Diagnosis result;
   result.triangles = triangles.size();
-  const SeenFacets facets = seen_in(all_of(triangles.size()), SeenFacets{Collector(places), {}},
-                                    [&](const Range& range, SeenFacets& seen) { seen.look(triangles, range); });
-  result.bounds = facets.box;
-  result.degenerate_facets = facets.degenerate.finding();
+  DegenerateFacets degenerate(places);
+  tbb::parallel_for(all_of(triangles.size()), [&](const Range& range) {
+    degenerate.look(range.begin(), triangles.subspan(range.begin(), range.size()));
+  });
+  result.degenerate_facets = degenerate.finding();
   return result;
 }
 
 /// What edges and shells show.
 void diagnose_edges(const Numbered& mesh, std::size_t places, Diagnosis& result) {
-  const std::size_t triangles = mesh.facets().size();
   result.vertices = mesh.vertices().size();
-  Joined joined(triangles);
+  result.bounds = seen_in(all_of(result.vertices), SeenPoints(), [&](const Range& range, SeenPoints& seen) {
+                    seen.look(mesh.vertices(), range);
+                  }).box;
+  Joined joined(mesh.size());
   {
-    const Stars stars(mesh);
-    const SeenEdges edges = seen_in(all_of(stars.vertices()), SeenEdges(places),
-                                    [&](const Range& range, SeenEdges& seen) { seen.look(mesh, stars, range, joined); });
+    const SeenEdges edges = mesh.in_order() ? edges_in_order(mesh, places, joined) : edges_of_any(mesh, places, joined);
     result.edges = edges.count;
     result.balanced = edges.balanced;
     result.open_edges = edges.open.finding();
@@ -252,10 +296,11 @@ void diagnose_edges(const Numbered& mesh, std::size_t places, Diagnosis& result)
   const auto measure = [&](const Range& range, SeenShells& seen) {
     seen.look(mesh, shell_of, joined.unbalanced, result.bounds.lo, range);
   };
+  const Range chunks(0, static_cast<std::uint32_t>(mesh.chunks()), 2);
   if (count > kManyShells)
-    measure(all_of(triangles), shells);
+    measure(chunks, shells);
   else
-    shells = seen_in(all_of(triangles), shells, measure);
+    shells = seen_in(chunks, shells, measure);
   Int128 volume = 0;
   for (const Shell& shell : shells.shell) volume += shell.volume;
   result.volume_mm3 = static_cast<double>(volume) / 6e18;
@@ -267,6 +312,13 @@ void diagnose_edges(const Numbered& mesh, std::size_t places, Diagnosis& result)
 Diagnosis diagnose(const Mesh& mesh, std::size_t places) {
   Diagnosis result = diagnose_facets(mesh.triangles, places);
   diagnose_edges(Numbered(mesh.triangles), places, result);
+  return result;
+}
+
+Diagnosis diagnose_blocks(const MeshBlocks& blocks) {
+  Diagnosis result;
+  result.triangles = blocks.triangle_count();
+  diagnose_edges(Numbered(blocks), 0, result);
   return result;
 }
 

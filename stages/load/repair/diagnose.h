@@ -46,6 +46,10 @@ Diagnosis diagnose(const Mesh& mesh, std::size_t places = 3);
 /// cost: as above; no more memory than the list and a quarter of it
 Diagnosis diagnose_alone(Mesh& mesh, std::size_t places = 3);
 
+/// The same of blocks that hold no caps. Degenerate facets are not looked for, and no places are told: the order of the file is
+/// not known.
+Diagnosis diagnose_blocks(const MeshBlocks& blocks);
+
 /// What every job pays for, in one pass.
 struct Census {
   /// Every edge is walked as often one way as the other, up to a chance of 2^-57 that is the same on every machine: the

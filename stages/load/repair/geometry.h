@@ -11,8 +11,8 @@ namespace lamina::load {
 
 __extension__ using Int128 = __int128;
 
-/// Calls use(normal) with twice the facet's area as a vector along its normal; exact. Its numbers have 64 bits where they hold
-/// it, as of all facets that are less than 2.1 m long, and 128 elsewhere.
+/// Calls use(normal) with twice the facet's area as a vector along its normal; exact. Its numbers have 64 bits where the facet
+/// is less than 1.07 m long, and 128 elsewhere.
 template <class Use>
 auto with_doubled_area(const Triangle& t, const Use& use) {
   using Vector = std::array<std::int64_t, 3>;
@@ -23,11 +23,12 @@ auto with_doubled_area(const Triangle& t, const Use& use) {
     return std::array<Number, 3>{u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]};
   };
   const Vector u = difference(t.b, t.a), v = difference(t.c, t.a);
-  bool narrow = true;  // products of two numbers of 31 bits and a sign, and differences of these, have 63
-  for (const Vector& side : {u, v}) {
-    for (const std::int64_t number : side) narrow &= std::int64_t{INT32_MIN} < number && number <= INT32_MAX;
-  }
-  if (narrow) return use(cross(u, v));
+  // Products of two numbers of at most 2^30 and a sign, and differences of these, have 62 bits. One test serves all six: a
+  // number is within if, 2^30 added, it has no bit above the lowest 31.
+  constexpr std::int64_t kMost = std::int64_t{1} << 30;
+  const std::int64_t bits = (u[0] + kMost) | (u[1] + kMost) | (u[2] + kMost) | (v[0] + kMost) | (v[1] + kMost) | (v[2] + kMost);
+  if (bits >> 31 == 0) [[likely]]
+    return use(cross(u, v));
   return use(cross(std::array<Int128, 3>{u[0], u[1], u[2]}, std::array<Int128, 3>{v[0], v[1], v[2]}));
 }
 
@@ -36,7 +37,13 @@ inline std::array<Int128, 3> doubled_area(const Triangle& t) {
   return with_doubled_area(t, [](const auto& normal) { return std::array<Int128, 3>{normal[0], normal[1], normal[2]}; });
 }
 
+/// The normal's numbers modulo 2^64 take no branch; where one of them is not 0, neither is what it is the rest of.
 inline bool has_area(const Triangle& t) {
+  const auto off = [](Nm to, Nm from) { return static_cast<std::uint64_t>(std::int64_t{to} - from); };
+  const std::uint64_t ux = off(t.b.x, t.a.x), uy = off(t.b.y, t.a.y), uz = off(t.b.z, t.a.z);
+  const std::uint64_t vx = off(t.c.x, t.a.x), vy = off(t.c.y, t.a.y), vz = off(t.c.z, t.a.z);
+  if (((uy * vz - uz * vy) | (uz * vx - ux * vz) | (ux * vy - uy * vx)) != 0) [[likely]]
+    return true;
   return with_doubled_area(t, [](const auto& normal) { return normal[0] != 0 || normal[1] != 0 || normal[2] != 0; });
 }
 

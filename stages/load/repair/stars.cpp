@@ -10,7 +10,9 @@ constexpr std::size_t kFew = 24;
 
 bool before(const Side& one, const Side& other) { return std::tie(one.high, one.facet) < std::tie(other.high, other.facet); }
 
-void sort_sides(Buffer<Side>& sides) {
+}  // namespace
+
+void sort_sides(std::span<Side> sides) {
   if (sides.size() > kFew) return std::sort(sides.begin(), sides.end(), before);
   for (std::size_t i = 1; i < sides.size(); ++i) {
     const Side side = sides[i];
@@ -19,8 +21,6 @@ void sort_sides(Buffer<Side>& sides) {
     sides[at] = side;
   }
 }
-
-}  // namespace
 
 Stars::Stars(const Numbered& mesh) : mesh_(mesh), begin_(mesh.vertices().size() + 1) {
   std::fill(begin_.begin(), begin_.end(), 0u);
@@ -62,23 +62,25 @@ bool Stars::sides_of(std::uint32_t vertex, Buffer<Side>& sides) const {
 }
 
 void Stars::repeats_of(std::uint32_t vertex, std::vector<std::uint32_t>& repeats) const {
-  struct Key {
-    Rising corners;
-    std::uint32_t facet;
+  std::vector<std::uint32_t> facets;
+  for (const std::uint32_t f : of(vertex))
+    if (rising(mesh_.facets()[f]).low == vertex) facets.push_back(f);
+  const std::vector<std::uint32_t> found = repeats_among(mesh_, facets);
+  repeats.insert(repeats.end(), found.begin(), found.end());
+}
+
+std::vector<std::uint32_t> repeats_among(const Numbered& mesh, std::vector<std::uint32_t>& facets) {
+  const auto key = [&](std::uint32_t f) {
+    const Rising corners = rising(mesh.facet(f));
+    return std::tuple(corners.low, corners.mid, corners.high, corners.forward || mesh.collapsed(f));
   };
-  std::vector<Key> keys;
-  for (const std::uint32_t f : of(vertex)) {
-    Rising corners = rising(mesh_.facets()[f]);
-    if (corners.low != vertex) continue;
-    if (collapsed(mesh_.facets()[f])) corners.forward = true;  // it has no orientation
-    keys.push_back({corners, f});
-  }
-  const auto shape = [](const Key& key) { return std::tuple(key.corners.mid, key.corners.high, key.corners.forward); };
-  std::sort(keys.begin(), keys.end(), [&](const Key& one, const Key& other) {
-    return std::tuple(shape(one), one.facet) < std::tuple(shape(other), other.facet);
-  });
-  for (std::size_t i = 1; i < keys.size(); ++i)
-    if (shape(keys[i]) == shape(keys[i - 1])) repeats.push_back(keys[i].facet);
+  std::sort(facets.begin(), facets.end());
+  facets.erase(std::unique(facets.begin(), facets.end()), facets.end());
+  std::stable_sort(facets.begin(), facets.end(), [&](std::uint32_t one, std::uint32_t other) { return key(one) < key(other); });
+  std::vector<std::uint32_t> repeats;
+  for (std::size_t i = 1; i < facets.size(); ++i)
+    if (key(facets[i]) == key(facets[i - 1])) repeats.push_back(facets[i]);
+  return repeats;
 }
 
 }  // namespace lamina::load

@@ -26,6 +26,13 @@ inline Rising rising(const Indexed::Facet& facet) {
   return {a, b, c, forward};
 }
 
+/// Sorts the sides of edges with one lower vertex by edge and then by facet.
+void sort_sides(std::span<Side> sides);
+
+/// Of some facets, those that an earlier one of them has the same corners as, in the same orientation; each once, in no order.
+/// A facet that uses a vertex twice has no orientation. facets: is overwritten
+std::vector<std::uint32_t> repeats_among(const Numbered& mesh, std::vector<std::uint32_t>& facets);
+
 /// Lists of facets, one a vertex: those of which it is the lowest or the middle vertex, in rising order. Every edge starts
 /// from its lower vertex, so its facets are all in one list. Of facets that use a vertex twice, the lowest lists them.
 class Stars {

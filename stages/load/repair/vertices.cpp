@@ -1,9 +1,21 @@
-// stages/load/repair/vertices.cpp: an open table of numbers, beside the list of points that they stand for.
+// stages/load/repair/vertices.cpp: each chunk of the list finds its own vertices in a core's cache; an open table then finds
+// those that several chunks have.
+//
+// Every vertex goes to the first corner that names it, whichever thread came first: the table keeps the smallest name of each
+// point. So numbers do not depend on threads.
 #include "stages/load/repair/vertices.h"
+
+#include <tbb/blocked_range.h>
+#include <tbb/enumerable_thread_specific.h>
+#include <tbb/parallel_for.h>
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <cstring>
+#include <memory>
+#include <utility>
+#include <vector>
 
 #include "stages/geometry/blocks/pages.h"
 
@@ -11,10 +23,11 @@ namespace lamina::load {
 namespace {
 
 constexpr std::uint32_t kFree = UINT32_MAX;
-/// So many facets are hashed before the first of them is looked up: the table's lines are on their way meanwhile.
-constexpr std::size_t kAhead = 16;
-/// So many triangles are read before their memory goes back to the system.
-constexpr std::size_t kTogether = std::size_t{1} << 14;
+constexpr std::size_t kChunk = Numbered::kChunk;  // 144 KiB
+constexpr std::size_t kTogether = 16;             // chunks a task, 2.25 MiB of the list
+constexpr std::uint32_t kNameBits = 14;           // of a point's name, within its chunk
+static_assert(kChunk == kBlockSize);
+static_assert(3 * kChunk <= std::size_t{1} << kNameBits);
 
 inline std::uint64_t hash_of(const Point3& p) {
   const std::uint64_t xy = static_cast<std::uint32_t>(p.x) | std::uint64_t{static_cast<std::uint32_t>(p.y)} << 32;
@@ -22,111 +35,341 @@ inline std::uint64_t hash_of(const Point3& p) {
   return (mixed ^ mixed >> 32) * 0x8bb84b93962eacc9;
 }
 
-/// Numbers of points by their hashes, at most two thirds full.
-class Table {
- public:
-  /// expected  points; more make it grow
-  explicit Table(std::size_t expected) {
-    points_.reserve(expected);
-    std::size_t slots = 64;
-    while (2 * slots < 3 * expected) slots *= 2;
-    clear(slots);
-  }
-  std::uint32_t size() const { return static_cast<std::uint32_t>(points_.size()); }
-  Buffer<Point3> take_points() { return std::move(points_); }
-  void prefetch(std::uint64_t hashed) const { __builtin_prefetch(&slots_[hashed >> shift_]); }
+using Local = Numbered::Local;
 
-  std::uint32_t number_of(const Point3& p, std::uint64_t hashed) {
-    std::size_t at = hashed >> shift_;
-    for (; slots_[at] != kFree; at = (at + 1) & mask_)
-      if (points_[slots_[at]] == p) return slots_[at];
-    const std::uint32_t number = size();
-    slots_[at] = number;
-    points_.push_back(p);
-    if (3 * points_.size() > 2 * slots_.size()) grow();
-    return number;
+/// The points of a chunk, each once, in the order in which its facets name them.
+struct Chunk {
+  const Point3* point = nullptr;
+  std::uint32_t count = 0;
+  std::uint32_t numbers_from = 0;  // of those that no earlier chunk has
+  std::size_t before = 0;          // points of earlier chunks
+};
+
+/// Numbers the corners of one chunk after the other, in memory that stays in a core's cache. Corners find the first corner that
+/// is the same point through a table in which the first corner of each hash stands: it is written from the last corner to the
+/// first, so no branch depends on what it held. Points whose slot another one has are few, and are found by probing.
+class ChunkNumbers {
+ public:
+  /// point  where to write the points, at most as many as corners; may be where the triangles begin, or before
+  /// returns  how many there are
+  std::uint32_t number(std::span<const Triangle> triangles, Local* facets, Point3* point) {
+    const auto corners = static_cast<std::uint32_t>(3 * triangles.size());
+    const Point3* const corner = &triangles.front().a;
+    match({corner, corners});
+    std::uint32_t count = 0;
+    std::uint16_t* const number = facets->data();
+    for (std::uint32_t i = 0; i < corners; ++i) {
+      number_[i] = static_cast<std::uint16_t>(count);  // of a first corner
+      number[i] = number_[first_[i]];
+      const Point3 at = corner[i];  // not behind point[count], which is read no more
+      point[count] = at;
+      count += first_[i] == i;
+    }
+    return count;
   }
 
  private:
-  void clear(std::size_t slots) {
-    slots_.resize(slots);
-    std::fill(slots_.begin(), slots_.end(), kFree);
-    mask_ = slots - 1;
-    shift_ = 64;
-    for (std::size_t i = slots; i > 1; i /= 2) --shift_;
-  }
-  void grow() {
-    const std::size_t slots = 2 * slots_.size();
-    Buffer<std::uint32_t>().swap(slots_);
-    clear(slots);
-    for (std::uint32_t number = 0; number < points_.size(); ++number) {
-      std::size_t at = hash_of(points_[number]) >> shift_;
-      while (slots_[at] != kFree) at = (at + 1) & mask_;
-      slots_[at] = number;
+  static constexpr std::uint16_t kNone = UINT16_MAX;
+  static constexpr int kSlotBits = 15;
+  static constexpr std::size_t kSlots = std::size_t{1} << kSlotBits;
+
+  static bool same(const Point3& p, const Point3& q) { return ((p.x ^ q.x) | (p.y ^ q.y) | (p.z ^ q.z)) == 0; }
+
+  void match(std::span<const Point3> corner) {
+    const auto corners = static_cast<std::uint32_t>(corner.size());
+    for (std::uint32_t i = 0; i < corners; ++i) hash_[i] = static_cast<std::uint16_t>(hash_of(corner[i]) >> (64 - kSlotBits));
+    for (std::uint32_t i = corners; i-- > 0;) slot_[hash_[i]] = static_cast<std::uint16_t>(i);
+    std::uint32_t unmatched = 0;
+    for (std::uint32_t i = 0; i < corners; ++i) {
+      first_[i] = slot_[hash_[i]];
+      rest_[unmatched] = static_cast<std::uint16_t>(i);
+      unmatched += !same(corner[i], corner[first_[i]]);
+    }
+    if (unmatched == 0) return;
+    slot_.fill(kNone);
+    for (std::uint32_t r = 0; r < unmatched; ++r) {
+      const std::uint16_t i = rest_[r];
+      std::size_t at = hash_[i];
+      while (slot_[at] != kNone && !same(corner[i], corner[slot_[at]])) at = (at + 1) % kSlots;
+      if (slot_[at] == kNone) slot_[at] = i;
+      first_[i] = slot_[at];
     }
   }
 
-  Buffer<Point3> points_;
-  Buffer<std::uint32_t> slots_;
-  std::size_t mask_ = 0;
-  int shift_ = 64;  // the upper bits of a hash are the slot: they depend on all of the point
+  std::array<std::uint16_t, kSlots> slot_;
+  std::array<std::uint16_t, 3 * kChunk> hash_, first_, number_, rest_;
 };
 
-/// Calls put(i, facet) for each triangle in order, once nothing of it is read any more. returns  the vertices
-template <class Put>
-Buffer<Point3> number_vertices(std::span<const Triangle> triangles, const Put& put) {
-  Table table(triangles.size() / 2 + triangles.size() / 16);  // a closed mesh has half as many vertices as facets
-  std::array<std::uint64_t, 3 * kAhead> hashes;
-  for (std::size_t first = 0; first < triangles.size(); first += kAhead) {
-    const std::size_t count = std::min(kAhead, triangles.size() - first);
-    for (std::size_t i = 0; i < count; ++i) {
-      const Triangle& t = triangles[first + i];
-      hashes[3 * i] = hash_of(t.a), hashes[3 * i + 1] = hash_of(t.b), hashes[3 * i + 2] = hash_of(t.c);
-      for (std::size_t k = 0; k < 3; ++k) table.prefetch(hashes[3 * i + k]);
+/// Points of all chunks, each in one slot, which holds its smallest name and later its number.
+class Table {
+ public:
+  Table(std::span<const Chunk> chunks, std::size_t slots)
+      : chunks_(chunks),
+        pages_(slots * sizeof(std::uint32_t)),
+        slots_(reinterpret_cast<std::uint32_t*>(pages_.take(slots * sizeof(std::uint32_t))), slots),
+        mask_(slots - 1) {
+    for (std::size_t i = slots; i > 1; i /= 2) --shift_;
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, slots, std::size_t{1} << 16),
+                      [&](const auto& range) { std::fill(slots_.data() + range.begin(), slots_.data() + range.end(), kFree); });
+  }
+
+  std::uint32_t& operator[](std::uint32_t slot) { return slots_[slot]; }
+
+  /// Enters the points of a chunk, and tells their slots; any thread may. false  it would fill the table
+  bool enter(std::uint32_t number, std::uint32_t* slots) {
+    const Chunk& chunk = chunks_[number];
+    if (4 * (reserved_ += chunk.count) > 3 * slots_.size()) return false;
+    // What a slot points at is on its way when it is compared, and the slot itself before that.
+    constexpr std::uint32_t kAhead = 16;
+    std::array<std::uint64_t, 4 * kAhead> hashes;
+    std::uint32_t taken = 0;
+    for (std::uint32_t i = 0; i < chunk.count + 2 * kAhead; ++i) {
+      if (i < chunk.count) {
+        std::uint64_t& hashed = hashes[i % hashes.size()];
+        hashed = hash_of(chunk.point[i]);
+        __builtin_prefetch(&slots_[hashed >> shift_], 1);
+      }
+      if (i >= kAhead && i - kAhead < chunk.count) {
+        const std::uint32_t held = std::atomic_ref<std::uint32_t>(slots_[hashes[(i - kAhead) % hashes.size()] >> shift_])
+                                       .load(std::memory_order_relaxed);
+        if (held != kFree) __builtin_prefetch(&point_named(held));
+      }
+      if (i < 2 * kAhead) continue;
+      const std::uint32_t at = i - 2 * kAhead;
+      slots[at] = slot_of(chunk.point[at], hashes[at % hashes.size()], number << kNameBits | at, taken);
     }
-    for (std::size_t i = 0; i < count; ++i) {
-      const Triangle& t = triangles[first + i];
-      Indexed::Facet facet;
-      facet[0] = table.number_of(t.a, hashes[3 * i]);
-      facet[1] = table.number_of(t.b, hashes[3 * i + 1]);
-      facet[2] = table.number_of(t.c, hashes[3 * i + 2]);
-      put(first + i, facet);
+    reserved_ -= chunk.count - taken;
+    return true;
+  }
+
+ private:
+  // A slot that holds a name of a point never holds one of another point.
+  std::uint32_t slot_of(const Point3& p, std::uint64_t hashed, std::uint32_t name, std::uint32_t& taken) {
+    for (std::size_t at = hashed >> shift_;; at = (at + 1) & mask_) {
+      const std::atomic_ref<std::uint32_t> slot(slots_[at]);
+      std::uint32_t held = slot.load(std::memory_order_relaxed);
+      if (held == kFree && slot.compare_exchange_strong(held, name, std::memory_order_relaxed)) {
+        ++taken;
+        return static_cast<std::uint32_t>(at);
+      }
+      if (!(point_named(held) == p)) continue;
+      while (name < held && !slot.compare_exchange_weak(held, name, std::memory_order_relaxed)) {
+      }
+      return static_cast<std::uint32_t>(at);
     }
   }
-  return table.take_points();
-}
+  const Point3& point_named(std::uint32_t name) const {
+    return chunks_[name >> kNameBits].point[name & ((1u << kNameBits) - 1)];
+  }
 
-char* place_of(Indexed::Facet* facets, std::size_t facet) { return reinterpret_cast<char*>(facets + facet); }
+  std::span<const Chunk> chunks_;
+  Pages pages_;  // large ones: a slot is anywhere
+  std::span<std::uint32_t> slots_;
+  std::size_t mask_;
+  int shift_ = 64;                        // the upper bits of a hash are the slot: they depend on all of the point
+  std::atomic<std::size_t> reserved_{0};  // slots that are taken, or may be by chunks that are being entered
+};
 
 }  // namespace
 
-Numbered::Numbered(std::span<const Triangle> triangles) : own_(triangles.size()), facets_(own_) {
-  vertices_ = number_vertices(triangles, [&](std::size_t i, const Indexed::Facet& facet) { own_[i] = facet; });
+class Numbering {
+ public:
+  explicit Numbering(std::size_t triangles) : facets_(triangles), chunks_((triangles + kChunk - 1) / kChunk) {}
+
+  /// Calls done(end, triangle) when the list has been read up to a triangle from the beginning of a task on.
+  /// points  room for as many points as corners; may be the memory of the list
+  template <class Done>
+  void read(std::span<const Triangle> triangles, Point3* points, const Done& done) {
+    tbb::enumerable_thread_specific<std::unique_ptr<ChunkNumbers>> workers([] { return std::make_unique<ChunkNumbers>(); });
+    tbb::parallel_for(
+        tbb::blocked_range<std::size_t>(0, chunks_.size(), kTogether),
+        [&](const tbb::blocked_range<std::size_t>& range) {
+          ChunkNumbers& worker = *workers.local();
+          Point3* to = points + 3 * kChunk * range.begin();
+          for (std::size_t c = range.begin(); c != range.end(); ++c) {
+            const std::size_t first = c * kChunk, count = std::min(kChunk, triangles.size() - first);
+            chunks_[c].point = to;
+            chunks_[c].count = worker.number(triangles.subspan(first, count), facets_.data() + first, to);
+            to += chunks_[c].count;
+          }
+          done(to, std::min(range.end() * kChunk, triangles.size()));
+        },
+        tbb::simple_partitioner());
+  }
+
+  /// The chunks are blocks. Points of blocks that hold clusters as they are read go to `listed`.
+  void read(const MeshBlocks& blocks, std::vector<Buffer<Point3>>& listed) {
+    tbb::enumerable_thread_specific<std::unique_ptr<ChunkNumbers>> workers([] { return std::make_unique<ChunkNumbers>(); });
+    for_each_chunk([&](std::uint32_t c) {
+      const std::uint32_t cluster = c * MeshBlocks::kClusters, count = blocks.triangles_in(c);
+      Local* const facets = facets_.data() + c * kChunk;
+      const MeshBlocks::Indexed first = blocks.indexed(cluster);
+      if (first.cluster == nullptr) {
+        Buffer<Triangle> list(count);
+        for (std::uint32_t i = 0; i < count; ++i)
+          list[i] = blocks.listed(cluster + i / kClusterSize).triangle(i % kClusterSize);
+        listed[c].resize(3 * count);
+        chunks_[c].count = workers.local()->number(list, facets, listed[c].data());
+        listed[c].resize(chunks_[c].count);
+        listed[c].shrink_to_fit();
+        chunks_[c].point = listed[c].data();
+        return;
+      }
+      std::uint16_t last = 0;  // vertices count in the order in which corners name them
+      for (std::uint32_t i = 0; i < count; ++i) {
+        const auto& corner = first.cluster[i / kClusterSize].corner;
+        const std::uint32_t lane = i % kClusterSize;
+        facets[i] = {corner[0][lane], corner[1][lane], corner[2][lane]};
+        last = std::max({last, facets[i][0], facets[i][1], facets[i][2]});
+      }
+      chunks_[c].point = first.vertex;
+      chunks_[c].count = last + 1u;
+    });
+  }
+
+  /// Numbers the points of all chunks. returns  the vertices
+  Buffer<Point3> join() {
+    std::size_t points = 0, slots = 64;
+    for (Chunk& chunk : chunks_) chunk.before = std::exchange(points, points + chunk.count);
+    slot_.resize(points);
+    first_.resize(points);
+    // A closed mesh has half as many vertices as facets; where there are more, the table is made anew.
+    const std::size_t expected = std::min(points, facets_.size() / 2 + facets_.size() / 16);
+    while (2 * slots < 3 * expected) slots *= 2;
+    std::unique_ptr<Table> table;
+    for (;; slots *= 2) {
+      table.reset();
+      table = std::make_unique<Table>(chunks_, slots);
+      std::atomic<bool> all{true};
+      for_each_chunk([&](std::uint32_t c) {
+        if (all && !table->enter(c, slot_.data() + chunks_[c].before)) all = false;
+      });
+      if (all) break;
+    }
+    for_each_chunk([&](std::uint32_t c) { find_first(c, *table); });
+    std::uint32_t count = 0;
+    for (Chunk& chunk : chunks_) chunk.numbers_from = std::exchange(count, count + chunk.numbers_from);
+    Buffer<Point3> vertices(count);
+    for_each_chunk([&](std::uint32_t c) { number(chunks_[c], *table, vertices); });
+    in_several_.resize(count);
+    std::fill(in_several_.begin(), in_several_.end(), std::uint8_t{0});
+    for_each_chunk([&](std::uint32_t c) {
+      for (std::size_t i = chunks_[c].before, end = i + chunks_[c].count; i < end; ++i) {
+        slot_[i] = (*table)[slot_[i]];
+        if (first_[i] == 0) std::atomic_ref<std::uint8_t>(in_several_[slot_[i]]).store(1, std::memory_order_relaxed);
+      }
+    });
+    return vertices;
+  }
+
+  void write(Indexed::Facet* facets) const {
+    for_each_chunk([&](std::uint32_t c) {
+      const std::uint32_t* const number = slot_.data() + chunks_[c].before;
+      for (std::size_t i = c * kChunk, end = std::min(i + kChunk, facets_.size()); i < end; ++i) {
+        const Indexed::Facet facet = {number[facets_[i][0]], number[facets_[i][1]], number[facets_[i][2]]};
+        std::memcpy(static_cast<void*>(facets + i), &facet, sizeof facet);
+      }
+    });
+  }
+
+  bool in_order() const { return 4 * slot_.size() <= 3 * facets_.size(); }
+  Buffer<Local> take_local() { return std::move(facets_); }
+  Buffer<std::uint32_t> take_numbers() { return std::move(slot_); }
+  Buffer<std::uint8_t> take_in_several() { return std::move(in_several_); }
+  Buffer<std::size_t> begins() const {
+    Buffer<std::size_t> begins;
+    for (const Chunk& chunk : chunks_) begins.push_back(chunk.before);
+    begins.push_back(slot_.size());
+    return begins;
+  }
+
+ private:
+  template <class Visit>
+  void for_each_chunk(const Visit& visit) const {
+    tbb::parallel_for(std::uint32_t{0}, static_cast<std::uint32_t>(chunks_.size()), visit);
+  }
+
+  /// Which points of a chunk no earlier one has, and how many.
+  void find_first(std::uint32_t c, Table& table) {
+    Chunk& chunk = chunks_[c];
+    for (std::uint32_t i = 0; i < chunk.count; ++i) {
+      const bool is = table[slot_[chunk.before + i]] == (c << kNameBits | i);
+      first_[chunk.before + i] = is;
+      chunk.numbers_from += is;
+    }
+  }
+  void number(const Chunk& chunk, Table& table, Buffer<Point3>& vertices) const {
+    std::uint32_t next = chunk.numbers_from;
+    for (std::uint32_t i = 0; i < chunk.count; ++i) {
+      if (first_[chunk.before + i] == 0) continue;
+      vertices[next] = chunk.point[i];
+      table[slot_[chunk.before + i]] = next++;
+    }
+  }
+
+  Buffer<Local> facets_;
+  std::vector<Chunk> chunks_;
+  Buffer<std::uint32_t> slot_;       // of each point of all chunks: in the table, then its number
+  Buffer<std::uint8_t> first_;       // whether it is the first of its name
+  Buffer<std::uint8_t> in_several_;  // of each vertex: several chunks have it
+};
+
+/// facets  where to write them, if that is done
+void Numbered::take(Numbering& numbering, Indexed::Facet* facets) {
+  if (facets != nullptr) numbering.write(facets);
+  begin_ = numbering.begins();
+  numbers_ = numbering.take_numbers();
+  in_several_ = numbering.take_in_several();
+  local_ = numbering.take_local();
+  if (facets != nullptr) facets_ = {facets, local_.size()};
 }
 
-// Facet i lies where triangle i / 3 was, which has been read by then.
+Numbered::Numbered(std::span<const Triangle> triangles) {
+  Numbering numbering(triangles.size());
+  Buffer<Point3> points(3 * triangles.size());  // of whose memory little is touched
+  numbering.read(triangles, points.data(), [](Point3*, std::size_t) {});
+  vertices_ = numbering.join();
+  Buffer<Point3>().swap(points);
+  if (!numbering.in_order()) own_.resize(triangles.size());
+  take(numbering, numbering.in_order() ? nullptr : own_.data());
+}
+
+Numbered::Numbered(const MeshBlocks& blocks) {
+  Numbering numbering(blocks.triangle_count());
+  {
+    std::vector<Buffer<Point3>> listed(blocks.block_count());
+    numbering.read(blocks, listed);
+    vertices_ = numbering.join();
+  }
+  if (!numbering.in_order()) own_.resize(blocks.triangle_count());
+  take(numbering, numbering.in_order() ? nullptr : own_.data());
+}
+
+// Points lie where their triangles were until vertices are known, then facets, if they are wanted, where the first third of the
+// list was. What neither takes goes back to the system.
 Numbered::Numbered(Buffer<Triangle>&& triangles) : taken_(std::move(triangles)) {
   const std::size_t count = taken_.size();
   auto* const facets = reinterpret_cast<Indexed::Facet*>(taken_.data());
-  char* unused = place_of(facets, count);  // from here on; what is read of it goes back
-  vertices_ = number_vertices(taken_, [&](std::size_t i, const Indexed::Facet& facet) {
-    std::memcpy(place_of(facets, i), &facet, sizeof facet);
-    if ((i + 1) % kTogether != 0 && i + 1 != count) return;
-    char* const read = reinterpret_cast<char*>(taken_.data() + i + 1);
-    if (read <= unused) return;
-    forget_pages(unused, read);
-    unused = read;
+  char* const rest = reinterpret_cast<char*>(facets + count);
+  Numbering numbering(count);
+  numbering.read(taken_, reinterpret_cast<Point3*>(taken_.data()), [&](Point3* points_end, std::size_t end) {
+    char* const from = std::max(rest, reinterpret_cast<char*>(points_end));
+    char* const to = reinterpret_cast<char*>(taken_.data() + end);
+    if (from < to) forget_pages(from, to);
   });
-  facets_ = {facets, count};
+  vertices_ = numbering.join();
+  if (count > 0) forget_pages(numbering.in_order() ? reinterpret_cast<char*>(facets) : rest, taken_.data() + count);
+  take(numbering, numbering.in_order() ? nullptr : facets);
 }
 
-// From the end: triangle i covers facets from 3 i on, which have been read by then.
 Buffer<Triangle> Numbered::give_back_list() {
-  for (std::size_t i = taken_.size(); i-- > 0;) {
-    const Triangle t = triangle(static_cast<std::uint32_t>(i));
-    std::memcpy(static_cast<void*>(taken_.data() + i), &t, sizeof t);
-  }
   facets_ = {};
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, taken_.size(), kChunk), [&](const auto& range) {
+    for (std::size_t i = range.begin(); i != range.end(); ++i) {
+      const Triangle t = triangle(static_cast<std::uint32_t>(i));
+      std::memcpy(static_cast<void*>(taken_.data() + i), &t, sizeof t);
+    }
+  });
   return std::move(taken_);
 }
 
