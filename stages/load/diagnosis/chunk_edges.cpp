@@ -55,15 +55,18 @@ std::uint32_t ChunkEdges::match(std::span<const std::uint16_t> sides, std::uint3
     const std::uint16_t first = slot_[hash_[i]];
     const bool same = (key_[i] ^ key_[first]) <= 1;
     match_[matches] = {first, i};
-    matches += same && first != i;
-    count_[first] = static_cast<std::uint8_t>(std::min(count_[first] + same, 3));
+    matches += same & (first != i);
     rest_[left] = i;
     left += !same;
   }
   for (std::uint32_t m = 0; m < matches; ++m) {
+    std::uint8_t& others = others_[match_[m][0]];
+    others = static_cast<std::uint8_t>(std::min(others + 1, 2));
+  }
+  for (std::uint32_t m = 0; m < matches; ++m) {
     const auto [one, other] = match_[m];
     const std::uint32_t key = key_[one];
-    const bool found = count_[one] == 2 && (key ^ key_[other]) == 1 && (own_[low_of(key)] | own_[high_of(key)]) != 0;
+    const bool found = (others_[one] == 1) & ((key ^ key_[other]) == 1) & ((own_[low_of(key)] | own_[high_of(key)]) != 0);
     pair_[pairs_] = {static_cast<std::uint16_t>(one / 3), static_cast<std::uint16_t>(other / 3)};
     pairs_ += found;
     done_[one] |= found;
@@ -80,7 +83,7 @@ std::span<const ChunkEdges::Pair> ChunkEdges::find(const Numbered& mesh, std::si
   const auto sides = static_cast<std::uint32_t>(3 * facets.size());
   for (std::size_t v = 0; v < numbers.size(); ++v) own_[v] = !mesh.in_several_chunks(numbers[v]);
   std::fill(done_.begin(), done_.begin() + sides, std::uint8_t{0});
-  std::fill(count_.begin(), count_.begin() + sides, std::uint8_t{0});
+  std::fill(others_.begin(), others_.begin() + sides, std::uint8_t{0});
   take_sides(facets, first_facet, collapsed);
   std::iota(all_.begin(), all_.begin() + sides, std::uint16_t{0});
   pairs_ = 0;
@@ -110,7 +113,11 @@ void ChunkPieces::join(std::span<const ChunkEdges::Pair> pairs, std::span<std::u
     const std::uint16_t a = find(one), b = find(other);
     parent_[std::max(a, b)] = std::min(a, b);
   }
-  for (std::size_t f = 0; f < parents.size(); ++f) parents[f] = first + find(static_cast<std::uint16_t>(f));
+  // No parent is larger than its child: whoever comes before has its root already.
+  for (std::size_t f = 0; f < parents.size(); ++f) {
+    parent_[f] = parent_[parent_[f]];
+    parents[f] = first + parent_[f];
+  }
 }
 
 SideLists::SideLists(std::uint32_t vertices, std::span<const Buffer<Side>> sides) : begin_(vertices + std::size_t{1}) {

@@ -219,8 +219,9 @@ struct SeenShells {
             const Point3& from, const Range& chunks) {
     Buffer<Point3> points;
     for (std::size_t c = chunks.begin(); c != chunks.end(); ++c) {
-      points.clear();
-      for (const std::uint32_t vertex : mesh.numbers_of(c)) points.push_back(mesh.vertices()[vertex]);
+      const std::span<const std::uint32_t> numbers = mesh.numbers_of(c);
+      points.resize(numbers.size());
+      for (std::size_t v = 0; v < numbers.size(); ++v) points[v] = mesh.vertices()[numbers[v]];
       const std::span<const Numbered::Local> facets = mesh.local_facets(c);
       const std::size_t first = c * Numbered::kChunk;
       look(points, facets, shell_of.subspan(first, facets.size()), unbalanced.subspan(first, facets.size()), from);
