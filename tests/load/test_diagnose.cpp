@@ -213,7 +213,7 @@ TEST(Diagnose, ChunksVerticesAndBlocksFindTheSame) {
     for (const std::vector<Triangle>& list : {triangles, shuffled}) {
       Mesh mesh;
       mesh.triangles.assign(list.begin(), list.end());
-      expect_same_counts(in_order, load::diagnose_blocks(*take_blocks(mesh)));
+      expect_same_counts(in_order, load::diagnose_blocks(take_blocks(mesh)));
     }
   }
 }

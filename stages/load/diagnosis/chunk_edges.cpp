@@ -55,7 +55,7 @@ std::uint32_t ChunkEdges::match(std::span<const std::uint16_t> sides, std::uint3
     const std::uint16_t first = slot_[hash_[i]];
     const bool same = (key_[i] ^ key_[first]) <= 1;
     match_[matches] = {first, i};
-    matches += same & (first != i);
+    matches += std::uint32_t{same} & std::uint32_t{first != i};
     rest_[left] = i;
     left += !same;
   }
@@ -66,11 +66,12 @@ std::uint32_t ChunkEdges::match(std::span<const std::uint16_t> sides, std::uint3
   for (std::uint32_t m = 0; m < matches; ++m) {
     const auto [one, other] = match_[m];
     const std::uint32_t key = key_[one];
-    const bool found = (others_[one] == 1) & ((key ^ key_[other]) == 1) & ((own_[low_of(key)] | own_[high_of(key)]) != 0);
+    const std::uint32_t once = others_[one] == 1, both_ways = (key ^ key_[other]) == 1;
+    const std::uint32_t found = once & both_ways & (own_[low_of(key)] | own_[high_of(key)]);
     pair_[pairs_] = {static_cast<std::uint16_t>(one / 3), static_cast<std::uint16_t>(other / 3)};
     pairs_ += found;
-    done_[one] |= found;
-    done_[other] |= found;
+    done_[one] |= static_cast<std::uint8_t>(found);
+    done_[other] |= static_cast<std::uint8_t>(found);
   }
   return left;
 }

@@ -37,9 +37,9 @@ class ChunkEdges {
   std::array<std::uint16_t, kSides> hash_, all_, rest_;
   std::array<std::uint16_t, std::size_t{1} << kSlotBits> slot_;
   std::array<std::uint8_t, kSides> others_;  // sides of the same edge behind the first, 2 for more
-  std::array<std::uint8_t, kSides> done_;   // nothing is left to say of the side
-  std::array<std::uint8_t, kSides> own_;    // no other chunk has the point
-  std::array<Pair, kSides> match_;          // two sides of an edge
+  std::array<std::uint8_t, kSides> done_;    // nothing is left to say of the side
+  std::array<std::uint8_t, kSides> own_;     // no other chunk has the point
+  std::array<Pair, kSides> match_;           // two sides of an edge
   std::array<Pair, kSides / 2> pair_;
   std::uint32_t pairs_ = 0;
 };

@@ -83,7 +83,7 @@ Result<Part> load_and_diagnose(const std::string& path, const LoadOptions& optio
   as_is.blocks = false;
   sound = false;
   if (part->meshes.size() == 1 && part->meshes.front().blocks) {
-    Diagnosis found = diagnose_blocks(*std::exchange(part->meshes.front().blocks, nullptr));
+    Diagnosis found = diagnose_blocks(std::exchange(part->meshes.front().blocks, nullptr));
     found.degenerate_facets = degenerate.finding();
     sound = is_sound(found);
     if (!sound || !found.shells_apart) part = load(path, as_is);

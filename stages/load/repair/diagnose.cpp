@@ -193,6 +193,7 @@ SeenEdges edges_in_order(const Numbered& mesh, std::size_t places, Joined& joine
   }
   const auto vertices = static_cast<std::uint32_t>(mesh.vertices().size());
   const SideLists lists(vertices, rest);
+  std::vector<Buffer<Side>>().swap(rest);
   SeenEdges seen = seen_in(all_of(vertices), SeenEdges(places),
                            [&](const Range& range, SeenEdges& some) { some.look(mesh, lists, range, joined); });
   seen.add(within);
@@ -316,10 +317,12 @@ Diagnosis diagnose(const Mesh& mesh, std::size_t places) {
   return result;
 }
 
-Diagnosis diagnose_blocks(const MeshBlocks& blocks) {
+Diagnosis diagnose_blocks(std::shared_ptr<MeshBlocks> blocks) {
   Diagnosis result;
-  result.triangles = blocks.triangle_count();
-  diagnose_edges(Numbered(blocks), 0, result);
+  result.triangles = blocks->triangle_count();
+  const Numbered numbered(*blocks);
+  blocks.reset();
+  diagnose_edges(numbered, 0, result);
   return result;
 }
 

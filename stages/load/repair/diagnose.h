@@ -47,8 +47,8 @@ Diagnosis diagnose(const Mesh& mesh, std::size_t places = 3);
 Diagnosis diagnose_alone(Mesh& mesh, std::size_t places = 3);
 
 /// The same of blocks that hold no caps. Degenerate facets are not looked for, and no places are told: the order of the file is
-/// not known.
-Diagnosis diagnose_blocks(const MeshBlocks& blocks);
+/// not known. blocks: given up as soon as their vertices are numbered
+Diagnosis diagnose_blocks(std::shared_ptr<MeshBlocks> blocks);
 
 /// What every job pays for, in one pass.
 struct Census {
