@@ -7,6 +7,7 @@ namespace {
 
 std::uint32_t clusters_for(std::uint32_t triangles) { return (triangles + kClusterSize - 1) / kClusterSize; }
 std::uint32_t blocks_for(std::uint32_t triangles) { return (triangles + kBlockSize - 1) / kBlockSize; }
+std::uint64_t bytes_of_bounds(std::uint32_t clusters) { return clusters * std::uint64_t{sizeof(Box)} + 63; }
 
 /// No block takes more than its clusters do as they are read.
 static_assert(sizeof(IndexedCluster) + kClusterSize * 3 / 2 * sizeof(Point3) + 4 + 63 <= sizeof(Cluster));
@@ -19,9 +20,11 @@ MeshBlocks::MeshBlocks(std::uint32_t own, std::uint32_t added)
       added_(added),
       first_cap_(clusters_for(own)),
       first_cap_block_(blocks_for(own)),
-      pages_(most_bytes(own) + most_bytes(added)) {
+      pages_(most_bytes(own) + most_bytes(added) + bytes_of_bounds(clusters_for(own) + clusters_for(added))) {
   blocks_.resize(std::size_t{first_cap_block_} + blocks_for(added));
-  bounds_.resize(std::size_t{first_cap_} + clusters_for(added));
+  const std::uint32_t clusters = first_cap_ + clusters_for(added);
+  bounds_ = {reinterpret_cast<Box*>(pages_.take(clusters * sizeof(Box))), clusters};
+  bounds_taken_ = pages_.bytes();
 }
 
 std::uint32_t MeshBlocks::triangles_in(std::uint32_t block) const {

@@ -95,8 +95,8 @@ class MeshBlocks {
   /// Moves every vertex. Not while others read.
   void shift(const Point3& by);
 
-  std::uint64_t bytes() const { return pages_.bytes() + bytes_held(blocks_); }  // of triangles
-  std::uint64_t bounds_bytes() const { return bytes_held(bounds_); }
+  std::uint64_t bytes() const { return pages_.bytes() - bounds_taken_ + bytes_held(blocks_); }  // of triangles
+  std::uint64_t bounds_bytes() const { return bounds_taken_; }
 
   std::uint32_t block_count() const { return static_cast<std::uint32_t>(blocks_.size()); }
   /// Which triangles of the list a block holds: own ones first, then those added.
@@ -139,8 +139,9 @@ class MeshBlocks {
 
   std::uint32_t own_, added_, first_cap_, first_cap_block_;
   Buffer<Block> blocks_;
-  Buffer<Box> bounds_;
   Pages pages_;
+  std::uint64_t bounds_taken_;
+  std::span<Box> bounds_;  // in pages_: written first where blocks are made, by all threads
 };
 
 /// Of a list or of blocks.

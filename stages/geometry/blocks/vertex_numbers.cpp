@@ -1,6 +1,6 @@
 // Corners find the first corner that is the same vertex through a table in which the first corner of each hash stands: it is
-// written from the last corner to the first, so nothing asks what it held. Vertices whose slot another one has are few, and
-// are found by probing.
+// written from the last corner to the first, so nothing asks what it held. Vertices whose slot another one has are few; they
+// are matched the same way among themselves, and those that are left then by probing.
 #include "stages/geometry/blocks/vertex_numbers.h"
 
 namespace lamina {
@@ -18,9 +18,25 @@ bool VertexNumbers::number(const SortedBlock& block, const BlockKernels& kernels
   }
   kernels.match(block, matches_);
   if (matches_.found > most) return false;
+  if (matches_.unmatched > 0) match_again(block);
   if (matches_.unmatched > 0) match_rest(block);
   count_ = kernels.number(corners, matches_);
   return count_ <= most;
+}
+
+/// The same once more among those that are left: nearly all of their slots had two vertices, one of which is matched. Whether
+/// one matches is not foreseen, so nothing branches on it.
+void VertexNumbers::match_again(const SortedBlock& block) {
+  auto& [slot, first, rest, number, vertex, found, unmatched] = matches_;
+  for (std::uint32_t r = unmatched; r-- > 0;) slot[block.hash[rest[r]] % CornerMatches::kSlots] = rest[r];
+  std::uint32_t left = 0;
+  for (std::uint32_t r = 0; r < unmatched; ++r) {
+    const std::uint16_t i = rest[r], candidate = slot[block.hash[i] % CornerMatches::kSlots];
+    first[i] = candidate;
+    rest[left] = i;
+    left += difference(corner_at(block, i), corner_at(block, candidate)) != 0 ? 1 : 0;
+  }
+  unmatched = left;
 }
 
 /// By open addressing. Hashes decide only where the search begins.

@@ -19,6 +19,7 @@ class VertexNumbers {
   const CornerMatches& matches() const { return matches_; }
 
  private:
+  void match_again(const SortedBlock& block);
   void match_rest(const SortedBlock& block);
 
   CornerMatches matches_;

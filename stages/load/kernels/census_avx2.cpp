@@ -68,10 +68,27 @@ LAMINA_INLINE std::uint64_t total(__m256i v) {
   return lane[0] + lane[1] + lane[2] + lane[3];
 }
 
-void add_sampled(std::uint64_t below, const std::uint64_t (&corner)[3][kLanes], std::uint32_t used, CensusSums& sums) {
-  for (std::uint32_t i = 0; i < used; ++i) {
-    if (unordered(corner[0][i], corner[1][i], corner[2][i]) <= below) sample(corner[0][i], corner[1][i], corner[2][i], sums);
+LAMINA_INLINE __m256i less(__m256i one, __m256i other) {
+  const __m256i sign = all(std::uint64_t{1} << 63);
+  return _mm256_cmpgt_epi64(_mm256_xor_si256(other, sign), _mm256_xor_si256(one, sign));
+}
+
+/// As sample() of those lanes. returns  how many are facets
+LAMINA_INLINE std::uint32_t sample_lanes(__m256i lanes, __m256i facet, const __m256i (&corner)[3], std::uint64_t* to) {
+  const __m256i a = corner[0], b = corner[1], c = corner[2];
+  const __m256i together =
+      _mm256_or_si256(_mm256_or_si256(_mm256_cmpeq_epi64(a, b), _mm256_cmpeq_epi64(b, c)), _mm256_cmpeq_epi64(c, a));
+  const __m256i turned = _mm256_xor_si256(_mm256_xor_si256(less(a, b), less(b, c)), less(c, a));
+  std::uint64_t value[kLanes];
+  _mm256_storeu_si256(reinterpret_cast<__m256i*>(value),
+                      _mm256_xor_si256(_mm256_or_si256(product(facet, all(kB)), all(1)), _mm256_and_si256(turned, all(1))));
+  const auto used = static_cast<unsigned>(_mm256_movemask_pd(_mm256_castsi256_pd(_mm256_andnot_si256(together, lanes))));
+  std::uint32_t count = 0;
+  for (std::uint32_t i = 0; i < kLanes; ++i) {
+    to[count] = value[i];
+    count += used >> i & 1;
   }
+  return count;
 }
 
 }  // namespace
@@ -81,6 +98,8 @@ void census(SortedBlock& block, std::uint64_t share, CensusSums& sums) {
   const __m256i sign = all(std::uint64_t{1} << 63), bound = _mm256_xor_si256(all(below), sign), to_b = all(kB), to_c = all(kC);
   const __m256i lanes = _mm256_set_epi64x(3, 2, 1, 0);
   __m256i boundary = _mm256_setzero_si256(), fingerprint = boundary;
+  std::uint64_t sampled[kBlockSize + kLanes];  // unset; four are written at once
+  std::uint32_t samples = 0;
   for (std::uint32_t first = 0; first < block.clusters() * kClusterSize; first += kLanes) {
     const std::uint32_t lane = first % kClusterSize, left = block.triangles - std::min(block.triangles, first);
     const __m256i used = _mm256_cmpgt_epi64(all(left), lanes);
@@ -99,12 +118,11 @@ void census(SortedBlock& block, std::uint64_t share, CensusSums& sums) {
     fingerprint = _mm256_add_epi64(fingerprint, _mm256_and_si256(used, fold_four(_mm256_xor_si256(forward, all(kA)), all(kD))));
     const __m256i facet = _mm256_add_epi64(_mm256_add_epi64(a, b), c);
     const __m256i beyond = _mm256_cmpgt_epi64(_mm256_xor_si256(facet, sign), bound);
-    if (_mm256_movemask_epi8(beyond) != -1) [[unlikely]] {
-      std::uint64_t hashes[3][kLanes];
-      for (std::uint32_t k = 0; k < 3; ++k) _mm256_storeu_si256(reinterpret_cast<__m256i*>(hashes[k]), corner[k]);
-      add_sampled(below, hashes, std::min(left, kLanes), sums);
+    if (_mm256_movemask_epi8(beyond) != -1) {
+      samples += sample_lanes(_mm256_andnot_si256(beyond, used), facet, corner, sampled + samples);
     }
   }
+  sums.sampled.insert(sums.sampled.end(), sampled, sampled + samples);
   sums.boundary += total(boundary);
   sums.fingerprint += total(fingerprint);
 }
