@@ -12,8 +12,11 @@ namespace lamina {
 namespace {
 
 using Four = Nm __attribute__((vector_size(16)));
+using SixteenCounts = std::uint16_t __attribute__((vector_size(32)));
 using FourHeights = std::uint32_t __attribute__((vector_size(16)));
 using FourSums = std::uint64_t __attribute__((vector_size(32)));
+
+constexpr std::uint32_t kFewValues = 1 << 13;  // 16 KiB of counts
 
 /// The height of the middle of each facet and where its first corner lies, and what the order needs to know of all, nm.
 struct Heights {
@@ -122,15 +125,46 @@ LAMINA_BODY void sort_by_byte(const std::uint32_t* key, std::uint32_t count, std
   each([&](std::uint16_t* of, std::uint32_t one) { out[of[one >> shift & 255]++] = static_cast<Out>(one); });
 }
 
+/// Each bucket's count becomes how many numbers lie in those before it. The array's length is a multiple of 16.
+LAMINA_BODY void sum_up_before(std::uint16_t* bucket, std::uint32_t buckets) {
+  SixteenCounts before = {};
+  for (std::uint32_t i = 0; i < buckets; i += 16) {
+    SixteenCounts own, sum;
+    const SixteenCounts zero = {};
+    std::memcpy(&own, bucket + i, sizeof own);
+    sum = own + __builtin_shufflevector(zero, own, 0, 16, 17, 18, 19, 20, 21, 22, 23, 24, 25, 26, 27, 28, 29, 30);
+    sum += __builtin_shufflevector(zero, sum, 0, 1, 16, 17, 18, 19, 20, 21, 22, 23, 24, 25, 26, 27, 28, 29);
+    sum += __builtin_shufflevector(zero, sum, 0, 1, 2, 3, 16, 17, 18, 19, 20, 21, 22, 23, 24, 25, 26, 27);
+    sum += __builtin_shufflevector(zero, sum, 0, 1, 2, 3, 4, 5, 6, 7, 16, 17, 18, 19, 20, 21, 22, 23);
+    const SixteenCounts first = before + sum - own;
+    std::memcpy(bucket + i, &first, sizeof first);
+    before += __builtin_shufflevector(sum, sum, 15, 15, 15, 15, 15, 15, 15, 15, 15, 15, 15, 15, 15, 15, 15, 15);
+  }
+}
+
+/// Sorts by the upper half of keys at once, stably: where there are few values, a bucket for each fits the nearest cache.
+LAMINA_BODY void sort_at_once(const std::uint32_t* key, std::uint32_t count, std::uint32_t values, std::uint16_t* order) {
+  alignas(64) std::uint16_t bucket[kFewValues];
+  const std::uint32_t buckets = (values + 15) / 16 * 16;
+  std::memset(bucket, 0, buckets * sizeof *bucket);
+  for (std::uint32_t i = 0; i < count; ++i) ++bucket[key[i] >> 16];
+  sum_up_before(bucket, buckets);
+  for (std::uint32_t i = 0; i < count; ++i) order[bucket[key[i] >> 16]++] = static_cast<std::uint16_t>(i);
+}
+
 LAMINA_BODY void order_body(std::span<const Triangle> block, std::uint16_t* order) {
   Heights heights;
   see(block, heights);
   const BlockOrder place(heights, block.size());
-  std::array<std::uint32_t, kBlockSize> key, half_sorted;  // the number of the triangle behind it
+  std::array<std::uint32_t, kBlockSize> key;  // the number of the triangle behind it
   const auto count = static_cast<std::uint32_t>(block.size());
   for (std::uint32_t i = 0; i < count; ++i) {
     key[i] = static_cast<std::uint32_t>(place.key(heights.middle[i], heights.y[i])) << 16 | i;
   }
+  // No key is greater than that of the greatest of both, for each grows with its own.
+  const auto values = static_cast<std::uint32_t>(place.key(heights.highest, heights.back)) + 1;
+  if (values <= kFewValues) return sort_at_once(key.data(), count, values, order);
+  std::array<std::uint32_t, kBlockSize> half_sorted;
   sort_by_byte(key.data(), count, 16, half_sorted.data());
   sort_by_byte(half_sorted.data(), count, 24, order);
 }
