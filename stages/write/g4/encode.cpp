@@ -247,7 +247,7 @@ std::size_t Encoder::encode(const RunsView& runs, Buffer<std::byte>& file, std::
     std::span<const std::uint32_t> row = runs.row(r);
     std::uint32_t coded = 0;  // changes of the row
     const bool same = row.size() > kFewChanges && is_same(row, above);
-    if (body_ != nullptr && row.size() == above.size() && row.size() - 1 < body_->most_changes && !same) {
+    if (body_ != nullptr && row.size() == above.size() && !row.empty() && !same) {
       const SteadyRows steady = steady_rows(runs, r);
       make_room(steady.rows * most_bytes(row.size(), row.size(), columns));
       const std::uint32_t done = put_steady_rows(writer, steady, *body_);

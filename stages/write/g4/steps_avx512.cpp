@@ -10,6 +10,8 @@
 #if defined(LAMINA_WIDE_KERNELS)
 #include <immintrin.h>
 
+#define LAMINA_INLINE LAMINA_AVX512 __attribute__((always_inline)) inline
+
 #if defined(__GNUC__) && !defined(__clang__)
 #pragma GCC diagnostic push
 #pragma GCC diagnostic ignored "-Wuninitialized"  // g++ 12 blames its own header
@@ -17,30 +19,10 @@
 #endif
 
 namespace lamina::write::g4::avx512 {
+namespace {
 
-LAMINA_AVX512 void find_steps(const StepsTask& task, Steps& steps) {
-  const auto all = static_cast<__mmask16>((1u << task.count) - 1);
-  const auto inner = static_cast<__mmask16>(all & ~task.ends);
-  const std::uint32_t* const at = task.change;
-  const std::uint32_t* const above_at = at - task.changes;
-  const __m512i change = _mm512_maskz_loadu_epi32(all, at), above = _mm512_maskz_loadu_epi32(all, above_at);
-  const __m512i next = _mm512_mask_loadu_epi32(_mm512_set1_epi32(-1), inner, at + 1);
-  const __m512i next_above = _mm512_mask_loadu_epi32(_mm512_set1_epi32(static_cast<int>(task.columns)), inner, above_at + 1);
-  const __mmask16 keeps = _mm512_mask_cmpge_epu32_mask(_mm512_mask_cmpgt_epu32_mask(all, next_above, change), next, above);
-  const __m512i mode = _mm512_add_epi32(_mm512_sub_epi32(change, above), _mm512_set1_epi32(3));
-  const __mmask16 far = _mm512_mask_cmpgt_epu32_mask(all, mode, _mm512_set1_epi32(6));
-  steps.keeps = keeps;
-  steps.far = far;
-  steps.count = static_cast<std::uint32_t>(std::countr_zero((~std::uint32_t{keeps} & 0xFFFF) | far | 0x10000));
-
-  // Vertical modes 3 to the left .. 3 to the right; the upper half is followed by the row's end, a vertical mode of 0.
-  const __m512i code_of = _mm512_setr_epi32(2, 2, 2, 1, 3, 3, 3, 0, 5, 5, 5, 3, 7, 7, 7, 0);
-  const __m512i length_of = _mm512_setr_epi32(7, 6, 3, 1, 3, 6, 7, 0, 8, 7, 4, 2, 4, 7, 8, 0);
-  const auto taken = static_cast<__mmask16>((1u << steps.count) - 1);
-  const __m512i index = _mm512_mask_add_epi32(mode, static_cast<__mmask16>(task.ends), mode, _mm512_set1_epi32(8));
-  const __m512i code = _mm512_maskz_permutexvar_epi32(taken, index, code_of);
-  const __m512i length = _mm512_maskz_permutexvar_epi32(taken, index, length_of);
-
+/// Joins the words of all lanes; a lane of length 0 has no word.
+LAMINA_INLINE void join(__m512i code, __m512i length, Steps& steps) {
   const __m512i low = _mm512_set1_epi64(0xFFFFFFFF);
   const __m512i odd = _mm512_srli_epi64(length, 32);
   const __m512i two = _mm512_or_si512(_mm512_sllv_epi64(_mm512_and_si512(code, low), odd), _mm512_srli_epi64(code, 32));
@@ -57,9 +39,53 @@ LAMINA_AVX512 void find_steps(const StepsTask& task, Steps& steps) {
   steps.lengths[1] = static_cast<std::uint32_t>(_mm_cvtsi128_si32(_mm512_extracti64x2_epi64(eight_length, 2)));
 }
 
+}  // namespace
+
+LAMINA_AVX512 void put_steps(BitWriter& writer, StepsTask& task, Steps& found) {
+  // Vertical modes 3 to the left .. 3 to the right; the upper half is followed by the row's end, a vertical mode of 0.
+  const __m512i code_of = _mm512_setr_epi32(2, 2, 2, 1, 3, 3, 3, 0, 5, 5, 5, 3, 7, 7, 7, 0);
+  const __m512i length_of = _mm512_setr_epi32(7, 6, 3, 1, 3, 6, 7, 0, 8, 7, 4, 2, 4, 7, 8, 0);
+  const __m512i columns = _mm512_set1_epi32(static_cast<int>(task.columns));
+  BitWriter out = writer;
+  RowEnds row_ends = task.ends;
+  const std::uint32_t* at = task.change;
+  std::uint32_t left = task.left;
+  for (; left != 0; at += 16, left -= 16, row_ends.advance_all()) {
+    const auto all = static_cast<__mmask16>(left >= 16 ? 0xFFFF : (1u << left) - 1);
+    const auto ends = static_cast<__mmask16>(row_ends.bits());
+    const auto inner = static_cast<__mmask16>(all & ~ends);
+    const std::uint32_t* const above_at = at - task.changes;
+    const __m512i change = _mm512_maskz_loadu_epi32(all, at), above = _mm512_maskz_loadu_epi32(all, above_at);
+    const __m512i next = _mm512_mask_loadu_epi32(_mm512_set1_epi32(-1), inner, at + 1);
+    const __m512i next_above = _mm512_mask_loadu_epi32(columns, inner, above_at + 1);
+    const __mmask16 keeps = _mm512_mask_cmpge_epu32_mask(_mm512_mask_cmpgt_epu32_mask(all, next_above, change), next, above);
+    const __m512i mode = _mm512_add_epi32(_mm512_sub_epi32(change, above), _mm512_set1_epi32(3));
+    const __mmask16 far = _mm512_mask_cmpgt_epu32_mask(all, mode, _mm512_set1_epi32(6));
+    const __m512i index = _mm512_mask_add_epi32(mode, ends, mode, _mm512_set1_epi32(8));
+    const std::uint32_t stops = (~std::uint32_t{keeps} & 0xFFFF) | far;
+    if (stops != 0) {
+      found.keeps = keeps;
+      found.far = far;
+      found.count = static_cast<std::uint32_t>(std::countr_zero(stops));
+      const auto taken = static_cast<__mmask16>((1u << found.count) - 1);
+      join(_mm512_maskz_permutexvar_epi32(taken, index, code_of), _mm512_maskz_permutexvar_epi32(taken, index, length_of),
+           found);
+      break;
+    }
+    Steps steps;
+    join(_mm512_permutexvar_epi32(index, code_of), _mm512_permutexvar_epi32(index, length_of), steps);
+    put_words(out, steps);
+  }
+  writer = out;
+  task.ends = row_ends;
+  task.change = at;
+  task.left = left;
+}
+
 }  // namespace lamina::write::g4::avx512
 
 #if defined(__GNUC__) && !defined(__clang__)
 #pragma GCC diagnostic pop
 #endif
+#undef LAMINA_INLINE
 #endif
