@@ -62,6 +62,25 @@ LAMINA_INLINE void merge_four(__m256i (&v)[4]) {
   v[3] = merge_bitonic(_mm256_max_epu32(high, high_2));
 }
 
+/// Sorts four registers as one list. Fours are sorted across registers first, where no lane has to move, and turned from
+/// columns into rows: half the work of sorting them within each.
+LAMINA_INLINE void sort_four_registers(__m256i (&v)[4]) {
+  const auto in_order = [](__m256i& a, __m256i& b) LAMINA_AVX2 {
+    const __m256i low = _mm256_min_epu32(a, b);
+    b = _mm256_max_epu32(a, b);
+    a = low;
+  };
+  in_order(v[0], v[1]), in_order(v[2], v[3]), in_order(v[0], v[2]), in_order(v[1], v[3]), in_order(v[1], v[2]);
+  const __m256i low = _mm256_unpacklo_epi32(v[0], v[1]), low_2 = _mm256_unpacklo_epi32(v[2], v[3]);
+  const __m256i high = _mm256_unpackhi_epi32(v[0], v[1]), high_2 = _mm256_unpackhi_epi32(v[2], v[3]);
+  v[0] = _mm256_unpacklo_epi64(low, low_2), v[1] = _mm256_unpackhi_epi64(low, low_2);
+  v[2] = _mm256_unpacklo_epi64(high, high_2), v[3] = _mm256_unpackhi_epi64(high, high_2);
+  for (__m256i& one : v) one = merge_bitonic(_mm256_blend_epi32(one, _mm256_shuffle_epi32(one, 0x1B), 0xF0));
+  merge_two(v[0], v[1]);
+  merge_two(v[2], v[3]);
+  merge_four(v);
+}
+
 /// Which of a register's crossings and their followers are not two changes, as are_changes() in rows_plain.cpp has it.
 LAMINA_INLINE std::uint32_t bad_pairs(__m256i v, __m256i next) {
   const __m256i both = _mm256_xor_si256(v, next);
@@ -81,10 +100,11 @@ LAMINA_AVX2 bool sort_in_registers(std::uint32_t* row, std::uint32_t count, bool
   }
   if constexpr (kRegisters == 1) {
     v[0] = count <= 4 ? sort_fours(v[0]) : sort_register(v[0]);
+  } else if constexpr (kRegisters == 2) {
+    v[0] = sort_register(v[0]), v[1] = sort_register(v[1]);
+    merge_two(v[0], v[1]);
   } else {
-    for (__m256i& one : v) one = sort_register(one);
-    for (std::uint32_t k = 0; k < kRegisters; k += 2) merge_two(v[k], v[k + 1]);
-    if constexpr (kRegisters == 4) merge_four(v);
+    sort_four_registers(v);
   }
   // The last crossing has no follower; beyond it values are equal.
   std::uint32_t bad = 0;
@@ -126,10 +146,8 @@ LAMINA_AVX2 std::uint32_t* sort_many(std::uint32_t* row, std::uint32_t count, st
   std::fill(row + count, row + padded, UINT32_MAX);
   for (std::uint32_t i = 0; i < padded; i += kBlock) {
     __m256i v[4];
-    for (std::uint32_t k = 0; k < 4; ++k) v[k] = sort_register(load_row(row + i + k * kLanes));
-    merge_two(v[0], v[1]);
-    merge_two(v[2], v[3]);
-    merge_four(v);
+    for (std::uint32_t k = 0; k < 4; ++k) v[k] = load_row(row + i + k * kLanes);
+    sort_four_registers(v);
     for (std::uint32_t k = 0; k < 4; ++k) store_row(row + i + k * kLanes, v[k]);
   }
   for (std::uint32_t length = kBlock; length < padded; length *= 2) {

@@ -46,7 +46,9 @@ LAMINA_INLINE __m512i step(__m512i v) {
 
 LAMINA_INLINE __m512i merge_bitonic(__m512i v) { return step<1, 16>(step<2, 16>(step<4, 16>(step<8, 16>(v)))); }
 LAMINA_INLINE __m512i sort_fours(__m512i v) { return step<1, 4>(step<2, 4>(step<1, 2>(v))); }
-LAMINA_INLINE __m512i sort_register(__m512i v) { return merge_bitonic(step<1, 8>(step<2, 8>(step<4, 8>(sort_fours(v))))); }
+/// Merges fours, of which the second and the last fall.
+LAMINA_INLINE __m512i merge_fours(__m512i v) { return merge_bitonic(step<1, 8>(step<2, 8>(step<4, 8>(v)))); }
+LAMINA_INLINE __m512i sort_register(__m512i v) { return merge_fours(sort_fours(v)); }
 
 LAMINA_INLINE __m512i reversed(__m512i v) {
   return _mm512_permutexvar_epi32(_mm512_set_epi32(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15), v);
@@ -68,6 +70,25 @@ LAMINA_INLINE void merge_four(__m512i (&v)[4]) {
   v[1] = merge_bitonic(_mm512_max_epu32(low, low_2));
   v[2] = merge_bitonic(_mm512_min_epu32(high, high_2));
   v[3] = merge_bitonic(_mm512_max_epu32(high, high_2));
+}
+
+/// Sorts four registers as one list. Fours are sorted across registers first, where no lane has to move, and turned from
+/// columns into rows: half the work of sorting them within each.
+LAMINA_INLINE void sort_four_registers(__m512i (&v)[4]) {
+  const auto in_order = [](__m512i& a, __m512i& b) LAMINA_AVX512 {
+    const __m512i low = _mm512_min_epu32(a, b);
+    b = _mm512_max_epu32(a, b);
+    a = low;
+  };
+  in_order(v[0], v[1]), in_order(v[2], v[3]), in_order(v[0], v[2]), in_order(v[1], v[3]), in_order(v[1], v[2]);
+  const __m512i low = _mm512_unpacklo_epi32(v[0], v[1]), low_2 = _mm512_unpacklo_epi32(v[2], v[3]);
+  const __m512i high = _mm512_unpackhi_epi32(v[0], v[1]), high_2 = _mm512_unpackhi_epi32(v[2], v[3]);
+  v[0] = _mm512_unpacklo_epi64(low, low_2), v[1] = _mm512_unpackhi_epi64(low, low_2);
+  v[2] = _mm512_unpacklo_epi64(high, high_2), v[3] = _mm512_unpackhi_epi64(high, high_2);
+  for (__m512i& one : v) one = merge_fours(_mm512_mask_shuffle_epi32(one, 0xF0F0, one, _MM_PERM_ABCD));
+  merge_two(v[0], v[1]);
+  merge_two(v[2], v[3]);
+  merge_four(v);
 }
 
 /// The same in half a register, in six steps instead of ten.
@@ -98,7 +119,8 @@ LAMINA_INLINE __mmask16 bad_pairs(__m512i v, __m512i next) {
 /// The lowest `count` lanes.
 LAMINA_INLINE __mmask16 lowest(std::uint32_t count) { return static_cast<__mmask16>(_bzhi_u32(0xFFFF, count)); }
 
-/// Sorts up to eight crossings and writes the row if it is its own changes; else puts it back, sorted.
+/// Sorts up to eight crossings and writes the row if it is its own changes; else puts it back, sorted. It is written before
+/// that is known, so that no address waits for the sorting.
 LAMINA_AVX512 bool sort_eight(std::uint32_t* row, std::uint32_t count, bool positive, std::uint32_t* change) {
   const __m256i none = _mm256_set1_epi32(-1);
   const __m256i v = sort_half(_mm256_mask_loadu_epi32(none, static_cast<__mmask8>(lowest(count)), row));
@@ -106,9 +128,31 @@ LAMINA_AVX512 bool sort_eight(std::uint32_t* row, std::uint32_t count, bool posi
   std::uint32_t bad = _mm256_testn_epi32_mask(both, _mm256_set1_epi32(1)) | _mm256_cmplt_epu32_mask(both, _mm256_set1_epi32(2));
   bad = _bzhi_u32(bad, count - 1) | (count & 1);
   if (positive) bad |= ~static_cast<std::uint32_t>(_mm256_cvtsi256_si32(v)) & 1;
-  const bool done = bad == 0;
-  _mm256_storeu_si256(reinterpret_cast<__m256i*>(done ? change : row), done ? _mm256_srli_epi32(v, 1) : v);
-  return done;
+  _mm256_storeu_si256(reinterpret_cast<__m256i*>(change), _mm256_srli_epi32(v, 1));
+  if (bad == 0) [[likely]]
+    return true;
+  _mm256_storeu_si256(reinterpret_cast<__m256i*>(row), v);
+  return false;
+}
+
+/// The same for up to four, in three steps instead of six.
+LAMINA_INLINE bool sort_four(std::uint32_t* row, std::uint32_t count, bool positive, std::uint32_t* change) {
+  const __m128i none = _mm_set1_epi32(-1);
+  const auto in_order = [](__m128i v, __m128i other, __mmask8 greater)
+                            LAMINA_AVX512 { return _mm_mask_max_epu32(_mm_min_epu32(v, other), greater, v, other); };
+  __m128i v = _mm_mask_loadu_epi32(none, static_cast<__mmask8>(_bzhi_u32(15, count)), row);
+  v = in_order(v, _mm_shuffle_epi32(v, 0xB1), 0b1010);
+  v = in_order(v, _mm_shuffle_epi32(v, 0x1B), 0b1100);
+  v = in_order(v, _mm_shuffle_epi32(v, 0xB1), 0b1010);
+  const __m128i both = _mm_xor_si128(v, _mm_alignr_epi32(none, v, 1));
+  std::uint32_t bad = _mm_testn_epi32_mask(both, _mm_set1_epi32(1)) | _mm_cmplt_epu32_mask(both, _mm_set1_epi32(2));
+  bad = _bzhi_u32(bad, count - 1) | (count & 1);
+  if (positive) bad |= ~static_cast<std::uint32_t>(_mm_cvtsi128_si32(v)) & 1;
+  _mm_storeu_si128(reinterpret_cast<__m128i*>(change), _mm_srli_epi32(v, 1));
+  if (bad == 0) [[likely]]
+    return true;
+  _mm_storeu_si128(reinterpret_cast<__m128i*>(row), v);
+  return false;
 }
 
 /// Sorts up to 16 * kRegisters crossings and writes the row if it is its own changes; else puts it back, sorted.
@@ -122,10 +166,11 @@ LAMINA_AVX512 bool sort_in_registers(std::uint32_t* row, std::uint32_t count, bo
   }
   if constexpr (kRegisters == 1) {
     v[0] = sort_register(v[0]);
+  } else if constexpr (kRegisters == 2) {
+    v[0] = sort_register(v[0]), v[1] = sort_register(v[1]);
+    merge_two(v[0], v[1]);
   } else {
-    for (__m512i& one : v) one = sort_register(one);
-    for (std::uint32_t k = 0; k < kRegisters; k += 2) merge_two(v[k], v[k + 1]);
-    if constexpr (kRegisters == 4) merge_four(v);
+    sort_four_registers(v);
   }
   // The last crossing has no follower; beyond it values are equal.
   std::uint64_t bad = 0;
@@ -135,12 +180,11 @@ LAMINA_AVX512 bool sort_in_registers(std::uint32_t* row, std::uint32_t count, bo
   }
   bad = _bzhi_u64(bad, count - 1) | (count & 1);
   if (positive) bad |= static_cast<std::uint64_t>(~_mm_cvtsi128_si32(_mm512_castsi512_si128(v[0]))) & 1;
-  const bool done = bad == 0;
-  std::uint32_t* const to = done ? change : row;
-  for (std::uint32_t k = 0; k < kRegisters; ++k) {
-    _mm512_storeu_si512(to + k * kLanes, done ? _mm512_srli_epi32(v[k], 1) : v[k]);
-  }
-  return done;
+  for (std::uint32_t k = 0; k < kRegisters; ++k) _mm512_storeu_si512(change + k * kLanes, _mm512_srli_epi32(v[k], 1));
+  if (bad == 0) [[likely]]
+    return true;
+  for (std::uint32_t k = 0; k < kRegisters; ++k) _mm512_storeu_si512(row + k * kLanes, v[k]);
+  return false;
 }
 
 /// Merges two sorted lists of whole registers: the lesser 16 of two registers are next, whatever comes.
@@ -167,10 +211,8 @@ LAMINA_AVX512 std::uint32_t* sort_many(std::uint32_t* row, std::uint32_t count, 
   std::fill(row + count, row + padded, UINT32_MAX);
   for (std::uint32_t i = 0; i < padded; i += kBlock) {
     __m512i v[4];
-    for (std::uint32_t k = 0; k < 4; ++k) v[k] = sort_register(load16(row + i + k * kLanes));
-    merge_two(v[0], v[1]);
-    merge_two(v[2], v[3]);
-    merge_four(v);
+    for (std::uint32_t k = 0; k < 4; ++k) v[k] = load16(row + i + k * kLanes);
+    sort_four_registers(v);
     for (std::uint32_t k = 0; k < 4; ++k) _mm512_storeu_si512(row + i + k * kLanes, v[k]);
   }
   for (std::uint32_t length = kBlock; length < padded; length *= 2) {
@@ -214,6 +256,8 @@ std::uint32_t* rows(const RowsTask& task) {
       if (count == 2) {
         done = put_pair(sorted, positive, change);
         if (!done && sorted[1] < sorted[0]) std::swap(sorted[0], sorted[1]);
+      } else if (count <= 4) {
+        done = sort_four(sorted, count, positive, change);
       } else if (count <= kLanes / 2) {
         done = sort_eight(sorted, count, positive, change);
       } else if (count <= kLanes) {
