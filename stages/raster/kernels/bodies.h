@@ -17,11 +17,25 @@ namespace lamina::raster {
 /// x and y: a share of an edge, below 2^31 nm, that four operations round, and a sum. The line through two such ends runs
 /// within (1 + slope) * 3.5 * 2^-20 nm of the facet's between them, however close they are. Products on the way to a guess are
 /// below 2^43 nm, and eight operations round them.
+///
+/// A ray enters where nx of the facet's normal is below 0. In y the left end less the right one is up * nx / (left z * right
+/// z), and up, left z and right z have one sign. So nx has the sign of the ends' rows, left less right, turned over where left
+/// z is below 0: rows are exact, and a segment whose ends have one row leaves nothing. Upright are those whose edges have no x,
+/// so that their slope is 0; a slanted facet along y is met by decide_near().
 inline constexpr double kSteepest = 4096;
 
-/// A mesh is larger than the caches: find() fetches the first corners of as many facets as most clusters have, found or not. No
-/// processor foresees the end of a loop over those that there are.
+/// A mesh is larger than the caches: find() fetches clusters early, and the first corners of every other one of as many facets
+/// as most clusters have, found or not. No processor foresees the end of a loop over those that there are. This is inlined:
+/// compilers take a function that does nothing else for one without effect, and leave calls of it out.
 inline constexpr std::uint32_t kCornersAhead = kClusterSize / 2;
+inline constexpr std::size_t kClustersAhead = 8;
+[[gnu::always_inline]] inline void fetch_early(const IndexedSource& source, std::span<const ClusterVisit> visits, std::size_t i,
+                                               const FoundFacets& found, std::uint32_t first) {
+  const auto* const later = reinterpret_cast<const char*>(&source.at(visits[std::min(i + kClustersAhead, visits.size() - 1)]));
+  __builtin_prefetch(later);
+  __builtin_prefetch(later + sizeof(IndexedCluster) / 2);
+  for (std::uint32_t k = first; k < first + kCornersAhead; k += 2) __builtin_prefetch(found.base + found.corner[0][k]);
+}
 
 /// The plane in the frame of a mesh, where corners lie; one out of reach of any corner cuts nothing.
 inline Nm plane_in_mesh(Nm plane, const Point3& offset) {

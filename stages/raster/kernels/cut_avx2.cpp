@@ -219,7 +219,7 @@ std::size_t find(const IndexedSource& source, std::span<const ClusterVisit> visi
             _mm256_add_epi32(order, _mm256_set1_epi32(static_cast<int>(visits[i].cluster * kClusterSize + half))));
       n += static_cast<std::uint32_t>(std::popcount(of_eight));
     }
-    for (std::uint32_t k = before; k < before + kCornersAhead; ++k) __builtin_prefetch(found.base + found.corner[0][k]);
+    fetch_early(source, visits, i, found, before);
   }
   found.size = n;
   return i;

@@ -217,7 +217,7 @@ std::size_t find(const IndexedSource& source, std::span<const ClusterVisit> visi
     _mm512_storeu_si512(found.facet + n,
                         _mm512_add_epi32(_mm512_maskz_compress_epi32(met, lanes),
                                          _mm512_set1_epi32(static_cast<int>(visits[i].cluster * kClusterSize))));
-    for (std::uint32_t k = n; k < n + kCornersAhead; ++k) __builtin_prefetch(found.base + found.corner[0][k]);
+    fetch_early(source, visits, i, found, n);
     n += static_cast<std::uint32_t>(std::popcount(static_cast<unsigned>(met)));
   }
   found.size = n;

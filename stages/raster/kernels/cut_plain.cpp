@@ -122,7 +122,7 @@ std::size_t find(const IndexedSource& source, std::span<const ClusterVisit> visi
       found.facet[i] = visits[taken].cluster * kClusterSize + lane;
       ++i;
     }
-    for (std::uint32_t k = before; k < before + kCornersAhead; ++k) __builtin_prefetch(found.base + found.corner[0][k]);
+    fetch_early(source, visits, taken, found, before);
   }
   found.size = i;
   return taken;
