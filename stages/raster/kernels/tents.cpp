@@ -2,6 +2,8 @@
 // operations lane by lane, none of them fused (-ffp-contract=off), so that every width gives the same bits.
 #include "stages/raster/kernels/tents.h"
 
+#include <bit>
+
 #if defined(__SSE2__)
 #include <emmintrin.h>
 #endif
@@ -17,16 +19,15 @@ LAMINA_BODY std::int32_t less(std::int32_t a, std::int32_t b) {
   return static_cast<std::int32_t>(static_cast<std::uint32_t>(a) - static_cast<std::uint32_t>(b));
 }
 
+/// The next float that has 11 bits: at most a thousandth more. Times up to 2^13 it is a float.
+LAMINA_BODY float raised(float x) { return std::bit_cast<float>((std::bit_cast<std::int32_t>(x) + 0x1FFF) & ~0x1FFF); }
+
 /// In float: rounding moves a tent's height by less than 2^-22 of the facet's depth, of which twice as much is added, and by
-/// ten operations more, of 2^-24 each, for which 2^-20 is added. Parts are rounded to multiples of 2^-12, of which one is
-/// added.
+/// ten operations more, of 2^-24 each, for which 2^-20 is added. A part of at least 2^-6 and of 11 bits is a multiple of 2^-16.
 LAMINA_BODY void tents_body(const Sides& __restrict sides, std::uint32_t shift, std::int32_t first, Tents& __restrict tents) {
   constexpr float kRounding = 1.0f / (1 << 21), kUp = 1 + 1.0f / (1 << 20);
-  constexpr float kStep = 1.0f / (1 << 12);
-  constexpr double kWhole = 3LL << 39;  // between 2^40 and 2^41, where doubles are 2^-12 apart
+  constexpr float kLeast = 1.0f / (1 << 6);
   const auto bits = static_cast<int>(shift);
-  alignas(64) float part[kClusterSize];
-  alignas(64) std::int32_t rises[kClusterSize], falls[kClusterSize];
   for (std::uint32_t i = 0; i < kClusterSize; ++i) {
     const Nm za = sides.z[0][i], zb = sides.z[1][i], zc = sides.z[2][i], ya = sides.y[0][i];
     const Nm lower = lesser(za, zb), upper = greater(za, zb);
@@ -40,19 +41,15 @@ LAMINA_BODY void tents_body(const Sides& __restrict sides, std::uint32_t shift, 
     const std::int32_t rise = greater(peak - begin, 1), fall = greater(last - peak, 1);
     const auto height = static_cast<float>(greater(less(hi, lo), 1));
     const float top = (area + depth * height * kRounding) * kUp;  // times the facet's height
-    part[i] = (top / (height * static_cast<float>(rise * fall)) + kStep) * static_cast<float>(count);
-    rises[i] = rise;
-    falls[i] = fall;
+    const auto rises = static_cast<float>(rise), falls = static_cast<float>(fall);
+    const float part = raised(top / (height * (rises * falls)) + kLeast) * static_cast<float>(count);
     tents.begin[i] = begin;
     tents.end[i] = last + 1;
     tents.top[i] = begin + rise;
     tents.fall[i] = last + 2 - fall;
+    tents.up[i] = part * falls;
+    tents.down[i] = part * rises;
     tents.count[i] = count;
-  }
-  for (std::uint32_t i = 0; i < kClusterSize; ++i) {
-    const double whole = static_cast<double>(part[i]) + kWhole - kWhole;
-    tents.up[i] = whole * falls[i];
-    tents.down[i] = whole * rises[i];
   }
 }
 

@@ -19,10 +19,9 @@ struct alignas(64) Sides {
 struct alignas(64) Tents {
   std::int32_t begin[kClusterSize], end[kClusterSize];  // slabs that the facet reaches, the latter beyond the last
   std::int32_t top[kClusterSize], fall[kClusterSize];   // from here on it no longer rises, and it falls
-  /// nm a slab. Multiples of 2^-12: their sums are the same in any order as long as they stay below 2^41. Each is the same
-  /// number of 32 bits or fewer times the slabs of the other slope, which double holds, so that a tent returns to exactly
-  /// nothing.
-  double up[kClusterSize], down[kClusterSize];
+  /// nm a slab. Multiples of 2^-16: doubles add them to the same sum in any order while it stays below 2^37. Each is the same
+  /// number times the slabs of the other slope, so that a tent returns to exactly nothing.
+  float up[kClusterSize], down[kClusterSize];
   std::int32_t count[kClusterSize];  // 1 where a plane cuts it
 };
 
