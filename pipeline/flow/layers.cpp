@@ -32,6 +32,7 @@ class LayerFlow {
         cancel_(cancel),
         budget_(limits.budget_bytes, limits.most_in_flight, {steps.bytes_held, steps.let_go}),
         moving_(limits.record_slots),
+        times_processor_(limits.processor_times),
         ready_(steps.steps.size()),
         step_ns_(steps.steps.size() + 1),
         step_processor_ns_(steps.steps.size() + 1) {
@@ -189,7 +190,7 @@ class LayerFlow {
   bool take_step(Moving& moving) {
     const Step& step = steps_.steps[moving.step];
     if (moving.status && given_up()) moving.status = Error{Fault::kInterrupted, "interrupted"};
-    const Turn turn;
+    const Turn turn{Clock::now(), processor_seconds()};
     if (step.needs && !moving.asked) {
       if (moving.status) ask(step, moving);
       moving.asked = true;
@@ -230,7 +231,7 @@ class LayerFlow {
       Moving& moving = at(recorded_);
       held.unlock();
       if (result_) {  // otherwise an earlier layer failed, and this one is not recorded
-        const Turn turn;
+        const Turn turn{Clock::now(), processor_seconds()};
         result_ = moving.status ? guarded([&] { return steps_.record(moving.ticket); }) : moving.status;
         count_time(steps_.steps.size(), turn);
       }
@@ -267,12 +268,13 @@ class LayerFlow {
 
   /// A step of one layer, from here on.
   struct Turn {
-    Clock::time_point start = Clock::now();
-    double processor = thread_seconds();
+    Clock::time_point start;
+    double processor = 0;
   };
+  double processor_seconds() const { return times_processor_ ? thread_seconds() : 0; }
   void count_time(std::size_t step, const Turn& turn) {
     step_ns_[step] += std::chrono::duration_cast<std::chrono::nanoseconds>(Clock::now() - turn.start).count();
-    step_processor_ns_[step] += static_cast<std::int64_t>(1e9 * (thread_seconds() - turn.processor));
+    step_processor_ns_[step] += static_cast<std::int64_t>(1e9 * (processor_seconds() - turn.processor));
   }
 
   static constexpr std::chrono::milliseconds kPatience{300};
@@ -283,8 +285,9 @@ class LayerFlow {
 
   std::mutex mutex_;  // guards the following members up to the times
   Budget budget_;
-  Correction admission_, whole_;                // of the estimates before and after a gate
-  std::vector<Moving> moving_;                  // by position, round and round
+  Correction admission_, whole_;  // of the estimates before and after a gate
+  std::vector<Moving> moving_;    // by position, round and round
+  const bool times_processor_;
   std::vector<std::set<std::uint32_t>> ready_;  // positions, by step: one turn each is on its way
   std::set<std::uint32_t> waiting_;             // for bytes
   std::uint32_t next_ = 0;                      // position of the next layer to admit

@@ -54,6 +54,7 @@ struct FlowLimits {
   std::uint64_t budget_bytes = 1ull << 30;
   std::uint32_t most_in_flight = 1;  // layers with scratch
   std::uint32_t record_slots = 32;   // layers begun and not recorded: the most that an interruption loses
+  bool processor_times = false;      // measured of each step: two calls of the system each
 };
 
 struct FlowReport {
@@ -61,7 +62,7 @@ struct FlowReport {
   std::uint64_t most_bytes = 0;                                   // peak of the credits, idle scratch included
   std::uint32_t oversized = 0;                                    // layers that held more than the budget by themselves
   std::vector<std::pair<std::string_view, double>> step_seconds;  // of each step and of "record", over all threads
-  std::vector<double> step_processor_seconds;                     // of the threads that took them
+  std::vector<double> step_processor_seconds;                     // of the threads that took them, 0 unless asked for
   double lock_seconds = 0;                                        // waited for the flow's own lock, over all threads
 };
 

@@ -215,6 +215,7 @@ Result<Summary> run(Resolved resolved, const ProgressCallback& progress, const s
   FlowLimits limits;
   limits.budget_bytes = job.memory_bytes;
   limits.most_in_flight = layers_in_flight();
+  limits.processor_times = job.timing;
   limits.record_slots = 2 * limits.most_in_flight;  // some layers wait for an older one, in a single file with their scratch
   if (product != Product::kImages) limits.most_in_flight = limits.record_slots;
   Summary summary = summary_of(*plan);
