@@ -46,7 +46,8 @@ void ChunkEdges::take_sides(std::span<const Numbered::Local> facets, std::uint32
   }
 }
 
-/// Finds pairs among the sides. returns  how many sides have met none, which are in rest_ then, each edge with all of its sides
+/// Finds pairs among sides, each of which has an end of its own. returns  how many sides have met none, which are in rest_
+/// then, each edge with all of its sides
 std::uint32_t ChunkEdges::match(std::span<const std::uint16_t> sides, std::uint32_t factor) {
   for (const std::uint16_t i : sides) hash_[i] = static_cast<std::uint16_t>((key_[i] >> 1) * factor >> (32 - kSlotBits));
   for (std::size_t s = sides.size(); s-- > 0;) slot_[hash_[sides[s]]] = sides[s];
@@ -67,7 +68,7 @@ std::uint32_t ChunkEdges::match(std::span<const std::uint16_t> sides, std::uint3
     const auto [one, other] = match_[m];
     const std::uint32_t key = key_[one];
     const std::uint32_t once = others_[one] == 1, both_ways = (key ^ key_[other]) == 1;
-    const std::uint32_t found = once & both_ways & (own_[low_of(key)] | own_[high_of(key)]);
+    const std::uint32_t found = once & both_ways;
     pair_[pairs_] = {static_cast<std::uint16_t>(one / 3), static_cast<std::uint16_t>(other / 3)};
     pairs_ += found;
     done_[one] |= static_cast<std::uint8_t>(found);
@@ -86,9 +87,14 @@ std::span<const ChunkEdges::Pair> ChunkEdges::find(const Numbered& mesh, std::si
   std::fill(done_.begin(), done_.begin() + sides, std::uint8_t{0});
   std::fill(others_.begin(), others_.begin() + sides, std::uint8_t{0});
   take_sides(facets, first_facet, collapsed);
-  std::iota(all_.begin(), all_.begin() + sides, std::uint16_t{0});
+  // An edge both of whose ends other chunks have too is left over with all of its sides: in disorder most are.
+  std::uint32_t near = 0;
+  for (std::uint32_t i = 0; i < sides; ++i) {
+    all_[near] = static_cast<std::uint16_t>(i);
+    near += (own_[low_of(key_[i]) & kEndMask] | own_[high_of(key_[i])]) & (done_[i] ^ 1u);
+  }
   pairs_ = 0;
-  const std::uint32_t left = match({all_.data(), sides}, 0x9e3779b1);
+  const std::uint32_t left = match({all_.data(), near}, 0x9e3779b1);
   // Those that met another edge meet each other by another hash; the few that do not again are left over.
   std::copy(rest_.begin(), rest_.begin() + left, all_.begin());
   if (left > 0) match({all_.data(), left}, 0x85ebca77);
