@@ -68,8 +68,9 @@ CrossingSums::Table CrossingSums::table() const {
     sum.segments += segments_[i];
     sum.clusters += clusters_[i];
     table.slab[i] = sum;
-    if (sum.segments == 0) slope = sum.depth = 0;  // nothing is cut here, whatever rounding left
-    table.slab[i].depth = std::max(0.0, sum.depth);
+    const bool empty = sum.segments == 0, was_empty = i > 0 && table.slab[i - 1].segments == 0;
+    if (empty && was_empty) slope = sum.depth = 0;  // whatever rounding left; the last bend lies one slab above an end
+    table.slab[i].depth = empty ? 0 : std::max(0.0, sum.depth);
   }
   return table;
 }

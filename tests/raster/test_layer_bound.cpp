@@ -212,6 +212,25 @@ TEST(Tents, AreTheSameBitsWithEveryInstructionSetAndReturnToNothing) {
   }
 }
 
+TEST(CrossingSums, WhatEndsBelowAGapIsNotCountedAboveIt) {
+  constexpr Nm kDeep = 20'000'000, kTop = 10'000'000;
+  for (Nm gap = 500; gap < 20'000; gap += 500) {
+    Triangles triangles = box({0, 0, 0}, {kDeep, kDeep, 2'000'000});
+    for (const Triangle& t : box({0, 0, 2'000'000 + gap}, {kDeep, kDeep, kTop})) triangles.push_back(t);
+    Mesh mesh = make_mesh(triangles);
+    const raster::ClusteredMesh clusters = raster::make_clusters(mesh);
+    CrossingSums sums(0, kTop);
+    for (std::uint32_t c = 0; c < clusters.cluster_count(); ++c) sums.add(clusters, c);
+    const CrossingSums::Table table = sums.table();
+    for (const Nm plane : {1'000'000, 2'010'000 + gap, 3'000'000, 6'000'000, kTop - 1}) {  // in slabs of one box
+      const CrossingSums::Slab* const slab = table.at(plane);
+      ASSERT_NE(slab, nullptr);
+      EXPECT_GE(slab->depth, 2.0 * kDeep) << gap << " nm, at " << plane;  // two walls along y
+      EXPECT_LE(slab->depth, 2.1 * kDeep) << gap << " nm, at " << plane;
+    }
+  }
+}
+
 TEST(CrossingSums, FewerSlabsHoldAtLeastAsMuchAndNoMoreThanTheLargestOfThoseJoined) {
   std::mt19937 random(8);
   for (int round = 0; round < 50; ++round) {
