@@ -6,6 +6,17 @@
 #define LAMINA_WIDE_KERNELS 1
 #define LAMINA_AVX2 __attribute__((target("avx2,bmi,bmi2,popcnt")))
 #define LAMINA_AVX512 __attribute__((target("avx512f,avx512dq,avx512vl,avx512bw,bmi,bmi2,popcnt")))
+
+/// Around bodies for AVX-512: g++ 12 says of its own header that something in it is not initialized.
+#if defined(__GNUC__) && !defined(__clang__)
+#define LAMINA_AVX512_BEGIN                                                            \
+  _Pragma("GCC diagnostic push") _Pragma("GCC diagnostic ignored \"-Wuninitialized\"") \
+      _Pragma("GCC diagnostic ignored \"-Wmaybe-uninitialized\"")
+#define LAMINA_AVX512_END _Pragma("GCC diagnostic pop")
+#else
+#define LAMINA_AVX512_BEGIN
+#define LAMINA_AVX512_END
+#endif
 #endif
 
 /// A body that is compiled once for each instruction set, within the functions that have the target.

@@ -8,11 +8,7 @@
 
 #define LAMINA_INLINE LAMINA_AVX512 __attribute__((always_inline)) inline
 
-#if defined(__GNUC__) && !defined(__clang__)
-#pragma GCC diagnostic push
-#pragma GCC diagnostic ignored "-Wuninitialized"  // g++ 12 blames its own header
-#pragma GCC diagnostic ignored "-Wmaybe-uninitialized"
-#endif
+LAMINA_AVX512_BEGIN
 
 namespace lamina::load::avx512 {
 namespace {
@@ -80,9 +76,7 @@ bool snap(const char* facets, std::size_t count, Triangle* out, CoordinateBox& b
 
 }  // namespace lamina::load::avx512
 
-#if defined(__GNUC__) && !defined(__clang__)
-#pragma GCC diagnostic pop
-#endif
+LAMINA_AVX512_END
 
 #undef LAMINA_INLINE
 #endif

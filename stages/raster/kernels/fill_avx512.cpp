@@ -7,11 +7,7 @@
 #if defined(LAMINA_WIDE_KERNELS)
 #include <immintrin.h>
 
-#if defined(__GNUC__) && !defined(__clang__)
-#pragma GCC diagnostic push
-#pragma GCC diagnostic ignored "-Wuninitialized"  // g++ 12 blames its own header
-#pragma GCC diagnostic ignored "-Wmaybe-uninitialized"
-#endif
+LAMINA_AVX512_BEGIN
 
 namespace lamina::raster::avx512 {
 
@@ -60,7 +56,5 @@ void fill(const FillTask& task) {
 
 }  // namespace lamina::raster::avx512
 
-#if defined(__GNUC__) && !defined(__clang__)
-#pragma GCC diagnostic pop
-#endif
+LAMINA_AVX512_END
 #endif

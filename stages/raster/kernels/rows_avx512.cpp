@@ -10,11 +10,7 @@
 
 #define LAMINA_INLINE LAMINA_AVX512 __attribute__((always_inline)) inline
 
-#if defined(__GNUC__) && !defined(__clang__)
-#pragma GCC diagnostic push
-#pragma GCC diagnostic ignored "-Wuninitialized"  // g++ 12 blames its own header
-#pragma GCC diagnostic ignored "-Wmaybe-uninitialized"
-#endif
+LAMINA_AVX512_BEGIN
 
 namespace lamina::raster::avx512 {
 namespace {
@@ -279,8 +275,6 @@ std::uint32_t* rows(const RowsTask& task) {
 
 }  // namespace lamina::raster::avx512
 
-#if defined(__GNUC__) && !defined(__clang__)
-#pragma GCC diagnostic pop
-#endif
+LAMINA_AVX512_END
 #undef LAMINA_INLINE
 #endif

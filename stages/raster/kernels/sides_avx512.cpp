@@ -6,11 +6,7 @@
 #if defined(LAMINA_WIDE_KERNELS)
 #include <immintrin.h>
 
-#if defined(__GNUC__) && !defined(__clang__)
-#pragma GCC diagnostic push
-#pragma GCC diagnostic ignored "-Wuninitialized"  // g++ 12 blames its own header
-#pragma GCC diagnostic ignored "-Wmaybe-uninitialized"
-#endif
+LAMINA_AVX512_BEGIN
 
 namespace lamina::raster {
 
@@ -31,7 +27,5 @@ void avx512::look_up_sides(const IndexedCluster& cluster, const Point3* vertices
 
 }  // namespace lamina::raster
 
-#if defined(__GNUC__) && !defined(__clang__)
-#pragma GCC diagnostic pop
-#endif
+LAMINA_AVX512_END
 #endif

@@ -12,11 +12,7 @@
 
 #define LAMINA_INLINE LAMINA_AVX512 __attribute__((always_inline)) inline
 
-#if defined(__GNUC__) && !defined(__clang__)
-#pragma GCC diagnostic push
-#pragma GCC diagnostic ignored "-Wuninitialized"  // g++ 12 blames its own header
-#pragma GCC diagnostic ignored "-Wmaybe-uninitialized"
-#endif
+LAMINA_AVX512_BEGIN
 
 namespace lamina::write::g4::avx512 {
 namespace {
@@ -84,8 +80,6 @@ LAMINA_AVX512 void put_steps(BitWriter& writer, StepsTask& task, Steps& found) {
 
 }  // namespace lamina::write::g4::avx512
 
-#if defined(__GNUC__) && !defined(__clang__)
-#pragma GCC diagnostic pop
-#endif
+LAMINA_AVX512_END
 #undef LAMINA_INLINE
 #endif

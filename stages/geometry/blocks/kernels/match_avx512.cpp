@@ -11,11 +11,7 @@
 
 #define LAMINA_INLINE LAMINA_AVX512 __attribute__((always_inline)) inline
 
-#if defined(__GNUC__) && !defined(__clang__)
-#pragma GCC diagnostic push
-#pragma GCC diagnostic ignored "-Wuninitialized"  // g++ 12 blames its own header
-#pragma GCC diagnostic ignored "-Wmaybe-uninitialized"
-#endif
+LAMINA_AVX512_BEGIN
 
 namespace lamina::avx512 {
 namespace {
@@ -127,9 +123,7 @@ void write(const SortedBlock& block, const CornerMatches& matches, std::uint32_t
 
 }  // namespace lamina::avx512
 
-#if defined(__GNUC__) && !defined(__clang__)
-#pragma GCC diagnostic pop
-#endif
+LAMINA_AVX512_END
 
 #undef LAMINA_INLINE
 #endif
