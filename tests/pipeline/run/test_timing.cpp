@@ -8,6 +8,7 @@
 #include <atomic>
 #include <chrono>
 #include <csignal>
+#include <filesystem>
 #include <nlohmann/json.hpp>
 #include <thread>
 
@@ -61,6 +62,34 @@ int ended_while_measuring(const test::Directory& folder, int signal) {
   ::kill(child, signal);
   ::waitpid(child, &result, 0);
   return WIFSIGNALED(result) ? WTERMSIG(result) : 0;
+}
+
+TEST(Timing, ARunTellsEachStepAndWhatTheLimitReadsAndWrites) {
+  const test::Directory folder;
+  const std::string part = test::corpus_file("dental_crown.stl");
+  const std::vector<std::string> job = {"jet",     part,  "--bed",  "30x30",   "--dpi", "600",
+                                        "--layer", "0.2", "--json", "--quiet", "-o"};
+  const auto summary_of = [&](std::vector<std::string> more) {
+    more.insert(more.begin(), job.begin(), job.end());
+    const test::Outcome outcome = test::run_lamina(more, folder.path());
+    EXPECT_EQ(outcome.code, 0) << outcome.err;
+    return nlohmann::json::parse(outcome.out, nullptr, false);
+  };
+  const nlohmann::json timed = summary_of({"timed", "--timing"});
+  const nlohmann::json &timing = timed["timing"], &limit = timing["limit"];
+  double steps = 0;
+  for (const char* step : {"raster", "dose", "encode", "store", "record"}) {
+    EXPECT_GT(timing["steps"][step]["processor"], 0) << step;
+    EXPECT_GT(timing["steps"][step]["busy"], 0) << step;
+    steps += timing["steps"][step]["processor"].get<double>();
+  }
+  EXPECT_LE(steps, timing["phases"]["layers"]["processor"]) << "steps are parts of the phase";
+  EXPECT_EQ(limit["read_bytes"], std::filesystem::file_size(part));
+  std::uint64_t bytes = 0;
+  for (const auto& file : std::filesystem::directory_iterator(folder.path() / "timed" / "layers")) bytes += file.file_size();
+  EXPECT_EQ(limit["write_bytes"], bytes);
+  EXPECT_EQ(limit["write_files"], timed["layers_planned"]);
+  EXPECT_FALSE(summary_of({"untimed"}).contains("timing"));
 }
 
 // Amdahl: a share s alone and the rest on n threads take s + (1 - s) / n of the time of one.
