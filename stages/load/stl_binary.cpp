@@ -1,6 +1,5 @@
 // stages/load/stl_binary.cpp: binary STL, read in blocks and snapped straight into the mesh.
 #include <fmt/core.h>
-#include <sys/mman.h>
 #include <tbb/blocked_range.h>
 #include <tbb/enumerable_thread_specific.h>
 #include <tbb/parallel_reduce.h>
@@ -9,6 +8,7 @@
 #include <atomic>
 #include <cstring>
 
+#include "stages/geometry/blocks/pages.h"
 #include "stages/load/stl_facets.h"
 
 namespace lamina::load {
@@ -61,15 +61,6 @@ std::string cut_short(const Source& source, std::uint64_t claimed, std::uint64_t
 
 std::string stray_bytes(std::uint64_t bytes, std::uint64_t facets) {
   return fmt::format("{} stray bytes after the last of {} facets are ignored", bytes, facets);
-}
-
-/// Asks for large pages: the triangles are written once from end to end, and faulting 4 KiB at a time takes as long as
-/// snapping. Where the system has none to give, nothing changes.
-void prefer_large_pages(Buffer<Triangle>& triangles) {
-  constexpr std::uintptr_t kPage = std::uintptr_t{2} << 20;
-  const auto begin = (reinterpret_cast<std::uintptr_t>(triangles.data()) + kPage - 1) / kPage * kPage;
-  const auto end = reinterpret_cast<std::uintptr_t>(triangles.data() + triangles.size()) / kPage * kPage;
-  if (begin < end) ::madvise(reinterpret_cast<void*>(begin), end - begin, MADV_HUGEPAGE);
 }
 
 /// Reads the first `count` facets.

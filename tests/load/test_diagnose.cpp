@@ -47,7 +47,8 @@ std::array<Point3, 3> turned(const Triangle& t) {
   return corners;
 }
 
-SlowDiagnosis slow(const std::vector<Triangle>& triangles) {
+/// with_shells  takes time as the square of the triangles
+SlowDiagnosis slow(const std::vector<Triangle>& triangles, bool with_shells = true) {
   SlowDiagnosis result;
   std::set<Point3> points;
   std::set<std::array<Point3, 3>> seen;
@@ -71,6 +72,7 @@ SlowDiagnosis slow(const std::vector<Triangle>& triangles) {
     if (walks.size() > 2) result.non_manifold.all.push_back(place);
     if (walks.size() == 2 && surplus != 0) result.misoriented.all.push_back(place);
     for (const Walk& walk : walks) {
+      if (!with_shells) break;
       const std::uint32_t from = shell[walk.first], to = shell[walks[0].first];
       for (std::uint32_t& number : shell) number = number == from ? to : number;
     }
@@ -127,15 +129,23 @@ TEST(Diagnose, FindsInFacetsAtRandomWhatOrderedMapsFind) {
   }
 }
 
-/// Lists of more than a task looks at, whose memory goes back piece by piece.
+void take_bounds(Mesh& mesh) {
+  for (const Triangle& t : mesh.triangles)
+    for (const Point3& corner : {t.a, t.b, t.c}) mesh.bounds.add(corner);
+}
+
+/// Lists of more than a task looks at, whose memory goes back piece by piece; in the order of the mesh and in none.
 TEST(Diagnose, InTheMemoryOfTheListFindsTheSameAndGivesItBackWhereShellsMayOverlap) {
-  for (const Nm rise : {0, 5}) {
+  std::mt19937 random(3);
+  for (const auto& [rise, shuffled] : {std::pair{0, false}, {5, false}, {0, true}, {5, true}}) {
     Mesh mesh;
     for (Nm i = 0; i < 50'000; ++i) {  // tetrahedra side by side, or each a little higher within the next one's box
       const Nm x = rise == 0 ? 20 * i : i, z = rise * i;
       const Point3 p{x, 0, z}, q{x + 10, 0, z}, r{x, 10, z}, s{x, 0, z + 10};
       for (const Triangle& t : {Triangle{p, r, q}, {p, q, s}, {q, r, s}, {r, p, s}}) mesh.triangles.push_back(t);
     }
+    if (shuffled) std::shuffle(mesh.triangles.begin(), mesh.triangles.end(), random);
+    take_bounds(mesh);
     const Buffer<Triangle> list = mesh.triangles;
     const load::Diagnosis found = load::diagnose(mesh), alone = load::diagnose_alone(mesh);
     EXPECT_EQ(found.shells, 50'000u);
@@ -169,7 +179,8 @@ std::vector<Triangle> torus_in_order(int around, int across) {
 load::Diagnosis diagnosis_of(const std::vector<Triangle>& triangles) {
   Mesh mesh;
   mesh.triangles.assign(triangles.begin(), triangles.end());
-  return load::diagnose(mesh);
+  take_bounds(mesh);
+  return load::diagnose(mesh, 50);
 }
 
 void expect_same_counts(const load::Diagnosis& one, const load::Diagnosis& other) {
@@ -189,8 +200,17 @@ void expect_same_counts(const load::Diagnosis& one, const load::Diagnosis& other
     EXPECT_EQ((one.*kind).count, (other.*kind).count);
 }
 
-/// Where the list is in no order, edges are found vertex by vertex and not chunk by chunk; blocks bring vertices of their own.
-TEST(Diagnose, ChunksVerticesAndBlocksFindTheSame) {
+/// The first of what is wrong, in the order of the list.
+void expect_places(const load::Diagnosis& found, const std::vector<Triangle>& list) {
+  SlowDiagnosis expected = slow(list, false);
+  EXPECT_EQ(places_of(found.open_edges), expected.open.first(50));
+  EXPECT_EQ(places_of(found.non_manifold_edges), expected.non_manifold.first(50));
+  EXPECT_EQ(places_of(found.misoriented_edges), expected.misoriented.first(50));
+  EXPECT_EQ(places_of(found.duplicate_facets), expected.duplicate.first(50));
+}
+
+/// Facets of a list in no order are looked at in a spatial one; blocks bring vertices of their own.
+TEST(Diagnose, ListsInAnyOrderAndBlocksFindTheSame) {
   std::mt19937 random(8);
   for (int faults = 0; faults < 3; ++faults) {
     std::vector<Triangle> triangles = torus_in_order(250, 40);
@@ -210,6 +230,8 @@ TEST(Diagnose, ChunksVerticesAndBlocksFindTheSame) {
     std::vector<Triangle> shuffled = triangles;
     std::shuffle(shuffled.begin(), shuffled.end(), random);
     expect_same_counts(in_order, diagnosis_of(shuffled));
+    expect_places(in_order, triangles);
+    expect_places(diagnosis_of(shuffled), shuffled);
     for (const std::vector<Triangle>& list : {triangles, shuffled}) {
       Mesh mesh;
       mesh.triangles.assign(list.begin(), list.end());

@@ -58,6 +58,13 @@ void Pages::give_back_rest() {
   mapped_ = used;
 }
 
+void prefer_large_pages(void* begin, void* end) {
+  constexpr std::uintptr_t kLarge = std::uintptr_t{2} << 20;
+  const std::uintptr_t first = rounded_up(reinterpret_cast<std::uintptr_t>(begin), kLarge);
+  const std::uintptr_t last = reinterpret_cast<std::uintptr_t>(end) / kLarge * kLarge;
+  if (first < last) ::madvise(reinterpret_cast<void*>(first), last - first, MADV_HUGEPAGE);
+}
+
 void forget_pages(void* begin, void* end) {
   const std::uint64_t first = rounded_up(reinterpret_cast<std::uintptr_t>(begin), kPage);
   const std::uint64_t last = reinterpret_cast<std::uintptr_t>(end) / kPage * kPage;

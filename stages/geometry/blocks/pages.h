@@ -5,6 +5,8 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "stages/data/buffer.h"
+
 namespace lamina {
 
 /// Addresses for as much as may be needed; memory only for what is written. Pieces lie side by side, so that large pages
@@ -36,6 +38,14 @@ class Pages {
   std::atomic<HeapPiece*> last_{nullptr};
   std::atomic<std::uint64_t> taken_{0};
 };
+
+/// Asks for large pages where memory is about to be written from end to end: faulting 4 KiB at a time takes as long as reading
+/// and snapping facets. Where the system has none to give, nothing changes.
+void prefer_large_pages(void* begin, void* end);
+template <class T>
+void prefer_large_pages(Buffer<T>& buffer) {
+  prefer_large_pages(buffer.data(), buffer.data() + buffer.size());
+}
 
 /// Gives the memory of whole pages within [begin, end) back to the system; what they held is lost, the addresses stay.
 void forget_pages(void* begin, void* end);

@@ -4,13 +4,9 @@
 // miss it and are left over. So an edge is either found with all of its sides or left with all of them.
 #include "stages/load/diagnosis/chunk_edges.h"
 
-#include <tbb/blocked_range.h>
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <numeric>
-
-#include "stages/load/repair/stars.h"
+#include <tuple>
 
 namespace lamina::load {
 namespace {
@@ -77,8 +73,8 @@ std::uint32_t ChunkEdges::match(std::span<const std::uint16_t> sides, std::uint3
   return left;
 }
 
-std::span<const ChunkEdges::Pair> ChunkEdges::find(const Numbered& mesh, std::size_t chunk, Buffer<Side>& rest,
-                                                   Buffer<std::uint32_t>& collapsed) {
+std::span<const ChunkEdges::Pair> ChunkEdges::find(const Numbered& mesh, std::size_t chunk, Buffer<Side>& odd,
+                                                   Buffer<Side>& rest, Buffer<std::uint32_t>& collapsed) {
   const std::span<const Numbered::Local> facets = mesh.local_facets(chunk);
   const std::span<const std::uint32_t> numbers = mesh.numbers_of(chunk);
   const auto first_facet = static_cast<std::uint32_t>(chunk * Numbered::kChunk);
@@ -86,12 +82,14 @@ std::span<const ChunkEdges::Pair> ChunkEdges::find(const Numbered& mesh, std::si
   for (std::size_t v = 0; v < numbers.size(); ++v) own_[v] = !mesh.in_several_chunks(numbers[v]);
   std::fill(done_.begin(), done_.begin() + sides, std::uint8_t{0});
   std::fill(others_.begin(), others_.begin() + sides, std::uint8_t{0});
+  odd.clear();
   take_sides(facets, first_facet, collapsed);
-  // An edge both of whose ends other chunks have too is left over with all of its sides: in disorder most are.
+  const auto within = [&](std::uint32_t key) { return (own_[low_of(key) & kEndMask] | own_[high_of(key)]) != 0; };
+  // An edge both of whose ends other chunks have too is left over with all of its sides.
   std::uint32_t near = 0;
   for (std::uint32_t i = 0; i < sides; ++i) {
     all_[near] = static_cast<std::uint16_t>(i);
-    near += (own_[low_of(key_[i]) & kEndMask] | own_[high_of(key_[i])]) & (done_[i] ^ 1u);
+    near += std::uint32_t{within(key_[i])} & (done_[i] ^ 1u);
   }
   pairs_ = 0;
   const std::uint32_t left = match({all_.data(), near}, 0x9e3779b1);
@@ -103,8 +101,12 @@ std::span<const ChunkEdges::Pair> ChunkEdges::find(const Numbered& mesh, std::si
       continue;
     const std::uint32_t one = numbers[low_of(key_[i])], other = numbers[high_of(key_[i])];
     const bool upwards = ((key_[i] & 1) != 0) == (one < other);
-    rest.push_back({std::min(one, other), std::max(one, other), first_facet + i / 3, upwards});
+    Buffer<Side>& list = within(key_[i]) ? odd : rest;
+    list.push_back({std::min(one, other), std::max(one, other), first_facet + i / 3, upwards});
   }
+  std::sort(odd.begin(), odd.end(), [](const Side& one, const Side& other) {
+    return std::tie(one.low, one.high, one.facet) < std::tie(other.low, other.high, other.facet);
+  });
   return {pair_.data(), pairs_};
 }
 
@@ -125,22 +127,6 @@ void ChunkPieces::join(std::span<const ChunkEdges::Pair> pairs, std::span<std::u
     parent_[f] = parent_[parent_[f]];
     parents[f] = first + parent_[f];
   }
-}
-
-SideLists::SideLists(std::uint32_t vertices, std::span<const Buffer<Side>> sides) : begin_(vertices + std::size_t{1}) {
-  std::fill(begin_.begin(), begin_.end(), 0u);
-  for (const Buffer<Side>& some : sides) {
-    for (const Side& side : some) ++begin_[side.low];
-  }
-  std::uint32_t end = 0;
-  for (std::uint32_t& list : begin_) list = end += list;
-  sides_.resize(end);
-  for (const Buffer<Side>& some : sides) {
-    for (const Side& side : some) sides_[--begin_[side.low]] = side;
-  }
-  tbb::parallel_for(tbb::blocked_range<std::uint32_t>(0, vertices, 1 << 13), [&](const auto& range) {
-    for (std::uint32_t v = range.begin(); v != range.end(); ++v) sort_sides({sides_.data() + begin_[v], of(v).size()});
-  });
 }
 
 }  // namespace lamina::load

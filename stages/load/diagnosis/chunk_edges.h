@@ -21,11 +21,13 @@ class ChunkEdges {
   /// Finds edges that are walked once either way and one of whose ends no other chunk has, so that no facet elsewhere can be at
   /// them: nearly all of those that there are.
   ///
-  /// rest       is given the sides of all other edges, which facets elsewhere may share; in no order
+  /// odd        becomes the sides of those other edges that have such an end, by edge and then by facet
+  /// rest       is given the sides of edges that facets elsewhere may share; in no order
   /// collapsed  is given the facets that use a vertex twice
   /// returns    the facets of each edge that was found; until the next call
   /// cost       O(T); no branch depends on the facets but where edges are left over
-  std::span<const Pair> find(const Numbered& mesh, std::size_t chunk, Buffer<Side>& rest, Buffer<std::uint32_t>& collapsed);
+  std::span<const Pair> find(const Numbered& mesh, std::size_t chunk, Buffer<Side>& odd, Buffer<Side>& rest,
+                             Buffer<std::uint32_t>& collapsed);
 
  private:
   void take_sides(std::span<const Numbered::Local> facets, std::uint32_t first_facet, Buffer<std::uint32_t>& collapsed);
@@ -57,21 +59,6 @@ class ChunkPieces {
   std::uint16_t find(std::uint16_t facet);
 
   std::array<std::uint16_t, Numbered::kChunk> parent_;
-};
-
-/// Sides by their lower vertex: a list a vertex, each in the order of edges and then of facets.
-class SideLists {
- public:
-  /// cost  O(V + S) and sorting each list; 16 bytes a side and 4 a vertex
-  SideLists(std::uint32_t vertices, std::span<const Buffer<Side>> sides);
-
-  std::span<const Side> of(std::uint32_t vertex) const {
-    return {sides_.data() + begin_[vertex], begin_[vertex + 1] - begin_[vertex]};
-  }
-
- private:
-  Buffer<std::uint32_t> begin_;  // of each vertex, and the end
-  Buffer<Side> sides_;
 };
 
 }  // namespace lamina::load

@@ -10,11 +10,13 @@
 #include <atomic>
 #include <memory>
 
+#include "stages/geometry/blocks/pages.h"
 #include "stages/load/diagnosis/chunk_edges.h"
 #include "stages/load/diagnosis/collector.h"
+#include "stages/load/diagnosis/repeats.h"
+#include "stages/load/diagnosis/side_lists.h"
 #include "stages/load/repair/geometry.h"
 #include "stages/load/repair/overlaps.h"
-#include "stages/load/repair/stars.h"
 #include "stages/load/repair/topology.h"
 #include "stages/load/repair/vertices.h"
 
@@ -104,35 +106,28 @@ struct SeenEdges {
     if (end - begin == 2 && begin[0].forward != begin[1].forward) return false;
     balanced = balanced && surplus(begin, end) == 0;
     Collector& kind = end - begin == 1 ? open : end - begin == 2 ? misoriented : non_manifold;
-    kind.add(begin->facet, mesh.vertices()[begin->low], mesh.vertices()[begin->high]);
+    std::uint32_t first = UINT32_MAX;  // in the list
+    for (const Side* side = begin; side != end; ++side) first = std::min(first, mesh.listed(side->facet));
+    kind.add(first, mesh.vertices()[begin->low], mesh.vertices()[begin->high]);
     return end - begin > 1;
+  }
+  /// Looks at edges one after the other.
+  void look(const Numbered& mesh, std::span<const Side> sides, Joined& joined) {
+    for_each_edge(sides, [&](const Side* begin, const Side* end) {
+      if (!look(mesh, begin, end, joined)) return;
+      for (const Side* side = begin; side != end; ++side) may_repeat.push_back(side->facet);
+    });
   }
   void add_repeats(const Numbered& mesh, std::span<const std::uint32_t> repeats) {
     for (const std::uint32_t i : repeats) {
       const Point3 corner = mesh.triangle(i).a;
-      duplicate.add(i, corner, corner);
+      duplicate.add(mesh.listed(i), corner, corner);
     }
   }
 
-  /// Of vertices of a list in any order.
-  void look(const Numbered& mesh, const Stars& stars, const Range& range, Joined& joined) {
-    Buffer<Side> sides;
-    std::vector<std::uint32_t> repeats;
-    for (std::uint32_t vertex = range.begin(); vertex != range.end(); ++vertex) {
-      bool odd = stars.sides_of(vertex, sides);  // where facets may be there twice
-      for_each_edge(sides, [&](const Side* begin, const Side* end) { odd = look(mesh, begin, end, joined) || odd; });
-      if (odd) stars.repeats_of(vertex, repeats);
-    }
-    add_repeats(mesh, repeats);
-  }
-  /// Of sides that chunks could not settle.
+  /// Of vertices whose sides chunks could not settle.
   void look(const Numbered& mesh, const SideLists& lists, const Range& range, Joined& joined) {
-    for (std::uint32_t vertex = range.begin(); vertex != range.end(); ++vertex) {
-      for_each_edge(lists.of(vertex), [&](const Side* begin, const Side* end) {
-        if (!look(mesh, begin, end, joined)) return;
-        for (const Side* side = begin; side != end; ++side) may_repeat.push_back(side->facet);
-      });
-    }
+    for (std::uint32_t vertex = range.begin(); vertex != range.end(); ++vertex) look(mesh, lists.of(vertex), joined);
   }
   void add(const SeenEdges& other) {
     open.add(other.open);
@@ -160,35 +155,30 @@ Seen seen_in(const Range& range, const Seen& nothing, const Look& look) {
       });
 }
 
-/// Vertex by vertex.
-SeenEdges edges_of_any(const Numbered& mesh, std::size_t places, Joined& joined) {
-  const Stars stars(mesh);
-  return seen_in(all_of(stars.vertices()), SeenEdges(places),
-                 [&](const Range& range, SeenEdges& seen) { seen.look(mesh, stars, range, joined); });
-}
-
 /// Chunk by chunk, and then the sides that several chunks share.
-SeenEdges edges_in_order(const Numbered& mesh, std::size_t places, Joined& joined) {
+SeenEdges edges_of(const Numbered& mesh, std::size_t places, Joined& joined) {
   struct Worker {
     ChunkEdges edges;
     ChunkPieces pieces;
-    Buffer<Side> rest;
+    Buffer<Side> odd, rest;
     Buffer<std::uint32_t> collapsed;
-    std::uint64_t count = 0;
+    SeenEdges seen;
+    explicit Worker(std::size_t places_told) : seen(places_told) {}
   };
-  tbb::enumerable_thread_specific<std::unique_ptr<Worker>> workers([] { return std::make_unique<Worker>(); });
+  tbb::enumerable_thread_specific<std::unique_ptr<Worker>> workers([&] { return std::make_unique<Worker>(places); });
   tbb::parallel_for(std::size_t{0}, mesh.chunks(), [&](std::size_t chunk) {
     Worker& worker = *workers.local();
     const auto first = static_cast<std::uint32_t>(chunk * Numbered::kChunk);
-    const std::span<const ChunkEdges::Pair> pairs = worker.edges.find(mesh, chunk, worker.rest, worker.collapsed);
+    const std::span<const ChunkEdges::Pair> pairs = worker.edges.find(mesh, chunk, worker.odd, worker.rest, worker.collapsed);
     worker.pieces.join(pairs, joined.sets.parents().subspan(first, mesh.local_facets(chunk).size()), first);
-    worker.count += pairs.size();
+    worker.seen.count += pairs.size();
+    worker.seen.look(mesh, worker.odd, joined);
   });
   std::vector<Buffer<Side>> rest;
   SeenEdges within(places);
   for (const std::unique_ptr<Worker>& worker : workers) {
     rest.push_back(std::move(worker->rest));
-    within.count += worker->count;
+    within.add(worker->seen);
     within.may_repeat.insert(within.may_repeat.end(), worker->collapsed.begin(), worker->collapsed.end());
   }
   const auto vertices = static_cast<std::uint32_t>(mesh.vertices().size());
@@ -205,6 +195,7 @@ SeenEdges edges_in_order(const Numbered& mesh, std::size_t places, Joined& joine
 /// shells: how many
 Buffer<std::uint32_t> numbered_shells(const Numbered& mesh, std::span<const std::uint32_t> parents, std::uint32_t& shells) {
   Buffer<std::uint32_t> shell_of(parents.size());
+  prefer_large_pages(shell_of);
   shells = 0;
   for (std::uint32_t i = 0; i < parents.size(); ++i)
     shell_of[i] = parents[i] != i ? shell_of[parents[i]] : mesh.collapsed(i) ? UINT32_MAX : shells++;
@@ -284,7 +275,7 @@ void diagnose_edges(const Numbered& mesh, std::size_t places, Diagnosis& result)
                   }).box;
   Joined joined(mesh.size());
   {
-    const SeenEdges edges = mesh.in_order() ? edges_in_order(mesh, places, joined) : edges_of_any(mesh, places, joined);
+    const SeenEdges edges = edges_of(mesh, places, joined);
     result.edges = edges.count;
     result.balanced = edges.balanced;
     result.open_edges = edges.open.finding();
@@ -313,7 +304,7 @@ void diagnose_edges(const Numbered& mesh, std::size_t places, Diagnosis& result)
 
 Diagnosis diagnose(const Mesh& mesh, std::size_t places) {
   Diagnosis result = diagnose_facets(mesh.triangles, places);
-  diagnose_edges(Numbered(mesh.triangles), places, result);
+  diagnose_edges(Numbered(mesh.triangles, mesh.bounds), places, result);
   return result;
 }
 
@@ -328,7 +319,7 @@ Diagnosis diagnose_blocks(std::shared_ptr<MeshBlocks> blocks) {
 
 Diagnosis diagnose_alone(Mesh& mesh, std::size_t places) {
   Diagnosis result = diagnose_facets(mesh.triangles, places);
-  Numbered numbered(std::move(mesh.triangles));
+  Numbered numbered(std::move(mesh.triangles), mesh.bounds);
   diagnose_edges(numbered, places, result);
   mesh.triangles = result.shells_apart ? Buffer<Triangle>() : numbered.give_back_list();
   return result;

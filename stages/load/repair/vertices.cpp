@@ -18,6 +18,8 @@
 #include <vector>
 
 #include "stages/geometry/blocks/pages.h"
+#include "stages/load/diagnosis/chunk_numbers.h"
+#include "stages/load/diagnosis/spatial_order.h"
 
 namespace lamina::load {
 namespace {
@@ -29,12 +31,6 @@ constexpr std::uint32_t kNameBits = 14;           // of a point's name, within i
 static_assert(kChunk == kBlockSize);
 static_assert(3 * kChunk <= std::size_t{1} << kNameBits);
 
-inline std::uint64_t hash_of(const Point3& p) {
-  const std::uint64_t xy = static_cast<std::uint32_t>(p.x) | std::uint64_t{static_cast<std::uint32_t>(p.y)} << 32;
-  const std::uint64_t mixed = (xy ^ xy >> 29) * 0x9e3779b97f4a7c15u + static_cast<std::uint32_t>(p.z) * 0x2d358dccaa6c78a5u;
-  return (mixed ^ mixed >> 32) * 0x8bb84b93962eacc9;
-}
-
 using Local = Numbered::Local;
 
 /// The points of a chunk, each once, in the order in which its facets name them.
@@ -45,59 +41,11 @@ struct Chunk {
   std::size_t before = 0;          // points of earlier chunks
 };
 
-/// Numbers the corners of one chunk after the other, in memory that stays in a core's cache. Corners find the first corner that
-/// is the same point through a table in which the first corner of each hash stands: it is written from the last corner to the
-/// first, so no branch depends on what it held. Points whose slot another one has are few, and are found by probing.
-class ChunkNumbers {
- public:
-  /// point  where to write the points, at most as many as corners; may be where the triangles begin, or before
-  /// returns  how many there are
-  std::uint32_t number(std::span<const Triangle> triangles, Local* facets, Point3* point) {
-    const auto corners = static_cast<std::uint32_t>(3 * triangles.size());
-    const Point3* const corner = &triangles.front().a;
-    match({corner, corners});
-    std::uint32_t count = 0;
-    std::uint16_t* const number = facets->data();
-    for (std::uint32_t i = 0; i < corners; ++i) {
-      number_[i] = static_cast<std::uint16_t>(count);  // of a first corner
-      number[i] = number_[first_[i]];
-      const Point3 at = corner[i];  // not behind point[count], which is read no more
-      point[count] = at;
-      count += first_[i] == i;
-    }
-    return count;
-  }
-
- private:
-  static constexpr std::uint16_t kNone = UINT16_MAX;
-  static constexpr int kSlotBits = 15;
-  static constexpr std::size_t kSlots = std::size_t{1} << kSlotBits;
-
-  static bool same(const Point3& p, const Point3& q) { return ((p.x ^ q.x) | (p.y ^ q.y) | (p.z ^ q.z)) == 0; }
-
-  void match(std::span<const Point3> corner) {
-    const auto corners = static_cast<std::uint32_t>(corner.size());
-    for (std::uint32_t i = 0; i < corners; ++i) hash_[i] = static_cast<std::uint16_t>(hash_of(corner[i]) >> (64 - kSlotBits));
-    for (std::uint32_t i = corners; i-- > 0;) slot_[hash_[i]] = static_cast<std::uint16_t>(i);
-    std::uint32_t unmatched = 0;
-    for (std::uint32_t i = 0; i < corners; ++i) {
-      first_[i] = slot_[hash_[i]];
-      rest_[unmatched] = static_cast<std::uint16_t>(i);
-      unmatched += !same(corner[i], corner[first_[i]]);
-    }
-    if (unmatched == 0) return;
-    slot_.fill(kNone);
-    for (std::uint32_t r = 0; r < unmatched; ++r) {
-      const std::uint16_t i = rest_[r];
-      std::size_t at = hash_[i];
-      while (slot_[at] != kNone && !same(corner[i], corner[slot_[at]])) at = (at + 1) % kSlots;
-      if (slot_[at] == kNone) slot_[at] = i;
-      first_[i] = slot_[at];
-    }
-  }
-
-  std::array<std::uint16_t, kSlots> slot_;
-  std::array<std::uint16_t, 3 * kChunk> hash_, first_, number_, rest_;
+/// Numbers chunks whose facets lie apart, in memory of its own.
+struct ChunkGatherer {
+  ChunkNumbers numbers;
+  std::array<Triangle, kChunk> list;
+  std::array<Point3, 3 * kChunk> points;
 };
 
 /// Points of all chunks, each in one slot, which holds its smallest name and later its number.
@@ -174,7 +122,9 @@ class Table {
 
 class Numbering {
  public:
-  explicit Numbering(std::size_t triangles) : facets_(triangles), chunks_((triangles + kChunk - 1) / kChunk) {}
+  explicit Numbering(std::size_t triangles) : facets_(triangles), chunks_((triangles + kChunk - 1) / kChunk) {
+    prefer_large_pages(facets_);
+  }
 
   /// Calls done(end, triangle) when the list has been read up to a triangle from the beginning of a task on.
   /// points  room for as many points as corners; may be the memory of the list
@@ -197,23 +147,29 @@ class Numbering {
         tbb::simple_partitioner());
   }
 
+  /// Facets are read in an order; points go to `listed`.
+  void read(std::span<const Triangle> triangles, std::span<const std::uint32_t> order, std::vector<Buffer<Point3>>& listed) {
+    Gatherers gatherers([] { return std::make_unique<ChunkGatherer>(); });
+    for_each_chunk([&](std::uint32_t c) {
+      ChunkGatherer& gatherer = *gatherers.local();
+      const std::size_t first = c * kChunk, count = std::min(kChunk, triangles.size() - first);
+      for (std::size_t i = 0; i < count; ++i) gatherer.list[i] = triangles[order[first + i]];
+      number_gathered(c, count, gatherer, listed);
+    });
+  }
+
   /// The chunks are blocks. Points of blocks that hold clusters as they are read go to `listed`.
   void read(const MeshBlocks& blocks, std::vector<Buffer<Point3>>& listed) {
-    tbb::enumerable_thread_specific<std::unique_ptr<ChunkNumbers>> workers([] { return std::make_unique<ChunkNumbers>(); });
+    Gatherers gatherers([] { return std::make_unique<ChunkGatherer>(); });
     for_each_chunk([&](std::uint32_t c) {
       const std::uint32_t cluster = c * MeshBlocks::kClusters, count = blocks.triangles_in(c);
       Local* const facets = facets_.data() + c * kChunk;
       const MeshBlocks::Indexed first = blocks.indexed(cluster);
       if (first.cluster == nullptr) {
-        Buffer<Triangle> list(count);
+        ChunkGatherer& gatherer = *gatherers.local();
         for (std::uint32_t i = 0; i < count; ++i)
-          list[i] = blocks.listed(cluster + i / kClusterSize).triangle(i % kClusterSize);
-        listed[c].resize(3 * count);
-        chunks_[c].count = workers.local()->number(list, facets, listed[c].data());
-        listed[c].resize(chunks_[c].count);
-        listed[c].shrink_to_fit();
-        chunks_[c].point = listed[c].data();
-        return;
+          gatherer.list[i] = blocks.listed(cluster + i / kClusterSize).triangle(i % kClusterSize);
+        return number_gathered(c, count, gatherer, listed);
       }
       std::uint16_t last = 0;  // vertices count in the order in which corners name them
       for (std::uint32_t i = 0; i < count; ++i) {
@@ -232,6 +188,7 @@ class Numbering {
     std::size_t points = 0, slots = 64;
     for (Chunk& chunk : chunks_) chunk.before = std::exchange(points, points + chunk.count);
     slot_.resize(points);
+    prefer_large_pages(slot_);
     first_.resize(points);
     // A closed mesh has half as many vertices as facets; where there are more, the table is made anew.
     const std::size_t expected = std::min(points, facets_.size() / 2 + facets_.size() / 16);
@@ -250,6 +207,7 @@ class Numbering {
     std::uint32_t count = 0;
     for (Chunk& chunk : chunks_) chunk.numbers_from = std::exchange(count, count + chunk.numbers_from);
     Buffer<Point3> vertices(count);
+    prefer_large_pages(vertices);
     for_each_chunk([&](std::uint32_t c) { number(chunks_[c], *table, vertices); });
     in_several_.resize(count);
     std::fill(in_several_.begin(), in_several_.end(), std::uint8_t{0});
@@ -262,17 +220,7 @@ class Numbering {
     return vertices;
   }
 
-  void write(Indexed::Facet* facets) const {
-    for_each_chunk([&](std::uint32_t c) {
-      const std::uint32_t* const number = slot_.data() + chunks_[c].before;
-      for (std::size_t i = c * kChunk, end = std::min(i + kChunk, facets_.size()); i < end; ++i) {
-        const Indexed::Facet facet = {number[facets_[i][0]], number[facets_[i][1]], number[facets_[i][2]]};
-        std::memcpy(static_cast<void*>(facets + i), &facet, sizeof facet);
-      }
-    });
-  }
-
-  bool in_order() const { return 4 * slot_.size() <= 3 * facets_.size(); }
+  std::size_t chunks() const { return chunks_.size(); }
   Buffer<Local> take_local() { return std::move(facets_); }
   Buffer<std::uint32_t> take_numbers() { return std::move(slot_); }
   Buffer<std::uint8_t> take_in_several() { return std::move(in_several_); }
@@ -287,6 +235,13 @@ class Numbering {
   template <class Visit>
   void for_each_chunk(const Visit& visit) const {
     tbb::parallel_for(std::uint32_t{0}, static_cast<std::uint32_t>(chunks_.size()), visit);
+  }
+
+  using Gatherers = tbb::enumerable_thread_specific<std::unique_ptr<ChunkGatherer>>;
+  void number_gathered(std::uint32_t c, std::size_t count, ChunkGatherer& from, std::vector<Buffer<Point3>>& listed) {
+    chunks_[c].count = from.numbers.number({from.list.data(), count}, facets_.data() + c * kChunk, from.points.data());
+    listed[c].assign(from.points.begin(), from.points.begin() + chunks_[c].count);
+    chunks_[c].point = listed[c].data();
   }
 
   /// Which points of a chunk no earlier one has, and how many.
@@ -314,24 +269,45 @@ class Numbering {
   Buffer<std::uint8_t> in_several_;  // of each vertex: several chunks have it
 };
 
-/// facets  where to write them, if that is done
-void Numbered::take(Numbering& numbering, Indexed::Facet* facets) {
-  if (facets != nullptr) numbering.write(facets);
+namespace {
+
+/// Whether a few chunks, spread over a list, have points of their own for most of their facets.
+bool in_disorder(std::span<const Triangle> triangles) {
+  constexpr std::size_t kLooked = 4;
+  if (triangles.size() < kLooked * kChunk) return false;
+  const auto worker = std::make_unique<ChunkNumbers>();
+  Buffer<Local> facets(kChunk);
+  Buffer<Point3> points(3 * kChunk);
+  std::size_t count = 0;
+  for (std::size_t i = 0; i < kLooked; ++i) {
+    const std::size_t first = (triangles.size() - kChunk) / (kLooked - 1) * i;
+    count += worker->number(triangles.subspan(first, kChunk), facets.data(), points.data());
+  }
+  return 4 * count > 3 * kLooked * kChunk;
+}
+
+}  // namespace
+
+void Numbered::take(Numbering& numbering) {
   begin_ = numbering.begins();
   numbers_ = numbering.take_numbers();
   in_several_ = numbering.take_in_several();
   local_ = numbering.take_local();
-  if (facets != nullptr) facets_ = {facets, local_.size()};
 }
 
-Numbered::Numbered(std::span<const Triangle> triangles) {
+Numbered::Numbered(std::span<const Triangle> triangles, const Box& bounds) {
   Numbering numbering(triangles.size());
-  Buffer<Point3> points(3 * triangles.size());  // of whose memory little is touched
-  numbering.read(triangles, points.data(), [](Point3*, std::size_t) {});
-  vertices_ = numbering.join();
-  Buffer<Point3>().swap(points);
-  if (!numbering.in_order()) own_.resize(triangles.size());
-  take(numbering, numbering.in_order() ? nullptr : own_.data());
+  if (in_disorder(triangles)) {
+    order_ = spatial_order(triangles, bounds);
+    std::vector<Buffer<Point3>> listed(numbering.chunks());
+    numbering.read(triangles, order_, listed);
+    vertices_ = numbering.join();
+  } else {
+    Buffer<Point3> points(3 * triangles.size());  // of whose memory little is touched
+    numbering.read(triangles, points.data(), [](Point3*, std::size_t) {});
+    vertices_ = numbering.join();
+  }
+  take(numbering);
 }
 
 Numbered::Numbered(const MeshBlocks& blocks) {
@@ -341,33 +317,34 @@ Numbered::Numbered(const MeshBlocks& blocks) {
     numbering.read(blocks, listed);
     vertices_ = numbering.join();
   }
-  if (!numbering.in_order()) own_.resize(blocks.triangle_count());
-  take(numbering, numbering.in_order() ? nullptr : own_.data());
+  take(numbering);
 }
 
-// Points lie where their triangles were until vertices are known, then facets, if they are wanted, where the first third of the
-// list was. What neither takes goes back to the system.
-Numbered::Numbered(Buffer<Triangle>&& triangles) : taken_(std::move(triangles)) {
-  const std::size_t count = taken_.size();
-  auto* const facets = reinterpret_cast<Indexed::Facet*>(taken_.data());
-  char* const rest = reinterpret_cast<char*>(facets + count);
-  Numbering numbering(count);
-  numbering.read(taken_, reinterpret_cast<Point3*>(taken_.data()), [&](Point3* points_end, std::size_t end) {
-    char* const from = std::max(rest, reinterpret_cast<char*>(points_end));
-    char* const to = reinterpret_cast<char*>(taken_.data() + end);
-    if (from < to) forget_pages(from, to);
-  });
-  vertices_ = numbering.join();
-  if (count > 0) forget_pages(numbering.in_order() ? reinterpret_cast<char*>(facets) : rest, taken_.data() + count);
-  take(numbering, numbering.in_order() ? nullptr : facets);
+// Points of a list in order lie where their triangles were until vertices are known.
+Numbered::Numbered(Buffer<Triangle>&& triangles, const Box& bounds) : taken_(std::move(triangles)) {
+  Numbering numbering(taken_.size());
+  Triangle* const end_of_list = taken_.data() + taken_.size();
+  if (in_disorder(taken_)) {
+    order_ = spatial_order(taken_, bounds);
+    std::vector<Buffer<Point3>> listed(numbering.chunks());
+    numbering.read(taken_, order_, listed);
+    forget_pages(taken_.data(), end_of_list);
+    vertices_ = numbering.join();
+  } else {
+    numbering.read(taken_, reinterpret_cast<Point3*>(taken_.data()),
+                   [&](Point3* points_end, std::size_t end) { forget_pages(points_end, taken_.data() + end); });
+    vertices_ = numbering.join();
+    if (!taken_.empty()) forget_pages(taken_.data(), end_of_list);
+  }
+  take(numbering);
 }
 
 Buffer<Triangle> Numbered::give_back_list() {
-  facets_ = {};
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, taken_.size(), kChunk), [&](const auto& range) {
     for (std::size_t i = range.begin(); i != range.end(); ++i) {
-      const Triangle t = triangle(static_cast<std::uint32_t>(i));
-      std::memcpy(static_cast<void*>(taken_.data() + i), &t, sizeof t);
+      const auto f = static_cast<std::uint32_t>(i);
+      const Triangle t = triangle(f);
+      std::memcpy(static_cast<void*>(taken_.data() + listed(f)), &t, sizeof t);
     }
   });
   return std::move(taken_);

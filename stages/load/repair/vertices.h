@@ -20,12 +20,14 @@ class Numbering;
 class Numbered {
  public:
   /// The numbers are the same on every machine and for any number of threads. Where they need not rise as points do, this
-  /// takes a fifth of the time and a third of the memory of index_mesh().
-  /// cost  O(T), parallel; 6 bytes a triangle, 4 for each chunk that has a vertex and 13 a vertex, meanwhile some 20 more a
-  ///       vertex; 12 bytes a triangle more where the list is not in order
-  explicit Numbered(std::span<const Triangle> triangles);
-  /// The same in the memory of the list, of which what is left over goes back to the system as it is read.
-  explicit Numbered(Buffer<Triangle>&& triangles);
+  /// takes a fifth of the time and a third of the memory of index_mesh(). Facets of a list in which neighbours in the mesh are
+  /// no neighbours count in a spatial order.
+  /// bounds  of the list
+  /// cost    O(T), parallel; 6 bytes a triangle, 4 for each chunk that has a vertex and 13 a vertex, meanwhile some 20 more a
+  ///         vertex; 4 bytes a triangle more where the list is not in order
+  Numbered(std::span<const Triangle> triangles, const Box& bounds);
+  /// The same in the memory of the list, which goes back to the system as it is read.
+  Numbered(Buffer<Triangle>&& triangles, const Box& bounds);
   /// Of blocks that hold no caps, each of which knows its own vertices already: facets count in the order of their clusters.
   explicit Numbered(const MeshBlocks& blocks);
   Numbered(const Numbered&) = delete;
@@ -33,19 +35,19 @@ class Numbered {
 
   std::size_t size() const { return local_.size(); }  // facets
   std::span<const Point3> vertices() const { return vertices_; }
-  /// In the order of the triangles; none where the list is in order.
-  std::span<const Indexed::Facet> facets() const { return facets_; }
   Indexed::Facet facet(std::uint32_t f) const {
     const std::uint32_t* const number = numbers_.data() + begin_[f / kChunk];
     return {number[local_[f][0]], number[local_[f][1]], number[local_[f][2]]};
   }
+  /// Its number in the list, or among the clusters of the blocks.
+  std::uint32_t listed(std::uint32_t f) const { return order_.empty() ? f : order_[f]; }
   /// It uses a vertex twice.
   bool collapsed(std::uint32_t f) const {
     const auto& [a, b, c] = local_[f];
     return a == b || b == c || c == a;
   }
 
-  /// The list was numbered in chunks of so many facets, each of whose points has a number in the chunk.
+  /// Facets were numbered in chunks of so many, each of whose points has a number in the chunk.
   static constexpr std::size_t kChunk = 4096;
   using Local = std::array<std::uint16_t, 3>;
   std::size_t chunks() const { return begin_.size() - 1; }
@@ -58,8 +60,6 @@ class Numbered {
     return {numbers_.data() + begin_[chunk], begin_[chunk + 1] - begin_[chunk]};
   }
   bool in_several_chunks(std::uint32_t vertex) const { return in_several_[vertex] != 0; }
-  /// Most neighbours in the mesh are neighbours in the list: most edges lie within a chunk.
-  bool in_order() const { return 4 * numbers_.size() <= 3 * size(); }
 
   Triangle triangle(std::uint32_t f) const {
     const Indexed::Facet corners = facet(f);
@@ -70,11 +70,10 @@ class Numbered {
   Buffer<Triangle> give_back_list();
 
  private:
-  void take(Numbering& numbering, Indexed::Facet* facets);
+  void take(Numbering& numbering);
 
-  Buffer<Indexed::Facet> own_;
   Buffer<Triangle> taken_;
-  std::span<const Indexed::Facet> facets_;  // in one of the two, or none
+  Buffer<std::uint32_t> order_;  // of facets in the list; none where they count as it does
   Buffer<Point3> vertices_;
   Buffer<Local> local_;
   Buffer<std::size_t> begin_;  // of the points of each chunk, and the end

@@ -33,7 +33,7 @@ std::string write_source(const Profile& profile) { return profile.calibration.so
 constexpr Word<BeadShape> kShapes[] = {
     {"stadium", BeadShape::kStadium}, {"rectangle", BeadShape::kRectangle}, {"ellipse", BeadShape::kEllipse}};
 std::string read_shape(Text text, std::optional<BeadShape>& shape) {
-  BeadShape read;
+  BeadShape read{};
   std::string wrong = read_word(kShapes, text, read);
   if (wrong.empty()) shape = read;
   return wrong;
