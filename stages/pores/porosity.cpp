@@ -1,0 +1,29 @@
+#include "stages/pores/porosity.h"
+
+#include "stages/pores/voids.h"
+
+namespace lamina::pores {
+
+Porosity porosity(const VoxelView& solid, const VoxelView* body, Faces outside) {
+  Porosity result;
+  const VoxelStack empty = void_of(solid, body);
+  const Parts parts = parts_of(empty);
+  Buffer<std::uint8_t> open(parts.size(), std::uint8_t{0});
+  if (body != nullptr) open = parts_beside(empty, parts, without(void_of(solid), *body));
+  result.body = body == nullptr ? solid.voxels() : set_voxels(*body);
+  result.voxel_mm3 = mm(solid.edge[0]) * mm(solid.edge[1]) * mm(solid.edge[2]);
+  result.parts = static_cast<std::uint32_t>(parts.size());
+  for (std::size_t p = 0; p < parts.size(); ++p) {
+    bool is_open = open[p] != 0 || (parts.faces[p] & outside) != 0;
+    for (int axis = 0; axis < 3; ++axis) {
+      is_open = is_open || ((outside & faces_of(axis)) != 0 && (parts.wraps[p] >> axis & 1) != 0);
+      if (parts.through(p, axis)) result.through[static_cast<std::size_t>(axis)] += parts.voxels[p];
+    }
+    result.empty += parts.voxels[p];
+    if (is_open) result.open += parts.voxels[p];
+    if (!is_open) ++result.cavities;
+  }
+  return result;
+}
+
+}  // namespace lamina::pores
