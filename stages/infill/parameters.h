@@ -8,11 +8,11 @@
 #include <utility>
 #include <vector>
 
-#include "stages/data/angle.h"
 #include "stages/data/choices.h"
 #include "stages/data/layer.h"
 #include "stages/data/mesh.h"  // Box
 #include "stages/data/units.h"
+#include "stages/geometry/angle.h"
 #include "stages/infill/settings.h"
 
 namespace lamina::infill {

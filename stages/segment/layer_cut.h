@@ -6,10 +6,10 @@
 #include <optional>
 #include <span>
 
-#include "stages/data/angle.h"
 #include "stages/data/mesh.h"  // Box
 #include "stages/data/status.h"
 #include "stages/data/toolpaths.h"
+#include "stages/geometry/angle.h"
 #include "stages/segment/expand.h"
 #include "stages/segment/predict.h"
 

@@ -1,4 +1,4 @@
-// stages/data/angle.h: directions on the bed are whole millionths of a degree.
+// stages/geometry/angle.h: directions on the bed are whole millionths of a degree.
 #pragma once
 
 #include <cstdint>
