@@ -10,6 +10,8 @@
 
 namespace lamina::pores::testing {
 
+inline constexpr std::array<Nm, 3> kEdge{10'000, 10'000, 10'000};  // 0.01 mm
+
 /// One byte a voxel, x fastest; 1 is solid.
 struct Voxels {
   std::uint32_t nx, ny, nz;

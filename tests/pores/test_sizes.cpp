@@ -12,13 +12,13 @@
 namespace lamina::pores {
 namespace {
 
+using testing::kEdge;
 using testing::random_box;
 using testing::stack_of;
 using testing::turned;
 using testing::Voxels;
 
 constexpr double kVoxel = 0.01;  // mm
-constexpr std::array<Nm, 3> kEdge{10'000, 10'000, 10'000};
 
 // One pore in a slice: where a point is, seen from the middle and turned by an angle, in voxels.
 template <class Is>

@@ -10,12 +10,11 @@
 namespace lamina::pores {
 namespace {
 
+using testing::kEdge;
 using testing::random_box;
 using testing::stack_of;
 using testing::turned;
 using testing::Voxels;
-
-constexpr std::array<Nm, 3> kEdge{10'000, 10'000, 10'000};  // 0.01 mm
 
 Voxels ball(std::uint32_t side, double radius, double shift = 0) {
   return Voxels(side, side, side).fill([&](auto x, auto y, auto z) {

@@ -12,12 +12,11 @@
 namespace lamina::pores {
 namespace {
 
+using testing::kEdge;
 using testing::random_box;
 using testing::stack_of;
 using testing::turned;
 using testing::Voxels;
-
-constexpr std::array<Nm, 3> kEdge{10'000, 10'000, 10'000};  // 0.01 mm
 
 std::vector<double> slow_distances(const Voxels& box, std::array<bool, 3> periodic, std::array<double, 3> edge) {
   const std::array<int, 3> n{static_cast<int>(box.nx), static_cast<int>(box.ny), static_cast<int>(box.nz)};
