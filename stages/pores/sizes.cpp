@@ -3,6 +3,7 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <utility>
 
@@ -48,11 +49,13 @@ PoreSizes sizes_of(const VoxelView& slice, const VoxelView* outside, std::uint32
   if (outside != nullptr) beside = parts_beside(slice, parts, *outside);
   Ends ends = ends_of(slice, parts);
   const double pixel_mm2 = mm(slice.edge[0]) * mm(slice.edge[1]);
+  const std::array<double, 2> size_mm{slice.nx * mm(slice.edge[0]), slice.ny * mm(slice.edge[1])};
   for (std::size_t p = 0; p < parts.size(); ++p) {
     const double area = static_cast<double>(parts.voxels[p]) * pixel_mm2;
     if (parts.wraps[p] != 0) {
       ++sizes.endless;
       sizes.endless_mm2 += area;
+      if (parts.wraps[p] < 3) sizes.channels_mm.push_back(area / (parts.wraps[p] == 1 ? size_mm[0] : size_mm[1]));
     } else if (beside[p] != 0 || (parts.faces[p] & (kFacesX | kFacesY)) != 0) {
       ++sizes.cut;
       sizes.cut_mm2 += area;
@@ -85,6 +88,7 @@ PoreSizes pore_sizes(const VoxelView& solid, const VoxelView* body) {
   PoreSizes all;
   for (PoreSizes& slice : found) {
     all.pores.insert(all.pores.end(), slice.pores.begin(), slice.pores.end());
+    all.channels_mm.insert(all.channels_mm.end(), slice.channels_mm.begin(), slice.channels_mm.end());
     all.cut += slice.cut, all.endless += slice.endless;
     all.cut_mm2 += slice.cut_mm2, all.endless_mm2 += slice.endless_mm2;
     slice = {};

@@ -17,12 +17,14 @@ struct Pore {
   std::uint32_t slice;
 };
 
-/// Pores of all slices, and what is none.
+/// Pores of all slices, and regions that have no length.
 struct PoreSizes {
-  Buffer<Pore> pores;  // by slice, then in the order of their first runs
-  // --- regions without a length
-  std::uint64_t cut = 0, endless = 0;  // that reach the edge of the box or body; that go around a periodic axis
+  Buffer<Pore> pores;         // by slice, then in the order of their first runs
+  std::uint64_t cut = 0;      // reach the edge of the box or body
+  std::uint64_t endless = 0;  // go around a periodic axis
   double cut_mm2 = 0, endless_mm2 = 0;
+  /// Mean widths, area / period, of endless regions that go around one axis only: gaps between straight beads.
+  Buffer<double> channels_mm;
 };
 
 /// The box of a pore is the one of least area that holds its pixels, in any direction. Rectangles and slots are measured

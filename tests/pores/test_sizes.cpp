@@ -122,9 +122,22 @@ TEST(PoreSizes, PoresThatAreCutOrEndlessAreCountedApart) {
   EXPECT_EQ(periodic.cut, 0u);
   EXPECT_EQ(periodic.endless, 1u);
   EXPECT_NEAR(periodic.endless_mm2, 20 * kVoxel * kVoxel, 1e-12);
+  ASSERT_EQ(periodic.channels_mm.size(), 1u);
+  EXPECT_NEAR(periodic.channels_mm[0], kVoxel, 1e-12);
   ASSERT_EQ(periodic.pores.size(), 2u);
   EXPECT_NEAR(periodic.pores[0].length_mm, 4 * kVoxel, 1e-12);
   EXPECT_NEAR(periodic.pores[0].width_mm, kVoxel, 1e-12);
+}
+
+// Straight gaps along y of 3 and 5 voxels, and a slice whose gaps cross: a mesh has no width.
+TEST(PoreSizes, ChannelsBetweenStraightBeadsHaveAMeanWidth) {
+  const Voxels box = Voxels(20, 6, 2).fill(
+      [](auto x, auto y, auto z) { return !((x >= 2 && x < 5) || (x >= 10 && x < 15) || (z == 1 && y == 3)); });
+  const PoreSizes sizes = pore_sizes(stack_of(box, {true, true, true}, kEdge));
+  EXPECT_EQ(sizes.endless, 3u);
+  ASSERT_EQ(sizes.channels_mm.size(), 2u);
+  EXPECT_NEAR(sizes.channels_mm[0], 3 * kVoxel, 1e-12);
+  EXPECT_NEAR(sizes.channels_mm[1], 5 * kVoxel, 1e-12);
 }
 
 TEST(PoreSizes, APoreIsTheSameWhereverThePeriodBegins) {

@@ -41,6 +41,20 @@ TEST(Tortuosity, OfASlotAt45DegreesIsRootTwo) {
   EXPECT_NEAR(of(around, 2, {true, false, false}).mean, std::numbers::sqrt2, 0.02);
 }
 
+// The direction between an axis and a diagonal is the worst in a plane: 8 % too long.
+TEST(Tortuosity, OfASlotAt22DegreesIsTooLongAsTheHeaderSays) {
+  const double slope = std::numbers::sqrt2 - 1;
+  const Voxels slot = Voxels(260, 3, 600).fill([&](auto x, auto, auto z) { return x < z * slope + 1 || x >= z * slope + 5; });
+  const double length = std::sqrt(1 + slope * slope);
+  EXPECT_NEAR(of(slot).mean / length, length, 0.01);  // 1.082, which is by how much it is too long as well
+}
+
+TEST(Tortuosity, WaysDoNotLeaveByTheFacesThemselves) {
+  // A solid lid in the middle: around a box that repeats along z one could reach the far face at once.
+  const Voxels box = Voxels(4, 4, 9).fill([](auto, auto, auto z) { return z == 4; });
+  EXPECT_EQ(of(box, 2, {true, true, true}).reached, 0u);
+}
+
 // Down a shaft, along a gallery and up again: lengths by hand, centre to centre, with corners cut by the diagonal.
 TEST(Tortuosity, OfATrapIsItsLengthByHand) {
   Voxels box(12, 1, 11, 1);
