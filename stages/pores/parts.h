@@ -37,7 +37,7 @@ struct Parts {
 };
 
 /// source  Hoshen, Kopelman, "Percolation and cluster distribution" (1976), on runs; the cells as in Newman, Ziff, "Fast Monte
-///         Carlo algorithm for site or bond percolation" (2001), section II D
+///         Carlo algorithm for site or bond percolation" (2001)
 /// cost    O(runs log runs), slices in parallel; 4 bytes a run, some 30 a piece
 Parts parts_of(const VoxelView& set);
 

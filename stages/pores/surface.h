@@ -20,9 +20,8 @@ struct Surface {
 /// solid  cubes or any edges: directions are weighted by their share of the sphere
 /// body   pairs of neighbours count where both lie in it; none: the whole box
 /// throws  std::length_error  2^32 changes or more
-/// source  Legland, Kieu, Devaux, "Computation of Minkowski measures on 2D and 3D binary images" (2007), whose weights for
-/// cubes
-///         are used; Ohser, Muecklich, "Statistical Analysis of Microstructures in Materials Science" (2000)
+/// source  Legland, Kieu, Devaux, "Computation of Minkowski measures on 2D and 3D binary images" (2007), with its weights for
+///         cubes; Ohser, Muecklich, "Statistical Analysis of Microstructures in Materials Science" (2000)
 /// cost    O(runs) for each direction, slices in parallel
 Surface specific_surface(const VoxelView& solid, const VoxelView* body = nullptr);
 

@@ -13,11 +13,12 @@ namespace lamina::pores {
 ///
 /// Centres of balls step from voxel to neighbour, and a wall lies half of the longest edge before the centre of a solid voxel.
 /// So between walls square to an axis an odd number of voxels is measured exactly, an even one a voxel too little, and a round
-/// hole within a voxel. Edges that are not the same: to 1/64 of the shortest edge squared. axes    those to look at; the others
-/// are 0 throws  std::length_error  2^32 changes or more source  Delerue, Perrier, "DXSoil, a library for 3D image analysis in
-/// soil science" (2002), by bisection: voxels that are far
-///         enough from the solid are joined as runs, until the next distance does not lead through
-/// cost    O(voxels of the window), some ten times, parallel; 4 bytes a voxel, and 16 a run of those that are far enough
+/// hole within a voxel. Edges that are not the same: to 1/64 of the shortest edge squared.
+/// axes    those to look at; the others are 0
+/// throws  std::length_error  2^32 changes or more
+/// source  Delerue, Perrier, "DXSoil, a library for 3D image analysis in soil science" (2002); here by bisection: voxels that
+///         are far enough from the solid are joined as runs, until the next distance does not lead through
+/// cost    O(voxels of the window), some ten times, parallel; 4 bytes a voxel, and 12 a run of those that are far enough
 std::array<double, 3> throats(const VoxelView& solid, const VoxelWindow& window,
                               std::array<bool, 3> axes = {false, false, true});
 
