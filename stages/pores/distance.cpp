@@ -25,8 +25,10 @@ class Line {
     for (std::uint32_t i = 0; i < count; ++i) value_[i] = values[i * stride];
     stands_.clear();
     from_.clear();
+    std::int64_t wrapped = (first + 2 * n) % n;
     for (std::int64_t at = first; at < end; ++at) {
-      const double height = value_[static_cast<std::size_t>(((at % n) + n) % n)];
+      const double height = value_[static_cast<std::size_t>(wrapped)];
+      if (++wrapped == n) wrapped = 0;
       if (height == static_cast<double>(kFar)) continue;
       double from = -std::numeric_limits<double>::infinity();
       while (!stands_.empty()) {
