@@ -1,0 +1,166 @@
+// stages/bead/line.cpp: stretches -> phases of constant acceleration -> pieces.
+#include "stages/bead/line.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+
+#include "stages/bead/section.h"
+
+namespace lamina::bead {
+namespace {
+
+constexpr double kLeastPiece = 1e-4;  // mm
+
+/// The one to three phases of a stretch, in order.
+struct Phases {
+  std::array<Phase, 3> phase;
+  std::uint32_t count = 0;
+
+  void add(double length, double area, double from, double to, double tau) {
+    if (length <= 0) return;
+    phase[count++] = {length, area, from, (to * to - from * from) / (2 * length), tau, 0};
+  }
+};
+
+Phases phases_of(const Planned& planned, const BeadMachine& machine) {
+  const auto& [length, area, speed] = planned.stretch;
+  const double tau = machine.tau_s, acceleration = machine.acceleration_mm_s2;
+  const double from = planned.begin_mm_s, to = planned.end_mm_s;
+  Phases phases;
+  if (std::isinf(acceleration)) {
+    phases.add(length, area, speed, speed, tau);
+    return phases;
+  }
+  const double peak = planned.peak(acceleration);
+  const double up = std::max((peak * peak - from * from) / (2 * acceleration), 0.0);
+  const double down = std::max((peak * peak - to * to) / (2 * acceleration), 0.0);
+  const double rest = length - up - down;
+  if (up + down > length * (1 + 1e-9)) {  // joined faster than the head can brake
+    phases.add(length, area, from, to, tau);
+    return phases;
+  }
+  const double even = rest > length * 1e-12 ? rest : 0;
+  const double share = (length - even) / std::max(up + down, 1e-300);
+  phases.add(up * share, area, from, peak, tau);
+  phases.add(even, area, peak, peak, tau);
+  phases.add(down * share, area, peak, to, tau);
+  return phases;
+}
+
+}  // namespace
+
+BeadLine::BeadLine(const BeadMachine& machine, double height_mm, double tolerance_mm)
+    : machine_(machine), height_(height_mm), tolerance_(tolerance_mm), plan_(machine.acceleration_mm_s2) {}
+
+void BeadLine::begin(const Joint& from) {
+  plan_ = SpeedPlan(machine_.acceleration_mm_s2);
+  plan_.begin(from.speed_mm_s);
+  place_ = seconds_ = laid_ = fed_ = 0;
+  flow_ = from.flow_mm3_s;
+  speed_ = from.speed_mm_s;
+}
+
+void BeadLine::add(const Stretch& stretch, const TakePiece& take) {
+  if (!(stretch.length_mm > 0)) return;
+  plan_.add(stretch);
+  for (Planned planned{}; plan_.take(planned);) lay(planned, take);
+}
+
+Joint BeadLine::end(double speed_mm_s, const TakePiece& take) {
+  for (Planned planned{}; plan_.waiting() > 0;) {
+    plan_.take_last(speed_mm_s, planned);
+    lay(planned, take);
+  }
+  return {speed_, flow_};
+}
+
+void BeadLine::lay(const Planned& planned, const TakePiece& take) {
+  Phases phases = phases_of(planned, machine_);
+  for (std::uint32_t i = 0; i < phases.count; ++i) {
+    phases.phase[i].flow_mm3_s = flow_;
+    lay(phases.phase[i], take);
+  }
+}
+
+double BeadLine::width(const Phase& phase, double s) const {
+  return width_of(std::min(phase.area_at(s), 1e12), phase.area_mm2, height_);
+}
+
+double BeadLine::step_within(const Phase& phase, double from, double step) const {
+  // Probes see an exponential's and a root's largest distance within a quarter of it: half of the tolerance is allowed.
+  for (; step > kLeastPiece; step /= 2) {
+    const double a = width(phase, from), b = width(phase, from + step);
+    bool within = true;
+    for (const double share : {0.125, 0.25, 0.5, 0.75, 0.875}) {
+      const double between = a + share * (b - a);
+      within = within && std::abs(width(phase, from + share * step) - between) <= tolerance_ / 2;
+    }
+    if (within) break;
+  }
+  return step;
+}
+
+void BeadLine::lay(const Phase& phase, const TakePiece& take) {
+  const double length = phase.length_mm;
+  double s = 0, step = length, laid = 0;
+  while (s < length) {
+    step = step_within(phase, s, std::min(2 * step, length - s));
+    if (step < kLeastPiece) step = std::min(kLeastPiece, length - s);
+    const double next = length - s - step < kLeastPiece / 2 ? length : s + step;
+    const double volume = phase.laid_after(phase.time_at(next));
+    const double mean = (volume - laid) / (next - s);
+    double a = phase.area_at(s), b = phase.area_at(next);
+    if (!std::isfinite(a)) a = mean;  // the head stands
+    if (!std::isfinite(b)) b = mean;
+    take({place_ + s, place_ + next, a, b, width_of(a, phase.area_mm2, height_), width_of(b, phase.area_mm2, height_),
+          phase.area_mm2, volume - laid});
+    laid = volume;
+    s = next;
+  }
+  const double time = phase.time_at(length);
+  flow_ = phase.flow_after(time);
+  speed_ = phase.speed_at(length);
+  seconds_ += time;
+  laid_ += laid;
+  fed_ += phase.area_mm2 * length;
+  place_ += length;
+}
+
+Joint steady_joint(const BeadMachine& machine, std::span<const Stretch> period) {
+  const double speed = cyclic_speed(period, machine.acceleration_mm_s2);
+  if (period.empty()) return {speed, 0};
+  // The flow after a period is kept x the flow before + added.
+  SpeedPlan plan(machine.acceleration_mm_s2);
+  plan.begin(speed);
+  for (const Stretch& stretch : period) plan.add(stretch);
+  double flow = 0, seconds = 0;
+  while (plan.waiting() > 0) {
+    Planned planned{};
+    plan.take_last(speed, planned);
+    Phases phases = phases_of(planned, machine);
+    for (std::uint32_t i = 0; i < phases.count; ++i) {
+      phases.phase[i].flow_mm3_s = flow;
+      const double time = phases.phase[i].time_at(phases.phase[i].length_mm);
+      flow = phases.phase[i].flow_after(time);
+      seconds += time;
+    }
+  }
+  if (machine.tau_s <= 0) return {speed, flow};
+  return {speed, flow / -std::expm1(-seconds / machine.tau_s)};
+}
+
+void lay_steady(const BeadMachine& machine, double height_mm, const Pattern& pattern, const TakePiece& take,
+                double tolerance_mm) {
+  const double area = machine.area_mm2 * pattern.extrusion_percent / 100;
+  const std::array<Stretch, 2> period{
+      {{pattern.thick_mm, area, pattern.thick_speed_mm_s}, {pattern.thin_mm, area, pattern.thin_speed_mm_s}}};
+  const Joint joint = steady_joint(machine, period);
+  BeadLine line(machine, height_mm, tolerance_mm);
+  line.begin(joint);
+  for (const Stretch& stretch : period) line.add(stretch, take);
+  line.end(joint.speed_mm_s, take);
+}
+
+}  // namespace lamina::bead

@@ -1,0 +1,80 @@
+// stages/bead/line.h: the bead along a line, predicted while its stretches come, without keeping the line.
+//
+// What it assumes: extrusion follows motion (what is fed is the commanded cross-section x the speed of the head), the head
+// accelerates evenly (speeds.h), the melt lags (lag.h), and volume is conserved: cross-section = flow / speed. The width is
+// that of the cross-section (section.h). That material spreads along the line as well is left to spread.h.
+#pragma once
+
+#include <functional>
+
+#include "stages/bead/lag.h"
+#include "stages/bead/machine.h"
+#include "stages/bead/speeds.h"
+
+namespace lamina::bead {
+
+/// A short piece of a bead, mm from where the line begins. Between its ends area and width are in proportion, within the
+/// tolerance; the volume is exact.
+struct BeadPiece {
+  double begin_mm, end_mm;
+  double begin_area_mm2, end_area_mm2;
+  double begin_width_mm, end_width_mm;
+  double fed_mm2;     // the commanded cross-section
+  double volume_mm3;  // that is laid
+};
+
+using TakePiece = std::function<void(const BeadPiece&)>;
+
+/// One line after another. Keeps the stretches within a braking distance, nothing else.
+///
+/// usage   begin(joint); add(stretch, take)...; joint = end(speed, take);
+class BeadLine {
+ public:
+  /// height     of the layer, mm, > 0
+  /// tolerance  mm of width, > 0: pieces are so short that between their ends a width is at most so far from the line
+  ///            between them; none is shorter than 0.1 um, which starts from rest need
+  BeadLine(const BeadMachine& machine, double height_mm, double tolerance_mm = 0.001);
+
+  /// At the place 0. Sums begin anew.
+  void begin(const Joint& from);
+  /// Gives the pieces of all stretches whose speeds are final, in order.
+  /// stretch  an empty one is left out
+  void add(const Stretch& stretch, const TakePiece& take);
+  /// Gives the rest. speed  that the line after joins with
+  /// returns  how the line ends
+  Joint end(double speed_mm_s, const TakePiece& take);
+
+  double place_mm() const { return place_; }
+  double seconds() const { return seconds_; }
+  double laid_mm3() const { return laid_; }
+  double fed_mm3() const { return fed_; }
+  /// What the lag holds: fed - laid = held now - held at the beginning.
+  double held_mm3() const { return machine_.tau_s * flow_; }
+
+ private:
+  void lay(const Planned& planned, const TakePiece& take);
+  void lay(const Phase& phase, const TakePiece& take);
+  double step_within(const Phase& phase, double from, double step) const;
+  double width(const Phase& phase, double s) const;
+
+  BeadMachine machine_;
+  double height_, tolerance_;
+  SpeedPlan plan_;
+  double place_ = 0, seconds_ = 0, laid_ = 0, fed_ = 0;
+  double flow_ = 0, speed_ = 0;
+};
+
+/// How a pattern that is repeated without end begins each time: a line that begins like this is in its steady state at once.
+/// cost  O(stretches), twice; the lag is linear, so that the flow after a period is a line of the flow before
+Joint steady_joint(const BeadMachine& machine, std::span<const Stretch> period);
+
+/// Thick and thin stretches of one extrusion in turn: one period in its steady state, thick first.
+struct Pattern {
+  double thick_mm, thin_mm;
+  double extrusion_percent;
+  double thick_speed_mm_s, thin_speed_mm_s;
+};
+void lay_steady(const BeadMachine& machine, double height_mm, const Pattern& pattern, const TakePiece& take,
+                double tolerance_mm = 0.001);
+
+}  // namespace lamina::bead

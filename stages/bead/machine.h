@@ -1,0 +1,32 @@
+// stages/bead/machine.h: what a machine differs in when it lays beads, and what it is told to lay.
+//
+// A bead is predicted from three numbers of a machine and from the volume it is fed; no table of widths is looked up.
+#pragma once
+
+#include <limits>
+
+namespace lamina::bead {
+
+/// A calibration for the model. Nothing else of a machine enters it.
+struct BeadMachine {
+  double area_mm2 = 0;  // cross-section of 100 %: bead_area x flow of the profile
+  /// The melt follows the feed with this lag, s; 0 lays at once what is fed. Anet A8: time_constant() in stabilisation.h.
+  double tau_s = 0;
+  /// Of the head along a line. Infinite: speeds change at once.
+  double acceleration_mm_s2 = std::numeric_limits<double>::infinity();
+};
+
+/// A straight piece of a line as it is commanded.
+struct Stretch {
+  double length_mm;   // > 0
+  double area_mm2;    // that is fed for each mm, >= 0: area of 100 % x extrusion
+  double speed_mm_s;  // > 0; reached if the stretch is long enough
+};
+
+/// How a line begins, or has ended: what the line before left behind.
+struct Joint {
+  double speed_mm_s = 0;  // of the head
+  double flow_mm3_s = 0;  // that leaves the nozzle
+};
+
+}  // namespace lamina::bead
