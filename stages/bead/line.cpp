@@ -60,6 +60,7 @@ void BeadLine::begin(const Joint& from) {
   place_ = seconds_ = laid_ = fed_ = 0;
   flow_ = from.flow_mm3_s;
   speed_ = from.speed_mm_s;
+  pressed_ = from.pressed;
 }
 
 void BeadLine::add(const Stretch& stretch, const TakePiece& take) {
@@ -73,7 +74,7 @@ Joint BeadLine::end(double speed_mm_s, const TakePiece& take) {
     plan_.take_last(speed_mm_s, planned);
     lay(planned, take);
   }
-  return {speed_, flow_};
+  return {speed_, flow_, pressed_};
 }
 
 void BeadLine::lay(const Planned& planned, const TakePiece& take) {
@@ -85,7 +86,7 @@ void BeadLine::lay(const Planned& planned, const TakePiece& take) {
 }
 
 double BeadLine::width(const Phase& phase, double s) const {
-  return width_of(std::min(phase.area_at(s), 1e12), phase.area_mm2, height_);
+  return width_of(std::min(phase.area_at(s), 1e12), pressed_ && may_stay_pressed(phase.area_mm2, height_), height_);
 }
 
 double BeadLine::step_within(const Phase& phase, double from, double step) const {
@@ -105,6 +106,8 @@ double BeadLine::step_within(const Phase& phase, double from, double step) const
 void BeadLine::lay(const Phase& phase, const TakePiece& take) {
   const double length = phase.length_mm;
   double s = 0, step = length, laid = 0;
+  const double fed = phase.area_mm2;
+  pressed_ = stays_pressed(phase.area_at(0), fed, pressed_, height_);
   while (s < length) {
     step = step_within(phase, s, std::min(2 * step, length - s));
     if (step < kLeastPiece) step = std::min(kLeastPiece, length - s);
@@ -114,8 +117,10 @@ void BeadLine::lay(const Phase& phase, const TakePiece& take) {
     double a = phase.area_at(s), b = phase.area_at(next);
     if (!std::isfinite(a)) a = mean;  // the head stands
     if (!std::isfinite(b)) b = mean;
-    take({place_ + s, place_ + next, a, b, width_of(a, phase.area_mm2, height_), width_of(b, phase.area_mm2, height_),
-          phase.area_mm2, volume - laid});
+    const bool pressed = pressed_ && may_stay_pressed(fed, height_);
+    take({place_ + s, place_ + next, a, b, width_of(a, pressed, height_), width_of(b, pressed, height_), volume - laid,
+          pressed});
+    pressed_ = stays_pressed(b, fed, pressed_, height_);
     laid = volume;
     s = next;
   }
@@ -128,9 +133,9 @@ void BeadLine::lay(const Phase& phase, const TakePiece& take) {
   place_ += length;
 }
 
-Joint steady_joint(const BeadMachine& machine, std::span<const Stretch> period) {
+Joint steady_joint(const BeadMachine& machine, double height_mm, std::span<const Stretch> period) {
   const double speed = cyclic_speed(period, machine.acceleration_mm_s2);
-  if (period.empty()) return {speed, 0};
+  if (period.empty()) return {};
   // The flow after a period is kept x the flow before + added.
   SpeedPlan plan(machine.acceleration_mm_s2);
   plan.begin(speed);
@@ -147,8 +152,16 @@ Joint steady_joint(const BeadMachine& machine, std::span<const Stretch> period) 
       seconds += time;
     }
   }
-  if (machine.tau_s <= 0) return {speed, flow};
-  return {speed, flow / -std::expm1(-seconds / machine.tau_s)};
+  if (machine.tau_s > 0) flow /= -std::expm1(-seconds / machine.tau_s);
+  // A period in which the layer is filled anywhere forgets how it began; in one in which it is not, only the feed decides.
+  Joint joint{speed, flow, true};
+  BeadLine line(machine, height_mm, 0.01);
+  for (int round = 0; round < 2; ++round) {
+    line.begin(joint);
+    for (const Stretch& stretch : period) line.add(stretch, [](const BeadPiece&) {});
+    joint.pressed = line.end(speed, [](const BeadPiece&) {}).pressed;
+  }
+  return joint;
 }
 
 void lay_steady(const BeadMachine& machine, double height_mm, const Pattern& pattern, const TakePiece& take,
@@ -156,7 +169,7 @@ void lay_steady(const BeadMachine& machine, double height_mm, const Pattern& pat
   const double area = machine.area_mm2 * pattern.extrusion_percent / 100;
   const std::array<Stretch, 2> period{
       {{pattern.thick_mm, area, pattern.thick_speed_mm_s}, {pattern.thin_mm, area, pattern.thin_speed_mm_s}}};
-  const Joint joint = steady_joint(machine, period);
+  const Joint joint = steady_joint(machine, height_mm, period);
   BeadLine line(machine, height_mm, tolerance_mm);
   line.begin(joint);
   for (const Stretch& stretch : period) line.add(stretch, take);

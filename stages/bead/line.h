@@ -19,8 +19,8 @@ struct BeadPiece {
   double begin_mm, end_mm;
   double begin_area_mm2, end_area_mm2;
   double begin_width_mm, end_width_mm;
-  double fed_mm2;     // the commanded cross-section
   double volume_mm3;  // that is laid
+  bool pressed;       // between nozzle and layer
 };
 
 using TakePiece = std::function<void(const BeadPiece&)>;
@@ -62,11 +62,12 @@ class BeadLine {
   SpeedPlan plan_;
   double place_ = 0, seconds_ = 0, laid_ = 0, fed_ = 0;
   double flow_ = 0, speed_ = 0;
+  bool pressed_ = true;
 };
 
 /// How a pattern that is repeated without end begins each time: a line that begins like this is in its steady state at once.
-/// cost  O(stretches), twice; the lag is linear, so that the flow after a period is a line of the flow before
-Joint steady_joint(const BeadMachine& machine, std::span<const Stretch> period);
+/// cost  O(stretches) and three periods: the lag is linear, so that the flow after a period is a line of the flow before
+Joint steady_joint(const BeadMachine& machine, double height_mm, std::span<const Stretch> period);
 
 /// Thick and thin stretches of one extrusion in turn: one period in its steady state, thick first.
 struct Pattern {

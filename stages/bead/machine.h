@@ -27,6 +27,7 @@ struct Stretch {
 struct Joint {
   double speed_mm_s = 0;  // of the head
   double flow_mm3_s = 0;  // that leaves the nozzle
+  bool pressed = true;    // the bead stays between nozzle and layer (section.h)
 };
 
 }  // namespace lamina::bead

@@ -3,11 +3,12 @@
 // Three forms, none with a constant of its own:
 // - A bead that fills its layer is a stadium: a rectangle with half circles at both sides (the `Flow` of PrusaSlicer and
 // Slic3r).
-// - A bead that is fed enough to fill its layer, but is starved by the lag, stays between nozzle and layer below: it keeps its
-//   height and is an ellipse. Such are the thin stretches of Di Nisio 2022, Table 11.
-// - A thread that is fed too little to fill its layer lies as it left the nozzle: it is round. Such are those of Table 12.
-// Which of the last two holds is decided by the feed. That rule was found by looking at Tables 11 and 12, in both of which a
-// bead has half of its area, 0.21 mm wide in one and 0.27 mm in the other; Tables 13 to 16 had no say in it.
+// - A bead that filled its layer and is starved by the lag, though it is fed enough, stays between nozzle and layer below: it
+//   keeps its height and is an ellipse. Such are the thin stretches of Di Nisio 2022, Table 11.
+// - A thread that is fed too little to fill its layer lets go and lies as it left the nozzle, round, until the layer is
+//   filled again. Such are those of Table 12.
+// The rule that tells the last two apart was found by looking at Tables 11 and 12, in both of which a bead has half of its area
+// and is 0.21 mm wide in one, 0.27 mm in the other. Tables 13 to 16 had no say in it.
 #pragma once
 
 #include <algorithm>
@@ -19,12 +20,20 @@ namespace lamina::bead {
 /// mm2: the circle as high as the layer.
 inline double full_circle(double height_mm) { return std::numbers::pi / 4 * height_mm * height_mm; }
 
-/// mm. area  mm2 that lie there; fed  mm2 that are fed there
-inline double width_of(double area_mm2, double fed_mm2, double height_mm) {
+/// What is fed is enough to fill the layer: a bead that is starved all the same stays between nozzle and layer.
+inline bool may_stay_pressed(double fed_mm2, double height_mm) { return fed_mm2 >= full_circle(height_mm); }
+
+/// Whether a bead lies between nozzle and layer. before  whether it did so just before
+inline bool stays_pressed(double area_mm2, double fed_mm2, bool before, double height_mm) {
+  return area_mm2 >= full_circle(height_mm) || (before && may_stay_pressed(fed_mm2, height_mm));
+}
+
+/// mm. pressed  it stays between nozzle and layer; says nothing where the layer is filled
+inline double width_of(double area_mm2, bool pressed, double height_mm) {
   const double circle = full_circle(height_mm);
   if (area_mm2 >= circle) return height_mm + (area_mm2 - circle) / height_mm;
-  if (fed_mm2 >= circle) return height_mm * std::max(area_mm2, 0.0) / circle;
-  return height_mm * std::sqrt(std::max(area_mm2, 0.0) / circle);
+  const double share = std::max(area_mm2, 0.0) / circle;
+  return height_mm * (pressed ? share : std::sqrt(share));
 }
 
 /// The cross-section of a stadium, or of a circle where it is no wider than high.

@@ -28,7 +28,7 @@ BeadSpread::BeadSpread(double height_mm, double cell_mm, double reach_mm)
       ring_(static_cast<std::size_t>(2 * reach_cells_ + 4), Sum{}),
       last_(first_ - 1) {}
 
-void BeadSpread::put(double place, double volume, double fed, double radius) {
+void BeadSpread::put(double place, double volume, bool pressed, double radius) {
   const double from = (place - radius) / cell_, to = (place + radius) / cell_;
   const auto begin = static_cast<std::int64_t>(std::floor(from)), end = static_cast<std::int64_t>(std::floor(to));
   double left = 0;
@@ -36,7 +36,7 @@ void BeadSpread::put(double place, double volume, double fed, double radius) {
     const double right = cell == end ? 1 : share_left((static_cast<double>(cell + 1) * cell_ - place) / radius);
     Sum& sum = at(cell);
     sum.volume += volume * (right - left);
-    sum.fed += volume * (right - left) * fed;
+    sum.pressed += pressed ? volume * (right - left) : 0;
     left = right;
   }
   last_ = std::max(last_, end);
@@ -56,9 +56,9 @@ void BeadSpread::add(const BeadPiece& piece, const TakeCell& take) {
                              ? t
                              : t * (2 * piece.begin_area_mm2 + t * (piece.end_area_mm2 - piece.begin_area_mm2)) / ends;
     const double volume = piece.volume_mm3 * (right - left);
-    const double width = width_of(volume / (end - begin), piece.fed_mm2, height_);
+    const double width = width_of(volume / (end - begin), piece.pressed, height_);
     give_before(static_cast<std::int64_t>(cell) - reach_cells_, take);
-    put((begin + end) / 2, volume, piece.fed_mm2, std::clamp(width / 2, cell_ * 1e-3, reach_));
+    put((begin + end) / 2, volume, piece.pressed, std::clamp(width / 2, cell_ * 1e-3, reach_));
     left = right;
     begin = end;
   }
@@ -69,9 +69,9 @@ void BeadSpread::give_before(std::int64_t cell, const TakeCell& take) {
     Sum& sum = at(first_);
     begun_ = begun_ || sum.volume > 0;
     if (begun_) {
-      const double area = sum.volume / cell_, fed = sum.volume > 0 ? sum.fed / sum.volume : 0;
-      take({static_cast<double>(first_) * cell_, static_cast<double>(first_ + 1) * cell_, sum.volume, area, fed,
-            width_of(area, fed, height_)});
+      const double area = sum.volume / cell_, share = sum.volume > 0 ? sum.pressed / sum.volume : 1;
+      const double width = share * width_of(area, true, height_) + (1 - share) * width_of(area, false, height_);
+      take({static_cast<double>(first_) * cell_, static_cast<double>(first_ + 1) * cell_, sum.volume, area, width});
     }
     sum = {};
   }

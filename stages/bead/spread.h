@@ -19,8 +19,7 @@ struct SpreadCell {
   double begin_mm, end_mm;
   double volume_mm3;
   double area_mm2;  // volume / length
-  double fed_mm2;   // the commanded cross-section of what lies there
-  double width_mm;
+  double width_mm;  // between those of a pressed bead and a round thread by the shares of either (section.h)
 };
 
 using TakeCell = std::function<void(const SpreadCell&)>;
@@ -40,9 +39,9 @@ class BeadSpread {
 
  private:
   struct Sum {
-    double volume = 0, fed = 0;  // mm3; mm3 x mm2
+    double volume = 0, pressed = 0;  // mm3
   };
-  void put(double place, double volume, double fed, double radius);
+  void put(double place, double volume, bool pressed, double radius);
   void give_before(std::int64_t cell, const TakeCell& take);
   Sum& at(std::int64_t cell) { return ring_[static_cast<std::size_t>(cell + reach_cells_) % ring_.size()]; }
 

@@ -25,12 +25,12 @@ double area_after(const BeadMachine& machine, double from, const StableAfter& ro
 }  // namespace
 
 double time_constant(const BeadMachine& machine, const StabilisationTest& test, const StableAfter& row) {
-  const double before = width_of(machine.area_mm2, machine.area_mm2, test.height_mm);
+  const double before = width_of(machine.area_mm2, true, test.height_mm);
   double low = 0, high = 10;  // s; nothing that lays beads lags longer
   for (int i = 0; i < 60; ++i) {
     const double tau = (low + high) / 2;
     const double area = area_after(machine, test.speed_mm_s, row, tau);
-    (width_of(area, machine.area_mm2, test.height_mm) < before - test.resolution_mm ? high : low) = tau;
+    (width_of(area, true, test.height_mm) < before - test.resolution_mm ? high : low) = tau;
   }
   return low;
 }

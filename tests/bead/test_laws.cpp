@@ -83,7 +83,7 @@ TEST(BeadLine, EvenFeedAndSpeedLayAnEvenBead) {
   EXPECT_LE(line.pieces.size(), 3U);  // nothing changes: one piece a stretch
   for (const BeadPiece& p : line.pieces) {
     EXPECT_NEAR(p.begin_area_mm2, 0.1, 1e-15);
-    EXPECT_NEAR(p.end_width_mm, width_of(0.1, 0.1, kHeight), 1e-14);
+    EXPECT_NEAR(p.end_width_mm, width_of(0.1, true, kHeight), 1e-14);
   }
   EXPECT_NEAR(line.seconds, 27.5 / 15, 1e-12);
 }
@@ -198,7 +198,7 @@ TEST(BeadLine, ASteadyPatternRepeatsItself) {
     for (const double acceleration : {100.0, 400.0, kInfinite}) {
       const BeadMachine machine{0.1, 0.053, acceleration};
       const auto period = random_stretches(seed, 1 + static_cast<int>(seed));
-      const Joint joint = steady_joint(machine, period);
+      const Joint joint = steady_joint(machine, kHeight, period);
       const Laid once = lay(machine, period, joint, joint.speed_mm_s);
       EXPECT_NEAR(once.end.flow_mm3_s / joint.flow_mm3_s, 1, 1e-10);
       EXPECT_NEAR(once.laid / once.fed, 1, 1e-10);  // nothing is gained or lost in a period
