@@ -164,16 +164,4 @@ Joint steady_joint(const BeadMachine& machine, double height_mm, std::span<const
   return joint;
 }
 
-void lay_steady(const BeadMachine& machine, double height_mm, const Pattern& pattern, const TakePiece& take,
-                double tolerance_mm) {
-  const double area = machine.area_mm2 * pattern.extrusion_percent / 100;
-  const std::array<Stretch, 2> period{
-      {{pattern.thick_mm, area, pattern.thick_speed_mm_s}, {pattern.thin_mm, area, pattern.thin_speed_mm_s}}};
-  const Joint joint = steady_joint(machine, height_mm, period);
-  BeadLine line(machine, height_mm, tolerance_mm);
-  line.begin(joint);
-  for (const Stretch& stretch : period) line.add(stretch, take);
-  line.end(joint.speed_mm_s, take);
-}
-
 }  // namespace lamina::bead

@@ -69,13 +69,4 @@ class BeadLine {
 /// cost  O(stretches) and three periods: the lag is linear, so that the flow after a period is a line of the flow before
 Joint steady_joint(const BeadMachine& machine, double height_mm, std::span<const Stretch> period);
 
-/// Thick and thin stretches of one extrusion in turn: one period in its steady state, thick first.
-struct Pattern {
-  double thick_mm, thin_mm;
-  double extrusion_percent;
-  double thick_speed_mm_s, thin_speed_mm_s;
-};
-void lay_steady(const BeadMachine& machine, double height_mm, const Pattern& pattern, const TakePiece& take,
-                double tolerance_mm = 0.001);
-
 }  // namespace lamina::bead

@@ -9,6 +9,7 @@
 #include <algorithm>
 #include <array>
 
+#include "stages/bead/pattern.h"
 #include "tests/bead/anet.h"
 
 namespace lamina::bead {
@@ -55,11 +56,11 @@ struct Readings {
 Readings errors_of_tables_13_to_15(const BeadMachine& machine, bool spread) {
   Rms mean, middle;
   for (const Repeated& sample : repeated_samples()) {
-    const auto widths = lay_repeated(machine, sample.extrusion, sample.thick_speed, spread);
-    mean.add(mean_width(widths, 9, 10.5) - sample.thick);
-    mean.add(mean_width(widths, 10.5, 12) - sample.thin);
-    middle.add(width_at(widths, 9.75) - sample.thick);
-    middle.add(width_at(widths, 11.25) - sample.thin);
+    const PatternWidths laid = steady_widths(machine, kHeight, {1.5, 1.5, sample.extrusion, sample.thick_speed, 30}, spread);
+    mean.add(laid.thick.mean - sample.thick);
+    mean.add(laid.thin.mean - sample.thin);
+    middle.add(laid.thick.middle - sample.thick);
+    middle.add(laid.thin.middle - sample.thin);
   }
   return {mean.value(), middle.value()};
 }

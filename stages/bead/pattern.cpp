@@ -1,0 +1,97 @@
+// stages/bead/pattern.cpp: one period of a pattern in its steady state, and its widths.
+#include "stages/bead/pattern.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "stages/bead/spread.h"
+
+namespace lamina::bead {
+namespace {
+
+constexpr double kReach = 1.5;  // mm, of the spread: beads up to 3 mm wide
+
+std::array<Stretch, 2> period_of(const BeadMachine& machine, const Pattern& pattern) {
+  const double area = machine.area_mm2 * pattern.extrusion_percent / 100;
+  return {{{pattern.thick_mm, area, pattern.thick_speed_mm_s}, {pattern.thin_mm, area, pattern.thin_speed_mm_s}}};
+}
+
+/// Gathers the widths between two places from pieces that come in order.
+class Gather {
+ public:
+  Gather(double begin, double end) : begin_(begin), end_(end), middle_((begin + end) / 2) {}
+
+  /// Straight between two places.
+  void add(double a, double b, double width_a, double width_b) {
+    const double from = std::max(a, begin_), to = std::min(b, end_);
+    if (from >= to) return;
+    const auto at = [&](double place) { return width_a + (width_b - width_a) * (place - a) / (b - a); };
+    const double first = at(from), last = at(to);
+    sum_ += (to - from) * (first + last) / 2;
+    widths_.least = std::min({widths_.least, first, last});
+    widths_.largest = std::max({widths_.largest, first, last});
+    if (from <= middle_ && middle_ <= to) widths_.middle = at(middle_);
+  }
+  StretchWidths widths() const {
+    StretchWidths result = widths_;
+    result.mean = sum_ / (end_ - begin_);
+    return result;
+  }
+
+ private:
+  double begin_, end_, middle_, sum_ = 0;
+  StretchWidths widths_{0, 0, HUGE_VAL, 0};
+};
+
+}  // namespace
+
+void lay_steady(const BeadMachine& machine, double height_mm, const Pattern& pattern, const TakePiece& take,
+                double tolerance_mm) {
+  const auto period = period_of(machine, pattern);
+  const Joint joint = steady_joint(machine, height_mm, period);
+  BeadLine line(machine, height_mm, tolerance_mm);
+  line.begin(joint);
+  for (const Stretch& stretch : period) line.add(stretch, take);
+  line.end(joint.speed_mm_s, take);
+}
+
+PatternWidths steady_widths(const BeadMachine& machine, double height_mm, const Pattern& pattern, bool spread) {
+  const auto period = period_of(machine, pattern);
+  const Joint joint = steady_joint(machine, height_mm, period);
+  const double length = pattern.thick_mm + pattern.thin_mm;
+  const int before = spread ? static_cast<int>(std::ceil(kReach / length)) : 0;
+  const double begin = before * length;
+  Gather thick(begin, begin + pattern.thick_mm), thin(begin + pattern.thick_mm, begin + length);
+  const auto see = [&](double a, double b, double width_a, double width_b) {
+    thick.add(a, b, width_a, width_b);
+    thin.add(a, b, width_a, width_b);
+  };
+  const double shortest = std::min(pattern.thick_mm, pattern.thin_mm);
+  BeadSpread pen(height_mm, std::min(0.02, shortest / 20), kReach);
+  double place = -HUGE_VAL, width = 0;
+  const TakeCell cell = [&](const SpreadCell& c) {
+    const double middle = (c.begin_mm + c.end_mm) / 2;
+    if (std::isfinite(place)) see(place, middle, width, c.width_mm);
+    place = middle;
+    width = c.width_mm;
+  };
+  const TakePiece take = [&](const BeadPiece& p) {
+    if (spread) return pen.add(p, cell);
+    see(p.begin_mm, p.end_mm, p.begin_width_mm, p.end_width_mm);
+  };
+  BeadLine line(machine, height_mm);
+  line.begin(joint);
+  for (int i = 0; i <= 2 * before; ++i) {
+    for (const Stretch& stretch : period) line.add(stretch, take);
+  }
+  line.end(joint.speed_mm_s, take);
+  if (spread) pen.end(cell);
+  const int periods = 2 * before + 1;
+  const Planned last{period[1], std::min(period[0].speed_mm_s, period[1].speed_mm_s), joint.speed_mm_s};
+  return {
+      thick.widths(),          thin.widths(), line.fed_mm3() / periods, joint.flow_mm3_s, last.peak(machine.acceleration_mm_s2),
+      line.seconds() / periods};
+}
+
+}  // namespace lamina::bead

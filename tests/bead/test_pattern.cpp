@@ -1,0 +1,60 @@
+// A pattern in its steady state: the widths told are those of a long line.
+#include <gtest/gtest.h>
+
+#include "stages/bead/pattern.h"
+#include "tests/bead/anet.h"
+
+namespace lamina::bead {
+namespace {
+
+using namespace test;
+
+TEST(Pattern, WidthsAreThoseOfALongLine) {
+  for (const double acceleration : {kAtOnce, kProfile}) {
+    const BeadMachine machine{0.1, 0.05, acceleration};
+    for (const bool spread : {false, true}) {
+      for (const double extrusion : {60.0, 75.0, 125.0}) {
+        const auto line = lay_repeated(machine, extrusion, 11.25, spread);
+        const PatternWidths widths = steady_widths(machine, kHeight, {1.5, 1.5, extrusion, 11.25, 30}, spread);
+        EXPECT_NEAR(widths.thick.middle, width_at(line, 9.75), 1e-3);
+        EXPECT_NEAR(widths.thin.middle, width_at(line, 11.25), 1e-3);
+        EXPECT_NEAR(widths.thick.mean, mean_width(line, 9, 10.5), 1e-3);
+        EXPECT_NEAR(widths.thin.mean, mean_width(line, 10.5, 12), 1e-3);
+        EXPECT_LE(widths.thin.least, widths.thin.mean);
+        EXPECT_GE(widths.thick.largest, widths.thick.mean);
+        EXPECT_NEAR(widths.fed_mm3, 3 * 0.1 * extrusion / 100, 1e-12);
+      }
+    }
+  }
+}
+
+TEST(Pattern, TimeAndSpeedAreThoseOfTheHead) {
+  const PatternWidths at_once = steady_widths({0.1, 0.05, kAtOnce}, kHeight, {1.5, 1.5, 100, 15, 30}, false);
+  EXPECT_NEAR(at_once.period_s, 1.5 / 15 + 1.5 / 30, 1e-12);
+  EXPECT_EQ(at_once.peak_mm_s, 30);
+  // 1.5 mm between 7.5 and 30 mm/s at 400 mm/s2.
+  const PatternWidths profile = steady_widths({0.1, 0.05, kProfile}, kHeight, {1.5, 1.5, 100, 7.5, 30}, false);
+  EXPECT_NEAR(profile.peak_mm_s, std::sqrt(7.5 * 7.5 + 400 * 1.5), 1e-12);
+  EXPECT_NEAR(profile.period_s, 1.5 / 7.5 + 2 * (profile.peak_mm_s - 7.5) / 400, 1e-12);
+}
+
+TEST(Pattern, OneOfOneSpeedIsEven) {
+  const PatternWidths widths = steady_widths({0.1, 0.05, kProfile}, kHeight, {0.5, 0.1, 120, 20, 20}, false);
+  const double width = width_of(0.12, true, kHeight);
+  for (const StretchWidths& w : {widths.thick, widths.thin}) {
+    for (const double value : {w.middle, w.mean, w.least, w.largest}) EXPECT_NEAR(value, width, 1e-12);
+  }
+}
+
+TEST(Pattern, OnePeriodOfPiecesHoldsWhatIsFed) {
+  double volume = 0, end = 0;
+  lay_steady({0.1, 0.05, kProfile}, kHeight, {1.5, 2, 100, 15, 30}, [&](const BeadPiece& p) {
+    volume += p.volume_mm3;
+    end = p.end_mm;
+  });
+  EXPECT_NEAR(volume, 0.35, 1e-12);
+  EXPECT_NEAR(end, 3.5, 1e-12);
+}
+
+}  // namespace
+}  // namespace lamina::bead
