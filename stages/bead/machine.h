@@ -5,6 +5,8 @@
 
 #include <limits>
 
+#include "stages/data/status.h"
+
 namespace lamina::bead {
 
 /// A calibration for the model. Nothing else of a machine enters it.
@@ -15,6 +17,9 @@ struct BeadMachine {
   /// Of the head along a line. Infinite: speeds change at once.
   double acceleration_mm_s2 = std::numeric_limits<double>::infinity();
 };
+
+/// Whether beads can be predicted for it. errors  kUsage, one line that begins with the number's name
+Status check(const BeadMachine& machine);
 
 /// A straight piece of a line as it is commanded.
 struct Stretch {

@@ -38,7 +38,7 @@ class Squeeze {
  private:
   bool has_right(std::size_t i) const { return i % size_ + 1 < size_ || period_ > 0; }
   const BesideBead& bead(std::size_t i) const { return beads_[i % size_]; }
-  double turns(std::size_t i) const { return static_cast<double>(i / size_) * period_; }
+  double turns(std::size_t i) const { return i < size_ ? 0 : period_; }
   double distance(std::size_t i) const { return bead(i + 1).centre_mm + turns(i % size_ + 1) - bead(i).centre_mm; }
   /// Room that stays between the centres of a bead and its right neighbour; below 0: more than all.
   double room(std::size_t i) const { return height_ * distance(i) - (bead(i).area_mm2 + bead(i + 1).area_mm2) / 2; }

@@ -80,7 +80,7 @@ PatternWidths steady_widths(const BeadMachine& machine, double height_mm, const 
     if (spread) return pen.add(p, cell);
     see(p.begin_mm, p.end_mm, p.begin_width_mm, p.end_width_mm);
   };
-  BeadLine line(machine, height_mm);
+  BeadLine line(machine, height_mm, 0.001);
   line.begin(joint);
   for (int i = 0; i <= 2 * before; ++i) {
     for (const Stretch& stretch : period) line.add(stretch, take);

@@ -28,7 +28,7 @@ struct PatternWidths {
 
 /// One period in its steady state, thick first, from the place 0.
 void lay_steady(const BeadMachine& machine, double height_mm, const Pattern& pattern, const TakePiece& take,
-                double tolerance_mm = 0.001);
+                double tolerance_mm = 0.005);
 
 /// spread  the bead spreads along its line (spread.h); widths are then those of cells of 0.02 mm at most
 /// cost    some hundred exponentials without spread, some ten thousand arc sines with it

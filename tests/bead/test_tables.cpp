@@ -158,8 +158,8 @@ TEST(Tables, PoresOfTable16) {
     const double width = number(row, "pore_width_mm"), length = number(row, "pore_length_mm");
     // Within 10 % or one standard deviation, and for B100 one micrometre outside of it: Table 16 has 0.12 +- 0.02.
     EXPECT_LT(std::abs(pore.width - width), std::max(0.1 * width, number(row, "pore_width_pm")) + 0.0015) << sample;
-    // Lengths within 25 %, but that of B75, whose thick beads do not reach their neighbours: 36 %, 1.3 standard deviations.
-    EXPECT_LT(std::abs(pore.length / length - 1), sample == "B75" ? 0.37 : 0.25) << sample;
+    // Lengths within 25 %, but that of B75, whose thick beads do not reach their neighbours: 33 %, 1.2 standard deviations.
+    EXPECT_LT(std::abs(pore.length / length - 1), sample == "B75" ? 0.35 : 0.25) << sample;
     RecordProperty("width_" + sample, std::to_string(pore.width));
     RecordProperty("length_" + sample, std::to_string(pore.length));
   }
