@@ -17,21 +17,19 @@ std::array<Stretch, 2> period_of(const BeadMachine& machine, const Pattern& patt
   return {{{pattern.thick_mm, area, pattern.thick_speed_mm_s}, {pattern.thin_mm, area, pattern.thin_speed_mm_s}}};
 }
 
-/// Gathers the widths between two places from pieces that come in order.
+/// Gathers the widths between two places.
 class Gather {
  public:
   Gather(double begin, double end) : begin_(begin), end_(end), middle_((begin + end) / 2) {}
 
-  /// Straight between two places.
-  void add(double a, double b, double width_a, double width_b) {
-    const double from = std::max(a, begin_), to = std::min(b, end_);
+  void add(const ProfilePiece& p) {
+    const double from = std::max(p.begin_mm, begin_), to = std::min(p.end_mm, end_);
     if (from >= to) return;
-    const auto at = [&](double place) { return width_a + (width_b - width_a) * (place - a) / (b - a); };
-    const double first = at(from), last = at(to);
+    const double first = p.width_at(from), last = p.width_at(to);
     sum_ += (to - from) * (first + last) / 2;
     widths_.least = std::min({widths_.least, first, last});
     widths_.largest = std::max({widths_.largest, first, last});
-    if (from <= middle_ && middle_ <= to) widths_.middle = at(middle_);
+    if (from <= middle_ && middle_ <= to) widths_.middle = p.width_at(middle_);
   }
   StretchWidths widths() const {
     StretchWidths result = widths_;
@@ -56,19 +54,20 @@ void lay_steady(const BeadMachine& machine, double height_mm, const Pattern& pat
   line.end(joint.speed_mm_s, take);
 }
 
-PatternWidths steady_widths(const BeadMachine& machine, double height_mm, const Pattern& pattern, bool spread) {
+PatternSums steady_profile(const BeadMachine& machine, double height_mm, const Pattern& pattern, bool spread,
+                           const TakeProfile& take) {
   const auto period = period_of(machine, pattern);
   const Joint joint = steady_joint(machine, height_mm, period);
   const double length = pattern.thick_mm + pattern.thin_mm;
   const int before = spread ? static_cast<int>(std::ceil(kReach / length)) : 0;
   const double begin = before * length;
-  Gather thick(begin, begin + pattern.thick_mm), thin(begin + pattern.thick_mm, begin + length);
   const auto see = [&](double a, double b, double width_a, double width_b) {
-    thick.add(a, b, width_a, width_b);
-    thin.add(a, b, width_a, width_b);
+    const double from = std::max(a, begin), to = std::min(b, begin + length);
+    if (from >= to) return;
+    const auto at = [&](double place) { return width_a + (width_b - width_a) * (place - a) / (b - a); };
+    take({from - begin, to - begin, at(from), at(to)});
   };
-  const double shortest = std::min(pattern.thick_mm, pattern.thin_mm);
-  BeadSpread pen(height_mm, std::min(0.02, shortest / 20), kReach);
+  BeadSpread pen(height_mm, std::min(0.02, std::min(pattern.thick_mm, pattern.thin_mm) / 20), kReach);
   double place = -HUGE_VAL, width = 0;
   const TakeCell cell = [&](const SpreadCell& c) {
     const double middle = (c.begin_mm + c.end_mm) / 2;
@@ -76,22 +75,29 @@ PatternWidths steady_widths(const BeadMachine& machine, double height_mm, const 
     place = middle;
     width = c.width_mm;
   };
-  const TakePiece take = [&](const BeadPiece& p) {
+  const TakePiece piece = [&](const BeadPiece& p) {
     if (spread) return pen.add(p, cell);
     see(p.begin_mm, p.end_mm, p.begin_width_mm, p.end_width_mm);
   };
   BeadLine line(machine, height_mm, 0.001);
   line.begin(joint);
   for (int i = 0; i <= 2 * before; ++i) {
-    for (const Stretch& stretch : period) line.add(stretch, take);
+    for (const Stretch& stretch : period) line.add(stretch, piece);
   }
-  line.end(joint.speed_mm_s, take);
+  line.end(joint.speed_mm_s, piece);
   if (spread) pen.end(cell);
   const int periods = 2 * before + 1;
-  const Planned last{period[1], std::min(period[0].speed_mm_s, period[1].speed_mm_s), joint.speed_mm_s};
-  return {
-      thick.widths(),          thin.widths(), line.fed_mm3() / periods, joint.flow_mm3_s, last.peak(machine.acceleration_mm_s2),
-      line.seconds() / periods};
+  const Planned thin{period[1], std::min(period[0].speed_mm_s, period[1].speed_mm_s), joint.speed_mm_s};
+  return {line.fed_mm3() / periods, line.seconds() / periods, joint.flow_mm3_s, thin.peak(machine.acceleration_mm_s2)};
+}
+
+PatternWidths steady_widths(const BeadMachine& machine, double height_mm, const Pattern& pattern, bool spread) {
+  Gather thick(0, pattern.thick_mm), thin(pattern.thick_mm, pattern.thick_mm + pattern.thin_mm);
+  const PatternSums sums = steady_profile(machine, height_mm, pattern, spread, [&](const ProfilePiece& p) {
+    thick.add(p);
+    thin.add(p);
+  });
+  return {thick.widths(), thin.widths(), sums};
 }
 
 }  // namespace lamina::bead

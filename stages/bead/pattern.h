@@ -18,20 +18,37 @@ struct StretchWidths {
   double least, largest;
 };
 
+/// Of a period.
+struct PatternSums {
+  double fed_mm3;  // and laid
+  double seconds;
+  double flow_mm3_s;  // with which a thick stretch begins
+  double peak_mm_s;   // that the head reaches in a thin stretch
+};
+
 struct PatternWidths {
   StretchWidths thick, thin;
-  double fed_mm3;     // in a period, and laid as well
-  double flow_mm3_s;  // with which a thick stretch begins
-  double peak_mm_s;   // what the head reaches in the thin stretch
-  double period_s;
+  PatternSums sums;
 };
+
+/// A piece of a period, mm from where its thick stretch begins; the width between its ends is in proportion.
+struct ProfilePiece {
+  double begin_mm, end_mm, begin_width_mm, end_width_mm;
+  double width_at(double place) const {
+    return begin_width_mm + (end_width_mm - begin_width_mm) * (place - begin_mm) / (end_mm - begin_mm);
+  }
+};
+using TakeProfile = std::function<void(const ProfilePiece&)>;
 
 /// One period in its steady state, thick first, from the place 0.
 void lay_steady(const BeadMachine& machine, double height_mm, const Pattern& pattern, const TakePiece& take,
                 double tolerance_mm = 0.005);
 
+/// The widths of one period, without gaps and in order.
 /// spread  the bead spreads along its line (spread.h); widths are then those of cells of 0.02 mm at most
 /// cost    some hundred exponentials without spread, some ten thousand arc sines with it
+PatternSums steady_profile(const BeadMachine& machine, double height_mm, const Pattern& pattern, bool spread,
+                           const TakeProfile& take);
 PatternWidths steady_widths(const BeadMachine& machine, double height_mm, const Pattern& pattern, bool spread);
 
 }  // namespace lamina::bead
