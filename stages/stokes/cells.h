@@ -1,0 +1,53 @@
+// stages/stokes/cells.h: the void of a box of voxels as cells of a fluid that know their neighbours.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "stages/data/buffer.h"
+#include "stages/data/status.h"
+#include "stages/data/voxels.h"
+
+namespace lamina::stokes {
+
+/// Void voxels, numbered row by row. A cell holds the pressure in its middle and, for each axis, the velocity through its upper
+/// face along that axis: a staggered grid. Velocity exists on faces between two cells; elsewhere it is zero.
+///
+/// neighbour  of each cell below and above along x, y, z; size() where there is none: a wall, or the end of the box
+/// kind       of each cell's three faces at once: which exist, and how many of the four neighbouring faces beside each are
+/// walls
+///            half a voxel away. For face a: 9 if it does not exist, else walls along the next axis + 3 x walls along the one
+///            after; the three make a number of three digits of base 10, that of x last.
+struct Cells {
+  std::array<std::uint32_t, 3> box{};  // voxels
+  std::array<double, 3> edge{};        // of a voxel, in units of the shortest one
+  double unit_m = 0;                   // that one
+  Buffer<std::array<std::uint32_t, 6>> neighbour;
+  Buffer<std::uint16_t> kind;
+
+  std::uint32_t size() const { return static_cast<std::uint32_t>(kind.size()); }
+  std::uint64_t voxels() const { return std::uint64_t{box[0]} * box[1] * box[2]; }
+  double porosity() const { return voxels() == 0 ? 0 : static_cast<double>(size()) / static_cast<double>(voxels()); }
+};
+
+/// Groups of up to 2 x 2 x 2 cells, and groups of these: for the coarse levels of a solver.
+///
+/// begin  size() + 1 entries; group g owns member[begin[g] .. begin[g + 1]) of the level below
+struct Groups {
+  Buffer<std::uint32_t> begin{0}, member;
+  std::uint32_t size() const { return static_cast<std::uint32_t>(begin.size() - 1); }
+};
+
+/// The cells of a box, and groups of them, each level coarser than the one before.
+struct Grid {
+  Cells cells;
+  std::vector<Groups> levels;
+};
+
+/// levels  at most so many; none has fewer than 64 groups
+/// errors  kInput: no void, or 2^31 cells and more
+/// cost    O(voxels), one thread; 26 bytes a void voxel and 5 for the groups, meanwhile 8 more
+Result<Grid> make_grid(const VoxelView& solid, std::uint32_t levels);
+
+}  // namespace lamina::stokes

@@ -1,0 +1,41 @@
+// stages/stokes/flow.h: creeping flow of a fluid through the void of a box of voxels, and the permeability that follows.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <functional>
+
+#include "stages/data/status.h"
+#include "stages/stokes/cells.h"
+#include "stages/stokes/operator.h"
+
+namespace lamina::stokes {
+
+struct FlowOptions {
+  double tolerance = 1e-4;  // of the residual, relative; the permeability is as exact or better
+  std::uint32_t most_steps = 20'000;
+  std::function<bool(std::uint32_t step, double residual)> progress;  // false ends the work; may be empty
+};
+
+/// Flow that a uniform force along one axis drives, for viscosity 1, force 1 and the shortest edge of a voxel as the unit.
+struct Flow {
+  std::array<double, 3> permeability{};  // mean velocity over the whole box along x, y, z; in squared units
+  double tortuosity = 0;                 // mean speed / mean velocity along the force, in the void; 0 without flow
+  double residual = 0;                   // relative, as computed anew from the result
+  std::uint32_t steps = 0;
+};
+
+/// Solves Stokes' equations by minimal residuals, started from `field` (field_of(), or that of a similar problem), which
+/// becomes the velocities and pressures. The same digits for any number of threads. axis     of the force returns  a Flow whose
+/// residual is above the tolerance if the steps did not suffice, or single precision: it ends at about
+///          1e-7 of the square of a pore's width in voxels, which the mean velocity hardly feels
+/// errors   kInterrupted: by progress
+/// source   C. C. Paige, M. A. Saunders, "Solution of sparse indefinite systems of linear equations", SIAM J. Numer. Anal. 12
+///          (1975), preconditioned as in H. C. Elman, D. J. Silvester, A. J. Wathen (2014), algorithm 4.1
+/// cost     some hundred steps, more for windows of many pores; 150 bytes a cell with the grid
+Result<Flow> solve(const Grid& grid, int axis, const FlowOptions& options, Field& field);
+
+/// The bytes that solve() and its grid take.
+std::uint64_t bytes_of_flow(std::uint64_t cells);
+
+}  // namespace lamina::stokes

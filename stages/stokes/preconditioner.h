@@ -1,0 +1,41 @@
+// stages/stokes/preconditioner.h: a cheap guess at what velocity and pressure a residual asks for; internal to stokes.
+#pragma once
+
+#include <vector>
+
+#include "stages/stokes/cells.h"
+#include "stages/stokes/operator.h"
+
+namespace lamina::stokes {
+
+/// Velocity is corrected on the cells and on all groups of them at once, each by the diagonal of the operator there; pressure
+/// is as large as the divergence. The sum is symmetric and positive, as minimal residuals need it. source  J. H. Bramble, J. E.
+/// Pasciak, J. Xu, "Parallel multilevel preconditioners", Mathematics of Computation 55 (1990), with
+///         groups for the coarse grids; H. C. Elman, D. J. Silvester, A. J. Wathen, "Finite Elements and Fast Iterative
+///         Solvers" (2014), 4.2, for the pressure
+class Preconditioner {
+ public:
+  /// stokes, levels  outlive it
+  /// scratch         of the cells; is overwritten
+  Preconditioner(const Operator& stokes, const std::vector<Groups>& levels, Field& scratch);
+
+  /// Takes the sums of a residual to the groups and makes what they add. Then at() gives the result.
+  void gather(const Field& residual);
+  /// What cell i gets from its residual and, by way of its group g of the first level, from all groups.
+  Four at(std::uint32_t i, std::uint32_t g, Four residual) const {
+    const Four exists = stokes_.exists(i), diagonal = stokes_.diagonal(i);
+    const Four own = {exists[0] != 0 ? 1 / diagonal[0] : 0, exists[1] != 0 ? 1 / diagonal[1] : 0,
+                      exists[2] != 0 ? 1 / diagonal[2] : 0, 1};
+    return own * residual + (levels_.empty() ? Four{} : exists * coarse_.front().sum[g]);
+  }
+
+ private:
+  struct Coarse {
+    Field inverse, sum;  // of each group: of the diagonal; of the residual, then of corrections
+  };
+  const Operator& stokes_;
+  const std::vector<Groups>& levels_;
+  std::vector<Coarse> coarse_;
+};
+
+}  // namespace lamina::stokes
