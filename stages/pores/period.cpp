@@ -2,9 +2,13 @@
 
 #include <algorithm>
 #include <span>
+#include <vector>
 
 namespace lamina::pores {
 namespace {
+
+constexpr double kUniform = 0.002;  // an image that differs less at any shift is the same all along
+constexpr double kClear = 0.15;     // of what the worst shift misses, a period misses at most so much
 
 /// Pixels of [begin, end) that exactly one of two rows has; the second is shifted to the left.
 std::uint64_t different(std::span<const std::uint32_t> one, std::span<const std::uint32_t> other, std::uint32_t shift,
@@ -41,18 +45,22 @@ std::uint32_t period(const RunsView& image, bool columns, std::uint32_t least, d
   const double share = static_cast<double>(set_pixels(image)) / (static_cast<double>(image.columns) * image.rows());
   if (!(share > 0 && share < 1)) return 0;
   const std::uint32_t most = (columns ? image.columns : image.rows()) / 3;
-  double best = miss;
-  std::uint32_t found = 0;
-  for (std::uint32_t shift = std::max(least, 1u); shift <= most; ++shift) {
-    const double here = missed(image, columns, shift, share);
-    if (here < best) {
-      best = here;
-      found = shift;
-    } else if (found > 0 && here > miss) {
-      break;
-    }
+  least = std::max(least, 1u);
+  if (most < least) return 0;
+  std::vector<double> at(most + std::size_t{1} - least);
+  for (std::uint32_t shift = least; shift <= most; ++shift) at[shift - least] = missed(image, columns, shift, share);
+  const double worst = *std::ranges::max_element(at);
+  if (worst < kUniform) return least;
+  const double pass = std::min(miss, kClear * worst);
+  for (std::size_t i = 0; i < at.size(); ++i) {
+    if (at[i] > pass) continue;
+    std::size_t best = i;
+    for (; i < at.size() && at[i] <= pass; ++i)
+      if (at[i] < at[best]) best = i;
+    // At the first shift it may only begin to differ.
+    if (best > 0) return least + static_cast<std::uint32_t>(best);
   }
-  return found;
+  return 0;
 }
 
 double mismatch(const RunsView& one, const RunsView& other) {

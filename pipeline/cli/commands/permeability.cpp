@@ -1,11 +1,16 @@
-// lamina permeability: k1 and k2 of measured pressure drops.
+// lamina permeability: k1 and k2 of measured pressure drops, and k1 predicted from written toolpaths.
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <cmath>
 #include <numbers>
 
+#include "pipeline/calibrate/bead_voxels.h"
+#include "pipeline/calibrate/predict_flow.h"
 #include "pipeline/cli/command.h"
 #include "pipeline/cli/plot_file.h"
 #include "stages/data/text/json.h"
+#include "stages/data/text/number_text.h"
 #include "stages/data/text/readable.h"
 #include "stages/segment/flows.h"
 
@@ -21,10 +26,12 @@ CommandSpec permeability_spec() {
   CommandSpec spec;
   spec.summary =
       "Fits dp / L = (mu / k1) v + (rho / k2) v^2 to measured flows and pressure drops: Darcy's k1, Forchheimer's k2,\n"
-      "their standard errors and the quality of the fit.";
+      "their standard errors and the quality of the fit. Of G-code, predicts Darcy's k1: cuts what repeats of the beads, or a\n"
+      "window, into voxels and computes how a fluid creeps through their pores.";
   spec.operand = "FILE";
   spec.operand_meaning =
-      "a table with a header: flow_l_min (or velocity_m_s) and drop_mbar (or _pa, _kpa, _bar, _psi), any number of drop columns";
+      "a table with a header: flow_l_min (or velocity_m_s) and drop_mbar (or _pa, _kpa, _bar, _psi), any number of drop columns;\n"
+      "or toolpaths, as in part.gcode";
   spec.options = {
       {"--length", "MM", "of the medium along the flow", "", "Medium"},
       {"--diameter", "MM", "of a round medium", "", "Medium"},
@@ -32,6 +39,9 @@ CommandSpec permeability_spec() {
       {"--viscosity", "PA.S", "of the fluid", "1.81e-05", "Fluid"},
       {"--density", "KG/M3", "of the fluid", "1.204", "Fluid"},
       {"--convention", "NAME", "dinisio2022: what reproduces Table 25 of that document", "", "Fluid", {"dinisio2022"}},
+      {"--window", "X,Y,Z", "mm of a print to look at; default: what repeats, else 2,2 and eight layers", "", "Toolpaths"},
+      {"--voxel", "UM", "edge of a voxel, micrometres", "10", "Toolpaths"},
+      {"--memory", "SIZE", "that the flow may take, as in 2G", "1G", "Toolpaths"},
       {"--plot", "FILE", "draw points and parabola, as .svg or .png", "", "Result"},
       {"--overwrite", "", "replace a file that lamina did not write", "", "Result"},
       {"--json", "", "print the result as one JSON object on stdout", "", "Result"}};
@@ -39,7 +49,8 @@ CommandSpec permeability_spec() {
       "Rows of one column `configuration` are fitted group by group. The convention dinisio2022 is L = 25.5 mm, v = Q / 28 in\n"
       "m/s of L/min (466.67 mm2), 1.87e-5 Pa.s and 998.2 kg/m3, which is water: its k2 is 832 times that of air.\n\n"
       "Examples:\n  lamina permeability drops.csv --length 25.4 --diameter 25.4\n"
-      "  lamina permeability drops.csv --convention dinisio2022 --plot fit.svg";
+      "  lamina permeability drops.csv --convention dinisio2022 --plot fit.svg\n"
+      "  lamina permeability part.gcode --voxel 15";
   return spec;
 }
 
@@ -74,8 +85,7 @@ Result<Settings> read_settings(const Arguments& arguments) {
   return settings;
 }
 
-Outcome run_permeability(const Arguments& arguments, Context& context) {
-  if (arguments.operands.size() != 1) return Error{Fault::kUsage, "name one file of measurements"};
+Outcome fit_table(const Arguments& arguments, Context& context) {
   const std::string &file = arguments.operands.front(), plot = arguments.text("--plot");
   if (Status status = check_plot_name(plot); !status) return status;
   const auto settings = read_settings(arguments);
@@ -116,9 +126,162 @@ Outcome run_permeability(const Arguments& arguments, Context& context) {
   return arguments.has("--json") ? context.give(json) : context.print(text);
 }
 
+/// Where to look at a print.
+struct Choice {
+  Window window;
+  std::uint32_t first_layer = 0, layers = 0;  // in the pile
+};
+
+Result<Choice> choose_window(const Arguments& arguments, const read::GcodeFile& file, const Pile& pile) {
+  double voxel_um = 10;
+  if (Status status = arguments.read("--voxel", {1, 500}, voxel_um); !status) return status.error();
+  std::array<double, 3> given{};
+  if (arguments.has("--window")) {
+    const auto parts = split(arguments.text("--window"), ",");
+    for (std::size_t a = 0; a < 3; ++a) {
+      const std::string wrong = parts.size() != 3 ? "want three lengths in mm, as in --window 2,3,0.6"
+                                                  : read_number(parts[a], 0.05, 100, " mm", given[a]);
+      if (Status status = at_option("--window", wrong); !status) return status.error();
+    }
+  }
+  const auto middle_layer = static_cast<std::uint32_t>(pile.layers.size() / 2);
+  const Point3 middle = file.box().middle();
+  const Result<Repeat> repeat = find_repeat(file, pile, {middle.x, middle.y}, middle_layer);
+  if (!repeat) return repeat.error();
+  Choice choice;
+  const bool asked = given[2] > 0;
+  std::array<std::int64_t, 2> side{};
+  for (std::size_t a = 0; a < 2; ++a) {
+    choice.window.periodic[a] = !asked && repeat->length[a] > 0;
+    side[a] = asked ? std::llround(given[a] * 1e6) : repeat->length[a] > 0 ? repeat->length[a] : 2'000'000;
+  }
+  choice.window.periodic[2] = !asked && repeat->layers > 0;
+  choice.first_layer = middle_layer;
+  const auto& layers = pile.layers;
+  const std::int64_t low = layers[middle_layer].low;
+  const std::uint32_t most = static_cast<std::uint32_t>(layers.size()) - middle_layer;
+  choice.layers = std::min(most, asked ? 1 : repeat->layers > 0 ? repeat->layers : 8);
+  while (asked && choice.layers < most && layers[middle_layer + choice.layers - 1].high - low < std::llround(given[2] * 1e6))
+    ++choice.layers;
+  const std::int64_t high = layers[middle_layer + choice.layers - 1].high;
+  const auto corner = [&](int sign, std::int64_t z) {
+    return Point3{static_cast<Nm>(middle.x + sign * side[0] / 2), static_cast<Nm>(middle.y + sign * side[1] / 2),
+                  static_cast<Nm>(z)};
+  };
+  choice.window.box.add(corner(-1, low));
+  choice.window.box.add(corner(1, high));
+  const std::array<std::int64_t, 3> length = {side[0], side[1], high - low};
+  for (std::size_t a = 0; a < 3; ++a)
+    choice.window.count[a] =
+        static_cast<std::uint32_t>(std::max(4LL, std::llround(static_cast<double>(length[a]) / (1e3 * voxel_um))));
+  if (choice.window.voxels() > std::uint64_t{1} << 31)
+    return Error{Fault::kUsage, "--voxel: so small that the window has more than 2^31; take larger ones or a smaller --window"};
+  return choice;
+}
+
+Window half_as_many(Window window) {
+  for (std::uint32_t& count : window.count) count = (count + 1) / 2;
+  return window;
+}
+
+std::string text_of(const Choice& choice, const PoreReport& report) {
+  const Box& box = choice.window.box;
+  const auto& repeats = choice.window.periodic;
+  std::string axes;
+  for (std::size_t a = 0; a < 3; ++a)
+    if (repeats[a]) axes += axes.empty() ? std::string(1, "xyz"[a]) : fmt::format(", {}", "xyz"[a]);
+  std::string text =
+      fmt::format("window    {:.3f} x {:.3f} x {:.3f} mm around {:.2f}, {:.2f} mm, {} from layer {} on; repeats along {}\n",
+                  mm(box.width()), mm(box.depth()), mm(box.height()), mm(box.middle().x), mm(box.middle().y),
+                  choice.layers == 1 ? "one layer" : fmt::format("{} layers", choice.layers), choice.first_layer,
+                  axes.empty() ? "no axis: walls close its sides" : axes);
+  const auto& count = choice.window.count;
+  text += fmt::format("voxels    {} x {} x {}, {} of void\n", count[0], count[1], count[2], readable_count(report.empty));
+  text += fmt::format("porosity  {:.2f} %, {:.2f} % leads through along z\n", 100 * report.porosity.total(),
+                      100 * report.porosity.percolating(2));
+  text += fmt::format("surface   {:.2f} mm2 a mm3\n", report.surface_per_mm);
+  for (std::size_t a = 0; a < 3; ++a) {
+    if (!report.flow[a]) continue;
+    const Darcy& darcy = *report.flow[a];
+    const double k = darcy.k_m2[a] / segment::kDarcy, error = darcy.error_m2[a] / segment::kDarcy;
+    if (darcy.steps == 0) {
+      text += fmt::format("along {}   k1 0 D: no void leads through\n", "xyz"[a]);
+      continue;
+    }
+    text += fmt::format("along {}   k1 {:.4g} +- {:.2g} D ({:.4e} m2), tortuosity {:.3f}, throat {:.3f} mm\n", "xyz"[a], k,
+                        error, darcy.k_m2[a], darcy.tortuosity, report.throat_mm[a]);
+  }
+  return text;
+}
+
+Json json_of(const Choice& choice, const PoreReport& report) {
+  const Box& box = choice.window.box;
+  Json json = {
+      {"command", "permeability"},
+      {"window_mm", {mm(box.width()), mm(box.depth()), mm(box.height())}},
+      {"repeats", choice.window.periodic},
+      {"voxels", choice.window.count},
+      {"void_voxels", report.empty},
+      {"porosity", report.porosity.total()},
+      {"porosity_through", {report.porosity.percolating(0), report.porosity.percolating(1), report.porosity.percolating(2)}},
+      {"surface_per_mm", report.surface_per_mm},
+      {"throat_mm", report.throat_mm},
+      {"flow", Json::array()}};
+  for (std::size_t a = 0; a < 3; ++a) {
+    const Darcy& darcy = *report.flow[a];
+    json["flow"].push_back({{"along", std::string(1, "xyz"[a])},
+                            {"k1_m2", darcy.k_m2},
+                            {"k1_error_m2", darcy.error_m2},
+                            {"k1_darcy", darcy.k_m2[a] / segment::kDarcy},
+                            {"k1_error_darcy", darcy.error_m2[a] / segment::kDarcy},
+                            {"tortuosity", darcy.tortuosity},
+                            {"steps", darcy.steps}});
+  }
+  return json;
+}
+
+Outcome predict(const Arguments& arguments, Context& context) {
+  for (const char* flag : {"--length", "--diameter", "--area", "--viscosity", "--density", "--convention", "--plot"})
+    if (arguments.has(flag))
+      return Error{Fault::kUsage, fmt::format("{} is for tables of measurements, not for toolpaths", flag)};
+  FlowRequest request;
+  if (Status status = arguments.read("--memory", read_bytes, request.memory_bytes); !status) return status.error();
+  const Result<read::GcodeFile> file = read::GcodeFile::open(arguments.operands.front());
+  if (!file) return file.error();
+  const Result<Pile> pile = pile_of(*file);
+  if (!pile) return pile.error();
+  const Result<Choice> choice = choose_window(arguments, *file, *pile);
+  if (!choice) return choice.error();
+  const Result<VoxelStack> fine = bead_voxels(*file, *pile, choice->window);
+  if (!fine) return fine.error();
+  const Result<VoxelStack> coarse = bead_voxels(*file, *pile, half_as_many(choice->window));
+  if (!coarse) return coarse.error();
+  const std::atomic<bool>& cancel = context.cancel();
+  const Result<PoreReport> report = look_at_pores(*fine, *coarse, request, [&](double) { return !cancel; });
+  if (!report) return Error{report.error().fault, fmt::format("{}: {}", arguments.operands.front(), report.error().message)};
+  if (!file->tells_widths()) context.say("note: the file tells no widths; they are those of what it feeds");
+  return arguments.has("--json") ? context.give(json_of(*choice, *report)) : context.print(text_of(*choice, *report));
+}
+
+bool is_gcode(const std::string& path) {
+  for (const char* ending : {".gcode", ".GCODE", ".gco", ".g", ".nc"})
+    if (path.ends_with(ending)) return true;
+  return false;
+}
+
+Outcome run_permeability(const Arguments& arguments, Context& context) {
+  if (arguments.operands.size() != 1) return Error{Fault::kUsage, "name one file of measurements, or of toolpaths"};
+  if (is_gcode(arguments.operands.front())) return predict(arguments, context);
+  for (const char* flag : {"--window", "--voxel", "--memory"})
+    if (arguments.has(flag))
+      return Error{Fault::kUsage, fmt::format("{} is for toolpaths, not for tables of measurements", flag)};
+  return fit_table(arguments, context);
+}
+
 }  // namespace
 
-const Command permeability_command = {"permeability", "Darcy's and Forchheimer's coefficients from flows and pressure drops",
+const Command permeability_command = {"permeability",
+                                      "Darcy's and Forchheimer's coefficients, of measured drops or predicted from toolpaths",
                                       permeability_spec, run_permeability};
 
 }  // namespace lamina::pipeline

@@ -1,0 +1,115 @@
+#include "pipeline/calibrate/predict_flow.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "stages/data/text/readable.h"
+#include "stages/pores/throat.h"
+#include "stages/stokes/flow.h"
+
+namespace lamina::pipeline {
+namespace {
+
+constexpr std::uint32_t kLevels = 8;
+constexpr std::uint32_t kFluidAtEnds = 4;  // voxels before each end of an axis that does not repeat
+
+/// The box with fluid before both ends of an axis, which repeats then.
+VoxelStack with_fluid_at_ends(const VoxelView& box, int axis) {
+  VoxelStack longer(box.nx, box.ny, box.edge, box.periodic);
+  longer.periodic[static_cast<std::size_t>(axis)] = true;
+  const std::uint32_t x = axis == 0 ? kFluidAtEnds : 0, y = axis == 1 ? kFluidAtEnds : 0, z = axis == 2 ? kFluidAtEnds : 0;
+  longer.nx += 2 * x;
+  longer.ny += 2 * y;
+  Runs slice;
+  slice.columns = longer.nx;
+  for (std::uint32_t k = 0; k < box.nz + 2 * z; ++k) {
+    slice.row_offset.assign(1, 0);
+    slice.change.clear();
+    for (std::uint32_t r = 0; r < longer.ny; ++r) {
+      if (k >= z && k < box.nz + z && r >= y && r < box.ny + y)
+        for (const std::uint32_t c : box.row(r - y, k - z)) slice.change.push_back(c + x);
+      slice.row_offset.push_back(static_cast<std::uint32_t>(slice.change.size()));
+    }
+    longer.append(slice);
+  }
+  return longer;
+}
+
+/// Flow through one box along an axis, m2.
+Result<Darcy> flow_along(const VoxelView& box, int axis, const FlowRequest& request, const std::function<bool(double)>& tell) {
+  const auto a = static_cast<std::size_t>(axis);
+  const VoxelStack longer = box.periodic[a] ? VoxelStack() : with_fluid_at_ends(box, axis);
+  const VoxelView used = box.periodic[a] ? box : longer.view();
+  const Result<stokes::Grid> grid = stokes::make_grid(used, kLevels);
+  if (!grid) return grid.error();
+  stokes::Field field = stokes::field_of(grid->cells);
+  stokes::FlowOptions options;
+  options.tolerance = request.tolerance;
+  options.progress = [&](std::uint32_t, double residual) {
+    return tell(std::clamp(std::log(std::max(residual, 1e-12)) / std::log(request.tolerance), 0.0, 1.0));
+  };
+  const Result<stokes::Flow> flow = stokes::solve(*grid, axis, options, field);
+  if (!flow) return flow.error();
+  // The force acts on the fluid at the ends too, where hardly anything resists.
+  const double stretched = static_cast<double>(box.size()[a]) / used.size()[a];
+  Darcy darcy;
+  for (std::size_t b = 0; b < 3; ++b)
+    darcy.k_m2[b] = flow->permeability[b] * stretched * grid->cells.unit_m * grid->cells.unit_m;
+  darcy.tortuosity = flow->tortuosity;
+  darcy.steps = flow->steps;
+  return darcy;
+}
+
+/// Of the voxels, extrapolated from those twice as large. A wall is known to a tenth of a voxel at best, which moves the
+/// permeability as a slit's width does: by three tenths of a voxel / hydraulic radius.
+void add_error(const Darcy& coarse, double ratio, double wall_share, Darcy& fine) {
+  for (std::size_t b = 0; b < 3; ++b) {
+    const double step = (fine.k_m2[b] - coarse.k_m2[b]) / (ratio - 1);
+    fine.error_m2[b] = std::max(std::abs(step), 3 * wall_share * std::abs(fine.k_m2[b]));
+    fine.k_m2[b] += step;
+  }
+}
+
+}  // namespace
+
+Result<PoreReport> look_at_pores(const VoxelView& fine, const VoxelView& coarse, const FlowRequest& request,
+                                 const std::function<bool(double)>& tell) {
+  PoreReport report;
+  report.voxels = fine.voxels();
+  report.empty = fine.voxels() - set_voxels(fine);
+  const std::uint64_t bytes = stokes::bytes_of_flow(report.empty);
+  if (bytes > request.memory_bytes) {
+    const double larger = std::cbrt(static_cast<double>(bytes) / static_cast<double>(request.memory_bytes));
+    return Error{Fault::kUsage,
+                 fmt::format("the flow through {} voxels of void takes {}, --memory allows {}; take --voxel {:.3g} "
+                             "or a smaller --window",
+                             readable_count(report.empty), readable_bytes(bytes), readable_bytes(request.memory_bytes),
+                             larger * fine.edge[2] * 1e-3)};
+  }
+  report.porosity = pores::porosity(fine);
+  report.surface_per_mm = pores::specific_surface(fine).crofton;
+  report.throat_mm = pores::throats(fine, pores::whole(fine), request.axes);
+  const double edge_mm = *std::min_element(fine.edge.begin(), fine.edge.end()) * 1e-6;
+  const double hydraulic_mm = report.surface_per_mm > 0 ? report.porosity.total() / report.surface_per_mm : 1;
+  const double ratio = static_cast<double>(fine.nx + fine.ny + fine.nz) / (coarse.nx + coarse.ny + coarse.nz);
+  for (int axis = 0; axis < 3; ++axis) {
+    const auto a = static_cast<std::size_t>(axis);
+    if (!request.axes[a]) continue;
+    report.flow[a] = Darcy();
+    if (report.porosity.percolating(axis) == 0) continue;
+    const auto told = [&](double from, double share) {
+      return [&tell, axis, from, share](double done) { return tell((axis + from + share * done) / 3); };
+    };
+    const Result<Darcy> rough = flow_along(coarse, axis, request, told(0, 0.15));
+    if (!rough) return rough.error();
+    Result<Darcy> darcy = flow_along(fine, axis, request, told(0.15, 0.85));
+    if (!darcy) return darcy.error();
+    add_error(*rough, ratio, 0.1 * edge_mm / hydraulic_mm, *darcy);
+    report.flow[a] = *darcy;
+  }
+  return report;
+}
+
+}  // namespace lamina::pipeline

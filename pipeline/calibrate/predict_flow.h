@@ -1,0 +1,47 @@
+// pipeline/calibrate/predict_flow.h: the pores of a window of voxels and what a fluid sees of them.
+#pragma once
+
+#include <array>
+#include <functional>
+#include <optional>
+#include <vector>
+
+#include "stages/data/status.h"
+#include "stages/data/voxels.h"
+#include "stages/pores/porosity.h"
+#include "stages/pores/surface.h"
+
+namespace lamina::pipeline {
+
+/// Darcy's permeability along an axis, and across it where the fluid is led aside.
+struct Darcy {
+  std::array<double, 3> k_m2{};      // mean velocity x viscosity / force, along x, y, z
+  std::array<double, 3> error_m2{};  // what voxels of this size may be wrong by, from voxels twice as large
+  double tortuosity = 0;             // mean speed / mean velocity
+  std::uint32_t steps = 0;
+  bool converged = true;
+};
+
+struct PoreReport {
+  std::uint64_t voxels = 0, empty = 0;
+  pores::Porosity porosity;
+  double surface_per_mm = 0;                 // mm2 in a mm3
+  std::array<double, 3> throat_mm{};         // the largest ball that passes along x, y, z; 0: none does
+  std::array<std::optional<Darcy>, 3> flow;  // along the axes that were asked for
+};
+
+struct FlowRequest {
+  std::array<bool, 3> axes{true, true, true};
+  double tolerance = 1e-4;
+  std::uint64_t memory_bytes = std::uint64_t{1} << 30;
+};
+
+/// fine, coarse  the same window, in voxels and in voxels about twice as large. Along axes that do not repeat, walls close the
+///               sides of the window, and fluid stands before its ends
+/// tell          is told how far it is, 0 .. 1; false stops
+/// errors        kUsage: it does not fit the memory, with the voxels that do; kInput: no void; kInterrupted
+/// cost          of stokes::solve() for each axis and window
+Result<PoreReport> look_at_pores(const VoxelView& fine, const VoxelView& coarse, const FlowRequest& request,
+                                 const std::function<bool(double)>& tell);
+
+}  // namespace lamina::pipeline

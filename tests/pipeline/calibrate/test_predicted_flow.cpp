@@ -1,0 +1,120 @@
+// tests/pipeline/calibrate/test_predicted_flow.cpp: beads of a written file become voxels, and these a permeability.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <fstream>
+#include <numbers>
+
+#include "pipeline/calibrate/bead_voxels.h"
+#include "pipeline/calibrate/predict_flow.h"
+#include "tests/commands/program.h"
+
+namespace lamina {
+namespace {
+
+constexpr double kWidth = 0.5, kHeight = 0.3, kSpacing = 0.8;  // mm
+
+/// Five layers of lines along y; `crossed`: every other layer along x.
+void write_lines(const std::string& path, bool crossed) {
+  std::ofstream file(path);
+  file << "G21\nG90\nM83\n";
+  for (int layer = 1; layer <= 5; ++layer) {
+    const double z = kHeight * layer;
+    file << ";LAYER_CHANGE\n;Z:" << z << "\n;HEIGHT:" << kHeight << "\nG1 Z" << z << " F600\n;WIDTH:" << kWidth << "\n";
+    for (int line = 0; line < 20; ++line) {
+      const double at = 10 + kSpacing * line;
+      if (crossed && layer % 2 == 0)
+        file << "G0 X10 Y" << at << "\nG1 X25.2 Y" << at << " E1 F900\n";
+      else
+        file << "G0 X" << at << " Y10\nG1 X" << at << " Y25.2 E1 F900\n";
+    }
+  }
+}
+
+struct Laid {
+  read::GcodeFile file;
+  pipeline::Pile pile;
+};
+Laid laid(const std::string& path) {
+  Result<read::GcodeFile> file = read::GcodeFile::open(path);
+  EXPECT_TRUE(file.ok());
+  Result<pipeline::Pile> pile = pipeline::pile_of(*file);
+  EXPECT_TRUE(pile.ok());
+  return {std::move(*file), std::move(*pile)};
+}
+
+pipeline::Window period_around(const Laid& lines, std::uint32_t layers, std::array<std::uint32_t, 3> count) {
+  pipeline::Window window;
+  window.box.add(Point3{17'600'000, 17'600'000, static_cast<Nm>(lines.pile.layers[1].low)});
+  window.box.add(Point3{18'400'000, 18'400'000, static_cast<Nm>(lines.pile.layers[layers].high)});
+  window.count = count;
+  window.periodic = {true, true, true};
+  return window;
+}
+
+TEST(PredictedFlow, WhatRepeatsIsFoundInTheFile) {
+  test::Directory folder;
+  write_lines(folder / "straight.gcode", false);
+  write_lines(folder / "crossed.gcode", true);
+  const Laid straight = laid(folder / "straight.gcode"), crossed = laid(folder / "crossed.gcode");
+  ASSERT_EQ(straight.pile.layers.size(), 5u);
+  EXPECT_EQ(straight.pile.layers[2].low, 600'000);
+  const Result<pipeline::Repeat> one = pipeline::find_repeat(straight.file, straight.pile, {17'600'000, 17'600'000}, 1);
+  const Result<pipeline::Repeat> two = pipeline::find_repeat(crossed.file, crossed.pile, {17'600'000, 17'600'000}, 1);
+  ASSERT_TRUE(one.ok() && two.ok());
+  EXPECT_EQ(one->length[0], 800'000);
+  EXPECT_LE(one->length[1], 200'000) << "any length along the lines";
+  EXPECT_EQ(one->layers, 1u);
+  EXPECT_EQ(two->length, (std::array<std::int64_t, 2>{800'000, 800'000}));
+  EXPECT_EQ(two->layers, 2u);
+}
+
+/// By hand: what stadia of 0.5 x 0.3 mm leave of cells of 0.8 x 0.3 mm.
+TEST(PredictedFlow, StraightLinesLeaveWhatTheirStadiaDoAndNothingFlowsAcrossThem) {
+  test::Directory folder;
+  write_lines(folder / "lines.gcode", false);
+  const Laid lines = laid(folder / "lines.gcode");
+  const Result<VoxelStack> fine = pipeline::bead_voxels(lines.file, lines.pile, period_around(lines, 1, {80, 8, 60}));
+  const Result<VoxelStack> coarse = pipeline::bead_voxels(lines.file, lines.pile, period_around(lines, 1, {40, 4, 30}));
+  ASSERT_TRUE(fine.ok() && coarse.ok());
+  const Result<pipeline::PoreReport> report = pipeline::look_at_pores(*fine, *coarse, {}, [](double) { return true; });
+  ASSERT_TRUE(report.ok());
+  const double bead = kHeight * (kWidth - kHeight) + std::numbers::pi / 4 * kHeight * kHeight;
+  EXPECT_NEAR(report->porosity.total(), 1 - bead / (kSpacing * kHeight), 0.005);
+  EXPECT_EQ(report->flow[0]->k_m2[0], 0) << "beads of all layers stand upon each other";
+  EXPECT_GT(report->flow[1]->k_m2[1], 0);
+  EXPECT_NEAR(report->flow[1]->tortuosity, 1, 1e-3) << "straight along the lines";
+  EXPECT_GT(report->flow[2]->tortuosity, 1);
+  EXPECT_GT(report->flow[2]->error_m2[2], 0);
+}
+
+/// Lines that cross make both directions of the bed alike.
+TEST(PredictedFlow, CrossedLinesLeadAlikeAlongXAndY) {
+  test::Directory folder;
+  write_lines(folder / "lines.gcode", true);
+  const Laid lines = laid(folder / "lines.gcode");
+  const Result<VoxelStack> fine = pipeline::bead_voxels(lines.file, lines.pile, period_around(lines, 2, {32, 32, 24}));
+  const Result<VoxelStack> coarse = pipeline::bead_voxels(lines.file, lines.pile, period_around(lines, 2, {16, 16, 12}));
+  ASSERT_TRUE(fine.ok() && coarse.ok());
+  const Result<pipeline::PoreReport> report = pipeline::look_at_pores(*fine, *coarse, {}, [](double) { return true; });
+  ASSERT_TRUE(report.ok());
+  EXPECT_NEAR(report->flow[0]->k_m2[0] / report->flow[1]->k_m2[1], 1, 1e-3);
+  EXPECT_DOUBLE_EQ(report->porosity.total(), report->porosity.percolating(2));
+}
+
+TEST(PredictedFlow, AWindowThatDoesNotFitTheMemoryIsRefusedWithVoxelsThatDo) {
+  test::Directory folder;
+  write_lines(folder / "lines.gcode", false);
+  const Laid lines = laid(folder / "lines.gcode");
+  const Result<VoxelStack> box = pipeline::bead_voxels(lines.file, lines.pile, period_around(lines, 1, {80, 80, 30}));
+  ASSERT_TRUE(box.ok());
+  pipeline::FlowRequest request;
+  request.memory_bytes = 1'000'000;
+  const Result<pipeline::PoreReport> report = pipeline::look_at_pores(*box, *box, request, [](double) { return true; });
+  ASSERT_FALSE(report.ok());
+  EXPECT_EQ(report.error().fault, Fault::kUsage);
+  EXPECT_NE(report.error().message.find("take --voxel"), std::string::npos) << report.error().message;
+}
+
+}  // namespace
+}  // namespace lamina
