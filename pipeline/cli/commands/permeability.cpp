@@ -137,7 +137,8 @@ Result<Choice> choose_window(const Arguments& arguments, const read::GcodeFile& 
   if (Status status = arguments.read("--voxel", {1, 500}, voxel_um); !status) return status.error();
   std::array<double, 3> given{};
   if (arguments.has("--window")) {
-    const auto parts = split(arguments.text("--window"), ",");
+    const std::string text = arguments.text("--window");
+    const auto parts = split(text, ",");
     for (std::size_t a = 0; a < 3; ++a) {
       const std::string wrong = parts.size() != 3 ? "want three lengths in mm, as in --window 2,3,0.6"
                                                   : read_number(parts[a], 0.05, 100, " mm", given[a]);
@@ -153,7 +154,13 @@ Result<Choice> choose_window(const Arguments& arguments, const read::GcodeFile& 
   std::array<std::int64_t, 2> side{};
   for (std::size_t a = 0; a < 2; ++a) {
     choice.window.periodic[a] = !asked && repeat->length[a] > 0;
-    side[a] = asked ? std::llround(given[a] * 1e6) : repeat->length[a] > 0 ? repeat->length[a] : 2'000'000;
+    const std::int64_t print = a == 0 ? file.box().width() : file.box().depth();
+    side[a] = asked                   ? std::llround(given[a] * 1e6)
+              : repeat->length[a] > 0 ? repeat->length[a]
+                                      : std::min<std::int64_t>(2'000'000, print);
+    if (side[a] > print)
+      return Error{Fault::kUsage, fmt::format("--window: {:.3f} mm along {} are more than the print has: {:.3f} mm",
+                                              mm(static_cast<Nm>(side[a])), "xy"[a], mm(static_cast<Nm>(print)))};
   }
   choice.window.periodic[2] = !asked && repeat->layers > 0;
   choice.first_layer = middle_layer;
