@@ -70,7 +70,11 @@ Result<Pile> pile_of(const read::GcodeFile& file) {
   for (std::uint32_t i = 0; i < file.count(); ++i) {
     const Result<read::GcodeLayer> layer = file.layer(i);
     if (!layer) return layer.error();
-    if (layer->beads.empty() || layer->z <= top) continue;
+    if (layer->beads.empty()) continue;
+    if (layer->z <= top) {
+      ++pile.skipped;
+      continue;
+    }
     pile.layers.push_back({i, top, layer->z});
     top = layer->z;
   }

@@ -28,6 +28,7 @@ struct Pile {
     std::int64_t low, high;  // nm
   };
   std::vector<Layer> layers;
+  std::uint32_t skipped = 0;  // layers with beads that do not lie above those before
 };
 /// cost  reads the file once; 24 bytes a layer
 Result<Pile> pile_of(const read::GcodeFile& file);

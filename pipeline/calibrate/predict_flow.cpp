@@ -56,19 +56,24 @@ Result<Darcy> flow_along(const VoxelView& box, int axis, const FlowRequest& requ
   const double stretched = static_cast<double>(box.size()[a]) / used.size()[a];
   Darcy darcy;
   for (std::size_t b = 0; b < 3; ++b)
-    darcy.k_m2[b] = flow->permeability[b] * stretched * grid->cells.unit_m * grid->cells.unit_m;
+    darcy.k_m2[b] = flow->permeability[b] * (b == a ? stretched : 1) * grid->cells.unit_m * grid->cells.unit_m;
   darcy.tortuosity = flow->tortuosity;
   darcy.steps = flow->steps;
+  darcy.residual = flow->residual;
   return darcy;
 }
 
 /// Of the voxels, extrapolated from those twice as large. A wall is known to a tenth of a voxel at best, which moves the
 /// permeability as a slit's width does: by three tenths of a voxel / hydraulic radius.
-void add_error(const Darcy& coarse, double ratio, double wall_share, Darcy& fine) {
+/// Where the two are too far apart for that, nothing is extrapolated, and the error is as large as the value.
+void add_error(const Darcy& coarse, double ratio, double wall_share, int axis, Darcy& fine) {
+  const auto along = static_cast<std::size_t>(axis);
+  const double whole = std::abs(fine.k_m2[along]);
+  fine.resolved = std::abs(fine.k_m2[along] - coarse.k_m2[along]) <= 0.5 * (ratio - 1) * whole;
   for (std::size_t b = 0; b < 3; ++b) {
     const double step = (fine.k_m2[b] - coarse.k_m2[b]) / (ratio - 1);
-    fine.error_m2[b] = std::max(std::abs(step), 3 * wall_share * std::abs(fine.k_m2[b]));
-    fine.k_m2[b] += step;
+    fine.error_m2[b] = fine.resolved ? std::max(std::abs(step), 3 * wall_share * std::abs(fine.k_m2[b])) : whole;
+    if (fine.resolved) fine.k_m2[b] += step;
   }
 }
 
@@ -79,7 +84,10 @@ Result<PoreReport> look_at_pores(const VoxelView& fine, const VoxelView& coarse,
   PoreReport report;
   report.voxels = fine.voxels();
   report.empty = fine.voxels() - set_voxels(fine);
-  const std::uint64_t bytes = stokes::bytes_of_flow(report.empty);
+  std::uint64_t ends = 0;  // fluid before what does not repeat
+  for (std::size_t a = 0; a < 3; ++a)
+    if (!fine.periodic[a]) ends = std::max(ends, 2 * kFluidAtEnds * fine.voxels() / fine.size()[a]);
+  const std::uint64_t bytes = stokes::bytes_of_flow(report.empty + ends) + 4 * fine.voxels();  // distances for throats
   if (bytes > request.memory_bytes) {
     const double larger = std::cbrt(static_cast<double>(bytes) / static_cast<double>(request.memory_bytes));
     return Error{Fault::kUsage,
@@ -102,11 +110,12 @@ Result<PoreReport> look_at_pores(const VoxelView& fine, const VoxelView& coarse,
     const auto told = [&](double from, double share) {
       return [&tell, axis, from, share](double done) { return tell((axis + from + share * done) / 3); };
     };
-    const Result<Darcy> rough = flow_along(coarse, axis, request, told(0, 0.15));
+    const bool rough_leads = set_voxels(coarse) < coarse.voxels() && pores::porosity(coarse).percolating(axis) > 0;
+    const Result<Darcy> rough = rough_leads ? flow_along(coarse, axis, request, told(0, 0.15)) : Result<Darcy>(Darcy());
     if (!rough) return rough.error();
     Result<Darcy> darcy = flow_along(fine, axis, request, told(0.15, 0.85));
     if (!darcy) return darcy.error();
-    add_error(*rough, ratio, 0.1 * edge_mm / hydraulic_mm, *darcy);
+    add_error(*rough, ratio, 0.1 * edge_mm / hydraulic_mm, axis, *darcy);
     report.flow[a] = *darcy;
   }
   return report;

@@ -19,7 +19,8 @@ struct Darcy {
   std::array<double, 3> error_m2{};  // what voxels of this size may be wrong by, from voxels twice as large
   double tortuosity = 0;             // mean speed / mean velocity
   std::uint32_t steps = 0;
-  bool converged = true;
+  double residual = 0;   // relative, of the equations
+  bool resolved = true;  // voxels twice as large say about the same; else nothing is extrapolated, the error is the value
 };
 
 struct PoreReport {

@@ -173,6 +173,7 @@ TEST_F(OneMeaning, OptionsThatDoNothingHereAreRefused) {
       {"permeability drops.csv --voxel 5", "--voxel is for toolpaths"},
       {"permeability beads.gcode --length 5", "--length is for tables"},
       {"permeability beads.gcode --window 2,3", "--window: want three lengths"},
+      {"permeability beads.gcode --window 2,3,50", "--window: 50.000 mm along z are more than the print has"},
       {"permeability beads.gcode --window 90,3,1", "--window: 90.000 mm along x are more than the print has"},
       {"info part.stl --repair off --weld 3", "--weld: is of repair"},
       {"export part.stl --no-repair --weld 3 -o x.stl", "--weld: is of repair"},

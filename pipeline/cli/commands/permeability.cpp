@@ -171,6 +171,10 @@ Result<Choice> choose_window(const Arguments& arguments, const read::GcodeFile& 
   while (asked && choice.layers < most && layers[middle_layer + choice.layers - 1].high - low < std::llround(given[2] * 1e6))
     ++choice.layers;
   const std::int64_t high = layers[middle_layer + choice.layers - 1].high;
+  if (asked && high - low < std::llround(given[2] * 1e6) - 1000)
+    return Error{Fault::kUsage,
+                 fmt::format("--window: {:.3f} mm along z are more than the print has above its middle: {:.3f} mm", given[2],
+                             static_cast<double>(high - low) * 1e-6)};
   const auto corner = [&](int sign, std::int64_t z) {
     return Point3{static_cast<Nm>(middle.x + sign * side[0] / 2), static_cast<Nm>(middle.y + sign * side[1] / 2),
                   static_cast<Nm>(z)};
@@ -242,7 +246,9 @@ Json json_of(const Choice& choice, const PoreReport& report) {
                             {"k1_darcy", darcy.k_m2[a] / segment::kDarcy},
                             {"k1_error_darcy", darcy.error_m2[a] / segment::kDarcy},
                             {"tortuosity", darcy.tortuosity},
-                            {"steps", darcy.steps}});
+                            {"steps", darcy.steps},
+                            {"residual", darcy.residual},
+                            {"resolved", darcy.resolved}});
   }
   return json;
 }
@@ -257,6 +263,8 @@ Outcome predict(const Arguments& arguments, Context& context) {
   if (!file) return file.error();
   const Result<Pile> pile = pile_of(*file);
   if (!pile) return pile.error();
+  if (pile->layers.empty())
+    return Error{Fault::kInput, arguments.operands.front() + ": no layer lies above z = 0; heights count from the bed"};
   const Result<Choice> choice = choose_window(arguments, *file, *pile);
   if (!choice) return choice.error();
   const Result<VoxelStack> fine = bead_voxels(*file, *pile, choice->window);
@@ -266,6 +274,15 @@ Outcome predict(const Arguments& arguments, Context& context) {
   const std::atomic<bool>& cancel = context.cancel();
   const Result<PoreReport> report = look_at_pores(*fine, *coarse, request, [&](double) { return !cancel; });
   if (!report) return Error{report.error().fault, fmt::format("{}: {}", arguments.operands.front(), report.error().message)};
+  if (pile->skipped > 0) {
+    context.say(
+        fmt::format("note: {} layers that do not lie above those before are left out, as of parts printed one after the other",
+                    pile->skipped));
+  }
+  for (const std::optional<Darcy>& darcy : report->flow) {
+    if (darcy && !darcy->resolved) context.say("note: voxels are too coarse for the pores; take a smaller --voxel");
+    if (darcy && darcy->residual > 1e-2) context.say("note: the flow was not solved to its end; take a smaller --window");
+  }
   if (!file->tells_widths()) context.say("note: the file tells no widths; they are those of what it feeds");
   return arguments.has("--json") ? context.give(json_of(*choice, *report)) : context.print(text_of(*choice, *report));
 }

@@ -116,5 +116,33 @@ TEST(PredictedFlow, AWindowThatDoesNotFitTheMemoryIsRefusedWithVoxelsThatDo) {
   EXPECT_NE(report.error().message.find("take --voxel"), std::string::npos) << report.error().message;
 }
 
+/// Voxels that see a pore in one way, and twice as large ones in another, tell so and never a negative permeability.
+TEST(PredictedFlow, VoxelsThatAreTooCoarseSaySo) {
+  test::Directory folder;
+  write_lines(folder / "lines.gcode", true);
+  const Laid lines = laid(folder / "lines.gcode");
+  const Result<VoxelStack> fine = pipeline::bead_voxels(lines.file, lines.pile, period_around(lines, 2, {5, 5, 4}));
+  const Result<VoxelStack> coarse = pipeline::bead_voxels(lines.file, lines.pile, period_around(lines, 2, {1, 1, 1}));
+  ASSERT_TRUE(fine.ok() && coarse.ok());
+  const Result<pipeline::PoreReport> report = pipeline::look_at_pores(*fine, *coarse, {}, [](double) { return true; });
+  ASSERT_TRUE(report.ok());
+  for (std::size_t a = 0; a < 3; ++a) {
+    const pipeline::Darcy& darcy = *report->flow[a];
+    EXPECT_GE(darcy.k_m2[a], 0);
+    if (darcy.steps > 0 && !darcy.resolved) {
+      EXPECT_DOUBLE_EQ(darcy.error_m2[a], darcy.k_m2[a]);
+    }
+  }
+  EXPECT_FALSE(report->flow[2]->steps > 0 && report->flow[2]->resolved);
+}
+
+TEST(PredictedFlow, LayersThatDoNotLieAboveTheOthersAreCounted) {
+  test::Directory folder;
+  std::ofstream(folder / "low.gcode") << "G90\nM82\nG1 Z0 F300\nG1 X0 Y0\nG1 X10 Y0 E1\nG1 X10 Y10 E2\n";
+  const Laid lines = laid(folder / "low.gcode");
+  EXPECT_TRUE(lines.pile.layers.empty());
+  EXPECT_EQ(lines.pile.skipped, 1u);
+}
+
 }  // namespace
 }  // namespace lamina
