@@ -12,8 +12,9 @@
 #pragma once
 
 #include <algorithm>
-#include <cmath>
 #include <numbers>
+
+#include "stages/geometry/bead_section.h"
 
 namespace lamina::bead {
 
@@ -30,16 +31,8 @@ inline bool stays_pressed(double area_mm2, double fed_mm2, bool before, double h
 
 /// mm. pressed  it stays between nozzle and layer; says nothing where the layer is filled
 inline double width_of(double area_mm2, bool pressed, double height_mm) {
-  const double circle = full_circle(height_mm);
-  if (area_mm2 >= circle) return height_mm + (area_mm2 - circle) / height_mm;
-  const double share = std::max(area_mm2, 0.0) / circle;
-  return height_mm * (pressed ? share : std::sqrt(share));
-}
-
-/// The cross-section of a stadium, or of a circle where it is no wider than high.
-inline double area_of(double width_mm, double height_mm) {
-  if (width_mm <= height_mm) return std::numbers::pi / 4 * width_mm * width_mm;
-  return full_circle(height_mm) + (width_mm - height_mm) * height_mm;
+  const bool ellipse = pressed && area_mm2 < full_circle(height_mm);
+  return bead_width(std::max(area_mm2, 0.0), height_mm, ellipse ? BeadShape::kEllipse : BeadShape::kStadium);
 }
 
 }  // namespace lamina::bead

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "stages/segment/bead.h"
+#include "stages/geometry/bead_section.h"
 
 namespace lamina::segment {
 

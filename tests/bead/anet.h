@@ -30,7 +30,7 @@ inline std::vector<StableAfter> stabilisation_column() {
 }
 
 /// 100 % lays the set width of 0.4 mm at the set height (3.1.2), or what the profile feeds: 85 % of the rectangle.
-inline double set_area() { return area_of(0.4, kHeight); }
+inline double set_area() { return bead_area(0.4, kHeight); }
 constexpr double kProfileArea = 0.85 * 0.4 * 0.3;
 
 inline BeadMachine anet(double area, double acceleration) {

@@ -15,7 +15,7 @@ namespace {
 constexpr double kLayerHeight = 0.3;                                             // mm, of the layer
 const double kCusps = kLayerHeight * kLayerHeight * (1 - std::numbers::pi / 4);  // of two stadia that touch
 
-BesideBead stadium(double centre, double width) { return {centre, area_of(width, kLayerHeight), width}; }
+BesideBead stadium(double centre, double width) { return {centre, bead_area(width, kLayerHeight), width}; }
 
 /// The material of what was squeezed: the space between the outer centres and, outside of them, halves of the beads alone.
 double material(const std::vector<BesideBead>& beads, const Buffer<SqueezedBead>& out, double period) {

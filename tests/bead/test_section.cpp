@@ -14,7 +14,7 @@ namespace lamina::bead {
 namespace {
 
 TEST(Section, WidthsAreThoseOfTheirShapes) {
-  EXPECT_NEAR(width_of(area_of(0.4, 0.3), false, 0.3), 0.4, 1e-15);                 // a stadium
+  EXPECT_NEAR(width_of(bead_area(0.4, 0.3), false, 0.3), 0.4, 1e-15);               // a stadium
   EXPECT_NEAR(width_of(3.14159265358979 / 4 * 0.2 * 0.3, true, 0.3), 0.2, 1e-14);   // an ellipse as high as the layer
   EXPECT_NEAR(width_of(3.14159265358979 / 4 * 0.2 * 0.2, false, 0.3), 0.2, 1e-14);  // a circle
   const double circle = full_circle(0.3);
@@ -29,7 +29,7 @@ TEST(Section, WidthsAreThoseOfTheirShapes) {
       EXPECT_NEAR(width_of(4 * area, pressed, 0.6), 2 * before, 1e-12);  // twice as large a picture
     }
   }
-  for (double width = 0.05; width < 1.5; width += 0.05) EXPECT_NEAR(width_of(area_of(width, 0.3), false, 0.3), width, 1e-12);
+  for (double width = 0.05; width < 1.5; width += 0.05) EXPECT_NEAR(width_of(bead_area(width, 0.3), false, 0.3), width, 1e-12);
 }
 
 TEST(Section, AStarvedBeadStaysPressedAnUnderfedOneLetsGoUntilTheLayerIsFilledAgain) {

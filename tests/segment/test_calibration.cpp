@@ -3,7 +3,7 @@
 
 #include <cmath>
 
-#include "stages/segment/bead.h"
+#include "stages/geometry/bead_section.h"
 #include "stages/segment/calibration.h"
 #include "stages/segment/predict.h"
 #include "tests/segment/table.h"

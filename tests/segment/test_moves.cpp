@@ -5,7 +5,7 @@
 #include <numbers>
 #include <vector>
 
-#include "stages/segment/bead.h"
+#include "stages/geometry/bead_section.h"
 #include "stages/segment/layer_cut.h"
 #include "stages/segment/moves.h"
 

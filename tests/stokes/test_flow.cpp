@@ -8,12 +8,18 @@
 #include <vector>
 
 #include "stages/stokes/flow.h"
-#include "tests/stokes/boxes.h"
+#include "tests/pores/boxes.h"
 
 namespace lamina {
 namespace {
 
-using test::box_of;
+/// A box that repeats along all axes. solid  called with the place of a voxel's centre, in voxels
+template <class Solid>
+VoxelStack box_of(std::uint32_t nx, std::uint32_t ny, std::uint32_t nz, const Solid& solid) {
+  return pores::testing::stack_of(
+      pores::testing::Voxels(nx, ny, nz).fill([&](auto x, auto y, auto z) { return solid(x + 0.5, y + 0.5, z + 0.5); }),
+      {true, true, true});
+}
 
 stokes::Flow flow_through(const VoxelView& solid, int axis, double tolerance = 1e-5, std::uint32_t levels = 5) {
   const Result<stokes::Grid> grid = stokes::make_grid(solid, levels);

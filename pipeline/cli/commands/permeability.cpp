@@ -1,12 +1,12 @@
 // lamina permeability: k1 and k2 of measured pressure drops, and k1 predicted from written toolpaths.
 #include <fmt/format.h>
 
-#include <algorithm>
-#include <cmath>
 #include <numbers>
 
 #include "pipeline/calibrate/bead_voxels.h"
+#include "pipeline/calibrate/pore_page.h"
 #include "pipeline/calibrate/predict_flow.h"
+#include "pipeline/calibrate/window_choice.h"
 #include "pipeline/cli/command.h"
 #include "pipeline/cli/plot_file.h"
 #include "stages/data/text/json.h"
@@ -126,131 +126,19 @@ Outcome fit_table(const Arguments& arguments, Context& context) {
   return arguments.has("--json") ? context.give(json) : context.print(text);
 }
 
-/// Where to look at a print.
-struct Choice {
-  Window window;
-  std::uint32_t first_layer = 0, layers = 0;  // in the pile
-};
-
-Result<Choice> choose_window(const Arguments& arguments, const read::GcodeFile& file, const Pile& pile) {
-  double voxel_um = 10;
-  if (Status status = arguments.read("--voxel", {1, 500}, voxel_um); !status) return status.error();
-  std::array<double, 3> given{};
-  if (arguments.has("--window")) {
-    const std::string text = arguments.text("--window");
-    const auto parts = split(text, ",");
-    for (std::size_t a = 0; a < 3; ++a) {
-      const std::string wrong = parts.size() != 3 ? "want three lengths in mm, as in --window 2,3,0.6"
-                                                  : read_number(parts[a], 0.05, 100, " mm", given[a]);
-      if (Status status = at_option("--window", wrong); !status) return status.error();
-    }
-  }
-  const auto middle_layer = static_cast<std::uint32_t>(pile.layers.size() / 2);
-  const Point3 middle = file.box().middle();
-  const Result<Repeat> repeat = find_repeat(file, pile, {middle.x, middle.y}, middle_layer);
-  if (!repeat) return repeat.error();
-  Choice choice;
-  const bool asked = given[2] > 0;
-  std::array<std::int64_t, 2> side{};
-  for (std::size_t a = 0; a < 2; ++a) {
-    choice.window.periodic[a] = !asked && repeat->length[a] > 0;
-    const std::int64_t print = a == 0 ? file.box().width() : file.box().depth();
-    side[a] = asked                   ? std::llround(given[a] * 1e6)
-              : repeat->length[a] > 0 ? repeat->length[a]
-                                      : std::min<std::int64_t>(2'000'000, print);
-    if (side[a] > print)
-      return Error{Fault::kUsage, fmt::format("--window: {:.3f} mm along {} are more than the print has: {:.3f} mm",
-                                              mm(static_cast<Nm>(side[a])), "xy"[a], mm(static_cast<Nm>(print)))};
-  }
-  choice.window.periodic[2] = !asked && repeat->layers > 0;
-  choice.first_layer = middle_layer;
-  const auto& layers = pile.layers;
-  const std::int64_t low = layers[middle_layer].low;
-  const std::uint32_t most = static_cast<std::uint32_t>(layers.size()) - middle_layer;
-  choice.layers = std::min(most, asked ? 1 : repeat->layers > 0 ? repeat->layers : 8);
-  while (asked && choice.layers < most && layers[middle_layer + choice.layers - 1].high - low < std::llround(given[2] * 1e6))
-    ++choice.layers;
-  const std::int64_t high = layers[middle_layer + choice.layers - 1].high;
-  if (asked && high - low < std::llround(given[2] * 1e6) - 1000)
-    return Error{Fault::kUsage,
-                 fmt::format("--window: {:.3f} mm along z are more than the print has above its middle: {:.3f} mm", given[2],
-                             static_cast<double>(high - low) * 1e-6)};
-  const auto corner = [&](int sign, std::int64_t z) {
-    return Point3{static_cast<Nm>(middle.x + sign * side[0] / 2), static_cast<Nm>(middle.y + sign * side[1] / 2),
-                  static_cast<Nm>(z)};
-  };
-  choice.window.box.add(corner(-1, low));
-  choice.window.box.add(corner(1, high));
-  const std::array<std::int64_t, 3> length = {side[0], side[1], high - low};
-  for (std::size_t a = 0; a < 3; ++a)
-    choice.window.count[a] =
-        static_cast<std::uint32_t>(std::max(4LL, std::llround(static_cast<double>(length[a]) / (1e3 * voxel_um))));
-  if (choice.window.voxels() > std::uint64_t{1} << 31)
-    return Error{Fault::kUsage, "--voxel: so small that the window has more than 2^31; take larger ones or a smaller --window"};
-  return choice;
-}
-
-Window half_as_many(Window window) {
-  for (std::uint32_t& count : window.count) count = (count + 1) / 2;
-  return window;
-}
-
-std::string text_of(const Choice& choice, const PoreReport& report) {
-  const Box& box = choice.window.box;
-  const auto& repeats = choice.window.periodic;
-  std::string axes;
-  for (std::size_t a = 0; a < 3; ++a)
-    if (repeats[a]) axes += axes.empty() ? std::string(1, "xyz"[a]) : fmt::format(", {}", "xyz"[a]);
-  std::string text =
-      fmt::format("window    {:.3f} x {:.3f} x {:.3f} mm around {:.2f}, {:.2f} mm, {} from layer {} on; repeats along {}\n",
-                  mm(box.width()), mm(box.depth()), mm(box.height()), mm(box.middle().x), mm(box.middle().y),
-                  choice.layers == 1 ? "one layer" : fmt::format("{} layers", choice.layers), choice.first_layer,
-                  axes.empty() ? "no axis: walls close its sides" : axes);
-  const auto& count = choice.window.count;
-  text += fmt::format("voxels    {} x {} x {}, {} of void\n", count[0], count[1], count[2], readable_count(report.empty));
-  text += fmt::format("porosity  {:.2f} %, {:.2f} % leads through along z\n", 100 * report.porosity.total(),
-                      100 * report.porosity.percolating(2));
-  text += fmt::format("surface   {:.2f} mm2 a mm3\n", report.surface_per_mm);
+/// What the options wish for. errors  kUsage
+Result<WindowWish> read_wish(const Arguments& arguments) {
+  WindowWish wish;
+  if (Status status = arguments.read("--voxel", {1, 500}, wish.voxel_um); !status) return status.error();
+  if (!arguments.has("--window")) return wish;
+  const std::string text = arguments.text("--window");
+  const auto parts = split(text, ",");
   for (std::size_t a = 0; a < 3; ++a) {
-    if (!report.flow[a]) continue;
-    const Darcy& darcy = *report.flow[a];
-    const double k = darcy.k_m2[a] / segment::kDarcy, error = darcy.error_m2[a] / segment::kDarcy;
-    if (darcy.steps == 0) {
-      text += fmt::format("along {}   k1 0 D: no void leads through\n", "xyz"[a]);
-      continue;
-    }
-    text += fmt::format("along {}   k1 {:.4g} +- {:.2g} D ({:.4e} m2), tortuosity {:.3f}, throat {:.3f} mm\n", "xyz"[a], k,
-                        error, darcy.k_m2[a], darcy.tortuosity, report.throat_mm[a]);
+    const std::string wrong = parts.size() != 3 ? "want three lengths in mm, as in --window 2,3,0.6"
+                                                : read_number(parts[a], 0.05, 100, " mm", wish.size_mm[a]);
+    if (Status status = at_option("--window", wrong); !status) return status.error();
   }
-  return text;
-}
-
-Json json_of(const Choice& choice, const PoreReport& report) {
-  const Box& box = choice.window.box;
-  Json json = {
-      {"command", "permeability"},
-      {"window_mm", {mm(box.width()), mm(box.depth()), mm(box.height())}},
-      {"repeats", choice.window.periodic},
-      {"voxels", choice.window.count},
-      {"void_voxels", report.empty},
-      {"porosity", report.porosity.total()},
-      {"porosity_through", {report.porosity.percolating(0), report.porosity.percolating(1), report.porosity.percolating(2)}},
-      {"surface_per_mm", report.surface_per_mm},
-      {"throat_mm", report.throat_mm},
-      {"flow", Json::array()}};
-  for (std::size_t a = 0; a < 3; ++a) {
-    const Darcy& darcy = *report.flow[a];
-    json["flow"].push_back({{"along", std::string(1, "xyz"[a])},
-                            {"k1_m2", darcy.k_m2},
-                            {"k1_error_m2", darcy.error_m2},
-                            {"k1_darcy", darcy.k_m2[a] / segment::kDarcy},
-                            {"k1_error_darcy", darcy.error_m2[a] / segment::kDarcy},
-                            {"tortuosity", darcy.tortuosity},
-                            {"steps", darcy.steps},
-                            {"residual", darcy.residual},
-                            {"resolved", darcy.resolved}});
-  }
-  return json;
+  return wish;
 }
 
 Outcome predict(const Arguments& arguments, Context& context) {
@@ -265,11 +153,13 @@ Outcome predict(const Arguments& arguments, Context& context) {
   if (!pile) return pile.error();
   if (pile->layers.empty())
     return Error{Fault::kInput, arguments.operands.front() + ": no layer lies above z = 0; heights count from the bed"};
-  const Result<Choice> choice = choose_window(arguments, *file, *pile);
+  const Result<WindowWish> wish = read_wish(arguments);
+  if (!wish) return wish.error();
+  const Result<WindowChoice> choice = choose_window(*file, *pile, *wish);
   if (!choice) return choice.error();
   const Result<VoxelStack> fine = bead_voxels(*file, *pile, choice->window);
   if (!fine) return fine.error();
-  const Result<VoxelStack> coarse = bead_voxels(*file, *pile, half_as_many(choice->window));
+  const Result<VoxelStack> coarse = bead_voxels(*file, *pile, with_half_as_many_voxels(choice->window));
   if (!coarse) return coarse.error();
   const std::atomic<bool>& cancel = context.cancel();
   const Result<PoreReport> report = look_at_pores(*fine, *coarse, request, [&](double) { return !cancel; });
@@ -284,7 +174,7 @@ Outcome predict(const Arguments& arguments, Context& context) {
     if (darcy && darcy->residual > 1e-2) context.say("note: the flow was not solved to its end; take a smaller --window");
   }
   if (!file->tells_widths()) context.say("note: the file tells no widths; they are those of what it feeds");
-  return arguments.has("--json") ? context.give(json_of(*choice, *report)) : context.print(text_of(*choice, *report));
+  return arguments.has("--json") ? context.give(as_json(*choice, *report)) : context.print(as_text(*choice, *report));
 }
 
 bool is_gcode(const std::string& path) {

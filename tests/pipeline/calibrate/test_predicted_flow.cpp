@@ -52,6 +52,17 @@ pipeline::Window period_around(const Laid& lines, std::uint32_t layers, std::arr
   return window;
 }
 
+/// Of so many layers, in these voxels and in twice as large ones.
+pipeline::PoreReport report_of(const Laid& lines, std::uint32_t layers, std::array<std::uint32_t, 3> count,
+                               std::array<std::uint32_t, 3> coarse_count) {
+  const Result<VoxelStack> fine = pipeline::bead_voxels(lines.file, lines.pile, period_around(lines, layers, count));
+  const Result<VoxelStack> coarse = pipeline::bead_voxels(lines.file, lines.pile, period_around(lines, layers, coarse_count));
+  EXPECT_TRUE(fine.ok() && coarse.ok());
+  const Result<pipeline::PoreReport> report = pipeline::look_at_pores(*fine, *coarse, {}, [](double) { return true; });
+  EXPECT_TRUE(report.ok());
+  return *report;
+}
+
 TEST(PredictedFlow, WhatRepeatsIsFoundInTheFile) {
   test::Directory folder;
   write_lines(folder / "straight.gcode", false);
@@ -74,18 +85,14 @@ TEST(PredictedFlow, StraightLinesLeaveWhatTheirStadiaDoAndNothingFlowsAcrossThem
   test::Directory folder;
   write_lines(folder / "lines.gcode", false);
   const Laid lines = laid(folder / "lines.gcode");
-  const Result<VoxelStack> fine = pipeline::bead_voxels(lines.file, lines.pile, period_around(lines, 1, {80, 8, 60}));
-  const Result<VoxelStack> coarse = pipeline::bead_voxels(lines.file, lines.pile, period_around(lines, 1, {40, 4, 30}));
-  ASSERT_TRUE(fine.ok() && coarse.ok());
-  const Result<pipeline::PoreReport> report = pipeline::look_at_pores(*fine, *coarse, {}, [](double) { return true; });
-  ASSERT_TRUE(report.ok());
+  const pipeline::PoreReport report = report_of(lines, 1, {80, 8, 60}, {40, 4, 30});
   const double bead = kHeight * (kWidth - kHeight) + std::numbers::pi / 4 * kHeight * kHeight;
-  EXPECT_NEAR(report->porosity.total(), 1 - bead / (kSpacing * kHeight), 0.005);
-  EXPECT_EQ(report->flow[0]->k_m2[0], 0) << "beads of all layers stand upon each other";
-  EXPECT_GT(report->flow[1]->k_m2[1], 0);
-  EXPECT_NEAR(report->flow[1]->tortuosity, 1, 1e-3) << "straight along the lines";
-  EXPECT_GT(report->flow[2]->tortuosity, 1);
-  EXPECT_GT(report->flow[2]->error_m2[2], 0);
+  EXPECT_NEAR(report.porosity.total(), 1 - bead / (kSpacing * kHeight), 0.005);
+  EXPECT_EQ(report.flow[0]->k_m2[0], 0) << "beads of all layers stand upon each other";
+  EXPECT_GT(report.flow[1]->k_m2[1], 0);
+  EXPECT_NEAR(report.flow[1]->tortuosity, 1, 1e-3) << "straight along the lines";
+  EXPECT_GT(report.flow[2]->tortuosity, 1);
+  EXPECT_GT(report.flow[2]->error_m2[2], 0);
 }
 
 /// Lines that cross make both directions of the bed alike.
@@ -93,13 +100,9 @@ TEST(PredictedFlow, CrossedLinesLeadAlikeAlongXAndY) {
   test::Directory folder;
   write_lines(folder / "lines.gcode", true);
   const Laid lines = laid(folder / "lines.gcode");
-  const Result<VoxelStack> fine = pipeline::bead_voxels(lines.file, lines.pile, period_around(lines, 2, {32, 32, 24}));
-  const Result<VoxelStack> coarse = pipeline::bead_voxels(lines.file, lines.pile, period_around(lines, 2, {16, 16, 12}));
-  ASSERT_TRUE(fine.ok() && coarse.ok());
-  const Result<pipeline::PoreReport> report = pipeline::look_at_pores(*fine, *coarse, {}, [](double) { return true; });
-  ASSERT_TRUE(report.ok());
-  EXPECT_NEAR(report->flow[0]->k_m2[0] / report->flow[1]->k_m2[1], 1, 1e-3);
-  EXPECT_DOUBLE_EQ(report->porosity.total(), report->porosity.percolating(2));
+  const pipeline::PoreReport report = report_of(lines, 2, {32, 32, 24}, {16, 16, 12});
+  EXPECT_NEAR(report.flow[0]->k_m2[0] / report.flow[1]->k_m2[1], 1, 1e-3);
+  EXPECT_DOUBLE_EQ(report.porosity.total(), report.porosity.percolating(2));
 }
 
 TEST(PredictedFlow, AWindowThatDoesNotFitTheMemoryIsRefusedWithVoxelsThatDo) {
@@ -121,19 +124,15 @@ TEST(PredictedFlow, VoxelsThatAreTooCoarseSaySo) {
   test::Directory folder;
   write_lines(folder / "lines.gcode", true);
   const Laid lines = laid(folder / "lines.gcode");
-  const Result<VoxelStack> fine = pipeline::bead_voxels(lines.file, lines.pile, period_around(lines, 2, {5, 5, 4}));
-  const Result<VoxelStack> coarse = pipeline::bead_voxels(lines.file, lines.pile, period_around(lines, 2, {1, 1, 1}));
-  ASSERT_TRUE(fine.ok() && coarse.ok());
-  const Result<pipeline::PoreReport> report = pipeline::look_at_pores(*fine, *coarse, {}, [](double) { return true; });
-  ASSERT_TRUE(report.ok());
+  const pipeline::PoreReport report = report_of(lines, 2, {5, 5, 4}, {1, 1, 1});
   for (std::size_t a = 0; a < 3; ++a) {
-    const pipeline::Darcy& darcy = *report->flow[a];
+    const pipeline::Darcy& darcy = *report.flow[a];
     EXPECT_GE(darcy.k_m2[a], 0);
     if (darcy.steps > 0 && !darcy.resolved) {
       EXPECT_DOUBLE_EQ(darcy.error_m2[a], darcy.k_m2[a]);
     }
   }
-  EXPECT_FALSE(report->flow[2]->steps > 0 && report->flow[2]->resolved);
+  EXPECT_FALSE(report.flow[2]->steps > 0 && report.flow[2]->resolved);
 }
 
 TEST(PredictedFlow, LayersThatDoNotLieAboveTheOthersAreCounted) {

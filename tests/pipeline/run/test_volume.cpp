@@ -10,7 +10,7 @@
 #include "pipeline/cli/command.h"
 #include "pipeline/cli/console.h"
 #include "pipeline/machine/profiles.h"
-#include "stages/segment/bead.h"
+#include "stages/geometry/bead_section.h"
 #include "tests/commands/program.h"
 #include "tests/segment/gcode_reader.h"
 
@@ -69,7 +69,7 @@ void expect_widths_of_what_is_fed(const test::GcodeFile& file, double feed_ratio
       const double length = std::hypot(bead.x1 - bead.x0, bead.y1 - bead.y0);
       if (bead.type != "External perimeter" || length < 2) continue;
       const double fed = bead.filament * feed_ratio * std::numbers::pi / 4 * 1.75 * 1.75;
-      ASSERT_NEAR(segment::bead_area(bead.width, layer.height) * length / fed, 1, 0.005);
+      ASSERT_NEAR(bead_area(bead.width, layer.height) * length / fed, 1, 0.005);
     }
   }
 }

@@ -1,4 +1,4 @@
-// stages/segment/bead.h: the cross-section of a bead that is laid on a layer, in mm.
+// stages/geometry/bead_section.h: the cross-section of a bead that is laid on a layer, in mm.
 #pragma once
 
 #include <algorithm>
@@ -7,7 +7,7 @@
 
 #include "stages/data/extruder.h"
 
-namespace lamina::segment {
+namespace lamina {
 
 /// mm2. A stadium no wider than it is high is round, with its width as the diameter.
 inline double bead_area(double width, double height, BeadShape shape = BeadShape::kStadium) {
@@ -27,4 +27,4 @@ inline double bead_width(double area, double height, BeadShape shape = BeadShape
   return area / height + height * (1 - kCircle);
 }
 
-}  // namespace lamina::segment
+}  // namespace lamina

@@ -1,0 +1,19 @@
+// pipeline/calibrate/pore_page.h: what there is to say of the pores of a window, for people and for programs.
+#pragma once
+
+#include <nlohmann/json_fwd.hpp>
+#include <string>
+
+#include "pipeline/calibrate/predict_flow.h"
+#include "pipeline/calibrate/window_choice.h"
+
+namespace lamina::pipeline {
+
+/// Lines that end with LF; k1 in darcy and m2.
+std::string as_text(const WindowChoice& choice, const PoreReport& report);
+
+/// The same, k1 as a tensor: a row for each axis of the force.
+/// report  with the flow along all axes
+nlohmann::ordered_json as_json(const WindowChoice& choice, const PoreReport& report);
+
+}  // namespace lamina::pipeline

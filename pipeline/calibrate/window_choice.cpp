@@ -1,0 +1,62 @@
+#include "pipeline/calibrate/window_choice.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+namespace lamina::pipeline {
+
+Result<WindowChoice> choose_window(const read::GcodeFile& file, const Pile& pile, const WindowWish& wish) {
+  const auto middle_layer = static_cast<std::uint32_t>(pile.layers.size() / 2);
+  const Point3 middle = file.box().middle();
+  const Result<Repeat> repeat = find_repeat(file, pile, {middle.x, middle.y}, middle_layer);
+  if (!repeat) return repeat.error();
+  WindowChoice choice;
+  const bool asked = wish.size_mm[2] > 0;
+  std::array<std::int64_t, 2> side{};
+  for (std::size_t a = 0; a < 2; ++a) {
+    choice.window.periodic[a] = !asked && repeat->length[a] > 0;
+    const std::int64_t print = a == 0 ? file.box().width() : file.box().depth();
+    side[a] = asked                   ? std::llround(wish.size_mm[a] * 1e6)
+              : repeat->length[a] > 0 ? repeat->length[a]
+                                      : std::min<std::int64_t>(2'000'000, print);
+    if (side[a] > print)
+      return Error{Fault::kUsage, fmt::format("--window: {:.3f} mm along {} are more than the print has: {:.3f} mm",
+                                              mm(static_cast<Nm>(side[a])), "xy"[a], mm(static_cast<Nm>(print)))};
+  }
+  choice.window.periodic[2] = !asked && repeat->layers > 0;
+  choice.first_layer = middle_layer;
+  const auto& layers = pile.layers;
+  const std::int64_t low = layers[middle_layer].low;
+  const std::uint32_t most = static_cast<std::uint32_t>(layers.size()) - middle_layer;
+  choice.layers = std::min(most, asked ? 1 : repeat->layers > 0 ? repeat->layers : 8);
+  while (asked && choice.layers < most &&
+         layers[middle_layer + choice.layers - 1].high - low < std::llround(wish.size_mm[2] * 1e6))
+    ++choice.layers;
+  const std::int64_t high = layers[middle_layer + choice.layers - 1].high;
+  if (asked && high - low < std::llround(wish.size_mm[2] * 1e6) - 1000)
+    return Error{Fault::kUsage,
+                 fmt::format("--window: {:.3f} mm along z are more than the print has above its middle: {:.3f} mm",
+                             wish.size_mm[2], static_cast<double>(high - low) * 1e-6)};
+  const auto corner = [&](int sign, std::int64_t z) {
+    return Point3{static_cast<Nm>(middle.x + sign * side[0] / 2), static_cast<Nm>(middle.y + sign * side[1] / 2),
+                  static_cast<Nm>(z)};
+  };
+  choice.window.box.add(corner(-1, low));
+  choice.window.box.add(corner(1, high));
+  const std::array<std::int64_t, 3> length = {side[0], side[1], high - low};
+  for (std::size_t a = 0; a < 3; ++a)
+    choice.window.count[a] =
+        static_cast<std::uint32_t>(std::max(4LL, std::llround(static_cast<double>(length[a]) / (1e3 * wish.voxel_um))));
+  if (choice.window.voxels() > std::uint64_t{1} << 31)
+    return Error{Fault::kUsage, "--voxel: so small that the window has more than 2^31; take larger ones or a smaller --window"};
+  return choice;
+}
+
+Window with_half_as_many_voxels(Window window) {
+  for (std::uint32_t& count : window.count) count = (count + 1) / 2;
+  return window;
+}
+
+}  // namespace lamina::pipeline

@@ -1,0 +1,33 @@
+// pipeline/calibrate/window_choice.h: which box of a print to look at.
+#pragma once
+
+#include <array>
+#include <cstdint>
+
+#include "pipeline/calibrate/bead_voxels.h"
+#include "stages/data/status.h"
+#include "stages/read/gcode.h"
+
+namespace lamina::pipeline {
+
+struct WindowWish {
+  double voxel_um = 10;             // edge
+  std::array<double, 3> size_mm{};  // of the box; 0: what repeats
+};
+
+struct WindowChoice {
+  Window window;
+  std::uint32_t first_layer = 0, layers = 0;  // in the pile
+};
+
+/// A box around the middle of the print, of whole layers from the middle one upwards. Without a wish for its size it is one
+/// period of what repeats; along an axis where nothing does, 2 mm, or eight layers, or the print.
+/// pile    not empty
+/// errors  kUsage: larger than the print, or more than 2^31 voxels; of find_repeat()
+/// cost    of find_repeat()
+Result<WindowChoice> choose_window(const read::GcodeFile& file, const Pile& pile, const WindowWish& wish);
+
+/// The same box in voxels twice as large, as near as whole numbers allow.
+Window with_half_as_many_voxels(Window window);
+
+}  // namespace lamina::pipeline
