@@ -4,7 +4,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
+#include "stages/bead/contacts.h"
 #include "stages/pores/period.h"
 #include "stages/raster/beads.h"
 
@@ -18,13 +20,9 @@ Nm width_at(Nm width, std::int64_t height, double above) {
   return static_cast<Nm>(std::lround(static_cast<double>(width) - round + 2 * std::sqrt(half * half - above * above)));
 }
 
-/// Beads that may reach into the window.
-void keep_near(const Box& box, Buffer<LaidBead>& beads) {
-  std::erase_if(beads, [&](const LaidBead& bead) {
-    const std::int64_t reach = bead.width;
-    return std::max(bead.from.x, bead.to.x) + reach < box.lo.x || std::min(bead.from.x, bead.to.x) - reach > box.hi.x ||
-           std::max(bead.from.y, bead.to.y) + reach < box.lo.y || std::min(bead.from.y, bead.to.y) - reach > box.hi.y;
-  });
+bool is_near(const Box& box, Point2 from, Point2 to, std::int64_t reach) {
+  return std::max(from.x, to.x) + reach >= box.lo.x && std::min(from.x, to.x) - reach <= box.hi.x &&
+         std::max(from.y, to.y) + reach >= box.lo.y && std::min(from.y, to.y) - reach <= box.hi.y;
 }
 
 /// Beads of one layer become slices.
@@ -35,14 +33,30 @@ class SliceCutter {
         raster_({PixelAxis(window.count[0], window.box.width(), window.box.width()),
                  PixelAxis(window.count[1], window.box.depth(), window.box.depth())}) {}
 
+  void clear() { raster_.clear(); }
   /// above  nm, of the slice, over the middle of the layer
-  const Runs& cut(std::span<const LaidBead> beads, std::int64_t height, double above) {
-    raster_.clear();
-    for (const LaidBead& bead : beads) {
-      const Nm width = width_at(bead.width, height, above);
-      const auto at = [&](Point2 p) { return Point2{p.x - origin_.x, p.y - origin_.y}; };
-      if (width > 0) raster_.add(at(bead.from), at(bead.to), width, raster::BeadEnds::kRound);
-    }
+  void add(const LaidBead& bead, std::int64_t height, double above) {
+    const Nm width = width_at(bead.width, height, above);
+    if (width > 0) raster_.add(at(bead.from), at(bead.to), width, raster::BeadEnds::kRound);
+  }
+  void add(const bead::LaidPiece& piece, const bead::PieceSides& sides, std::int64_t height, double above) {
+    const double height_mm = mm(height), above_mm = above * 1e-6;
+    const double left = bead::reach_at(piece, sides.left, height_mm, above_mm);
+    const double right = bead::reach_at(piece, sides.right, height_mm, above_mm);
+    const double from = left >= 0 ? left : 0, to = right >= 0 ? -right : 0;  // leftward of the line
+    const auto width = static_cast<Nm>(std::llround((from - to) * 1e6));
+    if (width <= 0) return;
+    const double x = mm(piece.to.x - piece.from.x), y = mm(piece.to.y - piece.from.y), length = std::hypot(x, y);
+    if (!(length > 0)) return;
+    // Rounded ends of pieces aslant leave gaps of a nanometre: each reaches a little into the next.
+    const double aside = (from + to) / 2 * 1e6 / length, further = 3 / length;
+    const auto moved = [&](Point2 p, double sign) {
+      return at({static_cast<Nm>(std::llround(p.x - y * aside + sign * x * further)),
+                 static_cast<Nm>(std::llround(p.y + x * aside + sign * y * further))});
+    };
+    raster_.add(moved(piece.from, -1), moved(piece.to, 1), width, raster::BeadEnds::kSquare);
+  }
+  const Runs& cut() {
     raster_.runs(image_);
     // Images begin at the back of the bed, windows in front.
     upright_.columns = image_.columns;
@@ -57,9 +71,71 @@ class SliceCutter {
   }
 
  private:
+  Point2 at(Point2 p) const { return {p.x - origin_.x, p.y - origin_.y}; }
+
   Point2 origin_;
   raster::BeadRaster raster_;
   Runs image_, upright_;
+};
+
+/// The beads of one layer, or the pieces that they come to lie as.
+class LayerBeads {
+ public:
+  LayerBeads(const Window& window, const bead::LayRules* rules) : window_(window) {
+    if (rules != nullptr) rules_ = *rules;
+  }
+
+  Status read(const read::GcodeFile& file, const Pile::Layer& layer) {
+    Result<read::GcodeLayer> found = file.layer(layer.index, rules_.has_value());
+    if (!found) return found.error();
+    beads_ = std::move(found->beads);
+    height_ = layer.high - layer.low;
+    if (!rules_) {
+      std::erase_if(beads_, [&](const LaidBead& b) { return !is_near(window_.box, b.from, b.to, b.width); });
+      return {};
+    }
+    keep_lines(found->feeds);
+    rules_->height_mm = mm(height_);
+    bead::lay(beads_, found->feeds, *rules_, pieces_);
+    std::erase_if(pieces_, [&](const bead::LaidPiece& p) { return !is_near(window_.box, p.from, p.to, kNeighbours); });
+    bead::find_contacts(pieces_, rules_->height_mm, sides_);
+    return {};
+  }
+
+  void cut(double above, SliceCutter& cutter) const {
+    if (!rules_)
+      for (const LaidBead& bead : beads_) cutter.add(bead, height_, above);
+    else
+      for (std::size_t i = 0; i < pieces_.size(); ++i) cutter.add(pieces_[i], sides_[i], height_, above);
+  }
+
+ private:
+  static constexpr std::int64_t kNeighbours = 2'000'000;  // nm: what may push those that reach into the window
+  static constexpr std::int64_t kMemory = 10'000'000;     // nm: what the melt has forgotten does not count
+
+  /// Beads far from the window lay nothing there, and the melt remembers nothing of them.
+  void keep_lines(Buffer<BeadFeed>& feeds) {
+    std::size_t kept = 0;
+    bool whole = true;
+    for (std::size_t i = 0; i < beads_.size(); ++i) {
+      const bool near = is_near(window_.box, beads_[i].from, beads_[i].to, kMemory);
+      if (near) {
+        feeds[kept] = feeds[i];
+        feeds[kept].joined = feeds[i].joined && whole && kept > 0;
+        beads_[kept++] = beads_[i];
+      }
+      whole = near;
+    }
+    beads_.resize(kept);
+    feeds.resize(kept);
+  }
+
+  const Window& window_;
+  std::optional<bead::LayRules> rules_;
+  Buffer<LaidBead> beads_;
+  Buffer<bead::LaidPiece> pieces_;
+  Buffer<bead::PieceSides> sides_;
+  std::int64_t height_ = 1;
 };
 
 }  // namespace
@@ -81,7 +157,8 @@ Result<Pile> pile_of(const read::GcodeFile& file) {
   return pile;
 }
 
-Result<VoxelStack> bead_voxels(const read::GcodeFile& file, const Pile& pile, const Window& window) {
+Result<VoxelStack> bead_voxels(const read::GcodeFile& file, const Pile& pile, const Window& window,
+                               const bead::LayRules* rules) {
   const Box& box = window.box;
   const std::array<std::int64_t, 3> side = {box.width(), box.depth(), box.height()};
   std::array<Nm, 3> edge{};
@@ -89,22 +166,19 @@ Result<VoxelStack> bead_voxels(const read::GcodeFile& file, const Pile& pile, co
   VoxelStack stack(window.count[0], window.count[1], edge, window.periodic);
   SliceCutter cutter(window);
   auto layer = pile.layers.begin();
-  Result<read::GcodeLayer> beads = read::GcodeLayer{};
+  LayerBeads beads(window, rules);
   std::int64_t read_low = -1;
   for (std::uint32_t k = 0; k < window.count[2]; ++k) {
     const std::int64_t z = box.lo.z + (2 * std::int64_t{k} + 1) * side[2] / (2 * std::int64_t{window.count[2]});
     while (layer != pile.layers.end() && layer->high <= z) ++layer;
     if (layer != pile.layers.end() && layer->low <= z && layer->low != read_low) {
-      beads = file.layer(layer->index);
-      if (!beads) return beads.error();
+      if (Status status = beads.read(file, *layer); !status) return status.error();
       read_low = layer->low;
-      keep_near(box, beads->beads);
     }
-    const bool within = layer != pile.layers.end() && layer->low <= z;
-    const std::int64_t height = within ? layer->high - layer->low : 1;
-    const double above = within ? static_cast<double>(z) - static_cast<double>(layer->low + layer->high) / 2 : 1;
-    if (!stack.append(
-            cutter.cut(within ? std::span<const LaidBead>(beads->beads) : std::span<const LaidBead>(), height, above)))
+    cutter.clear();
+    if (layer != pile.layers.end() && layer->low <= z)
+      beads.cut(static_cast<double>(z) - static_cast<double>(layer->low + layer->high) / 2, cutter);
+    if (!stack.append(cutter.cut()))
       return Error{Fault::kInput, "the window has too many runs of voxels; take a smaller one or larger voxels"};
   }
   return stack;

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <string>
 
+#include "stages/bead/laid.h"
 #include "stages/data/mesh.h"  // Box
 #include "stages/data/status.h"
 #include "stages/data/voxels.h"
@@ -33,11 +34,15 @@ struct Pile {
 /// cost  reads the file once; 24 bytes a layer
 Result<Pile> pile_of(const read::GcodeFile& file);
 
-/// Cuts the voxels whose centres lie in a bead. A bead is a stadium, as high as its layer and as wide as the file tells, with
-/// round ends; one that is narrower than its layer is high is round, in the middle of its layer.
+/// Cuts the voxels whose centres lie in a bead.
+/// rules   by which beads come to lie as what is fed makes them (stages/bead/laid.h, contacts.h); heights are those of the
+/// pile.
+///         None: a bead is a stadium, as high as its layer and as wide as the file tells, with round ends; one that is narrower
+///         than its layer is high is round, in the middle of its layer; beads keep their widths where they overlap
 /// errors  kUsage: a layer cannot be read; kInput: 2^32 runs and more
 /// cost    O(runs) and reading the window's layers; 8 bytes a run. y of the voxels rises as that of the bed does
-Result<VoxelStack> bead_voxels(const read::GcodeFile& file, const Pile& pile, const Window& window);
+Result<VoxelStack> bead_voxels(const read::GcodeFile& file, const Pile& pile, const Window& window,
+                               const bead::LayRules* rules = nullptr);
 
 /// What of a plan repeats, around a place where it does.
 struct Repeat {

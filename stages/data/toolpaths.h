@@ -211,4 +211,11 @@ struct LaidBead {
   std::uint32_t type;  // what it is for, as the file numbers it
 };
 
+/// What was commanded for one.
+struct BeadFeed {
+  double volume_mm3;  // fed along it
+  double speed_mm_s;  // of the head; 0: untold
+  bool joined;        // it begins where the bead before ended, and nothing was moved in between
+};
+
 }  // namespace lamina

@@ -44,7 +44,7 @@ double missed(const RunsView& image, bool columns, std::uint32_t shift, double s
 std::uint32_t period(const RunsView& image, bool columns, std::uint32_t least, double miss) {
   const double share = static_cast<double>(set_pixels(image)) / (static_cast<double>(image.columns) * image.rows());
   if (!(share > 0 && share < 1)) return 0;
-  const std::uint32_t most = (columns ? image.columns : image.rows()) / 3;
+  const std::uint32_t most = (columns ? image.columns : image.rows()) / 5 * 2;
   least = std::max(least, 1u);
   if (most < least) return 0;
   std::vector<double> at(most + std::size_t{1} - least);

@@ -10,7 +10,7 @@ namespace lamina::pores {
 /// The smallest shift along an axis of an image, in pixels, at which nearly all of it covers itself.
 ///
 /// columns  the shift is along rows, else across them
-/// least    shifts below this are not looked at, nor those above a third of the image: three periods have to be there
+/// least    shifts below this are not looked at, nor those above a two fifths of the image: three periods have to be there
 /// miss     share of the set pixels that may differ, and no more than 15 % of what differs at the worst shift; of several
 /// shifts
 ///          in a row that pass, the one that differs least is taken

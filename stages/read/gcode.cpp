@@ -126,6 +126,7 @@ void GcodeSurvey::take_filament() {
   if (facts.filament_mm > 0) file_.filament_mm_ = facts.filament_mm;
   if (options_.filament_mm > 0) file_.filament_mm_ = options_.filament_mm;
   file_.volumetric_ = facts.volumetric;
+  file_.machine_ = facts.machine;
 }
 
 /// Over the length of all beads whose widths no tag tells; 0 if there is none.
@@ -202,7 +203,7 @@ Result<GcodeFile> GcodeFile::read(FileReader& reader, const GcodeOptions& option
   return GcodeSurvey(reader, options).run();
 }
 
-Result<GcodeLayer> GcodeFile::layer(std::uint32_t index) const {
+Result<GcodeLayer> GcodeFile::layer(std::uint32_t index, bool with_feeds) const {
   if (index >= count()) return Error{Fault::kUsage, fmt::format("--layer {}: the file has layers 0 to {}", index, count() - 1)};
   std::vector<std::string> types = types_;
   const Error changed{Fault::kUsage, fmt::format("{}: has changed while it was drawn; draw it again", path_)};
@@ -221,6 +222,7 @@ Result<GcodeLayer> GcodeFile::layer(std::uint32_t index) const {
     const double unit = volume_of_unit(raw->volumetric || volumetric_, filament_mm_);
     const double width = width_of(*raw, height_of(*raw, now.height, place.height, place.below), unit);
     layer.beads.push_back(bead_of(*raw, now.width > 0 ? now.width : width, now.type));
+    if (with_feeds) layer.feeds.push_back({raw->fed * unit, raw->speed, raw->joined});
   }
   if (walk.fault || types.size() != types_.size() || layer.beads.size() != place.beads) return changed;
   // A layer in which nothing is laid is where the nozzle is at its end.

@@ -24,6 +24,7 @@ using GcodeBead = LaidBead;
 struct GcodeLayer {
   std::int64_t z = 0;  // nm, of the nozzle at the first bead; without beads about there
   Buffer<GcodeBead> beads;
+  Buffer<BeadFeed> feeds;  // one for each bead, if they are asked for
 };
 
 struct GcodeOptions {
@@ -59,10 +60,13 @@ class GcodeFile {
   bool tells_widths() const { return tells_widths_; }
   double filament_mm() const { return filament_mm_; }  // diameter
   bool tells_filament() const { return tells_filament_; }
+  /// The printer's name, as lamina's files tell it; "" of others.
+  const std::string& machine() const { return machine_; }
   /// What a person should know of the drawing, one line each: thin beads, spirals, arcs on which firmwares differ.
   const std::vector<std::string>& notes() const { return notes_; }
   /// errors  kUsage: no such layer, the file has changed
-  Result<GcodeLayer> layer(std::uint32_t index) const;
+  /// with_feeds  33 bytes a bead more
+  Result<GcodeLayer> layer(std::uint32_t index, bool with_feeds = false) const;
 
   /// Decides what G90 and G91 mean for E.
   enum class Firmware : std::uint8_t { kUntold, kMarlin, kRepRap };
@@ -71,12 +75,14 @@ class GcodeFile {
     std::uint64_t byte = 0, line = 0;
     double at[4] = {};                             // x, y, z, e: in the file's own units
     double unit = 1;                               // mm
+    double speed = 0;                              // mm/s; 0 until a line tells it
     bool relative = false, relative_feed = false;  // G91, M83
     Firmware firmware = Firmware::kUntold;         // of the tag ;FLAVOR:
     bool volumetric = false;                       // M200: E counts mm3
     std::uint8_t plane = 17;                       // of arcs: G17, G18, G19
     double width = 0, height = 0;                  // mm: tags, 0 without
     std::uint32_t type = 0;
+    bool lays = false;  // the last move laid a bead
   };
   /// Where a layer begins, and how high its beads are where no tag tells it.
   struct LayerPlace {
@@ -90,6 +96,7 @@ class GcodeFile {
   std::string path_;
   std::vector<LayerPlace> layers_;
   std::vector<std::string> types_{""}, notes_;
+  std::string machine_;
   Box box_;
   bool tells_widths_ = false, tells_filament_ = false, volumetric_ = false;
   double filament_mm_ = 1.75;

@@ -3,6 +3,7 @@
 
 #include <numbers>
 
+#include "pipeline/calibrate/bead_rules.h"
 #include "pipeline/calibrate/bead_voxels.h"
 #include "pipeline/calibrate/pore_page.h"
 #include "pipeline/calibrate/predict_flow.h"
@@ -41,6 +42,13 @@ CommandSpec permeability_spec() {
       {"--convention", "NAME", "dinisio2022: what reproduces Table 25 of that document", "", "Fluid", {"dinisio2022"}},
       {"--window", "X,Y,Z", "mm of a print to look at; default: what repeats, else 2,2 and eight layers", "", "Toolpaths"},
       {"--voxel", "UM", "edge of a voxel, micrometres", "10", "Toolpaths"},
+      {"--beads",
+       "WORD",
+       "laid: as the printer's melt lags and spreads; told: as wide as the file tells; default: laid by known printers",
+       "",
+       "Toolpaths",
+       {"laid", "told"}},
+      {"--machine", "NAME", "printer that lays them; default: the one that the file names", "", "Toolpaths"},
       {"--memory", "SIZE", "that the flow may take, as in 2G", "1G", "Toolpaths"},
       {"--plot", "FILE", "draw points and parabola, as .svg or .png", "", "Result"},
       {"--overwrite", "", "replace a file that lamina did not write", "", "Result"},
@@ -157,9 +165,12 @@ Outcome predict(const Arguments& arguments, Context& context) {
   if (!wish) return wish.error();
   const Result<WindowChoice> choice = choose_window(*file, *pile, *wish);
   if (!choice) return choice.error();
-  const Result<VoxelStack> fine = bead_voxels(*file, *pile, choice->window);
+  const Result<BeadRules> beads = bead_rules(*file, arguments.text("--beads"), arguments.text("--machine"));
+  if (!beads) return beads.error();
+  const bead::LayRules* rules = beads->rules ? &*beads->rules : nullptr;
+  const Result<VoxelStack> fine = bead_voxels(*file, *pile, choice->window, rules);
   if (!fine) return fine.error();
-  const Result<VoxelStack> coarse = bead_voxels(*file, *pile, with_half_as_many_voxels(choice->window));
+  const Result<VoxelStack> coarse = bead_voxels(*file, *pile, with_half_as_many_voxels(choice->window), rules);
   if (!coarse) return coarse.error();
   const std::atomic<bool>& cancel = context.cancel();
   const Result<PoreReport> report = look_at_pores(*fine, *coarse, request, [&](double) { return !cancel; });
@@ -173,7 +184,7 @@ Outcome predict(const Arguments& arguments, Context& context) {
     if (darcy && !darcy->resolved) context.say("note: voxels are too coarse for the pores; take a smaller --voxel");
     if (darcy && darcy->residual > 1e-2) context.say("note: the flow was not solved to its end; take a smaller --window");
   }
-  if (!file->tells_widths()) context.say("note: the file tells no widths; they are those of what it feeds");
+  context.say(beads->told);
   return arguments.has("--json") ? context.give(as_json(*choice, *report)) : context.print(as_text(*choice, *report));
 }
 
@@ -186,7 +197,7 @@ bool is_gcode(const std::string& path) {
 Outcome run_permeability(const Arguments& arguments, Context& context) {
   if (arguments.operands.size() != 1) return Error{Fault::kUsage, "name one file of measurements, or of toolpaths"};
   if (is_gcode(arguments.operands.front())) return predict(arguments, context);
-  for (const char* flag : {"--window", "--voxel", "--memory"})
+  for (const char* flag : {"--window", "--voxel", "--beads", "--machine", "--memory"})
     if (arguments.has(flag))
       return Error{Fault::kUsage, fmt::format("{} is for toolpaths, not for tables of measurements", flag)};
   return fit_table(arguments, context);

@@ -190,12 +190,18 @@ bool GcodeCommands::move(double code, const Words& words, std::optional<RawBead>
     if (words.has(kAxes[k])) to[k] = (relative ? place_.at[k] : 0) + words[kAxes[k]] * place_.unit;
   }
   const double fed = code != 92 ? to[3] - place_.at[3] : 0;
+  if (code != 92 && words.has('F')) place_.speed = std::max(words['F'] * place_.unit / 60, 0.0);
+  const bool joined = place_.lays;
+  if (code != 92) place_.lays = place_.lays && std::equal(std::begin(to), std::end(to), place_.at);
   if (code == 2 || code == 3) {
     if (!begin_arc(code == 2, words, to, fed)) return false;
+    whole_.joined = joined;
+    place_.lays = chord_ > 0;
   } else if (fed > 0 && (to[0] != place_.at[0] || to[1] != place_.at[1])) {
     const double* at = place_.at;
-    bead = RawBead{{at[0], at[1], at[2]}, {to[0], to[1], to[2]}, fed, place_.volumetric, true};
+    bead = RawBead{{at[0], at[1], at[2]}, {to[0], to[1], to[2]}, fed, place_.volumetric, place_.speed, joined, true};
     if (!within_reach(*bead)) return false;
+    place_.lays = true;
   }
   std::copy(std::begin(to), std::end(to), place_.at);
   return bead.has_value() || (chord_ > 0 && next_chord(bead));
@@ -224,7 +230,7 @@ bool GcodeCommands::begin_arc(bool clockwise, const Words& words, const double (
   }
   if (arc_.miss() > 0.05) off_circle.add(place_.line);
   if (arc_.radius_short()) short_radius.add(place_.line);
-  whole_ = {{at[0], at[1], at[2]}, {to[0], to[1], to[2]}, fed, place_.volumetric, true};
+  whole_ = {{at[0], at[1], at[2]}, {to[0], to[1], to[2]}, fed, place_.volumetric, place_.speed, false, true};
   chord_ = 1;
   return true;
 }
@@ -238,10 +244,17 @@ bool GcodeCommands::next_chord(std::optional<RawBead>& bead) {
   const Arc::Place from = chord_ == 1 ? Arc::Place{whole_.from[0], whole_.from[1]} : arc_.end_of(chord_ - 1);
   const Arc::Place to = arc_.end_of(chord_);
   const double fed = whole_.fed / static_cast<double>(arc_.chords());
-  RawBead piece{{from.x, from.y, z_of(chord_ - 1)}, {to.x, to.y, z_of(chord_)}, fed, whole_.volumetric, whole_.first};
+  RawBead piece{{from.x, from.y, z_of(chord_ - 1)},
+                {to.x, to.y, z_of(chord_)},
+                fed,
+                whole_.volumetric,
+                whole_.speed,
+                whole_.joined,
+                whole_.first};
   chord_ = chord_ < arc_.chords() ? chord_ + 1 : 0;
   if (from.x == to.x && from.y == to.y) return false;
   whole_.first = false;
+  whole_.joined = true;
   if (!within_reach(piece)) return false;
   bead = piece;
   return true;

@@ -18,6 +18,8 @@ struct RawBead {
   double from[3], to[3];
   double fed;             // mm of filament, or mm3
   bool volumetric;        // fed is mm3
+  double speed;           // mm/s
+  bool joined;            // BeadFeed
   bool first;             // of its line
   double length() const;  // over the bed
 };

@@ -137,6 +137,7 @@ void SlicerFacts::read_setting(std::string_view comment) {
 
 void SlicerFacts::read(std::string_view comment) {
   constexpr std::string_view kProfile = ";CURA_PROFILE_STRING:", kFlavor = ";FLAVOR:", kUsed = ";Filament used:";
+  constexpr std::string_view kMachine = "; machine: ";
   constexpr std::string_view kCuraSettings = ";SETTING_3 ", kMaterial = "material_diameter = ";
   if (comment.starts_with(kProfile)) {
     if (source_ < Source::kProfile) {
@@ -147,6 +148,8 @@ void SlicerFacts::read(std::string_view comment) {
     read_flavor(comment.substr(kFlavor.size()));
   } else if (comment.starts_with(kUsed)) {
     read_weight(comment.substr(kUsed.size()));
+  } else if (comment.starts_with(kMachine)) {
+    if (machine.empty()) machine = comment.substr(kMachine.size(), 100);
   } else if (comment.starts_with(kCuraSettings)) {
     const std::size_t at = comment.find(kMaterial);
     if (at != std::string_view::npos) tell_filament(leading_number(comment.substr(at + kMaterial.size())), Source::kProfile);

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <string>
 #include <string_view>
 
 namespace lamina::read {
@@ -17,10 +18,12 @@ namespace lamina::read {
 ///     ;Filament used: 1.3m 9.1g            Cura up to 15.04: what a metre weighs tells 1.75 mm from 2.85 mm
 ///     ;FLAVOR:Griffin                      CuraEngine: printers for 2.85 mm
 ///     ;FLAVOR:UltiGCode                    CuraEngine: E counts mm3; so does "; use_volumetric_e = 1" of PrusaSlicer
+///     ; machine: Anet A8                   lamina
 struct SlicerFacts {
   double filament_mm = 0;  // diameter; 0 if untold
   double nozzle_mm = 0;    // 0 if untold
   bool volumetric = false;
+  std::string machine;  // a name, at most 100 characters; empty if untold
 
   /// Takes a line that begins with a semicolon.
   void read(std::string_view comment);

@@ -140,6 +140,7 @@ constexpr Key<Profile> kKeys[] = {
                                                                                                   Form::kString),
     field<kMachine, &Extruder::material, &Material::flow>({"material", "flow"}, {0.01, 10}),
     field<kMachine, &Extruder::material, &Material::feed_ratio>({"material", "feed_ratio"}, {0.1, 10}),
+    field<kMachine, &Extruder::material, &Material::lag_s>({"material", "lag_s"}, {0, 10, " s"}),
     field<kMachine, &Extruder::material, &Material::nozzle_degc>({"material", "nozzle_degc"}, kNozzle),
     field<kMachine, &Extruder::material, &Material::bed_degc>({"material", "bed_degc"}, kPlate),
     field<kMachine, &Extruder::material, &Material::first_nozzle_degc>({"material", "first_nozzle_degc"}, kNozzle),

@@ -105,6 +105,25 @@ TEST(PredictedFlow, CrossedLinesLeadAlikeAlongXAndY) {
   EXPECT_DOUBLE_EQ(report.porosity.total(), report.porosity.percolating(2));
 }
 
+/// 1 mm of filament of 1.75 mm on 15.2 mm, in the middle of lines that the melt's lag does not reach.
+TEST(PredictedFlow, WhatIsFedIsLaid) {
+  test::Directory folder;
+  write_lines(folder / "lines.gcode", false);
+  const Laid lines = laid(folder / "lines.gcode");
+  bead::LayRules rules;
+  rules.machine.tau_s = 0.046;
+  rules.machine.acceleration_mm_s2 = 400;
+  const double area = std::numbers::pi / 4 * 1.75 * 1.75 / 15.2;
+  for (const double spacing : {kSpacing, 2 * kSpacing}) {
+    pipeline::Window window = period_around(lines, 1, {160, 16, 120});
+    window.box.hi.x = window.box.lo.x + static_cast<Nm>(spacing * 1e6);
+    const Result<VoxelStack> voxels = pipeline::bead_voxels(lines.file, lines.pile, window, &rules);
+    ASSERT_TRUE(voxels.ok());
+    const double solid = static_cast<double>(set_voxels(*voxels)) / static_cast<double>(window.voxels());
+    EXPECT_NEAR(solid, area / (kSpacing * kHeight), 0.003);
+  }
+}
+
 TEST(PredictedFlow, AWindowThatDoesNotFitTheMemoryIsRefusedWithVoxelsThatDo) {
   test::Directory folder;
   write_lines(folder / "lines.gcode", false);

@@ -1,0 +1,111 @@
+#include "stages/bead/laid.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+
+#include "stages/bead/line.h"
+#include "stages/bead/spread.h"
+
+namespace lamina::bead {
+namespace {
+
+constexpr double kFarthest = 1.5;  // mm: what is wider than 3 mm spreads so far
+
+double length_of(const LaidBead& bead) { return std::hypot(mm(bead.to.x - bead.from.x), mm(bead.to.y - bead.from.y)); }
+
+/// The beads of one line and how far along it each begins.
+class Line {
+ public:
+  explicit Line(const LayRules& rules) : rules_(rules), spread_(rules.height_mm, rules.piece_mm, kFarthest) {}
+
+  void lay(std::span<const LaidBead> beads, std::span<const BeadFeed> feeds, Buffer<LaidPiece>& out);
+
+ private:
+  double speed_of(const BeadFeed& feed) const { return feed.speed_mm_s > 0 ? feed.speed_mm_s : rules_.usual_mm_s; }
+  double speed_between(std::size_t i) const;
+  Point2 at(std::size_t bead, double place) const;
+  void put(const SpreadCell& cell, Buffer<LaidPiece>& out);
+
+  const LayRules& rules_;
+  BeadSpread spread_;
+  std::span<const LaidBead> beads_;
+  std::span<const BeadFeed> feeds_;
+  Buffer<double> begin_;  // mm, one more than beads
+  std::size_t here_ = 0;  // the bead that the last piece lies on
+};
+
+/// The speed with which the head goes from bead i to the next.
+double Line::speed_between(std::size_t i) const {
+  const LaidBead &a = beads_[i], &b = beads_[i + 1];
+  const double across = mm(a.to.x - a.from.x) * mm(b.to.y - b.from.y) - mm(a.to.y - a.from.y) * mm(b.to.x - b.from.x);
+  const double along = mm(a.to.x - a.from.x) * mm(b.to.x - b.from.x) + mm(a.to.y - a.from.y) * mm(b.to.y - b.from.y);
+  const double bend = 2 * std::sin(std::abs(std::atan2(across, along)) / 2);  // change of velocity / speed
+  return std::min({speed_of(feeds_[i]), speed_of(feeds_[i + 1]), bend > 0 ? rules_.corner_mm_s / bend : HUGE_VAL});
+}
+
+Point2 Line::at(std::size_t bead, double place) const {
+  const LaidBead& on = beads_[bead];
+  const double length = begin_[bead + 1] - begin_[bead];
+  const double share = length > 0 ? (place - begin_[bead]) / length : 0;
+  const auto between = [share](Nm a, Nm b) { return static_cast<Nm>(std::llround(a + share * (static_cast<double>(b) - a))); };
+  return {between(on.from.x, on.to.x), between(on.from.y, on.to.y)};
+}
+
+void Line::put(const SpreadCell& cell, Buffer<LaidPiece>& out) {
+  if (!(cell.volume_mm3 > 0)) return;
+  for (double from = cell.begin_mm; from < cell.end_mm;) {
+    while (here_ + 1 < beads_.size() && begin_[here_ + 1] <= from) ++here_;
+    const double to = here_ + 1 < beads_.size() ? std::min(cell.end_mm, begin_[here_ + 1]) : cell.end_mm;
+    out.push_back({at(here_, from), at(here_, to), cell.area_mm2, cell.width_mm});
+    from = to;
+  }
+}
+
+void Line::lay(std::span<const LaidBead> beads, std::span<const BeadFeed> feeds, Buffer<LaidPiece>& out) {
+  beads_ = beads;
+  feeds_ = feeds;
+  here_ = 0;
+  begin_.assign(1, 0);
+  for (const LaidBead& bead : beads) begin_.push_back(begin_.back() + length_of(bead));
+  const auto area = [&](std::size_t i) {
+    const double length = begin_[i + 1] - begin_[i];
+    return length > 0 ? feeds[i].volume_mm3 * rules_.feed_ratio / length : 0;
+  };
+  const TakeCell cell = [&](const SpreadCell& c) { put(c, out); };
+  double moved = 0;  // along the line, where the stretch that is under way began
+  const TakePiece piece = [&](BeadPiece p) {
+    p.begin_mm += moved;
+    p.end_mm += moved;
+    spread_.add(p, cell);
+  };
+  BeadLine line(rules_.machine, rules_.height_mm);
+  const double first = std::min(speed_of(feeds[0]), rules_.corner_mm_s);
+  Joint joint{first, first * area(0), true};
+  for (std::size_t i = 0; i < beads.size(); ++i) {
+    if (i == 0) line.begin(joint);
+    line.add({begin_[i + 1] - begin_[i], area(i), speed_of(feeds[i])}, piece);
+    const bool last = i + 1 == beads.size();
+    const double next = last ? std::min(speed_of(feeds[i]), rules_.corner_mm_s) : speed_between(i);
+    if (!last && next >= std::min(speed_of(feeds[i]), speed_of(feeds[i + 1]))) continue;
+    joint = line.end(next, piece);
+    moved = begin_[i + 1];
+    if (!last) line.begin(joint);
+  }
+  spread_.end(cell);
+}
+
+}  // namespace
+
+void lay(std::span<const LaidBead> beads, std::span<const BeadFeed> feeds, const LayRules& rules, Buffer<LaidPiece>& out) {
+  out.clear();
+  Line line(rules);
+  for (std::size_t i = 0; i < beads.size();) {
+    std::size_t end = i + 1;
+    while (end < beads.size() && feeds[end].joined) ++end;
+    line.lay(beads.subspan(i, end - i), feeds.subspan(i, end - i), out);
+    i = end;
+  }
+}
+
+}  // namespace lamina::bead

@@ -1,0 +1,37 @@
+// stages/bead/laid.h: the beads of a layer as they come to lie, predicted from what a toolpath file commands.
+//
+// A line is what is laid without a stop: it is fed along its whole way (line.h) and spreads along it (spread.h). At a bend the
+// head slows down to the speed at which the change of its velocity is that which the machine makes at once (the classic jerk
+// of Marlin's planner). Assumed: behind a travel the flow is that of the speed with which a line begins. Retractions are made
+// for that, and nothing is known of how well they do.
+#pragma once
+
+#include <span>
+
+#include "stages/bead/machine.h"
+#include "stages/data/buffer.h"
+#include "stages/data/toolpaths.h"
+
+namespace lamina::bead {
+
+struct LayRules {
+  BeadMachine machine;     // its area does not count: what is fed does
+  double corner_mm_s = 8;  // the change of velocity that is made at once, > 0
+  double feed_ratio = 1;   // what is fed / what is commanded
+  double height_mm = 0.2;  // of the layer, > 0
+  double piece_mm = 0.02;  // length of pieces, > 0
+  double usual_mm_s = 40;  // of beads whose speed the file does not tell
+};
+
+/// A piece of a bead that is straight and has one cross-section.
+struct LaidPiece {
+  Point2 from, to;            // nm on the bed
+  double area_mm2, width_mm;  // alone: of the bead that nothing is beside
+};
+
+/// beads, feeds  of one layer, in the order of printing, as many of each
+/// out           pieces in the same order. Those of round ends reach beyond the line
+/// cost          some ten thousand arc sines for a mm of line
+void lay(std::span<const LaidBead> beads, std::span<const BeadFeed> feeds, const LayRules& rules, Buffer<LaidPiece>& out);
+
+}  // namespace lamina::bead

@@ -1,0 +1,129 @@
+// The beads of a layer as a file commands them: what is fed is laid, where the line leads.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <vector>
+
+#include "stages/bead/laid.h"
+#include "stages/bead/pattern.h"
+#include "stages/bead/section.h"
+
+namespace lamina::bead {
+namespace {
+
+constexpr double kLayerHeight = 0.3, kArea = 0.102, kLag = 0.046;  // mm, mm2, s
+
+LayRules rules_at(double acceleration) { return {{0, kLag, acceleration}, 8, 1, kLayerHeight, 0.02, 15}; }
+
+/// A line through places, mm, of one cross-section or of one for each piece of the way.
+struct Way {
+  Buffer<LaidBead> beads;
+  Buffer<BeadFeed> feeds;
+
+  void add(double x0, double y0, double x1, double y1, double speed, double area, bool joined) {
+    const auto at = [](double x, double y) {
+      return Point2{static_cast<Nm>(std::lround(x * 1e6)), static_cast<Nm>(std::lround(y * 1e6))};
+    };
+    beads.push_back({at(x0, y0), at(x1, y1), 400'000, 0});
+    feeds.push_back({area * std::hypot(x1 - x0, y1 - y0), speed, joined});
+  }
+};
+
+Buffer<LaidPiece> lay(const Way& way, const LayRules& rules) {
+  Buffer<LaidPiece> pieces;
+  lay(way.beads, way.feeds, rules, pieces);
+  return pieces;
+}
+
+double length_of(const LaidPiece& piece) { return std::hypot(mm(piece.to.x - piece.from.x), mm(piece.to.y - piece.from.y)); }
+double volume_of(const Buffer<LaidPiece>& pieces) {
+  double sum = 0;
+  for (const LaidPiece& piece : pieces) sum += piece.area_mm2 * length_of(piece);
+  return sum;
+}
+
+TEST(LaidBeads, AnEvenLineIsWhatIsFedAndItsMelt) {
+  Way way;
+  way.add(1, 2, 21, 2, 15, kArea, false);
+  const auto pieces = lay(way, rules_at(INFINITY));
+  // From the corner's speed on the head goes faster at once: what comes late is what the lag holds in addition.
+  EXPECT_NEAR(volume_of(pieces), 20 * kArea - kLag * kArea * (15 - 8), 1e-4);
+  for (const LaidPiece& piece : pieces) {
+    EXPECT_EQ(piece.from.y, 2'000'000);
+    if (mm(piece.from.x) > 10 && mm(piece.to.x) < 20) {
+      EXPECT_NEAR(piece.width_mm, bead_width(kArea, kLayerHeight), 3e-4);
+    }
+  }
+  EXPECT_LT(pieces.front().from.x, 1'000'000) << "round ends reach out";
+  EXPECT_GT(pieces.back().to.x, 21'000'000);
+}
+
+TEST(LaidBeads, AWayRoundCornersKeepsItsVolumeAndSlowsDownThere) {
+  Way way;
+  way.add(0, 0, 10, 0, 30, kArea, false);
+  way.add(10, 0, 10, 10, 30, kArea, true);
+  way.add(10, 10, 20, 10, 30, kArea, true);
+  way.add(20, 10, 30, 10, 8, kArea, true);
+  const auto slow = lay(way, rules_at(400)), free = lay(way, rules_at(INFINITY));
+  double widest_slow = 0, widest_free = 0;
+  for (const LaidPiece& p : slow)
+    if (p.from.y > 1'000'000 && p.from.y < 9'999'000) widest_slow = std::max(widest_slow, p.width_mm);
+  for (const LaidPiece& p : free)
+    if (p.from.y > 1'000'000 && p.from.y < 9'999'000) widest_free = std::max(widest_free, p.width_mm);
+  EXPECT_GT(widest_slow, 1.05 * bead_width(kArea, kLayerHeight)) << "melt that was on its way comes while the head brakes";
+  EXPECT_GT(widest_slow, 1.01 * widest_free);
+  // It ends as it began, slowly: what is held is the same.
+  EXPECT_NEAR(volume_of(slow), 40 * kArea, 1e-4);
+  EXPECT_NEAR(volume_of(free), 40 * kArea, 1e-4);
+}
+
+TEST(LaidBeads, APatternSettlesOnTheWidthsOfItsSteadyState) {
+  Way way;
+  for (int i = 0; i < 8; ++i) {
+    way.add(0, 3 * i, 0, 3 * i + 1.5, 11.25, kArea, i > 0);
+    way.add(0, 3 * i + 1.5, 0, 3 * i + 3, 30, kArea, true);
+  }
+  const LayRules rules = rules_at(400);
+  const PatternWidths steady = steady_widths({kArea, kLag, 400}, kLayerHeight, {1.5, 1.5, 100, 11.25, 30}, true);
+  double least = 1, most = 0;
+  for (const LaidPiece& piece : lay(way, rules)) {
+    if (piece.from.y < 15'000'000 || piece.to.y > 18'000'000) continue;
+    least = std::min(least, piece.width_mm);
+    most = std::max(most, piece.width_mm);
+  }
+  EXPECT_NEAR(least, steady.thin.least, 2e-3);
+  EXPECT_NEAR(most, steady.thick.largest, 2e-3);
+}
+
+TEST(LaidBeads, LinesThatAreNotJoinedDoNotKnowOfEachOther) {
+  Way one, other, both;
+  one.add(0, 0, 5, 0, 15, kArea, false);
+  other.add(5, 1, 0, 1, 30, 0.8 * kArea, false);
+  both.add(0, 0, 5, 0, 15, kArea, false);
+  both.add(5, 1, 0, 1, 30, 0.8 * kArea, false);
+  const LayRules rules = rules_at(400);
+  const auto first = lay(one, rules), second = lay(other, rules), together = lay(both, rules);
+  ASSERT_EQ(together.size(), first.size() + second.size());
+  for (std::size_t i = 0; i < together.size(); ++i) {
+    const LaidPiece& alone = i < first.size() ? first[i] : second[i - first.size()];
+    EXPECT_EQ(together[i].width_mm, alone.width_mm);
+    EXPECT_EQ(together[i].from, alone.from);
+  }
+}
+
+TEST(LaidBeads, BeadsWithoutLengthSpeedOrFeedDoNoHarm) {
+  Way way;
+  way.add(0, 0, 1, 0, 0, kArea, false);
+  way.add(1, 0, 1, 0, 15, kArea, true);
+  way.add(1, 0, 2, 0, 1e-3, kArea, true);
+  way.add(2, 0, 3, 0, 15, 0, true);
+  way.add(3, 0, 3, 0, 15, 0, true);
+  for (const LaidPiece& piece : lay(way, rules_at(400))) {
+    EXPECT_TRUE(std::isfinite(piece.area_mm2) && std::isfinite(piece.width_mm));
+    EXPECT_GE(piece.from.x, -2'000'000);
+    EXPECT_LE(piece.to.x, 5'000'000);
+  }
+}
+
+}  // namespace
+}  // namespace lamina::bead
