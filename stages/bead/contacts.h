@@ -26,7 +26,7 @@ struct PieceSides {
 /// height_mm  of the layer
 /// sides      one for each piece
 /// returns    mm3 that found no room and are left out
-/// cost       O(pieces x pieces within the widest bead's width of one), parallel; 36 bytes a piece. Same for any threads
+/// cost       O(pieces x pieces within the widest bead's width of one), parallel; 100 bytes a piece. Same for any threads
 double find_contacts(std::span<const LaidPiece> pieces, double height_mm, Buffer<PieceSides>& sides);
 
 /// How far a side reaches at a height over or below the middle of the layer, mm; below 0: not at all.

@@ -10,7 +10,9 @@
 namespace lamina::bead {
 namespace {
 
-constexpr double kFarthest = 1.5;  // mm: what is wider than 3 mm spreads so far
+constexpr double kFarthest = 1.5;                       // mm: what is wider than 3 mm spreads so far
+constexpr double kWidest = 3;                           // mm
+constexpr double kLeastSpeed = 0.01, kMostSpeed = 1e4;  // mm/s: a file may say anything
 
 double length_of(const LaidBead& bead) { return std::hypot(mm(bead.to.x - bead.from.x), mm(bead.to.y - bead.from.y)); }
 
@@ -22,7 +24,9 @@ class Line {
   void lay(std::span<const LaidBead> beads, std::span<const BeadFeed> feeds, Buffer<LaidPiece>& out);
 
  private:
-  double speed_of(const BeadFeed& feed) const { return feed.speed_mm_s > 0 ? feed.speed_mm_s : rules_.usual_mm_s; }
+  double speed_of(const BeadFeed& feed) const {
+    return feed.speed_mm_s > 0 ? std::clamp(feed.speed_mm_s, kLeastSpeed, kMostSpeed) : rules_.usual_mm_s;
+  }
   double speed_between(std::size_t i) const;
   Point2 at(std::size_t bead, double place) const;
   void put(const SpreadCell& cell, Buffer<LaidPiece>& out);
@@ -57,7 +61,7 @@ void Line::put(const SpreadCell& cell, Buffer<LaidPiece>& out) {
   for (double from = cell.begin_mm; from < cell.end_mm;) {
     while (here_ + 1 < beads_.size() && begin_[here_ + 1] <= from) ++here_;
     const double to = here_ + 1 < beads_.size() ? std::min(cell.end_mm, begin_[here_ + 1]) : cell.end_mm;
-    out.push_back({at(here_, from), at(here_, to), cell.area_mm2, cell.width_mm});
+    out.push_back({at(here_, from), at(here_, to), cell.area_mm2, std::min(cell.width_mm, kWidest)});
     from = to;
   }
 }
@@ -70,7 +74,7 @@ void Line::lay(std::span<const LaidBead> beads, std::span<const BeadFeed> feeds,
   for (const LaidBead& bead : beads) begin_.push_back(begin_.back() + length_of(bead));
   const auto area = [&](std::size_t i) {
     const double length = begin_[i + 1] - begin_[i];
-    return length > 0 ? feeds[i].volume_mm3 * rules_.feed_ratio / length : 0;
+    return length > 0 ? std::min(feeds[i].volume_mm3 * rules_.feed_ratio / length, kWidest * rules_.height_mm) : 0;
   };
   const TakeCell cell = [&](const SpreadCell& c) { put(c, out); };
   double moved = 0;  // along the line, where the stretch that is under way began

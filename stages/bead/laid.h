@@ -30,7 +30,7 @@ struct LaidPiece {
 };
 
 /// beads, feeds  of one layer, in the order of printing, as many of each
-/// out           pieces in the same order. Those of round ends reach beyond the line
+/// out           pieces in the same order, no wider than 3 mm. Those of round ends reach beyond the line
 /// cost          some ten thousand arc sines for a mm of line
 void lay(std::span<const LaidBead> beads, std::span<const BeadFeed> feeds, const LayRules& rules, Buffer<LaidPiece>& out);
 

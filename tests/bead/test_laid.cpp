@@ -118,10 +118,13 @@ TEST(LaidBeads, BeadsWithoutLengthSpeedOrFeedDoNoHarm) {
   way.add(1, 0, 2, 0, 1e-3, kArea, true);
   way.add(2, 0, 3, 0, 15, 0, true);
   way.add(3, 0, 3, 0, 15, 0, true);
+  way.add(3, 0, 4, 0, 1e300, 1e300, true);
+  way.add(4, 0, 5, 0, 1e-300, 1e300, true);
   for (const LaidPiece& piece : lay(way, rules_at(400))) {
     EXPECT_TRUE(std::isfinite(piece.area_mm2) && std::isfinite(piece.width_mm));
     EXPECT_GE(piece.from.x, -2'000'000);
-    EXPECT_LE(piece.to.x, 5'000'000);
+    EXPECT_LE(piece.to.x, 7'000'000);
+    EXPECT_LE(piece.width_mm, 3);
   }
 }
 
