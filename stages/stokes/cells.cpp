@@ -3,11 +3,11 @@
 #include <algorithm>
 #include <utility>
 
+#include "stages/stokes/sums.h"
+#include "stages/stokes/walls.h"
+
 namespace lamina::stokes {
 namespace {
-
-/// Where a cell, or a group, lies: in voxels, or in groups of its level.
-using Place = std::array<std::uint32_t, 3>;
 
 /// Calls visit(row, begin, end) for all stretches of void.
 template <class Visit>
@@ -86,27 +86,6 @@ void join(const VoxelView& solid, const Stretches& stretches, Cells& cells) {
   }
 }
 
-std::uint16_t kind_of(const Cells& cells, std::uint32_t i) {
-  const std::uint32_t none = cells.size();
-  std::uint32_t kind = 0;
-  for (int a = 2; a >= 0; --a) {
-    const std::uint32_t above = cells.neighbour[i][2 * a + 1];
-    std::uint32_t digit = 9;
-    if (above != none) {
-      digit = 0;
-      for (int k = 1; k < 3; ++k) {
-        const int b = (a + k) % 3;
-        for (int side = 0; side < 2; ++side) {
-          const bool wall = cells.neighbour[i][2 * b + side] == none && cells.neighbour[above][2 * b + side] == none;
-          digit += wall ? (k == 1 ? 1u : 3u) : 0u;
-        }
-      }
-    }
-    kind = 10 * kind + digit;
-  }
-  return static_cast<std::uint16_t>(kind);
-}
-
 Buffer<Place> places_of(const VoxelView& solid) {
   Buffer<Place> places;
   for_each_void(solid, [&](std::size_t r, std::uint32_t begin, std::uint32_t end) {
@@ -114,6 +93,44 @@ Buffer<Place> places_of(const VoxelView& solid) {
     for (std::uint32_t x = begin; x < end; ++x) places.push_back({x, y, z});
   });
   return places;
+}
+
+/// Voxels without an open face.
+VoxelStack where_nothing_passes(const Walls& walls, const VoxelView& fine) {
+  const auto [nx, ny, nz] = walls.size();
+  VoxelStack solid(nx, ny, fine.edge, fine.periodic);
+  Runs slice;
+  slice.columns = nx;
+  for (std::uint32_t z = 0; z < nz; ++z) {
+    slice.row_offset.assign(1, 0);
+    slice.change.clear();
+    for (std::uint32_t y = 0; y < ny; ++y) {
+      bool before = false;
+      for (std::uint32_t x = 0; x < nx; ++x) {
+        const bool closed = !walls.passes({x, y, z});
+        if (closed != before) slice.change.push_back(x);
+        before = closed;
+      }
+      if (before) slice.change.push_back(nx);
+      slice.row_offset.push_back(static_cast<std::uint32_t>(slice.change.size()));
+    }
+    solid.append(slice);
+  }
+  return solid;
+}
+
+void hold_by(const Walls& walls, const Buffer<Place>& places, Cells& cells) {
+  std::array<double, 3> weight{};
+  for (std::size_t a = 0; a < 3; ++a) weight[a] = 1 / (cells.edge[a] * cells.edge[a]);
+  for_pieces(cells.size(), [&](std::uint32_t begin, std::uint32_t end) {
+    for (std::uint32_t i = begin; i < end; ++i) {
+      cells.hold[i] = Cells::Hold{};
+      for (int a = 0; a < 3; ++a)
+        cells.hold[i][a] = walls.open(places[i], a)
+                               ? static_cast<std::uint16_t>(walls.hold(places[i], a, weight) / Cells::kHold + 0.5)
+                               : Cells::kShut;
+    }
+  });
 }
 
 /// Groups what lies in `box`; places and box become those of the groups, which count as their first members do.
@@ -147,24 +164,29 @@ Groups group(Buffer<Place>& places, std::array<std::uint32_t, 3>& box) {
 
 }  // namespace
 
-Result<Grid> make_grid(const VoxelView& solid, std::uint32_t levels) {
-  const std::uint64_t count = solid.voxels() - set_voxels(solid);
+Result<Grid> make_grid(const VoxelView& fine, std::uint32_t factor, std::uint32_t levels) {
+  for (const std::uint32_t side : fine.size())
+    if (factor % 2 == 0 || side % factor != 0)
+      return Error{Fault::kInput, "voxels of the flow are an odd number of the solid's wide, and fill the box"};
+  const Walls walls(fine, factor);
+  const VoxelStack solid = where_nothing_passes(walls, fine);
+  const std::uint64_t count = solid.view().voxels() - set_voxels(solid);
   if (count == 0) return Error{Fault::kInput, "there is no void for a fluid"};
   if (count >= std::uint64_t{1} << 31)
     return Error{Fault::kInput, "more void than 2^31 voxels; take a smaller window or larger voxels"};
   Grid grid;
   Cells& cells = grid.cells;
-  cells.box = solid.size();
-  const Nm shortest = std::min({solid.edge[0], solid.edge[1], solid.edge[2]});
-  for (std::size_t a = 0; a < 3; ++a) cells.edge[a] = static_cast<double>(solid.edge[a]) / shortest;
-  cells.unit_m = shortest * 1e-9;
-  cells.kind.resize(count);
+  cells.box = walls.size();
+  const Nm shortest = std::min({fine.edge[0], fine.edge[1], fine.edge[2]});
+  for (std::size_t a = 0; a < 3; ++a) cells.edge[a] = static_cast<double>(fine.edge[a]) / shortest;
+  cells.unit_m = shortest * 1e-9 * factor;
+  cells.hold.resize(count);
   cells.neighbour.resize(count);
   const auto none = static_cast<std::uint32_t>(count);
   std::fill(cells.neighbour.begin(), cells.neighbour.end(), std::array{none, none, none, none, none, none});
   join(solid, Stretches(solid), cells);
-  for (std::uint32_t i = 0; i < none; ++i) cells.kind[i] = kind_of(cells, i);
   Buffer<Place> places = places_of(solid);
+  hold_by(walls, places, cells);
   std::array<std::uint32_t, 3> box = cells.box;
   while (grid.levels.size() < levels && places.size() > 512) grid.levels.push_back(group(places, box));
   return grid;

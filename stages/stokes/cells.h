@@ -15,18 +15,20 @@ namespace lamina::stokes {
 /// face along that axis: a staggered grid. Velocity exists on faces between two cells; elsewhere it is zero.
 ///
 /// neighbour  of each cell below and above along x, y, z; size() where there is none: a wall, or the end of the box
-/// kind       of each cell's three faces at once: which exist, and how many of the four neighbouring faces beside each are
-/// walls
-///            half a voxel away. For face a: 9 if it does not exist, else walls along the next axis + 3 x walls along the one
-///            after; the three make a number of three digits of base 10, that of x last.
+/// hold       of each cell's three faces, how much more walls resist the velocity there than neighbours would, in units of
+///            kHold; kShut if there is no velocity
 struct Cells {
+  using Hold [[gnu::vector_size(8)]] = std::uint16_t;
+  static constexpr float kHold = 1.0f / 1024;
+  static constexpr std::uint16_t kShut = 65535;
+
   std::array<std::uint32_t, 3> box{};  // voxels
   std::array<double, 3> edge{};        // of a voxel, in units of the shortest one
   double unit_m = 0;                   // that one
   Buffer<std::array<std::uint32_t, 6>> neighbour;
-  Buffer<std::uint16_t> kind;
+  Buffer<Hold> hold;
 
-  std::uint32_t size() const { return static_cast<std::uint32_t>(kind.size()); }
+  std::uint32_t size() const { return static_cast<std::uint32_t>(hold.size()); }
   std::uint64_t voxels() const { return std::uint64_t{box[0]} * box[1] * box[2]; }
   double porosity() const { return voxels() == 0 ? 0 : static_cast<double>(size()) / static_cast<double>(voxels()); }
 };
@@ -45,9 +47,14 @@ struct Grid {
   std::vector<Groups> levels;
 };
 
+/// fine    the solid in voxels whose edges are a factor of those of the flow
+/// factor  odd; the number of fine voxels along each axis is a multiple of it
 /// levels  at most so many; none has fewer than 64 groups
 /// errors  kInput: no void, or 2^31 cells and more
 /// cost    O(voxels), one thread; 26 bytes a void voxel and 5 for the groups, meanwhile 8 more
-Result<Grid> make_grid(const VoxelView& solid, std::uint32_t levels);
+Result<Grid> make_grid(const VoxelView& fine, std::uint32_t factor, std::uint32_t levels);
+
+/// The same of voxels whose faces are the walls.
+inline Result<Grid> make_grid(const VoxelView& solid, std::uint32_t levels) { return make_grid(solid, 1, levels); }
 
 }  // namespace lamina::stokes

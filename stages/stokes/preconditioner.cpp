@@ -31,7 +31,7 @@ void diagonals_within(const Operator& stokes, const Buffer<std::uint32_t>& of_ce
   const Cells& cells = stokes.cells();
   for_pieces(cells.size(), [&](std::uint32_t begin, std::uint32_t end) {
     for (std::uint32_t i = begin; i < end; ++i) {
-      Four sum = stokes.diagonal(i);
+      Four sum = stokes.faces_of(i).diagonal;
       for (int side = 0; side < 6; ++side) {
         const std::uint32_t n = cells.neighbour[i][static_cast<std::size_t>(side)];
         if (n != cells.size() && of_cell[n] == of_cell[i]) sum -= stokes.weight(side / 2) * stokes.exists(i) * stokes.exists(n);

@@ -23,10 +23,10 @@ class Preconditioner {
   void gather(const Field& residual);
   /// What cell i gets from its residual and, by way of its group g of the first level, from all groups.
   Four at(std::uint32_t i, std::uint32_t g, Four residual) const {
-    const Four exists = stokes_.exists(i), diagonal = stokes_.diagonal(i);
-    const Four own = {exists[0] != 0 ? 1 / diagonal[0] : 0, exists[1] != 0 ? 1 / diagonal[1] : 0,
-                      exists[2] != 0 ? 1 / diagonal[2] : 0, 1};
-    return own * residual + (levels_.empty() ? Four{} : exists * coarse_.front().sum[g]);
+    const Operator::Faces faces = stokes_.faces_of(i);
+    const Four rest = {1, 1, 1, 1};
+    const Four own = (faces.exists + Four{0, 0, 0, 1}) / (faces.diagonal + (rest - faces.exists));
+    return own * residual + (levels_.empty() ? Four{} : faces.exists * coarse_.front().sum[g]);
   }
 
  private:
