@@ -32,8 +32,12 @@ struct Flow {
 /// errors   kInterrupted: by progress
 /// source   C. C. Paige, M. A. Saunders, "Solution of sparse indefinite systems of linear equations", SIAM J. Numer. Anal. 12
 ///          (1975), preconditioned as in H. C. Elman, D. J. Silvester, A. J. Wathen (2014), algorithm 4.1
-/// cost     some hundred steps, more for windows of many pores; 150 bytes a cell with the grid
+/// cost     some hundred steps, more for windows of many pores; 140 bytes a cell with the grid
 Result<Flow> solve(const Grid& grid, int axis, const FlowOptions& options, Field& field);
+
+/// The bytes a cell that a step reads and writes at least: neighbours and walls of the cell for the product, 32 and 48 of fields;
+/// then seven fields read and three written; then walls, one field read and one written.
+inline constexpr double kBytesMoved = 264;
 
 /// The bytes that solve() and its grid take.
 std::uint64_t bytes_of_flow(std::uint64_t cells);

@@ -44,6 +44,8 @@ class Operator {
     return {exists, exists * (around_ + Cells::kHold * hold)};
   }
   Four exists(std::uint32_t i) const { return faces_of(i).exists; }
+  /// What a pressure of 1 in a cell alone lets out of it, of what it does far from walls.
+  float yields(std::uint32_t i) const { return Cells::kHold * static_cast<float>(cells_.hold[i][3]); }
   float weight(int axis) const { return weight_[axis]; }  // of the neighbours along an axis
   const Cells& cells() const { return cells_; }
 
