@@ -63,13 +63,11 @@ Result<Darcy> flow_along(const VoxelView& box, int axis, const FlowRequest& requ
   return darcy;
 }
 
-/// Of the voxels, extrapolated from those twice as large. The error is that step, and at least what a slit of the same
-/// hydraulic radius has: differences of second order are off by half of (voxel / radius)^2, and a wall is known to a tenth of a
-/// fine voxel at best, which is three tenths of it / radius. Where the two are too far apart, nothing is extrapolated, and the
-/// error is as large as the value. voxel  edge of one / hydraulic radius
-void add_error(const Darcy& coarse, double ratio, double voxel, int axis, Darcy& fine) {
+/// Of the voxels, extrapolated from those twice as large. The error is that step, or the least there is.
+/// Where the two are too far apart, nothing is extrapolated, and the error is as large as the value.
+void add_error(const Darcy& coarse, double ratio, double least, int axis, Darcy& fine) {
   const auto along = static_cast<std::size_t>(axis);
-  const double whole = std::abs(fine.k_m2[along]), least = std::max(0.3 * voxel / kFiner, 0.5 * voxel * voxel);
+  const double whole = std::abs(fine.k_m2[along]);
   fine.resolved = std::abs(fine.k_m2[along] - coarse.k_m2[along]) <= 0.5 * whole;
   for (std::size_t b = 0; b < 3; ++b) {
     const double step = (fine.k_m2[b] - coarse.k_m2[b]) / (ratio * ratio - 1);
@@ -103,7 +101,7 @@ Result<PoreReport> look_at_pores(const PoreRasters& rasters, const FlowRequest& 
   report.surface_per_mm = pores::specific_surface(fine).crofton;
   report.throat_mm = pores::throats(voxels, pores::whole(voxels), request.axes);
   const double edge_mm = *std::min_element(voxels.edge.begin(), voxels.edge.end()) * 1e-6;
-  const double hydraulic_mm = report.surface_per_mm > 0 ? report.porosity.total() / report.surface_per_mm : 1;
+  const double least = stokes::least_error(report.porosity.total(), report.surface_per_mm * edge_mm, kFiner);
   const double ratio = static_cast<double>(fine.nx + fine.ny + fine.nz) / (coarse.nx + coarse.ny + coarse.nz);
   for (int axis = 0; axis < 3; ++axis) {
     const auto a = static_cast<std::size_t>(axis);
@@ -118,7 +116,7 @@ Result<PoreReport> look_at_pores(const PoreRasters& rasters, const FlowRequest& 
     if (!rough) return rough.error();
     Result<Darcy> darcy = flow_along(fine, axis, request, told(0.15, 0.85));
     if (!darcy) return darcy.error();
-    add_error(*rough, ratio, edge_mm / hydraulic_mm, axis, *darcy);
+    add_error(*rough, ratio, least, axis, *darcy);
     report.flow[a] = *darcy;
   }
   return report;

@@ -160,9 +160,8 @@ void hold_by(const Walls& walls, const Buffer<Placed>& order, Cells& cells) {
       cells.hold[i] = Cells::Hold{};
       const Place at = order[i].place();
       for (int a = 0; a < 3; ++a)
-        cells.hold[i][a] = walls.open(at, a)
-                               ? static_cast<std::uint16_t>(walls.hold(at, a, weight) / Cells::kHold + 0.5)
-                               : Cells::kShut;
+        cells.hold[i][a] =
+            walls.open(at, a) ? static_cast<std::uint16_t>(walls.hold(at, a, weight) / Cells::kHold + 0.5) : Cells::kShut;
     }
   });
 }

@@ -11,8 +11,9 @@
 
 namespace lamina::stokes {
 
-/// Voxels that a fluid passes, numbered by blocks of 2 x 2 x 2 and blocks of these, as G. M. Morton has it (1966). A cell holds the pressure in its middle and, for each axis, the velocity through its upper
-/// face along that axis: a staggered grid. Velocity exists on faces between two cells; elsewhere it is zero.
+/// Voxels that a fluid passes, numbered by blocks of 2 x 2 x 2 and blocks of these, as G. M. Morton has it (1966). A cell holds
+/// the pressure in its middle and, for each axis, the velocity through its upper face along that axis: a staggered grid.
+/// Velocity exists on faces whose middles are in the void; elsewhere it is zero.
 ///
 /// neighbour  of each cell below and above along x, y, z; size() where there is none: a wall, or the end of the box
 /// hold       of each cell's three faces, how much more walls resist the velocity there than neighbours would, in units of
@@ -31,7 +32,6 @@ struct Cells {
 
   std::uint32_t size() const { return static_cast<std::uint32_t>(hold.size()); }
   std::uint64_t voxels() const { return std::uint64_t{box[0]} * box[1] * box[2]; }
-  double porosity() const { return voxels() == 0 ? 0 : static_cast<double>(size()) / static_cast<double>(voxels()); }
 };
 
 /// Blocks of up to 2 x 2 x 2 cells, and blocks of these: for the coarse levels of a solver.
@@ -51,7 +51,7 @@ struct Grid {
 /// fine    the solid in voxels whose edges are a factor of those of the flow
 /// factor  odd; the number of fine voxels along each axis is a multiple of it
 /// levels  at most so many; none has fewer than 64 groups
-/// errors  kInput: no void, or 2^31 cells and more
+/// errors  kInput: no void, 2^31 cells and more, or a factor that is even or does not fill the box
 /// cost    O(voxels); 33 bytes a cell, meanwhile 25 more and factor^3 / 8 + 1 a voxel
 Result<Grid> make_grid(const VoxelView& fine, std::uint32_t factor, std::uint32_t levels);
 

@@ -15,10 +15,11 @@ using Field = Buffer<Four>;  // one entry a cell, and a last one that stays zero
 
 Field field_of(const Cells& cells);
 
-/// The symmetric operator (u, p) -> (-div grad u + grad p, -div u): central differences of second order; no slip at walls, half
-/// a voxel from the velocity along them. source  F. H. Harlow, J. E. Welch, "Numerical calculation of time-dependent viscous
-/// incompressible flow of fluid with free
-///         surface", Physics of Fluids 8 (1965)
+/// The symmetric operator (u, p) -> (-div grad u + grad p, -div u): central differences of second order; no slip at walls, which
+/// hold a velocity the more strongly the nearer they are (Cells::hold).
+/// source  F. H. Harlow, J. E. Welch, "Numerical calculation of time-dependent viscous incompressible flow of fluid with free
+///         surface", Physics of Fluids 8 (1965); walls: F. Gibou, R. P. Fedkiw, L.-T. Cheng, M. Kang, "A second-order-accurate
+///         symmetric discretization of the Poisson equation on irregular domains", J. Comput. Phys. 176 (2002)
 class Operator {
  public:
   /// cells  outlives it
@@ -40,7 +41,7 @@ class Operator {
   };
   Faces faces_of(std::uint32_t i) const {
     const Four hold = __builtin_convertvector(cells_.hold[i], Four);
-    const Four exists = {hold[0] < kShut ? 1.0f : 0.0f, hold[1] < kShut ? 1.0f : 0.0f, hold[2] < kShut ? 1.0f : 0.0f, 0};
+    const Four exists = __builtin_convertvector(-(hold < kShut), Four);
     return {exists, exists * (around_ + Cells::kHold * hold)};
   }
   Four exists(std::uint32_t i) const { return faces_of(i).exists; }
@@ -50,7 +51,7 @@ class Operator {
   const Cells& cells() const { return cells_; }
 
  private:
-  static constexpr float kShut = Cells::kShut;
+  static constexpr Four kShut = {Cells::kShut, Cells::kShut, Cells::kShut, 0};
   const Cells& cells_;
   std::array<float, 3> weight_;
   Four step_, around_;

@@ -64,7 +64,8 @@ Preconditioner::Preconditioner(const Operator& stokes, const std::vector<Groups>
 }
 
 void Preconditioner::gather() {
-  for (std::size_t level = 1; level < levels_.size(); ++level) add_up(levels_[level], coarse_[level - 1].sum, coarse_[level].sum);
+  for (std::size_t level = 1; level < levels_.size(); ++level)
+    add_up(levels_[level], coarse_[level - 1].sum, coarse_[level].sum);
   for (std::size_t level = levels_.size(); level-- > 0;) {
     Coarse& here = coarse_[level];
     for_pieces(levels_[level].size(), [&](std::uint32_t begin, std::uint32_t end) {

@@ -9,9 +9,9 @@
 namespace lamina::stokes {
 
 /// Velocity is corrected on the cells and on all groups of them at once, each by the diagonal of the operator there; pressure
-/// is the divergence over what the cell's faces let out. The sum is symmetric and positive, as minimal residuals need it. source  J. H. Bramble, J. E.
-/// Pasciak, J. Xu, "Parallel multilevel preconditioners", Mathematics of Computation 55 (1990), with
-///         groups for the coarse grids; H. C. Elman, D. J. Silvester, A. J. Wathen, "Finite Elements and Fast Iterative
+/// is the divergence over what the cell's faces let out. The sum is symmetric and positive, as minimal residuals need it.
+/// source  J. H. Bramble, J. E. Pasciak, J. Xu, "Parallel multilevel preconditioners", Mathematics of Computation 55 (1990),
+///         with groups for the coarse grids; H. C. Elman, D. J. Silvester, A. J. Wathen, "Finite Elements and Fast Iterative
 ///         Solvers" (2014), 4.2, for the pressure
 class Preconditioner {
  public:
