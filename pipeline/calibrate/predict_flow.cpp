@@ -13,7 +13,7 @@ namespace lamina::pipeline {
 namespace {
 
 constexpr std::uint32_t kLevels = 8;
-constexpr std::uint32_t kFluidAtEnds = 4;  // voxels before each end of an axis that does not repeat
+constexpr std::uint32_t kFluidAtEnds = 4 * kFiner;  // fine voxels before each end of an axis that does not repeat
 
 /// The box with fluid before both ends of an axis, which repeats then.
 VoxelStack with_fluid_at_ends(const VoxelView& box, int axis) {
@@ -42,7 +42,7 @@ Result<Darcy> flow_along(const VoxelView& box, int axis, const FlowRequest& requ
   const auto a = static_cast<std::size_t>(axis);
   const VoxelStack longer = box.periodic[a] ? VoxelStack() : with_fluid_at_ends(box, axis);
   const VoxelView used = box.periodic[a] ? box : longer.view();
-  const Result<stokes::Grid> grid = stokes::make_grid(used, kLevels);
+  const Result<stokes::Grid> grid = stokes::make_grid(used, kFiner, kLevels);
   if (!grid) return grid.error();
   stokes::Field field = stokes::field_of(grid->cells);
   stokes::FlowOptions options;
@@ -63,44 +63,45 @@ Result<Darcy> flow_along(const VoxelView& box, int axis, const FlowRequest& requ
   return darcy;
 }
 
-/// Of the voxels, extrapolated from those twice as large. A wall is known to a tenth of a voxel at best, which moves the
-/// permeability as a slit's width does: by three tenths of a voxel / hydraulic radius.
-/// Where the two are too far apart for that, nothing is extrapolated, and the error is as large as the value.
-void add_error(const Darcy& coarse, double ratio, double wall_share, int axis, Darcy& fine) {
+/// Of the voxels, extrapolated from those twice as large. The error is that step, or the least there is.
+/// Where the two are too far apart, nothing is extrapolated, and the error is as large as the value.
+void add_error(const Darcy& coarse, double ratio, double least, int axis, Darcy& fine) {
   const auto along = static_cast<std::size_t>(axis);
   const double whole = std::abs(fine.k_m2[along]);
-  fine.resolved = std::abs(fine.k_m2[along] - coarse.k_m2[along]) <= 0.5 * (ratio - 1) * whole;
+  fine.resolved = std::abs(fine.k_m2[along] - coarse.k_m2[along]) <= 0.5 * whole;
   for (std::size_t b = 0; b < 3; ++b) {
-    const double step = (fine.k_m2[b] - coarse.k_m2[b]) / (ratio - 1);
-    fine.error_m2[b] = fine.resolved ? std::max(std::abs(step), 3 * wall_share * std::abs(fine.k_m2[b])) : whole;
+    const double step = (fine.k_m2[b] - coarse.k_m2[b]) / (ratio * ratio - 1);
+    fine.error_m2[b] = fine.resolved ? std::max(std::abs(step), least * std::abs(fine.k_m2[b])) : whole;
     if (fine.resolved) fine.k_m2[b] += step;
   }
 }
 
 }  // namespace
 
-Result<PoreReport> look_at_pores(const VoxelView& fine, const VoxelView& coarse, const FlowRequest& request,
+Result<PoreReport> look_at_pores(const PoreRasters& rasters, const FlowRequest& request,
                                  const std::function<bool(double)>& tell) {
+  const VoxelView &voxels = rasters.voxels, &fine = rasters.fine, &coarse = rasters.coarse;
   PoreReport report;
-  report.voxels = fine.voxels();
-  report.empty = fine.voxels() - set_voxels(fine);
+  report.voxels = voxels.voxels();
+  report.empty = voxels.voxels() - set_voxels(voxels);
   std::uint64_t ends = 0;  // fluid before what does not repeat
   for (std::size_t a = 0; a < 3; ++a)
-    if (!fine.periodic[a]) ends = std::max(ends, 2 * kFluidAtEnds * fine.voxels() / fine.size()[a]);
-  const std::uint64_t bytes = stokes::bytes_of_flow(report.empty + ends) + 4 * fine.voxels();  // distances for throats
+    if (!fine.periodic[a]) ends = std::max(ends, 2 * kFluidAtEnds / kFiner * voxels.voxels() / voxels.size()[a]);
+  // Cells at walls count whose middles are solid, and so do distances for throats.
+  const std::uint64_t bytes = stokes::bytes_of_flow(report.empty + report.empty / 8 + ends) + 5 * voxels.voxels();
   if (bytes > request.memory_bytes) {
     const double larger = std::cbrt(static_cast<double>(bytes) / static_cast<double>(request.memory_bytes));
     return Error{Fault::kUsage,
                  fmt::format("the flow through {} voxels of void takes {}, --memory allows {}; take --voxel {:.3g} "
                              "or a smaller --window",
                              readable_count(report.empty), readable_bytes(bytes), readable_bytes(request.memory_bytes),
-                             larger * fine.edge[2] * 1e-3)};
+                             larger * voxels.edge[2] * 1e-3)};
   }
   report.porosity = pores::porosity(fine);
   report.surface_per_mm = pores::specific_surface(fine).crofton;
-  report.throat_mm = pores::throats(fine, pores::whole(fine), request.axes);
-  const double edge_mm = *std::min_element(fine.edge.begin(), fine.edge.end()) * 1e-6;
-  const double hydraulic_mm = report.surface_per_mm > 0 ? report.porosity.total() / report.surface_per_mm : 1;
+  report.throat_mm = pores::throats(voxels, pores::whole(voxels), request.axes);
+  const double edge_mm = *std::min_element(voxels.edge.begin(), voxels.edge.end()) * 1e-6;
+  const double least = stokes::least_error(report.porosity.total(), report.surface_per_mm * edge_mm, kFiner);
   const double ratio = static_cast<double>(fine.nx + fine.ny + fine.nz) / (coarse.nx + coarse.ny + coarse.nz);
   for (int axis = 0; axis < 3; ++axis) {
     const auto a = static_cast<std::size_t>(axis);
@@ -115,7 +116,7 @@ Result<PoreReport> look_at_pores(const VoxelView& fine, const VoxelView& coarse,
     if (!rough) return rough.error();
     Result<Darcy> darcy = flow_along(fine, axis, request, told(0.15, 0.85));
     if (!darcy) return darcy.error();
-    add_error(*rough, ratio, 0.1 * edge_mm / hydraulic_mm, axis, *darcy);
+    add_error(*rough, ratio, least, axis, *darcy);
     report.flow[a] = *darcy;
   }
   return report;

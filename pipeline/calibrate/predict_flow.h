@@ -23,6 +23,16 @@ struct Darcy {
   bool resolved = true;  // voxels twice as large say about the same; else nothing is extrapolated, the error is the value
 };
 
+/// Voxels of the flow are cut so many times finer along each edge, to tell where in them walls stand.
+inline constexpr std::uint32_t kFiner = 3;
+
+/// One window in three ways.
+struct PoreRasters {
+  VoxelView voxels;  // of the report and the throats
+  VoxelView fine;    // kFiner times as many along each axis
+  VoxelView coarse;  // kFiner times as many as voxels about twice as large
+};
+
 struct PoreReport {
   std::uint64_t voxels = 0, empty = 0;
   pores::Porosity porosity;
@@ -37,12 +47,11 @@ struct FlowRequest {
   std::uint64_t memory_bytes = std::uint64_t{1} << 30;
 };
 
-/// fine, coarse  the same window, in voxels and in voxels about twice as large. Along axes that do not repeat, walls close the
-///               sides of the window, and fluid stands before its ends
-/// tell          is told how far it is, 0 .. 1; false stops
-/// errors        kUsage: it does not fit the memory, with the voxels that do; kInput: no void; kInterrupted
-/// cost          of stokes::solve() for each axis and window
-Result<PoreReport> look_at_pores(const VoxelView& fine, const VoxelView& coarse, const FlowRequest& request,
+/// Along axes that do not repeat, walls close the sides of the window, and fluid stands before its ends.
+/// tell    is told how far it is, 0 .. 1; false stops
+/// errors  kUsage: it does not fit the memory, with the voxels that do; kInput: no void; kInterrupted
+/// cost    of stokes::solve() for each axis and window
+Result<PoreReport> look_at_pores(const PoreRasters& rasters, const FlowRequest& request,
                                  const std::function<bool(double)>& tell);
 
 }  // namespace lamina::pipeline

@@ -29,5 +29,7 @@ Result<WindowChoice> choose_window(const read::GcodeFile& file, const Pile& pile
 
 /// The same box in voxels twice as large, as near as whole numbers allow.
 Window with_half_as_many_voxels(Window window);
+/// The same box, so many times as many voxels along each axis.
+Window finer(Window window, std::uint32_t times);
 
 }  // namespace lamina::pipeline

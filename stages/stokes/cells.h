@@ -11,31 +11,34 @@
 
 namespace lamina::stokes {
 
-/// Void voxels, numbered row by row. A cell holds the pressure in its middle and, for each axis, the velocity through its upper
-/// face along that axis: a staggered grid. Velocity exists on faces between two cells; elsewhere it is zero.
+/// Voxels that a fluid passes, numbered by blocks of 2 x 2 x 2 and blocks of these, as G. M. Morton has it (1966). A cell holds
+/// the pressure in its middle and, for each axis, the velocity through its upper face along that axis: a staggered grid.
+/// Velocity exists on faces whose middles are in the void; elsewhere it is zero.
 ///
 /// neighbour  of each cell below and above along x, y, z; size() where there is none: a wall, or the end of the box
-/// kind       of each cell's three faces at once: which exist, and how many of the four neighbouring faces beside each are
-/// walls
-///            half a voxel away. For face a: 9 if it does not exist, else walls along the next axis + 3 x walls along the one
-///            after; the three make a number of three digits of base 10, that of x last.
+/// hold       of each cell's three faces, how much more walls resist the velocity there than neighbours would, in units of
+///            kHold; kShut if there is no velocity. Then what a pressure of 1 in this cell alone lets out of it, at
+///            least a fifth: 1 far from walls
 struct Cells {
+  using Hold [[gnu::vector_size(8)]] = std::uint16_t;
+  static constexpr float kHold = 1.0f / 1024;
+  static constexpr std::uint16_t kShut = 65535;
+
   std::array<std::uint32_t, 3> box{};  // voxels
   std::array<double, 3> edge{};        // of a voxel, in units of the shortest one
   double unit_m = 0;                   // that one
   Buffer<std::array<std::uint32_t, 6>> neighbour;
-  Buffer<std::uint16_t> kind;
+  Buffer<Hold> hold;
 
-  std::uint32_t size() const { return static_cast<std::uint32_t>(kind.size()); }
+  std::uint32_t size() const { return static_cast<std::uint32_t>(hold.size()); }
   std::uint64_t voxels() const { return std::uint64_t{box[0]} * box[1] * box[2]; }
-  double porosity() const { return voxels() == 0 ? 0 : static_cast<double>(size()) / static_cast<double>(voxels()); }
 };
 
-/// Groups of up to 2 x 2 x 2 cells, and groups of these: for the coarse levels of a solver.
+/// Blocks of up to 2 x 2 x 2 cells, and blocks of these: for the coarse levels of a solver.
 ///
-/// begin  size() + 1 entries; group g owns member[begin[g] .. begin[g + 1]) of the level below
+/// begin  size() + 1 entries; group g owns begin[g] .. begin[g + 1] - 1 of the level below
 struct Groups {
-  Buffer<std::uint32_t> begin{0}, member;
+  Buffer<std::uint32_t> begin;
   std::uint32_t size() const { return static_cast<std::uint32_t>(begin.size() - 1); }
 };
 
@@ -45,9 +48,14 @@ struct Grid {
   std::vector<Groups> levels;
 };
 
+/// fine    the solid in voxels whose edges are a factor of those of the flow
+/// factor  odd; the number of fine voxels along each axis is a multiple of it
 /// levels  at most so many; none has fewer than 64 groups
-/// errors  kInput: no void, or 2^31 cells and more
-/// cost    O(voxels), one thread; 26 bytes a void voxel and 5 for the groups, meanwhile 8 more
-Result<Grid> make_grid(const VoxelView& solid, std::uint32_t levels);
+/// errors  kInput: no void, 2^31 cells and more, or a factor that is even or does not fill the box
+/// cost    O(voxels); 33 bytes a cell, meanwhile 25 more and factor^3 / 8 + 1 a voxel
+Result<Grid> make_grid(const VoxelView& fine, std::uint32_t factor, std::uint32_t levels);
+
+/// The same of voxels whose faces are the walls.
+inline Result<Grid> make_grid(const VoxelView& solid, std::uint32_t levels) { return make_grid(solid, 1, levels); }
 
 }  // namespace lamina::stokes

@@ -32,8 +32,18 @@ struct Flow {
 /// errors   kInterrupted: by progress
 /// source   C. C. Paige, M. A. Saunders, "Solution of sparse indefinite systems of linear equations", SIAM J. Numer. Anal. 12
 ///          (1975), preconditioned as in H. C. Elman, D. J. Silvester, A. J. Wathen (2014), algorithm 4.1
-/// cost     some hundred steps, more for windows of many pores; 150 bytes a cell with the grid
+/// cost     some hundred steps, more for windows of many pores; 140 bytes a cell with the grid
 Result<Flow> solve(const Grid& grid, int axis, const FlowOptions& options, Field& field);
+
+/// The bytes a cell that a step reads and writes at least: neighbours and walls of the cell for the product, 32 and 48 of
+/// fields; then six fields read and three written; then walls, one field read and one written.
+inline constexpr double kBytesMoved = 264;
+
+/// What a permeability may be off by at least, relative: differences of second order as in a slit of the same hydraulic radius,
+/// half of (voxel / radius)^2; and walls that are known to a tenth of a fine voxel at best, of a slit of that radius and of
+/// balls that have as much surface as the solid. surface  of walls, in squared voxels a voxel of the box factor   of
+/// make_grid()
+double least_error(double porosity, double surface, std::uint32_t factor);
 
 /// The bytes that solve() and its grid take.
 std::uint64_t bytes_of_flow(std::uint64_t cells);

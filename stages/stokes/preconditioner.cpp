@@ -12,7 +12,7 @@ void add_up(const Groups& groups, const Field& members, Field& sums) {
   for_pieces(groups.size(), [&](std::uint32_t begin, std::uint32_t end) {
     for (std::uint32_t g = begin; g < end; ++g) {
       Four sum{};
-      for (std::uint32_t m = groups.begin[g]; m < groups.begin[g + 1]; ++m) sum += members[groups.member[m]];
+      for (std::uint32_t m = groups.begin[g]; m < groups.begin[g + 1]; ++m) sum += members[m];
       sums[g] = sum;
     }
   });
@@ -20,10 +20,11 @@ void add_up(const Groups& groups, const Field& members, Field& sums) {
 
 /// Group numbers of the cells become those of the next level.
 void climb(const Groups& groups, Buffer<std::uint32_t>& of_cell) {
-  Buffer<std::uint32_t> of_member(groups.member.size());
-  for (std::uint32_t g = 0; g < groups.size(); ++g)
-    for (std::uint32_t m = groups.begin[g]; m < groups.begin[g + 1]; ++m) of_member[groups.member[m]] = g;
-  for (std::uint32_t& group : of_cell) group = of_member[group];
+  std::uint32_t g = 0;
+  for (std::uint32_t& group : of_cell) {
+    while (group >= groups.begin[g + 1]) ++g;
+    group = g;
+  }
 }
 
 /// What each cell adds to the diagonal of its group: all but what flows between members.
@@ -31,7 +32,7 @@ void diagonals_within(const Operator& stokes, const Buffer<std::uint32_t>& of_ce
   const Cells& cells = stokes.cells();
   for_pieces(cells.size(), [&](std::uint32_t begin, std::uint32_t end) {
     for (std::uint32_t i = begin; i < end; ++i) {
-      Four sum = stokes.diagonal(i);
+      Four sum = stokes.faces_of(i).diagonal;
       for (int side = 0; side < 6; ++side) {
         const std::uint32_t n = cells.neighbour[i][static_cast<std::size_t>(side)];
         if (n != cells.size() && of_cell[n] == of_cell[i]) sum -= stokes.weight(side / 2) * stokes.exists(i) * stokes.exists(n);
@@ -62,9 +63,9 @@ Preconditioner::Preconditioner(const Operator& stokes, const std::vector<Groups>
   std::fill(scratch.begin(), scratch.end(), Four{});
 }
 
-void Preconditioner::gather(const Field& residual) {
-  for (std::size_t level = 0; level < levels_.size(); ++level)
-    add_up(levels_[level], level == 0 ? residual : coarse_[level - 1].sum, coarse_[level].sum);
+void Preconditioner::gather() {
+  for (std::size_t level = 1; level < levels_.size(); ++level)
+    add_up(levels_[level], coarse_[level - 1].sum, coarse_[level].sum);
   for (std::size_t level = levels_.size(); level-- > 0;) {
     Coarse& here = coarse_[level];
     for_pieces(levels_[level].size(), [&](std::uint32_t begin, std::uint32_t end) {
@@ -76,7 +77,7 @@ void Preconditioner::gather(const Field& residual) {
     for_pieces(groups.size(), [&](std::uint32_t begin, std::uint32_t end) {
       for (std::uint32_t g = begin; g < end; ++g)
         for (std::uint32_t m = groups.begin[g]; m < groups.begin[g + 1]; ++m)
-          coarse_[level - 1].sum[groups.member[m]] += coarse_[level].sum[g];
+          coarse_[level - 1].sum[m] += coarse_[level].sum[g];
     });
   }
 }

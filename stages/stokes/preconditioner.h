@@ -9,9 +9,9 @@
 namespace lamina::stokes {
 
 /// Velocity is corrected on the cells and on all groups of them at once, each by the diagonal of the operator there; pressure
-/// is as large as the divergence. The sum is symmetric and positive, as minimal residuals need it. source  J. H. Bramble, J. E.
-/// Pasciak, J. Xu, "Parallel multilevel preconditioners", Mathematics of Computation 55 (1990), with
-///         groups for the coarse grids; H. C. Elman, D. J. Silvester, A. J. Wathen, "Finite Elements and Fast Iterative
+/// is the divergence over what the cell's faces let out. The sum is symmetric and positive, as minimal residuals need it.
+/// source  J. H. Bramble, J. E. Pasciak, J. Xu, "Parallel multilevel preconditioners", Mathematics of Computation 55 (1990),
+///         with groups for the coarse grids; H. C. Elman, D. J. Silvester, A. J. Wathen, "Finite Elements and Fast Iterative
 ///         Solvers" (2014), 4.2, for the pressure
 class Preconditioner {
  public:
@@ -19,14 +19,17 @@ class Preconditioner {
   /// scratch         of the cells; is overwritten
   Preconditioner(const Operator& stokes, const std::vector<Groups>& levels, Field& scratch);
 
-  /// Takes the sums of a residual to the groups and makes what they add. Then at() gives the result.
-  void gather(const Field& residual);
+  /// The residual's sum over a group of the first level, which gather() needs of all.
+  Four& sum_of(std::uint32_t group) { return coarse_.front().sum[group]; }
+  /// Takes the sums on to the other levels and makes what they add. Then at() gives the result.
+  void gather();
   /// What cell i gets from its residual and, by way of its group g of the first level, from all groups.
   Four at(std::uint32_t i, std::uint32_t g, Four residual) const {
-    const Four exists = stokes_.exists(i), diagonal = stokes_.diagonal(i);
-    const Four own = {exists[0] != 0 ? 1 / diagonal[0] : 0, exists[1] != 0 ? 1 / diagonal[1] : 0,
-                      exists[2] != 0 ? 1 / diagonal[2] : 0, 1};
-    return own * residual + (levels_.empty() ? Four{} : exists * coarse_.front().sum[g]);
+    const Operator::Faces faces = stokes_.faces_of(i);
+    const Four rest = {1, 1, 1, 1}, pressure = {0, 0, 0, 1};
+    Four under = faces.diagonal + (rest - faces.exists);
+    under[3] = stokes_.yields(i);
+    return (faces.exists + pressure) / under * residual + (levels_.empty() ? Four{} : faces.exists * coarse_.front().sum[g]);
   }
 
  private:

@@ -168,12 +168,15 @@ Outcome predict(const Arguments& arguments, Context& context) {
   const Result<BeadRules> beads = bead_rules(*file, arguments.text("--beads"), arguments.text("--machine"));
   if (!beads) return beads.error();
   const bead::LayRules* rules = beads->rules ? &*beads->rules : nullptr;
-  const Result<VoxelStack> fine = bead_voxels(*file, *pile, choice->window, rules);
-  if (!fine) return fine.error();
-  const Result<VoxelStack> coarse = bead_voxels(*file, *pile, with_half_as_many_voxels(choice->window), rules);
-  if (!coarse) return coarse.error();
+  const Window& window = choice->window;
+  std::vector<VoxelStack> cut;
+  for (const Window& in : {window, finer(window, kFiner), finer(with_half_as_many_voxels(window), kFiner)}) {
+    Result<VoxelStack> voxels = bead_voxels(*file, *pile, in, rules);
+    if (!voxels) return voxels.error();
+    cut.push_back(std::move(*voxels));
+  }
   const std::atomic<bool>& cancel = context.cancel();
-  const Result<PoreReport> report = look_at_pores(*fine, *coarse, request, [&](double) { return !cancel; });
+  const Result<PoreReport> report = look_at_pores({cut[0], cut[1], cut[2]}, request, [&](double) { return !cancel; });
   if (!report) return Error{report.error().fault, fmt::format("{}: {}", arguments.operands.front(), report.error().message)};
   if (pile->skipped > 0) {
     context.say(

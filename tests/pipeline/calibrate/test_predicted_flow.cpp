@@ -7,6 +7,7 @@
 
 #include "pipeline/calibrate/bead_voxels.h"
 #include "pipeline/calibrate/predict_flow.h"
+#include "pipeline/calibrate/window_choice.h"
 #include "tests/commands/program.h"
 
 namespace lamina {
@@ -43,22 +44,27 @@ Laid laid(const std::string& path) {
   return {std::move(*file), std::move(*pile)};
 }
 
-pipeline::Window period_around(const Laid& lines, std::uint32_t layers, std::array<std::uint32_t, 3> count) {
+/// Of so many voxels, each `finer` times finer along its edges.
+pipeline::Window period_around(const Laid& lines, std::uint32_t layers, std::array<std::uint32_t, 3> count,
+                               std::uint32_t finer = 1) {
   pipeline::Window window;
   window.box.add(Point3{17'600'000, 17'600'000, static_cast<Nm>(lines.pile.layers[1].low)});
   window.box.add(Point3{18'400'000, 18'400'000, static_cast<Nm>(lines.pile.layers[layers].high)});
   window.count = count;
   window.periodic = {true, true, true};
-  return window;
+  return pipeline::finer(window, finer);
 }
 
 /// Of so many layers, in these voxels and in twice as large ones.
 pipeline::PoreReport report_of(const Laid& lines, std::uint32_t layers, std::array<std::uint32_t, 3> count,
                                std::array<std::uint32_t, 3> coarse_count) {
-  const Result<VoxelStack> fine = pipeline::bead_voxels(lines.file, lines.pile, period_around(lines, layers, count));
-  const Result<VoxelStack> coarse = pipeline::bead_voxels(lines.file, lines.pile, period_around(lines, layers, coarse_count));
-  EXPECT_TRUE(fine.ok() && coarse.ok());
-  const Result<pipeline::PoreReport> report = pipeline::look_at_pores(*fine, *coarse, {}, [](double) { return true; });
+  const auto cut = [&](std::array<std::uint32_t, 3> into, std::uint32_t finer) {
+    Result<VoxelStack> voxels = pipeline::bead_voxels(lines.file, lines.pile, period_around(lines, layers, into, finer));
+    EXPECT_TRUE(voxels.ok());
+    return std::move(*voxels);
+  };
+  const VoxelStack voxels = cut(count, 1), fine = cut(count, pipeline::kFiner), coarse = cut(coarse_count, pipeline::kFiner);
+  const Result<pipeline::PoreReport> report = pipeline::look_at_pores({voxels, fine, coarse}, {}, [](double) { return true; });
   EXPECT_TRUE(report.ok());
   return *report;
 }
@@ -132,7 +138,7 @@ TEST(PredictedFlow, AWindowThatDoesNotFitTheMemoryIsRefusedWithVoxelsThatDo) {
   ASSERT_TRUE(box.ok());
   pipeline::FlowRequest request;
   request.memory_bytes = 1'000'000;
-  const Result<pipeline::PoreReport> report = pipeline::look_at_pores(*box, *box, request, [](double) { return true; });
+  const Result<pipeline::PoreReport> report = pipeline::look_at_pores({*box, *box, *box}, request, [](double) { return true; });
   ASSERT_FALSE(report.ok());
   EXPECT_EQ(report.error().fault, Fault::kUsage);
   EXPECT_NE(report.error().message.find("take --voxel"), std::string::npos) << report.error().message;
