@@ -35,6 +35,7 @@ struct FlowRequest {
   std::array<bool, 3> axes{true, true, true};
   double tolerance = 1e-4;
   std::uint64_t memory_bytes = std::uint64_t{1} << 30;
+  bool inertia = false;  // counts its memory too
 };
 
 /// fine, coarse  the same window, in voxels and in voxels about twice as large. Along axes that do not repeat, walls close the
@@ -44,5 +45,10 @@ struct FlowRequest {
 /// cost          of stokes::solve() for each axis and window
 Result<PoreReport> look_at_pores(const VoxelView& fine, const VoxelView& coarse, const FlowRequest& request,
                                  const std::function<bool(double)>& tell);
+
+/// The box with fluid before both ends of an axis, which repeats then.
+VoxelStack with_fluid_at_ends(const VoxelView& box, int axis);
+
+inline constexpr std::uint32_t kFlowLevels = 8;  // of the solver
 
 }  // namespace lamina::pipeline

@@ -16,8 +16,9 @@ double dot(const Four& x, const Four& y) {
 /// One run of minimal residuals; see the source for the letters.
 class MinimalResiduals {
  public:
-  MinimalResiduals(const Grid& grid, int axis)
+  MinimalResiduals(const Grid& grid, int axis, const Field* force)
       : grid_(grid),
+        force_(force),
         count_(grid.cells.size()),
         axis_(axis),
         stokes_(grid.cells),
@@ -82,6 +83,7 @@ class MinimalResiduals {
 
  private:
   Four force(std::uint32_t i) const {
+    if (force_ != nullptr) return (*force_)[i];
     Four force{};
     force[axis_] = stokes_.exists(i)[axis_];
     return force;
@@ -128,6 +130,7 @@ class MinimalResiduals {
   }
 
   const Grid& grid_;
+  const Field* force_;
   std::uint32_t count_;
   int axis_;
   Operator stokes_;
@@ -166,8 +169,8 @@ void measure(const Cells& cells, int axis, const Field& u, Flow& flow) {
 
 }  // namespace
 
-Result<Flow> solve(const Grid& grid, int axis, const FlowOptions& options, Field& field) {
-  MinimalResiduals run(grid, axis);
+Result<Flow> solve(const Grid& grid, int axis, const FlowOptions& options, Field& field, const Field* force) {
+  MinimalResiduals run(grid, axis, force);
   Flow flow;
   const double whole = run.norm_of_force();
   if (whole > 0) {
