@@ -66,4 +66,31 @@ nlohmann::ordered_json as_json(const WindowChoice& choice, const PoreReport& rep
   return json;
 }
 
+std::string as_text(const Forchheimer& inertia) {
+  const auto reynolds = [&](const segment::FlowPoint& point) { return point.velocity_m_s * inertia.reynolds_per_velocity; };
+  return fmt::format(
+      "inertia   k2 {:.4g} +- {:.2g} m along z, with k1 {:.4g} D, at pore Reynolds numbers of {:.1f} to {:.1f}{}\n",
+      inertia.fit.k2_m, inertia.fit.k2_error_m, inertia.fit.k1_m2 / segment::kDarcy, reynolds(inertia.points.front()),
+      reynolds(inertia.points.back()),
+      inertia.weak_reynolds > 0 ? fmt::format("; weak, with the cube of the velocity, up to {:.1f}", inertia.weak_reynolds)
+                                : "");
+}
+
+nlohmann::ordered_json as_json(const Forchheimer& inertia) {
+  Json json = {{"along", "z"},
+               {"k2_m", inertia.fit.k2_m},
+               {"k2_error_m", inertia.fit.k2_error_m},
+               {"k1_m2", inertia.fit.k1_m2},
+               {"k1_error_m2", inertia.fit.k1_error_m2},
+               {"weak_up_to_reynolds", inertia.weak_reynolds},
+               {"settled", inertia.settled},
+               {"points", Json::array()}};
+  for (const segment::FlowPoint& point : inertia.points) {
+    json["points"].push_back({{"velocity_m_s", point.velocity_m_s},
+                              {"gradient_pa_m", point.gradient_pa_m},
+                              {"reynolds", point.velocity_m_s * inertia.reynolds_per_velocity}});
+  }
+  return json;
+}
+
 }  // namespace lamina::pipeline

@@ -5,6 +5,7 @@
 #include <string>
 
 #include "pipeline/calibrate/predict_flow.h"
+#include "pipeline/calibrate/predict_inertia.h"
 #include "pipeline/calibrate/window_choice.h"
 
 namespace lamina::pipeline {
@@ -15,5 +16,9 @@ std::string as_text(const WindowChoice& choice, const PoreReport& report);
 /// The same, k1 as a tensor: a row for each axis of the force.
 /// report  with the flow along all axes
 nlohmann::ordered_json as_json(const WindowChoice& choice, const PoreReport& report);
+
+/// k2 along z, and what it was fitted on.
+std::string as_text(const Forchheimer& inertia);
+nlohmann::ordered_json as_json(const Forchheimer& inertia);
 
 }  // namespace lamina::pipeline

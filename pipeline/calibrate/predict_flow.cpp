@@ -8,41 +8,19 @@
 #include "stages/data/text/readable.h"
 #include "stages/pores/throat.h"
 #include "stages/stokes/flow.h"
+#include "stages/stokes/inertia.h"
 
 namespace lamina::pipeline {
 namespace {
 
-constexpr std::uint32_t kLevels = 8;
 constexpr std::uint32_t kFluidAtEnds = 4 * kFiner;  // fine voxels before each end of an axis that does not repeat
-
-/// The box with fluid before both ends of an axis, which repeats then.
-VoxelStack with_fluid_at_ends(const VoxelView& box, int axis) {
-  VoxelStack longer(box.nx, box.ny, box.edge, box.periodic);
-  longer.periodic[static_cast<std::size_t>(axis)] = true;
-  const std::uint32_t x = axis == 0 ? kFluidAtEnds : 0, y = axis == 1 ? kFluidAtEnds : 0, z = axis == 2 ? kFluidAtEnds : 0;
-  longer.nx += 2 * x;
-  longer.ny += 2 * y;
-  Runs slice;
-  slice.columns = longer.nx;
-  for (std::uint32_t k = 0; k < box.nz + 2 * z; ++k) {
-    slice.row_offset.assign(1, 0);
-    slice.change.clear();
-    for (std::uint32_t r = 0; r < longer.ny; ++r) {
-      if (k >= z && k < box.nz + z && r >= y && r < box.ny + y)
-        for (const std::uint32_t c : box.row(r - y, k - z)) slice.change.push_back(c + x);
-      slice.row_offset.push_back(static_cast<std::uint32_t>(slice.change.size()));
-    }
-    longer.append(slice);
-  }
-  return longer;
-}
 
 /// Flow through one box along an axis, m2.
 Result<Darcy> flow_along(const VoxelView& box, int axis, const FlowRequest& request, const std::function<bool(double)>& tell) {
   const auto a = static_cast<std::size_t>(axis);
   const VoxelStack longer = box.periodic[a] ? VoxelStack() : with_fluid_at_ends(box, axis);
   const VoxelView used = box.periodic[a] ? box : longer.view();
-  const Result<stokes::Grid> grid = stokes::make_grid(used, kFiner, kLevels);
+  const Result<stokes::Grid> grid = stokes::make_grid(used, kFiner, kFlowLevels);
   if (!grid) return grid.error();
   stokes::Field field = stokes::field_of(grid->cells);
   stokes::FlowOptions options;
@@ -78,6 +56,27 @@ void add_error(const Darcy& coarse, double ratio, double least, int axis, Darcy&
 
 }  // namespace
 
+VoxelStack with_fluid_at_ends(const VoxelView& box, int axis) {
+  VoxelStack longer(box.nx, box.ny, box.edge, box.periodic);
+  longer.periodic[static_cast<std::size_t>(axis)] = true;
+  const std::uint32_t x = axis == 0 ? kFluidAtEnds : 0, y = axis == 1 ? kFluidAtEnds : 0, z = axis == 2 ? kFluidAtEnds : 0;
+  longer.nx += 2 * x;
+  longer.ny += 2 * y;
+  Runs slice;
+  slice.columns = longer.nx;
+  for (std::uint32_t k = 0; k < box.nz + 2 * z; ++k) {
+    slice.row_offset.assign(1, 0);
+    slice.change.clear();
+    for (std::uint32_t r = 0; r < longer.ny; ++r) {
+      if (k >= z && k < box.nz + z && r >= y && r < box.ny + y)
+        for (const std::uint32_t c : box.row(r - y, k - z)) slice.change.push_back(c + x);
+      slice.row_offset.push_back(static_cast<std::uint32_t>(slice.change.size()));
+    }
+    longer.append(slice);
+  }
+  return longer;
+}
+
 Result<PoreReport> look_at_pores(const PoreRasters& rasters, const FlowRequest& request,
                                  const std::function<bool(double)>& tell) {
   const VoxelView &voxels = rasters.voxels, &fine = rasters.fine, &coarse = rasters.coarse;
@@ -88,7 +87,8 @@ Result<PoreReport> look_at_pores(const PoreRasters& rasters, const FlowRequest& 
   for (std::size_t a = 0; a < 3; ++a)
     if (!fine.periodic[a]) ends = std::max(ends, 2 * kFluidAtEnds / kFiner * voxels.voxels() / voxels.size()[a]);
   // Cells at walls count whose middles are solid, and so do distances for throats.
-  const std::uint64_t bytes = stokes::bytes_of_flow(report.empty + report.empty / 8 + ends) + 5 * voxels.voxels();
+  const auto bytes_of = request.inertia ? stokes::bytes_of_inertia : stokes::bytes_of_flow;
+  const std::uint64_t bytes = bytes_of(report.empty + report.empty / 8 + ends) + 5 * voxels.voxels();
   if (bytes > request.memory_bytes) {
     const double larger = std::cbrt(static_cast<double>(bytes) / static_cast<double>(request.memory_bytes));
     return Error{Fault::kUsage,

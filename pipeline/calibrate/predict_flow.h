@@ -45,6 +45,7 @@ struct FlowRequest {
   std::array<bool, 3> axes{true, true, true};
   double tolerance = 1e-4;
   std::uint64_t memory_bytes = std::uint64_t{1} << 30;
+  bool inertia = false;  // counts its memory too
 };
 
 /// Along axes that do not repeat, walls close the sides of the window, and fluid stands before its ends.
@@ -53,5 +54,10 @@ struct FlowRequest {
 /// cost    of stokes::solve() for each axis and window
 Result<PoreReport> look_at_pores(const PoreRasters& rasters, const FlowRequest& request,
                                  const std::function<bool(double)>& tell);
+
+/// The box with fluid before both ends of an axis, which repeats then.
+VoxelStack with_fluid_at_ends(const VoxelView& box, int axis);
+
+inline constexpr std::uint32_t kFlowLevels = 8;  // of the solver
 
 }  // namespace lamina::pipeline

@@ -18,8 +18,9 @@ constexpr std::uint32_t kBlock = 8;  // cells whose products are summed in singl
 /// one, none of them scaled; w the directions, to be multiplied by `w_scale_`; u what is solved for.
 class MinimalResiduals {
  public:
-  MinimalResiduals(const Grid& grid, int axis)
+  MinimalResiduals(const Grid& grid, int axis, const Field* force)
       : grid_(grid),
+        force_(force),
         count_(grid.cells.size()),
         axis_(axis),
         stokes_(grid.cells),
@@ -91,6 +92,7 @@ class MinimalResiduals {
 
  private:
   Four force(std::uint32_t i) const {
+    if (force_ != nullptr) return (*force_)[i];
     Four force{};
     force[axis_] = stokes_.exists(i)[axis_];
     return force;
@@ -153,6 +155,7 @@ class MinimalResiduals {
   }
 
   const Grid& grid_;
+  const Field* force_;
   std::uint32_t count_;
   int axis_;
   Operator stokes_;
@@ -192,8 +195,8 @@ void measure(const Cells& cells, int axis, const Field& u, Flow& flow) {
 
 }  // namespace
 
-Result<Flow> solve(const Grid& grid, int axis, const FlowOptions& options, Field& field) {
-  MinimalResiduals run(grid, axis);
+Result<Flow> solve(const Grid& grid, int axis, const FlowOptions& options, Field& field, const Field* force) {
+  MinimalResiduals run(grid, axis, force);
   Flow flow;
   const double whole = run.norm_of_force();
   if (whole > 0) {

@@ -29,11 +29,12 @@ struct Flow {
 /// becomes the velocities and pressures. The same digits for any number of threads. axis     of the force returns  a Flow whose
 /// residual is above the tolerance if the steps did not suffice, or single precision: it ends at about
 ///          1e-7 of the square of a pore's width in voxels, which the mean velocity hardly feels
+/// force    of each face, with a source of mass in the fourth lane, in place of the uniform one; null: none
 /// errors   kInterrupted: by progress
 /// source   C. C. Paige, M. A. Saunders, "Solution of sparse indefinite systems of linear equations", SIAM J. Numer. Anal. 12
 ///          (1975), preconditioned as in H. C. Elman, D. J. Silvester, A. J. Wathen (2014), algorithm 4.1
 /// cost     some hundred steps, more for windows of many pores; 140 bytes a cell with the grid
-Result<Flow> solve(const Grid& grid, int axis, const FlowOptions& options, Field& field);
+Result<Flow> solve(const Grid& grid, int axis, const FlowOptions& options, Field& field, const Field* force = nullptr);
 
 /// The bytes a cell that a step reads and writes at least: neighbours and walls of the cell for the product, 32 and 48 of
 /// fields; then six fields read and three written; then walls, one field read and one written.

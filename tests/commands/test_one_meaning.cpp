@@ -171,6 +171,7 @@ TEST_F(OneMeaning, OptionsThatDoNothingHereAreRefused) {
       {"preview out --swath 1 --count 3 -o a.png", "--swath: is drawn in one layer"},
       {"permeability drops.csv --length 5 --area 3 --diameter 3", "--area and --diameter exclude each other"},
       {"permeability drops.csv --voxel 5", "--voxel is for toolpaths"},
+      {"permeability drops.csv --inertia", "--inertia is for toolpaths"},
       {"permeability beads.gcode --length 5", "--length is for tables"},
       {"permeability beads.gcode --window 2,3", "--window: want three lengths"},
       {"permeability beads.gcode --window 2,3,50", "--window: 50.000 mm along z are more than the print has"},

@@ -50,6 +50,7 @@ CommandSpec permeability_spec() {
        {"laid", "told"}},
       {"--machine", "NAME", "printer that lays them; default: the one that the file names", "", "Toolpaths"},
       {"--memory", "SIZE", "that the flow may take, as in 2G", "1G", "Toolpaths"},
+      {"--inertia", "", "Forchheimer's k2 along z too, from six flows of air", "", "Toolpaths"},
       {"--plot", "FILE", "draw points and parabola, as .svg or .png", "", "Result"},
       {"--overwrite", "", "replace a file that lamina did not write", "", "Result"},
       {"--json", "", "print the result as one JSON object on stdout", "", "Result"}};
@@ -154,6 +155,7 @@ Outcome predict(const Arguments& arguments, Context& context) {
     if (arguments.has(flag))
       return Error{Fault::kUsage, fmt::format("{} is for tables of measurements, not for toolpaths", flag)};
   FlowRequest request;
+  request.inertia = arguments.has("--inertia");
   if (Status status = arguments.read("--memory", read_bytes, request.memory_bytes); !status) return status.error();
   const Result<read::GcodeFile> file = read::GcodeFile::open(arguments.operands.front());
   if (!file) return file.error();
@@ -178,6 +180,14 @@ Outcome predict(const Arguments& arguments, Context& context) {
   const std::atomic<bool>& cancel = context.cancel();
   const Result<PoreReport> report = look_at_pores({cut[0], cut[1], cut[2]}, request, [&](double) { return !cancel; });
   if (!report) return Error{report.error().fault, fmt::format("{}: {}", arguments.operands.front(), report.error().message)};
+  std::optional<Forchheimer> inertia;
+  if (request.inertia) {
+    Result<Forchheimer> found = look_at_inertia({cut[0], cut[1], cut[2]}, *report, [&](double) { return !cancel; });
+    if (!found && found.error().fault != Fault::kInput) return found.error();
+    if (!found) context.say("note: " + found.error().message);
+    if (found && !found->settled) context.say("note: the fastest flow found no steady state; k2 is of those before");
+    if (found) inertia = std::move(*found);
+  }
   if (pile->skipped > 0) {
     context.say(
         fmt::format("note: {} layers that do not lie above those before are left out, as of parts printed one after the other",
@@ -188,7 +198,10 @@ Outcome predict(const Arguments& arguments, Context& context) {
     if (darcy && darcy->residual > 1e-2) context.say("note: the flow was not solved to its end; take a smaller --window");
   }
   context.say(beads->told);
-  return arguments.has("--json") ? context.give(as_json(*choice, *report)) : context.print(as_text(*choice, *report));
+  if (!arguments.has("--json")) return context.print(as_text(*choice, *report) + (inertia ? as_text(*inertia) : ""));
+  Json json = as_json(*choice, *report);
+  if (inertia) json["inertia"] = as_json(*inertia);
+  return context.give(json);
 }
 
 bool is_gcode(const std::string& path) {
@@ -200,7 +213,7 @@ bool is_gcode(const std::string& path) {
 Outcome run_permeability(const Arguments& arguments, Context& context) {
   if (arguments.operands.size() != 1) return Error{Fault::kUsage, "name one file of measurements, or of toolpaths"};
   if (is_gcode(arguments.operands.front())) return predict(arguments, context);
-  for (const char* flag : {"--window", "--voxel", "--beads", "--machine", "--memory"})
+  for (const char* flag : {"--window", "--voxel", "--beads", "--machine", "--memory", "--inertia"})
     if (arguments.has(flag))
       return Error{Fault::kUsage, fmt::format("{} is for toolpaths, not for tables of measurements", flag)};
   return fit_table(arguments, context);

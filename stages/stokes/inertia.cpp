@@ -1,0 +1,219 @@
+#include "stages/stokes/inertia.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+#include <vector>
+
+#include "stages/stokes/convection.h"
+#include "stages/stokes/flow.h"
+#include "stages/stokes/sums.h"
+
+namespace lamina::stokes {
+namespace {
+
+constexpr std::size_t kMost = 16;     // vectors of a Krylov space
+constexpr double kInexact = 0.1;      // what is left of Newton's equations, relative
+constexpr double kOfCreeping = 0.02;  // the same of the creeping flows within, relative
+
+/// Of velocities.
+double dot(std::uint32_t count, const Field& x, const Field& y) {
+  return sum_of_pieces(count, [&](std::uint32_t begin, std::uint32_t end) {
+    double sum = 0;
+    for (std::uint32_t i = begin; i < end; ++i)
+      sum += double{x[i][0]} * y[i][0] + double{x[i][1]} * y[i][1] + double{x[i][2]} * y[i][2];
+    return sum;
+  });
+}
+
+void add(std::uint32_t count, double factor, const Field& x, Field& y) {
+  const auto by = static_cast<float>(factor);
+  for_pieces(count, [&](std::uint32_t begin, std::uint32_t end) {
+    for (std::uint32_t i = begin; i < end; ++i) y[i] += by * x[i];
+  });
+}
+
+void scale(std::uint32_t count, double factor, Field& x) {
+  const auto by = static_cast<float>(factor);
+  for_pieces(count, [&](std::uint32_t begin, std::uint32_t end) {
+    for (std::uint32_t i = begin; i < end; ++i) x[i] *= by;
+  });
+}
+
+/// Least squares of a Hessenberg matrix, column by column.
+class SmallestSum {
+ public:
+  explicit SmallestSum(double right) { right_[0] = right; }
+
+  /// column  of `size` + 1 entries. returns  the norm of what is left then
+  double take(std::size_t size, std::array<double, kMost + 1> column) {
+    for (std::size_t k = 0; k + 1 < size; ++k) turn(k, column[k], column[k + 1]);
+    const double length = std::hypot(column[size - 1], column[size]);
+    cosine_[size - 1] = length > 0 ? column[size - 1] / length : 1;
+    sine_[size - 1] = length > 0 ? column[size] / length : 0;
+    turn(size - 1, column[size - 1], column[size]);
+    turn(size - 1, right_[size - 1], right_[size]);
+    triangle_[size - 1] = column;
+    return std::abs(right_[size]);
+  }
+  std::array<double, kMost> solution(std::size_t size) const {
+    std::array<double, kMost> x{};
+    for (std::size_t k = size; k-- > 0;) {
+      double sum = right_[k];
+      for (std::size_t c = k + 1; c < size; ++c) sum -= triangle_[c][k] * x[c];
+      x[k] = triangle_[k][k] != 0 ? sum / triangle_[k][k] : 0;
+    }
+    return x;
+  }
+
+ private:
+  void turn(std::size_t k, double& upper, double& lower) const {
+    const double above = cosine_[k] * upper + sine_[k] * lower;
+    lower = cosine_[k] * lower - sine_[k] * upper;
+    upper = above;
+  }
+  std::array<std::array<double, kMost + 1>, kMost> triangle_{};
+  std::array<double, kMost + 1> right_{};
+  std::array<double, kMost> cosine_{}, sine_{};
+};
+
+/// Newton's method: each step by minimal residuals in the space of what creeping flow answers to inertia. That answer is smooth
+/// whatever the voxels are, so few vectors do. See the source in inertia.h.
+class Newton {
+ public:
+  Newton(const Grid& grid, int axis, double inertia, const InertiaOptions& options, Field& field)
+      : grid_(grid),
+        count_(grid.cells.size()),
+        axis_(axis),
+        inertia_(static_cast<float>(inertia)),
+        options_(options),
+        field_(field),
+        stokes_(grid.cells),
+        convection_(grid.cells),
+        force_(field_of(grid.cells)),
+        step_(field_of(grid.cells)) {
+    basis_.push_back(field_of(grid.cells));
+  }
+
+  Result<InertialFlow> run() {
+    if (Status status = look(); !status) return status.error();
+    bool better = true;
+    while (!flow_.settled && better && flow_.rounds < options_.most_rounds) {
+      ++flow_.rounds;
+      const double before = flow_.change;
+      if (Status status = find_step(); !status) return status.error();
+      add(count_, 1, step_, field_);
+      if (Status status = look(); !status) return status.error();
+      // Where a step leads away, a part of it may lead on.
+      for (double share = 0.5; !(flow_.change < before) && share > 0.1; share /= 2) {
+        add(count_, -share, step_, field_);
+        if (Status status = look(); !status) return status.error();
+      }
+      better = flow_.change < before;
+    }
+    for (int a = 0; a < 3; ++a)
+      flow_.permeability[static_cast<std::size_t>(a)] = sum_of(a) / static_cast<double>(grid_.cells.voxels());
+    return flow_;
+  }
+
+ private:
+  double sum_of(int lane) const {
+    return sum_of_pieces(count_, [&](std::uint32_t begin, std::uint32_t end) {
+      double sum = 0;
+      for (std::uint32_t i = begin; i < end; ++i) sum += double{field_[i][lane]};
+      return sum;
+    });
+  }
+
+  /// The creeping flow that force_ drives.
+  Status creep(Field& result) {
+    std::fill(result.begin(), result.end(), Four{});
+    FlowOptions creeping;
+    creeping.tolerance = kOfCreeping;
+    creeping.progress = [&](std::uint32_t, double) {
+      return !options_.progress || options_.progress(flow_.rounds, flow_.change);
+    };
+    const Result<Flow> added = solve(grid_, axis_, creeping, result, &force_);
+    if (!added) return added.error();
+    flow_.steps += added->steps;
+    return {};
+  }
+
+  /// Makes the first vector what creeping flow answers to what the equations lack.
+  Status look() {
+    for_pieces(count_, [&](std::uint32_t begin, std::uint32_t end) {
+      for (std::uint32_t i = begin; i < end; ++i) {
+        Four force{};
+        force[axis_] = stokes_.exists(i)[axis_];
+        force_[i] = force - stokes_.at(field_, i) - inertia_ * convection_.at(field_, field_, i);
+      }
+    });
+    if (Status status = creep(basis_[0]); !status) return status;
+    lack_ = std::sqrt(dot(count_, basis_[0], basis_[0]));
+    const double whole = std::sqrt(dot(count_, field_, field_));
+    flow_.change = lack_ == 0 ? 0 : lack_ / whole;  // infinite at rest: the first step cannot be worse
+    flow_.settled = flow_.change <= options_.tolerance;
+    return {};
+  }
+
+  /// The step that makes what is lacking smallest, in a space that grows until it is small enough.
+  Status find_step() {
+    SmallestSum least(lack_);
+    scale(count_, 1 / lack_, basis_[0]);
+    std::size_t size = 0;
+    for (double left = lack_; size < kMost && left > kInexact * lack_;) {
+      const Field& last = basis_[size];
+      for_pieces(count_, [&](std::uint32_t begin, std::uint32_t end) {
+        for (std::uint32_t i = begin; i < end; ++i)
+          force_[i] = inertia_ * (convection_.at(field_, last, i) + convection_.at(last, field_, i));
+      });
+      if (basis_.size() == size + 1) basis_.push_back(field_of(grid_.cells));
+      if (Status status = creep(basis_[size + 1]); !status) return status;
+      left = least.take(size + 1, make_next(size));
+      ++size;
+    }
+    std::fill(step_.begin(), step_.end(), Four{});
+    const auto share = least.solution(size);
+    for (std::size_t k = 0; k < size; ++k) add(count_, share[k], basis_[k], step_);
+    return {};
+  }
+
+  /// Adds the last vector to what creeping flow answers to it, and makes that stand upright on all vectors.
+  /// returns  its shares of them
+  std::array<double, kMost + 1> make_next(std::size_t last) {
+    Field& next = basis_[last + 1];
+    add(count_, 1, basis_[last], next);
+    std::array<double, kMost + 1> share{};
+    for (std::size_t k = 0; k <= last; ++k) {
+      share[k] = dot(count_, next, basis_[k]);
+      add(count_, -share[k], basis_[k], next);
+    }
+    share[last + 1] = std::sqrt(dot(count_, next, next));
+    if (share[last + 1] > 0) scale(count_, 1 / share[last + 1], next);
+    return share;
+  }
+
+  const Grid& grid_;
+  std::uint32_t count_;
+  int axis_;
+  float inertia_;
+  const InertiaOptions& options_;
+  Field& field_;
+  Operator stokes_;
+  Convection convection_;
+  Field force_, step_;
+  std::vector<Field> basis_;  // orthogonal, length 1: for velocities
+  double lack_ = 0;           // length of the first one before it was made 1
+  InertialFlow flow_;
+};
+
+}  // namespace
+
+Result<InertialFlow> solve_with_inertia(const Grid& grid, int axis, double inertia, const InertiaOptions& options,
+                                        Field& field) {
+  return Newton(grid, axis, inertia, options, field).run();
+}
+
+std::uint64_t bytes_of_inertia(std::uint64_t cells) { return bytes_of_flow(cells) + (kMost + 8) * sizeof(Four) * cells; }
+
+}  // namespace lamina::stokes

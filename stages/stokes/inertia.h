@@ -1,0 +1,45 @@
+// stages/stokes/inertia.h: steady flow with inertia through the void of a box of voxels.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <functional>
+
+#include "stages/data/status.h"
+#include "stages/stokes/cells.h"
+#include "stages/stokes/operator.h"
+
+namespace lamina::stokes {
+
+struct InertiaOptions {
+  double tolerance = 1e-4;         // of the velocities: what a creeping flow would change, relative
+  std::uint32_t most_rounds = 40;  // where it does not settle, the flow may have no steady state
+  std::function<bool(std::uint32_t round, double change)> progress;  // false ends the work; may be empty
+};
+
+/// Flow that a uniform force along one axis drives, in units that make viscosity, force and the shortest edge of a voxel 1.
+struct InertialFlow {
+  std::array<double, 3> permeability{};  // apparent: mean velocity over the whole box along x, y, z; in squared units
+  double change = 0;                     // that creeping flow answers to what the equations lack; root of the mean square
+  bool settled = false;                  // the change is within the tolerance
+  std::uint32_t rounds = 0, steps = 0;   // Newton's; of minimal residuals for creeping flows
+};
+
+/// Solves the steady Navier-Stokes equations, inertia (u . grad) u - div grad u + grad p = 1 along the axis, div u = 0, from
+/// `field` on, which becomes velocities and pressures: zero, or that of a smaller force. By Newton's method; its equations by
+/// minimal residuals (GMRES), with creeping flow as the preconditioner. The same digits for any number of threads.
+///
+/// inertia  density x force per volume x (shortest edge)^3 / viscosity^2; 0 is creeping flow
+/// returns  a flow that is not settled if the rounds did not suffice, or no step leads on
+/// errors   kInterrupted: by progress
+/// source   Y. Saad, M. H. Schultz, "GMRES: a generalized minimal residual algorithm for solving nonsymmetric linear systems",
+///          SIAM J. Sci. Stat. Comput. 7 (1986); R. S. Dembo, S. C. Eisenstat, T. Steihaug, "Inexact Newton methods", SIAM J.
+///          Numer. Anal. 19 (1982); H. C. Elman, D. J. Silvester, A. J. Wathen (2014), 8 and 9
+/// cost     3 to 8 rounds of 5 to 17 creeping flows of little exactness, more with more inertia; see bytes_of_inertia()
+Result<InertialFlow> solve_with_inertia(const Grid& grid, int axis, double inertia, const InertiaOptions& options,
+                                        Field& field);
+
+/// The bytes that solve_with_inertia() and its grid take.
+std::uint64_t bytes_of_inertia(std::uint64_t cells);
+
+}  // namespace lamina::stokes
