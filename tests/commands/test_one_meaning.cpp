@@ -178,6 +178,8 @@ TEST_F(OneMeaning, OptionsThatDoNothingHereAreRefused) {
       {"permeability beads.gcode --window 2,3", "--window: want three lengths"},
       {"permeability beads.gcode --window 2,3,50", "--window: 50.000 mm along z are more than the print has"},
       {"permeability beads.gcode --window 90,3,1", "--window: 90.000 mm along x are more than the print has"},
+      {"info part.stl --density 1.2", "--density: is of toolpaths"},
+      {"info beads.gcode --scale 2", "--scale: is of parts"},
       {"info part.stl --repair off --weld 3", "--weld: is of repair"},
       {"export part.stl --no-repair --weld 3 -o x.stl", "--weld: is of repair"},
       {"export part.stl --at 1,1 --gap 3 -o x.stl", "--gap: is between parts"},

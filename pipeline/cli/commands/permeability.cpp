@@ -5,6 +5,7 @@
 
 #include "pipeline/calibrate/bead_voxels.h"
 #include "pipeline/calibrate/drops_page.h"
+#include "pipeline/calibrate/laid_look.h"
 #include "pipeline/calibrate/pore_page.h"
 #include "pipeline/calibrate/predict_flow.h"
 #include "pipeline/calibrate/window_choice.h"
@@ -169,13 +170,16 @@ Outcome predict(const Arguments& arguments, Context& context) {
   if (!wish) return wish.error();
   const Result<WindowChoice> choice = choose_window(*file, *pile, *wish);
   if (!choice) return choice.error();
-  const Result<VoxelStack> fine = bead_voxels(*file, *pile, choice->window);
+  const CutWindow cut = [&](const Window& window) { return bead_voxels(*file, *pile, window); };
+  const Result<VoxelStack> fine = cut(choice->window);
   if (!fine) return fine.error();
-  const Result<VoxelStack> coarse = bead_voxels(*file, *pile, with_half_as_many_voxels(choice->window));
+  const Result<VoxelStack> coarse = cut(with_half_as_many_voxels(choice->window));
   if (!coarse) return coarse.error();
   const std::atomic<bool>& cancel = context.cancel();
   const Result<PoreReport> report = look_at_pores(*fine, *coarse, request, [&](double) { return !cancel; });
   if (!report) return Error{report.error().fault, fmt::format("{}: {}", arguments.operands.front(), report.error().message)};
+  const Result<LaidLook> look = look_at_laid(*file, *pile, *fine, cut);
+  if (!look) return look.error();
   if (pile->skipped > 0) {
     context.say(
         fmt::format("note: {} layers that do not lie above those before are left out, as of parts printed one after the other",
@@ -186,18 +190,15 @@ Outcome predict(const Arguments& arguments, Context& context) {
     if (darcy && darcy->residual > 1e-2) context.say("note: the flow was not solved to its end; take a smaller --window");
   }
   if (!file->tells_widths()) context.say("note: the file tells no widths; they are those of what it feeds");
-  return arguments.has("--json") ? context.give(as_json(*choice, *report)) : context.print(as_text(*choice, *report));
-}
-
-bool is_gcode(const std::string& path) {
-  for (const char* ending : {".gcode", ".GCODE", ".gco", ".g", ".nc"})
-    if (path.ends_with(ending)) return true;
-  return false;
+  if (!arguments.has("--json")) return context.print(as_text(*choice, *report) + as_text(*look));
+  Json json = as_json(*choice, *report);
+  add_to(*look, json);
+  return context.give(json);
 }
 
 Outcome run_permeability(const Arguments& arguments, Context& context) {
   if (arguments.operands.size() != 1) return Error{Fault::kUsage, "name one file of measurements, or of toolpaths"};
-  if (is_gcode(arguments.operands.front())) return predict(arguments, context);
+  if (names_toolpaths(arguments.operands.front())) return predict(arguments, context);
   for (const char* flag : {"--window", "--voxel", "--memory"})
     if (arguments.has(flag))
       return Error{Fault::kUsage, fmt::format("{} is for toolpaths, not for tables of measurements", flag)};

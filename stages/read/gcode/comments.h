@@ -17,9 +17,12 @@ namespace lamina::read {
 ///     ;Filament used: 1.3m 9.1g            Cura up to 15.04: what a metre weighs tells 1.75 mm from 2.85 mm
 ///     ;FLAVOR:Griffin                      CuraEngine: printers for 2.85 mm
 ///     ;FLAVOR:UltiGCode                    CuraEngine: E counts mm3; so does "; use_volumetric_e = 1" of PrusaSlicer
+///     ; filament_density = 1.24,1.24       PrusaSlicer, Orca; with a colon BambuStudio
+///     ; filament used [cm3] = 1.23         lamina, PrusaSlicer: density by what [g] of it weigh
 struct SlicerFacts {
-  double filament_mm = 0;  // diameter; 0 if untold
-  double nozzle_mm = 0;    // 0 if untold
+  double filament_mm = 0;    // diameter; 0 if untold
+  double nozzle_mm = 0;      // 0 if untold
+  double density_g_cm3 = 0;  // 0 if untold
   bool volumetric = false;
 
   /// Takes a line that begins with a semicolon.
@@ -29,6 +32,8 @@ struct SlicerFacts {
   /// How sure a way to know the diameter is.
   enum class Source : std::uint8_t { kNone, kFlavor, kWeight, kProfile, kSetting };
   Source source_ = Source::kNone;
+  double used_cm3_ = 0;
+  void tell_density(double g_cm3);
   void tell_filament(double diameter_mm, Source source);
   void read_flavor(std::string_view flavor);
   void read_weight(std::string_view used);
