@@ -154,8 +154,9 @@ Result<Report> make_report(const std::string& path, const ReportOptions& options
   std::uint64_t taken = (views.empty() ? 150'000 : 50'000) + 150 * manifest.layers.size();
   for (const ShownView& view : views) taken += view.deflated.size() / 3 * 4;
   HeldLayers held(options.size_limit > taken ? options.size_limit - taken : 0);
-  const auto seen = see_layers(*source, doubts, held);
+  auto seen = see_layers(*source, doubts, held);
   if (!seen) return seen.error();
+  seen->laid = options.laid;
   if (views.empty()) {
     auto built = build_up(*source, seen->window);
     if (!built) return built.error();

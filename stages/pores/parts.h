@@ -14,6 +14,14 @@ using Faces = std::uint8_t;
 constexpr Faces faces_of(int axis) { return static_cast<Faces>(3 << (2 * axis)); }
 inline constexpr Faces kFacesX = faces_of(0), kFacesY = faces_of(1), kFacesZ = faces_of(2), kAllFaces = 63;
 
+/// What touches one of the faces or, on a periodic axis of these, leads around it.
+/// touched, wraps  as of a part
+inline bool reached(Faces touched, std::uint8_t wraps, Faces outside) {
+  for (int axis = 0; axis < 3; ++axis)
+    if ((outside & faces_of(axis)) != 0 && (wraps >> axis & 1) != 0) return true;
+  return (touched & outside) != 0;
+}
+
 /// Parts of a box: voxels hang together if they share a face, across the ends of a periodic axis too. Parts count in the order
 /// of their first runs.
 ///
@@ -30,6 +38,7 @@ struct Parts {
 
   std::size_t size() const { return voxels.size(); }
   std::uint32_t part_of(std::size_t run) const { return part[piece[run - first_run]]; }
+  bool is_reached(std::size_t p, Faces outside) const { return reached(faces[p], wraps[p], outside); }
   /// It leads from one end of the box to the other: touches both faces, or goes around if the axis is periodic.
   bool through(std::size_t p, int axis) const {
     return (wraps[p] >> axis & 1) != 0 || (faces[p] & faces_of(axis)) == faces_of(axis);

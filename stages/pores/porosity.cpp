@@ -14,11 +14,9 @@ Porosity porosity(const VoxelView& solid, const VoxelView* body, Faces outside) 
   result.voxel_mm3 = mm(solid.edge[0]) * mm(solid.edge[1]) * mm(solid.edge[2]);
   result.parts = static_cast<std::uint32_t>(parts.size());
   for (std::size_t p = 0; p < parts.size(); ++p) {
-    bool is_open = open[p] != 0 || (parts.faces[p] & outside) != 0;
-    for (int axis = 0; axis < 3; ++axis) {
-      is_open = is_open || ((outside & faces_of(axis)) != 0 && (parts.wraps[p] >> axis & 1) != 0);
+    const bool is_open = open[p] != 0 || parts.is_reached(p, outside);
+    for (int axis = 0; axis < 3; ++axis)
       if (parts.through(p, axis)) result.through[static_cast<std::size_t>(axis)] += parts.voxels[p];
-    }
     result.empty += parts.voxels[p];
     if (is_open) result.open += parts.voxels[p];
     if (!is_open) ++result.cavities;

@@ -69,6 +69,7 @@ class GcodeSurvey {
   GcodeFile file_;
   GcodeCommands walk_;
   LayerCutter cutter_;
+  std::array<double, 2> fed_{};  // by all beads: mm of filament, mm3
 };
 
 void GcodeSurvey::add_to_box(const RawBead& raw) {
@@ -103,12 +104,13 @@ Status GcodeSurvey::read_all() {
   std::optional<RawBead> raw;
   while (walk_.next(raw)) {
     if (walk_.layer_tag) {
-      if (!cutter_.tagged()) file_.box_ = Box();  // what start code lays belongs to no layer
+      if (!cutter_.tagged()) file_.box_ = Box(), fed_ = {};  // what start code lays belongs to no layer
       cutter_.tag(walk_.before());
     } else {
       cutter_.add(*raw, walk_.before(), walk_.place());
       file_.tells_widths_ |= walk_.place().width > 0;
       add_to_box(*raw);
+      fed_[raw->volumetric ? 1 : 0] += raw->fed;
     }
     if (Status status = check_limits(); !status) return status;
   }
@@ -127,6 +129,8 @@ void GcodeSurvey::take_filament() {
   if (options_.filament_mm > 0) file_.filament_mm_ = options_.filament_mm;
   file_.volumetric_ = facts.volumetric;
   file_.machine_ = facts.machine;
+  file_.density_g_cm3_ = facts.density_g_cm3;
+  file_.fed_mm3_ = fed_[0] * volume_of_unit(facts.volumetric, file_.filament_mm_) + fed_[1];
 }
 
 /// Over the length of all beads whose widths no tag tells; 0 if there is none.

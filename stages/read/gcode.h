@@ -62,6 +62,9 @@ class GcodeFile {
   bool tells_filament() const { return tells_filament_; }
   /// The printer's name, as lamina's files tell it; "" of others.
   const std::string& machine() const { return machine_; }
+  /// What all beads take, mm3; without what start code lays, and priming on the spot.
+  double fed_mm3() const { return fed_mm3_; }
+  double density_g_cm3() const { return density_g_cm3_; }  // of the filament, as comments tell it; 0: untold
   /// What a person should know of the drawing, one line each: thin beads, spirals, arcs on which firmwares differ.
   const std::vector<std::string>& notes() const { return notes_; }
   /// errors  kUsage: no such layer, the file has changed
@@ -99,7 +102,7 @@ class GcodeFile {
   std::string machine_;
   Box box_;
   bool tells_widths_ = false, tells_filament_ = false, volumetric_ = false;
-  double filament_mm_ = 1.75;
+  double filament_mm_ = 1.75, fed_mm3_ = 0, density_g_cm3_ = 0;
 };
 
 }  // namespace lamina::read

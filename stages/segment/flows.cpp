@@ -35,7 +35,7 @@ double unit_of(std::string name, const Unit (&units)[N]) {
 struct Columns {
   std::vector<std::string> names;
   std::vector<double> drop_units;  // of each; 0: no pressure drop
-  std::size_t flow = SIZE_MAX, group = SIZE_MAX;
+  std::size_t flow = SIZE_MAX, group = SIZE_MAX, sample = SIZE_MAX;
   double flow_unit = 0;  // SI
   bool velocity = false;
 
@@ -45,6 +45,7 @@ struct Columns {
     drop_units.assign(names.size(), 0);
     for (std::size_t i = 0; i < names.size(); ++i) {
       if (names[i] == "configuration") group = i;
+      if (names[i] == "sample") sample = i;
       drop_units[i] = unit_of(names[i], kDrops);
       if (drop_units[i] > 0 || flow != SIZE_MAX) continue;
       flow_unit = unit_of(names[i], kFlows);
@@ -56,7 +57,24 @@ struct Columns {
     if (std::ranges::max(drop_units) > 0) return {};
     return "no column of pressure drops (drop_pa, drop_kpa, drop_mbar, drop_bar, drop_psi)";
   }
+
+  /// The name of the sample that a drop belongs to; "" if there is no telling.
+  std::string sample_of(const std::vector<std::string>& cells, std::size_t drop) const {
+    if (sample != SIZE_MAX) return cells[sample].empty() ? "unnamed" : cells[sample];
+    const auto columns = drop_units.size() - static_cast<std::size_t>(std::ranges::count(drop_units, 0.0));
+    return columns > 1 ? names[drop].substr(0, names[drop].rfind('_')) : std::string();
+  }
 };
+
+constexpr std::size_t kMostSamples = 1000;  // of a group: they are looked for one by one
+
+/// The number of a sample within its group.
+std::uint32_t number_of(const std::string& sample, FlowGroup& group) {
+  if (sample.empty()) return 0;
+  auto place = std::ranges::find(group.samples, sample);
+  if (place == group.samples.end()) place = group.samples.insert(place, sample);
+  return static_cast<std::uint32_t>(place - group.samples.begin());
+}
 
 /// Adds the points of a row to its group. returns "" or what is wrong
 std::string add_row(const Columns& columns, const std::vector<std::string>& cells, const Medium& medium,
@@ -77,7 +95,9 @@ std::string add_row(const Columns& columns, const std::vector<std::string>& cell
     if (columns.drop_units[i] == 0 || cells[i].empty()) continue;
     double drop = 0;
     if (const auto wrong = number(i, -1e12, drop); !wrong.empty()) return wrong;
-    group->points.push_back({velocity, drop * columns.drop_units[i] / medium.length_m});
+    group->points.push_back(
+        {velocity, drop * columns.drop_units[i] / medium.length_m, number_of(columns.sample_of(cells, i), *group)});
+    if (group->samples.size() > kMostSamples) return fmt::format("more than {} samples in one configuration", kMostSamples);
   }
   return {};
 }
@@ -124,7 +144,7 @@ GradientUnit unit_of(double most_pa_m) {
 }
 
 /// Grid lines with their numbers, from 0 to the largest value of each axis.
-void draw_axes(double most_v, double most_y, const GradientUnit& unit, Plot& plot) {
+void draw_axes(double most_v, double most_y, const GradientUnit& unit, bool gas, Plot& plot) {
   const double bottom = kPlotTop + kPlotHeight, v_step = tick_step(most_v, 6), y_step = tick_step(most_y / unit.pa_m, 6);
   for (int i = 0; i * v_step <= most_v * (1 + 1e-9); ++i) {
     const double x = kPlotLeft + kPlotWidth * i * v_step / most_v;
@@ -139,13 +159,13 @@ void draw_axes(double most_v, double most_y, const GradientUnit& unit, Plot& plo
   plot.lines.push_back({{{kPlotLeft, kPlotTop}, {kPlotLeft, bottom}, {kPlotLeft + kPlotWidth, bottom}}, kInk});
   plot.texts.push_back(
       {kPlotLeft + kPlotWidth / 2, bottom + 40, 13, Plot::Anchor::kMiddle, kInk, "superficial velocity (m/s)"});
-  plot.texts.push_back(
-      {10, kPlotTop - 10, 13, Plot::Anchor::kStart, kInk, fmt::format("pressure drop / length ({})", unit.name)});
+  plot.texts.push_back({10, kPlotTop - 10, 13, Plot::Anchor::kStart, kInk,
+                        fmt::format("{} ({})", gas ? "(p_in^2 - p_out^2) / (2 p L)" : "pressure drop / length", unit.name)});
 }
 
 }  // namespace
 
-Plot draw_fit(const FlowGroup& group, const Permeability& fit) {
+Plot draw_fit(const FlowGroup& group, const Permeability& fit, bool gas) {
   double most_v = 0, most_y = 0;
   for (const auto& p : group.points) {
     most_v = std::max(most_v, p.velocity_m_s);
@@ -157,7 +177,7 @@ Plot draw_fit(const FlowGroup& group, const Permeability& fit) {
   plot.width = 640;
   plot.height = 430;
   // No axis where nothing flows or no pressure drops.
-  if (most_v > 0 && most_y > 0) draw_axes(most_v, most_y, unit_of(most_y), plot);
+  if (most_v > 0 && most_y > 0) draw_axes(most_v, most_y, unit_of(most_y), gas, plot);
   auto& curve = plot.lines.emplace_back(Plot::Line{{}, "cc3333"});
   for (int i = 0; i <= 100; ++i) {
     const double v = most_v * i / 100;

@@ -14,6 +14,19 @@ std::string odd_about(const Fluid& fluid) {
       fluid.viscosity_pa_s, fluid.density_kg_m3, fluid.density_kg_m3 / 1.2);
 }
 
+Result<std::vector<FlowPoint>> expanded(std::span<const FlowPoint> points, double length_m, const GasPressures& pressures) {
+  std::vector<FlowPoint> gas(points.begin(), points.end());
+  for (FlowPoint& point : gas) {
+    const double drop = point.gradient_pa_m * length_m, inlet = pressures.outlet_pa + drop;
+    if (!(inlet > 0)) {
+      return Error{Fault::kInput, fmt::format("a drop of {:.4g} Pa from an outlet at {:.6g} Pa leaves no pressure at the inlet",
+                                              drop, pressures.outlet_pa)};
+    }
+    point.gradient_pa_m *= (inlet + pressures.outlet_pa) / (2 * pressures.told_pa);
+  }
+  return gas;
+}
+
 Result<Permeability> fit_permeability(std::span<const FlowPoint> points, const Fluid& fluid) {
   if (points.size() < 3) return Error{Fault::kInput, fmt::format("{} points; a fit needs three or more", points.size())};
   // Velocities in units of their largest, so that both columns are of one size.

@@ -4,6 +4,7 @@
 #include "stages/heights/study/study.h"
 #include "stages/segment/flows.h"
 #include "stages/segment/measured.h"
+#include "stages/segment/samples.h"
 #include "stages/segment/widths_table.h"
 #include "tests/fuzz/laws.h"
 
@@ -66,6 +67,12 @@ bool read_flows(std::string_view text) {
     }
     law(fit->k1_m2 > 0 && fit->k2_m > 0 && std::isfinite(fit->k1_m2) && std::isfinite(fit->k2_m), "coefficients");
     segment::draw_fit(group, *fit);
+    const auto each = segment::fit_group(group, {});
+    law(each.ok() && each->samples.size() + each->left_out.size() <= group.samples.size(), "samples");
+    for (const std::string& line : each->left_out) check_line(line);
+    for (const segment::FlowPoint& point : group.points)
+      law(group.samples.empty() || point.sample < group.samples.size(), "a point of no sample");
+    if (const auto gas = segment::expanded(group.points, 0.01, {}); !gas) check_error(gas.error());
   }
   return true;
 }
@@ -81,6 +88,7 @@ std::vector<std::string> width_seeds() {
 }
 std::vector<std::string> flow_seeds() {
   return {"configuration,flow_l_min,drop_pa,drop2_mbar\na,1,10,0.1\na,2,25,\na,3,45,0.44\na,4,70,\nb,1,5,\nb,2,11,\nb,3,18,\n",
+          "sample;flow_l_min;drop_pa\na;1;10\na;2;25\na;3;45\nb;1;11\nb;2;24\nb;3;46\n;4;9\n",
           "velocity_m_s\tdrop_kpa\n0.1\t1\n0.2\t2.5\n0.3\t4.5\n"};
 }
 
@@ -88,7 +96,8 @@ const Registered kHeights({"table_heights", read_heights, height_seeds, "stages/
 const Registered kWidths({"table_widths", read_widths, width_seeds,
                           "stages/segment/widths_table stages/segment/measured stages/data/text", ".csv", "tables.dict", 1024});
 const Registered kFlows({"table_flows", read_flows, flow_seeds,
-                         "stages/segment/flows stages/segment/permeability stages/data/text", ".csv", "tables.dict", 1024});
+                         "stages/segment/flows stages/segment/permeability stages/segment/samples stages/data/text", ".csv",
+                         "tables.dict", 1024});
 
 }  // namespace
 }  // namespace lamina::fuzz

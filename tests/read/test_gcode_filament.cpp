@@ -22,6 +22,30 @@ std::string line_of(double diameter_mm) {
   return fmt::format("M83\nG1 Z0.2\nG1 X10 E{:.9f}\n", filament_for(10, 0.4, 0.2, diameter_mm));
 }
 
+TEST(GcodeFilament, WhatIsFedAndWhatItsFilamentWeighsIsTold) {
+  const Directory directory;
+  const double area = 1.75 * 1.75 * test::kPi / 4;
+  // Beads alone count: no start code before the first layer, no retraction, no priming.
+  const std::string beads = "M83\nG1 Z0.2\nG1 X10 E9\n;LAYER_CHANGE\nG1 X20 E2\nG1 E-1\nG0 X0\nG1 E1\nG1 X20 E0.5\nG1 E3\n";
+  const auto file = gcode_file(directory, beads);
+  ASSERT_TRUE(file.ok());
+  EXPECT_NEAR(file->fed_mm3(), 2.5 * area, 1e-9);
+  EXPECT_EQ(file->density_g_cm3(), 0);
+  // A diameter that is told behind the beads counts; E of M200 is mm3.
+  EXPECT_NEAR(gcode_file(directory, beads + "; filament_diameter = 2.85\n")->fed_mm3(), 2.5 * 2.85 * 2.85 * test::kPi / 4,
+              1e-9);
+  EXPECT_NEAR(gcode_file(directory, "M200 D1.75\n" + beads)->fed_mm3(), 2.5, 1e-9);
+  const std::vector<std::pair<std::string, double>> told = {
+      {"; filament_density = 1.27,1.24\n", 1.27},
+      {"; filament_density: 1.04\n", 1.04},
+      {"; filament used [cm3] = 2.00\n; filament used [g] = 2.48\n", 1.24},
+      {"; filament_density = 1.3\n; filament used [cm3] = 2.00\n; filament used [g] = 2.48\n", 1.3},
+      {"; filament used [cm3] = 0.01\n; filament used [g] = 0.02\n", 0},  // two digits say nothing of so little
+      {"; filament_density = 0\n", 0}};
+  for (const auto& [text, density] : told)
+    EXPECT_NEAR(gcode_file(directory, beads + text)->density_g_cm3(), density, 1e-9) << text;
+}
+
 TEST(GcodeFilament, EverySlicerTellsItsDiameter) {
   const Directory directory;
   // Made with Python:

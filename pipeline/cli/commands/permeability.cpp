@@ -5,6 +5,8 @@
 
 #include "pipeline/calibrate/bead_rules.h"
 #include "pipeline/calibrate/bead_voxels.h"
+#include "pipeline/calibrate/drops_page.h"
+#include "pipeline/calibrate/laid_look.h"
 #include "pipeline/calibrate/pore_page.h"
 #include "pipeline/calibrate/predict_flow.h"
 #include "pipeline/calibrate/window_choice.h"
@@ -13,25 +15,20 @@
 #include "stages/data/text/json.h"
 #include "stages/data/text/number_text.h"
 #include "stages/data/text/readable.h"
-#include "stages/segment/flows.h"
 
 namespace lamina::pipeline {
 namespace {
-
-struct Settings {
-  segment::Medium medium;
-  segment::Fluid fluid;
-};
 
 CommandSpec permeability_spec() {
   CommandSpec spec;
   spec.summary =
       "Fits dp / L = (mu / k1) v + (rho / k2) v^2 to measured flows and pressure drops: Darcy's k1, Forchheimer's k2,\n"
-      "their standard errors and the quality of the fit. Of G-code, predicts Darcy's k1: cuts what repeats of the beads, or a\n"
-      "window, into voxels and computes how a fluid creeps through their pores.";
+      "their standard errors, the quality of the fit and how far samples differ. Of G-code, predicts Darcy's k1: cuts what\n"
+      "repeats of the beads, or a window, into voxels and computes how a fluid creeps through their pores.";
   spec.operand = "FILE";
   spec.operand_meaning =
       "a table with a header: flow_l_min (or velocity_m_s) and drop_mbar (or _pa, _kpa, _bar, _psi), any number of drop columns;\n"
+      "rows may name their configuration and sample; without a column sample each of several drop columns is one;\n"
       "or toolpaths, as in part.gcode";
   spec.options = {
       {"--length", "MM", "of the medium along the flow", "", "Medium"},
@@ -39,6 +36,9 @@ CommandSpec permeability_spec() {
       {"--area", "MM2", "cross-section, in place of a diameter", "", "Medium"},
       {"--viscosity", "PA.S", "of the fluid", "1.81e-05", "Fluid"},
       {"--density", "KG/M3", "of the fluid", "1.204", "Fluid"},
+      {"--compressible", "", "a gas that expands on its way: (p_in^2 - p_out^2) / (2 p L) too", "", "Fluid"},
+      {"--outlet-pressure", "PA", "absolute, behind the medium", "101325", "Fluid"},
+      {"--flow-pressure", "PA", "p, at which flow and density are told; default: that of the outlet", "", "Fluid"},
       {"--convention", "NAME", "dinisio2022: what reproduces Table 25 of that document", "", "Fluid", {"dinisio2022"}},
       {"--window", "X,Y,Z", "mm of a print to look at; default: what repeats, else 2,2 and eight layers", "", "Toolpaths"},
       {"--voxel", "UM", "edge of a voxel, micrometres", "10", "Toolpaths"},
@@ -55,23 +55,45 @@ CommandSpec permeability_spec() {
       {"--overwrite", "", "replace a file that lamina did not write", "", "Result"},
       {"--json", "", "print the result as one JSON object on stdout", "", "Result"}};
   spec.closing =
-      "Rows of one column `configuration` are fitted group by group. The convention dinisio2022 is L = 25.5 mm, v = Q / 28 in\n"
-      "m/s of L/min (466.67 mm2), 1.87e-5 Pa.s and 998.2 kg/m3, which is water: its k2 is 832 times that of air.\n\n"
+      "Rows of one column `configuration` are fitted group by group, and within it each sample by itself. Standard errors take\n"
+      "all points as independent; where samples differ, the deviation between them tells more. With --compressible both forms are\n"
+      "told, and air has the density that it has at p. The convention dinisio2022 is L = 25.5 mm, v = Q / 28 in\n"
+      "m/s of L/min (466.67 mm2), 1.87e-5 Pa.s and 998.2 kg/m3, which is water: its k2 is 832 times that of air;\n"
+      "with --compressible, an outlet at 102600 Pa.\n\n"
       "Examples:\n  lamina permeability drops.csv --length 25.4 --diameter 25.4\n"
       "  lamina permeability drops.csv --convention dinisio2022 --plot fit.svg\n"
+      "  lamina permeability drops.csv --length 25.4 --diameter 25.4 --compressible --outlet-pressure 95000\n"
       "  lamina permeability part.gcode --voxel 15";
   return spec;
 }
 
+/// Where a gas is measured; air has its density there. errors  kUsage
+Status read_pressures(const Arguments& arguments, segment::DropsSettings& settings) {
+  for (const char* flag : {"--outlet-pressure", "--flow-pressure"}) {
+    if (arguments.has(flag) && !settings.gas)
+      return Error{Fault::kUsage, fmt::format("{}: is of gases that expand; give --compressible too", flag)};
+  }
+  if (!settings.gas) return {};
+  segment::GasPressures& gas = *settings.gas;
+  if (Status status = arguments.read("--outlet-pressure", {1, 1e9}, gas.outlet_pa); !status) return status;
+  gas.told_pa = gas.outlet_pa;
+  if (Status status = arguments.read("--flow-pressure", {1, 1e9}, gas.told_pa); !status) return status;
+  if (!arguments.has("--density") && !arguments.has("--convention")) settings.fluid.density_kg_m3 *= gas.told_pa / 101325;
+  return {};
+}
+
 /// Medium and fluid from the options. errors  kUsage
-Result<Settings> read_settings(const Arguments& arguments) {
+Result<segment::DropsSettings> read_settings(const Arguments& arguments) {
   const auto usage = [](const std::string& what) { return Error{Fault::kUsage, what}; };
-  Settings settings;
+  segment::DropsSettings settings;
+  if (arguments.has("--compressible")) settings.gas.emplace();
   if (arguments.has("--convention")) {
     if (arguments.text("--convention") != "dinisio2022") {
       return usage(fmt::format("--convention: '{}' is none of dinisio2022", one_line(arguments.text("--convention"))));
     }
-    settings = {{0.0255, 1e-3 / 60 * 28}, {1.87e-5, 998.2}};
+    settings.medium = {0.0255, 1e-3 / 60 * 28};
+    settings.fluid = {1.87e-5, 998.2};
+    if (settings.gas) settings.gas->outlet_pa = 102600;
   }
   const auto number = [&](const char* flag, double unit, double& target) {
     double value = 0;
@@ -88,6 +110,7 @@ Result<Settings> read_settings(const Arguments& arguments) {
         number("--density", 1, settings.fluid.density_kg_m3)}) {
     if (!status) return status.error();
   }
+  if (Status status = read_pressures(arguments, settings); !status) return status.error();
   if (diameter > 0) settings.medium.area_m2 = std::numbers::pi / 4 * diameter * diameter;
   if (!(settings.medium.length_m > 0)) return usage("--length is missing; give the medium's length along the flow in mm");
   if (!(settings.medium.area_m2 > 0)) return usage("--diameter or --area is missing; give the medium's cross-section");
@@ -99,37 +122,26 @@ Outcome fit_table(const Arguments& arguments, Context& context) {
   if (Status status = check_plot_name(plot); !status) return status;
   const auto settings = read_settings(arguments);
   if (!settings) return settings.error();
-  const auto groups = segment::read_flows(file, settings->medium);
-  if (!groups) return groups.error();
+  const auto fits = segment::fit_drops(file, *settings);
+  if (!fits) return fits.error();
   Json json = {{"command", "permeability"}, {"fits", Json::array()}, {"warnings", Json::array()}};
   std::string text;
-  for (const segment::FlowGroup& group : *groups) {
-    const auto fit = segment::fit_permeability(group.points, settings->fluid);
-    if (!fit)
-      return Error{fit.error().fault,
-                   fmt::format("{}: {}{}", file, group.name.empty() ? "" : group.name + ": ", fit.error().message)};
-    const double k1 = fit->k1_m2 / segment::kDarcy, k1_error = fit->k1_error_m2 / segment::kDarcy;
-    text += fmt::format(
-        "{}k1   {:.2f} +- {:.2f} D ({:.4e} m2)\nk2   {:.4g} +- {:.2g} m\nfit  R2 {:.6f}, {} points, scatter {:.4g} Pa/m\n",
-        group.name.empty() ? "" : group.name + "\n", k1, k1_error, fit->k1_m2, fit->k2_m, fit->k2_error_m, fit->r_squared,
-        group.points.size(), fit->scatter_pa_m);
-    json["fits"].push_back({{"configuration", group.name},
-                            {"points", group.points.size()},
-                            {"k1_darcy", k1},
-                            {"k1_error_darcy", k1_error},
-                            {"k1_m2", fit->k1_m2},
-                            {"k2_m", fit->k2_m},
-                            {"k2_error_m", fit->k2_error_m},
-                            {"r_squared", fit->r_squared},
-                            {"scatter_pa_m", fit->scatter_pa_m}});
-    if (plot.empty() || &group != &groups->front()) continue;
-    if (Status status = write_plot(plot, draw_fit(group, *fit)); !status) return status;
+  std::vector<std::string> warnings;
+  for (const segment::DropsFit& fit : *fits) {
+    text += as_text(fit);
+    json["fits"].push_back(as_json(fit));
+    warnings.insert(warnings.end(), fit.warnings.begin(), fit.warnings.end());
   }
-  if (!plot.empty() && groups->size() > 1) {
-    context.say(fmt::format("note: {} is of {}, the first of {} configurations", plot, groups->front().name, groups->size()));
+  if (!plot.empty()) {
+    if (Status status = write_plot(plot, draw(fits->front())); !status) return status;
+    if (fits->size() > 1) {
+      context.say(
+          fmt::format("note: {} is of {}, the first of {} configurations", plot, fits->front().group.name, fits->size()));
+    }
   }
-  if (const std::string warning = segment::odd_about(settings->fluid); !warning.empty()) {
-    context.say_text(fmt::format("warning   {}\n", warning));
+  if (std::string warning = segment::odd_about(settings->fluid); !warning.empty()) warnings.push_back(std::move(warning));
+  for (const std::string& warning : warnings) {
+    context.say_text(fmt::format("warning   {}\n", one_line(warning)));
     json["warnings"].push_back(warning);
   }
   return arguments.has("--json") ? context.give(json) : context.print(text);
@@ -151,7 +163,8 @@ Result<WindowWish> read_wish(const Arguments& arguments) {
 }
 
 Outcome predict(const Arguments& arguments, Context& context) {
-  for (const char* flag : {"--length", "--diameter", "--area", "--viscosity", "--density", "--convention", "--plot"})
+  for (const char* flag : {"--length", "--diameter", "--area", "--viscosity", "--density", "--convention", "--plot",
+                           "--compressible", "--outlet-pressure", "--flow-pressure"})
     if (arguments.has(flag))
       return Error{Fault::kUsage, fmt::format("{} is for tables of measurements, not for toolpaths", flag)};
   FlowRequest request;
@@ -169,11 +182,13 @@ Outcome predict(const Arguments& arguments, Context& context) {
   if (!choice) return choice.error();
   const Result<BeadRules> beads = bead_rules(*file, arguments.text("--beads"), arguments.text("--machine"));
   if (!beads) return beads.error();
-  const bead::LayRules* rules = beads->rules ? &*beads->rules : nullptr;
+  const CutWindow cut_window = [&](const Window& window) {
+    return bead_voxels(*file, *pile, window, beads->rules ? &*beads->rules : nullptr);
+  };
   const Window& window = choice->window;
   std::vector<VoxelStack> cut;
   for (const Window& in : {window, finer(window, kFiner), finer(with_half_as_many_voxels(window), kFiner)}) {
-    Result<VoxelStack> voxels = bead_voxels(*file, *pile, in, rules);
+    Result<VoxelStack> voxels = cut_window(in);
     if (!voxels) return voxels.error();
     cut.push_back(std::move(*voxels));
   }
@@ -188,6 +203,8 @@ Outcome predict(const Arguments& arguments, Context& context) {
     if (found && !found->settled) context.say("note: the fastest flow found no steady state; k2 is of those before");
     if (found) inertia = std::move(*found);
   }
+  const Result<LaidLook> look = look_at_laid(*file, *pile, cut[0], cut_window);
+  if (!look) return look.error();
   if (pile->skipped > 0) {
     context.say(
         fmt::format("note: {} layers that do not lie above those before are left out, as of parts printed one after the other",
@@ -198,21 +215,17 @@ Outcome predict(const Arguments& arguments, Context& context) {
     if (darcy && darcy->residual > 1e-2) context.say("note: the flow was not solved to its end; take a smaller --window");
   }
   context.say(beads->told);
-  if (!arguments.has("--json")) return context.print(as_text(*choice, *report) + (inertia ? as_text(*inertia) : ""));
+  if (!arguments.has("--json"))
+    return context.print(as_text(*choice, *report) + (inertia ? as_text(*inertia) : "") + as_text(*look));
   Json json = as_json(*choice, *report);
   if (inertia) json["inertia"] = as_json(*inertia);
+  add_to(*look, json);
   return context.give(json);
-}
-
-bool is_gcode(const std::string& path) {
-  for (const char* ending : {".gcode", ".GCODE", ".gco", ".g", ".nc"})
-    if (path.ends_with(ending)) return true;
-  return false;
 }
 
 Outcome run_permeability(const Arguments& arguments, Context& context) {
   if (arguments.operands.size() != 1) return Error{Fault::kUsage, "name one file of measurements, or of toolpaths"};
-  if (is_gcode(arguments.operands.front())) return predict(arguments, context);
+  if (names_toolpaths(arguments.operands.front())) return predict(arguments, context);
   for (const char* flag : {"--window", "--voxel", "--beads", "--machine", "--memory", "--inertia"})
     if (arguments.has(flag))
       return Error{Fault::kUsage, fmt::format("{} is for toolpaths, not for tables of measurements", flag)};

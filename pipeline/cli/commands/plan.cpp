@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <span>
 
+#include "pipeline/calibrate/laid_look.h"
 #include "pipeline/cli/command.h"
 #include "pipeline/cli/keys.h"
 #include "pipeline/cli/needs.h"
@@ -106,9 +107,12 @@ Outcome plan(const PlanCommand& row, const Arguments& arguments, Context& contex
     if (Status status = save_job(arguments.text("--save-job"), saved, kNames[static_cast<int>(row.product)]); !status)
       return status.error();
   }
+  const bool tells_pores =
+      row.product == Product::kMoves && resolved->job.segment.any() && !job->dry_run && (!job->quiet || job->json);
   const auto progress = [&](const ProgressEvent& event) { context.progress(event); };
-  const Result<Summary> summary = run(std::move(*resolved), progress, context.cancel());
+  Result<Summary> summary = run(std::move(*resolved), progress, context.cancel());
   if (!summary) return summary.error();
+  if (tells_pores) add_pores(summary->output, *summary);
   if (!job->quiet) {
     for (const std::string& note : left) context.say("note: " + note);
     context.say_text(summary->text());

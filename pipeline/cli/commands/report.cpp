@@ -2,6 +2,7 @@
 
 #include <filesystem>
 
+#include "pipeline/calibrate/laid_look.h"
 #include "pipeline/cli/command.h"
 #include "pipeline/show/report.h"
 #include "stages/data/text/readable.h"
@@ -54,6 +55,7 @@ Outcome run_report(const Arguments& arguments, Context& context) {
   if (!options.parts.empty() && std::filesystem::is_regular_file(arguments.operands.front(), ignored)) {
     return at_option("--parts", "is of jobs of images; a page of toolpaths has no views of the parts, leave it out");
   }
+  options.laid = laid_text(arguments.operands.front());
   const Result<Report> report = make_report(arguments.operands.front(), options);
   if (!report) return report.error();
   if (Status status = write::write_file(output, report->page); !status) return status.error();

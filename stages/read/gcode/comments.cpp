@@ -105,6 +105,10 @@ void SlicerFacts::tell_filament(double diameter_mm, Source source) {
   source_ = source;
 }
 
+void SlicerFacts::tell_density(double g_cm3) {
+  if (density_g_cm3 == 0 && g_cm3 > 0.1 && g_cm3 < 25) density_g_cm3 = g_cm3;
+}
+
 void SlicerFacts::read_flavor(std::string_view flavor) {
   // Cura: gcodeExport.cpp, GCodeExport::setFlavor(): these two count E in mm3.
   if (flavor.starts_with("UltiGCode") || flavor.starts_with("Marlin(Volumetric)")) volumetric = true;
@@ -132,6 +136,10 @@ void SlicerFacts::read_setting(std::string_view comment) {
     const double diameter = leading_number(line.value);
     if (nozzle_mm == 0 && diameter > 0.05 && diameter < 10) nozzle_mm = diameter;
   }
+  if (name == "filamentdensity") tell_density(leading_number(line.value));
+  if (name == "filamentusedcm") used_cm3_ = leading_number(line.value);
+  if (name == "filamentusedg" && used_cm3_ >= 0.2)  // told to 0.01
+    tell_density(leading_number(line.value) / used_cm3_);
   if (name == "usevolumetrice" && leading_number(line.value) == 1) volumetric = true;
 }
 
@@ -154,7 +162,7 @@ void SlicerFacts::read(std::string_view comment) {
     const std::size_t at = comment.find(kMaterial);
     if (at != std::string_view::npos) tell_filament(leading_number(comment.substr(at + kMaterial.size())), Source::kProfile);
   } else {
-    for (const std::string_view sign : {"iameter", "IAMETER", "fiber_dia", "volumetric_e"}) {
+    for (const std::string_view sign : {"iameter", "IAMETER", "fiber_dia", "volumetric_e", "_density", "ment used ["}) {
       if (comment.find(sign) != std::string_view::npos) return read_setting(comment);
     }
   }

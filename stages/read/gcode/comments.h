@@ -19,9 +19,12 @@ namespace lamina::read {
 ///     ;FLAVOR:Griffin                      CuraEngine: printers for 2.85 mm
 ///     ;FLAVOR:UltiGCode                    CuraEngine: E counts mm3; so does "; use_volumetric_e = 1" of PrusaSlicer
 ///     ; machine: Anet A8                   lamina
+///     ; filament_density = 1.24,1.24       PrusaSlicer, Orca; with a colon BambuStudio
+///     ; filament used [cm3] = 1.23         lamina, PrusaSlicer: density by what [g] of it weigh
 struct SlicerFacts {
-  double filament_mm = 0;  // diameter; 0 if untold
-  double nozzle_mm = 0;    // 0 if untold
+  double filament_mm = 0;    // diameter; 0 if untold
+  double nozzle_mm = 0;      // 0 if untold
+  double density_g_cm3 = 0;  // 0 if untold
   bool volumetric = false;
   std::string machine;  // a name, at most 100 characters; empty if untold
 
@@ -32,6 +35,8 @@ struct SlicerFacts {
   /// How sure a way to know the diameter is.
   enum class Source : std::uint8_t { kNone, kFlavor, kWeight, kProfile, kSetting };
   Source source_ = Source::kNone;
+  double used_cm3_ = 0;
+  void tell_density(double g_cm3);
   void tell_filament(double diameter_mm, Source source);
   void read_flavor(std::string_view flavor);
   void read_weight(std::string_view used);

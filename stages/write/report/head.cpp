@@ -71,6 +71,7 @@ std::string head_json(const Manifest& manifest, const ManifestSeen& file, const 
                {"stride", held.stride()},
                {"job", head.job_toml},
                {"manifest", {{"name", file.name}, {"bytes", file.digest.bytes}, {"hash", hex(file.digest.hash)}}},
+               {"laid", seen.laid},
                {"parts", Json::array()},
                {"warnings", Json::array()},
                {"views", Json::object()},

@@ -29,6 +29,7 @@ struct LayersSeen {
   std::vector<std::uint64_t> set;  // pixels of each
   std::vector<double> seconds;     // of each, with a machine
   std::vector<Warning> warnings;
+  std::string laid;  // lines on what toolpaths leave open
 };
 
 /// The manifest's own file.

@@ -256,6 +256,8 @@ function fillTexts() {
     row($('parts'), [part.path, part.copies, part.triangles, part.low_mm.join(', '), part.high_mm.join(', ')]);
   }
   $('job').textContent = head.job;
+  $('laid').hidden = !head.laid;
+  $('laid-lines').textContent = head.laid;
   const line = $('manifest');
   line.append(`${head.manifest.name}, ${head.manifest.bytes} bytes, XXH3-128 `);
   element('code', head.manifest.hash, line);

@@ -1,0 +1,115 @@
+#include "stages/pores/bonds.h"
+
+#include <array>
+#include <utility>
+
+#include "stages/pores/closing.h"
+#include "stages/pores/rows.h"
+#include "stages/pores/voids.h"
+
+namespace lamina::pores {
+namespace {
+
+using Cell = std::array<std::int32_t, 3>;  // of the lattice of boxes
+
+Cell sum(const Cell& a, const Cell& b, std::int32_t sign) {
+  return {a[0] + sign * b[0], a[1] + sign * b[1], a[2] + sign * b[2]};
+}
+
+/// Parts that are joined to groups; each part knows in which box it lies as seen from its group.
+class Groups {
+ public:
+  explicit Groups(const Parts& parts) : wraps_(parts.wraps), faces_(parts.faces), up_(parts.size()), cell_(parts.size()) {
+    for (std::uint32_t p = 0; p < up_.size(); ++p) up_[p] = p;
+  }
+
+  /// The group of a part, and the part's box there.
+  std::pair<std::uint32_t, Cell> find(std::uint32_t part) {
+    std::uint32_t root = part;
+    Cell cell{};
+    for (; up_[root] != root; root = up_[root]) cell = sum(cell, cell_[root], 1);
+    Cell left = cell;
+    while (up_[part] != root && part != root) {
+      const Cell own = std::exchange(cell_[part], left);
+      left = sum(left, own, -1);
+      part = std::exchange(up_[part], root);
+    }
+    return {root, cell};
+  }
+
+  /// b lies in the box that is `shift` beside that of a.
+  void join(std::uint32_t a, std::uint32_t b, const Cell& shift) {
+    const auto [to, cell_a] = find(a);
+    const auto [from, cell_b] = find(b);
+    const Cell between = sum(sum(cell_a, shift, 1), cell_b, -1);
+    if (to == from) {
+      for (std::size_t axis = 0; axis < 3; ++axis)
+        if (between[axis] != 0) wraps_[to] = static_cast<std::uint8_t>(wraps_[to] | 1u << axis);
+      return;
+    }
+    up_[from] = to;
+    cell_[from] = between;
+    wraps_[to] = static_cast<std::uint8_t>(wraps_[to] | wraps_[from]);
+    faces_[to] = static_cast<Faces>(faces_[to] | faces_[from]);
+  }
+
+  bool is_reached(std::uint32_t part, Faces outside) {
+    const std::uint32_t root = find(part).first;
+    return reached(faces_[root], wraps_[root], outside);
+  }
+
+ private:
+  Buffer<std::uint8_t> wraps_;
+  Buffer<Faces> faces_;
+  Buffer<std::uint32_t> up_;
+  Buffer<Cell> cell_;  // as seen from up_
+};
+
+/// Joins parts of the void that lie above each other, with no more than so many solid voxels between.
+void join_over_contacts(const VoxelView& empty, const Parts& parts, std::uint32_t contact, Groups& groups) {
+  for (std::uint32_t z = 0; z < empty.nz; ++z) {
+    for (std::uint32_t up = 2; up <= contact + 1; ++up) {
+      const std::uint32_t above = (z + up) % empty.nz;
+      const auto boxes = static_cast<std::int32_t>((z + up) / empty.nz);
+      if (boxes > 0 && !empty.periodic[2]) break;
+      for (std::uint32_t y = 0; y < empty.ny; ++y) {
+        const std::size_t r = y + std::size_t{empty.ny} * z, s = y + std::size_t{empty.ny} * above;
+        for_each_overlap(empty.row(r), empty.row(s), [&](std::size_t i, std::size_t j) {
+          const std::uint32_t a = parts.piece[empty.row_offset[r] / 2 + i], b = parts.piece[empty.row_offset[s] / 2 + j];
+          // Pieces lie in their cells as seen from their part.
+          const Cell shift = sum(sum({0, 0, boxes}, parts.cell[b], -1), parts.cell[a], 1);
+          groups.join(parts.part[a], parts.part[b], shift);
+        });
+      }
+    }
+  }
+}
+
+/// The nearest whole number of voxels.
+Nm whole_gap(Nm gap, Nm edge) { return (gap + edge / 2) / edge * edge; }
+
+}  // namespace
+
+VoxelStack bond(const VoxelView& solid, Nm gap) {
+  const VoxelStack along_x = close_gaps(solid, 0, whole_gap(gap, solid.edge[0]));
+  return close_gaps(along_x, 1, whole_gap(gap, solid.edge[1]));
+}
+
+Connected connected(const VoxelView& solid, Nm gap, Nm contact, Faces outside) {
+  Connected result;
+  result.voxels = solid.voxels();
+  const VoxelStack between = void_of(bond(solid, gap));
+  const Parts tight = parts_of(between);
+  for (std::size_t p = 0; p < tight.size(); ++p)
+    if (tight.is_reached(p, outside)) result.bonded += tight.voxels[p];
+
+  const VoxelStack empty = void_of(solid);
+  const Parts parts = parts_of(empty);
+  Groups groups(parts);
+  join_over_contacts(empty, parts, static_cast<std::uint32_t>(contact / solid.edge[2]), groups);
+  for (std::uint32_t p = 0; p < parts.size(); ++p)
+    if (groups.is_reached(p, outside)) result.unbonded += parts.voxels[p];
+  return result;
+}
+
+}  // namespace lamina::pores
