@@ -31,8 +31,8 @@ bead::LayRules rules_of(const Extruder& machine) {
 }  // namespace
 
 Result<BeadRules> bead_rules(const read::GcodeFile& file, const std::string& beads, const std::string& machine) {
-  if (!beads.empty() && beads != "laid" && beads != "told")
-    return Error{Fault::kUsage, fmt::format("--beads: '{}' is none of laid, told", one_line(beads))};
+  if (!beads.empty() && beads != "laid" && beads != "spread" && beads != "told")
+    return Error{Fault::kUsage, fmt::format("--beads: '{}' is none of laid, spread, told", one_line(beads))};
   const std::string told = file.tells_widths() ? "widths are those that the file tells" : "widths are those of what is fed";
   if (beads == "told") return BeadRules{std::nullopt, told};
   std::optional<Extruder> printer;
@@ -45,9 +45,12 @@ Result<BeadRules> bead_rules(const read::GcodeFile& file, const std::string& bea
     if (!named) return named.error();
     printer = std::move(*named);
   }
-  if (printer)
-    return BeadRules{rules_of(*printer), fmt::format("widths are those that {} lays: lag {:g} s, {:g} mm/s2", printer->name,
-                                                     printer->material.lag_s, printer->speed.acceleration_mm_s2)};
+  if (printer) {
+    BeadRules found{rules_of(*printer), fmt::format("widths are those that {} lays: lag {:g} s, {:g} mm/s2", printer->name,
+                                                    printer->material.lag_s, printer->speed.acceleration_mm_s2)};
+    found.rules->spread = beads == "spread";
+    return found;
+  }
   if (beads == "laid")
     return Error{Fault::kUsage, "--beads laid: the file names no printer that is shipped; add --machine NAME"};
   return BeadRules{std::nullopt, told};

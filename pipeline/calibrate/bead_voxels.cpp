@@ -25,6 +25,14 @@ bool is_near(const Box& box, Point2 from, Point2 to, std::int64_t reach) {
          std::max(from.y, to.y) + reach >= box.lo.y && std::min(from.y, to.y) - reach <= box.hi.y;
 }
 
+/// Whether a piece goes on where the one before ended, in another direction.
+bool bends(const bead::LaidPiece& before, const bead::LaidPiece& piece) {
+  if (before.to != piece.from) return false;
+  const double ax = mm(before.to.x - before.from.x), ay = mm(before.to.y - before.from.y);
+  const double bx = mm(piece.to.x - piece.from.x), by = mm(piece.to.y - piece.from.y);
+  return std::abs(ax * by - ay * bx) > 1e-3 * std::hypot(ax, ay) * std::hypot(bx, by);
+}
+
 /// Beads of one layer become slices.
 class SliceCutter {
  public:
@@ -55,6 +63,13 @@ class SliceCutter {
                  static_cast<Nm>(std::llround(p.y + x * aside + sign * y * further))});
     };
     raster_.add(moved(piece.from, -1), moved(piece.to, 1), width, raster::BeadEnds::kSquare);
+  }
+  /// What lies outside of a bend, as wide as the bead behind it.
+  void round_off(const bead::LaidPiece& piece, const bead::PieceSides& sides, std::int64_t height, double above) {
+    const double reach = std::min(bead::reach_at(piece, sides.left, mm(height), above * 1e-6),
+                                  bead::reach_at(piece, sides.right, mm(height), above * 1e-6));
+    const auto width = static_cast<Nm>(std::llround(2e6 * reach));
+    if (width > 0) raster_.add(at(piece.from), at(piece.from), width, raster::BeadEnds::kRound);
   }
   const Runs& cut() {
     raster_.runs(image_);
@@ -106,7 +121,10 @@ class LayerBeads {
     if (!rules_)
       for (const LaidBead& bead : beads_) cutter.add(bead, height_, above);
     else
-      for (std::size_t i = 0; i < pieces_.size(); ++i) cutter.add(pieces_[i], sides_[i], height_, above);
+      for (std::size_t i = 0; i < pieces_.size(); ++i) {
+        cutter.add(pieces_[i], sides_[i], height_, above);
+        if (i > 0 && bends(pieces_[i - 1], pieces_[i])) cutter.round_off(pieces_[i], sides_[i], height_, above);
+      }
   }
 
  private:

@@ -5,6 +5,7 @@
 #include <cstddef>
 
 #include "stages/bead/line.h"
+#include "stages/bead/section.h"
 #include "stages/bead/spread.h"
 
 namespace lamina::bead {
@@ -29,6 +30,7 @@ class Line {
   }
   double speed_between(std::size_t i) const;
   Point2 at(std::size_t bead, double place) const;
+  void put(const BeadPiece& piece, Buffer<LaidPiece>& out);
   void put(const SpreadCell& cell, Buffer<LaidPiece>& out);
 
   const LayRules& rules_;
@@ -56,6 +58,18 @@ Point2 Line::at(std::size_t bead, double place) const {
   return {between(on.from.x, on.to.x), between(on.from.y, on.to.y)};
 }
 
+/// Cuts a piece, along which area and width run evenly, into shorter ones.
+void Line::put(const BeadPiece& piece, Buffer<LaidPiece>& out) {
+  const double length = piece.end_mm - piece.begin_mm;
+  const auto parts = static_cast<std::uint32_t>(std::ceil(length / rules_.piece_mm));
+  const double mean = piece.volume_mm3 / length, slope = piece.end_area_mm2 - piece.begin_area_mm2;
+  for (std::uint32_t i = 0; i < parts; ++i) {
+    const double middle = (i + 0.5) / parts, area = std::max(mean + slope * (middle - 0.5), 0.0);
+    const double begin = piece.begin_mm + length * i / parts, end = piece.begin_mm + length * (i + 1) / parts;
+    put(SpreadCell{begin, end, area * (end - begin), area, width_of(area, piece.pressed, rules_.height_mm)}, out);
+  }
+}
+
 void Line::put(const SpreadCell& cell, Buffer<LaidPiece>& out) {
   if (!(cell.volume_mm3 > 0)) return;
   for (double from = cell.begin_mm; from < cell.end_mm;) {
@@ -81,7 +95,10 @@ void Line::lay(std::span<const LaidBead> beads, std::span<const BeadFeed> feeds,
   const TakePiece piece = [&](BeadPiece p) {
     p.begin_mm += moved;
     p.end_mm += moved;
-    spread_.add(p, cell);
+    if (rules_.spread)
+      spread_.add(p, cell);
+    else
+      put(p, out);
   };
   BeadLine line(rules_.machine, rules_.height_mm);
   const double first = std::min(speed_of(feeds[0]), rules_.corner_mm_s);
@@ -96,7 +113,7 @@ void Line::lay(std::span<const LaidBead> beads, std::span<const BeadFeed> feeds,
     moved = begin_[i + 1];
     if (!last) line.begin(joint);
   }
-  spread_.end(cell);
+  if (rules_.spread) spread_.end(cell);
 }
 
 }  // namespace

@@ -1,9 +1,9 @@
 // stages/bead/laid.h: the beads of a layer as they come to lie, predicted from what a toolpath file commands.
 //
-// A line is what is laid without a stop: it is fed along its whole way (line.h) and spreads along it (spread.h). At a bend the
-// head slows down to the speed at which the change of its velocity is that which the machine makes at once (the classic jerk
-// of Marlin's planner). Assumed: behind a travel the flow is that of the speed with which a line begins. Retractions are made
-// for that, and nothing is known of how well they do.
+// A line is what is laid without a stop: it is fed along its whole way (line.h) and may spread along it (spread.h). At a bend
+// the head slows down to the speed at which the change of its velocity is that which the machine makes at once (the classic
+// jerk of Marlin's planner). Assumed: behind a travel the flow is that of the speed with which a line begins. Retractions are
+// made for that, and nothing is known of how well they do.
 #pragma once
 
 #include <span>
@@ -21,6 +21,7 @@ struct LayRules {
   double height_mm = 0.2;  // of the layer, > 0
   double piece_mm = 0.02;  // length of pieces, > 0
   double usual_mm_s = 40;  // of beads whose speed the file does not tell
+  bool spread = false;     // along the line too: lines end round then, and reach beyond their ends
 };
 
 /// A piece of a bead that is straight and has one cross-section.
@@ -30,8 +31,8 @@ struct LaidPiece {
 };
 
 /// beads, feeds  of one layer, in the order of printing, as many of each
-/// out           pieces in the same order, no wider than 3 mm. Those of round ends reach beyond the line
-/// cost          some ten thousand arc sines for a mm of line
+/// out           pieces in the same order, no wider than 3 mm
+/// cost          with spread, a thousand arc sines for a mm of line
 void lay(std::span<const LaidBead> beads, std::span<const BeadFeed> feeds, const LayRules& rules, Buffer<LaidPiece>& out);
 
 }  // namespace lamina::bead

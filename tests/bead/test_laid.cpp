@@ -13,7 +13,9 @@ namespace {
 
 constexpr double kLayerHeight = 0.3, kArea = 0.102, kLag = 0.046;  // mm, mm2, s
 
-LayRules rules_at(double acceleration) { return {{0, kLag, acceleration}, 8, 1, kLayerHeight, 0.02, 15}; }
+LayRules rules_at(double acceleration, bool spread = false) {
+  return {{0, kLag, acceleration}, 8, 1, kLayerHeight, 0.02, 15, spread};
+}
 
 /// A line through places, mm, of one cross-section or of one for each piece of the way.
 struct Way {
@@ -54,8 +56,12 @@ TEST(LaidBeads, AnEvenLineIsWhatIsFedAndItsMelt) {
       EXPECT_NEAR(piece.width_mm, bead_width(kArea, kLayerHeight), 3e-4);
     }
   }
-  EXPECT_LT(pieces.front().from.x, 1'000'000) << "round ends reach out";
-  EXPECT_GT(pieces.back().to.x, 21'000'000);
+  EXPECT_EQ(pieces.front().from.x, 1'000'000);
+  EXPECT_EQ(pieces.back().to.x, 21'000'000);
+  const auto spread = lay(way, rules_at(INFINITY, true));
+  EXPECT_NEAR(volume_of(spread), volume_of(pieces), 1e-4);
+  EXPECT_LT(spread.front().from.x, 1'000'000) << "round ends reach out";
+  EXPECT_GT(spread.back().to.x, 21'000'000);
 }
 
 TEST(LaidBeads, AWayRoundCornersKeepsItsVolumeAndSlowsDownThere) {
@@ -83,16 +89,17 @@ TEST(LaidBeads, APatternSettlesOnTheWidthsOfItsSteadyState) {
     way.add(0, 3 * i, 0, 3 * i + 1.5, 11.25, kArea, i > 0);
     way.add(0, 3 * i + 1.5, 0, 3 * i + 3, 30, kArea, true);
   }
-  const LayRules rules = rules_at(400);
-  const PatternWidths steady = steady_widths({kArea, kLag, 400}, kLayerHeight, {1.5, 1.5, 100, 11.25, 30}, true);
-  double least = 1, most = 0;
-  for (const LaidPiece& piece : lay(way, rules)) {
-    if (piece.from.y < 15'000'000 || piece.to.y > 18'000'000) continue;
-    least = std::min(least, piece.width_mm);
-    most = std::max(most, piece.width_mm);
+  for (const bool spread : {false, true}) {
+    const PatternWidths steady = steady_widths({kArea, kLag, 400}, kLayerHeight, {1.5, 1.5, 100, 11.25, 30}, spread);
+    double least = 1, most = 0;
+    for (const LaidPiece& piece : lay(way, rules_at(400, spread))) {
+      if (piece.from.y < 15'000'000 || piece.to.y > 18'000'000) continue;
+      least = std::min(least, piece.width_mm);
+      most = std::max(most, piece.width_mm);
+    }
+    EXPECT_NEAR(least, steady.thin.least, 2e-3);
+    EXPECT_NEAR(most, steady.thick.largest, 5e-3);
   }
-  EXPECT_NEAR(least, steady.thin.least, 2e-3);
-  EXPECT_NEAR(most, steady.thick.largest, 2e-3);
 }
 
 TEST(LaidBeads, LinesThatAreNotJoinedDoNotKnowOfEachOther) {
@@ -120,7 +127,7 @@ TEST(LaidBeads, BeadsWithoutLengthSpeedOrFeedDoNoHarm) {
   way.add(3, 0, 3, 0, 15, 0, true);
   way.add(3, 0, 4, 0, 1e300, 1e300, true);
   way.add(4, 0, 5, 0, 1e-300, 1e300, true);
-  for (const LaidPiece& piece : lay(way, rules_at(400))) {
+  for (const LaidPiece& piece : lay(way, rules_at(400, true))) {
     EXPECT_TRUE(std::isfinite(piece.area_mm2) && std::isfinite(piece.width_mm));
     EXPECT_GE(piece.from.x, -2'000'000);
     EXPECT_LE(piece.to.x, 7'000'000);
