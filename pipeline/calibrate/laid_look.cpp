@@ -14,8 +14,9 @@ namespace {
 
 constexpr Nm kBond = static_cast<Nm>(segment::kBondGap * 1e6);
 constexpr std::uint32_t kMostSections = 8;
+constexpr std::int64_t kMostContact = 1'000'000;    // nm, of two beads one beside the other
 constexpr std::int64_t kMostSide = 9'000'000;       // nm, of a section
-constexpr double kVoxelUm = 10, kMostVoxels = 4e7;  // of a window
+constexpr double kVoxelUm = 10, kMostVoxels = 8e6;  // of a window
 
 /// The middle of a layer, from the middle of the print as far as it goes.
 Window section_of(const read::GcodeFile& file, const Pile::Layer& layer) {
@@ -56,7 +57,7 @@ Result<LayerSections> sections_of(const read::GcodeFile& file, const Pile& pile,
 Result<LaidLook> look_at_laid(const read::GcodeFile& file, const Pile& pile, const VoxelView& window, const CutWindow& cut) {
   LaidLook look;
   const Pile::Layer& layer = pile.layers[pile.layers.size() / 2];
-  look.connected = pores::connected(window, kBond, static_cast<Nm>((layer.high - layer.low) / 2));
+  look.connected = pores::connected(window, kBond, static_cast<Nm>(std::min((layer.high - layer.low) / 2, kMostContact)));
   if (set_voxels(window) > 0) {
     look.throat_mm = pores::throats(window, pores::whole(window), {true, true, true});
     for (int axis = 0; axis < 3; ++axis)

@@ -57,7 +57,7 @@ struct LaidPrint {
 };
 /// density_g_cm3  of the filament; 0: what the file tells
 /// errors         kInput: no layer above the bed; of GcodeFile::open(), choose_window() and bead_voxels()
-/// cost           reads the file, and some twenty of its layers once more; about a second at 40 million voxels
+/// cost           reads the file, and some twenty of its layers once more; about a second at 8 million voxels
 Result<LaidPrint> look_at_print(const std::string& path, double density_g_cm3);
 std::string as_text(const LaidPrint& print);
 nlohmann::ordered_json as_json(const LaidPrint& print);

@@ -120,7 +120,8 @@ std::string as_text(const LaidPrint& print) {
       print.density_g_cm3 > 0
           ? fmt::format(", {:.2f} g of {:.3g} g/cm3", print.fed_mm3 * 1e-3 * print.density_g_cm3, print.density_g_cm3)
           : ", of a filament whose density nothing tells; give --density";
-  return fmt::format("fed       {:.1f} mm3 in {} layers{}\nbeads     {}\n", print.fed_mm3, print.layers, weight, print.beads) +
+  return fmt::format("fed       {:.1f} mm3 in {} layer{}{}\nbeads     {}\n", print.fed_mm3, print.layers,
+                     print.layers == 1 ? "" : "s", weight, print.beads) +
          as_text(print.choice, print.pores) + as_text(print.look);
 }
 

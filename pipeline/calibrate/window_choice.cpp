@@ -7,11 +7,19 @@
 
 namespace lamina::pipeline {
 
+namespace {
+
+constexpr std::int64_t kSameAllAlong = 150'000;  // nm: the least length that find_repeat() gives
+
+}  // namespace
+
 Result<WindowChoice> choose_window(const read::GcodeFile& file, const Pile& pile, const WindowWish& wish) {
   const auto middle_layer = static_cast<std::uint32_t>(pile.layers.size() / 2);
   const Point3 middle = file.box().middle();
-  const Result<Repeat> repeat = find_repeat(file, pile, {middle.x, middle.y}, middle_layer);
+  Result<Repeat> repeat = find_repeat(file, pile, {middle.x, middle.y}, middle_layer);
   if (!repeat) return repeat.error();
+  // Where beads touch, the middle of a layer is the same all over: that tells nothing of the cusps above and below it.
+  if (repeat->length[0] <= kSameAllAlong && repeat->length[1] <= kSameAllAlong) repeat->length = {};
   WindowChoice choice;
   const bool asked = wish.size_mm[2] > 0;
   std::array<std::int64_t, 2> side{};

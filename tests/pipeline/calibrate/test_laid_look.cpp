@@ -68,8 +68,8 @@ TEST(LaidLook, GroupsOfTouchingBeadsByHand) {
 Json plan_of(const Directory& directory, const std::string& configuration) {
   const fs::path job = fs::path(LAMINA_TEST_DIR) / "../docs/examples/dinisio2022" / (configuration + ".toml");
   test::write_box(directory / "part.stl", {0, 0, 0}, {12, 12, 2.1f});
-  const auto done =
-      test::run_lamina({"extrude", "part.stl", "--job", job.string(), "--overwrite", "-o", "part.gcode"}, directory.path());
+  const auto done = test::run_lamina(
+      {"extrude", "part.stl", "--job", job.string(), "--overwrite", "-o", "part.gcode", "--quiet"}, directory.path());
   EXPECT_EQ(done.code, 0) << done.err;
   const auto print = look_at_print(directory / "part.gcode", 0);
   EXPECT_TRUE(print.ok());
@@ -115,6 +115,25 @@ TEST(LaidLook, CuspsThatTouchNoPoreTellBondedFromUnbondedPlans) {
     // The file tells its filament's density by what it used, to 0.01 cm3.
     EXPECT_NEAR(json.value("density_g_cm3", 0.0), 1.24, 0.04);
   }
+}
+
+TEST(LaidLook, APrintWithoutPoresIsNotJudgedByASpotOfIt) {
+  // Beads of 0.4 mm that touch: a section through their middle is full, the cusps above and below are not.
+  const Directory directory;
+  std::ofstream file(directory / "full.gcode");
+  file << "G21\nG90\nM83\n";
+  for (int layer = 1; layer <= 6; ++layer) {
+    file << ";LAYER_CHANGE\n;HEIGHT:" << kHeight << "\nG1 Z" << kHeight * layer << " F600\n;WIDTH:" << kWidth << "\n";
+    for (int line = 0; line < 40; ++line)
+      file << "G0 X" << 10 + kWidth * line << " Y10\nG1 X" << 10 + kWidth * line << " Y26 E1 F900\n";
+  }
+  file.close();
+  const auto print = look_at_print(directory / "full.gcode", 0);
+  ASSERT_TRUE(print.ok());
+  const Json json = as_json(*print);
+  EXPECT_NEAR(json["window_mm"][0], 2, 0.011);
+  EXPECT_NEAR(json["porosity"], 1 - kBead / (kWidth * kHeight), 0.01);
+  EXPECT_LT(json["connected"]["bonded"].get<double>(), 0.01);
 }
 
 TEST(LaidLook, FilesWithoutALayerAreRefused) {
