@@ -16,8 +16,9 @@ using Field = Buffer<Four>;  // one entry a cell, and a last one that stays zero
 Field field_of(const Cells& cells);
 
 /// The symmetric operator (u, p) -> (-div grad u + grad p, -div u): central differences of second order; no slip at walls,
-/// which hold a velocity the more strongly the nearer they are (Cells::hold). source  F. H. Harlow, J. E. Welch, "Numerical
-/// calculation of time-dependent viscous incompressible flow of fluid with free
+/// which hold a velocity the more strongly the nearer they are (Cells::hold).
+///
+/// source  F. H. Harlow, J. E. Welch, "Numerical calculation of time-dependent viscous incompressible flow of fluid with free
 ///         surface", Physics of Fluids 8 (1965); walls: F. Gibou, R. P. Fedkiw, L.-T. Cheng, M. Kang, "A second-order-accurate
 ///         symmetric discretization of the Poisson equation on irregular domains", J. Comput. Phys. 176 (2002)
 class Operator {
