@@ -15,7 +15,8 @@
 namespace lamina::pipeline {
 namespace {
 
-constexpr double kNear = 0.03;  // a forward run that is as near ends the search
+constexpr double kNear = 0.04;   // a forward run that misses by so little ends the search
+constexpr double kFirst = 0.85;  // k1 of forward runs / of slots, as most plans have it: where the search begins
 
 /// The job's keys, as a person would write them.
 std::string keys_text(const std::string& machine, const segment::Settings& keys, const ExtruderProfile& used) {
@@ -81,7 +82,7 @@ Result<DesignedJob> design_job(const DesignRequest& request, const std::function
   const Calibration& calibration = profile->calibration;
   const auto limits = segment::DesignLimits::of(profile->machine, calibration);
   if (!limits) return Error{limits.error().fault, fmt::format("--machine {}: {}", request.machine, limits.error().message)};
-  segment::SlotRatio ratio;
+  segment::SlotRatio ratio{1, kFirst};
   std::optional<DesignedJob> best;
   std::uint32_t runs = 0;
   for (; runs < request.most_runs;) {

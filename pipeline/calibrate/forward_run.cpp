@@ -113,6 +113,7 @@ Result<ForwardRun> run_forward(Job job, const segment::Segmentation& plan, const
     const Darcy& along = *report->flow[2];
     forward.porosity += part * report->porosity.total();
     forward.porosity_through += part * report->porosity.percolating(2);
+    forward.resolved = forward.resolved && along.resolved;
     forward.permeability_m2 += part * along.k_m2[2];
     forward.permeability_error_m2 += part * along.error_m2[2];
   }

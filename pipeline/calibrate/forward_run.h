@@ -20,6 +20,7 @@ struct ForwardGrid {
 struct ForwardRun {
   double porosity = 0, porosity_through = 0;              // all void, and what leads through along z
   double permeability_m2 = 0, permeability_error_m2 = 0;  // Darcy's k1 along z; the error is that of the voxels
+  bool resolved = true;                                   // false: voxels are too coarse for the pores
   double pore_length_mm = 0, pore_width_mm = 0;           // means of the pores that the written toolpaths leave; 0 without any
 };
 

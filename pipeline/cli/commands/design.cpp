@@ -27,7 +27,7 @@ CommandSpec design_spec() {
       {"--machine", "NAME|FILE", "extrusion printer; lamina extrude --help lists them", "", "Machine",
        names_of(shipped_extruders())},
       {"--voxel", "UM", "edge of a voxel across the lines, micrometres; four times as long, twice as high", "5", "Solver"},
-      {"-o,--output", "FILE", "job file to be written, as in job.toml; else it is told alone", "", "Result"},
+      {"-o,--output", "FILE", "job file to be written, as in pores.toml; else it is told alone", "", "Result"},
       {"--nearest", "", "write the nearest job where the wish cannot be met, and end as if it were met", "", "Result"},
       {"--overwrite", "", "replace a file that lamina did not write", "", "Result"},
       {"--json", "", "print the result as one JSON object on stdout", "", "Result"},
@@ -35,9 +35,9 @@ CommandSpec design_spec() {
   spec.closing =
       "A wish is met if what the solver says of the plan is within 5 % of it. docs/design.md tells what is assumed and measured.\n\n"
       "Examples:\n"
-      "  lamina design --porosity 24 --permeability 100 --machine anet-a8 -o job.toml\n"
-      "  lamina design --pore 0.12x0.9 --machine anet-a8 -o job.toml\n"
-      "  lamina extrude part.stl --job job.toml -o part.gcode";
+      "  lamina design --porosity 24 --permeability 100 --machine anet-a8 -o pores.toml\n"
+      "  lamina design --pore 0.12x0.9 --machine anet-a8 --voxel 10 -o pores.toml\n"
+      "  lamina extrude part.stl --job pores.toml -o part.gcode";
   return spec;
 }
 
@@ -92,6 +92,7 @@ std::string design_text(const DesignedJob& found) {
   text +=
       "sure      +- is of the voxels; plans of this kind have lain within a factor of 1.5 (rms) of measured k1, 1.6 points of\n"
       "          measured porosity (bench/pores.md)\n";
+  if (!forward.resolved) text += "note      voxels are too coarse for the pores; take a smaller --voxel\n";
   for (const std::string& line : found.outside) text += fmt::format("beyond    {}\n", line);
   if (found.outside.empty()) text += "beyond    nothing: lengths, gaps and extrusion are those that were measured\n";
   return text + fmt::format("checked   by {} forward run{}; the wish is met within {:.1f} %\n", found.runs,
@@ -119,6 +120,7 @@ Json design_json(const DesignedJob& found, const std::string& output) {
           {"k1_darcy", forward.permeability_m2 / segment::kDarcy},
           {"k1_error_darcy", forward.permeability_error_m2 / segment::kDarcy},
           {"k1_m2", forward.permeability_m2},
+          {"resolved", forward.resolved},
           {"throat_mm", found.design.slots.throat_mm},
           {"pore_mm", {forward.pore_width_mm, forward.pore_length_mm}},
           {"runs", found.runs},
