@@ -15,7 +15,8 @@
 namespace lamina::pipeline {
 namespace {
 
-constexpr double kNear = 0.04;   // a forward run that misses by so little ends the search
+constexpr double kNear = 0.04;  // a forward run that misses by so little ends the search
+constexpr double kNoNearer = 0.02;
 constexpr double kFirst = 0.85;  // k1 of forward runs / of slots, as most plans have it: where the search begins
 
 /// The job's keys, as a person would write them.
@@ -88,6 +89,8 @@ Result<DesignedJob> design_job(const DesignRequest& request, const std::function
   for (; runs < request.most_runs;) {
     DesignedJob tried;
     tried.design = segment::search(request.wish, *limits, ratio);
+    // Out of reach, and no run to come is nearer.
+    if (best && tried.design.miss > request.tolerance && tried.design.miss > best->miss - kNoNearer) break;
     tried.toml = keys_text(request.machine, tried.design.settings, *profile);
     if (best && tried.toml == best->toml) break;
     Job job;
@@ -110,6 +113,7 @@ Result<DesignedJob> design_job(const DesignRequest& request, const std::function
     if (best->miss <= kNear) break;
   }
   best->runs = runs;
+  best->widths = one_line(calibration.source);
   best->toml.insert(0, head_text(best->forward));
   return *best;
 }

@@ -28,6 +28,7 @@ struct DesignedJob {
   std::uint32_t runs = 0;
   double model_ratio = 1;            // k1 of the forward run / of the slots alone
   std::vector<std::string> outside;  // what of the choice lies beyond what was measured, one line each
+  std::string widths;                // where the widths of beads come from
   std::string toml;                  // of the job file
 };
 

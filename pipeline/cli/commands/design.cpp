@@ -92,6 +92,7 @@ std::string design_text(const DesignedJob& found) {
   text +=
       "sure      +- is of the voxels; plans of this kind have lain within a factor of 1.5 (rms) of measured k1, 1.6 points of\n"
       "          measured porosity (bench/pores.md)\n";
+  if (!found.widths.empty()) text += fmt::format("widths    {}\n", found.widths);
   if (!forward.resolved) text += "note      voxels are too coarse for the pores; take a smaller --voxel\n";
   for (const std::string& line : found.outside) text += fmt::format("beyond    {}\n", line);
   if (found.outside.empty()) text += "beyond    nothing: lengths, gaps and extrusion are those that were measured\n";
@@ -125,6 +126,7 @@ Json design_json(const DesignedJob& found, const std::string& output) {
           {"pore_mm", {forward.pore_width_mm, forward.pore_length_mm}},
           {"runs", found.runs},
           {"k1_over_slots", found.model_ratio},
+          {"widths", found.widths},
           {"beyond_measured", found.outside}};
 }
 
@@ -142,9 +144,6 @@ std::string nearest_text(const segment::PoreWish& wish, const DesignedJob& found
 }
 
 Outcome run_design(const Arguments& arguments, Context& context) {
-  if (!arguments.operands.empty())
-    return Error{Fault::kUsage,
-                 fmt::format("'{}' is no option; a filling is designed for any part", one_line(arguments.operands.front()))};
   if (!arguments.has("--machine"))
     return Error{Fault::kUsage, "--machine is missing; name an extrusion printer, as lamina extrude takes it"};
   const auto wish = read_pore_wish(arguments);
