@@ -21,10 +21,10 @@
 namespace lamina::pipeline {
 namespace {
 
-constexpr const Command* kCommands[] = {&jet_command,          &slice_command,  &heights_command,    &extrude_command,
-                                        &info_command,         &export_command, &verify_command,     &calibrate_command,
-                                        &permeability_command, &merge_command,  &machines_command,   &preview_command,
-                                        &report_command,       &batch_command,  &completion_command, &manual_command};
+constexpr const Command* kCommands[] = {
+    &jet_command,     &slice_command,     &heights_command,      &extrude_command,    &info_command,  &export_command,
+    &verify_command,  &calibrate_command, &permeability_command, &design_command,     &merge_command, &machines_command,
+    &preview_command, &report_command,    &batch_command,        &completion_command, &manual_command};
 
 std::string program_help() {
   std::string text =
@@ -39,7 +39,7 @@ std::string program_help() {
       "  lamina verify out\n"
       "  lamina extrude bracket.stl --machine marlin --walls 2 --fill raster --line-distance 2 -o bracket.gcode\n\n"
       "Exit codes: 0 done, 1 internal error, 2 wrong option or job, 3 bad part file or an empty job, 4 output could not be\n"
-      "written, 5 verification failed or a warning with --strict, 6 out of memory, 130 interrupted.\n";
+      "written, 5 verification failed, a warning with --strict or a wish not met, 6 out of memory, 130 interrupted.\n";
   return text;
 }
 

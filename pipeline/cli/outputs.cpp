@@ -43,6 +43,7 @@ constexpr OwnFile kOwnFiles[] = {
     {"preview", "-o,--output", false, {kDrawing, kPicture}},
     {"report", "-o,--output", false, {"name=\"generator\" content=\"lamina\""}},
     {"calibrate", "-o,--output", false, {"Made by lamina calibrate."}},
+    {"design", "-o,--output", false, {"Made by lamina design."}},
     {"machines", "--target", false, {"^orientation target"}},
 };
 

@@ -126,6 +126,7 @@ TEST_F(Inputs, WhateverLiesInPlaceOfAFileEndsInOneLine) {
       {"report out -o new.html", "out/program/machine.toml", {5}},
       {"verify cut", "cut/manifest.json", {5}},
       {"preview cut -o new.png --quiet", "cut/job.toml", {2}},
+      {"design --pore 0.12x0.9 --machine ./printer.toml --voxel 40 -o new.toml", "printer.toml", {2}},
   };
   const fs::path kept = directory_.path() / "kept";
   std::size_t turn = 0;

@@ -90,6 +90,7 @@ TEST_F(Outputs, WhatACallReadsIsNeverReplaced) {
       {"heights part.stl --save-job part.stl", "part.stl"},
       {"calibrate --machine anet-a8 --measured widths.csv -o widths.csv", "widths.csv"},
       {"calibrate --machine printer.toml --measured widths.csv -o printer.toml --overwrite", "printer.toml"},
+      {"design --pore 0.12x0.9 --machine printer.toml --voxel 40 -o printer.toml --overwrite", "printer.toml"},
       {"permeability drops.csv --convention dinisio2022 --plot drops.csv", "drops.csv"},
       {"permeability drops.csv --convention dinisio2022 --plot drops.csv --overwrite", "drops.csv"},
       {"machines --check powder.toml --target powder.toml", "powder.toml"},

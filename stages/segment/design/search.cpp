@@ -1,0 +1,162 @@
+#include "stages/segment/design/search.h"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+
+namespace lamina::segment {
+namespace {
+
+constexpr int kFree = 4, kResiduals = 8;  // four of wishes, four of the way to what was measured
+constexpr double kExact = 1e-3;           // a wish that is missed by so much weighs as much as a length that is far off
+constexpr double kMet = 5e-3;             // of wishes; less than what rounding the keys does
+constexpr int kSteps = 30;
+
+using Residuals = Eigen::Matrix<double, kResiduals, 1>;
+using Free = Eigen::Matrix<double, kFree, 1>;
+
+/// Units of what is free, so that 1 is about as far in each.
+constexpr std::array<double, kFree> kUnit{25, 0.5, 0.5, 0.01};
+
+Free free_of(const Choice& choice) {
+  return {choice.extrusion / kUnit[0], choice.thick_mm / kUnit[1], choice.thin_mm / kUnit[2], choice.gap_mm / kUnit[3]};
+}
+
+Choice choice_of(const Free& at, std::uint32_t continuous) {
+  return {continuous, at[0] * kUnit[0], at[1] * kUnit[1], at[2] * kUnit[2], at[3] * kUnit[3]};
+}
+
+/// Logarithms of what a plan is, over what is wished; 0 where nothing is.
+std::array<double, 4> misses(const PoreWish& wish, const Slots& slots, const Pores& pores) {
+  const auto miss = [](const std::optional<double>& wished, double is) {
+    return wished ? std::log(std::max(is, 1e-30) / *wished) : 0.0;
+  };
+  return {miss(wish.porosity, slots.porosity), miss(wish.permeability_m2, slots.permeability_m2),
+          miss(wish.pore_width_mm, pores.width_mm), miss(wish.pore_length_mm, pores.length_mm)};
+}
+
+class Search {
+ public:
+  Search(const PoreWish& wish, const DesignLimits& limits, const SlotRatio& ratio)
+      : wish_(wish), limits_(limits), ratio_(ratio), layer_mm_(limits.calibration().height_mm) {}
+
+  Slots corrected(const Segmentation& plan) const {
+    Slots slots = slots_of(limits_.laid(plan), layer_mm_);
+    slots.porosity *= ratio_.porosity;
+    slots.permeability_m2 *= ratio_.permeability;
+    return slots;
+  }
+
+  /// The least sum of squares that is found from a beginning.
+  Choice descend(Choice begin) const {
+    const std::uint32_t lines = begin.continuous;
+    Choice best = limits_.nearest(begin);
+    Free at = free_of(best);
+    Residuals here = residuals(best);
+    double damping = 1e-2;
+    for (int step = 0; step < kSteps && damping < 1e8; ++step) {
+      Eigen::Matrix<double, kResiduals, kFree> slope;
+      for (int i = 0; i < kFree; ++i) {
+        // Away from a bound that lies ahead.
+        Free aside = at;
+        aside[i] += kAside;
+        Choice moved = limits_.nearest(choice_of(aside, lines));
+        if (std::abs(free_of(moved)[i] - at[i]) < kAside / 2) {
+          aside[i] = at[i] - kAside;
+          moved = limits_.nearest(choice_of(aside, lines));
+        }
+        const double way = free_of(moved)[i] - at[i];
+        slope.col(i) = std::abs(way) < kAside / 2 ? Residuals::Zero().eval() : ((residuals(moved) - here) / way).eval();
+      }
+      const Eigen::Matrix<double, kFree, kFree> square = slope.transpose() * slope;
+      const Free pull = slope.transpose() * here;
+      for (; damping < 1e8; damping *= 6) {
+        Eigen::Matrix<double, kFree, kFree> damped = square;
+        damped.diagonal() += damping * (square.diagonal() + Free::Constant(1e-6));
+        const Choice tried = limits_.nearest(choice_of(at - damped.ldlt().solve(pull), lines));
+        const Residuals there = residuals(tried);
+        if (there.squaredNorm() >= here.squaredNorm() * (1 - 1e-9)) continue;
+        best = tried;
+        at = free_of(tried);
+        here = there;
+        damping = std::max(damping / 10, 1e-9);
+        break;
+      }
+    }
+    return best;
+  }
+
+  Design design_of(const Choice& choice) const {
+    Design design;
+    design.choice = choice;
+    design.settings = limits_.settings_of(choice);
+    if (const Result<Segmentation> plan = limits_.plan_of(design.settings)) design.plan = *plan;
+    design.slots = corrected(design.plan);
+    design.pores = predict_pores(design.plan);
+    design.miss = miss_of(wish_, design.slots, design.pores);
+    for (const double part : limits_.beyond(choice)) design.beyond += part * part;
+    design.beyond = std::sqrt(design.beyond);
+    return design;
+  }
+
+ private:
+  static constexpr double kAside = 1e-3;
+
+  /// Not rounded to what is written.
+  Residuals residuals(const Choice& choice) const {
+    Settings settings = limits_.settings_of(choice);
+    settings.thick_extrusion = choice.extrusion;
+    settings.thick_mm = choice.thick_mm;
+    settings.thin_mm = choice.thin_mm;
+    const RepeatedReading widths = repeated_at(limits_.calibration(), choice.extrusion);
+    settings.spacing_sc_mm = spacing_for(widths.thick_mm, widths.continuous_mm, choice.gap_mm).segmented;
+    settings.spacing_cc_mm = widths.continuous_mm;
+    const Result<Segmentation> plan = limits_.plan_of(settings);
+    if (!plan) return Residuals::Constant(1e6);
+    Residuals all;
+    const auto wished = misses(wish_, corrected(*plan), predict_pores(*plan));
+    const auto beyond = limits_.beyond(choice);
+    for (int i = 0; i < 4; ++i) {
+      all[i] = wished[static_cast<std::size_t>(i)] / kExact;
+      all[4 + i] = beyond[static_cast<std::size_t>(i)];
+    }
+    return all;
+  }
+
+  const PoreWish& wish_;
+  const DesignLimits& limits_;
+  SlotRatio ratio_;
+  double layer_mm_;
+};
+
+/// Whether one meets the wish better than another: both do so, and it is nearer to what was measured.
+bool better(const Design& one, const Design& other) {
+  if (one.miss <= kMet && other.miss <= kMet) return one.beyond < other.beyond - 1e-3;
+  return one.miss < other.miss - 1e-9;
+}
+
+}  // namespace
+
+double miss_of(const PoreWish& wish, const Slots& slots, const Pores& pores) {
+  double worst = 0;
+  for (const double miss : misses(wish, slots, pores)) worst = std::max(worst, std::abs(std::expm1(miss)));
+  return worst;
+}
+
+Design search(const PoreWish& wish, const DesignLimits& limits, const SlotRatio& ratio) {
+  const Search finder(wish, limits, ratio);
+  const Interval extrusion = limits.extrusion();
+  std::optional<Design> best;
+  for (std::uint32_t lines = 1; lines <= DesignLimits::kMostContinuous; ++lines) {
+    for (const double share : {0.5, 0.0, 1.0}) {
+      for (const double thick : {1.5, 1.1, 2.2}) {
+        const double percent = extrusion.least + share * (extrusion.most - extrusion.least);
+        const Design design = finder.design_of(finder.descend({lines, percent, thick, 1.6, 0.005}));
+        if (!best || better(design, *best)) best = design;
+      }
+    }
+  }
+  return *best;
+}
+
+}  // namespace lamina::segment
