@@ -52,6 +52,7 @@ nlohmann::ordered_json as_json(const WindowChoice& choice, const PoreReport& rep
       {"throat_mm", report.throat_mm},
       {"flow", Json::array()}};
   for (std::size_t a = 0; a < 3; ++a) {
+    if (!report.flow[a]) continue;
     const Darcy& darcy = *report.flow[a];
     json["flow"].push_back({{"along", std::string(1, "xyz"[a])},
                             {"k1_m2", darcy.k_m2},

@@ -60,6 +60,8 @@ const Row kRows[] = {
     {"calibrate", "-o,--output", "calibrate --machine anet-a8 --quiet -o @", "printer.toml", "/widths.csv", true, false, true},
     {"calibrate", "-o,--output", "calibrate --machine printer.toml --measured widths.csv --quiet -o @", "widths.csv"},
     {"permeability", "--plot", "permeability drops.csv --convention dinisio2022 --plot @.svg", "drops.csv"},
+    {"permeability", "--solid", "permeability made.gcode --window 1,1,0.6 --voxel 50 --no-flow --solid @.mha", "made.gcode"},
+    {"permeability", "--void", "permeability made.gcode --window 1,1,0.6 --voxel 50 --no-flow --void @.stl", "made.gcode"},
     {"merge", "-o,--output", "merge shards --quiet -o @", "part.stl", "/manifest.json", true},
     {"machines", "--target", "machines --target @", nullptr},
     {"preview", "-o,--output", "preview made.gcode --quiet -o @.svg", "made.gcode"},

@@ -9,6 +9,7 @@
 #include "pipeline/calibrate/window_choice.h"
 #include "pipeline/cli/command.h"
 #include "pipeline/cli/plot_file.h"
+#include "pipeline/cli/window_files.h"
 #include "stages/data/text/json.h"
 #include "stages/data/text/number_text.h"
 #include "stages/data/text/readable.h"
@@ -45,12 +46,15 @@ CommandSpec permeability_spec() {
       {"--plot", "FILE", "draw points and parabola, as .svg or .png", "", "Result"},
       {"--overwrite", "", "replace a file that lamina did not write", "", "Result"},
       {"--json", "", "print the result as one JSON object on stdout", "", "Result"}};
+  const std::vector<OptionSpec> files = window_file_options();
+  spec.options.insert(spec.options.end() - 2, files.begin(), files.end());
   spec.closing =
       "Rows of one column `configuration` are fitted group by group. The convention dinisio2022 is L = 25.5 mm, v = Q / 28 in\n"
       "m/s of L/min (466.67 mm2), 1.87e-5 Pa.s and 998.2 kg/m3, which is water: its k2 is 832 times that of air.\n\n"
       "Examples:\n  lamina permeability drops.csv --length 25.4 --diameter 25.4\n"
       "  lamina permeability drops.csv --convention dinisio2022 --plot fit.svg\n"
-      "  lamina permeability part.gcode --voxel 15";
+      "  lamina permeability part.gcode --voxel 15\n"
+      "  lamina permeability part.gcode --window 2,2,0.6 --solid beads.stl --void pores.nrrd --no-flow";
   return spec;
 }
 
@@ -145,6 +149,7 @@ Outcome predict(const Arguments& arguments, Context& context) {
   for (const char* flag : {"--length", "--diameter", "--area", "--viscosity", "--density", "--convention", "--plot"})
     if (arguments.has(flag))
       return Error{Fault::kUsage, fmt::format("{} is for tables of measurements, not for toolpaths", flag)};
+  if (Status status = check_window_files(arguments); !status) return status;
   FlowRequest request;
   if (Status status = arguments.read("--memory", read_bytes, request.memory_bytes); !status) return status.error();
   const Result<read::GcodeFile> file = read::GcodeFile::open(arguments.operands.front());
@@ -161,8 +166,11 @@ Outcome predict(const Arguments& arguments, Context& context) {
   if (!fine) return fine.error();
   const Result<VoxelStack> coarse = bead_voxels(*file, *pile, with_half_as_many_voxels(choice->window));
   if (!coarse) return coarse.error();
+  const auto files = write_window_files(arguments, *fine);
+  if (!files) return files.error();
   const std::atomic<bool>& cancel = context.cancel();
-  const Result<PoreReport> report = look_at_pores(*fine, *coarse, request, [&](double) { return !cancel; });
+  const Result<PoreReport> report =
+      arguments.has("--no-flow") ? pores_alone(*fine) : look_at_pores(*fine, *coarse, request, [&](double) { return !cancel; });
   if (!report) return Error{report.error().fault, fmt::format("{}: {}", arguments.operands.front(), report.error().message)};
   if (pile->skipped > 0) {
     context.say(
@@ -174,7 +182,10 @@ Outcome predict(const Arguments& arguments, Context& context) {
     if (darcy && darcy->residual > 1e-2) context.say("note: the flow was not solved to its end; take a smaller --window");
   }
   if (!file->tells_widths()) context.say("note: the file tells no widths; they are those of what it feeds");
-  return arguments.has("--json") ? context.give(as_json(*choice, *report)) : context.print(as_text(*choice, *report));
+  if (!arguments.has("--json")) return context.print(as_text(*choice, *report) + as_text(*files));
+  Json json = as_json(*choice, *report);
+  if (!files->empty()) json["files"] = as_json(*files);
+  return context.give(json);
 }
 
 bool is_gcode(const std::string& path) {
@@ -186,7 +197,7 @@ bool is_gcode(const std::string& path) {
 Outcome run_permeability(const Arguments& arguments, Context& context) {
   if (arguments.operands.size() != 1) return Error{Fault::kUsage, "name one file of measurements, or of toolpaths"};
   if (is_gcode(arguments.operands.front())) return predict(arguments, context);
-  for (const char* flag : {"--window", "--voxel", "--memory"})
+  for (const char* flag : {"--window", "--voxel", "--memory", "--solid", "--void", "--no-flow"})
     if (arguments.has(flag))
       return Error{Fault::kUsage, fmt::format("{} is for toolpaths, not for tables of measurements", flag)};
   return fit_table(arguments, context);
