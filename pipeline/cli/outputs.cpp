@@ -25,7 +25,8 @@ constexpr InputOption kInputs[] = {{"--job", "the job file"},
                                    {"--show", "a machine profile"},
                                    {"--measured", "the measurements"},
                                    {"--measure", "a measured table"},
-                                   {"--parts", "a part"}};
+                                   {"--parts", "a part"},
+                                   {"--scan", "a scan"}};
 constexpr std::string_view kOutputs[] = {"-o,--output", "--save-job", "--plot", "--target", "--solid", "--void"};
 
 /// An output file of a command. Marks: every such file of lamina contains one of them in its head; a leading ^ means at

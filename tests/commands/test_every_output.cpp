@@ -73,11 +73,11 @@ const Row kRows[] = {
 
 /// Values of options that name no file, beside lists of words to choose from.
 const std::set<std::string_view> kNoFiles = {
-    "A:B",        "DEG",     "DEGC",      "DPI|XxY",       "ENGINE", "FACTOR",        "FILLING", "FORMAT",  "FORMULA",
-    "I/N",        "K",       "KEY=VALUE", "KEY=VALUE;...", "KG/M3",  "LOOPS",         "MM",      "MM/S",    "MM2",
-    "MM[,MM...]", "MODE",    "N",         "N,N,...",       "NAME",   "NAME|NAME,...", "PA.S",    "PATTERN", "PIXELS",
-    "RULE",       "SECONDS", "SET",       "SET|RANGE",     "SHARE",  "SIZE",          "S[,S]",   "S|X,Y,Z", "UM",
-    "UM|XxY",     "UNIT",    "WHEN",      "WIDTHxDEPTH",   "WORDS",  "X,Y",           "X,Y,Z"};
+    "A:B",     "AXES",       "DEG",     "DEGC",      "DPI|XxY",       "ENGINE", "FACTOR",        "FILLING", "FORMAT",
+    "FORMULA", "I/N",        "K",       "KEY=VALUE", "KEY=VALUE;...", "KG/M3",  "LOOPS",         "MM",      "MM/S",
+    "MM2",     "MM[,MM...]", "MODE",    "N",         "N,N,...",       "NAME",   "NAME|NAME,...", "PA.S",    "PATTERN",
+    "PIXELS",  "RULE",       "SECONDS", "SET",       "SET|RANGE",     "SHARE",  "SIZE",          "S[,S]",   "S|X,Y,Z",
+    "UM",      "UM|XxY",     "UNIT",    "WHEN",      "WIDTHxDEPTH",   "WORDS",  "X,Y",           "X,Y,Z"};
 
 std::string all_messages(const Outcome& outcome, const Row& row) { return std::string(row.call) + "\n" + outcome.err; }
 

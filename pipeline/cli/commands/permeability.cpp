@@ -1,6 +1,7 @@
 // lamina permeability: k1 and k2 of measured pressure drops, and k1 predicted from written toolpaths.
 #include <fmt/format.h>
 
+#include <filesystem>
 #include <numbers>
 
 #include "pipeline/calibrate/bead_voxels.h"
@@ -9,9 +10,9 @@
 #include "pipeline/calibrate/window_choice.h"
 #include "pipeline/cli/command.h"
 #include "pipeline/cli/plot_file.h"
+#include "pipeline/cli/pore_stack.h"
 #include "pipeline/cli/window_files.h"
 #include "stages/data/text/json.h"
-#include "stages/data/text/number_text.h"
 #include "stages/data/text/readable.h"
 #include "stages/segment/flows.h"
 
@@ -28,11 +29,12 @@ CommandSpec permeability_spec() {
   spec.summary =
       "Fits dp / L = (mu / k1) v + (rho / k2) v^2 to measured flows and pressure drops: Darcy's k1, Forchheimer's k2,\n"
       "their standard errors and the quality of the fit. Of G-code, predicts Darcy's k1: cuts what repeats of the beads, or a\n"
-      "window, into voxels and computes how a fluid creeps through their pores.";
-  spec.operand = "FILE";
+      "window, into voxels and computes how a fluid creeps through their pores. The same of layer images: a window of what\n"
+      "lamina jet wrote, or of a tomography.";
+  spec.operand = "FILE|DIR";
   spec.operand_meaning =
       "a table with a header: flow_l_min (or velocity_m_s) and drop_mbar (or _pa, _kpa, _bar, _psi), any number of drop columns;\n"
-      "or toolpaths, as in part.gcode";
+      "or toolpaths, as in part.gcode; or a folder: of lamina jet, or of numbered images .png, .tif or .pbm, the lowest first";
   spec.options = {
       {"--length", "MM", "of the medium along the flow", "", "Medium"},
       {"--diameter", "MM", "of a round medium", "", "Medium"},
@@ -40,14 +42,17 @@ CommandSpec permeability_spec() {
       {"--viscosity", "PA.S", "of the fluid", "1.81e-05", "Fluid"},
       {"--density", "KG/M3", "of the fluid", "1.204", "Fluid"},
       {"--convention", "NAME", "dinisio2022: what reproduces Table 25 of that document", "", "Fluid", {"dinisio2022"}},
-      {"--window", "X,Y,Z", "mm of a print to look at; default: what repeats, else 2,2 and eight layers", "", "Toolpaths"},
-      {"--voxel", "UM", "edge of a voxel, micrometres", "10", "Toolpaths"},
-      {"--memory", "SIZE", "that the flow may take, as in 2G", "1G", "Toolpaths"},
+      {"--window", "X,Y,Z", "mm of a print to look at; default: what repeats, else 2,2 and eight layers; of images: 2,2,2", "",
+       "Toolpaths and images"},
+      {"--voxel", "UM", "edge of a voxel, micrometres; of images: their pixels", "10", "Toolpaths and images"},
+      {"--memory", "SIZE", "that the flow may take, as in 2G", "1G", "Toolpaths and images"},
       {"--plot", "FILE", "draw points and parabola, as .svg or .png", "", "Result"},
       {"--overwrite", "", "replace a file that lamina did not write", "", "Result"},
       {"--json", "", "print the result as one JSON object on stdout", "", "Result"}};
-  const std::vector<OptionSpec> files = window_file_options();
+  const std::vector<OptionSpec> files = window_file_options(), images = stack_options();
   spec.options.insert(spec.options.end() - 2, files.begin(), files.end());
+  const auto plot = std::ranges::find(spec.options, "--plot", &OptionSpec::flag);
+  spec.options.insert(plot, images.begin(), images.end());
   spec.closing =
       "Rows of one column `configuration` are fitted group by group. The convention dinisio2022 is L = 25.5 mm, v = Q / 28 in\n"
       "m/s of L/min (466.67 mm2), 1.87e-5 Pa.s and 998.2 kg/m3, which is water: its k2 is 832 times that of air.\n\n"
@@ -130,25 +135,7 @@ Outcome fit_table(const Arguments& arguments, Context& context) {
   return arguments.has("--json") ? context.give(json) : context.print(text);
 }
 
-/// What the options wish for. errors  kUsage
-Result<WindowWish> read_wish(const Arguments& arguments) {
-  WindowWish wish;
-  if (Status status = arguments.read("--voxel", {1, 500}, wish.voxel_um); !status) return status.error();
-  if (!arguments.has("--window")) return wish;
-  const std::string text = arguments.text("--window");
-  const auto parts = split(text, ",");
-  for (std::size_t a = 0; a < 3; ++a) {
-    const std::string wrong = parts.size() != 3 ? "want three lengths in mm, as in --window 2,3,0.6"
-                                                : read_number(parts[a], 0.05, 100, " mm", wish.size_mm[a]);
-    if (Status status = at_option("--window", wrong); !status) return status.error();
-  }
-  return wish;
-}
-
 Outcome predict(const Arguments& arguments, Context& context) {
-  for (const char* flag : {"--length", "--diameter", "--area", "--viscosity", "--density", "--convention", "--plot"})
-    if (arguments.has(flag))
-      return Error{Fault::kUsage, fmt::format("{} is for tables of measurements, not for toolpaths", flag)};
   if (Status status = check_window_files(arguments); !status) return status;
   FlowRequest request;
   if (Status status = arguments.read("--memory", read_bytes, request.memory_bytes); !status) return status.error();
@@ -158,7 +145,8 @@ Outcome predict(const Arguments& arguments, Context& context) {
   if (!pile) return pile.error();
   if (pile->layers.empty())
     return Error{Fault::kInput, arguments.operands.front() + ": no layer lies above z = 0; heights count from the bed"};
-  const Result<WindowWish> wish = read_wish(arguments);
+  if (arguments.has("--scan")) return compare_scan(arguments, context, *file, *pile);
+  const Result<WindowWish> wish = read_window_wish(arguments, 10);
   if (!wish) return wish.error();
   const Result<WindowChoice> choice = choose_window(*file, *pile, *wish);
   if (!choice) return choice.error();
@@ -194,13 +182,32 @@ bool is_gcode(const std::string& path) {
   return false;
 }
 
+constexpr std::string_view kOfTables[] = {"--length",  "--diameter",   "--area", "--viscosity",
+                                          "--density", "--convention", "--plot"};
+constexpr std::string_view kOfImages[] = {"--pixel", "--layer-um", "--threshold", "--dark"};
+constexpr std::string_view kOfVoxels[] = {"--window", "--voxel", "--memory", "--solid", "--void", "--no-flow"};
+
+/// errors  kUsage: one of the options is given
+Status refuse(const Arguments& arguments, std::span<const std::string_view> flags, const char* why) {
+  for (const std::string_view flag : flags)
+    if (arguments.has(flag)) return Error{Fault::kUsage, fmt::format("{} is for {}", flag, why)};
+  return {};
+}
+
 Outcome run_permeability(const Arguments& arguments, Context& context) {
-  if (arguments.operands.size() != 1) return Error{Fault::kUsage, "name one file of measurements, or of toolpaths"};
-  if (is_gcode(arguments.operands.front())) return predict(arguments, context);
-  for (const char* flag : {"--window", "--voxel", "--memory", "--solid", "--void", "--no-flow"})
-    if (arguments.has(flag))
-      return Error{Fault::kUsage, fmt::format("{} is for toolpaths, not for tables of measurements", flag)};
-  return fit_table(arguments, context);
+  if (arguments.operands.size() != 1)
+    return Error{Fault::kUsage, "name one file of measurements or of toolpaths, or a folder of images"};
+  const std::string& operand = arguments.operands.front();
+  std::error_code ignored;
+  const bool images = std::filesystem::is_directory(operand, ignored), beads = !images && is_gcode(operand);
+  Status fits = images || beads ? refuse(arguments, kOfTables, "tables of measurements, not for toolpaths or images")
+                                : refuse(arguments, kOfVoxels, "toolpaths and images, not for tables of measurements");
+  if (fits && !images && !arguments.has("--scan")) fits = refuse(arguments, kOfImages, "folders of images");
+  if (fits && !images) fits = refuse(arguments, std::array<std::string_view, 1>{"--periodic"}, "folders of images");
+  if (fits && !beads) fits = refuse(arguments, std::array<std::string_view, 1>{"--scan"}, "toolpaths");
+  if (fits && !arguments.has("--scan")) fits = refuse(arguments, std::array<std::string_view, 1>{"--range"}, "--scan DIR");
+  if (!fits) return fits;
+  return images ? predict_stack(arguments, context) : beads ? predict(arguments, context) : fit_table(arguments, context);
 }
 
 }  // namespace
