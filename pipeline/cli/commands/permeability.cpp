@@ -59,7 +59,7 @@ CommandSpec permeability_spec() {
       "Examples:\n  lamina permeability drops.csv --length 25.4 --diameter 25.4\n"
       "  lamina permeability drops.csv --convention dinisio2022 --plot fit.svg\n"
       "  lamina permeability part.gcode --voxel 15\n"
-      "  lamina permeability part.gcode --window 2,2,0.6 --solid beads.stl --void pores.nrrd --no-flow";
+      "  lamina permeability part.gcode --window 2,2,0.6 --solid beads.nrrd --void pores.stl --no-flow";
   return spec;
 }
 
