@@ -111,6 +111,7 @@ nlohmann::ordered_json as_json(const ScanComparison& c) {
           {"wall_mm", c.wall_mm},
           {"width_mm", 2 * c.wall_mm},
           {"differing", c.differing()},
+          {"found", c.found()},
           {"plan_alone_voxels", c.match.only_small},
           {"scan_alone_voxels", c.match.only_large}};
 }

@@ -24,6 +24,10 @@ struct ScanComparison {
   double surface_per_mm = 0;  // mm2 in a mm3, mean of the two
   double wall_mm = 0;         // how far the scan's walls stand out of the plan's: porosity difference / surface
   double differing() const { return static_cast<double>(match.differing()) / static_cast<double>(window.voxels()); }
+  /// Fewer than half as many voxels differ as would between boxes of these porosities that have nothing to do with each other.
+  bool found() const {
+    return differing() <= 0.5 * (plan_porosity * (1 - scan_porosity) + scan_porosity * (1 - plan_porosity));
+  }
 };
 
 /// Lays the middle of the print upon the middle of the scan and searches for the shift

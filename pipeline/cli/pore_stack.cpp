@@ -109,6 +109,8 @@ Outcome compare_scan(const Arguments& arguments, Context& context, const read::G
   if (!scan) return scan.error();
   const auto comparison = compare_with_scan(file, pile, *scan, wish->size_mm, static_cast<std::uint32_t>(range));
   if (!comparison) return comparison.error();
+  if (!comparison->found())
+    context.say("note: the scan hardly looks like the plan at any of these shifts; is it turned, or give a larger --range?");
   return arguments.has("--json") ? context.give(as_json(*comparison)) : context.print(as_text(*comparison));
 }
 

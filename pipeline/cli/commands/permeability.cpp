@@ -202,6 +202,7 @@ Outcome run_permeability(const Arguments& arguments, Context& context) {
   const bool images = std::filesystem::is_directory(operand, ignored), beads = !images && is_gcode(operand);
   Status fits = images || beads ? refuse(arguments, kOfTables, "tables of measurements, not for toolpaths or images")
                                 : refuse(arguments, kOfVoxels, "toolpaths and images, not for tables of measurements");
+  if (images && !fits) return Error{Fault::kInput, fmt::format("{}: is a folder; {}", one_line(operand), fits.error().message)};
   if (fits && !images && !arguments.has("--scan")) fits = refuse(arguments, kOfImages, "folders of images");
   if (fits && !images) fits = refuse(arguments, std::array<std::string_view, 1>{"--periodic"}, "folders of images");
   if (fits && !beads) fits = refuse(arguments, std::array<std::string_view, 1>{"--scan"}, "toolpaths");

@@ -102,7 +102,7 @@ TEST_F(ImageStack, WithFaultsIsOneLine) {
   refused("s", 2, "give it as --pixel");
   refused("s --pixel 10 --window 1,0.1,0.05", 2, "1.000 mm along x are more than the images have: 0.160 mm");
   refused("s --pixel 10 --periodic xa", 2, "is not of the axes");
-  refused("s --pixel 10 --length 5", 2, "--length is for tables");
+  refused("s --pixel 10 --length 5", 3, "--length is for tables");
   refused("s --pixel 10 --scan s", 2, "--scan is for toolpaths");
   write_pbm(numbered(folder / "s", 3, ".pbm"), 16, 12, solid);
   refused("s --pixel 10", 3, "layer 2 is 16 x 12 pixels, others are 16 x 16");
@@ -187,6 +187,7 @@ TEST_F(ImageStack, OfAPlanThatIsShiftedAndGrownByAVoxelComesBackWithBoth) {
     EXPECT_EQ(json["voxels"], (nlohmann::json{64, 64, 36}));
     EXPECT_NEAR(json["shift_mm"][1].get<double>(), -0.05, 1e-9);
     EXPECT_EQ(json["plan_alone_voxels"], 0) << name;
+    EXPECT_TRUE(json["found"].get<bool>()) << name;
     if (!grown) {
       EXPECT_EQ(json["differing"].get<double>(), 0);
       EXPECT_EQ(json["wall_mm"].get<double>(), 0);
@@ -197,6 +198,8 @@ TEST_F(ImageStack, OfAPlanThatIsShiftedAndGrownByAVoxelComesBackWithBoth) {
       EXPECT_NEAR(json["width_mm"].get<double>(), 2 * json["wall_mm"].get<double>(), 1e-12);
     }
   }
+  const test::Outcome dark = run("lines.gcode --scan same --pixel 25 --range 8 --window 1.6,1.6,0.9");
+  EXPECT_NE(dark.err.find("hardly looks like the plan"), std::string::npos) << "solid and void exchanged" << dark.err;
   const test::Outcome outcome = run("lines.gcode --scan same --pixel 25 --dark --window 3,3,0.6");
   EXPECT_EQ(outcome.code, 2);
   EXPECT_NE(outcome.err.find("take a smaller --window or --range"), std::string::npos) << outcome.err;
