@@ -16,11 +16,12 @@ namespace {
 constexpr std::uint32_t kFluidAtEnds = 4 * kFiner;  // fine voxels before each end of an axis that does not repeat
 
 /// Flow through one box along an axis, m2.
-Result<Darcy> flow_along(const VoxelView& box, int axis, const FlowRequest& request, const std::function<bool(double)>& tell) {
+Result<Darcy> flow_along(const VoxelView& box, std::uint32_t finer, int axis, const FlowRequest& request,
+                         const std::function<bool(double)>& tell) {
   const auto a = static_cast<std::size_t>(axis);
   const VoxelStack longer = box.periodic[a] ? VoxelStack() : with_fluid_at_ends(box, axis);
   const VoxelView used = box.periodic[a] ? box : longer.view();
-  const Result<stokes::Grid> grid = stokes::make_grid(used, kFiner, kFlowLevels);
+  const Result<stokes::Grid> grid = stokes::make_grid(used, finer, kFlowLevels);
   if (!grid) return grid.error();
   stokes::Field field = stokes::field_of(grid->cells);
   stokes::FlowOptions options;
@@ -85,7 +86,7 @@ Result<PoreReport> look_at_pores(const PoreRasters& rasters, const FlowRequest& 
   report.empty = voxels.voxels() - set_voxels(voxels);
   std::uint64_t ends = 0;  // fluid before what does not repeat
   for (std::size_t a = 0; a < 3; ++a)
-    if (!fine.periodic[a]) ends = std::max(ends, 2 * kFluidAtEnds / kFiner * voxels.voxels() / voxels.size()[a]);
+    if (!fine.periodic[a]) ends = std::max(ends, 2 * kFluidAtEnds / rasters.finer * voxels.voxels() / voxels.size()[a]);
   // Cells at walls count whose middles are solid, and so do distances for throats.
   const auto bytes_of = request.inertia ? stokes::bytes_of_inertia : stokes::bytes_of_flow;
   const std::uint64_t bytes = bytes_of(report.empty + report.empty / 8 + ends) + 5 * voxels.voxels();
@@ -101,7 +102,7 @@ Result<PoreReport> look_at_pores(const PoreRasters& rasters, const FlowRequest& 
   report.surface_per_mm = pores::specific_surface(fine).crofton;
   report.throat_mm = pores::throats(voxels, pores::whole(voxels), request.axes);
   const double edge_mm = *std::min_element(voxels.edge.begin(), voxels.edge.end()) * 1e-6;
-  const double least = stokes::least_error(report.porosity.total(), report.surface_per_mm * edge_mm, kFiner);
+  const double least = stokes::least_error(report.porosity.total(), report.surface_per_mm * edge_mm, rasters.finer);
   const double ratio = static_cast<double>(fine.nx + fine.ny + fine.nz) / (coarse.nx + coarse.ny + coarse.nz);
   for (int axis = 0; axis < 3; ++axis) {
     const auto a = static_cast<std::size_t>(axis);
@@ -112,9 +113,10 @@ Result<PoreReport> look_at_pores(const PoreRasters& rasters, const FlowRequest& 
       return [&tell, axis, from, share](double done) { return tell((axis + from + share * done) / 3); };
     };
     const bool rough_leads = set_voxels(coarse) < coarse.voxels() && pores::porosity(coarse).percolating(axis) > 0;
-    const Result<Darcy> rough = rough_leads ? flow_along(coarse, axis, request, told(0, 0.15)) : Result<Darcy>(Darcy());
+    const Result<Darcy> rough =
+        rough_leads ? flow_along(coarse, rasters.finer, axis, request, told(0, 0.15)) : Result<Darcy>(Darcy());
     if (!rough) return rough.error();
-    Result<Darcy> darcy = flow_along(fine, axis, request, told(0.15, 0.85));
+    Result<Darcy> darcy = flow_along(fine, rasters.finer, axis, request, told(0.15, 0.85));
     if (!darcy) return darcy.error();
     add_error(*rough, ratio, least, axis, *darcy);
     report.flow[a] = *darcy;

@@ -28,9 +28,10 @@ inline constexpr std::uint32_t kFiner = 3;
 
 /// One window in three ways.
 struct PoreRasters {
-  VoxelView voxels;  // of the report and the throats
-  VoxelView fine;    // kFiner times as many along each axis
-  VoxelView coarse;  // kFiner times as many as voxels about twice as large
+  VoxelView voxels;              // of the report and the throats
+  VoxelView fine;                // kFiner times as many along each axis
+  VoxelView coarse;              // kFiner times as many as voxels about twice as large
+  std::uint32_t finer = kFiner;  // 1: images, whose pixels are all that is known; voxels and fine are the same then
 };
 
 struct PoreReport {

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "stages/write/replaceable.h"
+#include "stages/write/voxels/image.h"
 
 namespace lamina::pipeline {
 namespace {
@@ -24,8 +25,9 @@ constexpr InputOption kInputs[] = {{"--job", "the job file"},
                                    {"--show", "a machine profile"},
                                    {"--measured", "the measurements"},
                                    {"--measure", "a measured table"},
-                                   {"--parts", "a part"}};
-constexpr std::string_view kOutputs[] = {"-o,--output", "--save-job", "--plot", "--target"};
+                                   {"--parts", "a part"},
+                                   {"--scan", "a scan"}};
+constexpr std::string_view kOutputs[] = {"-o,--output", "--save-job", "--plot", "--target", "--solid", "--void"};
 
 /// An output file of a command. Marks: every such file of lamina contains one of them in its head; a leading ^ means at
 /// the very start.
@@ -40,6 +42,8 @@ constexpr OwnFile kOwnFiles[] = {
     {"heights", "-o,--output", true, {"^layers    ", "^way    ", "^table,layer,", "^{\"height_mm\":", "^Portugu"}},
     {"heights", "--plot", false, {kDrawing, kPicture}},
     {"permeability", "--plot", false, {kDrawing, kPicture}},
+    {"permeability", "--solid", false, {write::voxels::kMark}},
+    {"permeability", "--void", false, {write::voxels::kMark}},
     {"preview", "-o,--output", false, {kDrawing, kPicture}},
     {"report", "-o,--output", false, {"name=\"generator\" content=\"lamina\""}},
     {"calibrate", "-o,--output", false, {"Made by lamina calibrate."}},
@@ -160,7 +164,7 @@ Status check_own_file(const std::string& path, std::span<const std::string_view>
 
 Status check_outputs(std::string_view command, const Arguments& arguments) {
   const std::string_view operands = command == "batch"          ? "a list"
-                                    : command == "permeability" ? "the measurements"
+                                    : command == "permeability" ? "what is measured"
                                     : command == "preview"      ? "what is drawn"
                                                                 : "a part";
   std::vector<std::string> outputs = outputs_of(arguments);

@@ -15,28 +15,51 @@ namespace lamina::read {
 namespace {
 
 /// By the first bytes, whatever the name says.
-Result<Image> read_by_magic(int file, std::uint64_t bytes, const std::string& path) {
+Result<Image> read_by_magic(int file, std::uint64_t bytes, const std::string& path, int threshold) {
   unsigned char magic[8] = {};
   if (::pread(file, magic, sizeof magic, 0) < 0) {
     return Error{Fault::kVerification, fmt::format("{}: cannot read: {}", path, std::strerror(errno))};
   }
   const auto begins = [&](const char* text, std::size_t length) { return std::memcmp(magic, text, length) == 0; };
-  if (begins("II", 2) || begins("MM", 2)) return tiff(file, bytes, path);
-  if (begins("\x89PNG\r\n\x1a\n", 8)) return png(file, bytes, path);
+  if (begins("II", 2) || begins("MM", 2)) return tiff(file, bytes, path, threshold);
+  if (begins("\x89PNG\r\n\x1a\n", 8)) return png(file, bytes, path, threshold);
   if (begins("P4", 2)) return pbm(file, bytes, path);
   return Error{Fault::kVerification, fmt::format("{}: neither TIFF nor PNG nor PBM (P4); plan the layer again", path)};
 }
 
-}  // namespace
-
-Result<Image> image(const std::string& path) {
+Result<Image> read_image(const std::string& path, int threshold) {
   const auto file = FileReader::open(path, {});
   if (!file) return file.error();
   try {
-    return read_by_magic(file->descriptor(), file->size(), path);
+    return read_by_magic(file->descriptor(), file->size(), path, threshold);
   } catch (const std::bad_alloc&) {
     return Error{Fault::kVerification, fmt::format("{}: too many runs for the memory", path)};
   }
+}
+
+}  // namespace
+
+void bits_of_grey(std::span<std::byte> row, std::uint32_t columns, std::size_t step, bool second, int threshold) {
+  const std::size_t offset = second ? 1 : 0;
+  for (std::uint32_t first = 0; first < columns; first += 8) {
+    unsigned bits = 0;
+    for (std::uint32_t i = 0; i < 8 && first + i < columns; ++i) {
+      const int value = std::to_integer<int>(row[(std::size_t{first} + i) * step + offset]);
+      bits |= static_cast<unsigned>(value < threshold) << (7 - i);
+    }
+    row[first / 8] = static_cast<std::byte>(bits);  // before all values that are still to be read
+  }
+}
+
+Result<Image> image(const std::string& path) { return read_image(path, 0); }
+
+Result<Image> dark_pixels(const std::string& path, int threshold) {
+  auto image = read_image(path, threshold);
+  if (image) return image;
+  std::string message = image.error().message;
+  constexpr std::string_view kAgain = "; plan the layer again";
+  if (message.ends_with(kAgain)) message.resize(message.size() - kAgain.size());
+  return Error{Fault::kInput, message + "; take grey or 1-bit PNG, TIFF or PBM"};
 }
 
 std::string difference(const Image& image, const PixelGrid& grid, std::uint64_t set) {

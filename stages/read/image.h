@@ -22,6 +22,12 @@ struct Image {
 /// errors  kVerification with the file's name: truncated, not 1 bit, not readable
 Result<Image> image(const std::string& path);
 
+/// The same of images of others: of 1 bit, or grey of 8 or 16 bits a pixel; one image a file. Set are the dark pixels: black
+/// ones, and grey ones below the threshold.
+/// threshold  1 .. 255 of 255; of 16 bits the upper eight count
+/// errors     kInput with the file's name: truncated, coloured, several images, not readable
+Result<Image> dark_pixels(const std::string& path, int threshold);
+
 /// What an image differs from its manifest in, its pixels or their size first: "12 x 10 pixels, the manifest says 12 x 11";
 /// or "".
 /// set  pixels that are to be set

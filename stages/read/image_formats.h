@@ -1,17 +1,24 @@
 // stages/read/image_formats.h: the readers of layer images, one a format; what the formats hold is told in stages/write/.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
+#include <span>
 #include <string>
 
 #include "stages/read/image.h"
 
 namespace lamina::read {
 
+/// threshold  0: 1-bit images alone; else grey ones of 8 and 16 bits too, of which pixels below it are set
 /// Each reads `file`, open for reading and at its start, which stays the caller's; `bytes` is its size, `path` for messages.
 /// errors  of image()
-Result<Image> tiff(int file, std::uint64_t bytes, const std::string& path);
-Result<Image> png(int file, std::uint64_t bytes, const std::string& path);
+Result<Image> tiff(int file, std::uint64_t bytes, const std::string& path, int threshold = 0);
+Result<Image> png(int file, std::uint64_t bytes, const std::string& path, int threshold = 0);
 Result<Image> pbm(int file, std::uint64_t bytes, const std::string& path);
+
+/// Makes bits of a row of grey values, in place: set where a value is below the threshold.
+/// step  bytes a pixel; the first one of each counts, or the second where `second`
+void bits_of_grey(std::span<std::byte> row, std::uint32_t columns, std::size_t step, bool second, int threshold);
 
 }  // namespace lamina::read

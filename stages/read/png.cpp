@@ -68,9 +68,9 @@ bool set_is_dark(png_structp png, png_infop info, int colour_type) {
   return light(palette[1]) < light(palette[0]);
 }
 
-bool add_row(Source& source, bool invert) {
+bool add_row(Source& source, std::size_t bytes, bool invert) {
   try {
-    return source.builder->add_row(source.row, invert);
+    return source.builder->add_row(std::span(source.row).first(bytes), invert);
   } catch (...) {
     return false;
   }
@@ -87,7 +87,7 @@ bool prepare(Source& source, std::uint32_t columns, std::size_t stride) {
 }
 
 /// No object of this frame needs its destructor run when libpng jumps out.
-bool read_rows(png_structp png, png_infop info, Source& source) {
+bool read_rows(png_structp png, png_infop info, Source& source, int threshold) {
   if (setjmp(png_jmpbuf(png)) != 0) return false;
   png_set_user_limits(png, kMostPixelsASide, kMostPixelsASide);
   png_set_chunk_malloc_max(png, 1 << 20);
@@ -99,13 +99,15 @@ bool read_rows(png_structp png, png_infop info, Source& source) {
   png_read_info(png, info);
   const std::uint32_t columns = png_get_image_width(png, info), rows = png_get_image_height(png, info);
   const int colour_type = png_get_color_type(png, info);
-  if (png_get_bit_depth(png, info) != 1) png_error(png, "not a 1-bit image");
+  const int depth = png_get_bit_depth(png, info);
+  const bool grey = threshold > 0 && depth >= 8 && colour_type == PNG_COLOR_TYPE_GRAY;
+  if (depth != 1 && !grey) png_error(png, threshold > 0 ? "neither 1-bit nor grey of 8 or 16 bits" : "not a 1-bit image");
   if (png_get_interlace_type(png, info) != PNG_INTERLACE_NONE) png_error(png, "interlaced images are not supported");
-  const std::size_t stride = row_bytes(columns);
+  const std::size_t step = static_cast<std::size_t>(depth) / 8, stride = grey ? columns * step : row_bytes(columns);
   if ((stride + 1) * std::uint64_t{rows} / kMostExpansion > source.bytes) {
     png_error(png, "more pixels than a file of this size can hold");
   }
-  const bool invert = !set_is_dark(png, info, colour_type);
+  const bool invert = !grey && !set_is_dark(png, info, colour_type);
   png_uint_32 per_unit_x = 0, per_unit_y = 0;
   int unit = 0;
   if (png_get_pHYs(png, info, &per_unit_x, &per_unit_y, &unit) != 0 && unit == PNG_RESOLUTION_METER) {
@@ -115,7 +117,8 @@ bool read_rows(png_structp png, png_infop info, Source& source) {
   if (!prepare(source, columns, stride)) png_error(png, "out of memory");
   for (std::uint32_t r = 0; r < rows; ++r) {
     png_read_row(png, reinterpret_cast<png_bytep>(source.row.data()), nullptr);
-    if (!add_row(source, invert)) png_error(png, "too many runs for the memory");
+    if (grey) bits_of_grey(source.row, columns, step, false, threshold);
+    if (!add_row(source, row_bytes(columns), invert)) png_error(png, "too many runs for the memory");
   }
   png_read_end(png, nullptr);
   return true;
@@ -123,7 +126,7 @@ bool read_rows(png_structp png, png_infop info, Source& source) {
 
 }  // namespace
 
-Result<Image> png(int file, std::uint64_t bytes, const std::string& path) {
+Result<Image> png(int file, std::uint64_t bytes, const std::string& path, int threshold) {
   const auto source = std::make_unique<Source>();
   source->file = file;
   source->bytes = bytes;
@@ -132,12 +135,13 @@ Result<Image> png(int file, std::uint64_t bytes, const std::string& path) {
   bool whole = false;
   if (info != nullptr) {
     png_set_read_fn(reader, source.get(), read_bytes);
-    whole = read_rows(reader, info, *source);
+    whole = read_rows(reader, info, *source, threshold);
   }
   png_destroy_read_struct(&reader, &info, nullptr);
   if (!whole) {
-    return Error{Fault::kVerification, fmt::format("{}: not a whole 1-bit PNG: {}; plan the layer again", path,
-                                                   source->message[0] != 0 ? source->message : "out of memory")};
+    return Error{Fault::kVerification,
+                 fmt::format("{}: not a whole {}PNG: {}; plan the layer again", path, threshold > 0 ? "" : "1-bit ",
+                             source->message[0] != 0 ? source->message : "out of memory")};
   }
   return Image{source->builder->finish(), source->dpi_x, source->dpi_y};
 }

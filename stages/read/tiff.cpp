@@ -46,10 +46,11 @@ std::string check_strips(TIFF* tiff, std::uint64_t file_bytes, std::uint16_t com
 
 }  // namespace
 
-Result<Image> tiff(int file, std::uint64_t bytes, const std::string& path) {
+Result<Image> tiff(int file, std::uint64_t bytes, const std::string& path, int threshold) {
   std::string message;  // of libtiff, outlives the handle
   const auto failure = [&](std::string_view why) {
-    return Error{Fault::kVerification, fmt::format("{}: not a whole 1-bit TIFF: {}; plan the layer again", path, why)};
+    return Error{Fault::kVerification,
+                 fmt::format("{}: not a whole {}TIFF: {}; plan the layer again", path, threshold > 0 ? "" : "1-bit ", why)};
   };
   const auto options = strict_tiff_options(message);
   const int own_file = ::dup(file);
@@ -72,15 +73,20 @@ Result<Image> tiff(int file, std::uint64_t bytes, const std::string& path) {
   TIFFGetFieldDefaulted(handle.get(), TIFFTAG_SAMPLESPERPIXEL, &samples);
   TIFFGetFieldDefaulted(handle.get(), TIFFTAG_COMPRESSION, &compression);
   TIFFGetFieldDefaulted(handle.get(), TIFFTAG_RESOLUTIONUNIT, &unit);
-  if (TIFFGetField(handle.get(), TIFFTAG_PHOTOMETRIC, &photometric) == 0 || photometric > PHOTOMETRIC_MINISBLACK || bits != 1 ||
-      samples != 1) {
-    return failure("not a 1-bit image");
+  const bool grey = threshold > 0 && (bits == 8 || bits == 16);
+  if (TIFFGetField(handle.get(), TIFFTAG_PHOTOMETRIC, &photometric) == 0 || photometric > PHOTOMETRIC_MINISBLACK ||
+      (bits != 1 && !grey) || samples != 1) {
+    return failure(threshold > 0 ? "neither 1-bit nor grey of 8 or 16 bits" : "not a 1-bit image");
   }
+  std::uint16_t kind = SAMPLEFORMAT_UINT;
+  TIFFGetFieldDefaulted(handle.get(), TIFFTAG_SAMPLEFORMAT, &kind);
+  if (grey && kind != SAMPLEFORMAT_UINT) return failure("its values are not whole numbers from 0 on");
+  if (threshold > 0 && TIFFLastDirectory(handle.get()) == 0) return failure("several images in one file; write one a layer");
   if (TIFFIsTiled(handle.get()) != 0) return failure("tiles are not supported");
   if (columns == 0 || rows == 0 || columns > kMostPixelsASide || rows > kMostPixelsASide) {
     return failure(fmt::format("{} x {} pixels", columns, rows));
   }
-  const std::size_t stride = row_bytes(columns);
+  const std::size_t step = bits / 8u, stride = grey ? columns * step : row_bytes(columns);
   const std::string wrong = check_strips(handle.get(), bytes, compression, rows, stride);
   if (!wrong.empty()) return failure(wrong);
   if (TIFFScanlineSize(handle.get()) != static_cast<tmsize_t>(stride)) return failure("rows of an unexpected length");
@@ -99,7 +105,11 @@ Result<Image> tiff(int file, std::uint64_t bytes, const std::string& path) {
     if (TIFFReadScanline(handle.get(), row.data(), r, 0) < 0 || !message.empty()) {
       return failure(fmt::format("row {}: {}", r, message.empty() ? "cannot be decoded" : message));
     }
-    if (!builder.add_row(row, photometric == PHOTOMETRIC_MINISBLACK)) return failure("too many runs");
+    // Values of two bytes are in the order of this program's hosts, little-endian. Those of min-is-white: bright is small.
+    const bool bright_is_low = photometric == PHOTOMETRIC_MINISWHITE;
+    if (grey) bits_of_grey(row, columns, step, step == 2, bright_is_low ? 256 - threshold : threshold);
+    if (!builder.add_row(std::span(row).first(row_bytes(columns)), grey ? bright_is_low : !bright_is_low))
+      return failure("too many runs");
   }
   image.runs = builder.finish();
   return image;

@@ -61,6 +61,8 @@ const Row kRows[] = {
     {"calibrate", "-o,--output", "calibrate --machine printer.toml --measured widths.csv --quiet -o @", "widths.csv"},
     {"design", "-o,--output", "design --pore 0.12x0.9 --machine printer.toml --voxel 40 --quiet -o @", "printer.toml"},
     {"permeability", "--plot", "permeability drops.csv --convention dinisio2022 --plot @.svg", "drops.csv"},
+    {"permeability", "--solid", "permeability made.gcode --window 1,1,0.6 --voxel 50 --no-flow --solid @.mha", "made.gcode"},
+    {"permeability", "--void", "permeability made.gcode --window 1,1,0.6 --voxel 50 --no-flow --void @.stl", "made.gcode"},
     {"merge", "-o,--output", "merge shards --quiet -o @", "part.stl", "/manifest.json", true},
     {"machines", "--target", "machines --target @", nullptr},
     {"preview", "-o,--output", "preview made.gcode --quiet -o @.svg", "made.gcode"},
@@ -72,12 +74,12 @@ const Row kRows[] = {
 
 /// Values of options that name no file, beside lists of words to choose from.
 const std::set<std::string_view> kNoFiles = {
-    "A:B",     "DARCY",   "DEG",        "DEGC",   "DPI|XxY",   "ENGINE",        "FACTOR", "FILLING",       "FORMAT",
-    "FORMULA", "G/CM3",   "I/N",        "K",      "KEY=VALUE", "KEY=VALUE;...", "KG/M3",  "LOOPS",         "MM",
-    "MM/S",    "MM2",     "MM[,MM...]", "MODE",   "N",         "N,N,...",       "NAME",   "NAME|NAME,...", "PA",
-    "PA.S",    "PATTERN", "PERCENT",    "PIXELS", "RULE",      "SECONDS",       "SET",    "SET|RANGE",     "SHARE",
-    "SIZE",    "S[,S]",   "S|X,Y,Z",    "UM",     "UM|XxY",    "UNIT",          "WHEN",   "WIDTHxDEPTH",   "WIDTHxLENGTH",
-    "WORDS",   "X,Y",     "X,Y,Z"};
+    "A:B",          "AXES",    "DARCY",   "DEG",        "DEGC",   "DPI|XxY",   "ENGINE",        "FACTOR", "FILLING",
+    "FORMAT",       "FORMULA", "G/CM3",   "I/N",        "K",      "KEY=VALUE", "KEY=VALUE;...", "KG/M3",  "LOOPS",
+    "MM",           "MM/S",    "MM2",     "MM[,MM...]", "MODE",   "N",         "N,N,...",       "NAME",   "NAME|NAME,...",
+    "PA",           "PA.S",    "PATTERN", "PERCENT",    "PIXELS", "RULE",      "SECONDS",       "SET",    "SET|RANGE",
+    "SHARE",        "SIZE",    "S[,S]",   "S|X,Y,Z",    "UM",     "UM|XxY",    "UNIT",          "WHEN",   "WIDTHxDEPTH",
+    "WIDTHxLENGTH", "WORDS",   "X,Y",     "X,Y,Z"};
 
 std::string all_messages(const Outcome& outcome, const Row& row) { return std::string(row.call) + "\n" + outcome.err; }
 

@@ -1,19 +1,17 @@
 // lamina permeability: k1 and k2 of measured pressure drops, and k1 predicted from written toolpaths.
 #include <fmt/format.h>
 
+#include <filesystem>
 #include <numbers>
 
-#include "pipeline/calibrate/bead_rules.h"
-#include "pipeline/calibrate/bead_voxels.h"
 #include "pipeline/calibrate/drops_page.h"
 #include "pipeline/calibrate/laid_look.h"
-#include "pipeline/calibrate/pore_page.h"
-#include "pipeline/calibrate/predict_flow.h"
-#include "pipeline/calibrate/window_choice.h"
 #include "pipeline/cli/command.h"
 #include "pipeline/cli/plot_file.h"
+#include "pipeline/cli/pore_print.h"
+#include "pipeline/cli/pore_stack.h"
+#include "pipeline/cli/window_files.h"
 #include "stages/data/text/json.h"
-#include "stages/data/text/number_text.h"
 #include "stages/data/text/readable.h"
 
 namespace lamina::pipeline {
@@ -24,12 +22,13 @@ CommandSpec permeability_spec() {
   spec.summary =
       "Fits dp / L = (mu / k1) v + (rho / k2) v^2 to measured flows and pressure drops: Darcy's k1, Forchheimer's k2,\n"
       "their standard errors, the quality of the fit and how far samples differ. Of G-code, predicts Darcy's k1: cuts what\n"
-      "repeats of the beads, or a window, into voxels and computes how a fluid creeps through their pores.";
-  spec.operand = "FILE";
+      "repeats of the beads, or a window, into voxels and computes how a fluid creeps through their pores. The same of layer\n"
+      "images: a window of what lamina jet wrote, or of a tomography.";
+  spec.operand = "FILE|DIR";
   spec.operand_meaning =
       "a table with a header: flow_l_min (or velocity_m_s) and drop_mbar (or _pa, _kpa, _bar, _psi), any number of drop columns;\n"
       "rows may name their configuration and sample; without a column sample each of several drop columns is one;\n"
-      "or toolpaths, as in part.gcode";
+      "or toolpaths, as in part.gcode; or a folder: of lamina jet, or of numbered images .png, .tif or .pbm, the lowest first";
   spec.options = {
       {"--length", "MM", "of the medium along the flow", "", "Medium"},
       {"--diameter", "MM", "of a round medium", "", "Medium"},
@@ -40,8 +39,10 @@ CommandSpec permeability_spec() {
       {"--outlet-pressure", "PA", "absolute, behind the medium", "101325", "Fluid"},
       {"--flow-pressure", "PA", "p, at which flow and density are told; default: that of the outlet", "", "Fluid"},
       {"--convention", "NAME", "dinisio2022: what reproduces Table 25 of that document", "", "Fluid", {"dinisio2022"}},
-      {"--window", "X,Y,Z", "mm of a print to look at; default: what repeats, else 2,2 and eight layers", "", "Toolpaths"},
-      {"--voxel", "UM", "edge of a voxel, micrometres", "10", "Toolpaths"},
+      {"--window", "X,Y,Z", "mm of a print to look at; default: what repeats, else 2,2 and eight layers; of images: 2,2,2", "",
+       "Toolpaths and images"},
+      {"--voxel", "UM", "edge of a voxel, micrometres; of images: their pixels", "10", "Toolpaths and images"},
+      {"--memory", "SIZE", "that the flow may take, as in 2G", "1G", "Toolpaths and images"},
       {"--beads",
        "WORD",
        "laid: as the printer's melt lags; spread: along lines too; told: as wide as the file tells; default: laid by known printers",
@@ -49,11 +50,14 @@ CommandSpec permeability_spec() {
        "Toolpaths",
        {"laid", "spread", "told"}},
       {"--machine", "NAME", "printer that lays them; default: the one that the file names", "", "Toolpaths"},
-      {"--memory", "SIZE", "that the flow may take, as in 2G", "1G", "Toolpaths"},
       {"--inertia", "", "Forchheimer's k2 along z too, from six flows of air", "", "Toolpaths"},
       {"--plot", "FILE", "draw points and parabola, as .svg or .png", "", "Result"},
       {"--overwrite", "", "replace a file that lamina did not write", "", "Result"},
       {"--json", "", "print the result as one JSON object on stdout", "", "Result"}};
+  const std::vector<OptionSpec> files = window_file_options(), images = stack_options();
+  spec.options.insert(spec.options.end() - 2, files.begin(), files.end());
+  const auto plot = std::ranges::find(spec.options, "--plot", &OptionSpec::flag);
+  spec.options.insert(plot, images.begin(), images.end());
   spec.closing =
       "Rows of one column `configuration` are fitted group by group, and within it each sample by itself. Standard errors take\n"
       "all points as independent; where samples differ, the deviation between them tells more. With --compressible both forms are\n"
@@ -63,7 +67,8 @@ CommandSpec permeability_spec() {
       "Examples:\n  lamina permeability drops.csv --length 25.4 --diameter 25.4\n"
       "  lamina permeability drops.csv --convention dinisio2022 --plot fit.svg\n"
       "  lamina permeability drops.csv --length 25.4 --diameter 25.4 --compressible --outlet-pressure 95000\n"
-      "  lamina permeability part.gcode --voxel 15";
+      "  lamina permeability part.gcode --voxel 15\n"
+      "  lamina permeability part.gcode --window 2,2,0.6 --solid beads.nrrd --void pores.stl --no-flow";
   return spec;
 }
 
@@ -147,89 +152,35 @@ Outcome fit_table(const Arguments& arguments, Context& context) {
   return arguments.has("--json") ? context.give(json) : context.print(text);
 }
 
-/// What the options wish for. errors  kUsage
-Result<WindowWish> read_wish(const Arguments& arguments) {
-  WindowWish wish;
-  if (Status status = arguments.read("--voxel", {1, 500}, wish.voxel_um); !status) return status.error();
-  if (!arguments.has("--window")) return wish;
-  const std::string text = arguments.text("--window");
-  const auto parts = split(text, ",");
-  for (std::size_t a = 0; a < 3; ++a) {
-    const std::string wrong = parts.size() != 3 ? "want three lengths in mm, as in --window 2,3,0.6"
-                                                : read_number(parts[a], 0.05, 100, " mm", wish.size_mm[a]);
-    if (Status status = at_option("--window", wrong); !status) return status.error();
-  }
-  return wish;
-}
+constexpr std::string_view kOfTables[] = {"--length",          "--diameter",     "--area", "--viscosity",
+                                          "--density",         "--convention",   "--plot", "--compressible",
+                                          "--outlet-pressure", "--flow-pressure"};
+constexpr std::string_view kOfImages[] = {"--pixel", "--layer-um", "--threshold", "--dark"};
+constexpr std::string_view kOfVoxels[] = {"--window", "--voxel", "--memory", "--solid", "--void", "--no-flow"};
+constexpr std::string_view kOfToolpaths[] = {"--beads", "--machine", "--inertia", "--scan"};
 
-Outcome predict(const Arguments& arguments, Context& context) {
-  for (const char* flag : {"--length", "--diameter", "--area", "--viscosity", "--density", "--convention", "--plot",
-                           "--compressible", "--outlet-pressure", "--flow-pressure"})
-    if (arguments.has(flag))
-      return Error{Fault::kUsage, fmt::format("{} is for tables of measurements, not for toolpaths", flag)};
-  FlowRequest request;
-  request.inertia = arguments.has("--inertia");
-  if (Status status = arguments.read("--memory", read_bytes, request.memory_bytes); !status) return status.error();
-  const Result<read::GcodeFile> file = read::GcodeFile::open(arguments.operands.front());
-  if (!file) return file.error();
-  const Result<Pile> pile = pile_of(*file);
-  if (!pile) return pile.error();
-  if (pile->layers.empty())
-    return Error{Fault::kInput, arguments.operands.front() + ": no layer lies above z = 0; heights count from the bed"};
-  const Result<WindowWish> wish = read_wish(arguments);
-  if (!wish) return wish.error();
-  const Result<WindowChoice> choice = choose_window(*file, *pile, *wish);
-  if (!choice) return choice.error();
-  const Result<BeadRules> beads = bead_rules(*file, arguments.text("--beads"), arguments.text("--machine"));
-  if (!beads) return beads.error();
-  const CutWindow cut_window = [&](const Window& window) {
-    return bead_voxels(*file, *pile, window, beads->rules ? &*beads->rules : nullptr);
-  };
-  const Window& window = choice->window;
-  std::vector<VoxelStack> cut;
-  for (const Window& in : {window, finer(window, kFiner), finer(with_half_as_many_voxels(window), kFiner)}) {
-    Result<VoxelStack> voxels = cut_window(in);
-    if (!voxels) return voxels.error();
-    cut.push_back(std::move(*voxels));
-  }
-  const std::atomic<bool>& cancel = context.cancel();
-  const Result<PoreReport> report = look_at_pores({cut[0], cut[1], cut[2]}, request, [&](double) { return !cancel; });
-  if (!report) return Error{report.error().fault, fmt::format("{}: {}", arguments.operands.front(), report.error().message)};
-  std::optional<Forchheimer> inertia;
-  if (request.inertia) {
-    Result<Forchheimer> found = look_at_inertia({cut[0], cut[1], cut[2]}, *report, [&](double) { return !cancel; });
-    if (!found && found.error().fault != Fault::kInput) return found.error();
-    if (!found) context.say("note: " + found.error().message);
-    if (found && !found->settled) context.say("note: the fastest flow found no steady state; k2 is of those before");
-    if (found) inertia = std::move(*found);
-  }
-  const Result<LaidLook> look = look_at_laid(*file, *pile, cut[0], cut_window);
-  if (!look) return look.error();
-  if (pile->skipped > 0) {
-    context.say(
-        fmt::format("note: {} layers that do not lie above those before are left out, as of parts printed one after the other",
-                    pile->skipped));
-  }
-  for (const std::optional<Darcy>& darcy : report->flow) {
-    if (darcy && !darcy->resolved) context.say("note: voxels are too coarse for the pores; take a smaller --voxel");
-    if (darcy && darcy->residual > 1e-2) context.say("note: the flow was not solved to its end; take a smaller --window");
-  }
-  context.say(beads->told);
-  if (!arguments.has("--json"))
-    return context.print(as_text(*choice, *report) + (inertia ? as_text(*inertia) : "") + as_text(*look));
-  Json json = as_json(*choice, *report);
-  if (inertia) json["inertia"] = as_json(*inertia);
-  add_to(*look, json);
-  return context.give(json);
+/// errors  kUsage: one of the options is given
+Status refuse(const Arguments& arguments, std::span<const std::string_view> flags, const char* why) {
+  for (const std::string_view flag : flags)
+    if (arguments.has(flag)) return Error{Fault::kUsage, fmt::format("{} is for {}", flag, why)};
+  return {};
 }
 
 Outcome run_permeability(const Arguments& arguments, Context& context) {
-  if (arguments.operands.size() != 1) return Error{Fault::kUsage, "name one file of measurements, or of toolpaths"};
-  if (names_toolpaths(arguments.operands.front())) return predict(arguments, context);
-  for (const char* flag : {"--window", "--voxel", "--beads", "--machine", "--memory", "--inertia"})
-    if (arguments.has(flag))
-      return Error{Fault::kUsage, fmt::format("{} is for toolpaths, not for tables of measurements", flag)};
-  return fit_table(arguments, context);
+  if (arguments.operands.size() != 1)
+    return Error{Fault::kUsage, "name one file of measurements or of toolpaths, or a folder of images"};
+  const std::string& operand = arguments.operands.front();
+  std::error_code ignored;
+  const bool images = std::filesystem::is_directory(operand, ignored), beads = !images && names_toolpaths(operand);
+  Status fits = images || beads ? refuse(arguments, kOfTables, "tables of measurements, not for toolpaths or images")
+                                : refuse(arguments, kOfVoxels, "toolpaths and images, not for tables of measurements");
+  if (images && !fits) return Error{Fault::kInput, fmt::format("{}: is a folder; {}", one_line(operand), fits.error().message)};
+  if (fits && !images && !arguments.has("--scan")) fits = refuse(arguments, kOfImages, "folders of images");
+  if (fits && !images) fits = refuse(arguments, std::array<std::string_view, 1>{"--periodic"}, "folders of images");
+  if (fits && !beads) fits = refuse(arguments, kOfToolpaths, "toolpaths");
+  if (fits && !arguments.has("--scan")) fits = refuse(arguments, std::array<std::string_view, 1>{"--range"}, "--scan DIR");
+  if (!fits) return fits;
+  return images ? predict_stack(arguments, context) : beads ? predict_print(arguments, context) : fit_table(arguments, context);
 }
 
 }  // namespace

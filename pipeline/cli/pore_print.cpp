@@ -1,0 +1,102 @@
+#include "pipeline/cli/pore_print.h"
+
+#include <fmt/format.h>
+
+#include <vector>
+
+#include "pipeline/calibrate/bead_rules.h"
+#include "pipeline/calibrate/laid_look.h"
+#include "pipeline/calibrate/pore_page.h"
+#include "pipeline/calibrate/predict_inertia.h"
+#include "pipeline/cli/pore_stack.h"
+#include "pipeline/cli/window_files.h"
+#include "stages/data/text/json.h"
+#include "stages/data/text/readable.h"
+
+namespace lamina::pipeline {
+namespace {
+
+/// The window in its voxels and, for a flow, in those that it is computed with.
+Result<std::vector<VoxelStack>> cut_for(bool flow, const CutWindow& cut, const Window& window) {
+  std::vector<VoxelStack> all;
+  for (const Window& in : {window, finer(window, kFiner), finer(with_half_as_many_voxels(window), kFiner)}) {
+    if (!flow && !all.empty()) break;
+    Result<VoxelStack> voxels = cut(in);
+    if (!voxels) return voxels.error();
+    all.push_back(std::move(*voxels));
+  }
+  return all;
+}
+
+/// None where there is nothing to tell, which a note says.
+Result<std::optional<Forchheimer>> inertia_of(const PoreRasters& rasters, const PoreReport& report, Context& context) {
+  const std::atomic<bool>& cancel = context.cancel();
+  Result<Forchheimer> found = look_at_inertia(rasters, report, [&](double) { return !cancel; });
+  if (!found && found.error().fault != Fault::kInput) return found.error();
+  if (!found) context.say("note: " + found.error().message);
+  if (found && !found->settled) context.say("note: the fastest flow found no steady state; k2 is of those before");
+  return found ? std::optional(std::move(*found)) : std::nullopt;
+}
+
+void say_doubts(const Pile& pile, const PoreReport& report, Context& context) {
+  if (pile.skipped > 0) {
+    context.say(
+        fmt::format("note: {} layers that do not lie above those before are left out, as of parts printed one after the other",
+                    pile.skipped));
+  }
+  for (const std::optional<Darcy>& darcy : report.flow) {
+    if (darcy && !darcy->resolved) context.say("note: voxels are too coarse for the pores; take a smaller --voxel");
+    if (darcy && darcy->residual > 1e-2) context.say("note: the flow was not solved to its end; take a smaller --window");
+  }
+}
+
+}  // namespace
+
+Outcome predict_print(const Arguments& arguments, Context& context) {
+  const std::string& path = arguments.operands.front();
+  if (Status status = check_window_files(arguments); !status) return status;
+  if (arguments.has("--inertia") && arguments.has("--no-flow"))
+    return Error{Fault::kUsage, "--inertia does nothing beside --no-flow; leave one out"};
+  FlowRequest request;
+  request.inertia = arguments.has("--inertia");
+  if (Status status = arguments.read("--memory", read_bytes, request.memory_bytes); !status) return status.error();
+  const Result<read::GcodeFile> file = read::GcodeFile::open(path);
+  if (!file) return file.error();
+  const Result<Pile> pile = pile_of(*file);
+  if (!pile) return pile.error();
+  if (pile->layers.empty()) return Error{Fault::kInput, path + ": no layer lies above z = 0; heights count from the bed"};
+  const Result<BeadRules> beads = bead_rules(*file, arguments.text("--beads"), arguments.text("--machine"));
+  if (!beads) return beads.error();
+  const bead::LayRules* rules = beads->rules ? &*beads->rules : nullptr;
+  if (arguments.has("--scan")) return compare_scan(arguments, context, *file, *pile, rules);
+  const Result<WindowWish> wish = read_window_wish(arguments, 10);
+  if (!wish) return wish.error();
+  const Result<WindowChoice> choice = choose_window(*file, *pile, *wish);
+  if (!choice) return choice.error();
+  const CutWindow cut_window = [&](const Window& window) { return bead_voxels(*file, *pile, window, rules); };
+  const bool flows = !arguments.has("--no-flow");
+  const auto cut = cut_for(flows, cut_window, choice->window);
+  if (!cut) return cut.error();
+  const auto files = write_window_files(arguments, cut->front());
+  if (!files) return files.error();
+  const PoreRasters rasters{cut->front(), cut->at(flows ? 1 : 0), cut->at(flows ? 2 : 0)};
+  const std::atomic<bool>& cancel = context.cancel();
+  const Result<PoreReport> report =
+      flows ? look_at_pores(rasters, request, [&](double) { return !cancel; }) : pores_alone(rasters.voxels);
+  if (!report) return Error{report.error().fault, fmt::format("{}: {}", path, report.error().message)};
+  const auto inertia = request.inertia ? inertia_of(rasters, *report, context) : Result(std::optional<Forchheimer>());
+  if (!inertia) return inertia.error();
+  const Result<LaidLook> look = look_at_laid(*file, *pile, rasters.voxels, cut_window);
+  if (!look) return look.error();
+  say_doubts(*pile, *report, context);
+  context.say(beads->told);
+  if (!arguments.has("--json"))
+    return context.print(as_text(*choice, *report) + (*inertia ? as_text(**inertia) : "") + as_text(*look) + as_text(*files));
+  Json json = as_json(*choice, *report);
+  if (*inertia) json["inertia"] = as_json(**inertia);
+  add_to(*look, json);
+  if (!files->empty()) json["files"] = as_json(*files);
+  return context.give(json);
+}
+
+}  // namespace lamina::pipeline

@@ -1,0 +1,103 @@
+#include "pipeline/cli/window_files.h"
+
+#include <fmt/format.h>
+
+#include <filesystem>
+
+#include "stages/data/text/json.h"
+#include "stages/data/text/readable.h"
+#include "stages/data/text/version.h"
+#include "stages/write/voxels/image.h"
+#include "stages/write/voxels/surface_stl.h"
+
+namespace lamina::pipeline {
+namespace {
+
+namespace fs = std::filesystem;
+using write::voxels::Side;
+
+struct Choice {
+  const char *flag, *content;
+  Side side;
+};
+constexpr Choice kChoices[] = {{"--solid", "solid", Side::kSolid}, {"--void", "void", Side::kVoid}};
+
+bool is_stl(const std::string& path) { return lower_case(fs::path(path).extension().string()) == ".stl"; }
+
+}  // namespace
+
+std::vector<terminal::OptionSpec> window_file_options() {
+  return {{"--solid", "FILE", "what is solid in the window, as voxels .nrrd, .mha, .vti, or as a closed surface .stl", "",
+           "Result"},
+          {"--void", "FILE", "the same of its void", "", "Result"},
+          {"--no-flow", "", "tell pores and write files, but compute no flow", "", "Result"}};
+}
+
+Status check_window_files(const terminal::Arguments& arguments) {
+  for (const Choice& choice : kChoices) {
+    if (!arguments.has(choice.flag)) continue;
+    const std::string path = arguments.text(choice.flag), told = one_line(path);
+    if (!is_stl(path) && !write::voxels::image_kind(path))
+      return Error{Fault::kUsage, fmt::format("{} {}: end the name with .nrrd, .mha, .vti or .stl", choice.flag, told)};
+    const fs::path folder = fs::path(path).parent_path();
+    std::error_code ignored;
+    if (!folder.empty() && !fs::is_directory(folder, ignored))
+      return Error{Fault::kOutput, fmt::format("{} {}: there is no folder {}; make it or choose another place", choice.flag,
+                                               told, one_line(folder.string()))};
+  }
+  return {};
+}
+
+Result<std::vector<WindowFile>> write_window_files(const terminal::Arguments& arguments, const VoxelView& window) {
+  std::vector<WindowFile> written;
+  for (const Choice& choice : kChoices) {
+    if (!arguments.has(choice.flag)) continue;
+    WindowFile one{arguments.text(choice.flag), choice.content, 0, 0};
+    auto file = write::File::open(one.path);
+    if (!file) return file.error();
+    if (is_stl(one.path)) {
+      const auto counts = write::voxels::write_surface(*file, window, choice.side, version());
+      if (!counts)
+        return Error{counts.error().fault, fmt::format("{} {}: {}", choice.flag, one_line(one.path), counts.error().message)};
+      one.facets = counts->facets;
+    } else if (Status status =
+                   write::voxels::write_image(*file, window, choice.side, *write::voxels::image_kind(one.path), version());
+               !status) {
+      return status.error();
+    }
+    const auto whole = file->finish();
+    if (!whole) return whole.error();
+    one.bytes = whole->bytes;
+    written.push_back(one);
+  }
+  return written;
+}
+
+std::string as_text(const std::vector<WindowFile>& files) {
+  std::string text;
+  for (const WindowFile& file : files) {
+    text += fmt::format("file      {}: the {}, {}{}\n", one_line(file.path), file.content, readable_bytes(file.bytes),
+                        file.facets > 0 ? fmt::format(", {} facets", readable_count(file.facets)) : "");
+  }
+  return text;
+}
+
+nlohmann::ordered_json as_json(const std::vector<WindowFile>& files) {
+  Json json = Json::array();
+  for (const WindowFile& file : files) {
+    json.push_back({{"path", file.path}, {"content", file.content}, {"bytes", file.bytes}});
+    if (file.facets > 0) json.back()["facets"] = file.facets;
+  }
+  return json;
+}
+
+PoreReport pores_alone(const VoxelView& window) {
+  PoreReport report;
+  report.voxels = window.voxels();
+  report.empty = window.voxels() - set_voxels(window);
+  report.porosity = pores::porosity(window);
+  report.surface_per_mm = pores::specific_surface(window).crofton;
+  return report;
+}
+
+}  // namespace lamina::pipeline

@@ -1,0 +1,37 @@
+// pipeline/cli/window_files.h: the options --solid FILE, --void FILE and --no-flow: a window of voxels taken elsewhere.
+#pragma once
+
+#include <nlohmann/json_fwd.hpp>
+#include <string>
+#include <vector>
+
+#include "pipeline/calibrate/predict_flow.h"
+#include "stages/data/status.h"
+#include "stages/data/voxels.h"
+#include "stages/terminal/arguments.h"
+
+namespace lamina::pipeline {
+
+/// One file that was written.
+struct WindowFile {
+  std::string path, content;  // "solid" or "void"
+  std::uint64_t bytes = 0, facets = 0;
+};
+
+/// For the help.
+std::vector<terminal::OptionSpec> window_file_options();
+
+/// errors  kUsage: an ending of no format; kOutput: no such folder
+Status check_window_files(const terminal::Arguments& arguments);
+
+/// Writes what was asked for. errors  kOutput; kInput: more facets than an STL file counts
+Result<std::vector<WindowFile>> write_window_files(const terminal::Arguments& arguments, const VoxelView& window);
+
+/// A line each, which ends with LF.
+std::string as_text(const std::vector<WindowFile>& files);
+nlohmann::ordered_json as_json(const std::vector<WindowFile>& files);
+
+/// What there is to say of a window without a flow through it.
+PoreReport pores_alone(const VoxelView& window);
+
+}  // namespace lamina::pipeline
