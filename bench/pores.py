@@ -120,7 +120,8 @@ def first_table(folder, voxel, flow, porosity):
 def second_table(folder, voxel, flow):
     rows = []
     for name, options in (("widths as the file tells them, by the calibration's tables", ["--beads", "told"]),
-                          ("lag 0.046 s, 200 mm/s2", (0.046, 200)), ("lag 0.046 s, 400 mm/s2: the profile", []),
+                          ("lag 0.046 s, 400 mm/s2: the profile", []), ("the same, spread along the lines too", ["--beads", "spread"]),
+                          ("lag 0.046 s, 200 mm/s2", (0.046, 200)),
                           ("lag 0.052 s, 400 mm/s2", (0.052, 400)), ("lag 0.046 s, 1000 mm/s2", (0.046, 1000)),
                           ("lag 0.052 s, speed at once", (0.052, 1000000))):
         if isinstance(options, tuple):

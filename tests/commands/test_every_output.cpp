@@ -79,7 +79,7 @@ const std::set<std::string_view> kNoFiles = {
     "MM",           "MM/S",    "MM2",     "MM[,MM...]", "MODE",   "N",         "N,N,...",       "NAME",   "NAME|NAME,...",
     "PA",           "PA.S",    "PATTERN", "PERCENT",    "PIXELS", "RULE",      "SECONDS",       "SET",    "SET|RANGE",
     "SHARE",        "SIZE",    "S[,S]",   "S|X,Y,Z",    "UM",     "UM|XxY",    "UNIT",          "WHEN",   "WIDTHxDEPTH",
-    "WIDTHxLENGTH", "WORDS",   "X,Y",     "X,Y,Z"};
+    "WIDTHxLENGTH", "WORD",    "WORDS",   "X,Y",        "X,Y,Z"};
 
 std::string all_messages(const Outcome& outcome, const Row& row) { return std::string(row.call) + "\n" + outcome.err; }
 

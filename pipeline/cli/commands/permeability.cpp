@@ -49,7 +49,7 @@ CommandSpec permeability_spec() {
        "",
        "Toolpaths",
        {"laid", "spread", "told"}},
-      {"--machine", "NAME", "printer that lays them; default: the one that the file names", "", "Toolpaths"},
+      {"--machine", "NAME|FILE", "printer that lays them; default: the one that the file names", "", "Toolpaths"},
       {"--inertia", "", "Forchheimer's k2 along z too, from six flows of air", "", "Toolpaths"},
       {"--plot", "FILE", "draw points and parabola, as .svg or .png", "", "Result"},
       {"--overwrite", "", "replace a file that lamina did not write", "", "Result"},

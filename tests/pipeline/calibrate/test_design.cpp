@@ -48,8 +48,9 @@ TEST(DesignedJob, TheForwardRunOfWhatIsWrittenMeetsTheWish) {
 TEST(DesignedJob, TheVoidOfAForwardRunIsThatOfTheSlots) {
   const auto found = pipeline::design_job(wish_of(0.2, 0), go_on);
   ASSERT_TRUE(found.ok());
-  EXPECT_EQ(found->runs, 1u);
-  EXPECT_NEAR(found->forward.porosity / found->design.slots.porosity, 1, 0.02);
+  EXPECT_TRUE(found->met);
+  EXPECT_LE(found->runs, 2u) << "beads keep their volume, slots nearly so";
+  EXPECT_NEAR(found->forward.porosity, 0.2, 0.01);
   EXPECT_LE(found->forward.porosity_through, found->forward.porosity);
   EXPECT_NEAR(found->forward.pore_width_mm, found->design.pores.width_mm, 1e-3);
   EXPECT_NEAR(found->forward.pore_length_mm, found->design.pores.length_mm, 1e-3);
@@ -59,8 +60,8 @@ TEST(DesignedJob, WhatIsOutOfReachIsToldWithTheNearest) {
   const auto found = pipeline::design_job(wish_of(0.5, 0), go_on);
   ASSERT_TRUE(found.ok());
   EXPECT_FALSE(found->met);
-  EXPECT_EQ(found->runs, 1u) << "a second search finds the same";
-  EXPECT_GT(found->forward.porosity, 0.28);
+  EXPECT_LE(found->runs, 2u) << "a further search finds the same";
+  EXPECT_GT(found->forward.porosity, 0.25);
   EXPECT_LT(found->forward.porosity, 0.4);
   EXPECT_FALSE(found->outside.empty());
 }

@@ -77,7 +77,8 @@ Json plan_of(const Directory& directory, const std::string& configuration) {
 }
 
 TEST(LaidLook, CuspsThatTouchNoPoreTellBondedFromUnbondedPlans) {
-  // Table 17 was measured with helium: between what is open with good bonds and with none, give or take its window of error.
+  // Table 17 was measured with helium: between what is open with good bonds and with none, give or take the 2 points that its
+  // window of error is worth.
   // C2 and C3 have cusps between continuous lines, 5 and 7 points of volume, that touch no pore where beads bond.
   const Directory directory;
   for (const auto& row : test::table(17)) {
@@ -90,7 +91,7 @@ TEST(LaidLook, CuspsThatTouchNoPoreTellBondedFromUnbondedPlans) {
     const double helium = test::number(row, "effective_porosity_percent");
     EXPECT_NEAR(unbonded - bonded, between, 1.2) << name;
     EXPECT_LT(bonded, helium) << name;
-    EXPECT_LT(helium, unbonded + 0.5) << name;
+    EXPECT_LT(helium, unbonded + 2) << name;
     // Pores of thin stretches of 1.5 mm: all alike, closed at both ends.
     const Json& pores = json["pores"];
     EXPECT_GT(pores["count"].get<int>(), 50) << name;

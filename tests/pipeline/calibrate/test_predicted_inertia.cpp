@@ -15,7 +15,7 @@ namespace {
 /// A pore along z that repeats, of `scale` times 12 x 1 x 16 voxels; `wedge` closes it in part.
 VoxelStack pore(std::uint32_t scale, bool wedge, Nm edge) {
   const double unit = scale;
-  return pores::testing::stack_of(pores::testing::Voxels(12 * scale, 1, 16 * scale).fill([&](auto x, auto, auto z) {
+  return pores::testing::stack_of(pores::testing::Voxels(12 * scale, scale, 16 * scale).fill([&](auto x, auto, auto z) {
     const double at = (x + 0.5) / unit, height = (z + 0.5) / unit;
     return at < 2 || (wedge && height > 3 && height < 9 && at < 2 + (height - 3));
   }),
