@@ -109,7 +109,7 @@ def page(voxel):
 
 def main(arguments):
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--voxel", type=float, default=5, help="um, across the lines")
+    parser.add_argument("--voxel", type=float, default=10, help="um, across the lines")
     options = parser.parse_args(arguments)
     lines = list(page(options.voxel))
     with open(os.path.join(ROOT, "bench/design.md"), "w", encoding="utf-8") as file:

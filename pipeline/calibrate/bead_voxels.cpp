@@ -113,7 +113,9 @@ class LayerBeads {
     rules_->height_mm = mm(height_);
     bead::lay(beads_, found->feeds, *rules_, pieces_);
     std::erase_if(pieces_, [&](const bead::LaidPiece& p) { return !is_near(window_.box, p.from, p.to, kNeighbours); });
-    bead::find_contacts(pieces_, rules_->height_mm, sides_);
+    left_out_mm3_ += bead::find_contacts(pieces_, rules_->height_mm, sides_);
+    for (const bead::LaidPiece& p : pieces_)
+      laid_mm3_ += p.area_mm2 * std::hypot(mm(p.to.x - p.from.x), mm(p.to.y - p.from.y));
     return {};
   }
 
@@ -126,6 +128,8 @@ class LayerBeads {
         if (i > 0 && bends(pieces_[i - 1], pieces_[i])) cutter.round_off(pieces_[i], sides_[i], height_, above);
       }
   }
+
+  double left_out() const { return laid_mm3_ > 0 ? left_out_mm3_ / laid_mm3_ : 0; }
 
  private:
   static constexpr std::int64_t kNeighbours = 2'000'000;  // nm: what may push those that reach into the window
@@ -154,6 +158,7 @@ class LayerBeads {
   Buffer<bead::LaidPiece> pieces_;
   Buffer<bead::PieceSides> sides_;
   std::int64_t height_ = 1;
+  double laid_mm3_ = 0, left_out_mm3_ = 0;  // of all layers that were read
 };
 
 }  // namespace
@@ -176,7 +181,7 @@ Result<Pile> pile_of(const read::GcodeFile& file) {
 }
 
 Result<VoxelStack> bead_voxels(const read::GcodeFile& file, const Pile& pile, const Window& window,
-                               const bead::LayRules* rules) {
+                               const bead::LayRules* rules, double* left_out) {
   const Box& box = window.box;
   const std::array<std::int64_t, 3> side = {box.width(), box.depth(), box.height()};
   std::array<Nm, 3> edge{};
@@ -199,6 +204,7 @@ Result<VoxelStack> bead_voxels(const read::GcodeFile& file, const Pile& pile, co
     if (!stack.append(cutter.cut()))
       return Error{Fault::kInput, "the window has too many runs of voxels; take a smaller one or larger voxels"};
   }
+  if (left_out != nullptr) *left_out = beads.left_out();
   return stack;
 }
 

@@ -107,8 +107,13 @@ Result<DesignedJob> design_job(const DesignRequest& request, const std::function
     const double flow = tried.design.slots.permeability_m2 / ratio.permeability;
     const double void_share = tried.design.slots.porosity / ratio.porosity;
     tried.model_ratio = flow > 0 ? forward->permeability_m2 / flow : 1;
-    if (forward->permeability_m2 > 0 && flow > 0) ratio.permeability = forward->permeability_m2 / flow;
-    if (forward->porosity > 0 && void_share > 0) ratio.porosity = forward->porosity / void_share;
+    // From the second run on half of the way: plans that are far from each other have other ratios, and the search would go
+    // to and fro between them.
+    const auto correct = [&](double& old, double found, double model) {
+      if (found > 0 && model > 0) old = runs > 1 ? std::sqrt(old * found / model) : found / model;
+    };
+    correct(ratio.permeability, forward->permeability_m2, flow);
+    correct(ratio.porosity, forward->porosity, void_share);
     if (!best || tried.miss < best->miss) best = std::move(tried);
     if (best->miss <= kNear) break;
   }

@@ -16,7 +16,7 @@ struct DesignRequest {
   std::string machine;  // as --machine takes it
   segment::PoreWish wish;
   double tolerance = 0.05;  // of what the forward run says of each wish, relative
-  std::uint32_t most_runs = 5;
+  std::uint32_t most_runs = 20;
   ForwardGrid grid;
 };
 

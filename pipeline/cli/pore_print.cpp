@@ -73,10 +73,13 @@ Outcome predict_print(const Arguments& arguments, Context& context) {
   if (!wish) return wish.error();
   const Result<WindowChoice> choice = choose_window(*file, *pile, *wish);
   if (!choice) return choice.error();
-  const CutWindow cut_window = [&](const Window& window) { return bead_voxels(*file, *pile, window, rules); };
+  double left_out = 0;
+  const CutWindow cut_window = [&](const Window& window) { return bead_voxels(*file, *pile, window, rules, &left_out); };
   const bool flows = !arguments.has("--no-flow");
   const auto cut = cut_for(flows, cut_window, choice->window);
   if (!cut) return cut.error();
+  if (left_out > 0.002)
+    context.say(fmt::format("note: {:.1f} % of what is laid find no room beside their neighbours and are left out", 100 * left_out));
   const auto files = write_window_files(arguments, cut->front());
   if (!files) return files.error();
   const PoreRasters rasters{cut->front(), cut->at(flows ? 1 : 0), cut->at(flows ? 2 : 0)};
