@@ -114,8 +114,7 @@ class LayerBeads {
     bead::lay(beads_, found->feeds, *rules_, pieces_);
     std::erase_if(pieces_, [&](const bead::LaidPiece& p) { return !is_near(window_.box, p.from, p.to, kNeighbours); });
     left_out_mm3_ += bead::find_contacts(pieces_, rules_->height_mm, sides_);
-    for (const bead::LaidPiece& p : pieces_)
-      laid_mm3_ += p.area_mm2 * std::hypot(mm(p.to.x - p.from.x), mm(p.to.y - p.from.y));
+    for (const bead::LaidPiece& p : pieces_) laid_mm3_ += p.area_mm2 * std::hypot(mm(p.to.x - p.from.x), mm(p.to.y - p.from.y));
     return {};
   }
 
@@ -180,8 +179,8 @@ Result<Pile> pile_of(const read::GcodeFile& file) {
   return pile;
 }
 
-Result<VoxelStack> bead_voxels(const read::GcodeFile& file, const Pile& pile, const Window& window,
-                               const bead::LayRules* rules, double* left_out) {
+Result<VoxelStack> bead_voxels(const read::GcodeFile& file, const Pile& pile, const Window& window, const bead::LayRules* rules,
+                               double* left_out) {
   const Box& box = window.box;
   const std::array<std::int64_t, 3> side = {box.width(), box.depth(), box.height()};
   std::array<Nm, 3> edge{};

@@ -79,7 +79,8 @@ Outcome predict_print(const Arguments& arguments, Context& context) {
   const auto cut = cut_for(flows, cut_window, choice->window);
   if (!cut) return cut.error();
   if (left_out > 0.002)
-    context.say(fmt::format("note: {:.1f} % of what is laid find no room beside their neighbours and are left out", 100 * left_out));
+    context.say(
+        fmt::format("note: {:.1f} % of what is laid find no room beside their neighbours and are left out", 100 * left_out));
   const auto files = write_window_files(arguments, cut->front());
   if (!files) return files.error();
   const PoreRasters rasters{cut->front(), cut->at(flows ? 1 : 0), cut->at(flows ? 2 : 0)};
