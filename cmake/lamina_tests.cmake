@@ -16,7 +16,7 @@ target_compile_definitions(lamina_test_support PUBLIC LAMINA_TEST_DIR="${PROJECT
                            LAMINA_PROGRAM="$<TARGET_FILE:lamina>")
 # Tests are compiled to be compiled fast; what they call is optimised, and so is the slow reference of the bitmaps.
 target_compile_options(lamina_test_support PUBLIC $<$<NOT:$<CONFIG:Debug>>:-O1> -fno-sanitize=undefined
-                       -Wno-array-bounds -Wno-stringop-overflow)  # g++ 12 has them wrong for std::string at -O1
+                       -Wno-array-bounds -Wno-stringop-overflow -Wno-stringop-overread)  # g++ 12 has them wrong for std::string at -O1
 target_precompile_headers(lamina_test_support PRIVATE tests/precompiled.h)
 
 # Loaded before the program, to see what it syncs and renames.

@@ -34,6 +34,8 @@ Result<BeadRules> bead_rules(const read::GcodeFile& file, const std::string& bea
   if (!beads.empty() && beads != "laid" && beads != "spread" && beads != "told")
     return Error{Fault::kUsage, fmt::format("--beads: '{}' is none of laid, spread, told", one_line(beads))};
   const std::string told = file.tells_widths() ? "widths are those that the file tells" : "widths are those of what is fed";
+  if (beads == "told" && !machine.empty())
+    return Error{Fault::kUsage, "--machine does nothing beside --beads told; leave one out"};
   if (beads == "told") return BeadRules{std::nullopt, told};
   std::optional<Extruder> printer;
   if (!machine.empty()) {

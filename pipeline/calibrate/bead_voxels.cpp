@@ -13,6 +13,8 @@
 namespace lamina::pipeline {
 namespace {
 
+constexpr std::int64_t kLeastLayer = 1000;  // nm: what is thinner is none
+
 /// The width of a bead at a height above the middle of its layer, nm; 0 where it is not.
 Nm width_at(Nm width, std::int64_t height, double above) {
   const double round = static_cast<double>(std::min<std::int64_t>(width, height)), half = round / 2;
@@ -25,11 +27,21 @@ bool is_near(const Box& box, Point2 from, Point2 to, std::int64_t reach) {
          std::max(from.y, to.y) + reach >= box.lo.y && std::min(from.y, to.y) - reach <= box.hi.y;
 }
 
+/// Whether a straight way comes so near to the box, also where it passes aslant.
+bool passes_near(const Box& box, Point2 from, Point2 to, std::int64_t reach) {
+  if (!is_near(box, from, to, reach)) return false;
+  const double x = mm(to.x) - mm(from.x), y = mm(to.y) - mm(from.y), length = std::hypot(x, y);
+  const double from_middle_x = (mm(box.lo.x) + mm(box.hi.x)) / 2 - mm(from.x);
+  const double from_middle_y = (mm(box.lo.y) + mm(box.hi.y)) / 2 - mm(from.y);
+  const double aside = std::abs(x * from_middle_y - y * from_middle_x);
+  return aside <= std::abs(y) * mm(box.width()) / 2 + std::abs(x) * mm(box.depth()) / 2 + length * mm(reach);
+}
+
 /// Whether a piece goes on where the one before ended, in another direction.
 bool bends(const bead::LaidPiece& before, const bead::LaidPiece& piece) {
   if (before.to != piece.from) return false;
-  const double ax = mm(before.to.x - before.from.x), ay = mm(before.to.y - before.from.y);
-  const double bx = mm(piece.to.x - piece.from.x), by = mm(piece.to.y - piece.from.y);
+  const double ax = (mm(before.to.x) - mm(before.from.x)), ay = (mm(before.to.y) - mm(before.from.y));
+  const double bx = (mm(piece.to.x) - mm(piece.from.x)), by = (mm(piece.to.y) - mm(piece.from.y));
   return std::abs(ax * by - ay * bx) > 1e-3 * std::hypot(ax, ay) * std::hypot(bx, by);
 }
 
@@ -54,7 +66,7 @@ class SliceCutter {
     const double from = left >= 0 ? left : 0, to = right >= 0 ? -right : 0;  // leftward of the line
     const auto width = static_cast<Nm>(std::llround((from - to) * 1e6));
     if (width <= 0) return;
-    const double x = mm(piece.to.x - piece.from.x), y = mm(piece.to.y - piece.from.y), length = std::hypot(x, y);
+    const double x = (mm(piece.to.x) - mm(piece.from.x)), y = (mm(piece.to.y) - mm(piece.from.y)), length = std::hypot(x, y);
     if (!(length > 0)) return;
     // Rounded ends of pieces aslant leave gaps of a nanometre: each reaches a little into the next.
     const double aside = (from + to) / 2 * 1e6 / length, further = 3 / length;
@@ -111,10 +123,17 @@ class LayerBeads {
     }
     keep_lines(found->feeds);
     rules_->height_mm = mm(height_);
+    rules_->within = window_.box;
+    rules_->within.add(Point3{window_.box.lo.x - kNeighbours, window_.box.lo.y - kNeighbours, window_.box.lo.z});
+    rules_->within.add(Point3{window_.box.hi.x + kNeighbours, window_.box.hi.y + kNeighbours, window_.box.lo.z});
     bead::lay(beads_, found->feeds, *rules_, pieces_);
-    std::erase_if(pieces_, [&](const bead::LaidPiece& p) { return !is_near(window_.box, p.from, p.to, kNeighbours); });
+    const double area_mm2 = mm(rules_->within.width()) * mm(rules_->within.depth());
+    if (static_cast<double>(pieces_.size()) * rules_->piece_mm > kMostLaid * area_mm2)
+      return Error{Fault::kInput,
+                   fmt::format("layer {}: beads lie upon each other many times over; --beads told looks at them", layer.index)};
     left_out_mm3_ += bead::find_contacts(pieces_, rules_->height_mm, sides_);
-    for (const bead::LaidPiece& p : pieces_) laid_mm3_ += p.area_mm2 * std::hypot(mm(p.to.x - p.from.x), mm(p.to.y - p.from.y));
+    for (const bead::LaidPiece& p : pieces_)
+      laid_mm3_ += p.area_mm2 * std::hypot((mm(p.to.x) - mm(p.from.x)), (mm(p.to.y) - mm(p.from.y)));
     return {};
   }
 
@@ -131,15 +150,25 @@ class LayerBeads {
   double left_out() const { return laid_mm3_ > 0 ? left_out_mm3_ / laid_mm3_ : 0; }
 
  private:
-  static constexpr std::int64_t kNeighbours = 2'000'000;  // nm: what may push those that reach into the window
-  static constexpr std::int64_t kMemory = 10'000'000;     // nm: what the melt has forgotten does not count
+  static constexpr Nm kNeighbours = 2'000'000;  // nm: what may push those that reach into the window
+  static constexpr double kMostLaid = 50;       // mm of line a mm2: fifty lines a millimetre
+
+  /// nm: what the melt and the head have forgotten does not count
+  std::int64_t memory(std::span<const BeadFeed> feeds) const {
+    double fastest = rules_->usual_mm_s;
+    for (const BeadFeed& feed : feeds) fastest = std::max(fastest, feed.speed_mm_s);
+    const bead::BeadMachine& machine = rules_->machine;
+    const double way = fastest * fastest / (2 * machine.acceleration_mm_s2) + 5 * machine.tau_s * fastest;
+    return static_cast<std::int64_t>(1e6 * std::clamp(way, 10.0, 200.0));
+  }
 
   /// Beads far from the window lay nothing there, and the melt remembers nothing of them.
   void keep_lines(Buffer<BeadFeed>& feeds) {
+    const std::int64_t reach = memory(feeds);
     std::size_t kept = 0;
     bool whole = true;
     for (std::size_t i = 0; i < beads_.size(); ++i) {
-      const bool near = is_near(window_.box, beads_[i].from, beads_[i].to, kMemory);
+      const bool near = passes_near(window_.box, beads_[i].from, beads_[i].to, reach);
       if (near) {
         feeds[kept] = feeds[i];
         feeds[kept].joined = feeds[i].joined && whole && kept > 0;
@@ -169,7 +198,7 @@ Result<Pile> pile_of(const read::GcodeFile& file) {
     const Result<read::GcodeLayer> layer = file.layer(i);
     if (!layer) return layer.error();
     if (layer->beads.empty()) continue;
-    if (layer->z <= top) {
+    if (layer->z < top + kLeastLayer) {
       ++pile.skipped;
       continue;
     }

@@ -22,8 +22,8 @@ constexpr double kVoxelUm = 10, kMostVoxels = 8e6;  // of a window
 Window section_of(const read::GcodeFile& file, const Pile::Layer& layer) {
   const Box& print = file.box();
   const auto middle = print.middle();
-  const auto half_x = static_cast<Nm>(std::min<std::int64_t>(print.width(), kMostSide) / 2);
-  const auto half_y = static_cast<Nm>(std::min<std::int64_t>(print.depth(), kMostSide) / 2);
+  const auto half_x = static_cast<Nm>(std::clamp<std::int64_t>(print.width(), 1000, kMostSide) / 2);
+  const auto half_y = static_cast<Nm>(std::clamp<std::int64_t>(print.depth(), 1000, kMostSide) / 2);
   const auto low = static_cast<Nm>(layer.low + (layer.high - layer.low) / 2 - 1);
   Window window;
   window.box.add(Point3{middle.x - half_x, middle.y - half_y, low});
@@ -93,13 +93,19 @@ Result<LaidPrint> look_at_print(const std::string& path, double density_g_cm3) {
     if (!choice) return choice.error();
   }
   print.choice = std::move(*choice);
-  const Result<BeadRules> beads = bead_rules(*file, "", "");
+  Result<BeadRules> beads = bead_rules(*file, "", "");
   if (!beads) return beads.error();
   print.beads = beads->told;
   const CutWindow cut = [&](const Window& window) {
     return bead_voxels(*file, *pile, window, beads->rules ? &*beads->rules : nullptr);
   };
-  const Result<VoxelStack> voxels = cut(print.choice.window);
+  Result<VoxelStack> voxels = cut(print.choice.window);
+  if (!voxels && beads->rules) {  // beads upon each other
+    beads = bead_rules(*file, "told", "");
+    if (!beads) return beads.error();
+    print.beads = beads->told;
+    voxels = cut(print.choice.window);
+  }
   if (!voxels) return voxels.error();
   print.pores.voxels = voxels->view().voxels();
   print.pores.empty = print.pores.voxels - set_voxels(*voxels);

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <exception>
 #include <filesystem>
 
 #include "pipeline/calibrate/laid_look.h"
@@ -154,7 +155,13 @@ void add_pores(const std::string& path, Summary& summary) {
     summary.results.emplace_back("void", "of a file this large: lamina info tells it");
     return;
   }
-  const Result<LaidPrint> print = look_at_print(path, 0);
+  const Result<LaidPrint> print = [&]() -> Result<LaidPrint> {
+    try {
+      return look_at_print(path, 0);
+    } catch (const std::exception& fault) {  // the file is whole: what is told of it must not end the command
+      return Error{Fault::kInput, std::string("cannot be told: ") + fault.what()};
+    }
+  }();
   if (!print) return summary.results.emplace_back("void", print.error().message), void();
   const Box& box = print->choice.window.box;
   const auto& repeats = print->choice.window.periodic;

@@ -47,9 +47,9 @@ Result<Darcy> flow_along(const VoxelView& box, std::uint32_t finer, int axis, co
 void add_error(const Darcy& coarse, double ratio, double least, int axis, Darcy& fine) {
   const auto along = static_cast<std::size_t>(axis);
   const double whole = std::abs(fine.k_m2[along]);
-  fine.resolved = std::abs(fine.k_m2[along] - coarse.k_m2[along]) <= 0.5 * whole;
+  fine.resolved = ratio > 1.2 && std::abs(fine.k_m2[along] - coarse.k_m2[along]) <= 0.5 * whole;
   for (std::size_t b = 0; b < 3; ++b) {
-    const double step = (fine.k_m2[b] - coarse.k_m2[b]) / (ratio * ratio - 1);
+    const double step = fine.resolved ? (fine.k_m2[b] - coarse.k_m2[b]) / (ratio * ratio - 1) : 0;
     fine.error_m2[b] = fine.resolved ? std::max(std::abs(step), least * std::abs(fine.k_m2[b])) : whole;
     if (fine.resolved) fine.k_m2[b] += step;
   }
@@ -100,8 +100,8 @@ Result<PoreReport> look_at_pores(const PoreRasters& rasters, const FlowRequest& 
   }
   report.porosity = pores::porosity(fine);
   report.surface_per_mm = pores::specific_surface(fine).crofton;
-  report.throat_mm = pores::throats(voxels, pores::whole(voxels), request.axes);
-  const double edge_mm = *std::min_element(voxels.edge.begin(), voxels.edge.end()) * 1e-6;
+  if (report.empty < report.voxels) report.throat_mm = pores::throats(voxels, pores::whole(voxels), request.axes);
+  const double edge_mm = *std::max_element(voxels.edge.begin(), voxels.edge.end()) * 1e-6;
   const double least = stokes::least_error(report.porosity.total(), report.surface_per_mm * edge_mm, rasters.finer);
   const double ratio = static_cast<double>(fine.nx + fine.ny + fine.nz) / (coarse.nx + coarse.ny + coarse.nz);
   for (int axis = 0; axis < 3; ++axis) {

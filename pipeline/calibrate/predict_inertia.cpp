@@ -31,6 +31,8 @@ Result<Forchheimer> sweep_through(const VoxelView& box, double surface_per_mm, c
     if (point.settled) result.points.push_back({point.velocity * velocity, point.force * gradient});
   }
   result.weak_reynolds = stokes::weak_up_to(*points) * velocity * result.reynolds_per_velocity;
+  if (result.points.size() < 3 && !result.settled)
+    return Error{Fault::kInput, "hardly any of these flows finds a steady state: k2 is not told"};
   const auto fit = segment::fit_permeability(result.points, fluid);
   if (!fit) return Error{fit.error().fault, "inertia hardly resists here, k2 is without bounds: " + fit.error().message};
   result.fit = *fit;

@@ -54,6 +54,8 @@ Result<ScanComparison> compare_with_scan(const read::GcodeFile& file, const Pile
                                          const bead::LayRules* rules) {
   const Result<Window> window = window_of_plan(file, pile, scan, size_mm, range);
   if (!window) return window.error();
+  if (const auto& count = window->count; range > 16 && std::min({count[0], count[1], count[2]}) < 16)
+    return Error{Fault::kUsage, "--range: above 16 the window has to be 16 voxels thick at least; give a larger --window"};
   const Result<VoxelStack> plan = bead_voxels(file, pile, *window, rules);
   if (!plan) return plan.error();
   std::array<std::uint32_t, 3> low{}, count{};

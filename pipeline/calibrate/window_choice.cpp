@@ -9,6 +9,7 @@ namespace lamina::pipeline {
 
 namespace {
 
+constexpr std::int64_t kLeastSide = 1000;        // nm
 constexpr std::int64_t kSameAllAlong = 150'000;  // nm: the least length that find_repeat() gives
 
 }  // namespace
@@ -33,6 +34,8 @@ Result<WindowChoice> choose_window(const read::GcodeFile& file, const Pile& pile
       return Error{Fault::kUsage, fmt::format("--window: {:.3f} mm along {} are more than the print has: {:.3f} mm",
                                               mm(static_cast<Nm>(side[a])), "xy"[a], mm(static_cast<Nm>(print)))};
   }
+  if (std::min(side[0], side[1]) < kLeastSide)
+    return Error{Fault::kInput, "the print is thinner than a micrometre: there is nothing to look at"};
   choice.window.periodic[2] = !asked && repeat->layers > 0;
   choice.first_layer = middle_layer;
   const auto& layers = pile.layers;

@@ -23,7 +23,7 @@ struct WindowChoice {
 /// A box around the middle of the print, of whole layers from the middle one upwards. Without a wish for its size it is one
 /// period of what repeats; along an axis where nothing does, 2 mm, or eight layers, or the print.
 /// pile    not empty
-/// errors  kUsage: larger than the print, or more than 2^31 voxels; of find_repeat()
+/// errors  kUsage: larger than the print, or more than 2^31 voxels; kInput: a print without width; of find_repeat()
 /// cost    of find_repeat()
 Result<WindowChoice> choose_window(const read::GcodeFile& file, const Pile& pile, const WindowWish& wish);
 

@@ -73,6 +73,12 @@ Outcome predict_print(const Arguments& arguments, Context& context) {
   if (!wish) return wish.error();
   const Result<WindowChoice> choice = choose_window(*file, *pile, *wish);
   if (!choice) return choice.error();
+  // Ways and throats take that much; what the flow takes is looked at when its void is known.
+  if (const std::uint64_t bytes = 16 * choice->window.voxels(); bytes > request.memory_bytes)
+    return Error{Fault::kUsage, fmt::format("{}: {} voxels take {} at least, --memory allows {}; take a larger --voxel or a "
+                                            "smaller --window",
+                                            path, readable_count(choice->window.voxels()), readable_bytes(bytes),
+                                            readable_bytes(request.memory_bytes))};
   double left_out = 0;
   const CutWindow cut_window = [&](const Window& window) { return bead_voxels(*file, *pile, window, rules, &left_out); };
   const bool flows = !arguments.has("--no-flow");

@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <cmath>
+
 #include "pipeline/calibrate/pore_page.h"
 #include "pipeline/calibrate/scan_compare.h"
 #include "pipeline/cli/window_files.h"
@@ -46,7 +48,7 @@ std::vector<OptionSpec> stack_options() {
       {"--dark", "", "dark pixels of images without a manifest are the solid, not the bright ones", "", "Images"},
       {"--periodic", "AXES", "along which the window repeats, as in xy; else walls close its sides", "", "Images"},
       {"--scan", "DIR", "of a print of these toolpaths: images to be found in the plan, and compared with it", "", "Images"},
-      {"--range", "N", "voxels each way that the scan may be shifted by", "16", "Images"}};
+      {"--range", "N", "voxels each way that the scan may be shifted by, in eights", "16", "Images"}};
 }
 
 Result<WindowWish> read_window_wish(const Arguments& arguments, double voxel_um) {
@@ -98,10 +100,11 @@ Outcome predict_stack(const Arguments& arguments, Context& context) {
 
 Outcome compare_scan(const Arguments& arguments, Context& context, const read::GcodeFile& file, const Pile& pile,
                      const bead::LayRules* rules) {
-  for (const char* flag : {"--voxel", "--periodic", "--solid", "--void", "--no-flow", "--inertia"})
+  for (const char* flag : {"--voxel", "--periodic", "--solid", "--void", "--no-flow", "--inertia", "--memory"})
     if (arguments.has(flag)) return Error{Fault::kUsage, fmt::format("{} does nothing beside --scan; leave it out", flag)};
   double range = 16;
   if (Status status = arguments.read("--range", {1, 200}, range); !status) return status;
+  range = 8 * std::ceil(range / 8);  // that coarse voxels hold it
   const Result<WindowWish> wish = read_window_wish(arguments, 0);
   if (!wish) return wish.error();
   const Result<StackRequest> request = read_request(arguments);

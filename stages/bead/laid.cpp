@@ -15,7 +15,9 @@ constexpr double kFarthest = 1.5;                       // mm: what is wider tha
 constexpr double kWidest = 3;                           // mm
 constexpr double kLeastSpeed = 0.01, kMostSpeed = 1e4;  // mm/s: a file may say anything
 
-double length_of(const LaidBead& bead) { return std::hypot(mm(bead.to.x - bead.from.x), mm(bead.to.y - bead.from.y)); }
+double length_of(const LaidBead& bead) {
+  return std::hypot((mm(bead.to.x) - mm(bead.from.x)), (mm(bead.to.y) - mm(bead.from.y)));
+}
 
 /// The beads of one line and how far along it each begins.
 class Line {
@@ -44,8 +46,10 @@ class Line {
 /// The speed with which the head goes from bead i to the next.
 double Line::speed_between(std::size_t i) const {
   const LaidBead &a = beads_[i], &b = beads_[i + 1];
-  const double across = mm(a.to.x - a.from.x) * mm(b.to.y - b.from.y) - mm(a.to.y - a.from.y) * mm(b.to.x - b.from.x);
-  const double along = mm(a.to.x - a.from.x) * mm(b.to.x - b.from.x) + mm(a.to.y - a.from.y) * mm(b.to.y - b.from.y);
+  const double across =
+      (mm(a.to.x) - mm(a.from.x)) * (mm(b.to.y) - mm(b.from.y)) - (mm(a.to.y) - mm(a.from.y)) * (mm(b.to.x) - mm(b.from.x));
+  const double along =
+      (mm(a.to.x) - mm(a.from.x)) * (mm(b.to.x) - mm(b.from.x)) + (mm(a.to.y) - mm(a.from.y)) * (mm(b.to.y) - mm(b.from.y));
   const double bend = 2 * std::sin(std::abs(std::atan2(across, along)) / 2);  // change of velocity / speed
   return std::min({speed_of(feeds_[i]), speed_of(feeds_[i + 1]), bend > 0 ? rules_.corner_mm_s / bend : HUGE_VAL});
 }
@@ -75,7 +79,11 @@ void Line::put(const SpreadCell& cell, Buffer<LaidPiece>& out) {
   for (double from = cell.begin_mm; from < cell.end_mm;) {
     while (here_ + 1 < beads_.size() && begin_[here_ + 1] <= from) ++here_;
     const double to = here_ + 1 < beads_.size() ? std::min(cell.end_mm, begin_[here_ + 1]) : cell.end_mm;
-    out.push_back({at(here_, from), at(here_, to), cell.area_mm2, std::min(cell.width_mm, kWidest)});
+    const Point2 a = at(here_, from), b = at(here_, to);
+    const Box& box = rules_.within;
+    const bool outside = !box.empty() && (std::max(a.x, b.x) < box.lo.x || std::min(a.x, b.x) > box.hi.x ||
+                                          std::max(a.y, b.y) < box.lo.y || std::min(a.y, b.y) > box.hi.y);
+    if (!outside) out.push_back({a, b, cell.area_mm2, std::min(cell.width_mm, kWidest)});
     from = to;
   }
 }

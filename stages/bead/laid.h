@@ -10,6 +10,7 @@
 
 #include "stages/bead/machine.h"
 #include "stages/data/buffer.h"
+#include "stages/data/mesh.h"  // Box
 #include "stages/data/toolpaths.h"
 
 namespace lamina::bead {
@@ -21,6 +22,7 @@ struct LayRules {
   double height_mm = 0.2;  // of the layer, > 0
   double piece_mm = 0.02;  // length of pieces, > 0
   double usual_mm_s = 40;  // of beads whose speed the file does not tell
+  Box within;              // pieces that do not reach into it are left out; empty: all are laid
   bool spread = false;     // along the line too: lines end round then, and reach beyond their ends
 };
 

@@ -11,14 +11,14 @@
 namespace lamina::bead {
 namespace {
 
-constexpr double kLayerHeight = 0.3, kArea = 0.102, kLag = 0.046;  // mm, mm2, s
+constexpr double kLaidHeight = 0.3, kLaidArea = 0.102, kLaidLag = 0.046;  // mm, mm2, s
 
-LayRules rules_at(double acceleration, bool spread = false) {
-  return {{0, kLag, acceleration}, 8, 1, kLayerHeight, 0.02, 15, spread};
+LayRules laid_rules(double acceleration, bool spread = false) {
+  return {{0, kLaidLag, acceleration}, 8, 1, kLaidHeight, 0.02, 15, {}, spread};
 }
 
 /// A line through places, mm, of one cross-section or of one for each piece of the way.
-struct Way {
+struct CommandedWay {
   Buffer<LaidBead> beads;
   Buffer<BeadFeed> feeds;
 
@@ -31,68 +31,70 @@ struct Way {
   }
 };
 
-Buffer<LaidPiece> lay(const Way& way, const LayRules& rules) {
+Buffer<LaidPiece> pieces_of(const CommandedWay& way, const LayRules& rules) {
   Buffer<LaidPiece> pieces;
   lay(way.beads, way.feeds, rules, pieces);
   return pieces;
 }
 
-double length_of(const LaidPiece& piece) { return std::hypot(mm(piece.to.x - piece.from.x), mm(piece.to.y - piece.from.y)); }
-double volume_of(const Buffer<LaidPiece>& pieces) {
+double length_of_piece(const LaidPiece& piece) {
+  return std::hypot(mm(piece.to.x - piece.from.x), mm(piece.to.y - piece.from.y));
+}
+double volume_of_pieces(const Buffer<LaidPiece>& pieces) {
   double sum = 0;
-  for (const LaidPiece& piece : pieces) sum += piece.area_mm2 * length_of(piece);
+  for (const LaidPiece& piece : pieces) sum += piece.area_mm2 * length_of_piece(piece);
   return sum;
 }
 
 TEST(LaidBeads, AnEvenLineIsWhatIsFedAndItsMelt) {
-  Way way;
-  way.add(1, 2, 21, 2, 15, kArea, false);
-  const auto pieces = lay(way, rules_at(INFINITY));
+  CommandedWay way;
+  way.add(1, 2, 21, 2, 15, kLaidArea, false);
+  const auto pieces = pieces_of(way, laid_rules(INFINITY));
   // From the corner's speed on the head goes faster at once: what comes late is what the lag holds in addition.
-  EXPECT_NEAR(volume_of(pieces), 20 * kArea - kLag * kArea * (15 - 8), 1e-4);
+  EXPECT_NEAR(volume_of_pieces(pieces), 20 * kLaidArea - kLaidLag * kLaidArea * (15 - 8), 1e-4);
   for (const LaidPiece& piece : pieces) {
     EXPECT_EQ(piece.from.y, 2'000'000);
     if (mm(piece.from.x) > 10 && mm(piece.to.x) < 20) {
-      EXPECT_NEAR(piece.width_mm, bead_width(kArea, kLayerHeight), 3e-4);
+      EXPECT_NEAR(piece.width_mm, bead_width(kLaidArea, kLaidHeight), 3e-4);
     }
   }
   EXPECT_EQ(pieces.front().from.x, 1'000'000);
   EXPECT_EQ(pieces.back().to.x, 21'000'000);
-  const auto spread = lay(way, rules_at(INFINITY, true));
-  EXPECT_NEAR(volume_of(spread), volume_of(pieces), 1e-4);
+  const auto spread = pieces_of(way, laid_rules(INFINITY, true));
+  EXPECT_NEAR(volume_of_pieces(spread), volume_of_pieces(pieces), 1e-4);
   EXPECT_LT(spread.front().from.x, 1'000'000) << "round ends reach out";
   EXPECT_GT(spread.back().to.x, 21'000'000);
 }
 
 TEST(LaidBeads, AWayRoundCornersKeepsItsVolumeAndSlowsDownThere) {
-  Way way;
-  way.add(0, 0, 10, 0, 30, kArea, false);
-  way.add(10, 0, 10, 10, 30, kArea, true);
-  way.add(10, 10, 20, 10, 30, kArea, true);
-  way.add(20, 10, 30, 10, 8, kArea, true);
-  const auto slow = lay(way, rules_at(400)), free = lay(way, rules_at(INFINITY));
+  CommandedWay way;
+  way.add(0, 0, 10, 0, 30, kLaidArea, false);
+  way.add(10, 0, 10, 10, 30, kLaidArea, true);
+  way.add(10, 10, 20, 10, 30, kLaidArea, true);
+  way.add(20, 10, 30, 10, 8, kLaidArea, true);
+  const auto slow = pieces_of(way, laid_rules(400)), free = pieces_of(way, laid_rules(INFINITY));
   double widest_slow = 0, widest_free = 0;
   for (const LaidPiece& p : slow)
     if (p.from.y > 1'000'000 && p.from.y < 9'999'000) widest_slow = std::max(widest_slow, p.width_mm);
   for (const LaidPiece& p : free)
     if (p.from.y > 1'000'000 && p.from.y < 9'999'000) widest_free = std::max(widest_free, p.width_mm);
-  EXPECT_GT(widest_slow, 1.05 * bead_width(kArea, kLayerHeight)) << "melt that was on its way comes while the head brakes";
+  EXPECT_GT(widest_slow, 1.05 * bead_width(kLaidArea, kLaidHeight)) << "melt that was on its way comes while the head brakes";
   EXPECT_GT(widest_slow, 1.01 * widest_free);
   // It ends as it began, slowly: what is held is the same.
-  EXPECT_NEAR(volume_of(slow), 40 * kArea, 1e-4);
-  EXPECT_NEAR(volume_of(free), 40 * kArea, 1e-4);
+  EXPECT_NEAR(volume_of_pieces(slow), 40 * kLaidArea, 1e-4);
+  EXPECT_NEAR(volume_of_pieces(free), 40 * kLaidArea, 1e-4);
 }
 
 TEST(LaidBeads, APatternSettlesOnTheWidthsOfItsSteadyState) {
-  Way way;
+  CommandedWay way;
   for (int i = 0; i < 8; ++i) {
-    way.add(0, 3 * i, 0, 3 * i + 1.5, 11.25, kArea, i > 0);
-    way.add(0, 3 * i + 1.5, 0, 3 * i + 3, 30, kArea, true);
+    way.add(0, 3 * i, 0, 3 * i + 1.5, 11.25, kLaidArea, i > 0);
+    way.add(0, 3 * i + 1.5, 0, 3 * i + 3, 30, kLaidArea, true);
   }
   for (const bool spread : {false, true}) {
-    const PatternWidths steady = steady_widths({kArea, kLag, 400}, kLayerHeight, {1.5, 1.5, 100, 11.25, 30}, spread);
+    const PatternWidths steady = steady_widths({kLaidArea, kLaidLag, 400}, kLaidHeight, {1.5, 1.5, 100, 11.25, 30}, spread);
     double least = 1, most = 0;
-    for (const LaidPiece& piece : lay(way, rules_at(400, spread))) {
+    for (const LaidPiece& piece : pieces_of(way, laid_rules(400, spread))) {
       if (piece.from.y < 15'000'000 || piece.to.y > 18'000'000) continue;
       least = std::min(least, piece.width_mm);
       most = std::max(most, piece.width_mm);
@@ -103,13 +105,13 @@ TEST(LaidBeads, APatternSettlesOnTheWidthsOfItsSteadyState) {
 }
 
 TEST(LaidBeads, LinesThatAreNotJoinedDoNotKnowOfEachOther) {
-  Way one, other, both;
-  one.add(0, 0, 5, 0, 15, kArea, false);
-  other.add(5, 1, 0, 1, 30, 0.8 * kArea, false);
-  both.add(0, 0, 5, 0, 15, kArea, false);
-  both.add(5, 1, 0, 1, 30, 0.8 * kArea, false);
-  const LayRules rules = rules_at(400);
-  const auto first = lay(one, rules), second = lay(other, rules), together = lay(both, rules);
+  CommandedWay one, other, both;
+  one.add(0, 0, 5, 0, 15, kLaidArea, false);
+  other.add(5, 1, 0, 1, 30, 0.8 * kLaidArea, false);
+  both.add(0, 0, 5, 0, 15, kLaidArea, false);
+  both.add(5, 1, 0, 1, 30, 0.8 * kLaidArea, false);
+  const LayRules rules = laid_rules(400);
+  const auto first = pieces_of(one, rules), second = pieces_of(other, rules), together = pieces_of(both, rules);
   ASSERT_EQ(together.size(), first.size() + second.size());
   for (std::size_t i = 0; i < together.size(); ++i) {
     const LaidPiece& alone = i < first.size() ? first[i] : second[i - first.size()];
@@ -119,15 +121,15 @@ TEST(LaidBeads, LinesThatAreNotJoinedDoNotKnowOfEachOther) {
 }
 
 TEST(LaidBeads, BeadsWithoutLengthSpeedOrFeedDoNoHarm) {
-  Way way;
-  way.add(0, 0, 1, 0, 0, kArea, false);
-  way.add(1, 0, 1, 0, 15, kArea, true);
-  way.add(1, 0, 2, 0, 1e-3, kArea, true);
+  CommandedWay way;
+  way.add(0, 0, 1, 0, 0, kLaidArea, false);
+  way.add(1, 0, 1, 0, 15, kLaidArea, true);
+  way.add(1, 0, 2, 0, 1e-3, kLaidArea, true);
   way.add(2, 0, 3, 0, 15, 0, true);
   way.add(3, 0, 3, 0, 15, 0, true);
   way.add(3, 0, 4, 0, 1e300, 1e300, true);
   way.add(4, 0, 5, 0, 1e-300, 1e300, true);
-  for (const LaidPiece& piece : lay(way, rules_at(400, true))) {
+  for (const LaidPiece& piece : pieces_of(way, laid_rules(400, true))) {
     EXPECT_TRUE(std::isfinite(piece.area_mm2) && std::isfinite(piece.width_mm));
     EXPECT_GE(piece.from.x, -2'000'000);
     EXPECT_LE(piece.to.x, 7'000'000);

@@ -40,6 +40,7 @@ TEST(GcodeFilament, WhatIsFedAndWhatItsFilamentWeighsIsTold) {
       {"; filament_density: 1.04\n", 1.04},
       {"; filament used [cm3] = 2.00\n; filament used [g] = 2.48\n", 1.24},
       {"; filament_density = 1.3\n; filament used [cm3] = 2.00\n; filament used [g] = 2.48\n", 1.3},
+      {"; filament used [cm3] = 0.20\n; filament used [g] = 0.26\n; filament_density = 1.24\n", 1.24},
       {"; filament used [cm3] = 0.01\n; filament used [g] = 0.02\n", 0},  // two digits say nothing of so little
       {"; filament_density = 0\n", 0}};
   for (const auto& [text, density] : told)

@@ -16,7 +16,7 @@ constexpr std::uint32_t kFiner = 3;
 
 /// A box that repeats along all axes. solid  called with the place of a fine voxel's centre, in voxels of the flow
 template <class Solid>
-VoxelStack box_of(std::uint32_t nx, std::uint32_t ny, std::uint32_t nz, const Solid& solid) {
+VoxelStack fine_box_of(std::uint32_t nx, std::uint32_t ny, std::uint32_t nz, const Solid& solid) {
   const auto middle = [](std::uint32_t i) { return (i + 0.5) / kFiner; };
   return pores::testing::stack_of(
       pores::testing::Voxels(kFiner * nx, kFiner * ny, kFiner * nz).fill([&](auto x, auto y, auto z) {
@@ -25,7 +25,7 @@ VoxelStack box_of(std::uint32_t nx, std::uint32_t ny, std::uint32_t nz, const So
       {true, true, true});
 }
 
-stokes::Flow flow_through(const VoxelView& fine, int axis, double tolerance = 1e-5) {
+stokes::Flow fine_flow_through(const VoxelView& fine, int axis, double tolerance = 1e-5) {
   const Result<stokes::Grid> grid = stokes::make_grid(fine, kFiner, 5);
   EXPECT_TRUE(grid.ok());
   stokes::Field field = stokes::field_of(grid->cells);
@@ -41,8 +41,8 @@ stokes::Flow flow_through(const VoxelView& fine, int axis, double tolerance = 1e
 TEST(FineWalls, SlitsFollowTheCubicLawWhereverTheirWallsStand) {
   for (const double width : {8.0, 8 + 1 / 3.0, 8 + 2 / 3.0, 9.0}) {
     for (const double low : {1.0, 1 + 1 / 3.0, 1 + 2 / 3.0}) {
-      const VoxelStack box = box_of(1, 11, 1, [&](double, double y, double) { return y < low || y > low + width; });
-      EXPECT_NEAR(flow_through(box, 0).permeability[0] / (width * width * width / 12 / 11), 1, 2.5 / (width * width))
+      const VoxelStack box = fine_box_of(1, 11, 1, [&](double, double y, double) { return y < low || y > low + width; });
+      EXPECT_NEAR(fine_flow_through(box, 0).permeability[0] / (width * width * width / 12 / 11), 1, 2.5 / (width * width))
           << width << " from " << low;
     }
   }
@@ -50,19 +50,20 @@ TEST(FineWalls, SlitsFollowTheCubicLawWhereverTheirWallsStand) {
 
 TEST(FineWalls, ATubeFollowsHagenAndPoiseuille) {
   const double radius = 15.7, side = 34;
-  const VoxelStack box = box_of(
+  const VoxelStack box = fine_box_of(
       34, 34, 1, [&](double x, double y, double) { return std::hypot(x - side / 2 + 0.19, y - side / 2 + 0.37) > radius; });
-  EXPECT_NEAR(flow_through(box, 2).permeability[2] / (std::numbers::pi * std::pow(radius, 4) / 8 / (side * side)), 1, 0.01);
+  EXPECT_NEAR(fine_flow_through(box, 2).permeability[2] / (std::numbers::pi * std::pow(radius, 4) / 8 / (side * side)), 1,
+              0.01);
 }
 
 /// Planes of normal (3, 4) / 5, 24 voxels apart: the flow follows them, as the cubic law has it, whichever way it is pushed.
 TEST(FineWalls, SlantedSlitsLeadAlongTheirWalls) {
   const double apart = 24, width = 14.4;
-  const VoxelStack box = box_of(120, 120, 1, [&](double x, double y, double) {
+  const VoxelStack box = fine_box_of(120, 120, 1, [&](double x, double y, double) {
     return std::abs(std::remainder((3 * x + 4 * y) / 5 + 0.1, apart)) > width / 2;
   });
   const double by_hand = width * width * width / 12 / apart;
-  const std::array<double, 3> along_x = flow_through(box, 0, 1e-4).permeability;
+  const std::array<double, 3> along_x = fine_flow_through(box, 0, 1e-4).permeability;
   EXPECT_NEAR(along_x[0] / (by_hand * 16 / 25), 1, 0.02);
   EXPECT_NEAR(along_x[1] / (by_hand * -12 / 25), 1, 0.02);
 }
@@ -70,20 +71,20 @@ TEST(FineWalls, SlantedSlitsLeadAlongTheirWalls) {
 /// Hexagonal arrays lead alike along all directions of their plane; x and y differ for them by a turn of 30 degrees.
 TEST(FineWalls, AHexagonalArrayTurnedByThirtyDegreesIsTheSame) {
   const double radius = 22;
-  const VoxelStack box = box_of(97, 56, 1, [&](double x, double y, double) {
+  const VoxelStack box = fine_box_of(97, 56, 1, [&](double x, double y, double) {
     const auto within = [&](double cx, double cy) {
       return std::hypot(std::remainder(x - cx, 97.0), std::remainder(y - cy, 56.0)) < radius;
     };
     return within(0.19, 0.37) || within(0.19 + 48.5, 0.37 + 28);
   });
-  EXPECT_NEAR(flow_through(box, 0, 1e-4).permeability[0] / flow_through(box, 1, 1e-4).permeability[1], 1, 0.01);
+  EXPECT_NEAR(fine_flow_through(box, 0, 1e-4).permeability[0] / fine_flow_through(box, 1, 1e-4).permeability[1], 1, 0.01);
 }
 
 /// Drag of a sphere, 6 pi mu a K U (A. A. Zick, G. M. Homsy, "Stokes flow through periodic arrays of spheres", J. Fluid Mech.
 /// 115 (1982), table 2). centres  in sides of the cell
 double drag_of_spheres(const std::vector<std::array<double, 3>>& centres, double share, std::uint32_t side) {
   const double count = static_cast<double>(centres.size()), radius = std::cbrt(3 * share / (4 * std::numbers::pi * count));
-  const VoxelStack box = box_of(side, side, side, [&](double x, double y, double z) {
+  const VoxelStack box = fine_box_of(side, side, side, [&](double x, double y, double z) {
     for (const auto& c : centres) {
       const double dx = std::remainder((x + 0.19) / side - c[0], 1.0), dy = std::remainder((y + 0.37) / side - c[1], 1.0),
                    dz = std::remainder((z + 0.41) / side - c[2], 1.0);
@@ -91,7 +92,7 @@ double drag_of_spheres(const std::vector<std::array<double, 3>>& centres, double
     }
     return false;
   });
-  return side * side / (6 * std::numbers::pi * radius * count * flow_through(box, 2, 1e-4).permeability[2]);
+  return side * side / (6 * std::numbers::pi * radius * count * fine_flow_through(box, 2, 1e-4).permeability[2]);
 }
 const std::vector<std::array<double, 3>> kSimple = {{0, 0, 0}}, kBody = {{0, 0, 0}, {0.5, 0.5, 0.5}},
                                          kFace = {{0, 0, 0}, {0.5, 0.5, 0}, {0.5, 0, 0.5}, {0, 0.5, 0.5}};
@@ -118,15 +119,16 @@ TEST(FineWalls, TouchingSpheresAreAsPublishedWithinTheErrorThatIsTold) {
 
 TEST(FineWalls, AFilmThinnerThanAVoxelIsTight) {
   const double low = 10 + 1 / 3.0, high = 10 + 2 / 3.0;
-  const VoxelStack slits = box_of(1, 20, 1, [&](double, double y, double) { return y < 2 || (y > low && y < high) || y > 18; });
+  const VoxelStack slits =
+      fine_box_of(1, 20, 1, [&](double, double y, double) { return y < 2 || (y > low && y < high) || y > 18; });
   const double by_hand = (std::pow(low - 2, 3) + std::pow(18 - high, 3)) / 12 / 20;
-  EXPECT_NEAR(flow_through(slits, 0).permeability[0] / by_hand, 1, 2.5 / 50);
-  const VoxelStack across = box_of(1, 20, 1, [&](double, double y, double) { return y > low && y < high; });
-  EXPECT_NEAR(flow_through(across, 1).permeability[1], 0, 1e-3);
+  EXPECT_NEAR(fine_flow_through(slits, 0).permeability[0] / by_hand, 1, 2.5 / 50);
+  const VoxelStack across = fine_box_of(1, 20, 1, [&](double, double y, double) { return y > low && y < high; });
+  EXPECT_NEAR(fine_flow_through(across, 1).permeability[1], 0, 1e-3);
 }
 
 VoxelStack balls(std::uint32_t side, const std::array<int, 3>& order = {0, 1, 2}) {
-  return box_of(side, side, side, [&](double x, double y, double z) {
+  return fine_box_of(side, side, side, [&](double x, double y, double z) {
     const std::array<double, 3> at = {x, y, z};
     const double u = at[order[0]], v = at[order[1]], w = at[order[2]], s = side;
     const auto within = [&](double cu, double cv, double cw, double radius) {
@@ -141,9 +143,9 @@ VoxelStack balls(std::uint32_t side, const std::array<int, 3>& order = {0, 1, 2}
 TEST(FineWalls, TheTensorIsSymmetricAndTurnsWithTheBox) {
   const VoxelStack box = balls(20), turned = balls(20, {1, 2, 0});
   std::array<std::array<double, 3>, 3> k{};
-  for (int a = 0; a < 3; ++a) k[static_cast<std::size_t>(a)] = flow_through(box, a).permeability;
+  for (int a = 0; a < 3; ++a) k[static_cast<std::size_t>(a)] = fine_flow_through(box, a).permeability;
   for (const auto& [a, b] : {std::pair{0u, 1u}, {1u, 2u}, {0u, 2u}}) EXPECT_NEAR(k[a][b], k[b][a], 1e-3 * k[a][a]);
-  EXPECT_NEAR(flow_through(turned, 1).permeability[1] / k[0][0], 1, 1e-4);
+  EXPECT_NEAR(fine_flow_through(turned, 1).permeability[1] / k[0][0], 1, 1e-4);
 }
 
 TEST(FineWalls, AreTheSameForAnyThreads) {
@@ -151,14 +153,14 @@ TEST(FineWalls, AreTheSameForAnyThreads) {
   std::vector<stokes::Flow> found;
   for (const std::size_t threads : {1u, 3u}) {
     const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
-    found.push_back(flow_through(box, 2));
+    found.push_back(fine_flow_through(box, 2));
   }
   EXPECT_EQ(found[0].permeability, found[1].permeability);
   EXPECT_EQ(found[0].steps, found[1].steps);
 }
 
 TEST(FineWalls, OddFactorsThatFillTheBoxAreNeeded) {
-  const VoxelStack box = box_of(4, 4, 4, [](double x, double, double) { return x < 1; });  // 12 fine voxels a side
+  const VoxelStack box = fine_box_of(4, 4, 4, [](double x, double, double) { return x < 1; });  // 12 fine voxels a side
   for (const std::uint32_t factor : {0u, 2u, 5u, 9u}) {
     const Result<stokes::Grid> grid = stokes::make_grid(box, factor, 3);
     ASSERT_FALSE(grid.ok()) << factor;

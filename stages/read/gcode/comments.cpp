@@ -136,7 +136,11 @@ void SlicerFacts::read_setting(std::string_view comment) {
     const double diameter = leading_number(line.value);
     if (nozzle_mm == 0 && diameter > 0.05 && diameter < 10) nozzle_mm = diameter;
   }
-  if (name == "filamentdensity") tell_density(leading_number(line.value));
+  if (name == "filamentdensity" && !density_set_) {
+    density_g_cm3 = 0;  // what is set goes before what was weighed
+    tell_density(leading_number(line.value));
+    density_set_ = density_g_cm3 > 0;
+  }
   if (name == "filamentusedcm") used_cm3_ = leading_number(line.value);
   if (name == "filamentusedg" && used_cm3_ >= 0.2)  // told to 0.01
     tell_density(leading_number(line.value) / used_cm3_);

@@ -36,6 +36,7 @@ struct SlicerFacts {
   enum class Source : std::uint8_t { kNone, kFlavor, kWeight, kProfile, kSetting };
   Source source_ = Source::kNone;
   double used_cm3_ = 0;
+  bool density_set_ = false;
   void tell_density(double g_cm3);
   void tell_filament(double diameter_mm, Source source);
   void read_flavor(std::string_view flavor);
