@@ -100,7 +100,7 @@ def page(voxel):
     yield (f"{within} of {len(INSIDE)} within 5 %, the longest took {longest[0]:.0f} s, {longest[1]:.0f} s of processors "
            f"(load of the machine in the end: {os.getloadavg()[0]:.1f}). {warned} of the jobs are warned of by `lamina extrude`. "
            "k1 again: `lamina permeability` of the job planned for a cylinder of 25.4 mm, cubes of 10 um; - where the period is longer "
-           "than the 3 mm that it looks for.")
+           "than the 3.6 mm that it looks for.")
     yield ""
     yield "## Outside"
     yield ""

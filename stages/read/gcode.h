@@ -68,7 +68,7 @@ class GcodeFile {
   /// What a person should know of the drawing, one line each: thin beads, spirals, arcs on which firmwares differ.
   const std::vector<std::string>& notes() const { return notes_; }
   /// errors  kUsage: no such layer, the file has changed
-  /// with_feeds  33 bytes a bead more
+  /// with_feeds  24 bytes a bead more
   Result<GcodeLayer> layer(std::uint32_t index, bool with_feeds = false) const;
 
   /// Decides what G90 and G91 mean for E.

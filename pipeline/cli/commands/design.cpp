@@ -33,7 +33,8 @@ CommandSpec design_spec() {
       {"--json", "", "print the result as one JSON object on stdout", "", "Result"},
       {"--quiet", "", "say nothing but errors", "", "Result"}};
   spec.closing =
-      "A wish is met if what the solver says of the plan is within 5 % of it. docs/design.md tells what is assumed and measured.\n\n"
+      "A wish is met if what the solver says of the plan is within 5 % of it; of a pore, what\n"
+      "lamina extrude tells of it. docs/design.md tells what is assumed and measured.\n\n"
       "Examples:\n"
       "  lamina design --porosity 24 --permeability 100 --machine anet-a8 -o pores.toml\n"
       "  lamina design --pore 0.12x0.9 --machine anet-a8 --voxel 20 -o pores.toml\n"
