@@ -41,7 +41,8 @@ Result<Pile> pile_of(const read::GcodeFile& file);
 ///         than its layer is high is round, in the middle of its layer; beads keep their widths where they overlap
 /// left_out  by rules, the share of what is laid about the window that finds no room beside its neighbours, and is left out
 /// errors  kUsage: a layer cannot be read; kInput: 2^32 runs and more
-/// cost    O(runs) and reading the window's layers; 8 bytes a run. By rules, 150 bytes for each 20 um of line about the window. y of the voxels rises as that of the bed does
+/// cost    O(runs) and reading the window's layers; 8 bytes a run. By rules, 150 bytes for each 20 um of line about the window.
+/// y of the voxels rises as that of the bed does
 Result<VoxelStack> bead_voxels(const read::GcodeFile& file, const Pile& pile, const Window& window,
                                const bead::LayRules* rules = nullptr, double* left_out = nullptr);
 
