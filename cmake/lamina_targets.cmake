@@ -71,8 +71,8 @@ set_source_files_properties(${terminal_sources} ${PROJECT_SOURCE_DIR}/stages/rea
 lamina_sources(pipeline_sources "pipeline/*.cpp")
 list(FILTER pipeline_sources EXCLUDE REGEX "/pipeline/(main|preview_main|show/sheet|show/swath)\\.cpp$")
 # What runs once a job is compiled to be compiled fast; what runs once a layer, and what decodes programs, is optimised.
-lamina_sources(once_a_job "pipeline/batch/*.cpp" "pipeline/calibrate/*.cpp" "pipeline/cli/*.cpp" "pipeline/job/*.cpp"
-               "pipeline/machine/*.cpp" "pipeline/show/*.cpp")
+lamina_sources(once_a_job "pipeline/batch/*.cpp" "pipeline/calibrate/*.cpp" "pipeline/cli/*.cpp" "pipeline/design/*.cpp"
+               "pipeline/job/*.cpp" "pipeline/machine/*.cpp" "pipeline/show/*.cpp")
 list(FILTER once_a_job EXCLUDE REGEX "/show/(sheet|swath)\\.cpp$")
 list(REMOVE_ITEM pipeline_sources ${once_a_job})
 add_library(lamina_once_a_job OBJECT ${once_a_job})

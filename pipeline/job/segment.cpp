@@ -55,6 +55,8 @@ constexpr Key<SegmentSettings> kSegmentKeys[] = {
     field<&SegmentSettings::continuous_width_mm>({"segment", "continuous_width_mm", "", "MM", "the same of continuous lines"},
                                                  kAny),
     field<&SegmentSettings::one_direction>({"segment", "one_direction", "", "", "all segmented lines are laid the same way"}),
+    field<&SegmentSettings::even_starts>(
+        {"segment", "even_starts", "", "", "lines begin with the flow they keep, where the machine's material.lag_s is known"}),
     field<&SegmentSettings::shift_mm>({"segment", "shift_mm", "--pore-shift", "MM[,MM...]",
                                        "pores are moved along the lines by these, layer by layer in turn"},
                                       {-1000, 1000, " mm", false, 1}),

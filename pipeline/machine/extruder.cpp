@@ -8,10 +8,12 @@
 #include <vector>
 
 #include "pipeline/machine/profiles.h"
+#include "stages/bead/predicted_tables.h"
 #include "stages/data/text/json_text.h"
 #include "stages/data/text/key.h"
 #include "stages/data/text/names.h"
 #include "stages/data/text/readable.h"
+#include "stages/geometry/bead_section.h"
 
 namespace lamina::pipeline {
 
@@ -38,6 +40,25 @@ Result<ExtruderProfile> resolve_extruder(const Job& job) {
   if (r.skirt_loops) m.skirt.loops = *r.skirt_loops;
   if (r.relative_extrusion) m.code.relative_extrusion = *r.relative_extrusion;
   return found;
+}
+
+constexpr std::string_view kPublished = "Anet A8";  // whose widths Di Nisio 2022 measured
+
+constexpr double kLeastLag = 1e-3;  // s; what lags less makes no thin stretches
+
+bool has_measured_widths(const ExtruderProfile& profile) {
+  return profile.own_calibration || profile.machine.name == kPublished;
+}
+
+void predict_calibration(const Job& job, ExtruderProfile& profile) {
+  const Extruder& m = profile.machine;
+  if (has_measured_widths(profile) || !(m.material.lag_s >= kLeastLag)) return;
+  const double width = job.fill.all.width_mm, height = job.layer_mm;
+  const double area = bead_area(width, height, m.material.shape()) * m.material.flow;
+  if (!(area > 0)) return;  // layers that are too thick for such beads are refused elsewhere
+  profile.calibration =
+      bead::predicted_tables({area, m.material.lag_s, m.speed.acceleration_mm_s2}, width, height, m.speed.print_mm_s);
+  profile.predicted_calibration = true;
 }
 
 bool is_named(const Job& job, std::string_view key) { return std::ranges::find(job.named, key) != job.named.end(); }

@@ -13,6 +13,12 @@ namespace lamina::pipeline {
 /// errors  kUsage
 Result<ExtruderProfile> resolve_extruder(const Job& job);
 
+/// Whether widths of segmented lines were measured on this printer, or on the one that the documents had.
+bool has_measured_widths(const ExtruderProfile& profile);
+/// Where none were and the melt's lag is known, the tables of the calibration are those that the model of a bead has for beads
+/// and layers of the job (stages/bead/predicted_tables.h), in place of those of another machine.
+void predict_calibration(const Job& job, ExtruderProfile& profile);
+
 /// Whether a file, an option or --set gave the key, as in "fill.walls".
 bool is_named(const Job& job, std::string_view key);
 

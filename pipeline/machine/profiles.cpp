@@ -92,4 +92,19 @@ Result<ExtruderProfile> find_extruder(const std::string& name_or_file) {
   });
 }
 
+Result<bool> names_extruder(const std::string& name_or_file) {
+  if (is_one_of(shipped_extruders(), name_or_file)) return true;
+  if (is_one_of(shipped_machines(), name_or_file)) return false;
+  if (name_or_file.find('/') == std::string::npos && !name_or_file.ends_with(".toml")) {
+    std::vector<std::string_view> names = names_of(shipped_extruders());
+    for (const std::string_view name : names_of(shipped_machines())) names.push_back(name);
+    return Error{Fault::kUsage, fmt::format("no machine '{}'{}; name a profile (a file that ends in .toml) or one of {}",
+                                            one_line(name_or_file), suggest(name_or_file, names), fmt::join(names, ", "))};
+  }
+  const auto text =
+      read_file(name_or_file, {.fault = Fault::kUsage, .missing = "no such machine profile", .most_bytes = kMostTomlBytes});
+  if (!text) return text.error();
+  return !has_section(*text, "[head]") || has_section(*text, "[material]");
+}
+
 }  // namespace lamina::pipeline

@@ -35,4 +35,8 @@ Result<ExtruderProfile> read_extruder(std::string_view text, const std::string& 
 Result<Machine> find_machine(const std::string& name_or_file);
 Result<ExtruderProfile> find_extruder(const std::string& name_or_file);
 
+/// Whether it is the profile of an extrusion printer, else of a powder printer; a file may be wrong in other ways.
+/// errors  kUsage: neither, with the shipped names
+Result<bool> names_extruder(const std::string& name_or_file);
+
 }  // namespace lamina::pipeline

@@ -265,7 +265,13 @@ class Planner {
         plan_.warnings.push_back({"pores", heights.empty() ? warning : heights + ": " + warning});
       }
     }
-    if (plan_.segments->any() && !profile.own_calibration && profile.machine.name != "Anet A8") {
+    if (plan_.segments->any() && profile.predicted_calibration) {
+      plan_.warnings.push_back(
+          {"calibration",
+           fmt::format("{} has no calibration of its own; widths are predicted from the lag of its melt, {:g} s: "
+                       "lamina calibrate measures them",
+                       profile.machine.name, profile.machine.material.lag_s)});
+    } else if (plan_.segments->any() && !has_measured_widths(profile)) {
       plan_.warnings.push_back(
           {"calibration", fmt::format("{} has no calibration of its own; widths and limits are those measured on an Anet A8: "
                                       "lamina calibrate makes one",
@@ -322,6 +328,7 @@ Result<Resolved> resolve(const Job& job, Product product) {
     leave_to_machine(resolved.extruder->machine, resolved.job);
     if (Status status = check_job(resolved.job); !status) return status.error();
   }
+  predict_calibration(resolved.job, *resolved.extruder);
   return resolved;
 }
 

@@ -10,6 +10,7 @@
 
 #include "pipeline/plan/heights.h"
 #include "pipeline/plan/layer_cut.h"
+#include "stages/bead/even_starts.h"
 #include "stages/infill/skirt.h"
 #include "stages/segment/laid/crossing.h"
 #include "stages/segment/moves.h"
@@ -138,20 +139,25 @@ Result<bool> lay_moves(const Plan& plan, std::uint32_t index, const Sections::Wo
   LaidSums laid;
   laid.porosity.solid_mm3 = facts.area_mm2 * mm(layer.thickness);
   PoresByRange by_range(plan);
+  const Extruder& machine = plan.moves->profile.machine;
+  bead::EvenStarts starts(machine, mm(layer.thickness));
   if (index == 0 && plan.sections->fills()) lay_skirt(plan, layer, out);
   for (std::uint32_t a = 0; a + 1 < work.path_area.size(); ++a) {
     const AreaCut of = cut_of(plan, a, layer);
     const SegmentRange& range = of.range;
     const Result<segment::LayerCut>& cut = of.cut;
     if (!cut) return cut.error();
-    segment::MoveTable table(range.plan, *cut, plan.moves->profile.machine, layer);
+    segment::MoveTable table(range.plan, *cut, machine, layer);
     const ToolpathsView paths = paths_of(work, a);
     if (Status status = segment::check_stretch_count(range.plan, *cut, paths, layer.index); !status) return status.error();
-    const auto lay = [&](const BeadMove& move) -> std::optional<double> {
+    const auto write = [&](const BeadMove& move) -> std::optional<LaidMove> {
       const double length = out.lay(move);
       if (room.text.size() > room.most && !room.grown()) return std::nullopt;
-      return length;
+      return LaidMove{length, length * move.area_mm2};
     };
+    const bool even = range.settings.on && range.settings.even_starts && machine.material.lag_s > 0;
+    if (!even) starts.forget();
+    const auto lay = [&](const BeadMove& move) { return even ? starts.lay(move, write) : write(move); };
     if (!by_range.take(range, laid.pores, [&] { return segment::for_each_move(paths, *cut, table, laid, lay); })) return false;
     if (RangePores* told = by_range.find(range)) told->area_mm2 += plan.sections->area_mm2(plan.sections->areas()[a], work);
   }

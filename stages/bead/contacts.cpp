@@ -15,6 +15,7 @@ namespace {
 
 constexpr std::uint32_t kNone = UINT32_MAX;
 constexpr double kAlike = 0.9;                               // cosine of the angle between beads that lie side by side
+constexpr double kLevels = 0.05;                             // of a bead: what a free side takes at once does not heap up
 constexpr double kOwnLine = 0.2;                             // of a width: what is nearer lies on the same line
 constexpr double kCorners = 4 * (1 - std::numbers::pi / 4);  // area of the cusps of two round sides / their radius squared
 constexpr std::size_t kMostSquares = std::size_t{1} << 22;
@@ -89,15 +90,14 @@ class ContactFinder {
     for_all([&](std::size_t i) { frames_[i] = frame_of(pieces_[i]); });
   }
 
-  double run(Buffer<PieceSides>& sides) {
+  double run(Buffer<PieceSides>& sides, Buffer<PieceRoom>& rooms) {
     double widest = 0;
     for (const LaidPiece& piece : pieces_) widest = std::max(widest, piece.width_mm);
     const Squares squares(frames_, widest);
     for_all([&](std::size_t i) { contacts_[i] = touched(squares, static_cast<std::uint32_t>(i)); });
-    Buffer<double> left_out(pieces_.size());
-    for_all([&](std::size_t i) { left_out[i] = shape(i, sides[i]); });
+    for_all([&](std::size_t i) { rooms[i] = shape(i, sides[i]); });
     double sum = 0;
-    for (const double volume : left_out) sum += volume;
+    for (const PieceRoom& room : rooms) sum += room.over;
     return sum;
   }
 
@@ -136,15 +136,15 @@ class ContactFinder {
     return std::max(-contacts_[piece][from_side].room_mm2, 0.0) / 2;
   }
 
-  /// returns  mm3 that found no room
-  double shape(std::size_t i, PieceSides& out) const {
-    double left_out = 0;
+  PieceRoom shape(std::size_t i, PieceSides& out) const {
+    PieceRoom found;
     for (std::size_t s = 0; s < 2; ++s) {
       const Contact& contact = contacts_[i][s];
       PieceSide& side = s == 0 ? out.left : out.right;
       const double more = pushed(i, 1 - s);
       if (contact.piece == kNone) {
         side = {pieces_[i].width_mm / 2 + more / height_, -1};
+        found.room += kLevels * pieces_[i].area_mm2 * 2 * frames_[i].half_mm;
         continue;
       }
       const LaidPiece& beside = pieces_[contact.piece];
@@ -153,9 +153,10 @@ class ContactFinder {
       const double share = pieces_[i].width_mm / (pieces_[i].width_mm + beside.width_mm);
       side = {contact.distance_mm * share, std::min(std::sqrt(std::max(room, 0.0) / kCorners), height_ / 2)};
       // What a contact has no room for goes to the other sides; half of what has none there is this piece's.
-      left_out += (contact.room_mm2 >= 0 ? std::max(-room, 0.0) : taken) * frames_[i].half_mm;
+      found.over += (contact.room_mm2 >= 0 ? std::max(-room, 0.0) : taken) * frames_[i].half_mm;
+      found.room += std::max(room, 0.0) * frames_[i].half_mm;
     }
-    return left_out;
+    return found;
   }
 
   std::span<const LaidPiece> pieces_;
@@ -166,9 +167,12 @@ class ContactFinder {
 
 }  // namespace
 
-double find_contacts(std::span<const LaidPiece> pieces, double height_mm, Buffer<PieceSides>& sides) {
+double find_contacts(std::span<const LaidPiece> pieces, double height_mm, Buffer<PieceSides>& sides, Buffer<PieceRoom>* rooms) {
+  Buffer<PieceRoom> own;
+  Buffer<PieceRoom>& into = rooms != nullptr ? *rooms : own;
   sides.resize(pieces.size());
-  return pieces.empty() ? 0 : ContactFinder(pieces, height_mm).run(sides);
+  into.resize(pieces.size());
+  return pieces.empty() ? 0 : ContactFinder(pieces, height_mm).run(sides, into);
 }
 
 double reach_at(const LaidPiece& piece, const PieceSide& side, double height_mm, double above_mm) {

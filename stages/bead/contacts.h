@@ -2,7 +2,7 @@
 //
 // Two beads that reach each other share the room between their lines, as in neighbours.h: what would lie twice fills the cusps
 // above and below the place where they touch; a cusp that is partly filled is round. What finds no room there goes to the other
-// sides of both beads. No constant.
+// sides of both beads. One constant: a free side takes a twentieth of its bead at a time.
 #pragma once
 
 #include <span>
@@ -23,11 +23,19 @@ struct PieceSides {
   PieceSide left, right;
 };
 
+/// What a piece has too much and what it could still hold, mm3: its half of open cusps, and a twentieth of what it is where a
+/// side is free.
+struct PieceRoom {
+  double over = 0, room = 0;
+};
+
 /// height_mm  of the layer
 /// sides      one for each piece
+/// rooms      one for each piece; none: not told
 /// returns    mm3 that found no room and are left out
 /// cost       O(pieces x pieces within the widest bead's width of one), parallel; 100 bytes a piece. Same for any threads
-double find_contacts(std::span<const LaidPiece> pieces, double height_mm, Buffer<PieceSides>& sides);
+double find_contacts(std::span<const LaidPiece> pieces, double height_mm, Buffer<PieceSides>& sides,
+                     Buffer<PieceRoom>* rooms = nullptr);
 
 /// How far a side reaches at a height over or below the middle of the layer, mm; below 0: not at all.
 double reach_at(const LaidPiece& piece, const PieceSide& side, double height_mm, double above_mm);

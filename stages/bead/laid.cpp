@@ -13,6 +13,7 @@ namespace {
 
 constexpr double kFarthest = 1.5;                       // mm: what is wider than 3 mm spreads so far
 constexpr double kWidest = 3;                           // mm
+constexpr double kMostPrimed = 4;                       // times the flow of a line: what is primed beyond that is a purge
 constexpr double kLeastSpeed = 0.01, kMostSpeed = 1e4;  // mm/s: a file may say anything
 
 double length_of(const LaidBead& bead) {
@@ -24,9 +25,12 @@ class Line {
  public:
   explicit Line(const LayRules& rules) : rules_(rules), spread_(rules.height_mm, rules.piece_mm, kFarthest) {}
 
-  void lay(std::span<const LaidBead> beads, std::span<const BeadFeed> feeds, Buffer<LaidPiece>& out);
+  /// flow     mm3/s with which the line before ended; below 0: not known
+  /// returns  that with which this one ends
+  double lay(std::span<const LaidBead> beads, std::span<const BeadFeed> feeds, double flow, Buffer<LaidPiece>& out);
 
  private:
+  double first_flow(double fed_mm3_s, double most_mm3_s, double flow) const;
   double speed_of(const BeadFeed& feed) const {
     return feed.speed_mm_s > 0 ? std::clamp(feed.speed_mm_s, kLeastSpeed, kMostSpeed) : rules_.usual_mm_s;
   }
@@ -88,7 +92,14 @@ void Line::put(const SpreadCell& cell, Buffer<LaidPiece>& out) {
   }
 }
 
-void Line::lay(std::span<const LaidBead> beads, std::span<const BeadFeed> feeds, Buffer<LaidPiece>& out) {
+/// fed, most  mm3/s: at the speed with which the line begins, and at full speed
+double Line::first_flow(double fed, double most, double flow) const {
+  if (flow < 0 || !(rules_.machine.tau_s > 0)) return fed;
+  const double primed = flow + feeds_[0].primed_mm3 * rules_.feed_ratio / rules_.machine.tau_s;
+  return primed >= 0 && primed <= kMostPrimed * std::max(most, flow) ? primed : fed;
+}
+
+double Line::lay(std::span<const LaidBead> beads, std::span<const BeadFeed> feeds, double flow, Buffer<LaidPiece>& out) {
   beads_ = beads;
   feeds_ = feeds;
   here_ = 0;
@@ -110,7 +121,7 @@ void Line::lay(std::span<const LaidBead> beads, std::span<const BeadFeed> feeds,
   };
   BeadLine line(rules_.machine, rules_.height_mm);
   const double first = std::min(speed_of(feeds[0]), rules_.corner_mm_s);
-  Joint joint{first, first * area(0), true};
+  Joint joint{first, first_flow(first * area(0), speed_of(feeds[0]) * area(0), flow), true};
   for (std::size_t i = 0; i < beads.size(); ++i) {
     if (i == 0) line.begin(joint);
     line.add({begin_[i + 1] - begin_[i], area(i), speed_of(feeds[i])}, piece);
@@ -122,6 +133,7 @@ void Line::lay(std::span<const LaidBead> beads, std::span<const BeadFeed> feeds,
     if (!last) line.begin(joint);
   }
   if (rules_.spread) spread_.end(cell);
+  return joint.flow_mm3_s;
 }
 
 }  // namespace
@@ -129,10 +141,11 @@ void Line::lay(std::span<const LaidBead> beads, std::span<const BeadFeed> feeds,
 void lay(std::span<const LaidBead> beads, std::span<const BeadFeed> feeds, const LayRules& rules, Buffer<LaidPiece>& out) {
   out.clear();
   Line line(rules);
+  double flow = -1;
   for (std::size_t i = 0; i < beads.size();) {
     std::size_t end = i + 1;
     while (end < beads.size() && feeds[end].joined) ++end;
-    line.lay(beads.subspan(i, end - i), feeds.subspan(i, end - i), out);
+    flow = line.lay(beads.subspan(i, end - i), feeds.subspan(i, end - i), flow, out);
     i = end;
   }
 }

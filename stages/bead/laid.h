@@ -2,8 +2,9 @@
 //
 // A line is what is laid without a stop: it is fed along its whole way (line.h) and may spread along it (spread.h). At a bend
 // the head slows down to the speed at which the change of its velocity is that which the machine makes at once (the classic
-// jerk of Marlin's planner). Assumed: behind a travel the flow is that of the speed with which a line begins. Retractions are
-// made for that, and nothing is known of how well they do.
+// jerk of Marlin's planner). Assumed: what the melt held when a line ended it holds when the next one begins, and what was fed
+// in between in addition: retractions are made for that, and nothing is known of how well they do. The first line of all begins
+// with the flow of the speed with which it begins, and so does one behind a feed that no flow of a line explains (a purge).
 #pragma once
 
 #include <span>
@@ -34,7 +35,7 @@ struct LaidPiece {
 
 /// beads, feeds  of one layer, in the order of printing, as many of each
 /// out           pieces in the same order, no wider than 3 mm
-/// cost          with spread, a thousand arc sines for a mm of line
+/// cost          with spread, two thousand numbers from a table for a mm of line
 void lay(std::span<const LaidBead> beads, std::span<const BeadFeed> feeds, const LayRules& rules, Buffer<LaidPiece>& out);
 
 }  // namespace lamina::bead

@@ -10,7 +10,7 @@
 namespace lamina::bead {
 namespace {
 
-constexpr double kReach = 1.5;  // mm, of the spread: beads up to 3 mm wide
+constexpr double kReach = 1.5;  // mm: half of the widest bead that spreads
 
 std::array<Stretch, 2> period_of(const BeadMachine& machine, const Pattern& pattern) {
   const double area = machine.area_mm2 * pattern.extrusion_percent / 100;
@@ -59,7 +59,7 @@ PatternSums steady_profile(const BeadMachine& machine, double height_mm, const P
   const auto period = period_of(machine, pattern);
   const Joint joint = steady_joint(machine, height_mm, period);
   const double length = pattern.thick_mm + pattern.thin_mm;
-  const int before = spread ? static_cast<int>(std::ceil(kReach / length)) : 0;
+  const int before = spread ? static_cast<int>(std::ceil(2 * kReach / length)) : 0;
   const double begin = before * length;
   const auto see = [&](double a, double b, double width_a, double width_b) {
     const double from = std::max(a, begin), to = std::min(b, begin + length);

@@ -46,7 +46,7 @@ void lay_steady(const BeadMachine& machine, double height_mm, const Pattern& pat
 
 /// The widths of one period, without gaps and in order.
 /// spread  the bead spreads along its line (spread.h); widths are then those of cells of 0.02 mm at most
-/// cost    some hundred exponentials without spread, some ten thousand arc sines with it
+/// cost    some hundred exponentials without spread, some ten thousand numbers from a table with it
 PatternSums steady_profile(const BeadMachine& machine, double height_mm, const Pattern& pattern, bool spread,
                            const TakeProfile& take);
 PatternWidths steady_widths(const BeadMachine& machine, double height_mm, const Pattern& pattern, bool spread);

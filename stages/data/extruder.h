@@ -127,7 +127,8 @@ struct Calibration {
 struct ExtruderProfile {
   Extruder machine;
   Calibration calibration;
-  bool own_calibration = false;  // the profile has one
+  bool own_calibration = false;        // the profile has one
+  bool predicted_calibration = false;  // by the model of a bead, from the machine's lag
 };
 
 }  // namespace lamina

@@ -115,6 +115,12 @@ struct BeadMove {
   Nm width;         // nm, that the bead is expected to have: a tag for viewers
   double area_mm2;  // cross-section of what is laid: volume / length
   double speed_mm_s;
+  bool begins = false;  // a wall, line, curve or link begins
+};
+
+/// What a move has laid.
+struct LaidMove {
+  double length_mm, volume_mm3;
 };
 
 /// Segmented lines as they were laid. A piece is a line, or what holes leave of it, that is divided.
@@ -213,9 +219,10 @@ struct LaidBead {
 
 /// What was commanded for one.
 struct BeadFeed {
-  double volume_mm3;  // fed along it
-  double speed_mm_s;  // of the head; 0: untold
-  bool joined;        // it begins where the bead before ended, and nothing was moved in between
+  double volume_mm3;      // fed along it
+  double speed_mm_s;      // of the head; 0: untold
+  bool joined;            // it begins where the bead before ended, and nothing was moved in between
+  double primed_mm3 = 0;  // fed since the bead before, retractions and what took them back together
 };
 
 }  // namespace lamina

@@ -226,7 +226,7 @@ Result<GcodeLayer> GcodeFile::layer(std::uint32_t index, bool with_feeds) const 
     const double unit = volume_of_unit(raw->volumetric || volumetric_, filament_mm_);
     const double width = width_of(*raw, height_of(*raw, now.height, place.height, place.below), unit);
     layer.beads.push_back(bead_of(*raw, now.width > 0 ? now.width : width, now.type));
-    if (with_feeds) layer.feeds.push_back({raw->fed * unit, raw->speed, raw->joined});
+    if (with_feeds) layer.feeds.push_back({raw->fed * unit, raw->speed, raw->joined, raw->primed * unit});
   }
   if (walk.fault || types.size() != types_.size() || layer.beads.size() != place.beads) return changed;
   // A layer in which nothing is laid is where the nozzle is at its end.

@@ -86,6 +86,7 @@ class GcodeFile {
     double width = 0, height = 0;                  // mm: tags, 0 without
     std::uint32_t type = 0;
     bool lays = false;  // the last move laid a bead
+    double primed = 0;  // fed since then: mm, or mm3
   };
   /// Where a layer begins, and how high its beads are where no tag tells it.
   struct LayerPlace {

@@ -24,8 +24,10 @@ struct Numbered {
 Result<std::vector<Numbered>> numbered_images(const std::string& folder) {
   std::vector<Numbered> images;
   std::error_code wrong;
-  for (const fs::directory_entry& entry : fs::directory_iterator(folder, wrong)) {
-    const std::string ending = lower_case(entry.path().extension().string()), stem = entry.path().stem().string();
+  // A range-based loop would throw where reading goes wrong on the way.
+  for (fs::directory_iterator entry(folder, wrong); !wrong && entry != fs::directory_iterator(); entry.increment(wrong)) {
+    const fs::path& path = entry->path();
+    const std::string ending = lower_case(path.extension().string()), stem = path.stem().string();
     if (ending != ".png" && ending != ".tif" && ending != ".tiff" && ending != ".pbm") continue;
     const std::size_t last = stem.find_last_of("0123456789");
     const std::size_t before = last == std::string::npos ? last : stem.find_last_not_of("0123456789", last);
@@ -33,10 +35,11 @@ Result<std::vector<Numbered>> numbered_images(const std::string& folder) {
     if (digits.empty() || digits.size() > 18)
       return Error{Fault::kInput, fmt::format("{}: has no number in its name that tells its layer; name it as a0001.png, or "
                                               "move it elsewhere",
-                                              one_line(entry.path().string()))};
-    images.push_back({std::stoull(digits), entry.path().string()});
+                                              one_line(path.string()))};
+    images.push_back({std::stoull(digits), path.string()});
   }
-  if (wrong || images.empty())
+  if (wrong) return Error{Fault::kInput, fmt::format("{}: the folder cannot be read: {}", one_line(folder), wrong.message())};
+  if (images.empty())
     return Error{Fault::kInput,
                  fmt::format("{}: holds neither manifest.json of lamina jet nor images .png, .tif or .pbm", one_line(folder))};
   std::ranges::sort(images, [](const Numbered& a, const Numbered& b) {
@@ -91,7 +94,8 @@ Runs part_of(const Runs& image, const std::array<std::uint32_t, 3>& low, const s
 
 Result<ImageStack> stack_of_images(const std::string& folder, const StackRequest& request) {
   if (!(request.pixel_um > 0))
-    return Error{Fault::kUsage, folder + ": has no manifest.json that tells the size of a pixel; give it as --pixel"};
+    return Error{Fault::kUsage,
+                 one_line(folder) + ": no manifest.json of lamina jet tells the size of a pixel; give it as --pixel"};
   auto images = numbered_images(folder);
   if (!images) return images.error();
   const auto files = std::make_shared<const std::vector<Numbered>>(std::move(*images));

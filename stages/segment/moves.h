@@ -133,8 +133,8 @@ class SpeedCounter {
   double entry_ = 0, length_ = 0, speed_ = 0;
 };
 
-/// Calls lay(const BeadMove&) for every move of the paths of a part in a layer; it gives the move's length in mm, or nothing
-/// to stop: no further move is laid.
+/// Calls lay(const BeadMove&) for every move of the paths of a part in a layer; it gives what the move has laid, a LaidMove, or
+/// nothing to stop: no further move is laid.
 /// sums     what was laid is added
 /// returns  false if `lay` stopped
 template <class Lay>
@@ -144,19 +144,22 @@ bool for_each_move(const ToolpathsView& paths, const LayerCut& cut, MoveTable& t
   SpeedCounter speeds(table.machine(), sums.shorts);
   std::optional<PoreCounter> pores;
   if (cut.on) pores.emplace(paths, cut, table.plan(), sums.pores);
+  std::uint32_t run = UINT32_MAX;
   for_each_stretch(paths, cut, [&](const Stretch& s) {
     if (!goes_on) return;
     const MoveTable::Entry& entry = table.of(s);
-    const std::optional<double> length = lay(BeadMove{s.from, s.to, s.kind, s.jump, entry.width, entry.area, entry.speed});
-    if (!length) {
+    const std::optional<LaidMove> laid =
+        lay(BeadMove{s.from, s.to, s.kind, s.jump, entry.width, entry.area, entry.speed, s.jump || s.run != run});
+    run = s.run;
+    if (!laid) {
       goes_on = false;
       return;
     }
-    sums.porosity.extruded_mm3 += *length * entry.area;
-    sums.porosity.measured_mm3 += *length * entry.measured;
+    sums.porosity.extruded_mm3 += laid->volume_mm3;
+    sums.porosity.measured_mm3 += laid->length_mm * entry.measured;
     if (!pores) return;
     counter.add(s);
-    speeds.add(s, *length, entry.speed);
+    speeds.add(s, laid->length_mm, entry.speed);
     pores->add(s);
   });
   if (pores && goes_on) {

@@ -30,6 +30,7 @@ struct Settings {
   std::vector<double> thin_speed_sweep, thin_extrusion_sweep;  // of segmented lines, in turn; test pieces of a calibration
   std::optional<double> thick_width_mm, thin_width_mm, continuous_width_mm;  // that beads will have
   bool one_direction = true;
+  bool even_starts = true;  // lines begin with the flow they keep (stages/bead/even_starts.h), if the machine's lag is known
   std::vector<double> shift_mm{0};  // pores are moved along the lines by these, layer by layer in turn
   bool across = false;              // the grid begins so that pores of a layer turned by 90 degrees lie on the same places
 };

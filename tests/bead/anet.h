@@ -18,7 +18,7 @@ namespace lamina::bead::test {
 
 constexpr double kAtOnce = std::numeric_limits<double>::infinity();
 constexpr double kHeight = 0.3, kReference = 15;  // mm, mm/s: Table 2
-constexpr double kProfile = 400;                  // mm/s2: the profile's, not the document's
+constexpr double kProfile = 500;                  // mm/s2: the profile's, not the document's
 
 /// Table 11, the column of distances; widths are not read.
 inline std::vector<StableAfter> stabilisation_column() {

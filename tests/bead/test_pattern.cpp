@@ -33,10 +33,10 @@ TEST(Pattern, TimeAndSpeedAreThoseOfTheHead) {
   const PatternWidths at_once = steady_widths({0.1, 0.05, kAtOnce}, kHeight, {1.5, 1.5, 100, 15, 30}, false);
   EXPECT_NEAR(at_once.sums.seconds, 1.5 / 15 + 1.5 / 30, 1e-12);
   EXPECT_EQ(at_once.sums.peak_mm_s, 30);
-  // 1.5 mm between 7.5 and 30 mm/s at 400 mm/s2.
+  // 1.5 mm between 7.5 and 30 mm/s at 500 mm/s2.
   const PatternWidths profile = steady_widths({0.1, 0.05, kProfile}, kHeight, {1.5, 1.5, 100, 7.5, 30}, false);
-  EXPECT_NEAR(profile.sums.peak_mm_s, std::sqrt(7.5 * 7.5 + 400 * 1.5), 1e-12);
-  EXPECT_NEAR(profile.sums.seconds, 1.5 / 7.5 + 2 * (profile.sums.peak_mm_s - 7.5) / 400, 1e-12);
+  EXPECT_NEAR(profile.sums.peak_mm_s, std::sqrt(7.5 * 7.5 + 500 * 1.5), 1e-12);
+  EXPECT_NEAR(profile.sums.seconds, 1.5 / 7.5 + 2 * (profile.sums.peak_mm_s - 7.5) / 500, 1e-12);
 }
 
 TEST(Pattern, OneOfOneSpeedIsEven) {

@@ -3,7 +3,7 @@
 //
 // What 100 % lays is taken both ways that are known: the set width (0.1007 mm2), and what the profile feeds (0.102 mm2).
 // Two readings of the acceleration are kept apart, because no single one meets all tables: "speed acts at once" is what
-// section 4.1.2 saw (the bead narrows and swells where the speed changes), 400 mm/s2 is the profile's.
+// section 4.1.2 saw (the bead narrows and swells where the speed changes), 500 mm/s2 is the profile's, which is the maker's.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -69,7 +69,7 @@ TEST(TimeConstant, ItIsThatOfTheStabilisationColumn) {
   const auto rows = stabilisation_column();
   for (const double area : {set_area(), kProfileArea}) {
     EXPECT_NEAR(anet(area, kAtOnce).tau_s, 0.052, 0.001);
-    EXPECT_NEAR(anet(area, kProfile).tau_s, 0.046, 0.001);
+    EXPECT_NEAR(anet(area, kProfile).tau_s, 0.047, 0.001);
     // Every row from 175 % on tells it by itself.
     for (std::size_t i = 2; i < rows.size(); ++i) {
       const double tau = time_constant({area, 0, kAtOnce}, {kHeight, kReference, 0.01}, rows[i]);
@@ -93,16 +93,18 @@ TEST(Tables, WidthsOfThinStretchesBySpeed) {  // Table 11
   EXPECT_LT(errors_of_table_11(anet(set_area(), kAtOnce), false).thin, 0.025);
   EXPECT_LT(errors_of_table_11(anet(kProfileArea, kAtOnce), false).thin, 0.025);
   EXPECT_LT(errors_of_table_11(anet(set_area(), kAtOnce), true).thin, 0.025);
-  // A head that needs 0.04 to 0.11 s to speed up lets the melt catch up: beads twice as wide as measured.
-  EXPECT_GT(errors_of_table_11(anet(set_area(), kProfile), false).thin, 0.09);
+  // A head that needs 0.03 to 0.09 s to speed up lets the melt catch up: beads up to twice as wide as measured.
+  for (const bool spread : {false, true}) {
+    EXPECT_GT(errors_of_table_11(anet(set_area(), kProfile), spread).thin, 0.08);
+    EXPECT_LT(errors_of_table_11(anet(set_area(), kProfile), spread).thin, 0.09);
+  }
 }
 
-TEST(Tables, SwellingOfThickStretchesIsNotMetUnlessTheHeadBrakes) {  // Table 11
-  const double at_once = errors_of_table_11(anet(set_area(), kAtOnce), false).thick;
-  const double spread = errors_of_table_11(anet(set_area(), kAtOnce), true).thick;
-  EXPECT_GT(at_once, 0.3);
-  EXPECT_LT(spread, at_once / 3);
-  EXPECT_LT(errors_of_table_11(anet(set_area(), kProfile), false).thick, 0.045);
+TEST(Tables, SwellingOfThickStretchesIsNotMetUnlessTheHeadBrakesAndMeltSpreads) {  // Table 11
+  EXPECT_GT(errors_of_table_11(anet(set_area(), kAtOnce), false).thick, 0.3);
+  EXPECT_GT(errors_of_table_11(anet(set_area(), kAtOnce), true).thick, 0.2);
+  EXPECT_GT(errors_of_table_11(anet(set_area(), kProfile), false).thick, 0.07);
+  EXPECT_LT(errors_of_table_11(anet(set_area(), kProfile), true).thick, 0.04);
 }
 
 TEST(Tables, WidthsOfThinStretchesByExtrusion) {  // Table 12
@@ -121,17 +123,18 @@ TEST(Tables, WidthsOfThinStretchesByExtrusion) {  // Table 12
 }
 
 TEST(Tables, WidthsOfRepeatedStretches) {  // Tables 13 to 15
-  // The document does not say where along a stretch it measured. Of the four readings one is within 0.035 mm, by either area;
-  // the others lie at 0.037 to 0.044.
-  for (const double area : {set_area(), kProfileArea}) {
-    const Readings plain = errors_of_tables_13_to_15(anet(area, kProfile), false);
-    const Readings spread = errors_of_tables_13_to_15(anet(area, kProfile), true);
-    EXPECT_LT(spread.middle, 0.035);
-    for (const double other : {plain.middle, plain.mean, spread.mean}) EXPECT_LT(other, 0.045);
+  // The document does not say where along a stretch it measured. Table 16 tells: its pores are as wide as thin stretches of
+  // 0.22 (B100) and 0.20 mm (B75) leave, those of Tables 14 and 13 are 0.31 and 0.28 mm wide: means, not middles.
+  for (const bool spread : {false, true}) {
+    EXPECT_LE(errors_of_tables_13_to_15(anet(set_area(), kProfile), spread).mean, 0.0351);
+    for (const double area : {set_area(), kProfileArea}) {
+      const Readings read = errors_of_tables_13_to_15(anet(area, kProfile), spread);
+      EXPECT_LT(std::max(read.mean, read.middle), 0.046);
+    }
   }
-  // Speeds that change at once make thick stretches too thick and thin ones too thin; with spread it is half of that.
+  // Speeds that change at once make thick stretches too thick and thin ones too thin.
   EXPECT_GT(errors_of_tables_13_to_15(anet(set_area(), kAtOnce), false).mean, 0.06);
-  EXPECT_LT(errors_of_tables_13_to_15(anet(set_area(), kAtOnce), true).mean, 0.041);
+  EXPECT_GT(errors_of_tables_13_to_15(anet(set_area(), kAtOnce), true).mean, 0.04);
 }
 
 TEST(Tables, PoresOfTable16) {
@@ -139,18 +142,23 @@ TEST(Tables, PoresOfTable16) {
       {"B75", {15, 0.40}}, {"B100", {11.25, 0.43}}, {"B125", {7.5, 0.49}}};
   const BeadMachine machine = anet(set_area(), kProfile);
   const double beside = width_of(machine.area_mm2, true, kHeight);
-  for (const auto& row : table(16)) {
-    const std::string sample = row.at("sample");
-    const auto [speed, spacing] = printed.at(sample);  // Table 7
-    const BeadPore pore =
-        pore_beside(machine, kHeight, {1.5, 1.5, std::stod(sample.substr(1)), speed, 30}, spacing, beside, 0.02, false);
-    const double width = number(row, "pore_width_mm"), length = number(row, "pore_length_mm");
-    // Within 10 % or one standard deviation, and for B100 one micrometre outside of it: Table 16 has 0.12 +- 0.02.
-    EXPECT_LT(std::abs(pore.width - width), std::max(0.1 * width, number(row, "pore_width_pm")) + 0.0015) << sample;
-    // Lengths within 25 %, but that of B75, whose thick beads do not reach their neighbours: 33 %, 1.2 standard deviations.
-    EXPECT_LT(std::abs(pore.half_length / length - 1), sample == "B75" ? 0.35 : 0.25) << sample;
-    RecordProperty("width_" + sample, std::to_string(pore.width));
-    RecordProperty("length_" + sample, std::to_string(pore.half_length));
+  for (const bool spread : {false, true}) {
+    for (const auto& row : table(16)) {
+      const std::string sample = row.at("sample");
+      const auto [speed, spacing] = printed.at(sample);  // Table 7
+      const BeadPore pore =
+          pore_beside(machine, kHeight, {1.5, 1.5, std::stod(sample.substr(1)), speed, 30}, spacing, beside, 0.02, spread);
+      const double width = number(row, "pore_width_mm"), length = number(row, "pore_length_mm");
+      // Within 10 % or one standard deviation, and for B100 with spread one micrometre outside of it: Table 16 has 0.12 +-
+      // 0.02.
+      EXPECT_LT(std::abs(pore.width - width), std::max(0.1 * width, number(row, "pore_width_pm")) + 0.001) << sample;
+      // With spread within 8 %, but that of B75, whose thick beads do not reach their neighbours: 29 %, 1.03 standard
+      // deviations.
+      const double allowed = sample == "B75" ? (spread ? 0.30 : 0.36) : spread ? 0.08 : 0.25;
+      EXPECT_LT(std::abs(pore.half_length / length - 1), allowed) << sample << ' ' << spread;
+      RecordProperty("width_" + sample, std::to_string(pore.width));
+      RecordProperty("length_" + sample, std::to_string(pore.half_length));
+    }
   }
 }
 

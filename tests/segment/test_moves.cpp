@@ -84,11 +84,11 @@ TEST(Moves, AreAllThatIsLaidWithTheSpeedAndAreaOfTheirKind) {
   std::vector<BeadMove> moves;
   double length_mm = 0;
   const Toolpaths all = paths();
-  const bool whole = for_each_move(all, cut, table, sums, [&](const BeadMove& move) -> std::optional<double> {
+  const bool whole = for_each_move(all, cut, table, sums, [&](const BeadMove& move) -> std::optional<LaidMove> {
     moves.push_back(move);
     const double length = std::hypot(mm(move.to.x - move.from.x), mm(move.to.y - move.from.y));
     length_mm += length;
-    return length;
+    return LaidMove{length, length * move.area_mm2};
   });
   EXPECT_TRUE(whole);
   EXPECT_NEAR(length_mm, 80, 1e-9);
@@ -112,12 +112,12 @@ TEST(Moves, AreAllThatIsLaidWithTheSpeedAndAreaOfTheirKind) {
   // A first layer is laid no faster than its limit, and a sink that stops is given nothing more.
   MoveTable first(plan, cut, machine, {0, 0, 300'000});
   std::size_t laid = 0;
-  EXPECT_FALSE(for_each_move(all, cut, first, sums, [&](const BeadMove& move) -> std::optional<double> {
+  EXPECT_FALSE(for_each_move(all, cut, first, sums, [&](const BeadMove& move) -> std::optional<LaidMove> {
     if (move.kind == PathKind::kOuter) {
       EXPECT_EQ(move.speed_mm_s, machine.speed.first_layer_mm_s);
     }
     if (++laid == 3) return std::nullopt;
-    return 1.0;
+    return LaidMove{1, move.area_mm2};
   }));
   EXPECT_EQ(laid, 3u);
 }

@@ -196,12 +196,18 @@ bool GcodeCommands::move(double code, const Words& words, std::optional<RawBead>
   if (code == 2 || code == 3) {
     if (!begin_arc(code == 2, words, to, fed)) return false;
     whole_.joined = joined;
+    whole_.primed = place_.primed;
     place_.lays = chord_ > 0;
+    place_.primed = chord_ > 0 ? 0 : place_.primed + fed;
   } else if (fed > 0 && (to[0] != place_.at[0] || to[1] != place_.at[1])) {
     const double* at = place_.at;
-    bead = RawBead{{at[0], at[1], at[2]}, {to[0], to[1], to[2]}, fed, place_.volumetric, place_.speed, joined, true};
+    bead = RawBead{
+        {at[0], at[1], at[2]}, {to[0], to[1], to[2]}, fed, place_.volumetric, place_.speed, joined, place_.primed, true};
     if (!within_reach(*bead)) return false;
     place_.lays = true;
+    place_.primed = 0;
+  } else {
+    place_.primed += fed;
   }
   std::copy(std::begin(to), std::end(to), place_.at);
   return bead.has_value() || (chord_ > 0 && next_chord(bead));
@@ -230,7 +236,7 @@ bool GcodeCommands::begin_arc(bool clockwise, const Words& words, const double (
   }
   if (arc_.miss() > 0.05) off_circle.add(place_.line);
   if (arc_.radius_short()) short_radius.add(place_.line);
-  whole_ = {{at[0], at[1], at[2]}, {to[0], to[1], to[2]}, fed, place_.volumetric, place_.speed, false, true};
+  whole_ = {{at[0], at[1], at[2]}, {to[0], to[1], to[2]}, fed, place_.volumetric, place_.speed, false, 0, true};
   chord_ = 1;
   return true;
 }
@@ -250,11 +256,13 @@ bool GcodeCommands::next_chord(std::optional<RawBead>& bead) {
                 whole_.volumetric,
                 whole_.speed,
                 whole_.joined,
+                whole_.primed,
                 whole_.first};
   chord_ = chord_ < arc_.chords() ? chord_ + 1 : 0;
   if (from.x == to.x && from.y == to.y) return false;
   whole_.first = false;
   whole_.joined = true;
+  whole_.primed = 0;
   if (!within_reach(piece)) return false;
   bead = piece;
   return true;

@@ -20,6 +20,7 @@ struct RawBead {
   bool volumetric;        // fed is mm3
   double speed;           // mm/s
   bool joined;            // BeadFeed
+  double primed;          // before it: mm of filament, or mm3
   bool first;             // of its line
   double length() const;  // over the bed
 };

@@ -87,7 +87,7 @@ void tell_laid(const LaidSums& sums, const std::vector<LaidRange>& ranges, const
   facts["porosity"] = {{"by_extrusion", solid ? porosity.by_extrusion() : 0}, {"by_widths", solid ? porosity.by_widths() : 0}};
   facts["pores"] = Json::array();
   for (const LaidRange& range : ranges) {
-    lines.emplace_back("pores", pores_text(range));
+    if (ranges.size() == 1 || range.area_mm2 > 0) lines.emplace_back("pores", pores_text(range));  // else no layer lies in it
     facts["pores"].push_back(pores_json(range));
   }
   if (shorts.count > 0) lines.emplace_back("speeds", short_text(shorts, machine));

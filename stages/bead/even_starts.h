@@ -1,0 +1,63 @@
+// stages/bead/even_starts.h: lines that begin with the flow they keep, whatever the line before left behind.
+//
+// The melt lags (stages/bead/lag.h): behind a line that was laid faster a line begins too thick, behind a slower one too thin,
+// until the melt has forgotten, some tenths of a millimetre on. The first 0.2 mm of a line, or as much as keeps the feed
+// between a twentieth and thrice its own, are fed as much more or less as makes the flow at their end that of the line. Nothing
+// is fed standing or drawn back for it. Within a line nothing is changed: segmented lines live from the lag.
+//
+// Assumed: travels and retractions keep what the melt holds; lines begin and end with their own speeds. Braking at ends is the
+// same for all lines, and what it leaves behind is left alone.
+#pragma once
+
+#include <optional>
+
+#include "stages/bead/line.h"
+#include "stages/data/extruder.h"
+#include "stages/data/toolpaths.h"
+
+namespace lamina::bead {
+
+/// Takes the moves of a layer in the order in which they are laid. The first line of a layer is left as it is.
+/// cost  some ten exponentials a move
+class EvenStarts {
+ public:
+  /// machine  material.lag_s > 0: without a lag there is nothing to make even
+  /// height   of the layer, mm
+  EvenStarts(const Extruder& machine, double height_mm);
+
+  /// What is laid without this object is not known: the next line is left as it is.
+  void forget() { known_ = false; }
+
+  /// Gives lay(const BeadMove&) the move, or two pieces of it.
+  /// returns  what both have laid; nothing if `lay` stops
+  template <class Lay>
+  std::optional<LaidMove> lay(const BeadMove& move, Lay&& lay) {
+    const Pieces pieces = take(move);
+    LaidMove sum{};
+    for (int i = 0; i < pieces.count; ++i) {
+      const std::optional<LaidMove> laid = lay(pieces.move[i]);
+      if (!laid) return std::nullopt;
+      sum.length_mm += laid->length_mm;
+      sum.volume_mm3 += laid->volume_mm3;
+    }
+    return sum;
+  }
+
+ private:
+  struct Pieces {
+    BeadMove move[2];
+    int count = 1;
+  };
+  Pieces take(const BeadMove& move);
+  /// A move of a line that is not even yet.
+  Pieces made_even(const BeadMove& move);
+
+  double lag_;
+  BeadLine line_;              // since the line is even
+  double speed_ = 0;           // of the last move
+  double left_ = 0, own_ = 0;  // mm3/s: the flow that runs, and that of the line, until it is even
+  bool even_ = true;
+  bool known_ = false;  // whether a line was laid
+};
+
+}  // namespace lamina::bead
