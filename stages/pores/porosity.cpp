@@ -1,5 +1,6 @@
 #include "stages/pores/porosity.h"
 
+#include "stages/pores/rows.h"
 #include "stages/pores/voids.h"
 
 namespace lamina::pores {
@@ -21,6 +22,20 @@ Porosity porosity(const VoxelView& solid, const VoxelView* body, Faces outside) 
     if (is_open) result.open += parts.voxels[p];
     if (!is_open) ++result.cavities;
   }
+  return result;
+}
+
+VoxelStack void_through(const VoxelView& solid, int axis) {
+  const VoxelStack empty = void_of(solid);
+  const Parts parts = parts_of(empty);
+  VoxelStack result;
+  make_rows(empty, result, [&](std::size_t r, const auto& take) {
+    for (std::uint32_t i = empty.row_offset[r]; i < empty.row_offset[r + 1]; i += 2) {
+      if (!parts.through(parts.part_of(i / 2), axis)) continue;
+      take(empty.change[i]);
+      take(empty.change[i + 1]);
+    }
+  });
   return result;
 }
 

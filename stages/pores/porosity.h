@@ -37,4 +37,7 @@ struct Porosity {
 /// cost    of parts_of(), and 8 bytes a run of the void
 Porosity porosity(const VoxelView& solid, const VoxelView* body = nullptr, Faces outside = kFacesZ);
 
+/// The void of parts that lead through the box along an axis. cost  of porosity()
+VoxelStack void_through(const VoxelView& solid, int axis);
+
 }  // namespace lamina::pores

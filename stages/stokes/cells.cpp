@@ -238,4 +238,11 @@ Result<Grid> make_grid(const VoxelView& fine, std::uint32_t factor, std::uint32_
   return grid;
 }
 
+Buffer<std::array<std::uint32_t, 3>> places_of(const VoxelView& fine, std::uint32_t factor) {
+  const Buffer<Placed> order = in_order(where_nothing_passes(Walls(fine, factor), fine));
+  Buffer<Place> places(order.size());
+  for (std::size_t i = 0; i < order.size(); ++i) places[i] = order[i].place();
+  return places;
+}
+
 }  // namespace lamina::stokes

@@ -185,6 +185,18 @@ TEST(Porosity, ABoxThatRepeatsOpensWhatGoesOnForEver) {
   EXPECT_EQ(porosity(stack_of(slit, {true, true, true})).through, (std::array<std::uint64_t, 3>{20, 20, 0}));
 }
 
+TEST(Porosity, TheVoidThatLeadsThroughIsThatOfItsParts) {
+  const VoxelStack solid = stack_of(with_holes(), {true, false, false});
+  const VoxelStack hole = void_through(solid, 2);
+  EXPECT_EQ(set_voxels(hole), 60u);
+  for (std::uint32_t z = 0; z < 10; ++z)
+    for (std::uint32_t y = 0; y < 10; ++y)
+      EXPECT_TRUE(
+          std::ranges::equal(hole.view().row(y, z), y >= 1 && y < 4 ? Buffer<std::uint32_t>{1, 3} : Buffer<std::uint32_t>{}));
+  EXPECT_EQ(set_voxels(void_through(solid, 0)), 0u);
+  EXPECT_EQ(hole.periodic, solid.periodic);
+}
+
 // A helix that climbs one box each time it goes around in x: through along x and z only if both repeat.
 TEST(Porosity, AStairThatLeavesByTheSideComesBackHigher) {
   const Voxels stair = Voxels(4, 1, 4).fill([](auto x, auto, auto z) { return !(x == z || x == (z + 1) % 4); });

@@ -8,6 +8,7 @@
 
 #include "stages/stokes/flow.h"
 #include "tests/pores/boxes.h"
+#include "tests/stokes/flow_through.h"
 
 namespace lamina {
 namespace {
@@ -26,15 +27,7 @@ VoxelStack fine_box_of(std::uint32_t nx, std::uint32_t ny, std::uint32_t nz, con
 }
 
 stokes::Flow fine_flow_through(const VoxelView& fine, int axis, double tolerance = 1e-5) {
-  const Result<stokes::Grid> grid = stokes::make_grid(fine, kFiner, 5);
-  EXPECT_TRUE(grid.ok());
-  stokes::Field field = stokes::field_of(grid->cells);
-  stokes::FlowOptions options;
-  options.tolerance = tolerance;
-  const Result<stokes::Flow> flow = stokes::solve(*grid, axis, options, field);
-  EXPECT_TRUE(flow.ok());
-  EXPECT_LE(flow->residual, std::max(tolerance, 5e-4)) << "wide pores end where single precision does";
-  return *flow;
+  return test::flow_through(fine, axis, tolerance, 5, kFiner);
 }
 
 /// Walls at thirds of voxels: W^3 / 12 in all, up to the differences of second order.

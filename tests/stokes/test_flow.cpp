@@ -9,6 +9,7 @@
 
 #include "stages/stokes/flow.h"
 #include "tests/pores/boxes.h"
+#include "tests/stokes/flow_through.h"
 
 namespace lamina {
 namespace {
@@ -21,17 +22,7 @@ VoxelStack box_of(std::uint32_t nx, std::uint32_t ny, std::uint32_t nz, const So
       {true, true, true});
 }
 
-stokes::Flow flow_through(const VoxelView& solid, int axis, double tolerance = 1e-5, std::uint32_t levels = 5) {
-  const Result<stokes::Grid> grid = stokes::make_grid(solid, levels);
-  EXPECT_TRUE(grid.ok());
-  stokes::Field field = stokes::field_of(grid->cells);
-  stokes::FlowOptions options;
-  options.tolerance = tolerance;
-  const Result<stokes::Flow> flow = stokes::solve(*grid, axis, options, field);
-  EXPECT_TRUE(flow.ok());
-  EXPECT_LE(flow->residual, std::max(tolerance, 5e-4)) << "wide pores end where single precision does";
-  return *flow;
-}
+using test::flow_through;
 
 /// k = W^2 / 12 of the slit; the differences of second order are 2 / W^2 above it, which two grids show.
 TEST(Flow, SlitsFollowTheCubicLaw) {
