@@ -152,11 +152,13 @@ Result<Report> make_report(const std::string& path, const ReportOptions& options
 
   // Reserves room for the layers' lines and the rest of the page.
   std::uint64_t taken = (views.empty() ? 150'000 : 50'000) + 150 * manifest.layers.size();
+  taken += options.laid_svg.size() / 3 * 4;
   for (const ShownView& view : views) taken += view.deflated.size() / 3 * 4;
   HeldLayers held(options.size_limit > taken ? options.size_limit - taken : 0);
   auto seen = see_layers(*source, doubts, held);
   if (!seen) return seen.error();
   seen->laid = options.laid;
+  seen->laid_svg = options.laid_svg;
   if (views.empty()) {
     auto built = build_up(*source, seen->window);
     if (!built) return built.error();

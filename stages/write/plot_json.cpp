@@ -6,10 +6,11 @@
 namespace lamina {
 
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(Plot::Box, left, top, width, height, colour)
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(Plot::Image, left, top, columns, colours, pixels)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(Plot::Line, points, colour)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(Plot::Dot, x, y, radius, colour)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(Plot::Text, x, baseline, size, anchor, colour, line)
-NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(Plot, width, height, boxes, lines, dots, texts)
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(Plot, width, height, boxes, images, lines, dots, texts)
 
 }  // namespace lamina
 

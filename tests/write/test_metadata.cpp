@@ -1,4 +1,5 @@
 // What a file says of itself, read by the formats' own libraries, and golden bytes.
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <png.h>
 #include <tiffio.h>
@@ -6,6 +7,7 @@
 #include <cstdlib>
 
 #include "stages/read/image.h"
+#include "stages/write/png/coloured.h"
 #include "tests/write/images.h"
 
 namespace lamina::write {
@@ -152,6 +154,24 @@ TEST(Png, LibpngsOwnReaderSeesBlackWhereRunsAre) {
   ASSERT_NE(png_image_finish_read(&image, nullptr, pixels.data(), 0, nullptr), 0);
   const std::string expected = "###...#######.....##";
   for (std::size_t column = 0; column < 20; ++column) EXPECT_EQ(pixels[column], expected[column] == '#' ? 0 : 255);
+}
+
+TEST(Png, LibpngsOwnReaderSeesEveryColourOfAPalette) {
+  std::vector<std::string> colours;
+  for (int i = 0; i < 256; ++i) colours.push_back(fmt::format("{:02x}{:02x}{:02x}", i, 255 - i, i / 2));
+  std::vector<std::uint8_t> pixels(300 * 7);
+  for (std::size_t i = 0; i < pixels.size(); ++i) pixels[i] = static_cast<std::uint8_t>(i * i / 5 % 256);
+  const Bytes file = png::coloured(300, colours, pixels);
+  png_image image{};
+  image.version = PNG_IMAGE_VERSION;
+  ASSERT_NE(png_image_begin_read_from_memory(&image, file.data(), file.size()), 0);
+  ASSERT_EQ(image.width, 300u);
+  ASSERT_EQ(image.height, 7u);
+  image.format = PNG_FORMAT_RGB;
+  std::vector<std::uint8_t> read(PNG_IMAGE_SIZE(image));
+  ASSERT_NE(png_image_finish_read(&image, nullptr, read.data(), 0, nullptr), 0) << image.message;
+  for (std::size_t i = 0; i < pixels.size(); ++i)
+    ASSERT_EQ(fmt::format("{:02x}{:02x}{:02x}", read[3 * i], read[3 * i + 1], read[3 * i + 2]), colours[pixels[i]]) << i;
 }
 
 TEST(Pbm, IsAHeaderWithTheDpiAndPackedRows) {

@@ -45,6 +45,24 @@ Status stroke(Canvas& canvas, const std::vector<std::array<double, 2>>& points, 
   return {};
 }
 
+/// errors  kUsage: no image
+Status put(Canvas& canvas, const Plot::Image& image) {
+  const auto columns = static_cast<std::size_t>(image.columns);
+  const auto has_colour = [&](std::uint8_t pixel) { return pixel < image.colours.size(); };
+  if (image.columns < 1 || image.pixels.size() % columns != 0 || !std::ranges::all_of(image.pixels, has_colour))
+    return Error{Fault::kUsage, "an image of the plot has pixels without a column or a colour"};
+  std::vector<Colour> colours;
+  for (const std::string& rgb : image.colours) colours.push_back(colour_of(rgb));
+  // Stretches of one colour.
+  for (std::size_t i = 0, end = 0; i < image.pixels.size(); i = end) {
+    const std::size_t row = i / columns;
+    for (end = i + 1; end < (row + 1) * columns && image.pixels[end] == image.pixels[i];) ++end;
+    canvas.fill_box(image.left + static_cast<int>(i - row * columns), image.top + static_cast<int>(row),
+                    static_cast<int>(end - i), 1, colours[image.pixels[i]]);
+  }
+  return {};
+}
+
 }  // namespace
 
 Result<Buffer<std::byte>> plot_png(const Plot& plot) {
@@ -58,6 +76,8 @@ Result<Buffer<std::byte>> plot_png(const Plot& plot) {
     canvas.fill_box(left, top, std::max(1, rounded(box.left + box.width) - left),
                     std::max(1, rounded(box.top + box.height) - top), colour_of(box.colour));
   }
+  for (const Plot::Image& image : plot.images)
+    if (Status status = put(canvas, image); !status) return status.error();
   for (const Plot::Line& line : plot.lines) {
     if (Status status = stroke(canvas, line.points, 1, 1, colour_of(line.colour)); !status) return status.error();
   }

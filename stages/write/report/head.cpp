@@ -2,6 +2,9 @@
 
 #include <cmath>
 #include <nlohmann/json.hpp>
+#include <span>
+
+#include "stages/write/report/run_code.h"
 
 namespace lamina::write::report {
 namespace {
@@ -72,6 +75,7 @@ std::string head_json(const Manifest& manifest, const ManifestSeen& file, const 
                {"job", head.job_toml},
                {"manifest", {{"name", file.name}, {"bytes", file.digest.bytes}, {"hash", hex(file.digest.hash)}}},
                {"laid", seen.laid},
+               {"laid_svg", base64(std::as_bytes(std::span(seen.laid_svg)))},
                {"parts", Json::array()},
                {"warnings", Json::array()},
                {"views", Json::object()},

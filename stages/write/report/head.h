@@ -29,7 +29,8 @@ struct LayersSeen {
   std::vector<std::uint64_t> set;  // pixels of each
   std::vector<double> seconds;     // of each, with a machine
   std::vector<Warning> warnings;
-  std::string laid;  // lines on what toolpaths leave open
+  std::string laid;      // lines on what toolpaths leave open
+  std::string laid_svg;  // a picture of it; "" for none
 };
 
 /// The manifest's own file.

@@ -258,6 +258,11 @@ function fillTexts() {
   $('job').textContent = head.job;
   $('laid').hidden = !head.laid;
   $('laid-lines').textContent = head.laid;
+  if (head.laid_svg) {
+    const picture = element('img', undefined, $('laid'));
+    picture.alt = 'sections through beads and pores, across the layers and along them';
+    picture.src = 'data:image/svg+xml;base64,' + head.laid_svg;
+  }
   const line = $('manifest');
   line.append(`${head.manifest.name}, ${head.manifest.bytes} bytes, XXH3-128 `);
   element('code', head.manifest.hash, line);

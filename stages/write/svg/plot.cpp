@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include "stages/write/png/coloured.h"
+#include "stages/write/report/run_code.h"  // base64
 #include "stages/write/svg/svg_writer.h"
 
 namespace lamina::write {
@@ -16,6 +18,18 @@ void put(SvgWriter& svg, const Plot::Box& box) {
   svg.number("width", box.width);
   svg.number("height", box.height);
   colour(svg, "fill", box.colour);
+  svg.end();
+}
+
+/// A picture within the picture, so that a colour is a byte a pixel before it is deflated.
+void put(SvgWriter& svg, const Plot::Image& image) {
+  const Bytes file = png::coloured(static_cast<std::uint32_t>(image.columns), image.colours, image.pixels);
+  svg.begin("image");
+  svg.number("x", image.left);
+  svg.number("y", image.top);
+  svg.number("width", image.columns);
+  svg.number("height", static_cast<double>(image.pixels.size() / static_cast<std::size_t>(image.columns)));
+  svg.attribute("href", "data:image/png;base64," + report::base64(file));
   svg.end();
 }
 
@@ -65,6 +79,7 @@ std::string plot_svg(const Plot& plot) {
   svg.comment("drawn by lamina");
   put(svg, Plot::Box{0, 0, double(plot.width), double(plot.height), "ffffff"});
   for (const Plot::Box& box : plot.boxes) put(svg, box);
+  for (const Plot::Image& image : plot.images) put(svg, image);
   for (const Plot::Line& line : plot.lines) put(svg, line);
   for (const Plot::Dot& dot : plot.dots) put(svg, dot);
   for (const Plot::Text& text : plot.texts) put(svg, text);
