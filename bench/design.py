@@ -3,9 +3,9 @@
 
     scripts/bench design [--voxel UM]     writes bench/design.md
 
-Ten wishes within what the configurations of Di Nisio 2022 span as lamina predicts them (bench/pores.md), and five outside. Each
-job that is written is planned again by `lamina extrude` for a cylinder of 25.4 mm: it has to end without a warning of its
-segments.
+Ten wishes within what the configurations of Di Nisio 2022 span as lamina predicts them (bench/pores.md), five outside, and two
+gradients over a height of 25.4 mm. Each job that is written is planned again by `lamina extrude` for a cylinder of 25.4 mm: it has
+to end without a warning of its segments.
 """
 import argparse
 import json
@@ -28,6 +28,8 @@ INSIDE = ["--porosity 24 --permeability 100", "--porosity 22 --permeability 150"
           "--porosity 19 --permeability 45", "--porosity 23", "--porosity 18", "--permeability 80", "--permeability 200",
           "--pore 0.12x0.9", "--pore 0.1x1 --porosity 21"]
 OUTSIDE = ["--porosity 40", "--permeability 2000", "--porosity 12 --permeability 200", "--pore 0.3x1", "--pore 0.1x6"]
+GRADIENTS = ["--permeability 60:150", "--porosity 20:24"]
+HEIGHT = 25.4  # mm
 
 
 def design(wish, job, voxel):
@@ -42,10 +44,10 @@ def processor_seconds():
     return used.ru_utime + used.ru_stime
 
 
-def plan(job, folder):
-    """Warnings of the job's plan, and k1 as `lamina permeability` predicts it, where it finds the period."""
+def plan(job, folder, part="part.stl"):
+    """Warnings of the job's plan, and k1 as `lamina permeability` predicts it in the middle, where it finds the period."""
     toolpaths = os.path.join(folder, "part.gcode")
-    said = subprocess.run([LAMINA, "extrude", os.path.join(folder, "part.stl"), "--job", job, "--overwrite", "--json", "-o", toolpaths],
+    said = subprocess.run([LAMINA, "extrude", os.path.join(folder, part), "--job", job, "--overwrite", "--json", "-o", toolpaths],
                           check=True, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
     found = json.loads(subprocess.run([LAMINA, "permeability", toolpaths, "--json"], check=True, stdout=subprocess.PIPE).stdout)
     flow = found["flow"][2]
@@ -63,9 +65,30 @@ def told(found):
     return f"{100 * found['porosity']:.2f} | {found['k1_darcy']:.1f} +- {found['k1_error_darcy']:.1f} | " + "{:.3f} x {:.2f}".format(*found["pore_mm"])
 
 
+def gradients(voxel, folder):
+    """Lines of each region, and a line for each gradient."""
+    rows, ends = [], []
+    pores.write_cylinder(os.path.join(folder, "high.stl"), 25.4, HEIGHT)
+    for wish in GRADIENTS:
+        job = os.path.join(folder, "gradient.toml")
+        found, _, seconds = design(f"{wish} --height {HEIGHT}", job, voxel)
+        print(wish, found["met"], f"{100 * found['miss']:.1f} %", f"{seconds[0]:.0f} s", file=sys.stderr)
+        warnings, again = plan(job, folder, "high.stl") if found["met"] else ([], "-")
+        for i, step in enumerate(found["steps"]):
+            asked = step["wish"]
+            asked = f"{100 * asked['porosity']:.4g} %" if "porosity" in asked else f"{asked['k1_darcy']:.4g} D"
+            middle = i == len(found["steps"]) // 2
+            rows.append([f"`{wish}`" if i == 0 else "", f"{step['from_mm']:g} to {step['to_mm']:g}", asked, *keys_of(step),
+                         *told(step).split(" | "), f"{100 * step['miss']:.1f}", again if middle else ""])
+        ends.append(f"`{wish} --height {HEIGHT}`: {'met' if found['met'] else 'not met'} within {100 * found['miss']:.1f} %, {found['runs']} forward "
+                    f"runs, {seconds[0]:.0f} s, {seconds[1]:.0f} s of processors; porosity of the whole {100 * found['porosity']:.2f} %, "
+                    f"regions in series {found['k1_in_series_darcy']:.1f} D; {len(warnings)} warnings of `lamina extrude`.")
+    return rows, ends
+
+
 def page(voxel):
     inside, outside, warned, within = [], [], 0, 0
-    longest = [0, 0]
+    longest, longest_outside = [0, 0], [0, 0]
     with tempfile.TemporaryDirectory() as folder:
         pores.write_cylinder(os.path.join(folder, "part.stl"), 25.4, 3)
         for i, wish in enumerate(INSIDE):
@@ -82,10 +105,11 @@ def page(voxel):
                            str(found["runs"]), f"{found['k1_over_slots']:.2f}", f"{seconds[0]:.0f}, {seconds[1]:.0f}"])
         for wish in OUTSIDE:
             found, done, seconds = design(wish, os.path.join(folder, "none.toml"), voxel)
-            longest = list(map(max, longest, seconds))
+            longest_outside = list(map(max, longest_outside, seconds))
             refused = done.returncode == 5 and not os.path.exists(os.path.join(folder, "none.toml"))
             print(wish, done.returncode, f"{seconds[0]:.0f} s, {seconds[1]:.0f} of processors", file=sys.stderr)
             outside.append([f"`{wish}`", "yes" if refused else "no", *told(found).split(" | "), str(found["runs"]), f"{seconds[0]:.0f}, {seconds[1]:.0f}"])
+        regions, ends = gradients(voxel, folder)
     machine = figures.machine(ROOT)
     yield "# Fillings from wishes: what is asked for, and what the solver says of it"
     yield ""
@@ -104,7 +128,17 @@ def page(voxel):
     yield ""
     yield "## Outside"
     yield ""
+    yield (f"The longest took {longest_outside[0]:.0f} s, {longest_outside[1]:.0f} s of processors.")
+    yield ""
     yield from tables.table(["wish", "refused", "nearest: porosity, %", "k1, D", "pore, mm", "forward runs", "seconds, of processors"], outside)
+    yield ""
+    yield "## From the bottom to the top"
+    yield ""
+    yield from tables.table(["wish", "heights, mm", "of the region", "thick / thin, mm", "extrusion, %", "continuous lines", "S-C, mm", "porosity, %",
+                             "k1, D", "pore, mm", "miss, %", "k1 again, 10 um, D"], regions)
+    yield ""
+    yield from ends
+    yield "k1 again: of the region in the middle of a cylinder as high as wide."
 
 
 def main(arguments):

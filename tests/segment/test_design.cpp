@@ -5,23 +5,15 @@
 #include <set>
 
 #include "stages/segment/design/search.h"
+#include "tests/segment/slow_printer.h"
 
 namespace lamina::segment {
 namespace {
 
 constexpr double kSquareMm = 1e-6;  // m2
 
-Extruder anet() {
-  Extruder machine;
-  machine.speed.print_mm_s = 15;
-  machine.speed.acceleration_mm_s2 = 400;
-  machine.material.bead_area = BeadShape::kRectangle;
-  machine.material.flow = 0.85;
-  return machine;
-}
-
 DesignLimits limits() {
-  const auto found = DesignLimits::of(anet(), anet_a8_calibration());
+  const auto found = DesignLimits::of(test::slow_printer(), anet_a8_calibration());
   EXPECT_TRUE(found.ok());
   return *found;
 }
@@ -115,13 +107,13 @@ TEST(DesignLimits, WhatIsAskedIsBroughtWithinThem) {
 TEST(DesignLimits, WithoutWidthsOfRepeatedStretchesNothingIsDesigned) {
   Calibration calibration = anet_a8_calibration();
   calibration.repeated.clear();
-  const auto none = DesignLimits::of(anet(), calibration);
+  const auto none = DesignLimits::of(test::slow_printer(), calibration);
   ASSERT_FALSE(none.ok());
   EXPECT_NE(none.error().message.find("repeated"), std::string::npos);
   calibration = anet_a8_calibration();
   calibration.repeated[1].thin_speed_percent = 150;
-  EXPECT_FALSE(DesignLimits::of(anet(), calibration).ok());
-  Extruder lazy = anet();
+  EXPECT_FALSE(DesignLimits::of(test::slow_printer(), calibration).ok());
+  Extruder lazy = test::slow_printer();
   lazy.speed.acceleration_mm_s2 = 50;
   EXPECT_FALSE(DesignLimits::of(lazy, anet_a8_calibration()).ok()) << "no stretch comes near to its speed";
 }
@@ -187,6 +179,23 @@ TEST(DesignSearch, TheRatioOfABetterComputationMovesThePlan) {
   const Design again = search(porous(0.24, 100), limits(), {0.99, 0.8});
   EXPECT_EQ(again.settings.spacing_sc_mm, corrected.settings.spacing_sc_mm);
   EXPECT_EQ(again.settings.thin_mm, corrected.settings.thin_mm);
+}
+
+TEST(DesignSearch, WhatIsKnownOfAPlanHoldsThereAndFadesAwayFromIt) {
+  const DesignLimits bounds = limits();
+  const PoreWish wish = porous(0.21, 0);
+  const Design free = search(wish, bounds, {});
+  const std::vector<RatioAt> here{{free.choice, {1.08, 0.7}}};
+  // Of that plan what is known, of others something between that and nothing.
+  const Design again = search(porous(0.21 * 1.08, 0), bounds, {}, {}, here);
+  EXPECT_LT(again.miss, 5e-3);
+  EXPECT_GT(again.ratio.porosity, 1.0);
+  EXPECT_LE(again.ratio.porosity, 1.08);
+  const Design far = search(porous(0.165, 0), bounds, {}, {3, 3}, here);
+  EXPECT_LT(far.ratio.porosity, again.ratio.porosity);
+  EXPECT_GT(far.ratio.permeability, again.ratio.permeability);
+  EXPECT_NEAR(search(wish, bounds, {}, {}, std::vector<RatioAt>{{free.choice, {1, 1}}}).slots.porosity, free.slots.porosity,
+              1e-6);
 }
 
 }  // namespace

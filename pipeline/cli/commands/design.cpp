@@ -1,29 +1,40 @@
 // lamina design: the job of segmented lines whose pores, porosity or permeability are as wished.
 #include <fmt/format.h>
 
-#include "pipeline/calibrate/design.h"
+#include <functional>
+
 #include "pipeline/cli/command.h"
 #include "pipeline/cli/console.h"
+#include "pipeline/cli/outputs.h"
+#include "pipeline/design/gradient.h"
 #include "pipeline/machine/profiles.h"
 #include "stages/data/text/json.h"
 #include "stages/data/text/number_text.h"
 #include "stages/data/text/readable.h"
+#include "stages/segment/design/design_page.h"
 #include "stages/segment/permeability.h"  // the unit
 #include "stages/write/file.h"
 
 namespace lamina::pipeline {
 namespace {
 
+constexpr const char *kWishes = "Wish: one or two of them", *kGradient = "Regions of a wish with two ends";
+
 CommandSpec design_spec() {
   CommandSpec spec;
   spec.summary =
       "Finds the segmented filling whose pores are as wished: lengths of thick and thin stretches, spacing, extrusion, speeds and\n"
       "continuous lines, within what was measured of the machine. Plans it, solves the flow through what is laid, tells what it\n"
-      "will be, and writes the job file. A wish that cannot be met ends with exit code 5 and the nearest that can.";
+      "will be, and writes the job file. A wish with two ends changes from the bottom to the top, in regions of their own\n"
+      "filling. A wish that cannot be met ends with exit code 5 and the nearest that can.";
   spec.options = {
-      {"--porosity", "PERCENT", "void in the filling", "", "Wish: one or two of them"},
-      {"--permeability", "DARCY", "k1 along the height", "", "Wish: one or two of them"},
-      {"--pore", "WIDTHxLENGTH", "mm, of the pore beside a thin stretch, as in 0.12x0.9", "", "Wish: one or two of them"},
+      {"--porosity", "PERCENT", "void in the filling, as in 24; 20:26 from the bottom to the top", "", kWishes},
+      {"--permeability", "DARCY", "k1 along the height, as in 100; 60:150 from the bottom to the top", "", kWishes},
+      {"--pore", "WIDTHxLENGTH", "mm, of the pore beside a thin stretch, as in 0.12x0.9; 0.1x0.9:0.14x0.9 upwards", "",
+       kWishes},
+      {"--height", "MM", "of the part, for wishes with two ends", "", kGradient},
+      {"--steps", "N", "regions as high as each other", "5", kGradient},
+      {"--tops", "MM[,MM...]", "tops of the regions in place of them, the lowest first, the part's height last", "", kGradient},
       {"--machine", "NAME|FILE", "extrusion printer; lamina extrude --help lists them", "", "Machine",
        names_of(shipped_extruders())},
       {"--voxel", "UM", "edge of a voxel across the lines, micrometres; twice as long, as high", "10", "Solver"},
@@ -34,145 +45,161 @@ CommandSpec design_spec() {
       {"--quiet", "", "say nothing but errors", "", "Result"}};
   spec.closing =
       "A wish is met if what the solver says of the plan is within 5 % of it; of a pore, what\n"
-      "lamina extrude tells of it. docs/design.md tells what is assumed and measured.\n\n"
+      "lamina extrude tells of it. Regions end with whole layers; each is checked in the middle of one file of all of them.\n"
+      "docs/design.md tells what is assumed and measured.\n\n"
       "Examples:\n"
       "  lamina design --porosity 24 --permeability 100 --machine anet-a8 -o pores.toml\n"
       "  lamina design --pore 0.12x0.9 --machine anet-a8 --voxel 20 -o pores.toml\n"
+      "  lamina design --permeability 60:150 --height 25.4 --machine anet-a8 -o pores.toml\n"
       "  lamina extrude part.stl --job pores.toml -o part.gcode";
   return spec;
 }
 
-Status read_pore(const Arguments& arguments, segment::PoreWish& wish) {
-  if (!arguments.has("--pore")) return {};
-  const std::string text = arguments.text("--pore");
+/// A wish at the bottom and at the top; the same where it has no gradient.
+struct WishEnds {
+  segment::PoreWish bottom, top;
+  bool gradient = false;
+};
+
+/// Gives the texts of both ends to a reader. errors  kUsage
+Status read_ends(const Arguments& arguments, const char* flag, WishEnds& wish,
+                 const std::function<std::string(std::string_view, segment::PoreWish&)>& read) {
+  if (!arguments.has(flag)) return {};
+  const std::string text = arguments.text(flag);
+  const auto ends = split(text, ":");
+  if (ends.size() > 2)
+    return at_option(flag, fmt::format("'{}' has more than two ends; name those at the bottom and at the top", one_line(text)));
+  wish.gradient = wish.gradient || ends.size() == 2;
+  if (const Status status = at_option(flag, read(ends.front(), wish.bottom)); !status) return status;
+  return at_option(flag, read(ends.back(), wish.top));
+}
+
+std::string read_pore(std::string_view text, segment::PoreWish& wish) {
   const auto sides = split(text, "x");
   std::array<double, 2> side{};
-  if (sides.size() != 2) return at_option("--pore", fmt::format("'{}' is no width and length, as in 0.12x0.9", one_line(text)));
+  if (sides.size() != 2) return fmt::format("'{}' is no width and length, as in 0.12x0.9", one_line(std::string(text)));
   for (std::size_t i = 0; i < 2; ++i) {
-    if (const std::string wrong = read_number(sides[i], 0.001, 100, " mm", side[i]); !wrong.empty())
-      return at_option("--pore", wrong);
+    if (std::string wrong = read_number(sides[i], 0.001, 100, " mm", side[i]); !wrong.empty()) return wrong;
   }
-  if (side[0] >= side[1])
-    return at_option("--pore", fmt::format("{} mm is the width and has to be less than the length, {} mm", side[0], side[1]));
+  if (side[0] >= side[1]) return fmt::format("{} mm is the width and has to be less than the length, {} mm", side[0], side[1]);
   wish.pore_width_mm = side[0];
   wish.pore_length_mm = side[1];
   return {};
 }
 
+/// A number, times what it is told in.
+auto number_reader(const Limits& limits, double unit, std::optional<double> segment::PoreWish::*target) {
+  return [limits, unit, target](std::string_view text, segment::PoreWish& wish) {
+    double value = 0;
+    std::string wrong = read_value(text, limits, value);
+    if (wrong.empty()) wish.*target = value * unit;
+    return wrong;
+  };
+}
+
 /// errors  kUsage
-Result<segment::PoreWish> read_pore_wish(const Arguments& arguments) {
-  segment::PoreWish wish;
-  double porosity = 0, darcy = 0;
-  for (const Status& status : {arguments.read("--porosity", {0.1, 99, " %"}, porosity),
-                               arguments.read("--permeability", {1e-3, 1e6, " D"}, darcy), read_pore(arguments, wish)}) {
+Result<WishEnds> read_wish(const Arguments& arguments) {
+  WishEnds wish;
+  for (const Status& status :
+       {read_ends(arguments, "--porosity", wish, number_reader({0.1, 99, " %"}, 0.01, &segment::PoreWish::porosity)),
+        read_ends(arguments, "--permeability", wish,
+                  number_reader({1e-3, 1e6, " D"}, segment::kDarcy, &segment::PoreWish::permeability_m2)),
+        read_ends(arguments, "--pore", wish, read_pore)}) {
     if (!status) return status.error();
   }
-  if (porosity > 0) wish.porosity = porosity / 100;
-  if (darcy > 0) wish.permeability_m2 = darcy * segment::kDarcy;
-  const int wishes = (porosity > 0) + (darcy > 0) + wish.pore_width_mm.has_value();
+  const int wishes = arguments.has("--porosity") + arguments.has("--permeability") + arguments.has("--pore");
   if (wishes == 0) return Error{Fault::kUsage, "nothing is wished for; give --porosity, --permeability or --pore"};
   if (wishes == 3)
     return Error{Fault::kUsage, "--porosity, --permeability and --pore are more than a filling can follow; leave one out"};
   return wish;
 }
 
-std::string design_text(const DesignedJob& found) {
-  const segment::Settings& keys = found.design.settings;
-  const ForwardRun& forward = found.forward;
-  std::string text = fmt::format(
-      "lines     thick {:g} mm, thin {:g} mm, {} continuous line{} between segmented ones, S-C {:g}, C-C {:g} mm\n"
-      "laid at   {:g} % extrusion, thick {:g} %, thin {:g} % of the speed\n",
-      keys.thick_mm, keys.thin_mm, keys.continuous, keys.continuous == 1 ? "" : "s", *keys.spacing_sc_mm, *keys.spacing_cc_mm,
-      keys.thick_extrusion, *keys.thick_speed, keys.thin_speed);
-  text += fmt::format("porosity  {:.2f} %, {:.2f} % leads through along z\n", 100 * forward.porosity,
-                      100 * forward.porosity_through);
-  text +=
-      fmt::format("along z   k1 {:.4g} +- {:.2g} D ({:.4e} m2), throat {:.3f} mm\n", forward.permeability_m2 / segment::kDarcy,
-                  forward.permeability_error_m2 / segment::kDarcy, forward.permeability_m2, found.design.slots.throat_mm);
-  text += fmt::format("pores     {:.3f} x {:.2f} mm\n", forward.pore_width_mm, forward.pore_length_mm);
-  text +=
-      "sure      +- is of the voxels; plans of this kind have lain within a factor of 1.5 of measured k1, 2.5 points of\n"
-      "          measured porosity (bench/pores.md)\n";
-  if (!found.widths.empty()) text += fmt::format("widths    {}\n", found.widths);
-  if (!forward.resolved) text += "note      voxels are too coarse for the pores; take a smaller --voxel\n";
-  for (const std::string& line : found.outside) text += fmt::format("beyond    {}\n", line);
-  if (found.outside.empty()) text += "beyond    nothing: lengths, gaps and extrusion are those that were measured\n";
-  return text + fmt::format("checked   by {} forward run{}; the wish is met within {:.1f} %\n", found.runs,
-                            found.runs == 1 ? "" : "s", 100 * found.miss);
+/// The regions of a gradient. errors  kUsage
+Result<std::vector<segment::WishStep>> read_steps(const Arguments& arguments, const WishEnds& wish) {
+  if (arguments.has("--tops") && (arguments.has("--height") || arguments.has("--steps")))
+    return Error{Fault::kUsage, "--tops says all regions, --height and --steps make equal ones; give one of the two"};
+  const auto profile = designable_extruder(arguments.text("--machine"));
+  if (!profile) return profile.error();
+  const double layer_mm = profile->calibration.height_mm;
+  std::vector<double> tops_mm;
+  double height = 0;
+  std::uint32_t steps = 5;
+  for (const Status& status :
+       {arguments.read("--height", {0.1, 1000, " mm"}, height), arguments.read("--steps", {2, segment::kMostRegions}, steps)}) {
+    if (!status) return status.error();
+  }
+  if (arguments.has("--tops")) {
+    const std::string asked = arguments.text("--tops");
+    for (const std::string_view top : split(asked, ",")) {
+      if (const std::string wrong = read_number(top, 0.1, 1000, " mm", tops_mm.emplace_back()); !wrong.empty())
+        return at_option("--tops", wrong).error();
+    }
+  } else if (!arguments.has("--height")) {
+    return Error{Fault::kUsage, "a gradient needs the part's height; give --height MM, or --tops MM,MM,... of its regions"};
+  }
+  const bool equal = tops_mm.empty();
+  auto tops = equal ? segment::equal_tops(height, steps, layer_mm) : segment::whole_tops(tops_mm, layer_mm);
+  if (!tops) return at_option(equal ? "--steps" : "--tops", tops.error().message).error();
+  if (const double most = profile->machine.bed.build_height_mm; tops->back() > most)
+    return at_option(equal ? "--height" : "--tops", fmt::format("{:g} mm is higher than the {:g} mm that {} builds",
+                                                                tops->back(), most, profile->machine.name))
+        .error();
+  return segment::steps_of(wish.bottom, wish.top, *tops);
 }
 
-Json design_json(const DesignedJob& found, const std::string& output) {
-  const segment::Settings& keys = found.design.settings;
-  const ForwardRun& forward = found.forward;
-  return {{"command", "design"},
-          {"met", found.met},
-          {"miss", found.miss},
-          {"job", output},
-          {"segment",
-           {{"thick_mm", keys.thick_mm},
-            {"thin_mm", keys.thin_mm},
-            {"continuous_lines", keys.continuous},
-            {"spacing_sc_mm", *keys.spacing_sc_mm},
-            {"spacing_cc_mm", *keys.spacing_cc_mm},
-            {"thick_extrusion_percent", keys.thick_extrusion},
-            {"thick_speed_percent", *keys.thick_speed},
-            {"thin_speed_percent", keys.thin_speed}}},
-          {"porosity", forward.porosity},
-          {"porosity_through", forward.porosity_through},
-          {"k1_darcy", forward.permeability_m2 / segment::kDarcy},
-          {"k1_error_darcy", forward.permeability_error_m2 / segment::kDarcy},
-          {"k1_m2", forward.permeability_m2},
-          {"resolved", forward.resolved},
-          {"throat_mm", found.design.slots.throat_mm},
-          {"pore_mm", {forward.pore_width_mm, forward.pore_length_mm}},
-          {"runs", found.runs},
-          {"k1_over_slots", found.model_ratio},
-          {"widths", found.widths},
-          {"beyond_measured", found.outside}};
+Result<DesignRequest> read_request(const Arguments& arguments) {
+  DesignRequest request;
+  request.machine = arguments.text("--machine");
+  double voxel = 10;
+  if (const Status status = arguments.read("--voxel", {1, 50, " um"}, voxel); !status) return status.error();
+  request.grid = {voxel, 2 * voxel, voxel, request.grid.places};
+  return request;
 }
 
-/// What the nearest is, of what was wished.
-std::string nearest_text(const segment::PoreWish& wish, const DesignedJob& found) {
-  const ForwardRun& forward = found.forward;
-  std::string text;
-  const auto add = [&](bool wished, const std::string& part) {
-    if (wished) text += (text.empty() ? "" : ", ") + part;
-  };
-  add(wish.porosity.has_value(), fmt::format("--porosity {:.2f}", 100 * forward.porosity));
-  add(wish.permeability_m2.has_value(), fmt::format("--permeability {:.4g}", forward.permeability_m2 / segment::kDarcy));
-  add(wish.pore_width_mm.has_value(), fmt::format("--pore {:.3f}x{:.2f}", forward.pore_width_mm, forward.pore_length_mm));
-  return text;
+/// Tells what was found and writes it, if it is met or the nearest will do. missed  of the error else
+template <class Found>
+Outcome give_found(const Found& found, const std::string& missed, const Arguments& arguments, Context& context) {
+  const std::string output = arguments.text("-o,--output");
+  if (!arguments.has("--quiet")) context.say_text(as_text(found));
+  const bool enough = found.met || arguments.has("--nearest"), written = !output.empty() && enough;
+  if (written) {
+    if (const Status status = write::write_file(output, found.toml); !status) return status;
+  }
+  if (arguments.has("--json")) {
+    if (const Status status = context.give(as_json(found, written ? output : "")); !status) return status;
+  }
+  if (enough) return {};
+  return Error{Fault::kVerification, fmt::format("not reachable: {}; write it with --nearest", missed)};
 }
 
 Outcome run_design(const Arguments& arguments, Context& context) {
   if (!arguments.has("--machine"))
     return Error{Fault::kUsage, "--machine is missing; name an extrusion printer, as lamina extrude takes it"};
-  const auto wish = read_pore_wish(arguments);
+  const auto wish = read_wish(arguments);
   if (!wish) return wish.error();
-  DesignRequest request;
-  request.machine = arguments.text("--machine");
-  request.wish = *wish;
-  double voxel = 10;
-  if (const Status status = arguments.read("--voxel", {1, 50, " um"}, voxel); !status) return status;
-  request.grid = {voxel, 2 * voxel, voxel, request.grid.places};
-  const std::string output = arguments.text("-o,--output");
+  auto request = read_request(arguments);
+  if (!request) return request.error();
+  if (const Status status = check_folder("-o", arguments.text("-o,--output")); !status) return status;
   const std::atomic<bool>& cancel = context.cancel();
+  const auto go_on = [&](double) { return !cancel; };
+  if (wish->gradient) {
+    const auto steps = read_steps(arguments, *wish);
+    if (!steps) return steps.error();
+    keep_on_signals();
+    const auto found = design_gradient(*request, *steps, go_on);
+    if (!found) return found.error();
+    return give_found(*found, segment::missed_text(*found), arguments, context);
+  }
+  for (const char* flag : {"--height", "--steps", "--tops"})
+    if (arguments.has(flag)) return at_option(flag, "is of a gradient, and none is wished for, as in --porosity 20:26");
+  request->wish = wish->bottom;
   keep_on_signals();
-  const auto found = design_job(request, [&](double) { return !cancel; });
+  const auto found = design_job(*request, go_on);
   if (!found) return found.error();
-  if (!arguments.has("--quiet")) context.say_text(design_text(*found));
-  const bool written = !output.empty() && (found->met || arguments.has("--nearest"));
-  if (written) {
-    if (const Status status = write::write_file(output, found->toml); !status) return status;
-  }
-  if (arguments.has("--json")) {
-    if (const Status status = context.give(design_json(*found, written ? output : "")); !status) return status;
-  }
-  if (found->met || arguments.has("--nearest")) return {};
-  return Error{Fault::kVerification,
-               fmt::format("not reachable: nearest is {}, which misses the wish by {:.0f} %; write it with "
-                           "--nearest",
-                           nearest_text(*wish, *found), 100 * found->miss)};
+  return give_found(*found,
+                    fmt::format("nearest is {}, which misses the wish by {:.0f} %",
+                                segment::nearest_text(request->wish, *found), 100 * found->miss),
+                    arguments, context);
 }
 
 }  // namespace

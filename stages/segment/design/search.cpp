@@ -37,13 +37,27 @@ std::array<double, 4> misses(const PoreWish& wish, const Slots& slots, const Por
 
 class Search {
  public:
-  Search(const PoreWish& wish, const DesignLimits& limits, const SlotRatio& ratio)
-      : wish_(wish), limits_(limits), ratio_(ratio), layer_mm_(limits.calibration().height_mm) {}
+  Search(const PoreWish& wish, const DesignLimits& limits, const SlotRatio& ratio, std::span<const RatioAt> known)
+      : wish_(wish), limits_(limits), ratio_(ratio), known_(known), layer_mm_(limits.calibration().height_mm) {}
 
-  Slots corrected(const Segmentation& plan) const {
+  SlotRatio ratio_at(const Choice& choice) const {
+    const Free here = free_of(choice);
+    double weights = kFarWeight, porosity = kFarWeight * std::log(ratio_.porosity),
+           permeability = kFarWeight * std::log(ratio_.permeability);
+    for (const RatioAt& at : known_) {
+      const double lines = static_cast<double>(choice.continuous) - at.choice.continuous;
+      const double weight = 1 / ((free_of(at.choice) - here).squaredNorm() + lines * lines + kSamePlan);
+      weights += weight;
+      porosity += weight * std::log(at.ratio.porosity);
+      permeability += weight * std::log(at.ratio.permeability);
+    }
+    return {std::exp(porosity / weights), std::exp(permeability / weights)};
+  }
+
+  Slots corrected(const Segmentation& plan, const SlotRatio& ratio) const {
     Slots slots = slots_of(limits_.laid(plan), layer_mm_);
-    slots.porosity *= ratio_.porosity;
-    slots.permeability_m2 *= ratio_.permeability;
+    slots.porosity *= ratio.porosity;
+    slots.permeability_m2 *= ratio.permeability;
     return slots;
   }
 
@@ -91,7 +105,8 @@ class Search {
     design.choice = choice;
     design.settings = limits_.settings_of(choice);
     if (const Result<Segmentation> plan = limits_.plan_of(design.settings)) design.plan = *plan;
-    design.slots = corrected(design.plan);
+    design.ratio = ratio_at(choice);
+    design.slots = corrected(design.plan, design.ratio);
     design.pores = predict_pores(design.plan);
     design.miss = miss_of(wish_, design.slots, design.pores);
     for (const double part : limits_.beyond(choice)) design.beyond += part * part;
@@ -101,6 +116,7 @@ class Search {
 
  private:
   static constexpr double kAside = 1e-3;
+  static constexpr double kFarWeight = 0.1, kSamePlan = 1e-3;  // in units of what is free
 
   /// Not rounded to what is written.
   Residuals residuals(const Choice& choice) const {
@@ -114,7 +130,7 @@ class Search {
     const Result<Segmentation> plan = limits_.plan_of(settings);
     if (!plan) return Residuals::Constant(1e6);
     Residuals all;
-    const auto wished = misses(wish_, corrected(*plan), predict_pores(*plan));
+    const auto wished = misses(wish_, corrected(*plan, ratio_at(choice)), predict_pores(*plan));
     const auto beyond = limits_.beyond(choice);
     for (int i = 0; i < 4; ++i) {
       all[i] = wished[static_cast<std::size_t>(i)] / kExact;
@@ -126,6 +142,7 @@ class Search {
   const PoreWish& wish_;
   const DesignLimits& limits_;
   SlotRatio ratio_;
+  std::span<const RatioAt> known_;
   double layer_mm_;
 };
 
@@ -143,11 +160,12 @@ double miss_of(const PoreWish& wish, const Slots& slots, const Pores& pores) {
   return worst;
 }
 
-Design search(const PoreWish& wish, const DesignLimits& limits, const SlotRatio& ratio) {
-  const Search finder(wish, limits, ratio);
+Design search(const PoreWish& wish, const DesignLimits& limits, const SlotRatio& ratio, const LineBounds& bounds,
+              std::span<const RatioAt> known) {
+  const Search finder(wish, limits, ratio, known);
   const Interval extrusion = limits.extrusion();
   std::optional<Design> best;
-  for (std::uint32_t lines = 1; lines <= DesignLimits::kMostContinuous; ++lines) {
+  for (std::uint32_t lines = bounds.least; lines <= bounds.most; ++lines) {
     for (const double share : {0.5, 0.0, 1.0}) {
       for (const double thick : {1.5, 1.1, 2.2}) {
         const double percent = extrusion.least + share * (extrusion.most - extrusion.least);

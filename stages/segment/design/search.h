@@ -3,6 +3,7 @@
 
 #include <array>
 #include <optional>
+#include <span>
 
 #include "stages/segment/design/limits.h"
 #include "stages/segment/design/slots.h"
@@ -21,11 +22,23 @@ struct SlotRatio {
   double porosity = 1, permeability = 1;
 };
 
+/// The same of one plan.
+struct RatioAt {
+  Choice choice;
+  SlotRatio ratio;
+};
+
+/// How many continuous lines may lie between two segmented ones.
+struct LineBounds {
+  std::uint32_t least = 1, most = DesignLimits::kMostContinuous;
+};
+
 struct Design {
   Choice choice;
   Settings settings;  // its keys
   Segmentation plan;
   Slots slots;  // with the ratios
+  SlotRatio ratio;
   Pores pores;
   double miss = 0;    // of the wish that is met worst: relative
   double beyond = 0;  // what was measured: length of DesignLimits::beyond()
@@ -38,8 +51,12 @@ double miss_of(const PoreWish& wish, const Slots& slots, const Pores& pores);
 /// misses it least (sum of squared logarithms). Nothing is random: least squares (Levenberg and Marquardt, within bounds)
 /// from a grid of beginnings for each number of continuous lines.
 /// wish    at least one; positive
+/// ratio   of plans far from all that are known; near to these the ratio is theirs: a mean of logarithms, weighted with inverse
+///         squares of distances (D. Shepard, "A two-dimensional interpolation function for irregularly-spaced data", Proc. 23rd
+///         ACM National Conference, 1968)
 /// source  K. Levenberg, "A method for the solution of certain non-linear problems in least squares", Q. Appl. Math. 2 (1944)
 /// cost    some 10,000 calls of slots_of(), a fifth of a second
-Design search(const PoreWish& wish, const DesignLimits& limits, const SlotRatio& ratio);
+Design search(const PoreWish& wish, const DesignLimits& limits, const SlotRatio& ratio, const LineBounds& bounds = {},
+              std::span<const RatioAt> known = {});
 
 }  // namespace lamina::segment

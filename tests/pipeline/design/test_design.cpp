@@ -1,9 +1,9 @@
-// tests/pipeline/calibrate/test_design.cpp: a wish becomes a job whose forward run meets it.
+// tests/pipeline/design/test_design.cpp: a wish becomes a job whose forward run meets it.
 #include <gtest/gtest.h>
 
 #include <cmath>
 
-#include "pipeline/calibrate/design.h"
+#include "pipeline/design/design.h"
 #include "pipeline/job/file.h"
 #include "stages/data/text/json.h"
 #include "tests/commands/program.h"
@@ -61,7 +61,7 @@ TEST(DesignedJob, WhatIsOutOfReachIsToldWithTheNearest) {
   ASSERT_TRUE(found.ok());
   EXPECT_FALSE(found->met);
   EXPECT_LE(found->runs, 2u) << "a further search finds the same";
-  EXPECT_GT(found->forward.porosity, 0.25);
+  EXPECT_GT(found->forward.porosity, 0.24) << "the most open plan, of which no volume is left out";
   EXPECT_LT(found->forward.porosity, 0.4);
   EXPECT_FALSE(found->outside.empty());
 }

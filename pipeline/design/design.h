@@ -1,4 +1,4 @@
-// pipeline/calibrate/design.h: the job of segmented lines whose pores are as wished.
+// pipeline/design/design.h: the job of segmented lines whose pores are as wished.
 #pragma once
 
 #include <cstdint>
@@ -6,9 +6,10 @@
 #include <string>
 #include <vector>
 
-#include "pipeline/calibrate/forward_run.h"
+#include "pipeline/design/forward_run.h"
+#include "stages/data/extruder.h"
 #include "stages/data/status.h"
-#include "stages/segment/design/search.h"
+#include "stages/segment/design/designed.h"
 
 namespace lamina::pipeline {
 
@@ -18,19 +19,16 @@ struct DesignRequest {
   double tolerance = 0.05;  // of what the forward run says of each wish, relative
   std::uint32_t most_runs = 20;
   ForwardGrid grid;
+  double near = 0.04;                   // a run that misses the wish by so little ends the search
+  segment::SlotRatio ratio{1, 0.85};    // as most plans have it: where the search begins
+  std::vector<segment::RatioAt> known;  // of forward runs with the same machine and grid
+  segment::LineBounds lines;
 };
 
-struct DesignedJob {
-  segment::Design design;  // as the corrected model says
-  ForwardRun forward;      // of this design
-  double miss = 0;         // of the wish that the forward run meets worst: relative
-  bool met = false;        // within the tolerance
-  std::uint32_t runs = 0;
-  double model_ratio = 1;            // k1 of the forward run / of the slots alone
-  std::vector<std::string> outside;  // what of the choice lies beyond what was measured, one line each
-  std::string widths;                // where the widths of beads come from
-  std::string toml;                  // of the job file
-};
+using segment::DesignedJob;
+
+/// The printer, if pores are designed for it. errors  kUsage, of --machine
+Result<ExtruderProfile> designable_extruder(const std::string& machine);
 
 /// Searches by slots (segment/design/slots.h), runs the plan forward, corrects the slots by what that says, and searches again
 /// until every wish is met, or the corrected slots say that none within the machine's limits meets them.

@@ -1,16 +1,15 @@
-#include "pipeline/calibrate/forward_run.h"
+#include "pipeline/design/forward_run.h"
 
 #include <fmt/format.h>
-#include <stdlib.h>
 
 #include <algorithm>
 #include <atomic>
 #include <cmath>
-#include <filesystem>
 
 #include "pipeline/calibrate/bead_rules.h"
 #include "pipeline/calibrate/bead_voxels.h"
 #include "pipeline/calibrate/window_choice.h"
+#include "pipeline/output/temporary_folder.h"
 #include "pipeline/run/run.h"
 #include "stages/data/text/json.h"
 #include "stages/write/file.h"
@@ -19,30 +18,7 @@
 namespace lamina::pipeline {
 namespace {
 
-namespace fs = std::filesystem;
-
 constexpr double kBlockMm = 12;  // a side: three periods and more, and walls around them
-
-/// A folder that is gone when it is left.
-class TemporaryFolder {
- public:
-  TemporaryFolder() {
-    std::error_code none;
-    std::string name = (fs::temp_directory_path(none) / "lamina_design_XXXXXX").string();
-    if (!none && mkdtemp(name.data()) != nullptr) path_ = name;
-  }
-  TemporaryFolder(const TemporaryFolder&) = delete;
-  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
-  ~TemporaryFolder() {
-    std::error_code ignored;
-    if (!path_.empty()) fs::remove_all(path_, ignored);
-  }
-  bool made() const { return !path_.empty(); }
-  std::string file(const char* name) const { return (fs::path(path_) / name).string(); }
-
- private:
-  std::string path_;
-};
 
 /// One period around the middle of the block, moved across the lines.
 Window window_of(const read::GcodeFile& file, const Pile::Layer& layer, const segment::Segmentation& plan,
@@ -63,11 +39,10 @@ Window window_of(const read::GcodeFile& file, const Pile::Layer& layer, const se
   return window;
 }
 
-/// Plans the block. returns  the mean length and width of its pores
-Result<std::array<double, 2>> lay_block(Job job, const TemporaryFolder& folder) {
-  if (!folder.made())
-    return Error{Fault::kOutput, "no temporary folder can be made; TMPDIR names the folder that they are made in"};
-  const std::string block = write::stl::block({kBlockMm, kBlockMm, 3 * job.layer_mm});
+/// Plans the block. returns  what is said of its pores
+Result<Json> lay_block(Job job, double height_mm, const TemporaryFolder& folder) {
+  if (const Status status = folder.status(); !status) return status.error();
+  const std::string block = write::stl::block({kBlockMm, kBlockMm, height_mm});
   if (const Status status = write::write_file(folder.file("block.stl"), block); !status) return status.error();
   job.parts = {{.path = folder.file("block.stl")}};
   job.output = folder.file("block.gcode");
@@ -76,40 +51,23 @@ Result<std::array<double, 2>> lay_block(Job job, const TemporaryFolder& folder) 
   const auto summary = run(
       job, Product::kMoves, [](const ProgressEvent&) {}, never);
   if (!summary) return summary.error();
-  std::array<double, 2> pore{};
-  if (summary->facts && summary->facts->contains("pores") && !summary->facts->at("pores").empty()) {
-    const auto& all = summary->facts->at("pores").front();
-    pore = {all.at("length_mm").get<double>(), all.at("width_mm").get<double>()};
-  }
-  return pore;
+  return summary->facts && summary->facts->contains("pores") ? summary->facts->at("pores") : Json::array();
 }
 
-}  // namespace
-
-Result<ForwardRun> run_forward(Job job, const std::string& machine, const segment::Segmentation& plan, const ForwardGrid& grid,
-                               const std::function<bool(double)>& tell) {
-  const TemporaryFolder folder;
-  const auto pore = lay_block(std::move(job), folder);
-  if (!pore) return pore.error();
-  const Result<read::GcodeFile> file = read::GcodeFile::open(folder.file("block.gcode"));
-  if (!file) return file.error();
-  const Result<Pile> pile = pile_of(*file);
-  if (!pile) return pile.error();
-  if (pile->layers.size() < 2) return Error{Fault::kInternal, "the block of a forward run has no layer in its middle"};
-  const Result<BeadRules> beads = bead_rules(*file, "", machine);
-  if (!beads) return beads.error();
+/// Voxels of a region, looked at in each place.
+Result<ForwardRun> look_at_region(const read::GcodeFile& file, const Pile& pile, const Pile::Layer& layer,
+                                  const bead::LayRules* rules, const ForwardRegion& region, const ForwardGrid& grid,
+                                  const std::function<bool(double)>& tell) {
   ForwardRun forward;
-  forward.pore_length_mm = pore->at(0);
-  forward.pore_width_mm = pore->at(1);
   FlowRequest request;
   request.axes = {false, false, true};
   request.tolerance = 1e-2;  // of the equations; k1 is within 0.1 % of what 1e-3 gives
   for (std::uint32_t i = 0; i < grid.places; ++i) {
     const double done = i / static_cast<double>(grid.places), part = 1.0 / grid.places;
-    const Window window = window_of(*file, pile->layers[1], plan, grid, done);
+    const Window window = window_of(file, layer, region.plan, grid, done);
     std::vector<VoxelStack> cut;
     for (const Window& in : {window, finer(window, kFiner), finer(with_half_as_many_voxels(window), kFiner)}) {
-      Result<VoxelStack> voxels = bead_voxels(*file, *pile, in, beads->rules ? &*beads->rules : nullptr);
+      Result<VoxelStack> voxels = bead_voxels(file, pile, in, rules);
       if (!voxels) return voxels.error();
       cut.push_back(std::move(*voxels));
     }
@@ -124,6 +82,48 @@ Result<ForwardRun> run_forward(Job job, const std::string& machine, const segmen
     forward.permeability_error_m2 += part * along.error_m2[2];
   }
   return forward;
+}
+
+}  // namespace
+
+Result<std::vector<ForwardRun>> run_forward(Job job, const std::string& machine, double height_mm,
+                                            const std::vector<ForwardRegion>& regions, const ForwardGrid& grid,
+                                            const std::function<bool(double)>& tell) {
+  const TemporaryFolder folder("design");
+  const auto pores = lay_block(std::move(job), height_mm, folder);
+  if (!pores) return pores.error();
+  const Result<read::GcodeFile> file = read::GcodeFile::open(folder.file("block.gcode"));
+  if (!file) return file.error();
+  const Result<Pile> pile = pile_of(*file);
+  if (!pile) return pile.error();
+  const Result<BeadRules> beads = bead_rules(*file, "", machine);
+  if (!beads) return beads.error();
+  std::vector<ForwardRun> all;
+  for (const ForwardRegion& region : regions) {
+    const std::int64_t z = std::llround(1e6 * region.middle_mm);
+    const auto layer = std::ranges::find_if(pile->layers, [&](const Pile::Layer& one) { return one.low <= z && z < one.high; });
+    if (layer == pile->layers.end())
+      return Error{Fault::kInternal, fmt::format("the block of a forward run has no layer at {:g} mm", region.middle_mm)};
+    const double done = static_cast<double>(all.size()), count = static_cast<double>(regions.size());
+    auto forward = look_at_region(*file, *pile, *layer, beads->rules ? &*beads->rules : nullptr, region, grid,
+                                  [&](double share) { return tell((done + share) / count); });
+    if (!forward) return forward.error();
+    for (const Json& laid : *pores) {
+      if (laid.at("heights").get<std::string>() != region.heights) continue;
+      forward->pore_length_mm = laid.at("length_mm").get<double>();
+      forward->pore_width_mm = laid.at("width_mm").get<double>();
+    }
+    all.push_back(*forward);
+  }
+  return all;
+}
+
+Result<ForwardRun> run_forward(Job job, const std::string& machine, const segment::Segmentation& plan, const ForwardGrid& grid,
+                               const std::function<bool(double)>& tell) {
+  const double layer_mm = job.layer_mm;
+  const auto all = run_forward(std::move(job), machine, 3 * layer_mm, {{plan, 1.5 * layer_mm, ""}}, grid, tell);
+  if (!all) return all.error();
+  return all->front();
 }
 
 }  // namespace lamina::pipeline
