@@ -50,11 +50,12 @@ Result<BeadRules> bead_rules(const read::GcodeFile& file, const std::string& bea
   if (printer) {
     BeadRules found{rules_of(*printer), fmt::format("widths are those that {} lays: lag {:g} s, {:g} mm/s2", printer->name,
                                                     printer->material.lag_s, printer->speed.acceleration_mm_s2)};
-    found.rules->spread = beads == "spread";
+    found.rules->spread = beads != "laid";
     return found;
   }
-  if (beads == "laid")
-    return Error{Fault::kUsage, "--beads laid: the file names no printer that is shipped; add --machine NAME"};
+  if (!beads.empty())
+    return Error{Fault::kUsage,
+                 fmt::format("--beads {}: the file names no printer that is shipped; add --machine NAME", beads)};
   return BeadRules{std::nullopt, told};
 }
 

@@ -15,8 +15,8 @@ struct BeadRules {
   std::string told;                     // for people: where widths come from
 };
 
-/// beads    "laid" by the model of a bead (docs/bead.md), "spread": the same, which spread along their lines too; "told" by the
-///          file; or "": laid where the printer is known
+/// beads    "spread": by the model of a bead (docs/bead.md); "laid": the same, which do not spread along their lines; "told" by
+///          the file; or "": spread where the printer is known
 /// machine  as --machine takes it; "": the one that the file names, if a profile of that name is shipped
 /// errors   kUsage: an unknown printer or word; "laid" or "spread" without a printer
 Result<BeadRules> bead_rules(const read::GcodeFile& file, const std::string& beads, const std::string& machine);

@@ -5,8 +5,9 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
+#include <vector>
 
-#include "stages/bead/contacts.h"
+#include "stages/bead/along.h"
 #include "stages/pores/period.h"
 #include "stages/raster/beads.h"
 
@@ -131,7 +132,7 @@ class LayerBeads {
     if (static_cast<double>(pieces_.size()) * rules_->piece_mm > kMostLaid * area_mm2)
       return Error{Fault::kInput,
                    fmt::format("layer {}: beads lie upon each other many times over; --beads told looks at them", layer.index)};
-    left_out_mm3_ += bead::find_contacts(pieces_, rules_->height_mm, sides_);
+    left_out_mm3_ += bead::flow_along(pieces_, rules_->height_mm, sides_);
     for (const bead::LaidPiece& p : pieces_)
       laid_mm3_ += p.area_mm2 * std::hypot((mm(p.to.x) - mm(p.from.x)), (mm(p.to.y) - mm(p.from.y)));
     return {};
@@ -162,19 +163,25 @@ class LayerBeads {
     return static_cast<std::int64_t>(1e6 * std::clamp(way, 10.0, 200.0));
   }
 
-  /// Beads far from the window lay nothing there, and the melt remembers nothing of them.
+  /// Beads far from the window, by the way along the line too, lay nothing there, and the melt remembers nothing of them.
   void keep_lines(Buffer<BeadFeed>& feeds) {
     const std::int64_t reach = memory(feeds);
+    keep_.assign(beads_.size(), false);
+    std::int64_t back = 0;  // nm: how far the melt remembers from a bead that is near
+    for (std::size_t i = beads_.size(); i-- > 0;) {
+      const LaidBead& bead = beads_[i];
+      const bool near = passes_near(window_.box, bead.from, bead.to, reach);
+      keep_[i] = near || back > 0;
+      const double length =
+          std::hypot(static_cast<double>(bead.to.x) - bead.from.x, static_cast<double>(bead.to.y) - bead.from.y);
+      back = near ? reach : back - std::llround(length);
+    }
     std::size_t kept = 0;
-    bool whole = true;
     for (std::size_t i = 0; i < beads_.size(); ++i) {
-      const bool near = passes_near(window_.box, beads_[i].from, beads_[i].to, reach);
-      if (near) {
-        feeds[kept] = feeds[i];
-        feeds[kept].joined = feeds[i].joined && whole && kept > 0;
-        beads_[kept++] = beads_[i];
-      }
-      whole = near;
+      if (!keep_[i]) continue;
+      feeds[kept] = feeds[i];
+      feeds[kept].joined = feeds[i].joined && i > 0 && keep_[i - 1];
+      beads_[kept++] = beads_[i];
     }
     beads_.resize(kept);
     feeds.resize(kept);
@@ -183,6 +190,7 @@ class LayerBeads {
   const Window& window_;
   std::optional<bead::LayRules> rules_;
   Buffer<LaidBead> beads_;
+  std::vector<bool> keep_;
   Buffer<bead::LaidPiece> pieces_;
   Buffer<bead::PieceSides> sides_;
   std::int64_t height_ = 1;

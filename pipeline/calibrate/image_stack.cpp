@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <fstream>
 #include <memory>
 
 #include "pipeline/check/job_files.h"
@@ -17,6 +18,15 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::int64_t kMostSlices = 4'000'000;
+
+/// The first thing that a manifest of lamina tells is which lamina wrote it.
+bool begun_by_lamina(const std::string& path) {
+  std::ifstream file(path, std::ios::binary);
+  std::string head;
+  for (char c = 0; head.size() < 10 && file.get(c);)
+    if (c != ' ' && c != '\n' && c != '\r') head += c;
+  return head == "{\"lamina\":";
+}
 
 /// Voxels along z: as thick as the thinnest layer, from the bottom of the first to the top of the last.
 void slice_layers(const std::vector<LayerRecord>& layers, ImageStack& stack) {
@@ -65,12 +75,14 @@ Result<ImageStack> stack_of_job(const std::string& folder) {
 
 }  // namespace
 
+bool has_manifest(const std::string& folder) {
+  return begun_by_lamina(folder + "/manifest.json") || begun_by_lamina(folder + "/manifest.json.part");
+}
+
 Result<ImageStack> open_stack(const std::string& folder, const StackRequest& request) {
-  std::error_code ignored;
-  const std::string manifest = folder + "/manifest.json";
-  if (!fs::exists(manifest, ignored) && fs::exists(manifest + ".part", ignored))
-    return Error{Fault::kInput, folder + ": the job is not finished; end it with --resume first"};
-  return fs::exists(manifest, ignored) ? stack_of_job(folder) : read::stack_of_images(folder, request);
+  if (begun_by_lamina(folder + "/manifest.json")) return stack_of_job(folder);
+  if (has_manifest(folder)) return Error{Fault::kInput, folder + ": the job is not finished; end it with --resume first"};
+  return read::stack_of_images(folder, request);
 }
 
 Result<StackWindow> window_of_stack(const ImageStack& stack, const WindowWish& wish, const std::array<bool, 3>& periodic) {

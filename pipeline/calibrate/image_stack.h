@@ -14,6 +14,9 @@ namespace lamina::pipeline {
 using read::ImageStack;
 using read::StackRequest;
 
+/// Whether a folder has a manifest that lamina began; one of another program says nothing of images.
+bool has_manifest(const std::string& folder);
+
 /// A folder that lamina jet wrote, by its manifest, or one of numbered images.
 /// errors  of stack_of_images(); kInput: the job is not finished, or wrote no images
 Result<ImageStack> open_stack(const std::string& folder, const StackRequest& request);

@@ -5,6 +5,7 @@
 #include <filesystem>
 
 #include "pipeline/calibrate/bead_rules.h"
+#include "pipeline/calibrate/pore_drawing.h"
 #include "stages/data/text/readable.h"
 #include "stages/pores/throat.h"
 #include "stages/segment/predict.h"  // the gap that bonds
@@ -74,7 +75,7 @@ bool names_toolpaths(const std::string& path) {
   return ending == ".gcode" || ending == ".gco" || ending == ".g" || ending == ".nc";
 }
 
-Result<LaidPrint> look_at_print(const std::string& path, double density_g_cm3) {
+Result<LaidPrint> look_at_print(const std::string& path, double density_g_cm3, Plot* sections) {
   const Result<read::GcodeFile> file = read::GcodeFile::open(path);
   if (!file) return file.error();
   const Result<Pile> pile = pile_of(*file);
@@ -85,12 +86,13 @@ Result<LaidPrint> look_at_print(const std::string& path, double density_g_cm3) {
   print.density_g_cm3 = density_g_cm3 > 0 ? density_g_cm3 : file->density_g_cm3();
   print.layers = static_cast<std::uint32_t>(pile->layers.size());
   WindowWish wish{kVoxelUm, {}};
+  const auto of_file = [&](const Error& error) { return Error{error.fault, path + ": " + error.message}; };
   Result<WindowChoice> choice = choose_window(*file, *pile, wish);
-  if (!choice) return choice.error();
+  if (!choice) return of_file(choice.error());
   if (const double many = static_cast<double>(choice->window.voxels()) / kMostVoxels; many > 1) {
     wish.voxel_um *= std::cbrt(many);
     choice = choose_window(*file, *pile, wish);
-    if (!choice) return choice.error();
+    if (!choice) return of_file(choice.error());
   }
   print.choice = std::move(*choice);
   Result<BeadRules> beads = bead_rules(*file, "", "");
@@ -115,6 +117,11 @@ Result<LaidPrint> look_at_print(const std::string& path, double density_g_cm3) {
   if (!look) return look.error();
   print.look = std::move(*look);
   print.pores.throat_mm = print.look.throat_mm;
+  if (sections != nullptr) {
+    Result<Plot> plot = draw_window(path, print.choice, print.pores, *voxels, &*file, &*pile);
+    if (!plot) return plot.error();
+    *sections = std::move(*plot);
+  }
   return print;
 }
 

@@ -9,6 +9,7 @@
 #include "pipeline/calibrate/predict_flow.h"
 #include "pipeline/calibrate/window_choice.h"
 #include "pipeline/run/summary.h"
+#include "stages/data/picture/plot.h"
 #include "stages/pores/bonds.h"
 #include "stages/pores/sizes.h"
 #include "stages/pores/tortuosity.h"
@@ -56,14 +57,19 @@ struct LaidPrint {
   LaidLook look;
 };
 /// density_g_cm3  of the filament; 0: what the file tells
+/// sections       none, or where a picture of the window goes
 /// errors         kInput: no layer above the bed; of GcodeFile::open(), choose_window() and bead_voxels()
 /// cost           reads the file, and some twenty of its layers once more; about a second at 8 million voxels
-Result<LaidPrint> look_at_print(const std::string& path, double density_g_cm3);
+Result<LaidPrint> look_at_print(const std::string& path, double density_g_cm3, Plot* sections = nullptr);
 std::string as_text(const LaidPrint& print);
 nlohmann::ordered_json as_json(const LaidPrint& print);
 
-/// The same for a page; "" of other files, of those above 16 MB, and where nothing can be said.
-std::string laid_text(const std::string& path);
+/// The same for a page, with sections of the window as SVG; "" of other files, of those above 16 MB, and where nothing can be
+/// said.
+struct LaidPage {
+  std::string text, svg;
+};
+LaidPage laid_page(const std::string& path);
 
 /// Adds four lines and an object "laid" to the summary of a job that wrote toolpaths; none for other files, and for those above
 /// 16 MB, of which lamina info tells the same in more than a second.

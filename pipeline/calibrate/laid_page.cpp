@@ -12,6 +12,7 @@
 #include "stages/data/text/json.h"
 #include "stages/data/text/readable.h"
 #include "stages/segment/predict.h"
+#include "stages/write/plot.h"
 
 namespace lamina::pipeline {
 namespace {
@@ -141,11 +142,12 @@ nlohmann::ordered_json as_json(const LaidPrint& print) {
   return json;
 }
 
-std::string laid_text(const std::string& path) {
+LaidPage laid_page(const std::string& path) {
   std::error_code ignored;
   if (!names_toolpaths(path) || !fs::is_regular_file(path, ignored) || fs::file_size(path, ignored) > kMostBytes) return {};
-  const Result<LaidPrint> print = look_at_print(path, 0);
-  return print ? as_text(*print) : std::string();
+  Plot sections;
+  const Result<LaidPrint> print = look_at_print(path, 0, &sections);
+  return print ? LaidPage{as_text(*print), write::plot_svg(sections)} : LaidPage();
 }
 
 void add_pores(const std::string& path, Summary& summary) {

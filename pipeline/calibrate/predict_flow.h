@@ -10,6 +10,7 @@
 #include "stages/data/voxels.h"
 #include "stages/pores/porosity.h"
 #include "stages/pores/surface.h"
+#include "stages/stokes/section.h"
 
 namespace lamina::pipeline {
 
@@ -40,6 +41,7 @@ struct PoreReport {
   double surface_per_mm = 0;                 // mm2 in a mm3
   std::array<double, 3> throat_mm{};         // the largest ball that passes along x, y, z; 0: none does
   std::array<std::optional<Darcy>, 3> flow;  // along the axes that were asked for
+  std::optional<stokes::Section> section;    // along z, or where nothing leads through along it, of the largest k1
 };
 
 struct FlowRequest {
@@ -47,6 +49,7 @@ struct FlowRequest {
   double tolerance = 1e-4;
   std::uint64_t memory_bytes = std::uint64_t{1} << 30;
   bool inertia = false;  // counts its memory too
+  bool section = false;  // velocities of a picture, over the mean of the whole cross-section
 };
 
 /// Along axes that do not repeat, walls close the sides of the window, and fluid stands before its ends.

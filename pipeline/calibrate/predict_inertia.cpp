@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "stages/stokes/canonical.h"
 #include "stages/stokes/sweep.h"
 
 namespace lamina::pipeline {
@@ -14,8 +15,11 @@ constexpr std::uint32_t kPoints = 6;
 Result<Forchheimer> sweep_through(const VoxelView& box, double surface_per_mm, const std::function<bool(double)>& tell) {
   const VoxelStack longer = box.periodic[2] ? VoxelStack() : with_fluid_at_ends(box, 2);
   const VoxelView used = box.periodic[2] ? box : longer.view();
-  const Result<stokes::Grid> grid = stokes::make_grid(used, kFiner, kFlowLevels);
+  Result<stokes::Canonical> canonical = stokes::Canonical::of(used, 2, false);
+  if (!canonical) return canonical.error();
+  const Result<stokes::Grid> grid = stokes::make_grid(canonical->view(), kFiner, kFlowLevels);
   if (!grid) return grid.error();
+  canonical->forget_voxels();
   const segment::Fluid fluid;
   const double h = grid->cells.unit_m, velocity = fluid.viscosity_pa_s / (fluid.density_kg_m3 * h);
   const double gradient = velocity * fluid.viscosity_pa_s / (h * h) * used.nz / box.nz;
@@ -24,7 +28,8 @@ Result<Forchheimer> sweep_through(const VoxelView& box, double surface_per_mm, c
   stokes::InertiaOptions options;
   options.tolerance = 1e-3;
   options.progress = [&](std::uint32_t, double) { return tell(0); };
-  const auto points = stokes::sweep(*grid, 2, kMostReynolds / (result.reynolds_per_velocity * velocity), kPoints, options);
+  const auto points = stokes::sweep(*grid, stokes::Canonical::kAxis, kMostReynolds / (result.reynolds_per_velocity * velocity),
+                                    kPoints, options);
   if (!points) return points.error();
   for (const stokes::SweepPoint& point : *points) {
     result.settled = result.settled && point.settled;

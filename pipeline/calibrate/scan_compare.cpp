@@ -58,6 +58,10 @@ Result<ScanComparison> compare_with_scan(const read::GcodeFile& file, const Pile
     return Error{Fault::kUsage, "--range: above 16 the window has to be 16 voxels thick at least; give a larger --window"};
   const Result<VoxelStack> plan = bead_voxels(file, pile, *window, rules);
   if (!plan) return plan.error();
+  if (set_voxels(*plan) == 0)
+    return Error{Fault::kInput,
+                 "no bead lies in the middle of the print, where it is compared with the scan; take a --window "
+                 "that reaches them, or a file of one part"};
   std::array<std::uint32_t, 3> low{}, count{};
   for (std::size_t a = 0; a < 3; ++a) {
     count[a] = window->count[a] + 2 * range;

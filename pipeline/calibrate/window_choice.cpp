@@ -9,14 +9,27 @@ namespace lamina::pipeline {
 
 namespace {
 
-constexpr std::int64_t kLeastSide = 1000;        // nm
+constexpr std::int64_t kLeastSide = 1000;  // nm
+/// The layers [first, last) of a part, of all without one; one at least.
+std::array<std::uint32_t, 2> layers_of(const Pile& pile, const std::optional<Box>& part) {
+  const auto count = static_cast<std::uint32_t>(pile.layers.size());
+  if (!part) return {0, count};
+  std::uint32_t first = 0, last = count;
+  const auto middle = [&](std::uint32_t i) { return (pile.layers[i].low + pile.layers[i].high) / 2; };
+  while (first + 1 < last && middle(first) < part->lo.z) ++first;
+  while (last > first + 1 && middle(last - 1) > part->hi.z) --last;
+  return {first, last};
+}
+
 constexpr std::int64_t kSameAllAlong = 150'000;  // nm: the least length that find_repeat() gives
 
 }  // namespace
 
 Result<WindowChoice> choose_window(const read::GcodeFile& file, const Pile& pile, const WindowWish& wish) {
-  const auto middle_layer = static_cast<std::uint32_t>(pile.layers.size() / 2);
-  const Point3 middle = file.box().middle();
+  const Box& print = wish.part ? *wish.part : file.box();
+  const auto [bottom_layer, top_layer] = layers_of(pile, wish.part);
+  const std::uint32_t middle_layer = bottom_layer + (top_layer - bottom_layer) / 2;
+  const Point3 middle = print.middle();
   Result<Repeat> repeat = find_repeat(file, pile, {middle.x, middle.y}, middle_layer);
   if (!repeat) return repeat.error();
   // Where beads touch, the middle of a layer is the same all over: that tells nothing of the cusps above and below it.
@@ -26,13 +39,13 @@ Result<WindowChoice> choose_window(const read::GcodeFile& file, const Pile& pile
   std::array<std::int64_t, 2> side{};
   for (std::size_t a = 0; a < 2; ++a) {
     choice.window.periodic[a] = !asked && repeat->length[a] > 0;
-    const std::int64_t print = a == 0 ? file.box().width() : file.box().depth();
+    const std::int64_t most = a == 0 ? print.width() : print.depth();
     side[a] = asked                   ? std::llround(wish.size_mm[a] * 1e6)
               : repeat->length[a] > 0 ? repeat->length[a]
-                                      : std::min<std::int64_t>(2'000'000, print);
-    if (side[a] > print)
+                                      : std::min<std::int64_t>(2'000'000, most);
+    if (side[a] > most)
       return Error{Fault::kUsage, fmt::format("--window: {:.3f} mm along {} are more than the print has: {:.3f} mm",
-                                              mm(static_cast<Nm>(side[a])), "xy"[a], mm(static_cast<Nm>(print)))};
+                                              mm(static_cast<Nm>(side[a])), "xy"[a], mm(static_cast<Nm>(most)))};
   }
   if (std::min(side[0], side[1]) < kLeastSide)
     return Error{Fault::kInput, "the print is thinner than a micrometre: there is nothing to look at"};
@@ -40,7 +53,7 @@ Result<WindowChoice> choose_window(const read::GcodeFile& file, const Pile& pile
   choice.first_layer = middle_layer;
   const auto& layers = pile.layers;
   const std::int64_t low = layers[middle_layer].low;
-  const std::uint32_t most = static_cast<std::uint32_t>(layers.size()) - middle_layer;
+  const std::uint32_t most = top_layer - middle_layer;
   choice.layers = std::min(most, asked ? 1 : repeat->layers > 0 ? repeat->layers : 8);
   while (asked && choice.layers < most &&
          layers[middle_layer + choice.layers - 1].high - low < std::llround(wish.size_mm[2] * 1e6))

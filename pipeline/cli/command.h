@@ -34,6 +34,9 @@ class Context {
   /// Reports an error after which the command continues, such as one bad operand. returns  the exit code of the error
   virtual int complain(const Error& error) = 0;
 
+  /// How people know a file, where a call works on files that it made itself.
+  virtual std::string shown(const std::string& path) { return path; }
+
   // --- for scripts; errors  kOutput if writing fails; a closed pipe is not an error
   virtual Status print(std::string_view text) = 0;
   /// Prints a value as one line of JSON.

@@ -8,6 +8,7 @@
 #include <optional>
 #include <vector>
 
+#include "stages/data/text/readable.h"
 #include "stages/write/replaceable.h"
 #include "stages/write/voxels/image.h"
 
@@ -152,6 +153,14 @@ Status check_outputs(std::span<const InputFile> inputs, std::span<const std::str
                                             input.path, input.role, *found->output)};
   }
   return {};
+}
+
+Status check_folder(std::string_view flag, const std::string& file) {
+  const fs::path folder = fs::path(file).parent_path();
+  std::error_code ignored;
+  if (folder.empty() || fs::is_directory(folder, ignored)) return {};
+  return Error{Fault::kOutput, fmt::format("{} {}: there is no folder {}; make it or choose another place", flag,
+                                           one_line(file), one_line(folder.string()))};
 }
 
 Status check_own_file(const std::string& path, std::span<const std::string_view> marks) {

@@ -31,6 +31,9 @@ Status check_outputs(std::string_view command, const Arguments& arguments);
 /// The same for the files named in a job, by a job file or --set.
 Status check_outputs(const Arguments& arguments, const Job& job);
 
+/// Looks for the folder of a file before the work, not after it; "" and "-" have none. errors  kOutput
+Status check_folder(std::string_view flag, const std::string& file);
+
 /// Allows a file to be replaced if it is absent, empty or carries one of lamina's marks. errors  kUsage
 Status check_own_file(const std::string& path, std::span<const std::string_view> marks);
 

@@ -4,6 +4,7 @@
 
 #include <filesystem>
 
+#include "pipeline/cli/outputs.h"
 #include "stages/write/file.h"
 #include "stages/write/other_program.h"
 #include "stages/write/plot.h"
@@ -16,19 +17,20 @@ Status check_plot_name(const std::string& path) {
   if (name.extension() != ".svg" && name.extension() != ".png") {
     return Error{Fault::kUsage, fmt::format("--plot {}: plots are SVG or PNG; end the name with .svg or .png", path)};
   }
-  const std::filesystem::path folder = name.parent_path();
-  std::error_code ignored;
-  if (folder.empty() || std::filesystem::is_directory(folder, ignored)) return {};
-  return Error{Fault::kOutput,
-               fmt::format("--plot {}: there is no folder {}; make it or choose another place", path, folder.string())};
+  return check_folder("--plot", path);
+}
+
+Result<std::string> plot_text(const std::string& path, const Plot& plot) {
+  auto text = std::filesystem::path(path).extension() == ".svg"
+                  ? Result<std::string>(write::plot_svg(plot))
+                  : write::filter("lamina-preview", "--plot", write::plot_json(plot));
+  if (!text) return Error{text.error().fault, fmt::format("--plot {}: {}", path, text.error().message)};
+  return text;
 }
 
 Status write_plot(const std::string& path, const Plot& plot) {
-  const auto text = std::filesystem::path(path).extension() == ".svg"
-                        ? Result<std::string>(write::plot_svg(plot))
-                        : write::filter("lamina-preview", "--plot", write::plot_json(plot));
-  if (!text) return Error{text.error().fault, fmt::format("--plot {}: {}", path, text.error().message)};
-  return write::write_file(path, *text);
+  const auto text = plot_text(path, plot);
+  return text ? write::write_file(path, *text) : text.error();
 }
 
 }  // namespace lamina::pipeline

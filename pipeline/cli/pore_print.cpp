@@ -6,6 +6,7 @@
 
 #include "pipeline/calibrate/bead_rules.h"
 #include "pipeline/calibrate/laid_look.h"
+#include "pipeline/calibrate/pore_drawing.h"
 #include "pipeline/calibrate/pore_page.h"
 #include "pipeline/calibrate/predict_inertia.h"
 #include "pipeline/cli/pore_stack.h"
@@ -50,15 +51,24 @@ void say_doubts(const Pile& pile, const PoreReport& report, Context& context) {
   }
 }
 
+Error nothing_laid(const std::string& path, const Box& box) {
+  return {
+      Fault::kInput,
+      fmt::format("{}: no bead lies in the window of {:.3f} x {:.3f} x {:.3f} mm around {:.2f}, {:.2f} mm, the middle of the "
+                  "print; take a --window that reaches them, or a file of one part",
+                  path, mm(box.width()), mm(box.depth()), mm(box.height()), mm(box.middle().x), mm(box.middle().y))};
+}
+
 }  // namespace
 
-Outcome predict_print(const Arguments& arguments, Context& context) {
+Outcome predict_print(const Arguments& arguments, Context& context, const std::optional<Box>& part) {
   const std::string& path = arguments.operands.front();
   if (Status status = check_window_files(arguments); !status) return status;
   if (arguments.has("--inertia") && arguments.has("--no-flow"))
     return Error{Fault::kUsage, "--inertia does nothing beside --no-flow; leave one out"};
   FlowRequest request;
   request.inertia = arguments.has("--inertia");
+  request.section = arguments.has("--plot");
   if (Status status = arguments.read("--memory", read_bytes, request.memory_bytes); !status) return status.error();
   const Result<read::GcodeFile> file = read::GcodeFile::open(path);
   if (!file) return file.error();
@@ -69,10 +79,11 @@ Outcome predict_print(const Arguments& arguments, Context& context) {
   if (!beads) return beads.error();
   const bead::LayRules* rules = beads->rules ? &*beads->rules : nullptr;
   if (arguments.has("--scan")) return compare_scan(arguments, context, *file, *pile, rules);
-  const Result<WindowWish> wish = read_window_wish(arguments, 10);
+  Result<WindowWish> wish = read_window_wish(arguments, 10);
   if (!wish) return wish.error();
+  wish->part = part;
   const Result<WindowChoice> choice = choose_window(*file, *pile, *wish);
-  if (!choice) return choice.error();
+  if (!choice) return Error{choice.error().fault, fmt::format("{}: {}", path, choice.error().message)};
   // Ways and throats take that much; what the flow takes is looked at when its void is known.
   if (const std::uint64_t bytes = 16 * choice->window.voxels(); bytes > request.memory_bytes)
     return Error{Fault::kUsage, fmt::format("{}: {} voxels take {} at least, --memory allows {}; take a larger --voxel or a "
@@ -84,11 +95,11 @@ Outcome predict_print(const Arguments& arguments, Context& context) {
   const bool flows = !arguments.has("--no-flow");
   const auto cut = cut_for(flows, cut_window, choice->window);
   if (!cut) return cut.error();
+  const bool empty = set_voxels(cut->front()) == 0;
+  if (empty && flows) return nothing_laid(path, choice->window.box);
   if (left_out > 0.002)
     context.say(
         fmt::format("note: {:.1f} % of what is laid find no room beside their neighbours and are left out", 100 * left_out));
-  const auto files = write_window_files(arguments, cut->front());
-  if (!files) return files.error();
   const PoreRasters rasters{cut->front(), cut->at(flows ? 1 : 0), cut->at(flows ? 2 : 0)};
   const std::atomic<bool>& cancel = context.cancel();
   const Result<PoreReport> report =
@@ -98,6 +109,11 @@ Outcome predict_print(const Arguments& arguments, Context& context) {
   if (!inertia) return inertia.error();
   const Result<LaidLook> look = look_at_laid(*file, *pile, rasters.voxels, cut_window);
   if (!look) return look.error();
+  const auto files = write_window_files(arguments, rasters.voxels, [&] {
+    return draw_window(context.shown(path), *choice, *report, rasters.fine, &*file, &*pile);
+  });
+  if (!files) return files.error();
+  if (empty) context.say("note: " + nothing_laid(path, choice->window.box).message);
   say_doubts(*pile, *report, context);
   context.say(beads->told);
   if (!arguments.has("--json"))

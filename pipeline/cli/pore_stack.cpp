@@ -2,8 +2,7 @@
 
 #include <fmt/format.h>
 
-#include <cmath>
-
+#include "pipeline/calibrate/pore_drawing.h"
 #include "pipeline/calibrate/pore_page.h"
 #include "pipeline/calibrate/scan_compare.h"
 #include "pipeline/cli/window_files.h"
@@ -16,7 +15,7 @@ namespace {
 
 Result<StackRequest> read_request(const Arguments& arguments) {
   StackRequest request;
-  double threshold = 128;
+  std::int64_t threshold = request.threshold;
   for (const Status& status :
        {arguments.read("--pixel", {0.05, 1000}, request.pixel_um), arguments.read("--layer-um", {0.05, 5000}, request.layer_um),
         arguments.read("--threshold", {1, 255}, threshold)}) {
@@ -25,6 +24,18 @@ Result<StackRequest> read_request(const Arguments& arguments) {
   request.threshold = static_cast<int>(threshold);
   request.dark = arguments.has("--dark");
   return request;
+}
+
+/// The folder's images by its manifest, or by the options. errors  kUsage: both
+Result<ImageStack> open_images(const std::string& folder, const Arguments& arguments) {
+  const Result<StackRequest> request = read_request(arguments);
+  if (!request) return request.error();
+  for (const char* flag : {"--pixel", "--layer-um", "--threshold", "--dark"}) {
+    if (arguments.has(flag) && has_manifest(folder))
+      return Error{Fault::kUsage, fmt::format("{} is for images without a manifest; that of {} tells it, leave it out", flag,
+                                              one_line(folder))};
+  }
+  return open_stack(folder, *request);
 }
 
 Result<std::array<bool, 3>> read_periodic(const Arguments& arguments) {
@@ -44,7 +55,7 @@ std::vector<OptionSpec> stack_options() {
   return {
       {"--pixel", "UM", "of images without a manifest: edge of a pixel, micrometres", "", "Images"},
       {"--layer-um", "UM", "of images without a manifest: distance of layers; default: a pixel", "", "Images"},
-      {"--threshold", "N", "from which grey on a pixel is bright, of 255", "128", "Images"},
+      {"--threshold", "N", "of images without a manifest: from which grey on a pixel is bright, of 255", "128", "Images"},
       {"--dark", "", "dark pixels of images without a manifest are the solid, not the bright ones", "", "Images"},
       {"--periodic", "AXES", "along which the window repeats, as in xy; else walls close its sides", "", "Images"},
       {"--scan", "DIR", "of a print of these toolpaths: images to be found in the plan, and compared with it", "", "Images"},
@@ -70,24 +81,29 @@ Outcome predict_stack(const Arguments& arguments, Context& context) {
   const std::string& folder = arguments.operands.front();
   FlowRequest flow;
   if (Status status = check_window_files(arguments); !status) return status;
+  flow.section = arguments.has("--plot");
   if (Status status = arguments.read("--memory", read_bytes, flow.memory_bytes); !status) return status;
-  const Result<StackRequest> request = read_request(arguments);
-  if (!request) return request.error();
   const Result<std::array<bool, 3>> periodic = read_periodic(arguments);
   if (!periodic) return periodic.error();
   const Result<WindowWish> wish = read_window_wish(arguments, 0);
   if (!wish) return wish.error();
-  const Result<ImageStack> stack = open_stack(folder, *request);
+  const Result<ImageStack> stack = open_images(folder, arguments);
   if (!stack) return stack.error();
   const Result<StackWindow> window = window_of_stack(*stack, *wish, *periodic);
   if (!window) return window.error();
-  const auto files = write_window_files(arguments, window->fine);
-  if (!files) return files.error();
+  if (!arguments.has("--no-flow") && set_voxels(window->fine) == 0)
+    return Error{Fault::kInput,
+                 fmt::format("{}: nothing is solid in the window; take a larger --window, and without a manifest "
+                             "look at --threshold and --dark",
+                             one_line(folder))};
   const std::atomic<bool>& cancel = context.cancel();
   const Result<PoreReport> report = arguments.has("--no-flow") ? pores_alone(window->fine)
                                                                : look_at_pores({window->fine, window->fine, window->coarse, 1},
                                                                                flow, [&](double) { return !cancel; });
   if (!report) return Error{report.error().fault, fmt::format("{}: {}", one_line(folder), report.error().message)};
+  const auto files = write_window_files(
+      arguments, window->fine, [&] { return draw_window(context.shown(folder), window->choice, *report, window->fine); });
+  if (!files) return files.error();
   for (const std::optional<Darcy>& darcy : report->flow) {
     if (darcy && !darcy->resolved)
       context.say("note: voxels twice as large say something else; the images are coarse for these pores");
@@ -100,18 +116,16 @@ Outcome predict_stack(const Arguments& arguments, Context& context) {
 
 Outcome compare_scan(const Arguments& arguments, Context& context, const read::GcodeFile& file, const Pile& pile,
                      const bead::LayRules* rules) {
-  for (const char* flag : {"--voxel", "--periodic", "--solid", "--void", "--no-flow", "--inertia", "--memory"})
+  for (const char* flag : {"--voxel", "--periodic", "--solid", "--void", "--plot", "--no-flow", "--inertia", "--memory"})
     if (arguments.has(flag)) return Error{Fault::kUsage, fmt::format("{} does nothing beside --scan; leave it out", flag)};
-  double range = 16;
+  std::uint32_t range = 16;
   if (Status status = arguments.read("--range", {1, 200}, range); !status) return status;
-  range = 8 * std::ceil(range / 8);  // that coarse voxels hold it
+  range = (range + 7) / 8 * 8;  // that coarse voxels hold it
   const Result<WindowWish> wish = read_window_wish(arguments, 0);
   if (!wish) return wish.error();
-  const Result<StackRequest> request = read_request(arguments);
-  if (!request) return request.error();
-  const Result<ImageStack> scan = open_stack(arguments.text("--scan"), *request);
+  const Result<ImageStack> scan = open_images(arguments.text("--scan"), arguments);
   if (!scan) return scan.error();
-  const auto comparison = compare_with_scan(file, pile, *scan, wish->size_mm, static_cast<std::uint32_t>(range), rules);
+  const auto comparison = compare_with_scan(file, pile, *scan, wish->size_mm, range, rules);
   if (!comparison) return comparison.error();
   if (!comparison->found())
     context.say("note: the scan hardly looks like the plan at any of these shifts; is it turned, or give a larger --range?");

@@ -4,6 +4,8 @@
 
 #include <filesystem>
 
+#include "pipeline/cli/outputs.h"
+#include "pipeline/cli/plot_file.h"
 #include "stages/data/text/json.h"
 #include "stages/data/text/readable.h"
 #include "stages/data/text/version.h"
@@ -34,41 +36,56 @@ std::vector<terminal::OptionSpec> window_file_options() {
 }
 
 Status check_window_files(const terminal::Arguments& arguments) {
+  if (Status status = check_plot_name(arguments.text("--plot")); !status) return status;
   for (const Choice& choice : kChoices) {
     if (!arguments.has(choice.flag)) continue;
     const std::string path = arguments.text(choice.flag), told = one_line(path);
     if (!is_stl(path) && !write::voxels::image_kind(path))
       return Error{Fault::kUsage, fmt::format("{} {}: end the name with .nrrd, .mha, .vti or .stl", choice.flag, told)};
-    const fs::path folder = fs::path(path).parent_path();
-    std::error_code ignored;
-    if (!folder.empty() && !fs::is_directory(folder, ignored))
-      return Error{Fault::kOutput, fmt::format("{} {}: there is no folder {}; make it or choose another place", choice.flag,
-                                               told, one_line(folder.string()))};
+    if (Status status = check_folder(choice.flag, path); !status) return status;
   }
   return {};
 }
 
-Result<std::vector<WindowFile>> write_window_files(const terminal::Arguments& arguments, const VoxelView& window) {
+Result<std::vector<WindowFile>> write_window_files(const terminal::Arguments& arguments, const VoxelView& window,
+                                                   const std::function<Result<Plot>()>& draw) {
   std::vector<WindowFile> written;
+  std::vector<write::File> files;
+  const auto begin = [&](const char* flag, const char* content) -> Result<write::File*> {
+    written.push_back({arguments.text(flag), content, 0, 0});
+    auto file = write::File::open(written.back().path);
+    if (!file) return file.error();
+    files.push_back(std::move(*file));
+    return &files.back();
+  };
   for (const Choice& choice : kChoices) {
     if (!arguments.has(choice.flag)) continue;
-    WindowFile one{arguments.text(choice.flag), choice.content, 0, 0};
-    auto file = write::File::open(one.path);
+    const auto file = begin(choice.flag, choice.content);
     if (!file) return file.error();
+    WindowFile& one = written.back();
     if (is_stl(one.path)) {
-      const auto counts = write::voxels::write_surface(*file, window, choice.side, version());
+      const auto counts = write::voxels::write_surface(**file, window, choice.side, version());
       if (!counts)
         return Error{counts.error().fault, fmt::format("{} {}: {}", choice.flag, one_line(one.path), counts.error().message)};
       one.facets = counts->facets;
     } else if (Status status =
-                   write::voxels::write_image(*file, window, choice.side, *write::voxels::image_kind(one.path), version());
+                   write::voxels::write_image(**file, window, choice.side, *write::voxels::image_kind(one.path), version());
                !status) {
       return status.error();
     }
-    const auto whole = file->finish();
+  }
+  if (arguments.has("--plot")) {
+    const auto file = begin("--plot", "sections");
+    if (!file) return file.error();
+    const auto plot = draw();
+    const auto text = plot ? plot_text(written.back().path, *plot) : plot.error();
+    if (!text) return text.error();
+    if (Status status = (*file)->append(*text); !status) return status.error();
+  }
+  for (std::size_t i = 0; i < files.size(); ++i) {
+    const auto whole = files[i].finish();
     if (!whole) return whole.error();
-    one.bytes = whole->bytes;
-    written.push_back(one);
+    written[i].bytes = whole->bytes;
   }
   return written;
 }

@@ -1,11 +1,14 @@
-// pipeline/cli/window_files.h: the options --solid FILE, --void FILE and --no-flow: a window of voxels taken elsewhere.
+// pipeline/cli/window_files.h: the options --solid FILE, --void FILE, --plot FILE and --no-flow: a window of voxels taken
+// elsewhere.
 #pragma once
 
+#include <functional>
 #include <nlohmann/json_fwd.hpp>
 #include <string>
 #include <vector>
 
 #include "pipeline/calibrate/predict_flow.h"
+#include "stages/data/picture/plot.h"
 #include "stages/data/status.h"
 #include "stages/data/voxels.h"
 #include "stages/terminal/arguments.h"
@@ -14,18 +17,21 @@ namespace lamina::pipeline {
 
 /// One file that was written.
 struct WindowFile {
-  std::string path, content;  // "solid" or "void"
+  std::string path, content;  // "solid", "void" or "sections"
   std::uint64_t bytes = 0, facets = 0;
 };
 
-/// For the help.
+/// For the help; --plot is of measurements too.
 std::vector<terminal::OptionSpec> window_file_options();
 
 /// errors  kUsage: an ending of no format; kOutput: no such folder
 Status check_window_files(const terminal::Arguments& arguments);
 
-/// Writes what was asked for. errors  kOutput; kInput: more facets than an STL file counts
-Result<std::vector<WindowFile>> write_window_files(const terminal::Arguments& arguments, const VoxelView& window);
+/// Writes what was asked for; files take their names when all of them are whole.
+/// draw    makes the plot of --plot
+/// errors  kOutput; kInput: more facets than an STL file counts
+Result<std::vector<WindowFile>> write_window_files(const terminal::Arguments& arguments, const VoxelView& window,
+                                                   const std::function<Result<Plot>()>& draw);
 
 /// A line each, which ends with LF.
 std::string as_text(const std::vector<WindowFile>& files);

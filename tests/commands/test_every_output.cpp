@@ -61,6 +61,8 @@ const Row kRows[] = {
     {"calibrate", "-o,--output", "calibrate --machine printer.toml --measured widths.csv --quiet -o @", "widths.csv"},
     {"design", "-o,--output", "design --pore 0.12x0.9 --machine printer.toml --voxel 40 --quiet -o @", "printer.toml"},
     {"permeability", "--plot", "permeability drops.csv --convention dinisio2022 --plot @.svg", "drops.csv"},
+    {"permeability", "--plot", "permeability made.gcode --window 5,3.9,0.6 --voxel 100 --plot @.svg", "made.gcode"},
+    {"permeability", "--plot", "permeability made.gcode --window 1,1,0.6 --voxel 50 --no-flow --plot @.png", "made.gcode"},
     {"permeability", "--solid", "permeability made.gcode --window 1,1,0.6 --voxel 50 --no-flow --solid @.mha", "made.gcode"},
     {"permeability", "--void", "permeability made.gcode --window 1,1,0.6 --voxel 50 --no-flow --void @.stl", "made.gcode"},
     {"merge", "-o,--output", "merge shards --quiet -o @", "part.stl", "/manifest.json", true},

@@ -96,6 +96,8 @@ TEST_F(Inputs, WhateverLiesInPlaceOfAFileEndsInOneLine) {
       {"slice --job job.toml --dry-run", "job.toml", {2}},
       {"extrude --job job.toml --dry-run", "job.toml", {2}},
       {"heights --job job.toml", "job.toml", {2}},
+      {"permeability job.toml --machine anet-a8", "job.toml", {2}},
+      {"permeability job.toml --machine ./printer.toml", "printer.toml", {2}},
       {"jet part.stl --machine ./powder.toml --dry-run", "powder.toml", {2}},
       {"extrude part.stl --machine ./printer.toml --dry-run", "printer.toml", {2}},
       {"machines --check ./powder.toml", "powder.toml", {2}},

@@ -93,6 +93,8 @@ TEST_F(Outputs, WhatACallReadsIsNeverReplaced) {
       {"design --pore 0.12x0.9 --machine printer.toml --voxel 40 -o printer.toml --overwrite", "printer.toml"},
       {"permeability drops.csv --convention dinisio2022 --plot drops.csv", "drops.csv"},
       {"permeability drops.csv --convention dinisio2022 --plot drops.csv --overwrite", "drops.csv"},
+      {"permeability job.toml --machine anet-a8 --solid part.stl --overwrite", "part.stl"},
+      {"permeability job.toml --machine anet-a8 --void job.toml --overwrite", "job.toml"},
       {"machines --check powder.toml --target powder.toml", "powder.toml"},
       {"machines powder.toml --target powder.toml --overwrite", "powder.toml"},
       {"preview part.gcode -o part.gcode", "part.gcode"},

@@ -130,6 +130,7 @@ TEST_F(WrongUse, MissingThingsAreNamed) {
   refused(2, {"verify"}, {"directory"});
   refused(2, {"merge", "absent", "-o", "out"}, {"absent"});
   refused(2, {"merge", "."}, {"-o OUT"});
+  refused(4, {"design", "--pore", "0.12x0.9", "--machine", "anet-a8", "-o", "absent/x.toml"}, {"there is no folder absent"});
 }
 
 TEST_F(WrongUse, JobFileWithNanIsRefusedByLine) {

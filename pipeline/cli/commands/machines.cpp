@@ -5,6 +5,7 @@
 #include <optional>
 
 #include "pipeline/cli/command.h"
+#include "pipeline/machine/extruder.h"
 #include "pipeline/machine/powder_printer.h"
 #include "pipeline/machine/profiles.h"
 #include "pipeline/output/print_program.h"
@@ -48,7 +49,10 @@ std::string explain(const ExtruderProfile& profile) {
       "widths    {}\n",
       m.name, m.description, m.bed.size_mm[0], m.bed.size_mm[1], m.bed.build_height_mm, m.material.nozzle_mm,
       m.material.filament_mm, m.format == "sml" ? "SML; its path words are our own, no public reader knows them" : "G-code",
-      profile.own_calibration ? "measured on it" : "as published for an Anet A8; lamina calibrate measures them");
+      profile.own_calibration ? "measured on it"
+      : has_measured_widths(profile) || !(m.material.lag_s > 0)
+          ? "as published for an Anet A8; lamina calibrate measures them"
+          : "predicted from the lag of its melt; lamina calibrate measures them");
 }
 
 /// The image of a layer that sets every pixel whose centre lies on the bed.

@@ -8,6 +8,7 @@
 #include "pipeline/calibrate/laid_look.h"
 #include "pipeline/cli/command.h"
 #include "pipeline/cli/plot_file.h"
+#include "pipeline/cli/pore_job.h"
 #include "pipeline/cli/pore_print.h"
 #include "pipeline/cli/pore_stack.h"
 #include "pipeline/cli/window_files.h"
@@ -24,11 +25,12 @@ CommandSpec permeability_spec() {
       "their standard errors, the quality of the fit and how far samples differ. Of G-code, predicts Darcy's k1: cuts what\n"
       "repeats of the beads, or a window, into voxels and computes how a fluid creeps through their pores. The same of layer\n"
       "images: a window of what lamina jet wrote, or of a tomography.";
-  spec.operand = "FILE|DIR";
+  spec.operand = "FILE|DIR|JOB";
   spec.operand_meaning =
       "a table with a header: flow_l_min (or velocity_m_s) and drop_mbar (or _pa, _kpa, _bar, _psi), any number of drop columns;\n"
       "rows may name their configuration and sample; without a column sample each of several drop columns is one;\n"
-      "or toolpaths, as in part.gcode; or a folder: of lamina jet, or of numbered images .png, .tif or .pbm, the lowest first";
+      "or toolpaths, as in part.gcode; or a folder: of lamina jet, or of numbered images .png, .tif or .pbm, the lowest first;\n"
+      "or a job file, as in job.toml, that lamina extrude or lamina jet takes, and parts in place of its own: it is planned first";
   spec.options = {
       {"--length", "MM", "of the medium along the flow", "", "Medium"},
       {"--diameter", "MM", "of a round medium", "", "Medium"},
@@ -45,13 +47,15 @@ CommandSpec permeability_spec() {
       {"--memory", "SIZE", "that the flow may take, as in 2G", "1G", "Toolpaths and images"},
       {"--beads",
        "WORD",
-       "laid: as the printer's melt lags; spread: along lines too; told: as wide as the file tells; default: laid by known printers",
+       "spread: as the printer's melt lags and spreads; laid: no spread along lines; told: by the file; default: spread by known printers",
        "",
        "Toolpaths",
        {"laid", "spread", "told"}},
-      {"--machine", "NAME|FILE", "printer that lays them; default: the one that the file names", "", "Toolpaths"},
+      {"--machine", "NAME|FILE", "printer that lays them, or of a job; default: the one that the file names", "", "Toolpaths"},
+      {"--set", "KEY=VALUE", "of a job file: set any key, as in --set fill.width_mm=0.5", "", "Job"},
       {"--inertia", "", "Forchheimer's k2 along z too, from six flows of air", "", "Toolpaths"},
-      {"--plot", "FILE", "draw points and parabola, as .svg or .png", "", "Result"},
+      {"--plot", "FILE", "draw points and parabola; of toolpaths and images sections of flow and pores; .svg or .png", "",
+       "Result"},
       {"--overwrite", "", "replace a file that lamina did not write", "", "Result"},
       {"--json", "", "print the result as one JSON object on stdout", "", "Result"}};
   const std::vector<OptionSpec> files = window_file_options(), images = stack_options();
@@ -67,7 +71,9 @@ CommandSpec permeability_spec() {
       "Examples:\n  lamina permeability drops.csv --length 25.4 --diameter 25.4\n"
       "  lamina permeability drops.csv --convention dinisio2022 --plot fit.svg\n"
       "  lamina permeability drops.csv --length 25.4 --diameter 25.4 --compressible --outlet-pressure 95000\n"
-      "  lamina permeability part.gcode --voxel 15\n"
+      "  lamina permeability part.gcode --voxel 15 --plot pores.png\n"
+      "  lamina permeability job.toml --set segment.thin_mm=2\n"
+      "  lamina permeability pores.toml part.stl --machine anet-a8\n"
       "  lamina permeability part.gcode --window 2,2,0.6 --solid beads.nrrd --void pores.stl --no-flow";
   return spec;
 }
@@ -152,9 +158,9 @@ Outcome fit_table(const Arguments& arguments, Context& context) {
   return arguments.has("--json") ? context.give(json) : context.print(text);
 }
 
-constexpr std::string_view kOfTables[] = {"--length",          "--diameter",     "--area", "--viscosity",
-                                          "--density",         "--convention",   "--plot", "--compressible",
-                                          "--outlet-pressure", "--flow-pressure"};
+constexpr std::string_view kOfTables[] = {"--length",       "--diameter",        "--area",
+                                          "--viscosity",    "--density",         "--convention",
+                                          "--compressible", "--outlet-pressure", "--flow-pressure"};
 constexpr std::string_view kOfImages[] = {"--pixel", "--layer-um", "--threshold", "--dark"};
 constexpr std::string_view kOfVoxels[] = {"--window", "--voxel", "--memory", "--solid", "--void", "--no-flow"};
 constexpr std::string_view kOfToolpaths[] = {"--beads", "--machine", "--inertia", "--scan"};
@@ -166,9 +172,10 @@ Status refuse(const Arguments& arguments, std::span<const std::string_view> flag
   return {};
 }
 
-Outcome run_permeability(const Arguments& arguments, Context& context) {
+/// What can be told of one file or folder. part  as predict_print() takes it
+Outcome look_at_file(const Arguments& arguments, Context& context, const std::optional<Box>& part) {
   if (arguments.operands.size() != 1)
-    return Error{Fault::kUsage, "name one file of measurements or of toolpaths, or a folder of images"};
+    return Error{Fault::kUsage, "name one file of measurements or of toolpaths, a folder of images, or a job with its parts"};
   const std::string& operand = arguments.operands.front();
   std::error_code ignored;
   const bool images = std::filesystem::is_directory(operand, ignored), beads = !images && names_toolpaths(operand);
@@ -180,7 +187,17 @@ Outcome run_permeability(const Arguments& arguments, Context& context) {
   if (fits && !beads) fits = refuse(arguments, kOfToolpaths, "toolpaths");
   if (fits && !arguments.has("--scan")) fits = refuse(arguments, std::array<std::string_view, 1>{"--range"}, "--scan DIR");
   if (!fits) return fits;
-  return images ? predict_stack(arguments, context) : beads ? predict_print(arguments, context) : fit_table(arguments, context);
+  return images  ? predict_stack(arguments, context)
+         : beads ? predict_print(arguments, context, part)
+                 : fit_table(arguments, context);
+}
+
+Outcome run_permeability(const Arguments& arguments, Context& context) {
+  if (!arguments.operands.empty() && names_job(arguments.operands.front()))
+    return predict_job(arguments, context, look_at_file);
+  if (const Status fits = refuse(arguments, std::array<std::string_view, 1>{"--set"}, "job files, as in job.toml"); !fits)
+    return fits;
+  return look_at_file(arguments, context, std::nullopt);
 }
 
 }  // namespace

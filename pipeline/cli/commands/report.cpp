@@ -55,7 +55,9 @@ Outcome run_report(const Arguments& arguments, Context& context) {
   if (!options.parts.empty() && std::filesystem::is_regular_file(arguments.operands.front(), ignored)) {
     return at_option("--parts", "is of jobs of images; a page of toolpaths has no views of the parts, leave it out");
   }
-  options.laid = laid_text(arguments.operands.front());
+  LaidPage laid = laid_page(arguments.operands.front());
+  options.laid = std::move(laid.text);
+  options.laid_svg = std::move(laid.svg);
   const Result<Report> report = make_report(arguments.operands.front(), options);
   if (!report) return report.error();
   if (Status status = write::write_file(output, report->page); !status) return status.error();

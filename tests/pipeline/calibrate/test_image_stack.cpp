@@ -118,6 +118,77 @@ TEST_F(ImageStack, WithFaultsIsOneLine) {
   refused("s --pixel 10", 3, "cover.pbm: has no number");
   fs::create_directory(folder / "none");
   refused("none --pixel 10", 3, "holds neither");
+  fs::create_directory(folder / "white");
+  for (int z = 1; z <= 6; ++z) write_pbm(numbered(folder / "white", z, ".pbm"), 16, 16, [](auto, auto) { return true; });
+  refused("white --pixel 10 --periodic xyz", 3, "nothing is solid in the window");
+  refused("white --pixel 10 --threshold 110.5", 2, "--threshold: '110.5'");
+}
+
+/// A slit along y between two solid layers.
+TEST_F(ImageStack, IsPicturedAlongTheAxisThatLetsThrough) {
+  fs::create_directory(folder / "s");
+  for (int z = 1; z <= 12; ++z) {
+    write_pbm(numbered(folder / "s", z, ".pbm"), 16, 8,
+              [&](auto column, auto) { return z > 2 && z < 11 && column > 2 && column < 13; });
+  }
+  EXPECT_EQ(run("s --pixel 10 --plot pores.svg").code, 0);
+  const std::string picture = test::read_text(folder / "pores.svg");
+  EXPECT_NE(picture.find(" D along y ("), std::string::npos);
+  EXPECT_NE(picture.find("(a) velocity along y where it is fastest, y = "), std::string::npos);
+  EXPECT_NE(picture.find("z upwards"), std::string::npos);
+  for (int z = 1; z <= 12; ++z)
+    write_pbm(numbered(folder / "s", z, ".pbm"), 16, 8,
+              [&](auto column, auto row) { return column == 5 && row == 3 && z == 6; });
+  EXPECT_EQ(run("s --pixel 10 --plot pores.svg").code, 0);
+  EXPECT_NE(test::read_text(folder / "pores.svg").find("s: no void leads through"), std::string::npos);
+}
+
+/// Some other program's manifest.json says nothing of the images beside it.
+TEST_F(ImageStack, BesideAForeignManifestIsAStackOfImages) {
+  fs::create_directory(folder / "web");
+  for (int z = 1; z <= 6; ++z)
+    write_pbm(numbered(folder / "web", z, ".pbm"), 16, 16, [](auto column, auto) { return column < 4; });
+  for (const char* manifest :
+       {"{\"name\": \"gallery\", \"icons\": []}\n", "{\n  \"short_name\": \"x\"\n}\n", "", "[]", "\xff\xfe"}) {
+    test::write_text(folder / "web/manifest.json", manifest);
+    EXPECT_EQ(told("web --pixel 10 --no-flow")["porosity"].get<double>(), 0.25) << manifest;
+  }
+  test::write_text(folder / "web/manifest.json", "{\n\"lamina\": \"0.1.0\",\n");
+  EXPECT_EQ(run("web --no-flow").code, 3) << "one of lamina that is cut off";
+}
+
+/// What the manifest tells no option contradicts.
+TEST_F(ImageStack, OfAJobRefusesWhatItsManifestTells) {
+  test::write_box(folder / "part.stl", {0, 0, 0}, {6, 4, 3});
+  ASSERT_EQ(
+      test::run_lamina(test::words_of("jet part.stl --layer 0.25 --dpi 254 --bed 20x20 --quiet -o job"), folder.path()).code,
+      0);
+  for (const std::string option : {"--pixel 50", "--layer-um 100", "--threshold 99", "--dark"}) {
+    const test::Outcome outcome = run("job --no-flow " + option);
+    EXPECT_EQ(outcome.code, 2) << option;
+    EXPECT_NE(outcome.err.find(option.substr(0, option.find(' ')) + " is for images without a manifest"), std::string::npos)
+        << outcome.err;
+    EXPECT_EQ(outcome.error_lines(), 1u) << outcome.err;
+  }
+}
+
+/// A refusal of the flow comes after the window is cut: nothing is left of what was asked for, and what was there stays.
+TEST_F(ImageStack, RefusedLeavesNoFileOfTheWindow) {
+  fs::create_directory(folder / "s");
+  for (int z = 1; z <= 32; ++z)
+    write_pbm(numbered(folder / "s", z, ".pbm"), 32, 32, [](auto column, auto) { return column < 28; });
+  const std::string call = "s --pixel 10 --solid a.nrrd --void b.stl --plot c.svg";
+  test::Outcome outcome = run(call + " --memory 1M");
+  EXPECT_EQ(outcome.code, 2) << outcome.err;
+  EXPECT_NE(outcome.err.find("--memory allows"), std::string::npos) << outcome.err;
+  for (const char* name : {"a.nrrd", "b.stl", "c.svg"}) EXPECT_FALSE(fs::exists(folder / name)) << name;
+  EXPECT_EQ(run(call + " --no-flow").code, 0);
+  const std::string before = test::read_text(folder / "a.nrrd");
+  fs::remove(folder / "c.svg");
+  fs::create_directory(folder / "c.svg");
+  outcome = run(call + " --no-flow --window 0.1,0.1,0.1");
+  EXPECT_NE(outcome.code, 0);
+  EXPECT_TRUE(test::read_text(folder / "a.nrrd") == before) << "the picture cannot be written, and so nothing is";
 }
 
 /// Lines that cross, as test_predicted_flow.cpp lays them.
@@ -200,9 +271,30 @@ TEST_F(ImageStack, OfAPlanThatIsShiftedAndGrownByAVoxelComesBackWithBoth) {
   }
   const test::Outcome dark = run("lines.gcode --scan same --pixel 25 --range 8 --window 1.6,1.6,0.9");
   EXPECT_NE(dark.err.find("hardly looks like the plan"), std::string::npos) << "solid and void exchanged" << dark.err;
+  EXPECT_NE(run("lines.gcode --scan same --pixel 25 --dark --range 2.5").err.find("--range: '2.5'"), std::string::npos);
+  EXPECT_NE(run("lines.gcode --scan absent --pixel 25").err.find("absent: the folder cannot be read: "), std::string::npos);
   const test::Outcome outcome = run("lines.gcode --scan same --pixel 25 --dark --window 3,3,0.6");
   EXPECT_EQ(outcome.code, 2);
   EXPECT_NE(outcome.err.find("take a smaller --window or --range"), std::string::npos) << outcome.err;
+}
+
+/// Two towers 20 mm apart: the middle of the print is air.
+TEST_F(ImageStack, OfPartsWithAirBetweenThemIsOneLine) {
+  std::ofstream file(folder / "towers.gcode");
+  file << "G21\nG90\nM83\n";
+  for (int layer = 1; layer <= 8; ++layer) {
+    file << ";LAYER_CHANGE\n;Z:" << 0.3 * layer << "\n;HEIGHT:0.3\nG1 Z" << 0.3 * layer << " F600\n;WIDTH:0.5\n";
+    for (const int x : {10, 30})
+      for (int line = 0; line < 8; ++line)
+        file << "G0 X" << x << " Y" << 10 + 0.5 * line << "\nG1 X" << x + 4 << " Y" << 10 + 0.5 * line << " E0.3 F900\n";
+  }
+  file.close();
+  for (const std::string call : {"towers.gcode --window 2,2,0.6 --voxel 50", "towers.gcode --voxel 50 --no-flow"}) {
+    const test::Outcome outcome = run(call);
+    EXPECT_EQ(outcome.code, call.ends_with("--no-flow") ? 0 : 3) << "what is left of a flow is told without one";
+    EXPECT_NE(outcome.err.find("towers.gcode: no bead lies in the window of 2.000 x 2.000"), std::string::npos) << outcome.err;
+  }
+  EXPECT_EQ(run("towers.gcode --window 24,3,0.6 --voxel 100 --no-flow").code, 0);
 }
 
 }  // namespace

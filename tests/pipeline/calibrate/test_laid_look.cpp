@@ -108,7 +108,9 @@ TEST(LaidLook, CuspsThatTouchNoPoreTellBondedFromUnbondedPlans) {
       EXPECT_EQ(Json::parse(again.out)["laid"]["connected"].dump(), json["connected"].dump());
       EXPECT_NE(again.err.find(fmt::format("connected {:.2f} % if", bonded)), std::string::npos) << again.err;
       EXPECT_EQ(test::run_lamina({"report", "part.gcode", "-o", "page.html"}, directory.path()).code, 0);
-      EXPECT_NE(test::read_text(directory / "page.html").find("\"laid\":\"fed "), std::string::npos);
+      const std::string page = test::read_text(directory / "page.html");
+      EXPECT_NE(page.find("\"laid\":\"fed "), std::string::npos);
+      EXPECT_NE(page.find("\"laid_svg\":\"PHN2Zy"), std::string::npos) << "<svg in base 64";
       const auto info = test::run_lamina({"info", "part.gcode", "--density", "1.1", "--json"}, directory.path());
       EXPECT_EQ(Json::parse(info.out)["pores"].dump(), json["pores"].dump());
       EXPECT_NEAR(Json::parse(info.out)["fed_g"].get<double>(), json["fed_mm3"].get<double>() * 1.1e-3, 1e-9);

@@ -107,7 +107,7 @@ TEST(PredictedFlow, CrossedLinesLeadAlikeAlongXAndY) {
   write_lines(folder / "lines.gcode", true);
   const Laid lines = laid(folder / "lines.gcode");
   const pipeline::PoreReport report = report_of(lines, 2, {32, 32, 24}, {16, 16, 12});
-  EXPECT_NEAR(report.flow[0]->k_m2[0] / report.flow[1]->k_m2[1], 1, 1e-3);
+  EXPECT_EQ(report.flow[0]->k_m2[0], report.flow[1]->k_m2[1]) << "turned and upside down it is the same window";
   EXPECT_DOUBLE_EQ(report.porosity.total(), report.porosity.percolating(2));
 }
 
@@ -158,6 +158,37 @@ TEST(PredictedFlow, VoxelsThatAreTooCoarseSaySo) {
     }
   }
   EXPECT_FALSE(report.flow[2]->steps > 0 && report.flow[2]->resolved);
+}
+
+/// Two thousand times upon itself a line finds no room; told widths do not care.
+TEST(PredictedFlow, BeadsUponEachOtherAreRefusedByRulesAndNotAsTold) {
+  test::Directory folder;
+  std::ofstream file(folder / "heap.gcode");
+  file << "G21\nG90\nM83\n;LAYER_CHANGE\n;Z:0.3\n;HEIGHT:0.3\nG1 Z0.3 F600\n;WIDTH:0.5\n";
+  for (int line = 0; line < 2000; ++line) file << "G0 X10 Y10\nG1 X25 Y10 E1 F900\n";
+  file.close();
+  const Laid heap = laid(folder / "heap.gcode");
+  pipeline::Window window;
+  window.box.add(Point3{17'000'000, 9'500'000, 0});
+  window.box.add(Point3{18'000'000, 10'500'000, 300'000});
+  window.count = {20, 20, 6};
+  bead::LayRules rules;
+  rules.machine.tau_s = 0.046;
+  EXPECT_TRUE(pipeline::bead_voxels(heap.file, heap.pile, window).ok());
+  const Result<VoxelStack> refused = pipeline::bead_voxels(heap.file, heap.pile, window, &rules);
+  ASSERT_FALSE(refused.ok());
+  EXPECT_FALSE(refused.error().message.empty());
+}
+
+TEST(PredictedFlow, AWindowLargerThanThePrintIsRefused) {
+  test::Directory folder;
+  write_lines(folder / "lines.gcode", false);
+  const Laid lines = laid(folder / "lines.gcode");
+  for (const std::array<double, 3> size : {std::array{50.0, 1.0, 0.3}, {1.0, 50.0, 0.3}, {1.0, 1.0, 2.0}}) {
+    const Result<pipeline::WindowChoice> choice = pipeline::choose_window(lines.file, lines.pile, {10, size});
+    ASSERT_FALSE(choice.ok());
+    EXPECT_EQ(choice.error().fault, Fault::kUsage);
+  }
 }
 
 TEST(PredictedFlow, LayersThatDoNotLieAboveTheOthersAreCounted) {
