@@ -13,7 +13,7 @@ struct ProgressEvent {
 };
 using ProgressCallback = std::function<void(const ProgressEvent&)>;
 
-/// Peak memory of the process, bytes.
+/// Peak memory of the process since it began, bytes, by the kernel's count, which errs by some hundred kilobytes.
 std::uint64_t peak_resident_bytes();
 
 }  // namespace lamina::pipeline
