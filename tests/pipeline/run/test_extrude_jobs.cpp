@@ -149,7 +149,8 @@ TEST_F(ExtrudeProgram, PeakMemoryThatIsToldIsThatOfTheProgramNotOfItsCaller) {
   GTEST_SKIP() << "a sanitizer's shadow is counted too";
 #endif
   const std::vector<char> held(200'000'000, 'x');  // the caller's
-  const Outcome result = run("extrude --overwrite " + block(10, 10, 1, 0) + " --machine marlin --quiet --json -o " + file("a.gcode"));
+  const Outcome result =
+      run("extrude --overwrite " + block(10, 10, 1, 0) + " --machine marlin --quiet --json -o " + file("a.gcode"));
   ASSERT_EQ(result.code, 0) << result.err;
   EXPECT_LT(result.json()["peak_resident_bytes"], held.size() / 2);
   EXPECT_GT(result.json()["peak_resident_bytes"], 1'000'000);

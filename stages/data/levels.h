@@ -1,0 +1,101 @@
+// stages/data/levels.h: an image of whole levels as runs: drops a pixel, or how full a voxel is.
+#pragma once
+
+#include <cstdint>
+#include <span>
+
+#include "stages/data/buffer.h"
+#include "stages/data/runs.h"
+
+namespace lamina {
+
+/// Borrowed levels of one image.
+///
+/// row_offset  rows + 1 entries, first 0, last level.size(); row r owns the runs [row_offset[r], row_offset[r + 1])
+/// change      two a run, increasing within a row: begin, end (exclusive), end <= columns. Runs do not overlap; where two
+/// touch,
+///             their levels differ
+/// level       one a run, at least 1: where no run lies the level is 0
+/// Rows are those of RunsView: row 0 is the back of the bed unless the image was mirrored.
+struct LevelsView {
+  std::uint32_t columns = 0;
+  std::span<const std::uint32_t> row_offset;
+  std::span<const std::uint32_t> change;
+  std::span<const std::uint8_t> level;
+
+  std::uint32_t rows() const { return row_offset.empty() ? 0 : static_cast<std::uint32_t>(row_offset.size() - 1); }
+};
+
+/// Owned levels; 4 bytes a row and 9 bytes a run.
+struct Levels {
+  std::uint32_t columns = 0;
+  Buffer<std::uint32_t> row_offset;
+  Buffer<std::uint32_t> change;
+  Buffer<std::uint8_t> level;
+
+  /// Makes it an image of no rows yet; end_row() ends each.
+  void start(std::uint32_t width) {
+    columns = width;
+    row_offset.assign(1, 0);
+    change.clear();
+    level.clear();
+  }
+  /// Appends [begin, end) to the row that is being made; joins the run before it if both touch and are of one level.
+  /// Nothing is appended where the level is 0 or the run is empty.
+  void append(std::uint32_t begin, std::uint32_t end, std::uint8_t of_level) {
+    if (of_level == 0 || begin >= end) return;
+    if (level.size() > row_offset.back() && change.back() == begin && level.back() == of_level) {
+      change.back() = end;
+      return;
+    }
+    change.push_back(begin);
+    change.push_back(end);
+    level.push_back(of_level);
+  }
+  void end_row() { row_offset.push_back(static_cast<std::uint32_t>(level.size())); }
+
+  LevelsView view() const { return {columns, row_offset, change, level}; }
+  operator LevelsView() const { return view(); }
+  std::uint64_t bytes() const { return bytes_held(row_offset) + bytes_held(change) + bytes_held(level); }
+};
+
+/// Sum of the levels of all pixels.
+inline std::uint64_t sum_of_levels(const LevelsView& image) {
+  std::uint64_t sum = 0;
+  for (std::size_t i = 0; i < image.level.size(); ++i) {
+    sum += std::uint64_t{image.change[2 * i + 1] - image.change[2 * i]} * image.level[i];
+  }
+  return sum;
+}
+
+/// The pixels whose level is at least `least` (> 0): the plane of the drop of that number.
+inline void at_least(const LevelsView& image, std::uint8_t least, Runs& plane) {
+  plane.columns = image.columns;
+  plane.row_offset.assign(1, 0);
+  plane.change.clear();
+  for (std::uint32_t r = 0; r < image.rows(); ++r) {
+    const std::uint32_t row_begin = plane.row_offset.back();
+    for (std::uint32_t i = image.row_offset[r]; i < image.row_offset[r + 1]; ++i) {
+      if (image.level[i] < least) continue;
+      if (plane.change.size() > row_begin && plane.change.back() == image.change[2 * i]) {
+        plane.change.back() = image.change[2 * i + 1];
+      } else {
+        plane.change.push_back(image.change[2 * i]);
+        plane.change.push_back(image.change[2 * i + 1]);
+      }
+    }
+    plane.row_offset.push_back(static_cast<std::uint32_t>(plane.change.size()));
+  }
+}
+
+/// All set pixels at one level.
+inline void levels_of(const RunsView& image, std::uint8_t of_level, Levels& result) {
+  result.start(image.columns);
+  for (std::uint32_t r = 0; r < image.rows(); ++r) {
+    const auto row = image.row(r);
+    for (std::size_t i = 0; i + 1 < row.size(); i += 2) result.append(row[i], row[i + 1], of_level);
+    result.end_row();
+  }
+}
+
+}  // namespace lamina
