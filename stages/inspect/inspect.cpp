@@ -1,0 +1,206 @@
+#include "stages/inspect/inspect.h"
+
+#include <algorithm>
+#include <utility>
+
+namespace lamina::inspect {
+namespace {
+
+/// Places of at most this many squares of the least width are corners.
+constexpr double kCorner = 2;
+
+void note(Found& found, double amount, const Spot& spot) {
+  ++found.count;
+  found.amount += amount;
+  if (amount <= found.largest) return;
+  found.largest = amount;
+  found.spot = spot;
+}
+
+}  // namespace
+
+/// What set pixels are followed for.
+struct Inspection::Solids {
+  Inspection& all;
+  std::uint64_t islands = 0;  // of this layer
+
+  void grow(Body&) {}
+  void begin(Body& body) {
+    // A part begins in the layer that holds its bottom, or in the one above: then its first pixels lie above a layer's middle.
+    const std::uint32_t stand = all.owner_of(body, all.below_, body.top);
+    body.owner = stand;
+    body.open = stand != Body::kNone;  // it has the bottom of a part
+    if (body.open) return;
+    body.owner = all.owner_of(body, INT64_MIN, body.top);
+    ++islands;
+    note(all.findings_.islands, static_cast<double>(body.pixels) * all.pixel_mm2_,
+         all.spot(body.box, body.first_layer, body.bottom));
+  }
+  void join(const Body& stays, const Body& ends, const Body& piece) {
+    if (stays.owner == Body::kNone || ends.owner == Body::kNone || stays.owner == ends.owner) return;
+    all.note_touching(stays.owner, ends.owner, all.spot(piece.box, all.layer_.index, all.layer_.bottom));
+  }
+  void end(const Body& body) {
+    if (body.open) return;
+    note(all.findings_.loose, static_cast<double>(body.pixel_nm) * 1e-6 * all.pixel_mm2_,
+         all.spot(body.box, body.first_layer, body.bottom));
+  }
+};
+
+/// What the powder between set pixels is followed for.
+struct Inspection::Powder {
+  Inspection& all;
+
+  void begin(Body&) {}
+  void grow(Body& body) {
+    const PixelBox& box = body.box;
+    body.open = all.findings_.layers == 0 || box.left == all.all_.left || box.right == all.all_.right ||
+                box.top == all.all_.top || box.bottom == all.all_.bottom;
+  }
+  void join(const Body&, const Body&, const Body&) {}
+  void end(const Body& body) {
+    if (body.open) return;
+    note(all.findings_.hollows, static_cast<double>(body.pixel_nm) * 1e-6 * all.pixel_mm2_,
+         all.spot(body.box, body.first_layer, body.bottom));
+  }
+};
+
+Inspection::Inspection(const PixelGrid& grid, std::vector<Stand> stands, std::int64_t least_nm)
+    : grid_(grid),
+      stands_(std::move(stands)),
+      disc_(disc_of(grid, least_nm / 2)),
+      least_mm_(static_cast<double>(least_nm) / kNmPerMm),
+      pixel_mm2_(1 / (grid.x.pixels_per_nm() * grid.y.pixels_per_nm() * kNmPerMm * kNmPerMm)) {
+  std::ranges::stable_sort(stands_, {}, [](const Stand& stand) { return stand.box.lo.z; });
+  for (const Stand& stand : stands_) {
+    window_.push_back(window_of(stand.box));
+    all_.add(window_.back());
+  }
+  if (stands_.empty()) all_ = {0, 0, 0, 0};
+}
+
+/// The pixels that the box may set, one more on each side, within the image.
+PixelBox Inspection::window_of(const Box& box) const {
+  const auto clamp = [](const PixelAxis& axis, std::int64_t i) {
+    return static_cast<std::uint32_t>(std::clamp<std::int64_t>(i, 0, axis.count));
+  };
+  const std::uint32_t front = clamp(grid_.y, grid_.y.first_at_or_beyond(box.lo.y) - 1);
+  const std::uint32_t back = clamp(grid_.y, grid_.y.first_at_or_beyond(std::int64_t{box.hi.y} + 1) + 1);
+  return {clamp(grid_.x, grid_.x.first_at_or_beyond(box.lo.x) - 1),
+          clamp(grid_.x, grid_.x.first_at_or_beyond(std::int64_t{box.hi.x} + 1) + 1), grid_.rows() - back,
+          grid_.rows() - front};
+}
+
+Spot Inspection::spot(const PixelBox& box, std::uint32_t layer, std::int64_t z) const {
+  const std::int64_t column = (std::int64_t{box.left} + box.right - 1) / 2, row = (std::int64_t{box.top} + box.bottom - 1) / 2;
+  return {static_cast<double>(grid_.x.centre(column)) / kNmPerMm,
+          static_cast<double>(grid_.y.centre(std::int64_t{grid_.rows()} - 1 - row)) / kNmPerMm, layer,
+          static_cast<double>(z) / kNmPerMm};
+}
+
+/// Whether all of a body lies where a copy's box is.
+bool Inspection::stands_in(std::uint32_t stand, const Body& body) const {
+  const PixelBox &window = window_[stand], &box = body.box;
+  return window.left <= box.left && box.right <= window.right && window.top <= box.top && box.bottom <= window.bottom &&
+         stands_[stand].box.lo.z < body.top && body.bottom <= stands_[stand].box.hi.z;
+}
+
+/// The copy with the narrowest box around a body, of those whose bottoms lie in [from, to); kNone without one.
+std::uint32_t Inspection::owner_of(const Body& body, std::int64_t from, std::int64_t to) const {
+  const auto bottom = [](const Stand& stand) { return std::int64_t{stand.box.lo.z}; };
+  const auto first = std::ranges::lower_bound(stands_, from, {}, bottom),
+             last = std::ranges::lower_bound(stands_, to, {}, bottom);
+  std::uint32_t owner = Body::kNone;
+  std::int64_t narrowest = 0;
+  for (auto stand = first; stand < last; ++stand) {
+    const auto number = static_cast<std::uint32_t>(stand - stands_.begin());
+    if (!stands_in(number, body)) continue;
+    const std::int64_t area = stand->box.width() / 1000 * (stand->box.depth() / 1000);
+    if (owner != Body::kNone && area >= narrowest) continue;
+    owner = number;
+    narrowest = area;
+  }
+  return owner;
+}
+
+void Inspection::note_touching(std::uint32_t a, std::uint32_t b, const Spot& at) {
+  const std::uint32_t part = std::min(stands_[a].part, stands_[b].part), other = std::max(stands_[a].part, stands_[b].part);
+  auto& noted = findings_.touching;
+  const bool known = std::ranges::any_of(noted, [&](const auto& pair) { return pair.part == part && pair.other == other; });
+  if (!known && noted.size() < Findings::kMost) noted.push_back({part, other, at});
+}
+
+/// Bodies that have left the box of the copy that they began with: they have grown into another one.
+void Inspection::note_outgrown(const Layer& layer) {
+  for (Body& body : solid_.live()) {
+    if (body.owner == Body::kNone) continue;
+    if (stands_in(body.owner, body) && layer.bottom < stands_[body.owner].box.hi.z) continue;
+    for (std::uint32_t other = 0; other < stands_.size(); ++other) {
+      const Box& box = stands_[other].box;
+      if (other == body.owner || !window_[other].meets(body.box) || box.lo.z >= layer.bottom + layer.thickness ||
+          box.hi.z <= layer.bottom) {
+        continue;
+      }
+      note_touching(body.owner, other, spot(body.box, layer.index, layer.bottom));
+      break;
+    }
+    body.owner = Body::kNone;
+  }
+}
+
+void Inspection::note_edges(const Layer& layer, const RunsView& image) {
+  if (findings_.bed_edge || image.rows() == 0) return;
+  const auto note = [&](std::uint32_t column, std::uint32_t row) {
+    if (!findings_.bed_edge) findings_.bed_edge = spot({column, column + 1, row, row + 1}, layer.index, layer.bottom);
+  };
+  for (std::uint32_t r = 0; r < image.rows() && !findings_.bed_edge; ++r) {
+    const auto row = image.row(r);
+    if (row.empty()) continue;
+    if (r == 0 || r + 1 == image.rows() || row.front() == 0) note(row.front(), r);
+    if (row.back() == image.columns) note(row.back() - 1, r);
+  }
+}
+
+ThinPlaces Inspection::thin(const RunsView& image, ThinScratch& scratch) const {
+  const double least = kCorner * least_mm_ * least_mm_ / pixel_mm2_;
+  return thin_places(image, disc_, static_cast<std::uint64_t>(least), scratch);
+}
+
+void Inspection::add(const Layer& layer, const RunsView& image, const ThinPlaces& thin) {
+  layer_ = layer;
+  if (findings_.layers == 0) below_ = INT64_MIN;
+  Solids solids{*this};
+  solid_.add(layer, image, solids);
+  if (solids.islands > 0) ++findings_.islands.layers;
+  note_outgrown(layer);
+  complement(image, all_, between_);
+  Powder powder{*this};
+  powder_.add(layer, between_, powder);
+  note_edges(layer, image);
+  if (thin.count > 0) {
+    Found& found = findings_.thin;
+    found.count += thin.count;
+    found.amount += static_cast<double>(thin.pixels) * pixel_mm2_;
+    ++found.layers;
+    const double largest = static_cast<double>(thin.largest) * pixel_mm2_;
+    if (largest > found.largest) {
+      found.largest = largest;
+      found.spot = spot(thin.box, layer.index, layer.bottom);
+    }
+  }
+  ++findings_.layers;
+  below_ = layer.bottom;
+}
+
+const Findings& Inspection::finish() {
+  Solids solids{*this};
+  solid_.finish(solids);
+  // What reaches the last layer is open at the top.
+  struct Open {
+    void end(const Body&) {}
+  } open;
+  powder_.finish(open);
+  return findings_;
+}
+
+}  // namespace lamina::inspect

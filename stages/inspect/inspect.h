@@ -1,0 +1,112 @@
+// stages/inspect/inspect.h: looks at the layers of a powder job for what a person would want to know before printing: pieces
+// that hang on nothing, bodies that belong to no part, closed hollows full of powder, thin places, parts that grow together,
+// parts at the edge of the bed.
+//
+// codes   islands      pieces of layers with nothing below that are not the bottom of a part
+//         loose        bodies without the bottom of a part: they fall off
+//         hollows      powder that no way leads out from
+//         thin         places narrower than the least width
+//         touching     parts that grow together
+//         bed-edge     layers that reach the edge of the image
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "stages/data/grid.h"
+#include "stages/data/layer.h"
+#include "stages/data/mesh.h"
+#include "stages/data/runs.h"
+#include "stages/data/status.h"
+#include "stages/inspect/bodies.h"
+#include "stages/inspect/thin.h"
+
+namespace lamina::inspect {
+
+/// A mesh where it stands.
+struct Stand {
+  Box box;                 // nm, on the bed
+  std::uint32_t part = 0;  // of the job
+};
+
+/// Where something is: the middle of its box.
+struct Spot {
+  double x_mm = 0, y_mm = 0;  // from the left and from the front of the bed
+  std::uint32_t layer = 0;    // the first
+  double z_mm = 0;            // bottom of that layer
+};
+
+/// Some of one kind.
+struct Found {
+  std::uint64_t count = 0;   // pieces or bodies
+  double amount = 0;         // of all: mm2, or mm3 of bodies
+  double largest = 0;        // the same of the largest
+  Spot spot;                 // of the largest, the first of equals
+  std::uint32_t layers = 0;  // that hold them; of bodies none
+};
+
+struct Findings {
+  std::uint32_t layers = 0;  // that were looked at
+  Found islands, loose, hollows, thin;
+  struct Touching {
+    std::uint32_t part = 0, other = 0;  // of the job; equal for copies of one
+    Spot spot;
+  };
+  std::vector<Touching> touching;  // each pair of parts once, the first kMost
+  std::optional<Spot> bed_edge;    // of the first layer that reaches it
+  static constexpr std::size_t kMost = 20;
+};
+
+/// Layers are given from the bottom up, without gaps; images as sections are, before mirrors, bleed and doses.
+/// memory  two layers' runs and their numbers
+/// cost    O(runs) a layer for all but thin places
+class Inspection {
+ public:
+  /// grid      of the images; must outlive this object
+  /// stands    the boxes of all copies; a piece at the bottom of one is not an island
+  /// least_nm  what is narrower is thin; 0: nothing is
+  Inspection(const PixelGrid& grid, std::vector<Stand> stands, std::int64_t least_nm);
+
+  /// Thin places of a layer; from any thread.
+  ThinPlaces thin(const RunsView& image, ThinScratch& scratch) const;
+  /// The next layer.
+  void add(const Layer& layer, const RunsView& image, const ThinPlaces& thin);
+  /// After the last layer.
+  const Findings& finish();
+
+  std::uint64_t bytes() const {
+    return solid_.bytes() + powder_.bytes() + bytes_held(between_.change) + bytes_held(between_.row_offset);
+  }
+
+ private:
+  struct Solids;
+  struct Powder;
+
+  Spot spot(const PixelBox& box, std::uint32_t layer, std::int64_t z) const;
+  PixelBox window_of(const Box& box) const;
+  bool stands_in(std::uint32_t stand, const Body& body) const;
+  std::uint32_t owner_of(const Body& body, std::int64_t from, std::int64_t to) const;
+  void note_touching(std::uint32_t a, std::uint32_t b, const Spot& at);
+  void note_outgrown(const Layer& layer);
+  void note_edges(const Layer& layer, const RunsView& image);
+
+  const PixelGrid& grid_;
+  std::vector<Stand> stands_;  // by bottom
+  std::vector<PixelBox> window_;
+  PixelBox all_;  // of all stands, a pixel wider
+  Disc disc_;
+  double least_mm_, pixel_mm2_;
+  std::int64_t below_ = 0;  // bottom of the layer before
+  Layer layer_{};
+  Follower solid_{true}, powder_{false};
+  Runs between_;  // the powder of a layer
+  Findings findings_;
+};
+
+/// One warning for each kind. part  names of files
+void tell(const Findings& findings, std::span<const std::string> part, double least_mm, std::vector<Warning>& warnings);
+
+}  // namespace lamina::inspect
