@@ -131,9 +131,11 @@ struct Job {
   bool resume = false;
   bool overwrite = false;  // allow a directory with another job's output
   bool dry_run = false;
-  bool strict = false;       // warnings are errors
-  bool allow_empty = false;  // a whole job may have nothing
-  bool timing = false;       // tell where the time goes
+  bool strict = false;                  // warnings are errors
+  bool inspect = false;                 // look through the layers for islands, hollows, thin places
+  std::optional<double> least_wall_mm;  // what is narrower is thin; absent: two pixels, or a drop
+  bool allow_empty = false;             // a whole job may have nothing
+  bool timing = false;                  // tell where the time goes
   bool json = false;
   bool quiet = false;
   std::vector<std::string> notes;  // notes from reading it: old forms and their replacements

@@ -105,6 +105,12 @@ const JobKey kRunKeys[] = {
     field<&Job::strict>({"run", "strict", "--strict", "", "warnings are errors: exit 5, and nothing is written", 0, "true"}),
     field<&Job::allow_empty>({"run", "allow_empty", "--allow-empty", "",
                               "finish a whole job without a single pixel, contour or bead instead of refusing it", 0, "true"}),
+    field<&Job::inspect>({"run", "inspect", "--inspect", "",
+                          "look through the layers for what hangs on nothing, closed hollows, thin places and parts that touch",
+                          0, "true"}),
+    field<&Job::least_wall_mm>(
+        {"run", "least_wall_mm", "--least-wall", "MM", "what --inspect tells as thin; two pixels, or a drop, if absent"},
+        {0, 1000, " mm"}),
     custom<Job, read_pair<read_shard>, write_share, &Job::shard>(
         {"run", "shard", "--shard", "I/N", "only the I-th of N equal shares of the layers, I from 1; see lamina merge"},
         Form::kString),

@@ -7,6 +7,7 @@
 #include <numeric>
 
 #include "pipeline/machine/materials.h"
+#include "pipeline/run/inspector.h"
 #include "stages/data/text/number_text.h"
 #include "stages/data/text/readable.h"
 #include "stages/geometry/isa.h"
@@ -20,7 +21,13 @@ namespace {
 class ImageMaker : public Maker {
  public:
   ImageMaker(const Plan& plan, Sanity& sanity, const FlowLimits& limits)
-      : plan_(plan), sanity_(sanity), imager_(plan), files_(plan), work_(limits.most_in_flight), made_(limits.record_slots) {
+      : plan_(plan),
+        sanity_(sanity),
+        imager_(plan),
+        inspector_(plan),
+        files_(plan),
+        work_(limits.most_in_flight),
+        made_(limits.record_slots) {
     for (const JobMaterial& material : plan.images->materials.used) {
       materials_.emplace_back(material.name, 0);
       unfed_.push_back({material.name});
@@ -63,6 +70,12 @@ class ImageMaker : public Maker {
       add("beads",
           [this](const Layer& layer, Work& work, Made& made) { return imager_.beads(layer, work.images, made.notes); });
     }
+    if (inspector_.on()) {
+      add("inspect", [this](const Layer&, Work& work, Made&) {
+        inspector_.look(work.images.runs, work.inspected);
+        return Status();
+      });
+    }
     add("dose", [this](const Layer& layer, Work& work, Made& made) {
       imager_.bleed(work.images);
       if (plan_.images->dose.bleeds()) sanity_.add_left(layer, work.images.runs);
@@ -81,7 +94,7 @@ class ImageMaker : public Maker {
         [this](const Layer&, Work& work, Made& made) { return files_.store(work.images.runs, work.files, made.record); });
     return steps;
   }
-  bool records_from_work() const override { return false; }
+  bool records_from_work() const override { return inspector_.on(); }
 
   Status record(std::uint32_t, const Ticket& ticket) override {
     const Made& made = made_[ticket.record];
@@ -90,6 +103,7 @@ class ImageMaker : public Maker {
     }
     add(made.record);
     sanity_.record(made.record.layer.index, made.record.set_pixels > 0);
+    if (inspector_.on()) inspector_.record(made.record.layer, work_[ticket.work].inspected);
     const raster::LayerReport& report = made.notes.report;
     rows_.add_capped(made.record.layer, report.capped_rows, report.first_capped_row, report.first_capped_instance,
                      plan_.images->grid);
@@ -103,14 +117,17 @@ class ImageMaker : public Maker {
   }
   void add_kept(const LayerRecord& record) override {
     add(record);
+    inspector_.keep();
     sanity_.keep(record.layer.index, record.set_pixels > 0);
   }
 
-  std::uint64_t bytes_held(std::uint32_t work) const override { return work_[work].images.bytes() + work_[work].files.bytes(); }
+  std::uint64_t bytes_held(std::uint32_t work) const override {
+    return work_[work].images.bytes() + work_[work].files.bytes() + work_[work].inspected.bytes();
+  }
   void let_go(std::uint32_t work) override { work_[work] = Work(); }
 
   std::uint64_t crossings() const override { return crossings_; }
-  bool times_dry_runs() const override { return plan_.images->machine.has_value(); }
+  bool times_dry_runs() const override { return plan_.images->machine.has_value() || inspector_.on(); }
   bool keeps() const override { return !plan_.job.dry_run; }
   Status finish() override { return plan_.job.dry_run ? Status() : files_.finish(); }
   Status stop(bool) override { return plan_.job.dry_run ? Status() : files_.keep(); }
@@ -125,6 +142,7 @@ class ImageMaker : public Maker {
   struct Work {
     ImageWork images;
     ImageFiles::Work files;
+    Inspector::Work inspected;
   };
   struct Made {
     LayerRecord record;
@@ -160,6 +178,7 @@ class ImageMaker : public Maker {
   const Plan& plan_;
   Sanity& sanity_;
   LayerImager imager_;
+  mutable Inspector inspector_;
   ImageFiles files_;
   std::vector<Work> work_;
   std::vector<Made> made_;
@@ -175,6 +194,7 @@ class ImageMaker : public Maker {
 };
 
 void ImageMaker::warn(const Summary&, std::vector<Warning>& warnings) const {
+  inspector_.warn(warnings);
   sanity::warn_of_lost_pixels(lost_pixels_, warnings);
   for (const sanity::UnfedPowder& powder : unfed_) sanity::warn_of_unfed(powder, warnings);
   const std::vector<std::uint32_t>& part = plan_.scene->part_of_instance;
@@ -211,6 +231,7 @@ void ImageMaker::tell(Summary& summary) const {
     end("blocked", fmt::format("{} pixels of blocked nozzles are fired by their neighbours", readable_count(moved_pixels_)));
   if (capped_rows_ > 0) end("repaired", fmt::format("{} rows are closed only thanks to repair", readable_count(capped_rows_)));
 
+  inspector_.tell(summary);
   nlohmann::ordered_json& facts = *summary.facts;
   facts["set_pixels"] = set_pixels_;
   facts["capped_rows"] = capped_rows_;

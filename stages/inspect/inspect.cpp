@@ -28,8 +28,8 @@ struct Inspection::Solids {
   void begin(Body& body) {
     // A part begins in the layer that holds its bottom, or in the one above: then its first pixels lie above a layer's middle.
     const std::uint32_t stand = all.owner_of(body, all.below_, body.top);
-    body.owner = stand;
-    body.open = stand != Body::kNone;  // it has the bottom of a part
+    body.owner = stand != Body::kNone ? stand : all.first_of_several(body);
+    body.open = body.owner != Body::kNone;  // it has the bottom of a part
     if (body.open) return;
     body.owner = all.owner_of(body, INT64_MIN, body.top);
     ++islands;
@@ -59,9 +59,9 @@ struct Inspection::Powder {
   }
   void join(const Body&, const Body&, const Body&) {}
   void end(const Body& body) {
-    if (body.open) return;
-    note(all.findings_.hollows, static_cast<double>(body.pixel_nm) * 1e-6 * all.pixel_mm2_,
-         all.spot(body.box, body.first_layer, body.bottom));
+    const double volume = static_cast<double>(body.pixel_nm) * 1e-6 * all.pixel_mm2_;
+    if (body.open || volume < all.least_mm_ * all.least_mm_ * all.least_mm_) return;
+    note(all.findings_.hollows, volume, all.spot(body.box, body.first_layer, body.bottom));
   }
 };
 
@@ -121,6 +121,20 @@ std::uint32_t Inspection::owner_of(const Body& body, std::int64_t from, std::int
     narrowest = area;
   }
   return owner;
+}
+
+/// The first of the copies that begin together as one piece, wider than the box of any; kNone if it is none of them.
+std::uint32_t Inspection::first_of_several(const Body& body) {
+  std::uint32_t first = Body::kNone;
+  for (std::uint32_t s = 0; s < stands_.size() && stands_[s].box.lo.z < body.top; ++s) {
+    if (stands_[s].box.lo.z < below_ || !window_[s].meets(body.box)) continue;
+    if (first != Body::kNone) {
+      note_touching(first, s, spot(body.box, body.first_layer, body.bottom));
+    } else {
+      first = s;
+    }
+  }
+  return first;
 }
 
 void Inspection::note_touching(std::uint32_t a, std::uint32_t b, const Spot& at) {

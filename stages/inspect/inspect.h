@@ -4,7 +4,7 @@
 //
 // codes   islands      pieces of layers with nothing below that are not the bottom of a part
 //         loose        bodies without the bottom of a part: they fall off
-//         hollows      powder that no way leads out from
+//         hollows      powder that no way leads out from, more than a cube of the least width
 //         thin         places narrower than the least width
 //         touching     parts that grow together
 //         bed-edge     layers that reach the edge of the image
@@ -76,6 +76,7 @@ class Inspection {
   void add(const Layer& layer, const RunsView& image, const ThinPlaces& thin);
   /// After the last layer.
   const Findings& finish();
+  const Findings& findings() const { return findings_; }
 
   std::uint64_t bytes() const {
     return solid_.bytes() + powder_.bytes() + bytes_held(between_.change) + bytes_held(between_.row_offset);
@@ -89,6 +90,7 @@ class Inspection {
   PixelBox window_of(const Box& box) const;
   bool stands_in(std::uint32_t stand, const Body& body) const;
   std::uint32_t owner_of(const Body& body, std::int64_t from, std::int64_t to) const;
+  std::uint32_t first_of_several(const Body& body);
   void note_touching(std::uint32_t a, std::uint32_t b, const Spot& at);
   void note_outgrown(const Layer& layer);
   void note_edges(const Layer& layer, const RunsView& image);
