@@ -7,6 +7,7 @@
 #include <numeric>
 
 #include "pipeline/machine/materials.h"
+#include "pipeline/run/powders.h"
 #include "stages/data/text/number_text.h"
 #include "stages/data/text/readable.h"
 #include "stages/geometry/isa.h"
@@ -33,6 +34,7 @@ class ImageMaker : public Maker {
   }
 
   Result<std::vector<std::uint32_t>> open() override {
+    if (Status status = refuse_mixed_powders(plan_, imager_); !status) return status.error();
     if (plan_.job.dry_run) {
       std::vector<std::uint32_t> all(plan_.range[1] - plan_.range[0]);
       std::iota(all.begin(), all.end(), plan_.range[0]);
@@ -133,15 +135,7 @@ class ImageMaker : public Maker {
 
   /// Counts what lies in the powder of another vat.
   void add_unfed(const LayerRecord& record) {
-    std::vector<std::uint64_t> pixels;
-    for (const ImageRecord& image : record.images) pixels.push_back(image.set_pixels);
-    const Materials& materials = plan_.images->materials;
-    const auto fed = vats_of_layer(plan_.images->machine->machine, materials, pixels);
-    for (std::size_t m = 0; fed && m < pixels.size(); ++m) {
-      if (pixels[m] == 0 || std::ranges::find(*fed, materials.used[m].vat) != fed->end()) continue;
-      if (unfed_[m].layers++ == 0) unfed_[m].first = record.layer;
-      unfed_[m].pixels += pixels[m];
-    }
+    for (std::size_t m = 0; m < record.images.size(); ++m) unfed_[m].add(record.layer, record.images[m].unfed_pixels);
   }
 
   void add(const LayerRecord& record) {
@@ -171,12 +165,12 @@ class ImageMaker : public Maker {
   bool timed_ = true;              // layers that an earlier build left are not
   double volume_mm3_ = 0;
   std::vector<std::pair<std::string, std::uint64_t>> materials_;  // name, set pixels
-  std::vector<sanity::UnfedPowder> unfed_;                        // by material
+  std::vector<UnfedPowder> unfed_;                                // by material
 };
 
 void ImageMaker::warn(const Summary&, std::vector<Warning>& warnings) const {
   sanity::warn_of_lost_pixels(lost_pixels_, warnings);
-  for (const sanity::UnfedPowder& powder : unfed_) sanity::warn_of_unfed(powder, warnings);
+  for (const UnfedPowder& powder : unfed_) sanity::warn_of_unfed(powder, warnings);
   const std::vector<std::uint32_t>& part = plan_.scene->part_of_instance;
   rows_.tell(part.empty() ? std::string() : plan_.scene->parts[part[rows_.first_capped()]].path, warnings);
 }
@@ -227,7 +221,13 @@ void ImageMaker::tell(Summary& summary) const {
     facts["lost_pixels"] = lost_pixels_;
   }
   if (!several) return;
-  for (const auto& [name, count] : materials_) facts["materials"].push_back({{"name", name}, {"set_pixels", count}});
+  for (std::size_t m = 0; m < materials_.size(); ++m) {
+    nlohmann::ordered_json& fact = facts["materials"].emplace_back();
+    fact = {{"name", materials_[m].first}, {"set_pixels", materials_[m].second}};
+    if (!plan_.images->machine) continue;
+    fact["unfed_pixels"] = unfed_[m].pixels;
+    fact["unfed_layers"] = unfed_[m].layers;
+  }
 }
 
 }  // namespace

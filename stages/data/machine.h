@@ -22,7 +22,7 @@ enum class BlockedRule : std::uint8_t {
 enum class LagUnit : std::uint8_t { kPixel, kTick };
 /// Where the first swath of a layer begins.
 enum class FirstSwath : std::uint8_t { kBed, kLayer };
-/// Which vat feeds a layer that holds both materials; kRefuse: there must be none.
+/// Which vat feeds a layer that holds both materials; kRefuse, the default: there must be none.
 enum class VatRule : std::uint8_t { kFirst, kSecond, kMajority, kBoth, kRefuse };
 
 /// Everything that a profile says. Checked by program::make_head_grid.
@@ -77,7 +77,7 @@ struct Machine {
   struct Powder {
     std::uint32_t vats = 1;
     std::vector<std::string> materials;  // what each vat holds; empty: whatever a job names, in that order
-    VatRule vat_rule = VatRule::kMajority;
+    VatRule vat_rule = VatRule::kRefuse;
     std::string build_axis = "Z";
     std::vector<std::string> feed_axes{"A", "B"};
     std::string roller_axis = "U";

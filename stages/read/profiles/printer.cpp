@@ -143,6 +143,10 @@ constexpr Key<Machine> kKeys[] = {
 
 }  // namespace
 
+std::string read_vat_rule(std::string_view text, VatRule& rule) { return read_word(kVats, text, rule); }
+std::string vat_rule_text(VatRule rule) { return write_word(kVats, rule); }
+std::vector<std::string_view> vat_rule_words() { return words_of(kVats); }
+
 std::string check_material(std::string_view name) {
   const bool good = !name.empty() && name.size() <= kLongestMaterial && std::ranges::all_of(name, [](unsigned char c) {
     return (c >= '0' && c <= '9') || (c >= 'A' && c <= 'Z') || (c >= 'a' && c <= 'z') || c == '-' || c == '_';

@@ -25,6 +25,7 @@ struct ProgramRecord {
 /// The image of one material, where a job has several.
 struct ImageRecord {
   std::uint64_t bytes = 0, set_pixels = 0;
+  std::uint64_t unfed_pixels = 0;  // of the set ones, in the powder of another vat; of a job with a machine
   Hash128 hash;
 };
 
