@@ -7,6 +7,7 @@
 #include <numeric>
 
 #include "pipeline/machine/materials.h"
+#include "pipeline/run/job_cost.h"
 #include "pipeline/run/powders.h"
 #include "stages/data/text/number_text.h"
 #include "stages/data/text/readable.h"
@@ -22,6 +23,7 @@ class ImageMaker : public Maker {
  public:
   ImageMaker(const Plan& plan, Sanity& sanity, const FlowLimits& limits)
       : plan_(plan), sanity_(sanity), imager_(plan), files_(plan), work_(limits.most_in_flight), made_(limits.record_slots) {
+    if (plan.images->machine) cost_.emplace(plan);
     for (const JobMaterial& material : plan.images->materials.used) {
       materials_.emplace_back(material.name, 0);
       unfed_.push_back({material.name});
@@ -69,6 +71,7 @@ class ImageMaker : public Maker {
       imager_.bleed(work.images);
       if (plan_.images->dose.bleeds()) sanity_.add_left(layer, work.images.runs);
       imager_.dose(layer, work.images, made.record);
+      if (cost_) cost_->count(work.images.runs, made.record);
       return Status();
     });
     if (plan_.job.dry_run) {
@@ -140,6 +143,7 @@ class ImageMaker : public Maker {
 
   void add(const LayerRecord& record) {
     if (plan_.images->machine && record.images.size() > 1) add_unfed(record);
+    if (cost_) cost_->add(record);
     const PixelGrid& grid = plan_.images->grid;
     set_pixels_ += record.set_pixels;
     moved_pixels_ += record.program.moved;
@@ -157,6 +161,7 @@ class ImageMaker : public Maker {
   ImageFiles files_;
   std::vector<Work> work_;
   std::vector<Made> made_;
+  std::optional<JobCost> cost_;  // of a job with a machine
 
   sanity::RowWarnings rows_;
   std::uint64_t set_pixels_ = 0, moved_pixels_ = 0, lost_pixels_ = 0, solid_pixels_ = 0, bead_pixels_ = 0, capped_rows_ = 0;
@@ -197,6 +202,7 @@ void ImageMaker::tell(Summary& summary) const {
     for (const auto& [name, count] : materials_) result("", fmt::format("{} of {}", readable_count(count), name));
   }
   if (print_seconds > 0) result("printing", replay::time_text(print_seconds, plan_.images->machine->machine.name));
+  if (timed_ && cost_) cost_->tell(summary);
   if (!summary.dry_run) {
     end("rate", fmt::format("{:.2f} Gpx/s, {:.1f} layers/s ({})", pixels_a_second / 1e9,
                             summary.layer_seconds > 0 ? summary.layers_planned / summary.layer_seconds : 0, isa));

@@ -89,6 +89,16 @@ struct Machine {
     double pause_s = 0;    // a layer, beside all movements: drying, wiping
     double packing = 0.6;  // share of the powder bed that is solid, for the report
   } powder;
+
+  /// Prices, in units of the currency; 0: none. Powder by volume is that of the bed, as fed.
+  struct Cost {
+    std::string currency = "EUR";
+    double hour_price = 0;  // of the machine
+    double binder_price_l = 0;
+    double powder_price_l = 0, powder_price_kg = 0, powder_kg_l = 0;  // a litre's price, or that of a kg and a litre's mass
+    double powder_reuse = 0;                                          // share of unbound powder that is used again
+    std::uint32_t spit_drops = 0;                                     // a layer, off the bed: they count as binder
+  } cost;
 };
 
 /// A powder that parts of a job are of.

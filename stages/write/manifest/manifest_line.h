@@ -92,6 +92,7 @@ void describe_images(Io& io, const ManifestHead& head, Record& record) {
     }
     io.close("]");
   }
+  io.list("part_pixels", record.part_pixels, [&](auto& pixels) { io.number("set", pixels); });
   if (head.machine.empty()) return;
   io.open("program", "{");
   io.number("bytes", record.program.bytes);
