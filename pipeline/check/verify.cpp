@@ -37,6 +37,18 @@ struct Finding {
   std::optional<replay::Count> count;  // of its replayed program
 };
 
+/// Empty, or what is wrong with the vats that feed a layer of a job of several materials.
+/// feeds  the vats that do, a bit each
+std::string fault_of_feeding(const Inspection& inspection, const LayerRecord& record, std::uint32_t feeds) {
+  std::vector<std::uint64_t> set, unfed;
+  std::vector<std::uint32_t> vats;
+  for (const ImageRecord& one : record.images) set.push_back(one.set_pixels), unfed.push_back(one.unfed_pixels);
+  for (const JobMaterial& material : inspection.head.materials) vats.push_back(material.vat);
+  const std::uint32_t wanted = replay::vats_wanted(inspection.machine->profile(), set, vats);
+  if (feeds != wanted) return fmt::format("{} where {} has to", replay::vats_text(feeds), replay::vats_text(wanted));
+  return replay::fault_of_unfed(set, vats, unfed, feeds);
+}
+
 // Empty, or the fault of a layer's print program. A program with the wrong hash is still replayed, because the replay
 // locates the difference.
 std::string fault_of_program(const Inspection& inspection, const LayerRecord& record, const RunsView* image,
@@ -62,15 +74,8 @@ std::string fault_of_program(const Inspection& inspection, const LayerRecord& re
                          1e-6 * static_cast<double>(told));
     }
     if (same && !inspection.head.materials.empty()) {
-      std::vector<std::uint64_t> set;
-      std::vector<std::uint32_t> vats;
-      for (const ImageRecord& one : record.images) set.push_back(one.set_pixels);
-      for (const JobMaterial& material : inspection.head.materials) vats.push_back(material.vat);
-      const std::uint32_t wanted = replay::vats_wanted(inspection.machine->profile(), set, vats);
-      if (replay->vats != wanted) {
-        return fmt::format("{}: layer {}: {} where {} has to", name, record.layer.index, replay::vats_text(replay->vats),
-                           replay::vats_text(wanted));
-      }
+      std::string fault = fault_of_feeding(inspection, record, replay->vats);
+      if (!fault.empty()) return fmt::format("{}: layer {}: {}", name, record.layer.index, fault);
     }
     count = *replay;
   }
@@ -134,6 +139,9 @@ void check_layers(const std::string& directory, const Manifest& manifest, bool q
   if (!manifest.head.machine.empty()) {
     prepare_replay(inspection);
     check_frame(directory, manifest.head, report);
+    if (report.unfed.empty()) {
+      for (const JobMaterial& material : manifest.head.materials) report.unfed.push_back({material.name});
+    }
   }
   // In chunks, so that messages and sums stay in layer order without a string for each of a hundred thousand layers.
   constexpr std::size_t kPiece = 1024;
@@ -149,6 +157,7 @@ void check_layers(const std::string& directory, const Manifest& manifest, bool q
       report.bytes += record.bytes + record.program.bytes;
       report.moved += record.program.moved;
       report.lost += record.program.lost;
+      for (std::size_t m = 0; m < report.unfed.size(); ++m) report.unfed[m].add(record.layer, record.images[m].unfed_pixels);
       if (found[i].count) report.replay.add(*found[i].count);
       report.replayed += found[i].count.has_value();
       if (!found[i].fault.empty()) report.add(std::move(found[i].fault));

@@ -3,7 +3,9 @@
 
 #include <cstdint>
 #include <string>
+#include <vector>
 
+#include "stages/data/layer.h"
 #include "stages/data/status.h"
 #include "stages/replay/count.h"
 
@@ -22,6 +24,7 @@ struct VerifyReport : Faults {
   std::uint64_t replayed = 0;         // layers
   replay::Count replay;               // sum over the replayed layers
   std::uint64_t moved = 0, lost = 0;  // pixels of blocked nozzles
+  std::vector<UnfedPowder> unfed;     // by material, of a job with several and a machine
   replay::Material material;          // used up
   double coverage = 0;                // drops / pixels of the replayed layers
 };

@@ -17,6 +17,10 @@
 #include "stages/heights/settings.h"
 #include "stages/segment/settings.h"
 
+namespace lamina {
+enum class VatRule : std::uint8_t;  // stages/data/machine.h
+}
+
 namespace lamina::pipeline {
 
 /// A different material between two heights, in mm above the bottom of a part. Where ranges overlap, the last one counts.
@@ -86,6 +90,7 @@ struct MachineRequest {
   std::string profile;                                // name of a shipped profile, or a file; empty: none
   std::optional<double> scan_speed_mm_s;              // instead of the profile's
   std::optional<std::vector<std::uint32_t>> blocked;  // instead of the profile's
+  std::optional<VatRule> vat_rule;                    // instead of the profile's
 };
 
 /// Section [dose]: the distribution of binder (stages/dose/).

@@ -1,10 +1,19 @@
 // Sections [machine] and [dose].
 #include "pipeline/job/keys.h"
+#include "stages/read/profiles/printer.h"
 
 namespace lamina::pipeline {
 namespace {
 
 using raster::BeadEnds;
+
+std::string read_rule(std::string_view text, std::optional<VatRule>& rule) {
+  VatRule read{};
+  std::string wrong = read::read_vat_rule(text, read);
+  if (wrong.empty()) rule = read;
+  return wrong;
+}
+std::string rule_text(const std::optional<VatRule>& rule) { return rule ? read::vat_rule_text(*rule) : std::string(); }
 
 constexpr Word<BeadEnds> kBeadEnds[] = {{"round", BeadEnds::kRound}, {"square", BeadEnds::kSquare}};
 
@@ -21,6 +30,11 @@ const JobKey kMachineKeys[] = {
         {"machine", "blocked", "--blocked", "N,N,...", "nozzles that do not fire, from 0, instead of the machine's",
          decides::images},
         {0, 65'534}),
+    custom<Job, read_rule, rule_text, &Job::machine, &MachineRequest::vat_rule>(
+        {"machine", "vat_rule", "--vat-rule", "RULE",
+         "vat that feeds a layer of two powders, instead of the machine's; refuse: there must be none", decides::images},
+        Form::kString)
+        .with_words(read::vat_rule_words),
 };
 
 const JobKey kDoseKeys[] = {

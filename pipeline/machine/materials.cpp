@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "stages/data/text/readable.h"
 #include "stages/data/text/value.h"
 
 namespace lamina::pipeline {
@@ -98,9 +99,18 @@ Result<std::vector<std::uint32_t>> vats_of_layer(const Machine& machine, const M
     case VatRule::kBoth: return std::vector<std::uint32_t>{0, 1};
     case VatRule::kRefuse: break;
   }
-  return Error{Fault::kUsage, fmt::format("holds {}, which powder.vat_rule of {} refuses; choose another rule, or move the "
-                                          "parts to other heights",
-                                          names_text(materials.used), machine.name)};
+  std::string held;
+  for (const std::uint32_t m : present) {
+    held += fmt::format("{}{} pixels of {}", held.empty() ? "" : " and ", readable_count(pixels[m]), materials.used[m].name);
+  }
+  return Error{Fault::kUsage,
+               fmt::format("{}, but {} feeds a layer from one vat; move the parts to other heights or into jobs of "
+                           "their own, or print it with --vat-rule majority, first, second or both",
+                           held, machine.name)};
+}
+
+std::uint64_t unfed_pixels(const JobMaterial& material, std::span<const std::uint32_t> feeds, std::uint64_t pixels) {
+  return std::ranges::find(feeds, material.vat) == feeds.end() ? pixels : 0;
 }
 
 }  // namespace lamina::pipeline

@@ -40,8 +40,11 @@ Result<Materials> materials_of(const Job& job, const Machine* machine);
 
 /// The vats that feed a layer with the given pixels of each material: for one material its vat; for several the machine's
 /// rule decides, the first vat on a tie; for an empty layer the vat of the job's first material.
-/// errors  kUsage by the rule `refuse`; the text continues "layer 12"
+/// errors  kUsage by the rule `refuse`; the text continues "layer 12: "
 Result<std::vector<std::uint32_t>> vats_of_layer(const Machine& machine, const Materials& materials,
                                                  std::span<const std::uint64_t> pixels);
+
+/// The pixels of a material that lie in another powder: all of them if its vat does not feed the layer, else 0.
+std::uint64_t unfed_pixels(const JobMaterial& material, std::span<const std::uint32_t> feeds, std::uint64_t pixels);
 
 }  // namespace lamina::pipeline

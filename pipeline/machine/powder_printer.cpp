@@ -31,7 +31,8 @@ Result<PowderPrinter> resolve_powder_printer(const Job& job) {
   const MachineRequest& request = job.machine;
   PowderPrinter printer;
   if (request.profile.empty()) {
-    if (request.scan_speed_mm_s || request.blocked) return wrong("machine.profile", "is missing; name one with --machine");
+    if (request.scan_speed_mm_s || request.blocked || request.vat_rule)
+      return wrong("machine.profile", "is missing; name one with --machine");
     printer.bed = bare_bed(job);
     const auto dpi = job.dpi.value_or(kBareDpi);
     printer.grid = {PixelAxis(dpi[0], nm_of(printer.bed.size_mm[0])), PixelAxis(dpi[1], nm_of(printer.bed.size_mm[1]))};
@@ -41,6 +42,7 @@ Result<PowderPrinter> resolve_powder_printer(const Job& job) {
   if (!found) return found.error();
   Machine& machine = *found;
   if (request.scan_speed_mm_s) machine.motion.scan_speed_mm_s = *request.scan_speed_mm_s;
+  if (request.vat_rule) machine.powder.vat_rule = *request.vat_rule;
   if (request.blocked) machine.head.blocked = *request.blocked;
   auto resolved = resolve_profile(machine);
   if (!resolved) return resolved.error();

@@ -74,6 +74,7 @@ Status ImageFiles::open() {
     auto kept = layers_that_hold(job.output, manifest_name(job), head_);
     if (!kept) return kept.error();
     kept_ = std::move(*kept);
+    for (LayerRecord& record : kept_) tell_unfed(record);
   }
   auto stands = kept_.begin();
   todo_.reserve(head_.last_layer - head_.first_layer - kept_.size());
@@ -152,15 +153,29 @@ Status ImageFiles::store(const Runs& whole, Work& work, LayerRecord& record) con
   return program(whole, work, record);
 }
 
-Status ImageFiles::program(const Runs& whole, Work& work, LayerRecord& record) const {
-  if (!program_) return {};
+Result<std::vector<std::uint32_t>> ImageFiles::feeds_of(const LayerRecord& record) const {
   std::vector<std::uint64_t> pixels;
   for (const LayerImageFile& image : layer_images(head_, record)) pixels.push_back(image.record.set_pixels);
-  const auto feeds = vats_of_layer(plan_.images->machine->machine, plan_.images->materials, pixels);
+  return vats_of_layer(plan_.images->machine->machine, plan_.images->materials, pixels);
+}
+
+void ImageFiles::tell_unfed(LayerRecord& record) const {
+  if (!program_ || record.images.empty()) return;
+  const auto feeds = feeds_of(record);
+  const auto& materials = plan_.images->materials.used;
+  for (std::size_t m = 0; feeds && m < materials.size(); ++m) {
+    record.images[m].unfed_pixels = unfed_pixels(materials[m], *feeds, record.images[m].set_pixels);
+  }
+}
+
+Status ImageFiles::program(const Runs& whole, Work& work, LayerRecord& record) const {
+  if (!program_) return {};
+  const auto feeds = feeds_of(record);
   if (!feeds) {
     return Error{feeds.error().fault, fmt::format("layer {} (z {:.3f} mm): {}", record.layer.index, mm(record.layer.plane()),
                                                   feeds.error().message)};
   }
+  tell_unfed(record);
   return program_->write_layer(record.layer, whole, *feeds, work.program, record.program);
 }
 

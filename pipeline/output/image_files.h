@@ -68,6 +68,8 @@ class ImageFiles {
 
  private:
   Status record_kept_below(std::uint32_t layer);
+  Result<std::vector<std::uint32_t>> feeds_of(const LayerRecord& record) const;
+  void tell_unfed(LayerRecord& record) const;
   Status encode_one(const Runs& image, Work& work, const LayerRecord& record, write::Bytes& file) const;
 
   const Plan& plan_;

@@ -180,15 +180,19 @@ Status judge(std::span<const Shard> shards, bool strict, bool allow_empty, Merge
   Job job;
   if (Status status = read_job_text(head.job_toml, shards.front().path, job); !status) return unmatched(status.error().message);
   sanity::LayerRecords records;
+  std::vector<UnfedPowder> unfed;
+  for (const JobMaterial& material : head.materials) unfed.push_back({material.name});
   bool timed = true;  // layers that an earlier build left are not
   for (const Shard& shard : shards) {
     for (const LayerRecord& record : shard.manifest.layers) {
       records.add(record.layer, record.set_pixels, record.program.lost, record.capped_rows);
+      for (std::size_t m = 0; m < unfed.size(); ++m) unfed[m].add(record.layer, record.images[m].unfed_pixels);
       report.microseconds += record.program.microseconds;
       timed = timed && (record.program.bytes == 0 || record.program.microseconds > 0);
     }
   }
   if (!timed) report.microseconds = 0;
+  for (const UnfedPowder& powder : unfed) sanity::warn_of_unfed(powder, report.warnings);
   const bool thins = fills(job) || job.dose.core < 1;
   const Status status = records.judge(head.parts, thins, allow_empty, report.warnings);
   return status && strict ? sanity::refuse_warnings(report.warnings) : status;

@@ -8,6 +8,8 @@
 
 #include "pipeline/machine/materials.h"
 #include "pipeline/run/inspector.h"
+#include "pipeline/run/job_cost.h"
+#include "pipeline/run/powders.h"
 #include "stages/data/text/number_text.h"
 #include "stages/data/text/readable.h"
 #include "stages/geometry/isa.h"
@@ -28,6 +30,7 @@ class ImageMaker : public Maker {
         files_(plan),
         work_(limits.most_in_flight),
         made_(limits.record_slots) {
+    if (plan.images->machine) cost_.emplace(plan);
     for (const JobMaterial& material : plan.images->materials.used) {
       materials_.emplace_back(material.name, 0);
       unfed_.push_back({material.name});
@@ -40,6 +43,7 @@ class ImageMaker : public Maker {
   }
 
   Result<std::vector<std::uint32_t>> open() override {
+    if (Status status = refuse_mixed_powders(plan_, imager_); !status) return status.error();
     if (plan_.job.dry_run) {
       std::vector<std::uint32_t> all(plan_.range[1] - plan_.range[0]);
       std::iota(all.begin(), all.end(), plan_.range[0]);
@@ -80,6 +84,7 @@ class ImageMaker : public Maker {
       imager_.bleed(work.images);
       if (plan_.images->dose.bleeds()) sanity_.add_left(layer, work.images.runs);
       imager_.dose(layer, work.images, made.record);
+      if (cost_) cost_->count(work.images.runs, made.record);
       return Status();
     });
     if (plan_.job.dry_run) {
@@ -151,19 +156,12 @@ class ImageMaker : public Maker {
 
   /// Counts what lies in the powder of another vat.
   void add_unfed(const LayerRecord& record) {
-    std::vector<std::uint64_t> pixels;
-    for (const ImageRecord& image : record.images) pixels.push_back(image.set_pixels);
-    const Materials& materials = plan_.images->materials;
-    const auto fed = vats_of_layer(plan_.images->machine->machine, materials, pixels);
-    for (std::size_t m = 0; fed && m < pixels.size(); ++m) {
-      if (pixels[m] == 0 || std::ranges::find(*fed, materials.used[m].vat) != fed->end()) continue;
-      if (unfed_[m].layers++ == 0) unfed_[m].first = record.layer;
-      unfed_[m].pixels += pixels[m];
-    }
+    for (std::size_t m = 0; m < record.images.size(); ++m) unfed_[m].add(record.layer, record.images[m].unfed_pixels);
   }
 
   void add(const LayerRecord& record) {
     if (plan_.images->machine && record.images.size() > 1) add_unfed(record);
+    if (cost_) cost_->add(record);
     const PixelGrid& grid = plan_.images->grid;
     set_pixels_ += record.set_pixels;
     moved_pixels_ += record.program.moved;
@@ -182,6 +180,7 @@ class ImageMaker : public Maker {
   ImageFiles files_;
   std::vector<Work> work_;
   std::vector<Made> made_;
+  std::optional<JobCost> cost_;  // of a job with a machine
 
   sanity::RowWarnings rows_;
   std::uint64_t set_pixels_ = 0, moved_pixels_ = 0, lost_pixels_ = 0, solid_pixels_ = 0, bead_pixels_ = 0, capped_rows_ = 0;
@@ -190,13 +189,13 @@ class ImageMaker : public Maker {
   bool timed_ = true;              // layers that an earlier build left are not
   double volume_mm3_ = 0;
   std::vector<std::pair<std::string, std::uint64_t>> materials_;  // name, set pixels
-  std::vector<sanity::UnfedPowder> unfed_;                        // by material
+  std::vector<UnfedPowder> unfed_;                                // by material
 };
 
 void ImageMaker::warn(const Summary&, std::vector<Warning>& warnings) const {
   inspector_.warn(warnings);
   sanity::warn_of_lost_pixels(lost_pixels_, warnings);
-  for (const sanity::UnfedPowder& powder : unfed_) sanity::warn_of_unfed(powder, warnings);
+  for (const UnfedPowder& powder : unfed_) sanity::warn_of_unfed(powder, warnings);
   const std::vector<std::uint32_t>& part = plan_.scene->part_of_instance;
   rows_.tell(part.empty() ? std::string() : plan_.scene->parts[part[rows_.first_capped()]].path, warnings);
 }
@@ -223,6 +222,7 @@ void ImageMaker::tell(Summary& summary) const {
     for (const auto& [name, count] : materials_) result("", fmt::format("{} of {}", readable_count(count), name));
   }
   if (print_seconds > 0) result("printing", replay::time_text(print_seconds, plan_.images->machine->machine.name));
+  if (timed_ && cost_) cost_->tell(summary);
   if (!summary.dry_run) {
     end("rate", fmt::format("{:.2f} Gpx/s, {:.1f} layers/s ({})", pixels_a_second / 1e9,
                             summary.layer_seconds > 0 ? summary.layers_planned / summary.layer_seconds : 0, isa));
@@ -248,7 +248,13 @@ void ImageMaker::tell(Summary& summary) const {
     facts["lost_pixels"] = lost_pixels_;
   }
   if (!several) return;
-  for (const auto& [name, count] : materials_) facts["materials"].push_back({{"name", name}, {"set_pixels", count}});
+  for (std::size_t m = 0; m < materials_.size(); ++m) {
+    nlohmann::ordered_json& fact = facts["materials"].emplace_back();
+    fact = {{"name", materials_[m].first}, {"set_pixels", materials_[m].second}};
+    if (!plan_.images->machine) continue;
+    fact["unfed_pixels"] = unfed_[m].pixels;
+    fact["unfed_layers"] = unfed_[m].layers;
+  }
 }
 
 }  // namespace

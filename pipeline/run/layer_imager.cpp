@@ -93,7 +93,8 @@ void LayerImager::dose(const Layer& layer, ImageWork& work, LayerRecord& record)
   images.dose.thin(layer.index, work.runs, work.second, work.third);
   if (images.materials.several() && (images.beads || images.dose.any())) work.materials.keep(work.runs);
   record.set_pixels = set_pixels(work.runs);
-  for (const Runs& image : work.materials.image) record.images.push_back({0, set_pixels(image), {}});
+  for (const Runs& image : work.materials.image)
+    record.images.push_back({.bytes = 0, .set_pixels = set_pixels(image), .unfed_pixels = 0, .hash = {}});
 }
 
 Status LayerImager::make(const Layer& layer, ImageWork& work, LayerRecord& record, ImageNotes& notes) const {

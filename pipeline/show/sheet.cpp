@@ -124,10 +124,12 @@ Result<Preview> draw_images(const Manifest& manifest, const PreviewRequest& requ
     const LayerRecord& record = manifest.layers[index];
     const auto images = layer_images(manifest.head, record);
     for (std::size_t m = 0; m < images.size(); ++m) {
-      const std::string material = manifest.head.materials.empty() ? "" : ", " + manifest.head.materials[m].name;
+      std::string material = manifest.head.materials.empty() ? "" : ", " + manifest.head.materials[m].name;
+      const bool unfed = images[m].record.unfed_pixels > 0;
+      if (unfed) material += " in another powder";
       sheet.layers.push_back({(std::filesystem::path(request.source) / images[m].name).string(),
                               fmt::format("layer {}{}", record.layer.index, material),
-                              fmt::format("z {:.3f} mm", mm(record.layer.plane()))});
+                              fmt::format("z {:.3f} mm", mm(record.layer.plane())), unfed});
     }
   }
   const auto read_runs = [](const std::string& path) -> Result<Runs> {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <string>
 #include <string_view>
 
 #include "stages/data/units.h"
@@ -49,6 +50,21 @@ struct Layer {
   /// it, so the upper one lies 1 nm under the top: a face that ends the layer is still cut.
   Nm lowest_plane() const { return bottom; }
   Nm highest_plane() const { return bottom + thickness - 1; }
+};
+
+/// Pixels of a powder in layers that the vat of another one feeds: its binder falls into that other powder.
+struct UnfedPowder {
+  std::string name;
+  std::uint64_t pixels = 0;
+  std::uint32_t layers = 0;
+  Layer first{};
+
+  /// In layer order.
+  void add(const Layer& layer, std::uint64_t of_layer) {
+    if (of_layer == 0) return;
+    if (layers++ == 0) first = layer;
+    pixels += of_layer;
+  }
 };
 
 }  // namespace lamina

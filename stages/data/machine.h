@@ -22,7 +22,7 @@ enum class BlockedRule : std::uint8_t {
 enum class LagUnit : std::uint8_t { kPixel, kTick };
 /// Where the first swath of a layer begins.
 enum class FirstSwath : std::uint8_t { kBed, kLayer };
-/// Which vat feeds a layer that holds both materials; kRefuse: there must be none.
+/// Which vat feeds a layer that holds both materials; kRefuse, the default: there must be none.
 enum class VatRule : std::uint8_t { kFirst, kSecond, kMajority, kBoth, kRefuse };
 
 /// Everything that a profile says. Checked by program::make_head_grid.
@@ -77,7 +77,7 @@ struct Machine {
   struct Powder {
     std::uint32_t vats = 1;
     std::vector<std::string> materials;  // what each vat holds; empty: whatever a job names, in that order
-    VatRule vat_rule = VatRule::kMajority;
+    VatRule vat_rule = VatRule::kRefuse;
     std::string build_axis = "Z";
     std::vector<std::string> feed_axes{"A", "B"};
     std::string roller_axis = "U";
@@ -89,6 +89,16 @@ struct Machine {
     double pause_s = 0;    // a layer, beside all movements: drying, wiping
     double packing = 0.6;  // share of the powder bed that is solid, for the report
   } powder;
+
+  /// Prices, in units of the currency; 0: none. Powder by volume is that of the bed, as fed.
+  struct Cost {
+    std::string currency = "EUR";
+    double hour_price = 0;  // of the machine
+    double binder_price_l = 0;
+    double powder_price_l = 0, powder_price_kg = 0, powder_kg_l = 0;  // a litre's price, or that of a kg and a litre's mass
+    double powder_reuse = 0;                                          // share of unbound powder that is used again
+    std::uint32_t spit_drops = 0;                                     // a layer, off the bed: they count as binder
+  } cost;
 };
 
 /// A powder that parts of a job are of.

@@ -1,5 +1,7 @@
 #include "stages/replay/feeding.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 
 namespace lamina::replay {
@@ -18,6 +20,18 @@ std::uint32_t vats_wanted(const Machine& machine, std::span<const std::uint64_t>
     case VatRule::kRefuse: break;
   }
   return 0;
+}
+
+std::string fault_of_unfed(std::span<const std::uint64_t> set, std::span<const std::uint32_t> vat,
+                           std::span<const std::uint64_t> recorded, std::uint32_t feeds) {
+  const auto none = [](std::uint64_t pixels) { return pixels == 0; };
+  if (std::ranges::all_of(recorded, none)) return {};
+  for (std::size_t m = 0; m < set.size(); ++m) {
+    const std::uint64_t unfed = (feeds >> vat[m] & 1) != 0 ? 0 : set[m];
+    if (recorded[m] == unfed) continue;
+    return fmt::format("{} pixels of material {} lie in another powder, the manifest says {}", unfed, m, recorded[m]);
+  }
+  return {};
 }
 
 std::string vats_text(std::uint32_t vats) {

@@ -16,6 +16,11 @@ namespace lamina::replay {
 /// vat  of each material
 std::uint32_t vats_wanted(const Machine& machine, std::span<const std::uint64_t> set, std::span<const std::uint32_t> vat);
 
+/// Empty, or which material is recorded to have other pixels in the powder of another vat than `feeds` leaves it; records of
+/// older builds have none. feeds  a bit for each vat
+std::string fault_of_unfed(std::span<const std::uint64_t> set, std::span<const std::uint32_t> vat,
+                           std::span<const std::uint64_t> recorded, std::uint32_t feeds);
+
 /// "both vats feed"
 std::string vats_text(std::uint32_t vats);
 

@@ -59,7 +59,7 @@ void warn_of_unfed(const UnfedPowder& powder, std::vector<Warning>& warnings) {
   warnings.push_back(
       {"mixed-powders",
        fmt::format("{} pixels of {} in {} layers lie in another powder, whose vat feeds those layers, first in layer {} at z "
-                   "{:.3f} mm; powder.vat_rule says which vat feeds, refuse ends such a job",
+                   "{:.3f} mm; --vat-rule says which vat feeds, refuse ends such a job",
                    readable_count(powder.pixels), one_line(powder.name), powder.layers, powder.first.index, z),
        "", powder.first.index, z});
 }

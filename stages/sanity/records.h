@@ -35,13 +35,6 @@ class LayerRecords {
 /// Pixels of blocked nozzles that nothing fires; no warning if there are none.
 void warn_of_lost_pixels(std::uint64_t pixels, std::vector<Warning>& warnings);
 
-/// Pixels of a powder in layers that the vat of another one feeds: its binder falls into that other powder.
-struct UnfedPowder {
-  std::string name;
-  std::uint64_t pixels = 0;
-  std::uint32_t layers = 0;
-  Layer first{};
-};
 /// No warning if there are none.
 void warn_of_unfed(const UnfedPowder& powder, std::vector<Warning>& warnings);
 

@@ -8,6 +8,7 @@
 #include "stages/data/text/json_text.h"
 #include "stages/data/text/readable.h"
 #include "stages/replay/time/totals.h"
+#include "stages/sanity/records.h"
 
 namespace lamina::pipeline {
 namespace {
@@ -42,6 +43,9 @@ Json report_json(const VerifyReport& report) {
   Json json = {{"command", "verify"},   {"directory", report.directory},     {"ok", report.ok()}, {"layers", report.layers},
                {"bytes", report.bytes}, {"fault_count", report.fault_count}, {"faults", faults}};
   if (!report.machine.empty()) json["replay"] = replay::totals_json(totals_of(report));
+  for (const UnfedPowder& powder : report.unfed) {
+    json["unfed"].push_back({{"material", powder.name}, {"pixels", powder.pixels}, {"layers", powder.layers}});
+  }
   return json;
 }
 
@@ -68,6 +72,9 @@ Outcome run_verify(const Arguments& arguments, Context& context) {
                              readable_bytes(report->bytes)));
       if (report->replayed > 0) {
         for (const std::string& line : replay::totals_text(totals_of(*report))) answer.say(line);
+        std::vector<Warning> doubts;
+        for (const UnfedPowder& powder : report->unfed) sanity::warn_of_unfed(powder, doubts);
+        for (const Warning& doubt : doubts) answer.say("warning   " + one_line(doubt.text));
       }
       if (Status status = answer.status(); !status) return status;
     }

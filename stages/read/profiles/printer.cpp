@@ -39,13 +39,22 @@ using Head = decltype(Machine::head);
 using Mounting = decltype(Machine::mounting);
 using Motion = decltype(Machine::motion);
 using Powder = decltype(Machine::powder);
+constexpr auto kCost = &Machine::cost;
+using Cost = decltype(Machine::cost);
 
 constexpr double kMost = 1e9;
-constexpr Limits kAny{-kMost, kMost}, kDpi{0, 25'400}, kLength{kLeastMm, kMostMm, " mm"}, kSpeed{1e-3, 1e6, " mm/s"};
+constexpr Limits kAny{-kMost, kMost}, kDpi{0, 25'400}, kLength{kLeastMm, kMostMm, " mm"}, kSpeed{1e-3, 1e6, " mm/s"},
+    kPrice{0, 1e6};
 
 constexpr std::size_t kLongestMaterial = 40;
 
 std::string check_nothing(Text) { return {}; }
+
+std::string check_currency(Text text) {
+  const bool good =
+      !text.empty() && text.size() <= 8 && std::ranges::all_of(text, [](unsigned char c) { return c > ' ' && c != 127; });
+  return good ? std::string() : "is a short word without blanks, such as EUR";
+}
 
 std::string check_axis(Text text) {
   if (text.size() == 1 && text[0] >= 'A' && text[0] <= 'Z') return {};
@@ -139,9 +148,22 @@ constexpr Key<Machine> kKeys[] = {
     field<kPowder, &Powder::spread_s>({"powder", "spread_s"}, {0, 1e5, " s"}).unsaid_at("0"),
     field<kPowder, &Powder::pause_s>({"powder", "pause_s"}, {0, 1e5, " s"}).unsaid_at("0"),
     field<kPowder, &Powder::packing>({"powder", "packing"}, {0.01, 1}),
+
+    text<check_currency, kCost, &Cost::currency>({"cost", "currency"}).unsaid_at("EUR"),
+    field<kCost, &Cost::hour_price>({"cost", "hour_price"}, kPrice).unsaid_at("0"),
+    field<kCost, &Cost::binder_price_l>({"cost", "binder_price_l"}, kPrice).unsaid_at("0"),
+    field<kCost, &Cost::powder_price_l>({"cost", "powder_price_l"}, kPrice).unsaid_at("0"),
+    field<kCost, &Cost::powder_price_kg>({"cost", "powder_price_kg"}, kPrice).unsaid_at("0"),
+    field<kCost, &Cost::powder_kg_l>({"cost", "powder_kg_l"}, {0, 30}).unsaid_at("0"),
+    field<kCost, &Cost::powder_reuse>({"cost", "powder_reuse"}, {0, 1}).unsaid_at("0"),
+    field<kCost, &Cost::spit_drops>({"cost", "spit_drops"}, {0, 1e9}).unsaid_at("0"),
 };
 
 }  // namespace
+
+std::string read_vat_rule(std::string_view text, VatRule& rule) { return read_word(kVats, text, rule); }
+std::string vat_rule_text(VatRule rule) { return write_word(kVats, rule); }
+std::vector<std::string_view> vat_rule_words() { return words_of(kVats); }
 
 std::string check_material(std::string_view name) {
   const bool good = !name.empty() && name.size() <= kLongestMaterial && std::ranges::all_of(name, [](unsigned char c) {

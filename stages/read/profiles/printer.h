@@ -4,6 +4,7 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "stages/data/machine.h"
 #include "stages/data/status.h"
@@ -21,6 +22,11 @@ std::string machine_text(const Machine& machine);
 
 /// The same as jobs keep it, without younger keys at their defaults: equal machines have equal texts in older jobs too.
 std::string kept_machine_text(const Machine& machine);
+
+/// The words of powder.vat_rule. returns "" or an error message
+std::string read_vat_rule(std::string_view text, VatRule& rule);
+std::string vat_rule_text(VatRule rule);
+std::vector<std::string_view> vat_rule_words();
 
 /// An error in the name of a material, or "". Names consist of letters, digits, - and _, because file names contain them.
 std::string check_material(std::string_view name);

@@ -112,7 +112,7 @@ std::string layer_file_name(std::uint32_t index, std::string_view extension, std
 std::vector<LayerImageFile> layer_images(const ManifestHead& head, const LayerRecord& record) {
   std::vector<LayerImageFile> files;
   if (head.materials.empty()) {
-    files.push_back({layer_file_name(record.layer.index, head.extension), {record.bytes, record.set_pixels, record.hash}});
+    files.push_back({layer_file_name(record.layer.index, head.extension), {record.bytes, record.set_pixels, 0, record.hash}});
   }
   for (std::size_t m = 0; m < head.materials.size(); ++m) {
     files.push_back({layer_file_name(record.layer.index, head.extension, head.materials[m].name),

@@ -86,11 +86,13 @@ void describe_images(Io& io, const ManifestHead& head, Record& record) {
       io.fixed("file", layer_file_name(record.layer.index, head.extension, head.materials[m].name));
       io.number("bytes", image.bytes);
       io.number("set_pixels", image.set_pixels);
+      if (!head.machine.empty()) io.added("unfed_pixels", image.unfed_pixels);
       io.hash("xxh3_128", image.hash);
       io.close("}");
     }
     io.close("]");
   }
+  io.list("part_pixels", record.part_pixels, [&](auto& pixels) { io.number("set", pixels); });
   if (head.machine.empty()) return;
   io.open("program", "{");
   io.number("bytes", record.program.bytes);

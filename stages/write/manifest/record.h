@@ -25,6 +25,7 @@ struct ProgramRecord {
 /// The image of one material, where a job has several.
 struct ImageRecord {
   std::uint64_t bytes = 0, set_pixels = 0;
+  std::uint64_t unfed_pixels = 0;  // of the set ones, in the powder of another vat; of a job with a machine
   Hash128 hash;
 };
 
@@ -59,9 +60,10 @@ struct LayerRecord {
 
   // --- images
   std::uint64_t set_pixels = 0;
-  std::uint32_t capped_rows = 0;    // rows closed only by repair (stages/load)
-  ProgramRecord program;            // zeros without a machine
-  std::vector<ImageRecord> images;  // one per material, if the job has several
+  std::uint32_t capped_rows = 0;           // rows closed only by repair (stages/load)
+  ProgramRecord program;                   // zeros without a machine
+  std::vector<ImageRecord> images;         // one per material, if the job has several
+  std::vector<std::uint64_t> part_pixels;  // set ones of each part, of a job with prices and several parts; else empty
 
   std::shared_ptr<const PathFacts> paths;  // null for images
 };

@@ -12,7 +12,8 @@
 namespace lamina::write::picture {
 namespace {
 
-constexpr Colour kGround{250, 248, 243}, kPaper{255, 255, 255}, kFrame{214, 208, 196}, kInk{27, 38, 59}, kQuiet{120, 116, 108};
+constexpr Colour kGround{250, 248, 243}, kPaper{255, 255, 255}, kFrame{214, 208, 196}, kInk{27, 38, 59}, kQuiet{120, 116, 108},
+    kWarning{217, 72, 15};
 
 /// Calls use(index, runs) for each layer's image, from several threads. The error is that of the first layer with one.
 template <class Use>
@@ -77,7 +78,7 @@ void draw_frame(Canvas& canvas, const SheetRequest& request, const SheetLayout& 
   const SheetLayer& layer = request.layers[static_cast<std::size_t>(cell)];
   const int baseline = top + layout.cell_height + layout.caption_size * 5 / 4, size = layout.caption_size;
   const int remark_width = text_width(layer.remark, size), name_width = text_width(layer.name, size);
-  canvas.text(left, baseline, size, fitted(layer.name, size, layout.cell_width), kInk);
+  canvas.text(left, baseline, size, fitted(layer.name, size, layout.cell_width), layer.warns ? kWarning : kInk);
   if (name_width + size / 2 + remark_width <= layout.cell_width) {
     canvas.text(left + layout.cell_width - remark_width, baseline, size, layer.remark, kQuiet);
   }
@@ -101,7 +102,7 @@ Result<Buffer<std::byte>> contact_sheet(const SheetRequest& request, const ReadI
     coverage(runs, *window, static_cast<std::uint32_t>(layout.picture_width), shares);
     const int cell = static_cast<int>(index);
     const int left = layout.cell_left(cell) + (layout.cell_width - layout.picture_width) / 2;
-    canvas.paint(left, layout.cell_top(cell), layout.picture_width, shares, kInk);
+    canvas.paint(left, layout.cell_top(cell), layout.picture_width, shares, request.layers[index].warns ? kWarning : kInk);
   });
   if (!status) return status.error();
   return canvas.png();

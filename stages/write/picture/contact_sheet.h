@@ -16,6 +16,7 @@ namespace lamina::write::picture {
 struct SheetLayer {
   std::string path;          // of the image
   std::string name, remark;  // below the cell, on the left and on the right
+  bool warns = false;        // drawn in orange, its name too
 };
 
 struct SheetRequest {

@@ -1,0 +1,70 @@
+#include "pipeline/run/powders.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "pipeline/plan/heights.h"
+#include "stages/sanity/mixed.h"
+
+namespace lamina::pipeline {
+namespace {
+
+/// The heights of a part by material, one after the other.
+void add_stretches(const PartMaterial& part, const Box& box, std::vector<sanity::PowderStretch>& stretches) {
+  std::vector<std::int64_t> ends{box.lo.z, box.hi.z};
+  for (const PartMaterial::Range& range : part.ranges) {
+    for (const std::int64_t end : {range.from, range.to}) {
+      if (end > box.lo.z && end < box.hi.z) ends.push_back(end);
+    }
+  }
+  std::ranges::sort(ends);
+  for (std::size_t i = 0; i + 1 < ends.size(); ++i) {
+    stretches.push_back({ends[i], ends[i + 1], part.at(static_cast<Nm>(ends[i]))});
+  }
+}
+
+/// Layers of the job that can hold several materials.
+std::vector<sanity::LayerRange> layers_in_question(const Plan& plan) {
+  const Scene& scene = *plan.scene;
+  std::vector<sanity::PowderStretch> stretches;
+  for (std::size_t i = 0; i < scene.instances.size(); ++i) {
+    const PartMaterial& part = plan.images->materials.part[scene.part_of_instance[i]];
+    add_stretches(part, box_of(scene, scene.instances[i]), stretches);
+  }
+  std::vector<Nm> planes;
+  for (std::uint32_t i = plan.range[0]; i < plan.range[1]; ++i)
+    planes.push_back(plane_of(plan.job, plan.layer(i), scene.height));
+  const auto materials = static_cast<std::uint32_t>(plan.images->materials.used.size());
+  std::vector<sanity::LayerRange> ranges = sanity::mixed_layers(std::move(stretches), materials, planes);
+  for (sanity::LayerRange& range : ranges) range = {range[0] + plan.range[0], range[1] + plan.range[0]};
+  return ranges;
+}
+
+}  // namespace
+
+Status refuse_mixed_powders(const Plan& plan, const LayerImager& imager) {
+  const ImagePlan& images = *plan.images;
+  if (!images.machine || !images.materials.several()) return {};
+  const Machine& machine = images.machine->machine;
+  if (machine.powder.vat_rule != VatRule::kRefuse) return {};
+  const auto ranges = layers_in_question(plan);
+  ImageWork work;
+  for (const auto& [first, last] : ranges) {
+    for (std::uint32_t i = first; i <= last; ++i) {
+      const Layer layer = plan.layer(i);
+      LayerRecord record;
+      ImageNotes notes;
+      if (Status status = imager.make(layer, work, record, notes); !status) return status;
+      std::vector<std::uint64_t> pixels;
+      for (const ImageRecord& image : record.images) pixels.push_back(image.set_pixels);
+      const auto feeds = vats_of_layer(machine, images.materials, pixels);
+      if (feeds) continue;
+      return Error{Fault::kUsage, fmt::format("{} mix powders, by the heights of their parts; layer {} (z {:.3f} mm) has {}",
+                                              sanity::ranges_text(ranges), i, mm(layer.plane()), feeds.error().message)};
+    }
+  }
+  return {};
+}
+
+}  // namespace lamina::pipeline

@@ -1,0 +1,15 @@
+// pipeline/run/powders.h: refuses jobs whose layers would need two powders at once.
+#pragma once
+
+#include "pipeline/plan/plan.h"
+#include "pipeline/run/image_maker.h"
+
+namespace lamina::pipeline {
+
+/// By the rule `refuse`: looks, before anything is written, for a layer of the job's range with pixels of two materials, among
+/// those whose parts' heights allow it.
+/// errors  kUsage: names these layers, and the pixels of each material in the first one that has both
+/// cost    one layer's image as a rule; more only where parts stand at the same height without pixels
+Status refuse_mixed_powders(const Plan& plan, const LayerImager& imager);
+
+}  // namespace lamina::pipeline

@@ -1,0 +1,49 @@
+// stages/cost/part_pixels.h: the set pixels of each part in the image of all.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "stages/data/grid.h"
+#include "stages/data/layer.h"
+#include "stages/data/mesh.h"
+#include "stages/data/runs.h"
+
+namespace lamina::cost {
+
+/// A part's body on the bed.
+struct Body {
+  Box box;                  // nm
+  std::uint32_t part = 0;   // of the job
+  std::uint32_t group = 0;  // bodies whose boxes touch seen from above; boxes around groups do not overlap
+};
+
+/// Windows of bodies in the images of a bed. Exact where boxes seen from above lie apart. In a group of several parts the
+/// group's pixels of a layer are shared by what is set in the windows of those bodies that reach the layer: exact again where
+/// these windows have no set pixel in common.
+class PartPixels {
+ public:
+  /// groups  numbered from 0. mirror_x, mirror_y  of the images
+  PartPixels(std::span<const Body> bodies, std::size_t parts, const PixelGrid& grid, bool mirror_x, bool mirror_y);
+
+  /// The pixels of each part; their sum is that of the groups. cost  rows of windows x log of a row's runs
+  std::vector<std::uint64_t> count(const Layer& layer, const RunsView& runs) const;
+
+ private:
+  struct Window {
+    std::uint32_t left = 0, right = 0, top = 0, bottom = 0;  // [left, right) x [top, bottom)
+    std::int64_t low = 0, high = 0;                          // nm
+    std::uint32_t part = 0;
+  };
+  struct Group {
+    Window around;
+    std::vector<Window> bodies;
+    bool one_part = true;
+  };
+  static std::uint64_t pixels_in(const Window& window, const RunsView& runs);
+  std::vector<Group> groups_;
+  std::size_t parts_;
+};
+
+}  // namespace lamina::cost

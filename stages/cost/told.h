@@ -1,0 +1,22 @@
+// stages/cost/told.h: what a job uses up and costs, for people and for programs.
+#pragma once
+
+#include <nlohmann/json_fwd.hpp>
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "stages/cost/cost.h"
+
+namespace lamina::cost {
+
+/// Lines with their names: binder and powder; with prices the cost, and that of each part if there are several.
+/// names  of the parts
+std::vector<std::pair<std::string, std::string>> lines_of(const Quote& quote, const Machine::Cost& cost,
+                                                          std::span<const std::string> names);
+
+/// An object: hours, litres and, with prices, the currency's units of the job; the same of each part under "parts".
+nlohmann::ordered_json json_of(const Quote& quote, const Machine::Cost& cost, std::span<const std::string> names);
+
+}  // namespace lamina::cost
