@@ -91,10 +91,12 @@ Result<Coverage> Coverage::build(std::span<Mesh> meshes, std::span<const Instanc
   State& state = *coverage.state_;
   for (const Instance& instance : instances) state.copies.push_back({instance.mesh, instance.offset, true});
   find_alone(meshes, state.copies);
-  for (std::shared_ptr<MeshBlocks>& blocks : take_blocks(meshes)) {
-    SlabIndex index(blocks->bounds());
-    Suspects suspects = find_suspects(*blocks, index);
-    state.meshes.push_back({std::move(blocks), std::move(index), std::move(suspects)});
+  std::vector<std::shared_ptr<MeshBlocks>> blocks = take_blocks(meshes);
+  for (std::size_t i = 0; i < blocks.size(); ++i) {
+    meshes[i].blocks = blocks[i];
+    SlabIndex index(blocks[i]->bounds());
+    Suspects suspects = find_suspects(*blocks[i], index);
+    state.meshes.push_back({std::move(blocks[i]), std::move(index), std::move(suspects)});
   }
   return coverage;
 }

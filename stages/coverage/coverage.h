@@ -43,7 +43,7 @@ struct LayerReport {
 /// Immutable once built; layers may be asked for from any number of threads.
 class Coverage {
  public:
-  /// meshes     triangles are moved out of them, into blocks, unless they are there (mesh_blocks.h); blocks are shared
+  /// meshes     triangles are moved into Mesh::blocks, unless they are there: whoever indexes the meshes next shares these
   /// instances  where copies stand; every corner within the grid's bed and below kNmReach
   /// levels     2 .. 256 of them; 2, 4 and 16 are what drops come in
   /// errors     kInput if a mesh is open (Mesh::closed); kUsage for another number of levels

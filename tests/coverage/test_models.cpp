@@ -138,5 +138,26 @@ TEST(CoverageModels, RealPartsHaveTheLevelsOfTheContract) {
             << " of them partly full\n";
 }
 
+TEST(CoverageModels, SharesOfAllLayersAddUpToTheVolumeOfThePart) {
+  const char* folder = std::getenv("LAMINA_MODELS");
+  if (folder == nullptr) GTEST_SKIP() << "LAMINA_MODELS is not set: volumes of large real parts were NOT compared";
+  for (const char* name : {"dental_crown.stl", "nist_part_feature_open.stl", "stanford_bunny.stl"}) {
+    CoveredModel model;
+    ASSERT_TRUE(load_model(std::string(folder) + "/" + name, 200, model)) << name;
+    double whole = 0, sum = 0;
+    for (const Mesh& mesh : model.meshes) whole += mesh.volume_mm3;
+    auto coverage = cover::Coverage::build(model.meshes, model.instances, model.grid, FillRule::kNonzero, 4);
+    ASSERT_TRUE(coverage.ok());
+    cover::LayerScratch scratch;
+    Levels image;
+    const Nm thickness = 178'000;
+    for (std::uint32_t i = 0; static_cast<Nm>(i) * thickness < model.height; ++i) {
+      sum += coverage->layer({i, static_cast<Nm>(i) * thickness, thickness}, scratch, image).volume_mm3;
+    }
+    EXPECT_NEAR(sum, whole, 1e-6 * whole) << name;
+    std::cout << name << ": shares add up to the volume within " << std::abs(sum / whole - 1) << '\n';
+  }
+}
+
 }  // namespace
 }  // namespace lamina::test

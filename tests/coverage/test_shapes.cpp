@@ -2,10 +2,12 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <iostream>
 #include <numbers>
 #include <random>
 
 #include "stages/coverage/coverage.h"
+#include "stages/raster/raster.h"
 #include "tests/coverage/oracle.h"
 #include "tests/raster/shapes.h"
 
@@ -189,6 +191,61 @@ TEST(CoverageShapes, RandomTetrahedraOnEdgesAndOffThemHaveTheLevelsOfTheContract
     expect_levels(random_tetrahedra(1 + static_cast<int>(seed / 2), pick), kSmall, layers_of(100'000, 2));
     if (HasFailure()) FAIL() << "seed " << seed;
   }
+}
+
+/// Whether a pixel or one of its eight neighbours differs from it.
+bool is_beside_a_change(const std::vector<std::vector<bool>>& set, int row, int column) {
+  for (int r = row - 1; r <= row + 1; ++r) {
+    for (int c = column - 1; c <= column + 1; ++c) {
+      if (set[static_cast<std::size_t>(r)][static_cast<std::size_t>(c)] !=
+          set[static_cast<std::size_t>(row)][static_cast<std::size_t>(column)]) {
+        return true;
+      }
+    }
+  }
+  return false;
+}
+
+std::vector<std::vector<bool>> bits_of(const RunsView& runs) {
+  std::vector<std::vector<bool>> set(runs.rows(), std::vector<bool>(runs.columns));
+  for (std::uint32_t r = 0; r < runs.rows(); ++r) {
+    const auto row = runs.row(r);
+    for (std::size_t i = 0; i + 1 < row.size(); i += 2) std::fill(set[r].begin() + row[i], set[r].begin() + row[i + 1], true);
+  }
+  return set;
+}
+
+TEST(CoverageShapes, TwoLevelsDifferFromTheBitmapOnlyBesideItsBoundary) {
+  const PixelGrid grid{{600, 8'000'000}, {600, 8'000'000}};
+  const Triangles part = ball({4'000'000, 4'000'000, 3'000'000}, 2'900'000, 60);
+  Mesh of_voxels = make_mesh(part);
+  const Instance instance{0, {0, 0, 0}};
+  auto coverage = cover::Coverage::build({&of_voxels, 1}, {&instance, 1}, grid, FillRule::kNonzero, 2);
+  auto rasterizer = raster::Rasterizer::build({&of_voxels, 1}, {&instance, 1}, grid, FillRule::kNonzero, false, true);
+  cover::LayerScratch scratch;
+  raster::LayerScratch of_pixels;
+  Levels levels;
+  Runs pixels, full;
+  std::uint64_t differ = 0, solid = 0, far = 0;
+  for (const Layer& layer : layers_of(100'000, 59, 50'000)) {
+    coverage->layer(layer, scratch, levels);
+    rasterizer->layer(raster::Engine::kContours, layer.plane(), of_pixels, pixels);
+    at_least(levels, 1, full);
+    const auto of_bitmap = bits_of(pixels), of_shares = bits_of(full);
+    for (int r = 1; r + 1 < static_cast<int>(grid.rows()); ++r) {
+      for (int c = 1; c + 1 < static_cast<int>(grid.columns()); ++c) {
+        const auto row = static_cast<std::size_t>(r), column = static_cast<std::size_t>(c);
+        solid += of_bitmap[row][column] ? 1 : 0;
+        if (of_bitmap[row][column] == of_shares[row][column]) continue;
+        ++differ;
+        far += is_beside_a_change(of_bitmap, r, c) ? 0 : 1;
+      }
+    }
+  }
+  EXPECT_EQ(far, 0u);
+  EXPECT_GT(differ, 0u);
+  EXPECT_LT(static_cast<double>(differ), 0.01 * static_cast<double>(solid));
+  std::cout << differ << " of " << solid << " pixels differ, all beside the boundary\n";
 }
 
 TEST(CoverageShapes, AnOpenMeshIsRefused) {
