@@ -1,6 +1,7 @@
 // stages/coverage/edges.h: where voxels end along a side of the bed.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 
 #include "stages/data/buffer.h"
@@ -17,12 +18,17 @@ class Edges {
   explicit Edges(const PixelAxis& axis) : per_nm_(axis.pixels_per_nm()) {
     edge_.resize(std::size_t{axis.count} + 1);
     for (std::uint32_t i = 0; i <= axis.count; ++i) edge_[i] = static_cast<double>(edge(axis, i));
-    for (std::uint32_t i = 0; i < axis.count; ++i) widest_ = std::max(widest_, width(i));
+    narrowest_ = static_cast<double>(axis.span);
+    for (std::uint32_t i = 0; i < axis.count; ++i) {
+      widest_ = std::max(widest_, width(i));
+      narrowest_ = std::min(narrowest_, width(i));
+    }
   }
 
   double operator[](std::uint32_t i) const { return edge_[i]; }
   double width(std::uint32_t i) const { return edge_[i + 1] - edge_[i]; }
   double widest() const { return widest_; }
+  double narrowest() const { return narrowest_; }
   std::uint32_t count() const { return static_cast<std::uint32_t>(edge_.size() - 1); }
   std::uint64_t bytes() const { return bytes_held(edge_); }
 
@@ -37,7 +43,7 @@ class Edges {
 
  private:
   double per_nm_;
-  double widest_ = 0;
+  double widest_ = 0, narrowest_ = 0;
   Buffer<double> edge_;
 };
 

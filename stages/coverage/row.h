@@ -48,7 +48,7 @@ class RowMaker {
     std::span<const std::uint32_t> row;
     Levels& out;
     LayerReport& report;
-    double area, margin;  // nm^2 of the strip's section; nm^2 by which a facet's corners spoil a voxel for each nm they are off
+    double area, margin;  // nm^2 of the strip's section; the share that is spoilt for each nm that corners are off
   };
 
   void add(const Strip& strip, const Edges& edges, SlabFacet& facet);
