@@ -16,7 +16,7 @@ add_library(lamina_fuzzed STATIC ${fuzzed} ${PROJECT_BINARY_DIR}/shipped_machine
                                  ${PROJECT_BINARY_DIR}/shipped_extruders.cpp tests/fuzz/target.cpp tests/fuzz/laws.cpp)
 target_include_directories(lamina_fuzzed PUBLIC ${PROJECT_SOURCE_DIR})
 target_link_libraries(lamina_fuzzed PUBLIC TBB::tbb Eigen3::Eigen fmt::fmt PNG::PNG ZLIB::ZLIB EXPAT::EXPAT
-                      PkgConfig::POLYCLIPPING PkgConfig::MUPARSER PkgConfig::XXHASH nlohmann_json::nlohmann_json
+                      PkgConfig::POLYCLIPPING PkgConfig::MUPARSER PkgConfig::GMPXX PkgConfig::XXHASH nlohmann_json::nlohmann_json
                       ${CMAKE_DL_LIBS})
 target_include_directories(lamina_fuzzed SYSTEM PUBLIC ${lamina_late_headers})
 target_compile_options(lamina_fuzzed PUBLIC -fsanitize=fuzzer-no-link -fno-sanitize-recover=all)

@@ -37,7 +37,7 @@ endif()
 target_include_directories(lamina_stages PUBLIC $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}>
                                                 $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}/lamina>)
 target_link_libraries(lamina_stages PUBLIC TBB::tbb Eigen3::Eigen fmt::fmt
-                      PRIVATE PNG::PNG ZLIB::ZLIB EXPAT::EXPAT PkgConfig::POLYCLIPPING PkgConfig::MUPARSER
+                      PRIVATE PNG::PNG ZLIB::ZLIB EXPAT::EXPAT PkgConfig::POLYCLIPPING PkgConfig::MUPARSER PkgConfig::GMPXX
                               PkgConfig::XXHASH nlohmann_json::nlohmann_json ${CMAKE_DL_LIBS})
 
 # Embree, libtiff and libzip are loaded when a job first needs them (stages/data/handles/late.h), by the names that linking

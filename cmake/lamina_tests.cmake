@@ -41,7 +41,7 @@ foreach(folder ${folders})
   endif()
   add_executable(test_${folder} ${test_sources})
   target_link_libraries(test_${folder} PRIVATE lamina_test_support GTest::gtest_main TIFF::TIFF PNG::PNG ZLIB::ZLIB
-                        PkgConfig::LIBZIP PkgConfig::XXHASH)
+                        PkgConfig::LIBZIP PkgConfig::GMPXX PkgConfig::XXHASH)
   target_precompile_headers(test_${folder} REUSE_FROM lamina_test_support)
   if(LAMINA_UNITE_TESTS)
     list(REMOVE_ITEM test_sources ${PROJECT_SOURCE_DIR}/tests/raster/reference.cpp)  # options of its own

@@ -111,6 +111,7 @@ struct Job {
   double gap_mm = 5;  // between automatically arranged parts
   FillRule fill_rule = FillRule::kNonzero;
   Mirror mirror = Mirror::kNone;
+  std::uint32_t levels = 0;  // of shares of voxels, 2 to 256, for programs that ask for them; 0: pixels are set or not
   std::string format = "tiff-g4";
   std::string title;  // of the job, in tags of its images
   SliceRequest slice;

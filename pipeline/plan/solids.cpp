@@ -78,11 +78,20 @@ std::vector<Group> groups_of(Scene& scene, const Job& job, const Materials& mate
 Result<Solids> Solids::build(Scene& scene, const Job& job, const PixelGrid& grid, const Materials& materials) {
   Solids result;
   const bool rays = job.engine != Engine::kContours, contours = job.engine != Engine::kRays;
+  if (job.levels > 0 && materials.several()) {
+    return Error{Fault::kUsage, "shares of voxels are those of one material; give all parts the same, or ask for no levels"};
+  }
   const auto add = [&](std::span<Mesh> meshes, std::span<const Instance> instances, PartMaterial material,
                        std::vector<std::uint32_t> instance) -> Status {
+    std::optional<cover::Coverage> coverage;
+    if (job.levels > 0) {
+      auto covered = cover::Coverage::build(meshes, instances, grid, job.fill_rule, job.levels);
+      if (!covered) return covered.error();
+      coverage = std::move(*covered);
+    }
     auto built = raster::Rasterizer::build(meshes, instances, grid, job.fill_rule, rays, contours, job.isa);
     if (!built) return built.error();
-    result.solids_.push_back({std::move(material), std::move(*built), std::move(instance)});
+    result.solids_.push_back({std::move(material), std::move(*built), std::move(instance), std::move(coverage)});
     return {};
   };
   // Made here, so that a mesh in two groups is there once.
@@ -117,7 +126,9 @@ std::uint64_t Solids::crossings_bound(Nm plane) const {
 
 std::uint64_t Solids::index_bytes() const {
   std::uint64_t total = 0;
-  for (const Solid& solid : solids_) total += solid.rasterizer.index_bytes();
+  for (const Solid& solid : solids_) {
+    total += solid.rasterizer.index_bytes() + (solid.coverage ? solid.coverage->index_bytes() : 0);
+  }
   return total;
 }
 

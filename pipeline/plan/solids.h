@@ -2,12 +2,14 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
 #include "pipeline/job/job.h"
 #include "pipeline/machine/materials.h"
 #include "pipeline/plan/scene.h"
+#include "stages/coverage/coverage.h"
 #include "stages/data/grid.h"
 #include "stages/data/status.h"
 #include "stages/raster/raster.h"
@@ -18,7 +20,8 @@ namespace lamina::pipeline {
 struct Solid {
   PartMaterial material;
   raster::Rasterizer rasterizer;
-  std::vector<std::uint32_t> instance;  // scene index of each of its instances; empty: all in order
+  std::vector<std::uint32_t> instance;      // scene index of each of its instances; empty: all in order
+  std::optional<cover::Coverage> coverage;  // if the job asks for shares of voxels
 };
 
 /// All solids of a scene. A scene of one material is one solid. Otherwise parts with the same materials at all heights
@@ -27,7 +30,7 @@ struct Solid {
 class Solids {
  public:
   /// Moves the triangles out of the scene's meshes.
-  /// errors  of Rasterizer::build
+  /// errors  of Rasterizer::build and Coverage::build; kUsage: shares of voxels of several materials
   static Result<Solids> build(Scene& scene, const Job& job, const PixelGrid& grid, const Materials& materials);
 
   std::span<const Solid> all() const { return solids_; }

@@ -10,6 +10,7 @@
 #include "pipeline/plan/plan.h"
 #include "pipeline/run/maker.h"
 #include "pipeline/run/sanity.h"
+#include "stages/coverage/coverage.h"
 #include "stages/data/runs.h"
 #include "stages/raster/materials.h"
 #include "stages/raster/raster.h"
@@ -55,6 +56,10 @@ class LayerImager {
   void dose(const Layer& layer, ImageWork& work, LayerRecord& record) const;
   /// Runs all steps.
   Status make(const Layer& layer, ImageWork& work, LayerRecord& record, ImageNotes& notes) const;
+
+  /// How full the voxels of a layer are, in Job::levels levels, before anything is mirrored or thinned.
+  /// The plan's job asks for levels.
+  cover::LayerReport levels(const Layer& layer, cover::LayerScratch& scratch, Levels& image) const;
 
   /// Upper bound of the bytes for scratch and runs of a layer; a mirrored or second image counts separately.
   std::uint64_t bytes_of(const Layer& layer) const;

@@ -80,6 +80,10 @@ Status LayerImager::beads(const Layer& layer, ImageWork& work, ImageNotes& notes
   return {};
 }
 
+cover::LayerReport LayerImager::levels(const Layer& layer, cover::LayerScratch& scratch, Levels& image) const {
+  return plan_.images->solids.all().front().coverage->layer(layer, scratch, image);
+}
+
 void LayerImager::bleed(ImageWork& work) const {
   if (plan_.job.mirror != Mirror::kNone) {
     mirror(work.runs, work.second);

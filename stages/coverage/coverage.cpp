@@ -1,0 +1,189 @@
+#include "stages/coverage/coverage.h"
+
+#include <fmt/format.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <bit>
+#include <vector>
+
+#include "stages/coverage/edges.h"
+#include "stages/coverage/meetings.h"
+#include "stages/coverage/slab_index.h"
+#include "stages/geometry/blocks/block_maker.h"
+
+namespace lamina::cover {
+namespace {
+
+/// A mesh, and what was found out about it once.
+struct CoveredMesh {
+  std::shared_ptr<const MeshBlocks> blocks;
+  SlabIndex index;
+  Suspects suspects;
+};
+
+struct Copy {
+  std::uint32_t mesh;
+  Point3 offset;
+  bool alone;  // its box meets no other's
+};
+
+bool boxes_meet(const Box& a, const Point3& by, const Box& b, const Point3& other) {
+  const auto meet = [](std::int64_t lo, std::int64_t hi, std::int64_t from, std::int64_t to) { return lo <= to && from <= hi; };
+  return meet(std::int64_t{a.lo.x} + by.x, std::int64_t{a.hi.x} + by.x, std::int64_t{b.lo.x} + other.x,
+              std::int64_t{b.hi.x} + other.x) &&
+         meet(std::int64_t{a.lo.y} + by.y, std::int64_t{a.hi.y} + by.y, std::int64_t{b.lo.y} + other.y,
+              std::int64_t{b.hi.y} + other.y) &&
+         meet(std::int64_t{a.lo.z} + by.z, std::int64_t{a.hi.z} + by.z, std::int64_t{b.lo.z} + other.z,
+              std::int64_t{b.hi.z} + other.z);
+}
+
+/// Copies whose boxes meet others, by a sweep along x.
+void find_alone(std::span<const Mesh> meshes, std::vector<Copy>& copies) {
+  std::vector<std::uint32_t> order(copies.size());
+  for (std::uint32_t i = 0; i < order.size(); ++i) order[i] = i;
+  const auto left = [&](std::uint32_t i) { return std::int64_t{meshes[copies[i].mesh].bounds.lo.x} + copies[i].offset.x; };
+  const auto right = [&](std::uint32_t i) { return std::int64_t{meshes[copies[i].mesh].bounds.hi.x} + copies[i].offset.x; };
+  std::sort(order.begin(), order.end(), [&](auto a, auto b) { return left(a) != left(b) ? left(a) < left(b) : a < b; });
+  for (std::size_t i = 0; i < order.size(); ++i) {
+    Copy& one = copies[order[i]];
+    for (std::size_t k = i + 1; k < order.size() && left(order[k]) <= right(order[i]); ++k) {
+      Copy& other = copies[order[k]];
+      if (!boxes_meet(meshes[one.mesh].bounds, one.offset, meshes[other.mesh].bounds, other.offset)) continue;
+      one.alone = other.alone = false;
+    }
+  }
+}
+
+}  // namespace
+
+struct Coverage::State {
+  PixelGrid grid;
+  Edges x, y;
+  Rule rule;
+  std::vector<CoveredMesh> meshes;
+  std::vector<Copy> copies;
+
+  State(const PixelGrid& pixel_grid, Rule of_rows) : grid(pixel_grid), x(pixel_grid.x), y(pixel_grid.y), rule(of_rows) {}
+
+  void gather(const Layer& layer, LayerScratch& scratch) const;
+  void order_by_row(LayerScratch& scratch) const;
+};
+
+Coverage::Coverage(Coverage&&) noexcept = default;
+Coverage& Coverage::operator=(Coverage&&) noexcept = default;
+Coverage::~Coverage() = default;
+
+Result<Coverage> Coverage::build(std::span<Mesh> meshes, std::span<const Instance> instances, const PixelGrid& grid,
+                                 FillRule rule, std::uint32_t levels) {
+  if (levels < 2 || levels > 256) {
+    return Error{Fault::kUsage, fmt::format("{} levels: a voxel has 2 to 256; give 2, 4 or 16", levels)};
+  }
+  for (const Mesh& mesh : meshes) {
+    if (mesh.closed) continue;
+    return Error{Fault::kInput,
+                 fmt::format("{}: the surface is open, so no voxel of it has a share; load it with repair, or give "
+                             "2 levels of the 1-bit image",
+                             mesh.name)};
+  }
+  Coverage coverage;
+  coverage.state_ = std::make_unique<State>(grid, Rule{rule, levels - 1});
+  State& state = *coverage.state_;
+  for (const Instance& instance : instances) state.copies.push_back({instance.mesh, instance.offset, true});
+  find_alone(meshes, state.copies);
+  std::vector<std::shared_ptr<MeshBlocks>> blocks = take_blocks(meshes);
+  for (std::size_t i = 0; i < blocks.size(); ++i) {
+    meshes[i].blocks = blocks[i];
+    SlabIndex index(blocks[i]->bounds());
+    Suspects suspects = find_suspects(*blocks[i], index);
+    state.meshes.push_back({std::move(blocks[i]), std::move(index), std::move(suspects)});
+  }
+  return coverage;
+}
+
+void Coverage::State::gather(const Layer& layer, LayerScratch& scratch) const {
+  const std::int64_t bottom = layer.bottom, top = bottom + layer.thickness;
+  scratch.facets.clear();
+  SlabFacet taken;
+  Cluster room;
+  for (const Copy& copy : copies) {
+    const CoveredMesh& mesh = meshes[copy.mesh];
+    const Point3 by = copy.offset;
+    const auto moved = [&](const Point3& p) {
+      return Point3{static_cast<Nm>(p.x + by.x), static_cast<Nm>(p.y + by.y), static_cast<Nm>(p.z + by.z)};
+    };
+    mesh.index.each(bottom - by.z, top - by.z, [&](std::uint32_t c) {
+      const Cluster& cluster = mesh.blocks->cluster(c, room);
+      const unsigned suspects = copy.alone ? mesh.suspects[c] : ~0u;
+      for (std::uint32_t lane = 0; lane < kClusterSize; ++lane) {
+        const std::int64_t z0 = cluster.z[0][lane], z1 = cluster.z[1][lane], z2 = cluster.z[2][lane];
+        if (std::min({z0, z1, z2}) + by.z >= top || std::max({z0, z1, z2}) + by.z <= bottom) continue;
+        const Triangle t = cluster.triangle(lane);
+        const bool suspect = (suspects >> lane & 1) != 0;
+        if (take_facet({moved(t.a), moved(t.b), moved(t.c)}, suspect, bottom, top, y, taken)) scratch.facets.push_back(taken);
+      }
+    });
+  }
+}
+
+void Coverage::State::order_by_row(LayerScratch& scratch) const {
+  scratch.begins.assign(std::size_t{grid.rows()} + 2, 0);
+  for (const SlabFacet& facet : scratch.facets) ++scratch.begins[facet.last_row + 2];
+  for (std::size_t r = 1; r < scratch.begins.size(); ++r) scratch.begins[r] += scratch.begins[r - 1];
+  scratch.order.resize(scratch.facets.size());
+  for (std::uint32_t i = 0; i < scratch.facets.size(); ++i) scratch.order[scratch.begins[scratch.facets[i].last_row + 1]++] = i;
+}
+
+LayerReport Coverage::layer(const Layer& layer, LayerScratch& scratch, Levels& out) const {
+  const State& state = *state_;
+  LayerReport report;
+  state.gather(layer, scratch);
+  state.order_by_row(scratch);
+  report.facets = static_cast<std::uint32_t>(scratch.facets.size());
+  out.start(state.grid.columns());
+  scratch.row.clear();
+  const std::int64_t bottom = layer.bottom, top = bottom + layer.thickness;
+  for (std::uint32_t r = state.grid.rows(); r-- > 0;) {
+    std::erase_if(scratch.row, [&](std::uint32_t i) { return scratch.facets[i].first_row > r; });
+    for (std::uint32_t k = scratch.begins[r]; k < scratch.begins[r + 1]; ++k) scratch.row.push_back(scratch.order[k]);
+    if (scratch.row.empty()) {
+      out.end_row();
+      continue;
+    }
+    const Strip strip{edge(state.grid.y, r), edge(state.grid.y, std::int64_t{r} + 1), bottom, top};
+    scratch.maker.make(strip, state.grid.x, state.x, state.rule, scratch.facets, scratch.row, out, report);
+  }
+  report.volume_mm3 *= 1e-18;
+  report.scratch_bytes = scratch.bytes();
+  return report;
+}
+
+std::uint64_t Coverage::scratch_bytes_bound(const Layer& layer) const {
+  const State& state = *state_;
+  std::uint64_t facets = 0;
+  for (const Copy& copy : state.copies) {
+    const std::int64_t bottom = std::int64_t{layer.bottom} - copy.offset.z;
+    state.meshes[copy.mesh].index.each(bottom, bottom + layer.thickness, [&](std::uint32_t) { facets += kClusterSize; });
+  }
+  // Buffers double as they grow. Samples of a row come on top where facets meet.
+  return 2 * facets * (sizeof(SlabFacet) + 2 * sizeof(std::uint32_t)) + sizeof(std::uint32_t) * (state.grid.rows() + 2) +
+         (sizeof(Cell) + 1) * (std::uint64_t{state.grid.columns()} + 1);
+}
+
+std::uint64_t Coverage::suspects() const {
+  std::uint64_t count = 0;
+  for (const CoveredMesh& mesh : state_->meshes) {
+    for (const std::uint16_t bits : mesh.suspects) count += static_cast<std::uint64_t>(std::popcount(bits));
+  }
+  return count;
+}
+
+std::uint64_t Coverage::index_bytes() const {
+  std::uint64_t total = state_->x.bytes() + state_->y.bytes() + state_->copies.capacity() * sizeof(Copy);
+  for (const CoveredMesh& mesh : state_->meshes) total += mesh.index.bytes() + bytes_held(mesh.suspects);
+  return total;
+}
+
+const PixelGrid& Coverage::grid() const { return state_->grid; }
+
+}  // namespace lamina::cover

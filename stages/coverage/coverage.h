@@ -1,0 +1,74 @@
+// stages/coverage/coverage.h: meshes on a bed and a layer become the share of each voxel that they fill, as whole levels.
+//
+// The second contract. The voxel of column i and geometry row j has x in [e(i), e(i + 1)], y likewise and z in [bottom, bottom
+// + thickness], where e(i) = floor(i span / dots) nm (Column edges of data/grid.h's axes): voxels tile the bed. Its share is
+// the volume of the solid in it over its own. Of L levels, 0 to n = L - 1, it has floor(share n + 1/2), decided exactly: a tie
+// goes up. Rows are those of every image, row 0 at the back.
+//
+// Where the winding number is 0 or 1, the volume is that of the exact solid. Whether it is, and the share where it is not, are
+// facts of 8 x 8 x 8 samples a voxel, at the middles of eighths of its sides (e + (2 k + 1) w / 16, k = 0 .. 7, exact
+// rationals): if all have winding 0 or 1 the exact volume counts, else the share is that of the samples that the fill rule
+// calls solid. A winding is that of data/choices.h and raster/segment.h: a crossing at or left of a sample counts, a corner at
+// or below a plane lies below it.
+//
+// Source: signed areas that are accumulated along a row (D. Turner, FreeType's smooth rasterizer, 2001; R. Levien, font-rs,
+// 2016), here with volumes; doubles with a proven bound (docs/coverage.md) and rationals where the bound does not decide.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <span>
+
+#include "stages/coverage/scratch.h"
+#include "stages/data/choices.h"
+#include "stages/data/grid.h"
+#include "stages/data/layer.h"
+#include "stages/data/levels.h"
+#include "stages/data/mesh.h"
+#include "stages/data/status.h"
+
+namespace lamina::cover {
+
+/// What a layer told besides its levels.
+struct LayerReport {
+  double volume_mm3 = 0;             // sum of share x voxel, before shares become levels
+  std::uint32_t facets = 0;          // that reach into the layer
+  std::uint64_t held_voxels = 0;     // that hold facets
+  std::uint64_t sampled_voxels = 0;  // whose share is that of samples
+  std::uint64_t looked_at = 0;       // voxels whose samples were counted, for a facet in them meets another one
+  std::uint64_t exact_voxels = 0;    // that rationals decided; a stretch of one share counts once
+  std::uint64_t scratch_bytes = 0;
+};
+
+/// Immutable once built; layers may be asked for from any number of threads.
+class Coverage {
+ public:
+  /// meshes     triangles are moved into Mesh::blocks, unless they are there: whoever indexes the meshes next shares these
+  /// instances  where copies stand; every corner within the grid's bed and below kNmReach
+  /// levels     2 .. 256 of them; 2, 4 and 16 are what drops come in
+  /// errors     kInput if a mesh is open (Mesh::closed); kUsage for another number of levels
+  /// cost       O(T log T): which facets meet others is found once (meetings.h)
+  static Result<Coverage> build(std::span<Mesh> meshes, std::span<const Instance> instances, const PixelGrid& grid,
+                                FillRule rule, std::uint32_t levels);
+  Coverage(Coverage&&) noexcept;
+  Coverage& operator=(Coverage&&) noexcept;
+  ~Coverage();
+
+  /// The levels of the layer's voxels, into `out` (its capacity is reused).
+  /// cost  O(facets near the layer + voxels that hold facets), no matter how large the bed is; the same bytes on any thread
+  LayerReport layer(const Layer& layer, LayerScratch& scratch, Levels& out) const;
+
+  /// Bytes of scratch that the layer may need at most, its levels left out: those depend on its surface.
+  std::uint64_t scratch_bytes_bound(const Layer& layer) const;
+  /// Facets of all meshes that meet others, or whose front is not empty: voxels that hold them are sampled.
+  std::uint64_t suspects() const;
+  std::uint64_t index_bytes() const;
+  const PixelGrid& grid() const;
+
+ private:
+  Coverage() = default;
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
+}  // namespace lamina::cover

@@ -1,0 +1,50 @@
+// stages/coverage/edges.h: where voxels end along a side of the bed.
+#pragma once
+
+#include <algorithm>
+#include <cstdint>
+
+#include "stages/data/buffer.h"
+#include "stages/data/grid.h"
+
+namespace lamina::cover {
+
+/// nm of the edge before pixel i; that of pixel `count` ends the last one.
+constexpr std::int64_t edge(const PixelAxis& axis, std::int64_t i) { return i * axis.span / axis.dots; }
+
+/// All edges of an axis; doubles hold them exactly. 8 bytes a pixel.
+class Edges {
+ public:
+  explicit Edges(const PixelAxis& axis) : per_nm_(axis.pixels_per_nm()) {
+    edge_.resize(std::size_t{axis.count} + 1);
+    for (std::uint32_t i = 0; i <= axis.count; ++i) edge_[i] = static_cast<double>(edge(axis, i));
+    narrowest_ = static_cast<double>(axis.span);
+    for (std::uint32_t i = 0; i < axis.count; ++i) {
+      widest_ = std::max(widest_, width(i));
+      narrowest_ = std::min(narrowest_, width(i));
+    }
+  }
+
+  double operator[](std::uint32_t i) const { return edge_[i]; }
+  double width(std::uint32_t i) const { return edge_[i + 1] - edge_[i]; }
+  double widest() const { return widest_; }
+  double narrowest() const { return narrowest_; }
+  std::uint32_t count() const { return static_cast<std::uint32_t>(edge_.size() - 1); }
+  std::uint64_t bytes() const { return bytes_held(edge_); }
+
+  /// The pixel in which `nm` lies, the one behind if it lies on an edge; the nearest one of the bed.
+  std::uint32_t at(double nm) const {
+    const double guess = nm * per_nm_;
+    auto i = guess <= 0 ? 0 : std::min(static_cast<std::uint32_t>(guess), count() - 1);
+    while (i > 0 && edge_[i] > nm) --i;
+    while (i + 1 < count() && edge_[i + 1] <= nm) ++i;
+    return i;
+  }
+
+ private:
+  double per_nm_;
+  double widest_ = 0, narrowest_ = 0;
+  Buffer<double> edge_;
+};
+
+}  // namespace lamina::cover

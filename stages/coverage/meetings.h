@@ -1,0 +1,24 @@
+// stages/coverage/meetings.h: which facets of a mesh meet others, so that voxels that hold them have to be sampled.
+#pragma once
+
+#include <cstdint>
+
+#include "stages/coverage/slab_index.h"
+#include "stages/data/buffer.h"
+#include "stages/geometry/blocks/mesh_blocks.h"
+
+namespace lamina::cover {
+
+/// A bit a facet: lane i of cluster c is suspect if bit i of suspects[c] is set.
+using Suspects = Buffer<std::uint16_t>;
+
+/// A facet is not suspect if it meets no other beyond what they share, if each of its edges is walked once the other way by one
+/// other facet, and if the winding number in front of it is 0. The last is found by one exact ray for all facets that such
+/// edges connect. So where only facets lie that are not suspect, winding numbers are 0 and 1. Facets without area are no
+/// facets; who has an edge with one is suspect.
+///
+/// cost  O(T log T) and some ten pairs a facet; parallel; 12 bytes a facet meanwhile. A cluster whose box meets more than
+///       4096 others is suspect as a whole, and so is what lies apart once 65,536 rays are shot
+Suspects find_suspects(const MeshBlocks& mesh, const SlabIndex& index);
+
+}  // namespace lamina::cover

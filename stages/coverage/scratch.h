@@ -1,0 +1,24 @@
+// stages/coverage/scratch.h: memory of one layer in flight.
+#pragma once
+
+#include <cstdint>
+
+#include "stages/coverage/row.h"
+#include "stages/coverage/slab_facet.h"
+#include "stages/data/buffer.h"
+
+namespace lamina::cover {
+
+/// Any layer may follow any other in it.
+struct LayerScratch {
+  Buffer<SlabFacet> facets;             // that reach into the layer
+  Buffer<std::uint32_t> begins, order;  // facets by the last row they reach: from where on rows list them, and their indices
+  Buffer<std::uint32_t> row;            // those that reach a row
+  RowMaker maker;
+
+  std::uint64_t bytes() const {
+    return bytes_held(facets) + bytes_held(begins) + bytes_held(order) + bytes_held(row) + maker.bytes();
+  }
+};
+
+}  // namespace lamina::cover

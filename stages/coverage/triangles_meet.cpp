@@ -1,0 +1,178 @@
+#include "stages/coverage/triangles_meet.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+namespace lamina::cover {
+namespace {
+
+using Wide = __int128;
+
+template <class Number>
+int sign_of(Number value) {
+  return (value > 0) - (value < 0);
+}
+
+/// Which side of the plane a point is on: 1 in front, 0 in it, -1 behind. Exact.
+int side_of(const Plane& plane, const Point3& p) {
+  const Point3& a = plane.facet.a;
+  const std::int64_t dx = std::int64_t{p.x} - a.x, dy = std::int64_t{p.y} - a.y, dz = std::int64_t{p.z} - a.z;
+  const double x = static_cast<double>(plane.nx) * static_cast<double>(dx);
+  const double y = static_cast<double>(plane.ny) * static_cast<double>(dy);
+  const double z = static_cast<double>(plane.nz) * static_cast<double>(dz);
+  if (std::abs(x + y + z) > 1e-14 * (std::abs(x) + std::abs(y) + std::abs(z))) return sign_of(x + y + z);
+  return sign_of(static_cast<Wide>(plane.nx) * dx + static_cast<Wide>(plane.ny) * dy + static_cast<Wide>(plane.nz) * dz);
+}
+
+struct Flat {
+  std::int64_t u, v;
+};
+
+/// Seen along the axis on which the plane has the largest area.
+Flat seen(const Plane& plane, const Point3& p) {
+  const auto x = std::abs(plane.nx), y = std::abs(plane.ny), z = std::abs(plane.nz);
+  if (x >= y && x >= z) return {p.y, p.z};
+  return y >= z ? Flat{p.z, p.x} : Flat{p.x, p.y};
+}
+
+int turn(const Flat& a, const Flat& b, const Flat& c) {
+  return sign_of(static_cast<Wide>(b.u - a.u) * (c.v - a.v) - static_cast<Wide>(b.v - a.v) * (c.u - a.u));
+}
+
+/// Whether the direction from v to p lies between those to a and b, or on one of them; all in the plane, less than half a turn.
+bool between(const Plane& plane, const Point3& v, const Point3& a, const Point3& b, const Point3& p) {
+  const Flat o = seen(plane, v), at = seen(plane, p), left = seen(plane, b), right = seen(plane, a);
+  const int way = turn(o, right, left);
+  const int from_right = turn(o, right, at) * way, to_left = turn(o, at, left) * way;
+  if (from_right > 0 && to_left > 0) return true;
+  const auto along = [&](const Flat& ray) {
+    return static_cast<Wide>(ray.u - o.u) * (at.u - o.u) + static_cast<Wide>(ray.v - o.v) * (at.v - o.v) > 0;
+  };
+  return (from_right == 0 && along(right)) || (to_left == 0 && along(left));
+}
+
+using Corners = std::array<const Point3*, 3>;
+
+Corners corners_of(const Triangle& t) { return {&t.a, &t.b, &t.c}; }
+
+/// Of two facets in one plane.
+bool meet_in_plane(const Plane& f, const Plane& g) {
+  const auto separated = [&](const Triangle& one, const Triangle& other) {
+    const Corners p = corners_of(one), q = corners_of(other);
+    const int way = turn(seen(f, one.a), seen(f, one.b), seen(f, one.c));
+    for (int i = 0; i < 3; ++i) {
+      const Flat from = seen(f, *p[i]), to = seen(f, *p[(i + 1) % 3]);
+      if (std::ranges::all_of(q, [&](const Point3* r) { return turn(from, to, seen(f, *r)) * way < 0; })) return true;
+    }
+    return false;
+  };
+  return !separated(f.facet, g.facet) && !separated(g.facet, f.facet);
+}
+
+struct Arrow {
+  double x, y, z;
+  double dot(const Arrow& o) const { return x * o.x + y * o.y + z * o.z; }
+  double largest() const { return std::max({std::abs(x), std::abs(y), std::abs(z)}); }
+};
+
+Arrow arrow(const Point3& from, const Point3& to) {
+  return {static_cast<double>(std::int64_t{to.x} - from.x), static_cast<double>(std::int64_t{to.y} - from.y),
+          static_cast<double>(std::int64_t{to.z} - from.z)};
+}
+
+Arrow cross(const Arrow& a, const Arrow& b) { return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x}; }
+
+/// Whether a plane along an edge of each lies between them, for certain.
+bool apart_by_edges(const Triangle& f, const Triangle& g) {
+  const Corners p = corners_of(f), q = corners_of(g);
+  std::array<Arrow, 3> of_f, of_g;
+  double farthest = 0;
+  for (int i = 0; i < 3; ++i) {
+    of_f[i] = arrow(f.a, *p[i]);
+    of_g[i] = arrow(f.a, *q[i]);
+    farthest = std::max({farthest, of_f[i].largest(), of_g[i].largest()});
+  }
+  for (int i = 0; i < 3; ++i) {
+    const Arrow e = arrow(*p[i], *p[(i + 1) % 3]);
+    for (int k = 0; k < 3; ++k) {
+      const Arrow h = arrow(*q[k], *q[(k + 1) % 3]), axis = cross(e, h);
+      const double room = 1e-13 * e.largest() * h.largest() * farthest;
+      const auto low = [&](const std::array<Arrow, 3>& all) {
+        return std::min({axis.dot(all[0]), axis.dot(all[1]), axis.dot(all[2])});
+      };
+      const auto high = [&](const std::array<Arrow, 3>& all) {
+        return std::max({axis.dot(all[0]), axis.dot(all[1]), axis.dot(all[2])});
+      };
+      if (low(of_f) - high(of_g) > room || low(of_g) - high(of_f) > room) return true;
+    }
+  }
+  return false;
+}
+
+/// Facets (v, a, b) and (v, c, d).
+bool meet_beyond_corner(const Plane& f, const Plane& g, const Point3& v, const Point3& a, const Point3& b, const Point3& c,
+                        const Point3& d) {
+  const int side_c = side_of(f, c), side_d = side_of(f, d);
+  if (side_c * side_d > 0) return false;
+  const int side_a = side_of(g, a), side_b = side_of(g, b);
+  if (side_a * side_b > 0) return false;
+  if (side_c == 0 && side_d == 0) {
+    return between(f, v, a, b, c) || between(f, v, a, b, d) || between(f, v, c, d, a) || between(f, v, c, d, b);
+  }
+  if (side_c == 0) return between(f, v, a, b, c);
+  if (side_d == 0) return between(f, v, a, b, d);
+  if (side_a == 0) return between(g, v, c, d, a);
+  if (side_b == 0) return between(g, v, c, d, b);
+  // Each crosses the other's plane along a ray from v: apart if the rays point in opposite directions, for certain.
+  const auto ray = [&](const Plane& plane, const Point3& from, const Point3& to) {
+    const Arrow n{static_cast<double>(plane.nx), static_cast<double>(plane.ny), static_cast<double>(plane.nz)};
+    const Arrow one = arrow(v, from), other = arrow(v, to);
+    const double s = std::abs(n.dot(one)), t = std::abs(n.dot(other));
+    return Arrow{(one.x * t + other.x * s) / (s + t), (one.y * t + other.y * s) / (s + t), (one.z * t + other.z * s) / (s + t)};
+  };
+  const Arrow one = ray(g, a, b), other = ray(f, c, d);
+  return !(one.dot(other) < -1e-6 * one.largest() * other.largest());
+}
+
+}  // namespace
+
+Plane::Plane(const Triangle& t) : facet(t) {
+  const std::int64_t ux = std::int64_t{t.b.x} - t.a.x, uy = std::int64_t{t.b.y} - t.a.y, uz = std::int64_t{t.b.z} - t.a.z;
+  const std::int64_t vx = std::int64_t{t.c.x} - t.a.x, vy = std::int64_t{t.c.y} - t.a.y, vz = std::int64_t{t.c.z} - t.a.z;
+  nx = uy * vz - uz * vy;
+  ny = uz * vx - ux * vz;
+  nz = ux * vy - uy * vx;
+}
+
+bool triangles_meet(const Plane& f, const Plane& g, int& shared) {
+  const Corners p = corners_of(f.facet), q = corners_of(g.facet);
+  shared = 0;
+  int own = -1, others = -1, own_left = 3, others_left = 3;  // of the shared corners: the last; the sums of those left over
+  for (int i = 0; i < 3; ++i) {
+    for (int k = 0; k < 3; ++k) {
+      if (*p[i] != *q[k]) continue;
+      ++shared;
+      own = i, others = k;
+      own_left -= i, others_left -= k;
+    }
+  }
+  if (shared >= 3) return true;
+  if (shared == 2) {
+    if (side_of(f, *q[others_left]) != 0) return false;
+    const double same = static_cast<double>(f.nx) * static_cast<double>(g.nx) +
+                        static_cast<double>(f.ny) * static_cast<double>(g.ny) +
+                        static_cast<double>(f.nz) * static_cast<double>(g.nz);
+    return same <= 0;  // folded onto each other
+  }
+  if (shared == 1) {
+    return meet_beyond_corner(f, g, *p[own], *p[(own + 1) % 3], *p[(own + 2) % 3], *q[(others + 1) % 3], *q[(others + 2) % 3]);
+  }
+  const std::array<int, 3> of_g{side_of(f, *q[0]), side_of(f, *q[1]), side_of(f, *q[2])};
+  if (of_g[0] == of_g[1] && of_g[1] == of_g[2]) return of_g[0] == 0 && meet_in_plane(f, g);
+  const std::array<int, 3> of_f{side_of(g, *p[0]), side_of(g, *p[1]), side_of(g, *p[2])};
+  if (of_f[0] == of_f[1] && of_f[1] == of_f[2]) return false;
+  return !apart_by_edges(f.facet, g.facet);
+}
+
+}  // namespace lamina::cover
