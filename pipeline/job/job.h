@@ -14,6 +14,7 @@
 #include "stages/data/grid.h"
 #include "stages/data/status.h"
 #include "stages/data/text/changes.h"
+#include "stages/dose/wish.h"
 #include "stages/heights/settings.h"
 #include "stages/segment/settings.h"
 
@@ -93,6 +94,9 @@ struct DoseRequest {
   std::array<double, 2> bleed_um{0, 0};                   // along x and y: pixels closer to the edge are cleared
   double shell_mm = 0;                                    // pixels stay set to this depth; only with a core below 1 or beads
   double core = 1;                                        // fraction of the pixels inside the shell that stay set
+  std::optional<double> saturation_percent;               // of the voids; absent: one drop a pixel
+  std::optional<double> core_saturation_percent;          // inside of the shell
+  std::vector<dose::WishRange> saturation_ranges;         // between heights above the bed
   raster::BeadEnds bead_ends = raster::BeadEnds::kRound;  // of filling beads, also where thick changes to thin
 };
 
@@ -131,9 +135,10 @@ struct Job {
   bool resume = false;
   bool overwrite = false;  // allow a directory with another job's output
   bool dry_run = false;
-  bool strict = false;       // warnings are errors
-  bool allow_empty = false;  // a whole job may have nothing
-  bool timing = false;       // tell where the time goes
+  bool strict = false;         // warnings are errors
+  bool allow_empty = false;    // a whole job may have nothing
+  bool allow_unbound = false;  // layers may get less binder than the machine's powder needs
+  bool timing = false;         // tell where the time goes
   bool json = false;
   bool quiet = false;
   std::vector<std::string> notes;  // notes from reading it: old forms and their replacements

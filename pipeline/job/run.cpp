@@ -105,6 +105,10 @@ const JobKey kRunKeys[] = {
     field<&Job::strict>({"run", "strict", "--strict", "", "warnings are errors: exit 5, and nothing is written", 0, "true"}),
     field<&Job::allow_empty>({"run", "allow_empty", "--allow-empty", "",
                               "finish a whole job without a single pixel, contour or bead instead of refusing it", 0, "true"}),
+    field<&Job::allow_unbound>({"run", "allow_unbound", "--allow-unbound", "",
+                                "plan a job although layers get less binder than the machine's powder needs to hold", 0,
+                                "true"})
+        .shown_if([](const Job& job) { return job.allow_unbound; }),
     custom<Job, read_pair<read_shard>, write_share, &Job::shard>(
         {"run", "shard", "--shard", "I/N", "only the I-th of N equal shares of the layers, I from 1; see lamina merge"},
         Form::kString),

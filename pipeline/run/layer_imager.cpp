@@ -39,7 +39,7 @@ void add(const raster::LayerReport& solid, raster::LayerReport& all) {
 }  // namespace
 
 std::uint64_t ImageWork::bytes() const {
-  std::uint64_t total = scratch.bytes() + materials.bytes() + (beads ? beads->bytes() : 0);
+  std::uint64_t total = scratch.bytes() + materials.bytes() + drops.bytes() + (beads ? beads->bytes() : 0);
   for (const Runs* image : {&runs, &second, &third, &lowest, &highest, &section}) {
     total += bytes_held(image->row_offset) + bytes_held(image->change);
   }
@@ -91,8 +91,16 @@ void LayerImager::bleed(ImageWork& work) const {
 void LayerImager::dose(const Layer& layer, ImageWork& work, LayerRecord& record) const {
   const ImagePlan& images = *plan_.images;
   images.dose.thin(layer.index, work.runs, work.second, work.third);
+  if (images.dose.saturates()) {
+    record.dosed_pixels = set_pixels(work.runs);
+    record.asked_drops = images.dose.saturate(layer, work.runs, work.second, work.drops);
+    record.drops = sum_of_levels(work.drops.levels);
+  }
   if (images.materials.several() && (images.beads || images.dose.any())) work.materials.keep(work.runs);
   record.set_pixels = set_pixels(work.runs);
+  if (images.dose.most_drops() > 1) {
+    for (const Runs& plane : work.drops.planes) record.images.push_back({0, set_pixels(plane), {}});
+  }
   for (const Runs& image : work.materials.image) record.images.push_back({0, set_pixels(image), {}});
 }
 
@@ -178,7 +186,9 @@ std::uint64_t LayerImager::bytes_of_section(Nm plane, std::uint64_t changes) con
   // Images of each material, of all, of one solid, and one intermediate.
   const std::uint64_t materials = images.materials.several() ? images.materials.used.size() : 0;
   const std::uint64_t material_images = materials == 0 ? 0 : (materials + 3) * 2 * (4 * changes + 4 * rows);
-  return images.solids.layer_bytes_bound(plane) + second_image + material_images;
+  // Zones and levels, and the image of each drop.
+  const std::uint64_t drops = images.dose.saturates() ? 18 * changes + images.dose.most_drops() * 4 * (changes + rows) : 0;
+  return images.solids.layer_bytes_bound(plane) + second_image + material_images + drops;
 }
 
 }  // namespace lamina::pipeline

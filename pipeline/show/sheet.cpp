@@ -124,7 +124,7 @@ Result<Preview> draw_images(const Manifest& manifest, const PreviewRequest& requ
     const LayerRecord& record = manifest.layers[index];
     const auto images = layer_images(manifest.head, record);
     for (std::size_t m = 0; m < images.size(); ++m) {
-      const std::string material = manifest.head.materials.empty() ? "" : ", " + manifest.head.materials[m].name;
+      const std::string material = manifest.head.named_images() == 0 ? "" : ", " + manifest.head.image_name(m);
       sheet.layers.push_back({(std::filesystem::path(request.source) / images[m].name).string(),
                               fmt::format("layer {}{}", record.layer.index, material),
                               fmt::format("z {:.3f} mm", mm(record.layer.plane()))});

@@ -22,7 +22,7 @@ struct ProgramRecord {
   std::int64_t microseconds = 0;      // that the machine takes (stages/replay/time/timer.h); 0: of an earlier build
 };
 
-/// The image of one material, where a job has several.
+/// The image of one material where a job has several, or of the pixels that get at least so many drops.
 struct ImageRecord {
   std::uint64_t bytes = 0, set_pixels = 0;
   Hash128 hash;
@@ -61,7 +61,12 @@ struct LayerRecord {
   std::uint64_t set_pixels = 0;
   std::uint32_t capped_rows = 0;    // rows closed only by repair (stages/load)
   ProgramRecord program;            // zeros without a machine
-  std::vector<ImageRecord> images;  // one per material, if the job has several
+  std::vector<ImageRecord> images;  // of materials or drops (ManifestHead::named_images)
+
+  // --- images of a job with a saturation
+  std::uint64_t dosed_pixels = 0;  // that are to be filled, whether or not drops fall on them
+  std::uint64_t drops = 0;         // of the images
+  std::uint64_t asked_drops = 0;   // by the wished saturation, rounded
 
   std::shared_ptr<const PathFacts> paths;  // null for images
 };
