@@ -14,7 +14,6 @@
 #include "stages/data/grid.h"
 #include "stages/data/status.h"
 #include "stages/data/text/changes.h"
-#include "stages/dose/wish.h"
 #include "stages/heights/settings.h"
 #include "stages/segment/settings.h"
 
@@ -89,14 +88,21 @@ struct MachineRequest {
   std::optional<std::vector<std::uint32_t>> blocked;  // instead of the profile's
 };
 
+/// Another saturation between two heights above the bed, in mm. Where ranges overlap, the last one counts.
+struct SaturationRange {
+  double from_mm = 0, to_mm = 0;
+  double percent = 0;
+  std::optional<double> core_percent;  // inside of the shell; absent: as in it
+};
+
 /// Section [dose]: the distribution of binder (stages/dose/).
 struct DoseRequest {
-  std::array<double, 2> bleed_um{0, 0};                   // along x and y: pixels closer to the edge are cleared
-  double shell_mm = 0;                                    // pixels stay set to this depth; only with a core below 1 or beads
-  double core = 1;                                        // fraction of the pixels inside the shell that stay set
-  std::optional<double> saturation_percent;               // of the voids; absent: one drop a pixel
-  std::optional<double> core_saturation_percent;          // inside of the shell
-  std::vector<dose::WishRange> saturation_ranges;         // between heights above the bed
+  std::array<double, 2> bleed_um{0, 0};           // along x and y: pixels closer to the edge are cleared
+  double shell_mm = 0;                            // pixels stay set to this depth; only with a core below 1 or beads
+  double core = 1;                                // fraction of the pixels inside the shell that stay set
+  std::optional<double> saturation_percent;       // of the voids; absent: one drop a pixel
+  std::optional<double> core_saturation_percent;  // inside of the shell
+  std::vector<SaturationRange> saturation_ranges;
   raster::BeadEnds bead_ends = raster::BeadEnds::kRound;  // of filling beads, also where thick changes to thin
 };
 

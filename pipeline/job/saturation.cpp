@@ -21,28 +21,29 @@ constexpr Key<RangeWish> kRangeKeys[] = {
 
 }  // namespace
 
-std::string read_saturation_ranges(const TomlValue& list, std::vector<dose::WishRange>& ranges, Place& at) {
+std::string read_saturation_ranges(const TomlValue& list, std::vector<SaturationRange>& ranges, Place& at) {
   if (auto wrong = check_tables(list, "from_mm, to_mm and saturation_percent"); !wrong.empty()) return wrong;
-  std::vector<dose::WishRange> read;
+  std::vector<SaturationRange> read;
   for (TomlValue table : list.value) {
-    dose::WishRange& range = read.emplace_back();
+    SaturationRange& range = read.emplace_back();
     at = table.place;
     if (auto wrong = take_ends(table, range.from_mm, range.to_mm, at); !wrong.empty()) return wrong;
     RangeWish wish;
     if (auto wrong = read_table<RangeWish>(table, "saturation_range", kRangeKeys, wish, at); !wrong.empty()) return wrong;
     if (!wish.percent) return fmt::format("{}: saturation_percent is missing", range_name(range.from_mm, range.to_mm));
-    range.wish = {*wish.percent, wish.core};
+    range.percent = *wish.percent;
+    range.core_percent = wish.core;
   }
   ranges = std::move(read);
   return {};
 }
 
-std::string saturation_ranges_text(const std::vector<dose::WishRange>& ranges) {
+std::string saturation_ranges_text(const std::vector<SaturationRange>& ranges) {
   std::string text;
-  for (const auto& [from, to, wish] : ranges) {
+  for (const auto& [from, to, percent, core] : ranges) {
     text += fmt::format("{}{{ from_mm = {}, to_mm = {}, saturation_percent = {}", text.empty() ? "" : ", ", number_text(from),
-                        number_text(to), number_text(wish.percent));
-    if (wish.core_percent) text += fmt::format(", core_saturation_percent = {}", number_text(*wish.core_percent));
+                        number_text(to), number_text(percent));
+    if (core) text += fmt::format(", core_saturation_percent = {}", number_text(*core));
     text += " }";
   }
   return text.empty() ? text : fmt::format("[{}]", text);

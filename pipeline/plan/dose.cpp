@@ -16,7 +16,10 @@ DosePlan::DosePlan(const Job& job, const PixelGrid& grid)
       grid_(grid) {
   const std::int64_t shell = nm_of(job.dose.shell_mm);
   if (job.dose.saturation_percent) {
-    wishes_ = {{*job.dose.saturation_percent, job.dose.core_saturation_percent}, job.dose.saturation_ranges};
+    wishes_.all = {*job.dose.saturation_percent, job.dose.core_saturation_percent};
+    for (const SaturationRange& range : job.dose.saturation_ranges) {
+      wishes_.ranges.push_back({range.from_mm, range.to_mm, {range.percent, range.core_percent}});
+    }
   }
   if (core_ < 1 || wishes_.has_core()) shell_ = dose::reach_of(grid, shell, shell);
 }

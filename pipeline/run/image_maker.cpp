@@ -194,8 +194,8 @@ void ImageMaker::warn(const Summary&, std::vector<Warning>& warnings) const {
 void ImageMaker::tell_binder(const dose::Budget& budget, Summary& summary) const {
   summary.results.emplace_back("binder", dose::told(budget, binder_));
   nlohmann::ordered_json& facts = (*summary.facts)["saturation"];
-  facts["asked"] = budget.asked();
-  if (!budget.asked()) {
+  facts["asked"] = budget.has_wish();
+  if (!budget.has_wish()) {
     facts["least_percent"] = budget.gets().first;
     facts["most_percent"] = budget.gets().second;
     return;

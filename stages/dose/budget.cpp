@@ -71,8 +71,8 @@ Status Budget::judge(bool allow_unbound, std::vector<Warning>& warnings) const {
       "(powder.least_saturation_percent)",
       where(unbound_), unbound_.front().gets, number_text(least_percent_));
   if (!allow_unbound) {
-    return Error{Fault::kUsage, fmt::format("{}: {}; give {} saturation, or --allow-unbound", asked() ? "--saturation" : "dose",
-                                            text, asked() ? "a higher" : "a")};
+    return Error{Fault::kUsage, fmt::format("{}: {}; give {} saturation, or --allow-unbound",
+                                            has_wish() ? "--saturation" : "dose", text, has_wish() ? "a higher" : "a")};
   }
   warnings.push_back({"saturation", fmt::format("{}, parts may fall apart there", text)});
   return {};
@@ -108,7 +108,7 @@ double BinderCount::reached_percent(const Budget& budget) const {
 }
 
 std::string told(const Budget& budget, const BinderCount& count) {
-  if (!budget.asked()) {
+  if (!budget.has_wish()) {
     const auto [least, most] = budget.gets();
     const std::string share = least == most ? fmt::format("{:.1f}", most) : fmt::format("{:.1f} to {:.1f}", least, most);
     return fmt::format("one drop of {} pl a pixel fills {} % of the voids", number_text(budget.binder().drop_pl), share);

@@ -44,7 +44,7 @@ class Budget {
 
   const Binder& binder() const { return binder_; }
   const PixelGrid& grid() const { return grid_; }
-  bool asked() const { return wishes_.has_value(); }
+  bool has_wish() const { return wishes_.has_value(); }
   /// Least and most per cent that the layers get.
   std::pair<double, double> gets() const { return gets_; }
 
