@@ -52,7 +52,7 @@ class Drops : public testing::TestWithParam<const char*> {};
 TEST_P(Drops, AreReplayedDropForDrop) {
   for (const BlockedRule rule : {BlockedRule::kReport, BlockedRule::kNeighbour, BlockedRule::kSecondPass}) {
     const auto resolved = printed_parts::shipped(GetParam(), [&](Machine& machine) {
-      machine.head.blocked = {4, 5, 9};
+      if (machine.head.blocked.empty()) machine.head.blocked = {4, 5, 9};
       machine.head.blocked_rule = rule;
     });
     const Levels levels = random_drops(resolved.grid.image, 7);
