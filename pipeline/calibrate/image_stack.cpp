@@ -69,7 +69,11 @@ Result<ImageStack> stack_of_job(const std::string& folder) {
       stack.part[a] = voxel(high[a]) - stack.part_low[a];
     }
   }
-  stack.read = [job, folder](std::uint32_t layer) { return picture_of_layer(folder, job->head, job->layers[layer]); };
+  stack.read = [job, folder](std::uint32_t layer) -> Result<Runs> {
+    auto picture = picture_of_layer(folder, job->head, job->layers[layer]);
+    if (!picture) return picture.error();
+    return std::move(picture->front());
+  };
   return stack;
 }
 

@@ -38,19 +38,27 @@ std::string program_of_layer(const std::string& directory, const ManifestHead& h
   return whole_file(fs::path(directory) / program_file_name(layer, head.program_extension), kMostProgramBytes);
 }
 
-Result<Runs> picture_of_layer(const std::string& directory, const ManifestHead& head, const LayerRecord& record) {
-  Runs whole;
+bool add_picture(const ManifestHead& head, Runs&& image, LayerPicture& picture) {
+  if (head.materials.empty()) return raster::add_drop(std::move(image), picture);
+  picture.resize(1);
+  return raster::add_image(std::move(image), picture[0]);
+}
+
+Result<LayerPicture> picture_of_layer(const std::string& directory, const ManifestHead& head, const LayerRecord& record) {
+  LayerPicture picture;
   for (const LayerImageFile& file : layer_images(head, record)) {
     auto image = read::image((fs::path(directory) / file.name).string());
     if (!image) return image.error();
     if (image->runs.columns != head.grid.columns() || image->runs.view().rows() != head.grid.rows()) {
       return Error{Fault::kVerification, fmt::format("{}: is not of the manifest's size", file.name)};
     }
-    if (!raster::add_image(std::move(image->runs), whole)) {
-      return Error{Fault::kVerification, fmt::format("{}: sets pixels of another material", file.name)};
+    if (!add_picture(head, std::move(image->runs), picture)) {
+      return Error{Fault::kVerification,
+                   fmt::format("{}: sets pixels {}", file.name,
+                               head.materials.empty() ? "that get no drop before" : "of another material")};
     }
   }
-  return whole;
+  return picture;
 }
 
 }  // namespace lamina::pipeline

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include "pipeline/output/print_program.h"
 #include "stages/data/runs.h"
@@ -18,8 +19,14 @@ Result<replay::VirtualMachine> machine_of_job(const std::string& directory, cons
 /// The text of a layer's print program, unchecked; "" if it cannot be read.
 std::string program_of_layer(const std::string& directory, const ManifestHead& head, std::uint32_t layer);
 
-/// All materials of a layer as one image on the manifest's grid.
-/// errors  kVerification, with the file: of read::image; wrong size; two materials in one pixel
-Result<Runs> picture_of_layer(const std::string& directory, const ManifestHead& head, const LayerRecord& record);
+/// The images of a layer's drops, each within the one before; one, with all materials, where a pixel gets at most one drop.
+using LayerPicture = std::vector<Runs>;
+
+/// Adds an image of a layer, in the order of the manifest. returns  false if it contradicts those before
+bool add_picture(const ManifestHead& head, Runs&& image, LayerPicture& picture);
+
+/// A layer on the manifest's grid; at least one image.
+/// errors  kVerification, with the file: of read::image; wrong size; two materials in one pixel; drops without the first
+Result<LayerPicture> picture_of_layer(const std::string& directory, const ManifestHead& head, const LayerRecord& record);
 
 }  // namespace lamina::pipeline

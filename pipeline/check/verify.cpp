@@ -11,7 +11,6 @@
 #include "pipeline/check/job_files.h"
 #include "pipeline/output/directory.h"
 #include "pipeline/output/print_program.h"
-#include "stages/raster/materials.h"
 #include "stages/read/image.h"
 #include "stages/replay/feeding.h"
 #include "stages/write/manifest/compare.h"
@@ -51,7 +50,7 @@ std::string fault_of_feeding(const Inspection& inspection, const LayerRecord& re
 
 // Empty, or the fault of a layer's print program. A program with the wrong hash is still replayed, because the replay
 // locates the difference.
-std::string fault_of_program(const Inspection& inspection, const LayerRecord& record, const RunsView* image,
+std::string fault_of_program(const Inspection& inspection, const LayerRecord& record, const LayerPicture* image,
                              std::optional<replay::Count>& count) {
   const std::string name = program_file_name(record.layer.index, inspection.head.program_extension);
   if (name.empty()) return {};
@@ -62,8 +61,9 @@ std::string fault_of_program(const Inspection& inspection, const LayerRecord& re
   if (!digest) return digest.error().message;
   const bool same = digest->bytes == record.program.bytes && digest->hash == record.program.hash;
   if (image != nullptr && inspection.machine) {
+    const std::vector<RunsView> planes(image->begin(), image->end());
     const auto replay = inspection.machine->replay(program_of_layer(inspection.directory, inspection.head, record.layer.index),
-                                                   record.layer, *image, record.program.moved, record.program.lost);
+                                                   record.layer, planes, record.program.moved, record.program.lost);
     if (!replay) return fmt::format("{}: {}", name, replay.error().message);
     if (same && replay->drops != record.program.drops) {
       return fmt::format("{}: {} drops, the manifest says {}", name, replay->drops, record.program.drops);
@@ -84,29 +84,30 @@ std::string fault_of_program(const Inspection& inspection, const LayerRecord& re
                             image != nullptr ? ", though it prints the same" : "");
 }
 
-// Empty, or the fault of an image; its set pixels are added to `whole`.
-std::string fault_of_image(const Inspection& inspection, const LayerImageFile& file, Runs& whole) {
+// Empty, or the fault of an image; its set pixels are added to `picture`.
+std::string fault_of_image(const Inspection& inspection, const LayerImageFile& file, LayerPicture& picture) {
   const std::string& name = file.name;
   Result<read::Image> image = read::image((fs::path(inspection.directory) / name).string());
   if (!image) return image.error().message;
   if (const std::string what = read::difference(*image, inspection.head.grid, file.record.set_pixels); !what.empty())
     return fmt::format("{}: {}", name, what);
-  if (!raster::add_image(std::move(image->runs), whole))
-    return fmt::format("{}: sets pixels that another material's image sets as well", name);
+  if (!add_picture(inspection.head, std::move(image->runs), picture)) {
+    return fmt::format("{}: sets pixels that {}", name,
+                       inspection.head.materials.empty() ? "get no drop before" : "another material's image sets as well");
+  }
   return {};
 }
 
 std::string fault_of_layer(const Inspection& inspection, const LayerRecord& record, std::optional<replay::Count>& count) {
   if (inspection.head.extension.empty()) return fault_of_program(inspection, record, nullptr, count);  // a format without files
-  Runs whole;  // the set pixels of all materials together
+  LayerPicture picture;
   for (const LayerImageFile& file : layer_images(inspection.head, record)) {
     std::string fault = fault_of_file(inspection.directory, file.name, file.record.hash, file.record.bytes);
     if (!fault.empty()) return fault;
     if (inspection.quick) continue;
-    if (std::string what = fault_of_image(inspection, file, whole); !what.empty()) return what;
+    if (std::string what = fault_of_image(inspection, file, picture); !what.empty()) return what;
   }
-  const RunsView view = whole;
-  return fault_of_program(inspection, record, inspection.quick ? nullptr : &view, count);
+  return fault_of_program(inspection, record, inspection.quick ? nullptr : &picture, count);
 }
 
 // Restores the machine that the programs were written for.

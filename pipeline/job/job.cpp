@@ -27,6 +27,14 @@ Status check_job(const Job& job) {
   }
   if (const auto options = heights_options(job); !options) return options.error();
   if (const auto isa = usable_isa(job.isa); !isa) return isa.error();
+  const DoseRequest& dose = job.dose;
+  if (!dose.saturation_percent && (dose.core_saturation_percent || !dose.saturation_ranges.empty())) {
+    return Error{Fault::kUsage, fmt::format("dose.{}: changes a saturation that is not asked for; add --saturation",
+                                            dose.core_saturation_percent ? "core_saturation_percent" : "saturation_range")};
+  }
+  if (dose.saturation_percent && dose.core < 1) {
+    return Error{Fault::kUsage, "dose.core: a share of the pixels and --saturation exclude each other; use --core-saturation"};
+  }
   if (job.layers && job.shard) {
     return Error{Fault::kUsage, "--layers and --shard exclude each other; a shard is a share of all layers"};
   }

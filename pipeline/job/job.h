@@ -93,11 +93,21 @@ struct MachineRequest {
   std::optional<VatRule> vat_rule;                    // instead of the profile's
 };
 
+/// Another saturation between two heights above the bed, in mm. Where ranges overlap, the last one counts.
+struct SaturationRange {
+  double from_mm = 0, to_mm = 0;
+  double percent = 0;
+  std::optional<double> core_percent;  // inside of the shell; absent: as in it
+};
+
 /// Section [dose]: the distribution of binder (stages/dose/).
 struct DoseRequest {
-  std::array<double, 2> bleed_um{0, 0};                   // along x and y: pixels closer to the edge are cleared
-  double shell_mm = 0;                                    // pixels stay set to this depth; only with a core below 1 or beads
-  double core = 1;                                        // fraction of the pixels inside the shell that stay set
+  std::array<double, 2> bleed_um{0, 0};           // along x and y: pixels closer to the edge are cleared
+  double shell_mm = 0;                            // pixels stay set to this depth; only with a core below 1 or beads
+  double core = 1;                                // fraction of the pixels inside the shell that stay set
+  std::optional<double> saturation_percent;       // of the voids; absent: one drop a pixel
+  std::optional<double> core_saturation_percent;  // inside of the shell
+  std::vector<SaturationRange> saturation_ranges;
   raster::BeadEnds bead_ends = raster::BeadEnds::kRound;  // of filling beads, also where thick changes to thin
 };
 
@@ -141,6 +151,7 @@ struct Job {
   bool inspect = false;                 // look through the layers for islands, hollows, thin places
   std::optional<double> least_wall_mm;  // what is narrower is thin; absent: two pixels, or a drop
   bool allow_empty = false;             // a whole job may have nothing
+  bool allow_unbound = false;           // layers may get less binder than the machine's powder needs
   bool timing = false;                  // tell where the time goes
   bool json = false;
   bool quiet = false;

@@ -111,6 +111,10 @@ const JobKey kRunKeys[] = {
     field<&Job::least_wall_mm>(
         {"run", "least_wall_mm", "--least-wall", "MM", "what --inspect tells as thin; two pixels, or a drop, if absent"},
         {0, 1000, " mm"}),
+    field<&Job::allow_unbound>({"run", "allow_unbound", "--allow-unbound", "",
+                                "plan a job although layers get less binder than the machine's powder needs to hold", 0,
+                                "true"})
+        .shown_if([](const Job& job) { return job.allow_unbound; }),
     custom<Job, read_pair<read_shard>, write_share, &Job::shard>(
         {"run", "shard", "--shard", "I/N", "only the I-th of N equal shares of the layers, I from 1; see lamina merge"},
         Form::kString),

@@ -36,6 +36,7 @@ ManifestHead image_head(const Plan& plan) {
   head.mirror = value_of("image", "mirror", job);
   head.grid = plan.images->grid;
   if (plan.images->materials.several()) head.materials = plan.images->materials.used;
+  head.most_drops = plan.images->dose.most_drops();
   if (!plan.images->machine) return head;
   const Machine& machine = plan.images->machine->machine;
   head.machine = machine.name;
@@ -114,21 +115,21 @@ std::uint64_t ImageFiles::Work::bytes() const {
   return total;
 }
 
-Status ImageFiles::encode(const Runs& whole, std::span<const Runs> materials, Work& work, LayerRecord& record) const {
+Status ImageFiles::encode(const LayerImages& images, Work& work, LayerRecord& record) const {
   if (!work.encoder) (work.encoder = format_.make_encoder())->use(plan_.job.isa);
   write::LayerTags tags = tags_of(plan_, record.layer);
   work.encoder->tag(tags);
-  if (head_.materials.empty()) {
-    if (Status status = encode_one(whole, work, record, work.file); !status) return status;
+  if (head_.named_images() == 0) {
+    if (Status status = encode_one(images.whole, work, record, work.file); !status) return status;
     record.bytes = work.file.size();
     record.hash = hash_bytes(work.file);
     return {};
   }
-  work.files.resize(materials.size());
-  for (std::size_t m = 0; m < materials.size(); ++m) {
-    tags.material = head_.materials[m].name;
+  work.files.resize(images.several.size());
+  for (std::size_t m = 0; m < images.several.size(); ++m) {
+    if (!head_.materials.empty()) tags.material = head_.materials[m].name;
     work.encoder->tag(tags);
-    if (Status status = encode_one(materials[m], work, record, work.files[m]); !status) return status;
+    if (Status status = encode_one(images.several[m], work, record, work.files[m]); !status) return status;
     record.images[m].bytes = work.files[m].size();
     record.images[m].hash = hash_bytes(work.files[m]);
     record.bytes += work.files[m].size();
@@ -143,24 +144,27 @@ Status ImageFiles::encode_one(const Runs& image, Work& work, const LayerRecord& 
   return Error{status.error().fault, fmt::format("layer {}: {}", record.layer.index, status.error().message)};
 }
 
-Status ImageFiles::store(const Runs& whole, Work& work, LayerRecord& record) const {
-  const auto images = layer_images(head_, record);
+Status ImageFiles::store(const LayerImages& images, Work& work, LayerRecord& record) const {
+  const auto files = layer_images(head_, record);
   const write::FileOptions how = layer_file_options(plan_.job);
-  for (std::size_t m = 0; m < images.size() && !images[m].name.empty(); ++m) {
-    const write::Bytes& file = head_.materials.empty() ? work.file : work.files[m];
-    if (Status status = write::write_file(plan_.job.output + "/" + images[m].name, file, how); !status) return status;
+  for (std::size_t m = 0; m < files.size() && !files[m].name.empty(); ++m) {
+    const write::Bytes& file = head_.named_images() == 0 ? work.file : work.files[m];
+    if (Status status = write::write_file(plan_.job.output + "/" + files[m].name, file, how); !status) return status;
   }
-  return program(whole, work, record);
+  return program(images, work, record);
 }
 
 Result<std::vector<std::uint32_t>> ImageFiles::feeds_of(const LayerRecord& record) const {
   std::vector<std::uint64_t> pixels;
-  for (const LayerImageFile& image : layer_images(head_, record)) pixels.push_back(image.record.set_pixels);
+  if (head_.materials.empty()) pixels.push_back(record.set_pixels);
+  for (const ImageRecord& image : record.images) {
+    if (!head_.materials.empty()) pixels.push_back(image.set_pixels);
+  }
   return vats_of_layer(plan_.images->machine->machine, plan_.images->materials, pixels);
 }
 
 void ImageFiles::tell_unfed(LayerRecord& record) const {
-  if (!program_ || record.images.empty()) return;
+  if (!program_ || head_.materials.empty()) return;
   const auto feeds = feeds_of(record);
   const auto& materials = plan_.images->materials.used;
   for (std::size_t m = 0; feeds && m < materials.size(); ++m) {
@@ -168,7 +172,7 @@ void ImageFiles::tell_unfed(LayerRecord& record) const {
   }
 }
 
-Status ImageFiles::program(const Runs& whole, Work& work, LayerRecord& record) const {
+Status ImageFiles::program(const LayerImages& images, Work& work, LayerRecord& record) const {
   if (!program_) return {};
   const auto feeds = feeds_of(record);
   if (!feeds) {
@@ -176,13 +180,15 @@ Status ImageFiles::program(const Runs& whole, Work& work, LayerRecord& record) c
                                                   feeds.error().message)};
   }
   tell_unfed(record);
-  return program_->write_layer(record.layer, whole, *feeds, work.program, record.program);
+  std::vector<RunsView> planes{images.whole};
+  if (head_.most_drops > 1) planes.assign(images.several.begin(), images.several.end());
+  return program_->write_layer(record.layer, planes, *feeds, work.program, record.program);
 }
 
 std::uint64_t ImageFiles::bytes_bound(std::uint64_t changes) const {
-  const std::uint64_t files = std::max<std::size_t>(1, head_.materials.size());
+  const std::uint64_t files = std::max<std::size_t>(1, head_.named_images());
   return files * format_.most_bytes(head_.grid.columns(), head_.grid.rows(), changes) +
-         (program_ ? program_->bytes_bound(changes) : 0);
+         (program_ ? program_->bytes_bound(changes, std::max(1u, head_.most_drops)) : 0);
 }
 
 Status ImageFiles::record_kept_below(std::uint32_t layer) {

@@ -25,6 +25,12 @@ namespace lamina::pipeline {
 ManifestHead image_head(const Plan& plan);
 write::LayerTags tags_of(const Plan& plan, const Layer& layer);
 
+/// The images of a layer that is to be written.
+struct LayerImages {
+  const Runs& whole;              // of all materials, or of the first drop
+  std::span<const Runs> several;  // of each material, or of each drop of a pixel, if the job has several
+};
+
 class ImageFiles {
  public:
   /// The plan must outlive this object.
@@ -42,18 +48,17 @@ class ImageFiles {
   struct Work {
     std::unique_ptr<write::ImageEncoder> encoder;
     write::Bytes file;
-    std::vector<write::Bytes> files;  // one per material, if the job has several
+    std::vector<write::Bytes> files;  // one per material or drop, if the job has several
     ProgramWork program;
     std::uint64_t bytes() const;
   };
 
   // --- from many threads at once, each with its own work
-  /// materials  empty unless the job has several
-  Status encode(const Runs& whole, std::span<const Runs> materials, Work& work, LayerRecord& record) const;
+  Status encode(const LayerImages& images, Work& work, LayerRecord& record) const;
   /// errors  kOutput; kUsage: the machine cannot feed the layer
-  Status store(const Runs& whole, Work& work, LayerRecord& record) const;
+  Status store(const LayerImages& images, Work& work, LayerRecord& record) const;
   /// The print program alone; of a dry run it is only timed.
-  Status program(const Runs& whole, Work& work, LayerRecord& record) const;
+  Status program(const LayerImages& images, Work& work, LayerRecord& record) const;
   /// Upper bound of the bytes for a layer whose image has that many changes.
   std::uint64_t bytes_bound(std::uint64_t changes) const;
 

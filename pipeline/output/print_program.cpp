@@ -43,7 +43,7 @@ Status PrintProgram::begin() const {
   return status ? write::write_file(path(fmt::format("end{}", dialect_.extension)), frame.end, files_) : status;
 }
 
-Status PrintProgram::write_layer(const Layer& layer, const RunsView& image, const std::vector<std::uint32_t>& feeds,
+Status PrintProgram::write_layer(const Layer& layer, std::span<const RunsView> planes, const std::vector<std::uint32_t>& feeds,
                                  ProgramWork& work, ProgramRecord& record) const {
   if (!machine_) return machine_.error();
   if (!work.writer) work.writer = dialect_.make_writer(resolved_.machine, resolved_.grid);
@@ -68,7 +68,7 @@ Status PrintProgram::write_layer(const Layer& layer, const RunsView& image, cons
   work.writer->begin_layer(cycle, work.text);
   constexpr std::size_t kPiece = 256 << 10;
   const auto count =
-      program::compile(resolved_.grid, image, work.compile, [&](const Sweep& sweep, const SweepVectors& vectors) -> Status {
+      program::compile(resolved_.grid, planes, work.compile, [&](const Sweep& sweep, const SweepVectors& vectors) -> Status {
         if (!dialect_.has_motion) {
           const std::int64_t low = vectors.first_step, high = low + vectors.steps - 1;
           work.timer->sweep(static_cast<double>(write::across_nm(resolved_.machine, resolved_.grid, sweep.first_line)) / 1e6,
@@ -91,7 +91,7 @@ Status PrintProgram::write_layer(const Layer& layer, const RunsView& image, cons
   return {};
 }
 
-std::uint64_t PrintProgram::bytes_bound(std::uint64_t changes) const {
+std::uint64_t PrintProgram::bytes_bound(std::uint64_t changes, std::uint32_t planes) const {
   const HeadGrid& grid = resolved_.grid;
   // A sweep's vectors with their text of at most three times the size, lines, sorted changes and their steps.
   const std::uint64_t vectors = grid.steps() * grid.words() * 8;
@@ -100,10 +100,10 @@ std::uint64_t PrintProgram::bytes_bound(std::uint64_t changes) const {
   // text grows.
   constexpr std::uint64_t kStepText = 32, kSweepText = 256;
   const std::uint64_t further = grid.blocked_rule == BlockedRule::kSecondPass ? grid.blocked.size() : 0;
-  const std::uint64_t sweeps = std::uint64_t{grid.swaths(0)} * grid.passes * (1 + further);
+  const std::uint64_t sweeps = std::uint64_t{grid.swaths(0)} * grid.passes * (1 + further) * planes;
   const bool keeps = dialect_.has_motion && !replay::Timer::keeps_no_vectors(dialect_.id);
   const std::uint64_t kept = keeps ? 2 * sweeps * (kStepText * grid.steps() + kSweepText) : 0;
-  return 4 * vectors + 4 * grid.steps() + 16 * grid.lines + 2 * changes + turned + kept + (512 << 10);
+  return 4 * vectors + 4 * grid.steps() + planes * (16 * grid.lines + 2 * changes + turned) + kept + (512 << 10);
 }
 
 }  // namespace lamina::pipeline

@@ -10,6 +10,7 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 
@@ -54,12 +55,18 @@ class PrintProgram {
   Status begin() const;
 
   /// Compiles a layer, times it and writes its file, sweep by sweep. errors  kOutput
-  /// feeds  the vats that feed the layer
-  Status write_layer(const Layer& layer, const RunsView& image, const std::vector<std::uint32_t>& feeds, ProgramWork& work,
-                     ProgramRecord& record) const;
+  /// planes  of the drops of a pixel, each within the one before; one if all get at most one
+  /// feeds   the vats that feed the layer
+  Status write_layer(const Layer& layer, std::span<const RunsView> planes, const std::vector<std::uint32_t>& feeds,
+                     ProgramWork& work, ProgramRecord& record) const;
 
-  /// Upper bound of write_layer's memory, in bytes, for an image with that many changes.
-  std::uint64_t bytes_bound(std::uint64_t changes) const;
+  Status write_layer(const Layer& layer, const RunsView& image, const std::vector<std::uint32_t>& feeds, ProgramWork& work,
+                     ProgramRecord& record) const {
+    return write_layer(layer, std::span(&image, 1), feeds, work, record);
+  }
+
+  /// Upper bound of write_layer's memory, in bytes, for so many images with that many changes.
+  std::uint64_t bytes_bound(std::uint64_t changes, std::uint32_t planes = 1) const;
 
  private:
   std::string path(std::string_view name) const;

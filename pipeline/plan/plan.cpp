@@ -244,9 +244,14 @@ class Planner {
     std::optional<Beads> beads;
     if (beads_) beads.emplace(job(), grid, *plan_.sections, *plan_.segments);
     const double bed = static_cast<double>(grid.columns()) * grid.rows();
+    DosePlan dose(job(), grid);
+    const auto layer = [this](std::uint32_t i) { return plan_.layer(i); };
+    if (Status status = dose.decide(job(), machine(), plan_.layer_count, layer, plan_.warnings); !status) return status;
+    if (dose.most_drops() > 1 && materials_.several()) {
+      return usage("--saturation: several drops a pixel of several materials are not planned together; plan them apart");
+    }
     plan_.images.emplace(ImagePlan{std::move(printer_.machine), grid, std::move(materials_), std::move(*solids),
-                                   DosePlan(job(), grid), std::move(beads),
-                                   static_cast<std::uint64_t>(std::min(covered, bed))});
+                                   std::move(dose), std::move(beads), static_cast<std::uint64_t>(std::min(covered, bed))});
     end_indexing();
     return {};
   }

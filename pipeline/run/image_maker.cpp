@@ -89,14 +89,13 @@ class ImageMaker : public Maker {
     });
     if (plan_.job.dry_run) {
       add("program",
-          [this](const Layer&, Work& work, Made& made) { return files_.program(work.images.runs, work.files, made.record); });
+          [this](const Layer&, Work& work, Made& made) { return files_.program(images_of(work), work.files, made.record); });
       return steps;
     }
-    add("encode", [this](const Layer&, Work& work, Made& made) {
-      return files_.encode(work.images.runs, work.images.materials.image, work.files, made.record);
-    });
+    add("encode",
+        [this](const Layer&, Work& work, Made& made) { return files_.encode(images_of(work), work.files, made.record); });
     add("store",
-        [this](const Layer&, Work& work, Made& made) { return files_.store(work.images.runs, work.files, made.record); });
+        [this](const Layer&, Work& work, Made& made) { return files_.store(images_of(work), work.files, made.record); });
     return steps;
   }
   bool records_from_work() const override { return inspector_.on(); }
@@ -142,6 +141,7 @@ class ImageMaker : public Maker {
 
   void warn(const Summary&, std::vector<Warning>& warnings) const override;
   void tell(Summary& summary) const override;
+  void tell_binder(const dose::Budget& budget, Summary& summary) const;
 
  private:
   struct Work {
@@ -154,13 +154,21 @@ class ImageMaker : public Maker {
     ImageNotes notes;
   };
 
+  LayerImages images_of(const Work& work) const {
+    const ImageWork& images = work.images;
+    return {images.runs, plan_.images->dose.most_drops() > 1 ? images.drops.planes : images.materials.image};
+  }
+
   /// Counts what lies in the powder of another vat.
   void add_unfed(const LayerRecord& record) {
     for (std::size_t m = 0; m < record.images.size(); ++m) unfed_[m].add(record.layer, record.images[m].unfed_pixels);
   }
 
   void add(const LayerRecord& record) {
-    if (plan_.images->machine && record.images.size() > 1) add_unfed(record);
+    if (plan_.images->machine && plan_.images->materials.several()) add_unfed(record);
+    if (const auto& budget = plan_.images->dose.budget()) {
+      binder_.add(*budget, record.layer, record.dosed_pixels, record.drops, record.asked_drops, record.program.lost);
+    }
     if (cost_) cost_->add(record);
     const PixelGrid& grid = plan_.images->grid;
     set_pixels_ += record.set_pixels;
@@ -168,7 +176,8 @@ class ImageMaker : public Maker {
     lost_pixels_ += record.program.lost;
     microseconds_ += record.program.microseconds;
     timed_ = timed_ && (record.program.bytes == 0 || record.program.microseconds > 0);
-    for (std::size_t m = 0; m < record.images.size(); ++m) materials_[m].second += record.images[m].set_pixels;
+    for (std::size_t m = 0; plan_.images->materials.several() && m < record.images.size(); ++m)
+      materials_[m].second += record.images[m].set_pixels;
     const double pixel_mm2 = 25.4 * 25.4 / (grid.x.dpi() * grid.y.dpi());
     volume_mm3_ += static_cast<double>(record.set_pixels) * pixel_mm2 * mm(record.layer.thickness);
   }
@@ -188,6 +197,7 @@ class ImageMaker : public Maker {
   std::int64_t microseconds_ = 0;  // of the machine
   bool timed_ = true;              // layers that an earlier build left are not
   double volume_mm3_ = 0;
+  dose::BinderCount binder_;
   std::vector<std::pair<std::string, std::uint64_t>> materials_;  // name, set pixels
   std::vector<UnfedPowder> unfed_;                                // by material
 };
@@ -198,6 +208,22 @@ void ImageMaker::warn(const Summary&, std::vector<Warning>& warnings) const {
   for (const UnfedPowder& powder : unfed_) sanity::warn_of_unfed(powder, warnings);
   const std::vector<std::uint32_t>& part = plan_.scene->part_of_instance;
   rows_.tell(part.empty() ? std::string() : plan_.scene->parts[part[rows_.first_capped()]].path, warnings);
+}
+
+void ImageMaker::tell_binder(const dose::Budget& budget, Summary& summary) const {
+  summary.results.emplace_back("binder", dose::told(budget, binder_));
+  nlohmann::ordered_json& facts = (*summary.facts)["saturation"];
+  facts["asked"] = budget.has_wish();
+  if (!budget.has_wish()) {
+    facts["least_percent"] = budget.gets().first;
+    facts["most_percent"] = budget.gets().second;
+    return;
+  }
+  facts["asked_percent"] = binder_.asked_percent(budget);
+  facts["reached_percent"] = binder_.reached_percent(budget);
+  facts["drops"] = binder_.drops();
+  facts["most_drops"] = budget.most_drops();
+  facts["binder_ml"] = binder_.binder_ml(budget);
 }
 
 void ImageMaker::tell(Summary& summary) const {
@@ -221,6 +247,7 @@ void ImageMaker::tell(Summary& summary) const {
   if (several) {
     for (const auto& [name, count] : materials_) result("", fmt::format("{} of {}", readable_count(count), name));
   }
+  if (const auto& budget = plan_.images->dose.budget()) tell_binder(*budget, summary);
   if (print_seconds > 0) result("printing", replay::time_text(print_seconds, plan_.images->machine->machine.name));
   if (timed_ && cost_) cost_->tell(summary);
   if (!summary.dry_run) {

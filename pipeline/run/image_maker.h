@@ -25,6 +25,7 @@ struct ImageWork {
   Runs third;            // the core of a layer with a shell
   Runs lowest, highest;  // sections at both ends of the layer, if steps must lie inside or outside
   Runs section;          // of one solid of a layer with several materials
+  DropWork drops;        // if a saturation is asked for
   raster::MaterialImages materials;
   std::unique_ptr<BeadWork> beads;  // if beads fill parts
 

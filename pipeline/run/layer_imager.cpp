@@ -39,7 +39,7 @@ void add(const raster::LayerReport& solid, raster::LayerReport& all) {
 }  // namespace
 
 std::uint64_t ImageWork::bytes() const {
-  std::uint64_t total = scratch.bytes() + materials.bytes() + (beads ? beads->bytes() : 0);
+  std::uint64_t total = scratch.bytes() + materials.bytes() + drops.bytes() + (beads ? beads->bytes() : 0);
   for (const Runs* image : {&runs, &second, &third, &lowest, &highest, &section}) {
     total += bytes_held(image->row_offset) + bytes_held(image->change);
   }
@@ -95,10 +95,18 @@ void LayerImager::bleed(ImageWork& work) const {
 void LayerImager::dose(const Layer& layer, ImageWork& work, LayerRecord& record) const {
   const ImagePlan& images = *plan_.images;
   images.dose.thin(layer.index, work.runs, work.second, work.third);
+  if (images.dose.saturates()) {
+    record.dosed_pixels = set_pixels(work.runs);
+    record.asked_drops = images.dose.saturate(layer, work.runs, work.second, work.drops);
+    record.drops = sum_of_levels(work.drops.levels);
+  }
   if (images.materials.several() && (images.beads || images.dose.any())) work.materials.keep(work.runs);
   record.set_pixels = set_pixels(work.runs);
-  for (const Runs& image : work.materials.image)
+  const auto add_image = [&](const Runs& image) {
     record.images.push_back({.bytes = 0, .set_pixels = set_pixels(image), .unfed_pixels = 0, .hash = {}});
+  };
+  if (images.dose.most_drops() > 1) std::ranges::for_each(work.drops.planes, add_image);
+  std::ranges::for_each(work.materials.image, add_image);
 }
 
 Status LayerImager::make(const Layer& layer, ImageWork& work, LayerRecord& record, ImageNotes& notes) const {
@@ -183,7 +191,9 @@ std::uint64_t LayerImager::bytes_of_section(Nm plane, std::uint64_t changes) con
   // Images of each material, of all, of one solid, and one intermediate.
   const std::uint64_t materials = images.materials.several() ? images.materials.used.size() : 0;
   const std::uint64_t material_images = materials == 0 ? 0 : (materials + 3) * 2 * (4 * changes + 4 * rows);
-  return images.solids.layer_bytes_bound(plane) + second_image + material_images;
+  // Zones and levels, and the image of each drop.
+  const std::uint64_t drops = images.dose.saturates() ? 18 * changes + images.dose.most_drops() * 4 * (changes + rows) : 0;
+  return images.solids.layer_bytes_bound(plane) + second_image + material_images + drops;
 }
 
 }  // namespace lamina::pipeline

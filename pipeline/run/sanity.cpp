@@ -107,6 +107,7 @@ std::string Sanity::why_nothing() const {
   }
   if (kept_) return "look at `lamina info`";
   if (std::string why = sanity::why_nothing(*tally_, sampling_); !why.empty()) return why;
+  if (job.dose.saturation_percent) return "--saturation leaves no drop: give a higher one";
   if (job.dose.core < 1) return "--core leaves no drop: give a greater share, or --shell";
   return "no bead fits into the parts: they are narrower than walls and filling ask for";
 }
@@ -119,7 +120,7 @@ std::vector<std::uint8_t> Sanity::filled_or_rightly_empty() const {
     if (filled[i] == 0) planes.push_back(plane_of(plan_.job, plan_.layer(i), plan_.scene->height));
   }
   if (planes.empty()) return filled;
-  const bool thinned = plan_.images && (plan_.images->beads || plan_.job.dose.core < 1);
+  const bool thinned = plan_.images && (plan_.images->beads || plan_.job.dose.core < 1 || plan_.images->dose.saturates());
   std::vector<std::uint8_t> crossed(planes.size(), 0);
   if (!thinned && plan_.images) {
     for (const Solid& solid : plan_.images->solids.all()) solid.rasterizer.mark_crossed(planes, crossed);

@@ -41,7 +41,7 @@ Result<Manifest> finished_manifest(const std::string& place, const std::string& 
 }
 
 /// Reads a layer's files into runs if they match the manifest.
-Result<Runs> read_layer(const std::string& directory, const ManifestHead& head, const LayerRecord& record) {
+Result<LayerPicture> read_layer(const std::string& directory, const ManifestHead& head, const LayerRecord& record) {
   for (const LayerImageFile& file : layer_images(head, record)) {
     const std::string path = directory + "/" + file.name;
     const Result<FileDigest> digest = digest_file(path, file.record.bytes);
@@ -55,10 +55,11 @@ Result<Runs> read_layer(const std::string& directory, const ManifestHead& head, 
 
 /// Machine time of a layer, from replaying its program as lamina verify does.
 Result<double> seconds_of_layer(const std::string& directory, const ManifestHead& head, const replay::VirtualMachine& machine,
-                                const LayerRecord& record, const RunsView& image) {
+                                const LayerRecord& record, const LayerPicture& picture) {
   const std::string program = program_of_layer(directory, head, record.layer.index);
   if (hash_bytes(std::as_bytes(std::span(program))) == record.program.hash) {
-    const auto replay = machine.replay(program, record.layer, image, record.program.moved, record.program.lost);
+    const std::vector<RunsView> planes(picture.begin(), picture.end());
+    const auto replay = machine.replay(program, record.layer, planes, record.program.moved, record.program.lost);
     if (replay) return replay->seconds();
     return Error{Fault::kVerification, fmt::format("{}: {}", directory, replay.error().message)};
   }
@@ -83,10 +84,10 @@ Result<ReportSource> source_of_images(const std::string& directory, ReportSource
     const LayerRecord& record = manifest->layers[place];
     auto runs = read_layer(directory, manifest->head, record);
     if (!runs) return runs.error();
-    if (!machine || !timed) return LayerSeen{std::move(*runs)};
-    const auto seconds = seconds_of_layer(directory, manifest->head, *machine, record, runs->view());
+    if (!machine || !timed) return LayerSeen{std::move(runs->front())};
+    const auto seconds = seconds_of_layer(directory, manifest->head, *machine, record, *runs);
     if (!seconds) return seconds.error();
-    return LayerSeen{std::move(*runs), *seconds};
+    return LayerSeen{std::move(runs->front()), *seconds};
   };
   return source;
 }

@@ -124,7 +124,7 @@ Result<Preview> draw_images(const Manifest& manifest, const PreviewRequest& requ
     const LayerRecord& record = manifest.layers[index];
     const auto images = layer_images(manifest.head, record);
     for (std::size_t m = 0; m < images.size(); ++m) {
-      std::string material = manifest.head.materials.empty() ? "" : ", " + manifest.head.materials[m].name;
+      std::string material = manifest.head.named_images() == 0 ? "" : ", " + manifest.head.image_name(m);
       const bool unfed = images[m].record.unfed_pixels > 0;
       if (unfed) material += " in another powder";
       sheet.layers.push_back({(std::filesystem::path(request.source) / images[m].name).string(),

@@ -26,12 +26,14 @@ Result<Buffer<std::byte>> draw_swath(const std::string& directory, const Manifes
   if (!machine) return machine.error();
   const auto image = picture_of_layer(directory, head, *record);
   if (!image) return image.error();
-  const auto jetting = replay::jet_until(*machine, program_of_layer(directory, head, choice.layer), choice, head.grid);
+  replay::StepChoice step = choice;
+  step.planes = std::max(1u, head.most_drops);
+  const auto jetting = replay::jet_until(*machine, program_of_layer(directory, head, choice.layer), step, head.grid);
   if (!jetting) return jetting.error();
   write::picture::SwathView view;
   view.grid = head.grid;
   view.width = width;
-  view.image = *image;
+  view.image = image->front();
   view.fired = jetting->printed;
   view.bands = jetting->bands;
   view.nozzles = jetting->nozzles;

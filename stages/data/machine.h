@@ -43,6 +43,8 @@ struct Machine {
     std::vector<double> row_offset_um{0};  // nozzle i lies in row i mod rows, so far behind the first row
     double highest_frequency_hz = 5000;    // of one nozzle
     double drop_pl = 50;
+    std::uint32_t most_drops = 1;        // that a nozzle can fire on a pixel in one sweep
+    std::uint32_t most_drop_sweeps = 0;  // over one place, for several drops a pixel; 0: not stated
     std::vector<std::uint32_t> blocked;  // numbers from 0
     BlockedRule blocked_rule = BlockedRule::kReport;
   } head;
@@ -85,9 +87,11 @@ struct Machine {
     double dose = 1.2;                        // height fed / height of the layer
     std::array<double, 2> roller_mm{0, 200};  // home and far end
     double roller_speed_mm_s = 50, vat_speed_mm_s = 5;
-    double spread_s = 0;   // a layer's powder cycle that the program does not spell; 0: by the movements above
-    double pause_s = 0;    // a layer, beside all movements: drying, wiping
-    double packing = 0.6;  // share of the powder bed that is solid, for the report
+    double spread_s = 0;                  // a layer's powder cycle that the program does not spell; 0: by the movements above
+    double pause_s = 0;                   // a layer, beside all movements: drying, wiping
+    double packing = 0.6;                 // share of the powder bed that is solid
+    double evaporates_percent = 0;        // of the jetted binder, before the next layer is spread
+    double least_saturation_percent = 0;  // of the voids, that binds; 0: not stated
   } powder;
 
   /// Prices, in units of the currency; 0: none. Powder by volume is that of the bed, as fed.

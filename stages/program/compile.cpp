@@ -10,13 +10,20 @@ namespace {
 /// One layer while it is compiled.
 class LayerCompiler {
  public:
-  LayerCompiler(const HeadGrid& grid, const RunsView& image, CompileScratch& scratch, const EmitSweep& emit)
-      : grid_(grid), scratch_(scratch), emit_(emit), blocked_(grid.nozzles, false) {
+  LayerCompiler(const HeadGrid& grid, std::span<const RunsView> planes, CompileScratch& scratch, const EmitSweep& emit)
+      : grid_(grid),
+        scratch_(scratch),
+        emit_(emit),
+        blocked_(grid.nozzles, false),
+        planes_(static_cast<std::uint32_t>(planes.size())) {
     for (const std::uint32_t nozzle : grid.blocked) blocked_[nozzle] = true;
     scratch.made_used = 0;
-    const RunsView frame = to_scan_frame(grid, image, scratch.scan);
-    scratch.line.resize(grid.lines);
-    for (std::uint32_t l = 0; l < grid.lines; ++l) scratch.line[l] = frame.row(l);
+    if (scratch.scan.size() < planes.size()) scratch.scan.resize(planes.size());
+    scratch.line.resize(std::size_t{grid.lines} * planes.size());
+    for (std::uint32_t p = 0; p < planes_; ++p) {
+      const RunsView frame = to_scan_frame(grid, planes[p], scratch.scan[p]);
+      for (std::uint32_t l = 0; l < grid.lines; ++l) scratch.line[std::size_t{p} * grid.lines + l] = frame.row(l);
+    }
     scratch.nozzle.assign(grid.nozzles, Line());
     if (grid.first_swath == FirstSwath::kLayer) {
       while (first_ + 1 < grid.lines && scratch.line[first_].empty()) ++first_;
@@ -26,18 +33,23 @@ class LayerCompiler {
   }
 
   Result<ProgramCount> run() {
-    if (!grid_.blocked.empty() && grid_.blocked_rule != BlockedRule::kSecondPass) resolve_dead_lines();
+    for (plane_ = 0; plane_ < planes_; ++plane_) {
+      if (!grid_.blocked.empty() && grid_.blocked_rule != BlockedRule::kSecondPass) resolve_dead_lines();
+    }
     kept_ = scratch_.made_used;
-    const std::uint32_t regular = swaths_ * grid_.passes;
-    further_ = regular;
+    regular_ = further_ = swaths_ * grid_.passes * planes_;
+    std::uint32_t number = 0;
     for (std::uint32_t swath = 0; swath < swaths_; ++swath) {
       for (std::uint32_t pass = 0; pass < grid_.passes; ++pass) {
-        scratch_.made_used = kept_;
-        Sweep sweep{swath * grid_.passes + pass, regular, swath, pass, false, first_line(swath, pass)};
-        for (std::uint32_t i = 0; i < grid_.nozzles; ++i) scratch_.nozzle[i] = under(swath, pass, i);
-        if (Status status = make(sweep); !status) return status.error();
+        for (plane_ = 0; plane_ < planes_; ++plane_) {
+          scratch_.made_used = kept_;
+          Sweep sweep{number++, regular_, swath, pass, false, first_line(swath, pass)};
+          for (std::uint32_t i = 0; i < grid_.nozzles; ++i) scratch_.nozzle[i] = under(swath, pass, i);
+          if (Status status = make(sweep); !status) return status.error();
+        }
       }
-      if (grid_.blocked_rule == BlockedRule::kSecondPass && !grid_.blocked.empty()) {
+      if (grid_.blocked_rule != BlockedRule::kSecondPass || grid_.blocked.empty()) continue;
+      for (plane_ = 0; plane_ < planes_; ++plane_) {
         if (Status status = further_sweeps(swath); !status) return status.error();
       }
     }
@@ -48,6 +60,9 @@ class LayerCompiler {
   std::int64_t first_line(std::uint32_t swath, std::uint32_t pass) const {
     return std::int64_t{first_} + std::int64_t{swath} * stride_ + pass;
   }
+
+  /// A line of the plane at hand.
+  Line& line(std::uint32_t number) { return scratch_.line[std::size_t{plane_} * grid_.lines + number]; }
 
   /// Another line, in a buffer that lives as long as the layer.
   Buffer<std::uint32_t>& new_line() {
@@ -71,10 +86,10 @@ class LayerCompiler {
   /// What nozzle i of a sweep has to fire.
   Line under(std::uint32_t swath, std::uint32_t pass, std::uint32_t i) {
     const std::uint32_t own = pass + i * grid_.passes;  // line in the swath
-    const std::int64_t line = first_line(swath, pass) + std::int64_t{i} * grid_.passes;
-    if (line >= grid_.lines || blocked_[i]) return {};
-    const auto number = static_cast<std::uint32_t>(line);
-    const Line whole = scratch_.line[number];
+    const std::int64_t over = first_line(swath, pass) + std::int64_t{i} * grid_.passes;
+    if (over >= grid_.lines || blocked_[i]) return {};
+    const auto number = static_cast<std::uint32_t>(over);
+    const Line whole = line(number);
     const bool lower = swath > 0 && own < grid_.overlap, upper = swath + 1 < swaths_ && own >= stride_;
     if (whole.empty() || (!lower && !upper)) return whole;
     if (nozzle_blocked(lower ? own + stride_ : own - stride_)) return whole;  // the other swath cannot
@@ -103,13 +118,13 @@ class LayerCompiler {
   void resolve_dead_lines() {
     const std::int64_t next = grid_.passes;
     for (std::uint32_t l = first_; l < grid_.lines; ++l) {
-      if (scratch_.line[l].empty() || !dead(l)) continue;
-      Line left = scratch_.line[l];
-      scratch_.line[l] = {};
+      if (line(l).empty() || !dead(l)) continue;
+      Line left = line(l);
+      line(l) = {};
       for (const std::int64_t neighbour : {l - next, l + next}) {
         if (grid_.blocked_rule != BlockedRule::kNeighbour || left.empty()) break;
         if (neighbour < first_ || neighbour >= grid_.lines || dead(static_cast<std::uint32_t>(neighbour))) continue;
-        Line& target = scratch_.line[static_cast<std::size_t>(neighbour)];
+        Line& target = line(static_cast<std::uint32_t>(neighbour));
         Buffer<std::uint32_t>& both = new_line();
         combine(target, left, LineOperation::kUnion, both);
         Buffer<std::uint32_t>& added = new_line();
@@ -130,9 +145,9 @@ class LayerCompiler {
     for (std::uint32_t pass = 0; pass < grid_.passes; ++pass) {
       std::vector<std::uint32_t> waiting;
       for (const std::uint32_t j : grid_.blocked) {
-        const std::int64_t line = first_line(swath, pass) + std::int64_t{j} * grid_.passes;
-        if (line < grid_.lines && !scratch_.line[line].empty() && dead(static_cast<std::uint32_t>(line)) &&
-            owns(swath, pass + j * grid_.passes)) {
+        const std::int64_t over = first_line(swath, pass) + std::int64_t{j} * grid_.passes;
+        const auto own = static_cast<std::uint32_t>(over);
+        if (over < grid_.lines && !line(own).empty() && dead(own) && owns(swath, pass + j * grid_.passes)) {
           waiting.push_back(j);
         }
       }
@@ -143,12 +158,11 @@ class LayerCompiler {
           const std::int64_t other = j + d;
           if (other < 0 || other >= grid_.nozzles || blocked_[static_cast<std::size_t>(other)]) return false;
           scratch_.nozzle[static_cast<std::size_t>(other)] =
-              scratch_.line[first_line(swath, pass) + std::int64_t{j} * grid_.passes];
+              line(static_cast<std::uint32_t>(first_line(swath, pass) + std::int64_t{j} * grid_.passes));
           return true;
         });
         if (waiting.size() == before) continue;
-        Sweep sweep{
-            further_++, swaths_ * grid_.passes, swath, further_pass++, false, first_line(swath, pass) - d * grid_.passes};
+        Sweep sweep{further_++, regular_, swath, further_pass++, false, first_line(swath, pass) - d * grid_.passes};
         if (Status status = make(sweep); !status) return status;
       }
     }
@@ -162,7 +176,8 @@ class LayerCompiler {
   CompileScratch& scratch_;
   const EmitSweep& emit_;
   std::vector<bool> blocked_;
-  std::uint32_t first_ = 0, stride_ = 0, swaths_ = 0, further_ = 0;
+  std::uint32_t planes_, plane_ = 0;
+  std::uint32_t first_ = 0, stride_ = 0, swaths_ = 0, regular_ = 0, further_ = 0;
   std::size_t kept_ = 0;  // made lines that are needed to the end of the layer
   bool backward_ = false;
   ProgramCount count_;
@@ -171,7 +186,12 @@ class LayerCompiler {
 }  // namespace
 
 Result<ProgramCount> compile(const HeadGrid& grid, const RunsView& image, CompileScratch& scratch, const EmitSweep& emit) {
-  return LayerCompiler(grid, image, scratch, emit).run();
+  return compile(grid, {&image, 1}, scratch, emit);
+}
+
+Result<ProgramCount> compile(const HeadGrid& grid, std::span<const RunsView> planes, CompileScratch& scratch,
+                             const EmitSweep& emit) {
+  return LayerCompiler(grid, planes, scratch, emit).run();
 }
 
 }  // namespace lamina::program

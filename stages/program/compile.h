@@ -3,6 +3,7 @@
 
 #include <deque>
 #include <functional>
+#include <span>
 #include <vector>
 
 #include "stages/data/program.h"
@@ -15,19 +16,21 @@ namespace lamina::program {
 
 /// Kept from layer to layer.
 struct CompileScratch {
-  ScanScratch scan;
+  std::deque<ScanScratch> scan;  // of each plane
   FireScratch fire;
   SweepVectors vectors;
-  Buffer<Line> line;                       // every line of the layer
+  Buffer<Line> line;                       // every line of the layer, plane after plane
   std::vector<Line> nozzle;                // what is under each nozzle of a sweep
   std::deque<Buffer<std::uint32_t>> made;  // lines that are not those of the image: shared or moved ones
   std::size_t made_used = 0;
 
   std::uint64_t bytes() const {
-    std::uint64_t total = bytes_held(scan.turned.row_offset) + bytes_held(scan.turned.change) + bytes_held(scan.next) +
-                          bytes_held(fire.event_offset) + bytes_held(fire.event_bit) + bytes_held(fire.rows) +
+    std::uint64_t total = bytes_held(fire.event_offset) + bytes_held(fire.event_bit) + bytes_held(fire.rows) +
                           bytes_held(fire.current) + bytes_held(vectors.bits) + bytes_held(vectors.firing) + bytes_held(line) +
                           nozzle.capacity() * sizeof(Line);
+    for (const ScanScratch& one : scan) {
+      total += bytes_held(one.turned.row_offset) + bytes_held(one.turned.change) + bytes_held(one.next);
+    }
     for (const Buffer<std::uint32_t>& one : made) total += bytes_held(one);
     return total;
   }
@@ -50,5 +53,11 @@ using EmitSweep = std::function<Status(const Sweep&, const SweepVectors&)>;
 /// errors    those of `emit`, which end the layer
 /// cost      of fire() for each sweep; memory is one sweep's vectors
 Result<ProgramCount> compile(const HeadGrid& grid, const RunsView& image, CompileScratch& scratch, const EmitSweep& emit);
+
+/// The same for pixels of several drops, each of which is a sweep of its own: every sweep of the head is made once for each
+/// plane before the next one, so that the drops of a pixel follow each other closely.
+/// planes  at least one; each lies within the one before it
+Result<ProgramCount> compile(const HeadGrid& grid, std::span<const RunsView> planes, CompileScratch& scratch,
+                             const EmitSweep& emit);
 
 }  // namespace lamina::program

@@ -53,4 +53,16 @@ bool add_image(Runs&& image, Runs& whole) {
   return true;
 }
 
+bool add_drop(Runs&& image, std::vector<Runs>& planes) {
+  if (!planes.empty()) {
+    const Runs& before = planes.back();
+    if (image.columns != before.columns || image.row_offset.size() != before.row_offset.size()) return false;
+    Runs common;
+    combine(before, image, SetOperation::kIntersection, common);
+    if (set_pixels(common) != set_pixels(image)) return false;
+  }
+  planes.push_back(std::move(image));
+  return true;
+}
+
 }  // namespace lamina::raster

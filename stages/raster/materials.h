@@ -26,4 +26,8 @@ struct MaterialImages {
 /// returns  false if a pixel is set in both, or their sizes differ; `whole` is then as it was
 bool add_image(Runs&& image, Runs& whole);
 
+/// Adds the image of the next drop, of the pixels that get one more than those before; `planes` is empty before the first one.
+/// returns  false if it does not lie within the one before, or their sizes differ; `planes` is then as it was
+bool add_drop(Runs&& image, std::vector<Runs>& planes);
+
 }  // namespace lamina::raster

@@ -44,26 +44,23 @@ void Printing::coverage(std::vector<bool>& worked, std::vector<bool>& blocked) c
   }
 }
 
-void Printing::compare(const RunsView& image, std::uint64_t moved, std::uint64_t lost) {
-  if (image.columns != machine_.columns_ || image.rows() != machine_.rows_) return fault("the image is of another size");
-  std::vector<std::uint64_t> wanted(row_words_);
-  std::uint64_t missing = 0, added = 0;
-  std::string first, first_of_all;  // that nothing explains; explained or not
+void Printing::compare_plane(const RunsView& image, std::uint32_t plane, std::uint64_t moved, std::uint64_t lost,
+                             Differences& differ) const {
   const bool x = profile().mounting.scan_axis == ScanAxis::kX;
   const std::int64_t next = profile().mounting.passes;
-  std::vector<bool> worked(machine_.lines_), blocked(machine_.lines_);
-  coverage(worked, blocked);
   const auto may_be_lost = [&](std::int64_t column, std::int64_t row) {
     const auto over = std::size_t(line_of(static_cast<std::uint32_t>(column), static_cast<std::uint32_t>(row)));
-    return blocked[over] || !worked[over];
+    return differ.blocked[over] || !differ.worked[over];
   };
   const auto set_and_unfired = [&](std::int64_t column, std::int64_t row) {
     if (column < 0 || row < 0 || column >= machine_.columns_ || row >= machine_.rows_ || !may_be_lost(column, row))
       return false;
     const auto line = image.row(static_cast<std::uint32_t>(row));
     const auto after = std::upper_bound(line.begin(), line.end(), static_cast<std::uint32_t>(column)) - line.begin();
-    return after % 2 == 1 && (fired_[std::size_t(row) * row_words_ + std::size_t(column) / 64] >> (column % 64) & 1) == 0;
+    const std::uint64_t* fired = fired_row(plane, static_cast<std::uint32_t>(row));
+    return after % 2 == 1 && (fired[std::size_t(column) / 64] >> (column % 64) & 1) == 0;
   };
+  std::vector<std::uint64_t>& wanted = differ.wanted;
   for (std::uint32_t row = 0; row < image.rows(); ++row) {
     std::fill(wanted.begin(), wanted.end(), 0);
     const auto line = image.row(row);
@@ -76,31 +73,47 @@ void Printing::compare(const RunsView& image, std::uint64_t moved, std::uint64_t
       }
     }
     for (std::uint32_t w = 0; w < row_words_; ++w) {
-      const std::uint64_t got = fired_[std::size_t{row} * row_words_ + w];
-      for (std::uint64_t differ = got ^ wanted[w]; differ != 0; differ &= differ - 1) {
-        const auto bit = static_cast<std::uint32_t>(std::countr_zero(differ));
+      const std::uint64_t got = fired_row(plane, row)[w];
+      for (std::uint64_t different = got ^ wanted[w]; different != 0; different &= different - 1) {
+        const auto bit = static_cast<std::uint32_t>(std::countr_zero(different));
         const std::uint32_t column = w * 64 + bit;
         const bool extra = (got >> bit & 1) != 0;
-        (extra ? added : missing) += 1;
+        (extra ? differ.added : differ.missing) += 1;
         const bool explained =
             !extra ? moved + lost > 0 && may_be_lost(column, row)
                    : moved > 0 && (x ? set_and_unfired(column, row - next) || set_and_unfired(column, row + next)
                                      : set_and_unfired(column - next, row) || set_and_unfired(column + next, row));
-        if (first_of_all.empty()) first_of_all = place_of(column, row);
-        if (first.empty() && !explained) {
-          first = fmt::format("{}: column {}, row {} is {}", place_of(column, row), column, row,
-                              extra ? "fired and not set in the image" : "set in the image and not fired");
+        if (differ.first_of_all.empty()) differ.first_of_all = place_of(column, row);
+        if (differ.first.empty() && !explained) {
+          differ.first = fmt::format("{}: column {}, row {} is {}{}", place_of(column, row), column, row,
+                                     extra ? "fired and not set in the image" : "set in the image and not fired",
+                                     planes_ == 1 ? "" : fmt::format(", drop {}", plane + 1));
         }
       }
     }
   }
+}
+
+void Printing::compare(std::span<const RunsView> planes, std::uint64_t moved, std::uint64_t lost) {
+  Differences differ;
+  differ.wanted.resize(row_words_);
+  differ.worked.resize(machine_.lines_);
+  differ.blocked.resize(machine_.lines_);
+  coverage(differ.worked, differ.blocked);
+  for (std::uint32_t plane = 0; plane < planes.size(); ++plane) {
+    const RunsView& image = planes[plane];
+    if (image.columns != machine_.columns_ || image.rows() != machine_.rows_) return fault("the image is of another size");
+    compare_plane(image, plane, moved, lost, differ);
+  }
+  const auto& [missing, added, first, first_of_all, worked, blocked, wanted] = differ;
   if (!first.empty()) {
     return fail(fmt::format("{}; in all {} pixels are not fired and {} fired too many", first, missing, added));
   }
   if (added != moved || missing != moved + lost) {
-    if (first_of_all.empty()) first_of_all = fmt::format("layer {}", layer_.index);  // the manifest alone speaks of such pixels
-    fail(fmt::format("{}: {} pixels are not fired and {} fired instead; the manifest says {} and {}", first_of_all, missing,
-                     added, moved + lost, moved));
+    // The manifest alone may speak of such pixels.
+    const std::string place = first_of_all.empty() ? fmt::format("layer {}", layer_.index) : first_of_all;
+    fail(fmt::format("{}: {} pixels are not fired and {} fired instead; the manifest says {} and {}", place, missing, added,
+                     moved + lost, moved));
   }
 }
 

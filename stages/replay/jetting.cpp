@@ -25,6 +25,7 @@ Runs runs_of(std::vector<VirtualMachine::Drop>& drops, std::uint32_t columns, st
     runs.row_offset.push_back(static_cast<std::uint32_t>(runs.change.size()));
     for (; next < drops.size() && drops[next].row == row; ++next) {
       const std::uint32_t column = drops[next].column;
+      if (runs.change.size() > runs.row_offset.back() && runs.change.back() == column + 1) continue;  // another drop there
       if (runs.change.size() > runs.row_offset.back() && runs.change.back() == column) {
         ++runs.change.back();
       } else {
@@ -59,14 +60,18 @@ struct Carried {
 
 Result<Carried> carry_out(const VirtualMachine& machine, std::string_view program, const StepChoice& choice) {
   Carried carried;
-  const auto replayed = machine.run(program, choice.layer, [&](const VirtualMachine::Drop& drop) {
-    carried.drops.push_back(drop);
-    const auto [found, fresh] = carried.sweeps.try_emplace(drop.sweep, SweepSeen{drop.first_line, drop.step, drop.step, false});
-    if (fresh) carried.order.push_back(drop.sweep);
-    found->second.first_step = std::min(found->second.first_step, drop.step);
-    found->second.last_step = std::max(found->second.last_step, drop.step);
-    if (drop.step < found->second.last_step) found->second.backward = true;
-  });
+  const auto replayed = machine.run(
+      program, choice.layer,
+      [&](const VirtualMachine::Drop& drop) {
+        carried.drops.push_back(drop);
+        const auto [found, fresh] =
+            carried.sweeps.try_emplace(drop.sweep, SweepSeen{drop.first_line, drop.step, drop.step, false});
+        if (fresh) carried.order.push_back(drop.sweep);
+        found->second.first_step = std::min(found->second.first_step, drop.step);
+        found->second.last_step = std::max(found->second.last_step, drop.step);
+        if (drop.step < found->second.last_step) found->second.backward = true;
+      },
+      choice.planes);
   if (!replayed) return replayed.error();
   if (carried.order.empty())
     return Error{Fault::kUsage, fmt::format("layer {}: its program fires nothing; choose another --layer", choice.layer)};

@@ -18,6 +18,7 @@ namespace lamina::replay {
 struct StepChoice {
   std::uint32_t layer = 0;
   std::optional<std::uint32_t> swath, step;
+  std::uint32_t planes = 1;  // most drops of a pixel
 };
 
 /// The state of a layer's program after a step.

@@ -120,10 +120,15 @@ std::array<double, 2> VirtualMachine::nozzle_at(std::int64_t first_line, double 
 
 Result<Count> VirtualMachine::replay(std::string_view program, const Layer& layer, const RunsView& image, std::uint64_t moved,
                                      std::uint64_t lost) const {
-  Printing printing(*this, layer, Purpose::kPrint);
+  return replay(program, layer, {&image, 1}, moved, lost);
+}
+
+Result<Count> VirtualMachine::replay(std::string_view program, const Layer& layer, std::span<const RunsView> planes,
+                                     std::uint64_t moved, std::uint64_t lost) const {
+  Printing printing(*this, layer, Purpose::kPrint, nullptr, static_cast<std::uint32_t>(planes.size()));
   if (Status status = read(machine_.dialect, program, printing); !status) return status.error();
   printing.check_cycle();
-  if (printing.ok()) printing.compare(image, moved, lost);
+  if (printing.ok()) printing.compare(planes, moved, lost);
   if (!printing.ok()) return printing.status().error();
   return printing.finish();
 }
@@ -134,8 +139,9 @@ Result<std::int64_t> VirtualMachine::microseconds(std::string_view program, cons
   return printing.finish().microseconds;
 }
 
-Result<Count> VirtualMachine::run(std::string_view program, std::uint32_t layer, const Watch& watch) const {
-  Printing printing(*this, {layer, 0, 1}, Purpose::kPrint, &watch);
+Result<Count> VirtualMachine::run(std::string_view program, std::uint32_t layer, const Watch& watch,
+                                  std::uint32_t planes) const {
+  Printing printing(*this, {layer, 0, 1}, Purpose::kPrint, &watch, planes);
   if (Status status = read(machine_.dialect, program, printing); !status) return status.error();
   return printing.count;
 }

@@ -7,6 +7,7 @@
 #include <array>
 #include <cstdint>
 #include <functional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -41,6 +42,10 @@ class VirtualMachine {
   /// cost      O(text + drops); one bit per pixel
   Result<Count> replay(std::string_view program, const Layer& layer, const RunsView& image, std::uint64_t moved,
                        std::uint64_t lost) const;
+  /// The same for pixels of several drops: plane k, from 0, holds the pixels that have to get more than k drops, and a pixel
+  /// that is fired more often than there are planes is a fault. cost  a bit per pixel and plane
+  Result<Count> replay(std::string_view program, const Layer& layer, std::span<const RunsView> planes, std::uint64_t moved,
+                       std::uint64_t lost) const;
 
   /// How long a layer's program takes, by its movements alone. The machine stands where the layer below left it, so that
   /// layers can be timed in any order and their times add up to that of the job.
@@ -55,8 +60,8 @@ class VirtualMachine {
   };
   /// Called with each drop in the order of the program.
   using Watch = std::function<void(const Drop&)>;
-  /// Runs a program without comparing; nothing of it is timed. errors  as replay
-  Result<Count> run(std::string_view program, std::uint32_t layer, const Watch& watch) const;
+  /// Runs a program without comparing; nothing of it is timed. planes  most drops of a pixel. errors  as replay
+  Result<Count> run(std::string_view program, std::uint32_t layer, const Watch& watch, std::uint32_t planes = 1) const;
 
   /// Position of a nozzle at a step of a sweep, in fractional columns and rows of the image.
   std::array<double, 2> nozzle_at(std::int64_t first_line, double step, std::uint32_t nozzle) const;

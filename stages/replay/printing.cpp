@@ -14,14 +14,17 @@ constexpr double kHalfMmPerMinute = 0.5 / 60;  // in mm/s
 
 }  // namespace
 
-Printing::Printing(const VirtualMachine& machine, const Layer& layer, Purpose purpose, const VirtualMachine::Watch* watch)
+Printing::Printing(const VirtualMachine& machine, const Layer& layer, Purpose purpose, const VirtualMachine::Watch* watch,
+                   std::uint32_t planes)
     : machine_(machine),
       watch_(watch),
       layer_(layer),
       purpose_(purpose),
       row_words_((machine.columns_ + 63) / 64),
       roller_mm_(machine.machine_.powder.roller_mm[0]),
-      fired_(purpose == Purpose::kPrint ? std::size_t{row_words_} * machine.rows_ : 0, 0) {}
+      planes_(planes),
+      plane_words_(std::size_t{row_words_} * machine.rows_),
+      fired_(purpose == Purpose::kPrint ? planes * plane_words_ : 0, 0) {}
 
 Standing Printing::standing() const {
   const auto& motion = profile().motion;
@@ -132,12 +135,15 @@ void Printing::fire(std::uint32_t number) {
   if (late < 0 || late % machine_.ticks_ != 0 || !pixel(first_line_ + nozzle.line, late / machine_.ticks_, column, row)) {
     return fault(fmt::format("nozzle {} fires where there is no pixel", number));
   }
-  std::uint64_t& word = fired_[std::size_t{row} * row_words_ + column / 64];
+  const std::size_t word = std::size_t{row} * row_words_ + column / 64;
   const std::uint64_t bit = std::uint64_t{1} << (column % 64);
-  if ((word & bit) != 0) {
-    return fault(fmt::format("nozzle {} fires on column {}, row {} a second time", number, column, row));
+  std::uint32_t plane = 0;
+  while (plane < planes_ && (fired_[plane * plane_words_ + word] & bit) != 0) ++plane;
+  if (plane == planes_) {
+    return fault(fmt::format("nozzle {} fires on column {}, row {} {}", number, column, row,
+                             planes_ == 1 ? "a second time" : fmt::format("more than {} times", planes_)));
   }
-  word |= bit;
+  fired_[plane * plane_words_ + word] |= bit;
   ++count.drops;
   count.farthest_along_um = std::max(count.farthest_along_um, std::abs(nozzle.along_um));
   count.farthest_across_um = std::max(count.farthest_across_um, std::abs(nozzle.across_um));

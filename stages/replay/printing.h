@@ -31,7 +31,9 @@ struct Standing {
 /// are undefined. Readers return when ok() is false.
 class Printing {
  public:
-  Printing(const VirtualMachine& machine, const Layer& layer, Purpose purpose, const VirtualMachine::Watch* watch = nullptr);
+  /// planes  most drops of a pixel
+  Printing(const VirtualMachine& machine, const Layer& layer, Purpose purpose, const VirtualMachine::Watch* watch = nullptr,
+           std::uint32_t planes = 1);
 
   const Machine& profile() const { return machine_.machine_; }
   std::uint32_t layer() const { return layer_.index; }
@@ -80,8 +82,8 @@ class Printing {
   void check_cycle();
   /// Ends the layer: adds the time of what the profile knows and the program does not spell.
   const Count& finish();
-  /// Compares with an image; see VirtualMachine::replay.
-  void compare(const RunsView& image, std::uint64_t moved, std::uint64_t lost);
+  /// Compares with the image of each drop; see VirtualMachine::replay.
+  void compare(std::span<const RunsView> planes, std::uint64_t moved, std::uint64_t lost);
 
   Count count;
 
@@ -90,6 +92,18 @@ class Printing {
     std::uint32_t number;
     std::int64_t first_line;
   };
+  /// What differs in all planes.
+  struct Differences {
+    std::uint64_t missing = 0, added = 0;
+    std::string first, first_of_all;  // that nothing explains; explained or not
+    std::vector<bool> worked, blocked;
+    std::vector<std::uint64_t> wanted;
+  };
+  void compare_plane(const RunsView& image, std::uint32_t plane, std::uint64_t moved, std::uint64_t lost,
+                     Differences& differ) const;
+  const std::uint64_t* fired_row(std::uint32_t plane, std::uint32_t row) const {
+    return fired_.data() + plane * plane_words_ + std::size_t{row} * row_words_;
+  }
   void fail(std::string what);  // takes the complete message
   void coverage(std::vector<bool>& worked, std::vector<bool>& blocked) const;
   std::int64_t line_of(std::uint32_t column, std::uint32_t row) const;
@@ -112,7 +126,9 @@ class Printing {
   bool tells_powder_ = false;                     // moves a vat or the roller
   double seconds_ = 0;
   bool backward_ = false, sweeping_ = false, stepped_ = false, fired_here_ = false;
-  std::vector<std::uint64_t> fired_;  // one bit per pixel, the leftmost in bit 0
+  std::uint32_t planes_;
+  std::size_t plane_words_;
+  std::vector<std::uint64_t> fired_;  // one bit per plane and pixel, the leftmost in bit 0: fired more than so many times
   std::vector<Sweep> sweeps_;
   std::string fault_;         // the first one
   std::string spread_wrong_;  // the first fault of spreading; only check_cycle knows the layer's heights for true

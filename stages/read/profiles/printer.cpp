@@ -105,6 +105,8 @@ constexpr Key<Machine> kKeys[] = {
     field<kHead, &Head::row_offset_um>({"head", "row_offset_um"}, {-1e6, 1e6, " um", false, 1}),
     field<kHead, &Head::highest_frequency_hz>({"head", "highest_frequency_hz"}, {1e-3, kMost, " Hz"}),
     field<kHead, &Head::drop_pl>({"head", "drop_pl"}, {0, kMost, " pl"}),
+    field<kHead, &Head::most_drops>({"head", "most_drops"}, {1, 64}).unsaid_at("1"),
+    field<kHead, &Head::most_drop_sweeps>({"head", "most_drop_sweeps"}, {0, 64}).unsaid_at("0"),
     field<kHead, &Head::blocked>({"head", "blocked"}, {0, 65'534}),
     word<kBlocked, kHead, &Head::blocked_rule>({"head", "blocked_rule"}),
 
@@ -148,6 +150,8 @@ constexpr Key<Machine> kKeys[] = {
     field<kPowder, &Powder::spread_s>({"powder", "spread_s"}, {0, 1e5, " s"}).unsaid_at("0"),
     field<kPowder, &Powder::pause_s>({"powder", "pause_s"}, {0, 1e5, " s"}).unsaid_at("0"),
     field<kPowder, &Powder::packing>({"powder", "packing"}, {0.01, 1}),
+    field<kPowder, &Powder::evaporates_percent>({"powder", "evaporates_percent"}, {0, 99.9, " %"}).unsaid_at("0"),
+    field<kPowder, &Powder::least_saturation_percent>({"powder", "least_saturation_percent"}, {0, 1e4, " %"}).unsaid_at("0"),
 
     text<check_currency, kCost, &Cost::currency>({"cost", "currency"}).unsaid_at("EUR"),
     field<kCost, &Cost::hour_price>({"cost", "hour_price"}, kPrice).unsaid_at("0"),

@@ -104,18 +104,23 @@ Status check_begun_manifest(const std::string& part) {
                fmt::format("{}: is there already, and is no record of lamina; remove it, or name another output", part)};
 }
 
-std::string layer_file_name(std::uint32_t index, std::string_view extension, std::string_view material) {
+std::string ManifestHead::image_name(std::size_t number) const {
+  return materials.empty() ? fmt::format("drop{}", number + 1) : materials[number].name;
+}
+
+std::string layer_file_name(std::uint32_t index, std::string_view extension, std::string_view image) {
   if (extension.empty()) return {};
-  return fmt::format("layers/{:06}{}{}{}", index, material.empty() ? "" : "-", material, extension);
+  return fmt::format("layers/{:06}{}{}{}", index, image.empty() ? "" : "-", image, extension);
 }
 
 std::vector<LayerImageFile> layer_images(const ManifestHead& head, const LayerRecord& record) {
   std::vector<LayerImageFile> files;
-  if (head.materials.empty()) {
+  const std::size_t named = head.named_images();
+  if (named == 0) {
     files.push_back({layer_file_name(record.layer.index, head.extension), {record.bytes, record.set_pixels, 0, record.hash}});
   }
-  for (std::size_t m = 0; m < head.materials.size(); ++m) {
-    files.push_back({layer_file_name(record.layer.index, head.extension, head.materials[m].name),
+  for (std::size_t m = 0; m < named; ++m) {
+    files.push_back({layer_file_name(record.layer.index, head.extension, head.image_name(m)),
                      m < record.images.size() ? record.images[m] : ImageRecord()});
   }
   return files;

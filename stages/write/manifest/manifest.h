@@ -53,6 +53,13 @@ struct ManifestHead {
   std::string dialect, program_extension;  // of the print programs; empty without a machine
   Hash128 program_start, program_end;      // of program/start.* and end.*
   std::vector<JobMaterial> materials;      // if there are several
+  std::uint32_t most_drops = 0;            // of a pixel; 0: no saturation was asked for, and set pixels get one
+
+  /// Images of a layer that have names and records of their own: of materials, or of the drops of a pixel if there can be
+  /// several. 0: the one image that the layer's own record is of.
+  std::size_t named_images() const { return !materials.empty() ? materials.size() : most_drops > 1 ? most_drops : 0; }
+  /// bronze, or drop2
+  std::string image_name(std::size_t number) const;
 
   /// Hash of all fields above except the range: manifests of the same job have equal ids.
   Hash128 id() const;
@@ -71,16 +78,17 @@ struct Manifest {
   FileDigest file;                  // single file of all layers; set if it exists and the manifest is complete
 };
 
-/// The name of a layer's file in the job's directory, layers/000042.tif, or layers/000042-bronze.tif of a job with several
-/// materials; empty for a format without files.
-std::string layer_file_name(std::uint32_t index, std::string_view extension, std::string_view material = {});
+/// The name of a layer's file in the job's directory, layers/000042.tif, or layers/000042-bronze.tif and
+/// layers/000042-drop2.tif of a job with several images a layer; empty for a format without files.
+std::string layer_file_name(std::uint32_t index, std::string_view extension, std::string_view image = {});
 
 /// An image of a layer, as listed in the manifest.
 struct LayerImageFile {
   std::string name;  // in the job's directory; empty for a format without files
   ImageRecord record;
 };
-/// All images of a layer: one, or one per material in the order of the manifest.
+/// All images of a layer: one, or one per material in the order of the manifest, or one per drop: drop k is the image of the
+/// pixels that get at least k.
 std::vector<LayerImageFile> layer_images(const ManifestHead& head, const LayerRecord& record);
 
 /// Reads a manifest, or the complete lines of a .part.

@@ -79,6 +79,7 @@ void add_images(const ManifestHead& head, Json& json) {
     Json& materials = json["materials"] = Json::array();
     for (const JobMaterial& material : head.materials) materials.push_back({{"name", material.name}, {"vat", material.vat}});
   }
+  if (head.most_drops > 0) json["most_drops"] = head.most_drops;
   if (head.machine.empty()) return;
   json["dialect"] = head.dialect;
   json["program_extension"] = head.program_extension;
@@ -94,6 +95,7 @@ void read_images(const Json& json, ManifestHead& head) {
   if (json.contains("materials")) {
     for (const Json& entry : json.at("materials")) head.materials.push_back({entry.at("name"), entry.at("vat")});
   }
+  if (json.contains("most_drops")) head.most_drops = json.at("most_drops");
   if (head.machine.empty()) return;
   head.dialect = json.at("dialect");
   head.program_extension = json.at("program_extension");

@@ -76,14 +76,19 @@ void describe_paths(Io& io, Product product, Paths& paths) {
 template <class Io, class Record>
 void describe_images(Io& io, const ManifestHead& head, Record& record) {
   io.number("capped_rows", record.capped_rows);
-  if (head.materials.empty()) {
+  if (head.most_drops > 0) {
+    io.number("dosed_pixels", record.dosed_pixels);
+    io.number("drops", record.drops);
+    io.number("asked_drops", record.asked_drops);
+  }
+  if (head.named_images() == 0) {
     io.number("set_pixels", record.set_pixels);
   } else {
     io.open("images", "[");
-    for (std::size_t m = 0; m < head.materials.size(); ++m) {
+    for (std::size_t m = 0; m < head.named_images(); ++m) {
       auto& image = record.images[m];
       io.open("", "{");
-      io.fixed("file", layer_file_name(record.layer.index, head.extension, head.materials[m].name));
+      io.fixed("file", layer_file_name(record.layer.index, head.extension, head.image_name(m)));
       io.number("bytes", image.bytes);
       io.number("set_pixels", image.set_pixels);
       if (!head.machine.empty()) io.added("unfed_pixels", image.unfed_pixels);
@@ -105,18 +110,18 @@ void describe_images(Io& io, const ManifestHead& head, Record& record) {
   io.close("}");
 }
 
-/// When reading, record.images must already have one entry per material. `paths` is unused for images.
+/// When reading, record.images must already have head.named_images() entries. `paths` is unused for images.
 template <class Io, class Record, class Paths>
 void describe_line(Io& io, const ManifestHead& head, Record& record, Paths& paths) {
   io.open("", "{");
   io.number("index", record.layer.index);
-  if (!head.extension.empty() && head.materials.empty()) {
+  if (!head.extension.empty() && head.named_images() == 0) {
     io.fixed("file", layer_file_name(record.layer.index, head.extension));
   }
   io.number("bottom_nm", record.layer.bottom);
   io.number("thickness_nm", record.layer.thickness);
   io.reason("reason", record.layer.reason);
-  if (head.materials.empty()) {
+  if (head.named_images() == 0) {
     if (!head.file.empty()) io.number("offset", record.offset);
     io.number("bytes", record.bytes);
     io.hash("xxh3_128", record.hash);

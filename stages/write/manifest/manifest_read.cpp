@@ -42,7 +42,7 @@ bool read_rest(FileReader& file, const ManifestHead& head, FileDigest& digest) {
 std::string read_line(std::string_view line, const ManifestHead& head, std::uint32_t index, LayerRecord& record) {
   LineReader io(line);
   record.layer.index = index;
-  record.images.resize(head.materials.size());
+  record.images.resize(head.named_images());
   PathFacts paths;
   describe_line(io, head, record, paths);
   if (io.good() && !io.ended()) return "is not the line of a layer";
@@ -54,7 +54,7 @@ std::string read_line(std::string_view line, const ManifestHead& head, std::uint
   if (head.product != Product::kImages) record.paths = std::make_shared<const PathFacts>(paths);
   for (const ImageRecord& image : record.images) {
     record.bytes += image.bytes;
-    record.set_pixels += image.set_pixels;
+    record.set_pixels += head.materials.empty() && record.set_pixels > 0 ? 0 : image.set_pixels;  // drops fall on the same
   }
   return {};
 }

@@ -16,6 +16,7 @@ namespace {
 
 constexpr std::size_t kLongestName = 255, kLongestMaterial = 40;  // bytes
 constexpr std::int64_t kMostMicroseconds = 1'000'000'000'000;     // of a layer, as a replay counts them
+constexpr std::uint32_t kMostDrops = 64;                          // of a pixel
 constexpr std::int64_t kMostDots = 25'400, kMostSpan = 1'000'000'000'000, kLeastPixel = 1000;
 
 /// As read::check_material allows.
@@ -37,6 +38,9 @@ std::string fault_of_images(const ManifestHead& head) {
   std::set<std::string_view> names;
   for (const JobMaterial& material : head.materials) {
     if (!is_material(material.name) || !names.insert(material.name).second) return no_such("materials", material.name);
+  }
+  if (head.most_drops > kMostDrops || (head.most_drops > 1 && !head.materials.empty())) {
+    return no_such("most_drops", fmt::format("{}", head.most_drops));
   }
   if (head.machine.empty()) return {};
   const auto* dialect = write::find_dialect(head.dialect);

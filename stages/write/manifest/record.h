@@ -22,7 +22,7 @@ struct ProgramRecord {
   std::int64_t microseconds = 0;      // that the machine takes (stages/replay/time/timer.h); 0: of an earlier build
 };
 
-/// The image of one material, where a job has several.
+/// The image of one material where a job has several, or of the pixels that get at least so many drops.
 struct ImageRecord {
   std::uint64_t bytes = 0, set_pixels = 0;
   std::uint64_t unfed_pixels = 0;  // of the set ones, in the powder of another vat; of a job with a machine
@@ -64,6 +64,11 @@ struct LayerRecord {
   ProgramRecord program;                   // zeros without a machine
   std::vector<ImageRecord> images;         // one per material, if the job has several
   std::vector<std::uint64_t> part_pixels;  // set ones of each part, of a job with prices and several parts; else empty
+
+  // --- images of a job with a saturation
+  std::uint64_t dosed_pixels = 0;  // that are to be filled, whether or not drops fall on them
+  std::uint64_t drops = 0;         // of the images
+  std::uint64_t asked_drops = 0;   // by the wished saturation, rounded
 
   std::shared_ptr<const PathFacts> paths;  // null for images
 };

@@ -1,0 +1,43 @@
+// stages/dose/dither.h: a number of drops a pixel that is not whole becomes whole drops, evenly spread, on runs.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "stages/data/levels.h"
+#include "stages/data/runs.h"
+#include "stages/dose/saturation.h"
+
+namespace lamina::dose {
+
+/// Scratch for dither(); keeps its capacity. The pixels of the tile that get one drop more, as bits, for each level.
+struct DitherScratch {
+  struct Extra {
+    std::vector<std::uint64_t> bits;  // two words a row of the tile, turned to the layer's shift
+    bool made = false;
+  };
+  std::vector<Extra> of_level;
+};
+
+/// Every pixel gets the whole drops of its level, and one more where the remaining fraction is above the threshold of the
+/// blue-noise tile (blue_noise.h) as it lies in this layer. Thresholds have 24 bits: the rank of the pixel, and below it an
+/// offset that goes through 1024 places from layer to layer, so that fractions finer than a tile can show come out right
+/// over the layers.
+/// image   levels: zones of different doses, or shares of a voxel that a part fills
+/// drops   a pixel of each level, [0] for level 0 is not looked at; each at most kMostDrops
+/// layer   its number: the same for the same job
+/// cost    O(runs + changes of the result), and once a level and layer O(tile)
+void dither(const LevelsView& image, std::span<const Drops24> drops, std::uint32_t layer, DitherScratch& scratch,
+            Levels& result);
+
+/// Drops a pixel of each level of coverage 0 .. levels - 1 if a full voxel gets `full`: in proportion, rounded down.
+/// drops  of `levels` entries
+void drops_of_coverage(Drops24 full, std::span<Drops24> drops);
+
+/// Level 1 for the shell of an image, level 2 for its core.
+/// core  within the image and of its size
+void mark_core(const RunsView& image, const RunsView& core, Levels& result);
+
+}  // namespace lamina::dose

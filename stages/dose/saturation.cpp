@@ -1,0 +1,58 @@
+#include "stages/dose/saturation.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace lamina::dose {
+namespace {
+
+constexpr std::int64_t kMillion = 1'000'000;
+
+std::int64_t millionths(double value) { return std::llround(value * kMillion); }
+
+/// floor(2^bits a / b + 1/2) for a < b, by long division: no product of both fits into 128 bits.
+std::uint64_t fraction_of(unsigned __int128 a, unsigned __int128 b, unsigned bits) {
+  std::uint64_t quotient = 0;
+  for (unsigned bit = 0; bit < bits; ++bit) {
+    a *= 2;
+    quotient *= 2;
+    if (a < b) continue;
+    a -= b;
+    ++quotient;
+  }
+  return 2 * a >= b ? quotient + 1 : quotient;
+}
+
+}  // namespace
+
+Drops24 drops_for(double percent, const Binder& binder, const PixelGrid& grid, std::int64_t thickness_nm, std::uint32_t most) {
+  const Drops24 limit = Drops24{most} << kDropBits;
+  const std::int64_t wish = std::clamp<std::int64_t>(millionths(percent / 100), 0, 10'000 * kMillion);
+  const std::int64_t voids = std::clamp<std::int64_t>(kMillion - millionths(binder.packing), 0, kMillion);
+  const std::int64_t stays = std::clamp<std::int64_t>(kMillion - millionths(binder.evaporates), 0, kMillion);
+  const std::int64_t drop = std::max<std::int64_t>(0, millionths(binder.drop_pl));  // 10^6 nm3
+  if (wish == 0 || voids == 0) return 0;
+  if (drop == 0 || stays == 0) return limit;
+  // In thousandths of a nm3: at most 10^9 x 10^9 x 10^9 x 10^3 before it is divided.
+  using Wide = unsigned __int128;
+  const Wide area = static_cast<Wide>(grid.x.span) * static_cast<Wide>(grid.y.span);
+  const Wide pixels = static_cast<Wide>(grid.x.dots) * static_cast<Wide>(grid.y.dots);
+  const Wide voxel = area * static_cast<Wide>(thickness_nm) / pixels * 1000;
+  const Wide asked = voxel * static_cast<Wide>(wish) * static_cast<Wide>(voids);
+  const Wide one = static_cast<Wide>(stays) * static_cast<Wide>(drop) * (static_cast<Wide>(kMillion) * kMillion * 1000);
+  const Wide whole = asked / one;
+  if (whole >= most) return limit;
+  return std::min(limit, (static_cast<Drops24>(whole) << kDropBits) + fraction_of(asked % one, one, kDropBits));
+}
+
+double voids_pl(const Binder& binder, const PixelGrid& grid, std::int64_t thickness_nm) {
+  const double pixel_nm2 = 1 / (grid.x.pixels_per_nm() * grid.y.pixels_per_nm());
+  return pixel_nm2 * static_cast<double>(thickness_nm) * 1e-12 * (1 - binder.packing);
+}
+
+double saturation_of(double drops, const Binder& binder, const PixelGrid& grid, std::int64_t thickness_nm) {
+  const double voids = voids_pl(binder, grid, thickness_nm);
+  return voids > 0 ? 100 * drops * binder.drop_pl * (1 - binder.evaporates) / voids : 0;
+}
+
+}  // namespace lamina::dose

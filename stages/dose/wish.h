@@ -1,0 +1,56 @@
+// stages/dose/wish.h: the saturation that is asked for at each height, and the drops that every layer gets for it.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "stages/data/layer.h"
+#include "stages/dose/saturation.h"
+
+namespace lamina::dose {
+
+/// Per cent of the voids; the core is as the shell if none is stated.
+struct Wish {
+  double percent = 0;
+  std::optional<double> core_percent;
+  double of_core() const { return core_percent.value_or(percent); }
+};
+
+/// Another wish between two heights above the bed, in mm; the last one that holds a layer's plane counts.
+struct WishRange {
+  double from_mm = 0, to_mm = 0;
+  Wish wish;
+};
+
+struct Wishes {
+  Wish all;
+  std::vector<WishRange> ranges;
+
+  /// For a layer, by its plane: 0 for that of all, 1 for the first range, ...
+  std::size_t place_of(const Layer& layer) const;
+  const Wish& of(const Layer& layer) const {
+    const std::size_t place = place_of(layer);
+    return place == 0 ? all : ranges[place - 1].wish;
+  }
+  /// Whether shell and core differ anywhere.
+  bool has_core() const;
+};
+
+/// What a layer gets.
+struct LayerDose {
+  Drops24 shell = 0, core = 0;                // a pixel, at most as many as may be jetted
+  Drops24 asked_shell = 0, asked_inside = 0;  // however many
+  double asked = 0, asked_core = 0;           // per cent
+  double gets = 0, gets_core = 0;             // per cent, by these drops
+  bool cut = false;                           // more drops were asked for than may be jetted
+  std::uint32_t most() const {                // drops of any pixel
+    return static_cast<std::uint32_t>(((shell > core ? shell : core) + kOneDrop - 1) >> kDropBits);
+  }
+};
+
+/// most  drops a pixel, 1 .. kMostDrops
+LayerDose dose_of(const Layer& layer, const Wishes& wishes, const Binder& binder, const PixelGrid& grid, std::uint32_t most);
+
+}  // namespace lamina::dose

@@ -1,0 +1,256 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <complex>
+#include <vector>
+
+#include "stages/data/hash.h"
+#include "stages/dose/blue_noise.h"
+#include "stages/dose/budget.h"
+#include "stages/dose/dither.h"
+#include "stages/dose/saturation.h"
+#include "stages/dose/wish.h"
+#include "tests/program/machines.h"
+
+namespace lamina::dose {
+namespace {
+
+using program::testing::random_image;
+using DoseRandom = program::testing::Random;
+
+// Pixels of 100 um.
+const PixelGrid kTenths{PixelAxis(254, 20'000'000), PixelAxis(254, 20'000'000)};
+
+Runs full_square(std::uint32_t side) {
+  Runs runs{side, {0}, {}};
+  for (std::uint32_t r = 0; r < side; ++r) {
+    runs.change.insert(runs.change.end(), {0, side});
+    runs.row_offset.push_back(static_cast<std::uint32_t>(runs.change.size()));
+  }
+  return runs;
+}
+
+std::vector<int> levels_by_pixel(const LevelsView& levels) {
+  std::vector<int> pixels(std::size_t{levels.columns} * levels.rows(), 0);
+  for (std::uint32_t r = 0; r < levels.rows(); ++r) {
+    for (std::uint32_t i = levels.row_offset[r]; i < levels.row_offset[r + 1]; ++i) {
+      for (std::uint32_t c = levels.change[2 * i]; c < levels.change[2 * i + 1]; ++c) {
+        pixels[std::size_t{r} * levels.columns + c] = levels.level[i];
+      }
+    }
+  }
+  return pixels;
+}
+
+Levels dithered(const RunsView& image, Drops24 drops, std::uint32_t layer) {
+  Levels zones, levels;
+  levels_of(image, 1, zones);
+  DitherScratch scratch;
+  const std::array<Drops24, 2> table{0, drops};
+  dither(zones, table, layer, scratch, levels);
+  return levels;
+}
+
+std::vector<int> tile_pattern(double share, std::uint32_t layer) {
+  return levels_by_pixel(dithered(full_square(kTileSide), static_cast<Drops24>(share * kOneDrop), layer));
+}
+
+// A voxel of 100 x 100 x 100 um is 1000 pl, its voids at a packing of 0.6 are 400 pl: 70 % of them are 280 pl.
+TEST(Saturation, IsThatOfAHandCalculation) {
+  const Binder binder{40, 0, 0.6};
+  EXPECT_EQ(drops_for(70, binder, kTenths, 100'000), 7 * kOneDrop);
+  EXPECT_EQ(drops_for(70, binder, kTenths, 50'000), 7 * kOneDrop / 2);
+  EXPECT_EQ(drops_for(70, {40, 0.5, 0.6}, kTenths, 100'000), 14 * kOneDrop);
+  EXPECT_EQ(drops_for(70, {40, 0, 0.8}, kTenths, 100'000), 7 * kOneDrop / 2);
+  EXPECT_EQ(drops_for(0, binder, kTenths, 100'000), 0u);
+  EXPECT_EQ(drops_for(70, binder, kTenths, 100'000, 5), 5 * kOneDrop);
+  EXPECT_EQ(drops_for(100, {300, 0, 0.6}, kTenths, 100'000), (4 * kOneDrop + 1) / 3);
+  EXPECT_NEAR(voids_pl(binder, kTenths, 100'000), 400, 1e-9);
+  EXPECT_NEAR(saturation_of(1, binder, kTenths, 100'000), 10, 1e-9);
+  EXPECT_NEAR(saturation_of(1, {40, 0.25, 0.6}, kTenths, 100'000), 7.5, 1e-9);
+}
+
+// Against doubles, on grids that are no whole dpi too, up to the coarsest and thickest voxels.
+TEST(Saturation, FollowsItsFormulaOnAnyGrid) {
+  DoseRandom random(5);
+  for (int i = 0; i < 2000; ++i) {
+    const PixelGrid grid{PixelAxis(1000, 100'000'000, 1'000'000 + random() % 999'000'000), PixelAxis(1200, 100'000'000)};
+    const Binder binder{0.5 + random() % 900, 0.01 * (random() % 90), 0.3 + 0.01 * (random() % 50)};
+    const std::int64_t thickness = 5000 + random() % 2'000'000;
+    const double percent = random() % 300;
+    const double wanted = percent / 100 * voids_pl(binder, grid, thickness) / ((1 - binder.evaporates) * binder.drop_pl);
+    const double got = static_cast<double>(drops_for(percent, binder, grid, thickness, 1u << 30)) / double{kOneDrop};
+    ASSERT_NEAR(got, wanted, 1e-5 * wanted + 1e-7);
+  }
+}
+
+TEST(BlueNoise, HasEachRankOnceAndIsTheSameEverywhere) {
+  std::vector<std::uint16_t> ranks = blue_noise_ranks();
+  EXPECT_EQ(hex(hash_bytes(std::as_bytes(std::span(ranks)))), "4e5060a14e10a4ffe9260c58414b2633");
+  std::ranges::sort(ranks);
+  for (std::uint32_t i = 0; i < kTilePixels; ++i) ASSERT_EQ(ranks[i], i);
+}
+
+// The power of a pattern by distance from the middle of its spectrum, over that of white noise.
+std::vector<double> radial_power(const std::vector<int>& pattern) {
+  constexpr int n = kTileSide;
+  std::vector<std::complex<double>> turn(n), rows(n * n);
+  for (int i = 0; i < n; ++i) turn[i] = std::polar(1.0, -2 * 3.14159265358979323846 * i / n);
+  double mean = 0;
+  for (const int pixel : pattern) mean += pixel / double{n * n};
+  for (int y = 0; y < n; ++y) {
+    for (int k = 0; k < n; ++k) {
+      for (int x = 0; x < n; ++x) rows[y * n + k] += (pattern[y * n + x] - mean) * turn[k * x % n];
+    }
+  }
+  std::vector<double> power(n), count(n);
+  for (int x = 0; x < n; ++x) {
+    for (int k = 0; k < n; ++k) {
+      std::complex<double> sum = 0;
+      for (int y = 0; y < n; ++y) sum += rows[y * n + x] * turn[k * y % n];
+      const auto radius = std::lround(std::hypot(std::min(x, n - x), std::min(k, n - k)));
+      power[radius] += std::norm(sum) / (n * n * mean * (1 - mean));
+      count[radius] += 1;
+    }
+  }
+  for (int r = 0; r < n; ++r) power[r] = count[r] > 0 ? power[r] / count[r] : 0;
+  return power;
+}
+
+// 6 dB is a factor of 3.98; the neighbourhood of a radius is the mean of those two to four beside it.
+TEST(BlueNoise, SpectrumOfFlatGreyHasNoPeakAndLittleAtLowFrequencies) {
+  for (const double share : {0.1, 0.3, 0.5, 0.7, 0.9}) {
+    const std::vector<double> power = radial_power(tile_pattern(share, 0));
+    for (int r = 1; r <= 90; ++r) {
+      double sum = 0, count = 0;
+      for (int s = std::max(1, r - 4); s <= std::min(90, r + 4); ++s) {
+        if (std::abs(s - r) < 2) continue;
+        sum += power[s];
+        ++count;
+      }
+      EXPECT_LT(power[r], 3.98 * sum / count) << "share " << share << ", radius " << r;
+      if (r <= 8) {
+        EXPECT_LT(power[r], 0.1) << "share " << share << ", radius " << r;
+      }
+    }
+  }
+}
+
+TEST(BlueNoise, LayersAboveEachOtherDoNotRepeat) {
+  for (const double share : {0.05, 0.1, 0.25, 0.4, 0.5, 0.6, 0.75, 0.9, 0.95}) {
+    const std::vector<int> first = tile_pattern(share, 9);
+    for (const std::uint32_t above : {1u, 2u, 3u, 5u, 8u}) {
+      const std::vector<int> other = tile_pattern(share, 9 + above);
+      double both = 0, a = 0, b = 0;
+      for (std::size_t i = 0; i < first.size(); ++i) {
+        both += first[i] * other[i];
+        a += first[i];
+        b += other[i];
+      }
+      const double n = kTilePixels;
+      const double correlation = (both / n - a / n * b / n) / std::sqrt(a / n * (1 - a / n) * b / n * (1 - b / n));
+      EXPECT_LE(correlation, 0.02) << "share " << share << ", " << above << " layers above";
+    }
+  }
+}
+
+TEST(Dither, MeetsADoseWithinATenthOfAPerCentInDropsOfAPart) {
+  DoseRandom random(11);
+  const Runs part = program::testing::runs_of(random_image(random, 400, 300));
+  const double pixels = static_cast<double>(set_pixels(part));
+  for (const double dose : {0.05, 0.31, 0.5, 0.7777, 1.45, 3.002, 9.33}) {
+    std::uint64_t drops = 0;
+    constexpr std::uint32_t kLayers = 60;
+    for (std::uint32_t layer = 0; layer < kLayers; ++layer) {
+      drops += sum_of_levels(dithered(part, static_cast<Drops24>(dose * kOneDrop), layer));
+    }
+    EXPECT_NEAR(static_cast<double>(drops) / (pixels * kLayers * dose), 1, 1e-3) << dose;
+  }
+}
+
+// A pixel's drops depend on its place and dose alone, are the whole part or one more, and never fall when the dose grows.
+TEST(Dither, DecidesEveryPixelByItself) {
+  DoseRandom random(3);
+  const Runs part = program::testing::runs_of(random_image(random, 301, 150));
+  Runs whole = full_square(301);
+  whole.row_offset.resize(151);
+  whole.change.resize(whole.row_offset.back());
+  std::vector<int> set = levels_by_pixel(dithered(part, kOneDrop, 0)), before(set.size(), 0);
+  for (const double dose : {0.0, 0.2, 0.6, 1.0, 1.01, 1.99, 2.5}) {
+    const auto drops = static_cast<Drops24>(dose * kOneDrop);
+    const std::vector<int> of_part = levels_by_pixel(dithered(part, drops, 17)),
+                           all = levels_by_pixel(dithered(whole, drops, 17));
+    for (std::size_t i = 0; i < set.size(); ++i) {
+      ASSERT_EQ(of_part[i], set[i] * all[i]);
+      ASSERT_TRUE(all[i] == static_cast<int>(dose) || all[i] == static_cast<int>(std::ceil(dose)));
+      ASSERT_GE(all[i], before[i]);
+    }
+    before = all;
+  }
+}
+
+TEST(Dither, TakesSharesOfVoxelsInProportion) {
+  std::array<Drops24, 4> drops{};
+  drops_of_coverage(3 * kOneDrop, drops);
+  EXPECT_EQ(drops, (std::array<Drops24, 4>{0, kOneDrop, 2 * kOneDrop, 3 * kOneDrop}));
+  Levels coverage, levels;
+  coverage.start(9);
+  coverage.append(0, 3, 1);
+  coverage.append(4, 6, 3);
+  coverage.append(6, 9, 2);
+  coverage.end_row();
+  DitherScratch scratch;
+  dither(coverage, drops, 0, scratch, levels);
+  EXPECT_EQ(levels_by_pixel(levels), (std::vector<int>{1, 1, 1, 0, 3, 3, 2, 2, 2}));
+}
+
+TEST(Dither, MarksShellAndCore) {
+  const Runs image{10, {0, 4, 6}, {0, 3, 4, 10, 2, 5}}, core{10, {0, 4, 4}, {1, 2, 4, 9}};
+  Levels zones;
+  mark_core(image, core, zones);
+  EXPECT_EQ(levels_by_pixel(zones), (std::vector<int>{1, 2, 1, 0, 2, 2, 2, 2, 2, 1, 0, 0, 1, 1, 1, 0, 0, 0, 0, 0}));
+}
+
+Layer tenth(std::uint32_t index) { return {index, static_cast<Nm>(index * 100'000), 100'000, LayerReason::kUniform}; }
+
+TEST(Budget, TellsWishesByHeightThoseThatAreCutAndThoseThatDoNotBind) {
+  Wishes wishes{{50, 30.0}, {{0.2, 0.4, {5, {}}}, {0.6, 0.7, {200, {}}}}};
+  EXPECT_EQ(wishes.of(tenth(1)).percent, 50);
+  EXPECT_EQ(wishes.of(tenth(2)).percent, 5);
+  EXPECT_EQ(wishes.of(tenth(4)).percent, 50);
+  EXPECT_TRUE(wishes.has_core());
+  const Binder binder{40, 0, 0.6};  // 10 % a drop
+  Budget budget(binder, kTenths, wishes, 10, 20);
+  for (std::uint32_t i = 0; i < 10; ++i) budget.foresee(tenth(i));
+  EXPECT_EQ(budget.most_drops(), 10u);
+  std::vector<Warning> warnings;
+  const Status refused = budget.judge(false, warnings);
+  ASSERT_FALSE(refused.ok());
+  EXPECT_EQ(refused.error().fault, Fault::kUsage);
+  EXPECT_NE(refused.error().message.find("layers 2:4 (z 0.200 to 0.400 mm) get 5.0 %"), std::string::npos)
+      << refused.error().message;
+  ASSERT_EQ(warnings.size(), 1u);
+  EXPECT_NE(warnings[0].text.find("layers 6:7"), std::string::npos) << warnings[0].text;
+  warnings.clear();
+  EXPECT_TRUE(budget.judge(true, warnings).ok());
+  EXPECT_EQ(warnings.size(), 2u);
+  EXPECT_EQ(budget.asked_drops(tenth(0), 100, 10), 530u);
+  EXPECT_EQ(budget.asked_drops(tenth(6), 100, 0), 2000u);
+  BinderCount count;
+  count.add(budget, tenth(0), 110, 530, 530, 0);
+  EXPECT_NEAR(count.reached_percent(budget), 100 * 530 * 40 / (110 * 400.0), 1e-9);
+  EXPECT_NEAR(count.binder_ml(budget), 530 * 40e-9, 1e-15);
+}
+
+TEST(Budget, WithoutAWishTellsWhatOneDropGives) {
+  Budget budget({40, 0, 0.6}, kTenths, std::nullopt, 64, 0);
+  budget.foresee(tenth(0));
+  std::vector<Warning> warnings;
+  EXPECT_TRUE(budget.judge(false, warnings).ok());
+  EXPECT_EQ(told(budget, {}), "one drop of 40 pl a pixel fills 10.0 % of the voids");
+}
+
+}  // namespace
+}  // namespace lamina::dose
