@@ -138,7 +138,7 @@ Result<read::LayerImagesRequest> request_of(const Arguments& arguments) {
 Outcome run_convert(const Arguments& arguments, Context& context) {
   if (arguments.operands.size() != 1) return Error{Fault::kUsage, "name one stack: a folder of images, or a file"};
   const std::string& stack = arguments.operands.front();
-  const std::string output = arguments.text("-o"), mirror = arguments.text("--mirror");
+  const std::string output = arguments.text("-o,--output"), mirror = arguments.text("--mirror");
   if (output.empty()) return Error{Fault::kUsage, "-o DIR is missing; name a directory for the images"};
   const std::string id = arguments.has("--format") ? arguments.text("--format") : "tiff-g4";
   const write::ImageFormat* format = write::find_image_format(id);
