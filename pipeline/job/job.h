@@ -29,6 +29,18 @@ struct MaterialRange {
   std::string material;
 };
 
+/// What of images that are a part (docs/images-as-parts.md) their files do not tell.
+struct PartImages {
+  std::optional<std::array<std::int64_t, 2>> dpi;  // absent: by the tags of the files
+  std::optional<double> layer_mm;                  // absent: by the manifest beside them, or the job's
+  std::uint32_t threshold = 128;                   // grey below it is dark, 1 .. 255
+  bool invert = false;                             // bright pixels are jetted
+  bool missing_empty = false;                      // numbers that are missing are empty layers
+  bool crop = false;                               // what sticks out of the bed is cut off
+  bool resample = false;                           // another dpi than the job's is brought to it
+  bool operator==(const PartImages&) const = default;
+};
+
 /// One [[part]] of a job.
 struct PartRequest {
   std::string path;
@@ -43,6 +55,7 @@ struct PartRequest {
   FillChanges fill = {};                            // changes to the job's filling
   std::string material = {};                        // name of its powder; set for all parts or for none
   std::vector<MaterialRange> material_ranges = {};  // other materials between heights above its bottom
+  PartImages images = {};                           // of a part that is images
 };
 
 enum class Engine { kRays, kContours, kBoth };

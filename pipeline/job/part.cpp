@@ -34,7 +34,8 @@ std::string write_factors(const std::array<double, 3>& factors) { return value_t
 
 const PartKey kPartKeys[] = {
     text<check_path, &PartRequest::path>(
-        {"part", "path", "", "FILE", "STL, OBJ or 3MF file; in a job file, relative to that file", decides::all}),
+        {"part", "path", "", "FILE", "STL, OBJ or 3MF file, or a folder of layer images; in a job file, relative to that file",
+         decides::all}),
     text<check_unit, &PartRequest::unit>(
         {"part", "unit", "--unit", "UNIT", "of STL and OBJ, which carry none: mm, cm, m, um, inch, foot", decides::all})
         .with_words([] { return std::vector<std::string_view>(std::begin(kUnits), std::end(kUnits)); }),
@@ -62,6 +63,28 @@ const PartKey kPartKeys[] = {
         {"part", "material", "", "NAME", "powder of the part, for machines with two vats", decides::all}),
     structure<read_material_ranges, material_ranges_text, &PartRequest::material_ranges>(
         {"part", "material_range", "", "[{...}]", "other powders between two heights above the part's bottom", decides::all}),
+    field<&PartRequest::images, &PartImages::dpi>(
+        {"part", "dpi", "", "DPI|XxY", "of a part that is images, if their files do not tell it", decides::images},
+        {1, 25'400}),
+    field<&PartRequest::images, &PartImages::layer_mm>(
+        {"part", "layer_mm", "", "MM", "thickness of a layer of a part that is images; else by its manifest, or the job's",
+         decides::images},
+        {0.001, kMostMm, " mm"}),
+    field<&PartRequest::images, &PartImages::threshold>(
+        {"part", "threshold", "", "N", "grey below it is jetted, 1 to 255; of images", decides::images}, {1, 255})
+        .shown_if([](const PartRequest& part) { return part.images.threshold != PartImages().threshold; }),
+    field<&PartRequest::images, &PartImages::invert>(
+        {"part", "invert", "", "", "bright pixels are jetted, not dark ones; of images", decides::images})
+        .shown_if([](const PartRequest& part) { return part.images.invert; }),
+    field<&PartRequest::images, &PartImages::missing_empty>(
+        {"part", "missing_empty", "", "", "numbers that are missing among images are empty layers", decides::images})
+        .shown_if([](const PartRequest& part) { return part.images.missing_empty; }),
+    field<&PartRequest::images, &PartImages::crop>(
+        {"part", "crop", "", "", "what of images sticks out of the bed is cut off", decides::images})
+        .shown_if([](const PartRequest& part) { return part.images.crop; }),
+    field<&PartRequest::images, &PartImages::resample>(
+        {"part", "resample", "", "", "images of another dpi than the job's are brought to it", decides::images})
+        .shown_if([](const PartRequest& part) { return part.images.resample; }),
 };
 
 }  // namespace

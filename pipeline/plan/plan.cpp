@@ -13,6 +13,7 @@
 #include "pipeline/plan/heights.h"
 #include "pipeline/plan/layer_cut.h"
 #include "pipeline/plan/layers.h"
+#include "pipeline/plan/part_images.h"
 #include "pipeline/plan/reach.h"
 #include "stages/data/handles/clocks.h"
 #include "stages/data/text/number_text.h"
@@ -108,13 +109,14 @@ class Planner {
     progress_({ProgressEvent::Stage::kLoading});
     std::future<void> beside;  // without a thread to spare it is never run, and the index does it
     if (images() && job().engine != Engine::kContours) beside = std::async(raster::BeamIndex::prepare);
-    auto scene = load_scene(job(), plan_.bed, blocks);
+    auto scene = load_scene(job(), plan_.bed, blocks, images() ? &printer_.grid : nullptr);
     if (!scene) return scene.error();
     plan_.scene = std::make_unique<Scene>(std::move(*scene));
     plan_.triangles = 0;
     for (const Instance& instance : plan_.scene->instances) {
       plan_.triangles += triangle_count(plan_.scene->meshes[instance.mesh]);
     }
+    if (Status status = fit_layers(*plan_.scene, beads_, job()); !status) return status;
     const Elapsed took = loading.elapsed();
     plan_.load_seconds = took.wall;
     plan_.load_processor_seconds = took.processor;
@@ -236,6 +238,8 @@ class Planner {
       covered += (static_cast<double>(box.width()) * grid.x.pixels_per_nm() + 1) *
                  (static_cast<double>(box.depth()) * grid.y.pixels_per_nm() + 1);
     }
+    for (const PlacedImages& images : plan_.scene->images)
+      covered += static_cast<double>(images.images->columns()) * images.images->rows();
     // The slicer refers to the scene's meshes, the rasterizer takes those it is given.
     std::optional<Scene> copy;
     if (beads_) copy.emplace(*plan_.scene);

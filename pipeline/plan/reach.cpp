@@ -25,6 +25,13 @@ Status check_reach(const Machine& machine, const Scene& scene) {
                     "move, turn or scale the part",
                     part, mm(outside->place.x), mm(outside->place.y), mm(outside->place.z), outside->beyond_mm, machine.name)};
   }
+  for (const PlacedImages& images : scene.images) {
+    const double top = mm(images.bottom + std::int64_t{images.thickness} * images.images->layers());
+    if (top <= machine.bed.build_height_mm) continue;
+    return Error{Fault::kUsage,
+                 fmt::format("{}: its images reach z {:.3f} mm, above the build height of {}, {:g} mm; leave some out",
+                             scene.parts[images.part].path, top, machine.name, machine.bed.build_height_mm)};
+  }
   return {};
 }
 

@@ -8,6 +8,7 @@
 #include <tuple>
 
 #include "pipeline/job/keys.h"
+#include "pipeline/plan/part_images.h"
 #include "stages/arrange/placement.h"
 #include "stages/geometry/blocks/mesh_blocks.h"
 #include "stages/load/load.h"
@@ -31,6 +32,7 @@ struct Loaded {
   Box bounds;
   std::uint64_t triangles = 0, fingerprint = 0;
   std::vector<Note> notes;
+  std::shared_ptr<const OpenImages> images = {};  // of a part that is no mesh
 };
 
 using LoadKey =
@@ -98,6 +100,20 @@ Result<Loaded> load_part(const Job& job, const PartRequest& request, bool blocks
   return loaded;
 }
 
+Result<Loaded> load_images(const Job& job, const PartRequest& request, const PixelGrid* grid) {
+  auto open = open_images(job, request, grid);
+  if (!open) return open.error();
+  Loaded loaded;
+  loaded.bounds.add(Point3{0, 0, 0});
+  loaded.bounds.add(Point3{static_cast<Nm>(std::min(open->width, std::int64_t{INT32_MAX})),
+                           static_cast<Nm>(std::min(open->depth, std::int64_t{INT32_MAX})),
+                           static_cast<Nm>(open->images->layers() * std::int64_t{open->thickness})});
+  loaded.fingerprint = open->images->fingerprint();
+  loaded.notes = open->notes;
+  loaded.images = std::make_shared<const OpenImages>(std::move(*open));
+  return loaded;
+}
+
 // Only parts with explicit positions can overlap: arranged boxes are disjoint.
 void note_overlaps(const Job& job, Scene& scene, const std::vector<std::pair<std::uint32_t, Box>>& boxes) {
   std::vector<std::uint32_t> order(boxes.size());
@@ -141,9 +157,15 @@ load::LoadOptions load_options(const Job& job, const PartRequest& request) {
 
 namespace {
 
+/// nm above the bed.
+std::int64_t bottom_of(const PartRequest& part, const Loaded& loaded) {
+  return loaded.images ? loaded.images->bottom : nm_of(part.bottom_mm);
+}
+
 /// The file of each [[part]]; equal files with equal transforms are loaded once. A map's values stay where they are.
 /// errors  of load_part; kUsage: a part that reaches beyond what nm can say
-Result<std::vector<const Loaded*>> load_parts(const Job& job, bool blocks, std::map<LoadKey, Loaded>& files, Scene& scene) {
+Result<std::vector<const Loaded*>> load_parts(const Job& job, bool blocks, const PixelGrid* grid,
+                                              std::map<LoadKey, Loaded>& files, Scene& scene) {
   std::vector<const Loaded*> loaded;
   const auto scratch = load::make_scratch(job.isa);
   for (const PartRequest& part : job.parts) {
@@ -154,15 +176,23 @@ Result<std::vector<const Loaded*>> load_parts(const Job& job, bool blocks, std::
         part.material_ranges.empty()
             ? part.material
             : fmt::format("{} {} {}", part.material, material_ranges_text(part.material_ranges), part.bottom_mm);
-    const LoadKey key{file.empty() ? part.path : file.string(), part.unit, part.scale, part.rotate_deg, part.shrink, solid};
+    const bool images = read::names_images(part.path);
+    const LoadKey key{images         ? fmt::format("images {}", loaded.size())
+                      : file.empty() ? part.path
+                                     : file.string(),
+                      part.unit,
+                      part.scale,
+                      part.rotate_deg,
+                      part.shrink,
+                      solid};
     auto found = files.find(key);
     if (found == files.end()) {
-      Result<Loaded> fresh = load_part(job, part, blocks, scratch, scene);
+      Result<Loaded> fresh = images ? load_images(job, part, grid) : load_part(job, part, blocks, scratch, scene);
       if (!fresh) return fresh.error();
       found = files.emplace(key, std::move(*fresh)).first;
     }
     loaded.push_back(&found->second);
-    const std::int64_t top = nm_of(part.bottom_mm) + found->second.bounds.height();
+    const std::int64_t top = bottom_of(part, found->second) + found->second.bounds.height();
     if (top > kNmReach) {
       return Error{Fault::kUsage,
                    fmt::format("{}: reaches {} mm above the bed, beyond {} mm; use a smaller --scale or --bottom", part.path,
@@ -173,7 +203,7 @@ Result<std::vector<const Loaded*>> load_parts(const Job& job, bool blocks, std::
 }
 
 /// The space of a part.
-arrange::BoxRequest box_request(const PartRequest& part, const Loaded& loaded) {
+arrange::BoxRequest box_request(const PartRequest& part, const Loaded& loaded, const Bed& bed) {
   arrange::BoxRequest request;
   request.width = loaded.bounds.width();
   request.depth = loaded.bounds.depth();
@@ -183,19 +213,25 @@ arrange::BoxRequest box_request(const PartRequest& part, const Loaded& loaded) {
     request.at_x = nm_of((*part.at_mm)[0]);
     request.at_y = nm_of((*part.at_mm)[1]);
   }
+  if (loaded.images && part.images.crop) {
+    const std::int64_t room_x = nm_of(bed.size_mm[0]) - request.at_x.value_or(0);
+    const std::int64_t room_y = nm_of(bed.size_mm[1]) - request.at_y.value_or(0);
+    if (room_x > 0) request.width = std::min(request.width, room_x);
+    if (room_y > 0) request.depth = std::min(request.depth, room_y);
+  }
   return request;
 }
 
 }  // namespace
 
-Result<Scene> load_scene(const Job& job, const Bed& bed, bool blocks) {
+Result<Scene> load_scene(const Job& job, const Bed& bed, bool blocks, const PixelGrid* grid) {
   Scene scene;
   std::map<LoadKey, Loaded> files;
-  const auto parts = load_parts(job, blocks, files, scene);
+  const auto parts = load_parts(job, blocks, grid, files, scene);
   if (!parts) return parts.error();
   const std::vector<const Loaded*>& loaded = *parts;
   std::vector<arrange::BoxRequest> requests;
-  for (std::size_t p = 0; p < job.parts.size(); ++p) requests.push_back(box_request(job.parts[p], *loaded[p]));
+  for (std::size_t p = 0; p < job.parts.size(); ++p) requests.push_back(box_request(job.parts[p], *loaded[p], bed));
 
   const Result<std::vector<arrange::Place>> places =
       arrange::place_boxes(requests, nm_of(bed.size_mm[0]), nm_of(bed.size_mm[1]), nm_of(job.gap_mm), bed.of_machine);
@@ -211,7 +247,12 @@ Result<Scene> load_scene(const Job& job, const Bed& bed, bool blocks) {
   bool positions_asked = false;
   for (const arrange::Place& place : *places) {
     const Loaded& part = *loaded[place.request];
-    const std::int64_t bottom = nm_of(job.parts[place.request].bottom_mm);
+    const std::int64_t bottom = bottom_of(job.parts[place.request], part);
+    if (part.images) {
+      scene.images.push_back(
+          placed_images(*part.images, job.parts[place.request], *grid, place.x, place.y, scene.parts[place.request].notes));
+      scene.images.back().part = place.request;
+    }
     positions_asked = positions_asked || job.parts[place.request].at_mm.has_value();
     for (const Instance& instance : part.instances) {
       const std::uint32_t mesh = part.first_mesh + instance.mesh;

@@ -2,6 +2,8 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -10,8 +12,25 @@
 #include "stages/data/mesh.h"
 #include "stages/data/status.h"
 #include "stages/load/load.h"
+#include "stages/read/layer_images.h"
+#include "stages/read/placed.h"
 
 namespace lamina::pipeline {
+
+/// A copy of a part that is images, in whole pixels of the bed.
+struct PlacedImages {
+  std::uint32_t part = 0;  // index into Scene::parts
+  std::shared_ptr<const read::LayerImages> images;
+  read::Placement place;
+  Nm bottom = 0, thickness = 0;  // of the first layer; of each
+
+  /// The image whose heights hold the plane, if any.
+  std::optional<std::uint32_t> image_at(Nm plane) const {
+    const std::int64_t above = std::int64_t{plane} - bottom;
+    if (above < 0 || above / thickness >= images->layers()) return std::nullopt;
+    return static_cast<std::uint32_t>(above / thickness);
+  }
+};
 
 /// Meshes in the coordinates of their files, and instances with offsets into the frame of the bed:
 /// x from its left edge, y from its front edge, z from its surface; every coordinate within the bed and within int32.
@@ -20,6 +39,7 @@ struct Scene {
   std::vector<Instance> instances;
   std::vector<PartSummary> parts;
   std::vector<std::uint32_t> part_of_instance;  // index into parts
+  std::vector<PlacedImages> images;             // parts that are no meshes
   std::int64_t height = 0;                      // nm, highest point of all; > 0
 };
 
@@ -32,7 +52,8 @@ load::LoadOptions load_options(const Job& job, const PartRequest& request);
 /// arranged in rows from the front left, in job order and gap_mm apart; this block is centred on the bed. Positions are
 /// whole nm.
 /// blocks  meshes may come as Mesh::blocks: for whoever only rasterizes them
+/// grid    of the bed's pixels: parts may be images then
 /// errors  kUsage if a part does not fit the bed (with the excess and a remedy); kInput from load
-Result<Scene> load_scene(const Job& job, const Bed& bed, bool blocks = false);
+Result<Scene> load_scene(const Job& job, const Bed& bed, bool blocks = false, const PixelGrid* grid = nullptr);
 
 }  // namespace lamina::pipeline

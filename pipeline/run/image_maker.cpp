@@ -68,6 +68,8 @@ class ImageMaker : public Maker {
       if (status) sanity_.add_image(layer, work.images.runs);
       return status;
     });
+    if (!plan_.scene->images.empty())
+      add("images", [this](const Layer& layer, Work& work, Made&) { return imager_.images(layer, work.images); });
     if (plan_.images->beads) {
       add("contours", [this](const Layer& layer, Work& work, Made&) { return imager_.contours(layer, work.images); });
       add("fill", [this](const Layer& layer, Work& work, Made&) { return imager_.fill(layer, work.images); });

@@ -48,6 +48,8 @@ class LayerImager {
   // --- in this order; contours, fill and beads only if beads fill the parts
   /// errors  kVerification: engines disagree
   Status raster(const Layer& layer, ImageWork& work, LayerRecord& record, ImageNotes& notes) const;
+  /// Unites the layer with those of the parts that are images. errors  kInput: an image cannot be read
+  Status images(const Layer& layer, ImageWork& work) const;
   Status contours(const Layer& layer, ImageWork& work) const;
   Status fill(const Layer& layer, ImageWork& work) const;
   Status beads(const Layer& layer, ImageWork& work, ImageNotes& notes) const;
@@ -75,6 +77,7 @@ class LayerImager {
                               Runs& image) const;
   void mirror(Runs& image, Runs& scratch) const;
   std::uint64_t bytes_of_section(Nm plane, std::uint64_t changes) const;
+  std::uint64_t changes_of_images(Nm plane) const;
   std::uint64_t changes_of_section(Nm plane, std::uint64_t bead_changes) const;
 
   const Plan& plan_;

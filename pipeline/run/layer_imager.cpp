@@ -6,6 +6,7 @@
 #include "pipeline/run/image_maker.h"
 #include "stages/raster/combine.h"
 #include "stages/raster/mirror.h"
+#include "stages/read/placed.h"
 
 namespace lamina::pipeline {
 namespace {
@@ -63,6 +64,34 @@ Status LayerImager::raster(const Layer& layer, ImageWork& work, LayerRecord& rec
   return {};
 }
 
+Status LayerImager::images(const Layer& layer, ImageWork& work) const {
+  const ImagePlan& images = *plan_.images;
+  for (const PlacedImages& part : plan_.scene->images) {
+    const auto number = part.image_at(plane(layer));
+    if (!number) continue;
+    const auto read = part.images->read(*number);
+    if (!read) return read.error();
+    read::place(*read, part.place, work.section);
+    if (images.materials.several()) {
+      work.materials.lay(images.materials.part[part.part].at(plane(layer)), work.section, work.runs);
+    } else if (work.runs.change.empty()) {
+      std::swap(work.runs, work.section);
+    } else {
+      raster::combine(work.runs, work.section, raster::SetOperation::kUnion, work.second);
+      std::swap(work.runs, work.second);
+    }
+  }
+  return {};
+}
+
+std::uint64_t LayerImager::changes_of_images(Nm plane) const {
+  std::uint64_t changes = 0;
+  for (const PlacedImages& part : plan_.scene->images) {
+    if (const auto number = part.image_at(plane)) changes += part.images->expected_changes(*number);
+  }
+  return changes;
+}
+
 Status LayerImager::contours(const Layer& layer, ImageWork& work) const {
   if (!work.beads) work.beads = std::make_unique<BeadWork>(plan_.images->grid);
   return plan_.sections->contours(layer.index, work.beads->sections);
@@ -111,6 +140,7 @@ void LayerImager::dose(const Layer& layer, ImageWork& work, LayerRecord& record)
 
 Status LayerImager::make(const Layer& layer, ImageWork& work, LayerRecord& record, ImageNotes& notes) const {
   if (Status status = raster(layer, work, record, notes); !status) return status;
+  if (Status status = images(layer, work); !status) return status;
   if (plan_.images->beads) {
     if (Status status = contours(layer, work); !status) return status;
     if (Status status = fill(layer, work); !status) return status;
@@ -162,7 +192,8 @@ raster::LayerReport LayerImager::section(const Solid& solid, raster::Engine engi
 
 std::uint64_t LayerImager::changes_of_section(Nm plane, std::uint64_t bead_changes) const {
   const ImagePlan& images = *plan_.images;
-  return images.dose.changes_bound(images.solids.crossings_bound(plane), images.covered_pixels) + bead_changes;
+  return images.dose.changes_bound(images.solids.crossings_bound(plane) + changes_of_images(plane), images.covered_pixels) +
+         bead_changes;
 }
 
 std::uint64_t LayerImager::changes_bound(const Layer& layer) const {
@@ -193,7 +224,8 @@ std::uint64_t LayerImager::bytes_of_section(Nm plane, std::uint64_t changes) con
   const std::uint64_t material_images = materials == 0 ? 0 : (materials + 3) * 2 * (4 * changes + 4 * rows);
   // Zones and levels, and the image of each drop.
   const std::uint64_t drops = images.dose.saturates() ? 18 * changes + images.dose.most_drops() * 4 * (changes + rows) : 0;
-  return images.solids.layer_bytes_bound(plane) + second_image + material_images + drops;
+  const std::uint64_t read = plan_.scene->images.empty() ? 0 : 8 * (changes_of_images(plane) + rows);
+  return images.solids.layer_bytes_bound(plane) + read + second_image + material_images + drops;
 }
 
 }  // namespace lamina::pipeline

@@ -75,7 +75,7 @@ Sanity::Sanity(const Plan& plan, const std::atomic<bool>& cancel)
   sampling_.part = names_;
   // The triangles of images are in clusters by then: their parts are read again.
   sanity::United::Again again = [this]() -> Result<std::vector<Mesh>> {
-    Result<Scene> scene = load_scene(plan_.job, plan_.bed);
+    Result<Scene> scene = load_scene(plan_.job, plan_.bed, false, &plan_.images->grid);
     return scene ? Result<std::vector<Mesh>>(std::move(scene->meshes)) : scene.error();
   };
   sampling_.united_mm3 = united_in(*plan.scene, *tally_, &cancel, plan.images ? again : nullptr);

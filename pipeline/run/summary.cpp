@@ -62,8 +62,9 @@ Summary::Lines part_lines(const std::vector<PartSummary>& parts) {
   for (const PartSummary& part : parts) {
     const Box& box = part.bounds;
     lines.emplace_back(&part == &parts.front() ? "parts" : "",
-                       fmt::format("{}{}: {} triangles, {:.3f} x {:.3f} x {:.3f} mm at {:.3f}, {:.3f} mm", one_line(part.path),
-                                   part.copies > 1 ? fmt::format(" x {}", part.copies) : "", readable_count(part.triangles),
+                       fmt::format("{}{}: {}, {:.3f} x {:.3f} x {:.3f} mm at {:.3f}, {:.3f} mm", one_line(part.path),
+                                   part.copies > 1 ? fmt::format(" x {}", part.copies) : "",
+                                   part.triangles == 0 ? "images" : readable_count(part.triangles) + " triangles",
                                    mm(box.width()), mm(box.depth()), mm(box.height()), mm(box.lo.x), mm(box.lo.y)));
     for (const Note& note : part.notes) {
       lines.emplace_back("", fmt::format("  {}{}", note.repair ? "repair: " : "", one_line(note.text)));

@@ -15,23 +15,24 @@ namespace lamina::read {
 namespace {
 
 /// By the first bytes, whatever the name says.
-Result<Image> read_by_magic(int file, std::uint64_t bytes, const std::string& path, int threshold) {
+Result<Image> read_by_magic(int file, std::uint64_t bytes, const std::string& path, int threshold, std::uint64_t page) {
   unsigned char magic[8] = {};
   if (::pread(file, magic, sizeof magic, 0) < 0) {
     return Error{Fault::kVerification, fmt::format("{}: cannot read: {}", path, std::strerror(errno))};
   }
   const auto begins = [&](const char* text, std::size_t length) { return std::memcmp(magic, text, length) == 0; };
-  if (begins("II", 2) || begins("MM", 2)) return tiff(file, bytes, path, threshold);
+  if (begins("II", 2) || begins("MM", 2)) return tiff(file, bytes, path, threshold, page);
   if (begins("\x89PNG\r\n\x1a\n", 8)) return png(file, bytes, path, threshold);
-  if (begins("P4", 2)) return pbm(file, bytes, path);
-  return Error{Fault::kVerification, fmt::format("{}: neither TIFF nor PNG nor PBM (P4); plan the layer again", path)};
+  if (begins("P4", 2) || (threshold > 0 && begins("P5", 2))) return pbm(file, bytes, path, threshold);
+  if (begins("BM", 2)) return bmp(file, bytes, path, threshold);
+  return Error{Fault::kVerification, fmt::format("{}: neither TIFF nor PNG nor PBM (P4) nor BMP; plan the layer again", path)};
 }
 
-Result<Image> read_image(const std::string& path, int threshold) {
+Result<Image> read_image(const std::string& path, int threshold, std::uint64_t page = 0) {
   const auto file = FileReader::open(path, {});
   if (!file) return file.error();
   try {
-    return read_by_magic(file->descriptor(), file->size(), path, threshold);
+    return read_by_magic(file->descriptor(), file->size(), path, threshold, page);
   } catch (const std::bad_alloc&) {
     return Error{Fault::kVerification, fmt::format("{}: too many runs for the memory", path)};
   }
@@ -53,13 +54,25 @@ void bits_of_grey(std::span<std::byte> row, std::uint32_t columns, std::size_t s
 
 Result<Image> image(const std::string& path) { return read_image(path, 0); }
 
-Result<Image> dark_pixels(const std::string& path, int threshold) {
-  auto image = read_image(path, threshold);
+Result<Image> dark_pixels(const std::string& path, int threshold, std::uint64_t page) {
+  auto image = read_image(path, threshold, page);
   if (image) return image;
   std::string message = image.error().message;
   constexpr std::string_view kAgain = "; plan the layer again";
   if (message.ends_with(kAgain)) message.resize(message.size() - kAgain.size());
-  return Error{Fault::kInput, message + "; take grey or 1-bit PNG, TIFF or PBM"};
+  return Error{Fault::kInput, message + "; take grey or 1-bit PNG, TIFF, BMP or PBM"};
+}
+
+Result<std::vector<std::uint64_t>> pages_of(const std::string& path) {
+  const auto file = FileReader::open(path, {.fault = Fault::kInput});
+  if (!file) return file.error();
+  char magic[2] = {};
+  if (!file->read_at(0, magic)) return Error{Fault::kInput, path + ": is empty; take a whole image"};
+  const bool is_tiff = (magic[0] == 'I' || magic[0] == 'M') && magic[1] == magic[0];
+  if (!is_tiff) return std::vector<std::uint64_t>{0};
+  auto pages = tiff_pages(file->descriptor(), path);
+  if (pages && pages->size() == 1) pages->front() = 0;
+  return pages;
 }
 
 std::string difference(const Image& image, const PixelGrid& grid, std::uint64_t set) {

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <span>
 #include <string>
+#include <vector>
 
 #include "stages/data/grid.h"
 #include "stages/data/runs.h"
@@ -22,11 +23,15 @@ struct Image {
 /// errors  kVerification with the file's name: truncated, not 1 bit, not readable
 Result<Image> image(const std::string& path);
 
-/// The same of images of others: of 1 bit, or grey of 8 or 16 bits a pixel; one image a file. Set are the dark pixels: black
-/// ones, and grey ones below the threshold.
-/// threshold  1 .. 255 of 255; of 16 bits the upper eight count
-/// errors     kInput with the file's name: truncated, coloured, several images, not readable
-Result<Image> dark_pixels(const std::string& path, int threshold);
+/// The same of images of others: of 1 bit, or grey of 8 or 16 bits a pixel (TIFF, PNG, BMP, PBM, PGM). Set are the dark pixels:
+/// black ones, and grey ones below the threshold. threshold  1 .. 255 of 255; of 16 bits the upper eight count page       of
+/// pages_of(); 0: the file has one image errors     kInput with the file's name: truncated, coloured, several images, not
+/// readable
+Result<Image> dark_pixels(const std::string& path, int threshold, std::uint64_t page = 0);
+
+/// The places of the images of a file, in their order: of a TIFF of several, else one 0.
+/// errors  kInput: not readable, or more than 2^20 images
+Result<std::vector<std::uint64_t>> pages_of(const std::string& path);
 
 /// What an image differs from its manifest in, its pixels or their size first: "12 x 10 pixels, the manifest says 12 x 11";
 /// or "".

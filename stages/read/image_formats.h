@@ -13,9 +13,12 @@ namespace lamina::read {
 /// threshold  0: 1-bit images alone; else grey ones of 8 and 16 bits too, of which pixels below it are set
 /// Each reads `file`, open for reading and at its start, which stays the caller's; `bytes` is its size, `path` for messages.
 /// errors  of image()
-Result<Image> tiff(int file, std::uint64_t bytes, const std::string& path, int threshold = 0);
+/// page  the place of the directory; 0: the first one
+Result<Image> tiff(int file, std::uint64_t bytes, const std::string& path, int threshold = 0, std::uint64_t page = 0);
+Result<std::vector<std::uint64_t>> tiff_pages(int file, const std::string& path);
+Result<Image> bmp(int file, std::uint64_t bytes, const std::string& path, int threshold = 0);
 Result<Image> png(int file, std::uint64_t bytes, const std::string& path, int threshold = 0);
-Result<Image> pbm(int file, std::uint64_t bytes, const std::string& path);
+Result<Image> pbm(int file, std::uint64_t bytes, const std::string& path, int threshold = 0);
 
 /// Makes bits of a row of grey values, in place: set where a value is below the threshold.
 /// step  bytes a pixel; the first one of each counts, or the second where `second`

@@ -20,16 +20,21 @@ bool is_space(char c) { return c == ' ' || (c >= '\t' && c <= '\r'); }
 
 struct Head {
   std::uint64_t columns = 0, rows = 0;
+  std::uint64_t brightest = 0;  // of a PGM
+  bool grey = false;
   double dpi_x = 0, dpi_y = 0;
   std::size_t bytes = 0;  // of the header; pixels follow
 };
 
-/// The header of a P4 file: two numbers amid white space and comments, then one white space.
+/// The header of a P4 or P5 file: two or three numbers amid white space and comments, then one white space.
 std::optional<Head> parse_head(std::string_view text) {
-  if (text.substr(0, 2) != "P4") return std::nullopt;
+  const bool grey = text.substr(0, 2) == "P5";
+  if (!grey && text.substr(0, 2) != "P4") return std::nullopt;
   Head head;
+  head.grey = grey;
+  std::uint64_t* const numbers[] = {&head.columns, &head.rows, &head.brightest};
   std::size_t at = 2;
-  for (std::uint64_t* number : {&head.columns, &head.rows}) {
+  for (std::uint64_t* number : std::span(numbers).first(grey ? 3 : 2)) {
     const std::size_t gap = at;
     while (at < text.size() && (is_space(text[at]) || text[at] == '#')) {
       if (text[at] != '#') {
@@ -71,9 +76,9 @@ bool read_all_at(int file, std::span<std::byte> to, std::uint64_t offset) {
 
 }  // namespace
 
-Result<Image> pbm(int file, std::uint64_t bytes, const std::string& path) {
+Result<Image> pbm(int file, std::uint64_t bytes, const std::string& path, int threshold) {
   const auto failure = [&](std::string_view why) {
-    return Error{Fault::kVerification, fmt::format("{}: not a whole PBM (P4): {}; plan the layer again", path, why)};
+    return Error{Fault::kVerification, fmt::format("{}: not a whole PBM (P4) or PGM: {}; plan the layer again", path, why)};
   };
   Buffer<std::byte> buffer(std::min<std::uint64_t>(bytes, kMostHeadBytes));
   if (!read_all_at(file, buffer, 0)) return failure("cannot read");
@@ -83,7 +88,8 @@ Result<Image> pbm(int file, std::uint64_t bytes, const std::string& path) {
     return failure(fmt::format("{} x {} pixels", head->columns, head->rows));
   }
   const auto columns = static_cast<std::uint32_t>(head->columns), rows = static_cast<std::uint32_t>(head->rows);
-  const std::size_t stride = row_bytes(columns);
+  if (head->grey && head->brightest != 255) return failure(fmt::format("its grey ends at {}, not at 255", head->brightest));
+  const std::size_t stride = head->grey ? columns : row_bytes(columns);
   const std::uint64_t expected = head->bytes + std::uint64_t{stride} * rows;
   if (bytes != expected) return failure(fmt::format("{} bytes where {} x {} pixels take {}", bytes, columns, rows, expected));
 
@@ -95,7 +101,9 @@ Result<Image> pbm(int file, std::uint64_t bytes, const std::string& path) {
     const std::span<std::byte> strip = std::span(buffer).first(stride * count);
     if (!read_all_at(file, strip, head->bytes + std::uint64_t{stride} * first)) return failure("cannot read");
     for (std::uint32_t r = 0; r < count; ++r) {
-      if (!builder.add_row(strip.subspan(stride * r, stride), false)) return failure("too many runs");
+      const std::span<std::byte> row = strip.subspan(stride * r, stride);
+      if (head->grey) bits_of_grey(row, columns, 1, false, threshold);
+      if (!builder.add_row(row.first(row_bytes(columns)), false)) return failure("too many runs");
     }
   }
   return Image{builder.finish(), head->dpi_x, head->dpi_y};

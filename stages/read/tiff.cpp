@@ -46,7 +46,7 @@ std::string check_strips(TIFF* tiff, std::uint64_t file_bytes, std::uint16_t com
 
 }  // namespace
 
-Result<Image> tiff(int file, std::uint64_t bytes, const std::string& path, int threshold) {
+Result<Image> tiff(int file, std::uint64_t bytes, const std::string& path, int threshold, std::uint64_t page) {
   std::string message;  // of libtiff, outlives the handle
   const auto failure = [&](std::string_view why) {
     return Error{Fault::kVerification,
@@ -64,6 +64,7 @@ Result<Image> tiff(int file, std::uint64_t bytes, const std::string& path, int t
     ::close(own_file);
     return failure(message.empty() ? "no directory" : message);
   }
+  if (page != 0 && TIFFSetSubDirectory(handle.get(), page) == 0) return failure(message.empty() ? "no such page" : message);
   if (!message.empty()) return failure(message);
   std::uint32_t columns = 0, rows = 0;
   std::uint16_t bits = 1, samples = 1, photometric = 0, compression = COMPRESSION_NONE, unit = RESUNIT_INCH;
@@ -81,7 +82,8 @@ Result<Image> tiff(int file, std::uint64_t bytes, const std::string& path, int t
   std::uint16_t kind = SAMPLEFORMAT_UINT;
   TIFFGetFieldDefaulted(handle.get(), TIFFTAG_SAMPLEFORMAT, &kind);
   if (grey && kind != SAMPLEFORMAT_UINT) return failure("its values are not whole numbers from 0 on");
-  if (threshold > 0 && TIFFLastDirectory(handle.get()) == 0) return failure("several images in one file; write one a layer");
+  if (threshold > 0 && page == 0 && TIFFLastDirectory(handle.get()) == 0)
+    return failure("several images in one file; write one a layer");
   if (TIFFIsTiled(handle.get()) != 0) return failure("tiles are not supported");
   if (columns == 0 || rows == 0 || columns > kMostPixelsASide || rows > kMostPixelsASide) {
     return failure(fmt::format("{} x {} pixels", columns, rows));
@@ -113,6 +115,28 @@ Result<Image> tiff(int file, std::uint64_t bytes, const std::string& path, int t
   }
   image.runs = builder.finish();
   return image;
+}
+
+Result<std::vector<std::uint64_t>> tiff_pages(int file, const std::string& path) {
+  constexpr std::size_t kMostPages = 1 << 20;
+  std::string message;
+  const auto options = strict_tiff_options(message);
+  const int own_file = ::dup(file);
+  const TiffHandle handle(options != nullptr && own_file >= 0 ? TIFFFdOpenExt(own_file, path.c_str(), "rC", options.get())
+                                                              : nullptr);
+  if (handle == nullptr) {
+    if (own_file >= 0) ::close(own_file);
+    return Error{Fault::kInput, fmt::format("{}: not a TIFF: {}; take a whole file", path, message)};
+  }
+  std::vector<std::uint64_t> pages;
+  do {
+    pages.push_back(TIFFCurrentDirOffset(handle.get()));
+  } while (pages.size() <= kMostPages && TIFFReadDirectory(handle.get()) != 0);
+  if (!message.empty() || pages.size() > kMostPages) {
+    return Error{Fault::kInput, fmt::format("{}: page {}: {}; take a whole file", path, pages.size(),
+                                            message.empty() ? "too many of them" : message)};
+  }
+  return pages;
 }
 
 }  // namespace lamina::read

@@ -2,6 +2,7 @@
 #include <array>
 #include <cstdint>
 
+#include "stages/write/bmp/bmp.h"
 #include "stages/write/image_format.h"
 #include "stages/write/null/null.h"
 #include "stages/write/pbm/pbm.h"
@@ -35,14 +36,17 @@ constexpr Count most_png(Count columns, Count rows, Count changes) {
   const Count data = std::min(bytes / 256 + 8 * rows + 18 * changes, bytes / 8 * 13);
   return data + data / 4096 + kFileRoom;
 }
+/// Rows in whole words of four bytes.
+constexpr Count most_bmp(Count columns, Count rows, Count) { return kFileRoom + (columns + 31) / 32 * 4 * rows; }
 constexpr Count most_null(Count, Count, Count) { return 0; }
 
-constexpr std::array<ImageFormat, 6> kFormats = {{
+constexpr std::array<ImageFormat, 7> kFormats = {{
     {"tiff-g4", ".tif", "TIFF, CCITT Group 4: small and fast, read by every RIP", tiff::make_g4_encoder, most_g4},
     {"tiff-packbits", ".tif", "TIFF, PackBits: for readers without CCITT", tiff::make_packbits_encoder, most_packbits},
     {"tiff-none", ".tif", "TIFF, uncompressed", tiff::make_uncompressed_encoder, most_strips},
     {"png", ".png", "PNG, 1 bit", png::make_encoder, most_png},
     {"pbm", ".pbm", "portable bitmap, uncompressed", pbm::make_encoder, most_bits},
+    {"bmp", ".bmp", "Windows bitmap, 1 bit, uncompressed", bmp::make_encoder, most_bmp},
     {"null", "", "no image files: for timing", null::make_encoder, most_null},
 }};
 

@@ -9,13 +9,14 @@
 
 #include "stages/data/handles/late.h"
 
-#define LAMINA_TIFF(each)                                                                                         \
-  each(TIFFOpenOptionsAlloc) each(TIFFOpenOptionsFree) each(TIFFOpenOptionsSetMaxSingleMemAlloc)                  \
-      each(TIFFOpenOptionsSetErrorHandlerExtR) each(TIFFOpenOptionsSetWarningHandlerExtR) each(TIFFClientOpenExt) \
-          each(TIFFFdOpenExt) each(TIFFClose) each(TIFFFlush) each(TIFFGetField) each(TIFFGetFieldDefaulted)      \
-              each(TIFFSetField) each(TIFFGetStrileByteCount) each(TIFFGetStrileOffset) each(TIFFIsTiled)         \
-                  each(TIFFLastDirectory) each(TIFFNumberOfStrips) each(TIFFReadScanline) each(TIFFScanlineSize)  \
-                      each(TIFFWriteEncodedStrip) each(TIFFWriteRawStrip)
+#define LAMINA_TIFF(each)                                                                                                   \
+  each(TIFFOpenOptionsAlloc) each(TIFFOpenOptionsFree) each(TIFFOpenOptionsSetMaxSingleMemAlloc)                            \
+      each(TIFFOpenOptionsSetErrorHandlerExtR) each(TIFFOpenOptionsSetWarningHandlerExtR) each(TIFFClientOpenExt)           \
+          each(TIFFFdOpenExt) each(TIFFClose) each(TIFFFlush) each(TIFFGetField) each(TIFFGetFieldDefaulted)                \
+              each(TIFFSetField) each(TIFFGetStrileByteCount) each(TIFFGetStrileOffset) each(TIFFIsTiled)                   \
+                  each(TIFFLastDirectory) each(TIFFNumberOfStrips) each(TIFFReadScanline) each(TIFFScanlineSize)            \
+                      each(TIFFWriteEncodedStrip) each(TIFFWriteRawStrip) each(TIFFSetSubDirectory) each(TIFFReadDirectory) \
+                          each(TIFFCurrentDirOffset)
 
 namespace lamina {
 

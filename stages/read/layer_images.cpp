@@ -1,0 +1,98 @@
+#include "stages/read/layer_images.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+
+#include "stages/data/hash.h"
+#include "stages/data/text/readable.h"
+#include "stages/read/image.h"
+#include "stages/read/numbered.h"
+
+namespace lamina::read {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::uint64_t kMostLayers = 1 << 24;
+
+}  // namespace
+
+bool names_images(const std::string& path) {
+  constexpr std::string_view kEndings[] = {".tif", ".tiff", ".png", ".bmp", ".pbm", ".pgm"};
+  std::error_code ignored;
+  return fs::is_directory(path, ignored) ||
+         std::ranges::find(kEndings, lower_case(fs::path(path).extension().string())) != std::end(kEndings);
+}
+
+Result<LayerImages> LayerImages::open(const std::string& path, const LayerImagesRequest& request) {
+  LayerImages stack;
+  stack.request_ = request;
+  std::error_code ignored;
+  std::vector<Numbered> files{{0, path}};
+  const bool folder = fs::is_directory(path, ignored);
+  if (folder) {
+    auto found = numbered_images(path, request.missing_empty);
+    if (!found) return found.error();
+    files = std::move(*found);
+    if (files.back().number - files.front().number >= kMostLayers)
+      return Error{Fault::kInput, fmt::format("{}: its number is {} above the first one; number the images anew",
+                                              one_line(files.back().path), files.back().number - files.front().number)};
+  }
+  stack.first_number_ = files.front().number;
+  std::string all = fmt::format("{} {}", request.threshold, request.invert);
+  for (Numbered& file : files) {
+    const auto digest = digest_file(file.path);
+    if (!digest) return Error{Fault::kInput, digest.error().message};
+    const auto places = pages_of(file.path);
+    if (!places) return places.error();
+    if (folder && places->size() > 1)
+      return Error{Fault::kInput, fmt::format("{}: holds {} images; name the file itself, or write one image a file",
+                                              one_line(file.path), places->size())};
+    while (folder && stack.pages_.size() < file.number - stack.first_number_) {
+      stack.pages_.emplace_back();
+      ++stack.missing_;
+    }
+    all += fmt::format(" {} {}", stack.pages_.size(), hex(digest->hash));
+    for (const std::uint64_t place : *places)
+      stack.pages_.push_back({static_cast<std::uint32_t>(stack.files_.size()), place, digest->bytes / places->size()});
+    stack.files_.push_back(std::move(file.path));
+  }
+  stack.fingerprint_ = hash_text(all).low;
+  const auto first = dark_pixels(stack.files_.front(), request.threshold, stack.pages_.front().place);
+  if (!first) return first.error();
+  stack.columns_ = first->runs.columns;
+  stack.rows_ = first->runs.view().rows();
+  stack.dpi_x_ = first->dpi_x;
+  stack.dpi_y_ = first->dpi_y;
+  return stack;
+}
+
+std::string_view LayerImages::file(std::uint32_t layer) const {
+  return pages_[layer].file == UINT32_MAX ? std::string_view() : files_[pages_[layer].file];
+}
+
+Result<Runs> LayerImages::read(std::uint32_t layer) const {
+  const Page& page = pages_[layer];
+  if (page.file == UINT32_MAX) {
+    Runs empty;
+    empty.columns = columns_;
+    empty.row_offset.assign(std::size_t{rows_} + 1, 0);
+    return empty;
+  }
+  const std::string& path = files_[page.file];
+  auto image = dark_pixels(path, request_.threshold, page.place);
+  if (!image) return image.error();
+  const std::string where = page.place == 0 ? one_line(path) : fmt::format("{}: page {}", one_line(path), layer);
+  if (image->runs.columns != columns_ || image->runs.view().rows() != rows_)
+    return Error{Fault::kInput, fmt::format("{}: {} x {} pixels, the first image has {} x {}; bring them to one size", where,
+                                            image->runs.columns, image->runs.view().rows(), columns_, rows_)};
+  if (std::abs(image->dpi_x - dpi_x_) > 0.05 || std::abs(image->dpi_y - dpi_y_) > 0.05)
+    return Error{Fault::kInput, fmt::format("{}: {:g} x {:g} dpi, the first image has {:g} x {:g}; bring them to one", where,
+                                            image->dpi_x, image->dpi_y, dpi_x_, dpi_y_)};
+  return request_.invert ? inverse(image->runs) : std::move(image->runs);
+}
+
+}  // namespace lamina::read
