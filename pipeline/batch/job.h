@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "pipeline/plan/progress.h"
-#include "stages/data/hash.h"
+#include "stages/data/input/hash.h"
 #include "stages/data/status.h"
 #include "stages/data/text/json.h"
 #include "stages/read/jobs/batch_list.h"

@@ -8,7 +8,7 @@
 #include <string>
 
 #include "pipeline/batch/job.h"
-#include "stages/data/hash.h"
+#include "stages/data/input/hash.h"
 #include "stages/data/status.h"
 #include "stages/data/text/json.h"
 #include "stages/write/journal.h"

@@ -11,7 +11,7 @@
 #include "pipeline/show/report_cast.h"
 #include "pipeline/show/report_doubts.h"
 #include "pipeline/show/report_source.h"
-#include "stages/data/hash.h"
+#include "stages/data/input/hash.h"
 #include "stages/geometry/coverage.h"
 #include "stages/view/depth.h"
 #include "stages/write/report/head.h"

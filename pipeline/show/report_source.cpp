@@ -8,7 +8,7 @@
 #include <span>
 
 #include "pipeline/check/job_files.h"
-#include "stages/data/hash.h"
+#include "stages/data/input/hash.h"
 #include "stages/raster/beads.h"
 #include "stages/read/gcode.h"
 

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <filesystem>
 
-#include "stages/data/hash.h"
+#include "stages/data/input/hash.h"
 #include "stages/data/text/readable.h"
 #include "stages/read/image.h"
 #include "stages/read/numbered.h"

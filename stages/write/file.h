@@ -13,7 +13,7 @@
 #include <string_view>
 
 #include "stages/data/buffer.h"
-#include "stages/data/hash.h"
+#include "stages/data/input/hash.h"
 #include "stages/data/status.h"
 
 namespace lamina::write {

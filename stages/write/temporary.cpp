@@ -17,7 +17,7 @@
 #include <thread>
 #include <utility>
 
-#include "stages/data/hash.h"
+#include "stages/data/input/hash.h"
 #include "stages/write/file.h"
 #include "stages/write/leftovers.h"
 

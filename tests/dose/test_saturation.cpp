@@ -6,7 +6,7 @@
 #include <complex>
 #include <vector>
 
-#include "stages/data/hash.h"
+#include "stages/data/input/hash.h"
 #include "stages/dose/blue_noise.h"
 #include "stages/dose/budget.h"
 #include "stages/dose/dither.h"

@@ -5,7 +5,7 @@
 
 #include "pipeline/job/file.h"
 #include "pipeline/machine/powder_printer.h"
-#include "stages/data/hash.h"
+#include "stages/data/input/hash.h"
 #include "stages/data/text/version.h"
 #include "stages/write/manifest/manifest.h"
 #include "stages/write/manifest/manifest_line.h"

@@ -3,8 +3,8 @@
 
 #include <optional>
 
-#include "stages/data/hash.h"
 #include "stages/data/input/file_reader.h"
+#include "stages/data/input/hash.h"
 
 namespace lamina {
 

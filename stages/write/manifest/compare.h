@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "stages/data/hash.h"
+#include "stages/data/input/hash.h"
 #include "stages/data/status.h"
 #include "stages/write/manifest/manifest.h"
 

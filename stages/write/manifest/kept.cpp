@@ -8,8 +8,8 @@
 #include <cstring>
 #include <filesystem>
 
-#include "stages/data/hash.h"
 #include "stages/data/input/digest_range.h"
+#include "stages/data/input/hash.h"
 #include "stages/write/leftovers.h"
 
 namespace lamina {

@@ -14,7 +14,7 @@
 #include <string_view>
 #include <type_traits>
 
-#include "stages/data/hash.h"
+#include "stages/data/input/hash.h"
 #include "stages/data/layer.h"
 #include "stages/data/text/json_text.h"
 

@@ -19,7 +19,7 @@
 
 #include "stages/data/choices.h"
 #include "stages/data/grid.h"
-#include "stages/data/hash.h"
+#include "stages/data/input/hash.h"
 #include "stages/data/machine.h"
 #include "stages/data/mesh.h"
 #include "stages/data/status.h"

@@ -5,7 +5,7 @@
 #include <memory>
 #include <vector>
 
-#include "stages/data/hash.h"
+#include "stages/data/input/hash.h"
 #include "stages/data/layer.h"
 #include "stages/data/toolpaths.h"
 #include "stages/write/extrusion_format.h"

@@ -7,7 +7,7 @@
 
 #include "stages/data/buffer.h"
 #include "stages/data/grid.h"
-#include "stages/data/hash.h"
+#include "stages/data/input/hash.h"
 #include "stages/data/status.h"
 #include "stages/geometry/coverage.h"  // PixelWindow
 #include "stages/write/manifest/manifest.h"

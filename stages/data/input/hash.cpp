@@ -1,4 +1,4 @@
-#include "stages/data/hash.h"
+#include "stages/data/input/hash.h"
 
 #include <fmt/format.h>
 #include <unistd.h>

@@ -1,4 +1,4 @@
-// stages/data/hash.h: XXH3-128, the fingerprint of every file that a job leaves.
+// stages/data/input/hash.h: XXH3-128, the fingerprint of every file that a job leaves.
 #pragma once
 
 #include <cstddef>
