@@ -65,6 +65,7 @@ const Row kRows[] = {
     {"permeability", "--plot", "permeability made.gcode --window 1,1,0.6 --voxel 50 --no-flow --plot @.png", "made.gcode"},
     {"permeability", "--solid", "permeability made.gcode --window 1,1,0.6 --voxel 50 --no-flow --solid @.mha", "made.gcode"},
     {"permeability", "--void", "permeability made.gcode --window 1,1,0.6 --voxel 50 --no-flow --void @.stl", "made.gcode"},
+    {"convert", "-o,--output", "convert made --format bmp --quiet -o @", "made/layers/000000.tif", "", true, false, true},
     {"merge", "-o,--output", "merge shards --quiet -o @", "part.stl", "/manifest.json", true},
     {"machines", "--target", "machines --target @", nullptr},
     {"preview", "-o,--output", "preview made.gcode --quiet -o @.svg", "made.gcode"},
