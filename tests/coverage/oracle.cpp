@@ -1,7 +1,5 @@
 #include "tests/coverage/oracle.h"
 
-#include <gmpxx.h>
-
 #include <algorithm>
 #include <array>
 
@@ -18,8 +16,9 @@ struct VoxelBox {
 mpq_class number(std::int64_t value) { return mpq_class(static_cast<long>(value)); }
 
 /// What lies where side * coordinate >= side * limit.
-Shape cut_off(const Shape& shape, int axis, std::int64_t at, int side) {
+Shape cut_off(Shape shape, int axis, std::int64_t at, int side) {
   const mpq_class limit = number(at);
+  if (std::ranges::all_of(shape, [&](const Vertex& a) { return side * cmp(a[axis], limit) >= 0; })) return shape;
   Shape result;
   for (std::size_t i = 0; i < shape.size(); ++i) {
     const Vertex &a = shape[i], &b = shape[(i + 1) % shape.size()];
@@ -48,10 +47,15 @@ void measure(const Shape& shape, mpq_class& area, mpq_class& moment) {
 mpq_class volume_above(const Triangle& t, const VoxelBox& box) {
   Shape shape;
   for (const Point3* p : {&t.a, &t.b, &t.c}) shape.push_back({number(p->x), number(p->y), number(p->z)});
-  for (int axis = 0; axis < 2; ++axis) shape = cut_off(cut_off(shape, axis, box.lo[axis], 1), axis, box.hi[axis], -1);
+  for (int axis = 0; axis < 2; ++axis) {
+    shape = cut_off(cut_off(std::move(shape), axis, box.lo[axis], 1), axis, box.hi[axis], -1);
+  }
+  if (shape.empty()) return 0;
   const Shape below = cut_off(shape, 2, box.lo[2], -1);
-  Shape within = cut_off(cut_off(shape, 2, box.lo[2], 1), 2, box.hi[2], -1);
-  if (std::max({t.a.z, t.b.z, t.c.z}) <= box.lo[2]) within.clear();  // a level facet there lies below
+  Shape within;
+  if (std::max({t.a.z, t.b.z, t.c.z}) > box.lo[2]) {  // a level facet there lies below
+    within = cut_off(cut_off(std::move(shape), 2, box.lo[2], 1), 2, box.hi[2], -1);
+  }
   mpq_class area, moment, result;
   measure(below, area, moment);
   result = area * number(box.hi[2] - box.lo[2]);
@@ -60,10 +64,18 @@ mpq_class volume_above(const Triangle& t, const VoxelBox& box) {
   return -result / 2;  // above a facet that looks up nothing is solid
 }
 
-/// Winding number at a point in sixteenths of a nanometre, by the rules of the bitmap contract.
-int winding_at(std::span<const Triangle> facets, std::int64_t x, std::int64_t y, std::int64_t z) {
-  using Wide = __int128;
-  int winding = 0;
+using Wide = __int128;
+
+/// A facet that a line along x crosses, as a sample on that line sees it; sixteenths of a nanometre.
+struct CrossedFacet {
+  std::int64_t nx, x;  // of its normal and of a corner
+  Wide rest;           // what y and z of the line add to the side of its plane
+};
+using SampleLine = std::vector<CrossedFacet>;
+
+/// Facets that count along the line, by the rules of the bitmap contract.
+SampleLine line_at(std::span<const Triangle> facets, std::int64_t y, std::int64_t z) {
+  SampleLine line;
   for (const Triangle& t : facets) {
     const std::array<const Point3*, 3> p{&t.a, &t.b, &t.c};
     int before = 0, cut = 0;
@@ -80,76 +92,85 @@ int winding_at(std::span<const Triangle> facets, std::int64_t x, std::int64_t y,
     const std::int64_t ux = t.b.x - t.a.x, uy = t.b.y - t.a.y, uz = t.b.z - t.a.z;
     const std::int64_t vx = t.c.x - t.a.x, vy = t.c.y - t.a.y, vz = t.c.z - t.a.z;
     const std::int64_t nx = uy * vz - uz * vy, ny = uz * vx - ux * vz, nz = ux * vy - uy * vx;
-    const Wide side = static_cast<Wide>(nx) * (x - 16 * std::int64_t{t.a.x}) +
-                      static_cast<Wide>(ny) * (y - 16 * std::int64_t{t.a.y}) +
-                      static_cast<Wide>(nz) * (z - 16 * std::int64_t{t.a.z});
-    if (nx < 0 && side <= 0) ++winding;
-    if (nx > 0 && side >= 0) --winding;
+    line.push_back(
+        {nx, 16 * std::int64_t{t.a.x},
+         static_cast<Wide>(ny) * (y - 16 * std::int64_t{t.a.y}) + static_cast<Wide>(nz) * (z - 16 * std::int64_t{t.a.z})});
+  }
+  return line;
+}
+
+int winding_at(const SampleLine& line, std::int64_t x) {
+  int winding = 0;
+  for (const CrossedFacet& facet : line) {
+    const Wide side = static_cast<Wide>(facet.nx) * (x - facet.x) + facet.rest;
+    if (facet.nx < 0 && side <= 0) ++winding;
+    if (facet.nx > 0 && side >= 0) --winding;
   }
   return winding;
 }
 
-std::uint8_t oracle_voxel(std::span<const Triangle> of_column, std::span<const Triangle> of_row, const VoxelBox& box,
-                          FillRule rule, std::uint32_t levels) {
-  const std::int64_t n = levels - 1;
-  int solid = 0, others = 0;
-  for (std::int64_t l = 0; l < 8; ++l) {
-    for (std::int64_t k = 0; k < 8; ++k) {
-      for (std::int64_t s = 0; s < 8; ++s) {
-        const auto at = [&](int axis, std::int64_t i) {
-          return 16 * box.lo[axis] + (2 * i + 1) * (box.hi[axis] - box.lo[axis]);
-        };
-        const int winding = winding_at(of_row, at(0, s), at(1, k), at(2, l));
-        solid += is_solid(rule, winding) ? 1 : 0;
-        others += winding < 0 || winding > 1 ? 1 : 0;
-      }
-    }
+/// Sixteenths of a nanometre.
+std::int64_t sample_at(const VoxelBox& box, int axis, std::int64_t i) {
+  return 16 * box.lo[axis] + (2 * i + 1) * (box.hi[axis] - box.lo[axis]);
+}
+
+VoxelFacts facts_of(std::span<const Triangle> of_column, std::span<const SampleLine> lines, const VoxelBox& box) {
+  VoxelFacts facts;
+  for (const SampleLine& line : lines) {
+    for (std::int64_t s = 0; s < 8; ++s) ++facts.samples[winding_at(line, sample_at(box, 0, s))];
   }
-  mpq_class share(solid, 512);
-  share.canonicalize();
-  if (others == 0) {
-    share = 0;
-    for (const Triangle& t : of_column) share += volume_above(t, box);
-    for (int axis = 0; axis < 3; ++axis) share /= number(box.hi[axis] - box.lo[axis]);
-  }
-  const mpq_class place = share * static_cast<long>(n) + mpq_class(1, 2);
-  mpz_class level;
-  mpz_fdiv_q(level.get_mpz_t(), place.get_num_mpz_t(), place.get_den_mpz_t());
-  return static_cast<std::uint8_t>(std::clamp<long>(level.get_si(), 0, static_cast<long>(n)));
+  if (facts.samples.begin()->first < 0 || facts.samples.rbegin()->first > 1) return facts;
+  for (const Triangle& t : of_column) facts.share += volume_above(t, box);
+  for (int axis = 0; axis < 3; ++axis) facts.share /= number(box.hi[axis] - box.lo[axis]);
+  return facts;
 }
 
 }  // namespace
 
-std::vector<std::uint8_t> oracle_levels(std::span<const Triangle> facets, const PixelGrid& grid, const Layer& layer,
-                                        FillRule rule, std::uint32_t levels, const VoxelWindow& window) {
+std::vector<VoxelFacts> oracle_voxels(std::span<const Triangle> facets, const PixelGrid& grid, const Layer& layer,
+                                      const VoxelWindow& window) {
   const auto end_of = [](const PixelAxis& axis, std::uint32_t i) { return std::int64_t{i} * axis.span / axis.dots; };
-  std::vector<std::uint8_t> result;
-  std::vector<Triangle> of_row, in_layer, of_column, to_the_left;
+  std::vector<VoxelFacts> result;
+  std::vector<Triangle> of_row, in_layer, of_column;
+  std::vector<SampleLine> lines;
   for (std::uint32_t j = window.first; j < window.last; ++j) {
     VoxelBox box;
     box.lo[1] = end_of(grid.y, j), box.hi[1] = end_of(grid.y, j + 1);
     box.lo[2] = layer.bottom, box.hi[2] = std::int64_t{layer.bottom} + layer.thickness;
-    of_row.clear(), in_layer.clear();
+    of_row.clear(), in_layer.clear(), lines.clear();
     for (const Triangle& t : facets) {
       if (std::max({t.a.y, t.b.y, t.c.y}) < box.lo[1] || std::min({t.a.y, t.b.y, t.c.y}) > box.hi[1]) continue;
       if (std::min({t.a.z, t.b.z, t.c.z}) > box.hi[2]) continue;
       of_row.push_back(t);
       if (std::max({t.a.z, t.b.z, t.c.z}) >= box.lo[2]) in_layer.push_back(t);
     }
+    for (std::int64_t l = 0; l < 8; ++l) {
+      for (std::int64_t k = 0; k < 8; ++k) lines.push_back(line_at(in_layer, sample_at(box, 1, k), sample_at(box, 2, l)));
+    }
     for (std::uint32_t i = window.left; i < window.right; ++i) {
       box.lo[0] = end_of(grid.x, i), box.hi[0] = end_of(grid.x, i + 1);
-      of_column.clear(), to_the_left.clear();
+      of_column.clear();
       for (const Triangle& t : of_row) {
         if (std::min({t.a.x, t.b.x, t.c.x}) > box.hi[0]) continue;
         if (std::max({t.a.x, t.b.x, t.c.x}) >= box.lo[0]) of_column.push_back(t);
       }
-      for (const Triangle& t : in_layer) {
-        if (std::min({t.a.x, t.b.x, t.c.x}) <= box.hi[0]) to_the_left.push_back(t);
-      }
-      result.push_back(oracle_voxel(of_column, to_the_left, box, rule, levels));
+      result.push_back(facts_of(of_column, lines, box));
     }
   }
   return result;
+}
+
+std::uint8_t oracle_level(const VoxelFacts& voxel, FillRule rule, std::uint32_t levels) {
+  const long n = static_cast<long>(levels) - 1;
+  int solid = 0;
+  for (const auto& [winding, count] : voxel.samples) solid += is_solid(rule, winding) ? count : 0;
+  const bool exact = voxel.samples.begin()->first >= 0 && voxel.samples.rbegin()->first <= 1;
+  mpq_class share(solid, 512);
+  share.canonicalize();
+  const mpq_class place = (exact ? voxel.share : share) * n + mpq_class(1, 2);
+  mpz_class level;
+  mpz_fdiv_q(level.get_mpz_t(), place.get_num_mpz_t(), place.get_den_mpz_t());
+  return static_cast<std::uint8_t>(std::clamp<long>(level.get_si(), 0, n));
 }
 
 }  // namespace lamina::test

@@ -1,7 +1,10 @@
 // tests/coverage/oracle.h: the contract of shares, word for word, as slowly as it reads.
 #pragma once
 
+#include <gmpxx.h>
+
 #include <cstdint>
+#include <map>
 #include <span>
 #include <vector>
 
@@ -17,9 +20,17 @@ struct VoxelWindow {
   std::uint32_t left, right, first, last;
 };
 
-/// Levels of the window's voxels, row by row from the front. Shares no code with the stage: volumes are what lies above facets
+/// What no fill rule and no number of levels changes.
+struct VoxelFacts {
+  std::map<int, int> samples;  // how many have a winding number
+  mpq_class share;             // of the exact solid; only where all winding numbers are 0 or 1
+};
+
+/// Facts of the window's voxels, row by row from the front. Shares no code with the stage: volumes are what lies above facets
 /// that the six planes of a voxel have cut, along z, in rationals; samples are counted one by one.
-std::vector<std::uint8_t> oracle_levels(std::span<const Triangle> facets, const PixelGrid& grid, const Layer& layer,
-                                        FillRule rule, std::uint32_t levels, const VoxelWindow& window);
+std::vector<VoxelFacts> oracle_voxels(std::span<const Triangle> facets, const PixelGrid& grid, const Layer& layer,
+                                      const VoxelWindow& window);
+
+std::uint8_t oracle_level(const VoxelFacts& voxel, FillRule rule, std::uint32_t levels);
 
 }  // namespace lamina::test

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cstdlib>
+#include <filesystem>
 #include <iostream>
 #include <random>
 
@@ -17,6 +18,7 @@ namespace {
 
 constexpr int kLayersOfModel = 36;
 constexpr int kWindowsOfLayer = 6;
+constexpr std::uintmax_t kLargestFile = 4'000'000;  // beyond, most of the time would go into meetings of facets
 
 struct CoveredModel {
   std::vector<Mesh> meshes;
@@ -59,7 +61,7 @@ struct ComparedVoxels {
   std::uint64_t voxels = 0, partly = 0, wrong = 0;
 };
 
-/// Windows of 3 x 2 voxels around corners of facets of the layer.
+/// Windows of 2 x 2 voxels around corners of facets of the layer.
 void compare_layer(const CoveredModel& model, const Layer& layer, const LevelsView& image, std::uint32_t levels,
                    std::mt19937& random, ComparedVoxels& sum) {
   const std::int64_t top = std::int64_t{layer.bottom} + layer.thickness;
@@ -76,7 +78,8 @@ void compare_layer(const CoveredModel& model, const Layer& layer, const LevelsVi
       return std::clamp<std::uint32_t>(static_cast<std::uint32_t>(nm * axis.dots / axis.span), 2, axis.count - 3);
     };
     const std::uint32_t i = pixel(model.grid.x, at.x), j = pixel(model.grid.y, at.y);
-    const VoxelWindow window{i - 1, i + 2, j, j + 2};
+    const std::uint32_t left = i - static_cast<std::uint32_t>(w % 2);
+    const VoxelWindow window{left, left + 2, j, j + 2};
     const std::int64_t front = std::int64_t{j} * model.grid.y.span / model.grid.y.dots;
     const std::int64_t back = std::int64_t{j + 2} * model.grid.y.span / model.grid.y.dots;
     std::vector<Triangle> near;
@@ -84,16 +87,16 @@ void compare_layer(const CoveredModel& model, const Layer& layer, const LevelsVi
       const Triangle& t = model.facets[f];
       if (std::min({t.a.y, t.b.y, t.c.y}) <= back && std::max({t.a.y, t.b.y, t.c.y}) >= front) near.push_back(t);
     }
-    const auto expected = oracle_levels(near, model.grid, layer, FillRule::kNonzero, levels, window);
+    const std::vector<VoxelFacts> facts = oracle_voxels(near, model.grid, layer, window);
     std::size_t next = 0;
     for (std::uint32_t r = window.first; r < window.last; ++r) {
       for (std::uint32_t c = window.left; c < window.right; ++c, ++next) {
-        const std::uint8_t level = level_at(image, c, r);
+        const std::uint8_t level = level_at(image, c, r), expected = oracle_level(facts[next], FillRule::kNonzero, levels);
         ++sum.voxels;
-        sum.partly += expected[next] > 0 && expected[next] < levels - 1 ? 1 : 0;
-        if (level == expected[next] || sum.wrong++ > 3) continue;
+        sum.partly += expected > 0 && expected < levels - 1 ? 1 : 0;
+        if (level == expected || sum.wrong++ > 3) continue;
         ADD_FAILURE() << "voxel " << c << ", " << r << " of the layer at " << layer.bottom << " nm has level " << int{level}
-                      << ", not " << int{expected[next]};
+                      << ", not " << int{expected};
       }
     }
   }
@@ -106,6 +109,7 @@ TEST(CoverageModels, RealPartsHaveTheLevelsOfTheContract) {
   int parts = 0;
   for (const auto& file : part_files(folder)) {
     CoveredModel model;
+    if (std::filesystem::file_size(file) > kLargestFile) continue;
     if (file.string().find("broken") != std::string::npos || !load_model(file.string(), 300, model)) continue;
     if (model.grid.columns() > 4000 || model.grid.rows() > 4000) continue;
     SCOPED_TRACE(file.string());
