@@ -20,8 +20,8 @@ constexpr std::array<std::pair<std::string_view, std::string_view>, 5> kArgument
                                                                                       {"-o", "output"}}};
 /// Advice for the command line that is none here.
 constexpr std::array<std::pair<std::string_view, std::string_view>, 1> kAdvice = {
-    {{"neither TIFF nor PNG nor PBM (P4); plan the layer again",
-      "neither TIFF nor PNG nor PBM (P4); name the image of a layer (lamina.load reads parts)"}}};
+    {{"neither TIFF nor PNG nor PBM (P4) nor BMP; plan the layer again",
+      "neither TIFF nor PNG nor PBM (P4) nor BMP; name the image of a layer (lamina.load reads parts)"}}};
 
 /// Keys by their option; an option of several products has several keys.
 const std::map<std::string, std::string, std::less<>>& keys_by_option() {

@@ -78,6 +78,10 @@ std::vector<Group> groups_of(Scene& scene, const Job& job, const Materials& mate
 Result<Solids> Solids::build(Scene& scene, const Job& job, const PixelGrid& grid, const Materials& materials) {
   Solids result;
   const bool rays = job.engine != Engine::kContours, contours = job.engine != Engine::kRays;
+  if (job.levels > 0 && !scene.images.empty()) {
+    return Error{Fault::kUsage,
+                 "shares of voxels are those of meshes; leave out the parts that are images, or ask for no levels"};
+  }
   if (job.levels > 0 && materials.several()) {
     return Error{Fault::kUsage, "shares of voxels are those of one material; give all parts the same, or ask for no levels"};
   }

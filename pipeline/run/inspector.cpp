@@ -38,6 +38,16 @@ Inspector::Inspector(const Plan& plan) : plan_(plan) {
   for (std::size_t i = 0; i < plan.scene->instances.size(); ++i) {
     stands.push_back({box_of(*plan.scene, plan.scene->instances[i]), plan.scene->part_of_instance[i]});
   }
+  for (const PlacedImages& images : plan.scene->images) {
+    stands.push_back({plan.scene->parts[images.part].bounds, images.part});
+    Box& box = stands.back().box;
+    const PixelGrid& grid = plan.images->grid;
+    const auto nm = [](std::int64_t pixel, const PixelAxis& axis) { return static_cast<Nm>(pixel * axis.span / axis.dots); };
+    const std::int64_t back = std::int64_t{grid.rows()} - images.place.first_row;
+    box.lo = {nm(images.place.column.front(), grid.x), nm(back - std::ssize(images.place.row), grid.y), images.bottom};
+    box.hi = {nm(images.place.column.back(), grid.x), nm(back, grid.y),
+              static_cast<Nm>(images.bottom + std::int64_t{images.thickness} * images.images->layers())};
+  }
   least_mm_ = plan.job.least_wall_mm.value_or(narrowest_mm(*plan.images));
   inspection_.emplace(plan.images->grid, std::move(stands), nm_of(least_mm_));
 }

@@ -8,8 +8,11 @@
 namespace lamina::pipeline {
 
 JobCost::JobCost(const Plan& plan)
-    : machine_(plan.images->machine->machine), tally_(machine_, plan.images->grid, plan.scene->parts.size()) {
+    : machine_(plan.images->machine->machine),
+      tally_(machine_, plan.images->grid, plan.scene->images.empty() ? plan.scene->parts.size() : 1) {
   for (const PartSummary& part : plan.scene->parts) names_.push_back(part.path);
+  // What images set is nobody's window: with them the job is told as one.
+  if (!plan.scene->images.empty()) names_ = {title_of(plan.scene->parts)};
   if (names_.size() < 2 || !cost::has_prices(machine_.cost)) return;
   std::vector<cost::Body> bodies;
   for (const sanity::Solid& solid : solids_from_above(*plan.scene)) bodies.push_back({solid.box, solid.part, solid.group});

@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "pipeline/run/image_maker.h"
+#include "stages/program/reach.h"
 #include "stages/raster/combine.h"
 #include "stages/raster/mirror.h"
 #include "stages/read/placed.h"
@@ -72,6 +73,15 @@ Status LayerImager::images(const Layer& layer, ImageWork& work) const {
     const auto read = part.images->read(*number);
     if (!read) return read.error();
     read::place(*read, part.place, work.section);
+    const auto outside =
+        images.machine ? program::first_outside(images.machine->machine, images.grid, work.section) : std::nullopt;
+    if (outside) {
+      return Error{Fault::kUsage,
+                   fmt::format("{}: layer {} sets a pixel at x {:.3f}, y {:.3f} mm, {:.3f} mm outside of the bed of {}; "
+                               "move the images",
+                               plan_.scene->parts[part.part].path, layer.index, mm(outside->place.x), mm(outside->place.y),
+                               outside->beyond_mm, images.machine->machine.name)};
+    }
     if (images.materials.several()) {
       work.materials.lay(images.materials.part[part.part].at(plane(layer)), work.section, work.runs);
     } else if (work.runs.change.empty()) {

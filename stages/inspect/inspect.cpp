@@ -182,7 +182,9 @@ ThinPlaces Inspection::thin(const RunsView& image, ThinScratch& scratch) const {
 
 void Inspection::add(const Layer& layer, const RunsView& image, const ThinPlaces& thin) {
   layer_ = layer;
-  if (findings_.layers == 0) below_ = INT64_MIN;
+  // The first layer that holds anything is the bottom of what it holds.
+  if (!holds_) below_ = INT64_MIN;
+  holds_ = holds_ || !image.change.empty();
   Solids solids{*this};
   solid_.add(layer, image, solids);
   if (solids.islands > 0) ++findings_.islands.layers;

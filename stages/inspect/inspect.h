@@ -102,6 +102,7 @@ class Inspection {
   Disc disc_;
   double least_mm_, pixel_mm2_;
   std::int64_t below_ = 0;  // bottom of the layer before
+  bool holds_ = false;      // any layer so far
   Layer layer_{};
   Follower solid_{true}, powder_{false};
   Runs between_;  // the powder of a layer

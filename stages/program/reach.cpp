@@ -36,4 +36,22 @@ std::optional<Outside> first_outside(const Machine& machine, const Mesh& mesh, c
   return worst;
 }
 
+std::optional<Outside> first_outside(const Machine& machine, const PixelGrid& grid, const RunsView& image) {
+  if (machine.bed.shape != BedShape::kRound) return {};
+  const std::int64_t width = nm_of(machine.bed.size_mm[0]);
+  for (std::uint32_t r = 0; r < image.rows(); ++r) {
+    const auto row = image.row(r);
+    if (row.empty()) continue;
+    const std::int64_t y = grid.y.centre(std::int64_t{grid.rows()} - 1 - r);
+    for (const std::uint32_t column : {row.front(), row.back() - 1}) {
+      const std::int64_t x = grid.x.centre(column);
+      const __int128 dx = 2 * x - width, dy = 2 * y - width;
+      if (dx * dx + dy * dy <= __int128{width} * width) continue;
+      const double radius = std::hypot(static_cast<double>(dx), static_cast<double>(dy)) / 2;
+      return Outside{{static_cast<Nm>(x), static_cast<Nm>(y), 0}, false, (radius - static_cast<double>(width) / 2) / kNmPerMm};
+    }
+  }
+  return {};
+}
+
 }  // namespace lamina::program

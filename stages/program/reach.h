@@ -3,8 +3,10 @@
 
 #include <optional>
 
+#include "stages/data/grid.h"
 #include "stages/data/machine.h"
 #include "stages/data/mesh.h"
+#include "stages/data/runs.h"
 
 namespace lamina::program {
 
@@ -19,5 +21,9 @@ struct Outside {
 /// diameter in nm, doubled to stay whole.
 /// offset  nm, added to every vertex
 std::optional<Outside> first_outside(const Machine& machine, const Mesh& mesh, const Point3& offset);
+
+/// The first set pixel of an image, row by row, whose centre lies outside of the bed; z is not known. Images of parts that are
+/// no meshes are looked at so, layer by layer. cost  O(rows), none for rectangular beds, which images never leave
+std::optional<Outside> first_outside(const Machine& machine, const PixelGrid& grid, const RunsView& image);
 
 }  // namespace lamina::program

@@ -61,10 +61,13 @@ Result<LayerImages> LayerImages::open(const std::string& path, const LayerImages
     stack.files_.push_back(std::move(file.path));
   }
   stack.fingerprint_ = hash_text(all).low;
-  const auto first = dark_pixels(stack.files_.front(), request.threshold, stack.pages_.front().place);
+  auto first = dark_pixels(stack.files_.front(), request.threshold, stack.pages_.front().place);
   if (!first) return first.error();
   stack.columns_ = first->runs.columns;
   stack.rows_ = first->runs.view().rows();
+  // A resolution that no printer has is none.
+  const auto sound = [](double dpi) { return dpi >= 1 && dpi <= 25'400; };
+  if (!sound(first->dpi_x) || !sound(first->dpi_y)) first->dpi_x = first->dpi_y = 0;
   stack.dpi_x_ = first->dpi_x;
   stack.dpi_y_ = first->dpi_y;
   return stack;
@@ -89,7 +92,7 @@ Result<Runs> LayerImages::read(std::uint32_t layer) const {
   if (image->runs.columns != columns_ || image->runs.view().rows() != rows_)
     return Error{Fault::kInput, fmt::format("{}: {} x {} pixels, the first image has {} x {}; bring them to one size", where,
                                             image->runs.columns, image->runs.view().rows(), columns_, rows_)};
-  if (std::abs(image->dpi_x - dpi_x_) > 0.05 || std::abs(image->dpi_y - dpi_y_) > 0.05)
+  if (dpi_x_ > 0 && (std::abs(image->dpi_x - dpi_x_) > 0.05 || std::abs(image->dpi_y - dpi_y_) > 0.05)
     return Error{Fault::kInput, fmt::format("{}: {:g} x {:g} dpi, the first image has {:g} x {:g}; bring them to one", where,
                                             image->dpi_x, image->dpi_y, dpi_x_, dpi_y_)};
   return request_.invert ? inverse(image->runs) : std::move(image->runs);

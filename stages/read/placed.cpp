@@ -18,9 +18,9 @@ Placement placement_of(std::uint32_t columns, std::uint32_t rows, std::int64_t d
   Placement placement;
   placement.columns = grid.columns();
   placement.rows = grid.rows();
-  std::int64_t place = 0;  // the first one whose source is not before the boundary
   for (std::uint32_t boundary = 0; boundary <= columns; ++boundary) {
-    while (source_of(place, dots_x, grid.x) < boundary) ++place;
+    // The first place whose source is not before the boundary.
+    const std::int64_t place = ceil_div(std::int64_t{boundary} * 2 * grid.x.dots - dots_x, 2 * dots_x);
     placement.column.push_back(static_cast<std::uint32_t>(std::clamp<std::int64_t>(at_column + place, 0, grid.columns())));
   }
   for (std::uint32_t r = 0; r < grid.rows(); ++r) {

@@ -84,6 +84,12 @@ Result<Image> tiff(int file, std::uint64_t bytes, const std::string& path, int t
   if (grey && kind != SAMPLEFORMAT_UINT) return failure("its values are not whole numbers from 0 on");
   if (threshold > 0 && page == 0 && TIFFLastDirectory(handle.get()) == 0)
     return failure("several images in one file; write one a layer");
+  std::uint16_t orientation = ORIENTATION_TOPLEFT;
+  TIFFGetFieldDefaulted(handle.get(), TIFFTAG_ORIENTATION, &orientation);
+  if (orientation != ORIENTATION_TOPLEFT) {
+    return failure(
+        fmt::format("its Orientation tag is {}; write rows from the top and columns from the left, tag 1", orientation));
+  }
   if (TIFFIsTiled(handle.get()) != 0) return failure("tiles are not supported");
   if (columns == 0 || rows == 0 || columns > kMostPixelsASide || rows > kMostPixelsASide) {
     return failure(fmt::format("{} x {} pixels", columns, rows));

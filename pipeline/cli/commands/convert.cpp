@@ -42,7 +42,7 @@ CommandSpec convert_spec() {
   spec.closing =
       "Examples:\n"
       "  lamina convert slices -o g4                              G4, as lamina jet writes it\n"
-      "  lamina convert scan.tif -o bits --threshold 90 --invert  a page each, bright is solid\n"
+      "  lamina convert scan.tif -o bits --threshold 90 --invert   a page each, bright is solid\n"
       "  lamina convert out/layers -o bmp --format bmp --mirror x\n";
   return spec;
 }

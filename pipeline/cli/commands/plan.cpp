@@ -150,7 +150,7 @@ std::string jet_closing() {
          "  lamina jet bracket.stl -o out                                  a part in the middle of the bed\n"
          "  lamina jet a.stl b.3mf --bed 400x400 --dpi 600 --copies 12 -o out\n"
          "  lamina jet part.obj --unit inch --rotate 0,0,90 --shrink 1.02,1.02,1.025 -o out\n"
-         "  lamina jet a.stl b.stl --material steel,bronze --machine nuferbj -o out\n"
+         "  lamina jet a.stl b.stl --material steel,bronze --machine nuferbj --vat-rule majority -o out\n"
          "  lamina jet part.stl --layers 100:110 --format png -o look      ten layers only\n"
          "  lamina jet part.stl --shard 1/4 -o out                         a quarter; then lamina merge out -o out\n"
          "  lamina jet part.stl --fill segmented --thin 1.5 --shell 1 -o out   pores planned by the filling, in a solid shell\n"

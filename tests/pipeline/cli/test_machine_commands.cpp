@@ -152,7 +152,8 @@ TEST_F(MachineCommands, TheOrientationTargetIsAnFThatReadsRightOnEveryMounting) 
 
 TEST_F(MachineCommands, PreviewShowsALayerAtAStepOfASwath) {
   const std::string part = std::string(LAMINA_TEST_DIR) + "/corpus/parameter_quality_nut.stl";
-  lamina("jet " + part + " " + part + " --material steel,bronze --machine nuferbj --layer 4 -o " + at("out"));
+  lamina("jet " + part + " " + part + " --material steel,bronze --machine nuferbj --vat-rule majority --layer 4 -o " +
+         at("out"));
   const auto picture = [&](const std::string& options, int expected = 0) {
     fs::remove(at("p.png"));
     const std::string said =

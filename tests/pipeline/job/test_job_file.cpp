@@ -57,7 +57,14 @@ Job unusual_job(const Directory& directory) {
   job.machine.profile = "nuferbj";
   job.machine.scan_speed_mm_s = 12.5;
   job.machine.blocked = {{3, 5}};
-  job.dose = {{20, 30}, 0.5, 0.75, raster::BeadEnds::kSquare};
+  job.machine.vat_rule = lamina::VatRule::kFirst;
+  job.dose.bleed_um = {20, 30};
+  job.dose.shell_mm = 0.5;
+  job.dose.core = 0.75;
+  job.dose.bead_ends = raster::BeadEnds::kSquare;
+  job.inspect = true;
+  job.least_wall_mm = 0.35;
+  job.allow_unbound = true;
   job.output = directory / "out";
   job.engine = Engine::kBoth;
   job.isa = Isa::kPlain;
