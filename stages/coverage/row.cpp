@@ -16,6 +16,12 @@ constexpr double kEpsilon = 0x1p-53;
 /// Roundings of a facet's corners and volumes together, at most (docs/coverage.md counts 48).
 constexpr double kRoundings = 128;
 
+/// std::floor of less than 2^63, which is a call where SSE4.1 is not presumed.
+std::int64_t whole_below(double value) {
+  const auto whole = static_cast<std::int64_t>(value);
+  return static_cast<double>(whole) > value ? whole - 1 : whole;
+}
+
 /// A tent for many columns: quotients are made once.
 struct RowTent {
   double x0, x1, x2, area, mean, rise, fall;
@@ -142,8 +148,8 @@ std::uint8_t RowMaker::decide(const Job& job, const Stretch& stretch, std::uint3
   const double summed =
       2 * kEpsilon * (stretch.columns + 2 * stretch.facets) * (std::abs(static_cast<double>(stretch.winding)) + stretch.facets);
   const double place = share * top + 0.5, off = (spoilt + summed) * top + 16 * kEpsilon * (std::abs(place) + top);
-  const double least = std::floor(place - off), most = std::floor(place + off);
-  if (least == most || most <= 0 || least >= top) return static_cast<std::uint8_t>(std::clamp(least, 0.0, top));
+  const std::int64_t least = whole_below(place - off), most = whole_below(place + off), n = job.rule.top_level;
+  if (least == most || most <= 0 || least >= n) return static_cast<std::uint8_t>(std::clamp<std::int64_t>(least, 0, n));
   ++job.report.exact_voxels;
   const Voxel voxel{
       edge(job.columns, column), edge(job.columns, column + 1), job.strip.y0, job.strip.y1, job.strip.z0, job.strip.z1};
