@@ -32,6 +32,9 @@ Status check_job(const Job& job) {
     return Error{Fault::kUsage, fmt::format("dose.{}: changes a saturation that is not asked for; add --saturation",
                                             dose.core_saturation_percent ? "core_saturation_percent" : "saturation_range")};
   }
+  if (dose.core_saturation_percent && dose.shell_mm == 0) {
+    return Error{Fault::kUsage, "dose.core_saturation_percent: is of what lies inside of a shell; add --shell"};
+  }
   if (dose.saturation_percent && dose.core < 1) {
     return Error{Fault::kUsage, "dose.core: a share of the pixels and --saturation exclude each other; use --core-saturation"};
   }

@@ -38,6 +38,12 @@ Result<Told> told_by_manifest(const std::string& path) {
   }
   const auto read = read_manifest(manifest);
   if (!read || read->layers.empty()) return told;
+  if (read->head.named_images() > 0) {
+    return Error{Fault::kInput,
+                 fmt::format("{}: has several images a layer, of drops or materials; plan its parts again, or name a "
+                             "folder with one image a layer",
+                             one_line(manifest))};
+  }
   const Layer first = read->layers.front().layer;
   told.bottom = first.bottom;
   told.thickness = first.thickness;

@@ -181,7 +181,8 @@ class ImageMaker : public Maker {
     for (std::size_t m = 0; plan_.images->materials.several() && m < record.images.size(); ++m)
       materials_[m].second += record.images[m].set_pixels;
     const double pixel_mm2 = 25.4 * 25.4 / (grid.x.dpi() * grid.y.dpi());
-    volume_mm3_ += static_cast<double>(record.set_pixels) * pixel_mm2 * mm(record.layer.thickness);
+    const std::uint64_t filled = std::max(record.set_pixels, record.dosed_pixels);  // also where less than a drop a pixel falls
+    volume_mm3_ += static_cast<double>(filled) * pixel_mm2 * mm(record.layer.thickness);
   }
 
   const Plan& plan_;

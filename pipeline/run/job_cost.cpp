@@ -1,5 +1,6 @@
 #include "pipeline/run/job_cost.h"
 
+#include <algorithm>
 #include <nlohmann/json.hpp>
 
 #include "pipeline/run/sanity.h"
@@ -27,7 +28,8 @@ void JobCost::count(const RunsView& image, LayerRecord& record) const {
 }
 
 void JobCost::add(const LayerRecord& record) {
-  tally_.add(record.layer.thickness, record.program.microseconds, record.program.drops, record.set_pixels, record.part_pixels);
+  tally_.add(record.layer.thickness, record.program.microseconds, record.program.drops,
+             std::max(record.set_pixels, record.dosed_pixels), record.part_pixels);
 }
 
 void JobCost::tell(Summary& summary) const {

@@ -56,7 +56,7 @@ void Budget::foresee(const Layer& layer) {
   const double least = std::min(of.gets, of.gets_core), most = std::max(of.gets, of.gets_core);
   gets_ = layers_++ == 0 ? std::pair(least, most) : std::pair(std::min(gets_.first, least), std::max(gets_.second, most));
   if (of.cut) add(layer, std::max(of.asked, of.asked_core), most, cut_);
-  if (least < least_percent_ * (1 - 1e-9)) add(layer, std::min(of.asked, of.asked_core), least, unbound_);
+  if (least < least_percent_ * (1 - 1e-6)) add(layer, std::min(of.asked, of.asked_core), least, unbound_);
 }
 
 Status Budget::judge(bool allow_unbound, std::vector<Warning>& warnings) const {

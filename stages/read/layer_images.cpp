@@ -92,7 +92,7 @@ Result<Runs> LayerImages::read(std::uint32_t layer) const {
   if (image->runs.columns != columns_ || image->runs.view().rows() != rows_)
     return Error{Fault::kInput, fmt::format("{}: {} x {} pixels, the first image has {} x {}; bring them to one size", where,
                                             image->runs.columns, image->runs.view().rows(), columns_, rows_)};
-  if (dpi_x_ > 0 && (std::abs(image->dpi_x - dpi_x_) > 0.05 || std::abs(image->dpi_y - dpi_y_) > 0.05)
+  if (dpi_x_ > 0 && (std::abs(image->dpi_x - dpi_x_) > 0.05 || std::abs(image->dpi_y - dpi_y_) > 0.05))
     return Error{Fault::kInput, fmt::format("{}: {:g} x {:g} dpi, the first image has {:g} x {:g}; bring them to one", where,
                                             image->dpi_x, image->dpi_y, dpi_x_, dpi_y_)};
   return request_.invert ? inverse(image->runs) : std::move(image->runs);

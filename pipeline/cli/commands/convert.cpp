@@ -15,6 +15,7 @@
 #include "stages/read/layer_images.h"
 #include "stages/write/file.h"
 #include "stages/write/image_format.h"
+#include "stages/write/temporary.h"
 
 namespace lamina::pipeline {
 namespace {
@@ -171,6 +172,8 @@ Outcome run_convert(const Arguments& arguments, Context& context) {
   }
   const Conversion all{*images, *format, dpi, output, mirror, images->first_number(), arguments.has("--overwrite")};
   if (Status status = check_place(all, stack); !status) return status;
+  const auto claim = write::Claim::take(output + "/manifest.json", output);
+  if (!claim) return claim.error();
   Converted sum;
   context.progress({ProgressEvent::Stage::kLayers, 0, images->layers()});
   if (Status status = convert_all(all, context.cancel(), sum); !status) return status;

@@ -16,9 +16,9 @@ std::vector<std::string> totals_text(const Totals& totals) {
   const Count& count = totals.count;
   std::vector<std::string> lines;
   lines.push_back(fmt::format(
-      "programs  {} layers replayed on {}: {}, {} drops in {} sweeps, {:.3f} % of the bed", readable_count(totals.layers),
-      totals.machine,
-      totals.moved + totals.lost > 0 ? "every pixel fired once but those of blocked nozzles" : "every pixel fired once",
+      "programs  {} layers replayed on {}: {}, {} drops in {} sweeps, as many as {:.3f} % of the bed has pixels",
+      readable_count(totals.layers), totals.machine,
+      totals.moved + totals.lost > 0 ? "every drop fired once but those of blocked nozzles" : "every drop fired once",
       readable_count(count.drops), readable_count(count.sweeps), 100 * totals.coverage));
   if (totals.moved + totals.lost > 0) {
     lines.push_back(fmt::format("blocked   {} pixels fired by a neighbouring nozzle, {} not at all, as recorded",

@@ -43,6 +43,9 @@ std::string fault_of_images(const ManifestHead& head) {
     return no_such("most_drops", fmt::format("{}", head.most_drops));
   }
   if (head.machine.empty()) return {};
+  for (const JobMaterial& material : head.materials) {
+    if (material.vat > 1) return no_such("vat", fmt::format("{}", material.vat));
+  }
   const auto* dialect = write::find_dialect(head.dialect);
   if (dialect == nullptr) return no_such("dialect", head.dialect);
   return head.program_extension == dialect->extension ? "" : no_such("program_extension", head.program_extension);

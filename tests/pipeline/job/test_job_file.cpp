@@ -2,6 +2,7 @@
 
 #include "pipeline/job/file.h"
 #include "pipeline/job/keys.h"
+#include "stages/data/machine.h"
 #include "tests/commands/program.h"
 
 namespace lamina::pipeline {
@@ -62,6 +63,9 @@ Job unusual_job(const Directory& directory) {
   job.dose.shell_mm = 0.5;
   job.dose.core = 0.75;
   job.dose.bead_ends = raster::BeadEnds::kSquare;
+  job.dose.saturation_percent = 70;
+  job.dose.core_saturation_percent = 45.5;
+  job.dose.saturation_ranges = {{1, 2.5, 80, 60}};
   job.inspect = true;
   job.least_wall_mm = 0.35;
   job.allow_unbound = true;

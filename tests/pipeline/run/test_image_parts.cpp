@@ -103,6 +103,7 @@ TEST_F(ImageParts, ThatAreNoGoodAreOneLineEach) {
   const std::string mesh = part("parameter_quality_nut.stl"), rest = " --layer 0.9 --bed 60x40 --dpi 100";
   done("jet " + mesh + rest + " -o slices");
   const auto refused = [&](const std::string& line, const std::string& words) {
+    fs::remove_all(folder_ / "out");
     const auto [code, out] = run(line);
     EXPECT_TRUE(code == 2 || code == 3) << line << " " << code << out;
     EXPECT_EQ(std::ranges::count(out, '\n'), 1) << out;
@@ -116,6 +117,7 @@ TEST_F(ImageParts, ThatAreNoGoodAreOneLineEach) {
   fs::copy(folder_ / "slices/layers", folder_ / "gap", fs::copy_options::recursive);
   fs::remove(folder_ / "gap/000002.tif");
   refused("jet gap" + rest + " -o out", "2");
+  EXPECT_FALSE(fs::exists(folder_ / "out"));
   fs::copy(folder_ / "slices/layers", folder_ / "cut", fs::copy_options::recursive);
   fs::resize_file(folder_ / "cut/000004.tif", 60);
   refused("jet cut" + rest + " -o out", "000004.tif");
@@ -125,7 +127,6 @@ TEST_F(ImageParts, ThatAreNoGoodAreOneLineEach) {
   refused("jet size" + rest + " -o out", "000001.tif");
   fs::create_directory(folder_ / "empty");
   refused("jet empty" + rest + " -o out", "empty");
-  EXPECT_FALSE(fs::exists(folder_ / "out"));
 }
 
 }  // namespace

@@ -34,8 +34,7 @@ TEST(Levels, OfEachLayerComeFromThePlan) {
     volume += report.volume_mm3;
     EXPECT_EQ(image.view().rows(), plan->images->grid.rows());
     // Twenty by thirty voxels: full ones have level 3, those of half a layer round(1.5) = 2.
-    if (i < 2) EXPECT_EQ(sum_of_levels(image), 20u * 30u * 3u);
-    if (i == 2) EXPECT_EQ(sum_of_levels(image), 20u * 30u * 2u);
+    EXPECT_EQ(sum_of_levels(image), 20u * 30u * (i < 2 ? 3u : i == 2 ? 2u : 0u));
   }
   EXPECT_NEAR(volume, 2 * 3 * 0.25, 1e-9);
 }
