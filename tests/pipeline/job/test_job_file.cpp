@@ -87,6 +87,13 @@ Job unusual_job(const Directory& directory) {
   part.fill = changes_of("{ gap_mm = 0.1, walls = 2 }");
   part.material = "316L";
   part.material_ranges = {{2, 4.5, "bronze"}};
+  part.images = {.dpi = {{300, 150}},
+                 .layer_mm = 0.125,
+                 .threshold = 77,
+                 .invert = true,
+                 .missing_empty = true,
+                 .crop = true,
+                 .resample = true};
   job.parts = {part, PartRequest{.path = directory / "second.stl"}};
   return job;
 }
