@@ -23,6 +23,9 @@ std::uint32_t per_metre(double dpi) { return static_cast<std::uint32_t>(std::lro
 class BmpEncoder : public ImageEncoder {
  public:
   Status encode(const RunsView& runs, double dpi_x, double dpi_y, Bytes& file) override {
+    if (runs.columns == 0 || runs.rows() == 0 || runs.columns > kMostPixelsASide || runs.rows() > kMostPixelsASide) {
+      return Error{Fault::kOutput, fmt::format("bmp holds no {} x {} pixels", runs.columns, runs.rows())};
+    }
     const std::size_t used = row_bytes(runs.columns), stride = (used + 3) / 4 * 4;
     const std::uint64_t size = kHeadBytes + std::uint64_t{stride} * runs.rows();
     if (size > UINT32_MAX) {
