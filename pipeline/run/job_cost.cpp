@@ -5,6 +5,7 @@
 
 #include "pipeline/run/sanity.h"
 #include "stages/cost/told.h"
+#include "stages/write/manifest/manifest.h"
 
 namespace lamina::pipeline {
 
