@@ -11,6 +11,49 @@
 
 namespace lamina::pipeline {
 
+namespace {
+
+/// errors  kUsage: a bleed that shrinks along one axis and grows along the other; a part's dose without the job's
+Status check_dose(const Job& job) {
+  const DoseRequest& dose = job.dose;
+  const auto check_signs = [](std::string_view key, const std::optional<std::array<double, 2>>& um) -> Status {
+    if (!um || (*um)[0] * (*um)[1] >= 0) return {};
+    return Error{Fault::kUsage,
+                 fmt::format("{}: an edge moves inwards along both axes, or outwards (negative) along both; give two numbers "
+                             "of one sign",
+                             key)};
+  };
+  for (const auto& [key, um] : {std::pair{"dose.bleed_um", std::optional(dose.bleed_um)},
+                                {"dose.hole_bleed_um", dose.hole_bleed_um},
+                                {"dose.first_bleed_um", dose.first_bleed_um}}) {
+    if (Status status = check_signs(key, um); !status) return status;
+  }
+  for (const PartRequest& part : job.parts) {
+    if (Status status = check_signs("part.bleed_um", part.bleed_um); !status) return status;
+    if (Status status = check_signs("part.hole_bleed_um", part.hole_bleed_um); !status) return status;
+    if (part.core_saturation_percent && !part.saturation_percent)
+      return Error{Fault::kUsage, "part.core_saturation_percent: changes a part.saturation_percent that is missing; add it"};
+    if (part.core_saturation_percent && dose.shell_mm == 0)
+      return Error{Fault::kUsage, "part.core_saturation_percent: is of what lies inside of a shell; add --shell"};
+    if (part.saturation_percent && !dose.saturation_percent)
+      return Error{Fault::kUsage, "part.saturation_percent: changes a saturation that is not asked for; add --saturation"};
+  }
+  return {};
+}
+
+}  // namespace
+
+std::vector<std::array<double, 2>> bleeds_of(const Job& job) {
+  std::vector<std::array<double, 2>> all{job.dose.bleed_um};
+  const auto add = [&](const std::optional<std::array<double, 2>>& um) {
+    if (um) all.push_back(*um);
+  };
+  add(job.dose.hole_bleed_um);
+  add(job.dose.first_bleed_um);
+  for (const PartRequest& part : job.parts) add(part.bleed_um), add(part.hole_bleed_um);
+  return all;
+}
+
 Status check_job(const Job& job) {
   if (job.parts.empty()) return Error{Fault::kUsage, "no part to plan; name one or more STL, OBJ or 3MF files"};
   for (const JobKey& key : job_keys()) {
@@ -35,6 +78,7 @@ Status check_job(const Job& job) {
   if (dose.core_saturation_percent && dose.shell_mm == 0) {
     return Error{Fault::kUsage, "dose.core_saturation_percent: is of what lies inside of a shell; add --shell"};
   }
+  if (Status status = check_dose(job); !status) return status;
   if (dose.saturation_percent && dose.core < 1) {
     return Error{Fault::kUsage, "dose.core: a share of the pixels and --saturation exclude each other; use --core-saturation"};
   }

@@ -56,6 +56,9 @@ struct PartRequest {
   std::string material = {};                        // name of its powder; set for all parts or for none
   std::vector<MaterialRange> material_ranges = {};  // other materials between heights above its bottom
   PartImages images = {};                           // of a part that is images
+  // --- instead of the job's
+  std::optional<std::array<double, 2>> bleed_um = {}, hole_bleed_um = {};
+  std::optional<double> saturation_percent = {}, core_saturation_percent = {};  // at all heights
 };
 
 enum class Engine { kRays, kContours, kBoth };
@@ -115,7 +118,10 @@ struct SaturationRange {
 
 /// Section [dose]: the distribution of binder (stages/dose/).
 struct DoseRequest {
-  std::array<double, 2> bleed_um{0, 0};           // along x and y: pixels closer to the edge are cleared
+  std::array<double, 2> bleed_um{0, 0};  // along x and y: pixels closer to the edge are cleared; negative: are set outside
+  std::optional<std::array<double, 2>> hole_bleed_um;   // of the edges of holes; absent: as bleed_um
+  std::optional<std::array<double, 2>> first_bleed_um;  // of all edges of the first layers; absent: as in the others
+  std::uint32_t first_layers = 1;
   double shell_mm = 0;                            // pixels stay set to this depth; only with a core below 1 or beads
   double core = 1;                                // fraction of the pixels inside the shell that stay set
   std::optional<double> saturation_percent;       // of the voids; absent: one drop a pixel
@@ -179,6 +185,9 @@ Status check_job(const Job& job);
 
 /// The job's slice.tolerance_um; if absent 10 for toolpaths, whose planners look ahead over a few dozen moves, else 0.
 double tolerance_um_of(const Job& job, Product product);
+
+/// Every bleed that a job or a part of it states.
+std::vector<std::array<double, 2>> bleeds_of(const Job& job);
 
 /// Sets the materials of the parts: "steel" for all, or "steel,bronze" one per part in order.
 /// errors  kUsage: wrong number of names, or an invalid name

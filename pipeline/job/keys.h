@@ -52,6 +52,7 @@ std::string fill_changes_text(const FillChanges& changes);
 std::string read_material_ranges(const TomlValue& list, std::vector<MaterialRange>& ranges, Place& at);
 std::string material_ranges_text(const std::vector<MaterialRange>& ranges);
 
+inline constexpr Limits kBleedUm{-10'000, 10'000, " um", true};
 inline constexpr Limits kSaturationPercent{0, 10'000, " %"};
 /// Reads an array of tables { from_mm, to_mm, saturation_percent }. returns "" or an error message; at  its place
 std::string read_saturation_ranges(const TomlValue& list, std::vector<SaturationRange>& ranges, Place& at);

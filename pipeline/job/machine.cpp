@@ -39,9 +39,20 @@ const JobKey kMachineKeys[] = {
 
 const JobKey kDoseKeys[] = {
     field<&Job::dose, &DoseRequest::bleed_um>(
-        {"dose", "bleed_um", "--bleed", "UM|XxY", "leave out pixels nearer to the edge than binder spreads, along x and y",
+        {"dose", "bleed_um", "--bleed", "UM|XxY",
+         "leave out pixels nearer to the edge than binder spreads, along x and y; negative: set as far beyond it",
          decides::images},
-        {0, 10'000, " um", true}),
+        kBleedUm),
+    field<&Job::dose, &DoseRequest::hole_bleed_um>({"dose", "hole_bleed_um", "--hole-bleed", "UM|XxY",
+                                                    "the same at the edges of holes, if it differs there", decides::images},
+                                                   kBleedUm),
+    field<&Job::dose, &DoseRequest::first_bleed_um>(
+        {"dose", "first_bleed_um", "--first-bleed", "UM|XxY", "the same at all edges of the first layers, if it differs there",
+         decides::images},
+        kBleedUm),
+    field<&Job::dose, &DoseRequest::first_layers>(
+        {"dose", "first_layers", "--first-layers", "N", "that --first-bleed is of", decides::images}, {1, 1'000'000})
+        .shown_if([](const Job& job) { return job.dose.first_layers != DoseRequest().first_layers; }),
     field<&Job::dose, &DoseRequest::shell_mm>(
         {"dose", "shell_mm", "--shell", "MM",
          "depth below the edge of a layer that gets all its binder (with --core or --fill)", decides::images},

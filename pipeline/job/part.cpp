@@ -85,6 +85,18 @@ const PartKey kPartKeys[] = {
     field<&PartRequest::images, &PartImages::resample>(
         {"part", "resample", "", "", "images of another dpi than the job's are brought to it", decides::images})
         .shown_if([](const PartRequest& part) { return part.images.resample; }),
+    field<&PartRequest::bleed_um>(
+        {"part", "bleed_um", "", "UM|XxY", "of this part, instead of dose.bleed_um and dose.hole_bleed_um", decides::images},
+        kBleedUm),
+    field<&PartRequest::hole_bleed_um>(
+        {"part", "hole_bleed_um", "", "UM|XxY", "of this part's holes, if it differs there", decides::images}, kBleedUm),
+    field<&PartRequest::saturation_percent>(
+        {"part", "saturation_percent", "", "PERCENT",
+         "of this part at all heights, instead of dose.saturation_percent and its ranges", decides::images},
+        kSaturationPercent),
+    field<&PartRequest::core_saturation_percent>(
+        {"part", "core_saturation_percent", "", "PERCENT", "the same inside of its shell; absent: as in it", decides::images},
+        kSaturationPercent),
 };
 
 }  // namespace

@@ -3,9 +3,11 @@
 
 #include <functional>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "pipeline/job/job.h"
+#include "pipeline/plan/dose_zones.h"
 #include "stages/data/grid.h"
 #include "stages/data/layer.h"
 #include "stages/data/levels.h"
@@ -16,6 +18,7 @@
 #include "stages/dose/dither.h"
 #include "stages/dose/erode.h"
 #include "stages/dose/wish.h"
+#include "stages/dose/zones.h"
 
 namespace lamina::pipeline {
 
@@ -23,6 +26,8 @@ namespace lamina::pipeline {
 struct DropWork {
   Levels zones, levels;
   dose::DitherScratch dither;
+  std::vector<Runs> shells;  // shell and core of each zone, where there are several
+  std::vector<dose::ZonePiece> pieces;
   std::vector<Runs> planes;  // the pixels with at least one drop, two, ...: as many as the job has
   std::uint64_t bytes() const;
 };
@@ -44,22 +49,32 @@ class DosePlan {
   /// What binder gives and was asked to give, for the summary; absent without a machine that says how large its drops are.
   const std::optional<dose::Budget>& budget() const { return budget_; }
 
-  bool bleeds() const { return !bleed_.half_width.empty(); }
+  /// What parts get; the bleed of layers.
+  const DoseZones& zones() const { return zones_; }
+  bool bleeds() const { return zones_.bleeds(); }
 
-  /// Removes the bleed from an image. `second` is scratch.
-  void remove_bleed(Runs& image, Runs& second) const;
   /// Thins the core of an image without bleed. `second` and `third` are scratch.
   void thin(std::uint32_t layer, Runs& image, Runs& second, Runs& third) const;
 
   /// The drops of a layer in place of its image, which becomes that of the first drop. `second` is scratch.
+  /// zone     the image of each zone, where there are several
   /// returns  the drops that were asked for
-  std::uint64_t saturate(const Layer& layer, Runs& image, Runs& second, DropWork& work) const;
+  std::uint64_t saturate(const Layer& layer, Runs& image, std::span<const Runs> zone, Runs& second, DropWork& work) const;
 
+  /// Upper bound of the changes of edges that moved.
+  std::uint64_t edges_bound(std::uint64_t changes) const {
+    return zones_.grows() ? changes * (2 * std::uint64_t{zones_.most_rows()} + 1) : changes;
+  }
   /// Upper bound of an image's changes after both, given those before and the most pixels that its parts cover.
   std::uint64_t changes_bound(std::uint64_t changes, std::uint64_t covered) const;
 
  private:
-  dose::Reach bleed_, shell_;
+  /// The levels of zones and their doses; returns the drops that were asked for.
+  std::uint64_t mark_zones(const Layer& layer, const Runs& image, std::span<const Runs> zone, Runs& core, DropWork& work,
+                           std::vector<dose::Drops24>& drops) const;
+
+  DoseZones zones_;
+  dose::Reach shell_;
   double core_;
   PixelGrid grid_;
   dose::Wishes wishes_;

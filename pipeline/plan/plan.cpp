@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <future>
+#include <set>
 
 #include "pipeline/job/heights.h"
 #include "pipeline/machine/extruder.h"
@@ -112,6 +113,13 @@ class Planner {
     auto scene = load_scene(job(), plan_.bed, blocks, images() ? &printer_.grid : nullptr);
     if (!scene) return scene.error();
     plan_.scene = std::make_unique<Scene>(std::move(*scene));
+    for (const PlacedImages& images : plan_.scene->images) {
+      // Their manifest may put them higher than the job.
+      const std::int64_t by = images.bottom - nm_of(job().parts[images.part].bottom_mm);
+      if (materials_.part.empty() || raised_.contains(images.part)) continue;
+      raised_.insert(images.part);
+      for (PartMaterial::Range& range : materials_.part[images.part].ranges) range.from += by, range.to += by;
+    }
     plan_.triangles = 0;
     for (const Instance& instance : plan_.scene->instances) {
       plan_.triangles += triangle_count(plan_.scene->meshes[instance.mesh]);
@@ -222,6 +230,32 @@ class Planner {
     return {};
   }
 
+  /// errors  kUsage: what doses of parts exclude, and edges that grow beyond the bed
+  Status check_zones(const DoseZones& zones) {
+    constexpr std::uint32_t kMostZones = 100;
+    if (zones.count() > kMostZones) {
+      return usage(
+          fmt::format("part.bleed_um, part.saturation_percent: the parts have {} different doses, at most {} are "
+                      "planned together; plan them as several jobs",
+                      zones.count(), kMostZones));
+    }
+    if (!zones.grows()) return {};
+    if (materials_.several())
+      return usage("dose.bleed_um: edges that grow have no material where there are several; plan them as several jobs");
+    for (std::size_t i = 0; i < plan_.scene->instances.size(); ++i) {
+      const std::uint32_t part = plan_.scene->part_of_instance[i];
+      const Box box = box_of(*plan_.scene, plan_.scene->instances[i]);
+      const auto [by_x, by_y] = zones.grows_nm(zones.of_part(part));
+      const PixelGrid& grid = printer_.grid;
+      const std::int64_t beyond =
+          std::max({by_x - box.lo.x, box.hi.x + by_x - grid.x.length, by_y - box.lo.y, box.hi.y + by_y - grid.y.length});
+      if (beyond <= 0) continue;
+      return usage(fmt::format("dose.bleed_um: edges of {} grow {:.3f} mm beyond the bed; move it away from its edge",
+                               one_line(plan_.scene->parts[part].path), mm(beyond)));
+    }
+    return {};
+  }
+
   Status index_images() {
     if (!images()) return {};
     const PixelGrid grid = printer_.grid;
@@ -243,12 +277,13 @@ class Planner {
     // The slicer refers to the scene's meshes, the rasterizer takes those it is given.
     std::optional<Scene> copy;
     if (beads_) copy.emplace(*plan_.scene);
-    auto solids = Solids::build(copy ? *copy : *plan_.scene, job(), grid, materials_);
+    DosePlan dose(job(), grid);
+    if (Status status = check_zones(dose.zones()); !status) return status;
+    auto solids = Solids::build(copy ? *copy : *plan_.scene, job(), grid, materials_, dose.zones());
     if (!solids) return solids.error();
     std::optional<Beads> beads;
     if (beads_) beads.emplace(job(), grid, *plan_.sections, *plan_.segments);
     const double bed = static_cast<double>(grid.columns()) * grid.rows();
-    DosePlan dose(job(), grid);
     const auto layer = [this](std::uint32_t i) { return plan_.layer(i); };
     if (Status status = dose.decide(job(), machine(), plan_.layer_count, layer, plan_.warnings); !status) return status;
     if (dose.most_drops() > 1 && materials_.several()) {
@@ -295,6 +330,7 @@ class Planner {
   Plan plan_;
   PowderPrinter printer_;  // of images, until they are indexed
   Materials materials_;
+  std::set<std::uint32_t> raised_;  // parts that are images, whose materials are counted from where they begin
   std::vector<FillPlan> fillings_;
   LayerSchedule schedule_;
   bool beads_ = false;  // fill the parts of an image

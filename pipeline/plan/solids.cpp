@@ -14,7 +14,7 @@ bool overlap(const Box& a, const Box& b) {
 
 /// The number of stacked solids of other materials below each part, which gives the order of overwriting. Computed from
 /// the boxes of all copies of a part, so it may be too large.
-std::vector<std::uint32_t> levels_of(const Scene& scene, const Job& job, const Materials& materials) {
+std::vector<std::uint32_t> levels_of(const Scene& scene, const Job& job, const Materials& materials, const DoseZones& zones) {
   std::vector<std::uint32_t> level(job.parts.size(), 0);
   if (std::ranges::none_of(job.parts, [](const PartRequest& part) { return part.at_mm.has_value(); })) return level;
   std::vector<Box> box(job.parts.size());
@@ -26,7 +26,8 @@ std::vector<std::uint32_t> levels_of(const Scene& scene, const Job& job, const M
   }
   for (std::size_t later = 0; later < box.size(); ++later) {
     for (std::size_t earlier = 0; earlier < later; ++earlier) {
-      if (materials.part[later] == materials.part[earlier] || !overlap(box[later], box[earlier])) continue;
+      const bool same = materials.part[later] == materials.part[earlier] && zones.of_part(later) == zones.of_part(earlier);
+      if (same || !overlap(box[later], box[earlier])) continue;
       level[later] = std::max(level[later], level[earlier] + 1);
     }
   }
@@ -36,6 +37,7 @@ std::vector<std::uint32_t> levels_of(const Scene& scene, const Job& job, const M
 struct Group {
   std::uint32_t level;
   PartMaterial material;
+  std::uint32_t zone;
   std::vector<Mesh> meshes;
   std::vector<Instance> instances;
   std::vector<std::uint32_t> instance;
@@ -43,17 +45,18 @@ struct Group {
 };
 
 /// Moves meshes into the groups; two that use the same share its blocks.
-std::vector<Group> groups_of(Scene& scene, const Job& job, const Materials& materials) {
-  const std::vector<std::uint32_t> level = levels_of(scene, job, materials);
+std::vector<Group> groups_of(Scene& scene, const Job& job, const Materials& materials, const DoseZones& zones) {
+  const std::vector<std::uint32_t> level = levels_of(scene, job, materials, zones);
   std::vector<Group> groups;
   std::vector<std::uint32_t> home(scene.meshes.size(), UINT32_MAX);
   for (std::uint32_t i = 0; i < scene.instances.size(); ++i) {
     const std::uint32_t part = scene.part_of_instance[i], mesh = scene.instances[i].mesh;
-    const auto found = std::ranges::find_if(
-        groups, [&](const Group& group) { return group.level == level[part] && group.material == materials.part[part]; });
+    const auto found = std::ranges::find_if(groups, [&](const Group& group) {
+      return group.level == level[part] && group.material == materials.part[part] && group.zone == zones.of_part(part);
+    });
     const auto number = static_cast<std::uint32_t>(found - groups.begin());
     if (found == groups.end()) {
-      groups.push_back({level[part], materials.part[part], {}, {}, {}, {}});
+      groups.push_back({level[part], materials.part[part], zones.of_part(part), {}, {}, {}, {}});
       groups.back().own_mesh.assign(scene.meshes.size(), UINT32_MAX);
     }
     Group& group = groups[number];
@@ -75,7 +78,8 @@ std::vector<Group> groups_of(Scene& scene, const Job& job, const Materials& mate
 
 }  // namespace
 
-Result<Solids> Solids::build(Scene& scene, const Job& job, const PixelGrid& grid, const Materials& materials) {
+Result<Solids> Solids::build(Scene& scene, const Job& job, const PixelGrid& grid, const Materials& materials,
+                             const DoseZones& zones) {
   Solids result;
   const bool rays = job.engine != Engine::kContours, contours = job.engine != Engine::kRays;
   if (job.levels > 0 && !scene.images.empty()) {
@@ -85,7 +89,7 @@ Result<Solids> Solids::build(Scene& scene, const Job& job, const PixelGrid& grid
   if (job.levels > 0 && materials.several()) {
     return Error{Fault::kUsage, "shares of voxels are those of one material; give all parts the same, or ask for no levels"};
   }
-  const auto add = [&](std::span<Mesh> meshes, std::span<const Instance> instances, PartMaterial material,
+  const auto add = [&](std::span<Mesh> meshes, std::span<const Instance> instances, PartMaterial material, std::uint32_t zone,
                        std::vector<std::uint32_t> instance) -> Status {
     std::optional<cover::Coverage> coverage;
     if (job.levels > 0) {
@@ -95,7 +99,7 @@ Result<Solids> Solids::build(Scene& scene, const Job& job, const PixelGrid& grid
     }
     auto built = raster::Rasterizer::build(meshes, instances, grid, job.fill_rule, rays, contours, job.isa);
     if (!built) return built.error();
-    result.solids_.push_back({std::move(material), std::move(*built), std::move(instance), std::move(coverage)});
+    result.solids_.push_back({std::move(material), zone, std::move(*built), std::move(instance), std::move(coverage)});
     return {};
   };
   // Made here, so that a mesh in two groups is there once.
@@ -104,12 +108,13 @@ Result<Solids> Solids::build(Scene& scene, const Job& job, const PixelGrid& grid
     result.mesh_bytes_ += blocks[i]->bytes();
     scene.meshes[i].blocks = std::move(blocks[i]);
   }
-  if (!materials.several()) {
-    if (Status status = add(scene.meshes, scene.instances, {}, {}); !status) return status.error();
+  if (!materials.several() && !zones.several()) {
+    if (Status status = add(scene.meshes, scene.instances, {}, 0, {}); !status) return status.error();
     return result;
   }
-  for (Group& group : groups_of(scene, job, materials)) {
-    if (Status status = add(group.meshes, group.instances, std::move(group.material), std::move(group.instance)); !status) {
+  for (Group& group : groups_of(scene, job, materials, zones)) {
+    if (Status status = add(group.meshes, group.instances, std::move(group.material), group.zone, std::move(group.instance));
+        !status) {
       return status.error();
     }
   }

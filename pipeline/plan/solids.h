@@ -8,6 +8,7 @@
 
 #include "pipeline/job/job.h"
 #include "pipeline/machine/materials.h"
+#include "pipeline/plan/dose_zones.h"
 #include "pipeline/plan/scene.h"
 #include "stages/coverage/coverage.h"
 #include "stages/data/grid.h"
@@ -19,19 +20,21 @@ namespace lamina::pipeline {
 /// Instances to which the fill rule applies together.
 struct Solid {
   PartMaterial material;
+  std::uint32_t zone = 0;  // of DoseZones
   raster::Rasterizer rasterizer;
   std::vector<std::uint32_t> instance;      // scene index of each of its instances; empty: all in order
   std::optional<cover::Coverage> coverage;  // if the job asks for shares of voxels
 };
 
-/// All solids of a scene. A scene of one material is one solid. Otherwise parts with the same materials at all heights
-/// form one solid, unless a part covers an earlier one of another material: later solids overwrite earlier ones, so the
-/// later part of the job wins where different materials overlap.
+/// All solids of a scene. A scene of one material and one dose is one solid. Otherwise parts with the same materials at all
+/// heights and the same dose form one solid, unless a part covers an earlier one of another material or dose: later solids
+/// overwrite earlier ones, so the later part of the job wins where different materials overlap.
 class Solids {
  public:
   /// Moves the triangles out of the scene's meshes.
   /// errors  of Rasterizer::build and Coverage::build; kUsage: shares of voxels of several materials
-  static Result<Solids> build(Scene& scene, const Job& job, const PixelGrid& grid, const Materials& materials);
+  static Result<Solids> build(Scene& scene, const Job& job, const PixelGrid& grid, const Materials& materials,
+                              const DoseZones& zones);
 
   std::span<const Solid> all() const { return solids_; }
 

@@ -83,7 +83,7 @@ class ImageMaker : public Maker {
       });
     }
     add("dose", [this](const Layer& layer, Work& work, Made& made) {
-      imager_.bleed(work.images);
+      if (Status status = imager_.bleed(layer, work.images); !status) return status;
       if (plan_.images->dose.bleeds()) sanity_.add_left(layer, work.images.runs);
       imager_.dose(layer, work.images, made.record);
       if (cost_) cost_->count(work.images.runs, made.record);

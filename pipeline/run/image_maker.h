@@ -27,6 +27,8 @@ struct ImageWork {
   Runs section;          // of one solid of a layer with several materials
   DropWork drops;        // if a saturation is asked for
   raster::MaterialImages materials;
+  raster::MaterialImages zones;  // of parts with doses of their own
+  BleedWork bleed;
   std::unique_ptr<BeadWork> beads;  // if beads fill parts
 
   /// Capacity of its buffers.
@@ -53,8 +55,8 @@ class LayerImager {
   Status contours(const Layer& layer, ImageWork& work) const;
   Status fill(const Layer& layer, ImageWork& work) const;
   Status beads(const Layer& layer, ImageWork& work, ImageNotes& notes) const;
-  /// Mirrors the image and removes its bleed.
-  void bleed(ImageWork& work) const;
+  /// Mirrors the image and removes its bleed. errors  kUsage: it would grow beyond the bed
+  Status bleed(const Layer& layer, ImageWork& work) const;
   /// Thins the core and counts the remaining pixels.
   void dose(const Layer& layer, ImageWork& work, LayerRecord& record) const;
   /// Runs all steps.
@@ -76,6 +78,7 @@ class LayerImager {
   raster::LayerReport section(const Solid& solid, raster::Engine engine, const Layer& layer, ImageWork& work,
                               Runs& image) const;
   void mirror(Runs& image, Runs& scratch) const;
+  Status check_grown(const Layer& layer, const ImageWork& work) const;
   std::uint64_t bytes_of_section(Nm plane, std::uint64_t changes) const;
   std::uint64_t changes_of_images(Nm plane) const;
   std::uint64_t changes_of_section(Nm plane, std::uint64_t bead_changes) const;

@@ -41,7 +41,8 @@ void add(const raster::LayerReport& solid, raster::LayerReport& all) {
 }  // namespace
 
 std::uint64_t ImageWork::bytes() const {
-  std::uint64_t total = scratch.bytes() + materials.bytes() + drops.bytes() + (beads ? beads->bytes() : 0);
+  std::uint64_t total =
+      scratch.bytes() + materials.bytes() + zones.bytes() + bleed.bytes() + drops.bytes() + (beads ? beads->bytes() : 0);
   for (const Runs* image : {&runs, &second, &third, &lowest, &highest, &section}) {
     total += bytes_held(image->row_offset) + bytes_held(image->change);
   }
@@ -50,17 +51,19 @@ std::uint64_t ImageWork::bytes() const {
 
 Status LayerImager::raster(const Layer& layer, ImageWork& work, LayerRecord& record, ImageNotes& notes) const {
   const ImagePlan& images = *plan_.images;
-  const bool several = images.materials.several();
-  if (several) {
-    work.materials.start(images.materials.used.size(), images.grid.columns(), images.grid.rows());
+  const bool several = images.materials.several(), zones = images.dose.zones().several();
+  if (zones) work.zones.start(images.dose.zones().count(), images.grid.columns(), images.grid.rows());
+  if (several) work.materials.start(images.materials.used.size(), images.grid.columns(), images.grid.rows());
+  if (several || zones) {
     work.runs.columns = images.grid.columns();
     work.runs.row_offset.assign(std::size_t{images.grid.rows()} + 1, 0);
     work.runs.change.clear();
   }
   for (const Solid& solid : images.solids.all()) {
-    Runs& image = several ? work.section : work.runs;
+    Runs& image = several || zones ? work.section : work.runs;
     if (Status status = section_of(solid, layer, work, image, record, notes); !status) return status;
     if (several) work.materials.lay(solid.material.at(plane(layer)), image, work.runs);
+    if (zones) work.zones.lay(solid.zone, image, work.runs);
   }
   return {};
 }
@@ -82,8 +85,12 @@ Status LayerImager::images(const Layer& layer, ImageWork& work) const {
                                plan_.scene->parts[part.part].path, layer.index, mm(outside->place.x), mm(outside->place.y),
                                outside->beyond_mm, images.machine->machine.name)};
     }
+    const DoseZones& zones = images.dose.zones();
+    if (zones.several()) work.zones.lay(zones.of_part(part.part), work.section, work.runs);
     if (images.materials.several()) {
       work.materials.lay(images.materials.part[part.part].at(plane(layer)), work.section, work.runs);
+    } else if (zones.several()) {
+      continue;
     } else if (work.runs.change.empty()) {
       std::swap(work.runs, work.section);
     } else {
@@ -123,20 +130,49 @@ cover::LayerReport LayerImager::levels(const Layer& layer, cover::LayerScratch& 
   return plan_.images->solids.all().front().coverage->layer(layer, scratch, image);
 }
 
-void LayerImager::bleed(ImageWork& work) const {
+Status LayerImager::bleed(const Layer& layer, ImageWork& work) const {
+  const ImagePlan& images = *plan_.images;
+  const DoseZones& zones = images.dose.zones();
   if (plan_.job.mirror != Mirror::kNone) {
     mirror(work.runs, work.second);
     for (Runs& image : work.materials.image) mirror(image, work.second);
+    for (Runs& image : work.zones.image) mirror(image, work.second);
   }
-  plan_.images->dose.remove_bleed(work.runs, work.second);
+  if (!zones.bleeds()) return {};
+  if (zones.several() && images.beads) work.zones.keep(work.runs);
+  for (std::uint32_t zone = 0; zone < zones.count(); ++zone) {
+    const RunsView own = zones.several() ? work.zones.image[zone].view() : work.runs.view();
+    const Bleed& bleed = zones.bleed(zone, layer);
+    if (!bleed.outside.grows || !dose::grows_beyond(own, bleed.outside.reach)) continue;
+    return Error{Fault::kUsage,
+                 fmt::format("dose.bleed_um: in layer {} (z {:.3f} mm) edges would grow beyond the bed; move the "
+                             "parts away from its edge",
+                             layer.index, mm(layer.plane()))};
+  }
+  zones.remove_bleed(layer, work.runs, work.zones.image, work.bleed);
+  return check_grown(layer, work);
+}
+
+/// Parts stay on a bed that is not a rectangle as far as they were checked; what grew does too.
+Status LayerImager::check_grown(const Layer& layer, const ImageWork& work) const {
+  const ImagePlan& images = *plan_.images;
+  if (!images.machine || !images.dose.zones().grows()) return {};
+  const auto outside = program::first_outside(images.machine->machine, images.grid, work.runs);
+  if (!outside) return {};
+  return Error{
+      Fault::kUsage,
+      fmt::format("dose.bleed_um: layer {} grows to x {:.3f}, y {:.3f} mm, {:.3f} mm outside of the bed "
+                  "of {}; move the parts away from its edge",
+                  layer.index, mm(outside->place.x), mm(outside->place.y), outside->beyond_mm, images.machine->machine.name)};
 }
 
 void LayerImager::dose(const Layer& layer, ImageWork& work, LayerRecord& record) const {
   const ImagePlan& images = *plan_.images;
+  if (images.dose.zones().several() && images.beads) work.zones.keep(work.runs);
   images.dose.thin(layer.index, work.runs, work.second, work.third);
   if (images.dose.saturates()) {
     record.dosed_pixels = set_pixels(work.runs);
-    record.asked_drops = images.dose.saturate(layer, work.runs, work.second, work.drops);
+    record.asked_drops = images.dose.saturate(layer, work.runs, work.zones.image, work.second, work.drops);
     record.drops = sum_of_levels(work.drops.levels);
   }
   if (images.materials.several() && (images.beads || images.dose.any())) work.materials.keep(work.runs);
@@ -156,7 +192,7 @@ Status LayerImager::make(const Layer& layer, ImageWork& work, LayerRecord& recor
     if (Status status = fill(layer, work); !status) return status;
     if (Status status = beads(layer, work, notes); !status) return status;
   }
-  bleed(work);
+  if (Status status = bleed(layer, work); !status) return status;
   dose(layer, work, record);
   return {};
 }
@@ -232,10 +268,14 @@ std::uint64_t LayerImager::bytes_of_section(Nm plane, std::uint64_t changes) con
   // Images of each material, of all, of one solid, and one intermediate.
   const std::uint64_t materials = images.materials.several() ? images.materials.used.size() : 0;
   const std::uint64_t material_images = materials == 0 ? 0 : (materials + 3) * 2 * (4 * changes + 4 * rows);
+  // Images of each dose, before and after they grow, with shells and cores; the whole before it is moved, and scratch.
+  const std::uint64_t zones = images.dose.zones().several() ? images.dose.zones().count() : 0;
+  const std::uint64_t edges = images.dose.edges_bound(images.solids.crossings_bound(plane) + changes_of_images(plane));
+  const std::uint64_t zone_images = zones == 0 ? 0 : (4 * zones + 6) * 2 * (4 * edges + 4 * rows);
   // Zones and levels, and the image of each drop.
   const std::uint64_t drops = images.dose.saturates() ? 18 * changes + images.dose.most_drops() * 4 * (changes + rows) : 0;
   const std::uint64_t read = plan_.scene->images.empty() ? 0 : 8 * (changes_of_images(plane) + rows);
-  return images.solids.layer_bytes_bound(plane) + read + second_image + material_images + drops;
+  return images.solids.layer_bytes_bound(plane) + read + second_image + material_images + zone_images + drops;
 }
 
 }  // namespace lamina::pipeline

@@ -17,8 +17,10 @@ ReportDoubts::ReportDoubts(const Manifest& manifest, const Job& job, const Scene
   }
   std::vector<sanity::Solid> solids = solids_from_above(scene != nullptr ? *scene : boxes);
   // Beads and doses change the volume on purpose.
-  const bool whole =
-      !fills(job) && job.dose.core == 1 && !job.dose.saturation_percent && job.dose.bleed_um == std::array{0.0, 0.0};
+  const bool whole = !fills(job) && job.dose.core == 1 && !job.dose.saturation_percent &&
+                     std::ranges::all_of(bleeds_of(job), [](const std::array<double, 2>& um) {
+                       return um == std::array{0.0, 0.0};
+                     });
   for (sanity::Solid& solid : solids) solid.closed = solid.closed && whole && scene != nullptr;
   tally_ = std::make_unique<sanity::Tally>(std::move(solids));
   std::vector<Nm> planes;

@@ -12,7 +12,7 @@ namespace {
 
 void add(const Layer& layer, double asked, double gets, std::vector<LayerSpan>& spans) {
   const std::int64_t top = std::int64_t{layer.bottom} + layer.thickness;
-  if (!spans.empty() && spans.back().last == layer.index) {
+  if (!spans.empty() && (spans.back().last == layer.index || spans.back().last == layer.index + 1)) {
     spans.back().last = layer.index + 1;
     spans.back().to_nm = top;
     return;
@@ -37,12 +37,12 @@ Budget::Budget(const Binder& binder, const PixelGrid& grid, std::optional<Wishes
                double least_percent)
     : binder_(binder), grid_(grid), wishes_(std::move(wishes)), limit_(most_drops), least_percent_(least_percent) {}
 
-const LayerDose& Budget::dose(const Layer& layer) {
-  const auto [found, fresh] = known_.try_emplace({wishes_ ? wishes_->place_of(layer) : 0, layer.thickness});
+const LayerDose& Budget::dose(const Layer& layer, std::uint32_t zone) {
+  const auto [found, fresh] = known_.try_emplace({wishes_ ? wishes_->place_of(layer, zone) : 0, layer.thickness});
   if (!fresh) return found->second;
   LayerDose& dose = found->second;
   if (wishes_) {
-    dose = dose_of(layer, *wishes_, binder_, grid_, limit_);
+    dose = dose_of(layer, *wishes_, binder_, grid_, limit_, zone);
   } else {
     dose.shell = dose.core = dose.asked_shell = dose.asked_inside = kOneDrop;
     dose.gets = dose.gets_core = dose.asked = dose.asked_core = saturation_of(1, binder_, grid_, layer.thickness);
@@ -51,12 +51,15 @@ const LayerDose& Budget::dose(const Layer& layer) {
 }
 
 void Budget::foresee(const Layer& layer) {
-  const LayerDose& of = dose(layer);
-  most_drops_ = std::max(most_drops_, of.most());
-  const double least = std::min(of.gets, of.gets_core), most = std::max(of.gets, of.gets_core);
-  gets_ = layers_++ == 0 ? std::pair(least, most) : std::pair(std::min(gets_.first, least), std::max(gets_.second, most));
-  if (of.cut) add(layer, std::max(of.asked, of.asked_core), most, cut_);
-  if (least < least_percent_ * (1 - 1e-6)) add(layer, std::min(of.asked, of.asked_core), least, unbound_);
+  for (std::uint32_t zone = 0; zone < (wishes_ ? wishes_->zones() : 1); ++zone) {
+    const LayerDose& of = dose(layer, zone);
+    most_drops_ = std::max(most_drops_, of.most());
+    const double least = std::min(of.gets, of.gets_core), most = std::max(of.gets, of.gets_core);
+    gets_ = seen_ ? std::pair(std::min(gets_.first, least), std::max(gets_.second, most)) : std::pair(least, most);
+    seen_ = true;
+    if (of.cut) add(layer, std::max(of.asked, of.asked_core), most, cut_);
+    if (least < least_percent_ * (1 - 1e-6)) add(layer, std::min(of.asked, of.asked_core), least, unbound_);
+  }
 }
 
 Status Budget::judge(bool allow_unbound, std::vector<Warning>& warnings) const {
@@ -78,8 +81,9 @@ Status Budget::judge(bool allow_unbound, std::vector<Warning>& warnings) const {
   return {};
 }
 
-std::uint64_t Budget::asked_drops(const Layer& layer, std::uint64_t shell_pixels, std::uint64_t core_pixels) const {
-  const auto found = known_.find({wishes_ ? wishes_->place_of(layer) : 0, layer.thickness});
+std::uint64_t Budget::asked_drops(const Layer& layer, std::uint64_t shell_pixels, std::uint64_t core_pixels,
+                                  std::uint32_t zone) const {
+  const auto found = known_.find({wishes_ ? wishes_->place_of(layer, zone) : 0, layer.thickness});
   if (found == known_.end()) return 0;
   const auto sum = static_cast<unsigned __int128>(found->second.asked_shell) * shell_pixels +
                    static_cast<unsigned __int128>(found->second.asked_inside) * core_pixels;

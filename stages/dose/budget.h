@@ -40,7 +40,8 @@ class Budget {
   Status judge(bool allow_unbound, std::vector<Warning>& warnings) const;
 
   /// Drops that a wish comes to in a layer of so many pixels, rounded; more than there are where the wish is cut.
-  std::uint64_t asked_drops(const Layer& layer, std::uint64_t shell_pixels, std::uint64_t core_pixels) const;
+  std::uint64_t asked_drops(const Layer& layer, std::uint64_t shell_pixels, std::uint64_t core_pixels,
+                            std::uint32_t zone = 0) const;
 
   const Binder& binder() const { return binder_; }
   const PixelGrid& grid() const { return grid_; }
@@ -49,7 +50,7 @@ class Budget {
   std::pair<double, double> gets() const { return gets_; }
 
  private:
-  const LayerDose& dose(const Layer& layer);
+  const LayerDose& dose(const Layer& layer, std::uint32_t zone);
 
   Binder binder_;
   PixelGrid grid_;
@@ -57,7 +58,7 @@ class Budget {
   std::uint32_t limit_, most_drops_ = 0;
   double least_percent_;
   std::pair<double, double> gets_{0, 0};
-  std::uint32_t layers_ = 0;
+  bool seen_ = false;
   std::map<std::pair<std::size_t, Nm>, LayerDose> known_;  // by place of the wish and thickness
   std::vector<LayerSpan> cut_, unbound_;
 };

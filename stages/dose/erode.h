@@ -14,6 +14,7 @@ namespace lamina::dose {
 struct Reach {
   /// Columns on either side in the rows 0, 1, 2, ... above and below; empty if nothing is taken away.
   std::vector<std::uint32_t> half_width;
+  bool operator==(const Reach&) const = default;
 };
 
 /// All offsets (i columns, j rows) with (i px / x)^2 + (j py / y)^2 <= 1, decided in integers; px and py are the pitches in

@@ -15,7 +15,8 @@ double per_cent(Drops24 drops, const Binder& binder, const PixelGrid& grid, std:
 
 }  // namespace
 
-std::size_t Wishes::place_of(const Layer& layer) const {
+std::size_t Wishes::place_of(const Layer& layer, std::uint32_t zone) const {
+  if (zone > 0 && own[zone - 1]) return ranges.size() + zone;
   const Nm plane = layer.plane();
   for (std::size_t place = ranges.size(); place > 0; --place) {
     const WishRange& range = ranges[place - 1];
@@ -25,11 +26,13 @@ std::size_t Wishes::place_of(const Layer& layer) const {
 }
 
 bool Wishes::has_core() const {
-  return differs(all) || std::ranges::any_of(ranges, [](const WishRange& range) { return differs(range.wish); });
+  return differs(all) || std::ranges::any_of(ranges, [](const WishRange& range) { return differs(range.wish); }) ||
+         std::ranges::any_of(own, [](const std::optional<Wish>& wish) { return wish && differs(*wish); });
 }
 
-LayerDose dose_of(const Layer& layer, const Wishes& wishes, const Binder& binder, const PixelGrid& grid, std::uint32_t most) {
-  const Wish& wish = wishes.of(layer);
+LayerDose dose_of(const Layer& layer, const Wishes& wishes, const Binder& binder, const PixelGrid& grid, std::uint32_t most,
+                  std::uint32_t zone) {
+  const Wish& wish = wishes.of(layer, zone);
   LayerDose dose;
   dose.asked = wish.percent;
   dose.asked_core = wish.of_core();

@@ -16,6 +16,7 @@ struct Wish {
   double percent = 0;
   std::optional<double> core_percent;
   double of_core() const { return core_percent.value_or(percent); }
+  bool operator==(const Wish&) const = default;
 };
 
 /// Another wish between two heights above the bed, in mm; the last one that holds a layer's plane counts.
@@ -27,11 +28,14 @@ struct WishRange {
 struct Wishes {
   Wish all;
   std::vector<WishRange> ranges;
+  std::vector<std::optional<Wish>> own = {};  // of zones 1, 2, ...: at all heights; none: as zone 0
 
-  /// For a layer, by its plane: 0 for that of all, 1 for the first range, ...
-  std::size_t place_of(const Layer& layer) const;
-  const Wish& of(const Layer& layer) const {
-    const std::size_t place = place_of(layer);
+  std::uint32_t zones() const { return static_cast<std::uint32_t>(own.size()) + 1; }
+  /// For a layer, by its plane: 0 for that of all, 1 for the first range, ..., behind them those of zones.
+  std::size_t place_of(const Layer& layer, std::uint32_t zone = 0) const;
+  const Wish& of(const Layer& layer, std::uint32_t zone = 0) const {
+    const std::size_t place = place_of(layer, zone);
+    if (place > ranges.size()) return *own[place - ranges.size() - 1];
     return place == 0 ? all : ranges[place - 1].wish;
   }
   /// Whether shell and core differ anywhere.
@@ -51,6 +55,7 @@ struct LayerDose {
 };
 
 /// most  drops a pixel, 1 .. kMostDrops
-LayerDose dose_of(const Layer& layer, const Wishes& wishes, const Binder& binder, const PixelGrid& grid, std::uint32_t most);
+LayerDose dose_of(const Layer& layer, const Wishes& wishes, const Binder& binder, const PixelGrid& grid, std::uint32_t most,
+                  std::uint32_t zone = 0);
 
 }  // namespace lamina::dose

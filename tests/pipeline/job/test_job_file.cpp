@@ -60,6 +60,9 @@ Job unusual_job(const Directory& directory) {
   job.machine.blocked = {{3, 5}};
   job.machine.vat_rule = lamina::VatRule::kFirst;
   job.dose.bleed_um = {20, 30};
+  job.dose.hole_bleed_um = {-15, -15};
+  job.dose.first_bleed_um = {60, 0};
+  job.dose.first_layers = 4;
   job.dose.shell_mm = 0.5;
   job.dose.core = 0.75;
   job.dose.bead_ends = raster::BeadEnds::kSquare;
@@ -94,6 +97,10 @@ Job unusual_job(const Directory& directory) {
                  .missing_empty = true,
                  .crop = true,
                  .resample = true};
+  part.bleed_um = {{-30, -20}};
+  part.hole_bleed_um = {{10, 0}};
+  part.saturation_percent = 55;
+  part.core_saturation_percent = 33.5;
   job.parts = {part, PartRequest{.path = directory / "second.stl"}};
   return job;
 }
