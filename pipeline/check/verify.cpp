@@ -98,6 +98,19 @@ std::string fault_of_image(const Inspection& inspection, const LayerImageFile& f
   return {};
 }
 
+/// Empty, or what the manifest says of a layer's drops that its images do not.
+std::string fault_of_drops(const ManifestHead& head, const LayerRecord& record, const LayerPicture& picture) {
+  if (head.most_drops == 0) return {};
+  std::uint64_t drops = 0;
+  for (const Runs& plane : picture) drops += set_pixels(plane);
+  if (drops != record.drops)
+    return fmt::format("layer {}: its images have {} drops, the manifest says {}", record.layer.index, drops, record.drops);
+  const std::uint64_t first = picture.empty() ? 0 : set_pixels(picture.front());
+  if (first <= record.dosed_pixels) return {};
+  return fmt::format("layer {}: {} pixels get drops, the manifest says that {} are to be filled", record.layer.index, first,
+                     record.dosed_pixels);
+}
+
 std::string fault_of_layer(const Inspection& inspection, const LayerRecord& record, std::optional<replay::Count>& count) {
   if (inspection.head.extension.empty()) return fault_of_program(inspection, record, nullptr, count);  // a format without files
   LayerPicture picture;
@@ -106,6 +119,9 @@ std::string fault_of_layer(const Inspection& inspection, const LayerRecord& reco
     if (!fault.empty()) return fault;
     if (inspection.quick) continue;
     if (std::string what = fault_of_image(inspection, file, picture); !what.empty()) return what;
+  }
+  if (!inspection.quick) {
+    if (std::string what = fault_of_drops(inspection.head, record, picture); !what.empty()) return what;
   }
   return fault_of_program(inspection, record, inspection.quick ? nullptr : &picture, count);
 }

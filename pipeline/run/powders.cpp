@@ -11,11 +11,12 @@ namespace lamina::pipeline {
 namespace {
 
 /// The heights of a part by material, one after the other.
-void add_stretches(const PartMaterial& part, const Box& box, std::vector<sanity::PowderStretch>& stretches) {
-  std::vector<std::int64_t> ends{box.lo.z, box.hi.z};
+void add_stretches(const PartMaterial& part, std::int64_t bottom, std::int64_t top,
+                   std::vector<sanity::PowderStretch>& stretches) {
+  std::vector<std::int64_t> ends{bottom, top};
   for (const PartMaterial::Range& range : part.ranges) {
     for (const std::int64_t end : {range.from, range.to}) {
-      if (end > box.lo.z && end < box.hi.z) ends.push_back(end);
+      if (end > bottom && end < top) ends.push_back(end);
     }
   }
   std::ranges::sort(ends);
@@ -24,13 +25,27 @@ void add_stretches(const PartMaterial& part, const Box& box, std::vector<sanity:
   }
 }
 
+/// How far a section is taken from the plane of its layer: with steps outside of a part, layers hold what begins above it.
+std::int64_t reach_of_layers(const Plan& plan) {
+  if (plan.job.heights.containment == Containment::kAcross) return 0;
+  std::int64_t most = 0;
+  for (std::uint32_t i = plan.range[0]; i < plan.range[1]; ++i) most = std::max<std::int64_t>(most, plan.layer(i).thickness);
+  return most;
+}
+
 /// Layers of the job that can hold several materials.
 std::vector<sanity::LayerRange> layers_in_question(const Plan& plan) {
   const Scene& scene = *plan.scene;
+  const std::int64_t beyond = reach_of_layers(plan);
   std::vector<sanity::PowderStretch> stretches;
   for (std::size_t i = 0; i < scene.instances.size(); ++i) {
     const PartMaterial& part = plan.images->materials.part[scene.part_of_instance[i]];
-    add_stretches(part, box_of(scene, scene.instances[i]), stretches);
+    const Box box = box_of(scene, scene.instances[i]);
+    add_stretches(part, box.lo.z - beyond, box.hi.z + beyond, stretches);
+  }
+  for (const PlacedImages& images : scene.images) {
+    add_stretches(plan.images->materials.part[images.part], images.bottom,
+                  images.bottom + std::int64_t{images.thickness} * images.images->layers(), stretches);
   }
   std::vector<Nm> planes;
   for (std::uint32_t i = plan.range[0]; i < plan.range[1]; ++i)
