@@ -44,6 +44,7 @@ Result<LayerImages> LayerImages::open(const std::string& path, const LayerImages
   stack.first_number_ = files.front().number;
   std::string all = fmt::format("{} {}", request.threshold, request.invert);
   for (Numbered& file : files) {
+    stack.stamps_.push_back(stamp_of(file.path));
     const auto digest = digest_file(file.path);
     if (!digest) return Error{Fault::kInput, digest.error().message};
     const auto places = pages_of(file.path);
@@ -73,6 +74,12 @@ Result<LayerImages> LayerImages::open(const std::string& path, const LayerImages
   return stack;
 }
 
+LayerImages::Stamp LayerImages::stamp_of(const std::string& path) {
+  std::error_code ignored;
+  const std::uintmax_t bytes = fs::file_size(path, ignored);
+  return {bytes, fs::last_write_time(path, ignored).time_since_epoch().count()};
+}
+
 std::string_view LayerImages::file(std::uint32_t layer) const {
   return pages_[layer].file == UINT32_MAX ? std::string_view() : files_[pages_[layer].file];
 }
@@ -87,6 +94,8 @@ Result<Runs> LayerImages::read(std::uint32_t layer) const {
   }
   const std::string& path = files_[page.file];
   auto image = dark_pixels(path, request_.threshold, page.place);
+  if (stamp_of(path) != stamps_[page.file])
+    return Error{Fault::kInput, fmt::format("{}: was changed while the job ran; start again with --overwrite", one_line(path))};
   if (!image) return image.error();
   const std::string where = page.place == 0 ? one_line(path) : fmt::format("{}: page {}", one_line(path), layer);
   if (image->runs.columns != columns_ || image->runs.view().rows() != rows_)

@@ -42,7 +42,8 @@ class LayerImages {
   /// A guess of how many changes a layer has, by the size of its file.
   std::uint64_t expected_changes(std::uint32_t layer) const { return pages_[layer].bytes; }
 
-  /// Decodes one layer. errors  kInput with the file: cannot be read, or is of another size or resolution than the first
+  /// Decodes one layer. errors  kInput with the file: cannot be read, is of another size or resolution than the first,
+  /// or was changed since open()
   Result<Runs> read(std::uint32_t layer) const;
 
  private:
@@ -51,7 +52,16 @@ class LayerImages {
     std::uint64_t place = 0;          // of pages_of()
     std::uint64_t bytes = 0;          // its share of the file
   };
+  /// What tells that a file is another one than when it was hashed.
+  struct Stamp {
+    std::uint64_t bytes = 0;
+    std::int64_t modified = 0;  // of the clock of files
+    bool operator==(const Stamp&) const = default;
+  };
+  static Stamp stamp_of(const std::string& path);
+
   std::vector<std::string> files_;
+  std::vector<Stamp> stamps_;  // of each of them
   std::vector<Page> pages_;
   LayerImagesRequest request_;
   std::uint32_t columns_ = 0, rows_ = 0, missing_ = 0;

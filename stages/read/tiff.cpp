@@ -44,6 +44,10 @@ std::string check_strips(TIFF* tiff, std::uint64_t file_bytes, std::uint16_t com
   return {};
 }
 
+/// Not mapped: a file that becomes shorter while it is read is an error then, and no signal.
+constexpr const char* kMode = "rCm";
+constexpr std::int64_t kMostTiffAlloc = 64 << 20;
+
 }  // namespace
 
 Result<Image> tiff(int file, std::uint64_t bytes, const std::string& path, int threshold, std::uint64_t page) {
@@ -58,8 +62,8 @@ Result<Image> tiff(int file, std::uint64_t bytes, const std::string& path, int t
     if (own_file >= 0) ::close(own_file);
     return failure(message.empty() ? "out of memory or files" : message);
   }
-  TIFFOpenOptionsSetMaxSingleMemAlloc(options.get(), 64 << 20);
-  const TiffHandle handle(TIFFFdOpenExt(own_file, path.c_str(), "rC", options.get()));
+  TIFFOpenOptionsSetMaxSingleMemAlloc(options.get(), kMostTiffAlloc);
+  const TiffHandle handle(TIFFFdOpenExt(own_file, path.c_str(), kMode, options.get()));
   if (handle == nullptr) {
     ::close(own_file);
     return failure(message.empty() ? "no directory" : message);
@@ -128,7 +132,8 @@ Result<std::vector<std::uint64_t>> tiff_pages(int file, const std::string& path)
   std::string message;
   const auto options = strict_tiff_options(message);
   const int own_file = ::dup(file);
-  const TiffHandle handle(options != nullptr && own_file >= 0 ? TIFFFdOpenExt(own_file, path.c_str(), "rC", options.get())
+  if (options != nullptr) TIFFOpenOptionsSetMaxSingleMemAlloc(options.get(), kMostTiffAlloc);
+  const TiffHandle handle(options != nullptr && own_file >= 0 ? TIFFFdOpenExt(own_file, path.c_str(), kMode, options.get())
                                                               : nullptr);
   if (handle == nullptr) {
     if (own_file >= 0) ::close(own_file);
@@ -136,7 +141,9 @@ Result<std::vector<std::uint64_t>> tiff_pages(int file, const std::string& path)
   }
   std::vector<std::uint64_t> pages;
   do {
-    pages.push_back(TIFFCurrentDirOffset(handle.get()));
+    std::uint32_t kind = 0;
+    TIFFGetField(handle.get(), TIFFTAG_SUBFILETYPE, &kind);
+    if ((kind & (FILETYPE_REDUCEDIMAGE | FILETYPE_MASK)) == 0) pages.push_back(TIFFCurrentDirOffset(handle.get()));
   } while (pages.size() <= kMostPages && TIFFReadDirectory(handle.get()) != 0);
   if (!message.empty() || pages.size() > kMostPages) {
     return Error{Fault::kInput, fmt::format("{}: page {}: {}; take a whole file", path, pages.size(),

@@ -3,9 +3,15 @@
 
 #include <gtest/gtest.h>
 
+#include <tiffio.h>
+#include <unistd.h>
+
+#include <chrono>
 #include <filesystem>
 #include <random>
+#include <string>
 
+#include "stages/read/image.h"
 #include "stages/read/placed.h"
 #include "stages/write/file.h"
 #include "stages/write/image_format.h"
@@ -74,6 +80,44 @@ TEST_F(LayerImagesTest, NamesWhatIsMissingOrOfAnotherSize) {
   const auto other = stack->read(2);
   ASSERT_FALSE(other.ok());
   EXPECT_NE(other.error().message.find("9 x 4 pixels, the first image has 8 x 4"), std::string::npos) << other.error().message;
+}
+
+// What is read is what was hashed when the job was planned.
+TEST_F(LayerImagesTest, FilesThatChangeAfterTheyWereLookedAtAreRefused) {
+  save("a1.tif", square(20, 5), "tiff-g4");
+  save("a2.tif", square(20, 5), "tiff-g4");
+  const auto stack = LayerImages::open(folder_.string(), {});
+  ASSERT_TRUE(stack.ok());
+  ASSERT_TRUE(stack->read(1).ok());
+  const auto before = fs::last_write_time(folder_ / "a2.tif");
+  fs::last_write_time(folder_ / "a2.tif", before + std::chrono::seconds(2));
+  const auto changed = stack->read(1);
+  ASSERT_FALSE(changed.ok());
+  EXPECT_NE(changed.error().message.find("was changed while the job ran"), std::string::npos) << changed.error().message;
+  EXPECT_TRUE(stack->read(0).ok());
+  fs::resize_file(folder_ / "a1.tif", fs::file_size(folder_ / "a1.tif") / 2);
+  EXPECT_FALSE(stack->read(0).ok());
+}
+
+// A thumbnail beside a page is no layer.
+TEST_F(LayerImagesTest, ReducedPagesAreNoLayers) {
+  save("a1.tif", square(20, 5), "tiff-g4");
+  const std::string path = (folder_ / "pages.tif").string();
+  fs::rename(folder_ / "a1.tif", path);
+  EXPECT_EQ(read::pages_of(path)->size(), 1u);
+  TIFF* tiff = TIFFOpen(path.c_str(), "a");
+  ASSERT_NE(tiff, nullptr);
+  TIFFSetField(tiff, TIFFTAG_SUBFILETYPE, FILETYPE_REDUCEDIMAGE);
+  TIFFSetField(tiff, TIFFTAG_IMAGEWIDTH, 8);
+  TIFFSetField(tiff, TIFFTAG_IMAGELENGTH, 1);
+  TIFFSetField(tiff, TIFFTAG_BITSPERSAMPLE, 1);
+  TIFFSetField(tiff, TIFFTAG_PHOTOMETRIC, PHOTOMETRIC_MINISWHITE);
+  unsigned char row = 0xff;
+  TIFFWriteScanline(tiff, &row, 0, 0);
+  TIFFClose(tiff);
+  const auto pages = read::pages_of(path);
+  ASSERT_TRUE(pages.ok()) << pages.error().message;
+  EXPECT_EQ(pages->size(), 1u);
 }
 
 TEST_F(LayerImagesTest, InvertedImageIsTheRest) {
