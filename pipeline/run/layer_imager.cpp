@@ -41,7 +41,7 @@ void add(const raster::LayerReport& solid, raster::LayerReport& all) {
 }  // namespace
 
 std::uint64_t ImageWork::bytes() const {
-  std::uint64_t total = scratch.bytes() + materials.bytes() + drops.bytes() + (beads ? beads->bytes() : 0);
+  std::uint64_t total = scratch.bytes() + materials.bytes() + drops.bytes() + coverage.bytes() + (beads ? beads->bytes() : 0);
   for (const Runs* image : {&runs, &second, &third, &lowest, &highest, &section}) {
     total += bytes_held(image->row_offset) + bytes_held(image->change);
   }
@@ -123,20 +123,34 @@ cover::LayerReport LayerImager::levels(const Layer& layer, cover::LayerScratch& 
   return plan_.images->solids.all().front().coverage->layer(layer, scratch, image);
 }
 
+void LayerImager::shares(const Layer& layer, ImageWork& work, LayerRecord& record) const {
+  levels(layer, work.coverage, work.drops.shares);
+  const auto differs = dose::take_half(plan_.images->dose.full(), work.runs, work.second, work.drops);
+  record.half_differs = differs.pixels;
+  record.half_far = differs.far;
+}
+
 void LayerImager::bleed(ImageWork& work) const {
-  if (plan_.job.mirror != Mirror::kNone) {
+  const bool shares = plan_.job.levels > 0;
+  if (const Mirror axes = plan_.job.mirror; axes != Mirror::kNone) {
     mirror(work.runs, work.second);
     for (Runs& image : work.materials.image) mirror(image, work.second);
+    if (shares) dose::mirror(work.drops.shares, axes != Mirror::kY, axes != Mirror::kX, work.drops.zones);
+    if (shares) std::swap(work.drops.shares, work.drops.zones);
   }
   plan_.images->dose.remove_bleed(work.runs, work.second);
+  if (!shares || !plan_.images->dose.bleeds()) return;
+  dose::within(work.drops.shares, work.runs, work.drops.zones);
+  std::swap(work.drops.shares, work.drops.zones);
 }
 
 void LayerImager::dose(const Layer& layer, ImageWork& work, LayerRecord& record) const {
   const ImagePlan& images = *plan_.images;
   images.dose.thin(layer.index, work.runs, work.second, work.third);
   if (images.dose.saturates()) {
-    record.dosed_pixels = set_pixels(work.runs);
-    record.asked_drops = images.dose.saturate(layer, work.runs, work.second, work.drops);
+    const dose::ZoneSums sums = images.dose.saturate(layer, work.runs, work.second, work.drops);
+    record.dosed_pixels = sums.full_voxels;
+    record.asked_drops = sums.asked_drops;
     record.drops = sum_of_levels(work.drops.levels);
   }
   if (images.materials.several() && (images.beads || images.dose.any())) work.materials.keep(work.runs);
@@ -156,6 +170,7 @@ Status LayerImager::make(const Layer& layer, ImageWork& work, LayerRecord& recor
     if (Status status = fill(layer, work); !status) return status;
     if (Status status = beads(layer, work, notes); !status) return status;
   }
+  if (plan_.job.levels > 0) shares(layer, work, record);
   bleed(work);
   dose(layer, work, record);
   return {};
@@ -220,7 +235,10 @@ std::uint64_t LayerImager::bytes_of(const Layer& layer) const {
                 bytes_of_section(layer.highest_plane(), changes_of_section(layer.highest_plane(), 0)));
   }
   const std::uint64_t of_section = bytes_of_section(plane(layer), changes_bound(layer));
-  return plan_.images->beads ? of_section + plan_.images->beads->bytes_expected(layer.index) : of_section;
+  const auto& coverage = plan_.images->solids.all().front().coverage;
+  const std::uint64_t of_shares =
+      coverage ? coverage->scratch_bytes_bound(layer) + 9 * changes_bound(layer) + 4 * plan_.images->grid.rows() : 0;
+  return of_section + of_shares + (plan_.images->beads ? plan_.images->beads->bytes_expected(layer.index) : 0);
 }
 
 std::uint64_t LayerImager::bytes_of_section(Nm plane, std::uint64_t changes) const {
