@@ -24,7 +24,8 @@ bool stretched(Product, const Job& job) {
   return !std::ranges::all_of(job.parts, nominal);
 }
 bool shrinks(Product product, const Job& job) { return by_steps(product, job) && stretched(product, job); }
-bool thins(Product, const Job& job) { return job.dose.core < 1 || job.dose.core_saturation_percent || fills(job); }
+bool has_core(Product, const Job& job) { return job.dose.core < 1 || job.dose.core_saturation_percent || fills(job); }
+bool dithers(Product, const Job& job) { return job.levels > 0 || job.dose.saturation_percent; }
 /// Printers of filament lay a wall where nothing else is asked for.
 bool lays_beads(Product product, const Job& job) { return product == Product::kMoves || fills(job); }
 bool lays_lines(Product, const Job& job) {
@@ -75,7 +76,8 @@ constexpr Need kNeeds[] = {
     {"--flat-area", fits_heights, kUniform},
     {"--flat-tolerance", fits_heights, kUniform},
     {"--time-model", optimal, kOptimal, optimal},
-    {"--shell", thins, "is the depth that is not thinned, and nothing is; add --core, --core-saturation or --fill"},
+    {"--shell", has_core, "is the depth that is not thinned, and nothing is; add --core, --core-saturation or --fill"},
+    {"--no-dither", dithers, "is of drops that are not whole, and none are asked for; add --levels or --saturation"},
     {"--bead-ends", lays_beads, kBeads},
     {"--bead", lays_beads, kBeads},
     {"--bead-gap", lays_lines, kLines},

@@ -111,6 +111,8 @@ bool fills(const Job& job) {
   });
 }
 
+bool thins(const Job& job) { return fills(job) || job.dose.core < 1 || job.dose.saturation_percent || job.levels > 0; }
+
 Result<std::array<std::uint32_t, 2>> layer_range(const Job& job, std::uint32_t layer_count) {
   if (job.shard) {
     const auto [index, of] = *job.shard;

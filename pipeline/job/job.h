@@ -127,6 +127,7 @@ struct DoseRequest {
   std::optional<double> saturation_percent;       // of the voids; absent: one drop a pixel
   std::optional<double> core_saturation_percent;  // inside of the shell
   std::vector<SaturationRange> saturation_ranges;
+  bool dithered = true;                                   // drops that are not whole; else they are rounded
   raster::BeadEnds bead_ends = raster::BeadEnds::kRound;  // of filling beads, also where thick changes to thin
 };
 
@@ -140,7 +141,7 @@ struct Job {
   double gap_mm = 5;  // between automatically arranged parts
   FillRule fill_rule = FillRule::kNonzero;
   Mirror mirror = Mirror::kNone;
-  std::uint32_t levels = 0;  // of shares of voxels, 2 to 256, for programs that ask for them; 0: pixels are set or not
+  std::uint32_t levels = 0;  // of shares of voxels, 2, 4 or 16; 0: pixels are set or not
   std::string format = "tiff-g4";
   std::string title;  // of the job, in tags of its images
   SliceRequest slice;
@@ -195,6 +196,9 @@ Status set_materials(std::string_view names, Job& job);
 
 /// Whether any layer of any part has walls, a filling or segmented lines.
 bool fills(const Job& job);
+
+/// Whether pixels of an image can differ from those of its parts' sections on purpose, but for bleed.
+bool thins(const Job& job);
 
 /// Why jobs of one file refuse run.shard.
 inline constexpr std::string_view kNoShards =

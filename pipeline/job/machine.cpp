@@ -15,6 +15,8 @@ std::string read_rule(std::string_view text, std::optional<VatRule>& rule) {
 }
 std::string rule_text(const std::optional<VatRule>& rule) { return rule ? read::vat_rule_text(*rule) : std::string(); }
 
+constexpr Word<std::uint32_t> kLevels[] = {{"off", 0}, {"2", 2}, {"4", 4}, {"16", 16}};
+
 constexpr Word<BeadEnds> kBeadEnds[] = {{"round", BeadEnds::kRound}, {"square", BeadEnds::kSquare}};
 
 const JobKey kMachineKeys[] = {
@@ -70,6 +72,14 @@ const JobKey kDoseKeys[] = {
         kSaturationPercent),
     structure<read_saturation_ranges, saturation_ranges_text, &Job::dose, &DoseRequest::saturation_ranges>(
         {"dose", "saturation_range", "", "[{...}]", "other saturations between two heights above the bed", decides::images}),
+    word<kLevels, &Job::levels>({"dose", "levels", "--levels", "2|4|16|off",
+                                 "of drops by how full a voxel is, exactly, instead of by its centre alone", decides::images})
+        .with_form(Form::kBare)
+        .shown_if([](const Job& job) { return job.levels > 0; }),
+    field<&Job::dose, &DoseRequest::dithered>({"dose", "dithered", "--no-dither", "",
+                                               "round drops to whole ones (with --levels or --saturation)", decides::images,
+                                               "false"})
+        .unsaid_at("true"),
     // The default is omitted, so that jobs without beads keep their earlier text.
     word<kBeadEnds, &Job::dose, &DoseRequest::bead_ends>(
         {"dose", "bead_ends", "--bead-ends", "round|square",

@@ -37,6 +37,7 @@ ManifestHead image_head(const Plan& plan) {
   head.grid = plan.images->grid;
   if (plan.images->materials.several()) head.materials = plan.images->materials.used;
   head.most_drops = plan.images->dose.most_drops();
+  head.levels = job.levels;
   if (!plan.images->machine) return head;
   const Machine& machine = plan.images->machine->machine;
   head.machine = machine.name;

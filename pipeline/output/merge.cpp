@@ -193,8 +193,7 @@ Status judge(std::span<const Shard> shards, bool strict, bool allow_empty, Merge
   }
   if (!timed) report.microseconds = 0;
   for (const UnfedPowder& powder : unfed) sanity::warn_of_unfed(powder, report.warnings);
-  const bool thins = fills(job) || job.dose.core < 1 || job.dose.saturation_percent;
-  const Status status = records.judge(head.parts, thins, allow_empty, report.warnings);
+  const Status status = records.judge(head.parts, thins(job), allow_empty, report.warnings);
   return status && strict ? sanity::refuse_warnings(report.warnings) : status;
 }
 

@@ -10,42 +10,33 @@
 #include "pipeline/plan/dose_zones.h"
 #include "stages/data/grid.h"
 #include "stages/data/layer.h"
-#include "stages/data/levels.h"
 #include "stages/data/machine.h"
 #include "stages/data/runs.h"
 #include "stages/data/status.h"
 #include "stages/dose/budget.h"
-#include "stages/dose/dither.h"
 #include "stages/dose/erode.h"
+#include "stages/dose/layer_drops.h"
 #include "stages/dose/wish.h"
 #include "stages/dose/zones.h"
 
 namespace lamina::pipeline {
-
-/// Scratch for the drops of a layer, and what they are.
-struct DropWork {
-  Levels zones, levels;
-  dose::DitherScratch dither;
-  std::vector<Runs> shells;  // shell and core of each zone, where there are several
-  std::vector<dose::ZonePiece> pieces;
-  std::vector<Runs> planes;  // the pixels with at least one drop, two, ...: as many as the job has
-  std::uint64_t bytes() const;
-};
 
 class DosePlan {
  public:
   DosePlan(const Job& job, const PixelGrid& grid);
 
   /// Decides the drops of all layers of a job. machine  null without one
-  /// errors  kUsage: a saturation without a machine; less than the powder needs
+  /// errors  kUsage: a saturation without a machine; less than the powder needs; shares of voxels that are thinned
   Status decide(const Job& job, const Machine* machine, std::uint32_t layers, const std::function<Layer(std::uint32_t)>& layer,
                 std::vector<Warning>& warnings);
 
   /// Whether the dose changes any layer.
   bool any() const { return bleeds() || core_ < 1 || saturates(); }
-  /// Whether a saturation decides the drops, and how many a pixel can get; 0 if none does.
-  bool saturates() const { return most_drops_ > 0; }
-  std::uint32_t most_drops() const { return most_drops_; }
+  /// Whether a saturation or shares of voxels decide the drops, and how many a pixel can get; 0 if none does.
+  bool saturates() const { return most_drops() > 0; }
+  std::uint32_t most_drops() const { return rules_.most_drops; }
+  /// Level of a full voxel; 0: the job asks for no shares of voxels.
+  std::uint8_t full() const { return rules_.full; }
   /// What binder gives and was asked to give, for the summary; absent without a machine that says how large its drops are.
   const std::optional<dose::Budget>& budget() const { return budget_; }
 
@@ -57,9 +48,9 @@ class DosePlan {
   void thin(std::uint32_t layer, Runs& image, Runs& second, Runs& third) const;
 
   /// The drops of a layer in place of its image, which becomes that of the first drop. `second` is scratch.
-  /// zone     the image of each zone, where there are several
-  /// returns  the drops that were asked for
-  std::uint64_t saturate(const Layer& layer, Runs& image, std::span<const Runs> zone, Runs& second, DropWork& work) const;
+  /// zone  the image of each zone, where there are several
+  dose::ZoneSums saturate(const Layer& layer, Runs& image, std::span<const Runs> zone, Runs& second,
+                          dose::DropWork& work) const;
 
   /// Upper bound of the changes of edges that moved.
   std::uint64_t edges_bound(std::uint64_t changes) const {
@@ -69,17 +60,13 @@ class DosePlan {
   std::uint64_t changes_bound(std::uint64_t changes, std::uint64_t covered) const;
 
  private:
-  /// The levels of zones and their doses; returns the drops that were asked for.
-  std::uint64_t mark_zones(const Layer& layer, const Runs& image, std::span<const Runs> zone, Runs& core, DropWork& work,
-                           std::vector<dose::Drops24>& drops) const;
-
   DoseZones zones_;
-  dose::Reach shell_;
+  dose::DropRules rules_;
   double core_;
   PixelGrid grid_;
-  dose::Wishes wishes_;
+  std::optional<dose::Wishes> wishes_;
   dose::Binder binder_;
-  std::uint32_t limit_ = 0, most_drops_ = 0;
+  std::uint32_t limit_ = 0;
   std::optional<dose::Budget> budget_;
 };
 

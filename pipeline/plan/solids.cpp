@@ -1,6 +1,9 @@
 #include "pipeline/plan/solids.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
+#include <string_view>
 #include <utility>
 
 #include "stages/geometry/blocks/block_maker.h"
@@ -32,6 +35,19 @@ std::vector<std::uint32_t> levels_of(const Scene& scene, const Job& job, const M
     }
   }
   return level;
+}
+
+/// What keeps a job from levels, and what to do; empty if nothing does.
+std::string_view against_shares(const Scene& scene, const Job& job, const Materials& materials,
+                                const DoseZones& zones) {
+  if (!scene.images.empty()) return "meshes; leave out the parts that are images";
+  if (materials.several()) return "one material; give all parts the same";
+  if (zones.several()) return "parts of one dose; leave out part.saturation_percent and part.bleed_um";
+  if (zones.grows()) return "edges that stay or shrink; leave out a negative bleed";
+  if (fills(job)) return "whole parts; leave out walls, fillings and segments";
+  if (job.dose.core < 1) return "whole parts; give --core-saturation in place of --core";
+  if (job.heights.containment != Containment::kAcross) return "the layer as it is; leave out --containment";
+  return {};
 }
 
 struct Group {
@@ -82,12 +98,10 @@ Result<Solids> Solids::build(Scene& scene, const Job& job, const PixelGrid& grid
                              const DoseZones& zones) {
   Solids result;
   const bool rays = job.engine != Engine::kContours, contours = job.engine != Engine::kRays;
-  if (job.levels > 0 && !scene.images.empty()) {
-    return Error{Fault::kUsage,
-                 "shares of voxels are those of meshes; leave out the parts that are images, or ask for no levels"};
-  }
-  if (job.levels > 0 && materials.several()) {
-    return Error{Fault::kUsage, "shares of voxels are those of one material; give all parts the same, or ask for no levels"};
+  if (job.levels > 0) {
+    if (const auto what = against_shares(scene, job, materials, zones); !what.empty()) {
+      return Error{Fault::kUsage, fmt::format("--levels: shares of voxels are those of {}, or leave out --levels", what)};
+    }
   }
   const auto add = [&](std::span<Mesh> meshes, std::span<const Instance> instances, PartMaterial material, std::uint32_t zone,
                        std::vector<std::uint32_t> instance) -> Status {

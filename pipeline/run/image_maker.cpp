@@ -12,6 +12,7 @@
 #include "pipeline/run/powders.h"
 #include "stages/data/text/number_text.h"
 #include "stages/data/text/readable.h"
+#include "stages/dose/share_count.h"
 #include "stages/geometry/isa.h"
 #include "stages/replay/time/totals.h"
 #include "stages/sanity/records.h"
@@ -75,6 +76,12 @@ class ImageMaker : public Maker {
       add("fill", [this](const Layer& layer, Work& work, Made&) { return imager_.fill(layer, work.images); });
       add("beads",
           [this](const Layer& layer, Work& work, Made& made) { return imager_.beads(layer, work.images, made.notes); });
+    }
+    if (plan_.job.levels > 0) {
+      add("shares", [this](const Layer& layer, Work& work, Made& made) {
+        imager_.shares(layer, work.images, made.record);
+        return Status();
+      });
     }
     if (inspector_.on()) {
       add("inspect", [this](const Layer&, Work& work, Made&) {
@@ -171,6 +178,7 @@ class ImageMaker : public Maker {
     if (const auto& budget = plan_.images->dose.budget()) {
       binder_.add(*budget, record.layer, record.dosed_pixels, record.drops, record.asked_drops, record.program.lost);
     }
+    if (plan_.job.levels > 0) shares_.add(record.dosed_pixels, record.half_differs, record.half_far);
     if (cost_) cost_->add(record);
     const PixelGrid& grid = plan_.images->grid;
     set_pixels_ += record.set_pixels;
@@ -181,7 +189,8 @@ class ImageMaker : public Maker {
     for (std::size_t m = 0; plan_.images->materials.several() && m < record.images.size(); ++m)
       materials_[m].second += record.images[m].set_pixels;
     const double pixel_mm2 = 25.4 * 25.4 / (grid.x.dpi() * grid.y.dpi());
-    const std::uint64_t filled = std::max(record.set_pixels, record.dosed_pixels);  // also where less than a drop a pixel falls
+    // Also where less than a drop a pixel falls.
+    const std::uint64_t filled = plan_.images->dose.saturates() ? record.dosed_pixels : record.set_pixels;
     volume_mm3_ += static_cast<double>(filled) * pixel_mm2 * mm(record.layer.thickness);
   }
 
@@ -201,6 +210,7 @@ class ImageMaker : public Maker {
   bool timed_ = true;              // layers that an earlier build left are not
   double volume_mm3_ = 0;
   dose::BinderCount binder_;
+  dose::ShareCount shares_;
   std::vector<std::pair<std::string, std::uint64_t>> materials_;  // name, set pixels
   std::vector<UnfedPowder> unfed_;                                // by material
 };
@@ -243,6 +253,10 @@ void ImageMaker::tell(Summary& summary) const {
   const auto result = [&](std::string_view name, std::string text) { summary.results.emplace_back(name, std::move(text)); };
   const auto end = [&](std::string_view name, std::string text) { summary.end.emplace_back(name, std::move(text)); };
   result("pixels", fmt::format("{} set, {:.3f} cm3 of binder-filled volume", readable_count(set_pixels_), volume_mm3_ / 1000));
+  if (const std::uint32_t levels = plan_.job.levels; levels > 0) {
+    result("voxels", shares_.told(levels, plan_.job.dose.dithered));
+    (*summary.facts)["voxels"] = shares_.json(levels, plan_.job.dose.dithered);
+  }
   if (solid_pixels_ > 0) {
     result("porosity",
            fmt::format("{:.2f} % of the parts' {} pixels are left empty", 100 * porosity, readable_count(solid_pixels_)));

@@ -25,7 +25,8 @@ struct ImageWork {
   Runs third;            // the core of a layer with a shell
   Runs lowest, highest;  // sections at both ends of the layer, if steps must lie inside or outside
   Runs section;          // of one solid of a layer with several materials
-  DropWork drops;        // if a saturation is asked for
+  dose::DropWork drops;  // if a saturation or shares of voxels are asked for
+  cover::LayerScratch coverage;
   raster::MaterialImages materials;
   raster::MaterialImages zones;  // of parts with doses of their own
   BleedWork bleed;
@@ -55,6 +56,8 @@ class LayerImager {
   Status contours(const Layer& layer, ImageWork& work) const;
   Status fill(const Layer& layer, ImageWork& work) const;
   Status beads(const Layer& layer, ImageWork& work, ImageNotes& notes) const;
+  /// Of a job of shares of voxels, after the raster: the image becomes that of voxels half full or more.
+  void shares(const Layer& layer, ImageWork& work, LayerRecord& record) const;
   /// Mirrors the image and removes its bleed. errors  kUsage: it would grow beyond the bed
   Status bleed(const Layer& layer, ImageWork& work) const;
   /// Thins the core and counts the remaining pixels.

@@ -41,8 +41,8 @@ void add(const raster::LayerReport& solid, raster::LayerReport& all) {
 }  // namespace
 
 std::uint64_t ImageWork::bytes() const {
-  std::uint64_t total =
-      scratch.bytes() + materials.bytes() + zones.bytes() + bleed.bytes() + drops.bytes() + (beads ? beads->bytes() : 0);
+  std::uint64_t total = scratch.bytes() + materials.bytes() + zones.bytes() + bleed.bytes() + drops.bytes() +
+                        coverage.bytes() + (beads ? beads->bytes() : 0);
   for (const Runs* image : {&runs, &second, &third, &lowest, &highest, &section}) {
     total += bytes_held(image->row_offset) + bytes_held(image->change);
   }
@@ -133,10 +133,13 @@ cover::LayerReport LayerImager::levels(const Layer& layer, cover::LayerScratch& 
 Status LayerImager::bleed(const Layer& layer, ImageWork& work) const {
   const ImagePlan& images = *plan_.images;
   const DoseZones& zones = images.dose.zones();
-  if (plan_.job.mirror != Mirror::kNone) {
+  const bool shares = plan_.job.levels > 0;
+  if (const Mirror axes = plan_.job.mirror; axes != Mirror::kNone) {
     mirror(work.runs, work.second);
     for (Runs& image : work.materials.image) mirror(image, work.second);
     for (Runs& image : work.zones.image) mirror(image, work.second);
+    if (shares) dose::mirror(work.drops.shares, axes != Mirror::kY, axes != Mirror::kX, work.drops.zones);
+    if (shares) std::swap(work.drops.shares, work.drops.zones);
   }
   if (!zones.bleeds()) return {};
   if (zones.several() && images.beads) work.zones.keep(work.runs);
@@ -150,6 +153,10 @@ Status LayerImager::bleed(const Layer& layer, ImageWork& work) const {
                              layer.index, mm(layer.plane()))};
   }
   zones.remove_bleed(layer, work.runs, work.zones.image, work.bleed);
+  if (shares) {
+    dose::within(work.drops.shares, work.runs, work.drops.zones);
+    std::swap(work.drops.shares, work.drops.zones);
+  }
   return check_grown(layer, work);
 }
 
@@ -166,13 +173,21 @@ Status LayerImager::check_grown(const Layer& layer, const ImageWork& work) const
                   layer.index, mm(outside->place.x), mm(outside->place.y), outside->beyond_mm, images.machine->machine.name)};
 }
 
+void LayerImager::shares(const Layer& layer, ImageWork& work, LayerRecord& record) const {
+  levels(layer, work.coverage, work.drops.shares);
+  const auto differs = dose::take_half(plan_.images->dose.full(), work.runs, work.second, work.drops);
+  record.half_differs = differs.pixels;
+  record.half_far = differs.far;
+}
+
 void LayerImager::dose(const Layer& layer, ImageWork& work, LayerRecord& record) const {
   const ImagePlan& images = *plan_.images;
   if (images.dose.zones().several() && images.beads) work.zones.keep(work.runs);
   images.dose.thin(layer.index, work.runs, work.second, work.third);
   if (images.dose.saturates()) {
-    record.dosed_pixels = set_pixels(work.runs);
-    record.asked_drops = images.dose.saturate(layer, work.runs, work.zones.image, work.second, work.drops);
+    const dose::ZoneSums sums = images.dose.saturate(layer, work.runs, work.zones.image, work.second, work.drops);
+    record.dosed_pixels = sums.full_voxels;
+    record.asked_drops = sums.asked_drops;
     record.drops = sum_of_levels(work.drops.levels);
   }
   if (images.materials.several() && (images.beads || images.dose.any())) work.materials.keep(work.runs);
@@ -192,6 +207,7 @@ Status LayerImager::make(const Layer& layer, ImageWork& work, LayerRecord& recor
     if (Status status = fill(layer, work); !status) return status;
     if (Status status = beads(layer, work, notes); !status) return status;
   }
+  if (plan_.job.levels > 0) shares(layer, work, record);
   if (Status status = bleed(layer, work); !status) return status;
   dose(layer, work, record);
   return {};
@@ -256,7 +272,10 @@ std::uint64_t LayerImager::bytes_of(const Layer& layer) const {
                 bytes_of_section(layer.highest_plane(), changes_of_section(layer.highest_plane(), 0)));
   }
   const std::uint64_t of_section = bytes_of_section(plane(layer), changes_bound(layer));
-  return plan_.images->beads ? of_section + plan_.images->beads->bytes_expected(layer.index) : of_section;
+  const auto& coverage = plan_.images->solids.all().front().coverage;
+  const std::uint64_t of_shares =
+      coverage ? coverage->scratch_bytes_bound(layer) + 9 * changes_bound(layer) + 4 * plan_.images->grid.rows() : 0;
+  return of_section + of_shares + (plan_.images->beads ? plan_.images->beads->bytes_expected(layer.index) : 0);
 }
 
 std::uint64_t LayerImager::bytes_of_section(Nm plane, std::uint64_t changes) const {
@@ -271,7 +290,7 @@ std::uint64_t LayerImager::bytes_of_section(Nm plane, std::uint64_t changes) con
   // Images of each dose, before and after they grow, with shells and cores; the whole before it is moved, and scratch.
   const std::uint64_t zones = images.dose.zones().several() ? images.dose.zones().count() : 0;
   const std::uint64_t edges = images.dose.edges_bound(images.solids.crossings_bound(plane) + changes_of_images(plane));
-  const std::uint64_t zone_images = zones == 0 ? 0 : (4 * zones + 6) * 2 * (4 * edges + 4 * rows);
+  const std::uint64_t zone_images = zones == 0 ? 0 : (2 * zones + 6) * 2 * (4 * edges + 4 * rows);
   // Zones and levels, and the image of each drop.
   const std::uint64_t drops = images.dose.saturates() ? 18 * changes + images.dose.most_drops() * 4 * (changes + rows) : 0;
   const std::uint64_t read = plan_.scene->images.empty() ? 0 : 8 * (changes_of_images(plane) + rows);

@@ -17,16 +17,15 @@ ReportDoubts::ReportDoubts(const Manifest& manifest, const Job& job, const Scene
   }
   std::vector<sanity::Solid> solids = solids_from_above(scene != nullptr ? *scene : boxes);
   // Beads and doses change the volume on purpose.
-  const bool whole = !fills(job) && job.dose.core == 1 && !job.dose.saturation_percent &&
-                     std::ranges::all_of(bleeds_of(job), [](const std::array<double, 2>& um) {
-                       return um == std::array{0.0, 0.0};
-                     });
+  const bool whole = !thins(job) && std::ranges::all_of(bleeds_of(job), [](const std::array<double, 2>& um) {
+    return um == std::array{0.0, 0.0};
+  });
   for (sanity::Solid& solid : solids) solid.closed = solid.closed && whole && scene != nullptr;
   tally_ = std::make_unique<sanity::Tally>(std::move(solids));
   std::vector<Nm> planes;
   for (const LayerRecord& record : manifest.layers) planes.push_back(record.layer.plane());
   crossed_.resize(planes.size(), 0);
-  const bool thinned = head.product == Product::kImages && (fills(job) || job.dose.core < 1 || job.dose.saturation_percent);
+  const bool thinned = head.product == Product::kImages && thins(job);
   if (scene != nullptr && !thinned) crossed_ = sanity::crossed_planes(scene->meshes, scene->instances, planes);
   if (scene != nullptr) united_mm3_ = united_in(*scene, *tally_);
   if (head.product == Product::kImages) tally_->look_through(head.grid);

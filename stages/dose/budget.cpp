@@ -44,7 +44,7 @@ const LayerDose& Budget::dose(const Layer& layer, std::uint32_t zone) {
   if (wishes_) {
     dose = dose_of(layer, *wishes_, binder_, grid_, limit_, zone);
   } else {
-    dose.shell = dose.core = dose.asked_shell = dose.asked_inside = kOneDrop;
+    dose = one_drop();
     dose.gets = dose.gets_core = dose.asked = dose.asked_core = saturation_of(1, binder_, grid_, layer.thickness);
   }
   return dose;
@@ -79,15 +79,6 @@ Status Budget::judge(bool allow_unbound, std::vector<Warning>& warnings) const {
   }
   warnings.push_back({"saturation", fmt::format("{}, parts may fall apart there", text)});
   return {};
-}
-
-std::uint64_t Budget::asked_drops(const Layer& layer, std::uint64_t shell_pixels, std::uint64_t core_pixels,
-                                  std::uint32_t zone) const {
-  const auto found = known_.find({wishes_ ? wishes_->place_of(layer, zone) : 0, layer.thickness});
-  if (found == known_.end()) return 0;
-  const auto sum = static_cast<unsigned __int128>(found->second.asked_shell) * shell_pixels +
-                   static_cast<unsigned __int128>(found->second.asked_inside) * core_pixels;
-  return static_cast<std::uint64_t>((sum + kOneDrop / 2) >> kDropBits);
 }
 
 void BinderCount::add(const Budget& budget, const Layer& layer, std::uint64_t dosed_pixels, std::uint64_t drops,

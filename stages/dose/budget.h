@@ -39,10 +39,6 @@ class Budget {
   /// Warns of wishes that cannot be met. errors  kUsage: layers get less than binds, and that is not allowed
   Status judge(bool allow_unbound, std::vector<Warning>& warnings) const;
 
-  /// Drops that a wish comes to in a layer of so many pixels, rounded; more than there are where the wish is cut.
-  std::uint64_t asked_drops(const Layer& layer, std::uint64_t shell_pixels, std::uint64_t core_pixels,
-                            std::uint32_t zone = 0) const;
-
   const Binder& binder() const { return binder_; }
   const PixelGrid& grid() const { return grid_; }
   bool has_wish() const { return wishes_.has_value(); }

@@ -72,28 +72,4 @@ void dither(const LevelsView& image, std::span<const Drops24> drops, std::uint32
   }
 }
 
-void drops_of_coverage(Drops24 full, std::span<Drops24> drops) {
-  for (std::size_t level = 0; level < drops.size(); ++level) {
-    drops[level] = drops.size() < 2 ? full : full * level / (drops.size() - 1);
-  }
-}
-
-void mark_core(const RunsView& image, const RunsView& core, Levels& result) {
-  result.start(image.columns);
-  for (std::uint32_t row = 0; row < image.rows(); ++row) {
-    const auto all = image.row(row), inner = core.row(row);
-    std::size_t k = 0;
-    for (std::size_t i = 0; i + 1 < all.size(); i += 2) {
-      std::uint32_t at = all[i];
-      for (; k + 1 < inner.size() && inner[k] < all[i + 1]; k += 2) {
-        result.append(at, inner[k], 1);
-        result.append(inner[k], inner[k + 1], 2);
-        at = inner[k + 1];
-      }
-      result.append(at, all[i + 1], 1);
-    }
-    result.end_row();
-  }
-}
-
 }  // namespace lamina::dose

@@ -32,12 +32,4 @@ struct DitherScratch {
 void dither(const LevelsView& image, std::span<const Drops24> drops, std::uint32_t layer, DitherScratch& scratch,
             Levels& result);
 
-/// Drops a pixel of each level of coverage 0 .. levels - 1 if a full voxel gets `full`: in proportion, rounded down.
-/// drops  of `levels` entries
-void drops_of_coverage(Drops24 full, std::span<Drops24> drops);
-
-/// Level 1 for the shell of an image, level 2 for its core.
-/// core  within the image and of its size
-void mark_core(const RunsView& image, const RunsView& core, Levels& result);
-
 }  // namespace lamina::dose

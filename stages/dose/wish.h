@@ -54,6 +54,13 @@ struct LayerDose {
   }
 };
 
+/// Of a layer without a wish: a drop a pixel.
+inline LayerDose one_drop() {
+  LayerDose dose;
+  dose.shell = dose.core = dose.asked_shell = dose.asked_inside = kOneDrop;
+  return dose;
+}
+
 /// most  drops a pixel, 1 .. kMostDrops
 LayerDose dose_of(const Layer& layer, const Wishes& wishes, const Binder& binder, const PixelGrid& grid, std::uint32_t most,
                   std::uint32_t zone = 0);

@@ -11,6 +11,7 @@
 #include "stages/dose/budget.h"
 #include "stages/dose/dither.h"
 #include "stages/dose/saturation.h"
+#include "stages/dose/shares.h"
 #include "stages/dose/wish.h"
 #include "tests/program/machines.h"
 
@@ -192,9 +193,14 @@ TEST(Dither, DecidesEveryPixelByItself) {
 }
 
 TEST(Dither, TakesSharesOfVoxelsInProportion) {
-  std::array<Drops24, 4> drops{};
-  drops_of_coverage(3 * kOneDrop, drops);
-  EXPECT_EQ(drops, (std::array<Drops24, 4>{0, kOneDrop, 2 * kOneDrop, 3 * kOneDrop}));
+  std::array<Drops24, 7> drops{};
+  LayerDose dose;
+  dose.shell = 3 * kOneDrop;
+  dose.core = kOneDrop;
+  drops_of_zones(dose, 3, false, drops);
+  EXPECT_EQ(drops, (std::array<Drops24, 7>{0, kOneDrop, 2 * kOneDrop, 3 * kOneDrop, 0, kOneDrop, kOneDrop}));
+  drops_of_zones(dose, 3, true, drops);
+  EXPECT_EQ(drops, (std::array<Drops24, 7>{0, kOneDrop, 2 * kOneDrop, 3 * kOneDrop, kOneDrop / 3, 2 * kOneDrop / 3, kOneDrop}));
   Levels coverage, levels;
   coverage.start(9);
   coverage.append(0, 3, 1);
@@ -208,8 +214,9 @@ TEST(Dither, TakesSharesOfVoxelsInProportion) {
 
 TEST(Dither, MarksShellAndCore) {
   const Runs image{10, {0, 4, 6}, {0, 3, 4, 10, 2, 5}}, core{10, {0, 4, 4}, {1, 2, 4, 9}};
-  Levels zones;
-  mark_core(image, core, zones);
+  Levels levels, zones;
+  levels_of(image, 1, levels);
+  mark_core(levels, core, 1, zones);
   EXPECT_EQ(levels_by_pixel(zones), (std::vector<int>{1, 2, 1, 0, 2, 2, 2, 2, 2, 1, 0, 0, 1, 1, 1, 0, 0, 0, 0, 0}));
 }
 
@@ -236,8 +243,16 @@ TEST(Budget, TellsWishesByHeightThoseThatAreCutAndThoseThatDoNotBind) {
   warnings.clear();
   EXPECT_TRUE(budget.judge(true, warnings).ok());
   EXPECT_EQ(warnings.size(), 2u);
-  EXPECT_EQ(budget.asked_drops(tenth(0), 100, 10), 530u);
-  EXPECT_EQ(budget.asked_drops(tenth(6), 100, 0), 2000u);
+  Levels zones;
+  zones.start(110);
+  zones.append(0, 100, 1);
+  zones.append(100, 110, 2);
+  zones.end_row();
+  EXPECT_EQ(sums_of(zones, 1, dose_of(tenth(0), wishes, binder, kTenths, 10)).asked_drops, 530u);
+  zones.start(110);
+  zones.append(0, 100, 1);
+  zones.end_row();
+  EXPECT_EQ(sums_of(zones, 1, dose_of(tenth(6), wishes, binder, kTenths, 10)).asked_drops, 2000u);
   BinderCount count;
   count.add(budget, tenth(0), 110, 530, 530, 0);
   EXPECT_NEAR(count.reached_percent(budget), 100 * 530 * 40 / (110 * 400.0), 1e-9);

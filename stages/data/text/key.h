@@ -65,6 +65,11 @@ struct Key : KeyName {
     key.unsaid = same;
     return key;
   }
+  constexpr Key with_form(Form other) const {
+    Key key = *this;
+    key.form = other;
+    return key;
+  }
   constexpr Key shown_if(bool (*condition)(const Target&)) const {
     Key key = *this;
     key.shown = condition;

@@ -55,6 +55,8 @@ struct ManifestHead {
   std::vector<JobMaterial> materials;      // if there are several
   std::uint32_t most_drops = 0;            // of a pixel; 0: no saturation was asked for, and set pixels get one
 
+  std::uint32_t levels = 0;  // of shares of voxels that became drops; 0: pixels are set or not
+
   /// Images of a layer that have names and records of their own: of materials, or of the drops of a pixel if there can be
   /// several. 0: the one image that the layer's own record is of.
   std::size_t named_images() const { return !materials.empty() ? materials.size() : most_drops > 1 ? most_drops : 0; }

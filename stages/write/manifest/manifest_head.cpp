@@ -80,6 +80,7 @@ void add_images(const ManifestHead& head, Json& json) {
     for (const JobMaterial& material : head.materials) materials.push_back({{"name", material.name}, {"vat", material.vat}});
   }
   if (head.most_drops > 0) json["most_drops"] = head.most_drops;
+  if (head.levels > 0) json["levels"] = head.levels;
   if (head.machine.empty()) return;
   json["dialect"] = head.dialect;
   json["program_extension"] = head.program_extension;
@@ -96,6 +97,7 @@ void read_images(const Json& json, ManifestHead& head) {
     for (const Json& entry : json.at("materials")) head.materials.push_back({entry.at("name"), entry.at("vat")});
   }
   if (json.contains("most_drops")) head.most_drops = json.at("most_drops");
+  if (json.contains("levels")) head.levels = json.at("levels");
   if (head.machine.empty()) return;
   head.dialect = json.at("dialect");
   head.program_extension = json.at("program_extension");

@@ -81,6 +81,10 @@ void describe_images(Io& io, const ManifestHead& head, Record& record) {
     io.number("drops", record.drops);
     io.number("asked_drops", record.asked_drops);
   }
+  if (head.levels > 0) {
+    io.number("half_differs", record.half_differs);
+    io.number("half_far", record.half_far);
+  }
   if (head.named_images() == 0) {
     io.number("set_pixels", record.set_pixels);
   } else {

@@ -42,6 +42,9 @@ std::string fault_of_images(const ManifestHead& head) {
   if (head.most_drops > kMostDrops || (head.most_drops > 1 && !head.materials.empty())) {
     return no_such("most_drops", fmt::format("{}", head.most_drops));
   }
+  if (head.levels == 1 || head.levels > 256 || (head.levels > 0 && (head.most_drops == 0 || !head.materials.empty()))) {
+    return no_such("levels", fmt::format("{}", head.levels));
+  }
   if (head.machine.empty()) return {};
   for (const JobMaterial& material : head.materials) {
     if (material.vat > 1) return no_such("vat", fmt::format("{}", material.vat));

@@ -69,6 +69,8 @@ Job unusual_job(const Directory& directory) {
   job.dose.saturation_percent = 70;
   job.dose.core_saturation_percent = 45.5;
   job.dose.saturation_ranges = {{1, 2.5, 80, 60}};
+  job.dose.dithered = false;
+  job.levels = 4;
   job.inspect = true;
   job.least_wall_mm = 0.35;
   job.allow_unbound = true;

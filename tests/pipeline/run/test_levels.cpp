@@ -1,7 +1,12 @@
-// Shares of voxels through the plan of a job.
+// Shares of voxels through the plan of a job, and as drops to its files.
 #include <gtest/gtest.h>
 
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
 #include "pipeline/run/image_maker.h"
+#include "stages/write/manifest/manifest.h"
 #include "tests/commands/program.h"
 
 namespace lamina::pipeline {
@@ -45,6 +50,97 @@ TEST(Levels, MoreThanABytesWorthAreRefused) {
   const Result<Plan> plan = plan_of_levels(folder / "box.stl", 257);
   ASSERT_FALSE(plan.ok());
   EXPECT_EQ(plan.error().fault, Fault::kUsage);
+}
+
+/// A box whose top lies in the middle of its third layer, and what else a test needs.
+class LevelJobs : public testing::Test {
+ protected:
+  LevelJobs() { test::write_box(folder_ / "box.stl", {0, 0, 0}, {2, 3, 0.25f}); }
+
+  test::Outcome lamina(const std::string& line) const { return test::run_lamina(test::words_of(line), folder_.path()); }
+  void done(const std::string& line) const {
+    const test::Outcome outcome = lamina(line);
+    ASSERT_EQ(outcome.code, 0) << line << "\n" << outcome.err;
+  }
+  std::vector<LayerRecord> records_of(const std::string& output) const {
+    const auto manifest = read_manifest(folder_ / (output + "/manifest.json"));
+    EXPECT_TRUE(manifest.ok()) << manifest.error().message;
+    return manifest.ok() ? manifest->layers : std::vector<LayerRecord>();
+  }
+  std::string tree(const std::string& output) const { return test::tree_text(folder_.path() / output); }
+
+  test::Directory folder_;
+};
+
+constexpr const char* kTenthsOfBox = "jet box.stl --layer 0.1 --dpi 254 --bed 5x5 --at 1,1 --quiet ";
+
+// Half of a voxel is level 8 of 15, 2 of 3 and 1 of 1: of 600 voxels 320, 400 and 600.
+TEST_F(LevelJobs, GiveEachVoxelDropsByItsShare) {
+  for (const auto& [levels, full] : {std::pair{16, 320u}, {4, 400u}, {2, 600u}}) {
+    const std::string output = "of" + std::to_string(levels);
+    done(kTenthsOfBox + ("--levels " + std::to_string(levels)) + " -o " + output);
+    const auto records = records_of(output);
+    ASSERT_EQ(records.size(), 3u);
+    EXPECT_EQ(records[0].set_pixels, 600u);
+    EXPECT_EQ(records[2].dosed_pixels, full);
+    EXPECT_EQ(records[2].asked_drops, full);
+    EXPECT_EQ(records[2].drops, records[2].set_pixels);
+    EXPECT_NEAR(static_cast<double>(records[2].drops), full, 12);
+    done("verify " + output + " --quiet");
+  }
+  done(kTenthsOfBox + std::string("--levels 16 --no-dither -o rounded"));
+  EXPECT_EQ(records_of("rounded")[2].set_pixels, 600u);
+  // The top lies on the plane, where a pixel is not set and a tie of shares goes up: no boundary is near.
+  EXPECT_EQ(records_of("rounded")[2].half_differs, 600u);
+  EXPECT_EQ(records_of("rounded")[2].half_far, 600u);
+  done(kTenthsOfBox + std::string("-o plain"));
+  EXPECT_EQ(records_of("plain")[1].hash, records_of("rounded")[1].hash);
+}
+
+TEST_F(LevelJobs, TellHowFarHalvesAreFromTheBitmap) {
+  const test::Outcome outcome = lamina("jet " + test::corpus_file("dental_crown.stl") +
+                                       " --layer 0.3 --dpi 300 --bed 20x20 --levels 2 --no-dither --json --quiet -o crown");
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  const auto voxels = nlohmann::json::parse(outcome.out)["voxels"];
+  EXPECT_EQ(voxels["half_far"], 0);
+  EXPECT_GT(voxels["half_differs"], 0);
+  EXPECT_LT(voxels["half_differs_share"], 0.01);
+  std::uint64_t differs = 0;
+  for (const LayerRecord& record : records_of("crown")) differs += record.half_differs;
+  EXPECT_EQ(voxels["half_differs"], differs);
+}
+
+TEST_F(LevelJobs, GiveTheSameBytesHoweverTheyAreMade) {
+  const std::string job = "jet " + test::corpus_file("dental_crown.stl") +
+                          " --layer 1 --machine nuferbj --levels 16 --saturation 3 --core-saturation 1 --shell 0.6 "
+                          "--bleed 40 --mirror x --quiet -o ";
+  done(job + "one");
+  done("verify one --quiet");
+  for (const char* how : {" --threads 1 --engine contours", " --threads 8 --engine both --memory 64K"}) {
+    done(job + "other --overwrite" + how);
+    EXPECT_TRUE(tree("other") == tree("one")) << how;
+  }
+  for (const char* shard : {"1/3", "2/3", "3/3"}) done(job + "shards --shard " + shard);
+  done("merge shards -o shards --quiet");
+  EXPECT_TRUE(tree("shards") == tree("one"));
+  std::string begun = test::read_text(folder_ / "one/manifest.json");
+  begun.resize(begun.find("\n{\"index\": 4"));
+  std::filesystem::remove(folder_ / "one/manifest.json");
+  test::write_text(folder_ / "one/manifest.json.part", begun + "\n");
+  done(job + "one --resume");
+  EXPECT_TRUE(tree("one") == tree("shards"));
+}
+
+TEST_F(LevelJobs, OfWhatHasNoSharesAreRefused) {
+  const std::string job = kTenthsOfBox + std::string("--levels 4 -o out ");
+  test::expect_refused(job + "--fill raster", 2, "leave out walls, fillings", folder_);
+  test::expect_refused(job + "--core 0.5", 2, "--core-saturation", folder_);
+  test::expect_refused(job + "--heights cusp --thickness 0.05,0.1 --containment inside", 2, "--containment", folder_);
+  test::expect_refused(kTenthsOfBox + std::string("--levels 3 -o out"), 2, "none of off, 2, 4, 16", folder_);
+  test::expect_refused(kTenthsOfBox + std::string("--no-dither -o out"), 2, "add --levels or --saturation", folder_);
+  test::write_box(folder_ / "other.stl", {0, 0, 0}, {1, 1, 0.25f});
+  test::expect_refused("jet box.stl other.stl --material steel,bronze --layer 0.1 --dpi 254 --bed 9x9 --levels 4 -o out", 2,
+                       "one material", folder_);
 }
 
 }  // namespace

@@ -1,0 +1,80 @@
+#include "stages/dose/layer_drops.h"
+
+#include <algorithm>
+#include <utility>
+
+namespace lamina::dose {
+
+std::uint64_t DropWork::bytes() const {
+  std::uint64_t total = shares.bytes() + zones.bytes() + levels.bytes() + pieces.capacity() * sizeof(ZonePiece);
+  for (const Runs& plane : planes) total += bytes_held(plane.row_offset) + bytes_held(plane.change);
+  return total;
+}
+
+Difference take_half(std::uint8_t full, Runs& image, Runs& second, const DropWork& work) {
+  at_least(work.shares, half_of(full), second);
+  const Difference found = difference(image, second);
+  std::swap(image, second);
+  return found;
+}
+
+namespace {
+
+/// Shell and core in work.zones, by the levels in work.shares.
+void mark_shell(const DropRules& rules, const Runs& image, std::uint8_t full, Runs& second, DropWork& work) {
+  if (rules.shell.half_width.empty()) {
+    at_least(work.shares, 1, second);
+  } else {
+    erode(image, rules.shell, second);
+  }
+  mark_core(work.shares, second, full, work.zones);
+}
+
+/// The planes of work.zones.
+void make_planes(const DropRules& rules, std::span<const Drops24> drops, std::uint32_t layer, Runs& image, DropWork& work) {
+  dither(work.zones, drops, layer, work.dither, work.levels);
+  work.planes.resize(rules.most_drops);
+  for (std::uint32_t drop = 0; drop < rules.most_drops; ++drop) {
+    at_least(work.levels, static_cast<std::uint8_t>(drop + 1), work.planes[drop]);
+  }
+  image.row_offset = work.planes[0].row_offset;
+  image.change = work.planes[0].change;
+}
+
+}  // namespace
+
+ZoneSums drops_of_layer(const DropRules& rules, const LayerDose& dose, std::uint32_t layer, Runs& image, Runs& second,
+                        DropWork& work) {
+  const std::uint8_t full = std::max<std::uint8_t>(1, rules.full);
+  if (rules.full == 0) levels_of(image, 1, work.shares);
+  if (dose.asked_shell == dose.asked_inside) {
+    std::swap(work.shares, work.zones);
+  } else {
+    mark_shell(rules, image, full, second, work);
+  }
+  std::vector<Drops24> drops(std::size_t{2} * full + 1);
+  drops_of_zones(dose, full, rules.dithered, drops);
+  make_planes(rules, drops, layer, image, work);
+  return sums_of(work.zones, full, dose);
+}
+
+ZoneSums drops_of_parts(const DropRules& rules, std::span<const LayerDose> doses, std::uint32_t layer, std::span<const Runs> zone,
+                        Runs& image, Runs& second, DropWork& work) {
+  const auto count = static_cast<std::uint8_t>(zone.size());
+  join_zones(zone, work.pieces, work.shares);
+  mark_shell(rules, image, count, second, work);
+  std::vector<Drops24> drops{0}, asked{0};
+  for (const LayerDose& dose : doses) drops.push_back(dose.shell), asked.push_back(dose.asked_shell);
+  for (const LayerDose& dose : doses) drops.push_back(dose.core), asked.push_back(dose.asked_inside);
+  make_planes(rules, drops, layer, image, work);
+  unsigned __int128 sum = 0;
+  std::uint64_t pixels = 0;
+  for (std::size_t i = 0; i < work.zones.level.size(); ++i) {
+    const std::uint64_t length = work.zones.change[2 * i + 1] - work.zones.change[2 * i];
+    pixels += length;
+    sum += static_cast<unsigned __int128>(asked[work.zones.level[i]]) * length;
+  }
+  return {pixels, static_cast<std::uint64_t>((sum + kOneDrop / 2) >> kDropBits)};
+}
+
+}  // namespace lamina::dose

@@ -1,0 +1,129 @@
+#include "stages/dose/shares.h"
+
+#include <algorithm>
+
+namespace lamina::dose {
+namespace {
+
+bool is_set(std::span<const std::uint32_t> row, std::int64_t column) {
+  const auto after = std::ranges::upper_bound(row, column, {}, [](std::uint32_t at) { return std::int64_t{at}; });
+  return ((after - row.begin()) & 1) != 0;
+}
+
+/// Whether all nine pixels around one are equal; beyond the image nothing is set.
+bool alike_around(const RunsView& image, std::uint32_t row, std::uint32_t column) {
+  const bool here = is_set(image.row(row), column);
+  for (std::int64_t r = std::int64_t{row} - 1; r <= std::int64_t{row} + 1; ++r) {
+    const bool outside = r < 0 || r >= image.rows();
+    for (std::int64_t c = std::int64_t{column} - 1; c <= std::int64_t{column} + 1; ++c) {
+      const bool set = !outside && is_set(image.row(static_cast<std::uint32_t>(r)), c);
+      if (set != here) return false;
+    }
+  }
+  return true;
+}
+
+/// Appends the runs of a row with what `level_in` gives for each inside of the mask, and `level_out` outside.
+template <class In, class Out>
+void append_masked(const LevelsView& image, std::uint32_t row, std::span<const std::uint32_t> mask, In level_in, Out level_out,
+                   Levels& result) {
+  std::size_t k = 0;
+  for (std::uint32_t i = image.row_offset[row]; i < image.row_offset[row + 1]; ++i) {
+    const std::uint32_t end = image.change[2 * i + 1];
+    std::uint32_t at = image.change[2 * i];
+    while (k + 1 < mask.size() && mask[k + 1] <= at) k += 2;
+    for (std::size_t m = k; m + 1 < mask.size() && mask[m] < end; m += 2) {
+      const std::uint32_t begin = std::max(at, mask[m]), stop = std::min(end, mask[m + 1]);
+      result.append(at, begin, level_out(image.level[i]));
+      result.append(begin, stop, level_in(image.level[i]));
+      at = stop;
+    }
+    result.append(at, end, level_out(image.level[i]));
+  }
+}
+
+}  // namespace
+
+void mirror(const LevelsView& image, bool x, bool y, Levels& result) {
+  result.start(image.columns);
+  const std::uint32_t rows = image.rows();
+  for (std::uint32_t r = 0; r < rows; ++r) {
+    const std::uint32_t from = y ? rows - 1 - r : r;
+    const std::uint32_t begin = image.row_offset[from], end = image.row_offset[from + 1];
+    for (std::uint32_t k = begin; k < end; ++k) {
+      const std::uint32_t i = x ? begin + (end - 1 - k) : k;
+      const std::uint32_t left = image.change[2 * i], right = image.change[2 * i + 1];
+      result.append(x ? image.columns - right : left, x ? image.columns - left : right, image.level[i]);
+    }
+    result.end_row();
+  }
+}
+
+void within(const LevelsView& image, const RunsView& mask, Levels& result) {
+  result.start(image.columns);
+  for (std::uint32_t r = 0; r < image.rows(); ++r) {
+    append_masked(
+        image, r, mask.row(r), [](std::uint8_t level) { return level; }, [](std::uint8_t) { return std::uint8_t{0}; }, result);
+    result.end_row();
+  }
+}
+
+void mark_core(const LevelsView& image, const RunsView& core, std::uint8_t full, Levels& result) {
+  result.start(image.columns);
+  for (std::uint32_t r = 0; r < image.rows(); ++r) {
+    append_masked(
+        image, r, core.row(r), [full](std::uint8_t level) { return static_cast<std::uint8_t>(level + full); },
+        [](std::uint8_t level) { return level; }, result);
+    result.end_row();
+  }
+}
+
+void drops_of_zones(const LayerDose& dose, std::uint8_t full, bool dithered, std::span<Drops24> drops) {
+  drops[0] = 0;
+  for (std::uint32_t level = 1; level <= full; ++level) {
+    drops[level] = dose.shell * level / full;
+    drops[full + level] = dose.core * level / full;
+  }
+  if (dithered) return;
+  for (Drops24& of : drops) of = (of + kOneDrop / 2) >> kDropBits << kDropBits;
+}
+
+ZoneSums sums_of(const LevelsView& zones, std::uint8_t full, const LayerDose& dose) {
+  std::uint64_t shell = 0, core = 0;
+  for (std::size_t i = 0; i < zones.level.size(); ++i) {
+    const std::uint64_t pixels = zones.change[2 * i + 1] - zones.change[2 * i];
+    if (zones.level[i] <= full) {
+      shell += pixels * zones.level[i];
+    } else {
+      core += pixels * (zones.level[i] - full);
+    }
+  }
+  using Wide = unsigned __int128;
+  const Wide asked = Wide{dose.asked_shell} * shell + Wide{dose.asked_inside} * core;
+  const Wide one = Wide{kOneDrop} * full;
+  return {(2 * (shell + core) + full) / (2 * full), static_cast<std::uint64_t>((2 * asked + one) / (2 * one))};
+}
+
+Difference difference(const RunsView& a, const RunsView& b) {
+  Difference found;
+  for (std::uint32_t r = 0; r < a.rows(); ++r) {
+    const auto one = a.row(r), other = b.row(r);
+    // Where the changes of both are merged, pixels differ from every odd one to the next.
+    std::size_t i = 0, k = 0;
+    bool differs = false;
+    std::uint32_t from = 0;
+    while (i < one.size() || k < other.size()) {
+      const bool first = k == other.size() || (i < one.size() && one[i] <= other[k]);
+      const std::uint32_t at = first ? one[i++] : other[k++];
+      for (; differs && from < at; ++from) {
+        ++found.pixels;
+        found.far += alike_around(a, r, from) ? 1 : 0;
+      }
+      differs = !differs;
+      from = at;
+    }
+  }
+  return found;
+}
+
+}  // namespace lamina::dose

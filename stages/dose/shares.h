@@ -1,0 +1,48 @@
+// stages/dose/shares.h: images of how full voxels are, on their way from coverage to drops, on runs.
+//
+// Of L levels, n = L - 1 is that of a full voxel: `full` below. A zone is a level in the shell, or n more in the core.
+#pragma once
+
+#include <cstdint>
+#include <span>
+
+#include "stages/data/levels.h"
+#include "stages/data/runs.h"
+#include "stages/dose/saturation.h"
+#include "stages/dose/wish.h"
+
+namespace lamina::dose {
+
+/// The lowest level of a voxel that counts as set without dithering: its share rounds to half or more.
+constexpr std::uint8_t half_of(std::uint8_t full) { return static_cast<std::uint8_t>((full + 1) / 2); }
+
+/// x: columns are reversed; y: rows are reversed. cost  O(runs + rows)
+void mirror(const LevelsView& image, bool x, bool y, Levels& result);
+
+/// Levels where the mask is set; 0 elsewhere. mask  of the same size. cost  O(runs)
+void within(const LevelsView& image, const RunsView& mask, Levels& result);
+
+/// Zones of levels 1 .. full: those within the core get `full` more. core  of the same size. cost  O(runs)
+void mark_core(const LevelsView& image, const RunsView& core, std::uint8_t full, Levels& result);
+
+/// Drops a pixel of each zone: in proportion to the level, of a shell's or a core's full voxel.
+/// dithered  false: rounded to whole drops, half a drop up
+/// drops     2 full + 1 entries
+void drops_of_zones(const LayerDose& dose, std::uint8_t full, bool dithered, std::span<Drops24> drops);
+
+/// What a layer's zones come to.
+struct ZoneSums {
+  std::uint64_t full_voxels = 0;  // sum of levels / full, rounded
+  std::uint64_t asked_drops = 0;  // for them, rounded, however many may be jetted
+};
+ZoneSums sums_of(const LevelsView& zones, std::uint8_t full, const LayerDose& dose);
+
+/// Pixels of two images that differ.
+struct Difference {
+  std::uint64_t pixels = 0;
+  std::uint64_t far = 0;  // where all nine pixels around are equal in the first image: no boundary of it is near
+};
+/// a, b  of the same size. cost  O(changes + differing pixels x log(changes of a row))
+Difference difference(const RunsView& a, const RunsView& b);
+
+}  // namespace lamina::dose

@@ -1,0 +1,155 @@
+// Images of shares of voxels against images of pixels, each pixel looked at by itself.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cstdint>
+#include <vector>
+
+#include "stages/data/levels.h"
+#include "stages/data/runs.h"
+#include "stages/dose/layer_drops.h"
+#include "stages/dose/saturation.h"
+#include "stages/dose/share_count.h"
+#include "stages/dose/shares.h"
+#include "stages/dose/wish.h"
+#include "tests/program/machines.h"
+
+namespace lamina::dose {
+namespace {
+
+constexpr std::uint32_t kWide = 41, kHigh = 23;
+
+/// A byte a pixel: what the runs say, read back.
+std::vector<int> share_pixels(const LevelsView& image) {
+  std::vector<int> pixels(std::size_t{image.columns} * image.rows(), 0);
+  for (std::uint32_t r = 0; r < image.rows(); ++r) {
+    for (std::uint32_t i = image.row_offset[r]; i < image.row_offset[r + 1]; ++i) {
+      for (std::uint32_t c = image.change[2 * i]; c < image.change[2 * i + 1]; ++c) {
+        pixels[std::size_t{r} * image.columns + c] = image.level[i];
+      }
+    }
+  }
+  return pixels;
+}
+std::vector<int> share_pixels(const RunsView& image) {
+  Levels levels;
+  levels_of(image, 1, levels);
+  return share_pixels(levels.view());
+}
+
+Levels random_shares(std::uint32_t seed, std::uint32_t full) {
+  program::testing::Random random(seed);
+  Levels levels;
+  levels.start(kWide);
+  for (std::uint32_t r = 0; r < kHigh; ++r) {
+    for (std::uint32_t c = 0; c < kWide;) {
+      const std::uint32_t end = std::min(kWide, c + 1 + random() % 6);
+      levels.append(c, end, static_cast<std::uint8_t>(random() % (full + 1)));
+      c = end;
+    }
+    levels.end_row();
+  }
+  return levels;
+}
+
+Runs random_mask(std::uint32_t seed) {
+  Runs mask;
+  at_least(random_shares(seed, 2), 1, mask);
+  return mask;
+}
+
+TEST(Shares, AreTurnedMaskedAndMarkedPixelByPixel) {
+  for (std::uint32_t seed = 1; seed < 20; ++seed) {
+    const Levels image = random_shares(seed, 15);
+    const Runs mask = random_mask(seed + 100);
+    const std::vector<int> before = share_pixels(image.view()), set = share_pixels(mask.view());
+    Levels masked, marked, turned;
+    within(image, mask, masked);
+    mark_core(image, mask, 15, marked);
+    const std::vector<int> in_mask = share_pixels(masked.view()), in_core = share_pixels(marked.view());
+    for (std::size_t i = 0; i < before.size(); ++i) {
+      ASSERT_EQ(in_mask[i], set[i] != 0 ? before[i] : 0);
+      ASSERT_EQ(in_core[i], before[i] + (set[i] != 0 && before[i] > 0 ? 15 : 0));
+    }
+    for (const auto& [x, y] : {std::pair{true, false}, {false, true}, {true, true}}) {
+      mirror(image, x, y, turned);
+      const std::vector<int> after = share_pixels(turned.view());
+      for (std::uint32_t r = 0; r < kHigh; ++r) {
+        for (std::uint32_t c = 0; c < kWide; ++c) {
+          ASSERT_EQ(after[r * kWide + c], before[(y ? kHigh - 1 - r : r) * kWide + (x ? kWide - 1 - c : c)]);
+        }
+      }
+    }
+  }
+}
+
+TEST(Shares, DifferencesAreCountedAndThoseWithoutABoundaryBesideThem) {
+  for (std::uint32_t seed = 1; seed < 20; ++seed) {
+    const Runs a = random_mask(seed), b = random_mask(seed + 50);
+    const std::vector<int> one = share_pixels(a.view()), other = share_pixels(b.view());
+    const auto at = [&](std::int64_t c, std::int64_t r) {
+      return c < 0 || r < 0 || c >= kWide || r >= kHigh ? 0 : one[static_cast<std::size_t>(r * kWide + c)];
+    };
+    std::uint64_t pixels = 0, far = 0;
+    for (std::int64_t r = 0; r < kHigh; ++r) {
+      for (std::int64_t c = 0; c < kWide; ++c) {
+        const std::size_t i = static_cast<std::size_t>(r * kWide + c);
+        if (one[i] == other[i]) continue;
+        ++pixels;
+        bool alike = true;
+        for (std::int64_t k = 0; k < 9; ++k) alike = alike && at(c + k % 3 - 1, r + k / 3 - 1) == one[i];
+        far += alike ? 1 : 0;
+      }
+    }
+    const Difference found = difference(a, b);
+    ASSERT_EQ(found.pixels, pixels);
+    ASSERT_EQ(found.far, far);
+  }
+  const Runs empty{5, {0, 0, 0, 0}, {}}, square{5, {0, 2, 4, 6}, {0, 5, 0, 5, 0, 5}};
+  EXPECT_EQ(difference(empty, square).far, 15u);
+  EXPECT_EQ(difference(square, empty).far, 3u);  // its own edge is a boundary, that of the image too
+}
+
+// Levels 0 to 3 of a full voxel's 3.5 drops are 0, 1.1667, 2.3333 and 3.5: rounded 0, 1, 2, 4.
+TEST(Shares, BecomeDropsInProportionOrRounded) {
+  LayerDose dose = one_drop();
+  dose.shell = dose.core = dose.asked_shell = dose.asked_inside = 7 * kOneDrop / 2;
+  const std::vector<int> rounded{0, 1, 2, 4};
+  for (const bool dithered : {true, false}) {
+    DropWork work;
+    work.shares = random_shares(3, 3);
+    const std::vector<int> levels = share_pixels(work.shares.view());
+    Runs image, second;
+    image.columns = second.columns = kWide;
+    take_half(3, image = random_mask(9), second, work);
+    const std::vector<int> half = share_pixels(image.view());
+    const ZoneSums sums = drops_of_layer({3, dithered, {}, 4}, dose, 5, image, second, work);
+    const std::vector<int> drops = share_pixels(work.levels.view()), first = share_pixels(image.view());
+    std::uint64_t sum = 0;
+    for (std::size_t i = 0; i < levels.size(); ++i) {
+      sum += static_cast<std::uint64_t>(levels[i]);
+      ASSERT_EQ(half[i], levels[i] >= 2 ? 1 : 0);
+      ASSERT_EQ(first[i], drops[i] > 0 ? 1 : 0);
+      const double wished = 3.5 * levels[i] / 3;
+      if (dithered) {
+        ASSERT_TRUE(drops[i] == static_cast<int>(wished) || drops[i] == static_cast<int>(wished) + 1);
+      } else {
+        ASSERT_EQ(drops[i], rounded[static_cast<std::size_t>(levels[i])]);
+      }
+    }
+    EXPECT_EQ(sums.full_voxels, (2 * sum + 3) / 6);
+    EXPECT_EQ(sums.asked_drops, (7 * sum + 3) / 6);
+  }
+}
+
+TEST(Shares, AreToldInOneLine) {
+  ShareCount count;
+  count.add(150, 2, 0);
+  count.add(50, 1, 1);
+  EXPECT_EQ(count.told(16, true),
+            "16 levels come to 200 full voxels, dithered; 3 (1.500 %) half full or more are not as their centre, 1 away from "
+            "any boundary");
+}
+
+}  // namespace
+}  // namespace lamina::dose
