@@ -6,11 +6,13 @@
 #include <algorithm>
 #include <cstdlib>
 #include <filesystem>
+#include <nlohmann/json.hpp>
 #include <optional>
 
 #include "pipeline/check/job_files.h"
 #include "pipeline/output/directory.h"
 #include "pipeline/output/print_program.h"
+#include "pipeline/run/job_cost.h"
 #include "stages/read/image.h"
 #include "stages/replay/feeding.h"
 #include "stages/write/manifest/compare.h"
@@ -140,19 +142,24 @@ void check_frame(const std::string& directory, const ManifestHead& head, VerifyR
 }
 
 // Sums that need the profile.
-void finish_replay(const Inspection& inspection) {
+void finish_replay(const Inspection& inspection, const std::optional<JobCost>& cost) {
   if (!inspection.machine || inspection.report.replayed == 0) return;
   VerifyReport& report = inspection.report;
   report.material = replay::material_of(inspection.machine->profile(), report.replay);
   report.coverage = static_cast<double>(report.replay.drops) / static_cast<double>(report.replayed) /
                     static_cast<double>(inspection.head.grid.columns()) / static_cast<double>(inspection.head.grid.rows());
+  report.use = {};
+  report.use.facts = std::make_shared<nlohmann::ordered_json>();
+  cost->account().tell(report.use.results, *report.use.facts, report.use.quote);
 }
 
-void check_layers(const std::string& directory, const Manifest& manifest, bool quick, VerifyReport& report) {
+void check_layers(const std::string& directory, const Manifest& manifest, bool quick, std::optional<JobCost>& cost,
+                  VerifyReport& report) {
   Inspection inspection{directory, manifest.head, quick, std::nullopt, report};
   if (!manifest.head.machine.empty()) {
     prepare_replay(inspection);
     check_frame(directory, manifest.head, report);
+    if (!cost && inspection.machine) cost.emplace(inspection.machine->profile(), manifest);
     if (report.unfed.empty()) {
       for (const JobMaterial& material : manifest.head.materials) report.unfed.push_back({material.name});
     }
@@ -172,13 +179,17 @@ void check_layers(const std::string& directory, const Manifest& manifest, bool q
       report.moved += record.program.moved;
       report.lost += record.program.lost;
       for (std::size_t m = 0; m < report.unfed.size(); ++m) report.unfed[m].add(record.layer, record.images[m].unfed_pixels);
-      if (found[i].count) report.replay.add(*found[i].count);
+      if (found[i].count) {
+        report.replay.add(*found[i].count);
+        cost->add(record, found[i].count->drops, found[i].count->microseconds);
+        if (found[i].fault.empty()) found[i].fault = fault_of_shares(inspection.head, record);
+      }
       report.replayed += found[i].count.has_value();
       if (!found[i].fault.empty()) report.add(std::move(found[i].fault));
     }
   }
   report.layers += manifest.layers.size();
-  finish_replay(inspection);
+  finish_replay(inspection, cost);
 }
 
 void check_strays(const std::string& directory, const std::vector<Manifest>& manifests, VerifyReport& report) {
@@ -268,6 +279,7 @@ Result<VerifyReport> verify(const std::string& directory, const VerifyOptions& o
   }
   std::vector<Manifest> manifests;
   std::vector<ShardRange> shards;
+  std::optional<JobCost> cost;
   bool whole_job = false;  // a manifest of it is there
   bool interrupted = false;
   for (const ManifestFile& file : files) {
@@ -289,7 +301,7 @@ Result<VerifyReport> verify(const std::string& directory, const VerifyOptions& o
     if (file.shard) shards.push_back({file.name, *file.shard, manifest->head.first_layer, manifest->head.last_layer});
     manifests.push_back(std::move(*manifest));
   }
-  for (const Manifest& manifest : manifests) check_layers(directory, manifest, options.quick, report);
+  for (const Manifest& manifest : manifests) check_layers(directory, manifest, options.quick, cost, report);
   // An interrupted run may have finished layers without a line in its manifest.
   if (!interrupted) check_strays(directory, manifests, report);
   if (!whole_job && !manifests.empty()) check_shards(shards, manifests[0].head.layer_count, report);

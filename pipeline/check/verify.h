@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "pipeline/run/summary.h"
 #include "stages/data/layer.h"
 #include "stages/data/status.h"
 #include "stages/replay/count.h"
@@ -27,6 +28,7 @@ struct VerifyReport : Faults {
   std::vector<UnfedPowder> unfed;     // by material, of a job with several and a machine
   replay::Material material;          // used up
   double coverage = 0;                // drops / pixels of the replayed layers
+  Summary use;                        // what they use up and cost: lines, facts, table; empty without programs
 };
 
 /// Compares every file with the manifest of the whole job, or of all shards present: existence, size and hash. Unless

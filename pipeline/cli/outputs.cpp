@@ -8,7 +8,9 @@
 #include <optional>
 #include <vector>
 
+#include "stages/cost/quote_table.h"
 #include "stages/data/text/readable.h"
+#include "stages/write/file.h"
 #include "stages/write/replaceable.h"
 #include "stages/write/voxels/image.h"
 
@@ -28,7 +30,7 @@ constexpr InputOption kInputs[] = {{"--job", "the job file"},
                                    {"--measure", "a measured table"},
                                    {"--parts", "a part"},
                                    {"--scan", "a scan"}};
-constexpr std::string_view kOutputs[] = {"-o,--output", "--save-job", "--plot", "--target", "--solid", "--void"};
+constexpr std::string_view kOutputs[] = {"-o,--output", "--save-job", "--plot", "--target", "--solid", "--void", "--quote"};
 
 /// An output file of a command. Marks: every such file of lamina contains one of them in its head; a leading ^ means at
 /// the very start.
@@ -40,6 +42,7 @@ struct OwnFile {
 constexpr std::string_view kPicture("Software\0lamina", 15), kDrawing = "<!-- drawn by lamina -->";
 constexpr OwnFile kOwnFiles[] = {
     {"", "--save-job", false, {"^# A job of lamina."}},
+    {"", "--quote", false, {"^part,copies,volume_mm3,pixels,drops,"}},
     {"heights", "-o,--output", true, {"^layers    ", "^way    ", "^table,layer,", "^{\"height_mm\":", "^Portugu"}},
     {"heights", "--plot", false, {kDrawing, kPicture}},
     {"permeability", "--plot", false, {kDrawing, kPicture}},
@@ -169,6 +172,12 @@ Status check_own_file(const std::string& path, std::span<const std::string_view>
                fmt::format("{}: is there already, and is no such file of lamina; name another one, or replace it "
                            "with --overwrite",
                            path)};
+}
+
+Status write_quote(const Arguments& arguments, const std::vector<std::vector<std::string>>& rows) {
+  if (!arguments.has("--quote")) return {};
+  if (rows.empty()) return Error{Fault::kInput, "--quote: the job has no machine, or layers whose time was not recorded"};
+  return write::write_file(arguments.text("--quote"), cost::csv_text(rows));
 }
 
 Status check_outputs(std::string_view command, const Arguments& arguments) {

@@ -4,6 +4,7 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "pipeline/job/job.h"
 #include "stages/data/status.h"
@@ -36,6 +37,9 @@ Status check_folder(std::string_view flag, const std::string& file);
 
 /// Allows a file to be replaced if it is absent, empty or carries one of lamina's marks. errors  kUsage
 Status check_own_file(const std::string& path, std::span<const std::string_view> marks);
+
+/// Writes the table that --quote asks for. errors  kInput: there is none, as layers of an earlier build have no times
+Status write_quote(const Arguments& arguments, const std::vector<std::vector<std::string>>& rows);
 
 /// Whether an option's value is an input file; whether it is an output file.
 bool is_input_option(std::string_view flag);

@@ -173,6 +173,7 @@ struct Job {
   bool allow_empty = false;             // a whole job may have nothing
   bool allow_unbound = false;           // layers may get less binder than the machine's powder needs
   bool timing = false;                  // tell where the time goes
+  bool quote = false;                   // tell what each part uses up, without prices too
   bool json = false;
   bool quiet = false;
   std::vector<std::string> notes;  // notes from reading it: old forms and their replacements

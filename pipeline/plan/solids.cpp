@@ -38,8 +38,7 @@ std::vector<std::uint32_t> levels_of(const Scene& scene, const Job& job, const M
 }
 
 /// What keeps a job from levels, and what to do; empty if nothing does.
-std::string_view against_shares(const Scene& scene, const Job& job, const Materials& materials,
-                                const DoseZones& zones) {
+std::string_view against_shares(const Scene& scene, const Job& job, const Materials& materials, const DoseZones& zones) {
   if (!scene.images.empty()) return "meshes; leave out the parts that are images";
   if (materials.several()) return "one material; give all parts the same";
   if (zones.several()) return "parts of one dose; leave out part.saturation_percent and part.bleed_um";

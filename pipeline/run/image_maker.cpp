@@ -93,7 +93,7 @@ class ImageMaker : public Maker {
       if (Status status = imager_.bleed(layer, work.images); !status) return status;
       if (plan_.images->dose.bleeds()) sanity_.add_left(layer, work.images.runs);
       imager_.dose(layer, work.images, made.record);
-      if (cost_) cost_->count(work.images.runs, made.record);
+      if (cost_) cost_->count(work.images.runs, work.images.drops, made.record);
       return Status();
     });
     if (plan_.job.dry_run) {
@@ -179,7 +179,7 @@ class ImageMaker : public Maker {
       binder_.add(*budget, record.layer, record.dosed_pixels, record.drops, record.asked_drops, record.program.lost);
     }
     if (plan_.job.levels > 0) shares_.add(record.dosed_pixels, record.half_differs, record.half_far);
-    if (cost_) cost_->add(record);
+    if (cost_) cost_->add(record, record.program.drops, record.program.microseconds);
     const PixelGrid& grid = plan_.images->grid;
     set_pixels_ += record.set_pixels;
     moved_pixels_ += record.program.moved;
@@ -189,9 +189,7 @@ class ImageMaker : public Maker {
     for (std::size_t m = 0; plan_.images->materials.several() && m < record.images.size(); ++m)
       materials_[m].second += record.images[m].set_pixels;
     const double pixel_mm2 = 25.4 * 25.4 / (grid.x.dpi() * grid.y.dpi());
-    // Also where less than a drop a pixel falls.
-    const std::uint64_t filled = plan_.images->dose.saturates() ? record.dosed_pixels : record.set_pixels;
-    volume_mm3_ += static_cast<double>(filled) * pixel_mm2 * mm(record.layer.thickness);
+    volume_mm3_ += static_cast<double>(record.filled_pixels()) * pixel_mm2 * mm(record.layer.thickness);
   }
 
   const Plan& plan_;
@@ -266,7 +264,7 @@ void ImageMaker::tell(Summary& summary) const {
   }
   if (const auto& budget = plan_.images->dose.budget()) tell_binder(*budget, summary);
   if (print_seconds > 0) result("printing", replay::time_text(print_seconds, plan_.images->machine->machine.name));
-  if (timed_ && cost_) cost_->tell(summary);
+  if (timed_ && cost_) cost_->account().tell(summary.results, (*summary.facts)["use"], summary.quote);
   if (!summary.dry_run) {
     end("rate", fmt::format("{:.2f} Gpx/s, {:.1f} layers/s ({})", pixels_a_second / 1e9,
                             summary.layer_seconds > 0 ? summary.layers_planned / summary.layer_seconds : 0, isa));

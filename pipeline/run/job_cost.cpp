@@ -1,42 +1,40 @@
 #include "pipeline/run/job_cost.h"
 
 #include <algorithm>
-#include <nlohmann/json.hpp>
 
 #include "pipeline/run/sanity.h"
-#include "stages/cost/told.h"
-#include "stages/write/manifest/manifest.h"
 
 namespace lamina::pipeline {
 
+JobCost::JobCost(const Machine& machine, const Manifest& manifest)
+    : account_(machine, manifest.head.grid, manifest.head.parts,
+               std::ranges::any_of(manifest.layers, [](const LayerRecord& record) { return !record.part_pixels.empty(); }),
+               title_of(manifest.head.parts)) {}
+
+// What images set is nobody's window: with them the job is told as one.
 JobCost::JobCost(const Plan& plan)
-    : machine_(plan.images->machine->machine),
-      tally_(machine_, plan.images->grid, plan.scene->images.empty() ? plan.scene->parts.size() : 1) {
-  for (const PartSummary& part : plan.scene->parts) names_.push_back(part.path);
-  // What images set is nobody's window: with them the job is told as one.
-  if (!plan.scene->images.empty()) names_ = {title_of(plan.scene->parts)};
-  if (names_.size() < 2 || !cost::has_prices(machine_.cost)) return;
+    : account_(plan.images->machine->machine, plan.images->grid, plan.scene->parts,
+               plan.scene->images.empty() && (plan.job.quote || cost::has_prices(plan.images->machine->machine.cost)),
+               title_of(plan.scene->parts)) {
+  if (account_.parts() < 2) return;
+  saturates_ = plan.images->dose.saturates();
   std::vector<cost::Body> bodies;
   for (const sanity::Solid& solid : solids_from_above(*plan.scene)) bodies.push_back({solid.box, solid.part, solid.group});
   const Mirror mirror = plan.job.mirror;
   const bool mirrored = mirror != Mirror::kNone;
-  windows_.emplace(bodies, names_.size(), plan.images->grid, mirrored && mirror != Mirror::kY,
+  windows_.emplace(bodies, account_.parts(), plan.images->grid, mirrored && mirror != Mirror::kY,
                    mirrored && mirror != Mirror::kX);
 }
 
-void JobCost::count(const RunsView& image, LayerRecord& record) const {
-  if (windows_) record.part_pixels = windows_->count(record.layer, image);
+void JobCost::count(const RunsView& image, const DropWork& drops, LayerRecord& record) const {
+  if (!windows_) return;
+  record.part_pixels = saturates_ ? windows_->count(record.layer, drops.zones) : windows_->count(record.layer, image);
+  if (saturates_) record.part_drops = windows_->sum(record.layer, drops.levels);
 }
 
-void JobCost::add(const LayerRecord& record) {
-  tally_.add(record.layer.thickness, record.program.microseconds, record.program.drops,
-             std::max(record.set_pixels, record.dosed_pixels), record.part_pixels);
-}
-
-void JobCost::tell(Summary& summary) const {
-  const cost::Quote quote = tally_.quote();
-  for (auto& line : cost::lines_of(quote, machine_.cost, names_)) summary.results.push_back(std::move(line));
-  (*summary.facts)["use"] = cost::json_of(quote, machine_.cost, names_);
+void JobCost::add(const LayerRecord& record, std::uint64_t drops, std::int64_t microseconds) {
+  account_.tally().add(record.layer.thickness, microseconds, drops, record.filled_pixels(), record.part_pixels,
+                       record.part_drops);
 }
 
 }  // namespace lamina::pipeline

@@ -2,34 +2,32 @@
 #pragma once
 
 #include <optional>
-#include <string>
-#include <vector>
 
 #include "pipeline/plan/plan.h"
-#include "pipeline/run/summary.h"
-#include "stages/cost/cost.h"
+#include "stages/cost/account.h"
 #include "stages/cost/part_pixels.h"
-#include "stages/write/manifest/record.h"
+#include "stages/write/manifest/manifest.h"
 
 namespace lamina::pipeline {
 
-/// Of a plan with a machine, which outlives it. Parts are told apart where there are several and anything has a price.
+/// Of a job with a machine.
 class JobCost {
  public:
+  /// Parts are told apart where there are several, and anything has a price or their table is wanted.
   explicit JobCost(const Plan& plan);
+  /// Of a finished job, whose parts are told apart if its layers say what is whose.
+  JobCost(const Machine& machine, const Manifest& manifest);
 
-  /// Counts the pixels of each part in a layer's image. From many threads at once.
-  void count(const RunsView& image, LayerRecord& record) const;
-  /// From one thread at a time.
-  void add(const LayerRecord& record);
-  /// Its lines and facts.
-  void tell(Summary& summary) const;
+  /// Counts the pixels of each part in a layer, and its drops where a saturation decides them. From many threads at once.
+  void count(const RunsView& image, const DropWork& drops, LayerRecord& record) const;
+  /// From one thread at a time. drops, microseconds  of its print program
+  void add(const LayerRecord& record, std::uint64_t drops, std::int64_t microseconds);
+  const cost::Account& account() const { return account_; }
 
  private:
-  const Machine& machine_;
-  std::vector<std::string> names_;
-  cost::Tally tally_;
+  cost::Account account_;
   std::optional<cost::PartPixels> windows_;
+  bool saturates_ = false;
 };
 
 }  // namespace lamina::pipeline

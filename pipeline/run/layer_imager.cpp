@@ -41,8 +41,8 @@ void add(const raster::LayerReport& solid, raster::LayerReport& all) {
 }  // namespace
 
 std::uint64_t ImageWork::bytes() const {
-  std::uint64_t total = scratch.bytes() + materials.bytes() + zones.bytes() + bleed.bytes() + drops.bytes() +
-                        coverage.bytes() + (beads ? beads->bytes() : 0);
+  std::uint64_t total = scratch.bytes() + materials.bytes() + zones.bytes() + bleed.bytes() + drops.bytes() + coverage.bytes() +
+                        (beads ? beads->bytes() : 0);
   for (const Runs* image : {&runs, &second, &third, &lowest, &highest, &section}) {
     total += bytes_held(image->row_offset) + bytes_held(image->change);
   }

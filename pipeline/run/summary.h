@@ -40,6 +40,7 @@ struct Summary {
   using Lines = std::vector<std::pair<std::string, std::string>>;  // name, text
   Lines head, results, end;                                        // before the layers, after them, after memory
   std::shared_ptr<nlohmann::ordered_json> facts;                   // an object, or null
+  std::vector<std::vector<std::string>> quote;                     // rows of a table of costs; empty for none
 
   /// Aligned lines with units, then one line per warning.
   std::string text() const;

@@ -4,10 +4,12 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
 #include <span>
 
 #include "pipeline/job/file.h"
+#include "pipeline/run/job_cost.h"
 #include "pipeline/show/report_cast.h"
 #include "pipeline/show/report_doubts.h"
 #include "pipeline/show/report_source.h"
@@ -159,6 +161,12 @@ Result<Report> make_report(const std::string& path, const ReportOptions& options
   if (!seen) return seen.error();
   seen->laid = options.laid;
   seen->laid_svg = options.laid_svg;
+  if (source->machine) {
+    JobCost cost(*source->machine, manifest);
+    for (std::size_t i = 0; i < manifest.layers.size(); ++i)
+      cost.add(manifest.layers[i], manifest.layers[i].program.drops, std::llround(1e6 * seen->seconds[i]));
+    seen->quote = cost.account().rows();
+  }
   if (views.empty()) {
     auto built = build_up(*source, seen->window);
     if (!built) return built.error();

@@ -78,6 +78,7 @@ Result<ReportSource> source_of_images(const std::string& directory, ReportSource
     auto built = machine_of_job(directory, head);
     if (!built) return Error{built.error().fault, fmt::format("{}/{}", directory, built.error().message)};
     machine.emplace(std::move(*built));
+    source.machine = machine->profile();
   }
   const auto manifest = std::make_shared<const Manifest>(source.manifest);
   source.layer = [directory, manifest, machine](std::uint32_t place, bool timed) -> Result<LayerSeen> {

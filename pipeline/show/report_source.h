@@ -3,9 +3,11 @@
 
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <string>
 
 #include "stages/data/grid.h"
+#include "stages/data/machine.h"
 #include "stages/data/runs.h"
 #include "stages/data/status.h"
 #include "stages/write/manifest/manifest.h"
@@ -20,7 +22,8 @@ struct LayerSeen {
 struct ReportSource {
   std::string manifest_path;
   Manifest manifest;
-  PixelGrid grid;  // of the layers' runs
+  PixelGrid grid;                  // of the layers' runs
+  std::optional<Machine> machine;  // that the job's programs are for
   /// A layer, by its place in the manifest; for any thread. timed: with the machine's seconds
   /// errors  kVerification: a file that is missing or differs from the manifest, a program that prints a different image
   std::function<Result<LayerSeen>(std::uint32_t place, bool timed)> layer;

@@ -50,7 +50,7 @@ Tally::Tally(const Machine& machine, const PixelGrid& grid, std::size_t parts)
 }
 
 void Tally::add(std::int64_t thickness_nm, std::int64_t microseconds, std::uint64_t drops, std::uint64_t pixels,
-                std::span<const std::uint64_t> part_pixels) {
+                std::span<const std::uint64_t> part_pixels, std::span<const std::uint64_t> part_drops) {
   const std::int64_t fed_nl = whole(machine_.powder.dose * static_cast<double>(thickness_nm) * 1e-3 * bed_mm2_);
   const std::uint64_t of_layer = pixels * static_cast<std::uint64_t>(thickness_nm);
   drops_ += drops + machine_.cost.spit_drops;
@@ -63,11 +63,15 @@ void Tally::add(std::int64_t thickness_nm, std::int64_t microseconds, std::uint6
   if (pixels == 0 || part_pixels.size() != parts_.size()) {
     unshared_microseconds_ += microseconds;
     unshared_nl_ += fed_nl;
+    unknown_layers_ += pixels > 0;
     return;
   }
+  if (part_drops.size() != parts_.size()) part_drops = part_pixels;
   const auto time = shares(microseconds, part_pixels), fed = shares(fed_nl, part_pixels);
+  const auto fired = shares(static_cast<std::int64_t>(drops), part_drops);
   for (std::size_t p = 0; p < parts_.size(); ++p) {
     parts_[p].pixels += part_pixels[p];
+    parts_[p].drops += static_cast<std::uint64_t>(fired[p]);
     parts_[p].pixel_nm += part_pixels[p] * static_cast<std::uint64_t>(thickness_nm);
     parts_[p].microseconds += time[p];
     parts_[p].fed_nl += fed[p];
@@ -76,7 +80,7 @@ void Tally::add(std::int64_t thickness_nm, std::int64_t microseconds, std::uint6
 
 Quote Tally::quote() const {
   const Machine::Cost& cost = machine_.cost;
-  Use job{pixels_, microseconds_};
+  Use job{pixels_, drops_, microseconds_};
   job.binder_nl = whole(static_cast<double>(drops_) * machine_.head.drop_pl * 1e-3);
   job.fed_nl = fed_nl_;
   job.bound_nl = whole(static_cast<double>(pixel_nm_) * 1e-3 * pixel_mm2_);
@@ -85,20 +89,24 @@ Quote Tally::quote() const {
   job.binder_cents = whole(100 * cost.binder_price_l * static_cast<double>(job.binder_nl) / kNlPerLitre);
   job.powder_cents = whole(100 * powder_price_l(cost) * spent_nl / kNlPerLitre);
 
-  std::vector<std::uint64_t> pixels, pixel_nm, time, fed;
-  for (const Part& part : parts_) pixels.push_back(part.pixels), pixel_nm.push_back(part.pixel_nm);
+  std::vector<std::uint64_t> pixels, drops, pixel_nm, time, fed;
+  for (const Part& part : parts_) {
+    pixels.push_back(part.pixels), drops.push_back(part.drops), pixel_nm.push_back(part.pixel_nm);
+  }
   const auto further_time = shares(unshared_microseconds_, pixels), further_fed = shares(unshared_nl_, pixels);
   for (std::size_t p = 0; p < parts_.size(); ++p) {
     time.push_back(static_cast<std::uint64_t>(parts_[p].microseconds + further_time[p]));
     fed.push_back(static_cast<std::uint64_t>(parts_[p].fed_nl + further_fed[p]));
   }
-  const auto all_pixels = shares(static_cast<std::int64_t>(pixels_), pixels), binder = shares(job.binder_nl, pixels);
+  const auto all_pixels = shares(static_cast<std::int64_t>(pixels_), pixels), binder = shares(job.binder_nl, drops);
+  const auto all_drops = shares(static_cast<std::int64_t>(drops_), drops);
   const auto bound = shares(job.bound_nl, pixel_nm), hour_cents = shares(job.hour_cents, time);
-  const auto binder_cents = shares(job.binder_cents, pixels), powder_cents = shares(job.powder_cents, fed);
-  Quote quote{job, {}};
+  const auto binder_cents = shares(job.binder_cents, drops), powder_cents = shares(job.powder_cents, fed);
+  Quote quote{job, {}, unknown_layers_};
   for (std::size_t p = 0; p < parts_.size(); ++p) {
-    quote.parts.push_back({static_cast<std::uint64_t>(all_pixels[p]), static_cast<std::int64_t>(time[p]), binder[p],
-                           static_cast<std::int64_t>(fed[p]), bound[p], hour_cents[p], binder_cents[p], powder_cents[p]});
+    quote.parts.push_back({static_cast<std::uint64_t>(all_pixels[p]), static_cast<std::uint64_t>(all_drops[p]),
+                           static_cast<std::int64_t>(time[p]), binder[p], static_cast<std::int64_t>(fed[p]), bound[p],
+                           hour_cents[p], binder_cents[p], powder_cents[p]});
   }
   return quote;
 }

@@ -9,9 +9,9 @@
 //      spent    bound + left x (1 - reused share)
 //      cost     binder x price + spent x price + hours x price, each rounded to hundredths
 //
-// A part's share: binder by its set pixels; hours and powder layer by layer, by its pixels of that layer, so that a part pays
-// for the layers in which it stands. Layers without a pixel are shared by all pixels. Shares are whole microseconds, nanolitres
-// and hundredths by the largest remainder: those of the parts add up to the job exactly.
+// A part's share: binder by its drops; hours and powder layer by layer, by its pixels of that layer that are to be filled, so
+// that a part pays for the layers in which it stands. Layers without a pixel are shared by all pixels. Shares are whole drops,
+// microseconds, nanolitres and hundredths by the largest remainder: those of the parts add up to the job exactly.
 #pragma once
 
 #include <cstdint>
@@ -30,7 +30,7 @@ std::vector<std::int64_t> shares(std::int64_t total, std::span<const std::uint64
 
 /// What is used up; of a job, or of one of its parts.
 struct Use {
-  std::uint64_t pixels = 0;
+  std::uint64_t pixels = 0, drops = 0;  // drops: those of spitting too
   std::int64_t microseconds = 0;
   std::int64_t binder_nl = 0;                                       // nanolitres: 1000 of them are 1 mm3
   std::int64_t fed_nl = 0, bound_nl = 0;                            // powder
@@ -42,7 +42,8 @@ struct Use {
 
 struct Quote {
   Use job;
-  std::vector<Use> parts;  // their sum is the job, field by field
+  std::vector<Use> parts;            // their sum is the job, field by field
+  std::uint32_t unknown_layers = 0;  // have pixels, and do not say whose: shared as those without are
 };
 
 /// Adds up the layers of a job, in any order.
@@ -51,15 +52,16 @@ class Tally {
   /// machine  outlives this object. parts  of the job, at least 1
   Tally(const Machine& machine, const PixelGrid& grid, std::size_t parts);
 
-  /// pixels  set ones of the layer. part_pixels  of each part; empty: unknown, or of the only part
+  /// pixels  of the layer that are to be filled. part_pixels  of each part; empty: unknown, or of the only part
+  /// part_drops  of each part; empty: as its pixels
   void add(std::int64_t thickness_nm, std::int64_t microseconds, std::uint64_t drops, std::uint64_t pixels,
-           std::span<const std::uint64_t> part_pixels);
+           std::span<const std::uint64_t> part_pixels, std::span<const std::uint64_t> part_drops = {});
 
   Quote quote() const;
 
  private:
   struct Part {
-    std::uint64_t pixels = 0, pixel_nm = 0;
+    std::uint64_t pixels = 0, drops = 0, pixel_nm = 0;
     std::int64_t microseconds = 0, fed_nl = 0;
   };
   const Machine& machine_;
@@ -68,6 +70,7 @@ class Tally {
   std::uint64_t drops_ = 0, pixels_ = 0, pixel_nm_ = 0;
   std::int64_t microseconds_ = 0, fed_nl_ = 0;
   std::int64_t unshared_microseconds_ = 0, unshared_nl_ = 0;
+  std::uint32_t unknown_layers_ = 0;
 };
 
 /// Price of a litre of powder as fed: powder_price_l, or powder_price_kg x powder_kg_l.

@@ -17,6 +17,13 @@ std::array<std::uint32_t, 2> pixels_of(const PixelAxis& axis, std::int64_t low, 
   return {at(low), at(high + 1)};
 }
 
+constexpr auto as_one = [](std::size_t) { return std::uint8_t{1}; };
+
+std::span<const std::uint32_t> changes_of(const LevelsView& image, std::uint32_t row) {
+  const std::size_t first = image.row_offset[row];
+  return image.change.subspan(2 * first, 2 * (image.row_offset[row + 1] - first));
+}
+
 }  // namespace
 
 PartPixels::PartPixels(std::span<const Body> bodies, std::size_t parts, const PixelGrid& grid, bool mirror_x, bool mirror_y)
@@ -43,40 +50,57 @@ PartPixels::PartPixels(std::span<const Body> bodies, std::size_t parts, const Pi
   }
 }
 
-std::uint64_t PartPixels::pixels_in(const Window& window, const RunsView& runs) {
-  std::uint64_t pixels = 0;
-  for (std::uint32_t r = window.top; r < std::min(window.bottom, runs.rows()); ++r) {
-    const auto row = runs.row(r);
+template <class Row>
+std::uint64_t PartPixels::sum_in(const Window& window, std::uint32_t rows, const Row& row_of) {
+  std::uint64_t sum = 0;
+  for (std::uint32_t r = window.top; r < std::min(window.bottom, rows); ++r) {
+    const auto [row, level_of] = row_of(r);
     // Runs from the first one that ends behind the left side.
     std::size_t i = static_cast<std::size_t>(std::ranges::upper_bound(row, window.left) - row.begin()) / 2 * 2;
     for (; i + 1 < row.size() && row[i] < window.right; i += 2) {
       const std::uint32_t begin = std::max(row[i], window.left), end = std::min(row[i + 1], window.right);
-      if (begin < end) pixels += end - begin;
+      if (begin < end) sum += std::uint64_t{end - begin} * level_of(i / 2);
     }
   }
-  return pixels;
+  return sum;
 }
 
-std::vector<std::uint64_t> PartPixels::count(const Layer& layer, const RunsView& runs) const {
-  std::vector<std::uint64_t> pixels(parts_), weights;
+template <class Row>
+std::vector<std::uint64_t> PartPixels::sums(const Layer& layer, std::uint32_t rows, const Row& row_of) const {
+  std::vector<std::uint64_t> sums(parts_), weights;
   const auto reaches = [&](const Window& window) {
     return window.low <= layer.highest_plane() && window.high >= layer.lowest_plane();
   };
   for (const Group& group : groups_) {
     if (group.bodies.empty() || !reaches(group.around)) continue;
-    const std::uint64_t together = pixels_in(group.around, runs);
+    const std::uint64_t together = sum_in(group.around, rows, row_of);
     if (group.one_part || together == 0) {
-      pixels[group.around.part] += together;
+      sums[group.around.part] += together;
       continue;
     }
     weights.assign(group.bodies.size(), 0);
     for (std::size_t i = 0; i < group.bodies.size(); ++i) {
-      if (reaches(group.bodies[i])) weights[i] = pixels_in(group.bodies[i], runs);
+      if (reaches(group.bodies[i])) weights[i] = sum_in(group.bodies[i], rows, row_of);
     }
     const auto share = shares(static_cast<std::int64_t>(together), weights);
-    for (std::size_t i = 0; i < group.bodies.size(); ++i) pixels[group.bodies[i].part] += static_cast<std::uint64_t>(share[i]);
+    for (std::size_t i = 0; i < group.bodies.size(); ++i) sums[group.bodies[i].part] += static_cast<std::uint64_t>(share[i]);
   }
-  return pixels;
+  return sums;
+}
+
+std::vector<std::uint64_t> PartPixels::count(const Layer& layer, const RunsView& runs) const {
+  return sums(layer, runs.rows(), [&](std::uint32_t r) { return std::pair(runs.row(r), as_one); });
+}
+
+std::vector<std::uint64_t> PartPixels::count(const Layer& layer, const LevelsView& image) const {
+  return sums(layer, image.rows(), [&](std::uint32_t r) { return std::pair(changes_of(image, r), as_one); });
+}
+
+std::vector<std::uint64_t> PartPixels::sum(const Layer& layer, const LevelsView& image) const {
+  return sums(layer, image.rows(), [&](std::uint32_t r) {
+    const auto level_of = [&image, first = image.row_offset[r]](std::size_t run) { return image.level[first + run]; };
+    return std::pair(changes_of(image, r), level_of);
+  });
 }
 
 }  // namespace lamina::cost

@@ -7,6 +7,7 @@
 
 #include "stages/data/grid.h"
 #include "stages/data/layer.h"
+#include "stages/data/levels.h"
 #include "stages/data/mesh.h"
 #include "stages/data/runs.h"
 
@@ -29,6 +30,9 @@ class PartPixels {
 
   /// The pixels of each part; their sum is that of the groups. cost  rows of windows x log of a row's runs
   std::vector<std::uint64_t> count(const Layer& layer, const RunsView& runs) const;
+  /// The pixels of each part that are of any level, and the sums of its levels: where levels are drops, what it gets.
+  std::vector<std::uint64_t> count(const Layer& layer, const LevelsView& image) const;
+  std::vector<std::uint64_t> sum(const Layer& layer, const LevelsView& image) const;
 
  private:
   struct Window {
@@ -41,7 +45,10 @@ class PartPixels {
     std::vector<Window> bodies;
     bool one_part = true;
   };
-  static std::uint64_t pixels_in(const Window& window, const RunsView& runs);
+  template <class Row>
+  static std::uint64_t sum_in(const Window& window, std::uint32_t rows, const Row& row_of);
+  template <class Row>
+  std::vector<std::uint64_t> sums(const Layer& layer, std::uint32_t rows, const Row& row_of) const;
   std::vector<Group> groups_;
   std::size_t parts_;
 };

@@ -16,6 +16,7 @@ std::string money(std::int64_t cents) { return fmt::format("{}.{:02}", cents / 1
 
 nlohmann::ordered_json use_json(const Use& use, const Machine::Cost& cost) {
   nlohmann::ordered_json json = {{"set_pixels", use.pixels},
+                                 {"drops", use.drops},
                                  {"hours", hours(use)},
                                  {"binder_l", litres(use.binder_nl)},
                                  {"powder_fed_l", litres(use.fed_nl)},
@@ -32,7 +33,7 @@ nlohmann::ordered_json use_json(const Use& use, const Machine::Cost& cost) {
 }  // namespace
 
 std::vector<std::pair<std::string, std::string>> lines_of(const Quote& quote, const Machine::Cost& cost,
-                                                          std::span<const std::string> names) {
+                                                          std::span<const QuotedPart> parts) {
   std::vector<std::pair<std::string, std::string>> lines;
   const Use& job = quote.job;
   lines.emplace_back("material", fmt::format("{:.3f} ml of binder, {:.2f} ml of powder fed: {:.2f} bound, {:.2f} left over",
@@ -43,20 +44,25 @@ std::vector<std::pair<std::string, std::string>> lines_of(const Quote& quote, co
                        money(use.hour_cents), money(use.binder_cents), money(use.powder_cents));
   };
   lines.emplace_back("cost", text(job));
-  if (names.size() < 2) return lines;
-  for (std::size_t p = 0; p < names.size(); ++p) {
-    lines.emplace_back("", fmt::format("{}: {}", one_line(names[p]), text(quote.parts[p])));
+  if (parts.size() < 2) return lines;
+  for (std::size_t p = 0; p < parts.size(); ++p) {
+    lines.emplace_back("", fmt::format("{}: {}", one_line(parts[p].name), text(quote.parts[p])));
+  }
+  if (quote.unknown_layers > 0) {
+    lines.emplace_back("",
+                       fmt::format("{} layers do not say whose their pixels are; the parts share them as they do the others",
+                                   quote.unknown_layers));
   }
   return lines;
 }
 
-nlohmann::ordered_json json_of(const Quote& quote, const Machine::Cost& cost, std::span<const std::string> names) {
+nlohmann::ordered_json json_of(const Quote& quote, const Machine::Cost& cost, std::span<const QuotedPart> parts) {
   nlohmann::ordered_json json = use_json(quote.job, cost);
-  if (!has_prices(cost)) return json;
-  json["currency"] = cost.currency;
-  for (std::size_t p = 0; p < names.size(); ++p) {
+  if (has_prices(cost)) json["currency"] = cost.currency;
+  if (!has_prices(cost) && parts.size() < 2) return json;
+  for (std::size_t p = 0; p < parts.size(); ++p) {
     nlohmann::ordered_json& part = json["parts"].emplace_back();
-    part = {{"path", names[p]}};
+    part = {{"path", parts[p].name}};
     part.update(use_json(quote.parts[p], cost));
   }
   return json;

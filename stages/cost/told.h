@@ -8,15 +8,17 @@
 #include <vector>
 
 #include "stages/cost/cost.h"
+#include "stages/cost/quote_table.h"
 
 namespace lamina::cost {
 
 /// Lines with their names: binder and powder; with prices the cost, and that of each part if there are several.
-/// names  of the parts
+/// parts  as many as the quote has
 std::vector<std::pair<std::string, std::string>> lines_of(const Quote& quote, const Machine::Cost& cost,
-                                                          std::span<const std::string> names);
+                                                          std::span<const QuotedPart> parts);
 
-/// An object: hours, litres and, with prices, the currency's units of the job; the same of each part under "parts".
-nlohmann::ordered_json json_of(const Quote& quote, const Machine::Cost& cost, std::span<const std::string> names);
+/// An object: hours, litres and, with prices, the currency's units of the job; the same of each part under "parts", if there
+/// are prices or several.
+nlohmann::ordered_json json_of(const Quote& quote, const Machine::Cost& cost, std::span<const QuotedPart> parts);
 
 }  // namespace lamina::cost

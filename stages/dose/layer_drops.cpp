@@ -58,8 +58,8 @@ ZoneSums drops_of_layer(const DropRules& rules, const LayerDose& dose, std::uint
   return sums_of(work.zones, full, dose);
 }
 
-ZoneSums drops_of_parts(const DropRules& rules, std::span<const LayerDose> doses, std::uint32_t layer, std::span<const Runs> zone,
-                        Runs& image, Runs& second, DropWork& work) {
+ZoneSums drops_of_parts(const DropRules& rules, std::span<const LayerDose> doses, std::uint32_t layer,
+                        std::span<const Runs> zone, Runs& image, Runs& second, DropWork& work) {
   const auto count = static_cast<std::uint8_t>(zone.size());
   join_zones(zone, work.pieces, work.shares);
   mark_shell(rules, image, count, second, work);

@@ -44,7 +44,7 @@ ZoneSums drops_of_layer(const DropRules& rules, const LayerDose& dose, std::uint
 
 /// The same of parts that get different doses; no shares of voxels.
 /// doses, zone  of each of them; no pixel is in two of the images, and together they are `image`; at most 127
-ZoneSums drops_of_parts(const DropRules& rules, std::span<const LayerDose> doses, std::uint32_t layer, std::span<const Runs> zone,
-                        Runs& image, Runs& second, DropWork& work);
+ZoneSums drops_of_parts(const DropRules& rules, std::span<const LayerDose> doses, std::uint32_t layer,
+                        std::span<const Runs> zone, Runs& image, Runs& second, DropWork& work);
 
 }  // namespace lamina::dose

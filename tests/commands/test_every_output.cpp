@@ -39,6 +39,7 @@ const Row kRows[] = {
     {"jet", "-o,--output", "jet part.stl --layer 1 --machine hp45 --quiet -o @", "part.stl", "/manifest.json", true, false,
      true},
     {"jet", "--save-job", "jet part.stl --layer 1 --dry-run --quiet --save-job @", "part.stl"},
+    {"jet", "--quote", "jet part.stl --layer 1 --machine hp45 --dry-run --quiet --quote @", "part.stl"},
     {"slice", "-o,--output", "slice part.stl --layer 1 --quiet -o @", "part.stl", "/manifest.json", true, false, true},
     {"slice", "-o,--output", "slice part.stl --layer 1 --file-a-layer --quiet -o @", "part.stl", "/manifest.json", true, false,
      true},
@@ -71,6 +72,7 @@ const Row kRows[] = {
     {"machines", "--target", "machines --target @", nullptr},
     {"preview", "-o,--output", "preview made.gcode --quiet -o @.svg", "made.gcode"},
     {"preview", "-o,--output", "preview made.gcode --quiet -o @.png", "made.gcode"},
+    {"verify", "--quote", "verify powder --quiet --quote @", nullptr},
     {"report", "-o,--output", "report made --quiet -o @.html", nullptr},
     {"batch", "-o,--output", "batch list.txt --quiet -o @", "list.txt", "/summary.json", true, false, true},
     {"manual", "-o,--output", "manual --markdown -o @", nullptr, "/jet.md", true},
@@ -99,6 +101,7 @@ class EveryOutput : public ::testing::Test {
     for (const char* line : {"jet part.stl --layer 1 --dpi 60 --quiet -o made",
                              "jet part.stl --layer 1 --dpi 60 --quiet -o shards "
                              "--shard 1/1",
+                             "jet part.stl --layer 1 --machine hp45 --quiet -o powder",
                              "extrude part.stl --machine anet-a8 --layer 0.3 --quiet -o made.gcode"}) {
       const Outcome outcome = run(line);
       EXPECT_EQ(outcome.code, 0) << line << outcome.err;

@@ -6,6 +6,12 @@
 
 #include "stages/cost/cost.h"
 #include "stages/cost/part_pixels.h"
+#include "stages/data/grid.h"
+#include "stages/data/layer.h"
+#include "stages/data/levels.h"
+#include "stages/data/machine.h"
+#include "stages/data/mesh.h"
+#include "stages/data/runs.h"
 
 namespace lamina::cost {
 namespace {
@@ -97,7 +103,8 @@ TEST(Cost, WhatPartsHaveAddsUpToTheJob) {
     const Quote quote = tally.quote();
     Use sum;
     for (const Use& part : quote.parts) {
-      sum.pixels += part.pixels, sum.microseconds += part.microseconds, sum.binder_nl += part.binder_nl;
+      sum.pixels += part.pixels, sum.drops += part.drops, sum.microseconds += part.microseconds,
+          sum.binder_nl += part.binder_nl;
       sum.fed_nl += part.fed_nl, sum.bound_nl += part.bound_nl, sum.hour_cents += part.hour_cents;
       sum.binder_cents += part.binder_cents, sum.powder_cents += part.powder_cents;
     }
@@ -135,6 +142,17 @@ TEST(Cost, PixelsOfPartsApartAreExactAndOthersShareTheirs) {
   // In one group: 500 pixels by windows of 100 and 400; a part above the layer has none.
   Body touching[] = {{box(0, 1, 1, 1), 0, 0}, {box(2, 0, 2, 2), 1, 0}};
   EXPECT_EQ(PartPixels(touching, 2, bed, false, false).count(layer, runs), (Pixels{100, 400}));
+  // Drops: two a pixel where the columns are below 10, three beyond them; levels may touch within a row.
+  Levels drops;
+  drops.start(40);
+  for (int r = 0; r < 20; ++r) {
+    if (r < 10) drops.append(0, 10, 2);
+    drops.append(20, 30, 3), drops.append(30, 40, 1);
+    drops.end_row();
+  }
+  EXPECT_EQ(PartPixels(apart, 2, bed, false, false).sum(layer, drops), (Pixels{200, 800}));
+  EXPECT_EQ(PartPixels(apart, 2, bed, false, false).count(layer, drops), (Pixels{100, 400}));
+  EXPECT_EQ(PartPixels(apart, 2, bed, true, false).sum(layer, drops), (Pixels{100, 200}));
   touching[0].box.lo.z = 600'000;
   EXPECT_EQ(PartPixels(touching, 2, bed, false, false).count(layer, runs), (Pixels{0, 500}));
 }

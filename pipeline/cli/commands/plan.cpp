@@ -84,6 +84,7 @@ Outcome plan(const PlanCommand& row, const Arguments& arguments, Context& contex
   job->overwrite = arguments.has("--overwrite");
   job->dry_run = arguments.has("--dry-run");
   job->timing = arguments.has("--timing");
+  job->quote = arguments.has("--quote");
   job->json = arguments.has("--json");
   job->quiet = arguments.has("--quiet");
   job->leave_to_machine = true;
@@ -113,6 +114,7 @@ Outcome plan(const PlanCommand& row, const Arguments& arguments, Context& contex
   Result<Summary> summary = run(std::move(*resolved), progress, context.cancel());
   if (!summary) return summary.error();
   if (tells_pores) add_pores(summary->output, *summary);
+  if (Status status = write_quote(arguments, summary->quote); !status) return status.error();
   if (!job->quiet) {
     for (const std::string& note : left) context.say("note: " + note);
     context.say_text(summary->text());
@@ -137,6 +139,7 @@ const KeyChoice kJetKeys = {"bed", "layers", "heights", "place", "image", "machi
 const OptionSpec kJetSwitches[] = {
     {"--material", "NAME|NAME,...", "powder of all parts, or of each in their order; two vats can hold two", "",
      "Machine and binder"},
+    {"--quote", "CSV", "write what every part uses up and costs as a table (with --machine)", "", "Machine and binder"},
     {"--resume", "", "go on with an interrupted job; finished layers whose hash holds are kept", "", "Run"},
     {"--overwrite", "", "replace an earlier job in the directory", "", "Run"},
     {"--dry-run", "", "load, place and index, tell what it takes and how long it prints, write nothing", "", "Run"}};
@@ -151,6 +154,7 @@ std::string jet_closing() {
          "  lamina jet a.stl b.3mf --bed 400x400 --dpi 600 --copies 12 -o out\n"
          "  lamina jet part.obj --unit inch --rotate 0,0,90 --shrink 1.02,1.02,1.025 -o out\n"
          "  lamina jet a.stl b.stl --material steel,bronze --machine nuferbj --vat-rule majority -o out\n"
+         "  lamina jet a.stl b.stl --machine mine.toml --dry-run --quote quote.csv     what they cost, for the office\n"
          "  lamina jet part.stl --layers 100:110 --format png -o look      ten layers only\n"
          "  lamina jet part.stl --shard 1/4 -o out                         a quarter; then lamina merge out -o out\n"
          "  lamina jet part.stl --fill segmented --thin 1.5 --shell 1 -o out   pores planned by the filling, in a solid shell\n"
@@ -159,6 +163,9 @@ std::string jet_closing() {
 }
 
 Status complete_jet(const Arguments& arguments, Job& job) {
+  if (arguments.has("--quote") && job.machine.profile.empty())
+    return at_option("--quote", "tells what a machine uses up; add --machine");
+  if (Status status = check_folder("--quote", arguments.text("--quote")); !status) return status;
   if (!arguments.has("--material")) return {};
   const Status status = set_materials(arguments.text("--material"), job);
   return status ? status : Error{Fault::kUsage, "--material: " + status.error().message};

@@ -4,6 +4,7 @@
 
 #include "pipeline/check/verify.h"
 #include "pipeline/cli/command.h"
+#include "pipeline/cli/outputs.h"
 #include "stages/data/text/json.h"
 #include "stages/data/text/json_text.h"
 #include "stages/data/text/readable.h"
@@ -23,12 +24,15 @@ CommandSpec verify_spec() {
   spec.operand = "DIR|GCODE|SML";
   spec.operand_meaning =
       "directory that lamina jet or lamina slice wrote, or G-code or SML file of lamina extrude; several are verified in turn";
-  spec.options = {{"--quick", "", "sizes and hashes only, images are not decoded", "", ""},
+  spec.options = {{"--quote", "CSV", "write what every part uses up and costs as a table, of one directory", "", ""},
+                  {"--overwrite", "", "replace a file that lamina did not write", "", ""},
+                  {"--quick", "", "sizes and hashes only, images are not decoded", "", ""},
                   {"--json", "", "print one JSON object for each directory on stdout", "", ""},
                   {"--quiet", "", "say nothing but faults", "", ""}};
   spec.closing =
       "Examples:\n"
       "  lamina verify out\n"
+      "  lamina verify out --quote quote.csv      what it took, from what the files make the machine do\n"
       "  lamina verify --quick --json out | jq .fault_count";
   return spec;
 }
@@ -43,6 +47,7 @@ Json report_json(const VerifyReport& report) {
   Json json = {{"command", "verify"},   {"directory", report.directory},     {"ok", report.ok()}, {"layers", report.layers},
                {"bytes", report.bytes}, {"fault_count", report.fault_count}, {"faults", faults}};
   if (!report.machine.empty()) json["replay"] = replay::totals_json(totals_of(report));
+  if (report.use.facts) json["use"] = *report.use.facts;
   for (const UnfedPowder& powder : report.unfed) {
     json["unfed"].push_back({{"material", powder.name}, {"pixels", powder.pixels}, {"layers", powder.layers}});
   }
@@ -52,6 +57,9 @@ Json report_json(const VerifyReport& report) {
 Outcome run_verify(const Arguments& arguments, Context& context) {
   if (arguments.operands.empty())
     return Error{Fault::kUsage, "no directory to verify; name one that lamina jet or lamina slice wrote"};
+  if (arguments.has("--quote") && (arguments.operands.size() > 1 || arguments.has("--quick")))
+    return at_option("--quote", "is of one directory, whose programs are replayed; leave --quick out");
+  if (Status status = check_folder("--quote", arguments.text("--quote")); !status) return status;
   int code = 0;
   Answer answer(arguments, context);
   for (const std::string& directory : arguments.operands) {
@@ -72,11 +80,16 @@ Outcome run_verify(const Arguments& arguments, Context& context) {
                              readable_bytes(report->bytes)));
       if (report->replayed > 0) {
         for (const std::string& line : replay::totals_text(totals_of(*report))) answer.say(line);
+        for (const auto& [name, what] : report->use.results)
+          answer.say(fmt::format("{:<10}{}", name == "material" ? "used" : name, what));
         std::vector<Warning> doubts;
         for (const UnfedPowder& powder : report->unfed) sanity::warn_of_unfed(powder, doubts);
         for (const Warning& doubt : doubts) answer.say("warning   " + one_line(doubt.text));
       }
       if (Status status = answer.status(); !status) return status;
+    }
+    if (report->ok()) {
+      if (Status status = write_quote(arguments, report->use.quote); !status) return status;
     }
     if (arguments.has("--json")) {
       if (Status status = context.give(report_json(*report)); !status) return status.error();

@@ -107,6 +107,25 @@ std::string fault_of_file(const std::string& directory, const std::string& name,
   return digest->hash == hash ? "" : fmt::format("{}: its content is not what was written", name);
 }
 
+std::string fault_of_shares(const ManifestHead& head, const LayerRecord& record) {
+  const auto fault = [&](const std::vector<std::uint64_t>& shares, std::uint64_t total, std::string_view what) -> std::string {
+    if (shares.empty()) return {};
+    if (shares.size() != head.parts.size()) {
+      return fmt::format("layer {}: has {} of {} parts, the job has {}", record.layer.index, what, shares.size(),
+                         head.parts.size());
+    }
+    std::uint64_t left = total;
+    for (const std::uint64_t share : shares) {
+      if (share > left)
+        return fmt::format("layer {}: its parts have more {} than the {} of all", record.layer.index, what, total);
+      left -= share;
+    }
+    return {};
+  };
+  std::string pixels = fault(record.part_pixels, record.filled_pixels(), "pixels");
+  return pixels.empty() ? fault(record.part_drops, record.drops, "drops") : pixels;
+}
+
 std::uint64_t compare_paths(const std::string& directory, const Manifest& manifest, Faults& faults) {
   return PathComparison(directory, manifest, faults).run();
 }

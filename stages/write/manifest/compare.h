@@ -18,6 +18,9 @@ namespace lamina {
 std::string fault_of_file(const std::string& directory, const std::string& name, const Hash128& hash,
                           std::optional<std::uint64_t> bytes = {});
 
+/// "", or how the shares of a layer's parts contradict what the layer has, as in "layer 3: its parts ...".
+std::string fault_of_shares(const ManifestHead& head, const LayerRecord& record);
+
 /// Compares contours or toolpaths with their manifest: hash of each layer, in the single file or in per-layer files;
 /// layers without gaps; hash of the whole single file; no other layers in layers/.
 ///

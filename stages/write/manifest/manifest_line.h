@@ -102,6 +102,7 @@ void describe_images(Io& io, const ManifestHead& head, Record& record) {
     io.close("]");
   }
   io.list("part_pixels", record.part_pixels, [&](auto& pixels) { io.number("set", pixels); });
+  io.list("part_drops", record.part_drops, [&](auto& drops) { io.number("drops", drops); });
   if (head.machine.empty()) return;
   io.open("program", "{");
   io.number("bytes", record.program.bytes);

@@ -63,17 +63,20 @@ struct LayerRecord {
   std::uint32_t capped_rows = 0;           // rows closed only by repair (stages/load)
   ProgramRecord program;                   // zeros without a machine
   std::vector<ImageRecord> images;         // one per material, if the job has several
-  std::vector<std::uint64_t> part_pixels;  // set ones of each part, of a job with prices and several parts; else empty
+  std::vector<std::uint64_t> part_pixels;  // to be filled of each part, of a job with prices and several parts; else empty
 
   // --- images of a job with a saturation, or of shares of voxels
-  std::uint64_t dosed_pixels = 0;  // that are to be filled, whether or not drops fall on them
-  std::uint64_t drops = 0;         // of the images
-  std::uint64_t asked_drops = 0;   // by the wished saturation, rounded
-  std::uint64_t half_differs =
-      0;                       // pixels whose voxel is half full or more and whose centre is not set, or the other way round
-  std::uint64_t half_far = 0;  // of them, those that are not beside a boundary of the image
+  std::uint64_t dosed_pixels = 0;         // that are to be filled, whether or not drops fall on them; voxels' shares summed
+  std::uint64_t drops = 0;                // of the images
+  std::uint64_t asked_drops = 0;          // by the wished saturation, rounded
+  std::vector<std::uint64_t> part_drops;  // of each part, where there are part_pixels
+  std::uint64_t half_differs = 0;         // pixels whose centre says something else than half of their voxel
+  std::uint64_t half_far = 0;             // of them, those that are not beside a boundary of the image
 
   std::shared_ptr<const PathFacts> paths;  // null for images
+
+  /// Pixels that are to be filled: where less than a drop a pixel falls, more than are set; of shares of voxels, fewer.
+  std::uint64_t filled_pixels() const { return drops > 0 || dosed_pixels > 0 ? dosed_pixels : set_pixels; }
 };
 
 }  // namespace lamina

@@ -76,6 +76,7 @@ std::string head_json(const Manifest& manifest, const ManifestSeen& file, const 
                {"manifest", {{"name", file.name}, {"bytes", file.digest.bytes}, {"hash", hex(file.digest.hash)}}},
                {"laid", seen.laid},
                {"laid_svg", base64(std::as_bytes(std::span(seen.laid_svg)))},
+               {"quote", seen.quote},
                {"parts", Json::array()},
                {"warnings", Json::array()},
                {"views", Json::object()},

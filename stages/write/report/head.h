@@ -29,8 +29,9 @@ struct LayersSeen {
   std::vector<std::uint64_t> set;  // pixels of each
   std::vector<double> seconds;     // of each, with a machine
   std::vector<Warning> warnings;
-  std::string laid;      // lines on what toolpaths leave open
-  std::string laid_svg;  // a picture of it; "" for none
+  std::string laid;                             // lines on what toolpaths leave open
+  std::string laid_svg;                         // a picture of it; "" for none
+  std::vector<std::vector<std::string>> quote;  // rows of a table of costs; empty for none
 };
 
 /// The manifest's own file.

@@ -255,6 +255,8 @@ function fillTexts() {
   for (const part of head.parts) {
     row($('parts'), [part.path, part.copies, part.triangles, part.low_mm.join(', '), part.high_mm.join(', ')]);
   }
+  $('cost').hidden = !head.quote.length;
+  head.quote.forEach((cells, i) => row($('quote'), i ? cells : cells.map(name => name.replaceAll('_', ' ')), i ? 'td' : 'th'));
   $('job').textContent = head.job;
   $('laid').hidden = !head.laid;
   $('laid-lines').textContent = head.laid;
