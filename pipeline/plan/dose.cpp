@@ -6,7 +6,6 @@
 #include <cmath>
 
 #include "stages/dose/saturate.h"
-#include "stages/raster/combine.h"
 
 namespace lamina::pipeline {
 
@@ -21,7 +20,7 @@ DosePlan::DosePlan(const Job& job, const PixelGrid& grid)
     for (const SaturationRange& range : job.dose.saturation_ranges) {
       wishes_->ranges.push_back({range.from_mm, range.to_mm, {range.percent, range.core_percent}});
     }
-    wishes_.own = zones_.wishes();
+    wishes_->own = zones_.wishes();
   }
   if (core_ < 1 || (wishes_ && wishes_->has_core())) rules_.shell = dose::reach_of(grid, shell, shell);
 }

@@ -19,14 +19,20 @@ JobCost::JobCost(const Plan& plan)
   if (account_.parts() < 2) return;
   saturates_ = plan.images->dose.saturates();
   std::vector<cost::Body> bodies;
-  for (const sanity::Solid& solid : solids_from_above(*plan.scene)) bodies.push_back({solid.box, solid.part, solid.group});
+  for (const sanity::Solid& solid : solids_from_above(*plan.scene)) {
+    Box box = solid.box;
+    const auto [by_x, by_y] = plan.images->dose.zones().grows_nm(plan.images->dose.zones().of_part(solid.part));
+    box.lo.x -= static_cast<Nm>(by_x), box.hi.x += static_cast<Nm>(by_x);
+    box.lo.y -= static_cast<Nm>(by_y), box.hi.y += static_cast<Nm>(by_y);
+    bodies.push_back({box, solid.part, solid.group});
+  }
   const Mirror mirror = plan.job.mirror;
   const bool mirrored = mirror != Mirror::kNone;
   windows_.emplace(bodies, account_.parts(), plan.images->grid, mirrored && mirror != Mirror::kY,
                    mirrored && mirror != Mirror::kX);
 }
 
-void JobCost::count(const RunsView& image, const DropWork& drops, LayerRecord& record) const {
+void JobCost::count(const RunsView& image, const dose::DropWork& drops, LayerRecord& record) const {
   if (!windows_) return;
   record.part_pixels = saturates_ ? windows_->count(record.layer, drops.zones) : windows_->count(record.layer, image);
   if (saturates_) record.part_drops = windows_->sum(record.layer, drops.levels);
