@@ -87,11 +87,10 @@ void FacetWalk::step_over_corners(const SlabFacet& facet, double low, double hig
 
 void FacetWalk::cut_out(const SlabFacet& facet, double low, double high, Tents& piece) const {
   if (!plain_) return piece.cut_out(facet, low, high);
-  piece.count = 0;
-  if (facet.edgewise) return;
+  piece.count = facet.edgewise ? 0 : 1;
   const double half = (high - low) * 0.5;
-  piece.put(above_.x_back, above_.x_on, below_.x_back, above_.height() * half);
-  piece.put(below_.x_back, below_.x_on, above_.x_on, below_.height() * half);
+  piece.pair[0] = TentPair(Two{above_.x_back, below_.x_back}, Two{above_.x_on, below_.x_on}, Two{below_.x_back, above_.x_on},
+                           Two{above_.height() * half, below_.height() * half});
 }
 
 }  // namespace lamina::cover

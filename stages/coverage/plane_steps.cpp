@@ -17,16 +17,17 @@ class ShareBehind {
   /// What the plane gains over the voxel's depth and height, and the voxel's width: all at least 0.
   ShareBehind(double over_y, double over_z, double width) : half_width_(width / 2), per_volume_(1 / width) {
     const double a = (over_y + over_z) / 2, b = (over_y - over_z) / 2;
-    front_.put(-a, -b, b, 0.5);
-    front_.put(a, -b, b, 0.5);
+    front_ = TentPair(Two{-a, a}, Two{-b, -b}, Two{b, b}, Two{0.5, 0.5});
     reach_ = a + half_width_;
   }
   double at(double distance, double& density) const {
-    double covered_lo = 0, covered_hi = 0, lo = 0, hi = 0;
-    front_.add(distance - half_width_, covered_lo, lo);
-    front_.add(distance + half_width_, covered_hi, hi);
-    density = (covered_hi - covered_lo) * per_volume_;
-    return (hi - lo) * per_volume_;
+    Two covered_before{}, covered{}, before{}, behind{};
+    front_.add(distance - half_width_, covered_before, before);
+    front_.add(distance + half_width_, covered, behind);
+    covered -= covered_before;
+    behind -= before;
+    density = (covered[0] + covered[1]) * per_volume_;
+    return (behind[0] + behind[1]) * per_volume_;
   }
   double reach() const { return reach_; }
 
@@ -48,7 +49,7 @@ class ShareBehind {
   }
 
  private:
-  Tents front_;
+  TentPair front_;
   double half_width_, per_volume_, reach_;
 };
 

@@ -114,7 +114,7 @@ std::int64_t RowMaker::pass(const Job& job, Stretch& stretch) {
     suspect |= walk.suspect;
   }
   stretch.cover = static_cast<double>(stretch.winding) * job.area;
-  const std::int64_t behind = stretch.winding + std::llround(cover / job.area);
+  const std::int64_t behind = stretch.winding + whole_below(cover / job.area + 0.5);
   const bool is_plain = stretch.winding >= 0 && stretch.winding <= 1 && behind >= 0 && behind <= 1;
   if (!suspect && is_plain && stretch.facets.size() <= kMostClimbed && job.slab.rule.top_level <= kMostSteps) {
     climb(job, stretch);

@@ -1,19 +1,8 @@
 // Stretches of columns whose facets all enter the solid, or all leave it: steps are found, not passed.
-#include <array>
-
 #include "stages/coverage/coverage.h"
 #include "stages/coverage/row.h"
 
 namespace lamina::cover {
-namespace {
-
-std::int64_t at_or_beyond(double value) {
-  const auto whole = static_cast<std::int64_t>(value);
-  return static_cast<double>(whole) < value ? whole + 1 : whole;
-}
-
-}  // namespace
-
 const Tents& RowMaker::tents(const Job& job, const RowFacet& of_row) {
   Walk& walk = walk_[of_row.index];
   if (walk.tents == kNone) {
@@ -36,11 +25,7 @@ std::uint32_t RowMaker::level_at(const Job& job, Stretch& stretch, std::uint32_t
     if (of_row.last < column) {
       before += walk.walk.area;
     } else if (walk.sign != 0) {
-      const Tents& piece = tents(job, of_row);
-      double covered = 0, none = 0, behind_left = 0, behind_right = 0;
-      piece.add(left - walk.from_x, covered, behind_left);
-      piece.add(right - walk.from_x, none, behind_right);
-      partial += behind_right - behind_left;
+      partial += tents(job, of_row).between(left - walk.from_x, right - walk.from_x);
     }
   }
   const double width = right - left;
@@ -93,20 +78,24 @@ bool RowMaker::climb_plane(const Job& job, Stretch& stretch, const RowFacet& of_
   const double middle = static_cast<double>(job.strip.y0 + job.strip.y1) * 0.5 - walk.from_y;
   const double place = (walk.from_x + plane.x + plane.per_y * middle) * per_nm - 0.5;
   const auto level_behind = [&](std::uint32_t passed) { return walk.sign > 0 ? passed : steps - passed; };
-  std::array<std::int64_t, kMostSteps> column;
-  std::uint32_t before = 0;
-  for (std::uint32_t k = 0; k < steps; ++k) {
-    const double at = place + step[k] * per_nm;
-    column[k] = at_or_beyond(at - room);
-    if (column[k] >= begin && column[k] <= end && column[k] != at_or_beyond(at + room)) {
-      const std::uint32_t level = level_at(job, stretch, static_cast<std::uint32_t>(column[k]));
-      if (level_behind(level) <= k) ++column[k];
-    }
-    before += column[k] <= begin ? 1 : 0;
+  const double first = begin, last = end;
+  std::uint32_t passed = 0;
+  while (passed < steps && place + step[passed] * per_nm + room <= first) ++passed;
+  if (passed < steps && place + step[passed] * per_nm - room <= first) {
+    passed = level_behind(level_at(job, stretch, begin));
   }
-  between(job, stretch, begin, level_behind(before));
-  for (std::uint32_t k = before; k < steps && column[k] <= end; ++k) {
-    climb_to(job, stretch, static_cast<std::uint32_t>(column[k]), level_behind(k + 1));
+  between(job, stretch, begin, level_behind(passed));
+  for (; passed < steps; ++passed) {
+    const double at = place + step[passed] * per_nm;
+    if (at > last + room) break;
+    // Columns before `at` come before the step, others behind; `at` is more than 0 here.
+    auto column = static_cast<std::uint32_t>(at + room);
+    if (static_cast<double>(column) < at + room) ++column;
+    if (static_cast<double>(column) - 1 >= at - room) {
+      column -= level_behind(level_at(job, stretch, column - 1)) > passed ? 1 : 0;
+    }
+    if (column > end) break;
+    climb_to(job, stretch, column, level_behind(passed + 1));
   }
   stretch.known = end;
   return true;
