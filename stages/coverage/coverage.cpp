@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "stages/coverage/edges.h"
-#include "stages/coverage/meetings.h"
+#include "stages/coverage/meet/meetings.h"
 #include "stages/coverage/slab_index.h"
 #include "stages/geometry/blocks/block_maker.h"
 
@@ -141,18 +141,27 @@ LayerReport Coverage::layer(const Layer& layer, LayerScratch& scratch, Levels& o
   state.order_by_row(scratch);
   report.facets = static_cast<std::uint32_t>(scratch.facets.size());
   out.start(state.grid.columns());
-  scratch.row.clear();
   const std::int64_t bottom = layer.bottom, top = bottom + layer.thickness;
+  const RowMaker::Slab slab{state.grid.x,
+                            state.x,
+                            state.rule,
+                            {1 / state.x.per_nm(), 1 / state.y.per_nm(), static_cast<double>(layer.thickness)},
+                            static_cast<double>(bottom),
+                            scratch.facets};
+  scratch.maker.start(slab);
   for (std::uint32_t r = state.grid.rows(); r-- > 0;) {
-    std::erase_if(scratch.row, [&](std::uint32_t i) { return scratch.facets[i].first_row > r; });
-    for (std::uint32_t k = scratch.begins[r]; k < scratch.begins[r + 1]; ++k) scratch.row.push_back(scratch.order[k]);
-    if (scratch.row.empty()) {
+    for (std::uint32_t k = scratch.begins[r]; k < scratch.begins[r + 1]; ++k) {
+      scratch.maker.enter(scratch.facets[scratch.order[k]], scratch.order[k]);
+    }
+    if (scratch.maker.is_empty()) {
       out.end_row();
       continue;
     }
     const Strip strip{edge(state.grid.y, r), edge(state.grid.y, std::int64_t{r} + 1), bottom, top};
-    scratch.maker.make(strip, state.grid.x, state.x, state.rule, scratch.facets, scratch.row, out, report);
+    scratch.maker.make(slab, strip, r, out, report);
   }
+  const auto end = static_cast<double>(state.grid.x.length);
+  for (const SlabFacet& facet : scratch.facets) report.volume_mm3 += facet.edgewise ? 0 : volume_behind(facet, end);
   report.volume_mm3 *= 1e-18;
   report.scratch_bytes = scratch.bytes();
   return report;
@@ -166,7 +175,8 @@ std::uint64_t Coverage::scratch_bytes_bound(const Layer& layer) const {
     state.meshes[copy.mesh].index.each(bottom, bottom + layer.thickness, [&](std::uint32_t) { facets += kClusterSize; });
   }
   // Buffers double as they grow. Samples of a row come on top where facets meet.
-  return 2 * facets * (sizeof(SlabFacet) + 2 * sizeof(std::uint32_t)) + sizeof(std::uint32_t) * (state.grid.rows() + 2) +
+  return 2 * facets * (sizeof(SlabFacet) + 2 * sizeof(std::uint32_t)) +
+         2 * RowMaker::bytes_of(facets, state.rule.top_level + 1) + sizeof(std::uint32_t) * (state.grid.rows() + 2) +
          (sizeof(Cell) + 1) * (std::uint64_t{state.grid.columns()} + 1);
 }
 

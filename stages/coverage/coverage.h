@@ -47,7 +47,7 @@ class Coverage {
   /// instances  where copies stand; every corner within the grid's bed and below kNmReach
   /// levels     2 .. 256 of them; 2, 4 and 16 are what drops come in
   /// errors     kInput if a mesh is open (Mesh::closed); kUsage for another number of levels
-  /// cost       O(T log T): which facets meet others is found once (meetings.h)
+  /// cost       O(T log T): which facets meet others is found once (meet/meetings.h)
   static Result<Coverage> build(std::span<Mesh> meshes, std::span<const Instance> instances, const PixelGrid& grid,
                                 FillRule rule, std::uint32_t levels);
   Coverage(Coverage&&) noexcept;

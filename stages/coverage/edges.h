@@ -25,6 +25,11 @@ class Edges {
     }
   }
 
+  /// A pixel at or before, and one at or behind that of `nm`, without a look at edges: these are up to 1 nm below i pixels.
+  std::uint32_t at_or_before(double nm) const { return bounded(nm * per_nm_); }
+  std::uint32_t at_or_behind(double nm) const { return bounded((nm + 1.0625) * per_nm_); }
+  double per_nm() const { return per_nm_; }
+
   double operator[](std::uint32_t i) const { return edge_[i]; }
   double width(std::uint32_t i) const { return edge_[i + 1] - edge_[i]; }
   double widest() const { return widest_; }
@@ -42,6 +47,10 @@ class Edges {
   }
 
  private:
+  std::uint32_t bounded(double i) const {
+    return static_cast<std::uint32_t>(std::clamp(i, 0.0, static_cast<double>(edge_.size() - 2)));
+  }
+
   double per_nm_;
   double widest_ = 0, narrowest_ = 0;
   Buffer<double> edge_;

@@ -12,11 +12,8 @@ namespace lamina::cover {
 struct Cell {
   double cover = 0;           // nm^2 that facets in the column add to what lies behind them
   double partial = 0;         // nm^3 that they add within it
-  double scale = 0;           // nm, sum over facets that begin here; the bound of errors is made of it
   std::int32_t held = 0;      // facets that begin here, less those that ended in the column before
   std::int32_t suspects = 0;  // of these the suspect ones
-  std::uint32_t facets = 0;   // that begin here
-  std::uint32_t columns = 0;  // that they reach
 };
 
 /// Cells of one row, reused from row to row; touched ones are marked, so that a row costs what lies in it.

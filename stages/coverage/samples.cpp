@@ -63,16 +63,14 @@ void Samples::cross(const SlabFacet& facet, const Strip& strip, const PixelAxis&
 }
 
 void Samples::count(const Strip& strip, const PixelAxis& columns, const Edges& edges, std::int64_t winding, FillRule fill,
-                    std::span<const SlabFacet> facets, std::span<const std::uint32_t> row, std::uint32_t first,
+                    std::span<const SlabFacet> facets, std::span<const RowFacet> stretch, std::uint32_t first,
                     std::uint32_t end) {
   first_ = first;
   end_ = end;
   crossing_.clear();
   count_.assign(end - first, {});
-  for (const std::uint32_t index : row) {
-    const SlabFacet& facet = facets[index];
-    if (facet.edgewise || facet.last_column < first || facet.first_column >= end) continue;
-    cross(facet, strip, columns, edges);
+  for (const RowFacet& of_row : stretch) {
+    if (!facets[of_row.index].edgewise) cross(facets[of_row.index], strip, columns, edges);
   }
   std::sort(crossing_.begin(), crossing_.end());
   const auto add = [&](Count& count, std::int64_t wound, std::uint64_t samples) {

@@ -20,10 +20,10 @@ class Samples {
   };
 
   /// Columns [first, end) of a row; before them the winding number is `winding`.
-  /// row   facets of the row; those that reach the columns count, and none reaches them and columns outside
-  /// cost  64 lines a facet, one step a column and line
+  /// stretch  facets that reach the columns; none reaches columns outside
+  /// cost     64 lines a facet, one step a column and line
   void count(const Strip& strip, const PixelAxis& columns, const Edges& edges, std::int64_t winding, FillRule fill,
-             std::span<const SlabFacet> facets, std::span<const std::uint32_t> row, std::uint32_t first, std::uint32_t end);
+             std::span<const SlabFacet> facets, std::span<const RowFacet> stretch, std::uint32_t first, std::uint32_t end);
 
   const Count& at(std::uint32_t column) const { return count_[column - first_]; }
   bool knows(std::uint32_t column) const { return column >= first_ && column < end_; }

@@ -13,12 +13,9 @@ namespace lamina::cover {
 struct LayerScratch {
   Buffer<SlabFacet> facets;             // that reach into the layer
   Buffer<std::uint32_t> begins, order;  // facets by the last row they reach: from where on rows list them, and their indices
-  Buffer<std::uint32_t> row;            // those that reach a row
   RowMaker maker;
 
-  std::uint64_t bytes() const {
-    return bytes_held(facets) + bytes_held(begins) + bytes_held(order) + bytes_held(row) + maker.bytes();
-  }
+  std::uint64_t bytes() const { return bytes_held(facets) + bytes_held(begins) + bytes_held(order) + maker.bytes(); }
 };
 
 }  // namespace lamina::cover

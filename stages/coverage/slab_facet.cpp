@@ -12,6 +12,7 @@ bool take_facet(const Triangle& on_bed, bool suspect, std::int64_t bottom, std::
   const std::int64_t ux = std::int64_t{b.x} - a.x, uy = std::int64_t{b.y} - a.y, uz = std::int64_t{b.z} - a.z;
   const std::int64_t vx = std::int64_t{c.x} - a.x, vy = std::int64_t{c.y} - a.y, vz = std::int64_t{c.z} - a.z;
   out.edgewise = uy * vz == uz * vy;
+  out.enters = uy * vz < uz * vy;
   if (out.edgewise && uz * vx == ux * vz && ux * vy == uy * vx) return false;
   out.facet = on_bed;
   out.suspect = suspect;
@@ -49,6 +50,16 @@ bool take_facet(const Triangle& on_bed, bool suspect, std::int64_t bottom, std::
   out.first_row = rows.at(front + first - kRoom);
   out.last_row = rows.at(front + last + kRoom);
   return true;
+}
+
+double volume_behind(const SlabFacet& facet, double end) {
+  double sum = 0;
+  const auto corner = [&](std::uint32_t i) { return Corner<double>{facet.x[i], facet.y[i], facet.z[i]}; };
+  for (std::uint32_t k = 1; k + 1 < facet.corners; ++k) {
+    const Corner<double> a = corner(0), b = corner(k), c = corner(k + 1);
+    sum += area_along_x(a, b, c) * (end - facet.low.x - (a.x + b.x + c.x) / 3);
+  }
+  return sum;
 }
 
 }  // namespace lamina::cover

@@ -15,18 +15,28 @@ namespace lamina::cover {
 inline constexpr double kRoom = 1.0 / 1024;
 
 struct SlabFacet {
-  Triangle facet;                           // nm, on the bed
-  Point3 low;                               // lowest corner of its box
-  Nm size;                                  // longest side of its box
-  bool edgewise;                            // seen from along x it has no area
-  bool suspect;                             // it meets others (meetings.h)
-  std::uint32_t first_row, last_row;        // geometry rows that it may reach; last_row included
-  std::uint32_t first_column, last_column;  // the same of columns, in the row that is made
-  std::array<double, 5> x, y, z;            // of the piece within the layer, from `low`
+  Triangle facet;                     // nm, on the bed
+  Point3 low;                         // lowest corner of its box
+  Nm size;                            // longest side of its box
+  bool edgewise;                      // seen from along x it has no area
+  bool enters;                        // +x goes into the solid
+  bool suspect;                       // it meets others (meet/meetings.h)
+  std::uint32_t first_row, last_row;  // geometry rows that it may reach; last_row included
+  std::array<double, 5> x, y, z;      // of the piece within the layer, from `low`
   std::uint32_t corners;
 };
 
-/// Fills in everything but columns; false if nothing of the facet lies between the heights, or it has no area at all.
+/// A facet in the row that is made.
+struct RowFacet {
+  std::uint32_t first = 0, last = 0;  // columns that it may reach; last included
+  std::uint32_t index = 0;            // among those of the layer
+  std::uint32_t first_row = 0;        // the last one that it may reach, for rows go downwards
+};
+
+/// What lies behind the piece within the layer, up to where x is `end`, nm^3; negative behind facets that +x leaves through.
+double volume_behind(const SlabFacet& facet, double end);
+
+/// Fills in everything; false if nothing of the facet lies between the heights, or it has no area at all.
 bool take_facet(const Triangle& on_bed, bool suspect, std::int64_t bottom, std::int64_t top, const Edges& rows, SlabFacet& out);
 
 }  // namespace lamina::cover

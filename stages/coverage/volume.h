@@ -41,6 +41,12 @@ void cut(const Piece<Number>& from, const Number& limit, Piece<Number>& to) {
   }
 }
 
+/// Seen along x; positive where +x goes into the solid.
+template <class Number>
+Number area_along_x(const Corner<Number>& a, const Corner<Number>& b, const Corner<Number>& c) {
+  return ((b.z - a.z) * (c.y - a.y) - (b.y - a.y) * (c.z - a.z)) / 2;
+}
+
 /// A triangle as what lies behind it, towards +x, sees it: its area along x by x. The area before x rises with the square of
 /// the distance from the first corner, and falls short of all by the square of that from the last.
 template <class Number>
@@ -53,7 +59,7 @@ struct Tent {
     if (x1 < x0) std::swap(x0, x1);
     if (x2 < x1) std::swap(x1, x2);
     if (x1 < x0) std::swap(x0, x1);
-    area = ((b.z - a.z) * (c.y - a.y) - (b.y - a.y) * (c.z - a.z)) / 2;
+    area = area_along_x(a, b, c);
   }
 
   Number mean() const { return (x0 + x1 + x2) / 3; }

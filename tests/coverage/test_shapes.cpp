@@ -145,6 +145,52 @@ TEST(CoverageShapes, TiltedBoxesHaveTheLevelsOfTheContract) {
   }
 }
 
+TEST(CoverageShapes, FacetsOverManyVoxelsStepWhereTheirPlanesDo) {
+  for (int i = 0; i < 6; ++i) {
+    const double about_x = i % 2 == 0 ? 0.06 + 0.1 * i : -0.11 * i;
+    const Triangles part =
+        turned(box({-560'000, -190'000, -60'000}, {560'000, 190'000, 60'000}), 0.02 * i, about_x, {800'000, 350'000, 200'000});
+    std::vector<Triangle> leaning;
+    for (const Triangle& t : part) {
+      const auto lean = [](const Point3& p) { return Point3{p.x, p.y, p.z + p.x / 11}; };
+      leaning.push_back({lean(t.a), lean(t.b), lean(t.c)});
+    }
+    const Triangles all(leaning.begin(), leaning.end());
+    const Told told = expect_levels(all, kSmall, layers_of(70'000, 7));
+    EXPECT_EQ(told.exact + told.sampled, 0u);
+    EXPECT_NEAR(told.volume_mm3, volume_of(all), 1e-9 * volume_of(all));
+    if (HasFailure()) FAIL() << "box " << i;
+  }
+}
+
+/// A vault along y, its ends fans of facets in one plane.
+Triangles vault(Point3 corner, double radius, Nm depth, int around) {
+  Triangles out;
+  const auto at = [&](int k, Nm y) {
+    const double phi = std::numbers::pi * k / around;
+    return Point3{corner.x + static_cast<Nm>(std::llround(radius * (1 - std::cos(phi)))), corner.y + y,
+                  corner.z + (k % around == 0 ? 0 : static_cast<Nm>(std::llround(0.6 * radius * std::sin(phi))))};
+  };
+  for (int k = 0; k <= around; ++k) {
+    const int next = k == around ? 0 : k + 1;
+    out.push_back({at(k, 0), at(k, depth), at(next, depth)});
+    out.push_back({at(k, 0), at(next, depth), at(next, 0)});
+    if (k == 0 || k == around) continue;
+    out.push_back({at(0, 0), at(k, 0), at(next, 0)});
+    out.push_back({at(0, depth), at(next, depth), at(k, depth)});
+  }
+  return out;
+}
+
+TEST(CoverageShapes, FacetsAlongARowHoldAllColumnsThatTheyReach) {
+  for (const Nm y : {125'000, 137'001, 150'000}) {
+    const Triangles part = reversed(vault({150'000, y, 30'000}, 610'000, 310'000, 9));
+    const Told told = expect_levels(part, kSmall, layers_of(100'000, 4));
+    EXPECT_NEAR(told.volume_mm3, volume_of(part), 1e-9 * volume_of(part));
+    if (HasFailure()) FAIL() << "at " << y;
+  }
+}
+
 TEST(CoverageShapes, ABallHasTheLevelsOfTheContract) {
   const Told told = expect_levels(ball({800'000, 350'000, 300'000}, 290'000, 24), kSmall, layers_of(100'000, 6));
   EXPECT_GT(told.partly, 100u);

@@ -1,4 +1,4 @@
-// stages/coverage/box_tree.h: which boxes meet a box.
+// stages/coverage/meet/box_tree.h: which boxes meet a box.
 #pragma once
 
 #include <algorithm>

@@ -1,4 +1,4 @@
-// stages/coverage/meetings.h: which facets of a mesh meet others, so that voxels that hold them have to be sampled.
+// stages/coverage/meet/meetings.h: which facets of a mesh meet others, so that voxels that hold them have to be sampled.
 #pragma once
 
 #include <cstdint>

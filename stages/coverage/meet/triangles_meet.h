@@ -1,4 +1,4 @@
-// stages/coverage/triangles_meet.h: whether two facets meet anywhere but in corners and edges that they share.
+// stages/coverage/meet/triangles_meet.h: whether two facets meet anywhere but in corners and edges that they share.
 #pragma once
 
 #include <cstdint>

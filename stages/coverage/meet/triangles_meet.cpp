@@ -1,4 +1,4 @@
-#include "stages/coverage/triangles_meet.h"
+#include "stages/coverage/meet/triangles_meet.h"
 
 #include <algorithm>
 #include <array>

@@ -1,4 +1,4 @@
-#include "stages/coverage/meetings.h"
+#include "stages/coverage/meet/meetings.h"
 
 #include <tbb/parallel_for.h>
 
@@ -7,8 +7,8 @@
 #include <cstdlib>
 #include <vector>
 
-#include "stages/coverage/box_tree.h"
-#include "stages/coverage/triangles_meet.h"
+#include "stages/coverage/meet/box_tree.h"
+#include "stages/coverage/meet/triangles_meet.h"
 
 namespace lamina::cover {
 namespace {
