@@ -13,6 +13,7 @@
 #include "stages/data/text/number_text.h"
 #include "stages/data/text/readable.h"
 #include "stages/geometry/isa.h"
+#include "stages/program/vats.h"
 #include "stages/replay/time/totals.h"
 #include "stages/sanity/records.h"
 #include "stages/sanity/rows.h"
@@ -44,6 +45,9 @@ class ImageMaker : public Maker {
 
   Result<std::vector<std::uint32_t>> open() override {
     if (Status status = refuse_mixed_powders(plan_, imager_); !status) return status.error();
+    auto refills = plan_refills(plan_, imager_);
+    if (!refills) return refills.error();
+    files_.pause_before(refills_ = std::move(*refills));
     if (plan_.job.dry_run) {
       std::vector<std::uint32_t> all(plan_.range[1] - plan_.range[0]);
       std::iota(all.begin(), all.end(), plan_.range[0]);
@@ -200,6 +204,7 @@ class ImageMaker : public Maker {
   std::int64_t microseconds_ = 0;  // of the machine
   bool timed_ = true;              // layers that an earlier build left are not
   double volume_mm3_ = 0;
+  std::vector<std::uint32_t> refills_;  // layers before which vats are filled
   dose::BinderCount binder_;
   std::vector<std::pair<std::string, std::uint64_t>> materials_;  // name, set pixels
   std::vector<UnfedPowder> unfed_;                                // by material
@@ -252,6 +257,7 @@ void ImageMaker::tell(Summary& summary) const {
   }
   if (const auto& budget = plan_.images->dose.budget()) tell_binder(*budget, summary);
   if (print_seconds > 0) result("printing", replay::time_text(print_seconds, plan_.images->machine->machine.name));
+  if (!refills_.empty()) result("vats", program::refills_text(refills_));
   if (timed_ && cost_) cost_->tell(summary);
   if (!summary.dry_run) {
     end("rate", fmt::format("{:.2f} Gpx/s, {:.1f} layers/s ({})", pixels_a_second / 1e9,
@@ -274,6 +280,7 @@ void ImageMaker::tell(Summary& summary) const {
   }
   if (plan_.images->machine) {
     if (timed_) facts["print_seconds"] = print_seconds;
+    facts["refills"] = refills_;
     facts["moved_pixels"] = moved_pixels_;
     facts["lost_pixels"] = lost_pixels_;
   }

@@ -29,7 +29,8 @@ void JobCost::count(const RunsView& image, LayerRecord& record) const {
 }
 
 void JobCost::add(const LayerRecord& record) {
-  tally_.add(record.layer.thickness, record.program.microseconds, record.program.drops,
+  if (record.layer.index == 0) tally_.add_base();
+  tally_.add(record.layer.thickness, record.program.microseconds, record.program.drops + record.program.spat,
              std::max(record.set_pixels, record.dosed_pixels), record.part_pixels);
 }
 
