@@ -13,6 +13,7 @@
 #include "stages/data/program.h"
 #include "stages/data/runs.h"
 #include "stages/replay/feeding.h"
+#include "stages/replay/machine.h"
 #include "stages/write/program/dialect.h"
 #include "tests/program/machines.h"
 #include "tests/replay/printed_parts.h"
@@ -167,6 +168,54 @@ TEST(Care, TheRollersSpeedIsWrittenAndHeld) {
   }
   const CareBench none("oasis");
   EXPECT_NE(none.fault(none.with("M4", "M4 S300\n")).find("M4 has no S"), std::string::npos);
+}
+
+// The first layer of 0.1 mm over a base of 3 x 0.2 mm: 0.7 mm fed in four turns, and a turn that is left out or fed from too
+// low a vat is found by its number.
+TEST(Care, TheBaseIsSpreadLayerByLayerBelowTheFirst) {
+  const Layer first{0, 0, 100'000, LayerReason::kUniform};
+  for (const auto& [machine, shot] : kDialects) {
+    SCOPED_TRACE(machine);
+    const CareBench bench(machine, [](Machine& m) {
+      m.care = {};
+      m.powder.base_layers = 3;
+      m.powder.base_layer_mm = 0.2;
+    });
+    const Machine& m = bench.resolved.machine;
+    write::ProgramBytes bytes;
+    const auto writer = write::find_dialect(m.dialect)->make_writer(m, bench.resolved.grid);
+    LayerCycle cycle;
+    cycle.layers = 9;
+    cycle.thickness_nm = first.thickness;
+    writer->begin_layer(cycle, bytes);
+    writer->end_layer(cycle, bytes);
+    const std::string text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+    const PixelGrid& grid = bench.resolved.grid.image;
+    const Runs empty = program::testing::runs_of(program::testing::Image(grid.rows(), std::vector<int>(grid.columns(), 0)));
+    const auto virtual_machine = replay::VirtualMachine::build(m, grid.columns(), grid.rows());
+    const auto fault = [&](const std::string& program) {
+      const auto count = virtual_machine->replay(program, first, empty, 0, 0);
+      return count.ok() ? std::string() : count.error().message;
+    };
+    const auto count = virtual_machine->replay(text, first, empty, 0, 0);
+    ASSERT_TRUE(count.ok()) << count.error().message << text;
+    EXPECT_NEAR(count->fed_mm[0], m.powder.dose * 0.7, 1e-6);
+    EXPECT_NEAR(count->build_mm, 0.1, 1e-6);
+    const std::string far = fmt::format("G1 {}{:.4f} ", m.powder.roller_axis, m.powder.roller_mm[1]);
+    std::string without = text;
+    for (std::size_t at = without.find(far); at != std::string::npos; at = std::string::npos) {
+      without.erase(at, without.find('\n', at) + 1 - at);
+    }
+    EXPECT_NE(fault(without).find("powder cycle: "), std::string::npos) << fault(without);
+    const std::string feed = fmt::format("G1 {}{:.4f} ", m.powder.feed_axes[0], m.powder.feed_sign * m.powder.dose * 0.2);
+    if (m.dialect == "oasis") continue;  // feeds in several movements
+    std::string later = text;
+    const std::size_t second = later.find(feed, later.find(feed) + 1);
+    const std::string line = later.substr(second, later.find('\n', second) + 1 - second);
+    later.erase(second, line.size());
+    later.insert(later.find(feed, second), line);
+    EXPECT_NE(fault(later).find("layer 2 of the base is spread"), std::string::npos) << fault(later);
+  }
 }
 
 // What a program cannot say, or a machine cannot do, is refused with its key.
