@@ -98,9 +98,10 @@ struct Machine {
     double pause_s = 0;   // a layer, beside all movements: drying, wiping
     std::array<double, 2> vat_depth_mm{0, 0};  // that each vat can feed when it is full; 0: not stated
     VatRefill refill = VatRefill::kRefuse;
-    std::uint32_t base_layers = 0;        // spread below the first layer, without a drop
-    double base_layer_mm = 0.1;           // thickness of each
-    double dry_s = 0;                     // pause of the program behind the last sweep of each layer
+    std::uint32_t base_layers = 0;                         // spread below the first layer, without a drop
+    double base_layer_mm = 0.1;                            // thickness of each
+    double dry_s = 0;                                      // pause of the program behind the last sweep of each layer
+    std::vector<std::string> dry_on_lines, dry_off_lines;  // the machine's own around it: a lamp
     double roller_rpm = 0;                // of a roller that turns against its way while it spreads; 0: not told
     double packing = 0.6;                 // share of the powder bed that is solid
     double evaporates_percent = 0;        // of the jetted binder, before the next layer is spread
@@ -115,6 +116,7 @@ struct Machine {
     std::optional<std::array<double, 2>> spit_mm;    // where the head fires
     std::optional<std::array<double, 4>> wipe_mm;    // x, y from where and to where the head goes over its wiper
     double wipe_speed_mm_s = 50;
+    std::vector<std::string> wipe_lines;          // the machine's own, behind the way over the wiper: a pump, a valve
     std::optional<std::array<double, 2>> cap_mm;  // where the head waits in pauses; else its safe place
 
     bool spits() const { return spit_layers > 0 || spit_seconds > 0; }

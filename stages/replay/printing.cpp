@@ -176,17 +176,22 @@ void Printing::head_moves(double mm, double mm_s, bool scanning) {
   const auto& care = profile().care;
   if (care.spits()) check_care("fired off the bed", care.spit_layers, care.spit_seconds, spat_s_);
   if (care.wipes()) check_care("wiped", care.wipe_layers, care.wipe_seconds, wiped_s_);
-  if (dwelt_s_ > 0) fault("scans behind the pause in which the layer dries");
+  if (dwelt_s_ + lamp_blocks_ > 0) fault("scans behind the pause in which the layer dries");
 }
 
 void Printing::head_stands_at(double x_mm, double y_mm) {
+  bool wiped = false;
   if (const auto& wiper = profile().care.wipe_mm) {
     const auto [x, y] = head_mm_.value_or(profile().motion.safe_mm);
     if (std::hypot(x - (*wiper)[0], y - (*wiper)[1]) + std::hypot(x_mm - (*wiper)[2], y_mm - (*wiper)[3]) < 1e-3) {
+      wiped = true;
       wiped_s_ = seconds_;
       ++count.wipes;
     }
   }
+  if (own_ > 0) fault("the head goes on before all lines of the machine's own stand behind the wiper");
+  own_ = 0;
+  at_wiper_ = wiped;
   head_mm_ = {x_mm, y_mm};
   spat_here_ = 0;
 }
@@ -243,8 +248,30 @@ void Printing::refills() {
 
 void Printing::dwells(double seconds) {
   waits_capped("the layer dries");
+  if (own_ > 0) fault("the layer dries before all lines of the machine's own stand before it");
+  own_ = 0;
   dwelt_s_ += seconds;
   takes(seconds);
+}
+
+// The block that may come now.
+const std::vector<std::string>& Printing::own_lines() const {
+  const auto& profile = machine_.machine_;
+  if (at_wiper_) return profile.care.wipe_lines;
+  return dwelt_s_ > 0 ? profile.powder.dry_off_lines : profile.powder.dry_on_lines;
+}
+
+bool Printing::takes_own(std::string_view line) {
+  const auto& lines = own_lines();
+  if (own_ < lines.size() && lines[own_] == line) {
+    if (++own_ < lines.size()) return true;
+    own_ = 0;
+    ++(at_wiper_ ? wiper_blocks_ : lamp_blocks_);
+    at_wiper_ = false;
+    return true;
+  }
+  if (own_ > 0) fault(fmt::format("'{}' stands where the machine's own '{}' has to", line, lines[own_]));
+  return false;
 }
 
 void Printing::roller_turns(double rpm) { rpm_ = rpm; }
@@ -327,6 +354,11 @@ void Printing::check_cycle() {
   if (!rolled_) wrong(fmt::format("the roller does not reach its far end at {:g} mm", powder.roller_mm[1]));
   if (std::abs(dwelt_s_ - powder.dry_s) > 1e-3) {
     wrong(fmt::format("the layer dries for {:g} s where {:g} have to be", dwelt_s_, powder.dry_s));
+  }
+  const std::uint32_t lamps = (powder.dry_on_lines.empty() ? 0 : 1) + (powder.dry_off_lines.empty() ? 0 : 1);
+  const std::uint32_t wipers = profile().care.wipe_lines.empty() ? 0 : count.wipes;
+  if (lamp_blocks_ != lamps || wiper_blocks_ != wipers) {
+    wrong(fmt::format("the machine's own lines stand {} times where {} have to", lamp_blocks_ + wiper_blocks_, lamps + wipers));
   }
   if (fires_on_old_) wrong("the first sweep begins before powder is spread");
   if (std::abs(roller_mm_ - powder.roller_mm[0]) > 1e-3) {

@@ -85,6 +85,9 @@ class Printing {
   void refills();
   /// It waits for the layer to dry; behind the sweeps.
   void dwells(double seconds);
+  /// Whether a line is the next of the machine's own, which its profile has: behind a wiper, around the pause in which the
+  /// layer dries. Whole blocks, in their order.
+  bool takes_own(std::string_view line);
   /// The roller turns so fast against its way, or, at 0, no longer.
   void roller_turns(double rpm);
 
@@ -121,6 +124,7 @@ class Printing {
   double base_mm() const { return layer_.index == 0 ? profile().powder.base_mm() : 0; }
   std::uint32_t base_layers() const { return layer_.index == 0 ? profile().powder.base_layers : 0; }
   void strokes(double build_mm, double fed_mm);
+  const std::vector<std::string>& own_lines() const;
   void waits_capped(std::string_view what);
   void coverage(std::vector<bool>& worked, std::vector<bool>& blocked) const;
   std::int64_t line_of(std::uint32_t column, std::uint32_t row) const;
@@ -150,9 +154,12 @@ class Printing {
   std::uint32_t strokes_ = 0;          // of the roller to its far end
   double spat_s_ = -1, wiped_s_ = -1;  // when the layer's last care ended; -1: none yet
   std::uint64_t spat_here_ = 0;        // drops of a nozzle since the head stands
-  double dwelt_s_ = 0, rpm_ = 0;       // rpm: of the roller
-  std::string fault_;                  // the first one
-  std::string spread_wrong_;           // the first fault of spreading; only check_cycle knows the layer's heights for true
+  std::size_t own_ = 0;                // lines of the block at hand that came
+  std::uint32_t wiper_blocks_ = 0, lamp_blocks_ = 0;
+  bool at_wiper_ = false;         // the head has just gone over it
+  double dwelt_s_ = 0, rpm_ = 0;  // rpm: of the roller
+  std::string fault_;             // the first one
+  std::string spread_wrong_;      // the first fault of spreading; only check_cycle knows the layer's heights for true
 };
 
 }  // namespace lamina::replay

@@ -70,6 +70,9 @@ TEST(Vats, TwoOfThem) {
 TEST(Vats, NoDepthIsNoLimitAndALayerThatNoVatHoldsIsRefusedByEitherRule) {
   EXPECT_FALSE(VatPlan::has_depths(vat_machine(0, 0, VatRefill::kRefuse)));
   EXPECT_TRUE(planned(vat_machine(0, 0, VatRefill::kRefuse), 5000, {1, 2}).status().ok());
+  Machine base = vat_machine(0.3, 0, VatRefill::kPause);
+  base.powder.base_layers = 2;  // of 0.1 mm: with the first layer 0.375 mm
+  EXPECT_NE(planned(base, 3, {1}).status().error().message.find("layer 0 (z 0.000 mm)"), std::string::npos);
   for (const VatRefill rule : {VatRefill::kRefuse, VatRefill::kPause}) {
     const Status small = planned(vat_machine(0.12, 0, rule), 3, {1}).status();
     ASSERT_FALSE(small.ok());

@@ -159,6 +159,28 @@ TEST(Care, PausesToDryAreBehindTheSweepsAtTheCapAndAsLongAsTold) {
   }
 }
 
+// A lamp around the pause to dry, a pump behind the wiper: exactly the profile's lines, in whole blocks, where they belong.
+TEST(Care, LinesOfTheMachinesOwnStandWhereTheProfileHasThem) {
+  for (const char* machine : {"nuferbj", "oasis", "reprap-inkjet"}) {
+    SCOPED_TRACE(machine);
+    const CareBench bench(machine, [](Machine& m) {
+      m.powder.dry_s = 2.5;
+      m.powder.dry_on_lines = {"M106 S255"};
+      m.powder.dry_off_lines = {"M107"};
+      m.care.wipe_lines = {"M42 P4 S1", "M42 P4 S0"};
+    });
+    EXPECT_EQ(bench.fault(bench.program.text), "");
+    EXPECT_NE(bench.program.text.find("M42 P4 S1\nM42 P4 S0\n"), std::string::npos);
+    for (const char* line : {"M106", "M107", "M42 P4 S1", "M42 P4 S0"})
+      EXPECT_NE(bench.fault(bench.with(line, "")), "") << line;
+    EXPECT_NE(bench.fault(bench.with("M106", "M106 S254\n")), "");
+    EXPECT_NE(bench.fault(bench.with("M107", "M107\nM107\n")), "");
+    EXPECT_NE(bench.fault(bench.with("M42 P4 S0", "M42 P4 S0\nM42 P4 S1\n")), "");
+    const std::string first = bench.program.text.substr(0, bench.program.text.find('\n') + 1);
+    EXPECT_NE(bench.fault(first + "M106 S255\n" + bench.program.text.substr(first.size())), "");
+  }
+}
+
 TEST(Care, TheRollersSpeedIsWrittenAndHeld) {
   for (const char* machine : {"nuferbj", "oasis"}) {
     const CareBench bench(machine, [](Machine& m) { m.powder.roller_rpm = 350; });
@@ -247,6 +269,9 @@ TEST(Care, ProfilesThatCannotBeKeptAreRefused) {
          m.care.spit_seconds = 0.5, m.care.spit_mm = {{-45, 0}};
        }},
       {"nuferbj", "powder.refill: pauses need powder.vat_depth_mm", [](Machine& m) { m.powder.refill = VatRefill::kPause; }},
+      {"nuferbj", "care.wipe_lines: M816 is a command of programs", [](Machine& m) { m.care.wipe_lines = {"M816 N4"}; }},
+      {"nuferbj", "powder.dry_on_lines: there is no pause", [](Machine& m) { m.powder.dry_off_lines = {"M107"}; }},
+      {"hp45", "care.wipe_lines: programs of the dialect hp45", [](Machine& m) { m.care.wipe_lines = {"M42 P4 S1"}; }},
       {"hp45", "powder.dry_s: programs of the dialect hp45 cannot say it", [](Machine& m) { m.powder.dry_s = 1; }},
       {"hp45", "powder.roller_rpm: ", [](Machine& m) { m.powder.roller_rpm = 100; }},
       {"reprap-inkjet", "care.spit_seconds: ",

@@ -91,6 +91,24 @@ std::string read_axes(Text text, std::vector<std::string>& axes) {
   axes.assign(names.begin(), names.end());
   return {};
 }
+/// Commands of a machine's own: M and a number, and words of a letter and a number, with one blank between.
+std::string read_own_lines(Text text, std::vector<std::string>& lines) {
+  constexpr std::size_t kLongest = 60, kMostLines = 20;
+  std::vector<std::string> read;
+  for (const Text line : text.empty() ? std::vector<Text>() : split(text, ",")) {
+    const auto words = split(line, " ");
+    const bool good = line.size() <= kLongest && line.starts_with('M') && std::ranges::all_of(words, [](Text word) {
+                        double value = 0;
+                        return word.size() > 1 && word[0] >= 'A' && word[0] <= 'Z' &&
+                               read_number(word.substr(1), -kMost, kMost, "", value).empty();
+                      });
+    if (!good) return fmt::format("'{}' is no command such as M42 P4 S1, of up to {} characters", line, kLongest);
+    read.emplace_back(line);
+  }
+  if (read.size() > kMostLines) return fmt::format("{} lines; give up to {}", read.size(), kMostLines);
+  lines = std::move(read);
+  return {};
+}
 std::string join(const std::vector<std::string>& names) { return fmt::format("{}", fmt::join(names, ",")); }
 
 constexpr Key<Machine> kKeys[] = {
@@ -161,6 +179,10 @@ constexpr Key<Machine> kKeys[] = {
     field<kPowder, &Powder::base_layers>({"powder", "base_layers"}, {0, 10'000}).unsaid_at("0"),
     field<kPowder, &Powder::base_layer_mm>({"powder", "base_layer_mm"}, {1e-3, 100, " mm"}).unsaid_at("0.1"),
     field<kPowder, &Powder::dry_s>({"powder", "dry_s"}, {0, 1e5, " s"}).unsaid_at("0"),
+    custom<Machine, read_own_lines, join, kPowder, &Powder::dry_on_lines>({"powder", "dry_on_lines"}, Form::kStrings)
+        .unsaid_at(""),
+    custom<Machine, read_own_lines, join, kPowder, &Powder::dry_off_lines>({"powder", "dry_off_lines"}, Form::kStrings)
+        .unsaid_at(""),
     field<kPowder, &Powder::roller_rpm>({"powder", "roller_rpm"}, {0, 1e5, " rpm"}).unsaid_at("0"),
 
     field<kCare, &Care::spit_layers>({"care", "spit_layers"}, {0, 1e6}).unsaid_at("0"),
@@ -171,6 +193,7 @@ constexpr Key<Machine> kKeys[] = {
     field<kCare, &Care::wipe_seconds>({"care", "wipe_seconds"}, {0, 1e6, " s"}).unsaid_at("0"),
     field<kCare, &Care::wipe_mm>({"care", "wipe_mm"}, kAny).unsaid_at(""),
     field<kCare, &Care::wipe_speed_mm_s>({"care", "wipe_speed_mm_s"}, kSpeed).unsaid_at("50"),
+    custom<Machine, read_own_lines, join, kCare, &Care::wipe_lines>({"care", "wipe_lines"}, Form::kStrings).unsaid_at(""),
     field<kCare, &Care::cap_mm>({"care", "cap_mm"}, kAny).unsaid_at(""),
 
     text<check_currency, kCost, &Cost::currency>({"cost", "currency"}).unsaid_at("EUR"),
@@ -183,8 +206,10 @@ constexpr Key<Machine> kKeys[] = {
     field<kCost, &Cost::spit_drops>({"cost", "spit_drops"}, {0, 1e9}).unsaid_at("0"),
 };
 
-/// Whether a profile may say nothing of it: names of vats, places of a head's care.
-bool may_be_absent(const KeyName& key) { return key.name == "materials" || (key.section == "care" && key.unsaid == ""); }
+/// Whether a profile may say nothing of it: names of vats, places of a head's care, lines of its own.
+bool may_be_absent(const KeyName& key) {
+  return key.name == "materials" || key.name.ends_with("_lines") || (key.section == "care" && key.unsaid == "");
+}
 
 }  // namespace
 

@@ -17,6 +17,10 @@ constexpr double kOfLimit = 0.97;
 // What dialects add to a sweep at either end, beside its ramps: the HP45 controller's rows and measures of speed.
 constexpr double kRunUpMm = 20;
 
+/// Commands that programs have, or that end them: nobody may put them between.
+constexpr std::string_view kOfPrograms[] = {"M0",   "M1",   "M2",   "M3",   "M4",   "M5",   "M25",  "M30",  "M112", "M226",
+                                            "M400", "M578", "M810", "M811", "M812", "M813", "M814", "M815", "M816"};
+
 double move_seconds(const Machine& machine, double way_mm, double speed_mm_s) {
   const double a = machine.motion.acceleration_mm_s2;
   if (a == 0) return way_mm / speed_mm_s;
@@ -86,6 +90,8 @@ class Checker {
                 {"powder.roller_rpm", powder.roller_rpm > 0, kSaysRoller},
                 {"care.spit_layers", care_.spits(), kSaysCare},
                 {"care.wipe_layers", care_.wipes(), kSaysCare},
+                {"powder.dry_on_lines", !powder.dry_on_lines.empty() || !powder.dry_off_lines.empty(), kSaysOwn},
+                {"care.wipe_lines", !care_.wipe_lines.empty(), kSaysOwn},
                 {"care.spit_seconds", care_.spit_seconds > 0, kSaysSeconds},
                 {"care.wipe_seconds", care_.wipe_seconds > 0, kSaysSeconds}};
     for (const auto& [key, asked, says] : rows) {
@@ -94,6 +100,16 @@ class Checker {
                                     "powder.pause_s and its drops in cost.spit_drops",
                                     dialect_.id));
     }
+    for (const auto* lines : {&powder.dry_on_lines, &powder.dry_off_lines, &care_.wipe_lines}) {
+      for (const std::string& line : *lines) {
+        const std::string command = line.substr(0, line.find(' '));
+        if (std::ranges::find(kOfPrograms, command) == std::end(kOfPrograms)) continue;
+        return wrong(lines == &care_.wipe_lines ? "care.wipe_lines" : "powder.dry_on_lines",
+                     fmt::format("{} is a command of programs; give the machine's own alone", command));
+      }
+    }
+    if (powder.dry_s == 0 && (!powder.dry_on_lines.empty() || !powder.dry_off_lines.empty()))
+      return wrong("powder.dry_on_lines", "there is no pause to dry; give powder.dry_s");
     if (powder.refill == VatRefill::kPause && !depths) return wrong("powder.refill", "pauses need powder.vat_depth_mm");
     if (care_.spits() && !care_.spit_mm) return wrong("care.spit_mm", "is missing; give the carriage's place beside the bed");
     if (care_.wipes() && !care_.wipe_mm) return wrong("care.wipe_mm", "is missing; give x, y of both ends of the wiper");
@@ -162,6 +178,10 @@ void Care::go(std::string_view command, double x_mm, double y_mm, double speed_m
       feed_text(speed_mm_s));
 }
 
+void Care::put_own(const std::vector<std::string>& lines, ProgramBytes& out) const {
+  for (const std::string& line : lines) put(out, "{}\n", line);
+}
+
 double Care::seconds(Place from, Place to, double speed_mm_s) const {
   return move_seconds(machine_, way(from, to), speed_mm_s);
 }
@@ -214,6 +234,8 @@ void Care::serve(bool wipe, bool spit, ProgramBytes& out) {
     const auto& [x, y, to_x, to_y] = *care.wipe_mm;
     go(words_.travel, x, y, motion.travel_speed_mm_s, out);
     go("G1", to_x, to_y, care.wipe_speed_mm_s, out);
+    if (!care.wipe_lines.empty()) put(out, "{}", words_.wait);
+    put_own(care.wipe_lines, out);
     at_ = {to_x, to_y};
     since_wipe_ = 0;
   }
@@ -233,7 +255,10 @@ void Care::dry(ProgramBytes& out) const {
   if (machine_.powder.dry_s == 0) return;
   const Place at = machine_.care.cap_mm.value_or(machine_.motion.safe_mm);
   go(words_.travel, at[0], at[1], machine_.motion.travel_speed_mm_s, out);
-  put(out, "{}{}{}\n", words_.wait, words_.dwell, number_text(machine_.powder.dry_s / words_.dwell_unit_s));
+  put(out, "{}", words_.wait);
+  put_own(machine_.powder.dry_on_lines, out);
+  put(out, "{}{}\n", words_.dwell, number_text(machine_.powder.dry_s / words_.dwell_unit_s));
+  put_own(machine_.powder.dry_off_lines, out);
 }
 
 }  // namespace lamina::write

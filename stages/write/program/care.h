@@ -2,7 +2,9 @@
 #pragma once
 
 #include <array>
+#include <string>
 #include <string_view>
+#include <vector>
 
 #include "stages/write/program/dialect.h"
 
@@ -39,6 +41,7 @@ class Care {
 
  private:
   void serve(bool wipe, bool spit, ProgramBytes& out);
+  void put_own(const std::vector<std::string>& lines, ProgramBytes& out) const;
   void go(std::string_view command, double x_mm, double y_mm, double speed_mm_s, ProgramBytes& out) const;
   double seconds(std::array<double, 2> from, std::array<double, 2> to, double speed_mm_s) const;
   /// Travels and the sweep itself.

@@ -39,7 +39,8 @@ enum Saying : std::uint32_t {
   kSaysRoller = 8,    // the speed of a roller that turns
   kSaysCare = 16,     // firing off the bed, and wiping, at the begin of a layer
   kSaysSeconds = 32,  // the same between sweeps, by the clock
-  kSaysAll = 63
+  kSaysOwn = 64,      // lines of the machine's own, which its profile has
+  kSaysAll = 127
 };
 
 /// One row of the registry.

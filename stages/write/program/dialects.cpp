@@ -31,7 +31,7 @@ constexpr std::array<Dialect, 7> kDialects = {{
     {"brundlefab", ".gcode", "G-code of the BrundleFab, whose Y loads an ink bar of 840 dots: T1 P, 12 nozzles", 12, 0, true, 0,
      brundlefab::make_writer, brundlefab::check},
     {"m578", ".gcode", "M578 S of RepRapFirmware 1.09r to 3.4 built with inkjet support: one head, 12 nozzles, a stop a pixel",
-     12, 0, true, kSaysBase | kSaysRefill | kSaysDry | kSaysCare, m578::make_writer, m578::check},
+     12, 0, true, kSaysBase | kSaysRefill | kSaysDry | kSaysCare | kSaysOwn, m578::make_writer, m578::check},
 }};
 
 }  // namespace
