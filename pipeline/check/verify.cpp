@@ -67,8 +67,9 @@ std::string fault_of_program(const Inspection& inspection, const LayerRecord& re
     const auto replay = inspection.machine->replay(program_of_layer(inspection.directory, inspection.head, record.layer.index),
                                                    record.layer, planes, record.program.moved, record.program.lost);
     if (!replay) return fmt::format("{}: {}", name, replay.error().message);
-    if (same && replay->drops != record.program.drops) {
-      return fmt::format("{}: {} drops, the manifest says {}", name, replay->drops, record.program.drops);
+    if (same && (replay->drops != record.program.drops || replay->spat != record.program.spat)) {
+      return fmt::format("{}: {} drops and {} off the bed, the manifest says {} and {}", name, replay->drops, replay->spat,
+                         record.program.drops, record.program.spat);
     }
     const std::int64_t told = record.program.microseconds;
     if (same && told > 0 && std::abs(replay->microseconds - told) > 1) {
@@ -167,6 +168,7 @@ void check_layers(const std::string& directory, const Manifest& manifest, bool q
   // In chunks, so that messages and sums stay in layer order without a string for each of a hundred thousand layers.
   constexpr std::size_t kPiece = 1024;
   std::vector<Finding> found(std::min(kPiece, manifest.layers.size()));
+  replay::VatLevels vats(inspection.machine ? inspection.machine->profile() : Machine());
   for (std::size_t first = 0; first < manifest.layers.size(); first += kPiece) {
     const std::size_t count = std::min(kPiece, manifest.layers.size() - first);
     tbb::parallel_for(std::size_t{0}, count, [&](std::size_t i) {
@@ -181,9 +183,11 @@ void check_layers(const std::string& directory, const Manifest& manifest, bool q
       for (std::size_t m = 0; m < report.unfed.size(); ++m) report.unfed[m].add(record.layer, record.images[m].unfed_pixels);
       if (found[i].count) {
         report.replay.add(*found[i].count);
-        cost->add(record, found[i].count->drops, found[i].count->microseconds);
+        cost->add(record, found[i].count->drops + found[i].count->spat, found[i].count->microseconds);
         if (found[i].fault.empty()) found[i].fault = fault_of_shares(inspection.head, record);
       }
+      if (std::string fault = vats.take(record.layer.index, found[i].count.value_or(replay::Count())); !fault.empty())
+        report.add(std::move(fault));
       report.replayed += found[i].count.has_value();
       if (!found[i].fault.empty()) report.add(std::move(found[i].fault));
     }

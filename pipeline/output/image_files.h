@@ -36,6 +36,10 @@ class ImageFiles {
   /// The plan must outlive this object.
   explicit ImageFiles(const Plan& plan);
 
+  /// Before anything is written: layers before which vats are to be filled, in order.
+  void pause_before(const std::vector<std::uint32_t>& layers) {
+    if (program_) program_->refills = layers;
+  }
   /// Prepares the directory and starts its manifest.
   /// errors  kUsage: the directory holds another job; kOutput
   Status open();

@@ -56,7 +56,8 @@ Status PrintProgram::write_layer(const Layer& layer, std::span<const RunsView> p
     if (!opened) return opened.error();
     file.emplace(std::move(*opened));
   }
-  const LayerCycle cycle{layer.index, layers_, layer.bottom, layer.thickness, feeds};
+  const LayerCycle cycle{layer.index,     layers_, layer.bottom,
+                         layer.thickness, feeds,   std::ranges::binary_search(refills, layer.index)};
   const auto flush = [&]() -> Status {
     if (dialect_.has_motion) work.timer->read(work.text);
     Status status = file ? file->append(work.text) : Status();
@@ -82,7 +83,7 @@ Status PrintProgram::write_layer(const Layer& layer, std::span<const RunsView> p
   if (Status status = flush(); !status) return status;
   const auto taken = work.timer->end();
   if (!taken) return taken.error();
-  record = {0, {}, count->sweeps - count->skipped, count->drops, count->moved, count->lost, *taken};
+  record = {0, {}, count->sweeps - count->skipped, count->drops, count->moved, count->lost, taken->microseconds, taken->spat};
   if (!file) return {};
   const auto digest = file->finish();
   if (!digest) return digest.error();
@@ -103,7 +104,9 @@ std::uint64_t PrintProgram::bytes_bound(std::uint64_t changes, std::uint32_t pla
   const std::uint64_t sweeps = std::uint64_t{grid.swaths(0)} * grid.passes * (1 + further) * planes;
   const bool keeps = dialect_.has_motion && !replay::Timer::keeps_no_vectors(dialect_.id);
   const std::uint64_t kept = keeps ? 2 * sweeps * (kStepText * grid.steps() + kSweepText) : 0;
-  return 4 * vectors + 4 * grid.steps() + planes * (16 * grid.lines + 2 * changes + turned) + kept + (512 << 10);
+  const Machine& machine = resolved_.machine;  // lines of the base, and of shots off the bed (m578)
+  const std::uint64_t care = 256 * machine.powder.base_layers + (machine.care.spits() ? 16 * machine.care.spit_drops : 0);
+  return 4 * care + 4 * vectors + 4 * grid.steps() + planes * (16 * grid.lines + 2 * changes + turned) + kept + (512 << 10);
 }
 
 }  // namespace lamina::pipeline

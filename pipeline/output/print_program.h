@@ -65,6 +65,8 @@ class PrintProgram {
     return write_layer(layer, std::span(&image, 1), feeds, work, record);
   }
 
+  std::vector<std::uint32_t> refills;  // layers before which the program pauses for vats to be filled, in order; set first
+
   /// Upper bound of write_layer's memory, in bytes, for so many images with that many changes.
   std::uint64_t bytes_bound(std::uint64_t changes, std::uint32_t planes = 1) const;
 

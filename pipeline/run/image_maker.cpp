@@ -14,6 +14,7 @@
 #include "stages/data/text/readable.h"
 #include "stages/dose/share_count.h"
 #include "stages/geometry/isa.h"
+#include "stages/program/vats.h"
 #include "stages/replay/time/totals.h"
 #include "stages/sanity/records.h"
 #include "stages/sanity/rows.h"
@@ -45,6 +46,9 @@ class ImageMaker : public Maker {
 
   Result<std::vector<std::uint32_t>> open() override {
     if (Status status = refuse_mixed_powders(plan_, imager_); !status) return status.error();
+    auto refills = plan_refills(plan_, imager_);
+    if (!refills) return refills.error();
+    files_.pause_before(refills_ = std::move(*refills));
     if (plan_.job.dry_run) {
       std::vector<std::uint32_t> all(plan_.range[1] - plan_.range[0]);
       std::iota(all.begin(), all.end(), plan_.range[0]);
@@ -179,7 +183,7 @@ class ImageMaker : public Maker {
       binder_.add(*budget, record.layer, record.dosed_pixels, record.drops, record.asked_drops, record.program.lost);
     }
     if (plan_.job.levels > 0) shares_.add(record.dosed_pixels, record.half_differs, record.half_far);
-    if (cost_) cost_->add(record, record.program.drops, record.program.microseconds);
+    if (cost_) cost_->add(record, record.program.drops + record.program.spat, record.program.microseconds);
     const PixelGrid& grid = plan_.images->grid;
     set_pixels_ += record.set_pixels;
     moved_pixels_ += record.program.moved;
@@ -207,6 +211,7 @@ class ImageMaker : public Maker {
   std::int64_t microseconds_ = 0;  // of the machine
   bool timed_ = true;              // layers that an earlier build left are not
   double volume_mm3_ = 0;
+  std::vector<std::uint32_t> refills_;  // layers before which vats are filled
   dose::BinderCount binder_;
   dose::ShareCount shares_;
   std::vector<std::pair<std::string, std::uint64_t>> materials_;  // name, set pixels
@@ -264,6 +269,7 @@ void ImageMaker::tell(Summary& summary) const {
   }
   if (const auto& budget = plan_.images->dose.budget()) tell_binder(*budget, summary);
   if (print_seconds > 0) result("printing", replay::time_text(print_seconds, plan_.images->machine->machine.name));
+  if (!refills_.empty()) result("vats", program::refills_text(refills_));
   if (timed_ && cost_) cost_->account().tell(summary.results, (*summary.facts)["use"], summary.quote);
   if (!summary.dry_run) {
     end("rate", fmt::format("{:.2f} Gpx/s, {:.1f} layers/s ({})", pixels_a_second / 1e9,
@@ -286,6 +292,7 @@ void ImageMaker::tell(Summary& summary) const {
   }
   if (plan_.images->machine) {
     if (timed_) facts["print_seconds"] = print_seconds;
+    facts["refills"] = refills_;
     facts["moved_pixels"] = moved_pixels_;
     facts["lost_pixels"] = lost_pixels_;
   }

@@ -39,6 +39,7 @@ void JobCost::count(const RunsView& image, const dose::DropWork& drops, LayerRec
 }
 
 void JobCost::add(const LayerRecord& record, std::uint64_t drops, std::int64_t microseconds) {
+  if (record.layer.index == 0) account_.tally().add_base();
   account_.tally().add(record.layer.thickness, microseconds, drops, record.filled_pixels(), record.part_pixels,
                        record.part_drops);
 }

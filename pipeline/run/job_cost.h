@@ -20,7 +20,7 @@ class JobCost {
 
   /// Counts the pixels of each part in a layer, and its drops where a saturation decides them. From many threads at once.
   void count(const RunsView& image, const dose::DropWork& drops, LayerRecord& record) const;
-  /// From one thread at a time. drops, microseconds  of its print program
+  /// From one thread at a time. drops, microseconds  of its print program, with the drops that are spat
   void add(const LayerRecord& record, std::uint64_t drops, std::int64_t microseconds);
   const cost::Account& account() const { return account_; }
 

@@ -1,10 +1,13 @@
 #include "pipeline/run/powders.h"
 
 #include <fmt/format.h>
+#include <tbb/enumerable_thread_specific.h>
+#include <tbb/parallel_for.h>
 
 #include <algorithm>
 
 #include "pipeline/plan/heights.h"
+#include "stages/program/vats.h"
 #include "stages/sanity/mixed.h"
 
 namespace lamina::pipeline {
@@ -56,6 +59,17 @@ std::vector<sanity::LayerRange> layers_in_question(const Plan& plan) {
   return ranges;
 }
 
+/// The vats that feed a layer, from its image, a bit each. errors  of the image; kUsage: of vats_of_layer
+Result<std::uint32_t> vats_made(const Plan& plan, const LayerImager& imager, const Layer& layer, ImageWork& work) {
+  LayerRecord record;
+  ImageNotes notes;
+  if (Status status = imager.make(layer, work, record, notes); !status) return status.error();
+  std::vector<std::uint64_t> pixels;
+  for (const ImageRecord& image : record.images) pixels.push_back(image.set_pixels);
+  const auto vats = vats_of_layer(plan.images->machine->machine, plan.images->materials, pixels);
+  return vats ? Result<std::uint32_t>(vats->size() > 1 ? 3 : 1u << vats->front()) : vats.error();
+}
+
 }  // namespace
 
 Status refuse_mixed_powders(const Plan& plan, const LayerImager& imager) {
@@ -68,18 +82,31 @@ Status refuse_mixed_powders(const Plan& plan, const LayerImager& imager) {
   for (const auto& [first, last] : ranges) {
     for (std::uint32_t i = first; i <= last; ++i) {
       const Layer layer = plan.layer(i);
-      LayerRecord record;
-      ImageNotes notes;
-      if (Status status = imager.make(layer, work, record, notes); !status) return status;
-      std::vector<std::uint64_t> pixels;
-      for (const ImageRecord& image : record.images) pixels.push_back(image.set_pixels);
-      const auto feeds = vats_of_layer(machine, images.materials, pixels);
+      const auto feeds = vats_made(plan, imager, layer, work);
       if (feeds) continue;
+      if (feeds.error().fault != Fault::kUsage) return feeds.error();
       return Error{Fault::kUsage, fmt::format("{} mix powders, by the heights of their parts; layer {} (z {:.3f} mm) has {}",
                                               sanity::ranges_text(ranges), i, mm(layer.plane()), feeds.error().message)};
     }
   }
   return {};
+}
+
+Result<std::vector<std::uint32_t>> plan_refills(const Plan& plan, const LayerImager& imager) {
+  const ImagePlan& images = *plan.images;
+  if (!images.machine || !program::VatPlan::has_depths(images.machine->machine)) return std::vector<std::uint32_t>();
+  std::vector<std::uint32_t> feeds(plan.layer_count, images.materials.several() ? 0 : 1u << images.materials.used[0].vat);
+  tbb::enumerable_thread_specific<ImageWork> works;
+  tbb::parallel_for(0u, images.materials.several() ? plan.layer_count : 0, [&](std::uint32_t i) {
+    if (const auto vats = vats_made(plan, imager, plan.layer(i), works.local())) feeds[i] = *vats;
+  });
+  program::VatPlan vats(images.machine->machine);
+  for (std::uint32_t i = 0; i < plan.layer_count; ++i) {
+    if (feeds[i] == 0) return vats_made(plan, imager, plan.layer(i), works.local()).error();
+    vats.add(plan.layer(i), feeds[i]);
+  }
+  if (Status status = vats.status(); !status) return status.error();
+  return vats.refills();
 }
 
 }  // namespace lamina::pipeline

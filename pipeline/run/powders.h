@@ -12,4 +12,9 @@ namespace lamina::pipeline {
 /// cost    one layer's image as a rule; more only where parts stand at the same height without pixels
 Status refuse_mixed_powders(const Plan& plan, const LayerImager& imager);
 
+/// The layers of the whole job before which its program pauses for vats to be filled.
+/// errors  kUsage: a vat runs empty, by the profile's rule
+/// cost    O(layers); where materials differ, an image of each layer, whose pixels decide which vat feeds
+Result<std::vector<std::uint32_t>> plan_refills(const Plan& plan, const LayerImager& imager);
+
 }  // namespace lamina::pipeline

@@ -78,6 +78,12 @@ void Tally::add(std::int64_t thickness_nm, std::int64_t microseconds, std::uint6
   }
 }
 
+void Tally::add_base() {
+  const std::int64_t fed_nl = whole(machine_.powder.dose * machine_.powder.base_mm() * 1e3 * bed_mm2_);
+  fed_nl_ += fed_nl;
+  unshared_nl_ += fed_nl;
+}
+
 Quote Tally::quote() const {
   const Machine::Cost& cost = machine_.cost;
   Use job{pixels_, drops_, microseconds_};

@@ -57,6 +57,9 @@ class Tally {
   void add(std::int64_t thickness_nm, std::int64_t microseconds, std::uint64_t drops, std::uint64_t pixels,
            std::span<const std::uint64_t> part_pixels, std::span<const std::uint64_t> part_drops = {});
 
+  /// The powder below the first layer, which all parts share.
+  void add_base();
+
   Quote quote() const;
 
  private:

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -24,6 +25,11 @@ enum class LagUnit : std::uint8_t { kPixel, kTick };
 enum class FirstSwath : std::uint8_t { kBed, kLayer };
 /// Which vat feeds a layer that holds both materials; kRefuse, the default: there must be none.
 enum class VatRule : std::uint8_t { kFirst, kSecond, kMajority, kBoth, kRefuse };
+/// What becomes of a job that takes more powder than a vat of stated depth holds.
+enum class VatRefill : std::uint8_t {
+  kRefuse,  // it is refused before it starts
+  kPause    // the program pauses before the layers for which vats have to be filled
+};
 
 /// Everything that a profile says. Checked by program::make_head_grid.
 struct Machine {
@@ -87,12 +93,35 @@ struct Machine {
     double dose = 1.2;                        // height fed / height of the layer
     std::array<double, 2> roller_mm{0, 200};  // home and far end
     double roller_speed_mm_s = 50, vat_speed_mm_s = 5;
-    double spread_s = 0;                  // a layer's powder cycle that the program does not spell; 0: by the movements above
-    double pause_s = 0;                   // a layer, beside all movements: drying, wiping
+    double base_mm() const { return base_layers * base_layer_mm; }
+    double spread_s = 0;  // a layer's powder cycle that the program does not spell; 0: by the movements above
+    double pause_s = 0;   // a layer, beside all movements: drying, wiping
+    std::array<double, 2> vat_depth_mm{0, 0};  // that each vat can feed when it is full; 0: not stated
+    VatRefill refill = VatRefill::kRefuse;
+    std::uint32_t base_layers = 0;                         // spread below the first layer, without a drop
+    double base_layer_mm = 0.1;                            // thickness of each
+    double dry_s = 0;                                      // pause of the program behind the last sweep of each layer
+    std::vector<std::string> dry_on_lines, dry_off_lines;  // the machine's own around it: a lamp
+    double roller_rpm = 0;                // of a roller that turns against its way while it spreads; 0: not told
     double packing = 0.6;                 // share of the powder bed that is solid
     double evaporates_percent = 0;        // of the jetted binder, before the next layer is spread
     double least_saturation_percent = 0;  // of the voids, that binds; 0: not stated
   } powder;
+
+  /// Keeps the nozzles from drying: firing off the bed, and wiping. Positions are those of the carriage.
+  struct Care {
+    std::uint32_t spit_layers = 0, wipe_layers = 0;  // before the sweeps of every so many layers, from the first; 0: never
+    double spit_seconds = 0, wipe_seconds = 0;       // and at most so long before the end of any sweep; 0: no limit
+    std::uint32_t spit_drops = 100;                  // of each nozzle that is not blocked
+    std::optional<std::array<double, 2>> spit_mm;    // where the head fires
+    std::optional<std::array<double, 4>> wipe_mm;    // x, y from where and to where the head goes over its wiper
+    double wipe_speed_mm_s = 50;
+    std::vector<std::string> wipe_lines;          // the machine's own, behind the way over the wiper: a pump, a valve
+    std::optional<std::array<double, 2>> cap_mm;  // where the head waits in pauses; else its safe place
+
+    bool spits() const { return spit_layers > 0 || spit_seconds > 0; }
+    bool wipes() const { return wipe_layers > 0 || wipe_seconds > 0; }
+  } care;
 
   /// Prices, in units of the currency; 0: none. Powder by volume is that of the bed, as fed.
   struct Cost {

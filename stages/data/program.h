@@ -95,6 +95,7 @@ struct LayerCycle {
   std::uint32_t layer = 0, layers = 0;
   std::int64_t bottom_nm = 0, thickness_nm = 0;
   std::vector<std::uint32_t> feeds{0};  // vats, from 0, that give powder to it
+  bool refill = false;                  // the program pauses before it, for the vats to be filled
 };
 
 }  // namespace lamina

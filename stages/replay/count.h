@@ -17,6 +17,8 @@ struct Count {
   std::int64_t microseconds = 0;                         // of the machine; whole, so that sums of layers are exact
   std::array<double, 2> fed_mm{0, 0};                    // by each vat
   std::uint32_t vats = 0;                                // one bit per vat that feeds, by command or by movement
+  std::uint64_t spat = 0;                                // drops off the bed
+  std::uint32_t spits = 0, wipes = 0, refills = 0;       // times; refills: pauses for vats to be filled
   bool moves = false;                                    // whether the program moves vats and roller
   double build_mm = 0;                                   // final position of the build vat
   double farthest_along_um = 0, farthest_across_um = 0;  // greatest distance of a drop from its pixel's centre
@@ -26,7 +28,7 @@ struct Count {
 
 /// Binder and powder used by a program.
 struct Material {
-  double binder_mm3 = 0;  // drops x their volume
+  double binder_mm3 = 0;  // drops, those off the bed too, x their volume
   double powder_mm3 = 0;  // solid: height fed x area of the bed x packing
 };
 

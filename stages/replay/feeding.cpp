@@ -34,6 +34,20 @@ std::string fault_of_unfed(std::span<const std::uint64_t> set, std::span<const s
   return {};
 }
 
+std::string VatLevels::take(std::uint32_t layer, const Count& count) {
+  if (count.refills > 0) left_mm_ = depth_mm_;
+  std::string fault;
+  for (std::size_t vat = 0; vat < 2; ++vat) {
+    const double before = left_mm_[vat];
+    left_mm_[vat] -= count.fed_mm[vat];
+    if (depth_mm_[vat] == 0 || told_[vat] || left_mm_[vat] > -1e-3) continue;
+    told_[vat] = true;
+    fault = fmt::format("layer {}: takes {:g} mm of the {} vat, where {:g} of {:g} are left", layer, count.fed_mm[vat],
+                        vat == 0 ? "first" : "second", before, depth_mm_[vat]);
+  }
+  return fault;
+}
+
 std::string vats_text(std::uint32_t vats) {
   constexpr const char* kTexts[] = {"no vat feeds", "the first vat feeds", "the second vat feeds", "both vats feed"};
   return kTexts[vats & 3];
@@ -42,7 +56,7 @@ std::string vats_text(std::uint32_t vats) {
 Material material_of(const Machine& machine, const Count& count) {
   const double side = machine.bed.size_mm[0] * machine.bed.size_mm[1];
   const double area = machine.bed.shape == BedShape::kRound ? side * 3.14159265358979 / 4 : side;
-  return {static_cast<double>(count.drops) * machine.head.drop_pl * 1e-6,
+  return {static_cast<double>(count.drops + count.spat) * machine.head.drop_pl * 1e-6,
           (count.fed_mm[0] + count.fed_mm[1]) * area * machine.powder.packing};
 }
 

@@ -1,6 +1,7 @@
 // stages/replay/feeding.h: the vats that must feed a layer, and the material used.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <span>
 #include <string>
@@ -20,6 +21,20 @@ std::uint32_t vats_wanted(const Machine& machine, std::span<const std::uint64_t>
 /// older builds have none. feeds  a bit for each vat
 std::string fault_of_unfed(std::span<const std::uint64_t> set, std::span<const std::uint32_t> vat,
                            std::span<const std::uint64_t> recorded, std::uint32_t feeds);
+
+/// What is left in vats of stated depth, layer by layer in their order; a pause fills all of them.
+class VatLevels {
+ public:
+  /// They are full.
+  explicit VatLevels(const Machine& machine) : depth_mm_(machine.powder.vat_depth_mm), left_mm_(depth_mm_) {}
+
+  /// Empty, or which vat had less than the layer took, once for each vat.
+  std::string take(std::uint32_t layer, const Count& count);
+
+ private:
+  std::array<double, 2> depth_mm_, left_mm_;
+  std::array<bool, 2> told_{};
+};
 
 /// "both vats feed"
 std::string vats_text(std::uint32_t vats);

@@ -22,6 +22,7 @@ bool GcodeReader::take(GcodeLine& line, bool all_words) {
     now_ = now_.substr(0, now_.find(';'));
     while (now_.ends_with(' ')) now_.remove_suffix(1);
     if (now_.empty()) continue;
+    if (now_[0] == 'M' && printing_.takes_own(now_)) continue;
     const std::size_t space = now_.find(' ');
     if (space == 0) {
       fault("begins with a blank");

@@ -2,8 +2,10 @@
 // c781c362). stages/write/program/m578/README.md tells the format.
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <bit>
 #include <charconv>
+#include <cmath>
 
 #include "stages/replay/dialects.h"
 #include "stages/replay/gcode.h"
@@ -36,6 +38,25 @@ bool has_m578(std::string_view version) {
   return major < 3 || (major == 3 && minor < 5);
 }
 
+/// Whether the carriage stands where the head fires off the bed.
+bool beside_bed(Axes& axes, const Machine& profile) {
+  const auto& place = profile.care.spit_mm;
+  return place && profile.care.spits() && std::abs(axes.at(profile.motion.x_axis) - (*place)[0]) < 1e-3 &&
+         std::abs(axes.at(profile.motion.y_axis) - (*place)[1]) < 1e-3;
+}
+
+/// A shot off the bed: every nozzle that is not blocked, one after the other.
+void spit_inkjet(const GcodeLine& line, GcodeReader& reader, Axes& axes, Printing& printing) {
+  const Machine& profile = printing.profile();
+  const std::uint32_t bits = reader.count(line, 'S');
+  for (std::uint32_t bit = 0; bit < profile.head.nozzles; ++bit) {
+    const bool blocked = std::ranges::find(profile.head.blocked, bit) != profile.head.blocked.end();
+    if ((bits >> bit & 1) == (blocked ? 0u : 1u)) continue;
+    return reader.fault(fmt::format("M578 S{} off the bed {} nozzle {}", bits, blocked ? "fires blocked" : "leaves out", bit));
+  }
+  printing.spits(axes.at(profile.motion.x_axis), axes.at(profile.motion.y_axis), 1, std::popcount(bits) * kSecondsOfNozzle);
+}
+
 /// Waits for standstill, reads S and no P (GCodes::HandleMcode), and fires the nozzles of its lowest bits one after the
 /// other (Platform::Inkjet).
 void fire_inkjet(const GcodeLine& line, GcodeReader& reader, Printing& printing) {
@@ -66,7 +87,13 @@ void read_m578(std::string_view text, Printing& printing) {
   std::int64_t step = INT64_MIN;
   while (reader.next(line)) {
     if (ended) return reader.fault("goes on behind M400");
-    if (line.command == "M578") {
+    if (line.command == "M578" && !in_sweep && beside_bed(axes, printing.profile())) {
+      spit_inkjet(line, reader, axes, printing);
+    } else if (line.command == "M226") {
+      printing.refills();
+    } else if (line.command == "G4") {
+      printing.dwells(reader.number(line, 'P') / 1000);
+    } else if (line.command == "M578") {
       const double at = axes.at(scan.along);
       if (!in_sweep) printing.reading_sweep(sweep);
       const std::int64_t now = printing.step_at(at);

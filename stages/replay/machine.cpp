@@ -43,6 +43,10 @@ void Count::add(const Count& other) {
   fed_mm[0] += other.fed_mm[0];
   fed_mm[1] += other.fed_mm[1];
   vats |= other.vats;
+  spat += other.spat;
+  spits += other.spits;
+  wipes += other.wipes;
+  refills += other.refills;
   moves |= other.moves;
   build_mm = std::max(build_mm, other.build_mm);
   farthest_along_um = std::max(farthest_along_um, other.farthest_along_um);
@@ -133,10 +137,10 @@ Result<Count> VirtualMachine::replay(std::string_view program, const Layer& laye
   return printing.finish();
 }
 
-Result<std::int64_t> VirtualMachine::microseconds(std::string_view program, const Layer& layer) const {
+Result<Count> VirtualMachine::timed(std::string_view program, const Layer& layer) const {
   Printing printing(*this, layer, Purpose::kTime);
   if (Status status = read(machine_.dialect, program, printing); !status) return status.error();
-  return printing.finish().microseconds;
+  return printing.finish();
 }
 
 Result<Count> VirtualMachine::run(std::string_view program, std::uint32_t layer, const Watch& watch,

@@ -47,11 +47,11 @@ class VirtualMachine {
   Result<Count> replay(std::string_view program, const Layer& layer, std::span<const RunsView> planes, std::uint64_t moved,
                        std::uint64_t lost) const;
 
-  /// How long a layer's program takes, by its movements alone. The machine stands where the layer below left it, so that
-  /// layers can be timed in any order and their times add up to that of the job.
+  /// How long a layer's program takes, by its movements alone, and its care: nothing fires on the bed. The machine stands where
+  /// the layer below left it, so that layers can be timed in any order and their times add up to that of the job.
   /// program  of a dialect with motion; vectors may be left out of those of nuferbj
   /// errors   kVerification: a word unknown to the dialect
-  Result<std::int64_t> microseconds(std::string_view program, const Layer& layer) const;
+  Result<Count> timed(std::string_view program, const Layer& layer) const;
 
   /// A drop, by column and row of the image, sweep and step.
   struct Drop {

@@ -101,6 +101,25 @@ void fire(const Loaded& loaded, bool backward, double from, double to, Printing&
   }
 }
 
+/// Carries out what is no drop, powder or movement; false if it is another command.
+bool take_care(const GcodeLine& line, GcodeReader& reader, Axes& axes, Printing& printing) {
+  const auto& profile = printing.profile();
+  if (line.command == "M815") {
+    printing.refills();
+  } else if (line.command == "M816") {
+    const std::uint32_t drops = reader.count(line, 'N');
+    printing.spits(axes.at(profile.motion.x_axis), axes.at(profile.motion.y_axis), drops,
+                   drops / profile.head.highest_frequency_hz);
+  } else if (line.command == "G4") {
+    printing.dwells(reader.number(line, 'P') / 1000);
+  } else if (line.command == "M4" || line.command == "M5") {
+    printing.roller_turns(line.command == "M4" ? reader.number(line, 'S') : 0);
+  } else {
+    return false;
+  }
+  return true;
+}
+
 }  // namespace
 
 void read_nuferbj(std::string_view text, Printing& printing) {
@@ -133,6 +152,8 @@ void read_nuferbj(std::string_view text, Printing& printing) {
       if (!printing.ok()) return;
       loaded.clear();
       in_sweep = false;
+    } else if (!in_sweep && take_care(line, reader, axes, printing)) {
+      if (!printing.ok()) return;
     } else if (line.command == "M813") {
       if (in_sweep || reader.count(line, 'L') != printing.layer()) return reader.fault("the layer ends within a swath");
       axes.end();

@@ -28,7 +28,8 @@ Printing::Printing(const VirtualMachine& machine, const Layer& layer, Purpose pu
 
 Standing Printing::standing() const {
   const auto& motion = profile().motion;
-  return {motion.safe_mm[0], motion.safe_mm[1], profile().powder.build_sign * mm(layer_.bottom), profile().powder.roller_mm[0]};
+  return {motion.safe_mm[0], motion.safe_mm[1], profile().powder.build_sign * (mm(layer_.bottom) - base_mm()),
+          profile().powder.roller_mm[0]};
 }
 
 void Printing::fail(std::string what) {
@@ -170,11 +171,110 @@ void Printing::head_moves(double mm, double mm_s, bool scanning) {
   }
   (scanning ? count.scan_mm : count.travel_mm) += std::abs(mm);
   const double way = std::abs(mm), a = profile().motion.acceleration_mm_s2;
-  if (a == 0) return takes(way / mm_s);
-  takes(way < mm_s * mm_s / a ? 2 * std::sqrt(way / a) : way / mm_s + mm_s / a);
+  takes(a == 0 ? way / mm_s : way < mm_s * mm_s / a ? 2 * std::sqrt(way / a) : way / mm_s + mm_s / a);
+  if (!scanning) return;
+  const auto& care = profile().care;
+  if (care.spits()) check_care("fired off the bed", care.spit_layers, care.spit_seconds, spat_s_);
+  if (care.wipes()) check_care("wiped", care.wipe_layers, care.wipe_seconds, wiped_s_);
+  if (dwelt_s_ + lamp_blocks_ > 0) fault("scans behind the pause in which the layer dries");
 }
 
-void Printing::head_stands_at(double x_mm, double y_mm) { head_mm_ = {x_mm, y_mm}; }
+void Printing::head_stands_at(double x_mm, double y_mm) {
+  bool wiped = false;
+  if (const auto& wiper = profile().care.wipe_mm) {
+    const auto [x, y] = head_mm_.value_or(profile().motion.safe_mm);
+    if (std::hypot(x - (*wiper)[0], y - (*wiper)[1]) + std::hypot(x_mm - (*wiper)[2], y_mm - (*wiper)[3]) < 1e-3) {
+      wiped = true;
+      wiped_s_ = seconds_;
+      ++count.wipes;
+    }
+  }
+  if (own_ > 0) fault("the head goes on before all lines of the machine's own stand behind the wiper");
+  own_ = 0;
+  at_wiper_ = wiped;
+  head_mm_ = {x_mm, y_mm};
+  spat_here_ = 0;
+}
+
+void Printing::check_care(std::string_view what, std::uint32_t every, double limit_s, double done_s) {
+  const bool due = limit_s > 0 || (every > 0 && layer_.index % every == 0);
+  if (done_s < 0 && due) return fault(fmt::format("scans before the head is {}, as it has to be in this layer", what));
+  if (limit_s == 0 || seconds_ - done_s <= limit_s) return;
+  fault(fmt::format("a sweep ends {:.2f} s after the head was {} where {:g} may pass", seconds_ - done_s, what, limit_s));
+}
+
+void Printing::spits(double x_mm, double y_mm, std::uint64_t drops, double seconds) {
+  const auto& care = profile().care;
+  const auto& mount = profile().mounting;
+  if (!care.spits() || !care.spit_mm) return fault("fires off the bed, and the profile has no place for it");
+  if (std::hypot(x_mm - (*care.spit_mm)[0], y_mm - (*care.spit_mm)[1]) > 1e-3) {
+    return fault(fmt::format("fires off the bed at {:g}, {:g} mm, not at {:g}, {:g}", x_mm, y_mm, (*care.spit_mm)[0],
+                             (*care.spit_mm)[1]));
+  }
+  const bool x = mount.scan_axis == ScanAxis::kX;
+  double um = ((x ? y_mm : x_mm) - mount.offset_mm[x ? 1 : 0]) * 1000;
+  if (mount.nozzle_0 == Side::kBack || mount.nozzle_0 == Side::kRight) um = machine_.lines_ * machine_.line_um_ - um;
+  const auto line = static_cast<std::int64_t>(std::floor(um / machine_.line_um_));
+  const double step = ((x ? x_mm : y_mm) - position_of(0)) / (position_of(1) - position_of(0));
+  for (std::uint32_t nozzle = 0; nozzle < nozzles(); ++nozzle) {
+    const auto [column, row] = machine_.nozzle_at(line, step, nozzle);
+    if (machine_.nozzle_[nozzle].blocked || column < -0.5 || row < -0.5 || column > machine_.columns_ - 0.5 ||
+        row > machine_.rows_ - 0.5) {
+      count.spat += machine_.nozzle_[nozzle].blocked ? 0 : drops;
+      continue;
+    }
+    return fault(fmt::format("nozzle {} fires off the bed where column {:.0f}, row {:.0f} of it is", nozzle, column, row));
+  }
+  takes(seconds);
+  spat_here_ += drops;
+  if (spat_here_ < care.spit_drops) return;
+  spat_here_ -= care.spit_drops;
+  spat_s_ = seconds_;
+  ++count.spits;
+}
+
+void Printing::waits_capped(std::string_view what) {
+  const auto& cap = profile().care.cap_mm;
+  const auto [x, y] = head_mm_.value_or(profile().motion.safe_mm);
+  if (!cap || std::hypot(x - (*cap)[0], y - (*cap)[1]) < 1e-3) return;
+  fault(fmt::format("{} while the head is not at its cap, {:g}, {:g} mm", what, (*cap)[0], (*cap)[1]));
+}
+
+void Printing::refills() {
+  if (count.fed_mm[0] + count.fed_mm[1] > 0) return fault("waits for the vats to be filled behind the layer's powder");
+  waits_capped("the vats are filled");
+  ++count.refills;
+}
+
+void Printing::dwells(double seconds) {
+  waits_capped("the layer dries");
+  if (own_ > 0) fault("the layer dries before all lines of the machine's own stand before it");
+  own_ = 0;
+  dwelt_s_ += seconds;
+  takes(seconds);
+}
+
+// The block that may come now.
+const std::vector<std::string>& Printing::own_lines() const {
+  const auto& profile = machine_.machine_;
+  if (at_wiper_) return profile.care.wipe_lines;
+  return dwelt_s_ > 0 ? profile.powder.dry_off_lines : profile.powder.dry_on_lines;
+}
+
+bool Printing::takes_own(std::string_view line) {
+  const auto& lines = own_lines();
+  if (own_ < lines.size() && lines[own_] == line) {
+    if (++own_ < lines.size()) return true;
+    own_ = 0;
+    ++(at_wiper_ ? wiper_blocks_ : lamp_blocks_);
+    at_wiper_ = false;
+    return true;
+  }
+  if (own_ > 0) fault(fmt::format("'{}' stands where the machine's own '{}' has to", line, lines[own_]));
+  return false;
+}
+
+void Printing::roller_turns(double rpm) { rpm_ = rpm; }
 
 void Printing::feeds(std::uint32_t vat, double mm, double mm_s) {
   count.fed_mm[vat] += mm;
@@ -195,14 +295,36 @@ void Printing::build_vat_goes_down(double mm) {
 
 void Printing::roller_stands_at(double mm) {
   tells_powder_ = true;
-  rolled_ = rolled_ || std::abs(mm - profile().powder.roller_mm[1]) < 1e-3;
+  const double far = profile().powder.roller_mm[1];
+  const bool comes = std::abs(roller_mm_ - far) >= 1e-3 || std::abs(profile().powder.roller_mm[0] - far) < 1e-3;
+  if (std::abs(mm - far) < 1e-3 && comes) strokes(count.build_mm, count.fed_mm[0] + count.fed_mm[1]);
+  rolled_ = rolled_ || strokes_ > base_layers();
   roller_mm_ = mm;
+}
+
+// A layer without a base has its powder checked at its end alone, as ever: strokes are counted, and told by the last one.
+void Printing::strokes(double build_mm, double fed_mm) {
+  const auto& powder = profile().powder;
+  ++strokes_;
+  if (powder.roller_rpm > 0 && std::abs(rpm_ - powder.roller_rpm) > 1e-3 && spread_wrong_.empty()) {
+    spread_wrong_ = fmt::format("the roller spreads with {:g} turns a minute where {:g} have to be", rpm_, powder.roller_rpm);
+  }
+  if (profile().dialect == "oasis" || strokes_ > base_layers() || !spread_wrong_.empty()) return;
+  const double above = base_mm() - strokes_ * powder.base_layer_mm;  // of the base, still to be spread
+  const double build = mm(layer_.bottom) - above, fed = powder.dose * strokes_ * powder.base_layer_mm;
+  if (std::abs(build_mm - build) > 1e-3 || std::abs(fed_mm - fed) > 1e-3 * strokes_) {
+    spread_wrong_ =
+        fmt::format("layer {} of the base is spread with the build vat at {:g} mm and {:g} mm fed, not {:g} and {:g}", strokes_,
+                    build_mm, fed_mm, build, fed);
+  }
 }
 
 void Printing::spreads(double build_mm, double fed_mm, double clearance_mm) {
   const auto& powder = profile().powder;
-  const double build = build_mm * powder.build_sign, top = mm(std::int64_t{layer_.bottom} + layer_.thickness) - clearance_mm;
-  const double fed = powder.dose * mm(layer_.thickness) + clearance_mm;
+  const bool base = strokes_ < base_layers();
+  const double height = base ? (strokes_ + 1) * powder.base_layer_mm : base_mm() + mm(layer_.thickness);
+  const double build = build_mm * powder.build_sign, top = mm(layer_.bottom) - base_mm() + height - clearance_mm;
+  const double fed = powder.dose * height + clearance_mm;
   if (!spread_wrong_.empty()) return;
   if (std::abs(build - top) > 1e-3) {
     spread_wrong_ = fmt::format("powder is spread with the build vat at {:g} mm where {:g} have to be", build, top);
@@ -227,9 +349,17 @@ void Printing::check_cycle() {
   if (const double top = mm(std::int64_t{layer.bottom} + layer.thickness); std::abs(count.build_mm - top) > 1e-3) {
     wrong(fmt::format("the build vat stands at {:g} mm where {:g} have to", count.build_mm, top));
   }
-  const double fed = count.fed_mm[0] + count.fed_mm[1], dose = powder.dose * mm(layer.thickness);
-  if (std::abs(fed - dose) > 1e-3) wrong(fmt::format("{:g} mm are fed where {:g} have to", fed, dose));
+  const double fed = count.fed_mm[0] + count.fed_mm[1], dose = powder.dose * (mm(layer.thickness) + base_mm());
+  if (std::abs(fed - dose) > 1e-3 * (1 + base_layers())) wrong(fmt::format("{:g} mm are fed where {:g} have to", fed, dose));
   if (!rolled_) wrong(fmt::format("the roller does not reach its far end at {:g} mm", powder.roller_mm[1]));
+  if (std::abs(dwelt_s_ - powder.dry_s) > 1e-3) {
+    wrong(fmt::format("the layer dries for {:g} s where {:g} have to be", dwelt_s_, powder.dry_s));
+  }
+  const std::uint32_t lamps = (powder.dry_on_lines.empty() ? 0 : 1) + (powder.dry_off_lines.empty() ? 0 : 1);
+  const std::uint32_t wipers = profile().care.wipe_lines.empty() ? 0 : count.wipes;
+  if (lamp_blocks_ != lamps || wiper_blocks_ != wipers) {
+    wrong(fmt::format("the machine's own lines stand {} times where {} have to", lamp_blocks_ + wiper_blocks_, lamps + wipers));
+  }
   if (fires_on_old_) wrong("the first sweep begins before powder is spread");
   if (std::abs(roller_mm_ - powder.roller_mm[0]) > 1e-3) {
     wrong(fmt::format("the roller stays at {:g} mm, not at {:g}", roller_mm_, powder.roller_mm[0]));

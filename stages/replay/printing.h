@@ -78,6 +78,19 @@ class Printing {
   void spreads(double build_mm, double fed_mm, double clearance_mm);
   void takes(double seconds) { seconds_ += seconds; }
 
+  // --- care of head and powder
+  /// Every nozzle that is not blocked fires so many drops where the carriage stands, off the bed.
+  void spits(double x_mm, double y_mm, std::uint64_t drops, double seconds);
+  /// The program waits for somebody to fill the vats; before powder is fed.
+  void refills();
+  /// It waits for the layer to dry; behind the sweeps.
+  void dwells(double seconds);
+  /// Whether a line is the next of the machine's own, which its profile has: behind a wiper, around the pause in which the
+  /// layer dries. Whole blocks, in their order.
+  bool takes_own(std::string_view line);
+  /// The roller turns so fast against its way, or, at 0, no longer.
+  void roller_turns(double rpm);
+
   /// Checks the powder cycle of the layer, and that it leaves the machine as the next one expects it; called at the end.
   void check_cycle();
   /// Ends the layer: adds the time of what the profile knows and the program does not spell.
@@ -105,6 +118,14 @@ class Printing {
     return fired_.data() + plane * plane_words_ + std::size_t{row} * row_words_;
   }
   void fail(std::string what);  // takes the complete message
+  /// Whether care was taken before this sweep, which has just ended. since_s  of the layer, behind it; below 0: not yet
+  void check_care(std::string_view what, std::uint32_t every, double limit_s, double since_s);
+  /// mm of powder below the layer, fed with it.
+  double base_mm() const { return layer_.index == 0 ? profile().powder.base_mm() : 0; }
+  std::uint32_t base_layers() const { return layer_.index == 0 ? profile().powder.base_layers : 0; }
+  void strokes(double build_mm, double fed_mm);
+  const std::vector<std::string>& own_lines() const;
+  void waits_capped(std::string_view what);
   void coverage(std::vector<bool>& worked, std::vector<bool>& blocked) const;
   std::int64_t line_of(std::uint32_t column, std::uint32_t row) const;
   bool pixel(std::int64_t line, std::int64_t place, std::uint32_t& column, std::uint32_t& row) const;
@@ -130,8 +151,15 @@ class Printing {
   std::size_t plane_words_;
   std::vector<std::uint64_t> fired_;  // one bit per plane and pixel, the leftmost in bit 0: fired more than so many times
   std::vector<Sweep> sweeps_;
-  std::string fault_;         // the first one
-  std::string spread_wrong_;  // the first fault of spreading; only check_cycle knows the layer's heights for true
+  std::uint32_t strokes_ = 0;          // of the roller to its far end
+  double spat_s_ = -1, wiped_s_ = -1;  // when the layer's last care ended; -1: none yet
+  std::uint64_t spat_here_ = 0;        // drops of a nozzle since the head stands
+  std::size_t own_ = 0;                // lines of the block at hand that came
+  std::uint32_t wiper_blocks_ = 0, lamp_blocks_ = 0;
+  bool at_wiper_ = false;         // the head has just gone over it
+  double dwelt_s_ = 0, rpm_ = 0;  // rpm: of the roller
+  std::string fault_;             // the first one
+  std::string spread_wrong_;      // the first fault of spreading; only check_cycle knows the layer's heights for true
 };
 
 }  // namespace lamina::replay

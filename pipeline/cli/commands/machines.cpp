@@ -88,7 +88,8 @@ Result<std::optional<program::FullLayer>> time_full_layer(const ResolvedMachine&
   }
   program::FullLayer full;
   full.thickness_mm = std::max(0.1, resolved.machine.motion.layer_step_um / 1000);
-  const Layer layer{0, 0, static_cast<Nm>(nm_of(full.thickness_mm))};
+  const auto thickness = static_cast<Nm>(nm_of(full.thickness_mm));
+  const Layer layer{1, thickness, thickness};  // the first one has the base of powder below it
   Runs image = image_of_bed(resolved.machine, grid.image);
   ProgramWork work;
   ProgramRecord record;

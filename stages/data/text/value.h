@@ -64,7 +64,9 @@ std::string read_value(std::string_view text, const Limits& limits, std::array<T
   const bool one = limits.one_for_all && pieces.size() == 1;
   if (pieces.size() != N && !one) {
     return fmt::format("'{}' is not {}{}", text.substr(0, 60), limits.one_for_all ? "one or " : "",
-                       N == 2 ? "two numbers; write them as A,B or AxB" : "three numbers; write them as X,Y,Z");
+                       N == 2   ? "two numbers; write them as A,B or AxB"
+                       : N == 3 ? "three numbers; write them as X,Y,Z"
+                                : "four numbers; write them with commas between");
   }
   std::array<T, N> read{};
   for (std::size_t i = 0; i < N; ++i) {

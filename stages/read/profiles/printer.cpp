@@ -28,6 +28,7 @@ constexpr Word<VatRule> kVats[] = {{"first", VatRule::kFirst},
                                    {"majority", VatRule::kMajority},
                                    {"both", VatRule::kBoth},
                                    {"refuse", VatRule::kRefuse}};
+constexpr Word<VatRefill> kRefills[] = {{"refuse", VatRefill::kRefuse}, {"pause", VatRefill::kPause}};
 
 constexpr auto kBed = &Machine::bed;
 constexpr auto kHead = &Machine::head;
@@ -39,6 +40,8 @@ using Head = decltype(Machine::head);
 using Mounting = decltype(Machine::mounting);
 using Motion = decltype(Machine::motion);
 using Powder = decltype(Machine::powder);
+constexpr auto kCare = &Machine::care;
+using Care = decltype(Machine::care);
 constexpr auto kCost = &Machine::cost;
 using Cost = decltype(Machine::cost);
 
@@ -86,6 +89,24 @@ std::string read_axes(Text text, std::vector<std::string>& axes) {
   }
   if (names.size() != 2) return "give two axes, of the first and of the second vat";
   axes.assign(names.begin(), names.end());
+  return {};
+}
+/// Commands of a machine's own: M and a number, and words of a letter and a number, with one blank between.
+std::string read_own_lines(Text text, std::vector<std::string>& lines) {
+  constexpr std::size_t kLongest = 60, kMostLines = 20;
+  std::vector<std::string> read;
+  for (const Text line : text.empty() ? std::vector<Text>() : split(text, ",")) {
+    const auto words = split(line, " ");
+    const bool good = line.size() <= kLongest && line.starts_with('M') && std::ranges::all_of(words, [](Text word) {
+                        double value = 0;
+                        return word.size() > 1 && word[0] >= 'A' && word[0] <= 'Z' &&
+                               read_number(word.substr(1), -kMost, kMost, "", value).empty();
+                      });
+    if (!good) return fmt::format("'{}' is no command such as M42 P4 S1, of up to {} characters", line, kLongest);
+    read.emplace_back(line);
+  }
+  if (read.size() > kMostLines) return fmt::format("{} lines; give up to {}", read.size(), kMostLines);
+  lines = std::move(read);
   return {};
 }
 std::string join(const std::vector<std::string>& names) { return fmt::format("{}", fmt::join(names, ",")); }
@@ -153,6 +174,28 @@ constexpr Key<Machine> kKeys[] = {
     field<kPowder, &Powder::evaporates_percent>({"powder", "evaporates_percent"}, {0, 99.9, " %"}).unsaid_at("0"),
     field<kPowder, &Powder::least_saturation_percent>({"powder", "least_saturation_percent"}, {0, 1e4, " %"}).unsaid_at("0"),
 
+    field<kPowder, &Powder::vat_depth_mm>({"powder", "vat_depth_mm"}, {0, kMostMm, " mm"}).unsaid_at("0,0"),
+    word<kRefills, kPowder, &Powder::refill>({"powder", "refill"}).unsaid_at("refuse"),
+    field<kPowder, &Powder::base_layers>({"powder", "base_layers"}, {0, 10'000}).unsaid_at("0"),
+    field<kPowder, &Powder::base_layer_mm>({"powder", "base_layer_mm"}, {1e-3, 100, " mm"}).unsaid_at("0.1"),
+    field<kPowder, &Powder::dry_s>({"powder", "dry_s"}, {0, 1e5, " s"}).unsaid_at("0"),
+    custom<Machine, read_own_lines, join, kPowder, &Powder::dry_on_lines>({"powder", "dry_on_lines"}, Form::kStrings)
+        .unsaid_at(""),
+    custom<Machine, read_own_lines, join, kPowder, &Powder::dry_off_lines>({"powder", "dry_off_lines"}, Form::kStrings)
+        .unsaid_at(""),
+    field<kPowder, &Powder::roller_rpm>({"powder", "roller_rpm"}, {0, 1e5, " rpm"}).unsaid_at("0"),
+
+    field<kCare, &Care::spit_layers>({"care", "spit_layers"}, {0, 1e6}).unsaid_at("0"),
+    field<kCare, &Care::spit_seconds>({"care", "spit_seconds"}, {0, 1e6, " s"}).unsaid_at("0"),
+    field<kCare, &Care::spit_drops>({"care", "spit_drops"}, {1, 65'535}).unsaid_at("100"),
+    field<kCare, &Care::spit_mm>({"care", "spit_mm"}, kAny).unsaid_at(""),
+    field<kCare, &Care::wipe_layers>({"care", "wipe_layers"}, {0, 1e6}).unsaid_at("0"),
+    field<kCare, &Care::wipe_seconds>({"care", "wipe_seconds"}, {0, 1e6, " s"}).unsaid_at("0"),
+    field<kCare, &Care::wipe_mm>({"care", "wipe_mm"}, kAny).unsaid_at(""),
+    field<kCare, &Care::wipe_speed_mm_s>({"care", "wipe_speed_mm_s"}, kSpeed).unsaid_at("50"),
+    custom<Machine, read_own_lines, join, kCare, &Care::wipe_lines>({"care", "wipe_lines"}, Form::kStrings).unsaid_at(""),
+    field<kCare, &Care::cap_mm>({"care", "cap_mm"}, kAny).unsaid_at(""),
+
     text<check_currency, kCost, &Cost::currency>({"cost", "currency"}).unsaid_at("EUR"),
     field<kCost, &Cost::hour_price>({"cost", "hour_price"}, kPrice).unsaid_at("0"),
     field<kCost, &Cost::binder_price_l>({"cost", "binder_price_l"}, kPrice).unsaid_at("0"),
@@ -162,6 +205,11 @@ constexpr Key<Machine> kKeys[] = {
     field<kCost, &Cost::powder_reuse>({"cost", "powder_reuse"}, {0, 1}).unsaid_at("0"),
     field<kCost, &Cost::spit_drops>({"cost", "spit_drops"}, {0, 1e9}).unsaid_at("0"),
 };
+
+/// Whether a profile may say nothing of it: names of vats, places of a head's care, lines of its own.
+bool may_be_absent(const KeyName& key) {
+  return key.name == "materials" || key.name.ends_with("_lines") || (key.section == "care" && key.unsaid == "");
+}
 
 }  // namespace
 
@@ -190,14 +238,13 @@ Result<Machine> read_machine(std::string_view text, const std::string& where, st
 }
 
 std::string machine_text(const Machine& machine) {
-  return sections_text<Machine>(kKeys, machine, [](const Key<Machine>& key, const std::string& value) {
-    return key.name != "materials" || !value.empty();  // profiles without names of vats say nothing of them
-  });
+  return sections_text<Machine>(
+      kKeys, machine, [](const Key<Machine>& key, const std::string& value) { return !may_be_absent(key) || !value.empty(); });
 }
 
 std::string kept_machine_text(const Machine& machine) {
   return sections_text<Machine>(kKeys, machine, [](const Key<Machine>& key, const std::string& value) {
-    return key.unsaid != value && (key.name != "materials" || !value.empty());
+    return key.unsaid != value && (!may_be_absent(key) || !value.empty());
   });
 }
 

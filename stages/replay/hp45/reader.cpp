@@ -50,6 +50,7 @@ class Hp45Reader {
 
  private:
   void command(const GcodeLine& line);
+  void prime(std::string_view number);
   void move(const GcodeLine& line);
   void spread(const GcodeLine& line);
   bool ready();
@@ -90,8 +91,15 @@ void Hp45Reader::read() {
   while (reader_.next(line)) {
     if (ended_) return reader_.fault("goes on behind BRL");
     if (line.command == "G4") {
-      if (reader_.number(line, 'P') != 0) return reader_.fault("G4 has P0: the host waits until nothing moves");
+      const double seconds = reader_.number(line, 'P');
+      if (seconds > 0 && oasis_ && printing_.profile().powder.dry_s > 0) {
+        printing_.dwells(seconds);
+      } else if (seconds != 0) {
+        return reader_.fault("G4 has P0: the host waits until nothing moves");
+      }
       moving_ = false;
+    } else if (oasis_ && line.command == "M0") {
+      printing_.refills();
     } else if (oasis_ && (line.command == "M4" || line.command == "M5")) {
       spread(line);
     } else if (line.command[0] == 'G') {
@@ -108,6 +116,7 @@ void Hp45Reader::command(const GcodeLine& line) {
   if (moving_) return reader_.fault(fmt::format("{} is sent while the head may still move; G4 P0 waits for it", line.command));
   if (line.command == "SBR" && !ready()) return;
   if (line.command == "BRES" && ++rewinds_ > kMostRewinds) return reader_.fault("rewinds the buffer again and again");
+  if (line.command == "PRM") return prime(line.rest);
   const std::string wrong = controller_.execute(line.command, line.rest);
   if (!wrong.empty()) return reader_.fault(wrong);
   if (line.command == "SBR") {
@@ -123,6 +132,22 @@ void Hp45Reader::command(const GcodeLine& line) {
     axes_.end();
     ended_ = true;
   }
+}
+
+// DMAPrint::Prime: so many bursts of all nozzles, wherever the head stands.
+void Hp45Reader::prime(std::string_view number) {
+  constexpr std::string_view kDigits = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+  std::uint32_t bursts = 0;
+  for (const char c : number) {
+    const std::size_t digit = kDigits.find(c);
+    if (digit == std::string_view::npos || bursts > UINT16_MAX)
+      return reader_.fault("PRM takes up to 65535 bursts, in base 64");
+    bursts = bursts * 64 + static_cast<std::uint32_t>(digit);
+  }
+  if (bursts > UINT16_MAX) return reader_.fault("PRM takes up to 65535 bursts, in base 64");
+  const auto& profile = printing_.profile();
+  printing_.spits(axes_.at(profile.motion.x_axis), axes_.at(profile.motion.y_axis), bursts,
+                  bursts / profile.head.highest_frequency_hz);
 }
 
 // Whether lines can be fired as the profile has it: where the head stands, how fine the encoder, how many bursts.
@@ -216,6 +241,16 @@ bool Hp45Reader::reaches(double mm) {
     high = std::max({high, profile.powder.roller_mm[0], profile.powder.roller_mm[1]});
   }
   // The run-up takes two measures of speed, of 50 counts each.
+  if (const auto& care = profile.care; care.spits() || care.wipes() || care.cap_mm) {
+    const std::size_t i = x ? 0 : 1;
+    for (const auto& place : {care.spit_mm, care.cap_mm}) {
+      if (place) low = std::min(low, (*place)[i]), high = std::max(high, (*place)[i]);
+    }
+    if (care.wipe_mm) {
+      low = std::min({low, (*care.wipe_mm)[i], (*care.wipe_mm)[2 + i]});
+      high = std::max({high, (*care.wipe_mm)[i], (*care.wipe_mm)[2 + i]});
+    }
+  }
   const double row_mm = printing_.nozzles() * profile.head.pitch_um / 1000;  // of a tilted head
   const double room = kRoomMm + row_mm + profile.motion.ramp_mm + 110 * 25.4 / controller_.counts_per_inch();
   return mm >= low - room && mm <= high + room;
@@ -329,6 +364,8 @@ void Hp45Reader::spread(const GcodeLine& line) {
         fmt::format("the spreader starts at {:g} mm, not at {:g}", axes_.at(powder.roller_axis), powder.roller_mm[0]));
   }
   spreading_ = line.command == "M4";
+  if (line.has('S') && powder.roller_rpm == 0) return reader_.fault("M4 has no S: the profile tells no speed of the roller");
+  printing_.roller_turns(spreading_ && line.has('S') ? line.word.at('S') : 0);
 }
 
 }  // namespace

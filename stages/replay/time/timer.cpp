@@ -51,9 +51,9 @@ void Timer::sweep(double across_mm, bool backward, std::int64_t first, std::int6
   sweeps_.push_back({across_mm, backward, first, last});
 }
 
-Result<std::int64_t> Timer::end() {
+Result<Count> Timer::end() {
   if (!text_.empty()) {
-    auto taken = machine_->microseconds(text_, layer_);
+    auto taken = machine_->timed(text_, layer_);
     if (taken) return taken;
     return Error{Fault::kInternal, fmt::format("the machine would not take the program: {}; this is a fault of lamina, please "
                                                "report it",
@@ -68,7 +68,7 @@ Result<std::int64_t> Timer::end() {
   }
   passes.end();
   if (Status status = printing.status(); !status) return Error{Fault::kInternal, status.error().message};
-  return printing.finish().microseconds;
+  return printing.finish();
 }
 
 }  // namespace lamina::replay

@@ -30,8 +30,8 @@ class Timer {
   /// Dialects without: the next sweep, by its first and last step that fire, in the order of the movement.
   /// across_mm  of the carriage
   void sweep(double across_mm, bool backward, std::int64_t first, std::int64_t last);
-  /// Microseconds of the layer. errors  kInternal: the machine's reader does not take the program
-  Result<std::int64_t> end();
+  /// The layer's time, and its care. errors  kInternal: the machine's reader does not take the program
+  Result<Count> end();
 
   std::uint64_t bytes() const { return text_.capacity() + sweeps_.capacity() * sizeof(Sweep); }
 

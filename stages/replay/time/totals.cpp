@@ -37,6 +37,11 @@ std::vector<std::string> totals_text(const Totals& totals) {
                             totals.material.powder_mm3 / 1000, count.fed_mm[0], count.fed_mm[1]);
   }
   lines.push_back(std::move(material));
+  if (count.spits + count.wipes + count.refills > 0) {
+    lines.push_back(fmt::format("care      fired off the bed {} times, {} drops; wiped {} times; {} pauses to fill vats",
+                                readable_count(count.spits), readable_count(count.spat), readable_count(count.wipes),
+                                readable_count(count.refills)));
+  }
   return lines;
 }
 
@@ -54,6 +59,10 @@ nlohmann::ordered_json totals_json(const Totals& totals) {
           {"scan_mm", count.scan_mm},
           {"travel_mm", count.travel_mm},
           {"fed_mm", count.fed_mm},
+          {"spits", count.spits},
+          {"spat_drops", count.spat},
+          {"wipes", count.wipes},
+          {"refills", count.refills},
           {"binder_mm3", totals.material.binder_mm3},
           {"powder_mm3", totals.material.powder_mm3},
           {"farthest_along_um", count.farthest_along_um},

@@ -111,6 +111,7 @@ void describe_images(Io& io, const ManifestHead& head, Record& record) {
   io.number("moved", record.program.moved);
   io.number("lost", record.program.lost);
   io.added("microseconds", record.program.microseconds);
+  io.added("spat", record.program.spat);
   io.hash("xxh3_128", record.program.hash);
   io.close("}");
 }

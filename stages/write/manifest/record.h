@@ -20,6 +20,7 @@ struct ProgramRecord {
   std::uint64_t drops = 0;
   std::uint64_t moved = 0, lost = 0;  // pixels of blocked nozzles (stages/program/compile.h)
   std::int64_t microseconds = 0;      // that the machine takes (stages/replay/time/timer.h); 0: of an earlier build
+  std::uint64_t spat = 0;             // drops fired off the bed
 };
 
 /// The image of one material where a job has several, or of the pixels that get at least so many drops.

@@ -31,6 +31,18 @@ class ProgramWriter {
   virtual void end(ProgramBytes& out) = 0;
 };
 
+/// What a dialect can say beside the drops and the powder of a layer, a bit each.
+enum Saying : std::uint32_t {
+  kSaysBase = 1,      // layers of powder below the first one
+  kSaysRefill = 2,    // a pause for a vat to be filled
+  kSaysDry = 4,       // a pause behind the sweeps
+  kSaysRoller = 8,    // the speed of a roller that turns
+  kSaysCare = 16,     // firing off the bed, and wiping, at the begin of a layer
+  kSaysSeconds = 32,  // the same between sweeps, by the clock
+  kSaysOwn = 64,      // lines of the machine's own, which its profile has
+  kSaysAll = 127
+};
+
 /// One row of the registry.
 struct Dialect {
   std::string_view id;         // as in machine.dialect
@@ -39,6 +51,7 @@ struct Dialect {
   std::uint32_t most_nozzles;
   std::uint32_t bit_order;  // HeadGrid::bit_order that its vectors have
   bool has_motion;          // the text moves axes and vats; else it is the data of the head alone
+  std::uint32_t says;       // bits of Saying
   /// A writer for one thread. machine and grid have to live as long as it does.
   std::unique_ptr<ProgramWriter> (*make_writer)(const Machine& machine, const HeadGrid& grid);
   /// What it cannot say beside the number of nozzles. errors  kUsage

@@ -4,6 +4,7 @@
 #include <array>
 
 #include "stages/write/program/brundlefab/brundlefab.h"
+#include "stages/write/program/care.h"
 #include "stages/write/program/dialect.h"
 #include "stages/write/program/hp45/head.h"
 #include "stages/write/program/hp45/hp45.h"
@@ -18,19 +19,19 @@ namespace {
 
 constexpr std::array<Dialect, 7> kDialects = {{
     {"nuferbj", ".gcode", "G-code with vectors as hexadecimal words, powder cycle and counters; our own definition", 65'535, 0,
-     true, nuferbj::make_writer},
-    {"raw", ".raw", "128-bit words as a Xaar XJ128 takes them, with swath heads; our own definition", 65'535, 120, false,
+     true, kSaysAll, nuferbj::make_writer},
+    {"raw", ".raw", "128-bit words as a Xaar XJ128 takes them, with swath heads; our own definition", 65'535, 120, false, 0,
      raw::make_writer},
     {"planes", ".planes", "32-bit padded planes of a swath, as production heads take them; our own definition", 65'535, 31,
-     false, planes::make_writer},
+     false, 0, planes::make_writer},
     {"hp45", ".hp45", "HP45 controller V4, firmware 0.08: SBR lines for it, G-code for a motion controller beside it", 300, 0,
-     true, hp45::make_writer, hp45::check},
+     true, kSaysBase | kSaysCare | kSaysSeconds, hp45::make_writer, hp45::check},
     {"oasis", ".oasis", "Oasis: an HP45 controller V4 and GRBL, with the new layer of the Oasis controller", 300, 0, true,
-     oasis::make_writer, oasis::check},
-    {"brundlefab", ".gcode", "G-code of the BrundleFab, whose Y loads an ink bar of 840 dots: T1 P, 12 nozzles", 12, 0, true,
+     kSaysAll, oasis::make_writer, oasis::check},
+    {"brundlefab", ".gcode", "G-code of the BrundleFab, whose Y loads an ink bar of 840 dots: T1 P, 12 nozzles", 12, 0, true, 0,
      brundlefab::make_writer, brundlefab::check},
     {"m578", ".gcode", "M578 S of RepRapFirmware 1.09r to 3.4 built with inkjet support: one head, 12 nozzles, a stop a pixel",
-     12, 0, true, m578::make_writer, m578::check},
+     12, 0, true, kSaysBase | kSaysRefill | kSaysDry | kSaysCare | kSaysOwn, m578::make_writer, m578::check},
 }};
 
 }  // namespace
@@ -43,7 +44,10 @@ const Dialect* find_dialect(std::string_view id) {
 }
 
 Status check_dialect(const Dialect& dialect, const Machine& machine, const HeadGrid& grid) {
-  if (grid.nozzles <= dialect.most_nozzles) return dialect.check != nullptr ? dialect.check(machine, grid) : Status();
+  if (grid.nozzles <= dialect.most_nozzles) {
+    if (Status status = check_care(dialect, machine, grid); !status) return status;
+    return dialect.check != nullptr ? dialect.check(machine, grid) : Status();
+  }
   return Error{Fault::kUsage, fmt::format("{}: machine.dialect: {} speaks to at most {} nozzles, the head has {}", machine.name,
                                           dialect.id, dialect.most_nozzles, grid.nozzles)};
 }

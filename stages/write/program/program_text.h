@@ -3,11 +3,14 @@
 
 #include <fmt/format.h>
 
+#include <array>
 #include <cstring>
 #include <string>
 #include <string_view>
 #include <utility>
 
+#include "stages/data/text/number_text.h"
+#include "stages/data/units.h"
 #include "stages/write/program/dialect.h"
 
 namespace lamina::write {
@@ -50,6 +53,11 @@ class Carriage {
   double across(std::int64_t line) const {
     return grid_.line_position_nm(line) / kNmPerMm + machine_.mounting.offset_mm[grid_.scan_axis == ScanAxis::kX ? 1 : 0];
   }
+  /// x and y of the carriage.
+  std::array<double, 2> place(double along_mm, std::int64_t line) const {
+    const double across_mm = across(line);
+    return grid_.scan_axis == ScanAxis::kX ? std::array{along_mm, across_mm} : std::array{across_mm, along_mm};
+  }
   /// Where a sweep's movement begins and ends: the ramp before its first and behind its last step.
   double begin(const Sweep& sweep, const SweepVectors& vectors) const { return end_of(vectors, sweep.backward); }
   double end(const Sweep& sweep, const SweepVectors& vectors) const { return end_of(vectors, !sweep.backward); }
@@ -63,8 +71,22 @@ class Carriage {
   const HeadGrid& grid_;
 };
 
+/// Tells the build vat where it stands before a base of powder is spread, so that the first layer above it begins at 0. Nothing
+/// without a base.
+void put_base_zero(const Machine& machine, ProgramBytes& out);
+
+/// Calls visit(bottom_nm, thickness_nm) for each spreading of a layer's powder, from the bottom up: those of the base before
+/// the first layer, then the layer's own.
+template <class Visit>
+void for_each_spread(const Machine& machine, const LayerCycle& cycle, const Visit& visit) {
+  const std::uint32_t below = cycle.layer == 0 ? machine.powder.base_layers : 0;
+  const std::int64_t thickness = nm_of(machine.powder.base_layer_mm);
+  for (std::uint32_t k = 0; k < below; ++k) visit(cycle.bottom_nm - (below - k) * thickness, thickness);
+  visit(cycle.bottom_nm, cycle.thickness_nm);
+}
+
 /// The powder cycle before the head moves, as relative and absolute moves of G-code: the build vat goes to the depth of
-/// the layer, the vats feed dose x thickness each, the roller spreads and returns.
+/// the layer, the vats feed dose x thickness each, the roller spreads and returns. Before the first layer the base likewise.
 void put_powder_cycle(const Machine& machine, const LayerCycle& cycle, ProgramBytes& out);
 
 /// Calls visit(step, words) for the steps that fire, in the order of the movement.

@@ -1,10 +1,12 @@
 // lamina jet --inspect on parts with planted faults: each is told with its number and place, sound parts are not.
 #include <gtest/gtest.h>
+#include <sys/wait.h>
 
 #include <array>
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
+#include <iterator>
 #include <nlohmann/json.hpp>
 #include <set>
 #include <string>
@@ -63,6 +65,33 @@ class InspectedJobs : public testing::Test {
     EXPECT_EQ(pclose(pipe), 0) << command;
     return nlohmann::json::parse(out);
   }
+  /// A profile of nuferbj with more lines, which stand within [powder].
+  std::string profile(const std::string& lines) const {
+    std::ifstream shipped(fs::path(LAMINA_TEST_DIR).parent_path() / "stages/write/machines/nuferbj.toml");
+    const std::string text{std::istreambuf_iterator<char>(shipped), std::istreambuf_iterator<char>()};
+    std::ofstream(folder_ / "machine.toml") << text << lines;
+    return (folder_ / "machine.toml").string();
+  }
+  /// Exit code, and the codes of warnings and what is said where it fails.
+  struct Told {
+    int code = 0;
+    std::set<std::string> warnings;
+    std::string said;
+  };
+  Told jet(const std::string& arguments) const {
+    const fs::path said = folder_ / "said.txt";
+    const std::string command = std::string(LAMINA_PROGRAM) + " jet --json --quiet " + arguments + " -o " +
+                                (folder_ / "jet").string() + " --overwrite 2> " + said.string();
+    std::string out;
+    FILE* pipe = popen(command.c_str(), "r");
+    char buffer[4096];
+    for (std::size_t n; (n = fread(buffer, 1, sizeof buffer, pipe)) > 0;) out.append(buffer, n);
+    Told told{WEXITSTATUS(pclose(pipe)), {}, {}};
+    std::ifstream file(said);
+    told.said.assign(std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>());
+    if (told.code == 0) told.warnings = codes(nlohmann::json::parse(out));
+    return told;
+  }
   static std::set<std::string> codes(const nlohmann::json& summary) {
     std::set<std::string> codes;
     for (const auto& warning : summary["warnings"]) codes.insert(warning["code"]);
@@ -101,6 +130,45 @@ TEST_F(InspectedJobs, EachPlantedFaultIsToldAndSoundPartsAreNot) {
   for (const auto& [name, boxes, told, options] : cases) {
     EXPECT_EQ(codes(inspect(stl("part.stl", boxes) + " " + options)), told) << name;
     EXPECT_EQ(codes(inspect(stl("part.stl", boxes) + " --dry-run " + options)), told) << name;
+  }
+}
+
+// What can go wrong with powder, binder and head: each is refused with exit code 2 and a line, or done and told by a warning.
+TEST_F(InspectedJobs, EachFaultOfPowderBinderAndHeadIsToldOrRefused) {
+  const std::string block = stl("block.stl", {{{0, 0, 0}, {10, 10, 2}}}), other = stl("other.stl", {{{0, 0, 0}, {10, 10, 2}}}),
+                    fin = stl("fin.stl", {{{0, 0, 0}, {10, 1, 2}}});
+  const std::string two = block + " " + other + " --material steel,bronze";
+  const struct {
+    const char* name;
+    std::string lines, arguments;
+    int code;
+    std::string told;  // a warning's code, or what is said; empty: nothing
+  } rows[] = {
+      {"nothing wrong", "", block, 0, ""},
+      {"two powders in a layer", "", two, 2, "mix powders"},
+      {"the same, fed by the rule", "", two + " --vat-rule first", 0, "mixed-powders"},
+      {"a vat that runs empty", "vat_depth_mm = [2.4, 0]\n", block, 2,
+       "the first vat of nuferbj, 2.4 mm deep, is empty for it"},
+      {"the same, filled in a pause", "vat_depth_mm = [2.4, 0]\nrefill = \"pause\"\n", block, 0, ""},
+      {"a vat that just lasts", "vat_depth_mm = [2.5, 0]\n", block, 0, ""},
+      {"a base that no vat holds", "vat_depth_mm = [3, 0]\nbase_layers = 30\n", block, 2, "holds less than this layer takes"},
+      {"too little binder to bind", "least_saturation_percent = 50\n", block, 2, "or --allow-unbound"},
+      {"the same, allowed", "least_saturation_percent = 50\n", block + " --allow-unbound", 0, "saturation"},
+      {"more drops than a sweep and the profile allow", "", block + " --saturation 900", 0, "saturation"},
+      {"a part that the bleed eats", "", fin + " --bleed 300", 0, "bleed"},
+      {"a blocked nozzle", "", block + " --blocked 70", 0, "lost-pixels"},
+      {"shots over the bed", "[care]\nspit_layers = 1\nspit_mm = [65, 12]\n", block, 2, "nozzles are over the bed"},
+      {"a clock that no sweep keeps", "[care]\nspit_seconds = 0.5\nspit_mm = [-40, 5]\n", block, 2, "a sweep ends up to"},
+  };
+  for (const auto& [name, lines, arguments, code, told] : rows) {
+    const Told found = jet("--machine " + profile(lines) + " --layer 0.1 " + arguments + (code == 0 ? " --dry-run" : ""));
+    EXPECT_EQ(found.code, code) << name << found.said;
+    if (code == 0) {
+      EXPECT_EQ(found.warnings, told.empty() ? std::set<std::string>() : std::set{told}) << name;
+    } else {
+      EXPECT_NE(found.said.find(told), std::string::npos) << name << ": " << found.said;
+      EXPECT_FALSE(fs::exists(folder_ / "jet")) << name;
+    }
   }
 }
 

@@ -142,7 +142,9 @@ void Head::line(double encoder_um, const std::uint64_t* words, std::uint32_t cou
   put(out, "SBR {} {}\n", number(std::llround(encoder_um)), text);
 }
 
-void Head::sweep(const Sweep& sweep, const SweepVectors& vectors, ProgramBytes& out) const {
+void Head::spit(const Machine& machine, ProgramBytes& out) { put(out, "PRM {}\n", number(machine.care.spit_drops)); }
+
+void Head::sweep(const Sweep& sweep, const SweepVectors& vectors, Care& care, ProgramBytes& out) const {
   const double step_um = grid_.step_nm() / 1000, count_um = kUmPerInch / counts_;
   const double ahead = sweep.backward == grid_.places_from_end ? 1 : -1;  // of the carriage
   const std::uint32_t last = vectors.first_step + vectors.steps - 1;
@@ -160,6 +162,7 @@ void Head::sweep(const Sweep& sweep, const SweepVectors& vectors, ProgramBytes& 
   if (zero < 0 || um_of_counts(zero, counts_) > kMostProduct / counts_) zero = 0;  // any count does that all lines start from
   const auto encoder = [&](double um) { return static_cast<double>(zero) * count_um + um - start; };
 
+  care.before_sweep(carriage_.place(start / 1000, sweep.first_line), carriage_.place(end / 1000, sweep.first_line), out);
   put(out, "G1 {}{} {}{} F{}\n", carriage_.scan_axis(), mm_text(start / 1000), carriage_.line_axis(),
       mm_text(carriage_.across(sweep.first_line)), feed_text(machine_.motion.travel_speed_mm_s));
   wait(out);

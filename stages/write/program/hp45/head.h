@@ -1,6 +1,9 @@
 // stages/write/program/hp45/head.h: lines for the HP45 controller V4, as its hosts send them; see the README here.
 #pragma once
 
+#include <string_view>
+
+#include "stages/write/program/care.h"
 #include "stages/write/program/dialect.h"
 #include "stages/write/program/program_text.h"
 
@@ -18,10 +21,13 @@ class Head {
 
   /// Mode of position, encoder, resolution, density, sides and buffer: whatever a layer needs, so that it can be sent alone.
   void settings(ProgramBytes& out) const;
-  /// Moves to the start, waits, sends the lines and moves over them.
-  void sweep(const Sweep& sweep, const SweepVectors& vectors, ProgramBytes& out) const;
+  /// Moves to the start, waits, sends the lines and moves over them; before that whatever care is due.
+  void sweep(const Sweep& sweep, const SweepVectors& vectors, Care& care, ProgramBytes& out) const;
   /// The host goes on when all movements have ended.
-  static void wait(ProgramBytes& out) { put(out, "G4 P0\n"); }
+  static constexpr std::string_view kWait = "G4 P0\n";
+  static void wait(ProgramBytes& out) { put(out, "{}", kWait); }
+  /// All nozzles of the cartridge fire where the head stands, by the firmware's DMAPrint::Prime.
+  static void spit(const Machine& machine, ProgramBytes& out);
 
  private:
   void line(double encoder_um, const std::uint64_t* words, std::uint32_t count, ProgramBytes& out) const;

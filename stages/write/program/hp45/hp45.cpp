@@ -1,20 +1,29 @@
 #include "stages/write/program/hp45/hp45.h"
 
+#include "stages/write/program/care.h"
 #include "stages/write/program/hp45/head.h"
 
 namespace lamina::write::hp45 {
 namespace {
 
+constexpr CareWords kCare{"G1", Head::spit, Head::kWait, "", "", 1};
+
 class Writer final : public ProgramWriter {
  public:
-  Writer(const Machine& machine, const HeadGrid& grid) : machine_(machine), head_(machine, grid) {}
+  Writer(const Machine& machine, const HeadGrid& grid) : machine_(machine), head_(machine, grid), care_(machine, kCare) {}
 
-  void start(std::uint32_t, ProgramBytes& out) override { put(out, "G21\nG90\n"); }
+  void start(std::uint32_t, ProgramBytes& out) override {
+    put(out, "G21\nG90\n");
+    put_base_zero(machine_, out);
+  }
   void begin_layer(const LayerCycle& cycle, ProgramBytes& out) override {
     head_.settings(out);
     put_powder_cycle(machine_, cycle, out);
+    care_.begin_layer(cycle, out);
   }
-  void sweep(const Sweep& sweep, const SweepVectors& vectors, ProgramBytes& out) override { head_.sweep(sweep, vectors, out); }
+  void sweep(const Sweep& sweep, const SweepVectors& vectors, ProgramBytes& out) override {
+    head_.sweep(sweep, vectors, care_, out);
+  }
   void end_layer(const LayerCycle&, ProgramBytes& out) override {
     put(out, "G1 {}{} {}{} F{}\n", machine_.motion.x_axis, mm_text(machine_.motion.safe_mm[0]), machine_.motion.y_axis,
         mm_text(machine_.motion.safe_mm[1]), feed_text(machine_.motion.travel_speed_mm_s));
@@ -26,6 +35,7 @@ class Writer final : public ProgramWriter {
  private:
   const Machine& machine_;
   Head head_;
+  Care care_;
 };
 
 }  // namespace

@@ -1,23 +1,38 @@
 #include "stages/write/program/m578/m578.h"
 
+#include <algorithm>
 #include <charconv>
 
+#include "stages/write/program/care.h"
 #include "stages/write/program/program_text.h"
 
 namespace lamina::write::m578 {
 namespace {
 
+void put_spit(const Machine& machine, ProgramBytes& out) {
+  std::uint32_t all = 0;
+  for (std::uint32_t nozzle = 0; nozzle < machine.head.nozzles; ++nozzle) {
+    if (std::ranges::find(machine.head.blocked, nozzle) == machine.head.blocked.end()) all |= 1u << nozzle;
+  }
+  for (std::uint32_t drop = 0; drop < machine.care.spit_drops; ++drop) put(out, "M578 S{}\n", all);
+}
+
+constexpr CareWords kCare{"G0", put_spit, "", "; fill the vats, then go on\nM226\n", "G4 P", 1e-3};
+
 class Writer final : public ProgramWriter {
  public:
-  Writer(const Machine& machine, const HeadGrid& grid) : machine_(machine), carriage_(machine, grid) {}
+  Writer(const Machine& machine, const HeadGrid& grid) : machine_(machine), carriage_(machine, grid), care_(machine, kCare) {}
 
   void start(std::uint32_t layers, ProgramBytes& out) override {
     put(out, "; print program of {}, {} layers, for RepRapFirmware 1.09r to 3.4 built with SUPPORT_INKJET\nG21\nG90\n",
         machine_.name, layers);
+    put_base_zero(machine_, out);
   }
   void begin_layer(const LayerCycle& cycle, ProgramBytes& out) override {
     put(out, "; layer {} of {}\n", cycle.layer, cycle.layers);
+    care_.refill(cycle, out);
     put_powder_cycle(machine_, cycle, out);
+    care_.begin_layer(cycle, out);
   }
 
   void sweep(const Sweep& sweep, const SweepVectors& vectors, ProgramBytes& out) override {
@@ -33,6 +48,7 @@ class Writer final : public ProgramWriter {
   }
 
   void end_layer(const LayerCycle& cycle, ProgramBytes& out) override {
+    care_.dry(out);
     put(out, "G0 {}{} {}{} F{}\nM400\n; end of layer {}\n", machine_.motion.x_axis, mm_text(machine_.motion.safe_mm[0]),
         machine_.motion.y_axis, mm_text(machine_.motion.safe_mm[1]), feed_text(machine_.motion.travel_speed_mm_s), cycle.layer);
   }
@@ -41,6 +57,7 @@ class Writer final : public ProgramWriter {
  private:
   const Machine& machine_;
   Carriage carriage_;
+  Care care_;
 };
 
 }  // namespace

@@ -1,0 +1,316 @@
+// Care of head and powder in programs: what is written is found to be sound, and what was left out or done elsewhere is told.
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "pipeline/machine/powder_printer.h"
+#include "pipeline/machine/profiles.h"
+#include "stages/data/layer.h"
+#include "stages/data/machine.h"
+#include "stages/data/program.h"
+#include "stages/data/runs.h"
+#include "stages/replay/feeding.h"
+#include "stages/replay/machine.h"
+#include "stages/write/program/dialect.h"
+#include "tests/program/machines.h"
+#include "tests/replay/printed_parts.h"
+
+namespace lamina {
+namespace {
+
+/// A shipped machine with a small bed, care of all kinds that its dialect can say, and the program of a filled layer.
+struct CareBench {
+  pipeline::ResolvedMachine resolved;
+  Runs image;
+  printed_parts::Program program;
+
+  explicit CareBench(const std::string& name, const std::function<void(Machine&)>& change = nullptr)
+      : resolved(printed_parts::shipped(name, [&](Machine& m) {
+          m.bed.size_mm = {12, 12};
+          m.care.spit_layers = 7;  // of which the layer is one
+          m.care.spit_drops = 40;
+          m.care.spit_mm = {{-45, -10}};
+          m.care.wipe_layers = 7;
+          m.care.wipe_mm = {{-45, -30, -45, -12}};
+          if (change) change(m);
+        })) {
+    const PixelGrid& grid = resolved.grid.image;
+    image = program::testing::runs_of(program::testing::Image(grid.rows(), std::vector<int>(grid.columns(), 1)));
+    program = printed_parts::program_of(resolved, image);
+  }
+
+  Result<replay::Count> count(const std::string& text) const {
+    return printed_parts::verified(resolved, image, {text, program.count});
+  }
+  std::string fault(const std::string& text) const {
+    const auto found = count(text);
+    return found.ok() ? std::string() : found.error().message;
+  }
+  /// The program with one line that begins so replaced, by nothing too. number  from 0
+  std::string with(const std::string& begin, const std::string& other, int number = 0) const {
+    std::string text;
+    for (std::size_t at = 0; at < program.text.size();) {
+      const std::size_t end = program.text.find('\n', at) + 1;
+      const std::string line = program.text.substr(at, end - at);
+      text += line.starts_with(begin) && number-- == 0 ? other : line;
+      at = end;
+    }
+    EXPECT_LT(number, 0) << begin;
+    return text;
+  }
+};
+
+/// Of each dialect that fires off the bed: the line of a shot.
+const struct {
+  const char *machine, *shot;
+} kDialects[] = {{"nuferbj", "M816 N40"}, {"hp45", "PRM o"}, {"oasis", "PRM o"}, {"reprap-inkjet", "M578 S4095"}};
+
+TEST(Care, WhatIsWrittenIsFoundAndWhatIsLeftOutIsTold) {
+  for (const auto& [machine, shot] : kDialects) {
+    SCOPED_TRACE(machine);
+    const CareBench bench(machine);
+    const auto count = bench.count(bench.program.text);
+    ASSERT_TRUE(count.ok()) << count.error().message;
+    EXPECT_EQ(count->spits, 1u);
+    EXPECT_EQ(count->wipes, 1u);
+    const Machine& m = bench.resolved.machine;
+    EXPECT_EQ(count->spat, 40u * (m.head.nozzles - m.head.blocked.size()));
+    EXPECT_NE(bench.fault(bench.with(shot, "")).find("before the head is fired off the bed"), std::string::npos);
+    const std::string wipe = fmt::format("G1 X-45.0000 Y-12.0000 F{:.0f}\n", m.care.wipe_speed_mm_s * 60);
+    EXPECT_NE(bench.fault(bench.with(wipe, "")).find("before the head is wiped"), std::string::npos);
+    const std::string spat = "X-45.0000 Y-10.0000";
+    std::string text = bench.program.text;
+    text.replace(text.find(spat), spat.size(), "X20.0000 Y10.0000");
+    EXPECT_NE(bench.fault(text), "");
+  }
+}
+
+TEST(Care, LayersThatAreNotDueHaveNone) {
+  for (const auto& [machine, shot] : kDialects) {
+    const CareBench bench(machine, [](Machine& m) { m.care.spit_layers = m.care.wipe_layers = 3; });
+    const auto count = bench.count(bench.program.text);
+    ASSERT_TRUE(count.ok()) << machine << count.error().message;
+    EXPECT_EQ(count->spits + count->wipes, 0u) << machine;
+  }
+}
+
+// nuferbj with sweeps of 5 mm/s, of which one takes some 8 s: whatever the limit, no sweep ends later, and as few are made as
+// that takes but for 3 % of room.
+TEST(Care, NoSweepEndsLaterThanTheLimitOfSeconds) {
+  for (const char* machine : {"nuferbj", "hp45", "oasis"}) {
+    std::uint32_t before = UINT32_MAX;
+    for (const double limit : {21.0, 26.0, 41.0, 90.0}) {
+      const CareBench bench(machine, [&](Machine& m) {
+        m.bed.size_mm = {60, 60};
+        m.motion.scan_speed_mm_s = m.dialect == "nuferbj" ? 10 : 26;
+        m.motion.travel_speed_mm_s = 60;
+        m.care.spit_layers = m.care.wipe_layers = 0;
+        m.care.spit_seconds = limit;
+        m.care.wipe_seconds = 2 * limit;
+      });
+      const auto count = bench.count(bench.program.text);
+      ASSERT_TRUE(count.ok()) << machine << " " << limit << ": " << count.error().message;
+      EXPECT_LE(count->spits, before) << machine;
+      EXPECT_GE(count->spits, 1u);
+      EXPECT_GE(count->wipes, 1u);
+      before = count->spits;
+      if (count->spits < 2) continue;
+      const char* shot = bench.resolved.machine.dialect == "nuferbj" ? "M816" : "PRM";
+      const std::string fault = bench.fault(bench.with(shot, "", 1));
+      EXPECT_NE(fault.find("after the head was fired off the bed"), std::string::npos) << machine << limit << fault;
+    }
+  }
+}
+
+TEST(Care, ShotsElsewhereOrOnTheBedAreFound) {
+  const CareBench bench("nuferbj");
+  EXPECT_NE(bench.fault(bench.with("M816", "G0 X65.0000 Y12.0000 F1000\nM816 N40\n")).find("not at -45, -10"),
+            std::string::npos);
+  EXPECT_NE(bench.fault(bench.with("M816", "M816 N39\n")).find("before the head is fired off the bed"), std::string::npos);
+  // The profile itself says a place over the bed: its reader finds it, whoever wrote it.
+  CareBench wrong("nuferbj");
+  wrong.resolved.machine.care.spit_mm = {{65, 12}};
+  const std::string text = wrong.with("G0 X-45.0000 Y-10.0000", "G0 X65.0000 Y12.0000 F24000\n");
+  EXPECT_NE(wrong.fault(text).find("fires off the bed where column"), std::string::npos) << wrong.fault(text);
+  // And a profile without any takes no shot.
+  wrong.resolved.machine.care = {};
+  EXPECT_NE(wrong.fault(text).find("the profile has no place for it"), std::string::npos) << wrong.fault(text);
+}
+
+TEST(Care, PausesToDryAreBehindTheSweepsAtTheCapAndAsLongAsTold) {
+  for (const char* machine : {"nuferbj", "oasis", "reprap-inkjet"}) {
+    SCOPED_TRACE(machine);
+    const CareBench bench(machine, [](Machine& m) {
+      m.powder.dry_s = 2.5;
+      m.care.cap_mm = {{-45, -10}};
+    });
+    const double wet = CareBench(machine).count(CareBench(machine).program.text)->seconds();
+    const auto count = bench.count(bench.program.text);
+    ASSERT_TRUE(count.ok()) << count.error().message;
+    EXPECT_GT(count->seconds(), wet + 2.5);
+    const std::string pause = bench.resolved.machine.dialect == "oasis" ? "G4 P2.5" : "G4 P2500";
+    EXPECT_NE(bench.fault(bench.with(pause, "")).find("the layer dries for 0 s where 2.5 have to be"), std::string::npos);
+    const std::string spat = bench.resolved.machine.dialect == "m578" ? "M578" : "M812";
+    if (bench.resolved.machine.dialect == "oasis") continue;
+    EXPECT_NE(bench.fault(bench.with(spat, pause + "\n")), "");
+  }
+}
+
+// A lamp around the pause to dry, a pump behind the wiper: exactly the profile's lines, in whole blocks, where they belong.
+TEST(Care, LinesOfTheMachinesOwnStandWhereTheProfileHasThem) {
+  for (const char* machine : {"nuferbj", "oasis", "reprap-inkjet"}) {
+    SCOPED_TRACE(machine);
+    const CareBench bench(machine, [](Machine& m) {
+      m.powder.dry_s = 2.5;
+      m.powder.dry_on_lines = {"M106 S255"};
+      m.powder.dry_off_lines = {"M107"};
+      m.care.wipe_lines = {"M42 P4 S1", "M42 P4 S0"};
+    });
+    EXPECT_EQ(bench.fault(bench.program.text), "");
+    EXPECT_NE(bench.program.text.find("M42 P4 S1\nM42 P4 S0\n"), std::string::npos);
+    for (const char* line : {"M106", "M107", "M42 P4 S1", "M42 P4 S0"})
+      EXPECT_NE(bench.fault(bench.with(line, "")), "") << line;
+    EXPECT_NE(bench.fault(bench.with("M106", "M106 S254\n")), "");
+    EXPECT_NE(bench.fault(bench.with("M107", "M107\nM107\n")), "");
+    EXPECT_NE(bench.fault(bench.with("M42 P4 S0", "M42 P4 S0\nM42 P4 S1\n")), "");
+    const std::string first = bench.program.text.substr(0, bench.program.text.find('\n') + 1);
+    EXPECT_NE(bench.fault(first + "M106 S255\n" + bench.program.text.substr(first.size())), "");
+  }
+}
+
+TEST(Care, TheRollersSpeedIsWrittenAndHeld) {
+  for (const char* machine : {"nuferbj", "oasis"}) {
+    const CareBench bench(machine, [](Machine& m) { m.powder.roller_rpm = 350; });
+    EXPECT_EQ(bench.fault(bench.program.text), "");
+    EXPECT_NE(bench.fault(bench.with("M4 S350", "M4 S300\n")).find("300 turns a minute where 350 have to be"),
+              std::string::npos);
+  }
+  const CareBench none("oasis");
+  EXPECT_NE(none.fault(none.with("M4", "M4 S300\n")).find("M4 has no S"), std::string::npos);
+}
+
+// The first layer of 0.1 mm over a base of 3 x 0.2 mm: 0.7 mm fed in four turns, and a turn that is left out or fed from too
+// low a vat is found by its number.
+TEST(Care, TheBaseIsSpreadLayerByLayerBelowTheFirst) {
+  const Layer first{0, 0, 100'000, LayerReason::kUniform};
+  for (const auto& [machine, shot] : kDialects) {
+    SCOPED_TRACE(machine);
+    const CareBench bench(machine, [](Machine& m) {
+      m.care = {};
+      m.powder.base_layers = 3;
+      m.powder.base_layer_mm = 0.2;
+    });
+    const Machine& m = bench.resolved.machine;
+    write::ProgramBytes bytes;
+    const auto writer = write::find_dialect(m.dialect)->make_writer(m, bench.resolved.grid);
+    LayerCycle cycle;
+    cycle.layers = 9;
+    cycle.thickness_nm = first.thickness;
+    writer->begin_layer(cycle, bytes);
+    writer->end_layer(cycle, bytes);
+    const std::string text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+    const PixelGrid& grid = bench.resolved.grid.image;
+    const Runs empty = program::testing::runs_of(program::testing::Image(grid.rows(), std::vector<int>(grid.columns(), 0)));
+    const auto virtual_machine = replay::VirtualMachine::build(m, grid.columns(), grid.rows());
+    const auto fault = [&](const std::string& program) {
+      const auto count = virtual_machine->replay(program, first, empty, 0, 0);
+      return count.ok() ? std::string() : count.error().message;
+    };
+    const auto count = virtual_machine->replay(text, first, empty, 0, 0);
+    ASSERT_TRUE(count.ok()) << count.error().message << text;
+    EXPECT_NEAR(count->fed_mm[0], m.powder.dose * 0.7, 1e-6);
+    EXPECT_NEAR(count->build_mm, 0.1, 1e-6);
+    const std::string far = fmt::format("G1 {}{:.4f} ", m.powder.roller_axis, m.powder.roller_mm[1]);
+    std::string without = text;
+    for (std::size_t at = without.find(far); at != std::string::npos; at = std::string::npos) {
+      without.erase(at, without.find('\n', at) + 1 - at);
+    }
+    EXPECT_NE(fault(without).find("powder cycle: "), std::string::npos) << fault(without);
+    const std::string feed = fmt::format("G1 {}{:.4f} ", m.powder.feed_axes[0], m.powder.feed_sign * m.powder.dose * 0.2);
+    if (m.dialect == "oasis") continue;  // feeds in several movements
+    std::string later = text;
+    const std::size_t second = later.find(feed, later.find(feed) + 1);
+    const std::string line = later.substr(second, later.find('\n', second) + 1 - second);
+    later.erase(second, line.size());
+    later.insert(later.find(feed, second), line);
+    EXPECT_NE(fault(later).find("layer 2 of the base is spread"), std::string::npos) << fault(later);
+  }
+}
+
+// What a program cannot say, or a machine cannot do, is refused with its key.
+TEST(Care, ProfilesThatCannotBeKeptAreRefused) {
+  const struct {
+    const char *machine, *key;
+    std::function<void(Machine&)> change;
+  } rows[] = {
+      {"nuferbj", "care.spit_mm: is missing", [](Machine& m) { m.care.spit_layers = 1; }},
+      {"nuferbj", "care.wipe_mm: is missing", [](Machine& m) { m.care.wipe_seconds = 9; }},
+      {"nuferbj", "care.spit_mm: nozzles are over the bed",
+       [](Machine& m) {
+         m.care.spit_layers = 1, m.care.spit_mm = {{65, 12}};
+       }},
+      {"nuferbj", "care.cap_mm: nozzles are over the bed",
+       [](Machine& m) {
+         m.care.cap_mm = {{70, 60}};
+       }},
+      {"nuferbj", "care.wipe_mm: nozzles are over the bed",
+       [](Machine& m) {
+         m.care.wipe_layers = 1, m.care.wipe_mm = {{-45, 12, 250, 12}};
+       }},
+      {"nuferbj", "care.wipe_mm: the head does not move",
+       [](Machine& m) {
+         m.care.wipe_layers = 1, m.care.wipe_mm = {{-45, 12, -45, 12}};
+       }},
+      {"nuferbj", "care.spit_seconds: 0.5 s, and a sweep ends up to",
+       [](Machine& m) {
+         m.care.spit_seconds = 0.5, m.care.spit_mm = {{-45, 0}};
+       }},
+      {"nuferbj", "powder.refill: pauses need powder.vat_depth_mm", [](Machine& m) { m.powder.refill = VatRefill::kPause; }},
+      {"nuferbj", "care.wipe_lines: M816 is a command of programs", [](Machine& m) { m.care.wipe_lines = {"M816 N4"}; }},
+      {"nuferbj", "powder.dry_on_lines: there is no pause", [](Machine& m) { m.powder.dry_off_lines = {"M107"}; }},
+      {"hp45", "care.wipe_lines: programs of the dialect hp45", [](Machine& m) { m.care.wipe_lines = {"M42 P4 S1"}; }},
+      {"hp45", "powder.dry_s: programs of the dialect hp45 cannot say it", [](Machine& m) { m.powder.dry_s = 1; }},
+      {"hp45", "powder.roller_rpm: ", [](Machine& m) { m.powder.roller_rpm = 100; }},
+      {"reprap-inkjet", "care.spit_seconds: ",
+       [](Machine& m) {
+         m.care.spit_seconds = 60, m.care.spit_mm = {{-45, 0}};
+       }},
+      {"brundlefab", "care.spit_layers: ",
+       [](Machine& m) {
+         m.care.spit_layers = 1, m.care.spit_mm = {{0, 0}};
+       }},
+      {"production-1200", "powder.base_layers: ", [](Machine& m) { m.powder.base_layers = 1; }},
+      {"xaar128-raw", "powder.refill: ", [](Machine& m) { m.powder.refill = VatRefill::kPause; }},
+  };
+  for (const auto& [machine, key, change] : rows) {
+    Machine m = *pipeline::find_machine(machine);
+    change(m);
+    const auto resolved = pipeline::resolve_profile(m);
+    ASSERT_FALSE(resolved.ok()) << machine << " " << key;
+    EXPECT_NE(resolved.error().message.find(key), std::string::npos) << machine << ": " << resolved.error().message;
+    EXPECT_EQ(resolved.error().fault, Fault::kUsage);
+  }
+}
+
+// 2 mm of depth, layers that take 0.5: four, and the fifth has none; both vats are filled by a pause.
+TEST(Care, VatsAreEmptiedAndFilledByWhatProgramsFeed) {
+  Machine machine;
+  machine.powder.vat_depth_mm = {2, 0};
+  replay::VatLevels levels(machine);
+  replay::Count count;
+  count.fed_mm = {0.5, 7};
+  for (std::uint32_t layer = 0; layer < 4; ++layer) EXPECT_EQ(levels.take(layer, count), "");
+  EXPECT_EQ(levels.take(4, count), "layer 4: takes 0.5 mm of the first vat, where 0 of 2 are left");
+  EXPECT_EQ(levels.take(5, count), "") << "once";
+  replay::VatLevels filled(machine);
+  for (std::uint32_t layer = 0; layer < 12; ++layer) {
+    count.refills = layer == 4 || layer == 8 ? 1 : 0;
+    EXPECT_EQ(filled.take(layer, count), "") << layer;
+  }
+}
+
+}  // namespace
+}  // namespace lamina
