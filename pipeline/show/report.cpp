@@ -164,7 +164,8 @@ Result<Report> make_report(const std::string& path, const ReportOptions& options
   if (source->machine) {
     JobCost cost(*source->machine, manifest);
     for (std::size_t i = 0; i < manifest.layers.size(); ++i)
-      cost.add(manifest.layers[i], manifest.layers[i].program.drops, std::llround(1e6 * seen->seconds[i]));
+      cost.add(manifest.layers[i], manifest.layers[i].program.drops + manifest.layers[i].program.spat,
+               std::llround(1e6 * seen->seconds[i]));
     seen->quote = cost.account().rows();
   }
   if (views.empty()) {
