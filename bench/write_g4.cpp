@@ -1,15 +1,20 @@
-// bench/write_g4.cpp: the G4 and PNG encoders alone, on rows of known kinds; what they write is first decoded by libtiff and
-// libpng. PNG's time is told beside that of zlib at its fastest for the same rows of bits.
+// bench/write_g4.cpp: the G4 and PNG encoders and the G4 decoder alone, on rows of known kinds; what they write is first
+// decoded by libtiff and libpng. PNG's time is told beside that of zlib at its fastest for the same rows of bits, that of the
+// decoder beside libtiff's, which decodes into rows of bits that become runs.
 #include <benchmark/benchmark.h>
+#include <fcntl.h>
 #include <zlib.h>
 
 #include <chrono>
+#include <cstring>
 #include <filesystem>
 #include <random>
 #include <string>
 
 #include "bench/named_parts.h"
+#include "stages/data/handles/tiff.h"
 #include "stages/geometry/bits.h"
+#include "stages/read/g4.h"
 #include "stages/read/image.h"
 #include "stages/write/file.h"
 #include "stages/write/g4/encode.h"
@@ -60,16 +65,37 @@ Runs image_of(Kind kind, std::uint32_t side) {
   return runs;
 }
 
+/// Seconds that libtiff takes for a file of one image; what it decodes. 0 if it cannot.
+double libtiff_seconds(const std::string& path, std::uint32_t columns, std::uint32_t rows, Runs& runs) {
+  const auto start = std::chrono::steady_clock::now();
+  std::string message;
+  const auto options = strict_tiff_options(message);
+  const TiffHandle tiff(options ? TIFFFdOpenExt(::open(path.c_str(), O_RDONLY | O_CLOEXEC), path.c_str(), "rC", options.get())
+                                : nullptr);
+  if (tiff == nullptr) return 0;
+  RunsBuilder builder(columns);
+  write::Bytes row(row_bytes(columns));
+  for (std::uint32_t r = 0; r < rows; ++r) {
+    if (TIFFReadScanline(tiff.get(), row.data(), r, 0) < 0 || !message.empty() || !builder.add_row(row, false)) return 0;
+  }
+  runs = builder.finish();
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
 /// Empty if the format's library decodes the file to the runs.
-std::string wrong_with(std::string_view id, const Runs& runs) {
+std::string wrong_with(std::string_view id, const Runs& runs, double* by_libtiff = nullptr) {
   const write::ImageFormat& format = *write::find_image_format(id);
   write::Bytes file;
   if (auto encoded = format.make_encoder()->encode(runs, 1200, 1200, file); !encoded) return encoded.error().message;
   const auto path = (std::filesystem::temp_directory_path() / "lamina-bench-runs").string() + std::string(format.extension);
   if (auto written = write::write_file(path, file); !written) return written.error().message;
   const auto image = read::image(path);
+  Runs decoded;
+  const double seconds = id == "tiff-g4" ? libtiff_seconds(path, runs.columns, runs.view().rows(), decoded) : 1;
+  if (by_libtiff != nullptr) *by_libtiff = seconds;
   std::filesystem::remove(path);
   if (!image) return image.error().message;
+  if (id == "tiff-g4" && (seconds == 0 || !same_runs(decoded, runs))) return "libtiff decodes other pixels";
   return same_runs(image->runs, runs) ? "" : "other pixels are decoded";
 }
 
@@ -119,6 +145,28 @@ void encode_g4(benchmark::State& state, Kind kind, std::uint32_t side) {
   set_counters(state, runs, bytes);
 }
 
+void decode_g4(benchmark::State& state, Kind kind, std::uint32_t side) {
+  const Runs runs = image_of(kind, side);
+  double by_libtiff = 0;
+  const std::string wrong = wrong_with("tiff-g4", runs, &by_libtiff);
+  if (!wrong.empty()) return state.SkipWithError(wrong.c_str());
+  write::Bytes file, coded;
+  file.resize(write::g4::Encoder().encode(runs, file, 0));
+  read::G4Decoder decoder;
+  Runs decoded;
+  const auto start = std::chrono::steady_clock::now();
+  for (auto _ : state) {
+    coded = file;
+    decoded.columns = side;
+    decoded.row_offset.assign(1, 0);
+    decoded.change.clear();
+    if (!decoder.append(coded, {side, side, false, false}, decoded)) return state.SkipWithError("cannot be decoded");
+  }
+  state.counters["libtiff_times"] = by_libtiff * static_cast<double>(state.iterations()) / seconds_since(start);
+  if (!same_runs(decoded, runs)) return state.SkipWithError("other pixels are decoded");
+  set_counters(state, runs, file.size());
+}
+
 void encode_png(benchmark::State& state, Kind kind, std::uint32_t side) {
   const Runs runs = image_of(kind, side);
   const std::string wrong = wrong_with("png", runs);
@@ -138,6 +186,12 @@ BENCHMARK_CAPTURE(encode_g4, parts, Kind::kParts, 4725u)->Unit(benchmark::kMicro
 BENCHMARK_CAPTURE(encode_g4, random, Kind::kRandom, 4725u)->Unit(benchmark::kMicrosecond);
 BENCHMARK_CAPTURE(encode_g4, same, Kind::kSame, 4725u)->Unit(benchmark::kMicrosecond);
 BENCHMARK_CAPTURE(encode_g4, empty, Kind::kEmpty, 18898u)->Unit(benchmark::kMicrosecond);
+BENCHMARK_CAPTURE(decode_g4, few, Kind::kFew, 4725u)->Unit(benchmark::kMicrosecond);
+BENCHMARK_CAPTURE(decode_g4, slopes, Kind::kSlopes, 4725u)->Unit(benchmark::kMicrosecond);
+BENCHMARK_CAPTURE(decode_g4, parts, Kind::kParts, 4725u)->Unit(benchmark::kMicrosecond);
+BENCHMARK_CAPTURE(decode_g4, random, Kind::kRandom, 4725u)->Unit(benchmark::kMicrosecond);
+BENCHMARK_CAPTURE(decode_g4, same, Kind::kSame, 4725u)->Unit(benchmark::kMicrosecond);
+BENCHMARK_CAPTURE(decode_g4, empty, Kind::kEmpty, 18898u)->Unit(benchmark::kMicrosecond);
 BENCHMARK_CAPTURE(encode_png, few, Kind::kFew, 4725u)->Unit(benchmark::kMicrosecond);
 BENCHMARK_CAPTURE(encode_png, slopes, Kind::kSlopes, 4725u)->Unit(benchmark::kMicrosecond);
 BENCHMARK_CAPTURE(encode_png, parts, Kind::kParts, 4725u)->Unit(benchmark::kMicrosecond);

@@ -25,34 +25,51 @@ struct CoveredMesh {
 struct Copy {
   std::uint32_t mesh;
   Point3 offset;
-  bool alone;  // its box meets no other's
+  bool crowded;             // its box meets too many others to look at each
+  std::vector<Box> others;  // boxes of other copies that its own meets, nm, on the bed
 };
 
-bool boxes_meet(const Box& a, const Point3& by, const Box& b, const Point3& other) {
-  const auto meet = [](std::int64_t lo, std::int64_t hi, std::int64_t from, std::int64_t to) { return lo <= to && from <= hi; };
-  return meet(std::int64_t{a.lo.x} + by.x, std::int64_t{a.hi.x} + by.x, std::int64_t{b.lo.x} + other.x,
-              std::int64_t{b.hi.x} + other.x) &&
-         meet(std::int64_t{a.lo.y} + by.y, std::int64_t{a.hi.y} + by.y, std::int64_t{b.lo.y} + other.y,
-              std::int64_t{b.hi.y} + other.y) &&
-         meet(std::int64_t{a.lo.z} + by.z, std::int64_t{a.hi.z} + by.z, std::int64_t{b.lo.z} + other.z,
-              std::int64_t{b.hi.z} + other.z);
+/// Boxes that each facet of a copy is compared with.
+constexpr std::size_t kMostOthers = 64;
+
+bool boxes_meet(const Box& a, const Box& b) {
+  return a.lo.x <= b.hi.x && b.lo.x <= a.hi.x && a.lo.y <= b.hi.y && b.lo.y <= a.hi.y && a.lo.z <= b.hi.z && b.lo.z <= a.hi.z;
 }
 
-/// Copies whose boxes meet others, by a sweep along x.
-void find_alone(std::span<const Mesh> meshes, std::vector<Copy>& copies) {
+Box moved(const Box& box, const Point3& by) {
+  if (box.empty()) return box;
+  const auto move = [&](const Point3& p) { return Point3{p.x + by.x, p.y + by.y, p.z + by.z}; };
+  return {move(box.lo), move(box.hi)};
+}
+
+void note_other(Copy& copy, const Box& other) {
+  copy.crowded |= copy.others.size() == kMostOthers;
+  if (!copy.crowded) copy.others.push_back(other);
+}
+
+/// Which boxes of copies meet, by a sweep along x.
+void find_others(std::span<const Mesh> meshes, std::vector<Copy>& copies) {
+  std::vector<Box> box;
+  for (const Copy& copy : copies) box.push_back(moved(meshes[copy.mesh].bounds, copy.offset));
   std::vector<std::uint32_t> order(copies.size());
   for (std::uint32_t i = 0; i < order.size(); ++i) order[i] = i;
-  const auto left = [&](std::uint32_t i) { return std::int64_t{meshes[copies[i].mesh].bounds.lo.x} + copies[i].offset.x; };
-  const auto right = [&](std::uint32_t i) { return std::int64_t{meshes[copies[i].mesh].bounds.hi.x} + copies[i].offset.x; };
-  std::sort(order.begin(), order.end(), [&](auto a, auto b) { return left(a) != left(b) ? left(a) < left(b) : a < b; });
+  std::sort(order.begin(), order.end(),
+            [&](auto a, auto b) { return box[a].lo.x != box[b].lo.x ? box[a].lo.x < box[b].lo.x : a < b; });
   for (std::size_t i = 0; i < order.size(); ++i) {
-    Copy& one = copies[order[i]];
-    for (std::size_t k = i + 1; k < order.size() && left(order[k]) <= right(order[i]); ++k) {
-      Copy& other = copies[order[k]];
-      if (!boxes_meet(meshes[one.mesh].bounds, one.offset, meshes[other.mesh].bounds, other.offset)) continue;
-      one.alone = other.alone = false;
+    for (std::size_t k = i + 1; k < order.size() && box[order[k]].lo.x <= box[order[i]].hi.x; ++k) {
+      if (!boxes_meet(box[order[i]], box[order[k]])) continue;
+      note_other(copies[order[i]], box[order[k]]);
+      note_other(copies[order[k]], box[order[i]]);
     }
   }
+}
+
+/// Whether a facet of the copy, where it stands, may meet another copy or lie within it.
+bool is_near_others(const Copy& copy, const Triangle& facet) {
+  if (copy.others.empty()) return false;
+  Box box;
+  box.add(facet.a), box.add(facet.b), box.add(facet.c);
+  return std::ranges::any_of(copy.others, [&](const Box& other) { return boxes_meet(box, other); });
 }
 
 }  // namespace
@@ -89,8 +106,8 @@ Result<Coverage> Coverage::build(std::span<Mesh> meshes, std::span<const Instanc
   Coverage coverage;
   coverage.state_ = std::make_unique<State>(grid, Rule{rule, levels - 1});
   State& state = *coverage.state_;
-  for (const Instance& instance : instances) state.copies.push_back({instance.mesh, instance.offset, true});
-  find_alone(meshes, state.copies);
+  for (const Instance& instance : instances) state.copies.push_back({instance.mesh, instance.offset, false, {}});
+  find_others(meshes, state.copies);
   std::vector<std::shared_ptr<MeshBlocks>> blocks = take_blocks(meshes);
   for (std::size_t i = 0; i < blocks.size(); ++i) {
     meshes[i].blocks = blocks[i];
@@ -114,13 +131,14 @@ void Coverage::State::gather(const Layer& layer, LayerScratch& scratch) const {
     };
     mesh.index.each(bottom - by.z, top - by.z, [&](std::uint32_t c) {
       const Cluster& cluster = mesh.blocks->cluster(c, room);
-      const unsigned suspects = copy.alone ? mesh.suspects[c] : ~0u;
+      const unsigned suspects = copy.crowded ? ~0u : mesh.suspects[c];
       for (std::uint32_t lane = 0; lane < kClusterSize; ++lane) {
         const std::int64_t z0 = cluster.z[0][lane], z1 = cluster.z[1][lane], z2 = cluster.z[2][lane];
         if (std::min({z0, z1, z2}) + by.z >= top || std::max({z0, z1, z2}) + by.z <= bottom) continue;
         const Triangle t = cluster.triangle(lane);
-        const bool suspect = (suspects >> lane & 1) != 0;
-        if (take_facet({moved(t.a), moved(t.b), moved(t.c)}, suspect, bottom, top, y, taken)) scratch.facets.push_back(taken);
+        const Triangle on_bed{moved(t.a), moved(t.b), moved(t.c)};
+        const bool suspect = (suspects >> lane & 1) != 0 || is_near_others(copy, on_bed);
+        if (take_facet(on_bed, suspect, bottom, top, y, taken)) scratch.facets.push_back(taken);
       }
     });
   }
@@ -190,6 +208,7 @@ std::uint64_t Coverage::suspects() const {
 
 std::uint64_t Coverage::index_bytes() const {
   std::uint64_t total = state_->x.bytes() + state_->y.bytes() + state_->copies.capacity() * sizeof(Copy);
+  for (const Copy& copy : state_->copies) total += copy.others.capacity() * sizeof(Box);
   for (const CoveredMesh& mesh : state_->meshes) total += mesh.index.bytes() + bytes_held(mesh.suspects);
   return total;
 }

@@ -1,4 +1,4 @@
-// stages/read/image.h: layer images back into runs, through libtiff, libpng and a PBM reader.
+// stages/read/image.h: layer images back into runs, through libtiff, libpng, and readers of Group 4 and PBM.
 #pragma once
 
 #include <cstddef>
@@ -19,7 +19,7 @@ struct Image {
 };
 
 /// Decodes a 1-bit image as the writers make them (TIFF of any 1-bit compression, PNG, PBM), row by row: memory is
-/// the runs plus one row or strip of bits.
+/// the runs plus one row or strip of bits, or of Group 4 the coded strip.
 /// errors  kVerification with the file's name: truncated, not 1 bit, not readable
 Result<Image> image(const std::string& path);
 

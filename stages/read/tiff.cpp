@@ -7,6 +7,7 @@
 
 #include "stages/data/handles/tiff.h"
 #include "stages/geometry/bits.h"
+#include "stages/read/g4.h"
 #include "stages/read/image_formats.h"
 
 namespace lamina::read {
@@ -47,6 +48,27 @@ std::string check_strips(TIFF* tiff, std::uint64_t file_bytes, std::uint16_t com
 /// Not mapped: a file that becomes shorter while it is read is an error then, and no signal.
 constexpr const char* kMode = "rCm";
 constexpr std::int64_t kMostTiffAlloc = 64 << 20;
+
+/// The image of a file in Group 4, without bits. false: libtiff has to say what is wrong with it, or to read it.
+bool read_g4(TIFF* tiff, int file, std::uint32_t columns, std::uint32_t rows, bool white_is_set, Runs& runs) {
+  std::uint32_t rows_per_strip = rows;
+  std::uint16_t fill_order = FILLORDER_MSB2LSB;
+  TIFFGetFieldDefaulted(tiff, TIFFTAG_ROWSPERSTRIP, &rows_per_strip);
+  TIFFGetFieldDefaulted(tiff, TIFFTAG_FILLORDER, &fill_order);
+  rows_per_strip = std::min(rows_per_strip, rows);
+  runs.columns = columns;
+  runs.row_offset.assign(1, 0);
+  G4Decoder decoder;
+  Buffer<std::byte> coded;
+  for (std::uint32_t row = 0, strip = 0; row < rows; row += rows_per_strip, ++strip) {
+    coded.resize(TIFFGetStrileByteCount(tiff, strip));
+    const auto place = static_cast<off_t>(TIFFGetStrileOffset(tiff, strip));
+    if (::pread(file, coded.data(), coded.size(), place) != static_cast<ssize_t>(coded.size())) return false;
+    const G4Strip of_rows{columns, std::min(rows_per_strip, rows - row), fill_order == FILLORDER_LSB2MSB, white_is_set};
+    if (!decoder.append(coded, of_rows, runs)) return false;
+  }
+  return true;
+}
 
 }  // namespace
 
@@ -110,6 +132,10 @@ Result<Image> tiff(int file, std::uint64_t bytes, const std::string& path, int t
     const double to_inch = unit == RESUNIT_CENTIMETER ? 2.54 : 1;
     image.dpi_x = double{resolution_x} * to_inch;
     image.dpi_y = double{resolution_y} * to_inch;
+  }
+  if (compression == COMPRESSION_CCITTFAX4 && !grey &&
+      read_g4(handle.get(), file, columns, rows, photometric == PHOTOMETRIC_MINISBLACK, image.runs)) {
+    return image;
   }
   RunsBuilder builder(columns);
   Buffer<std::byte> row(stride);

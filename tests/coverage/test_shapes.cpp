@@ -250,6 +250,38 @@ TEST(CoverageShapes, RandomTetrahedraOnEdgesOnSamplesAndOffThemHaveTheLevelsOfTh
   }
 }
 
+TEST(CoverageShapes, CopiesThatOverlapAreSampledOnlyWhereTheirBoxesMeet) {
+  const PixelGrid grid{{254, 4'000'000}, {254, 4'000'000}};
+  const Triangles part = turned(box({-600'000, -600'000, -250'000}, {600'000, 600'000, 250'000}), 0.2, 0.1, {0, 0, 0});
+  const std::vector<Point3> places{
+      {1'000'000, 1'000'000, 400'000}, {2'060'000, 1'270'000, 430'000}, {2'900'000, 3'100'000, 400'000}};
+  std::vector<Instance> instances;
+  Triangles all;
+  for (const Point3& place : places) {
+    instances.push_back({0, place});
+    const Triangles copy = turned(part, 0, 0, place);
+    all.insert(all.end(), copy.begin(), copy.end());
+  }
+  Mesh mesh = make_mesh(part), joined_mesh = make_mesh(all);
+  const Instance only{0, {0, 0, 0}};
+  for (const FillRule rule : {FillRule::kNonzero, FillRule::kEvenOdd}) {
+    auto copies = cover::Coverage::build({&mesh, 1}, instances, grid, rule, 16);
+    auto together = cover::Coverage::build({&joined_mesh, 1}, {&only, 1}, grid, rule, 16);
+    cover::LayerScratch scratch;
+    Levels of_copies, of_all;
+    std::uint64_t held = 0, looked_at = 0, sampled = 0;
+    for (const Layer& layer : layers_of(90'000, 8, 20'000)) {
+      const auto report = copies->layer(layer, scratch, of_copies);
+      together->layer(layer, scratch, of_all);
+      EXPECT_TRUE(of_copies.row_offset == of_all.row_offset && of_copies.change == of_all.change &&
+                  of_copies.level == of_all.level);
+      held += report.held_voxels, looked_at += report.looked_at, sampled += report.sampled_voxels;
+    }
+    EXPECT_GT(sampled, 0u);
+    EXPECT_LT(10 * looked_at, 6 * held);  // two of three copies as a whole would be more
+  }
+}
+
 /// Whether a pixel or one of its eight neighbours differs from it.
 bool is_beside_a_change(const std::vector<std::vector<bool>>& set, int row, int column) {
   for (int r = row - 1; r <= row + 1; ++r) {

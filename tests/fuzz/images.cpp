@@ -68,7 +68,7 @@ std::size_t mutate_png(std::uint8_t* bytes, std::size_t size, std::size_t, std::
 }
 
 constexpr std::string_view kImageSources =
-    "stages/read/image stages/read/tiff stages/read/png stages/read/pbm stages/geometry/bits";
+    "stages/read/image stages/read/tiff stages/read/g4 stages/read/png stages/read/pbm stages/geometry/bits";
 const Registered kTiff({"image_tiff", read_image, tiff_seeds, kImageSources, ".tif", "tiff.dict", 1024});
 const Registered kPng({"image_png", read_image, png_seeds, kImageSources, ".png", "png.dict", 1024, mutate_png});
 const Registered kPbm({"image_pbm", read_image, pbm_seeds, kImageSources, ".pbm", {}, 512});
