@@ -26,7 +26,7 @@ include(GNUInstallDirs)
 
 # --- stages: what is done
 lamina_sources(stage_sources "stages/*.cpp")
-list(FILTER stage_sources EXCLUDE REGEX "/stages/write/picture/")
+list(FILTER stage_sources EXCLUDE REGEX "/stages/(write/picture|scan)/")
 
 add_library(lamina_stages STATIC ${stage_sources})
 add_library(lamina::stages ALIAS lamina_stages)
@@ -126,6 +126,34 @@ if(LAMINA_PRECOMPILE AND NOT CMAKE_CXX_COMPILER_LAUNCHER MATCHES "ccache")
   target_precompile_headers(lamina-preview PRIVATE cmake/precompiled.h <OpenImageIO/imagebuf.h> <OpenImageIO/imagebufalgo.h>
                             <OpenImageIO/imageio.h>)
   target_compile_options(lamina-preview PRIVATE -Wno-array-bounds -Wno-stringop-overflow -Wno-stringop-overread)
+endif()
+
+# Photographs need OpenCV: a program of its own too, that `lamina calibrate --scan` and `lamina compare` run as a filter. Debian's
+# core and imgproc are enough; its files for CMake come with all of OpenCV, so that they are not asked for.
+find_path(OPENCV_INCLUDE_DIR opencv2/imgproc.hpp PATH_SUFFIXES opencv4)
+find_library(OPENCV_CORE_LIBRARY opencv_core)
+find_library(OPENCV_IMGPROC_LIBRARY opencv_imgproc)
+mark_as_advanced(OPENCV_INCLUDE_DIR OPENCV_CORE_LIBRARY OPENCV_IMGPROC_LIBRARY)
+if(OPENCV_INCLUDE_DIR AND OPENCV_CORE_LIBRARY AND OPENCV_IMGPROC_LIBRARY)
+  set(LAMINA_SCAN ON)
+  lamina_sources(scan_sources "stages/scan/*.cpp")
+  list(FILTER scan_sources EXCLUDE REGEX "/scan/main\\.cpp$")
+  add_library(lamina_scan STATIC ${scan_sources})
+  target_include_directories(lamina_scan SYSTEM PUBLIC ${OPENCV_INCLUDE_DIR})
+  target_link_libraries(lamina_scan PUBLIC lamina::stages ${OPENCV_IMGPROC_LIBRARY} ${OPENCV_CORE_LIBRARY} nlohmann_json::nlohmann_json
+                        PRIVATE PkgConfig::OPENIMAGEIO)
+  target_compile_options(lamina_scan PRIVATE -Wno-array-bounds -Wno-stringop-overflow)
+  add_executable(lamina-scan stages/scan/main.cpp)
+  target_link_libraries(lamina-scan PRIVATE lamina_scan)
+  if(LAMINA_UNITE STREQUAL "all")
+    set_target_properties(lamina_scan PROPERTIES UNITY_BUILD OFF)  # helpers of one name in several files
+  endif()
+  if(NOT LAMINA_TEST_COMMANDS)
+    set_target_properties(lamina_scan lamina-scan PROPERTIES EXCLUDE_FROM_ALL ON)
+  endif()
+else()
+  set(LAMINA_SCAN OFF)
+  message(WARNING "OpenCV is not there: lamina-scan and its tests are NOT built. Debian: libopencv-core-dev libopencv-imgproc-dev")
 endif()
 
 if(NOT LAMINA_TEST_COMMANDS)

@@ -29,8 +29,10 @@ constexpr InputOption kInputs[] = {{"--job", "the job file"},
                                    {"--measured", "the measurements"},
                                    {"--measure", "a measured table"},
                                    {"--parts", "a part"},
-                                   {"--scan", "a scan"}};
-constexpr std::string_view kOutputs[] = {"-o,--output", "--save-job", "--plot", "--target", "--solid", "--void", "--quote"};
+                                   {"--scan", "a scan"},
+                                   {"--chart", "the chart"}};
+constexpr std::string_view kOutputs[] = {"-o,--output", "--save-job", "--plot",  "--target",
+                                         "--solid",     "--void",     "--quote", "--overlay"};
 
 /// An output file of a command. Marks: every such file of lamina contains one of them in its head; a leading ^ means at
 /// the very start.
@@ -48,6 +50,7 @@ constexpr OwnFile kOwnFiles[] = {
     {"permeability", "--plot", false, {kDrawing, kPicture}},
     {"permeability", "--solid", false, {write::voxels::kMark}},
     {"permeability", "--void", false, {write::voxels::kMark}},
+    {"", "--overlay", false, {kPicture}},
     {"preview", "-o,--output", false, {kDrawing, kPicture}},
     {"report", "-o,--output", false, {"name=\"generator\" content=\"lamina\""}},
     {"calibrate", "-o,--output", false, {"Made by lamina calibrate."}},

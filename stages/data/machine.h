@@ -53,6 +53,7 @@ struct Machine {
     std::uint32_t most_drop_sweeps = 0;  // over one place, for several drops a pixel; 0: not stated
     std::vector<std::uint32_t> blocked;  // numbers from 0
     BlockedRule blocked_rule = BlockedRule::kReport;
+    std::array<double, 2> dot_gain_um{0, 0};  // how far edges of full ink stand out of their pixels along x, y; as measured
   } head;
 
   struct Mounting {

@@ -60,6 +60,12 @@ const Row kRows[] = {
     {"heights", "--save-job", "heights part.stl --layer 1 --quiet --save-job @", "part.stl"},
     {"calibrate", "-o,--output", "calibrate --machine anet-a8 --quiet -o @", "printer.toml", "/widths.csv", true, false, true},
     {"calibrate", "-o,--output", "calibrate --machine printer.toml --measured widths.csv --quiet -o @", "widths.csv"},
+    {"calibrate", "-o,--output", "calibrate --machine hp45 --quiet -o @", nullptr, "/chart.json", true, false, true},
+    {"calibrate", "-o,--output", "calibrate --machine hp45 --drops 1000 --quiet -o @", nullptr, "/drops.json", true, false,
+     true},
+    {"calibrate", "-o,--output", "calibrate --machine hp45 --drops 1000 --weighed-mg 0.04 --quiet -o @", nullptr},
+    {"calibrate", "--overlay", "calibrate --machine nuferbj --chart sheet --scan photo.png --quiet -o y.toml --overlay @.png",
+     "photo.png"},
     {"design", "-o,--output", "design --pore 0.12x0.9 --machine printer.toml --voxel 40 --quiet -o @", "printer.toml"},
     {"permeability", "--plot", "permeability drops.csv --convention dinisio2022 --plot @.svg", "drops.csv"},
     {"permeability", "--plot", "permeability made.gcode --window 5,3.9,0.6 --voxel 100 --plot @.svg", "made.gcode"},
@@ -79,13 +85,15 @@ const Row kRows[] = {
 };
 
 /// Values of options that name no file, beside lists of words to choose from.
-const std::set<std::string_view> kNoFiles = {
-    "A:B",          "AXES",    "DARCY",   "DEG",        "DEGC",   "DPI|XxY",   "ENGINE",        "FACTOR", "FILLING",
-    "FORMAT",       "FORMULA", "G/CM3",   "I/N",        "K",      "KEY=VALUE", "KEY=VALUE;...", "KG/M3",  "LOOPS",
-    "MM",           "MM/S",    "MM2",     "MM[,MM...]", "MODE",   "N",         "N,N,...",       "NAME",   "NAME|NAME,...",
-    "PA",           "PA.S",    "PATTERN", "PERCENT",    "PIXELS", "RULE",      "SECONDS",       "SET",    "SET|RANGE",
-    "SHARE",        "SIZE",    "S[,S]",   "S|X,Y,Z",    "UM",     "UM|XxY",    "UNIT",          "WHEN",   "WIDTHxDEPTH",
-    "WIDTHxLENGTH", "WORD",    "WORDS",   "X,Y",        "X,Y,Z"};
+const std::set<std::string_view> kNoFiles = {"A:B",    "AXES",      "DARCY",   "DEG",       "DEGC",          "DPI|XxY",
+                                             "ENGINE", "FACTOR",    "FILLING", "FORMAT",    "FORMULA",       "G/CM3",
+                                             "G/ML",   "I/N",       "K",       "KEY=VALUE", "KEY=VALUE;...", "KG/M3",
+                                             "LOOPS",  "MG",        "MM",      "MM/S",      "MM2",           "MM[,MM...]",
+                                             "MODE",   "N",         "N,N,...", "NAME",      "NAME|NAME,...", "PA",
+                                             "PA.S",   "PATTERN",   "PERCENT", "PIXELS",    "RULE",          "SECONDS",
+                                             "SET",    "SET|RANGE", "SHARE",   "SIZE",      "S[,S]",         "S|X,Y,Z",
+                                             "UM",     "UM|XxY",    "UNIT",    "WHEN",      "WIDTHxDEPTH",   "WIDTHxLENGTH",
+                                             "WORD",   "WORDS",     "X,Y",     "X,Y,Z"};
 
 std::string all_messages(const Outcome& outcome, const Row& row) { return std::string(row.call) + "\n" + outcome.err; }
 
@@ -98,11 +106,13 @@ class EveryOutput : public ::testing::Test {
     fs::copy(tests / ".." / "stages/write/machines/extrusion/anet-a8.toml", directory_ / "printer.toml");
     write_text(directory_ / "widths.csv", kWidths);
     write_text(directory_ / "list.txt", "info part.stl\n");
-    for (const char* line : {"jet part.stl --layer 1 --dpi 60 --quiet -o made",
-                             "jet part.stl --layer 1 --dpi 60 --quiet -o shards "
-                             "--shard 1/1",
-                             "jet part.stl --layer 1 --machine hp45 --quiet -o powder",
-                             "extrude part.stl --machine anet-a8 --layer 0.3 --quiet -o made.gcode"}) {
+    for (const char* line :
+         {"jet part.stl --layer 1 --dpi 60 --quiet -o made",
+          "jet part.stl --layer 1 --dpi 60 --quiet -o shards "
+          "--shard 1/1",
+          "jet part.stl --layer 1 --machine hp45 --quiet -o powder", "calibrate --machine nuferbj --quiet -o sheet",
+          "preview sheet/print --layer 0 --quiet -o photo.png",
+          "extrude part.stl --machine anet-a8 --layer 0.3 --quiet -o made.gcode"}) {
       const Outcome outcome = run(line);
       EXPECT_EQ(outcome.code, 0) << line << outcome.err;
     }

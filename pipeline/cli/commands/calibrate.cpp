@@ -3,6 +3,7 @@
 
 #include "pipeline/calibrate/calibrate.h"
 #include "pipeline/cli/command.h"
+#include "pipeline/cli/commands/calibrate_powder.h"
 #include "pipeline/cli/console.h"
 #include "stages/data/text/json.h"
 #include "stages/data/text/readable.h"
@@ -11,14 +12,20 @@
 namespace lamina::pipeline {
 namespace {
 
+std::vector<std::string_view> names_of_all() {
+  std::vector<std::string_view> names = names_of(shipped_extruders());
+  for (const std::string_view name : names_of(shipped_machines())) names.push_back(name);
+  return names;
+}
+
 CommandSpec calibrate_spec() {
   CommandSpec spec;
   spec.summary =
-      "Test pieces for segmented lines on a printer, as job files and toolpaths with a table to be filled in; then, from\n"
-      "the measured widths, the printer's profile with its spacings and speeds.";
+      "Extrusion printers: test pieces for segmented lines, as job files and toolpaths with a table to be filled in; then, from\n"
+      "the measured widths, the printer's profile with its spacings and speeds. Powder printers: a chart of all nozzles as a\n"
+      "print job, or a job of a stated number of drops; then, from a photograph or a mass, the printer's profile.";
   spec.options = {
-      {"--machine", "NAME|FILE", "extrusion printer; lamina extrude --help lists them", "", "Machine",
-       names_of(shipped_extruders())},
+      {"--machine", "NAME|FILE", "printer; lamina extrude --help and lamina machines list them", "", "Machine", names_of_all()},
       {"-o,--output", "DIR|FILE", "directory for the pieces; with --measured, the profile to be written", "", "Machine"},
       {"--measured", "FILE", "the widths.csv of the pieces, filled in", "", "Measurements"},
       {"--bead", "MM", "width of a bead at 100 %; the nozzle if absent", "", "Beads"},
@@ -28,12 +35,16 @@ CommandSpec calibrate_spec() {
       {"--overwrite", "", "replace a profile that lamina did not write, or the pieces of an earlier call", "", "Result"},
       {"--json", "", "print the result as one JSON object on stdout", "", "Result"},
       {"--quiet", "", "say nothing but errors", "", "Result"}};
+  for (OptionSpec& option : powder_calibration_options()) spec.options.push_back(std::move(option));
   spec.closing =
-      "The steps are those of Di Nisio (2022), Appendix A; docs/calibrate.md tells them.\n\n"
+      "The steps of extrusion printers are those of Di Nisio (2022), Appendix A; docs/calibrate.md tells all of them.\n\n"
       "Examples:\n"
       "  lamina calibrate --machine anet-a8 -o pieces\n"
       "  lamina calibrate --machine anet-a8 --measured pieces/widths.csv -o my-anet.toml\n"
-      "  lamina extrude part.stl --machine my-anet.toml --fill segmented --extrusion 125 -o part.gcode";
+      "  lamina extrude part.stl --machine my-anet.toml --fill segmented --extrusion 125 -o part.gcode\n"
+      "  lamina calibrate --machine nuferbj -o chart\n"
+      "  lamina calibrate --machine nuferbj --drops 1000000 -o drops\n"
+      "  lamina calibrate --machine nuferbj --drops 1000000 --weighed-mg 52.5 -o my-nuferbj.toml";
   return spec;
 }
 
@@ -80,7 +91,8 @@ Outcome run_calibrate(const Arguments& arguments, Context& context) {
   const auto usage = [](const std::string& what) { return Error{Fault::kUsage, what}; };
   if (!arguments.operands.empty())
     return usage(fmt::format("'{}' is no option; the pieces are made here", one_line(arguments.operands.front())));
-  if (!arguments.has("--machine")) return usage("--machine is missing; name an extrusion printer, as lamina extrude takes it");
+  if (!arguments.has("--machine"))
+    return usage("--machine is missing; name a printer, as lamina extrude or lamina jet takes it");
   CalibrationRequest request{arguments.text("--machine"), arguments.text("-o,--output"), segment::preset_pieces(), false};
   if (request.directory.empty())
     return usage("-o is missing; name a directory for the test pieces, or with --measured the profile to be written");
@@ -89,6 +101,12 @@ Outcome run_calibrate(const Arguments& arguments, Context& context) {
                                arguments.read("--layer", {0.01, 20, " mm"}, request.pieces.height_mm),
                                arguments.read("--gap", {-10, 10, " mm"}, gap)}) {
     if (!status) return status;
+  }
+  const auto extruder = names_extruder(request.machine);
+  if (!extruder) return Error{extruder.error().fault, "--machine: " + extruder.error().message};
+  if (!*extruder) return calibrate_powder(arguments, context);
+  for (const OptionSpec& option : powder_calibration_options()) {
+    if (arguments.has(option.flag)) return at_option(option.flag, "is of powder printers; this is an extrusion printer");
   }
   if (!arguments.has("--measured")) {
     for (const char* flag : {"--gap", "--exact-spacing"}) {
@@ -110,7 +128,7 @@ Outcome run_calibrate(const Arguments& arguments, Context& context) {
 }  // namespace
 
 const Command calibrate_command = {"calibrate",
-                                   "test pieces of an extrusion printer, and its profile from what was measured on them",
+                                   "test pieces or charts of a printer, and its profile from what was measured on them",
                                    calibrate_spec, run_calibrate};
 
 }  // namespace lamina::pipeline

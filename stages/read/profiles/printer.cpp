@@ -130,6 +130,7 @@ constexpr Key<Machine> kKeys[] = {
     field<kHead, &Head::most_drop_sweeps>({"head", "most_drop_sweeps"}, {0, 64}).unsaid_at("0"),
     field<kHead, &Head::blocked>({"head", "blocked"}, {0, 65'534}),
     word<kBlocked, kHead, &Head::blocked_rule>({"head", "blocked_rule"}),
+    field<kHead, &Head::dot_gain_um>({"head", "dot_gain_um"}, {-1e3, 1e4, " um"}).unsaid_at("0,0"),
 
     field<kMounting, &Mounting::tilt_deg>({"mounting", "tilt_deg"}, {-360, 360, " degrees"}),
     field<kMounting, &Mounting::dpi>({"mounting", "dpi"}, kDpi),

@@ -1,0 +1,177 @@
+#include "stages/scan/dashes.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "stages/scan/marks.h"
+
+namespace lamina::scan {
+namespace {
+
+constexpr double kSamplesAPixel = 2;
+
+/// Samples of a dash's surroundings in its own frame: rows across, columns along.
+struct Window {
+  int across = 0, along = 0;               // samples each
+  double step_across = 0, step_along = 0;  // mm
+  std::vector<double> dark;
+  double at(int v, int u) const { return dark[static_cast<std::size_t>(v * along + u)]; }
+  double v_of(int v) const { return (v - 0.5 * (across - 1)) * step_across; }
+  double u_of(int u) const { return (u - 0.5 * (along - 1)) * step_along; }
+};
+
+/// Local, linear: a window is a millimetre wide.
+bool look(const Photo& photo, const View& view, const Spot& middle, bool along_x, double half_along, double half_across,
+          Window& w) {
+  const double e = 0.05;
+  const Spot c = view.at(middle.x, middle.y), x = view.at(middle.x + e, middle.y), y = view.at(middle.x, middle.y + e);
+  const Spot dx{(x.x - c.x) / e, (x.y - c.y) / e}, dy{(y.x - c.x) / e, (y.y - c.y) / e};
+  const Spot du = along_x ? dx : dy, dv = along_x ? dy : dx;
+  const auto samples = [](double half, const Spot& d) {
+    return std::clamp(2 * static_cast<int>(std::ceil(half * std::hypot(d.x, d.y) * kSamplesAPixel)) + 1, 9, 401);
+  };
+  w.along = samples(half_along, du);
+  w.across = samples(half_across, dv);
+  w.step_along = 2 * half_along / (w.along - 1);
+  w.step_across = 2 * half_across / (w.across - 1);
+  for (const double sv : {-half_across, half_across}) {
+    for (const double su : {-half_along, half_along}) {
+      const double px = c.x + su * du.x + sv * dv.x, py = c.y + su * du.y + sv * dv.y;
+      if (!(px >= 0 && py >= 0 && px < photo.darkness.cols - 1 && py < photo.darkness.rows - 1)) return false;
+    }
+  }
+  w.dark.resize(static_cast<std::size_t>(w.across * w.along));
+  for (int v = 0; v < w.across; ++v) {
+    for (int u = 0; u < w.along; ++u) {
+      const double a = w.u_of(u), b = w.v_of(v);
+      w.dark[static_cast<std::size_t>(v * w.along + u)] =
+          darkness_at(photo.darkness, c.x + a * du.x + b * dv.x, c.y + a * du.y + b * dv.y);
+    }
+  }
+  return true;
+}
+
+double middle_value(std::vector<double>& values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+/// The centre of what is above the ground within `reach` of `about`.
+double centre(const std::vector<double>& profile, double step, double ground, double about, double reach) {
+  double sum = 0, moment = 0;
+  for (std::size_t i = 0; i < profile.size(); ++i) {
+    const double at = (static_cast<double>(i) - 0.5 * static_cast<double>(profile.size() - 1)) * step;
+    // The window's ends count by the share of a step that lies within.
+    const double share = std::clamp((reach - std::abs(at - about)) / step + 0.5, 0.0, 1.0);
+    sum += share * (profile[i] - ground);
+    moment += share * (profile[i] - ground) * at;
+  }
+  return sum > 1e-9 ? std::clamp(moment / sum, about - reach, about + reach) : about;
+}
+
+/// The middle between two ends, each where what is above the ground within `reach` of the end adds up to half of it: less noise
+/// than a centre of all has, and no level to be chosen.
+double middle_of_ends(const std::vector<double>& profile, double step, double ground, double half, double reach) {
+  double middle = 0;
+  for (int round = 0; round < 3; ++round) {
+    double left = 0, right = 0, top = 0, count = 0;
+    for (std::size_t i = 0; i < profile.size(); ++i) {
+      const double at = (static_cast<double>(i) - 0.5 * static_cast<double>(profile.size() - 1)) * step - middle;
+      const double value = profile[i] - ground;
+      const auto within = [&](double end) { return std::clamp((reach - std::abs(at - end)) / step + 0.5, 0.0, 1.0); };
+      left += within(-half) * value * step;
+      right += within(half) * value * step;
+      if (std::abs(at) < half - reach) top += value, ++count;
+    }
+    if (count == 0 || top / count < 1e-4) return middle;
+    middle += std::clamp((right - left) / (2 * top / count), -reach, reach);
+  }
+  return middle;
+}
+
+DashSeen see_dash(const Photo& photo, const Chart& chart, const View& view, const Spot& place, double length, Window& w) {
+  const double half_across = chart.between_mm / 2, half_along = (length + chart.gap_mm) / 2;
+  DashSeen seen{.place = place};
+  if (!look(photo, view, place, chart.scan_along_x, half_along, half_across, w)) {
+    seen.hidden = true;
+    return seen;
+  }
+  std::vector<double> across(static_cast<std::size_t>(w.across)), along(static_cast<std::size_t>(w.along)), edge;
+  for (int v = 0; v < w.across; ++v) {
+    double sum = 0;
+    int count = 0;
+    for (int u = 0; u < w.along; ++u) {
+      if (std::abs(w.u_of(u)) > 0.42 * length) continue;
+      sum += w.at(v, u);
+      ++count;
+      if (std::abs(w.v_of(v)) > 0.8 * half_across) edge.push_back(w.at(v, u));
+    }
+    across[static_cast<std::size_t>(v)] = sum / std::max(count, 1);
+  }
+  seen.ground = edge.empty() ? 0 : middle_value(edge);
+  for (int v = 0; v < w.across; ++v) {
+    if (std::abs(w.v_of(v)) <= 0.7 * half_across)
+      seen.mass += (across[static_cast<std::size_t>(v)] - seen.ground) * w.step_across;
+  }
+  double v = 0;
+  for (const double reach : {0.8, 0.55, 0.45, 0.45, 0.45})
+    v = centre(across, w.step_across, seen.ground, v, reach * half_across);
+  for (int u = 0; u < w.along; ++u) {
+    double sum = 0;
+    int count = 0;
+    for (int r = 0; r < w.across; ++r) {
+      if (std::abs(w.v_of(r) - v) > 0.28 * half_across) continue;
+      sum += w.at(r, u);
+      ++count;
+    }
+    along[static_cast<std::size_t>(u)] = sum / std::max(count, 1);
+  }
+  const double u = middle_of_ends(along, w.step_along, seen.ground, length / 2, 0.4 * chart.gap_mm);
+  seen.place = chart.scan_along_x ? Spot{place.x + u, place.y + v} : Spot{place.x + v, place.y + u};
+  return seen;
+}
+
+}  // namespace
+
+std::vector<DashSeen> see_dashes(const Photo& photo, const Chart& chart, const View& view, const std::vector<Spot>& shifts) {
+  constexpr double kThere = 0.5, kMost = 2.5;  // shares of a usual dash
+  std::vector<DashSeen> seen;
+  seen.reserve(chart.dashes.size());
+  Window window;
+  for (const ChartDash& dash : chart.dashes) {
+    const Spot m = middle_of(dash.box, chart), shift = shifts[dash.swath];
+    const double length = chart.scan_along_x ? (dash.box.right - dash.box.left) * 1e-6 * chart.pixel_x_nm
+                                             : (dash.box.bottom - dash.box.top) * 1e-6 * chart.pixel_y_nm;
+    seen.push_back(see_dash(photo, chart, view, {m.x + shift.x, m.y + shift.y}, length, window));
+  }
+  // A usual dash: three quarters of all have less. Where most are missing, half of what full ink of its width has.
+  std::vector<double> masses;
+  for (const DashSeen& one : seen) {
+    if (!one.hidden) masses.push_back(one.mass);
+  }
+  if (masses.empty()) return seen;
+  const auto rank = masses.begin() + static_cast<std::ptrdiff_t>(masses.size() * 3 / 4);
+  std::nth_element(masses.begin(), rank, masses.end());
+  const double pitch = 1e-6 * (chart.scan_along_x ? chart.pixel_y_nm : chart.pixel_x_nm);
+  const double usual = std::max(*rank, 0.5 * photo.ink * pitch);
+  for (DashSeen& one : seen) {
+    one.there = !one.hidden && one.mass > kThere * usual;
+    one.hidden = one.hidden || one.mass > kMost * usual || one.ground > 0.35 * photo.ink;
+  }
+  return seen;
+}
+
+std::vector<double> stripe(const Photo& photo, const View& view, const Spot& middle, bool along_x, double reach, double half) {
+  Window w;
+  std::vector<double> line;
+  if (!look(photo, view, middle, along_x, reach, half, w)) return line;
+  for (int u = 0; u < w.along; ++u) {
+    double sum = 0;
+    for (int v = 0; v < w.across; ++v) sum += w.at(v, u);
+    line.push_back(sum / w.across);
+  }
+  return line;
+}
+
+}  // namespace lamina::scan

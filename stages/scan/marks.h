@@ -1,0 +1,20 @@
+// stages/scan/marks.h: the four marks of a chart in a photograph.
+#pragma once
+
+#include "stages/data/picture/chart.h"
+#include "stages/data/status.h"
+#include "stages/scan/photo.h"
+#include "stages/scan/view.h"
+
+namespace lamina::scan {
+
+/// The middle of a box, in mm of the image from its upper left corner.
+inline Spot middle_of(const ChartBox& box, const Chart& chart) {
+  return {(box.left + box.right) * 0.5e-6 * chart.pixel_x_nm, (box.top + box.bottom) * 0.5e-6 * chart.pixel_y_nm};
+}
+
+/// Finds discs and rings, however the sheet lies, and takes the four whose view puts the most dashes onto ink.
+/// errors  kInput: they are not there, or the photograph is mirrored
+Result<View> find_marks(const Photo& photo, const Chart& chart);
+
+}  // namespace lamina::scan

@@ -1,0 +1,179 @@
+// tests/chart/test_layout.cpp: every dash of a chart is of the nozzle that it names, and drops are as many as stated.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <cstdint>
+#include <map>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "pipeline/machine/powder_printer.h"
+#include "pipeline/machine/profiles.h"
+#include "stages/chart/draw.h"
+#include "stages/chart/layout.h"
+#include "stages/chart/measured.h"
+#include "stages/data/picture/chart.h"
+#include "stages/data/runs.h"
+#include "stages/program/compile.h"
+
+namespace lamina::test {
+namespace {
+
+/// The machine as calibrate has it: its own blocked nozzles where its controller insists on them.
+pipeline::ResolvedMachine machine_of_chart(const std::string& name) {
+  const auto machine = pipeline::find_machine(name);
+  EXPECT_TRUE(machine) << name;
+  auto resolved = pipeline::resolve_profile(chart::chart_machine(*machine));
+  if (!resolved) resolved = pipeline::resolve_profile(chart::chart_machine(*machine, true));
+  EXPECT_TRUE(resolved) << resolved.error().message;
+  return *resolved;
+}
+
+/// Drops of each swath and nozzle.
+std::map<std::pair<std::uint32_t, std::uint32_t>, std::uint64_t> fired(const HeadGrid& grid, const RunsView& image) {
+  std::map<std::pair<std::uint32_t, std::uint32_t>, std::uint64_t> drops;
+  program::CompileScratch scratch;
+  const auto count = program::compile(grid, image, scratch, [&](const Sweep& sweep, const SweepVectors& vectors) {
+    for (std::uint32_t step = 0; step < vectors.steps; ++step) {
+      const std::uint64_t* words = vectors.step(vectors.first_step + step);
+      for (std::uint32_t n = 0; n < grid.nozzles; ++n) {
+        const std::uint32_t bit = n ^ grid.bit_order;
+        if (words[bit / 64] >> bit % 64 & 1) ++drops[{sweep.swath, n}];
+      }
+    }
+    return Status();
+  });
+  EXPECT_TRUE(count);
+  return drops;
+}
+
+TEST(ChartLayout, DashesAreFiredByTheNozzlesThatTheyName) {
+  for (const std::string_view name : pipeline::names_of(pipeline::shipped_machines())) {
+    const auto machine = machine_of_chart(std::string(name));
+    const auto laid = chart::lay_out(machine.machine, machine.grid);
+    ASSERT_TRUE(laid) << name << ": " << laid.error().message;
+    Chart dashes = *laid;
+    dashes.marks.clear();
+    dashes.bars.clear();
+    dashes.wedges.clear();
+    dashes.joints.clear();
+    std::map<std::pair<std::uint32_t, std::uint32_t>, std::uint64_t> wanted;
+    for (const ChartDash& dash : dashes.dashes)
+      wanted[{dash.swath, dash.nozzle}] += (dash.box.right - dash.box.left) * (dash.box.bottom - dash.box.top);
+    const auto drops = fired(machine.grid, chart::draw(dashes));
+    const std::uint32_t first = drops.begin()->first.first;  // of the bed's swaths
+    ASSERT_EQ(drops.size(), wanted.size()) << name;
+    for (const auto& [who, count] : wanted) {
+      const auto found = drops.find({first + who.first, who.second});
+      ASSERT_TRUE(found != drops.end() && found->second == count)
+          << name << ": swath " << who.first << ", nozzle " << who.second;
+    }
+    const auto free_nozzles = machine.grid.nozzles - machine.grid.blocked.size();
+    EXPECT_EQ(wanted.size(), free_nozzles * laid->swaths) << name;
+  }
+}
+
+TEST(ChartLayout, NothingTouchesAnythingElse) {
+  for (const std::string_view name : pipeline::names_of(pipeline::shipped_machines())) {
+    const auto machine = machine_of_chart(std::string(name));
+    const auto laid = chart::lay_out(machine.machine, machine.grid);
+    ASSERT_TRUE(laid);
+    std::vector<ChartBox> boxes = laid->marks;
+    for (const ChartBar& bar : laid->bars) boxes.push_back(bar.box);
+    for (const ChartWedge& wedge : laid->wedges) boxes.push_back(wedge.box);
+    for (const ChartBox& joint : laid->joints) boxes.push_back(joint);
+    for (const ChartDash& dash : laid->dashes) boxes.push_back(dash.box);
+    const std::size_t others = boxes.size() - laid->dashes.size();
+    for (std::size_t i = 0; i < others; ++i) {
+      for (std::size_t j = i + 1; j < boxes.size(); ++j) {
+        const ChartBox &a = boxes[i], &b = boxes[j];
+        EXPECT_FALSE(a.left <= b.right && b.left <= a.right && a.top <= b.bottom && b.top <= a.bottom)
+            << name << ' ' << i << ' ' << j;
+      }
+    }
+  }
+}
+
+TEST(ChartLayout, JsonKeepsAllOfAChart) {
+  const auto machine = machine_of_chart("nuferbj");
+  const auto laid = chart::lay_out(machine.machine, machine.grid);
+  ASSERT_TRUE(laid);
+  const std::string text = chart_text(*laid);
+  const auto again = read_chart(text, "chart.json");
+  ASSERT_TRUE(again) << again.error().message;
+  EXPECT_EQ(*again, *laid);
+  // Every cut of it is refused in one line.
+  for (std::size_t length = 0; length + 1 < text.size(); length += text.size() / 97) {
+    const auto cut = read_chart(text.substr(0, length), "chart.json");
+    ASSERT_FALSE(cut);
+    EXPECT_EQ(std::ranges::count(cut.error().message, '\n'), 0);
+    EXPECT_EQ(cut.error().fault, Fault::kInput);
+  }
+}
+
+TEST(ChartLayout, ABedWithoutRoomIsRefused) {
+  auto machine = *pipeline::find_machine("hp45");
+  machine.bed.size_mm = {30, 30};
+  const auto resolved = pipeline::resolve_profile(machine);
+  ASSERT_TRUE(resolved);
+  const auto laid = chart::lay_out(resolved->machine, resolved->grid);
+  ASSERT_FALSE(laid);
+  EXPECT_EQ(laid.error().fault, Fault::kUsage);
+}
+
+TEST(ChartDrops, AreAsManyAsStatedAndEvenAmongNozzles) {
+  const auto machine = machine_of_chart("nuferbj");
+  for (const std::uint64_t drops : {1ull, 127ull, 364'032ull, 364'033ull, 1'000'000ull}) {
+    const auto wanted = chart::lay_out_drops(machine.machine, machine.grid, drops);
+    ASSERT_TRUE(wanted);
+    std::uint64_t sum = 0;
+    for (std::uint32_t layer = 0; layer < wanted->layers; ++layer)
+      sum += set_pixels(chart::draw_drops(*wanted, machine.grid, layer));
+    EXPECT_EQ(sum, drops);
+  }
+  const auto whole = chart::lay_out_drops(machine.machine, machine.grid, 364'032);
+  ASSERT_TRUE(whole);
+  ASSERT_EQ(whole->layers, 1u);
+  std::map<std::uint32_t, std::uint64_t> by_nozzle;
+  for (const auto& [who, count] : fired(machine.grid, chart::draw_drops(*whole, machine.grid, 0)))
+    by_nozzle[who.second] += count;
+  ASSERT_EQ(by_nozzle.size(), 128u);
+  for (const auto& [nozzle, count] : by_nozzle) EXPECT_EQ(count, 364'032u / 128);
+  EXPECT_FALSE(chart::lay_out_drops(machine.machine, machine.grid, 1'000'000'000'000));
+}
+
+/// 52.5 mg of water, a million drops: 52.5 nl / 1000, by hand.
+TEST(ChartDrops, VolumeFollowsFromMass) {
+  EXPECT_DOUBLE_EQ(chart::drop_pl_of(52.5, 1, 1e6), 52.5);
+  EXPECT_DOUBLE_EQ(chart::drop_pl_of(52.5, 1.05, 1e6), 50);
+  EXPECT_DOUBLE_EQ(chart::drop_pl_of(0.5, 1, 1e7), 0.05);
+}
+
+/// A reading with two rows: odd nozzles land 10 um too far, so that their row stands 10 um less far behind.
+TEST(ChartMeasured, ReadingsBecomeKeysOfAProfile) {
+  Machine machine;
+  machine.head.nozzles = 4;
+  machine.head.row_offset_um = {0, 2540};
+  machine.head.blocked = {1};
+  machine.mounting.scan_axis = ScanAxis::kY;
+  const char* reading =
+      R"({"pixels_a_mm":20,"scatter_um":5,"blocked":[2],"weak":[],"untold":[],"swaths":[{"along_um":0,"across_um":0},{"along_um":30,"across_um":-20},null],)"
+      R"("nozzles":[{"along_um":-5,"across_um":0},{"along_um":5,"across_um":0},null,{"along_um":5,"across_um":1}],)"
+      R"("dot_gain_um":{"along":12.4,"across":30.6},"wedges":[{"pixels_percent":50,"seen_percent":61}]})";
+  const auto lines = chart::take_over(reading, machine);
+  ASSERT_TRUE(lines) << lines.error().message;
+  EXPECT_EQ(machine.head.blocked, (std::vector<std::uint32_t>{2}));
+  EXPECT_EQ(machine.head.row_offset_um, (std::vector<double>{0, 2530}));
+  EXPECT_EQ(machine.head.dot_gain_um, (std::array<double, 2>{31, 12}));
+  EXPECT_TRUE(
+      std::ranges::count_if(*lines, [](const std::string& line) { return line.find("--bleed 31x12") != std::string::npos; }));
+  EXPECT_TRUE(
+      std::ranges::count_if(*lines, [](const std::string& line) { return line.find("was not printed") != std::string::npos; }));
+  EXPECT_FALSE(chart::take_over("{}", machine));
+}
+
+}  // namespace
+}  // namespace lamina::test
