@@ -30,4 +30,5 @@ std::span<const ShippedProfile> @function@() { return kShipped; }
 endfunction()
 
 lamina_ship_profiles(stages/write/machines shipped_machines)
+lamina_ship_profiles(stages/write/machines/presets shipped_presets)
 lamina_ship_profiles(stages/write/machines/extrusion shipped_extruders)

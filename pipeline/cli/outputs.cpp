@@ -24,6 +24,7 @@ struct InputOption {
 };
 constexpr InputOption kInputs[] = {{"--job", "the job file"},
                                    {"--machine", "the machine profile"},
+                                   {"--preset", "a preset"},
                                    {"--check", "a machine profile"},
                                    {"--show", "a machine profile"},
                                    {"--measured", "the measurements"},
@@ -217,6 +218,7 @@ Status check_outputs(const Arguments& arguments, const Job& job) {
   std::vector<InputFile> inputs = inputs_of(arguments, "a part");
   for (const PartRequest& part : job.parts) inputs.push_back({part.path, "a part"});
   inputs.push_back({job.machine.profile, "the machine profile"});
+  for (const std::string& preset : job.machine.presets) inputs.push_back({preset, "a preset"});
   std::vector<std::string> outputs = outputs_of(arguments);
   add_output(job.output, outputs);
   return check_outputs(inputs, outputs);

@@ -103,7 +103,8 @@ struct ExtrudeRequest {
 
 /// Section [machine].
 struct MachineRequest {
-  std::string profile;                                // name of a shipped profile, or a file; empty: none
+  std::string profile;                                // name of a profile, or a file; empty: none
+  std::vector<std::string> presets;                   // of powder, binder and process that change it, in their order
   std::optional<double> scan_speed_mm_s;              // instead of the profile's
   std::optional<std::vector<std::uint32_t>> blocked;  // instead of the profile's
   std::optional<VatRule> vat_rule;                    // instead of the profile's

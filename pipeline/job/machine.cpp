@@ -24,6 +24,11 @@ const JobKey kMachineKeys[] = {
         {"machine", "profile", "--machine", "NAME|FILE",
          "write the print program of this machine, and take bed and dpi from it; lamina machines lists them",
          decides::images | decides::moves}),
+    custom<Job, read::read_presets, read::presets_text, &Job::machine, &MachineRequest::presets>(
+        {"machine", "presets", "--preset", "NAME|FILE,...",
+         "powder, binder and process that change the machine's profile, in their order; lamina machines lists them",
+         decides::images},
+        Form::kStrings),
     field<&Job::machine, &MachineRequest::scan_speed_mm_s>(
         {"machine", "scan_speed_mm_s", "--scan-speed", "MM/S", "of the head over the bed, instead of the machine's",
          decides::images},

@@ -31,14 +31,14 @@ Result<PowderPrinter> resolve_powder_printer(const Job& job) {
   const MachineRequest& request = job.machine;
   PowderPrinter printer;
   if (request.profile.empty()) {
-    if (request.scan_speed_mm_s || request.blocked || request.vat_rule)
+    if (request.scan_speed_mm_s || request.blocked || request.vat_rule || !request.presets.empty())
       return wrong("machine.profile", "is missing; name one with --machine");
     printer.bed = bare_bed(job);
     const auto dpi = job.dpi.value_or(kBareDpi);
     printer.grid = {PixelAxis(dpi[0], nm_of(printer.bed.size_mm[0])), PixelAxis(dpi[1], nm_of(printer.bed.size_mm[1]))};
     return printer;
   }
-  Result<Machine> found = find_machine(request.profile);
+  Result<Machine> found = find_machine(request.profile, request.presets);
   if (!found) return found.error();
   Machine& machine = *found;
   if (request.scan_speed_mm_s) machine.motion.scan_speed_mm_s = *request.scan_speed_mm_s;

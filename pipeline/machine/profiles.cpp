@@ -6,7 +6,6 @@
 #include <vector>
 
 #include "pipeline/job/decisions.h"
-#include "stages/data/input/file_reader.h"
 #include "stages/data/text/json_text.h"
 #include "stages/data/text/names.h"
 #include "stages/data/text/readable.h"
@@ -16,95 +15,107 @@
 namespace lamina::pipeline {
 namespace {
 
-/// Reads a shipped profile or a file. unknown(suggestion, names)  makes the error for an unknown name
-template <class Profile, class Unknown>
-Result<Profile> find(const std::string& name_or_file, std::span<const ShippedProfile> shipped,
-                     Result<Profile> (*read)(std::string_view, const std::string&), const Unknown& unknown) {
-  if (name_or_file.find('/') == std::string::npos && !name_or_file.ends_with(".toml")) {
-    for (const auto& [name, text] : shipped) {
-      if (name == name_or_file) return read(text, std::string(name) + ".toml");
-    }
-    const std::vector<std::string_view> names = names_of(shipped);
+/// The files of a profile, shipped or the user's. unknown(suggestion, names)  makes the error for an unknown name
+template <class Unknown>
+Result<read::ProfileFiles> find(const std::string& name_or_file, std::span<const ShippedProfile> shipped,
+                                const Unknown& unknown) {
+  const read::Library library = profile_library();
+  std::vector<std::string_view> names = names_of(shipped);
+  if (!read::is_profile_path(name_or_file) && std::ranges::find(names, name_or_file) == names.end() &&
+      !library.is_own(name_or_file)) {
+    const std::vector<std::string> own = library.own_names();
+    names.insert(names.end(), own.begin(), own.end());
     return Error{Fault::kUsage, unknown(suggest(name_or_file, names), fmt::format("{}", fmt::join(names, ", ")))};
   }
-  const auto text =
-      read_file(name_or_file,
-                {.fault = Fault::kUsage, .missing = "no such machine profile", .most_bytes = kMostTomlBytes, .streams = true});
-  return text ? read(*text, name_or_file) : Result<Profile>(text.error());
+  read::ProfileFiles files;
+  const Status status = library.add(name_or_file, files);
+  return status ? Result<read::ProfileFiles>(std::move(files)) : status.error();
 }
 
 bool is_one_of(std::span<const ShippedProfile> shipped, std::string_view name) {
   return std::ranges::find(shipped, name, &ShippedProfile::name) != shipped.end();
 }
 
-/// Whether a profile has a section.
-bool has_section(std::string_view text, std::string_view section) {
-  return text.starts_with(section) || text.find(fmt::format("\n{}", section)) != std::string_view::npos;
-}
-
-}  // namespace
-
-std::vector<std::string_view> names_of(std::span<const ShippedProfile> profiles) {
-  std::vector<std::string_view> names;
-  for (const ShippedProfile& profile : profiles) names.push_back(profile.name);
-  return names;
-}
-
-Result<Machine> read_machine(std::string_view text, const std::string& where) {
-  if (has_section(text, "[material]") && !has_section(text, "[head]")) {
-    const auto other = read_extruder(text, where);
-    return Error{Fault::kUsage,
-                 other ? where + ": is the profile of an extrusion printer; lamina extrude takes it" : other.error().message};
-  }
+Result<ExtruderProfile> extruder_of(const read::ProfileFiles& files) {
+  if (have_section(files, "head") && !have_section(files, "material"))
+    return Error{Fault::kUsage, files.back().where + ": is the profile of a powder printer; lamina jet takes it"};
   count(Decision::kMachine);
-  std::vector<std::string_view> dialects;
-  for (const auto& dialect : write::dialects()) dialects.push_back(dialect.id);
-  return read::read_machine(text, where, dialects);
-}
-
-Result<ExtruderProfile> read_extruder(std::string_view text, const std::string& where) {
-  if (has_section(text, "[head]") && !has_section(text, "[material]")) {
-    return Error{Fault::kUsage, where + ": is the profile of a powder printer; lamina jet takes it"};
-  }
-  count(Decision::kMachine);
-  auto profile = read::read_extruder(text, where, {.machine = {}, .calibration = segment::anet_a8_calibration()});
+  auto profile = read::read_extruder(files, {.machine = {}, .calibration = segment::anet_a8_calibration()});
   if (!profile) return profile;
   if (const Status status = segment::check(profile->calibration); !status) {
-    return Error{Fault::kUsage, fmt::format("{}: calibration.{}", where, status.error().message)};
+    return Error{Fault::kUsage, fmt::format("{}: calibration.{}", files.back().where, status.error().message)};
   }
   return profile;
 }
 
-Result<Machine> find_machine(const std::string& name_or_file) {
-  return find(name_or_file, shipped_machines(), read_machine, [&](const std::string& near, const std::string& names) {
+}  // namespace
+
+read::Library profile_library() {
+  std::vector<ShippedProfile> all;
+  for (const auto shipped : {shipped_machines(), shipped_presets(), shipped_extruders()})
+    all.insert(all.end(), shipped.begin(), shipped.end());
+  return {std::move(all), read::profile_folder()};
+}
+
+Result<Machine> read_machine(const read::ProfileFiles& files) {
+  if (have_section(files, "material") && !have_section(files, "head")) {
+    const auto other = extruder_of(files);
+    return Error{Fault::kUsage, other ? files.back().where + ": is the profile of an extrusion printer; lamina extrude takes it"
+                                      : other.error().message};
+  }
+  count(Decision::kMachine);
+  std::vector<std::string_view> dialects;
+  for (const auto& dialect : write::dialects()) dialects.push_back(dialect.id);
+  return read::read_machine(files, dialects);
+}
+
+Result<Machine> read_machine(std::string_view text, const std::string& where) {
+  auto keys = read_toml(text, where);
+  return keys ? read_machine(read::ProfileFiles{{std::move(*keys), where, {}}}) : keys.error();
+}
+
+Result<ExtruderProfile> read_extruder(std::string_view text, const std::string& where) {
+  auto keys = read_toml(text, where);
+  return keys ? extruder_of({{std::move(*keys), where, {}}}) : keys.error();
+}
+
+Result<read::ProfileFiles> machine_files(const std::string& name_or_file, const std::vector<std::string>& presets) {
+  auto files = find(name_or_file, shipped_machines(), [&](const std::string& near, const std::string& names) {
     if (is_one_of(shipped_extruders(), name_or_file))
       return fmt::format("'{}' is an extrusion printer, of lamina extrude; name a profile or one of {}", name_or_file, names);
     return fmt::format("no machine '{}'; name a profile (a file that ends in .toml) or one of {}{}", name_or_file, names, near);
   });
+  for (std::size_t i = 0; files && i < presets.size(); ++i) {
+    if (Status status = profile_library().add(presets[i], *files); !status)
+      return Error{Fault::kUsage, "--preset: " + status.error().message};
+  }
+  return files;
+}
+
+Result<Machine> find_machine(const std::string& name_or_file, const std::vector<std::string>& presets) {
+  const auto files = machine_files(name_or_file, presets);
+  return files ? read_machine(*files) : files.error();
 }
 
 Result<ExtruderProfile> find_extruder(const std::string& name_or_file) {
-  return find(name_or_file, shipped_extruders(), read_extruder, [&](const std::string& near, const std::string& names) {
+  const auto files = find(name_or_file, shipped_extruders(), [&](const std::string& near, const std::string& names) {
     if (is_one_of(shipped_machines(), name_or_file))
       return fmt::format("'{}' is a powder printer, of lamina jet; name a profile or one of {}", name_or_file, names);
     return fmt::format("no extrusion printer '{}'{}; name a profile (a file that ends in .toml) or one of {}",
                        one_line(name_or_file), near, names);
   });
+  return files ? extruder_of(*files) : files.error();
 }
 
 Result<bool> names_extruder(const std::string& name_or_file) {
-  if (is_one_of(shipped_extruders(), name_or_file)) return true;
-  if (is_one_of(shipped_machines(), name_or_file)) return false;
-  if (name_or_file.find('/') == std::string::npos && !name_or_file.ends_with(".toml")) {
-    std::vector<std::string_view> names = names_of(shipped_extruders());
-    for (const std::string_view name : names_of(shipped_machines())) names.push_back(name);
-    return Error{Fault::kUsage, fmt::format("no machine '{}'{}; name a profile (a file that ends in .toml) or one of {}",
-                                            one_line(name_or_file), suggest(name_or_file, names), fmt::join(names, ", "))};
-  }
-  const auto text =
-      read_file(name_or_file, {.fault = Fault::kUsage, .missing = "no such machine profile", .most_bytes = kMostTomlBytes});
-  if (!text) return text.error();
-  return !has_section(*text, "[head]") || has_section(*text, "[material]");
+  std::vector<ShippedProfile> printers(shipped_extruders().begin(), shipped_extruders().end());
+  printers.insert(printers.end(), shipped_machines().begin(), shipped_machines().end());
+  const auto files = find(name_or_file, printers, [&](const std::string& near, const std::string& names) {
+    return fmt::format("no machine '{}'{}; name a profile (a file that ends in .toml) or one of {}", one_line(name_or_file),
+                       near, names);
+  });
+  if (!files) return files.error();
+  return !have_section(*files, "head") || have_section(*files, "material");
 }
 
 }  // namespace lamina::pipeline

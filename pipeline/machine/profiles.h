@@ -10,29 +10,36 @@
 #include "stages/data/machine.h"
 #include "stages/data/status.h"
 #include "stages/read/profiles/extruder.h"
+#include "stages/read/profiles/library.h"
 #include "stages/read/profiles/printer.h"
 
 namespace lamina::pipeline {
 
-/// A profile built into the program.
-struct ShippedProfile {
-  std::string_view name, text;
-};
+using read::names_of;
+using read::ShippedProfile;
 std::span<const ShippedProfile> shipped_machines();   // powder printers, stages/write/machines/*.toml
+std::span<const ShippedProfile> shipped_presets();    // powder, binder and process for them, presets/*.toml there
 std::span<const ShippedProfile> shipped_extruders();  // stages/write/machines/extrusion/*.toml
-std::vector<std::string_view> names_of(std::span<const ShippedProfile> profiles);
 
-/// Reads a profile. `where` names it in messages.
+/// All of them, and the user's own.
+read::Library profile_library();
+
+/// Reads a profile that inherits nothing. `where` names it in messages.
 /// errors  kUsage: place, key, reason; an unknown dialect
 Result<Machine> read_machine(std::string_view text, const std::string& where);
+Result<Machine> read_machine(const read::ProfileFiles& files);
 
 /// The same for an extrusion printer; the default calibration is the published one of the Anet A8.
 /// errors  kUsage: place, key, reason; those of segment::check
 Result<ExtruderProfile> read_extruder(std::string_view text, const std::string& where);
 
+/// The files of a powder printer's profile by name or file, and those of presets, which change it in their order.
+/// errors  kUsage, with the known names; of read::Library
+Result<read::ProfileFiles> machine_files(const std::string& name_or_file, const std::vector<std::string>& presets = {});
+
 /// The profile with that name, or in that file (a text with a slash or ending in .toml).
-/// errors  kUsage, with the shipped names
-Result<Machine> find_machine(const std::string& name_or_file);
+/// errors  kUsage, with the known names
+Result<Machine> find_machine(const std::string& name_or_file, const std::vector<std::string>& presets = {});
 Result<ExtruderProfile> find_extruder(const std::string& name_or_file);
 
 /// Whether it is the profile of an extrusion printer, else of a powder printer; a file may be wrong in other ways.

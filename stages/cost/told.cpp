@@ -36,7 +36,7 @@ std::vector<std::pair<std::string, std::string>> lines_of(const Quote& quote, co
                                                           std::span<const QuotedPart> parts) {
   std::vector<std::pair<std::string, std::string>> lines;
   const Use& job = quote.job;
-  lines.emplace_back("material", fmt::format("{:.3f} ml of binder, {:.2f} ml of powder fed: {:.2f} bound, {:.2f} left over",
+  lines.emplace_back("material", fmt::format("{:.3f} ml of binder, {:.2f} ml of powder dosed: {:.2f} bound, {:.2f} left over",
                                              ml(job.binder_nl), ml(job.fed_nl), ml(job.bound_nl), ml(job.left_nl())));
   if (!has_prices(cost)) return lines;
   const auto text = [&](const Use& use) {

@@ -1,7 +1,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
 #include <optional>
 
 #include "pipeline/cli/command.h"
@@ -10,6 +9,7 @@
 #include "pipeline/machine/profiles.h"
 #include "pipeline/output/print_program.h"
 #include "stages/program/head_grid.h"
+#include "stages/program/image_of_bed.h"
 #include "stages/program/orientation_target.h"
 #include "stages/write/file.h"
 #include "stages/write/program/dialect.h"
@@ -30,6 +30,8 @@ CommandSpec machines_spec() {
   const auto& names = spec.operand_words;
   spec.options = {{"--check", "NAME|FILE", "explain this machine; a profile is a TOML file", "", "", names},
                   {"--show", "NAME|FILE", "print the whole profile, every key of it, to be changed and saved", "", "", names},
+                  {"--preset", "NAME|FILE", "change the machine by this preset of powder, binder and process; several times",
+                   "", "", names_of(shipped_presets())},
                   {"--dialects", "", "list the dialects that programs can be written in", "", ""},
                   {"--target", "STL", "write a part whose print shows which way x, y and up are", "", ""},
                   {"--overwrite", "", "replace a file that lamina did not write", "", ""}};
@@ -38,6 +40,7 @@ CommandSpec machines_spec() {
       "  lamina machines\n"
       "  lamina machines --check nuferbj\n"
       "  lamina machines --show nuferbj > mine.toml\n"
+      "  lamina machines --show jet1000 --preset example-steel       each value with the file that it comes from\n"
       "  lamina jet part.stl --machine mine.toml -o out";
   return spec;
 }
@@ -55,28 +58,6 @@ std::string explain(const ExtruderProfile& profile) {
           : "predicted from the lag of its melt; lamina calibrate measures them");
 }
 
-/// The image of a layer that sets every pixel whose centre lies on the bed.
-Runs image_of_bed(const Machine& machine, const PixelGrid& grid) {
-  const bool round = machine.bed.shape == BedShape::kRound;
-  const double width = machine.bed.size_mm[0] * kNmPerMm, radius = width / 2;
-  // The first pixel whose centre does not lie before a place.
-  const auto pixel = [](const PixelAxis& axis, double nm) {
-    return static_cast<std::uint32_t>(std::clamp(std::ceil(nm * axis.pixels_per_nm() - 0.5), 0.0, double(axis.count)));
-  };
-  const std::uint32_t rows = grid.rows(), behind = rows - pixel(grid.y, machine.bed.size_mm[1] * kNmPerMm);
-  Runs runs;
-  runs.columns = grid.columns();
-  runs.row_offset.push_back(0);
-  for (std::uint32_t r = 0; r < rows; ++r) {
-    const double y = static_cast<double>(grid.y.centre(rows - 1 - r)) - radius;
-    const double half = round ? std::sqrt(std::max(0.0, radius * radius - y * y)) : radius;
-    const std::uint32_t begin = pixel(grid.x, radius - half), end = pixel(grid.x, radius + half);
-    if (r >= behind && begin < end) runs.change.insert(runs.change.end(), {begin, end});
-    runs.row_offset.push_back(static_cast<std::uint32_t>(runs.change.size()));
-  }
-  return runs;
-}
-
 /// Compiles and times a full layer and an empty one; none if the vectors of the full one take more than 256 MiB, six times
 /// those of the largest shipped machine, or its program more than 1 GiB.
 Result<std::optional<program::FullLayer>> time_full_layer(const ResolvedMachine& resolved) {
@@ -90,7 +71,7 @@ Result<std::optional<program::FullLayer>> time_full_layer(const ResolvedMachine&
   full.thickness_mm = std::max(0.1, resolved.machine.motion.layer_step_um / 1000);
   const auto thickness = static_cast<Nm>(nm_of(full.thickness_mm));
   const Layer layer{1, thickness, thickness};  // the first one has the base of powder below it
-  Runs image = image_of_bed(resolved.machine, grid.image);
+  Runs image = program::image_of_bed(resolved.machine, grid.image);
   ProgramWork work;
   ProgramRecord record;
   if (Status status = program.write_layer(layer, image, {0}, work, record); !status) return status.error();
@@ -105,14 +86,15 @@ Result<std::optional<program::FullLayer>> time_full_layer(const ResolvedMachine&
 
 /// A printer by name or file, first among powder printers, then extrusion: its profile or its derived values.
 /// errors  for an unknown name, those of powder printers
-Result<std::string> printer_text(const std::string& name, bool whole) {
-  const Result<Machine> powder = find_machine(name);
+Result<std::string> printer_text(const std::string& name, const std::vector<std::string>& presets, bool whole) {
+  const auto files = machine_files(name, presets);
+  const Result<Machine> powder = files ? read_machine(*files) : files.error();
   if (!powder) {
     const auto extrusion = find_extruder(name);
     if (!extrusion) return powder.error();
     return whole ? read::extruder_text(*extrusion) : explain(*extrusion);
   }
-  if (whole) return read::machine_text(*powder);
+  if (whole) return read::sourced_text(read::machine_text(*powder), *files);
   const auto resolved = resolve_profile(*powder);
   if (!resolved) return resolved.error();
   const auto full = time_full_layer(*resolved);
@@ -131,18 +113,20 @@ Outcome run_machines(const Arguments& arguments, Context& context) {
     return 0;
   }
   std::string text;
+  std::vector<std::string> presets;
+  if (Status status = arguments.read("--preset", read::read_presets, presets); !status) return status;
   if (arguments.has("--dialects")) {
     for (const write::Dialect& dialect : write::dialects()) text += fmt::format("{:<12}{}\n", dialect.id, dialect.description);
   }
   for (const std::string& name : arguments.all("--show")) {
-    const auto profile = printer_text(name, true);
+    const auto profile = printer_text(name, presets, true);
     if (!profile) return profile.error();
     text += *profile;
   }
   std::vector<std::string> checked = arguments.all("--check");
   checked.insert(checked.end(), arguments.operands.begin(), arguments.operands.end());
   for (const std::string& name : checked) {
-    const auto explained = printer_text(name, false);
+    const auto explained = printer_text(name, presets, false);
     if (!explained) return explained.error();
     text += (text.empty() ? "" : "\n") + *explained;
   }
@@ -152,6 +136,11 @@ Outcome run_machines(const Arguments& arguments, Context& context) {
       if (!machine) return machine.error();
       text += fmt::format("{:<16}{}\n", shipped.name, machine->description);
     }
+    text += "\n--preset:\n";
+    for (const ShippedProfile& shipped : shipped_presets()) text += fmt::format("{}\n", shipped.name);
+    const read::Library library = profile_library();
+    if (!library.own_names().empty()) text += fmt::format("\nin {}:\n", one_line(library.folder()));
+    for (const std::string& name : library.own_names()) text += one_line(name) + "\n";
     text += "\nlamina extrude:\n";
     for (const ShippedProfile& shipped : shipped_extruders()) {
       const auto profile = read_extruder(shipped.text, std::string(shipped.name));

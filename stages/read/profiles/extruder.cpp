@@ -197,14 +197,11 @@ constexpr Key<Profile> kKeys[] = {
 
 }  // namespace
 
-Result<ExtruderProfile> read_extruder(std::string_view text, const std::string& where, ExtruderProfile profile) {
-  const auto file = read_toml(text, where);
-  if (!file) return file.error();
-  if (file->find("head") != nullptr || file->find("powder") != nullptr) {
-    return Error{Fault::kUsage, fmt::format("{}: is the profile of a powder printer; lamina jet takes it", where)};
+Result<ExtruderProfile> read_extruder(const ProfileFiles& files, ExtruderProfile profile) {
+  if (have_section(files, "head") || have_section(files, "powder")) {
+    return Error{Fault::kUsage, fmt::format("{}: is the profile of a powder printer; lamina jet takes it", files.back().where)};
   }
-  if (Status status = read_sections<Profile>(*file, where, kKeys, profile, profile.machine.name); !status)
-    return status.error();
+  if (Status status = read_sections<Profile>(files, kKeys, profile, profile.machine.name); !status) return status.error();
   return profile;
 }
 

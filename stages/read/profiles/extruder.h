@@ -6,14 +6,15 @@
 
 #include "stages/data/extruder.h"
 #include "stages/data/status.h"
+#include "stages/read/profiles/library.h"
 
 namespace lamina::read {
 
 /// Reads a profile; refuses unknown keys. Does not check the tables of its calibration, see segment::check.
-/// where    its name in messages
-/// profile  the values of keys absent from the text
+/// files    at least one
+/// profile  the values of keys absent from them
 /// errors   kUsage: place, key, reason; a powder printer's profile
-Result<ExtruderProfile> read_extruder(std::string_view text, const std::string& where, ExtruderProfile profile);
+Result<ExtruderProfile> read_extruder(const ProfileFiles& files, ExtruderProfile profile);
 
 /// Sets one key, such as material.flow to 0.85. returns "" or an error message
 std::string set_extruder_key(std::string_view name, std::string_view value, ExtruderProfile& profile);

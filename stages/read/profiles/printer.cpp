@@ -226,16 +226,17 @@ std::string check_material(std::string_view name) {
   return fmt::format("'{}' is no name of a material; use up to {} letters, digits, - and _", name, kLongestMaterial);
 }
 
-Result<Machine> read_machine(std::string_view text, const std::string& where, std::span<const std::string_view> dialects) {
-  const auto file = read_toml(text, where);
-  if (!file) return file.error();
+Result<Machine> read_machine(const ProfileFiles& files, std::span<const std::string_view> dialects) {
   Machine machine;
-  if (Status status = read_sections<Machine>(*file, where, kKeys, machine, machine.name); !status) return status.error();
+  if (Status status = read_sections<Machine>(files, kKeys, machine, machine.name); !status) return status.error();
   if (std::ranges::find(dialects, machine.dialect) != dialects.end()) return machine;
-  const TomlValue* section = file->find("machine");
-  const TomlValue* named = section == nullptr ? nullptr : section->find("dialect");
-  const Place at = named == nullptr ? Place() : named->place;
-  return Error{Fault::kUsage, fmt::format("{}machine.dialect: {}", at.text(where), not_one_of(machine.dialect, dialects))};
+  std::string at;
+  for (const ProfileFile& file : files) {
+    const TomlValue* section = file.keys.find("machine");
+    const TomlValue* named = section == nullptr ? nullptr : section->find("dialect");
+    if (named != nullptr) at = named->place.text(file.where);
+  }
+  return Error{Fault::kUsage, fmt::format("{}machine.dialect: {}", at, not_one_of(machine.dialect, dialects))};
 }
 
 std::string machine_text(const Machine& machine) {

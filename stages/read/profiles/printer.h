@@ -8,14 +8,14 @@
 
 #include "stages/data/machine.h"
 #include "stages/data/status.h"
+#include "stages/read/profiles/library.h"
 
 namespace lamina::read {
 
-/// Reads a profile. Every key has a default; unknown keys are refused.
-/// where     its name in messages
+/// Reads a profile from its files, at least one. Every key has a default; unknown keys are refused.
 /// dialects  the available dialects of print programs: the profile names one or uses the default
 /// errors    kUsage: place, key, reason
-Result<Machine> read_machine(std::string_view text, const std::string& where, std::span<const std::string_view> dialects);
+Result<Machine> read_machine(const ProfileFiles& files, std::span<const std::string_view> dialects);
 
 /// The text with every key of a profile: equal machines have equal texts, and reading it restores the machine.
 std::string machine_text(const Machine& machine);

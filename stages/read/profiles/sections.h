@@ -10,6 +10,7 @@
 #include "stages/data/text/json_text.h"
 #include "stages/data/text/key.h"
 #include "stages/data/text/readable.h"
+#include "stages/read/profiles/library.h"
 
 namespace lamina::read {
 
@@ -20,16 +21,18 @@ inline std::string read_name(std::string_view text, std::string& name) {
 inline std::string read_line(std::string_view text, std::string& line) { return line = one_line(text), std::string(); }
 inline std::string same_text(const std::string& text) { return text; }
 
-/// Reads every section of a file. name  of the machine; required
+/// Reads every section of a profile's files, at least one. name  of the machine; required
 /// errors  kUsage: place, key, reason
 template <class Profile>
-Status read_sections(const TomlValue& file, const std::string& where, std::span<const Key<Profile>> keys, Profile& profile,
-                     const std::string& name) {
-  for (std::size_t i = 0; i < file.value.size(); ++i) {
-    if (Status status = read_section(file.value[i], file.name[i], where, keys, profile); !status) return status;
+Status read_sections(const ProfileFiles& files, std::span<const Key<Profile>> keys, Profile& profile, const std::string& name) {
+  for (const ProfileFile& file : files) {
+    for (std::size_t i = 0; i < file.keys.value.size(); ++i) {
+      const Status status = read_section(file.keys.value[i], file.keys.name[i], file.where, keys, profile);
+      if (!status) return status;
+    }
   }
   if (!name.empty()) return {};
-  return Error{Fault::kUsage, fmt::format("{}: machine.name is missing; name the machine", where)};
+  return Error{Fault::kUsage, fmt::format("{}: machine.name is missing; name the machine", files.back().where)};
 }
 
 }  // namespace lamina::read
