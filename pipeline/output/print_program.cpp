@@ -68,8 +68,9 @@ Status PrintProgram::write_layer(const Layer& layer, std::span<const RunsView> p
   work.timer->begin(layer);
   work.writer->begin_layer(cycle, work.text);
   constexpr std::size_t kPiece = 256 << 10;
-  const auto count =
-      program::compile(resolved_.grid, planes, work.compile, [&](const Sweep& sweep, const SweepVectors& vectors) -> Status {
+  const auto count = program::compile(
+      resolved_.grid, planes, work.compile,
+      [&](const Sweep& sweep, const SweepVectors& vectors) -> Status {
         if (!dialect_.has_motion) {
           const std::int64_t low = vectors.first_step, high = low + vectors.steps - 1;
           work.timer->sweep(static_cast<double>(write::across_nm(resolved_.machine, resolved_.grid, sweep.first_line)) / 1e6,
@@ -77,7 +78,8 @@ Status PrintProgram::write_layer(const Layer& layer, std::span<const RunsView> p
         }
         if (file || dialect_.has_motion) work.writer->sweep(sweep, vectors, work.text);
         return work.text.size() < kPiece ? Status() : flush();
-      });
+      },
+      layer.index);
   if (!count) return count.error();
   work.writer->end_layer(cycle, work.text);
   if (Status status = flush(); !status) return status;
@@ -101,7 +103,7 @@ std::uint64_t PrintProgram::bytes_bound(std::uint64_t changes, std::uint32_t pla
   // text grows.
   constexpr std::uint64_t kStepText = 32, kSweepText = 256;
   const std::uint64_t further = grid.blocked_rule == BlockedRule::kSecondPass ? grid.blocked.size() : 0;
-  const std::uint64_t sweeps = std::uint64_t{grid.swaths(0)} * grid.passes * (1 + further) * planes;
+  const std::uint64_t sweeps = std::uint64_t{grid.most_swaths()} * grid.passes * (1 + further) * planes;
   const bool keeps = dialect_.has_motion && !replay::Timer::keeps_no_vectors(dialect_.id);
   const std::uint64_t kept = keeps ? 2 * sweeps * (kStepText * grid.steps() + kSweepText) : 0;
   const Machine& machine = resolved_.machine;  // lines of the base, and of shots off the bed (m578)

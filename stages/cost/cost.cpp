@@ -44,14 +44,14 @@ bool has_prices(const Machine::Cost& cost) {
 }
 
 Tally::Tally(const Machine& machine, const PixelGrid& grid, std::size_t parts)
-    : machine_(machine), pixel_mm2_(25.4 * 25.4 / (grid.x.dpi() * grid.y.dpi())), parts_(parts) {
-  const double side = machine.bed.size_mm[0] * machine.bed.size_mm[1];
-  bed_mm2_ = machine.bed.shape == BedShape::kRound ? side * 3.14159265358979 / 4 : side;
-}
+    : machine_(machine),
+      pixel_mm2_(25.4 * 25.4 / (grid.x.dpi() * grid.y.dpi())),
+      fed_mm2_(fed_area_mm2(machine)),
+      parts_(parts) {}
 
 void Tally::add(std::int64_t thickness_nm, std::int64_t microseconds, std::uint64_t drops, std::uint64_t pixels,
                 std::span<const std::uint64_t> part_pixels, std::span<const std::uint64_t> part_drops) {
-  const std::int64_t fed_nl = whole(machine_.powder.dose * static_cast<double>(thickness_nm) * 1e-3 * bed_mm2_);
+  const std::int64_t fed_nl = whole(machine_.powder.dose * static_cast<double>(thickness_nm) * 1e-3 * fed_mm2_);
   const std::uint64_t of_layer = pixels * static_cast<std::uint64_t>(thickness_nm);
   drops_ += drops + machine_.cost.spit_drops;
   pixels_ += pixels;
@@ -79,7 +79,7 @@ void Tally::add(std::int64_t thickness_nm, std::int64_t microseconds, std::uint6
 }
 
 void Tally::add_base() {
-  const std::int64_t fed_nl = whole(machine_.powder.dose * machine_.powder.base_mm() * 1e3 * bed_mm2_);
+  const std::int64_t fed_nl = whole(machine_.powder.dose * machine_.powder.base_mm() * 1e3 * fed_mm2_);
   fed_nl_ += fed_nl;
   unshared_nl_ += fed_nl;
 }

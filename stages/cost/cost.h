@@ -1,8 +1,8 @@
 // stages/cost/cost.h: what a powder job uses up and costs, and what each of its parts has of that.
 //
 //      binder   (drops + spat drops x layers) x volume of a drop
-//      fed      sum over layers: dose x thickness x area of the bed, as the powder cycle feeds it; volumes of powder are those
-//      of
+//      fed      sum over layers: dose x thickness x area of the vats, that of the bed unless told, as the powder cycle feeds
+//      it; volumes of powder are those of
 //               the bed, gaps between grains included
 //      bound    sum over layers: set pixels x area of a pixel x thickness
 //      left     fed - bound, 0 at least
@@ -68,7 +68,7 @@ class Tally {
     std::int64_t microseconds = 0, fed_nl = 0;
   };
   const Machine& machine_;
-  double pixel_mm2_, bed_mm2_;
+  double pixel_mm2_, fed_mm2_;
   std::vector<Part> parts_;
   std::uint64_t drops_ = 0, pixels_ = 0, pixel_nm_ = 0;
   std::int64_t microseconds_ = 0, fed_nl_ = 0;

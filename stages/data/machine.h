@@ -61,11 +61,12 @@ struct Machine {
     double dpi = 0;        // across the scan: the tilt follows from it; 0: the dpi follow from the tilt
     double along_dpi = 0;  // along the scan; 0: as across, or ticks_per_pixel
     ScanAxis scan_axis = ScanAxis::kX;
-    Side scan_from = Side::kLeft;     // where a forward sweep begins: left or right for x, front or back for y
-    Side nozzle_0 = Side::kBack;      // where nozzle 0 lies: back or front for x, left or right for y
-    bool first_leads = true;          // nozzle 0 goes ahead on a forward sweep, else the last nozzle
-    std::uint32_t passes = 1;         // interlaced sweeps a swath: dpi across is so many times that of the head
-    std::uint32_t overlap_lines = 0;  // that neighbouring swaths share
+    Side scan_from = Side::kLeft;         // where a forward sweep begins: left or right for x, front or back for y
+    Side nozzle_0 = Side::kBack;          // where nozzle 0 lies: back or front for x, left or right for y
+    bool first_leads = true;              // nozzle 0 goes ahead on a forward sweep, else the last nozzle
+    std::uint32_t passes = 1;             // interlaced sweeps a swath: dpi across is so many times that of the head
+    std::uint32_t overlap_lines = 0;      // that neighbouring swaths share
+    std::uint32_t joint_shift_lines = 0;  // that swaths begin earlier than those of the layer below, round about
     FirstSwath first_swath = FirstSwath::kBed;
     std::array<double, 2> offset_mm{0, 0};  // carriage position minus bed position of nozzle 0
   } mounting;
@@ -98,6 +99,7 @@ struct Machine {
     double spread_s = 0;  // a layer's powder cycle that the program does not spell; 0: by the movements above
     double pause_s = 0;   // a layer, beside all movements: drying, wiping
     std::array<double, 2> vat_depth_mm{0, 0};  // that each vat can feed when it is full; 0: not stated
+    double vat_area_mm2 = 0;                   // of each; 0: that of the bed
     VatRefill refill = VatRefill::kRefuse;
     std::uint32_t base_layers = 0;                         // spread below the first layer, without a drop
     double base_layer_mm = 0.1;                            // thickness of each
@@ -134,6 +136,13 @@ struct Machine {
     std::uint32_t spit_drops = 0;                                     // a layer, off the bed: they count as binder
   } cost;
 };
+
+/// Area of what vats feed from, mm2.
+inline double fed_area_mm2(const Machine& machine) {
+  if (machine.powder.vat_area_mm2 > 0) return machine.powder.vat_area_mm2;
+  const double side = machine.bed.size_mm[0] * machine.bed.size_mm[1];
+  return machine.bed.shape == BedShape::kRound ? side * 3.14159265358979 / 4 : side;
+}
 
 /// A powder that parts of a job are of.
 struct JobMaterial {

@@ -22,7 +22,7 @@ struct HeadGrid {
   bool lines_from_end = false;   // line 0 is the last image row (x) or column (y)
   bool places_from_end = false;  // place 0 is at the right (x) or at the back (y), else at the left or at the front
   std::uint32_t lines = 0, places = 0;
-  std::uint32_t nozzles = 0, passes = 1, overlap = 0, steps_per_pixel = 1;
+  std::uint32_t nozzles = 0, passes = 1, overlap = 0, joint_shift = 0, steps_per_pixel = 1;
   std::vector<std::uint32_t> lag;  // steps, the least is 0
   std::uint32_t most_lag = 0;
   std::uint32_t bit_order = 0;  // of vectors: nozzle i is bit i ^ bit_order, as the dialect has it; below 128
@@ -43,11 +43,13 @@ struct HeadGrid {
   std::uint32_t words() const { return bit_order < 64 ? (nozzles + 63) / 64 : (nozzles + 127) / 128 * 2; }
   /// Steps of a sweep over a whole line, the first one 0.
   std::uint64_t steps() const { return (std::uint64_t{places} - 1) * steps_per_pixel + 1 + most_lag; }
-  /// Swaths of a layer whose first line is `first`.
-  std::uint32_t swaths(std::uint32_t first) const {
-    const std::uint32_t left = lines - first, all = swath_lines();
-    return left <= all ? 1 : 1 + (left - all + (all - overlap) - 1) / (all - overlap);
+  /// Swaths of a layer whose first one begins at the line `first`, before the bed's if joints are shifted.
+  std::uint32_t swaths(std::int64_t first) const {
+    const std::int64_t left = lines - first, all = swath_lines();
+    return left <= all ? 1 : static_cast<std::uint32_t>(1 + (left - all + (all - overlap) - 1) / (all - overlap));
   }
+  /// The most that a layer can have.
+  std::uint32_t most_swaths() const { return swaths(0) + (joint_shift > 0 ? 1 : 0); }
   /// Bed coordinates in nm (x or y) of a line and of the lag-free nozzle at a step. Lines may lie outside of the bed.
   double line_position_nm(std::int64_t line) const {
     const PixelAxis& axis = scan_axis == ScanAxis::kX ? image.y : image.x;

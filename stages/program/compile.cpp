@@ -10,7 +10,8 @@ namespace {
 /// One layer while it is compiled.
 class LayerCompiler {
  public:
-  LayerCompiler(const HeadGrid& grid, std::span<const RunsView> planes, CompileScratch& scratch, const EmitSweep& emit)
+  LayerCompiler(const HeadGrid& grid, std::span<const RunsView> planes, CompileScratch& scratch, const EmitSweep& emit,
+                std::uint32_t layer)
       : grid_(grid),
         scratch_(scratch),
         emit_(emit),
@@ -26,9 +27,10 @@ class LayerCompiler {
     }
     scratch.nozzle.assign(grid.nozzles, Line());
     if (grid.first_swath == FirstSwath::kLayer) {
-      while (first_ + 1 < grid.lines && scratch.line[first_].empty()) ++first_;
+      while (first_ + 1 < grid.lines && scratch.line[static_cast<std::size_t>(first_)].empty()) ++first_;
     }
     stride_ = grid.swath_lines() - grid.overlap;
+    first_ -= static_cast<std::int64_t>(std::uint64_t{layer} * grid.joint_shift % stride_);
     swaths_ = grid.swaths(first_);
   }
 
@@ -58,8 +60,11 @@ class LayerCompiler {
 
  private:
   std::int64_t first_line(std::uint32_t swath, std::uint32_t pass) const {
-    return std::int64_t{first_} + std::int64_t{swath} * stride_ + pass;
+    return first_ + std::int64_t{swath} * stride_ + pass;
   }
+
+  /// The first line of the bed that a swath comes over.
+  std::uint32_t top() const { return static_cast<std::uint32_t>(std::max<std::int64_t>(first_, 0)); }
 
   /// A line of the plane at hand.
   Line& line(std::uint32_t number) { return scratch_.line[std::size_t{plane_} * grid_.lines + number]; }
@@ -76,7 +81,7 @@ class LayerCompiler {
 
   /// Whether no swath can fire a line.
   bool dead(std::uint32_t line) const {
-    const std::uint32_t from_first = line - first_;
+    const auto from_first = static_cast<std::uint32_t>(line - first_);
     const std::uint32_t swath = std::min(from_first / stride_, swaths_ - 1);
     const std::uint32_t own = from_first - swath * stride_;
     if (!nozzle_blocked(own)) return false;
@@ -87,7 +92,7 @@ class LayerCompiler {
   Line under(std::uint32_t swath, std::uint32_t pass, std::uint32_t i) {
     const std::uint32_t own = pass + i * grid_.passes;  // line in the swath
     const std::int64_t over = first_line(swath, pass) + std::int64_t{i} * grid_.passes;
-    if (over >= grid_.lines || blocked_[i]) return {};
+    if (over < 0 || over >= grid_.lines || blocked_[i]) return {};
     const auto number = static_cast<std::uint32_t>(over);
     const Line whole = line(number);
     const bool lower = swath > 0 && own < grid_.overlap, upper = swath + 1 < swaths_ && own >= stride_;
@@ -117,13 +122,13 @@ class LayerCompiler {
   // Left out, or moved to the line of the next nozzle where that is free.
   void resolve_dead_lines() {
     const std::int64_t next = grid_.passes;
-    for (std::uint32_t l = first_; l < grid_.lines; ++l) {
+    for (std::uint32_t l = top(); l < grid_.lines; ++l) {
       if (line(l).empty() || !dead(l)) continue;
       Line left = line(l);
       line(l) = {};
       for (const std::int64_t neighbour : {l - next, l + next}) {
         if (grid_.blocked_rule != BlockedRule::kNeighbour || left.empty()) break;
-        if (neighbour < first_ || neighbour >= grid_.lines || dead(static_cast<std::uint32_t>(neighbour))) continue;
+        if (neighbour < top() || neighbour >= grid_.lines || dead(static_cast<std::uint32_t>(neighbour))) continue;
         Line& target = line(static_cast<std::uint32_t>(neighbour));
         Buffer<std::uint32_t>& both = new_line();
         combine(target, left, LineOperation::kUnion, both);
@@ -147,7 +152,7 @@ class LayerCompiler {
       for (const std::uint32_t j : grid_.blocked) {
         const std::int64_t over = first_line(swath, pass) + std::int64_t{j} * grid_.passes;
         const auto own = static_cast<std::uint32_t>(over);
-        if (over < grid_.lines && !line(own).empty() && dead(own) && owns(swath, pass + j * grid_.passes)) {
+        if (over >= 0 && over < grid_.lines && !line(own).empty() && dead(own) && owns(swath, pass + j * grid_.passes)) {
           waiting.push_back(j);
         }
       }
@@ -177,7 +182,8 @@ class LayerCompiler {
   const EmitSweep& emit_;
   std::vector<bool> blocked_;
   std::uint32_t planes_, plane_ = 0;
-  std::uint32_t first_ = 0, stride_ = 0, swaths_ = 0, regular_ = 0, further_ = 0;
+  std::int64_t first_ = 0;  // line of the first swath
+  std::uint32_t stride_ = 0, swaths_ = 0, regular_ = 0, further_ = 0;
   std::size_t kept_ = 0;  // made lines that are needed to the end of the layer
   bool backward_ = false;
   ProgramCount count_;
@@ -185,13 +191,14 @@ class LayerCompiler {
 
 }  // namespace
 
-Result<ProgramCount> compile(const HeadGrid& grid, const RunsView& image, CompileScratch& scratch, const EmitSweep& emit) {
-  return compile(grid, {&image, 1}, scratch, emit);
+Result<ProgramCount> compile(const HeadGrid& grid, const RunsView& image, CompileScratch& scratch, const EmitSweep& emit,
+                             std::uint32_t layer) {
+  return compile(grid, {&image, 1}, scratch, emit, layer);
 }
 
 Result<ProgramCount> compile(const HeadGrid& grid, std::span<const RunsView> planes, CompileScratch& scratch,
-                             const EmitSweep& emit) {
-  return LayerCompiler(grid, planes, scratch, emit).run();
+                             const EmitSweep& emit, std::uint32_t layer) {
+  return LayerCompiler(grid, planes, scratch, emit, layer).run();
 }
 
 }  // namespace lamina::program

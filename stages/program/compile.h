@@ -47,17 +47,21 @@ using EmitSweep = std::function<Status(const Sweep&, const SweepVectors&)>;
 ///           neighbours sharing `overlap` lines. A line that two swaths share is divided between them by an ordered
 ///           pattern of 64 places that turns from line to line, whose share goes from all to none over the overlap.
 ///           Sweeps that would fire nothing are skipped; with both directions every other sweep that is left runs back.
+/// layer     its swaths begin layer x grid.joint_shift lines earlier, modulo a swath less what it shares: joints of
+/// neighbouring
+///           layers lie apart
 /// blocked   lines that no nozzle of any swath can fire, by rule: left out; moved pixel by pixel to the line of the next
 ///           nozzle before or else behind it, where that pixel is free; or fired by further sweeps of the same swath with
 ///           the head shifted by whole nozzles, the shortest shift first.
 /// errors    those of `emit`, which end the layer
 /// cost      of fire() for each sweep; memory is one sweep's vectors
-Result<ProgramCount> compile(const HeadGrid& grid, const RunsView& image, CompileScratch& scratch, const EmitSweep& emit);
+Result<ProgramCount> compile(const HeadGrid& grid, const RunsView& image, CompileScratch& scratch, const EmitSweep& emit,
+                             std::uint32_t layer = 0);
 
 /// The same for pixels of several drops, each of which is a sweep of its own: every sweep of the head is made once for each
 /// plane before the next one, so that the drops of a pixel follow each other closely.
 /// planes  at least one; each lies within the one before it
 Result<ProgramCount> compile(const HeadGrid& grid, std::span<const RunsView> planes, CompileScratch& scratch,
-                             const EmitSweep& emit);
+                             const EmitSweep& emit, std::uint32_t layer = 0);
 
 }  // namespace lamina::program

@@ -73,6 +73,7 @@ Status Builder::check_head() {
   grid_.nozzles = head.nozzles;
   grid_.passes = mount.passes;
   grid_.overlap = mount.overlap_lines;
+  grid_.joint_shift = mount.joint_shift_lines;
   grid_.first_swath = mount.first_swath;
   grid_.both_directions = machine_.motion.both_directions;
   if (head.nozzles == 0 || head.nozzles > 65'535) return wrong(machine_, "head.nozzles", "give 1 to 65535");
@@ -321,7 +322,8 @@ std::string explain(const Machine& machine, const HeadGrid& grid, const std::opt
                           "from the centre of their pixel",
                           grid.lag_pixels, grid.most_lag, grid.worst_place_nm / kNmPerUm, grid.worst_line_nm / kNmPerUm));
   line("swath", fmt::format("{} lines, {:.3f} mm wide{}", grid.swath_lines(), grid.swath_lines() * grid.line_nm / kNmPerMm,
-                            grid.overlap > 0 ? fmt::format(", {} of them shared with the next", grid.overlap) : ""));
+                            grid.overlap > 0 ? fmt::format(", {} of them shared with the next", grid.overlap) : "") +
+                    (grid.joint_shift > 0 ? fmt::format(", {} lines further back in each layer", grid.joint_shift) : ""));
   line("layer",
        fmt::format("{} x {} pixels, {} bytes as bits; {} swaths, {} sweeps of up to {} steps, {} bytes of vectors",
                    grid.image.columns(), grid.image.rows(), (std::uint64_t{grid.image.columns()} + 7) / 8 * grid.image.rows(),

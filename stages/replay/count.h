@@ -29,7 +29,7 @@ struct Count {
 /// Binder and powder used by a program.
 struct Material {
   double binder_mm3 = 0;  // drops, those off the bed too, x their volume
-  double powder_mm3 = 0;  // solid: height fed x area of the bed x packing
+  double powder_mm3 = 0;  // solid: height fed x area of the vats x packing
 };
 
 }  // namespace lamina::replay

@@ -54,10 +54,8 @@ std::string vats_text(std::uint32_t vats) {
 }
 
 Material material_of(const Machine& machine, const Count& count) {
-  const double side = machine.bed.size_mm[0] * machine.bed.size_mm[1];
-  const double area = machine.bed.shape == BedShape::kRound ? side * 3.14159265358979 / 4 : side;
   return {static_cast<double>(count.drops + count.spat) * machine.head.drop_pl * 1e-6,
-          (count.fed_mm[0] + count.fed_mm[1]) * area * machine.powder.packing};
+          (count.fed_mm[0] + count.fed_mm[1]) * fed_area_mm2(machine) * machine.powder.packing};
 }
 
 }  // namespace lamina::replay

@@ -164,6 +164,7 @@ class RandomMachine {
       machine.motion.lag_unit = random() % 2 ? LagUnit::kTick : LagUnit::kPixel;
     }
     if (random() % 3 == 0 && machine.mounting.tilt_deg == 90 && x) machine.head.row_offset_um = {0, 400.5, 137};
+    machine.mounting.joint_shift_lines = random() % 2 ? random() % 200 : 0;
   }
   testing::Random random;
   Machine machine;
@@ -178,16 +179,20 @@ TEST(Compile, EverySetPixelIsFiredOnceAndNoOtherWhateverTheMounting) {
     SlowHead head(setup.machine, grid);
     CompileScratch scratch;
     std::uint32_t emitted = 0;
-    const auto count = compile(grid, runs, scratch, [&](const Sweep& sweep, const SweepVectors& vectors) -> Status {
-      ++emitted;
-      EXPECT_EQ(sweep.of, grid.swaths(setup.machine.mounting.first_swath == FirstSwath::kBed
-                                          ? 0
-                                          : static_cast<std::uint32_t>(sweep.first_line - sweep.pass -
-                                                                       sweep.swath * (grid.swath_lines() - grid.overlap))) *
-                              grid.passes);
-      head.sweep(sweep, vectors);
-      return {};
-    });
+    const auto count = compile(
+        grid, runs, scratch,
+        [&](const Sweep& sweep, const SweepVectors& vectors) -> Status {
+          ++emitted;
+          const std::int64_t stride = grid.swath_lines() - grid.overlap,
+                             first = sweep.first_line - sweep.pass - sweep.swath * stride;
+          EXPECT_EQ(sweep.of, grid.swaths(first) * grid.passes);
+          if (setup.machine.mounting.first_swath == FirstSwath::kBed) {
+            EXPECT_EQ(-first, seed * setup.machine.mounting.joint_shift_lines % stride);
+          }
+          head.sweep(sweep, vectors);
+          return {};
+        },
+        seed);
     ASSERT_TRUE(count.ok());
     ASSERT_EQ(head.fired, image) << "seed " << seed;
     EXPECT_EQ(head.outside, 0u);
@@ -195,6 +200,42 @@ TEST(Compile, EverySetPixelIsFiredOnceAndNoOtherWhateverTheMounting) {
     EXPECT_EQ(count->drops, head.drops);
     EXPECT_EQ(count->sweeps - count->skipped, emitted);
     EXPECT_EQ(count->moved + count->lost, 0u);
+  }
+}
+
+// A full bed, swaths of 20 lines that share 8: of line k of them the upper swath fires (8 - k) / 9 of each 64 places, evenly
+// spread, the lower one the others.
+TEST(Compile, JointsFadeFromOneSwathToTheNext) {
+  Machine machine = small_machine(20, 90, 640, 32);
+  machine.mounting.overlap_lines = 8;
+  for (const std::uint32_t shift : {0u, 5u}) {
+    machine.mounting.joint_shift_lines = shift;
+    const HeadGrid grid = grid_of(machine);
+    const Runs runs = runs_of(Image(grid.image.rows(), std::vector<int>(grid.image.columns(), 1)));
+    CompileScratch scratch;
+    std::vector<std::vector<std::uint32_t>> places(grid.lines);  // of the upper swath, by line
+    const std::uint32_t layer = 1;
+    const auto count = compile(
+        grid, runs, scratch,
+        [&](const Sweep& sweep, const SweepVectors& vectors) -> Status {
+          for (std::uint32_t s = vectors.first_step; sweep.swath == 0 && s < vectors.first_step + vectors.steps; ++s) {
+            for (std::uint32_t i = 0; i < grid.nozzles; ++i) {
+              if ((vectors.step(s)[0] >> i & 1) != 0) places[static_cast<std::size_t>(sweep.first_line + i)].push_back(s);
+            }
+          }
+          return {};
+        },
+        layer);
+    ASSERT_TRUE(count.ok());
+    EXPECT_EQ(count->drops, set_pixels(runs));
+    for (std::uint32_t k = 0; k < 8; ++k) {
+      const auto& own = places[12 + k - shift];
+      const std::uint32_t share = (8 - k) * 64 / 9;
+      ASSERT_EQ(own.size(), grid.places / 64 * share) << k;
+      for (std::size_t i = 1; i < own.size(); ++i) EXPECT_LE(own[i] - own[i - 1], 2 * (64 / share) + 1) << k;
+    }
+    EXPECT_EQ(places[11 - shift].size(), grid.places);
+    EXPECT_TRUE(places[20 - shift].empty());
   }
 }
 
@@ -236,10 +277,13 @@ TEST(Compile, WithBlockedNozzlesTheDifferenceIsExactlyWhatIsReported) {
     const Runs runs = runs_of(image);
     SlowHead head(setup.machine, grid);
     CompileScratch scratch;
-    const auto count = compile(grid, runs, scratch, [&](const Sweep& sweep, const SweepVectors& vectors) -> Status {
-      head.sweep(sweep, vectors);
-      return {};
-    });
+    const auto count = compile(
+        grid, runs, scratch,
+        [&](const Sweep& sweep, const SweepVectors& vectors) -> Status {
+          head.sweep(sweep, vectors);
+          return {};
+        },
+        seed);
     ASSERT_TRUE(count.ok());
     std::uint64_t missing = 0, added = 0, twice = 0;
     for (std::size_t r = 0; r < image.size(); ++r) {

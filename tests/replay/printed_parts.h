@@ -35,11 +35,13 @@ inline Program program_of(const pipeline::ResolvedMachine& resolved, const RunsV
   write::ProgramBytes bytes;
   writer->begin_layer(cycle, bytes);
   program::CompileScratch scratch;
-  const auto count =
-      program::compile(resolved.grid, image, scratch, [&](const Sweep& sweep, const SweepVectors& vectors) -> Status {
+  const auto count = program::compile(
+      resolved.grid, image, scratch,
+      [&](const Sweep& sweep, const SweepVectors& vectors) -> Status {
         writer->sweep(sweep, vectors, bytes);
         return {};
-      });
+      },
+      kLayer.index);
   EXPECT_TRUE(count.ok());
   writer->end_layer(cycle, bytes);
   return {std::string(reinterpret_cast<const char*>(bytes.data()), bytes.size()), *count};

@@ -12,6 +12,7 @@
 #include "stages/data/machine.h"
 #include "stages/data/program.h"
 #include "stages/data/runs.h"
+#include "stages/read/profiles/printer.h"
 #include "stages/replay/feeding.h"
 #include "stages/replay/machine.h"
 #include "stages/write/program/dialect.h"
@@ -292,6 +293,30 @@ TEST(Care, ProfilesThatCannotBeKeptAreRefused) {
     ASSERT_FALSE(resolved.ok()) << machine << " " << key;
     EXPECT_NE(resolved.error().message.find(key), std::string::npos) << machine << ": " << resolved.error().message;
     EXPECT_EQ(resolved.error().fault, Fault::kUsage);
+  }
+}
+
+TEST(Care, EveryKeyIsReadAndKept) {
+  const std::string text =
+      "[machine]\nname = \"kept\"\n[powder]\nvat_depth_mm = [120, 80.5]\nrefill = \"pause\"\nbase_layers = 7\nbase_layer_mm = 0.15\n"
+      "dry_s = 2.5\ndry_on_lines = [\"M106 S255\", \"M42 P-4 S0.5\"]\ndry_off_lines = [\"M107\"]\nroller_rpm = 350\n"
+      "[care]\nspit_layers = 3\nspit_seconds = 12.5\nspit_drops = 33\nspit_mm = [-40, 5.5]\nwipe_layers = 9\nwipe_seconds = 60\n"
+      "wipe_mm = [-40, 20, -40, 60]\nwipe_speed_mm_s = 25\nwipe_lines = [\"M42 P4 S1\"]\ncap_mm = [-45, 5]\n";
+  const std::string_view dialects[] = {"nuferbj"};
+  const auto machine = read::read_machine(text, "kept.toml", dialects);
+  ASSERT_TRUE(machine.ok()) << machine.error().message;
+  const std::string kept = read::kept_machine_text(*machine);
+  const std::string tail = text.substr(text.find("vat_depth_mm"));
+  std::string lines = kept.substr(kept.find("vat_depth_mm")), wanted = tail;
+  std::erase(lines, '\n');
+  std::erase(wanted, '\n');
+  EXPECT_EQ(lines, wanted);
+  EXPECT_EQ(read::kept_machine_text(*read::read_machine(kept, "again.toml", dialects)), kept);
+  for (const char* line : {"G1 X3", "M42 p4", "M42  P4", "M", "42", "M42 P4;S1", "M42 Pnan"}) {
+    const auto wrong =
+        read::read_machine(fmt::format("[machine]\nname = \"a\"\n[care]\nwipe_lines = [\"{}\"]\n", line), "a.toml", dialects);
+    ASSERT_FALSE(wrong.ok()) << line;
+    EXPECT_NE(wrong.error().message.find("is no command such as M42 P4 S1"), std::string::npos) << wrong.error().message;
   }
 }
 

@@ -166,6 +166,7 @@ TEST(Replay, EveryDialectSpeaksForAnyMountingDirectionAndBlockedNozzle) {
     machine.mounting.passes = 1 + random() % 2;
     machine.mounting.first_swath = random() % 2 ? FirstSwath::kBed : FirstSwath::kLayer;
     machine.mounting.overlap_lines = random() % (machine.head.nozzles / 2 + 1);
+    machine.mounting.joint_shift_lines = random() % 3 * 5;
     machine.mounting.offset_mm = {12.5, -3.25};
     machine.motion.both_directions = random() % 2;
     machine.head.blocked = {random() % machine.head.nozzles};

@@ -141,6 +141,7 @@ constexpr Key<Machine> kKeys[] = {
     field<kMounting, &Mounting::first_leads>({"mounting", "first_leads"}),
     field<kMounting, &Mounting::passes>({"mounting", "passes"}, {1, 64}),
     field<kMounting, &Mounting::overlap_lines>({"mounting", "overlap_lines"}, {0, 65'535}),
+    field<kMounting, &Mounting::joint_shift_lines>({"mounting", "joint_shift_lines"}, {0, 65'535}).unsaid_at("0"),
     word<kFirst, kMounting, &Mounting::first_swath>({"mounting", "first_swath"}),
     field<kMounting, &Mounting::offset_mm>({"mounting", "offset_mm"}, kAny),
 
@@ -176,6 +177,7 @@ constexpr Key<Machine> kKeys[] = {
     field<kPowder, &Powder::least_saturation_percent>({"powder", "least_saturation_percent"}, {0, 1e4, " %"}).unsaid_at("0"),
 
     field<kPowder, &Powder::vat_depth_mm>({"powder", "vat_depth_mm"}, {0, kMostMm, " mm"}).unsaid_at("0,0"),
+    field<kPowder, &Powder::vat_area_mm2>({"powder", "vat_area_mm2"}, {0, 1e7, " mm2"}).unsaid_at("0"),
     word<kRefills, kPowder, &Powder::refill>({"powder", "refill"}).unsaid_at("refuse"),
     field<kPowder, &Powder::base_layers>({"powder", "base_layers"}, {0, 10'000}).unsaid_at("0"),
     field<kPowder, &Powder::base_layer_mm>({"powder", "base_layer_mm"}, {1e-3, 100, " mm"}).unsaid_at("0.1"),

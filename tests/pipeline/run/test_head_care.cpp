@@ -97,6 +97,14 @@ TEST_F(HeadCare, TimeBinderAndPowderByHand) {
   EXPECT_NEAR(done["use"]["powder_fed_l"].get<double>(), 1.25 * 4 * 3.14159265358979 * 49 * 49 * 1e-6, 1e-7);
 }
 
+// A vat of 1000 mm2 for a bed of 7543: the dose is 7.543 times as high for the same powder.
+TEST_F(HeadCare, PowderIsCountedByTheAreaOfTheVats) {
+  Job job = prism(1, profile("narrow", "vat_area_mm2 = 1000\n"), "narrow");
+  const auto fed = facts(job)["use"]["powder_fed_l"].get<double>();
+  EXPECT_NEAR(fed, 1.25 * 1000 * 1e-6, 1e-8);
+  EXPECT_NEAR(verified(job).material.powder_mm3, 1.25 * 1000 * 0.6, 1e-6);
+}
+
 // Each layer takes 0.125 mm of the vat: 3 mm of part 3.75. A vat of 1.5 mm lasts for 12 layers.
 TEST_F(HeadCare, AVatThatRunsEmptyRefusesTheJobBeforeItStartsOrIsFilledInPauses) {
   const Job refused = prism(3, profile("shallow", "vat_depth_mm = [1.5, 0]\n"), "refused");
