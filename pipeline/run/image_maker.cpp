@@ -165,7 +165,8 @@ class ImageMaker : public Maker {
 
   LayerImages images_of(const Work& work) const {
     const ImageWork& images = work.images;
-    return {images.runs, plan_.images->dose.most_drops() > 1 ? images.drops.planes : images.materials.image};
+    return {images.runs, plan_.images->dose.most_drops() > 1 ? images.drops.planes : images.materials.image,
+            images.drops.shares};
   }
 
   /// Counts what lies in the powder of another vat.
@@ -190,7 +191,8 @@ class ImageMaker : public Maker {
       materials_[m].second += record.images[m].set_pixels;
     const double pixel_mm2 = 25.4 * 25.4 / (grid.x.dpi() * grid.y.dpi());
     // Also where less than a drop a pixel falls.
-    const std::uint64_t filled = plan_.images->dose.saturates() ? record.dosed_pixels : record.set_pixels;
+    const bool dosed = plan_.images->dose.saturates() || plan_.job.levels > 0;
+    const std::uint64_t filled = dosed ? record.dosed_pixels : record.set_pixels;
     volume_mm3_ += static_cast<double>(filled) * pixel_mm2 * mm(record.layer.thickness);
   }
 
@@ -254,8 +256,10 @@ void ImageMaker::tell(Summary& summary) const {
   const auto end = [&](std::string_view name, std::string text) { summary.end.emplace_back(name, std::move(text)); };
   result("pixels", fmt::format("{} set, {:.3f} cm3 of binder-filled volume", readable_count(set_pixels_), volume_mm3_ / 1000));
   if (const std::uint32_t levels = plan_.job.levels; levels > 0) {
-    result("voxels", shares_.told(levels, plan_.job.dose.dithered));
-    (*summary.facts)["voxels"] = shares_.json(levels, plan_.job.dose.dithered);
+    const bool drops = plan_.images->dose.saturates();
+    const std::string_view as = !drops ? "grey" : plan_.job.dose.dithered ? "dithered drops" : "whole drops";
+    result("voxels", shares_.told(levels, as));
+    (*summary.facts)["voxels"] = shares_.json(levels, as);
   }
   if (solid_pixels_ > 0) {
     result("porosity",
