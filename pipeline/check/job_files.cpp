@@ -47,7 +47,7 @@ bool add_picture(const ManifestHead& head, Runs&& image, LayerPicture& picture) 
 Result<LayerPicture> picture_of_layer(const std::string& directory, const ManifestHead& head, const LayerRecord& record) {
   LayerPicture picture;
   for (const LayerImageFile& file : layer_images(head, record)) {
-    auto image = read::image((fs::path(directory) / file.name).string());
+    auto image = read::image((fs::path(directory) / file.name).string(), head.full_level());
     if (!image) return image.error();
     if (image->runs.columns != head.grid.columns() || image->runs.view().rows() != head.grid.rows()) {
       return Error{Fault::kVerification, fmt::format("{}: is not of the manifest's size", file.name)};

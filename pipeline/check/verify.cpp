@@ -90,7 +90,7 @@ std::string fault_of_program(const Inspection& inspection, const LayerRecord& re
 // Empty, or the fault of an image; its set pixels are added to `picture`.
 std::string fault_of_image(const Inspection& inspection, const LayerImageFile& file, LayerPicture& picture) {
   const std::string& name = file.name;
-  Result<read::Image> image = read::image((fs::path(inspection.directory) / name).string());
+  Result<read::Image> image = read::image((fs::path(inspection.directory) / name).string(), inspection.head.full_level());
   if (!image) return image.error().message;
   if (const std::string what = read::difference(*image, inspection.head.grid, file.record.set_pixels); !what.empty())
     return fmt::format("{}: {}", name, what);

@@ -1,6 +1,6 @@
 // Section [image].
 #include "pipeline/job/keys.h"
-#include "stages/write/image_format.h"
+#include "stages/write/levels/level_format.h"
 
 namespace lamina::pipeline {
 namespace {
@@ -12,11 +12,12 @@ constexpr Word<Mirror> kMirrors[] = {{"none", Mirror::kNone}, {"x", Mirror::kX},
 std::vector<std::string_view> image_formats() {
   std::vector<std::string_view> ids;
   for (const auto& format : write::image_formats()) ids.push_back(format.id);
+  for (const auto& format : write::level_formats()) ids.push_back(format.id);
   return ids;
 }
 
 std::string check_image_format(std::string_view text) {
-  return write::find_image_format(text) == nullptr ? not_one_of(text, image_formats()) : std::string();
+  return !write::extension_of(text) ? not_one_of(text, image_formats()) : std::string();
 }
 
 std::string check_title(std::string_view) { return {}; }

@@ -31,7 +31,7 @@ ManifestHead image_head(const Plan& plan) {
   const Job& job = plan.job;
   ManifestHead head = plan_head(plan);
   head.format = job.format;
-  if (const auto* format = write::find_image_format(job.format)) head.extension = format->extension;
+  head.extension = write::extension_of(job.format).value_or("");
   head.fill_rule = value_of("image", "fill", job);
   head.mirror = value_of("image", "mirror", job);
   head.grid = plan.images->grid;
@@ -60,7 +60,10 @@ write::LayerTags tags_of(const Plan& plan, const Layer& layer) {
 }
 
 ImageFiles::ImageFiles(const Plan& plan)
-    : plan_(plan), head_(image_head(plan)), format_(*write::find_image_format(plan.job.format)) {
+    : plan_(plan),
+      head_(image_head(plan)),
+      format_(write::find_image_format(plan.job.format)),
+      levels_(write::find_level_format(plan.job.format)) {
   if (plan.images->machine)
     program_.emplace(*plan.images->machine, plan.job.dry_run ? "" : plan.job.output, plan.layer_count,
                      layer_file_options(plan.job));
@@ -117,11 +120,16 @@ std::uint64_t ImageFiles::Work::bytes() const {
 }
 
 Status ImageFiles::encode(const LayerImages& images, Work& work, LayerRecord& record) const {
-  if (!work.encoder) (work.encoder = format_.make_encoder())->use(plan_.job.isa);
   write::LayerTags tags = tags_of(plan_, record.layer);
-  work.encoder->tag(tags);
+  if (levels_ == nullptr) {
+    if (!work.encoder) (work.encoder = format_->make_encoder())->use(plan_.job.isa);
+    work.encoder->tag(tags);
+  } else {
+    if (!work.level_encoder) work.level_encoder = levels_->make_encoder();
+    work.level_encoder->tag(tags);
+  }
   if (head_.named_images() == 0) {
-    if (Status status = encode_one(images.whole, work, record, work.file); !status) return status;
+    if (Status status = encode_one(images.whole, images.shares, work, record, work.file); !status) return status;
     record.bytes = work.file.size();
     record.hash = hash_bytes(work.file);
     return {};
@@ -130,7 +138,7 @@ Status ImageFiles::encode(const LayerImages& images, Work& work, LayerRecord& re
   for (std::size_t m = 0; m < images.several.size(); ++m) {
     if (!head_.materials.empty()) tags.material = head_.materials[m].name;
     work.encoder->tag(tags);
-    if (Status status = encode_one(images.several[m], work, record, work.files[m]); !status) return status;
+    if (Status status = encode_one(images.several[m], images.shares, work, record, work.files[m]); !status) return status;
     record.images[m].bytes = work.files[m].size();
     record.images[m].hash = hash_bytes(work.files[m]);
     record.bytes += work.files[m].size();
@@ -138,9 +146,12 @@ Status ImageFiles::encode(const LayerImages& images, Work& work, LayerRecord& re
   return {};
 }
 
-Status ImageFiles::encode_one(const Runs& image, Work& work, const LayerRecord& record, write::Bytes& file) const {
+Status ImageFiles::encode_one(const Runs& image, const Levels& shares, Work& work, const LayerRecord& record,
+                              write::Bytes& file) const {
   file.clear();
-  const Status status = work.encoder->encode(image, head_.grid.x.dpi(), head_.grid.y.dpi(), file);
+  const double x = head_.grid.x.dpi(), y = head_.grid.y.dpi();
+  const Status status = levels_ == nullptr ? work.encoder->encode(image, x, y, file)
+                                           : work.level_encoder->encode(shares, head_.full_level(), x, y, file);
   if (status) return {};
   return Error{status.error().fault, fmt::format("layer {}: {}", record.layer.index, status.error().message)};
 }
@@ -188,7 +199,8 @@ Status ImageFiles::program(const LayerImages& images, Work& work, LayerRecord& r
 
 std::uint64_t ImageFiles::bytes_bound(std::uint64_t changes) const {
   const std::uint64_t files = std::max<std::size_t>(1, head_.named_images());
-  return files * format_.most_bytes(head_.grid.columns(), head_.grid.rows(), changes) +
+  const auto most_bytes = levels_ == nullptr ? format_->most_bytes : levels_->most_bytes;
+  return files * most_bytes(head_.grid.columns(), head_.grid.rows(), changes) +
          (program_ ? program_->bytes_bound(changes, std::max(1u, head_.most_drops)) : 0);
 }
 

@@ -12,10 +12,11 @@
 #include "pipeline/output/plan_head.h"
 #include "pipeline/output/print_program.h"
 #include "pipeline/plan/plan.h"
+#include "stages/data/levels.h"
 #include "stages/data/runs.h"
 #include "stages/data/status.h"
-#include "stages/write/image_format.h"
 #include "stages/write/leftovers.h"
+#include "stages/write/levels/level_format.h"
 #include "stages/write/manifest/manifest.h"
 #include "stages/write/sync.h"
 
@@ -29,6 +30,7 @@ write::LayerTags tags_of(const Plan& plan, const Layer& layer);
 struct LayerImages {
   const Runs& whole;              // of all materials, or of the first drop
   std::span<const Runs> several;  // of each material, or of each drop of a pixel, if the job has several
+  const Levels& shares;           // of the voxels, for formats that carry them
 };
 
 class ImageFiles {
@@ -51,6 +53,7 @@ class ImageFiles {
   /// Scratch of a layer in flight; reused by later layers.
   struct Work {
     std::unique_ptr<write::ImageEncoder> encoder;
+    std::unique_ptr<write::LevelEncoder> level_encoder;
     write::Bytes file;
     std::vector<write::Bytes> files;  // one per material or drop, if the job has several
     ProgramWork program;
@@ -79,11 +82,12 @@ class ImageFiles {
   Status record_kept_below(std::uint32_t layer);
   Result<std::vector<std::uint32_t>> feeds_of(const LayerRecord& record) const;
   void tell_unfed(LayerRecord& record) const;
-  Status encode_one(const Runs& image, Work& work, const LayerRecord& record, write::Bytes& file) const;
+  Status encode_one(const Runs& image, const Levels& shares, Work& work, const LayerRecord& record, write::Bytes& file) const;
 
   const Plan& plan_;
   ManifestHead head_;
-  const write::ImageFormat& format_;
+  const write::ImageFormat* format_;  // null if levels_ is there
+  const write::LevelFormat* levels_;
   std::optional<PrintProgram> program_;
   std::optional<ManifestWriter> manifest_;
   std::optional<write::FolderSync> sync_;

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "stages/dose/saturate.h"
+#include "stages/write/levels/level_format.h"
 
 namespace lamina::pipeline {
 
@@ -35,7 +36,7 @@ void DosePlan::thin(std::uint32_t layer, Runs& image, Runs& second, Runs& third)
 Status DosePlan::decide(const Job& job, const Machine* machine, std::uint32_t layers,
                         const std::function<Layer(std::uint32_t)>& layer, std::vector<Warning>& warnings) {
   const bool asked = wishes_.has_value();
-  if (asked || job.levels > 0) rules_.most_drops = 1;
+  if (asked || (job.levels > 0 && write::find_level_format(job.format) == nullptr)) rules_.most_drops = 1;
   if (machine == nullptr || machine->head.drop_pl == 0) {
     if (!asked) return {};
     return Error{Fault::kUsage, fmt::format("--saturation: {}",

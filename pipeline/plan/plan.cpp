@@ -23,7 +23,7 @@
 #include "stages/heights/build_steps.h"
 #include "stages/raster/beams.h"
 #include "stages/write/extrusion_format.h"
-#include "stages/write/image_format.h"
+#include "stages/write/levels/level_format.h"
 #include "stages/write/slice_format.h"
 
 namespace lamina::pipeline {
@@ -349,7 +349,12 @@ Result<Resolved> resolve(const Job& job, Product product) {
     if (!printer) return printer.error();
     resolved.bed = printer->bed;
     resolved.printer = std::move(*printer);
-    if (write::find_image_format(job.format) == nullptr) return usage(fmt::format("unknown format '{}'", job.format));
+    if (!write::extension_of(job.format)) return usage(fmt::format("unknown format '{}'", job.format));
+    if (write::find_level_format(job.format) != nullptr && (job.levels == 0 || resolved.printer->machine)) {
+      return usage(fmt::format("--format {}: carries shares of voxels, {}", job.format,
+                               job.levels == 0 ? "and none are asked for; add --levels 2, 4 or 16"
+                                               : "and print programs fire drops; choose a 1-bit format"));
+    }
     return resolved;
   }
   if (job.shard) return usage(fmt::format("run.shard: {}", kNoShards));

@@ -169,7 +169,8 @@ class ImageMaker : public Maker {
 
   LayerImages images_of(const Work& work) const {
     const ImageWork& images = work.images;
-    return {images.runs, plan_.images->dose.most_drops() > 1 ? images.drops.planes : images.materials.image};
+    return {images.runs, plan_.images->dose.most_drops() > 1 ? images.drops.planes : images.materials.image,
+            images.drops.shares};
   }
 
   /// Counts what lies in the powder of another vat.
@@ -257,8 +258,10 @@ void ImageMaker::tell(Summary& summary) const {
   const auto end = [&](std::string_view name, std::string text) { summary.end.emplace_back(name, std::move(text)); };
   result("pixels", fmt::format("{} set, {:.3f} cm3 of binder-filled volume", readable_count(set_pixels_), volume_mm3_ / 1000));
   if (const std::uint32_t levels = plan_.job.levels; levels > 0) {
-    result("voxels", shares_.told(levels, plan_.job.dose.dithered));
-    (*summary.facts)["voxels"] = shares_.json(levels, plan_.job.dose.dithered);
+    const bool drops = plan_.images->dose.saturates();
+    const std::string_view as = !drops ? "grey" : plan_.job.dose.dithered ? "dithered drops" : "whole drops";
+    result("voxels", shares_.told(levels, as));
+    (*summary.facts)["voxels"] = shares_.json(levels, as);
   }
   if (solid_pixels_ > 0) {
     result("porosity",

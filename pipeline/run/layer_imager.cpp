@@ -189,6 +189,9 @@ void LayerImager::dose(const Layer& layer, ImageWork& work, LayerRecord& record)
     record.dosed_pixels = sums.full_voxels;
     record.asked_drops = sums.asked_drops;
     record.drops = sum_of_levels(work.drops.levels);
+  } else if (plan_.job.levels > 0) {
+    at_least(work.drops.shares, 1, work.runs);
+    record.dosed_pixels = dose::sums_of(work.drops.shares, images.dose.full(), dose::one_drop()).full_voxels;
   }
   if (images.materials.several() && (images.beads || images.dose.any())) work.materials.keep(work.runs);
   record.set_pixels = set_pixels(work.runs);

@@ -123,7 +123,7 @@ std::vector<std::uint8_t> Sanity::filled_or_rightly_empty() const {
     if (filled[i] == 0) planes.push_back(plane_of(plan_.job, plan_.layer(i), plan_.scene->height));
   }
   if (planes.empty()) return filled;
-  const bool thinned = plan_.images && (plan_.images->beads || plan_.job.dose.core < 1 || plan_.images->dose.saturates());
+  const bool thinned = plan_.images && thins(plan_.job);
   std::vector<std::uint8_t> crossed(planes.size(), 0);
   if (!thinned && plan_.images) {
     for (const Solid& solid : plan_.images->solids.all()) solid.rasterizer.mark_crossed(planes, crossed);

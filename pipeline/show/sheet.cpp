@@ -132,8 +132,8 @@ Result<Preview> draw_images(const Manifest& manifest, const PreviewRequest& requ
                               fmt::format("z {:.3f} mm", mm(record.layer.plane())), unfed});
     }
   }
-  const auto read_runs = [](const std::string& path) -> Result<Runs> {
-    auto image = read::image(path);
+  const auto read_runs = [&](const std::string& path) -> Result<Runs> {
+    auto image = read::image(path, manifest.head.full_level());
     if (!image) return image.error();
     return std::move(image->runs);
   };

@@ -18,17 +18,16 @@ double ShareCount::differing_share() const {
   return full_voxels_ > 0 ? static_cast<double>(differs_) / static_cast<double>(full_voxels_) : 0;
 }
 
-std::string ShareCount::told(std::uint32_t levels, bool dithered) const {
+std::string ShareCount::told(std::uint32_t levels, std::string_view as) const {
   return fmt::format(
-      "{} levels come to {} full voxels, {}; {} ({:.3f} %) half full or more are not as their centre, {} away "
+      "{} levels come to {} full voxels, as {}; {} ({:.3f} %) half full or more are not as their centre, {} away "
       "from any boundary",
-      levels, readable_count(full_voxels_), dithered ? "dithered" : "rounded to whole drops", readable_count(differs_),
-      100 * differing_share(), readable_count(far_));
+      levels, readable_count(full_voxels_), as, readable_count(differs_), 100 * differing_share(), readable_count(far_));
 }
 
-nlohmann::ordered_json ShareCount::json(std::uint32_t levels, bool dithered) const {
+nlohmann::ordered_json ShareCount::json(std::uint32_t levels, std::string_view as) const {
   return {{"levels", levels},
-          {"dithered", dithered},
+          {"as", as},
           {"full_voxels", full_voxels_},
           {"half_differs", differs_},
           {"half_differs_share", differing_share()},

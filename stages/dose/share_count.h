@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <nlohmann/json_fwd.hpp>
 #include <string>
+#include <string_view>
 
 namespace lamina::dose {
 
@@ -13,9 +14,9 @@ class ShareCount {
   /// differs, far  of take_half(): voxels half full or more against pixels whose centre is set
   void add(std::uint64_t full_voxels, std::uint64_t differs, std::uint64_t far);
 
-  /// The summary's line. levels  of a voxel
-  std::string told(std::uint32_t levels, bool dithered) const;
-  nlohmann::ordered_json json(std::uint32_t levels, bool dithered) const;
+  /// The summary's line. levels  of a voxel; as  what they are written as
+  std::string told(std::uint32_t levels, std::string_view as) const;
+  nlohmann::ordered_json json(std::uint32_t levels, std::string_view as) const;
 
  private:
   double differing_share() const;

@@ -15,24 +15,26 @@ namespace lamina::read {
 namespace {
 
 /// By the first bytes, whatever the name says.
-Result<Image> read_by_magic(int file, std::uint64_t bytes, const std::string& path, int threshold, std::uint64_t page) {
+Result<Image> read_by_magic(int file, std::uint64_t bytes, const std::string& path, int threshold, std::uint64_t page,
+                            LevelSink* sink) {
   unsigned char magic[8] = {};
   if (::pread(file, magic, sizeof magic, 0) < 0) {
     return Error{Fault::kVerification, fmt::format("{}: cannot read: {}", path, std::strerror(errno))};
   }
   const auto begins = [&](const char* text, std::size_t length) { return std::memcmp(magic, text, length) == 0; };
-  if (begins("II", 2) || begins("MM", 2)) return tiff(file, bytes, path, threshold, page);
-  if (begins("\x89PNG\r\n\x1a\n", 8)) return png(file, bytes, path, threshold);
+  if (begins("II", 2) || begins("MM", 2)) return tiff(file, bytes, path, threshold, page, sink);
+  if (begins("\x89PNG\r\n\x1a\n", 8)) return png(file, bytes, path, threshold, sink);
+  if (sink != nullptr) return Error{Fault::kVerification, path + ": neither TIFF nor PNG; plan the layer again"};
   if (begins("P4", 2) || (threshold > 0 && begins("P5", 2))) return pbm(file, bytes, path, threshold);
   if (begins("BM", 2)) return bmp(file, bytes, path, threshold);
   return Error{Fault::kVerification, fmt::format("{}: neither TIFF nor PNG nor PBM (P4) nor BMP; plan the layer again", path)};
 }
 
-Result<Image> read_image(const std::string& path, int threshold, std::uint64_t page = 0) {
+Result<Image> read_image(const std::string& path, int threshold, std::uint64_t page = 0, LevelSink* sink = nullptr) {
   const auto file = FileReader::open(path, {});
   if (!file) return file.error();
   try {
-    return read_by_magic(file->descriptor(), file->size(), path, threshold, page);
+    return read_by_magic(file->descriptor(), file->size(), path, threshold, page, sink);
   } catch (const std::bad_alloc&) {
     return Error{Fault::kVerification, fmt::format("{}: too many runs for the memory", path)};
   }
@@ -52,7 +54,36 @@ void bits_of_grey(std::span<std::byte> row, std::uint32_t columns, std::size_t s
   }
 }
 
-Result<Image> image(const std::string& path) { return read_image(path, 0); }
+Result<Image> image(const std::string& path, std::uint8_t full) {
+  if (full == 0) return read_image(path, 0);
+  Levels unused;
+  return levels(path, full, unused);
+}
+
+bool LevelSink::add_row(std::span<const std::byte> row, std::uint32_t columns, unsigned bits, bool bright_is_low) {
+  const unsigned darkest = (1u << bits) - 1;
+  for (std::uint32_t begin = 0; begin < columns;) {
+    const auto value_at = [&](std::uint32_t column) {
+      const auto byte = std::to_integer<unsigned>(row[bits == 8 ? column : column / 2]);
+      return bits == 8 ? byte : column % 2 == 0 ? byte >> 4 : byte & 15u;
+    };
+    const unsigned value = value_at(begin), dark = bright_is_low ? value : darkest - value;
+    std::uint32_t end = begin + 1;
+    while (end < columns && value_at(end) == value) ++end;
+    if (dark * full % darkest != 0 || levels.level.size() >= UINT32_MAX / 2) return false;
+    levels.append(begin, end, static_cast<std::uint8_t>(dark * full / darkest));
+    begin = end;
+  }
+  levels.end_row();
+  return true;
+}
+
+Result<Image> levels(const std::string& path, std::uint8_t full, Levels& levels) {
+  LevelSink sink{full, levels};
+  auto image = read_image(path, 0, 0, &sink);
+  if (image) at_least(levels, 1, image->runs);
+  return image;
+}
 
 Result<Image> dark_pixels(const std::string& path, int threshold, std::uint64_t page) {
   auto image = read_image(path, threshold, page);

@@ -11,6 +11,10 @@
 #include "stages/data/runs.h"
 #include "stages/data/status.h"
 
+namespace lamina {
+struct Levels;
+}
+
 namespace lamina::read {
 
 struct Image {
@@ -20,14 +24,20 @@ struct Image {
 
 /// Decodes a 1-bit image as the writers make them (TIFF of any 1-bit compression, PNG, PBM), row by row: memory is
 /// the runs plus one row or strip of bits, or of Group 4 the coded strip.
+/// full    of images that carry levels, that of a full voxel: their runs are as levels() gives them
 /// errors  kVerification with the file's name: truncated, not 1 bit, not readable
-Result<Image> image(const std::string& path);
+Result<Image> image(const std::string& path, std::uint8_t full = 0);
 
 /// The same of images of others: of 1 bit, or grey of 8 or 16 bits a pixel (TIFF, PNG, BMP, PBM, PGM). Set are the dark pixels:
 /// black ones, and grey ones below the threshold. threshold  1 .. 255 of 255; of 16 bits the upper eight count page       of
 /// pages_of(); 0: the file has one image errors     kInput with the file's name: truncated, coloured, several images, not
 /// readable
 Result<Image> dark_pixels(const std::string& path, int threshold, std::uint64_t page = 0);
+
+/// Decodes levels of voxels as the formats of stages/write/levels/level_format.h have them (TIFF of 4 or 8 bits, PNG of 8), row
+/// by row. full    level of a full voxel: 1, 3 or 15 image   its runs are the pixels of any level above 0 levels  the levels
+/// errors  kVerification with the file's name: of image(); a value that is none of the levels
+Result<Image> levels(const std::string& path, std::uint8_t full, Levels& levels);
 
 /// The places of the images of a file, in their order: of a TIFF of several, else one 0.
 /// errors  kInput: not readable, or more than 2^20 images

@@ -26,6 +26,7 @@ struct Source {
   std::size_t begin = 0, end = 0;  // unread part of buffer
   Buffer<std::byte> row;
   std::optional<RunsBuilder> builder;
+  LevelSink* sink = nullptr;
   double dpi_x = 0, dpi_y = 0;
 };
 
@@ -70,6 +71,7 @@ bool set_is_dark(png_structp png, png_infop info, int colour_type) {
 
 bool add_row(Source& source, std::size_t bytes, bool invert) {
   try {
+    if (source.sink != nullptr) return source.sink->add_row(source.row, source.sink->levels.columns, 8, false);
     return source.builder->add_row(std::span(source.row).first(bytes), invert);
   } catch (...) {
     return false;
@@ -80,6 +82,7 @@ bool prepare(Source& source, std::uint32_t columns, std::size_t stride) {
   try {
     source.row.resize(stride);
     source.builder.emplace(columns);
+    if (source.sink != nullptr) source.sink->levels.start(columns);
     return true;
   } catch (...) {
     return false;
@@ -100,7 +103,9 @@ bool read_rows(png_structp png, png_infop info, Source& source, int threshold) {
   const std::uint32_t columns = png_get_image_width(png, info), rows = png_get_image_height(png, info);
   const int colour_type = png_get_color_type(png, info);
   const int depth = png_get_bit_depth(png, info);
-  const bool grey = threshold > 0 && depth >= 8 && colour_type == PNG_COLOR_TYPE_GRAY;
+  const bool levels = source.sink != nullptr;
+  const bool grey = (levels ? depth == 8 : threshold > 0 && depth >= 8) && colour_type == PNG_COLOR_TYPE_GRAY;
+  if (levels && !grey) png_error(png, "not 8 bits of grey");
   if (depth != 1 && !grey) png_error(png, threshold > 0 ? "neither 1-bit nor grey of 8 or 16 bits" : "not a 1-bit image");
   if (png_get_interlace_type(png, info) != PNG_INTERLACE_NONE) png_error(png, "interlaced images are not supported");
   const std::size_t step = static_cast<std::size_t>(depth) / 8, stride = grey ? columns * step : row_bytes(columns);
@@ -117,8 +122,9 @@ bool read_rows(png_structp png, png_infop info, Source& source, int threshold) {
   if (!prepare(source, columns, stride)) png_error(png, "out of memory");
   for (std::uint32_t r = 0; r < rows; ++r) {
     png_read_row(png, reinterpret_cast<png_bytep>(source.row.data()), nullptr);
-    if (grey) bits_of_grey(source.row, columns, step, false, threshold);
-    if (!add_row(source, row_bytes(columns), invert)) png_error(png, "too many runs for the memory");
+    if (grey && !levels) bits_of_grey(source.row, columns, step, false, threshold);
+    if (!add_row(source, row_bytes(columns), invert))
+      png_error(png, levels ? "a value is no level" : "too many runs for the memory");
   }
   png_read_end(png, nullptr);
   return true;
@@ -126,10 +132,11 @@ bool read_rows(png_structp png, png_infop info, Source& source, int threshold) {
 
 }  // namespace
 
-Result<Image> png(int file, std::uint64_t bytes, const std::string& path, int threshold) {
+Result<Image> png(int file, std::uint64_t bytes, const std::string& path, int threshold, LevelSink* sink) {
   const auto source = std::make_unique<Source>();
   source->file = file;
   source->bytes = bytes;
+  source->sink = sink;
   png_structp reader = png_create_read_struct(PNG_LIBPNG_VER_STRING, source.get(), keep_error, ignore_warning);
   png_infop info = reader != nullptr ? png_create_info_struct(reader) : nullptr;
   bool whole = false;
@@ -139,9 +146,9 @@ Result<Image> png(int file, std::uint64_t bytes, const std::string& path, int th
   }
   png_destroy_read_struct(&reader, &info, nullptr);
   if (!whole) {
-    return Error{Fault::kVerification,
-                 fmt::format("{}: not a whole {}PNG: {}; plan the layer again", path, threshold > 0 ? "" : "1-bit ",
-                             source->message[0] != 0 ? source->message : "out of memory")};
+    return Error{Fault::kVerification, fmt::format("{}: not a whole {}PNG: {}; plan the layer again", path,
+                                                   threshold > 0 || sink != nullptr ? "" : "1-bit ",
+                                                   source->message[0] != 0 ? source->message : "out of memory")};
   }
   return Image{source->builder->finish(), source->dpi_x, source->dpi_y};
 }

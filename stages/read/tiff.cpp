@@ -70,13 +70,25 @@ bool read_g4(TIFF* tiff, int file, std::uint32_t columns, std::uint32_t rows, bo
   return true;
 }
 
+/// In dpi; 0 where the file does not say.
+void read_resolution(TIFF* tiff, Image& image) {
+  std::uint16_t unit = RESUNIT_INCH;
+  TIFFGetFieldDefaulted(tiff, TIFFTAG_RESOLUTIONUNIT, &unit);
+  float x = 0, y = 0;
+  if (TIFFGetField(tiff, TIFFTAG_XRESOLUTION, &x) == 0 || TIFFGetField(tiff, TIFFTAG_YRESOLUTION, &y) == 0) return;
+  if (unit == RESUNIT_NONE) return;
+  const double to_inch = unit == RESUNIT_CENTIMETER ? 2.54 : 1;
+  image.dpi_x = double{x} * to_inch;
+  image.dpi_y = double{y} * to_inch;
+}
+
 }  // namespace
 
-Result<Image> tiff(int file, std::uint64_t bytes, const std::string& path, int threshold, std::uint64_t page) {
+Result<Image> tiff(int file, std::uint64_t bytes, const std::string& path, int threshold, std::uint64_t page, LevelSink* sink) {
   std::string message;  // of libtiff, outlives the handle
   const auto failure = [&](std::string_view why) {
-    return Error{Fault::kVerification,
-                 fmt::format("{}: not a whole {}TIFF: {}; plan the layer again", path, threshold > 0 ? "" : "1-bit ", why)};
+    return Error{Fault::kVerification, fmt::format("{}: not a whole {}TIFF: {}; plan the layer again", path,
+                                                   threshold > 0 || sink != nullptr ? "" : "1-bit ", why)};
   };
   const auto options = strict_tiff_options(message);
   const int own_file = ::dup(file);
@@ -93,16 +105,16 @@ Result<Image> tiff(int file, std::uint64_t bytes, const std::string& path, int t
   if (page != 0 && TIFFSetSubDirectory(handle.get(), page) == 0) return failure(message.empty() ? "no such page" : message);
   if (!message.empty()) return failure(message);
   std::uint32_t columns = 0, rows = 0;
-  std::uint16_t bits = 1, samples = 1, photometric = 0, compression = COMPRESSION_NONE, unit = RESUNIT_INCH;
+  std::uint16_t bits = 1, samples = 1, photometric = 0, compression = COMPRESSION_NONE;
   TIFFGetField(handle.get(), TIFFTAG_IMAGEWIDTH, &columns);
   TIFFGetField(handle.get(), TIFFTAG_IMAGELENGTH, &rows);
   TIFFGetFieldDefaulted(handle.get(), TIFFTAG_BITSPERSAMPLE, &bits);
   TIFFGetFieldDefaulted(handle.get(), TIFFTAG_SAMPLESPERPIXEL, &samples);
   TIFFGetFieldDefaulted(handle.get(), TIFFTAG_COMPRESSION, &compression);
-  TIFFGetFieldDefaulted(handle.get(), TIFFTAG_RESOLUTIONUNIT, &unit);
   const bool grey = threshold > 0 && (bits == 8 || bits == 16);
   if (TIFFGetField(handle.get(), TIFFTAG_PHOTOMETRIC, &photometric) == 0 || photometric > PHOTOMETRIC_MINISBLACK ||
-      (bits != 1 && !grey) || samples != 1) {
+      (sink != nullptr ? bits != 4 && bits != 8 : bits != 1 && !grey) || samples != 1) {
+    if (sink != nullptr) return failure("neither 4 nor 8 bits of grey");
     return failure(threshold > 0 ? "neither 1-bit nor grey of 8 or 16 bits" : "not a 1-bit image");
   }
   std::uint16_t kind = SAMPLEFORMAT_UINT;
@@ -120,20 +132,15 @@ Result<Image> tiff(int file, std::uint64_t bytes, const std::string& path, int t
   if (columns == 0 || rows == 0 || columns > kMostPixelsASide || rows > kMostPixelsASide) {
     return failure(fmt::format("{} x {} pixels", columns, rows));
   }
-  const std::size_t step = bits / 8u, stride = grey ? columns * step : row_bytes(columns);
+  const std::size_t step = bits / 8u, stride = (std::size_t{columns} * bits + 7) / 8;
   const std::string wrong = check_strips(handle.get(), bytes, compression, rows, stride);
   if (!wrong.empty()) return failure(wrong);
   if (TIFFScanlineSize(handle.get()) != static_cast<tmsize_t>(stride)) return failure("rows of an unexpected length");
 
+  if (sink != nullptr) sink->levels.start(columns);
   Image image;
-  float resolution_x = 0, resolution_y = 0;
-  if (TIFFGetField(handle.get(), TIFFTAG_XRESOLUTION, &resolution_x) != 0 &&
-      TIFFGetField(handle.get(), TIFFTAG_YRESOLUTION, &resolution_y) != 0 && unit != RESUNIT_NONE) {
-    const double to_inch = unit == RESUNIT_CENTIMETER ? 2.54 : 1;
-    image.dpi_x = double{resolution_x} * to_inch;
-    image.dpi_y = double{resolution_y} * to_inch;
-  }
-  if (compression == COMPRESSION_CCITTFAX4 && !grey &&
+  read_resolution(handle.get(), image);
+  if (sink == nullptr && compression == COMPRESSION_CCITTFAX4 && !grey &&
       read_g4(handle.get(), file, columns, rows, photometric == PHOTOMETRIC_MINISBLACK, image.runs)) {
     return image;
   }
@@ -145,6 +152,10 @@ Result<Image> tiff(int file, std::uint64_t bytes, const std::string& path, int t
     }
     // Values of two bytes are in the order of this program's hosts, little-endian. Those of min-is-white: bright is small.
     const bool bright_is_low = photometric == PHOTOMETRIC_MINISWHITE;
+    if (sink != nullptr) {
+      if (!sink->add_row(row, columns, bits, bright_is_low)) return failure(fmt::format("row {}: a value is no level", r));
+      continue;
+    }
     if (grey) bits_of_grey(row, columns, step, step == 2, bright_is_low ? 256 - threshold : threshold);
     if (!builder.add_row(std::span(row).first(row_bytes(columns)), grey ? bright_is_low : !bright_is_low))
       return failure("too many runs");

@@ -146,8 +146,8 @@ TEST(Shares, AreToldInOneLine) {
   ShareCount count;
   count.add(150, 2, 0);
   count.add(50, 1, 1);
-  EXPECT_EQ(count.told(16, true),
-            "16 levels come to 200 full voxels, dithered; 3 (1.500 %) half full or more are not as their centre, 1 away from "
+  EXPECT_EQ(count.told(16, "grey"),
+            "16 levels come to 200 full voxels, as grey; 3 (1.500 %) half full or more are not as their centre, 1 away from "
             "any boundary");
 }
 

@@ -4,7 +4,10 @@
 #include <gtest/gtest.h>
 
 #include <fstream>
+#include <random>
 
+#include "stages/data/levels.h"
+#include "stages/write/levels/level_format.h"
 #include "tests/write/images.h"
 
 namespace lamina::write {
@@ -59,6 +62,38 @@ TEST(OpenImageIO, SeesBlackExactlyWhereRunsAreInEveryFormat) {
         EXPECT_EQ(metre[1], 23622);
         continue;
       }
+      EXPECT_NEAR(dpi[0], 1200, 0.02);
+      EXPECT_NEAR(dpi[1], 600, 0.02);
+    }
+  }
+}
+
+// Level l of 15 is l seventeenths of 255 away from white, whatever the file's own idea of it.
+TEST(OpenImageIO, SeesLevelsAsGreyInEveryFormatThatCarriesThem) {
+  const testing::Folder folder;
+  for (const std::uint32_t columns : {1u, 8u, 63u, 1001u}) {
+    std::mt19937 random(columns);
+    Levels levels;
+    std::vector<std::uint8_t> expected(std::size_t{columns} * 30, 255);
+    levels.start(columns);
+    for (std::uint32_t r = 0; r < 30; ++r) {
+      for (std::uint32_t c = 0; c < columns; ++c) {
+        const auto level = static_cast<std::uint8_t>(random() % 16);
+        levels.append(c, c + 1, level);
+        expected[std::size_t{columns} * r + c] = static_cast<std::uint8_t>(255 - 17 * level);
+      }
+      levels.end_row();
+    }
+    Runs size;
+    at_least(levels, 1, size);
+    for (const LevelFormat& format : level_formats()) {
+      SCOPED_TRACE(std::string(format.id) + ", " + std::to_string(columns) + " columns");
+      const std::string path = folder / ("grey" + std::string(format.extension));
+      Bytes file;
+      ASSERT_TRUE(format.make_encoder()->encode(levels, 15, 1200, 600, file).ok());
+      testing::save(path, file);
+      double dpi[2] = {};
+      ASSERT_EQ(pixels_by_openimageio(path, size, dpi), expected);
       EXPECT_NEAR(dpi[0], 1200, 0.02);
       EXPECT_NEAR(dpi[1], 600, 0.02);
     }

@@ -16,7 +16,7 @@
 #include "pipeline/machine/profiles.h"
 #include "pipeline/run/run_resolved.h"
 #include "stages/data/text/json.h"
-#include "stages/write/image_format.h"
+#include "stages/write/levels/level_format.h"
 
 namespace lamina::pipeline {
 namespace {
@@ -147,6 +147,7 @@ const OptionSpec kJetSwitches[] = {
 std::string jet_closing() {
   std::string text = "Formats:\n";
   for (const auto& format : write::image_formats()) text += fmt::format("  {:<16}{}\n", format.id, format.description);
+  for (const auto& format : write::level_formats()) text += fmt::format("  {:<16}{}\n", format.id, format.description);
   return text +
          "\nLengths are mm, angles degrees. Part options hold for every part; a job file sets them for each.\n\n"
          "Examples:\n"

@@ -55,7 +55,10 @@ struct ManifestHead {
   std::vector<JobMaterial> materials;      // if there are several
   std::uint32_t most_drops = 0;            // of a pixel; 0: no saturation was asked for, and set pixels get one
 
-  std::uint32_t levels = 0;  // of shares of voxels that became drops; 0: pixels are set or not
+  std::uint32_t levels = 0;  // of shares of voxels; 0: pixels are set or not
+
+  /// Level of a full voxel in images that carry levels, which have no drops; 0: images of one bit.
+  std::uint8_t full_level() const { return static_cast<std::uint8_t>(levels > 0 && most_drops == 0 ? levels - 1 : 0); }
 
   /// Images of a layer that have names and records of their own: of materials, or of the drops of a pixel if there can be
   /// several. 0: the one image that the layer's own record is of.

@@ -76,8 +76,8 @@ void describe_paths(Io& io, Product product, Paths& paths) {
 template <class Io, class Record>
 void describe_images(Io& io, const ManifestHead& head, Record& record) {
   io.number("capped_rows", record.capped_rows);
+  if (head.most_drops > 0 || head.levels > 0) io.number("dosed_pixels", record.dosed_pixels);
   if (head.most_drops > 0) {
-    io.number("dosed_pixels", record.dosed_pixels);
     io.number("drops", record.drops);
     io.number("asked_drops", record.asked_drops);
   }

@@ -7,7 +7,7 @@
 #include <stdexcept>
 
 #include "stages/data/text/readable.h"
-#include "stages/write/image_format.h"
+#include "stages/write/levels/level_format.h"
 #include "stages/write/program/dialect.h"
 #include "stages/write/slice_format.h"
 
@@ -31,9 +31,9 @@ std::string no_such(std::string_view what, std::string_view value) {
 }
 
 std::string fault_of_images(const ManifestHead& head) {
-  const auto* format = write::find_image_format(head.format);
-  if (format == nullptr) return no_such("format", head.format);
-  if (head.extension != format->extension) return no_such("extension", head.extension);
+  const auto extension = write::extension_of(head.format);
+  if (!extension) return no_such("format", head.format);
+  if (head.extension != *extension) return no_such("extension", head.extension);
   if (!head.file.empty()) return no_such("file", head.file);
   std::set<std::string_view> names;
   for (const JobMaterial& material : head.materials) {
@@ -42,8 +42,14 @@ std::string fault_of_images(const ManifestHead& head) {
   if (head.most_drops > kMostDrops || (head.most_drops > 1 && !head.materials.empty())) {
     return no_such("most_drops", fmt::format("{}", head.most_drops));
   }
-  if (head.levels == 1 || head.levels > 256 || (head.levels > 0 && (head.most_drops == 0 || !head.materials.empty()))) {
+  const bool grey = write::find_level_format(head.format) != nullptr;
+  const bool right = head.levels == 2 || head.levels == 4 || head.levels == 16;
+  if (grey ? !right || head.most_drops > 0 : head.levels > 0 && (!right || head.most_drops == 0)) {
     return no_such("levels", fmt::format("{}", head.levels));
+  }
+  if (head.levels > 0 && !head.materials.empty()) return no_such("materials", head.materials.front().name);
+  if (grey && !head.machine.empty()) {
+    return no_such("machine", head.machine);
   }
   if (head.machine.empty()) return {};
   for (const JobMaterial& material : head.materials) {

@@ -1,11 +1,14 @@
 // Shares of voxels through the plan of a job, and as drops to its files.
 #include <gtest/gtest.h>
 
+#include <filesystem>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 
 #include "pipeline/run/image_maker.h"
+#include "stages/data/levels.h"
+#include "stages/read/image.h"
 #include "stages/write/manifest/manifest.h"
 #include "tests/commands/program.h"
 
@@ -129,6 +132,41 @@ TEST_F(LevelJobs, GiveTheSameBytesHoweverTheyAreMade) {
   test::write_text(folder_ / "one/manifest.json.part", begun + "\n");
   done(job + "one --resume");
   EXPECT_TRUE(tree("one") == tree("shards"));
+}
+
+// The box mirrored: its columns 10 to 29 of 50 are 20 to 39; half of a voxel is level 8.
+TEST_F(LevelJobs, WriteLevelsAsGreyInFormatsThatCarryThem) {
+  for (const char* format : {"tiff-4", "tiff-8", "png-8"}) {
+    const std::string job = std::string(kTenthsOfBox) + "--levels 16 --mirror x --format " + format + " -o ";
+    done(job + format);
+    done(std::string("verify --quiet ") + format);
+    const auto records = records_of(format);
+    ASSERT_EQ(records.size(), 3u);
+    EXPECT_EQ(records[2].set_pixels, 600u);
+    EXPECT_EQ(records[2].dosed_pixels, 320u);
+    Levels levels;
+    const std::string top =
+        folder_ / (std::string(format) + "/layers/000002" + (format == std::string("png-8") ? ".png" : ".tif"));
+    const auto image = read::levels(top, 15, levels);
+    ASSERT_TRUE(image.ok()) << image.error().message;
+    ASSERT_EQ(levels.level.size(), 30u);
+    EXPECT_EQ(levels.change[0], 20u);
+    EXPECT_EQ(levels.change[1], 40u);
+    EXPECT_EQ(levels.level[0], 8);
+    for (const char* shard : {"1/2", "2/2"}) done(job + "shards --threads 1 --shard " + shard);
+    done("merge shards -o shards --quiet");
+    EXPECT_TRUE(tree("shards") == tree(format));
+    std::filesystem::remove_all(folder_.path() / "shards");
+    test::write_text(top, "another");
+    EXPECT_EQ(lamina(std::string("verify --quiet ") + format).code, 5);
+    done(job + format + " --resume");
+    done(std::string("verify --quiet ") + format);
+    test::expect_refused(kTenthsOfBox + std::string("-o none --format ") + format, 2, "add --levels 2, 4 or 16", folder_);
+    test::expect_refused("jet box.stl --machine nuferbj --levels 4 -o none --format " + std::string(format), 2,
+                         "print programs fire drops", folder_);
+  }
+  done("jet tiff-8 --dpi 254 --bed 5x5 --quiet -o half");
+  EXPECT_EQ(records_of("half")[2].set_pixels, 600u);
 }
 
 TEST_F(LevelJobs, OfWhatHasNoSharesAreRefused) {
