@@ -13,6 +13,8 @@
 namespace lamina::read {
 namespace {
 
+constexpr std::uint32_t kLargestAllocation = 64 << 20;  // bytes; no strip that anybody writes is larger
+
 /// Rows of `stride` bytes that `bytes` of this compression can hold at most; a header that promises more lies.
 std::uint64_t most_rows(std::uint16_t compression, std::uint64_t bytes, std::uint64_t stride) {
   switch (compression) {
@@ -57,7 +59,9 @@ bool read_g4(TIFF* tiff, int file, std::uint32_t columns, std::uint32_t rows, bo
   G4Decoder decoder;
   Buffer<std::byte> coded;
   for (std::uint32_t row = 0, strip = 0; row < rows; row += rows_per_strip, ++strip) {
-    coded.resize(TIFFGetStrileByteCount(tiff, strip));
+    const std::uint64_t size = TIFFGetStrileByteCount(tiff, strip);
+    if (size > kLargestAllocation) return false;
+    coded.resize(size);
     const auto place = static_cast<off_t>(TIFFGetStrileOffset(tiff, strip));
     if (::pread(file, coded.data(), coded.size(), place) != static_cast<ssize_t>(coded.size())) return false;
     const G4Strip of_rows{columns, std::min(rows_per_strip, rows - row), fill_order == FILLORDER_LSB2MSB, white_is_set};
@@ -80,7 +84,7 @@ Result<Image> tiff(int file, std::uint64_t bytes, const std::string& path, int t
     if (own_file >= 0) ::close(own_file);
     return failure(message.empty() ? "out of memory or files" : message);
   }
-  TIFFOpenOptionsSetMaxSingleMemAlloc(options.get(), 64 << 20);
+  TIFFOpenOptionsSetMaxSingleMemAlloc(options.get(), kLargestAllocation);
   const TiffHandle handle(TIFFFdOpenExt(own_file, path.c_str(), "rC", options.get()));
   if (handle == nullptr) {
     ::close(own_file);
