@@ -13,6 +13,8 @@
 namespace lamina::read {
 namespace {
 
+constexpr std::uint32_t kLargestAllocation = 64 << 20;  // bytes; no strip that anybody writes is larger
+
 /// Rows of `stride` bytes that `bytes` of this compression can hold at most; a header that promises more lies.
 std::uint64_t most_rows(std::uint16_t compression, std::uint64_t bytes, std::uint64_t stride) {
   switch (compression) {
@@ -47,7 +49,6 @@ std::string check_strips(TIFF* tiff, std::uint64_t file_bytes, std::uint16_t com
 
 /// Not mapped: a file that becomes shorter while it is read is an error then, and no signal.
 constexpr const char* kMode = "rCm";
-constexpr std::int64_t kMostTiffAlloc = 64 << 20;
 
 /// The image of a file in Group 4, without bits. false: libtiff has to say what is wrong with it, or to read it.
 bool read_g4(TIFF* tiff, int file, std::uint32_t columns, std::uint32_t rows, bool white_is_set, Runs& runs) {
@@ -61,7 +62,9 @@ bool read_g4(TIFF* tiff, int file, std::uint32_t columns, std::uint32_t rows, bo
   G4Decoder decoder;
   Buffer<std::byte> coded;
   for (std::uint32_t row = 0, strip = 0; row < rows; row += rows_per_strip, ++strip) {
-    coded.resize(TIFFGetStrileByteCount(tiff, strip));
+    const std::uint64_t size = TIFFGetStrileByteCount(tiff, strip);
+    if (size > kLargestAllocation) return false;
+    coded.resize(size);
     const auto place = static_cast<off_t>(TIFFGetStrileOffset(tiff, strip));
     if (::pread(file, coded.data(), coded.size(), place) != static_cast<ssize_t>(coded.size())) return false;
     const G4Strip of_rows{columns, std::min(rows_per_strip, rows - row), fill_order == FILLORDER_LSB2MSB, white_is_set};
@@ -96,7 +99,7 @@ Result<Image> tiff(int file, std::uint64_t bytes, const std::string& path, int t
     if (own_file >= 0) ::close(own_file);
     return failure(message.empty() ? "out of memory or files" : message);
   }
-  TIFFOpenOptionsSetMaxSingleMemAlloc(options.get(), kMostTiffAlloc);
+  TIFFOpenOptionsSetMaxSingleMemAlloc(options.get(), kLargestAllocation);
   const TiffHandle handle(TIFFFdOpenExt(own_file, path.c_str(), kMode, options.get()));
   if (handle == nullptr) {
     ::close(own_file);
@@ -169,7 +172,7 @@ Result<std::vector<std::uint64_t>> tiff_pages(int file, const std::string& path)
   std::string message;
   const auto options = strict_tiff_options(message);
   const int own_file = ::dup(file);
-  if (options != nullptr) TIFFOpenOptionsSetMaxSingleMemAlloc(options.get(), kMostTiffAlloc);
+  if (options != nullptr) TIFFOpenOptionsSetMaxSingleMemAlloc(options.get(), kLargestAllocation);
   const TiffHandle handle(options != nullptr && own_file >= 0 ? TIFFFdOpenExt(own_file, path.c_str(), kMode, options.get())
                                                               : nullptr);
   if (handle == nullptr) {
