@@ -126,6 +126,31 @@ TEST(Care, NoSweepEndsLaterThanTheLimitOfSeconds) {
   }
 }
 
+// Two clocks at a time, one's errand taking time of the other's, and a head that has to gain its speed.
+TEST(Care, BothClocksAreKeptWhateverTheirLimits) {
+  program::testing::Random random(18);
+  std::uint32_t spits = 0, wipes = 0;
+  for (int round = 0; round < 60; ++round) {
+    const CareBench bench("nuferbj", [&](Machine& m) {
+      m.bed.size_mm = {30, 90};
+      m.motion.scan_speed_mm_s = 8.34;
+      m.motion.travel_speed_mm_s = 60 + random() % 50;
+      m.motion.acceleration_mm_s2 = round % 2 == 0 ? 0 : 20 + random() % 500;
+      m.motion.both_directions = random() % 2 == 0;
+      m.care.spit_layers = m.care.wipe_layers = 0;
+      m.care.spit_drops = 4000;
+      m.care.spit_seconds = 30 + random() % 30;
+      m.care.wipe_seconds = 34 + random() % 60;
+    });
+    const auto count = bench.count(bench.program.text);
+    ASSERT_TRUE(count.ok()) << round << ": " << count.error().message;
+    spits += count->spits;
+    wipes += count->wipes;
+  }
+  EXPECT_GT(spits, 120u);
+  EXPECT_GT(wipes, 60u);
+}
+
 TEST(Care, ShotsElsewhereOrOnTheBedAreFound) {
   const CareBench bench("nuferbj");
   EXPECT_NE(bench.fault(bench.with("M816", "G0 X65.0000 Y12.0000 F1000\nM816 N40\n")).find("not at -45, -10"),

@@ -22,6 +22,7 @@ constexpr std::string_view kOfPrograms[] = {"M0",   "M1",   "M2",   "M3",   "M4"
                                             "M400", "M578", "M810", "M811", "M812", "M813", "M814", "M815", "M816"};
 
 double move_seconds(const Machine& machine, double way_mm, double speed_mm_s) {
+  if (speed_mm_s * 60 >= 1) speed_mm_s = std::round(speed_mm_s * 60) / 60;  // as it is spelt
   const double a = machine.motion.acceleration_mm_s2;
   if (a == 0) return way_mm / speed_mm_s;
   return way_mm < speed_mm_s * speed_mm_s / a ? 2 * std::sqrt(way_mm / a) : way_mm / speed_mm_s + speed_mm_s / a;
@@ -67,9 +68,13 @@ class Checker {
   Status check() {
     if (Status status = check_words(); !status) return status;
     if (Status status = check_places(); !status) return status;
-    if (Status status = check_clock("care.spit_seconds", care_.spit_seconds, care_.spit_mm); !status) return status;
+    if (Status status = check_clock("care.spit_seconds", care_.spit_seconds, care_.spit_mm, 0); !status) return status;
     if (!care_.wipes()) return {};
-    return check_clock("care.wipe_seconds", care_.wipe_seconds, Place{(*care_.wipe_mm)[2], (*care_.wipe_mm)[3]});
+    const Place wiped{(*care_.wipe_mm)[2], (*care_.wipe_mm)[3]};
+    if (!care_.spits()) return check_clock("care.wipe_seconds", care_.wipe_seconds, wiped, 0);
+    const double shot =
+        move_seconds(machine_, way(wiped, *care_.spit_mm), machine_.motion.travel_speed_mm_s) + spit_seconds(machine_);
+    return check_clock("care.wipe_seconds", care_.wipe_seconds, care_.spit_mm, shot);
   }
 
  private:
@@ -137,8 +142,8 @@ class Checker {
     return check("care.wipe_mm", box);
   }
 
-  /// Whether the longest sweep ends in time.
-  Status check_clock(std::string_view key, double limit_s, const std::optional<Place>& from) const {
+  /// Whether the longest sweep ends in time. from  where the head goes to it after so many seconds
+  Status check_clock(std::string_view key, double limit_s, const std::optional<Place>& from, double after_s) const {
     if (limit_s == 0) return {};
     const auto& motion = machine_.motion;
     const auto& [width, depth] = machine_.bed.size_mm;
@@ -150,13 +155,11 @@ class Checker {
         farthest = std::max(farthest, way(*from, {x + machine_.mounting.offset_mm[0], y + machine_.mounting.offset_mm[1]}));
       }
     }
-    double needed =
-        move_seconds(machine_, farthest, motion.travel_speed_mm_s) +
+    const double needed =
+        after_s + move_seconds(machine_, farthest, motion.travel_speed_mm_s) +
         move_seconds(machine_,
                      static_cast<double>(grid_.steps()) * grid_.step_nm() / kNmPerMm + 2 * (motion.ramp_mm + kRunUpMm),
                      motion.scan_speed_mm_s);
-    if (key == "care.wipe_seconds" && care_.spits())
-      needed += move_seconds(machine_, way(*from, *care_.spit_mm), motion.travel_speed_mm_s) + spit_seconds(machine_);
     if (needed < kOfLimit * limit_s) return {};
     return wrong(key, fmt::format("{:g} s, and a sweep ends up to {:.2f} s later; give more, or move faster", limit_s, needed));
   }
@@ -216,9 +219,14 @@ void Care::begin_layer(const LayerCycle& cycle, ProgramBytes& out) {
 
 void Care::before_sweep(Place from, Place to, ProgramBytes& out) {
   const auto& care = machine_.care;
-  const double now = sweep_seconds(from, to);
-  const bool wipe = care.wipe_seconds > 0 && since_wipe_ + now > kOfLimit * care.wipe_seconds;
+  double now = sweep_seconds(from, to);
   const bool spit = care.spit_seconds > 0 && since_spit_ + now > kOfLimit * care.spit_seconds;
+  if (spit) {  // the wiper waits for the shot as well
+    const double travel = machine_.motion.travel_speed_mm_s;
+    now = seconds(at_, *care.spit_mm, travel) + spit_seconds(machine_) + seconds(*care.spit_mm, from, travel) +
+          seconds(from, to, machine_.motion.scan_speed_mm_s);
+  }
+  const bool wipe = care.wipe_seconds > 0 && since_wipe_ + now > kOfLimit * care.wipe_seconds;
   serve(wipe, spit, out);
   const double taken = sweep_seconds(from, to);
   since_wipe_ += taken;
