@@ -67,6 +67,7 @@ Photo photo_of(cv::Mat grey) {
   std::size_t bin = counts.size() - 1;
   for (; bin > 0 && left >= counts[bin]; --bin) left -= counts[bin];
   photo.ink = static_cast<double>(bin) / 1024;
+  photo.light = std::move(light);
   photo.grey = std::move(grey);
   return photo;
 }

@@ -13,6 +13,7 @@ namespace lamina::scan {
 /// Darkness of each pixel, 0 as bright as its surroundings, 1 black: 1 - light / light of the blank sheet there.
 struct Photo {
   cv::Mat darkness;  // CV_32F
+  cv::Mat light;     // CV_32F, 0 .. 1
   cv::Mat grey;      // CV_8U, as it was
   double ink = 0;    // darkness of full ink: what three pixels in a thousand exceed
 };
@@ -20,7 +21,7 @@ struct Photo {
 /// Reads PNG, JPEG, TIFF and whatever else OpenImageIO reads; values count as sRGB, colours by their luminance.
 /// least   pixels of the shorter side
 /// errors  kInput: no such image, smaller, or more than 2^27 pixels
-/// cost    reads the image; 9 bytes a pixel
+/// cost    reads the image; 13 bytes a pixel
 Result<Photo> read_photo(const std::string& path, int least);
 
 /// The same of grey values in memory.

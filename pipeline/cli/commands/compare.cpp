@@ -1,0 +1,72 @@
+// lamina compare: a photograph of a printed layer beside the layer.
+#include <fmt/format.h>
+
+#include "pipeline/cli/command.h"
+#include "pipeline/cli/scan_program.h"
+#include "pipeline/machine/profiles.h"
+#include "stages/data/text/json.h"
+#include "stages/data/units.h"
+#include "stages/read/image.h"
+
+namespace lamina::pipeline {
+namespace {
+
+CommandSpec compare_spec() {
+  CommandSpec spec;
+  spec.summary =
+      "Finds a layer in a photograph of it, and tells stripes along the scan that were not printed and the area of each\n"
+      "connected part, expected and seen. Exit code 5 if a stripe is missing.";
+  spec.operand = "LAYER PHOTO";
+  spec.operand_meaning = "image of a layer, as lamina jet wrote it, and a photograph from above (PNG, JPEG, TIFF)";
+  spec.options = {{"--pixel", "UM", "of the sheet that a pixel of the photograph shows, within 5 %", "100", ""},
+                  {"--machine", "NAME|FILE", "whose scan axis counts; without it x", "", "", names_of(shipped_machines())},
+                  {"--json", "", "print one JSON object on stdout", "", ""},
+                  {"--quiet", "", "say nothing but errors", "", ""}};
+  spec.closing = "Examples:\n  lamina compare out/layers/000002.tif photo.png --pixel 254";
+  return spec;
+}
+
+Outcome run_compare(const Arguments& arguments, Context& context) {
+  if (arguments.operands.size() != 2) return Error{Fault::kUsage, "name the image of a layer, and a photograph of it"};
+  double photo_um = 100;
+  if (Status status = arguments.read("--pixel", {1, 2000, " um"}, photo_um); !status) return status;
+  const auto machine = arguments.has("--machine") ? find_machine(arguments.text("--machine")) : Machine();
+  if (!machine) return machine.error();
+  const auto layer = read::dark_pixels(arguments.operands[0], 128);
+  if (!layer) return layer.error();
+  if (!(layer->dpi_x > 0) || !(layer->dpi_y > 0))
+    return Error{Fault::kInput, fmt::format("{}: tells no resolution; give an image that lamina wrote", arguments.operands[0])};
+  const auto told = scanned("compare",
+                            {{"photo", arguments.operands[1]},
+                             {"photo_um", photo_um},
+                             {"scan_along_x", machine->mounting.scan_axis == ScanAxis::kX},
+                             {"pixel_nm", {kNmPerInch / layer->dpi_x, kNmPerInch / layer->dpi_y}},
+                             {"columns", layer->runs.columns},
+                             {"row_offset", layer->runs.row_offset},
+                             {"change", layer->runs.change}},
+                            "");
+  if (!told) return told.error();
+  Json json = Json::parse(*told);
+  const auto number = [](const Json& value) { return value.get<double>(); };
+  const char* axis = machine->mounting.scan_axis == ScanAxis::kX ? "from the back" : "from the left";
+  Answer answer(arguments, context);
+  for (const Json& band : json["missing"])
+    answer.say(fmt::format("missing   {:.2f} mm of {:.2f} to {:.2f} mm {}", number(band["missing_mm"]), number(band["from_mm"]),
+                           number(band["to_mm"]), axis));
+  for (const Json& body : json["bodies"])
+    answer.say(fmt::format("area      {:.2f} of {:.2f} mm2 about {:.1f}, {:.1f} mm from the left and the back",
+                           number(body["seen_mm2"]), number(body["expected_mm2"]), number(body["x_mm"]), number(body["y_mm"])));
+  if (Status status = answer.status(); !status) return status;
+  const bool whole = json["missing"].empty();
+  json["command"] = "compare";
+  if (arguments.has("--json")) {
+    if (Status status = context.give(json); !status) return status;
+  }
+  return whole ? 0 : static_cast<int>(Fault::kVerification);
+}
+
+}  // namespace
+
+const Command compare_command = {"compare", "a printed layer's photograph beside the layer", compare_spec, run_compare};
+
+}  // namespace lamina::pipeline
