@@ -8,7 +8,7 @@
 
 #include "stages/data/text/number_text.h"
 #include "stages/data/text/readable.h"
-#include "stages/write/manifest/manifest.h"
+#include "stages/write/manifest/images_on_record.h"
 
 namespace lamina::pipeline {
 namespace {
@@ -16,47 +16,6 @@ namespace {
 namespace fs = std::filesystem;
 
 Error usage(std::string what) { return {Fault::kUsage, std::move(what)}; }
-
-/// What lamina's own manifest beside the images says.
-struct Told {
-  std::string path;  // of the images
-  Nm bottom = 0, thickness = 0;
-  std::string mirror;
-};
-
-Result<Told> told_by_manifest(const std::string& path) {
-  Told told{path, 0, 0, {}};
-  std::error_code ignored;
-  if (!fs::is_directory(path, ignored)) return told;
-  std::string manifest = path + "/manifest.json";
-  if (product_of_manifest(manifest) == Product::kImages) {
-    told.path = path + "/layers";
-  } else {
-    manifest = (fs::path(path).lexically_normal() / "../manifest.json").string();
-    if (!fs::equivalent(path, fs::path(path) / "../layers", ignored) || product_of_manifest(manifest) != Product::kImages)
-      return told;
-  }
-  const auto read = read_manifest(manifest);
-  if (!read || read->layers.empty()) return told;
-  if (read->head.named_images() > 0) {
-    return Error{Fault::kInput,
-                 fmt::format("{}: has several images a layer, of drops or materials; plan its parts again, or name a "
-                             "folder with one image a layer",
-                             one_line(manifest))};
-  }
-  const Layer first = read->layers.front().layer;
-  told.bottom = first.bottom;
-  told.thickness = first.thickness;
-  told.mirror = read->head.mirror;
-  for (const LayerRecord& record : read->layers) {
-    if (record.layer.thickness == first.thickness) continue;
-    return Error{Fault::kInput,
-                 fmt::format("{}: layer {} is {} mm thick, the first one {} mm; images as parts are layers of "
-                             "one thickness",
-                             one_line(manifest), record.layer.index, mm(record.layer.thickness), mm(first.thickness))};
-  }
-  return told;
-}
 
 /// An output never replaces an input.
 Status check_apart(const Job& job, const std::string& path) {
@@ -114,7 +73,7 @@ Result<OpenImages> open_images(const Job& job, const PartRequest& part, const Pi
     return usage(fmt::format("{}: is layer images; lamina jet and lamina convert take them", one_line(part.path)));
   if (Status status = check_no_transform(part); !status) return status.error();
   if (Status status = check_apart(job, part.path); !status) return status.error();
-  const auto told = told_by_manifest(part.path);
+  const auto told = images_on_record(part.path);
   if (!told) return told.error();
   auto images = read::LayerImages::open(
       told->path, {static_cast<int>(part.images.threshold), part.images.invert, part.images.missing_empty});

@@ -1,0 +1,21 @@
+// stages/write/manifest/images_on_record.h: what a manifest of lamina tells of the layer images beside it.
+#pragma once
+
+#include <string>
+
+#include "stages/data/status.h"
+#include "stages/data/units.h"
+
+namespace lamina {
+
+struct ImagesOnRecord {
+  std::string path;              // of the images
+  Nm bottom = 0, thickness = 0;  // of the first layer, of all; 0: nothing is on record
+  std::string mirror;            // of the job that wrote them
+};
+
+/// path  a job's directory, its layers/, or anything else, of which nothing is on record
+/// errors  kInput: several images a layer, or layers of several thicknesses
+Result<ImagesOnRecord> images_on_record(const std::string& path);
+
+}  // namespace lamina
