@@ -36,6 +36,30 @@ constexpr std::array<Word, 1 << kModeBits> kModes = [] {
   return table;
 }();
 
+/// Vertical modes after each other that the highest bits of a window begin with: steps of a1 from b1.
+struct Steps {
+  std::uint8_t count = 0;
+  std::array<std::int8_t, 7> step{};
+};
+
+constexpr std::uint32_t kStepsBits = 10;
+constexpr std::array<std::uint8_t, 4> kStepLength{1, 3, 6, 7};  // bits, of none to three columns to a side
+
+constexpr std::array<Steps, 1 << kStepsBits> kSteps = [] {
+  std::array<Steps, 1 << kStepsBits> table{};
+  for (std::uint32_t bits = 0; bits < table.size(); ++bits) {
+    Steps& steps = table[bits];
+    for (std::uint32_t at = 0; steps.count < steps.step.size();) {
+      const std::uint32_t left = bits << at & (table.size() - 1);
+      const Word mode = kModes[left >> (kStepsBits - kModeBits)];
+      at += mode.length;
+      if (mode.length == 0 || mode.value >= kPass || at > kStepsBits) break;
+      steps.step[steps.count++] = static_cast<std::int8_t>(mode.value - 3);
+    }
+  }
+  return table;
+}();
+
 std::array<Word, 1 << kRunBits> run_table(const t6::RunCodes& codes) {
   std::array<Word, 1 << kRunBits> table{};
   for (std::uint16_t i = 0; i < codes.terminating.size(); ++i) {
@@ -89,6 +113,24 @@ bool G4Decoder::decode_row(const std::byte* coded) {
   for (;;) {
     if (at > bits_) return false;
     const std::uint64_t bits = window(coded, at);
+    if (bits >> 57 != 0x7F) {  // a slope: vertical modes that end before the last column
+      const Steps& steps = kSteps[bits >> (64 - kStepsBits)];
+      std::uint32_t k = 0;
+      for (; k < steps.count; ++k) {
+        const std::int64_t step = steps.step[k], a1 = std::int64_t{above[b]} + step;
+        if (a1 <= a0 || a1 >= columns) break;
+        row[n++] = static_cast<std::uint32_t>(a1);
+        a0 = a1;
+        at += kStepLength[static_cast<std::size_t>(step < 0 ? -step : step)];
+        if (step < 0 && b > 0 && above[b - 1] > a1) {
+          --b;
+        } else {
+          ++b;
+          while (above[b] <= a1) b += 2;
+        }
+      }
+      if (k > 0) continue;
+    }
     if (bits >> 63 != 0) {  // vertical modes without a step, as many as there are
       const auto ones = std::min<std::uint32_t>(static_cast<std::uint32_t>(std::countl_one(bits)), 57);
       const std::uint32_t left = of_above_ > b ? of_above_ - b : 0, taken = std::min(ones, left);
