@@ -2,8 +2,12 @@
 #include <gtest/gtest.h>
 
 #include <string>
+#include <string_view>
 #include <vector>
 
+#include "stages/data/machine.h"
+#include "stages/data/status.h"
+#include "stages/data/text/toml.h"
 #include "stages/read/profiles/library.h"
 #include "stages/read/profiles/printer.h"
 #include "tests/commands/program.h"
