@@ -1,0 +1,63 @@
+// tests/scan/test_calibrate.cpp: lamina calibrate --scan from the command line, on a photograph in a file.
+#include <gtest/gtest.h>
+
+#include <cstdint>
+#include <filesystem>
+#include <fstream>
+#include <random>
+#include <string>
+#include <vector>
+
+#include "pipeline/machine/powder_printer.h"
+#include "pipeline/machine/profiles.h"
+#include "stages/chart/layout.h"
+#include "stages/read/image.h"
+#include "tests/commands/program.h"
+#include "tests/scan/synthetic.h"
+
+namespace lamina::test {
+namespace {
+
+/// The sheet is printed from the layer's file, not from the chart.
+TEST(CalibrateScan, APhotographBecomesAProfile) {
+  Directory directory;
+  ASSERT_EQ(run_lamina(words_of("calibrate --machine nuferbj --quiet -o sheet"), directory.path()).code, 0);
+  const auto machine = pipeline::find_machine("nuferbj");
+  ASSERT_TRUE(machine);
+  const auto resolved = pipeline::resolve_profile(chart::chart_machine(*machine));
+  const auto layer = read::image(directory / "sheet/print/layers/000000.tif");
+  ASSERT_TRUE(resolved && layer);
+  Printing printing;
+  printing.blocked = {17, 93};
+  printing.gain_um = 20;
+  std::mt19937_64 random(1);
+  const GreyPicture picture = photograph(print_sheet(resolved->grid, layer->runs, printing),
+                                         {.pixels_a_mm = 15, .turn_deg = 100, .tilt_x = 0.03}, random);
+  std::ofstream(directory / "photo.pgm", std::ios::binary) << "P5\n"
+                                                           << picture.width << ' ' << picture.height << "\n255\n"
+                                                           << std::string(picture.grey.begin(), picture.grey.end());
+  const Outcome seen = run_lamina(
+      words_of("calibrate --machine nuferbj --chart sheet --scan photo.pgm -o mine.toml --overlay seen.png"), directory.path());
+  ASSERT_EQ(seen.code, 0) << seen.err;
+  EXPECT_TRUE(std::filesystem::exists(directory / "seen.png"));
+  const auto mine = pipeline::find_machine(directory / "mine.toml");
+  ASSERT_TRUE(mine) << mine.error().message;
+  EXPECT_EQ(mine->head.blocked, (std::vector<std::uint32_t>{17, 93}));
+  for (const double um : mine->head.dot_gain_um) EXPECT_NEAR(um, 20, 6);
+  // What is no chart, of another machine, or is not there: one line each.
+  for (const char* line :
+       {"calibrate --machine nuferbj --chart sheet --scan sheet/machine.toml -o no.toml",
+        "calibrate --machine nuferbj --chart sheet --scan absent.png -o no.toml",
+        "calibrate --machine nuferbj --chart photo.pgm --scan photo.pgm -o no.toml",
+        "calibrate --machine hp45 --chart sheet --scan photo.pgm -o no.toml",
+        "calibrate --machine nuferbj --chart sheet -o no.toml", "calibrate --machine nuferbj --scan photo.pgm -o no.toml",
+        "calibrate --machine nuferbj --weighed-mg 3 -o no.toml"}) {
+    const Outcome refused = run_lamina(words_of(line), directory.path());
+    EXPECT_TRUE(refused.code == 2 || refused.code == 3) << line << refused.code;
+    EXPECT_EQ(refused.error_lines(), 1u) << line << refused.err;
+    EXPECT_FALSE(std::filesystem::exists(directory / "no.toml"));
+  }
+}
+
+}  // namespace
+}  // namespace lamina::test
