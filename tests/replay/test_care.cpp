@@ -327,8 +327,7 @@ TEST(Care, EveryKeyIsReadAndKept) {
       "dry_s = 2.5\ndry_on_lines = [\"M106 S255\", \"M42 P-4 S0.5\"]\ndry_off_lines = [\"M107\"]\nroller_rpm = 350\n"
       "[care]\nspit_layers = 3\nspit_seconds = 12.5\nspit_drops = 33\nspit_mm = [-40, 5.5]\nwipe_layers = 9\nwipe_seconds = 60\n"
       "wipe_mm = [-40, 20, -40, 60]\nwipe_speed_mm_s = 25\nwipe_lines = [\"M42 P4 S1\"]\ncap_mm = [-45, 5]\n";
-  const std::string_view dialects[] = {"nuferbj"};
-  const auto machine = read::read_machine(text, "kept.toml", dialects);
+  const auto machine = pipeline::read_machine(text, "kept.toml");
   ASSERT_TRUE(machine.ok()) << machine.error().message;
   const std::string kept = read::kept_machine_text(*machine);
   const std::string tail = text.substr(text.find("vat_depth_mm"));
@@ -336,10 +335,10 @@ TEST(Care, EveryKeyIsReadAndKept) {
   std::erase(lines, '\n');
   std::erase(wanted, '\n');
   EXPECT_EQ(lines, wanted);
-  EXPECT_EQ(read::kept_machine_text(*read::read_machine(kept, "again.toml", dialects)), kept);
+  EXPECT_EQ(read::kept_machine_text(*pipeline::read_machine(kept, "again.toml")), kept);
   for (const char* line : {"G1 X3", "M42 p4", "M42  P4", "M", "42", "M42 P4;S1", "M42 Pnan"}) {
     const auto wrong =
-        read::read_machine(fmt::format("[machine]\nname = \"a\"\n[care]\nwipe_lines = [\"{}\"]\n", line), "a.toml", dialects);
+        pipeline::read_machine(fmt::format("[machine]\nname = \"a\"\n[care]\nwipe_lines = [\"{}\"]\n", line), "a.toml");
     ASSERT_FALSE(wrong.ok()) << line;
     EXPECT_NE(wrong.error().message.find("is no command such as M42 P4 S1"), std::string::npos) << wrong.error().message;
   }
