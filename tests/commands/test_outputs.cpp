@@ -206,9 +206,9 @@ TEST_F(Outputs, ATableOfHeightsGoesToStandardOutputByName) {
 TEST(OutputOptions, EveryOptionThatNamesAFileIsKnownAsReadOrWritten) {
   for (const pipeline::Command* command : pipeline::commands()) {
     for (const pipeline::OptionSpec& option : pipeline::spec_of(*command).options) {
-      const bool file = std::ranges::any_of(std::array{"FILE", "DIR", "HTML", "PNG", "STL", "OUT"}, [&](std::string_view word) {
-        return option.value.find(word) != std::string::npos;
-      });
+      const bool file =
+          std::ranges::any_of(std::array{"FILE", "DIR", "HTML", "PNG", "STL", "OUT", "CSV", "PHOTO"},
+                              [&](std::string_view word) { return option.value.find(word) != std::string::npos; });
       EXPECT_EQ(file, pipeline::is_input_option(option.flag) || pipeline::is_output_option(option.flag))
           << command->name << " " << option.flag << " " << option.value;
     }
