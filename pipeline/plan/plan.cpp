@@ -239,6 +239,8 @@ class Planner {
                       "planned together; plan them as several jobs",
                       zones.count(), kMostZones));
     }
+    if (zones.several() && job().fill_rule == FillRule::kEvenOdd)
+      return usage("--fill-rule: evenodd looks at all parts together, and parts have doses of their own; choose nonzero");
     if (!zones.grows()) return {};
     if (materials_.several())
       return usage("dose.bleed_um: edges that grow have no material where there are several; plan them as several jobs");

@@ -95,7 +95,8 @@ class ImageMaker : public Maker {
     }
     add("dose", [this](const Layer& layer, Work& work, Made& made) {
       if (Status status = imager_.bleed(layer, work.images); !status) return status;
-      if (plan_.images->dose.bleeds()) sanity_.add_left(layer, work.images.runs);
+      // What walls and fillings left out is no bleed.
+      if (plan_.images->dose.bleeds() && !plan_.images->beads) sanity_.add_left(layer, work.images.runs);
       imager_.dose(layer, work.images, made.record);
       if (cost_) cost_->count(work.images.runs, work.images.drops, made.record);
       return Status();

@@ -82,6 +82,7 @@ class LayerImager {
                               Runs& image) const;
   void mirror(Runs& image, Runs& scratch) const;
   Status check_grown(const Layer& layer, const ImageWork& work) const;
+  static void empty_removed(const Runs& before, ImageWork& work);
   std::uint64_t bytes_of_section(Nm plane, std::uint64_t changes) const;
   std::uint64_t changes_of_images(Nm plane) const;
   std::uint64_t changes_of_section(Nm plane, std::uint64_t bead_changes) const;

@@ -152,12 +152,20 @@ Status LayerImager::bleed(const Layer& layer, ImageWork& work) const {
                              "parts away from its edge",
                              layer.index, mm(layer.plane()))};
   }
+  if (shares) work.third = work.runs;
   zones.remove_bleed(layer, work.runs, work.zones.image, work.bleed);
-  if (shares) {
-    dose::within(work.drops.shares, work.runs, work.drops.zones);
-    std::swap(work.drops.shares, work.drops.zones);
-  }
+  if (shares) empty_removed(work.third, work);
   return check_grown(layer, work);
+}
+
+/// Where an edge moved inwards, the voxels that it left and those beside them that are less than half full are emptied.
+void LayerImager::empty_removed(const Runs& before, ImageWork& work) {
+  raster::combine(before, work.runs, raster::SetOperation::kDifference, work.second);
+  const dose::Reach beside{{1, 1}};
+  dose::dilate(work.second, beside, work.section);
+  raster::combine(work.section, work.runs, raster::SetOperation::kDifference, work.second);
+  dose::without(work.drops.shares, work.second, work.drops.zones);
+  std::swap(work.drops.shares, work.drops.zones);
 }
 
 /// Parts stay on a bed that is not a rectangle as far as they were checked; what grew does too.

@@ -46,9 +46,8 @@ sanity::Sampling sampling_of(const Job& job, const PixelGrid* grid) {
   sampling.one_sided = job.heights.containment != Containment::kAcross;
   if (grid != nullptr) {
     sampling.pixel_mm = {25.4 / grid->x.dpi(), 25.4 / grid->y.dpi()};
-    for (const auto& um : bleeds_of(job)) {
-      for (std::size_t axis = 0; axis < 2; ++axis) sampling.bleed_um[axis] = std::max(sampling.bleed_um[axis], um[axis]);
-    }
+    const auto bleeds = bleeds_of(job);
+    if (std::ranges::all_of(bleeds, [&](const auto& um) { return um == bleeds.front(); })) sampling.bleed_um = bleeds.front();
   } else {
     sampling.tolerance_um = job.slice.tolerance_um.value_or(0);
     sampling.offset_mm = job.slice.offset_mm;

@@ -98,10 +98,9 @@ Result<Coverage> Coverage::build(std::span<Mesh> meshes, std::span<const Instanc
   }
   for (const Mesh& mesh : meshes) {
     if (mesh.closed) continue;
-    return Error{Fault::kInput,
-                 fmt::format("{}: the surface is open, so no voxel of it has a share; load it with repair, or give "
-                             "2 levels of the 1-bit image",
-                             mesh.name)};
+    return Error{Fault::kInput, fmt::format("{}: the surface is open, so no voxel of it has a share; load it with repair, or "
+                                            "leave out --levels",
+                                            mesh.name)};
   }
   Coverage coverage;
   coverage.state_ = std::make_unique<State>(grid, Rule{rule, levels - 1});

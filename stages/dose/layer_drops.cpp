@@ -66,6 +66,7 @@ ZoneSums drops_of_parts(const DropRules& rules, std::span<const LayerDose> doses
   std::vector<Drops24> drops{0}, asked{0};
   for (const LayerDose& dose : doses) drops.push_back(dose.shell), asked.push_back(dose.asked_shell);
   for (const LayerDose& dose : doses) drops.push_back(dose.core), asked.push_back(dose.asked_inside);
+  if (!rules.dithered) std::ranges::for_each(drops, [](Drops24& of) { of = rounded(of); });
   make_planes(rules, drops, layer, image, work);
   unsigned __int128 sum = 0;
   std::uint64_t pixels = 0;

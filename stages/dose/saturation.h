@@ -11,6 +11,8 @@ namespace lamina::dose {
 using Drops24 = std::uint64_t;
 inline constexpr unsigned kDropBits = 24;
 inline constexpr Drops24 kOneDrop = Drops24{1} << kDropBits;
+/// To whole drops, half a drop up.
+constexpr Drops24 rounded(Drops24 drops) { return (drops + kOneDrop / 2) >> kDropBits << kDropBits; }
 /// Of a pixel, in all planes of a layer.
 inline constexpr std::uint32_t kMostDrops = 64;
 

@@ -59,11 +59,11 @@ void mirror(const LevelsView& image, bool x, bool y, Levels& result) {
   }
 }
 
-void within(const LevelsView& image, const RunsView& mask, Levels& result) {
+void without(const LevelsView& image, const RunsView& mask, Levels& result) {
   result.start(image.columns);
   for (std::uint32_t r = 0; r < image.rows(); ++r) {
     append_masked(
-        image, r, mask.row(r), [](std::uint8_t level) { return level; }, [](std::uint8_t) { return std::uint8_t{0}; }, result);
+        image, r, mask.row(r), [](std::uint8_t) { return std::uint8_t{0}; }, [](std::uint8_t level) { return level; }, result);
     result.end_row();
   }
 }
@@ -85,7 +85,7 @@ void drops_of_zones(const LayerDose& dose, std::uint8_t full, bool dithered, std
     drops[full + level] = dose.core * level / full;
   }
   if (dithered) return;
-  for (Drops24& of : drops) of = (of + kOneDrop / 2) >> kDropBits << kDropBits;
+  for (Drops24& of : drops) of = rounded(of);
 }
 
 ZoneSums sums_of(const LevelsView& zones, std::uint8_t full, const LayerDose& dose) {

@@ -19,8 +19,8 @@ constexpr std::uint8_t half_of(std::uint8_t full) { return static_cast<std::uint
 /// x: columns are reversed; y: rows are reversed. cost  O(runs + rows)
 void mirror(const LevelsView& image, bool x, bool y, Levels& result);
 
-/// Levels where the mask is set; 0 elsewhere. mask  of the same size. cost  O(runs)
-void within(const LevelsView& image, const RunsView& mask, Levels& result);
+/// Levels where the mask is not set; 0 elsewhere. mask  of the same size. cost  O(runs)
+void without(const LevelsView& image, const RunsView& mask, Levels& result);
 
 /// Zones of levels 1 .. full: those within the core get `full` more. core  of the same size. cost  O(runs)
 void mark_core(const LevelsView& image, const RunsView& core, std::uint8_t full, Levels& result);

@@ -132,6 +132,13 @@ void judge_lost(const Tally& tally, const Sampling& sampling, std::vector<Warnin
   }
 }
 
+/// "a bleed of 40 um", or "its bleed" where parts or edges have several.
+std::string bleed_text(const Sampling& sampling, std::string_view of_several) {
+  const auto [x, y] = sampling.bleed_um;
+  if (x == 0 && y == 0) return std::string(of_several);
+  return fmt::format("a bleed of {} um", x == y ? number_text(x) : number_text(x) + " x " + number_text(y));
+}
+
 void judge_bleed(const Tally& tally, const Sampling& sampling, std::vector<Warning>& warnings) {
   WorstOfParts worst;
   for (std::uint32_t g = 0; g < tally.groups().size(); ++g) {
@@ -141,11 +148,9 @@ void judge_bleed(const Tally& tally, const Sampling& sampling, std::vector<Warni
   }
   for (std::uint32_t part = 0; part < worst.size(); ++part) {
     if (worst[part].count == 0) continue;
-    const auto [x, y] = sampling.bleed_um;
     warnings.push_back({"bleed",
-                        fmt::format("{}: a bleed of {} um takes away {:.0f} % of it{}; --bleed counts in um",
-                                    sampling.part[part], x == y ? number_text(x) : number_text(x) + " x " + number_text(y),
-                                    100 * worst[part].badness, and_more(worst[part])),
+                        fmt::format("{}: {} takes away {:.0f} % of it{}; --bleed counts in um", sampling.part[part],
+                                    bleed_text(sampling, "its bleed"), 100 * worst[part].badness, and_more(worst[part])),
                         sampling.part[part]});
   }
 }
@@ -226,9 +231,7 @@ std::string why_nothing(const Tally& tally, const Sampling& sampling) {
   for (std::uint32_t s = 0; s < solids.size(); ++s) {
     if (tally.seen(s)) {
       const bool bleeds = tally.looked_at_bleed() && tally.left_mm3(solids[s].group) == 0;
-      return bleeds ? fmt::format("a bleed of {} um takes away all of the parts: --bleed counts in um",
-                                  number_text(std::max(sampling.bleed_um[0], sampling.bleed_um[1])))
-                    : std::string();
+      return bleeds ? bleed_text(sampling, "the bleed") + " takes away all of the parts: --bleed counts in um" : std::string();
     }
   }
   for (const Solid& solid : solids) {

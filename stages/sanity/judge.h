@@ -26,7 +26,7 @@ namespace lamina::sanity {
 struct Sampling {
   std::array<double, 2> pixel_mm{};   // 0 without pixels
   double thickest_mm = 0;             // of all layers
-  std::array<double, 2> bleed_um{};   // along x and y
+  std::array<double, 2> bleed_um{};   // along x and y; 0 where parts or edges have several
   double tolerance_um = 0;            // of contours
   double offset_mm = 0;               // of contours
   bool one_sided = false;             // steps lie inside or outside of the parts, on purpose

@@ -64,11 +64,11 @@ TEST(Shares, AreTurnedMaskedAndMarkedPixelByPixel) {
     const Runs mask = random_mask(seed + 100);
     const std::vector<int> before = share_pixels(image.view()), set = share_pixels(mask.view());
     Levels masked, marked, turned;
-    within(image, mask, masked);
+    without(image, mask, masked);
     mark_core(image, mask, 15, marked);
-    const std::vector<int> in_mask = share_pixels(masked.view()), in_core = share_pixels(marked.view());
+    const std::vector<int> outside = share_pixels(masked.view()), in_core = share_pixels(marked.view());
     for (std::size_t i = 0; i < before.size(); ++i) {
-      ASSERT_EQ(in_mask[i], set[i] != 0 ? before[i] : 0);
+      ASSERT_EQ(outside[i], set[i] != 0 ? 0 : before[i]);
       ASSERT_EQ(in_core[i], before[i] + (set[i] != 0 && before[i] > 0 ? 15 : 0));
     }
     for (const auto& [x, y] : {std::pair{true, false}, {false, true}, {true, true}}) {

@@ -3,6 +3,7 @@
 
 #include <atomic>
 #include <cstdint>
+#include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 
@@ -169,6 +170,40 @@ TEST(PartDoses, RecordedDropsAreComparedWithTheImages) {
   ASSERT_TRUE(report.ok()) << report.error().message;
   ASSERT_FALSE(report->ok());
   EXPECT_NE(report->faults[0].find("drops, the manifest says"), std::string::npos) << report->faults[0];
+}
+
+// Rounding to whole drops is the same for one dose and for several.
+TEST(PartDoses, RoundedDropsAreThoseOfOneDose) {
+  const test::Directory folder;
+  std::vector<std::uint64_t> drops;
+  for (const bool zones : {false, true}) {
+    Job job = job_of_boxes(folder, zones ? "zones" : "one");
+    job.dose.saturation_percent = 70;
+    job.dose.dithered = false;
+    if (zones) job.parts[1].hole_bleed_um = {1, 1};  // moves nothing
+    const auto summary = run_part_doses(job);
+    ASSERT_TRUE(summary.ok()) << summary.error().message;
+    drops.push_back((*summary->facts)["saturation"]["drops"]);
+  }
+  EXPECT_EQ(drops[0], drops[1]);
+}
+
+// A bleed leaves the voxels alone that lie at no edge that it moves.
+TEST(PartDoses, SharesOfVoxelsStayWhereNoEdgeMoves) {
+  const test::Directory folder;
+  std::vector<std::uint64_t> full;
+  for (const double um : {0.0, 10.0, 100.0}) {  // a pixel is 35.3 um
+    Job job = job_of_boxes(folder, "shares" + std::to_string(static_cast<int>(um)));
+    test::write_box(folder / "odd.stl", {0, 0, 0}, {5.01f, 5.01f, 0.4f});
+    job.parts = {{.path = folder / "odd.stl", .at_mm = std::array{10.01, 10.01}}};
+    job.levels = 16;
+    job.dose.bleed_um = {um, um};
+    const auto summary = run_part_doses(job);
+    ASSERT_TRUE(summary.ok()) << summary.error().message;
+    full.push_back((*summary->facts)["voxels"]["full_voxels"]);
+  }
+  EXPECT_EQ(full[0], full[1]);
+  EXPECT_LT(full[2], full[1]);
 }
 
 TEST(PartDoses, WhatCannotBeIsRefusedInOneLine) {
