@@ -155,7 +155,7 @@ void finish_replay(const Inspection& inspection, const std::optional<JobCost>& c
 }
 
 void check_layers(const std::string& directory, const Manifest& manifest, bool quick, std::optional<JobCost>& cost,
-                  VerifyReport& report) {
+                  std::optional<replay::VatLevels>& vats, VerifyReport& report) {
   Inspection inspection{directory, manifest.head, quick, std::nullopt, report};
   if (!manifest.head.machine.empty()) {
     prepare_replay(inspection);
@@ -168,7 +168,7 @@ void check_layers(const std::string& directory, const Manifest& manifest, bool q
   // In chunks, so that messages and sums stay in layer order without a string for each of a hundred thousand layers.
   constexpr std::size_t kPiece = 1024;
   std::vector<Finding> found(std::min(kPiece, manifest.layers.size()));
-  replay::VatLevels vats(inspection.machine ? inspection.machine->profile() : Machine());
+  if (!vats && inspection.machine) vats.emplace(inspection.machine->profile());
   for (std::size_t first = 0; first < manifest.layers.size(); first += kPiece) {
     const std::size_t count = std::min(kPiece, manifest.layers.size() - first);
     tbb::parallel_for(std::size_t{0}, count, [&](std::size_t i) {
@@ -186,7 +186,7 @@ void check_layers(const std::string& directory, const Manifest& manifest, bool q
         cost->add(record, found[i].count->drops + found[i].count->spat, found[i].count->microseconds);
         if (found[i].fault.empty()) found[i].fault = fault_of_shares(inspection.head, record);
       }
-      if (std::string fault = vats.take(record.layer.index, found[i].count.value_or(replay::Count())); !fault.empty())
+      if (std::string fault = vats ? vats->take(record.layer.index, found[i].count) : ""; !fault.empty())
         report.add(std::move(fault));
       report.replayed += found[i].count.has_value();
       if (!found[i].fault.empty()) report.add(std::move(found[i].fault));
@@ -305,7 +305,9 @@ Result<VerifyReport> verify(const std::string& directory, const VerifyOptions& o
     if (file.shard) shards.push_back({file.name, *file.shard, manifest->head.first_layer, manifest->head.last_layer});
     manifests.push_back(std::move(*manifest));
   }
-  for (const Manifest& manifest : manifests) check_layers(directory, manifest, options.quick, cost, report);
+  std::ranges::stable_sort(manifests, {}, [](const Manifest& manifest) { return manifest.head.first_layer; });
+  std::optional<replay::VatLevels> vats;  // of all shards, one behind the other
+  for (const Manifest& manifest : manifests) check_layers(directory, manifest, options.quick, cost, vats, report);
   // An interrupted run may have finished layers without a line in its manifest.
   if (!interrupted) check_strays(directory, manifests, report);
   if (!whole_job && !manifests.empty()) check_shards(shards, manifests[0].head.layer_count, report);

@@ -24,6 +24,7 @@
 #include "stages/raster/beams.h"
 #include "stages/write/extrusion_format.h"
 #include "stages/write/levels/level_format.h"
+#include "stages/write/program/care.h"
 #include "stages/write/slice_format.h"
 
 namespace lamina::pipeline {
@@ -192,6 +193,7 @@ class Planner {
       Result<std::string> steps = heights::check_build_steps(*machine(), plan_.heights.table);
       if (!steps) return steps.error();
       if (!steps->empty()) plan_.warnings.push_back({"build-steps", std::move(*steps)});
+      if (std::string idle = write::idle_care(*machine()); !idle.empty()) plan_.warnings.push_back({"care", std::move(idle)});
     }
     const auto range = layer_range(job(), plan_.layer_count);
     if (!range) return range.error();

@@ -34,8 +34,13 @@ std::string fault_of_unfed(std::span<const std::uint64_t> set, std::span<const s
   return {};
 }
 
-std::string VatLevels::take(std::uint32_t layer, const Count& count) {
-  if (count.refills > 0) left_mm_ = depth_mm_;
+std::string VatLevels::take(std::uint32_t layer, const std::optional<Count>& taken) {
+  const bool fills = layer == 0 || (taken && taken->refills > 0);
+  known_ = taken && (fills || (known_ && layer == next_));
+  next_ = layer + 1;
+  if (!known_) return {};
+  if (fills) left_mm_ = depth_mm_;
+  const Count& count = *taken;
   std::string fault;
   for (std::size_t vat = 0; vat < 2; ++vat) {
     const double before = left_mm_[vat];

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <string>
 
@@ -22,18 +23,21 @@ std::uint32_t vats_wanted(const Machine& machine, std::span<const std::uint64_t>
 std::string fault_of_unfed(std::span<const std::uint64_t> set, std::span<const std::uint32_t> vat,
                            std::span<const std::uint64_t> recorded, std::uint32_t feeds);
 
-/// What is left in vats of stated depth, layer by layer in their order; a pause fills all of them.
+/// What is left in vats of stated depth, layer by layer in their order; a pause fills all of them. Behind a layer that is left
+/// out, or that nobody could carry out, nothing is known of them until they are filled.
 class VatLevels {
  public:
   /// They are full.
   explicit VatLevels(const Machine& machine) : depth_mm_(machine.powder.vat_depth_mm), left_mm_(depth_mm_) {}
 
-  /// Empty, or which vat had less than the layer took, once for each vat.
-  std::string take(std::uint32_t layer, const Count& count);
+  /// Empty, or which vat had less than the layer took, once for each vat. count  none: the layer could not be carried out
+  std::string take(std::uint32_t layer, const std::optional<Count>& count);
 
  private:
   std::array<double, 2> depth_mm_, left_mm_;
   std::array<bool, 2> told_{};
+  std::uint32_t next_ = 0;  // layer
+  bool known_ = false;
 };
 
 /// "both vats feed"

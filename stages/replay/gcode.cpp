@@ -38,7 +38,7 @@ bool GcodeReader::take(GcodeLine& line, bool all_words) {
       double value = 0;
       const bool letter = rest[0] >= 'A' && rest[0] <= 'Z';
       const char *const from = rest.data() + (letter ? 1 : 0), *const to = rest.data() + gap;
-      const auto [stop, error] = std::from_chars(from, to, value);
+      const auto [stop, error] = std::from_chars(from, to, value, std::chars_format::fixed);  // firmware knows no exponents
       if (!letter || error != std::errc() || stop != to || !std::isfinite(value)) {
         fault(fmt::format("'{}' is no word", rest.substr(0, gap)));
         return false;
@@ -87,6 +87,7 @@ bool Axes::take(const GcodeLine& line, bool scanning) {
   if (line.command != "G0" && line.command != "G1") return false;
   const auto& profile = printing_.profile();
   double head_squared = 0, all_squared = 0, alone = 0;  // alone: the ways of the other axes, one after the other
+  bool head = false;
   if (line.has('F')) feed_mm_s_ = line.word.at('F') / 60;
   if (!(feed_mm_s_ > 0)) {
     reader_.fault("moves at no speed");
@@ -100,6 +101,7 @@ bool Axes::take(const GcodeLine& line, bool scanning) {
     all_squared += way * way;
     const std::string axis(1, letter);
     if (axis == profile.motion.x_axis || axis == profile.motion.y_axis) {
+      head = true;
       head_squared += way * way;
       if (roller_on_gantry_ && axis == profile.powder.roller_axis) printing_.roller_stands_at(at);
     } else if (axis == profile.powder.build_axis || axis == profile.powder.roller_axis) {
@@ -124,9 +126,10 @@ bool Axes::take(const GcodeLine& line, bool scanning) {
   }
   // Vats and roller of one line move together: F is the speed along their common way.
   printing_.takes((std::sqrt(all_squared - head_squared) - alone) / feed_mm_s_);
-  if (head_squared > 0) {
-    printing_.head_moves(std::sqrt(head_squared), feed_mm_s_, scanning);
-    printing_.head_stands_at(at_[profile.motion.x_axis[0]], at_[profile.motion.y_axis[0]]);
+  if (head_squared > 0) printing_.head_moves(std::sqrt(head_squared), feed_mm_s_, scanning);
+  if (head) {  // where it stands already, too
+    printing_.head_stands_at(at_[profile.motion.x_axis[0]], at_[profile.motion.y_axis[0]],
+                             line.command == "G1" && !scanning ? feed_mm_s_ : 0);
   }
   return true;
 }

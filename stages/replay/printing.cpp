@@ -176,22 +176,32 @@ void Printing::head_moves(double mm, double mm_s, bool scanning) {
   const auto& care = profile().care;
   if (care.spits()) check_care("fired off the bed", care.spit_layers, care.spit_seconds, spat_s_);
   if (care.wipes()) check_care("wiped", care.wipe_layers, care.wipe_seconds, wiped_s_);
+  if (care.spits() && wiped_s_ > spat_s_) fault("scans behind the wiper before the head is fired off the bed");
   if (dwelt_s_ + lamp_blocks_ > 0) fault("scans behind the pause in which the layer dries");
 }
 
-void Printing::head_stands_at(double x_mm, double y_mm) {
-  bool wiped = false;
-  if (const auto& wiper = profile().care.wipe_mm) {
+void Printing::leaves_wiper(std::string_view what) {
+  if (own_ > 0) fault(fmt::format("{} before all lines of the machine's own stand there", what));
+  own_ = 0;
+  at_wiper_ = false;
+}
+
+// A wipe is a G1 as fast as the profile has it: travels may have the same ends.
+void Printing::head_stands_at(double x_mm, double y_mm, double works_mm_s) {
+  const auto& care = profile().care;
+  leaves_wiper("the head goes on");
+  if (spat_here_ % std::max(1u, care.spit_drops) != 0) {
+    fault(fmt::format("nozzles fire {} drops off the bed, where {} are a shot", spat_here_, care.spit_drops));
+  }
+  const bool slow = std::abs(works_mm_s - care.wipe_speed_mm_s) < 1.01 * kHalfMmPerMinute;
+  if (const auto& wiper = care.wipe_mm; wiper && slow) {
     const auto [x, y] = head_mm_.value_or(profile().motion.safe_mm);
     if (std::hypot(x - (*wiper)[0], y - (*wiper)[1]) + std::hypot(x_mm - (*wiper)[2], y_mm - (*wiper)[3]) < 1e-3) {
-      wiped = true;
+      at_wiper_ = true;
       wiped_s_ = seconds_;
       ++count.wipes;
     }
   }
-  if (own_ > 0) fault("the head goes on before all lines of the machine's own stand behind the wiper");
-  own_ = 0;
-  at_wiper_ = wiped;
   head_mm_ = {x_mm, y_mm};
   spat_here_ = 0;
 }
@@ -225,10 +235,13 @@ void Printing::spits(double x_mm, double y_mm, std::uint64_t drops, double secon
     }
     return fault(fmt::format("nozzle {} fires off the bed where column {:.0f}, row {:.0f} of it is", nozzle, column, row));
   }
+  leaves_wiper("nozzles fire off the bed");
   takes(seconds);
   spat_here_ += drops;
+  if (spat_here_ > care.spit_drops) {
+    return fault(fmt::format("nozzles fire {} drops off the bed, where {} are a shot", spat_here_, care.spit_drops));
+  }
   if (spat_here_ < care.spit_drops) return;
-  spat_here_ -= care.spit_drops;
   spat_s_ = seconds_;
   ++count.spits;
 }
@@ -243,13 +256,12 @@ void Printing::waits_capped(std::string_view what) {
 void Printing::refills() {
   if (count.fed_mm[0] + count.fed_mm[1] > 0) return fault("waits for the vats to be filled behind the layer's powder");
   waits_capped("the vats are filled");
-  ++count.refills;
+  if (++count.refills > 1) fault("waits for the vats to be filled a second time");
 }
 
 void Printing::dwells(double seconds) {
   waits_capped("the layer dries");
-  if (own_ > 0) fault("the layer dries before all lines of the machine's own stand before it");
-  own_ = 0;
+  leaves_wiper("the layer dries");
   dwelt_s_ += seconds;
   takes(seconds);
 }
@@ -299,6 +311,10 @@ void Printing::roller_stands_at(double mm) {
   const bool comes = std::abs(roller_mm_ - far) >= 1e-3 || std::abs(profile().powder.roller_mm[0] - far) < 1e-3;
   if (std::abs(mm - far) < 1e-3 && comes) strokes(count.build_mm, count.fed_mm[0] + count.fed_mm[1]);
   rolled_ = rolled_ || strokes_ > base_layers();
+  const double home = profile().powder.roller_mm[0];
+  if (rpm_ != 0 && std::abs(mm - home) < 1e-3 && std::abs(roller_mm_ - home) >= 1e-3 && spread_wrong_.empty()) {
+    spread_wrong_ = fmt::format("the roller returns with {:g} turns a minute, and has to stand still", rpm_);
+  }
   roller_mm_ = mm;
 }
 

@@ -67,7 +67,8 @@ class Printing {
   // --- movements; each takes its time
   /// From rest to rest if the profile knows the head's acceleration.
   void head_moves(double mm, double mm_s, bool scanning);
-  void head_stands_at(double x_mm, double y_mm);
+  /// works_mm_s  how fast it came, of a G1 beside sweeps; 0: by a travel, or in a sweep
+  void head_stands_at(double x_mm, double y_mm, double works_mm_s);
   void feeds(std::uint32_t vat, double mm, double mm_s);
   void build_vat_stands_at(double mm);
   /// The same, where a program tells but how far from where the layer before left it.
@@ -126,6 +127,7 @@ class Printing {
   void strokes(double build_mm, double fed_mm);
   const std::vector<std::string>& own_lines() const;
   void waits_capped(std::string_view what);
+  void leaves_wiper(std::string_view what);
   void coverage(std::vector<bool>& worked, std::vector<bool>& blocked) const;
   std::int64_t line_of(std::uint32_t column, std::uint32_t row) const;
   bool pixel(std::int64_t line, std::int64_t place, std::uint32_t& column, std::uint32_t& row) const;

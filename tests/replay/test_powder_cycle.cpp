@@ -164,7 +164,7 @@ TEST(PowderCycle, RepeatsOfNothingTakeNoTime) {
   const std::string text = bench.edited([&](const std::string& line) {
     const bool loaded = line.starts_with("M812"), scans = sweeping && line.starts_with("G1 X");
     sweeping = loaded || (sweeping && !scans);
-    return loaded ? line : scans ? loads.substr(1) + "\nG1 X9e9 F18000" : line;
+    return loaded ? line : scans ? loads.substr(1) + "\nG1 X9000000000 F18000" : line;
   });
   ASSERT_NE(text, bench.program.text);
   EXPECT_EQ(bench.fault(text), "");

@@ -356,6 +356,7 @@ void Hp45Reader::spread(const GcodeLine& line) {
     if (!spreading_) return reader_.fault("M5 stops a spreader that does not turn");
     spread_ = true;
     printing_.roller_stands_at(axes_.at(powder.roller_axis));
+    printing_.roller_turns(0);
     // On the gantry it does not touch the powder on the way back.
     if (powder.roller_axis == scan_.along || powder.roller_axis == scan_.across)
       printing_.roller_stands_at(powder.roller_mm[0]);

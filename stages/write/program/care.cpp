@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "stages/write/program/program_text.h"
 
@@ -17,9 +18,12 @@ constexpr double kOfLimit = 0.97;
 // What dialects add to a sweep at either end, beside its ramps: the HP45 controller's rows and measures of speed.
 constexpr double kRunUpMm = 20;
 
+// The least of kPlainDigits.
+constexpr double kLeastPlain = 1e-3;
+
 /// Commands that programs have, or that end them: nobody may put them between.
 constexpr std::string_view kOfPrograms[] = {"M0",   "M1",   "M2",   "M3",   "M4",   "M5",   "M25",  "M30",  "M112", "M226",
-                                            "M400", "M578", "M810", "M811", "M812", "M813", "M814", "M815", "M816"};
+                                            "M400", "M578", "M999", "M810", "M811", "M812", "M813", "M814", "M815", "M816"};
 
 double move_seconds(const Machine& machine, double way_mm, double speed_mm_s) {
   if (speed_mm_s * 60 >= 1) speed_mm_s = std::round(speed_mm_s * 60) / 60;  // as it is spelt
@@ -68,6 +72,7 @@ class Checker {
   Status check() {
     if (Status status = check_words(); !status) return status;
     if (Status status = check_places(); !status) return status;
+    if (Status status = check_wiper_alone(); !status) return status;
     if (Status status = check_clock("care.spit_seconds", care_.spit_seconds, care_.spit_mm, 0); !status) return status;
     if (!care_.wipes()) return {};
     const Place wiped{(*care_.wipe_mm)[2], (*care_.wipe_mm)[3]};
@@ -93,9 +98,10 @@ class Checker {
                 {"powder.refill", powder.refill == VatRefill::kPause, kSaysRefill},
                 {"powder.dry_s", powder.dry_s > 0, kSaysDry},
                 {"powder.roller_rpm", powder.roller_rpm > 0, kSaysRoller},
-                {"care.spit_layers", care_.spits(), kSaysCare},
-                {"care.wipe_layers", care_.wipes(), kSaysCare},
-                {"powder.dry_on_lines", !powder.dry_on_lines.empty() || !powder.dry_off_lines.empty(), kSaysOwn},
+                {care_.spit_layers > 0 ? "care.spit_layers" : "care.spit_seconds", care_.spits(), kSaysCare},
+                {care_.wipe_layers > 0 ? "care.wipe_layers" : "care.wipe_seconds", care_.wipes(), kSaysCare},
+                {"powder.dry_on_lines", !powder.dry_on_lines.empty(), kSaysOwn},
+                {"powder.dry_off_lines", !powder.dry_off_lines.empty(), kSaysOwn},
                 {"care.wipe_lines", !care_.wipe_lines.empty(), kSaysOwn},
                 {"care.spit_seconds", care_.spit_seconds > 0, kSaysSeconds},
                 {"care.wipe_seconds", care_.wipe_seconds > 0, kSaysSeconds}};
@@ -105,19 +111,46 @@ class Checker {
                                     "powder.pause_s and its drops in cost.spit_drops",
                                     dialect_.id));
     }
-    for (const auto* lines : {&powder.dry_on_lines, &powder.dry_off_lines, &care_.wipe_lines}) {
-      for (const std::string& line : *lines) {
-        const std::string command = line.substr(0, line.find(' '));
-        if (std::ranges::find(kOfPrograms, command) == std::end(kOfPrograms)) continue;
-        return wrong(lines == &care_.wipe_lines ? "care.wipe_lines" : "powder.dry_on_lines",
-                     fmt::format("{} is a command of programs; give the machine's own alone", command));
-      }
+    for (const auto& [key, value] :
+         {std::pair("powder.dry_s", powder.dry_s), std::pair("powder.roller_rpm", powder.roller_rpm)}) {
+      if (value > 0 && value < kLeastPlain) return wrong(key, fmt::format("{:g} is written as 0; give at least 0.001", value));
     }
-    if (powder.dry_s == 0 && (!powder.dry_on_lines.empty() || !powder.dry_off_lines.empty()))
-      return wrong("powder.dry_on_lines", "there is no pause to dry; give powder.dry_s");
+    if (Status status = check_own("powder.dry_on_lines", powder.dry_on_lines, powder.dry_s > 0); !status) return status;
+    if (Status status = check_own("powder.dry_off_lines", powder.dry_off_lines, powder.dry_s > 0); !status) return status;
+    if (Status status = check_own("care.wipe_lines", care_.wipe_lines, true); !status) return status;
     if (powder.refill == VatRefill::kPause && !depths) return wrong("powder.refill", "pauses need powder.vat_depth_mm");
     if (care_.spits() && !care_.spit_mm) return wrong("care.spit_mm", "is missing; give the carriage's place beside the bed");
     if (care_.wipes() && !care_.wipe_mm) return wrong("care.wipe_mm", "is missing; give x, y of both ends of the wiper");
+    return {};
+  }
+
+  /// Lines of the machine's own. paused  whether the program comes to where they stand
+  Status check_own(std::string_view key, const std::vector<std::string>& lines, bool paused) const {
+    for (const std::string& line : lines) {
+      const std::string command = line.substr(0, line.find(' '));
+      const std::string_view number = std::string_view(command).substr(1);
+      if (number.find_first_not_of("0123456789") != std::string_view::npos || (number.size() > 1 && number[0] == '0')) {
+        return wrong(key, fmt::format("{}: give the command's number whole and without leading zeros", command));
+      }
+      if (std::ranges::find(kOfPrograms, command) == std::end(kOfPrograms)) continue;
+      return wrong(key, fmt::format("{} is a command of programs; give the machine's own alone", command));
+    }
+    if (!lines.empty() && !paused) return wrong(key, "there is no pause to dry; give powder.dry_s");
+    return {};
+  }
+
+  /// A wiper that lies where the head travels, and as fast: nobody can tell a wipe from a way to another place.
+  Status check_wiper_alone() const {
+    const auto& motion = machine_.motion;
+    if (!care_.wipes() || feed_text(care_.wipe_speed_mm_s) != feed_text(motion.travel_speed_mm_s)) return {};
+    const auto& [x, y, to_x, to_y] = *care_.wipe_mm;
+    const std::optional<Place> places[] = {motion.safe_mm, care_.spit_mm, care_.cap_mm};
+    for (const auto& from : places) {
+      for (const auto& to : places) {
+        if (!from || !to || way({x, y}, *from) + way({to_x, to_y}, *to) >= 1e-3) continue;
+        return wrong("care.wipe_mm", "the head travels there as fast anyway; give another wiper, or care.wipe_speed_mm_s");
+      }
+    }
     return {};
   }
 
@@ -174,6 +207,21 @@ class Checker {
 
 Status check_care(const Dialect& dialect, const Machine& machine, const HeadGrid& grid) {
   return Checker(dialect, machine, grid).check();
+}
+
+std::string idle_care(const Machine& machine) {
+  const auto& care = machine.care;
+  const auto& powder = machine.powder;
+  const bool pauses = powder.dry_s > 0 || powder.refill == VatRefill::kPause;
+  const bool shot = care.spit_mm || care.spit_drops != Machine::Care().spit_drops;
+  std::string idle;
+  const auto add = [&](bool said, bool asked, std::string_view what) {
+    if (said && !asked) idle += fmt::format("{}{}", idle.empty() ? "" : "; ", what);
+  };
+  add(shot, care.spits(), "no shot: care.spit_layers and care.spit_seconds are 0");
+  add(care.wipe_mm || !care.wipe_lines.empty(), care.wipes(), "no wipe: care.wipe_layers and care.wipe_seconds are 0");
+  add(care.cap_mm.has_value(), pauses, "no pause under care.cap_mm: powder.dry_s is 0 and powder.refill no \"pause\"");
+  return idle.empty() ? idle : fmt::format("{}: {}", machine.name, idle);
 }
 
 void Care::go(std::string_view command, double x_mm, double y_mm, double speed_mm_s, ProgramBytes& out) const {
@@ -265,7 +313,8 @@ void Care::dry(ProgramBytes& out) const {
   go(words_.travel, at[0], at[1], machine_.motion.travel_speed_mm_s, out);
   put(out, "{}", words_.wait);
   put_own(machine_.powder.dry_on_lines, out);
-  put(out, "{}{}\n", words_.dwell, number_text(machine_.powder.dry_s / words_.dwell_unit_s));
+  put(out, "{}{}\n", words_.dwell,
+      plain_text(machine_.powder.dry_s / words_.dwell_unit_s, words_.dwell_unit_s < 1 ? 0 : kPlainDigits));
   put_own(machine_.powder.dry_off_lines, out);
 }
 

@@ -14,6 +14,9 @@ namespace lamina::write {
 /// limits in seconds that the longest sweep keeps. errors  kUsage, with the key and what to do
 Status check_care(const Dialect& dialect, const Machine& machine, const HeadGrid& grid);
 
+/// Empty, or what a profile has places for and asks for never.
+std::string idle_care(const Machine& machine);
+
 /// How a dialect spells it.
 struct CareWords {
   std::string_view travel;                                  // the command of a movement beside the bed

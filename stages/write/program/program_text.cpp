@@ -15,7 +15,7 @@ void put_spread(const Machine& machine, const LayerCycle& cycle, std::int64_t bo
         mm_text(powder.feed_sign * powder.dose * mm(thickness_nm) / static_cast<double>(cycle.feeds.size())), vat_speed);
   }
   put(out, "G90\n");
-  if (powder.roller_rpm > 0) put(out, "M4 S{}\n", number_text(powder.roller_rpm));
+  if (powder.roller_rpm > 0) put(out, "M4 S{}\n", plain_text(powder.roller_rpm, kPlainDigits));
   put(out, "G1 {}{} F{}\n", powder.roller_axis, mm_text(powder.roller_mm[1]), roller_speed);
   if (powder.roller_rpm > 0) put(out, "M5\n");
   put(out, "G1 {}{} F{}\n", powder.roller_axis, mm_text(powder.roller_mm[0]), roller_speed);

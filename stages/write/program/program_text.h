@@ -31,6 +31,18 @@ inline std::string mm_text(double millimetres) {
   return fmt::format("{:.4f}", rounded == 0 ? 0.0 : rounded);
 }
 
+/// A number with up to so many digits behind the point, and no exponent, which G-code does not know.
+inline std::string plain_text(double value, int digits) {
+  std::string text = fmt::format("{:.{}f}", value, digits);
+  if (digits == 0) return text;
+  text.erase(text.find_last_not_of('0') + 1);
+  if (text.back() == '.') text.pop_back();
+  return text;
+}
+
+/// The least that is written of a roller's turns a minute, and of seconds to dry: a thousandth.
+inline constexpr int kPlainDigits = 3;
+
 /// mm a minute, as F words have it: whole ones but below 1, never 0.
 inline std::string feed_text(double mm_s) {
   return mm_s * 60 < 1 ? fmt::format("{:.2f}", mm_s * 60) : fmt::format("{:.0f}", mm_s * 60);

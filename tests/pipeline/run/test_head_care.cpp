@@ -1,6 +1,7 @@
 // Jobs of machines with care of head and powder: times, binder and powder by hand, pauses for vats, and the same in shards.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
 #include <atomic>
 #include <cstdint>
@@ -129,6 +130,21 @@ TEST_F(HeadCare, AVatThatRunsEmptyRefusesTheJobBeforeItStartsOrIsFilledInPauses)
     pauses.shard = {{i, 3}};
     EXPECT_EQ(facts(pauses)["refills"], nlohmann::json({12, 24}));
   }
+  EXPECT_EQ(verified(pauses).replay.refills, 2u) << "shards that are not merged are one job";
+  // Vats are carried from one to the next: the second one's pause left out empties the vat that the first has left.
+  {
+    const fs::path layer = fs::path(pauses.output) / "program/000012.gcode";
+    const std::string good = test::read_text(layer);
+    std::string text = good;
+    text.erase(text.find("M815\n"), 5);
+    test::write_text(layer, text);
+    const auto report = verify(pauses.output, {});
+    ASSERT_TRUE(report.ok());
+    EXPECT_TRUE(std::ranges::any_of(report->faults, [](const std::string& fault) {
+      return fault.find("layer 12: takes 0.125 mm of the first vat, where 0 of 1.5 are left") != std::string::npos;
+    }));
+    test::write_text(layer, good);
+  }
   ASSERT_TRUE(merge({.directories = {pauses.output}, .output = pauses.output}).ok());
   verified(pauses);
   EXPECT_EQ(test::read_text(fs::path(pauses.output) / "program/000024.gcode"), whole);
@@ -143,6 +159,18 @@ TEST_F(HeadCare, AVatThatRunsEmptyRefusesTheJobBeforeItStartsOrIsFilledInPauses)
   std::string faults;
   for (const std::string& fault : report->faults) faults += fault + "\n";
   EXPECT_NE(faults.find("layer 12: takes 0.125 mm of the first vat, where 0 of 1.5 are left"), std::string::npos) << faults;
+}
+
+TEST_F(HeadCare, PlacesWithoutATimeForThemAreDoubted) {
+  Job job =
+      prism(0.3F, profile("idle", "[care]\nspit_mm = [-40, 5]\nwipe_mm = [-40, 20, -40, 60]\ncap_mm = [-40, 5]\n"), "idle");
+  job.dry_run = true;
+  const auto summary = made(job);
+  ASSERT_TRUE(summary.ok()) << summary.error().message;
+  ASSERT_EQ(summary->warnings.size(), 1u);
+  EXPECT_EQ(summary->warnings[0].code, "care");
+  for (const char* what : {"no shot: care.spit_layers", "no wipe: care.wipe_layers", "no pause under care.cap_mm"})
+    EXPECT_NE(summary->warnings[0].text.find(what), std::string::npos) << summary->warnings[0].text;
 }
 
 // Of two powders pixels decide which vat feeds, and so which one is empty, and when: bronze from 1 mm on, in the second vat.

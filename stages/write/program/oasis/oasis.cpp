@@ -85,7 +85,7 @@ void Writer::spread(std::int64_t bottom_nm, std::int64_t thickness_nm, ProgramBy
   put(out, "G91\n");
   feed_by(-kHysteresisMm, out);
   feed_by(powder.dose * mm(thickness_nm) + kClearanceMm + kHysteresisMm, out);
-  put(out, "G90\nM4{}\n", powder.roller_rpm > 0 ? " S" + number_text(powder.roller_rpm) : "");
+  put(out, "G90\nM4{}\n", powder.roller_rpm > 0 ? " S" + plain_text(powder.roller_rpm, kPlainDigits) : "");
   put(out, "G1 {}{} F{}\nM5\n", powder.roller_axis, mm_text(powder.roller_mm[1]), feed_text(powder.roller_speed_mm_s));
   build_to(top - kClearanceMm + kHysteresisMm, out);
   build_to(top, out);
