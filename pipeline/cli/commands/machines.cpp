@@ -8,6 +8,7 @@
 #include "pipeline/machine/powder_printer.h"
 #include "pipeline/machine/profiles.h"
 #include "pipeline/output/print_program.h"
+#include "stages/data/text/readable.h"
 #include "stages/program/head_grid.h"
 #include "stages/program/image_of_bed.h"
 #include "stages/program/orientation_target.h"

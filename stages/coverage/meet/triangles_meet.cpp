@@ -148,16 +148,16 @@ Plane::Plane(const Triangle& t) : facet(t) {
 bool triangles_meet(const Plane& f, const Plane& g, int& shared) {
   const Corners p = corners_of(f.facet), q = corners_of(g.facet);
   shared = 0;
-  int own = -1, others = -1, own_left = 3, others_left = 3;  // of the shared corners: the last; the sums of those left over
+  int own = -1, others = -1, others_left = 3;  // of the shared corners: the last; the one of g that is left over
   for (int i = 0; i < 3; ++i) {
     for (int k = 0; k < 3; ++k) {
       if (*p[i] != *q[k]) continue;
       ++shared;
       own = i, others = k;
-      own_left -= i, others_left -= k;
+      others_left -= k;
     }
   }
-  if (shared >= 3) return true;
+  if (shared >= 3 || (shared == 2 && (others_left < 0 || others_left > 2))) return true;  // equal, or without area
   if (shared == 2) {
     if (side_of(f, *q[others_left]) != 0) return false;
     const double same = static_cast<double>(f.nx) * static_cast<double>(g.nx) +
