@@ -11,6 +11,7 @@
 #include "stages/cost/quote_table.h"
 #include "stages/data/text/readable.h"
 #include "stages/write/file.h"
+#include "stages/write/manifest/layer_files.h"
 #include "stages/write/replaceable.h"
 #include "stages/write/voxels/image.h"
 
@@ -178,6 +179,13 @@ Status check_own_file(const std::string& path, std::span<const std::string_view>
                            path)};
 }
 
+Status check_quote(const Arguments& arguments, const std::string& directory) {
+  const std::string path = arguments.text("--quote");
+  if (path.empty() || directory.empty() || !lies_in_job(path, directory)) return {};
+  return Error{Fault::kUsage, fmt::format("--quote {}: is among the files of the job in {}; name another file", one_line(path),
+                                          one_line(directory))};
+}
+
 Status write_quote(const Arguments& arguments, const std::vector<std::vector<std::string>>& rows) {
   if (!arguments.has("--quote")) return {};
   if (rows.empty()) return Error{Fault::kInput, "--quote: the job has no machine, or layers whose time was not recorded"};
@@ -219,6 +227,7 @@ Status check_outputs(const Arguments& arguments, const Job& job) {
   for (const PartRequest& part : job.parts) inputs.push_back({part.path, "a part"});
   inputs.push_back({job.machine.profile, "the machine profile"});
   for (const std::string& preset : job.machine.presets) inputs.push_back({preset, "a preset"});
+  if (Status status = check_quote(arguments, job.output); !status) return status;
   std::vector<std::string> outputs = outputs_of(arguments);
   add_output(job.output, outputs);
   return check_outputs(inputs, outputs);

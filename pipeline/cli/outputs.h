@@ -38,6 +38,9 @@ Status check_folder(std::string_view flag, const std::string& file);
 /// Allows a file to be replaced if it is absent, empty or carries one of lamina's marks. errors  kUsage
 Status check_own_file(const std::string& path, std::span<const std::string_view> marks);
 
+/// Refuses a table in the place of a job's own files. errors  kUsage
+Status check_quote(const Arguments& arguments, const std::string& directory);
+
 /// Writes the table that --quote asks for. errors  kInput: there is none, as layers of an earlier build have no times
 Status write_quote(const Arguments& arguments, const std::vector<std::vector<std::string>>& rows);
 

@@ -12,6 +12,7 @@
 #include "pipeline/output/resume.h"
 #include "stages/data/text/version.h"
 #include "stages/write/file.h"
+#include "stages/write/manifest/compare.h"
 #include "stages/write/program/dialect.h"
 
 namespace lamina::pipeline {
@@ -78,6 +79,9 @@ Status ImageFiles::open() {
   if (job.resume) {
     auto kept = layers_that_hold(job.output, manifest_name(job), head_);
     if (!kept) return kept.error();
+    if (job.quote && plan_.scene->images.empty()) {
+      if (Status status = check_shares_known(head_, *kept); !status) return status;
+    }
     kept_ = std::move(*kept);
     for (LayerRecord& record : kept_) tell_unfed(record);
   }

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "pipeline/run/sanity.h"
+#include "stages/slice/bodies.h"
 
 namespace lamina::pipeline {
 
@@ -18,14 +19,19 @@ JobCost::JobCost(const Plan& plan)
                title_of(plan.scene->parts)) {
   if (account_.parts() < 2) return;
   saturates_ = plan.images->dose.saturates();
-  std::vector<cost::Body> bodies;
-  for (const sanity::Solid& solid : solids_from_above(*plan.scene)) {
-    Box box = solid.box;
+  full_ = plan.images->dose.full();
+  const std::vector<sanity::Solid> solids = solids_from_above(*plan.scene);
+  std::vector<Box> boxes;
+  for (const sanity::Solid& solid : solids) {
+    Box box = full_ > 0 ? cost::box_of_voxels(solid.box, plan.images->grid) : solid.box;
     const auto [by_x, by_y] = plan.images->dose.zones().grows_nm(plan.images->dose.zones().of_part(solid.part));
     box.lo.x -= static_cast<Nm>(by_x), box.hi.x += static_cast<Nm>(by_x);
     box.lo.y -= static_cast<Nm>(by_y), box.hi.y += static_cast<Nm>(by_y);
-    bodies.push_back({box, solid.part, solid.group});
+    boxes.push_back(box);
   }
+  const std::vector<std::uint32_t> group = slice::group_seen_from_above(boxes);  // anew, for boxes have grown
+  std::vector<cost::Body> bodies;
+  for (std::size_t i = 0; i < solids.size(); ++i) bodies.push_back({boxes[i], solids[i].part, group[i]});
   const Mirror mirror = plan.job.mirror;
   const bool mirrored = mirror != Mirror::kNone;
   windows_.emplace(bodies, account_.parts(), plan.images->grid, mirrored && mirror != Mirror::kY,
@@ -34,7 +40,12 @@ JobCost::JobCost(const Plan& plan)
 
 void JobCost::count(const RunsView& image, const dose::DropWork& drops, LayerRecord& record) const {
   if (!windows_) return;
-  record.part_pixels = saturates_ ? windows_->count(record.layer, drops.zones) : windows_->count(record.layer, image);
+  if (full_ > 0) {
+    const Levels& voxels = saturates_ ? drops.zones : drops.shares;
+    record.part_pixels = windows_->share(record.layer, voxels, full_, record.dosed_pixels);
+  } else {
+    record.part_pixels = saturates_ ? windows_->count(record.layer, drops.zones) : windows_->count(record.layer, image);
+  }
   if (saturates_) record.part_drops = windows_->sum(record.layer, drops.levels);
 }
 

@@ -28,6 +28,7 @@ class JobCost {
   cost::Account account_;
   std::optional<cost::PartPixels> windows_;
   bool saturates_ = false;
+  std::uint8_t full_ = 0;  // level of a full voxel; 0: pixels are set or not
 };
 
 }  // namespace lamina::pipeline

@@ -1,17 +1,33 @@
 #include "stages/cost/account.h"
 
+#include <fmt/format.h>
+
+#include <cstdint>
+#include <filesystem>
+#include <map>
 #include <nlohmann/json.hpp>
+#include <set>
 
 #include "stages/cost/told.h"
 
 namespace lamina::cost {
 namespace {
 
+/// Parts by the names of their files, as manifests have them; the second a.stl is a.stl (2).
 std::vector<QuotedPart> named(std::span<const PartSummary> parts, bool apart, const std::string& title) {
   std::vector<QuotedPart> named;
   if (!apart) named.push_back({title, 0});
+  std::map<std::string, std::uint32_t> last;
+  std::set<std::string> taken;
   for (const PartSummary& part : parts) {
-    if (apart) named.push_back({part.path, 0});
+    if (apart) {
+      const std::string file = std::filesystem::path(part.path).filename().string();
+      std::string name = file;
+      std::uint32_t& number = last.try_emplace(file, 1).first->second;
+      while (taken.contains(name)) name = fmt::format("{} ({})", file, ++number);
+      taken.insert(name);
+      named.push_back({std::move(name), 0});
+    }
     named.back().copies += part.copies;
   }
   return named;

@@ -17,6 +17,14 @@ std::array<std::uint32_t, 2> pixels_of(const PixelAxis& axis, std::int64_t low, 
   return {at(low), at(high + 1)};
 }
 
+/// Edges, as in stages/coverage: voxel i lies from floor(i span / dots) to floor((i + 1) span / dots).
+void reach_voxels(const PixelAxis& axis, std::int32_t& low, std::int32_t& high) {
+  const std::int64_t first = floor_div((std::int64_t{low} + 1) * axis.dots + axis.span - 1, axis.span) - 1;
+  const std::int64_t end = ceil_div(std::int64_t{high} * axis.dots, axis.span);
+  low = static_cast<std::int32_t>(floor_div(first * axis.span, axis.dots));
+  high = static_cast<std::int32_t>(floor_div(end * axis.span, axis.dots) - 1);
+}
+
 constexpr auto as_one = [](std::size_t) { return std::uint8_t{1}; };
 
 std::span<const std::uint32_t> changes_of(const LevelsView& image, std::uint32_t row) {
@@ -25,6 +33,14 @@ std::span<const std::uint32_t> changes_of(const LevelsView& image, std::uint32_t
 }
 
 }  // namespace
+
+Box box_of_voxels(const Box& box, const PixelGrid& grid) {
+  Box reached = box;
+  if (box.lo.x >= box.hi.x || box.lo.y >= box.hi.y) return reached;
+  reach_voxels(grid.x, reached.lo.x, reached.hi.x);
+  reach_voxels(grid.y, reached.lo.y, reached.hi.y);
+  return reached;
+}
 
 PartPixels::PartPixels(std::span<const Body> bodies, std::size_t parts, const PixelGrid& grid, bool mirror_x, bool mirror_y)
     : parts_(parts) {
@@ -101,6 +117,20 @@ std::vector<std::uint64_t> PartPixels::sum(const Layer& layer, const LevelsView&
     const auto level_of = [&image, first = image.row_offset[r]](std::size_t run) { return image.level[first + run]; };
     return std::pair(changes_of(image, r), level_of);
   });
+}
+
+std::vector<std::uint64_t> PartPixels::share(const Layer& layer, const LevelsView& image, std::uint8_t full,
+                                             std::uint64_t voxels) const {
+  std::vector<std::uint64_t> weights = sums(layer, image.rows(), [&](std::uint32_t r) {
+    const auto level_of = [&image, full, first = image.row_offset[r]](std::size_t run) {
+      const std::uint8_t level = image.level[first + run];
+      return static_cast<std::uint8_t>(level > full ? level - full : level);
+    };
+    return std::pair(changes_of(image, r), level_of);
+  });
+  const auto whole = shares(static_cast<std::int64_t>(voxels), weights);
+  std::ranges::copy(whole, weights.begin());
+  return weights;
 }
 
 }  // namespace lamina::cost

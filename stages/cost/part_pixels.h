@@ -20,6 +20,10 @@ struct Body {
   std::uint32_t group = 0;  // bodies whose boxes touch seen from above; boxes around groups do not overlap
 };
 
+/// The box of all voxels that hold some of a box, for images of shares of voxels: pixels are set whose centres lie outside of
+/// the part. Boxes of bodies with no voxel in common do not touch.
+Box box_of_voxels(const Box& box, const PixelGrid& grid);
+
 /// Windows of bodies in the images of a bed. Exact where boxes seen from above lie apart. In a group of several parts the
 /// group's pixels of a layer are shared by what is set in the windows of those bodies that reach the layer: exact again where
 /// these windows have no set pixel in common.
@@ -30,6 +34,9 @@ class PartPixels {
 
   /// The pixels of each part; their sum is that of the groups. cost  rows of windows x log of a row's runs
   std::vector<std::uint64_t> count(const Layer& layer, const RunsView& runs) const;
+  /// The same of shares of voxels, weighed by them: whole ones by the largest remainder. full  the level of a full voxel in
+  /// the shell; a core's is twice that (dose/shares.h). voxels  that all come to
+  std::vector<std::uint64_t> share(const Layer& layer, const LevelsView& image, std::uint8_t full, std::uint64_t voxels) const;
   /// The pixels of each part that are of any level, and the sums of its levels: where levels are drops, what it gets.
   std::vector<std::uint64_t> count(const Layer& layer, const LevelsView& image) const;
   std::vector<std::uint64_t> sum(const Layer& layer, const LevelsView& image) const;

@@ -36,16 +36,16 @@ std::vector<std::pair<std::string, std::string>> lines_of(const Quote& quote, co
                                                           std::span<const QuotedPart> parts) {
   std::vector<std::pair<std::string, std::string>> lines;
   const Use& job = quote.job;
-  lines.emplace_back("material", fmt::format("{:.3f} ml of binder, {:.2f} ml of powder dosed: {:.2f} bound, {:.2f} left over",
-                                             ml(job.binder_nl), ml(job.fed_nl), ml(job.bound_nl), ml(job.left_nl())));
-  if (!has_prices(cost)) return lines;
+  lines.emplace_back("material", fmt::format("{:.3f} ml of binder{}, {:.2f} ml of powder dosed: {:.2f} bound, {:.2f} left over",
+                                             ml(job.binder_nl), cost.spit_drops > 0 ? " with cost.spit_drops" : "",
+                                             ml(job.fed_nl), ml(job.bound_nl), ml(job.left_nl())));
   const auto text = [&](const Use& use) {
     return fmt::format("{} {}: {:.2f} h {}, binder {}, powder {}", money(use.cents()), cost.currency, hours(use),
                        money(use.hour_cents), money(use.binder_cents), money(use.powder_cents));
   };
-  lines.emplace_back("cost", text(job));
+  if (has_prices(cost)) lines.emplace_back("cost", text(job));
   if (parts.size() < 2) return lines;
-  for (std::size_t p = 0; p < parts.size(); ++p) {
+  for (std::size_t p = 0; has_prices(cost) && p < parts.size(); ++p) {
     lines.emplace_back("", fmt::format("{}: {}", one_line(parts[p].name), text(quote.parts[p])));
   }
   if (quote.unknown_layers > 0) {
@@ -60,6 +60,7 @@ nlohmann::ordered_json json_of(const Quote& quote, const Machine::Cost& cost, st
   nlohmann::ordered_json json = use_json(quote.job, cost);
   if (has_prices(cost)) json["currency"] = cost.currency;
   if (!has_prices(cost) && parts.size() < 2) return json;
+  if (parts.size() > 1) json["unknown_layers"] = quote.unknown_layers;
   for (std::size_t p = 0; p < parts.size(); ++p) {
     nlohmann::ordered_json& part = json["parts"].emplace_back();
     part = {{"path", parts[p].name}};

@@ -17,6 +17,7 @@ namespace lamina::cost {
 std::vector<std::pair<std::string, std::string>> lines_of(const Quote& quote, const Machine::Cost& cost,
                                                           std::span<const QuotedPart> parts);
 
+/// Layers that do not say whose their pixels are, are told of several parts.
 /// An object: hours, litres and, with prices, the currency's units of the job; the same of each part under "parts", if there
 /// are prices or several.
 nlohmann::ordered_json json_of(const Quote& quote, const Machine::Cost& cost, std::span<const QuotedPart> parts);

@@ -153,6 +153,15 @@ TEST(Cost, PixelsOfPartsApartAreExactAndOthersShareTheirs) {
   EXPECT_EQ(PartPixels(apart, 2, bed, false, false).sum(layer, drops), (Pixels{200, 800}));
   EXPECT_EQ(PartPixels(apart, 2, bed, false, false).count(layer, drops), (Pixels{100, 400}));
   EXPECT_EQ(PartPixels(apart, 2, bed, true, false).sum(layer, drops), (Pixels{100, 200}));
+  // Levels of three for a full voxel: 100 pixels of two are 67, 200 of three in the core and 100 of one are 233, 300 in all.
+  Levels voxels;
+  voxels.start(40);
+  for (int r = 0; r < 20; ++r) {
+    if (r < 10) voxels.append(0, 10, 2);
+    if (r < 20) voxels.append(20, 30, 6), voxels.append(30, 40, 1);
+    voxels.end_row();
+  }
+  EXPECT_EQ(PartPixels(apart, 2, bed, false, false).share(layer, voxels, 3, 333), (Pixels{67, 266}));
   touching[0].box.lo.z = 600'000;
   EXPECT_EQ(PartPixels(touching, 2, bed, false, false).count(layer, runs), (Pixels{0, 500}));
 }

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <filesystem>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
@@ -152,6 +153,68 @@ TEST_F(Quotes, AreRefusedWhereNothingIsKnown) {
   EXPECT_EQ(run("jet a.stl --machine free.toml --layer 1 --quote mine.csv -o out").code, 2);
   EXPECT_EQ(test::read_text(directory_ / "mine.csv"), "part;mine\n");
   EXPECT_EQ(run("verify one two --quote q.csv").code, 2);
+}
+
+TEST_F(Quotes, KeptLayersThatSayNothingAreNoTable) {
+  const std::string job = "jet a.stl b.stl --machine free.toml --layer 1 --quiet -o out";
+  ASSERT_EQ(run(job).code, 0);
+  test::expect_refused(job + " --resume --quote q.csv", 2, "4 layers of an earlier run do not say which part", directory_);
+  EXPECT_EQ(run(job + " --overwrite --quote q.csv").code, 0);
+  EXPECT_EQ(run(job + " --resume --quote again.csv").code, 0);
+  EXPECT_EQ(test::read_text(directory_ / "again.csv"), test::read_text(directory_ / "q.csv"));
+  // A job of both kinds of layers is told as what it is.
+  std::string manifest = test::read_text(directory_ / "out/manifest.json");
+  const std::size_t list = manifest.find("\"part_pixels\": ["), end = manifest.find("]", list);
+  ASSERT_NE(end, std::string::npos);
+  const std::size_t comma = manifest.rfind(',', list);
+  test::write_text(directory_ / "out/manifest.json", manifest.erase(comma, end + 1 - comma));
+  const test::Outcome verified = run("verify out");
+  EXPECT_NE(verified.out.find("1 layers do not say whose"), std::string::npos) << verified.out << verified.err;
+  EXPECT_EQ(nlohmann::json::parse(run("verify out --json").out)["use"]["unknown_layers"], 1);
+}
+
+TEST_F(Quotes, NeverReplaceFilesOfTheJob) {
+  const std::string job = "jet a.stl --machine free.toml --layer 1 --quiet --overwrite ";
+  ASSERT_EQ(run(job + "-o out").code, 0);
+  for (const char* file :
+       {"out/manifest.json", "out/program/machine.toml", "out/layers/new.csv", "out/manifest-1-of-2.json.part"}) {
+    test::expect_refused(job + "-o out --quote " + file, 2, "is among the files of the job in out", directory_);
+    test::expect_refused(std::string("verify out --overwrite --quote ") + file, 2, "", directory_);
+  }
+  test::expect_refused("verify out/ --quote out/program/new.csv", 2, "is among the files of the job", directory_);
+  EXPECT_EQ(run("verify out --quote out/quote.csv").code, 0);
+  test::expect_refused("verify out out --quote q.csv", 2, "is of one directory; verify them one by one", directory_);
+  test::expect_refused("verify out --quick --quote q.csv", 2, "leave --quick out", directory_);
+}
+
+TEST_F(Quotes, PartsAreNamedAlikeAndApart) {
+  std::filesystem::create_directory(directory_ / "in");
+  test::write_box(directory_ / "in/a.stl", {0, 0, 0}, {5, 5, 4});
+  ASSERT_EQ(run("jet a.stl in/a.stl --machine printer.toml --layer 1 --quiet --quote q.csv -o out").code, 0);
+  ASSERT_EQ(run("verify out --quote v.csv").code, 0);
+  EXPECT_EQ(test::read_text(directory_ / "v.csv"), test::read_text(directory_ / "q.csv"));
+  EXPECT_EQ(table("q.csv")[1][0], "a.stl");
+  EXPECT_EQ(table("q.csv")[2][0], "a.stl (2)");
+}
+
+// What is spat by the program is in its drops; what the host spits is added: 4 layers x 20,000.
+TEST_F(Quotes, ThePageHasTheRowsOfTheFiles) {
+  test::write_text(directory_ / "spits.toml",
+                   std::string(kPrinter) + kPrices + "[care]\nspit_layers = 1\nspit_drops = 50\nspit_mm = [-40, 5]\n");
+  ASSERT_EQ(run("jet a.stl b.stl --machine spits.toml --layer 1 --quiet --quote q.csv -o out").code, 0);
+  const test::Outcome verified = run("verify out --quote v.csv");
+  ASSERT_EQ(verified.code, 0) << verified.err;
+  EXPECT_NE(verified.out.find("ml of binder with cost.spit_drops, "), std::string::npos) << verified.out;
+  const auto spat = nlohmann::json::parse(run("verify out --json").out)["replay"];
+  EXPECT_GT(spat["spat_drops"], 0);
+  const Rows rows = table("v.csv");
+  EXPECT_EQ(rows[3][4], std::to_string(spat["drops"].get<std::int64_t>() + spat["spat_drops"].get<std::int64_t>() + 80'000));
+  EXPECT_EQ(table("q.csv"), rows);
+  ASSERT_EQ(run("report out -o page.html --quiet").code, 0);
+  const std::string page = test::read_text(directory_ / "page.html");
+  const std::size_t begin = page.find("[[\"part\",\"copies\""), end = page.find("]]", begin);
+  ASSERT_NE(end, std::string::npos);
+  EXPECT_EQ(nlohmann::json::parse(page.substr(begin, end + 2 - begin)).get<Rows>(), rows);
 }
 
 // Without prices money and grams are empty, and parts are told apart all the same.

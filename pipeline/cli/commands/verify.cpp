@@ -57,8 +57,11 @@ Json report_json(const VerifyReport& report) {
 Outcome run_verify(const Arguments& arguments, Context& context) {
   if (arguments.operands.empty())
     return Error{Fault::kUsage, "no directory to verify; name one that lamina jet or lamina slice wrote"};
-  if (arguments.has("--quote") && (arguments.operands.size() > 1 || arguments.has("--quick")))
-    return at_option("--quote", "is of one directory, whose programs are replayed; leave --quick out");
+  if (arguments.has("--quote") && arguments.operands.size() > 1)
+    return at_option("--quote", "is of one directory; verify them one by one");
+  if (arguments.has("--quote") && arguments.has("--quick"))
+    return at_option("--quote", "tells what programs do that are replayed; leave --quick out");
+  if (Status status = check_quote(arguments, arguments.operands.front()); !status) return status;
   if (Status status = check_folder("--quote", arguments.text("--quote")); !status) return status;
   int code = 0;
   Answer answer(arguments, context);

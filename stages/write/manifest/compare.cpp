@@ -127,6 +127,17 @@ std::string fault_of_shares(const ManifestHead& head, const LayerRecord& record)
   return pixels.empty() ? fault(record.part_drops, record.drops, "drops") : pixels;
 }
 
+Status check_shares_known(const ManifestHead& head, const std::vector<LayerRecord>& kept) {
+  const auto unknown = std::ranges::count_if(kept, [&](const LayerRecord& record) {
+    return record.filled_pixels() > 0 && record.part_pixels.size() != head.parts.size();
+  });
+  if (unknown == 0 || head.parts.size() < 2) return {};
+  return Error{Fault::kUsage, fmt::format("--quote: {} layers of an earlier run do not say which part their pixels belong to; "
+                                          "plan again with --overwrite, or go on without --quote and let lamina verify --quote "
+                                          "tell all parts as one",
+                                          unknown)};
+}
+
 std::uint64_t compare_paths(const std::string& directory, const Manifest& manifest, Faults& faults) {
   return PathComparison(directory, manifest, faults).run();
 }

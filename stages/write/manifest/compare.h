@@ -21,6 +21,9 @@ std::string fault_of_file(const std::string& directory, const std::string& name,
 /// "", or how the shares of a layer's parts contradict what the layer has, as in "layer 3: its parts ...".
 std::string fault_of_shares(const ManifestHead& head, const LayerRecord& record);
 
+/// Refuses to tell several parts apart where layers that are kept do not say whose their pixels are. errors  kUsage
+Status check_shares_known(const ManifestHead& head, const std::vector<LayerRecord>& kept);
+
 /// Compares contours or toolpaths with their manifest: hash of each layer, in the single file or in per-layer files;
 /// layers without gaps; hash of the whole single file; no other layers in layers/.
 ///

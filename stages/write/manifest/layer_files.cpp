@@ -69,6 +69,16 @@ std::vector<fs::path> program_frames(const std::string& directory) {
 
 }  // namespace
 
+bool lies_in_job(const std::string& file, const std::string& directory) {
+  std::error_code error;
+  const auto place = [&](const std::string& name) { return fs::weakly_canonical(fs::absolute(name, error), error); };
+  const fs::path inside = place(file).lexically_relative(place(directory));
+  if (inside.empty()) return false;
+  const fs::path& first = *inside.begin();
+  ManifestFile manifest;
+  return first == "layers" || first == "program" || is_manifest(inside.string(), manifest);
+}
+
 std::vector<ManifestFile> find_manifests(const std::string& directory) {
   std::vector<ManifestFile> found;
   for_each_entry(directory, [&](const fs::directory_entry& entry) {

@@ -23,6 +23,10 @@ struct ManifestFile {
 /// All manifests of a directory, the whole job's first, then by shard; empty if the directory is missing.
 std::vector<ManifestFile> find_manifests(const std::string& directory);
 
+/// Whether a file, there or not, is or would be one of a job's directory: a manifest, or anything in layers/ or program/. Names
+/// are followed through links.
+bool lies_in_job(const std::string& file, const std::string& directory);
+
 /// Takes the index off a layer's file name: the digits that lamina writes, 000042 or 1234567; false for other names.
 bool take_layer_index(std::string_view& name, std::uint32_t& index);
 /// Parses the name of a layer's file: 000042.tif, 000042-bronze.tif, or of a temporary file of one; false for others.
