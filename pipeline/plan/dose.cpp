@@ -33,7 +33,7 @@ void DosePlan::thin(std::uint32_t layer, Runs& image, Runs& second, Runs& third)
   std::swap(image, second);
 }
 
-Status DosePlan::decide(const Job& job, const Machine* machine, std::uint32_t layers,
+Status DosePlan::decide(const Job& job, const Machine* machine, const Scene& scene, std::uint32_t layers,
                         const std::function<Layer(std::uint32_t)>& layer, std::vector<Warning>& warnings) {
   const bool asked = wishes_.has_value();
   if (asked || (job.levels > 0 && write::find_level_format(job.format) == nullptr)) rules_.most_drops = 1;
@@ -46,7 +46,10 @@ Status DosePlan::decide(const Job& job, const Machine* machine, std::uint32_t la
   const auto& powder = machine->powder;
   binder_ = {machine->head.drop_pl, powder.evaporates_percent / 100, powder.packing};
   limit_ = machine->head.most_drop_sweeps > 0 ? machine->head.most_drop_sweeps : dose::kMostDrops;
-  budget_.emplace(binder_, grid_, wishes_, limit_, powder.least_saturation_percent);
+  const auto pitch = static_cast<std::int64_t>(std::ceil(1 / std::min(grid_.x.pixels_per_nm(), grid_.y.pixels_per_nm())));
+  budget_.emplace(binder_, grid_, wishes_, limit_, powder.least_saturation_percent,
+                  dose::Jetting{rules_.dithered, !rules_.shell.half_width.empty(), core_},
+                  dose::Stretches(zone_boxes(scene, zones_, grid_), zones_.count(), nm_of(job.dose.shell_mm), pitch));
   for (std::uint32_t i = 0; i < layers; ++i) budget_->foresee(layer(i));
   if (asked) rules_.most_drops = std::max(1u, budget_->most_drops());
   return budget_->judge(job.allow_unbound, warnings);
@@ -55,7 +58,10 @@ Status DosePlan::decide(const Job& job, const Machine* machine, std::uint32_t la
 dose::ZoneSums DosePlan::saturate(const Layer& layer, Runs& image, std::span<const Runs> zone, Runs& second,
                                   dose::DropWork& work) const {
   const auto dose_of = [&](std::uint32_t z) {
-    return wishes_ ? dose::dose_of(layer, *wishes_, binder_, grid_, limit_, z) : dose::one_drop();
+    dose::LayerDose dose = wishes_ ? dose::dose_of(layer, *wishes_, binder_, grid_, limit_, z) : dose::one_drop();
+    // Of shares of voxels the drops of each are rounded, not those of full ones.
+    if (wishes_ && !rules_.dithered && zones_.several()) dose::round_drops(dose, binder_, grid_, layer.thickness);
+    return dose;
   };
   if (!zones_.several()) return dose::drops_of_layer(rules_, dose_of(0), layer.index, image, second, work);
   std::vector<dose::LayerDose> doses;

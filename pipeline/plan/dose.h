@@ -8,6 +8,7 @@
 
 #include "pipeline/job/job.h"
 #include "pipeline/plan/dose_zones.h"
+#include "pipeline/plan/scene.h"
 #include "stages/data/grid.h"
 #include "stages/data/layer.h"
 #include "stages/data/machine.h"
@@ -27,8 +28,8 @@ class DosePlan {
 
   /// Decides the drops of all layers of a job. machine  null without one
   /// errors  kUsage: a saturation without a machine; less than the powder needs; shares of voxels that are thinned
-  Status decide(const Job& job, const Machine* machine, std::uint32_t layers, const std::function<Layer(std::uint32_t)>& layer,
-                std::vector<Warning>& warnings);
+  Status decide(const Job& job, const Machine* machine, const Scene& scene, std::uint32_t layers,
+                const std::function<Layer(std::uint32_t)>& layer, std::vector<Warning>& warnings);
 
   /// Whether the dose changes any layer.
   bool any() const { return bleeds() || core_ < 1 || saturates(); }

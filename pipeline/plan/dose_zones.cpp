@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "pipeline/plan/sections.h"
+#include "stages/data/mesh.h"
 #include "stages/raster/combine.h"
 
 namespace lamina::pipeline {
@@ -145,6 +147,21 @@ void DoseZones::remove_bleed(const Layer& layer, Runs& image, std::span<Runs> zo
     std::swap(zone[z], work.second);
     lay(zone[z]);
   }
+}
+
+std::vector<dose::ZoneBox> zone_boxes(const Scene& scene, const DoseZones& zones, const PixelGrid& grid) {
+  std::vector<dose::ZoneBox> boxes;
+  for (std::size_t i = 0; i < scene.instances.size(); ++i) {
+    const std::uint32_t zone = zones.of_part(scene.part_of_instance[i]);
+    const auto [x, y] = zones.grows_nm(zone);
+    const Box box = box_of(scene, scene.instances[i]);
+    boxes.push_back({zone, {box.lo.x - x, box.lo.y - y, box.lo.z}, {box.hi.x + x, box.hi.y + y, box.hi.z}});
+  }
+  for (const PlacedImages& of : scene.images) {  // anywhere on the bed
+    const std::int64_t top = of.bottom + std::int64_t{of.thickness} * of.images->layers();
+    boxes.push_back({zones.of_part(of.part), {0, 0, of.bottom}, {grid.x.length, grid.y.length, top}});
+  }
+  return boxes;
 }
 
 }  // namespace lamina::pipeline

@@ -8,12 +8,14 @@
 #include <vector>
 
 #include "pipeline/job/job.h"
+#include "pipeline/plan/scene.h"
 #include "stages/data/grid.h"
 #include "stages/data/layer.h"
 #include "stages/data/runs.h"
 #include "stages/dose/dilate.h"
 #include "stages/dose/erode.h"
 #include "stages/dose/holes.h"
+#include "stages/dose/stretches.h"
 #include "stages/dose/wish.h"
 
 namespace lamina::pipeline {
@@ -82,5 +84,8 @@ class DoseZones {
   std::vector<std::uint32_t> of_part_;
   std::uint32_t first_layers_ = 0;
 };
+
+/// What parts cover at most, after their edges moved.
+std::vector<dose::ZoneBox> zone_boxes(const Scene& scene, const DoseZones& zones, const PixelGrid& grid);
 
 }  // namespace lamina::pipeline

@@ -289,7 +289,8 @@ class Planner {
     if (beads_) beads.emplace(job(), grid, *plan_.sections, *plan_.segments);
     const double bed = static_cast<double>(grid.columns()) * grid.rows();
     const auto layer = [this](std::uint32_t i) { return plan_.layer(i); };
-    if (Status status = dose.decide(job(), machine(), plan_.layer_count, layer, plan_.warnings); !status) return status;
+    if (Status status = dose.decide(job(), machine(), *plan_.scene, plan_.layer_count, layer, plan_.warnings); !status)
+      return status;
     if (dose.most_drops() > 1 && materials_.several()) {
       return usage("--saturation: several drops a pixel of several materials are not planned together; plan them apart");
     }

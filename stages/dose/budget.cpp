@@ -10,16 +10,6 @@
 namespace lamina::dose {
 namespace {
 
-void add(const Layer& layer, double asked, double gets, std::vector<LayerSpan>& spans) {
-  const std::int64_t top = std::int64_t{layer.bottom} + layer.thickness;
-  if (!spans.empty() && (spans.back().last == layer.index || spans.back().last == layer.index + 1)) {
-    spans.back().last = layer.index + 1;
-    spans.back().to_nm = top;
-    return;
-  }
-  spans.push_back({layer.index, layer.index + 1, layer.bottom, top, asked, gets});
-}
-
 /// "layers 3:9 (z 0.3 to 0.9 mm)", and how many others there are.
 std::string where(const std::vector<LayerSpan>& spans) {
   std::uint32_t layers = 0;
@@ -31,11 +21,36 @@ std::string where(const std::vector<LayerSpan>& spans) {
   return text;
 }
 
+/// As the job names it.
+std::string_view key_of(std::size_t place, const Wishes& wishes, bool core) {
+  if (place == 0) return core ? "--core-saturation" : "--saturation";
+  if (place <= wishes.ranges.size()) return "dose.saturation_range";
+  return core ? "part.core_saturation_percent" : "part.saturation_percent";
+}
+
 }  // namespace
 
+void DoseFault::add(const Layer& layer, double asked_percent, double gets_percent, double asked_drops, bool worse) {
+  const std::int64_t top = std::int64_t{layer.bottom} + layer.thickness;
+  if (!where.empty() && gets_percent != gets) alike = false;
+  if (where.empty() || worse) asked = asked_percent, gets = gets_percent, drops = asked_drops;
+  if (!where.empty() && (where.back().last == layer.index || where.back().last == layer.index + 1)) {
+    where.back().last = layer.index + 1;
+    where.back().to_nm = top;
+  } else {
+    where.push_back({layer.index, layer.index + 1, layer.bottom, top});
+  }
+}
+
 Budget::Budget(const Binder& binder, const PixelGrid& grid, std::optional<Wishes> wishes, std::uint32_t most_drops,
-               double least_percent)
-    : binder_(binder), grid_(grid), wishes_(std::move(wishes)), limit_(most_drops), least_percent_(least_percent) {}
+               double least_percent, const Jetting& jetting, Stretches stretches)
+    : binder_(binder),
+      grid_(grid),
+      wishes_(std::move(wishes)),
+      limit_(most_drops),
+      least_percent_(least_percent),
+      jetting_(jetting),
+      stretches_(std::move(stretches)) {}
 
 const LayerDose& Budget::dose(const Layer& layer, std::uint32_t zone) {
   const auto [found, fresh] = known_.try_emplace({wishes_ ? wishes_->place_of(layer, zone) : 0, layer.thickness});
@@ -43,36 +58,65 @@ const LayerDose& Budget::dose(const Layer& layer, std::uint32_t zone) {
   LayerDose& dose = found->second;
   if (wishes_) {
     dose = dose_of(layer, *wishes_, binder_, grid_, limit_, zone);
+    if (!jetting_.dithered) round_drops(dose, binder_, grid_, layer.thickness);
   } else {
     dose = one_drop();
-    dose.gets = dose.gets_core = dose.asked = dose.asked_core = saturation_of(1, binder_, grid_, layer.thickness);
+    dose.gets = dose.asked = saturation_of(1, binder_, grid_, layer.thickness);
+    dose.gets_core = dose.asked_core = dose.gets * jetting_.core;
   }
   return dose;
 }
 
 void Budget::foresee(const Layer& layer) {
   for (std::uint32_t zone = 0; zone < (wishes_ ? wishes_->zones() : 1); ++zone) {
+    if (!stretches_.any(zone, layer)) continue;
     const LayerDose& of = dose(layer, zone);
-    most_drops_ = std::max(most_drops_, of.most());
-    const double least = std::min(of.gets, of.gets_core), most = std::max(of.gets, of.gets_core);
-    gets_ = seen_ ? std::pair(std::min(gets_.first, least), std::max(gets_.second, most)) : std::pair(least, most);
-    seen_ = true;
-    if (of.cut) add(layer, std::max(of.asked, of.asked_core), most, cut_);
-    if (least < least_percent_ * (1 - 1e-6)) add(layer, std::min(of.asked, of.asked_core), least, unbound_);
+    const bool differ = of.asked != of.asked_core;
+    if (jetting_.shell || !differ) look_at(layer, zone, of, false);
+    if (differ && (!jetting_.shell || stretches_.core(zone, layer))) look_at(layer, zone, of, true);
+  }
+}
+
+void Budget::look_at(const Layer& layer, std::uint32_t zone, const LayerDose& dose, bool core) {
+  const double asked = core ? dose.asked_core : dose.asked, gets = core ? dose.gets_core : dose.gets;
+  const Drops24 drops = core ? dose.core : dose.shell, asked_drops = core ? dose.asked_inside : dose.asked_shell;
+  const double wish = static_cast<double>(asked_drops) / static_cast<double>(kOneDrop);
+  most_drops_ = std::max(most_drops_, static_cast<std::uint32_t>((drops + kOneDrop - 1) >> kDropBits));
+  gets_ = seen_ ? std::pair(std::min(gets_.first, gets), std::max(gets_.second, gets)) : std::pair(gets, gets);
+  seen_ = true;
+  if (asked_drops > Drops24{limit_} << kDropBits) cut_.add(layer, asked, gets, wish, asked > cut_.asked);
+  if (gets < least_percent_ * (1 - 1e-6)) unbound_.add(layer, asked, gets, wish, gets < unbound_.gets);
+  if (!wishes_) return;
+  const std::size_t place = wishes_->place_of(layer, zone);
+  if (drops == 0 && asked > 0) none_[{place, core}].add(layer, asked, gets, wish, false);
+  if (place > wishes_->ranges.size()) jetted_[zone] |= drops > 0 || asked > 0;
+}
+
+void Budget::warn_of_none(std::vector<Warning>& warnings) const {
+  for (const auto& [of, fault] : none_) {
+    warnings.push_back({"no-drop", fmt::format("{}: {} % is {:.2f} drops a pixel, which rounds to none in {}; leave out "
+                                               "--no-dither, or ask for more",
+                                               key_of(of.first, *wishes_, of.second), number_text(fault.asked), fault.drops,
+                                               where(fault.where))});
+  }
+  for (const auto& [zone, jetted] : jetted_) {
+    if (!jetted) warnings.push_back({"no-drop", "part.saturation_percent: 0: that part stays loose powder"});
   }
 }
 
 Status Budget::judge(bool allow_unbound, std::vector<Warning>& warnings) const {
-  if (!cut_.empty()) {
+  if (!cut_.where.empty()) {
     warnings.push_back({"saturation", fmt::format("--saturation: {:.1f} % needs more than the {} drops a pixel that may be "
                                                   "jetted, {} get {:.1f} %; thinner layers or larger drops reach it",
-                                                  cut_.front().asked, limit_, where(cut_), cut_.front().gets)});
+                                                  cut_.asked, limit_, where(cut_.where), cut_.gets)});
   }
-  if (unbound_.empty()) return {};
+  warn_of_none(warnings);
+  if (unbound_.where.empty()) return {};
+  const std::string asked = has_wish() ? fmt::format(" where {} % is asked", number_text(unbound_.asked)) : "";
   const std::string text = fmt::format(
-      "{} get {:.1f} % of their voids filled, and the powder binds from {} % on "
+      "{} get {}{:.1f} % of their voids filled{}, and the powder binds from {} % on "
       "(powder.least_saturation_percent)",
-      where(unbound_), unbound_.front().gets, number_text(least_percent_));
+      where(unbound_.where), unbound_.alike ? "" : "as little as ", unbound_.gets, asked, number_text(least_percent_));
   if (!allow_unbound) {
     return Error{Fault::kUsage, fmt::format("{}: {}; give {} saturation, or --allow-unbound",
                                             has_wish() ? "--saturation" : "dose", text, has_wish() ? "a higher" : "a")};
@@ -106,7 +150,10 @@ std::string told(const Budget& budget, const BinderCount& count) {
   if (!budget.has_wish()) {
     const auto [least, most] = budget.gets();
     const std::string share = least == most ? fmt::format("{:.1f}", most) : fmt::format("{:.1f} to {:.1f}", least, most);
-    return fmt::format("one drop of {} pl a pixel fills {} % of the voids", number_text(budget.binder().drop_pl), share);
+    const double core = budget.jetting().core;
+    const std::string thinned = core < 1 ? fmt::format(", of the core's {} %,", number_text(100 * core)) : "";
+    return fmt::format("one drop of {} pl a pixel{} fills {} % of the voids", number_text(budget.binder().drop_pl), thinned,
+                       share);
   }
   return fmt::format("{:.2f} % of the voids reached, {:.2f} % asked; {} drops, {:.3f} ml of binder, up to {} a pixel",
                      count.reached_percent(budget), count.asked_percent(budget), readable_count(count.drops()),

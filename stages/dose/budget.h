@@ -10,15 +10,31 @@
 
 #include "stages/data/layer.h"
 #include "stages/data/status.h"
+#include "stages/dose/stretches.h"
 #include "stages/dose/wish.h"
 
 namespace lamina::dose {
 
-/// Layers [first, last) that follow each other and have one thing in common.
+/// Layers [first, last) that follow each other.
 struct LayerSpan {
   std::uint32_t first = 0, last = 0;
   std::int64_t from_nm = 0, to_nm = 0;  // heights above the bed
-  double asked = 0, gets = 0;           // per cent, of the first of them
+};
+
+/// Layers that have a fault in common, and the worst of them.
+struct DoseFault {
+  std::vector<LayerSpan> where;
+  double asked = 0, gets = 0, drops = 0;  // per cent and drops a pixel, of the worst
+  bool alike = true;                      // all get the same
+  /// worse  whether this is worse than what was found so far
+  void add(const Layer& layer, double asked_percent, double gets_percent, double asked_drops, bool worse);
+};
+
+/// How drops are jetted.
+struct Jetting {
+  bool dithered = true;  // else drops of a pixel are rounded to whole ones
+  bool shell = false;    // else all is core
+  double core = 1;       // share of the core's pixels that get their drop; a job with a wish has 1
 };
 
 /// Looks at the layers of a job before any is made.
@@ -27,8 +43,9 @@ class Budget {
   /// wishes         none: one drop a pixel
   /// most_drops     that may be jetted on a pixel
   /// least_percent  of the voids, that binds; 0: nobody knows
+  /// stretches      where doses are needed: those of nothing are not judged
   Budget(const Binder& binder, const PixelGrid& grid, std::optional<Wishes> wishes, std::uint32_t most_drops,
-         double least_percent);
+         double least_percent, const Jetting& jetting = {true, true, 1}, Stretches stretches = {});
 
   /// Layers in their order. cost  that of dose_of(), once for equal layers
   void foresee(const Layer& layer);
@@ -36,27 +53,35 @@ class Budget {
   /// The most drops of any pixel in the layers so far.
   std::uint32_t most_drops() const { return most_drops_; }
 
-  /// Warns of wishes that cannot be met. errors  kUsage: layers get less than binds, and that is not allowed
+  /// Warns of wishes that cannot be met, and of those that come to no drop.
+  /// errors  kUsage: layers get less than binds, and that is not allowed
   Status judge(bool allow_unbound, std::vector<Warning>& warnings) const;
 
   const Binder& binder() const { return binder_; }
   const PixelGrid& grid() const { return grid_; }
+  const Jetting& jetting() const { return jetting_; }
   bool has_wish() const { return wishes_.has_value(); }
   /// Least and most per cent that the layers get.
   std::pair<double, double> gets() const { return gets_; }
 
  private:
   const LayerDose& dose(const Layer& layer, std::uint32_t zone);
+  void look_at(const Layer& layer, std::uint32_t zone, const LayerDose& dose, bool core);
+  void warn_of_none(std::vector<Warning>& warnings) const;
 
   Binder binder_;
   PixelGrid grid_;
   std::optional<Wishes> wishes_;
   std::uint32_t limit_, most_drops_ = 0;
   double least_percent_;
+  Jetting jetting_;
+  Stretches stretches_;
   std::pair<double, double> gets_{0, 0};
   bool seen_ = false;
   std::map<std::pair<std::size_t, Nm>, LayerDose> known_;  // by place of the wish and thickness
-  std::vector<LayerSpan> cut_, unbound_;
+  DoseFault cut_, unbound_;
+  std::map<std::pair<std::size_t, bool>, DoseFault> none_;  // wishes above 0 that come to no drop; by place, of the core
+  std::map<std::uint32_t, bool> jetted_;                    // whether parts with a wish of their own get any; by zone
 };
 
 /// Counts what layers got.

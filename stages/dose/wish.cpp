@@ -50,4 +50,10 @@ LayerDose dose_of(const Layer& layer, const Wishes& wishes, const Binder& binder
   return dose;
 }
 
+void round_drops(LayerDose& dose, const Binder& binder, const PixelGrid& grid, std::int64_t thickness_nm) {
+  for (Drops24* of : {&dose.shell, &dose.core}) *of = (*of + kOneDrop / 2) >> kDropBits << kDropBits;
+  dose.gets = per_cent(dose.shell, binder, grid, thickness_nm);
+  dose.gets_core = per_cent(dose.core, binder, grid, thickness_nm);
+}
+
 }  // namespace lamina::dose

@@ -54,6 +54,9 @@ struct LayerDose {
   }
 };
 
+/// Drops rounded to whole ones, half of one to one, and what they give: as a job without dithering jets them.
+void round_drops(LayerDose& dose, const Binder& binder, const PixelGrid& grid, std::int64_t thickness_nm);
+
 /// Of a layer without a wish: a drop a pixel.
 inline LayerDose one_drop() {
   LayerDose dose;

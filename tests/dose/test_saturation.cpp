@@ -4,6 +4,8 @@
 #include <array>
 #include <cmath>
 #include <complex>
+#include <optional>
+#include <string>
 #include <vector>
 
 #include "stages/data/input/hash.h"
@@ -12,6 +14,7 @@
 #include "stages/dose/dither.h"
 #include "stages/dose/saturation.h"
 #include "stages/dose/shares.h"
+#include "stages/dose/stretches.h"
 #include "stages/dose/wish.h"
 #include "tests/program/machines.h"
 
@@ -265,6 +268,94 @@ TEST(Budget, WithoutAWishTellsWhatOneDropGives) {
   std::vector<Warning> warnings;
   EXPECT_TRUE(budget.judge(false, warnings).ok());
   EXPECT_EQ(told(budget, {}), "one drop of 40 pl a pixel fills 10.0 % of the voids");
+}
+
+std::string refusal(const Budget& budget, std::vector<Warning>& warnings) {
+  const Status status = budget.judge(false, warnings);
+  return status.ok() ? "" : status.error().message;
+}
+
+// 10 % a drop: 14 % is 1.4 drops, one of which is jetted; of the core's 4 % none is.
+TEST(Budget, JudgesAndTellsDropsAsTheyAreRounded) {
+  const Binder binder{40, 0, 0.6};
+  Budget dithered(binder, kTenths, Wishes{{14, 4.0}, {}}, 10, 0),
+      whole(binder, kTenths, Wishes{{14, 4.0}, {}}, 10, 0, {false, true, 1});
+  for (Budget* budget : {&dithered, &whole}) budget->foresee(tenth(0));
+  EXPECT_EQ(dithered.most_drops(), 2u);
+  EXPECT_EQ(whole.most_drops(), 1u);
+  EXPECT_NEAR(whole.gets().second, 10, 1e-9);
+  EXPECT_EQ(whole.gets().first, 0);
+  std::vector<Warning> warnings;
+  EXPECT_EQ(refusal(dithered, warnings), "");
+  EXPECT_TRUE(warnings.empty());
+  EXPECT_EQ(refusal(whole, warnings), "");
+  ASSERT_EQ(warnings.size(), 1u);
+  EXPECT_EQ(warnings[0].text.find("--core-saturation: 4 % is 0.40 drops a pixel, which rounds to none in layers 0:1"), 0u)
+      << warnings[0].text;
+  Budget bound(binder, kTenths, Wishes{{14, {}}, {}}, 10, 12, {false, true, 1});
+  bound.foresee(tenth(0));
+  EXPECT_NE(refusal(bound, warnings).find("get 10.0 %"), std::string::npos) << refusal(bound, warnings);
+}
+
+TEST(Budget, JudgesTheShareOfACore) {
+  const Binder binder{40, 0, 0.6};
+  std::vector<Warning> warnings;
+  Budget core(binder, kTenths, std::nullopt, 64, 1, {true, false, 0.05}),
+      shell(binder, kTenths, std::nullopt, 64, 1, {true, true, 0.05});
+  for (Budget* budget : {&core, &shell}) budget->foresee(tenth(0));
+  EXPECT_NE(refusal(core, warnings).find("get 0.5 %"), std::string::npos) << refusal(core, warnings);
+  EXPECT_NE(refusal(shell, warnings).find("get 0.5 %"), std::string::npos) << refusal(shell, warnings);
+  EXPECT_EQ(told(core, {}), "one drop of 40 pl a pixel, of the core's 5 %, fills 0.5 % of the voids");
+  EXPECT_EQ(told(shell, {}), "one drop of 40 pl a pixel, of the core's 5 %, fills 0.5 to 10.0 % of the voids");
+}
+
+TEST(Budget, NamesTheWorstDose) {
+  const Binder binder{40, 0, 0.6};
+  std::vector<Warning> warnings;
+  Budget budget(binder, kTenths, Wishes{{15, {}}, {{0.2, 0.3, {5, {}}}}, {Wish{8, {}}}}, 64, 20);
+  for (std::uint32_t i = 0; i < 4; ++i) budget.foresee(tenth(i));
+  const std::string text = refusal(budget, warnings);
+  EXPECT_NE(text.find("layers 0:4 (z 0.000 to 0.400 mm) get as little as 5.0 % of their voids filled where 5 % is asked"),
+            std::string::npos)
+      << text;
+}
+
+TEST(Budget, TellsOfAPartWithoutADrop) {
+  std::vector<Warning> warnings;
+  Budget budget({40, 0, 0.6}, kTenths, Wishes{{100, {}}, {}, {Wish{0, {}}, Wish{50, {}}}}, 64, 0);
+  budget.foresee(tenth(0));
+  EXPECT_EQ(refusal(budget, warnings), "");
+  ASSERT_EQ(warnings.size(), 1u);
+  EXPECT_EQ(warnings[0].text, "part.saturation_percent: 0: that part stays loose powder");
+}
+
+// Zone 0 has no part; that of zone 1 stands at 0.2 to 0.35 mm and is too narrow for a core.
+TEST(Budget, LooksAtWhatIsThere) {
+  const Wishes wishes{{5000, {}}, {{0, 0.2, {1, {}}}}, {Wish{70, 5.0}}};
+  const ZoneBox box{1, {0, 0, 200'000}, {5'000'000, 30'000'000, 350'000}};
+  Budget budget({40, 0, 0.6}, kTenths, wishes, 64, 30, {true, true, 1}, Stretches({&box, 1}, 2, 9'000'000, 100'000));
+  for (std::uint32_t i = 0; i < 6; ++i) budget.foresee(tenth(i));
+  std::vector<Warning> warnings;
+  EXPECT_EQ(refusal(budget, warnings), "");
+  EXPECT_TRUE(warnings.empty());
+  EXPECT_EQ(budget.most_drops(), 7u);
+  EXPECT_NEAR(budget.gets().first, 70, 1e-4);
+}
+
+TEST(Stretches, AreThoseOfBoxesAndOfCoresOfPartsThatTouch) {
+  // Two boxes of 6 mm side by side, one of 12 mm above and apart.
+  const std::vector<ZoneBox> boxes{{0, {0, 0, 0}, {6'000'000, 12'000'000, 200'000}},
+                                   {1, {6'000'000, 0, 0}, {12'000'000, 12'000'000, 150'000}},
+                                   {1, {40'000'000, 0, 300'000}, {46'000'000, 12'000'000, 500'000}}};
+  const Stretches stretches(boxes, 2, 5'000'000, 30'000);
+  const auto seen = [&](std::uint32_t zone) {
+    std::string text;
+    for (std::uint32_t i = 0; i < 6; ++i)
+      text += stretches.core(zone, tenth(i)) ? 'c' : stretches.any(zone, tenth(i)) ? 's' : '.';
+    return text;
+  };
+  EXPECT_EQ(seen(0), "cc....");
+  EXPECT_EQ(seen(1), "cc.ss.");
 }
 
 }  // namespace
