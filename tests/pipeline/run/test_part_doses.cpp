@@ -206,6 +206,26 @@ TEST(PartDoses, SharesOfVoxelsStayWhereNoEdgeMoves) {
   EXPECT_LT(full[2], full[1]);
 }
 
+// Whose drops are whose adds up where voxels at the edges of parts are only partly full.
+TEST(PartDoses, SharesOfVoxelsAreSharedOutAmongPartsAndVerified) {
+  const test::Directory folder;
+  for (const std::uint32_t levels : {2u, 4u, 16u}) {
+    Job job = job_of_boxes(folder, "quoted" + std::to_string(levels));
+    test::write_box(folder / "odd.stl", {0, 0, 0}, {5.013f, 3.017f, 0.37f});
+    job.parts[1].path = folder / "odd.stl";
+    job.parts[1].at_mm = {20.013, 10.007};
+    job.levels = levels;
+    job.quote = true;
+    const auto summary = run_part_doses(job);
+    ASSERT_TRUE(summary.ok()) << summary.error().message;
+    expect_replayed(job);
+    const auto& use = (*summary->facts)["use"];
+    std::uint64_t drops = 0;
+    for (const auto& part : use["parts"]) drops += part["drops"].get<std::uint64_t>();
+    EXPECT_EQ(drops, use["drops"].get<std::uint64_t>());
+  }
+}
+
 TEST(PartDoses, WhatCannotBeIsRefusedInOneLine) {
   const test::Directory folder;
   const auto refused = [&](const auto& change, const std::string& words) {
