@@ -121,14 +121,14 @@ TEST_F(HeadCare, AVatThatRunsEmptyRefusesTheJobBeforeItStartsOrIsFilledInPauses)
 
   Job pauses =
       prism(3, profile("pauses", "vat_depth_mm = [1.5, 0]\nrefill = \"pause\"\n[care]\ncap_mm = [-40, 5]\n"), "pauses");
-  EXPECT_EQ(facts(pauses)["refills"], nlohmann::json({12, 24}));
+  EXPECT_EQ(facts(pauses)["refills"], nlohmann::ordered_json({12, 24}));
   EXPECT_EQ(verified(pauses).replay.refills, 2u);
   EXPECT_NE(test::read_text(fs::path(pauses.output) / "program/000012.gcode").find("\nM815\n"), std::string::npos);
   const std::string whole = test::read_text(fs::path(pauses.output) / "program/000024.gcode");
   pauses.output = directory_ / "shards";
   for (std::uint32_t i = 0; i < 3; ++i) {
     pauses.shard = {{i, 3}};
-    EXPECT_EQ(facts(pauses)["refills"], nlohmann::json({12, 24}));
+    EXPECT_EQ(facts(pauses)["refills"], nlohmann::ordered_json({12, 24}));
   }
   EXPECT_EQ(verified(pauses).replay.refills, 2u) << "shards that are not merged are one job";
   // Vats are carried from one to the next: the second one's pause left out empties the vat that the first has left.
@@ -188,7 +188,7 @@ TEST_F(HeadCare, TheSecondVatIsEmptiedByTheLayersThatItFeeds) {
   EXPECT_NE(first.error().message.find("layer 9 (z 0.900 mm): the first vat"), std::string::npos) << first.error().message;
   EXPECT_NE(second.error().message.find("layer 29 (z 2.900 mm): the second vat"), std::string::npos) << second.error().message;
   Job pauses = two("both", "vat_depth_mm = [1.25, 1.25]\nrefill = \"pause\"\n");
-  EXPECT_EQ(facts(pauses)["refills"], nlohmann::json({20}));
+  EXPECT_EQ(facts(pauses)["refills"], nlohmann::ordered_json({20}));
   EXPECT_EQ(verified(pauses).replay.refills, 1u);
 }
 
