@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include "stages/write/image_format.h"
 #include "stages/write/png/coloured.h"
 #include "stages/write/report/run_code.h"  // base64
 #include "stages/write/svg/svg_writer.h"
