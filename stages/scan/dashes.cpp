@@ -134,16 +134,18 @@ DashSeen see_dash(const Photo& photo, const Chart& chart, const View& view, cons
 
 }  // namespace
 
-std::vector<DashSeen> see_dashes(const Photo& photo, const Chart& chart, const View& view, const std::vector<Spot>& shifts) {
+std::vector<DashSeen> see_dashes(const Photo& photo, const Chart& chart, const SheetFit& fit) {
   constexpr double kThere = 0.5, kMost = 2.5;  // shares of a usual dash
+  constexpr double kStray = 0.2;                // of the way to the next dash: how far a nozzle's own offset is followed
   std::vector<DashSeen> seen;
   seen.reserve(chart.dashes.size());
   Window window;
   for (const ChartDash& dash : chart.dashes) {
-    const Spot m = middle_of(dash.box, chart), shift = shifts[dash.swath];
+    const Spot m = middle_of(dash.box, chart), shift = fit.shift[dash.swath], offset = fit.offset[dash.nozzle];
+    const auto bounded = [&](double mm) { return std::clamp(mm, -kStray * chart.between_mm, kStray * chart.between_mm); };
     const double length = chart.scan_along_x ? (dash.box.right - dash.box.left) * 1e-6 * chart.pixel_x_nm
                                              : (dash.box.bottom - dash.box.top) * 1e-6 * chart.pixel_y_nm;
-    seen.push_back(see_dash(photo, chart, view, {m.x + shift.x, m.y + shift.y}, length, window));
+    seen.push_back(see_dash(photo, chart, fit.view, {m.x + shift.x + bounded(offset.x), m.y + shift.y + bounded(offset.y)}, length, window));
   }
   // A usual dash: three quarters of all have less. Where most are missing, half of what full ink of its width has.
   std::vector<double> masses;

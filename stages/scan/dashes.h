@@ -5,7 +5,7 @@
 
 #include "stages/data/picture/chart.h"
 #include "stages/scan/photo.h"
-#include "stages/scan/view.h"
+#include "stages/scan/sheet_fit.h"
 
 namespace lamina::scan {
 
@@ -18,11 +18,10 @@ struct DashSeen {
   bool hidden = false;  // too dark for a dash, or out of the picture: nothing can be told
 };
 
-/// Looks at each dash where the view and the shift of its swath put it.
-/// shifts   of each swath, mm
+/// Looks at each dash where the fit puts it.
 /// returns  one for each dash of the chart
 /// cost     some thousand samples a dash
-std::vector<DashSeen> see_dashes(const Photo& photo, const Chart& chart, const View& view, const std::vector<Spot>& shifts);
+std::vector<DashSeen> see_dashes(const Photo& photo, const Chart& chart, const SheetFit& fit);
 
 /// Darkness along a line, averaged over a stripe about it: from -reach to reach, evenly; empty if it leaves the picture.
 /// reach, half  mm, of the line on either side of the middle and of the stripe's width
