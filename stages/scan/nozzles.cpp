@@ -46,7 +46,7 @@ std::vector<Tally> tallies_of(const Chart& chart, const std::vector<DashSeen>& s
     ++tally.laid;
     if (seen[d].hidden || !printed[dash.swath]) continue;
     ++(seen[d].there ? tally.there : tally.absent);
-    if (!seen[d].there) continue;
+    if (!seen[d].there || seen[d].marred) continue;
     const Spot m = middle_of(dash.box, chart), shift = fit.shift[dash.swath];
     const Axes um = axes_of(chart, {seen[d].place.x - m.x - shift.x, seen[d].place.y - m.y - shift.y});
     for (std::size_t axis = 0; axis < 2; ++axis) tally.um[axis].push_back(um[axis]);
@@ -143,7 +143,7 @@ std::vector<Sighting> sightings_of(const Chart& chart, const std::vector<DashSee
   std::vector<Sighting> sightings;
   for (std::size_t d = 0; d < seen.size(); ++d) {
     const ChartDash& dash = chart.dashes[d];
-    if (!seen[d].there || seen[d].hidden || !printed[dash.swath]) continue;
+    if (!seen[d].there || seen[d].hidden || seen[d].marred || !printed[dash.swath]) continue;
     sightings.push_back(
         {middle_of(dash.box, chart), view.at(seen[d].place.x, seen[d].place.y), dash.swath, dash.nozzle, dash.repeat});
   }
@@ -153,6 +153,7 @@ std::vector<Sighting> sightings_of(const Chart& chart, const std::vector<DashSee
 HeadReading judge_head(const Chart& chart, const std::vector<DashSeen>& seen, const std::vector<bool>& printed,
                        const SheetFit& fit, bool lens) {
   HeadReading head;
+  head.nozzle.assign(chart.nozzles, std::nullopt);
   const std::vector<Tally> tallies = tallies_of(chart, seen, printed, fit);
   const Axes scatter = scatter_of_dashes(tallies);
   std::vector<bool> told(chart.nozzles, false);
@@ -167,6 +168,8 @@ HeadReading judge_head(const Chart& chart, const std::vector<DashSeen>& seen, co
       head.blocked.push_back(n);
     } else {
       if (tally.absent * 3 > looked) head.weak.push_back(n);
+      head.nozzle[n] = Offset{};
+      if (tally.um[0].empty()) continue;  // all of them marred
       told[n] = true;
       offsets[n] = errors[n] = Axes{};
       for (std::size_t axis = 0; axis < 2; ++axis) {
@@ -177,7 +180,6 @@ HeadReading judge_head(const Chart& chart, const std::vector<DashSeen>& seen, co
     }
   }
   const std::array<HeadLine, 2> lines = lines_of(offsets);
-  head.nozzle.assign(chart.nozzles, std::nullopt);
   for (std::uint32_t n = 0; n < chart.nozzles; ++n) {
     if (!told[n]) continue;
     Axes um = *offsets[n];

@@ -17,13 +17,15 @@ std::uint32_t first_of(const std::vector<bool>& printed) {
 
 /// Fits the view, the swaths and the nozzles to the dashes, and looks again, thrice. False if too few are seen.
 bool settle(const Photo& photo, const Chart& chart, ChartReading& reading) {
-  reading.dashes = see_dashes(photo, chart, reading.fit);
+  std::optional<DashShapes> shapes;
+  reading.dashes = see_dashes(photo, chart, reading.fit, shapes);
+  shapes.reset();  // blurred by a view of the marks alone
   for (int round = 0; round < 3; ++round) {
     const std::vector<bool> printed = printed_swaths(chart, reading.dashes);
     const std::vector<Sighting> sightings = sightings_of(chart, reading.dashes, reading.fit.view, printed);
     if (sightings.size() < kFewest) return false;
     fit_sheet(sightings, first_of(printed), sightings.size() >= kEnoughForLens, reading.fit);
-    reading.dashes = see_dashes(photo, chart, reading.fit);
+    reading.dashes = see_dashes(photo, chart, reading.fit, shapes);
   }
   return true;
 }
