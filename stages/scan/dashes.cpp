@@ -224,7 +224,8 @@ void judge_dashes(const Photo& photo, const Chart& chart, std::vector<DashSeen>&
 
 }  // namespace
 
-std::vector<DashSeen> see_dashes(const Photo& photo, const Chart& chart, const SheetFit& fit, std::optional<DashShapes>& shapes) {
+std::vector<DashSeen> see_dashes(const Photo& photo, const Chart& chart, const SheetFit& fit,
+                                 std::optional<DashShapes>& shapes) {
   constexpr double kStray = 0.2;  // of the way to the next dash: how far a nozzle's own offset is followed
   std::vector<DashSeen> seen;
   seen.reserve(chart.dashes.size());
@@ -232,8 +233,8 @@ std::vector<DashSeen> see_dashes(const Photo& photo, const Chart& chart, const S
   const double most = kStray * chart.between_mm;
   for (const ChartDash& dash : chart.dashes) {
     const Spot m = middle_of(dash.box, chart), shift = fit.shift[dash.swath], offset = fit.offset[dash.nozzle];
-    seen.push_back(look.see(
-        dash, {m.x + shift.x + std::clamp(offset.x, -most, most), m.y + shift.y + std::clamp(offset.y, -most, most)}));
+    seen.push_back(
+        look.see(dash, {m.x + shift.x + std::clamp(offset.x, -most, most), m.y + shift.y + std::clamp(offset.y, -most, most)}));
   }
   judge_dashes(photo, chart, seen);
   shapes = look.shapes();

@@ -31,7 +31,8 @@ struct DashShapes {
 /// shapes   by which dashes are placed if there are any, else by centres and ends; replaced by those that were seen
 /// returns  one for each dash of the chart
 /// cost     some thousand samples a dash
-std::vector<DashSeen> see_dashes(const Photo& photo, const Chart& chart, const SheetFit& fit, std::optional<DashShapes>& shapes);
+std::vector<DashSeen> see_dashes(const Photo& photo, const Chart& chart, const SheetFit& fit,
+                                 std::optional<DashShapes>& shapes);
 
 /// Darkness along a line, averaged over a stripe about it: from -reach to reach, evenly; empty if it leaves the picture.
 /// reach, half  mm, of the line on either side of the middle and of the stripe's width

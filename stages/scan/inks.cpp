@@ -11,23 +11,6 @@
 namespace lamina::scan {
 namespace {
 
-/// From the first place to the last where a profile is half of full ink above its ground, in mm; 0 if it never is. What gaps
-/// lie between them does not count, and blur moves neither.
-double width_of(const std::vector<double>& profile, double reach, double full) {
-  const std::size_t end = profile.size() / 10 + 1, last = profile.size() - 1;
-  double ground = 0;
-  for (std::size_t i = 0; i < end; ++i) ground += (profile[i] + profile[last - i]) / (2 * static_cast<double>(end));
-  const double half = (full + ground) / 2;
-  const auto crossing = [&](bool from_end) {
-    const auto value = [&](std::size_t i) { return profile[from_end ? last - i : i]; };
-    for (std::size_t i = 1; i <= last; ++i) {
-      if (value(i) >= half) return static_cast<double>(i) - (value(i) - half) / std::max(value(i) - value(i - 1), 1e-9);
-    }
-    return static_cast<double>(last) / 2;
-  };
-  return (static_cast<double>(last) - crossing(false) - crossing(true)) * 2 * reach / static_cast<double>(last);
-}
-
 /// What is known of each line of the image from the dash on it.
 struct LineSeen {
   bool known = false, there = false;
@@ -88,7 +71,7 @@ std::vector<BarSeen> see_bars(const Photo& photo, const Chart& chart, const View
 void measure_bars(const Photo& photo, const Chart& chart, const View& view, const HeadReading& head, InkReading& reading) {
   constexpr double kWideEnough = 0.4;  // mm: the middle is free of blur
   const std::vector<LineSeen> lines = lines_seen(chart, head);
-  double full = 0;
+  double& full = reading.full;
   for (const bool along : {true, false}) {
     const std::vector<BarSeen> bars = see_bars(photo, chart, view, lines, along);
     std::vector<double> gains;
@@ -123,6 +106,21 @@ void measure_wedges(const Photo& photo, const Chart& chart, const View& view, In
 }
 
 }  // namespace
+
+double width_of(const std::vector<double>& profile, double reach, double full) {
+  const std::size_t end = profile.size() / 10 + 1, last = profile.size() - 1;
+  double ground = 0;
+  for (std::size_t i = 0; i < end; ++i) ground += (profile[i] + profile[last - i]) / (2 * static_cast<double>(end));
+  const double half = (full + ground) / 2;
+  const auto crossing = [&](bool from_end) {
+    const auto value = [&](std::size_t i) { return profile[from_end ? last - i : i]; };
+    for (std::size_t i = 1; i <= last; ++i) {
+      if (value(i) >= half) return static_cast<double>(i) - (value(i) - half) / std::max(value(i) - value(i - 1), 1e-9);
+    }
+    return static_cast<double>(last) / 2;
+  };
+  return (static_cast<double>(last) - crossing(false) - crossing(true)) * 2 * reach / static_cast<double>(last);
+}
 
 InkReading read_inks(const Photo& photo, const Chart& chart, const SheetFit& fit, const HeadReading& head) {
   InkReading reading;

@@ -49,12 +49,13 @@ Result<ChartReading> read_chart_photo(const Photo& photo, const Chart& chart) {
   reading.scatter_um = 1000 * reading.fit.scatter_pixels / reading.pixels_a_mm;
   reading.head = judge_head(chart, reading.dashes, printed, reading.fit, there >= kEnoughForLens);
   reading.inks = read_inks(photo, chart, reading.fit, reading.head);
+  reading.joints = read_joints(photo, chart, reading.fit, reading.head, reading.inks);
   return reading;
 }
 
 Json reading_json(const ChartReading& reading) {
-  const auto offsets = [](const std::vector<std::optional<Offset>>& list) {
-    const auto rounded = [](double um) { return std::round(10 * um) / 10; };
+  const auto rounded = [](double um) { return std::round(10 * um) / 10; };
+  const auto offsets = [&](const std::vector<std::optional<Offset>>& list) {
     Json json = Json::array();
     for (const auto& one : list) {
       Json& entry = json.emplace_back();
@@ -69,15 +70,25 @@ Json reading_json(const ChartReading& reading) {
     return json;
   };
   const HeadReading& head = reading.head;
-  Json json = {{"pixels_a_mm", reading.pixels_a_mm}, {"scatter_um", reading.scatter_um},
-               {"blocked", head.blocked},            {"weak", head.weak},
-               {"untold", head.untold},              {"swaths", offsets(head.swath)},
+  Json json = {{"pixels_a_mm", reading.pixels_a_mm},
+               {"scatter_um", reading.scatter_um},
+               {"blocked", head.blocked},
+               {"weak", head.weak},
+               {"untold", head.untold},
+               {"swaths", offsets(head.swath)},
                {"nozzles", offsets(head.nozzle)}};
   // Where no bar across the scan is whole, what is known is the gain along it.
   const InkReading& inks = reading.inks;
   if (inks.bars_along > 0)
     json["dot_gain_um"] = {{"along", inks.gain_along_um},
                            {"across", inks.bars_across > 0 ? inks.gain_across_um : inks.gain_along_um}};
+  json["joints"] = Json::array();
+  for (const JointReading& joint : reading.joints) {
+    json["joints"].push_back({{"swath", joint.swath},
+                              {"along_um", joint.along_um ? Json(rounded(*joint.along_um)) : Json()},
+                              {"across_um", joint.across_um ? Json(rounded(*joint.across_um)) : Json()},
+                              {"agrees", joint.agrees}});
+  }
   json["wedges"] = Json::array();
   for (const auto& [percent, seen] : inks.wedges)
     json["wedges"].push_back({{"pixels_percent", percent}, {"seen_percent", seen}});

@@ -9,6 +9,7 @@
 #include "stages/data/text/json.h"
 #include "stages/scan/dashes.h"
 #include "stages/scan/inks.h"
+#include "stages/scan/joints.h"
 #include "stages/scan/nozzles.h"
 #include "stages/scan/sheet_fit.h"
 
@@ -21,6 +22,7 @@ struct ChartReading {
   double scatter_um = 0;         // median distance of dashes from where the fit puts them
   HeadReading head;
   InkReading inks;
+  std::vector<JointReading> joints;
 };
 
 /// Reads a chart.

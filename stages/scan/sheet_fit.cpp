@@ -10,8 +10,8 @@ namespace lamina::scan {
 namespace {
 
 constexpr Eigen::Index kViewUnknowns = 9;
-constexpr double kSmall = 1e-6;    // step of slopes
-constexpr double kKeptSmall = 1;   // pixels^2 / mm^2: an offset of 50 um weighs as much as a twentieth of a pixel of one dash
+constexpr double kSmall = 1e-6;   // step of slopes
+constexpr double kKeptSmall = 1;  // pixels^2 / mm^2: an offset of 50 um weighs as much as a twentieth of a pixel of one dash
 constexpr double kLeastScale = 0.02;  // pixels
 
 using Both = Eigen::Matrix2d;
@@ -148,7 +148,8 @@ class Fitter {
     if (!change.allFinite()) return 0;
     for (Eigen::Index i = 0; i < kViewUnknowns; ++i) unknown(fit_.view, i) += change(i);
     for (std::uint32_t s = 0; s < fit_.shift.size(); ++s) {
-      if (const Eigen::Index at = shift_at(s); at >= 0) fit_.shift[s] = {fit_.shift[s].x + change(at), fit_.shift[s].y + change(at + 1)};
+      if (const Eigen::Index at = shift_at(s); at >= 0)
+        fit_.shift[s] = {fit_.shift[s].x + change(at), fit_.shift[s].y + change(at + 1)};
     }
     for (std::size_t n = 0; n < nozzles_; ++n) {
       const Nozzle& nozzle = by_nozzle_[n];

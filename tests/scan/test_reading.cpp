@@ -101,8 +101,8 @@ scan::Photo photo_in_memory(const GreyPicture& picture) {
   return scan::photo_of(std::move(grey));
 }
 
-/// A straight line through the nozzles' offsets cannot be told from the scale of the picture: docs/calibrate.md has the one that
-/// is taken off, and along which swaths count: of the slopes of all pairs of nozzles, and of what they leave, the medians.
+/// A straight line through the nozzles' offsets cannot be told from the scale of the picture: docs/calibrate.md has the one
+/// that is taken off, and along which swaths count: of the slopes of all pairs of nozzles, and of what they leave, the medians.
 struct HeadLine {
   double middle = 0, slope = 0;
 };
@@ -127,10 +127,12 @@ HeadLine line_through(const Printing& printing, std::size_t axis) {
 }
 
 struct Errors {
-  std::vector<double> nozzle, swath, gain_um;  // pixels of the layer
+  std::vector<double> nozzle, swath, gain_um;     // pixels of the layer
   std::vector<double> nozzle_ratio, swath_ratio;  // errors in standard errors that were told
   std::size_t blocked = 0, found = 0, accused = 0, unread = 0;
   std::size_t nozzles_untold = 0, swaths_untold = 0;
+  std::vector<double> joint_along, joint_across;  // pixels of the layer
+  std::size_t joints_without = 0, joints_doubted = 0;
 };
 
 void add_measure(const scan::Measure& measure, double pitch_um, double truth, std::vector<double>& errors,
@@ -171,6 +173,16 @@ void add_errors(const PrintedChart& printed, const Trial& trial, const scan::Cha
                 errors.swaths_untold);
     add_measure(head.swath[s]->across, across_um, to[1] - from[1] - across.slope * lines, errors.swath, errors.swath_ratio,
                 errors.swaths_untold);
+  }
+  for (const scan::JointReading& joint : reading.joints) {
+    const auto &from = trial.printing.swath[base + joint.swath - 1], &to = trial.printing.swath[base + joint.swath];
+    const auto off = [&](double um, double pitch_um, std::size_t axis, double slope) {
+      return std::abs(um / pitch_um - (to[axis] - from[axis] - slope * printed.grid.nozzles));
+    };
+    if (joint.along_um) errors.joint_along.push_back(off(*joint.along_um, along_um, 0, along.slope));
+    if (joint.across_um) errors.joint_across.push_back(off(*joint.across_um, across_um, 1, across.slope));
+    errors.joints_without += !joint.along_um + !joint.across_um;
+    errors.joints_doubted += !joint.agrees;
   }
   const scan::InkReading& inks = reading.inks;
   if (inks.bars_along > 0) errors.gain_um.push_back(std::abs(inks.gain_along_um - trial.printing.gain_um));
@@ -215,24 +227,31 @@ TEST(ScannedChart, BlockedNozzlesAreFoundNoneIsAccusedAndOffsetsHold) {
     add_errors(one, trial, *reading, errors);
     const double worst = worst_from(errors.nozzle, before.nozzle.size()), joint = worst_from(errors.swath, before.swath.size());
     const std::size_t missed = errors.blocked - errors.found - (before.blocked - before.found);
-    const std::size_t untold = errors.nozzles_untold - before.nozzles_untold, swaths = errors.swaths_untold - before.swaths_untold;
+    const std::size_t untold = errors.nozzles_untold - before.nozzles_untold,
+                      swaths = errors.swaths_untold - before.swaths_untold;
     if (asked != nullptr &&
         (worst > 0.08 || joint > 0.08 || missed > 0 || errors.accused > before.accused || untold + swaths > 0))
-      printf("scan %d: nozzles within %.3f, swaths %.3f, missed %zu, accused %zu; not told %zu and %zu; blur %.2f, noise %.1f, %.1f pixels a mm\n",
-             i, worst, joint, missed, errors.accused - before.accused, untold, swaths, trial.camera.blur_pixels,
-             trial.camera.noise, trial.camera.pixels_a_mm);
+      printf(
+          "scan %d: nozzles within %.3f, swaths %.3f, missed %zu, accused %zu; not told %zu and %zu; blur %.2f, noise %.1f, %.1f pixels a mm\n",
+          i, worst, joint, missed, errors.accused - before.accused, untold, swaths, trial.camera.blur_pixels,
+          trial.camera.noise, trial.camera.pixels_a_mm);
   }
   printf(
       "%d scans, %zu not read: %zu of %zu blocked nozzles found, %zu accused wrongly\n"
       "offsets of nozzles, in pixels of the layer: %zu told, %zu not; half within %.4f, 99.9 %% within %.4f, all within %.4f\n"
       "offsets of swaths: %zu told, %zu not; half within %.4f, 99 %% within %.4f, all within %.4f\n"
       "errors in standard errors as told: nozzles half %.2f, 99 %% %.2f, all %.2f; swaths half %.2f, 99 %% %.2f, all %.2f\n"
+      "joints by verniers: %zu, half within %.4f, 99 %% within %.4f, all within %.4f; by blocks: %zu, half %.4f, 99 %% %.4f, all %.4f; "
+      "%zu not read, %zu not as the dashes have them\n"
       "gain in um: half within %.2f, 99 %% within %.2f, all within %.2f\n",
       end - first, errors.unread, errors.found, errors.blocked, errors.accused, errors.nozzle.size(), errors.nozzles_untold,
       share_of(errors.nozzle, 0.5), share_of(errors.nozzle, 0.999), share_of(errors.nozzle, 1), errors.swath.size(),
       errors.swaths_untold, share_of(errors.swath, 0.5), share_of(errors.swath, 0.99), share_of(errors.swath, 1),
       share_of(errors.nozzle_ratio, 0.5), share_of(errors.nozzle_ratio, 0.99), share_of(errors.nozzle_ratio, 1),
       share_of(errors.swath_ratio, 0.5), share_of(errors.swath_ratio, 0.99), share_of(errors.swath_ratio, 1),
+      errors.joint_along.size(), share_of(errors.joint_along, 0.5), share_of(errors.joint_along, 0.99),
+      share_of(errors.joint_along, 1), errors.joint_across.size(), share_of(errors.joint_across, 0.5),
+      share_of(errors.joint_across, 0.99), share_of(errors.joint_across, 1), errors.joints_without, errors.joints_doubted,
       share_of(errors.gain_um, 0.5), share_of(errors.gain_um, 0.99), share_of(errors.gain_um, 1));
   EXPECT_GE(static_cast<double>(errors.found), 0.995 * static_cast<double>(errors.blocked));
   EXPECT_EQ(errors.accused, 0u);
