@@ -11,8 +11,8 @@
 namespace lamina::scan {
 namespace {
 
-constexpr double kAgreePixels = 0.25;
-constexpr std::size_t kFewestTicks = 3;  // on a side
+constexpr double kAgreeAlong = 0.25, kAgreeAcross = 1;  // pixels
+constexpr std::size_t kFewestTicks = 3;                 // on a side
 
 struct Tick {
   std::size_t vernier = 0;
@@ -165,11 +165,11 @@ std::vector<JointReading> read_joints(const Photo& photo, const Chart& chart, co
       if (chart.verniers[v].swath == s) joint.along_um = along_um(chart, ticks, v, lines);
     }
     if (s <= chart.joints.size()) joint.across_um = across_um(photo, chart, fit, chart.joints[s - 1], s, inks, lines);
-    const auto differs = [&](const std::optional<double>& um, const Measure& to, const Measure& from, double nm) {
-      return um && to.told && from.told && std::abs(*um - (to.um - from.um)) > kAgreePixels * 1e-3 * nm;
+    const auto differs = [&](const std::optional<double>& um, const Measure& to, const Measure& from, double most_nm) {
+      return um && to.told && from.told && std::abs(*um - (to.um - from.um)) > 1e-3 * most_nm;
     };
-    joint.agrees = !differs(joint.along_um, head.swath[s]->along, head.swath[s - 1]->along, along_nm) &&
-                   !differs(joint.across_um, head.swath[s]->across, head.swath[s - 1]->across, across_nm);
+    joint.agrees = !differs(joint.along_um, head.swath[s]->along, head.swath[s - 1]->along, kAgreeAlong * along_nm) &&
+                   !differs(joint.across_um, head.swath[s]->across, head.swath[s - 1]->across, kAgreeAcross * across_nm);
     joints.push_back(joint);
   }
   return joints;

@@ -19,7 +19,7 @@ struct JointReading {
   std::optional<double> along_um;  // by its vernier; absent: no vernier, or too little of it is seen
   std::optional<double>
       across_um;       // by the height of its block; absent: its outermost nozzles are blocked, or no gain is known
-  bool agrees = true;  // with the swaths' offsets, within a quarter of a pixel
+  bool agrees = true;  // with the swaths' offsets, within a quarter of a pixel along the scan and one across it
 };
 
 /// Of all joints between swaths that were printed.

@@ -43,6 +43,7 @@ class Fitter {
 
   void run() {
     for (int step = 0; step < 12; ++step) {
+      place_swaths();
       place_nozzles();
       if (take_step() < 1e-9) break;
     }
@@ -71,12 +72,32 @@ class Fitter {
     return median_of(distances);
   }
 
+  /// How far a dash lies from where it should, in mm of the sheet.
+  Pair off_by(const Sighting& one) const {
+    const Spot at = place_of(one), p = fit_.view.at(at.x, at.y);
+    return slopes_at(fit_.view, at, p).inverse() * Pair(one.seen.x - p.x, one.seen.y - p.y);
+  }
+
+  /// Shifts as the medians of their dashes have them, so that a swath that lies far from the others is no outlier.
+  void place_swaths() {
+    std::vector<std::vector<double>> x(fit_.shift.size()), y(fit_.shift.size());
+    for (const Sighting& one : sightings_) {
+      const Pair off = off_by(one);
+      x[one.swath].push_back(off.x());
+      y[one.swath].push_back(off.y());
+    }
+    const Spot first{median_of(x[first_]), median_of(y[first_])};
+    for (std::size_t s = 0; s < fit_.shift.size(); ++s) {
+      if (s != first_ && !x[s].empty())
+        fit_.shift[s] = {fit_.shift[s].x + median_of(x[s]) - first.x, fit_.shift[s].y + median_of(y[s]) - first.y};
+    }
+  }
+
   /// Offsets as the medians of their dashes have them, so that a stray nozzle is no outlier.
   void place_nozzles() {
     std::vector<std::vector<double>> x(nozzles_), y(nozzles_);
     for (const Sighting& one : sightings_) {
-      const Spot at = place_of(one), p = fit_.view.at(at.x, at.y);
-      const Pair off = slopes_at(fit_.view, at, p).inverse() * Pair(one.seen.x - p.x, one.seen.y - p.y);
+      const Pair off = off_by(one);
       x[one.nozzle].push_back(fit_.offset[one.nozzle].x + off.x());
       y[one.nozzle].push_back(fit_.offset[one.nozzle].y + off.y());
     }

@@ -230,11 +230,13 @@ TEST(ScannedChart, BlockedNozzlesAreFoundNoneIsAccusedAndOffsetsHold) {
     const std::size_t untold = errors.nozzles_untold - before.nozzles_untold,
                       swaths = errors.swaths_untold - before.swaths_untold;
     if (asked != nullptr &&
-        (worst > 0.08 || joint > 0.08 || missed > 0 || errors.accused > before.accused || untold + swaths > 0))
+        (worst > 0.08 || joint > 0.08 || missed > 0 || errors.accused > before.accused || untold + swaths > 0)) {
       printf(
           "scan %d: nozzles within %.3f, swaths %.3f, missed %zu, accused %zu; not told %zu and %zu; blur %.2f, noise %.1f, %.1f pixels a mm\n",
           i, worst, joint, missed, errors.accused - before.accused, untold, swaths, trial.camera.blur_pixels,
           trial.camera.noise, trial.camera.pixels_a_mm);
+      std::fflush(stdout);
+    }
   }
   printf(
       "%d scans, %zu not read: %zu of %zu blocked nozzles found, %zu accused wrongly\n"
