@@ -171,7 +171,10 @@ Best search_fourth(const Photo& photo, const Chart& chart, Guess guess) {
 
 Result<View> find_marks(const Photo& photo, const Chart& chart) {
   constexpr double kLeast = 0.05, kClear = 0.2, kLeastOfThree = 0.12;  // shares of full ink
+  constexpr double kFaintest = 0.04;                                   // darkness
   constexpr std::size_t kMostGuesses = 60;
+  if (photo.ink < kFaintest)
+    return Error{Fault::kInput, "shows nothing dark: photograph the chart on a sheet that its ink darkens"};
   Best best;
   Patches all;
   for (const double level : {0.45, 0.3, 0.6}) {

@@ -1,5 +1,7 @@
 #include "stages/scan/reading.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <opencv2/imgproc.hpp>
@@ -10,6 +12,7 @@ namespace lamina::scan {
 namespace {
 
 constexpr std::size_t kFewest = 30, kEnoughForLens = 200;  // dashes
+constexpr double kClosest = 4.5;                           // pixels from a dash to the one beside it
 
 std::uint32_t first_of(const std::vector<bool>& printed) {
   return static_cast<std::uint32_t>(std::ranges::find(printed, true) - printed.begin());
@@ -35,6 +38,13 @@ bool settle(const Photo& photo, const Chart& chart, ChartReading& reading) {
 Result<ChartReading> read_chart_photo(const Photo& photo, const Chart& chart) {
   const auto view = find_marks(photo, chart);
   if (!view) return view.error();
+  const Spot m = middle_of({0, 0, chart.columns, chart.rows}, chart);
+  if (const double pixels = view->pixels_a_mm(m.x, m.y); pixels * chart.between_mm < kClosest)
+    return Error{
+        Fault::kInput,
+        fmt::format("a millimetre has {:.1f} pixels; {:.0f} and more are needed to tell the dashes apart: photograph the "
+                    "chart from nearer",
+                    pixels, std::ceil(kClosest / chart.between_mm))};
   ChartReading reading;
   reading.fit = {*view, std::vector<Spot>(chart.swaths), std::vector<Spot>(chart.nozzles)};
   const bool settled = settle(photo, chart, reading);
@@ -44,7 +54,6 @@ Result<ChartReading> read_chart_photo(const Photo& photo, const Chart& chart) {
     return Error{Fault::kInput,
                  "the chart is found, but fewer than a tenth of its dashes: photograph it sharper, or from nearer"};
   const std::vector<bool> printed = printed_swaths(chart, reading.dashes);
-  const Spot m = middle_of({0, 0, chart.columns, chart.rows}, chart);
   reading.pixels_a_mm = reading.fit.view.pixels_a_mm(m.x, m.y);
   reading.scatter_um = 1000 * reading.fit.scatter_pixels / reading.pixels_a_mm;
   reading.head = judge_head(chart, reading.dashes, printed, reading.fit, there >= kEnoughForLens);
