@@ -28,7 +28,7 @@ target_precompile_headers(lamina_fuzzed PRIVATE cmake/precompiled.h)
 
 add_library(lamina_libfuzzer OBJECT tests/fuzz/libfuzzer.cpp)
 target_link_libraries(lamina_libfuzzer PRIVATE lamina_fuzzed)
-foreach(targets meshes threemf jobs profiles manifest lists gcode programs images tables texts)
+foreach(targets meshes threemf jobs profiles manifest lists charts gcode programs images tables texts)
   add_executable(fuzz_${targets} tests/fuzz/${targets}.cpp $<TARGET_OBJECTS:lamina_libfuzzer>)
   target_link_libraries(fuzz_${targets} PRIVATE lamina_fuzzed)
   target_link_options(fuzz_${targets} PRIVATE -fsanitize=fuzzer)

@@ -57,8 +57,9 @@ Result<Summary> write_chart_job(const ChartRequest& request, const std::atomic<b
   const auto printer = all || machine->head.blocked.empty() ? all : resolve_profile(chart::chart_machine(*machine, true));
   if (!printer) return printer.error();
   const auto drops = chart::lay_out_drops(printer->machine, printer->grid, std::max<std::uint64_t>(request.drops, 1));
-  const auto laid = request.drops > 0 ? Result<Chart>(Chart()) : chart::lay_out(printer->machine, printer->grid);
+  auto laid = request.drops > 0 ? Result<Chart>(Chart()) : chart::lay_out(printer->machine, printer->grid);
   if (!drops || !laid) return drops ? laid.error() : drops.error();
+  laid->layer_mm = request.layer_mm;
   const fs::path directory = request.directory;
   std::error_code failed;
   fs::create_directories(directory / "images", failed);

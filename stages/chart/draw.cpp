@@ -82,6 +82,10 @@ Runs draw(const Chart& chart) {
   for (const ChartBar& bar : chart.bars) add_box(bar.box, runs);
   for (const ChartWedge& wedge : chart.wedges) add_wedge(wedge, runs);
   for (const ChartBox& joint : chart.joints) add_box(joint, runs);
+  for (const ChartVernier& vernier : chart.verniers) {
+    for (const ChartBox& tick : vernier.before) add_box(tick, runs);
+    for (const ChartBox& tick : vernier.after) add_box(tick, runs);
+  }
   return image_of(runs, chart.columns, chart.rows);
 }
 

@@ -17,6 +17,8 @@ constexpr double kMarkMm = 1.5, kApartMm = 1;
 constexpr std::array<double, 4> kBarsMm{0.3, 0.5, 0.8, 1.2};
 constexpr double kBarLongMm = 4, kWedgeMm = 3;
 constexpr std::uint32_t kWedges = 8;
+constexpr double kTickMm = 0.25, kTickApartMm = 0.7, kTickLongMm = 1.2, kTickGapMm = 0.1;  // of verniers
+constexpr std::uint32_t kTicks = 4;                                                        // on either side of the middle one
 
 /// Lengths of dashes; the first that fits is taken.
 struct Dashes {
@@ -79,9 +81,11 @@ class Layout {
     lines_ = std::max({combs, strip, 4 * pitch_.lines(2 * kMarkMm)});
     if (chart_.swaths == 0 || lines_ > height) return too_small();
     for (const Dashes& dashes : kDashes) {
-      if (add_combs(dashes)) {
+      for (const bool verniers : {true, false}) {
+        if (!add_combs(dashes, verniers)) continue;
         add_strip();
         add_joints();
+        if (verniers) add_verniers();
         add_marks();
         return std::move(chart_);
       }
@@ -127,15 +131,21 @@ class Layout {
            kWedges / 2 * pitch_.lines(kWedgeMm + kApartMm);
   }
 
-  /// Adds the combs if they fit, between marks and strip; nothing else is there yet.
-  bool add_combs(const Dashes& dashes) {
+  std::uint32_t tick_wide() const { return pitch_.places(kTickMm); }
+  std::uint32_t tick_apart() const { return std::max(pitch_.places(kTickApartMm), tick_wide() + 2); }
+  std::uint32_t vernier_places() const { return 2 * kTicks * tick_apart() + tick_wide(); }
+
+  /// Adds the combs if they fit, between marks and strip, with or without room for verniers; nothing else is there yet.
+  bool add_combs(const Dashes& dashes, bool verniers) {
     const double nozzle_mm = grid_.passes * pitch_.line_mm;
     const auto tiers = static_cast<std::uint32_t>(std::ceil(dashes.between_mm / nozzle_mm - 1e-9));
     const std::uint32_t length = std::max(pitch_.places(dashes.long_mm), 4u),
                         step = length + std::max(pitch_.places(dashes.gap_mm), 2u);
     const std::uint32_t comb = tiers * step + pitch_.places(kApartMm);
     first_place_ = free_.place + mark_places();
-    end_place_ = first_place_ + kRepeats * comb + 3 * pitch_.places(kApartMm) + strip_places() + mark_places();
+    vernier_place_ = first_place_ + kRepeats * comb;
+    strip_place_ = vernier_place_ + (verniers ? vernier_places() + pitch_.places(kApartMm) : 0) + 3 * pitch_.places(kApartMm);
+    end_place_ = strip_place_ + strip_places() + mark_places();
     if (end_place_ > free_.place_end) return false;
     chart_.between_mm = tiers * nozzle_mm;
     chart_.gap_mm = (step - length) * pitch_.place_mm;
@@ -150,7 +160,6 @@ class Layout {
         }
       }
     }
-    strip_place_ = first_place_ + kRepeats * comb + 3 * pitch_.places(kApartMm);
     return true;
   }
 
@@ -186,6 +195,24 @@ class Layout {
     }
   }
 
+  /// The swath behind a joint has its ticks a place closer than the one before.
+  void add_verniers() {
+    const std::uint32_t gap = pitch_.lines(kTickGapMm), swath = grid_.swath_lines(),
+                        tall = std::min(pitch_.lines(kTickLongMm), swath / 4);
+    if (tall <= gap) return;
+    for (std::uint32_t s = 1; s < chart_.swaths; ++s) {
+      const std::uint32_t joint = free_.line + s * swath, middle = vernier_place_ + kTicks * tick_apart();
+      ChartVernier vernier{s, {}, {}};
+      for (std::uint32_t k = 0; k <= 2 * kTicks; ++k) {
+        const std::uint32_t before = vernier_place_ + k * tick_apart(),
+                            after = middle + k * (tick_apart() - 1) - kTicks * (tick_apart() - 1);
+        vernier.before.push_back(box({joint - tall, joint - gap, before, before + tick_wide()}));
+        vernier.after.push_back(box({joint + gap, joint + tall, after, after + tick_wide()}));
+      }
+      chart_.verniers.push_back(std::move(vernier));
+    }
+  }
+
   void add_marks() {
     const std::uint32_t places = pitch_.places(2 * kMarkMm), lines = pitch_.lines(2 * kMarkMm);
     const std::uint32_t far = free_.line + lines_ - lines, end = end_place_ - places;
@@ -201,7 +228,7 @@ class Layout {
   Pitch pitch_;
   Chart chart_;
   Area free_;
-  std::uint32_t lines_ = 0, first_place_ = 0, strip_place_ = 0, end_place_ = 0;
+  std::uint32_t lines_ = 0, first_place_ = 0, vernier_place_ = 0, strip_place_ = 0, end_place_ = 0;
 };
 
 }  // namespace

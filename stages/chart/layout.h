@@ -1,6 +1,6 @@
 // stages/chart/layout.h: a calibration chart for the head of a powder printer.
 //
-//   o | nozzle by nozzle, thrice | bars of known widths, wedges | o
+//   o | nozzle by nozzle, thrice | verniers of joints | bars of known widths, wedges | o
 //
 // Along the scan lie three combs. Of a comb each nozzle of each swath prints one dash alone; dashes that lie beside each other
 // are of nozzles so far apart that blurred ones do not touch.

@@ -21,7 +21,7 @@ std::string correct_rows(const Json& nozzles, Machine& machine) {
   std::vector<double>& rows = machine.head.row_offset_um;
   std::vector<double> sum(rows.size(), 0), count(rows.size(), 0);
   for (std::size_t n = 0; n < nozzles.size(); ++n) {
-    if (nozzles[n].is_null()) continue;
+    if (nozzles[n].is_null() || nozzles[n].at("along_um").is_null()) continue;
     sum[n % rows.size()] += nozzles[n].at("along_um").get<double>();
     ++count[n % rows.size()];
   }
@@ -35,20 +35,54 @@ std::string correct_rows(const Json& nozzles, Machine& machine) {
   return line;
 }
 
+/// A length, or that it cannot be told.
+std::string told(const Json& json, const char* key) {
+  return json.at(key).is_null() ? "untold" : fmt::format("{:+.0f} um", json.at(key).get<double>());
+}
+
 std::vector<std::string> swath_lines(const Json& swaths) {
   std::vector<std::string> lines;
   for (std::size_t s = 0; s < swaths.size(); ++s) {
-    if (swaths[s].is_null()) {
+    const Json& swath = swaths[s];
+    if (swath.is_null()) {
       lines.push_back(fmt::format("swath {}   was not printed", s));
     } else if (s > 0) {
-      lines.push_back(fmt::format("swath {}   {:+.0f} um across, {:+.0f} um along the scan against the first one", s,
-                                  swaths[s].at("across_um").get<double>(), swaths[s].at("along_um").get<double>()));
+      lines.push_back(fmt::format("swath {}   {} across, {} along the scan against the first one", s, told(swath, "across_um"),
+                                  told(swath, "along_um")));
     }
   }
   return lines;
 }
 
-std::vector<std::string> take(const Json& json, Machine& machine) {
+/// Joints whose verniers and blocks show something else than the swaths' dashes: one of the two was read wrong.
+std::vector<std::string> joint_lines(const Json& joints) {
+  std::vector<std::string> lines;
+  for (const Json& joint : joints) {
+    if (joint.at("agrees").get<bool>()) continue;
+    const auto swath = joint.at("swath").get<std::uint32_t>();
+    lines.push_back(fmt::format(
+        "joint {}   shows {} across, {} along the scan from swath {} to {}, which its dashes do not: look at it in the photograph",
+        swath, told(joint, "across_um"), told(joint, "along_um"), swath - 1, swath));
+  }
+  return lines;
+}
+
+/// Offsets that four standard errors do not hold within a tenth of a pixel.
+std::string untold_line(const Json& nozzles) {
+  std::size_t seen = 0, untold = 0;
+  for (const Json& nozzle : nozzles) {
+    if (nozzle.is_null()) continue;
+    for (const char* key : {"along_um", "across_um"}) {
+      ++seen;
+      untold += nozzle.at(key).is_null();
+    }
+  }
+  if (untold == 0) return "";
+  return fmt::format("untold    {} of {} offsets of nozzles: the photograph does not show them within a tenth of a pixel",
+                     untold, seen);
+}
+
+std::vector<std::string> take(const Json& json, const Chart& chart, Machine& machine) {
   const auto seen_blocked = json.at("blocked").get<std::vector<std::uint32_t>>();
   const auto weak = json.at("weak").get<std::vector<std::uint32_t>>(),
              untold = json.at("untold").get<std::vector<std::uint32_t>>();
@@ -67,6 +101,8 @@ std::vector<std::string> take(const Json& json, Machine& machine) {
   if (!untold.empty()) lines.push_back("unknown   " + list_of(untold) + ": nothing of theirs can be seen");
   if (auto rows = correct_rows(nozzles, machine); !rows.empty()) lines.push_back(std::move(rows));
   for (std::string& line : swath_lines(json.at("swaths"))) lines.push_back(std::move(line));
+  for (std::string& line : joint_lines(json.at("joints"))) lines.push_back(std::move(line));
+  if (auto untold_offsets = untold_line(nozzles); !untold_offsets.empty()) lines.push_back(std::move(untold_offsets));
   if (const auto gain = json.find("dot_gain_um"); gain != json.end()) {
     const double along = gain->at("along").get<double>(), across = gain->at("across").get<double>();
     const bool along_x = machine.mounting.scan_axis == ScanAxis::kX;
@@ -76,20 +112,30 @@ std::vector<std::string> take(const Json& json, Machine& machine) {
                     um[1], std::max(um[0], 0.0), std::max(um[1], 0.0)));
     machine.head.dot_gain_um = um;
   }
-  for (const Json& wedge : json.at("wedges"))
-    lines.push_back(fmt::format("wedge     {:g} % of the pixels: {:.0f} % of full ink",
-                                wedge.at("pixels_percent").get<double>(), wedge.at("seen_percent").get<double>()));
+  for (const Json& wedge : json.at("wedges")) {
+    const double percent = wedge.at("pixels_percent").get<double>(), saturation = saturation_of(percent, chart, machine);
+    lines.push_back(fmt::format("wedge     {:g} % of the pixels{}: {:.0f} % of full ink", percent,
+                                saturation > 0 ? fmt::format(", {:.1f} % saturation", saturation) : "",
+                                wedge.at("seen_percent").get<double>()));
+  }
   return lines;
 }
 
 }  // namespace
 
-Result<std::vector<std::string>> take_over(std::string_view reading, Machine& machine) {
+Result<std::vector<std::string>> take_over(std::string_view reading, const Chart& chart, Machine& machine) {
   try {
-    return take(Json::parse(reading), machine);
+    return take(Json::parse(reading), chart, machine);
   } catch (const std::exception& error) {
     return Error{Fault::kInternal, std::string("lamina-scan told what is no reading: ") + error.what()};
   }
+}
+
+double saturation_of(double pixels_percent, const Chart& chart, const Machine& machine) {
+  const double stays = 1 - machine.powder.evaporates_percent / 100, drop_um3 = machine.head.drop_pl * 1000 * stays;
+  const double voids_um3 =
+      chart.pixel_x_nm * 1e-3 * chart.pixel_y_nm * 1e-3 * chart.layer_mm * 1e3 * (1 - machine.powder.packing);
+  return voids_um3 > 0 ? pixels_percent * drop_um3 / voids_um3 : 0;
 }
 
 }  // namespace lamina::chart

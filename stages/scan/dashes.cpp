@@ -90,67 +90,124 @@ double middle_of_ends(const std::vector<double>& profile, double step, double gr
   return middle;
 }
 
-DashSeen see_dash(const Photo& photo, const Chart& chart, const View& view, const Spot& place, double length, Window& w) {
-  const double half_across = chart.between_mm / 2, half_along = (length + chart.gap_mm) / 2;
-  DashSeen seen{.place = place};
-  if (!look(photo, view, place, chart.scan_along_x, half_along, half_across, w)) {
-    seen.hidden = true;
+/// What looks at one dash after the other.
+class Look {
+ public:
+  Look(const Photo& photo, const Chart& chart, const View& view, const std::optional<DashShapes>& shapes)
+      : photo_(photo), chart_(chart), view_(view), shapes_(shapes) {
+    for (const ChartDash& dash : chart.dashes) longest_ = std::max(longest_, length_of(dash));
+    gathered_.emplace(DashShapes{Shape(chart.between_mm, 0.01), Shape(longest_, 0.01)});
+  }
+
+  DashSeen see(const ChartDash& dash, const Spot& place) {
+    const double length = length_of(dash), half_across = chart_.between_mm / 2, half_along = (length + chart_.gap_mm) / 2;
+    DashSeen seen{.place = place};
+    if (!look(photo_, view_, place, chart_.scan_along_x, half_along, half_across, w_)) {
+      seen.hidden = true;
+      return seen;
+    }
+    sum_across(length, half_across, seen);
+    const double v = place_across(half_across, seen);
+    sum_along(half_across, v);
+    const double u = place_along(length, half_along, seen);
+    seen.place = chart_.scan_along_x ? Spot{place.x + u, place.y + v} : Spot{place.x + v, place.y + u};
+    gathered_->across.add(across_, v, seen.ground);
+    gathered_->along.add(along_, u, seen.ground);
     return seen;
   }
-  std::vector<double> across(static_cast<std::size_t>(w.across)), along(static_cast<std::size_t>(w.along)), edge;
-  for (int v = 0; v < w.across; ++v) {
-    double sum = 0;
-    int count = 0;
-    for (int u = 0; u < w.along; ++u) {
-      if (std::abs(w.u_of(u)) > 0.42 * length) continue;
-      sum += w.at(v, u);
-      ++count;
-      if (std::abs(w.v_of(v)) > 0.8 * half_across) edge.push_back(w.at(v, u));
-    }
-    across[static_cast<std::size_t>(v)] = sum / std::max(count, 1);
-  }
-  seen.ground = edge.empty() ? 0 : middle_value(edge);
-  for (int v = 0; v < w.across; ++v) {
-    if (std::abs(w.v_of(v)) <= 0.7 * half_across)
-      seen.mass += (across[static_cast<std::size_t>(v)] - seen.ground) * w.step_across;
-  }
-  double v = 0;
-  for (const double reach : {0.8, 0.55, 0.45, 0.45, 0.45})
-    v = centre(across, w.step_across, seen.ground, v, reach * half_across);
-  for (int u = 0; u < w.along; ++u) {
-    double sum = 0;
-    int count = 0;
-    for (int r = 0; r < w.across; ++r) {
-      if (std::abs(w.v_of(r) - v) > 0.28 * half_across) continue;
-      sum += w.at(r, u);
-      ++count;
-    }
-    along[static_cast<std::size_t>(u)] = sum / std::max(count, 1);
-  }
-  const double u = middle_of_ends(along, w.step_along, seen.ground, length / 2, 0.4 * chart.gap_mm);
-  seen.place = chart.scan_along_x ? Spot{place.x + u, place.y + v} : Spot{place.x + v, place.y + u};
-  return seen;
-}
 
-}  // namespace
-
-std::vector<DashSeen> see_dashes(const Photo& photo, const Chart& chart, const View& view, const std::vector<Spot>& shifts) {
-  constexpr double kThere = 0.5, kMost = 2.5;  // shares of a usual dash
-  std::vector<DashSeen> seen;
-  seen.reserve(chart.dashes.size());
-  Window window;
-  for (const ChartDash& dash : chart.dashes) {
-    const Spot m = middle_of(dash.box, chart), shift = shifts[dash.swath];
-    const double length = chart.scan_along_x ? (dash.box.right - dash.box.left) * 1e-6 * chart.pixel_x_nm
-                                             : (dash.box.bottom - dash.box.top) * 1e-6 * chart.pixel_y_nm;
-    seen.push_back(see_dash(photo, chart, view, {m.x + shift.x, m.y + shift.y}, length, window));
+  /// The shapes of all that were seen.
+  std::optional<DashShapes> shapes() {
+    gathered_->across.settle();
+    gathered_->along.settle();
+    return std::move(gathered_);
   }
+
+ private:
+  double length_of(const ChartDash& dash) const {
+    return chart_.scan_along_x ? (dash.box.right - dash.box.left) * 1e-6 * chart_.pixel_x_nm
+                               : (dash.box.bottom - dash.box.top) * 1e-6 * chart_.pixel_y_nm;
+  }
+
+  void sum_across(double length, double half_across, DashSeen& seen) {
+    across_.value.assign(static_cast<std::size_t>(w_.across), 0);
+    across_.step = w_.step_across;
+    edge_.clear();
+    for (int v = 0; v < w_.across; ++v) {
+      double sum = 0;
+      int count = 0;
+      for (int u = 0; u < w_.along; ++u) {
+        if (std::abs(w_.u_of(u)) > 0.42 * length) continue;
+        sum += w_.at(v, u);
+        ++count;
+        if (std::abs(w_.v_of(v)) > 0.8 * half_across) edge_.push_back(w_.at(v, u));
+      }
+      across_.value[static_cast<std::size_t>(v)] = sum / std::max(count, 1);
+    }
+    seen.ground = edge_.empty() ? 0 : middle_value(edge_);
+    for (int v = 0; v < w_.across; ++v) {
+      if (std::abs(w_.v_of(v)) <= 0.7 * half_across)
+        seen.mass += (across_.value[static_cast<std::size_t>(v)] - seen.ground) * w_.step_across;
+    }
+  }
+
+  double place_across(double half_across, DashSeen& seen) const {
+    double v = 0;
+    for (const double reach : {0.8, 0.55, 0.45, 0.45, 0.45})
+      v = centre(across_.value, w_.step_across, seen.ground, v, reach * half_across);
+    if (!shapes_) return v;
+    const ShapeFit fit = fit_shape(across_, shapes_->across, v, 0.75 * half_across, 0.25 * half_across);
+    seen.misfit = std::max(seen.misfit, fit.misfit / std::max(fit.height, 1e-3));
+    return fit.middle;
+  }
+
+  /// The profile along the scan, of what lies about the dash's middle line.
+  void sum_along(double half_across, double middle) {
+    weights_.assign(static_cast<std::size_t>(w_.across), 0);
+    double all = 0;
+    for (int r = 0; r < w_.across; ++r) {
+      const double off = w_.v_of(r) - middle;
+      const double weight = shapes_ ? (std::abs(off) < 0.6 * half_across ? std::max(shapes_->across.at(off), 0.0) : 0)
+                                    : (std::abs(off) > 0.28 * half_across ? 0 : 1);
+      all += weights_[static_cast<std::size_t>(r)] = weight;
+    }
+    along_.value.assign(static_cast<std::size_t>(w_.along), 0);
+    along_.step = w_.step_along;
+    for (int r = 0; r < w_.across && all > 0; ++r) {
+      const double weight = weights_[static_cast<std::size_t>(r)] / all;
+      if (weight <= 0) continue;
+      for (int u = 0; u < w_.along; ++u) along_.value[static_cast<std::size_t>(u)] += weight * w_.at(r, u);
+    }
+  }
+
+  double place_along(double length, double half_along, DashSeen& seen) const {
+    const double u = middle_of_ends(along_.value, w_.step_along, seen.ground, length / 2, 0.4 * chart_.gap_mm);
+    if (!shapes_) return u;
+    const ShapeFit fit = fit_shape(along_, shapes_->along, u, half_along - 0.1 * chart_.gap_mm, 0.25 * chart_.gap_mm);
+    seen.misfit = std::max(seen.misfit, fit.misfit / std::max(fit.height, 1e-3));
+    return fit.middle;
+  }
+
+  const Photo& photo_;
+  const Chart& chart_;
+  const View& view_;
+  const std::optional<DashShapes>& shapes_;
+  std::optional<DashShapes> gathered_;
+  double longest_ = 0;
+  Window w_;
+  Profile across_, along_;
+  std::vector<double> edge_, weights_;
+};
+
+/// Tells what is there, by what usual dashes have.
+void judge_dashes(const Photo& photo, const Chart& chart, std::vector<DashSeen>& seen) {
+  constexpr double kThere = 0.5, kMost = 2.5, kMarred = 3;  // shares of a usual dash
   // A usual dash: three quarters of all have less. Where most are missing, half of what full ink of its width has.
-  std::vector<double> masses;
+  std::vector<double> masses, misfits;
   for (const DashSeen& one : seen) {
     if (!one.hidden) masses.push_back(one.mass);
   }
-  if (masses.empty()) return seen;
+  if (masses.empty()) return;
   const auto rank = masses.begin() + static_cast<std::ptrdiff_t>(masses.size() * 3 / 4);
   std::nth_element(masses.begin(), rank, masses.end());
   const double pitch = 1e-6 * (chart.scan_along_x ? chart.pixel_y_nm : chart.pixel_x_nm);
@@ -158,7 +215,29 @@ std::vector<DashSeen> see_dashes(const Photo& photo, const Chart& chart, const V
   for (DashSeen& one : seen) {
     one.there = !one.hidden && one.mass > kThere * usual;
     one.hidden = one.hidden || one.mass > kMost * usual || one.ground > 0.35 * photo.ink;
+    if (one.there && !one.hidden) misfits.push_back(one.misfit);
   }
+  if (misfits.empty()) return;
+  const double most = kMarred * middle_value(misfits);
+  for (DashSeen& one : seen) one.marred = one.misfit > most;
+}
+
+}  // namespace
+
+std::vector<DashSeen> see_dashes(const Photo& photo, const Chart& chart, const SheetFit& fit,
+                                 std::optional<DashShapes>& shapes) {
+  constexpr double kStray = 0.2;  // of the way to the next dash: how far a nozzle's own offset is followed
+  std::vector<DashSeen> seen;
+  seen.reserve(chart.dashes.size());
+  Look look(photo, chart, fit.view, shapes);
+  const double most = kStray * chart.between_mm;
+  for (const ChartDash& dash : chart.dashes) {
+    const Spot m = middle_of(dash.box, chart), shift = fit.shift[dash.swath], offset = fit.offset[dash.nozzle];
+    seen.push_back(
+        look.see(dash, {m.x + shift.x + std::clamp(offset.x, -most, most), m.y + shift.y + std::clamp(offset.y, -most, most)}));
+  }
+  judge_dashes(photo, chart, seen);
+  shapes = look.shapes();
   return seen;
 }
 

@@ -1,11 +1,13 @@
 // stages/scan/dashes.h: what is seen of each dash of a chart.
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include "stages/data/picture/chart.h"
 #include "stages/scan/photo.h"
-#include "stages/scan/view.h"
+#include "stages/scan/shape.h"
+#include "stages/scan/sheet_fit.h"
 
 namespace lamina::scan {
 
@@ -16,13 +18,21 @@ struct DashSeen {
   Spot place;           // of its middle; meaningful if it is there
   bool there = false;   // it was printed
   bool hidden = false;  // too dark for a dash, or out of the picture: nothing can be told
+  double misfit = 0;    // from the common shape, as a share of its height
+  bool marred = false;  // by dust: it is there, but its place is not to be trusted
 };
 
-/// Looks at each dash where the view and the shift of its swath put it.
-/// shifts   of each swath, mm
+/// The common shapes of all dashes of a photograph, across the scan and along it.
+struct DashShapes {
+  Shape across, along;
+};
+
+/// Looks at each dash where the fit puts it.
+/// shapes   by which dashes are placed if there are any, else by centres and ends; replaced by those that were seen
 /// returns  one for each dash of the chart
 /// cost     some thousand samples a dash
-std::vector<DashSeen> see_dashes(const Photo& photo, const Chart& chart, const View& view, const std::vector<Spot>& shifts);
+std::vector<DashSeen> see_dashes(const Photo& photo, const Chart& chart, const SheetFit& fit,
+                                 std::optional<DashShapes>& shapes);
 
 /// Darkness along a line, averaged over a stripe about it: from -reach to reach, evenly; empty if it leaves the picture.
 /// reach, half  mm, of the line on either side of the middle and of the stripe's width

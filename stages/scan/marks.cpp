@@ -4,69 +4,21 @@
 #include <array>
 #include <cmath>
 #include <numbers>
-#include <opencv2/imgproc.hpp>
+
+#include "stages/scan/patches.h"
 
 namespace lamina::scan {
 namespace {
 
-/// A dark patch. fullness  area / area of the ellipse with its second moments: 1 of a disc, 0.6 of the ring
-struct Patch {
-  Spot middle;
-  double area = 0, fullness = 0;
-  bool hollow = false;  // its middle is bright
-};
-
-constexpr std::size_t kMostDiscs = 14, kMostRings = 6;
 constexpr double kRingShare = 1 - kRingHole * kRingHole;
 
-/// Patches that may be marks. close  pixels of gaps that are bridged: lines of blocked nozzles cut a disc in two
-void find_patches(const cv::Mat& dark, int close, std::vector<Patch>& discs, std::vector<Patch>& rings) {
-  cv::Mat mask = dark, labels, stats, middles;
-  if (close > 1) cv::morphologyEx(dark, mask, cv::MORPH_CLOSE, cv::getStructuringElement(cv::MORPH_ELLIPSE, {close, close}));
-  const int count = cv::connectedComponentsWithStats(mask, labels, stats, middles, 8);
-  struct Moments {
-    double xx = 0, xy = 0, yy = 0;
-  };
-  std::vector<Moments> moments(static_cast<std::size_t>(count));
-  std::vector<char> fits(static_cast<std::size_t>(count), 0);
-  const double most = 0.05 * static_cast<double>(dark.total());
-  for (int i = 1; i < count; ++i) {
-    const int *s = stats.ptr<int>(i), w = s[cv::CC_STAT_WIDTH], h = s[cv::CC_STAT_HEIGHT];
-    const bool inside = s[cv::CC_STAT_LEFT] > 0 && s[cv::CC_STAT_TOP] > 0 && s[cv::CC_STAT_LEFT] + w < dark.cols &&
-                        s[cv::CC_STAT_TOP] + h < dark.rows;
-    fits[static_cast<std::size_t>(i)] =
-        inside && s[cv::CC_STAT_AREA] >= 60 && s[cv::CC_STAT_AREA] <= most && 3 * w > h && 3 * h > w;
-  }
-  for (int y = 0; y < labels.rows; ++y) {
-    const int* row = labels.ptr<int>(y);
-    for (int x = 0; x < labels.cols; ++x) {
-      const auto label = static_cast<std::size_t>(row[x]);
-      if (!fits[label]) continue;
-      const double *c = middles.ptr<double>(row[x]), dx = x - c[0], dy = y - c[1];
-      moments[label].xx += dx * dx;
-      moments[label].xy += dx * dy;
-      moments[label].yy += dy * dy;
-    }
-  }
-  for (int i = 1; i < count; ++i) {
-    if (!fits[static_cast<std::size_t>(i)]) continue;
-    const Moments& m = moments[static_cast<std::size_t>(i)];
-    const double area = stats.ptr<int>(i)[cv::CC_STAT_AREA], det = (m.xx * m.yy - m.xy * m.xy) / (area * area);
-    const double* c = middles.ptr<double>(i);
-    Patch patch{{c[0], c[1]}, area, area / (4 * std::numbers::pi * std::sqrt(std::max(det, 1e-9))), false};
-    patch.hollow = mask.at<std::uint8_t>(static_cast<int>(std::lround(c[1])), static_cast<int>(std::lround(c[0]))) == 0;
-    if (!patch.hollow && patch.fullness > 0.9 && patch.fullness < 1.1) discs.push_back(patch);
-    if (patch.hollow && patch.fullness > 0.4 && patch.fullness < 0.8) rings.push_back(patch);
-  }
-}
+/// A view, and how much darker it finds the dashes' places than those between them.
+struct Best {
+  View view;
+  double contrast = 0;
+};
 
-void keep_largest(std::vector<Patch>& patches, std::size_t most) {
-  std::ranges::sort(patches, [](const Patch& a, const Patch& b) { return a.area > b.area; });
-  if (patches.size() > most) patches.resize(most);
-}
-
-/// How much darker the dashes' places are than the places between them.
-double contrast(const Photo& photo, const Chart& chart, const View& view) {
+double contrast_of(const Photo& photo, const Chart& chart, const View& view) {
   const std::size_t step = std::max<std::size_t>(1, chart.dashes.size() / 300);
   const double x = chart.scan_along_x ? 0 : chart.between_mm / 2, y = chart.scan_along_x ? chart.between_mm / 2 : 0;
   double sum = 0;
@@ -80,7 +32,18 @@ double contrast(const Photo& photo, const Chart& chart, const View& view) {
   return count == 0 ? 0 : sum / static_cast<double>(count);
 }
 
-/// The view of a ring and three discs, which follow each other clockwise; false if their sizes do not agree with it.
+/// The view that has the marks at four pixels, unless they do not follow each other clockwise.
+bool view_of_corners(const Photo& photo, const Chart& chart, const std::array<Spot, 4>& pixels, View& view) {
+  std::array<Spot, 4> places;
+  for (std::size_t i = 0; i < 4; ++i) {
+    places[i] = middle_of(chart.marks[i], chart);
+    const Spot a = pixels[i], b = pixels[(i + 1) % 4], c = pixels[(i + 2) % 4];
+    if ((b.x - a.x) * (c.y - b.y) - (b.y - a.y) * (c.x - b.x) <= 0) return false;
+  }
+  return view_of(places, pixels, photo.grey.cols, photo.grey.rows, view);
+}
+
+/// The view of a ring and three discs; false if their sizes do not agree with it.
 bool view_of_marks(const Photo& photo, const Chart& chart, const Patch& ring, std::array<Patch, 3> discs, View& view) {
   const Spot middle{(ring.middle.x + discs[0].middle.x + discs[1].middle.x + discs[2].middle.x) / 4,
                     (ring.middle.y + discs[0].middle.y + discs[1].middle.y + discs[2].middle.y) / 4};
@@ -90,15 +53,10 @@ bool view_of_marks(const Photo& photo, const Chart& chart, const Patch& ring, st
     return angle < 0 ? angle + 2 * std::numbers::pi : angle;
   };
   std::ranges::sort(discs, [&](const Patch& a, const Patch& b) { return turn(a) < turn(b); });
-  std::array<Spot, 4> places, pixels{ring.middle, discs[0].middle, discs[1].middle, discs[2].middle};
+  if (!view_of_corners(photo, chart, {ring.middle, discs[0].middle, discs[1].middle, discs[2].middle}, view)) return false;
   for (std::size_t i = 0; i < 4; ++i) {
-    places[i] = middle_of(chart.marks[i], chart);
-    const Spot a = pixels[i], b = pixels[(i + 1) % 4], c = pixels[(i + 2) % 4];
-    if ((b.x - a.x) * (c.y - b.y) - (b.y - a.y) * (c.x - b.x) <= 0) return false;
-  }
-  if (!view_of(places, pixels, photo.grey.cols, photo.grey.rows, view)) return false;
-  for (std::size_t i = 0; i < 4; ++i) {
-    const double radius = view.pixels_a_mm(places[i].x, places[i].y) * chart.mark_mm;
+    const Spot place = middle_of(chart.marks[i], chart);
+    const double radius = view.pixels_a_mm(place.x, place.y) * chart.mark_mm;
     const double area = std::numbers::pi * radius * radius * (i == 0 ? kRingShare : 1),
                  seen = i == 0 ? ring.area : discs[i - 1].area;
     if (!(seen > 0.5 * area && seen < 2 * area)) return false;
@@ -106,36 +64,139 @@ bool view_of_marks(const Photo& photo, const Chart& chart, const Patch& ring, st
   return true;
 }
 
-}  // namespace
-
-Result<View> find_marks(const Photo& photo, const Chart& chart) {
-  cv::Mat dark = photo.darkness > 0.45 * photo.ink;
-  View best, view;
-  double highest = 0;
-  for (const int share : {0, 300, 150, 80}) {
-    std::vector<Patch> discs, rings;
-    find_patches(dark, share == 0 ? 0 : dark.cols / share, discs, rings);
-    keep_largest(discs, kMostDiscs);
-    keep_largest(rings, kMostRings);
-    for (const Patch& ring : rings) {
-      for (std::size_t i = 0; i < discs.size(); ++i) {
-        for (std::size_t j = i + 1; j < discs.size(); ++j) {
-          for (std::size_t k = j + 1; k < discs.size(); ++k) {
-            if (!view_of_marks(photo, chart, ring, {discs[i], discs[j], discs[k]}, view)) continue;
-            if (const double got = contrast(photo, chart, view); got > highest) {
-              highest = got;
-              best = view;
-            }
-          }
+void try_four(const Photo& photo, const Chart& chart, const Patches& patches, Best& best) {
+  const std::vector<Patch>& discs = patches.discs;
+  View view;
+  for (const Patch& ring : patches.rings) {
+    for (std::size_t i = 0; i < discs.size(); ++i) {
+      for (std::size_t j = i + 1; j < discs.size(); ++j) {
+        for (std::size_t k = j + 1; k < discs.size(); ++k) {
+          if (!view_of_marks(photo, chart, ring, {discs[i], discs[j], discs[k]}, view)) continue;
+          if (const double got = contrast_of(photo, chart, view); got > best.contrast) best = {view, got};
         }
       }
     }
   }
-  if (highest > 0.05 * photo.ink) return best;
-  return Error{
-      Fault::kInput,
-      "the chart is not found: its ring and three discs have to be whole in the photograph, which is not mirrored, and "
-      "sharp enough to tell its dashes apart"};
+}
+
+/// Three marks, the fourth where it would be without perspective. misfit  of shape and sizes, 0 if all agree
+struct Guess {
+  std::array<Spot, 4> pixels;
+  std::size_t missing = 0;
+  double misfit = 0;
+};
+
+/// seen  of the marks but the missing one, in their order
+void add_guess(const Chart& chart, std::size_t missing, const std::array<const Patch*, 3>& seen, std::vector<Guess>& guesses) {
+  constexpr double kMostStretch = 1.35, kMostSize = 1.8;
+  std::array<std::size_t, 3> marks{};
+  for (std::size_t i = 0, m = 0; m < 4; ++m) {
+    if (m != missing) marks[i++] = m;
+  }
+  const Spot o = middle_of(chart.marks[marks[0]], chart), a = middle_of(chart.marks[marks[1]], chart),
+             b = middle_of(chart.marks[marks[2]], chart), last = middle_of(chart.marks[missing], chart);
+  const double ax = a.x - o.x, ay = a.y - o.y, bx = b.x - o.x, by = b.y - o.y, whole = ax * by - ay * bx;
+  if (std::abs(whole) < 1e-6) return;
+  const Spot p = seen[0]->middle, q = seen[1]->middle, r = seen[2]->middle;
+  const double qx = q.x - p.x, qy = q.y - p.y, rx = r.x - p.x, ry = r.y - p.y;
+  // Pixels of a mm of x and of y.
+  const Spot x{(qx * by - rx * ay) / whole, (qy * by - ry * ay) / whole},
+      y{(rx * ax - qx * bx) / whole, (ry * ax - qy * bx) / whole};
+  const double det = x.x * y.y - x.y * y.x, sum = x.x * x.x + x.y * x.y + y.x * y.x + y.y * y.y;
+  if (det <= 0) return;
+  const double stretch = sum / (2 * det) + std::sqrt(std::max(sum * sum / (4 * det * det) - 1, 0.0));  // of the axes
+  if (stretch > kMostStretch) return;
+  Guess guess{{}, missing, std::log(stretch)};
+  for (std::size_t i = 0; i < 3; ++i) {
+    const double area = std::numbers::pi * chart.mark_mm * chart.mark_mm * det * (marks[i] == 0 ? kRingShare : 1);
+    const double off = std::abs(std::log(seen[i]->area / area));
+    if (off > std::log(kMostSize)) return;
+    guess.misfit += off;
+    guess.pixels[marks[i]] = seen[i]->middle;
+  }
+  const double dx = last.x - o.x, dy = last.y - o.y;
+  guess.pixels[missing] = {p.x + dx * x.x + dy * y.x, p.y + dx * x.y + dy * y.y};
+  guesses.push_back(guess);
+}
+
+std::vector<Guess> guesses_of(const Chart& chart, const Patches& patches) {
+  std::vector<Guess> guesses;
+  const std::vector<Patch>& discs = patches.discs;
+  for (std::size_t i = 0; i < discs.size(); ++i) {
+    for (std::size_t j = 0; j < discs.size(); ++j) {
+      if (i == j) continue;
+      for (const Patch& ring : patches.rings) {
+        for (std::size_t missing = 1; missing < 4; ++missing) add_guess(chart, missing, {&ring, &discs[i], &discs[j]}, guesses);
+      }
+      for (std::size_t k = 0; k < discs.size(); ++k) {
+        if (k != i && k != j) add_guess(chart, 0, {&discs[i], &discs[j], &discs[k]}, guesses);
+      }
+    }
+  }
+  std::ranges::stable_sort(guesses, {}, &Guess::misfit);
+  return guesses;
+}
+
+/// Moves the fourth mark to where the dashes' contrast is highest, by a grid that becomes finer.
+Best search_fourth(const Photo& photo, const Chart& chart, Guess guess) {
+  const Spot a = guess.pixels[0], c = guess.pixels[2], b = guess.pixels[1], d = guess.pixels[3];
+  const double diagonal = 0.5 * (std::hypot(c.x - a.x, c.y - a.y) + std::hypot(d.x - b.x, d.y - b.y));
+  View view;
+  if (!view_of_corners(photo, chart, guess.pixels, view)) return {};
+  const Spot m = middle_of({0, 0, chart.columns, chart.rows}, chart);
+  Best best;
+  double reach = 0.1 * diagonal, step = 0.35 * chart.between_mm * view.pixels_a_mm(m.x, m.y);
+  step = std::max(step, reach / 40);
+  for (int round = 0; round < 4; ++round) {
+    const Spot from = guess.pixels[guess.missing];
+    std::array<Spot, 4> pixels = guess.pixels;
+    const int steps = static_cast<int>(std::ceil(reach / step));
+    for (int j = -steps; j <= steps; ++j) {
+      for (int i = -steps; i <= steps; ++i) {
+        pixels[guess.missing] = {from.x + i * step, from.y + j * step};
+        if (!view_of_corners(photo, chart, pixels, view)) continue;
+        if (const double got = contrast_of(photo, chart, view); got > best.contrast) {
+          best = {view, got};
+          guess.pixels = pixels;
+        }
+      }
+    }
+    reach = step;
+    step /= 3;
+  }
+  return best;
+}
+
+}  // namespace
+
+Result<View> find_marks(const Photo& photo, const Chart& chart) {
+  constexpr double kLeast = 0.05, kClear = 0.2, kLeastOfThree = 0.12;  // shares of full ink
+  constexpr double kFaintest = 0.04;                                   // darkness
+  constexpr std::size_t kMostGuesses = 60;
+  if (photo.ink < kFaintest)
+    return Error{Fault::kInput, "shows nothing dark: photograph the chart on a sheet that its ink darkens"};
+  Best best;
+  Patches all;
+  for (const double level : {0.45, 0.3, 0.6}) {
+    for (const int share : {0, 300, 150, 80}) {
+      const Patches patches = find_patches(photo, level, share == 0 ? 0 : photo.grey.cols / share);
+      try_four(photo, chart, patches, best);
+      add_patches(patches, all);
+    }
+    if (best.contrast > kClear * photo.ink) return best.view;
+  }
+  std::vector<Guess> guesses = guesses_of(chart, all);
+  if (guesses.size() > kMostGuesses) guesses.resize(kMostGuesses);
+  Best three;
+  for (const Guess& guess : guesses) {
+    if (const Best found = search_fourth(photo, chart, guess); found.contrast > three.contrast) three = found;
+    if (three.contrast > kClear * photo.ink) break;
+  }
+  if (three.contrast > kLeastOfThree * photo.ink && three.contrast > best.contrast) return three.view;
+  if (best.contrast > kLeast * photo.ink) return best.view;
+  return Error{Fault::kInput,
+               "the chart is not found: three of its ring and discs have to be whole in the photograph, which is not mirrored, "
+               "and sharp enough to tell its dashes apart"};
 }
 
 }  // namespace lamina::scan

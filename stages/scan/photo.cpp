@@ -41,6 +41,15 @@ cv::Mat blank_light(const cv::Mat& light) {
   return blank;
 }
 
+/// Turned as the camera was held. orientation  of Exif and TIFF: 1 as it is
+cv::Mat upright(cv::Mat grey, int orientation) {
+  if (orientation >= 5 && orientation <= 8) cv::transpose(grey, grey);
+  const bool mirrored = orientation == 2 || orientation == 3 || orientation == 6 || orientation == 7;
+  const bool upside_down = orientation == 3 || orientation == 4 || orientation == 7 || orientation == 8;
+  if (mirrored || upside_down) cv::flip(grey, grey, mirrored && upside_down ? -1 : mirrored ? 1 : 0);
+  return grey;
+}
+
 }  // namespace
 
 Photo photo_of(cv::Mat grey) {
@@ -82,20 +91,24 @@ Result<Photo> read_photo(const std::string& path, int least) {
   if (std::int64_t{spec.width} * spec.height > kMostPixels) return refused("has more than 2^27 pixels; give a smaller one");
   if (std::min(spec.width, spec.height) < least)
     return refused(fmt::format("has {} x {} pixels; {} and more a side are needed", spec.width, spec.height, least));
-  const int channels = spec.nchannels;
+  const int channels = spec.nchannels, turn = spec.get_int_attribute("Orientation", 1);
   if (channels < 1 || channels > 4) return refused(fmt::format("has {} channels; give a grey or a colour picture", channels));
   std::vector<std::uint8_t> row(static_cast<std::size_t>(spec.width) * static_cast<std::size_t>(channels));
   std::vector<std::uint8_t> all(row.size() * static_cast<std::size_t>(spec.height));
   if (!file->read_image(0, 0, 0, channels, OIIO::TypeDesc::UINT8, all.data()))
     return refused("cannot be read: " + file->geterror());
+  // OpenImageIO multiplies colours by their opacity: what is transparent shows white paper.
+  const int alpha = channels % 2 == 0 ? channels - 1 : -1;
   cv::Mat grey(spec.height, spec.width, CV_8U);
   for (int y = 0; y < spec.height; ++y) {
     const std::uint8_t* from = all.data() + static_cast<std::size_t>(y) * row.size();
     auto* to = grey.ptr<std::uint8_t>(y);
-    for (int x = 0; x < spec.width; ++x, from += channels)  // Rec. 709
-      to[x] = channels < 3 ? from[0] : static_cast<std::uint8_t>((54 * from[0] + 183 * from[1] + 19 * from[2] + 128) >> 8);
+    for (int x = 0; x < spec.width; ++x, from += channels) {
+      const int seen = channels < 3 ? from[0] : (54 * from[0] + 183 * from[1] + 19 * from[2] + 128) >> 8;  // Rec. 709
+      to[x] = static_cast<std::uint8_t>(std::min(255, alpha < 0 ? seen : seen + 255 - from[alpha]));
+    }
   }
-  return photo_of(std::move(grey));
+  return photo_of(upright(std::move(grey), turn));
 }
 
 Result<std::string> png_of(const cv::Mat& bgr) {

@@ -18,7 +18,8 @@ struct Photo {
   double ink = 0;    // darkness of full ink: what three pixels in a thousand exceed
 };
 
-/// Reads PNG, JPEG, TIFF and whatever else OpenImageIO reads; values count as sRGB, colours by their luminance.
+/// Reads PNG, JPEG, TIFF and whatever else OpenImageIO reads; values count as sRGB, colours by their luminance,
+/// what is transparent as white. Turned as the file says that the camera was held.
 /// least   pixels of the shorter side
 /// errors  kInput: no such image, smaller, or more than 2^27 pixels
 /// cost    reads the image; 13 bytes a pixel

@@ -3,8 +3,6 @@
 
 #include <array>
 #include <cmath>
-#include <cstdint>
-#include <vector>
 
 namespace lamina::scan {
 
@@ -37,18 +35,5 @@ struct View {
 
 /// The view, without a lens, that takes four places to four pixels. False if three of either lie on a line.
 bool view_of(const std::array<Spot, 4>& places, const std::array<Spot, 4>& pixels, double width, double height, View& view);
-
-/// A place and where it was seen. group  its places may all be shifted together; 0: they are not
-struct Sighting {
-  Spot place, seen;
-  std::uint32_t group = 0;
-};
-
-/// Least squares, by Gauss and Newton, with Tukey's weights: what lies far off (dust) counts nothing. Unknown are the view and
-/// a shift for each group but the first, in mm.
-/// shifts   of all groups, changed
-/// returns  the median distance in pixels
-/// cost     O(sightings) for each of some ten steps
-double fit_view(const std::vector<Sighting>& sightings, View& view, std::vector<Spot>& shifts, bool lens);
 
 }  // namespace lamina::scan

@@ -60,6 +60,7 @@ TEST(ChartLayout, DashesAreFiredByTheNozzlesThatTheyName) {
     dashes.bars.clear();
     dashes.wedges.clear();
     dashes.joints.clear();
+    dashes.verniers.clear();
     std::map<std::pair<std::uint32_t, std::uint32_t>, std::uint64_t> wanted;
     for (const ChartDash& dash : dashes.dashes)
       wanted[{dash.swath, dash.nozzle}] += (dash.box.right - dash.box.left) * (dash.box.bottom - dash.box.top);
@@ -85,6 +86,10 @@ TEST(ChartLayout, NothingTouchesAnythingElse) {
     for (const ChartBar& bar : laid->bars) boxes.push_back(bar.box);
     for (const ChartWedge& wedge : laid->wedges) boxes.push_back(wedge.box);
     for (const ChartBox& joint : laid->joints) boxes.push_back(joint);
+    for (const ChartVernier& vernier : laid->verniers) {
+      boxes.insert(boxes.end(), vernier.before.begin(), vernier.before.end());
+      boxes.insert(boxes.end(), vernier.after.begin(), vernier.after.end());
+    }
     for (const ChartDash& dash : laid->dashes) boxes.push_back(dash.box);
     const std::size_t others = boxes.size() - laid->dashes.size();
     for (std::size_t i = 0; i < others; ++i) {
@@ -152,27 +157,75 @@ TEST(ChartDrops, VolumeFollowsFromMass) {
   EXPECT_DOUBLE_EQ(chart::drop_pl_of(0.5, 1, 1e7), 0.05);
 }
 
-/// A reading with two rows: odd nozzles land 10 um too far, so that their row stands 10 um less far behind.
+/// Ticks of a swath are fired by it alone, and pair m + k lines up if the later swath lies k places too far.
+TEST(ChartLayout, VerniersTellWholePixels) {
+  std::size_t seen = 0;
+  for (const std::string_view name : pipeline::names_of(pipeline::shipped_machines())) {
+    const auto machine = machine_of_chart(std::string(name));
+    const auto laid = chart::lay_out(machine.machine, machine.grid);
+    ASSERT_TRUE(laid);
+    for (const ChartVernier& vernier : laid->verniers) {
+      ++seen;
+      ASSERT_EQ(vernier.before.size(), 9u);
+      Chart before = *laid, after = *laid;
+      for (Chart* chart : {&before, &after}) {
+        chart->marks.clear(), chart->dashes.clear(), chart->bars.clear(), chart->wedges.clear(), chart->joints.clear();
+        chart->verniers = {{vernier.swath, {}, {}}};
+      }
+      before.verniers[0].before = vernier.before;
+      after.verniers[0].after = vernier.after;
+      const auto one = fired(machine.grid, chart::draw(before)), other = fired(machine.grid, chart::draw(after));
+      ASSERT_TRUE(!one.empty() && !other.empty());
+      const std::uint32_t swath = one.begin()->first.first;
+      for (const auto& [who, count] : one) EXPECT_EQ(who.first, swath) << name;
+      for (const auto& [who, count] : other) EXPECT_EQ(who.first, swath + 1) << name;
+      for (std::size_t i = 0; i < 9; ++i) {
+        const std::int64_t a = laid->scan_along_x ? vernier.before[i].left : vernier.before[i].top,
+                           b = laid->scan_along_x ? vernier.after[i].left : vernier.after[i].top;
+        EXPECT_EQ(b + (static_cast<std::int64_t>(i) - 4) * laid->along_sign, a) << name << ' ' << i;
+      }
+    }
+  }
+  EXPECT_GE(seen, 10u);
+}
+
+/// nuferbj, by hand: 50 pl = 50,000 um3 on 96.944 x 96.944 x 100 um, of which 40 % are voids: 13.30 %.
+TEST(ChartMeasured, WedgesAreTakenForSaturations) {
+  const auto machine = machine_of_chart("nuferbj");
+  auto laid = chart::lay_out(machine.machine, machine.grid);
+  ASSERT_TRUE(laid);
+  EXPECT_EQ(chart::saturation_of(100, *laid, machine.machine), 0);  // of no thickness
+  laid->layer_mm = 0.1;
+  EXPECT_NEAR(chart::saturation_of(100, *laid, machine.machine), 13.30, 0.01);
+  EXPECT_NEAR(chart::saturation_of(25, *laid, machine.machine), 3.325, 0.003);
+}
+
+/// A reading with two rows: odd nozzles land 10 um too far, so that their row stands 10 um less far behind. One is seen too
+/// faintly to tell where along the scan.
 TEST(ChartMeasured, ReadingsBecomeKeysOfAProfile) {
   Machine machine;
-  machine.head.nozzles = 4;
+  machine.head.nozzles = 6;
   machine.head.row_offset_um = {0, 2540};
   machine.head.blocked = {1};
   machine.mounting.scan_axis = ScanAxis::kY;
+  Chart chart;
+  chart.pixel_x_nm = chart.pixel_y_nm = 100'000;
+  chart.layer_mm = 0.1;
   const char* reading =
-      R"({"pixels_a_mm":20,"scatter_um":5,"blocked":[2],"weak":[],"untold":[],"swaths":[{"along_um":0,"across_um":0},{"along_um":30,"across_um":-20},null],)"
-      R"("nozzles":[{"along_um":-5,"across_um":0},{"along_um":5,"across_um":0},null,{"along_um":5,"across_um":1}],)"
+      R"({"pixels_a_mm":20,"scatter_um":5,"blocked":[2],"weak":[],"untold":[],"swaths":[{"along_um":0,"across_um":0},{"along_um":30,"across_um":null},null],)"
+      R"("nozzles":[{"along_um":-5,"across_um":0},{"along_um":5,"across_um":0},null,{"along_um":5,"across_um":1},{"along_um":null,"across_um":1},null],)"
+      R"("joints":[{"swath":1,"along_um":30,"across_um":-41,"agrees":false}],)"
       R"("dot_gain_um":{"along":12.4,"across":30.6},"wedges":[{"pixels_percent":50,"seen_percent":61}]})";
-  const auto lines = chart::take_over(reading, machine);
+  const auto lines = chart::take_over(reading, chart, machine);
   ASSERT_TRUE(lines) << lines.error().message;
   EXPECT_EQ(machine.head.blocked, (std::vector<std::uint32_t>{2}));
   EXPECT_EQ(machine.head.row_offset_um, (std::vector<double>{0, 2530}));
   EXPECT_EQ(machine.head.dot_gain_um, (std::array<double, 2>{31, 12}));
-  EXPECT_TRUE(
-      std::ranges::count_if(*lines, [](const std::string& line) { return line.find("--bleed 31x12") != std::string::npos; }));
-  EXPECT_TRUE(
-      std::ranges::count_if(*lines, [](const std::string& line) { return line.find("was not printed") != std::string::npos; }));
-  EXPECT_FALSE(chart::take_over("{}", machine));
+  for (const char* words : {"--bleed 31x12", "was not printed", "untold across, +30 um along", "joint 1   shows -41 um across",
+                            "1 of 8 offsets", "50 % of the pixels, 6.2 % saturation: 61 %"})
+    EXPECT_EQ(std::ranges::count_if(*lines, [&](const std::string& line) { return line.find(words) != std::string::npos; }), 1)
+        << words;
+  EXPECT_FALSE(chart::take_over("{}", chart, machine));
 }
 
 }  // namespace

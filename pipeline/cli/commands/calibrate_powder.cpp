@@ -72,7 +72,7 @@ Outcome scan(const ChartRequest& request, const Arguments& arguments, Context& c
       "chart", {{"photo", arguments.text("--scan")}, {"chart", Json::parse(*text)}, {"picture", arguments.has("--overlay")}},
       arguments.text("--overlay"));
   if (!seen) return seen.error();
-  const auto lines = chart::take_over(*seen, *machine);
+  const auto lines = chart::take_over(*seen, *laid, *machine);
   if (!lines) return lines.error();
   const auto profile = measured_profile(*machine);
   if (!profile) return profile.error();

@@ -38,6 +38,14 @@ struct ChartWedge {
   bool operator==(const ChartWedge&) const = default;
 };
 
+/// Ticks on either side of the joint before `swath`, across the scan: pair k of 0 .. 2 m lines up where that swath lies k - m
+/// places too far along the scan.
+struct ChartVernier {
+  std::uint32_t swath = 0;
+  std::vector<ChartBox> before, after;  // of the swath before and of this one; as many
+  bool operator==(const ChartVernier&) const = default;
+};
+
 struct Chart {
   std::string machine;                    // its name
   std::uint32_t columns = 0, rows = 0;    // of the image
@@ -47,11 +55,13 @@ struct Chart {
   std::uint32_t nozzles = 0, nozzle_rows = 1, swaths = 0;
   double between_mm = 0, gap_mm = 0;  // of dashes: across the scan from centre to centre, along it from end to end
   double mark_mm = 0;                 // radius of the marks
+  double layer_mm = 0;                // thickness that it is printed with; 0: not stated
   std::vector<ChartBox> marks;        // around the four discs, the first one a ring; clockwise as the image is seen
   std::vector<ChartDash> dashes;
   std::vector<ChartBar> bars;
   std::vector<ChartWedge> wedges;
-  std::vector<ChartBox> joints;  // full blocks over the joints of swaths, for the eye
+  std::vector<ChartBox> joints;        // full blocks over the joints before swath 1, 2 ...; their height tells gaps
+  std::vector<ChartVernier> verniers;  // none where the bed has no room
   bool operator==(const Chart&) const = default;
 };
 
