@@ -19,6 +19,7 @@ JobCost::JobCost(const Plan& plan)
                title_of(plan.scene->parts)) {
   if (account_.parts() < 2) return;
   saturates_ = plan.images->dose.saturates();
+  several_ = plan.images->dose.most_drops() > 1;
   full_ = plan.images->dose.full();
   const std::vector<sanity::Solid> solids = solids_from_above(*plan.scene);
   std::vector<Box> boxes;
@@ -46,7 +47,9 @@ void JobCost::count(const RunsView& image, const dose::DropWork& drops, LayerRec
   } else {
     record.part_pixels = saturates_ ? windows_->count(record.layer, drops.zones) : windows_->count(record.layer, image);
   }
-  if (saturates_) record.part_drops = windows_->sum(record.layer, drops.levels);
+  if (saturates_) {
+    record.part_drops = several_ ? windows_->sum(record.layer, drops.levels) : windows_->count(record.layer, image);
+  }
 }
 
 void JobCost::add(const LayerRecord& record, std::uint64_t drops, std::int64_t microseconds) {

@@ -27,8 +27,8 @@ class JobCost {
  private:
   cost::Account account_;
   std::optional<cost::PartPixels> windows_;
-  bool saturates_ = false;
-  std::uint8_t full_ = 0;  // level of a full voxel; 0: pixels are set or not
+  bool saturates_ = false, several_ = false;  // drops are decided; pixels get more than one
+  std::uint8_t full_ = 0;                     // level of a full voxel; 0: pixels are set or not
 };
 
 }  // namespace lamina::pipeline

@@ -196,13 +196,14 @@ void LayerImager::dose(const Layer& layer, ImageWork& work, LayerRecord& record)
     const dose::ZoneSums sums = images.dose.saturate(layer, work.runs, work.zones.image, work.second, work.drops);
     record.dosed_pixels = sums.full_voxels;
     record.asked_drops = sums.asked_drops;
-    record.drops = sum_of_levels(work.drops.levels);
+    record.drops = images.dose.most_drops() > 1 ? sum_of_levels(work.drops.levels) : set_pixels(work.runs);
   } else if (plan_.job.levels > 0) {
     at_least(work.drops.shares, 1, work.runs);
     record.dosed_pixels = dose::sums_of(work.drops.shares, images.dose.full(), dose::one_drop()).full_voxels;
   }
   if (images.materials.several() && (images.beads || images.dose.any())) work.materials.keep(work.runs);
-  record.set_pixels = set_pixels(work.runs);
+  const bool counted = images.dose.saturates() && images.dose.most_drops() <= 1;
+  record.set_pixels = counted ? record.drops : set_pixels(work.runs);
   const auto add_image = [&](const Runs& image) {
     record.images.push_back({.bytes = 0, .set_pixels = set_pixels(image), .unfed_pixels = 0, .hash = {}});
   };

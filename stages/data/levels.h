@@ -68,24 +68,35 @@ inline std::uint64_t sum_of_levels(const LevelsView& image) {
   return sum;
 }
 
-/// The pixels whose level is at least `least` (> 0): the plane of the drop of that number.
+/// The pixels whose level is at least `least` (> 0): the plane of the drop of that number. No branch waits for a level.
 inline void at_least(const LevelsView& image, std::uint8_t least, Runs& plane) {
+  const std::uint32_t rows = image.rows();
   plane.columns = image.columns;
-  plane.row_offset.assign(1, 0);
-  plane.change.clear();
-  for (std::uint32_t r = 0; r < image.rows(); ++r) {
-    const std::uint32_t row_begin = plane.row_offset.back();
-    for (std::uint32_t i = image.row_offset[r]; i < image.row_offset[r + 1]; ++i) {
-      if (image.level[i] < least) continue;
-      if (plane.change.size() > row_begin && plane.change.back() == image.change[2 * i]) {
-        plane.change.back() = image.change[2 * i + 1];
-      } else {
-        plane.change.push_back(image.change[2 * i]);
-        plane.change.push_back(image.change[2 * i + 1]);
-      }
+  plane.row_offset.resize(std::size_t{rows} + 1);
+  plane.row_offset[0] = 0;
+  std::size_t used = 0;
+  for (std::uint32_t r = 0; r < rows; ++r) {
+    const std::uint32_t first = image.row_offset[r], last = image.row_offset[r + 1];
+    const std::size_t most = used + 2 * std::size_t{last - first} + 1;
+    if (plane.change.size() < most) plane.change.resize(most < plane.change.capacity() ? plane.change.capacity() : 2 * most);
+    std::uint32_t* change = plane.change.data() + used;
+    std::uint32_t set = 0, end = 0;  // 1: the run before is taken; where it ends
+    for (std::uint32_t i = first; i < last; ++i) {
+      const std::uint32_t begin = image.change[2 * i];
+      const std::uint32_t takes = image.level[i] >= least ? 1 : 0, joined = begin == end ? takes & set : 0;
+      *change = end;
+      change += set ^ joined;
+      *change = begin;
+      change += takes ^ joined;
+      set = takes;
+      end = image.change[2 * i + 1];
     }
-    plane.row_offset.push_back(static_cast<std::uint32_t>(plane.change.size()));
+    *change = end;
+    change += set;
+    used = static_cast<std::size_t>(change - plane.change.data());
+    plane.row_offset[r + 1] = static_cast<std::uint32_t>(used);
   }
+  plane.change.resize(used);
 }
 
 /// All set pixels at one level.

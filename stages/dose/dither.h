@@ -15,10 +15,17 @@ namespace lamina::dose {
 /// Scratch for dither(); keeps its capacity. The pixels of the tile that get one drop more, as bits, for each level.
 struct DitherScratch {
   struct Extra {
-    std::vector<std::uint64_t> bits;  // two words a row of the tile, turned to the layer's shift
+    std::vector<std::uint64_t> bits;  // three words a row of the tile, turned to the layer's shift; the third is the first
     bool made = false;
   };
+  /// The pixels of a level that get a drop: in all rows the same word, or those of the tile.
+  struct Bits {
+    const std::uint64_t* words;
+    std::uint32_t stride;  // 0: the word is of all rows
+    std::uint32_t most;    // pixels of a run that matter: one where all are equal
+  };
   std::vector<Extra> of_level;
+  std::vector<Bits> bits_of;  // a level, of dither_one()
 };
 
 /// Every pixel gets the whole drops of its level, and one more where the remaining fraction is above the threshold of the
@@ -31,5 +38,11 @@ struct DitherScratch {
 /// cost    O(runs + changes of the result), and once a level and layer O(tile)
 void dither(const LevelsView& image, std::span<const Drops24> drops, std::uint32_t layer, DitherScratch& scratch,
             Levels& result);
+
+/// The same of at most one drop a pixel, as the image of those that get it.
+/// drops  each at most kOneDrop
+/// cost   as dither(); no branch waits for a level, a length or a pattern
+void dither_one(const LevelsView& image, std::span<const Drops24> drops, std::uint32_t layer, DitherScratch& scratch,
+                Runs& result);
 
 }  // namespace lamina::dose

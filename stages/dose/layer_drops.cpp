@@ -30,8 +30,9 @@ void mark_shell(const DropRules& rules, const Runs& image, std::uint8_t full, Ru
   mark_core(work.shares, second, full, work.zones);
 }
 
-/// The planes of work.zones.
+/// The planes of work.zones; of one drop a pixel the image alone.
 void make_planes(const DropRules& rules, std::span<const Drops24> drops, std::uint32_t layer, Runs& image, DropWork& work) {
+  if (rules.most_drops == 1) return dither_one(work.zones, drops, layer, work.dither, image);
   dither(work.zones, drops, layer, work.dither, work.levels);
   work.planes.resize(rules.most_drops);
   for (std::uint32_t drop = 0; drop < rules.most_drops; ++drop) {

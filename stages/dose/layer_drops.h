@@ -18,10 +18,11 @@ namespace lamina::dose {
 /// Scratch for the drops of a layer, and what they are; buffers keep their capacity.
 struct DropWork {
   Levels shares;  // how full voxels are, if the job asks for that
-  Levels zones, levels;
+  Levels zones;
+  Levels levels;  // drops of each pixel, where any of the job gets several
   DitherScratch dither;
   std::vector<ZonePiece> pieces;
-  std::vector<Runs> planes;  // the pixels with at least one drop, two, ...: as many as the job has
+  std::vector<Runs> planes;  // then: the pixels with at least one drop, two, ...: as many as the job has
   std::uint64_t bytes() const;
 };
 

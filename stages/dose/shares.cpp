@@ -42,6 +42,19 @@ void append_masked(const LevelsView& image, std::uint32_t row, std::span<const s
   }
 }
 
+/// How many changes two rows have in common at their beginning; eight are looked at at once.
+std::size_t same_changes(std::span<const std::uint32_t> a, std::span<const std::uint32_t> b) {
+  const std::size_t most = std::min(a.size(), b.size());
+  std::size_t same = 0;
+  for (; same + 8 <= most; same += 8) {
+    std::uint32_t differs = 0;
+    for (std::size_t i = same; i < same + 8; ++i) differs |= a[i] ^ b[i];
+    if (differs != 0) break;
+  }
+  while (same < most && a[same] == b[same]) ++same;
+  return same;
+}
+
 }  // namespace
 
 void mirror(const LevelsView& image, bool x, bool y, Levels& result) {
@@ -109,7 +122,7 @@ Difference difference(const RunsView& a, const RunsView& b) {
   for (std::uint32_t r = 0; r < a.rows(); ++r) {
     const auto one = a.row(r), other = b.row(r);
     // Where the changes of both are merged, pixels differ from every odd one to the next.
-    std::size_t i = 0, k = 0;
+    std::size_t i = same_changes(one, other), k = i;
     bool differs = false;
     std::uint32_t from = 0;
     while (i < one.size() || k < other.size()) {

@@ -60,6 +60,7 @@ DropStack::DropStack(const std::vector<Triangle>& part, const DropWay& way, doub
     if (way.levels > 0) coverage->layer(layer, of_voxels, work.shares);
     const auto top = static_cast<std::uint8_t>(way.levels > 0 ? way.levels - 1 : 0);
     dose::drops_of_layer({top, way.dithered, {}, full}, dose, l, image, second, work);
+    if (full == 1) levels_of(image, 1, work.levels);
     for (std::uint32_t r = 0; r < grid.rows(); ++r) {
       float* row = share_.data() + (std::size_t{l} * grid.rows() + (grid.rows() - 1 - r)) * grid.columns();
       for (std::uint32_t i = work.levels.row_offset[r]; i < work.levels.row_offset[r + 1]; ++i) {

@@ -57,6 +57,20 @@ Levels dithered(const RunsView& image, Drops24 drops, std::uint32_t layer) {
   return levels;
 }
 
+/// By the way of several drops a pixel, and by that of one.
+void expect_one_drop(const Levels& shares, std::span<const Drops24> drops, std::uint32_t layer) {
+  DitherScratch scratch;
+  Levels levels;
+  Runs plane, image{7, {0, 1}, {3}};
+  dither(shares, drops, layer, scratch, levels);
+  at_least(levels, 1, plane);
+  EXPECT_EQ(set_pixels(plane), sum_of_levels(levels));
+  dither_one(shares, drops, layer, scratch, image);
+  EXPECT_EQ(image.columns, plane.columns);
+  EXPECT_EQ(image.row_offset, plane.row_offset);
+  EXPECT_EQ(image.change, plane.change);
+}
+
 std::vector<int> tile_pattern(double share, std::uint32_t layer) {
   return levels_by_pixel(dithered(full_square(kTileSide), static_cast<Drops24>(share * kOneDrop), layer));
 }
@@ -213,6 +227,26 @@ TEST(Dither, TakesSharesOfVoxelsInProportion) {
   DitherScratch scratch;
   dither(coverage, drops, 0, scratch, levels);
   EXPECT_EQ(levels_by_pixel(levels), (std::vector<int>{1, 1, 1, 0, 3, 3, 2, 2, 2}));
+}
+
+// Rows of single pixels, of runs longer than words and tiles, that touch or do not, from the first column to the last.
+TEST(Dither, OfOneDropIsThatOfSeveral) {
+  program::testing::Random random(11);
+  const std::array<Drops24, 6> drops{0, kOneDrop, kOneDrop / 3, 5 * kOneDrop / 7, 0, 3};
+  for (const std::uint32_t columns : {1u, 5u, 63u, 64u, 65u, 129u, 700u}) {
+    Levels shares;
+    shares.start(columns);
+    for (std::uint32_t r = 0; r < 150; ++r) {
+      const std::uint32_t longest = 1u << (r % 10);
+      for (std::uint32_t c = 0; c < columns && r % 13 != 5;) {
+        const std::uint32_t end = std::min<std::uint32_t>(columns, c + 1 + random() % longest);
+        shares.append(c, end, static_cast<std::uint8_t>(random() % drops.size()));
+        c = end;
+      }
+      shares.end_row();
+    }
+    for (const std::uint32_t layer : {0u, 1u, 77u, 1000u}) expect_one_drop(shares, drops, layer);
+  }
 }
 
 TEST(Dither, MarksShellAndCore) {

@@ -1,14 +1,19 @@
 #include "stages/coverage/meet/meetings.h"
 
+#include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <cstdlib>
+#include <memory>
 #include <vector>
 
-#include "stages/coverage/meet/box_tree.h"
+#include "stages/coverage/meet/facet_group.h"
+#include "stages/coverage/meet/facet_order.h"
 #include "stages/coverage/meet/triangles_meet.h"
+#include "stages/geometry/isa.h"
 
 namespace lamina::cover {
 namespace {
@@ -16,11 +21,16 @@ namespace {
 using Wide = __int128;
 
 constexpr std::size_t kMostNeighbours = 4096;
+constexpr std::uint32_t kGroupsAtOnce = 512;
 constexpr std::uint32_t kMostRays = 1 << 16;
 constexpr std::uint32_t kNobody = UINT32_MAX;
 
 /// Of each facet, numbered cluster * kClusterSize + lane, those behind its three edges.
 using Neighbours = Buffer<std::array<std::uint32_t, 3>>;
+
+bool boxes_touch(const Box& a, const Box& b) {
+  return a.lo.x <= b.hi.x && b.lo.x <= a.hi.x && a.lo.y <= b.hi.y && b.lo.y <= a.hi.y && a.lo.z <= b.hi.z && b.lo.z <= a.hi.z;
+}
 
 Box box_of(const Triangle& t) {
   Box box;
@@ -28,87 +38,128 @@ Box box_of(const Triangle& t) {
   return box;
 }
 
-struct Facets {
-  std::array<Plane, kClusterSize> plane;
-  std::array<Box, kClusterSize> box;
-
-  void take(const Cluster& cluster) {
-    for (std::uint32_t i = 0; i < kClusterSize; ++i) {
-      plane[i] = Plane(cluster.triangle(i));
-      box[i] = box_of(plane[i].facet);
-    }
-  }
-};
-
-/// Looks at all facets near one.
-class Surroundings {
+/// What is found out about facets, by many threads: what they write does not depend on who comes first.
+class Findings {
  public:
-  Surroundings(const Plane& facet, const Box& box, std::uint32_t number) : facet_(facet), box_(box), number_(number) {}
+  Findings(Suspects& suspects, Neighbours& neighbours) : suspects_(suspects), neighbours_(neighbours) {}
 
-  void look_at(const Facets& others, std::uint32_t first_number) {
-    for (std::uint32_t i = 0; i < kClusterSize; ++i) {
-      if (!boxes_touch(box_, others.box[i]) || first_number + i == number_) continue;
-      const Plane& other = others.plane[i];
-      if (other.flat()) continue;
-      int shared = 0;
-      if (triangles_meet(facet_, other, shared)) meets_ = true;
-      if (shared == 2) note_edge(other.facet, first_number + i);
-      if (meets_) return;
-    }
+  void suspect(std::uint32_t facet) {
+    std::atomic_ref(suspects_[facet / kClusterSize])
+        .fetch_or(static_cast<std::uint16_t>(1u << facet % kClusterSize), std::memory_order_relaxed);
   }
-  bool suspect() const {
-    return meets_ || std::ranges::any_of(behind_, [](std::uint32_t n) { return n == kNobody; });
+  /// Behind that edge lies another; two of them are too many.
+  void note(std::uint32_t facet, std::uint32_t edge, std::uint32_t other) {
+    if (std::atomic_ref(neighbours_[facet][edge]).exchange(other, std::memory_order_relaxed) != kNobody) suspect(facet);
   }
-  const std::array<std::uint32_t, 3>& behind() const { return behind_; }
+  bool has_all(std::uint32_t facet) const {
+    return std::ranges::none_of(neighbours_[facet], [](std::uint32_t other) { return other == kNobody; });
+  }
 
  private:
-  void note_edge(const Triangle& other, std::uint32_t number) {
-    const std::array<const Point3*, 3> p{&facet_.facet.a, &facet_.facet.b, &facet_.facet.c}, q{&other.a, &other.b, &other.c};
-    for (int i = 0; i < 3; ++i) {
-      const Point3 &from = *p[i], &to = *p[(i + 1) % 3];
-      for (int k = 0; k < 3; ++k) {
-        const Point3 &start = *q[k], &end = *q[(k + 1) % 3];
-        if (from == start && to == end) meets_ = true;
-        if (from != end || to != start) continue;
-        if (behind_[i] != kNobody) meets_ = true;
-        behind_[i] = number;
-      }
-    }
-  }
-
-  const Plane& facet_;
-  const Box& box_;
-  std::uint32_t number_;
-  bool meets_ = false;
-  std::array<std::uint32_t, 3> behind_{kNobody, kNobody, kNobody};
+  Suspects& suspects_;
+  Neighbours& neighbours_;
 };
 
-void look_around(const MeshBlocks& mesh, const BoxTree& tree, std::uint32_t cluster, std::uint16_t& suspects,
-                 Neighbours& neighbours) {
-  std::vector<std::uint32_t> near;
-  tree.each(mesh.bounds()[cluster], [&](std::uint32_t other) { near.push_back(other); });
-  suspects = 0;
-  if (near.size() > kMostNeighbours) {
-    suspects = 0xFFFF;
-    return;
-  }
-  Cluster room;
-  Facets own, others;
-  own.take(mesh.cluster(cluster, room));
-  std::vector<Surroundings> all;
-  for (std::uint32_t i = 0; i < kClusterSize; ++i) all.emplace_back(own.plane[i], own.box[i], cluster * kClusterSize + i);
-  for (const std::uint32_t other : near) {
-    others.take(mesh.cluster(other, room));
-    for (std::uint32_t i = 0; i < kClusterSize; ++i) {
-      if (own.plane[i].flat() || !boxes_touch(own.box[i], mesh.bounds()[other])) continue;
-      all[i].look_at(others, other * kClusterSize);
+/// All pairs of facets whose boxes touch, where they lie too far apart for kernels: decided one by one.
+void far_pairs(const FacetGroup& a, const FacetGroup& b, Findings& findings) {
+  for (std::uint32_t i = 0; i < a.used; ++i) {
+    const Triangle one = a.facet(i);
+    for (std::uint32_t k = &a == &b ? i + 1 : 0; k < b.used; ++k) {
+      const Triangle other = b.facet(k);
+      if (!boxes_touch(box_of(one), box_of(other))) continue;
+      int shared = 0;
+      bool meets = triangles_meet(Plane(one), Plane(other), shared);
+      const std::array<Point3, 3> p{one.a, one.b, one.c}, q{other.a, other.b, other.c};
+      for (std::uint32_t e = 0; e < 9; ++e) {
+        const std::uint32_t from = e / 3, start = e % 3, to = (from + 1) % 3, end = (start + 1) % 3;
+        meets |= p[from] == q[start] && p[to] == q[end];
+        if (p[from] != q[end] || p[to] != q[start]) continue;
+        findings.note(a.number[i], from, b.number[k]);
+        findings.note(b.number[k], start, a.number[i]);
+      }
+      if (meets) findings.suspect(a.number[i]), findings.suspect(b.number[k]);
     }
   }
-  for (std::uint32_t i = 0; i < kClusterSize; ++i) {
-    if (own.plane[i].flat()) continue;
-    neighbours[std::size_t{cluster} * kClusterSize + i] = all[i].behind();
-    if (all[i].suspect()) suspects = static_cast<std::uint16_t>(suspects | 1u << i);
+}
+
+/// Groups as kernels take them; those of some groups are kept.
+class GroupRoom {
+ public:
+  GroupRoom(const MeshBlocks& mesh, const FacetOrder& order) : mesh_(mesh), order_(order) {
+    held_.resize(kHeld);
+    number_.assign(kHeld, kNobody);
   }
+  const FacetGroup& of(std::uint32_t group) {
+    FacetGroup& room = held_[group % kHeld];
+    if (number_[group % kHeld] != group) fill(group, room);
+    number_[group % kHeld] = group;
+    return room;
+  }
+  void fill(std::uint32_t group, FacetGroup& room) const {
+    room.start();
+    for (const std::uint32_t f : order_.facets(group)) room.add(mesh_.triangle(f / kClusterSize, f % kClusterSize), f);
+  }
+
+ private:
+  static constexpr std::uint32_t kHeld = 256;  // 600 KB
+  const MeshBlocks& mesh_;
+  const FacetOrder& order_;
+  Buffer<FacetGroup> held_;
+  std::vector<std::uint32_t> number_;
+};
+
+void look_at_pairs(const FacetGroup& a, const FacetGroup& b, const Box& around_a, const Box& around_b,
+                   const PairKernels& kernels, FoundPairs& found, Findings& findings) {
+  Box around = around_a;
+  around.add(around_b);
+  if (std::max({around.width(), around.depth(), around.height()}) > kWidestPair) return far_pairs(a, b, findings);
+  kernels.pairs(a, b, around_b, found);
+  for (std::uint32_t i = 0; i < found.edges; ++i) {
+    const FoundPairs::Edge& edge = found.edge[i];
+    findings.note(a.number[edge.a], edge.edge_a, b.number[edge.b]);
+    findings.note(b.number[edge.b], edge.edge_b, a.number[edge.a]);
+  }
+  const auto both = [&](const FoundPairs::Pair& pair) {
+    findings.suspect(a.number[pair.a]);
+    findings.suspect(b.number[pair.b]);
+  };
+  for (std::uint32_t i = 0; i < found.alikes; ++i) both(found.alike[i]);
+  for (std::uint32_t i = 0; i < found.doubts; ++i) {
+    const FoundPairs::Pair& pair = found.doubtful[i];
+    int shared = 0;
+    if (triangles_meet(Plane(a.facet(pair.a)), Plane(b.facet(pair.b)), shared)) both(pair);
+  }
+}
+
+/// Each pair of groups that touch is looked at once: by the first of them, or by the other if that has too many others.
+void look_around(const MeshBlocks& mesh, const FacetOrder& order, const PairKernels& kernels, Findings& findings) {
+  std::vector<std::uint8_t> crowded(order.groups());
+  tbb::parallel_for(std::uint32_t{0}, order.groups(), [&](std::uint32_t g) {
+    std::size_t others = 0;
+    order.each(order.box(g), [&](std::uint32_t) { ++others; });
+    crowded[g] = others > kMostNeighbours ? 1 : 0;
+  });
+  tbb::parallel_for(tbb::blocked_range<std::uint32_t>(0, order.groups(), kGroupsAtOnce), [&](const auto& range) {
+    GroupRoom room(mesh, order);
+    FacetGroup own;
+    const auto found = std::make_unique<FoundPairs>();
+    for (std::uint32_t g = range.begin(); g < range.end(); ++g) {
+      if (crowded[g] != 0) {
+        for (const std::uint32_t f : order.facets(g)) findings.suspect(f);
+        continue;
+      }
+      room.fill(g, own);
+      order.each(order.box(g), [&](std::uint32_t other) {
+        if (other < g && crowded[other] == 0) return;
+        look_at_pairs(own, other == g ? own : room.of(other), order.box(g), order.box(other), kernels, *found, findings);
+      });
+    }
+  });
+  tbb::parallel_for(std::uint32_t{0}, order.groups(), [&](std::uint32_t g) {
+    for (const std::uint32_t f : order.facets(g)) {
+      if (!findings.has_all(f)) findings.suspect(f);
+    }
+  });
 }
 
 /// Where a line along x at an odd half-nanometre of y and z crosses a facet: whole + rest / divisor half-nanometres.
@@ -222,14 +273,15 @@ void judge_shells(const MeshBlocks& mesh, const SlabIndex& index, const Neighbou
 
 }  // namespace
 
-Suspects find_suspects(const MeshBlocks& mesh, const SlabIndex& index) {
+Suspects find_suspects(const MeshBlocks& mesh, const SlabIndex& index, Isa isa) {
   const std::uint32_t clusters = mesh.cluster_count();
   Suspects suspects;
   suspects.assign(clusters, 0);
   Neighbours neighbours;
   neighbours.assign(std::size_t{clusters} * kClusterSize, {kNobody, kNobody, kNobody});
-  const BoxTree tree(mesh.bounds());
-  tbb::parallel_for(std::uint32_t{0}, clusters, [&](std::uint32_t c) { look_around(mesh, tree, c, suspects[c], neighbours); });
+  const PairKernels& kernels = pair_kernels_for(isa_at_most(isa));
+  Findings findings(suspects, neighbours);
+  look_around(mesh, FacetOrder(mesh, kernels), kernels, findings);
   judge_shells(mesh, index, neighbours, suspects);
   return suspects;
 }
