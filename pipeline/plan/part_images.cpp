@@ -78,9 +78,10 @@ Result<OpenImages> open_images(const Job& job, const PartRequest& part, const Pi
   const auto told = images_on_record(part.path);
   if (!told) return told.error();
   if (job.levels > 0 && part.images.threshold != PartImages().threshold)
-    return usage(fmt::format("{}: part.threshold is of images of 1 bit, and --levels takes grey as shares of voxels; leave out "
-                             "one of them",
-                             one_line(part.path)));
+    return usage(
+        fmt::format("{}: part.threshold is of images of 1 bit, and --levels takes grey as shares of voxels; leave out "
+                    "one of them",
+                    one_line(part.path)));
   auto images = read::LayerImages::open(
       told->path, {static_cast<int>(part.images.threshold), part.images.invert, part.images.missing_empty, kLooks});
   if (!images) return images.error();
@@ -113,9 +114,9 @@ Result<OpenImages> open_images(const Job& job, const PartRequest& part, const Pi
         {false, fmt::format("its manifest says that the images are mirrored; --mirror {} turns them back", told->mirror)});
   if (told->levels > 0 && told->levels != job.levels)
     open.notes.push_back(
-        {false, fmt::format("its manifest says that the images are shares of voxels in {} levels, which --levels {} keeps; {}",
-                            told->levels, told->levels,
-                            job.levels > 0 ? "here they are rounded" : "here half full and more is set")});
+        {false,
+         fmt::format("its manifest says that the images are shares of voxels in {} levels, which --levels {} keeps; {}",
+                     told->levels, told->levels, job.levels > 0 ? "here they are rounded" : "here half full and more is set")});
   open.images = std::make_shared<const read::LayerImages>(std::move(*images));
   return open;
 }

@@ -175,8 +175,7 @@ Result<std::vector<const Loaded*>> load_parts(const Job& job, bool blocks, const
     const std::string solid =
         part.material_ranges.empty()
             ? part.material
-            : fmt::format("{} {} {}", part.material, material_ranges_text(part.material_ranges),
-                          part.bottom_mm.value_or(0));
+            : fmt::format("{} {} {}", part.material, material_ranges_text(part.material_ranges), part.bottom_mm.value_or(0));
     const bool images = read::names_images(part.path);
     const LoadKey key{images         ? fmt::format("images {}", loaded.size())
                       : file.empty() ? part.path

@@ -40,7 +40,7 @@ struct ImageWork {
 struct ImageNotes {
   raster::LayerReport report;
   std::uint64_t solid_pixels = 0, bead_pixels = 0;  // of parts, before and after clearing outside beads and shells
-  std::vector<std::uint64_t> part_pixels;  // of each part before its dose, or shares of voxels; empty: nobody asks
+  std::vector<std::uint64_t> part_pixels;           // of each part before its dose, or shares of voxels; empty: nobody asks
 };
 
 /// The steps of a layer's images; const, usable from any thread with separate work objects.

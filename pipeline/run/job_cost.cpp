@@ -16,8 +16,7 @@ JobCost::JobCost(const Machine& machine, const Manifest& manifest)
 // The plan outlives this object.
 JobCost::JobCost(const Plan& plan)
     : account_(plan.images->machine->machine, plan.images->grid, plan.scene->parts,
-               plan.job.quote || cost::has_prices(plan.images->machine->machine.cost),
-               title_of(plan.scene->parts)) {
+               plan.job.quote || cost::has_prices(plan.images->machine->machine.cost), title_of(plan.scene->parts)) {
   if (account_.parts() < 2) return;
   plan_ = &plan;
   saturates_ = plan.images->dose.saturates();

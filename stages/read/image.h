@@ -28,8 +28,8 @@ struct Image {
 /// errors  kVerification with the file's name: truncated, not 1 bit, not readable
 Result<Image> image(const std::string& path, std::uint8_t full = 0);
 
-/// The same of images of others: of 1 bit, or grey of 4, 8 or 16 bits a pixel (TIFF, PNG, BMP, PBM, PGM). Set are the dark pixels:
-/// black ones, and grey ones below the threshold. threshold  1 .. 255 of 255; of 16 bits the upper eight count page       of
+/// The same of images of others: of 1 bit, or grey of 4, 8 or 16 bits a pixel (TIFF, PNG, BMP, PBM, PGM). Set are the dark
+/// pixels: black ones, and grey ones below the threshold. threshold  1 .. 255 of 255; of 16 bits the upper eight count page of
 /// pages_of(); 0: the file has one image errors     kInput with the file's name: truncated, coloured, several images, not
 /// readable
 Result<Image> dark_pixels(const std::string& path, int threshold, std::uint64_t page = 0);

@@ -26,7 +26,8 @@ struct LevelSink {
 /// Each reads `file`, open for reading and at its start, which stays the caller's; `bytes` is its size, `path` for messages.
 /// errors  of image()
 /// page  the place of the directory; 0: the first one
-/// sink  takes the levels of a grey image, whose runs are empty then; one of 1 bit is refused, or with `nearest` leaves the sink
+/// sink  takes the levels of a grey image, whose runs are empty then; one of 1 bit is refused, or with `nearest` leaves the
+/// sink
 ///       as it is
 Result<Image> tiff(int file, std::uint64_t bytes, const std::string& path, int threshold = 0, std::uint64_t page = 0,
                    LevelSink* sink = nullptr);

@@ -38,7 +38,10 @@ Result<ImageKind> tiff_kind(int file, const std::string& path, std::uint64_t pag
   TIFFGetFieldDefaulted(handle.get(), TIFFTAG_COMPRESSION, &compression);
   TIFFGetField(handle.get(), TIFFTAG_PHOTOMETRIC, &photometric);
   const bool white = photometric == PHOTOMETRIC_MINISWHITE, black = photometric == PHOTOMETRIC_MINISBLACK;
-  return ImageKind{"TIFF", bits, white ? "0 is white" : black ? "0 is black" : fmt::format("photometric {}", photometric),
+  return ImageKind{"TIFF", bits,
+                   white   ? "0 is white"
+                   : black ? "0 is black"
+                           : fmt::format("photometric {}", photometric),
                    tiff_coding(compression)};
 }
 

@@ -46,8 +46,8 @@ Result<std::vector<Numbered>> numbered_images(const std::string& folder, bool ga
   }
   if (wrong) return Error{Fault::kInput, fmt::format("{}: the folder cannot be read: {}", one_line(folder), wrong.message())};
   if (images.empty() && !nested.empty())
-    return Error{Fault::kInput, fmt::format("{}: holds no images, but folders; name one of them, as {}", one_line(folder),
-                                            one_line(nested))};
+    return Error{Fault::kInput,
+                 fmt::format("{}: holds no images, but folders; name one of them, as {}", one_line(folder), one_line(nested))};
   if (images.empty())
     return Error{Fault::kInput, fmt::format("{}: holds neither manifest.json of lamina jet nor images .png, .tif, .bmp or .pbm",
                                             one_line(folder))};

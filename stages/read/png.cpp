@@ -72,8 +72,7 @@ bool set_is_dark(png_structp png, png_infop info, int colour_type) {
 
 bool add_row(Source& source, std::size_t bytes, bool invert) {
   try {
-    if (source.level_bits > 0)
-      return source.sink->add_row(source.row, source.sink->levels.columns, source.level_bits, false);
+    if (source.level_bits > 0) return source.sink->add_row(source.row, source.sink->levels.columns, source.level_bits, false);
     return source.builder->add_row(std::span(source.row).first(bytes), invert);
   } catch (...) {
     return false;

@@ -122,8 +122,7 @@ Result<StackInfo> look_at_stack(const std::string& path, int threshold) {
     info.first_number = files.front().number;
     info.last_number = files.back().number;
     for (std::size_t i = 1; i < files.size(); ++i) {
-      if (files[i].number != files[i - 1].number + 1)
-        info.missing.push_back({files[i - 1].number + 1, files[i].number - 1});
+      if (files[i].number != files[i - 1].number + 1) info.missing.push_back({files[i - 1].number + 1, files[i].number - 1});
     }
   }
   info.files = files.size();
@@ -162,9 +161,9 @@ std::string as_text(const StackInfo& info) {
   line("images", fmt::format("{} {}{}: {} bit{}, {}, coded {}", info.images, info.kind.format, in, info.kind.bits,
                              info.kind.bits > 1 ? "s" : "", info.kind.light, info.kind.coding));
   if (info.folder) {
-    line("numbers", fmt::format("{} to {}{}", info.first_number, info.last_number,
-                                info.missing.empty() ? "" : fmt::format("; {} missing: {}", info.missing_numbers(),
-                                                                        ranges_text(info))));
+    line("numbers",
+         fmt::format("{} to {}{}", info.first_number, info.last_number,
+                     info.missing.empty() ? "" : fmt::format("; {} missing: {}", info.missing_numbers(), ranges_text(info))));
   }
   const bool told = info.dpi_x > 0 && info.dpi_y > 0;
   line("size", fmt::format("{} x {} pixels{}", info.columns, info.rows,
@@ -172,8 +171,7 @@ std::string as_text(const StackInfo& info) {
                                               info.columns * 25.4 / info.dpi_x, info.rows * 25.4 / info.dpi_y)
                                 : "; the files tell no resolution"));
   line("set", fmt::format("{} pixels, {} to {} an image{}", readable_count(info.set), readable_count(info.least_set),
-                          readable_count(info.most_set),
-                          info.empty > 0 ? fmt::format("; {} of them empty", info.empty) : ""));
+                          readable_count(info.most_set), info.empty > 0 ? fmt::format("; {} of them empty", info.empty) : ""));
   if (info.kind.bits > 1)
     line("grey", fmt::format("{} pixels between white and black; all come to {} full ones", readable_count(info.grey),
                              readable_count(static_cast<std::uint64_t>(std::llround(info.filled)))));

@@ -131,7 +131,8 @@ std::string read_tiff_head(TIFF* tiff, std::uint64_t file_bytes, int threshold, 
 }
 
 /// One row as libtiff decodes it. returns  why not, or nothing
-std::string_view add_tiff_row(std::span<std::byte> row, const TiffHead& head, int threshold, LevelSink* sink, RunsBuilder& builder) {
+std::string_view add_tiff_row(std::span<std::byte> row, const TiffHead& head, int threshold, LevelSink* sink,
+                              RunsBuilder& builder) {
   // Values of two bytes are in the order of this program's hosts, little-endian. Those of min-is-white: bright is small.
   const bool low = head.bright_is_low();
   if (head.grey() && sink != nullptr) return sink->add_row(row, head.columns, head.bits, low) ? "" : "a value is no level";

@@ -85,7 +85,8 @@ bool read_grey(std::string_view bytes) {
   Levels half, levels, exact;
   const auto of_half = read::nearest_levels(path, {1, false, page}, half);
   const auto of_levels = read::nearest_levels(path, {full, dice.below(2) == 0, page}, levels);
-  law(dark.ok() == of_half.ok() && dark.ok() == of_levels.ok(), "read in levels, and not as dark pixels, or the other way round");
+  law(dark.ok() == of_half.ok() && dark.ok() == of_levels.ok(),
+      "read in levels, and not as dark pixels, or the other way round");
   if (!dark) return check_error(dark.error()), false;
   check_runs(dark->runs);
   check_levels(half, 1);
@@ -102,7 +103,8 @@ bool read_grey(std::string_view bytes) {
   }
   if (std::uint64_t{levels.columns} * levels.view().rows() > 1 << 16) return true;
   write::Bytes out;
-  const Status done = write::find_level_format(dice.below(2) == 0 ? "tiff-8" : "png-8")->make_encoder()->encode(levels, full, 600, 300, out);
+  const Status done =
+      write::find_level_format(dice.below(2) == 0 ? "tiff-8" : "png-8")->make_encoder()->encode(levels, full, 600, 300, out);
   law(done.ok(), done.ok() ? "" : done.error().message.c_str());
   const auto again = read::levels(file.hold({reinterpret_cast<const char*>(out.data()), out.size()}), full, exact);
   law(again.ok() && same(exact, levels), "levels that were written read back as others");
@@ -115,12 +117,20 @@ void put(std::string& out, std::uint32_t value, int bytes) {
 
 /// One strip of Group 4 as a TIFF.
 std::string tiff_of(std::string_view coded, const read::G4Strip& strip) {
-  const std::uint32_t tags[][2] = {{256, strip.columns}, {257, strip.rows}, {258, 1}, {259, 4}, {262, 0}, {266, strip.low_bit_first ? 2u : 1u},
-                                   {273, 8 + 2 + 10 * 12 + 4}, {277, 1}, {278, strip.rows},
+  const std::uint32_t tags[][2] = {{256, strip.columns},
+                                   {257, strip.rows},
+                                   {258, 1},
+                                   {259, 4},
+                                   {262, 0},
+                                   {266, strip.low_bit_first ? 2u : 1u},
+                                   {273, 8 + 2 + 10 * 12 + 4},
+                                   {277, 1},
+                                   {278, strip.rows},
                                    {279, static_cast<std::uint32_t>(coded.size())}};
   std::string out = "II*";
   put(out, 0, 1), put(out, 8, 4), put(out, 10, 2);
-  for (const auto& [tag, value] : tags) put(out, tag, 2), put(out, tag < 258 || tag == 273 || tag > 277 ? 4 : 3, 2), put(out, 1, 4), put(out, value, 4);
+  for (const auto& [tag, value] : tags)
+    put(out, tag, 2), put(out, tag < 258 || tag == 273 || tag > 277 ? 4 : 3, 2), put(out, 1, 4), put(out, value, 4);
   put(out, 0, 4);
   return out + std::string(coded);
 }

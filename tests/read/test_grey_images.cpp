@@ -168,7 +168,7 @@ TEST(GreyImages, SayTheSameInEveryFormatAndPhotometric) {
       files.insert(files.end(), {"p.pgm", "p.bmp"});
     }
     const unsigned darkest = (1u << bits) - 1;
-    for (const std::uint8_t full : {1, 3, 15, 255}) {
+    for (const auto full : std::initializer_list<std::uint8_t>{1, 3, 15, 255}) {
       Pixels expected = values;
       for (auto& row : expected)  // in rationals: the nearest of l / full, the higher one of two
         for (unsigned& value : row) {
@@ -185,7 +185,8 @@ TEST(GreyImages, SayTheSameInEveryFormatAndPhotometric) {
     for (const int threshold : {1, 100, 128, 255}) {
       Pixels expected = values;
       for (auto& row : expected)
-        for (unsigned& value : row) value = (bits == 16 ? value >> 8 : value * 255 / darkest) < static_cast<unsigned>(threshold);
+        for (unsigned& value : row)
+          value = (bits == 16 ? value >> 8 : value * 255 / darkest) < static_cast<unsigned>(threshold);
       for (const std::string& file : files) {
         const auto dark = dark_pixels(folder / file, threshold);
         ASSERT_TRUE(dark.ok()) << dark.error().message;

@@ -54,7 +54,7 @@ CommandSpec convert_spec() {
 
 struct Conversion {
   read::LayerImages images;
-  const write::ImageFormat* bits;   // one of both
+  const write::ImageFormat* bits;  // one of both
   const write::LevelFormat* grey;
   std::uint8_t full;  // the highest level of grey
   std::array<double, 2> dpi;

@@ -82,12 +82,14 @@ Status tell_images(const std::string& path, int threshold, const Arguments& argu
                         told->mirror.empty() || told->mirror == "none" ? "" : "; mirrored " + told->mirror);
     json["layers"] = {{"thickness_mm", mm(told->thickness)}, {"bottom_mm", mm(told->bottom)}, {"levels", told->levels}};
   } else {
-    text += fmt::format("  {:<12}no manifest of lamina tells how thick they are; jet wants --layer or part.layer_mm\n", "layers");
+    text +=
+        fmt::format("  {:<12}no manifest of lamina tells how thick they are; jet wants --layer or part.layer_mm\n", "layers");
     json["layers"] = nullptr;
   }
   const Status status = arguments.has("--json") ? context.give(json) : context.print(text);
   if (!status || info->unreadable == 0) return status;
-  return Error{Fault::kInput, fmt::format("{}: {} of {} images cannot be read", one_line(path), info->unreadable, info->images)};
+  return Error{Fault::kInput,
+               fmt::format("{}: {} of {} images cannot be read", one_line(path), info->unreadable, info->images)};
 }
 
 /// errors  kUsage: an option that is of none of the operands

@@ -62,7 +62,8 @@ TEST_F(ImageLevels, GiveTheBytesOfTheMeshesThatTheyWereMadeOf) {
   for (const std::string& part : real_parts()) {
     for (const char* format : {"tiff-4", "tiff-8", "png-8"}) {
       for (const char* levels : {"2", "4", "16"}) {
-        const std::string rest = std::string(" --layer 1.7 --dpi 90x70 --bed 260x240.3 --format ") + format + " --levels " + levels;
+        const std::string rest =
+            std::string(" --layer 1.7 --dpi 90x70 --bed 260x240.3 --format ") + format + " --levels " + levels;
         done("jet " + part + rest + " -o first");
         done("jet first" + rest + " -o again");
         ASSERT_EQ(layers("again"), layers("first")) << part << rest;
@@ -154,7 +155,8 @@ TEST_F(ImageLevels, AreMirroredCroppedResampledAndThresholded) {
   for (std::size_t l = 0; l < grey.layers.size(); ++l) {
     const std::string file = layer_file_name(static_cast<std::uint32_t>(l), ".png");
     EXPECT_NEAR(static_cast<double>(sum_of_levels(levels("fine/" + file, 3))),
-                4.0 * static_cast<double>(sum_of_levels(levels("grey/" + file, 3))), 1) << l;
+                4.0 * static_cast<double>(sum_of_levels(levels("grey/" + file, 3))), 1)
+        << l;
   }
   // Without --levels, half and more is set, in every format of grey; of two of them, half is a tie that goes up.
   for (const char* format : {"tiff-4", "tiff-8", "png-8"}) {
@@ -266,7 +268,8 @@ class ImageCosts : public ImageLevels {
   nlohmann::json use(const std::string& parts, const std::string& more = {}) const {
     test::write_text(folder_.path() / "job.toml", parts);
     const test::Outcome outcome = test::run_lamina(
-        test::words_of("jet --job job.toml --layer 0.1 --machine printer.toml --dry-run --json --quiet" + more), folder_.path());
+        test::words_of("jet --job job.toml --layer 0.1 --machine printer.toml --dry-run --json --quiet" + more),
+        folder_.path());
     EXPECT_EQ(outcome.code, 0) << outcome.err;
     return outcome.code == 0 ? nlohmann::json::parse(outcome.out)["use"] : nlohmann::json();
   }
@@ -325,7 +328,8 @@ TEST_F(ImageCosts, FollowTheDropsOfEachPart) {
 
 TEST_F(ImageLevels, AreToldByInfo) {
   test::write_box(folder_ / "box.stl", {0, 0, 0}, {2, 3, 0.25f});
-  done("jet box.stl --layer 0.1 --dpi 254x127 --bed 9x8 --at 1,1 --bottom 0.4 --layers 4:7 --levels 16 --format tiff-8 -o grey");
+  done(
+      "jet box.stl --layer 0.1 --dpi 254x127 --bed 9x8 --at 1,1 --bottom 0.4 --layers 4:7 --levels 16 --format tiff-8 -o grey");
   const test::Outcome told = test::run_lamina({"info", "--json", "grey"}, folder_.path());
   ASSERT_EQ(told.code, 0) << told.err;
   const auto json = nlohmann::json::parse(told.out);
@@ -338,7 +342,7 @@ TEST_F(ImageLevels, AreToldByInfo) {
   EXPECT_EQ(json["layers"]["thickness_mm"], 0.1);
   EXPECT_EQ(json["layers"]["bottom_mm"], 0.4);
   EXPECT_EQ(json["layers"]["levels"], 16);
-  EXPECT_EQ(json["set_pixels"], 900);     // 20 x 15, half of a voxel is level 8 of 15
+  EXPECT_EQ(json["set_pixels"], 900);  // 20 x 15, half of a voxel is level 8 of 15
   EXPECT_EQ(json["grey_pixels"], 300);
   EXPECT_NEAR(json["filled_pixels"], 600 + 300 * 8 / 15.0, 1e-6);
   EXPECT_EQ(json["numbers"]["first"], 4);
@@ -361,13 +365,13 @@ TEST_F(ImageLevels, WithoutDropsAreNoPores) {
   done("jet box.stl --machine printer.toml --saturation 10 -o few" + rest);
   done("jet box.stl --machine printer.toml --levels 16 -o dithered" + rest);
   done("jet box.stl --bed 5x5 --dpi 254 --core 0.5 -o thin" + rest);
-  for (const auto& [name, words] : {std::pair{"few", "get no drop (--saturation)"}, {"dithered", "(--levels)"}, {"thin", "(--core)"}})
+  for (const auto& [name, words] :
+       {std::pair{"few", "get no drop (--saturation)"}, {"dithered", "(--levels)"}, {"thin", "(--core)"}})
     test::expect_refused(std::string("permeability --no-flow ") + name, 3, words, folder_);
   done("jet box.stl --machine printer.toml --saturation 60 -o enough" + rest);
   done("jet box.stl --bed 5x5 --dpi 254 --levels 16 --format tiff-4 -o grey" + rest);
   for (const char* name : {"enough", "grey"}) {
-    const test::Outcome outcome =
-        test::run_lamina({"permeability", "--no-flow", "--json", name}, folder_.path());
+    const test::Outcome outcome = test::run_lamina({"permeability", "--no-flow", "--json", name}, folder_.path());
     ASSERT_EQ(outcome.code, 0) << outcome.err;
     EXPECT_EQ(nlohmann::json::parse(outcome.out)["porosity"], 0) << outcome.out;
   }
