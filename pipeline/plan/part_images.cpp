@@ -62,10 +62,10 @@ Status check_no_transform(const PartRequest& part) {
                            one_line(part.path)));
 }
 
-/// nm that pixels of the image take on the bed.
+/// nm that pixels of the image take on the bed. As many as a bed of this length has are as long as the bed.
 std::int64_t length_of(std::uint32_t pixels, std::int64_t dots, const PixelAxis& axis) {
   const std::int64_t nm = pixels * axis.span / dots;
-  return dots == axis.dots && pixels == axis.count ? std::min(nm, axis.length) : nm;
+  return pixels == ceil_div(axis.length * dots, axis.span) ? std::min(nm, axis.length) : nm;
 }
 
 }  // namespace

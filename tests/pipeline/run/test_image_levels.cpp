@@ -19,6 +19,25 @@ namespace {
 
 namespace fs = std::filesystem;
 
+// 100 x 50 mm at 254 dpi; an hour costs 36, so a second costs one hundredth.
+constexpr const char* kPrinter = R"([machine]
+name = "printer"
+[bed]
+size_mm = [100, 50]
+build_height_mm = 50
+[head]
+drop_pl = 80
+most_drop_sweeps = 8
+[mounting]
+dpi = 254
+[powder]
+dose = 1.5
+packing = 0.6
+[cost]
+hour_price = 36
+binder_price_l = 10000
+)";
+
 class ImageLevels : public testing::Test {
  protected:
   test::Outcome run(const std::string& line) const {
@@ -79,10 +98,10 @@ TEST_F(ImageLevels, GiveTheBytesOfTheMeshesThatTheyWereMadeOf) {
 // Of levels become drops what of the mesh does, on a printer and however the work is shared out.
 TEST_F(ImageLevels, BecomeTheDropsOfTheMesh) {
   const std::string part = test::corpus_file("dental_crown.stl");
-  const std::string rest = " --layer 0.5 --machine nuferbj --levels 16";
-  done("jet " + part + " --layer 0.5 --bed 75x75 --dpi 600 --levels 16 --format tiff-4 -o grey --at 10,10");
+  test::write_text(folder_.path() / "printer.toml", kPrinter);
+  const std::string rest = " --layer 0.5 --machine printer.toml --levels 16";
+  done("jet " + part + " --layer 0.5 --bed 100x50 --dpi 254 --levels 16 --format tiff-4 -o grey --at 10,10");
   done("jet " + part + rest + " --saturation 4 --at 10,10 -o mesh");
-  fs::create_directories(folder_.path() / "shares");
   done("jet grey" + rest + " --saturation 4 --at 0,0 -o shares");
   const Manifest mesh = manifest("mesh"), shares = manifest("shares");
   ASSERT_EQ(mesh.layers.size(), shares.layers.size());
@@ -122,7 +141,7 @@ TEST_F(ImageLevels, AreUnitedWithMeshesByTheLargerShare) {
       at_least(a, least, in_a), at_least(b, least, in_b), at_least(c, least, in_c);
       std::vector<bool> expected(in_a.columns);
       for (std::uint32_t r = 0; r < in_a.view().rows(); ++r) {
-        std::ranges::fill(expected, false);
+        expected.assign(in_a.columns, false);
         for (const Runs* image : {&in_a, &in_b}) {
           const auto row = image->view().row(r);
           for (std::size_t i = 0; i + 1 < row.size(); i += 2)
@@ -164,7 +183,9 @@ TEST_F(ImageLevels, AreMirroredCroppedResampledAndThresholded) {
       done("jet " + part + " --layer 1 --dpi 100 --bed 30x20 -o shares --format " + format + " --levels " + levels);
       done("jet shares --layer 1 --dpi 100 --bed 30x20 -o half");
       done("jet " + part + " --layer 1 --dpi 100 --bed 30x20 -o rounded --no-dither --levels " + levels);
-      if (levels[0] == '2') EXPECT_EQ(layers("half"), layers("rounded")) << format;
+      if (levels[0] == '2') {
+        EXPECT_EQ(layers("half"), layers("rounded")) << format;
+      }
       const Manifest shares = manifest("shares"), half = manifest("half");
       for (const LayerRecord& record : shares.layers) {
         const auto full = static_cast<std::uint8_t>(std::stoi(levels) - 1);
@@ -213,8 +234,9 @@ TEST_F(ImageLevels, ThatDoNotFitAreOneLineEach) {
   };
   refused("jet grey --levels 4 --set part.threshold=90", "part.threshold is of images of 1 bit");
   refused("jet grey --levels 4 --containment inside", "--containment");
-  test::write_text(folder_.path() / "two.toml",
-                   "[[part]]\npath = \"grey\"\nmaterial = \"a\"\n[[part]]\npath = \"box.stl\"\nmaterial = \"b\"\n");
+  test::write_text(
+      folder_.path() / "two.toml",
+      "[[part]]\npath = \"grey\"\nat_mm = [0, 0]\nmaterial = \"a\"\n[[part]]\npath = \"box.stl\"\nmaterial = \"b\"\nat_mm = [1, 1]\n");
   refused("jet --job two.toml --levels 4", "leave out the parts that are images");
 }
 
@@ -238,25 +260,6 @@ TEST_F(ImageLevels, BeginWhereTheJobSays) {
   done("jet --job there.toml -o saved_there");
   EXPECT_EQ(empty_below("saved_there"), 4u);
 }
-
-// 100 x 50 mm at 254 dpi; an hour costs 36, so a second costs one hundredth.
-constexpr const char* kPrinter = R"([machine]
-name = "printer"
-[bed]
-size_mm = [100, 50]
-build_height_mm = 50
-[head]
-drop_pl = 80
-most_drop_sweeps = 8
-[mounting]
-dpi = 254
-[powder]
-dose = 1.5
-packing = 0.6
-[cost]
-hour_price = 36
-binder_price_l = 10000
-)";
 
 class ImageCosts : public ImageLevels {
  protected:
@@ -289,11 +292,13 @@ TEST_F(ImageCosts, AreSharedByPixelsAndHeightsAsThoseOfMeshes) {
   EXPECT_EQ(mixed["parts"][0]["drops"], 60'000);
   EXPECT_EQ(mixed["parts"][1]["drops"], 40'000);
   for (const auto& [key, value] : meshes.items()) {
-    if (key != "parts") EXPECT_EQ(mixed[key], value) << key;
+    if (key != "parts") {
+      EXPECT_EQ(mixed[key], value) << key;
+    }
   }
   for (int p = 0; p < 2; ++p) {
     auto a = meshes["parts"][p], b = mixed["parts"][p];
-    a.erase("name"), b.erase("name");
+    a.erase("path"), b.erase("path");
     EXPECT_EQ(a, b) << p;
   }
   // Mirrored, and as shares of voxels, the same.
