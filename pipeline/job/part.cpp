@@ -37,7 +37,8 @@ std::string write_factors(const std::array<double, 3>& factors) { return value_t
 /// What no mesh is called: images, whose manifest may say where they begin.
 bool may_be_images(const PartRequest& part) {
   constexpr std::string_view kMeshes[] = {".stl", ".obj", ".3mf", ".gz"};
-  return std::ranges::find(kMeshes, lower_case(std::filesystem::path(part.path).extension().string())) == std::end(kMeshes);
+  return !part.path.empty() &&
+         std::ranges::find(kMeshes, lower_case(std::filesystem::path(part.path).extension().string())) == std::end(kMeshes);
 }
 
 PartKey bottom_key() {

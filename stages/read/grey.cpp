@@ -1,4 +1,7 @@
 // Rows of grey values become bits or levels.
+#include <algorithm>
+#include <cstring>
+
 #include "stages/read/image_formats.h"
 
 namespace lamina::read {
@@ -27,6 +30,22 @@ void bits_of_nibbles(std::span<std::byte> row, std::uint32_t columns, int thresh
   }
 }
 
+namespace {
+
+/// The first byte of [from, to) that is another one; `to` if none is.
+std::size_t first_other(std::span<const std::byte> row, std::size_t from, std::size_t to, std::byte byte) {
+  std::uint64_t pattern = 0, word = 0;
+  std::memset(&pattern, std::to_integer<int>(byte), sizeof pattern);
+  for (; from + sizeof word <= to; from += sizeof word) {
+    std::memcpy(&word, row.data() + from, sizeof word);
+    if (word != pattern) break;
+  }
+  while (from < to && row[from] == byte) ++from;
+  return from;
+}
+
+}  // namespace
+
 bool LevelSink::add_row(std::span<const std::byte> row, std::uint32_t columns, unsigned bits, bool bright_is_low) {
   const unsigned darkest = (1u << bits) - 1;
   const auto value_at = [&](std::uint32_t column) -> unsigned {
@@ -40,6 +59,10 @@ bool LevelSink::add_row(std::span<const std::byte> row, std::uint32_t columns, u
   for (std::uint32_t begin = 0; begin < columns;) {
     const unsigned value = value_at(begin), dark = bright_is_low != invert ? value : darkest - value;
     std::uint32_t end = begin + 1;
+    if (bits == 8) end = static_cast<std::uint32_t>(first_other(row, end, columns, row[begin]));
+    if (bits == 4)  // whole bytes of it from the next one on
+      end =
+          std::max(end, static_cast<std::uint32_t>(2 * first_other(row, (begin + 1) / 2, columns / 2, std::byte(17 * value))));
     while (end < columns && value_at(end) == value) ++end;
     if ((!nearest && dark * full % darkest != 0) || levels.level.size() >= UINT32_MAX / 2) return false;
     levels.append(begin, end, static_cast<std::uint8_t>((2 * dark * full + darkest) / (2 * darkest)));

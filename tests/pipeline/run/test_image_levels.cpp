@@ -168,6 +168,10 @@ TEST_F(ImageLevels, AreMirroredCroppedResampledAndThresholded) {
   EXPECT_EQ(layers("again"), layers("turned"));
   done("jet turned" + rest + " --dpi 100 --bed 30x20 --mirror xy -o back");
   EXPECT_EQ(layers("back"), layers("grey"));
+  // What sticks out is empty here, so that the mesh on the smaller bed is the same.
+  done("jet " + part + rest + " --dpi 100 --bed 17x18 --at 2,3 -o small");
+  done("jet grey" + rest + " --dpi 100 --bed 17x18 --at 0,0 --set part.crop=true -o cropped");
+  EXPECT_EQ(layers("cropped"), layers("small"));
   // Twice as many dots: each pixel four times.
   done("jet grey" + rest + " --dpi 200 --bed 30x20 --at 0,0 --set part.resample=true -o fine");
   const Manifest grey = manifest("grey"), fine = manifest("fine");
