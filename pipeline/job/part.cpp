@@ -80,7 +80,7 @@ const PartKey kPartKeys[] = {
         {"part", "material_range", "", "[{...}]", "other powders between two heights above the part's bottom", decides::all}),
     field<&PartRequest::images, &PartImages::dpi>(
         {"part", "dpi", "", "DPI|XxY", "of a part that is images, if their files do not tell it", decides::images},
-        {1, 25'400}),
+        {1, 25'400, "", true}),
     field<&PartRequest::images, &PartImages::layer_mm>(
         {"part", "layer_mm", "", "MM", "thickness of a layer of a part that is images; else by its manifest, or the job's",
          decides::images},
