@@ -9,8 +9,11 @@
 #include <memory>
 
 #include "pipeline/check/job_files.h"
+#include "pipeline/job/file.h"
+#include "stages/data/levels.h"
 #include "stages/data/text/readable.h"
 #include "stages/pores/coarser.h"
+#include "stages/read/image.h"
 
 namespace lamina::pipeline {
 namespace {
@@ -43,6 +46,43 @@ void slice_layers(const std::vector<LayerRecord>& layers, ImageStack& stack) {
   stack.edge[2] = thinnest;
 }
 
+/// Pixels that get no drop because drops are few are no pores. errors  kInput: the images leave some out
+Status check_all_filled(const std::string& folder, const Manifest& manifest) {
+  const ManifestHead& head = manifest.head;
+  if (head.full_level() > 0) return {};  // grey, no drops
+  Job job;
+  const bool known = read_job_text(head.job_toml, folder + "/manifest.json", job).ok();
+  std::uint64_t without = 0, filled = 0;
+  for (const LayerRecord& record : manifest.layers) {
+    filled += record.filled_pixels();
+    if (record.filled_pixels() > record.set_pixels) without += record.filled_pixels() - record.set_pixels;
+  }
+  const bool thinned = known && job.dose.core < 1;
+  const bool rounded = known && head.levels > 0 && !job.dose.dithered && !job.dose.saturation_percent;
+  const bool shares = head.levels > 0 && !rounded;  // of which full voxels are counted, and any is set that has a drop
+  if (!thinned && !shares && (without == 0 || rounded)) return {};
+  const std::string what =
+      thinned  ? fmt::format("{:.4g} % of the pixels of its cores get no drop (--core)", 100 * (1 - job.dose.core))
+      : shares ? "shares of voxels are drops here and there (--levels)"
+               : fmt::format("{} of {} pixels that are to be filled get no drop (--saturation)", without, filled);
+  return Error{Fault::kInput, fmt::format("{}: {}, which is no pore; plan the job again without that, or name {}/layers with "
+                                          "--pixel, --layer-um and --dark to take its pixels as they are",
+                                          one_line(folder), what, one_line(folder))};
+}
+
+/// The solid of a layer: of shares of voxels those that are half full or more.
+Result<Runs> solid_of_layer(const std::string& folder, const ManifestHead& head, const LayerRecord& record) {
+  auto picture = picture_of_layer(folder, head, record);
+  if (!picture) return picture.error();
+  const std::uint8_t full = head.full_level();
+  if (full == 0) return std::move(picture->front());
+  Levels levels;
+  auto image = read::levels(folder + "/" + layer_images(head, record).front().name, full, levels);
+  if (!image) return image.error();
+  at_least(levels, static_cast<std::uint8_t>((full + 1) / 2), image->runs);
+  return std::move(image->runs);
+}
+
 Result<ImageStack> stack_of_job(const std::string& folder) {
   auto manifest = read_manifest(folder + "/manifest.json");
   if (!manifest) return Error{Fault::kInput, manifest.error().message};
@@ -50,6 +90,7 @@ Result<ImageStack> stack_of_job(const std::string& folder) {
   const ManifestHead& head = job->head;
   if (head.product != Product::kImages || head.extension.empty() || job->layers.empty())
     return Error{Fault::kInput, folder + ": its job wrote no images; name a folder of lamina jet, or of images"};
+  if (Status status = check_all_filled(folder, *job); !status) return status.error();
   ImageStack stack;
   stack.path = folder;
   slice_layers(job->layers, stack);
@@ -70,9 +111,7 @@ Result<ImageStack> stack_of_job(const std::string& folder) {
     }
   }
   stack.read = [job, folder](std::uint32_t layer) -> Result<Runs> {
-    auto picture = picture_of_layer(folder, job->head, job->layers[layer]);
-    if (!picture) return picture.error();
-    return std::move(picture->front());
+    return solid_of_layer(folder, job->head, job->layers[layer]);
   };
   return stack;
 }

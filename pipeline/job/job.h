@@ -48,7 +48,8 @@ struct PartRequest {
   std::string unit = "mm";    // mm, cm, m, um, inch, foot: for STL and OBJ, which store no unit
   std::uint32_t copies = 1;
   std::optional<std::array<double, 2>> at_mm = {};  // corner of the part's box on the bed; arranged if absent
-  double bottom_mm = 0;                             // height of the part's lowest point above the bed
+  std::optional<double> bottom_mm = {};             // height of the part's lowest point above the bed; absent: of images as
+                                                    // their manifest has it, else 0
   std::array<double, 3> scale{1, 1, 1};
   std::array<double, 3> rotate_deg{0, 0, 0};
   std::array<double, 3> shrink{1, 1, 1};            // compensation factors per axis of the bed, applied last

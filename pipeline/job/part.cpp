@@ -1,10 +1,12 @@
 // [[part]] of a job.
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
 
 #include "pipeline/job/fill.h"
 #include "pipeline/job/job.h"
 #include "pipeline/job/keys.h"
+#include "stages/data/text/readable.h"
 #include "stages/read/profiles/printer.h"
 
 namespace lamina::pipeline {
@@ -32,6 +34,21 @@ std::string read_factors(std::string_view text, std::array<double, 3>& factors) 
 }
 std::string write_factors(const std::array<double, 3>& factors) { return value_text(factors); }
 
+/// What no mesh is called: images, whose manifest may say where they begin.
+bool may_be_images(const PartRequest& part) {
+  constexpr std::string_view kMeshes[] = {".stl", ".obj", ".3mf", ".gz"};
+  return !part.path.empty() &&
+         std::ranges::find(kMeshes, lower_case(std::filesystem::path(part.path).extension().string())) == std::end(kMeshes);
+}
+
+PartKey bottom_key() {
+  PartKey key = field<&PartRequest::bottom_mm>(
+      {"part", "bottom_mm", "--bottom", "MM", "height of the part's lowest point above the bed, in mm", decides::all},
+      {0, kMostMm, " mm"});
+  key.write_text = [](const PartKey&, const PartRequest& part) { return value_text(part.bottom_mm.value_or(0)); };
+  return key.shown_if([](const PartRequest& part) { return part.bottom_mm || !may_be_images(part); });
+}
+
 const PartKey kPartKeys[] = {
     text<check_path, &PartRequest::path>(
         {"part", "path", "", "FILE", "STL, OBJ or 3MF file, or a folder of layer images; in a job file, relative to that file",
@@ -44,9 +61,7 @@ const PartKey kPartKeys[] = {
     field<&PartRequest::at_mm>({"part", "at_mm", "--at", "X,Y",
                                 "where the part's box starts, in mm from the bed's front left; else arranged", decides::all},
                                {0, kMostMm, " mm"}),
-    field<&PartRequest::bottom_mm>(
-        {"part", "bottom_mm", "--bottom", "MM", "height of the part's lowest point above the bed, in mm", decides::all},
-        {0, kMostMm, " mm"}),
+    bottom_key(),
     custom<PartRequest, read_factors<kLeastScale, true>, write_factors, &PartRequest::scale>(
         {"part", "scale", "--scale", "S|X,Y,Z", "factors per axis of the file; a negative one mirrors", decides::all},
         Form::kList),
@@ -65,7 +80,7 @@ const PartKey kPartKeys[] = {
         {"part", "material_range", "", "[{...}]", "other powders between two heights above the part's bottom", decides::all}),
     field<&PartRequest::images, &PartImages::dpi>(
         {"part", "dpi", "", "DPI|XxY", "of a part that is images, if their files do not tell it", decides::images},
-        {1, 25'400}),
+        {1, 25'400, "", true}),
     field<&PartRequest::images, &PartImages::layer_mm>(
         {"part", "layer_mm", "", "MM", "thickness of a layer of a part that is images; else by its manifest, or the job's",
          decides::images},

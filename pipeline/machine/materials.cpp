@@ -74,7 +74,7 @@ Result<Materials> materials_of(const Job& job, const Machine* machine) {
   };
   for (std::size_t p = 0; p < job.parts.size(); ++p) {
     const PartRequest& part = job.parts[p];
-    const std::int64_t bottom = nm_of(part.bottom_mm);
+    const std::int64_t bottom = nm_of(part.bottom_mm.value_or(0));
     result.part[p].elsewhere = number_of(part.material);
     for (const auto& [from_mm, to_mm, material] : part.material_ranges) {
       result.part[p].ranges.push_back({bottom + nm_of(from_mm), bottom + nm_of(to_mm), number_of(material)});

@@ -15,6 +15,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
+constexpr std::uint32_t kLooks = 5;  // into a stack, for how crowded its images are
+
 Error usage(std::string what) { return {Fault::kUsage, std::move(what)}; }
 
 /// An output never replaces an input.
@@ -60,10 +62,10 @@ Status check_no_transform(const PartRequest& part) {
                            one_line(part.path)));
 }
 
-/// nm that pixels of the image take on the bed.
+/// nm that pixels of the image take on the bed. As many as a bed of this length has are as long as the bed.
 std::int64_t length_of(std::uint32_t pixels, std::int64_t dots, const PixelAxis& axis) {
   const std::int64_t nm = pixels * axis.span / dots;
-  return dots == axis.dots && pixels == axis.count ? std::min(nm, axis.length) : nm;
+  return pixels == ceil_div(axis.length * dots, axis.span) ? std::min(nm, axis.length) : nm;
 }
 
 }  // namespace
@@ -75,14 +77,19 @@ Result<OpenImages> open_images(const Job& job, const PartRequest& part, const Pi
   if (Status status = check_apart(job, part.path); !status) return status.error();
   const auto told = images_on_record(part.path);
   if (!told) return told.error();
+  if (job.levels > 0 && part.images.threshold != PartImages().threshold)
+    return usage(
+        fmt::format("{}: part.threshold is of images of 1 bit, and --levels takes grey as shares of voxels; leave out "
+                    "one of them",
+                    one_line(part.path)));
   auto images = read::LayerImages::open(
-      told->path, {static_cast<int>(part.images.threshold), part.images.invert, part.images.missing_empty});
+      told->path, {static_cast<int>(part.images.threshold), part.images.invert, part.images.missing_empty, kLooks});
   if (!images) return images.error();
   OpenImages open;
   const auto dots = dots_of(part, *images, *grid);
   if (!dots) return dots.error();
   open.dots = *dots;
-  open.bottom = part.bottom_mm > 0 ? static_cast<Nm>(nm_of(part.bottom_mm)) : told->bottom;
+  open.bottom = part.bottom_mm ? static_cast<Nm>(nm_of(*part.bottom_mm)) : told->bottom;
   open.thickness = told->thickness;
   const bool layer_named = std::ranges::find(job.named, "layers.thickness_mm") != job.named.end();
   if (part.images.layer_mm) {
@@ -105,6 +112,11 @@ Result<OpenImages> open_images(const Job& job, const PartRequest& part, const Pi
   if (!told->mirror.empty() && told->mirror != "none")
     open.notes.push_back(
         {false, fmt::format("its manifest says that the images are mirrored; --mirror {} turns them back", told->mirror)});
+  if (told->levels > 0 && told->levels != job.levels)
+    open.notes.push_back(
+        {false,
+         fmt::format("its manifest says that the images are shares of voxels in {} levels, which --levels {} keeps; {}",
+                     told->levels, told->levels, job.levels > 0 ? "here they are rounded" : "here half full and more is set")});
   open.images = std::make_shared<const read::LayerImages>(std::move(*images));
   return open;
 }

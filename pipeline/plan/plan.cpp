@@ -116,7 +116,7 @@ class Planner {
     plan_.scene = std::make_unique<Scene>(std::move(*scene));
     for (const PlacedImages& images : plan_.scene->images) {
       // Their manifest may put them higher than the job.
-      const std::int64_t by = images.bottom - nm_of(job().parts[images.part].bottom_mm);
+      const std::int64_t by = images.bottom - nm_of(job().parts[images.part].bottom_mm.value_or(0));
       if (materials_.part.empty() || raised_.contains(images.part)) continue;
       raised_.insert(images.part);
       for (PartMaterial::Range& range : materials_.part[images.part].ranges) range.from += by, range.to += by;

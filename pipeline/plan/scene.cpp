@@ -159,7 +159,7 @@ namespace {
 
 /// nm above the bed.
 std::int64_t bottom_of(const PartRequest& part, const Loaded& loaded) {
-  return loaded.images ? loaded.images->bottom : nm_of(part.bottom_mm);
+  return loaded.images ? loaded.images->bottom : nm_of(part.bottom_mm.value_or(0));
 }
 
 /// The file of each [[part]]; equal files with equal transforms are loaded once. A map's values stay where they are.
@@ -175,7 +175,7 @@ Result<std::vector<const Loaded*>> load_parts(const Job& job, bool blocks, const
     const std::string solid =
         part.material_ranges.empty()
             ? part.material
-            : fmt::format("{} {} {}", part.material, material_ranges_text(part.material_ranges), part.bottom_mm);
+            : fmt::format("{} {} {}", part.material, material_ranges_text(part.material_ranges), part.bottom_mm.value_or(0));
     const bool images = read::names_images(part.path);
     const LoadKey key{images         ? fmt::format("images {}", loaded.size())
                       : file.empty() ? part.path

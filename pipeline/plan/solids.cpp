@@ -39,7 +39,8 @@ std::vector<std::uint32_t> levels_of(const Scene& scene, const Job& job, const M
 
 /// What keeps a job from levels, and what to do; empty if nothing does.
 std::string_view against_shares(const Scene& scene, const Job& job, const Materials& materials, const DoseZones& zones) {
-  if (!scene.images.empty()) return "meshes; leave out the parts that are images";
+  if (!scene.images.empty() && (materials.several() || zones.several()))
+    return "meshes where parts have several materials or doses; leave out the parts that are images";
   if (materials.several()) return "one material; give all parts the same";
   if (zones.several()) return "parts of one dose; leave out part.saturation_percent and part.bleed_um";
   if (zones.grows()) return "edges that stay or shrink; leave out a negative bleed";
@@ -105,7 +106,7 @@ Result<Solids> Solids::build(Scene& scene, const Job& job, const PixelGrid& grid
   const auto add = [&](std::span<Mesh> meshes, std::span<const Instance> instances, PartMaterial material, std::uint32_t zone,
                        std::vector<std::uint32_t> instance) -> Status {
     std::optional<cover::Coverage> coverage;
-    if (job.levels > 0) {
+    if (job.levels > 0 && !instances.empty()) {
       auto covered = cover::Coverage::build(meshes, instances, grid, job.fill_rule, job.levels);
       if (!covered) return covered.error();
       coverage = std::move(*covered);

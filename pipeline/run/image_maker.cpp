@@ -73,19 +73,23 @@ class ImageMaker : public Maker {
       if (status) sanity_.add_image(layer, work.images.runs);
       return status;
     });
-    if (!plan_.scene->images.empty())
-      add("images", [this](const Layer& layer, Work& work, Made&) { return imager_.images(layer, work.images); });
-    if (plan_.images->beads) {
-      add("contours", [this](const Layer& layer, Work& work, Made&) { return imager_.contours(layer, work.images); });
-      add("fill", [this](const Layer& layer, Work& work, Made&) { return imager_.fill(layer, work.images); });
-      add("beads",
-          [this](const Layer& layer, Work& work, Made& made) { return imager_.beads(layer, work.images, made.notes); });
-    }
     if (plan_.job.levels > 0) {
       add("shares", [this](const Layer& layer, Work& work, Made& made) {
         imager_.shares(layer, work.images, made.record);
         return Status();
       });
+    }
+    if (!plan_.scene->images.empty()) {
+      add("images", [this](const Layer& layer, Work& work, Made& made) {
+        if (cost_) cost_->weigh(layer, work.images, made.notes);
+        return imager_.images(layer, work.images, made.notes);
+      });
+    }
+    if (plan_.images->beads) {
+      add("contours", [this](const Layer& layer, Work& work, Made&) { return imager_.contours(layer, work.images); });
+      add("fill", [this](const Layer& layer, Work& work, Made&) { return imager_.fill(layer, work.images); });
+      add("beads",
+          [this](const Layer& layer, Work& work, Made& made) { return imager_.beads(layer, work.images, made.notes); });
     }
     if (inspector_.on()) {
       add("inspect", [this](const Layer&, Work& work, Made&) {
@@ -98,7 +102,7 @@ class ImageMaker : public Maker {
       // What walls and fillings left out is no bleed.
       if (plan_.images->dose.bleeds() && !plan_.images->beads) sanity_.add_left(layer, work.images.runs);
       imager_.dose(layer, work.images, made.record);
-      if (cost_) cost_->count(work.images.runs, work.images.drops, made.record);
+      if (cost_) cost_->count(work.images, made.notes, made.record);
       return Status();
     });
     if (plan_.job.dry_run) {

@@ -40,6 +40,7 @@ struct ImageWork {
 struct ImageNotes {
   raster::LayerReport report;
   std::uint64_t solid_pixels = 0, bead_pixels = 0;  // of parts, before and after clearing outside beads and shells
+  std::vector<std::uint64_t> part_pixels;           // of each part before its dose, or shares of voxels; empty: nobody asks
 };
 
 /// The steps of a layer's images; const, usable from any thread with separate work objects.
@@ -51,13 +52,14 @@ class LayerImager {
   // --- in this order; contours, fill and beads only if beads fill the parts
   /// errors  kVerification: engines disagree
   Status raster(const Layer& layer, ImageWork& work, LayerRecord& record, ImageNotes& notes) const;
-  /// Unites the layer with those of the parts that are images. errors  kInput: an image cannot be read
-  Status images(const Layer& layer, ImageWork& work) const;
+  /// Of a job of shares of voxels: the image becomes that of voxels half full or more.
+  void shares(const Layer& layer, ImageWork& work, LayerRecord& record) const;
+  /// Unites the layer with those of the parts that are images, whose pixels it adds to notes.part_pixels, if those are wanted.
+  /// errors  kInput: an image cannot be read; kUsage: it sets pixels outside of the bed
+  Status images(const Layer& layer, ImageWork& work, ImageNotes& notes) const;
   Status contours(const Layer& layer, ImageWork& work) const;
   Status fill(const Layer& layer, ImageWork& work) const;
   Status beads(const Layer& layer, ImageWork& work, ImageNotes& notes) const;
-  /// Of a job of shares of voxels, after the raster: the image becomes that of voxels half full or more.
-  void shares(const Layer& layer, ImageWork& work, LayerRecord& record) const;
   /// Mirrors the image and removes its bleed. errors  kUsage: it would grow beyond the bed
   Status bleed(const Layer& layer, ImageWork& work) const;
   /// Thins the core and counts the remaining pixels.
@@ -80,6 +82,7 @@ class LayerImager {
                     ImageNotes& notes) const;
   raster::LayerReport section(const Solid& solid, raster::Engine engine, const Layer& layer, ImageWork& work,
                               Runs& image) const;
+  Status place(const Layer& layer, const PlacedImages& part, ImageWork& work, std::uint64_t& filled) const;
   void mirror(Runs& image, Runs& scratch) const;
   Status check_grown(const Layer& layer, const ImageWork& work) const;
   static void empty_removed(const Runs& before, ImageWork& work);

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "pipeline/run/image_maker.h"
 #include "pipeline/run/sanity.h"
 #include "stages/slice/bodies.h"
 
@@ -12,12 +13,12 @@ JobCost::JobCost(const Machine& machine, const Manifest& manifest)
                std::ranges::any_of(manifest.layers, [](const LayerRecord& record) { return !record.part_pixels.empty(); }),
                title_of(manifest.head.parts)) {}
 
-// What images set is nobody's window: with them the job is told as one.
+// The plan outlives this object.
 JobCost::JobCost(const Plan& plan)
     : account_(plan.images->machine->machine, plan.images->grid, plan.scene->parts,
-               plan.scene->images.empty() && (plan.job.quote || cost::has_prices(plan.images->machine->machine.cost)),
-               title_of(plan.scene->parts)) {
+               plan.job.quote || cost::has_prices(plan.images->machine->machine.cost), title_of(plan.scene->parts)) {
   if (account_.parts() < 2) return;
+  plan_ = &plan;
   saturates_ = plan.images->dose.saturates();
   several_ = plan.images->dose.most_drops() > 1;
   full_ = plan.images->dose.full();
@@ -34,21 +35,50 @@ JobCost::JobCost(const Plan& plan)
   std::vector<cost::Body> bodies;
   for (std::size_t i = 0; i < solids.size(); ++i) bodies.push_back({boxes[i], solids[i].part, group[i]});
   const Mirror mirror = plan.job.mirror;
-  const bool mirrored = mirror != Mirror::kNone;
+  // What images set is nobody's window: beside them windows are of the meshes alone, before anything is mirrored.
+  const bool mirrored = mirror != Mirror::kNone && plan.scene->images.empty();
   windows_.emplace(bodies, account_.parts(), plan.images->grid, mirrored && mirror != Mirror::kY,
                    mirrored && mirror != Mirror::kX);
 }
 
-void JobCost::count(const RunsView& image, const dose::DropWork& drops, LayerRecord& record) const {
+void JobCost::weigh(const Layer& layer, const ImageWork& work, ImageNotes& notes) const {
   if (!windows_) return;
+  notes.part_pixels = full_ > 0 ? windows_->sum(layer, work.drops.shares) : windows_->count(layer, work.runs);
+}
+
+void JobCost::count(const ImageWork& work, const ImageNotes& notes, LayerRecord& record) const {
+  if (!windows_) return;
+  if (!plan_->scene->images.empty()) return share_out(work, notes.part_pixels, record);
+  const dose::DropWork& drops = work.drops;
   if (full_ > 0) {
     const Levels& voxels = saturates_ ? drops.zones : drops.shares;
     record.part_pixels = windows_->share(record.layer, voxels, full_, record.dosed_pixels);
   } else {
-    record.part_pixels = saturates_ ? windows_->count(record.layer, drops.zones) : windows_->count(record.layer, image);
+    record.part_pixels = saturates_ ? windows_->count(record.layer, drops.zones) : windows_->count(record.layer, work.runs);
   }
   if (saturates_) {
     record.part_drops = several_ ? windows_->sum(record.layer, drops.levels) : windows_->count(record.layer, image);
+  }
+}
+
+void JobCost::share_out(const ImageWork& work, const std::vector<std::uint64_t>& weights, LayerRecord& record) const {
+  const auto shared = [](std::uint64_t all, const std::vector<std::uint64_t>& by) {
+    const auto whole = cost::shares(static_cast<std::int64_t>(all), by);
+    return std::vector<std::uint64_t>(whole.begin(), whole.end());
+  };
+  record.part_pixels = shared(record.filled_pixels(), weights);
+  const DoseZones& zones = plan_->images->dose.zones();
+  if (!saturates_ || !zones.several()) return;  // drops are as pixels
+  record.part_drops.assign(weights.size(), 0);
+  for (std::uint32_t zone = 0; zone < zones.count(); ++zone) {
+    std::vector<std::uint64_t> within(weights.size(), 0);
+    for (std::uint32_t part = 0; part < weights.size(); ++part) {
+      if (zones.of_part(part) == zone) within[part] = weights[part];
+    }
+    const std::uint64_t drops = sum_of_levels(work.drops.levels, work.zones.image[zone]);
+    if (drops == 0) continue;
+    const std::vector<std::uint64_t> own = shared(drops, within);
+    for (std::size_t part = 0; part < own.size(); ++part) record.part_drops[part] += own[part];
   }
 }
 

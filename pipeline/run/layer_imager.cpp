@@ -68,22 +68,42 @@ Status LayerImager::raster(const Layer& layer, ImageWork& work, LayerRecord& rec
   return {};
 }
 
-Status LayerImager::images(const Layer& layer, ImageWork& work) const {
+Status LayerImager::place(const Layer& layer, const PlacedImages& part, ImageWork& work, std::uint64_t& filled) const {
   const ImagePlan& images = *plan_.images;
-  for (const PlacedImages& part : plan_.scene->images) {
-    const auto number = part.image_at(plane(layer));
-    if (!number) continue;
-    const auto read = part.images->read(*number);
+  const std::uint32_t number = *part.image_at(plane(layer));
+  if (const std::uint8_t full = images.dose.full(); full > 0) {
+    const auto levels = part.images->levels(number, full);
+    if (!levels) return levels.error();
+    read::place(*levels, part.place, work.drops.zones);
+    at_least(work.drops.zones, 1, work.section);
+    filled = sum_of_levels(work.drops.zones);
+  } else {
+    const auto read = part.images->read(number);
     if (!read) return read.error();
     read::place(*read, part.place, work.section);
-    const auto outside =
-        images.machine ? program::first_outside(images.machine->machine, images.grid, work.section) : std::nullopt;
-    if (outside) {
-      return Error{Fault::kUsage,
-                   fmt::format("{}: layer {} sets a pixel at x {:.3f}, y {:.3f} mm, {:.3f} mm outside of the bed of {}; "
-                               "move the images",
-                               plan_.scene->parts[part.part].path, layer.index, mm(outside->place.x), mm(outside->place.y),
-                               outside->beyond_mm, images.machine->machine.name)};
+    filled = set_pixels(work.section);
+  }
+  const auto outside =
+      images.machine ? program::first_outside(images.machine->machine, images.grid, work.section) : std::nullopt;
+  if (!outside) return {};
+  return Error{Fault::kUsage,
+               fmt::format("{}: layer {} sets a pixel at x {:.3f}, y {:.3f} mm, {:.3f} mm outside of the bed of {}; "
+                           "move the images",
+                           plan_.scene->parts[part.part].path, layer.index, mm(outside->place.x), mm(outside->place.y),
+                           outside->beyond_mm, images.machine->machine.name)};
+}
+
+Status LayerImager::images(const Layer& layer, ImageWork& work, ImageNotes& notes) const {
+  const ImagePlan& images = *plan_.images;
+  for (const PlacedImages& part : plan_.scene->images) {
+    if (!part.image_at(plane(layer))) continue;
+    std::uint64_t filled = 0;
+    if (Status status = place(layer, part, work, filled); !status) return status;
+    if (!notes.part_pixels.empty()) notes.part_pixels[part.part] += filled;
+    if (const std::uint8_t full = images.dose.full(); full > 0) {
+      raster::larger(work.drops.shares, work.drops.zones, work.drops.levels);
+      std::swap(work.drops.shares, work.drops.levels);
+      at_least(work.drops.zones, dose::half_of(full), work.section);
     }
     const DoseZones& zones = images.dose.zones();
     if (zones.several()) work.zones.lay(zones.of_part(part.part), work.section, work.runs);
@@ -127,7 +147,11 @@ Status LayerImager::beads(const Layer& layer, ImageWork& work, ImageNotes& notes
 }
 
 cover::LayerReport LayerImager::levels(const Layer& layer, cover::LayerScratch& scratch, Levels& image) const {
-  return plan_.images->solids.all().front().coverage->layer(layer, scratch, image);
+  const Solid& solid = plan_.images->solids.all().front();
+  if (solid.coverage) return solid.coverage->layer(layer, scratch, image);
+  image.start(plan_.images->grid.columns());  // no mesh
+  image.row_offset.assign(std::size_t{plan_.images->grid.rows()} + 1, 0);
+  return {};
 }
 
 Status LayerImager::bleed(const Layer& layer, ImageWork& work) const {
@@ -213,13 +237,13 @@ void LayerImager::dose(const Layer& layer, ImageWork& work, LayerRecord& record)
 
 Status LayerImager::make(const Layer& layer, ImageWork& work, LayerRecord& record, ImageNotes& notes) const {
   if (Status status = raster(layer, work, record, notes); !status) return status;
-  if (Status status = images(layer, work); !status) return status;
+  if (plan_.job.levels > 0) shares(layer, work, record);
+  if (Status status = images(layer, work, notes); !status) return status;
   if (plan_.images->beads) {
     if (Status status = contours(layer, work); !status) return status;
     if (Status status = fill(layer, work); !status) return status;
     if (Status status = beads(layer, work, notes); !status) return status;
   }
-  if (plan_.job.levels > 0) shares(layer, work, record);
   if (Status status = bleed(layer, work); !status) return status;
   dose(layer, work, record);
   return {};
@@ -305,7 +329,9 @@ std::uint64_t LayerImager::bytes_of_section(Nm plane, std::uint64_t changes) con
   const std::uint64_t zone_images = zones == 0 ? 0 : (2 * zones + 6) * 2 * (4 * edges + 4 * rows);
   // Zones and levels, and the image of each drop.
   const std::uint64_t drops = images.dose.saturates() ? 18 * changes + images.dose.most_drops() * 4 * (changes + rows) : 0;
-  const std::uint64_t read = plan_.scene->images.empty() ? 0 : 8 * (changes_of_images(plane) + rows);
+  // An image as read and as placed; where levels are, 9 bytes a run of those and of both together.
+  const std::uint64_t of_images = changes_of_images(plane), levels = plan_.job.levels > 0 ? 18 * of_images + 12 * rows : 0;
+  const std::uint64_t read = plan_.scene->images.empty() ? 0 : 8 * (of_images + rows) + levels;
   return images.solids.layer_bytes_bound(plane) + read + second_image + material_images + zone_images + drops;
 }
 

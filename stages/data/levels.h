@@ -1,6 +1,7 @@
 // stages/data/levels.h: an image of whole levels as runs: drops a pixel, or how full a voxel is.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <span>
 
@@ -64,6 +65,22 @@ inline std::uint64_t sum_of_levels(const LevelsView& image) {
   std::uint64_t sum = 0;
   for (std::size_t i = 0; i < image.level.size(); ++i) {
     sum += std::uint64_t{image.change[2 * i + 1] - image.change[2 * i]} * image.level[i];
+  }
+  return sum;
+}
+
+/// The same of the pixels that the mask sets. mask  of the same size
+inline std::uint64_t sum_of_levels(const LevelsView& image, const RunsView& mask) {
+  std::uint64_t sum = 0;
+  for (std::uint32_t r = 0; r < image.rows(); ++r) {
+    const auto row = mask.row(r);
+    std::size_t k = 0;
+    for (std::uint32_t i = image.row_offset[r]; i < image.row_offset[r + 1]; ++i) {
+      const std::uint32_t begin = image.change[2 * std::size_t{i}], end = image.change[2 * std::size_t{i} + 1];
+      while (k + 1 < row.size() && row[k + 1] <= begin) k += 2;
+      for (std::size_t j = k; j + 1 < row.size() && row[j] < end; j += 2)
+        sum += std::uint64_t{std::min(end, row[j + 1]) - std::max(begin, row[j])} * image.level[i];
+    }
   }
   return sum;
 }

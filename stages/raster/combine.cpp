@@ -1,5 +1,7 @@
 #include "stages/raster/combine.h"
 
+#include <algorithm>
+
 namespace lamina::raster {
 
 void combine(const RunsView& a, const RunsView& b, SetOperation operation, Runs& out) {
@@ -32,6 +34,46 @@ void append_combined(const RunsView& a, const RunsView& b, SetOperation operatio
     out.row_offset[row + r] = static_cast<std::uint32_t>(next - out.change.data());
   }
   out.change.resize(static_cast<std::size_t>(next - out.change.data()));
+}
+
+namespace {
+
+/// The runs of a row that are not yet behind.
+struct Ahead {
+  const LevelsView& image;
+  std::uint32_t i, end;
+
+  Ahead(const LevelsView& of, std::uint32_t row) : image(of), i(of.row_offset[row]), end(of.row_offset[row + 1]) {}
+  bool any() const { return i < end; }
+  std::uint8_t level_at(std::uint32_t column) const {
+    return any() && image.change[2 * std::size_t{i}] <= column ? image.level[i] : std::uint8_t{0};
+  }
+  /// Where its level changes next.
+  std::uint32_t next(std::uint32_t column) const {
+    if (!any()) return UINT32_MAX;
+    const std::uint32_t begin = image.change[2 * std::size_t{i}];
+    return begin > column ? begin : image.change[2 * std::size_t{i} + 1];
+  }
+  void leave(std::uint32_t column) {
+    if (any() && image.change[2 * std::size_t{i} + 1] <= column) ++i;
+  }
+};
+
+}  // namespace
+
+void larger(const LevelsView& a, const LevelsView& b, Levels& out) {
+  out.start(a.columns);
+  for (std::uint32_t r = 0; r < a.rows(); ++r) {
+    Ahead first(a, r), second(b, r);
+    for (std::uint32_t column = 0; first.any() || second.any();) {
+      const std::uint32_t next = std::min(first.next(column), second.next(column));
+      out.append(column, next, std::max(first.level_at(column), second.level_at(column)));
+      first.leave(next);
+      second.leave(next);
+      column = next;
+    }
+    out.end_row();
+  }
 }
 
 }  // namespace lamina::raster

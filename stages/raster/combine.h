@@ -3,6 +3,7 @@
 
 #include <cstdint>
 
+#include "stages/data/levels.h"
 #include "stages/data/runs.h"
 
 namespace lamina::raster {
@@ -15,5 +16,8 @@ void combine(const RunsView& a, const RunsView& b, SetOperation operation, Runs&
 
 /// The same, behind the rows that `out` has (its row_offset is not empty).
 void append_combined(const RunsView& a, const RunsView& b, SetOperation operation, Runs& out);
+
+/// The larger level of each pixel; both of the same size; `out` is neither. cost  O(runs + rows)
+void larger(const LevelsView& a, const LevelsView& b, Levels& out);
 
 }  // namespace lamina::raster

@@ -32,7 +32,7 @@ std::uint32_t number(std::span<const std::byte> bytes, std::size_t at, std::size
 
 }  // namespace
 
-Result<Image> bmp(int file, std::uint64_t bytes, const std::string& path, int threshold) {
+Result<Image> bmp(int file, std::uint64_t bytes, const std::string& path, int threshold, LevelSink* sink) {
   const auto failure = [&](std::string_view why) {
     return Error{Fault::kVerification, fmt::format("{}: not a whole BMP: {}; plan the layer again", path, why)};
   };
@@ -64,6 +64,7 @@ Result<Image> bmp(int file, std::uint64_t bytes, const std::string& path, int th
   if (begin > bytes || bytes - begin < stride * rows)
     return failure(fmt::format("{} bytes where {} x {} pixels take {}", bytes, columns, rows, begin + stride * rows));
 
+  if (sink != nullptr && grey) sink->levels.start(columns);
   RunsBuilder builder(columns);
   const auto at_once = static_cast<std::uint32_t>(std::clamp<std::uint64_t>(256 * 1024 / stride, 1, rows));
   Buffer<std::byte> buffer(stride * at_once);
@@ -76,6 +77,10 @@ Result<Image> bmp(int file, std::uint64_t bytes, const std::string& path, int th
       const std::span<std::byte> row = strip.subspan(stride * (from_top ? r : count - 1 - r), stride);
       if (grey) {
         for (std::uint32_t i = 0; i < columns; ++i) row[i] = std::byte{light[std::to_integer<std::uint8_t>(row[i])]};
+        if (sink != nullptr) {
+          if (!sink->add_row(row, columns, 8, false)) return failure("too many runs");
+          continue;
+        }
         bits_of_grey(row, columns, 1, false, threshold);
       }
       if (!builder.add_row(row.first(row_bytes(columns)), !grey && light[1] >= light[0])) return failure("too many runs");

@@ -10,6 +10,7 @@
 
 #include "stages/data/input/file_reader.h"
 #include "stages/read/image_formats.h"
+#include "stages/read/numbered.h"
 
 namespace lamina::read {
 namespace {
@@ -24,9 +25,10 @@ Result<Image> read_by_magic(int file, std::uint64_t bytes, const std::string& pa
   const auto begins = [&](const char* text, std::size_t length) { return std::memcmp(magic, text, length) == 0; };
   if (begins("II", 2) || begins("MM", 2)) return tiff(file, bytes, path, threshold, page, sink);
   if (begins("\x89PNG\r\n\x1a\n", 8)) return png(file, bytes, path, threshold, sink);
-  if (sink != nullptr) return Error{Fault::kVerification, path + ": neither TIFF nor PNG; plan the layer again"};
-  if (begins("P4", 2) || (threshold > 0 && begins("P5", 2))) return pbm(file, bytes, path, threshold);
-  if (begins("BM", 2)) return bmp(file, bytes, path, threshold);
+  if (sink != nullptr && !sink->nearest)
+    return Error{Fault::kVerification, path + ": neither TIFF nor PNG; plan the layer again"};
+  if (begins("P4", 2) || (threshold > 0 && begins("P5", 2))) return pbm(file, bytes, path, threshold, sink);
+  if (begins("BM", 2)) return bmp(file, bytes, path, threshold, sink);
   return Error{Fault::kVerification, fmt::format("{}: neither TIFF nor PNG nor PBM (P4) nor BMP; plan the layer again", path)};
 }
 
@@ -42,40 +44,10 @@ Result<Image> read_image(const std::string& path, int threshold, std::uint64_t p
 
 }  // namespace
 
-void bits_of_grey(std::span<std::byte> row, std::uint32_t columns, std::size_t step, bool second, int threshold) {
-  const std::size_t offset = second ? 1 : 0;
-  for (std::uint32_t first = 0; first < columns; first += 8) {
-    unsigned bits = 0;
-    for (std::uint32_t i = 0; i < 8 && first + i < columns; ++i) {
-      const int value = std::to_integer<int>(row[(std::size_t{first} + i) * step + offset]);
-      bits |= static_cast<unsigned>(value < threshold) << (7 - i);
-    }
-    row[first / 8] = static_cast<std::byte>(bits);  // before all values that are still to be read
-  }
-}
-
 Result<Image> image(const std::string& path, std::uint8_t full) {
   if (full == 0) return read_image(path, 0);
   Levels unused;
   return levels(path, full, unused);
-}
-
-bool LevelSink::add_row(std::span<const std::byte> row, std::uint32_t columns, unsigned bits, bool bright_is_low) {
-  const unsigned darkest = (1u << bits) - 1;
-  for (std::uint32_t begin = 0; begin < columns;) {
-    const auto value_at = [&](std::uint32_t column) {
-      const auto byte = std::to_integer<unsigned>(row[bits == 8 ? column : column / 2]);
-      return bits == 8 ? byte : column % 2 == 0 ? byte >> 4 : byte & 15u;
-    };
-    const unsigned value = value_at(begin), dark = bright_is_low ? value : darkest - value;
-    std::uint32_t end = begin + 1;
-    while (end < columns && value_at(end) == value) ++end;
-    if (dark * full % darkest != 0 || levels.level.size() >= UINT32_MAX / 2) return false;
-    levels.append(begin, end, static_cast<std::uint8_t>(dark * full / darkest));
-    begin = end;
-  }
-  levels.end_row();
-  return true;
 }
 
 Result<Image> levels(const std::string& path, std::uint8_t full, Levels& levels) {
@@ -85,13 +57,32 @@ Result<Image> levels(const std::string& path, std::uint8_t full, Levels& levels)
   return image;
 }
 
-Result<Image> dark_pixels(const std::string& path, int threshold, std::uint64_t page) {
-  auto image = read_image(path, threshold, page);
-  if (image) return image;
-  std::string message = image.error().message;
+namespace {
+
+/// Of images of others: what is wrong is with the input.
+Error of_others(std::string message) {
   constexpr std::string_view kAgain = "; plan the layer again";
   if (message.ends_with(kAgain)) message.resize(message.size() - kAgain.size());
   return Error{Fault::kInput, message + "; take grey or 1-bit PNG, TIFF, BMP or PBM"};
+}
+
+}  // namespace
+
+Result<Image> nearest_levels(const std::string& path, const LevelsRequest& request, Levels& levels) {
+  LevelSink sink{request.full, levels, true, request.invert};
+  levels.row_offset.clear();
+  auto image = read_image(path, 128, request.page, &sink);
+  if (!image) return of_others(image.error().message);
+  if (levels.row_offset.empty()) {  // of 1 bit
+    levels_of(request.invert ? inverse(image->runs) : std::move(image->runs), request.full, levels);
+  }
+  image->runs = {};
+  return image;
+}
+
+Result<Image> dark_pixels(const std::string& path, int threshold, std::uint64_t page) {
+  auto image = read_image(path, threshold, page);
+  return image ? std::move(image) : of_others(image.error().message);
 }
 
 Result<std::vector<std::uint64_t>> pages_of(const std::string& path) {

@@ -28,8 +28,8 @@ struct Image {
 /// errors  kVerification with the file's name: truncated, not 1 bit, not readable
 Result<Image> image(const std::string& path, std::uint8_t full = 0);
 
-/// The same of images of others: of 1 bit, or grey of 8 or 16 bits a pixel (TIFF, PNG, BMP, PBM, PGM). Set are the dark pixels:
-/// black ones, and grey ones below the threshold. threshold  1 .. 255 of 255; of 16 bits the upper eight count page       of
+/// The same of images of others: of 1 bit, or grey of 4, 8 or 16 bits a pixel (TIFF, PNG, BMP, PBM, PGM). Set are the dark
+/// pixels: black ones, and grey ones below the threshold. threshold  1 .. 255 of 255; of 16 bits the upper eight count page of
 /// pages_of(); 0: the file has one image errors     kInput with the file's name: truncated, coloured, several images, not
 /// readable
 Result<Image> dark_pixels(const std::string& path, int threshold, std::uint64_t page = 0);
@@ -38,6 +38,18 @@ Result<Image> dark_pixels(const std::string& path, int threshold, std::uint64_t 
 /// by row. full    level of a full voxel: 1, 3 or 15 image   its runs are the pixels of any level above 0 levels  the levels
 /// errors  kVerification with the file's name: of image(); a value that is none of the levels
 Result<Image> levels(const std::string& path, std::uint8_t full, Levels& levels);
+
+/// What grey of others becomes.
+struct LevelsRequest {
+  std::uint8_t full = 1;   // level of a full voxel, 1 .. 255: black is full, white 0
+  bool invert = false;     // white is full
+  std::uint64_t page = 0;  // of pages_of(); 0: the file has one image
+};
+
+/// The levels of an image of others, of 1, 4, 8 or 16 bits: level = floor(darkness x full + 1/2), in integers, so that a value
+/// between two levels takes the nearest. Those of stages/write/levels/level_format.h come back as they are.
+/// returns  the image's resolution; its runs are empty. errors  kInput: of dark_pixels()
+Result<Image> nearest_levels(const std::string& path, const LevelsRequest& request, Levels& levels);
 
 /// The places of the images of a file, in their order: of a TIFF of several, else one 0.
 /// errors  kInput: not readable, or more than 2^20 images

@@ -76,7 +76,7 @@ bool read_all_at(int file, std::span<std::byte> to, std::uint64_t offset) {
 
 }  // namespace
 
-Result<Image> pbm(int file, std::uint64_t bytes, const std::string& path, int threshold) {
+Result<Image> pbm(int file, std::uint64_t bytes, const std::string& path, int threshold, LevelSink* sink) {
   const auto failure = [&](std::string_view why) {
     return Error{Fault::kVerification, fmt::format("{}: not a whole PBM (P4) or PGM: {}; plan the layer again", path, why)};
   };
@@ -93,6 +93,8 @@ Result<Image> pbm(int file, std::uint64_t bytes, const std::string& path, int th
   const std::uint64_t expected = head->bytes + std::uint64_t{stride} * rows;
   if (bytes != expected) return failure(fmt::format("{} bytes where {} x {} pixels take {}", bytes, columns, rows, expected));
 
+  const bool to_sink = sink != nullptr && head->grey;
+  if (to_sink) sink->levels.start(columns);
   RunsBuilder builder(columns);
   const std::uint32_t rows_at_once = static_cast<std::uint32_t>(std::max<std::size_t>(1, 256 * 1024 / stride));
   buffer.resize(stride * std::min(rows_at_once, rows));
@@ -102,6 +104,10 @@ Result<Image> pbm(int file, std::uint64_t bytes, const std::string& path, int th
     if (!read_all_at(file, strip, head->bytes + std::uint64_t{stride} * first)) return failure("cannot read");
     for (std::uint32_t r = 0; r < count; ++r) {
       const std::span<std::byte> row = strip.subspan(stride * r, stride);
+      if (to_sink) {
+        if (!sink->add_row(row, columns, 8, false)) return failure("too many runs");
+        continue;
+      }
       if (head->grey) bits_of_grey(row, columns, 1, false, threshold);
       if (!builder.add_row(row.first(row_bytes(columns)), false)) return failure("too many runs");
     }

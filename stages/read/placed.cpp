@@ -59,4 +59,17 @@ void place(const RunsView& image, const Placement& placement, Runs& out) {
             static_cast<std::uint32_t>(out.change.size()));
 }
 
+void place(const LevelsView& image, const Placement& placement, Levels& out) {
+  out.start(placement.columns);
+  const auto held = static_cast<std::uint32_t>(placement.row.size());
+  for (std::uint32_t r = 0; r < placement.rows; ++r) {
+    if (r >= placement.first_row && r - placement.first_row < held) {
+      const std::uint32_t from = placement.row[r - placement.first_row];
+      for (std::uint32_t i = image.row_offset[from]; i < image.row_offset[from + 1]; ++i)
+        out.append(placement.column[image.change[2 * i]], placement.column[image.change[2 * i + 1]], image.level[i]);
+    }
+    out.end_row();
+  }
+}
+
 }  // namespace lamina::read

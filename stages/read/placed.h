@@ -5,6 +5,7 @@
 
 #include "stages/data/buffer.h"
 #include "stages/data/grid.h"
+#include "stages/data/levels.h"
 #include "stages/data/runs.h"
 
 namespace lamina::read {
@@ -25,5 +26,6 @@ Placement placement_of(std::uint32_t columns, std::uint32_t rows, std::int64_t d
 
 /// The image on the bed; `out` is another one. cost  O(changes + rows of the bed)
 void place(const RunsView& image, const Placement& placement, Runs& out);
+void place(const LevelsView& image, const Placement& placement, Levels& out);
 
 }  // namespace lamina::read

@@ -27,6 +27,7 @@ struct Source {
   Buffer<std::byte> row;
   std::optional<RunsBuilder> builder;
   LevelSink* sink = nullptr;
+  unsigned level_bits = 0;  // of a value for the sink; 0: the image is of 1 bit
   double dpi_x = 0, dpi_y = 0;
 };
 
@@ -71,7 +72,7 @@ bool set_is_dark(png_structp png, png_infop info, int colour_type) {
 
 bool add_row(Source& source, std::size_t bytes, bool invert) {
   try {
-    if (source.sink != nullptr) return source.sink->add_row(source.row, source.sink->levels.columns, 8, false);
+    if (source.level_bits > 0) return source.sink->add_row(source.row, source.sink->levels.columns, source.level_bits, false);
     return source.builder->add_row(std::span(source.row).first(bytes), invert);
   } catch (...) {
     return false;
@@ -82,7 +83,7 @@ bool prepare(Source& source, std::uint32_t columns, std::size_t stride) {
   try {
     source.row.resize(stride);
     source.builder.emplace(columns);
-    if (source.sink != nullptr) source.sink->levels.start(columns);
+    if (source.level_bits > 0) source.sink->levels.start(columns);
     return true;
   } catch (...) {
     return false;
@@ -102,14 +103,20 @@ bool read_rows(png_structp png, png_infop info, Source& source, int threshold) {
   png_read_info(png, info);
   const std::uint32_t columns = png_get_image_width(png, info), rows = png_get_image_height(png, info);
   const int colour_type = png_get_color_type(png, info);
-  const int depth = png_get_bit_depth(png, info);
-  const bool levels = source.sink != nullptr;
-  const bool grey = (levels ? depth == 8 : threshold > 0 && depth >= 8) && colour_type == PNG_COLOR_TYPE_GRAY;
-  if (levels && !grey) png_error(png, "not 8 bits of grey");
-  if (depth != 1 && !grey) png_error(png, threshold > 0 ? "neither 1-bit nor grey of 8 or 16 bits" : "not a 1-bit image");
+  const int coded = png_get_bit_depth(png, info);
+  const bool exact = source.sink != nullptr && !source.sink->nearest;
+  const bool grey = (exact ? coded == 8 : threshold > 0 && coded > 1) && colour_type == PNG_COLOR_TYPE_GRAY;
+  const bool levels = source.sink != nullptr && grey;
+  if (exact && !grey) png_error(png, "not 8 bits of grey");
+  if (grey && coded < 8) png_set_expand_gray_1_2_4_to_8(png);
+  if (levels && coded == 16) png_set_swap(png);  // low byte first
+  const int depth = grey && coded < 8 ? 8 : coded;
+  source.level_bits = levels ? static_cast<unsigned>(depth) : 0;
+  if (depth != 1 && !grey) png_error(png, threshold > 0 ? "neither 1-bit nor grey" : "not a 1-bit image");
   if (png_get_interlace_type(png, info) != PNG_INTERLACE_NONE) png_error(png, "interlaced images are not supported");
   const std::size_t step = static_cast<std::size_t>(depth) / 8, stride = grey ? columns * step : row_bytes(columns);
-  if ((stride + 1) * std::uint64_t{rows} / kMostExpansion > source.bytes) {
+  const std::size_t coded_stride = (std::size_t{columns} * static_cast<std::size_t>(coded) + 7) / 8;
+  if ((coded_stride + 1) * std::uint64_t{rows} / kMostExpansion > source.bytes) {
     png_error(png, "more pixels than a file of this size can hold");
   }
   const bool invert = !grey && !set_is_dark(png, info, colour_type);

@@ -87,6 +87,63 @@ void read_resolution(TIFF* tiff, Image& image) {
 
 }  // namespace
 
+namespace {
+
+/// What the directory of an image tells.
+struct TiffHead {
+  std::uint32_t columns = 0, rows = 0;
+  std::uint16_t bits = 1, samples = 1, photometric = 0, compression = COMPRESSION_NONE;
+  bool grey() const { return bits > 1; }
+  bool bright_is_low() const { return photometric == PHOTOMETRIC_MINISWHITE; }
+  std::size_t stride() const { return (std::size_t{columns} * bits + 7) / 8; }
+};
+
+/// returns  why it cannot be read, or nothing
+std::string read_tiff_head(TIFF* tiff, std::uint64_t file_bytes, int threshold, const LevelSink* sink, TiffHead& head) {
+  TIFFGetField(tiff, TIFFTAG_IMAGEWIDTH, &head.columns);
+  TIFFGetField(tiff, TIFFTAG_IMAGELENGTH, &head.rows);
+  TIFFGetFieldDefaulted(tiff, TIFFTAG_BITSPERSAMPLE, &head.bits);
+  TIFFGetFieldDefaulted(tiff, TIFFTAG_SAMPLESPERPIXEL, &head.samples);
+  TIFFGetFieldDefaulted(tiff, TIFFTAG_COMPRESSION, &head.compression);
+  const std::uint16_t bits = head.bits;
+  const bool exact = sink != nullptr && !sink->nearest;
+  const bool grey = exact ? bits == 4 || bits == 8 : threshold > 0 && (bits == 4 || bits == 8 || bits == 16);
+  const bool known = TIFFGetField(tiff, TIFFTAG_PHOTOMETRIC, &head.photometric) != 0;
+  if (!known || head.photometric > PHOTOMETRIC_MINISBLACK || (!grey && (exact || bits != 1)) || head.samples != 1) {
+    if (exact) return "neither 4 nor 8 bits of grey";
+    return threshold > 0 ? "neither 1-bit nor grey of 4, 8 or 16 bits" : "not a 1-bit image";
+  }
+  std::uint16_t kind = SAMPLEFORMAT_UINT;
+  TIFFGetFieldDefaulted(tiff, TIFFTAG_SAMPLEFORMAT, &kind);
+  if (grey && kind != SAMPLEFORMAT_UINT) return "its values are not whole numbers from 0 on";
+  std::uint16_t orientation = ORIENTATION_TOPLEFT;
+  TIFFGetFieldDefaulted(tiff, TIFFTAG_ORIENTATION, &orientation);
+  if (orientation != ORIENTATION_TOPLEFT) {
+    return fmt::format("its Orientation tag is {}; write rows from the top and columns from the left, tag 1", orientation);
+  }
+  if (TIFFIsTiled(tiff) != 0) return "tiles are not supported";
+  if (head.columns == 0 || head.rows == 0 || head.columns > kMostPixelsASide || head.rows > kMostPixelsASide) {
+    return fmt::format("{} x {} pixels", head.columns, head.rows);
+  }
+  if (std::string wrong = check_strips(tiff, file_bytes, head.compression, head.rows, head.stride()); !wrong.empty())
+    return wrong;
+  return TIFFScanlineSize(tiff) == static_cast<tmsize_t>(head.stride()) ? "" : "rows of an unexpected length";
+}
+
+/// One row as libtiff decodes it. returns  why not, or nothing
+std::string_view add_tiff_row(std::span<std::byte> row, const TiffHead& head, int threshold, LevelSink* sink,
+                              RunsBuilder& builder) {
+  // Values of two bytes are in the order of this program's hosts, little-endian. Those of min-is-white: bright is small.
+  const bool low = head.bright_is_low();
+  if (head.grey() && sink != nullptr) return sink->add_row(row, head.columns, head.bits, low) ? "" : "a value is no level";
+  const int below = low ? 256 - threshold : threshold;
+  if (head.bits == 4) bits_of_nibbles(row, head.columns, below);
+  if (head.bits >= 8) bits_of_grey(row, head.columns, head.bits / 8u, head.bits == 16, below);
+  return builder.add_row(row.first(row_bytes(head.columns)), head.grey() ? low : !low) ? "" : "too many runs";
+}
+
+}  // namespace
+
 Result<Image> tiff(int file, std::uint64_t bytes, const std::string& path, int threshold, std::uint64_t page, LevelSink* sink) {
   std::string message;  // of libtiff, outlives the handle
   const auto failure = [&](std::string_view why) {
@@ -107,63 +164,30 @@ Result<Image> tiff(int file, std::uint64_t bytes, const std::string& path, int t
   }
   if (page != 0 && TIFFSetSubDirectory(handle.get(), page) == 0) return failure(message.empty() ? "no such page" : message);
   if (!message.empty()) return failure(message);
-  std::uint32_t columns = 0, rows = 0;
-  std::uint16_t bits = 1, samples = 1, photometric = 0, compression = COMPRESSION_NONE;
-  TIFFGetField(handle.get(), TIFFTAG_IMAGEWIDTH, &columns);
-  TIFFGetField(handle.get(), TIFFTAG_IMAGELENGTH, &rows);
-  TIFFGetFieldDefaulted(handle.get(), TIFFTAG_BITSPERSAMPLE, &bits);
-  TIFFGetFieldDefaulted(handle.get(), TIFFTAG_SAMPLESPERPIXEL, &samples);
-  TIFFGetFieldDefaulted(handle.get(), TIFFTAG_COMPRESSION, &compression);
-  const bool grey = threshold > 0 && (bits == 8 || bits == 16);
-  if (TIFFGetField(handle.get(), TIFFTAG_PHOTOMETRIC, &photometric) == 0 || photometric > PHOTOMETRIC_MINISBLACK ||
-      (sink != nullptr ? bits != 4 && bits != 8 : bits != 1 && !grey) || samples != 1) {
-    if (sink != nullptr) return failure("neither 4 nor 8 bits of grey");
-    return failure(threshold > 0 ? "neither 1-bit nor grey of 8 or 16 bits" : "not a 1-bit image");
-  }
-  std::uint16_t kind = SAMPLEFORMAT_UINT;
-  TIFFGetFieldDefaulted(handle.get(), TIFFTAG_SAMPLEFORMAT, &kind);
-  if (grey && kind != SAMPLEFORMAT_UINT) return failure("its values are not whole numbers from 0 on");
+  TiffHead head;
+  const std::string wrong = read_tiff_head(handle.get(), bytes, threshold, sink, head);
+  if (!wrong.empty()) return failure(wrong);
   if (threshold > 0 && page == 0 && TIFFLastDirectory(handle.get()) == 0)
     return failure("several images in one file; write one a layer");
-  std::uint16_t orientation = ORIENTATION_TOPLEFT;
-  TIFFGetFieldDefaulted(handle.get(), TIFFTAG_ORIENTATION, &orientation);
-  if (orientation != ORIENTATION_TOPLEFT) {
-    return failure(
-        fmt::format("its Orientation tag is {}; write rows from the top and columns from the left, tag 1", orientation));
-  }
-  if (TIFFIsTiled(handle.get()) != 0) return failure("tiles are not supported");
-  if (columns == 0 || rows == 0 || columns > kMostPixelsASide || rows > kMostPixelsASide) {
-    return failure(fmt::format("{} x {} pixels", columns, rows));
-  }
-  const std::size_t step = bits / 8u, stride = (std::size_t{columns} * bits + 7) / 8;
-  const std::string wrong = check_strips(handle.get(), bytes, compression, rows, stride);
-  if (!wrong.empty()) return failure(wrong);
-  if (TIFFScanlineSize(handle.get()) != static_cast<tmsize_t>(stride)) return failure("rows of an unexpected length");
 
-  if (sink != nullptr) sink->levels.start(columns);
+  const bool to_sink = head.grey() && sink != nullptr;
+  if (to_sink) sink->levels.start(head.columns);
   Image image;
   read_resolution(handle.get(), image);
-  if (sink == nullptr && compression == COMPRESSION_CCITTFAX4 && !grey &&
-      read_g4(handle.get(), file, columns, rows, photometric == PHOTOMETRIC_MINISBLACK, image.runs)) {
+  if (head.compression == COMPRESSION_CCITTFAX4 && !head.grey() &&
+      read_g4(handle.get(), file, head.columns, head.rows, !head.bright_is_low(), image.runs)) {
     return image;
   }
-  RunsBuilder builder(columns);
-  Buffer<std::byte> row(stride);
-  for (std::uint32_t r = 0; r < rows; ++r) {
+  RunsBuilder builder(head.columns);
+  Buffer<std::byte> row(head.stride());
+  for (std::uint32_t r = 0; r < head.rows; ++r) {
     if (TIFFReadScanline(handle.get(), row.data(), r, 0) < 0 || !message.empty()) {
       return failure(fmt::format("row {}: {}", r, message.empty() ? "cannot be decoded" : message));
     }
-    // Values of two bytes are in the order of this program's hosts, little-endian. Those of min-is-white: bright is small.
-    const bool bright_is_low = photometric == PHOTOMETRIC_MINISWHITE;
-    if (sink != nullptr) {
-      if (!sink->add_row(row, columns, bits, bright_is_low)) return failure(fmt::format("row {}: a value is no level", r));
-      continue;
-    }
-    if (grey) bits_of_grey(row, columns, step, step == 2, bright_is_low ? 256 - threshold : threshold);
-    if (!builder.add_row(std::span(row).first(row_bytes(columns)), grey ? bright_is_low : !bright_is_low))
-      return failure("too many runs");
+    if (const std::string_view why = add_tiff_row(row, head, threshold, sink, builder); !why.empty())
+      return failure(fmt::format("row {}: {}", r, why));
   }
-  image.runs = builder.finish();
+  if (!to_sink) image.runs = builder.finish();
   return image;
 }
 

@@ -11,10 +11,12 @@
 #include "stages/data/text/json.h"
 #include "stages/data/text/readable.h"
 #include "stages/data/text/value.h"
+#include "stages/dose/shares.h"
 #include "stages/raster/mirror.h"
 #include "stages/read/layer_images.h"
 #include "stages/write/file.h"
 #include "stages/write/image_format.h"
+#include "stages/write/levels/level_format.h"
 #include "stages/write/temporary.h"
 
 namespace lamina::pipeline {
@@ -26,12 +28,13 @@ CommandSpec convert_spec() {
   CommandSpec spec;
   spec.summary =
       "Writes layer images in another format, without a job: a folder of numbered images, a TIFF of several pages, or one\n"
-      "image; 1 bit, or grey of 8 or 16 bits. Files are written side by side, one layer each in memory.";
+      "image; 1 bit, or grey of 4, 8 or 16 bits. Files are written side by side, one layer each in memory.";
   spec.operand = "STACK";
   spec.operand_meaning = "a folder of images .tif, .png, .bmp, .pbm, .pgm, or one file";
   spec.options = {{"-o,--output", "DIR", "directory for the images", "", "Output"},
                   {"--format", "FORMAT", "of the files", "tiff-g4", "Output"},
-                  {"--threshold", "N", "grey below it becomes a set pixel, 1 to 255", "128", "Images"},
+                  {"--levels", "N", "of a grey --format: 2, 4, 16, or 256 of 8 bits; the nearest one", "all it has", "Output"},
+                  {"--threshold", "N", "grey below it becomes a set pixel, 1 to 255; of 1-bit formats", "128", "Images"},
                   {"--dpi", "DPI|XxY", "to write, if the images do not tell it", "", "Images"},
                   {"--invert", "", "bright pixels are set, not dark ones", "", "Images"},
                   {"--mirror", "AXES", "turn the images over: x, y or xy", "", "Images"},
@@ -44,20 +47,23 @@ CommandSpec convert_spec() {
       "Examples:\n"
       "  lamina convert slices -o g4                              G4, as lamina jet writes it\n"
       "  lamina convert scan.tif -o bits --threshold 90 --invert   a page each, bright is solid\n"
-      "  lamina convert out/layers -o bmp --format bmp --mirror x\n";
+      "  lamina convert out/layers -o bmp --format bmp --mirror x\n"
+      "  lamina convert grey -o shares --format tiff-4              shares of voxels, 16 levels\n";
   return spec;
 }
 
 struct Conversion {
-  const read::LayerImages& images;
-  const write::ImageFormat& format;
+  read::LayerImages images;
+  const write::ImageFormat* bits;  // one of both
+  const write::LevelFormat* grey;
+  std::uint8_t full;  // the highest level of grey
   std::array<double, 2> dpi;
   std::string output, mirror;
   std::uint64_t first_number;
   bool overwrite;
 
   std::string name(std::uint32_t layer) const {
-    return fmt::format("{}/{:06}{}", output, first_number + layer, format.extension);
+    return fmt::format("{}/{:06}{}", output, first_number + layer, grey != nullptr ? grey->extension : bits->extension);
   }
 };
 
@@ -65,8 +71,8 @@ struct Converted {
   std::uint64_t bytes = 0, set = 0;
 };
 
-/// One layer, read, turned and written.
-Status convert_one(const Conversion& all, std::uint32_t layer, Converted& done) {
+/// One layer, read, turned and coded.
+Status code_bits(const Conversion& all, std::uint32_t layer, write::Bytes& file, Converted& done) {
   auto runs = all.images.read(layer);
   if (!runs) return runs.error();
   if (!all.mirror.empty()) {
@@ -74,12 +80,29 @@ Status convert_one(const Conversion& all, std::uint32_t layer, Converted& done) 
     raster::mirror(*runs, all.mirror != "y", all.mirror != "x", turned);
     *runs = std::move(turned);
   }
-  write::Bytes file;
-  const auto encoder = all.format.make_encoder();
-  if (Status status = encoder->encode(*runs, all.dpi[0], all.dpi[1], file); !status)
-    return Error{status.error().fault, fmt::format("image {}: {}", layer, status.error().message)};
-  done.bytes = file.size();
   done.set = set_pixels(*runs);
+  return all.bits->make_encoder()->encode(*runs, all.dpi[0], all.dpi[1], file);
+}
+
+Status code_grey(const Conversion& all, std::uint32_t layer, write::Bytes& file, Converted& done) {
+  auto levels = all.images.levels(layer, all.full);
+  if (!levels) return levels.error();
+  if (!all.mirror.empty()) {
+    Levels turned;
+    dose::mirror(*levels, all.mirror != "y", all.mirror != "x", turned);
+    *levels = std::move(turned);
+  }
+  for (std::size_t i = 0; i < levels->level.size(); ++i) done.set += levels->change[2 * i + 1] - levels->change[2 * i];
+  return all.grey->make_encoder()->encode(*levels, all.full, all.dpi[0], all.dpi[1], file);
+}
+
+Status convert_one(const Conversion& all, std::uint32_t layer, Converted& done) {
+  write::Bytes file;
+  const Status status = all.grey != nullptr ? code_grey(all, layer, file, done) : code_bits(all, layer, file, done);
+  if (!status && status.error().fault == Fault::kOutput)
+    return Error{status.error().fault, fmt::format("image {}: {}", layer, status.error().message)};
+  if (!status) return status;
+  done.bytes = file.size();
   return write::write_file(all.name(layer), file, {.lock = false, .follow = false, .durable = write::Durable::kNo});
 }
 
@@ -136,15 +159,35 @@ Result<read::LayerImagesRequest> request_of(const Arguments& arguments) {
   return request;
 }
 
+/// The format, and the highest level of a grey one. errors  kUsage
+Status choose_format(const Arguments& arguments, const std::string& id, Conversion& all) {
+  all.bits = write::find_image_format(id);
+  all.grey = write::find_level_format(id);
+  if (all.grey == nullptr && (all.bits == nullptr || all.bits->extension.empty()))
+    return Error{Fault::kUsage, fmt::format("--format {}: is none of the image formats; `lamina jet --help` lists them", id)};
+  const bool nibbles = id == "tiff-4";
+  all.full = nibbles ? 15 : 255;
+  if (all.grey == nullptr && arguments.has("--levels"))
+    return at_option("--levels", fmt::format("is of grey formats, and {} has 1 bit; choose tiff-4, tiff-8 or png-8", id));
+  if (all.grey != nullptr && arguments.has("--threshold"))
+    return at_option("--threshold", fmt::format("is of 1-bit formats, and {} keeps grey; leave it out", id));
+  if (!arguments.has("--levels")) return {};
+  std::int64_t levels = 0;
+  const std::string why = read_whole(arguments.text("--levels"), 2, 256, levels);
+  if (!why.empty() || (levels != 2 && levels != 4 && levels != 16 && (levels != 256 || nibbles)))
+    return at_option("--levels", nibbles ? "give 2, 4 or 16" : "give 2, 4, 16 or 256");
+  all.full = static_cast<std::uint8_t>(levels - 1);
+  return {};
+}
+
 Outcome run_convert(const Arguments& arguments, Context& context) {
   if (arguments.operands.size() != 1) return Error{Fault::kUsage, "name one stack: a folder of images, or a file"};
   const std::string& stack = arguments.operands.front();
   const std::string output = arguments.text("-o,--output"), mirror = arguments.text("--mirror");
   if (output.empty()) return Error{Fault::kUsage, "-o DIR is missing; name a directory for the images"};
   const std::string id = arguments.has("--format") ? arguments.text("--format") : "tiff-g4";
-  const write::ImageFormat* format = write::find_image_format(id);
-  if (format == nullptr || format->extension.empty())
-    return Error{Fault::kUsage, fmt::format("--format {}: is none of the image formats; `lamina jet --help` lists them", id)};
+  Conversion all{{}, nullptr, nullptr, 0, {}, output, mirror, 0, arguments.has("--overwrite")};
+  if (Status status = choose_format(arguments, id, all); !status) return status;
   if (!mirror.empty() && mirror != "x" && mirror != "y" && mirror != "xy")
     return Error{Fault::kUsage, fmt::format("--mirror {}: give x, y or xy", mirror)};
   const auto request = request_of(arguments);
@@ -161,36 +204,38 @@ Outcome run_convert(const Arguments& arguments, Context& context) {
   }
   std::optional<tbb::global_control> limit;
   if (threads > 0) limit.emplace(tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(threads));
-  const auto images = read::LayerImages::open(stack, *request);
+  auto images = read::LayerImages::open(stack, *request);
   if (!images) return images.error();
-  std::array<double, 2> dpi{images->dpi_x(), images->dpi_y()};
+  std::array<double, 2>& dpi = all.dpi;
+  dpi = {images->dpi_x(), images->dpi_y()};
   if (given[0] > 0) dpi = {static_cast<double>(given[0]), static_cast<double>(given[1])};
   if (!(dpi[0] > 0) || !(dpi[1] > 0))
     return Error{Fault::kInput, fmt::format("{}: its files tell no resolution; give --dpi", stack)};
   for (double& one : dpi) {
     if (std::abs(one - std::round(one)) < 0.02) one = std::round(one);  // of whole pixels a metre
   }
-  const Conversion all{*images, *format, dpi, output, mirror, images->first_number(), arguments.has("--overwrite")};
+  all.first_number = images->first_number();
+  all.images = std::move(*images);
   if (Status status = check_place(all, stack); !status) return status;
   const auto claim = write::Claim::take(output + "/manifest.json", output);
   if (!claim) return claim.error();
   Converted sum;
-  context.progress({ProgressEvent::Stage::kLayers, 0, images->layers()});
+  context.progress({ProgressEvent::Stage::kLayers, 0, all.images.layers()});
   if (Status status = convert_all(all, context.cancel(), sum); !status) return status;
-  context.progress({ProgressEvent::Stage::kLayers, images->layers(), images->layers()});
+  context.progress({ProgressEvent::Stage::kLayers, all.images.layers(), all.images.layers()});
   if (!arguments.has("--quiet")) {
-    context.say(fmt::format("{} images of {} x {} pixels, {} set, {} in {}", images->layers(), images->columns(),
-                            images->rows(), readable_count(sum.set), readable_bytes(sum.bytes), output));
+    context.say(fmt::format("{} images of {} x {} pixels, {} set, {} in {}", all.images.layers(), all.images.columns(),
+                            all.images.rows(), readable_count(sum.set), readable_bytes(sum.bytes), output));
   }
   if (arguments.has("--json")) {
     return context.give(Json{{"command", "convert"},
                              {"output", output},
                              {"format", id},
-                             {"images", images->layers()},
-                             {"columns", images->columns()},
-                             {"rows", images->rows()},
+                             {"images", all.images.layers()},
+                             {"columns", all.images.columns()},
+                             {"rows", all.images.rows()},
                              {"dpi", dpi},
-                             {"missing", images->missing()},
+                             {"missing", all.images.missing()},
                              {"set_pixels", sum.set},
                              {"bytes_written", sum.bytes}});
   }

@@ -8,9 +8,13 @@
 #include "pipeline/cli/needs.h"
 #include "pipeline/plan/scene.h"
 #include "stages/data/text/json.h"
+#include "stages/data/text/number_text.h"
 #include "stages/data/text/readable.h"
 #include "stages/load/info/info.h"
+#include "stages/read/layer_images.h"
+#include "stages/read/stack_info.h"
 #include "stages/slice/surplus.h"
+#include "stages/write/manifest/images_on_record.h"
 
 namespace lamina::pipeline {
 namespace {
@@ -19,9 +23,12 @@ CommandSpec info_spec() {
   CommandSpec spec;
   spec.summary =
       "Says what is in a part file: triangles, shells, size, volume, whether it is closed and where it is not, and what\n"
-      "lamina jet will do about that. Of G-code: what is fed, and the pores that its beads leave. Nothing is written.";
-  spec.operand = "PART|GCODE";
-  spec.operand_meaning = "STL, OBJ or 3MF file, also gzipped STL and OBJ, or toolpaths, as in part.gcode; as many as you like";
+      "lamina jet will do about that. Of G-code: what is fed, and the pores that its beads leave. Of layer images: their\n"
+      "size, resolution, numbers and gaps. Nothing is written.";
+  spec.operand = "PART|GCODE|STACK";
+  spec.operand_meaning =
+      "STL, OBJ or 3MF file, also gzipped STL and OBJ, toolpaths, as in part.gcode, or layer images, a folder or a file; as many "
+      "as you like";
   spec.options = {{"--unit",
                    "UNIT",
                    "of STL and OBJ, which carry none: mm, cm, m, um, inch, foot",
@@ -38,6 +45,7 @@ CommandSpec info_spec() {
                    "",
                    {"auto", "winding", "off"}},
                   {"--weld", "UM", "repair joins open edges this far apart, in micrometres; 5 grows by itself", "5", ""},
+                  {"--threshold", "N", "of images: grey below it counts as set, 1 to 255", "128", ""},
                   {"--density", "G/CM3", "of the filament of toolpaths, where the file tells none", "", ""},
                   {"--json", "", "print one JSON object for each part on stdout", "", ""}};
   spec.closing =
@@ -45,6 +53,7 @@ CommandSpec info_spec() {
       "  lamina info bracket.stl\n"
       "  lamina info --unit inch housing.stl\n"
       "  lamina info part.gcode                     volume fed, weight, porosity, pores by width and length\n"
+      "  lamina info slices/                        images: pages, dpi, numbers that are missing, set pixels\n"
       "  lamina info --json *.stl | jq -r 'select(.closed | not) | .path'";
   return spec;
 }
@@ -58,6 +67,44 @@ Status tell_print(const std::string& path, double density_g_cm3, const Arguments
   return context.give(json);
 }
 
+/// errors  kInput: some images cannot be read
+Status tell_images(const std::string& path, int threshold, const Arguments& arguments, Context& context) {
+  const auto told = images_on_record(path);
+  if (!told) return told.error();
+  const Result<read::StackInfo> info = read::look_at_stack(told->path, threshold);
+  if (!info) return info.error();
+  Json json = read::as_json(*info);
+  std::string text = read::as_text(*info);
+  if (told->thickness > 0) {
+    text += fmt::format("  {:<12}{} mm each from {} mm on, by the manifest{}{}\n", "layers", number_text(mm(told->thickness)),
+                        number_text(mm(told->bottom)),
+                        told->levels > 0 ? fmt::format("; shares of voxels in {} levels", told->levels) : "",
+                        told->mirror.empty() || told->mirror == "none" ? "" : "; mirrored " + told->mirror);
+    json["layers"] = {{"thickness_mm", mm(told->thickness)}, {"bottom_mm", mm(told->bottom)}, {"levels", told->levels}};
+  } else {
+    text +=
+        fmt::format("  {:<12}no manifest of lamina tells how thick they are; jet wants --layer or part.layer_mm\n", "layers");
+    json["layers"] = nullptr;
+  }
+  const Status status = arguments.has("--json") ? context.give(json) : context.print(text);
+  if (!status || info->unreadable == 0) return status;
+  return Error{Fault::kInput,
+               fmt::format("{}: {} of {} images cannot be read", one_line(path), info->unreadable, info->images)};
+}
+
+/// errors  kUsage: an option that is of none of the operands
+Status check_flags(const Arguments& arguments) {
+  const auto any = [&](auto names) { return std::ranges::any_of(arguments.operands, names); };
+  const bool parts = any([](const std::string& path) { return !names_toolpaths(path) && !read::names_images(path); });
+  if (arguments.has("--density") && !any(names_toolpaths))
+    return at_option("--density", "is of toolpaths; parts have no filament");
+  if (arguments.has("--threshold") && !any(read::names_images))
+    return at_option("--threshold", "is of layer images; leave it out");
+  for (const char* flag : {"--unit", "--scale", "--rotate", "--drop-bad", "--repair", "--weld"})
+    if (arguments.has(flag) && !parts) return at_option(flag, "is of parts, not of toolpaths or images");
+  return {};
+}
+
 Outcome run_info(const Arguments& arguments, Context& context) {
   if (arguments.operands.empty()) return Error{Fault::kUsage, "no part to look at; name an STL, OBJ or 3MF file"};
   // Read as lamina jet reads them.
@@ -66,15 +113,18 @@ Outcome run_info(const Arguments& arguments, Context& context) {
   if (Status status = check_needs(Product::kImages, arguments, *job); !status) return status;
   double density_g_cm3 = 0;
   if (Status status = arguments.read("--density", {0.1, 25}, density_g_cm3); !status) return status;
-  const bool parts = !std::ranges::all_of(arguments.operands, names_toolpaths);
-  if (arguments.has("--density") && !std::ranges::any_of(arguments.operands, names_toolpaths))
-    return at_option("--density", "is of toolpaths; parts have no filament");
-  for (const char* flag : {"--unit", "--scale", "--rotate", "--drop-bad", "--repair", "--weld"})
-    if (arguments.has(flag) && !parts) return at_option(flag, "is of parts, not of toolpaths");
+  std::int64_t threshold = 128;
+  if (Status status = arguments.read("--threshold", {1, 255}, threshold); !status) return status;
+  if (Status status = check_flags(arguments); !status) return status;
   int code = 0;
   for (const PartRequest& part : job->parts) {
     if (names_toolpaths(part.path)) {
       if (Status status = tell_print(part.path, density_g_cm3, arguments, context); !status)
+        code = std::max(code, context.complain(status.error()));
+      continue;
+    }
+    if (read::names_images(part.path)) {
+      if (Status status = tell_images(part.path, static_cast<int>(threshold), arguments, context); !status)
         code = std::max(code, context.complain(status.error()));
       continue;
     }

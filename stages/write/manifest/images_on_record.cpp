@@ -14,7 +14,7 @@ namespace lamina {
 namespace fs = std::filesystem;
 
 Result<ImagesOnRecord> images_on_record(const std::string& path) {
-  ImagesOnRecord told{path, 0, 0, {}};
+  ImagesOnRecord told{path, 0, 0, {}, 0};
   std::error_code ignored;
   if (!fs::is_directory(path, ignored)) return told;
   std::string manifest = path + "/manifest.json";
@@ -37,6 +37,7 @@ Result<ImagesOnRecord> images_on_record(const std::string& path) {
   told.bottom = first.bottom;
   told.thickness = first.thickness;
   told.mirror = read->head.mirror;
+  told.levels = read->head.full_level() > 0 ? read->head.levels : 0;
   for (const LayerRecord& record : read->layers) {
     if (record.layer.thickness == first.thickness) continue;
     return Error{Fault::kInput,

@@ -1,6 +1,7 @@
 // stages/write/manifest/images_on_record.h: what a manifest of lamina tells of the layer images beside it.
 #pragma once
 
+#include <cstdint>
 #include <string>
 
 #include "stages/data/status.h"
@@ -12,6 +13,7 @@ struct ImagesOnRecord {
   std::string path;              // of the images
   Nm bottom = 0, thickness = 0;  // of the first layer, of all; 0: nothing is on record
   std::string mirror;            // of the job that wrote them
+  std::uint32_t levels = 0;      // of shares of voxels, that they carry; 0: they are of 1 bit
 };
 
 /// path  a job's directory, its layers/, or anything else, of which nothing is on record
