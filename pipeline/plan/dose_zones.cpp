@@ -155,7 +155,8 @@ std::vector<dose::ZoneBox> zone_boxes(const Scene& scene, const DoseZones& zones
     const std::uint32_t zone = zones.of_part(scene.part_of_instance[i]);
     const auto [x, y] = zones.grows_nm(zone);
     const Box box = box_of(scene, scene.instances[i]);
-    boxes.push_back({zone, {box.lo.x - x, box.lo.y - y, box.lo.z}, {box.hi.x + x, box.hi.y + y, box.hi.z}});
+    boxes.push_back(
+        {zone, {box.lo.x - x, box.lo.y - y, box.lo.z}, {box.hi.x + x, box.hi.y + y, box.hi.z}, {box.lo.x, box.lo.y, box.lo.z}});
   }
   for (const PlacedImages& of : scene.images) {  // anywhere on the bed
     const std::int64_t top = of.bottom + std::int64_t{of.thickness} * of.images->layers();

@@ -60,8 +60,8 @@ class LayerImager {
   void shares(const Layer& layer, ImageWork& work, LayerRecord& record) const;
   /// Mirrors the image and removes its bleed. errors  kUsage: it would grow beyond the bed
   Status bleed(const Layer& layer, ImageWork& work) const;
-  /// Thins the core and counts the remaining pixels.
-  void dose(const Layer& layer, ImageWork& work, LayerRecord& record) const;
+  /// Thins the core, or gives pixels their drops, and counts what remains. errors  kUsage: of DosePlan::saturate
+  Status dose(const Layer& layer, ImageWork& work, LayerRecord& record) const;
   /// Runs all steps.
   Status make(const Layer& layer, ImageWork& work, LayerRecord& record, ImageNotes& notes) const;
 

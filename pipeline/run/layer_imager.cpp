@@ -188,14 +188,15 @@ void LayerImager::shares(const Layer& layer, ImageWork& work, LayerRecord& recor
   record.half_far = differs.far;
 }
 
-void LayerImager::dose(const Layer& layer, ImageWork& work, LayerRecord& record) const {
+Status LayerImager::dose(const Layer& layer, ImageWork& work, LayerRecord& record) const {
   const ImagePlan& images = *plan_.images;
   if (images.dose.zones().several() && images.beads) work.zones.keep(work.runs);
   images.dose.thin(layer.index, work.runs, work.second, work.third);
   if (images.dose.saturates()) {
-    const dose::ZoneSums sums = images.dose.saturate(layer, work.runs, work.zones.image, work.second, work.drops);
-    record.dosed_pixels = sums.full_voxels;
-    record.asked_drops = sums.asked_drops;
+    const auto sums = images.dose.saturate(layer, work.runs, work.zones.image, work.second, work.drops);
+    if (!sums) return sums.error();
+    record.dosed_pixels = sums->full_voxels;
+    record.asked_drops = sums->asked_drops;
     record.drops = sum_of_levels(work.drops.levels);
   } else if (plan_.job.levels > 0) {
     at_least(work.drops.shares, 1, work.runs);
@@ -208,6 +209,7 @@ void LayerImager::dose(const Layer& layer, ImageWork& work, LayerRecord& record)
   };
   if (images.dose.most_drops() > 1) std::ranges::for_each(work.drops.planes, add_image);
   std::ranges::for_each(work.materials.image, add_image);
+  return {};
 }
 
 Status LayerImager::make(const Layer& layer, ImageWork& work, LayerRecord& record, ImageNotes& notes) const {
@@ -220,8 +222,7 @@ Status LayerImager::make(const Layer& layer, ImageWork& work, LayerRecord& recor
   }
   if (plan_.job.levels > 0) shares(layer, work, record);
   if (Status status = bleed(layer, work); !status) return status;
-  dose(layer, work, record);
-  return {};
+  return dose(layer, work, record);
 }
 
 /// The section of one solid; observations go to the record and the notes.

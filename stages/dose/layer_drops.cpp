@@ -6,7 +6,9 @@
 namespace lamina::dose {
 
 std::uint64_t DropWork::bytes() const {
-  std::uint64_t total = shares.bytes() + zones.bytes() + levels.bytes() + pieces.capacity() * sizeof(ZonePiece);
+  std::uint64_t total = shares.bytes() + zones.bytes() + levels.bytes() + pour.bytes() + pieces.capacity() * sizeof(ZonePiece);
+  for (const LaidPart& part : laid) total += part.bytes();
+  for (const Field& field : fields) total += field.bytes();
   for (const Runs& plane : planes) total += bytes_held(plane.row_offset) + bytes_held(plane.change);
   return total;
 }
@@ -30,9 +32,8 @@ void mark_shell(const DropRules& rules, const Runs& image, std::uint8_t full, Ru
   mark_core(work.shares, second, full, work.zones);
 }
 
-/// The planes of work.zones.
-void make_planes(const DropRules& rules, std::span<const Drops24> drops, std::uint32_t layer, Runs& image, DropWork& work) {
-  dither(work.zones, drops, layer, work.dither, work.levels);
+/// The planes of work.levels.
+void make_planes(const DropRules& rules, Runs& image, DropWork& work) {
   work.planes.resize(rules.most_drops);
   for (std::uint32_t drop = 0; drop < rules.most_drops; ++drop) {
     at_least(work.levels, static_cast<std::uint8_t>(drop + 1), work.planes[drop]);
@@ -54,7 +55,8 @@ ZoneSums drops_of_layer(const DropRules& rules, const LayerDose& dose, std::uint
   }
   std::vector<Drops24> drops(std::size_t{2} * full + 1);
   drops_of_zones(dose, full, rules.dithered, drops);
-  make_planes(rules, drops, layer, image, work);
+  dither(work.zones, drops, layer, work.dither, work.levels);
+  make_planes(rules, image, work);
   return sums_of(work.zones, full, dose);
 }
 
@@ -67,7 +69,8 @@ ZoneSums drops_of_parts(const DropRules& rules, std::span<const LayerDose> doses
   for (const LayerDose& dose : doses) drops.push_back(dose.shell), asked.push_back(dose.asked_shell);
   for (const LayerDose& dose : doses) drops.push_back(dose.core), asked.push_back(dose.asked_inside);
   if (!rules.dithered) std::ranges::for_each(drops, [](Drops24& of) { of = rounded(of); });
-  make_planes(rules, drops, layer, image, work);
+  dither(work.zones, drops, layer, work.dither, work.levels);
+  make_planes(rules, image, work);
   unsigned __int128 sum = 0;
   std::uint64_t pixels = 0;
   for (std::size_t i = 0; i < work.zones.level.size(); ++i) {
@@ -76,6 +79,22 @@ ZoneSums drops_of_parts(const DropRules& rules, std::span<const LayerDose> doses
     sum += static_cast<unsigned __int128>(asked[work.zones.level[i]]) * length;
   }
   return {pixels, static_cast<std::uint64_t>((sum + kOneDrop / 2) >> kDropBits)};
+}
+
+Result<ZoneSums> drops_of_laid(const DropRules& rules, const Sheet& sheet, std::span<const std::array<Ask, 2>> asks,
+                               Runs& image, Runs& second, DropWork& work) {
+  const std::uint8_t full = std::max<std::uint8_t>(1, rules.full);
+  const bool shell = !rules.shell.half_width.empty();
+  if (shell) erode(image, rules.shell, second);
+  std::vector<Dosed> parts;
+  for (LaidPart& part : work.laid) {
+    const auto& [of_shell, of_core] = asks[part.zone];
+    if (shell) mark_core(part.shares, second, full, part.zones);
+    parts.push_back({shell ? part.zones.view() : part.shares.view(), shell ? of_shell : of_core, of_core});
+  }
+  const auto sums = pour(parts, full, sheet, work.pour, work.levels, work.zones);
+  if (sums) make_planes(rules, image, work);
+  return sums;
 }
 
 }  // namespace lamina::dose

@@ -14,6 +14,7 @@ namespace lamina::dose {
 struct ZoneBox {
   std::uint32_t zone = 0;
   std::array<std::int64_t, 3> low{}, high{};
+  std::array<std::int64_t, 3> origin{};  // corner of the part, from which a formula of its own counts
 };
 
 /// A bound by boxes: what is told not to be there is not there; what is told to be there may be absent.
