@@ -72,7 +72,8 @@ bool DosePlan::has_formula(const Layer& layer) const {
   return false;
 }
 
-Result<dose::ZoneSums> DosePlan::saturate_laid(const Layer& layer, Runs& image, Runs& second, dose::DropWork& work) const {
+Result<dose::ZoneSums> DosePlan::saturate_laid(const Layer& layer, std::uint32_t materials, Runs& image, Runs& second,
+                                               dose::DropWork& work) const {
   dose::Sheet sheet{grid_, mirror_ == Mirror::kX || mirror_ == Mirror::kXY, mirror_ == Mirror::kY || mirror_ == Mirror::kXY,
                     layer};
   sheet.limit = dose::Drops24{limit_ > 0 ? limit_ : 1} << dose::kDropBits;
@@ -103,22 +104,25 @@ Result<dose::ZoneSums> DosePlan::saturate_laid(const Layer& layer, Runs& image, 
       asks[zone][inside].field = &field;
     }
   }
-  return dose::drops_of_laid(rules_, sheet, asks, image, second, work);
+  return dose::drops_of_laid(rules_, sheet, asks, materials, image, second, work);
 }
 
-Result<dose::ZoneSums> DosePlan::saturate(const Layer& layer, Runs& image, std::span<const Runs> zone, Runs& second,
-                                          dose::DropWork& work) const {
+Result<dose::ZoneSums> DosePlan::saturate(const Layer& layer, bool laid, std::uint32_t materials, Runs& image,
+                                          std::span<const Runs> zone, Runs& second, dose::DropWork& work) const {
+  if (laid) return saturate_laid(layer, materials, image, second, work);
   if (has_formula(layer)) {
     work.laid.resize(zones_.count());
     for (std::uint32_t z = 0; z < zones_.count(); ++z) {
-      work.laid[z].zone = z;
+      dose::LaidPart& part = work.laid[z];
+      part.zone = z;
+      part.material = 0;
       if (rules_.full > 0) {
-        std::swap(work.laid[z].shares, work.shares);
+        std::swap(part.shares, work.shares);
       } else {
-        levels_of(zones_.several() ? zone[z].view() : image.view(), 1, work.laid[z].shares);
+        levels_of(zones_.several() ? zone[z].view() : image.view(), 1, part.shares);
       }
     }
-    return saturate_laid(layer, image, second, work);
+    return saturate_laid(layer, 1, image, second, work);
   }
   const auto dose_of = [&](std::uint32_t z) {
     dose::LayerDose dose = wishes_ ? dose::dose_of(layer, *wishes_, binder_, grid_, limit_, z) : dose::one_drop();

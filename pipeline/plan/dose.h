@@ -51,8 +51,10 @@ class DosePlan {
   /// The drops of a layer in place of its image, which becomes that of the first drop. `second` is scratch.
   /// zone  the image of each zone, where there are several
   /// errors  kUsage: a formula has no number of per cent where a part lies, or one that does not bind
-  Result<dose::ZoneSums> saturate(const Layer& layer, Runs& image, std::span<const Runs> zone, Runs& second,
-                                  dose::DropWork& work) const;
+  /// laid    work.laid has the shares of voxels of several solids
+  /// materials  of the job, whose drops are told apart if solids share voxels
+  Result<dose::ZoneSums> saturate(const Layer& layer, bool laid, std::uint32_t materials, Runs& image,
+                                  std::span<const Runs> zone, Runs& second, dose::DropWork& work) const;
 
   /// Upper bound of the changes of edges that moved.
   std::uint64_t edges_bound(std::uint64_t changes) const {
@@ -63,7 +65,8 @@ class DosePlan {
 
  private:
   bool has_formula(const Layer& layer) const;
-  Result<dose::ZoneSums> saturate_laid(const Layer& layer, Runs& image, Runs& second, dose::DropWork& work) const;
+  Result<dose::ZoneSums> saturate_laid(const Layer& layer, std::uint32_t materials, Runs& image, Runs& second,
+                                       dose::DropWork& work) const;
 
   DoseZones zones_;
   dose::DropRules rules_;

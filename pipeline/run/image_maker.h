@@ -82,10 +82,13 @@ class LayerImager {
                               Runs& image) const;
   void mirror(Runs& image, Runs& scratch) const;
   Status check_grown(const Layer& layer, const ImageWork& work) const;
-  static void empty_removed(const Runs& before, ImageWork& work);
+  bool shares_voxels() const;  // of several solids
+  void share_out(const Layer& layer, ImageWork& work) const;
+  static void split_materials(ImageWork& work);
+  static void empty_removed(const Runs& before, bool laid, ImageWork& work);
   std::uint64_t bytes_of_section(Nm plane, std::uint64_t changes) const;
   std::uint64_t changes_of_images(Nm plane) const;
-  std::uint64_t changes_of_section(Nm plane, std::uint64_t bead_changes) const;
+  std::uint64_t changes_of_section(const Layer& layer, Nm plane, std::uint64_t bead_changes) const;
 
   const Plan& plan_;
 };

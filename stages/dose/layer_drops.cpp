@@ -8,8 +8,11 @@ namespace lamina::dose {
 std::uint64_t DropWork::bytes() const {
   std::uint64_t total = shares.bytes() + zones.bytes() + levels.bytes() + pour.bytes() + pieces.capacity() * sizeof(ZonePiece);
   for (const LaidPart& part : laid) total += part.bytes();
+  total += shared.bytes();
   for (const Field& field : fields) total += field.bytes();
-  for (const Runs& plane : planes) total += bytes_held(plane.row_offset) + bytes_held(plane.change);
+  const auto add = [&](const Runs& plane) { total += bytes_held(plane.row_offset) + bytes_held(plane.change); };
+  std::ranges::for_each(planes, add);
+  for (const std::vector<Runs>& of : up_to) std::ranges::for_each(of, add);
   return total;
 }
 
@@ -82,19 +85,29 @@ ZoneSums drops_of_parts(const DropRules& rules, std::span<const LayerDose> doses
 }
 
 Result<ZoneSums> drops_of_laid(const DropRules& rules, const Sheet& sheet, std::span<const std::array<Ask, 2>> asks,
-                               Runs& image, Runs& second, DropWork& work) {
+                               std::uint32_t materials, Runs& image, Runs& second, DropWork& work) {
   const std::uint8_t full = std::max<std::uint8_t>(1, rules.full);
   const bool shell = !rules.shell.half_width.empty();
   if (shell) erode(image, rules.shell, second);
-  std::vector<Dosed> parts;
   for (LaidPart& part : work.laid) {
-    const auto& [of_shell, of_core] = asks[part.zone];
     if (shell) mark_core(part.shares, second, full, part.zones);
-    parts.push_back({shell ? part.zones.view() : part.shares.view(), shell ? of_shell : of_core, of_core});
   }
-  const auto sums = pour(parts, full, sheet, work.pour, work.levels, work.zones);
-  if (sums) make_planes(rules, image, work);
-  return sums;
+  work.up_to.resize(materials);
+  std::vector<Dosed> parts;
+  for (std::uint32_t material = 0;; ++material) {
+    const bool last = material + 1 >= materials;
+    parts.clear();
+    for (const LaidPart& part : work.laid) {
+      const auto& [of_shell, of_core] = asks[part.zone];
+      if (last || part.material <= material)
+        parts.push_back({shell ? part.zones.view() : part.shares.view(), shell ? of_shell : of_core, of_core});
+    }
+    const auto sums = pour(parts, full, sheet, work.pour, work.levels, work.zones);
+    if (!sums) return sums;
+    make_planes(rules, image, work);
+    if (materials > 1) work.up_to[material] = work.planes;
+    if (last) return sums;
+  }
 }
 
 }  // namespace lamina::dose

@@ -34,7 +34,9 @@ struct DropWork {
   std::vector<ZonePiece> pieces;
   std::vector<Runs> planes;  // the pixels with at least one drop, two, ...: as many as the job has
   std::vector<LaidPart> laid;
-  std::vector<Field> fields;  // two a zone: of its shell, of its core
+  ShareOut shared;                       // of the parts' shares
+  std::vector<std::vector<Runs>> up_to;  // planes of the drops of the first material, of the first two, ...
+  std::vector<Field> fields;             // two a zone: of its shell, of its core
   PourScratch pour;
   std::uint64_t bytes() const;
 };
@@ -62,9 +64,11 @@ ZoneSums drops_of_parts(const DropRules& rules, std::span<const LayerDose> doses
                         std::span<const Runs> zone, Runs& image, Runs& second, DropWork& work);
 
 /// The same of parts in work.laid that share voxels, or whose doses are formulas. The image is that of all of them.
-/// asks  of each zone, shell and core; work.zones becomes the levels of all parts together
-/// errors  of pour()
+/// asks       of each zone, shell and core; work.zones becomes the levels of all parts together
+/// materials  whose drops are told apart in work.up_to: of a voxel's drops the first are those of the first material, so that
+///            each gets them in proportion to its share over many voxels
+/// errors     of pour()
 Result<ZoneSums> drops_of_laid(const DropRules& rules, const Sheet& sheet, std::span<const std::array<Ask, 2>> asks,
-                               Runs& image, Runs& second, DropWork& work);
+                               std::uint32_t materials, Runs& image, Runs& second, DropWork& work);
 
 }  // namespace lamina::dose
