@@ -13,7 +13,7 @@ namespace {
 
 /// A wish of which each part may be left out.
 struct RangeWish {
-  std::optional<dose::Percent> percent, core;
+  std::optional<Saturation> percent, core;
 };
 
 constexpr Key<RangeWish> kRangeKeys[] = {
@@ -23,7 +23,7 @@ constexpr Key<RangeWish> kRangeKeys[] = {
 
 }  // namespace
 
-std::string read_saturation(const TomlValue& value, std::optional<dose::Percent>& percent, Place&) {
+std::string read_saturation(const TomlValue& value, std::optional<Saturation>& percent, Place&) {
   if (!value.is_text()) return "is not a number of per cent or a formula of x, y and z";
   const std::string& text = value.text;
   const bool number = !text.empty() && text.find_first_not_of("0123456789.+-eE_") == std::string::npos;
@@ -38,13 +38,13 @@ std::string read_saturation(const TomlValue& value, std::optional<dose::Percent>
   if (text.empty() || (number && read_value(text, Limits{-1e300, 1e300}, any).empty())) return wrong;
   if (text.size() > kLongest) return fmt::format("is a formula of {} characters, at most {} are read", text.size(), kLongest);
   if (const auto parsed = dose::parse_saturation(text); !parsed) return parsed.error().message;
-  percent = dose::Percent::of(text);
+  percent = Saturation::of(text);
   return {};
 }
 
-std::string saturation_text(const std::optional<dose::Percent>& percent) {
+std::string saturation_text(const std::optional<Saturation>& percent) {
   if (!percent) return {};
-  return percent->formula.empty() ? number_text(percent->value) : toml_string(percent->formula);
+  return percent->formula.empty() ? number_text(percent->percent) : toml_string(percent->formula);
 }
 
 std::string read_saturation_ranges(const TomlValue& list, std::vector<SaturationRange>& ranges, Place& at) {

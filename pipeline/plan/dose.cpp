@@ -18,9 +18,9 @@ DosePlan::DosePlan(const Job& job, const PixelGrid& grid)
       mirror_(job.mirror) {
   const std::int64_t shell = nm_of(job.dose.shell_mm);
   if (job.dose.saturation_percent) {
-    wishes_.emplace().all = {*job.dose.saturation_percent, job.dose.core_saturation_percent};
+    wishes_.emplace().all = wish_of(*job.dose.saturation_percent, job.dose.core_saturation_percent);
     for (const SaturationRange& range : job.dose.saturation_ranges) {
-      wishes_->ranges.push_back({range.from_mm, range.to_mm, {range.percent, range.core_percent}});
+      wishes_->ranges.push_back({range.from_mm, range.to_mm, wish_of(range.percent, range.core_percent)});
     }
     wishes_->own = zones_.wishes();
   }

@@ -63,7 +63,7 @@ class Field {
 
   /// Drops that a full pixel of a block asks for, however many may be jetted; a block is evaluated once a band of rows.
   /// 0 where it has none: fault() then says why
-  Drops24 asked(std::uint32_t block_column, std::uint32_t block_row) {
+  Drops24 drops_of(std::uint32_t block_column, std::uint32_t block_row) {
     if (block_row != band_) begin_band(block_row);
     if (block_column < known_.size() && known_[block_column] == stamp_) return drops_[block_column];
     return evaluate(block_column);

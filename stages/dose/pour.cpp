@@ -45,9 +45,9 @@ class Cutter {
   void cut_blocks(Field& field, const Piece& run, std::uint32_t row, std::vector<Piece>& pieces) {
     const std::uint32_t block_row = sheet_.block_row(row);
     for (std::uint32_t at = run.begin; at < run.end;) {
-      const Drops24 asked = field.asked(sheet_.block_column(at), block_row);
+      const Drops24 asked = field.drops_of(sheet_.block_column(at), block_row);
       std::uint32_t stop = std::min(run.end, sheet_.block_end(at));
-      while (stop < run.end && field.asked(sheet_.block_column(stop), block_row) == asked)
+      while (stop < run.end && field.drops_of(sheet_.block_column(stop), block_row) == asked)
         stop = std::min(run.end, sheet_.block_end(stop));
       add({at, stop, run.level, 0}, asked, pieces);
       at = stop;

@@ -18,7 +18,7 @@ struct Percent {
   std::string formula;  // of x, y and z in mm; empty: the value
 
   Percent() = default;
-  Percent(double per_cent) : value(per_cent) {}
+  Percent(double of_voids) : value(of_voids) {}
   static Percent of(std::string text) {
     Percent percent;
     percent.formula = std::move(text);

@@ -19,8 +19,6 @@
 namespace lamina::pipeline {
 namespace {
 
-using FormulaPercent = dose::Percent;
-
 class FormulaJobs : public testing::Test {
  protected:
   FormulaJobs() { test::write_box(folder_ / "box.stl", {0, 0, 0}, {8, 6, 0.4f}); }
@@ -70,8 +68,8 @@ class FormulaJobs : public testing::Test {
 // The first box lies at x 10 to 18 mm of the bed: 20 + 5 x is 90 % there on average; the second one's own 60 - 4 x is 44 %.
 TEST_F(FormulaJobs, CountFromTheBedOrFromThePart) {
   Job job = job_of_boxes("ramps");
-  job.dose.saturation_percent = FormulaPercent::of("20+5*x");
-  job.parts[1].saturation_percent = FormulaPercent::of("60-4*x");
+  job.dose.saturation_percent = Saturation::of("20+5*x");
+  job.parts[1].saturation_percent = Saturation::of("60-4*x");
   const auto facts = facts_of(job)["saturation"];
   EXPECT_NEAR(facts["asked_percent"].get<double>(), 67, 0.067);
   EXPECT_NEAR(facts["reached_percent"].get<double>(), facts["asked_percent"].get<double>(), 0.067);
@@ -79,7 +77,7 @@ TEST_F(FormulaJobs, CountFromTheBedOrFromThePart) {
   Job moved = job_of_boxes("moved", 9);
   moved.parts.erase(moved.parts.begin());
   moved.dose.saturation_percent = 20;
-  moved.parts[0].saturation_percent = FormulaPercent::of("60-4*x");
+  moved.parts[0].saturation_percent = Saturation::of("60-4*x");
   EXPECT_NEAR(facts_of(moved)["saturation"]["asked_percent"].get<double>(), 44, 0.05);
 }
 
@@ -91,7 +89,7 @@ TEST_F(FormulaJobs, OfOneNumberAreThoseOfTheNumber) {
     job->parts[1].bleed_um = {{60, 60}};
   }
   number.dose.saturation_percent = 62.5;
-  formula.dose.saturation_percent = FormulaPercent::of("62.5+0*x*y*z");
+  formula.dose.saturation_percent = Saturation::of("62.5+0*x*y*z");
   const auto one = facts_of(number)["saturation"], other = facts_of(formula)["saturation"];
   EXPECT_EQ(one["drops"], other["drops"]);
   EXPECT_EQ(one["asked_percent"], other["asked_percent"]);
@@ -202,7 +200,7 @@ TEST_F(FormulaJobs, SharesOfPartsThatTouchComeToAFullVoxel) {
     of->levels = 16;
     of->dose.saturation_percent = 40;
   }
-  job.parts[1].saturation_percent = FormulaPercent::of("40+0*x");
+  job.parts[1].saturation_percent = Saturation::of("40+0*x");
   EXPECT_EQ(facts_of(job)["saturation"]["drops"], facts_of(one)["saturation"]["drops"]);
   EXPECT_TRUE(alike(image(job, "000002-drop1.tif"), image(one, "000002-drop1.tif")));
 }
