@@ -23,6 +23,20 @@ enum class VatRule : std::uint8_t;  // stages/data/machine.h
 
 namespace lamina::pipeline {
 
+/// Per cent of the powder's voids: a number, or a formula of x, y and z in mm.
+struct Saturation {
+  double percent = 0;
+  std::string formula;  // empty: the number
+
+  Saturation() = default;
+  Saturation(double of_voids) : percent(of_voids) {}
+  static Saturation of(std::string text) {
+    Saturation saturation;
+    saturation.formula = std::move(text);
+    return saturation;
+  }
+};
+
 /// A different material between two heights, in mm above the bottom of a part. Where ranges overlap, the last one counts.
 struct MaterialRange {
   double from_mm = 0, to_mm = 0;
@@ -59,7 +73,7 @@ struct PartRequest {
   PartImages images = {};                           // of a part that is images
   // --- instead of the job's
   std::optional<std::array<double, 2>> bleed_um = {}, hole_bleed_um = {};
-  std::optional<double> saturation_percent = {}, core_saturation_percent = {};  // at all heights
+  std::optional<Saturation> saturation_percent = {}, core_saturation_percent = {};  // at all heights; by its own corner
 };
 
 enum class Engine { kRays, kContours, kBoth };
@@ -114,8 +128,8 @@ struct MachineRequest {
 /// Another saturation between two heights above the bed, in mm. Where ranges overlap, the last one counts.
 struct SaturationRange {
   double from_mm = 0, to_mm = 0;
-  double percent = 0;
-  std::optional<double> core_percent;  // inside of the shell; absent: as in it
+  Saturation percent;
+  std::optional<Saturation> core_percent;  // inside of the shell; absent: as in it
 };
 
 /// Section [dose]: the distribution of binder (stages/dose/).
@@ -124,10 +138,10 @@ struct DoseRequest {
   std::optional<std::array<double, 2>> hole_bleed_um;   // of the edges of holes; absent: as bleed_um
   std::optional<std::array<double, 2>> first_bleed_um;  // of all edges of the first layers; absent: as in the others
   std::uint32_t first_layers = 1;
-  double shell_mm = 0;                            // pixels stay set to this depth; only with a core below 1 or beads
-  double core = 1;                                // fraction of the pixels inside the shell that stay set
-  std::optional<double> saturation_percent;       // of the voids; absent: one drop a pixel
-  std::optional<double> core_saturation_percent;  // inside of the shell
+  double shell_mm = 0;                                // pixels stay set to this depth; only with a core below 1 or beads
+  double core = 1;                                    // fraction of the pixels inside the shell that stay set
+  std::optional<Saturation> saturation_percent;       // of the voids; absent: one drop a pixel
+  std::optional<Saturation> core_saturation_percent;  // inside of the shell
   std::vector<SaturationRange> saturation_ranges;
   bool dithered = true;                                   // drops that are not whole; else they are rounded
   raster::BeadEnds bead_ends = raster::BeadEnds::kRound;  // of filling beads, also where thick changes to thin

@@ -53,7 +53,9 @@ std::string read_material_ranges(const TomlValue& list, std::vector<MaterialRang
 std::string material_ranges_text(const std::vector<MaterialRange>& ranges);
 
 inline constexpr Limits kBleedUm{-10'000, 10'000, " um", true};
-inline constexpr Limits kSaturationPercent{0, 10'000, " %"};
+/// Reads a number of per cent or a formula of x, y and z. returns "" or an error message; at  its place
+std::string read_saturation(const TomlValue& value, std::optional<Saturation>& percent, Place& at);
+std::string saturation_text(const std::optional<Saturation>& percent);
 /// Reads an array of tables { from_mm, to_mm, saturation_percent }. returns "" or an error message; at  its place
 std::string read_saturation_ranges(const TomlValue& list, std::vector<SaturationRange>& ranges, Place& at);
 std::string saturation_ranges_text(const std::vector<SaturationRange>& ranges);

@@ -67,14 +67,13 @@ const JobKey kDoseKeys[] = {
     field<&Job::dose, &DoseRequest::core>(
         {"dose", "core", "--core", "SHARE", "of the pixels inside of the shell that is jetted, 0 to 1", decides::images},
         {0, 1}),
-    field<&Job::dose, &DoseRequest::saturation_percent>(
-        {"dose", "saturation_percent", "--saturation", "PERCENT",
-         "of the voids of the powder that binder fills, by as many drops a pixel as it takes", decides::images},
-        kSaturationPercent),
-    field<&Job::dose, &DoseRequest::core_saturation_percent>(
-        {"dose", "core_saturation_percent", "--core-saturation", "PERCENT",
-         "the same inside of the shell (with --saturation and --shell)", decides::images},
-        kSaturationPercent),
+    structure<read_saturation, saturation_text, &Job::dose, &DoseRequest::saturation_percent>(
+        {"dose", "saturation_percent", "--saturation", "PERCENT|FORMULA",
+         "of the voids of the powder that binder fills, by as many drops a pixel as it takes; of x, y, z in mm",
+         decides::images}),
+    structure<read_saturation, saturation_text, &Job::dose, &DoseRequest::core_saturation_percent>(
+        {"dose", "core_saturation_percent", "--core-saturation", "PERCENT|FORMULA",
+         "the same inside of the shell (with --saturation and --shell)", decides::images}),
     structure<read_saturation_ranges, saturation_ranges_text, &Job::dose, &DoseRequest::saturation_ranges>(
         {"dose", "saturation_range", "", "[{...}]", "other saturations between two heights above the bed", decides::images}),
     word<kLevels, &Job::levels>({"dose", "levels", "--levels", "2|4|16|off",

@@ -105,13 +105,13 @@ const PartKey kPartKeys[] = {
         kBleedUm),
     field<&PartRequest::hole_bleed_um>(
         {"part", "hole_bleed_um", "", "UM|XxY", "of this part's holes, if it differs there", decides::images}, kBleedUm),
-    field<&PartRequest::saturation_percent>(
-        {"part", "saturation_percent", "", "PERCENT",
-         "of this part at all heights, instead of dose.saturation_percent and its ranges", decides::images},
-        kSaturationPercent),
-    field<&PartRequest::core_saturation_percent>(
-        {"part", "core_saturation_percent", "", "PERCENT", "the same inside of its shell; absent: as in it", decides::images},
-        kSaturationPercent),
+    structure<read_saturation, saturation_text, &PartRequest::saturation_percent>(
+        {"part", "saturation_percent", "", "PERCENT|FORMULA",
+         "of this part at all heights, instead of dose.saturation_percent and its ranges; of x, y, z from its corner",
+         decides::images}),
+    structure<read_saturation, saturation_text, &PartRequest::core_saturation_percent>(
+        {"part", "core_saturation_percent", "", "PERCENT|FORMULA", "the same inside of its shell; absent: as in it",
+         decides::images}),
 };
 
 }  // namespace

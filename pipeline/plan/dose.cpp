@@ -14,12 +14,13 @@ DosePlan::DosePlan(const Job& job, const PixelGrid& grid)
     : zones_(job, grid),
       rules_{static_cast<std::uint8_t>(job.levels > 0 ? job.levels - 1 : 0), job.dose.dithered, {}, 0},
       core_(job.dose.core),
-      grid_(grid) {
+      grid_(grid),
+      mirror_(job.mirror) {
   const std::int64_t shell = nm_of(job.dose.shell_mm);
   if (job.dose.saturation_percent) {
-    wishes_.emplace().all = {*job.dose.saturation_percent, job.dose.core_saturation_percent};
+    wishes_.emplace().all = wish_of(*job.dose.saturation_percent, job.dose.core_saturation_percent);
     for (const SaturationRange& range : job.dose.saturation_ranges) {
-      wishes_->ranges.push_back({range.from_mm, range.to_mm, {range.percent, range.core_percent}});
+      wishes_->ranges.push_back({range.from_mm, range.to_mm, wish_of(range.percent, range.core_percent)});
     }
     wishes_->own = zones_.wishes();
   }
@@ -45,18 +46,84 @@ Status DosePlan::decide(const Job& job, const Machine* machine, const Scene& sce
   }
   const auto& powder = machine->powder;
   binder_ = {machine->head.drop_pl, powder.evaporates_percent / 100, powder.packing};
+  if (!job.allow_unbound) least_percent_ = powder.least_saturation_percent;
   limit_ = machine->head.most_drop_sweeps > 0 ? machine->head.most_drop_sweeps : dose::kMostDrops;
   const auto pitch = static_cast<std::int64_t>(std::ceil(1 / std::min(grid_.x.pixels_per_nm(), grid_.y.pixels_per_nm())));
+  std::vector<dose::ZoneBox> boxes = zone_boxes(scene, zones_, grid_);
   budget_.emplace(binder_, grid_, wishes_, limit_, powder.least_saturation_percent,
                   dose::Jetting{rules_.dithered, !rules_.shell.half_width.empty(), core_},
-                  dose::Stretches(zone_boxes(scene, zones_, grid_), zones_.count(), nm_of(job.dose.shell_mm), pitch));
+                  dose::Stretches(boxes, zones_.count(), nm_of(job.dose.shell_mm), pitch));
+  if (wishes_ && wishes_->has_formula()) {
+    copies_.resize(wishes_->zones());
+    for (const dose::ZoneBox& box : boxes) {
+      if (wishes_->is_own(box.zone) && wishes_->own[box.zone - 1]->has_formula()) copies_[box.zone].push_back(box);
+    }
+    budget_->survey(std::move(boxes), layers);
+  }
   for (std::uint32_t i = 0; i < layers; ++i) budget_->foresee(layer(i));
   if (asked) rules_.most_drops = std::max(1u, budget_->most_drops());
   return budget_->judge(job.allow_unbound, warnings);
 }
 
-dose::ZoneSums DosePlan::saturate(const Layer& layer, Runs& image, std::span<const Runs> zone, Runs& second,
-                                  dose::DropWork& work) const {
+bool DosePlan::has_formula(const Layer& layer) const {
+  for (std::uint32_t zone = 0; wishes_ && !copies_.empty() && zone < wishes_->zones(); ++zone) {
+    if (wishes_->of(layer, zone).has_formula()) return true;
+  }
+  return false;
+}
+
+Result<dose::ZoneSums> DosePlan::saturate_laid(const Layer& layer, std::uint32_t materials, Runs& image, Runs& second,
+                                               dose::DropWork& work) const {
+  dose::Sheet sheet{grid_, mirror_ == Mirror::kX || mirror_ == Mirror::kXY, mirror_ == Mirror::kY || mirror_ == Mirror::kXY,
+                    layer};
+  sheet.limit = dose::Drops24{limit_ > 0 ? limit_ : 1} << dose::kDropBits;
+  sheet.dithered = rules_.dithered;
+  if (wishes_) {
+    sheet.limit = std::min(sheet.limit, dose::Drops24{rules_.most_drops} << dose::kDropBits);
+    sheet.scale = dose::DropScale(binder_, grid_, layer.thickness);
+    sheet.least = sheet.scale.drops(least_percent_ * (1 - 1e-6));
+    sheet.least_percent = least_percent_;
+  }
+  work.fields.resize(std::size_t{2} * zones_.count());
+  std::vector<std::array<dose::Ask, 2>> asks(zones_.count(), {dose::Ask{dose::kOneDrop}, dose::Ask{dose::kOneDrop}});
+  for (std::uint32_t zone = 0; wishes_ && zone < zones_.count(); ++zone) {
+    const dose::Wish& wish = wishes_->of(layer, zone);
+    for (std::size_t inside = 0; inside < 2; ++inside) {
+      const dose::Percent& percent = inside == 0 ? wish.percent : wish.of_core();
+      if (percent.formula.empty()) {
+        constexpr std::uint32_t kAny = 1u << 20;
+        asks[zone][inside].drops = dose::drops_for(percent.value, binder_, grid_, layer.thickness, kAny);
+        continue;
+      }
+      dose::Field& field = work.fields[2 * zone + inside];
+      const bool own = wishes_->is_own(zone);
+      const std::string_view key = own ? "part.saturation_percent" : "--saturation";
+      Status status = field.start(percent.formula, key, sheet,
+                                  own ? std::span<const dose::ZoneBox>(copies_[zone]) : std::span<const dose::ZoneBox>());
+      if (!status) return status.error();
+      asks[zone][inside].field = &field;
+    }
+  }
+  return dose::drops_of_laid(rules_, sheet, asks, materials, image, second, work);
+}
+
+Result<dose::ZoneSums> DosePlan::saturate(const Layer& layer, bool laid, std::uint32_t materials, Runs& image,
+                                          std::span<const Runs> zone, Runs& second, dose::DropWork& work) const {
+  if (laid) return saturate_laid(layer, materials, image, second, work);
+  if (has_formula(layer)) {
+    work.laid.resize(zones_.count());
+    for (std::uint32_t z = 0; z < zones_.count(); ++z) {
+      dose::LaidPart& part = work.laid[z];
+      part.zone = z;
+      part.material = 0;
+      if (rules_.full > 0) {
+        std::swap(part.shares, work.shares);
+      } else {
+        levels_of(zones_.several() ? zone[z].view() : image.view(), 1, part.shares);
+      }
+    }
+    return saturate_laid(layer, 1, image, second, work);
+  }
   const auto dose_of = [&](std::uint32_t z) {
     dose::LayerDose dose = wishes_ ? dose::dose_of(layer, *wishes_, binder_, grid_, limit_, z) : dose::one_drop();
     // Of shares of voxels the drops of each are rounded, not those of full ones.

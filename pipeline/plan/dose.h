@@ -50,8 +50,11 @@ class DosePlan {
 
   /// The drops of a layer in place of its image, which becomes that of the first drop. `second` is scratch.
   /// zone  the image of each zone, where there are several
-  dose::ZoneSums saturate(const Layer& layer, Runs& image, std::span<const Runs> zone, Runs& second,
-                          dose::DropWork& work) const;
+  /// errors  kUsage: a formula has no number of per cent where a part lies, or one that does not bind
+  /// laid    work.laid has the shares of voxels of several solids
+  /// materials  of the job, whose drops are told apart if solids share voxels
+  Result<dose::ZoneSums> saturate(const Layer& layer, bool laid, std::uint32_t materials, Runs& image,
+                                  std::span<const Runs> zone, Runs& second, dose::DropWork& work) const;
 
   /// Upper bound of the changes of edges that moved.
   std::uint64_t edges_bound(std::uint64_t changes) const {
@@ -61,6 +64,10 @@ class DosePlan {
   std::uint64_t changes_bound(std::uint64_t changes, std::uint64_t covered) const;
 
  private:
+  bool has_formula(const Layer& layer) const;
+  Result<dose::ZoneSums> saturate_laid(const Layer& layer, std::uint32_t materials, Runs& image, Runs& second,
+                                       dose::DropWork& work) const;
+
   DoseZones zones_;
   dose::DropRules rules_;
   double core_;
@@ -68,6 +75,9 @@ class DosePlan {
   std::optional<dose::Wishes> wishes_;
   dose::Binder binder_;
   std::uint32_t limit_ = 0;
+  double least_percent_ = 0;  // that binds, of a job that has to; 0: it has not
+  Mirror mirror_;
+  std::vector<std::vector<dose::ZoneBox>> copies_;  // of each zone with formulas of its own
   std::optional<dose::Budget> budget_;
 };
 

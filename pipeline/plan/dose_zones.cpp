@@ -33,7 +33,17 @@ void copy(const RunsView& image, Runs& result) {
   result.change.assign(image.change.begin(), image.change.end());
 }
 
+dose::Percent percent_of(const Saturation& saturation) {
+  return saturation.formula.empty() ? dose::Percent(saturation.percent) : dose::Percent::of(saturation.formula);
+}
+
 }  // namespace
+
+dose::Wish wish_of(const Saturation& saturation, const std::optional<Saturation>& core) {
+  dose::Wish wish{percent_of(saturation), {}};
+  if (core) wish.core_percent = percent_of(*core);
+  return wish;
+}
 
 std::uint64_t BleedWork::bytes() const {
   std::uint64_t total = bytes_held(holes.parent);
@@ -72,7 +82,7 @@ DoseZones::DoseZones(const Job& job, const PixelGrid& grid) {
     }
     zone.first_bleed = dose.first_bleed_um ? bleed_of(grid, *dose.first_bleed_um, *dose.first_bleed_um) : zone.bleed;
     if (part != nullptr && part->saturation_percent)
-      zone.wish = dose::Wish{*part->saturation_percent, part->core_saturation_percent};
+      zone.wish = wish_of(*part->saturation_percent, part->core_saturation_percent);
     return zone;
   };
   if (dose.first_bleed_um) first_layers_ = dose.first_layers;
@@ -155,7 +165,8 @@ std::vector<dose::ZoneBox> zone_boxes(const Scene& scene, const DoseZones& zones
     const std::uint32_t zone = zones.of_part(scene.part_of_instance[i]);
     const auto [x, y] = zones.grows_nm(zone);
     const Box box = box_of(scene, scene.instances[i]);
-    boxes.push_back({zone, {box.lo.x - x, box.lo.y - y, box.lo.z}, {box.hi.x + x, box.hi.y + y, box.hi.z}});
+    boxes.push_back(
+        {zone, {box.lo.x - x, box.lo.y - y, box.lo.z}, {box.hi.x + x, box.hi.y + y, box.hi.z}, {box.lo.x, box.lo.y, box.lo.z}});
   }
   for (const PlacedImages& of : scene.images) {  // anywhere on the bed
     const std::int64_t top = of.bottom + std::int64_t{of.thickness} * of.images->layers();

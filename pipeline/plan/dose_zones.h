@@ -20,6 +20,9 @@
 
 namespace lamina::pipeline {
 
+/// A saturation of a job, and of its core.
+dose::Wish wish_of(const Saturation& saturation, const std::optional<Saturation>& core);
+
 /// How an edge moves.
 struct EdgeMove {
   dose::Reach reach;

@@ -241,8 +241,12 @@ class Planner {
                       "planned together; plan them as several jobs",
                       zones.count(), kMostZones));
     }
-    if (zones.several() && job().fill_rule == FillRule::kEvenOdd)
-      return usage("--fill-rule: evenodd looks at all parts together, and parts have doses of their own; choose nonzero");
+    if (zones.several() && job().fill_rule == FillRule::kEvenOdd && (materials_.several() || job().levels > 0)) {
+      return usage(
+          fmt::format("--fill-rule: evenodd looks at all parts together, and parts have doses of their own and {}; "
+                      "choose nonzero",
+                      job().levels > 0 ? "shares of voxels" : "several materials"));
+    }
     if (!zones.grows()) return {};
     if (materials_.several())
       return usage("dose.bleed_um: edges that grow have no material where there are several; plan them as several jobs");
@@ -270,14 +274,6 @@ class Planner {
            "dose.core: 0 without a shell of at least a pixel jets no drop, the parts stay loose powder; add --shell or "
            "give a share above 0"});
     }
-    double covered = 0;
-    for (const Instance& instance : plan_.scene->instances) {
-      const Box& box = plan_.scene->meshes[instance.mesh].bounds;
-      covered += (static_cast<double>(box.width()) * grid.x.pixels_per_nm() + 1) *
-                 (static_cast<double>(box.depth()) * grid.y.pixels_per_nm() + 1);
-    }
-    for (const PlacedImages& images : plan_.scene->images)
-      covered += static_cast<double>(images.images->columns()) * images.images->rows();
     // The slicer refers to the scene's meshes, the rasterizer takes those it is given.
     std::optional<Scene> copy;
     if (beads_) copy.emplace(*plan_.scene);
@@ -287,7 +283,7 @@ class Planner {
     if (!solids) return solids.error();
     std::optional<Beads> beads;
     if (beads_) beads.emplace(job(), grid, *plan_.sections, *plan_.segments);
-    const double bed = static_cast<double>(grid.columns()) * grid.rows();
+    dose::Covered covered(zone_boxes(*plan_.scene, dose.zones(), grid), grid);
     const auto layer = [this](std::uint32_t i) { return plan_.layer(i); };
     if (Status status = dose.decide(job(), machine(), *plan_.scene, plan_.layer_count, layer, plan_.warnings); !status)
       return status;
@@ -295,7 +291,7 @@ class Planner {
       return usage("--saturation: several drops a pixel of several materials are not planned together; plan them apart");
     }
     plan_.images.emplace(ImagePlan{std::move(printer_.machine), grid, std::move(materials_), std::move(*solids),
-                                   std::move(dose), std::move(beads), static_cast<std::uint64_t>(std::min(covered, bed))});
+                                   std::move(dose), std::move(beads), std::move(covered)});
     end_indexing();
     return {};
   }

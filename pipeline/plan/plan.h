@@ -38,8 +38,8 @@ struct ImagePlan {
   Materials materials;
   Solids solids;
   DosePlan dose;
-  std::optional<Beads> beads;        // set if parts consist of beads
-  std::uint64_t covered_pixels = 0;  // upper bound from the boxes of all parts
+  std::optional<Beads> beads;  // set if parts consist of beads
+  dose::Covered covered;       // pixels of a layer, at most
 };
 
 /// Data for toolpaths only.

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "stages/geometry/blocks/block_maker.h"
+#include "stages/write/levels/level_format.h"
 
 namespace lamina::pipeline {
 namespace {
@@ -41,8 +42,8 @@ std::vector<std::uint32_t> levels_of(const Scene& scene, const Job& job, const M
 std::string_view against_shares(const Scene& scene, const Job& job, const Materials& materials, const DoseZones& zones) {
   if (!scene.images.empty() && (materials.several() || zones.several()))
     return "meshes where parts have several materials or doses; leave out the parts that are images";
-  if (materials.several()) return "one material; give all parts the same";
-  if (zones.several()) return "parts of one dose; leave out part.saturation_percent and part.bleed_um";
+  if (materials.several() && write::find_level_format(job.format) != nullptr)
+    return "one material as grey, for several would lie in one voxel; choose a 1-bit format";
   if (zones.grows()) return "edges that stay or shrink; leave out a negative bleed";
   if (fills(job)) return "whole parts; leave out walls, fillings and segments";
   if (job.dose.core < 1) return "whole parts; give --core-saturation in place of --core";

@@ -32,7 +32,7 @@ struct Solid {
 class Solids {
  public:
   /// Moves the triangles out of the scene's meshes.
-  /// errors  of Rasterizer::build and Coverage::build; kUsage: shares of voxels of several materials
+  /// errors  of Rasterizer::build and Coverage::build; kUsage: shares of voxels of what has none
   static Result<Solids> build(Scene& scene, const Job& job, const PixelGrid& grid, const Materials& materials,
                               const DoseZones& zones);
 

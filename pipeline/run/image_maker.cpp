@@ -101,7 +101,7 @@ class ImageMaker : public Maker {
       if (Status status = imager_.bleed(layer, work.images); !status) return status;
       // What walls and fillings left out is no bleed.
       if (plan_.images->dose.bleeds() && !plan_.images->beads) sanity_.add_left(layer, work.images.runs);
-      imager_.dose(layer, work.images, made.record);
+      if (Status status = imager_.dose(layer, work.images, made.record); !status) return status;
       if (cost_) cost_->count(work.images, made.notes, made.record);
       return Status();
     });

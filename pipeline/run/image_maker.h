@@ -62,8 +62,8 @@ class LayerImager {
   Status beads(const Layer& layer, ImageWork& work, ImageNotes& notes) const;
   /// Mirrors the image and removes its bleed. errors  kUsage: it would grow beyond the bed
   Status bleed(const Layer& layer, ImageWork& work) const;
-  /// Thins the core and counts the remaining pixels.
-  void dose(const Layer& layer, ImageWork& work, LayerRecord& record) const;
+  /// Thins the core, or gives pixels their drops, and counts what remains. errors  kUsage: of DosePlan::saturate
+  Status dose(const Layer& layer, ImageWork& work, LayerRecord& record) const;
   /// Runs all steps.
   Status make(const Layer& layer, ImageWork& work, LayerRecord& record, ImageNotes& notes) const;
 
@@ -85,10 +85,13 @@ class LayerImager {
   Status place(const Layer& layer, const PlacedImages& part, ImageWork& work, std::uint64_t& filled) const;
   void mirror(Runs& image, Runs& scratch) const;
   Status check_grown(const Layer& layer, const ImageWork& work) const;
-  static void empty_removed(const Runs& before, ImageWork& work);
+  bool shares_voxels() const;  // of several solids
+  void share_out(const Layer& layer, ImageWork& work) const;
+  static void split_materials(ImageWork& work);
+  static void empty_removed(const Runs& before, bool laid, ImageWork& work);
   std::uint64_t bytes_of_section(Nm plane, std::uint64_t changes) const;
   std::uint64_t changes_of_images(Nm plane) const;
-  std::uint64_t changes_of_section(Nm plane, std::uint64_t bead_changes) const;
+  std::uint64_t changes_of_section(const Layer& layer, Nm plane, std::uint64_t bead_changes) const;
 
   const Plan& plan_;
 };

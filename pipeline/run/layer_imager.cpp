@@ -63,7 +63,7 @@ Status LayerImager::raster(const Layer& layer, ImageWork& work, LayerRecord& rec
     Runs& image = several || zones ? work.section : work.runs;
     if (Status status = section_of(solid, layer, work, image, record, notes); !status) return status;
     if (several) work.materials.lay(solid.material.at(plane(layer)), image, work.runs);
-    if (zones) work.zones.lay(solid.zone, image, work.runs);
+    if (zones) work.zones.lay(solid.zone, image, work.runs, plan_.job.fill_rule == FillRule::kEvenOdd);
   }
   return {};
 }
@@ -146,6 +146,8 @@ Status LayerImager::beads(const Layer& layer, ImageWork& work, ImageNotes& notes
   return {};
 }
 
+bool LayerImager::shares_voxels() const { return plan_.job.levels > 0 && plan_.images->solids.all().size() > 1; }
+
 cover::LayerReport LayerImager::levels(const Layer& layer, cover::LayerScratch& scratch, Levels& image) const {
   const Solid& solid = plan_.images->solids.all().front();
   if (solid.coverage) return solid.coverage->layer(layer, scratch, image);
@@ -164,6 +166,12 @@ Status LayerImager::bleed(const Layer& layer, ImageWork& work) const {
     for (Runs& image : work.zones.image) mirror(image, work.second);
     if (shares) dose::mirror(work.drops.shares, axes != Mirror::kY, axes != Mirror::kX, work.drops.zones);
     if (shares) std::swap(work.drops.shares, work.drops.zones);
+    if (shares_voxels()) {
+      for (dose::LaidPart& part : work.drops.laid) {
+        dose::mirror(part.shares, axes != Mirror::kY, axes != Mirror::kX, part.zones);
+        std::swap(part.shares, part.zones);
+      }
+    }
   }
   if (!zones.bleeds()) return {};
   if (zones.several() && images.beads) work.zones.keep(work.runs);
@@ -178,18 +186,23 @@ Status LayerImager::bleed(const Layer& layer, ImageWork& work) const {
   }
   if (shares) work.third = work.runs;
   zones.remove_bleed(layer, work.runs, work.zones.image, work.bleed);
-  if (shares) empty_removed(work.third, work);
+  if (shares) empty_removed(work.third, shares_voxels(), work);
   return check_grown(layer, work);
 }
 
 /// Where an edge moved inwards, the voxels that it left and those beside them that are less than half full are emptied.
-void LayerImager::empty_removed(const Runs& before, ImageWork& work) {
+void LayerImager::empty_removed(const Runs& before, bool laid, ImageWork& work) {
   raster::combine(before, work.runs, raster::SetOperation::kDifference, work.second);
   const dose::Reach beside{{1, 1}};
   dose::dilate(work.second, beside, work.section);
   raster::combine(work.section, work.runs, raster::SetOperation::kDifference, work.second);
   dose::without(work.drops.shares, work.second, work.drops.zones);
   std::swap(work.drops.shares, work.drops.zones);
+  if (!laid) return;
+  for (dose::LaidPart& part : work.drops.laid) {
+    dose::without(part.shares, work.second, part.zones);
+    std::swap(part.shares, part.zones);
+  }
 }
 
 /// Parts stay on a bed that is not a rectangle as far as they were checked; what grew does too.
@@ -206,26 +219,65 @@ Status LayerImager::check_grown(const Layer& layer, const ImageWork& work) const
 }
 
 void LayerImager::shares(const Layer& layer, ImageWork& work, LayerRecord& record) const {
-  levels(layer, work.coverage, work.drops.shares);
-  const auto differs = dose::take_half(plan_.images->dose.full(), work.runs, work.second, work.drops);
+  const ImagePlan& images = *plan_.images;
+  if (shares_voxels()) {
+    share_out(layer, work);
+  } else {
+    levels(layer, work.coverage, work.drops.shares);
+  }
+  const auto differs = dose::take_half(images.dose.full(), work.runs, work.second, work.drops);
   record.half_differs = differs.pixels;
   record.half_far = differs.far;
+  if (!shares_voxels()) return;
+  // Voxels half full or more are those of the solid that has most of them.
+  const std::uint32_t columns = images.grid.columns(), rows = images.grid.rows();
+  const bool several = images.materials.several(), zones = images.dose.zones().several();
+  if (several) work.materials.start(images.materials.used.size(), columns, rows);
+  if (zones) work.zones.start(images.dose.zones().count(), columns, rows);
+  for (std::size_t i = 0; i < work.drops.laid.size(); ++i) {
+    const dose::LaidPart& part = work.drops.laid[i];
+    const auto unite = [&](Runs& image) {
+      raster::combine(image, work.drops.shared.owner[i], raster::SetOperation::kUnion, work.section);
+      std::swap(image, work.section);
+    };
+    if (several) unite(work.materials.image[part.material]);
+    if (zones) unite(work.zones.image[part.zone]);
+  }
 }
 
-void LayerImager::dose(const Layer& layer, ImageWork& work, LayerRecord& record) const {
+/// How full each solid makes the voxels, and all of them together.
+void LayerImager::share_out(const Layer& layer, ImageWork& work) const {
+  const std::span<const Solid> solids = plan_.images->solids.all();
+  work.drops.laid.resize(solids.size());
+  std::vector<Levels*> parts;
+  for (std::size_t i = 0; i < solids.size(); ++i) {
+    dose::LaidPart& part = work.drops.laid[i];
+    solids[i].coverage->layer(layer, work.coverage, part.shares);
+    part.zone = solids[i].zone;
+    part.material = plan_.images->materials.several() ? solids[i].material.at(plane(layer)) : 0;
+    parts.push_back(&part.shares);
+  }
+  dose::share_out(parts, plan_.images->dose.full(), work.drops.shared, work.drops.shares);
+}
+
+Status LayerImager::dose(const Layer& layer, ImageWork& work, LayerRecord& record) const {
   const ImagePlan& images = *plan_.images;
   if (images.dose.zones().several() && images.beads) work.zones.keep(work.runs);
   images.dose.thin(layer.index, work.runs, work.second, work.third);
   if (images.dose.saturates()) {
-    const dose::ZoneSums sums = images.dose.saturate(layer, work.runs, work.zones.image, work.second, work.drops);
-    record.dosed_pixels = sums.full_voxels;
-    record.asked_drops = sums.asked_drops;
+    const auto materials = static_cast<std::uint32_t>(std::max<std::size_t>(1, images.materials.used.size()));
+    const auto sums =
+        images.dose.saturate(layer, shares_voxels(), materials, work.runs, work.zones.image, work.second, work.drops);
+    if (!sums) return sums.error();
+    record.dosed_pixels = sums->full_voxels;
+    record.asked_drops = sums->asked_drops;
     record.drops = images.dose.most_drops() > 1 ? sum_of_levels(work.drops.levels) : set_pixels(work.runs);
   } else if (plan_.job.levels > 0) {
     at_least(work.drops.shares, 1, work.runs);
     record.dosed_pixels = dose::sums_of(work.drops.shares, images.dose.full(), dose::one_drop()).full_voxels;
   }
   if (images.materials.several() && (images.beads || images.dose.any())) work.materials.keep(work.runs);
+  if (images.materials.several() && shares_voxels()) split_materials(work);
   const bool counted = images.dose.saturates() && images.dose.most_drops() <= 1;
   record.set_pixels = counted ? record.drops : set_pixels(work.runs);
   const auto add_image = [&](const Runs& image) {
@@ -233,6 +285,20 @@ void LayerImager::dose(const Layer& layer, ImageWork& work, LayerRecord& record)
   };
   if (images.dose.most_drops() > 1) std::ranges::for_each(work.drops.planes, add_image);
   std::ranges::for_each(work.materials.image, add_image);
+  return {};
+}
+
+/// Of voxels that materials share, each drop is one material's.
+void LayerImager::split_materials(ImageWork& work) {
+  std::vector<Runs>& image = work.materials.image;
+  for (std::size_t m = 0; m < image.size(); ++m) {
+    if (m == 0) {
+      image[m] = work.drops.up_to[m].front();
+    } else {
+      raster::combine(work.drops.up_to[m].front(), work.drops.up_to[m - 1].front(), raster::SetOperation::kDifference,
+                      image[m]);
+    }
+  }
 }
 
 Status LayerImager::make(const Layer& layer, ImageWork& work, LayerRecord& record, ImageNotes& notes) const {
@@ -245,8 +311,7 @@ Status LayerImager::make(const Layer& layer, ImageWork& work, LayerRecord& recor
     if (Status status = beads(layer, work, notes); !status) return status;
   }
   if (Status status = bleed(layer, work); !status) return status;
-  dose(layer, work, record);
-  return {};
+  return dose(layer, work, record);
 }
 
 /// The section of one solid; observations go to the record and the notes.
@@ -288,29 +353,36 @@ raster::LayerReport LayerImager::section(const Solid& solid, raster::Engine engi
   return low.open_rows + low.capped_rows >= high.open_rows + high.capped_rows ? low : high;
 }
 
-std::uint64_t LayerImager::changes_of_section(Nm plane, std::uint64_t bead_changes) const {
+std::uint64_t LayerImager::changes_of_section(const Layer& layer, Nm plane, std::uint64_t bead_changes) const {
   const ImagePlan& images = *plan_.images;
-  return images.dose.changes_bound(images.solids.crossings_bound(plane) + changes_of_images(plane), images.covered_pixels) +
-         bead_changes;
+  const std::uint64_t covered = images.covered.pixels(layer.bottom, std::int64_t{layer.bottom} + layer.thickness);
+  return images.dose.changes_bound(images.solids.crossings_bound(plane) + changes_of_images(plane), covered) + bead_changes;
 }
 
 std::uint64_t LayerImager::changes_bound(const Layer& layer) const {
   if (plan_.job.heights.containment != Containment::kAcross) {
-    return changes_of_section(layer.lowest_plane(), 0) + changes_of_section(layer.highest_plane(), 0);
+    return changes_of_section(layer, layer.lowest_plane(), 0) + changes_of_section(layer, layer.highest_plane(), 0);
   }
-  return changes_of_section(plane(layer), plan_.images->beads ? 2 * plan_.images->beads->expected(layer.index).spans : 0);
+  return changes_of_section(layer, plane(layer),
+                            plan_.images->beads ? 2 * plan_.images->beads->expected(layer.index).spans : 0);
 }
 
 std::uint64_t LayerImager::bytes_of(const Layer& layer) const {
   if (plan_.job.heights.containment != Containment::kAcross) {
     // Both sections, and an image with up to the crossings of both; doubled for a second engine or a mirror.
-    return 2 * (bytes_of_section(layer.lowest_plane(), changes_of_section(layer.lowest_plane(), 0)) +
-                bytes_of_section(layer.highest_plane(), changes_of_section(layer.highest_plane(), 0)));
+    return 2 * (bytes_of_section(layer.lowest_plane(), changes_of_section(layer, layer.lowest_plane(), 0)) +
+                bytes_of_section(layer.highest_plane(), changes_of_section(layer, layer.highest_plane(), 0)));
   }
   const std::uint64_t of_section = bytes_of_section(plane(layer), changes_bound(layer));
-  const auto& coverage = plan_.images->solids.all().front().coverage;
-  const std::uint64_t of_shares =
-      coverage ? coverage->scratch_bytes_bound(layer) + 9 * changes_bound(layer) + 4 * plan_.images->grid.rows() : 0;
+  std::uint64_t of_shares = 0, scratch = 0;
+  for (const Solid& solid : plan_.images->solids.all()) {
+    if (!solid.coverage) continue;
+    scratch = std::max(scratch, solid.coverage->scratch_bytes_bound(layer));
+    of_shares += 9 * changes_bound(layer) + 4 * plan_.images->grid.rows();
+  }
+  // Of solids that share voxels, their shares twice, with their cores, and together; their drops for each material.
+  if (shares_voxels()) of_shares *= 3 + plan_.images->materials.used.size();
+  of_shares += scratch;
   return of_section + of_shares + (plan_.images->beads ? plan_.images->beads->bytes_expected(layer.index) : 0);
 }
 

@@ -28,9 +28,10 @@ void add_stretches(const PartMaterial& part, std::int64_t bottom, std::int64_t t
   }
 }
 
-/// How far a section is taken from the plane of its layer: with steps outside of a part, layers hold what begins above it.
+/// How far a section is taken from the plane of its layer: with steps outside of a part, layers hold what begins above it, and
+/// so they do of shares of voxels.
 std::int64_t reach_of_layers(const Plan& plan) {
-  if (plan.job.heights.containment == Containment::kAcross) return 0;
+  if (plan.job.heights.containment == Containment::kAcross && plan.job.levels == 0) return 0;
   std::int64_t most = 0;
   for (std::uint32_t i = plan.range[0]; i < plan.range[1]; ++i) most = std::max<std::int64_t>(most, plan.layer(i).thickness);
   return most;

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <iterator>
 
 #include "stages/data/text/number_text.h"
 #include "stages/data/text/readable.h"
@@ -67,9 +68,21 @@ const LayerDose& Budget::dose(const Layer& layer, std::uint32_t zone) {
   return dose;
 }
 
+void Budget::survey(std::vector<ZoneBox> boxes, std::uint32_t layers) {
+  boxes_ = std::move(boxes);
+  layers_ = layers;
+}
+
 void Budget::foresee(const Layer& layer) {
   for (std::uint32_t zone = 0; zone < (wishes_ ? wishes_->zones() : 1); ++zone) {
     if (!stretches_.any(zone, layer)) continue;
+    if (wishes_ && wishes_->of(layer, zone).has_formula()) {
+      const Wish& wish = wishes_->of(layer, zone);
+      const bool differ = !(wish.percent == wish.of_core());
+      if (jetting_.shell || !differ) look_at_field(layer, zone, false);
+      if (differ && (!jetting_.shell || stretches_.core(zone, layer))) look_at_field(layer, zone, true);
+      continue;
+    }
     const LayerDose& of = dose(layer, zone);
     const bool differ = of.asked != of.asked_core;
     if (jetting_.shell || !differ) look_at(layer, zone, of, false);
@@ -92,6 +105,42 @@ void Budget::look_at(const Layer& layer, std::uint32_t zone, const LayerDose& do
   if (place > wishes_->ranges.size()) jetted_[zone] |= drops > 0 || asked > 0;
 }
 
+FieldSurvey* Budget::survey_of(const std::string& formula, std::size_t place, std::uint32_t zone) {
+  const auto found = surveys_.find({formula, zone});
+  if (found != surveys_.end()) return &found->second;
+  std::vector<ZoneBox> boxes;
+  std::ranges::copy_if(boxes_, std::back_inserter(boxes), [&](const ZoneBox& box) { return box.zone == zone; });
+  auto made = FieldSurvey::make(formula, grid_, std::move(boxes), place > wishes_->ranges.size(), layers_);
+  if (made) return &surveys_.emplace(std::pair(formula, zone), std::move(*made)).first->second;
+  if (!no_formula_) no_formula_ = Error{Fault::kUsage, made.error().message};
+  return nullptr;
+}
+
+void Budget::look_at_field(const Layer& layer, std::uint32_t zone, bool core) {
+  const Wish& wish = wishes_->of(layer, zone);
+  const std::size_t place = wishes_->place_of(layer, zone);
+  const Percent& percent = core ? wish.of_core() : wish.percent;
+  FieldRange range{percent.value, percent.value, true};
+  if (!percent.formula.empty()) {
+    FieldSurvey* survey = survey_of(percent.formula, place, zone);
+    if (survey != nullptr) range = survey->in(layer);
+  }
+  if (!range.any) return;  // where it meets a part it is told
+  const DropScale scale(binder_, grid_, layer.thickness);
+  const auto of = [&](double asked) {
+    LayerDose dose;
+    dose.asked = dose.asked_core = asked;
+    dose.asked_shell = dose.asked_inside = scale.drops(asked);
+    dose.shell = dose.core = std::min(dose.asked_shell, Drops24{limit_} << kDropBits);
+    dose.gets = dose.gets_core = saturation_of(static_cast<double>(dose.shell) / kOneDrop, binder_, grid_, layer.thickness);
+    if (!jetting_.dithered) round_drops(dose, binder_, grid_, layer.thickness);
+    return dose;
+  };
+  const LayerDose least = of(range.least);
+  if (least.gets < least_percent_ * (1 - 1e-6)) thin_.add(layer, least.asked, least.gets, 0, least.gets < thin_.gets);
+  look_at(layer, zone, of(range.most), core);
+}
+
 void Budget::warn_of_none(std::vector<Warning>& warnings) const {
   for (const auto& [of, fault] : none_) {
     warnings.push_back({"no-drop", fmt::format("{}: {} % is {:.2f} drops a pixel, which rounds to none in {}; leave out "
@@ -111,6 +160,13 @@ Status Budget::judge(bool allow_unbound, std::vector<Warning>& warnings) const {
                                                   cut_.asked, limit_, where(cut_.where), cut_.gets)});
   }
   warn_of_none(warnings);
+  if (no_formula_) return *no_formula_;
+  if (unbound_.where.empty() && !thin_.where.empty() && allow_unbound) {
+    warnings.push_back(
+        {"saturation", fmt::format("{} may get as little as {:.1f} % of their voids filled by their formula, and the "
+                                   "powder binds from {} % on (powder.least_saturation_percent)",
+                                   where(thin_.where), thin_.gets, number_text(least_percent_))});
+  }
   if (unbound_.where.empty()) return {};
   const std::string asked = has_wish() ? fmt::format(" where {} % is asked", number_text(unbound_.asked)) : "";
   const std::string text = fmt::format(

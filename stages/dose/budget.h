@@ -10,6 +10,7 @@
 
 #include "stages/data/layer.h"
 #include "stages/data/status.h"
+#include "stages/dose/field.h"
 #include "stages/dose/stretches.h"
 #include "stages/dose/wish.h"
 
@@ -47,14 +48,17 @@ class Budget {
   Budget(const Binder& binder, const PixelGrid& grid, std::optional<Wishes> wishes, std::uint32_t most_drops,
          double least_percent, const Jetting& jetting = {true, true, 1}, Stretches stretches = {});
 
-  /// Layers in their order. cost  that of dose_of(), once for equal layers
+  /// Before foresee(), of wishes that are formulas: where parts lie, and how many layers there are.
+  void survey(std::vector<ZoneBox> boxes, std::uint32_t layers);
+
+  /// Layers in their order. cost  that of dose_of(), once for equal layers; of formulas that of FieldSurvey
   void foresee(const Layer& layer);
 
   /// The most drops of any pixel in the layers so far.
   std::uint32_t most_drops() const { return most_drops_; }
 
   /// Warns of wishes that cannot be met, and of those that come to no drop.
-  /// errors  kUsage: layers get less than binds, and that is not allowed
+  /// errors  kUsage: layers get less than binds, and that is not allowed; a formula is none
   Status judge(bool allow_unbound, std::vector<Warning>& warnings) const;
 
   const Binder& binder() const { return binder_; }
@@ -67,6 +71,8 @@ class Budget {
  private:
   const LayerDose& dose(const Layer& layer, std::uint32_t zone);
   void look_at(const Layer& layer, std::uint32_t zone, const LayerDose& dose, bool core);
+  void look_at_field(const Layer& layer, std::uint32_t zone, bool core);
+  FieldSurvey* survey_of(const std::string& formula, std::size_t place, std::uint32_t zone);
   void warn_of_none(std::vector<Warning>& warnings) const;
 
   Binder binder_;
@@ -78,10 +84,14 @@ class Budget {
   Stretches stretches_;
   std::pair<double, double> gets_{0, 0};
   bool seen_ = false;
-  std::map<std::pair<std::size_t, Nm>, LayerDose> known_;  // by place of the wish and thickness
-  DoseFault cut_, unbound_;
+  std::map<std::pair<std::size_t, Nm>, LayerDose> known_;   // by place of the wish and thickness
+  DoseFault cut_, unbound_, thin_;                          // thin: by places of a formula, of which none need be in a part
   std::map<std::pair<std::size_t, bool>, DoseFault> none_;  // wishes above 0 that come to no drop; by place, of the core
   std::map<std::uint32_t, bool> jetted_;                    // whether parts with a wish of their own get any; by zone
+  std::vector<ZoneBox> boxes_;
+  std::uint32_t layers_ = 1;
+  std::map<std::pair<std::string, std::uint32_t>, FieldSurvey> surveys_;  // by formula and zone
+  std::optional<Error> no_formula_;
 };
 
 /// Counts what layers got.

@@ -186,6 +186,33 @@ auto row_kernel() {
 
 }  // namespace
 
+void Thresholds::start(std::uint32_t layer) {
+  const std::vector<std::uint16_t>& rank = blue_noise_ranks();
+  const TileShift shift = tile_shift(layer);
+  const std::uint32_t offset = offset_of(layer);
+  of_tile_.resize(kTilePixels);
+  for (std::uint32_t row = 0; row < kTileSide; ++row) {
+    const std::uint16_t* line = rank.data() + (row + shift.row) % kTileSide * kTileSide;
+    std::uint32_t* turned = of_tile_.data() + std::size_t{row} * kTileSide;
+    for (std::uint32_t column = 0; column < kTileSide; ++column)
+      turned[column] = (std::uint32_t{line[(column + shift.column) % kTileSide]} << kBelowRank) + offset;
+  }
+}
+
+void Thresholds::append(std::uint32_t begin, std::uint32_t end, std::uint32_t row, Drops24 drops, Levels& result) const {
+  const auto base = static_cast<std::uint8_t>(drops >> kDropBits);
+  const auto fraction = static_cast<std::uint32_t>(drops & (kOneDrop - 1));
+  if (fraction == 0) return result.append(begin, end, base);
+  const std::uint32_t* line = of_tile_.data() + std::size_t{row % kTileSide} * kTileSide;
+  while (begin < end) {
+    const bool more = line[begin % kTileSide] < fraction;
+    std::uint32_t stop = begin + 1;
+    while (stop < end && (line[stop % kTileSide] < fraction) == more) ++stop;
+    result.append(begin, stop, static_cast<std::uint8_t>(base + (more ? 1 : 0)));
+    begin = stop;
+  }
+}
+
 void dither(const LevelsView& image, std::span<const Drops24> drops, std::uint32_t layer, DitherScratch& scratch,
             Levels& result) {
   scratch.of_level.resize(drops.size());

@@ -45,4 +45,18 @@ void dither(const LevelsView& image, std::span<const Drops24> drops, std::uint32
 void dither_one(const LevelsView& image, std::span<const Drops24> drops, std::uint32_t layer, DitherScratch& scratch,
                 Runs& result);
 
+/// The thresholds of a layer, for stretches of pixels that each have a number of drops of their own: the same drops as those
+/// of dither(). Scratch; keeps its capacity.
+class Thresholds {
+ public:
+  /// cost  O(tile)
+  void start(std::uint32_t layer);
+  /// Appends [begin, end) of a row. drops  a pixel, at most kMostDrops; cost  O(pixels) where they are not whole
+  void append(std::uint32_t begin, std::uint32_t end, std::uint32_t row, Drops24 drops, Levels& result) const;
+  std::uint64_t bytes() const { return of_tile_.capacity() * sizeof(std::uint32_t); }
+
+ private:
+  std::vector<std::uint32_t> of_tile_;  // row by row, turned to the layer's shift
+};
+
 }  // namespace lamina::dose

@@ -6,8 +6,13 @@
 namespace lamina::dose {
 
 std::uint64_t DropWork::bytes() const {
-  std::uint64_t total = shares.bytes() + zones.bytes() + levels.bytes() + pieces.capacity() * sizeof(ZonePiece);
-  for (const Runs& plane : planes) total += bytes_held(plane.row_offset) + bytes_held(plane.change);
+  std::uint64_t total = shares.bytes() + zones.bytes() + levels.bytes() + pour.bytes() + pieces.capacity() * sizeof(ZonePiece);
+  for (const LaidPart& part : laid) total += part.bytes();
+  total += shared.bytes();
+  for (const Field& field : fields) total += field.bytes();
+  const auto add = [&](const Runs& plane) { total += bytes_held(plane.row_offset) + bytes_held(plane.change); };
+  std::ranges::for_each(planes, add);
+  for (const std::vector<Runs>& of : up_to) std::ranges::for_each(of, add);
   return total;
 }
 
@@ -30,16 +35,21 @@ void mark_shell(const DropRules& rules, const Runs& image, std::uint8_t full, Ru
   mark_core(work.shares, second, full, work.zones);
 }
 
-/// The planes of work.zones; of one drop a pixel the image alone.
-void make_planes(const DropRules& rules, std::span<const Drops24> drops, std::uint32_t layer, Runs& image, DropWork& work) {
-  if (rules.most_drops == 1) return dither_one(work.zones, drops, layer, work.dither, image);
-  dither(work.zones, drops, layer, work.dither, work.levels);
+/// The planes of work.levels.
+void make_planes(const DropRules& rules, Runs& image, DropWork& work) {
   work.planes.resize(rules.most_drops);
   for (std::uint32_t drop = 0; drop < rules.most_drops; ++drop) {
     at_least(work.levels, static_cast<std::uint8_t>(drop + 1), work.planes[drop]);
   }
   image.row_offset = work.planes[0].row_offset;
   image.change = work.planes[0].change;
+}
+
+/// The planes of work.zones; of one drop a pixel the image alone.
+void dither_zones(const DropRules& rules, std::span<const Drops24> drops, std::uint32_t layer, Runs& image, DropWork& work) {
+  if (rules.most_drops == 1) return dither_one(work.zones, drops, layer, work.dither, image);
+  dither(work.zones, drops, layer, work.dither, work.levels);
+  make_planes(rules, image, work);
 }
 
 }  // namespace
@@ -55,7 +65,7 @@ ZoneSums drops_of_layer(const DropRules& rules, const LayerDose& dose, std::uint
   }
   std::vector<Drops24> drops(std::size_t{2} * full + 1);
   drops_of_zones(dose, full, rules.dithered, drops);
-  make_planes(rules, drops, layer, image, work);
+  dither_zones(rules, drops, layer, image, work);
   return sums_of(work.zones, full, dose);
 }
 
@@ -68,7 +78,7 @@ ZoneSums drops_of_parts(const DropRules& rules, std::span<const LayerDose> doses
   for (const LayerDose& dose : doses) drops.push_back(dose.shell), asked.push_back(dose.asked_shell);
   for (const LayerDose& dose : doses) drops.push_back(dose.core), asked.push_back(dose.asked_inside);
   if (!rules.dithered) std::ranges::for_each(drops, [](Drops24& of) { of = rounded(of); });
-  make_planes(rules, drops, layer, image, work);
+  dither_zones(rules, drops, layer, image, work);
   unsigned __int128 sum = 0;
   std::uint64_t pixels = 0;
   for (std::size_t i = 0; i < work.zones.level.size(); ++i) {
@@ -77,6 +87,32 @@ ZoneSums drops_of_parts(const DropRules& rules, std::span<const LayerDose> doses
     sum += static_cast<unsigned __int128>(asked[work.zones.level[i]]) * length;
   }
   return {pixels, static_cast<std::uint64_t>((sum + kOneDrop / 2) >> kDropBits)};
+}
+
+Result<ZoneSums> drops_of_laid(const DropRules& rules, const Sheet& sheet, std::span<const std::array<Ask, 2>> asks,
+                               std::uint32_t materials, Runs& image, Runs& second, DropWork& work) {
+  const std::uint8_t full = std::max<std::uint8_t>(1, rules.full);
+  const bool shell = !rules.shell.half_width.empty();
+  if (shell) erode(image, rules.shell, second);
+  for (LaidPart& part : work.laid) {
+    if (shell) mark_core(part.shares, second, full, part.zones);
+  }
+  work.up_to.resize(materials);
+  std::vector<Dosed> parts;
+  for (std::uint32_t material = 0;; ++material) {
+    const bool last = material + 1 >= materials;
+    parts.clear();
+    for (const LaidPart& part : work.laid) {
+      const auto& [of_shell, of_core] = asks[part.zone];
+      if (last || part.material <= material)
+        parts.push_back({shell ? part.zones.view() : part.shares.view(), shell ? of_shell : of_core, of_core});
+    }
+    const auto sums = pour(parts, full, sheet, work.pour, work.levels, work.zones);
+    if (!sums) return sums;
+    make_planes(rules, image, work);
+    if (materials > 1) work.up_to[material] = work.planes;
+    if (last) return sums;
+  }
 }
 
 }  // namespace lamina::dose

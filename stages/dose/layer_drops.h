@@ -1,6 +1,7 @@
 // stages/dose/layer_drops.h: the image of a layer, or how full its voxels are, becomes the images of its drops.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -9,11 +10,21 @@
 #include "stages/data/runs.h"
 #include "stages/dose/dither.h"
 #include "stages/dose/erode.h"
+#include "stages/dose/field.h"
+#include "stages/dose/pour.h"
 #include "stages/dose/shares.h"
 #include "stages/dose/wish.h"
 #include "stages/dose/zones.h"
 
 namespace lamina::dose {
+
+/// A part of a layer that has a dose, or shares of voxels, of its own.
+struct LaidPart {
+  Levels shares;  // how full its voxels are
+  Levels zones;   // the same, with its core marked
+  std::uint32_t zone = 0, material = 0;
+  std::uint64_t bytes() const { return shares.bytes() + zones.bytes(); }
+};
 
 /// Scratch for the drops of a layer, and what they are; buffers keep their capacity.
 struct DropWork {
@@ -23,6 +34,11 @@ struct DropWork {
   DitherScratch dither;
   std::vector<ZonePiece> pieces;
   std::vector<Runs> planes;  // then: the pixels with at least one drop, two, ...: as many as the job has
+  std::vector<LaidPart> laid;
+  ShareOut shared;                       // of the parts' shares
+  std::vector<std::vector<Runs>> up_to;  // planes of the drops of the first material, of the first two, ...
+  std::vector<Field> fields;             // two a zone: of its shell, of its core
+  PourScratch pour;
   std::uint64_t bytes() const;
 };
 
@@ -47,5 +63,13 @@ ZoneSums drops_of_layer(const DropRules& rules, const LayerDose& dose, std::uint
 /// doses, zone  of each of them; no pixel is in two of the images, and together they are `image`; at most 127
 ZoneSums drops_of_parts(const DropRules& rules, std::span<const LayerDose> doses, std::uint32_t layer,
                         std::span<const Runs> zone, Runs& image, Runs& second, DropWork& work);
+
+/// The same of parts in work.laid that share voxels, or whose doses are formulas. The image is that of all of them.
+/// asks       of each zone, shell and core; work.zones becomes the levels of all parts together
+/// materials  whose drops are told apart in work.up_to: of a voxel's drops the first are those of the first material, so that
+///            each gets them in proportion to its share over many voxels
+/// errors     of pour()
+Result<ZoneSums> drops_of_laid(const DropRules& rules, const Sheet& sheet, std::span<const std::array<Ask, 2>> asks,
+                               std::uint32_t materials, Runs& image, Runs& second, DropWork& work);
 
 }  // namespace lamina::dose

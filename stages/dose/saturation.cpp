@@ -23,26 +23,66 @@ std::uint64_t fraction_of(unsigned __int128 a, unsigned __int128 b, unsigned bit
   return 2 * a >= b ? quotient + 1 : quotient;
 }
 
+using Wide = unsigned __int128;
+
+/// Both in millionths.
+std::int64_t voids_of(const Binder& binder) {
+  return std::clamp<std::int64_t>(kMillion - millionths(binder.packing), 0, kMillion);
+}
+std::int64_t stays_of(const Binder& binder) {
+  return std::clamp<std::int64_t>(kMillion - millionths(binder.evaporates), 0, kMillion);
+}
+std::int64_t wish_of(double percent) { return std::clamp<std::int64_t>(millionths(percent / 100), 0, 10'000 * kMillion); }
+std::int64_t drop_of(const Binder& binder) { return std::max<std::int64_t>(0, millionths(binder.drop_pl)); }  // 10^6 nm3
+
+/// In thousandths of a nm3, at most 10^9 x 10^9 x 10^9 x 10^3 before it is divided.
+Wide voxel_of(const PixelGrid& grid, std::int64_t thickness_nm) {
+  const Wide area = static_cast<Wide>(grid.x.span) * static_cast<Wide>(grid.y.span);
+  const Wide pixels = static_cast<Wide>(grid.x.dots) * static_cast<Wide>(grid.y.dots);
+  return area * static_cast<Wide>(thickness_nm) / pixels * 1000;
+}
+/// What one drop leaves, in the same unit times 10^12, as wishes and voids are in millionths.
+Wide one_of(const Binder& binder) {
+  return static_cast<Wide>(stays_of(binder)) * static_cast<Wide>(drop_of(binder)) *
+         (static_cast<Wide>(kMillion) * kMillion * 1000);
+}
+
 }  // namespace
 
 Drops24 drops_for(double percent, const Binder& binder, const PixelGrid& grid, std::int64_t thickness_nm, std::uint32_t most) {
   const Drops24 limit = Drops24{most} << kDropBits;
-  const std::int64_t wish = std::clamp<std::int64_t>(millionths(percent / 100), 0, 10'000 * kMillion);
-  const std::int64_t voids = std::clamp<std::int64_t>(kMillion - millionths(binder.packing), 0, kMillion);
-  const std::int64_t stays = std::clamp<std::int64_t>(kMillion - millionths(binder.evaporates), 0, kMillion);
-  const std::int64_t drop = std::max<std::int64_t>(0, millionths(binder.drop_pl));  // 10^6 nm3
+  const std::int64_t wish = wish_of(percent), voids = voids_of(binder);
   if (wish == 0 || voids == 0) return 0;
-  if (drop == 0 || stays == 0) return limit;
-  // In thousandths of a nm3: at most 10^9 x 10^9 x 10^9 x 10^3 before it is divided.
-  using Wide = unsigned __int128;
-  const Wide area = static_cast<Wide>(grid.x.span) * static_cast<Wide>(grid.y.span);
-  const Wide pixels = static_cast<Wide>(grid.x.dots) * static_cast<Wide>(grid.y.dots);
-  const Wide voxel = area * static_cast<Wide>(thickness_nm) / pixels * 1000;
-  const Wide asked = voxel * static_cast<Wide>(wish) * static_cast<Wide>(voids);
-  const Wide one = static_cast<Wide>(stays) * static_cast<Wide>(drop) * (static_cast<Wide>(kMillion) * kMillion * 1000);
+  const Wide one = one_of(binder);
+  if (one == 0) return limit;
+  const Wide asked = voxel_of(grid, thickness_nm) * static_cast<Wide>(wish) * static_cast<Wide>(voids);
   const Wide whole = asked / one;
   if (whole >= most) return limit;
   return std::min(limit, (static_cast<Drops24>(whole) << kDropBits) + fraction_of(asked % one, one, kDropBits));
+}
+
+DropScale::DropScale(const Binder& binder, const PixelGrid& grid, std::int64_t thickness_nm) {
+  constexpr unsigned kBits = 88;
+  constexpr Wide kMost = Wide{1} << (kBits - 2);  // more than any nozzle fires, for ten millionths
+  Wide asked = voxel_of(grid, thickness_nm) * static_cast<Wide>(voids_of(binder));
+  const Wide one = one_of(binder);
+  if (asked == 0) return;
+  of_millionth_ = kMost;
+  if (asked >= one / 4) return;
+  of_millionth_ = 0;
+  for (unsigned bit = 0; bit < kBits; ++bit) {
+    asked *= 2;
+    of_millionth_ *= 2;
+    if (asked < one) continue;
+    asked -= one;
+    ++of_millionth_;
+  }
+}
+
+Drops24 DropScale::drops(double percent) const {
+  constexpr Wide kAny = Wide{1} << (20 + kDropBits);
+  const Wide drops = (static_cast<Wide>(wish_of(percent)) * of_millionth_ + (Wide{1} << 63)) >> 64;
+  return static_cast<Drops24>(std::min(drops, kAny));
 }
 
 double voids_pl(const Binder& binder, const PixelGrid& grid, std::int64_t thickness_nm) {

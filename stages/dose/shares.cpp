@@ -55,7 +55,94 @@ std::size_t same_changes(std::span<const std::uint32_t> a, std::span<const std::
   return same;
 }
 
+/// Appends [begin, end) to the row that is being made.
+void append_run(std::uint32_t row_begin, std::uint32_t begin, std::uint32_t end, Runs& image) {
+  if (image.change.size() > row_begin && image.change.back() == begin) {
+    image.change.back() = end;
+    return;
+  }
+  image.change.push_back(begin);
+  image.change.push_back(end);
+}
+
+/// Goes through a row of several parts from column to column at which any of them changes.
+class RowOfParts {
+ public:
+  explicit RowOfParts(std::span<Levels* const> parts) : parts_(parts), at_(parts.size()) {}
+
+  void start(std::uint32_t row) {
+    row_ = row;
+    for (std::size_t i = 0; i < parts_.size(); ++i) at_[i] = parts_[i]->row_offset[row];
+  }
+  /// The first column at or behind `from` where a part has a level; UINT32_MAX: none has.
+  std::uint32_t next(std::uint32_t from) {
+    std::uint32_t first = UINT32_MAX;
+    for (std::size_t i = 0; i < parts_.size(); ++i) {
+      const Levels& part = *parts_[i];
+      while (at_[i] < part.row_offset[row_ + 1] && part.change[2 * at_[i] + 1] <= from) ++at_[i];
+      if (at_[i] < part.row_offset[row_ + 1]) first = std::min(first, std::max(from, part.change[2 * at_[i]]));
+    }
+    return first;
+  }
+  std::uint8_t level(std::size_t i, std::uint32_t column) const { return holds(i, column) ? parts_[i]->level[at_[i]] : 0; }
+  /// Where the levels from `column` on, as next() gave it, end.
+  std::uint32_t end(std::uint32_t column) const {
+    std::uint32_t stop = UINT32_MAX;
+    for (std::size_t i = 0; i < parts_.size(); ++i) {
+      if (at_[i] == parts_[i]->row_offset[row_ + 1]) continue;
+      stop = std::min(stop, parts_[i]->change[2 * at_[i] + (holds(i, column) ? 1 : 0)]);
+    }
+    return stop;
+  }
+
+ private:
+  bool holds(std::size_t i, std::uint32_t column) const {
+    return at_[i] < parts_[i]->row_offset[row_ + 1] && parts_[i]->change[2 * at_[i]] <= column;
+  }
+  std::span<Levels* const> parts_;
+  std::vector<std::uint32_t> at_;  // run of each part
+  std::uint32_t row_ = 0;
+};
+
 }  // namespace
+
+std::uint64_t ShareOut::bytes() const {
+  std::uint64_t total = 0;
+  for (const Levels& levels : part) total += levels.bytes();
+  for (const Runs& runs : owner) total += bytes_held(runs.row_offset) + bytes_held(runs.change);
+  return total;
+}
+
+void share_out(std::span<Levels* const> parts, std::uint8_t full, ShareOut& out, Levels& total) {
+  const std::uint32_t columns = parts.front()->columns, rows = parts.front()->view().rows();
+  out.part.resize(parts.size());
+  out.owner.resize(parts.size());
+  for (Levels& part : out.part) part.start(columns);
+  for (Runs& image : out.owner) image.columns = columns, image.row_offset.assign(1, 0), image.change.clear();
+  total.start(columns);
+  RowOfParts row(parts);
+  for (std::uint32_t r = 0; r < rows; ++r) {
+    row.start(r);
+    for (std::uint32_t at = row.next(0); at != UINT32_MAX; at = row.next(at)) {
+      const std::uint32_t stop = row.end(at);
+      std::uint8_t used = 0, most = 0;
+      std::size_t owner = 0;
+      for (std::size_t i = parts.size(); i-- > 0;) {
+        const std::uint8_t level = std::min<std::uint8_t>(row.level(i, at), static_cast<std::uint8_t>(full - used));
+        out.part[i].append(at, stop, level);
+        used = static_cast<std::uint8_t>(used + level);
+        if (level > most) most = level, owner = i;
+      }
+      total.append(at, stop, used);
+      if (used >= half_of(full)) append_run(out.owner[owner].row_offset.back(), at, stop, out.owner[owner]);
+      at = stop;
+    }
+    for (Levels& part : out.part) part.end_row();
+    for (Runs& image : out.owner) image.row_offset.push_back(static_cast<std::uint32_t>(image.change.size()));
+    total.end_row();
+  }
+  for (std::size_t i = 0; i < parts.size(); ++i) std::swap(*parts[i], out.part[i]);
+}
 
 void mirror(const LevelsView& image, bool x, bool y, Levels& result) {
   result.start(image.columns);

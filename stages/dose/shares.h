@@ -5,6 +5,7 @@
 
 #include <cstdint>
 #include <span>
+#include <vector>
 
 #include "stages/data/levels.h"
 #include "stages/data/runs.h"
@@ -36,6 +37,17 @@ struct ZoneSums {
   std::uint64_t asked_drops = 0;  // for them, rounded, however many may be jetted
 };
 ZoneSums sums_of(const LevelsView& zones, std::uint8_t full, const LayerDose& dose);
+
+/// Parts of a layer, in the order in which they are laid, whose voxels have one sum.
+struct ShareOut {
+  std::vector<Levels> part;  // scratch
+  std::vector<Runs> owner;   // of each part, the voxels half full or more of which it has most; of equals the last
+  std::uint64_t bytes() const;
+};
+/// Takes from parts what is too much: the last one keeps its level, and each one before it has at most what is left to `full`.
+/// parts  of one size; total  the sums, 1 .. full
+/// cost   O((rows + runs of all) x parts)
+void share_out(std::span<Levels* const> parts, std::uint8_t full, ShareOut& out, Levels& total);
 
 /// Pixels of two images that differ.
 struct Difference {

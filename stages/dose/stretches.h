@@ -6,6 +6,7 @@
 #include <span>
 #include <vector>
 
+#include "stages/data/grid.h"
 #include "stages/data/layer.h"
 
 namespace lamina::dose {
@@ -14,6 +15,7 @@ namespace lamina::dose {
 struct ZoneBox {
   std::uint32_t zone = 0;
   std::array<std::int64_t, 3> low{}, high{};
+  std::array<std::int64_t, 3> origin{};  // corner of the part, from which a formula of its own counts
 };
 
 /// A bound by boxes: what is told not to be there is not there; what is told to be there may be absent.
@@ -38,6 +40,25 @@ class Stretches {
 
   bool everywhere_ = true;
   std::vector<Spans> all_, core_;  // by zone
+};
+
+/// How many pixels of a layer boxes cover at most.
+class Covered {
+ public:
+  Covered() = default;
+  Covered(std::span<const ZoneBox> boxes, const PixelGrid& grid);
+  /// Of the boxes that a layer meets, each by itself; at most the bed. cost  O(log boxes)
+  std::uint64_t pixels(std::int64_t bottom, std::int64_t top) const;
+
+ private:
+  struct Step {
+    std::int64_t at = 0;
+    std::uint64_t pixels = 0;  // of all boxes that begin, or end, there or below
+  };
+  static std::uint64_t below(const std::vector<Step>& steps, std::int64_t at);
+
+  std::vector<Step> begin_, end_;
+  std::uint64_t bed_ = 0;
 };
 
 }  // namespace lamina::dose

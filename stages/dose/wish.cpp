@@ -7,7 +7,7 @@
 namespace lamina::dose {
 namespace {
 
-bool differs(const Wish& wish) { return wish.of_core() != wish.percent; }
+bool differs(const Wish& wish) { return !(wish.of_core() == wish.percent); }
 
 double per_cent(Drops24 drops, const Binder& binder, const PixelGrid& grid, std::int64_t thickness_nm) {
   return saturation_of(static_cast<double>(drops) / static_cast<double>(kOneDrop), binder, grid, thickness_nm);
@@ -16,7 +16,7 @@ double per_cent(Drops24 drops, const Binder& binder, const PixelGrid& grid, std:
 }  // namespace
 
 std::size_t Wishes::place_of(const Layer& layer, std::uint32_t zone) const {
-  if (zone > 0 && own[zone - 1]) return ranges.size() + zone;
+  if (is_own(zone)) return ranges.size() + zone;
   const Nm plane = layer.plane();
   for (std::size_t place = ranges.size(); place > 0; --place) {
     const WishRange& range = ranges[place - 1];
@@ -30,12 +30,17 @@ bool Wishes::has_core() const {
          std::ranges::any_of(own, [](const std::optional<Wish>& wish) { return wish && differs(*wish); });
 }
 
+bool Wishes::has_formula() const {
+  return all.has_formula() || std::ranges::any_of(ranges, [](const WishRange& range) { return range.wish.has_formula(); }) ||
+         std::ranges::any_of(own, [](const std::optional<Wish>& wish) { return wish && wish->has_formula(); });
+}
+
 LayerDose dose_of(const Layer& layer, const Wishes& wishes, const Binder& binder, const PixelGrid& grid, std::uint32_t most,
                   std::uint32_t zone) {
   const Wish& wish = wishes.of(layer, zone);
   LayerDose dose;
-  dose.asked = wish.percent;
-  dose.asked_core = wish.of_core();
+  dose.asked = wish.percent.value;
+  dose.asked_core = wish.of_core().value;
   constexpr std::uint32_t kAny = 1u << 20;
   const Drops24 shell = drops_for(dose.asked, binder, grid, layer.thickness, kAny);
   const Drops24 core = drops_for(dose.asked_core, binder, grid, layer.thickness, kAny);

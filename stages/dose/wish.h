@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "stages/data/layer.h"
@@ -11,11 +12,27 @@
 
 namespace lamina::dose {
 
-/// Per cent of the voids; the core is as the shell if none is stated.
+/// Per cent of the voids: a number, or a formula of the place (field.h).
+struct Percent {
+  double value = 0;
+  std::string formula;  // of x, y and z in mm; empty: the value
+
+  Percent() = default;
+  Percent(double of_voids) : value(of_voids) {}
+  static Percent of(std::string text) {
+    Percent percent;
+    percent.formula = std::move(text);
+    return percent;
+  }
+  bool operator==(const Percent&) const = default;
+};
+
+/// The core is as the shell if none is stated.
 struct Wish {
-  double percent = 0;
-  std::optional<double> core_percent;
-  double of_core() const { return core_percent.value_or(percent); }
+  Percent percent;
+  std::optional<Percent> core_percent;
+  const Percent& of_core() const { return core_percent ? *core_percent : percent; }
+  bool has_formula() const { return !percent.formula.empty() || !of_core().formula.empty(); }
   bool operator==(const Wish&) const = default;
 };
 
@@ -38,11 +55,15 @@ struct Wishes {
     if (place > ranges.size()) return *own[place - ranges.size() - 1];
     return place == 0 ? all : ranges[place - 1].wish;
   }
+  /// Whether a layer's wish is one of a part, whose formulas count from the part's corner.
+  bool is_own(std::uint32_t zone) const { return zone > 0 && own[zone - 1].has_value(); }
+  /// Whether any is a formula.
+  bool has_formula() const;
   /// Whether shell and core differ anywhere.
   bool has_core() const;
 };
 
-/// What a layer gets.
+/// What a layer gets, of numbers: of a formula 0.
 struct LayerDose {
   Drops24 shell = 0, core = 0;                // a pixel, at most as many as may be jetted
   Drops24 asked_shell = 0, asked_inside = 0;  // however many
@@ -64,7 +85,7 @@ inline LayerDose one_drop() {
   return dose;
 }
 
-/// most  drops a pixel, 1 .. kMostDrops
+/// most  drops a pixel, 1 .. kMostDrops; of numbers
 LayerDose dose_of(const Layer& layer, const Wishes& wishes, const Binder& binder, const PixelGrid& grid, std::uint32_t most,
                   std::uint32_t zone = 0);
 

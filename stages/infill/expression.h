@@ -1,10 +1,12 @@
-// stages/infill/expression.h: a gap as a formula, on muParser.
+// stages/infill/expression.h: a gap as a formula.
 #pragma once
 
-#include <memory>
 #include <string>
+#include <string_view>
+#include <utility>
 
 #include "stages/data/status.h"
+#include "stages/data/text/formula.h"
 
 namespace lamina::infill {
 
@@ -14,8 +16,7 @@ namespace lamina::infill {
 ///   i  number of the line before the gap                    s  mm, its distance from the part's side, across the lines
 ///   u  the same as a share of the part's extent, 0 .. 1
 /// (s and u of what lies outside of the part are those of its nearer side)
-/// with + - * / ^, comparisons, `c ? x : y`, min, max, abs, sqrt, exp, ln, sin, cos, tan, rint and _pi (muParser 2.3).
-/// Names are not assigned to. Not shared between threads.
+/// with what a Formula has (stages/data/text/formula.h). Not shared between threads.
 class Expression {
  public:
   struct Variables {
@@ -23,18 +24,15 @@ class Expression {
   };
   /// errors  kUsage: what is wrong, and at which character
   static Result<Expression> parse(const std::string& text);
-  Expression(Expression&&) noexcept;
-  ~Expression();
 
   /// Whether the formula looks at a variable.
-  bool uses(const std::string& variable) const;
+  bool uses(std::string_view variable) const { return formula_.uses(variable); }
   /// errors  kUsage: no finite number, and for which variables
   Result<double> operator()(const Variables& variables);
 
  private:
-  Expression();
-  struct State;
-  std::unique_ptr<State> state_;
+  explicit Expression(Formula formula) : formula_(std::move(formula)) {}
+  Formula formula_;
 };
 
 }  // namespace lamina::infill

@@ -15,8 +15,16 @@ void MaterialImages::start(std::size_t materials, std::uint32_t columns, std::ui
   }
 }
 
-void MaterialImages::lay(std::uint32_t material, const RunsView& section, Runs& whole) {
+void MaterialImages::lay(std::uint32_t material, const RunsView& section, Runs& whole, bool parity) {
   if (section.change.empty()) return;
+  if (parity) {
+    Runs own, others;
+    combine(section, whole, SetOperation::kDifference, own);
+    combine(whole, section, SetOperation::kDifference, others);
+    keep(others);
+    std::swap(whole, others);
+    return lay(material, own, whole);
+  }
   for (std::uint32_t m = 0; m < image.size(); ++m) {
     if (m != material && image[m].change.empty()) continue;
     combine(image[m], section, m == material ? SetOperation::kUnion : SetOperation::kDifference, scratch);

@@ -16,7 +16,8 @@ struct MaterialImages {
 
   void start(std::size_t materials, std::uint32_t columns, std::uint32_t rows);
   /// Lays a solid's section over the others: it is set in `whole` and in its material's image, and in no other one.
-  void lay(std::uint32_t material, const RunsView& section, Runs& whole);
+  /// parity  what is set in both becomes neither (even-odd over all solids)
+  void lay(std::uint32_t material, const RunsView& section, Runs& whole, bool parity = false);
   /// Keeps only what is set in `whole`.
   void keep(const RunsView& whole);
   std::uint64_t bytes() const;

@@ -47,7 +47,7 @@ std::string fault_of_images(const ManifestHead& head) {
   if (grey ? !right || head.most_drops > 0 : head.levels > 0 && (!right || head.most_drops == 0)) {
     return no_such("levels", fmt::format("{}", head.levels));
   }
-  if (head.levels > 0 && !head.materials.empty()) return no_such("materials", head.materials.front().name);
+  if (grey && !head.materials.empty()) return no_such("materials", head.materials.front().name);
   if (grey && !head.machine.empty()) {
     return no_such("machine", head.machine);
   }

@@ -68,8 +68,8 @@ Job unusual_job(const Directory& directory) {
   job.dose.core = 0.75;
   job.dose.bead_ends = raster::BeadEnds::kSquare;
   job.dose.saturation_percent = 70;
-  job.dose.core_saturation_percent = 45.5;
-  job.dose.saturation_ranges = {{1, 2.5, 80, 60}};
+  job.dose.core_saturation_percent = Saturation::of("x < 3 ? 45.5 : min(z, 2)");
+  job.dose.saturation_ranges = {{1, 2.5, 80, 60}, {3, 4, Saturation::of("9*x"), Saturation::of("8*y")}};
   job.dose.dithered = false;
   job.levels = 4;
   job.inspect = true;
@@ -103,7 +103,7 @@ Job unusual_job(const Directory& directory) {
   part.bleed_um = {{-30, -20}};
   part.hole_bleed_um = {{10, 0}};
   part.saturation_percent = 55;
-  part.core_saturation_percent = 33.5;
+  part.core_saturation_percent = Saturation::of("33.5-z");
   job.parts = {part, PartRequest{.path = directory / "second.stl"}};
   return job;
 }

@@ -176,9 +176,6 @@ TEST_F(LevelJobs, OfWhatHasNoSharesAreRefused) {
   test::expect_refused(job + "--heights cusp --thickness 0.05,0.1 --containment inside", 2, "--containment", folder_);
   test::expect_refused(kTenthsOfBox + std::string("--levels 3 -o out"), 2, "none of off, 2, 4, 16", folder_);
   test::expect_refused(kTenthsOfBox + std::string("--no-dither -o out"), 2, "add --levels or --saturation", folder_);
-  test::write_box(folder_ / "other.stl", {0, 0, 0}, {1, 1, 0.25f});
-  test::expect_refused("jet box.stl other.stl --material steel,bronze --layer 0.1 --dpi 254 --bed 9x9 --levels 4 -o out", 2,
-                       "one material", folder_);
 }
 
 }  // namespace
