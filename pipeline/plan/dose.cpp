@@ -33,10 +33,22 @@ void DosePlan::thin(std::uint32_t layer, Runs& image, Runs& second, Runs& third)
   std::swap(image, second);
 }
 
-Status DosePlan::decide(const Job& job, const Machine* machine, const Scene& scene, std::uint32_t layers,
-                        const std::function<Layer(std::uint32_t)>& layer, std::vector<Warning>& warnings) {
+Status DosePlan::decide(const Job& job, const Machine* machine, std::uint32_t sweep_drops, const Scene& scene,
+                        std::uint32_t layers, const std::function<Layer(std::uint32_t)>& layer, std::vector<Warning>& warnings) {
   const bool asked = wishes_.has_value();
-  if (asked || (job.levels > 0 && write::find_level_format(job.format) == nullptr)) rules_.most_drops = 1;
+  // Without a machine, formats that carry levels have those of the voxels.
+  if (asked || (job.levels > 0 && (machine != nullptr || write::find_level_format(job.format) == nullptr))) rules_.most_drops = 1;
+  // Levels that are not dithered are drops to a head that fires several.
+  if (machine != nullptr && machine->head.most_drops > 1 && rules_.full > 0 && !rules_.dithered && !asked) full_drops_ = rules_.full;
+  rules_.most_drops *= full_drops_;
+  limit_ = dose::kMostDrops;
+  if (machine != nullptr && machine->head.most_drop_sweeps > 0)
+    limit_ = std::min(limit_, machine->head.most_drop_sweeps * sweep_drops);
+  if (full_drops_ > limit_) {
+    return Error{Fault::kUsage, fmt::format("--levels {}: {} drops of a full voxel, {} can be jetted (head.most_drop_sweeps of {} in "
+                                            "each); choose fewer levels, or give --saturation",
+                                            rules_.full + 1, full_drops_, limit_, sweep_drops)};
+  }
   if (machine == nullptr || machine->head.drop_pl == 0) {
     if (!asked) return {};
     return Error{Fault::kUsage, fmt::format("--saturation: {}",
@@ -45,10 +57,9 @@ Status DosePlan::decide(const Job& job, const Machine* machine, const Scene& sce
   }
   const auto& powder = machine->powder;
   binder_ = {machine->head.drop_pl, powder.evaporates_percent / 100, powder.packing};
-  limit_ = machine->head.most_drop_sweeps > 0 ? machine->head.most_drop_sweeps : dose::kMostDrops;
   const auto pitch = static_cast<std::int64_t>(std::ceil(1 / std::min(grid_.x.pixels_per_nm(), grid_.y.pixels_per_nm())));
   budget_.emplace(binder_, grid_, wishes_, limit_, powder.least_saturation_percent,
-                  dose::Jetting{rules_.dithered, !rules_.shell.half_width.empty(), core_},
+                  dose::Jetting{rules_.dithered, !rules_.shell.half_width.empty(), core_, full_drops_},
                   dose::Stretches(zone_boxes(scene, zones_, grid_), zones_.count(), nm_of(job.dose.shell_mm), pitch));
   for (std::uint32_t i = 0; i < layers; ++i) budget_->foresee(layer(i));
   if (asked) rules_.most_drops = std::max(1u, budget_->most_drops());
@@ -58,7 +69,7 @@ Status DosePlan::decide(const Job& job, const Machine* machine, const Scene& sce
 dose::ZoneSums DosePlan::saturate(const Layer& layer, Runs& image, std::span<const Runs> zone, Runs& second,
                                   dose::DropWork& work) const {
   const auto dose_of = [&](std::uint32_t z) {
-    dose::LayerDose dose = wishes_ ? dose::dose_of(layer, *wishes_, binder_, grid_, limit_, z) : dose::one_drop();
+    dose::LayerDose dose = wishes_ ? dose::dose_of(layer, *wishes_, binder_, grid_, limit_, z) : dose::one_drop(full_drops_);
     // Of shares of voxels the drops of each are rounded, not those of full ones.
     if (wishes_ && !rules_.dithered && zones_.several()) dose::round_drops(dose, binder_, grid_, layer.thickness);
     return dose;

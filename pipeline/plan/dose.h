@@ -26,9 +26,11 @@ class DosePlan {
  public:
   DosePlan(const Job& job, const PixelGrid& grid);
 
-  /// Decides the drops of all layers of a job. machine  null without one
+  /// Decides the drops of all layers of a job.
+  /// machine      null without one
+  /// sweep_drops  of a pixel in one sweep
   /// errors  kUsage: a saturation without a machine; less than the powder needs; shares of voxels that are thinned
-  Status decide(const Job& job, const Machine* machine, const Scene& scene, std::uint32_t layers,
+  Status decide(const Job& job, const Machine* machine, std::uint32_t sweep_drops, const Scene& scene, std::uint32_t layers,
                 const std::function<Layer(std::uint32_t)>& layer, std::vector<Warning>& warnings);
 
   /// Whether the dose changes any layer.
@@ -67,7 +69,7 @@ class DosePlan {
   PixelGrid grid_;
   std::optional<dose::Wishes> wishes_;
   dose::Binder binder_;
-  std::uint32_t limit_ = 0;
+  std::uint32_t limit_ = 0, full_drops_ = 1;  // full_drops: of a full pixel without a wish
   std::optional<dose::Budget> budget_;
 };
 

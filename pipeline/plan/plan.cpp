@@ -260,6 +260,15 @@ class Planner {
     return {};
   }
 
+  /// errors  kUsage: drops of several materials as grey, or more than a pixel of 4 bits tells
+  Status check_grey_drops(std::uint32_t most_drops) const {
+    if (most_drops == 0 || write::find_level_format(job().format) == nullptr) return {};
+    if (materials_.several())
+      return usage(fmt::format("--format {}: drops of several materials have images of 1 bit; choose tiff-g4", job().format));
+    if (job().format != "tiff-4" || most_drops <= 15) return {};
+    return usage(fmt::format("--format tiff-4: tells up to 15 drops of a pixel, the job has {}; choose tiff-8", most_drops));
+  }
+
   Status index_images() {
     if (!images()) return {};
     const PixelGrid grid = printer_.grid;
@@ -289,8 +298,10 @@ class Planner {
     if (beads_) beads.emplace(job(), grid, *plan_.sections, *plan_.segments);
     const double bed = static_cast<double>(grid.columns()) * grid.rows();
     const auto layer = [this](std::uint32_t i) { return plan_.layer(i); };
-    if (Status status = dose.decide(job(), machine(), *plan_.scene, plan_.layer_count, layer, plan_.warnings); !status)
+    const std::uint32_t sweep_drops = printer_.machine ? printer_.machine->grid.sweep_drops : 1;
+    if (Status status = dose.decide(job(), machine(), sweep_drops, *plan_.scene, plan_.layer_count, layer, plan_.warnings); !status)
       return status;
+    if (Status status = check_grey_drops(dose.most_drops()); !status) return status;
     if (dose.most_drops() > 1 && materials_.several()) {
       return usage("--saturation: several drops a pixel of several materials are not planned together; plan them apart");
     }
@@ -355,10 +366,11 @@ Result<Resolved> resolve(const Job& job, Product product) {
     resolved.bed = printer->bed;
     resolved.printer = std::move(*printer);
     if (!write::extension_of(job.format)) return usage(fmt::format("unknown format '{}'", job.format));
-    if (write::find_level_format(job.format) != nullptr && (job.levels == 0 || resolved.printer->machine)) {
-      return usage(fmt::format("--format {}: carries shares of voxels, {}", job.format,
-                               job.levels == 0 ? "and none are asked for; add --levels 2, 4 or 16"
-                                               : "and print programs fire drops; choose a 1-bit format"));
+    const bool dosed = job.levels > 0 || (resolved.printer->machine && job.dose.saturation_percent);
+    if (write::find_level_format(job.format) != nullptr && !dosed) {
+      return usage(fmt::format("--format {}: carries shares of voxels, or of a machine drops, and none are asked for; add "
+                               "--levels 2, 4 or 16, or --machine and --saturation",
+                               job.format));
     }
     return resolved;
   }

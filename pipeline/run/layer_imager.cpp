@@ -8,6 +8,7 @@
 #include "stages/raster/combine.h"
 #include "stages/raster/mirror.h"
 #include "stages/read/placed.h"
+#include "stages/write/levels/level_format.h"
 
 namespace lamina::pipeline {
 namespace {
@@ -197,6 +198,7 @@ void LayerImager::dose(const Layer& layer, ImageWork& work, LayerRecord& record)
     record.dosed_pixels = sums.full_voxels;
     record.asked_drops = sums.asked_drops;
     record.drops = sum_of_levels(work.drops.levels);
+    record.most_drops = highest(work.drops.levels);
   } else if (plan_.job.levels > 0) {
     at_least(work.drops.shares, 1, work.runs);
     record.dosed_pixels = dose::sums_of(work.drops.shares, images.dose.full(), dose::one_drop()).full_voxels;
@@ -206,7 +208,8 @@ void LayerImager::dose(const Layer& layer, ImageWork& work, LayerRecord& record)
   const auto add_image = [&](const Runs& image) {
     record.images.push_back({.bytes = 0, .set_pixels = set_pixels(image), .unfed_pixels = 0, .hash = {}});
   };
-  if (images.dose.most_drops() > 1) std::ranges::for_each(work.drops.planes, add_image);
+  const bool grey = write::find_level_format(plan_.job.format) != nullptr;
+  if (images.dose.most_drops() > 1 && !grey) std::ranges::for_each(work.drops.planes, add_image);
   std::ranges::for_each(work.materials.image, add_image);
 }
 

@@ -68,6 +68,13 @@ inline std::uint64_t sum_of_levels(const LevelsView& image) {
   return sum;
 }
 
+/// The highest level of any pixel; 0 of an empty image.
+inline std::uint8_t highest(const LevelsView& image) {
+  std::uint8_t most = 0;
+  for (const std::uint8_t level : image.level) most = most < level ? level : most;
+  return most;
+}
+
 /// The pixels whose level is at least `least` (> 0): the plane of the drop of that number.
 inline void at_least(const LevelsView& image, std::uint8_t least, Runs& plane) {
   plane.columns = image.columns;
