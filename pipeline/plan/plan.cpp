@@ -261,7 +261,7 @@ class Planner {
   }
 
   /// errors  kUsage: drops of several materials as grey, or more than a pixel of 4 bits tells
-  Status check_grey_drops(std::uint32_t most_drops) const {
+  Status check_grey_drops(std::uint32_t most_drops) {
     if (most_drops == 0 || write::find_level_format(job().format) == nullptr) return {};
     if (materials_.several())
       return usage(fmt::format("--format {}: drops of several materials have images of 1 bit; choose tiff-g4", job().format));

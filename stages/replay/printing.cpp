@@ -156,6 +156,7 @@ void Printing::fire(std::uint32_t number, std::uint32_t drops) {
     of_bit = (of_bit & ~(std::uint64_t{1} << bit)) | std::uint64_t{times >> b & 1} << bit;
   }
   count.drops += drops;
+  count.most_at_place = std::max(count.most_at_place, drops);
   count.farthest_along_um = std::max(count.farthest_along_um, std::abs(nozzle.along_um));
   count.farthest_across_um = std::max(count.farthest_across_um, std::abs(nozzle.across_um));
   for (std::uint32_t k = 0; watch_ != nullptr && k < drops; ++k) {

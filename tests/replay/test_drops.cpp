@@ -114,6 +114,7 @@ TEST_P(GreyDrops, AreReplayedDropForDrop) {
     ASSERT_TRUE(same.ok()) << most << " " << allowed << ": " << same.error().message;
     EXPECT_EQ(same->drops, program.count.drops);
     EXPECT_EQ(same->sweeps, numbers.size());
+    EXPECT_EQ(same->most_at_place, std::min(3u, allowed));
     EXPECT_FALSE(replay(resolved.machine, std::array<RunsView, 3>{views[0], views[1], views[1]}).ok());
     EXPECT_FALSE(replay(resolved.machine, std::span(views).first(2)).ok());
     const std::uint32_t fired = std::min(3u, allowed);
