@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "stages/dose/saturate.h"
 #include "stages/write/levels/level_format.h"
@@ -34,20 +35,24 @@ void DosePlan::thin(std::uint32_t layer, Runs& image, Runs& second, Runs& third)
 }
 
 Status DosePlan::decide(const Job& job, const Machine* machine, std::uint32_t sweep_drops, const Scene& scene,
-                        std::uint32_t layers, const std::function<Layer(std::uint32_t)>& layer, std::vector<Warning>& warnings) {
+                        std::uint32_t layers, const std::function<Layer(std::uint32_t)>& layer,
+                        std::vector<Warning>& warnings) {
   const bool asked = wishes_.has_value();
   // Without a machine, formats that carry levels have those of the voxels.
-  if (asked || (job.levels > 0 && (machine != nullptr || write::find_level_format(job.format) == nullptr))) rules_.most_drops = 1;
+  if (asked || (job.levels > 0 && (machine != nullptr || write::find_level_format(job.format) == nullptr)))
+    rules_.most_drops = 1;
   // Levels that are not dithered are drops to a head that fires several.
-  if (machine != nullptr && machine->head.most_drops > 1 && rules_.full > 0 && !rules_.dithered && !asked) full_drops_ = rules_.full;
+  if (machine != nullptr && machine->head.most_drops > 1 && rules_.full > 0 && !rules_.dithered && !asked)
+    full_drops_ = rules_.full;
   rules_.most_drops *= full_drops_;
   limit_ = dose::kMostDrops;
   if (machine != nullptr && machine->head.most_drop_sweeps > 0)
     limit_ = std::min(limit_, machine->head.most_drop_sweeps * sweep_drops);
   if (full_drops_ > limit_) {
-    return Error{Fault::kUsage, fmt::format("--levels {}: {} drops of a full voxel, {} can be jetted (head.most_drop_sweeps of {} in "
-                                            "each); choose fewer levels, or give --saturation",
-                                            rules_.full + 1, full_drops_, limit_, sweep_drops)};
+    return Error{Fault::kUsage,
+                 fmt::format("--levels {}: {} drops of a full voxel, {} can be jetted (head.most_drop_sweeps of {} in "
+                             "each); choose fewer levels, or give --saturation",
+                             rules_.full + 1, full_drops_, limit_, sweep_drops)};
   }
   if (machine == nullptr || machine->head.drop_pl == 0) {
     if (!asked) return {};
@@ -64,6 +69,17 @@ Status DosePlan::decide(const Job& job, const Machine* machine, std::uint32_t sw
   for (std::uint32_t i = 0; i < layers; ++i) budget_->foresee(layer(i));
   if (asked) rules_.most_drops = std::max(1u, budget_->most_drops());
   return budget_->judge(job.allow_unbound, warnings);
+}
+
+Status DosePlan::check_images(std::string_view format, bool several) const {
+  const auto refuse = [](std::string text) { return Error{Fault::kUsage, std::move(text)}; };
+  const bool grey = saturates() && write::find_level_format(format) != nullptr;
+  if (several && grey)
+    return refuse(fmt::format("--format {}: drops of several materials have images of 1 bit; choose tiff-g4", format));
+  if (several && most_drops() > 1)
+    return refuse("--saturation: several drops a pixel of several materials are not planned together; plan them apart");
+  if (!grey || format != "tiff-4" || most_drops() <= 15) return {};
+  return refuse(fmt::format("--format tiff-4: tells up to 15 drops of a pixel, the job has {}; choose tiff-8", most_drops()));
 }
 
 dose::ZoneSums DosePlan::saturate(const Layer& layer, Runs& image, std::span<const Runs> zone, Runs& second,

@@ -4,6 +4,7 @@
 #include <functional>
 #include <optional>
 #include <span>
+#include <string_view>
 #include <vector>
 
 #include "pipeline/job/job.h"
@@ -32,6 +33,10 @@ class DosePlan {
   /// errors  kUsage: a saturation without a machine; less than the powder needs; shares of voxels that are thinned
   Status decide(const Job& job, const Machine* machine, std::uint32_t sweep_drops, const Scene& scene, std::uint32_t layers,
                 const std::function<Layer(std::uint32_t)>& layer, std::vector<Warning>& warnings);
+
+  /// Whether images of a format carry the drops, decided before. several  materials
+  /// errors  kUsage: several drops or grey ones of several materials; more than pixels of 4 bits tell
+  Status check_images(std::string_view format, bool several) const;
 
   /// Whether the dose changes any layer.
   bool any() const { return bleeds() || core_ < 1 || saturates(); }

@@ -260,15 +260,6 @@ class Planner {
     return {};
   }
 
-  /// errors  kUsage: drops of several materials as grey, or more than a pixel of 4 bits tells
-  Status check_grey_drops(std::uint32_t most_drops) {
-    if (most_drops == 0 || write::find_level_format(job().format) == nullptr) return {};
-    if (materials_.several())
-      return usage(fmt::format("--format {}: drops of several materials have images of 1 bit; choose tiff-g4", job().format));
-    if (job().format != "tiff-4" || most_drops <= 15) return {};
-    return usage(fmt::format("--format tiff-4: tells up to 15 drops of a pixel, the job has {}; choose tiff-8", most_drops));
-  }
-
   Status index_images() {
     if (!images()) return {};
     const PixelGrid grid = printer_.grid;
@@ -299,12 +290,10 @@ class Planner {
     const double bed = static_cast<double>(grid.columns()) * grid.rows();
     const auto layer = [this](std::uint32_t i) { return plan_.layer(i); };
     const std::uint32_t sweep_drops = printer_.machine ? printer_.machine->grid.sweep_drops : 1;
-    if (Status status = dose.decide(job(), machine(), sweep_drops, *plan_.scene, plan_.layer_count, layer, plan_.warnings); !status)
+    if (Status status = dose.decide(job(), machine(), sweep_drops, *plan_.scene, plan_.layer_count, layer, plan_.warnings);
+        !status)
       return status;
-    if (Status status = check_grey_drops(dose.most_drops()); !status) return status;
-    if (dose.most_drops() > 1 && materials_.several()) {
-      return usage("--saturation: several drops a pixel of several materials are not planned together; plan them apart");
-    }
+    if (Status status = dose.check_images(job().format, materials_.several()); !status) return status;
     plan_.images.emplace(ImagePlan{std::move(printer_.machine), grid, std::move(materials_), std::move(*solids),
                                    std::move(dose), std::move(beads), static_cast<std::uint64_t>(std::min(covered, bed))});
     end_indexing();
@@ -368,9 +357,10 @@ Result<Resolved> resolve(const Job& job, Product product) {
     if (!write::extension_of(job.format)) return usage(fmt::format("unknown format '{}'", job.format));
     const bool dosed = job.levels > 0 || (resolved.printer->machine && job.dose.saturation_percent);
     if (write::find_level_format(job.format) != nullptr && !dosed) {
-      return usage(fmt::format("--format {}: carries shares of voxels, or of a machine drops, and none are asked for; add "
-                               "--levels 2, 4 or 16, or --machine and --saturation",
-                               job.format));
+      return usage(
+          fmt::format("--format {}: carries shares of voxels, or of a machine drops, and none are asked for; add "
+                      "--levels 2, 4 or 16, or --machine and --saturation",
+                      job.format));
     }
     return resolved;
   }

@@ -14,8 +14,8 @@
 namespace lamina::pipeline {
 namespace {
 
-/// Pixels and layers of 100 um, of which half are voids: 500 pl, 5 drops of 100 pl. At 10 mm/s nozzles pass 100 places a second,
-/// so that 350 Hz are 3 of the head's 7 drops. One swath of 64 lines is wider than the bed.
+/// Pixels and layers of 100 um, of which half are voids: 500 pl, 5 drops of 100 pl. At 10 mm/s nozzles pass 100 places a
+/// second, so that 350 Hz are 3 of the head's 7 drops. One swath of 64 lines is wider than the bed.
 constexpr const char* kHead = R"([machine]
 name = "seven"
 dialect = "planes"
@@ -80,9 +80,10 @@ TEST_F(GreyHeads, FireWhatTheirFrequencyAllowsAndTellWhatThatAdds) {
     EXPECT_EQ(json["saturation"]["most_jetted_drops"], 5);
   }
   const test::Outcome told = lamina(kBox + std::string("--dry-run"));
-  EXPECT_NE(told.err.find("2 over a place for up to 5 drops a pixel: 350 Hz allow 3 of the head's 7 drops at 10 mm/s, all of them "
-                          "at 5.0 mm/s; that adds 2 sweeps, 2.50 s"),
-            std::string::npos)
+  EXPECT_NE(
+      told.err.find("2 over a place for up to 5 drops a pixel: 350 Hz allow 3 of the head's 7 drops at 10 mm/s, all of them "
+                    "at 5.0 mm/s; that adds 2 sweeps, 2.5 s"),
+      std::string::npos)
       << told.err;
   const auto records = records_of("out");
   ASSERT_EQ(records.size(), 2u);
