@@ -62,8 +62,9 @@ void Printing::compare_plane(const RunsView& image, std::uint32_t plane, std::ui
   };
   std::vector<std::uint64_t>& wanted = differ.wanted;
   for (std::uint32_t row = 0; row < image.rows(); ++row) {
-    std::fill(wanted.begin(), wanted.end(), 0);
     const auto line = image.row(row);
+    if (line.empty() && fires_row_[row] == 0) continue;
+    std::fill(wanted.begin(), wanted.end(), 0);
     for (std::size_t i = 0; i + 1 < line.size(); i += 2) {
       for (std::uint32_t c = line[i]; c < line[i + 1];) {
         const std::uint32_t to = std::min((c / 64 + 1) * 64, line[i + 1]);

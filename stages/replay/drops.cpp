@@ -36,6 +36,7 @@ void Printing::fire(std::uint32_t number, std::uint32_t drops) {
   for (std::uint32_t b = 0; b < times_bits_; ++b) {
     fired[b] = (fired[b] & ~(std::uint64_t{1} << bit)) | std::uint64_t{times >> b & 1} << bit;
   }
+  fires_row_[row] = 1;
   count.drops += drops;
   count.most_at_place = std::max(count.most_at_place, drops);
   count.farthest_along_um = std::max(count.farthest_along_um, std::abs(nozzle.along_um));

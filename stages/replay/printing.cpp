@@ -24,7 +24,8 @@ Printing::Printing(const VirtualMachine& machine, const Layer& layer, Purpose pu
       roller_mm_(machine.machine_.powder.roller_mm[0]),
       planes_(planes),
       times_bits_(static_cast<std::uint32_t>(std::bit_width(planes))),
-      fired_(purpose == Purpose::kPrint ? std::size_t{row_words_} * machine.rows_ * times_bits_ : 0, 0) {}
+      fired_(purpose == Purpose::kPrint ? std::size_t{row_words_} * machine.rows_ * times_bits_ : 0, 0),
+      fires_row_(purpose == Purpose::kPrint ? machine.rows_ : 0, 0) {}
 
 Standing Printing::standing() const {
   const auto& motion = profile().motion;

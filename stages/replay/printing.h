@@ -153,7 +153,8 @@ class Printing {
   double seconds_ = 0;
   bool backward_ = false, sweeping_ = false, stepped_ = false, fired_here_ = false;
   std::uint32_t planes_, times_bits_;
-  std::vector<std::uint64_t> fired_;  // how many times, for 64 pixels a word for each bit of it, the leftmost one in bit 0
+  std::vector<std::uint64_t> fired_;     // how many times, for 64 pixels a word for each bit of it, the leftmost one in bit 0
+  std::vector<std::uint8_t> fires_row_;  // whether anything is fired there
   std::vector<Sweep> sweeps_;
   std::uint32_t strokes_ = 0;          // of the roller to its far end
   double spat_s_ = -1, wiped_s_ = -1;  // when the layer's last care ended; -1: none yet
