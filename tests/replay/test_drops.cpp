@@ -261,6 +261,27 @@ TEST(AddedSweeps, TakeTheTimeOfTheirWays) {
   }
 }
 
+// Two places of two sweeps each: without the second ones the head would run there over the first place and back over the other.
+TEST(AddedSweeps, AreComparedWithSweepsThatRunBothWays) {
+  const auto resolved = printed_parts::shipped("jet1000", [](Machine& machine) { machine.motion.both_directions = true; });
+  const auto machine =
+      replay::VirtualMachine::build(resolved.machine, resolved.grid.image.columns(), resolved.grid.image.rows());
+  ASSERT_TRUE(machine.ok());
+  replay::Timer all(*machine), needed(*machine);
+  all.begin(printed_parts::kLayer);
+  needed.begin(printed_parts::kLayer);
+  all.sweep(10, false, 0, 1000);
+  all.sweep(10, true, 1000, 0, true);
+  all.sweep(40, false, 0, 1000);
+  all.sweep(40, true, 1000, 0, true);
+  needed.sweep(10, false, 0, 1000);
+  needed.sweep(40, true, 1000, 0);
+  const auto with = all.end(), without = needed.end();
+  ASSERT_TRUE(with.ok() && without.ok());
+  EXPECT_EQ(all.added_microseconds(), with->microseconds - without->microseconds);
+  EXPECT_GT(all.added_microseconds(), 0);
+}
+
 INSTANTIATE_TEST_SUITE_P(AllDialects, Drops,
                          testing::Values("nuferbj", "brundlefab", "hp45", "oasis", "reprap-inkjet", "xaar128-raw", "jet1000"));
 
