@@ -3,12 +3,13 @@
 #include <fmt/format.h>
 
 #include <filesystem>
+#include <utility>
 
 #include "pipeline/machine/profiles.h"
 #include "pipeline/output/print_program.h"
 #include "stages/data/input/file_reader.h"
+#include "stages/data/levels.h"
 #include "stages/raster/materials.h"
-#include "stages/read/image.h"
 
 namespace lamina::pipeline {
 namespace {
@@ -38,7 +39,25 @@ std::string program_of_layer(const std::string& directory, const ManifestHead& h
   return whole_file(fs::path(directory) / program_file_name(layer, head.program_extension), kMostProgramBytes);
 }
 
-bool add_picture(const ManifestHead& head, Runs&& image, LayerPicture& picture) {
+Result<read::Image> read_layer_image(const std::string& path, const ManifestHead& head, LayerPicture& drops) {
+  if (!head.grey_drops()) return read::image(path, head.full_level());
+  Levels levels;
+  auto image = read::levels(path, head.full_level(), levels);
+  if (!image) return image;
+  if (const std::uint32_t most = highest(levels); most > head.most_drops) {
+    return Error{Fault::kVerification,
+                 fmt::format("{}: has pixels of {} drops, the job at most {}", path, most, head.most_drops)};
+  }
+  drops.resize(head.most_drops);
+  for (std::uint32_t k = 0; k < head.most_drops; ++k) at_least(levels, static_cast<std::uint8_t>(k + 1), drops[k]);
+  return image;
+}
+
+bool add_picture(const ManifestHead& head, Runs&& image, LayerPicture&& drops, LayerPicture& picture) {
+  if (head.grey_drops()) {
+    picture = std::move(drops);
+    return true;
+  }
   if (head.materials.empty()) return raster::add_drop(std::move(image), picture);
   picture.resize(1);
   return raster::add_image(std::move(image), picture[0]);
@@ -47,12 +66,13 @@ bool add_picture(const ManifestHead& head, Runs&& image, LayerPicture& picture) 
 Result<LayerPicture> picture_of_layer(const std::string& directory, const ManifestHead& head, const LayerRecord& record) {
   LayerPicture picture;
   for (const LayerImageFile& file : layer_images(head, record)) {
-    auto image = read::image((fs::path(directory) / file.name).string(), head.full_level());
+    LayerPicture drops;
+    auto image = read_layer_image((fs::path(directory) / file.name).string(), head, drops);
     if (!image) return image.error();
     if (image->runs.columns != head.grid.columns() || image->runs.view().rows() != head.grid.rows()) {
       return Error{Fault::kVerification, fmt::format("{}: is not of the manifest's size", file.name)};
     }
-    if (!add_picture(head, std::move(image->runs), picture)) {
+    if (!add_picture(head, std::move(image->runs), std::move(drops), picture)) {
       return Error{Fault::kVerification,
                    fmt::format("{}: sets pixels {}", file.name,
                                head.materials.empty() ? "that get no drop before" : "of another material")};

@@ -7,6 +7,7 @@
 #include "pipeline/output/print_program.h"
 #include "stages/data/runs.h"
 #include "stages/data/status.h"
+#include "stages/read/image.h"
 #include "stages/replay/machine.h"
 #include "stages/write/manifest/compare.h"
 
@@ -22,8 +23,13 @@ std::string program_of_layer(const std::string& directory, const ManifestHead& h
 /// The images of a layer's drops, each within the one before; one, with all materials, where a pixel gets at most one drop.
 using LayerPicture = std::vector<Runs>;
 
+/// Reads an image of a layer; its runs are the pixels with any drop.
+/// drops   of a job whose images are grey drops: the pixels of each
+/// errors  kVerification, with the file: of read::image; more drops than the job has
+Result<read::Image> read_layer_image(const std::string& path, const ManifestHead& head, LayerPicture& drops);
+
 /// Adds an image of a layer, in the order of the manifest. returns  false if it contradicts those before
-bool add_picture(const ManifestHead& head, Runs&& image, LayerPicture& picture);
+bool add_picture(const ManifestHead& head, Runs&& image, LayerPicture&& drops, LayerPicture& picture);
 
 /// A layer on the manifest's grid; at least one image.
 /// errors  kVerification, with the file: of read::image; wrong size; two materials in one pixel; drops without the first

@@ -90,11 +90,12 @@ std::string fault_of_program(const Inspection& inspection, const LayerRecord& re
 // Empty, or the fault of an image; its set pixels are added to `picture`.
 std::string fault_of_image(const Inspection& inspection, const LayerImageFile& file, LayerPicture& picture) {
   const std::string& name = file.name;
-  Result<read::Image> image = read::image((fs::path(inspection.directory) / name).string(), inspection.head.full_level());
+  LayerPicture drops;
+  auto image = read_layer_image((fs::path(inspection.directory) / name).string(), inspection.head, drops);
   if (!image) return image.error().message;
   if (const std::string what = read::difference(*image, inspection.head.grid, file.record.set_pixels); !what.empty())
     return fmt::format("{}: {}", name, what);
-  if (!add_picture(inspection.head, std::move(image->runs), picture)) {
+  if (!add_picture(inspection.head, std::move(image->runs), std::move(drops), picture)) {
     return fmt::format("{}: sets pixels that {}", name,
                        inspection.head.materials.empty() ? "get no drop before" : "another material's image sets as well");
   }

@@ -47,6 +47,8 @@ ManifestHead image_head(const Plan& plan) {
   const std::string profile = read::kept_machine_text(machine);
   head.machine_profile = hash_bytes(std::as_bytes(std::span(profile)));
   const ProgramFrame frame = program_frame(*plan.images->machine, plan.layer_count);
+  head.head_drops = plan.images->machine->grid.head_drops;
+  head.sweep_drops = plan.images->machine->grid.sweep_drops;
   head.program_start = hash_bytes(frame.start);
   head.program_end = hash_bytes(frame.end);
   return head;
@@ -133,7 +135,7 @@ Status ImageFiles::encode(const LayerImages& images, Work& work, LayerRecord& re
     work.level_encoder->tag(tags);
   }
   if (head_.named_images() == 0) {
-    if (Status status = encode_one(images.whole, images.shares, work, record, work.file); !status) return status;
+    if (Status status = encode_one(images.whole, images.levels, work, record, work.file); !status) return status;
     record.bytes = work.file.size();
     record.hash = hash_bytes(work.file);
     return {};
@@ -142,7 +144,7 @@ Status ImageFiles::encode(const LayerImages& images, Work& work, LayerRecord& re
   for (std::size_t m = 0; m < images.several.size(); ++m) {
     if (!head_.materials.empty()) tags.material = head_.materials[m].name;
     work.encoder->tag(tags);
-    if (Status status = encode_one(images.several[m], images.shares, work, record, work.files[m]); !status) return status;
+    if (Status status = encode_one(images.several[m], images.levels, work, record, work.files[m]); !status) return status;
     record.images[m].bytes = work.files[m].size();
     record.images[m].hash = hash_bytes(work.files[m]);
     record.bytes += work.files[m].size();
@@ -150,12 +152,12 @@ Status ImageFiles::encode(const LayerImages& images, Work& work, LayerRecord& re
   return {};
 }
 
-Status ImageFiles::encode_one(const Runs& image, const Levels& shares, Work& work, const LayerRecord& record,
+Status ImageFiles::encode_one(const Runs& image, const Levels& levels, Work& work, const LayerRecord& record,
                               write::Bytes& file) const {
   file.clear();
   const double x = head_.grid.x.dpi(), y = head_.grid.y.dpi();
   const Status status = levels_ == nullptr ? work.encoder->encode(image, x, y, file)
-                                           : work.level_encoder->encode(shares, head_.full_level(), x, y, file);
+                                           : work.level_encoder->encode(levels, head_.full_level(), x, y, file);
   if (status) return {};
   return Error{status.error().fault, fmt::format("layer {}: {}", record.layer.index, status.error().message)};
 }

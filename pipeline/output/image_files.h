@@ -30,7 +30,7 @@ write::LayerTags tags_of(const Plan& plan, const Layer& layer);
 struct LayerImages {
   const Runs& whole;              // of all materials, or of the first drop
   std::span<const Runs> several;  // of each material, or of each drop of a pixel, if the job has several
-  const Levels& shares;           // of the voxels, for formats that carry them
+  const Levels& levels;           // shares of the voxels, or drops, for formats that carry them
 };
 
 class ImageFiles {
@@ -82,7 +82,7 @@ class ImageFiles {
   Status record_kept_below(std::uint32_t layer);
   Result<std::vector<std::uint32_t>> feeds_of(const LayerRecord& record) const;
   void tell_unfed(LayerRecord& record) const;
-  Status encode_one(const Runs& image, const Levels& shares, Work& work, const LayerRecord& record, write::Bytes& file) const;
+  Status encode_one(const Runs& image, const Levels& levels, Work& work, const LayerRecord& record, write::Bytes& file) const;
 
   const Plan& plan_;
   ManifestHead head_;

@@ -74,7 +74,7 @@ Status PrintProgram::write_layer(const Layer& layer, std::span<const RunsView> p
         if (!dialect_.has_motion) {
           const std::int64_t low = vectors.first_step, high = low + vectors.steps - 1;
           work.timer->sweep(static_cast<double>(write::across_nm(resolved_.machine, resolved_.grid, sweep.first_line)) / 1e6,
-                            sweep.backward, sweep.backward ? high : low, sweep.backward ? low : high);
+                            sweep.backward, sweep.backward ? high : low, sweep.backward ? low : high, sweep.added, sweep.drops);
         }
         if (file || dialect_.has_motion) work.writer->sweep(sweep, vectors, work.text);
         return work.text.size() < kPiece ? Status() : flush();
@@ -86,6 +86,8 @@ Status PrintProgram::write_layer(const Layer& layer, std::span<const RunsView> p
   const auto taken = work.timer->end();
   if (!taken) return taken.error();
   record = {0, {}, count->sweeps - count->skipped, count->drops, count->moved, count->lost, taken->microseconds, taken->spat};
+  record.added_sweeps = count->added;
+  record.added_microseconds = work.timer->added_microseconds();
   if (!file) return {};
   const auto digest = file->finish();
   if (!digest) return digest.error();
@@ -97,18 +99,20 @@ Status PrintProgram::write_layer(const Layer& layer, std::span<const RunsView> p
 std::uint64_t PrintProgram::bytes_bound(std::uint64_t changes, std::uint32_t planes) const {
   const HeadGrid& grid = resolved_.grid;
   // A sweep's vectors with their text of at most three times the size, lines, sorted changes and their steps.
-  const std::uint64_t vectors = grid.steps() * grid.words() * 8;
+  const std::uint64_t vectors = grid.steps() * grid.words() * grid.drop_bits * 8;
   const std::uint64_t turned = grid.scan_axis == ScanAxis::kX ? 4 * changes : 16 * changes;
   // The timer keeps a layer's text, but for vectors of nuferbj, hp45 and oasis: at most 32 bytes a step (m578), twice while the
   // text grows.
   constexpr std::uint64_t kStepText = 32, kSweepText = 256;
   const std::uint64_t further = grid.blocked_rule == BlockedRule::kSecondPass ? grid.blocked.size() : 0;
-  const std::uint64_t sweeps = std::uint64_t{grid.most_swaths()} * grid.passes * (1 + further) * planes;
+  const std::uint64_t sweeps = std::uint64_t{grid.most_swaths()} * grid.passes * (1 + further) * grid.sweeps_for(planes);
   const bool keeps = dialect_.has_motion && !replay::Timer::keeps_no_vectors(dialect_.id);
   const std::uint64_t kept = keeps ? 2 * sweeps * (kStepText * grid.steps() + kSweepText) : 0;
   const Machine& machine = resolved_.machine;  // lines of the base, and of shots off the bed (m578)
   const std::uint64_t care = 256 * machine.powder.base_layers + (machine.care.spits() ? 16 * machine.care.spit_drops : 0);
-  return 4 * care + 4 * vectors + 4 * grid.steps() + planes * (16 * grid.lines + 2 * changes + turned) + kept + (512 << 10);
+  // Lines of the bits of drops, at most twice those of the drops, and their changes sorted.
+  const std::uint64_t bits = grid.drop_bits > 1 ? 16 * changes * grid.sweep_drops + 40 * grid.nozzles : 0;
+  return bits + 4 * care + 4 * vectors + 4 * grid.steps() + planes * (16 * grid.lines + 2 * changes + turned) + kept + (512 << 10);
 }
 
 }  // namespace lamina::pipeline

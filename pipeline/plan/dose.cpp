@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "stages/dose/saturate.h"
 #include "stages/write/levels/level_format.h"
@@ -34,10 +35,26 @@ void DosePlan::thin(std::uint32_t layer, Runs& image, Runs& second, Runs& third)
   std::swap(image, second);
 }
 
-Status DosePlan::decide(const Job& job, const Machine* machine, const Scene& scene, std::uint32_t layers,
-                        const std::function<Layer(std::uint32_t)>& layer, std::vector<Warning>& warnings) {
+Status DosePlan::decide(const Job& job, const Machine* machine, std::uint32_t sweep_drops, const Scene& scene,
+                        std::uint32_t layers, const std::function<Layer(std::uint32_t)>& layer,
+                        std::vector<Warning>& warnings) {
   const bool asked = wishes_.has_value();
-  if (asked || (job.levels > 0 && write::find_level_format(job.format) == nullptr)) rules_.most_drops = 1;
+  // Without a machine, formats that carry levels have those of the voxels.
+  if (asked || (job.levels > 0 && (machine != nullptr || write::find_level_format(job.format) == nullptr)))
+    rules_.most_drops = 1;
+  // Levels that are not dithered are drops to a head that fires several.
+  if (machine != nullptr && machine->head.most_drops > 1 && rules_.full > 0 && !rules_.dithered && !asked)
+    full_drops_ = rules_.full;
+  rules_.most_drops *= full_drops_;
+  limit_ = dose::kMostDrops;
+  if (machine != nullptr && machine->head.most_drop_sweeps > 0)
+    limit_ = std::min(limit_, machine->head.most_drop_sweeps * sweep_drops);
+  if (full_drops_ > limit_) {
+    return Error{Fault::kUsage,
+                 fmt::format("--levels {}: {} drops of a full voxel, {} can be jetted (head.most_drop_sweeps of {} in "
+                             "each); choose fewer levels, or give --saturation",
+                             rules_.full + 1, full_drops_, limit_, sweep_drops)};
+  }
   if (machine == nullptr || machine->head.drop_pl == 0) {
     if (!asked) return {};
     return Error{Fault::kUsage, fmt::format("--saturation: {}",
@@ -47,11 +64,10 @@ Status DosePlan::decide(const Job& job, const Machine* machine, const Scene& sce
   const auto& powder = machine->powder;
   binder_ = {machine->head.drop_pl, powder.evaporates_percent / 100, powder.packing};
   if (!job.allow_unbound) least_percent_ = powder.least_saturation_percent;
-  limit_ = machine->head.most_drop_sweeps > 0 ? machine->head.most_drop_sweeps : dose::kMostDrops;
   const auto pitch = static_cast<std::int64_t>(std::ceil(1 / std::min(grid_.x.pixels_per_nm(), grid_.y.pixels_per_nm())));
   std::vector<dose::ZoneBox> boxes = zone_boxes(scene, zones_, grid_);
   budget_.emplace(binder_, grid_, wishes_, limit_, powder.least_saturation_percent,
-                  dose::Jetting{rules_.dithered, !rules_.shell.half_width.empty(), core_},
+                  dose::Jetting{rules_.dithered, !rules_.shell.half_width.empty(), core_, full_drops_},
                   dose::Stretches(boxes, zones_.count(), nm_of(job.dose.shell_mm), pitch));
   if (wishes_ && wishes_->has_formula()) {
     copies_.resize(wishes_->zones());
@@ -63,6 +79,17 @@ Status DosePlan::decide(const Job& job, const Machine* machine, const Scene& sce
   for (std::uint32_t i = 0; i < layers; ++i) budget_->foresee(layer(i));
   if (asked) rules_.most_drops = std::max(1u, budget_->most_drops());
   return budget_->judge(job.allow_unbound, warnings);
+}
+
+Status DosePlan::check_images(std::string_view format, bool several) const {
+  const auto refuse = [](std::string text) { return Error{Fault::kUsage, std::move(text)}; };
+  const bool grey = saturates() && write::find_level_format(format) != nullptr;
+  if (several && grey)
+    return refuse(fmt::format("--format {}: drops of several materials have images of 1 bit; choose tiff-g4", format));
+  if (several && most_drops() > 1)
+    return refuse("--saturation: several drops a pixel of several materials are not planned together; plan them apart");
+  if (!grey || format != "tiff-4" || most_drops() <= 15) return {};
+  return refuse(fmt::format("--format tiff-4: tells up to 15 drops of a pixel, the job has {}; choose tiff-8", most_drops()));
 }
 
 bool DosePlan::has_formula(const Layer& layer) const {
@@ -85,7 +112,8 @@ Result<dose::ZoneSums> DosePlan::saturate_laid(const Layer& layer, std::uint32_t
     sheet.least_percent = least_percent_;
   }
   work.fields.resize(std::size_t{2} * zones_.count());
-  std::vector<std::array<dose::Ask, 2>> asks(zones_.count(), {dose::Ask{dose::kOneDrop}, dose::Ask{dose::kOneDrop}});
+  const dose::Ask one{dose::Drops24{full_drops_} << dose::kDropBits};
+  std::vector<std::array<dose::Ask, 2>> asks(zones_.count(), {one, one});
   for (std::uint32_t zone = 0; wishes_ && zone < zones_.count(); ++zone) {
     const dose::Wish& wish = wishes_->of(layer, zone);
     for (std::size_t inside = 0; inside < 2; ++inside) {
@@ -125,7 +153,7 @@ Result<dose::ZoneSums> DosePlan::saturate(const Layer& layer, bool laid, std::ui
     return saturate_laid(layer, 1, image, second, work);
   }
   const auto dose_of = [&](std::uint32_t z) {
-    dose::LayerDose dose = wishes_ ? dose::dose_of(layer, *wishes_, binder_, grid_, limit_, z) : dose::one_drop();
+    dose::LayerDose dose = wishes_ ? dose::dose_of(layer, *wishes_, binder_, grid_, limit_, z) : dose::one_drop(full_drops_);
     // Of shares of voxels the drops of each are rounded, not those of full ones.
     if (wishes_ && !rules_.dithered && zones_.several()) dose::round_drops(dose, binder_, grid_, layer.thickness);
     return dose;

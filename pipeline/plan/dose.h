@@ -4,6 +4,7 @@
 #include <functional>
 #include <optional>
 #include <span>
+#include <string_view>
 #include <vector>
 
 #include "pipeline/job/job.h"
@@ -26,10 +27,16 @@ class DosePlan {
  public:
   DosePlan(const Job& job, const PixelGrid& grid);
 
-  /// Decides the drops of all layers of a job. machine  null without one
+  /// Decides the drops of all layers of a job.
+  /// machine      null without one
+  /// sweep_drops  of a pixel in one sweep
   /// errors  kUsage: a saturation without a machine; less than the powder needs; shares of voxels that are thinned
-  Status decide(const Job& job, const Machine* machine, const Scene& scene, std::uint32_t layers,
+  Status decide(const Job& job, const Machine* machine, std::uint32_t sweep_drops, const Scene& scene, std::uint32_t layers,
                 const std::function<Layer(std::uint32_t)>& layer, std::vector<Warning>& warnings);
+
+  /// Whether images of a format carry the drops, decided before. several  materials
+  /// errors  kUsage: several drops or grey ones of several materials; more than pixels of 4 bits tell
+  Status check_images(std::string_view format, bool several) const;
 
   /// Whether the dose changes any layer.
   bool any() const { return bleeds() || core_ < 1 || saturates(); }
@@ -49,10 +56,10 @@ class DosePlan {
   void thin(std::uint32_t layer, Runs& image, Runs& second, Runs& third) const;
 
   /// The drops of a layer in place of its image, which becomes that of the first drop. `second` is scratch.
-  /// zone  the image of each zone, where there are several
-  /// errors  kUsage: a formula has no number of per cent where a part lies, or one that does not bind
-  /// laid    work.laid has the shares of voxels of several solids
+  /// laid       work.laid has the shares of voxels of several solids
   /// materials  of the job, whose drops are told apart if solids share voxels
+  /// zone       the image of each zone, where there are several
+  /// errors  kUsage: a formula has no number of per cent where a part lies, or one that does not bind
   Result<dose::ZoneSums> saturate(const Layer& layer, bool laid, std::uint32_t materials, Runs& image,
                                   std::span<const Runs> zone, Runs& second, dose::DropWork& work) const;
 
@@ -74,8 +81,8 @@ class DosePlan {
   PixelGrid grid_;
   std::optional<dose::Wishes> wishes_;
   dose::Binder binder_;
-  std::uint32_t limit_ = 0;
-  double least_percent_ = 0;  // that binds, of a job that has to; 0: it has not
+  std::uint32_t limit_ = 0, full_drops_ = 1;  // full_drops: of a full pixel without a wish
+  double least_percent_ = 0;                  // that binds, of a job that has to; 0: it has not
   Mirror mirror_;
   std::vector<std::vector<dose::ZoneBox>> copies_;  // of each zone with formulas of its own
   std::optional<dose::Budget> budget_;

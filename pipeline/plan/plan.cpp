@@ -285,11 +285,11 @@ class Planner {
     if (beads_) beads.emplace(job(), grid, *plan_.sections, *plan_.segments);
     dose::Covered covered(zone_boxes(*plan_.scene, dose.zones(), grid), grid);
     const auto layer = [this](std::uint32_t i) { return plan_.layer(i); };
-    if (Status status = dose.decide(job(), machine(), *plan_.scene, plan_.layer_count, layer, plan_.warnings); !status)
+    const std::uint32_t sweep_drops = printer_.machine ? printer_.machine->grid.sweep_drops : 1;
+    if (Status status = dose.decide(job(), machine(), sweep_drops, *plan_.scene, plan_.layer_count, layer, plan_.warnings);
+        !status)
       return status;
-    if (dose.most_drops() > 1 && materials_.several()) {
-      return usage("--saturation: several drops a pixel of several materials are not planned together; plan them apart");
-    }
+    if (Status status = dose.check_images(job().format, materials_.several()); !status) return status;
     plan_.images.emplace(ImagePlan{std::move(printer_.machine), grid, std::move(materials_), std::move(*solids),
                                    std::move(dose), std::move(beads), std::move(covered)});
     end_indexing();
@@ -351,10 +351,12 @@ Result<Resolved> resolve(const Job& job, Product product) {
     resolved.bed = printer->bed;
     resolved.printer = std::move(*printer);
     if (!write::extension_of(job.format)) return usage(fmt::format("unknown format '{}'", job.format));
-    if (write::find_level_format(job.format) != nullptr && (job.levels == 0 || resolved.printer->machine)) {
-      return usage(fmt::format("--format {}: carries shares of voxels, {}", job.format,
-                               job.levels == 0 ? "and none are asked for; add --levels 2, 4 or 16"
-                                               : "and print programs fire drops; choose a 1-bit format"));
+    const bool dosed = job.levels > 0 || (resolved.printer->machine && job.dose.saturation_percent);
+    if (write::find_level_format(job.format) != nullptr && !dosed) {
+      return usage(
+          fmt::format("--format {}: carries shares of voxels, or of a machine drops, and none are asked for; add "
+                      "--levels 2, 4 or 16, or --machine and --saturation",
+                      job.format));
     }
     return resolved;
   }

@@ -14,6 +14,7 @@
 #include "stages/data/text/readable.h"
 #include "stages/dose/share_count.h"
 #include "stages/geometry/isa.h"
+#include "stages/program/explain.h"
 #include "stages/program/vats.h"
 #include "stages/replay/time/totals.h"
 #include "stages/sanity/records.h"
@@ -160,6 +161,7 @@ class ImageMaker : public Maker {
   void warn(const Summary&, std::vector<Warning>& warnings) const override;
   void tell(Summary& summary) const override;
   void tell_binder(const dose::Budget& budget, Summary& summary) const;
+  void tell_jetting(const ResolvedMachine& resolved, Summary& summary) const;
 
  private:
   struct Work {
@@ -175,7 +177,7 @@ class ImageMaker : public Maker {
   LayerImages images_of(const Work& work) const {
     const ImageWork& images = work.images;
     return {images.runs, plan_.images->dose.most_drops() > 1 ? images.drops.planes : images.materials.image,
-            images.drops.shares};
+            plan_.images->dose.saturates() ? images.drops.levels : images.drops.shares};
   }
 
   /// Counts what lies in the powder of another vat.
@@ -186,7 +188,8 @@ class ImageMaker : public Maker {
   void add(const LayerRecord& record) {
     if (plan_.images->machine && plan_.images->materials.several()) add_unfed(record);
     if (const auto& budget = plan_.images->dose.budget()) {
-      binder_.add(*budget, record.layer, record.dosed_pixels, record.drops, record.asked_drops, record.program.lost);
+      binder_.add(*budget, record.layer, record.dosed_pixels, record.drops, record.asked_drops, record.program.lost,
+                  record.most_drops);
     }
     if (plan_.job.levels > 0) shares_.add(record.dosed_pixels, record.half_differs, record.half_far);
     if (cost_) cost_->add(record, record.program.drops + record.program.spat, record.program.microseconds);
@@ -195,6 +198,8 @@ class ImageMaker : public Maker {
     moved_pixels_ += record.program.moved;
     lost_pixels_ += record.program.lost;
     microseconds_ += record.program.microseconds;
+    added_sweeps_ += record.program.added_sweeps;
+    added_microseconds_ += record.program.added_microseconds;
     timed_ = timed_ && (record.program.bytes == 0 || record.program.microseconds > 0);
     for (std::size_t m = 0; plan_.images->materials.several() && m < record.images.size(); ++m)
       materials_[m].second += record.images[m].set_pixels;
@@ -214,7 +219,8 @@ class ImageMaker : public Maker {
   sanity::RowWarnings rows_;
   std::uint64_t set_pixels_ = 0, moved_pixels_ = 0, lost_pixels_ = 0, solid_pixels_ = 0, bead_pixels_ = 0, capped_rows_ = 0;
   std::uint64_t bytes_written_ = 0, crossings_ = 0;
-  std::int64_t microseconds_ = 0;  // of the machine
+  std::int64_t microseconds_ = 0, added_microseconds_ = 0;  // of the machine
+  std::uint64_t added_sweeps_ = 0;
   bool timed_ = true;              // layers that an earlier build left are not
   double volume_mm3_ = 0;
   std::vector<std::uint32_t> refills_;  // layers before which vats are filled
@@ -245,7 +251,23 @@ void ImageMaker::tell_binder(const dose::Budget& budget, Summary& summary) const
   facts["reached_percent"] = binder_.reached_percent(budget);
   facts["drops"] = binder_.drops();
   facts["most_drops"] = budget.most_drops();
+  facts["most_jetted_drops"] = binder_.most_drops();
   facts["binder_ml"] = binder_.binder_ml(budget);
+}
+
+// Of a head that fires several drops of a pixel in one sweep.
+void ImageMaker::tell_jetting(const ResolvedMachine& resolved, Summary& summary) const {
+  const HeadGrid& grid = resolved.grid;
+  if (grid.head_drops < 2) return;
+  const program::DropSweeps sweeps{std::max(1u, plan_.images->dose.most_drops()), added_sweeps_,
+                                   static_cast<double>(added_microseconds_) * 1e-6};
+  summary.results.emplace_back("sweeps", program::sweeps_text(resolved.machine, grid, sweeps));
+  (*summary.facts)["jetting"] = {{"head_drops", grid.head_drops},
+                                 {"sweep_drops", grid.sweep_drops},
+                                 {"pixel_drops", sweeps.most_drops},
+                                 {"sweeps_a_place", grid.sweeps_for(sweeps.most_drops)},
+                                 {"added_sweeps", sweeps.added},
+                                 {"added_seconds", sweeps.added_seconds}};
 }
 
 void ImageMaker::tell(Summary& summary) const {
@@ -276,6 +298,7 @@ void ImageMaker::tell(Summary& summary) const {
     for (const auto& [name, count] : materials_) result("", fmt::format("{} of {}", readable_count(count), name));
   }
   if (const auto& budget = plan_.images->dose.budget()) tell_binder(*budget, summary);
+  if (const auto& machine = plan_.images->machine) tell_jetting(*machine, summary);
   if (print_seconds > 0) result("printing", replay::time_text(print_seconds, plan_.images->machine->machine.name));
   if (!refills_.empty()) result("vats", program::refills_text(refills_));
   if (timed_ && cost_) cost_->account().tell(summary.results, (*summary.facts)["use"], summary.quote);

@@ -8,6 +8,7 @@
 #include "stages/raster/combine.h"
 #include "stages/raster/mirror.h"
 #include "stages/read/placed.h"
+#include "stages/write/levels/level_format.h"
 
 namespace lamina::pipeline {
 namespace {
@@ -272,6 +273,10 @@ Status LayerImager::dose(const Layer& layer, ImageWork& work, LayerRecord& recor
     record.dosed_pixels = sums->full_voxels;
     record.asked_drops = sums->asked_drops;
     record.drops = images.dose.most_drops() > 1 ? sum_of_levels(work.drops.levels) : set_pixels(work.runs);
+    record.most_drops = images.dose.most_drops() > 1 ? highest(work.drops.levels) : record.drops > 0 ? 1 : 0;
+    // Of one drop a pixel the image alone was made.
+    const bool levels = write::find_level_format(plan_.job.format) != nullptr || !plan_.scene->images.empty();
+    if (levels && images.dose.most_drops() == 1) levels_of(work.runs, 1, work.drops.levels);
   } else if (plan_.job.levels > 0) {
     at_least(work.drops.shares, 1, work.runs);
     record.dosed_pixels = dose::sums_of(work.drops.shares, images.dose.full(), dose::one_drop()).full_voxels;
@@ -283,7 +288,8 @@ Status LayerImager::dose(const Layer& layer, ImageWork& work, LayerRecord& recor
   const auto add_image = [&](const Runs& image) {
     record.images.push_back({.bytes = 0, .set_pixels = set_pixels(image), .unfed_pixels = 0, .hash = {}});
   };
-  if (images.dose.most_drops() > 1) std::ranges::for_each(work.drops.planes, add_image);
+  const bool grey = write::find_level_format(plan_.job.format) != nullptr;
+  if (images.dose.most_drops() > 1 && !grey) std::ranges::for_each(work.drops.planes, add_image);
   std::ranges::for_each(work.materials.image, add_image);
   return {};
 }

@@ -69,6 +69,13 @@ inline std::uint64_t sum_of_levels(const LevelsView& image) {
   return sum;
 }
 
+/// The highest level of any pixel; 0 of an empty image.
+inline std::uint8_t highest(const LevelsView& image) {
+  std::uint8_t most = 0;
+  for (const std::uint8_t level : image.level) most = most < level ? level : most;
+  return most;
+}
+
 /// The same of the pixels that the mask sets. mask  of the same size
 inline std::uint64_t sum_of_levels(const LevelsView& image, const RunsView& mask) {
   std::uint64_t sum = 0;

@@ -49,7 +49,7 @@ struct Machine {
     std::vector<double> row_offset_um{0};  // nozzle i lies in row i mod rows, so far behind the first row
     double highest_frequency_hz = 5000;    // of one nozzle
     double drop_pl = 50;
-    std::uint32_t most_drops = 1;        // that a nozzle can fire on a pixel in one sweep
+    std::uint32_t most_drops = 1;        // that a nozzle can fire on a pixel in one sweep, where its dialect can say so
     std::uint32_t most_drop_sweeps = 0;  // over one place, for several drops a pixel; 0: not stated
     std::vector<std::uint32_t> blocked;  // numbers from 0
     BlockedRule blocked_rule = BlockedRule::kReport;

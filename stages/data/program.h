@@ -25,6 +25,9 @@ struct HeadGrid {
   std::uint32_t nozzles = 0, passes = 1, overlap = 0, joint_shift = 0, steps_per_pixel = 1;
   std::vector<std::uint32_t> lag;  // steps, the least is 0
   std::uint32_t most_lag = 0;
+  std::uint32_t head_drops = 1;   // most drops that a nozzle can fire on a pixel in one sweep
+  std::uint32_t sweep_drops = 1;  // that it does at the scan's speed, within its frequency
+  std::uint32_t drop_bits = 1;    // of their number in vectors: 1, 2 or 4, by head_drops
   std::uint32_t bit_order = 0;  // of vectors: nozzle i is bit i ^ bit_order, as the dialect has it; below 128
   FirstSwath first_swath = FirstSwath::kBed;
   bool both_directions = false;
@@ -39,7 +42,7 @@ struct HeadGrid {
 
   double step_nm() const { return place_nm / steps_per_pixel; }
   std::uint32_t swath_lines() const { return nozzles * passes; }
-  /// Of 64 bits a vector.
+  /// Of 64 bits a vector, for one bit of the drops.
   std::uint32_t words() const { return bit_order < 64 ? (nozzles + 63) / 64 : (nozzles + 127) / 128 * 2; }
   /// Steps of a sweep over a whole line, the first one 0.
   std::uint64_t steps() const { return (std::uint64_t{places} - 1) * steps_per_pixel + 1 + most_lag; }
@@ -48,6 +51,8 @@ struct HeadGrid {
     const std::int64_t left = lines - first, all = swath_lines();
     return left <= all ? 1 : static_cast<std::uint32_t>(1 + (left - all + (all - overlap) - 1) / (all - overlap));
   }
+  /// Sweeps over a place that its drops take.
+  std::uint32_t sweeps_for(std::uint32_t drops) const { return (drops + sweep_drops - 1) / sweep_drops; }
   /// The most that a layer can have.
   std::uint32_t most_swaths() const { return swaths(0) + (joint_shift > 0 ? 1 : 0); }
   /// Bed coordinates in nm (x or y) of a line and of the lag-free nozzle at a step. Lines may lie outside of the bed.
@@ -71,10 +76,15 @@ struct Sweep {
   std::uint32_t swath = 0, pass = 0;  // pass >= HeadGrid::passes: a further one for blocked nozzles
   bool backward = false;              // steps run downwards
   std::int64_t first_line = 0;        // of nozzle 0; negative or behind the last line where a further pass needs it
+  std::uint32_t drop = 0;             // of a pixel, from 0: the first one that this sweep can fire
+  std::uint32_t drops = 1;            // the most of a nozzle at a place
+  bool added = false;                 // not needed if nozzles fired all of their drops at the scan's speed
 };
 
 /// What the nozzles do in a sweep.
-/// bits    steps x words; nozzle i is bit b % 64 of word b / 64 of a step, b = i ^ HeadGrid::bit_order.
+/// bits    steps x words; nozzle i is bit b % 64 of word b / 64 of a step, b = i ^ HeadGrid::bit_order. Of heads that fire
+///         several drops a step has HeadGrid::drop_bits such vectors, one behind the other: those of the lowest bit of the
+///         number of drops first
 /// firing  begin, end, begin, end, ... of the stretches of steps that fire something, from the first step, which does, as
 ///         does the last one
 struct SweepVectors {
@@ -88,6 +98,7 @@ struct SweepVectors {
 /// What a layer's program does, counted while it is compiled.
 struct ProgramCount {
   std::uint32_t sweeps = 0, skipped = 0;  // skipped ones would have fired nothing
+  std::uint32_t added = 0;                // Sweep::added, of those that fire
   std::uint64_t drops = 0, vectors = 0;   // vectors: steps at which something fires
   std::uint64_t moved = 0, lost = 0;      // pixels of blocked nozzles: fired by a neighbour instead, or not at all
 };

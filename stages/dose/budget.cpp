@@ -61,8 +61,8 @@ const LayerDose& Budget::dose(const Layer& layer, std::uint32_t zone) {
     dose = dose_of(layer, *wishes_, binder_, grid_, limit_, zone);
     if (!jetting_.dithered) round_drops(dose, binder_, grid_, layer.thickness);
   } else {
-    dose = one_drop();
-    dose.gets = dose.asked = saturation_of(1, binder_, grid_, layer.thickness);
+    dose = one_drop(jetting_.full_drops);
+    dose.gets = dose.asked = saturation_of(jetting_.full_drops, binder_, grid_, layer.thickness);
     dose.gets_core = dose.asked_core = dose.gets * jetting_.core;
   }
   return dose;
@@ -182,7 +182,8 @@ Status Budget::judge(bool allow_unbound, std::vector<Warning>& warnings) const {
 }
 
 void BinderCount::add(const Budget& budget, const Layer& layer, std::uint64_t dosed_pixels, std::uint64_t drops,
-                      std::uint64_t asked_drops, std::uint64_t lost) {
+                      std::uint64_t asked_drops, std::uint64_t lost, std::uint32_t most_drops) {
+  most_drops_ = std::max(most_drops_, most_drops);
   drops_ += drops - std::min(lost, drops);
   asked_drops_ += asked_drops;
   voids_pl_ += static_cast<double>(dosed_pixels) * dose::voids_pl(budget.binder(), budget.grid(), layer.thickness);
@@ -208,12 +209,14 @@ std::string told(const Budget& budget, const BinderCount& count) {
     const std::string share = least == most ? fmt::format("{:.1f}", most) : fmt::format("{:.1f} to {:.1f}", least, most);
     const double core = budget.jetting().core;
     const std::string thinned = core < 1 ? fmt::format(", of the core's {} %,", number_text(100 * core)) : "";
-    return fmt::format("one drop of {} pl a pixel{} fills {} % of the voids", number_text(budget.binder().drop_pl), thinned,
-                       share);
+    const std::string pl = number_text(budget.binder().drop_pl);
+    if (const std::uint32_t full = budget.jetting().full_drops; full > 1)
+      return fmt::format("{} drops of {} pl a full voxel fill {} % of the voids", full, pl, share);
+    return fmt::format("one drop of {} pl a pixel{} fills {} % of the voids", pl, thinned, share);
   }
   return fmt::format("{:.2f} % of the voids reached, {:.2f} % asked; {} drops, {:.3f} ml of binder, up to {} a pixel",
                      count.reached_percent(budget), count.asked_percent(budget), readable_count(count.drops()),
-                     count.binder_ml(budget), budget.most_drops());
+                     count.binder_ml(budget), count.most_drops() > 0 ? count.most_drops() : budget.most_drops());
 }
 
 }  // namespace lamina::dose

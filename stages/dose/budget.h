@@ -36,6 +36,7 @@ struct Jetting {
   bool dithered = true;  // else drops of a pixel are rounded to whole ones
   bool shell = false;    // else all is core
   double core = 1;       // share of the core's pixels that get their drop; a job with a wish has 1
+  std::uint32_t full_drops = 1;  // of a full pixel without a wish
 };
 
 /// Looks at the layers of a job before any is made.
@@ -97,11 +98,13 @@ class Budget {
 /// Counts what layers got.
 class BinderCount {
  public:
-  /// dosed_pixels, drops, asked_drops  of the layer's record; lost  drops that no nozzle fires
+  /// dosed_pixels, drops, asked_drops, most_drops  of the layer's record; lost  drops that no nozzle fires
   void add(const Budget& budget, const Layer& layer, std::uint64_t dosed_pixels, std::uint64_t drops, std::uint64_t asked_drops,
-           std::uint64_t lost);
+           std::uint64_t lost, std::uint32_t most_drops = 0);
 
   std::uint64_t drops() const { return drops_; }
+  /// Of any pixel; a dithered wish plans for one more than a small part may get.
+  std::uint32_t most_drops() const { return most_drops_; }
   double binder_ml(const Budget& budget) const;
   /// Per cent of the voids of all dosed pixels, by the wish and by the drops.
   double asked_percent(const Budget& budget) const;
@@ -109,6 +112,7 @@ class BinderCount {
 
  private:
   std::uint64_t drops_ = 0, asked_drops_ = 0;
+  std::uint32_t most_drops_ = 0;
   double voids_pl_ = 0;
 };
 

@@ -78,10 +78,10 @@ struct LayerDose {
 /// Drops rounded to whole ones, half of one to one, and what they give: as a job without dithering jets them.
 void round_drops(LayerDose& dose, const Binder& binder, const PixelGrid& grid, std::int64_t thickness_nm);
 
-/// Of a layer without a wish: a drop a pixel.
-inline LayerDose one_drop() {
+/// Of a layer without a wish: a drop a pixel, or so many.
+inline LayerDose one_drop(std::uint32_t drops = 1) {
   LayerDose dose;
-  dose.shell = dose.core = dose.asked_shell = dose.asked_inside = kOneDrop;
+  dose.shell = dose.core = dose.asked_shell = dose.asked_inside = Drops24{drops} << kDropBits;
   return dose;
 }
 

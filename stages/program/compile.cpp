@@ -25,7 +25,8 @@ class LayerCompiler {
       const RunsView frame = to_scan_frame(grid, planes[p], scratch.scan[p]);
       for (std::uint32_t l = 0; l < grid.lines; ++l) scratch.line[std::size_t{p} * grid.lines + l] = frame.row(l);
     }
-    scratch.nozzle.assign(grid.nozzles, Line());
+    scratch.nozzle.assign(std::size_t{grid.nozzles} * grid.drop_bits, Line());
+    fired_.resize(grid.sweep_drops);
     if (grid.first_swath == FirstSwath::kLayer) {
       while (first_ + 1 < grid.lines && scratch.line[static_cast<std::size_t>(first_)].empty()) ++first_;
     }
@@ -39,19 +40,19 @@ class LayerCompiler {
       if (!grid_.blocked.empty() && grid_.blocked_rule != BlockedRule::kSecondPass) resolve_dead_lines();
     }
     kept_ = scratch_.made_used;
-    regular_ = further_ = swaths_ * grid_.passes * planes_;
+    regular_ = further_ = swaths_ * grid_.passes * grid_.sweeps_for(planes_);
     std::uint32_t number = 0;
     for (std::uint32_t swath = 0; swath < swaths_; ++swath) {
       for (std::uint32_t pass = 0; pass < grid_.passes; ++pass) {
-        for (plane_ = 0; plane_ < planes_; ++plane_) {
+        for (first_drop_ = 0; first_drop_ < planes_; first_drop_ += grid_.sweep_drops) {
           scratch_.made_used = kept_;
-          Sweep sweep{number++, regular_, swath, pass, false, first_line(swath, pass)};
-          for (std::uint32_t i = 0; i < grid_.nozzles; ++i) scratch_.nozzle[i] = under(swath, pass, i);
+          Sweep sweep{number++, regular_, swath, pass, false, first_line(swath, pass), first_drop_};
+          load([&](std::uint32_t i) { return under(swath, pass, i); });
           if (Status status = make(sweep); !status) return status.error();
         }
       }
       if (grid_.blocked_rule != BlockedRule::kSecondPass || grid_.blocked.empty()) continue;
-      for (plane_ = 0; plane_ < planes_; ++plane_) {
+      for (first_drop_ = 0; first_drop_ < planes_; first_drop_ += grid_.sweep_drops) {
         if (Status status = further_sweeps(swath); !status) return status.error();
       }
     }
@@ -105,6 +106,27 @@ class LayerCompiler {
     return part;
   }
 
+  /// Gives each nozzle the drops that a sweep fires. under(nozzle)  its line in the plane at hand
+  template <class Under>
+  void load(const Under& under) {
+    plane_ = first_drop_;
+    most_here_ = 1;
+    if (grid_.drop_bits == 1) {
+      for (std::uint32_t i = 0; i < grid_.nozzles; ++i) scratch_.nozzle[i] = under(i);
+      return;
+    }
+    const std::uint32_t end = std::min(planes_, first_drop_ + grid_.sweep_drops);
+    scratch_.bits.begin(grid_.drop_bits);
+    for (std::uint32_t i = 0; i < grid_.nozzles; ++i) {
+      std::uint32_t drops = 0;
+      for (plane_ = first_drop_; plane_ < end && !(fired_[drops] = under(i)).empty(); ++plane_) ++drops;
+      scratch_.bits.add({fired_.data(), drops});
+      most_here_ = std::max(most_here_, drops);
+    }
+    scratch_.bits.end(scratch_.nozzle);
+    plane_ = first_drop_;
+  }
+
   Status make(Sweep& sweep) {
     ++count_.sweeps;
     if (!fire(grid_, scratch_.nozzle, scratch_.fire, scratch_.vectors)) {
@@ -113,7 +135,14 @@ class LayerCompiler {
     }
     sweep.backward = grid_.both_directions && backward_;
     backward_ = !backward_;
-    for (const Line line : scratch_.nozzle) count_.drops += pixels_of(line);
+    // A sweep of all drops that the head has would have fired these with those before.
+    const auto whole = [&](std::uint32_t drops) { return (drops + grid_.head_drops - 1) / grid_.head_drops; };
+    sweep.drops = most_here_;
+    sweep.added = whole(first_drop_ + most_here_) == whole(first_drop_);
+    count_.added += sweep.added ? 1 : 0;
+    for (std::size_t i = 0; i < scratch_.nozzle.size(); ++i) {
+      count_.drops += pixels_of(scratch_.nozzle[i]) << (i / grid_.nozzles);
+    }
     const SweepVectors& vectors = scratch_.vectors;
     count_.vectors += pixels_of(vectors.firing);
     return emit_(sweep, vectors);
@@ -146,6 +175,7 @@ class LayerCompiler {
 
   // The head shifted by d nozzles: nozzle j + d is where nozzle j was.
   Status further_sweeps(std::uint32_t swath) {
+    plane_ = first_drop_;
     std::uint32_t further_pass = grid_.passes;
     for (std::uint32_t pass = 0; pass < grid_.passes; ++pass) {
       std::vector<std::uint32_t> waiting;
@@ -157,17 +187,18 @@ class LayerCompiler {
         }
       }
       for (std::int64_t d = 1; !waiting.empty(); d = d > 0 ? -d : 1 - d) {
-        std::fill(scratch_.nozzle.begin(), scratch_.nozzle.end(), Line());
-        const std::size_t before = waiting.size();
-        std::erase_if(waiting, [&](std::uint32_t j) {
+        const auto served = [&](std::uint32_t j) {
           const std::int64_t other = j + d;
-          if (other < 0 || other >= grid_.nozzles || blocked_[static_cast<std::size_t>(other)]) return false;
-          scratch_.nozzle[static_cast<std::size_t>(other)] =
-              line(static_cast<std::uint32_t>(first_line(swath, pass) + std::int64_t{j} * grid_.passes));
-          return true;
+          return other >= 0 && other < grid_.nozzles && !blocked_[static_cast<std::size_t>(other)];
+        };
+        if (std::ranges::none_of(waiting, served)) continue;
+        load([&](std::uint32_t i) -> Line {
+          const std::int64_t j = i - d;
+          if (blocked_[i] || j < 0 || !std::ranges::binary_search(waiting, j)) return {};
+          return line(static_cast<std::uint32_t>(first_line(swath, pass) + j * grid_.passes));
         });
-        if (waiting.size() == before) continue;
-        Sweep sweep{further_++, regular_, swath, further_pass++, false, first_line(swath, pass) - d * grid_.passes};
+        std::erase_if(waiting, served);
+        Sweep sweep{further_++, regular_, swath, further_pass++, false, first_line(swath, pass) - d * grid_.passes, first_drop_};
         if (Status status = make(sweep); !status) return status;
       }
     }
@@ -181,7 +212,8 @@ class LayerCompiler {
   CompileScratch& scratch_;
   const EmitSweep& emit_;
   std::vector<bool> blocked_;
-  std::uint32_t planes_, plane_ = 0;
+  std::uint32_t planes_, plane_ = 0, first_drop_ = 0, most_here_ = 1;
+  std::vector<Line> fired_;  // of a nozzle, drop after drop
   std::int64_t first_ = 0;  // line of the first swath
   std::uint32_t stride_ = 0, swaths_ = 0, regular_ = 0, further_ = 0;
   std::size_t kept_ = 0;  // made lines that are needed to the end of the layer

@@ -9,6 +9,7 @@
 #include "stages/data/program.h"
 #include "stages/data/runs.h"
 #include "stages/data/status.h"
+#include "stages/program/drop_bits.h"
 #include "stages/program/fire.h"
 #include "stages/program/scan_frame.h"
 
@@ -20,9 +21,10 @@ struct CompileScratch {
   FireScratch fire;
   SweepVectors vectors;
   Buffer<Line> line;                       // every line of the layer, plane after plane
-  std::vector<Line> nozzle;                // what is under each nozzle of a sweep
+  std::vector<Line> nozzle;                // what is under each nozzle of a sweep, bit after bit of the drops
   std::deque<Buffer<std::uint32_t>> made;  // lines that are not those of the image: shared or moved ones
   std::size_t made_used = 0;
+  DropBits bits;  // of heads that fire several drops in a sweep
 
   std::uint64_t bytes() const {
     std::uint64_t total = bytes_held(fire.event_offset) + bytes_held(fire.event_bit) + bytes_held(fire.rows) +
@@ -32,7 +34,7 @@ struct CompileScratch {
       total += bytes_held(one.turned.row_offset) + bytes_held(one.turned.change) + bytes_held(one.next);
     }
     for (const Buffer<std::uint32_t>& one : made) total += bytes_held(one);
-    return total;
+    return total + bits.bytes();
   }
 };
 
@@ -58,8 +60,8 @@ using EmitSweep = std::function<Status(const Sweep&, const SweepVectors&)>;
 Result<ProgramCount> compile(const HeadGrid& grid, const RunsView& image, CompileScratch& scratch, const EmitSweep& emit,
                              std::uint32_t layer = 0);
 
-/// The same for pixels of several drops, each of which is a sweep of its own: every sweep of the head is made once for each
-/// plane before the next one, so that the drops of a pixel follow each other closely.
+/// The same for pixels of several drops: a sweep fires up to grid.sweep_drops of them, and every sweep of the head is made as
+/// often as the planes take before the next one, so that the drops of a pixel follow each other closely.
 /// planes  at least one; each lies within the one before it
 Result<ProgramCount> compile(const HeadGrid& grid, std::span<const RunsView> planes, CompileScratch& scratch,
                              const EmitSweep& emit, std::uint32_t layer = 0);

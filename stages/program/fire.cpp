@@ -55,14 +55,16 @@ void fire_changes(const HeadGrid& grid, std::span<const Line> lines, FireScratch
   const auto place_of = [&](std::uint32_t change, std::uint32_t lag) {
     return std::min(std::uint64_t{change} * ticks + lag - vectors.first_step, std::uint64_t{vectors.steps});
   };
-  for (std::uint32_t i = 0; i < grid.nozzles; ++i) {
-    for (const std::uint32_t change : lines[i]) ++offset[place_of(change, grid.lag[i]) + 1];
+  for (std::size_t l = 0; l < lines.size(); ++l) {
+    for (const std::uint32_t change : lines[l]) ++offset[place_of(change, grid.lag[l % grid.nozzles]) + 1];
   }
   for (std::size_t s = 0; s + 1 < offset.size(); ++s) offset[s + 1] += offset[s];
   scratch.event_bit.resize(offset.back());
-  for (std::uint32_t i = 0; i < grid.nozzles; ++i) {
-    for (const std::uint32_t change : lines[i]) {
-      scratch.event_bit[offset[place_of(change, grid.lag[i])]++] = static_cast<std::uint16_t>(i ^ grid.bit_order);
+  for (std::size_t l = 0; l < lines.size(); ++l) {
+    const auto i = static_cast<std::uint32_t>(l % grid.nozzles);
+    const std::size_t bit = (i ^ grid.bit_order) + l / grid.nozzles * grid.words() * 64;
+    for (const std::uint32_t change : lines[l]) {
+      scratch.event_bit[offset[place_of(change, grid.lag[i])]++] = static_cast<std::uint16_t>(bit);
     }
   }
   // Filling moved each offset to the end of its step.
@@ -104,9 +106,10 @@ void fire_blocks(const HeadGrid& grid, std::span<const Line> lines, FireScratch&
       std::uint64_t from = UINT64_MAX, to = 0;  // q
       std::fill(scratch.rows.begin(), scratch.rows.end(), 0);
       for (std::uint32_t bit = 0; bit < 64; ++bit) {
-        const std::uint32_t nozzle = (word * 64 + bit) ^ grid.bit_order;
-        if (nozzle >= grid.nozzles || lines[nozzle].empty() || grid.lag[nozzle] % ticks != residue) continue;
-        const Line line = lines[nozzle];
+        const std::uint32_t nozzle = (word % grid.words() * 64 + bit) ^ grid.bit_order;
+        if (nozzle >= grid.nozzles || grid.lag[nozzle] % ticks != residue) continue;
+        const Line line = lines[word / grid.words() * grid.nozzles + nozzle];
+        if (line.empty()) continue;
         const std::uint64_t shift = grid.lag[nozzle] / ticks - base;
         std::uint64_t* const row = scratch.rows.data() + bit * row_words;
         for (std::size_t c = 0; c + 1 < line.size(); c += 2) set_bits(row, line[c] + shift, line[c + 1] + shift);
@@ -140,13 +143,15 @@ void fire_blocks(const HeadGrid& grid, std::span<const Line> lines, FireScratch&
 bool fire(const HeadGrid& grid, std::span<const Line> lines, FireScratch& scratch, SweepVectors& vectors, FireWay way) {
   const std::uint64_t ticks = grid.steps_per_pixel;
   std::uint64_t first = UINT64_MAX, last = 0, changes = 0;
-  for (std::uint32_t i = 0; i < grid.nozzles; ++i) {
-    if (lines[i].empty()) continue;
-    first = std::min(first, lines[i].front() * ticks + grid.lag[i]);
-    last = std::max(last, (lines[i].back() - 1) * ticks + grid.lag[i]);
-    changes += lines[i].size();
+  for (std::size_t l = 0; l < lines.size(); ++l) {
+    const Line line = lines[l];
+    if (line.empty()) continue;
+    const std::uint64_t lag = grid.lag[l % grid.nozzles];
+    first = std::min(first, line.front() * ticks + lag);
+    last = std::max(last, (line.back() - 1) * ticks + lag);
+    changes += line.size();
   }
-  vectors.words = grid.words();
+  vectors.words = grid.words() * grid.drop_bits;
   vectors.firing.clear();
   if (changes == 0) {
     vectors.first_step = vectors.steps = 0;

@@ -25,7 +25,7 @@ enum class FireWay : std::uint8_t { kCheapest, kChanges, kBlocks };
 
 /// Fills `vectors` with the steps from the first to the last that fires. False if nothing fires.
 ///
-/// lines  one for each nozzle
+/// lines  one for each nozzle, and of grid.drop_bits for each bit of the drops, the lowest first
 /// cost   by changes: each line's changes sorted by step, and copies of the vector between them; nothing is expanded.
 ///        by blocks, for patterns with a change every few pixels: 64 lines at a time expanded to bits, and blocks of
 ///        64 x 64 of them transposed

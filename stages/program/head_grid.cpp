@@ -76,7 +76,15 @@ Status Builder::check_head() {
   grid_.joint_shift = mount.joint_shift_lines;
   grid_.first_swath = mount.first_swath;
   grid_.both_directions = machine_.motion.both_directions;
+  grid_.head_drops = head.most_drops;
+  grid_.drop_bits = head.most_drops <= 1 ? 1 : head.most_drops <= 3 ? 2 : 4;
   if (head.nozzles == 0 || head.nozzles > 65'535) return wrong(machine_, "head.nozzles", "give 1 to 65535");
+  if (head.most_drops == 0 || head.most_drops > 15) return wrong(machine_, "head.most_drops", "give 1 to 15");
+  if (grid_.words() * 64 * grid_.drop_bits > 65'536) {
+    return wrong(machine_, "head.most_drops",
+                 fmt::format("{} nozzles of {} bits of drops; {} nozzles of so many bits are planned, or 65535 of one drop",
+                             head.nozzles, grid_.drop_bits, 65'536 / grid_.drop_bits));
+  }
   if (!(head.pitch_um > 0)) {
     return wrong(machine_, "head.pitch_um", fmt::format("{:g} um between nozzles; give a pitch above 0", head.pitch_um));
   }
@@ -256,6 +264,9 @@ Status Builder::check_speed() {
                              motion.scan_speed_mm_s, frequency, head.highest_frequency_hz,
                              std::floor(head.highest_frequency_hz * grid_.place_nm / kNmPerMm * 10) / 10));
   }
+  // Drops of a pixel follow each other before the next place.
+  const double fits = std::floor(head.highest_frequency_hz / frequency * (1 + 1e-9));
+  grid_.sweep_drops = static_cast<std::uint32_t>(std::clamp(fits, 1.0, static_cast<double>(head.most_drops)));
   return {};
 }
 
@@ -294,47 +305,6 @@ Status ask_for_dpi(Machine& machine, const HeadGrid& grid, const std::array<std:
     machine.mounting.along_dpi = 0;
   }
   return {};
-}
-
-std::string explain(const Machine& machine, const HeadGrid& grid, const std::optional<FullLayer>& full) {
-  std::string text;
-  const auto line = [&](std::string_view name, const std::string& value) { text += fmt::format("{:<12}{}\n", name, value); };
-  const auto dpi = [](double nm) { return kNmPerInch / nm; };
-  const std::uint64_t sweeps = full ? full->sweeps : std::uint64_t{grid.swaths(0)} * grid.passes;
-  line("machine", fmt::format("{}: {}", machine.name, machine.description));
-  line("bed", machine.bed.shape == BedShape::kRound
-                  ? fmt::format("round, {:g} mm, parts up to {:g} mm high", machine.bed.size_mm[0], machine.bed.build_height_mm)
-                  : fmt::format("{:g} x {:g} mm, parts up to {:g} mm high", machine.bed.size_mm[0], machine.bed.size_mm[1],
-                                machine.bed.build_height_mm));
-  line("head", fmt::format("{} nozzles {:g} um apart ({:.2f} npi) in {} row{}, {:g} pl a drop{}", grid.nozzles,
-                           machine.head.pitch_um, dpi(machine.head.pitch_um * kNmPerUm), machine.head.row_offset_um.size(),
-                           machine.head.row_offset_um.size() == 1 ? "" : "s", machine.head.drop_pl,
-                           grid.blocked.empty() ? "" : fmt::format(", {} blocked", grid.blocked.size())));
-  line("angle", fmt::format("{:.4f} degrees between the nozzles and the scan along {}", grid.angle_deg,
-                            grid.scan_axis == ScanAxis::kX ? "x" : "y"));
-  line("across", fmt::format("{:.3f} dpi, lines {:.4f} um apart{}", dpi(grid.line_nm), grid.line_nm / kNmPerUm,
-                             grid.passes > 1 ? fmt::format(" in {} interlaced passes", grid.passes) : ""));
-  line("along", fmt::format("{:.3f} dpi, pixels of {:.4f} um{}", dpi(grid.place_nm), grid.place_nm / kNmPerUm,
-                            grid.steps_per_pixel > 1
-                                ? fmt::format(" in {} steps of {:.4f} um", grid.steps_per_pixel, grid.step_nm() / kNmPerUm)
-                                : ""));
-  line("lag", fmt::format("{:.6f} pixels a nozzle, {} steps in all; drops land up to {:.2f} um along and {:.2f} um across "
-                          "from the centre of their pixel",
-                          grid.lag_pixels, grid.most_lag, grid.worst_place_nm / kNmPerUm, grid.worst_line_nm / kNmPerUm));
-  line("swath", fmt::format("{} lines, {:.3f} mm wide{}", grid.swath_lines(), grid.swath_lines() * grid.line_nm / kNmPerMm,
-                            grid.overlap > 0 ? fmt::format(", {} of them shared with the next", grid.overlap) : "") +
-                    (grid.joint_shift > 0 ? fmt::format(", {} lines further back in each layer", grid.joint_shift) : ""));
-  line("layer",
-       fmt::format("{} x {} pixels, {} bytes as bits; {} swaths, {} sweeps of up to {} steps, {} bytes of vectors",
-                   grid.image.columns(), grid.image.rows(), (std::uint64_t{grid.image.columns()} + 7) / 8 * grid.image.rows(),
-                   grid.swaths(0), sweeps, grid.steps(), sweeps * grid.steps() * ((grid.nozzles + 7) / 8)));
-  line("speed", fmt::format("{:g} mm/s, at most {:.1f} mm/s at {:g} Hz", machine.motion.scan_speed_mm_s,
-                            machine.head.highest_frequency_hz * grid.place_nm / kNmPerMm, machine.head.highest_frequency_hz));
-  line("time", full ? fmt::format("{:.1f} s a full layer of {:g} mm, {:.1f} s an empty one (powder, pauses)", full->seconds,
-                                  full->thickness_mm, full->empty_seconds)
-                    : "not told: the program of a full layer is too long");
-  line("dialect", machine.dialect);
-  return text;
 }
 
 }  // namespace lamina::program

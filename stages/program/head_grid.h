@@ -3,8 +3,6 @@
 
 #include <array>
 #include <cstdint>
-#include <optional>
-#include <string>
 
 #include "stages/data/machine.h"
 #include "stages/data/program.h"
@@ -32,17 +30,5 @@ Result<HeadGrid> make_head_grid(const Machine& machine);
 /// grid    of the machine as it is
 /// errors  kUsage, "bed.dpi: what is wrong": dpi that the head or the encoder cannot reach
 Status ask_for_dpi(Machine& machine, const HeadGrid& grid, const std::array<std::int64_t, 2>& dpi);
-
-/// A layer that sets every pixel of the bed, by the program that the machine gets for it.
-struct FullLayer {
-  double thickness_mm = 0;
-  std::uint32_t sweeps = 0;  // second passes for blocked nozzles included
-  double seconds = 0;        // of the layer
-  double empty_seconds = 0;  // of a layer without a pixel: powder, pauses
-};
-
-/// What follows from a profile, one fact a line, for people.
-/// full  absent: its time is not told
-std::string explain(const Machine& machine, const HeadGrid& grid, const std::optional<FullLayer>& full);
 
 }  // namespace lamina::program

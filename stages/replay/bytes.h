@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <string_view>
@@ -58,10 +59,11 @@ class Passes {
     across_ = across_mm;
     backward_ = backward;
   }
-  /// A step that fires, in the order of the movement.
-  void at(std::int64_t step) {
-    if (!any_) first_ = step;
+  /// A step that fires, in the order of the movement. drops  the most of a nozzle there
+  void at(std::int64_t step, std::uint32_t drops = 1) {
+    if (!any_) first_ = step, most_ = 1;
     last_ = step;
+    most_ = std::max(most_, drops);
     any_ = true;
   }
   /// Ends the last sweep; the head goes back.
@@ -80,7 +82,7 @@ class Passes {
     const double from = printing_.position_of(static_cast<double>(first_)) - ramp;
     const double to = printing_.position_of(static_cast<double>(last_)) + ramp;
     go(from, across_);
-    printing_.head_moves(to - from, motion.scan_speed_mm_s, true);
+    printing_.head_moves(to - from, motion.scan_speed_mm_s, true, most_);
     at_along_ = to;
     any_ = false;
   }
@@ -95,6 +97,7 @@ class Passes {
   bool along_;  // the scan is along x
   double at_along_ = 0, at_across_ = 0, across_ = 0;
   std::int64_t first_ = 0, last_ = 0;
+  std::uint32_t most_ = 1;  // drops of a nozzle at a step
   bool backward_ = false, any_ = false;
 };
 

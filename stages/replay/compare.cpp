@@ -57,13 +57,14 @@ void Printing::compare_plane(const RunsView& image, std::uint32_t plane, std::ui
       return false;
     const auto line = image.row(static_cast<std::uint32_t>(row));
     const auto after = std::upper_bound(line.begin(), line.end(), static_cast<std::uint32_t>(column)) - line.begin();
-    const std::uint64_t* fired = fired_row(plane, static_cast<std::uint32_t>(row));
-    return after % 2 == 1 && (fired[std::size_t(column) / 64] >> (column % 64) & 1) == 0;
+    const std::uint64_t fired = fired_more(plane, std::size_t(row) * row_words_ + std::size_t(column) / 64);
+    return after % 2 == 1 && (fired >> (column % 64) & 1) == 0;
   };
   std::vector<std::uint64_t>& wanted = differ.wanted;
   for (std::uint32_t row = 0; row < image.rows(); ++row) {
-    std::fill(wanted.begin(), wanted.end(), 0);
     const auto line = image.row(row);
+    if (line.empty() && fires_row_[row] == 0) continue;
+    std::fill(wanted.begin(), wanted.end(), 0);
     for (std::size_t i = 0; i + 1 < line.size(); i += 2) {
       for (std::uint32_t c = line[i]; c < line[i + 1];) {
         const std::uint32_t to = std::min((c / 64 + 1) * 64, line[i + 1]);
@@ -73,7 +74,7 @@ void Printing::compare_plane(const RunsView& image, std::uint32_t plane, std::ui
       }
     }
     for (std::uint32_t w = 0; w < row_words_; ++w) {
-      const std::uint64_t got = fired_row(plane, row)[w];
+      const std::uint64_t got = fired_more(plane, std::size_t{row} * row_words_ + w);
       for (std::uint64_t different = got ^ wanted[w]; different != 0; different &= different - 1) {
         const auto bit = static_cast<std::uint32_t>(std::countr_zero(different));
         const std::uint32_t column = w * 64 + bit;

@@ -43,7 +43,7 @@ class VirtualMachine {
   Result<Count> replay(std::string_view program, const Layer& layer, const RunsView& image, std::uint64_t moved,
                        std::uint64_t lost) const;
   /// The same for pixels of several drops: plane k, from 0, holds the pixels that have to get more than k drops, and a pixel
-  /// that is fired more often than there are planes is a fault. cost  a bit per pixel and plane
+  /// that is fired more often than there are planes is a fault. memory  a bit per pixel for each bit of their number
   Result<Count> replay(std::string_view program, const Layer& layer, std::span<const RunsView> planes, std::uint64_t moved,
                        std::uint64_t lost) const;
 

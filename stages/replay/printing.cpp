@@ -23,8 +23,9 @@ Printing::Printing(const VirtualMachine& machine, const Layer& layer, Purpose pu
       row_words_((machine.columns_ + 63) / 64),
       roller_mm_(machine.machine_.powder.roller_mm[0]),
       planes_(planes),
-      plane_words_(std::size_t{row_words_} * machine.rows_),
-      fired_(purpose == Purpose::kPrint ? planes * plane_words_ : 0, 0) {}
+      times_bits_(static_cast<std::uint32_t>(std::bit_width(planes))),
+      fired_(purpose == Purpose::kPrint ? std::size_t{row_words_} * machine.rows_ * times_bits_ : 0, 0),
+      fires_row_(purpose == Purpose::kPrint ? machine.rows_ : 0, 0) {}
 
 Standing Printing::standing() const {
   const auto& motion = profile().motion;
@@ -124,47 +125,9 @@ bool Printing::pixel(std::int64_t line, std::int64_t place, std::uint32_t& colum
   return true;
 }
 
-void Printing::fire(std::uint32_t number) {
-  if (purpose_ == Purpose::kTime) return;
-  if (number >= machine_.nozzle_.size()) return fault(fmt::format("nozzle {} does not exist", number));
-  const VirtualMachine::Nozzle& nozzle = machine_.nozzle_[number];
-  if (nozzle.blocked) return fault(fmt::format("nozzle {} fires, which is blocked", number));
-  if (!fired_here_) sweeps_.push_back({sweep_, first_line_});
-  fired_here_ = true;
-  const std::int64_t late = step_ - nozzle.step_offset;
-  std::uint32_t column = 0, row = 0;
-  if (late < 0 || late % machine_.ticks_ != 0 || !pixel(first_line_ + nozzle.line, late / machine_.ticks_, column, row)) {
-    return fault(fmt::format("nozzle {} fires where there is no pixel", number));
-  }
-  const std::size_t word = std::size_t{row} * row_words_ + column / 64;
-  const std::uint64_t bit = std::uint64_t{1} << (column % 64);
-  std::uint32_t plane = 0;
-  while (plane < planes_ && (fired_[plane * plane_words_ + word] & bit) != 0) ++plane;
-  if (plane == planes_) {
-    return fault(fmt::format("nozzle {} fires on column {}, row {} {}", number, column, row,
-                             planes_ == 1 ? "a second time" : fmt::format("more than {} times", planes_)));
-  }
-  fired_[plane * plane_words_ + word] |= bit;
-  ++count.drops;
-  count.farthest_along_um = std::max(count.farthest_along_um, std::abs(nozzle.along_um));
-  count.farthest_across_um = std::max(count.farthest_across_um, std::abs(nozzle.across_um));
-  if (watch_ != nullptr) (*watch_)({column, row, sweep_, static_cast<std::uint32_t>(step_), number, first_line_});
-}
-
-void Printing::fire_words(std::span<const std::uint64_t> words) {
-  if (purpose_ == Purpose::kTime) return;
-  for (std::size_t w = 0; w < words.size(); ++w) {
-    for (std::uint64_t left = words[w]; left != 0 && ok();) {
-      const int bit = std::countl_zero(left);
-      left &= ~(std::uint64_t{1} << (63 - bit));
-      fire(static_cast<std::uint32_t>(w * 64) + static_cast<std::uint32_t>(bit));
-    }
-  }
-}
-
-void Printing::head_moves(double mm, double mm_s, bool scanning) {
-  const double hertz = mm_s * 1000 / machine_.place_um_;
-  const double rounded = kHalfMmPerMinute * 1000 / machine_.place_um_;  // speeds are written so
+void Printing::head_moves(double mm, double mm_s, bool scanning, std::uint32_t drops) {
+  const double hertz = drops * mm_s * 1000 / machine_.place_um_;
+  const double rounded = drops * kHalfMmPerMinute * 1000 / machine_.place_um_;  // speeds are written so
   if (scanning && hertz > profile().head.highest_frequency_hz * (1 + 1e-4) + rounded) {
     return fault(fmt::format("scans at {:g} mm/s, where nozzles fire {:.0f} times a second; they can {:.0f}", mm_s, hertz,
                              profile().head.highest_frequency_hz));

@@ -60,13 +60,17 @@ class Printing {
   }
   void reading_step(std::int64_t step) { reading_ = step; }
   void at_step(std::int64_t step);
-  void fire(std::uint32_t nozzle);
+  /// drops  in a burst, where the dialect can say several
+  void fire(std::uint32_t nozzle, std::uint32_t drops = 1);
   /// Fires all nozzles with set bits; bit 63 of the first word is nozzle 0.
   void fire_words(std::span<const std::uint64_t> words);
+  /// Bits of a nozzle's drops in programs of heads that fire several at a place; 1 for others.
+  std::uint32_t drop_bits() const;
 
   // --- movements; each takes its time
   /// From rest to rest if the profile knows the head's acceleration.
-  void head_moves(double mm, double mm_s, bool scanning);
+  /// drops  of a scan: the most that a nozzle fires at a place of it
+  void head_moves(double mm, double mm_s, bool scanning, std::uint32_t drops = 1);
   /// works_mm_s  how fast it came, of a G1 beside sweeps; 0: by a travel, or in a sweep
   void head_stands_at(double x_mm, double y_mm, double works_mm_s);
   void feeds(std::uint32_t vat, double mm, double mm_s);
@@ -115,9 +119,8 @@ class Printing {
   };
   void compare_plane(const RunsView& image, std::uint32_t plane, std::uint64_t moved, std::uint64_t lost,
                      Differences& differ) const;
-  const std::uint64_t* fired_row(std::uint32_t plane, std::uint32_t row) const {
-    return fired_.data() + plane * plane_words_ + std::size_t{row} * row_words_;
-  }
+  /// The 64 pixels of a word that are fired more than so many times.
+  std::uint64_t fired_more(std::uint32_t times, std::size_t word) const;
   void fail(std::string what);  // takes the complete message
   /// Whether care was taken before this sweep, which has just ended. since_s  of the layer, behind it; below 0: not yet
   void check_care(std::string_view what, std::uint32_t every, double limit_s, double since_s);
@@ -149,9 +152,9 @@ class Printing {
   bool tells_powder_ = false;                     // moves a vat or the roller
   double seconds_ = 0;
   bool backward_ = false, sweeping_ = false, stepped_ = false, fired_here_ = false;
-  std::uint32_t planes_;
-  std::size_t plane_words_;
-  std::vector<std::uint64_t> fired_;  // one bit per plane and pixel, the leftmost in bit 0: fired more than so many times
+  std::uint32_t planes_, times_bits_;
+  std::vector<std::uint64_t> fired_;     // how many times, for 64 pixels a word for each bit of it, the leftmost one in bit 0
+  std::vector<std::uint8_t> fires_row_;  // whether anything is fired there
   std::vector<Sweep> sweeps_;
   std::uint32_t strokes_ = 0;          // of the roller to its far end
   double spat_s_ = -1, wiped_s_ = -1;  // when the layer's last care ended; -1: none yet

@@ -10,7 +10,7 @@ void read_raw(std::string_view text, Printing& printing) {
   if (reader.take(4) != "LAYR" || reader.word() != printing.layer()) return reader.fault("does not begin with this layer");
   reader.take(3 * 4);
   printing.count.vats = reader.word();
-  const std::uint32_t words = (printing.nozzles() + 127) / 128;
+  const std::uint32_t words = (printing.nozzles() + 127) / 128, planes = printing.drop_bits();
   while (printing.ok()) {
     const std::string_view tag = reader.take(4);
     if (tag == "LEND") {
@@ -30,18 +30,24 @@ void read_raw(std::string_view text, Printing& printing) {
     for (std::uint32_t segments = reader.word(); segments > 0 && printing.ok(); --segments) {
       std::int64_t step = reader.word();
       for (std::uint32_t left = reader.word(); left > 0; --left, step += backward ? -1 : 1) {
-        const std::string_view bytes = reader.take(std::size_t{words} * 16);
+        const std::string_view bytes = reader.take(std::size_t{words} * planes * 16);
         if (!printing.ok()) return;
         bool any = false;
         for (const char c : bytes) any = any || c != 0;
         if (!any) continue;
         printing.at_step(step);
-        passes.at(step);
         // Each word is a number of 128 bits, the highest byte first; bit i is nozzle i of the word.
+        std::uint32_t most = 0;
         for (std::uint32_t nozzle = 0; nozzle < words * 128; ++nozzle) {
-          const auto byte = static_cast<std::uint8_t>(bytes[nozzle / 128 * 16 + 15 - nozzle % 128 / 8]);
-          if ((byte >> (nozzle % 8) & 1) != 0) printing.fire(nozzle);
+          std::uint32_t drops = 0;
+          for (std::uint32_t plane = 0; plane < planes; ++plane) {
+            const auto byte = static_cast<std::uint8_t>(bytes[(plane * words + nozzle / 128) * 16 + 15 - nozzle % 128 / 8]);
+            drops += static_cast<std::uint32_t>(byte >> (nozzle % 8) & 1) << plane;
+          }
+          most = std::max(most, drops);
+          if (drops > 0) printing.fire(nozzle, drops);
         }
+        passes.at(step, most);
       }
     }
   }

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <optional>
+#include <vector>
 
 #include "pipeline/cli/command.h"
 #include "pipeline/machine/extruder.h"
@@ -9,7 +10,7 @@
 #include "pipeline/machine/profiles.h"
 #include "pipeline/output/print_program.h"
 #include "stages/data/text/readable.h"
-#include "stages/program/head_grid.h"
+#include "stages/program/explain.h"
 #include "stages/program/image_of_bed.h"
 #include "stages/program/orientation_target.h"
 #include "stages/write/file.h"
@@ -64,8 +65,8 @@ std::string explain(const ExtruderProfile& profile) {
 Result<std::optional<program::FullLayer>> time_full_layer(const ResolvedMachine& resolved) {
   const HeadGrid& grid = resolved.grid;
   const PrintProgram program(resolved, "", 1, {});
-  const double vectors = double(grid.swaths(0)) * grid.passes * static_cast<double>(grid.steps()) * grid.words() * 8;
-  if (vectors > (256 << 20) || program.bytes_bound(2 * std::uint64_t{grid.image.rows()}) > (1u << 30)) {
+  const double vectors = double(grid.swaths(0)) * grid.passes * static_cast<double>(grid.steps()) * grid.words() * 8 * grid.drop_bits;
+  if (vectors > (256 << 20) || program.bytes_bound(2 * std::uint64_t{grid.image.rows()}, grid.head_drops) > (1u << 30)) {
     return std::optional<program::FullLayer>();
   }
   program::FullLayer full;
@@ -78,6 +79,11 @@ Result<std::optional<program::FullLayer>> time_full_layer(const ResolvedMachine&
   if (Status status = program.write_layer(layer, image, {0}, work, record); !status) return status.error();
   full.sweeps = record.sweeps;
   full.seconds = static_cast<double>(record.microseconds) / 1e6;
+  if (grid.head_drops > 1) {
+    const std::vector<RunsView> drops(grid.head_drops, image.view());
+    if (Status status = program.write_layer(layer, drops, {0}, work, record); !status) return status.error();
+    full.drops_seconds = static_cast<double>(record.microseconds) / 1e6;
+  }
   image.change.clear();
   std::fill(image.row_offset.begin(), image.row_offset.end(), 0u);
   if (Status status = program.write_layer(layer, image, {0}, work, record); !status) return status.error();

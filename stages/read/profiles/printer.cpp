@@ -126,7 +126,7 @@ constexpr Key<Machine> kKeys[] = {
     field<kHead, &Head::row_offset_um>({"head", "row_offset_um"}, {-1e6, 1e6, " um", false, 1}),
     field<kHead, &Head::highest_frequency_hz>({"head", "highest_frequency_hz"}, {1e-3, kMost, " Hz"}),
     field<kHead, &Head::drop_pl>({"head", "drop_pl"}, {0, kMost, " pl"}),
-    field<kHead, &Head::most_drops>({"head", "most_drops"}, {1, 64}).unsaid_at("1"),
+    field<kHead, &Head::most_drops>({"head", "most_drops"}, {1, 15}).unsaid_at("1"),
     field<kHead, &Head::most_drop_sweeps>({"head", "most_drop_sweeps"}, {0, 64}).unsaid_at("0"),
     field<kHead, &Head::blocked>({"head", "blocked"}, {0, 65'534}),
     word<kBlocked, kHead, &Head::blocked_rule>({"head", "blocked_rule"}),

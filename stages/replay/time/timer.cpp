@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <string_view>
 
 #include "stages/replay/bytes.h"
@@ -35,6 +36,7 @@ void Timer::begin(const Layer& layer) {
   layer_ = layer;
   text_.clear();
   sweeps_.clear();
+  added_microseconds_ = 0;
 }
 
 void Timer::read(std::span<const std::byte> lines) {
@@ -47,8 +49,26 @@ void Timer::read(std::span<const std::byte> lines) {
   }
 }
 
-void Timer::sweep(double across_mm, bool backward, std::int64_t first, std::int64_t last) {
-  sweeps_.push_back({across_mm, backward, first, last});
+void Timer::sweep(double across_mm, bool backward, std::int64_t first, std::int64_t last, bool added, std::uint32_t drops) {
+  sweeps_.push_back({across_mm, backward, added, first, last, drops});
+}
+
+Result<Count> Timer::pass(bool all) const {
+  Printing printing(*machine_, layer_, Purpose::kTime);
+  Passes passes(printing);
+  bool backward = false;
+  for (const Sweep& sweep : sweeps_) {
+    if (!all && sweep.added) continue;
+    // Without the added ones directions alternate anew.
+    const bool turned = !all && machine_->profile().motion.both_directions && sweep.backward != backward;
+    passes.begin(sweep.across_mm, sweep.backward != turned);
+    passes.at(turned ? sweep.last : sweep.first, sweep.drops);
+    passes.at(turned ? sweep.first : sweep.last, sweep.drops);
+    backward = !backward;
+  }
+  passes.end();
+  if (Status status = printing.status(); !status) return Error{Fault::kInternal, status.error().message};
+  return printing.finish();
 }
 
 Result<Count> Timer::end() {
@@ -59,16 +79,12 @@ Result<Count> Timer::end() {
                                                "report it",
                                                taken.error().message)};
   }
-  Printing printing(*machine_, layer_, Purpose::kTime);
-  Passes passes(printing);
-  for (const Sweep& sweep : sweeps_) {
-    passes.begin(sweep.across_mm, sweep.backward);
-    passes.at(sweep.first);
-    passes.at(sweep.last);
-  }
-  passes.end();
-  if (Status status = printing.status(); !status) return Error{Fault::kInternal, status.error().message};
-  return printing.finish();
+  const Result<Count> whole = pass(true);
+  if (!whole || std::ranges::none_of(sweeps_, &Sweep::added)) return whole;
+  const Result<Count> without = pass(false);
+  if (!without) return without;
+  added_microseconds_ = whole->microseconds - without->microseconds;
+  return whole;
 }
 
 }  // namespace lamina::replay

@@ -29,22 +29,30 @@ class Timer {
   void read(std::span<const std::byte> lines);
   /// Dialects without: the next sweep, by its first and last step that fire, in the order of the movement.
   /// across_mm  of the carriage
-  void sweep(double across_mm, bool backward, std::int64_t first, std::int64_t last);
+  /// added      it is there since nozzles cannot fire all of their drops at the scan's speed
+  /// drops      the most of a nozzle at a place
+  void sweep(double across_mm, bool backward, std::int64_t first, std::int64_t last, bool added = false,
+             std::uint32_t drops = 1);
   /// The layer's time, and its care. errors  kInternal: the machine's reader does not take the program
   Result<Count> end();
+  /// How much of it is that of added sweeps; the others are as they would be without them. After end().
+  std::int64_t added_microseconds() const { return added_microseconds_; }
 
   std::uint64_t bytes() const { return text_.capacity() + sweeps_.capacity() * sizeof(Sweep); }
 
  private:
   struct Sweep {
     double across_mm;
-    bool backward;
+    bool backward, added;
     std::int64_t first, last;
+    std::uint32_t drops;
   };
+  Result<Count> pass(bool all) const;
   const VirtualMachine* machine_;
   Layer layer_{};
   std::string text_;
   std::vector<Sweep> sweeps_;
+  std::int64_t added_microseconds_ = 0;
 };
 
 }  // namespace lamina::replay

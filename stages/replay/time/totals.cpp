@@ -24,6 +24,10 @@ std::vector<std::string> totals_text(const Totals& totals) {
     lines.push_back(fmt::format("blocked   {} pixels fired by a neighbouring nozzle, {} not at all, as recorded",
                                 readable_count(totals.moved), readable_count(totals.lost)));
   }
+  if (count.most_at_place > 1) {
+    lines.push_back(fmt::format("at once   up to {} drops of a nozzle on a pixel in one sweep, within its frequency",
+                                count.most_at_place));
+  }
   lines.push_back(
       fmt::format("places    drops land up to {:.2f} um along and {:.2f} um across the scan from the centre of their pixel",
                   count.farthest_along_um, count.farthest_across_um));
@@ -52,6 +56,7 @@ nlohmann::ordered_json totals_json(const Totals& totals) {
           {"drops", count.drops},
           {"vectors", count.vectors},
           {"sweeps", count.sweeps},
+          {"drops_at_once", count.most_at_place},
           {"moved", totals.moved},
           {"lost", totals.lost},
           {"coverage", totals.coverage},

@@ -14,6 +14,7 @@
 #include "stages/data/input/file_reader.h"
 #include "stages/data/text/number_text.h"
 #include "stages/write/file.h"
+#include "stages/write/levels/level_format.h"
 #include "stages/write/manifest/manifest_head.h"
 #include "stages/write/manifest/manifest_line.h"
 
@@ -102,6 +103,17 @@ Status check_begun_manifest(const std::string& part) {
   if (!file || !file->read_at(0, {&first, 1}) || first == '{' || first == 0) return {};
   return Error{Fault::kUsage,
                fmt::format("{}: is there already, and is no record of lamina; remove it, or name another output", part)};
+}
+
+std::uint8_t grey_level_of(std::uint32_t most_drops) {
+  return most_drops <= 1 ? 1 : most_drops <= 3 ? 3 : most_drops <= 15 ? 15 : 255;
+}
+
+bool ManifestHead::grey_drops() const { return most_drops > 0 && write::find_level_format(format) != nullptr; }
+
+std::uint8_t ManifestHead::full_level() const {
+  if (grey_drops()) return grey_level_of(most_drops);
+  return static_cast<std::uint8_t>(levels > 0 && most_drops == 0 ? levels - 1 : 0);
 }
 
 std::string ManifestHead::image_name(std::size_t number) const {

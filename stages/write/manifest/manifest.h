@@ -56,19 +56,29 @@ struct ManifestHead {
   std::uint32_t most_drops = 0;            // of a pixel; 0: no saturation was asked for, and set pixels get one
 
   std::uint32_t levels = 0;  // of shares of voxels; 0: pixels are set or not
+  /// That a nozzle can fire on a pixel in one sweep, and does at the scan's speed.
+  std::uint32_t head_drops = 1, sweep_drops = 1;
 
-  /// Level of a full voxel in images that carry levels, which have no drops; 0: images of one bit.
-  std::uint8_t full_level() const { return static_cast<std::uint8_t>(levels > 0 && most_drops == 0 ? levels - 1 : 0); }
+  /// Whether the drops of a pixel are the level of a grey image, the only one of its layer.
+  bool grey_drops() const;
+  /// The darkest level of images that carry levels: of a full voxel, or of grey_level_of(most_drops) drops; 0: images of one
+  /// bit.
+  std::uint8_t full_level() const;
 
   /// Images of a layer that have names and records of their own: of materials, or of the drops of a pixel if there can be
   /// several. 0: the one image that the layer's own record is of.
-  std::size_t named_images() const { return !materials.empty() ? materials.size() : most_drops > 1 ? most_drops : 0; }
+  std::size_t named_images() const {
+    return !materials.empty() ? materials.size() : most_drops > 1 && !grey_drops() ? most_drops : 0;
+  }
   /// bronze, or drop2
   std::string image_name(std::size_t number) const;
 
   /// Hash of all fields above except the range: manifests of the same job have equal ids.
   Hash128 id() const;
 };
+
+/// The darkest level of grey images of so many drops: 1, 3, 15 or 255, that of as many bits.
+std::uint8_t grey_level_of(std::uint32_t most_drops);
 
 /// "bracket.stl and 2 more"; empty without parts.
 std::string title_of(const std::vector<PartSummary>& parts);
@@ -93,7 +103,7 @@ struct LayerImageFile {
   ImageRecord record;
 };
 /// All images of a layer: one, or one per material in the order of the manifest, or one per drop: drop k is the image of the
-/// pixels that get at least k.
+/// pixels that get at least k. Of grey drops one.
 std::vector<LayerImageFile> layer_images(const ManifestHead& head, const LayerRecord& record);
 
 /// Reads a manifest, or the complete lines of a .part.

@@ -86,6 +86,9 @@ void add_images(const ManifestHead& head, Json& json) {
   json["program_extension"] = head.program_extension;
   json["program_start_xxh3_128"] = hex(head.program_start);
   json["program_end_xxh3_128"] = hex(head.program_end);
+  if (head.head_drops <= 1) return;
+  json["head_drops"] = head.head_drops;
+  json["sweep_drops"] = head.sweep_drops;
 }
 
 void read_images(const Json& json, ManifestHead& head) {
@@ -103,6 +106,8 @@ void read_images(const Json& json, ManifestHead& head) {
   head.program_extension = json.at("program_extension");
   head.program_start = hash_from(json.at("program_start_xxh3_128"));
   head.program_end = hash_from(json.at("program_end_xxh3_128"));
+  if (json.contains("head_drops")) head.head_drops = json.at("head_drops");
+  if (json.contains("sweep_drops")) head.sweep_drops = json.at("sweep_drops");
 }
 
 Json lasting_json(const ManifestHead& head) {

@@ -80,6 +80,7 @@ void describe_images(Io& io, const ManifestHead& head, Record& record) {
   if (head.most_drops > 0) {
     io.number("drops", record.drops);
     io.number("asked_drops", record.asked_drops);
+    if (head.grey_drops()) io.number("most_drops", record.most_drops);
   }
   if (head.levels > 0) {
     io.number("half_differs", record.half_differs);
@@ -112,6 +113,10 @@ void describe_images(Io& io, const ManifestHead& head, Record& record) {
   io.number("lost", record.program.lost);
   io.added("microseconds", record.program.microseconds);
   io.added("spat", record.program.spat);
+  if (head.head_drops > 1) {
+    io.number("added_sweeps", record.program.added_sweeps);
+    io.number("added_microseconds", record.program.added_microseconds);
+  }
   io.hash("xxh3_128", record.program.hash);
   io.close("}");
 }

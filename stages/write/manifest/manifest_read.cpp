@@ -52,9 +52,11 @@ std::string read_line(std::string_view line, const ManifestHead& head, std::uint
     if (!what.empty()) return fmt::format("layer {}: {}", index, what);
   }
   if (head.product != Product::kImages) record.paths = std::make_shared<const PathFacts>(paths);
+  if (head.most_drops == 1) record.most_drops = record.drops > 0 ? 1 : 0;
   for (const ImageRecord& image : record.images) {
     record.bytes += image.bytes;
     record.set_pixels += head.materials.empty() && record.set_pixels > 0 ? 0 : image.set_pixels;  // drops fall on the same
+    if (head.materials.empty() && image.set_pixels > 0) ++record.most_drops;
   }
   return {};
 }

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cstdlib>
 #include <set>
 #include <stdexcept>
 
@@ -44,12 +45,14 @@ std::string fault_of_images(const ManifestHead& head) {
   }
   const bool grey = write::find_level_format(head.format) != nullptr;
   const bool right = head.levels == 2 || head.levels == 4 || head.levels == 16;
-  if (grey ? !right || head.most_drops > 0 : head.levels > 0 && (!right || head.most_drops == 0)) {
+  const bool drops = head.most_drops > 0;  // also as grey, of a job with a machine
+  if (head.levels > 0 ? !right || (!grey && !drops) : grey && !drops) {
     return no_such("levels", fmt::format("{}", head.levels));
   }
-  if (grey && !head.materials.empty()) return no_such("materials", head.materials.front().name);
-  if (grey && !head.machine.empty()) {
-    return no_such("machine", head.machine);
+  if (grey && (drops == head.machine.empty() || !head.materials.empty())) return no_such("format", head.format);
+  constexpr std::uint32_t kMostHeadDrops = 15;
+  if (head.head_drops > kMostHeadDrops || head.sweep_drops < 1 || head.sweep_drops > head.head_drops) {
+    return no_such("sweep_drops", fmt::format("{}", head.sweep_drops));
   }
   if (head.machine.empty()) return {};
   for (const JobMaterial& material : head.materials) {
@@ -110,6 +113,9 @@ std::string what_is_impossible(const Layer& layer) {
 }
 
 std::string what_is_impossible(const ProgramRecord& program) {
+  if (program.added_sweeps > program.sweeps || std::abs(program.added_microseconds) > program.microseconds) {
+    return fmt::format("has {} added sweeps in {} microseconds", program.added_sweeps, program.added_microseconds);
+  }
   const bool possible = program.microseconds >= 0 && program.microseconds <= kMostMicroseconds;
   return possible ? "" : fmt::format("takes {} microseconds", program.microseconds);
 }

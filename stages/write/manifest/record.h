@@ -21,6 +21,9 @@ struct ProgramRecord {
   std::uint64_t moved = 0, lost = 0;  // pixels of blocked nozzles (stages/program/compile.h)
   std::int64_t microseconds = 0;      // that the machine takes (stages/replay/time/timer.h); 0: of an earlier build
   std::uint64_t spat = 0;             // drops fired off the bed
+  /// Of heads that fire several drops: sweeps that are there for their frequency (data/program.h), and what they take.
+  std::uint32_t added_sweeps = 0;
+  std::int64_t added_microseconds = 0;
 };
 
 /// The image of one material where a job has several, or of the pixels that get at least so many drops.
@@ -70,6 +73,7 @@ struct LayerRecord {
   std::uint64_t dosed_pixels = 0;         // that are to be filled, whether or not drops fall on them; voxels' shares summed
   std::uint64_t drops = 0;                // of the images
   std::uint64_t asked_drops = 0;          // by the wished saturation, rounded
+  std::uint32_t most_drops = 0;           // of any pixel
   std::vector<std::uint64_t> part_drops;  // of each part, where there are part_pixels
   std::uint64_t half_differs = 0;         // pixels whose centre says something else than half of their voxel
   std::uint64_t half_far = 0;             // of them, those that are not beside a boundary of the image

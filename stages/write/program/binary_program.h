@@ -47,18 +47,20 @@ void for_each_segment(const SweepVectors& vectors, std::size_t head_bytes, std::
 /// Appends the segments of a sweep in the order of the movement: for each one its head, kHead bytes that
 /// head(to, place, count) writes, and its vectors as they stand in `vectors.bits`, whose order is that of the dialect
 /// (Dialect::bit_order), cut off at vector_bytes.
-/// turn  vectors of a segment run downwards
+/// turn    vectors of a segment run downwards
+/// planes  a step's vectors are so many, and a segment has those of all its steps plane after plane
 template <std::size_t kHead, class Head>
 void put_segments(const SweepVectors& vectors, bool backward, bool turn, std::size_t vector_bytes, ProgramBytes& out,
-                  const Head& head) {
+                  const Head& head, std::uint32_t planes = 1) {
   std::size_t end = out.size();
-  for_each_segment(vectors, kHead, vector_bytes,
-                   [&](std::uint32_t, std::uint32_t count) { end += kHead + count * vector_bytes; });
+  const std::size_t step_bytes = vector_bytes * planes;
+  for_each_segment(vectors, kHead, step_bytes,
+                   [&](std::uint32_t, std::uint32_t count) { end += kHead + count * step_bytes; });
   std::size_t next = backward ? end : out.size();
   out.resize(end);
-  const std::size_t stride = vectors.words * sizeof(std::uint64_t);
-  for_each_segment(vectors, kHead, vector_bytes, [&](std::uint32_t place, std::uint32_t count) {
-    const std::size_t bytes = kHead + count * vector_bytes;
+  const std::size_t stride = vectors.words * sizeof(std::uint64_t), plane_stride = stride / planes;
+  for_each_segment(vectors, kHead, step_bytes, [&](std::uint32_t place, std::uint32_t count) {
+    const std::size_t bytes = kHead + count * step_bytes;
     if (backward) next -= bytes;
     std::byte* to = out.data() + next;
     head(to, place, count);
@@ -67,8 +69,10 @@ void put_segments(const SweepVectors& vectors, bool backward, bool turn, std::si
     if (stride == vector_bytes && !turn) {
       std::memcpy(to, from, count * stride);
     } else {
-      for (std::uint32_t k = 0; k < count; ++k, to += vector_bytes) {
-        std::memcpy(to, from + (turn ? count - 1 - k : k) * stride, vector_bytes);
+      for (std::uint32_t p = 0; p < planes; ++p, from += plane_stride) {
+        for (std::uint32_t k = 0; k < count; ++k, to += vector_bytes) {
+          std::memcpy(to, from + (turn ? count - 1 - k : k) * stride, vector_bytes);
+        }
       }
     }
     if (!backward) next += bytes;

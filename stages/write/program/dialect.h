@@ -40,7 +40,8 @@ enum Saying : std::uint32_t {
   kSaysCare = 16,     // firing off the bed, and wiping, at the begin of a layer
   kSaysSeconds = 32,  // the same between sweeps, by the clock
   kSaysOwn = 64,      // lines of the machine's own, which its profile has
-  kSaysAll = 127
+  kSaysAll = 127,
+  kSaysDrops = 128  // several drops of a pixel in one sweep
 };
 
 /// One row of the registry.

@@ -9,7 +9,7 @@ namespace lamina::pipeline {
 namespace {
 
 TEST(ShippedProfiles, AreTheTenThatTheDocumentsNameAndTheirTextReadsBackTheSame) {
-  EXPECT_EQ(shipped_machines().size(), 10u);
+  EXPECT_EQ(shipped_machines().size(), 11u);
   for (const ShippedProfile& shipped : shipped_machines()) {
     const auto machine = read_machine(shipped.text, std::string(shipped.name));
     ASSERT_TRUE(machine.ok()) << machine.error().message;

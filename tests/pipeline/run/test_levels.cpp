@@ -162,8 +162,8 @@ TEST_F(LevelJobs, WriteLevelsAsGreyInFormatsThatCarryThem) {
     done(job + format + " --resume");
     done(std::string("verify --quiet ") + format);
     test::expect_refused(kTenthsOfBox + std::string("-o none --format ") + format, 2, "add --levels 2, 4 or 16", folder_);
-    test::expect_refused("jet box.stl --machine nuferbj --levels 4 -o none --format " + std::string(format), 2,
-                         "print programs fire drops", folder_);
+    test::expect_refused("jet box.stl --machine nuferbj -o none --format " + std::string(format), 2,
+                         "--machine and --saturation", folder_);
   }
   done("jet tiff-8 --dpi 254 --bed 5x5 --quiet -o half");
   EXPECT_EQ(records_of("half")[2].set_pixels, 600u);

@@ -7,18 +7,20 @@
 namespace lamina::write::planes {
 namespace {
 
-constexpr std::uint32_t kLayer = 0x4C01, kPlane = 0x4C02, kEnd = 0x4C03, kStart = 0x4C04, kDone = 0x4C05;
-constexpr std::size_t kPlaneHead = 36;
+constexpr std::uint32_t kLayer = 0x4C01, kPlane = 0x4C02, kEnd = 0x4C03, kStart = 0x4C04, kDone = 0x4C05, kGrey = 0x4C06;
+constexpr std::size_t kPlaneHead = 36, kGreyHead = 40;
 
 class Writer final : public ProgramWriter {
  public:
   Writer(const Machine& machine, const HeadGrid& grid) : machine_(machine), grid_(grid), words_((grid.nozzles + 31) / 32) {}
 
   void start(std::uint32_t layers, ProgramBytes& out) override {
+    const bool grey = grid_.drop_bits > 1;
     for (const std::uint32_t value :
-         {kStart, 7u, 1u, layers, grid_.nozzles, grid_.places, grid_.lines, grid_.steps_per_pixel, words_}) {
+         {kStart, grey ? 8u : 7u, grey ? 2u : 1u, layers, grid_.nozzles, grid_.places, grid_.lines, grid_.steps_per_pixel, words_}) {
       put_little<std::uint32_t>(out, value);
     }
+    if (grey) put_little<std::uint32_t>(out, grid_.drop_bits);
   }
   void begin_layer(const LayerCycle& cycle, ProgramBytes& out) override {
     const std::uint32_t vats = vat_bits(cycle);
@@ -32,6 +34,18 @@ class Writer final : public ProgramWriter {
   // Planes of one sweep, in the order of the movement; inside of a plane steps increase.
   void sweep(const Sweep& sweep, const SweepVectors& vectors, ProgramBytes& out) override {
     const auto across = static_cast<std::uint32_t>(across_nm(machine_, grid_, sweep.first_line));
+    if (const std::uint32_t bits = grid_.drop_bits; bits > 1) {
+      put_segments<kGreyHead>(
+          vectors, sweep.backward, false, words_ * 4, out,
+          [&](std::byte* to, std::uint32_t begin, std::uint32_t count) {
+            const std::uint32_t head[10] = {
+                kGrey,  8 + count * words_ * bits,  sweep.number, sweep.of, sweep.backward ? 1u : 0u,
+                across, vectors.first_step + begin, count,        words_,   bits};
+            std::memcpy(to, head, kGreyHead);
+          },
+          bits);
+      return;
+    }
     put_segments<kPlaneHead>(
         vectors, sweep.backward, false, words_ * 4, out, [&](std::byte* to, std::uint32_t begin, std::uint32_t count) {
           const std::uint32_t head[9] = {kPlane, 7 + count * words_,         sweep.number, sweep.of, sweep.backward ? 1u : 0u,

@@ -15,9 +15,11 @@ class Writer final : public ProgramWriter {
 
   void start(std::uint32_t layers, ProgramBytes& out) override {
     put_tag(out, "LRAW");
-    for (const std::uint32_t value : {1u, layers, grid_.nozzles, grid_.places, grid_.lines, grid_.steps_per_pixel, words_}) {
+    const bool grey = grid_.drop_bits > 1;
+    for (const std::uint32_t value : {grey ? 2u : 1u, layers, grid_.nozzles, grid_.places, grid_.lines, grid_.steps_per_pixel, words_}) {
       put_little<std::uint32_t>(out, value);
     }
+    if (grey) put_little<std::uint32_t>(out, grid_.drop_bits);
   }
 
   void begin_layer(const LayerCycle& cycle, ProgramBytes& out) override {
@@ -30,7 +32,7 @@ class Writer final : public ProgramWriter {
   }
 
   void sweep(const Sweep& sweep, const SweepVectors& vectors, ProgramBytes& out) override {
-    const std::size_t vector_bytes = words_ * 16;
+    const std::size_t vector_bytes = words_ * 16 * grid_.drop_bits;
     std::uint32_t segments = 0;
     for_each_segment(vectors, kSegmentHead, vector_bytes, [&](std::uint32_t, std::uint32_t) { ++segments; });
     put_tag(out, "SWTH");
@@ -56,7 +58,7 @@ class Writer final : public ProgramWriter {
  private:
   const Machine& machine_;
   const HeadGrid& grid_;
-  std::uint32_t words_;  // of 128 bits a vector
+  std::uint32_t words_;  // of 128 bits a vector of one bit of the drops
 };
 
 }  // namespace

@@ -1,0 +1,203 @@
+// Several drops of a pixel in one sweep: how many a head's frequency allows, and what its nozzles fire then.
+#include <gtest/gtest.h>
+
+#include <numeric>
+
+#include "stages/program/compile.h"
+#include "stages/program/explain.h"
+#include "stages/write/program/dialect.h"
+#include "tests/program/machines.h"
+
+namespace lamina::program {
+namespace {
+
+/// A head square to a scan along x whose pixels are 100 um long: at 10 mm/s a nozzle passes 100 places a second.
+Machine head_of(std::uint32_t most_drops, double highest_frequency_hz, std::uint32_t nozzles = 4) {
+  Machine machine;
+  machine.name = "test";
+  machine.dialect = "planes";
+  machine.head.nozzles = nozzles;
+  machine.head.pitch_um = 100;
+  machine.head.most_drops = most_drops;
+  machine.head.highest_frequency_hz = highest_frequency_hz;
+  machine.motion.scan_speed_mm_s = 10;
+  machine.bed.size_mm = {0.8, 0.1 * nozzles};
+  return machine;
+}
+
+HeadGrid grid_of(const Machine& machine) {
+  auto grid = make_head_grid(machine);
+  EXPECT_TRUE(grid.ok()) << (grid.ok() ? "" : grid.error().message);
+  return *grid;
+}
+
+/// The pixels of more than k drops, for each k, of rows of digits.
+std::vector<Runs> planes_of(const std::vector<std::string>& rows, std::uint32_t most) {
+  std::vector<Runs> planes;
+  for (std::uint32_t k = 0; k < most; ++k) {
+    testing::Image image;
+    for (const std::string& row : rows) {
+      image.emplace_back();
+      for (const char c : row) image.back().push_back(static_cast<std::uint32_t>(c - '0') > k ? 1 : 0);
+    }
+    planes.push_back(testing::runs_of(image));
+  }
+  return planes;
+}
+
+struct Fired {
+  std::vector<Sweep> sweeps;
+  std::vector<std::vector<std::string>> drops;  // of each sweep, a row of digits a nozzle, by step from 0
+  ProgramCount count;
+};
+
+Fired fired_by(const HeadGrid& grid, const std::vector<Runs>& planes) {
+  Fired fired;
+  CompileScratch scratch;
+  const std::vector<RunsView> views(planes.begin(), planes.end());
+  const auto count = compile(grid, views, scratch, [&](const Sweep& sweep, const SweepVectors& vectors) -> Status {
+    fired.sweeps.push_back(sweep);
+    std::vector<std::string> rows(grid.nozzles, std::string(grid.steps(), '0'));
+    EXPECT_EQ(vectors.words, grid.words() * grid.drop_bits);
+    for (std::uint32_t s = 0; s < vectors.steps; ++s) {
+      for (std::uint32_t i = 0; i < grid.nozzles; ++i) {
+        for (std::uint32_t bit = 0; bit < grid.drop_bits; ++bit) {
+          const std::uint64_t word = vectors.bits[std::size_t{s} * vectors.words + bit * grid.words() + i / 64];
+          rows[i][vectors.first_step + s] = static_cast<char>(rows[i][vectors.first_step + s] + ((word >> i % 64 & 1) << bit));
+        }
+      }
+    }
+    fired.drops.push_back(std::move(rows));
+    return {};
+  });
+  EXPECT_TRUE(count.ok());
+  fired.count = *count;
+  return fired;
+}
+
+// 100 places a second: of 350 Hz each gets 3 drops, of 299 Hz 2, of 700 Hz 7, and no more than the head has.
+TEST(DropSweeps, FireWhatTheFrequencyAllows) {
+  const auto drops = [](std::uint32_t most, double hertz) { return grid_of(head_of(most, hertz)).sweep_drops; };
+  EXPECT_EQ(drops(7, 350), 3u);
+  EXPECT_EQ(drops(7, 299), 2u);
+  EXPECT_EQ(drops(7, 300), 3u);
+  EXPECT_EQ(drops(7, 100), 1u);
+  EXPECT_EQ(drops(7, 700), 7u);
+  EXPECT_EQ(drops(7, 5000), 7u);
+  EXPECT_EQ(drops(1, 5000), 1u);
+  const auto too_fast = make_head_grid(head_of(7, 99));
+  ASSERT_FALSE(too_fast.ok());
+  EXPECT_NE(too_fast.error().message.find("scan at 9.9 mm/s or slower"), std::string::npos) << too_fast.error().message;
+}
+
+TEST(DropSweeps, TakeAsManyBitsAsTheHeadHasDrops) {
+  for (const auto& [most, bits] : {std::pair{1u, 1u}, {2u, 2u}, {3u, 2u}, {4u, 4u}, {7u, 4u}, {15u, 4u}}) {
+    EXPECT_EQ(grid_of(head_of(most, 100)).drop_bits, bits) << most;
+  }
+  for (const std::uint32_t most : {0u, 16u, 64u}) {
+    const auto grid = make_head_grid(head_of(most, 1e5));
+    ASSERT_FALSE(grid.ok());
+    EXPECT_NE(grid.error().message.find("head.most_drops: give 1 to 15"), std::string::npos) << grid.error().message;
+  }
+  EXPECT_FALSE(make_head_grid(head_of(7, 1e5, 16'385)).ok());
+  EXPECT_TRUE(make_head_grid(head_of(7, 1e5, 16'384)).ok());
+}
+
+TEST(DropSweeps, FireEachPixelsNumberOfDrops) {
+  const std::vector<std::string> image{"01234567", "70000007", "00000000", "11111111"};
+  const Fired fired = fired_by(grid_of(head_of(7, 700)), planes_of(image, 7));
+  ASSERT_EQ(fired.drops.size(), 1u);
+  EXPECT_EQ(fired.drops[0], image);
+  EXPECT_EQ(fired.count.drops, 28u + 14u + 8u);
+  EXPECT_EQ(fired.count.sweeps, 1u);
+  EXPECT_EQ(fired.count.added, 0u);
+}
+
+// Of 350 Hz 3 drops fit: 7 drops are 3 + 3 + 1. The head would have fired them in one sweep, so two are added.
+TEST(DropSweeps, AreAddedWhereDropsComeTooFast) {
+  const std::vector<std::string> image{"01234567", "00000000", "00000000", "00000002"};
+  const Fired fired = fired_by(grid_of(head_of(7, 350)), planes_of(image, 7));
+  ASSERT_EQ(fired.drops.size(), 3u);
+  EXPECT_EQ(fired.drops[0], (std::vector<std::string>{"01233333", "00000000", "00000000", "00000002"}));
+  EXPECT_EQ(fired.drops[1], (std::vector<std::string>{"00001233", "00000000", "00000000", "00000000"}));
+  EXPECT_EQ(fired.drops[2], (std::vector<std::string>{"00000001", "00000000", "00000000", "00000000"}));
+  EXPECT_EQ(fired.count.drops, 28u + 2u);
+  EXPECT_EQ(fired.count.added, 2u);
+  for (std::uint32_t i = 0; i < 3; ++i) {
+    EXPECT_EQ(fired.sweeps[i].number, i);
+    EXPECT_EQ(fired.sweeps[i].of, 3u);
+    EXPECT_EQ(fired.sweeps[i].added, i > 0);
+    EXPECT_EQ(fired.sweeps[i].drops, i < 2 ? 3u : 1u);
+  }
+}
+
+// A pixel of d drops takes ceil(d / k) sweeps of k drops, and ceil(d / m) of a head that is fast enough.
+TEST(DropSweeps, AddedOnesAreThoseBeyondTheHeadsOwn) {
+  for (std::uint32_t most = 2; most <= 15; ++most) {
+    for (std::uint32_t allowed = 1; allowed <= most; ++allowed) {
+      const HeadGrid grid = grid_of(head_of(most, 100.0 * allowed));
+      ASSERT_EQ(grid.sweep_drops, allowed);
+      for (std::uint32_t drops = 1; drops <= 9; ++drops) {
+        const std::string row = std::string("00") + static_cast<char>('0' + drops) + "00000";
+        // Planes are those of the job, whatever the layer has.
+        const Fired fired = fired_by(grid, planes_of({row, "00000000", "00000000", "00000000"}, 12));
+        const std::uint32_t sweeps = (drops + allowed - 1) / allowed, own = (drops + most - 1) / most;
+        EXPECT_EQ(fired.sweeps.size(), sweeps);
+        EXPECT_EQ(fired.count.added, sweeps - own) << most << " " << allowed << " " << drops;
+        EXPECT_EQ(fired.count.drops, drops);
+      }
+    }
+  }
+}
+
+TEST(DropSweeps, BothWaysToTheVectorsAgree) {
+  for (const std::uint32_t ticks : {1u, 3u}) {
+    Machine machine = head_of(7, 5000, 200);
+    machine.head.row_offset_um = {0, 300};
+    machine.motion.encoder_dpi = 254 * ticks;
+    machine.motion.ticks_per_pixel = ticks;
+    machine.motion.lag_unit = LagUnit::kTick;
+    machine.bed.size_mm = {15, 20};
+    const HeadGrid grid = grid_of(machine);
+    testing::Random random(ticks);
+    std::vector<std::vector<std::uint32_t>> changes(std::size_t{grid.nozzles} * grid.drop_bits);
+    std::vector<Line> lines;
+    for (auto& line : changes) {
+      for (std::uint32_t c = random() % 5; c < grid.places && random() % 40 != 0; c += 1 + random() % 4) line.push_back(c);
+      if (line.size() % 2 == 1) line.push_back(grid.places);
+      lines.emplace_back(line);
+    }
+    FireScratch scratch;
+    SweepVectors by_changes, by_blocks;
+    ASSERT_TRUE(fire(grid, lines, scratch, by_changes, FireWay::kChanges));
+    ASSERT_TRUE(fire(grid, lines, scratch, by_blocks, FireWay::kBlocks));
+    EXPECT_EQ(by_changes.first_step, by_blocks.first_step);
+    EXPECT_EQ(by_changes.bits, by_blocks.bits);
+    EXPECT_EQ(by_changes.firing, by_blocks.firing);
+  }
+}
+
+TEST(DropSweeps, AreRefusedOfADialectOfOneDrop) {
+  for (const write::Dialect& dialect : write::dialects()) {
+    Machine machine = head_of(3, 5000);
+    const HeadGrid grid = grid_of(machine);
+    const Status status = write::check_dialect(dialect, machine, grid);
+    const bool says = dialect.id == "planes" || dialect.id == "raw";
+    EXPECT_EQ(status.ok(), says) << dialect.id;
+    if (says) continue;
+    EXPECT_NE(status.error().message.find("head.most_drops: 3"), std::string::npos) << status.error().message;
+  }
+}
+
+TEST(DropSweeps, AreTold) {
+  const Machine slow = head_of(7, 350), fast = head_of(7, 700);
+  EXPECT_EQ(sweeps_text(fast, grid_of(fast), {12, 0, 0}), "2 over a place for up to 12 drops a pixel, up to 7 in each");
+  EXPECT_EQ(sweeps_text(slow, grid_of(slow), {7, 20, 12.5}),
+            "3 over a place for up to 7 drops a pixel: 350 Hz allow 3 of the head's 7 drops at 10 mm/s, all of them at 5.0 mm/s; "
+            "that adds 20 sweeps, 12.5 s");
+  EXPECT_NE(explain(slow, grid_of(slow), {}).find("3 of 7 of a pixel in one sweep at that speed, as 4 bits; all at 5.0 mm/s"),
+            std::string::npos);
+}
+
+}  // namespace
+}  // namespace lamina::program
