@@ -9,10 +9,12 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
+#include "pipeline/check/doses.h"
 #include "pipeline/check/job_files.h"
 #include "pipeline/output/directory.h"
 #include "pipeline/output/print_program.h"
 #include "pipeline/run/job_cost.h"
+#include "stages/data/levels.h"
 #include "stages/read/image.h"
 #include "stages/replay/feeding.h"
 #include "stages/write/manifest/compare.h"
@@ -29,6 +31,7 @@ struct Inspection {
   const ManifestHead& head;
   bool quick;
   std::optional<replay::VirtualMachine> machine;  // if there are programs to replay
+  std::optional<DoseCheck> doses;
   VerifyReport& report;
 };
 
@@ -87,11 +90,18 @@ std::string fault_of_program(const Inspection& inspection, const LayerRecord& re
                             image != nullptr ? ", though it prints the same" : "");
 }
 
-// Empty, or the fault of an image; its set pixels are added to `picture`.
-std::string fault_of_image(const Inspection& inspection, const LayerImageFile& file, LayerPicture& picture) {
+// Empty, or the fault of an image; its set pixels are added to `picture`, its levels to `sum`.
+std::string fault_of_image(const Inspection& inspection, const LayerImageFile& file, LayerPicture& picture,
+                           std::uint64_t& sum) {
   const std::string& name = file.name;
-  Result<read::Image> image = read::image((fs::path(inspection.directory) / name).string(), inspection.head.full_level());
+  const std::string path = (fs::path(inspection.directory) / name).string();
+  Levels levels;
+  const std::uint8_t full = inspection.head.full_level();
+  Result<read::Image> image = full > 0 ? read::levels(path, full, levels) : read::image(path);
   if (!image) return image.error().message;
+  for (std::size_t i = 0; i < levels.level.size(); ++i) {
+    sum += std::uint64_t{levels.level[i]} * (levels.change[2 * i + 1] - levels.change[2 * i]);
+  }
   if (const std::string what = read::difference(*image, inspection.head.grid, file.record.set_pixels); !what.empty())
     return fmt::format("{}: {}", name, what);
   if (!add_picture(inspection.head, std::move(image->runs), picture)) {
@@ -114,14 +124,16 @@ std::string fault_of_drops(const ManifestHead& head, const LayerRecord& record, 
 std::string fault_of_layer(const Inspection& inspection, const LayerRecord& record, std::optional<replay::Count>& count) {
   if (inspection.head.extension.empty()) return fault_of_program(inspection, record, nullptr, count);  // a format without files
   LayerPicture picture;
+  std::uint64_t levels = 0;
   for (const LayerImageFile& file : layer_images(inspection.head, record)) {
     std::string fault = fault_of_file(inspection.directory, file.name, file.record.hash, file.record.bytes);
     if (!fault.empty()) return fault;
     if (inspection.quick) continue;
-    if (std::string what = fault_of_image(inspection, file, picture); !what.empty()) return what;
+    if (std::string what = fault_of_image(inspection, file, picture, levels); !what.empty()) return what;
   }
   if (!inspection.quick) {
     if (std::string what = fault_of_drops(inspection.head, record, picture); !what.empty()) return what;
+    if (std::string what = inspection.doses->fault(record, picture, levels); !what.empty()) return what;
   }
   return fault_of_program(inspection, record, inspection.quick ? nullptr : &picture, count);
 }
@@ -156,9 +168,10 @@ void finish_replay(const Inspection& inspection, const std::optional<JobCost>& c
 
 void check_layers(const std::string& directory, const Manifest& manifest, bool quick, std::optional<JobCost>& cost,
                   std::optional<replay::VatLevels>& vats, VerifyReport& report) {
-  Inspection inspection{directory, manifest.head, quick, std::nullopt, report};
+  Inspection inspection{directory, manifest.head, quick, std::nullopt, std::nullopt, report};
+  if (!manifest.head.machine.empty()) prepare_replay(inspection);
+  inspection.doses.emplace(manifest.head, inspection.machine ? &inspection.machine->profile() : nullptr);
   if (!manifest.head.machine.empty()) {
-    prepare_replay(inspection);
     check_frame(directory, manifest.head, report);
     if (!cost && inspection.machine) cost.emplace(inspection.machine->profile(), manifest);
     if (report.unfed.empty()) {

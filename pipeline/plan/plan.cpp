@@ -24,7 +24,7 @@
 #include "stages/raster/beams.h"
 #include "stages/write/extrusion_format.h"
 #include "stages/write/levels/level_format.h"
-#include "stages/write/program/care.h"
+#include "stages/write/program/care_check.h"
 #include "stages/write/slice_format.h"
 
 namespace lamina::pipeline {

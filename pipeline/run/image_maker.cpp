@@ -54,6 +54,7 @@ class ImageMaker : public Maker {
       std::iota(all.begin(), all.end(), plan_.range[0]);
       return all;
     }
+    if (Status status = inspector_.check_file(); !status) return status.error();
     if (Status status = files_.open(); !status) return status.error();
     return files_.take_todo();
   }
@@ -147,7 +148,11 @@ class ImageMaker : public Maker {
   std::uint64_t crossings() const override { return crossings_; }
   bool times_dry_runs() const override { return plan_.images->machine.has_value() || inspector_.on(); }
   bool keeps() const override { return !plan_.job.dry_run; }
-  Status finish() override { return plan_.job.dry_run ? Status() : files_.finish(); }
+  Status finish() override {
+    if (plan_.job.dry_run) return {};
+    const Status status = files_.finish();
+    return status ? inspector_.write(files_.head()) : status;
+  }
   Status stop(bool) override { return plan_.job.dry_run ? Status() : files_.keep(); }
   void discard() override {
     if (!plan_.job.dry_run) files_.discard();

@@ -296,6 +296,25 @@ Status ask_for_dpi(Machine& machine, const HeadGrid& grid, const std::array<std:
   return {};
 }
 
+namespace {
+
+/// "every 4 layers and 30 s"; empty without any.
+std::string how_often(std::uint32_t layers, double seconds) {
+  std::string text = layers == 0 ? "" : layers == 1 ? "every layer" : fmt::format("every {} layers", layers);
+  if (seconds > 0) text += fmt::format("{}{:g} s", text.empty() ? "every " : " and ", seconds);
+  return text;
+}
+
+std::string care_text(const Machine& machine, const FullLayer& full) {
+  const auto& care = machine.care;
+  const std::string shots = how_often(care.spit_layers, care.spit_seconds), wipes = how_often(care.wipe_layers, care.wipe_seconds);
+  std::string text = shots.empty() ? "" : "fired off the bed " + shots;
+  if (!wipes.empty()) text += (text.empty() ? "wiped " : ", wiped ") + wipes;
+  return text + fmt::format(": {:.2f} s of a full layer and {:.0f} drops, averaged over layers", full.care_seconds, full.spat_drops);
+}
+
+}  // namespace
+
 std::string explain(const Machine& machine, const HeadGrid& grid, const std::optional<FullLayer>& full) {
   std::string text;
   const auto line = [&](std::string_view name, const std::string& value) { text += fmt::format("{:<12}{}\n", name, value); };
@@ -333,6 +352,7 @@ std::string explain(const Machine& machine, const HeadGrid& grid, const std::opt
   line("time", full ? fmt::format("{:.1f} s a full layer of {:g} mm, {:.1f} s an empty one (powder, pauses)", full->seconds,
                                   full->thickness_mm, full->empty_seconds)
                     : "not told: the program of a full layer is too long");
+  if (full && (machine.care.spits() || machine.care.wipes())) line("care", care_text(machine, *full));
   line("dialect", machine.dialect);
   return text;
 }

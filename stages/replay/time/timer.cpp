@@ -5,6 +5,7 @@
 #include <string_view>
 
 #include "stages/replay/bytes.h"
+#include "stages/replay/care/records.h"
 #include "stages/replay/printing.h"
 
 namespace lamina::replay {
@@ -48,26 +49,42 @@ void Timer::read(std::span<const std::byte> lines) {
 }
 
 void Timer::sweep(double across_mm, bool backward, std::int64_t first, std::int64_t last) {
-  sweeps_.push_back({across_mm, backward, first, last});
+  sweeps_.push_back({across_mm, backward, first, last, text_.size()});
+}
+
+void Timer::care(std::span<const std::byte> records) {
+  text_.append(reinterpret_cast<const char*>(records.data()), records.size());
 }
 
 Result<Count> Timer::end() {
-  if (!text_.empty()) {
-    auto taken = machine_->timed(text_, layer_);
-    if (taken) return taken;
-    return Error{Fault::kInternal, fmt::format("the machine would not take the program: {}; this is a fault of lamina, please "
-                                               "report it",
-                                               taken.error().message)};
-  }
+  const std::string& dialect = machine_->profile().dialect;
+  const bool head_alone = dialect == "raw" || dialect == "planes";
+  auto taken = head_alone ? of_sweeps() : machine_->timed(text_, layer_);
+  if (taken) return taken;
+  return Error{Fault::kInternal, fmt::format("the machine would not take the program: {}; this is a fault of lamina, please "
+                                             "report it",
+                                             taken.error().message)};
+}
+
+Result<Count> Timer::of_sweeps() const {
   Printing printing(*machine_, layer_, Purpose::kTime);
   Passes passes(printing);
+  std::size_t at = 0;
+  const auto care_until = [&](std::size_t end) {
+    ByteReader reader(std::string_view(text_).substr(at, end - at), printing);
+    take_care_records(reader, printing, passes);
+    if (!reader.done()) reader.fault("is no record of care");
+    at = end;
+  };
   for (const Sweep& sweep : sweeps_) {
+    care_until(sweep.care);
     passes.begin(sweep.across_mm, sweep.backward);
     passes.at(sweep.first);
     passes.at(sweep.last);
   }
+  care_until(text_.size());
   passes.end();
-  if (Status status = printing.status(); !status) return Error{Fault::kInternal, status.error().message};
+  if (Status status = printing.status(); !status) return status.error();
   return printing.finish();
 }
 

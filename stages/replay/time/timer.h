@@ -30,6 +30,8 @@ class Timer {
   /// Dialects without: the next sweep, by its first and last step that fire, in the order of the movement.
   /// across_mm  of the carriage
   void sweep(double across_mm, bool backward, std::int64_t first, std::int64_t last);
+  /// The same: records of care, before the next sweep and behind the last one.
+  void care(std::span<const std::byte> records);
   /// The layer's time, and its care. errors  kInternal: the machine's reader does not take the program
   Result<Count> end();
 
@@ -40,10 +42,12 @@ class Timer {
     double across_mm;
     bool backward;
     std::int64_t first, last;
+    std::size_t care;  // bytes of text_ that come before it
   };
+  Result<Count> of_sweeps() const;
   const VirtualMachine* machine_;
   Layer layer_{};
-  std::string text_;
+  std::string text_;  // of dialects with motion; of others their records of care
   std::vector<Sweep> sweeps_;
 };
 
