@@ -43,8 +43,7 @@ std::optional<DoseCheck::Wished> DoseCheck::wished(const Layer& layer) const {
   }
   const double pixel_mm2 = 25.4 / head_.grid.x.dpi() * 25.4 / head_.grid.y.dpi();
   const double voids_pl = pixel_mm2 * mm(layer.thickness) * 1e6 * (1 - machine_->powder.packing);
-  const double of_percent =
-      voids_pl / 100 / (machine_->head.drop_pl * (1 - machine_->powder.evaporates_percent / 100));
+  const double of_percent = voids_pl / 100 / (machine_->head.drop_pl * (1 - machine_->powder.evaporates_percent / 100));
   return Wished{*std::ranges::min_element(wishes) * of_percent, *std::ranges::max_element(wishes) * of_percent};
 }
 
@@ -79,7 +78,7 @@ std::string DoseCheck::fault(const LayerRecord& record, const LayerPicture& pict
   if (head_.most_drops == 0) return {};
   const std::string what = fault_of_dosed(record, set_pixels(picture.front()));
   if (!what.empty()) return said(what);
-  const std::string asked = fault_of_asked(record);
+  const std::string asked = fault_of_wish(record);
   return asked.empty() ? asked : said(asked);
 }
 
@@ -104,7 +103,7 @@ std::string DoseCheck::fault_of_dosed(const LayerRecord& record, std::uint64_t s
                      dosed < least ? "images" : "parts");
 }
 
-std::string DoseCheck::fault_of_asked(const LayerRecord& record) const {
+std::string DoseCheck::fault_of_wish(const LayerRecord& record) const {
   const auto wish = wished(record.layer);
   if (!wish) return {};
   const auto dosed = static_cast<double>(record.dosed_pixels), asked = static_cast<double>(record.asked_drops);
@@ -113,8 +112,8 @@ std::string DoseCheck::fault_of_asked(const LayerRecord& record) const {
   const double least = std::max(0.0, dosed - apart) * std::max(0.0, wish->least * (1 - kOfDrops) - kDropStep) - 0.51;
   const double most = (dosed + apart) * (wish->most * (1 + kOfDrops) + kDropStep) + 0.51;
   if (asked >= least && asked <= most) return {};
-  const std::string drops = wish->least == wish->most ? fmt::format("{:.6g}", wish->least)
-                                                      : fmt::format("{:.6g} to {:.6g}", wish->least, wish->most);
+  const std::string drops =
+      wish->least == wish->most ? fmt::format("{:.6g}", wish->least) : fmt::format("{:.6g} to {:.6g}", wish->least, wish->most);
   return fmt::format("{} pixels to be filled with {} drops each are asked {:.0f} to {:.0f}, the manifest says asked_drops {}",
                      record.dosed_pixels, drops, std::ceil(std::max(0.0, least)), std::floor(most), record.asked_drops);
 }

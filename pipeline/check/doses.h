@@ -28,7 +28,7 @@ class DoseCheck {
     double least = 1, most = 1;  // drops a full pixel, of any part, in shell or core
   };
   std::optional<Wished> wished(const Layer& layer) const;
-  std::string fault_of_asked(const LayerRecord& record) const;
+  std::string fault_of_wish(const LayerRecord& record) const;
   std::string fault_of_dosed(const LayerRecord& record, std::uint64_t set) const;
   double most_pixels(const Layer& layer) const;
 

@@ -95,7 +95,7 @@ class ImageMaker : public Maker {
       });
     }
     add("dose", [this](const Layer& layer, Work& work, Made& made) {
-      if (Status status = imager_.bleed(layer, work.images); !status) return status;
+      if (Status status = imager_.bleed(layer, work.images, made.notes); !status) return status;
       // What walls and fillings left out is no bleed.
       if (plan_.images->dose.bleeds() && !plan_.images->beads) sanity_.add_left(layer, work.images.runs);
       imager_.dose(layer, work.images, made.record);
@@ -123,6 +123,7 @@ class ImageMaker : public Maker {
     add(made.record);
     sanity_.record(made.record.layer.index, made.record.set_pixels > 0);
     if (inspector_.on()) inspector_.record(made.record.layer, work_[ticket.work].inspected);
+    vanished_.add(made.record.layer, made.notes.vanished);
     const raster::LayerReport& report = made.notes.report;
     rows_.add_capped(made.record.layer, report.capped_rows, report.first_capped_row, report.first_capped_instance,
                      plan_.images->grid);
@@ -213,6 +214,7 @@ class ImageMaker : public Maker {
   std::optional<JobCost> cost_;  // of a job with a machine
 
   sanity::RowWarnings rows_;
+  inspect::VanishCount vanished_;
   std::uint64_t set_pixels_ = 0, moved_pixels_ = 0, lost_pixels_ = 0, solid_pixels_ = 0, bead_pixels_ = 0, capped_rows_ = 0;
   std::uint64_t bytes_written_ = 0, crossings_ = 0;
   std::int64_t microseconds_ = 0;  // of the machine
@@ -227,6 +229,9 @@ class ImageMaker : public Maker {
 
 void ImageMaker::warn(const Summary&, std::vector<Warning>& warnings) const {
   inspector_.warn(warnings);
+  const Mirror mirror = plan_.job.mirror;
+  vanished_.tell(plan_.images->grid, mirror == Mirror::kX || mirror == Mirror::kXY,
+                 mirror == Mirror::kY || mirror == Mirror::kXY, warnings);
   sanity::warn_of_lost_pixels(lost_pixels_, warnings);
   for (const UnfedPowder& powder : unfed_) sanity::warn_of_unfed(powder, warnings);
   const std::vector<std::uint32_t>& part = plan_.scene->part_of_instance;

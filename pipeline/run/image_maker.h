@@ -12,6 +12,7 @@
 #include "pipeline/run/sanity.h"
 #include "stages/coverage/coverage.h"
 #include "stages/data/runs.h"
+#include "stages/inspect/vanished.h"
 #include "stages/raster/materials.h"
 #include "stages/raster/raster.h"
 
@@ -30,6 +31,7 @@ struct ImageWork {
   raster::MaterialImages materials;
   raster::MaterialImages zones;  // of parts with doses of their own
   BleedWork bleed;
+  inspect::VanishScratch vanish;    // if edges move inwards
   std::unique_ptr<BeadWork> beads;  // if beads fill parts
 
   /// Capacity of its buffers.
@@ -39,6 +41,7 @@ struct ImageWork {
 /// Observations about a layer, for the summary.
 struct ImageNotes {
   raster::LayerReport report;
+  inspect::VanishedPieces vanished;                 // by the bleed
   std::uint64_t solid_pixels = 0, bead_pixels = 0;  // of parts, before and after clearing outside beads and shells
 };
 
@@ -59,7 +62,7 @@ class LayerImager {
   /// Of a job of shares of voxels, after the raster: the image becomes that of voxels half full or more.
   void shares(const Layer& layer, ImageWork& work, LayerRecord& record) const;
   /// Mirrors the image and removes its bleed. errors  kUsage: it would grow beyond the bed
-  Status bleed(const Layer& layer, ImageWork& work) const;
+  Status bleed(const Layer& layer, ImageWork& work, ImageNotes& notes) const;
   /// Thins the core and counts the remaining pixels.
   void dose(const Layer& layer, ImageWork& work, LayerRecord& record) const;
   /// Runs all steps.
@@ -82,6 +85,7 @@ class LayerImager {
                               Runs& image) const;
   void mirror(Runs& image, Runs& scratch) const;
   Status check_grown(const Layer& layer, const ImageWork& work) const;
+  std::uint64_t least_vanished() const;
   static void empty_removed(const Runs& before, ImageWork& work);
   std::uint64_t bytes_of_section(Nm plane, std::uint64_t changes) const;
   std::uint64_t changes_of_images(Nm plane) const;

@@ -5,8 +5,8 @@
 #include <nlohmann/json.hpp>
 #include <numbers>
 
-#include "pipeline/output/inspection_file.h"
 #include "stages/data/text/readable.h"
+#include "stages/write/manifest/inspection_file.h"
 
 namespace lamina::pipeline {
 namespace {
@@ -101,9 +101,7 @@ void Inspector::tell(Summary& summary) const {
   if (on() && !kept_) (*summary.facts)["inspection"] = json();
 }
 
-Status Inspector::check_file() const {
-  return on() && whole() ? check_inspection_file(plan_.job.output) : Status();
-}
+Status Inspector::check_file() const { return on() && whole() ? check_inspection_file(plan_.job.output) : Status(); }
 
 Status Inspector::write(const ManifestHead& head) const {
   if (!on() || kept_ || !whole()) return keep_inspection_of(plan_.job.output, head);

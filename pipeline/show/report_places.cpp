@@ -4,7 +4,7 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
-#include "pipeline/output/inspection_file.h"
+#include "stages/write/manifest/inspection_file.h"
 
 namespace lamina::pipeline {
 namespace {

@@ -49,11 +49,11 @@ struct Place {
 
 /// Some of one kind.
 struct Found {
-  std::uint64_t count = 0;   // pieces or bodies
-  double amount = 0;         // of all: mm2, or mm3 of bodies
-  double largest = 0;        // the same of the largest
-  Spot spot;                 // of the largest, the first of equals
-  std::uint32_t layers = 0;  // that hold them; of bodies none
+  std::uint64_t count = 0;    // pieces or bodies
+  double amount = 0;          // of all: mm2, or mm3 of bodies
+  double largest = 0;         // the same of the largest
+  Spot spot;                  // of the largest, the first of equals
+  std::uint32_t layers = 0;   // that hold them; of bodies none
   std::vector<Place> places;  // the largest, at most kMost: the largest first, equal ones from the bottom up; thin ones that
                               // lie upon each other are one, as large as the largest of them
 

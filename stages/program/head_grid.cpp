@@ -263,6 +263,15 @@ Status Builder::check_speed() {
 
 Result<HeadGrid> make_head_grid(const Machine& machine) { return Builder(machine).build(); }
 
+std::string idle_joints(const Machine& machine, const HeadGrid& grid) {
+  const std::uint32_t apart = grid.swath_lines() - grid.overlap;
+  if (grid.joint_shift == 0 || grid.joint_shift % apart != 0) return {};
+  return fmt::format(
+      "{}: mounting.joint_shift_lines: {} lines are whole swaths of {}, so that joints of all layers lie over each "
+      "other; give a number that comes round late, as {}",
+      machine.name, grid.joint_shift, apart, std::max(1u, apart * 3 / 8));
+}
+
 Status ask_for_dpi(Machine& machine, const HeadGrid& grid, const std::array<std::int64_t, 2>& dpi) {
   const auto refuse = [](const std::string& what) { return Error{Fault::kUsage, "bed.dpi: " + what}; };
   const bool scan_x = machine.mounting.scan_axis == ScanAxis::kX;
@@ -307,10 +316,12 @@ std::string how_often(std::uint32_t layers, double seconds) {
 
 std::string care_text(const Machine& machine, const FullLayer& full) {
   const auto& care = machine.care;
-  const std::string shots = how_often(care.spit_layers, care.spit_seconds), wipes = how_often(care.wipe_layers, care.wipe_seconds);
+  const std::string shots = how_often(care.spit_layers, care.spit_seconds),
+                    wipes = how_often(care.wipe_layers, care.wipe_seconds);
   std::string text = shots.empty() ? "" : "fired off the bed " + shots;
   if (!wipes.empty()) text += (text.empty() ? "wiped " : ", wiped ") + wipes;
-  return text + fmt::format(": {:.2f} s of a full layer and {:.0f} drops, averaged over layers", full.care_seconds, full.spat_drops);
+  return text +
+         fmt::format(": {:.2f} s of a full layer and {:.0f} drops, averaged over layers", full.care_seconds, full.spat_drops);
 }
 
 }  // namespace

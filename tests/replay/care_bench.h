@@ -33,9 +33,7 @@ struct CareBench {
     program = program_of(resolved, image);
   }
 
-  Result<replay::Count> count(const std::string& text) const {
-    return verified(resolved, image, {text, program.count});
-  }
+  Result<replay::Count> count(const std::string& text) const { return verified(resolved, image, {text, program.count}); }
   std::string fault(const std::string& text) const {
     const auto found = count(text);
     return found.ok() ? std::string() : found.error().message;

@@ -381,13 +381,16 @@ TEST(Care, ProfilesThatCannotBeKeptAreRefused) {
          m.care.spit_seconds = 9, m.care.spit_mm = {{400, 0}};
        }},
       {"brundlefab", "bed.build_height_mm, powder.dose: the bins move by 140 mm",
-       [](Machine& m) {
-         m.powder.base_layers = 30, m.powder.base_layer_mm = 0.2;
-       }},
+       [](Machine& m) { m.powder.base_layers = 30, m.powder.base_layer_mm = 0.2; }},
       {"brundlefab", "powder.refill: programs",
-       [](Machine& m) { m.powder.refill = VatRefill::kPause, m.powder.vat_depth_mm = {100, 0}; }},
+       [](Machine& m) {
+         m.powder.refill = VatRefill::kPause, m.powder.vat_depth_mm = {100, 0};
+       }},
       {"brundlefab", "powder.dry_s: programs", [](Machine& m) { m.powder.dry_s = 1; }},
-      {"brundlefab", "care.cap_mm: programs", [](Machine& m) { m.care.cap_mm = {{400, 0}}; }},
+      {"brundlefab", "care.cap_mm: programs",
+       [](Machine& m) {
+         m.care.cap_mm = {{400, 0}};
+       }},
       {"xaar128-raw", "care.wipe_mm: raw has places up to 2147 mm",
        [](Machine& m) {
          m.care.wipe_layers = 1, m.care.wipe_mm = {{-3000, 5, -3000, 50}};
@@ -405,7 +408,8 @@ TEST(Care, ProfilesThatCannotBeKeptAreRefused) {
          m.care.spit_seconds = 6, m.care.spit_mm = {{-45, 0}};
        }},
       {"reprap-inkjet", "powder.roller_rpm: programs", [](Machine& m) { m.powder.roller_rpm = 1; }},
-      {"xaar128-raw", "powder.refill: pauses need powder.vat_depth_mm", [](Machine& m) { m.powder.refill = VatRefill::kPause; }},
+      {"xaar128-raw", "powder.refill: pauses need powder.vat_depth_mm",
+       [](Machine& m) { m.powder.refill = VatRefill::kPause; }},
   };
   for (const auto& [machine, key, change] : rows) {
     Machine m = *pipeline::find_machine(machine);

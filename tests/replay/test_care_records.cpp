@@ -169,8 +169,8 @@ TEST_P(CareRecords, VatsAreFilledUnderTheCapAndTheBaseIsTold) {
   // The host spreads four times: by the profile's ways and speeds, 3 x 0.2 mm and 0.1.
   const auto alone = machine->timed(text, {0, 0, 100'000, LayerReason::kUniform});
   const double strokes = 4 * 2 * std::abs(m.powder.roller_mm[1] - m.powder.roller_mm[0]) / m.powder.roller_speed_mm_s;
-  const double spread = m.powder.spread_s > 0 ? 4 * m.powder.spread_s
-                                              : strokes + (1 + m.powder.dose) * 0.7 / m.powder.vat_speed_mm_s;
+  const double spread =
+      m.powder.spread_s > 0 ? 4 * m.powder.spread_s : strokes + (1 + m.powder.dose) * 0.7 / m.powder.vat_speed_mm_s;
   EXPECT_GT(alone->seconds(), spread + 2.5);
   EXPECT_LT(alone->seconds(), spread + 2.5 + 20);
 }
@@ -237,7 +237,10 @@ TEST(Care, ClocksAreKeptWhereSweepsAreNoEvenMovement) {
   const struct {
     const char* machine;
     std::vector<double> limits;
-  } rows[] = {{"xaar128-raw", {12, 20, 45}}, {"jet1000", {12, 20, 45}}, {"reprap-inkjet", {150, 260, 900}}, {"brundlefab", {9, 16, 60}}};
+  } rows[] = {{"xaar128-raw", {12, 20, 45}},
+              {"jet1000", {12, 20, 45}},
+              {"reprap-inkjet", {150, 260, 900}},
+              {"brundlefab", {9, 16, 60}}};
   for (const auto& [name, limits] : rows) {
     std::uint32_t before = UINT32_MAX, most = 0;
     for (const double limit : limits) {
@@ -281,8 +284,8 @@ std::map<long, std::map<int, int>> sprays_of(const std::string& text) {
   return ticks;
 }
 
-// By the port: with the pen at 400 mm all nozzles but the blocked one spray alike, the drops of the profile, there and back; and
-// not one spray more than without the shot falls elsewhere.
+// By the port: with the pen at 400 mm all nozzles but the blocked one spray alike, the drops of the profile, there and back;
+// and not one spray more than without the shot falls elsewhere.
 TEST(Care, ShotsOfTheBrundleFabAreFiredByItsFirmware) {
   const auto change = [](std::uint32_t drops) {
     return [drops](Machine& m) {

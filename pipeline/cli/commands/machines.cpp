@@ -72,7 +72,10 @@ std::vector<CareCase> care_cases(const Machine& machine) {
   constexpr std::uint32_t kNever = 1'000'000;  // a layer later than 1
   const auto& care = machine.care;
   const double shots = care.spit_layers, wipes = care.wipe_layers;
-  const double both = shots > 0 && wipes > 0 ? 1.0 / static_cast<double>(std::lcm(std::uint64_t{care.spit_layers}, std::uint64_t{care.wipe_layers})) : 0;
+  const double both =
+      shots > 0 && wipes > 0
+          ? 1.0 / static_cast<double>(std::lcm(std::uint64_t{care.spit_layers}, std::uint64_t{care.wipe_layers}))
+          : 0;
   const double shot = shots > 0 ? 1 / shots : 0, wipe = wipes > 0 ? 1 / wipes : 0;
   std::vector<CareCase> cases;
   const auto add = [&](bool shoots, bool wipes_too, double share) {
@@ -93,7 +96,8 @@ std::vector<CareCase> care_cases(const Machine& machine) {
 Result<std::optional<program::FullLayer>> time_full_layer(const ResolvedMachine& resolved) {
   const HeadGrid& grid = resolved.grid;
   const double vectors = double(grid.swaths(0)) * grid.passes * static_cast<double>(grid.steps()) * grid.words() * 8;
-  if (vectors > (256 << 20) || PrintProgram(resolved, "", 1, {}).bytes_bound(2 * std::uint64_t{grid.image.rows()}) > (1u << 30)) {
+  if (vectors > (256 << 20) ||
+      PrintProgram(resolved, "", 1, {}).bytes_bound(2 * std::uint64_t{grid.image.rows()}) > (1u << 30)) {
     return std::optional<program::FullLayer>();
   }
   program::FullLayer full;

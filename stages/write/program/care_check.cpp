@@ -151,7 +151,8 @@ class Checker {
     const auto beyond = [](const auto& place) {
       return place && std::ranges::any_of(*place, [](double mm) { return std::abs(mm) > kMostMm; });
     };
-    for (const auto& [key, is] : {std::pair("care.spit_mm", beyond(care_.spit_mm)), {"care.wipe_mm", beyond(care_.wipe_mm)},
+    for (const auto& [key, is] : {std::pair("care.spit_mm", beyond(care_.spit_mm)),
+                                  {"care.wipe_mm", beyond(care_.wipe_mm)},
                                   {"care.cap_mm", beyond(care_.cap_mm)}}) {
       if (is && !dialect_.has_motion) return wrong(key, fmt::format("{} has places up to {:g} mm", dialect_.id, kMostMm));
     }
@@ -224,12 +225,20 @@ std::string idle_care(const Machine& machine) {
   const bool pauses = powder.dry_s > 0 || powder.refill == VatRefill::kPause;
   const bool shot = care.spit_mm || care.spit_drops != Machine::Care().spit_drops;
   std::string idle;
-  const auto add = [&](bool said, bool asked, std::string_view what) {
+  const auto add = [&](bool said, bool asked, const std::string& what) {
     if (said && !asked) idle += fmt::format("{}{}", idle.empty() ? "" : "; ", what);
   };
   add(shot, care.spits(), "no shot: care.spit_layers and care.spit_seconds are 0");
   add(care.wipe_mm || !care.wipe_lines.empty(), care.wipes(), "no wipe: care.wipe_layers and care.wipe_seconds are 0");
   add(care.cap_mm.has_value(), pauses, "no pause under care.cap_mm: powder.dry_s is 0 and powder.refill no \"pause\"");
+  add(!powder.dry_on_lines.empty(), !powder.dry_off_lines.empty(),
+      "what powder.dry_on_lines switch on stays on: powder.dry_off_lines is empty");
+  add(!powder.dry_off_lines.empty(), !powder.dry_on_lines.empty(),
+      "nothing is switched on before a layer dries: powder.dry_on_lines is empty");
+  const double dries_s = care.spit_seconds > 0 ? care.spit_seconds : care.wipe_seconds;
+  add(dries_s > 0 && powder.dry_s > dries_s, care.cap_mm.has_value(),
+      fmt::format("nozzles wait uncapped for {:g} s while a layer dries, and care.{} is {:g}: give care.cap_mm", powder.dry_s,
+                  care.spit_seconds > 0 ? "spit_seconds" : "wipe_seconds", dries_s));
   return idle.empty() ? idle : fmt::format("{}: {}", machine.name, idle);
 }
 

@@ -25,13 +25,13 @@ struct ShownView {
 
 /// Where something was found in the layers.
 struct SeenPlace {
-  std::string code;                      // of its warning
-  double x_mm = 0, y_mm = 0, z_mm = 0;   // the middle, on the bed; the bottom
-  double width_mm = 0, depth_mm = 0;     // of the box around it; 0: a spot
+  std::string code;                     // of its warning
+  double x_mm = 0, y_mm = 0, z_mm = 0;  // the middle, on the bed; the bottom
+  double width_mm = 0, depth_mm = 0;    // of the box around it; 0: a spot
   std::uint32_t layer = 0, last_layer = 0;
-  std::string unit;                      // of `amount`; empty: none is known
+  std::string unit;  // of `amount`; empty: none is known
   double amount = 0;
-  double column_mm = 0, row_mm = 0;      // the middle from the left and the top of the image
+  double column_mm = 0, row_mm = 0;  // the middle from the left and the top of the image
 };
 
 /// The result of one pass over all layers.

@@ -1,4 +1,4 @@
-#include "pipeline/output/inspection_file.h"
+#include "stages/write/manifest/inspection_file.h"
 
 #include <fmt/format.h>
 
@@ -12,7 +12,7 @@
 #include "stages/write/file.h"
 #include "stages/write/replaceable.h"
 
-namespace lamina::pipeline {
+namespace lamina {
 namespace {
 
 using Json = nlohmann::ordered_json;
@@ -21,7 +21,7 @@ constexpr std::uint64_t kMostBytes = 4 << 20;
 constexpr std::array<std::string_view, 1> kMarks = {"\"kind\":\"inspection\""};
 
 /// Of this job, or of any if head is null.
-std::optional<Json> read(const std::string& directory, const ManifestHead* head) {
+std::optional<Json> read_of(const std::string& directory, const ManifestHead* head) {
   const std::string path = inspection_path(directory);
   if (!write::is_file(path)) return std::nullopt;
   const auto text = read_file(path, {.most_bytes = kMostBytes});
@@ -42,9 +42,10 @@ std::string inspection_path(const std::string& directory) { return directory + "
 Status check_inspection_file(const std::string& directory) {
   const std::string path = inspection_path(directory);
   if (write::is_replaceable(path, kMarks)) return {};
-  return Error{Fault::kUsage, fmt::format("{}: is there already, and lamina did not write it; remove it, leave out --inspect, or "
-                                          "name another output",
-                                          path)};
+  return Error{Fault::kUsage,
+               fmt::format("{}: is there already, and lamina did not write it; remove it, leave out --inspect, or "
+                           "name another output",
+                           path)};
 }
 
 Status write_inspection(const std::string& directory, const ManifestHead& head, const Json& facts) {
@@ -56,12 +57,14 @@ Status write_inspection(const std::string& directory, const ManifestHead& head, 
 }
 
 Status keep_inspection_of(const std::string& directory, const ManifestHead& head) {
-  if (!read(directory, nullptr) || read(directory, &head)) return {};
+  if (!read_of(directory, nullptr) || read_of(directory, &head)) return {};
   std::error_code error;
   std::filesystem::remove(inspection_path(directory), error);
   return error ? Status(Error{Fault::kOutput, fmt::format("{}: {}", inspection_path(directory), error.message())}) : Status();
 }
 
-std::optional<Json> read_inspection(const std::string& directory, const ManifestHead& head) { return read(directory, &head); }
+std::optional<Json> read_inspection(const std::string& directory, const ManifestHead& head) {
+  return read_of(directory, &head);
+}
 
-}  // namespace lamina::pipeline
+}  // namespace lamina

@@ -1,4 +1,4 @@
-// pipeline/output/inspection_file.h: what --inspect found, beside the manifest of the job that it is of.
+// stages/write/manifest/inspection_file.h: what --inspect found, beside the manifest of the job that it is of.
 //
 // The manifest is the same for all runs of a job, looked at or not, so that findings have a file of their own:
 //   {"lamina": version, "kind": "inspection", "job": id of the manifest, "inspection": {...}, "warnings": [...]}
@@ -11,7 +11,7 @@
 #include "stages/data/status.h"
 #include "stages/write/manifest/manifest.h"
 
-namespace lamina::pipeline {
+namespace lamina {
 
 /// DIR/inspection.json.
 std::string inspection_path(const std::string& directory);
@@ -28,4 +28,4 @@ Status keep_inspection_of(const std::string& directory, const ManifestHead& head
 /// What was found in this job; none without a file of it, or with one that says something else.
 std::optional<nlohmann::ordered_json> read_inspection(const std::string& directory, const ManifestHead& head);
 
-}  // namespace lamina::pipeline
+}  // namespace lamina
