@@ -31,8 +31,7 @@ nlohmann::ordered_json json_of(const inspect::Found& found, std::string_view amo
   for (const inspect::Place& place : found.places) {
     nlohmann::ordered_json& one = json["places"].emplace_back(json_of(place.spot));
     one["last_layer"] = place.last_layer;
-    one["width_mm"] = place.width_mm;
-    one["depth_mm"] = place.depth_mm;
+    one["box_mm"] = place.box_mm;
     one[std::string(amount)] = place.amount;
   }
   return json;

@@ -18,17 +18,21 @@ struct Shown {
 
   /// Throws where something is missing or of another type.
   SeenPlace place(const std::string& code, const std::string& unit, const Json& json) const {
-    SeenPlace place{code, json.at("x_mm"), json.at("y_mm"), json.at("z_mm"), 0, 0, json.at("layer"), json.at("layer"), ""};
+    SeenPlace place{.code = code, .x_mm = json.at("x_mm"), .y_mm = json.at("y_mm"), .z_mm = json.at("z_mm")};
+    place.layer = place.last_layer = json.at("layer");
+    std::array<double, 4> box{place.x_mm, place.y_mm, place.x_mm, place.y_mm};
     if (json.contains("last_layer")) place.last_layer = json.at("last_layer");
-    if (json.contains("width_mm")) place.width_mm = json.at("width_mm");
-    if (json.contains("depth_mm")) place.depth_mm = json.at("depth_mm");
+    if (json.contains("box_mm")) box = json.at("box_mm");
     if (!unit.empty()) {
       place.amount = json.at(unit);
       place.unit = unit;
     }
     const auto side = [](const PixelAxis& axis) { return static_cast<double>(axis.count) / axis.pixels_per_nm() / kNmPerMm; };
-    place.column_mm = mirrored_x ? side(grid.x) - place.x_mm : place.x_mm;
-    place.row_mm = mirrored_y ? place.y_mm : side(grid.y) - place.y_mm;
+    const double x = (box[0] + box[2]) / 2, y = (box[1] + box[3]) / 2;
+    place.width_mm = box[2] - box[0];
+    place.depth_mm = box[3] - box[1];
+    place.column_mm = mirrored_x ? side(grid.x) - x : x;
+    place.row_mm = mirrored_y ? y : side(grid.y) - y;
     return place;
   }
 };

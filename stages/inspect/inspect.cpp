@@ -102,7 +102,12 @@ Spot Inspection::spot(const PixelBox& box, std::uint32_t layer, std::int64_t z) 
 
 Place Inspection::place(const PixelBox& box, const Spot& at, double amount, std::uint32_t last_layer) const {
   const auto mm_of = [](std::uint32_t pixels, const PixelAxis& axis) { return pixels / axis.pixels_per_nm() / kNmPerMm; };
-  return {amount, at, mm_of(box.right - box.left, grid_.x), mm_of(box.bottom - box.top, grid_.y), last_layer};
+  const std::uint32_t rows = grid_.rows();
+  return {
+      amount,
+      at,
+      {mm_of(box.left, grid_.x), mm_of(rows - box.bottom, grid_.y), mm_of(box.right, grid_.x), mm_of(rows - box.top, grid_.y)},
+      last_layer};
 }
 
 void Inspection::note_body(Found& found, const Body& body, double amount, std::uint32_t last_layer) {

@@ -10,6 +10,7 @@
 //         bed-edge     layers that reach the edge of the image
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <optional>
 #include <span>
@@ -43,8 +44,8 @@ struct Spot {
 struct Place {
   double amount = 0;  // as Found::amount
   Spot spot;
-  double width_mm = 0, depth_mm = 0;
-  std::uint32_t last_layer = 0;  // the first is the spot's
+  std::array<double, 4> box_mm{};  // left, front, right, back, from the left and the front of the bed
+  std::uint32_t last_layer = 0;    // the first is the spot's
 };
 
 /// Some of one kind.

@@ -1,8 +1,10 @@
 // What lamina jet --inspect found is kept beside the manifest and shown by lamina report, with its places.
 #include <gtest/gtest.h>
+#include <sys/wait.h>
 
 #include <algorithm>
 #include <array>
+#include <cstdio>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 #include <string>
@@ -135,6 +137,36 @@ TEST_F(InspectedReports, TheManifestIsTheSameAndTheFileIsThatOfItsJob) {
   EXPECT_EQ(read_text(directory_ / "out/inspection.json"), "notes of mine");
   ASSERT_EQ(lamina(job({"--overwrite"})).code, 0);
   EXPECT_EQ(read_text(directory_ / "out/inspection.json"), "notes of mine");
+}
+
+// The hollow of 13 to 17 and 25 to 27 mm: 130 to 170 and, from the back, 330 to 350 pixels, with a frame around it.
+TEST_F(InspectedReports, InABrowserAButtonLeadsToTheFrameOfAPlace) {
+  planted();
+  ASSERT_EQ(lamina(job({"--inspect"})).code, 0);
+  ASSERT_EQ(lamina({"report", "out", "-o", "report.html", "--quiet"}).code, 0);
+  const std::string command =
+      "python3 '" + std::string(LAMINA_TEST_DIR) + "/report/browser.py' '" + directory_ / "report.html" + "' 0 2>/dev/null";
+  std::FILE* pipe = ::popen(command.c_str(), "r");
+  ASSERT_NE(pipe, nullptr);
+  std::string text;
+  std::array<char, 65536> piece{};
+  for (std::size_t got = 0; (got = std::fread(piece.data(), 1, piece.size(), pipe)) > 0;) text.append(piece.data(), got);
+  const int status = ::pclose(pipe);
+  if (WEXITSTATUS(status) == 77) GTEST_SKIP() << "NOT RUN: places in a browser; install Debian's chromium";
+  ASSERT_EQ(status, 0);
+  const Json said = Json::parse(text);
+  EXPECT_EQ(said["console"], Json::array());
+  ASSERT_EQ(said["places"].size(), 3u);
+  EXPECT_EQ(said["places"][2], "hollows of 8 mm³ at x 14.95, y 26.05, z 1 mm, layer 10 to 19");
+  EXPECT_EQ(said["steps"]["place"]["layer"], 10);
+  EXPECT_NEAR(said["steps"]["place"]["x"].get<double>(), 150, 1);
+  EXPECT_NEAR(said["steps"]["place"]["y"].get<double>(), 340, 1);
+  const Json& frame = said["frames"][2];
+  const double least[] = {120, 320, 170, 350}, most[] = {130, 330, 180, 360};
+  for (std::size_t side = 0; side < 4; ++side) {
+    EXPECT_GE(frame[side].get<double>(), least[side]) << side;
+    EXPECT_LE(frame[side].get<double>(), most[side]) << side;
+  }
 }
 
 // A thin wall is thin in all its layers, and one place.
