@@ -166,6 +166,12 @@ void finish_replay(const Inspection& inspection, const std::optional<JobCost>& c
   cost->account().tell(report.use.results, *report.use.facts, report.use.quote);
 }
 
+/// As the program feeds, or its host.
+std::optional<replay::Count> fed_of(const Inspection& inspection, const LayerRecord& record,
+                                    const std::optional<replay::Count>& count) {
+  return inspection.machine ? replay::with_fed_by_host(inspection.machine->profile(), record.layer, count) : count;
+}
+
 void check_layers(const std::string& directory, const Manifest& manifest, bool quick, std::optional<JobCost>& cost,
                   std::optional<replay::VatLevels>& vats, VerifyReport& report) {
   Inspection inspection{directory, manifest.head, quick, std::nullopt, std::nullopt, report};
@@ -199,7 +205,8 @@ void check_layers(const std::string& directory, const Manifest& manifest, bool q
         cost->add(record, found[i].count->drops + found[i].count->spat, found[i].count->microseconds);
         if (found[i].fault.empty()) found[i].fault = fault_of_shares(inspection.head, record);
       }
-      if (std::string fault = vats ? vats->take(record.layer.index, found[i].count) : ""; !fault.empty())
+      if (std::string fault = vats ? vats->take(record.layer.index, fed_of(inspection, record, found[i].count)) : "";
+          !fault.empty())
         report.add(std::move(fault));
       report.replayed += found[i].count.has_value();
       if (!found[i].fault.empty()) report.add(std::move(found[i].fault));

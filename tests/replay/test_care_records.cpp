@@ -11,6 +11,7 @@
 #include <utility>
 #include <vector>
 
+#include "stages/replay/feeding.h"
 #include "stages/replay/time/timer.h"
 #include "tests/replay/brundlefab_port.h"
 #include "tests/replay/care_bench.h"
@@ -228,6 +229,25 @@ TEST_P(CareRecords, AreTimedWithoutVectors) {
     EXPECT_EQ(timed->spat, replayed->spat);
     EXPECT_GT(replayed->spits, limit > 0 ? 1u : 0u);
   }
+}
+
+// Vats of 2 mm, of which the host feeds 1.2 x 0.5 mm of each layer by the vats that the program names: three layers, half of it
+// each where both feed.
+TEST_P(CareRecords, VatsAreEmptiedByTheHost) {
+  Machine machine;
+  machine.powder.dose = 1.2;
+  machine.powder.vats = 2;
+  machine.powder.vat_depth_mm = {2, 2};
+  replay::VatLevels levels(machine);
+  replay::Count count;
+  const auto take = [&](std::uint32_t layer, std::uint32_t vats) {
+    count.vats = vats;
+    return levels.take(layer, replay::with_fed_by_host(
+                                  machine, {layer, static_cast<Nm>(layer * 500'000), 500'000, LayerReason::kUniform}, count));
+  };
+  for (std::uint32_t layer = 0; layer < 3; ++layer) EXPECT_EQ(take(layer, 1), "");
+  EXPECT_EQ(take(3, 2), "");
+  EXPECT_EQ(take(4, 3), "layer 4: takes 0.3 mm of the first vat, where 0.2 of 2 are left");
 }
 
 INSTANTIATE_TEST_SUITE_P(Dialects, CareRecords, testing::Values("xaar128-raw", "jet1000"));
