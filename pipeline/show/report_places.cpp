@@ -18,7 +18,9 @@ struct Shown {
 
   /// Throws where something is missing or of another type.
   SeenPlace place(const std::string& code, const std::string& unit, const Json& json) const {
-    SeenPlace place{.code = code, .x_mm = json.at("x_mm"), .y_mm = json.at("y_mm"), .z_mm = json.at("z_mm")};
+    SeenPlace place;
+    place.code = code;
+    place.x_mm = json.at("x_mm"), place.y_mm = json.at("y_mm"), place.z_mm = json.at("z_mm");
     place.layer = place.last_layer = json.at("layer");
     std::array<double, 4> box{place.x_mm, place.y_mm, place.x_mm, place.y_mm};
     if (json.contains("last_layer")) place.last_layer = json.at("last_layer");

@@ -144,6 +144,7 @@ TEST_F(InspectedJobs, EachFaultOfPowderBinderAndHeadIsToldOrRefused) {
   const std::string block = stl("block.stl", {{{0, 0, 0}, {10, 10, 2}}}), other = stl("other.stl", {{{0, 0, 0}, {10, 10, 2}}}),
                     fin = stl("fin.stl", {{{0, 0, 0}, {10, 1, 2}}}),
                     rib = stl("rib.stl", {{{0, 0, 0}, {10, 10, 2}}, {{12, 0, 0}, {12.5, 10, 1}}}),
+                    plate = stl("plate.stl", {{{0, 0, 0}, {66, 66, 0.5}}}),
                     tall = stl("tall.stl", {{{0, 0, 0}, {10, 10, 200}}});
   std::string all = "0";
   for (int nozzle = 1; nozzle < 128; ++nozzle) all += "," + std::to_string(nozzle);
@@ -171,7 +172,7 @@ TEST_F(InspectedJobs, EachFaultOfPowderBinderAndHeadIsToldOrRefused) {
       {"shots over the bed", "[care]\nspit_layers = 1\nspit_mm = [65, 12]\n", block, 2, "nozzles are over the bed"},
       {"a wall that the bleed eats, of a part that it leaves", "", rib + " --bleed 300", 0, "vanished"},
       {"the same wall, and a bleed that leaves it", "", rib + " --bleed 150", 0, ""},
-      {"edges that grow beyond the bed", "", block + " --bleed -30000", 2, "beyond the bed"},
+      {"edges that grow beyond the bed", "", plate + " --bleed -4000", 2, "outside of the bed"},
       {"shots without a place", "[care]\nspit_layers = 1\n", block, 2, "care.spit_mm: is missing"},
       {"a place to fire, and no shot", "[care]\nspit_mm = [-40, 5]\n", block, 0, "care"},
       {"wiping that never comes", "[care]\nwipe_mm = [-40, 20, -40, 60]\n", block, 0, "care"},
@@ -186,7 +187,7 @@ TEST_F(InspectedJobs, EachFaultOfPowderBinderAndHeadIsToldOrRefused) {
       {"a pause to fill vats of no depth", "refill = \"pause\"\n", block, 2, "pauses need powder.vat_depth_mm"},
       {"joints that shift by a whole swath", "[mounting]\njoint_shift_lines = 128\n", block, 0, "joints"},
       {"the same by less", "[mounting]\njoint_shift_lines = 48\n", block, 0, ""},
-      {"a part higher than the machine builds", "", tall, 2, "high"},
+      {"a part higher than the machine builds", "", tall, 2, "above the build height"},
       {"nozzles that are faster than they fire", "", block + " --scan-speed 900", 2, "fires a nozzle"},
       {"a head all of whose nozzles are blocked", "", block + " --blocked " + all, 2, "one at least has to fire"},
       {"a powder that no vat holds", "materials = [\"steel\", \"bronze\"]\n", block + " --material zinc", 2, "zinc"},
