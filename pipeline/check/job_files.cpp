@@ -39,11 +39,11 @@ std::string program_of_layer(const std::string& directory, const ManifestHead& h
   return whole_file(fs::path(directory) / program_file_name(layer, head.program_extension), kMostProgramBytes);
 }
 
-Result<read::Image> read_layer_image(const std::string& path, const ManifestHead& head, LayerPicture& drops) {
-  if (!head.grey_drops()) return read::image(path, head.full_level());
-  Levels levels;
+Result<read::Image> read_layer_image(const std::string& path, const ManifestHead& head, LayerPicture& drops, Levels& levels) {
+  const bool grey = head.grey_drops() || head.full_level() > 0;
+  if (!grey) return read::image(path);
   auto image = read::levels(path, head.full_level(), levels);
-  if (!image) return image;
+  if (!image || !head.grey_drops()) return image;
   if (const std::uint32_t most = highest(levels); most > head.most_drops) {
     return Error{Fault::kVerification,
                  fmt::format("{}: has pixels of {} drops, the job at most {}", path, most, head.most_drops)};
@@ -67,7 +67,8 @@ Result<LayerPicture> picture_of_layer(const std::string& directory, const Manife
   LayerPicture picture;
   for (const LayerImageFile& file : layer_images(head, record)) {
     LayerPicture drops;
-    auto image = read_layer_image((fs::path(directory) / file.name).string(), head, drops);
+    Levels levels;
+    auto image = read_layer_image((fs::path(directory) / file.name).string(), head, drops, levels);
     if (!image) return image.error();
     if (image->runs.columns != head.grid.columns() || image->runs.view().rows() != head.grid.rows()) {
       return Error{Fault::kVerification, fmt::format("{}: is not of the manifest's size", file.name)};

@@ -25,8 +25,9 @@ using LayerPicture = std::vector<Runs>;
 
 /// Reads an image of a layer; its runs are the pixels with any drop.
 /// drops   of a job whose images are grey drops: the pixels of each
+/// levels  of grey images
 /// errors  kVerification, with the file: of read::image; more drops than the job has
-Result<read::Image> read_layer_image(const std::string& path, const ManifestHead& head, LayerPicture& drops);
+Result<read::Image> read_layer_image(const std::string& path, const ManifestHead& head, LayerPicture& drops, Levels& levels);
 
 /// Adds an image of a layer, in the order of the manifest. returns  false if it contradicts those before
 bool add_picture(const ManifestHead& head, Runs&& image, LayerPicture&& drops, LayerPicture& picture);

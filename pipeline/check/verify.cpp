@@ -9,10 +9,12 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
+#include "pipeline/check/doses.h"
 #include "pipeline/check/job_files.h"
 #include "pipeline/output/directory.h"
 #include "pipeline/output/print_program.h"
 #include "pipeline/run/job_cost.h"
+#include "stages/data/levels.h"
 #include "stages/read/image.h"
 #include "stages/replay/feeding.h"
 #include "stages/write/manifest/compare.h"
@@ -29,6 +31,7 @@ struct Inspection {
   const ManifestHead& head;
   bool quick;
   std::optional<replay::VirtualMachine> machine;  // if there are programs to replay
+  std::optional<DoseCheck> doses;
   VerifyReport& report;
 };
 
@@ -87,12 +90,15 @@ std::string fault_of_program(const Inspection& inspection, const LayerRecord& re
                             image != nullptr ? ", though it prints the same" : "");
 }
 
-// Empty, or the fault of an image; its set pixels are added to `picture`.
-std::string fault_of_image(const Inspection& inspection, const LayerImageFile& file, LayerPicture& picture) {
+// Empty, or the fault of an image; its set pixels are added to `picture`, its levels to `sum`.
+std::string fault_of_image(const Inspection& inspection, const LayerImageFile& file, LayerPicture& picture,
+                           std::uint64_t& sum) {
   const std::string& name = file.name;
   LayerPicture drops;
-  auto image = read_layer_image((fs::path(inspection.directory) / name).string(), inspection.head, drops);
+  Levels levels;
+  auto image = read_layer_image((fs::path(inspection.directory) / name).string(), inspection.head, drops, levels);
   if (!image) return image.error().message;
+  sum += sum_of_levels(levels);
   if (const std::string what = read::difference(*image, inspection.head.grid, file.record.set_pixels); !what.empty())
     return fmt::format("{}: {}", name, what);
   if (!add_picture(inspection.head, std::move(image->runs), std::move(drops), picture)) {
@@ -115,14 +121,16 @@ std::string fault_of_drops(const ManifestHead& head, const LayerRecord& record, 
 std::string fault_of_layer(const Inspection& inspection, const LayerRecord& record, std::optional<replay::Count>& count) {
   if (inspection.head.extension.empty()) return fault_of_program(inspection, record, nullptr, count);  // a format without files
   LayerPicture picture;
+  std::uint64_t levels = 0;
   for (const LayerImageFile& file : layer_images(inspection.head, record)) {
     std::string fault = fault_of_file(inspection.directory, file.name, file.record.hash, file.record.bytes);
     if (!fault.empty()) return fault;
     if (inspection.quick) continue;
-    if (std::string what = fault_of_image(inspection, file, picture); !what.empty()) return what;
+    if (std::string what = fault_of_image(inspection, file, picture, levels); !what.empty()) return what;
   }
   if (!inspection.quick) {
     if (std::string what = fault_of_drops(inspection.head, record, picture); !what.empty()) return what;
+    if (std::string what = inspection.doses->fault(record, picture, levels); !what.empty()) return what;
   }
   return fault_of_program(inspection, record, inspection.quick ? nullptr : &picture, count);
 }
@@ -155,11 +163,18 @@ void finish_replay(const Inspection& inspection, const std::optional<JobCost>& c
   cost->account().tell(report.use.results, *report.use.facts, report.use.quote);
 }
 
+/// As the program feeds, or its host.
+std::optional<replay::Count> fed_of(const Inspection& inspection, const LayerRecord& record,
+                                    const std::optional<replay::Count>& count) {
+  return inspection.machine ? replay::with_fed_by_host(inspection.machine->profile(), record.layer, count) : count;
+}
+
 void check_layers(const std::string& directory, const Manifest& manifest, bool quick, std::optional<JobCost>& cost,
                   std::optional<replay::VatLevels>& vats, VerifyReport& report) {
-  Inspection inspection{directory, manifest.head, quick, std::nullopt, report};
+  Inspection inspection{directory, manifest.head, quick, std::nullopt, std::nullopt, report};
+  if (!manifest.head.machine.empty()) prepare_replay(inspection);
+  inspection.doses.emplace(manifest.head, inspection.machine ? &inspection.machine->profile() : nullptr);
   if (!manifest.head.machine.empty()) {
-    prepare_replay(inspection);
     check_frame(directory, manifest.head, report);
     if (!cost && inspection.machine) cost.emplace(inspection.machine->profile(), manifest);
     if (report.unfed.empty()) {
@@ -187,7 +202,8 @@ void check_layers(const std::string& directory, const Manifest& manifest, bool q
         cost->add(record, found[i].count->drops + found[i].count->spat, found[i].count->microseconds);
         if (found[i].fault.empty()) found[i].fault = fault_of_shares(inspection.head, record);
       }
-      if (std::string fault = vats ? vats->take(record.layer.index, found[i].count) : ""; !fault.empty())
+      if (std::string fault = vats ? vats->take(record.layer.index, fed_of(inspection, record, found[i].count)) : "";
+          !fault.empty())
         report.add(std::move(fault));
       report.replayed += found[i].count.has_value();
       if (!found[i].fault.empty()) report.add(std::move(found[i].fault));

@@ -49,6 +49,7 @@ class ImageFiles {
   std::vector<std::uint32_t> take_todo() { return std::move(todo_); }
   /// Layers kept from an interrupted run.
   const std::vector<LayerRecord>& kept() const { return kept_; }
+  const ManifestHead& head() const { return head_; }
 
   /// Scratch of a layer in flight; reused by later layers.
   struct Work {

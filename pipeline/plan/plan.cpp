@@ -21,10 +21,11 @@
 #include "stages/data/text/readable.h"
 #include "stages/geometry/blocks/mesh_blocks.h"
 #include "stages/heights/build_steps.h"
+#include "stages/program/head_grid.h"
 #include "stages/raster/beams.h"
 #include "stages/write/extrusion_format.h"
 #include "stages/write/levels/level_format.h"
-#include "stages/write/program/care.h"
+#include "stages/write/program/care_check.h"
 #include "stages/write/slice_format.h"
 
 namespace lamina::pipeline {
@@ -194,6 +195,8 @@ class Planner {
       if (!steps) return steps.error();
       if (!steps->empty()) plan_.warnings.push_back({"build-steps", std::move(*steps)});
       if (std::string idle = write::idle_care(*machine()); !idle.empty()) plan_.warnings.push_back({"care", std::move(idle)});
+      std::string joints = program::idle_joints(*machine(), printer_.machine->grid);
+      if (!joints.empty()) plan_.warnings.push_back({"joints", std::move(joints)});
     }
     const auto range = layer_range(job(), plan_.layer_count);
     if (!range) return range.error();

@@ -55,6 +55,7 @@ class ImageMaker : public Maker {
       std::iota(all.begin(), all.end(), plan_.range[0]);
       return all;
     }
+    if (Status status = inspector_.check_file(); !status) return status.error();
     if (Status status = files_.open(); !status) return status.error();
     return files_.take_todo();
   }
@@ -99,7 +100,7 @@ class ImageMaker : public Maker {
       });
     }
     add("dose", [this](const Layer& layer, Work& work, Made& made) {
-      if (Status status = imager_.bleed(layer, work.images); !status) return status;
+      if (Status status = imager_.bleed(layer, work.images, made.notes); !status) return status;
       // What walls and fillings left out is no bleed.
       if (plan_.images->dose.bleeds() && !plan_.images->beads) sanity_.add_left(layer, work.images.runs);
       if (Status status = imager_.dose(layer, work.images, made.record); !status) return status;
@@ -127,6 +128,7 @@ class ImageMaker : public Maker {
     add(made.record);
     sanity_.record(made.record.layer.index, made.record.set_pixels > 0);
     if (inspector_.on()) inspector_.record(made.record.layer, work_[ticket.work].inspected);
+    vanished_.add(made.record.layer, made.notes.vanished);
     const raster::LayerReport& report = made.notes.report;
     rows_.add_capped(made.record.layer, report.capped_rows, report.first_capped_row, report.first_capped_instance,
                      plan_.images->grid);
@@ -152,7 +154,11 @@ class ImageMaker : public Maker {
   std::uint64_t crossings() const override { return crossings_; }
   bool times_dry_runs() const override { return plan_.images->machine.has_value() || inspector_.on(); }
   bool keeps() const override { return !plan_.job.dry_run; }
-  Status finish() override { return plan_.job.dry_run ? Status() : files_.finish(); }
+  Status finish() override {
+    if (plan_.job.dry_run) return {};
+    const Status status = files_.finish();
+    return status ? inspector_.write(files_.head()) : status;
+  }
   Status stop(bool) override { return plan_.job.dry_run ? Status() : files_.keep(); }
   void discard() override {
     if (!plan_.job.dry_run) files_.discard();
@@ -217,6 +223,7 @@ class ImageMaker : public Maker {
   std::optional<JobCost> cost_;  // of a job with a machine
 
   sanity::RowWarnings rows_;
+  inspect::VanishCount vanished_;
   std::uint64_t set_pixels_ = 0, moved_pixels_ = 0, lost_pixels_ = 0, solid_pixels_ = 0, bead_pixels_ = 0, capped_rows_ = 0;
   std::uint64_t bytes_written_ = 0, crossings_ = 0;
   std::int64_t microseconds_ = 0, added_microseconds_ = 0;  // of the machine
@@ -232,6 +239,9 @@ class ImageMaker : public Maker {
 
 void ImageMaker::warn(const Summary&, std::vector<Warning>& warnings) const {
   inspector_.warn(warnings);
+  const Mirror mirror = plan_.job.mirror;
+  vanished_.tell(plan_.images->grid, mirror == Mirror::kX || mirror == Mirror::kXY,
+                 mirror == Mirror::kY || mirror == Mirror::kXY, warnings);
   sanity::warn_of_lost_pixels(lost_pixels_, warnings);
   for (const UnfedPowder& powder : unfed_) sanity::warn_of_unfed(powder, warnings);
   const std::vector<std::uint32_t>& part = plan_.scene->part_of_instance;

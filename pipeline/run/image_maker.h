@@ -12,6 +12,7 @@
 #include "pipeline/run/sanity.h"
 #include "stages/coverage/coverage.h"
 #include "stages/data/runs.h"
+#include "stages/inspect/vanished.h"
 #include "stages/raster/materials.h"
 #include "stages/raster/raster.h"
 
@@ -30,6 +31,7 @@ struct ImageWork {
   raster::MaterialImages materials;
   raster::MaterialImages zones;  // of parts with doses of their own
   BleedWork bleed;
+  inspect::VanishScratch vanish;    // if edges move inwards
   std::unique_ptr<BeadWork> beads;  // if beads fill parts
 
   /// Capacity of its buffers.
@@ -39,6 +41,7 @@ struct ImageWork {
 /// Observations about a layer, for the summary.
 struct ImageNotes {
   raster::LayerReport report;
+  inspect::VanishedPieces vanished;                 // by the bleed
   std::uint64_t solid_pixels = 0, bead_pixels = 0;  // of parts, before and after clearing outside beads and shells
   std::vector<std::uint64_t> part_pixels;           // of each part before its dose, or shares of voxels; empty: nobody asks
 };
@@ -61,7 +64,7 @@ class LayerImager {
   Status fill(const Layer& layer, ImageWork& work) const;
   Status beads(const Layer& layer, ImageWork& work, ImageNotes& notes) const;
   /// Mirrors the image and removes its bleed. errors  kUsage: it would grow beyond the bed
-  Status bleed(const Layer& layer, ImageWork& work) const;
+  Status bleed(const Layer& layer, ImageWork& work, ImageNotes& notes) const;
   /// Thins the core, or gives pixels their drops, and counts what remains. errors  kUsage: of DosePlan::saturate
   Status dose(const Layer& layer, ImageWork& work, LayerRecord& record) const;
   /// Runs all steps.
@@ -85,6 +88,7 @@ class LayerImager {
   Status place(const Layer& layer, const PlacedImages& part, ImageWork& work, std::uint64_t& filled) const;
   void mirror(Runs& image, Runs& scratch) const;
   Status check_grown(const Layer& layer, const ImageWork& work) const;
+  std::uint64_t least_vanished() const;
   bool shares_voxels() const;  // of several solids
   void share_out(const Layer& layer, ImageWork& work) const;
   static void split_materials(ImageWork& work);

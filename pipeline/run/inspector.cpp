@@ -6,6 +6,7 @@
 #include <numbers>
 
 #include "stages/data/text/readable.h"
+#include "stages/write/manifest/inspection_file.h"
 
 namespace lamina::pipeline {
 namespace {
@@ -27,6 +28,12 @@ nlohmann::ordered_json json_of(const inspect::Found& found, std::string_view amo
   json[std::string(amount)] = found.amount;
   json["largest_" + std::string(amount)] = found.largest;
   json["largest_at"] = json_of(found.spot);
+  for (const inspect::Place& place : found.places) {
+    nlohmann::ordered_json& one = json["places"].emplace_back(json_of(place.spot));
+    one["last_layer"] = place.last_layer;
+    one["box_mm"] = place.box_mm;
+    one[std::string(amount)] = place.amount;
+  }
   return json;
 }
 
@@ -69,24 +76,37 @@ void Inspector::warn(std::vector<Warning>& warnings) {
   }
   std::vector<std::string> names;
   for (const PartSummary& part : plan_.scene->parts) names.push_back(one_line(part.path));
-  inspect::tell(inspection_->finish(), names, least_mm_, warnings);
+  inspect::tell(inspection_->finish(), names, least_mm_, told_);
+  warnings.insert(warnings.end(), told_.begin(), told_.end());
 }
 
-void Inspector::tell(Summary& summary) const {
-  if (!on() || kept_) return;
+nlohmann::ordered_json Inspector::json() const {
   const inspect::Findings& found = inspection_->findings();
-  nlohmann::ordered_json& json = (*summary.facts)["inspection"];
-  json = {{"layers", found.layers},
-          {"least_wall_mm", least_mm_},
-          {"islands", json_of(found.islands, "mm2")},
-          {"loose", json_of(found.loose, "mm3")},
-          {"hollows", json_of(found.hollows, "mm3")},
-          {"thin", json_of(found.thin, "mm2")},
-          {"touching", nlohmann::ordered_json::array()}};
+  nlohmann::ordered_json json{{"layers", found.layers},
+                              {"least_wall_mm", least_mm_},
+                              {"islands", json_of(found.islands, "mm2")},
+                              {"loose", json_of(found.loose, "mm3")},
+                              {"hollows", json_of(found.hollows, "mm3")},
+                              {"thin", json_of(found.thin, "mm2")},
+                              {"touching", nlohmann::ordered_json::array()}};
   for (const auto& pair : found.touching) {
     json["touching"].push_back({{"part", pair.part}, {"other", pair.other}, {"at", json_of(pair.spot)}});
   }
   if (found.bed_edge) json["bed_edge"] = json_of(*found.bed_edge);
+  return json;
 }
+
+void Inspector::tell(Summary& summary) const {
+  if (on() && !kept_) (*summary.facts)["inspection"] = json();
+}
+
+Status Inspector::check_file() const { return on() && whole() ? check_inspection_file(plan_.job.output) : Status(); }
+
+Status Inspector::write(const ManifestHead& head) const {
+  if (!on() || kept_ || !whole()) return keep_inspection_of(plan_.job.output, head);
+  return write_inspection(plan_.job.output, head, {{"inspection", json()}, {"warnings", warnings_json(told_)}});
+}
+
+bool Inspector::whole() const { return plan_.range[0] == 0 && plan_.range[1] == plan_.layer_count && !plan_.job.shard; }
 
 }  // namespace lamina::pipeline

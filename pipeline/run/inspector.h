@@ -1,6 +1,7 @@
 // pipeline/run/inspector.h: looks through the layers of a powder job on request (stages/inspect/).
 #pragma once
 
+#include <nlohmann/json_fwd.hpp>
 #include <optional>
 #include <string>
 #include <vector>
@@ -8,6 +9,7 @@
 #include "pipeline/plan/plan.h"
 #include "pipeline/run/summary.h"
 #include "stages/inspect/inspect.h"
+#include "stages/write/manifest/manifest.h"
 
 namespace lamina::pipeline {
 
@@ -35,9 +37,19 @@ class Inspector {
   void warn(std::vector<Warning>& warnings);
   void tell(Summary& summary) const;
 
+  // --- DIR/inspection.json, for reports: of whole jobs that were looked at from the first layer to the last
+  /// Before the first layer. errors  kUsage: a file of somebody else has that name
+  Status check_file() const;
+  /// After warn(). Without findings of this run the file stays if it is of the same job, and is removed if it is of another.
+  Status write(const ManifestHead& head) const;
+
  private:
+  bool whole() const;
+  nlohmann::ordered_json json() const;
+
   const Plan& plan_;
   std::optional<inspect::Inspection> inspection_;
+  std::vector<Warning> told_;
   double least_mm_ = 0;
   bool kept_ = false;
 };

@@ -57,7 +57,7 @@ void JobCost::count(const ImageWork& work, const ImageNotes& notes, LayerRecord&
     record.part_pixels = saturates_ ? windows_->count(record.layer, drops.zones) : windows_->count(record.layer, work.runs);
   }
   if (saturates_) {
-    record.part_drops = several_ ? windows_->sum(record.layer, drops.levels) : windows_->count(record.layer, image);
+    record.part_drops = several_ ? windows_->sum(record.layer, drops.levels) : windows_->count(record.layer, work.runs);
   }
 }
 

@@ -2,6 +2,7 @@
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <numbers>
 
 #include "pipeline/run/image_maker.h"
 #include "stages/program/reach.h"
@@ -43,7 +44,7 @@ void add(const raster::LayerReport& solid, raster::LayerReport& all) {
 
 std::uint64_t ImageWork::bytes() const {
   std::uint64_t total = scratch.bytes() + materials.bytes() + zones.bytes() + bleed.bytes() + drops.bytes() + coverage.bytes() +
-                        (beads ? beads->bytes() : 0);
+                        vanish.bytes() + (beads ? beads->bytes() : 0);
   for (const Runs* image : {&runs, &second, &third, &lowest, &highest, &section}) {
     total += bytes_held(image->row_offset) + bytes_held(image->change);
   }
@@ -157,7 +158,7 @@ cover::LayerReport LayerImager::levels(const Layer& layer, cover::LayerScratch& 
   return {};
 }
 
-Status LayerImager::bleed(const Layer& layer, ImageWork& work) const {
+Status LayerImager::bleed(const Layer& layer, ImageWork& work, ImageNotes& notes) const {
   const ImagePlan& images = *plan_.images;
   const DoseZones& zones = images.dose.zones();
   const bool shares = plan_.job.levels > 0;
@@ -185,10 +186,22 @@ Status LayerImager::bleed(const Layer& layer, ImageWork& work) const {
                              "parts away from its edge",
                              layer.index, mm(layer.plane()))};
   }
-  if (shares) work.third = work.runs;
+  const std::uint64_t least = least_vanished();
+  if (shares || least > 0) work.third = work.runs;
   zones.remove_bleed(layer, work.runs, work.zones.image, work.bleed);
+  if (least > 0) notes.vanished = inspect::vanished_pieces(work.third, work.runs, least, work.vanish);
   if (shares) empty_removed(work.third, shares_voxels(), work);
   return check_grown(layer, work);
+}
+
+/// Pixels of four discs of the widest bleed inwards; 0: there is none, or beads fill the parts.
+std::uint64_t LayerImager::least_vanished() const {
+  if (plan_.images->beads) return 0;
+  double widest = 0;
+  for (const auto& [x, y] : bleeds_of(plan_.job)) widest = std::max(widest, std::max(x, 0.0) * std::max(y, 0.0));
+  const PixelGrid& grid = plan_.images->grid;
+  const double pixels = 4 * std::numbers::pi * widest * 1e6 * grid.x.pixels_per_nm() * grid.y.pixels_per_nm();
+  return widest > 0 ? std::max<std::uint64_t>(1, static_cast<std::uint64_t>(pixels)) : 0;
 }
 
 /// Where an edge moved inwards, the voxels that it left and those beside them that are less than half full are emptied.
@@ -316,7 +329,7 @@ Status LayerImager::make(const Layer& layer, ImageWork& work, LayerRecord& recor
     if (Status status = fill(layer, work); !status) return status;
     if (Status status = beads(layer, work, notes); !status) return status;
   }
-  if (Status status = bleed(layer, work); !status) return status;
+  if (Status status = bleed(layer, work, notes); !status) return status;
   return dose(layer, work, record);
 }
 
@@ -397,7 +410,7 @@ std::uint64_t LayerImager::bytes_of_section(Nm plane, std::uint64_t changes) con
   const std::uint64_t rows = images.grid.rows();
   const bool dosed = images.dose.any();
   const bool second = images.beads || plan_.job.engine == Engine::kBoth || plan_.job.mirror != Mirror::kNone || dosed;
-  const std::uint64_t second_image = (second ? 8 * changes + 4 * rows : 0) * (dosed ? 3 : 1);
+  const std::uint64_t second_image = (second ? 8 * changes + 4 * rows : 0) * (dosed ? 5 : 1);
   // Images of each material, of all, of one solid, and one intermediate.
   const std::uint64_t materials = images.materials.several() ? images.materials.used.size() : 0;
   const std::uint64_t material_images = materials == 0 ? 0 : (materials + 3) * 2 * (4 * changes + 4 * rows);

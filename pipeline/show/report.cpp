@@ -12,6 +12,7 @@
 #include "pipeline/run/job_cost.h"
 #include "pipeline/show/report_cast.h"
 #include "pipeline/show/report_doubts.h"
+#include "pipeline/show/report_places.h"
 #include "pipeline/show/report_source.h"
 #include "stages/data/input/hash.h"
 #include "stages/geometry/coverage.h"
@@ -159,6 +160,7 @@ Result<Report> make_report(const std::string& path, const ReportOptions& options
   HeldLayers held(options.size_limit > taken ? options.size_limit - taken : 0);
   auto seen = see_layers(*source, doubts, held);
   if (!seen) return seen.error();
+  add_inspection(folder.string(), manifest.head, job.mirror, *seen);
   seen->laid = options.laid;
   seen->laid_svg = options.laid_svg;
   if (source->machine) {

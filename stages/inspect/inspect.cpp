@@ -9,15 +9,19 @@ namespace {
 /// Places of at most this many squares of the least width are corners.
 constexpr double kCorner = 2;
 
-void note(Found& found, double amount, const Spot& spot) {
-  ++found.count;
-  found.amount += amount;
-  if (amount <= found.largest) return;
-  found.largest = amount;
-  found.spot = spot;
+}  // namespace
+
+void Found::note_place(const Place& place) {
+  places.push_back(place);
+  if (places.size() >= 4 * kMost) sort_places();
 }
 
-}  // namespace
+void Found::sort_places() {
+  std::ranges::stable_sort(places, [](const Place& a, const Place& b) {
+    return a.amount != b.amount ? a.amount > b.amount : a.spot.layer < b.spot.layer;
+  });
+  places.resize(std::min(places.size(), kMost));
+}
 
 /// What set pixels are followed for.
 struct Inspection::Solids {
@@ -33,8 +37,7 @@ struct Inspection::Solids {
     if (body.open) return;
     body.owner = all.owner_of(body, INT64_MIN, body.top);
     ++islands;
-    note(all.findings_.islands, static_cast<double>(body.pixels) * all.pixel_mm2_,
-         all.spot(body.box, body.first_layer, body.bottom));
+    all.note_body(all.findings_.islands, body, static_cast<double>(body.pixels) * all.pixel_mm2_, body.first_layer);
   }
   void join(const Body& stays, const Body& ends, const Body& piece) {
     if (stays.owner == Body::kNone || ends.owner == Body::kNone || stays.owner == ends.owner) return;
@@ -42,8 +45,7 @@ struct Inspection::Solids {
   }
   void end(const Body& body) {
     if (body.open) return;
-    note(all.findings_.loose, static_cast<double>(body.pixel_nm) * 1e-6 * all.pixel_mm2_,
-         all.spot(body.box, body.first_layer, body.bottom));
+    all.note_body(all.findings_.loose, body, static_cast<double>(body.pixel_nm) * 1e-6 * all.pixel_mm2_, body.last_layer);
   }
 };
 
@@ -61,7 +63,7 @@ struct Inspection::Powder {
   void end(const Body& body) {
     const double volume = static_cast<double>(body.pixel_nm) * 1e-6 * all.pixel_mm2_;
     if (body.open || volume < all.least_mm_ * all.least_mm_ * all.least_mm_) return;
-    note(all.findings_.hollows, volume, all.spot(body.box, body.first_layer, body.bottom));
+    all.note_body(all.findings_.hollows, body, volume, body.last_layer);
   }
 };
 
@@ -96,6 +98,49 @@ Spot Inspection::spot(const PixelBox& box, std::uint32_t layer, std::int64_t z) 
   return {static_cast<double>(grid_.x.centre(column)) / kNmPerMm,
           static_cast<double>(grid_.y.centre(std::int64_t{grid_.rows()} - 1 - row)) / kNmPerMm, layer,
           static_cast<double>(z) / kNmPerMm};
+}
+
+Place Inspection::place(const PixelBox& box, const Spot& at, double amount, std::uint32_t last_layer) const {
+  const auto mm_of = [](std::uint32_t pixels, const PixelAxis& axis) { return pixels / axis.pixels_per_nm() / kNmPerMm; };
+  const std::uint32_t rows = grid_.rows();
+  return {
+      amount,
+      at,
+      {mm_of(box.left, grid_.x), mm_of(rows - box.bottom, grid_.y), mm_of(box.right, grid_.x), mm_of(rows - box.top, grid_.y)},
+      last_layer};
+}
+
+void Inspection::note_body(Found& found, const Body& body, double amount, std::uint32_t last_layer) {
+  const Spot at = spot(body.box, body.first_layer, body.bottom);
+  ++found.count;
+  found.amount += amount;
+  found.note_place(place(body.box, at, amount, last_layer));
+  if (amount <= found.largest) return;
+  found.largest = amount;
+  found.spot = at;
+}
+
+/// A thin wall is thin in many layers: the places that lie upon each other are one.
+void Inspection::note_thin(const Layer& layer, const ThinPlaces& thin) {
+  Found& found = findings_.thin;
+  const bool goes_on = thin_.amount > 0 && thin.count > 0 && thin_box_.meets(thin.box);
+  if (thin_.amount > 0 && !goes_on) {
+    found.note_place(thin_);
+    thin_ = {};
+  }
+  if (thin.count == 0) return;
+  const double largest = static_cast<double>(thin.largest) * pixel_mm2_;
+  const Spot at = spot(thin.box, layer.index, layer.bottom);
+  if (!goes_on) thin_ = place(thin.box, at, largest, layer.index);
+  thin_box_ = thin.box;
+  thin_.last_layer = layer.index;
+  thin_.amount = std::max(thin_.amount, largest);
+  found.count += thin.count;
+  found.amount += static_cast<double>(thin.pixels) * pixel_mm2_;
+  ++found.layers;
+  if (largest <= found.largest) return;
+  found.largest = largest;
+  found.spot = at;
 }
 
 /// Whether all of a body lies where a copy's box is.
@@ -193,17 +238,7 @@ void Inspection::add(const Layer& layer, const RunsView& image, const ThinPlaces
   Powder powder{*this};
   powder_.add(layer, between_, powder);
   note_edges(layer, image);
-  if (thin.count > 0) {
-    Found& found = findings_.thin;
-    found.count += thin.count;
-    found.amount += static_cast<double>(thin.pixels) * pixel_mm2_;
-    ++found.layers;
-    const double largest = static_cast<double>(thin.largest) * pixel_mm2_;
-    if (largest > found.largest) {
-      found.largest = largest;
-      found.spot = spot(thin.box, layer.index, layer.bottom);
-    }
-  }
+  note_thin(layer, thin);
   ++findings_.layers;
   below_ = layer.bottom;
 }
@@ -216,6 +251,8 @@ const Findings& Inspection::finish() {
     void end(const Body&) {}
   } open;
   powder_.finish(open);
+  note_thin({}, {});
+  for (Found* found : {&findings_.islands, &findings_.loose, &findings_.hollows, &findings_.thin}) found->sort_places();
   return findings_;
 }
 

@@ -10,6 +10,7 @@
 //         bed-edge     layers that reach the edge of the image
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <optional>
 #include <span>
@@ -39,13 +40,28 @@ struct Spot {
   double z_mm = 0;            // bottom of that layer
 };
 
+/// One of a kind: what it holds, and the box around it.
+struct Place {
+  double amount = 0;  // as Found::amount
+  Spot spot;
+  std::array<double, 4> box_mm{};  // left, front, right, back, from the left and the front of the bed
+  std::uint32_t last_layer = 0;    // the first is the spot's
+};
+
 /// Some of one kind.
 struct Found {
-  std::uint64_t count = 0;   // pieces or bodies
-  double amount = 0;         // of all: mm2, or mm3 of bodies
-  double largest = 0;        // the same of the largest
-  Spot spot;                 // of the largest, the first of equals
-  std::uint32_t layers = 0;  // that hold them; of bodies none
+  std::uint64_t count = 0;    // pieces or bodies
+  double amount = 0;          // of all: mm2, or mm3 of bodies
+  double largest = 0;         // the same of the largest
+  Spot spot;                  // of the largest, the first of equals
+  std::uint32_t layers = 0;   // that hold them; of bodies none
+  std::vector<Place> places;  // the largest, at most kMost: the largest first, equal ones from the bottom up; thin ones that
+                              // lie upon each other are one, as large as the largest of them
+
+  static constexpr std::size_t kMost = 20;
+  void note_place(const Place& place);
+  /// Puts places in their order.
+  void sort_places();
 };
 
 struct Findings {
@@ -87,6 +103,9 @@ class Inspection {
   struct Powder;
 
   Spot spot(const PixelBox& box, std::uint32_t layer, std::int64_t z) const;
+  Place place(const PixelBox& box, const Spot& at, double amount, std::uint32_t last_layer) const;
+  void note_body(Found& found, const Body& body, double amount, std::uint32_t last_layer);
+  void note_thin(const Layer& layer, const ThinPlaces& thin);
   PixelBox window_of(const Box& box) const;
   bool stands_in(std::uint32_t stand, const Body& body) const;
   std::uint32_t owner_of(const Body& body, std::int64_t from, std::int64_t to) const;
@@ -104,6 +123,8 @@ class Inspection {
   std::int64_t below_ = 0;  // bottom of the layer before
   bool holds_ = false;      // any layer so far
   Layer layer_{};
+  Place thin_;         // of the layers so far, that the next one may go on with; of no amount: none
+  PixelBox thin_box_;  // of its last layer
   Follower solid_{true}, powder_{false};
   Runs between_;  // the powder of a layer
   Findings findings_;

@@ -15,6 +15,23 @@ double whole_drops_mm_s(const Machine& machine, const HeadGrid& grid) {
   return std::floor(machine.head.highest_frequency_hz / grid.head_drops * grid.place_nm / kNmPerMm * 10) / 10;
 }
 
+/// "every 4 layers and 30 s"; empty without any.
+std::string how_often(std::uint32_t layers, double seconds) {
+  std::string text = layers == 0 ? "" : layers == 1 ? "every layer" : fmt::format("every {} layers", layers);
+  if (seconds > 0) text += fmt::format("{}{:g} s", text.empty() ? "every " : " and ", seconds);
+  return text;
+}
+
+std::string care_text(const Machine& machine, const FullLayer& full) {
+  const auto& care = machine.care;
+  const std::string shots = how_often(care.spit_layers, care.spit_seconds),
+                    wipes = how_often(care.wipe_layers, care.wipe_seconds);
+  std::string text = shots.empty() ? "" : "fired off the bed " + shots;
+  if (!wipes.empty()) text += (text.empty() ? "wiped " : ", wiped ") + wipes;
+  return text +
+         fmt::format(": {:.2f} s of a full layer and {:.0f} drops, averaged over layers", full.care_seconds, full.spat_drops);
+}
+
 }  // namespace
 
 std::string sweeps_text(const Machine& machine, const HeadGrid& grid, const DropSweeps& sweeps) {
@@ -77,6 +94,7 @@ std::string explain(const Machine& machine, const HeadGrid& grid, const std::opt
                                                                  full->drops_seconds, grid.head_drops)
                                                    : "")
                     : "not told: the program of a full layer is too long");
+  if (full && (machine.care.spits() || machine.care.wipes())) line("care", care_text(machine, *full));
   line("dialect", machine.dialect);
   return text;
 }

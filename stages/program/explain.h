@@ -23,9 +23,11 @@ std::string sweeps_text(const Machine& machine, const HeadGrid& grid, const Drop
 struct FullLayer {
   double thickness_mm = 0;
   std::uint32_t sweeps = 0;  // second passes for blocked nozzles included
-  double seconds = 0;        // of the layer
-  double empty_seconds = 0;  // of a layer without a pixel: powder, pauses
+  double seconds = 0;        // of the layer; care that is not due in each one is averaged
+  double empty_seconds = 0;  // of a layer without a pixel: powder, pauses, care; averaged likewise
   double drops_seconds = 0;  // of all drops that the head has on every pixel; 0: it has one
+  double care_seconds = 0;   // of `seconds`: what they are more than without care of the head
+  double spat_drops = 0;     // off the bed, averaged likewise
 };
 
 /// What follows from a profile, one fact a line, for people.

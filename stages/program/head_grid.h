@@ -25,6 +25,9 @@ namespace lamina::program {
 ///         rows that do not land on lines, all nozzles blocked or one that does not exist, too fast for the nozzles
 Result<HeadGrid> make_head_grid(const Machine& machine);
 
+/// Empty, or why joints of swaths do not move from layer to layer though mounting.joint_shift_lines says so.
+std::string idle_joints(const Machine& machine, const HeadGrid& grid);
+
 /// Changes a machine so that it prints at these dpi, along x and y, if its head can: across the scan by its number of
 /// interlaced passes, along it by the length of a pixel.
 /// grid    of the machine as it is

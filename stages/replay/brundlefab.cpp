@@ -57,7 +57,7 @@ class Firmware {
   }
   void end_of_program() {
     if (!ended_) return printing_.fault("the program ends before its last line");
-    printing_.build_vat_goes_down(moved_mm_[kZ]);
+    printing_.build_vat_goes_down(moved_mm_[kZ] - base_mm());
     end_of_bar();
     for (const auto& [axis, name] : {std::pair{kZ, "part"}, {kE, "feed"}}) {
       if (std::abs(spread_mm_[axis] - moved_mm_[axis]) < 1e-3) continue;
@@ -68,6 +68,8 @@ class Firmware {
 
  private:
   void fault(std::string_view what) { printing_.fault(fmt::format("line {}: {}", number_, what)); }
+  /// Of powder below this layer, fed with it.
+  double base_mm() const { return printing_.layer() == 0 ? printing_.profile().powder.base_mm() : 0; }
   /// What the next layer relies on.
   void end_of_bar() {
     if (!bar_.is_empty() || inked_[0] != inked_[1]) {
@@ -184,9 +186,10 @@ class Firmware {
     if (feed == 0) printing_.takes(time);
     moved_mm_[kE] += feed;
     moved_mm_[kZ] += part;
-    const double below = std::abs(printing_.standing().build_mm);
+    const double top = printing_.standing().build_mm, below = top + printing_.profile().powder.base_mm();
     bin_stands_at("feed", kLiftedMm + printing_.profile().powder.dose * below + moved_mm_[kE]);
     bin_stands_at("part", below + moved_mm_[kZ]);
+    printing_.build_vat_stands_at(top + moved_mm_[kZ]);  // whatever is below the first layer counts below 0
   }
   /// Axis_Stepper::update cuts what is beyond.
   void bin_stands_at(std::string_view name, double mm) {
@@ -208,6 +211,7 @@ class Firmware {
 
   void carriage(double way, double seconds) {
     moved_ = true;
+    printing_.leaves_place();
     printing_.head_moves(std::abs(way), std::abs(way) / seconds, false);
     if (tool_ == kRecoater) printing_.roller_stands_at(axis_x_ + kBladeMm);
     if (way > 0 && tool_ == kRecoater) spread_mm_ = moved_mm_;
@@ -223,6 +227,11 @@ class Firmware {
     if (!run.fault.empty()) return fault(run.fault);
     for (int i = 0; i < run.passes && printing_.ok(); ++i) {
       const Pass& pass = run.pass[static_cast<std::size_t>(i)];
+      if (off_bed()) {
+        if (moving) return fault("inks while the carriage moves along X");
+        shoot(pass);
+        continue;
+      }
       printing_.head_moves(pass.dots * kDotMm, kDotMm * 1000 / bar_.sprays(), true);
       if (moving) return fault("inks while the carriage moves along X");
       if (bar_.sprays() < 3) return fault(fmt::format("S{} is so fast that dots are left out", bar_.sprays()));
@@ -232,6 +241,32 @@ class Firmware {
         inked_[pass.forward ? 0 : 1] += static_cast<std::uint64_t>(std::popcount(bar_.dot(dot)));
       }
     }
+  }
+
+  /// Whether the pen is where the head is fired off the bed.
+  bool off_bed() const {
+    const auto& care = printing_.profile().care;
+    return care.spits() && care.spit_mm && std::abs(axis_x_ + kPenMm - (*care.spit_mm)[0]) < 1e-3;
+  }
+
+  // A dot is a drop of each nozzle that works, half of it on the way there. It may be inked nowhere over the bed.
+  void shoot(const Pass& pass) {
+    const auto& head = printing_.profile().head;
+    const double seconds = pass.dots * 1e-3 * bar_.sprays();
+    std::uint64_t drops = 0;
+    for (std::int32_t dot = pass.begin; dot < pass.end && printing_.ok(); ++dot) {
+      if (bar_.dot(dot) == 0) continue;
+      for (std::uint32_t nozzle = 0; nozzle < head.nozzles; ++nozzle) {
+        const bool blocked = std::ranges::find(head.blocked, nozzle) != head.blocked.end();
+        if ((bar_.dot(dot) >> nozzle & 1) == (blocked ? 0u : 1u)) continue;
+        return fault(fmt::format("a shot off the bed {} nozzle {}", blocked ? "fires blocked" : "leaves out", nozzle));
+      }
+      printing_.beside_bed(axis_x_ + kPenMm, (dot + 0.5) * kDotMm);
+      ++drops;
+    }
+    inked_[pass.forward ? 0 : 1] += drops;
+    if (pass.forward) return printing_.takes(seconds);
+    printing_.spits(axis_x_ + kPenMm, 0, drops, seconds);
   }
 
   void ink(const Pass& pass) {

@@ -33,6 +33,8 @@ class ByteReader {
     for (std::size_t i = 0; i < taken.size(); ++i) value |= std::uint64_t{static_cast<std::uint8_t>(taken[i])} << (8 * i);
     return value;
   }
+  /// The next bytes, which are not taken; fewer at the end.
+  std::string_view ahead(std::size_t count) const { return left_.substr(0, count); }
   std::uint32_t word() { return static_cast<std::uint32_t>(number(4)); }
   bool done() const { return left_.empty(); }
   void fault(std::string_view what) { printing_.fault(fmt::format("byte {}: {}", all_ - left_.size(), what)); }
@@ -59,6 +61,14 @@ class Passes {
     across_ = across_mm;
     backward_ = backward;
   }
+  /// The head goes to a place beside the bed. works_mm_s  how fast over its wiper; 0: as it travels
+  void visit(double x_mm, double y_mm, double works_mm_s) {
+    make();
+    const double along = along_ ? x_mm : y_mm, across = along_ ? y_mm : x_mm;
+    const double speed = works_mm_s > 0 ? works_mm_s : printing_.profile().motion.travel_speed_mm_s;
+    go(along, across, speed);
+    printing_.head_stands_at(x_mm, y_mm, works_mm_s);
+  }
   /// A step that fires, in the order of the movement. drops  the most of a nozzle there
   void at(std::int64_t step, std::uint32_t drops = 1) {
     if (!any_) first_ = step, most_ = 1;
@@ -66,11 +76,15 @@ class Passes {
     most_ = std::max(most_, drops);
     any_ = true;
   }
+  /// Ends the sweep before; the head stays where that ends.
+  void stop() { make(); }
+  /// Where the carriage stands.
+  double x_mm() const { return along_ ? at_along_ : at_across_; }
+  double y_mm() const { return along_ ? at_across_ : at_along_; }
   /// Ends the last sweep; the head goes back.
   void end() {
-    make();
     const Standing stand = printing_.standing();
-    go(along_ ? stand.x_mm : stand.y_mm, along_ ? stand.y_mm : stand.x_mm);
+    visit(stand.x_mm, stand.y_mm, 0);
   }
 
  private:
@@ -81,14 +95,15 @@ class Passes {
     const double ramp = grows ? motion.ramp_mm : -motion.ramp_mm;
     const double from = printing_.position_of(static_cast<double>(first_)) - ramp;
     const double to = printing_.position_of(static_cast<double>(last_)) + ramp;
-    go(from, across_);
+    go(from, across_, motion.travel_speed_mm_s);
+    printing_.head_stands_at(along_ ? from : across_, along_ ? across_ : from, 0);
     printing_.head_moves(to - from, motion.scan_speed_mm_s, true, most_);
     at_along_ = to;
     any_ = false;
+    printing_.head_stands_at(along_ ? to : across_, along_ ? across_ : to, 0);
   }
-  void go(double along, double across) {
-    printing_.head_moves(std::hypot(along - at_along_, across - at_across_), printing_.profile().motion.travel_speed_mm_s,
-                         false);
+  void go(double along, double across, double mm_s) {
+    printing_.head_moves(std::hypot(along - at_along_, across - at_across_), mm_s, false);
     at_along_ = along;
     at_across_ = across;
   }

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <bit>
 
 namespace lamina::replay {
 
@@ -51,6 +52,14 @@ std::string VatLevels::take(std::uint32_t layer, const std::optional<Count>& tak
                         vat == 0 ? "first" : "second", before, depth_mm_[vat]);
   }
   return fault;
+}
+
+std::optional<Count> with_fed_by_host(const Machine& machine, const Layer& layer, std::optional<Count> count) {
+  if (!count || count->moves || count->vats == 0) return count;
+  const double base = layer.index == 0 ? machine.powder.base_mm() : 0;
+  const double fed = machine.powder.dose * (mm(layer.thickness) + base) / std::popcount(count->vats & 3);
+  for (std::size_t vat = 0; vat < 2; ++vat) count->fed_mm[vat] = (count->vats >> vat & 1) != 0 ? fed : 0;
+  return count;
 }
 
 std::string vats_text(std::uint32_t vats) {

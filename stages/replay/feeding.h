@@ -7,6 +7,7 @@
 #include <span>
 #include <string>
 
+#include "stages/data/layer.h"
 #include "stages/data/machine.h"
 #include "stages/replay/count.h"
 
@@ -39,6 +40,9 @@ class VatLevels {
   std::uint32_t next_ = 0;  // layer
   bool known_ = false;
 };
+
+/// The count of a layer with what its host feeds by the profile, of a program that names its vats and moves none.
+std::optional<Count> with_fed_by_host(const Machine& machine, const Layer& layer, std::optional<Count> count);
 
 /// "both vats feed"
 std::string vats_text(std::uint32_t vats);

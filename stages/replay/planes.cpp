@@ -2,6 +2,7 @@
 #include <vector>
 
 #include "stages/replay/bytes.h"
+#include "stages/replay/care/records.h"
 #include "stages/replay/dialects.h"
 
 namespace lamina::replay {
@@ -71,6 +72,7 @@ void read_planes(std::string_view text, Printing& printing) {
   reader.take(3 * 4);
   printing.count.vats = counts == 5 ? reader.word() : 1;
   while (printing.ok()) {
+    take_care_records(reader, printing, passes);
     const std::uint32_t command = reader.word(), size = reader.word();
     if (command == kEnd) {
       if (size != 1 || reader.word() != printing.layer() || !reader.done())

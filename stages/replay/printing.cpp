@@ -8,11 +8,6 @@
 #include <utility>
 
 namespace lamina::replay {
-namespace {
-
-constexpr double kHalfMmPerMinute = 0.5 / 60;  // in mm/s
-
-}  // namespace
 
 Printing::Printing(const VirtualMachine& machine, const Layer& layer, Purpose purpose, const VirtualMachine::Watch* watch,
                    std::uint32_t planes)
@@ -143,113 +138,7 @@ void Printing::head_moves(double mm, double mm_s, bool scanning, std::uint32_t d
   if (dwelt_s_ + lamp_blocks_ > 0) fault("scans behind the pause in which the layer dries");
 }
 
-void Printing::leaves_wiper(std::string_view what) {
-  if (own_ > 0) fault(fmt::format("{} before all lines of the machine's own stand there", what));
-  own_ = 0;
-  at_wiper_ = false;
-}
-
-// A wipe is a G1 as fast as the profile has it: travels may have the same ends.
-void Printing::head_stands_at(double x_mm, double y_mm, double works_mm_s) {
-  const auto& care = profile().care;
-  leaves_wiper("the head goes on");
-  if (spat_here_ % std::max(1u, care.spit_drops) != 0) {
-    fault(fmt::format("nozzles fire {} drops off the bed, where {} are a shot", spat_here_, care.spit_drops));
-  }
-  const bool slow = std::abs(works_mm_s - care.wipe_speed_mm_s) < 1.01 * kHalfMmPerMinute;
-  if (const auto& wiper = care.wipe_mm; wiper && slow) {
-    const auto [x, y] = head_mm_.value_or(profile().motion.safe_mm);
-    if (std::hypot(x - (*wiper)[0], y - (*wiper)[1]) + std::hypot(x_mm - (*wiper)[2], y_mm - (*wiper)[3]) < 1e-3) {
-      at_wiper_ = true;
-      wiped_s_ = seconds_;
-      ++count.wipes;
-    }
-  }
-  head_mm_ = {x_mm, y_mm};
-  spat_here_ = 0;
-}
-
-void Printing::check_care(std::string_view what, std::uint32_t every, double limit_s, double done_s) {
-  const bool due = limit_s > 0 || (every > 0 && layer_.index % every == 0);
-  if (done_s < 0 && due) return fault(fmt::format("scans before the head is {}, as it has to be in this layer", what));
-  if (limit_s == 0 || seconds_ - done_s <= limit_s) return;
-  fault(fmt::format("a sweep ends {:.2f} s after the head was {} where {:g} may pass", seconds_ - done_s, what, limit_s));
-}
-
-void Printing::spits(double x_mm, double y_mm, std::uint64_t drops, double seconds) {
-  const auto& care = profile().care;
-  const auto& mount = profile().mounting;
-  if (!care.spits() || !care.spit_mm) return fault("fires off the bed, and the profile has no place for it");
-  if (std::hypot(x_mm - (*care.spit_mm)[0], y_mm - (*care.spit_mm)[1]) > 1e-3) {
-    return fault(fmt::format("fires off the bed at {:g}, {:g} mm, not at {:g}, {:g}", x_mm, y_mm, (*care.spit_mm)[0],
-                             (*care.spit_mm)[1]));
-  }
-  const bool x = mount.scan_axis == ScanAxis::kX;
-  double um = ((x ? y_mm : x_mm) - mount.offset_mm[x ? 1 : 0]) * 1000;
-  if (mount.nozzle_0 == Side::kBack || mount.nozzle_0 == Side::kRight) um = machine_.lines_ * machine_.line_um_ - um;
-  const auto line = static_cast<std::int64_t>(std::floor(um / machine_.line_um_));
-  const double step = ((x ? x_mm : y_mm) - position_of(0)) / (position_of(1) - position_of(0));
-  for (std::uint32_t nozzle = 0; nozzle < nozzles(); ++nozzle) {
-    const auto [column, row] = machine_.nozzle_at(line, step, nozzle);
-    if (machine_.nozzle_[nozzle].blocked || column < -0.5 || row < -0.5 || column > machine_.columns_ - 0.5 ||
-        row > machine_.rows_ - 0.5) {
-      count.spat += machine_.nozzle_[nozzle].blocked ? 0 : drops;
-      continue;
-    }
-    return fault(fmt::format("nozzle {} fires off the bed where column {:.0f}, row {:.0f} of it is", nozzle, column, row));
-  }
-  leaves_wiper("nozzles fire off the bed");
-  takes(seconds);
-  spat_here_ += drops;
-  if (spat_here_ > care.spit_drops) {
-    return fault(fmt::format("nozzles fire {} drops off the bed, where {} are a shot", spat_here_, care.spit_drops));
-  }
-  if (spat_here_ < care.spit_drops) return;
-  spat_s_ = seconds_;
-  ++count.spits;
-}
-
-void Printing::waits_capped(std::string_view what) {
-  const auto& cap = profile().care.cap_mm;
-  const auto [x, y] = head_mm_.value_or(profile().motion.safe_mm);
-  if (!cap || std::hypot(x - (*cap)[0], y - (*cap)[1]) < 1e-3) return;
-  fault(fmt::format("{} while the head is not at its cap, {:g}, {:g} mm", what, (*cap)[0], (*cap)[1]));
-}
-
-void Printing::refills() {
-  if (count.fed_mm[0] + count.fed_mm[1] > 0) return fault("waits for the vats to be filled behind the layer's powder");
-  waits_capped("the vats are filled");
-  if (++count.refills > 1) fault("waits for the vats to be filled a second time");
-}
-
-void Printing::dwells(double seconds) {
-  waits_capped("the layer dries");
-  leaves_wiper("the layer dries");
-  dwelt_s_ += seconds;
-  takes(seconds);
-}
-
-// The block that may come now.
-const std::vector<std::string>& Printing::own_lines() const {
-  const auto& profile = machine_.machine_;
-  if (at_wiper_) return profile.care.wipe_lines;
-  return dwelt_s_ > 0 ? profile.powder.dry_off_lines : profile.powder.dry_on_lines;
-}
-
-bool Printing::takes_own(std::string_view line) {
-  const auto& lines = own_lines();
-  if (own_ < lines.size() && lines[own_] == line) {
-    if (++own_ < lines.size()) return true;
-    own_ = 0;
-    ++(at_wiper_ ? wiper_blocks_ : lamp_blocks_);
-    at_wiper_ = false;
-    return true;
-  }
-  if (own_ > 0) fault(fmt::format("'{}' stands where the machine's own '{}' has to", line, lines[own_]));
-  return false;
-}
-
-void Printing::roller_turns(double rpm) { rpm_ = rpm; }
+void Printing::wrong_cycle(std::string_view what) { fail(fmt::format("layer {}, powder cycle: {}", layer_.index, what)); }
 
 void Printing::feeds(std::uint32_t vat, double mm, double mm_s) {
   count.fed_mm[vat] += mm;
@@ -315,13 +204,13 @@ void Printing::spreads(double build_mm, double fed_mm, double clearance_mm) {
 void Printing::check_cycle() {
   const auto& powder = profile().powder;
   const Layer& layer = layer_;
-  const auto wrong = [&](const std::string& what) { fail(fmt::format("layer {}, powder cycle: {}", layer_.index, what)); };
+  const auto wrong = [&](const std::string& what) { wrong_cycle(what); };
   if (const Standing next = standing(); head_mm_ && std::hypot((*head_mm_)[0] - next.x_mm, (*head_mm_)[1] - next.y_mm) > 1e-3) {
     wrong(fmt::format("the head stays at {:g}, {:g} mm, and the next layer finds it at {:g}, {:g}", (*head_mm_)[0],
                       (*head_mm_)[1], next.x_mm, next.y_mm));
   }
   if (lowered_mm_) count.build_mm = mm(layer.bottom) + *lowered_mm_;
-  if (profile().dialect == "raw" || profile().dialect == "planes") return;  // the head alone
+  if (profile().dialect == "raw" || profile().dialect == "planes") return check_told();  // the head alone
   if (!count.moves) return wrong("the build vat does not move");
   if (!spread_wrong_.empty()) return wrong(spread_wrong_);
   // Numbers are written to a tenth of a micrometre.
@@ -331,14 +220,7 @@ void Printing::check_cycle() {
   const double fed = count.fed_mm[0] + count.fed_mm[1], dose = powder.dose * (mm(layer.thickness) + base_mm());
   if (std::abs(fed - dose) > 1e-3 * (1 + base_layers())) wrong(fmt::format("{:g} mm are fed where {:g} have to", fed, dose));
   if (!rolled_) wrong(fmt::format("the roller does not reach its far end at {:g} mm", powder.roller_mm[1]));
-  if (std::abs(dwelt_s_ - powder.dry_s) > 1e-3) {
-    wrong(fmt::format("the layer dries for {:g} s where {:g} have to be", dwelt_s_, powder.dry_s));
-  }
-  const std::uint32_t lamps = (powder.dry_on_lines.empty() ? 0 : 1) + (powder.dry_off_lines.empty() ? 0 : 1);
-  const std::uint32_t wipers = profile().care.wipe_lines.empty() ? 0 : count.wipes;
-  if (lamp_blocks_ != lamps || wiper_blocks_ != wipers) {
-    wrong(fmt::format("the machine's own lines stand {} times where {} have to", lamp_blocks_ + wiper_blocks_, lamps + wipers));
-  }
+  check_pauses();
   if (fires_on_old_) wrong("the first sweep begins before powder is spread");
   if (std::abs(roller_mm_ - powder.roller_mm[0]) > 1e-3) {
     wrong(fmt::format("the roller stays at {:g} mm, not at {:g}", roller_mm_, powder.roller_mm[0]));
@@ -348,10 +230,14 @@ void Printing::check_cycle() {
 const Count& Printing::finish() {
   const auto& powder = profile().powder;
   takes(powder.pause_s);
-  if (!tells_powder_) {
-    const double by_moves = (1 + powder.dose) * mm(layer_.thickness) / powder.vat_speed_mm_s +
+  const auto spread = [&](double height_mm) {
+    const double by_moves = (1 + powder.dose) * height_mm / powder.vat_speed_mm_s +
                             2 * std::abs(powder.roller_mm[1] - powder.roller_mm[0]) / powder.roller_speed_mm_s;
     takes(powder.spread_s > 0 ? powder.spread_s : by_moves);
+  };
+  if (!tells_powder_) {
+    for (std::uint32_t below = 0; below < base_layers(); ++below) spread(powder.base_layer_mm);
+    spread(mm(layer_.thickness));
   }
   count.microseconds = std::llround((seconds_ < kMostSeconds ? seconds_ : kMostSeconds) * 1e6);
   return count;

@@ -14,6 +14,9 @@
 
 namespace lamina::replay {
 
+/// Half of the last digit of speeds as they are spelt, in mm/s.
+inline constexpr double kHalfMmPerMinute = 0.5 / 60;
+
 /// What a program is carried out for.
 enum class Purpose : std::uint8_t {
   kPrint,  // its drops
@@ -86,6 +89,10 @@ class Printing {
   // --- care of head and powder
   /// Every nozzle that is not blocked fires so many drops where the carriage stands, off the bed.
   void spits(double x_mm, double y_mm, std::uint64_t drops, double seconds);
+  /// Faults a nozzle that is not blocked and over the bed where the carriage stands.
+  void beside_bed(double x_mm, double y_mm);
+  /// The head leaves the place where it stood: shots there have to be whole.
+  void leaves_place();
   /// The program waits for somebody to fill the vats; before powder is fed.
   void refills();
   /// It waits for the layer to dry; behind the sweeps.
@@ -95,6 +102,8 @@ class Printing {
   bool takes_own(std::string_view line);
   /// The roller turns so fast against its way, or, at 0, no longer.
   void roller_turns(double rpm);
+  /// A program that moves no powder tells the host the layers of powder below this one.
+  void tells_base(std::uint32_t layers, double layer_mm);
 
   /// Checks the powder cycle of the layer, and that it leaves the machine as the next one expects it; called at the end.
   void check_cycle();
@@ -122,6 +131,7 @@ class Printing {
   /// The 64 pixels of a word that are fired more than so many times.
   std::uint64_t fired_more(std::uint32_t times, std::size_t word) const;
   void fail(std::string what);  // takes the complete message
+  void wrong_cycle(std::string_view what);
   /// Whether care was taken before this sweep, which has just ended. since_s  of the layer, behind it; below 0: not yet
   void check_care(std::string_view what, std::uint32_t every, double limit_s, double since_s);
   /// mm of powder below the layer, fed with it.
@@ -130,6 +140,8 @@ class Printing {
   void strokes(double build_mm, double fed_mm);
   const std::vector<std::string>& own_lines() const;
   void waits_capped(std::string_view what);
+  void check_pauses();
+  void check_told();
   void leaves_wiper(std::string_view what);
   void coverage(std::vector<bool>& worked, std::vector<bool>& blocked) const;
   std::int64_t line_of(std::uint32_t column, std::uint32_t row) const;
@@ -156,6 +168,7 @@ class Printing {
   std::vector<std::uint64_t> fired_;     // how many times, for 64 pixels a word for each bit of it, the leftmost one in bit 0
   std::vector<std::uint8_t> fires_row_;  // whether anything is fired there
   std::vector<Sweep> sweeps_;
+  bool based_ = false;                 // told a base
   std::uint32_t strokes_ = 0;          // of the roller to its far end
   double spat_s_ = -1, wiped_s_ = -1;  // when the layer's last care ended; -1: none yet
   std::uint64_t spat_here_ = 0;        // drops of a nozzle since the head stands

@@ -1,5 +1,6 @@
 // stages/write/program/raw/README.md tells the format.
 #include "stages/replay/bytes.h"
+#include "stages/replay/care/records.h"
 #include "stages/replay/dialects.h"
 
 namespace lamina::replay {
@@ -12,6 +13,7 @@ void read_raw(std::string_view text, Printing& printing) {
   printing.count.vats = reader.word();
   const std::uint32_t words = (printing.nozzles() + 127) / 128, planes = printing.drop_bits();
   while (printing.ok()) {
+    take_care_records(reader, printing, passes);
     const std::string_view tag = reader.take(4);
     if (tag == "LEND") {
       if (reader.word() != printing.layer() || !reader.done())

@@ -28,6 +28,14 @@ Bench make_bench(std::string_view dialect) {
     // A bed of so many of its own pixels.
     const PixelGrid grid = pipeline::resolve_profile(machine)->grid.image;
     machine.bed.size_mm = {60 / grid.x.pixels_per_nm() / 1e6, 50 / grid.y.pixels_per_nm() / 1e6};
+    if (!write::find_dialect(dialect)->has_motion) {  // records of care are bytes too
+      machine.care.spit_layers = machine.care.wipe_layers = 7;
+      machine.care.spit_mm = {{-200, -200}};
+      machine.care.wipe_mm = {{-200, -300, -200, -250}};
+      machine.care.wipe_lines = {"M42 P4 S1"};
+      machine.powder.dry_s = 1;
+      machine.powder.roller_rpm = 99;
+    }
     Bench bench{*pipeline::resolve_profile(machine), {}, {}};
     const PixelGrid& small = bench.resolved.grid.image;
     program::testing::Image pixels(small.rows(), std::vector<int>(small.columns(), 0));
@@ -73,13 +81,16 @@ std::vector<std::string> program_seeds(std::string_view dialect) {
   cycle.thickness_nm = kLayer.thickness;
   write::ProgramBytes bytes;
   writer->begin_layer(cycle, bytes);
+  writer->care_of_layer(cycle, bytes);
   program::CompileScratch scratch;
   const auto count = program::compile(bench.resolved.grid, bench.image, scratch,
                                       [&](const Sweep& sweep, const SweepVectors& vectors) -> Status {
+                                        writer->care_before(sweep, vectors, bytes);
                                         writer->sweep(sweep, vectors, bytes);
                                         return {};
                                       });
   if (!count) throw std::logic_error(count.error().message);
+  writer->care_behind(bytes);
   writer->end_layer(cycle, bytes);
   return {std::string(reinterpret_cast<const char*>(bytes.data()), bytes.size())};
 }

@@ -18,52 +18,13 @@
 #include "stages/replay/machine.h"
 #include "stages/write/program/dialect.h"
 #include "tests/program/machines.h"
+#include "tests/replay/care_bench.h"
 #include "tests/replay/printed_parts.h"
 
 namespace lamina {
 namespace {
 
-/// A shipped machine with a small bed, care of all kinds that its dialect can say, and the program of a filled layer.
-struct CareBench {
-  pipeline::ResolvedMachine resolved;
-  Runs image;
-  printed_parts::Program program;
-
-  explicit CareBench(const std::string& name, const std::function<void(Machine&)>& change = nullptr)
-      : resolved(printed_parts::shipped(name, [&](Machine& m) {
-          m.bed.size_mm = {12, 12};
-          m.care.spit_layers = 7;  // of which the layer is one
-          m.care.spit_drops = 40;
-          m.care.spit_mm = {{-45, -10}};
-          m.care.wipe_layers = 7;
-          m.care.wipe_mm = {{-45, -30, -45, -12}};
-          if (change) change(m);
-        })) {
-    const PixelGrid& grid = resolved.grid.image;
-    image = program::testing::runs_of(program::testing::Image(grid.rows(), std::vector<int>(grid.columns(), 1)));
-    program = printed_parts::program_of(resolved, image);
-  }
-
-  Result<replay::Count> count(const std::string& text) const {
-    return printed_parts::verified(resolved, image, {text, program.count});
-  }
-  std::string fault(const std::string& text) const {
-    const auto found = count(text);
-    return found.ok() ? std::string() : found.error().message;
-  }
-  /// The program with one line that begins so replaced, by nothing too. number  from 0
-  std::string with(const std::string& begin, const std::string& other, int number = 0) const {
-    std::string text;
-    for (std::size_t at = 0; at < program.text.size();) {
-      const std::size_t end = program.text.find('\n', at) + 1;
-      const std::string line = program.text.substr(at, end - at);
-      text += line.starts_with(begin) && number-- == 0 ? other : line;
-      at = end;
-    }
-    EXPECT_LT(number, 0) << begin;
-    return text;
-  }
-};
+using printed_parts::CareBench;
 
 /// Of each dialect that fires off the bed: the line of a shot.
 const struct {
@@ -403,24 +364,52 @@ TEST(Care, ProfilesThatCannotBeKeptAreRefused) {
       {"reprap-inkjet", "care.wipe_lines: M+2: give the command's number", [](Machine& m) { m.care.wipe_lines = {"M+2"}; }},
       {"nuferbj", "powder.dry_s: 0.0004 is written as 0", [](Machine& m) { m.powder.dry_s = 4e-4; }},
       {"nuferbj", "powder.roller_rpm: 1e-05 is written as 0", [](Machine& m) { m.powder.roller_rpm = 1e-5; }},
-      {"brundlefab", "care.spit_seconds: programs",
+      {"brundlefab", "care.spit_mm: the ink bar runs from its home along Y; give 0 for y",
        [](Machine& m) {
-         m.care.spit_seconds = 9, m.care.spit_mm = {{0, 0}};
+         m.care.spit_seconds = 9, m.care.spit_mm = {{400, 5}};
+       }},
+      {"brundlefab", "care.spit_mm: the bar runs over the bed at x",
+       [](Machine& m) {
+         m.care.spit_layers = 1, m.care.spit_mm = {{300, 0}};
+       }},
+      {"brundlefab", "care.spit_mm: the pen reaches x 195 to 845 mm",
+       [](Machine& m) {
+         m.care.spit_layers = 1, m.care.spit_mm = {{850, 0}};
+       }},
+      {"brundlefab", "care.spit_seconds: 9 s, and a band ends up to",
+       [](Machine& m) {
+         m.care.spit_seconds = 9, m.care.spit_mm = {{400, 0}};
+       }},
+      {"brundlefab", "bed.build_height_mm, powder.dose: the bins move by 140 mm",
+       [](Machine& m) { m.powder.base_layers = 30, m.powder.base_layer_mm = 0.2; }},
+      {"brundlefab", "powder.refill: programs",
+       [](Machine& m) {
+         m.powder.refill = VatRefill::kPause, m.powder.vat_depth_mm = {100, 0};
+       }},
+      {"brundlefab", "powder.dry_s: programs", [](Machine& m) { m.powder.dry_s = 1; }},
+      {"brundlefab", "care.cap_mm: programs",
+       [](Machine& m) {
+         m.care.cap_mm = {{400, 0}};
+       }},
+      {"xaar128-raw", "care.wipe_mm: raw has places up to 2147 mm",
+       [](Machine& m) {
+         m.care.wipe_layers = 1, m.care.wipe_mm = {{-3000, 5, -3000, 50}};
+       }},
+      {"jet1000", "care.spit_mm: nozzles are over the bed",
+       [](Machine& m) {
+         m.care.spit_layers = 1, m.care.spit_mm = {{50, 50}};
        }},
       {"brundlefab", "care.wipe_seconds: programs", [](Machine& m) { m.care.wipe_seconds = 9; }},
       {"hp45", "care.wipe_lines: programs of the dialect hp45", [](Machine& m) { m.care.wipe_lines = {"M42 P4 S1"}; }},
       {"hp45", "powder.dry_s: programs of the dialect hp45 cannot say it", [](Machine& m) { m.powder.dry_s = 1; }},
       {"hp45", "powder.roller_rpm: ", [](Machine& m) { m.powder.roller_rpm = 100; }},
-      {"reprap-inkjet", "care.spit_seconds: ",
+      {"reprap-inkjet", "care.spit_seconds: 6 s, and a sweep ends up to",
        [](Machine& m) {
-         m.care.spit_seconds = 60, m.care.spit_mm = {{-45, 0}};
+         m.care.spit_seconds = 6, m.care.spit_mm = {{-45, 0}};
        }},
-      {"brundlefab", "care.spit_layers: ",
-       [](Machine& m) {
-         m.care.spit_layers = 1, m.care.spit_mm = {{0, 0}};
-       }},
-      {"production-1200", "powder.base_layers: ", [](Machine& m) { m.powder.base_layers = 1; }},
-      {"xaar128-raw", "powder.refill: ", [](Machine& m) { m.powder.refill = VatRefill::kPause; }},
+      {"reprap-inkjet", "powder.roller_rpm: programs", [](Machine& m) { m.powder.roller_rpm = 1; }},
+      {"xaar128-raw", "powder.refill: pauses need powder.vat_depth_mm",
+       [](Machine& m) { m.powder.refill = VatRefill::kPause; }},
   };
   for (const auto& [machine, key, change] : rows) {
     Machine m = *pipeline::find_machine(machine);

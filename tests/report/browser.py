@@ -164,6 +164,15 @@ def look(browser, page, layer, shots, only_open):
         browser.click("#warnings button")
         steps["warning"] = browser.value(STATE)
         said["warning"] = browser.value("document.querySelector('#warnings button').textContent")
+    said["places"] = browser.value("[...document.querySelectorAll('#places button')].map(b => b.textContent)")
+    if said["places"]:
+        browser.click("#places li:last-child button")
+        steps["place"] = browser.value(STATE)
+        # Each frame of the picture in pixels of the image: left, top, right, bottom.
+        said["frames"] = browser.value("(() => { const s = laminaReport.state, v = document.getElementById('view'), h = laminaReport.head,"
+                                       " r = h.pixel_mm[1] / h.pixel_mm[0];"
+                                       " const x = p => s.x + (p - v.width / 2) / s.scale, y = p => s.y + (p - v.height / 2) / (s.scale * r);"
+                                       " return s.frames.map(([l, t, w, d]) => [x(l), y(t), x(l + w), y(t + d)]); })()")
     browser.value("document.querySelector('#files').open = true")
     browser.settle()
     # Every picture has the shape of its place: a circle is one. And each plot says what it is.

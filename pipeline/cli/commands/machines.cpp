@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <numeric>
 #include <optional>
 #include <vector>
 
@@ -60,8 +61,38 @@ std::string explain(const ExtruderProfile& profile) {
           : "predicted from the lag of its melt; lamina calibrate measures them");
 }
 
-/// Compiles and times a full layer and an empty one; none if the vectors of the full one take more than 256 MiB, six times
-/// those of the largest shipped machine, or its program more than 1 GiB.
+/// A profile whose layer 1 has the care that is due in some layers, and the share of layers that are such.
+struct CareCase {
+  Machine machine;
+  double share = 1;
+};
+
+/// Shots and wipes are due every so many layers, apart or in the same one: up to four kinds of layers.
+std::vector<CareCase> care_cases(const Machine& machine) {
+  constexpr std::uint32_t kNever = 1'000'000;  // a layer later than 1
+  const auto& care = machine.care;
+  const double shots = care.spit_layers, wipes = care.wipe_layers;
+  const double both =
+      shots > 0 && wipes > 0
+          ? 1.0 / static_cast<double>(std::lcm(std::uint64_t{care.spit_layers}, std::uint64_t{care.wipe_layers}))
+          : 0;
+  const double shot = shots > 0 ? 1 / shots : 0, wipe = wipes > 0 ? 1 / wipes : 0;
+  std::vector<CareCase> cases;
+  const auto add = [&](bool shoots, bool wipes_too, double share) {
+    if (share < 1e-12) return;
+    CareCase& made = cases.emplace_back(CareCase{machine, share});
+    if (shots > 0) made.machine.care.spit_layers = shoots ? 1 : kNever;
+    if (wipes > 0) made.machine.care.wipe_layers = wipes_too ? 1 : kNever;
+  };
+  add(false, false, 1 - shot - wipe + both);
+  add(true, false, shot - both);
+  add(false, true, wipe - both);
+  add(true, true, both);
+  return cases;
+}
+
+/// Compiles and times a full layer and an empty one, averaged over the kinds of layers that care makes; none if the vectors of
+/// the full one take more than 256 MiB, six times those of the largest shipped machine, or its program more than 1 GiB.
 Result<std::optional<program::FullLayer>> time_full_layer(const ResolvedMachine& resolved) {
   const HeadGrid& grid = resolved.grid;
   const PrintProgram program(resolved, "", 1, {});
@@ -73,21 +104,37 @@ Result<std::optional<program::FullLayer>> time_full_layer(const ResolvedMachine&
   full.thickness_mm = std::max(0.1, resolved.machine.motion.layer_step_um / 1000);
   const auto thickness = static_cast<Nm>(nm_of(full.thickness_mm));
   const Layer layer{1, thickness, thickness};  // the first one has the base of powder below it
-  Runs image = program::image_of_bed(resolved.machine, grid.image);
-  ProgramWork work;
-  ProgramRecord record;
-  if (Status status = program.write_layer(layer, image, {0}, work, record); !status) return status.error();
-  full.sweeps = record.sweeps;
-  full.seconds = static_cast<double>(record.microseconds) / 1e6;
-  if (grid.head_drops > 1) {
-    const std::vector<RunsView> drops(grid.head_drops, image.view());
-    if (Status status = program.write_layer(layer, drops, {0}, work, record); !status) return status.error();
-    full.drops_seconds = static_cast<double>(record.microseconds) / 1e6;
+  const Runs image = program::image_of_bed(resolved.machine, grid.image);
+  Runs empty = image;
+  empty.change.clear();
+  std::fill(empty.row_offset.begin(), empty.row_offset.end(), 0u);
+  const auto timed = [&](const Machine& machine, const Runs& of, std::uint32_t drops) -> Result<ProgramRecord> {
+    const ResolvedMachine changed{machine, grid};
+    const PrintProgram program(changed, "", 1, {});
+    ProgramWork work;
+    ProgramRecord record;
+    const Status status = program.write_layer(layer, std::vector<RunsView>(drops, of.view()), {0}, work, record);
+    return status ? Result<ProgramRecord>(record) : Result<ProgramRecord>(status.error());
+  };
+  for (const CareCase& one : care_cases(resolved.machine)) {
+    const auto filled = timed(one.machine, image, 1), none = timed(one.machine, empty, 1);
+    if (!filled || !none) return filled ? none.error() : filled.error();
+    full.sweeps = filled->sweeps;
+    full.seconds += one.share * static_cast<double>(filled->microseconds) / 1e6;
+    full.empty_seconds += one.share * static_cast<double>(none->microseconds) / 1e6;
+    full.spat_drops += one.share * static_cast<double>(filled->spat);
+    if (grid.head_drops == 1) continue;
+    const auto all = timed(one.machine, image, grid.head_drops);
+    if (!all) return all.error();
+    full.drops_seconds += one.share * static_cast<double>(all->microseconds) / 1e6;
   }
-  image.change.clear();
-  std::fill(image.row_offset.begin(), image.row_offset.end(), 0u);
-  if (Status status = program.write_layer(layer, image, {0}, work, record); !status) return status.error();
-  full.empty_seconds = static_cast<double>(record.microseconds) / 1e6;
+  if (resolved.machine.care.spits() || resolved.machine.care.wipes()) {
+    Machine without = resolved.machine;
+    without.care = {};
+    const auto filled = timed(without, image, 1);
+    if (!filled) return filled.error();
+    full.care_seconds = full.seconds - static_cast<double>(filled->microseconds) / 1e6;
+  }
   return std::optional(full);
 }
 

@@ -6,6 +6,7 @@
 #include <string_view>
 
 #include "stages/replay/bytes.h"
+#include "stages/replay/care/records.h"
 #include "stages/replay/printing.h"
 
 namespace lamina::replay {
@@ -50,14 +51,26 @@ void Timer::read(std::span<const std::byte> lines) {
 }
 
 void Timer::sweep(double across_mm, bool backward, std::int64_t first, std::int64_t last, bool added, std::uint32_t drops) {
-  sweeps_.push_back({across_mm, backward, added, first, last, drops});
+  sweeps_.push_back({across_mm, backward, added, first, last, drops, text_.size()});
+}
+
+void Timer::care(std::span<const std::byte> records) {
+  text_.append(reinterpret_cast<const char*>(records.data()), records.size());
 }
 
 Result<Count> Timer::pass(bool all) const {
   Printing printing(*machine_, layer_, Purpose::kTime);
   Passes passes(printing);
+  std::size_t care = 0;
+  const auto care_until = [&](std::size_t end) {
+    ByteReader reader(std::string_view(text_).substr(care, end - care), printing);
+    take_care_records(reader, printing, passes);
+    if (!reader.done()) reader.fault("is no record of care");
+    care = end;
+  };
   bool backward = false;
   for (const Sweep& sweep : sweeps_) {
+    care_until(sweep.care);
     if (!all && sweep.added) continue;
     // Without the added ones directions alternate anew.
     const bool turned = !all && machine_->profile().motion.both_directions && sweep.backward != backward;
@@ -66,13 +79,15 @@ Result<Count> Timer::pass(bool all) const {
     passes.at(turned ? sweep.first : sweep.last, sweep.drops);
     backward = !backward;
   }
+  care_until(text_.size());
   passes.end();
   if (Status status = printing.status(); !status) return Error{Fault::kInternal, status.error().message};
   return printing.finish();
 }
 
 Result<Count> Timer::end() {
-  if (!text_.empty()) {
+  const std::string& dialect = machine_->profile().dialect;
+  if (dialect != "raw" && dialect != "planes") {
     auto taken = machine_->timed(text_, layer_);
     if (taken) return taken;
     return Error{Fault::kInternal, fmt::format("the machine would not take the program: {}; this is a fault of lamina, please "

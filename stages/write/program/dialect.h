@@ -29,6 +29,12 @@ class ProgramWriter {
   virtual void sweep(const Sweep& sweep, const SweepVectors& vectors, ProgramBytes& out) = 0;
   virtual void end_layer(const LayerCycle& cycle, ProgramBytes& out) = 0;
   virtual void end(ProgramBytes& out) = 0;
+
+  // --- care in dialects of vectors alone, as records of their own; all others spell it within the lines above
+  /// Behind begin_layer(), before each sweep(), before end_layer().
+  virtual void care_of_layer(const LayerCycle&, ProgramBytes&) {}
+  virtual void care_before(const Sweep&, const SweepVectors&, ProgramBytes&) {}
+  virtual void care_behind(ProgramBytes&) {}
 };
 
 /// What a dialect can say beside the drops and the powder of a layer, a bit each.
@@ -37,11 +43,21 @@ enum Saying : std::uint32_t {
   kSaysRefill = 2,    // a pause for a vat to be filled
   kSaysDry = 4,       // a pause behind the sweeps
   kSaysRoller = 8,    // the speed of a roller that turns
-  kSaysCare = 16,     // firing off the bed, and wiping, at the begin of a layer
-  kSaysSeconds = 32,  // the same between sweeps, by the clock
-  kSaysOwn = 64,      // lines of the machine's own, which its profile has
-  kSaysAll = 127,
-  kSaysDrops = 128  // several drops of a pixel in one sweep
+  kSaysShots = 16,    // firing off the bed at the begin of a layer
+  kSaysWipes = 32,    // the same for wiping
+  kSaysSeconds = 64,  // what it says of both between sweeps as well, by the clock
+  kSaysOwn = 128,     // lines of the machine's own, which its profile has
+  kSaysCap = 256,     // where the head waits in pauses
+  kSaysCare = kSaysShots | kSaysWipes,
+  kSaysAll = 511,
+  kSaysDrops = 512  // several drops of a pixel in one sweep
+};
+
+/// Care where a head does not go to it as to any place, at the speed of travels, and fire at its highest frequency.
+struct CareRules {
+  double (*shot_s)(const Machine&) = nullptr;
+  double (*longest_sweep_s)(const Machine&, const HeadGrid&) = nullptr;  // without the way to it
+  bool own_places = false;  // the dialect's check() holds places and limits in seconds itself
 };
 
 /// One row of the registry.
@@ -57,6 +73,7 @@ struct Dialect {
   std::unique_ptr<ProgramWriter> (*make_writer)(const Machine& machine, const HeadGrid& grid);
   /// What it cannot say beside the number of nozzles. errors  kUsage
   Status (*check)(const Machine& machine, const HeadGrid& grid) = nullptr;
+  CareRules care = {};
 };
 
 std::span<const Dialect> dialects();

@@ -4,7 +4,7 @@
 #include <array>
 
 #include "stages/write/program/brundlefab/brundlefab.h"
-#include "stages/write/program/care.h"
+#include "stages/write/program/care_check.h"
 #include "stages/write/program/dialect.h"
 #include "stages/write/program/hp45/head.h"
 #include "stages/write/program/hp45/hp45.h"
@@ -20,18 +20,34 @@ namespace {
 constexpr std::array<Dialect, 7> kDialects = {{
     {"nuferbj", ".gcode", "G-code with vectors as hexadecimal words, powder cycle and counters; our own definition", 65'535, 0,
      true, kSaysAll, nuferbj::make_writer},
-    {"raw", ".raw", "128-bit words as a Xaar XJ128 takes them, with swath heads; our own definition", 65'535, 120, false, kSaysDrops,
-     raw::make_writer},
+    {"raw", ".raw", "128-bit words as a Xaar XJ128 takes them, with swath heads; our own definition", 65'535, 120, false,
+     kSaysAll, raw::make_writer},
     {"planes", ".planes", "32-bit padded planes of a swath, as production heads take them; our own definition", 65'535, 31,
-     false, kSaysDrops, planes::make_writer},
+     false, kSaysAll | kSaysDrops, planes::make_writer},
     {"hp45", ".hp45", "HP45 controller V4, firmware 0.08: SBR lines for it, G-code for a motion controller beside it", 300, 0,
-     true, kSaysBase | kSaysCare | kSaysSeconds, hp45::make_writer, hp45::check},
+     true, kSaysBase | kSaysCare | kSaysSeconds | kSaysCap, hp45::make_writer, hp45::check},
     {"oasis", ".oasis", "Oasis: an HP45 controller V4 and GRBL, with the new layer of the Oasis controller", 300, 0, true,
      kSaysAll, oasis::make_writer, oasis::check},
-    {"brundlefab", ".gcode", "G-code of the BrundleFab, whose Y loads an ink bar of 840 dots: T1 P, 12 nozzles", 12, 0, true, 0,
-     brundlefab::make_writer, brundlefab::check},
-    {"m578", ".gcode", "M578 S of RepRapFirmware 1.09r to 3.4 built with inkjet support: one head, 12 nozzles, a stop a pixel",
-     12, 0, true, kSaysBase | kSaysRefill | kSaysDry | kSaysCare | kSaysOwn, m578::make_writer, m578::check},
+    {"brundlefab",
+     ".gcode",
+     "G-code of the BrundleFab, whose Y loads an ink bar of 840 dots: T1 P, 12 nozzles",
+     12,
+     0,
+     true,
+     kSaysBase | kSaysShots | kSaysSeconds,
+     brundlefab::make_writer,
+     brundlefab::check,
+     {.own_places = true}},
+    {"m578",
+     ".gcode",
+     "M578 S of RepRapFirmware 1.09r to 3.4 built with inkjet support: one head, 12 nozzles, a stop a pixel",
+     12,
+     0,
+     true,
+     kSaysAll & ~std::uint32_t{kSaysRoller},
+     m578::make_writer,
+     m578::check,
+     {.shot_s = m578::shot_s, .longest_sweep_s = m578::longest_sweep_s}},
 }};
 
 }  // namespace

@@ -79,6 +79,7 @@ std::string head_json(const Manifest& manifest, const ManifestSeen& file, const 
                {"quote", seen.quote},
                {"parts", Json::array()},
                {"warnings", Json::array()},
+               {"places", Json::array()},
                {"views", Json::object()},
                {"reasons", Json::array()},
                {"embedded", Json::array()}};
@@ -86,6 +87,14 @@ std::string head_json(const Manifest& manifest, const ManifestSeen& file, const 
   for (const Warning& warning : seen.warnings) {
     json["warnings"].push_back({{"code", warning.code}, {"text", warning.text}});
     if (warning.layer) json["warnings"].back()["layer"] = *warning.layer;
+  }
+  for (const SeenPlace& place : seen.places) {
+    json["places"].push_back({{"code", place.code},
+                              {"mm", {place.x_mm, place.y_mm, place.z_mm}},
+                              {"box_mm", {place.column_mm, place.row_mm, place.width_mm, place.depth_mm}},
+                              {"layers", {place.layer, place.last_layer}},
+                              {"amount", place.amount},
+                              {"unit", place.unit}});
   }
   for (const ShownView& view : views)
     json["views"][view.name] = {view.width, view.height, view.most, view.width_mm, view.height_mm};

@@ -23,12 +23,24 @@ struct ShownView {
   Buffer<std::byte> deflated;
 };
 
+/// Where something was found in the layers.
+struct SeenPlace {
+  std::string code;                     // of its warning
+  double x_mm = 0, y_mm = 0, z_mm = 0;  // the middle, on the bed; the bottom
+  double width_mm = 0, depth_mm = 0;    // of the box around it; 0: a spot
+  std::uint32_t layer = 0, last_layer = 0;
+  std::string unit;  // of `amount`; empty: none is known
+  double amount = 0;
+  double column_mm = 0, row_mm = 0;  // the middle from the left and the top of the image
+};
+
 /// The result of one pass over all layers.
 struct LayersSeen {
   PixelWindow window;
   std::vector<std::uint64_t> set;  // pixels of each
   std::vector<double> seconds;     // of each, with a machine
   std::vector<Warning> warnings;
+  std::vector<SeenPlace> places;
   std::string laid;                             // lines on what toolpaths leave open
   std::string laid_svg;                         // a picture of it; "" for none
   std::vector<std::vector<std::string>> quote;  // rows of a table of costs; empty for none

@@ -105,6 +105,29 @@ function drawView() {
     }
   }
   pen.putImageData(image, 0, 0);
+  drawPlaces(pen, left, top, sx, sy);
+}
+
+// Frames around what --inspect found in the layer at hand.
+function placesOf(number) { return head.places.filter(place => place.layers[0] <= number && number <= place.layers[1]); }
+function drawPlaces(pen, left, top, sx, sy) {
+  const frames = placesOf(head.first_layer + (shown[state.at] ?? 0)).map(place => {
+    const [x, y, width, depth] = place.box_mm, least = 14;
+    const w = Math.max(least, width / head.pixel_mm[0] * sx + 8), h = Math.max(least, depth / head.pixel_mm[1] * sy + 8);
+    return [(x / head.pixel_mm[0] - left) * sx - w / 2, (y / head.pixel_mm[1] - top) * sy - h / 2, w, h];
+  });
+  pen.strokeStyle = colour('--bad'); pen.lineWidth = 3;
+  for (const frame of frames) pen.strokeRect(...frame);
+  state.frames = frames;
+}
+async function showPlace(place) {
+  await showLayer(place.layers[0]);
+  const [x, y, width, depth] = place.box_mm;
+  state.x = x / head.pixel_mm[0]; state.y = y / head.pixel_mm[1];
+  const across = Math.max(width, depth / 2, 2) * 4 / head.pixel_mm[0];  // of the view: four times the place
+  state.scale = Math.min(64, Math.max(state.scale, view.width / across));
+  drawView();
+  view.scrollIntoView({ block: 'center' });
 }
 
 function fit() {
@@ -134,7 +157,8 @@ async function show(place) {  // place: within `shown`
   $('readout').textContent = `z ${mm(layers.bottom[i])} to ${mm(layers.bottom[i] + layers.thickness[i])} mm, ` +
     `${(layers.set[i] * head.pixel_mm[0] * head.pixel_mm[1]).toFixed(2)} mm², ` +
     (head.images ? `${layers.set[i].toLocaleString('en')} pixels` : `${layers.volume[i].toFixed(3)} mm³ in beads`) +
-    (layers.seconds ? `, about ${duration(layers.seconds[i])}` : '');
+    (layers.seconds ? `, about ${duration(layers.seconds[i])}` : '') +
+    placesOf(head.first_layer + i).map(place => `, ${place.code}`).filter((code, k, all) => all.indexOf(code) === k).join('');
   if (!state.fitted) { state.fitted = true; fit(); } else drawView();
   drawPlots();
   document.documentElement.dataset.layer = head.first_layer + i;
@@ -250,6 +274,15 @@ function fillTexts() {
   });
   if (more) warn(`and ${more} more layers`);
   if (!warnings.children.length) warn('none');
+  $('h-places').hidden = !head.places.length;
+  for (const place of head.places) {
+    const [x, y, z] = place.mm.map(value => +value.toFixed(2)), unit = { mm2: 'mm²', mm3: 'mm³' }[place.unit];
+    const button = element('button', `${place.code}` + (unit ? ` of ${+place.amount.toPrecision(3)} ${unit}` : '') +
+      ` at x ${x}, y ${y}, z ${z} mm, layer ${place.layers[0]}` +
+      (place.layers[1] > place.layers[0] ? ` to ${place.layers[1]}` : ''), element('li', undefined, $('places')));
+    button.type = 'button';
+    button.addEventListener('click', () => showPlace(place));
+  }
   const row = (table, cells, cell = 'td') => { const line = element('tr', undefined, table); cells.forEach(text => element(cell, text, line)); };
   row($('parts'), ['part', 'copies', 'triangles', 'from, mm', 'to, mm'], 'th');
   for (const part of head.parts) {
@@ -335,4 +368,4 @@ if (layers.seconds) addPlot('time, estimated', 's', layers.seconds);
 if (layers.sweeps) addPlot('sweeps', '', layers.sweeps);
 if (layers.filament) addPlot('filament', 'mm', layers.filament);
 const ready = fromAddress().then(drawViews).then(() => { document.documentElement.dataset.ready = 'yes'; });
-window.laminaReport = { head, state, decodeLayer, showLayer, ready };
+window.laminaReport = { head, state, decodeLayer, showLayer, showPlace, ready };

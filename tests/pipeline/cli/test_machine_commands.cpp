@@ -111,6 +111,42 @@ TEST_F(MachineCommands, CheckTellsTheTimeThatTheProgramOfAFullLayerTakes) {
   }
 }
 
+// Twelve full layers, of which shots are due in three, wipes in two, one of them with a shot: what is told of one is a twelfth.
+TEST_F(MachineCommands, CheckAveragesCareThatIsDueEverySoManyLayers) {
+  std::ofstream part(at("full.stl"));
+  part << "solid full\n";
+  constexpr int kFaces[12][3] = {{0, 2, 3}, {0, 3, 1}, {4, 5, 7}, {4, 7, 6}, {0, 1, 5}, {0, 5, 4},
+                                 {2, 6, 7}, {2, 7, 3}, {0, 4, 6}, {0, 6, 2}, {1, 3, 7}, {1, 7, 5}};
+  for (const auto& face : kFaces) {
+    part << "facet normal 0 0 0\nouter loop\n";
+    for (const int corner : face) {
+      part << "vertex " << (corner & 1 ? 30 : 0) << " " << (corner & 2 ? 24 : 0) << " " << (corner & 4 ? 1.2 : 0) << "\n";
+    }
+    part << "endloop\nendfacet\n";
+  }
+  part << "endsolid full\n";
+  part.close();
+  for (const std::string machine : {"xaar128-raw", "hp45"}) {
+    std::ofstream(at("m.toml")) << "inherits = \"" << machine << "\"\n[bed]\nsize_mm = [30, 24]\n[care]\nspit_layers = 4\n"
+                                << "spit_drops = 9000\nspit_mm = [-60, 5]\nwipe_layers = 6\nwipe_mm = [-60, 20, -60, 60]\n"
+                                << "wipe_speed_mm_s = 7\n";
+    fs::remove_all(at("full"));
+    lamina("jet " + at("full.stl") + " --machine " + at("m.toml") + " --layer 0.1 -o " + at("full"));
+    const std::string replayed = lamina("verify " + at("full") + " --json");
+    const std::string told = lamina("machines --check " + at("m.toml"));
+    const auto number = [&](const std::string& key) {
+      const std::size_t found = replayed.find("\"" + key + "\":");
+      EXPECT_NE(found, std::string::npos) << key << replayed;
+      return std::strtod(replayed.c_str() + found + key.size() + 3, nullptr);
+    };
+    EXPECT_EQ(number("spits"), 4) << "three, and one behind a wipe";
+    EXPECT_EQ(number("wipes"), 2);
+    EXPECT_NEAR(number_before(told, " s a full layer of 0.1 mm"), number("seconds") / 12, 0.051) << machine << told;
+    EXPECT_NEAR(number_before(told, " drops, averaged over layers"), number("spat_drops") / 12, 0.51) << told;
+    expect_words(told, {"fired off the bed every 4 layers, wiped every 6 layers: "});
+  }
+}
+
 TEST_F(MachineCommands, TheOrientationTargetIsAnFThatReadsRightOnEveryMounting) {
   lamina("machines --target " + at("f.stl"));
   for (const std::string machine : {"nuferbj", "nuferbj-31", "brundlefab", "xaar128-raw"}) {

@@ -65,11 +65,17 @@ class InspectedJobs : public testing::Test {
     EXPECT_EQ(pclose(pipe), 0) << command;
     return nlohmann::json::parse(out);
   }
-  /// A profile of nuferbj with more lines, which stand within [powder].
+  /// A profile of nuferbj with more lines, which stand within [powder], or begin with [mounting] and stand there.
   std::string profile(const std::string& lines) const {
     std::ifstream shipped(fs::path(LAMINA_TEST_DIR).parent_path() / "stages/write/machines/nuferbj.toml");
-    const std::string text{std::istreambuf_iterator<char>(shipped), std::istreambuf_iterator<char>()};
-    std::ofstream(folder_ / "machine.toml") << text << lines;
+    std::string text{std::istreambuf_iterator<char>(shipped), std::istreambuf_iterator<char>()};
+    const std::string mounting = "[mounting]\n";
+    if (lines.starts_with(mounting)) {
+      text.replace(text.find(mounting), mounting.size(), lines);
+    } else {
+      text += lines;
+    }
+    std::ofstream(folder_ / "machine.toml") << text;
     return (folder_ / "machine.toml").string();
   }
   /// Exit code, and the codes of warnings and what is said where it fails.
@@ -136,7 +142,13 @@ TEST_F(InspectedJobs, EachPlantedFaultIsToldAndSoundPartsAreNot) {
 // What can go wrong with powder, binder and head: each is refused with exit code 2 and a line, or done and told by a warning.
 TEST_F(InspectedJobs, EachFaultOfPowderBinderAndHeadIsToldOrRefused) {
   const std::string block = stl("block.stl", {{{0, 0, 0}, {10, 10, 2}}}), other = stl("other.stl", {{{0, 0, 0}, {10, 10, 2}}}),
-                    fin = stl("fin.stl", {{{0, 0, 0}, {10, 1, 2}}});
+                    fin = stl("fin.stl", {{{0, 0, 0}, {10, 1, 2}}}),
+                    rib = stl("rib.stl", {{{0, 0, 0}, {10, 10, 2}}, {{12, 0, 0}, {12.5, 10, 1}}}),
+                    plate = stl("plate.stl", {{{0, 0, 0}, {66, 66, 0.5}}}),
+                    tall = stl("tall.stl", {{{0, 0, 0}, {10, 10, 200}}});
+  std::string all = "0";
+  for (int nozzle = 1; nozzle < 128; ++nozzle) all += "," + std::to_string(nozzle);
+  const std::string care = "[care]\nspit_layers = 1\nspit_mm = [-40, 5]\n";
   const std::string two = block + " " + other + " --material steel,bronze";
   const struct {
     const char* name;
@@ -158,6 +170,27 @@ TEST_F(InspectedJobs, EachFaultOfPowderBinderAndHeadIsToldOrRefused) {
       {"a part that the bleed eats", "", fin + " --bleed 300", 0, "bleed"},
       {"a blocked nozzle", "", block + " --blocked 70", 0, "lost-pixels"},
       {"shots over the bed", "[care]\nspit_layers = 1\nspit_mm = [65, 12]\n", block, 2, "nozzles are over the bed"},
+      {"a wall that the bleed eats, of a part that it leaves", "", rib + " --bleed 300", 0, "vanished"},
+      {"the same wall, and a bleed that leaves it", "", rib + " --bleed 150", 0, ""},
+      {"edges that grow beyond the bed", "", plate + " --bleed -4000", 2, "outside of the bed"},
+      {"shots without a place", "[care]\nspit_layers = 1\n", block, 2, "care.spit_mm: is missing"},
+      {"a place to fire, and no shot", "[care]\nspit_mm = [-40, 5]\n", block, 0, "care"},
+      {"wiping that never comes", "[care]\nwipe_mm = [-40, 20, -40, 60]\n", block, 0, "care"},
+      {"a wiper without a way", "[care]\nwipe_layers = 5\n", block, 2, "care.wipe_mm: is missing"},
+      {"a cap and no pause", care + "cap_mm = [-40, 5]\n", block, 0, "care"},
+      {"a cap over the bed", "dry_s = 5\n[care]\ncap_mm = [60, 20]\n", block, 2, "care.cap_mm: nozzles are over the bed"},
+      {"a lamp without a pause", "dry_on_lines = [\"M106 S255\"]\n", block, 2, "there is no pause to dry"},
+      {"a lamp that stays on", "dry_s = 5\ndry_on_lines = [\"M106 S255\"]\n", block, 0, "care"},
+      {"the same, switched off", "dry_s = 5\ndry_on_lines = [\"M106 S255\"]\ndry_off_lines = [\"M107\"]\n", block, 0, ""},
+      {"a pause longer than nozzles may wait", "dry_s = 90\n" + care + "spit_seconds = 60\n", block, 0, "care"},
+      {"the same under a cap", "dry_s = 90\n" + care + "spit_seconds = 60\ncap_mm = [-40, 5]\n", block, 0, ""},
+      {"a pause to fill vats of no depth", "refill = \"pause\"\n", block, 2, "pauses need powder.vat_depth_mm"},
+      {"joints that shift by a whole swath", "[mounting]\njoint_shift_lines = 128\n", block, 0, "joints"},
+      {"the same by less", "[mounting]\njoint_shift_lines = 48\n", block, 0, ""},
+      {"a part higher than the machine builds", "", tall, 2, "above the build height"},
+      {"nozzles that are faster than they fire", "", block + " --scan-speed 900", 2, "fires a nozzle"},
+      {"a head all of whose nozzles are blocked", "", block + " --blocked " + all, 2, "one at least has to fire"},
+      {"a powder that no vat holds", "materials = [\"steel\", \"bronze\"]\n", block + " --material zinc", 2, "zinc"},
       {"a clock that no sweep keeps", "[care]\nspit_seconds = 0.5\nspit_mm = [-40, 5]\n", block, 2, "a sweep ends up to"},
   };
   for (const auto& [name, lines, arguments, code, told] : rows) {

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 
+#include "stages/write/program/care_clock.h"
 #include "stages/write/program/program_text.h"
 
 namespace lamina::write::brundlefab {
@@ -28,9 +29,20 @@ std::int64_t sprays(const Machine& machine) {
   return std::max<std::int64_t>(1, std::llround(kDotMm * 1000 / machine.motion.scan_speed_mm_s));
 }
 
+/// Of one way along the bar.
+double bar_seconds(const Machine& machine, std::int64_t dots) { return static_cast<double>(dots * sprays(machine)) * 1e-3; }
+
+/// Dots of the bar that a shot takes, a drop a dot of each nozzle: kShotDots in one run there and back, or more runs.
+constexpr std::int64_t kShotDots = kLastDot - kBrakeDots + 1;
+double shot_s(const Machine& machine) {
+  const std::int64_t drops = machine.care.spit_drops, runs = (drops + kShotDots - 1) / kShotDots;
+  return 2 * bar_seconds(machine, drops + runs * 2 * kBrakeDots);
+}
+
 class Writer final : public ProgramWriter {
  public:
-  Writer(const Machine& machine, const HeadGrid& grid) : machine_(machine), carriage_(machine, grid) {}
+  Writer(const Machine& machine, const HeadGrid& grid)
+      : machine_(machine), carriage_(machine, grid), clock_(machine, shot_s(machine)) {}
 
   void start(std::uint32_t layers, ProgramBytes& out) override {
     const std::string speed = feed_text(machine_.powder.roller_speed_mm_s);
@@ -49,7 +61,11 @@ class Writer final : public ProgramWriter {
     state(out);
     put(out, "T21\n");
     wipe(out);
-    put_powder(cycle, out);
+    for_each_spread(machine_, cycle, [&](std::int64_t bottom_nm, std::int64_t thickness_nm) {
+      put_powder(thickness_nm, out);
+      if (bottom_nm != cycle.bottom_nm) put_return(out);  // of the base
+    });
+    if (clock_.begin_layer(cycle.layer, {machine_.powder.roller_mm[1] + kPenMm, 0}).shot) shoot(out);
   }
 
   void sweep(const Sweep& sweep, const SweepVectors& vectors, ProgramBytes& out) override {
@@ -61,19 +77,21 @@ class Writer final : public ProgramWriter {
       dots_[static_cast<std::size_t>(dot)] = static_cast<std::uint16_t>(words[0] & 0xFFF);
       last = std::max<std::int64_t>(last, dot);
     });
-    put(out, "T0\n");
-    std::int64_t end = last + 1 + kBrakeDots;
-    if (longest_ - end > kWorthWiping) wipe(out);
-    end = std::max(end, longest_);
-    longest_ = end;
-    put(out, "T1 P0\nG1 X{} F{}\n", mm_text(carriage_.across(sweep.first_line)), feed_text(machine_.motion.travel_speed_mm_s));
-    load(end, out);
-    put(out, "T0\nT1 P0\nG0 Y0\n");
+    const double across = carriage_.across(sweep.first_line);
+    const CareClock::Place place{across, 0};                 // the bar's home
+    const std::int64_t end = band_end(last) + kWorthWiping;  // a shot before it may have been longer
+    if (clock_.before_sweep(place, place, 2 * bar_seconds(machine_, end)).shot) {
+      const auto dots = dots_;
+      shoot(out);
+      dots_ = dots;
+    }
+    put_band(across, last, out);
   }
 
   void end_layer(const LayerCycle& cycle, ProgramBytes& out) override {
-    put(out, "T21\nG0 X{}\nG91\nG1 E{} Z{} F{}\nG90\nM117 Done {}\n", mm_text(machine_.powder.roller_mm[0]),
-        mm_text(kGiveWayMm), mm_text(-kGiveWayMm), vat_speed(), cycle.layer + 1);
+    put(out, "T21\n");
+    put_return(out);
+    put(out, "M117 Done {}\n", cycle.layer + 1);
   }
   void end(ProgramBytes& out) override { put(out, "T0\nM117 Done\n"); }
 
@@ -86,11 +104,50 @@ class Writer final : public ProgramWriter {
   }
 
   // The bins give way by whole millimetres: the firmware reads -1.5 as -0.5 (GCode::_line_parse).
-  void put_powder(const LayerCycle& cycle, ProgramBytes& out) const {
-    const double thickness = static_cast<double>(cycle.thickness_nm) / kNmPerMm;
+  void put_powder(std::int64_t thickness_nm, ProgramBytes& out) const {
+    const double thickness = static_cast<double>(thickness_nm) / kNmPerMm;
     put(out, "G91\nG1 E{} Z{} F{}\nG90\n", mm_text(machine_.powder.dose * thickness), mm_text(thickness), vat_speed());
     put(out, "G1 X{} F{}\n", mm_text(machine_.powder.roller_mm[1]), feed_text(machine_.powder.roller_speed_mm_s));
     put(out, "G91\nG1 E{} Z{} F{}\nG90\n", mm_text(-kGiveWayMm), mm_text(kGiveWayMm), vat_speed());
+  }
+
+  /// The recoater to the feed bin, and the bins up.
+  void put_return(ProgramBytes& out) const {
+    put(out, "G0 X{}\nG91\nG1 E{} Z{} F{}\nG90\n", mm_text(machine_.powder.roller_mm[0]), mm_text(kGiveWayMm),
+        mm_text(-kGiveWayMm), vat_speed());
+  }
+
+  /// The dots that a band with such a last one takes, those that it brakes over among them.
+  std::int64_t band_end(std::int64_t last) const {
+    const std::int64_t end = last + 1 + kBrakeDots;
+    return longest_ - end > kWorthWiping ? end : std::max(end, longest_);
+  }
+
+  /// dots_, up to the last one, inked on the way there and back with the pen at x.
+  void put_band(double x_mm, std::int64_t last, ProgramBytes& out) {
+    put(out, "T0\n");
+    std::int64_t end = last + 1 + kBrakeDots;
+    if (longest_ - end > kWorthWiping) wipe(out);
+    end = std::max(end, longest_);
+    longest_ = end;
+    put(out, "T1 P0\nG1 X{} F{}\n", mm_text(x_mm), feed_text(machine_.motion.travel_speed_mm_s));
+    load(end, out);
+    put(out, "T0\nT1 P0\nG0 Y0\n");
+  }
+
+  /// All nozzles that are not blocked, a drop a dot, beside the bed.
+  void shoot(ProgramBytes& out) {
+    std::uint16_t all = 0;
+    for (std::uint32_t nozzle = 0; nozzle < machine_.head.nozzles; ++nozzle) {
+      const bool blocked = std::ranges::find(machine_.head.blocked, nozzle) != machine_.head.blocked.end();
+      all = static_cast<std::uint16_t>(all | (blocked ? 0u : 1u << nozzle));
+    }
+    for (std::int64_t left = machine_.care.spit_drops; left > 0; left -= kShotDots) {
+      const std::int64_t drops = std::min(left, kShotDots);
+      dots_.fill(0);
+      std::fill_n(dots_.begin() + kBrakeDots, drops, all);
+      put_band((*machine_.care.spit_mm)[0], kBrakeDots + drops - 1, out);
+    }
   }
 
   // Overwrites what earlier bands left in the printhead's buffer, which 'k' does not clear: with no ink tool selected the
@@ -123,6 +180,7 @@ class Writer final : public ProgramWriter {
 
   const Machine& machine_;
   Carriage carriage_;
+  CareClock clock_;
   std::array<std::uint16_t, kBarDots + kBrakeDots + 1> dots_{};
   std::int64_t longest_ = 0;  // the dots loaded since the bar was wiped
 };
@@ -131,10 +189,40 @@ class Writer final : public ProgramWriter {
 std::string wrong_bins(const Machine& machine) {
   constexpr double kLastLayerMm = 1;  // may end above the part
   const double height = machine.bed.build_height_mm + kLastLayerMm;
-  const double part = height + kGiveWayMm, feed = machine.powder.dose * height + kGiveWayMm;
+  const double base = machine.powder.base_mm();
+  const double part = height + base + kGiveWayMm, feed = machine.powder.dose * (height + base) + kGiveWayMm;
   if (std::max(part, feed) <= kBinMm) return {};
-  return fmt::format("the bins move by {:g} mm, and parts of {:g} mm take {:g} of the part bin and {:g} of the feed bin",
-                     kBinMm, machine.bed.build_height_mm, part, feed);
+  return fmt::format("the bins move by {:g} mm, and parts of {:g} mm{} take {:g} of the part bin and {:g} of the feed bin",
+                     kBinMm, machine.bed.build_height_mm, base > 0 ? fmt::format(" on a base of {:g}", base) : "", part, feed);
+}
+
+/// The bar runs along the whole bed, whatever Y: a shot has to be beside it in X, and begins at the bar's home.
+Status check_shots(const Machine& machine, const Carriage& carriage, const HeadGrid& grid) {
+  const auto& care = machine.care;
+  const auto wrong = [&](std::string_view key, const std::string& what) {
+    return Error{Fault::kUsage, fmt::format("{}: {}: {}", machine.name, key, what)};
+  };
+  if (!care.spits()) return {};
+  const auto& [x, y] = *care.spit_mm;
+  if (y != 0) return wrong("care.spit_mm", "the ink bar runs from its home along Y; give 0 for y");
+  const double line = grid.line_nm / kNmPerMm, head = grid.swath_lines() * line;
+  const double ends[] = {carriage.across(0), carriage.across(std::int64_t{grid.lines} - 1)};
+  const double low = std::min(ends[0], ends[1]) - head, high = std::max(ends[0], ends[1]) + head;
+  if (x > low && x < high) {
+    return wrong("care.spit_mm", fmt::format("the bar runs over the bed at x {:.2f} to {:.2f} mm; give an x beside it, as 400, "
+                                             "over the waste bin",
+                                             low, high));
+  }
+  if (x < kPenMm || x >= kPenMm + kLongestXMm) {
+    return wrong("care.spit_mm", fmt::format("the pen reaches x {:g} to {:g} mm", kPenMm, kPenMm + kLongestXMm));
+  }
+  if (care.spit_seconds == 0) return {};
+  const double way = std::max(std::abs(x - low), std::abs(x - high));
+  const double needed =
+      move_seconds(machine, way, machine.motion.travel_speed_mm_s) + 2 * bar_seconds(machine, kBarDots + kBrakeDots);
+  if (needed < kOfCareLimit * care.spit_seconds) return {};
+  return wrong("care.spit_seconds", fmt::format("{:g} s, and a band ends up to {:.2f} s later; give more, or move faster",
+                                                care.spit_seconds, needed));
 }
 
 }  // namespace
@@ -186,6 +274,7 @@ Status check(const Machine& machine, const HeadGrid& grid) {
   if (const auto& [home, far] = powder.roller_mm; std::min(home, far) < 0 || std::max(home, far) >= kLongestXMm) {
     return wrong("powder.roller_mm", fmt::format("the recoater reaches x 0 to {:g} mm", kLongestXMm));
   }
+  if (Status status = check_shots(machine, carriage, grid); !status) return status;
   if (sprays(machine) < kFewestSprays) {
     return wrong("motion.scan_speed_mm_s", fmt::format("the head sprays every 2 ms, and meets each dot at {:.1f} mm/s or less",
                                                        kDotMm * 1000 / kFewestSprays));

@@ -3,15 +3,24 @@
 #include <algorithm>
 
 #include "stages/write/program/binary_program.h"
+#include "stages/write/program/care_records.h"
 
 namespace lamina::write::raw {
 namespace {
 
 constexpr std::size_t kSegmentHead = 8;
 
+void put_care(CareRecord kind, std::span<const std::uint32_t> numbers, ProgramBytes& out) {
+  constexpr char kTags[][5] = {"GOTO", "FILL", "BASE", "ROLL", "WIPE", "SPIT", "DRYS", "LINE"};
+  put_tag(out, kTags[static_cast<std::size_t>(kind)]);
+  put_little<std::uint32_t>(out, static_cast<std::uint32_t>(numbers.size()));
+  for (const std::uint32_t number : numbers) put_little<std::uint32_t>(out, number);
+}
+
 class Writer final : public ProgramWriter {
  public:
-  Writer(const Machine& machine, const HeadGrid& grid) : machine_(machine), grid_(grid), words_((grid.nozzles + 127) / 128) {}
+  Writer(const Machine& machine, const HeadGrid& grid)
+      : machine_(machine), grid_(grid), words_((grid.nozzles + 127) / 128), care_(machine, grid, put_care) {}
 
   void start(std::uint32_t layers, ProgramBytes& out) override {
     put_tag(out, "LRAW");
@@ -55,10 +64,17 @@ class Writer final : public ProgramWriter {
   }
   void end(ProgramBytes& out) override { put_tag(out, "DONE"); }
 
+  void care_of_layer(const LayerCycle& cycle, ProgramBytes& out) override { care_.begin_layer(cycle, out); }
+  void care_before(const Sweep& sweep, const SweepVectors& vectors, ProgramBytes& out) override {
+    care_.before_sweep(sweep, vectors, out);
+  }
+  void care_behind(ProgramBytes& out) override { care_.dry(out); }
+
  private:
   const Machine& machine_;
   const HeadGrid& grid_;
   std::uint32_t words_;  // of 128 bits a vector of one bit of the drops
+  CareRecords care_;
 };
 
 }  // namespace

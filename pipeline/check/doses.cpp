@@ -1,0 +1,121 @@
+#include "pipeline/check/doses.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "pipeline/job/file.h"
+
+namespace lamina::pipeline {
+namespace {
+
+// Drops a pixel are rounded to 2^-24, drops and shares to millionths.
+constexpr double kOfDrops = 2e-6, kDropStep = 1.2e-7;
+constexpr double kMostDropsOfPixel = 64;
+
+}  // namespace
+
+DoseCheck::DoseCheck(const ManifestHead& head, const Machine* machine) : head_(head), machine_(machine) {
+  Job job;
+  if (read_job_text(head.job_toml, "manifest.json", job)) job_ = std::move(job);
+}
+
+std::optional<DoseCheck::Wished> DoseCheck::wished(const Layer& layer) const {
+  if (!job_) return std::nullopt;
+  const DoseRequest& dose = job_->dose;
+  if (!dose.saturation_percent) return Wished{};  // a drop a pixel
+  if (machine_ == nullptr || machine_->head.drop_pl <= 0) return std::nullopt;
+  const Nm plane = layer.plane();
+  double percent = *dose.saturation_percent;
+  std::optional<double> core = dose.core_saturation_percent;
+  for (const SaturationRange& range : dose.saturation_ranges) {
+    if (plane < nm_of(range.from_mm) || plane >= nm_of(range.to_mm)) continue;
+    percent = range.percent;
+    core = range.core_percent;
+  }
+  std::vector<double> wishes{percent, core.value_or(percent)};
+  for (const PartRequest& part : job_->parts) {
+    if (!part.saturation_percent && !part.core_saturation_percent) continue;
+    const double own = part.saturation_percent.value_or(percent);
+    wishes.insert(wishes.end(), {own, part.core_saturation_percent.value_or(own), core.value_or(own)});
+  }
+  const double pixel_mm2 = 25.4 / head_.grid.x.dpi() * 25.4 / head_.grid.y.dpi();
+  const double voids_pl = pixel_mm2 * mm(layer.thickness) * 1e6 * (1 - machine_->powder.packing);
+  const double of_percent = voids_pl / 100 / (machine_->head.drop_pl * (1 - machine_->powder.evaporates_percent / 100));
+  return Wished{*std::ranges::min_element(wishes) * of_percent, *std::ranges::max_element(wishes) * of_percent};
+}
+
+double DoseCheck::most_pixels(const Layer& layer) const {
+  const double bed = static_cast<double>(head_.grid.columns()) * head_.grid.rows();
+  double pixels = 0;
+  const auto grows = [](const std::optional<std::array<double, 2>>& um) { return um && ((*um)[0] < 0 || (*um)[1] < 0); };
+  if (!job_ || grows(job_->dose.bleed_um) || grows(job_->dose.hole_bleed_um) || grows(job_->dose.first_bleed_um)) return bed;
+  for (const PartRequest& part : job_->parts) {
+    if (grows(part.bleed_um) || grows(part.hole_bleed_um)) return bed;
+  }
+  for (const PartSummary& part : head_.parts) {
+    const Box& box = part.bounds;
+    if (box.lo.z >= layer.bottom + layer.thickness || box.hi.z <= layer.bottom) continue;
+    pixels += part.copies * (static_cast<double>(box.width()) * head_.grid.x.pixels_per_nm() + 2) *
+              (static_cast<double>(box.depth()) * head_.grid.y.pixels_per_nm() + 2);
+  }
+  return std::min(pixels, bed);
+}
+
+std::string DoseCheck::fault(const LayerRecord& record, const LayerPicture& picture, std::uint64_t levels) const {
+  const auto said = [&](const std::string& what) { return fmt::format("layer {}: {}", record.layer.index, what); };
+  if (record.half_far > record.half_differs) {
+    return said(fmt::format("the manifest says {} of {} pixels whose voxels differ", record.half_far, record.half_differs));
+  }
+  if (const std::uint64_t full = head_.full_level(); full > 0) {
+    const std::uint64_t voxels = (2 * levels + full) / (2 * full);
+    if (voxels == record.dosed_pixels) return {};
+    return said(
+        fmt::format("its levels come to {} full voxels, the manifest says dosed_pixels {}", voxels, record.dosed_pixels));
+  }
+  if (head_.most_drops == 0) return {};
+  const std::string what = fault_of_dosed(record, set_pixels(picture.front()));
+  if (!what.empty()) return said(what);
+  const std::string asked = fault_of_wish(record);
+  return asked.empty() ? asked : said(asked);
+}
+
+std::string DoseCheck::fault_of_dosed(const LayerRecord& record, std::uint64_t set) const {
+  const auto dosed = static_cast<double>(record.dosed_pixels);
+  // A level is at least one of a full voxel's.
+  const double full = std::max(1u, head_.levels > 0 ? head_.levels - 1 : 1), least = static_cast<double>(set) / full - 0.5;
+  const auto wish = wished(record.layer);
+  if (head_.levels == 0 && wish) {
+    const double limit =
+        machine_ != nullptr && machine_->head.most_drop_sweeps > 0 ? machine_->head.most_drop_sweeps : kMostDropsOfPixel;
+    const double jetted = std::min(wish->least, limit);
+    if (jetted > (job_->dose.dithered ? 1 : 0.5) * (1 + kOfDrops) + kDropStep && record.dosed_pixels != set) {
+      return fmt::format("each pixel gets a drop, and {} have one; the manifest says dosed_pixels {}", set,
+                         record.dosed_pixels);
+    }
+  }
+  const double most = most_pixels(record.layer);
+  if (dosed >= least && dosed <= most + 0.5) return {};
+  return fmt::format("the manifest says dosed_pixels {}, and {} is the {} that its {} can have", record.dosed_pixels,
+                     dosed < least ? std::ceil(least) : std::floor(most), dosed < least ? "least" : "most",
+                     dosed < least ? "images" : "parts");
+}
+
+std::string DoseCheck::fault_of_wish(const LayerRecord& record) const {
+  const auto wish = wished(record.layer);
+  if (!wish) return {};
+  const auto dosed = static_cast<double>(record.dosed_pixels), asked = static_cast<double>(record.asked_drops);
+  // Both numbers are rounded, that of voxels too where they are shares.
+  const double apart = head_.levels > 0 ? 0.5 : 0;
+  const double least = std::max(0.0, dosed - apart) * std::max(0.0, wish->least * (1 - kOfDrops) - kDropStep) - 0.51;
+  const double most = (dosed + apart) * (wish->most * (1 + kOfDrops) + kDropStep) + 0.51;
+  if (asked >= least && asked <= most) return {};
+  const std::string drops =
+      wish->least == wish->most ? fmt::format("{:.6g}", wish->least) : fmt::format("{:.6g} to {:.6g}", wish->least, wish->most);
+  return fmt::format("{} pixels to be filled with {} drops each are asked {:.0f} to {:.0f}, the manifest says asked_drops {}",
+                     record.dosed_pixels, drops, std::ceil(std::max(0.0, least)), std::floor(most), record.asked_drops);
+}
+
+}  // namespace lamina::pipeline

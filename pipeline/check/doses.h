@@ -1,0 +1,40 @@
+// pipeline/check/doses.h: what a manifest says of pixels to be filled and of drops asked for, against images, job and profile.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+
+#include "pipeline/check/job_files.h"
+#include "pipeline/job/job.h"
+#include "stages/data/machine.h"
+#include "stages/write/manifest/manifest.h"
+
+namespace lamina::pipeline {
+
+/// Works by the formulas of docs/saturation.md in floating point and shares nothing with stages/dose/, which has decided the
+/// drops. What follows from images alone is held exactly: levels of voxels, and the pixels to be filled where each gets a drop.
+/// Where fewer fall, those pixels lie between what the images have and what the boxes of the parts hold.
+class DoseCheck {
+ public:
+  /// head  outlives this object. machine  of the job; null without one
+  DoseCheck(const ManifestHead& head, const Machine* machine);
+
+  /// Empty, or what is wrong. levels  sum of the levels of the layer's image, of a job that has them
+  std::string fault(const LayerRecord& record, const LayerPicture& picture, std::uint64_t levels) const;
+
+ private:
+  struct Wished {
+    double least = 1, most = 1;  // drops a full pixel, of any part, in shell or core
+  };
+  std::optional<Wished> wished(const Layer& layer) const;
+  std::string fault_of_wish(const LayerRecord& record) const;
+  std::string fault_of_dosed(const LayerRecord& record, std::uint64_t set) const;
+  double most_pixels(const Layer& layer) const;
+
+  const ManifestHead& head_;
+  const Machine* machine_;
+  std::optional<Job> job_;  // none: its text cannot be read
+};
+
+}  // namespace lamina::pipeline

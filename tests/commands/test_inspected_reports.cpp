@@ -1,0 +1,184 @@
+// What lamina jet --inspect found is kept beside the manifest and shown by lamina report, with its places.
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+
+#include <algorithm>
+#include <array>
+#include <cstdio>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "tests/commands/program.h"
+
+namespace lamina::test {
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::json;
+using Words = std::vector<std::string>;
+
+class InspectedReports : public ::testing::Test {
+ protected:
+  Outcome lamina(const Words& arguments) { return run_lamina(arguments, directory_.path()); }
+
+  /// A plate of 20 x 20 x 3 mm at 10, 10 on a bed of 40 x 60, with a closed hollow of 4 x 2 x 1 mm at 13, 25, 1, and a peg of
+  /// 2 x 3 x 1 mm that hangs at 34, 12, 1.
+  void planted() {
+    write_text(directory_ / "hollow.obj", boxes({{10, 10, 0, 30, 30, 3}, {34, 12, 1, 36, 15, 2}}, {{13, 25, 1, 17, 27, 2}}));
+  }
+  static std::string boxes(const std::vector<std::array<double, 6>>& solid, const std::vector<std::array<double, 6>>& hollow) {
+    std::string text;
+    int vertices = 0;
+    const auto add = [&](const std::array<double, 6>& box, bool inwards) {
+      for (int corner = 0; corner < 8; ++corner) {
+        text += "v";
+        for (int axis = 0; axis < 3; ++axis) {
+          text += " " + std::to_string(box[static_cast<std::size_t>(axis + ((corner >> axis & 1) != 0 ? 3 : 0))]);
+        }
+        text += "\n";
+      }
+      for (auto face : std::vector<std::array<int, 4>>{
+               {1, 3, 4, 2}, {5, 6, 8, 7}, {1, 2, 6, 5}, {3, 7, 8, 4}, {1, 5, 7, 3}, {2, 4, 8, 6}}) {
+        if (inwards) std::reverse(face.begin(), face.end());
+        text += "f";
+        for (const int corner : face) text += " " + std::to_string(vertices + corner);
+        text += "\n";
+      }
+      vertices += 8;
+    };
+    for (const auto& box : solid) add(box, false);
+    for (const auto& box : hollow) add(box, true);
+    return text;
+  }
+  Words job(const Words& more) {
+    Words words = {"jet", "hollow.obj", "--bed", "40x60",   "--at", "10,10", "--dpi",
+                   "254", "--layer",    "0.1",   "--quiet", "-o",   "out"};
+    words.insert(words.end(), more.begin(), more.end());
+    return words;
+  }
+  Json head() {
+    const Outcome outcome = lamina({"report", "out", "-o", "report.html", "--quiet", "--overwrite"});
+    EXPECT_EQ(outcome.code, 0) << outcome.err;
+    const std::string page = read_text(directory_ / "report.html");
+    const std::string begin = "<script id=\"head\" type=\"application/json\">";
+    const std::size_t at = page.find(begin) + begin.size();
+    return Json::parse(page.substr(at, page.find("</script>", at) - at));
+  }
+  static std::vector<std::string> codes(const Json& list) {
+    std::vector<std::string> codes;
+    for (const Json& one : list) codes.push_back(one["code"]);
+    return codes;
+  }
+
+  Directory directory_;
+};
+
+TEST_F(InspectedReports, PlacesAreThoseOfThePlantedBoxes) {
+  planted();
+  for (const char* mirror : {"none", "x", "xy"}) {
+    ASSERT_EQ(lamina(job({"--inspect", "--mirror", mirror, "--overwrite"})).code, 0);
+    const Json page = head();
+    const auto warned = codes(page["warnings"]);
+    for (const char* code : {"islands", "loose", "hollows"}) {
+      EXPECT_NE(std::find(warned.begin(), warned.end(), code), warned.end()) << code;
+    }
+    ASSERT_EQ(codes(page["places"]), (std::vector<std::string>{"islands", "loose", "hollows"}));
+    const bool x = std::string(mirror) != "none", y = std::string(mirror) == "xy";
+    const double middle[3][5] = {{35, 13.5, 1, 10, 10}, {35, 13.5, 1, 10, 19}, {15, 26, 1, 10, 19}};  // x, y, z, layers
+    const double size[3][3] = {{2, 3, 6}, {2, 3, 6}, {4, 2, 8}};                                      // and mm2 or mm3
+    for (std::size_t i = 0; i < 3; ++i) {
+      SCOPED_TRACE(std::string(mirror) + " " + std::to_string(i));
+      const Json& place = page["places"][i];
+      for (std::size_t k = 0; k < 3; ++k) EXPECT_NEAR(place["mm"][k].get<double>(), middle[i][k], 0.101);
+      EXPECT_EQ(place["layers"], (Json{middle[i][3], middle[i][4]}));
+      EXPECT_NEAR(place["box_mm"][0].get<double>(), x ? 40 - middle[i][0] : middle[i][0], 0.101);
+      EXPECT_NEAR(place["box_mm"][1].get<double>(), y ? middle[i][1] : 60 - middle[i][1], 0.101);
+      EXPECT_NEAR(place["box_mm"][2].get<double>(), size[i][0], 0.101);
+      EXPECT_NEAR(place["box_mm"][3].get<double>(), size[i][1], 0.101);
+      EXPECT_NEAR(place["amount"].get<double>(), size[i][2], 0.05);
+    }
+  }
+}
+
+TEST_F(InspectedReports, TheManifestIsTheSameAndTheFileIsThatOfItsJob) {
+  planted();
+  ASSERT_EQ(lamina(job({"--inspect"})).code, 0);
+  const std::string manifest = read_text(directory_ / "out/manifest.json"),
+                    found = read_text(directory_ / "out/inspection.json");
+  EXPECT_EQ(lamina({"verify", "out"}).code, 0);
+  ASSERT_EQ(lamina(job({"--resume"})).code, 0);
+  EXPECT_EQ(read_text(directory_ / "out/inspection.json"), found) << "the same job";
+  ASSERT_EQ(lamina(job({"--overwrite"})).code, 0);
+  EXPECT_EQ(read_text(directory_ / "out/manifest.json"), manifest);
+  EXPECT_EQ(read_text(directory_ / "out/inspection.json"), found) << "its layers are the same, looked at or not";
+  EXPECT_FALSE(head()["places"].empty());
+  ASSERT_EQ(lamina(job({"--overwrite", "--layer", "0.2"})).code, 0);
+  EXPECT_FALSE(fs::exists(directory_ / "out/inspection.json")) << "another job";
+  EXPECT_TRUE(head()["places"].empty());
+  // A file of another job, or no file of lamina's form, tells nothing or is told.
+  write_text(directory_ / "out/inspection.json", found);
+  EXPECT_TRUE(head()["places"].empty());
+  ASSERT_EQ(lamina(job({"--overwrite", "--inspect"})).code, 0);
+  std::string other = read_text(directory_ / "out/inspection.json");
+  other.replace(other.find("\"islands\""), 9, "\"Islands\"");
+  write_text(directory_ / "out/inspection.json", other);
+  EXPECT_EQ(codes(head()["warnings"]).back(), "inspection");
+  for (const char* text : {"", "{", "{\"kind\":\"inspection\"}", "[1]"}) {
+    write_text(directory_ / "out/inspection.json", text);
+    EXPECT_TRUE(head()["places"].empty()) << text;
+  }
+  write_text(directory_ / "out/inspection.json", "notes of mine");
+  const Outcome refused = lamina(job({"--overwrite", "--inspect"}));
+  EXPECT_EQ(refused.code, 2);
+  EXPECT_NE(refused.err.find("out/inspection.json: is there already, and lamina did not write it"), std::string::npos)
+      << refused.err;
+  EXPECT_EQ(read_text(directory_ / "out/inspection.json"), "notes of mine");
+  ASSERT_EQ(lamina(job({"--overwrite"})).code, 0);
+  EXPECT_EQ(read_text(directory_ / "out/inspection.json"), "notes of mine");
+}
+
+// The hollow of 13 to 17 and 25 to 27 mm: 130 to 170 and, from the back, 330 to 350 pixels, with a frame around it.
+TEST_F(InspectedReports, InABrowserAButtonLeadsToTheFrameOfAPlace) {
+  planted();
+  ASSERT_EQ(lamina(job({"--inspect"})).code, 0);
+  ASSERT_EQ(lamina({"report", "out", "-o", "report.html", "--quiet"}).code, 0);
+  const std::string command =
+      "python3 '" + std::string(LAMINA_TEST_DIR) + "/report/browser.py' '" + directory_ / "report.html" + "' 0 2>/dev/null";
+  std::FILE* pipe = ::popen(command.c_str(), "r");
+  ASSERT_NE(pipe, nullptr);
+  std::string text;
+  std::array<char, 65536> piece{};
+  for (std::size_t got = 0; (got = std::fread(piece.data(), 1, piece.size(), pipe)) > 0;) text.append(piece.data(), got);
+  const int status = ::pclose(pipe);
+  if (WEXITSTATUS(status) == 77) GTEST_SKIP() << "NOT RUN: places in a browser; install Debian's chromium";
+  ASSERT_EQ(status, 0);
+  const Json said = Json::parse(text);
+  EXPECT_EQ(said["console"], Json::array());
+  ASSERT_EQ(said["places"].size(), 3u);
+  EXPECT_EQ(said["places"][2], "hollows of 8 mm³ at x 14.95, y 26.05, z 1 mm, layer 10 to 19");
+  EXPECT_EQ(said["steps"]["place"]["layer"], 10);
+  EXPECT_NEAR(said["steps"]["place"]["x"].get<double>(), 150, 1);
+  EXPECT_NEAR(said["steps"]["place"]["y"].get<double>(), 340, 1);
+  const Json& frame = said["frames"][2];
+  const double least[] = {120, 320, 170, 350}, most[] = {130, 330, 180, 360};
+  for (std::size_t side = 0; side < 4; ++side) {
+    EXPECT_GE(frame[side].get<double>(), least[side]) << side;
+    EXPECT_LE(frame[side].get<double>(), most[side]) << side;
+  }
+}
+
+// A thin wall is thin in all its layers, and one place.
+TEST_F(InspectedReports, AThinWallIsOnePlace) {
+  write_text(directory_ / "hollow.obj", boxes({{10, 10, 0, 20, 20, 3}, {19, 14, 0, 30, 14.4, 2}}, {}));
+  ASSERT_EQ(lamina(job({"--inspect", "--least-wall", "0.8"})).code, 0);
+  const Json places = head()["places"];
+  ASSERT_EQ(places.size(), 1u) << places.dump();
+  EXPECT_EQ(places[0]["code"], "thin");
+  EXPECT_EQ(places[0]["layers"], (Json{0, 19}));
+  EXPECT_NEAR(places[0]["mm"][0].get<double>(), 25, 0.5);
+}
+
+}  // namespace
+}  // namespace lamina::test
