@@ -25,26 +25,34 @@ DoseCheck::DoseCheck(const ManifestHead& head, const Machine* machine) : head_(h
 std::optional<DoseCheck::Wished> DoseCheck::wished(const Layer& layer) const {
   if (!job_) return std::nullopt;
   const DoseRequest& dose = job_->dose;
-  if (!dose.saturation_percent) return Wished{};  // a drop a pixel
+  if (!dose.saturation_percent) {
+    // Levels that are not dithered are drops to a head that fires several; else a full pixel gets one.
+    const bool drops = machine_ != nullptr && machine_->head.most_drops > 1 && head_.levels > 0 && !dose.dithered;
+    const double full = drops ? head_.levels - 1 : 1;
+    return Wished{full, full};
+  }
   if (machine_ == nullptr || machine_->head.drop_pl <= 0) return std::nullopt;
   const Nm plane = layer.plane();
-  double percent = *dose.saturation_percent;
-  std::optional<double> core = dose.core_saturation_percent;
+  Saturation percent = *dose.saturation_percent;
+  std::optional<Saturation> core = dose.core_saturation_percent;
   for (const SaturationRange& range : dose.saturation_ranges) {
     if (plane < nm_of(range.from_mm) || plane >= nm_of(range.to_mm)) continue;
     percent = range.percent;
     core = range.core_percent;
   }
-  std::vector<double> wishes{percent, core.value_or(percent)};
+  std::vector<Saturation> wishes{percent, core.value_or(percent)};
   for (const PartRequest& part : job_->parts) {
     if (!part.saturation_percent && !part.core_saturation_percent) continue;
-    const double own = part.saturation_percent.value_or(percent);
+    const Saturation own = part.saturation_percent.value_or(percent);
     wishes.insert(wishes.end(), {own, part.core_saturation_percent.value_or(own), core.value_or(own)});
   }
+  // What a formula asks for depends on where parts lie.
+  if (std::ranges::any_of(wishes, [](const Saturation& wish) { return !wish.formula.empty(); })) return std::nullopt;
   const double pixel_mm2 = 25.4 / head_.grid.x.dpi() * 25.4 / head_.grid.y.dpi();
   const double voids_pl = pixel_mm2 * mm(layer.thickness) * 1e6 * (1 - machine_->powder.packing);
   const double of_percent = voids_pl / 100 / (machine_->head.drop_pl * (1 - machine_->powder.evaporates_percent / 100));
-  return Wished{*std::ranges::min_element(wishes) * of_percent, *std::ranges::max_element(wishes) * of_percent};
+  const auto [least, most] = std::ranges::minmax_element(wishes, {}, &Saturation::percent);
+  return Wished{least->percent * of_percent, most->percent * of_percent};
 }
 
 double DoseCheck::most_pixels(const Layer& layer) const {
@@ -69,7 +77,7 @@ std::string DoseCheck::fault(const LayerRecord& record, const LayerPicture& pict
   if (record.half_far > record.half_differs) {
     return said(fmt::format("the manifest says {} of {} pixels whose voxels differ", record.half_far, record.half_differs));
   }
-  if (const std::uint64_t full = head_.full_level(); full > 0) {
+  if (const std::uint64_t full = head_.grey_drops() ? 0 : head_.full_level(); full > 0) {
     const std::uint64_t voxels = (2 * levels + full) / (2 * full);
     if (voxels == record.dosed_pixels) return {};
     return said(
@@ -88,8 +96,8 @@ std::string DoseCheck::fault_of_dosed(const LayerRecord& record, std::uint64_t s
   const double full = std::max(1u, head_.levels > 0 ? head_.levels - 1 : 1), least = static_cast<double>(set) / full - 0.5;
   const auto wish = wished(record.layer);
   if (head_.levels == 0 && wish) {
-    const double limit =
-        machine_ != nullptr && machine_->head.most_drop_sweeps > 0 ? machine_->head.most_drop_sweeps : kMostDropsOfPixel;
+    const double sweeps = machine_ != nullptr ? machine_->head.most_drop_sweeps : 0;
+    const double limit = sweeps > 0 ? std::min(sweeps * head_.sweep_drops, kMostDropsOfPixel) : kMostDropsOfPixel;
     const double jetted = std::min(wish->least, limit);
     if (jetted > (job_->dose.dithered ? 1 : 0.5) * (1 + kOfDrops) + kDropStep && record.dosed_pixels != set) {
       return fmt::format("each pixel gets a drop, and {} have one; the manifest says dosed_pixels {}", set,

@@ -110,10 +110,10 @@ Result<std::optional<program::FullLayer>> time_full_layer(const ResolvedMachine&
   std::fill(empty.row_offset.begin(), empty.row_offset.end(), 0u);
   const auto timed = [&](const Machine& machine, const Runs& of, std::uint32_t drops) -> Result<ProgramRecord> {
     const ResolvedMachine changed{machine, grid};
-    const PrintProgram program(changed, "", 1, {});
+    const PrintProgram written(changed, "", 1, {});
     ProgramWork work;
     ProgramRecord record;
-    const Status status = program.write_layer(layer, std::vector<RunsView>(drops, of.view()), {0}, work, record);
+    const Status status = written.write_layer(layer, std::vector<RunsView>(drops, of.view()), {0}, work, record);
     return status ? Result<ProgramRecord>(record) : Result<ProgramRecord>(status.error());
   };
   for (const CareCase& one : care_cases(resolved.machine)) {
