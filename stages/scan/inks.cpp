@@ -74,6 +74,7 @@ void measure_bars(const Photo& photo, const Chart& chart, const View& view, cons
   double& full = reading.full;
   for (const bool along : {true, false}) {
     const std::vector<BarSeen> bars = see_bars(photo, chart, view, lines, along);
+    if (along) reading.bars_seen = static_cast<std::uint32_t>(bars.size());
     std::vector<double> gains;
     for (const BarSeen& bar : bars) {
       // Full ink is what bars along the scan show, of which many nozzles have a part.

@@ -10,9 +10,11 @@
 namespace lamina::scan {
 namespace {
 
+constexpr double kFaintDash = 0.15;  // of full ink: the contrast of a dash that is blurred and looked at beside its middle
 constexpr double kRingShare = 1 - kRingHole * kRingHole;
 
-/// A view, and how much darker it finds the dashes' places than those between them.
+/// A view, and how many of the dashes' places it finds darker than those between them: 1 if all are, about 0 if any place is as
+/// good. What is darker than a dash counts as one, so that patches do not make up for dashes that are not there.
 struct Best {
   View view;
   double contrast = 0;
@@ -21,13 +23,15 @@ struct Best {
 double contrast_of(const Photo& photo, const Chart& chart, const View& view) {
   const std::size_t step = std::max<std::size_t>(1, chart.dashes.size() / 300);
   const double x = chart.scan_along_x ? 0 : chart.between_mm / 2, y = chart.scan_along_x ? chart.between_mm / 2 : 0;
+  const double usual = kFaintDash * photo.ink;
   double sum = 0;
   std::size_t count = 0;
   for (std::size_t d = 0; d < chart.dashes.size(); d += step, ++count) {
     const Spot m = middle_of(chart.dashes[d].box, chart);
     const Spot on = view.at(m.x, m.y), above = view.at(m.x - x, m.y - y), below = view.at(m.x + x, m.y + y);
-    sum += darkness_at(photo.darkness, on.x, on.y) -
-           0.5 * (darkness_at(photo.darkness, above.x, above.y) + darkness_at(photo.darkness, below.x, below.y));
+    const double darker = darkness_at(photo.darkness, on.x, on.y) -
+                          0.5 * (darkness_at(photo.darkness, above.x, above.y) + darkness_at(photo.darkness, below.x, below.y));
+    sum += std::clamp(darker / usual, -1.0, 1.0);
   }
   return count == 0 ? 0 : sum / static_cast<double>(count);
 }
@@ -170,8 +174,8 @@ Best search_fourth(const Photo& photo, const Chart& chart, Guess guess) {
 }  // namespace
 
 Result<View> find_marks(const Photo& photo, const Chart& chart) {
-  constexpr double kLeast = 0.05, kClear = 0.2, kLeastOfThree = 0.12;  // shares of full ink
-  constexpr double kFaintest = 0.04;                                   // darkness
+  constexpr double kLeastOfFour = 0.3, kClear = 0.8, kLeastOfThree = 0.65;  // shares of dashes
+  constexpr double kFaintest = 0.04;                                        // darkness
   constexpr std::size_t kMostGuesses = 60;
   if (photo.ink < kFaintest)
     return Error{Fault::kInput, "shows nothing dark: photograph the chart on a sheet that its ink darkens"};
@@ -183,17 +187,17 @@ Result<View> find_marks(const Photo& photo, const Chart& chart) {
       try_four(photo, chart, patches, best);
       add_patches(patches, all);
     }
-    if (best.contrast > kClear * photo.ink) return best.view;
+    if (best.contrast > kClear) return best.view;
   }
+  // Four marks tell which way the sheet lies; three discs alone may not.
+  if (best.contrast > kLeastOfFour) return best.view;
   std::vector<Guess> guesses = guesses_of(chart, all);
   if (guesses.size() > kMostGuesses) guesses.resize(kMostGuesses);
   Best three;
   for (const Guess& guess : guesses) {
     if (const Best found = search_fourth(photo, chart, guess); found.contrast > three.contrast) three = found;
-    if (three.contrast > kClear * photo.ink) break;
   }
-  if (three.contrast > kLeastOfThree * photo.ink && three.contrast > best.contrast) return three.view;
-  if (best.contrast > kLeast * photo.ink) return best.view;
+  if (three.contrast > kLeastOfThree) return three.view;
   return Error{Fault::kInput,
                "the chart is not found: three of its ring and discs have to be whole in the photograph, which is not mirrored, "
                "and sharp enough to tell its dashes apart"};

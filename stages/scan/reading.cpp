@@ -12,6 +12,7 @@ namespace lamina::scan {
 namespace {
 
 constexpr std::size_t kFewest = 30, kEnoughForLens = 200;  // dashes
+constexpr double kFaintBar = 0.3;                          // of full ink
 constexpr double kClosest = 4.5;                           // pixels from a dash to the one beside it
 
 std::uint32_t first_of(const std::vector<bool>& printed) {
@@ -58,6 +59,11 @@ Result<ChartReading> read_chart_photo(const Photo& photo, const Chart& chart) {
   reading.scatter_um = 1000 * reading.fit.scatter_pixels / reading.pixels_a_mm;
   reading.head = judge_head(chart, reading.dashes, printed, reading.fit, there >= kEnoughForLens);
   reading.inks = read_inks(photo, chart, reading.fit, reading.head);
+  if (reading.inks.bars_seen > 0 && reading.inks.full < kFaintBar * photo.ink)
+    return Error{
+        Fault::kInput,
+        "the chart is found, but its bars are not where they should be: photograph it with all four marks, and nothing "
+        "beside it"};
   reading.joints = read_joints(photo, chart, reading.fit, reading.head, reading.inks);
   return reading;
 }
