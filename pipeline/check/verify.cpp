@@ -74,6 +74,12 @@ std::string fault_of_program(const Inspection& inspection, const LayerRecord& re
       return fmt::format("{}: {} drops and {} off the bed, the manifest says {} and {}", name, replay->drops, replay->spat,
                          record.program.drops, record.program.spat);
     }
+    const auto& jets = inspection.machine->profile().head;  // further sweeps for blocked nozzles are over no place of their own
+    const bool counted = jets.most_drops > 1 && (jets.blocked.empty() || jets.blocked_rule != BlockedRule::kSecondPass);
+    if (same && counted && replay->added != record.program.added_sweeps) {
+      return fmt::format("{}: {} sweeps are there for the head's frequency, the manifest says {}", name, replay->added,
+                         record.program.added_sweeps);
+    }
     const std::int64_t told = record.program.microseconds;
     if (same && told > 0 && std::abs(replay->microseconds - told) > 1) {
       return fmt::format("{}: takes {:.6f} s, the manifest says {:.6f}", name, replay->seconds(),

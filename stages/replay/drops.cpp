@@ -38,6 +38,7 @@ void Printing::fire(std::uint32_t number, std::uint32_t drops) {
   }
   fires_row_[row] = 1;
   count.drops += drops;
+  sweep_most_ = std::max(sweep_most_, drops);
   count.most_at_place = std::max(count.most_at_place, drops);
   count.farthest_along_um = std::max(count.farthest_along_um, std::abs(nozzle.along_um));
   count.farthest_across_um = std::max(count.farthest_across_um, std::abs(nozzle.across_um));
@@ -54,6 +55,29 @@ std::uint64_t Printing::fired_more(std::uint32_t times, std::size_t word) const 
     same &= (times >> b & 1) != 0 ? fired : ~fired;
   }
   return more;
+}
+
+std::uint32_t Printing::sweeps_a_place() const {
+  const auto& head = profile().head;
+  const double hertz = profile().motion.scan_speed_mm_s * 1000 / machine_.place_um_;
+  const double fits = std::clamp(std::floor(head.highest_frequency_hz / hertz + 1e-9), 1.0, double(head.most_drops));
+  return static_cast<std::uint32_t>(std::ceil(planes_ / fits));
+}
+
+void Printing::leave_sweep() {
+  if (sweep_most_ == 0 || profile().head.most_drops < 2) return;
+  const std::uint32_t number = sweep_ / sweeps_a_place();
+  if (number != place_.number) leave_place();
+  place_.number = number;
+  ++place_.sweeps;
+  place_.drops += sweep_most_;
+  sweep_most_ = 0;
+}
+
+void Printing::leave_place() {
+  const std::uint32_t most = profile().head.most_drops;
+  count.added += place_.sweeps - (place_.drops + most - 1) / most;
+  place_ = {};
 }
 
 std::uint32_t Printing::drop_bits() const {

@@ -37,6 +37,7 @@ void Count::add(const Count& other) {
   drops += other.drops;
   vectors += other.vectors;
   sweeps += other.sweeps;
+  added += other.added;
   most_at_place = std::max(most_at_place, other.most_at_place);
   scan_mm += other.scan_mm;
   travel_mm += other.travel_mm;

@@ -50,6 +50,7 @@ void Printing::fault(std::string_view what) {
 }
 
 void Printing::begin_sweep(std::uint32_t number, bool backward) {
+  leave_sweep();
   if (sweeping_ && number <= sweep_ && !(sweeps_.empty())) {
     // Further sweeps for blocked nozzles have higher numbers than the regular ones that follow them.
     for (const Sweep& sweep : sweeps_) {
@@ -228,6 +229,8 @@ void Printing::check_cycle() {
 }
 
 const Count& Printing::finish() {
+  leave_sweep();
+  leave_place();
   const auto& powder = profile().powder;
   takes(powder.pause_s);
   const auto spread = [&](double height_mm) {

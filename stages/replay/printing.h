@@ -132,6 +132,10 @@ class Printing {
   std::uint64_t fired_more(std::uint32_t times, std::size_t word) const;
   void fail(std::string what);  // takes the complete message
   void wrong_cycle(std::string_view what);
+  // Of heads that fire several drops: sweeps follow each other over a place until its drops are fired.
+  std::uint32_t sweeps_a_place() const;
+  void leave_sweep();
+  void leave_place();
   /// Whether care was taken before this sweep, which has just ended. since_s  of the layer, behind it; below 0: not yet
   void check_care(std::string_view what, std::uint32_t every, double limit_s, double since_s);
   /// mm of powder below the layer, fed with it.
@@ -167,6 +171,10 @@ class Printing {
   std::uint32_t planes_, times_bits_;
   std::vector<std::uint64_t> fired_;     // how many times, for 64 pixels a word for each bit of it, the leftmost one in bit 0
   std::vector<std::uint8_t> fires_row_;  // whether anything is fired there
+  struct Place {
+    std::uint32_t number = 0, sweeps = 0, drops = 0;  // drops: of the pixel that gets most
+  } place_;
+  std::uint32_t sweep_most_ = 0;  // drops of a nozzle at a step of the sweep at hand
   std::vector<Sweep> sweeps_;
   bool based_ = false;                 // told a base
   std::uint32_t strokes_ = 0;          // of the roller to its far end

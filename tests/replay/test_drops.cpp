@@ -115,6 +115,8 @@ TEST_P(GreyDrops, AreReplayedDropForDrop) {
     EXPECT_EQ(same->drops, program.count.drops);
     EXPECT_EQ(same->sweeps, numbers.size());
     EXPECT_EQ(same->most_at_place, std::min(3u, allowed));
+    EXPECT_EQ(same->added, program.count.added);
+    EXPECT_EQ(same->added > 0, allowed < std::min(3u, most));
     EXPECT_FALSE(replay(resolved.machine, std::array<RunsView, 3>{views[0], views[1], views[1]}).ok());
     EXPECT_FALSE(replay(resolved.machine, std::span(views).first(2)).ok());
     const std::uint32_t fired = std::min(3u, allowed);

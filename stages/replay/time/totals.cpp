@@ -25,8 +25,9 @@ std::vector<std::string> totals_text(const Totals& totals) {
                                 readable_count(totals.moved), readable_count(totals.lost)));
   }
   if (count.most_at_place > 1) {
-    lines.push_back(fmt::format("at once   up to {} drops of a nozzle on a pixel in one sweep, within its frequency",
-                                count.most_at_place));
+    lines.push_back(
+        fmt::format("at once   up to {} drops of a nozzle on a pixel in one sweep, within its frequency", count.most_at_place) +
+        (count.added > 0 ? fmt::format(", which adds {} sweeps", readable_count(count.added)) : ""));
   }
   lines.push_back(
       fmt::format("places    drops land up to {:.2f} um along and {:.2f} um across the scan from the centre of their pixel",
@@ -57,6 +58,7 @@ nlohmann::ordered_json totals_json(const Totals& totals) {
           {"vectors", count.vectors},
           {"sweeps", count.sweeps},
           {"drops_at_once", count.most_at_place},
+          {"added_sweeps", count.added},
           {"moved", totals.moved},
           {"lost", totals.lost},
           {"coverage", totals.coverage},

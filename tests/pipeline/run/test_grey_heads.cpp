@@ -91,6 +91,13 @@ TEST_F(GreyHeads, FireWhatTheirFrequencyAllowsAndTellWhatThatAdds) {
   EXPECT_EQ(records[0].program.added_sweeps, 1u);
   EXPECT_EQ(records[0].program.drops, 5u * 600);
   done("verify out --quiet");
+  std::string text = test::read_text(folder_ / "out/manifest.json");
+  test::write_text(folder_ / "kept.json", text);
+  text.replace(text.find("\"added_sweeps\": 1"), 17, "\"added_sweeps\": 0");
+  test::write_text(folder_ / "out/manifest.json", text);
+  EXPECT_NE(lamina("verify out --quiet").err.find("1 sweeps are there for the head's frequency, the manifest says 0"),
+            std::string::npos);
+  test::write_text(folder_ / "out/manifest.json", test::read_text(folder_ / "kept.json"));
   // At half of the speed all of them fit, as the line says.
   const auto slow = facts(kBox + std::string("--scan-speed 5 -o slow"));
   EXPECT_EQ(slow["jetting"]["added_sweeps"], 0);
