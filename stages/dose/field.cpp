@@ -97,6 +97,7 @@ Drops24 Field::evaluate(std::uint32_t column) {
 
 void Field::blame(double value, bool binds) {
   if (fault_) return;
+  if (std::isnan(value)) value = std::abs(value);  // written without a sign
   const std::string where = fmt::format("{} '{}': is {:.6g} % in layer {} at x {:.3f}, y {:.3f}, z {:.3f} mm", key_,
                                         formula_->text(), value, sheet_->layer.index, place_[0], place_[1], place_[2]);
   if (binds) {

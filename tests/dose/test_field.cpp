@@ -121,7 +121,7 @@ TEST(Field, ConstantOneIsTheNumber) {
     DitherScratch scratch;
     Levels plain;
     dither(image, table, 7, scratch, plain);
-    for (const std::string formula : {number, number + "+0*x*y"}) {
+    for (const std::string& formula : {number, number + "+0*x*y"}) {
       const Poured of = poured(sheet_of(7), image, formula);
       EXPECT_TRUE(std::ranges::equal(of.drops.change, plain.change) && std::ranges::equal(of.drops.level, plain.level));
       EXPECT_TRUE(std::ranges::equal(of.levels.change, image.change));
@@ -217,7 +217,6 @@ TEST(Pour, PartsThatShareAVoxelAddUp) {
   const Levels left = levels_where([](double x, double) { return x < 9; }, 10),
                right = levels_where([](double x, double) { return x > 7; }, 5),
                core = levels_where([](double x, double) { return x > 4 && x < 6; }, 25);
-  const Levels one = levels_where([](double, double) { return true; }, 15);
   PourScratch scratch;
   Levels drops, levels;
   const Drops24 ask = 3 * kOneDrop / 2;
@@ -234,8 +233,8 @@ TEST(Pour, PartsThatShareAVoxelAddUp) {
   const Dosed inside{core, {ask}, {4 * kOneDrop}};
   ASSERT_TRUE(pour({&inside, 1}, 15, sheet, scratch, drops, levels).ok());
   EXPECT_NEAR(static_cast<double>(sum_of_levels(drops)), 200 * 20 * 4 * 10 / 15.0, 40);
-  const std::array halves{Dosed{left, {ask}, {ask}},
-                          Dosed{levels_where([](double x, double) { return x > 9; }, 10), {ask}, {ask}}};
+  const Levels rest = levels_where([](double x, double) { return x > 9; }, 10);
+  const std::array halves{Dosed{left, {ask}, {ask}}, Dosed{rest, {ask}, {ask}}};
   Levels whole_drops, whole;
   const Levels all = levels_where([](double, double) { return true; }, 10);
   const Dosed together{all, {ask}, {ask}};
