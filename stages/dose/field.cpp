@@ -166,7 +166,10 @@ void FieldSurvey::look(const ZoneBox& box, Nm plane, std::uint64_t most, FieldRa
     for (std::uint64_t i = 0; i < samples[0]; ++i) {
       at[0] = mm(nth(0, i) - (own_ ? box.origin[0] : 0));
       const Result<double> value = formula_(at);
-      if (!value || !is_percent(*value)) continue;
+      if (!value || !is_percent(*value)) {
+        found.each = false;
+        continue;
+      }
       found.least = found.any ? std::min(found.least, *value) : *value;
       found.most = found.any ? std::max(found.most, *value) : *value;
       found.any = true;
