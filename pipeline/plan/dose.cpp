@@ -125,7 +125,10 @@ Result<dose::ZoneSums> DosePlan::saturate_laid(const Layer& layer, std::uint32_t
       }
       dose::Field& field = work.fields[2 * zone + inside];
       const bool own = wishes_->is_own(zone);
-      const std::string_view key = own ? "part.saturation_percent" : "--saturation";
+      const bool core = inside == 1 && wish.core_percent;
+      const std::string_view key = own    ? core ? "part.core_saturation_percent" : "part.saturation_percent"
+                                   : core ? "--core-saturation"
+                                          : "--saturation";
       Status status = field.start(percent.formula, key, sheet,
                                   own ? std::span<const dose::ZoneBox>(copies_[zone]) : std::span<const dose::ZoneBox>());
       if (!status) return status.error();

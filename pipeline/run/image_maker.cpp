@@ -47,6 +47,7 @@ class ImageMaker : public Maker {
 
   Result<std::vector<std::uint32_t>> open() override {
     if (Status status = refuse_mixed_powders(plan_, imager_); !status) return status.error();
+    if (Status status = refuse_faulty_formulas(plan_, imager_); !status) return status.error();
     auto refills = plan_refills(plan_, imager_);
     if (!refills) return refills.error();
     files_.pause_before(refills_ = std::move(*refills));

@@ -89,7 +89,7 @@ class LayerImager {
   void mirror(Runs& image, Runs& scratch) const;
   Status check_grown(const Layer& layer, const ImageWork& work) const;
   std::uint64_t least_vanished() const;
-  bool shares_voxels() const;  // of several solids
+  bool shares_voxels() const;  // of several materials or doses
   void share_out(const Layer& layer, ImageWork& work) const;
   static void split_materials(ImageWork& work);
   static void empty_removed(const Runs& before, bool laid, ImageWork& work);

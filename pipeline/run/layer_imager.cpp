@@ -148,7 +148,9 @@ Status LayerImager::beads(const Layer& layer, ImageWork& work, ImageNotes& notes
   return {};
 }
 
-bool LayerImager::shares_voxels() const { return plan_.job.levels > 0 && plan_.images->solids.all().size() > 1; }
+bool LayerImager::shares_voxels() const {
+  return plan_.job.levels > 0 && (plan_.images->materials.several() || plan_.images->dose.zones().several());
+}
 
 cover::LayerReport LayerImager::levels(const Layer& layer, cover::LayerScratch& scratch, Levels& image) const {
   const Solid& solid = plan_.images->solids.all().front();

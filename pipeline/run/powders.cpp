@@ -5,6 +5,7 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <atomic>
 
 #include "pipeline/plan/heights.h"
 #include "stages/program/vats.h"
@@ -91,6 +92,24 @@ Status refuse_mixed_powders(const Plan& plan, const LayerImager& imager) {
     }
   }
   return {};
+}
+
+Status refuse_faulty_formulas(const Plan& plan, const LayerImager& imager) {
+  const auto& budget = plan.images->dose.budget();
+  if (!budget || !budget->in_doubt(plan.job.allow_unbound)) return {};
+  tbb::enumerable_thread_specific<ImageWork> works;
+  std::atomic<std::uint32_t> lowest{UINT32_MAX};
+  const auto look = [&](std::uint32_t i, ImageWork& work) {
+    LayerRecord record;
+    ImageNotes notes;
+    return imager.make(plan.layer(i), work, record, notes);
+  };
+  tbb::parallel_for(plan.range[0], plan.range[1], [&](std::uint32_t i) {
+    if (i > lowest || look(i, works.local())) return;
+    for (std::uint32_t known = lowest; i < known && !lowest.compare_exchange_weak(known, i);) {
+    }
+  });
+  return lowest == UINT32_MAX ? Status() : look(lowest, works.local());
 }
 
 Result<std::vector<std::uint32_t>> plan_refills(const Plan& plan, const LayerImager& imager) {

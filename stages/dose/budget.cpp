@@ -125,6 +125,7 @@ void Budget::look_at_field(const Layer& layer, std::uint32_t zone, bool core) {
     FieldSurvey* survey = survey_of(percent.formula, place, zone);
     if (survey != nullptr) range = survey->in(layer);
   }
+  no_number_ |= !range.each;
   if (!range.any) return;  // where it meets a part it is told
   const DropScale scale(binder_, grid_, layer.thickness);
   const auto of = [&](double asked) {

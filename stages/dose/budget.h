@@ -66,6 +66,8 @@ class Budget {
   const PixelGrid& grid() const { return grid_; }
   const Jetting& jetting() const { return jetting_; }
   bool has_wish() const { return wishes_.has_value(); }
+  /// Whether somewhere in the boxes of parts a formula is no number of per cent, or gives less than binds.
+  bool in_doubt(bool allow_unbound) const { return no_number_ || (!allow_unbound && !thin_.where.empty()); }
   /// Least and most per cent that the layers get.
   std::pair<double, double> gets() const { return gets_; }
 
@@ -93,6 +95,7 @@ class Budget {
   std::uint32_t layers_ = 1;
   std::map<std::pair<std::string, std::uint32_t>, FieldSurvey> surveys_;  // by formula and zone
   std::optional<Error> no_formula_;
+  bool no_number_ = false;
 };
 
 /// Counts what layers got.

@@ -97,6 +97,7 @@ Drops24 Field::evaluate(std::uint32_t column) {
 
 void Field::blame(double value, bool binds) {
   if (fault_) return;
+  if (std::isnan(value)) value = std::abs(value);  // written without a sign
   const std::string where = fmt::format("{} '{}': is {:.6g} % in layer {} at x {:.3f}, y {:.3f}, z {:.3f} mm", key_,
                                         formula_->text(), value, sheet_->layer.index, place_[0], place_[1], place_[2]);
   if (binds) {
@@ -165,7 +166,10 @@ void FieldSurvey::look(const ZoneBox& box, Nm plane, std::uint64_t most, FieldRa
     for (std::uint64_t i = 0; i < samples[0]; ++i) {
       at[0] = mm(nth(0, i) - (own_ ? box.origin[0] : 0));
       const Result<double> value = formula_(at);
-      if (!value || !is_percent(*value)) continue;
+      if (!value || !is_percent(*value)) {
+        found.each = false;
+        continue;
+      }
       found.least = found.any ? std::min(found.least, *value) : *value;
       found.most = found.any ? std::max(found.most, *value) : *value;
       found.any = true;

@@ -95,6 +95,7 @@ class Field {
 struct FieldRange {
   double least = 0, most = 0;
   bool any = false;  // else no sample has a number of 0 to kMostPercent
+  bool each = true;  // all of them have
 };
 class FieldSurvey {
  public:

@@ -12,6 +12,9 @@
 #include "stages/dose/field.h"
 #include "stages/dose/layer_drops.h"
 #include "stages/dose/pour.h"
+#include "stages/dose/shares.h"
+#include "stages/dose/stretches.h"
+#include "tests/program/machines.h"
 
 namespace lamina::dose {
 namespace {
@@ -121,7 +124,7 @@ TEST(Field, ConstantOneIsTheNumber) {
     DitherScratch scratch;
     Levels plain;
     dither(image, table, 7, scratch, plain);
-    for (const std::string formula : {number, number + "+0*x*y"}) {
+    for (const std::string& formula : {number, number + "+0*x*y"}) {
       const Poured of = poured(sheet_of(7), image, formula);
       EXPECT_TRUE(std::ranges::equal(of.drops.change, plain.change) && std::ranges::equal(of.drops.level, plain.level));
       EXPECT_TRUE(std::ranges::equal(of.levels.change, image.change));
@@ -217,7 +220,6 @@ TEST(Pour, PartsThatShareAVoxelAddUp) {
   const Levels left = levels_where([](double x, double) { return x < 9; }, 10),
                right = levels_where([](double x, double) { return x > 7; }, 5),
                core = levels_where([](double x, double) { return x > 4 && x < 6; }, 25);
-  const Levels one = levels_where([](double, double) { return true; }, 15);
   PourScratch scratch;
   Levels drops, levels;
   const Drops24 ask = 3 * kOneDrop / 2;
@@ -234,14 +236,83 @@ TEST(Pour, PartsThatShareAVoxelAddUp) {
   const Dosed inside{core, {ask}, {4 * kOneDrop}};
   ASSERT_TRUE(pour({&inside, 1}, 15, sheet, scratch, drops, levels).ok());
   EXPECT_NEAR(static_cast<double>(sum_of_levels(drops)), 200 * 20 * 4 * 10 / 15.0, 40);
-  const std::array halves{Dosed{left, {ask}, {ask}},
-                          Dosed{levels_where([](double x, double) { return x > 9; }, 10), {ask}, {ask}}};
+  const Levels rest = levels_where([](double x, double) { return x > 9; }, 10);
+  const std::array halves{Dosed{left, {ask}, {ask}}, Dosed{rest, {ask}, {ask}}};
   Levels whole_drops, whole;
   const Levels all = levels_where([](double, double) { return true; }, 10);
   const Dosed together{all, {ask}, {ask}};
   ASSERT_TRUE(pour(halves, 15, sheet, scratch, drops, levels).ok());
   ASSERT_TRUE(pour({&together, 1}, 15, sheet, scratch, whole_drops, whole).ok());
   EXPECT_TRUE(std::ranges::equal(drops.change, whole_drops.change) && std::ranges::equal(drops.level, whole_drops.level));
+}
+
+std::vector<int> pixels_of(const LevelsView& levels) {
+  std::vector<int> pixels(std::size_t{levels.columns} * levels.rows(), 0);
+  for (std::uint32_t r = 0; r < levels.rows(); ++r) {
+    for (std::uint32_t i = levels.row_offset[r]; i < levels.row_offset[r + 1]; ++i) {
+      for (std::uint32_t c = levels.change[2 * i]; c < levels.change[2 * i + 1]; ++c)
+        pixels[std::size_t{r} * levels.columns + c] = levels.level[i];
+    }
+  }
+  return pixels;
+}
+
+// Pixel by pixel: the last part keeps its level, each one before it what is left.
+TEST(ShareOut, NoVoxelIsFilledTwice) {
+  program::testing::Random random(11);
+  constexpr std::uint32_t kColumns = 37, kRows = 60, kParts = 4;
+  std::vector<Levels> parts(kParts);
+  std::vector<std::vector<int>> before;
+  for (Levels& part : parts) {
+    part.start(kColumns);
+    for (std::uint32_t r = 0; r < kRows; ++r) {
+      for (std::uint32_t at = random() % 9; at < kColumns && r % 5 > 0; at += random() % 3) {
+        const std::uint32_t stop = std::min(kColumns, at + 1 + random() % 6);
+        part.append(at, stop, static_cast<std::uint8_t>(random() % 16));
+        at = stop;
+      }
+      part.end_row();
+    }
+    before.push_back(pixels_of(part));
+  }
+  std::vector<Levels*> pointers;
+  for (Levels& part : parts) pointers.push_back(&part);
+  ShareOut out;
+  Levels total;
+  share_out(pointers, 15, out, total);
+  const std::vector<int> sum = pixels_of(total);
+  std::vector<std::vector<int>> after, owner;
+  for (std::uint32_t i = 0; i < kParts; ++i) {
+    after.push_back(pixels_of(parts[i]));
+    Levels owned;
+    levels_of(out.owner[i], 1, owned);
+    owner.push_back(pixels_of(owned));
+  }
+  for (std::size_t p = 0; p < sum.size(); ++p) {
+    int left = 15, most = 0, whose = -1;
+    for (int i = kParts - 1; i >= 0; --i) {
+      const int own = std::min(left, before[i][p]);
+      ASSERT_EQ(after[i][p], own) << p;
+      left -= own;
+      if (own > most) most = own, whose = i;
+    }
+    ASSERT_EQ(sum[p], 15 - left) << p;
+    for (int i = 0; i < static_cast<int>(kParts); ++i) ASSERT_EQ(owner[i][p], 15 - left >= 8 && i == whose ? 1 : 0) << p;
+  }
+}
+
+TEST(Covered, CountsTheBoxesThatALayerMeets) {
+  const std::array boxes{ZoneBox{0, {1'000'000, 1'000'000, 0}, {3'000'000, 4'000'000, 300'000}},
+                         ZoneBox{1, {9'000'000, 1'000'000, 200'000}, {11'000'000, 4'000'000, 900'000}}};
+  const Covered covered(boxes, kBed);
+  const std::uint64_t one = 22 * 32;  // 20 by 30 pixels, and those that its sides cut
+  EXPECT_EQ(covered.pixels(0, 100'000), one);
+  EXPECT_EQ(covered.pixels(200'000, 300'000), 2 * one);
+  EXPECT_EQ(covered.pixels(400'000, 500'000), one);
+  EXPECT_EQ(covered.pixels(1'000'000, 1'100'000), 0u);
+  const std::array bed(std::to_array(
+      {ZoneBox{0, {0, 0, 0}, {20'000'000, 20'000'000, 100'000}}, ZoneBox{0, {0, 0, 0}, {20'000'000, 20'000'000, 100'000}}}));
+  EXPECT_EQ(Covered(bed, kBed).pixels(0, 50'000), 40'000u);
 }
 
 TEST(Budget, ForeseesFormulasInTheBoxesOfParts) {

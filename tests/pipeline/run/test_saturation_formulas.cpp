@@ -131,10 +131,10 @@ TEST_F(FormulaJobs, ThatGiveNoNumberOrDoNotBindAreRefused) {
   test::expect_refused(job + "60/(z-z)", 2, "is inf % in layer 0", folder_);
   const std::string shipped = test::read_text(LAMINA_TEST_DIR "/../stages/write/machines/nuferbj.toml");
   test::write_text(folder_ / "binds.toml", shipped + "least_saturation_percent = 30\n");
-  const std::string binds = "jet box.stl --machine binds.toml --at 10,10 --layer 0.1 --quiet -o out --saturation ";
-  test::expect_refused(binds + "2*x", 2, "binds from 30 % on", folder_);
-  done(binds + "4*x");
-  done(binds + "2*x --allow-unbound --overwrite");
+  const std::string binds = "jet box.stl --machine binds.toml --at 40,40 --layer 0.1 --quiet -o out --saturation ";
+  test::expect_refused(binds + "x-15", 2, "binds from 30 % on", folder_);
+  done(binds + "x-9");
+  done(binds + "x-15 --allow-unbound --overwrite");
 }
 
 // A column of voxels is half of one powder and half of the other: the later one has 8 of 15, the earlier one what is left.
@@ -214,6 +214,7 @@ TEST_F(FormulaJobs, EvenOddLooksAtPartsOfAllDoses) {
   facts_of(plain);
   EXPECT_TRUE(alike(image(zones, "000001.tif"), image(plain, "000001.tif")));
   zones.levels = 4;
+  zones.output = folder_ / "levels";
   const auto refused = run_job(zones);
   ASSERT_FALSE(refused.ok());
   EXPECT_NE(refused.error().message.find("shares of voxels; choose nonzero"), std::string::npos) << refused.error().message;
