@@ -65,9 +65,13 @@ Status check_all_filled(const std::string& folder, const Manifest& manifest) {
       thinned  ? fmt::format("{:.4g} % of the pixels of its cores get no drop (--core)", 100 * (1 - job.dose.core))
       : shares ? "shares of voxels are drops here and there (--levels)"
                : fmt::format("{} of {} pixels that are to be filled get no drop (--saturation)", without, filled);
-  return Error{Fault::kInput, fmt::format("{}: {}, which is no pore; plan the job again without that, or name {}/layers with "
-                                          "--pixel, --layer-um and --dark to take its pixels as they are",
-                                          one_line(folder), what, one_line(folder))};
+  const std::string as_they_are =
+      head.named_images() > 0
+          ? ""
+          : fmt::format(", or name {}/layers with --pixel, --layer-um and --dark to take its pixels as they are",
+                        one_line(folder));
+  return Error{Fault::kInput,
+               fmt::format("{}: {}, which is no pore; plan the job again without that{}", one_line(folder), what, as_they_are)};
 }
 
 /// The solid of a layer: of shares of voxels those that are half full or more.
