@@ -11,9 +11,12 @@
 namespace lamina::pipeline {
 namespace {
 
-// Drops a pixel are rounded to 2^-24, drops and shares to millionths.
-constexpr double kOfDrops = 2e-6, kDropStep = 1.2e-7;
+// Drops a pixel are rounded to 2^-24.
+constexpr double kOfDrops = 1e-12, kDropStep = 3e-8;
 constexpr double kMostDropsOfPixel = 64;
+
+/// As shares and drops are taken.
+double in_millionths(double value) { return static_cast<double>(std::llround(value * 1e6)) * 1e-6; }
 
 }  // namespace
 
@@ -48,11 +51,13 @@ std::optional<DoseCheck::Wished> DoseCheck::wished(const Layer& layer) const {
   }
   // What a formula asks for depends on where parts lie.
   if (std::ranges::any_of(wishes, [](const Saturation& wish) { return !wish.formula.empty(); })) return std::nullopt;
+  const auto& powder = machine_->powder;
   const double pixel_mm2 = 25.4 / head_.grid.x.dpi() * 25.4 / head_.grid.y.dpi();
-  const double voids_pl = pixel_mm2 * mm(layer.thickness) * 1e6 * (1 - machine_->powder.packing);
-  const double of_percent = voids_pl / 100 / (machine_->head.drop_pl * (1 - machine_->powder.evaporates_percent / 100));
+  const double voids_pl = pixel_mm2 * mm(layer.thickness) * 1e6 * (1 - in_millionths(powder.packing));
+  const double stays_pl = in_millionths(machine_->head.drop_pl) * (1 - in_millionths(powder.evaporates_percent / 100));
+  const auto drops = [&](double wish) { return in_millionths(wish / 100) * voids_pl / stays_pl; };
   const auto [least, most] = std::ranges::minmax_element(wishes, {}, &Saturation::percent);
-  return Wished{least->percent * of_percent, most->percent * of_percent};
+  return Wished{drops(least->percent), drops(most->percent)};
 }
 
 double DoseCheck::most_pixels(const Layer& layer) const {
@@ -117,8 +122,8 @@ std::string DoseCheck::fault_of_wish(const LayerRecord& record) const {
   const auto dosed = static_cast<double>(record.dosed_pixels), asked = static_cast<double>(record.asked_drops);
   // Both numbers are rounded, that of voxels too where they are shares.
   const double apart = head_.levels > 0 ? 0.5 : 0;
-  const double least = std::max(0.0, dosed - apart) * std::max(0.0, wish->least * (1 - kOfDrops) - kDropStep) - 0.51;
-  const double most = (dosed + apart) * (wish->most * (1 + kOfDrops) + kDropStep) + 0.51;
+  const double least = std::max(0.0, dosed - apart) * std::max(0.0, wish->least * (1 - kOfDrops) - kDropStep) - 0.5001;
+  const double most = (dosed + apart) * (wish->most * (1 + kOfDrops) + kDropStep) + 0.5001;
   if (asked >= least && asked <= most) return {};
   const std::string drops =
       wish->least == wish->most ? fmt::format("{:.6g}", wish->least) : fmt::format("{:.6g} to {:.6g}", wish->least, wish->most);

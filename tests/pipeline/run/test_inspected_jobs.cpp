@@ -172,7 +172,7 @@ TEST_F(InspectedJobs, EachFaultOfPowderBinderAndHeadIsToldOrRefused) {
       {"shots over the bed", "[care]\nspit_layers = 1\nspit_mm = [65, 12]\n", block, 2, "nozzles are over the bed"},
       {"a wall that the bleed eats, of a part that it leaves", "", rib + " --bleed 300", 0, "vanished"},
       {"the same wall, and a bleed that leaves it", "", rib + " --bleed 150", 0, ""},
-      {"edges that grow beyond the bed", "", plate + " --bleed -4000", 2, "outside of the bed"},
+      {"edges that grow beyond the bed", "", plate + " --bleed -4000 --dry-run", 2, "outside of the bed"},
       {"shots without a place", "[care]\nspit_layers = 1\n", block, 2, "care.spit_mm: is missing"},
       {"a place to fire, and no shot", "[care]\nspit_mm = [-40, 5]\n", block, 0, "care"},
       {"wiping that never comes", "[care]\nwipe_mm = [-40, 20, -40, 60]\n", block, 0, "care"},
