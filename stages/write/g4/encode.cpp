@@ -5,6 +5,7 @@
 #endif
 
 #include <algorithm>
+#include <array>
 #include <cstring>
 #include <span>
 #include <utility>
@@ -118,6 +119,11 @@ inline std::uint32_t put_in_step(BitWriter& writer, const std::uint32_t* a, cons
   return done;
 }
 
+/// Changes that go the way of all rows between two looks at whether eight keep step: the least, and after looks in vain.
+constexpr std::uint32_t kLeastBetween = 4, kMostBetween = 64;
+constexpr std::array<Code, 8> kVerticalOrPass = {kVertical[0], kVertical[1], kVertical[2], kVertical[3],
+                                                 kVertical[4], kVertical[5], kVertical[6], kPass};
+
 /// One row from its change number `done` on; `a` and `b` point to the first changes of the row and of the one above, in scratch
 /// rows. Those before are coded, and b[done] is b1 then.
 /// Names as in T.6: a0 is where coding stands, a[0] is a1, b[0] is b1. a and b move in step, so that both are at
@@ -127,36 +133,38 @@ BitWriter put_row(BitWriter writer, const std::uint32_t* a, const std::uint32_t*
   const std::uint32_t* const a_start = a;
   a += done;
   b += done;
-  std::uint32_t a0 = a[-1];
+  std::uint32_t a0 = a[-1], between = kLeastBetween;
   for (;;) {
     const std::uint32_t in_step = put_in_step(writer, a, b, columns);
     a += in_step;
     b += in_step;
     if (in_step != 0) a0 = a[-1];
-    // The way of all rows: it ends a row, and takes a few changes where four do not keep step.
-    for (const std::uint32_t* const a_enough = a + 4; a < a_enough;) {
-      const std::uint32_t a1 = *a;
-      const std::uint32_t shift = a1 - *b + 3;
-      if (b[1] < a1) {
-        writer.put(kPass);
-        a0 = b[1];
-        b += 2;  // beyond a0, as changes above rise
+    between = in_step >= 8 ? kLeastBetween : std::min(2 * between, kMostBetween);
+    // The way of all rows: it ends a row, and takes a few changes where four do not keep step. Whether one is passed over or
+    // coded, and which is the next b1, is chosen without a branch: rows of dithered images are too irregular to foresee it.
+    for (const std::uint32_t* const a_enough = a + between; a < a_enough;) {
+      const std::uint32_t a1 = *a, b2 = b[1], shift = a1 - *b + 3;
+      std::uint32_t passes = b2 < a1 ? 1 : 0;
+#if defined(__GNUC__)
+      asm("" : "+r"(passes));  // or compilers branch on it again
+#endif
+      if ((shift > 6) > passes) {
+        const std::uint32_t a2 = a[1];
+        put_horizontal(writer, static_cast<unsigned>(a - a_start) & 1, a1 - a0, a2 - a1);
+        if (a2 == columns) return writer;
+        a += 2;
+        a0 = a2;
+        while (*b <= a0) b += 2;
         continue;
       }
-      if (shift <= 6) {
-        writer.put(kVertical[shift]);
-        if (a1 == columns) return writer;
-        ++a;
-        b += b[-1] > a1 ? -1 : b[1] > a1 ? 1 : 3;
-        a0 = a1;
-        continue;
-      }
-      const std::uint32_t a2 = a[1];
-      put_horizontal(writer, static_cast<unsigned>(a - a_start) & 1, a1 - a0, a2 - a1);
-      if (a2 == columns) return writer;
-      a += 2;
-      a0 = a2;
-      while (*b <= a0) b += 2;
+      writer.put(kVerticalOrPass[(shift | (0 - passes)) & 7]);
+      if (a1 == columns && passes == 0) return writer;
+      // The next b1: beyond a0, as changes above rise. It is the next change, or if the one before lies beyond a1 that one, or
+      // if the next does not the third; two on after a pass.
+      const int beyond = (b[-1] > a1 ? 1 : 0) + (b2 > a1 ? 1 : 0);
+      b += 3 - 2 * beyond - static_cast<int>(passes);
+      a += 1 - passes;
+      a0 = std::min(a1, b2);
     }
   }
 }

@@ -41,7 +41,11 @@ inline void put_run(BitWriter& writer, const RunCodes& codes, std::uint32_t run)
 /// `first` in the colour `black`, then `second` in the other.
 inline void put_horizontal(BitWriter& writer, unsigned black, std::uint32_t first, std::uint32_t second) {
   const RunCodes &codes = kRunCodes[black], &other = kRunCodes[black ^ 1];
-  if ((first | second) < kLongestMakeUp) [[likely]] {
+  if ((first | second) < 64) [[likely]] {
+    const Code one = codes.terminating[first], two = other.terminating[second];
+    const std::uint64_t bits = (std::uint64_t{kHorizontal.bits()} << one.length() | one.bits()) << two.length() | two.bits();
+    writer.put(bits, kHorizontal.length() + one.length() + two.length());
+  } else if ((first | second) < kLongestMakeUp) {
     const RunWord one = run_word(codes, first), two = run_word(other, second);
     const std::uint64_t bits = (std::uint64_t{kHorizontal.bits()} << one.length | one.bits) << two.length | two.bits;
     writer.put(bits, kHorizontal.length() + one.length + two.length);
