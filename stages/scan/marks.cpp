@@ -68,6 +68,35 @@ bool view_of_marks(const Photo& photo, const Chart& chart, const Patch& ring, st
   return true;
 }
 
+/// The marks without a lens of this strength, about the middle of the photograph.
+std::array<Spot, 4> without_lens(const Photo& photo, const std::array<Spot, 4>& pixels, double lens) {
+  const Spot m{(photo.grey.cols - 1) / 2.0, (photo.grey.rows - 1) / 2.0};
+  const double radius = std::hypot(photo.grey.cols, photo.grey.rows) / 2;
+  std::array<Spot, 4> flat = pixels;
+  for (std::size_t i = 0; i < 4; ++i) {
+    for (int round = 0; round < 4; ++round) {
+      const double x = flat[i].x - m.x, y = flat[i].y - m.y, grown = 1 + lens * (x * x + y * y) / (radius * radius);
+      flat[i] = {m.x + (pixels[i].x - m.x) / grown, m.y + (pixels[i].y - m.y) / grown};
+    }
+  }
+  return flat;
+}
+
+/// Takes a view of four marks, or the same through one of some lenses, if it is better.
+void try_lenses(const Photo& photo, const Chart& chart, const View& view, Best& best) {
+  std::array<Spot, 4> pixels;
+  for (std::size_t i = 0; i < 4; ++i) {
+    const Spot place = middle_of(chart.marks[i], chart);
+    pixels[i] = view.at(place.x, place.y);
+  }
+  for (const double lens : {0.0, -0.005, 0.005, -0.01, 0.01}) {
+    View through;
+    if (!view_of_corners(photo, chart, without_lens(photo, pixels, lens), through)) continue;
+    through.lens = lens;
+    if (const double got = contrast_of(photo, chart, through); got > best.contrast) best = {through, got};
+  }
+}
+
 void try_four(const Photo& photo, const Chart& chart, const Patches& patches, Best& best) {
   const std::vector<Patch>& discs = patches.discs;
   View view;
@@ -76,7 +105,7 @@ void try_four(const Photo& photo, const Chart& chart, const Patches& patches, Be
       for (std::size_t j = i + 1; j < discs.size(); ++j) {
         for (std::size_t k = j + 1; k < discs.size(); ++k) {
           if (!view_of_marks(photo, chart, ring, {discs[i], discs[j], discs[k]}, view)) continue;
-          if (const double got = contrast_of(photo, chart, view); got > best.contrast) best = {view, got};
+          try_lenses(photo, chart, view, best);
         }
       }
     }

@@ -32,8 +32,10 @@ std::vector<Moments> moments_of(const cv::Mat& labels, const cv::Mat& middles, c
   return moments;
 }
 
-void keep_largest(std::vector<Patch>& patches, std::size_t most) {
-  std::ranges::stable_sort(patches, [](const Patch& a, const Patch& b) { return a.area > b.area; });
+/// Large ones of the right shape: squares, of 0.955, come after discs.
+void keep_likely(std::vector<Patch>& patches, std::size_t most, double fullness) {
+  const auto likely = [&](const Patch& p) { return p.area * std::exp(-std::abs(p.fullness - fullness) / 0.02); };
+  std::ranges::stable_sort(patches, [&](const Patch& a, const Patch& b) { return likely(a) > likely(b); });
   if (patches.size() > most) patches.resize(most);
 }
 
@@ -75,8 +77,8 @@ Patches find_patches(const Photo& photo, double level, int close) {
     if (!hollow && patch.fullness > 0.9 && patch.fullness < 1.1) patches.discs.push_back(patch);
     if (hollow && patch.fullness > 0.4 && patch.fullness < 0.8) patches.rings.push_back(patch);
   }
-  keep_largest(patches.discs, kMostDiscs);
-  keep_largest(patches.rings, kMostRings);
+  keep_likely(patches.discs, kMostDiscs, 1);
+  keep_likely(patches.rings, kMostRings, 0.6);
   return patches;
 }
 

@@ -15,7 +15,7 @@ struct Patch {
   double fullness = 0;  // area / area of the ellipse with its second moments: 1 of a disc, 0.6 of the ring
 };
 
-/// The largest of them, whole within the photograph.
+/// The likeliest of them, whole within the photograph.
 struct Patches {
   std::vector<Patch> discs, rings;
 };

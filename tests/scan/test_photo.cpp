@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <cstring>
 #include <fstream>
+#include <initializer_list>
 #include <opencv2/core.hpp>
 #include <random>
 #include <string>
@@ -75,8 +76,8 @@ TEST(Photo, GreyColourOpacityAndSixteenBitsAreOnePicture) {
   const Directory directory;
   const std::string path = directory / "photo.tif";
   const auto greys = some_greys();
-  for (const std::uint16_t samples : {1, 2, 3, 4}) {
-    for (const std::uint16_t bits : {8, 16}) {
+  for (const std::uint16_t samples : std::initializer_list<std::uint16_t>{1, 2, 3, 4}) {
+    for (const std::uint16_t bits : std::initializer_list<std::uint16_t>{8, 16}) {
       write_photo(path, greys, kWide, kHigh, {samples, bits});
       const auto photo = scan::read_photo(path, 20);
       ASSERT_TRUE(photo) << photo.error().message;
