@@ -244,6 +244,21 @@ TEST_F(ImageLevels, ThatDoNotFitAreOneLineEach) {
   refused("jet --job two.toml --levels 4", "leave out the parts that are images");
 }
 
+// Grey of another program, whose files tell no resolution: (255 - v) 3 / 255 is 3, 2.51, 2 and 1, 0.49, 0.
+TEST_F(ImageLevels, TakeGreyOfOtherPrograms) {
+  fs::create_directory(folder_.path() / "grey");
+  std::string pixels = "P5 3 2 255\n";
+  for (const int value : {0, 42, 85, 170, 213, 255}) pixels += static_cast<char>(value);
+  test::write_text(folder_.path() / "grey/slice-001.PGM", pixels);
+  const std::string rest = " --layer 0.1 --dpi 254 --bed 0.3x0.2 --levels 4 --format tiff-8 -o out";
+  test::expect_refused("jet grey" + rest, 3, "give it as part.dpi", folder_);
+  done("jet grey --set part.dpi=254" + rest);
+  const Levels image = levels("out/" + layer_file_name(0, ".tif"), 3);
+  EXPECT_EQ(std::vector<std::uint32_t>(image.change.begin(), image.change.end()),
+            (std::vector<std::uint32_t>{0, 2, 2, 3, 0, 1}));
+  EXPECT_EQ(std::vector<std::uint8_t>(image.level.begin(), image.level.end()), (std::vector<std::uint8_t>{3, 2, 1}));
+}
+
 // Where images begin: their manifest says 0.4 mm, unless the job says otherwise, also that it is 0.
 TEST_F(ImageLevels, BeginWhereTheJobSays) {
   test::write_box(folder_ / "box.stl", {0, 0, 0}, {2, 3, 0.3f});
