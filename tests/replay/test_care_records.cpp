@@ -85,7 +85,7 @@ class CareRecords : public testing::TestWithParam<const char*> {
 
 TEST_P(CareRecords, AreWhatTheProfileAsksInItsOrder) {
   const CareBench bench(GetParam(), all_care);
-  EXPECT_EQ(names(bench), "ROLL GOTO WIPE LINE LINE GOTO SPIT GOTO LINE DRYS LINE ");
+  ASSERT_EQ(names(bench), "ROLL GOTO WIPE LINE LINE GOTO SPIT GOTO LINE DRYS LINE ");
   const auto all = records(bench);
   const std::string& text = bench.program.text;
   EXPECT_EQ(number_at(text, all[0].at + 8), 350'500u);
