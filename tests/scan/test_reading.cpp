@@ -195,11 +195,15 @@ double share_of(std::vector<double>& values, double share) {
   return values[std::min(values.size() - 1, static_cast<std::size_t>(share * static_cast<double>(values.size())))];
 }
 
-/// LAMINA_SCANS=N: the first N; A:B: from A on, below B.
-std::pair<int, int> scans_of(const char* asked) {
-  if (asked == nullptr) return {0, 6};
+/// LAMINA_SCANS=N: the first N; A:B: from A on, below B. Else some, among them one with a swath far from the others, and one
+/// whose fourth mark is cut off.
+std::vector<int> scans_of(const char* asked) {
+  if (asked == nullptr) return {0, 1, 2, 3, 112, 321};
   const char* colon = std::strchr(asked, ':');
-  return colon == nullptr ? std::pair(0, std::atoi(asked)) : std::pair(std::atoi(asked), std::atoi(colon + 1));
+  std::vector<int> scans;
+  for (int i = colon == nullptr ? 0 : std::atoi(asked); i < std::atoi(colon == nullptr ? asked : colon + 1); ++i)
+    scans.push_back(i);
+  return scans;
 }
 
 double worst_from(const std::vector<double>& values, std::size_t begin) {
@@ -208,10 +212,10 @@ double worst_from(const std::vector<double>& values, std::size_t begin) {
 
 TEST(ScannedChart, BlockedNozzlesAreFoundNoneIsAccusedAndOffsetsHold) {
   const char* asked = std::getenv("LAMINA_SCANS");
-  const auto [first, end] = scans_of(asked);
+  const std::vector<int> scans = scans_of(asked);
   const PrintedChart printed[2] = {chart_of(false), chart_of(true)};
   Errors errors;
-  for (int i = first; i < end; ++i) {
+  for (const int i : scans) {
     std::mt19937_64 random(static_cast<std::uint64_t>(i) * 7919 + 1);
     const PrintedChart& one = printed[i % 2];
     const Trial trial = random_trial(one, random);
@@ -239,14 +243,14 @@ TEST(ScannedChart, BlockedNozzlesAreFoundNoneIsAccusedAndOffsetsHold) {
     }
   }
   printf(
-      "%d scans, %zu not read: %zu of %zu blocked nozzles found, %zu accused wrongly\n"
+      "%zu scans, %zu not read: %zu of %zu blocked nozzles found, %zu accused wrongly\n"
       "offsets of nozzles, in pixels of the layer: %zu told, %zu not; half within %.4f, 99.9 %% within %.4f, all within %.4f\n"
       "offsets of swaths: %zu told, %zu not; half within %.4f, 99 %% within %.4f, all within %.4f\n"
       "errors in standard errors as told: nozzles half %.2f, 99 %% %.2f, all %.2f; swaths half %.2f, 99 %% %.2f, all %.2f\n"
       "joints by verniers: %zu, half within %.4f, 99 %% within %.4f, all within %.4f; by blocks: %zu, half %.4f, 99 %% %.4f, all %.4f; "
       "%zu not read, %zu not as the dashes have them\n"
       "gain in um: half within %.2f, 99 %% within %.2f, all within %.2f\n",
-      end - first, errors.unread, errors.found, errors.blocked, errors.accused, errors.nozzle.size(), errors.nozzles_untold,
+      scans.size(), errors.unread, errors.found, errors.blocked, errors.accused, errors.nozzle.size(), errors.nozzles_untold,
       share_of(errors.nozzle, 0.5), share_of(errors.nozzle, 0.999), share_of(errors.nozzle, 1), errors.swath.size(),
       errors.swaths_untold, share_of(errors.swath, 0.5), share_of(errors.swath, 0.99), share_of(errors.swath, 1),
       share_of(errors.nozzle_ratio, 0.5), share_of(errors.nozzle_ratio, 0.99), share_of(errors.nozzle_ratio, 1),
@@ -261,6 +265,9 @@ TEST(ScannedChart, BlockedNozzlesAreFoundNoneIsAccusedAndOffsetsHold) {
   EXPECT_LE(share_of(errors.swath, 1), 0.1);
   EXPECT_LE(errors.nozzles_untold * 100, errors.nozzle.size());
   EXPECT_LE(errors.swaths_untold * 20, errors.swath.size());
+  EXPECT_FALSE(errors.joint_along.empty());
+  EXPECT_LE(share_of(errors.joint_along, 0.99), 0.15);
+  EXPECT_LE(share_of(errors.joint_across, 0.99), 1);
   EXPECT_LE(share_of(errors.gain_um, 0.99), 12);
 }
 
