@@ -3,6 +3,9 @@
 #include <algorithm>
 #include <array>
 
+#include "stages/geometry/isa.h"
+#include "stages/geometry/targets.h"
+
 namespace lamina::dose {
 namespace {
 
@@ -36,32 +39,39 @@ class FarField {
   explicit FarField(const Energies& weights) : weights_(weights), energy_(kTilePixels, 0), set_(kTilePixels, 0) {}
 
   bool set(std::uint32_t pixel) const { return set_[pixel] != 0; }
-  void change(std::uint32_t pixel) {
+  LAMINA_BODY void change(std::uint32_t pixel) {
     set_[pixel] ^= 1;
-    const std::uint32_t sign = set_[pixel] != 0 ? 1u : ~0u;  // modulo 2^32
+    const std::uint32_t turn = set_[pixel] != 0 ? 0u : ~0u;  // (w ^ ~0) - ~0 is -w modulo 2^32
     const std::uint32_t left = kTileSide - pixel % kTileSide, top = kTileSide - pixel / kTileSide;
     for (std::uint32_t y = 0; y < kTileSide; ++y) {
       const std::uint32_t* weight = weights_.data() + (top + y) * 2 * kTileSide + left;
       std::uint32_t* energy = energy_.data() + y * kTileSide;
-      for (std::uint32_t x = 0; x < kTileSide; ++x) energy[x] += sign * weight[x];
+      for (std::uint32_t x = 0; x < kTileSide; ++x) energy[x] += (weight[x] ^ turn) - turn;
     }
   }
   /// The set pixel of most energy; the first one of equals.
-  std::uint32_t tightest_cluster() const {
-    std::uint32_t best = 0, most = 0;
-    for (std::uint32_t i = 0; i < kTilePixels; ++i) most = std::max(most, set_[i] != 0 ? energy_[i] + 1 : 0);
-    while (set_[best] == 0 || energy_[best] + 1 != most) ++best;
-    return best;
+  LAMINA_BODY std::uint32_t tightest_cluster() const {
+    return first_of_most([](std::uint32_t energy, std::uint32_t set) { return set != 0 ? energy + 1 : 0; });
   }
   /// The pixel of least energy that is not set; the first one of equals.
-  std::uint32_t largest_void() const {
-    std::uint32_t best = 0, least = ~0u;
-    for (std::uint32_t i = 0; i < kTilePixels; ++i) least = std::min(least, set_[i] != 0 ? ~0u : energy_[i]);
-    while (set_[best] != 0 || energy_[best] != least) ++best;
-    return best;
+  LAMINA_BODY std::uint32_t largest_void() const {
+    return first_of_most([](std::uint32_t energy, std::uint32_t set) { return set != 0 ? 0 : ~energy; });
   }
 
  private:
+  /// Row by row, so that the first of equals is looked for in one.
+  template <class Value>
+  LAMINA_BODY std::uint32_t first_of_most(Value value) const {
+    std::uint32_t best = 0, most = 0;
+    for (std::uint32_t row = 0; row < kTilePixels; row += kTileSide) {
+      std::uint32_t of_row = 0;
+      for (std::uint32_t i = row; i < row + kTileSide; ++i) of_row = std::max(of_row, value(energy_[i], set_[i]));
+      if (of_row > most) best = row, most = of_row;
+    }
+    while (value(energy_[best], set_[best]) != most) ++best;
+    return best;
+  }
+
   const Energies& weights_;
   Energies energy_, set_;
 };
@@ -113,7 +123,8 @@ class NearField {
   std::vector<std::uint32_t> at_;
 };
 
-std::vector<std::uint16_t> make_ranks() {
+/// Eight energies at a time, where the processor can.
+LAMINA_BODY std::vector<std::uint16_t> ranks_body() {
   const Energies weights = far_weights();
   FarField first(weights);
   // Any start does; this one has no pattern: a linear congruential generator (D. Knuth, W. Lewis, 1981).
@@ -159,6 +170,19 @@ std::vector<std::uint16_t> make_ranks() {
     rank[pixel] = static_cast<std::uint16_t>(next);
   }
   return rank;
+}
+
+std::vector<std::uint16_t> make_ranks_plain() { return ranks_body(); }
+#if defined(LAMINA_WIDE_KERNELS)
+LAMINA_AVX2 std::vector<std::uint16_t> make_ranks_avx2() { return ranks_body(); }
+#endif
+
+/// The same on every processor.
+std::vector<std::uint16_t> make_ranks() {
+#if defined(LAMINA_WIDE_KERNELS)
+  if (widest_isa() >= Isa::kAvx2) return make_ranks_avx2();
+#endif
+  return make_ranks_plain();
 }
 
 }  // namespace
