@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <numbers>
+#include <numeric>
 #include <string>
 #include <vector>
 
@@ -185,6 +186,17 @@ TEST(Field, CopiesHaveTheirOwnFrames) {
   EXPECT_NEAR(static_cast<double>(drops_between(left.drops, 100, 160)), 3600 * 21.0, 3600 * 0.05);
 }
 
+std::vector<int> pixels_of(const LevelsView& levels) {
+  std::vector<int> pixels(std::size_t{levels.columns} * levels.rows(), 0);
+  for (std::uint32_t r = 0; r < levels.rows(); ++r) {
+    for (std::uint32_t i = levels.row_offset[r]; i < levels.row_offset[r + 1]; ++i) {
+      for (std::uint32_t c = levels.change[2 * i]; c < levels.change[2 * i + 1]; ++c)
+        pixels[std::size_t{r} * levels.columns + c] = levels.level[i];
+    }
+  }
+  return pixels;
+}
+
 std::string fault_of(const std::string& formula, Sheet sheet) {
   Field field;
   if (const Status status = field.start(formula, "--saturation", sheet, {}); !status) return status.error().message;
@@ -233,6 +245,9 @@ TEST(Pour, PartsThatShareAVoxelAddUp) {
   EXPECT_EQ(sum_of_levels(levels), 200u * (90 * 10 + 130 * 5));
   // Between 7 and 9 mm a voxel is full: 1 drop of the left one and 1 of the right one.
   EXPECT_EQ(drops_between(drops, 70, 90), 200u * 20 * 2);
+  const std::vector<int> pixels = pixels_of(drops);
+  EXPECT_EQ(std::accumulate(pixels.begin(), pixels.end(), std::uint64_t{0}), sum_of_levels(drops));  // no run lies on another
+  EXPECT_EQ(std::count(pixels.begin() + 70, pixels.begin() + 90, 2), 20);
   const Dosed inside{core, {ask}, {4 * kOneDrop}};
   ASSERT_TRUE(pour({&inside, 1}, 15, sheet, scratch, drops, levels).ok());
   EXPECT_NEAR(static_cast<double>(sum_of_levels(drops)), 200 * 20 * 4 * 10 / 15.0, 40);
@@ -244,17 +259,6 @@ TEST(Pour, PartsThatShareAVoxelAddUp) {
   ASSERT_TRUE(pour(halves, 15, sheet, scratch, drops, levels).ok());
   ASSERT_TRUE(pour({&together, 1}, 15, sheet, scratch, whole_drops, whole).ok());
   EXPECT_TRUE(std::ranges::equal(drops.change, whole_drops.change) && std::ranges::equal(drops.level, whole_drops.level));
-}
-
-std::vector<int> pixels_of(const LevelsView& levels) {
-  std::vector<int> pixels(std::size_t{levels.columns} * levels.rows(), 0);
-  for (std::uint32_t r = 0; r < levels.rows(); ++r) {
-    for (std::uint32_t i = levels.row_offset[r]; i < levels.row_offset[r + 1]; ++i) {
-      for (std::uint32_t c = levels.change[2 * i]; c < levels.change[2 * i + 1]; ++c)
-        pixels[std::size_t{r} * levels.columns + c] = levels.level[i];
-    }
-  }
-  return pixels;
 }
 
 // Pixel by pixel: the last part keeps its level, each one before it what is left.
