@@ -263,7 +263,7 @@ TEST(ScannedChart, BlockedNozzlesAreFoundNoneIsAccusedAndOffsetsHold) {
   EXPECT_EQ(errors.accused, 0u);
   EXPECT_LE(share_of(errors.nozzle, 1), 0.1);
   EXPECT_LE(share_of(errors.swath, 1), 0.1);
-  EXPECT_LE(errors.nozzles_untold * 100, errors.nozzle.size());
+  EXPECT_LE(errors.nozzles_untold * 50, errors.nozzle.size());
   EXPECT_LE(errors.swaths_untold * 20, errors.swath.size());
   EXPECT_FALSE(errors.joint_along.empty());
   EXPECT_LE(share_of(errors.joint_along, 0.99), 0.15);
