@@ -122,7 +122,8 @@ std::uint64_t PrintProgram::bytes_bound(std::uint64_t changes, std::uint32_t pla
   const std::uint64_t care = 512 * machine.powder.base_layers + shots * (256 + 16 * std::uint64_t{machine.care.spit_drops});
   // Lines of the bits of drops, at most twice those of the drops, and their changes sorted.
   const std::uint64_t bits = grid.drop_bits > 1 ? 16 * changes * grid.sweep_drops + 40 * grid.nozzles : 0;
-  return bits + 4 * care + 4 * vectors + 4 * grid.steps() + planes * (16 * grid.lines + 2 * changes + turned) + kept + (512 << 10);
+  return bits + 4 * care + 4 * vectors + 4 * grid.steps() + planes * (16 * grid.lines + 2 * changes + turned) + kept +
+         (512 << 10);
 }
 
 }  // namespace lamina::pipeline

@@ -229,7 +229,7 @@ class ImageMaker : public Maker {
   std::uint64_t bytes_written_ = 0, crossings_ = 0;
   std::int64_t microseconds_ = 0, added_microseconds_ = 0;  // of the machine
   std::uint64_t added_sweeps_ = 0;
-  bool timed_ = true;              // layers that an earlier build left are not
+  bool timed_ = true;  // layers that an earlier build left are not
   double volume_mm3_ = 0;
   std::vector<std::uint32_t> refills_;  // layers before which vats are filled
   dose::BinderCount binder_;
@@ -273,12 +273,9 @@ void ImageMaker::tell_jetting(const ResolvedMachine& resolved, Summary& summary)
   const program::DropSweeps sweeps{std::max(1u, plan_.images->dose.most_drops()), added_sweeps_,
                                    static_cast<double>(added_microseconds_) * 1e-6};
   summary.results.emplace_back("sweeps", program::sweeps_text(resolved.machine, grid, sweeps));
-  (*summary.facts)["jetting"] = {{"head_drops", grid.head_drops},
-                                 {"sweep_drops", grid.sweep_drops},
-                                 {"pixel_drops", sweeps.most_drops},
-                                 {"sweeps_a_place", grid.sweeps_for(sweeps.most_drops)},
-                                 {"added_sweeps", sweeps.added},
-                                 {"added_seconds", sweeps.added_seconds}};
+  (*summary.facts)["jetting"] = {{"head_drops", grid.head_drops},    {"sweep_drops", grid.sweep_drops},
+                                 {"pixel_drops", sweeps.most_drops}, {"sweeps_a_place", grid.sweeps_for(sweeps.most_drops)},
+                                 {"added_sweeps", sweeps.added},     {"added_seconds", sweeps.added_seconds}};
 }
 
 void ImageMaker::tell(Summary& summary) const {

@@ -28,7 +28,7 @@ struct HeadGrid {
   std::uint32_t head_drops = 1;   // most drops that a nozzle can fire on a pixel in one sweep
   std::uint32_t sweep_drops = 1;  // that it does at the scan's speed, within its frequency
   std::uint32_t drop_bits = 1;    // of their number in vectors: 1, 2 or 4, by head_drops
-  std::uint32_t bit_order = 0;  // of vectors: nozzle i is bit i ^ bit_order, as the dialect has it; below 128
+  std::uint32_t bit_order = 0;    // of vectors: nozzle i is bit i ^ bit_order, as the dialect has it; below 128
   FirstSwath first_swath = FirstSwath::kBed;
   bool both_directions = false;
   std::vector<std::uint32_t> blocked;  // increasing

@@ -85,19 +85,19 @@ void Budget::foresee(const Layer& layer) {
     }
     const LayerDose& of = dose(layer, zone);
     const bool differ = of.asked != of.asked_core;
-    if (jetting_.shell || !differ) look_at(layer, zone, of, false);
-    if (differ && (!jetting_.shell || stretches_.core(zone, layer))) look_at(layer, zone, of, true);
+    if (jetting_.shell || !differ) look_at(layer, zone, of, false, cut_);
+    if (differ && (!jetting_.shell || stretches_.core(zone, layer))) look_at(layer, zone, of, true, cut_);
   }
 }
 
-void Budget::look_at(const Layer& layer, std::uint32_t zone, const LayerDose& dose, bool core) {
+void Budget::look_at(const Layer& layer, std::uint32_t zone, const LayerDose& dose, bool core, DoseFault& cut) {
   const double asked = core ? dose.asked_core : dose.asked, gets = core ? dose.gets_core : dose.gets;
   const Drops24 drops = core ? dose.core : dose.shell, asked_drops = core ? dose.asked_inside : dose.asked_shell;
   const double wish = static_cast<double>(asked_drops) / static_cast<double>(kOneDrop);
   most_drops_ = std::max(most_drops_, static_cast<std::uint32_t>((drops + kOneDrop - 1) >> kDropBits));
   gets_ = seen_ ? std::pair(std::min(gets_.first, gets), std::max(gets_.second, gets)) : std::pair(gets, gets);
   seen_ = true;
-  if (asked_drops > Drops24{limit_} << kDropBits) cut_.add(layer, asked, gets, wish, asked > cut_.asked);
+  if (asked_drops > Drops24{limit_} << kDropBits) cut.add(layer, asked, gets, wish, asked > cut.asked);
   if (gets < least_percent_ * (1 - 1e-6)) unbound_.add(layer, asked, gets, wish, gets < unbound_.gets);
   if (!wishes_) return;
   const std::size_t place = wishes_->place_of(layer, zone);
@@ -139,7 +139,7 @@ void Budget::look_at_field(const Layer& layer, std::uint32_t zone, bool core) {
   };
   const LayerDose least = of(range.least);
   if (least.gets < least_percent_ * (1 - 1e-6)) thin_.add(layer, least.asked, least.gets, 0, least.gets < thin_.gets);
-  look_at(layer, zone, of(range.most), core);
+  look_at(layer, zone, of(range.most), core, percent.formula.empty() ? cut_ : peaks_);
 }
 
 void Budget::warn_of_none(std::vector<Warning>& warnings) const {
@@ -159,6 +159,13 @@ Status Budget::judge(bool allow_unbound, std::vector<Warning>& warnings) const {
     warnings.push_back({"saturation", fmt::format("--saturation: {:.1f} % needs more than the {} drops a pixel that may be "
                                                   "jetted, {} get {:.1f} %; thinner layers or larger drops reach it",
                                                   cut_.asked, limit_, where(cut_.where), cut_.gets)});
+  }
+  if (!peaks_.where.empty()) {
+    warnings.push_back(
+        {"saturation", fmt::format("--saturation: the formula comes to {:.1f} % somewhere in the boxes of the parts, "
+                                   "which needs more than the {} drops a pixel that may be jetted; what lies "
+                                   "there gets {:.1f} %, in {}",
+                                   peaks_.asked, limit_, peaks_.gets, where(peaks_.where))});
   }
   warn_of_none(warnings);
   if (no_formula_) return *no_formula_;

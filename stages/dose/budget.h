@@ -33,9 +33,9 @@ struct DoseFault {
 
 /// How drops are jetted.
 struct Jetting {
-  bool dithered = true;  // else drops of a pixel are rounded to whole ones
-  bool shell = false;    // else all is core
-  double core = 1;       // share of the core's pixels that get their drop; a job with a wish has 1
+  bool dithered = true;          // else drops of a pixel are rounded to whole ones
+  bool shell = false;            // else all is core
+  double core = 1;               // share of the core's pixels that get their drop; a job with a wish has 1
   std::uint32_t full_drops = 1;  // of a full pixel without a wish
 };
 
@@ -73,7 +73,7 @@ class Budget {
 
  private:
   const LayerDose& dose(const Layer& layer, std::uint32_t zone);
-  void look_at(const Layer& layer, std::uint32_t zone, const LayerDose& dose, bool core);
+  void look_at(const Layer& layer, std::uint32_t zone, const LayerDose& dose, bool core, DoseFault& cut);
   void look_at_field(const Layer& layer, std::uint32_t zone, bool core);
   FieldSurvey* survey_of(const std::string& formula, std::size_t place, std::uint32_t zone);
   void warn_of_none(std::vector<Warning>& warnings) const;
@@ -88,6 +88,7 @@ class Budget {
   std::pair<double, double> gets_{0, 0};
   bool seen_ = false;
   std::map<std::pair<std::size_t, Nm>, LayerDose> known_;   // by place of the wish and thickness
+  DoseFault peaks_;                                         // as cut_, of formulas in boxes of parts
   DoseFault cut_, unbound_, thin_;                          // thin: by places of a formula, of which none need be in a part
   std::map<std::pair<std::size_t, bool>, DoseFault> none_;  // wishes above 0 that come to no drop; by place, of the core
   std::map<std::uint32_t, bool> jetted_;                    // whether parts with a wish of their own get any; by zone

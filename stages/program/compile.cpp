@@ -198,7 +198,8 @@ class LayerCompiler {
           return line(static_cast<std::uint32_t>(first_line(swath, pass) + j * grid_.passes));
         });
         std::erase_if(waiting, served);
-        Sweep sweep{further_++, regular_, swath, further_pass++, false, first_line(swath, pass) - d * grid_.passes, first_drop_};
+        Sweep sweep{further_++, regular_, swath, further_pass++, false, first_line(swath, pass) - d * grid_.passes,
+                    first_drop_};
         if (Status status = make(sweep); !status) return status;
       }
     }
@@ -214,7 +215,7 @@ class LayerCompiler {
   std::vector<bool> blocked_;
   std::uint32_t planes_, plane_ = 0, first_drop_ = 0, most_here_ = 1;
   std::vector<Line> fired_;  // of a nozzle, drop after drop
-  std::int64_t first_ = 0;  // line of the first swath
+  std::int64_t first_ = 0;   // line of the first swath
   std::uint32_t stride_ = 0, swaths_ = 0, regular_ = 0, further_ = 0;
   std::size_t kept_ = 0;  // made lines that are needed to the end of the layer
   bool backward_ = false;

@@ -36,8 +36,8 @@ std::string care_text(const Machine& machine, const FullLayer& full) {
 
 std::string sweeps_text(const Machine& machine, const HeadGrid& grid, const DropSweeps& sweeps) {
   const std::uint32_t count = grid.sweeps_for(sweeps.most_drops);
-  std::string text = fmt::format("{} over a place for up to {} drop{} a pixel", count, sweeps.most_drops,
-                                 sweeps.most_drops == 1 ? "" : "s");
+  std::string text =
+      fmt::format("{} over a place for up to {} drop{} a pixel", count, sweeps.most_drops, sweeps.most_drops == 1 ? "" : "s");
   if (grid.sweep_drops == grid.head_drops) return text + fmt::format(", up to {} in each", grid.sweep_drops);
   text += fmt::format(": {:g} Hz allow {} of the head's {} drops at {:g} mm/s, all of them at {:.1f} mm/s",
                       machine.head.highest_frequency_hz, grid.sweep_drops, grid.head_drops, machine.motion.scan_speed_mm_s,
@@ -90,9 +90,9 @@ std::string explain(const Machine& machine, const HeadGrid& grid, const std::opt
   }
   line("time", full ? fmt::format("{:.1f} s a full layer of {:g} mm, {:.1f} s an empty one (powder, pauses)", full->seconds,
                                   full->thickness_mm, full->empty_seconds) +
-                          (full->drops_seconds > 0 ? fmt::format(", {:.1f} s one of {} drops on every pixel",
-                                                                 full->drops_seconds, grid.head_drops)
-                                                   : "")
+                          (full->drops_seconds > 0
+                               ? fmt::format(", {:.1f} s one of {} drops on every pixel", full->drops_seconds, grid.head_drops)
+                               : "")
                     : "not told: the program of a full layer is too long");
   if (full && (machine.care.spits() || machine.care.wipes())) line("care", care_text(machine, *full));
   line("dialect", machine.dialect);

@@ -109,7 +109,7 @@ Target target(std::string_view name) {
           "stages/replay stages/program/head_grid",
           "",
           "gcode.dict",
-          name == "program_planes" ? std::size_t{16384} : std::size_t{4096}};
+          name == "program_planes" ? std::size_t{32768} : std::size_t{4096}};
 }
 
 const Registered kNuferbj(target<"nuferbj">("program_nuferbj"));

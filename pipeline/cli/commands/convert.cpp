@@ -17,6 +17,7 @@
 #include "stages/write/file.h"
 #include "stages/write/image_format.h"
 #include "stages/write/levels/level_format.h"
+#include "stages/write/manifest/images_on_record.h"
 #include "stages/write/temporary.h"
 
 namespace lamina::pipeline {
@@ -204,7 +205,9 @@ Outcome run_convert(const Arguments& arguments, Context& context) {
   }
   std::optional<tbb::global_control> limit;
   if (threads > 0) limit.emplace(tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(threads));
-  auto images = read::LayerImages::open(stack, *request);
+  const auto told = images_on_record(stack);
+  if (!told) return told.error();
+  auto images = read::LayerImages::open(told->path, *request);
   if (!images) return images.error();
   std::array<double, 2>& dpi = all.dpi;
   dpi = {images->dpi_x(), images->dpi_y()};

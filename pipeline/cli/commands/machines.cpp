@@ -96,7 +96,8 @@ std::vector<CareCase> care_cases(const Machine& machine) {
 Result<std::optional<program::FullLayer>> time_full_layer(const ResolvedMachine& resolved) {
   const HeadGrid& grid = resolved.grid;
   const PrintProgram program(resolved, "", 1, {});
-  const double vectors = double(grid.swaths(0)) * grid.passes * static_cast<double>(grid.steps()) * grid.words() * 8 * grid.drop_bits;
+  const double vectors =
+      double(grid.swaths(0)) * grid.passes * static_cast<double>(grid.steps()) * grid.words() * 8 * grid.drop_bits;
   if (vectors > (256 << 20) || program.bytes_bound(2 * std::uint64_t{grid.image.rows()}, grid.head_drops) > (1u << 30)) {
     return std::optional<program::FullLayer>();
   }

@@ -23,8 +23,10 @@ constexpr std::uint64_t most_grey_png(std::uint64_t columns, std::uint64_t rows,
 }
 
 constexpr std::array<LevelFormat, 3> kLevelFormats = {{
-    {"tiff-4", ".tif", "TIFF, 4-bit grey, PackBits: shares of voxels, or a machine's drops", tiff::make_4_bit_encoder, most_grey_packbits},
-    {"tiff-8", ".tif", "TIFF, 8-bit grey, PackBits: shares of voxels, or a machine's drops", tiff::make_8_bit_encoder, most_grey_packbits},
+    {"tiff-4", ".tif", "TIFF, 4-bit grey, PackBits: shares of voxels, or a machine's drops", tiff::make_4_bit_encoder,
+     most_grey_packbits},
+    {"tiff-8", ".tif", "TIFF, 8-bit grey, PackBits: shares of voxels, or a machine's drops", tiff::make_8_bit_encoder,
+     most_grey_packbits},
     {"png-8", ".png", "PNG, 8-bit grey: shares of voxels, or a machine's drops", png::make_8_bit_encoder, most_grey_png},
 }};
 

@@ -28,9 +28,10 @@ Result<ImagesOnRecord> images_on_record(const std::string& path) {
   const auto read = read_manifest(manifest);
   if (!read || read->layers.empty()) return told;
   if (read->head.grey_drops()) {
-    return Error{Fault::kInput, fmt::format("{}: its images are drops of a pixel as grey, which are no shares of a part; plan its "
-                                            "parts again, or copy the images into a folder of their own",
-                                            one_line(manifest))};
+    return Error{Fault::kInput,
+                 fmt::format("{}: its images are drops of a pixel as grey, which are no shares of a part; plan its "
+                             "parts again, or copy the images into a folder of their own",
+                             one_line(manifest))};
   }
   if (read->head.named_images() > 0) {
     return Error{Fault::kInput,

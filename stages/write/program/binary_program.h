@@ -54,8 +54,7 @@ void put_segments(const SweepVectors& vectors, bool backward, bool turn, std::si
                   const Head& head, std::uint32_t planes = 1) {
   std::size_t end = out.size();
   const std::size_t step_bytes = vector_bytes * planes;
-  for_each_segment(vectors, kHead, step_bytes,
-                   [&](std::uint32_t, std::uint32_t count) { end += kHead + count * step_bytes; });
+  for_each_segment(vectors, kHead, step_bytes, [&](std::uint32_t, std::uint32_t count) { end += kHead + count * step_bytes; });
   std::size_t next = backward ? end : out.size();
   out.resize(end);
   const std::size_t stride = vectors.words * sizeof(std::uint64_t), plane_stride = stride / planes;

@@ -21,7 +21,7 @@ constexpr std::array<Dialect, 7> kDialects = {{
     {"nuferbj", ".gcode", "G-code with vectors as hexadecimal words, powder cycle and counters; our own definition", 65'535, 0,
      true, kSaysAll, nuferbj::make_writer},
     {"raw", ".raw", "128-bit words as a Xaar XJ128 takes them, with swath heads; our own definition", 65'535, 120, false,
-     kSaysAll, raw::make_writer},
+     kSaysAll | kSaysDrops, raw::make_writer},
     {"planes", ".planes", "32-bit padded planes of a swath, as production heads take them; our own definition", 65'535, 31,
      false, kSaysAll | kSaysDrops, planes::make_writer},
     {"hp45", ".hp45", "HP45 controller V4, firmware 0.08: SBR lines for it, G-code for a motion controller beside it", 300, 0,
@@ -61,9 +61,10 @@ const Dialect* find_dialect(std::string_view id) {
 
 Status check_dialect(const Dialect& dialect, const Machine& machine, const HeadGrid& grid) {
   if (machine.head.most_drops > 1 && (dialect.says & kSaysDrops) == 0) {
-    return Error{Fault::kUsage, fmt::format("{}: head.most_drops: {}, and a command of {} fires one drop of a nozzle; give 1, and "
-                                            "each drop of a pixel is a sweep",
-                                            machine.name, machine.head.most_drops, dialect.id)};
+    return Error{Fault::kUsage,
+                 fmt::format("{}: head.most_drops: {}, and a command of {} fires one drop of a nozzle; give 1, and "
+                             "each drop of a pixel is a sweep",
+                             machine.name, machine.head.most_drops, dialect.id)};
   }
   if (grid.nozzles <= dialect.most_nozzles) {
     if (Status status = check_care(dialect, machine, grid); !status) return status;

@@ -26,8 +26,8 @@ class Writer final : public ProgramWriter {
 
   void start(std::uint32_t layers, ProgramBytes& out) override {
     const bool grey = grid_.drop_bits > 1;
-    for (const std::uint32_t value :
-         {kStart, grey ? 8u : 7u, grey ? 2u : 1u, layers, grid_.nozzles, grid_.places, grid_.lines, grid_.steps_per_pixel, words_}) {
+    for (const std::uint32_t value : {kStart, grey ? 8u : 7u, grey ? 2u : 1u, layers, grid_.nozzles, grid_.places, grid_.lines,
+                                      grid_.steps_per_pixel, words_}) {
       put_little<std::uint32_t>(out, value);
     }
     if (grey) put_little<std::uint32_t>(out, grid_.drop_bits);
