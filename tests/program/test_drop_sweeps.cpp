@@ -25,7 +25,7 @@ Machine head_of(std::uint32_t most_drops, double highest_frequency_hz, std::uint
   return machine;
 }
 
-HeadGrid grid_of(const Machine& machine) {
+HeadGrid grid_of_head(const Machine& machine) {
   auto grid = make_head_grid(machine);
   EXPECT_TRUE(grid.ok()) << (grid.ok() ? "" : grid.error().message);
   return *grid;
@@ -45,14 +45,14 @@ std::vector<Runs> planes_of(const std::vector<std::string>& rows, std::uint32_t 
   return planes;
 }
 
-struct Fired {
+struct FiredSweeps {
   std::vector<Sweep> sweeps;
   std::vector<std::vector<std::string>> drops;  // of each sweep, a row of digits a nozzle, by step from 0
   ProgramCount count;
 };
 
-Fired fired_by(const HeadGrid& grid, const std::vector<Runs>& planes) {
-  Fired fired;
+FiredSweeps sweeps_fired_by(const HeadGrid& grid, const std::vector<Runs>& planes) {
+  FiredSweeps fired;
   CompileScratch scratch;
   const std::vector<RunsView> views(planes.begin(), planes.end());
   const auto count = compile(grid, views, scratch, [&](const Sweep& sweep, const SweepVectors& vectors) -> Status {
@@ -77,7 +77,7 @@ Fired fired_by(const HeadGrid& grid, const std::vector<Runs>& planes) {
 
 // 100 places a second: of 350 Hz each gets 3 drops, of 299 Hz 2, of 700 Hz 7, and no more than the head has.
 TEST(DropSweeps, FireWhatTheFrequencyAllows) {
-  const auto drops = [](std::uint32_t most, double hertz) { return grid_of(head_of(most, hertz)).sweep_drops; };
+  const auto drops = [](std::uint32_t most, double hertz) { return grid_of_head(head_of(most, hertz)).sweep_drops; };
   EXPECT_EQ(drops(7, 350), 3u);
   EXPECT_EQ(drops(7, 299), 2u);
   EXPECT_EQ(drops(7, 300), 3u);
@@ -92,7 +92,7 @@ TEST(DropSweeps, FireWhatTheFrequencyAllows) {
 
 TEST(DropSweeps, TakeAsManyBitsAsTheHeadHasDrops) {
   for (const auto& [most, bits] : {std::pair{1u, 1u}, {2u, 2u}, {3u, 2u}, {4u, 4u}, {7u, 4u}, {15u, 4u}}) {
-    EXPECT_EQ(grid_of(head_of(most, 100)).drop_bits, bits) << most;
+    EXPECT_EQ(grid_of_head(head_of(most, 100)).drop_bits, bits) << most;
   }
   for (const std::uint32_t most : {0u, 16u, 64u}) {
     const auto grid = make_head_grid(head_of(most, 1e5));
@@ -105,7 +105,7 @@ TEST(DropSweeps, TakeAsManyBitsAsTheHeadHasDrops) {
 
 TEST(DropSweeps, FireEachPixelsNumberOfDrops) {
   const std::vector<std::string> image{"01234567", "70000007", "00000000", "11111111"};
-  const Fired fired = fired_by(grid_of(head_of(7, 700)), planes_of(image, 7));
+  const FiredSweeps fired = sweeps_fired_by(grid_of_head(head_of(7, 700)), planes_of(image, 7));
   ASSERT_EQ(fired.drops.size(), 1u);
   EXPECT_EQ(fired.drops[0], image);
   EXPECT_EQ(fired.count.drops, 28u + 14u + 8u);
@@ -116,7 +116,7 @@ TEST(DropSweeps, FireEachPixelsNumberOfDrops) {
 // Of 350 Hz 3 drops fit: 7 drops are 3 + 3 + 1. The head would have fired them in one sweep, so two are added.
 TEST(DropSweeps, AreAddedWhereDropsComeTooFast) {
   const std::vector<std::string> image{"01234567", "00000000", "00000000", "00000002"};
-  const Fired fired = fired_by(grid_of(head_of(7, 350)), planes_of(image, 7));
+  const FiredSweeps fired = sweeps_fired_by(grid_of_head(head_of(7, 350)), planes_of(image, 7));
   ASSERT_EQ(fired.drops.size(), 3u);
   EXPECT_EQ(fired.drops[0], (std::vector<std::string>{"01233333", "00000000", "00000000", "00000002"}));
   EXPECT_EQ(fired.drops[1], (std::vector<std::string>{"00001233", "00000000", "00000000", "00000000"}));
@@ -135,12 +135,12 @@ TEST(DropSweeps, AreAddedWhereDropsComeTooFast) {
 TEST(DropSweeps, AddedOnesAreThoseBeyondTheHeadsOwn) {
   for (std::uint32_t most = 2; most <= 15; ++most) {
     for (std::uint32_t allowed = 1; allowed <= most; ++allowed) {
-      const HeadGrid grid = grid_of(head_of(most, 100.0 * allowed));
+      const HeadGrid grid = grid_of_head(head_of(most, 100.0 * allowed));
       ASSERT_EQ(grid.sweep_drops, allowed);
       for (std::uint32_t drops = 1; drops <= 9; ++drops) {
         const std::string row = std::string("00") + static_cast<char>('0' + drops) + "00000";
         // Planes are those of the job, whatever the layer has.
-        const Fired fired = fired_by(grid, planes_of({row, "00000000", "00000000", "00000000"}, 12));
+        const FiredSweeps fired = sweeps_fired_by(grid, planes_of({row, "00000000", "00000000", "00000000"}, 12));
         const std::uint32_t sweeps = (drops + allowed - 1) / allowed, own = (drops + most - 1) / most;
         EXPECT_EQ(fired.sweeps.size(), sweeps);
         EXPECT_EQ(fired.count.added, sweeps - own) << most << " " << allowed << " " << drops;
@@ -158,7 +158,7 @@ TEST(DropSweeps, BothWaysToTheVectorsAgree) {
     machine.motion.ticks_per_pixel = ticks;
     machine.motion.lag_unit = LagUnit::kTick;
     machine.bed.size_mm = {15, 20};
-    const HeadGrid grid = grid_of(machine);
+    const HeadGrid grid = grid_of_head(machine);
     testing::Random random(ticks);
     std::vector<std::vector<std::uint32_t>> changes(std::size_t{grid.nozzles} * grid.drop_bits);
     std::vector<Line> lines;
@@ -180,7 +180,7 @@ TEST(DropSweeps, BothWaysToTheVectorsAgree) {
 TEST(DropSweeps, AreRefusedOfADialectOfOneDrop) {
   for (const write::Dialect& dialect : write::dialects()) {
     Machine machine = head_of(3, 5000);
-    const HeadGrid grid = grid_of(machine);
+    const HeadGrid grid = grid_of_head(machine);
     const Status status = write::check_dialect(dialect, machine, grid);
     const bool says = dialect.id == "planes" || dialect.id == "raw";
     EXPECT_EQ(status.ok(), says) << dialect.id;
@@ -191,13 +191,14 @@ TEST(DropSweeps, AreRefusedOfADialectOfOneDrop) {
 
 TEST(DropSweeps, AreTold) {
   const Machine slow = head_of(7, 350), fast = head_of(7, 700);
-  EXPECT_EQ(sweeps_text(fast, grid_of(fast), {12, 0, 0}), "2 over a place for up to 12 drops a pixel, up to 7 in each");
+  EXPECT_EQ(sweeps_text(fast, grid_of_head(fast), {12, 0, 0}), "2 over a place for up to 12 drops a pixel, up to 7 in each");
   EXPECT_EQ(
-      sweeps_text(slow, grid_of(slow), {7, 20, 12.5}),
+      sweeps_text(slow, grid_of_head(slow), {7, 20, 12.5}),
       "3 over a place for up to 7 drops a pixel: 350 Hz allow 3 of the head's 7 drops at 10 mm/s, all of them at 5.0 mm/s; "
       "that adds 20 sweeps, 12.5 s");
-  EXPECT_NE(explain(slow, grid_of(slow), {}).find("3 of 7 of a pixel in one sweep at that speed, as 4 bits; all at 5.0 mm/s"),
-            std::string::npos);
+  EXPECT_NE(
+      explain(slow, grid_of_head(slow), {}).find("3 of 7 of a pixel in one sweep at that speed, as 4 bits; all at 5.0 mm/s"),
+      std::string::npos);
 }
 
 }  // namespace
