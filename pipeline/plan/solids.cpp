@@ -41,8 +41,8 @@ std::vector<std::uint32_t> levels_of(const Scene& scene, const Job& job, const M
 /// What keeps a job from levels, and what to do; empty if nothing does.
 std::string_view against_shares(const Scene& scene, const Job& job, const Materials& materials, const DoseZones& zones) {
   if (!scene.images.empty() && (materials.several() || zones.several()))
-    return "meshes where parts have materials or doses of their own; leave out part.saturation_percent, part.bleed_um and "
-           "materials for those of the job, or the parts that are images";
+    return "meshes where parts have materials or doses of their own; leave out the parts that are images, or give all parts those "
+           "of the job";
   if (materials.several() && write::find_level_format(job.format) != nullptr)
     return "one material as grey, for several would lie in one voxel; choose a 1-bit format";
   if (zones.grows()) return "edges that stay or shrink; leave out a negative bleed";

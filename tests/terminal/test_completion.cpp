@@ -81,7 +81,7 @@ TEST_F(Completion, FilesAreThoseOfTheRightEnding) {
   EXPECT_EQ(candidates("lamina preview ''"), (Words{"beads.gcode", "parts"}));
   EXPECT_EQ(candidates("lamina verify ''"), (Words{"beads.gcode", "beads.sml", "parts"}));
   EXPECT_EQ(candidates("lamina jet '~/par'"), Words{"~/parts"}) << "below the home folder, which is this one";
-  EXPECT_EQ(candidates("lamina jet --machine j"), (Words{"jet1000", "job.toml"}));
+  EXPECT_EQ(candidates("lamina jet --machine j"), (Words{"jet1000", "jet1000-grey", "job.toml"}));
   EXPECT_TRUE(holds(candidates("lamina batch ''"), "notes.txt"));
   EXPECT_TRUE(holds(candidates("lamina jet --d"), "--dpi"));
 }
