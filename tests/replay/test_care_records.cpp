@@ -185,7 +185,8 @@ TEST_P(CareRecords, AreTimedWithoutVectors) {
       m.motion.scan_speed_mm_s = 20;
       m.care.spit_seconds = limit;
     });
-    const auto& [machine, grid] = bench.resolved;
+    const Machine& machine = bench.resolved.machine;
+    const HeadGrid& grid = bench.resolved.grid;
     const auto built = replay::VirtualMachine::build(machine, grid.image.columns(), grid.image.rows());
     replay::Timer timer(*built);
     const auto writer = write::find_dialect(machine.dialect)->make_writer(machine, grid);
