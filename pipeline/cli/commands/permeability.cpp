@@ -178,7 +178,8 @@ Outcome look_at_file(const Arguments& arguments, Context& context, const std::op
     return Error{Fault::kUsage, "name one file of measurements or of toolpaths, a folder of images, or a job with its parts"};
   const std::string& operand = arguments.operands.front();
   std::error_code ignored;
-  if (!std::filesystem::exists(operand, ignored))
+  const std::filesystem::path path = operand;
+  if (!path.has_extension() && !std::filesystem::exists(path, ignored))  // a table's name has one; its reader tells
     return Error{Fault::kInput, fmt::format("{}: no such file or folder", one_line(operand))};
   const bool images = std::filesystem::is_directory(operand, ignored), beads = !images && names_toolpaths(operand);
   Status fits = images || beads ? refuse(arguments, kOfTables, "tables of measurements, not for toolpaths or images")
