@@ -109,7 +109,7 @@ Result<Solids> Solids::build(Scene& scene, const Job& job, const PixelGrid& grid
                        std::vector<std::uint32_t> instance) -> Status {
     std::optional<cover::Coverage> coverage;
     if (job.levels > 0 && !instances.empty()) {
-      auto covered = cover::Coverage::build(meshes, instances, grid, job.fill_rule, job.levels);
+      auto covered = cover::Coverage::build(meshes, instances, grid, job.fill_rule, job.levels, job.isa);
       if (!covered) return covered.error();
       coverage = std::move(*covered);
     }

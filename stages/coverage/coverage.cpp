@@ -11,6 +11,7 @@
 #include "stages/coverage/meet/meetings.h"
 #include "stages/coverage/slab_index.h"
 #include "stages/geometry/blocks/block_maker.h"
+#include "stages/geometry/isa.h"
 
 namespace lamina::cover {
 namespace {
@@ -72,19 +73,28 @@ bool is_near_others(const Copy& copy, const Triangle& facet) {
   return std::ranges::any_of(copy.others, [&](const Box& other) { return boxes_meet(box, other); });
 }
 
+/// Facets lie in the order of the mesh, and each is looked at once.
+void fetch(const SlabFacet& facet) {
+  const auto* bytes = reinterpret_cast<const char*>(&facet);
+  for (std::size_t at = 0; at < sizeof facet; at += 64) __builtin_prefetch(bytes + at);
+}
+
 }  // namespace
 
 struct Coverage::State {
   PixelGrid grid;
   Edges x, y;
   Rule rule;
+  Isa isa;
   std::vector<CoveredMesh> meshes;
   std::vector<Copy> copies;
 
-  State(const PixelGrid& pixel_grid, Rule of_rows) : grid(pixel_grid), x(pixel_grid.x), y(pixel_grid.y), rule(of_rows) {}
+  State(const PixelGrid& pixel_grid, Rule of_rows, Isa widest)
+      : grid(pixel_grid), x(pixel_grid.x), y(pixel_grid.y), rule(of_rows), isa(isa_at_most(widest)) {}
 
+  std::uint32_t bands() const { return (grid.rows() + kBandRows - 1) / kBandRows; }
   void gather(const Layer& layer, LayerScratch& scratch) const;
-  void order_by_row(LayerScratch& scratch) const;
+  void order_by_band(LayerScratch& scratch) const;
 };
 
 Coverage::Coverage(Coverage&&) noexcept = default;
@@ -92,7 +102,7 @@ Coverage& Coverage::operator=(Coverage&&) noexcept = default;
 Coverage::~Coverage() = default;
 
 Result<Coverage> Coverage::build(std::span<Mesh> meshes, std::span<const Instance> instances, const PixelGrid& grid,
-                                 FillRule rule, std::uint32_t levels) {
+                                 FillRule rule, std::uint32_t levels, Isa isa) {
   if (levels < 2 || levels > 256) {
     return Error{Fault::kUsage, fmt::format("{} levels: a voxel has 2 to 256; give 2, 4 or 16", levels)};
   }
@@ -103,7 +113,7 @@ Result<Coverage> Coverage::build(std::span<Mesh> meshes, std::span<const Instanc
                                             mesh.name)};
   }
   Coverage coverage;
-  coverage.state_ = std::make_unique<State>(grid, Rule{rule, levels - 1});
+  coverage.state_ = std::make_unique<State>(grid, Rule{rule, levels - 1}, isa);
   State& state = *coverage.state_;
   for (const Instance& instance : instances) state.copies.push_back({instance.mesh, instance.offset, false, {}});
   find_others(meshes, state.copies);
@@ -111,7 +121,7 @@ Result<Coverage> Coverage::build(std::span<Mesh> meshes, std::span<const Instanc
   for (std::size_t i = 0; i < blocks.size(); ++i) {
     meshes[i].blocks = blocks[i];
     SlabIndex index(blocks[i]->bounds());
-    Suspects suspects = find_suspects(*blocks[i], index);
+    Suspects suspects = find_suspects(*blocks[i], index, isa);
     state.meshes.push_back({std::move(blocks[i]), std::move(index), std::move(suspects)});
   }
   return coverage;
@@ -143,39 +153,43 @@ void Coverage::State::gather(const Layer& layer, LayerScratch& scratch) const {
   }
 }
 
-void Coverage::State::order_by_row(LayerScratch& scratch) const {
-  scratch.begins.assign(std::size_t{grid.rows()} + 2, 0);
-  for (const SlabFacet& facet : scratch.facets) ++scratch.begins[facet.last_row + 2];
+void Coverage::State::order_by_band(LayerScratch& scratch) const {
+  scratch.begins.assign(std::size_t{bands()} + 2, 0);
+  for (const SlabFacet& facet : scratch.facets) ++scratch.begins[facet.last_row / kBandRows + 2];
   for (std::size_t r = 1; r < scratch.begins.size(); ++r) scratch.begins[r] += scratch.begins[r - 1];
   scratch.order.resize(scratch.facets.size());
-  for (std::uint32_t i = 0; i < scratch.facets.size(); ++i) scratch.order[scratch.begins[scratch.facets[i].last_row + 1]++] = i;
+  for (std::uint32_t i = 0; i < scratch.facets.size(); ++i)
+    scratch.order[scratch.begins[scratch.facets[i].last_row / kBandRows + 1]++] = i;
 }
 
 LayerReport Coverage::layer(const Layer& layer, LayerScratch& scratch, Levels& out) const {
   const State& state = *state_;
   LayerReport report;
   state.gather(layer, scratch);
-  state.order_by_row(scratch);
+  state.order_by_band(scratch);
   report.facets = static_cast<std::uint32_t>(scratch.facets.size());
   out.start(state.grid.columns());
   const std::int64_t bottom = layer.bottom, top = bottom + layer.thickness;
-  const RowMaker::Slab slab{state.grid.x,
-                            state.x,
-                            state.rule,
-                            {1 / state.x.per_nm(), 1 / state.y.per_nm(), static_cast<double>(layer.thickness)},
-                            static_cast<double>(bottom),
-                            scratch.facets};
-  scratch.maker.start(slab);
-  for (std::uint32_t r = state.grid.rows(); r-- > 0;) {
-    for (std::uint32_t k = scratch.begins[r]; k < scratch.begins[r + 1]; ++k) {
-      scratch.maker.enter(scratch.facets[scratch.order[k]], scratch.order[k]);
+  const Slab slab{state.grid.x,
+                  state.grid.y,
+                  state.x,
+                  state.rule,
+                  {1 / state.x.per_nm(), 1 / state.y.per_nm(), static_cast<double>(layer.thickness)},
+                  bottom,
+                  top,
+                  scratch.facets};
+  scratch.maker.start(slab, state.isa);
+  for (std::uint32_t band = state.bands(); band-- > 0;) {
+    for (std::uint32_t k = scratch.begins[band]; k < scratch.begins[band + 1]; ++k) {
+      if (k + 4 < scratch.order.size()) fetch(scratch.facets[scratch.order[k + 4]]);
+      scratch.maker.enter(scratch.facets[scratch.order[k]], scratch.order[k], state.y);
     }
+    const std::uint32_t first = band * kBandRows, rows = std::min(state.grid.rows() - first, kBandRows);
     if (scratch.maker.is_empty()) {
-      out.end_row();
-      continue;
+      for (std::uint32_t r = 0; r < rows; ++r) out.end_row();
+    } else {
+      scratch.maker.make(slab, first, rows, out, report);
     }
-    const Strip strip{edge(state.grid.y, r), edge(state.grid.y, std::int64_t{r} + 1), bottom, top};
-    scratch.maker.make(slab, strip, r, out, report);
   }
   const auto end = static_cast<double>(state.grid.x.length);
   for (const SlabFacet& facet : scratch.facets) report.volume_mm3 += facet.edgewise ? 0 : volume_behind(facet, end);
@@ -192,9 +206,8 @@ std::uint64_t Coverage::scratch_bytes_bound(const Layer& layer) const {
     state.meshes[copy.mesh].index.each(bottom, bottom + layer.thickness, [&](std::uint32_t) { facets += kClusterSize; });
   }
   // Buffers double as they grow. Samples of a row come on top where facets meet.
-  return 2 * facets * (sizeof(SlabFacet) + 2 * sizeof(std::uint32_t)) +
-         2 * RowMaker::bytes_of(facets, state.rule.top_level + 1) + sizeof(std::uint32_t) * (state.grid.rows() + 2) +
-         (sizeof(Cell) + 1) * (std::uint64_t{state.grid.columns()} + 1);
+  return 2 * facets * (sizeof(SlabFacet) + 2 * sizeof(std::uint32_t)) + 2 * BandMaker::bytes_of(facets, state.grid.columns()) +
+         sizeof(std::uint32_t) * (std::uint64_t{state.bands()} + 2);
 }
 
 std::uint64_t Coverage::suspects() const {

@@ -46,10 +46,11 @@ class Coverage {
   /// meshes     triangles are moved into Mesh::blocks, unless they are there: whoever indexes the meshes next shares these
   /// instances  where copies stand; every corner within the grid's bed and below kNmReach
   /// levels     2 .. 256 of them; 2, 4 and 16 are what drops come in
+  /// isa        the widest instructions to use; levels are the same with any
   /// errors     kInput if a mesh is open (Mesh::closed); kUsage for another number of levels
   /// cost       O(T log T): which facets meet others is found once (meet/meetings.h)
   static Result<Coverage> build(std::span<Mesh> meshes, std::span<const Instance> instances, const PixelGrid& grid,
-                                FillRule rule, std::uint32_t levels);
+                                FillRule rule, std::uint32_t levels, Isa isa = Isa::kAuto);
   Coverage(Coverage&&) noexcept;
   Coverage& operator=(Coverage&&) noexcept;
   ~Coverage();

@@ -26,11 +26,10 @@ struct SlabFacet {
   std::uint32_t corners;
 };
 
-/// A facet in the row that is made.
+/// A facet in a row.
 struct RowFacet {
   std::uint32_t first = 0, last = 0;  // columns that it may reach; last included
   std::uint32_t index = 0;            // among those of the layer
-  std::uint32_t first_row = 0;        // the last one that it may reach, for rows go downwards
 };
 
 /// What lies behind the piece within the layer, up to where x is `end`, nm^3; negative behind facets that +x leaves through.

@@ -17,6 +17,11 @@ struct Voxel {
   std::int64_t x0, x1, y0, y1, z0, z1;
 };
 
+/// nm; a voxel's nominal sides, which true ones differ from by less than 1.
+struct VoxelSides {
+  double x, y, z;
+};
+
 /// The same of a row of voxels in a layer.
 struct Strip {
   std::int64_t y0, y1, z0, z1;

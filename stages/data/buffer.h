@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <memory>
 #include <type_traits>
 #include <utility>
@@ -38,3 +39,10 @@ std::size_t bytes_held(const Buffer<T>& buffer) {
 }
 
 }  // namespace lamina
+
+/// Made once, optimised: of the copies that files make of what they do not inline, linkers take any, also that of a file that
+/// is compiled to be compiled fast, where resize() counts up to what it leaves unset.
+extern template class std::vector<std::uint8_t, lamina::UnsetAllocator<std::uint8_t>>;
+extern template class std::vector<std::uint32_t, lamina::UnsetAllocator<std::uint32_t>>;
+extern template class std::vector<std::uint64_t, lamina::UnsetAllocator<std::uint64_t>>;
+extern template class std::vector<double, lamina::UnsetAllocator<double>>;

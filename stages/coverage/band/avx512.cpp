@@ -1,0 +1,96 @@
+// Eight lanes at a time, with AVX-512.
+#include <algorithm>
+#include <bit>
+#include <cmath>
+
+#include "stages/coverage/band/kernels.h"
+#include "stages/geometry/targets.h"
+
+#if defined(LAMINA_WIDE_KERNELS)
+#include <immintrin.h>
+
+#define LAMINA_TARGET LAMINA_AVX512
+#define LAMINA_LANES LAMINA_AVX512 __attribute__((always_inline)) inline
+
+LAMINA_AVX512_BEGIN
+
+namespace lamina::cover::avx512 {
+namespace {
+
+using Eight = __m512d;
+using Mask = __mmask8;
+
+LAMINA_LANES Eight load(const double* at) { return _mm512_loadu_pd(at); }
+LAMINA_LANES Eight all(double value) { return _mm512_set1_pd(value); }
+LAMINA_LANES Eight plus(Eight a, Eight b) { return _mm512_add_pd(a, b); }
+LAMINA_LANES Eight less(Eight a, Eight b) { return _mm512_sub_pd(a, b); }
+LAMINA_LANES Eight times(Eight a, Eight b) { return _mm512_mul_pd(a, b); }
+LAMINA_LANES Eight over(Eight a, Eight b) { return _mm512_div_pd(a, b); }
+LAMINA_LANES Eight least(Eight a, Eight b) { return _mm512_min_pd(a, b); }
+LAMINA_LANES Eight most(Eight a, Eight b) { return _mm512_max_pd(a, b); }
+LAMINA_LANES Eight absolute(Eight a) { return _mm512_abs_pd(a); }
+LAMINA_LANES Eight whole_below(Eight a) { return _mm512_floor_pd(a); }
+LAMINA_LANES Mask below(Eight a, Eight b) { return _mm512_cmp_pd_mask(a, b, _CMP_LT_OQ); }
+LAMINA_LANES std::uint32_t bits(Mask mask) { return mask; }
+LAMINA_LANES Eight pick(Mask mask, Eight a, Eight b) { return _mm512_mask_blend_pd(mask, b, a); }
+LAMINA_LANES Eight keep(Mask mask, Eight a) { return _mm512_maskz_mov_pd(mask, a); }
+LAMINA_LANES Eight drop(Mask mask, Eight a) { return _mm512_maskz_mov_pd(static_cast<Mask>(~mask), a); }
+LAMINA_LANES Mask first_lanes(std::uint32_t count) { return static_cast<Mask>((1u << count) - 1); }
+LAMINA_LANES Eight keep_first(std::uint32_t count, Eight a) { return _mm512_maskz_mov_pd(first_lanes(count), a); }
+LAMINA_LANES void store(double* at, Eight a) { _mm512_storeu_pd(at, a); }
+LAMINA_LANES void store_first(double* at, std::uint32_t count, Eight a) { _mm512_mask_storeu_pd(at, first_lanes(count), a); }
+LAMINA_LANES void store_whole(std::uint32_t* at, Eight a) {
+  _mm256_storeu_si256(reinterpret_cast<__m256i*>(at), _mm512_cvttpd_epi32(a));
+}
+LAMINA_LANES bool is_zero(Eight a, Eight b) {
+  return (_mm512_cmp_pd_mask(a, _mm512_setzero_pd(), _CMP_NEQ_UQ) | _mm512_cmp_pd_mask(b, _mm512_setzero_pd(), _CMP_NEQ_UQ)) ==
+         0;
+}
+/// Lanes 1 .. 7 of a, then lane 0 of b.
+LAMINA_LANES Eight shifted(Eight a, Eight b) {
+  return _mm512_castsi512_pd(_mm512_alignr_epi64(_mm512_castpd_si512(b), _mm512_castpd_si512(a), 1));
+}
+template <int kBy>
+LAMINA_LANES Eight raised(Eight a) {
+  return _mm512_castsi512_pd(_mm512_alignr_epi64(_mm512_castpd_si512(a), _mm512_setzero_si512(), 8 - kBy));
+}
+/// Each lane and all before it.
+LAMINA_LANES Eight sums_of(Eight a) {
+  a = plus(a, raised<1>(a));
+  a = plus(a, raised<2>(a));
+  return plus(a, raised<4>(a));
+}
+LAMINA_LANES double last_of(Eight a) { return _mm512_cvtsd_f64(_mm512_permutexvar_pd(_mm512_set1_epi64(7), a)); }
+LAMINA_LANES std::uint64_t bytes_of(Eight a) {
+  return static_cast<std::uint64_t>(_mm_cvtsi128_si64(_mm256_cvtepi32_epi8(_mm512_cvttpd_epi32(a))));
+}
+LAMINA_LANES void note_changes(std::uint64_t levels, std::uint32_t columns, std::uint32_t first, std::uint32_t& level,
+                               Changes& changes) {
+  const __m128i now = _mm_cvtsi64_si128(static_cast<long long>(levels));
+  const __m128i before = _mm_cvtsi64_si128(static_cast<long long>(levels << 8 | level));
+  const auto changed = static_cast<__mmask8>(_mm_cmpneq_epi8_mask(now, before) & ((1u << columns) - 1));
+  const __m256i column =
+      _mm256_add_epi32(_mm256_set1_epi32(static_cast<int>(first)), _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7));
+  _mm256_storeu_si256(reinterpret_cast<__m256i*>(changes.column + changes.count), _mm256_maskz_compress_epi32(changed, column));
+  const __m256i level_of = _mm256_maskz_compress_epi32(changed, _mm256_cvtepu8_epi32(now));
+  _mm_storel_epi64(reinterpret_cast<__m128i*>(changes.level + changes.count), _mm256_cvtepi32_epi8(level_of));
+  changes.count += static_cast<std::uint32_t>(std::popcount(static_cast<std::uint32_t>(changed)));
+  level = levels >> (8 * (columns - 1)) & 255;
+}
+
+#include "stages/coverage/band/body.h"
+
+}  // namespace
+
+LAMINA_AVX512 void lay(const Trapezoid& piece, const BandRows& rows, const Edges& columns, BandCells& cells, Reach& reach,
+                       BandSums& sums) {
+  lay_body(piece, rows, columns, cells, reach, sums);
+}
+LAMINA_AVX512 void sweep(const RowTask& row, Changes& changes) { sweep_body(row, changes); }
+
+}  // namespace lamina::cover::avx512
+
+LAMINA_AVX512_END
+#undef LAMINA_LANES
+#undef LAMINA_TARGET
+#endif

@@ -1,0 +1,107 @@
+#include "stages/coverage/band/maker.h"
+
+#include "stages/coverage/coverage.h"
+#include "stages/coverage/edges.h"
+
+namespace lamina::cover {
+
+std::uint64_t BandMaker::bytes_of(std::uint64_t facets, std::uint32_t columns) {
+  // A facet has five corners at most, so four trapezoids.
+  return 4 * facets * (sizeof(Trapezoid) + sizeof(Reach)) + facets * sizeof(RowFacet) +
+         std::uint64_t{columns} * (2 * kBandRows * sizeof(double) + sizeof(std::uint32_t) + 2 + 2 * kBandRows / 8);
+}
+
+void BandMaker::start(const Slab& slab, Isa isa) {
+  kernels_ = &band_kernels_for(isa);
+  cells_.start(slab.edges.count());
+  active_.clear();
+  column_.resize(std::size_t{slab.edges.count()} + 1 + kLanes);
+  level_.resize(std::size_t{slab.edges.count()} + 1 + kLanes);
+}
+
+void BandMaker::enter(const SlabFacet& facet, std::uint32_t index, const Edges& rows) {
+  cut_trapezoids(facet, index, rows, active_);
+}
+
+/// All that reaches the band goes into its cells.
+void BandMaker::lay(const Slab& slab, BandSums& sums) {
+  sums = {};
+  reach_.resize(active_.size());
+  const std::uint32_t last = rows_.first + rows_.count - 1;
+  for (std::size_t i = 0; i < active_.size(); ++i) {
+    const Trapezoid& piece = active_[i];
+    if (piece.first_row > last || piece.last_row < rows_.first) continue;
+    kernels_->lay(piece, rows_, slab.edges, cells_, reach_[i], sums);
+  }
+}
+
+/// Runs between changes; those of level 0 are none.
+void BandMaker::append(const Changes& changes, std::uint32_t columns, Levels& out) const {
+  const std::size_t before = out.level.size(), most = before + changes.count;
+  if (out.level.capacity() < most) {
+    out.level.reserve(2 * most);
+    out.change.reserve(4 * most);
+  }
+  out.level.resize(most);
+  out.change.resize(2 * most);
+  changes.column[changes.count] = columns;
+  std::uint32_t* change = out.change.data() + 2 * before;
+  std::uint8_t* level = out.level.data() + before;
+  for (std::uint32_t i = 0; i < changes.count; ++i) {
+    change[0] = changes.column[i];
+    change[1] = changes.column[i + 1];
+    *level = changes.level[i];
+    const std::size_t taken = changes.level[i] != 0 ? 1 : 0;
+    change += 2 * taken;
+    level += taken;
+  }
+  out.level.resize(static_cast<std::size_t>(level - out.level.data()));
+  out.change.resize(2 * out.level.size());
+  out.end_row();
+}
+
+RowTask BandMaker::task(const Slab& slab, std::uint32_t lane, const BandSums& sums) {
+  const double depth = rows_.y[lane + 1] - rows_.y[lane], area = depth * slab.sides.z, count = sums.count[lane];
+  const double scale = sums.size[lane] + count * widest_side(slab, depth), added = sums.columns[lane] + 2 * count;
+  const ColumnMarks suspect = cells_.suspect(lane);
+  return {.edges = slab.edges.data(),
+          .columns = slab.edges.count(),
+          .fill = slab.rule.fill,
+          .area = area,
+          .widest = slab.edges.widest(),
+          .per_widest = slab.rule.top_level / (slab.edges.widest() * area),
+          .per_narrowest = slab.rule.top_level / (slab.edges.narrowest() * area),
+          .top = static_cast<double>(slab.rule.top_level),
+          .spoilt = spoilt_share(slab, depth, scale, added, count),
+          .partial = cells_.partial(lane),
+          .passed = cells_.passed(lane),
+          .held = cells_.held(lane),
+          .suspect = suspect,
+          .has_suspects = suspect.next(0) != ColumnMarks::kNone,
+          .judge = &judge_};
+}
+
+void BandMaker::make(const Slab& slab, std::uint32_t first, std::uint32_t rows, Levels& out, LayerReport& report) {
+  rows_.first = first;
+  rows_.count = rows;
+  for (std::uint32_t i = 0; i <= kBandRows; ++i) {
+    rows_.y[i] = static_cast<double>(edge(slab.rows, std::int64_t{first} + std::min(i, rows)));
+  }
+  BandSums sums;
+  lay(slab, sums);
+  for (std::uint32_t lane = rows; lane-- > 0;) {
+    Changes changes{column_.data(), level_.data()};
+    if (sums.count[lane] > 0) {
+      judge_.start(slab, {active_, reach_}, first + lane, first, report);
+      const RowTask row = task(slab, lane, sums);
+      kernels_->sweep(row, changes);
+      report.held_voxels += changes.held;
+      row.held.clear();
+      if (row.has_suspects) row.suspect.clear();
+    }
+    append(changes, slab.edges.count(), out);
+  }
+  std::erase_if(active_, [&](const Trapezoid& piece) { return piece.first_row >= first; });
+}
+
+}  // namespace lamina::cover

@@ -1,0 +1,130 @@
+// stages/coverage/band/parts.h: eight lanes in parts of kPartBytes, which compilers turn into what the target has. Included
+// once for each of those instruction sets, in its namespace, behind Part, an array of doubles, and its least_of(), most_of()
+// and signs_of(); LAMINA_LANES has the target.
+
+constexpr int kWidth = sizeof(Part) / sizeof(double), kParts = 8 / kWidth;
+using Whole = std::int64_t __attribute__((vector_size(sizeof(Part))));
+
+struct Eight {
+  Part part[kParts];
+};
+struct Mask {
+  Whole part[kParts];
+};
+
+/// Parts that lie anywhere.
+using LoosePart = Part __attribute__((aligned(8), may_alias));
+using LooseWhole = Whole __attribute__((aligned(8), may_alias));
+
+LAMINA_LANES Eight load(const double* at) {
+  Eight a;
+  for (int i = 0; i < kParts; ++i) a.part[i] = *reinterpret_cast<const LoosePart*>(at + i * kWidth);
+  return a;
+}
+LAMINA_LANES void store(double* at, const Eight& a) {
+  for (int i = 0; i < kParts; ++i) *reinterpret_cast<LoosePart*>(at + i * kWidth) = a.part[i];
+}
+
+#define LAMINA_EACH(expression)                                 \
+  Eight result;                                                 \
+  for (int i = 0; i < kParts; ++i) result.part[i] = expression; \
+  return result
+
+LAMINA_LANES Eight all(double value) { LAMINA_EACH(Part{} + value); }
+LAMINA_LANES Eight plus(const Eight& a, const Eight& b) { LAMINA_EACH(a.part[i] + b.part[i]); }
+LAMINA_LANES Eight less(const Eight& a, const Eight& b) { LAMINA_EACH(a.part[i] - b.part[i]); }
+LAMINA_LANES Eight times(const Eight& a, const Eight& b) { LAMINA_EACH(a.part[i] * b.part[i]); }
+LAMINA_LANES Eight over(const Eight& a, const Eight& b) { LAMINA_EACH(a.part[i] / b.part[i]); }
+LAMINA_LANES Eight least(const Eight& a, const Eight& b) { LAMINA_EACH(least_of(a.part[i], b.part[i])); }
+LAMINA_LANES Eight most(const Eight& a, const Eight& b) { LAMINA_EACH(most_of(a.part[i], b.part[i])); }
+LAMINA_LANES Eight absolute(const Eight& a) { LAMINA_EACH(most_of(a.part[i], -a.part[i])); }
+/// Of less than 2^51.
+LAMINA_LANES Eight whole_below(const Eight& a) {
+  Eight near;
+  for (int i = 0; i < kParts; ++i) near.part[i] = (a.part[i] + 0x1.8p52) - 0x1.8p52;
+  LAMINA_EACH(near.part[i] > a.part[i] ? near.part[i] - 1 : near.part[i]);
+}
+LAMINA_LANES Mask below(const Eight& a, const Eight& b) {
+  Mask mask;
+  for (int i = 0; i < kParts; ++i) mask.part[i] = a.part[i] < b.part[i];
+  return mask;
+}
+LAMINA_LANES std::uint32_t bits(const Mask& mask) {
+  std::uint32_t found = 0;
+  for (int i = 0; i < kParts; ++i) found |= signs_of((Part)mask.part[i]) << i * kWidth;
+  return found;
+}
+LAMINA_LANES Eight pick(const Mask& mask, const Eight& a, const Eight& b) { LAMINA_EACH(mask.part[i] ? a.part[i] : b.part[i]); }
+LAMINA_LANES Eight keep(const Mask& mask, const Eight& a) { LAMINA_EACH(mask.part[i] ? a.part[i] : Part{}); }
+LAMINA_LANES Eight drop(const Mask& mask, const Eight& a) { LAMINA_EACH(mask.part[i] ? Part{} : a.part[i]); }
+LAMINA_LANES Mask first_lanes(std::uint32_t count) {
+  static constexpr std::int64_t kOnes[16] = {-1, -1, -1, -1, -1, -1, -1, -1};
+  Mask mask;
+  for (int i = 0; i < kParts; ++i) mask.part[i] = *reinterpret_cast<const LooseWhole*>(kOnes + 8 - count + i * kWidth);
+  return mask;
+}
+LAMINA_LANES Eight keep_first(std::uint32_t count, const Eight& a) { return keep(first_lanes(count), a); }
+LAMINA_LANES void store_first(double* at, std::uint32_t count, const Eight& a) {
+  store(at, pick(first_lanes(count), a, load(at)));
+}
+LAMINA_LANES void store_whole(std::uint32_t* at, const Eight& a) {
+  for (int i = 0; i < 8; ++i) at[i] = static_cast<std::uint32_t>(static_cast<std::int32_t>(a.part[i / kWidth][i % kWidth]));
+}
+LAMINA_LANES bool is_zero(const Eight& a, const Eight& b) {
+  Whole some{};
+  for (int i = 0; i < kParts; ++i) some |= (a.part[i] != 0) | (b.part[i] != 0);
+  return signs_of((Part)some) == 0;
+}
+
+/// Lanes k .. k + kWidth - 1 of a part and the one behind it.
+template <int kFirst, class P>
+LAMINA_LANES P across(const P& a, const P& b) {
+  if constexpr (kFirst == 0) {
+    return a;
+  } else if constexpr (sizeof(P) == 16) {
+    return __builtin_shufflevector(a, b, 1, 2);
+  } else {
+    return __builtin_shufflevector(a, b, kFirst, kFirst + 1, kFirst + 2, kFirst + 3);
+  }
+}
+/// Lanes 1 .. 7 of a, then lane 0 of b.
+LAMINA_LANES Eight shifted(const Eight& a, const Eight& b) {
+  LAMINA_EACH(across<1>(a.part[i], i + 1 < kParts ? a.part[i + 1] : b.part[0]));
+}
+template <int kBy>
+LAMINA_LANES Eight raised(const Eight& a) {
+  constexpr int kSkipped = (kBy + kWidth - 1) / kWidth;
+  const auto at = [&](int i) LAMINA_TARGET { return i < 0 ? Part{} : a.part[i]; };
+  LAMINA_EACH((across<kSkipped * kWidth - kBy>(at(i - kSkipped), at(i - kSkipped + 1))));
+}
+/// Each lane and all before it.
+LAMINA_LANES Eight sums_of(Eight a) {
+  a = plus(a, raised<1>(a));
+  a = plus(a, raised<2>(a));
+  return plus(a, raised<4>(a));
+}
+LAMINA_LANES double last_of(const Eight& a) { return a.part[kParts - 1][kWidth - 1]; }
+/// Of whole numbers below 256: sums of less than 2^32 are exact.
+LAMINA_LANES std::uint64_t bytes_of(const Eight& a) {
+  double weighted[8];
+  const double weight[8] = {1, 0x1p8, 0x1p16, 0x1p24, 1, 0x1p8, 0x1p16, 0x1p24};
+  store(weighted, times(a, load(weight)));
+  const auto four = [&](int i) LAMINA_TARGET {
+    return static_cast<std::int64_t>((weighted[i] + weighted[i + 1]) + (weighted[i + 2] + weighted[i + 3]));
+  };
+  return static_cast<std::uint64_t>(four(0)) | static_cast<std::uint64_t>(four(4)) << 32;
+}
+LAMINA_LANES void note_changes(std::uint64_t levels, std::uint32_t columns, std::uint32_t first, std::uint32_t& level,
+                               Changes& changes) {
+  std::uint64_t changed = levels ^ (levels << 8 | level);
+  if (columns < 8) changed &= (std::uint64_t{1} << 8 * columns) - 1;
+  while (changed != 0) {
+    const auto lane = static_cast<std::uint32_t>(std::countr_zero(changed)) / 8;
+    level = levels >> 8 * lane & 255;
+    changes.column[changes.count] = first + lane;
+    changes.level[changes.count++] = static_cast<std::uint8_t>(level);
+    changed &= ~(std::uint64_t{255} << 8 * lane);
+  }
+}
+
+#undef LAMINA_EACH
