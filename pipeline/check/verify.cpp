@@ -161,6 +161,8 @@ void check_frame(const std::string& directory, const ManifestHead& head, VerifyR
 void finish_replay(const Inspection& inspection, const std::optional<JobCost>& cost) {
   if (!inspection.machine || inspection.report.replayed == 0) return;
   VerifyReport& report = inspection.report;
+  if (inspection.head.materials.empty() && report.replay.vats == 3)
+    report.add("both vats feed, some layers or each, and the job is of one powder");
   report.material = replay::material_of(inspection.machine->profile(), report.replay);
   report.coverage = static_cast<double>(report.replay.drops) / static_cast<double>(report.replayed) /
                     static_cast<double>(inspection.head.grid.columns()) / static_cast<double>(inspection.head.grid.rows());

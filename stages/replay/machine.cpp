@@ -55,12 +55,14 @@ void Count::add(const Count& other) {
   farthest_across_um = std::max(farthest_across_um, other.farthest_across_um);
 }
 
-Result<VirtualMachine> VirtualMachine::build(const Machine& machine, std::uint32_t columns, std::uint32_t rows) {
+Result<VirtualMachine> VirtualMachine::build(const Machine& machine, std::uint32_t columns, std::uint32_t rows,
+                                             std::uint32_t layers) {
   const auto wrong = [](const std::string& what) { return Error{Fault::kVerification, "program/machine.toml: " + what}; };
   VirtualMachine made;
   made.machine_ = machine;
   made.columns_ = columns;
   made.rows_ = rows;
+  made.layers_ = layers;
   const bool x = machine.mounting.scan_axis == ScanAxis::kX;
   const double pitch = machine.head.pitch_um;
   const double passes = machine.mounting.passes;

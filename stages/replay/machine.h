@@ -23,8 +23,10 @@ namespace lamina::replay {
 /// The pixels of a machine, derived independently from its profile.
 class VirtualMachine {
  public:
-  /// columns, rows  of the images. errors  kVerification if the profile cannot be this job's
-  static Result<VirtualMachine> build(const Machine& machine, std::uint32_t columns, std::uint32_t rows);
+  /// columns, rows  of the images. layers: of the job; 0: whatever programs say.
+  /// errors  kVerification if the profile cannot be this job's
+  static Result<VirtualMachine> build(const Machine& machine, std::uint32_t columns, std::uint32_t rows,
+                                      std::uint32_t layers = 0);
 
   const Machine& profile() const { return machine_; }
 
@@ -69,7 +71,7 @@ class VirtualMachine {
  private:
   friend class Printing;
   Machine machine_;
-  std::uint32_t columns_ = 0, rows_ = 0;
+  std::uint32_t columns_ = 0, rows_ = 0, layers_ = 0;
   double line_um_ = 0, place_um_ = 0, step_um_ = 0;
   std::uint32_t lines_ = 0, places_ = 0;
   struct Nozzle {
