@@ -33,6 +33,8 @@ Status read(std::string_view dialect, std::string_view program, Printing& printi
 
 }  // namespace
 
+std::uint32_t drop_bits(std::uint32_t most_drops) { return most_drops < 2 ? 1 : most_drops < 4 ? 2 : 4; }
+
 void Count::add(const Count& other) {
   drops += other.drops;
   vectors += other.vectors;
@@ -111,6 +113,15 @@ Result<VirtualMachine> VirtualMachine::build(const Machine& machine, std::uint32
     made.nozzle_.push_back(nozzle);
   }
   return made;
+}
+
+VirtualMachine::Counts VirtualMachine::counts() const {
+  return {machine_.head.nozzles,
+          places_,
+          lines_,
+          static_cast<std::uint32_t>(ticks_),
+          drop_bits(machine_.head.most_drops),
+          step_um_};
 }
 
 std::array<double, 2> VirtualMachine::nozzle_at(std::int64_t first_line, double step, std::uint32_t number) const {

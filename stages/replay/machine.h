@@ -20,6 +20,9 @@
 
 namespace lamina::replay {
 
+/// Bits of a nozzle's drops in programs of heads that fire several at a place; 1 for others.
+std::uint32_t drop_bits(std::uint32_t most_drops);
+
 /// The pixels of a machine, derived independently from its profile.
 class VirtualMachine {
  public:
@@ -29,6 +32,13 @@ class VirtualMachine {
                                       std::uint32_t layers = 0);
 
   const Machine& profile() const { return machine_; }
+  std::uint32_t layers() const { return layers_; }
+  /// Sizes that headers of programs tell. steps: of a pixel; drop_bits: of a nozzle's drops at a place
+  struct Counts {
+    std::uint32_t nozzles, places, lines, steps, drop_bits;
+    double step_um;
+  };
+  Counts counts() const;
 
   /// Replays the program of a layer (the whole file) and compares the printed pixels with the image.
   ///
