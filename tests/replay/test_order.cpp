@@ -127,10 +127,6 @@ TEST(Order, CountsAreThoseOfTheLayer) {
   expect_in(Reordered(bench).replace("M812 S1", "M812 S2").told(), "beyond the 2 that the layer has");
   expect_in(Reordered(bench).replace("M812 S1", "M812 S7").replace("M812 S0", "M812 S1").replace("M812 S7", "M812 S0").told(),
             "and the swath of that number at line");
-  const TamperBench one_way("nuferbj", [](Machine& m) {
-    printed_parts::all_care_of(m);
-    m.motion.both_directions = false;
-  });
   TamperBench both = bench;
   both.resolved.machine.motion.both_directions = false;
   expect_in(both.told(both.program.text), "fires on the way there alone");
