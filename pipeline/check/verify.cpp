@@ -155,14 +155,14 @@ void prepare_replay(Inspection& inspection) {
 // Checks the programs before the first and after the last layer.
 void check_frame(const Inspection& inspection, VerifyReport& report) {
   const ManifestHead& head = inspection.head;
-  for (const auto& [stem, hash, check] :
-       {std::tuple{"start", head.program_start, &replay::check_start}, std::tuple{"end", head.program_end, &replay::check_end}}) {
+  for (const auto& [stem, hash, check] : {std::tuple{"start", head.program_start, &replay::check_start},
+                                          std::tuple{"end", head.program_end, &replay::check_end}}) {
     const std::string name = fmt::format("program/{}{}", stem, head.program_extension);
     std::string fault = fault_of_file(inspection.directory, name, hash);
-    if (fault.empty() && inspection.machine && !inspection.quick) {
-      const auto text = read_file((fs::path(inspection.directory) / name).string(), {.most_bytes = kMostTomlBytes});
-      const Status status = text ? check(*inspection.machine, *text) : Status(text.error());
-      if (!status) fault = fmt::format("{}: {}", name, status.error().message);
+    const auto text = read_file((fs::path(inspection.directory) / name).string(), {.most_bytes = kMostTomlBytes});
+    if (inspection.machine && !inspection.quick && text) {
+      if (const Status status = check(*inspection.machine, *text); !status)
+        fault = fmt::format("{}: {}", name, status.error().message);
     }
     if (!fault.empty()) report.add(std::move(fault));
   }

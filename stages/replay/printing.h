@@ -171,7 +171,6 @@ class Printing {
   void strokes(double build_mm, double fed_mm);
   const std::vector<std::string>& own_lines() const;
   bool capped() const;
-  bool lamp_is_on() const;
   void waits_capped(std::string_view what);
   void check_pauses();
   void check_told();
@@ -212,6 +211,7 @@ class Printing {
   std::uint64_t spat_here_ = 0;        // drops of a nozzle since the head stands
   std::size_t own_ = 0;                // lines of the block at hand that came
   std::uint32_t wiper_blocks_ = 0, lamp_blocks_ = 0;
+  bool lamp_on_ = false;          // by the lines that begin the pause to dry
   bool at_wiper_ = false;         // the head has just gone over it
   bool filled_ = false;           // vats are, and the head has not gone back to its safe place
   double dwelt_s_ = 0, rpm_ = 0;  // rpm: of the roller

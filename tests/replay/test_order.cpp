@@ -100,6 +100,7 @@ TEST(Order, OfTheLampAndTheCapIsHeld) {
       m.care.cap_mm.reset();
     });
     expect_in(Reordered(open).move("M106", safe).told(), "while the head is not at its safe place");
+    expect_in(bench.told(bench.with(bench.find("M106"), "")), "own lines stand");
     // The lamp is on until its line comes.
     expect_in(bench.told(bench.with(bench.find("M107"), bench.pieces[bench.find(safe, -1)] + "M107\n")),
               "the head moves before 'M107'");

@@ -19,7 +19,7 @@ void Printing::head_stands_at(double x_mm, double y_mm, double works_mm_s) {
   const auto& care = profile().care;
   leaves_wiper("the head goes on");
   leaves_place();
-  if (lamp_is_on()) {
+  if (lamp_on_) {
     fault(fmt::format("the head moves before '{}', which ends the pause to dry", profile().powder.dry_off_lines.front()));
   }
   if (filled_ && std::hypot(x_mm - profile().motion.safe_mm[0], y_mm - profile().motion.safe_mm[1]) > 1e-3) {
@@ -104,11 +104,6 @@ void Printing::waits_capped(std::string_view what) {
   fault(fmt::format("{} while the head is not at its {}, {:g}, {:g} mm", what, cap ? "cap" : "safe place", at[0], at[1]));
 }
 
-bool Printing::lamp_is_on() const {
-  const auto& powder = profile().powder;
-  return lamp_blocks_ == 1 && !powder.dry_on_lines.empty() && !powder.dry_off_lines.empty();
-}
-
 void Printing::refills() {
   if (count.fed_mm[0] + count.fed_mm[1] > 0) return fault("waits for the vats to be filled behind the layer's powder");
   waits_capped("the vats are filled");
@@ -138,6 +133,7 @@ bool Printing::takes_own(std::string_view line) {
     if (++own_ < lines.size()) return true;
     own_ = 0;
     ++(at_wiper_ ? wiper_blocks_ : lamp_blocks_);
+    lamp_on_ = !at_wiper_ && dwelt_s_ == 0 && !profile().powder.dry_off_lines.empty();
     at_wiper_ = false;
     return true;
   }
