@@ -32,7 +32,7 @@ Result<replay::VirtualMachine> machine_of_job(const std::string& directory, cons
   if (!fault.empty()) return Error{Fault::kVerification, std::move(fault)};
   const Result<Machine> machine = read_machine(whole_file(fs::path(directory) / name, kMostTomlBytes), name);
   if (!machine) return machine.error();
-  return replay::VirtualMachine::build(*machine, head.grid.columns(), head.grid.rows());
+  return replay::VirtualMachine::build(*machine, head.grid.columns(), head.grid.rows(), head.layer_count);
 }
 
 std::string program_of_layer(const std::string& directory, const ManifestHead& head, std::uint32_t layer) {

@@ -8,15 +8,18 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <tuple>
 
 #include "pipeline/check/doses.h"
 #include "pipeline/check/job_files.h"
 #include "pipeline/output/directory.h"
 #include "pipeline/output/print_program.h"
 #include "pipeline/run/job_cost.h"
+#include "stages/data/input/file_reader.h"
 #include "stages/data/levels.h"
 #include "stages/read/image.h"
 #include "stages/replay/feeding.h"
+#include "stages/replay/frame/frame.h"
 #include "stages/write/manifest/compare.h"
 #include "stages/write/manifest/manifest.h"
 
@@ -150,10 +153,18 @@ void prepare_replay(Inspection& inspection) {
 }
 
 // Checks the programs before the first and after the last layer.
-void check_frame(const std::string& directory, const ManifestHead& head, VerifyReport& report) {
-  for (const auto& [stem, hash] : {std::pair{"start", head.program_start}, {"end", head.program_end}}) {
+void check_frame(const Inspection& inspection, VerifyReport& report) {
+  const ManifestHead& head = inspection.head;
+  for (const auto& [stem, hash, check] : {std::tuple{"start", head.program_start, &replay::check_start},
+                                          std::tuple{"end", head.program_end, &replay::check_end}}) {
     const std::string name = fmt::format("program/{}{}", stem, head.program_extension);
-    if (std::string fault = fault_of_file(directory, name, hash); !fault.empty()) report.add(std::move(fault));
+    std::string fault = fault_of_file(inspection.directory, name, hash);
+    const auto text = read_file((fs::path(inspection.directory) / name).string(), {.most_bytes = kMostTomlBytes});
+    if (inspection.machine && !inspection.quick && text) {
+      if (const Status status = check(*inspection.machine, *text); !status)
+        fault = fmt::format("{}: {}", name, status.error().message);
+    }
+    if (!fault.empty()) report.add(std::move(fault));
   }
 }
 
@@ -161,6 +172,8 @@ void check_frame(const std::string& directory, const ManifestHead& head, VerifyR
 void finish_replay(const Inspection& inspection, const std::optional<JobCost>& cost) {
   if (!inspection.machine || inspection.report.replayed == 0) return;
   VerifyReport& report = inspection.report;
+  if (inspection.head.materials.empty() && report.replay.vats == 3)
+    report.add("both vats feed, some layers or each, and the job is of one powder");
   report.material = replay::material_of(inspection.machine->profile(), report.replay);
   report.coverage = static_cast<double>(report.replay.drops) / static_cast<double>(report.replayed) /
                     static_cast<double>(inspection.head.grid.columns()) / static_cast<double>(inspection.head.grid.rows());
@@ -181,7 +194,7 @@ void check_layers(const std::string& directory, const Manifest& manifest, bool q
   if (!manifest.head.machine.empty()) prepare_replay(inspection);
   inspection.doses.emplace(manifest.head, inspection.machine ? &inspection.machine->profile() : nullptr);
   if (!manifest.head.machine.empty()) {
-    check_frame(directory, manifest.head, report);
+    check_frame(inspection, report);
     if (!cost && inspection.machine) cost.emplace(inspection.machine->profile(), manifest);
     if (report.unfed.empty()) {
       for (const JobMaterial& material : manifest.head.materials) report.unfed.push_back({material.name});

@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <array>
 #include <bit>
+#include <charconv>
 #include <cmath>
 #include <string>
 #include <utility>
@@ -88,8 +89,19 @@ class Firmware {
     if (!block.text.starts_with(want) || (block.text.size() > want.size() && block.text[want.size()] != ' ')) {
       return fault("M117 is not of this layer");
     }
+    if (!begun_) tell_layers(std::string_view(block.text).substr(want.size()));
     ended_ = begun_;
     begun_ = true;
+  }
+
+  /// " of 9"
+  void tell_layers(std::string_view text) {
+    constexpr std::string_view kOf = " of ";
+    std::uint32_t layers = 0;
+    if (text.starts_with(kOf)) text.remove_prefix(kOf.size());
+    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), layers);
+    if (error != std::errc() || end != text.data() + text.size()) return fault("M117 does not tell how many layers there are");
+    printing_.tells_layers(layers);
   }
 
   // GCode::_block_do, 'T': stop, select, parameters, start.
@@ -128,10 +140,16 @@ class Firmware {
         return move(block, feed_mm_min_);
       case 10: return tool_table(block);
       case 20:
-      case 21: unit_mm_ = block.command == 20 ? 25.4f : 1.0f; return;
+      case 21:
+        unit_mm_ = block.command == 20 ? 25.4f : 1.0f;
+        unit_told_ = true;
+        return;
       case 28: return home(block);
       case 90:
-      case 91: relative_ = block.command == 91; return;
+      case 91:
+        relative_ = block.command == 91;
+        mode_told_ = true;
+        return;
       default: unknown(block);
     }
   }
@@ -145,7 +163,10 @@ class Firmware {
     if (found == kTools.end()) return fault(fmt::format("there is no tool {}", tool));
     if (block.has('Y') || block.has('Z') || block.has('E')) return fault("sets a tool's offset along another axis than X");
     const auto row = static_cast<std::size_t>(found - kTools.begin());
-    if (block.has('X')) offset_mm_[row] = block['X'];
+    if (block.has('X')) {
+      offset_mm_[row] = block['X'];
+      place_told_[row] = true;
+    }
     if (std::abs(offset_mm_[row] - kPlaceMm[row]) > 1e-3) {
       return fault(fmt::format("sets tool {} at {:g} mm of the carriage, where {:g} is its place", tool, offset_mm_[row],
                                kPlaceMm[row]));
@@ -201,6 +222,12 @@ class Firmware {
   void go(double seconds) {
     const auto tool = static_cast<std::size_t>(std::ranges::find(kTools, tool_) - kTools.begin());
     const double from = axis_x_;
+    if (!unit_told_ || !mode_told_ || !place_told_[tool]) {
+      return fault(fmt::format("moves before {}: the firmware keeps what another print has set",
+                               !unit_told_   ? "G21 tells the unit"
+                               : !mode_told_ ? "G90 tells that places are absolute"
+                                             : fmt::format("G10 tells where tool {} is", tool_)));
+    }
     axis_x_ = std::clamp<double>(position_[kX] - offset_mm_[tool], 0, kMostXMm);
     const double way = axis_x_ - from;
     carry_out(bar_.move(position_[kY]), std::abs(way) > 1e-4);
@@ -306,6 +333,8 @@ class Firmware {
   double feed_mm_min_ = 3000;        // GCode::begin
   std::array<float, 4> position_{};  // CNC::_pos: X of the tool
   std::array<double, kTools.size()> offset_mm_{};
+  std::array<bool, kTools.size()> place_told_{};
+  bool unit_told_ = false, mode_told_ = false;
   int tool_ = kRecoater;                  // the layer before ends with it
   double axis_x_ = 0, inked_x_ = -1;      // of the carriage
   std::array<double, 4> moved_mm_{};      // of the bins since the layer began

@@ -36,6 +36,8 @@ class ByteReader {
   /// The next bytes, which are not taken; fewer at the end.
   std::string_view ahead(std::size_t count) const { return left_.substr(0, count); }
   std::uint32_t word() { return static_cast<std::uint32_t>(number(4)); }
+  /// Of nm as i32.
+  double mm() { return static_cast<std::int32_t>(word()) / 1e6; }
   bool done() const { return left_.empty(); }
   void fault(std::string_view what) { printing_.fault(fmt::format("byte {}: {}", all_ - left_.size(), what)); }
 

@@ -107,6 +107,7 @@ void Printing::compare(std::span<const RunsView> planes, std::uint64_t moved, st
     compare_plane(image, plane, moved, lost, differ);
   }
   const auto& [missing, added, first, first_of_all, worked, blocked, wanted] = differ;
+  if (first.empty()) check_numbers(planes);
   if (!first.empty()) {
     return fail(fmt::format("{}; in all {} pixels are not fired and {} fired too many", first, missing, added));
   }

@@ -80,10 +80,7 @@ void Printing::leave_place() {
   place_ = {};
 }
 
-std::uint32_t Printing::drop_bits() const {
-  const std::uint32_t most = profile().head.most_drops;
-  return most < 2 ? 1 : most < 4 ? 2 : 4;
-}
+std::uint32_t Printing::drop_bits() const { return replay::drop_bits(profile().head.most_drops); }
 
 void Printing::fire_words(std::span<const std::uint64_t> words) {
   if (purpose_ == Purpose::kTime) return;

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <cmath>
+#include <tuple>
 
 namespace lamina::replay {
 
@@ -75,8 +76,23 @@ Axes::Axes(Printing& printing, GcodeReader& reader) : printing_(printing), reade
   at_[profile.motion.x_axis[0]] = stand.x_mm;
   at_[profile.motion.y_axis[0]] = stand.y_mm;
   // Oasis's spreader spreads where it turns, which its reader sees.
-  const std::string& roller = profile.powder.roller_axis;
-  roller_on_gantry_ = profile.dialect != "oasis" && (roller == profile.motion.x_axis || roller == profile.motion.y_axis);
+  roller_on_gantry_ = profile.dialect != "oasis" && printing.roller_on_gantry();
+}
+
+// One line moves one part, and no part comes into the way of another.
+bool Axes::ways_are_free(const GcodeLine& line) {
+  using Part = Printing::Part;
+  const auto& [powder, motion] = std::tie(printing_.profile().powder, printing_.profile().motion);
+  const auto has = [&](const std::string& axis) { return line.has(axis[0]); };
+  const bool head = has(motion.x_axis) || has(motion.y_axis);
+  const bool roller = !printing_.roller_on_gantry() && has(powder.roller_axis);
+  const bool vat = has(powder.build_axis) || has(powder.feed_axes[0]) || (powder.vats > 1 && has(powder.feed_axes[1]));
+  if (head + roller + vat > 1) {
+    reader_.fault("moves two of head, roller and vats at a time");
+    return false;
+  }
+  if (head + roller + vat == 1) printing_.check_way(head ? Part::kHead : roller ? Part::kRoller : Part::kVat, feed_mm_s_);
+  return true;
 }
 
 bool Axes::take(const GcodeLine& line, bool scanning) {
@@ -93,17 +109,19 @@ bool Axes::take(const GcodeLine& line, bool scanning) {
     reader_.fault("moves at no speed");
     return true;
   }
+  if (!ways_are_free(line)) return true;
   for (const auto& [letter, value] : line.word) {
     if (letter == 'F') continue;
     double& at = at_[letter];
     const double way = relative_ ? value : value - at;
     at += way;
+    way_[letter] = way;
     all_squared += way * way;
     const std::string axis(1, letter);
     if (axis == profile.motion.x_axis || axis == profile.motion.y_axis) {
       head = true;
       head_squared += way * way;
-      if (roller_on_gantry_ && axis == profile.powder.roller_axis) printing_.roller_stands_at(at);
+      if (roller_on_gantry_ && axis == profile.powder.roller_axis) printing_.roller_stands_at(at, line.command == "G1");
     } else if (axis == profile.powder.build_axis || axis == profile.powder.roller_axis) {
       printing_.takes(std::abs(way) / feed_mm_s_);
       alone += std::abs(way);

@@ -62,11 +62,14 @@ class Axes {
   void end();
   double speed_mm_s() const { return feed_mm_s_; }  // the last F
   double at(const std::string& axis) { return at_[axis[0]]; }
+  /// Its last way, from before to where it stands; 0: none.
+  double last_way(const std::string& axis) { return way_[axis[0]]; }
 
  private:
+  bool ways_are_free(const GcodeLine& line);
   Printing& printing_;
   GcodeReader& reader_;
-  std::map<char, double> at_;
+  std::map<char, double> at_, way_;
   bool relative_ = false, roller_on_gantry_ = false;
   double feed_mm_s_ = 0;
 };

@@ -33,6 +33,8 @@ Status read(std::string_view dialect, std::string_view program, Printing& printi
 
 }  // namespace
 
+std::uint32_t drop_bits(std::uint32_t most_drops) { return most_drops < 2 ? 1 : most_drops < 4 ? 2 : 4; }
+
 void Count::add(const Count& other) {
   drops += other.drops;
   vectors += other.vectors;
@@ -55,12 +57,14 @@ void Count::add(const Count& other) {
   farthest_across_um = std::max(farthest_across_um, other.farthest_across_um);
 }
 
-Result<VirtualMachine> VirtualMachine::build(const Machine& machine, std::uint32_t columns, std::uint32_t rows) {
+Result<VirtualMachine> VirtualMachine::build(const Machine& machine, std::uint32_t columns, std::uint32_t rows,
+                                             std::uint32_t layers) {
   const auto wrong = [](const std::string& what) { return Error{Fault::kVerification, "program/machine.toml: " + what}; };
   VirtualMachine made;
   made.machine_ = machine;
   made.columns_ = columns;
   made.rows_ = rows;
+  made.layers_ = layers;
   const bool x = machine.mounting.scan_axis == ScanAxis::kX;
   const double pitch = machine.head.pitch_um;
   const double passes = machine.mounting.passes;
@@ -109,6 +113,15 @@ Result<VirtualMachine> VirtualMachine::build(const Machine& machine, std::uint32
     made.nozzle_.push_back(nozzle);
   }
   return made;
+}
+
+VirtualMachine::Counts VirtualMachine::counts() const {
+  return {machine_.head.nozzles,
+          places_,
+          lines_,
+          static_cast<std::uint32_t>(ticks_),
+          drop_bits(machine_.head.most_drops),
+          step_um_};
 }
 
 std::array<double, 2> VirtualMachine::nozzle_at(std::int64_t first_line, double step, std::uint32_t number) const {

@@ -20,13 +20,25 @@
 
 namespace lamina::replay {
 
+/// Bits of a nozzle's drops in programs of heads that fire several at a place; 1 for others.
+std::uint32_t drop_bits(std::uint32_t most_drops);
+
 /// The pixels of a machine, derived independently from its profile.
 class VirtualMachine {
  public:
-  /// columns, rows  of the images. errors  kVerification if the profile cannot be this job's
-  static Result<VirtualMachine> build(const Machine& machine, std::uint32_t columns, std::uint32_t rows);
+  /// columns, rows  of the images. layers: of the job; 0: whatever programs say.
+  /// errors  kVerification if the profile cannot be this job's
+  static Result<VirtualMachine> build(const Machine& machine, std::uint32_t columns, std::uint32_t rows,
+                                      std::uint32_t layers = 0);
 
   const Machine& profile() const { return machine_; }
+  std::uint32_t layers() const { return layers_; }
+  /// Sizes that headers of programs tell. steps: of a pixel; drop_bits: of a nozzle's drops at a place
+  struct Counts {
+    std::uint32_t nozzles, places, lines, steps, drop_bits;
+    double step_um;
+  };
+  Counts counts() const;
 
   /// Replays the program of a layer (the whole file) and compares the printed pixels with the image.
   ///
@@ -69,7 +81,7 @@ class VirtualMachine {
  private:
   friend class Printing;
   Machine machine_;
-  std::uint32_t columns_ = 0, rows_ = 0;
+  std::uint32_t columns_ = 0, rows_ = 0, layers_ = 0;
   double line_um_ = 0, place_um_ = 0, step_um_ = 0;
   std::uint32_t lines_ = 0, places_ = 0;
   struct Nozzle {

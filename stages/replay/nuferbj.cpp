@@ -81,6 +81,21 @@ class Loaded {
   std::vector<std::uint64_t> words_;
 };
 
+/// Whether the head goes the way that the sweep says, and has its ramps before the first step and behind the last.
+bool goes_its_way(std::span<const Vector> vectors, bool backward, double from, double to, Printing& printing) {
+  if (vectors.empty()) return true;
+  const bool grows = printing.position_of(1) > printing.position_of(0), up = (to > from) == grows;
+  if (up == backward) {
+    printing.fault(fmt::format("D{} and the head goes from {:g} to {:g} mm", backward ? 1 : 0, from, to));
+    return false;
+  }
+  const Vector& last = vectors.back();
+  const double sign = to > from ? 1 : -1, repeats = backward ? -double(last.repeats) : last.repeats;
+  const double first_mm = printing.position_of(static_cast<double>(vectors.front().step));
+  const double last_mm = printing.position_of(static_cast<double>(last.step) + repeats);
+  return printing.has_ramps(sign * (first_mm - from), sign * (to - last_mm));
+}
+
 /// Fires what is loaded while the head goes from one place to another, mm.
 void fire(const Loaded& loaded, bool backward, double from, double to, Printing& printing) {
   const double low = std::min(from, to), high = std::max(from, to);
@@ -99,6 +114,7 @@ void fire(const Loaded& loaded, bool backward, double from, double to, Printing&
       if (!printing.ok()) return;
     }
   }
+  goes_its_way(vectors, backward, from, to, printing);
 }
 
 /// Carries out what is no drop, powder or movement; false if it is another command.
@@ -129,6 +145,8 @@ void read_nuferbj(std::string_view text, Printing& printing) {
   if (!reader.next(line) || line.command != "M811" || reader.count(line, 'L') != printing.layer()) {
     return printing.fault("the program does not begin with M811 of this layer");
   }
+  printing.tells_layers(reader.count(line, 'T'));
+  printing.tells_heights({}, reader.number(line, 'H'));
   const ScanAxes scan(printing.profile());
   Loaded loaded(printing.nozzles());  // fired by the next G1 along the scan
   bool in_sweep = false, backward = false, ended = false;
@@ -136,8 +154,10 @@ void read_nuferbj(std::string_view text, Printing& printing) {
     if (ended) return reader.fault("goes on behind M813");
     if (line.command == "M812") {
       if (in_sweep) return reader.fault("a swath begins before the last one was scanned");
-      backward = reader.count(line, 'D') == 1;
-      printing.begin_sweep(reader.count(line, 'S'), backward);
+      const std::uint32_t direction = reader.count(line, 'D');
+      if (direction > 1) return reader.fault("D is 0, or 1 of a sweep that runs back");
+      backward = direction == 1;
+      printing.begin_sweep(reader.count(line, 'S'), backward, reader.count(line, 'T'));
       in_sweep = true;
     } else if (line.command[0] == 'J') {
       if (!in_sweep) return reader.fault("a vector outside of a swath");
@@ -145,9 +165,10 @@ void read_nuferbj(std::string_view text, Printing& printing) {
     } else if (line.command[0] == 'R') {
       if (!loaded.repeat(line.command.substr(1))) return reader.fault("R repeats no vector");
     } else if (line.command == "G1" && in_sweep && line.has(scan.along[0])) {
-      const double from = axes.at(scan.along);
-      printing.go_across(axes.at(scan.across));
+      const double from = axes.at(scan.along), across = axes.at(scan.across);
+      printing.go_across(across);
       axes.take(line, true);
+      if (axes.at(scan.across) != across) return reader.fault("moves across while it fires");
       fire(loaded, backward, from, axes.at(scan.along), printing);
       if (!printing.ok()) return;
       loaded.clear();
@@ -158,6 +179,8 @@ void read_nuferbj(std::string_view text, Printing& printing) {
       if (in_sweep || reader.count(line, 'L') != printing.layer()) return reader.fault("the layer ends within a swath");
       axes.end();
       ended = true;
+    } else if (!loaded.vectors().empty()) {
+      return reader.fault("only the sweep may follow vectors: the head would come over their steps on another way");
     } else if (!axes.take(line, false)) {
       return reader.fault(fmt::format("'{}' is no command of the dialect nuferbj", line.command));
     }

@@ -1,4 +1,6 @@
 // stages/write/program/planes/README.md tells the format.
+#include <array>
+#include <optional>
 #include <vector>
 
 #include "stages/replay/bytes.h"
@@ -64,12 +66,14 @@ void read_planes(std::string_view text, Printing& printing) {
   ByteReader reader(text, printing);
   Passes passes(printing);
   const std::uint32_t words = (printing.nozzles() + 31) / 32, bits = printing.drop_bits(), grey = bits > 1 ? 1 : 0;
-  std::uint32_t sweep = UINT32_MAX;
+  std::optional<std::array<std::uint32_t, 4>> sweep;  // number, of, direction, position of the one at hand
   const bool layer = reader.word() == kLayer;
   const std::uint32_t counts = reader.word();
   if (!layer || (counts != 4 && counts != 5) || reader.word() != printing.layer())
     return reader.fault("does not begin with this layer");
-  reader.take(3 * 4);
+  printing.tells_layers(reader.word());
+  const double bottom_mm = reader.mm();
+  printing.tells_heights(bottom_mm, reader.mm());
   printing.count.vats = counts == 5 ? reader.word() : 1;
   while (printing.ok()) {
     take_care_records(reader, printing, passes);
@@ -81,15 +85,20 @@ void read_planes(std::string_view text, Printing& printing) {
       return;
     }
     if (command != (grey != 0 ? kGrey : kPlane)) return reader.fault("neither a plane nor the end");
-    const std::uint32_t number = reader.word();
-    reader.word();
-    const bool backward = reader.word() == 1;
-    const auto across = static_cast<std::int32_t>(reader.word());
-    if (number != sweep) {
-      printing.begin_sweep(number, backward);
-      printing.go_across(across / 1e6);
-      passes.begin(across / 1e6, backward);
-      sweep = number;
+    std::array<std::uint32_t, 4> head{};
+    for (std::uint32_t& word : head) word = reader.word();
+    const auto [number, of, direction, position] = head;
+    if (direction > 1) return reader.fault("a sweep runs there, 0, or back, 1");
+    const bool backward = direction == 1;
+    if (sweep && (*sweep)[0] == number && *sweep != head) {
+      return reader.fault(fmt::format("a plane of swath {} with another number, way or position than the one before", number));
+    }
+    if (sweep != head) {
+      const double across_mm = static_cast<std::int32_t>(position) / 1e6;
+      printing.begin_sweep(number, backward, of);
+      printing.go_across(across_mm);
+      passes.begin(across_mm, backward);
+      sweep = head;
     }
     const std::int64_t first = reader.word();
     const std::uint32_t steps = reader.word();

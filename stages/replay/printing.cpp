@@ -49,7 +49,7 @@ void Printing::fault(std::string_view what) {
   fail(fmt::format("{}: {}", place, what));
 }
 
-void Printing::begin_sweep(std::uint32_t number, bool backward) {
+void Printing::begin_sweep(std::uint32_t number, bool backward, std::optional<std::uint32_t> of) {
   leave_sweep();
   if (sweeping_ && number <= sweep_ && !(sweeps_.empty())) {
     // Further sweeps for blocked nozzles have higher numbers than the regular ones that follow them.
@@ -58,13 +58,15 @@ void Printing::begin_sweep(std::uint32_t number, bool backward) {
     }
   }
   sweep_ = number;
-  fires_on_old_ = fires_on_old_ || !rolled_;
   reading_sweep_ = INT64_MIN;
   backward_ = backward;
   sweeping_ = true;
   stepped_ = false;
   fired_here_ = false;
   ++count.sweeps;
+  host_spread_ = true;
+  if (of) tells_sweep(*of);
+  check_spread();
 }
 
 void Printing::go_across(double carriage_mm) {
@@ -128,6 +130,7 @@ void Printing::head_moves(double mm, double mm_s, bool scanning, std::uint32_t d
     return fault(fmt::format("scans at {:g} mm/s, where nozzles fire {:.0f} times a second; they can {:.0f}", mm_s, hertz,
                              profile().head.highest_frequency_hz));
   }
+  check_speed(mm_s, scanning);
   (scanning ? count.scan_mm : count.travel_mm) += std::abs(mm);
   const double way = std::abs(mm), a = profile().motion.acceleration_mm_s2;
   takes(a == 0 ? way / mm_s : way < mm_s * mm_s / a ? 2 * std::sqrt(way / a) : way / mm_s + mm_s / a);
@@ -139,93 +142,27 @@ void Printing::head_moves(double mm, double mm_s, bool scanning, std::uint32_t d
   if (dwelt_s_ + lamp_blocks_ > 0) fault("scans behind the pause in which the layer dries");
 }
 
-void Printing::wrong_cycle(std::string_view what) { fail(fmt::format("layer {}, powder cycle: {}", layer_.index, what)); }
-
-void Printing::feeds(std::uint32_t vat, double mm, double mm_s) {
-  count.fed_mm[vat] += mm;
-  if (mm > 0) count.vats |= 1u << vat;
-  tells_powder_ = true;
-  takes(std::abs(mm) / mm_s);
+// Sweeps of the BrundleFab's bar are as fast as its sprays let them, which its reader holds.
+void Printing::check_speed(double mm_s, bool scanning) {
+  if (purpose_ == Purpose::kTime || profile().dialect == "brundlefab") return;
+  const auto& motion = profile().motion;
+  if (scanning) {
+    if (std::abs(mm_s - motion.scan_speed_mm_s) < 1.01 * kHalfMmPerMinute) return;
+    return fault(fmt::format("scans at {:g} mm/s where {:g} have to be", mm_s, motion.scan_speed_mm_s));
+  }
+  const double wipe = profile().care.wipes() ? profile().care.wipe_speed_mm_s : 0;
+  const double roller = roller_on_gantry() ? profile().powder.roller_speed_mm_s : 0;
+  const double most = std::max({motion.travel_speed_mm_s, motion.scan_speed_mm_s, wipe, roller});
+  if (mm_s > most + 1.01 * kHalfMmPerMinute)
+    fault(fmt::format("the head travels at {:g} mm/s, the profile's fastest is {:g}", mm_s, most));
 }
 
-void Printing::build_vat_stands_at(double mm) {
-  count.moves = tells_powder_ = true;
-  count.build_mm = mm * profile().powder.build_sign;
-}
-
-void Printing::build_vat_goes_down(double mm) {
-  count.moves = tells_powder_ = true;
-  lowered_mm_ = mm;
-}
-
-void Printing::roller_stands_at(double mm) {
-  tells_powder_ = true;
-  const double far = profile().powder.roller_mm[1];
-  const bool comes = std::abs(roller_mm_ - far) >= 1e-3 || std::abs(profile().powder.roller_mm[0] - far) < 1e-3;
-  if (std::abs(mm - far) < 1e-3 && comes) strokes(count.build_mm, count.fed_mm[0] + count.fed_mm[1]);
-  rolled_ = rolled_ || strokes_ > base_layers();
-  const double home = profile().powder.roller_mm[0];
-  if (rpm_ != 0 && std::abs(mm - home) < 1e-3 && std::abs(roller_mm_ - home) >= 1e-3 && spread_wrong_.empty()) {
-    spread_wrong_ = fmt::format("the roller returns with {:g} turns a minute, and has to stand still", rpm_);
-  }
-  roller_mm_ = mm;
-}
-
-// A layer without a base has its powder checked at its end alone, as ever: strokes are counted, and told by the last one.
-void Printing::strokes(double build_mm, double fed_mm) {
-  const auto& powder = profile().powder;
-  ++strokes_;
-  if (powder.roller_rpm > 0 && std::abs(rpm_ - powder.roller_rpm) > 1e-3 && spread_wrong_.empty()) {
-    spread_wrong_ = fmt::format("the roller spreads with {:g} turns a minute where {:g} have to be", rpm_, powder.roller_rpm);
-  }
-  if (profile().dialect == "oasis" || strokes_ > base_layers() || !spread_wrong_.empty()) return;
-  const double above = base_mm() - strokes_ * powder.base_layer_mm;  // of the base, still to be spread
-  const double build = mm(layer_.bottom) - above, fed = powder.dose * strokes_ * powder.base_layer_mm;
-  if (std::abs(build_mm - build) > 1e-3 || std::abs(fed_mm - fed) > 1e-3 * strokes_) {
-    spread_wrong_ =
-        fmt::format("layer {} of the base is spread with the build vat at {:g} mm and {:g} mm fed, not {:g} and {:g}", strokes_,
-                    build_mm, fed_mm, build, fed);
-  }
-}
-
-void Printing::spreads(double build_mm, double fed_mm, double clearance_mm) {
-  const auto& powder = profile().powder;
-  const bool base = strokes_ < base_layers();
-  const double height = base ? (strokes_ + 1) * powder.base_layer_mm : base_mm() + mm(layer_.thickness);
-  const double build = build_mm * powder.build_sign, top = mm(layer_.bottom) - base_mm() + height - clearance_mm;
-  const double fed = powder.dose * height + clearance_mm;
-  if (!spread_wrong_.empty()) return;
-  if (std::abs(build - top) > 1e-3) {
-    spread_wrong_ = fmt::format("powder is spread with the build vat at {:g} mm where {:g} have to be", build, top);
-  } else if (std::abs(fed_mm - fed) > 1e-3) {
-    spread_wrong_ = fmt::format("powder is spread with {:g} mm fed where {:g} have to be", fed_mm, fed);
-  }
-}
-
-void Printing::check_cycle() {
-  const auto& powder = profile().powder;
-  const Layer& layer = layer_;
-  const auto wrong = [&](const std::string& what) { wrong_cycle(what); };
-  if (const Standing next = standing(); head_mm_ && std::hypot((*head_mm_)[0] - next.x_mm, (*head_mm_)[1] - next.y_mm) > 1e-3) {
-    wrong(fmt::format("the head stays at {:g}, {:g} mm, and the next layer finds it at {:g}, {:g}", (*head_mm_)[0],
-                      (*head_mm_)[1], next.x_mm, next.y_mm));
-  }
-  if (lowered_mm_) count.build_mm = mm(layer.bottom) + *lowered_mm_;
-  if (profile().dialect == "raw" || profile().dialect == "planes") return check_told();  // the head alone
-  if (!count.moves) return wrong("the build vat does not move");
-  if (!spread_wrong_.empty()) return wrong(spread_wrong_);
-  // Numbers are written to a tenth of a micrometre.
-  if (const double top = mm(std::int64_t{layer.bottom} + layer.thickness); std::abs(count.build_mm - top) > 1e-3) {
-    wrong(fmt::format("the build vat stands at {:g} mm where {:g} have to", count.build_mm, top));
-  }
-  const double fed = count.fed_mm[0] + count.fed_mm[1], dose = powder.dose * (mm(layer.thickness) + base_mm());
-  if (std::abs(fed - dose) > 1e-3 * (1 + base_layers())) wrong(fmt::format("{:g} mm are fed where {:g} have to", fed, dose));
-  if (!rolled_) wrong(fmt::format("the roller does not reach its far end at {:g} mm", powder.roller_mm[1]));
-  check_pauses();
-  if (fires_on_old_) wrong("the first sweep begins before powder is spread");
-  if (std::abs(roller_mm_ - powder.roller_mm[0]) > 1e-3) {
-    wrong(fmt::format("the roller stays at {:g} mm, not at {:g}", roller_mm_, powder.roller_mm[0]));
-  }
+bool Printing::has_ramps(double before_mm, double behind_mm, double beside_mm) {
+  const double ramp = profile().motion.ramp_mm;
+  if (std::min(before_mm, behind_mm) > ramp - beside_mm) return true;
+  fault(fmt::format("{:g} mm before the first drops and {:g} behind the last are left, where ramps of {:g} have to be",
+                    before_mm, behind_mm, ramp));
+  return false;
 }
 
 const Count& Printing::finish() {

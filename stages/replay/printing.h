@@ -50,7 +50,8 @@ class Printing {
   Status status() const { return ok() ? Status() : Status(Error{Fault::kVerification, fault_}); }
 
   // --- sweeps
-  void begin_sweep(std::uint32_t number, bool backward);
+  /// of  how many the program says that the layer has, where its dialect numbers them
+  void begin_sweep(std::uint32_t number, bool backward, std::optional<std::uint32_t> of = {});
   /// Moves nozzle 0 to a carriage position, in mm.
   void go_across(double carriage_mm);
   /// Carriage position in mm of a step, and the step at a position; 0 if no step is near.
@@ -70,17 +71,33 @@ class Printing {
   /// Bits of a nozzle's drops in programs of heads that fire several at a place; 1 for others.
   std::uint32_t drop_bits() const;
 
+  // --- what the program says of itself
+  void tells_layers(std::uint32_t layers);
+  void tells_heights(std::optional<double> bottom_mm, double thickness_mm);
+
   // --- movements; each takes its time
+  enum class Part : std::uint8_t { kHead, kRoller, kVat };
+  /// Before a part moves: whether the others are out of its way, and roller and vats as fast as the profile has it.
+  void check_way(Part part, double mm_s);
+  /// Roller and head have an axis in common.
+  bool roller_on_gantry() const;
+  /// The head may still move, or it rests: lines of the machine's own that do not wait for it belong there alone.
+  void under_way(bool moving) { under_way_ = moving; }
   /// From rest to rest if the profile knows the head's acceleration.
   /// drops  of a scan: the most that a nozzle fires at a place of it
   void head_moves(double mm, double mm_s, bool scanning, std::uint32_t drops = 1);
+  /// Whether a sweep has the profile's ramp before its first drops and behind its last, each so many mm long; a fault if not.
+  bool has_ramps(double before_mm, double behind_mm, double beside_mm = 1e-3);
   /// works_mm_s  how fast it came, of a G1 beside sweeps; 0: by a travel, or in a sweep
   void head_stands_at(double x_mm, double y_mm, double works_mm_s);
   void feeds(std::uint32_t vat, double mm, double mm_s);
   void build_vat_stands_at(double mm);
   /// The same, where a program tells but how far from where the layer before left it.
   void build_vat_goes_down(double mm);
-  void roller_stands_at(double mm);
+  /// may_spread  such a movement can be that over the powder
+  void roller_stands_at(double mm, bool may_spread = true);
+  /// What is wrong with the powder, the first of all; told at the layer's end, where its heights are known for true.
+  void wrong_powder(std::string what);
   /// Powder is spread now: the build vat stands where it is told, vats have fed so much, and the spreader goes so far above
   /// both.
   void spreads(double build_mm, double fed_mm, double clearance_mm);
@@ -102,7 +119,10 @@ class Printing {
   bool takes_own(std::string_view line);
   /// The roller turns so fast against its way, or, at 0, no longer.
   void roller_turns(double rpm);
-  /// A program that moves no powder tells the host the layers of powder below this one.
+  /// A program that moves no powder has a record that the host carries out; it spreads the layer before the first one that is
+  /// not of its powder.
+  void tells_host(std::string_view record, bool of_powder);
+  /// Of these: the layers of powder below this one.
   void tells_base(std::uint32_t layers, double layer_mm);
 
   /// Checks the powder cycle of the layer, and that it leaves the machine as the next one expects it; called at the end.
@@ -132,6 +152,13 @@ class Printing {
   std::uint64_t fired_more(std::uint32_t times, std::size_t word) const;
   void fail(std::string what);  // takes the complete message
   void wrong_cycle(std::string_view what);
+  bool roller_at_home() const;
+  bool head_at_safe() const;
+  void check_spread();
+  void check_speed(double mm_s, bool scanning);
+  void tells_sweep(std::uint32_t of);
+  std::int64_t first_of_layer(const RunsView& image) const;
+  void check_numbers(std::span<const RunsView> planes);
   // Of heads that fire several drops: sweeps follow each other over a place until its drops are fired.
   std::uint32_t sweeps_a_place() const;
   void leave_sweep();
@@ -143,6 +170,7 @@ class Printing {
   std::uint32_t base_layers() const { return layer_.index == 0 ? profile().powder.base_layers : 0; }
   void strokes(double build_mm, double fed_mm);
   const std::vector<std::string>& own_lines() const;
+  bool capped() const;
   void waits_capped(std::string_view what);
   void check_pauses();
   void check_told();
@@ -160,8 +188,9 @@ class Printing {
   std::uint32_t sweep_ = 0;
   std::int64_t first_line_ = 0, step_ = 0, previous_step_ = 0;
   std::int64_t reading_ = INT64_MIN, reading_sweep_ = INT64_MIN;
-  bool rolled_ = false;        // to the far end
-  bool fires_on_old_ = false;  // a sweep begins before that
+  bool rolled_ = false;  // to the far end
+  bool under_way_ = false, host_spread_ = false;
+  std::optional<std::uint32_t> told_of_;  // swaths of the layer
   std::optional<double> lowered_mm_;
   double roller_mm_ = 0;
   std::optional<std::array<double, 2>> head_mm_;  // if the program says where
@@ -182,10 +211,12 @@ class Printing {
   std::uint64_t spat_here_ = 0;        // drops of a nozzle since the head stands
   std::size_t own_ = 0;                // lines of the block at hand that came
   std::uint32_t wiper_blocks_ = 0, lamp_blocks_ = 0;
+  bool lamp_on_ = false;          // by the lines that begin the pause to dry
   bool at_wiper_ = false;         // the head has just gone over it
+  bool filled_ = false;           // vats are, and the head has not gone back to its safe place
   double dwelt_s_ = 0, rpm_ = 0;  // rpm: of the roller
   std::string fault_;             // the first one
-  std::string spread_wrong_;      // the first fault of spreading; only check_cycle knows the layer's heights for true
+  std::string spread_wrong_;      // the first fault of spreading; see cycle.cpp
 };
 
 }  // namespace lamina::replay

@@ -9,7 +9,9 @@ void read_raw(std::string_view text, Printing& printing) {
   ByteReader reader(text, printing);
   Passes passes(printing);
   if (reader.take(4) != "LAYR" || reader.word() != printing.layer()) return reader.fault("does not begin with this layer");
-  reader.take(3 * 4);
+  printing.tells_layers(reader.word());
+  const double bottom_mm = reader.mm();
+  printing.tells_heights(bottom_mm, reader.mm());
   printing.count.vats = reader.word();
   const std::uint32_t words = (printing.nozzles() + 127) / 128, planes = printing.drop_bits();
   while (printing.ok()) {
@@ -22,10 +24,10 @@ void read_raw(std::string_view text, Printing& printing) {
       return;
     }
     if (tag != "SWTH") return reader.fault("neither a swath nor the end");
-    const std::uint32_t number = reader.word();
-    reader.word();
-    const bool backward = reader.word() == 1;
-    printing.begin_sweep(number, backward);
+    const std::uint32_t number = reader.word(), of = reader.word(), direction = reader.word();
+    if (direction > 1) return reader.fault("a sweep runs there, 0, or back, 1");
+    const bool backward = direction == 1;
+    printing.begin_sweep(number, backward, of);
     const double across = static_cast<double>(static_cast<std::int64_t>(reader.number(8))) / 1e6;
     printing.go_across(across);
     passes.begin(across, backward);

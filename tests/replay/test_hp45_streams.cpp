@@ -21,7 +21,8 @@ TEST(Hp45, AuthorsExampleFiresAQuarterOfTheNozzlesForTenMillimetresEach) {
   bare.head.blocked = {};
   const std::string off(50, 'A');
   const std::string program =
-      "SPME\nSER JY\nSDP JY\nSDN Bk\nG1 X-20.32 Y" + std::to_string(resolved.grid.line_position_nm(0) / 1e6) +
+      "SPME\nSER JY\nSDP JY\nSDN Bk\nSSID A\nBMOD A\nBCL\nG1 X-20.32 Y" +
+      std::to_string(resolved.grid.line_position_nm(0) / 1e6) +
       " F15000\nG4 P0\nSEP -E9g\n"
       "SBR A " +
       off +

@@ -19,6 +19,13 @@ void Printing::head_stands_at(double x_mm, double y_mm, double works_mm_s) {
   const auto& care = profile().care;
   leaves_wiper("the head goes on");
   leaves_place();
+  if (lamp_on_) {
+    fault(fmt::format("the head moves before '{}', which ends the pause to dry", profile().powder.dry_off_lines.front()));
+  }
+  if (filled_ && std::hypot(x_mm - profile().motion.safe_mm[0], y_mm - profile().motion.safe_mm[1]) > 1e-3) {
+    fault(fmt::format("the head goes to {:g}, {:g} mm behind the pause to fill vats, not to its safe place", x_mm, y_mm));
+  }
+  filled_ = false;
   const bool slow = std::abs(works_mm_s - care.wipe_speed_mm_s) < 1.01 * kHalfMmPerMinute;
   if (const auto& wiper = care.wipe_mm; wiper && slow) {
     const auto [x, y] = head_mm_.value_or(profile().motion.safe_mm);
@@ -83,16 +90,24 @@ void Printing::spits(double x_mm, double y_mm, std::uint64_t drops, double secon
   ++count.spits;
 }
 
+// Where the profile has the head wait in pauses.
+bool Printing::capped() const {
+  const auto at = profile().care.cap_mm.value_or(profile().motion.safe_mm);
+  const auto [x, y] = head_mm_.value_or(profile().motion.safe_mm);
+  return std::hypot(x - at[0], y - at[1]) < 1e-3;
+}
+
 void Printing::waits_capped(std::string_view what) {
   const auto& cap = profile().care.cap_mm;
-  const auto [x, y] = head_mm_.value_or(profile().motion.safe_mm);
-  if (!cap || std::hypot(x - (*cap)[0], y - (*cap)[1]) < 1e-3) return;
-  fault(fmt::format("{} while the head is not at its cap, {:g}, {:g} mm", what, (*cap)[0], (*cap)[1]));
+  const auto at = cap.value_or(profile().motion.safe_mm);
+  if (capped()) return;
+  fault(fmt::format("{} while the head is not at its {}, {:g}, {:g} mm", what, cap ? "cap" : "safe place", at[0], at[1]));
 }
 
 void Printing::refills() {
   if (count.fed_mm[0] + count.fed_mm[1] > 0) return fault("waits for the vats to be filled behind the layer's powder");
   waits_capped("the vats are filled");
+  filled_ = profile().care.cap_mm.has_value();
   if (++count.refills > 1) fault("waits for the vats to be filled a second time");
 }
 
@@ -113,9 +128,12 @@ const std::vector<std::string>& Printing::own_lines() const {
 bool Printing::takes_own(std::string_view line) {
   const auto& lines = own_lines();
   if (own_ < lines.size() && lines[own_] == line) {
+    if (under_way_) fault(fmt::format("'{}' comes while the head may still move; G4 P0 waits for it", line));
+    if (!at_wiper_) waits_capped(fmt::format("'{}' of the pause to dry comes", line));
     if (++own_ < lines.size()) return true;
     own_ = 0;
     ++(at_wiper_ ? wiper_blocks_ : lamp_blocks_);
+    lamp_on_ = !at_wiper_ && dwelt_s_ == 0 && !profile().powder.dry_off_lines.empty();
     at_wiper_ = false;
     return true;
   }
@@ -124,6 +142,14 @@ bool Printing::takes_own(std::string_view line) {
 }
 
 void Printing::roller_turns(double rpm) { rpm_ = rpm; }
+
+void Printing::tells_host(std::string_view record, bool of_powder) {
+  if (of_powder && host_spread_) return fault(fmt::format("{} stands behind the layer's powder", record));
+  if (of_powder && record != "FILL" && !head_at_safe()) {
+    return fault(fmt::format("{} stands where the head is not at its safe place, and the powder is spread", record));
+  }
+  host_spread_ = host_spread_ || !of_powder;
+}
 
 void Printing::tells_base(std::uint32_t layers, double layer_mm) {
   if (based_) return fault("tells a base of powder a second time");

@@ -61,6 +61,7 @@ class Carer {
  private:
   void carry_out(std::string_view tag, std::span<const std::uint32_t> n) {
     const auto& profile = printing_.profile();
+    if (tag != "GOTO") printing_.tells_host(tag, tag == "FILL" || tag == "BASE" || tag == "ROLL");
     if (tag == "GOTO") return go(mm_of(n[0]), mm_of(n[1]), 0);
     if (tag == "FILL") return printing_.refills();
     if (tag == "BASE") return printing_.tells_base(n[0], n[1] / 1e6);

@@ -3,7 +3,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
+#include <iterator>
 
 namespace lamina::replay::hp45 {
 namespace {
@@ -18,6 +20,9 @@ constexpr std::int32_t kFullDpi = 600;      // DMAPrint.cpp: SetDPI
 // DMAPrint.cpp: seven pairs of nozzles have one address and primitive in the tables; ConvertB6RawToBurst writes the second one
 // of a pair over the first, which so never fires: 8 (36), 43 (69), 132 (170), 172 (178), 184 (196), 243 (255), 293 (299).
 constexpr std::uint32_t kOverwritten[] = {8, 43, 132, 172, 184, 243, 293};
+// What stays as it was until it is told or the controller is switched on anew: how positions are counted, which nozzles, rows
+// and bursts fire, how the buffer is read, and what it holds.
+constexpr std::string_view kSettings[] = {"SPME", "SER", "SDP", "SDN", "SSID", "BMOD", "BCL"};
 constexpr std::uint64_t kEvenBits = 0x5555'5555'5555'5555;  // of a word of a burst: nozzles with even numbers
 
 // Serialcom.cpp: B64Lookup.
@@ -71,6 +76,7 @@ std::string Controller::execute(std::string_view command, std::string_view rest)
   std::int32_t value = 0;
   for (const char c : small) value = value * 64 + digit_of(c);
   if (negative) value = -value;
+  tell(command);
   if (command == "SBR") return add(value, raw);
   if (command == "BCL") {  // BufferClear
     if (unread() > 0) return fmt::format("{} lines that the head has not come to are cleared", unread());
@@ -88,6 +94,16 @@ std::string Controller::execute(std::string_view command, std::string_view rest)
   return set(command, value);
 }
 
+void Controller::tell(std::string_view command) {
+  const auto setting = std::ranges::find(kSettings, command == "SDPI" ? "SDP" : command);
+  if (setting != std::end(kSettings)) told_ |= 1u << (setting - std::begin(kSettings));
+}
+
+std::string_view Controller::unset() const {
+  const auto first = static_cast<std::size_t>(std::countr_one(told_));
+  return first < std::size(kSettings) ? kSettings[first] : std::string_view();
+}
+
 std::string Controller::set(std::string_view command, std::int32_t value) {
   if (command == "SEP") {
     set_encoder(value);
@@ -98,12 +114,13 @@ std::string Controller::set(std::string_view command, std::int32_t value) {
     raw_zero_ = raw_;
     zero_um_ = at_um_;
   } else if (command == "SDP" || command == "SDPI") {  // DMAPrint::SetDPI
-    if (value < 1) return "SDP has the nozzles an inch, 1 to 600";
-    if (value <= kFullDpi) repeat_ = kFullDpi / value;
+    if (value < 1 || value > kFullDpi) return "SDP has the nozzles an inch, 1 to 600";
+    repeat_ = kFullDpi / value;
   } else if (command == "SDN") {
     density_ = value;
   } else if (command == "SSID") {  // Buffer::SetPrintMode
-    if (value >= 0 && value <= 2) print_mode_ = value;
+    if (value < 0 || value > 2) return "SSID has the rows that fire, A to C";
+    print_mode_ = value;
   } else if (command == "BMOD") {
     if (value != 0) return "BMOD has to be A: lines are read once";
   } else if (command != "SPME" && command != "BRL") {

@@ -45,6 +45,9 @@ class Controller {
   void move(double to_um, const Watch& watch);
 
   bool zeroed() const { return zeroed_; }
+  /// The first command that has not come yet of those without which the controller keeps what another print has set; empty if
+  /// all have come.
+  std::string_view unset() const;
   std::int32_t counts_per_inch() const { return counts_per_inch_; }
   std::int32_t density() const { return density_; }
   /// Lines that a row has not come to.
@@ -62,6 +65,7 @@ class Controller {
   std::string set(std::string_view command, std::int32_t value);
   std::string add(std::int32_t position, std::string_view raw);
   void set_encoder(std::int32_t position_um);
+  void tell(std::string_view command);
   void update_position();
   void clear_buffer();
   std::int32_t read_left(std::uint32_t side) const;
@@ -92,6 +96,7 @@ class Controller {
   std::int32_t counts_per_inch_ = 600, raw_ = 0, base_um_ = 0, history_um_ = 0;
   std::uint32_t pulses_ = 0, measures_ = 0;  // since the last measure of speed; measures since the head rested
   int direction_ = 0;
+  std::uint32_t told_ = 0;  // a bit for each command of kSettings
   // the head
   bool zeroed_ = false;
   double at_um_ = 0, zero_um_ = 0;

@@ -11,19 +11,16 @@
 #include "stages/replay/dialects.h"
 #include "stages/replay/gcode.h"
 #include "stages/replay/hp45/controller.h"
+#include "stages/replay/hp45/limits.h"
 
 namespace lamina::replay {
 namespace {
 
 constexpr double kClearanceMm =
     0.25;                            // SerialGRBL.py, NewLayer: the pistons stand so far nearer to the spreader than layers say
-constexpr double kRoomMm = 100;      // beside the bed, besides ramps
 constexpr int kMostBusyTravels = 8;  // over lines that are not done; hosts have none
 constexpr int kMostRewinds = 8;      // BRES reads up to 4000 lines again; hosts have none
 constexpr double kBurstsPerInch = 600;
-// PositionUpdate measures the speed every 50 counts (POSITION_STEP_COUNT); 100 ms behind the last measure it is 0
-// (POSITION_STEP_TIMEOUT), and bursts need one. It is held in whole mm/s.
-constexpr double kLeastCountsPerSecond = 500;
 // Of the profile: DMAPrint.cpp gives them another one's address and primitive, so that their drops fall on its line.
 constexpr std::uint32_t kMisplaced[] = {0, 129, 263};
 
@@ -51,15 +48,17 @@ class Hp45Reader {
  private:
   void command(const GcodeLine& line);
   void prime(std::string_view number);
+  bool begins_well(double from_um, double to_um);
   void move(const GcodeLine& line);
   void spread(const GcodeLine& line);
   bool ready();
-  bool right_encoder();
+  std::string encoder_fault() const {
+    return hp45::encoder_fault(controller_.counts_per_inch(), printing_.profile().motion.encoder_dpi, step_um_);
+  }
   void take_burst();
   void take_firing(const hp45::Controller::Firing& firing);
   void end_stretch(std::uint32_t row);
-  bool keeps_speed();
-  bool reaches(double mm);
+  void check_play();
   void drop(bool sweeping, bool upwards);
   std::uint64_t drops() const;
   double step_of(double um) const { return (um / 1000 - printing_.position_of(0)) / (grows_ ? step_um_ : -step_um_) * 1000; }
@@ -70,6 +69,8 @@ class Hp45Reader {
   const ScanAxes scan_;
   hp45::Controller controller_;
   bool oasis_, grows_ = true, moving_ = false, ended_ = false, spreading_ = false, spread_ = false;
+  bool swept_ = false;   // and has not rested yet
+  bool primes_ = false;  // or may still do so: no answer has come behind it
   double step_um_ = 0;
   std::uint32_t repeat_ = 1, words_ = 1, sweep_ = 0, lines_ = 0;
   int busy_travels_ = 0, rewinds_ = 0;
@@ -77,9 +78,12 @@ class Hp45Reader {
     std::int64_t step;
     hp45::Burst words;
   };
-  std::vector<Shot> shots_[2];  // of a movement, in its order
-  std::uint64_t hurried_ = 0;   // bursts before the speed was measured
-  struct Stretch {              // of one line of a row
+  std::vector<Shot> shots_[2];         // of a movement, in its order
+  std::uint64_t hurried_ = 0;          // bursts before the speed was measured
+  bool begins_off_ = false;            // the first line of a sweep
+  double begin_um_ = 0, ahead_ = 0;    // its place; 1 or -1, the way to the second one
+  double first_um_ = 0, last_um_ = 0;  // of the head's centre where nozzles were on in a movement
+  struct Stretch {                     // of one line of a row
     std::uint32_t line = 0, steps = 0;
     double from_um = 0, to_um = 0;
     bool any = false;
@@ -97,7 +101,8 @@ void Hp45Reader::read() {
       } else if (seconds != 0) {
         return reader_.fault("G4 has P0: the host waits until nothing moves");
       }
-      moving_ = false;
+      moving_ = swept_ = false;
+      printing_.under_way(false);
     } else if (oasis_ && line.command == "M0") {
       printing_.refills();
     } else if (oasis_ && (line.command == "M4" || line.command == "M5")) {
@@ -116,64 +121,56 @@ void Hp45Reader::command(const GcodeLine& line) {
   if (moving_) return reader_.fault(fmt::format("{} is sent while the head may still move; G4 P0 waits for it", line.command));
   if (line.command == "SBR" && !ready()) return;
   if (line.command == "BRES" && ++rewinds_ > kMostRewinds) return reader_.fault("rewinds the buffer again and again");
-  if (line.command == "PRM") return prime(line.rest);
+  primes_ = line.command == "PRM";
+  if (primes_) return prime(line.rest);
   const std::string wrong = controller_.execute(line.command, line.rest);
   if (!wrong.empty()) return reader_.fault(wrong);
   if (line.command == "SBR") {
-    ++lines_;
+    const double at_um = controller_.true_um(controller_.last_position_um());
+    if (++lines_ == 1) {
+      begins_off_ = std::ranges::all_of(controller_.last_burst(), [](std::uint64_t word) { return word == 0; });
+      begin_um_ = at_um;
+    }
+    if (lines_ == 2) ahead_ = at_um > begin_um_ ? 1 : -1;
     take_burst();
   } else if (line.command == "SER") {
-    right_encoder();
+    if (const std::string fault = encoder_fault(); !fault.empty()) reader_.fault(fault);
   } else if (line.command == "BRL") {
     if (controller_.unread() > 0) {
       return reader_.fault(fmt::format("{} lines are left that the head has not come to", controller_.unread()));
     }
+    if (!controller_.idle()) return reader_.fault("the last line is not all off, and fires on the ways of the next layer");
     if (oasis_ && (spreading_ || !spread_)) return reader_.fault("the layer has no powder spread between M4 and M5");
+    if (oasis_) check_play();
     axes_.end();
     ended_ = true;
   }
 }
 
-// DMAPrint::Prime: so many bursts of all nozzles, wherever the head stands.
+// So many bursts of all nozzles, wherever the head stands. SerialCommand::Update answers before they are fired.
 void Hp45Reader::prime(std::string_view number) {
-  constexpr std::string_view kDigits = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-  std::uint32_t bursts = 0;
-  for (const char c : number) {
-    const std::size_t digit = kDigits.find(c);
-    if (digit == std::string_view::npos || bursts > UINT16_MAX)
-      return reader_.fault("PRM takes up to 65535 bursts, in base 64");
-    bursts = bursts * 64 + static_cast<std::uint32_t>(digit);
-  }
-  if (bursts > UINT16_MAX) return reader_.fault("PRM takes up to 65535 bursts, in base 64");
+  const auto bursts = hp45::primed(number);
+  if (!bursts) return reader_.fault("PRM takes up to 25000 bursts, in base 64");
   const auto& profile = printing_.profile();
-  printing_.spits(axes_.at(profile.motion.x_axis), axes_.at(profile.motion.y_axis), bursts,
-                  bursts / profile.head.highest_frequency_hz);
+  printing_.spits(axes_.at(profile.motion.x_axis), axes_.at(profile.motion.y_axis), *bursts,
+                  *bursts / profile.head.highest_frequency_hz);
 }
 
 // Whether lines can be fired as the profile has it: where the head stands, how fine the encoder, how many bursts.
 bool Hp45Reader::ready() {
+  const std::string encoder = encoder_fault();
   const double density = 100 * 25'400 / (kBurstsPerInch * step_um_);
-  if (!controller_.zeroed()) {
+  if (const std::string_view unset = controller_.unset(); !unset.empty()) {
+    reader_.fault(fmt::format("lines come before {}: the controller keeps what another print has set or left", unset));
+  } else if (!controller_.zeroed()) {
     reader_.fault("lines come before SEP tells where the head stands");
-  } else if (!right_encoder()) {
-    return false;
+  } else if (!encoder.empty()) {
+    reader_.fault(encoder);
   } else if (controller_.density() != std::max<std::int64_t>(1, std::llround(density))) {
     reader_.fault(fmt::format("SDN has {} %, where {:.0f} give a burst a pixel", controller_.density(), density));
   } else {
     return true;
   }
-  return false;
-}
-
-bool Hp45Reader::right_encoder() {
-  const double encoder = printing_.profile().motion.encoder_dpi, counts = controller_.counts_per_inch();
-  if (counts == encoder) return true;
-  if (encoder <= 0) {  // 600, or what pixels need
-    if (counts <= 600 + 2 * 25'400 / step_um_) return true;
-    reader_.fault(fmt::format("SER has {:g} counts an inch, far more than pixels of {:.1f} um need", counts, step_um_));
-    return false;
-  }
-  reader_.fault(fmt::format("SER has {:g} counts an inch, the machine's encoder {:g}", counts, encoder));
   return false;
 }
 
@@ -197,73 +194,64 @@ void Hp45Reader::take_burst() {
 }
 
 void Hp45Reader::move(const GcodeLine& line) {
-  const bool sweeping = lines_ > 0;
+  const bool sweeping = lines_ > 0, moves = line.command == "G1" || line.command == "G0";
+  if (moves && swept_) {
+    return reader_.fault(
+        "the head goes on from a sweep without G4 P0, and the controller forgets its speed and way at rest alone");
+  }
+  if (moves && primes_) {
+    return reader_.fault("moves while PRM may still fire: the controller answers at once, and again behind its last burst");
+  }
+  if (line.command == "G0") return reader_.fault("G0 goes as fast as the motion controller can, whatever F");
   const double from = axes_.at(scan_.along), beside = axes_.at(scan_.across);
   if (!axes_.take(line, sweeping)) {
     return reader_.fault(fmt::format("'{}' is no command of the dialect {}", line.command, oasis_ ? "oasis" : "hp45"));
   }
-  if (line.command != "G0" && line.command != "G1") return;
+  if (!moves) return;
   const auto& powder = printing_.profile().powder;
   if (spreading_ && (line.has(powder.build_axis[0]) || line.has(powder.feed_axes[0][0]))) {
     return reader_.fault("a piston moves while powder is spread");
   }
   moving_ = true;
+  swept_ = sweeping;
+  printing_.under_way(true);
   const double to = axes_.at(scan_.along);
   if (to == from || !printing_.ok()) return;
-  if (!reaches(to)) return reader_.fault(fmt::format("moves to {:g} mm, out of the machine", to));
+  if (!hp45::reaches(printing_, controller_.counts_per_inch(), to))
+    return reader_.fault(fmt::format("moves to {:g} mm, out of the machine", to));
   if (!sweeping && !controller_.idle() && ++busy_travels_ > kMostBusyTravels) {
     return reader_.fault("travels to and fro over lines that are not done");
   }
   const bool upwards = (to > from) == grows_;
+  if (sweeping && !begins_well(from * 1000, to * 1000)) return;
   if (sweeping) {
     printing_.begin_sweep(sweep_++, !upwards);
     if (axes_.at(scan_.across) != beside) return reader_.fault("moves across while it fires");
     printing_.go_across(axes_.at(scan_.across));
-    if (!keeps_speed()) return;
+    const std::string slow = hp45::speed_fault(axes_.speed_mm_s(), controller_.counts_per_inch());
+    if (!slow.empty()) return reader_.fault(slow);
   }
   for (auto& shots : shots_) shots.clear();
   hurried_ = 0;
+  first_um_ = last_um_ = std::nan("");
   controller_.move(to * 1000, [&](const hp45::Controller::Firing& firing) { take_firing(firing); });
   end_stretch(0);
   end_stretch(1);
   drop(sweeping, upwards);
   lines_ = 0;
+  if (!sweeping || std::isnan(first_um_)) return;
+  const double way = to > from ? 1 : -1, count_mm = 25.4 / controller_.counts_per_inch();
+  printing_.has_ramps(way * (first_um_ / 1000 - from), way * (to - last_um_ / 1000), count_mm + 1e-3);
 }
 
-// Along the scan: the bed with ramps and room, where the head waits, and the spreader's ends if the gantry has it.
-bool Hp45Reader::reaches(double mm) {
-  const auto& profile = printing_.profile();
-  const bool x = profile.mounting.scan_axis == ScanAxis::kX;
-  const double begin = profile.mounting.offset_mm[x ? 0 : 1], stand = x ? printing_.standing().x_mm : printing_.standing().y_mm;
-  double low = std::min(begin, stand), high = std::max(begin + profile.bed.size_mm[x ? 0 : 1], stand);
-  if (profile.powder.roller_axis == scan_.along) {
-    low = std::min({low, profile.powder.roller_mm[0], profile.powder.roller_mm[1]});
-    high = std::max({high, profile.powder.roller_mm[0], profile.powder.roller_mm[1]});
-  }
-  // The run-up takes two measures of speed, of 50 counts each.
-  if (const auto& care = profile.care; care.spits() || care.wipes() || care.cap_mm) {
-    const std::size_t i = x ? 0 : 1;
-    for (const auto& place : {care.spit_mm, care.cap_mm}) {
-      if (place) low = std::min(low, (*place)[i]), high = std::max(high, (*place)[i]);
-    }
-    if (care.wipe_mm) {
-      low = std::min({low, (*care.wipe_mm)[i], (*care.wipe_mm)[2 + i]});
-      high = std::max({high, (*care.wipe_mm)[i], (*care.wipe_mm)[2 + i]});
-    }
-  }
-  const double row_mm = printing_.nozzles() * profile.head.pitch_um / 1000;  // of a tilted head
-  const double room = kRoomMm + row_mm + profile.motion.ramp_mm + 110 * 25.4 / controller_.counts_per_inch();
-  return mm >= low - room && mm <= high + room;
-}
-
-// Whether the firmware knows the sweep's speed all the way.
-bool Hp45Reader::keeps_speed() {
-  const double speed = axes_.speed_mm_s(), counts = speed / 25.4 * controller_.counts_per_inch();
-  if (std::abs(speed - std::round(speed)) > 1e-3) {
-    reader_.fault(fmt::format("sweeps at {:g} mm/s, which the controller cuts to whole mm/s", speed));
-  } else if (counts < kLeastCountsPerSecond) {
-    reader_.fault(fmt::format("sweeps at {:g} mm/s, {:.0f} counts a second: below {:.0f} the controller takes the head to rest",
-                              speed, counts, kLeastCountsPerSecond));
+// BufferUpdateValues reads the first line at once after the controller was switched on, and when a row has come to it after
+// another sweep. Nothing else may hang on which it is.
+bool Hp45Reader::begins_well(double from_um, double to_um) {
+  const double way = to_um > from_um ? 1 : -1;
+  if (!begins_off_) {
+    reader_.fault("the first line of the sweep is not all off, and may fire from where the head stands");
+  } else if (way * (begin_um_ - from_um) <= hp45::kHalfRowGapUm || (lines_ > 1 && ahead_ * way < 0)) {
+    reader_.fault("the first line of the sweep is not ahead of both rows, or the second one not ahead of it");
   } else {
     return true;
   }
@@ -272,6 +260,10 @@ bool Hp45Reader::keeps_speed() {
 
 // The steps whose places a row passes, once each.
 void Hp45Reader::take_firing(const hp45::Controller::Firing& firing) {
+  const double row = firing.row == 1 ? hp45::kHalfRowGapUm : -hp45::kHalfRowGapUm;
+  const double way = firing.to_um > firing.from_um ? 1 : -1;
+  if (std::isnan(first_um_) || way * (firing.from_um - row - first_um_) < 0) first_um_ = firing.from_um - row;
+  if (std::isnan(last_um_) || way * (firing.to_um - row - last_um_) > 0) last_um_ = firing.to_um - row;
   Stretch& now = stretch_[firing.row];
   if (now.any && (now.line != firing.line || std::abs(firing.from_um - now.to_um) > 1e-3)) end_stretch(firing.row);
   if (!now.any) {
@@ -348,11 +340,23 @@ void Hp45Reader::drop(bool sweeping, bool upwards) {
   }
 }
 
+// SerialGRBL.py, NewLayer: pistons have play, and come to each place from 1 mm below.
+void Hp45Reader::check_play() {
+  const auto& powder = printing_.profile().powder;
+  const bool build = axes_.last_way(powder.build_axis) * powder.build_sign < 0;
+  if (build && axes_.last_way(powder.feed_axes[0]) * powder.feed_sign > 0) return;
+  printing_.wrong_powder(fmt::format("the {} piston comes to its place from above, and has play", build ? "feed" : "build"));
+}
+
 // The spreader turns on the gantry, which spreads on its way to the far end.
 void Hp45Reader::spread(const GcodeLine& line) {
   const auto& powder = printing_.profile().powder;
   printing_.spreads(axes_.at(powder.build_axis), printing_.count.fed_mm[0] + printing_.count.fed_mm[1], kClearanceMm);
   if (line.command == "M5") {
+    if (std::abs(axes_.speed_mm_s() - powder.roller_speed_mm_s) > 1.01 * kHalfMmPerMinute) {
+      printing_.wrong_powder(
+          fmt::format("the spreader moves at {:g} mm/s where {:g} have to be", axes_.speed_mm_s(), powder.roller_speed_mm_s));
+    }
     if (!spreading_) return reader_.fault("M5 stops a spreader that does not turn");
     spread_ = true;
     printing_.roller_stands_at(axes_.at(powder.roller_axis));
@@ -363,6 +367,8 @@ void Hp45Reader::spread(const GcodeLine& line) {
   } else if (std::abs(axes_.at(powder.roller_axis) - powder.roller_mm[0]) > 1e-3) {
     return reader_.fault(
         fmt::format("the spreader starts at {:g} mm, not at {:g}", axes_.at(powder.roller_axis), powder.roller_mm[0]));
+  } else {
+    check_play();
   }
   spreading_ = line.command == "M4";
   if (line.has('S') && powder.roller_rpm == 0) return reader_.fault("M4 has no S: the profile tells no speed of the roller");

@@ -18,6 +18,7 @@ constexpr std::uint32_t kSpeedCounts = 50;  // of the encoder that one measure o
 // Position.ino forgets the speed 100 ms after its last measure, of 50 counts: nothing fires below 500 counts a second.
 constexpr double kLeastCountsPerSecond = 600;
 constexpr std::int64_t kMostProduct = 2'000'000'000;  // of micrometres and counts an inch in 32 bits
+constexpr std::uint32_t kMostPrimed = 25'000;         // HP45_Standalone_V4.ino cuts the bursts of PRM there
 constexpr std::uint32_t kLines = 3950;                // the host stops at 50 free lines of 4000
 
 // Of the profile: the firmware's tables (DMAPrint.cpp) give them the address and primitive of another one. Drops of the first
@@ -142,7 +143,12 @@ void Head::line(double encoder_um, const std::uint64_t* words, std::uint32_t cou
   put(out, "SBR {} {}\n", number(std::llround(encoder_um)), text);
 }
 
-void Head::spit(const Machine& machine, ProgramBytes& out) { put(out, "PRM {}\n", number(machine.care.spit_drops)); }
+void Head::spit(const Machine& machine, ProgramBytes& out) {
+  for (std::uint32_t left = machine.care.spit_drops; left > 0; left -= std::min(left, kMostPrimed)) {
+    put(out, "PRM {}\n", number(std::min(left, kMostPrimed)));
+  }
+  put(out, "BCL\n");  // answered when the last burst is fired, as PRM is not
+}
 
 void Head::sweep(const Sweep& sweep, const SweepVectors& vectors, Care& care, ProgramBytes& out) const {
   const double step_um = grid_.step_nm() / 1000, count_um = kUmPerInch / counts_;

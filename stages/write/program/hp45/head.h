@@ -26,7 +26,8 @@ class Head {
   /// The host goes on when all movements have ended.
   static constexpr std::string_view kWait = "G4 P0\n";
   static void wait(ProgramBytes& out) { put(out, "{}", kWait); }
-  /// All nozzles of the cartridge fire where the head stands, by the firmware's DMAPrint::Prime.
+  /// All nozzles of the cartridge fire where the head stands, by the firmware's DMAPrint::Prime; the host waits until they
+  /// have.
   static void spit(const Machine& machine, ProgramBytes& out);
 
  private:
