@@ -160,29 +160,26 @@ Status LayerImager::dose(const Layer& layer, ImageWork& work, LayerRecord& recor
     record.dosed_pixels = dose::sums_of(work.drops.shares, images.dose.full(), dose::one_drop()).full_voxels;
   }
   if (images.materials.several() && (images.beads || images.dose.any())) work.materials.keep(work.runs);
-  if (images.materials.several() && shares_voxels()) split_materials(work);
+  const bool grey = write::find_level_format(plan_.job.format) != nullptr, drops = images.dose.most_drops() > 1;
+  if (images.materials.several() && (shares_voxels() || drops || grey))
+    dose::drops_of_materials(images.dose.most_drops(), shares_voxels(), work.materials.image, work.drops);
   const bool counted = images.dose.saturates() && images.dose.most_drops() <= 1;
   record.set_pixels = counted ? record.drops : set_pixels(work.runs);
-  const auto add_image = [&](const Runs& image) {
-    record.images.push_back({.bytes = 0, .set_pixels = set_pixels(image), .unfed_pixels = 0, .hash = {}});
-  };
-  const bool grey = write::find_level_format(plan_.job.format) != nullptr;
-  if (images.dose.most_drops() > 1 && !grey) std::ranges::for_each(work.drops.planes, add_image);
-  std::ranges::for_each(work.materials.image, add_image);
+  for (const Runs& image : several(work)) record.images.emplace_back().set_pixels = set_pixels(image);
+  for (std::size_t m = 0; grey && m < record.images.size(); ++m)
+    record.images[m].drops = sum_of_levels(work.drops.of_material[m]);
   return {};
 }
 
-/// Of voxels that materials share, each drop is one material's.
-void LayerImager::split_materials(ImageWork& work) {
-  std::vector<Runs>& image = work.materials.image;
-  for (std::size_t m = 0; m < image.size(); ++m) {
-    if (m == 0) {
-      image[m] = work.drops.up_to[m].front();
-    } else {
-      raster::combine(work.drops.up_to[m].front(), work.drops.up_to[m - 1].front(), raster::SetOperation::kDifference,
-                      image[m]);
-    }
-  }
+std::span<const Runs> LayerImager::several(const ImageWork& work) const {
+  const bool drops = plan_.images->dose.most_drops() > 1 && write::find_level_format(plan_.job.format) == nullptr;
+  if (!drops) return work.materials.image;
+  return plan_.images->materials.several() ? work.drops.material_planes : work.drops.planes;
+}
+
+std::span<const Levels> LayerImager::levels(const ImageWork& work) const {
+  if (plan_.images->materials.several()) return work.drops.of_material;
+  return {plan_.images->dose.saturates() ? &work.drops.levels : &work.drops.shares, 1};
 }
 
 }  // namespace lamina::pipeline

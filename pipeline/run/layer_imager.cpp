@@ -245,7 +245,9 @@ std::uint64_t LayerImager::bytes_of_section(Nm plane, std::uint64_t changes) con
   const std::uint64_t edges = images.dose.edges_bound(images.solids.crossings_bound(plane) + changes_of_images(plane));
   const std::uint64_t zone_images = zones == 0 ? 0 : (2 * zones + 6) * 2 * (4 * edges + 4 * rows);
   // Zones and levels, and the image of each drop.
-  const std::uint64_t drops = images.dose.saturates() ? 18 * changes + images.dose.most_drops() * 4 * (changes + rows) : 0;
+  // Of each material once more.
+  const std::uint64_t drop_images = 18 * changes + images.dose.most_drops() * 4 * (changes + rows);
+  const std::uint64_t drops = images.dose.saturates() ? (1 + materials) * drop_images : 0;
   // An image as read and as placed; where levels are, 9 bytes a run of those and of both together.
   const std::uint64_t of_images = changes_of_images(plane), levels = plan_.job.levels > 0 ? 18 * of_images + 12 * rows : 0;
   const std::uint64_t read = plan_.scene->images.empty() ? 0 : 8 * (of_images + rows) + levels;
