@@ -44,7 +44,7 @@ std::string_view against_shares(const Scene& scene, const Job& job, const Materi
     return "meshes where parts have materials or doses of their own; leave out the parts that are images, or give all parts those "
            "of the job";
   if (materials.several() && job.machine.profile.empty() && write::find_level_format(job.format) != nullptr)
-    return "one material as grey, for several would lie in one voxel; choose a 1-bit format, or a machine whose drops grey tells";
+    return "one material as grey, for several would lie in one voxel; choose a 1-bit format or name a machine";
   if (zones.grows()) return "edges that stay or shrink; leave out a negative bleed";
   if (fills(job)) return "whole parts; leave out walls, fillings and segments";
   if (job.dose.core < 1) return "whole parts; give --core-saturation in place of --core";
