@@ -94,7 +94,9 @@ class LayerImager {
   Status check_grown(const Layer& layer, const ImageWork& work) const;
   std::uint64_t least_vanished() const;
   bool shares_voxels() const;  // of several materials or doses
-  void share_out(const Layer& layer, ImageWork& work) const;
+  void cover(const Layer& layer, ImageWork& work) const;
+  void lay_shares(const Layer& layer, std::uint32_t part, ImageWork& work) const;
+  void own_voxels(ImageWork& work) const;
   static void empty_removed(const Runs& before, bool laid, ImageWork& work);
   std::uint64_t bytes_of_section(Nm plane, std::uint64_t changes) const;
   std::uint64_t changes_of_images(Nm plane) const;

@@ -70,14 +70,22 @@ void JobCost::share_out(const ImageWork& work, const std::vector<std::uint64_t>&
   const DoseZones& zones = plan_->images->dose.zones();
   if (!saturates_ || !zones.several()) return;  // drops are as pixels
   record.part_drops.assign(weights.size(), 0);
+  std::vector<std::uint64_t> drops(zones.count(), 0);  // those of shared voxels count for all of theirs
+  for (std::uint32_t zone = 0; full_ == 0 && zone < zones.count(); ++zone)
+    drops[zone] = sum_of_levels(work.drops.levels, work.zones.image[zone]);
+  for (std::size_t i = 0; full_ > 0 && i < work.drops.laid.size(); ++i) {
+    Runs voxels;
+    at_least(work.drops.laid[i].shares, 1, voxels);
+    drops[work.drops.laid[i].zone] += sum_of_levels(work.drops.levels, voxels);
+  }
+  drops = shared(record.drops, drops);
   for (std::uint32_t zone = 0; zone < zones.count(); ++zone) {
     std::vector<std::uint64_t> within(weights.size(), 0);
     for (std::uint32_t part = 0; part < weights.size(); ++part) {
       if (zones.of_part(part) == zone) within[part] = weights[part];
     }
-    const std::uint64_t drops = sum_of_levels(work.drops.levels, work.zones.image[zone]);
-    if (drops == 0) continue;
-    const std::vector<std::uint64_t> own = shared(drops, within);
+    if (drops[zone] == 0) continue;
+    const std::vector<std::uint64_t> own = shared(drops[zone], within);
     for (std::size_t part = 0; part < own.size(); ++part) record.part_drops[part] += own[part];
   }
 }

@@ -100,15 +100,20 @@ Status LayerImager::check_grown(const Layer& layer, const ImageWork& work) const
 void LayerImager::shares(const Layer& layer, ImageWork& work, LayerRecord& record) const {
   const ImagePlan& images = *plan_.images;
   if (shares_voxels()) {
-    share_out(layer, work);
+    cover(layer, work);
+    dose::share_out(images.dose.full(), images.grid.columns(), images.grid.rows(), work.drops);
   } else {
     levels(layer, work.coverage, work.drops.shares);
   }
   const auto differs = dose::take_half(images.dose.full(), work.runs, work.second, work.drops);
   record.half_differs = differs.pixels;
   record.half_far = differs.far;
-  if (!shares_voxels()) return;
-  // Voxels half full or more are those of the solid that has most of them.
+  if (shares_voxels()) own_voxels(work);
+}
+
+/// Voxels half full or more are those of the part that has most of them.
+void LayerImager::own_voxels(ImageWork& work) const {
+  const ImagePlan& images = *plan_.images;
   const std::uint32_t columns = images.grid.columns(), rows = images.grid.rows();
   const bool several = images.materials.several(), zones = images.dose.zones().several();
   if (several) work.materials.start(images.materials.used.size(), columns, rows);
@@ -124,19 +129,30 @@ void LayerImager::shares(const Layer& layer, ImageWork& work, LayerRecord& recor
   }
 }
 
-/// How full each solid makes the voxels, and all of them together.
-void LayerImager::share_out(const Layer& layer, ImageWork& work) const {
+/// How full each solid makes the voxels.
+void LayerImager::cover(const Layer& layer, ImageWork& work) const {
   const std::span<const Solid> solids = plan_.images->solids.all();
   work.drops.laid.resize(solids.size());
-  std::vector<Levels*> parts;
   for (std::size_t i = 0; i < solids.size(); ++i) {
     dose::LaidPart& part = work.drops.laid[i];
     solids[i].coverage->layer(layer, work.coverage, part.shares);
     part.zone = solids[i].zone;
     part.material = plan_.images->materials.several() ? solids[i].material.at(plane(layer)) : 0;
-    parts.push_back(&part.shares);
   }
-  dose::share_out(parts, plan_.images->dose.full(), work.drops.shared, work.drops.shares);
+}
+
+/// Those of an image, as placed in work.drops.zones, lie over the parts before: of the same kind as the last one, the larger
+/// share counts.
+void LayerImager::lay_shares(const Layer& layer, std::uint32_t part, ImageWork& work) const {
+  std::vector<dose::LaidPart>& laid = work.drops.laid;
+  const std::uint32_t zone = plan_.images->dose.zones().of_part(part);
+  const std::uint32_t material = plan_.images->materials.several() ? plan_.images->materials.part[part].at(plane(layer)) : 0;
+  if (laid.empty() || laid.back().zone != zone || laid.back().material != material) {
+    laid.push_back({work.drops.zones, {}, zone, material});
+  } else {
+    raster::larger(laid.back().shares, work.drops.zones, work.drops.levels);
+    std::swap(laid.back().shares, work.drops.levels);
+  }
 }
 
 Status LayerImager::dose(const Layer& layer, ImageWork& work, LayerRecord& record) const {

@@ -18,6 +18,17 @@ std::uint64_t DropWork::bytes() const {
   return total;
 }
 
+void share_out(std::uint8_t full, std::uint32_t columns, std::uint32_t rows, DropWork& work) {
+  if (work.laid.empty()) {
+    work.shares.start(columns);
+    work.shares.row_offset.assign(std::size_t{rows} + 1, 0);
+    return;
+  }
+  std::vector<Levels*> parts;
+  for (LaidPart& part : work.laid) parts.push_back(&part.shares);
+  share_out(parts, full, work.shared, work.shares);
+}
+
 Difference take_half(std::uint8_t full, Runs& image, Runs& second, const DropWork& work) {
   at_least(work.shares, half_of(full), second);
   const Difference found = difference(image, second);

@@ -52,6 +52,10 @@ struct DropRules {
   std::uint32_t most_drops = 0;  // of any pixel of the job
 };
 
+/// What the parts in work.laid, of which each lies over those before, make of the voxels together: shares.h. Laid more parts
+/// upon, the same again gives what all of them at once would.
+void share_out(std::uint8_t full, std::uint32_t columns, std::uint32_t rows, DropWork& work);
+
 /// Gives `image` the voxels of work.shares that are half full or more. second  scratch
 /// returns  where it was another one: pixels whose centres say something else than their voxels
 Difference take_half(std::uint8_t full, Runs& image, Runs& second, const DropWork& work);
