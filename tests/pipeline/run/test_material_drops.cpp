@@ -275,8 +275,9 @@ TEST_F(MaterialDrops, AreGreyImagesToo) {
       }
     }
   }
-  test::expect_refused("jet low.stl high.stl --material a,b --dpi 254 --bed 20x20 --layer 0.1 --levels 4 --format tiff-8 -o none",
-                       2, "of one material as grey", folder_);
+  test::expect_refused(
+      "jet low.stl high.stl --material a,b --dpi 254 --bed 20x20 --layer 0.1 --levels 4 --format tiff-8 -o none", 2,
+      "of one material as grey", folder_);
 }
 
 // A file that is another one, and one whose manifest was made to agree.
@@ -374,6 +375,25 @@ TEST_F(MaterialDrops, AreCarriedByTheProgramsOfMachinesWithTwoVats) {
   }
   for (const char* machine : {"oasis", "jet1000-grey"})
     test::expect_refused(parts + "--machine " + machine + " -o none", 2, "has one vat; plan them as several jobs", folder_);
+}
+
+// Pixels decide which vat feeds, however many drops they get: 20 x 40 of steel, 50 x 40 of bronze.
+TEST_F(MaterialDrops, AreFedByTheVatOfMorePixels) {
+  test::write_box(folder_ / "low.stl", {0, 0, 0}, {2, 4, 0.8f});
+  test::write_box(folder_ / "high.stl", {0, 0, 0}, {5, 4, 0.8f});
+  test::write_text(folder_ / "nuferbj.toml",
+                   "[machine]\nprofile = \"nuferbj\"\nvat_rule = \"majority\"\n[layers]\nthickness_mm = 0.1\n[dose]\n"
+                   "saturation_percent = 60\n[[part]]\npath = \"low.stl\"\nmaterial = \"steel\"\n[[part]]\n"
+                   "path = \"high.stl\"\nmaterial = \"bronze\"\nsaturation_percent = 15\n");
+  const auto json = facts("jet --job nuferbj.toml -o out");
+  done("verify --quiet out");
+  EXPECT_EQ(json["materials"][0]["unfed_pixels"], json["materials"][0]["set_pixels"]);
+  EXPECT_EQ(json["materials"][0]["unfed_layers"], 8);
+  EXPECT_EQ(json["materials"][1]["unfed_pixels"], 0);
+  EXPECT_GT(json["materials"][0]["drops"], json["materials"][1]["drops"]);
+  const std::string program = test::read_text(folder_ / "out/program/000003.gcode");
+  EXPECT_EQ(program.find("\nG1 A"), std::string::npos);
+  EXPECT_NE(program.find("\nG1 B"), std::string::npos);
 }
 
 }  // namespace
