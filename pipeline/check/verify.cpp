@@ -196,7 +196,10 @@ void check_layers(const std::string& directory, const Manifest& manifest, bool q
     if (!cost && inspection.machine) cost.emplace(inspection.machine->profile(), manifest);
     if (report.unfed.empty()) {
       for (const JobMaterial& material : manifest.head.materials) report.unfed.push_back({material.name});
+      for (std::size_t m = 0; m < report.unfed.size() && manifest.head.most_drops > 0; ++m)
+        report.powders.push_back({report.unfed[m].name});
     }
+    if (inspection.machine) report.drop_pl = inspection.machine->profile().head.drop_pl;
   }
   // In chunks, so that messages and sums stay in layer order without a string for each of a hundred thousand layers.
   constexpr std::size_t kPiece = 1024;
@@ -215,6 +218,8 @@ void check_layers(const std::string& directory, const Manifest& manifest, bool q
       report.lost += record.program.lost;
       for (std::size_t m = 0; m < report.unfed.size(); ++m)
         report.unfed[m].add(record.layer, record.image_of(m, report.unfed.size()).unfed_pixels);
+      for (std::size_t m = 0; m < report.powders.size(); ++m)
+        report.powders[m].add(record.image_of(m, report.powders.size()).set_pixels, record.drops_of(m, report.powders.size()));
       if (found[i].count) {
         report.replay.add(*found[i].count);
         cost->add(record, found[i].count->drops + found[i].count->spat, found[i].count->microseconds);

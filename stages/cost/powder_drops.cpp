@@ -14,9 +14,10 @@ double ml_of(std::uint64_t drops, double drop_pl) { return static_cast<double>(d
 }  // namespace
 
 std::string PowderDrops::told(double drop_pl) const {
-  const std::string text = fmt::format("{} of {}", readable_count(pixels), name);
-  if (drop_pl <= 0) return text;
-  return fmt::format("{}: {} drops, {:.3f} ml of binder", text, readable_count(drops), ml_of(drops, drop_pl));
+  const std::string count = readable_count(pixels);
+  if (drop_pl <= 0) return fmt::format("{} of {}", count, name);
+  return fmt::format("{} pixels of {}: {} drops, {:.3f} ml of binder", count, name, readable_count(drops),
+                     ml_of(drops, drop_pl));
 }
 
 nlohmann::ordered_json PowderDrops::json(double drop_pl) const {

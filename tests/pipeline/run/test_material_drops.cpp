@@ -190,6 +190,14 @@ TEST_F(MaterialDrops, OfEachMaterialAreThoseOfItsWish) {
     }
     EXPECT_EQ(json["saturation"]["drops"].get<double>(), drops);
   }
+  const test::Outcome verified = lamina("verify out --json --quiet");
+  ASSERT_EQ(verified.code, 0) << verified.err;
+  const auto seen = nlohmann::json::parse(verified.out)["materials"];
+  ASSERT_EQ(seen.size(), 2u);
+  const auto told = facts("jet --job wish.toml --dry-run")["materials"];
+  for (std::size_t m = 0; m < 2; ++m) {
+    for (const char* key : {"name", "set_pixels", "drops", "binder_ml"}) EXPECT_EQ(seen[m][key], told[m][key]) << key;
+  }
   EXPECT_NE(lamina("jet --job wish.toml --dry-run").err.find(" of steel: 19 200 drops, 0.002 ml of binder"), std::string::npos);
 }
 
