@@ -178,6 +178,10 @@ void finish_replay(const Inspection& inspection, const std::optional<JobCost>& c
   report.use = {};
   report.use.facts = std::make_shared<nlohmann::ordered_json>();
   cost->account().tell(report.use.results, *report.use.facts, report.use.quote);
+  for (const cost::PowderDrops& powder : cost->powders()) {
+    report.use.results.emplace_back("", powder.told(cost->drop_pl()));
+    (*report.use.facts)["materials"].push_back(powder.json(cost->drop_pl()));
+  }
 }
 
 /// As the program feeds, or its host.
@@ -196,10 +200,7 @@ void check_layers(const std::string& directory, const Manifest& manifest, bool q
     if (!cost && inspection.machine) cost.emplace(inspection.machine->profile(), manifest);
     if (report.unfed.empty()) {
       for (const JobMaterial& material : manifest.head.materials) report.unfed.push_back({material.name});
-      for (std::size_t m = 0; m < report.unfed.size() && manifest.head.most_drops > 0; ++m)
-        report.powders.push_back({report.unfed[m].name});
     }
-    if (inspection.machine) report.drop_pl = inspection.machine->profile().head.drop_pl;
   }
   // In chunks, so that messages and sums stay in layer order without a string for each of a hundred thousand layers.
   constexpr std::size_t kPiece = 1024;
@@ -218,8 +219,6 @@ void check_layers(const std::string& directory, const Manifest& manifest, bool q
       report.lost += record.program.lost;
       for (std::size_t m = 0; m < report.unfed.size(); ++m)
         report.unfed[m].add(record.layer, record.image_of(m, report.unfed.size()).unfed_pixels);
-      for (std::size_t m = 0; m < report.powders.size(); ++m)
-        report.powders[m].add(record.image_of(m, report.powders.size()).set_pixels, record.drops_of(m, report.powders.size()));
       if (found[i].count) {
         report.replay.add(*found[i].count);
         cost->add(record, found[i].count->drops + found[i].count->spat, found[i].count->microseconds);

@@ -6,7 +6,6 @@
 #include <vector>
 
 #include "pipeline/run/summary.h"
-#include "stages/cost/powder_drops.h"
 #include "stages/data/layer.h"
 #include "stages/data/status.h"
 #include "stages/replay/count.h"
@@ -27,12 +26,9 @@ struct VerifyReport : Faults {
   replay::Count replay;               // sum over the replayed layers
   std::uint64_t moved = 0, lost = 0;  // pixels of blocked nozzles
   std::vector<UnfedPowder> unfed;     // by material, of a job with several and a machine
-  /// Of the same materials what their images have, if a wish decides the drops; empty of others.
-  std::vector<cost::PowderDrops> powders;
-  double drop_pl = 0;
-  replay::Material material;  // used up
-  double coverage = 0;        // drops / pixels of the replayed layers
-  Summary use;                // what they use up and cost: lines, facts, table; empty without programs
+  replay::Material material;          // used up
+  double coverage = 0;                // drops / pixels of the replayed layers
+  Summary use;                        // what they use up and cost: lines, facts, table; empty without programs
 };
 
 /// Compares every file with the manifest of the whole job, or of all shards present: existence, size and hash. Unless

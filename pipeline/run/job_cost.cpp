@@ -11,7 +11,12 @@ namespace lamina::pipeline {
 JobCost::JobCost(const Machine& machine, const Manifest& manifest)
     : account_(machine, manifest.head.grid, manifest.head.parts,
                std::ranges::any_of(manifest.layers, [](const LayerRecord& record) { return !record.part_pixels.empty(); }),
-               title_of(manifest.head.parts)) {}
+               title_of(manifest.head.parts)),
+      drop_pl_(machine.head.drop_pl) {
+  for (const JobMaterial& material : manifest.head.materials) {
+    if (manifest.head.most_drops > 0) powders_.push_back({material.name});
+  }
+}
 
 // The plan outlives this object.
 JobCost::JobCost(const Plan& plan)
@@ -94,6 +99,8 @@ void JobCost::add(const LayerRecord& record, std::uint64_t drops, std::int64_t m
   if (record.layer.index == 0) account_.tally().add_base();
   account_.tally().add(record.layer.thickness, microseconds, drops, record.filled_pixels(), record.part_pixels,
                        record.part_drops);
+  for (std::size_t m = 0; m < powders_.size(); ++m)
+    powders_[m].add(record.image_of(m, powders_.size()).set_pixels, record.drops_of(m, powders_.size()));
 }
 
 }  // namespace lamina::pipeline

@@ -233,7 +233,8 @@ std::uint64_t LayerImager::bytes_of(const Layer& layer) const {
     scratch = std::max(scratch, solid.coverage->scratch_bytes_bound(layer));
     of_shares += 9 * changes_bound(layer) + 4 * plan_.images->grid.rows();
   }
-  if (shares_voxels()) of_shares += plan_.scene->images.size() * (9 * changes_bound(layer) + 4 * plan_.images->grid.rows());
+  if (shares_voxels())
+    of_shares += 9 * changes_of_images(plane(layer)) + plan_.scene->images.size() * 4 * plan_.images->grid.rows();
   // Of solids that share voxels, their shares twice, with their cores, and together; their drops for each material.
   if (shares_voxels()) of_shares *= 3 + plan_.images->materials.used.size();
   of_shares += scratch;

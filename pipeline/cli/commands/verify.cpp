@@ -51,7 +51,6 @@ Json report_json(const VerifyReport& report) {
   for (const UnfedPowder& powder : report.unfed) {
     json["unfed"].push_back({{"material", powder.name}, {"pixels", powder.pixels}, {"layers", powder.layers}});
   }
-  for (const cost::PowderDrops& powder : report.powders) json["materials"].push_back(powder.json(report.drop_pl));
   return json;
 }
 
@@ -86,7 +85,6 @@ Outcome run_verify(const Arguments& arguments, Context& context) {
         for (const std::string& line : replay::totals_text(totals_of(*report))) answer.say(line);
         for (const auto& [name, what] : report->use.results)
           answer.say(fmt::format("{:<10}{}", name == "material" ? "used" : name, what));
-        for (const cost::PowderDrops& powder : report->powders) answer.say("          " + powder.told(report->drop_pl));
         std::vector<Warning> doubts;
         for (const UnfedPowder& powder : report->unfed) sanity::warn_of_unfed(powder, doubts);
         for (const Warning& doubt : doubts) answer.say("warning   " + one_line(doubt.text));

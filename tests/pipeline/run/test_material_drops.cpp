@@ -192,7 +192,7 @@ TEST_F(MaterialDrops, OfEachMaterialAreThoseOfItsWish) {
   }
   const test::Outcome verified = lamina("verify out --json --quiet");
   ASSERT_EQ(verified.code, 0) << verified.err;
-  const auto seen = nlohmann::json::parse(verified.out)["materials"];
+  const auto seen = nlohmann::json::parse(verified.out)["use"]["materials"];
   ASSERT_EQ(seen.size(), 2u);
   const auto told = facts("jet --job wish.toml --dry-run")["materials"];
   for (std::size_t m = 0; m < 2; ++m) {
