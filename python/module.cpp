@@ -206,8 +206,8 @@ void define_layer(py::module_& module) {
             }
             return images;
           },
-          "dict: the Image of each powder by its name, in the plan's order; no pixel is set in two, and together they are the "
-          "layer. Empty if no part names a material. They lie in the layer; nothing is copied.")
+          "dict: the Image of each powder by its name, in the plan's order; of several drops, that of the first. Together "
+          "they are the layer; no pixel is set in two, but for voxels that get drops of both. Empty if no part names a material. They lie in the layer; nothing is copied.")
       .def("__repr__", [](const PlannedLayer& l) {
         return fmt::format("<lamina.Layer {}: {} to {} mm, {} x {} pixels, {} set>", l.layer.index, mm(l.layer.bottom),
                            mm(std::int64_t{l.layer.bottom} + l.layer.thickness), l.runs.columns, l.runs.view().rows(),

@@ -79,7 +79,7 @@ Result<Runs> solid_of_layer(const std::string& folder, const ManifestHead& head,
   auto picture = picture_of_layer(folder, head, record);
   if (!picture) return picture.error();
   const std::uint8_t full = head.full_level();
-  if (full == 0) return std::move(picture->front());
+  if (full == 0 || head.grey_drops()) return std::move(picture->front());
   Levels levels;
   auto image = read::levels(folder + "/" + layer_images(head, record).front().name, full, levels);
   if (!image) return image.error();

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <utility>
 
@@ -9,7 +10,6 @@
 #include "pipeline/output/print_program.h"
 #include "stages/data/input/file_reader.h"
 #include "stages/data/levels.h"
-#include "stages/raster/materials.h"
 
 namespace lamina::pipeline {
 namespace {
@@ -53,33 +53,33 @@ Result<read::Image> read_layer_image(const std::string& path, const ManifestHead
   return image;
 }
 
-bool add_picture(const ManifestHead& head, Runs&& image, LayerPicture&& drops, LayerPicture& picture) {
-  if (head.grey_drops()) {
-    picture = std::move(drops);
-    return true;
-  }
-  if (head.materials.empty()) return raster::add_drop(std::move(image), picture);
-  picture.resize(1);
-  return raster::add_image(std::move(image), picture[0]);
+raster::DropPlanes planes_of(const ManifestHead& head) {
+  return {std::max(1u, head.most_drops), head.levels > 0 && head.drops_of_materials()};
+}
+
+std::string add_picture(const ManifestHead& head, std::size_t number, Runs&& image, LayerPicture&& drops,
+                        raster::DropPlanes& picture) {
+  if (!head.grey_drops()) return picture.add(std::move(image), static_cast<std::uint32_t>(number % head.drop_images()));
+  std::string what;
+  for (std::uint32_t drop = 0; drop < drops.size() && what.empty(); ++drop) what = picture.add(std::move(drops[drop]), drop);
+  return what;
 }
 
 Result<LayerPicture> picture_of_layer(const std::string& directory, const ManifestHead& head, const LayerRecord& record) {
-  LayerPicture picture;
-  for (const LayerImageFile& file : layer_images(head, record)) {
+  raster::DropPlanes picture = planes_of(head);
+  const auto files = layer_images(head, record);
+  for (std::size_t i = 0; i < files.size(); ++i) {
     LayerPicture drops;
     Levels levels;
-    auto image = read_layer_image((fs::path(directory) / file.name).string(), head, drops, levels);
+    auto image = read_layer_image((fs::path(directory) / files[i].name).string(), head, drops, levels);
     if (!image) return image.error();
     if (image->runs.columns != head.grid.columns() || image->runs.view().rows() != head.grid.rows()) {
-      return Error{Fault::kVerification, fmt::format("{}: is not of the manifest's size", file.name)};
+      return Error{Fault::kVerification, fmt::format("{}: is not of the manifest's size", files[i].name)};
     }
-    if (!add_picture(head, std::move(image->runs), std::move(drops), picture)) {
-      return Error{Fault::kVerification,
-                   fmt::format("{}: sets pixels {}", file.name,
-                               head.materials.empty() ? "that get no drop before" : "of another material")};
-    }
+    const std::string what = add_picture(head, i, std::move(image->runs), std::move(drops), picture);
+    if (!what.empty()) return Error{Fault::kVerification, fmt::format("{}: sets pixels that {}", files[i].name, what)};
   }
-  return picture;
+  return std::move(picture.planes);
 }
 
 }  // namespace lamina::pipeline

@@ -7,6 +7,7 @@
 #include "pipeline/output/print_program.h"
 #include "stages/data/runs.h"
 #include "stages/data/status.h"
+#include "stages/raster/materials.h"
 #include "stages/read/image.h"
 #include "stages/replay/machine.h"
 #include "stages/write/manifest/compare.h"
@@ -20,7 +21,7 @@ Result<replay::VirtualMachine> machine_of_job(const std::string& directory, cons
 /// The text of a layer's print program, unchecked; "" if it cannot be read.
 std::string program_of_layer(const std::string& directory, const ManifestHead& head, std::uint32_t layer);
 
-/// The images of a layer's drops, each within the one before; one, with all materials, where a pixel gets at most one drop.
+/// The images of a layer's drops, of all materials, each within the one before; one where a pixel gets at most one drop.
 using LayerPicture = std::vector<Runs>;
 
 /// Reads an image of a layer; its runs are the pixels with any drop.
@@ -29,8 +30,11 @@ using LayerPicture = std::vector<Runs>;
 /// errors  kVerification, with the file: of read::image; more drops than the job has
 Result<read::Image> read_layer_image(const std::string& path, const ManifestHead& head, LayerPicture& drops, Levels& levels);
 
-/// Adds an image of a layer, in the order of the manifest. returns  false if it contradicts those before
-bool add_picture(const ManifestHead& head, Runs&& image, LayerPicture&& drops, LayerPicture& picture);
+/// What the images of a layer are put together by, and adds the one of this number.
+/// returns  empty, or what the pixels that it sets contradict, as DropPlanes::add()
+raster::DropPlanes planes_of(const ManifestHead& head);
+std::string add_picture(const ManifestHead& head, std::size_t number, Runs&& image, LayerPicture&& drops,
+                        raster::DropPlanes& picture);
 
 /// A layer on the manifest's grid; at least one image.
 /// errors  kVerification, with the file: of read::image; wrong size; two materials in one pixel; drops without the first

@@ -47,13 +47,18 @@ struct Finding {
 /// Empty, or what is wrong with the vats that feed a layer of a job of several materials.
 /// feeds  the vats that do, a bit each
 std::string fault_of_feeding(const Inspection& inspection, const LayerRecord& record, std::uint32_t feeds) {
+  const ManifestHead& head = inspection.head;
   std::vector<std::uint64_t> set, unfed;
-  std::vector<std::uint32_t> vats;
+  std::vector<std::uint32_t> vats, vat_of_image;
   for (const ImageRecord& one : record.images) set.push_back(one.set_pixels), unfed.push_back(one.unfed_pixels);
-  for (const JobMaterial& material : inspection.head.materials) vats.push_back(material.vat);
-  const std::uint32_t wanted = replay::vats_wanted(inspection.machine->profile(), set, vats);
+  for (const JobMaterial& material : head.materials) {
+    vats.push_back(material.vat);
+    vat_of_image.insert(vat_of_image.end(), head.drop_images(), material.vat);
+  }
+  const std::uint32_t wanted =
+      replay::vats_wanted(inspection.machine->profile(), record.pixels_of_materials(head.materials.size()), vats);
   if (feeds != wanted) return fmt::format("{} where {} has to", replay::vats_text(feeds), replay::vats_text(wanted));
-  return replay::fault_of_unfed(set, vats, unfed, feeds);
+  return replay::fault_of_unfed(set, vat_of_image, unfed, feeds);
 }
 
 // Empty, or the fault of a layer's print program. A program with the wrong hash is still replayed, because the replay
@@ -99,22 +104,22 @@ std::string fault_of_program(const Inspection& inspection, const LayerRecord& re
                             image != nullptr ? ", though it prints the same" : "");
 }
 
-// Empty, or the fault of an image; its set pixels are added to `picture`, its levels to `sum`.
-std::string fault_of_image(const Inspection& inspection, const LayerImageFile& file, LayerPicture& picture,
-                           std::uint64_t& sum) {
+// Empty, or the fault of the image of this number; its set pixels are added to `picture`, its levels to `sum`.
+std::string fault_of_image(const Inspection& inspection, std::size_t number, const LayerImageFile& file,
+                           raster::DropPlanes& picture, std::uint64_t& sum) {
   const std::string& name = file.name;
   LayerPicture drops;
   Levels levels;
   auto image = read_layer_image((fs::path(inspection.directory) / name).string(), inspection.head, drops, levels);
   if (!image) return image.error().message;
-  sum += sum_of_levels(levels);
+  const std::uint64_t own = sum_of_levels(levels);
+  sum += own;
   if (const std::string what = read::difference(*image, inspection.head.grid, file.record.set_pixels); !what.empty())
     return fmt::format("{}: {}", name, what);
-  if (!add_picture(inspection.head, std::move(image->runs), std::move(drops), picture)) {
-    return fmt::format("{}: sets pixels that {}", name,
-                       inspection.head.materials.empty() ? "get no drop before" : "another material's image sets as well");
-  }
-  return {};
+  if (file.record.drops > 0 && own != file.record.drops)
+    return fmt::format("{}: has {} drops, the manifest says {}", name, own, file.record.drops);
+  const std::string what = add_picture(inspection.head, number, std::move(image->runs), std::move(drops), picture);
+  return what.empty() ? what : fmt::format("{}: sets pixels that {}", name, what);
 }
 
 /// Empty, or what the manifest says of a layer's drops that its images do not.
@@ -124,24 +129,30 @@ std::string fault_of_drops(const ManifestHead& head, const LayerRecord& record, 
   for (const Runs& plane : picture) drops += set_pixels(plane);
   if (drops != record.drops)
     return fmt::format("layer {}: its images have {} drops, the manifest says {}", record.layer.index, drops, record.drops);
-  return {};
+  const std::uint64_t set = set_pixels(picture.front());
+  const auto most = std::ranges::count_if(picture, [](const Runs& plane) { return !plane.change.empty(); });
+  if (set == record.set_pixels && most == record.most_drops) return {};
+  return fmt::format("layer {}: its images set {} pixels with up to {} drops, the manifest says {} with {}", record.layer.index,
+                     set, most, record.set_pixels, record.most_drops);
 }
 
 std::string fault_of_layer(const Inspection& inspection, const LayerRecord& record, std::optional<replay::Count>& count) {
   if (inspection.head.extension.empty()) return fault_of_program(inspection, record, nullptr, count);  // a format without files
-  LayerPicture picture;
+  raster::DropPlanes picture = planes_of(inspection.head);
   std::uint64_t levels = 0;
-  for (const LayerImageFile& file : layer_images(inspection.head, record)) {
+  const auto files = layer_images(inspection.head, record);
+  for (std::size_t i = 0; i < files.size(); ++i) {
+    const LayerImageFile& file = files[i];
     std::string fault = fault_of_file(inspection.directory, file.name, file.record.hash, file.record.bytes);
     if (!fault.empty()) return fault;
     if (inspection.quick) continue;
-    if (std::string what = fault_of_image(inspection, file, picture, levels); !what.empty()) return what;
+    if (std::string what = fault_of_image(inspection, i, file, picture, levels); !what.empty()) return what;
   }
   if (!inspection.quick) {
-    if (std::string what = fault_of_drops(inspection.head, record, picture); !what.empty()) return what;
-    if (std::string what = inspection.doses->fault(record, picture, levels); !what.empty()) return what;
+    if (std::string what = fault_of_drops(inspection.head, record, picture.planes); !what.empty()) return what;
+    if (std::string what = inspection.doses->fault(record, picture.planes, levels); !what.empty()) return what;
   }
-  return fault_of_program(inspection, record, inspection.quick ? nullptr : &picture, count);
+  return fault_of_program(inspection, record, inspection.quick ? nullptr : &picture.planes, count);
 }
 
 // Restores the machine that the programs were written for.
@@ -180,6 +191,10 @@ void finish_replay(const Inspection& inspection, const std::optional<JobCost>& c
   report.use = {};
   report.use.facts = std::make_shared<nlohmann::ordered_json>();
   cost->account().tell(report.use.results, *report.use.facts, report.use.quote);
+  for (const cost::PowderDrops& powder : cost->powders()) {
+    report.use.results.emplace_back("", powder.told(cost->drop_pl()));
+    (*report.use.facts)["materials"].push_back(powder.json(cost->drop_pl()));
+  }
 }
 
 /// As the program feeds, or its host.
@@ -215,7 +230,8 @@ void check_layers(const std::string& directory, const Manifest& manifest, bool q
       report.bytes += record.bytes + record.program.bytes;
       report.moved += record.program.moved;
       report.lost += record.program.lost;
-      for (std::size_t m = 0; m < report.unfed.size(); ++m) report.unfed[m].add(record.layer, record.images[m].unfed_pixels);
+      for (std::size_t m = 0; m < report.unfed.size(); ++m)
+        report.unfed[m].add(record.layer, record.image_of(m, report.unfed.size()).unfed_pixels);
       if (found[i].count) {
         report.replay.add(*found[i].count);
         cost->add(record, found[i].count->drops + found[i].count->spat, found[i].count->microseconds);

@@ -135,16 +135,18 @@ Status ImageFiles::encode(const LayerImages& images, Work& work, LayerRecord& re
     work.level_encoder->tag(tags);
   }
   if (head_.named_images() == 0) {
-    if (Status status = encode_one(images.whole, images.levels, work, record, work.file); !status) return status;
+    if (Status status = encode_one(images.whole, images.levels.data(), work, record, work.file); !status) return status;
     record.bytes = work.file.size();
     record.hash = hash_bytes(work.file);
     return {};
   }
   work.files.resize(images.several.size());
   for (std::size_t m = 0; m < images.several.size(); ++m) {
-    if (!head_.materials.empty()) tags.material = head_.materials[m].name;
-    work.encoder->tag(tags);
-    if (Status status = encode_one(images.several[m], images.levels, work, record, work.files[m]); !status) return status;
+    if (!head_.materials.empty()) tags.material = head_.materials[m / head_.drop_images()].name;
+    if (work.encoder) work.encoder->tag(tags);
+    if (work.level_encoder) work.level_encoder->tag(tags);
+    const Levels* levels = m < images.levels.size() ? &images.levels[m] : nullptr;
+    if (Status status = encode_one(images.several[m], levels, work, record, work.files[m]); !status) return status;
     record.images[m].bytes = work.files[m].size();
     record.images[m].hash = hash_bytes(work.files[m]);
     record.bytes += work.files[m].size();
@@ -152,12 +154,12 @@ Status ImageFiles::encode(const LayerImages& images, Work& work, LayerRecord& re
   return {};
 }
 
-Status ImageFiles::encode_one(const Runs& image, const Levels& levels, Work& work, const LayerRecord& record,
+Status ImageFiles::encode_one(const Runs& image, const Levels* levels, Work& work, const LayerRecord& record,
                               write::Bytes& file) const {
   file.clear();
   const double x = head_.grid.x.dpi(), y = head_.grid.y.dpi();
   const Status status = levels_ == nullptr ? work.encoder->encode(image, x, y, file)
-                                           : work.level_encoder->encode(levels, head_.full_level(), x, y, file);
+                                           : work.level_encoder->encode(*levels, head_.full_level(), x, y, file);
   if (status) return {};
   return Error{status.error().fault, fmt::format("layer {}: {}", record.layer.index, status.error().message)};
 }
@@ -173,20 +175,17 @@ Status ImageFiles::store(const LayerImages& images, Work& work, LayerRecord& rec
 }
 
 Result<std::vector<std::uint32_t>> ImageFiles::feeds_of(const LayerRecord& record) const {
-  std::vector<std::uint64_t> pixels;
-  if (head_.materials.empty()) pixels.push_back(record.set_pixels);
-  for (const ImageRecord& image : record.images) {
-    if (!head_.materials.empty()) pixels.push_back(image.set_pixels);
-  }
+  std::vector<std::uint64_t> pixels{record.set_pixels};
+  if (!head_.materials.empty()) pixels = record.pixels_of_materials(head_.materials.size());
   return vats_of_layer(plan_.images->machine->machine, plan_.images->materials, pixels);
 }
 
 void ImageFiles::tell_unfed(LayerRecord& record) const {
   if (!program_ || head_.materials.empty()) return;
   const auto feeds = feeds_of(record);
-  const auto& materials = plan_.images->materials.used;
-  for (std::size_t m = 0; feeds && m < materials.size(); ++m) {
-    record.images[m].unfed_pixels = unfed_pixels(materials[m], *feeds, record.images[m].set_pixels);
+  for (std::size_t i = 0; feeds && i < record.images.size(); ++i) {
+    const JobMaterial& material = head_.materials[i / head_.drop_images()];
+    record.images[i].unfed_pixels = unfed_pixels(material, *feeds, record.images[i].set_pixels);
   }
 }
 
@@ -199,7 +198,7 @@ Status ImageFiles::program(const LayerImages& images, Work& work, LayerRecord& r
   }
   tell_unfed(record);
   std::vector<RunsView> planes{images.whole};
-  if (head_.most_drops > 1) planes.assign(images.several.begin(), images.several.end());
+  if (head_.most_drops > 1) planes.assign(images.planes.begin(), images.planes.end());
   return program_->write_layer(record.layer, planes, *feeds, work.program, record.program);
 }
 

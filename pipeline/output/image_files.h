@@ -28,9 +28,10 @@ write::LayerTags tags_of(const Plan& plan, const Layer& layer);
 
 /// The images of a layer that is to be written.
 struct LayerImages {
-  const Runs& whole;              // of all materials, or of the first drop
-  std::span<const Runs> several;  // of each material, or of each drop of a pixel, if the job has several
-  const Levels& levels;           // shares of the voxels, or drops, for formats that carry them
+  const Runs& whole;               // of all materials, of the first drop
+  std::span<const Runs> planes;    // of all materials, of each drop, if pixels can get several
+  std::span<const Runs> several;   // those that have names (ManifestHead::named_images)
+  std::span<const Levels> levels;  // for formats that carry shares of the voxels, or drops: one, or one a material
 };
 
 class ImageFiles {
@@ -56,7 +57,7 @@ class ImageFiles {
     std::unique_ptr<write::ImageEncoder> encoder;
     std::unique_ptr<write::LevelEncoder> level_encoder;
     write::Bytes file;
-    std::vector<write::Bytes> files;  // one per material or drop, if the job has several
+    std::vector<write::Bytes> files;  // those that have names
     ProgramWork program;
     std::uint64_t bytes() const;
   };
@@ -83,7 +84,7 @@ class ImageFiles {
   Status record_kept_below(std::uint32_t layer);
   Result<std::vector<std::uint32_t>> feeds_of(const LayerRecord& record) const;
   void tell_unfed(LayerRecord& record) const;
-  Status encode_one(const Runs& image, const Levels& levels, Work& work, const LayerRecord& record, write::Bytes& file) const;
+  Status encode_one(const Runs& image, const Levels* levels, Work& work, const LayerRecord& record, write::Bytes& file) const;
 
   const Plan& plan_;
   ManifestHead head_;

@@ -186,7 +186,7 @@ Status judge(std::span<const Shard> shards, bool strict, bool allow_empty, Merge
   for (const Shard& shard : shards) {
     for (const LayerRecord& record : shard.manifest.layers) {
       records.add(record.layer, record.set_pixels, record.program.lost, record.capped_rows);
-      for (std::size_t m = 0; m < unfed.size(); ++m) unfed[m].add(record.layer, record.images[m].unfed_pixels);
+      for (std::size_t m = 0; m < unfed.size(); ++m) unfed[m].add(record.layer, record.image_of(m, unfed.size()).unfed_pixels);
       report.microseconds += record.program.microseconds;
       timed = timed && (record.program.bytes == 0 || record.program.microseconds > 0);
     }

@@ -81,15 +81,10 @@ Status DosePlan::decide(const Job& job, const Machine* machine, std::uint32_t sw
   return budget_->judge(job.allow_unbound, warnings);
 }
 
-Status DosePlan::check_images(std::string_view format, bool several) const {
-  const auto refuse = [](std::string text) { return Error{Fault::kUsage, std::move(text)}; };
-  const bool grey = saturates() && write::find_level_format(format) != nullptr;
-  if (several && grey)
-    return refuse(fmt::format("--format {}: drops of several materials have images of 1 bit; choose tiff-g4", format));
-  if (several && most_drops() > 1)
-    return refuse("--saturation: several drops a pixel of several materials are not planned together; plan them apart");
-  if (!grey || format != "tiff-4" || most_drops() <= 15) return {};
-  return refuse(fmt::format("--format tiff-4: tells up to 15 drops of a pixel, the job has {}; choose tiff-8", most_drops()));
+Status DosePlan::check_images(std::string_view format) const {
+  if (format != "tiff-4" || most_drops() <= 15) return {};
+  return Error{Fault::kUsage,
+               fmt::format("--format tiff-4: tells up to 15 drops of a pixel, the job has {}; choose tiff-8", most_drops())};
 }
 
 bool DosePlan::has_formula(const Layer& layer) const {

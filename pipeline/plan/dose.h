@@ -34,9 +34,8 @@ class DosePlan {
   Status decide(const Job& job, const Machine* machine, std::uint32_t sweep_drops, const Scene& scene, std::uint32_t layers,
                 const std::function<Layer(std::uint32_t)>& layer, std::vector<Warning>& warnings);
 
-  /// Whether images of a format carry the drops, decided before. several  materials
-  /// errors  kUsage: several drops or grey ones of several materials; more than pixels of 4 bits tell
-  Status check_images(std::string_view format, bool several) const;
+  /// errors  kUsage: images of a format do not carry as many drops as were decided before
+  Status check_images(std::string_view format) const;
 
   /// Whether the dose changes any layer.
   bool any() const { return bleeds() || core_ < 1 || saturates(); }

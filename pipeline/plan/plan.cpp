@@ -292,7 +292,7 @@ class Planner {
     if (Status status = dose.decide(job(), machine(), sweep_drops, *plan_.scene, plan_.layer_count, layer, plan_.warnings);
         !status)
       return status;
-    if (Status status = dose.check_images(job().format, materials_.several()); !status) return status;
+    if (Status status = dose.check_images(job().format); !status) return status;
     plan_.images.emplace(ImagePlan{std::move(printer_.machine), grid, std::move(materials_), std::move(*solids),
                                    std::move(dose), std::move(beads), std::move(covered)});
     end_indexing();

@@ -134,10 +134,12 @@ void note_overlaps(const Job& job, Scene& scene, const std::vector<std::pair<std
   }
   for (const auto& [pair, unused] : noted) {
     const auto& [first, second] = pair;
+    const auto is_images = [&](std::uint32_t part) { return std::ranges::count(scene.images, part, &PlacedImages::part) > 0; };
     scene.parts[second].notes.push_back(
         {false, fmt::format("its box overlaps that of part {} ({}); where solids overlap {}", first + 1,
                             std::filesystem::path(scene.parts[first].path).filename().string(),
                             job.parts[first].material == job.parts[second].material ? "they are united"
+                            : is_images(first) && !is_images(second)                ? "that one's material counts"
                                                                                     : "this one's material counts")});
   }
 }

@@ -39,12 +39,9 @@ std::vector<std::uint32_t> levels_of(const Scene& scene, const Job& job, const M
 }
 
 /// What keeps a job from levels, and what to do; empty if nothing does.
-std::string_view against_shares(const Scene& scene, const Job& job, const Materials& materials, const DoseZones& zones) {
-  if (!scene.images.empty() && (materials.several() || zones.several()))
-    return "meshes where parts have materials or doses of their own; leave out the parts that are images, or give all parts those "
-           "of the job";
-  if (materials.several() && write::find_level_format(job.format) != nullptr)
-    return "one material as grey, for several would lie in one voxel; choose a 1-bit format";
+std::string_view against_shares(const Job& job, const Materials& materials, const DoseZones& zones) {
+  if (materials.several() && job.machine.profile.empty() && write::find_level_format(job.format) != nullptr)
+    return "one material as grey, for several would lie in one voxel; choose a 1-bit format or name a machine";
   if (zones.grows()) return "edges that stay or shrink; leave out a negative bleed";
   if (fills(job)) return "whole parts; leave out walls, fillings and segments";
   if (job.dose.core < 1) return "whole parts; give --core-saturation in place of --core";
@@ -101,7 +98,7 @@ Result<Solids> Solids::build(Scene& scene, const Job& job, const PixelGrid& grid
   Solids result;
   const bool rays = job.engine != Engine::kContours, contours = job.engine != Engine::kRays;
   if (job.levels > 0) {
-    if (const auto what = against_shares(scene, job, materials, zones); !what.empty()) {
+    if (const auto what = against_shares(job, materials, zones); !what.empty()) {
       return Error{Fault::kUsage, fmt::format("--levels: shares of voxels are those of {}, or leave out --levels", what)};
     }
   }

@@ -10,6 +10,7 @@
 #include "pipeline/run/inspector.h"
 #include "pipeline/run/job_cost.h"
 #include "pipeline/run/powders.h"
+#include "stages/cost/powder_drops.h"
 #include "stages/data/text/number_text.h"
 #include "stages/data/text/readable.h"
 #include "stages/dose/share_count.h"
@@ -35,7 +36,7 @@ class ImageMaker : public Maker {
         made_(limits.record_slots) {
     if (plan.images->machine) cost_.emplace(plan);
     for (const JobMaterial& material : plan.images->materials.used) {
-      materials_.emplace_back(material.name, 0);
+      materials_.push_back({material.name});
       unfed_.push_back({material.name});
     }
   }
@@ -183,13 +184,12 @@ class ImageMaker : public Maker {
 
   LayerImages images_of(const Work& work) const {
     const ImageWork& images = work.images;
-    return {images.runs, plan_.images->dose.most_drops() > 1 ? images.drops.planes : images.materials.image,
-            plan_.images->dose.saturates() ? images.drops.levels : images.drops.shares};
+    return {images.runs, images.drops.planes, imager_.several(images), imager_.levels(images)};
   }
 
   /// Counts what lies in the powder of another vat.
   void add_unfed(const LayerRecord& record) {
-    for (std::size_t m = 0; m < record.images.size(); ++m) unfed_[m].add(record.layer, record.images[m].unfed_pixels);
+    for (std::size_t m = 0; m < unfed_.size(); ++m) unfed_[m].add(record.layer, record.image_of(m, unfed_.size()).unfed_pixels);
   }
 
   void add(const LayerRecord& record) {
@@ -208,8 +208,9 @@ class ImageMaker : public Maker {
     added_sweeps_ += record.program.added_sweeps;
     added_microseconds_ += record.program.added_microseconds;
     timed_ = timed_ && (record.program.bytes == 0 || record.program.microseconds > 0);
-    for (std::size_t m = 0; plan_.images->materials.several() && m < record.images.size(); ++m)
-      materials_[m].second += record.images[m].set_pixels;
+    const std::size_t materials = plan_.images->materials.several() ? materials_.size() : 0;
+    for (std::size_t m = 0; m < materials; ++m)
+      materials_[m].add(record.image_of(m, materials).set_pixels, record.drops_of(m, materials));
     const double pixel_mm2 = 25.4 * 25.4 / (grid.x.dpi() * grid.y.dpi());
     volume_mm3_ += static_cast<double>(record.filled_pixels()) * pixel_mm2 * mm(record.layer.thickness);
   }
@@ -234,8 +235,8 @@ class ImageMaker : public Maker {
   std::vector<std::uint32_t> refills_;  // layers before which vats are filled
   dose::BinderCount binder_;
   dose::ShareCount shares_;
-  std::vector<std::pair<std::string, std::uint64_t>> materials_;  // name, set pixels
-  std::vector<UnfedPowder> unfed_;                                // by material
+  std::vector<cost::PowderDrops> materials_;
+  std::vector<UnfedPowder> unfed_;  // by material
 };
 
 void ImageMaker::warn(const Summary&, std::vector<Warning>& warnings) const {
@@ -284,6 +285,8 @@ void ImageMaker::tell(Summary& summary) const {
   const double pixels = static_cast<double>(grid.columns()) * grid.rows() * summary.layers_planned;
   const double pixels_a_second = summary.layer_seconds > 0 ? pixels / summary.layer_seconds : 0;
   const bool several = plan_.images->materials.several();
+  const auto& budget = plan_.images->dose.budget();
+  const double drop_pl = budget && plan_.images->dose.saturates() ? budget->binder().drop_pl : 0;
   const std::string_view isa = isa_name(*usable_isa(plan_.job.isa));
   const double print_seconds = timed_ ? static_cast<double>(microseconds_) * 1e-6 : 0;
   summary.bytes_written = bytes_written_;
@@ -303,9 +306,9 @@ void ImageMaker::tell(Summary& summary) const {
            fmt::format("{:.2f} % of the parts' {} pixels are left empty", 100 * porosity, readable_count(solid_pixels_)));
   }
   if (several) {
-    for (const auto& [name, count] : materials_) result("", fmt::format("{} of {}", readable_count(count), name));
+    for (const cost::PowderDrops& powder : materials_) result("", powder.told(drop_pl));
   }
-  if (const auto& budget = plan_.images->dose.budget()) tell_binder(*budget, summary);
+  if (budget) tell_binder(*budget, summary);
   if (const auto& machine = plan_.images->machine) tell_jetting(*machine, summary);
   if (print_seconds > 0) result("printing", replay::time_text(print_seconds, plan_.images->machine->machine.name));
   if (!refills_.empty()) result("vats", program::refills_text(refills_));
@@ -337,8 +340,7 @@ void ImageMaker::tell(Summary& summary) const {
   }
   if (!several) return;
   for (std::size_t m = 0; m < materials_.size(); ++m) {
-    nlohmann::ordered_json& fact = facts["materials"].emplace_back();
-    fact = {{"name", materials_[m].first}, {"set_pixels", materials_[m].second}};
+    nlohmann::ordered_json& fact = facts["materials"].emplace_back(materials_[m].json(drop_pl));
     if (!plan_.images->machine) continue;
     fact["unfed_pixels"] = unfed_[m].pixels;
     fact["unfed_layers"] = unfed_[m].layers;

@@ -70,6 +70,10 @@ class LayerImager {
   /// Runs all steps.
   Status make(const Layer& layer, ImageWork& work, LayerRecord& record, ImageNotes& notes) const;
 
+  /// The images of a layer that have names, and its levels, of each material if there are several; from then on.
+  std::span<const Runs> several(const ImageWork& work) const;
+  std::span<const Levels> levels(const ImageWork& work) const;
+
   /// How full the voxels of a layer are, in Job::levels levels, before anything is mirrored or thinned.
   /// The plan's job asks for levels.
   cover::LayerReport levels(const Layer& layer, cover::LayerScratch& scratch, Levels& image) const;
@@ -90,8 +94,9 @@ class LayerImager {
   Status check_grown(const Layer& layer, const ImageWork& work) const;
   std::uint64_t least_vanished() const;
   bool shares_voxels() const;  // of several materials or doses
-  void share_out(const Layer& layer, ImageWork& work) const;
-  static void split_materials(ImageWork& work);
+  void cover(const Layer& layer, ImageWork& work) const;
+  void lay_shares(const Layer& layer, std::uint32_t part, ImageWork& work) const;
+  void own_voxels(ImageWork& work) const;
   static void empty_removed(const Runs& before, bool laid, ImageWork& work);
   std::uint64_t bytes_of_section(Nm plane, std::uint64_t changes) const;
   std::uint64_t changes_of_images(Nm plane) const;

@@ -11,7 +11,12 @@ namespace lamina::pipeline {
 JobCost::JobCost(const Machine& machine, const Manifest& manifest)
     : account_(machine, manifest.head.grid, manifest.head.parts,
                std::ranges::any_of(manifest.layers, [](const LayerRecord& record) { return !record.part_pixels.empty(); }),
-               title_of(manifest.head.parts)) {}
+               title_of(manifest.head.parts)),
+      drop_pl_(machine.head.drop_pl) {
+  for (const JobMaterial& material : manifest.head.materials) {
+    if (manifest.head.most_drops > 0) powders_.push_back({material.name});
+  }
+}
 
 // The plan outlives this object.
 JobCost::JobCost(const Plan& plan)
@@ -70,14 +75,22 @@ void JobCost::share_out(const ImageWork& work, const std::vector<std::uint64_t>&
   const DoseZones& zones = plan_->images->dose.zones();
   if (!saturates_ || !zones.several()) return;  // drops are as pixels
   record.part_drops.assign(weights.size(), 0);
+  std::vector<std::uint64_t> drops(zones.count(), 0);  // those of shared voxels count for all of theirs
+  for (std::uint32_t zone = 0; full_ == 0 && zone < zones.count(); ++zone)
+    drops[zone] = sum_of_levels(work.drops.levels, work.zones.image[zone]);
+  for (std::size_t i = 0; full_ > 0 && i < work.drops.laid.size(); ++i) {
+    Runs voxels;
+    at_least(work.drops.laid[i].shares, 1, voxels);
+    drops[work.drops.laid[i].zone] += sum_of_levels(work.drops.levels, voxels);
+  }
+  drops = shared(record.drops, drops);
   for (std::uint32_t zone = 0; zone < zones.count(); ++zone) {
     std::vector<std::uint64_t> within(weights.size(), 0);
     for (std::uint32_t part = 0; part < weights.size(); ++part) {
       if (zones.of_part(part) == zone) within[part] = weights[part];
     }
-    const std::uint64_t drops = sum_of_levels(work.drops.levels, work.zones.image[zone]);
-    if (drops == 0) continue;
-    const std::vector<std::uint64_t> own = shared(drops, within);
+    if (drops[zone] == 0) continue;
+    const std::vector<std::uint64_t> own = shared(drops[zone], within);
     for (std::size_t part = 0; part < own.size(); ++part) record.part_drops[part] += own[part];
   }
 }
@@ -86,6 +99,8 @@ void JobCost::add(const LayerRecord& record, std::uint64_t drops, std::int64_t m
   if (record.layer.index == 0) account_.tally().add_base();
   account_.tally().add(record.layer.thickness, microseconds, drops, record.filled_pixels(), record.part_pixels,
                        record.part_drops);
+  for (std::size_t m = 0; m < powders_.size(); ++m)
+    powders_[m].add(record.image_of(m, powders_.size()).set_pixels, record.drops_of(m, powders_.size()));
 }
 
 }  // namespace lamina::pipeline

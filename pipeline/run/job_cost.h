@@ -6,6 +6,7 @@
 #include "pipeline/plan/plan.h"
 #include "stages/cost/account.h"
 #include "stages/cost/part_pixels.h"
+#include "stages/cost/powder_drops.h"
 #include "stages/write/manifest/manifest.h"
 
 namespace lamina::pipeline {
@@ -30,11 +31,16 @@ class JobCost {
   /// From one thread at a time. drops, microseconds  of its print program, with the drops that are spat
   void add(const LayerRecord& record, std::uint64_t drops, std::int64_t microseconds);
   const cost::Account& account() const { return account_; }
+  /// Of a finished job of several materials whose drops a wish decides: what each got; empty of others. drop_pl  a drop
+  const std::vector<cost::PowderDrops>& powders() const { return powders_; }
+  double drop_pl() const { return drop_pl_; }
 
  private:
   void share_out(const ImageWork& work, const std::vector<std::uint64_t>& weights, LayerRecord& record) const;
 
   cost::Account account_;
+  std::vector<cost::PowderDrops> powders_;
+  double drop_pl_ = 0;
   const Plan* plan_ = nullptr;  // of a job whose parts are told apart
   std::optional<cost::PartPixels> windows_;
   bool saturates_ = false, several_ = false;  // drops are decided; pixels get more than one

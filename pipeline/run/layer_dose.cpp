@@ -100,15 +100,20 @@ Status LayerImager::check_grown(const Layer& layer, const ImageWork& work) const
 void LayerImager::shares(const Layer& layer, ImageWork& work, LayerRecord& record) const {
   const ImagePlan& images = *plan_.images;
   if (shares_voxels()) {
-    share_out(layer, work);
+    cover(layer, work);
+    dose::share_out(images.dose.full(), images.grid.columns(), images.grid.rows(), work.drops);
   } else {
     levels(layer, work.coverage, work.drops.shares);
   }
   const auto differs = dose::take_half(images.dose.full(), work.runs, work.second, work.drops);
   record.half_differs = differs.pixels;
   record.half_far = differs.far;
-  if (!shares_voxels()) return;
-  // Voxels half full or more are those of the solid that has most of them.
+  if (shares_voxels()) own_voxels(work);
+}
+
+/// Voxels half full or more are those of the part that has most of them.
+void LayerImager::own_voxels(ImageWork& work) const {
+  const ImagePlan& images = *plan_.images;
   const std::uint32_t columns = images.grid.columns(), rows = images.grid.rows();
   const bool several = images.materials.several(), zones = images.dose.zones().several();
   if (several) work.materials.start(images.materials.used.size(), columns, rows);
@@ -124,19 +129,30 @@ void LayerImager::shares(const Layer& layer, ImageWork& work, LayerRecord& recor
   }
 }
 
-/// How full each solid makes the voxels, and all of them together.
-void LayerImager::share_out(const Layer& layer, ImageWork& work) const {
+/// How full each solid makes the voxels.
+void LayerImager::cover(const Layer& layer, ImageWork& work) const {
   const std::span<const Solid> solids = plan_.images->solids.all();
   work.drops.laid.resize(solids.size());
-  std::vector<Levels*> parts;
   for (std::size_t i = 0; i < solids.size(); ++i) {
     dose::LaidPart& part = work.drops.laid[i];
     solids[i].coverage->layer(layer, work.coverage, part.shares);
     part.zone = solids[i].zone;
     part.material = plan_.images->materials.several() ? solids[i].material.at(plane(layer)) : 0;
-    parts.push_back(&part.shares);
   }
-  dose::share_out(parts, plan_.images->dose.full(), work.drops.shared, work.drops.shares);
+}
+
+/// Those of an image, as placed in work.drops.zones, lie over the parts before: of the same kind as the last one, the larger
+/// share counts.
+void LayerImager::lay_shares(const Layer& layer, std::uint32_t part, ImageWork& work) const {
+  std::vector<dose::LaidPart>& laid = work.drops.laid;
+  const std::uint32_t zone = plan_.images->dose.zones().of_part(part);
+  const std::uint32_t material = plan_.images->materials.several() ? plan_.images->materials.part[part].at(plane(layer)) : 0;
+  if (laid.empty() || laid.back().zone != zone || laid.back().material != material) {
+    laid.push_back({work.drops.zones, {}, zone, material});
+  } else {
+    raster::larger(laid.back().shares, work.drops.zones, work.drops.levels);
+    std::swap(laid.back().shares, work.drops.levels);
+  }
 }
 
 Status LayerImager::dose(const Layer& layer, ImageWork& work, LayerRecord& record) const {
@@ -160,29 +176,26 @@ Status LayerImager::dose(const Layer& layer, ImageWork& work, LayerRecord& recor
     record.dosed_pixels = dose::sums_of(work.drops.shares, images.dose.full(), dose::one_drop()).full_voxels;
   }
   if (images.materials.several() && (images.beads || images.dose.any())) work.materials.keep(work.runs);
-  if (images.materials.several() && shares_voxels()) split_materials(work);
+  const bool grey = write::find_level_format(plan_.job.format) != nullptr, drops = images.dose.most_drops() > 1;
+  if (images.materials.several() && (shares_voxels() || drops || grey))
+    dose::drops_of_materials(images.dose.most_drops(), shares_voxels(), work.materials.image, work.drops);
   const bool counted = images.dose.saturates() && images.dose.most_drops() <= 1;
   record.set_pixels = counted ? record.drops : set_pixels(work.runs);
-  const auto add_image = [&](const Runs& image) {
-    record.images.push_back({.bytes = 0, .set_pixels = set_pixels(image), .unfed_pixels = 0, .hash = {}});
-  };
-  const bool grey = write::find_level_format(plan_.job.format) != nullptr;
-  if (images.dose.most_drops() > 1 && !grey) std::ranges::for_each(work.drops.planes, add_image);
-  std::ranges::for_each(work.materials.image, add_image);
+  for (const Runs& image : several(work)) record.images.emplace_back().set_pixels = set_pixels(image);
+  for (std::size_t m = 0; grey && m < record.images.size(); ++m)
+    record.images[m].drops = sum_of_levels(work.drops.of_material[m]);
   return {};
 }
 
-/// Of voxels that materials share, each drop is one material's.
-void LayerImager::split_materials(ImageWork& work) {
-  std::vector<Runs>& image = work.materials.image;
-  for (std::size_t m = 0; m < image.size(); ++m) {
-    if (m == 0) {
-      image[m] = work.drops.up_to[m].front();
-    } else {
-      raster::combine(work.drops.up_to[m].front(), work.drops.up_to[m - 1].front(), raster::SetOperation::kDifference,
-                      image[m]);
-    }
-  }
+std::span<const Runs> LayerImager::several(const ImageWork& work) const {
+  const bool drops = plan_.images->dose.most_drops() > 1 && write::find_level_format(plan_.job.format) == nullptr;
+  if (!drops) return work.materials.image;
+  return plan_.images->materials.several() ? work.drops.material_planes : work.drops.planes;
+}
+
+std::span<const Levels> LayerImager::levels(const ImageWork& work) const {
+  if (plan_.images->materials.several()) return work.drops.of_material;
+  return {plan_.images->dose.saturates() ? &work.drops.levels : &work.drops.shares, 1};
 }
 
 }  // namespace lamina::pipeline

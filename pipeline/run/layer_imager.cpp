@@ -100,6 +100,10 @@ Status LayerImager::images(const Layer& layer, ImageWork& work, ImageNotes& note
     std::uint64_t filled = 0;
     if (Status status = place(layer, part, work, filled); !status) return status;
     if (!notes.part_pixels.empty()) notes.part_pixels[part.part] += filled;
+    if (shares_voxels()) {
+      lay_shares(layer, part.part, work);
+      continue;
+    }
     if (const std::uint8_t full = images.dose.full(); full > 0) {
       raster::larger(work.drops.shares, work.drops.zones, work.drops.levels);
       std::swap(work.drops.shares, work.drops.levels);
@@ -118,6 +122,10 @@ Status LayerImager::images(const Layer& layer, ImageWork& work, ImageNotes& note
       std::swap(work.runs, work.second);
     }
   }
+  if (!shares_voxels() || plan_.scene->images.empty()) return {};
+  dose::share_out(images.dose.full(), images.grid.columns(), images.grid.rows(), work.drops);
+  at_least(work.drops.shares, dose::half_of(images.dose.full()), work.runs);
+  own_voxels(work);
   return {};
 }
 
@@ -225,6 +233,8 @@ std::uint64_t LayerImager::bytes_of(const Layer& layer) const {
     scratch = std::max(scratch, solid.coverage->scratch_bytes_bound(layer));
     of_shares += 9 * changes_bound(layer) + 4 * plan_.images->grid.rows();
   }
+  if (shares_voxels())
+    of_shares += 9 * changes_of_images(plane(layer)) + plan_.scene->images.size() * 4 * plan_.images->grid.rows();
   // Of solids that share voxels, their shares twice, with their cores, and together; their drops for each material.
   if (shares_voxels()) of_shares *= 3 + plan_.images->materials.used.size();
   of_shares += scratch;
@@ -245,7 +255,9 @@ std::uint64_t LayerImager::bytes_of_section(Nm plane, std::uint64_t changes) con
   const std::uint64_t edges = images.dose.edges_bound(images.solids.crossings_bound(plane) + changes_of_images(plane));
   const std::uint64_t zone_images = zones == 0 ? 0 : (2 * zones + 6) * 2 * (4 * edges + 4 * rows);
   // Zones and levels, and the image of each drop.
-  const std::uint64_t drops = images.dose.saturates() ? 18 * changes + images.dose.most_drops() * 4 * (changes + rows) : 0;
+  // Of each material once more.
+  const std::uint64_t drop_images = 18 * changes + images.dose.most_drops() * 4 * (changes + rows);
+  const std::uint64_t drops = images.dose.saturates() ? (1 + materials) * drop_images : 0;
   // An image as read and as placed; where levels are, 9 bytes a run of those and of both together.
   const std::uint64_t of_images = changes_of_images(plane), levels = plan_.job.levels > 0 ? 18 * of_images + 12 * rows : 0;
   const std::uint64_t read = plan_.scene->images.empty() ? 0 : 8 * (of_images + rows) + levels;

@@ -66,8 +66,7 @@ Result<std::uint32_t> vats_made(const Plan& plan, const LayerImager& imager, con
   LayerRecord record;
   ImageNotes notes;
   if (Status status = imager.make(layer, work, record, notes); !status) return status.error();
-  std::vector<std::uint64_t> pixels;
-  for (const ImageRecord& image : record.images) pixels.push_back(image.set_pixels);
+  const std::vector<std::uint64_t> pixels = record.pixels_of_materials(plan.images->materials.used.size());
   const auto vats = vats_of_layer(plan.images->machine->machine, plan.images->materials, pixels);
   return vats ? Result<std::uint32_t>(vats->size() > 1 ? 3 : 1u << vats->front()) : vats.error();
 }

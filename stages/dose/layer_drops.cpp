@@ -12,8 +12,21 @@ std::uint64_t DropWork::bytes() const {
   for (const Field& field : fields) total += field.bytes();
   const auto add = [&](const Runs& plane) { total += bytes_held(plane.row_offset) + bytes_held(plane.change); };
   std::ranges::for_each(planes, add);
-  for (const std::vector<Runs>& of : up_to) std::ranges::for_each(of, add);
+  std::ranges::for_each(material_planes, add);
+  for (const Levels& drops : of_material) total += drops.bytes();
+  total += up_to.bytes();
   return total;
+}
+
+void share_out(std::uint8_t full, std::uint32_t columns, std::uint32_t rows, DropWork& work) {
+  if (work.laid.empty()) {
+    work.shares.start(columns);
+    work.shares.row_offset.assign(std::size_t{rows} + 1, 0);
+    return;
+  }
+  std::vector<Levels*> parts;
+  for (LaidPart& part : work.laid) parts.push_back(&part.shares);
+  share_out(parts, full, work.shared, work.shares);
 }
 
 Difference take_half(std::uint8_t full, Runs& image, Runs& second, const DropWork& work) {
@@ -97,7 +110,7 @@ Result<ZoneSums> drops_of_laid(const DropRules& rules, const Sheet& sheet, std::
   for (LaidPart& part : work.laid) {
     if (shell) mark_core(part.shares, second, full, part.zones);
   }
-  work.up_to.resize(materials);
+  work.of_material.resize(materials);
   std::vector<Dosed> parts;
   for (std::uint32_t material = 0;; ++material) {
     const bool last = material + 1 >= materials;
@@ -109,9 +122,26 @@ Result<ZoneSums> drops_of_laid(const DropRules& rules, const Sheet& sheet, std::
     }
     const auto sums = pour(parts, full, sheet, work.pour, work.levels, work.zones);
     if (!sums) return sums;
-    make_planes(rules, image, work);
-    if (materials > 1) work.up_to[material] = work.planes;
-    if (last) return sums;
+    if (materials > 1 && material == 0) work.of_material[0] = work.levels;
+    if (material > 0) surplus(work.levels, work.up_to, work.of_material[material]);
+    if (last) {
+      make_planes(rules, image, work);
+      return sums;
+    }
+    std::swap(work.levels, work.up_to);
+  }
+}
+
+void drops_of_materials(std::uint32_t most_drops, bool shared, std::span<Runs> image, DropWork& work) {
+  work.of_material.resize(image.size());
+  work.material_planes.resize(image.size() * most_drops);
+  for (std::size_t m = 0; m < image.size(); ++m) {
+    Levels& drops = work.of_material[m];
+    if (!shared && most_drops == 1) levels_of(image[m], 1, drops);
+    if (!shared && most_drops > 1) within(work.levels, image[m], drops);
+    Runs* const planes = &work.material_planes[m * most_drops];
+    for (std::uint32_t drop = 0; drop < most_drops; ++drop) at_least(drops, static_cast<std::uint8_t>(drop + 1), planes[drop]);
+    image[m] = planes[0];
   }
 }
 

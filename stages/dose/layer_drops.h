@@ -35,9 +35,11 @@ struct DropWork {
   std::vector<ZonePiece> pieces;
   std::vector<Runs> planes;  // then: the pixels with at least one drop, two, ...: as many as the job has
   std::vector<LaidPart> laid;
-  ShareOut shared;                       // of the parts' shares
-  std::vector<std::vector<Runs>> up_to;  // planes of the drops of the first material, of the first two, ...
-  std::vector<Field> fields;             // two a zone: of its shell, of its core
+  ShareOut shared;                    // of the parts' shares
+  std::vector<Levels> of_material;    // drops of each material, where they are told apart
+  std::vector<Runs> material_planes;  // of them: the planes of the first material, of the next, ...
+  Levels up_to;                       // drops of the materials so far; scratch
+  std::vector<Field> fields;          // two a zone: of its shell, of its core
   PourScratch pour;
   std::uint64_t bytes() const;
 };
@@ -49,6 +51,10 @@ struct DropRules {
   Reach shell;                   // empty: all is core
   std::uint32_t most_drops = 0;  // of any pixel of the job
 };
+
+/// What the parts in work.laid, of which each lies over those before, make of the voxels together: shares.h. Laid more parts
+/// upon, the same again gives what all of them at once would.
+void share_out(std::uint8_t full, std::uint32_t columns, std::uint32_t rows, DropWork& work);
 
 /// Gives `image` the voxels of work.shares that are half full or more. second  scratch
 /// returns  where it was another one: pixels whose centres say something else than their voxels
@@ -66,10 +72,16 @@ ZoneSums drops_of_parts(const DropRules& rules, std::span<const LayerDose> doses
 
 /// The same of parts in work.laid that share voxels, or whose doses are formulas. The image is that of all of them.
 /// asks       of each zone, shell and core; work.zones becomes the levels of all parts together
-/// materials  whose drops are told apart in work.up_to: of a voxel's drops the first are those of the first material, so that
-///            each gets them in proportion to its share over many voxels
+/// materials  whose drops are told apart in work.of_material: of a voxel's drops the first are those of the first material, so
+///            that each gets them in proportion to its share over many voxels
 /// errors     of pour()
 Result<ZoneSums> drops_of_laid(const DropRules& rules, const Sheet& sheet, std::span<const std::array<Ask, 2>> asks,
                                std::uint32_t materials, Runs& image, Runs& second, DropWork& work);
+
+/// The planes of each material's drops, work.material_planes, after any of the functions above.
+/// shared  drops_of_laid() has told the drops apart; else all drops of a pixel are of the material that it is of
+/// image   of each material, its pixels; becomes that of those which get any drop of it
+/// cost    O((runs + rows) x materials x most_drops)
+void drops_of_materials(std::uint32_t most_drops, bool shared, std::span<Runs> image, DropWork& work);
 
 }  // namespace lamina::dose

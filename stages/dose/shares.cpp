@@ -1,6 +1,7 @@
 #include "stages/dose/shares.h"
 
 #include <algorithm>
+#include <array>
 
 namespace lamina::dose {
 namespace {
@@ -68,7 +69,7 @@ void append_run(std::uint32_t row_begin, std::uint32_t begin, std::uint32_t end,
 /// Goes through a row of several parts from column to column at which any of them changes.
 class RowOfParts {
  public:
-  explicit RowOfParts(std::span<Levels* const> parts) : parts_(parts), at_(parts.size()) {}
+  explicit RowOfParts(std::span<const Levels* const> parts) : parts_(parts), at_(parts.size()) {}
 
   void start(std::uint32_t row) {
     row_ = row;
@@ -99,7 +100,7 @@ class RowOfParts {
   bool holds(std::size_t i, std::uint32_t column) const {
     return at_[i] < parts_[i]->row_offset[row_ + 1] && parts_[i]->change[2 * at_[i]] <= column;
   }
-  std::span<Levels* const> parts_;
+  std::span<const Levels* const> parts_;
   std::vector<std::uint32_t> at_;  // run of each part
   std::uint32_t row_ = 0;
 };
@@ -144,6 +145,20 @@ void share_out(std::span<Levels* const> parts, std::uint8_t full, ShareOut& out,
   for (std::size_t i = 0; i < parts.size(); ++i) std::swap(*parts[i], out.part[i]);
 }
 
+void surplus(const Levels& all, const Levels& some, Levels& result) {
+  result.start(all.columns);
+  const std::array<const Levels*, 2> both{&all, &some};
+  RowOfParts row(both);
+  for (std::uint32_t r = 0; r < all.view().rows(); ++r) {
+    row.start(r);
+    for (std::uint32_t at = row.next(0), stop = 0; at != UINT32_MAX; at = row.next(stop)) {
+      stop = row.end(at);
+      result.append(at, stop, static_cast<std::uint8_t>(row.level(0, at) - row.level(1, at)));
+    }
+    result.end_row();
+  }
+}
+
 void mirror(const LevelsView& image, bool x, bool y, Levels& result) {
   result.start(image.columns);
   const std::uint32_t rows = image.rows();
@@ -164,6 +179,15 @@ void without(const LevelsView& image, const RunsView& mask, Levels& result) {
   for (std::uint32_t r = 0; r < image.rows(); ++r) {
     append_masked(
         image, r, mask.row(r), [](std::uint8_t) { return std::uint8_t{0}; }, [](std::uint8_t level) { return level; }, result);
+    result.end_row();
+  }
+}
+
+void within(const LevelsView& image, const RunsView& mask, Levels& result) {
+  result.start(image.columns);
+  for (std::uint32_t r = 0; r < image.rows(); ++r) {
+    append_masked(
+        image, r, mask.row(r), [](std::uint8_t level) { return level; }, [](std::uint8_t) { return std::uint8_t{0}; }, result);
     result.end_row();
   }
 }

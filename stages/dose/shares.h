@@ -22,6 +22,8 @@ void mirror(const LevelsView& image, bool x, bool y, Levels& result);
 
 /// Levels where the mask is not set; 0 elsewhere. mask  of the same size. cost  O(runs)
 void without(const LevelsView& image, const RunsView& mask, Levels& result);
+/// Levels where it is set. The same cost.
+void within(const LevelsView& image, const RunsView& mask, Levels& result);
 
 /// Zones of levels 1 .. full: those within the core get `full` more. core  of the same size. cost  O(runs)
 void mark_core(const LevelsView& image, const RunsView& core, std::uint8_t full, Levels& result);
@@ -48,6 +50,9 @@ struct ShareOut {
 /// parts  of one size; total  the sums, 1 .. full
 /// cost   O((rows + runs of all) x parts)
 void share_out(std::span<Levels* const> parts, std::uint8_t full, ShareOut& out, Levels& total);
+
+/// What pixels of `all` have more than those of `some`, which have at most as much. Both of one size. cost  O(rows + runs)
+void surplus(const Levels& all, const Levels& some, Levels& result);
 
 /// Pixels of two images that differ.
 struct Difference {

@@ -1,5 +1,7 @@
 #include "stages/raster/materials.h"
 
+#include <fmt/format.h>
+
 #include <utility>
 
 #include "stages/raster/combine.h"
@@ -61,16 +63,57 @@ bool add_image(Runs&& image, Runs& whole) {
   return true;
 }
 
-bool add_drop(Runs&& image, std::vector<Runs>& planes) {
-  if (!planes.empty()) {
-    const Runs& before = planes.back();
-    if (image.columns != before.columns || image.row_offset.size() != before.row_offset.size()) return false;
-    Runs common;
-    combine(before, image, SetOperation::kIntersection, common);
-    if (set_pixels(common) != set_pixels(image)) return false;
+namespace {
+
+bool meets(const RunsView& a, const RunsView& b) {
+  Runs common;
+  combine(a, b, SetOperation::kIntersection, common);
+  return !common.change.empty();
+}
+
+bool lies_within(const RunsView& inner, const RunsView& outer) {
+  Runs beyond;
+  combine(inner, outer, SetOperation::kDifference, beyond);
+  return beyond.change.empty();
+}
+
+void unite(const Runs& image, Runs& plane) {
+  Runs both;
+  combine(plane, image, SetOperation::kUnion, both);
+  plane = std::move(both);
+}
+
+}  // namespace
+
+std::string DropPlanes::add(Runs&& image, std::uint32_t drop) {
+  if (planes.empty()) {
+    Runs none;
+    none.columns = image.columns;
+    none.row_offset.assign(image.row_offset.size(), 0);
+    planes.resize(most_, none);
   }
-  planes.push_back(std::move(image));
-  return true;
+  if (drop >= most_) return fmt::format("get more than {} drops", most_);
+  if (drop > 0 && !lies_within(image, before_)) return "get no drop before";
+  if (most_ > 1) before_ = image;
+  if (!shared_) {
+    if (planes[drop].change.empty()) {
+      planes[drop] = std::move(image);
+    } else if (drop == 0 && meets(planes[0], image)) {
+      return "another material's image sets as well";
+    } else {
+      unite(image, planes[drop]);
+    }
+    return {};
+  }
+  // A drop falls on those that other materials have there.
+  for (Runs& plane : planes) {
+    if (image.change.empty()) break;
+    Runs upon;
+    combine(plane, image, SetOperation::kIntersection, upon);
+    unite(image, plane);
+    image = std::move(upon);
+  }
+  return image.change.empty() ? std::string() : fmt::format("get more than {} drops", most_);
 }
 
 }  // namespace lamina::raster

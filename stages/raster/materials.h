@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <string>
 #include <vector>
 
 #include "stages/data/runs.h"
@@ -27,8 +28,24 @@ struct MaterialImages {
 /// returns  false if a pixel is set in both, or their sizes differ; `whole` is then as it was
 bool add_image(Runs&& image, Runs& whole);
 
-/// Adds the image of the next drop, of the pixels that get one more than those before; `planes` is empty before the first one.
-/// returns  false if it does not lie within the one before, or their sizes differ; `planes` is then as it was
-bool add_drop(Runs&& image, std::vector<Runs>& planes);
+/// The images of a layer's files put together: of each material, of each drop of a pixel, or of both.
+class DropPlanes {
+ public:
+  /// most    drops of a pixel; at least 1
+  /// shared  a pixel can get drops of several materials
+  DropPlanes(std::uint32_t most, bool shared) : most_(most), shared_(shared) {}
+
+  /// Images come material by material, those of a material drop by drop, all of one size. drop  of its material, from 0
+  /// returns  empty, or what its pixels contradict: "get no drop before"; `planes` are then of no use
+  std::string add(Runs&& image, std::uint32_t drop);
+
+  /// The pixels that get at least one drop of any material, two, ...: `most` of them, once an image was added.
+  std::vector<Runs> planes;
+
+ private:
+  std::uint32_t most_;
+  bool shared_;
+  Runs before_;  // the image of the drop before
+};
 
 }  // namespace lamina::raster

@@ -2,11 +2,14 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cstdint>
 #include <vector>
 
+#include "stages/data/grid.h"
 #include "stages/data/levels.h"
 #include "stages/data/runs.h"
+#include "stages/dose/field.h"
 #include "stages/dose/layer_drops.h"
 #include "stages/dose/saturation.h"
 #include "stages/dose/share_count.h"
@@ -139,6 +142,95 @@ TEST(Shares, BecomeDropsInProportionOrRounded) {
     }
     EXPECT_EQ(sums.full_voxels, (2 * sum + 3) / 6);
     EXPECT_EQ(sums.asked_drops, (7 * sum + 3) / 6);
+  }
+}
+
+TEST(Shares, SurplusAndMaskAreThoseOfEachPixel) {
+  for (std::uint32_t seed = 1; seed <= 40; ++seed) {
+    const Levels some = random_shares(seed, 5), more = random_shares(1000 + seed, 3);
+    const Runs mask = random_mask(500 + seed);
+    const std::vector<int> a = share_pixels(some.view()), b = share_pixels(more.view()), m = share_pixels(mask.view());
+    Levels all;  // the sum, made pixel by pixel
+    all.start(kWide);
+    for (std::uint32_t r = 0; r < kHigh; ++r) {
+      for (std::uint32_t c = 0; c < kWide; ++c) {
+        const std::size_t p = std::size_t{r} * kWide + c;
+        all.append(c, c + 1, static_cast<std::uint8_t>(a[p] + b[p]));
+      }
+      all.end_row();
+    }
+    Levels surplus_of, kept;
+    surplus(all, some, surplus_of);
+    EXPECT_EQ(share_pixels(surplus_of.view()), b) << seed;
+    within(all, mask, kept);
+    const std::vector<int> inside = share_pixels(kept.view());
+    for (std::size_t p = 0; p < inside.size(); ++p) EXPECT_EQ(inside[p], m[p] * (a[p] + b[p])) << seed;
+  }
+}
+
+/// Random parts of three materials that share voxels, and what a full voxel of each asks for.
+void lay_random_parts(std::uint32_t seed, std::uint8_t full, DropWork& work) {
+  work.laid.clear();
+  for (std::uint32_t i = 0; i < 5; ++i) work.laid.push_back({random_shares(100 * seed + i, full), {}, i % 2, (i * 2) % 3});
+  share_out(full, kWide, kHigh, work);
+}
+
+// Each pixel's drops are those of its materials; a material has what it would have in the parts up to it.
+TEST(Shares, DropsOfMaterialsAddUpAndAreNested) {
+  constexpr std::uint8_t kFull = 15;
+  for (std::uint32_t seed = 1; seed <= 20; ++seed) {
+    for (const bool dithered : {true, false}) {
+      DropWork work;
+      lay_random_parts(seed, kFull, work);
+      const Sheet sheet{
+          PixelGrid{PixelAxis(254, kWide * 100'000), PixelAxis(254, kHigh * 100'000)}, false, false, {seed, 0, 100'000}};
+      ASSERT_EQ(sheet.grid.columns(), kWide);
+      const DropRules rules{kFull, dithered, {}, 4};
+      Sheet limited = sheet;
+      limited.dithered = dithered;
+      limited.limit = Drops24{4} << kDropBits;
+      const std::vector<std::array<Ask, 2>> asks{{Ask{kOneDrop * 7 / 2}, Ask{kOneDrop * 7 / 2}},
+                                                 {Ask{kOneDrop * 2}, Ask{kOneDrop * 2}}};
+      Runs image, second;
+      ASSERT_TRUE(drops_of_laid(rules, limited, asks, 3, image, second, work).ok());
+      std::vector<Runs> own(3);
+      drops_of_materials(4, true, own, work);
+      std::vector<int> sum(std::size_t{kWide} * kHigh, 0);
+      for (std::size_t m = 0; m < 3; ++m) {
+        std::vector<int> drops(sum.size(), 0);
+        for (int k = 0; k < 4; ++k) {
+          const std::vector<int> plane = share_pixels(work.material_planes[4 * m + static_cast<std::size_t>(k)].view());
+          for (std::size_t p = 0; p < plane.size(); ++p) {
+            EXPECT_TRUE(plane[p] == 0 || drops[p] == k) << "not nested";
+            drops[p] += plane[p];
+          }
+        }
+        EXPECT_EQ(share_pixels(own[m].view()), share_pixels(work.material_planes[4 * m].view()));
+        for (std::size_t p = 0; p < sum.size(); ++p) sum[p] += drops[p];
+      }
+      EXPECT_EQ(sum, share_pixels(work.levels.view())) << seed;
+    }
+  }
+}
+
+// What lies over others takes from them; laid one by one it is as laid at once.
+TEST(Shares, LaidOneByOneAreThoseLaidAtOnce) {
+  for (std::uint32_t seed = 1; seed <= 30; ++seed) {
+    DropWork at_once, one_by_one;
+    std::vector<Levels> parts;
+    for (std::uint32_t i = 0; i < 5; ++i) parts.push_back(random_shares(100 * seed + i, 15));
+    share_out(15, kWide, kHigh, one_by_one);
+    EXPECT_EQ(one_by_one.shares.level.size(), 0u);
+    for (const Levels& part : parts) {
+      at_once.laid.push_back({part, {}, 0, 0});
+      one_by_one.laid.push_back({part, {}, 0, 0});
+      share_out(15, kWide, kHigh, one_by_one);
+    }
+    share_out(15, kWide, kHigh, at_once);
+    EXPECT_EQ(share_pixels(at_once.shares.view()), share_pixels(one_by_one.shares.view()));
+    for (std::size_t i = 0; i < parts.size(); ++i) {
+      EXPECT_EQ(share_pixels(at_once.laid[i].shares.view()), share_pixels(one_by_one.laid[i].shares.view())) << seed;
+    }
   }
 }
 

@@ -2,13 +2,17 @@
 
 #include <filesystem>
 #include <nlohmann/json.hpp>
+#include <set>
+#include <tuple>
 
 #include "pipeline/job/file.h"
 #include "pipeline/machine/powder_printer.h"
 #include "stages/data/input/hash.h"
 #include "stages/data/text/version.h"
+#include "stages/write/manifest/layer_files.h"
 #include "stages/write/manifest/manifest.h"
 #include "stages/write/manifest/manifest_line.h"
+#include "stages/write/program/dialect.h"
 #include "tests/commands/program.h"
 
 namespace lamina::pipeline {
@@ -93,6 +97,79 @@ TEST(Manifest, WhatIsWrittenIsRead) {
   EXPECT_EQ(manifest->head.grid.columns(), head.grid.columns());
   expect_records(*manifest, 0, kLayers);
   EXPECT_EQ(test::files_below(directory.path()), std::vector<std::string>{"manifest.json"});
+}
+
+/// A head of two materials whose pixels get up to three drops.
+ManifestHead head_of_drops(const std::string& format, std::uint32_t most) {
+  ManifestHead head = some_head();
+  head.format = format;
+  head.extension = ".tif";
+  head.machine = "m";
+  head.dialect = "raw";
+  head.program_extension = write::find_dialect("raw")->extension;
+  head.materials = {{"steel", 0}, {"bronze-drop2", 1}};
+  head.most_drops = most;
+  return head;
+}
+
+// Names of a material's drops are no other material's, and numbers of layers come back.
+TEST(Manifest, OfDropsOfMaterialsIsReadAsItIsWritten) {
+  for (const auto& [format, most, images] :
+       {std::tuple{"tiff-g4", 3u, 6u}, {"tiff-8", 3u, 2u}, {"tiff-g4", 1u, 2u}, {"tiff-8", 1u, 2u}}) {
+    const Directory directory;
+    const ManifestHead head = head_of_drops(format, most);
+    ASSERT_EQ(head.named_images(), images);
+    std::set<std::string> names;
+    for (std::size_t i = 0; i < images; ++i) {
+      const std::string file = layer_file_name(7, head.extension, head.image_name(i)).substr(7);
+      names.insert(file);
+      std::uint32_t index = 0;
+      bool partial = true;
+      EXPECT_TRUE(read_layer_file_name(file, index, partial) && index == 7 && !partial) << file;
+    }
+    EXPECT_EQ(names.size(), images);
+    auto writer = ManifestWriter::open(directory / "manifest.json", head, {});
+    ASSERT_TRUE(writer.ok()) << writer.error().message;
+    const bool told = head.drops_of_materials();
+    for (std::uint32_t i = 0; i < kLayers; ++i) {
+      LayerRecord made = record(i);
+      made.images.resize(images);
+      made.set_pixels = told ? 40 + i : 0;
+      made.most_drops = told || head.grey_drops() ? most : 1;
+      made.drops = 5;
+      made.bytes = 0;
+      for (std::size_t m = 0; m < images; ++m) {
+        made.images[m].bytes = 10 + m, made.images[m].set_pixels = 100 * m + i, made.images[m].unfed_pixels = m;
+        made.images[m].drops = head.grey_drops() ? 1000 + m : 0;
+        made.bytes += made.images[m].bytes;
+        if (!told) made.set_pixels += made.images[m].set_pixels;
+      }
+      ASSERT_TRUE(writer->append(made).ok());
+    }
+    ASSERT_TRUE(writer->finish().ok());
+    const auto manifest = read_manifest(directory / "manifest.json");
+    ASSERT_TRUE(manifest.ok()) << manifest.error().message;
+    EXPECT_EQ(manifest->head.id(), head.id());
+    for (const LayerRecord& read : manifest->layers) {
+      ASSERT_EQ(read.images.size(), images);
+      std::uint64_t bytes = 0, set = 0;
+      for (std::size_t m = 0; m < images; ++m) {
+        bytes += 10 + m, set += 100 * m + read.layer.index;
+        EXPECT_EQ(read.images[m].set_pixels, 100 * m + read.layer.index);
+        EXPECT_EQ(read.images[m].drops, head.grey_drops() ? 1000 + m : 0);
+      }
+      EXPECT_EQ(read.bytes, bytes);
+      EXPECT_EQ(read.set_pixels, told ? 40 + read.layer.index : set);
+      EXPECT_EQ(read.most_drops, told || head.grey_drops() ? most : 1);
+      EXPECT_EQ(read.pixels_of_materials(2)[1], 100 * images / 2 + read.layer.index);
+    }
+  }
+  const Directory directory;
+  ManifestHead many = head_of_drops("tiff-g4", 3);
+  many.materials.push_back({"third", 1});  // of a machine with two vats
+  many.last_layer = many.first_layer;
+  ASSERT_TRUE(ManifestWriter::open(directory / "manifest.json", many, {})->finish().ok());
+  EXPECT_NE(read_manifest_head(directory / "manifest.json").error().message.find("most_drops"), std::string::npos);
 }
 
 TEST(Manifest, IsJsonForEverybody) {

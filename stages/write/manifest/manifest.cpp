@@ -117,7 +117,10 @@ std::uint8_t ManifestHead::full_level() const {
 }
 
 std::string ManifestHead::image_name(std::size_t number) const {
-  return materials.empty() ? fmt::format("drop{}", number + 1) : materials[number].name;
+  const std::uint32_t drops = drop_images();
+  const std::string material = materials.empty() ? "" : materials[number / drops].name;
+  if (drops == 1) return material;
+  return fmt::format("{}{}drop{}", material, material.empty() ? "" : "-", number % drops + 1);
 }
 
 std::string layer_file_name(std::uint32_t index, std::string_view extension, std::string_view image) {
@@ -129,7 +132,8 @@ std::vector<LayerImageFile> layer_images(const ManifestHead& head, const LayerRe
   std::vector<LayerImageFile> files;
   const std::size_t named = head.named_images();
   if (named == 0) {
-    files.push_back({layer_file_name(record.layer.index, head.extension), {record.bytes, record.set_pixels, 0, record.hash}});
+    files.push_back(
+        {layer_file_name(record.layer.index, head.extension), {record.bytes, record.set_pixels, 0, 0, record.hash}});
   }
   for (std::size_t m = 0; m < named; ++m) {
     files.push_back({layer_file_name(record.layer.index, head.extension, head.image_name(m)),

@@ -65,13 +65,18 @@ struct ManifestHead {
   /// bit.
   std::uint8_t full_level() const;
 
-  /// Images of a layer that have names and records of their own: of materials, or of the drops of a pixel if there can be
-  /// several. 0: the one image that the layer's own record is of.
+  /// Images of a material in a layer: one a drop of a pixel, if there can be several and the images are of one bit.
+  std::uint32_t drop_images() const { return most_drops > 1 && !grey_drops() ? most_drops : 1; }
+  /// Images of a layer that have names and records of their own: those of the first material, of the next, ... 0: the one
+  /// image that the layer's own record is of.
   std::size_t named_images() const {
-    return !materials.empty() ? materials.size() : most_drops > 1 && !grey_drops() ? most_drops : 0;
+    const std::size_t drops = drop_images();
+    return !materials.empty() ? materials.size() * drops : drops > 1 ? drops : 0;
   }
-  /// bronze, or drop2
+  /// bronze, drop2, or bronze-drop2
   std::string image_name(std::size_t number) const;
+  /// Whether a pixel can get several drops, of several materials: its images do not say alone what the layer's record does.
+  bool drops_of_materials() const { return most_drops > 1 && !materials.empty(); }
 
   /// Hash of all fields above except the range: manifests of the same job have equal ids.
   Hash128 id() const;

@@ -80,15 +80,14 @@ void describe_images(Io& io, const ManifestHead& head, Record& record) {
   if (head.most_drops > 0) {
     io.number("drops", record.drops);
     io.number("asked_drops", record.asked_drops);
-    if (head.grey_drops()) io.number("most_drops", record.most_drops);
+    if (head.grey_drops() || head.drops_of_materials()) io.number("most_drops", record.most_drops);
   }
   if (head.levels > 0) {
     io.number("half_differs", record.half_differs);
     io.number("half_far", record.half_far);
   }
-  if (head.named_images() == 0) {
-    io.number("set_pixels", record.set_pixels);
-  } else {
+  if (head.named_images() == 0 || head.drops_of_materials()) io.number("set_pixels", record.set_pixels);
+  if (head.named_images() > 0) {
     io.open("images", "[");
     for (std::size_t m = 0; m < head.named_images(); ++m) {
       auto& image = record.images[m];
@@ -96,6 +95,7 @@ void describe_images(Io& io, const ManifestHead& head, Record& record) {
       io.fixed("file", layer_file_name(record.layer.index, head.extension, head.image_name(m)));
       io.number("bytes", image.bytes);
       io.number("set_pixels", image.set_pixels);
+      if (head.grey_drops()) io.number("drops", image.drops);
       if (!head.machine.empty()) io.added("unfed_pixels", image.unfed_pixels);
       io.hash("xxh3_128", image.hash);
       io.close("}");

@@ -55,6 +55,7 @@ std::string read_line(std::string_view line, const ManifestHead& head, std::uint
   if (head.most_drops == 1) record.most_drops = record.drops > 0 ? 1 : 0;
   for (const ImageRecord& image : record.images) {
     record.bytes += image.bytes;
+    if (head.drops_of_materials()) continue;
     record.set_pixels += head.materials.empty() && record.set_pixels > 0 ? 0 : image.set_pixels;  // drops fall on the same
     if (head.materials.empty() && image.set_pixels > 0) ++record.most_drops;
   }

@@ -40,7 +40,8 @@ std::string fault_of_images(const ManifestHead& head) {
   for (const JobMaterial& material : head.materials) {
     if (!is_material(material.name) || !names.insert(material.name).second) return no_such("materials", material.name);
   }
-  if (head.most_drops > kMostDrops || (head.most_drops > 1 && !head.materials.empty())) {
+  constexpr std::size_t kMostVats = 2;  // several drops are of a machine, whose vats the materials are in
+  if (head.most_drops > kMostDrops || (head.drops_of_materials() && head.materials.size() > kMostVats)) {
     return no_such("most_drops", fmt::format("{}", head.most_drops));
   }
   const bool grey = write::find_level_format(head.format) != nullptr;
@@ -49,7 +50,7 @@ std::string fault_of_images(const ManifestHead& head) {
   if (head.levels > 0 ? !right || (!grey && !drops) : grey && !drops) {
     return no_such("levels", fmt::format("{}", head.levels));
   }
-  if (grey && (drops == head.machine.empty() || !head.materials.empty())) return no_such("format", head.format);
+  if (grey && (drops == head.machine.empty() || (!drops && !head.materials.empty()))) return no_such("format", head.format);
   constexpr std::uint32_t kMostHeadDrops = 15;
   if (head.head_drops > kMostHeadDrops || head.sweep_drops < 1 || head.sweep_drops > head.head_drops) {
     return no_such("sweep_drops", fmt::format("{}", head.sweep_drops));

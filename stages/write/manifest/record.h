@@ -26,10 +26,11 @@ struct ProgramRecord {
   std::int64_t added_microseconds = 0;
 };
 
-/// The image of one material where a job has several, or of the pixels that get at least so many drops.
+/// The image of one material where a job has several, of the pixels that get at least so many drops, or both.
 struct ImageRecord {
   std::uint64_t bytes = 0, set_pixels = 0;
   std::uint64_t unfed_pixels = 0;  // of the set ones, in the powder of another vat; of a job with a machine
+  std::uint64_t drops = 0;         // of a grey image of one material
   Hash128 hash;
 };
 
@@ -66,7 +67,7 @@ struct LayerRecord {
   std::uint64_t set_pixels = 0;
   std::uint32_t capped_rows = 0;           // rows closed only by repair (stages/load)
   ProgramRecord program;                   // zeros without a machine
-  std::vector<ImageRecord> images;         // one per material, if the job has several
+  std::vector<ImageRecord> images;         // of materials, of drops, or of the drops of each material (ManifestHead)
   std::vector<std::uint64_t> part_pixels;  // to be filled of each part, of a job with prices and several parts; else empty
 
   // --- images of a job with a saturation, or of shares of voxels
@@ -77,6 +78,13 @@ struct LayerRecord {
   std::vector<std::uint64_t> part_drops;  // of each part, where there are part_pixels
   std::uint64_t half_differs = 0;         // pixels whose centre says something else than half of their voxel
   std::uint64_t half_far = 0;             // of them, those that are not beside a boundary of the image
+
+  /// Of a job of so many materials, the first image of each: the pixels that get any drop of it.
+  const ImageRecord& image_of(std::size_t material, std::size_t materials) const {
+    return images[material * (images.size() / materials)];
+  }
+  std::vector<std::uint64_t> pixels_of_materials(std::size_t materials) const;
+  std::uint64_t drops_of(std::size_t material, std::size_t materials) const;
 
   std::shared_ptr<const PathFacts> paths;  // null for images
 

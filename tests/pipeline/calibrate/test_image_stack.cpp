@@ -89,6 +89,25 @@ TEST_F(ImageStack, OfAJobKnowsItsPixelsAndLayers) {
   EXPECT_EQ(all["porosity"].get<double>(), 0) << "the part, and nothing beside it";
 }
 
+// Drops of a pixel are no shares of a voxel: one of 20 is part of the solid, of every material.
+TEST_F(ImageStack, OfAJobOfSeveralDropsIsSolidWhereAnyFalls) {
+  test::write_text(
+      folder / "two.toml",
+      "[machine]\nname = \"two\"\ndialect = \"raw\"\n[bed]\nsize_mm = [20, 20]\n[head]\nnozzles = 64\n"
+      "pitch_um = 100\ndrop_pl = 100\n[powder]\nvats = 2\nmaterials = [\"b\", \"a\"]\nvat_rule = \"both\"\npacking = 0.5\n");
+  test::write_box(folder / "part.stl", {0, 0, 0}, {3, 4, 3});
+  for (const std::string format : {"tiff-g4", "tiff-4", "tiff-8"}) {
+    test::write_text(folder / "job.toml",
+                     "[machine]\nprofile = \"two.toml\"\n[layers]\nthickness_mm = 0.25\n[dose]\n"
+                     "saturation_percent = 40\n[[part]]\npath = \"part.stl\"\nat_mm = [5, 5]\n"
+                     "material = \"a\"\n[[part]]\npath = \"part.stl\"\nat_mm = [8, 5]\nmaterial = \"b\"\n");
+    const test::Outcome made =
+        test::run_lamina(test::words_of("jet --job job.toml --quiet --format " + format + " -o " + format), folder.path());
+    ASSERT_EQ(made.code, 0) << made.err;
+    EXPECT_EQ(told(format + " --window 2,2,2 --no-flow")["porosity"].get<double>(), 0) << format;
+  }
+}
+
 TEST_F(ImageStack, WithFaultsIsOneLine) {
   fs::create_directory(folder / "s");
   const auto solid = [](auto, auto) { return false; };

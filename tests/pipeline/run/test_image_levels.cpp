@@ -238,10 +238,6 @@ TEST_F(ImageLevels, ThatDoNotFitAreOneLineEach) {
   };
   refused("jet grey --levels 4 --set part.threshold=90", "part.threshold is of images of 1 bit");
   refused("jet grey --levels 4 --containment inside", "--containment");
-  test::write_text(
-      folder_.path() / "two.toml",
-      "[[part]]\npath = \"grey\"\nat_mm = [0, 0]\nmaterial = \"a\"\n[[part]]\npath = \"box.stl\"\nmaterial = \"b\"\nat_mm = [1, 1]\n");
-  refused("jet --job two.toml --levels 4", "leave out the parts that are images");
 }
 
 // Grey of another program, whose files tell no resolution: (255 - v) 3 / 255 is 3, 2.51, 2 and 1, 0.49, 0.
