@@ -215,5 +215,34 @@ TEST(Order, PistonsOfOasisComeFromBelow) {
   expect_in(bench.told(bench.with(bench.find("G1 X475"), "G1 X475.0000 F3000\n")), "the spreader moves at 50 mm/s");
 }
 
+/// A record of raw: a tag, and how many numbers follow.
+std::string record_of(const std::string& tag, const std::vector<std::int32_t>& numbers) {
+  std::string bytes = tag;
+  const auto put = [&](std::uint32_t number) {
+    for (int i = 0; i < 4; ++i) bytes += static_cast<char>(number >> (8 * i) & 255);
+  };
+  put(static_cast<std::uint32_t>(numbers.size()));
+  for (const std::int32_t number : numbers) put(static_cast<std::uint32_t>(number));
+  return bytes;
+}
+
+// The host spreads a layer before the first record that is not of its powder, with the head at its safe place.
+TEST(Order, OfRecordsIsHeld) {
+  const TamperBench bench("xaar128-raw");
+  const std::string roll = bench.pieces[bench.find("ROLL")], fill = record_of("FILL", {});
+  const std::string cap = record_of("GOTO", {-50'000'000, -10'000'000}), safe = record_of("GOTO", {0, 0});
+  EXPECT_EQ(bench.told(bench.with(bench.find("ROLL"), safe + roll)), "");
+  expect_in(Reordered(bench).insert(cap + fill + safe, "ROLL").told(), "other numbers");  // it takes time
+  expect_in(Reordered(bench).insert(fill, "ROLL").told(), "the vats are filled while the head is not at its cap");
+  expect_in(Reordered(bench).insert(cap, "ROLL").told(), "ROLL stands where the head is not at its safe place");
+  expect_in(Reordered(bench).insert(roll, "SWTH", 1).told(), "ROLL stands behind the layer's powder");
+  expect_in(Reordered(bench).insert(fill, "SWTH", 1).told(), "FILL stands behind the layer's powder");
+  const TamperBench still("xaar128-raw", [](Machine& m) {
+    printed_parts::all_care_of(m);
+    m.powder.roller_rpm = 0;
+  });
+  expect_in(Reordered(still).insert(cap + fill, "GOTO").told(), "behind the pause to fill vats, not to its safe place");
+}
+
 }  // namespace
 }  // namespace lamina

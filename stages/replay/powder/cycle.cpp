@@ -84,7 +84,8 @@ void Printing::roller_stands_at(double mm, bool may_spread) {
   tells_powder_ = true;
   const double far = profile().powder.roller_mm[1];
   const bool comes = std::abs(roller_mm_ - far) >= 1e-3 || std::abs(profile().powder.roller_mm[0] - far) < 1e-3;
-  if (may_spread && std::abs(mm - far) < 1e-3 && comes) strokes(count.build_mm, count.fed_mm[0] + count.fed_mm[1]);
+  if (may_spread && std::abs(mm - far) < 1e-3 && comes)
+    strokes(count.moves ? count.build_mm : lamina::mm(layer_.bottom) - base_mm(), count.fed_mm[0] + count.fed_mm[1]);
   rolled_ = rolled_ || strokes_ > base_layers();
   const double home = profile().powder.roller_mm[0];
   if (rpm_ != 0 && std::abs(mm - home) < 1e-3 && std::abs(roller_mm_ - home) >= 1e-3) {
