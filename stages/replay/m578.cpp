@@ -16,11 +16,14 @@ namespace {
 constexpr std::uint32_t kInkjetBits = 12;    // INKJET_BITS of Platform.h, a constant in all versions
 constexpr double kSecondsOfNozzle = 805e-6;  // INKJET_FIRE_MICROSECONDS + INKJET_DELAY_MICROSECONDS, one after the other
 
+/// Ways are added up: a place that is gone to again differs in its last bits.
+bool apart(double at, double from) { return std::abs(at - from) > 1e-6; }
+
 /// Whether the next movement along the scan goes to greater places; false if none follows before the next sweep.
 bool goes_up(GcodeReader ahead, char along, double from) {
   GcodeLine line;
   while (ahead.next(line) && line.command != "G0") {
-    if (line.command == "G1" && line.has(along) && line.word.at(along) != from) return line.word.at(along) > from;
+    if (line.command == "G1" && line.has(along) && apart(line.word.at(along), from)) return line.word.at(along) > from;
   }
   return false;
 }
@@ -100,7 +103,7 @@ void read_m578(std::string_view text, Printing& printing) {
       if (!in_sweep) {
         const bool towards_end = printing.position_of(1) > printing.position_of(0);
         // Without a ramp the first drop falls where the sweep begins.
-        const bool up = at != begin ? at > begin : goes_up(reader, scan.along[0], at);
+        const bool up = apart(at, begin) ? at > begin : goes_up(reader, scan.along[0], at);
         printing.begin_sweep(sweep++, up != towards_end);
         printing.go_across(axes.at(scan.across));
         in_sweep = true;

@@ -90,9 +90,6 @@ void read_planes(std::string_view text, Printing& printing) {
     const auto [number, of, direction, position] = head;
     if (direction > 1) return reader.fault("a sweep runs there, 0, or back, 1");
     const bool backward = direction == 1;
-    if (sweep && (*sweep)[0] == number && *sweep != head) {
-      return reader.fault(fmt::format("a plane of swath {} with another number, way or position than the one before", number));
-    }
     if (sweep != head) {
       const double across_mm = static_cast<std::int32_t>(position) / 1e6;
       printing.begin_sweep(number, backward, of);

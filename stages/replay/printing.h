@@ -101,6 +101,8 @@ class Printing {
   /// Powder is spread now: the build vat stands where it is told, vats have fed so much, and the spreader goes so far above
   /// both.
   void spreads(double build_mm, double fed_mm, double clearance_mm);
+  /// The last ways of the axes of pistons that have play, and come to each place from below.
+  void pistons_came(double build_mm, double feed_mm);
   void takes(double seconds) { seconds_ += seconds; }
 
   // --- care of head and powder

@@ -75,14 +75,16 @@ TEST(M578, TwelveLayersOfFivePartsAreFiredAndNothingElse) {
   EXPECT_GT(drops, 50'000u);
 }
 
-// Without a ramp a sweep's first drop falls where its movement begins.
+// Without a ramp a sweep's first drop falls where its movement begins, whatever the bits of the ways before it.
 TEST(M578, SweepsWithoutARampAreFiredEitherWay) {
-  for (const Side from : {Side::kLeft, Side::kRight}) {
+  for (int i = 0; i < 40; ++i) {
+    const Side from = i % 2 == 0 ? Side::kLeft : Side::kRight;
     const auto resolved = printed_parts::shipped("reprap-inkjet", [&](Machine& machine) {
       machine.bed.size_mm = {40 * 25.4 / 96 - 1e-4, 50 * 25.4 / 96 - 1e-4};
       machine.mounting.scan_from = from;
       machine.motion.both_directions = true;
       machine.motion.ramp_mm = 0;
+      machine.motion.safe_mm = {-3.3333 * i, -1.7 * i};
     });
     program::testing::Image image(50, std::vector<int>(40, 0));
     for (std::size_t r = 3; r < 40; ++r) {

@@ -58,7 +58,6 @@ class Hp45Reader {
   void take_burst();
   void take_firing(const hp45::Controller::Firing& firing);
   void end_stretch(std::uint32_t row);
-  void check_play();
   void drop(bool sweeping, bool upwards);
   std::uint64_t drops() const;
   double step_of(double um) const { return (um / 1000 - printing_.position_of(0)) / (grows_ ? step_um_ : -step_um_) * 1000; }
@@ -141,7 +140,9 @@ void Hp45Reader::command(const GcodeLine& line) {
     }
     if (!controller_.idle()) return reader_.fault("the last line is not all off, and fires on the ways of the next layer");
     if (oasis_ && (spreading_ || !spread_)) return reader_.fault("the layer has no powder spread between M4 and M5");
-    if (oasis_) check_play();
+    if (oasis_)
+      printing_.pistons_came(axes_.last_way(printing_.profile().powder.build_axis),
+                             axes_.last_way(printing_.profile().powder.feed_axes[0]));
     axes_.end();
     ended_ = true;
   }
@@ -340,14 +341,6 @@ void Hp45Reader::drop(bool sweeping, bool upwards) {
   }
 }
 
-// SerialGRBL.py, NewLayer: pistons have play, and come to each place from 1 mm below.
-void Hp45Reader::check_play() {
-  const auto& powder = printing_.profile().powder;
-  const bool build = axes_.last_way(powder.build_axis) * powder.build_sign < 0;
-  if (build && axes_.last_way(powder.feed_axes[0]) * powder.feed_sign > 0) return;
-  printing_.wrong_powder(fmt::format("the {} piston comes to its place from above, and has play", build ? "feed" : "build"));
-}
-
 // The spreader turns on the gantry, which spreads on its way to the far end.
 void Hp45Reader::spread(const GcodeLine& line) {
   const auto& powder = printing_.profile().powder;
@@ -368,7 +361,8 @@ void Hp45Reader::spread(const GcodeLine& line) {
     return reader_.fault(
         fmt::format("the spreader starts at {:g} mm, not at {:g}", axes_.at(powder.roller_axis), powder.roller_mm[0]));
   } else {
-    check_play();
+    printing_.pistons_came(axes_.last_way(printing_.profile().powder.build_axis),
+                           axes_.last_way(printing_.profile().powder.feed_axes[0]));
   }
   spreading_ = line.command == "M4";
   if (line.has('S') && powder.roller_rpm == 0) return reader_.fault("M4 has no S: the profile tells no speed of the roller");

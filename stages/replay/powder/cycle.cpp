@@ -127,6 +127,16 @@ void Printing::spreads(double build_mm, double fed_mm, double clearance_mm) {
   }
 }
 
+// SerialGRBL.py, NewLayer, takes it 1 mm down before a layer, which a thicker one's place lies below.
+void Printing::pistons_came(double build_mm, double feed_mm) {
+  constexpr double kThickMm = 1.25;
+  const auto& powder = profile().powder;
+  const double height = strokes_ < base_layers() ? powder.base_layer_mm : mm(layer_.thickness);
+  const bool build = build_mm * powder.build_sign < 0 || height >= kThickMm;
+  if (build && feed_mm * powder.feed_sign > 0) return;
+  wrong_powder(fmt::format("the {} piston comes to its place from above, and has play", build ? "feed" : "build"));
+}
+
 void Printing::check_cycle() {
   const auto& powder = profile().powder;
   const Layer& layer = layer_;

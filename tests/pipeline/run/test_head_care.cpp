@@ -161,6 +161,23 @@ TEST_F(HeadCare, AVatThatRunsEmptyRefusesTheJobBeforeItStartsOrIsFilledInPauses)
   EXPECT_NE(faults.find("layer 12: takes 0.125 mm of the first vat, where 0 of 1.5 are left"), std::string::npos) << faults;
 }
 
+TEST_F(HeadCare, JobsOfOnePowderAreFedByOneVat) {
+  const Job job = prism(0.3F, profile("one", ""), "one");
+  ASSERT_TRUE(made(job).ok());
+  verified(job);
+  const fs::path layer = fs::path(job.output) / "program/000001.gcode";
+  std::string text = test::read_text(layer);
+  const std::size_t feeds = text.find("G1 A");
+  ASSERT_NE(feeds, std::string::npos);
+  text[feeds + 3] = 'B';
+  test::write_text(layer, text);
+  const auto report = verify(job.output, {});
+  ASSERT_TRUE(report.ok());
+  EXPECT_TRUE(std::ranges::any_of(report->faults, [](const std::string& fault) {
+    return fault.find("both vats feed, some layers or each, and the job is of one powder") != std::string::npos;
+  }));
+}
+
 TEST_F(HeadCare, PlacesWithoutATimeForThemAreDoubted) {
   Job job =
       prism(0.3F, profile("idle", "[care]\nspit_mm = [-40, 5]\nwipe_mm = [-40, 20, -40, 60]\ncap_mm = [-40, 5]\n"), "idle");

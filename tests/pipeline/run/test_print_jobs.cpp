@@ -123,11 +123,14 @@ TEST_F(PrintJobs, WhatSurroundsTheLayersAndThePowderCycleAreVerifiedToo) {
     EXPECT_NE(fault.find(what), std::string::npos) << fault;
   };
   const fs::path layer = program / "000001.gcode";
-  tells(fault_with(program / "start.gcode", "G21", "G20"), "program/start.gcode: its content is not what was written");
-  tells(fault_with(layer, "Z3.0000", "Z2.5000"), "layer 1, powder cycle: the build vat stands at 2.5 mm where 3 have to");
-  tells(fault_with(layer, "G1 A1.8750", "G1 A0.8750"), "layer 1, powder cycle: 0.875 mm are fed where 1.875 have to");
+  tells(fault_with(program / "start.gcode", "G21", "G20"), "program/start.gcode: G21 is missing: layers are in mm");
+  tells(fault_with(layer, "Z3.0000", "Z2.5000"),
+        "layer 1, powder cycle: powder is spread with the build vat at 2.5 mm and 1.875 mm fed, not 3 and 1.875");
+  tells(fault_with(layer, "G1 A1.8750", "G1 A0.8750"),
+        "layer 1, powder cycle: powder is spread with the build vat at 3 mm and 0.875 mm fed, not 3 and 1.875");
   tells(fault_with(layer, "G1 U260.0000", "G1 U100.0000"), "layer 1, powder cycle: the roller does not reach its far end");
-  tells(fault_with(layer, "G1 U0.0000", "G1 U9.0000"), "layer 1, powder cycle: the roller stays at 9 mm");
+  tells(fault_with(layer, "G1 U0.0000", "G1 U9.0000"),
+        "layer 1, powder cycle: the head moves while the roller is at 9 mm, not at 0");
   const std::string text = text_of(layer);
   const std::size_t scan = text.find("G1 Y") != std::string::npos ? text.find("G1 Y") : text.find("G1 X");
   ASSERT_NE(scan, std::string::npos);
