@@ -28,15 +28,17 @@ std::int64_t whole_below(double value) {
 
 std::uint64_t RowMaker::bytes_of(std::uint64_t facets, std::uint32_t levels) {
   const std::uint64_t steps = levels - 1 <= kMostSteps ? levels - 1 : 0;
-  return facets * (sizeof(RowFacet) + sizeof(Walk) + sizeof(PlaneSteps) + steps * sizeof(double) + sizeof(Tents));
+  // Facets of a row double their room as they are listed.
+  return (facets + facets / 8) * (sizeof(Walk) + sizeof(PlaneSteps) + steps * sizeof(double)) +
+         2 * facets * (sizeof(RowFacet) + sizeof(Tents));
 }
 
 void RowMaker::start(const Slab& slab) {
   cells_.start(slab.edges.count());
   row_.clear();
-  walk_.resize(slab.facets.size());
-  plane_.resize(slab.facets.size());
-  if (slab.rule.top_level <= kMostSteps) step_.resize(slab.facets.size() * slab.rule.top_level);
+  const std::size_t facets = slab.facets.size(), steps = slab.rule.top_level <= kMostSteps ? slab.rule.top_level : 0;
+  make_room(walk_, facets), make_room(plane_, facets), make_room(step_, facets * steps);
+  walk_.resize(facets), plane_.resize(facets), step_.resize(facets * steps);
 }
 
 void RowMaker::enter(const SlabFacet& facet, std::uint32_t index) {
