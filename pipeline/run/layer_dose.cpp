@@ -102,7 +102,8 @@ void LayerImager::shares(const Layer& layer, ImageWork& work, LayerRecord& recor
   if (shares_voxels()) {
     share_out(layer, work);
   } else {
-    std::swap(work.drops.shares, work.drops.zones);  // which the layer before has made as large
+    // What was dosed in the layer before took its buffer with it.
+    if (work.drops.zones.bytes() > work.drops.shares.bytes()) std::swap(work.drops.shares, work.drops.zones);
     levels(layer, work.coverage, work.drops.shares);
   }
   const auto differs = dose::take_half(images.dose.full(), work.runs, work.second, work.drops);

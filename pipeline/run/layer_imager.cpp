@@ -216,13 +216,16 @@ dose::DropSizes LayerImager::sizes_of(const Layer& layer, std::uint64_t pixels) 
   sizes.materials = static_cast<std::uint32_t>(std::max<std::size_t>(1, images.materials.used.size()));
   if (images.dose.has_copies()) sizes.parts = images.dose.zones().count();
   if (plan_.job.levels == 0) return sizes;
+  std::uint64_t voxels = of_images;
   sizes.runs = of_images;
   for (const Solid& solid : images.solids.all()) {
     if (!solid.coverage) continue;
     const cover::LayerBound bound = solid.coverage->bound(layer);
     sizes.runs += bound.runs, sizes.edges += bound.edges;
-    if (pixels == kUnknown) sizes.pixels = std::min(sizes.pixels, bound.voxels);
+    voxels += bound.voxels;
   }
+  // Full voxels get whole drops without a saturation, which is a machine's.
+  if (pixels == kUnknown && !images.machine) sizes.pixels = std::min(sizes.pixels, voxels);
   if (shares_voxels()) sizes.parts = static_cast<std::uint32_t>(images.solids.all().size());
   return sizes;
 }

@@ -115,7 +115,7 @@ Result<Coverage> Coverage::build(std::span<Mesh> meshes, std::span<const Instanc
     meshes[i].blocks = blocks[i];
     SlabIndex index(blocks[i]->bounds());
     Suspects suspects = find_suspects(*blocks[i], index);
-    HeldBound held(*blocks[i], grid, levels - 1);
+    HeldBound held(*blocks[i], suspects, grid, levels - 1);
     state.meshes.push_back({std::move(blocks[i]), std::move(index), std::move(suspects), std::move(held)});
   }
   return coverage;
@@ -194,7 +194,8 @@ HeldBound::Count Coverage::State::held_in(const Layer& layer) const {
   HeldBound::Count held;
   for (const Copy& copy : copies) {
     const std::int64_t bottom = std::int64_t{layer.bottom} - copy.offset.z;
-    const HeldBound::Count own = meshes[copy.mesh].held.at(bottom, bottom + layer.thickness);
+    HeldBound::Count own = meshes[copy.mesh].held.at(bottom, bottom + layer.thickness);
+    if (copy.crowded || !copy.others.empty()) own.runs = own.voxels, own.edges = 2 * own.voxels;  // facets may meet others
     held.facets += own.facets, held.voxels += own.voxels, held.runs += own.runs, held.edges += own.edges;
   }
   return held;

@@ -30,6 +30,7 @@ std::int64_t units(double amount) { return static_cast<std::int64_t>(std::ceil(a
 
 struct HeldBound::Facet {
   Triangle t;           // corners by height
+  bool suspect;         // meets others: samples may say anything
   bool flat;            // shares that pass levels are fewer than its voxels
   double area, levels;  // seen from above, voxels; along x, levels x nm
   double low, middle, high;
@@ -37,11 +38,12 @@ struct HeldBound::Facet {
   /// Voxels that a way along x and one along y pass.
   Sums way(double x, double y, double share) const {
     // Rows count once more, for what lies between stretches of voxels; of flat facets two changes a row.
-    return {units((x + 1.5 * y) * share), units((flat ? y : x + 1.5 * y) * share), units(y * share), 0};
+    return {units((x + 1.5 * y) * share), units((flat ? y : x + 1.5 * y) * share), units((suspect ? 2 * x + 3 * y : y) * share),
+            0};
   }
 };
 
-HeldBound::HeldBound(const MeshBlocks& mesh, const PixelGrid& grid, std::uint32_t top_level)
+HeldBound::HeldBound(const MeshBlocks& mesh, const Suspects& suspects, const PixelGrid& grid, std::uint32_t top_level)
     : columns_per_nm_(grid.x.pixels_per_nm()), rows_per_nm_(grid.y.pixels_per_nm()), top_level_(top_level) {
   const std::span<const Box> bounds = mesh.bounds();
   if (bounds.empty()) return;
@@ -58,7 +60,7 @@ HeldBound::HeldBound(const MeshBlocks& mesh, const PixelGrid& grid, std::uint32_
   Cluster room;
   for (std::uint32_t c = 0; c < bounds.size(); ++c) {
     const Cluster& cluster = mesh.cluster(c, room);
-    for (std::uint32_t lane = 0; lane < kClusterSize; ++lane) add(cluster.triangle(lane));
+    for (std::uint32_t lane = 0; lane < kClusterSize; ++lane) add(cluster.triangle(lane), (suspects[c] >> lane & 1) != 0);
   }
   // Differences become what each slab has, and that what all below have.
   Sums here, cut, below;
@@ -72,7 +74,7 @@ HeldBound::HeldBound(const MeshBlocks& mesh, const PixelGrid& grid, std::uint32_
   }
 }
 
-void HeldBound::add(const Triangle& facet) {
+void HeldBound::add(const Triangle& facet, bool suspect) {
   Triangle t = facet;
   if (t.b.z < t.a.z) std::swap(t.a, t.b);
   if (t.c.z < t.b.z) std::swap(t.b, t.c);
@@ -81,7 +83,8 @@ void HeldBound::add(const Triangle& facet) {
   if (t.a == t.b && t.b == t.c) return;  // no facet
   const double steps = top_level_ * side * rows_per_nm_;
   const Facet own{t,
-                  kUsualPixels * area >= top_level_ * side,
+                  suspect,
+                  !suspect && kUsualPixels * area >= top_level_ * side,
                   area * columns_per_nm_ * rows_per_nm_,
                   steps,
                   static_cast<double>(t.a.z),
@@ -115,7 +118,8 @@ void HeldBound::add_parts(const Facet& f) {
   const double low = f.low, middle = f.middle, high = f.high, rise = f.rise();
   const std::int64_t first = slab_of(f.t.a.z);
   const auto within = [&](double share) {
-    return Sums{units(f.area * share), units(f.flat ? 0 : f.area * share), 0, f.flat ? units(f.levels * share) : 0};
+    return Sums{units(f.area * share), units(f.flat ? 0 : f.area * share), units(f.suspect ? 2 * f.area * share : 0),
+                f.flat ? units(f.levels * share) : 0};
   };
   if (rise == 0) {
     if ((first + first_) << shift_ == f.t.a.z) return slab(first).floor.add(within(1), 1);

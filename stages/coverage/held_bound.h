@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "stages/coverage/meet/meetings.h"
 #include "stages/data/grid.h"
 #include "stages/data/mesh.h"
 #include "stages/geometry/blocks/mesh_blocks.h"
@@ -17,9 +18,9 @@ namespace lamina::cover {
 /// which each slab has its share, and along the cuts with the layer's two planes, which grow evenly up to the middle corner and
 /// shrink again, as areas for each nm of height do.
 ///
-/// Of a steep facet each voxel may be a run of levels. Along a row of a flat one shares only rise or only fall, by its area
-/// seen along x over that of the row: of levels 0 .. n they pass n times that many, and what other facets add begins or ends
-/// with them.
+/// Of a steep facet, and of one that meets others, each voxel may be a run of levels. Along a row of a flat one shares only
+/// rise or only fall, by its area seen along x over that of the row: of levels 0 .. n they pass n times that many, and what
+/// other facets add begins or ends with them.
 class HeldBound {
  public:
   struct Count {
@@ -30,7 +31,7 @@ class HeldBound {
   };
 
   /// top_level  n. cost  some ten nanoseconds a facet
-  HeldBound(const MeshBlocks& mesh, const PixelGrid& grid, std::uint32_t top_level);
+  HeldBound(const MeshBlocks& mesh, const Suspects& suspects, const PixelGrid& grid, std::uint32_t top_level);
   /// Between two heights, nm in the frame of the mesh. cost  O(1)
   Count at(std::int64_t bottom, std::int64_t top) const;
   std::uint64_t bytes() const { return slab_.capacity() * sizeof(Slab); }
@@ -56,7 +57,7 @@ class HeldBound {
     std::uint64_t end = 0;    // whose highest one does, or where they end
   };
   struct Facet;
-  void add(const Triangle& facet);
+  void add(const Triangle& facet, bool suspect);
   void add_edge(const Facet& facet, const Point3& a, const Point3& b);
   void add_parts(const Facet& facet);
   void spread(std::int64_t first, std::int64_t end, const Sums& within, const Sums& cut);
