@@ -36,8 +36,8 @@ void DosePlan::thin(std::uint32_t layer, Runs& image, Runs& second, Runs& third)
 }
 
 Status DosePlan::decide(const Job& job, const Machine* machine, std::uint32_t sweep_drops, const Scene& scene,
-                        std::uint32_t layers, const std::function<Layer(std::uint32_t)>& layer,
-                        std::vector<Warning>& warnings) {
+                        std::uint32_t layers, const std::array<std::uint32_t, 2>& range,
+                        const std::function<Layer(std::uint32_t)>& layer, std::vector<Warning>& warnings) {
   const bool asked = wishes_.has_value();
   // Without a machine, formats that carry levels have those of the voxels.
   if (asked || (job.levels > 0 && (machine != nullptr || write::find_level_format(job.format) == nullptr)))
@@ -76,7 +76,7 @@ Status DosePlan::decide(const Job& job, const Machine* machine, std::uint32_t sw
     }
     budget_->survey(std::move(boxes), layers);
   }
-  for (std::uint32_t i = 0; i < layers; ++i) budget_->foresee(layer(i));
+  for (std::uint32_t i = 0; i < layers; ++i) budget_->foresee(layer(i), i >= range[0] && i < range[1]);
   if (asked) rules_.most_drops = std::max(1u, budget_->most_drops());
   return budget_->judge(job.allow_unbound, warnings);
 }

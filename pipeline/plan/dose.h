@@ -30,9 +30,11 @@ class DosePlan {
   /// Decides the drops of all layers of a job.
   /// machine      null without one
   /// sweep_drops  of a pixel in one sweep
+  /// range        [first, last) of the layers: what is made, and so warned of
   /// errors  kUsage: a saturation without a machine; less than the powder needs; shares of voxels that are thinned
   Status decide(const Job& job, const Machine* machine, std::uint32_t sweep_drops, const Scene& scene, std::uint32_t layers,
-                const std::function<Layer(std::uint32_t)>& layer, std::vector<Warning>& warnings);
+                const std::array<std::uint32_t, 2>& range, const std::function<Layer(std::uint32_t)>& layer,
+                std::vector<Warning>& warnings);
 
   /// Whether images of a format carry the drops, decided before. several  materials
   /// errors  kUsage: several drops or grey ones of several materials; more than pixels of 4 bits tell

@@ -288,7 +288,8 @@ class Planner {
     if (beads_) beads.emplace(job(), grid, *plan_.sections, *plan_.segments);
     const auto layer = [this](std::uint32_t i) { return plan_.layer(i); };
     const std::uint32_t sweep_drops = printer_.machine ? printer_.machine->grid.sweep_drops : 1;
-    if (Status status = dose.decide(job(), machine(), sweep_drops, *plan_.scene, plan_.layer_count, layer, plan_.warnings);
+    if (Status status =
+            dose.decide(job(), machine(), sweep_drops, *plan_.scene, plan_.layer_count, plan_.range, layer, plan_.warnings);
         !status)
       return status;
     if (Status status = dose.check_images(job().format, materials_.several()); !status) return status;

@@ -166,7 +166,11 @@ class ImageMaker : public Maker {
     const Status status = files_.finish();
     return status ? inspector_.write(files_.head()) : status;
   }
-  Status stop(bool) override { return plan_.job.dry_run ? Status() : files_.keep(); }
+  Status stop(bool keep) override {
+    if (!plan_.job.dry_run && keep) return files_.keep();
+    discard();
+    return {};
+  }
   void discard() override {
     if (!plan_.job.dry_run) files_.discard();
   }
