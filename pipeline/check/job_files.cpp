@@ -10,6 +10,9 @@
 #include "pipeline/output/print_program.h"
 #include "stages/data/input/file_reader.h"
 #include "stages/data/levels.h"
+#include "stages/program/explain.h"
+#include "stages/program/head_grid.h"
+#include "stages/raster/materials.h"
 
 namespace lamina::pipeline {
 namespace {
@@ -33,6 +36,19 @@ Result<replay::VirtualMachine> machine_of_job(const std::string& directory, cons
   const Result<Machine> machine = read_machine(whole_file(fs::path(directory) / name, kMostTomlBytes), name);
   if (!machine) return machine.error();
   return replay::VirtualMachine::build(*machine, head.grid.columns(), head.grid.rows(), head.layer_count);
+}
+
+std::string sweeps_of_job(const std::string& directory, const Manifest& manifest) {
+  if (manifest.head.head_drops < 2) return {};
+  const auto machine = machine_of_job(directory, manifest.head);
+  const auto grid = machine ? program::make_head_grid(machine->profile()) : machine.error();
+  if (!grid) return {};
+  program::DropSweeps sweeps{std::max(1u, manifest.head.most_drops)};
+  for (const LayerRecord& record : manifest.layers) {
+    sweeps.added += record.program.added_sweeps;
+    sweeps.added_seconds += 1e-6 * static_cast<double>(record.program.added_microseconds);
+  }
+  return program::sweeps_text(machine->profile(), *grid, sweeps);
 }
 
 std::string program_of_layer(const std::string& directory, const ManifestHead& head, std::uint32_t layer) {

@@ -18,6 +18,9 @@ namespace lamina::pipeline {
 /// errors  kVerification: missing, changed, or of another job; begins with the file's path in the directory
 Result<replay::VirtualMachine> machine_of_job(const std::string& directory, const ManifestHead& head);
 
+/// What the drops of a pixel took of a head that fires several, as planning told; "" of another one, or without its files.
+std::string sweeps_of_job(const std::string& directory, const Manifest& manifest);
+
 /// The text of a layer's print program, unchecked; "" if it cannot be read.
 std::string program_of_layer(const std::string& directory, const ManifestHead& head, std::uint32_t layer);
 

@@ -202,11 +202,15 @@ Status ImageFiles::program(const LayerImages& images, Work& work, LayerRecord& r
   return program_->write_layer(record.layer, planes, *feeds, work.program, record.program);
 }
 
-std::uint64_t ImageFiles::bytes_bound(std::uint64_t changes) const {
+std::uint64_t ImageFiles::bytes_bound(const dose::DropBound& drops) const {
   const std::uint64_t files = std::max<std::size_t>(1, head_.named_images());
+  const std::uint32_t planes = std::max(1u, head_.most_drops);
   const auto most_bytes = levels_ == nullptr ? format_->most_bytes : levels_->most_bytes;
-  return files * most_bytes(head_.grid.columns(), head_.grid.rows(), changes) +
-         (program_ ? program_->bytes_bound(changes, std::max(1u, head_.most_drops)) : 0);
+  // Planes of drops share their changes, images of materials each have all.
+  const std::uint64_t of_plane = drops.changes_of_all / planes + 1;
+  const std::uint64_t of_file = head_.materials.empty() && levels_ == nullptr ? of_plane : drops.changes;
+  return files * most_bytes(head_.grid.columns(), head_.grid.rows(), of_file) +
+         (program_ ? program_->bytes_bound(of_plane, planes) : 0);
 }
 
 Status ImageFiles::record_kept_below(std::uint32_t layer) {

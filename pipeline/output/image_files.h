@@ -68,8 +68,8 @@ class ImageFiles {
   Status store(const LayerImages& images, Work& work, LayerRecord& record) const;
   /// The print program alone; of a dry run it is only timed.
   Status program(const LayerImages& images, Work& work, LayerRecord& record) const;
-  /// Upper bound of the bytes for a layer whose image has that many changes.
-  std::uint64_t bytes_bound(std::uint64_t changes) const;
+  /// Upper bound of the bytes for a layer whose images have that many changes.
+  std::uint64_t bytes_bound(const dose::DropBound& drops) const;
 
   // --- from one thread at a time
   /// In layer order; kept layers are recorded in their place.

@@ -36,8 +36,8 @@ void DosePlan::thin(std::uint32_t layer, Runs& image, Runs& second, Runs& third)
 }
 
 Status DosePlan::decide(const Job& job, const Machine* machine, std::uint32_t sweep_drops, const Scene& scene,
-                        std::uint32_t layers, const std::function<Layer(std::uint32_t)>& layer,
-                        std::vector<Warning>& warnings) {
+                        std::uint32_t layers, const std::array<std::uint32_t, 2>& range,
+                        const std::function<Layer(std::uint32_t)>& layer, std::vector<Warning>& warnings) {
   const bool asked = wishes_.has_value();
   // Without a machine, formats that carry levels have those of the voxels.
   if (asked || (job.levels > 0 && (machine != nullptr || write::find_level_format(job.format) == nullptr)))
@@ -76,7 +76,7 @@ Status DosePlan::decide(const Job& job, const Machine* machine, std::uint32_t sw
     }
     budget_->survey(std::move(boxes), layers);
   }
-  for (std::uint32_t i = 0; i < layers; ++i) budget_->foresee(layer(i));
+  for (std::uint32_t i = 0; i < layers; ++i) budget_->foresee(layer(i), i >= range[0] && i < range[1]);
   if (asked) rules_.most_drops = std::max(1u, budget_->most_drops());
   return budget_->judge(job.allow_unbound, warnings);
 }
@@ -162,14 +162,14 @@ Result<dose::ZoneSums> DosePlan::saturate(const Layer& layer, bool laid, std::ui
   return dose::drops_of_parts(rules_, doses, layer.index, zone, image, second, work);
 }
 
-std::uint64_t DosePlan::changes_bound(std::uint64_t changes, std::uint64_t covered) const {
-  // A run that grows is in every row that it reaches.
-  changes = edges_bound(changes);
-  covered = edges_bound(covered);
-  // Of blue noise at most every pixel differs from the one before it.
-  if (saturates()) return changes + covered + 2;
-  if (core_ >= 1) return changes;
-  return changes + static_cast<std::uint64_t>(2 * std::min(core_, 1 - core_) * static_cast<double>(covered)) + 2;
+std::uint64_t DosePlan::parted_pixels(const Runs& image, const dose::DropWork& work) const {
+  if (!parts_pixels()) return 0;
+  if (rules_.full > 0) {
+    const std::uint64_t full = pixels_at(work.shares, rules_.full);
+    return pixels_at(work.shares) - (wishes_ ? 0 : full);
+  }
+  const std::uint64_t pixels = edges_bound(set_pixels(image));  // at most, where edges grow
+  return core_ >= 1 ? pixels : static_cast<std::uint64_t>(2 * std::min(core_, 1 - core_) * static_cast<double>(pixels)) + 2;
 }
 
 }  // namespace lamina::pipeline

@@ -30,9 +30,11 @@ class DosePlan {
   /// Decides the drops of all layers of a job.
   /// machine      null without one
   /// sweep_drops  of a pixel in one sweep
+  /// range        [first, last) of the layers: what is made, and so warned of
   /// errors  kUsage: a saturation without a machine; less than the powder needs; shares of voxels that are thinned
   Status decide(const Job& job, const Machine* machine, std::uint32_t sweep_drops, const Scene& scene, std::uint32_t layers,
-                const std::function<Layer(std::uint32_t)>& layer, std::vector<Warning>& warnings);
+                const std::array<std::uint32_t, 2>& range, const std::function<Layer(std::uint32_t)>& layer,
+                std::vector<Warning>& warnings);
 
   /// errors  kUsage: images of a format do not carry as many drops as were decided before
   Status check_images(std::string_view format) const;
@@ -66,8 +68,15 @@ class DosePlan {
   std::uint64_t edges_bound(std::uint64_t changes) const {
     return zones_.grows() ? changes * (2 * std::uint64_t{zones_.most_rows()} + 1) : changes;
   }
-  /// Upper bound of an image's changes after both, given those before and the most pixels that its parts cover.
-  std::uint64_t changes_bound(std::uint64_t changes, std::uint64_t covered) const;
+  /// Of pixels or voxels of a layer those that blue noise may part from the one before them, at most; none of many jobs.
+  bool parts_pixels() const {
+    return core_ < 1 || (saturates() && (rules_.dithered ? wishes_ || rules_.full > 0 : has_copies()));
+  }
+  std::uint64_t parted_pixels(const Runs& image, const dose::DropWork& work) const;
+  /// What drops make of it. sizes  its edges moved
+  dose::DropBound bound(const dose::DropSizes& sizes) const { return dose::bound_of(rules_, sizes); }
+  /// Whether formulas may lay the parts of a layer one by one.
+  bool has_copies() const { return !copies_.empty(); }
 
  private:
   bool has_formula(const Layer& layer) const;

@@ -286,15 +286,15 @@ class Planner {
     if (!solids) return solids.error();
     std::optional<Beads> beads;
     if (beads_) beads.emplace(job(), grid, *plan_.sections, *plan_.segments);
-    dose::Covered covered(zone_boxes(*plan_.scene, dose.zones(), grid), grid);
     const auto layer = [this](std::uint32_t i) { return plan_.layer(i); };
     const std::uint32_t sweep_drops = printer_.machine ? printer_.machine->grid.sweep_drops : 1;
-    if (Status status = dose.decide(job(), machine(), sweep_drops, *plan_.scene, plan_.layer_count, layer, plan_.warnings);
+    if (Status status =
+            dose.decide(job(), machine(), sweep_drops, *plan_.scene, plan_.layer_count, plan_.range, layer, plan_.warnings);
         !status)
       return status;
     if (Status status = dose.check_images(job().format); !status) return status;
     plan_.images.emplace(ImagePlan{std::move(printer_.machine), grid, std::move(materials_), std::move(*solids),
-                                   std::move(dose), std::move(beads), std::move(covered)});
+                                   std::move(dose), std::move(beads)});
     end_indexing();
     return {};
   }

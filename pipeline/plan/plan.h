@@ -39,7 +39,6 @@ struct ImagePlan {
   Solids solids;
   DosePlan dose;
   std::optional<Beads> beads;  // set if parts consist of beads
-  dose::Covered covered;       // pixels of a layer, at most
 };
 
 /// Data for toolpaths only.

@@ -42,8 +42,8 @@ class ImageMaker : public Maker {
   }
 
   std::uint64_t bytes_of(std::uint32_t layer) const override {
-    const Layer of = plan_.layer(layer);
-    return imager_.bytes_of(of) + files_.bytes_bound(imager_.changes_bound(of));
+    // What is to be dosed is told before the dose, unless no layer is made.
+    return bytes_of(plan_.layer(layer), plan_.job.dry_run && !times_dry_runs() ? LayerImager::kUnknown : 0);
   }
 
   Result<std::vector<std::uint32_t>> open() override {
@@ -101,6 +101,11 @@ class ImageMaker : public Maker {
         return Status();
       });
     }
+    const auto dose_needs = [this](std::uint32_t layer, const Ticket& ticket) -> Result<std::uint64_t> {
+      const ImageWork& work = work_[ticket.work].images;
+      const Layer of = plan_.layer(layer);
+      return bytes_of(of, plan_.images->dose.parted_pixels(work.runs, work.drops)) - bytes_of(of, 0);
+    };
     add("dose", [this](const Layer& layer, Work& work, Made& made) {
       if (Status status = imager_.bleed(layer, work.images, made.notes); !status) return status;
       // What walls and fillings left out is no bleed.
@@ -109,6 +114,7 @@ class ImageMaker : public Maker {
       if (cost_) cost_->count(work.images, made.notes, made.record);
       return Status();
     });
+    if (plan_.images->dose.parts_pixels()) steps.back().needs = dose_needs;
     if (plan_.job.dry_run) {
       add("program",
           [this](const Layer&, Work& work, Made& made) { return files_.program(images_of(work), work.files, made.record); });
@@ -161,7 +167,11 @@ class ImageMaker : public Maker {
     const Status status = files_.finish();
     return status ? inspector_.write(files_.head()) : status;
   }
-  Status stop(bool) override { return plan_.job.dry_run ? Status() : files_.keep(); }
+  Status stop(bool keep) override {
+    if (!plan_.job.dry_run && keep) return files_.keep();
+    discard();
+    return {};
+  }
   void discard() override {
     if (!plan_.job.dry_run) files_.discard();
   }
@@ -182,6 +192,9 @@ class ImageMaker : public Maker {
     ImageNotes notes;
   };
 
+  std::uint64_t bytes_of(const Layer& layer, std::uint64_t pixels) const {
+    return imager_.bytes_of(layer, pixels) + files_.bytes_bound(imager_.drops_bound(layer, pixels));
+  }
   LayerImages images_of(const Work& work) const {
     const ImageWork& images = work.images;
     return {images.runs, images.drops.planes, imager_.several(images), imager_.levels(images)};

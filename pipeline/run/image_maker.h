@@ -78,10 +78,14 @@ class LayerImager {
   /// The plan's job asks for levels.
   cover::LayerReport levels(const Layer& layer, cover::LayerScratch& scratch, Levels& image) const;
 
-  /// Upper bound of the bytes for scratch and runs of a layer; a mirrored or second image counts separately.
-  std::uint64_t bytes_of(const Layer& layer) const;
-  /// Upper bound of the changes in the layer's image.
-  std::uint64_t changes_bound(const Layer& layer) const;
+  static constexpr std::uint64_t kUnknown = UINT64_MAX;
+  /// Upper bound of the bytes for scratch and runs of a layer.
+  /// pixels  that blue noise may part (DosePlan::parted_pixels), 0 before the dose, or kUnknown
+  std::uint64_t bytes_of(const Layer& layer, std::uint64_t pixels) const;
+  /// Upper bound of the changes in the layer's images with their drops.
+  dose::DropBound drops_bound(const Layer& layer, std::uint64_t pixels) const {
+    return plan_.images->dose.bound(sizes_of(layer, pixels));
+  }
 
  private:
   Nm plane(const Layer& layer) const { return plane_of(plan_.job, layer, plan_.scene->height); }
@@ -98,9 +102,9 @@ class LayerImager {
   void lay_shares(const Layer& layer, std::uint32_t part, ImageWork& work) const;
   void own_voxels(ImageWork& work) const;
   static void empty_removed(const Runs& before, bool laid, ImageWork& work);
-  std::uint64_t bytes_of_section(Nm plane, std::uint64_t changes) const;
+  std::array<Nm, 2> planes(const Layer& layer) const;
+  dose::DropSizes sizes_of(const Layer& layer, std::uint64_t pixels) const;
   std::uint64_t changes_of_images(Nm plane) const;
-  std::uint64_t changes_of_section(const Layer& layer, Nm plane, std::uint64_t bead_changes) const;
 
   const Plan& plan_;
 };

@@ -103,6 +103,8 @@ void LayerImager::shares(const Layer& layer, ImageWork& work, LayerRecord& recor
     cover(layer, work);
     dose::share_out(images.dose.full(), images.grid.columns(), images.grid.rows(), work.drops);
   } else {
+    // What was dosed in the layer before took its buffer with it.
+    if (work.drops.zones.bytes() > work.drops.shares.bytes()) std::swap(work.drops.shares, work.drops.zones);
     levels(layer, work.coverage, work.drops.shares);
   }
   const auto differs = dose::take_half(images.dose.full(), work.runs, work.second, work.drops);

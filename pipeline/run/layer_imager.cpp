@@ -206,62 +206,63 @@ raster::LayerReport LayerImager::section(const Solid& solid, raster::Engine engi
   return low.open_rows + low.capped_rows >= high.open_rows + high.capped_rows ? low : high;
 }
 
-std::uint64_t LayerImager::changes_of_section(const Layer& layer, Nm plane, std::uint64_t bead_changes) const {
+std::array<Nm, 2> LayerImager::planes(const Layer& layer) const {
+  if (plan_.job.heights.containment == Containment::kAcross) return {plane(layer), plane(layer)};
+  return {layer.lowest_plane(), layer.highest_plane()};
+}
+
+dose::DropSizes LayerImager::sizes_of(const Layer& layer, std::uint64_t pixels) const {
   const ImagePlan& images = *plan_.images;
-  const std::uint64_t covered = images.covered.pixels(layer.bottom, std::int64_t{layer.bottom} + layer.thickness);
-  return images.dose.changes_bound(images.solids.crossings_bound(plane) + changes_of_images(plane), covered) + bead_changes;
-}
-
-std::uint64_t LayerImager::changes_bound(const Layer& layer) const {
-  if (plan_.job.heights.containment != Containment::kAcross) {
-    return changes_of_section(layer, layer.lowest_plane(), 0) + changes_of_section(layer, layer.highest_plane(), 0);
-  }
-  return changes_of_section(layer, plane(layer),
-                            plan_.images->beads ? 2 * plan_.images->beads->expected(layer.index).spans : 0);
-}
-
-std::uint64_t LayerImager::bytes_of(const Layer& layer) const {
-  if (plan_.job.heights.containment != Containment::kAcross) {
-    // Both sections, and an image with up to the crossings of both; doubled for a second engine or a mirror.
-    return 2 * (bytes_of_section(layer.lowest_plane(), changes_of_section(layer, layer.lowest_plane(), 0)) +
-                bytes_of_section(layer.highest_plane(), changes_of_section(layer, layer.highest_plane(), 0)));
-  }
-  const std::uint64_t of_section = bytes_of_section(plane(layer), changes_bound(layer));
-  std::uint64_t of_shares = 0, scratch = 0;
-  for (const Solid& solid : plan_.images->solids.all()) {
+  const auto [low, high] = planes(layer);
+  const std::uint64_t of_images = changes_of_images(plane(layer));
+  std::uint64_t changes =
+      images.solids.crossings_bound(low) + (high == low ? 0 : images.solids.crossings_bound(high)) + of_images;
+  dose::DropSizes sizes{images.grid.rows(), images.grid.columns(), images.dose.edges_bound(changes)};
+  if (images.beads) sizes.edges += 2 * images.beads->expected(layer.index).spans;
+  sizes.pixels = std::min(pixels, sizes.rows * sizes.columns);
+  sizes.zones = images.dose.zones().several() || images.dose.bleeds() || plan_.job.mirror != Mirror::kNone || of_images > 0;
+  sizes.materials = static_cast<std::uint32_t>(std::max<std::size_t>(1, images.materials.used.size()));
+  if (images.dose.has_copies()) sizes.parts = images.dose.zones().count();
+  if (plan_.job.levels == 0) return sizes;
+  std::uint64_t voxels = of_images;
+  sizes.runs = of_images;
+  for (const Solid& solid : images.solids.all()) {
     if (!solid.coverage) continue;
-    scratch = std::max(scratch, solid.coverage->scratch_bytes_bound(layer));
-    of_shares += 9 * changes_bound(layer) + 4 * plan_.images->grid.rows();
+    const cover::LayerBound bound = solid.coverage->bound(layer);
+    sizes.runs += bound.runs, sizes.edges += bound.edges;
+    voxels += bound.voxels;
   }
-  if (shares_voxels())
-    of_shares += 9 * changes_of_images(plane(layer)) + plan_.scene->images.size() * 4 * plan_.images->grid.rows();
-  // Of solids that share voxels, their shares twice, with their cores, and together; their drops for each material.
-  if (shares_voxels()) of_shares *= 3 + plan_.images->materials.used.size();
-  of_shares += scratch;
-  return of_section + of_shares + (plan_.images->beads ? plan_.images->beads->bytes_expected(layer.index) : 0);
+  // Full voxels get whole drops without a saturation, which is a machine's.
+  if (pixels == kUnknown && !images.machine) sizes.pixels = std::min(sizes.pixels, voxels);
+  if (shares_voxels()) sizes.parts = static_cast<std::uint32_t>(images.solids.all().size() + plan_.scene->images.size());
+  return sizes;
 }
 
-std::uint64_t LayerImager::bytes_of_section(Nm plane, std::uint64_t changes) const {
+std::uint64_t LayerImager::bytes_of(const Layer& layer, std::uint64_t pixels) const {
   const ImagePlan& images = *plan_.images;
-  const std::uint64_t rows = images.grid.rows();
-  const bool dosed = images.dose.any();
-  const bool second = images.beads || plan_.job.engine == Engine::kBoth || plan_.job.mirror != Mirror::kNone || dosed;
-  const std::uint64_t second_image = (second ? 8 * changes + 4 * rows : 0) * (dosed ? 5 : 1);
+  const dose::DropSizes sizes = sizes_of(layer, pixels);
+  const dose::DropBound drops = images.dose.bound(sizes);
+  const std::uint64_t rows = sizes.rows, edges = sizes.edges, zones = images.dose.zones().count();
+  const auto image = [rows](std::uint64_t changes) { return 8 * changes + 4 * rows; };
+  const auto [low, high] = planes(layer);
+  std::uint64_t total = drops.bytes + images.solids.layer_bytes_bound(low);
+  if (high != low) total += images.solids.layer_bytes_bound(high);
+  // The image, and one more; those of bleed, with what it took away.
+  total += image(edges) * (2 + (images.dose.bleeds() ? 6 : 0));
+  if (plan_.job.dose.core < 1) total += image(edges) + 2 * image(drops.changes);
   // Images of each material, of all, of one solid, and one intermediate.
-  const std::uint64_t materials = images.materials.several() ? images.materials.used.size() : 0;
-  const std::uint64_t material_images = materials == 0 ? 0 : (materials + 3) * 2 * (4 * changes + 4 * rows);
+  if (images.materials.several()) total += (images.materials.used.size() + 3) * image(std::max(edges, drops.changes));
   // Images of each dose, before and after they grow, with shells and cores; the whole before it is moved, and scratch.
-  const std::uint64_t zones = images.dose.zones().several() ? images.dose.zones().count() : 0;
-  const std::uint64_t edges = images.dose.edges_bound(images.solids.crossings_bound(plane) + changes_of_images(plane));
-  const std::uint64_t zone_images = zones == 0 ? 0 : (2 * zones + 6) * 2 * (4 * edges + 4 * rows);
-  // Zones and levels, and the image of each drop.
-  // Of each material once more.
-  const std::uint64_t drop_images = 18 * changes + images.dose.most_drops() * 4 * (changes + rows);
-  const std::uint64_t drops = images.dose.saturates() ? (1 + materials) * drop_images : 0;
+  if (images.dose.zones().several()) total += (2 * zones + 6) * image(edges);
   // An image as read and as placed; where levels are, 9 bytes a run of those and of both together.
-  const std::uint64_t of_images = changes_of_images(plane), levels = plan_.job.levels > 0 ? 18 * of_images + 12 * rows : 0;
-  const std::uint64_t read = plan_.scene->images.empty() ? 0 : 8 * (of_images + rows) + levels;
-  return images.solids.layer_bytes_bound(plane) + read + second_image + material_images + zone_images + drops;
+  const std::uint64_t of_images = changes_of_images(plane(layer));
+  if (!plan_.scene->images.empty())
+    total += image(of_images) + 4 * rows + (plan_.job.levels > 0 ? 18 * of_images + 12 * rows : 0);
+  std::uint64_t scratch = 0;
+  for (const Solid& solid : images.solids.all()) {
+    if (solid.coverage) scratch = std::max(scratch, solid.coverage->bound(layer).scratch_bytes);
+  }
+  return total + scratch + (images.beads ? images.beads->bytes_expected(layer.index) : 0);
 }
 
 }  // namespace lamina::pipeline

@@ -125,7 +125,9 @@ Result<std::vector<std::uint32_t>> plan_refills(const Plan& plan, const LayerIma
     vats.add(plan.layer(i), feeds[i]);
   }
   if (Status status = vats.status(); !status) return status.error();
-  return vats.refills();
+  std::vector<std::uint32_t> refills = vats.refills();
+  std::erase_if(refills, [&](std::uint32_t i) { return i < plan.range[0] || i >= plan.range[1]; });
+  return refills;
 }
 
 }  // namespace lamina::pipeline

@@ -17,7 +17,7 @@ Status refuse_mixed_powders(const Plan& plan, const LayerImager& imager);
 /// cost    the images of all layers, if it is in doubt; else nothing
 Status refuse_faulty_formulas(const Plan& plan, const LayerImager& imager);
 
-/// The layers of the whole job before which its program pauses for vats to be filled.
+/// The layers of the range before which the whole job pauses for vats to be filled.
 /// errors  kUsage: a vat runs empty, by the profile's rule
 /// cost    O(layers); where materials differ, an image of each layer, whose pixels decide which vat feeds
 Result<std::vector<std::uint32_t>> plan_refills(const Plan& plan, const LayerImager& imager);

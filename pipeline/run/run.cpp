@@ -90,11 +90,11 @@ LayerSteps steps_of(Maker& maker, const std::vector<std::uint32_t>& todo, const 
   return steps;
 }
 
-/// Ends a job early: makes the error and keeps or removes its files.
-Error ended_early(Maker& maker, const Error& error, bool any_layer) {
+/// Ends a job early: makes the error and keeps or removes its files. shared  an earlier run, or another shard, has made some
+Error ended_early(Maker& maker, const Error& error, bool any_layer, bool shared) {
   const bool interrupted = error.fault == Fault::kInterrupted;
   const bool kept = interrupted || error.fault == Fault::kOutput || error.fault == Fault::kMemory;
-  const bool keep = kept && maker.keeps() && (any_layer || !maker.records_from_work());
+  const bool keep = maker.keeps() && (shared || (kept && (any_layer || !maker.records_from_work())));
   if (Status stopped = maker.stop(keep); !stopped && interrupted) return stopped.error();
   if (interrupted) {
     return {Fault::kInterrupted, keep        ? "interrupted; finished layers are kept, run again with --resume to go on"
@@ -119,13 +119,13 @@ bool cut_short(const Status& status) {
 
 /// Collects the warnings while the files are unfinished still, and refuses what is empty or, if strict, doubtful. Then
 /// nothing stays, unless an earlier run had made a part of it.
-Status judge(const Plan& plan, Maker& maker, const Sanity& sanity, bool resumed, Summary& summary) {
+Status judge(const Plan& plan, Maker& maker, const Sanity& sanity, bool shared, Summary& summary) {
   maker.warn(summary, summary.warnings);
   Status status = sanity.end(summary.warnings);
   if (status && plan.job.strict) status = sanity::refuse_warnings(summary.warnings);
   if (status) return {};
   if (cut_short(status)) return status;
-  if (resumed || plan.job.shard) {
+  if (shared) {
     static_cast<void>(maker.stop(true));
   } else {
     maker.discard();
@@ -150,13 +150,14 @@ Status make_layers(const Plan& plan, Maker& maker, const Sanity& sanity, const F
     progress({ProgressEvent::Stage::kLayers, ++done, layers});
   };
   const LayerSteps steps = steps_of(maker, *todo, recorded);
+  const bool shared = !kept.empty() || plan.job.shard;
   FlowReport report;
   const Status moved = flow_layers(static_cast<std::uint32_t>(todo->size()), steps, limits, cancel, report);
-  if (!moved) return ended_early(maker, moved.error(), done > 0);
-  if (Status status = judge(plan, maker, sanity, !kept.empty(), summary); !status) {
-    return cut_short(status) ? ended_early(maker, status.error(), done > 0) : status;
+  if (!moved) return ended_early(maker, moved.error(), done > 0, shared);
+  if (Status status = judge(plan, maker, sanity, shared, summary); !status) {
+    return cut_short(status) ? ended_early(maker, status.error(), done > 0, shared) : status;
   }
-  if (Status status = maker.finish(); !status) return ended_early(maker, status.error(), done > 0);
+  if (Status status = maker.finish(); !status) return ended_early(maker, status.error(), done > 0, shared);
   const Elapsed moved_in = moving.elapsed();
   summary.layer_seconds = moved_in.wall;
   summary.step_seconds = report.step_seconds;

@@ -1,4 +1,5 @@
 #include "pipeline/show/report.h"
+#include "pipeline/check/job_files.h"
 
 #include <fmt/format.h>
 #include <tbb/parallel_for.h>
@@ -169,6 +170,7 @@ Result<Report> make_report(const std::string& path, const ReportOptions& options
       cost.add(manifest.layers[i], manifest.layers[i].program.drops + manifest.layers[i].program.spat,
                std::llround(1e6 * seen->seconds[i]));
     seen->quote = cost.account().rows();
+    seen->sweeps = sweeps_of_job(folder.string(), manifest);
   }
   if (views.empty()) {
     auto built = build_up(*source, seen->window);

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "stages/coverage/edges.h"
+#include "stages/coverage/held_bound.h"
 #include "stages/coverage/meet/meetings.h"
 #include "stages/coverage/slab_index.h"
 #include "stages/geometry/blocks/block_maker.h"
@@ -21,6 +22,7 @@ struct CoveredMesh {
   std::shared_ptr<const MeshBlocks> blocks;
   SlabIndex index;
   Suspects suspects;
+  HeldBound held;
 };
 
 struct Copy {
@@ -93,6 +95,7 @@ struct Coverage::State {
       : grid(pixel_grid), x(pixel_grid.x), y(pixel_grid.y), rule(of_rows), isa(isa_at_most(widest)) {}
 
   std::uint32_t bands() const { return (grid.rows() + kBandRows - 1) / kBandRows; }
+  HeldBound::Count held_in(const Layer& layer) const;
   void gather(const Layer& layer, LayerScratch& scratch) const;
   void order_by_band(LayerScratch& scratch) const;
 };
@@ -122,7 +125,8 @@ Result<Coverage> Coverage::build(std::span<Mesh> meshes, std::span<const Instanc
     meshes[i].blocks = blocks[i];
     SlabIndex index(blocks[i]->bounds());
     Suspects suspects = find_suspects(*blocks[i], index, isa);
-    state.meshes.push_back({std::move(blocks[i]), std::move(index), std::move(suspects)});
+    HeldBound held(*blocks[i], suspects, grid, levels - 1);
+    state.meshes.push_back({std::move(blocks[i]), std::move(index), std::move(suspects), std::move(held)});
   }
   return coverage;
 }
@@ -130,6 +134,7 @@ Result<Coverage> Coverage::build(std::span<Mesh> meshes, std::span<const Instanc
 void Coverage::State::gather(const Layer& layer, LayerScratch& scratch) const {
   const std::int64_t bottom = layer.bottom, top = bottom + layer.thickness;
   scratch.facets.clear();
+  make_room(scratch.facets, held_in(layer).facets);
   SlabFacet taken;
   Cluster room;
   for (const Copy& copy : copies) {
@@ -157,6 +162,7 @@ void Coverage::State::order_by_band(LayerScratch& scratch) const {
   scratch.begins.assign(std::size_t{bands()} + 2, 0);
   for (const SlabFacet& facet : scratch.facets) ++scratch.begins[facet.last_row / kBandRows + 2];
   for (std::size_t r = 1; r < scratch.begins.size(); ++r) scratch.begins[r] += scratch.begins[r - 1];
+  make_room(scratch.order, scratch.facets.size());
   scratch.order.resize(scratch.facets.size());
   for (std::uint32_t i = 0; i < scratch.facets.size(); ++i)
     scratch.order[scratch.begins[scratch.facets[i].last_row / kBandRows + 1]++] = i;
@@ -198,16 +204,26 @@ LayerReport Coverage::layer(const Layer& layer, LayerScratch& scratch, Levels& o
   return report;
 }
 
-std::uint64_t Coverage::scratch_bytes_bound(const Layer& layer) const {
-  const State& state = *state_;
-  std::uint64_t facets = 0;
-  for (const Copy& copy : state.copies) {
+HeldBound::Count Coverage::State::held_in(const Layer& layer) const {
+  HeldBound::Count held;
+  for (const Copy& copy : copies) {
     const std::int64_t bottom = std::int64_t{layer.bottom} - copy.offset.z;
-    state.meshes[copy.mesh].index.each(bottom, bottom + layer.thickness, [&](std::uint32_t) { facets += kClusterSize; });
+    HeldBound::Count own = meshes[copy.mesh].held.at(bottom, bottom + layer.thickness);
+    if (copy.crowded || !copy.others.empty()) own.runs = own.voxels, own.edges = 2 * own.voxels;  // facets may meet others
+    held.facets += own.facets, held.voxels += own.voxels, held.runs += own.runs, held.edges += own.edges;
   }
-  // Buffers double as they grow. Samples of a row come on top where facets meet.
-  return 2 * facets * (sizeof(SlabFacet) + 2 * sizeof(std::uint32_t)) + 2 * BandMaker::bytes_of(facets, state.grid.columns()) +
-         sizeof(std::uint32_t) * (std::uint64_t{state.bands()} + 2);
+  return held;
+}
+
+LayerBound Coverage::bound(const Layer& layer) const {
+  const State& state = *state_;
+  const HeldBound::Count held = state.held_in(layer);
+  // Samples of a row come on top where facets meet.
+  const std::uint64_t columns = state.grid.columns(), rows = state.grid.rows(), facets = held.facets + held.facets / 8;
+  const std::uint64_t bytes = facets * (sizeof(SlabFacet) + sizeof(std::uint32_t)) +
+                              sizeof(std::uint32_t) * (std::uint64_t{state.bands()} + 2) +
+                              BandMaker::bytes_of(held.facets, state.grid.columns());
+  return {held.facets, std::min(held.voxels, columns * rows), std::min(held.runs, columns * rows), held.edges, bytes};
 }
 
 std::uint64_t Coverage::suspects() const {
@@ -221,7 +237,7 @@ std::uint64_t Coverage::suspects() const {
 std::uint64_t Coverage::index_bytes() const {
   std::uint64_t total = state_->x.bytes() + state_->y.bytes() + state_->copies.capacity() * sizeof(Copy);
   for (const Copy& copy : state_->copies) total += copy.others.capacity() * sizeof(Box);
-  for (const CoveredMesh& mesh : state_->meshes) total += mesh.index.bytes() + bytes_held(mesh.suspects);
+  for (const CoveredMesh& mesh : state_->meshes) total += mesh.index.bytes() + bytes_held(mesh.suspects) + mesh.held.bytes();
   return total;
 }
 

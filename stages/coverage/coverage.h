@@ -40,6 +40,15 @@ struct LayerReport {
   std::uint64_t scratch_bytes = 0;
 };
 
+/// What a layer has at most, before it is planned.
+struct LayerBound {
+  std::uint64_t facets = 0;
+  std::uint64_t voxels = 0;         // that hold facets, or end a stretch of full ones
+  std::uint64_t runs = 0;           // of its levels
+  std::uint64_t edges = 0;          // changes of the image of those of one level and more
+  std::uint64_t scratch_bytes = 0;  // its levels left out
+};
+
 /// Immutable once built; layers may be asked for from any number of threads.
 class Coverage {
  public:
@@ -59,8 +68,8 @@ class Coverage {
   /// cost  O(facets near the layer + voxels that hold facets), no matter how large the bed is; the same bytes on any thread
   LayerReport layer(const Layer& layer, LayerScratch& scratch, Levels& out) const;
 
-  /// Bytes of scratch that the layer may need at most, its levels left out: those depend on its surface.
-  std::uint64_t scratch_bytes_bound(const Layer& layer) const;
+  /// What the layer has at most. cost  O(copies)
+  LayerBound bound(const Layer& layer) const;
   /// Facets of all meshes that meet others, or whose front is not empty: voxels that hold them are sampled.
   std::uint64_t suspects() const;
   std::uint64_t index_bytes() const;

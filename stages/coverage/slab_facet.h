@@ -11,6 +11,14 @@
 
 namespace lamina::cover {
 
+/// Room for `count` elements, an eighth more than that at most; what was in it is lost.
+template <class T>
+void make_room(Buffer<T>& buffer, std::size_t count) {
+  if (count <= buffer.capacity()) return;
+  buffer = {};
+  buffer.reserve(count + count / 8);
+}
+
 /// How far computed corners may lie from where they are, nm, and more: those of facets of 4 m by 4 million roundings.
 inline constexpr double kRoom = 1.0 / 1024;
 

@@ -69,6 +69,15 @@ inline std::uint64_t sum_of_levels(const LevelsView& image) {
   return sum;
 }
 
+/// Pixels of a level, or of any above 0.
+inline std::uint64_t pixels_at(const LevelsView& image, std::uint8_t level = 0) {
+  std::uint64_t pixels = 0;
+  for (std::size_t i = 0; i < image.level.size(); ++i) {
+    if (level == 0 || image.level[i] == level) pixels += image.change[2 * i + 1] - image.change[2 * i];
+  }
+  return pixels;
+}
+
 /// The highest level of any pixel; 0 of an empty image.
 inline std::uint8_t highest(const LevelsView& image) {
   std::uint8_t most = 0;

@@ -73,7 +73,8 @@ void Budget::survey(std::vector<ZoneBox> boxes, std::uint32_t layers) {
   layers_ = layers;
 }
 
-void Budget::foresee(const Layer& layer) {
+void Budget::foresee(const Layer& layer, bool made) {
+  made_ = made;
   for (std::uint32_t zone = 0; zone < (wishes_ ? wishes_->zones() : 1); ++zone) {
     if (!stretches_.any(zone, layer)) continue;
     if (wishes_ && wishes_->of(layer, zone).has_formula()) {
@@ -95,10 +96,13 @@ void Budget::look_at(const Layer& layer, std::uint32_t zone, const LayerDose& do
   const Drops24 drops = core ? dose.core : dose.shell, asked_drops = core ? dose.asked_inside : dose.asked_shell;
   const double wish = static_cast<double>(asked_drops) / static_cast<double>(kOneDrop);
   most_drops_ = std::max(most_drops_, static_cast<std::uint32_t>((drops + kOneDrop - 1) >> kDropBits));
+  const bool unbound = gets < least_percent_ * (1 - 1e-6);
+  if (unbound) unbound_anywhere_.add(layer, asked, gets, wish, gets < unbound_anywhere_.gets);
+  if (!made_) return;
   gets_ = seen_ ? std::pair(std::min(gets_.first, gets), std::max(gets_.second, gets)) : std::pair(gets, gets);
   seen_ = true;
   if (asked_drops > Drops24{limit_} << kDropBits) cut.add(layer, asked, gets, wish, asked > cut.asked);
-  if (gets < least_percent_ * (1 - 1e-6)) unbound_.add(layer, asked, gets, wish, gets < unbound_.gets);
+  if (unbound) unbound_.add(layer, asked, gets, wish, gets < unbound_.gets);
   if (!wishes_) return;
   const std::size_t place = wishes_->place_of(layer, zone);
   if (drops == 0 && asked > 0) none_[{place, core}].add(layer, asked, gets, wish, false);
@@ -125,7 +129,7 @@ void Budget::look_at_field(const Layer& layer, std::uint32_t zone, bool core) {
     FieldSurvey* survey = survey_of(percent.formula, place, zone);
     if (survey != nullptr) range = survey->in(layer);
   }
-  no_number_ |= !range.each;
+  no_number_ |= made_ && !range.each;
   if (!range.any) return;  // where it meets a part it is told
   const DropScale scale(binder_, grid_, layer.thickness);
   const auto of = [&](double asked) {
@@ -138,7 +142,7 @@ void Budget::look_at_field(const Layer& layer, std::uint32_t zone, bool core) {
     return dose;
   };
   const LayerDose least = of(range.least);
-  if (least.gets < least_percent_ * (1 - 1e-6)) thin_.add(layer, least.asked, least.gets, 0, least.gets < thin_.gets);
+  if (made_ && least.gets < least_percent_ * (1 - 1e-6)) thin_.add(layer, least.asked, least.gets, 0, least.gets < thin_.gets);
   look_at(layer, zone, of(range.most), core, percent.formula.empty() ? cut_ : peaks_);
 }
 
@@ -175,12 +179,13 @@ Status Budget::judge(bool allow_unbound, std::vector<Warning>& warnings) const {
                                    "powder binds from {} % on (powder.least_saturation_percent)",
                                    where(thin_.where), thin_.gets, number_text(least_percent_))});
   }
-  if (unbound_.where.empty()) return {};
-  const std::string asked = has_wish() ? fmt::format(" where {} % is asked", number_text(unbound_.asked)) : "";
+  const DoseFault& unbound = allow_unbound ? unbound_ : unbound_anywhere_;
+  if (unbound.where.empty()) return {};
+  const std::string asked = has_wish() ? fmt::format(" where {} % is asked", number_text(unbound.asked)) : "";
   const std::string text = fmt::format(
       "{} get {}{:.1f} % of their voids filled{}, and the powder binds from {} % on "
       "(powder.least_saturation_percent)",
-      where(unbound_.where), unbound_.alike ? "" : "as little as ", unbound_.gets, asked, number_text(least_percent_));
+      where(unbound.where), unbound.alike ? "" : "as little as ", unbound.gets, asked, number_text(least_percent_));
   if (!allow_unbound) {
     return Error{Fault::kUsage, fmt::format("{}: {}; give {} saturation, or --allow-unbound",
                                             has_wish() ? "--saturation" : "dose", text, has_wish() ? "a higher" : "a")};

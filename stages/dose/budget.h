@@ -53,13 +53,14 @@ class Budget {
   void survey(std::vector<ZoneBox> boxes, std::uint32_t layers);
 
   /// Layers in their order. cost  that of dose_of(), once for equal layers; of formulas that of FieldSurvey
-  void foresee(const Layer& layer);
+  /// made  false: by another run of the same job, which tells what is to be told of it
+  void foresee(const Layer& layer, bool made = true);
 
   /// The most drops of any pixel in the layers so far.
   std::uint32_t most_drops() const { return most_drops_; }
 
   /// Warns of wishes that cannot be met, and of those that come to no drop.
-  /// errors  kUsage: layers get less than binds, and that is not allowed; a formula is none
+  /// errors  kUsage: layers get less than binds, whoever makes them, and that is not allowed; a formula is none
   Status judge(bool allow_unbound, std::vector<Warning>& warnings) const;
 
   const Binder& binder() const { return binder_; }
@@ -68,7 +69,7 @@ class Budget {
   bool has_wish() const { return wishes_.has_value(); }
   /// Whether somewhere in the boxes of parts a formula is no number of per cent, or gives less than binds.
   bool in_doubt(bool allow_unbound) const { return no_number_ || (!allow_unbound && !thin_.where.empty()); }
-  /// Least and most per cent that the layers get.
+  /// Least and most per cent that the layers get that are made.
   std::pair<double, double> gets() const { return gets_; }
 
  private:
@@ -86,10 +87,11 @@ class Budget {
   Jetting jetting_;
   Stretches stretches_;
   std::pair<double, double> gets_{0, 0};
-  bool seen_ = false;
+  bool seen_ = false, made_ = true;                         // made: the layer that is looked at
   std::map<std::pair<std::size_t, Nm>, LayerDose> known_;   // by place of the wish and thickness
   DoseFault peaks_;                                         // as cut_, of formulas in boxes of parts
   DoseFault cut_, unbound_, thin_;                          // thin: by places of a formula, of which none need be in a part
+  DoseFault unbound_anywhere_;                              // in layers of other runs, too
   std::map<std::pair<std::size_t, bool>, DoseFault> none_;  // wishes above 0 that come to no drop; by place, of the core
   std::map<std::uint32_t, bool> jetted_;                    // whether parts with a wish of their own get any; by zone
   std::vector<ZoneBox> boxes_;

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "stages/dose/blue_noise.h"
+
 namespace lamina::dose {
 
 std::uint64_t DropWork::bytes() const {
@@ -27,6 +29,31 @@ void share_out(std::uint8_t full, std::uint32_t columns, std::uint32_t rows, Dro
   std::vector<Levels*> parts;
   for (LaidPart& part : work.laid) parts.push_back(&part.shares);
   share_out(parts, full, work.shared, work.shares);
+}
+
+DropBound bound_of(const DropRules& rules, const DropSizes& sizes) {
+  const std::uint64_t most = std::max(1u, rules.most_drops), rows = sizes.rows;
+  // Of blue noise each pixel may differ from the one before it, by one drop: in one plane. Where it ends there is an edge.
+  const std::uint64_t parted = sizes.pixels == 0 ? 0 : sizes.edges + sizes.pixels;
+  DropBound bound{sizes.edges + parted + 2, most * sizes.edges + parted + 2, 0};
+  if (rules.full == 0 && rules.most_drops == 0) return bound;
+  const auto image = [&](std::uint64_t changes) { return 8 * changes + 4 * (rows + 1); };
+  const auto levels = [&](std::uint64_t runs) { return 18 * runs + 8 * (rows + 1); };
+  const std::uint64_t core = rules.shell.half_width.empty() ? 0 : sizes.edges;
+  const std::uint64_t runs = rules.full > 0 ? sizes.runs : sizes.edges / 2 + 1;
+  bound.bytes = levels(runs) + (core > 0 || sizes.zones ? levels(runs + core) : 0) + image(bound.changes + sizes.columns) +
+                16 * sizes.columns;
+  if (const std::uint64_t parts = sizes.parts; parts > 0) {
+    // Of each part its shares with and without its core, what others leave of it, and its voxels half full.
+    bound.bytes += 70 * runs + 18 * core * parts + 32 * parts * (rows + 1);
+    bound.bytes += 112 * std::min(sizes.columns, runs) + 36 * sizes.columns + sizeof(std::uint32_t) * kTilePixels;
+  }
+  if (most == 1 && sizes.parts == 0) return bound;
+  // A plane is made with room for all runs of a row.
+  const std::uint64_t planes = 8 * bound.changes_of_all + most * (4 * (rows + 1) + 16 * sizes.columns);
+  // Drops and planes of each material, and of those up to it.
+  bound.bytes += (levels(bound.changes) + planes) * (sizes.materials > 1 ? 2 + sizes.materials : 1);
+  return bound;
 }
 
 Difference take_half(std::uint8_t full, Runs& image, Runs& second, const DropWork& work) {
@@ -70,11 +97,12 @@ void dither_zones(const DropRules& rules, std::span<const Drops24> drops, std::u
 ZoneSums drops_of_layer(const DropRules& rules, const LayerDose& dose, std::uint32_t layer, Runs& image, Runs& second,
                         DropWork& work) {
   const std::uint8_t full = std::max<std::uint8_t>(1, rules.full);
-  if (rules.full == 0) levels_of(image, 1, work.shares);
-  if (dose.asked_shell == dose.asked_inside) {
-    std::swap(work.shares, work.zones);
-  } else {
+  const bool core = dose.asked_shell != dose.asked_inside;
+  if (rules.full == 0) levels_of(image, 1, core ? work.shares : work.zones);
+  if (core) {
     mark_shell(rules, image, full, second, work);
+  } else if (rules.full > 0) {
+    std::swap(work.shares, work.zones);
   }
   std::vector<Drops24> drops(std::size_t{2} * full + 1);
   drops_of_zones(dose, full, rules.dithered, drops);

@@ -56,12 +56,32 @@ struct DropRules {
 /// upon, the same again gives what all of them at once would.
 void share_out(std::uint8_t full, std::uint32_t columns, std::uint32_t rows, DropWork& work);
 
+/// What the images of a layer have at most, before it gets its drops.
+struct DropSizes {
+  std::uint64_t rows = 0, columns = 0;
+  std::uint64_t edges = 0;      // changes of the image, or of one of the voxels of some level and more
+  std::uint64_t runs = 0;       // of the shares of voxels of all parts, if there are any
+  std::uint64_t pixels = 0;     // that get drops which are not whole
+  bool zones = false;           // of several doses, or moved edges or axes
+  std::uint32_t parts = 0;      // in DropWork::laid
+  std::uint32_t materials = 1;  // whose drops are told apart
+};
+
+/// What it has at most with them; buffers double as they grow.
+struct DropBound {
+  std::uint64_t changes = 0;         // of the image, or runs of DropWork::levels
+  std::uint64_t changes_of_all = 0;  // of the planes together
+  std::uint64_t bytes = 0;           // of DropWork and the image
+};
+DropBound bound_of(const DropRules& rules, const DropSizes& sizes);
+
 /// Gives `image` the voxels of work.shares that are half full or more. second  scratch
 /// returns  where it was another one: pixels whose centres say something else than their voxels
 Difference take_half(std::uint8_t full, Runs& image, Runs& second, const DropWork& work);
 
 /// The drops of a layer in place of its image, which becomes that of the first drop. Of shares, the image is that of
-/// take_half() without its bleed, and the core is measured from its edge. second  scratch; work.shares is lost
+/// take_half() without its bleed, and the core is measured from its edge. second  scratch; work.shares is lost, and work.zones
+/// has what was dosed
 ZoneSums drops_of_layer(const DropRules& rules, const LayerDose& dose, std::uint32_t layer, Runs& image, Runs& second,
                         DropWork& work);
 

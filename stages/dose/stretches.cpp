@@ -51,33 +51,6 @@ void Stretches::unite(Spans& spans) {
   if (!spans.empty()) spans.resize(kept + 1);
 }
 
-Covered::Covered(std::span<const ZoneBox> boxes, const PixelGrid& grid) : bed_(std::uint64_t{grid.columns()} * grid.rows()) {
-  const auto across = [&](const ZoneBox& box, std::size_t axis) {
-    const PixelAxis& along = axis == 0 ? grid.x : grid.y;
-    const auto pixels =
-        static_cast<std::int64_t>(static_cast<double>(box.high[axis] - box.low[axis]) * along.pixels_per_nm()) + 2;
-    return static_cast<std::uint64_t>(std::clamp<std::int64_t>(pixels, 0, along.count));
-  };
-  for (const ZoneBox& box : boxes) {
-    const std::uint64_t pixels = across(box, 0) * across(box, 1);
-    begin_.push_back({box.low[2], pixels});
-    end_.push_back({box.high[2], pixels});
-  }
-  for (std::vector<Step>* steps : {&begin_, &end_}) {
-    std::ranges::sort(*steps, {}, &Step::at);
-    for (std::size_t i = 1; i < steps->size(); ++i) (*steps)[i].pixels += (*steps)[i - 1].pixels;
-  }
-}
-
-std::uint64_t Covered::below(const std::vector<Step>& steps, std::int64_t at) {
-  const auto after = std::ranges::lower_bound(steps, at, {}, &Step::at);
-  return after == steps.begin() ? 0 : (after - 1)->pixels;
-}
-
-std::uint64_t Covered::pixels(std::int64_t bottom, std::int64_t top) const {
-  return std::min(bed_, below(begin_, top + 1) - below(end_, bottom));
-}
-
 bool Stretches::meets(const Spans& spans, const Layer& layer) {
   const auto above =
       std::ranges::upper_bound(spans, std::int64_t{layer.bottom}, {}, &Span::to);  // ends above the layer's bottom

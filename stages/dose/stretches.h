@@ -42,23 +42,4 @@ class Stretches {
   std::vector<Spans> all_, core_;  // by zone
 };
 
-/// How many pixels of a layer boxes cover at most.
-class Covered {
- public:
-  Covered() = default;
-  Covered(std::span<const ZoneBox> boxes, const PixelGrid& grid);
-  /// Of the boxes that a layer meets, each by itself; at most the bed. cost  O(log boxes)
-  std::uint64_t pixels(std::int64_t bottom, std::int64_t top) const;
-
- private:
-  struct Step {
-    std::int64_t at = 0;
-    std::uint64_t pixels = 0;  // of all boxes that begin, or end, there or below
-  };
-  static std::uint64_t below(const std::vector<Step>& steps, std::int64_t at);
-
-  std::vector<Step> begin_, end_;
-  std::uint64_t bed_ = 0;
-};
-
 }  // namespace lamina::dose

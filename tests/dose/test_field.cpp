@@ -305,20 +305,6 @@ TEST(ShareOut, NoVoxelIsFilledTwice) {
   }
 }
 
-TEST(Covered, CountsTheBoxesThatALayerMeets) {
-  const std::array boxes{ZoneBox{0, {1'000'000, 1'000'000, 0}, {3'000'000, 4'000'000, 300'000}},
-                         ZoneBox{1, {9'000'000, 1'000'000, 200'000}, {11'000'000, 4'000'000, 900'000}}};
-  const Covered covered(boxes, kBed);
-  const std::uint64_t one = 22 * 32;  // 20 by 30 pixels, and those that its sides cut
-  EXPECT_EQ(covered.pixels(0, 100'000), one);
-  EXPECT_EQ(covered.pixels(200'000, 300'000), 2 * one);
-  EXPECT_EQ(covered.pixels(400'000, 500'000), one);
-  EXPECT_EQ(covered.pixels(1'000'000, 1'100'000), 0u);
-  const std::array bed(std::to_array(
-      {ZoneBox{0, {0, 0, 0}, {20'000'000, 20'000'000, 100'000}}, ZoneBox{0, {0, 0, 0}, {20'000'000, 20'000'000, 100'000}}}));
-  EXPECT_EQ(Covered(bed, kBed).pixels(0, 50'000), 40'000u);
-}
-
 TEST(Budget, ForeseesFormulasInTheBoxesOfParts) {
   const ZoneBox box{0, {2'000'000, 2'000'000, 0}, {6'000'000, 3'000'000, 400'000}, {2'000'000, 2'000'000, 0}};
   std::vector<Warning> warnings;

@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include "pipeline/check/job_files.h"
 #include "pipeline/cli/command.h"
 #include "pipeline/output/merge.h"
 #include "pipeline/run/summary.h"
@@ -42,13 +43,17 @@ Outcome run_merge(const Arguments& arguments, Context& context) {
     context.say(fmt::format("{}: {} layers of {} shards joined, {} files linked, {} copied", report->output,
                             readable_count(report->layers), report->shards, report->linked, report->copied));
   }
+  const auto whole = read_manifest(report->output + "/manifest.json");
+  const std::string sweeps = whole ? sweeps_of_job(report->output, *whole) : std::string();
   if (!arguments.has("--quiet")) {
+    if (!sweeps.empty()) context.say("sweeps: " + sweeps);
     for (const Warning& warning : report->warnings) context.say("warning: " + one_line(warning.text));
   }
   if (!arguments.has("--json")) return {};
   Json told = {{"command", "merge"},       {"directory", report->output}, {"shards", report->shards},
                {"layers", report->layers}, {"linked", report->linked},    {"copied", report->copied}};
   if (report->microseconds > 0) told["print_seconds"] = 1e-6 * static_cast<double>(report->microseconds);
+  if (!sweeps.empty()) told["sweeps"] = sweeps;
   told["warnings"] = warnings_json(report->warnings);
   return context.give(told);
 }

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <optional>
 #include <span>
 
 #include "pipeline/calibrate/laid_look.h"
@@ -16,6 +17,7 @@
 #include "pipeline/machine/profiles.h"
 #include "pipeline/run/run_resolved.h"
 #include "stages/data/text/json.h"
+#include "stages/write/file.h"
 #include "stages/write/levels/level_format.h"
 
 namespace lamina::pipeline {
@@ -102,17 +104,30 @@ Outcome plan(const PlanCommand& row, const Arguments& arguments, Context& contex
     if (Status status = check_machine_needs(resolved->extruder->machine, arguments); !status) return status;
     if (arguments.has("--job")) left = notes_on_defaults(arguments.text("--job"), resolved->job);
   }
+  std::optional<write::File> file;  // takes its name once the job is planned
   if (arguments.has("--save-job")) {
     Job saved = resolved->job;
     if (saved.bed_mm || saved.machine.profile.empty()) saved.bed_mm = resolved->bed.size_mm;
-    if (Status status = save_job(arguments.text("--save-job"), saved, kNames[static_cast<int>(row.product)]); !status)
-      return status.error();
+    auto begun = write_job(arguments.text("--save-job"), saved, true, kNames[static_cast<int>(row.product)]);
+    if (!begun) return begun.error();
+    file.emplace(std::move(*begun));
   }
+  Status kept;
+  const auto keep_job = [&] {
+    if (!file) return;
+    if (auto done = file->finish(); !done) kept = done.error();
+    file.reset();
+  };
   const bool tells_pores =
       row.product == Product::kMoves && resolved->job.segment.any() && !job->dry_run && (!job->quiet || job->json);
-  const auto progress = [&](const ProgressEvent& event) { context.progress(event); };
+  const auto progress = [&](const ProgressEvent& event) {
+    if (event.stage == ProgressEvent::Stage::kLayers) keep_job();
+    context.progress(event);
+  };
   Result<Summary> summary = run(std::move(*resolved), progress, context.cancel());
   if (!summary) return summary.error();
+  keep_job();
+  if (!kept) return kept.error();
   if (tells_pores) add_pores(summary->output, *summary);
   if (Status status = write_quote(arguments, summary->quote); !status) return status.error();
   if (!job->quiet) {

@@ -4,11 +4,19 @@
 #include "stages/coverage/edges.h"
 
 namespace lamina::cover {
+namespace {
+
+/// A facet's piece in the layer has five corners at most, and one trapezoid less.
+constexpr std::uint64_t kMostPieces = 4;
+constexpr std::size_t kMoreRoom = 64;
+
+}  // namespace
 
 std::uint64_t BandMaker::bytes_of(std::uint64_t facets, std::uint32_t columns) {
-  // A facet has five corners at most, so four trapezoids.
-  return 4 * facets * (sizeof(Trapezoid) + sizeof(Reach)) + facets * sizeof(RowFacet) +
-         std::uint64_t{columns} * (2 * kBandRows * sizeof(double) + sizeof(std::uint32_t) + 2 + 2 * kBandRows / 8);
+  // Rows list facets where doubles do not decide, and double their room.
+  const std::uint64_t pieces = kMostPieces * facets, room = pieces + pieces / 8 + 2 * kMoreRoom;
+  return room * (sizeof(Trapezoid) + sizeof(Reach)) + 2 * pieces * sizeof(RowFacet) +
+         (std::uint64_t{columns} + 64) * (2 * kBandRows * sizeof(double) + sizeof(std::uint32_t) + 2 + 2 * kBandRows / 8);
 }
 
 void BandMaker::start(const Slab& slab, Isa isa) {
@@ -20,12 +28,14 @@ void BandMaker::start(const Slab& slab, Isa isa) {
 }
 
 void BandMaker::enter(const SlabFacet& facet, std::uint32_t index, const Edges& rows) {
+  if (active_.size() + kMostPieces > active_.capacity()) active_.reserve(active_.size() + active_.size() / 8 + kMoreRoom);
   cut_trapezoids(facet, index, rows, active_);
 }
 
 /// All that reaches the band goes into its cells.
 void BandMaker::lay(const Slab& slab, BandSums& sums) {
   sums = {};
+  make_room(reach_, active_.size());
   reach_.resize(active_.size());
   const std::uint32_t last = rows_.first + rows_.count - 1;
   for (std::size_t i = 0; i < active_.size(); ++i) {

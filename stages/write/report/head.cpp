@@ -74,6 +74,7 @@ std::string head_json(const Manifest& manifest, const ManifestSeen& file, const 
                {"stride", held.stride()},
                {"job", head.job_toml},
                {"manifest", {{"name", file.name}, {"bytes", file.digest.bytes}, {"hash", hex(file.digest.hash)}}},
+               {"sweeps", seen.sweeps},
                {"laid", seen.laid},
                {"laid_svg", base64(std::as_bytes(std::span(seen.laid_svg)))},
                {"quote", seen.quote},

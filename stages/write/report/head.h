@@ -41,6 +41,7 @@ struct LayersSeen {
   std::vector<double> seconds;     // of each, with a machine
   std::vector<Warning> warnings;
   std::vector<SeenPlace> places;
+  std::string sweeps;                           // what drops of a pixel take of a head that fires several
   std::string laid;                             // lines on what toolpaths leave open
   std::string laid_svg;                         // a picture of it; "" for none
   std::vector<std::vector<std::string>> quote;  // rows of a table of costs; empty for none

@@ -253,7 +253,7 @@ function fillTexts() {
   $('title').textContent = head.title;
   $('facts').textContent = `${head.layer_count.toLocaleString('en')} layers, ` + (head.images ?
     `${head.columns} × ${head.rows} pixels of ${+head.dpi[0].toFixed(3)} × ${+head.dpi[1].toFixed(3)} dpi, ` :
-    `drawn in pixels of ${Math.round(head.pixel_mm[0] * 1000)} µm, `) + head.format + (head.machine ? `, ${head.machine}, about ${duration(layers.seconds.reduce((a, b) => a + b, 0))}` : '');
+    `drawn in pixels of ${Math.round(head.pixel_mm[0] * 1000)} µm, `) + head.format + (head.machine ? `, ${head.machine}, about ${duration(layers.seconds.reduce((a, b) => a + b, 0))}` : '') + (head.sweeps ? `; sweeps: ${head.sweeps}` : '');
   if (head.stride > 1) $('note').textContent = `To keep this page small, every ${head.stride}th layer can be looked at.`;
   const warnings = $('warnings'), warn = (text, layer) => {
     const line = element('li', layer === undefined ? text : undefined, warnings);

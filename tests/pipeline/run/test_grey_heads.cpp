@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <filesystem>
+#include <fstream>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
@@ -192,6 +193,23 @@ TEST_F(GreyHeads, AreTheShippedOneToo) {
   EXPECT_NE(checked.out.find("all 3 of a pixel in one sweep at that speed, as 2 bits"), std::string::npos) << checked.out;
   done("jet box.stl --machine jet1000-grey --layer 0.1 --saturation 60 -o out --quiet");
   done("verify out --quiet");
+}
+
+// What jet tells of all layers, merge and report tell from the manifests.
+TEST_F(GreyHeads, TellTheSweepsThatAreAddedAfterAMergeToo) {
+  const test::Outcome whole = lamina(kBox + std::string("-o whole"));
+  ASSERT_EQ(whole.code, 0) << whole.err;
+  const std::size_t from = whole.err.find("; that adds ");
+  ASSERT_NE(from, std::string::npos) << whole.err;
+  const std::string added = whole.err.substr(from, whole.err.find('\n', from) - from);
+  for (const char* shard : {"1/2", "2/2"}) done(kBox + std::string("--quiet -o parts --shard ") + shard);
+  const test::Outcome merged = lamina("merge parts -o parts");
+  EXPECT_EQ(merged.code, 0) << merged.err;
+  EXPECT_NE(merged.err.find(added), std::string::npos) << merged.err;
+  done("report parts -o page.html --quiet");
+  std::ifstream page(folder_ / "page.html");
+  const std::string text{std::istreambuf_iterator<char>(page), {}};
+  EXPECT_NE(text.find(added), std::string::npos);
 }
 
 }  // namespace
