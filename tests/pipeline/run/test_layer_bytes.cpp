@@ -63,7 +63,8 @@ TakenBytes expect_layers_take_no_more(const std::vector<std::string>& parts, con
 
 constexpr const char* kCrown = "dental_crown.stl";
 constexpr const char* kNut = "parameter_quality_nut.stl";
-const std::string kHead = "machine.profile=jet1000", kGreyHead = "machine.profile=jet1000-grey", kBed = "bed.size_mm=[60,60]";
+const std::string kOneDropHead = "machine.profile=jet1000", kGreyHead = "machine.profile=jet1000-grey",
+                  kBed = "bed.size_mm=[60,60]";
 
 TEST(LayerBytes, OfLevelsAreAtMostWhatIsToldAndAQuarterOfItAtLeast) {
   TakenBytes all;
@@ -75,7 +76,7 @@ TEST(LayerBytes, OfLevelsAreAtMostWhatIsToldAndAQuarterOfItAtLeast) {
       expect_layers_take_no_more({part}, {kBed, "bed.dpi=300", levels, "dose.dithered=false"});
       expect_layers_take_no_more({part}, {kBed, "bed.dpi=300", levels, "image.format=tiff-8"});
       expect_layers_take_no_more({part}, {kBed, "bed.dpi=300", levels, "image.mirror=xy", "dose.bleed_um=[150,100]"});
-      expect_layers_take_no_more({part}, {kHead, levels, "dose.saturation_percent=170"});
+      expect_layers_take_no_more({part}, {kOneDropHead, levels, "dose.saturation_percent=170"});
       expect_layers_take_no_more({part}, {kGreyHead, levels, "dose.dithered=false"});
     }
   }
@@ -88,18 +89,18 @@ TEST(LayerBytes, OfDropsAreAtMostWhatIsToldAndAQuarterOfItAtLeast) {
   for (const char* part : {kCrown, kNut, "quad_knot.obj"}) {
     for (const char* drops :
          {"dose.saturation_percent=40", "dose.saturation_percent=350", "dose.saturation_percent=40+x", "dose.core=0.4"}) {
-      const TakenBytes plain = expect_layers_take_no_more({part}, {kHead, drops});
+      const TakenBytes plain = expect_layers_take_no_more({part}, {kOneDropHead, drops});
       all.told += plain.told, all.used += plain.used;
-      expect_layers_take_no_more({part}, {kHead, drops, "dose.bleed_um=[100,100]", "image.mirror=x"});
-      expect_layers_take_no_more({part}, {kHead, drops, "dose.bleed_um=[-100,-50]"});
-      expect_layers_take_no_more({part}, {kHead, drops, "heights.containment=inside"});
+      expect_layers_take_no_more({part}, {kOneDropHead, drops, "dose.bleed_um=[100,100]", "image.mirror=x"});
+      expect_layers_take_no_more({part}, {kOneDropHead, drops, "dose.bleed_um=[-100,-50]"});
+      expect_layers_take_no_more({part}, {kOneDropHead, drops, "heights.containment=inside"});
       expect_layers_take_no_more({part}, {kGreyHead, drops, "run.engine=both"});
       if (std::string(drops).find("core") != std::string::npos) continue;
-      expect_layers_take_no_more({part}, {kHead, drops, "dose.core_saturation_percent=30", "dose.shell_mm=0.5"});
-      expect_layers_take_no_more({part}, {kHead, drops, "dose.dithered=false"});
+      expect_layers_take_no_more({part}, {kOneDropHead, drops, "dose.core_saturation_percent=30", "dose.shell_mm=0.5"});
+      expect_layers_take_no_more({part}, {kOneDropHead, drops, "dose.dithered=false"});
       // A second part of another dose; with levels they share voxels.
-      expect_layers_take_no_more({part, kCrown}, {kHead, drops, "part.saturation_percent=123"});
-      expect_layers_take_no_more({part, kCrown}, {kHead, drops, "part.saturation_percent=123", "dose.levels=4"});
+      expect_layers_take_no_more({part, kCrown}, {kOneDropHead, drops, "part.saturation_percent=123"});
+      expect_layers_take_no_more({part, kCrown}, {kOneDropHead, drops, "part.saturation_percent=123", "dose.levels=4"});
     }
   }
   EXPECT_LT(all.told, 5 * all.used);
