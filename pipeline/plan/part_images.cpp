@@ -44,8 +44,10 @@ Result<std::array<std::int64_t, 2>> dots_of(const PartRequest& part, const read:
       return usage(fmt::format("{}: {:g} x {:g} dpi, the job has {:g} x {:g}; give the same --dpi, or part.resample = true",
                                one_line(part.path), dpi[0], dpi[1], grid.x.dpi(), grid.y.dpi()));
     } else if (axes[a]->span != kNmPerInch || dpi[a] < 1 || dpi[a] > 25'400) {
-      return usage(fmt::format("{}: {:g} dpi cannot be resampled to {:g}; plan the images at the machine's",
-                               one_line(part.path), dpi[a], axes[a]->dpi()));
+      return usage(
+          fmt::format("{}: {:g} dpi cannot be resampled to the job's {:g} x {:g}, which are not whole; plan the images at "
+                      "the machine's",
+                      one_line(part.path), dpi[a], grid.x.dpi(), grid.y.dpi()));
     } else {
       dots[a] = std::llround(dpi[a]);
     }

@@ -37,7 +37,7 @@ void add_costs(const Summary& s, std::vector<Line>& lines) {
                                          readable_seconds(s.load_seconds + s.index_seconds + s.layer_seconds),
                                          readable_seconds(s.load_seconds), readable_seconds(s.index_seconds),
                                          readable_seconds(s.layer_seconds), steps));
-  lines.emplace_back("memory", fmt::format("{} at most (mesh {}, index {}, layers in flight up to {} of {}, {} at once)",
+  lines.emplace_back("memory", fmt::format("{} at most (mesh {}, index {}; room kept for layers {} of {}, {} at once)",
                                            readable_bytes(s.peak_resident_bytes), readable_bytes(s.mesh_bytes),
                                            readable_bytes(s.index_bytes), readable_bytes(s.peak_layer_bytes),
                                            readable_bytes(s.memory_budget_bytes), s.most_layers_in_flight));

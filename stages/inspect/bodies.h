@@ -30,6 +30,9 @@ struct PixelBox {
     top = std::min(top, other.top);
     bottom = std::max(bottom, other.bottom);
   }
+  PixelBox common(const PixelBox& other) const {
+    return {std::max(left, other.left), std::min(right, other.right), std::max(top, other.top), std::min(bottom, other.bottom)};
+  }
   bool meets(const PixelBox& other) const {
     return left < other.right && other.left < right && top < other.bottom && other.top < bottom;
   }

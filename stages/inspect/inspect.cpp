@@ -41,7 +41,7 @@ struct Inspection::Solids {
   }
   void join(const Body& stays, const Body& ends, const Body& piece) {
     if (stays.owner == Body::kNone || ends.owner == Body::kNone || stays.owner == ends.owner) return;
-    all.note_touching(stays.owner, ends.owner, all.spot(piece.box, all.layer_.index, all.layer_.bottom));
+    all.note_touching(stays.owner, ends.owner, piece.box, all.layer_);
   }
   void end(const Body& body) {
     if (body.open) return;
@@ -171,22 +171,33 @@ std::uint32_t Inspection::owner_of(const Body& body, std::int64_t from, std::int
 /// The first of the copies that begin together as one piece, wider than the box of any; kNone if it is none of them.
 std::uint32_t Inspection::first_of_several(const Body& body) {
   std::uint32_t first = Body::kNone;
+  const auto begins = [&](std::uint32_t s) { return stands_[s].box.lo.z >= below_ && window_[s].meets(body.box); };
   for (std::uint32_t s = 0; s < stands_.size() && stands_[s].box.lo.z < body.top; ++s) {
-    if (stands_[s].box.lo.z < below_ || !window_[s].meets(body.box)) continue;
-    if (first != Body::kNone) {
-      note_touching(first, s, spot(body.box, body.first_layer, body.bottom));
-    } else {
+    if (!begins(s)) continue;
+    if (first == Body::kNone) {
       first = s;
+      continue;
     }
+    // The one beside it, of those before it.
+    std::uint32_t beside = first;
+    for (std::uint32_t before = first; before < s; ++before) {
+      if (begins(before) && window_[before].meets(window_[s])) beside = before;
+    }
+    note_touching(beside, s, body.box, layer_);
   }
   return first;
 }
 
-void Inspection::note_touching(std::uint32_t a, std::uint32_t b, const Spot& at) {
+/// within  where they are one piece: the place is where their own boxes meet in it
+void Inspection::note_touching(std::uint32_t a, std::uint32_t b, const PixelBox& within, const Layer& layer) {
+  PixelBox box = within;
+  for (const PixelBox& window : {window_[a], window_[b]}) {
+    if (window.meets(box)) box = box.common(window);
+  }
   const std::uint32_t part = std::min(stands_[a].part, stands_[b].part), other = std::max(stands_[a].part, stands_[b].part);
   auto& noted = findings_.touching;
   const bool known = std::ranges::any_of(noted, [&](const auto& pair) { return pair.part == part && pair.other == other; });
-  if (!known && noted.size() < Findings::kMost) noted.push_back({part, other, at});
+  if (!known && noted.size() < Findings::kMost) noted.push_back({part, other, spot(box, layer.index, layer.bottom)});
 }
 
 /// Bodies that have left the box of the copy that they began with: they have grown into another one.
@@ -200,7 +211,7 @@ void Inspection::note_outgrown(const Layer& layer) {
           box.hi.z <= layer.bottom) {
         continue;
       }
-      note_touching(body.owner, other, spot(body.box, layer.index, layer.bottom));
+      note_touching(body.owner, other, body.box, layer);
       break;
     }
     body.owner = Body::kNone;

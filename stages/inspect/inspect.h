@@ -110,7 +110,7 @@ class Inspection {
   bool stands_in(std::uint32_t stand, const Body& body) const;
   std::uint32_t owner_of(const Body& body, std::int64_t from, std::int64_t to) const;
   std::uint32_t first_of_several(const Body& body);
-  void note_touching(std::uint32_t a, std::uint32_t b, const Spot& at);
+  void note_touching(std::uint32_t a, std::uint32_t b, const PixelBox& within, const Layer& layer);
   void note_outgrown(const Layer& layer);
   void note_edges(const Layer& layer, const RunsView& image);
 

@@ -240,6 +240,9 @@ TEST_F(InspectedJobs, PartsThatGrowTogetherAreNamed) {
   EXPECT_EQ(codes(job(10, 10, 2)), std::set<std::string>{"touching"});  // within each other
   EXPECT_EQ(codes(job(5, 5, 5)), std::set<std::string>{"touching"});    // one upon the other
   EXPECT_EQ(codes(job(5, 5, 5.2)), std::set<std::string>{});            // powder between them
+  const auto beside = job(15, 8, 0)["inspection"]["touching"][0]["at"];
+  EXPECT_NEAR(beside["x_mm"].get<double>(), 15, 0.2) << beside.dump();
+  EXPECT_NEAR(beside["y_mm"].get<double>(), 11.5, 0.2) << "from 8 to 15";
   const auto summary = job(5, 5, 5);
   EXPECT_EQ(summary["inspection"]["touching"].size(), 1u);
   EXPECT_EQ(summary["inspection"]["touching"][0]["at"]["layer"], 50);
