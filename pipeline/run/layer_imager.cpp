@@ -4,8 +4,8 @@
 #include <algorithm>
 
 #include "pipeline/run/image_maker.h"
+#include "stages/geometry/combine.h"
 #include "stages/program/reach.h"
-#include "stages/raster/combine.h"
 #include "stages/raster/mirror.h"
 #include "stages/read/placed.h"
 
@@ -105,7 +105,7 @@ Status LayerImager::images(const Layer& layer, ImageWork& work, ImageNotes& note
       continue;
     }
     if (const std::uint8_t full = images.dose.full(); full > 0) {
-      raster::larger(work.drops.shares, work.drops.zones, work.drops.levels);
+      larger(work.drops.shares, work.drops.zones, work.drops.levels);
       std::swap(work.drops.shares, work.drops.levels);
       at_least(work.drops.zones, dose::half_of(full), work.section);
     }
@@ -118,7 +118,7 @@ Status LayerImager::images(const Layer& layer, ImageWork& work, ImageNotes& note
     } else if (work.runs.change.empty()) {
       std::swap(work.runs, work.section);
     } else {
-      raster::combine(work.runs, work.section, raster::SetOperation::kUnion, work.second);
+      combine(work.runs, work.section, SetOperation::kUnion, work.second);
       std::swap(work.runs, work.second);
     }
   }
@@ -201,8 +201,7 @@ raster::LayerReport LayerImager::section(const Solid& solid, raster::Engine engi
   const raster::LayerReport low = rasterizer.layer(engine, layer.lowest_plane(), work.scratch, work.lowest);
   const raster::LayerReport high = rasterizer.layer(engine, layer.highest_plane(), work.scratch, work.highest);
   const bool inside = containment == Containment::kInside;
-  raster::combine(work.lowest, work.highest, inside ? raster::SetOperation::kIntersection : raster::SetOperation::kUnion,
-                  image);
+  combine(work.lowest, work.highest, inside ? SetOperation::kIntersection : SetOperation::kUnion, image);
   return low.open_rows + low.capped_rows >= high.open_rows + high.capped_rows ? low : high;
 }
 

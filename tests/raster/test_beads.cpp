@@ -2,8 +2,8 @@
 
 #include <random>
 
+#include "stages/geometry/combine.h"
 #include "stages/raster/beads.h"
-#include "stages/raster/combine.h"
 
 namespace lamina::raster {
 namespace {

@@ -1,8 +1,8 @@
-#include "stages/raster/combine.h"
+#include "stages/geometry/combine.h"
 
 #include <algorithm>
 
-namespace lamina::raster {
+namespace lamina {
 
 void combine(const RunsView& a, const RunsView& b, SetOperation operation, Runs& out) {
   out.columns = a.columns;
@@ -76,4 +76,4 @@ void larger(const LevelsView& a, const LevelsView& b, Levels& out) {
   }
 }
 
-}  // namespace lamina::raster
+}  // namespace lamina

@@ -1,4 +1,4 @@
-// stages/raster/combine.h: two images of the same bed become one, as runs.
+// stages/geometry/combine.h: two images of the same bed become one, as runs.
 #pragma once
 
 #include <cstdint>
@@ -6,7 +6,7 @@
 #include "stages/data/levels.h"
 #include "stages/data/runs.h"
 
-namespace lamina::raster {
+namespace lamina {
 
 /// Set in one of them or both; in both; in the first but not in the second.
 enum class SetOperation : std::uint8_t { kUnion, kIntersection, kDifference };
@@ -20,4 +20,4 @@ void append_combined(const RunsView& a, const RunsView& b, SetOperation operatio
 /// The larger level of each pixel; both of the same size; `out` is neither. cost  O(runs + rows)
 void larger(const LevelsView& a, const LevelsView& b, Levels& out);
 
-}  // namespace lamina::raster
+}  // namespace lamina
