@@ -59,21 +59,31 @@ struct Ahead {
   }
 };
 
-}  // namespace
-
-void larger(const LevelsView& a, const LevelsView& b, Levels& out) {
+/// level  of a pixel, by its level in a and in b
+template <class Level>
+void join(const LevelsView& a, const LevelsView& b, Levels& out, Level level) {
   out.start(a.columns);
   for (std::uint32_t r = 0; r < a.rows(); ++r) {
     Ahead first(a, r), second(b, r);
     for (std::uint32_t column = 0; first.any() || second.any();) {
       const std::uint32_t next = std::min(first.next(column), second.next(column));
-      out.append(column, next, std::max(first.level_at(column), second.level_at(column)));
+      out.append(column, next, level(first.level_at(column), second.level_at(column)));
       first.leave(next);
       second.leave(next);
       column = next;
     }
     out.end_row();
   }
+}
+
+}  // namespace
+
+void larger(const LevelsView& a, const LevelsView& b, Levels& out) {
+  join(a, b, out, [](std::uint8_t one, std::uint8_t other) { return std::max(one, other); });
+}
+
+void add_levels(const LevelsView& a, const LevelsView& b, Levels& out) {
+  join(a, b, out, [](int one, int other) { return static_cast<std::uint8_t>(std::min(one + other, 255)); });
 }
 
 }  // namespace lamina

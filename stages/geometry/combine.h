@@ -20,4 +20,7 @@ void append_combined(const RunsView& a, const RunsView& b, SetOperation operatio
 /// The larger level of each pixel; both of the same size; `out` is neither. cost  O(runs + rows)
 void larger(const LevelsView& a, const LevelsView& b, Levels& out);
 
+/// The sum of both levels of each pixel, at most 255; the same of both.
+void add_levels(const LevelsView& a, const LevelsView& b, Levels& out);
+
 }  // namespace lamina
