@@ -14,28 +14,12 @@ namespace {
 
 /// The first difference between two engines.
 Error disagreement(const Layer& layer, const PixelGrid& grid, const RunsView& rays, const RunsView& contours) {
-  std::uint32_t row = 0;
-  while (row + 1 < rays.rows() && std::ranges::equal(rays.row(row), contours.row(row))) ++row;
-  const auto a = rays.row(row), b = contours.row(row);
-  const auto place = static_cast<std::size_t>(std::ranges::mismatch(a, b).in1 - a.begin());
-  const std::uint32_t column = std::min(place < a.size() ? a[place] : rays.columns, place < b.size() ? b[place] : rays.columns);
+  const auto [column, row] = first_difference(rays, contours);
   return {Fault::kVerification,
           fmt::format("layer {}: engines disagree first in image row {}, column {} (x {:.4f} mm, y {:.4f} mm, z {:.4f} "
                       "mm); this is a fault of lamina, please report it with the part",
                       layer.index, row, column, mm(grid.x.centre(column)), mm(grid.y.centre(grid.rows() - 1 - row)),
                       mm(layer.plane()))};
-}
-
-/// Sums over a layer's solids; places come from the first solid that has any.
-void add(const raster::LayerReport& solid, raster::LayerReport& all) {
-  if (all.capped_rows == 0) {
-    all.first_capped_row = solid.first_capped_row;
-    all.first_capped_instance = solid.first_capped_instance;
-  }
-  if (all.open_rows == 0) all.first_open_row = solid.first_open_row;
-  all.crossings += solid.crossings;
-  all.capped_rows += solid.capped_rows;
-  all.open_rows += solid.open_rows;
 }
 
 }  // namespace
@@ -183,7 +167,7 @@ Status LayerImager::section_of(const Solid& solid, const Layer& layer, ImageWork
     report.first_capped_instance = solid.instance[report.first_capped_instance];
   }
   record.capped_rows += report.capped_rows;
-  add(report, notes.report);
+  notes.report.add_solid(report);
   return {};
 }
 

@@ -36,6 +36,14 @@ void append_combined(const RunsView& a, const RunsView& b, SetOperation operatio
   out.change.resize(static_cast<std::size_t>(next - out.change.data()));
 }
 
+std::array<std::uint32_t, 2> first_difference(const RunsView& a, const RunsView& b) {
+  std::uint32_t r = 0;
+  while (r + 1 < a.rows() && std::ranges::equal(a.row(r), b.row(r))) ++r;
+  const auto first = a.row(r), second = b.row(r);
+  const auto place = static_cast<std::size_t>(std::ranges::mismatch(first, second).in1 - first.begin());
+  return {std::min(place < first.size() ? first[place] : a.columns, place < second.size() ? second[place] : a.columns), r};
+}
+
 namespace {
 
 /// The runs of a row that are not yet behind.
