@@ -16,7 +16,7 @@
 #include "stages/data/runs.h"
 #include "stages/data/status.h"
 #include "stages/dose/budget.h"
-#include "stages/dose/erode.h"
+#include "stages/dose/edges/erode.h"
 #include "stages/dose/layer_drops.h"
 #include "stages/dose/wish.h"
 #include "stages/dose/zones.h"
@@ -51,7 +51,7 @@ class DosePlan {
 
   /// What parts get; the bleed of layers.
   const DoseZones& zones() const { return zones_; }
-  bool bleeds() const { return zones_.bleeds(); }
+  bool bleeds() const { return zones_.bleeds().any(); }
 
   /// Thins the core of an image without bleed. `second` and `third` are scratch.
   void thin(std::uint32_t layer, Runs& image, Runs& second, Runs& third) const;
@@ -66,7 +66,7 @@ class DosePlan {
 
   /// Upper bound of the changes of edges that moved.
   std::uint64_t edges_bound(std::uint64_t changes) const {
-    return zones_.grows() ? changes * (2 * std::uint64_t{zones_.most_rows()} + 1) : changes;
+    return zones_.bleeds().grows() ? changes * (2 * std::uint64_t{zones_.bleeds().most_rows()} + 1) : changes;
   }
   /// Of pixels or voxels of a layer those that blue noise may part from the one before them, at most; none of many jobs.
   bool parts_pixels() const {

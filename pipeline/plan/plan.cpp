@@ -250,7 +250,7 @@ class Planner {
                       "choose nonzero",
                       job().levels > 0 ? "shares of voxels" : "several materials"));
     }
-    if (!zones.grows()) return {};
+    if (!zones.bleeds().grows()) return {};
     if (materials_.several())
       return usage("dose.bleed_um: edges that grow have no material where there are several; plan them as several jobs");
     for (std::size_t i = 0; i < plan_.scene->instances.size(); ++i) {

@@ -42,7 +42,7 @@ std::vector<std::uint32_t> levels_of(const Scene& scene, const Job& job, const M
 std::string_view against_shares(const Job& job, const Materials& materials, const DoseZones& zones) {
   if (materials.several() && job.machine.profile.empty() && write::find_level_format(job.format) != nullptr)
     return "one material as grey, for several would lie in one voxel; choose a 1-bit format or name a machine";
-  if (zones.grows()) return "edges that stay or shrink; leave out a negative bleed";
+  if (zones.bleeds().grows()) return "edges that stay or shrink; leave out a negative bleed";
   if (fills(job)) return "whole parts; leave out walls, fillings and segments";
   if (job.dose.core < 1) return "whole parts; give --core-saturation in place of --core";
   if (job.heights.containment != Containment::kAcross) return "the layer as it is; leave out --containment";

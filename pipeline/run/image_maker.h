@@ -30,7 +30,7 @@ struct ImageWork {
   cover::LayerScratch coverage;
   raster::MaterialImages materials;
   raster::MaterialImages zones;  // of parts with doses of their own
-  BleedWork bleed;
+  dose::BleedWork bleed;
   inspect::VanishScratch vanish;    // if edges move inwards
   std::unique_ptr<BeadWork> beads;  // if beads fill parts
 

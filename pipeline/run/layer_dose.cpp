@@ -5,8 +5,9 @@
 #include <numbers>
 
 #include "pipeline/run/image_maker.h"
+#include "stages/dose/edges/dilate.h"
+#include "stages/geometry/combine.h"
 #include "stages/program/reach.h"
-#include "stages/raster/combine.h"
 #include "stages/write/levels/level_format.h"
 
 namespace lamina::pipeline {
@@ -40,11 +41,11 @@ Status LayerImager::bleed(const Layer& layer, ImageWork& work, ImageNotes& notes
       }
     }
   }
-  if (!zones.bleeds()) return {};
+  if (!images.dose.bleeds()) return {};
   if (zones.several() && images.beads) work.zones.keep(work.runs);
   for (std::uint32_t zone = 0; zone < zones.count(); ++zone) {
     const RunsView own = zones.several() ? work.zones.image[zone].view() : work.runs.view();
-    const Bleed& bleed = zones.bleed(zone, layer);
+    const dose::Bleed& bleed = zones.bleeds().of(zone, layer);
     if (!bleed.outside.grows || !dose::grows_beyond(own, bleed.outside.reach)) continue;
     return Error{Fault::kUsage,
                  fmt::format("dose.bleed_um: in layer {} (z {:.3f} mm) edges would grow beyond the bed; move the "
@@ -53,7 +54,7 @@ Status LayerImager::bleed(const Layer& layer, ImageWork& work, ImageNotes& notes
   }
   const std::uint64_t least = least_vanished();
   if (shares || least > 0) work.third = work.runs;
-  zones.remove_bleed(layer, work.runs, work.zones.image, work.bleed);
+  zones.bleeds().remove(layer, work.runs, work.zones.image, work.bleed);
   if (least > 0) notes.vanished = inspect::vanished_pieces(work.third, work.runs, least, work.vanish);
   if (shares) empty_removed(work.third, shares_voxels(), work);
   return check_grown(layer, work);
@@ -71,10 +72,10 @@ std::uint64_t LayerImager::least_vanished() const {
 
 /// Where an edge moved inwards, the voxels that it left and those beside them that are less than half full are emptied.
 void LayerImager::empty_removed(const Runs& before, bool laid, ImageWork& work) {
-  raster::combine(before, work.runs, raster::SetOperation::kDifference, work.second);
+  combine(before, work.runs, SetOperation::kDifference, work.second);
   const dose::Reach beside{{1, 1}};
   dose::dilate(work.second, beside, work.section);
-  raster::combine(work.section, work.runs, raster::SetOperation::kDifference, work.second);
+  combine(work.section, work.runs, SetOperation::kDifference, work.second);
   dose::without(work.drops.shares, work.second, work.drops.zones);
   std::swap(work.drops.shares, work.drops.zones);
   if (!laid) return;
@@ -87,7 +88,7 @@ void LayerImager::empty_removed(const Runs& before, bool laid, ImageWork& work) 
 /// Parts stay on a bed that is not a rectangle as far as they were checked; what grew does too.
 Status LayerImager::check_grown(const Layer& layer, const ImageWork& work) const {
   const ImagePlan& images = *plan_.images;
-  if (!images.machine || !images.dose.zones().grows()) return {};
+  if (!images.machine || !images.dose.zones().bleeds().grows()) return {};
   const auto outside = program::first_outside(images.machine->machine, images.grid, work.runs);
   if (!outside) return {};
   return Error{
@@ -123,7 +124,7 @@ void LayerImager::own_voxels(ImageWork& work) const {
   for (std::size_t i = 0; i < work.drops.laid.size(); ++i) {
     const dose::LaidPart& part = work.drops.laid[i];
     const auto unite = [&](Runs& image) {
-      raster::combine(image, work.drops.shared.owner[i], raster::SetOperation::kUnion, work.section);
+      combine(image, work.drops.shared.owner[i], SetOperation::kUnion, work.section);
       std::swap(image, work.section);
     };
     if (several) unite(work.materials.image[part.material]);
@@ -152,7 +153,7 @@ void LayerImager::lay_shares(const Layer& layer, std::uint32_t part, ImageWork& 
   if (laid.empty() || laid.back().zone != zone || laid.back().material != material) {
     laid.push_back({work.drops.zones, {}, zone, material});
   } else {
-    raster::larger(laid.back().shares, work.drops.zones, work.drops.levels);
+    larger(laid.back().shares, work.drops.zones, work.drops.levels);
     std::swap(laid.back().shares, work.drops.levels);
   }
 }

@@ -4,8 +4,8 @@
 #include <algorithm>
 
 #include "pipeline/run/image_maker.h"
+#include "stages/geometry/combine.h"
 #include "stages/program/reach.h"
-#include "stages/raster/combine.h"
 #include "stages/raster/mirror.h"
 #include "stages/read/placed.h"
 
@@ -14,28 +14,12 @@ namespace {
 
 /// The first difference between two engines.
 Error disagreement(const Layer& layer, const PixelGrid& grid, const RunsView& rays, const RunsView& contours) {
-  std::uint32_t row = 0;
-  while (row + 1 < rays.rows() && std::ranges::equal(rays.row(row), contours.row(row))) ++row;
-  const auto a = rays.row(row), b = contours.row(row);
-  const auto place = static_cast<std::size_t>(std::ranges::mismatch(a, b).in1 - a.begin());
-  const std::uint32_t column = std::min(place < a.size() ? a[place] : rays.columns, place < b.size() ? b[place] : rays.columns);
+  const auto [column, row] = first_difference(rays, contours);
   return {Fault::kVerification,
           fmt::format("layer {}: engines disagree first in image row {}, column {} (x {:.4f} mm, y {:.4f} mm, z {:.4f} "
                       "mm); this is a fault of lamina, please report it with the part",
                       layer.index, row, column, mm(grid.x.centre(column)), mm(grid.y.centre(grid.rows() - 1 - row)),
                       mm(layer.plane()))};
-}
-
-/// Sums over a layer's solids; places come from the first solid that has any.
-void add(const raster::LayerReport& solid, raster::LayerReport& all) {
-  if (all.capped_rows == 0) {
-    all.first_capped_row = solid.first_capped_row;
-    all.first_capped_instance = solid.first_capped_instance;
-  }
-  if (all.open_rows == 0) all.first_open_row = solid.first_open_row;
-  all.crossings += solid.crossings;
-  all.capped_rows += solid.capped_rows;
-  all.open_rows += solid.open_rows;
 }
 
 }  // namespace
@@ -105,7 +89,7 @@ Status LayerImager::images(const Layer& layer, ImageWork& work, ImageNotes& note
       continue;
     }
     if (const std::uint8_t full = images.dose.full(); full > 0) {
-      raster::larger(work.drops.shares, work.drops.zones, work.drops.levels);
+      larger(work.drops.shares, work.drops.zones, work.drops.levels);
       std::swap(work.drops.shares, work.drops.levels);
       at_least(work.drops.zones, dose::half_of(full), work.section);
     }
@@ -118,7 +102,7 @@ Status LayerImager::images(const Layer& layer, ImageWork& work, ImageNotes& note
     } else if (work.runs.change.empty()) {
       std::swap(work.runs, work.section);
     } else {
-      raster::combine(work.runs, work.section, raster::SetOperation::kUnion, work.second);
+      combine(work.runs, work.section, SetOperation::kUnion, work.second);
       std::swap(work.runs, work.second);
     }
   }
@@ -183,7 +167,7 @@ Status LayerImager::section_of(const Solid& solid, const Layer& layer, ImageWork
     report.first_capped_instance = solid.instance[report.first_capped_instance];
   }
   record.capped_rows += report.capped_rows;
-  add(report, notes.report);
+  notes.report.add_solid(report);
   return {};
 }
 
@@ -201,8 +185,7 @@ raster::LayerReport LayerImager::section(const Solid& solid, raster::Engine engi
   const raster::LayerReport low = rasterizer.layer(engine, layer.lowest_plane(), work.scratch, work.lowest);
   const raster::LayerReport high = rasterizer.layer(engine, layer.highest_plane(), work.scratch, work.highest);
   const bool inside = containment == Containment::kInside;
-  raster::combine(work.lowest, work.highest, inside ? raster::SetOperation::kIntersection : raster::SetOperation::kUnion,
-                  image);
+  combine(work.lowest, work.highest, inside ? SetOperation::kIntersection : SetOperation::kUnion, image);
   return low.open_rows + low.capped_rows >= high.open_rows + high.capped_rows ? low : high;
 }
 

@@ -39,9 +39,12 @@ Result<Manifest> manifest_of(const std::string& directory) {
 
 std::string title_of(const ManifestHead& head) {
   const std::string parts = lamina::title_of(head.parts);
-  return (parts.empty() ? "" : parts + "   |   ") + fmt::format("{} layers   |   {:g} x {:g} dpi   |   bed {:g} x {:g} mm",
-                                                                head.layer_count, head.grid.x.dpi(), head.grid.y.dpi(),
-                                                                mm(head.grid.x.length), mm(head.grid.y.length));
+  std::string title = parts.empty() ? "" : parts + "   |   ";
+  title += fmt::format("{} layers   |   {:g} x {:g} dpi   |   bed {:g} x {:g} mm", head.layer_count, head.grid.x.dpi(),
+                       head.grid.y.dpi(), mm(head.grid.x.length), mm(head.grid.y.length));
+  if (const int most = head.most_of_pixel(); most > 1)
+    title += head.most_drops > 0 ? fmt::format("   |   darkest {} drops", most) : fmt::format("   |   darkest level {}", most);
+  return title;
 }
 
 /// Several layers side by side.
@@ -115,31 +118,33 @@ Result<Preview> draw_images(const Manifest& manifest, const PreviewRequest& requ
   for (const LayerRecord& record : manifest.layers) numbers.push_back(record.layer.index);
   const auto chosen = chosen_layers(request.layers, numbers);
   if (!chosen) return chosen.error();
+  const ManifestHead& head = manifest.head;
+  const std::filesystem::path folder = request.source;
   write::picture::SheetRequest sheet;
-  sheet.title = title_of(manifest.head);
-  sheet.grid = manifest.head.grid;
+  sheet.title = title_of(head);
+  sheet.grid = head.grid;
+  sheet.most = head.most_of_pixel();
   sheet.whole_bed = request.whole_bed;
   sheet.width = request.width.value_or(kSheetWidth);
   for (const std::size_t index : *chosen) {
     const LayerRecord& record = manifest.layers[index];
-    const auto images = layer_images(manifest.head, record);
-    for (std::size_t m = 0; m < images.size(); ++m) {
-      std::string material = manifest.head.named_images() == 0 ? "" : ", " + manifest.head.image_name(m);
-      const bool unfed = images[m].record.unfed_pixels > 0;
-      if (unfed) material += " in another powder";
-      sheet.layers.push_back({(std::filesystem::path(request.source) / images[m].name).string(),
-                              fmt::format("layer {}{}", record.layer.index, material),
-                              fmt::format("z {:.3f} mm", mm(record.layer.plane())), unfed});
+    const auto images = layer_images(head, record);
+    for (std::size_t first = 0; first < images.size(); first += head.drop_images()) {  // of each material
+      write::picture::SheetLayer cell;
+      for (std::size_t drop = 0; drop < head.drop_images(); ++drop)
+        cell.paths.push_back((folder / images[first + drop].name).string());
+      cell.warns = images[first].record.unfed_pixels > 0;
+      cell.name = fmt::format("layer {}", record.layer.index);
+      if (!head.materials.empty()) cell.name += ", " + head.materials[first / head.drop_images()].name;
+      if (cell.warns) cell.name += " in another powder";
+      cell.remark = fmt::format("z {:.3f} mm", mm(record.layer.plane()));
+      sheet.layers.push_back(std::move(cell));
     }
   }
-  const auto read_runs = [&](const std::string& path) -> Result<Runs> {
-    auto image = read::image(path, manifest.head.full_level());
-    if (!image) return image.error();
-    return std::move(image->runs);
-  };
-  auto picture = write::picture::contact_sheet(sheet, read_runs);
+  const auto read_levels = [&](const std::string& path) { return read::image_levels(path, head.full_level()); };
+  auto picture = write::picture::contact_sheet(sheet, read_levels);
   if (!picture) return picture.error();
-  const std::size_t made = manifest.layers.size(), all = manifest.head.layer_count;
+  const std::size_t made = manifest.layers.size(), all = head.layer_count;
   Preview preview{std::move(*picture), fmt::format("{}: {} of {} layers{}, ", request.output, chosen->size(), made,
                                                    made == all ? "" : fmt::format(" that are there, of {}", all))};
   preview.said += readable_bytes(preview.bytes.size());

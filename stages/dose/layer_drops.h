@@ -9,7 +9,7 @@
 #include "stages/data/levels.h"
 #include "stages/data/runs.h"
 #include "stages/dose/dither.h"
-#include "stages/dose/erode.h"
+#include "stages/dose/edges/erode.h"
 #include "stages/dose/field.h"
 #include "stages/dose/pour.h"
 #include "stages/dose/shares.h"

@@ -5,17 +5,36 @@
 
 namespace lamina {
 
-PixelWindow window_of(const RunsView& runs) {
+namespace {
+
+/// Image: RunsView or LevelsView; row  begin and end of each run of a row
+template <class Image, class Row>
+PixelWindow window_of_rows(const Image& image, Row row) {
   PixelWindow window{UINT32_MAX, 0, UINT32_MAX, 0};
-  for (std::uint32_t r = 0; r < runs.rows(); ++r) {
-    const auto row = runs.row(r);
-    if (row.empty()) continue;
-    window.left = std::min(window.left, row.front());
-    window.right = std::max(window.right, row.back());
+  for (std::uint32_t r = 0; r < image.rows(); ++r) {
+    const std::span<const std::uint32_t> runs = row(r);
+    if (runs.empty()) continue;
+    window.left = std::min(window.left, runs.front());
+    window.right = std::max(window.right, runs.back());
     window.top = std::min(window.top, r);
     window.bottom = r + 1;
   }
   return window.right == 0 ? PixelWindow{} : window;
+}
+
+std::span<const std::uint32_t> runs_of(const LevelsView& levels, std::uint32_t row) {
+  const std::size_t first = levels.row_offset[row], last = levels.row_offset[row + 1];
+  return levels.change.subspan(2 * first, 2 * (last - first));
+}
+
+}  // namespace
+
+PixelWindow window_of(const RunsView& runs) {
+  return window_of_rows(runs, [&](std::uint32_t r) { return runs.row(r); });
+}
+
+PixelWindow window_of(const LevelsView& levels) {
+  return window_of_rows(levels, [&](std::uint32_t r) { return runs_of(levels, r); });
 }
 
 PixelWindow joined(const PixelWindow& one, const PixelWindow& other) {
@@ -40,22 +59,13 @@ class PartRow {
         inside_(columns + 1, 0) {}
 
   /// Adds a row of pixels, of which `weight` units of height lie in this row of parts.
-  void add(std::span<const std::uint32_t> row, std::uint64_t weight) {
+  /// level_of  how much of it a run has
+  template <class LevelOf>
+  void add(std::span<const std::uint32_t> row, std::uint64_t weight, LevelOf level_of) {
     for (std::size_t i = 0; i < row.size(); i += 2) {
       if (row[i + 1] <= left_) continue;
       if (row[i] >= right_) break;
-      const std::uint64_t begin = std::uint64_t{std::max(row[i], left_) - left_} * pixel_;
-      const std::uint64_t end = std::uint64_t{std::min(row[i + 1], right_) - left_} * pixel_;
-      const std::uint64_t first = begin / part_, last = end / part_;
-      if (first == last) {
-        edge_[first] += (end - begin) * weight;
-        continue;
-      }
-      // Part of the first one, part of the last one (nothing if the run ends where it begins), and all between.
-      edge_[first] += ((first + 1) * part_ - begin) * weight;
-      edge_[last] += (end - last * part_) * weight;
-      inside_[first + 1] += static_cast<std::int64_t>(part_ * weight);
-      inside_[last] -= static_cast<std::int64_t>(part_ * weight);
+      add_run(std::max(row[i], left_) - left_, std::min(row[i + 1], right_) - left_, weight * level_of(i / 2));
     }
   }
 
@@ -73,15 +83,31 @@ class PartRow {
   }
 
  private:
+  /// Pixels [from, to) of the window.
+  void add_run(std::uint64_t from, std::uint64_t to, std::uint64_t weight) {
+    const std::uint64_t begin = from * pixel_, end = to * pixel_;
+    const std::uint64_t first = begin / part_, last = end / part_;
+    if (first == last) {
+      edge_[first] += (end - begin) * weight;
+      return;
+    }
+    // Part of the first one, part of the last one (nothing if the run ends where it begins), and all between.
+    edge_[first] += ((first + 1) * part_ - begin) * weight;
+    edge_[last] += (end - last * part_) * weight;
+    inside_[first + 1] += static_cast<std::int64_t>(part_ * weight);
+    inside_[last] -= static_cast<std::int64_t>(part_ * weight);
+  }
+
   std::uint32_t left_, right_;
   std::uint64_t pixel_, part_;        // units
   std::vector<std::uint64_t> edge_;   // area of runs that begin or end within a part
   std::vector<std::int64_t> inside_;  // change of the area that runs cover from one part to the next
 };
 
-}  // namespace
-
-void coverage(const RunsView& runs, const PixelWindow& window, std::uint32_t columns, std::span<std::uint8_t> result) {
+/// full  what a pixel has at most; add_row(r, weight, part_row) adds a row of pixels
+template <class AddRow>
+void fill_parts(const PixelWindow& window, std::uint32_t columns, std::uint64_t full, std::span<std::uint8_t> result,
+                AddRow add_row) {
   const std::uint64_t part_rows = result.size() / columns, pixel_rows = window.height();
   PartRow part_row(window, columns);
   for (std::uint64_t part = 0; part < part_rows; ++part) {
@@ -89,10 +115,26 @@ void coverage(const RunsView& runs, const PixelWindow& window, std::uint32_t col
     const std::uint64_t top = part * pixel_rows, bottom = top + pixel_rows;
     for (std::uint64_t r = top / part_rows; r * part_rows < bottom; ++r) {
       const std::uint64_t weight = std::min((r + 1) * part_rows, bottom) - std::max(r * part_rows, top);
-      part_row.add(runs.row(window.top + static_cast<std::uint32_t>(r)), weight);
+      add_row(window.top + static_cast<std::uint32_t>(r), weight, part_row);
     }
-    part_row.take(pixel_rows, result.subspan(static_cast<std::size_t>(part) * columns, columns));
+    part_row.take(pixel_rows * full, result.subspan(static_cast<std::size_t>(part) * columns, columns));
   }
+}
+
+}  // namespace
+
+void coverage(const RunsView& runs, const PixelWindow& window, std::uint32_t columns, std::span<std::uint8_t> result) {
+  fill_parts(window, columns, 1, result, [&](std::uint32_t r, std::uint64_t weight, PartRow& part_row) {
+    part_row.add(runs.row(r), weight, [](std::size_t) { return std::uint64_t{1}; });
+  });
+}
+
+void coverage(const LevelsView& levels, std::uint8_t full, const PixelWindow& window, std::uint32_t columns,
+              std::span<std::uint8_t> result) {
+  fill_parts(window, columns, full, result, [&](std::uint32_t r, std::uint64_t weight, PartRow& part_row) {
+    const std::uint8_t* level = levels.level.data() + levels.row_offset[r];
+    part_row.add(runs_of(levels, r), weight, [&](std::size_t run) { return std::uint64_t{level[run]}; });
+  });
 }
 
 }  // namespace lamina

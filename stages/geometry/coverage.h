@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <span>
 
+#include "stages/data/levels.h"
 #include "stages/data/runs.h"
 
 namespace lamina {
@@ -19,6 +20,7 @@ struct PixelWindow {
 
 /// The smallest window that holds all set pixels; empty if there is none. Cost: the first and last change of each row.
 PixelWindow window_of(const RunsView& runs);
+PixelWindow window_of(const LevelsView& levels);
 
 /// The smallest window that holds both.
 PixelWindow joined(const PixelWindow& one, const PixelWindow& other);
@@ -30,5 +32,10 @@ PixelWindow joined(const PixelWindow& one, const PixelWindow& other);
 /// columns  1 .. 65535; result  columns x rows values, the top row first
 /// cost     a few operations a run and result row that it touches, and one a result value
 void coverage(const RunsView& runs, const PixelWindow& window, std::uint32_t columns, std::span<std::uint8_t> result);
+
+/// The same of levels, each pixel set by its share: 255 where all have the level `full` (no pixel has more), and the mean of
+/// shares where they differ. Of one level it is what the runs are.
+void coverage(const LevelsView& levels, std::uint8_t full, const PixelWindow& window, std::uint32_t columns,
+              std::span<std::uint8_t> result);
 
 }  // namespace lamina

@@ -4,7 +4,7 @@
 
 #include <utility>
 
-#include "stages/raster/combine.h"
+#include "stages/geometry/combine.h"
 
 namespace lamina::raster {
 

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "stages/raster/combine.h"
+#include "stages/geometry/combine.h"
 
 namespace lamina::raster {
 

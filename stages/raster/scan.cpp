@@ -5,6 +5,18 @@
 #include <cstring>
 
 namespace lamina::raster {
+
+void LayerReport::add_solid(const LayerReport& solid) {
+  if (capped_rows == 0) {
+    first_capped_row = solid.first_capped_row;
+    first_capped_instance = solid.first_capped_instance;
+  }
+  if (open_rows == 0) first_open_row = solid.first_open_row;
+  crossings += solid.crossings;
+  capped_rows += solid.capped_rows;
+  open_rows += solid.open_rows;
+}
+
 void ScanConverter::place_segments(const Segments& segments, std::uint32_t first_row, std::uint32_t rows) {
   place_.assign(std::size_t{rows} + 1, 0);
   std::uint32_t* const place = place_.data();

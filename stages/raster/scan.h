@@ -24,6 +24,9 @@ struct LayerReport {
   std::uint32_t first_capped_row = 0, first_open_row = 0;  // geometry rows; the lowest, if there is any
   std::uint32_t first_capped_instance = 0;                 // of the facet that closes that row
   std::uint64_t scratch_bytes = 0;
+
+  /// Adds the crossings and rows of another solid of the layer; places come from the first solid that has any.
+  void add_solid(const LayerReport& solid);
 };
 
 /// Scan conversion of one band of rows at a time: count (by differences, a segment costs two additions), scan, fill,

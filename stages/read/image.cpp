@@ -57,6 +57,14 @@ Result<Image> levels(const std::string& path, std::uint8_t full, Levels& levels)
   return image;
 }
 
+Result<Levels> image_levels(const std::string& path, std::uint8_t full) {
+  Levels found;
+  const auto image = full == 0 ? read_image(path, 0) : levels(path, full, found);
+  if (!image) return image.error();
+  if (full == 0) levels_of(image->runs, 1, found);
+  return found;
+}
+
 namespace {
 
 /// Of images of others: what is wrong is with the input.

@@ -39,6 +39,10 @@ Result<Image> dark_pixels(const std::string& path, int threshold, std::uint64_t 
 /// errors  kVerification with the file's name: of image(); a value that is none of the levels
 Result<Image> levels(const std::string& path, std::uint8_t full, Levels& levels);
 
+/// An image of a job as levels: those that it carries, or 1 where one of 1 bit is set. full  as in image()
+/// errors  of image()
+Result<Levels> image_levels(const std::string& path, std::uint8_t full);
+
 /// What grey of others becomes.
 struct LevelsRequest {
   std::uint8_t full = 1;   // level of a full voxel, 1 .. 255: black is full, white 0

@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-#include "stages/dose/erode.h"
+#include "stages/dose/edges/erode.h"
 #include "stages/dose/saturate.h"
 #include "tests/program/machines.h"
 

@@ -9,9 +9,9 @@
 #include "stages/data/grid.h"
 #include "stages/data/levels.h"
 #include "stages/data/runs.h"
-#include "stages/dose/dilate.h"
-#include "stages/dose/erode.h"
-#include "stages/dose/holes.h"
+#include "stages/dose/edges/dilate.h"
+#include "stages/dose/edges/erode.h"
+#include "stages/dose/edges/holes.h"
 #include "stages/dose/zones.h"
 #include "tests/program/machines.h"
 

@@ -2,8 +2,8 @@
 
 #include <random>
 
+#include "stages/geometry/combine.h"
 #include "stages/raster/beads.h"
-#include "stages/raster/combine.h"
 
 namespace lamina::raster {
 namespace {
@@ -95,6 +95,9 @@ TEST(BeadRaster, SetOperationsAreThoseOfTheirPixels) {
   for (int round = 0; round < 50; ++round) {
     const Runs a = any(), b = any();
     const auto p = bits_of(a), q = bits_of(b);
+    const auto differs = static_cast<std::size_t>(std::ranges::mismatch(p, q).in1 - p.begin());
+    const auto [column, row] = first_difference(a, b);
+    ASSERT_EQ(differs, std::size_t{row} * 40 + column);
     for (const SetOperation operation : {SetOperation::kUnion, SetOperation::kIntersection, SetOperation::kDifference}) {
       Runs out;
       combine(a, b, operation, out);

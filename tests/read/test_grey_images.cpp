@@ -14,7 +14,7 @@
 #include <string>
 #include <vector>
 
-#include "stages/raster/combine.h"
+#include "stages/geometry/combine.h"
 #include "stages/read/image.h"
 #include "stages/read/layer_images.h"
 #include "stages/read/placed.h"
@@ -227,7 +227,7 @@ TEST(GreyImages, ArePlacedAndUnitedPixelByPixel) {
       for (std::size_t c = 0; c < 17; ++c) most[r][c] = std::max(a[r][c], b[r][c]), within += b[r][c] > 0 ? a[r][c] : 0;
     const Levels first = levels_from(a), second = levels_from(b);
     Levels out;
-    raster::larger(first, second, out);
+    larger(first, second, out);
     EXPECT_EQ(pixels_of(out.view()), most);
     for (std::size_t i = 1; i < out.level.size(); ++i)  // joined where they touch
       EXPECT_FALSE(out.change[2 * i] == out.change[2 * i - 1] && out.level[i] == out.level[i - 1] && out.change[2 * i] > 0);

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include "stages/data/levels.h"
+#include "stages/geometry/combine.h"
 #include "tests/write/images.h"
 
 namespace lamina::write {
@@ -58,6 +60,32 @@ TEST(Coverage, AFullImageIsFullAndAnEmptyOneEmpty) {
   EXPECT_EQ(std::count(result.begin(), result.end(), 0), 500 * 377);
 }
 
+TEST(Coverage, OfLevelsIsTheMeanOfTheirShares) {
+  std::mt19937 random(4);
+  for (std::uint32_t seed = 0; seed < 60; ++seed) {
+    const std::uint32_t columns = 1 + testing::below(random, 40), rows = 1 + testing::below(random, 25);
+    const auto full = static_cast<std::uint8_t>(seed % 3 == 0 ? 1 : seed % 3 == 1 ? 1 + testing::below(random, 15) : 255);
+    const PixelWindow window{0, columns, 0, rows};
+    const std::uint32_t to_columns = 1 + testing::below(random, 30), to_rows = 1 + testing::below(random, 30);
+    // Levels as a sum of planes, each of which counts for one part of the full level.
+    Levels levels;
+    levels_of(testing::random_image(seed, columns, rows), 1, levels);
+    std::vector<double> expected = shares_by_pixels(testing::random_image(seed, columns, rows), window, to_columns, to_rows);
+    for (std::uint32_t plane = 1; plane < std::min<std::uint32_t>(full, 20); ++plane) {
+      const Runs more = testing::random_image(1000 * plane + seed, columns, rows);
+      const Levels before = levels;
+      Levels one;
+      levels_of(more, 1, one);
+      add_levels(before, one, levels);
+      const std::vector<double> shares = shares_by_pixels(more, window, to_columns, to_rows);
+      for (std::size_t i = 0; i < shares.size(); ++i) expected[i] += shares[i];
+    }
+    std::vector<std::uint8_t> result(std::size_t{to_columns} * to_rows);
+    coverage(levels, full, window, to_columns, result);
+    for (std::size_t i = 0; i < result.size(); ++i) ASSERT_NEAR(result[i], expected[i] / full * 255, 0.5 + 1e-6) << seed;
+  }
+}
+
 TEST(PixelWindow, HoldsAllThatIsSetAndNoMore) {
   const PixelWindow window = window_of(testing::image_of(50, {{}, {7, 9, 20, 21}, {}, {5, 6}, {}}));
   EXPECT_EQ(window.left, 5u);
@@ -65,6 +93,12 @@ TEST(PixelWindow, HoldsAllThatIsSetAndNoMore) {
   EXPECT_EQ(window.top, 1u);
   EXPECT_EQ(window.bottom, 4u);
   EXPECT_TRUE(window_of(testing::image_of(50, {{}, {}})).empty());
+  Levels levels;
+  levels_of(testing::image_of(50, {{}, {7, 9, 20, 21}, {}, {5, 6}, {}}), 3, levels);
+  EXPECT_EQ(window_of(levels).left, 5u);
+  EXPECT_EQ(window_of(levels).right, 21u);
+  EXPECT_EQ(window_of(levels).top, 1u);
+  EXPECT_EQ(window_of(levels).bottom, 4u);
   EXPECT_EQ(joined(PixelWindow{}, window).right, 21u);
   EXPECT_EQ(joined(PixelWindow{1, 2, 1, 9}, window).bottom, 9u);
   EXPECT_EQ(joined(PixelWindow{1, 2, 1, 9}, window).right, 21u);

@@ -7,9 +7,9 @@ namespace {
 CommandSpec preview_spec() {
   CommandSpec spec;
   spec.summary =
-      "Draws layers of a job as one picture (PNG), each pixel as dark as the share of its area that is set; or one layer of\n"
-      "a sliced job with its filling, or of a G-code file, bead widths true (PNG or SVG), or several with --count or --every\n"
-      "(PNG).";
+      "Draws layers of a job as one picture (PNG), each pixel as dark as the share of its area that is set, or as its share of\n"
+      "the most drops, or of a full voxel's levels; or one layer of a sliced job with its filling, or of a G-code file, bead\n"
+      "widths true (PNG or SVG), or several with --count or --every (PNG).";
   spec.operand = "DIR|GCODE";
   spec.operand_meaning =
       "directory that lamina jet or lamina slice wrote, or a G-code file of lamina extrude or another slicer";

@@ -116,6 +116,10 @@ std::uint8_t ManifestHead::full_level() const {
   return static_cast<std::uint8_t>(levels > 0 && most_drops == 0 ? levels - 1 : 0);
 }
 
+std::uint8_t ManifestHead::most_of_pixel() const {
+  return std::max<std::uint8_t>(1, most_drops > 0 ? static_cast<std::uint8_t>(most_drops) : full_level());
+}
+
 std::string ManifestHead::image_name(std::size_t number) const {
   const std::uint32_t drops = drop_images();
   const std::string material = materials.empty() ? "" : materials[number / drops].name;

@@ -65,6 +65,9 @@ struct ManifestHead {
   /// bit.
   std::uint8_t full_level() const;
 
+  /// What a pixel has at most: drops, or levels of a full voxel; 1: it is set or not.
+  std::uint8_t most_of_pixel() const;
+
   /// Images of a material in a layer: one a drop of a pixel, if there can be several and the images are of one bit.
   std::uint32_t drop_images() const { return most_drops > 1 && !grey_drops() ? most_drops : 1; }
   /// Images of a layer that have names and records of their own: those of the first material, of the next, ... 0: the one

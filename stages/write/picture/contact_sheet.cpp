@@ -4,7 +4,9 @@
 #include <tbb/parallel_for.h>
 
 #include <mutex>
+#include <utility>
 
+#include "stages/geometry/combine.h"
 #include "stages/geometry/coverage.h"
 #include "stages/write/picture/canvas.h"
 #include "stages/write/picture/layout.h"
@@ -15,29 +17,45 @@ namespace {
 constexpr Colour kGround{250, 248, 243}, kPaper{255, 255, 255}, kFrame{214, 208, 196}, kInk{27, 38, 59}, kQuiet{120, 116, 108},
     kWarning{217, 72, 15};
 
-/// Calls use(index, runs) for each layer's image, from several threads. The error is that of the first layer with one.
+/// The levels of a layer, its images added up.
+Result<Levels> levels_of_layer(const SheetRequest& request, const SheetLayer& layer, const ReadImage& read) {
+  Levels all;
+  for (const std::string& path : layer.paths) {
+    Result<Levels> image = read(path);
+    if (!image) return image;
+    if (image->columns != request.grid.columns() || image->view().rows() != request.grid.rows()) {
+      return Error{Fault::kVerification,
+                   fmt::format("{}: {} x {} pixels where the manifest says {} x {}; plan the layer again", path, image->columns,
+                               image->view().rows(), request.grid.columns(), request.grid.rows())};
+    }
+    if (&path == &layer.paths.front()) {
+      all = std::move(*image);
+      continue;
+    }
+    Levels before;
+    std::swap(before, all);
+    add_levels(before, *image, all);
+  }
+  if (const int found = highest(all); found > request.most) {
+    return Error{Fault::kVerification, fmt::format("{}: has pixels of {} drops, the job at most {}; plan the layer again",
+                                                   layer.paths.front(), found, request.most)};
+  }
+  return all;
+}
+
+/// Calls use(index, levels) for each layer, from several threads. The error is that of the first layer with one.
 template <class Use>
 Status for_each_image(const SheetRequest& request, const ReadImage& read, const Use& use) {
   std::mutex mutex;
   std::size_t first_wrong = request.layers.size();
   Error error;
   tbb::parallel_for(std::size_t{0}, request.layers.size(), [&](std::size_t index) {
-    const Result<Runs> image = read(request.layers[index].path);
-    Error wrong;
-    if (!image) {
-      wrong = image.error();
-    } else if (image->columns != request.grid.columns() || image->view().rows() != request.grid.rows()) {
-      wrong = {Fault::kVerification, fmt::format("{}: {} x {} pixels where the manifest says {} x {}; plan the layer again",
-                                                 request.layers[index].path, image->columns, image->view().rows(),
-                                                 request.grid.columns(), request.grid.rows())};
-    } else {
-      use(index, image->view());
-      return;
-    }
+    const Result<Levels> levels = levels_of_layer(request, request.layers[index], read);
+    if (levels) return use(index, levels->view());
     const std::lock_guard lock(mutex);
     if (index < first_wrong) {
       first_wrong = index;
-      error = wrong;
+      error = levels.error();
     }
   });
   if (first_wrong < request.layers.size()) return error;
@@ -49,8 +67,8 @@ Result<PixelWindow> shown_window(const SheetRequest& request, const ReadImage& r
   if (request.whole_bed) return bed;
   std::mutex mutex;
   PixelWindow all;
-  const Status status = for_each_image(request, read, [&](std::size_t, const RunsView& runs) {
-    const PixelWindow window = window_of(runs);
+  const Status status = for_each_image(request, read, [&](std::size_t, const LevelsView& levels) {
+    const PixelWindow window = window_of(levels);
     const std::lock_guard lock(mutex);
     all = joined(all, window);
   });
@@ -97,9 +115,9 @@ Result<Buffer<std::byte>> contact_sheet(const SheetRequest& request, const ReadI
               fitted(title, layout.title_size, layout.width - 2 * layout.margin), kInk);
   for (int cell = 0; cell < cells; ++cell) draw_frame(canvas, request, layout, cell);
 
-  const Status status = for_each_image(request, read, [&](std::size_t index, const RunsView& runs) {
+  const Status status = for_each_image(request, read, [&](std::size_t index, const LevelsView& levels) {
     Buffer<std::uint8_t> shares(static_cast<std::size_t>(layout.picture_width) * layout.picture_height);
-    coverage(runs, *window, static_cast<std::uint32_t>(layout.picture_width), shares);
+    coverage(levels, request.most, *window, static_cast<std::uint32_t>(layout.picture_width), shares);
     const int cell = static_cast<int>(index);
     const int left = layout.cell_left(cell) + (layout.cell_width - layout.picture_width) / 2;
     canvas.paint(left, layout.cell_top(cell), layout.picture_width, shares, request.layers[index].warns ? kWarning : kInk);

@@ -11,7 +11,7 @@
 #include "pipeline/run/run.h"
 #include "stages/data/machine.h"
 #include "stages/data/runs.h"
-#include "stages/raster/combine.h"
+#include "stages/geometry/combine.h"
 #include "stages/read/image.h"
 #include "tests/commands/program.h"
 
@@ -46,7 +46,7 @@ bool same(const Runs& a, const Runs& b) { return a.row_offset == b.row_offset &&
 
 Runs united(const Runs& a, const Runs& b) {
   Runs both;
-  raster::combine(a, b, raster::SetOperation::kUnion, both);
+  combine(a, b, SetOperation::kUnion, both);
   return both;
 }
 

@@ -9,8 +9,8 @@
 #include <polyclipping/clipper.hpp>
 
 #include "pipeline/plan/layer_cut.h"
-#include "stages/dose/erode.h"
-#include "stages/raster/combine.h"
+#include "stages/dose/edges/erode.h"
+#include "stages/geometry/combine.h"
 #include "stages/raster/raster.h"
 #include "stages/read/image.h"
 #include "stages/segment/expand.h"
@@ -28,7 +28,7 @@ const std::string kCrown = std::string(LAMINA_TEST_DIR) + "/corpus/dental_crown.
 
 std::uint64_t outside(const RunsView& image, const RunsView& of) {
   Runs rest;
-  raster::combine(image, of, raster::SetOperation::kDifference, rest);
+  combine(image, of, SetOperation::kDifference, rest);
   return set_pixels(rest);
 }
 
@@ -103,8 +103,8 @@ TEST_F(PorousJob, AShellIsSolidAndBelowItAreTheBeads) {
   for (std::size_t i = 0; i < solid.size(); ++i) {
     Runs inner, rim, expected;
     dose::erode(solid[i], reach, inner);
-    raster::combine(solid[i], inner, raster::SetOperation::kDifference, rim);
-    raster::combine(rim, beads[i], raster::SetOperation::kUnion, expected);
+    combine(solid[i], inner, SetOperation::kDifference, rim);
+    combine(rim, beads[i], SetOperation::kUnion, expected);
     EXPECT_EQ(expected.change, shell[i].change) << "layer " << i;
     EXPECT_EQ(expected.row_offset, shell[i].row_offset) << "layer " << i;
   }

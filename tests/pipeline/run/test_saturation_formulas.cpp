@@ -11,7 +11,7 @@
 #include "pipeline/check/verify.h"
 #include "pipeline/run/run.h"
 #include "stages/data/runs.h"
-#include "stages/raster/combine.h"
+#include "stages/geometry/combine.h"
 #include "stages/read/image.h"
 #include "stages/write/manifest/manifest.h"
 #include "tests/commands/program.h"
@@ -51,9 +51,9 @@ class FormulaJobs : public testing::Test {
     return read.ok() ? std::move(read->runs) : Runs();
   }
   static bool alike(const Runs& a, const Runs& b) { return a.row_offset == b.row_offset && a.change == b.change; }
-  static Runs both(const Runs& a, const Runs& b, raster::SetOperation how) {
+  static Runs both(const Runs& a, const Runs& b, SetOperation how) {
     Runs result;
-    raster::combine(a, b, how, result);
+    combine(a, b, how, result);
     return result;
   }
   void done(const std::string& line) const {
@@ -185,7 +185,7 @@ TEST_F(FormulaJobs, SharesOfPartsWithDosesAreThoseOfThePartsAlone) {
   EXPECT_EQ(facts["saturation"]["drops"].get<std::uint64_t>(), drops);
   for (const std::string layer : {"000000", "000003"}) {
     for (const std::string drop : {"-drop1.tif", "-drop2.tif"}) {
-      const Runs united = both(image(alone[0], layer + drop), image(alone[1], layer + drop), raster::SetOperation::kUnion);
+      const Runs united = both(image(alone[0], layer + drop), image(alone[1], layer + drop), SetOperation::kUnion);
       EXPECT_TRUE(alike(image(job, layer + drop), united)) << layer << drop;
     }
   }

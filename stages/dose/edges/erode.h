@@ -1,4 +1,4 @@
-// stages/dose/erode.h: what is left of an image when all that is near to its edge is taken away, on runs.
+// stages/dose/edges/erode.h: what is left of an image when all that is near to its edge is taken away, on runs.
 #pragma once
 
 #include <array>

@@ -1,4 +1,4 @@
-// stages/dose/holes.h: the holes of a layer, on runs.
+// stages/dose/edges/holes.h: the holes of a layer, on runs.
 #pragma once
 
 #include <cstdint>

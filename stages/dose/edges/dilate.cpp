@@ -1,4 +1,4 @@
-#include "stages/dose/dilate.h"
+#include "stages/dose/edges/dilate.h"
 
 #include <algorithm>
 #include <utility>

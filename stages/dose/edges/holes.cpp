@@ -1,4 +1,4 @@
-#include "stages/dose/holes.h"
+#include "stages/dose/edges/holes.h"
 
 #include <algorithm>
 

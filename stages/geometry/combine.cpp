@@ -1,8 +1,8 @@
-#include "stages/raster/combine.h"
+#include "stages/geometry/combine.h"
 
 #include <algorithm>
 
-namespace lamina::raster {
+namespace lamina {
 
 void combine(const RunsView& a, const RunsView& b, SetOperation operation, Runs& out) {
   out.columns = a.columns;
@@ -36,6 +36,14 @@ void append_combined(const RunsView& a, const RunsView& b, SetOperation operatio
   out.change.resize(static_cast<std::size_t>(next - out.change.data()));
 }
 
+std::array<std::uint32_t, 2> first_difference(const RunsView& a, const RunsView& b) {
+  std::uint32_t r = 0;
+  while (r + 1 < a.rows() && std::ranges::equal(a.row(r), b.row(r))) ++r;
+  const auto first = a.row(r), second = b.row(r);
+  const auto place = static_cast<std::size_t>(std::ranges::mismatch(first, second).in1 - first.begin());
+  return {std::min(place < first.size() ? first[place] : a.columns, place < second.size() ? second[place] : a.columns), r};
+}
+
 namespace {
 
 /// The runs of a row that are not yet behind.
@@ -59,15 +67,15 @@ struct Ahead {
   }
 };
 
-}  // namespace
-
-void larger(const LevelsView& a, const LevelsView& b, Levels& out) {
+/// level  of a pixel, by its level in a and in b
+template <class Level>
+void join(const LevelsView& a, const LevelsView& b, Levels& out, Level level) {
   out.start(a.columns);
   for (std::uint32_t r = 0; r < a.rows(); ++r) {
     Ahead first(a, r), second(b, r);
     for (std::uint32_t column = 0; first.any() || second.any();) {
       const std::uint32_t next = std::min(first.next(column), second.next(column));
-      out.append(column, next, std::max(first.level_at(column), second.level_at(column)));
+      out.append(column, next, level(first.level_at(column), second.level_at(column)));
       first.leave(next);
       second.leave(next);
       column = next;
@@ -76,4 +84,14 @@ void larger(const LevelsView& a, const LevelsView& b, Levels& out) {
   }
 }
 
-}  // namespace lamina::raster
+}  // namespace
+
+void larger(const LevelsView& a, const LevelsView& b, Levels& out) {
+  join(a, b, out, [](std::uint8_t one, std::uint8_t other) { return std::max(one, other); });
+}
+
+void add_levels(const LevelsView& a, const LevelsView& b, Levels& out) {
+  join(a, b, out, [](int one, int other) { return static_cast<std::uint8_t>(std::min(one + other, 255)); });
+}
+
+}  // namespace lamina

@@ -1,4 +1,4 @@
-#include "stages/dose/erode.h"
+#include "stages/dose/edges/erode.h"
 
 #include <algorithm>
 #include <cmath>

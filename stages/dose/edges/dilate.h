@@ -1,8 +1,8 @@
-// stages/dose/dilate.h: an image and all that is near to it, on runs.
+// stages/dose/edges/dilate.h: an image and all that is near to it, on runs.
 #pragma once
 
 #include "stages/data/runs.h"
-#include "stages/dose/erode.h"
+#include "stages/dose/edges/erode.h"
 
 namespace lamina::dose {
 
