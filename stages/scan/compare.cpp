@@ -326,7 +326,9 @@ double mirrored_likeness(const cv::Mat& photo, const cv::Mat& cells, const Cells
 Result<Comparison> compare_layer(const Photo& photo, const ExpectedLayer& layer) {
   constexpr double kLeastLikeness = 0.25, kClearly = 0.05;
   const Cells cells = cells_of(layer);
-  if (cells.share.empty()) return Error{Fault::kInput, "the layer is empty, or too large for these pixels of the photograph"};
+  if (cells.share.empty())
+    return Error{Fault::kInput,
+                 "cannot be compared: the layer is empty, or too large for pixels of the size that --pixel says"};
   const double wide = std::max(8.0, 0.08 * std::max(cells.share.cols, cells.share.rows));
   const cv::Mat seen = without_shade(-photo.light, wide), wanted = without_shade(cells.share, wide);
   Comparison comparison;
@@ -358,6 +360,11 @@ Result<Comparison> compare_layer(const Photo& photo, const ExpectedLayer& layer)
       if (full.at<std::uint8_t>(y, x) != 0) inked.push_back(dark.at<float>(y, x));
     }
   }
+  if (inked.empty())
+    return Error{
+        Fault::kInput,
+        "cannot be compared: no place of the layer, several pixels of the photograph wide, is printed in full, to tell "
+        "the darkness of ink by; where drops are strewn, take the layer of a job without --saturation"};
   const double ink = median_of(inked);
   if (ink < 0.05)
     return Error{Fault::kInput, "shows no ink where the layer has some: less than a twentieth darker than the blank sheet"};

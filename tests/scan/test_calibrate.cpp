@@ -84,6 +84,30 @@ TEST(CalibrateScan, APhotographBecomesAProfile) {
         0);
 }
 
+/// A layer of grey drops is compared by where any drop lies: the sheet is printed so.
+TEST(CompareScan, AnyDropOfAGreyLayerIsInk) {
+  Directory directory;
+  write_box(directory / "part.stl", {0, 0, 0}, {9, 5, 0.3f});
+  ASSERT_EQ(
+      run_lamina(words_of("jet part.stl --machine jet1000-grey --layer 0.3 --saturation 60 --format tiff-8 --quiet -o job"),
+                 directory.path())
+          .code,
+      0);
+  const auto machine = pipeline::find_machine("jet1000-grey");
+  ASSERT_TRUE(machine);
+  const auto resolved = pipeline::resolve_profile(*machine);
+  const auto all = read::dark_pixels(directory / "job/layers/000000.tif", 255);
+  ASSERT_TRUE(resolved && all);
+  std::mt19937_64 random(1);
+  const GreyPicture picture = photograph(print_sheet(resolved->grid, all->runs, {}), {.pixels_a_mm = 10}, random);
+  std::ofstream(directory / "photo.pgm", std::ios::binary) << "P5\n"
+                                                           << picture.width << ' ' << picture.height << "\n255\n"
+                                                           << std::string(picture.grey.begin(), picture.grey.end());
+  const Outcome seen = run_lamina(words_of("compare job/layers/000000.tif photo.pgm --machine jet1000-grey"), directory.path());
+  ASSERT_EQ(seen.code, 0) << seen.err << seen.out;
+  EXPECT_NEAR(std::stod(seen.out.substr(seen.out.find("area      ") + 10)), 45, 1) << seen.out;
+}
+
 TEST(CalibrateScan, AMassTooLargeIsToldByItsOption) {
   Directory directory;
   const Outcome refused =

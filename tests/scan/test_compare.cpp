@@ -208,6 +208,23 @@ TEST(ComparedLayer, InkWhereTheLayerHasNoneIsTold) {
   EXPECT_TRUE(whole->extra.empty());
 }
 
+/// Eight in nine pixels are blank: nothing is printed in full.
+TEST(ComparedLayer, ALayerOfStrewnDropsIsRefusedForItself) {
+  const SheetOfBlocks one(false);
+  SheetOfBlocks strewn = one;
+  strewn.layer = {one.layer.columns, {0}, {}};
+  for (std::uint32_t r = 0; r < one.layer.view().rows(); ++r) {
+    const auto row = one.layer.view().row(r);
+    for (std::size_t i = 0; r % 3 == 0 && i + 1 < row.size(); i += 2) {
+      for (std::uint32_t c = row[i]; c < row[i + 1]; c += 3) strewn.layer.change.insert(strewn.layer.change.end(), {c, c + 1});
+    }
+    strewn.layer.row_offset.push_back(static_cast<std::uint32_t>(strewn.layer.change.size()));
+  }
+  const auto refused = compare_blocks(strewn, grey_of_blocks(strewn, 3));
+  ASSERT_FALSE(refused);
+  EXPECT_NE(refused.error().message.find("without --saturation"), std::string::npos) << refused.error().message;
+}
+
 TEST(ComparedLayer, AMirroredPhotographIsRefused) {
   const SheetOfBlocks all(true), one(false);
   for (const SheetOfBlocks* sheet : {&all, &one}) {
