@@ -101,7 +101,10 @@ Result<std::string> measured_profile(const Machine& machine) {
                                  read::machine_text(machine));
   const auto again = read_machine(toml, "the profile");
   const auto grid = again ? resolve_profile(*again) : again.error();
-  if (!grid) return Error{Fault::kInput, "what was measured gives no valid profile: " + grid.error().message};
+  if (!grid) {  // without a place in a file that is not there
+    const std::string& why = grid.error().message;
+    return Error{Fault::kInput, "what was measured gives no valid profile: " + (again ? why : why.substr(why.find(": ") + 2))};
+  }
   return toml;
 }
 

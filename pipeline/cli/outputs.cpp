@@ -60,15 +60,26 @@ constexpr OwnFile kOwnFiles[] = {
     {"machines", "--target", false, {"^orientation target"}},
 };
 
-/// The operand whose directory, layers or programs contain a file; nullptr for none.
-const std::string* directory_read(const std::string& file, const Arguments& arguments) {
+/// The folder of a file, or of what a link leads to.
+std::optional<write::FileId> folder_id(const std::string& file) {
   std::error_code ignored;
-  const std::string place = fs::absolute(file, ignored).parent_path().string();
-  const auto found = std::ranges::find_if(arguments.operands, [&](const std::string& operand) {
+  const fs::path place = fs::is_symlink(file, ignored) ? fs::weakly_canonical(file, ignored) : fs::absolute(file, ignored);
+  return write::file_id(place.parent_path().string());
+}
+
+/// The directory read, of a job or a chart, in which a file or what a link leads to lies; "" for none.
+std::string directory_read(const std::string& file, const Arguments& arguments) {
+  std::vector<std::string> read = arguments.operands;
+  for (const std::string& chart : arguments.all("--chart")) {
+    const std::string folder = write::is_file(chart) ? fs::absolute(chart).parent_path().string() : chart;
+    read.insert(read.end(), {folder, folder + "/images", folder + "/print"});
+  }
+  const auto place = folder_id(file);
+  const auto found = std::ranges::find_if(read, [&](const std::string& directory) {
     return std::ranges::any_of(std::array{"", "/layers", "/program"},
-                               [&](const char* below) { return write::same_file(place, operand + below); });
+                               [&](const char* below) { return place && place == write::file_id(directory + below); });
   });
-  return found == arguments.operands.end() ? nullptr : &*found;
+  return found == read.end() ? "" : *found;
 }
 
 /// What no input may be, or lie in: an output that is there, and the folders in which a run would remove or replace files.
@@ -89,18 +100,14 @@ std::vector<Taken> taken_by(std::span<const std::string> outputs) {
   return taken;
 }
 
-/// The folder of a file, or of what a link leads to.
-std::optional<write::FileId> folder_id(const std::string& file) {
-  std::error_code ignored;
-  const fs::path place = fs::is_symlink(file, ignored) ? fs::weakly_canonical(file, ignored) : fs::absolute(file, ignored);
-  return write::file_id(place.parent_path().string());
-}
-
 std::vector<InputFile> inputs_of(const Arguments& arguments, std::string_view operand_role) {
   std::vector<InputFile> inputs;
   for (const std::string& operand : arguments.operands) inputs.push_back({operand, std::string(operand_role)});
   for (const InputOption& option : kInputs) {
-    for (const std::string& path : arguments.all(option.flag)) inputs.push_back({path, std::string(option.role)});
+    for (const std::string& path : arguments.all(option.flag)) {
+      inputs.push_back({path, std::string(option.role)});
+      if (option.flag == "--chart") inputs.push_back({path + "/chart.json", "the chart"});
+    }
   }
   return inputs;
 }
@@ -213,10 +220,9 @@ Status check_outputs(std::string_view command, const Arguments& arguments) {
     }
     const Status status = check_own_file(path, own.marks);
     if (status) continue;
-    if (const std::string* directory = directory_read(path, arguments)) {
+    if (const std::string directory = directory_read(path, arguments); !directory.empty())
       return Error{Fault::kUsage,
-                   fmt::format("{}: belongs to {}, which this call reads; name another output", path, *directory)};
-    }
+                   fmt::format("{}: belongs to {}, which this call reads; name another output", path, directory)};
     if (!arguments.has("--overwrite")) return status;
   }
   return {};

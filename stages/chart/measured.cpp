@@ -5,8 +5,10 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <optional>
 #include <set>
 
+#include "stages/chart/rows.h"
 #include "stages/data/text/json.h"
 
 namespace lamina::chart {
@@ -16,23 +18,52 @@ std::string list_of(const std::vector<std::uint32_t>& nozzles) {
   return nozzles.empty() ? "none" : fmt::format("{}", fmt::join(nozzles, ", "));
 }
 
-/// A nozzle of a later row that lands too far along the scan stands less far behind than the profile says.
-std::string correct_rows(const Json& nozzles, Machine& machine) {
-  std::vector<double>& rows = machine.head.row_offset_um;
-  std::vector<double> sum(rows.size(), 0), count(rows.size(), 0);
+constexpr double kToldPixels = 0.1, kErrors = 4;  // as of single nozzles
+
+/// Nozzles that were read along the scan or across it, with those that are too uncertain to be told.
+std::vector<std::optional<Located>> read_nozzles(const Json& nozzles, const char* seen, const char* error) {
+  std::vector<std::optional<Located>> read(nozzles.size());
   for (std::size_t n = 0; n < nozzles.size(); ++n) {
-    if (nozzles[n].is_null() || nozzles[n].at("along_um").is_null()) continue;
-    sum[n % rows.size()] += nozzles[n].at("along_um").get<double>();
-    ++count[n % rows.size()];
+    if (nozzles[n].is_null() || nozzles[n].at(seen).is_null()) continue;
+    read[n] = Located{nozzles[n].at(seen).get<double>(), nozzles[n].at(error).get<double>()};
   }
+  return read;
+}
+
+/// A nozzle of a later row that lands too far along the scan stands less far behind than the profile says.
+std::string correct_rows(const std::vector<std::optional<Located>>& along, const Chart& chart, Machine& machine) {
+  std::vector<double>& rows = machine.head.row_offset_um;
+  if (rows.size() < 2) return "";
+  const auto seen = rows_of(along, static_cast<std::uint32_t>(rows.size()));
+  const double pixel_um = 1e-3 * (chart.scan_along_x ? chart.pixel_x_nm : chart.pixel_y_nm);
   std::string line;
+  std::size_t untold = 0;
   for (std::size_t r = 1; r < rows.size(); ++r) {
-    if (count[r] == 0 || count[0] == 0) continue;
-    const double late = std::round(sum[r] / count[r] - sum[0] / count[0]);
+    line += line.empty() ? "rows      against the first one, changed by " : ", ";
+    if (!seen[r] || kErrors * seen[r]->error_um > kToldPixels * pixel_um) {
+      line += "untold";
+      ++untold;
+      continue;
+    }
+    const double late = std::round(seen[r]->um);
     rows[r] -= late;
-    line += fmt::format("{}{:+g} um", line.empty() ? "rows      against the first one, changed by " : ", ", -late);
+    line += fmt::format("{:+g} um", 0 - late);
   }
-  return line;
+  const char* why = "the photograph does not show them within a tenth of a pixel";
+  if (untold + 1 == rows.size()) return fmt::format("rows      not told: {}", why);
+  return untold == 0 ? line : fmt::format("{}: {}", line, why);
+}
+
+/// How far nozzles lie off, of all that were read.
+std::string places_line(const std::vector<std::optional<Located>>& along, const std::vector<std::optional<Located>>& across) {
+  const auto most = [](const std::vector<std::optional<Located>>& nozzles) {
+    double um = 0;
+    for (const auto& one : nozzles) um = std::max(um, one ? std::abs(one->um) : 0);
+    return um;
+  };
+  const auto read = std::ranges::count_if(along, [](const auto& one) { return one.has_value(); });
+  return fmt::format("nozzles   {} read, within {:.0f} um along the scan and {:.0f} across it of the head's line", read,
+                     most(along), most(across));
 }
 
 /// A length, or that it cannot be told.
@@ -93,13 +124,16 @@ std::vector<std::string> take(const Json& json, const Chart& chart, Machine& mac
     if (n < nozzles.size() && nozzles[n].is_null()) blocked.insert(n);
   }
   std::vector<std::string> lines;
-  lines.push_back(fmt::format("photo     {:.1f} pixels a mm, dashes within {:.0f} um of their places",
+  lines.push_back(fmt::format("photo     {:.1f} pixels a mm, half of the dashes within {:.0f} um of their nozzle's place",
                               json.at("pixels_a_mm").get<double>(), json.at("scatter_um").get<double>()));
+  const auto read_along = read_nozzles(nozzles, "along_seen_um", "along_error_um"),
+             read_across = read_nozzles(nozzles, "across_seen_um", "across_error_um");
+  lines.push_back(places_line(read_along, read_across));
   machine.head.blocked.assign(blocked.begin(), blocked.end());
   lines.push_back("blocked   " + list_of(machine.head.blocked));
   if (!weak.empty()) lines.push_back(fmt::format("weak      {}: seen by times, not taken for blocked", list_of(weak)));
   if (!untold.empty()) lines.push_back("unknown   " + list_of(untold) + ": nothing of theirs can be seen");
-  if (auto rows = correct_rows(nozzles, machine); !rows.empty()) lines.push_back(std::move(rows));
+  if (auto rows = correct_rows(read_along, chart, machine); !rows.empty()) lines.push_back(std::move(rows));
   for (std::string& line : swath_lines(json.at("swaths"))) lines.push_back(std::move(line));
   for (std::string& line : joint_lines(json.at("joints"))) lines.push_back(std::move(line));
   if (auto untold_offsets = untold_line(nozzles); !untold_offsets.empty()) lines.push_back(std::move(untold_offsets));

@@ -7,6 +7,8 @@
 #include <numbers>
 #include <opencv2/imgproc.hpp>
 
+#include "stages/scan/extra.h"
+
 namespace lamina::scan {
 namespace {
 
@@ -306,16 +308,36 @@ std::vector<BodySeen> bodies_of(const cv::Mat& dark, const Cells& layer, double 
   return bodies;
 }
 
+/// How alike the layer is when it is seen in a mirror, at its best.
+double mirrored_likeness(const cv::Mat& photo, const cv::Mat& cells, const Cells& layer) {
+  double best = -1;
+  for (const int axis : {0, 1}) {
+    cv::Mat mirrored;
+    cv::flip(cells, mirrored, axis);
+    double likeness = 0;
+    first_view(photo, mirrored, layer, likeness);
+    best = std::max(best, likeness);
+  }
+  return best;
+}
+
 }  // namespace
 
 Result<Comparison> compare_layer(const Photo& photo, const ExpectedLayer& layer) {
-  constexpr double kLeastLikeness = 0.25;
+  constexpr double kLeastLikeness = 0.25, kClearly = 0.05;
   const Cells cells = cells_of(layer);
-  if (cells.share.empty()) return Error{Fault::kInput, "the layer is empty, or too large for these pixels of the photograph"};
+  if (cells.share.empty())
+    return Error{Fault::kInput,
+                 "cannot be compared: the layer is empty, or too large for pixels of the size that --pixel says"};
   const double wide = std::max(8.0, 0.08 * std::max(cells.share.cols, cells.share.rows));
   const cv::Mat seen = without_shade(-photo.light, wide), wanted = without_shade(cells.share, wide);
   Comparison comparison;
   comparison.view = first_view(seen, wanted, cells, comparison.likeness);
+  if (const double mirrored = mirrored_likeness(seen, wanted, cells);
+      mirrored >= kLeastLikeness && mirrored > comparison.likeness + kClearly)
+    return Error{Fault::kInput,
+                 "is mirrored: the layer lies in it as in a mirror; turn the picture over, or photograph the layer "
+                 "from above"};
   if (comparison.likeness < kLeastLikeness)
     return Error{Fault::kInput,
                  "does not show the layer: it has to lie upright, turned by at most 6 degrees, with pixels of about "
@@ -338,21 +360,30 @@ Result<Comparison> compare_layer(const Photo& photo, const ExpectedLayer& layer)
       if (full.at<std::uint8_t>(y, x) != 0) inked.push_back(dark.at<float>(y, x));
     }
   }
+  if (inked.empty())
+    return Error{
+        Fault::kInput,
+        "cannot be compared: no place of the layer, several pixels of the photograph wide, is printed in full, to tell "
+        "the darkness of ink by; where drops are strewn, take the layer of a job without --saturation"};
   const double ink = median_of(inked);
   if (ink < 0.05)
     return Error{Fault::kInput, "shows no ink where the layer has some: less than a twentieth darker than the blank sheet"};
   comparison.bands = missing_bands(dark, full, cells, layer.scan_along_x, ink);
   comparison.bodies = bodies_of(dark, cells, ink);
+  comparison.extra = extra_ink(photo, layer, comparison.view, ink);
   return comparison;
 }
 
 Json comparison_json(const Comparison& comparison) {
-  Json json = {{"likeness", comparison.likeness}, {"missing", Json::array()}, {"bodies", Json::array()}};
+  Json json = {
+      {"likeness", comparison.likeness}, {"missing", Json::array()}, {"bodies", Json::array()}, {"extra", Json::array()}};
   for (const MissingBand& band : comparison.bands)
     json["missing"].push_back({{"from_mm", band.from_mm}, {"to_mm", band.to_mm}, {"missing_mm", band.missing_mm}});
   for (const BodySeen& body : comparison.bodies)
     json["bodies"].push_back(
         {{"x_mm", body.x_mm}, {"y_mm", body.y_mm}, {"expected_mm2", body.expected_mm2}, {"seen_mm2", body.seen_mm2}});
+  for (const ExtraInk& ink : comparison.extra)
+    json["extra"].push_back({{"x_mm", ink.x_mm}, {"y_mm", ink.y_mm}, {"mm2", ink.mm2}});
   return json;
 }
 

@@ -30,15 +30,21 @@ struct BodySeen {
   double x_mm = 0, y_mm = 0, expected_mm2 = 0, seen_mm2 = 0;  // the place is its middle
 };
 
+/// Ink where the layer has none. The place is its middle.
+struct ExtraInk {
+  double x_mm = 0, y_mm = 0, mm2 = 0;
+};
+
 struct Comparison {
   View view;
   double likeness = 0;  // correlation of layer and photograph, 1 at most
   std::vector<MissingBand> bands;
   std::vector<BodySeen> bodies;
+  std::vector<ExtraInk> extra;
 };
 
 /// Registers the photograph, turned by at most 6 degrees, by its content, and compares.
-/// errors  kInput: the layer is empty, or the photograph does not show it
+/// errors  kInput: the layer is empty, or the photograph does not show it, or is mirrored
 /// cost    a second for a million pixels
 Result<Comparison> compare_layer(const Photo& photo, const ExpectedLayer& layer);
 

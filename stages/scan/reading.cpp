@@ -75,12 +75,13 @@ Json reading_json(const ChartReading& reading) {
     for (const auto& one : list) {
       Json& entry = json.emplace_back();
       if (!one) continue;
-      const auto add = [&](const char* name, const char* error, const Measure& measure) {
+      const auto add = [&](const char* name, const char* seen, const char* error, const Measure& measure) {
         entry[name] = measure.told ? Json(rounded(measure.um)) : Json();
+        entry[seen] = measure.error_um > 0 ? Json(rounded(measure.um)) : Json();  // null: all dashes are marred
         entry[error] = std::round(100 * measure.error_um) / 100;
       };
-      add("along_um", "along_error_um", one->along);
-      add("across_um", "across_error_um", one->across);
+      add("along_um", "along_seen_um", "along_error_um", one->along);
+      add("across_um", "across_seen_um", "across_error_um", one->across);
     }
     return json;
   };

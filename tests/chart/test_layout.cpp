@@ -219,7 +219,10 @@ TEST(ChartMeasured, ReadingsBecomeKeysOfAProfile) {
   chart.layer_mm = 0.1;
   const char* reading =
       R"({"pixels_a_mm":20,"scatter_um":5,"blocked":[2],"weak":[],"untold":[],"swaths":[{"along_um":0,"across_um":0},{"along_um":30,"across_um":null},null],)"
-      R"("nozzles":[{"along_um":-5,"across_um":0},{"along_um":5,"across_um":0},null,{"along_um":5,"across_um":1},{"along_um":null,"across_um":1},null],)"
+      R"("nozzles":[{"along_um":-5,"along_seen_um":-5,"along_error_um":0.5,"across_um":0,"across_seen_um":0,"across_error_um":0.5},)"
+      R"({"along_um":5,"along_seen_um":5,"along_error_um":0.5,"across_um":0,"across_seen_um":0,"across_error_um":0.5},null,)"
+      R"({"along_um":5,"along_seen_um":5,"along_error_um":0.5,"across_um":1,"across_seen_um":1,"across_error_um":0.5},)"
+      R"({"along_um":null,"along_seen_um":-8,"along_error_um":3,"across_um":1,"across_seen_um":1,"across_error_um":0.5},null],)"
       R"("joints":[{"swath":1,"along_um":30,"across_um":-41,"agrees":false}],)"
       R"("dot_gain_um":{"along":12.4,"across":30.6},"wedges":[{"pixels_percent":50,"seen_percent":61}]})";
   const auto lines = chart::take_over(reading, chart, machine);
@@ -227,8 +230,9 @@ TEST(ChartMeasured, ReadingsBecomeKeysOfAProfile) {
   EXPECT_EQ(machine.head.blocked, (std::vector<std::uint32_t>{2}));
   EXPECT_EQ(machine.head.row_offset_um, (std::vector<double>{0, 2530}));
   EXPECT_EQ(machine.head.dot_gain_um, (std::array<double, 2>{31, 12}));
-  for (const char* words : {"--bleed 31x12", "was not printed", "untold across, +30 um along", "joint 1   shows -41 um across",
-                            "1 of 8 offsets", "50 % of the pixels, 6.2 % saturation: 61 %"})
+  for (const char* words :
+       {"--bleed 31x12", "was not printed", "untold across, +30 um along", "joint 1   shows -41 um across", "1 of 8 offsets",
+        "4 read, within 8 um along the scan and 1 across", "changed by -10 um", "50 % of the pixels, 6.2 % saturation: 61 %"})
     EXPECT_EQ(std::ranges::count_if(*lines, [&](const std::string& line) { return line.find(words) != std::string::npos; }), 1)
         << words;
   EXPECT_FALSE(chart::take_over("{}", chart, machine));

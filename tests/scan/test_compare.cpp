@@ -60,7 +60,7 @@ TEST(ComparedLayer, MissingSwathsAreFoundAndNoneIsMadeUp) {
   machine.mounting.tilt_deg = 45;
   const auto grid = program::make_head_grid(machine);
   ASSERT_TRUE(grid);
-  std::size_t unread = 0, missing = 0, found = 0, wrong = 0;
+  std::size_t unread = 0, missing = 0, found = 0, wrong = 0, extra = 0;
   std::vector<double> area;
   for (int i = 0; i < layers; ++i) {
     std::mt19937_64 random(static_cast<std::uint64_t>(i) * 104'729 + 7);
@@ -122,6 +122,7 @@ TEST(ComparedLayer, MissingSwathsAreFoundAndNoneIsMadeUp) {
     if (asked != nullptr && (hit != (gap != UINT32_MAX) || seen->bands.size() > 1))
       printf("layer %d: %zu bands, gap %u, likeness %.3f, ink %.2f, turn %.2f\n", i, seen->bands.size(), gap, seen->likeness,
              camera.ink, camera.turn_deg);
+    extra += seen->extra.size();
     if (gap == UINT32_MAX) {
       double expected = 0, got = 0;
       for (const scan::BodySeen& body : seen->bodies) expected += body.expected_mm2, got += body.seen_mm2;
@@ -135,6 +136,112 @@ TEST(ComparedLayer, MissingSwathsAreFoundAndNoneIsMadeUp) {
       area.empty() ? 0 : 100 * area.back());
   EXPECT_GE(static_cast<double>(found), 0.95 * static_cast<double>(missing));
   EXPECT_EQ(wrong, 0u);
+  EXPECT_EQ(extra, 0u);
+}
+
+/// A sheet of squares and an L, photographed; the layer has some of it.
+struct SheetOfBlocks {
+  explicit SheetOfBlocks(bool all) {
+    machine.name = "along x";
+    machine.mounting.tilt_deg = 45;
+    const auto made = program::make_head_grid(machine);
+    EXPECT_TRUE(made);
+    grid = *made;
+    const double x_mm = grid.place_nm * 1e-6, y_mm = grid.line_nm * 1e-6;
+    layer.columns = grid.image.columns();
+    layer.row_offset.push_back(0);
+    for (std::uint32_t r = 0; r < grid.image.rows(); ++r) {
+      bool on = false;
+      for (std::uint32_t c = 0; c <= layer.columns; ++c) {
+        const double x = c * x_mm, y = r * y_mm;
+        const auto within = [&](double left, double top, double wide, double deep) {
+          return x >= left && x < left + wide && y >= top && y < top + deep;
+        };
+        const bool set = c < layer.columns && (within(30, 40, 12, 4) || within(30, 40, 4, 16) ||
+                                               (all && (within(50, 40, 6, 6) || within(52, 60, 3, 3))));
+        if (set != on) layer.change.push_back(c);
+        on = set;
+      }
+      layer.row_offset.push_back(static_cast<std::uint32_t>(layer.change.size()));
+    }
+  }
+  Machine machine;
+  HeadGrid grid;
+  Runs layer;
+};
+
+cv::Mat grey_of_blocks(const SheetOfBlocks& sheet, std::uint64_t seed) {
+  std::mt19937_64 random(seed);
+  const Camera camera{.pixels_a_mm = 10,
+                      .turn_deg = 2,
+                      .tilt_x = 0.01,
+                      .noise = 4,
+                      .shade_x = 0.15,
+                      .shade_y = -0.15,
+                      .dark_specks = 40,
+                      .bright_specks = 10};
+  Printing printing;
+  printing.gain_um = 10;
+  const GreyPicture picture = photograph(print_sheet(sheet.grid, sheet.layer, printing), camera, random);
+  cv::Mat grey(picture.height, picture.width, CV_8U);
+  std::memcpy(grey.data, picture.grey.data(), picture.grey.size());
+  return grey;
+}
+
+Result<scan::Comparison> compare_blocks(const SheetOfBlocks& sheet, const cv::Mat& grey) {
+  return scan::compare_layer(scan::photo_of(grey.clone()),
+                             {sheet.layer.view(), sheet.grid.place_nm, sheet.grid.line_nm, true, 100});
+}
+
+TEST(ComparedLayer, InkWhereTheLayerHasNoneIsTold) {
+  const SheetOfBlocks all(true), one(false);
+  const cv::Mat grey = grey_of_blocks(all, 1);
+  const auto seen = compare_blocks(one, grey);
+  ASSERT_TRUE(seen) << seen.error().message;
+  ASSERT_EQ(seen->extra.size(), 2u);
+  EXPECT_NEAR(seen->extra[0].x_mm, 53, 0.3);
+  EXPECT_NEAR(seen->extra[0].y_mm, 43, 0.3);
+  EXPECT_NEAR(seen->extra[0].mm2, 36, 3);
+  EXPECT_NEAR(seen->extra[1].mm2, 9, 1);
+  const auto whole = compare_blocks(all, grey);
+  ASSERT_TRUE(whole) << whole.error().message;
+  EXPECT_TRUE(whole->extra.empty());
+}
+
+/// Eight in nine pixels are blank: nothing is printed in full.
+TEST(ComparedLayer, ALayerOfStrewnDropsIsRefusedForItself) {
+  const SheetOfBlocks one(false);
+  SheetOfBlocks strewn = one;
+  strewn.layer = {one.layer.columns, {0}, {}};
+  for (std::uint32_t r = 0; r < one.layer.view().rows(); ++r) {
+    const auto row = one.layer.view().row(r);
+    for (std::size_t i = 0; r % 3 == 0 && i + 1 < row.size(); i += 2) {
+      for (std::uint32_t c = row[i]; c < row[i + 1]; c += 3) strewn.layer.change.insert(strewn.layer.change.end(), {c, c + 1});
+    }
+    strewn.layer.row_offset.push_back(static_cast<std::uint32_t>(strewn.layer.change.size()));
+  }
+  const auto refused = compare_blocks(strewn, grey_of_blocks(strewn, 3));
+  ASSERT_FALSE(refused);
+  EXPECT_NE(refused.error().message.find("without --saturation"), std::string::npos) << refused.error().message;
+}
+
+TEST(ComparedLayer, AMirroredPhotographIsRefused) {
+  const SheetOfBlocks all(true), one(false);
+  for (const SheetOfBlocks* sheet : {&all, &one}) {
+    const cv::Mat grey = grey_of_blocks(*sheet, 2);
+    EXPECT_TRUE(compare_blocks(*sheet, grey));
+    for (const bool upside : {false, true}) {
+      cv::Mat mirrored(grey.rows, grey.cols, CV_8U);
+      for (int y = 0; y < grey.rows; ++y) {
+        for (int x = 0; x < grey.cols; ++x)
+          mirrored.at<std::uint8_t>(y, x) =
+              upside ? grey.at<std::uint8_t>(grey.rows - 1 - y, x) : grey.at<std::uint8_t>(y, grey.cols - 1 - x);
+      }
+      const auto refused = compare_blocks(*sheet, mirrored);
+      ASSERT_FALSE(refused);
+      EXPECT_NE(refused.error().message.find("is mirrored"), std::string::npos) << refused.error().message;
+    }
+  }
 }
 
 }  // namespace

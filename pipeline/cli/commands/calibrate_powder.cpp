@@ -48,7 +48,9 @@ Outcome weigh(const ChartRequest& request, double mass_mg, const Arguments& argu
   const double before = machine->head.drop_pl;
   machine->head.drop_pl = chart::drop_pl_of(mass_mg, density, static_cast<double>(request.drops));
   const auto profile = measured_profile(*machine);
-  if (!profile) return profile.error();
+  if (!profile)
+    return at_option("--weighed-mg",
+                     fmt::format("{} of {} drops: {}", arguments.text("--weighed-mg"), request.drops, profile.error().message));
   if (Status status = write::write_file(request.directory, *profile); !status) return status;
   if (!arguments.has("--quiet"))
     context.say_text(fmt::format("drop      {:.4g} pl, was {:.4g}\nprofile   {}\n", machine->head.drop_pl, before,

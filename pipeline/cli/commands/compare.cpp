@@ -7,6 +7,7 @@
 #include "stages/data/text/json.h"
 #include "stages/data/units.h"
 #include "stages/read/image.h"
+#include "stages/write/manifest/images_on_record.h"
 
 namespace lamina::pipeline {
 namespace {
@@ -32,7 +33,7 @@ Outcome run_compare(const Arguments& arguments, Context& context) {
   if (Status status = arguments.read("--pixel", {1, 2000, " um"}, photo_um); !status) return status;
   const auto machine = arguments.has("--machine") ? find_machine(arguments.text("--machine")) : Machine();
   if (!machine) return machine.error();
-  const auto layer = read::dark_pixels(arguments.operands[0], 128);
+  const auto layer = read::dark_pixels(arguments.operands[0], are_grey_drops(arguments.operands[0]) ? 255 : 128);
   if (!layer) return layer.error();
   if (!(layer->dpi_x > 0) || !(layer->dpi_y > 0))
     return Error{Fault::kInput, fmt::format("{}: tells no resolution; give an image that lamina wrote", arguments.operands[0])};
@@ -56,6 +57,10 @@ Outcome run_compare(const Arguments& arguments, Context& context) {
   for (const Json& body : json["bodies"])
     answer.say(fmt::format("area      {:.2f} of {:.2f} mm2 about {:.1f}, {:.1f} mm from the left and the back",
                            number(body["seen_mm2"]), number(body["expected_mm2"]), number(body["x_mm"]), number(body["y_mm"])));
+  for (const Json& ink : json["extra"])
+    answer.say(
+        fmt::format("extra     {:.2f} mm2 about {:.1f}, {:.1f} mm from the left and the back, where the layer has no ink",
+                    number(ink["mm2"]), number(ink["x_mm"]), number(ink["y_mm"])));
   if (Status status = answer.status(); !status) return status;
   const bool whole = json["missing"].empty();
   json["command"] = "compare";

@@ -54,4 +54,11 @@ Result<ImagesOnRecord> images_on_record(const std::string& path) {
   return told;
 }
 
+bool are_grey_drops(const std::string& image) {
+  const std::string manifest = (fs::path(image).parent_path() / "../manifest.json").string();
+  if (product_of_manifest(manifest) != Product::kImages) return false;
+  const auto read = read_manifest(manifest);
+  return read && read->head.grey_drops();
+}
+
 }  // namespace lamina

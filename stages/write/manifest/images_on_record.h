@@ -20,4 +20,7 @@ struct ImagesOnRecord {
 /// errors  kInput: several images a layer, or layers of several thicknesses
 Result<ImagesOnRecord> images_on_record(const std::string& path);
 
+/// Whether an image is a layer of a job whose manifest says that its grey is drops of a pixel. False where none says so.
+bool are_grey_drops(const std::string& image);
+
 }  // namespace lamina
