@@ -4,6 +4,8 @@
 
 #include <cstdlib>
 
+#include "stages/data/machine.h"
+
 namespace lamina::replay {
 
 std::string fault_of_count(const Machine& machine, const Count& told, const Count& found) {

@@ -5,7 +5,9 @@
 #include <cstdint>
 #include <string>
 
-#include "stages/data/machine.h"
+namespace lamina {
+struct Machine;
+}
 
 namespace lamina::replay {
 

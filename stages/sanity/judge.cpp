@@ -130,11 +130,10 @@ void warn_of_bleed(const Sampling& sampling, std::uint32_t part, double taken, c
                       sampling.part[part]});
 }
 
-/// Whether a solid of a finished job had pixels before bleed or dose took them: what is smaller than one may have had none.
-bool has_pixels(const Box& box, const Sampling& sampling) {
-  if (!sampling.finished || !(sampling.bleeds || sampling.drops_none)) return false;
-  const auto [x, y] = sampling.pixel_mm;
-  return mm(box.width()) >= x && mm(box.depth()) >= y && mm(box.height()) >= sampling.thickest_mm;
+/// Whether bleed or dose took a solid of a finished job: it lies over pixels and is as high as a layer.
+bool was_taken(const Tally& tally, std::uint32_t solid, const Sampling& sampling) {
+  return sampling.finished && (sampling.bleeds || sampling.drops_none) && tally.has_pixels(solid) &&
+         mm(tally.solids()[solid].box.height()) >= sampling.thickest_mm;
 }
 
 void judge_lost(const Tally& tally, const Sampling& sampling, std::vector<Warning>& warnings) {
@@ -142,7 +141,7 @@ void judge_lost(const Tally& tally, const Sampling& sampling, std::vector<Warnin
   for (std::uint32_t s = 0; s < tally.solids().size(); ++s) {
     const Solid& solid = tally.solids()[s];
     if (tally.seen(s) || solid.box.empty()) continue;
-    note(has_pixels(solid.box, sampling) ? taken : worst, solid.part, s, std::abs(solid.mesh_mm3));
+    note(was_taken(tally, s, sampling) ? taken : worst, solid.part, s, std::abs(solid.mesh_mm3));
   }
   for (std::uint32_t part = 0; part < taken.size() && sampling.bleeds; ++part) {
     if (taken[part].count > 0) warn_of_bleed(sampling, part, 1, taken[part], warnings);
