@@ -9,6 +9,13 @@
 #include "stages/sanity/records.h"
 
 namespace lamina::pipeline {
+namespace {
+
+bool any_bleed(const Job& job, bool (*is)(double)) {
+  return std::ranges::any_of(bleeds_of(job), [&](const auto& um) { return std::ranges::any_of(um, is); });
+}
+
+}  // namespace
 
 // The machine and the dose are planned as they were; that they could be, the job has shown.
 void ReportDoubts::plan_again(const Machine* machine, const Scene& scene) {
@@ -45,8 +52,9 @@ ReportDoubts::ReportDoubts(const Manifest& manifest, const Job& job, const Machi
     boxes.part_of_instance.push_back(p);
   }
   std::vector<sanity::Solid> solids = solids_from_above(scene != nullptr ? *scene : boxes);
-  // Beads and doses change the volume on purpose.
-  for (sanity::Solid& solid : solids) solid.closed = solid.closed && !thins(job) && scene != nullptr;
+  // Beads, doses and edges that grow change the volume on purpose.
+  const bool whole = !thins(job) && !any_bleed(job, [](double um) { return um < 0; });
+  for (sanity::Solid& solid : solids) solid.closed = solid.closed && whole && scene != nullptr;
   tally_ = std::make_unique<sanity::Tally>(std::move(solids));
   std::vector<Nm> planes;
   for (const LayerRecord& record : manifest.layers) planes.push_back(record.layer.plane());
@@ -77,9 +85,7 @@ std::vector<Warning> ReportDoubts::tell(const std::vector<std::uint64_t>& set) c
   sampling.part = names;
   sampling.united_mm3 = united_mm3_;
   sampling.finished = true;
-  sampling.bleeds = images && std::ranges::any_of(bleeds_of(job_), [](const std::array<double, 2>& um) {
-                      return um != std::array{0.0, 0.0};
-                    });
+  sampling.bleeds = images && any_bleed(job_, [](double um) { return um > 0; });
   sampling.drops_none = std::ranges::any_of(told_, [](const Warning& warning) { return warning.code == "no-drop"; });
   std::vector<std::uint8_t> filled;
   for (const std::uint64_t pixels : set) filled.push_back(pixels > 0 ? 1 : 0);

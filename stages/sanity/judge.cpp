@@ -162,7 +162,8 @@ void judge_bleed(const Tally& tally, const Sampling& sampling, std::vector<Warni
   for (std::uint32_t g = 0; g < tally.groups().size(); ++g) {
     const Group& group = tally.groups()[g];
     const double left = sampling.finished ? tally.planned_mm3(g) : tally.left_mm3(g);
-    const double planned = !sampling.finished ? tally.planned_mm3(g) : group.closed ? group.least_mm3 : 0;
+    const bool known = group.closed && !sampling.one_sided && too_coarse(group.box, sampling).empty();
+    const double planned = !sampling.finished ? tally.planned_mm3(g) : known ? group.least_mm3 : 0;
     if (!tally.measured(g) || planned <= 0 || left >= kLeft * planned || (sampling.finished && left == 0)) continue;
     note(worst, group.part, g, 1 - left / planned);
   }
