@@ -7,6 +7,8 @@
 #include <vector>
 
 #include "pipeline/job/file.h"
+#include "pipeline/job/heights.h"
+#include "stages/heights/heights.h"
 
 namespace lamina::pipeline {
 namespace {
@@ -23,6 +25,11 @@ double in_millionths(double value) { return static_cast<double>(std::llround(val
 DoseCheck::DoseCheck(const ManifestHead& head, const Machine* machine) : head_(head), machine_(machine) {
   Job job;
   if (read_job_text(head.job_toml, "manifest.json", job)) job_ = std::move(job);
+}
+
+std::optional<Nm> DoseCheck::thickness() const {
+  const auto options = job_ ? heights_options(*job_) : Error{};
+  return options && options->mode == heights::Mode::kUniform ? std::optional(options->set.least()) : std::nullopt;
 }
 
 std::optional<DoseCheck::Wished> DoseCheck::wished(const Layer& layer) const {

@@ -20,6 +20,9 @@ class DoseCheck {
   /// head  outlives this object. machine  of the job; null without one
   DoseCheck(const ManifestHead& head, const Machine* machine);
 
+  /// That all layers of the job have; nothing if they may differ.
+  std::optional<Nm> thickness() const;
+
   /// Empty, or what is wrong. levels  sum of the levels of the layer's image, of a job that has them
   std::string fault(const LayerRecord& record, const LayerPicture& picture, std::uint64_t levels) const;
 

@@ -4,7 +4,6 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
-#include <cstdlib>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -44,10 +43,11 @@ struct Finding {
   std::optional<replay::Count> count;  // of its replayed program
 };
 
-/// Empty, or what is wrong with the vats that feed a layer of a job of several materials.
+/// Empty, or what is wrong with the vats that feed a layer.
 /// feeds  the vats that do, a bit each
 std::string fault_of_feeding(const Inspection& inspection, const LayerRecord& record, std::uint32_t feeds) {
   const ManifestHead& head = inspection.head;
+  if (head.materials.empty()) return fault_of_one_powder(record);
   std::vector<std::uint64_t> set, unfed;
   std::vector<std::uint32_t> vats, vat_of_image;
   for (const ImageRecord& one : record.images) set.push_back(one.set_pixels), unfed.push_back(one.unfed_pixels);
@@ -78,22 +78,15 @@ std::string fault_of_program(const Inspection& inspection, const LayerRecord& re
     const auto replay = inspection.machine->replay(program_of_layer(inspection.directory, inspection.head, record.layer.index),
                                                    record.layer, planes, record.program.moved, record.program.lost);
     if (!replay) return fmt::format("{}: {}", name, replay.error().message);
-    if (same && (replay->drops != record.program.drops || replay->spat != record.program.spat)) {
-      return fmt::format("{}: {} drops and {} off the bed, the manifest says {} and {}", name, replay->drops, replay->spat,
-                         record.program.drops, record.program.spat);
-    }
-    const auto& jets = inspection.machine->profile().head;  // further sweeps for blocked nozzles are over no place of their own
-    const bool counted = jets.most_drops > 1 && (jets.blocked.empty() || jets.blocked_rule != BlockedRule::kSecondPass);
-    if (same && counted && replay->added != record.program.added_sweeps) {
-      return fmt::format("{}: {} sweeps are there for the head's frequency, the manifest says {}", name, replay->added,
-                         record.program.added_sweeps);
-    }
-    const std::int64_t told = record.program.microseconds;
-    if (same && told > 0 && std::abs(replay->microseconds - told) > 1) {
-      return fmt::format("{}: takes {:.6f} s, the manifest says {:.6f}", name, replay->seconds(),
-                         1e-6 * static_cast<double>(told));
-    }
-    if (same && !inspection.head.materials.empty()) {
+    const ProgramRecord& says = record.program;
+    const replay::Count told{.drops = says.drops,
+                             .sweeps = says.sweeps,
+                             .added = says.added_sweeps,
+                             .microseconds = says.microseconds,
+                             .spat = says.spat};
+    if (std::string fault = fault_of_count(inspection.machine->profile(), told, *replay); same && !fault.empty())
+      return fmt::format("{}: {}", name, fault);
+    if (same) {
       std::string fault = fault_of_feeding(inspection, record, replay->vats);
       if (!fault.empty()) return fmt::format("{}: layer {}: {}", name, record.layer.index, fault);
     }
@@ -208,6 +201,7 @@ void check_layers(const std::string& directory, const Manifest& manifest, bool q
   Inspection inspection{directory, manifest.head, quick, std::nullopt, std::nullopt, report};
   if (!manifest.head.machine.empty()) prepare_replay(inspection);
   inspection.doses.emplace(manifest.head, inspection.machine ? &inspection.machine->profile() : nullptr);
+  check_heights(manifest, inspection.doses->thickness(), report);
   if (!manifest.head.machine.empty()) {
     check_frame(inspection, report);
     if (!cost && inspection.machine) cost.emplace(inspection.machine->profile(), manifest);

@@ -7,7 +7,9 @@
 #include <utility>
 
 #include "stages/dose/saturate.h"
+#include "stages/program/head_grid.h"
 #include "stages/write/levels/level_format.h"
+#include "stages/write/program/care_check.h"
 
 namespace lamina::pipeline {
 
@@ -38,6 +40,12 @@ void DosePlan::thin(std::uint32_t layer, Runs& image, Runs& second, Runs& third)
 Status DosePlan::decide(const Job& job, const Machine* machine, std::uint32_t sweep_drops, const Scene& scene,
                         std::uint32_t layers, const std::array<std::uint32_t, 2>& range,
                         const std::function<Layer(std::uint32_t)>& layer, std::vector<Warning>& warnings) {
+  if (core_ == 0 &&
+      static_cast<double>(nm_of(job.dose.shell_mm)) * std::max(grid_.x.pixels_per_nm(), grid_.y.pixels_per_nm()) < 1) {
+    warnings.push_back({"no-drop",
+                        "dose.core: 0 without a shell of at least a pixel jets no drop, the parts stay loose powder; add "
+                        "--shell or give a share above 0"});
+  }
   const bool asked = wishes_.has_value();
   // Without a machine, formats that carry levels have those of the voxels.
   if (asked || (job.levels > 0 && (machine != nullptr || write::find_level_format(job.format) == nullptr)))
@@ -79,6 +87,12 @@ Status DosePlan::decide(const Job& job, const Machine* machine, std::uint32_t sw
   for (std::uint32_t i = 0; i < layers; ++i) budget_->foresee(layer(i), i >= range[0] && i < range[1]);
   if (asked) rules_.most_drops = std::max(1u, budget_->most_drops());
   return budget_->judge(job.allow_unbound, warnings);
+}
+
+void warn_of_machine(const Machine& machine, const HeadGrid& grid, std::vector<Warning>& warnings) {
+  if (std::string idle = write::idle_care(machine); !idle.empty()) warnings.push_back({"care", std::move(idle)});
+  if (std::string joints = program::idle_joints(machine, grid); !joints.empty())
+    warnings.push_back({"joints", std::move(joints)});
 }
 
 Status DosePlan::check_images(std::string_view format) const {

@@ -23,6 +23,9 @@
 
 namespace lamina::pipeline {
 
+/// What a machine's profile has that does nothing: care, joints.
+void warn_of_machine(const Machine& machine, const HeadGrid& grid, std::vector<Warning>& warnings);
+
 class DosePlan {
  public:
   DosePlan(const Job& job, const PixelGrid& grid);

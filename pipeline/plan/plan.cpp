@@ -21,11 +21,9 @@
 #include "stages/data/text/readable.h"
 #include "stages/geometry/blocks/mesh_blocks.h"
 #include "stages/heights/build_steps.h"
-#include "stages/program/head_grid.h"
 #include "stages/raster/beams.h"
 #include "stages/write/extrusion_format.h"
 #include "stages/write/levels/level_format.h"
-#include "stages/write/program/care_check.h"
 #include "stages/write/slice_format.h"
 
 namespace lamina::pipeline {
@@ -194,9 +192,7 @@ class Planner {
       Result<std::string> steps = heights::check_build_steps(*machine(), plan_.heights.table);
       if (!steps) return steps.error();
       if (!steps->empty()) plan_.warnings.push_back({"build-steps", std::move(*steps)});
-      if (std::string idle = write::idle_care(*machine()); !idle.empty()) plan_.warnings.push_back({"care", std::move(idle)});
-      std::string joints = program::idle_joints(*machine(), printer_.machine->grid);
-      if (!joints.empty()) plan_.warnings.push_back({"joints", std::move(joints)});
+      warn_of_machine(*machine(), printer_.machine->grid, plan_.warnings);
     }
     const auto range = layer_range(job(), plan_.layer_count);
     if (!range) return range.error();
@@ -270,13 +266,6 @@ class Planner {
   Status index_images() {
     if (!images()) return {};
     const PixelGrid grid = printer_.grid;
-    if (job().dose.core == 0 &&
-        static_cast<double>(nm_of(job().dose.shell_mm)) * std::max(grid.x.pixels_per_nm(), grid.y.pixels_per_nm()) < 1) {
-      plan_.warnings.push_back(
-          {"no-drop",
-           "dose.core: 0 without a shell of at least a pixel jets no drop, the parts stay loose powder; add --shell or "
-           "give a share above 0"});
-    }
     // The slicer refers to the scene's meshes, the rasterizer takes those it is given.
     std::optional<Scene> copy;
     if (beads_) copy.emplace(*plan_.scene);

@@ -152,7 +152,7 @@ Result<Report> make_report(const std::string& path, const ReportOptions& options
   } else {
     report.without_parts = shown.error().message;
   }
-  ReportDoubts doubts(manifest, job, parts ? &*parts : nullptr);
+  ReportDoubts doubts(manifest, job, source->machine ? &*source->machine : nullptr, parts ? &*parts : nullptr);
 
   // Reserves room for the layers' lines and the rest of the page.
   std::uint64_t taken = (views.empty() ? 150'000 : 50'000) + 150 * manifest.layers.size();

@@ -2,12 +2,48 @@
 
 #include <algorithm>
 
+#include "pipeline/plan/dose.h"
 #include "pipeline/run/sanity.h"
+#include "stages/program/head_grid.h"
 #include "stages/sanity/crossed.h"
+#include "stages/sanity/records.h"
 
 namespace lamina::pipeline {
+namespace {
 
-ReportDoubts::ReportDoubts(const Manifest& manifest, const Job& job, const Scene* scene) : manifest_(manifest), job_(job) {
+bool any_bleed(const Job& job, bool (*is)(double)) {
+  return std::ranges::any_of(bleeds_of(job), [&](const auto& um) { return std::ranges::any_of(um, is); });
+}
+
+}  // namespace
+
+// The machine and the dose are planned as they were; that they could be, the job has shown.
+void ReportDoubts::plan_again(const Machine* machine, const Scene& scene) {
+  const ManifestHead& head = manifest_.head;
+  if (const auto grid = machine != nullptr ? program::make_head_grid(*machine) : Error{}; grid)
+    warn_of_machine(*machine, *grid, told_);
+  job_.allow_unbound = true;
+  static_cast<void>(DosePlan(job_, head.grid)
+                        .decide(
+                            job_, machine, head.sweep_drops, scene, head.layer_count, {head.first_layer, head.last_layer},
+                            [this](std::uint32_t i) { return manifest_.layers[i].layer; }, told_));
+}
+
+void ReportDoubts::look_at_records() {
+  const std::vector<JobMaterial>& materials = manifest_.head.materials;
+  std::uint64_t lost = 0;
+  for (const LayerRecord& record : manifest_.layers) lost += record.program.lost;
+  sanity::warn_of_lost_pixels(lost, told_);
+  for (std::size_t m = 0; m < materials.size(); ++m) {
+    UnfedPowder powder{materials[m].name};
+    for (const LayerRecord& record : manifest_.layers)
+      powder.add(record.layer, record.image_of(m, materials.size()).unfed_pixels);
+    sanity::warn_of_unfed(powder, told_);
+  }
+}
+
+ReportDoubts::ReportDoubts(const Manifest& manifest, const Job& job, const Machine* machine, const Scene* scene)
+    : manifest_(manifest), job_(job) {
   const ManifestHead& head = manifest.head;
   Scene boxes;  // of first copies
   for (std::uint32_t p = 0; scene == nullptr && p < head.parts.size(); ++p) {
@@ -16,10 +52,8 @@ ReportDoubts::ReportDoubts(const Manifest& manifest, const Job& job, const Scene
     boxes.part_of_instance.push_back(p);
   }
   std::vector<sanity::Solid> solids = solids_from_above(scene != nullptr ? *scene : boxes);
-  // Beads and doses change the volume on purpose.
-  const bool whole = !thins(job) && std::ranges::all_of(bleeds_of(job), [](const std::array<double, 2>& um) {
-    return um == std::array{0.0, 0.0};
-  });
+  // Beads, doses and edges that grow change the volume on purpose.
+  const bool whole = !thins(job) && !any_bleed(job, [](double um) { return um < 0; });
   for (sanity::Solid& solid : solids) solid.closed = solid.closed && whole && scene != nullptr;
   tally_ = std::make_unique<sanity::Tally>(std::move(solids));
   std::vector<Nm> planes;
@@ -28,7 +62,10 @@ ReportDoubts::ReportDoubts(const Manifest& manifest, const Job& job, const Scene
   const bool thinned = head.product == Product::kImages && thins(job);
   if (scene != nullptr && !thinned) crossed_ = sanity::crossed_planes(scene->meshes, scene->instances, planes);
   if (scene != nullptr) united_mm3_ = united_in(*scene, *tally_);
-  if (head.product == Product::kImages) tally_->look_through(head.grid);
+  if (head.product != Product::kImages) return;
+  tally_->look_through(head.grid);
+  if (manifest.layers.size() == head.layer_count) plan_again(machine, scene != nullptr ? *scene : boxes);
+  look_at_records();
 }
 
 void ReportDoubts::look(const Layer& layer, const RunsView& image) {
@@ -39,7 +76,7 @@ void ReportDoubts::look(const Layer& layer, const RunsView& image) {
 
 std::vector<Warning> ReportDoubts::tell(const std::vector<std::uint64_t>& set) const {
   const ManifestHead& head = manifest_.head;
-  std::vector<Warning> warnings;
+  std::vector<Warning> warnings = told_;
   if (head.first_layer != 0 || head.last_layer != head.layer_count) return warnings;
   const bool images = head.product == Product::kImages;
   sanity::Sampling sampling = sampling_of(job_, images ? &head.grid : nullptr);
@@ -47,6 +84,9 @@ std::vector<Warning> ReportDoubts::tell(const std::vector<std::uint64_t>& set) c
   for (const PartSummary& part : head.parts) names.push_back(part.path);
   sampling.part = names;
   sampling.united_mm3 = united_mm3_;
+  sampling.finished = true;
+  sampling.bleeds = images && any_bleed(job_, [](double um) { return um > 0; });
+  sampling.drops_none = std::ranges::any_of(told_, [](const Warning& warning) { return warning.code == "no-drop"; });
   std::vector<std::uint8_t> filled;
   for (const std::uint64_t pixels : set) filled.push_back(pixels > 0 ? 1 : 0);
   for (const LayerRecord& record : manifest_.layers) {

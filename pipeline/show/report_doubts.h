@@ -17,8 +17,10 @@ namespace lamina::pipeline {
 
 class ReportDoubts {
  public:
-  /// scene  the parts; null: their boxes as the manifest has them, without volumes. The manifest must outlive this object.
-  ReportDoubts(const Manifest& manifest, const Job& job, const Scene* scene);
+  /// machine  null without one
+  /// scene    the parts; null: their boxes as the manifest has them, without volumes. Manifest and machine must outlive this
+  ///          object.
+  ReportDoubts(const Manifest& manifest, const Job& job, const Machine* machine, const Scene* scene);
 
   /// An image as in its file; from many threads at once.
   void look(const Layer& layer, const RunsView& image);
@@ -27,8 +29,12 @@ class ReportDoubts {
   std::vector<Warning> tell(const std::vector<std::uint64_t>& set) const;
 
  private:
+  void plan_again(const Machine* machine, const Scene& scene);
+  void look_at_records();
+
   const Manifest& manifest_;
   Job job_;
+  std::vector<Warning> told_;  // by the plan and the records of layers, as lamina jet tells them
   std::unique_ptr<sanity::Tally> tally_;
   std::vector<std::uint8_t> crossed_;                        // by layer: whether it may not be empty
   std::function<Result<double>(std::uint32_t)> united_mm3_;  // of a group; empty without the parts

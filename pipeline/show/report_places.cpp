@@ -2,6 +2,7 @@
 
 #include <array>
 #include <nlohmann/json.hpp>
+#include <stdexcept>
 #include <utility>
 
 #include "stages/write/manifest/inspection_file.h"
@@ -15,15 +16,23 @@ using write::report::SeenPlace;
 struct Shown {
   const PixelGrid& grid;
   bool mirrored_x, mirrored_y;
+  std::uint32_t layers;  // of the job
+
+  /// Throws for one that the job has not.
+  std::uint32_t layer(const Json& json) const {
+    const auto number = json.get<std::int64_t>();
+    if (number < 0 || number >= layers) throw std::out_of_range("layer");
+    return static_cast<std::uint32_t>(number);
+  }
 
   /// Throws where something is missing or of another type.
   SeenPlace place(const std::string& code, const std::string& unit, const Json& json) const {
     SeenPlace place;
     place.code = code;
     place.x_mm = json.at("x_mm"), place.y_mm = json.at("y_mm"), place.z_mm = json.at("z_mm");
-    place.layer = place.last_layer = json.at("layer");
+    place.layer = place.last_layer = layer(json.at("layer"));
     std::array<double, 4> box{place.x_mm, place.y_mm, place.x_mm, place.y_mm};
-    if (json.contains("last_layer")) place.last_layer = json.at("last_layer");
+    if (json.contains("last_layer")) place.last_layer = layer(json.at("last_layer"));
     if (json.contains("box_mm")) box = json.at("box_mm");
     if (!unit.empty()) {
       place.amount = json.at(unit);
@@ -42,7 +51,7 @@ struct Shown {
 void add(const Json& json, const Shown& shown, write::report::LayersSeen& seen) {
   for (const Json& warning : json.at("warnings")) {
     Warning& told = seen.warnings.emplace_back(Warning{warning.at("code"), warning.at("text")});
-    if (warning.contains("layer")) told.layer = warning.at("layer");
+    if (warning.contains("layer")) told.layer = shown.layer(warning.at("layer"));
   }
   const Json& found = json.at("inspection");
   constexpr std::array<std::pair<const char*, const char*>, 4> kKinds = {
@@ -62,10 +71,11 @@ void add_inspection(const std::string& directory, const ManifestHead& head, Mirr
   const auto json = read_inspection(directory, head);
   if (!json) return;
   write::report::LayersSeen with = {};
-  const Shown shown{head.grid, mirror == Mirror::kX || mirror == Mirror::kXY, mirror == Mirror::kY || mirror == Mirror::kXY};
+  const Shown shown{head.grid, mirror == Mirror::kX || mirror == Mirror::kXY, mirror == Mirror::kY || mirror == Mirror::kXY,
+                    head.layer_count};
   try {
     add(*json, shown, with);
-  } catch (const Json::exception&) {
+  } catch (const std::exception&) {
     seen.warnings.push_back({"inspection", "inspection.json is not as lamina wrote it; plan the job again with --inspect"});
     return;
   }

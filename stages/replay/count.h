@@ -3,6 +3,11 @@
 
 #include <array>
 #include <cstdint>
+#include <string>
+
+namespace lamina {
+struct Machine;
+}
 
 namespace lamina::replay {
 
@@ -27,6 +32,10 @@ struct Count {
   double seconds() const { return static_cast<double>(microseconds) * 1e-6; }
   void add(const Count& other);
 };
+
+/// Empty, or the first number in which a program differs from what is told of it: drops, sweeps, added sweeps and time; a time
+/// of 0 is untold.
+std::string fault_of_count(const Machine& machine, const Count& told, const Count& found);
 
 /// Binder and powder used by a program.
 struct Material {

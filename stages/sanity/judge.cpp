@@ -115,11 +115,36 @@ Status judge_volumes(const Tally& tally, const Sampling& sampling, std::vector<W
   return {};
 }
 
+/// "a bleed of 40 um", or "its bleed" where parts or edges have several.
+std::string bleed_text(const Sampling& sampling, std::string_view of_several) {
+  const auto [x, y] = sampling.bleed_um;
+  if (x == 0 && y == 0) return std::string(of_several);
+  return fmt::format("a bleed of {} um", x == y ? number_text(x) : number_text(x) + " x " + number_text(y));
+}
+
+void warn_of_bleed(const Sampling& sampling, std::uint32_t part, double taken, const Worst& worst,
+                   std::vector<Warning>& warnings) {
+  warnings.push_back({"bleed",
+                      fmt::format("{}: {} takes away {:.0f} % of it{}; --bleed counts in um", sampling.part[part],
+                                  bleed_text(sampling, "its bleed"), 100 * taken, and_more(worst)),
+                      sampling.part[part]});
+}
+
+/// Whether bleed or dose took a solid of a finished job: it lies over pixels and is as high as a layer.
+bool was_taken(const Tally& tally, std::uint32_t solid, const Sampling& sampling) {
+  return sampling.finished && (sampling.bleeds || sampling.drops_none) && tally.has_pixels(solid) &&
+         mm(tally.solids()[solid].box.height()) >= sampling.thickest_mm;
+}
+
 void judge_lost(const Tally& tally, const Sampling& sampling, std::vector<Warning>& warnings) {
-  WorstOfParts worst;
+  WorstOfParts worst, taken;  // taken: by bleed or dose
   for (std::uint32_t s = 0; s < tally.solids().size(); ++s) {
     const Solid& solid = tally.solids()[s];
-    if (!tally.seen(s) && !solid.box.empty()) note(worst, solid.part, s, std::abs(solid.mesh_mm3));
+    if (tally.seen(s) || solid.box.empty()) continue;
+    note(was_taken(tally, s, sampling) ? taken : worst, solid.part, s, std::abs(solid.mesh_mm3));
+  }
+  for (std::uint32_t part = 0; part < taken.size() && sampling.bleeds; ++part) {
+    if (taken[part].count > 0) warn_of_bleed(sampling, part, 1, taken[part], warnings);
   }
   for (std::uint32_t part = 0; part < worst.size(); ++part) {
     if (worst[part].count == 0) continue;
@@ -132,26 +157,18 @@ void judge_lost(const Tally& tally, const Sampling& sampling, std::vector<Warnin
   }
 }
 
-/// "a bleed of 40 um", or "its bleed" where parts or edges have several.
-std::string bleed_text(const Sampling& sampling, std::string_view of_several) {
-  const auto [x, y] = sampling.bleed_um;
-  if (x == 0 && y == 0) return std::string(of_several);
-  return fmt::format("a bleed of {} um", x == y ? number_text(x) : number_text(x) + " x " + number_text(y));
-}
-
 void judge_bleed(const Tally& tally, const Sampling& sampling, std::vector<Warning>& warnings) {
   WorstOfParts worst;
   for (std::uint32_t g = 0; g < tally.groups().size(); ++g) {
-    const double planned = tally.planned_mm3(g);
-    if (!tally.measured(g) || planned == 0 || tally.left_mm3(g) >= kLeft * planned) continue;
-    note(worst, tally.groups()[g].part, g, 1 - tally.left_mm3(g) / planned);
+    const Group& group = tally.groups()[g];
+    const double left = sampling.finished ? tally.planned_mm3(g) : tally.left_mm3(g);
+    const bool known = group.closed && !sampling.one_sided && too_coarse(group.box, sampling).empty();
+    const double planned = !sampling.finished ? tally.planned_mm3(g) : known ? group.least_mm3 : 0;
+    if (!tally.measured(g) || planned <= 0 || left >= kLeft * planned || (sampling.finished && left == 0)) continue;
+    note(worst, group.part, g, 1 - left / planned);
   }
   for (std::uint32_t part = 0; part < worst.size(); ++part) {
-    if (worst[part].count == 0) continue;
-    warnings.push_back({"bleed",
-                        fmt::format("{}: {} takes away {:.0f} % of it{}; --bleed counts in um", sampling.part[part],
-                                    bleed_text(sampling, "its bleed"), 100 * worst[part].badness, and_more(worst[part])),
-                        sampling.part[part]});
+    if (worst[part].count > 0) warn_of_bleed(sampling, part, worst[part].badness, worst[part], warnings);
   }
 }
 
@@ -159,10 +176,10 @@ void judge_bleed(const Tally& tally, const Sampling& sampling, std::vector<Warni
 
 Status judge_solids(const Tally& tally, const Sampling& sampling, std::vector<Warning>& warnings) {
   judge_lost(tally, sampling, warnings);
-  if (!sampling.one_sided) {
+  if (!sampling.one_sided && !sampling.bleeds) {
     if (Status status = judge_volumes(tally, sampling, warnings); !status) return status;
   }
-  if (tally.looked_at_bleed()) judge_bleed(tally, sampling, warnings);
+  if (tally.looked_at_bleed() || sampling.bleeds) judge_bleed(tally, sampling, warnings);
   return {};
 }
 

@@ -24,11 +24,15 @@ namespace lamina::sanity {
 
 /// How the job sees its solids.
 struct Sampling {
-  std::array<double, 2> pixel_mm{};   // 0 without pixels
-  double thickest_mm = 0;             // of all layers
-  std::array<double, 2> bleed_um{};   // along x and y; 0 where parts or edges have several
-  double tolerance_um = 0;            // of contours
-  double offset_mm = 0;               // of contours
+  std::array<double, 2> pixel_mm{};  // 0 without pixels
+  double thickest_mm = 0;            // of all layers
+  std::array<double, 2> bleed_um{};  // along x and y; 0 where parts or edges have several
+  double tolerance_um = 0;           // of contours
+  double offset_mm = 0;              // of contours
+  /// What was tallied are images of a finished job: without their bleed, and with the drops that they got.
+  bool finished = false;
+  bool bleeds = false;                // of a finished job
+  bool drops_none = false;            // of a finished job: some part gets no drop, which is told already
   bool one_sided = false;             // steps lie inside or outside of the parts, on purpose
   std::span<const std::string> part;  // names of files
   /// What the solids of a group hold together, mm3, where shells overlap or lie inside out too; 0: the volumes of the meshes

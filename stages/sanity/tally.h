@@ -57,6 +57,11 @@ class Tally {
   bool seen(std::uint32_t solid) const {
     return grid_ ? seen_[solid].load(std::memory_order_relaxed) != 0 : planned_mm3(solids_[solid].group) > 0;
   }
+  /// Whether a pixel's centre lies in the solid's box, seen from above; of images.
+  bool has_pixels(std::uint32_t solid) const {
+    const Window& window = solid_window_[solid];
+    return window.first_column < window.last_column && window.first_row < window.last_row;
+  }
   /// Groups beyond the first kMeasured are not measured in images.
   bool measured(std::uint32_t group) const { return !grid_ || group < kMeasured; }
   double planned_mm3(std::uint32_t group) const { return volume(planned_[group]); }

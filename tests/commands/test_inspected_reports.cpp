@@ -7,6 +7,7 @@
 #include <cstdio>
 #include <filesystem>
 #include <nlohmann/json.hpp>
+#include <regex>
 #include <string>
 #include <vector>
 
@@ -125,6 +126,14 @@ TEST_F(InspectedReports, TheManifestIsTheSameAndTheFileIsThatOfItsJob) {
   other.replace(other.find("\"islands\""), 9, "\"Islands\"");
   write_text(directory_ / "out/inspection.json", other);
   EXPECT_EQ(codes(head()["warnings"]).back(), "inspection");
+  // Layers that the job has not.
+  for (const char* beyond : {"4711", "-1"}) {
+    other = std::regex_replace(found, std::regex("\"layer\":[0-9]+"), std::string("\"layer\":") + beyond);
+    ASSERT_EQ(lamina(job({"--overwrite", "--inspect"})).code, 0);
+    write_text(directory_ / "out/inspection.json", other);
+    EXPECT_EQ(codes(head()["warnings"]).back(), "inspection") << beyond;
+    EXPECT_TRUE(head()["places"].empty());
+  }
   for (const char* text : {"", "{", "{\"kind\":\"inspection\"}", "[1]"}) {
     write_text(directory_ / "out/inspection.json", text);
     EXPECT_TRUE(head()["places"].empty()) << text;

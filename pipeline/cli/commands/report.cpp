@@ -55,6 +55,10 @@ Outcome run_report(const Arguments& arguments, Context& context) {
   if (!options.parts.empty() && std::filesystem::is_regular_file(arguments.operands.front(), ignored)) {
     return at_option("--parts", "is of jobs of images; a page of toolpaths has no views of the parts, leave it out");
   }
+  for (const std::string& parts : options.parts) {
+    if (!std::filesystem::exists(parts, ignored))
+      return Error{Fault::kInput, fmt::format("--parts: {}: no such file or folder", parts)};
+  }
   LaidPage laid = laid_page(arguments.operands.front());
   options.laid = std::move(laid.text);
   options.laid_svg = std::move(laid.svg);
@@ -64,6 +68,9 @@ Outcome run_report(const Arguments& arguments, Context& context) {
   Answer answer(arguments, context);
   answer.say(fmt::format("{}: {} of {} layers to look at, {}", output, report->held, report->layers,
                          readable_bytes(report->page.size())));
+  if (const std::uint64_t bytes = report->page.size(); bytes > options.size_limit && !arguments.has("--quiet"))
+    context.say(fmt::format("note: {} takes {}, more than --most-bytes; no page of this job is smaller", output,
+                            readable_bytes(bytes)));
   if (!report->without_parts.empty()) answer.say("views are of the layers: " + report->without_parts);
   return answer.status();
 }

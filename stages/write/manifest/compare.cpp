@@ -121,10 +121,36 @@ std::string fault_of_shares(const ManifestHead& head, const LayerRecord& record)
         return fmt::format("layer {}: its parts have more {} than the {} of all", record.layer.index, what, total);
       left -= share;
     }
-    return {};
+    if (left == 0) return {};
+    return fmt::format("layer {}: its parts have {} of the {} {} of all", record.layer.index, total - left, total, what);
   };
   std::string pixels = fault(record.part_pixels, record.filled_pixels(), "pixels");
   return pixels.empty() ? fault(record.part_drops, record.drops, "drops") : pixels;
+}
+
+std::string fault_of_one_powder(const LayerRecord& record) {
+  for (const ImageRecord& image : record.images) {
+    if (image.unfed_pixels > 0)
+      return fmt::format("the job is of one powder, the manifest says {} pixels in another one", image.unfed_pixels);
+  }
+  return {};
+}
+
+void check_heights(const Manifest& manifest, std::optional<Nm> thickness, Faults& faults) {
+  std::optional<std::int64_t> begins;
+  for (const LayerRecord& record : manifest.layers) {
+    const Layer& layer = record.layer;
+    if (layer.index == 0) begins = 0;
+    if (thickness) begins = std::int64_t{layer.index} * *thickness;
+    if (begins && layer.bottom != *begins) {
+      faults.add(fmt::format("layer {}: begins {} nm above the bed, the manifest says {}", layer.index, *begins, layer.bottom));
+    }
+    if (thickness && layer.thickness != *thickness) {
+      faults.add(fmt::format("layer {}: is {} nm thick as all of the job, the manifest says {}", layer.index, *thickness,
+                             layer.thickness));
+    }
+    begins = std::int64_t{layer.bottom} + layer.thickness;
+  }
 }
 
 Status check_shares_known(const ManifestHead& head, const std::vector<LayerRecord>& kept) {

@@ -384,9 +384,14 @@ TEST_F(ImageLevels, WithoutDropsAreNoPores) {
   const std::string rest = " --layer 0.1 --at 1,1 ";
   done("jet box.stl --machine printer.toml --saturation 10 -o few" + rest);
   done("jet box.stl --machine printer.toml --levels 16 -o dithered" + rest);
+  done("jet box.stl --machine printer.toml --saturation 10 --format tiff-4 -o few-grey" + rest);
+  done("jet box.stl --machine printer.toml --levels 16 --format png-8 -o dithered-grey" + rest);
   done("jet box.stl --bed 5x5 --dpi 254 --core 0.5 -o thin" + rest);
-  for (const auto& [name, words] :
-       {std::pair{"few", "get no drop (--saturation)"}, {"dithered", "(--levels)"}, {"thin", "(--core)"}})
+  for (const auto& [name, words] : {std::pair{"few", "get no drop (--saturation)"},
+                                    {"dithered", "(--levels)"},
+                                    {"few-grey", "get no drop (--saturation)"},
+                                    {"dithered-grey", "(--levels)"},
+                                    {"thin", "(--core)"}})
     test::expect_refused(std::string("permeability --no-flow ") + name, 3, words, folder_);
   done("jet box.stl --machine printer.toml --saturation 60 -o enough" + rest);
   done("jet box.stl --bed 5x5 --dpi 254 --levels 16 --format tiff-4 -o grey" + rest);

@@ -1,0 +1,28 @@
+#include "stages/replay/count.h"
+
+#include <fmt/format.h>
+
+#include <cstdlib>
+
+#include "stages/data/machine.h"
+
+namespace lamina::replay {
+
+std::string fault_of_count(const Machine& machine, const Count& told, const Count& found) {
+  if (found.drops != told.drops || found.spat != told.spat) {
+    return fmt::format("{} drops and {} off the bed, the manifest says {} and {}", found.drops, found.spat, told.drops,
+                       told.spat);
+  }
+  if (found.sweeps != told.sweeps) return fmt::format("{} sweeps fire, the manifest says {}", found.sweeps, told.sweeps);
+  // Further sweeps for blocked nozzles are over no place of their own.
+  const auto& head = machine.head;
+  const bool counted = head.most_drops > 1 && (head.blocked.empty() || head.blocked_rule != BlockedRule::kSecondPass);
+  if (counted && found.added != told.added) {
+    return fmt::format("{} sweeps are there for the head's frequency, the manifest says {}", found.added, told.added);
+  }
+  if (told.microseconds > 0 && std::abs(found.microseconds - told.microseconds) > 1)
+    return fmt::format("takes {:.6f} s, the manifest says {:.6f}", found.seconds(), told.seconds());
+  return {};
+}
+
+}  // namespace lamina::replay

@@ -1,0 +1,101 @@
+// The page of a finished job doubts what lamina jet doubts, with the same words and cause.
+#include <gtest/gtest.h>
+
+#include <nlohmann/json.hpp>
+#include <set>
+#include <string>
+
+#include "tests/commands/program.h"
+
+namespace lamina::test {
+namespace {
+
+using Json = nlohmann::json;
+
+class ReportedDoubts : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    write_box(directory_ / "a.stl", {0, 0, 0}, {10, 8, 1});
+    write_box(directory_ / "b.stl", {0, 0, 0}, {5, 5, 0.5F});
+    write_box(directory_ / "thin.stl", {0, 0, 0}, {8, 0.4F, 1});
+  }
+  Outcome run(const std::string& line) const { return run_lamina(words_of(line), directory_.path()); }
+  static std::set<std::string> texts(const Json& warnings, const std::set<std::string>& without = {}) {
+    std::set<std::string> all;
+    for (const Json& warning : warnings) {
+      if (!without.contains(warning["code"]))
+        all.insert(warning["code"].get<std::string>() + ": " + std::string(warning["text"]));
+    }
+    return all;
+  }
+  Json page() const {
+    const Outcome outcome = run("report out -o page.html --quiet --overwrite");
+    EXPECT_EQ(outcome.code, 0) << outcome.err;
+    const std::string text = read_text(directory_ / "page.html"), begin = "<script id=\"head\" type=\"application/json\">";
+    const std::size_t at = text.find(begin) + begin.size();
+    return Json::parse(text.substr(at, text.find("</script>", at) - at))["warnings"];
+  }
+  Json jet(const std::string& line) const {
+    const Outcome outcome = run("jet " + line + " --json --overwrite -o out");
+    EXPECT_EQ(outcome.code, 0) << outcome.err;
+    return Json::parse(outcome.out)["warnings"];
+  }
+  /// The page has the warnings of the job, but for those of sections before the bleed, and these codes are among them.
+  void expect_alike(const std::string& line, const std::set<std::string>& codes) const {
+    SCOPED_TRACE(line);
+    const Json told = jet(line);
+    std::set<std::string> found;
+    for (const Json& warning : told) found.insert(warning["code"]);
+    for (const std::string& code : codes) EXPECT_TRUE(found.contains(code)) << code << told.dump();
+    EXPECT_EQ(texts(page()), texts(told, {"vanished"}));
+  }
+
+  Directory directory_;
+};
+
+TEST_F(ReportedDoubts, ArePowdersDropsNozzlesAndCareOfTheJob) {
+  write_text(directory_ / "two.toml",
+             "inherits = \"nuferbj\"\n[machine]\nname = \"two\"\n[powder]\nmaterials = [\"steel\", \"bronze\"]\n");
+  expect_alike("a.stl b.stl --machine two.toml --material steel,bronze --vat-rule majority --layer 0.1", {"mixed-powders"});
+  write_text(
+      directory_ / "idle.toml",
+      "inherits = \"nuferbj\"\n[machine]\nname = \"idle\"\n[head]\nblocked = [10, 11, 12, 13]\nblocked_rule = \"neighbour\"\n"
+      "most_drop_sweeps = 1\n[powder]\nleast_saturation_percent = 60\n[care]\nspit_mm = [-40, 5]\n");
+  expect_alike("a.stl --machine idle.toml --layer 0.1 --saturation 40 --allow-unbound", {"care", "saturation", "lost-pixels"});
+}
+
+TEST_F(ReportedDoubts, OfPartsWithoutDropsAreThoseOfTheDose) {
+  for (const char* percent : {"1", "0"}) {
+    write_text(directory_ / "job.toml", std::string("[layers]\nthickness_mm = 0.1\n[machine]\nprofile = \"nuferbj\"\n[dose]\n"
+                                                    "saturation_percent = 70\ndithered = false\n[run]\nallow_unbound = true\n"
+                                                    "[[part]]\npath = \"a.stl\"\n[[part]]\npath = \"b.stl\"\n"
+                                                    "saturation_percent = ") +
+                                            percent + "\n");
+    expect_alike("--job job.toml", {"no-drop"});
+  }
+}
+
+TEST_F(ReportedDoubts, OfWhatTheBleedTakesNameTheBleed) {
+  expect_alike("thin.stl a.stl --bed 60x40 --dpi 300 --layer 0.1 --bleed 300", {"bleed"});
+  expect_alike("a.stl --bed 60x40 --dpi 300 --layer 0.1 --bleed 2000", {"bleed"});
+  // Without the part's file too.
+  const Json told = jet("thin.stl a.stl --bed 60x40 --dpi 300 --layer 0.1 --bleed 300");
+  std::filesystem::rename(directory_ / "thin.stl", directory_ / "moved.stl");
+  EXPECT_EQ(texts(page()), texts(told, {"vanished"}));
+}
+
+TEST_F(ReportedDoubts, FoldersOfPartsThatAreNotThereAreErrors) {
+  jet("a.stl --bed 60x40 --dpi 300 --layer 0.1");
+  expect_refused("report out -o page.html --parts nowhere", 3, "--parts: nowhere: no such file or folder", directory_);
+}
+
+TEST_F(ReportedDoubts, PagesThatCannotBeSmallEnoughAreTold) {
+  jet("a.stl --bed 60x40 --dpi 300 --layer 0.1");
+  const Outcome small = run("report out -o page.html --most-bytes 10");
+  EXPECT_EQ(small.code, 0);
+  EXPECT_NE(small.err.find("more than --most-bytes"), std::string::npos) << small.err;
+  EXPECT_EQ(run("report out -o page.html --overwrite").err, "");
+}
+
+}  // namespace
+}  // namespace lamina::test
