@@ -14,7 +14,7 @@ namespace {
 
 using raster::Engine;
 
-std::string first_difference(const RunsView& a, const RunsView& b) {
+std::string place_of_difference(const RunsView& a, const RunsView& b) {
   if (a.rows() != b.rows()) return "row counts differ";
   for (std::uint32_t r = 0; r < a.rows(); ++r) {
     const auto x = a.row(r), y = b.row(r);
@@ -56,7 +56,7 @@ std::uint64_t expect_exact(const Triangles& triangles, const PixelGrid& grid, co
       pixels += set_pixels(expected);
       for (Engine engine : {Engine::kRays, Engine::kContours}) {
         const auto report = rasterizer->layer(engine, plane, scratch, runs);
-        EXPECT_EQ(first_difference(runs, expected), "")
+        EXPECT_EQ(place_of_difference(runs, expected), "")
             << (engine == Engine::kRays ? "rays" : "contours") << " at " << plane << " nm";
         EXPECT_EQ(report.open_rows, 0u);
         EXPECT_LE(report.crossings, rasterizer->crossings_bound(plane));
@@ -204,7 +204,7 @@ TEST(Engines, AgreeWhereALayerHasSoManyCrossingsThatRaysTakeItInBands) {
   const auto report = rasterizer->layer(Engine::kRays, 500'000, scratch, rays);
   EXPECT_GT(report.crossings, 1u << 19);
   EXPECT_GT(report.segments, rasterizer->layer(Engine::kContours, 500'000, scratch, contours).segments);  // cut again in each
-  EXPECT_EQ(first_difference(rays, contours), "");
+  EXPECT_EQ(place_of_difference(rays, contours), "");
   EXPECT_GT(set_pixels(rays), 0u);
 }
 
@@ -221,7 +221,7 @@ TEST(Scan, ARowThatStaysOpenEndsAtItsLastCrossingAndIsReported) {
   const auto report = rasterizer->layer(Engine::kRays, 500'000, scratch, rays);
   rasterizer->layer(Engine::kContours, 500'000, scratch, contours);
   EXPECT_EQ(report.open_rows, 10u);
-  EXPECT_EQ(first_difference(rays, contours), "");
+  EXPECT_EQ(place_of_difference(rays, contours), "");
   for (std::uint32_t r = 0; r < rays.view().rows(); ++r) {
     for (std::uint32_t column : rays.view().row(r)) EXPECT_LE(column, 40u);
   }
@@ -251,7 +251,7 @@ TEST(Scan, AnOpenPartEndsWhereItEndsWhateverStandsBesideIt) {
     rasterizer->layer(Engine::kContours, 500'000, scratch, contours);
     EXPECT_EQ(report.open_rows, 20u);
     EXPECT_EQ(report.first_open_row, 10u);
-    EXPECT_EQ(first_difference(rays, contours), "");
+    EXPECT_EQ(place_of_difference(rays, contours), "");
     for (std::uint32_t r = 0; r < rays.view().rows(); ++r) {
       const auto row = rays.view().row(r);
       if (row.empty()) continue;
