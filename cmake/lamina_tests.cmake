@@ -10,7 +10,8 @@ set_source_files_properties(${PROJECT_SOURCE_DIR}/tests/raster/reference.cpp
                             PROPERTIES COMPILE_OPTIONS -O3 SKIP_PRECOMPILE_HEADERS ON)
 
 # What runs the program itself, for the tests of any folder.
-add_library(lamina_test_support STATIC tests/commands/program.cpp)
+set(test_support_sources ${PROJECT_SOURCE_DIR}/tests/commands/job_folder.cpp ${PROJECT_SOURCE_DIR}/tests/commands/program.cpp)
+add_library(lamina_test_support STATIC ${test_support_sources})
 target_link_libraries(lamina_test_support PUBLIC lamina::pipeline GTest::gtest nlohmann_json::nlohmann_json)
 target_compile_definitions(lamina_test_support PUBLIC LAMINA_TEST_DIR="${PROJECT_SOURCE_DIR}/tests"
                            LAMINA_PROGRAM="$<TARGET_FILE:lamina>")
@@ -34,8 +35,7 @@ foreach(folder ${folders})
     continue()
   endif()
   lamina_sources(test_sources "tests/${folder}/*.cpp")
-  list(REMOVE_ITEM test_sources ${PROJECT_SOURCE_DIR}/tests/commands/program.cpp
-                                ${PROJECT_SOURCE_DIR}/tests/fuzz/libfuzzer.cpp)
+  list(REMOVE_ITEM test_sources ${test_support_sources} ${PROJECT_SOURCE_DIR}/tests/fuzz/libfuzzer.cpp)
   if(LAMINA_TEST_ONLY)
     list(FILTER test_sources INCLUDE REGEX "${LAMINA_TEST_ONLY}")
     if(NOT test_sources)

@@ -75,10 +75,7 @@ class BandCells {
  public:
   void start(std::uint32_t columns) {
     if (columns_ == columns) return;
-    columns_ = columns;
-    stride_ = (columns + 2 * kLanes) / kLanes * kLanes;
-    words_ = columns / 64 + 2;
-    groups_ = words_ / 64 + 1;
+    size(columns);
     value_.assign(std::size_t{2} * kBandRows * stride_, 0.0);
     word_.assign(std::size_t{2} * kBandRows * words_, 0);
     group_.assign(std::size_t{2} * kBandRows * groups_, 0);
@@ -91,9 +88,22 @@ class BandCells {
     return {word_.data() + std::size_t{lane} * words_, group_.data() + std::size_t{lane} * groups_, words_};
   }
   ColumnMarks suspect(std::uint32_t lane) { return held(kBandRows + lane); }
+  static std::uint64_t bytes_of(std::uint32_t columns) {
+    BandCells cells;
+    cells.size(columns);
+    return std::uint64_t{2} * kBandRows *
+           (cells.stride_ * sizeof(double) + (cells.words_ + cells.groups_) * sizeof(std::uint64_t));
+  }
   std::uint64_t bytes() const { return bytes_held(value_) + bytes_held(word_) + bytes_held(group_); }
 
  private:
+  void size(std::uint32_t columns) {
+    columns_ = columns;
+    stride_ = (columns + 2 * kLanes) / kLanes * kLanes;
+    words_ = columns / 64 + 2;
+    groups_ = words_ / 64 + 1;
+  }
+
   std::uint32_t columns_ = 0, stride_ = 0, words_ = 0, groups_ = 0;
   Buffer<double> value_;
   Buffer<std::uint64_t> word_, group_;

@@ -131,12 +131,9 @@ std::uint64_t RowJudge::decide(const Doubt& doubt, std::uint64_t levels) {
   for (std::uint32_t lane = 0; lane < kLanes; ++lane) {
     const bool is_suspect = (doubt.suspects >> lane & 1) != 0, is_undecided = (doubt.undecided >> lane & 1) != 0;
     std::uint8_t level = 0;
-    if (is_suspect && look_at(doubt, lane, level)) {
-    } else if (is_undecided) {
-      level = exact(doubt, lane);
-    } else {
-      continue;
-    }
+    const bool is_sampled = is_suspect && look_at(doubt, lane, level);
+    if (!is_sampled && !is_undecided) continue;
+    if (!is_sampled) level = exact(doubt, lane);
     levels = (levels & ~(std::uint64_t{255} << 8 * lane)) | std::uint64_t{level} << 8 * lane;
   }
   return levels;

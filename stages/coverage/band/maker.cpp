@@ -15,8 +15,8 @@ constexpr std::size_t kMoreRoom = 64;
 std::uint64_t BandMaker::bytes_of(std::uint64_t facets, std::uint32_t columns) {
   // Rows list facets where doubles do not decide, and double their room.
   const std::uint64_t pieces = kMostPieces * facets, room = pieces + pieces / 8 + 2 * kMoreRoom;
-  return room * (sizeof(Trapezoid) + sizeof(Reach)) + 2 * pieces * sizeof(RowFacet) +
-         (std::uint64_t{columns} + 64) * (2 * kBandRows * sizeof(double) + sizeof(std::uint32_t) + 2 + 2 * kBandRows / 8);
+  return room * (sizeof(Trapezoid) + sizeof(Reach)) + 2 * pieces * sizeof(RowFacet) + BandCells::bytes_of(columns) +
+         (std::uint64_t{columns} + 1 + kLanes) * (sizeof(std::uint32_t) + sizeof(std::uint8_t));
 }
 
 void BandMaker::start(const Slab& slab, Isa isa) {

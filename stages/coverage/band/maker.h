@@ -20,6 +20,7 @@ struct LayerReport;
 /// facets, and rationals look no further back.
 class BandMaker {
  public:
+  /// slab  outlives the layer. isa  one that this processor has, not kAuto
   void start(const Slab& slab, Isa isa);
   /// The facet's last row lies in the band that is made next. rows  edges of all
   void enter(const SlabFacet& facet, std::uint32_t index, const Edges& rows);
@@ -32,7 +33,7 @@ class BandMaker {
     return cells_.bytes() + judge_.bytes() + bytes_held(active_) + bytes_held(reach_) + bytes_held(column_) +
            bytes_held(level_);
   }
-  /// The same for a layer of so many facets.
+  /// At most, for a layer of so many facets on a grid of so many columns.
   static std::uint64_t bytes_of(std::uint64_t facets, std::uint32_t columns);
 
  private:

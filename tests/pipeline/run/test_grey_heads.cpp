@@ -10,7 +10,7 @@
 #include "stages/data/levels.h"
 #include "stages/read/image.h"
 #include "stages/write/manifest/manifest.h"
-#include "tests/commands/program.h"
+#include "tests/commands/job_folder.h"
 
 namespace lamina::pipeline {
 namespace {
@@ -36,7 +36,7 @@ ramp_mm = 5
 packing = 0.5
 )";
 
-class GreyHeads : public testing::Test {
+class GreyHeads : public test::JobFolder {
  protected:
   GreyHeads() {
     test::write_text(folder_ / "seven.toml", kHead);
@@ -44,24 +44,11 @@ class GreyHeads : public testing::Test {
     test::write_box(folder_ / "half.stl", {0, 0, 0}, {2, 3, 0.25f});
   }
 
-  test::Outcome lamina(const std::string& line) const { return test::run_lamina(test::words_of(line), folder_.path()); }
-  void done(const std::string& line) const {
-    const test::Outcome outcome = lamina(line);
-    ASSERT_EQ(outcome.code, 0) << line << "\n" << outcome.err;
-  }
-  nlohmann::json facts(const std::string& line) const {
-    const test::Outcome outcome = lamina(line + " --json --quiet");
-    EXPECT_EQ(outcome.code, 0) << line << "\n" << outcome.err;
-    return outcome.code == 0 ? nlohmann::json::parse(outcome.out) : nlohmann::json();
-  }
   std::vector<LayerRecord> records_of(const std::string& output) const {
     const auto manifest = read_manifest(folder_ / (output + "/manifest.json"));
     EXPECT_TRUE(manifest.ok()) << manifest.error().message;
     return manifest.ok() ? manifest->layers : std::vector<LayerRecord>();
   }
-  std::string tree(const std::string& output) const { return test::tree_text(folder_.path() / output); }
-
-  test::Directory folder_;
 };
 
 constexpr const char* kBox = "jet box.stl --machine seven.toml --layer 0.1 --saturation 100 ";

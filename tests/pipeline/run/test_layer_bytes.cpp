@@ -66,7 +66,7 @@ constexpr const char* kNut = "parameter_quality_nut.stl";
 const std::string kOneDropHead = "machine.profile=jet1000", kGreyHead = "machine.profile=jet1000-grey",
                   kBed = "bed.size_mm=[60,60]";
 
-TEST(LayerBytes, OfLevelsAreAtMostWhatIsToldAndAQuarterOfItAtLeast) {
+TEST(LayerBytes, OfLevelsAreAtMostWhatIsToldAndAFifthOfItAtLeast) {
   TakenBytes all;
   for (const char* part : {kCrown, kNut, "nist_part_feature_open.stl"}) {
     for (const char* levels : {"dose.levels=2", "dose.levels=4", "dose.levels=16"}) {
@@ -84,7 +84,7 @@ TEST(LayerBytes, OfLevelsAreAtMostWhatIsToldAndAQuarterOfItAtLeast) {
   std::cout << "levels are told with " << all.told / all.used << " times what they take\n";
 }
 
-TEST(LayerBytes, OfDropsAreAtMostWhatIsToldAndAQuarterOfItAtLeast) {
+TEST(LayerBytes, OfDropsAreAtMostWhatIsToldAndAFifthOfItAtLeast) {
   TakenBytes all;
   for (const char* part : {kCrown, kNut, "quad_knot.obj"}) {
     for (const char* drops :

@@ -10,7 +10,7 @@
 #include "stages/data/levels.h"
 #include "stages/read/image.h"
 #include "stages/write/manifest/manifest.h"
-#include "tests/commands/program.h"
+#include "tests/commands/job_folder.h"
 
 namespace lamina::pipeline {
 namespace {
@@ -56,23 +56,15 @@ TEST(Levels, MoreThanABytesWorthAreRefused) {
 }
 
 /// A box whose top lies in the middle of its third layer, and what else a test needs.
-class LevelJobs : public testing::Test {
+class LevelJobs : public test::JobFolder {
  protected:
   LevelJobs() { test::write_box(folder_ / "box.stl", {0, 0, 0}, {2, 3, 0.25f}); }
 
-  test::Outcome lamina(const std::string& line) const { return test::run_lamina(test::words_of(line), folder_.path()); }
-  void done(const std::string& line) const {
-    const test::Outcome outcome = lamina(line);
-    ASSERT_EQ(outcome.code, 0) << line << "\n" << outcome.err;
-  }
   std::vector<LayerRecord> records_of(const std::string& output) const {
     const auto manifest = read_manifest(folder_ / (output + "/manifest.json"));
     EXPECT_TRUE(manifest.ok()) << manifest.error().message;
     return manifest.ok() ? manifest->layers : std::vector<LayerRecord>();
   }
-  std::string tree(const std::string& output) const { return test::tree_text(folder_.path() / output); }
-
-  test::Directory folder_;
 };
 
 constexpr const char* kTenthsOfBox = "jet box.stl --layer 0.1 --dpi 254 --bed 5x5 --at 1,1 --quiet ";
@@ -116,22 +108,8 @@ TEST_F(LevelJobs, TellHowFarHalvesAreFromTheBitmap) {
 TEST_F(LevelJobs, GiveTheSameBytesHoweverTheyAreMade) {
   const std::string job = "jet " + test::corpus_file("dental_crown.stl") +
                           " --layer 1 --machine nuferbj --levels 16 --saturation 3 --core-saturation 1 --shell 0.6 "
-                          "--bleed 40 --mirror x --quiet -o ";
-  done(job + "one");
-  done("verify one --quiet");
-  for (const char* how : {" --threads 1 --engine contours", " --threads 8 --engine both --memory 64K"}) {
-    done(job + "other --overwrite" + how);
-    EXPECT_TRUE(tree("other") == tree("one")) << how;
-  }
-  for (const char* shard : {"1/3", "2/3", "3/3"}) done(job + "shards --shard " + shard);
-  done("merge shards -o shards --quiet");
-  EXPECT_TRUE(tree("shards") == tree("one"));
-  std::string begun = test::read_text(folder_ / "one/manifest.json");
-  begun.resize(begun.find("\n{\"index\": 4"));
-  std::filesystem::remove(folder_ / "one/manifest.json");
-  test::write_text(folder_ / "one/manifest.json.part", begun + "\n");
-  done(job + "one --resume");
-  EXPECT_TRUE(tree("one") == tree("shards"));
+                          "--bleed 40 --mirror x";
+  expect_same_however_made(job);
 }
 
 // The box mirrored: its columns 10 to 29 of 50 are 20 to 39; half of a voxel is level 8.

@@ -11,7 +11,7 @@
 #include "stages/data/levels.h"
 #include "stages/read/image.h"
 #include "stages/write/manifest/manifest.h"
-#include "tests/commands/program.h"
+#include "tests/commands/job_folder.h"
 
 namespace lamina::pipeline {
 namespace {
@@ -41,7 +41,7 @@ packing = 0.5
 /// Drops a pixel, row by row.
 using DropPixels = std::vector<int>;
 
-class MaterialDrops : public testing::Test {
+class MaterialDrops : public test::JobFolder {
  protected:
   MaterialDrops() {
     test::write_text(folder_ / "twins.toml", kTwoVats);
@@ -49,16 +49,6 @@ class MaterialDrops : public testing::Test {
     test::write_box(folder_ / "high.stl", {0, 0, 0}, {3, 4, 1.2f});
   }
 
-  test::Outcome lamina(const std::string& line) const { return test::run_lamina(test::words_of(line), folder_.path()); }
-  void done(const std::string& line) const {
-    const test::Outcome outcome = lamina(line);
-    ASSERT_EQ(outcome.code, 0) << line << "\n" << outcome.err;
-  }
-  nlohmann::json facts(const std::string& line) const {
-    const test::Outcome outcome = lamina(line + " --json --quiet");
-    EXPECT_EQ(outcome.code, 0) << line << "\n" << outcome.err;
-    return outcome.code == 0 ? nlohmann::json::parse(outcome.out) : nlohmann::json();
-  }
   /// A fault of a finished job.
   std::string fault(const std::string& output) const {
     const test::Outcome outcome = lamina("verify --quiet " + output);
@@ -70,7 +60,6 @@ class MaterialDrops : public testing::Test {
     EXPECT_TRUE(read.ok()) << read.error().message;
     return read.ok() ? std::move(*read) : Manifest();
   }
-  std::string tree(const std::string& output) const { return test::tree_text(folder_.path() / output); }
 
   /// What the images of one material, or of a job without any, come to. They are nested, or the test fails.
   DropPixels drops_of(const std::string& output, std::uint32_t layer, const std::string& material, std::uint32_t most) const {
@@ -98,7 +87,6 @@ class MaterialDrops : public testing::Test {
     }
     return drops;
   }
-  test::Directory folder_;
 };
 
 std::uint64_t sum_of_drops(const DropPixels& drops) {
@@ -234,24 +222,9 @@ TEST_F(MaterialDrops, OfOneMaterialAreTheJobOfNone) {
 TEST_F(MaterialDrops, GiveTheSameBytesHoweverTheyAreMade) {
   for (const std::string dose :
        {"--saturation 46", "--saturation 66 --levels 16 --no-dither", "--saturation 46 --format tiff-4"}) {
-    const std::string job = kTwoMaterials + dose + " --quiet -o ";
-    done(job + "one");
-    done("verify one --quiet");
-    for (const char* how : {" --threads 1 --engine contours", " --threads 8 --engine both --memory 64K"}) {
-      done(job + "other --overwrite" + how);
-      EXPECT_TRUE(tree("other") == tree("one")) << how;
-    }
-    for (const char* shard : {"1/3", "2/3", "3/3"}) done(job + "shards --shard " + shard);
-    done("merge shards -o shards --quiet");
-    EXPECT_TRUE(tree("shards") == tree("one"));
-    std::string begun = test::read_text(folder_ / "one/manifest.json");
-    begun.resize(begun.find("\n{\"index\": 4"));
-    std::filesystem::remove(folder_ / "one/manifest.json");
-    test::write_text(folder_ / "one/manifest.json.part", begun + "\n");
-    const auto resumed = facts(job + "one --resume"), whole = facts(kTwoMaterials + dose + " --dry-run");
+    const auto resumed = expect_same_however_made(kTwoMaterials + dose), whole = facts(kTwoMaterials + dose + " --dry-run");
     EXPECT_EQ(resumed["materials"], whole["materials"]);
     EXPECT_EQ(resumed["saturation"], whole["saturation"]);
-    EXPECT_TRUE(tree("one") == tree("shards"));
     for (const char* output : {"one", "other", "shards"}) std::filesystem::remove_all(folder_.path() / output);
   }
 }

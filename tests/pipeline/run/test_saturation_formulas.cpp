@@ -14,12 +14,12 @@
 #include "stages/geometry/combine.h"
 #include "stages/read/image.h"
 #include "stages/write/manifest/manifest.h"
-#include "tests/commands/program.h"
+#include "tests/commands/job_folder.h"
 
 namespace lamina::pipeline {
 namespace {
 
-class FormulaJobs : public testing::Test {
+class FormulaJobs : public test::JobFolder {
  protected:
   FormulaJobs() { test::write_box(folder_ / "box.stl", {0, 0, 0}, {8, 6, 0.4f}); }
 
@@ -56,13 +56,6 @@ class FormulaJobs : public testing::Test {
     combine(a, b, how, result);
     return result;
   }
-  void done(const std::string& line) const {
-    const test::Outcome outcome = test::run_lamina(test::words_of(line), folder_.path());
-    ASSERT_EQ(outcome.code, 0) << line << "\n" << outcome.err;
-  }
-  std::string tree(const std::string& output) const { return test::tree_text(folder_.path() / output); }
-
-  test::Directory folder_;
 };
 
 // The first box lies at x 10 to 18 mm of the bed: 20 + 5 x is 90 % there on average; the second one's own 60 - 4 x is 44 %.
@@ -103,22 +96,8 @@ TEST_F(FormulaJobs, OfOneNumberAreThoseOfTheNumber) {
 TEST_F(FormulaJobs, AreTheSameHoweverTheyAreMade) {
   const std::string job = "jet " + test::corpus_file("dental_crown.stl") +
                           " --layer 1 --machine nuferbj --levels 16 --saturation 2+x/100+z/4 --core-saturation "
-                          "1+cos(y)*exp(-z) --shell 0.6 --bleed 40 --mirror x --quiet -o ";
-  done(job + "one");
-  done("verify one --quiet");
-  for (const char* how : {" --threads 1 --engine contours", " --threads 8 --engine both --memory 64K"}) {
-    done(job + "other --overwrite" + how);
-    EXPECT_TRUE(tree("other") == tree("one")) << how;
-  }
-  for (const char* shard : {"1/3", "2/3", "3/3"}) done(job + "shards --shard " + shard);
-  done("merge shards -o shards --quiet");
-  EXPECT_TRUE(tree("shards") == tree("one"));
-  std::string begun = test::read_text(folder_ / "one/manifest.json");
-  begun.resize(begun.find("\n{\"index\": 4"));
-  std::filesystem::remove(folder_ / "one/manifest.json");
-  test::write_text(folder_ / "one/manifest.json.part", begun + "\n");
-  done(job + "one --resume");
-  EXPECT_TRUE(tree("one") == tree("shards"));
+                          "1+cos(y)*exp(-z) --shell 0.6 --bleed 40 --mirror x";
+  expect_same_however_made(job);
 }
 
 TEST_F(FormulaJobs, ThatGiveNoNumberOrDoNotBindAreRefused) {
