@@ -19,6 +19,9 @@ struct GcodeLine {
   bool has(char letter) const { return word.contains(letter); }
 };
 
+/// Adds words such as X1.5, which blanks part. returns  empty, or the text that is no word
+std::string_view add_words(std::string_view text, std::map<char, double>& words);
+
 /// Iterates over the lines of a program without comments and empty lines. A fault names its line and ends the iteration.
 class GcodeReader {
  public:

@@ -1,7 +1,9 @@
 #include "stages/replay/frame/frame.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
-#include <array>
+#include <cmath>
 #include <iterator>
 
 #include "stages/replay/frame/lines.h"
@@ -54,15 +56,15 @@ Status check_zero(const Machine& machine, const State& state) {
 
 Status check_header(const VirtualMachine& machine, const Line& line) {
   const VirtualMachine::Counts want = machine.counts();
-  const std::pair<char, double> words[] = {{'L', machine.layers() > 0 ? machine.layers() : line.number('L')},
+  const std::pair<char, double> words[] = {{'L', machine.layers() > 0 ? machine.layers() : line.value('L')},
                                            {'N', want.nozzles},
                                            {'W', want.places},
                                            {'K', want.steps},
                                            {'Q', std::round(want.step_um * 1e6) / 1e3}};
   for (const auto& [letter, value] : words) {
-    if (std::abs(line.number(letter) - value) > (letter == 'Q' ? 2e-3 : 0)) {
+    if (std::abs(line.value(letter) - value) > (letter == 'Q' ? 2e-3 : 0)) {
       return wrong(
-          fmt::format("line {}: M810 says {}{:g} where {:g} have to be", line.at_line, letter, line.number(letter), value));
+          fmt::format("line {}: M810 says {}{:g} where {:g} have to be", line.number, letter, line.value(letter), value));
     }
   }
   return {};
@@ -83,9 +85,9 @@ Status start_of_gcode(const VirtualMachine& machine, std::string_view text) {
       homed = true;
       state = {};
     } else if (!take(line, state)) {
-      return wrong(fmt::format("line {}: '{}' is no command of a program's begin", line.at_line, line.command));
+      return wrong(fmt::format("line {}: '{}' is no command of a program's begin", line.number, line.command));
     }
-    if (oasis && !homed) return wrong(fmt::format("line {}: '{}' before $h has homed the gantry", line.at_line, line.command));
+    if (oasis && !homed) return wrong(fmt::format("line {}: '{}' before $h has homed the gantry", line.number, line.command));
   }
   if (nuferbj && !header) return wrong("M810 is missing, which tells nozzles and steps");
   if (Status status = check_modes(state); !status) return status;
@@ -119,10 +121,10 @@ Status start_of_brundlefab(const VirtualMachine& machine, std::string_view text)
     } else if (line.command[0] == 'T') {
       tool = line.command;
     } else if (line.command != "G10" && line.command != "M117" && !take(line, state)) {
-      return wrong(fmt::format("line {}: '{}' is no command of a program's begin", line.at_line, line.command));
+      return wrong(fmt::format("line {}: '{}' is no command of a program's begin", line.number, line.command));
     }
     if (!homed && (line.command == "G0" || line.command == "G1")) {
-      return wrong(fmt::format("line {}: moves before G28 has homed X and E", line.at_line));
+      return wrong(fmt::format("line {}: moves before G28 has homed X and E", line.number));
     }
   }
   if (Status status = check_modes(state); !status) return status;
@@ -155,7 +157,7 @@ Status start_of_bytes(const VirtualMachine& machine, std::string_view text) {
   if (text.size() != numbers.size() * 4)
     return wrong(fmt::format("has {} bytes where {} have to be", text.size(), numbers.size() * 4));
   for (std::size_t i = 0; i < numbers.size(); ++i) {
-    const std::uint32_t said = frame::at_lineat(text, i * 4);
+    const std::uint32_t said = frame::number_at(text, i * 4);
     if (said == numbers[i] || (i == layers && machine.layers() == 0)) continue;
     return wrong(fmt::format("byte {}: says {} where {} has to be", i * 4, said, numbers[i]));
   }
@@ -174,7 +176,7 @@ Status check_end(const VirtualMachine& machine, std::string_view text) {
   const std::string& dialect = machine.profile().dialect;
   if (dialect == "raw") return text == "DONE" ? Status() : wrong("is not DONE");
   if (dialect == "planes") {
-    const bool ends = text.size() == 8 && frame::at_lineat(text, 0) == 0x4C05 && frame::at_lineat(text, 4) == 0;
+    const bool ends = text.size() == 8 && frame::number_at(text, 0) == 0x4C05 && frame::number_at(text, 4) == 0;
     return ends ? Status() : wrong("is not the command 0x4C05");
   }
   constexpr std::pair<std::string_view, std::string_view> kCommands[] = {
@@ -184,7 +186,7 @@ Status check_end(const VirtualMachine& machine, std::string_view text) {
   if (!lines) return lines.error();
   for (const Line& line : *lines) {
     if (own != std::end(kCommands) && frame::has_word(own->second, line.command)) continue;
-    return wrong(fmt::format("line {}: '{}' is no command of a program's end", line.at_line, line.command));
+    return wrong(fmt::format("line {}: '{}' is no command of a program's end", line.number, line.command));
   }
   if (dialect == "nuferbj" && lines->empty()) return wrong("M814 is missing");
   return {};
