@@ -8,18 +8,18 @@
 
 namespace lamina::replay {
 
-std::string_view add_words(std::string_view text, std::map<char, double>& words) {
+std::optional<std::string_view> add_words(std::string_view text, std::map<char, double>& words) {
   while (!text.empty()) {
     const std::string_view word = text.substr(0, text.find(' '));
     double value = 0;
     const bool letter = !word.empty() && word[0] >= 'A' && word[0] <= 'Z';
     const char *const from = word.data() + (letter ? 1 : 0), *const to = word.data() + word.size();
     const auto [stop, error] = std::from_chars(from, to, value, std::chars_format::fixed);  // firmware knows no exponents
-    if (!letter || error != std::errc() || stop != to || !std::isfinite(value)) return word.empty() ? text : word;
+    if (!letter || error != std::errc() || stop != to || !std::isfinite(value)) return word;
     words[word[0]] = value;
     text.remove_prefix(std::min(word.size() + 1, text.size()));
   }
-  return {};
+  return std::nullopt;
 }
 
 void GcodeReader::fault(std::string_view what) { printing_.fault(fmt::format("line {}: {}", number_, what)); }
@@ -49,8 +49,8 @@ bool GcodeReader::take(GcodeLine& line, bool all_words) {
     line.word.clear();
     if (line.command[0] != 'G' && line.command[0] != 'M' && line.command[0] != 'T') return true;
     if (!all_words && line.command == "M117") return true;
-    if (const std::string_view wrong = add_words(line.rest, line.word); !wrong.empty()) {
-      fault(fmt::format("'{}' is no word", wrong));
+    if (const auto wrong = add_words(line.rest, line.word)) {
+      fault(fmt::format("'{}' is no word", *wrong));
       return false;
     }
     return true;

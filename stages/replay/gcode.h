@@ -3,6 +3,7 @@
 
 #include <charconv>
 #include <map>
+#include <optional>
 #include <string>
 #include <string_view>
 
@@ -19,8 +20,8 @@ struct GcodeLine {
   bool has(char letter) const { return word.contains(letter); }
 };
 
-/// Adds words such as X1.5, which blanks part. returns  empty, or the text that is no word
-std::string_view add_words(std::string_view text, std::map<char, double>& words);
+/// Adds words such as X1.5, which blanks part. returns  nothing, or what is no word
+std::optional<std::string_view> add_words(std::string_view text, std::map<char, double>& words);
 
 /// Iterates over the lines of a program without comments and empty lines. A fault names its line and ends the iteration.
 class GcodeReader {

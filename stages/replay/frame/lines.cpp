@@ -26,8 +26,8 @@ Result<std::vector<Line>> lines_of(std::string_view text) {
     line.command = left.substr(0, left.find(' '));
     left.remove_prefix(std::min(line.command.size() + 1, left.size()));
     const bool has_words = std::string_view("GMT").find(line.command[0]) != std::string_view::npos && line.command != "M117";
-    if (const std::string_view what = has_words ? add_words(left, line.word) : std::string_view(); !what.empty())
-      return wrong(fmt::format("line {}: '{}' is no word", number, what));
+    if (const auto what = has_words ? add_words(left, line.word) : std::nullopt)
+      return wrong(fmt::format("line {}: '{}' is no word", number, *what));
     lines.push_back(std::move(line));
   }
   return lines;
