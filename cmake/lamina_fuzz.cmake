@@ -12,8 +12,8 @@ lamina_sources(fuzzed "stages/data/*.cpp" "stages/geometry/*.cpp" "stages/load/*
                "stages/replay/*.cpp" "stages/program/*.cpp" "stages/heights/*.cpp" "stages/segment/*.cpp"
                "stages/infill/*.cpp" "stages/write/*.cpp" "pipeline/job/*.cpp" "pipeline/machine/*.cpp")
 list(FILTER fuzzed EXCLUDE REGEX "/stages/write/(picture|report)/")
-list(APPEND fuzzed ${PROJECT_SOURCE_DIR}/stages/write/report/run_code.cpp   # SVG holds pictures in it
-                   ${PROJECT_SOURCE_DIR}/stages/dose/field.cpp)            # saturation in job files is a formula
+list(APPEND fuzzed ${PROJECT_SOURCE_DIR}/stages/write/report/run_code.cpp)  # SVG holds pictures in it
+lamina_add_included(fuzzed)
 add_library(lamina_fuzzed STATIC ${fuzzed} ${PROJECT_BINARY_DIR}/shipped_machines.cpp ${PROJECT_BINARY_DIR}/shipped_presets.cpp
                                  ${PROJECT_BINARY_DIR}/shipped_extruders.cpp tests/fuzz/target.cpp tests/fuzz/laws.cpp)
 target_include_directories(lamina_fuzzed PUBLIC ${PROJECT_SOURCE_DIR})

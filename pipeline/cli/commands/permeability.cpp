@@ -71,7 +71,7 @@ CommandSpec permeability_spec() {
       "Examples:\n  lamina permeability drops.csv --length 25.4 --diameter 25.4\n"
       "  lamina permeability drops.csv --convention dinisio2022 --plot fit.svg\n"
       "  lamina permeability drops.csv --length 25.4 --diameter 25.4 --compressible --outlet-pressure 95000\n"
-      "  lamina permeability part.gcode --voxel 15 --plot pores.png\n"
+      "  lamina permeability part.gcode --voxel 20 --plot pores.png\n"
       "  lamina permeability job.toml --set segment.thin_mm=2\n"
       "  lamina permeability pores.toml part.stl --machine anet-a8\n"
       "  lamina permeability part.gcode --window 2,2,0.6 --solid beads.nrrd --void pores.stl --no-flow";
