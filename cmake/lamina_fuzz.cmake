@@ -5,8 +5,9 @@ if(NOT LAMINA_FUZZ)
   return()
 endif()
 
-# Everything that is compiled now and is not for fuzzing waits until it is asked for.
-set_target_properties(lamina_stages lamina_once_a_job lamina_pipeline lamina lamina-preview PROPERTIES EXCLUDE_FROM_ALL ON)
+# All other programs and libraries wait until they are asked for.
+get_property(others DIRECTORY PROPERTY BUILDSYSTEM_TARGETS)
+set_target_properties(${others} PROPERTIES EXCLUDE_FROM_ALL ON)
 
 lamina_sources(fuzzed "stages/data/*.cpp" "stages/geometry/*.cpp" "stages/load/*.cpp" "stages/read/*.cpp"
                "stages/replay/*.cpp" "stages/program/*.cpp" "stages/heights/*.cpp" "stages/segment/*.cpp"
