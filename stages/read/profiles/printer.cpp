@@ -182,7 +182,7 @@ constexpr Key<Machine> kKeys[] = {
     field<kPowder, &Powder::vat_speed_mm_s>({"powder", "vat_speed_mm_s"}, kSpeed),
     field<kPowder, &Powder::spread_s>({"powder", "spread_s"}, {0, 1e5, " s"}).unsaid_at("0"),
     field<kPowder, &Powder::pause_s>({"powder", "pause_s"}, {0, 1e5, " s"}).unsaid_at("0"),
-    field<kPowder, &Powder::packing>({"powder", "packing"}, {0.01, 1}),
+    field<kPowder, &Powder::packing>({"powder", "packing"}, {0.01, 0.99}),
     field<kPowder, &Powder::evaporates_percent>({"powder", "evaporates_percent"}, {0, 99.9, " %"}).unsaid_at("0"),
     field<kPowder, &Powder::least_saturation_percent>({"powder", "least_saturation_percent"}, {0, 1e4, " %"}).unsaid_at("0"),
 
