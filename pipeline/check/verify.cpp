@@ -335,7 +335,7 @@ Result<VerifyReport> verify(const std::string& directory, const VerifyOptions& o
   for (const ManifestFile& file : files) {
     Result<Manifest> manifest = read_manifest((fs::path(directory) / file.name).string());
     if (!manifest) return manifest.error();
-    if (!manifests.empty() && manifest->head.id() != manifests[0].head.id()) {
+    if (!manifests.empty() && !same_job(manifest->head, manifests[0].head)) {
       report.add(fmt::format("{}: belongs to another job than {} ({})", file.name, files[0].name,
                              difference(manifest->head, manifests[0].head)));
       continue;
