@@ -8,7 +8,7 @@
 
 #include "pipeline/job/file.h"
 #include "pipeline/job/heights.h"
-#include "stages/heights/heights.h"
+#include "stages/heights/on_record.h"
 
 namespace lamina::pipeline {
 namespace {
@@ -27,9 +27,12 @@ DoseCheck::DoseCheck(const ManifestHead& head, const Machine* machine) : head_(h
   if (read_job_text(head.job_toml, "manifest.json", job)) job_ = std::move(job);
 }
 
-std::optional<Nm> DoseCheck::thickness() const {
+void DoseCheck::check_heights(const Manifest& manifest, Faults& faults) const {
   const auto options = job_ ? heights_options(*job_) : Error{};
-  return options && options->mode == heights::Mode::kUniform ? std::optional(options->set.least()) : std::nullopt;
+  heights::OnRecord layers(options ? std::optional(*options) : std::nullopt);
+  for (const LayerRecord& record : manifest.layers) {
+    if (std::string what = layers.fault(record.layer); !what.empty()) faults.add(std::move(what));
+  }
 }
 
 std::optional<DoseCheck::Wished> DoseCheck::wished(const Layer& layer) const {

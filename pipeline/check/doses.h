@@ -20,8 +20,8 @@ class DoseCheck {
   /// head  outlives this object. machine  of the job; null without one
   DoseCheck(const ManifestHead& head, const Machine* machine);
 
-  /// That all layers of the job have; nothing if they may differ.
-  std::optional<Nm> thickness() const;
+  /// Adds the layers that lie or are thick as none of the job can.
+  void check_heights(const Manifest& manifest, Faults& faults) const;
 
   /// Empty, or what is wrong. levels  sum of the levels of the layer's image, of a job that has them
   std::string fault(const LayerRecord& record, const LayerPicture& picture, std::uint64_t levels) const;

@@ -83,6 +83,7 @@ std::string fault_of_program(const Inspection& inspection, const LayerRecord& re
                              .sweeps = says.sweeps,
                              .added = says.added_sweeps,
                              .microseconds = says.microseconds,
+                             .added_microseconds = says.added_microseconds,
                              .spat = says.spat};
     if (std::string fault = fault_of_count(inspection.machine->profile(), told, *replay); same && !fault.empty())
       return fmt::format("{}: {}", name, fault);
@@ -98,7 +99,7 @@ std::string fault_of_program(const Inspection& inspection, const LayerRecord& re
 }
 
 // Empty, or the fault of the image of this number; its set pixels are added to `picture`, its levels to `sum`.
-std::string fault_of_image(const Inspection& inspection, std::size_t number, const LayerImageFile& file,
+std::string fault_of_image(const Inspection& inspection, const Layer& layer, std::size_t number, const LayerImageFile& file,
                            raster::DropPlanes& picture, std::uint64_t& sum) {
   const std::string& name = file.name;
   LayerPicture drops;
@@ -107,7 +108,7 @@ std::string fault_of_image(const Inspection& inspection, std::size_t number, con
   if (!image) return image.error().message;
   const std::uint64_t own = sum_of_levels(levels);
   sum += own;
-  if (const std::string what = read::difference(*image, inspection.head.grid, file.record.set_pixels); !what.empty())
+  if (const std::string what = read::difference(*image, inspection.head.grid, file.record.set_pixels, layer); !what.empty())
     return fmt::format("{}: {}", name, what);
   if (file.record.drops > 0 && own != file.record.drops)
     return fmt::format("{}: has {} drops, the manifest says {}", name, own, file.record.drops);
@@ -139,7 +140,7 @@ std::string fault_of_layer(const Inspection& inspection, const LayerRecord& reco
     std::string fault = fault_of_file(inspection.directory, file.name, file.record.hash, file.record.bytes);
     if (!fault.empty()) return fault;
     if (inspection.quick) continue;
-    if (std::string what = fault_of_image(inspection, i, file, picture, levels); !what.empty()) return what;
+    if (std::string what = fault_of_image(inspection, record.layer, i, file, picture, levels); !what.empty()) return what;
   }
   if (!inspection.quick) {
     if (std::string what = fault_of_drops(inspection.head, record, picture.planes); !what.empty()) return what;
@@ -201,7 +202,7 @@ void check_layers(const std::string& directory, const Manifest& manifest, bool q
   Inspection inspection{directory, manifest.head, quick, std::nullopt, std::nullopt, report};
   if (!manifest.head.machine.empty()) prepare_replay(inspection);
   inspection.doses.emplace(manifest.head, inspection.machine ? &inspection.machine->profile() : nullptr);
-  check_heights(manifest, inspection.doses->thickness(), report);
+  inspection.doses->check_heights(manifest, report);
   if (!manifest.head.machine.empty()) {
     check_frame(inspection, report);
     if (!cost && inspection.machine) cost.emplace(inspection.machine->profile(), manifest);
@@ -335,7 +336,7 @@ Result<VerifyReport> verify(const std::string& directory, const VerifyOptions& o
   for (const ManifestFile& file : files) {
     Result<Manifest> manifest = read_manifest((fs::path(directory) / file.name).string());
     if (!manifest) return manifest.error();
-    if (!manifests.empty() && manifest->head.id() != manifests[0].head.id()) {
+    if (!manifests.empty() && !same_job(manifest->head, manifests[0].head)) {
       report.add(fmt::format("{}: belongs to another job than {} ({})", file.name, files[0].name,
                              difference(manifest->head, manifests[0].head)));
       continue;

@@ -4,12 +4,14 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <tuple>
 #include <vector>
 
 #include "pipeline/job/keys.h"
 #include "stages/data/input/file_reader.h"
 #include "stages/data/text/json_text.h"
 #include "stages/read/jobs/job_command.h"
+#include "stages/read/jobs/named_files.h"
 #include "stages/read/jobs/old_forms.h"
 #include "stages/write/file.h"
 #include "stages/write/replaceable.h"
@@ -39,10 +41,6 @@ Status read_parts(const TomlValue& list, const std::string& file, Job& job) {
   return {};
 }
 
-std::string beside(const fs::path& directory, const std::string& path) {
-  return path.empty() || fs::path(path).is_absolute() ? path : (directory / path).lexically_normal().string();
-}
-
 Status no_section(const TomlValue& value, std::string_view section, const std::string& file) {
   auto names = section_names(job_keys());
   names.push_back("part");
@@ -56,18 +54,15 @@ bool has_section(std::string_view section) {
 Status read_tree(Result<TomlValue> tree, const std::string& file, Job& job) {
   if (!tree) return tree.error();
   if (Status status = read::replace_old_forms(*tree, file, job.notes); !status) return status;
-  const fs::path directory = names_stream(file) ? fs::path() : fs::path(file).parent_path();
+  if (Status status = read::replace_paths(*tree, file, job.missing); !status) return status;
   for (std::size_t i = 0; i < tree->value.size(); ++i) {
     const std::string& section = tree->name[i];
     if (section == "part") {
       if (Status status = read_parts(tree->value[i], file, job); !status) return status;
-      for (PartRequest& part : job.parts) part.path = beside(directory, part.path);
       continue;
     }
     if (!has_section(section)) return no_section(tree->value[i], section, file);
-    const std::string output = std::exchange(job.output, {});
     if (Status status = read_section(tree->value[i], section, file, job_keys(), job); !status) return status;
-    job.output = job.output.empty() ? output : beside(directory, job.output);
     for (const std::string& name : tree->value[i].name) job.named.push_back(section + "." + name);
   }
   return {};
@@ -81,6 +76,12 @@ std::string part_text(const PartRequest& part) {
     if (!value.empty()) text += key_line(key.name, key.form, value) + "\n";
   }
   return text;
+}
+
+template <class Change>
+void change_profiles(MachineRequest& machine, const Change& change) {
+  machine.profile = change(machine.profile);
+  for (std::string& preset : machine.presets) preset = change(preset);
 }
 
 /// Whether a job's bytes are other ones than those of 77c7a2d, which wrote texts without the keys that are unsaid.
@@ -168,16 +169,9 @@ Status set_key(Job& job, std::string_view assignment) {
 
 std::string job_text(const Job& job, const std::string& directory) {
   Job named = job;
-  if (!directory.empty()) {
-    const auto relative = [&](const std::string& path) {
-      if (path.empty()) return path;
-      const fs::path whole = fs::absolute(path).lexically_normal();
-      const fs::path near = whole.lexically_relative(fs::absolute(directory).lexically_normal());
-      return near.empty() || *near.begin() == ".." ? whole.string() : near.string();
-    };
-    named.output = relative(named.output);
-    for (PartRequest& part : named.parts) part.path = relative(part.path);
-  }
+  named.output = read::path_in(directory, named.output);
+  change_profiles(named.machine, [&](const std::string& name) { return read::profile_in(directory, name); });
+  for (PartRequest& part : named.parts) part.path = read::path_in(directory, part.path);
   std::string text = sections_text(job_keys(), named, [](const JobKey&, const std::string& value) { return !value.empty(); });
   for (const PartRequest& part : named.parts) text += part_text(part);
   return text;
@@ -188,6 +182,7 @@ std::string canonical_job_text(const Job& job, Product product) {
   const bool is_new = bytes_are_new(job, product);
   Job whole = job;
   whole.slice.tolerance_um = tolerance_um_of(job, product);
+  change_profiles(whole.machine, read::profile_name);
   std::string text = sections_text(job_keys(), whole, [&](const JobKey& key, const std::string& value) {
     const bool of_filling = key.section == "fill" || key.section == "segment";
     if (key.unsaid == value && !is_new) return false;
@@ -211,6 +206,8 @@ Result<write::File> write_job(const std::string& path, const Job& job, bool dura
   }
   fs::path directory = fs::path(path).parent_path();
   if (directory.empty()) directory = ".";
+  const auto& [profile, presets] = std::tie(job.machine.profile, job.machine.presets);
+  if (Status status = read::check_nameable(directory.string(), profile, presets); !status) return status.error();
   const std::string text = read::job_command_line(command) + "\n\n" + job_text(job, directory.string());
   auto file = write::File::open(path, {.durable = durable ? write::Durable::kAll : write::Durable::kNo});
   Status status = file ? file->append(text) : Status(file.error());

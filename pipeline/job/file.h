@@ -16,7 +16,7 @@ class File;
 namespace lamina::pipeline {
 
 /// Reads a job file into `job`: keys absent from the file keep their values; its parts replace the job's.
-/// Relative paths (of parts and of the output) are relative to the file.
+/// Relative paths (of parts, profiles, presets and of the output) are relative to the file.
 /// Old forms are accepted with a line in job.notes.
 /// errors  kUsage, one line: file, line, column, key, reason. The job is then undefined.
 Status read_job(const std::string& path, Job& job);
@@ -40,7 +40,7 @@ std::vector<KeyFacts> key_facts();
 /// `directory` is empty.
 std::string job_text(const Job& job, const std::string& directory);
 
-/// Only the keys that decide the bytes of a product, parts by their file names. Equal jobs give equal texts,
+/// Only the keys that decide the bytes of a product, parts and profiles by their file names. Equal jobs give equal texts,
 /// independent of host and source.
 std::string canonical_job_text(const Job& job, Product product);
 

@@ -195,6 +195,8 @@ struct Job {
   std::vector<std::string> notes;  // notes from reading it: old forms and their replacements
   std::vector<std::string> named;  // keys that a file, an option or --set gave, as in "fill.walls"
   bool leave_to_machine = false;   // toolpaths: walls and layers that nobody named are the extruder's, not those here
+  /// Profiles that its file names and that are not there, with what to say of each.
+  std::vector<std::pair<std::string, std::string>> missing;
 };
 
 /// Checks every value of a job against its limits and against the others; for jobs from any source.

@@ -14,10 +14,12 @@
 #include "stages/data/text/names.h"
 #include "stages/data/text/readable.h"
 #include "stages/geometry/bead_section.h"
+#include "stages/read/jobs/named_files.h"
 
 namespace lamina::pipeline {
 
 Result<ExtruderProfile> resolve_extruder(const Job& job) {
+  if (Status status = read::check_there(job.missing, job.machine.profile, {}); !status) return status.error();
   auto found = find_extruder(job.machine.profile.empty() ? "marlin" : job.machine.profile);
   if (!found) return Error{found.error().fault, "--machine: " + found.error().message};
   ExtruderProfile& profile = *found;

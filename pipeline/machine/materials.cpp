@@ -6,6 +6,7 @@
 
 #include "stages/data/text/readable.h"
 #include "stages/data/text/value.h"
+#include "stages/read/profiles/printer.h"
 
 namespace lamina::pipeline {
 namespace {
@@ -21,6 +22,10 @@ std::string names_text(const std::vector<JobMaterial>& materials) {
 /// Adds the material of a part. errors  a name without a vat
 Status use(const std::string& name, const std::string& part, const Machine* machine, std::vector<JobMaterial>& used) {
   if (std::ranges::find(used, name, &JobMaterial::name) != used.end()) return {};
+  for (const JobMaterial& other : used) {
+    if (const std::string what = read::check_case(other.name, name); !what.empty())
+      return wrong(fmt::format("{}: {}", part, what));
+  }
   JobMaterial material{name, static_cast<std::uint32_t>(used.size())};
   if (machine != nullptr && !machine->powder.materials.empty()) {
     const auto& vats = machine->powder.materials;

@@ -35,7 +35,7 @@ struct Materials {
 
 /// The materials of a job. machine  null without one. Either all parts or none have a material. Materials must match the
 /// vats (powder.materials); unnamed vats receive them in the order of the parts.
-/// errors  kUsage: only some parts have a material, a name without a vat, more materials than vats
+/// errors  kUsage: only some parts have a material, a name without a vat, two that differ in case alone, more than vats
 Result<Materials> materials_of(const Job& job, const Machine* machine);
 
 /// The vats that feed a layer with the given pixels of each material: for one material its vat; for several the machine's

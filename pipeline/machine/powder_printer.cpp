@@ -4,6 +4,7 @@
 
 #include "pipeline/machine/profiles.h"
 #include "stages/program/head_grid.h"
+#include "stages/read/jobs/named_files.h"
 #include "stages/write/program/dialect.h"
 
 namespace lamina::pipeline {
@@ -38,6 +39,8 @@ Result<PowderPrinter> resolve_powder_printer(const Job& job) {
     printer.grid = {PixelAxis(dpi[0], nm_of(printer.bed.size_mm[0])), PixelAxis(dpi[1], nm_of(printer.bed.size_mm[1]))};
     return printer;
   }
+  const Status there = read::check_there(job.missing, request.profile, request.presets);
+  if (!there) return there.error();
   Result<Machine> found = find_machine(request.profile, request.presets);
   if (!found) return found.error();
   Machine& machine = *found;

@@ -105,7 +105,7 @@ Status check_shard_fits(const Job& job, const ManifestHead& head) {
     if (is_own ? !job.overwrite : !joins(job, file)) continue;
     const std::string path = job.output + "/" + file.name;
     const auto earlier = read_manifest_head(path);
-    if (earlier && earlier->id() == head.id()) continue;
+    if (earlier && same_job(*earlier, head)) continue;
     if (is_own) {
       return Error{Fault::kUsage, fmt::format("{}: is of another job, whose layers a shard cannot clear away; remove {} "
                                               "first, or name another directory",

@@ -131,7 +131,7 @@ Result<bool> check_place(const std::string& output, const ManifestHead& head, co
     const std::string path = (fs::path(output) / file.name).string();
     if (file.name == "manifest.json.part" && !claim.found()) continue;
     const Result<Manifest> present = read_manifest(path);
-    if (!present || present->head.id() != head.id()) {
+    if (!present || !same_job(present->head, head)) {
       return Error{Fault::kUsage, fmt::format("{}: is not of this job; name another directory with -o", path)};
     }
     known = true;
@@ -169,8 +169,8 @@ std::optional<Shard> whole_job(const std::vector<std::string>& directories, cons
   const std::string path = (fs::path(output) / "manifest.json").string();
   auto manifest = read_manifest(path);
   if (!manifest || manifest->head.product != Product::kImages || !covers_all(manifest->head)) return std::nullopt;
-  const Hash128 id = manifest->head.id();
-  if (!std::ranges::all_of(shards, [&](const Shard& shard) { return shard.manifest.head.id() == id; })) return std::nullopt;
+  const auto is_of_it = [&](const Shard& shard) { return same_job(shard.manifest.head, manifest->head); };
+  if (!std::ranges::all_of(shards, is_of_it)) return std::nullopt;
   return Shard{output, path, std::move(*manifest)};
 }
 

@@ -21,7 +21,7 @@ Result<std::vector<LayerRecord>> layers_that_hold(const std::string& directory, 
 
   auto manifest = read_manifest(path);
   if (!manifest) return manifest.error();
-  if (manifest->head.id() != head.id()) {
+  if (!same_job(manifest->head, head)) {
     const std::string what = difference(head, manifest->head);
     return Error{Fault::kUsage, fmt::format("{}: belongs to another job ({}); choose another directory, or --overwrite", path,
                                             what.empty() ? "its parts or keys differ" : what)};

@@ -5,10 +5,13 @@
 
 #include <cerrno>
 #include <cmath>
+#include <cstdio>
 #include <cstring>
 #include <new>
 
 #include "stages/data/input/file_reader.h"
+#include "stages/data/text/number_text.h"
+#include "stages/data/units.h"
 #include "stages/read/image_formats.h"
 #include "stages/read/numbered.h"
 
@@ -105,7 +108,28 @@ Result<std::vector<std::uint64_t>> pages_of(const std::string& path) {
   return pages;
 }
 
-std::string difference(const Image& image, const PixelGrid& grid, std::uint64_t set) {
+namespace {
+
+/// "layer 3 of 6, z 0.1 to 0.15 mm", behind a title and before what else there is: "" if the description does not say so, or
+/// says this layer.
+std::string other_layer(const std::string& description, const Layer& layer) {
+  const std::size_t begin = description.rfind("layer ");
+  unsigned number = 0, of = 0;
+  double bottom = 0, top = 0;
+  int end = 0;
+  if (begin == std::string::npos) return {};
+  const std::string text = description.substr(begin);
+  if (std::sscanf(text.c_str(), "layer %u of %u, z %lf to %lf mm%n", &number, &of, &bottom, &top, &end) != 4 || end == 0)
+    return {};
+  const std::int64_t lies = layer.bottom, ends = lies + layer.thickness;
+  if (number == std::uint64_t{layer.index} + 1 && nm_of(bottom) == lies && nm_of(top) == ends) return {};
+  return fmt::format("tells {}, the manifest says layer {} from {} to {} mm", text.substr(0, static_cast<std::size_t>(end)),
+                     std::uint64_t{layer.index} + 1, number_text(mm(lies)), number_text(mm(ends)));
+}
+
+}  // namespace
+
+std::string difference(const Image& image, const PixelGrid& grid, std::uint64_t set, const Layer& layer) {
   const std::uint32_t columns = image.runs.columns, rows = image.runs.view().rows();
   if (columns != grid.columns() || rows != grid.rows()) {
     return fmt::format("{} x {} pixels, the manifest says {} x {}", columns, rows, grid.columns(), grid.rows());
@@ -118,7 +142,8 @@ std::string difference(const Image& image, const PixelGrid& grid, std::uint64_t 
     return fmt::format("{} x {} dpi, the manifest says {} x {}", image.dpi_x, image.dpi_y, grid.x.dpi(), grid.y.dpi());
   }
   const std::uint64_t is_set = set_pixels(image.runs);
-  return is_set == set ? "" : fmt::format("{} set pixels, the manifest says {}", is_set, set);
+  return is_set == set ? other_layer(image.description, layer)
+                       : fmt::format("{} set pixels, the manifest says {}", is_set, set);
 }
 
 }  // namespace lamina::read

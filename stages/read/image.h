@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "stages/data/grid.h"
+#include "stages/data/layer.h"
 #include "stages/data/runs.h"
 #include "stages/data/status.h"
 
@@ -19,7 +20,8 @@ namespace lamina::read {
 
 struct Image {
   Runs runs;
-  double dpi_x = 0, dpi_y = 0;  // 0 where the file does not say
+  double dpi_x = 0, dpi_y = 0;   // 0 where the file does not say
+  std::string description = {};  // of a TIFF
 };
 
 /// Decodes a 1-bit image as the writers make them (TIFF of any 1-bit compression, PNG, PBM), row by row: memory is
@@ -61,7 +63,8 @@ Result<std::vector<std::uint64_t>> pages_of(const std::string& path);
 
 /// What an image differs from its manifest in, its pixels or their size first: "12 x 10 pixels, the manifest says 12 x 11";
 /// or "".
-/// set  pixels that are to be set
-std::string difference(const Image& image, const PixelGrid& grid, std::uint64_t set);
+/// set    pixels that are to be set
+/// layer  that the image is of, and that its description tells where lamina wrote one (stages/write/tiff/)
+std::string difference(const Image& image, const PixelGrid& grid, std::uint64_t set, const Layer& layer);
 
 }  // namespace lamina::read

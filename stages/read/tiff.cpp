@@ -89,6 +89,15 @@ void read_resolution(TIFF* tiff, Image& image) {
 
 namespace {
 
+/// What no writer of layers says is longer.
+constexpr std::size_t kLongestDescription = 1000;
+
+std::string description_of(TIFF* tiff) {
+  const char* text = nullptr;
+  if (TIFFGetField(tiff, TIFFTAG_IMAGEDESCRIPTION, &text) == 0 || text == nullptr) return {};
+  return std::string(text).substr(0, kLongestDescription);
+}
+
 /// What the directory of an image tells.
 struct TiffHead {
   std::uint32_t columns = 0, rows = 0;
@@ -174,6 +183,7 @@ Result<Image> tiff(int file, std::uint64_t bytes, const std::string& path, int t
   if (to_sink) sink->levels.start(head.columns);
   Image image;
   read_resolution(handle.get(), image);
+  image.description = description_of(handle.get());
   if (head.compression == COMPRESSION_CCITTFAX4 && !head.grey() &&
       read_g4(handle.get(), file, head.columns, head.rows, !head.bright_is_low(), image.runs)) {
     return image;

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <cstdint>
 #include <string_view>
+#include <utility>
 
 #include "stages/replay/printing.h"
 
@@ -62,6 +63,10 @@ class Passes {
     make();
     across_ = across_mm;
     backward_ = backward;
+    left_out_ = printing_.leaves_out_sweep();
+    if (left_out_ || !printing_.turns_anew()) return;
+    turned_ = backward != anew_;
+    anew_ = !anew_;
   }
   /// The head goes to a place beside the bed. works_mm_s  how fast over its wiper; 0: as it travels
   void visit(double x_mm, double y_mm, double works_mm_s) {
@@ -73,6 +78,7 @@ class Passes {
   }
   /// A step that fires, in the order of the movement. drops  the most of a nozzle there
   void at(std::int64_t step, std::uint32_t drops = 1) {
+    if (left_out_) return;
     if (!any_) first_ = step, most_ = 1;
     last_ = step;
     most_ = std::max(most_, drops);
@@ -93,7 +99,8 @@ class Passes {
   void make() {
     if (!any_) return;
     const auto& motion = printing_.profile().motion;
-    const bool grows = (printing_.position_of(1) > printing_.position_of(0)) != backward_;
+    if (turned_) std::swap(first_, last_);
+    const bool grows = (printing_.position_of(1) > printing_.position_of(0)) != (backward_ != turned_);
     const double ramp = grows ? motion.ramp_mm : -motion.ramp_mm;
     const double from = printing_.position_of(static_cast<double>(first_)) - ramp;
     const double to = printing_.position_of(static_cast<double>(last_)) + ramp;
@@ -116,6 +123,7 @@ class Passes {
   std::int64_t first_ = 0, last_ = 0;
   std::uint32_t most_ = 1;  // drops of a nozzle at a step
   bool backward_ = false, any_ = false;
+  bool left_out_ = false, turned_ = false, anew_ = false;  // anew_: the next one of those that are left runs back
 };
 
 }  // namespace lamina::replay

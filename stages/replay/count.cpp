@@ -22,6 +22,12 @@ std::string fault_of_count(const Machine& machine, const Count& told, const Coun
   }
   if (told.microseconds > 0 && std::abs(found.microseconds - told.microseconds) > 1)
     return fmt::format("takes {:.6f} s, the manifest says {:.6f}", found.seconds(), told.seconds());
+  // Of two times, each a whole number.
+  if (counted && told.microseconds > 0 && std::abs(found.added_microseconds - told.added_microseconds) > 2) {
+    return fmt::format("{:.6f} s are for sweeps that the head's frequency adds, the manifest says {:.6f}",
+                       1e-6 * static_cast<double>(found.added_microseconds),
+                       1e-6 * static_cast<double>(told.added_microseconds));
+  }
   return {};
 }
 

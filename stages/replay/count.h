@@ -22,6 +22,7 @@ struct Count {
   std::uint32_t added = 0;                               // sweeps beyond those that the head's own drops would take
   double scan_mm = 0, travel_mm = 0;                     // of the head
   std::int64_t microseconds = 0;                         // of the machine; whole, so that sums of layers are exact
+  std::int64_t added_microseconds = 0;                   // of them, those that the layer takes for added sweeps
   std::array<double, 2> fed_mm{0, 0};                    // by each vat
   std::uint32_t vats = 0;                                // one bit per vat that feeds, by command or by movement
   std::uint64_t spat = 0;                                // drops off the bed
@@ -33,7 +34,7 @@ struct Count {
   void add(const Count& other);
 };
 
-/// Empty, or the first number in which a program differs from what is told of it: drops, sweeps, added sweeps and time; a time
+/// Empty, or the first number in which a program differs from what is told of it: drops, sweeps, added sweeps and times; a time
 /// of 0 is untold.
 std::string fault_of_count(const Machine& machine, const Count& told, const Count& found);
 

@@ -67,17 +67,15 @@ std::uint32_t Printing::sweeps_a_place() const {
 void Printing::leave_sweep() {
   if (sweep_most_ == 0 || profile().head.most_drops < 2) return;
   const std::uint32_t number = sweep_ / sweeps_a_place();
-  if (number != place_.number) leave_place();
+  if (number != place_.number) place_ = {};
   place_.number = number;
-  ++place_.sweeps;
-  place_.drops += sweep_most_;
-  sweep_most_ = 0;
-}
-
-void Printing::leave_place() {
   const std::uint32_t most = profile().head.most_drops;
-  count.added += place_.sweeps - (place_.drops + most - 1) / most;
-  place_ = {};
+  const auto needed = [&] { return (place_.drops + most - 1) / most; };  // sweeps, for the drops so far
+  const std::uint32_t before = needed();
+  place_.drops += sweep_most_;
+  if (needed() == before) added_.insert(sweep_);
+  count.added = static_cast<std::uint32_t>(added_.size());
+  sweep_most_ = 0;
 }
 
 std::uint32_t Printing::drop_bits() const { return replay::drop_bits(profile().head.most_drops); }

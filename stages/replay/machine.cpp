@@ -44,6 +44,7 @@ void Count::add(const Count& other) {
   scan_mm += other.scan_mm;
   travel_mm += other.travel_mm;
   microseconds += other.microseconds;
+  added_microseconds += other.added_microseconds;
   fed_mm[0] += other.fed_mm[0];
   fed_mm[1] += other.fed_mm[1];
   vats |= other.vats;
@@ -149,7 +150,13 @@ Result<Count> VirtualMachine::replay(std::string_view program, const Layer& laye
   printing.check_cycle();
   if (printing.ok()) printing.compare(planes, moved, lost);
   if (!printing.ok()) return printing.status().error();
-  return printing.finish();
+  Count count = printing.finish();
+  if (printing.added_sweeps().empty()) return count;
+  Printing without(*this, layer, Purpose::kTime);
+  without.leave_out(printing.added_sweeps());
+  if (Status status = read(machine_.dialect, program, without); !status) return status.error();
+  count.added_microseconds = count.microseconds - without.finish().microseconds;
+  return count;
 }
 
 Result<Count> VirtualMachine::timed(std::string_view program, const Layer& layer) const {

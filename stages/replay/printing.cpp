@@ -167,7 +167,6 @@ bool Printing::has_ramps(double before_mm, double behind_mm, double beside_mm) {
 
 const Count& Printing::finish() {
   leave_sweep();
-  leave_place();
   const auto& powder = profile().powder;
   takes(powder.pause_s);
   const auto spread = [&](double height_mm) {

@@ -5,9 +5,11 @@
 #include <cmath>
 #include <cstdint>
 #include <optional>
+#include <set>
 #include <span>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "stages/replay/machine.h"
@@ -39,6 +41,10 @@ class Printing {
            std::uint32_t planes = 1);
 
   const Machine& profile() const { return machine_.machine_; }
+  /// Sweeps that are there since nozzles cannot fire all of their drops at the scan's speed, by number; after finish().
+  const std::set<std::uint32_t>& added_sweeps() const { return added_; }
+  /// Times the others alone; before the program.
+  void leave_out(std::set<std::uint32_t> sweeps) { left_out_ = std::move(sweeps); }
   std::uint32_t layer() const { return layer_.index; }
   /// Where the program finds the machine.
   Standing standing() const;
@@ -63,6 +69,10 @@ class Printing {
     reading_ = INT64_MIN;
   }
   void reading_step(std::int64_t step) { reading_ = step; }
+  /// Of programs that are timed without some sweeps: whether that at hand is one, and whether the others run there and back
+  /// anew.
+  bool leaves_out_sweep() const { return left_out_.contains(sweep_); }
+  bool turns_anew() const { return !left_out_.empty() && profile().motion.both_directions; }
   void at_step(std::int64_t step);
   /// drops  in a burst, where the dialect can say several
   void fire(std::uint32_t nozzle, std::uint32_t drops = 1);
@@ -164,7 +174,6 @@ class Printing {
   // Of heads that fire several drops: sweeps follow each other over a place until its drops are fired.
   std::uint32_t sweeps_a_place() const;
   void leave_sweep();
-  void leave_place();
   /// Whether care was taken before this sweep, which has just ended. since_s  of the layer, behind it; below 0: not yet
   void check_care(std::string_view what, std::uint32_t every, double limit_s, double since_s);
   /// mm of powder below the layer, fed with it.
@@ -203,8 +212,9 @@ class Printing {
   std::vector<std::uint64_t> fired_;     // how many times, for 64 pixels a word for each bit of it, the leftmost one in bit 0
   std::vector<std::uint8_t> fires_row_;  // whether anything is fired there
   struct Place {
-    std::uint32_t number = 0, sweeps = 0, drops = 0;  // drops: of the pixel that gets most
+    std::uint32_t number = 0, drops = 0;  // drops: of the pixel that gets most
   } place_;
+  std::set<std::uint32_t> added_, left_out_;
   std::uint32_t sweep_most_ = 0;  // drops of a nozzle at a step of the sweep at hand
   std::vector<Sweep> sweeps_;
   bool based_ = false;                 // told a base

@@ -44,8 +44,13 @@ bool set_keys(std::string_view lines) {
     any |= set.ok();
     at = end + 1;
   }
-  if (!any || Dice(lines).below(8) != 0) return all;                                // a hundred times as long as setting a key
-  for (pipeline::PartRequest& part : job.parts) part.path = "/parts/" + part.path;  // a job file means paths from its folder
+  if (!any || Dice(lines).below(8) != 0) return all;  // a hundred times as long as setting a key
+  const auto place = [](std::string& path) {          // a job file means paths from its folder
+    if (!path.empty()) path = "/parts/" + path;
+  };
+  for (pipeline::PartRequest& part : job.parts) place(part.path);
+  for (std::string& preset : job.machine.presets) place(preset);
+  place(job.machine.profile), place(job.output);
   check_round_trip(job);
   return all;
 }

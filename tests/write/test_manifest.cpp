@@ -339,6 +339,34 @@ TEST(Manifest, SecondRunInTheSameDirectoryIsRefusedWhileTheFirstWrites) {
   EXPECT_TRUE(ManifestWriter::open(directory / "manifest.json", some_head(), {}).ok());
 }
 
+// Builds before wrote profiles by the path that a call or a file had for them.
+TEST(Manifest, IsOfTheSameJobWhereverItsProfilesLie) {
+  const auto with = [](const std::string& machine, const std::string& rest = "") {
+    ManifestHead head = some_head();
+    head.job_toml = "[bed]\ndpi = [600, 600]\n\n[machine]\n" + machine + rest + "\n\n[[part]]\npath = \"a/b\"\n";
+    return head;
+  };
+  const auto now = with("profile = \"mine.toml\"\npresets = [\"steel\", \"dear.toml\"]");
+  for (const char* before : {"profile = \"mine.toml\"\npresets = [\"steel\", \"dear.toml\"]",
+                             "profile = \"../shop/mine.toml\"\npresets = [\"steel\", \"./dear.toml\"]",
+                             "profile = \"/a \\\"b/ c\\\\/mine.toml\"\npresets = [\"x/y/steel\", \"z/dear.toml\"]"}) {
+    EXPECT_TRUE(same_job(now, with(before))) << before;
+    EXPECT_EQ(difference(now, with(before)), "") << before;
+  }
+  for (const char* other : {"profile = \"shop/yours.toml\"\npresets = [\"steel\", \"dear.toml\"]",
+                            "profile = \"mine.toml\"\npresets = [\"dear.toml\"]", "profile = \"mine.toml\""}) {
+    EXPECT_FALSE(same_job(now, with(other))) << other;
+    EXPECT_NE(difference(now, with(other)).find("machine."), std::string::npos) << difference(now, with(other));
+  }
+  ManifestHead changed = with("profile = \"../shop/mine.toml\"\npresets = [\"steel\", \"dear.toml\"]");
+  changed.machine_profile = hash_bytes({});
+  changed.machine = "mine";
+  EXPECT_FALSE(same_job(now, changed));
+  ManifestHead part = now;
+  part.job_toml.replace(part.job_toml.find("a/b"), 3, "c/b");
+  EXPECT_FALSE(same_job(now, part));
+}
+
 TEST(Hash, KnownValuesAndFiles) {
   // xxhsum -H2 of nothing, and of "lamina".
   EXPECT_EQ(hex(hash_bytes({})), "99aa06d3014798d86001c324468d497f");

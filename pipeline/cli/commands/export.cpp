@@ -146,11 +146,11 @@ Outcome run_export(const Arguments& arguments, Context& context) {
   }
   const Result<Bed> bed = bed_of(*job);
   if (!bed) return bed.error();
+  const Result<Scene> scene = load_scene(*job, *bed);
+  if (!scene) return scene.error();
   if (arguments.has("--save-job")) {
     if (Status status = save_job(arguments.text("--save-job"), *job, "export"); !status) return status;
   }
-  const Result<Scene> scene = load_scene(*job, *bed);
-  if (!scene) return scene.error();
   const Result<Exported> exported = write_meshes(*scene, *format, output);
   if (!exported) return exported.error();
   if (!arguments.has("--quiet")) context.say_text(page_of(*scene, *exported, output, *format));

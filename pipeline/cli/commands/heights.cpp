@@ -154,9 +154,6 @@ Outcome run_heights(const Arguments& arguments, Context& context) {
   if (form == Form::kRp3) {
     if (Status status = check_one_table(*job, arguments); !status) return status.error();
   }
-  if (arguments.has("--save-job")) {
-    if (Status status = save_job(arguments.text("--save-job"), read->asked, "heights"); !status) return status.error();
-  }
   using Clock = std::chrono::steady_clock;
   const auto start = Clock::now();
   const Result<Scene> scene = load_scene(*job, kLargestBed);
@@ -170,6 +167,9 @@ Outcome run_heights(const Arguments& arguments, Context& context) {
   const std::chrono::duration<double> surface = Clock::now() - start - load;
   const auto studies = studies_of(arguments, *job, index, *options);
   if (!studies) return studies.error();
+  if (arguments.has("--save-job")) {
+    if (Status status = save_job(arguments.text("--save-job"), read->asked, "heights"); !status) return status.error();
+  }
   const heights::Study& last = studies->back();
   if (Status status = tell(output, table_text(form, *job, *scene, *studies), context); !status) return status.error();
   if (studies->size() == 1 && !arguments.has("--quiet")) {

@@ -72,11 +72,21 @@ std::string read_sign(Text text, double& sign) {
 }
 std::string write_sign(const double& sign) { return number_text(sign); }
 
+/// "drop2", "steel-drop2": what stands behind the material in the name of an image of several drops.
+bool reads_like_drop(std::string_view name) {
+  const std::string last = lower_case(name.substr(name.rfind('-') + 1));
+  const auto is_digit = [](char c) { return c >= '0' && c <= '9'; };
+  return last.size() > 4 && last.starts_with("drop") && std::all_of(last.begin() + 4, last.end(), is_digit);
+}
+
 std::string read_vats(Text text, std::vector<std::string>& materials) {
   std::vector<std::string> names;
   for (const Text name : text.empty() ? std::vector<Text>() : split(text, ",")) {
     if (auto wrong = check_material(name); !wrong.empty()) return wrong;
     if (std::ranges::find(names, name) != names.end()) return fmt::format("'{}' is in two vats; name them apart", name);
+    for (const std::string& other : names) {
+      if (auto wrong = check_case(other, name); !wrong.empty()) return wrong;
+    }
     names.emplace_back(name);
   }
   materials = std::move(names);
@@ -172,7 +182,7 @@ constexpr Key<Machine> kKeys[] = {
     field<kPowder, &Powder::vat_speed_mm_s>({"powder", "vat_speed_mm_s"}, kSpeed),
     field<kPowder, &Powder::spread_s>({"powder", "spread_s"}, {0, 1e5, " s"}).unsaid_at("0"),
     field<kPowder, &Powder::pause_s>({"powder", "pause_s"}, {0, 1e5, " s"}).unsaid_at("0"),
-    field<kPowder, &Powder::packing>({"powder", "packing"}, {0.01, 1}),
+    field<kPowder, &Powder::packing>({"powder", "packing"}, {0.01, 0.99}),
     field<kPowder, &Powder::evaporates_percent>({"powder", "evaporates_percent"}, {0, 99.9, " %"}).unsaid_at("0"),
     field<kPowder, &Powder::least_saturation_percent>({"powder", "least_saturation_percent"}, {0, 1e4, " %"}).unsaid_at("0"),
 
@@ -220,10 +230,20 @@ std::string read_vat_rule(std::string_view text, VatRule& rule) { return read_wo
 std::string vat_rule_text(VatRule rule) { return write_word(kVats, rule); }
 std::vector<std::string_view> vat_rule_words() { return words_of(kVats); }
 
+std::string check_case(std::string_view one, std::string_view other) {
+  if (one == other || lower_case(one) != lower_case(other)) return {};
+  return fmt::format(
+      "'{}' and '{}' differ in case alone, and their files would be one where case does not count; name them apart", one,
+      other);
+}
+
 std::string check_material(std::string_view name) {
   const bool good = !name.empty() && name.size() <= kLongestMaterial && std::ranges::all_of(name, [](unsigned char c) {
     return (c >= '0' && c <= '9') || (c >= 'A' && c <= 'Z') || (c >= 'a' && c <= 'z') || c == '-' || c == '_';
   });
+  if (good && reads_like_drop(name)) {
+    return fmt::format("'{}' reads like a drop in names of files, as in steel-drop2; name the material otherwise", name);
+  }
   if (good) return {};
   return fmt::format("'{}' is no name of a material; use up to {} letters, digits, - and _", name, kLongestMaterial);
 }

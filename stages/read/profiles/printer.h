@@ -28,7 +28,10 @@ std::string read_vat_rule(std::string_view text, VatRule& rule);
 std::string vat_rule_text(VatRule rule);
 std::vector<std::string_view> vat_rule_words();
 
-/// An error in the name of a material, or "". Names consist of letters, digits, - and _, because file names contain them.
+/// An error in the name of a material, or "". Names consist of letters, digits, - and _, because file names contain them, and
+/// do not end like the name of a drop.
 std::string check_material(std::string_view name);
+/// The same of two materials of a job, whose names may not differ in case alone.
+std::string check_case(std::string_view one, std::string_view other);
 
 }  // namespace lamina::read

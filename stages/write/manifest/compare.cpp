@@ -136,23 +136,6 @@ std::string fault_of_one_powder(const LayerRecord& record) {
   return {};
 }
 
-void check_heights(const Manifest& manifest, std::optional<Nm> thickness, Faults& faults) {
-  std::optional<std::int64_t> begins;
-  for (const LayerRecord& record : manifest.layers) {
-    const Layer& layer = record.layer;
-    if (layer.index == 0) begins = 0;
-    if (thickness) begins = std::int64_t{layer.index} * *thickness;
-    if (begins && layer.bottom != *begins) {
-      faults.add(fmt::format("layer {}: begins {} nm above the bed, the manifest says {}", layer.index, *begins, layer.bottom));
-    }
-    if (thickness && layer.thickness != *thickness) {
-      faults.add(fmt::format("layer {}: is {} nm thick as all of the job, the manifest says {}", layer.index, *thickness,
-                             layer.thickness));
-    }
-    begins = std::int64_t{layer.bottom} + layer.thickness;
-  }
-}
-
 Status check_shares_known(const ManifestHead& head, const std::vector<LayerRecord>& kept) {
   const auto unknown = std::ranges::count_if(kept, [&](const LayerRecord& record) {
     return record.filled_pixels() > 0 && record.part_pixels.size() != head.parts.size();

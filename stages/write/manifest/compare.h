@@ -24,10 +24,6 @@ std::string fault_of_shares(const ManifestHead& head, const LayerRecord& record)
 /// "", or how a layer of a job of one powder says that pixels lie in another one.
 std::string fault_of_one_powder(const LayerRecord& record);
 
-/// Adds the layers that are not as thick as all are, or do not begin where the one before ends: the first on the bed.
-/// thickness  of all layers, nm; none: they may differ
-void check_heights(const Manifest& manifest, std::optional<Nm> thickness, Faults& faults);
-
 /// Refuses to tell several parts apart where layers that are kept do not say whose their pixels are. errors  kUsage
 Status check_shares_known(const ManifestHead& head, const std::vector<LayerRecord>& kept);
 

@@ -16,7 +16,7 @@ namespace lamina {
 
 Status check_same_job(const std::string& path, const Manifest& manifest, const ManifestHead& head) {
   const std::string what = difference(head, manifest.head);
-  if (manifest.head.id() != head.id()) {
+  if (!same_job(manifest.head, head)) {
     return Error{Fault::kUsage, fmt::format("{}: belongs to another job ({}); name another file, or use --overwrite", path,
                                             what.empty() ? "its parts or keys differ" : what)};
   }

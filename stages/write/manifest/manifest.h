@@ -91,6 +91,9 @@ std::uint8_t grey_level_of(std::uint32_t most_drops);
 /// "bracket.stl and 2 more"; empty without parts.
 std::string title_of(const std::vector<PartSummary>& parts);
 
+/// Whether heads are of one job, whatever their ranges. Builds before wrote profiles and presets by their paths.
+bool same_job(const ManifestHead& one, const ManifestHead& other);
+
 /// The first difference between heads of different jobs, "bed.dpi is [600, 600], was [1200, 1200]"; empty for one job.
 std::string difference(const ManifestHead& now, const ManifestHead& earlier);
 

@@ -20,7 +20,7 @@ constexpr std::int64_t kMostMicroseconds = 1'000'000'000'000;     // of a layer,
 constexpr std::uint32_t kMostDrops = 64;                          // of a pixel
 constexpr std::int64_t kMostDots = 25'400, kMostSpan = 1'000'000'000'000, kLeastPixel = 1000;
 
-/// As read::check_material allows.
+/// Of the letters that read::check_material allows.
 bool is_material(std::string_view name) {
   return !name.empty() && name.size() <= kLongestMaterial && std::ranges::all_of(name, [](unsigned char c) {
     return (c >= '0' && c <= '9') || (c >= 'A' && c <= 'Z') || (c >= 'a' && c <= 'z') || c == '-' || c == '_';

@@ -56,7 +56,7 @@ Job unusual_job(const Directory& directory) {
                  Containment::kInside,
                  true};
   job.machine.profile = "nuferbj";
-  job.machine.presets = {"example-sand", "own/binder.toml"};
+  job.machine.presets = {"example-sand", directory / "own/binder.toml"};
   job.machine.scan_speed_mm_s = 12.5;
   job.machine.blocked = {{3, 5}};
   job.machine.vat_rule = lamina::VatRule::kFirst;

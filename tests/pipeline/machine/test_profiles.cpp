@@ -39,6 +39,16 @@ TEST(Profiles, AreFoundByNameAndErrorsNameLineAndColumn) {
   EXPECT_NE(unknown.error().message.find("head.nozzels: no such key"), std::string::npos) << unknown.error().message;
 }
 
+// Without voids each saturation would be one that drops do not reach.
+TEST(Profiles, OfPowderWithoutVoidsAreToldByThatKey) {
+  for (const char* packing : {"1", "0.995", "0"}) {
+    const auto solid = read_machine("[machine]\nname = \"x\"\n[powder]\npacking = " + std::string(packing) + "\n", "x.toml");
+    ASSERT_FALSE(solid.ok()) << packing;
+    EXPECT_EQ(solid.error().message,
+              "x.toml:4:11: powder.packing: " + std::string(packing) + " is out of range; give a number from 0.01 to 0.99");
+  }
+}
+
 TEST(Profiles, ExtrusionPrintersReadBackTheSameAndHaveTheirCalibrationOrThePublishedOne) {
   for (const ShippedProfile& shipped : shipped_extruders()) {
     const auto profile = read_extruder(shipped.text, std::string(shipped.name));

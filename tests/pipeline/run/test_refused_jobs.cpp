@@ -46,6 +46,31 @@ TEST_F(RefusedJobs, SaveNoJob) {
   EXPECT_TRUE(is_there("other.toml"));
 }
 
+// Nor do commands that plan no layers.
+TEST_F(RefusedJobs, OfPartsThatCannotBeLoadedSaveNone) {
+  save("bad.stl", "no mesh at all\n");
+  const std::string commands[] = {"export @ --quiet --overwrite -o x.stl", "heights @ --layer 1 --quiet",
+                                  "jet @ --layer 1 --quiet --dry-run", "slice @ --layer 1 --quiet --dry-run",
+                                  "extrude @ --layer 0.3 --quiet --dry-run"};
+  for (std::string line : commands) {
+    line += " --save-job job.toml";
+    const std::size_t part = line.find('@');
+    fs::remove(folder_ / "job.toml");
+    EXPECT_EQ(lamina(std::string(line).replace(part, 1, "bad.stl")).code, 3) << line;
+    EXPECT_FALSE(is_there("job.toml")) << line;
+    ASSERT_EQ(lamina(std::string(line).replace(part, 1, "box.stl")).code, 0) << line;
+    const std::string before = text_of("job.toml");
+    EXPECT_NE(before.find("box.stl"), std::string::npos) << line;
+    EXPECT_EQ(lamina(std::string(line).replace(part, 1, "bad.stl")).code, 3) << line;
+    EXPECT_EQ(text_of("job.toml"), before) << line;
+  }
+  // A table that cannot be measured is found behind the mesh.
+  fs::remove(folder_ / "job.toml");
+  save("tops.txt", "no table\n");
+  EXPECT_NE(lamina("heights box.stl --measure tops.txt --layer 1 --quiet --save-job job.toml").code, 0);
+  EXPECT_FALSE(is_there("job.toml"));
+}
+
 TEST_F(RefusedJobs, OfAnErrorInALayerLeaveNothingButWhatOthersMade) {
   const std::string size = " --layer 0.1 --dpi 300 --bed 5x5 --format pbm ";
   ASSERT_EQ(lamina("jet box.stl" + size + "-o made --quiet").code, 0);

@@ -401,5 +401,39 @@ TEST_F(TwoPowders, WhatTheVatsDoNotHoldIsRefusedInOneLine) {
   EXPECT_NE(wrong_ranges("[{ from_mm = 2, to_mm = 4 }]").find("material is missing"), std::string::npos);
 }
 
+// Images lie beside each other as 000001-steel.tif, 000001-steel-drop2.tif.
+TEST_F(TwoPowders, NamesWhoseFilesAreOneOrReadLikeADropAreRefused) {
+  const auto refused = [&](const Job& job, const std::string& what) {
+    const auto summary = run(job);
+    ASSERT_FALSE(summary.ok()) << what;
+    EXPECT_EQ(summary.error().fault, Fault::kUsage);
+    EXPECT_TRUE(summary.error().message.starts_with(what)) << summary.error().message;
+    EXPECT_EQ(summary.error().message.find('\n'), std::string::npos);
+    EXPECT_FALSE(fs::exists(job.output));
+  };
+  const PartRequest steel = part("parameter_quality_nut.stl", 0.3, "steel"),
+                    other = part("parameter_quality_nut.stl", 0.3, "Steel");
+  const std::string in_part = "part.material: " + steel.path + ": ";
+  for (const char* machine : {"", "nuferbj"}) {
+    Job both = job({steel, other}, "refused", machine);
+    if (*machine == 0) both.machine.vat_rule.reset();
+    refused(both, in_part + "'steel' and 'Steel' differ in case alone");
+    both.parts.pop_back();
+    both.parts[0].material_ranges = {{1, 2, "sTEEL"}};
+    refused(both, in_part + "'steel' and 'sTEEL' differ in case alone");
+  }
+  refused(job({steel}, "refused", profile("materials = [\"steel\", \"STEEL\"]")), (directory_ / "mine.toml").string());
+  for (const char* name : {"drop1", "Drop12", "steel-drop2", "a-b-DROP0"}) {
+    EXPECT_NE(read::check_material(name).find(std::string("'") + name + "' reads like a drop"), std::string::npos) << name;
+    Job named = job({steel}, "refused");
+    EXPECT_EQ(set_materials(name, named).error().fault, Fault::kUsage) << name;
+    named.parts[0].material = name;
+    EXPECT_NE(check_job(named).error().message.find("part.material: '"), std::string::npos) << check_job(named).error().message;
+  }
+  for (const char* name : {"drop", "drops2", "raindrop1", "drop-1x", "drop1-steel", "drop_1", "steel-drop"}) {
+    EXPECT_EQ(read::check_material(name), "") << name;
+  }
+}
+
 }  // namespace
 }  // namespace lamina::pipeline
