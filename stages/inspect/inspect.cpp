@@ -4,6 +4,25 @@
 #include <utility>
 
 namespace lamina::inspect {
+namespace {
+
+/// About what looking at a layer takes that is not looked at: it is enough, with as many bodies below as in it.
+std::uint64_t expected_bytes(const RunsView& image, const PixelBox& all) {
+  Follower solid(true);
+  solid.find(image);
+  std::uint64_t bodies = solid.need(image);
+  solid = Follower(true);
+  Runs between;
+  complement(image, all, between);
+  Follower powder(false);
+  powder.find(between);
+  bodies += powder.need(between);
+  // Image, powder, and scratch of thin places.
+  return image.change.size_bytes() * 8 + image.row_offset.size_bytes() * 7 + bodies + bodies / 2;
+}
+
+}  // namespace
+
 void Found::note_place(const Place& place) {
   places.push_back(place);
   if (places.size() >= 4 * kMost) sort_places();
@@ -246,7 +265,7 @@ void Inspection::look(const RunsView& image, LayerLook& look) const {
   const std::uint64_t runs = image.change.size() / 2, rows = image.rows(), least = kOfRun * (2 * runs - std::min(runs, rows));
   if (stopped_ || least > most_bytes_) {
     look = {};
-    look.least_bytes = least;
+    look.least_bytes = stopped_ ? least : expected_bytes(image, all_);
     return;
   }
   look.least_bytes = 0;

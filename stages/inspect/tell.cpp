@@ -79,13 +79,12 @@ void tell(const Findings& findings, std::span<const std::string> part, double le
     constexpr std::uint64_t kMega = 1 << 20;
     warnings.push_back(
         {"not-inspected",
-         fmt::format(
-             "{}: to look at layer {} takes at least {}, and half of --memory is for that; give --memory {}M or more, or "
-             "leave out --inspect",
-             layers == 0
-                 ? "no layer was looked at"
-                 : fmt::format("layers from {} on were not looked at, and what is told is of those below it", stop->layer),
-             stop->layer, readable_bytes(stop->bytes), (2 * stop->bytes + kMega - 1) / kMega),
+         fmt::format("{}: to look at layer {} takes about {}, and half of --memory is for that; give --memory {}M or more, or "
+                     "leave out --inspect",
+                     layers == 0 ? "no layer was looked at"
+                                 : fmt::format("layers from {} on were not looked at, and what is told is of those below it",
+                                               stop->layer),
+                     stop->layer, readable_bytes(stop->bytes), (2 * stop->bytes + kMega - 1) / kMega),
          {},
          stop->layer,
          stop->z_mm});

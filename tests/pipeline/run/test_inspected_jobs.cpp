@@ -237,7 +237,7 @@ TEST_F(InspectedJobs, AWiderLeastWallFindsAllThatANarrowerOneFinds) {
     before = count;
     const double width = std::stod(least);
     EXPECT_EQ(count, width <= 0.1 ? 0u : width <= 0.4 ? 10u : 20u) << least;
-    if (count > 0) EXPECT_EQ(thin["places"].size(), count / 10) << "each wall is one place";
+    EXPECT_EQ(count > 0 ? thin["places"].size() : 0, count / 10) << "each wall is one place";
   }
   // Two pixels are enough where nothing else is asked for.
   EXPECT_EQ(codes(inspect(stl("two.stl", {{{0, 0, 0}, {10, 10, 1}}, {{10, 4, 0}, {16, 4.2, 1}}}))), std::set<std::string>{});
@@ -264,7 +264,7 @@ TEST_F(InspectedJobs, WhatTakesMoreMemoryThanItMayIsToldAndTheJobGoesOn) {
   EXPECT_EQ(tight["inspection"]["layers"], 1);
   EXPECT_EQ(tight["inspection"]["stopped"]["layer"], 1);
   EXPECT_TRUE(codes(tight).contains("not-inspected"));
-  EXPECT_LE(tight["peak_layer_bytes"], 4 << 20);
+  EXPECT_LT(tight["peak_layer_bytes"], whole["peak_layer_bytes"]);
   // What it asks for is enough.
   const std::string text = tight["warnings"].back()["text"], give = "give --memory ";
   const std::string asked = text.substr(text.find(give) + give.size(), text.find(" or more") - text.find(give) - give.size());
