@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <functional>
 #include <optional>
+#include <utility>
 #include <vector>
 
 namespace lamina::pipeline {
@@ -83,6 +84,12 @@ class Budget {
     idle_bytes_ += retained;
   }
 
+  /// Bytes that no layer holds, and that they leave room for.
+  void hold_beside(std::uint64_t bytes) {
+    used_ -= std::exchange(beside_, bytes);
+    use(bytes);
+  }
+
   std::uint64_t bytes() const { return budget_; }
   std::uint32_t most_in_flight() const { return most_in_flight_; }
   std::uint64_t most_bytes() const { return most_bytes_; }
@@ -107,7 +114,8 @@ class Budget {
   Scratch scratch_;
   std::vector<Loan> idle_;  // each with its retained bytes
   std::uint32_t in_flight_ = 0, most_in_flight_ = 0;
-  std::uint64_t used_ = 0;        // by layers in flight
+  std::uint64_t used_ = 0;  // by layers in flight and beside them
+  std::uint64_t beside_ = 0;
   std::uint64_t idle_bytes_ = 0;  // of idle slots
   std::uint64_t most_bytes_ = 0;
 };

@@ -236,7 +236,9 @@ class LayerFlow {
         count_time(steps_.steps.size(), turn);
       }
       const std::uint64_t retained = steps_.records_from_work ? held_now(moving) : 0;
+      const std::uint64_t beside = steps_.bytes_beside ? steps_.bytes_beside() : 0;
       held = lock();
+      budget_.hold_beside(beside);
       if (steps_.records_from_work) budget_.give_back(moving.loan, retained);
       moving.finished = false;
       ++recorded_;

@@ -78,6 +78,8 @@ struct PartRequest {
 
 enum class Engine { kRays, kContours, kBoth };
 enum class Mirror { kNone, kX, kY, kXY };
+constexpr bool mirrors_x(Mirror mirror) { return mirror == Mirror::kX || mirror == Mirror::kXY; }
+constexpr bool mirrors_y(Mirror mirror) { return mirror == Mirror::kY || mirror == Mirror::kXY; }
 
 /// Defaults of jobs without a machine.
 inline constexpr std::array<double, 2> kBareBedMm{490, 380};

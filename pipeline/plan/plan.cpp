@@ -22,6 +22,7 @@
 #include "stages/geometry/blocks/mesh_blocks.h"
 #include "stages/heights/build_steps.h"
 #include "stages/raster/beams.h"
+#include "stages/sanity/records.h"
 #include "stages/write/extrusion_format.h"
 #include "stages/write/levels/level_format.h"
 #include "stages/write/slice_format.h"
@@ -165,11 +166,7 @@ class Planner {
     if (!covers_top(job()) || job().heights.containment != Containment::kInside) return;
     const heights::LayerTable& table = plan_.heights.table;
     const Layer last = job().heights.per_part ? schedule_.layers.back().layer : table[table.size() - 1];
-    if (last.highest_plane() < plan_.scene->height) return;
-    plan_.warnings.push_back(
-        {"cover-top", fmt::format("--cover-top: the layer that covers the top is empty with --containment inside, the "
-                                  "topmost {:.3f} mm are not built; leave out one of the two",
-                                  mm(std::int64_t{plan_.scene->height} - last.bottom))});
+    sanity::warn_of_open_top(last, plan_.scene->height, plan_.warnings);
   }
 
   /// Layers of one thickness are counted before there is a table of them. errors  kUsage: it does not fit into the memory
@@ -295,27 +292,7 @@ class Planner {
           {"not-written", "--format 3mf: slices of 3MF hold contours only, the filling is not in the file; choose svg or cli"});
     }
     if (!moves()) return {};
-    if (!plan_.sections->fills()) {
-      plan_.warnings.push_back({"no-bead", "nothing is asked for: no walls and no filling; give --walls, --fill or both"});
-    }
-    const ExtruderProfile& profile = plan_.moves->profile;
-    for (const auto& [heights, range] : plan_.segments->segmented()) {
-      for (const std::string& warning : segment::warnings(range->plan, profile.calibration)) {
-        plan_.warnings.push_back({"pores", heights.empty() ? warning : heights + ": " + warning});
-      }
-    }
-    if (plan_.segments->any() && profile.predicted_calibration) {
-      plan_.warnings.push_back(
-          {"calibration",
-           fmt::format("{} has no calibration of its own; widths are predicted from the lag of its melt, {:g} s: "
-                       "lamina calibrate measures them",
-                       profile.machine.name, profile.machine.material.lag_s)});
-    } else if (plan_.segments->any() && !has_measured_widths(profile)) {
-      plan_.warnings.push_back(
-          {"calibration", fmt::format("{} has no calibration of its own; widths and limits are those measured on an Anet A8: "
-                                      "lamina calibrate makes one",
-                                      profile.machine.name)});
-    }
+    warn_of_segments(*plan_.segments, plan_.moves->profile, plan_.sections->fills(), plan_.warnings);
     return {};
   }
 

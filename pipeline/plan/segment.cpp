@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "pipeline/job/keys.h"
+#include "pipeline/machine/extruder.h"
 #include "pipeline/plan/segment.h"
 #include "stages/data/text/number_text.h"
 #include "stages/data/text/ranges.h"
@@ -101,6 +102,28 @@ Result<SegmentPlan> plan_segments(const SegmentRequest& request, const segment::
   }
   std::ranges::sort(plan.ranges, {}, &SegmentRange::from);
   return plan;
+}
+
+void warn_of_segments(const SegmentPlan& segments, const ExtruderProfile& profile, bool fills, std::vector<Warning>& warnings) {
+  if (!fills) {
+    warnings.push_back({"no-bead", "nothing is asked for: no walls and no filling; give --walls, --fill or both"});
+  }
+  for (const auto& [heights, range] : segments.segmented()) {
+    for (const std::string& warning : segment::warnings(range->plan, profile.calibration)) {
+      warnings.push_back({"pores", heights.empty() ? warning : heights + ": " + warning});
+    }
+  }
+  if (!segments.any()) return;
+  if (profile.predicted_calibration) {
+    warnings.push_back(
+        {"calibration", fmt::format("{} has no calibration of its own; widths are predicted from the lag of its melt, {:g} s: "
+                                    "lamina calibrate measures them",
+                                    profile.machine.name, profile.machine.material.lag_s)});
+  } else if (!has_measured_widths(profile)) {
+    warnings.push_back({"calibration", fmt::format("{} has no calibration of its own; widths and limits are those measured on "
+                                                   "an Anet A8: lamina calibrate makes one",
+                                                   profile.machine.name)});
+  }
 }
 
 }  // namespace lamina::pipeline

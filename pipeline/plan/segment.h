@@ -8,6 +8,7 @@
 
 #include "pipeline/job/fill.h"
 #include "pipeline/job/job.h"
+#include "stages/data/extruder.h"
 #include "stages/data/status.h"
 #include "stages/segment/calibration.h"
 #include "stages/segment/expand.h"
@@ -37,5 +38,8 @@ struct SegmentPlan {
 /// Makes the plan and completes `fill`: line distances derived from the plan unless given, and lines where it has none.
 /// errors   kUsage, one line that begins with the key
 Result<SegmentPlan> plan_segments(const SegmentRequest& request, const segment::Calibration& calibration, FillRequest& fill);
+
+/// What can be said of toolpaths before any is laid: `no-bead`, `pores`, `calibration`. fills  walls or lines are asked for
+void warn_of_segments(const SegmentPlan& segments, const ExtruderProfile& profile, bool fills, std::vector<Warning>& warnings);
 
 }  // namespace lamina::pipeline

@@ -9,6 +9,7 @@
 #include "pipeline/run/path_layer.h"
 #include "stages/data/text/number_text.h"
 #include "stages/data/text/readable.h"
+#include "stages/sanity/paths.h"
 
 namespace lamina::pipeline {
 namespace {
@@ -112,7 +113,7 @@ class ContourMaker : public Maker {
   PathFacts sums_;
   double volume_mm3_ = 0, largest_gap_mm_ = 0;  // largest of those closed
   std::uint64_t cuts_ = 0, gaps_closed_ = 0, bytes_written_ = 0;
-  LayersTold open_, emptied_;  // emptied: solid before the offset
+  sanity::LayersTold open_, emptied_;  // emptied: solid before the offset
 };
 
 void ContourMaker::warn(const Summary& so_far, std::vector<Warning>& warnings) const {

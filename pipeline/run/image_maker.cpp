@@ -97,14 +97,18 @@ class ImageMaker : public Maker {
     }
     if (inspector_.on()) {
       add("inspect", [this](const Layer&, Work& work, Made&) {
-        inspector_.look(work.images.runs, work.inspected);
+        inspector_.looks().look(work.images.runs, work.look);
         return Status();
       });
+      steps.back().needs = [this](std::uint32_t, const Ticket& ticket) -> Result<std::uint64_t> {
+        return inspector_.looks().look_needs(work_[ticket.work].images.runs);
+      };
     }
     const auto dose_needs = [this](std::uint32_t layer, const Ticket& ticket) -> Result<std::uint64_t> {
       const ImageWork& work = work_[ticket.work].images;
       const Layer of = plan_.layer(layer);
-      return bytes_of(of, plan_.images->dose.parted_pixels(work.runs, work.drops)) - bytes_of(of, 0);
+      return bytes_of(of, plan_.images->dose.parted_pixels(work.runs, work.drops)) - bytes_of(of, 0) +
+             work_[ticket.work].look.bytes();
     };
     add("dose", [this](const Layer& layer, Work& work, Made& made) {
       if (Status status = imager_.bleed(layer, work.images, made.notes); !status) return status;
@@ -135,7 +139,7 @@ class ImageMaker : public Maker {
     }
     add(made.record);
     sanity_.record(made.record.layer.index, made.record.set_pixels > 0);
-    if (inspector_.on()) inspector_.record(made.record.layer, work_[ticket.work].inspected);
+    if (inspector_.on()) inspector_.record(made.record.layer, work_[ticket.work].look);
     vanished_.add(made.record.layer, made.notes.vanished);
     const raster::LayerReport& report = made.notes.report;
     rows_.add_capped(made.record.layer, report.capped_rows, report.first_capped_row, report.first_capped_instance,
@@ -155,8 +159,9 @@ class ImageMaker : public Maker {
   }
 
   std::uint64_t bytes_held(std::uint32_t work) const override {
-    return work_[work].images.bytes() + work_[work].files.bytes() + work_[work].inspected.bytes();
+    return work_[work].images.bytes() + work_[work].files.bytes() + work_[work].look.bytes();
   }
+  std::uint64_t bytes_beside() const override { return inspector_.bytes(); }
   void let_go(std::uint32_t work) override { work_[work] = Work(); }
 
   std::uint64_t crossings() const override { return crossings_; }
@@ -185,7 +190,7 @@ class ImageMaker : public Maker {
   struct Work {
     ImageWork images;
     ImageFiles::Work files;
-    Inspector::Work inspected;
+    inspect::LayerLook look;
   };
   struct Made {
     LayerRecord record;
@@ -254,9 +259,7 @@ class ImageMaker : public Maker {
 
 void ImageMaker::warn(const Summary&, std::vector<Warning>& warnings) const {
   inspector_.warn(warnings);
-  const Mirror mirror = plan_.job.mirror;
-  vanished_.tell(plan_.images->grid, mirror == Mirror::kX || mirror == Mirror::kXY,
-                 mirror == Mirror::kY || mirror == Mirror::kXY, warnings);
+  vanished_.tell(plan_.images->grid, mirrors_x(plan_.job.mirror), mirrors_y(plan_.job.mirror), warnings);
   sanity::warn_of_lost_pixels(lost_pixels_, warnings);
   for (const UnfedPowder& powder : unfed_) sanity::warn_of_unfed(powder, warnings);
   const std::vector<std::uint32_t>& part = plan_.scene->part_of_instance;

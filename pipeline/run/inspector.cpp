@@ -18,25 +18,6 @@ double narrowest_mm(const ImagePlan& images) {
   return std::max(2 * pixel, std::cbrt(6 * drop_mm3 / std::numbers::pi));
 }
 
-nlohmann::ordered_json json_of(const inspect::Spot& spot) {
-  return {{"x_mm", spot.x_mm}, {"y_mm", spot.y_mm}, {"z_mm", spot.z_mm}, {"layer", spot.layer}};
-}
-
-nlohmann::ordered_json json_of(const inspect::Found& found, std::string_view amount) {
-  nlohmann::ordered_json json{{"count", found.count}};
-  if (found.count == 0) return json;
-  json[std::string(amount)] = found.amount;
-  json["largest_" + std::string(amount)] = found.largest;
-  json["largest_at"] = json_of(found.spot);
-  for (const inspect::Place& place : found.places) {
-    nlohmann::ordered_json& one = json["places"].emplace_back(json_of(place.spot));
-    one["last_layer"] = place.last_layer;
-    one["box_mm"] = place.box_mm;
-    one[std::string(amount)] = place.amount;
-  }
-  return json;
-}
-
 }  // namespace
 
 Inspector::Inspector(const Plan& plan) : plan_(plan) {
@@ -56,14 +37,7 @@ Inspector::Inspector(const Plan& plan) : plan_(plan) {
               static_cast<Nm>(images.bottom + std::int64_t{images.thickness} * images.images->layers())};
   }
   least_mm_ = plan.job.least_wall_mm.value_or(narrowest_mm(*plan.images));
-  inspection_.emplace(plan.images->grid, std::move(stands), nm_of(least_mm_));
-}
-
-void Inspector::look(const Runs& image, Work& work) const {
-  work.image.columns = image.columns;
-  work.image.row_offset.assign(image.row_offset.begin(), image.row_offset.end());
-  work.image.change.assign(image.change.begin(), image.change.end());
-  work.thin = inspection_->thin(image, work.scratch);
+  inspection_.emplace(plan.images->grid, std::move(stands), nm_of(least_mm_), plan.job.memory_bytes / 2);
 }
 
 void Inspector::warn(std::vector<Warning>& warnings) {
@@ -80,31 +54,16 @@ void Inspector::warn(std::vector<Warning>& warnings) {
   warnings.insert(warnings.end(), told_.begin(), told_.end());
 }
 
-nlohmann::ordered_json Inspector::json() const {
-  const inspect::Findings& found = inspection_->findings();
-  nlohmann::ordered_json json{{"layers", found.layers},
-                              {"least_wall_mm", least_mm_},
-                              {"islands", json_of(found.islands, "mm2")},
-                              {"loose", json_of(found.loose, "mm3")},
-                              {"hollows", json_of(found.hollows, "mm3")},
-                              {"thin", json_of(found.thin, "mm2")},
-                              {"touching", nlohmann::ordered_json::array()}};
-  for (const auto& pair : found.touching) {
-    json["touching"].push_back({{"part", pair.part}, {"other", pair.other}, {"at", json_of(pair.spot)}});
-  }
-  if (found.bed_edge) json["bed_edge"] = json_of(*found.bed_edge);
-  return json;
-}
-
 void Inspector::tell(Summary& summary) const {
-  if (on() && !kept_) (*summary.facts)["inspection"] = json();
+  if (on() && !kept_) (*summary.facts)["inspection"] = json_of(inspection_->findings(), least_mm_);
 }
 
 Status Inspector::check_file() const { return on() && whole() ? check_inspection_file(plan_.job.output) : Status(); }
 
 Status Inspector::write(const ManifestHead& head) const {
   if (!on() || kept_ || !whole()) return keep_inspection_of(plan_.job.output, head);
-  return write_inspection(plan_.job.output, head, {{"inspection", json()}, {"warnings", warnings_json(told_)}});
+  return write_inspection(plan_.job.output, head,
+                          {{"inspection", json_of(inspection_->findings(), least_mm_)}, {"warnings", warnings_json(told_)}});
 }
 
 bool Inspector::whole() const { return plan_.range[0] == 0 && plan_.range[1] == plan_.layer_count && !plan_.job.shard; }

@@ -1,7 +1,6 @@
 // pipeline/run/inspector.h: looks through the layers of a powder job on request (stages/inspect/).
 #pragma once
 
-#include <nlohmann/json_fwd.hpp>
 #include <optional>
 #include <string>
 #include <vector>
@@ -19,19 +18,17 @@ class Inspector {
   explicit Inspector(const Plan& plan);
   bool on() const { return inspection_.has_value(); }
 
-  /// What of a layer in flight waits for its turn.
-  struct Work {
-    Runs image;
-    inspect::ThinScratch scratch;
-    inspect::ThinPlaces thin;
-    std::uint64_t bytes() const { return bytes_held(image.row_offset) + bytes_held(image.change) + scratch.bytes(); }
-  };
-  /// Keeps the section of a layer; from any thread.
-  void look(const Runs& image, Work& work) const;
+  /// Those of layers in flight, from any thread, are its const functions. Of an idle one there is none.
+  const inspect::Inspection& looks() const { return *inspection_; }
   /// In layer order.
-  void record(const Layer& layer, const Work& work) { inspection_->add(layer, work.image, work.thin); }
+  void record(const Layer& layer, const inspect::LayerLook& look) { inspection_->add(layer, look); }
+  /// Beside the looks at layers.
+  std::uint64_t bytes() const { return on() ? inspection_->bytes() : 0; }
   /// A layer of an earlier run, whose image is not at hand: bodies cannot be followed.
-  void keep() { kept_ = true; }
+  void keep() {
+    kept_ = true;
+    if (on()) inspection_->leave();
+  }
 
   /// After the last layer.
   void warn(std::vector<Warning>& warnings);
@@ -45,7 +42,6 @@ class Inspector {
 
  private:
   bool whole() const;
-  nlohmann::ordered_json json() const;
 
   const Plan& plan_;
   std::optional<inspect::Inspection> inspection_;

@@ -48,6 +48,8 @@ class Maker {
   virtual void add_kept(const LayerRecord& record) = 0;
   virtual std::uint64_t bytes_held(std::uint32_t work) const = 0;
   virtual void let_go(std::uint32_t work) = 0;
+  /// Of what record() keeps from layer to layer.
+  virtual std::uint64_t bytes_beside() const { return 0; }
 
   // --- the end
   /// Adds the product's own warnings; before finish().

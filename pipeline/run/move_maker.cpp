@@ -9,6 +9,7 @@
 #include "pipeline/run/path_layer.h"
 #include "stages/data/text/number_text.h"
 #include "stages/data/text/readable.h"
+#include "stages/sanity/paths.h"
 #include "stages/segment/laid/told.h"
 #include "stages/write/gcode/gcode.h"
 
@@ -74,7 +75,6 @@ class MoveMaker : public Maker {
       return status;
     add(made.record);
     sanity_.record(layer, made.facts.totals.part_moves() > 0);
-    if (made.facts.laid.segments.lines > 0 && made.facts.laid.segments.thin == 0) undivided_.add(made.record.layer);
     return {};
   }
   void add_kept(const LayerRecord& record) override {
@@ -83,7 +83,7 @@ class MoveMaker : public Maker {
   }
   void add(const LayerRecord& record) {
     if (record.layer.index == plan_.range[0]) first_layer_points_ = record.paths->laid.segments.points();
-    if (record.paths->open > 0) open_.add(record.layer);
+    told_.add(record.layer, record.paths->open, record.paths->laid.segments.lines, record.paths->laid.segments.thin);
     sums_.add(*record.paths);
     const std::vector<RangePores>& by_range = record.paths->by_range;
     const auto& areas = plan_.sections->areas();
@@ -177,25 +177,13 @@ class MoveMaker : public Maker {
   std::vector<segment::LaidRange> ranges_;  // of segmented_, and one of layers of an earlier build
   bool by_range_ = false;                   // records hold the pores of each range
   std::uint64_t first_layer_points_ = 0, bytes_written_ = 0;
-  LayersTold open_, undivided_;
+  sanity::PathsTold told_;
 };
 
 void MoveMaker::warn(const Summary& so_far, std::vector<Warning>& warnings) const {
-  open_.warn("chains-open",
-             fmt::format("chains of cuts stay open in {} layers, first in {}: they bound nothing and are left out; leave "
-                         "out --no-repair to close the parts",
-                         open_.count, open_.first),
-             warnings);
-  undivided_.warn("undivided",
-                  fmt::format("segment.thin_mm: longer than every segmented line less its ends in {} of {} layers, first "
-                              "in {}: no pores there",
-                              undivided_.count, so_far.layers_planned, undivided_.first),
-                  warnings);
+  told_.tell(plan_.sections->fills(), sums_.totals.part_moves(), so_far.layers_planned, warnings);
   std::string slow = segment::speed_warning(sums_.laid.shorts, plan_.moves->profile.machine);
   if (!slow.empty()) warnings.push_back({"acceleration", std::move(slow)});
-  if (plan_.sections->fills() && sums_.totals.part_moves() == 0) {
-    warnings.push_back({"no-bead", "no bead fits into the parts: they are narrower than the walls and the filling ask for"});
-  }
 }
 
 void MoveMaker::tell(Summary& summary) const {

@@ -170,15 +170,4 @@ Result<bool> lay_moves(const Plan& plan, std::uint32_t index, const Sections::Wo
   return true;
 }
 
-void LayersTold::add(const Layer& layer) {
-  if (++count > 1) return;
-  index = layer.index;
-  z_mm = mm(layer.plane());
-  first = fmt::format("layer {} at z {:.3f} mm", index, z_mm);
-}
-
-void LayersTold::warn(std::string_view code, std::string text, std::vector<Warning>& warnings) const {
-  if (count > 0) warnings.push_back({std::string(code), std::move(text), "", index, z_mm});
-}
-
 }  // namespace lamina::pipeline

@@ -34,15 +34,4 @@ struct TextRoom {
 Result<bool> lay_moves(const Plan& plan, std::uint32_t layer, const Sections::Work& work, const TextRoom& room,
                        write::LayerMoves& out, PathFacts& facts);
 
-/// Counts the layers with a fault and names the first.
-struct LayersTold {
-  std::uint32_t count = 0;
-  std::string first;  // "layer 12 at z 0.300 mm"
-  std::uint32_t index = 0;
-  double z_mm = 0;
-  void add(const Layer& layer);
-  /// Only if there are any.
-  void warn(std::string_view code, std::string text, std::vector<Warning>& warnings) const;
-};
-
 }  // namespace lamina::pipeline

@@ -85,6 +85,7 @@ LayerSteps steps_of(Maker& maker, const std::vector<std::uint32_t>& todo, const 
     return status;
   };
   steps.bytes_held = [&](std::uint32_t work) { return maker.bytes_held(work); };
+  steps.bytes_beside = [&] { return maker.bytes_beside(); };
   steps.let_go = [&](std::uint32_t work) { maker.let_go(work); };
   steps.records_from_work = maker.records_from_work();
   return steps;

@@ -86,8 +86,7 @@ Sanity::Sanity(const Plan& plan, const std::atomic<bool>& cancel)
 }
 
 void Sanity::add_left(const Layer& layer, const Runs& image) {
-  const Mirror mirror = plan_.job.mirror;
-  tally_->add_left(layer, image, mirror == Mirror::kX || mirror == Mirror::kXY, mirror == Mirror::kY || mirror == Mirror::kXY);
+  tally_->add_left(layer, image, mirrors_x(plan_.job.mirror), mirrors_y(plan_.job.mirror));
 }
 
 double Sanity::add_contours(const Layer& layer, const slice::LayerContours& contours) {

@@ -13,13 +13,13 @@
 #include "pipeline/run/job_cost.h"
 #include "pipeline/show/report_cast.h"
 #include "pipeline/show/report_doubts.h"
-#include "pipeline/show/report_places.h"
 #include "pipeline/show/report_source.h"
 #include "stages/data/input/hash.h"
 #include "stages/geometry/coverage.h"
 #include "stages/view/depth.h"
 #include "stages/write/report/head.h"
 #include "stages/write/report/page.h"
+#include "stages/write/report/places.h"
 #include "stages/write/report/run_code.h"
 
 namespace lamina::pipeline {
@@ -147,7 +147,8 @@ Result<Report> make_report(const std::string& path, const ReportOptions& options
   auto shown = parts ? views_of_parts(*parts) : parts.error();
   if (shown) {
     views = std::move(*shown);
-  } else if (!options.parts.empty()) {
+  } else if (!options.parts.empty() &&
+             std::ranges::none_of(manifest.head.parts, [](const auto& part) { return part.triangles == 0; })) {
     return Error{Fault::kInput, shown.error().message};
   } else {
     report.without_parts = shown.error().message;
@@ -161,7 +162,7 @@ Result<Report> make_report(const std::string& path, const ReportOptions& options
   HeldLayers held(options.size_limit > taken ? options.size_limit - taken : 0);
   auto seen = see_layers(*source, doubts, held);
   if (!seen) return seen.error();
-  add_inspection(folder.string(), manifest.head, job.mirror, *seen);
+  write::report::add_inspection(folder.string(), manifest.head, mirrors_x(job.mirror), mirrors_y(job.mirror), *seen);
   seen->laid = options.laid;
   seen->laid_svg = options.laid_svg;
   if (source->machine) {

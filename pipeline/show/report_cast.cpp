@@ -25,6 +25,10 @@ std::string find_part(const std::string& name, const std::vector<std::string>& f
 
 Result<Scene> find_parts(const ManifestHead& head, const Job& recorded, const std::vector<std::string>& folders) {
   Job job = recorded;
+  for (const PartSummary& part : head.parts) {
+    if (part.triangles == 0)
+      return Error{Fault::kInput, fmt::format("{}: is images, which have no sides to look at", part.path)};
+  }
   for (PartRequest& part : job.parts) {
     const std::string name = fs::path(part.path).filename().string();
     part.path = find_part(name, folders);

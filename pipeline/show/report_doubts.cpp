@@ -3,9 +3,12 @@
 #include <algorithm>
 
 #include "pipeline/plan/dose.h"
+#include "pipeline/plan/heights.h"
 #include "pipeline/run/sanity.h"
+#include "stages/heights/build_steps.h"
 #include "stages/program/head_grid.h"
 #include "stages/sanity/crossed.h"
+#include "stages/sanity/paths.h"
 #include "stages/sanity/records.h"
 
 namespace lamina::pipeline {
@@ -20,8 +23,15 @@ bool any_bleed(const Job& job, bool (*is)(double)) {
 // The machine and the dose are planned as they were; that they could be, the job has shown.
 void ReportDoubts::plan_again(const Machine* machine, const Scene& scene) {
   const ManifestHead& head = manifest_.head;
-  if (const auto grid = machine != nullptr ? program::make_head_grid(*machine) : Error{}; grid)
+  if (const auto grid = machine != nullptr ? program::make_head_grid(*machine) : Error{}; grid) {
+    heights::LayerTable table;
+    for (const LayerRecord& record : manifest_.layers) table.add(record.layer.thickness, record.layer.reason);
+    if (auto steps = heights::check_build_steps(*machine, table); steps && !steps->empty())
+      told_.push_back({"build-steps", std::move(*steps)});
     warn_of_machine(*machine, *grid, told_);
+  }
+  FillRequest fill = job_.fill;
+  if (fills(job_)) static_cast<void>(plan_bead_segments(job_, fill, told_));
   job_.allow_unbound = true;
   static_cast<void>(DosePlan(job_, head.grid)
                         .decide(
@@ -29,15 +39,32 @@ void ReportDoubts::plan_again(const Machine* machine, const Scene& scene) {
                             [this](std::uint32_t i) { return manifest_.layers[i].layer; }, told_));
 }
 
+void ReportDoubts::plan_paths_again() {
+  const auto resolved = resolve(job_, Product::kMoves);
+  if (!resolved) return;
+  FillRequest fill = resolved->job.fill;
+  const auto segments = plan_segments(resolved->job.segment, resolved->extruder->calibration, fill);
+  if (segments) warn_of_segments(*segments, *resolved->extruder, fills(resolved->job), told_);
+}
+
 void ReportDoubts::look_at_records() {
-  const std::vector<JobMaterial>& materials = manifest_.head.materials;
-  std::uint64_t lost = 0;
-  for (const LayerRecord& record : manifest_.layers) lost += record.program.lost;
-  sanity::warn_of_lost_pixels(lost, told_);
-  for (std::size_t m = 0; m < materials.size(); ++m) {
-    UnfedPowder powder{materials[m].name};
+  const ManifestHead& head = manifest_.head;
+  sanity::LayerRecords records;
+  sanity::PathsTold paths;
+  std::uint64_t moves = 0;
+  for (const LayerRecord& record : manifest_.layers) {
+    records.add(record.layer, record.set_pixels, record.program.lost, record.capped_rows);
+    if (!record.paths) continue;
+    const auto& segments = record.paths->laid.segments;
+    paths.add(record.layer, record.paths->open, segments.lines, segments.thin);
+    moves += record.paths->totals.part_moves();
+  }
+  records.tell(head.parts, told_);
+  if (head.product == Product::kMoves) paths.tell(fills(job_), moves, head.layer_count, told_);
+  for (std::size_t m = 0; m < head.materials.size(); ++m) {
+    UnfedPowder powder{head.materials[m].name};
     for (const LayerRecord& record : manifest_.layers)
-      powder.add(record.layer, record.image_of(m, materials.size()).unfed_pixels);
+      powder.add(record.layer, record.image_of(m, head.materials.size()).unfed_pixels);
     sanity::warn_of_unfed(powder, told_);
   }
 }
@@ -62,21 +89,29 @@ ReportDoubts::ReportDoubts(const Manifest& manifest, const Job& job, const Machi
   const bool thinned = head.product == Product::kImages && thins(job);
   if (scene != nullptr && !thinned) crossed_ = sanity::crossed_planes(scene->meshes, scene->instances, planes);
   if (scene != nullptr) united_mm3_ = united_in(*scene, *tally_);
-  if (head.product != Product::kImages) return;
-  tally_->look_through(head.grid);
-  if (manifest.layers.size() == head.layer_count) plan_again(machine, scene != nullptr ? *scene : boxes);
+  const Scene& parts = scene != nullptr ? *scene : boxes;
+  std::int64_t height = 0;
+  for (const Instance& instance : parts.instances) height = std::max<std::int64_t>(height, box_of(parts, instance).hi.z);
+  const bool all = manifest.layers.size() == head.layer_count, images = head.product == Product::kImages;
+  if (all && covers_top(job) && job.heights.containment == Containment::kInside)
+    sanity::warn_of_open_top(manifest.layers.back().layer, height, told_);
+  if (images) tally_->look_through(head.grid);
+  if (images && all) plan_again(machine, parts);
+  if (!images) plan_paths_again();
   look_at_records();
+  if (images && scene != nullptr) bleed_ = ReportBleed::make(manifest, job, machine, *scene);
 }
 
 void ReportDoubts::look(const Layer& layer, const RunsView& image) {
   if (manifest_.head.product != Product::kImages) return;
-  const Mirror mirror = job_.mirror;
-  tally_->add_image(layer, image, mirror == Mirror::kX || mirror == Mirror::kXY, mirror == Mirror::kY || mirror == Mirror::kXY);
+  if (bleed_) bleed_->look(layer);
+  tally_->add_image(layer, image, mirrors_x(job_.mirror), mirrors_y(job_.mirror));
 }
 
 std::vector<Warning> ReportDoubts::tell(const std::vector<std::uint64_t>& set) const {
   const ManifestHead& head = manifest_.head;
   std::vector<Warning> warnings = told_;
+  if (bleed_) bleed_->tell(warnings);
   if (head.first_layer != 0 || head.last_layer != head.layer_count) return warnings;
   const bool images = head.product == Product::kImages;
   sanity::Sampling sampling = sampling_of(job_, images ? &head.grid : nullptr);

@@ -8,6 +8,7 @@
 
 #include "pipeline/job/job.h"
 #include "pipeline/plan/scene.h"
+#include "pipeline/show/report_bleed.h"
 #include "stages/data/runs.h"
 #include "stages/data/status.h"
 #include "stages/sanity/tally.h"
@@ -30,11 +31,13 @@ class ReportDoubts {
 
  private:
   void plan_again(const Machine* machine, const Scene& scene);
+  void plan_paths_again();
   void look_at_records();
 
   const Manifest& manifest_;
   Job job_;
-  std::vector<Warning> told_;  // by the plan and the records of layers, as lamina jet tells them
+  std::vector<Warning> told_;           // by the plan and the records of layers, as lamina jet tells them
+  std::unique_ptr<ReportBleed> bleed_;  // null: it takes nothing, or the parts are not there
   std::unique_ptr<sanity::Tally> tally_;
   std::vector<std::uint8_t> crossed_;                        // by layer: whether it may not be empty
   std::function<Result<double>(std::uint32_t)> united_mm3_;  // of a group; empty without the parts

@@ -6,6 +6,7 @@
 #include <algorithm>
 
 #include "pipeline/check/job_files.h"
+#include "stages/geometry/combine.h"
 #include "stages/write/picture/swath_view.h"
 
 namespace lamina::pipeline {
@@ -33,14 +34,17 @@ Result<Buffer<std::byte>> draw_swath(const std::string& directory, const Manifes
   write::picture::SwathView view;
   view.grid = head.grid;
   view.width = width;
-  view.image = image->front();
+  const Levels asked = times_set(*image);
+  view.image = asked;
   view.fired = jetting->printed;
+  view.most = head.most_of_pixel();
   view.bands = jetting->bands;
   view.nozzles = jetting->nozzles;
   view.title = fmt::format("{}, layer {}, swath {} ({} of {} that fire), step {}", head.machine, choice.layer, jetting->swath,
                            jetting->place, jetting->sweeps, jetting->step);
   view.caption = fmt::format("{} of {} drops fired; {} of {} nozzles fire at this step (red)", jetting->fired, jetting->drops,
                              jetting->firing, jetting->nozzles.size());
+  if (view.most > 1) view.caption += fmt::format("; darkest {} drops", view.most);
   return write::picture::swath_picture(view);
 }
 

@@ -11,7 +11,7 @@
 
 namespace lamina::pipeline {
 
-/// Replays the layer's program up to the step and draws the pixels jetted so far, `width` pixels wide. errors  kUsage: no
+/// Replays the layer's program up to the step and draws the drops jetted so far, `width` pixels wide. errors  kUsage: no
 /// such layer, swath or step; kVerification: missing or changed files; kInternal
 Result<Buffer<std::byte>> draw_swath(const std::string& directory, const Manifest& manifest, const replay::StepChoice& choice,
                                      std::uint32_t width);

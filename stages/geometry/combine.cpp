@@ -1,6 +1,7 @@
 #include "stages/geometry/combine.h"
 
 #include <algorithm>
+#include <utility>
 
 namespace lamina {
 
@@ -92,6 +93,17 @@ void larger(const LevelsView& a, const LevelsView& b, Levels& out) {
 
 void add_levels(const LevelsView& a, const LevelsView& b, Levels& out) {
   join(a, b, out, [](int one, int other) { return static_cast<std::uint8_t>(std::min(one + other, 255)); });
+}
+
+Levels times_set(std::span<const Runs> images) {
+  Levels sum, one, both;
+  levels_of(images.front(), 1, sum);
+  for (const Runs& image : images.subspan(1)) {
+    levels_of(image, 1, one);
+    add_levels(sum, one, both);
+    std::swap(sum, both);
+  }
+  return sum;
 }
 
 }  // namespace lamina

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstdint>
+#include <span>
 
 #include "stages/data/levels.h"
 #include "stages/data/runs.h"
@@ -26,5 +27,7 @@ void larger(const LevelsView& a, const LevelsView& b, Levels& out);
 
 /// The sum of both levels of each pixel, at most 255; the same of both.
 void add_levels(const LevelsView& a, const LevelsView& b, Levels& out);
+/// How many of the images set each pixel, at most 255; at least one image, all of the same size.
+Levels times_set(std::span<const Runs> images);
 
 }  // namespace lamina

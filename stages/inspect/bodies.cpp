@@ -13,6 +13,10 @@ void Pieces::find(const RunsView& image, bool diagonal) {
   of_run.resize(runs);
   pixels.clear();
   box.clear();
+  std::size_t roots = 0;
+  for (std::uint32_t i = 0; i < runs; ++i) roots += sets_.find(i) == i ? 1 : 0;
+  pixels.reserve(roots);
+  box.reserve(roots);
   for (std::uint32_t r = 0; r < image.rows(); ++r) {
     for (std::uint32_t i = image.row_offset[r] / 2; i < image.row_offset[r + 1] / 2; ++i) {
       const std::uint32_t root = sets_.find(i);
@@ -29,9 +33,16 @@ void Pieces::find(const RunsView& image, bool diagonal) {
   }
 }
 
-void Follower::start(const Layer& layer, const RunsView& image) {
-  pieces_.find(image, diagonal_);
+std::uint64_t Follower::need(const RunsView& image) const {
+  const std::uint64_t pieces = pieces_.count(), nodes = bodies_.size() + pieces, runs = image.change.size() / 2;
+  const std::uint64_t of_pieces = runs * 2 * sizeof(std::uint32_t) + pieces * (sizeof(std::uint64_t) + sizeof(PixelBox));
+  const std::uint64_t of_nodes = nodes * (2 * sizeof(std::uint32_t) + sizeof(Body)) + pieces * (1 + sizeof(Body));
+  return of_pieces + of_nodes + runs * 3 * sizeof(std::uint32_t) + image.row_offset.size_bytes();
+}
+
+void Follower::start(const Layer& layer) {
   const std::size_t old = bodies_.size();
+  bodies_.reserve(old + pieces_.count());
   for (std::size_t p = 0; p < pieces_.count(); ++p) {
     Body& body = bodies_.emplace_back();
     body.pixels = pieces_.pixels[p];

@@ -112,6 +112,11 @@ class Follower {
   /// diagonal  within a layer; layers touch where they share a pixel
   explicit Follower(bool diagonal) : diagonal_(diagonal) {}
 
+  /// The pieces of the next layer: before add() of it.
+  void find(const RunsView& image) { pieces_.find(image, diagonal_); }
+  /// Bytes that are held once add() has been through the layer whose pieces were found.
+  std::uint64_t need(const RunsView& image) const;
+
   /// Rules: begin(Body&) a piece with nothing below; grow(Body&) any piece, before it joins what is below; join(const Body&
   /// stays, const Body& ends, const Body& piece) two bodies of lower layers that a piece unites; fields `owner` and `open` of
   /// what is united are those of the first that has one, and of either. end(const Body&) a body that no layer goes on with.
@@ -130,11 +135,12 @@ class Follower {
 
   std::uint64_t bytes() const {
     return pieces_.bytes() + sets_.bytes() + bytes_held(below_.change) + bytes_held(below_.row_offset) +
-           bytes_held(body_below_) + (bodies_.capacity() + next_.capacity()) * sizeof(Body);
+           bytes_held(body_below_) + bytes_held(number_) + bytes_held(hangs_) +
+           (bodies_.capacity() + next_.capacity()) * sizeof(Body);
   }
 
  private:
-  void start(const Layer& layer, const RunsView& image);
+  void start(const Layer& layer);
   void keep(const RunsView& image);
 
   bool diagonal_;
@@ -151,7 +157,7 @@ class Follower {
 template <class Rules>
 void Follower::add(const Layer& layer, const RunsView& image, Rules& rules) {
   const auto old = static_cast<std::uint32_t>(bodies_.size());
-  start(layer, image);
+  start(layer);
   for (std::size_t p = old; p < bodies_.size(); ++p) rules.grow(bodies_[p]);
   for (std::uint32_t r = 0; r < image.rows() && r < below_.view().rows(); ++r) {
     for_touching(below_, r, image, r, false, [&](std::uint32_t under, std::uint32_t over) {
@@ -179,6 +185,7 @@ void Follower::add(const Layer& layer, const RunsView& image, Rules& rules) {
   // Bodies that a piece of this layer belongs to go on, in the order of the pieces.
   number_.assign(bodies_.size(), Body::kNone);
   next_.clear();
+  next_.reserve(pieces_.count());
   for (std::uint32_t p = 0; p < pieces_.count(); ++p) {
     const std::uint32_t root = sets_.find(old + p);
     if (number_[root] != Body::kNone) continue;

@@ -6,8 +6,20 @@
 namespace lamina::inspect {
 namespace {
 
-/// Places of at most this many squares of the least width are corners.
-constexpr double kCorner = 2;
+/// About what looking at a layer takes that is not looked at: it is enough, with as many bodies below as in it.
+std::uint64_t expected_bytes(const RunsView& image, const PixelBox& all) {
+  Follower solid(true);
+  solid.find(image);
+  std::uint64_t bodies = solid.need(image);
+  solid = Follower(true);
+  Runs between;
+  complement(image, all, between);
+  Follower powder(false);
+  powder.find(between);
+  bodies += powder.need(between);
+  // Image, powder, and scratch of thin places.
+  return image.change.size_bytes() * 8 + image.row_offset.size_bytes() * 7 + bodies + bodies / 2;
+}
 
 }  // namespace
 
@@ -67,12 +79,13 @@ struct Inspection::Powder {
   }
 };
 
-Inspection::Inspection(const PixelGrid& grid, std::vector<Stand> stands, std::int64_t least_nm)
+Inspection::Inspection(const PixelGrid& grid, std::vector<Stand> stands, std::int64_t least_nm, std::uint64_t most_bytes)
     : grid_(grid),
       stands_(std::move(stands)),
-      disc_(disc_of(grid, least_nm / 2)),
+      stencils_(grid, least_nm),
       least_mm_(static_cast<double>(least_nm) / kNmPerMm),
-      pixel_mm2_(1 / (grid.x.pixels_per_nm() * grid.y.pixels_per_nm() * kNmPerMm * kNmPerMm)) {
+      pixel_mm2_(1 / (grid.x.pixels_per_nm() * grid.y.pixels_per_nm() * kNmPerMm * kNmPerMm)),
+      most_bytes_(most_bytes) {
   std::ranges::stable_sort(stands_, {}, [](const Stand& stand) { return stand.box.lo.z; });
   for (const Stand& stand : stands_) {
     window_.push_back(window_of(stand.box));
@@ -123,24 +136,34 @@ void Inspection::note_body(Found& found, const Body& body, double amount, std::u
 /// A thin wall is thin in many layers: the places that lie upon each other are one.
 void Inspection::note_thin(const Layer& layer, const ThinPlaces& thin) {
   Found& found = findings_.thin;
-  const bool goes_on = thin_.amount > 0 && thin.count > 0 && thin_box_.meets(thin.box);
-  if (thin_.amount > 0 && !goes_on) {
-    found.note_place(thin_);
-    thin_ = {};
+  std::vector<Wall> walls;
+  for (const ThinPlace& place : thin.largest) {
+    const auto below = std::ranges::find_if(walls_, [&](const Wall& wall) { return wall.last.meets(place.box); });
+    Wall wall{place.box, place.box, place.pixels, layer, layer};
+    if (below != walls_.end()) {
+      wall.all.add(below->all);
+      wall.most_pixels = std::max(wall.most_pixels, below->most_pixels);
+      wall.first = below->first;
+      walls_.erase(below);
+    }
+    walls.push_back(wall);
   }
+  for (const Wall& wall : walls_) end_wall(wall);
+  walls_ = std::move(walls);
   if (thin.count == 0) return;
-  const double largest = static_cast<double>(thin.largest) * pixel_mm2_;
-  const Spot at = spot(thin.box, layer.index, layer.bottom);
-  if (!goes_on) thin_ = place(thin.box, at, largest, layer.index);
-  thin_box_ = thin.box;
-  thin_.last_layer = layer.index;
-  thin_.amount = std::max(thin_.amount, largest);
   found.count += thin.count;
   found.amount += static_cast<double>(thin.pixels) * pixel_mm2_;
   ++found.layers;
-  if (largest <= found.largest) return;
-  found.largest = largest;
-  found.spot = at;
+  const ThinPlace& largest = thin.largest.front();
+  const double mm2 = static_cast<double>(largest.pixels) * pixel_mm2_;
+  if (mm2 <= found.largest) return;
+  found.largest = mm2;
+  found.spot = spot(largest.box, layer.index, layer.bottom);
+}
+
+void Inspection::end_wall(const Wall& wall) {
+  const Spot at = spot(wall.all, wall.first.index, wall.first.bottom);
+  findings_.thin.note_place(place(wall.all, at, static_cast<double>(wall.most_pixels) * pixel_mm2_, wall.latest.index));
 }
 
 /// Whether all of a body lies where a copy's box is.
@@ -231,12 +254,49 @@ void Inspection::note_edges(const Layer& layer, const RunsView& image) {
   }
 }
 
-ThinPlaces Inspection::thin(const RunsView& image, ThinScratch& scratch) const {
-  const double least = kCorner * least_mm_ * least_mm_ / pixel_mm2_;
-  return thin_places(image, disc_, static_cast<std::uint64_t>(least), scratch);
+std::uint64_t Inspection::look_needs(const RunsView& image) const {
+  // The image, what lies around it and what is left of it; rows of these, and of four that hold little.
+  return stopped_ ? 0 : 3 * image.change.size_bytes() + 7 * image.row_offset.size_bytes();
 }
 
-void Inspection::add(const Layer& layer, const RunsView& image, const ThinPlaces& thin) {
+void Inspection::look(const RunsView& image, LayerLook& look) const {
+  // The image, the numbers of its runs, and the layer below; the same of the powder, whose rows have one run less or more.
+  constexpr std::uint64_t kOfRun = 8 + 8 + 12;
+  const std::uint64_t runs = image.change.size() / 2, rows = image.rows(), least = kOfRun * (2 * runs - std::min(runs, rows));
+  if (stopped_ || least > most_bytes_) {
+    look = {};
+    look.least_bytes = stopped_ ? least : expected_bytes(image, all_);
+    return;
+  }
+  look.least_bytes = 0;
+  look.image.columns = image.columns;
+  look.image.row_offset.assign(image.row_offset.begin(), image.row_offset.end());
+  look.image.change.assign(image.change.begin(), image.change.end());
+  look.thin = thin_places(image, stencils_, look.scratch);
+}
+
+void Inspection::stop(const Layer& layer, std::uint64_t bytes) {
+  findings_.stop = {layer.index, mm(layer.bottom), bytes};
+  leave();
+}
+
+void Inspection::leave() {
+  stopped_ = true;
+  solid_ = Follower(true);
+  powder_ = Follower(false);
+  between_ = {};
+}
+
+void Inspection::add(const Layer& layer, const LayerLook& look) {
+  if (stopped_) return;
+  if (look.least_bytes > 0) return stop(layer, look.least_bytes);
+  const RunsView image = look.image;
+  solid_.find(image);
+  complement(image, all_, between_);
+  powder_.find(between_);
+  const std::uint64_t bytes = image.change.size_bytes() + image.row_offset.size_bytes() + look.thin.bytes + solid_.need(image) +
+                              between_.view().change.size_bytes() + powder_.need(between_);
+  if (bytes > most_bytes_) return stop(layer, bytes);
   layer_ = layer;
   // The first layer that holds anything is the bottom of what it holds.
   if (!holds_) below_ = INT64_MIN;
@@ -245,11 +305,10 @@ void Inspection::add(const Layer& layer, const RunsView& image, const ThinPlaces
   solid_.add(layer, image, solids);
   if (solids.islands > 0) ++findings_.islands.layers;
   note_outgrown(layer);
-  complement(image, all_, between_);
   Powder powder{*this};
   powder_.add(layer, between_, powder);
   note_edges(layer, image);
-  note_thin(layer, thin);
+  note_thin(layer, look.thin);
   ++findings_.layers;
   below_ = layer.bottom;
 }

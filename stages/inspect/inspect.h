@@ -11,7 +11,9 @@
 #pragma once
 
 #include <array>
+#include <atomic>
 #include <cstdint>
+#include <nlohmann/json_fwd.hpp>
 #include <optional>
 #include <span>
 #include <string>
@@ -56,7 +58,7 @@ struct Found {
   Spot spot;                  // of the largest, the first of equals
   std::uint32_t layers = 0;   // that hold them; of bodies none
   std::vector<Place> places;  // the largest, at most kMost: the largest first, equal ones from the bottom up; thin ones that
-                              // lie upon each other are one, as large as the largest of them
+                              // lie upon each other are one, as large as in the layer where most of it is thin
 
   static constexpr std::size_t kMost = 20;
   void note_place(const Place& place);
@@ -73,27 +75,51 @@ struct Findings {
   };
   std::vector<Touching> touching;  // each pair of parts once, the first kMost
   std::optional<Spot> bed_edge;    // of the first layer that reaches it
+  struct Stop {
+    std::uint32_t layer = 0;  // from which on none was looked at
+    double z_mm = 0;          // its bottom
+    std::uint64_t bytes = 0;  // that looking at it takes, at least
+  };
+  std::optional<Stop> stop;  // for want of memory
   static constexpr std::size_t kMost = 20;
 };
 
+/// What of a layer is looked at before its turn; kept from layer to layer.
+struct LayerLook {
+  Runs image;
+  ThinScratch scratch;
+  ThinPlaces thin;
+  std::uint64_t least_bytes = 0;  // of looking at it, if that is more than there may be: then the rest is empty
+  std::uint64_t bytes() const { return bytes_held(image.row_offset) + bytes_held(image.change) + scratch.bytes(); }
+};
+
 /// Layers are given from the bottom up, without gaps; images as sections are, before mirrors, bleed and doses.
-/// memory  two layers' runs and their numbers
+/// memory  two layers' runs with their numbers and bodies. Where these and the look at a layer are more than they may be, the
+///         inspection stops, and lets go of what it holds; where it does depends on the images alone
 /// cost    O(runs) a layer for all but thin places
 class Inspection {
  public:
-  /// grid      of the images; must outlive this object
-  /// stands    the boxes of all copies; a piece at the bottom of one is not an island
-  /// least_nm  what is narrower is thin; 0: nothing is
-  Inspection(const PixelGrid& grid, std::vector<Stand> stands, std::int64_t least_nm);
+  /// grid        of the images; must outlive this object
+  /// stands      the boxes of all copies; a piece at the bottom of one is not an island
+  /// least_nm    what is narrower is thin; 0: nothing is
+  /// most_bytes  that it may take, with the look at one layer
+  Inspection(const PixelGrid& grid, std::vector<Stand> stands, std::int64_t least_nm, std::uint64_t most_bytes = UINT64_MAX);
 
-  /// Thin places of a layer; from any thread.
-  ThinPlaces thin(const RunsView& image, ThinScratch& scratch) const;
-  /// The next layer.
-  void add(const Layer& layer, const RunsView& image, const ThinPlaces& thin);
+  // --- from any thread
+  /// About what look() adds to what a layer holds.
+  std::uint64_t look_needs(const RunsView& image) const;
+  /// Keeps the image, and finds its thin places.
+  void look(const RunsView& image, LayerLook& look) const;
+
+  // --- in layer order
+  /// Looks at no more layers, and lets go of what it holds.
+  void leave();
+  void add(const Layer& layer, const LayerLook& look);
   /// After the last layer.
   const Findings& finish();
   const Findings& findings() const { return findings_; }
 
+  /// Without looks.
   std::uint64_t bytes() const {
     return solid_.bytes() + powder_.bytes() + bytes_held(between_.change) + bytes_held(between_.row_offset);
   }
@@ -101,11 +127,19 @@ class Inspection {
  private:
   struct Solids;
   struct Powder;
+  /// A thin place that goes on from layer to layer.
+  struct Wall {
+    PixelBox all, last;  // of all its layers; of the last one
+    std::uint64_t most_pixels = 0;
+    Layer first, latest;
+  };
 
   Spot spot(const PixelBox& box, std::uint32_t layer, std::int64_t z) const;
   Place place(const PixelBox& box, const Spot& at, double amount, std::uint32_t last_layer) const;
   void note_body(Found& found, const Body& body, double amount, std::uint32_t last_layer);
   void note_thin(const Layer& layer, const ThinPlaces& thin);
+  void end_wall(const Wall& wall);
+  void stop(const Layer& layer, std::uint64_t bytes);
   PixelBox window_of(const Box& box) const;
   bool stands_in(std::uint32_t stand, const Body& body) const;
   std::uint32_t owner_of(const Body& body, std::int64_t from, std::int64_t to) const;
@@ -118,18 +152,21 @@ class Inspection {
   std::vector<Stand> stands_;  // by bottom
   std::vector<PixelBox> window_;
   PixelBox all_;  // of all stands, a pixel wider
-  Disc disc_;
+  Stencils stencils_;
   double least_mm_, pixel_mm2_;
+  std::uint64_t most_bytes_;
+  std::atomic<bool> stopped_ = false;
   std::int64_t below_ = 0;  // bottom of the layer before
   bool holds_ = false;      // any layer so far
   Layer layer_{};
-  Place thin_;         // of the layers so far, that the next one may go on with; of no amount: none
-  PixelBox thin_box_;  // of its last layer
+  std::vector<Wall> walls_;  // of the last layer, that the next one may go on with
   Follower solid_{true}, powder_{false};
   Runs between_;  // the powder of a layer
   Findings findings_;
 };
 
+/// What was found, for programs.
+nlohmann::ordered_json json_of(const Findings& findings, double least_mm);
 /// One warning for each kind. part  names of files
 void tell(const Findings& findings, std::span<const std::string> part, double least_mm, std::vector<Warning>& warnings);
 

@@ -1,6 +1,7 @@
 // What an inspection found, in words.
 #include <fmt/format.h>
 
+#include "stages/data/text/readable.h"
 #include "stages/inspect/inspect.h"
 
 namespace lamina::inspect {
@@ -25,7 +26,7 @@ Warning warning(std::string code, std::string text, const Spot& spot) {
 }  // namespace
 
 void tell(const Findings& findings, std::span<const std::string> part, double least_mm, std::vector<Warning>& warnings) {
-  const auto& [layers, islands, loose, hollows, thin, touching, bed_edge] = findings;
+  const auto& [layers, islands, loose, hollows, thin, touching, bed_edge, stop] = findings;
   if (islands.count > 0) {
     warnings.push_back(warning(
         "islands",
@@ -73,6 +74,20 @@ void tell(const Findings& findings, std::span<const std::string> part, double le
     warnings.push_back(warning(
         "bed-edge", fmt::format("pixels lie at the very edge of the bed, first {}: move the parts inwards", at(*bed_edge)),
         *bed_edge));
+  }
+  if (stop) {
+    constexpr std::uint64_t kMega = 1 << 20;
+    warnings.push_back(
+        {"not-inspected",
+         fmt::format("{}: to look at layer {} takes about {}, and half of --memory is for that; give --memory {}M or more, or "
+                     "leave out --inspect",
+                     layers == 0 ? "no layer was looked at"
+                                 : fmt::format("layers from {} on were not looked at, and what is told is of those below it",
+                                               stop->layer),
+                     stop->layer, readable_bytes(stop->bytes), (2 * stop->bytes + kMega - 1) / kMega),
+         {},
+         stop->layer,
+         stop->z_mm});
   }
 }
 

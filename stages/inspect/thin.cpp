@@ -1,106 +1,133 @@
 #include "stages/inspect/thin.h"
 
 #include <algorithm>
-#include <cmath>
+#include <tuple>
+
+#include "stages/geometry/combine.h"
 
 namespace lamina::inspect {
 namespace {
 
-/// Where the image has rows and columns that are set, one pixel more on each side than `margin`, within the image.
-PixelBox window_of(const RunsView& image, std::uint32_t margin) {
+/// Where the image has rows and columns that are set.
+PixelBox box_of(const RunsView& image) {
   PixelBox box;
   for (std::uint32_t r = 0; r < image.rows(); ++r) {
     const auto row = image.row(r);
     if (!row.empty()) box.add({row.front(), row.back(), r, r + 1});
   }
-  if (box.right == 0) return {0, 0, 0, 0};
-  return {box.left - std::min(box.left, margin), std::min(image.columns, box.right + margin),
-          box.top - std::min(box.top, margin), std::min(image.rows(), box.bottom + margin)};
+  return box;
 }
 
-/// All pixels that lie within the disc of a set pixel, within the window.
-void grow(const RunsView& image, const Disc& disc, const PixelBox& window, Buffer<std::uint64_t>& spans, Runs& result) {
+/// Where the top left corner of a stencil may lie within a box; empty if it does not fit.
+PixelBox corners_in(const PixelBox& box, const Stencil& stencil) {
+  const auto rows = static_cast<std::uint32_t>(stencil.rows.size());
+  if (box.right - box.left < stencil.columns || box.bottom - box.top < rows) return {0, 0, 0, 0};
+  return {box.left, box.right - stencil.columns + 1, box.top, box.bottom - rows + 1};
+}
+
+enum class To { kPixels, kCorners };
+
+/// Of corners, all pixels of their stencils; of pixels, the corners of all stencils that hold one. Within the window.
+void spread(const RunsView& image, const Stencil& stencil, To to, const PixelBox& window, Buffer<std::uint64_t>& spans,
+            Runs& result) {
   result.columns = image.columns;
   result.row_offset.assign(1, 0);
   result.change.clear();
-  const auto far = static_cast<std::int64_t>(disc.size()) - 1;
+  const std::int64_t left = window.left, right = window.right;
   for (std::uint32_t r = 0; r < image.rows(); ++r) {
     const std::size_t row_begin = result.change.size();
-    if (r >= window.top && r < window.bottom) {
-      spans.clear();
-      for (std::int64_t j = -far; j <= far; ++j) {
-        const std::int64_t from = r + j;
-        if (from < 0 || from >= image.rows()) continue;
-        const std::uint32_t width = disc[static_cast<std::size_t>(std::abs(j))];
-        const auto row = image.row(static_cast<std::uint32_t>(from));
-        for (std::size_t i = 0; i + 1 < row.size(); i += 2) {
-          const std::uint32_t begin = std::max(window.left, row[i] - std::min(row[i], width));
-          const std::uint32_t end = std::min(window.right, row[i + 1] + width);
-          if (begin < end) spans.push_back(std::uint64_t{begin} << 32 | end);
-        }
+    const std::size_t rows = r >= window.top && r < window.bottom ? stencil.rows.size() : 0;
+    spans.clear();
+    for (std::size_t j = 0; j < rows; ++j) {
+      const std::int64_t from =
+          to == To::kPixels ? std::int64_t{r} - static_cast<std::int64_t>(j) : static_cast<std::int64_t>(r + j);
+      if (from < 0 || from >= image.rows()) continue;
+      const std::int64_t first = stencil.rows[j].first, last = stencil.rows[j].last;
+      const auto row = image.row(static_cast<std::uint32_t>(from));
+      for (std::size_t i = 0; i + 1 < row.size(); i += 2) {
+        const std::int64_t begin = std::max(left, row[i] + (to == To::kPixels ? first : -last));
+        const std::int64_t end = std::min(right, row[i + 1] + (to == To::kPixels ? last : -first));
+        if (begin < end) spans.push_back(static_cast<std::uint64_t>(begin) << 32 | static_cast<std::uint64_t>(end));
       }
-      std::sort(spans.begin(), spans.end());
-      for (const std::uint64_t span : spans) {
-        const auto begin = static_cast<std::uint32_t>(span >> 32), end = static_cast<std::uint32_t>(span);
-        if (result.change.size() > row_begin && begin <= result.change.back()) {
-          result.change.back() = std::max(result.change.back(), end);
-        } else {
-          result.change.push_back(begin);
-          result.change.push_back(end);
-        }
+    }
+    std::sort(spans.begin(), spans.end());
+    for (const std::uint64_t span : spans) {
+      const auto begin = static_cast<std::uint32_t>(span >> 32), end = static_cast<std::uint32_t>(span);
+      if (result.change.size() > row_begin && begin <= result.change.back()) {
+        result.change.back() = std::max(result.change.back(), end);
+      } else {
+        result.change.push_back(begin);
+        result.change.push_back(end);
       }
     }
     result.row_offset.push_back(static_cast<std::uint32_t>(result.change.size()));
   }
 }
 
-/// The pixels of `image` that `taken` does not hold.
-void subtract(const RunsView& image, const RunsView& taken, Runs& result) {
+/// Pixels of `of`, all of which are set in the image, that the stencil covers nowhere.
+void uncovered(const RunsView& image, const PixelBox& box, const RunsView& of, const Stencil& stencil, ThinScratch& scratch) {
+  const PixelBox corners = corners_in(box, stencil);
+  auto& [outside, anchors, grown, fits, left, chosen, waiting, pending, spans, pieces] = scratch;
+  if (&of == &image) {
+    complement(image, box, outside);
+    spread(outside, stencil, To::kCorners, corners, spans, grown);
+    complement(grown, corners, fits);
+  } else {
+    spread(of, stencil, To::kCorners, corners, spans, anchors);
+    spread(anchors, stencil, To::kPixels, box, spans, grown);
+    combine(grown, image, SetOperation::kDifference, outside);
+    spread(outside, stencil, To::kCorners, corners, spans, grown);
+    combine(anchors, grown, SetOperation::kDifference, fits);
+  }
+  spread(fits, stencil, To::kPixels, box, spans, grown);
+  combine(of, grown, SetOperation::kDifference, left);
+}
+
+/// The pieces of an image, of more than `least` pixels and at most `most`. returns  the pixels of the largest
+std::uint64_t pick(const RunsView& image, const Pieces& pieces, std::uint64_t least, std::uint64_t most, Runs& result) {
+  std::uint64_t largest = 0;
   result.columns = image.columns;
   result.row_offset.assign(1, 0);
   result.change.clear();
   for (std::uint32_t r = 0; r < image.rows(); ++r) {
-    const auto row = image.row(r), away = taken.row(r);
-    std::size_t k = 0;
-    for (std::size_t i = 0; i + 1 < row.size(); i += 2) {
-      std::uint32_t at = row[i];
-      while (k + 1 < away.size() && away[k + 1] <= at) k += 2;
-      for (std::size_t j = k; j + 1 < away.size() && away[j] < row[i + 1]; j += 2) {
-        if (at < away[j]) {
-          result.change.push_back(at);
-          result.change.push_back(away[j]);
-        }
-        at = std::max(at, away[j + 1]);
-      }
-      if (at < row[i + 1]) {
-        result.change.push_back(at);
-        result.change.push_back(row[i + 1]);
-      }
+    for (std::uint32_t i = image.row_offset[r] / 2; i < image.row_offset[r + 1] / 2; ++i) {
+      const std::uint64_t pixels = pieces.pixels[pieces.of_run[i]];
+      if (pixels <= least || pixels > most) continue;
+      largest = std::max(largest, pixels);
+      result.change.push_back(image.change[2 * i]);
+      result.change.push_back(image.change[2 * i + 1]);
     }
     result.row_offset.push_back(static_cast<std::uint32_t>(result.change.size()));
+  }
+  return largest;
+}
+
+/// Puts the largest in front, and no more than so many.
+void keep_largest(std::vector<ThinPlace>& places, std::size_t most) {
+  const auto order = [](const ThinPlace& place) { return std::tuple(~place.pixels, place.box.top, place.box.left); };
+  std::ranges::stable_sort(places, {}, order);
+  places.resize(std::min(places.size(), most));
+}
+
+/// Takes pieces of more pixels than `least` into the places.
+void take(const Pieces& pieces, std::uint64_t least, ThinPlaces& places) {
+  for (std::size_t p = 0; p < pieces.count(); ++p) {
+    const std::uint64_t pixels = pieces.pixels[p];
+    if (pixels <= least) continue;
+    ++places.count;
+    places.pixels += pixels;
+    places.largest.push_back({pixels, pieces.box[p]});
+    if (places.largest.size() >= 4 * ThinPlaces::kMost) keep_largest(places.largest, ThinPlaces::kMost);
   }
 }
 
 }  // namespace
 
-Disc disc_of(const PixelGrid& grid, std::int64_t radius_nm) {
-  const auto picometres = [](const PixelAxis& axis) { return static_cast<__int128>(axis.span) * 1000 / axis.dots; };
-  const __int128 px = picometres(grid.x), py = picometres(grid.y), radius = __int128{radius_nm} * 1000;
-  const auto within = [&](std::int64_t i, std::int64_t j) { return i * px * (i * px) + j * py * (j * py) <= radius * radius; };
-  Disc disc;
-  auto width = static_cast<std::int64_t>(radius / px);
-  for (std::int64_t j = 0; within(0, j); ++j) {
-    while (width > 0 && !within(width, j)) --width;
-    disc.push_back(static_cast<std::uint32_t>(width));
-  }
-  if (disc.size() == 1 && disc[0] == 0) disc.clear();
-  return disc;
-}
-
 void complement(const RunsView& image, const PixelBox& window, Runs& result) {
   result.columns = image.columns;
   result.row_offset.assign(1, 0);
   result.change.clear();
+  result.change.reserve(image.change.size() + 2 * (window.bottom - window.top));
   for (std::uint32_t r = 0; r < image.rows(); ++r) {
     if (r >= window.top && r < window.bottom) {
       std::uint32_t at = window.left;
@@ -123,32 +150,39 @@ void complement(const RunsView& image, const PixelBox& window, Runs& result) {
 
 std::uint64_t ThinScratch::bytes() const {
   std::uint64_t total = bytes_held(spans) + pieces.bytes();
-  for (const Runs* image : {&outside, &shrunk, &grown, &left})
+  for (const Runs* image : {&outside, &anchors, &grown, &fits, &left, &chosen, &waiting, &pending})
     total += bytes_held(image->row_offset) + bytes_held(image->change);
   return total;
 }
 
-ThinPlaces thin_places(const RunsView& image, const Disc& disc, std::uint64_t least_pixels, ThinScratch& scratch) {
+// From wide to narrow. What a stencil covers is thin for none that is narrower, so that each looks at what those before it
+// left, and of that at pieces that are large enough for it: of corners few are.
+ThinPlaces thin_places(const RunsView& image, const Stencils& stencils, ThinScratch& scratch) {
   ThinPlaces places;
-  if (disc.empty() || image.change.empty()) return places;
-  // A disc fits where its centre is out of reach of everything that is not set; what such discs cover is not thin.
-  const auto reach = std::max<std::uint32_t>(disc[0], static_cast<std::uint32_t>(disc.size()) - 1) + 1;
-  const PixelBox window = window_of(image, reach);
-  complement(image, window, scratch.outside);
-  grow(scratch.outside, disc, window, scratch.spans, scratch.grown);
-  complement(scratch.grown, window, scratch.shrunk);
-  grow(scratch.shrunk, disc, window, scratch.spans, scratch.grown);
-  subtract(image, scratch.grown, scratch.left);
-  scratch.pieces.find(scratch.left, true);
-  for (std::size_t p = 0; p < scratch.pieces.count(); ++p) {
-    const std::uint64_t pixels = scratch.pieces.pixels[p];
-    if (pixels <= least_pixels) continue;
-    ++places.count;
-    places.pixels += pixels;
-    if (pixels <= places.largest) continue;
-    places.largest = pixels;
-    places.box = scratch.pieces.box[p];
+  if (stencils.count() < 2 || image.change.empty()) return places;
+  const PixelBox box = box_of(image);
+  auto& [outside, anchors, grown, fits, left, chosen, waiting, pending, spans, pieces] = scratch;
+  const std::uint64_t corner = stencils.two_squares(1);
+  std::uint32_t number = stencils.count() - 1;
+  uncovered(image, box, image, stencils.at(number), scratch);
+  pieces.find(left, true);
+  places.bytes = image.change.size_bytes() + 5 * image.row_offset.size_bytes() + pieces.count() * sizeof(ThinPlace);
+  for (const Runs* held : {&outside, &grown, &grown, &fits, &left}) places.bytes += held->view().change.size_bytes();
+  take(pieces, stencils.two_squares(number), places);
+  std::uint64_t most = pick(left, pieces, corner, stencils.two_squares(number), pending);
+  while (--number > 0) {
+    const std::uint64_t least = stencils.two_squares(number);
+    if (most <= least) continue;
+    pieces.find(pending, true);
+    pick(pending, pieces, least, UINT64_MAX, chosen);
+    most = pick(pending, pieces, corner, least, waiting);
+    uncovered(image, box, chosen, stencils.at(number), scratch);
+    pieces.find(left, true);
+    take(pieces, least, places);
+    most = std::max(most, pick(left, pieces, corner, least, chosen));
+    combine(waiting, chosen, SetOperation::kUnion, pending);
   }
+  keep_largest(places.largest, ThinPlaces::kMost);
   return places;
 }
 

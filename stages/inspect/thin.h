@@ -1,42 +1,44 @@
-// stages/inspect/thin.h: what of an image is narrower than a circle, on runs.
+// stages/inspect/thin.h: what of an image is narrower than a width, on runs.
 #pragma once
 
 #include <cstdint>
 #include <vector>
 
 #include "stages/data/buffer.h"
-#include "stages/data/grid.h"
 #include "stages/data/runs.h"
 #include "stages/inspect/bodies.h"
+#include "stages/inspect/stencils.h"
 
 namespace lamina::inspect {
 
-/// Columns on either side in the rows 0, 1, 2, ... above and below a pixel: all offsets whose length is at most a radius.
-using Disc = std::vector<std::uint32_t>;
-
-/// Decided in whole numbers: pitches in picometres. radius_nm  0 .. 10^9; empty if it holds no neighbour
-Disc disc_of(const PixelGrid& grid, std::int64_t radius_nm);
+struct ThinPlace {
+  std::uint64_t pixels = 0;
+  PixelBox box;
+};
 
 /// What a layer holds of thin places.
 struct ThinPlaces {
   std::uint32_t count = 0;
-  std::uint64_t pixels = 0, largest = 0;  // of all; of the largest
-  PixelBox box;                           // of the largest, the first of equals
+  std::uint64_t pixels = 0;        // of all
+  std::vector<ThinPlace> largest;  // at most kMost, the largest first; equal ones from the top, then from the left
+  std::uint64_t bytes = 0;         // that finding them took
+  static constexpr std::size_t kMost = 20;
 };
 
 /// Scratch of thin_places(); kept from layer to layer.
 struct ThinScratch {
-  Runs outside, shrunk, grown, left;
+  Runs outside, anchors, grown, fits, left, chosen, waiting, pending;
   Buffer<std::uint64_t> spans;
   Pieces pieces;
   std::uint64_t bytes() const;
 };
 
-/// Places that no disc within the image covers, as pieces that touch at sides or corners. Corners of thick bodies leave such
-/// places too, of at most 0.22 radii squared at right angles and 4.3 at 20 degrees: pieces of `least_pixels` or fewer do not
-/// count. What lies beyond the image's edges counts as set: a part that the bed cuts is not thin for it. cost  O(rows of the
-/// disc x runs)
-ThinPlaces thin_places(const RunsView& image, const Disc& disc, std::uint64_t least_pixels, ThinScratch& scratch);
+/// Places that for any of the stencils are thin: pixels that it covers nowhere where it lies on set pixels alone, and that
+/// touch each other at sides or corners, more than two squares of its width. Of places within each other the largest counts.
+/// Corners of thick bodies leave less: of a width of 2 r 0.22 r squared at right angles and 4.3 r squared at 20 degrees. More
+/// stencils find more: never less. cost  O(rows of the last stencil x runs), and for narrower ones that of the places that are
+/// left
+ThinPlaces thin_places(const RunsView& image, const Stencils& stencils, ThinScratch& scratch);
 
 /// The pixels between the runs of `image`, in rows and columns [first, last) of the window; nothing beyond it.
 void complement(const RunsView& image, const PixelBox& window, Runs& result);

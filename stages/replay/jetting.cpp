@@ -15,26 +15,23 @@ struct SweepSeen {
   bool backward;
 };
 
-Runs runs_of(std::vector<VirtualMachine::Drop>& drops, std::uint32_t columns, std::uint32_t rows) {
-  std::ranges::sort(drops,
-                    [](const auto& a, const auto& b) { return std::pair(a.row, a.column) < std::pair(b.row, b.column); });
-  Runs runs;
-  runs.columns = columns;
-  std::size_t next = 0;
+/// How many fell on each pixel; 255 stand for more.
+Levels levels_of_drops(std::vector<VirtualMachine::Drop>& drops, std::uint32_t columns, std::uint32_t rows) {
+  const auto place = [](const VirtualMachine::Drop& drop) { return std::pair(drop.row, drop.column); };
+  std::ranges::sort(drops, {}, place);
+  Levels levels;
+  levels.start(columns);
+  auto next = drops.begin();
   for (std::uint32_t row = 0; row < rows; ++row) {
-    runs.row_offset.push_back(static_cast<std::uint32_t>(runs.change.size()));
-    for (; next < drops.size() && drops[next].row == row; ++next) {
-      const std::uint32_t column = drops[next].column;
-      if (runs.change.size() > runs.row_offset.back() && runs.change.back() == column + 1) continue;  // another drop there
-      if (runs.change.size() > runs.row_offset.back() && runs.change.back() == column) {
-        ++runs.change.back();
-      } else {
-        runs.change.insert(runs.change.end(), {column, column + 1});
-      }
+    while (next != drops.end() && next->row == row) {
+      const std::uint32_t column = next->column;
+      const auto end = std::find_if(next, drops.end(), [&](const auto& drop) { return place(drop) != std::pair(row, column); });
+      levels.append(column, column + 1, static_cast<std::uint8_t>(std::min<std::ptrdiff_t>(end - next, 255)));
+      next = end;
     }
+    levels.end_row();
   }
-  runs.row_offset.push_back(static_cast<std::uint32_t>(runs.change.size()));
-  return runs;
+  return levels;
 }
 
 /// A layer's program carried out, and what is looked at.
@@ -118,7 +115,7 @@ Result<Jetting> jet_until(const VirtualMachine& machine, std::string_view progra
   jetting.sweeps = order.size();
   jetting.fired = fired.size();
   jetting.drops = drops.size();
-  jetting.printed = runs_of(fired, grid.columns(), grid.rows());
+  jetting.printed = levels_of_drops(fired, grid.columns(), grid.rows());
   jetting.bands = bands_of(*carried, machine, grid);
   std::vector<bool> fires(machine.profile().head.nozzles, false);
   for (const VirtualMachine::Drop& drop : drops) {

@@ -27,16 +27,7 @@ Status LayerRecords::judge(std::span<const PartSummary> parts, bool thins, bool 
                                             layers_.size(), layers_.size() == 1 ? "" : "s", kLook)};
   }
   if (nothing) warnings.push_back({"empty", fmt::format("the whole job is empty: {}", kLook)});
-  warn_of_lost_pixels(lost_, warnings);
-  if (capped_ > 0) {
-    const double z = mm(first_capped_.plane());
-    const std::string part = parts.size() == 1 ? one_line(parts.front().path) : std::string();
-    warnings.push_back({"rows-capped",
-                        fmt::format("{}{} rows in {} layers are closed only by the caps put over openings, first in layer {} "
-                                    "at z {:.3f} mm; look at `lamina info`",
-                                    part.empty() ? "" : part + ": ", capped_, capped_layers_, first_capped_.index, z),
-                        part, first_capped_.index, z});
-  }
+  tell(parts, warnings);
   if (thins) return {};
   std::vector<Solid> solids(parts.size());
   for (std::size_t i = 0; i < parts.size(); ++i) solids[i].box = parts[i].bounds;
@@ -45,12 +36,34 @@ Status LayerRecords::judge(std::span<const PartSummary> parts, bool thins, bool 
   return {};
 }
 
+void LayerRecords::tell(std::span<const PartSummary> parts, std::vector<Warning>& warnings) const {
+  warn_of_lost_pixels(lost_, warnings);
+  if (capped_ == 0) return;
+  const double z = mm(first_capped_.plane());
+  const std::string part = parts.size() == 1 ? one_line(parts.front().path) : std::string();
+  warnings.push_back({"rows-capped",
+                      fmt::format("{}{} rows in {} layers are closed only by the caps put over openings, first in layer {} "
+                                  "at z {:.3f} mm; look at `lamina info`",
+                                  part.empty() ? "" : part + ": ", capped_, capped_layers_, first_capped_.index, z),
+                      part, first_capped_.index, z});
+}
+
 void warn_of_lost_pixels(std::uint64_t pixels, std::vector<Warning>& warnings) {
   if (pixels == 0) return;
   warnings.push_back(
       {"lost-pixels",
        fmt::format("{} pixels of blocked nozzles are not fired at all; head.blocked_rule = \"second-pass\" fires them",
                    readable_count(pixels))});
+}
+
+void warn_of_open_top(const Layer& last, std::int64_t height, std::vector<Warning>& warnings) {
+  const std::int64_t end = std::int64_t{last.bottom} + last.thickness;
+  if (end < height || last.highest_plane() >= height) {
+    warnings.push_back(
+        {"cover-top", fmt::format("--cover-top: the layer that covers the top is empty with --containment inside, the "
+                                  "topmost {:.3f} mm are not built; leave out one of the two",
+                                  mm(height - (end < height ? end : last.bottom)))});
+  }
 }
 
 void warn_of_unfed(const UnfedPowder& powder, std::vector<Warning>& warnings) {

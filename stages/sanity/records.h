@@ -1,6 +1,7 @@
 // stages/sanity/records.h: judges a whole job by the records of its layers, without meshes: shards that are joined.
 //
-// codes   empty, layers-empty, lost-pixels, rows-capped; volumes, lost parts and bleeds are not in records
+// codes   empty, layers-empty, lost-pixels, rows-capped, cover-top, mixed-powders; volumes, lost parts and bleeds are not in
+// records
 #pragma once
 
 #include <cstdint>
@@ -19,7 +20,10 @@ class LayerRecords {
  public:
   void add(const Layer& layer, std::uint64_t set_pixels, std::uint64_t lost_pixels, std::uint32_t capped_rows);
 
-  /// parts  of the manifest: a layer within the height of one is expected to have pixels
+  /// Lost pixels and capped rows.
+  void tell(std::span<const PartSummary> parts, std::vector<Warning>& warnings) const;
+
+  /// Those and the rest. parts  of the manifest: a layer within the height of one is expected to have pixels
   /// thins  beads or a dose may leave layers empty on purpose
   /// errors kInput: no layer has a pixel, and that is not allowed
   Status judge(std::span<const PartSummary> parts, bool thins, bool allow_empty, std::vector<Warning>& warnings) const;
@@ -34,6 +38,10 @@ class LayerRecords {
 
 /// Pixels of blocked nozzles that nothing fires; no warning if there are none.
 void warn_of_lost_pixels(std::uint64_t pixels, std::vector<Warning>& warnings);
+
+/// Of a job whose steps lie inside of its parts and whose last layer covers them: where it is empty, or was left out.
+/// height  nm, of the parts
+void warn_of_open_top(const Layer& last, std::int64_t height, std::vector<Warning>& warnings);
 
 /// No warning if there are none.
 void warn_of_unfed(const UnfedPowder& powder, std::vector<Warning>& warnings);

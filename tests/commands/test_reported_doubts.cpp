@@ -40,14 +40,14 @@ class ReportedDoubts : public ::testing::Test {
     EXPECT_EQ(outcome.code, 0) << outcome.err;
     return Json::parse(outcome.out)["warnings"];
   }
-  /// The page has the warnings of the job, but for those of sections before the bleed, and these codes are among them.
+  /// The page has the warnings of the job, and these codes are among them.
   void expect_alike(const std::string& line, const std::set<std::string>& codes) const {
     SCOPED_TRACE(line);
     const Json told = jet(line);
     std::set<std::string> found;
     for (const Json& warning : told) found.insert(warning["code"]);
     for (const std::string& code : codes) EXPECT_TRUE(found.contains(code)) << code << told.dump();
-    EXPECT_EQ(texts(page()), texts(told, {"vanished"}));
+    EXPECT_EQ(texts(page()), texts(told));
   }
 
   Directory directory_;
@@ -76,9 +76,11 @@ TEST_F(ReportedDoubts, OfPartsWithoutDropsAreThoseOfTheDose) {
 }
 
 TEST_F(ReportedDoubts, OfWhatTheBleedTakesNameTheBleed) {
-  expect_alike("thin.stl a.stl --bed 60x40 --dpi 300 --layer 0.1 --bleed 300", {"bleed"});
+  for (const char* more : {"", " --mirror xy", " --levels 4", " --layers 2:9"})
+    expect_alike(std::string("thin.stl a.stl --bed 60x40 --dpi 300 --layer 0.1 --bleed 300") + more, {"vanished"});
+  expect_alike("thin.stl a.stl --bed 60x40 --dpi 300 --layer 0.1 --bleed 300", {"bleed", "vanished"});
   expect_alike("a.stl --bed 60x40 --dpi 300 --layer 0.1 --bleed 2000", {"bleed"});
-  // Without the part's file too.
+  // Without the part's file too, but for what was there before the bleed.
   const Json told = jet("thin.stl a.stl --bed 60x40 --dpi 300 --layer 0.1 --bleed 300");
   std::filesystem::rename(directory_ / "thin.stl", directory_ / "moved.stl");
   EXPECT_EQ(texts(page()), texts(told, {"vanished"}));
@@ -87,6 +89,17 @@ TEST_F(ReportedDoubts, OfWhatTheBleedTakesNameTheBleed) {
 TEST_F(ReportedDoubts, FoldersOfPartsThatAreNotThereAreErrors) {
   jet("a.stl --bed 60x40 --dpi 300 --layer 0.1");
   expect_refused("report out -o page.html --parts nowhere", 3, "--parts: nowhere: no such file or folder", directory_);
+}
+
+TEST_F(ReportedDoubts, OfPartsThatAreImagesNoMeshIsLookedFor) {
+  jet("a.stl --bed 60x40 --dpi 300 --layer 0.1");
+  ASSERT_EQ(run("jet out --bed 60x40 --dpi 300 --layer 0.1 -o again").code, 0);
+  for (const char* parts : {"", " --parts ."}) {
+    const Outcome outcome = run(std::string("report again -o again.html --overwrite") + parts);
+    EXPECT_EQ(outcome.code, 0) << outcome.err;
+    EXPECT_NE((outcome.out + outcome.err).find("views are of the layers: out: is images"), std::string::npos)
+        << outcome.out << outcome.err;
+  }
 }
 
 TEST_F(ReportedDoubts, PagesThatCannotBeSmallEnoughAreTold) {

@@ -7,31 +7,10 @@
 #include <vector>
 
 #include "stages/inspect/bodies.h"
-#include "stages/inspect/thin.h"
+#include "tests/inspect/volume.h"
 
 namespace lamina::inspect {
 namespace {
-
-struct Volume {
-  std::uint32_t columns, rows, layers;
-  std::vector<std::uint8_t> set;
-  bool at(std::int64_t c, std::int64_t r, std::int64_t l) const {
-    if (c < 0 || r < 0 || l < 0 || c >= columns || r >= rows || l >= layers) return false;
-    return set[static_cast<std::size_t>((l * rows + r) * columns + c)] != 0;
-  }
-  Runs layer(std::uint32_t l) const {
-    Runs runs;
-    runs.columns = columns;
-    runs.row_offset.push_back(0);
-    for (std::uint32_t r = 0; r < rows; ++r) {
-      for (std::uint32_t c = 0; c <= columns; ++c) {
-        if (at(c, r, l) != at(std::int64_t{c} - 1, r, l)) runs.change.push_back(c);
-      }
-      runs.row_offset.push_back(static_cast<std::uint32_t>(runs.change.size()));
-    }
-    return runs;
-  }
-};
 
 Volume random_volume(std::uint32_t seed, double share) {
   Volume volume{23, 17, 9, {}};
@@ -93,7 +72,10 @@ TEST(Bodies, AreThoseOfAFloodOfVoxels) {
       Follower follower(diagonal);
       Count count;
       for (std::uint32_t l = 0; l < volume.layers; ++l) {
-        follower.add({l, static_cast<Nm>(l * 50'000), 50'000}, volume.layer(l), count);
+        const Runs image = volume.layer(l);
+        follower.find(image);
+        follower.add({l, static_cast<Nm>(l * 50'000), 50'000}, image, count);
+        EXPECT_EQ(follower.live().size() > 0, !image.change.empty());
       }
       follower.finish(count);
       std::sort(count.sizes.rbegin(), count.sizes.rend());
@@ -120,7 +102,11 @@ TEST(Bodies, BoxesHeightsAndVolumesAreThoseOfTheirVoxels) {
     void end(const Body& body) { last = body; }
   } rules;
   Follower follower(true);
-  for (std::uint32_t l = 0; l < 3; ++l) follower.add({l, static_cast<Nm>(l * 100), 100}, arch.layer(l), rules);
+  for (std::uint32_t l = 0; l < 3; ++l) {
+    const Runs image = arch.layer(l);
+    follower.find(image);
+    follower.add({l, static_cast<Nm>(l * 100), 100}, image, rules);
+  }
   follower.finish(rules);
   EXPECT_EQ(rules.begun, 2u);
   EXPECT_EQ(rules.joined, 1u);
@@ -132,72 +118,6 @@ TEST(Bodies, BoxesHeightsAndVolumesAreThoseOfTheirVoxels) {
   EXPECT_EQ(rules.last.last_layer, 2u);
   EXPECT_EQ(rules.last.box.left, 2u);
   EXPECT_EQ(rules.last.box.right, 10u);
-}
-
-/// Whether a pixel is in no disc of the image, pixel by pixel.
-TEST(ThinPlaces, AreThosePixelsThatNoDiscCovers) {
-  const PixelGrid grid{PixelAxis(254, 10 * kNmPerMm), PixelAxis(254, 10 * kNmPerMm)};  // pixels of 100 um
-  std::mt19937 random(7);
-  for (const std::int64_t radius : {100'000, 150'000, 250'000, 400'000}) {
-    const Disc disc = disc_of(grid, radius);
-    for (int turn = 0; turn < 20; ++turn) {
-      Volume image{40, 30, 1, std::vector<std::uint8_t>(40 * 30, 0)};
-      for (int k = 0; k < 6; ++k) {
-        const auto draw = [&](std::uint32_t below) { return std::uniform_int_distribution<std::uint32_t>(0, below)(random); };
-        const std::uint32_t left = draw(34), top = draw(24), wide = 1 + draw(14), high = 1 + draw(12);
-        for (std::uint32_t r = top; r < std::min(30u, top + high); ++r) {
-          for (std::uint32_t c = left; c < std::min(40u, left + wide); ++c) image.set[r * 40 + c] = 1;
-        }
-      }
-      const auto in_disc = [&](std::int64_t dc, std::int64_t dr) {
-        return 1e10 * static_cast<double>(dc * dc + dr * dr) <= static_cast<double>(radius * radius);
-      };
-      const auto set_or_beyond = [&](std::int64_t c, std::int64_t r) {
-        return c < 0 || r < 0 || c >= 40 || r >= 30 || image.at(c, r, 0);
-      };
-      std::uint64_t thin = 0;
-      for (std::int64_t r = 0; r < 30; ++r) {
-        for (std::int64_t c = 0; c < 40; ++c) {
-          if (!image.at(c, r, 0)) continue;
-          bool covered = false;
-          for (std::int64_t dr = -4; dr <= 4 && !covered; ++dr) {
-            for (std::int64_t dc = -4; dc <= 4 && !covered; ++dc) {
-              if (!in_disc(dc, dr) || c + dc < 0 || r + dr < 0 || c + dc >= 40 || r + dr >= 30) continue;
-              bool fits = true;
-              for (std::int64_t er = -4; er <= 4 && fits; ++er) {
-                for (std::int64_t ec = -4; ec <= 4 && fits; ++ec) {
-                  fits = !in_disc(ec, er) || set_or_beyond(c + dc + ec, r + dr + er);
-                }
-              }
-              covered = fits;
-            }
-          }
-          thin += covered ? 0 : 1;
-        }
-      }
-      ThinScratch scratch;
-      ASSERT_EQ(thin_places(image.layer(0), disc, 0, scratch).pixels, thin) << radius << " " << turn;
-    }
-  }
-}
-
-TEST(ThinPlaces, CornersOfThickBodiesAreNoneAndWallsAre) {
-  const PixelGrid grid{PixelAxis(508, 20 * kNmPerMm), PixelAxis(508, 20 * kNmPerMm)};  // pixels of 50 um
-  const Disc disc = disc_of(grid, 400'000);                                            // least width 0.8 mm: 16 pixels
-  Runs image;
-  image.columns = grid.columns();
-  image.row_offset.push_back(0);
-  for (std::uint32_t r = 0; r < grid.rows(); ++r) {
-    if (r >= 100 && r < 200) image.change.insert(image.change.end(), {100, 200});
-    if (r >= 150 && r < 160) image.change.back() = 300;  // a fin of half a millimetre, five long
-    image.row_offset.push_back(static_cast<std::uint32_t>(image.change.size()));
-  }
-  ThinScratch scratch;
-  const ThinPlaces places = thin_places(image, disc, 2 * 16 * 16, scratch);
-  ASSERT_EQ(places.count, 1u);
-  EXPECT_GE(places.largest, 980u);  // discs of the block reach a little way into the fin
-  EXPECT_LE(places.largest, 1000u);
-  EXPECT_EQ(places.box.right, 300u);
 }
 
 }  // namespace

@@ -6,7 +6,9 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <iterator>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "tests/commands/program.h"
@@ -142,6 +144,41 @@ TEST_F(DropPictures, ASmallPictureHasTheMeanAndGreyImagesThePictureOfTheirDrops)
     draw("grey", options);
     EXPECT_TRUE(read_text(in_ / "out.png") == read_text(in_ / "grey.png")) << width;
   }
+}
+
+// A picture pixel a pixel of the bed; the head's nozzles lie over some.
+TEST_F(DropPictures, ASwathShowsThoseAskedForAndThoseThatFell) {
+  plan(several_, "out");
+  const std::vector<int> drops = drops_in_files("out");
+  draw("out", "--layer 10 --swath middle --width 1059");
+  const Picture picture = read_picture(in_ / "out.png");
+  constexpr Rgb kGrounds[] = {{247, 247, 244}, {236, 240, 245}, {255, 240, 214}, {176, 182, 190}}, kAsked{150, 160, 175},
+                kFallen{24, 44, 92}, kNozzles[] = {{150, 95, 20}, {225, 20, 20}};
+  const auto over = [](const Rgb& ground, const Rgb& ink, int of) {
+    Rgb mixed;
+    for (std::size_t c = 0; c < 3; ++c)
+      mixed[c] = static_cast<int>(std::lround(ground[c] + (ink[c] - ground[c]) * static_cast<double>(of) / kMost));
+    return mixed;
+  };
+  const auto alike = [](const Rgb& a, const Rgb& b) {
+    return std::abs(a[0] - b[0]) <= 2 && std::abs(a[1] - b[1]) <= 2 && std::abs(a[2] - b[2]) <= 2;
+  };
+  std::array<std::array<int, kMost + 1>, kMost + 1> seen{};  // pixels by drops asked for and fallen
+  for (int r = 0; r < 1011; ++r) {
+    for (int c = 0; c < 1011; ++c) {
+      const int asked = drops[static_cast<std::size_t>(r) * 1011 + static_cast<std::size_t>(c)];
+      const Rgb& pixel = picture.at(24 + c, 58 + r);
+      if (asked == 0 || std::ranges::find(kNozzles, pixel) != std::end(kNozzles)) continue;
+      int fallen = asked;
+      const auto is = [&](const Rgb& ground) { return alike(pixel, over(over(ground, kAsked, asked), kFallen, fallen)); };
+      while (fallen >= 0 && std::ranges::none_of(kGrounds, is)) --fallen;
+      ASSERT_GE(fallen, 0) << c << ", " << r << ": " << asked << " drops, " << pixel[0] << ' ' << pixel[1] << ' ' << pixel[2];
+      ++seen[static_cast<std::size_t>(asked)][static_cast<std::size_t>(fallen)];
+    }
+  }
+  for (const auto& [asked, fallen] : {std::pair{1, 0}, {1, 1}, {kMost, 0}, {kMost, kMost}})
+    EXPECT_GT(seen[static_cast<std::size_t>(asked)][static_cast<std::size_t>(fallen)], 20) << asked << " " << fallen;
+  EXPECT_TRUE(std::ranges::find(picture.pixel, kGrounds[2]) != picture.pixel.end()) << "where the head passes now";
 }
 
 TEST_F(DropPictures, OneDropIsDrawnAsSetWhateverTheFormat) {

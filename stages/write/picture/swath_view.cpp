@@ -33,10 +33,16 @@ Result<Buffer<std::byte>> swath_picture(const SwathView& view) {
               b = std::clamp(static_cast<int>(std::lround(y1 * sy)), 0, high);
     if (r > l && b > t) canvas.fill_box(left + l, top + t, r - l, b - t, colour);
   };
-  bool odd = false;
+  // Sweeps of several drops pass over one place: it has one colour, that of the present one before all.
+  bool odd = true;
+  const SwathBand* last = nullptr;
   for (const SwathBand& band : view.bands) {
-    box(band.left, band.top, band.right, band.bottom, band.present ? kPresent : odd ? kOdd : kBed);
-    odd = !odd;
+    if (last == nullptr || last->left != band.left || last->top != band.top) odd = !odd;
+    box(band.left, band.top, band.right, band.bottom, odd ? kOdd : kBed);
+    last = &band;
+  }
+  for (const SwathBand& band : view.bands) {
+    if (band.present) box(band.left, band.top, band.right, band.bottom, kPresent);
   }
   const double line_x = 1 / sx, line_y = 1 / sy;
   for (const SwathBand& band : view.bands) {
@@ -47,8 +53,8 @@ Result<Buffer<std::byte>> swath_picture(const SwathView& view) {
   }
   const PixelWindow window{0, view.grid.columns(), 0, view.grid.rows()};
   Buffer<std::uint8_t> shares(static_cast<std::size_t>(wide) * static_cast<std::size_t>(high));
-  const auto paint = [&](const RunsView& runs, Colour ink) {
-    coverage(runs, window, static_cast<std::uint32_t>(wide), shares);
+  const auto paint = [&](const LevelsView& levels, Colour ink) {
+    coverage(levels, view.most, window, static_cast<std::uint32_t>(wide), shares);
     for (int row = 0; row < high; ++row) {
       canvas.paint(left, top + row, wide,
                    std::span(shares).subspan(static_cast<std::size_t>(row) * static_cast<std::size_t>(wide),

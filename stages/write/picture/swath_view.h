@@ -7,8 +7,8 @@
 
 #include "stages/data/buffer.h"
 #include "stages/data/grid.h"
+#include "stages/data/levels.h"
 #include "stages/data/picture/jetting.h"
-#include "stages/data/runs.h"
 #include "stages/data/status.h"
 
 namespace lamina::write::picture {
@@ -16,8 +16,9 @@ namespace lamina::write::picture {
 struct SwathView {
   std::string title, caption;
   PixelGrid grid;
-  RunsView image;                // what is to be jetted: drawn light
-  RunsView fired;                // what is jetted so far: drawn dark
+  LevelsView image;              // drops that are to be jetted: drawn light
+  LevelsView fired;              // drops so far: drawn dark
+  std::uint8_t most = 1;         // drops of a pixel, which is drawn by its share of them
   std::vector<SwathBand> bands;  // the present one is marked
   std::vector<NozzlePlace> nozzles;
   std::uint32_t width = 1200;  // of the picture

@@ -3,6 +3,7 @@
 #include <sys/wait.h>
 
 #include <array>
+#include <cstdint>
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
@@ -223,6 +224,51 @@ TEST_F(InspectedJobs, NumbersAndPlacesAreThoseOfThePlantedBoxes) {
   EXPECT_EQ(found["islands"]["count"], 1);
   EXPECT_NEAR(found["islands"]["mm2"], 3, 1e-6);
   EXPECT_EQ(found["bed_edge"]["layer"], 0);
+}
+
+// A wall of one pixel beside a block, by the width that is asked for.
+TEST_F(InspectedJobs, AWiderLeastWallFindsAllThatANarrowerOneFinds) {
+  const std::string part = stl("wall.stl", {{{0, 0, 0}, {10, 10, 1}}, {{10, 4, 0}, {16, 4.1, 1}}, {{3, 10, 0}, {3.4, 15, 1}}});
+  std::uint64_t before = 0;
+  for (const char* least : {"0.1", "0.15", "0.2", "0.3", "0.4", "0.5", "0.8", "1.5", "2", "4", "8"}) {
+    const auto thin = inspect(part + " --dry-run --least-wall " + least)["inspection"]["thin"];
+    const std::uint64_t count = thin["count"];
+    EXPECT_GE(count, before) << least;
+    before = count;
+    const double width = std::stod(least);
+    EXPECT_EQ(count, width <= 0.1 ? 0u : width <= 0.4 ? 10u : 20u) << least;
+    EXPECT_EQ(count > 0 ? thin["places"].size() : 0, count / 10) << "each wall is one place";
+  }
+  // Two pixels are enough where nothing else is asked for.
+  EXPECT_EQ(codes(inspect(stl("two.stl", {{{0, 0, 0}, {10, 10, 1}}, {{10, 4, 0}, {16, 4.2, 1}}}))), std::set<std::string>{});
+  EXPECT_EQ(codes(inspect(part)), std::set<std::string>{"thin"});
+}
+
+// Layers of random bits as a part: bodies without number, told as what was not looked at, and the job is done all the same.
+TEST_F(InspectedJobs, WhatTakesMoreMemoryThanItMayIsToldAndTheJobGoesOn) {
+  fs::create_directories(folder_ / "noise");
+  std::uint32_t state = 12345;
+  for (const int layer : {0, 1, 2, 3}) {
+    std::string bits(std::size_t{400} * 50, '\0');
+    for (char& byte : bits) byte = layer == 0 ? '\x7f' : static_cast<char>((state = state * 1664525 + 1013904223) >> 24);
+    std::ofstream(folder_ / "noise" / (std::to_string(layer) + ".pbm"), std::ios::binary) << "P4\n400 400\n" << bits;
+  }
+  std::ofstream(folder_ / "noise.toml") << "[[part]]\npath = \"noise\"\ndpi = 254\nlayer_mm = 0.1\nat_mm = [0, 0]\n";
+  const std::string job = "--job " + (folder_ / "noise.toml").string();
+  const auto whole = inspect(job);
+  EXPECT_EQ(whole["inspection"]["layers"], 4);
+  EXPECT_FALSE(whole["inspection"].contains("stopped"));
+  const auto tight = inspect(job + " --memory 4M");
+  EXPECT_EQ(tight["layers_planned"], 4);
+  EXPECT_EQ(tight["set_pixels"], whole["set_pixels"]);
+  EXPECT_EQ(tight["inspection"]["layers"], 1);
+  EXPECT_EQ(tight["inspection"]["stopped"]["layer"], 1);
+  EXPECT_TRUE(codes(tight).contains("not-inspected"));
+  EXPECT_LT(tight["peak_layer_bytes"], whole["peak_layer_bytes"]);
+  // What it asks for is enough.
+  const std::string text = tight["warnings"].back()["text"], give = "give --memory ";
+  const std::string asked = text.substr(text.find(give) + give.size(), text.find(" or more") - text.find(give) - give.size());
+  EXPECT_GT(inspect(job + " --memory " + asked)["inspection"]["layers"].get<int>(), 1) << text;
 }
 
 TEST_F(InspectedJobs, PartsThatGrowTogetherAreNamed) {

@@ -1,4 +1,4 @@
-#include "pipeline/show/report_places.h"
+#include "stages/write/report/places.h"
 
 #include <array>
 #include <nlohmann/json.hpp>
@@ -7,11 +7,10 @@
 
 #include "stages/write/manifest/inspection_file.h"
 
-namespace lamina::pipeline {
+namespace lamina::write::report {
 namespace {
 
 using Json = nlohmann::ordered_json;
-using write::report::SeenPlace;
 
 struct Shown {
   const PixelGrid& grid;
@@ -48,7 +47,7 @@ struct Shown {
   }
 };
 
-void add(const Json& json, const Shown& shown, write::report::LayersSeen& seen) {
+void add(const Json& json, const Shown& shown, LayersSeen& seen) {
   for (const Json& warning : json.at("warnings")) {
     Warning& told = seen.warnings.emplace_back(Warning{warning.at("code"), warning.at("text")});
     if (warning.contains("layer")) told.layer = shown.layer(warning.at("layer"));
@@ -66,13 +65,13 @@ void add(const Json& json, const Shown& shown, write::report::LayersSeen& seen) 
 
 }  // namespace
 
-void add_inspection(const std::string& directory, const ManifestHead& head, Mirror mirror, write::report::LayersSeen& seen) {
+void add_inspection(const std::string& directory, const ManifestHead& head, bool mirrored_x, bool mirrored_y,
+                    LayersSeen& seen) {
   if (head.product != Product::kImages) return;
   const auto json = read_inspection(directory, head);
   if (!json) return;
-  write::report::LayersSeen with = {};
-  const Shown shown{head.grid, mirror == Mirror::kX || mirror == Mirror::kXY, mirror == Mirror::kY || mirror == Mirror::kXY,
-                    head.layer_count};
+  LayersSeen with = {};
+  const Shown shown{head.grid, mirrored_x, mirrored_y, head.layer_count};
   try {
     add(*json, shown, with);
   } catch (const std::exception&) {
@@ -83,4 +82,4 @@ void add_inspection(const std::string& directory, const ManifestHead& head, Mirr
   seen.places = std::move(with.places);
 }
 
-}  // namespace lamina::pipeline
+}  // namespace lamina::write::report
