@@ -45,9 +45,9 @@ std::string correct_rows(const std::vector<std::optional<Located>>& along, const
       ++untold;
       continue;
     }
-    const double late = std::round(seen[r]->um);
+    const double late = std::round(10 * seen[r]->um) / 10;
     rows[r] -= late;
-    line += fmt::format("{:+g} um", 0 - late);
+    line += fmt::format("{:+g} um (within {:.1f})", 0 - late, seen[r]->within_um);
   }
   const char* why = "the photograph does not show them within a tenth of a pixel";
   if (untold + 1 == rows.size()) return fmt::format("rows      not told: {}", why);
@@ -70,6 +70,10 @@ std::string places_line(const std::vector<std::optional<Located>>& along, const 
 std::string told(const Json& json, const char* key) {
   return json.at(key).is_null() ? "untold" : fmt::format("{:+.0f} um", json.at(key).get<double>());
 }
+std::string told_within(const Json& json, const char* key, const char* within) {
+  if (json.at(key).is_null()) return "untold";
+  return fmt::format("{:+.1f} um (within {:.1f})", json.at(key).get<double>(), json.at(within).get<double>());
+}
 
 std::vector<std::string> swath_lines(const Json& swaths) {
   std::vector<std::string> lines;
@@ -78,8 +82,9 @@ std::vector<std::string> swath_lines(const Json& swaths) {
     if (swath.is_null()) {
       lines.push_back(fmt::format("swath {}   was not printed", s));
     } else if (s > 0) {
-      lines.push_back(fmt::format("swath {}   {} across, {} along the scan against the first one", s, told(swath, "across_um"),
-                                  told(swath, "along_um")));
+      lines.push_back(fmt::format("swath {}   {} across, {} along the scan against the first one", s,
+                                  told_within(swath, "across_um", "across_within_um"),
+                                  told_within(swath, "along_um", "along_within_um")));
     }
   }
   return lines;

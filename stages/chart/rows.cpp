@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "stages/data/picture/within.h"
+
 namespace lamina::chart {
 namespace {
 
@@ -23,16 +25,18 @@ std::optional<Located> mean_of(const std::vector<Located>& row) {
   }
   // Of the head's own: the standard deviation that normal values have, less what errors make of it.
   const double all = 1.4826 * middle_of(distances), error = middle_of(errors), own = std::max(all * all - error * error, 0.0);
-  double weights = 0, sum = 0, squares = 0;
+  double weights = 0, sum = 0, squares = 0, count = 0;
   for (const Located& one : row) {
     const double off = one.um - middle, variance = std::max(one.error_um * one.error_um + own, 1e-6);
     if (off * off > kFar * kFar * variance) continue;
     weights += 1 / variance;
     sum += off / variance;
     squares += off * off / (variance * variance);
+    ++count;
   }
   if (weights == 0) return std::nullopt;
-  return Located{middle + sum / weights, std::max(std::sqrt(squares), std::sqrt(weights)) / weights};
+  const double error_um = std::max(std::sqrt(squares), std::sqrt(weights)) / weights;
+  return Located{middle + sum / weights, error_um, errors_of_99(count - 1) * error_um};
 }
 
 }  // namespace
@@ -48,7 +52,9 @@ std::vector<std::optional<Located>> rows_of(const std::vector<std::optional<Loca
   told[0] = Located{};
   for (std::uint32_t r = 1; r < rows; ++r) {
     const auto mean = mean_of(of_row[r]);
-    if (mean) told[r] = Located{mean->um - first->um, std::hypot(mean->error_um, first->error_um)};
+    if (mean)
+      told[r] = Located{mean->um - first->um, std::hypot(mean->error_um, first->error_um),
+                        std::hypot(mean->within_um, first->within_um)};
   }
   return told;
 }

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <random>
 
 #include "stages/scan/marks.h"
 
@@ -231,10 +232,19 @@ std::vector<DashSeen> see_dashes(const Photo& photo, const Chart& chart, const S
   seen.reserve(chart.dashes.size());
   Look look(photo, chart, fit.view, shapes);
   const double most = kStray * chart.between_mm;
+  const Spot sheet = middle_of({0, 0, chart.columns, chart.rows}, chart);
+  const double sample = 1 / (kSamplesAPixel * fit.view.pixels_a_mm(sheet.x, sheet.y));
+  std::minstd_rand random;
+  const auto strewn = [&] {
+    return sample * (static_cast<double>(random()) / static_cast<double>(std::minstd_rand::max()) - 0.5);
+  };
   for (const ChartDash& dash : chart.dashes) {
     const Spot m = middle_of(dash.box, chart), shift = fit.shift[dash.swath], offset = fit.offset[dash.nozzle];
-    seen.push_back(
-        look.see(dash, {m.x + shift.x + std::clamp(offset.x, -most, most), m.y + shift.y + std::clamp(offset.y, -most, most)}));
+    // Strewn over a sample: of windows that all lie about where their dashes were seen before, the common shape knows some
+    // places alone, and keeps each dash there. By chance, as a nozzle's dashes come at even distances.
+    const double dx = strewn(), dy = strewn();
+    seen.push_back(look.see(dash, {m.x + shift.x + std::clamp(offset.x, -most, most) + dx,
+                                   m.y + shift.y + std::clamp(offset.y, -most, most) + dy}));
   }
   judge_dashes(photo, chart, seen);
   shapes = look.shapes();

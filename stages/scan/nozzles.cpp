@@ -3,8 +3,10 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <random>
 #include <utility>
 
+#include "stages/data/picture/within.h"
 #include "stages/scan/marks.h"
 #include "stages/scan/robust.h"
 
@@ -21,14 +23,15 @@ Axes axes_of(const Chart& chart, const Spot& mm) {
   return {1000 * along * chart.along_sign, 1000 * across * chart.across_sign};
 }
 
-Measure measured(double um, double error_um, double pitch_nm) {
-  return {um, error_um, kErrors * error_um <= kToldPixels * 1e-3 * pitch_nm};
+Measure measured(double um, double error_um, double freedom, double pitch_nm) {
+  return {um, error_um, errors_of_99(freedom) * error_um, kErrors * error_um <= kToldPixels * 1e-3 * pitch_nm};
 }
 
-Offset offset_of(const Chart& chart, const Axes& um, const Axes& error_um) {
+/// freedom  degrees of it that the errors have
+Offset offset_of(const Chart& chart, const Axes& um, const Axes& error_um, const Axes& freedom) {
   const double along_nm = chart.scan_along_x ? chart.pixel_x_nm : chart.pixel_y_nm,
                across_nm = chart.scan_along_x ? chart.pixel_y_nm : chart.pixel_x_nm;
-  return {measured(um[0], error_um[0], along_nm), measured(um[1], error_um[1], across_nm)};
+  return {measured(um[0], error_um[0], freedom[0], along_nm), measured(um[1], error_um[1], freedom[1], across_nm)};
 }
 
 /// What was seen of the dashes of a nozzle. um  how far each lies from where its swath has it, along and across
@@ -81,6 +84,32 @@ std::array<HeadLine, 2> lines_of(const std::vector<std::optional<Axes>>& nozzles
   return lines;
 }
 
+/// Standard errors of the lines at each nozzle: what becomes of them where each nozzle lies elsewhere by its error. The middle
+/// one is a median, which has the error of a single nozzle, not the smaller one of a mean.
+std::vector<Axes> line_errors(const std::vector<std::optional<Axes>>& nozzles, const std::vector<std::optional<Axes>>& errors) {
+  constexpr int kTimes = 50;
+  std::mt19937_64 random(1);
+  std::normal_distribution<double> normal;
+  std::vector<std::array<HeadLine, 2>> lines;
+  for (int i = 0; i < kTimes; ++i) {
+    std::vector<std::optional<Axes>> moved = nozzles;
+    for (std::size_t n = 0; n < moved.size(); ++n) {
+      for (std::size_t axis = 0; axis < 2 && moved[n]; ++axis) (*moved[n])[axis] += (*errors[n])[axis] * normal(random);
+    }
+    lines.push_back(lines_of(moved));
+  }
+  std::vector<Axes> line_error(nozzles.size());
+  for (std::size_t n = 0; n < nozzles.size(); ++n) {
+    for (std::size_t axis = 0; axis < 2; ++axis) {
+      double sum = 0, squares = 0;
+      for (const auto& line : lines) sum += line[axis].at(static_cast<double>(n));
+      for (const auto& line : lines) squares += std::pow(line[axis].at(static_cast<double>(n)) - sum / kTimes, 2);
+      line_error[n][axis] = std::sqrt(squares / (kTimes - 1));
+    }
+  }
+  return line_error;
+}
+
 /// Shifts of swaths against the first one, along the head's line, by a fit. told  which nozzles make the line
 std::vector<Axes> swaths_of(const Chart& chart, const SheetFit& fit, const std::vector<bool>& told, std::uint32_t first) {
   std::vector<std::optional<Axes>> nozzles(chart.nozzles);
@@ -98,10 +127,11 @@ std::vector<Axes> swaths_of(const Chart& chart, const SheetFit& fit, const std::
   return swaths;
 }
 
-/// Standard errors of swaths_of().
+constexpr std::uint32_t kGroups = 9;  // by combs, and thirds of the nozzles
+
+/// Standard errors of swaths_of(), with kGroups - 1 degrees of freedom.
 std::vector<Axes> swath_errors(const Chart& chart, const std::vector<Sighting>& all, const SheetFit& fit,
                                const std::vector<bool>& told, std::uint32_t first, bool lens) {
-  constexpr std::uint32_t kGroups = 9;  // by combs, and thirds of the nozzles
   std::vector<std::vector<Axes>> without;
   for (std::uint32_t g = 0; g < kGroups; ++g) {
     std::vector<Sighting> rest;
@@ -158,6 +188,7 @@ HeadReading judge_head(const Chart& chart, const std::vector<DashSeen>& seen, co
   const Axes scatter = scatter_of_dashes(tallies);
   std::vector<bool> told(chart.nozzles, false);
   std::vector<std::optional<Axes>> offsets(chart.nozzles), errors(chart.nozzles);
+  std::vector<Axes> freedom(chart.nozzles);
   for (std::uint32_t n = 0; n < chart.nozzles; ++n) {
     const Tally& tally = tallies[n];
     const std::uint32_t looked = tally.there + tally.absent;
@@ -176,15 +207,20 @@ HeadReading judge_head(const Chart& chart, const std::vector<DashSeen>& seen, co
         const SettledMean settled = settled_mean(tally.um[axis], scatter[axis]);
         (*offsets[n])[axis] = settled.mean;
         (*errors[n])[axis] = std::max(scatter[axis], settled.deviation) / std::sqrt(static_cast<double>(settled.count));
+        freedom[n][axis] = static_cast<double>(settled.count) - 1;
       }
     }
   }
   const std::array<HeadLine, 2> lines = lines_of(offsets);
+  const std::vector<Axes> line_error = line_errors(offsets, errors);
   for (std::uint32_t n = 0; n < chart.nozzles; ++n) {
     if (!told[n]) continue;
-    Axes um = *offsets[n];
-    for (std::size_t axis = 0; axis < 2; ++axis) um[axis] -= lines[axis].at(n);
-    head.nozzle[n] = offset_of(chart, um, *errors[n]);
+    Axes um = *offsets[n], error = *errors[n];
+    for (std::size_t axis = 0; axis < 2; ++axis) {
+      um[axis] -= lines[axis].at(n);
+      error[axis] = std::hypot(error[axis], line_error[n][axis]);
+    }
+    head.nozzle[n] = offset_of(chart, um, error, freedom[n]);
   }
   const auto first = static_cast<std::uint32_t>(std::ranges::find(printed, true) - printed.begin());
   const std::vector<Sighting> all = sightings_of(chart, seen, fit.view, printed);
@@ -192,7 +228,7 @@ HeadReading judge_head(const Chart& chart, const std::vector<DashSeen>& seen, co
   const std::vector<Axes> swath_error = swath_errors(chart, all, fit, told, first, lens);
   head.swath.assign(chart.swaths, std::nullopt);
   for (std::uint32_t s = 0; s < chart.swaths; ++s) {
-    if (printed[s]) head.swath[s] = offset_of(chart, swaths[s], swath_error[s]);
+    if (printed[s]) head.swath[s] = offset_of(chart, swaths[s], swath_error[s], {kGroups - 1, kGroups - 1});
   }
   return head;
 }

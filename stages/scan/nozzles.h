@@ -11,9 +11,10 @@
 
 namespace lamina::scan {
 
-/// A length with its standard error. told  four standard errors are at most a tenth of a pixel of the layer
+/// A length with its standard error. within_um  99 in 100 of them lie nearer to the truth (stages/data/picture/within.h)
+/// told  four standard errors are at most a tenth of a pixel of the layer
 struct Measure {
-  double um = 0, error_um = 0;
+  double um = 0, error_um = 0, within_um = 0;
   bool told = false;
 };
 
@@ -39,10 +40,9 @@ std::vector<Sighting> sightings_of(const Chart& chart, const std::vector<DashSee
 /// Decides each nozzle by all of its dashes in the swaths that were printed, and measures nozzles and swaths.
 ///
 /// The head's line is the straight line through its nozzles' offsets (line_of), which cannot be told from the scale of the
-/// photograph. Errors of swaths follow from leaving out a ninth of all dashes at a time (jackknife), those of nozzles from the
-/// scatter of dashes.
-/// fit      of these dashes
-/// printed  as printed_swaths() has it, one at least
+/// photograph. Errors of swaths follow from leaving out a ninth of all dashes at a time (jackknife). Those of nozzles are of
+/// two parts: the scatter of dashes, and the line's own error, which the middle nozzle brings to all: found by moving nozzles
+/// by their errors. fit      of these dashes printed  as printed_swaths() has it, one at least
 HeadReading judge_head(const Chart& chart, const std::vector<DashSeen>& seen, const std::vector<bool>& printed,
                        const SheetFit& fit, bool lens);
 

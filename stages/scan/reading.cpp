@@ -69,19 +69,20 @@ Result<ChartReading> read_chart_photo(const Photo& photo, const Chart& chart) {
 }
 
 Json reading_json(const ChartReading& reading) {
-  const auto rounded = [](double um) { return std::round(10 * um) / 10; };
+  const auto rounded = [](double um) { return std::round(100 * um) / 100; };
   const auto offsets = [&](const std::vector<std::optional<Offset>>& list) {
     Json json = Json::array();
     for (const auto& one : list) {
       Json& entry = json.emplace_back();
       if (!one) continue;
-      const auto add = [&](const char* name, const char* seen, const char* error, const Measure& measure) {
+      const auto add = [&](const char* name, const char* seen, const char* error, const char* within, const Measure& measure) {
         entry[name] = measure.told ? Json(rounded(measure.um)) : Json();
         entry[seen] = measure.error_um > 0 ? Json(rounded(measure.um)) : Json();  // null: all dashes are marred
-        entry[error] = std::round(100 * measure.error_um) / 100;
+        entry[error] = rounded(measure.error_um);
+        entry[within] = rounded(measure.within_um);
       };
-      add("along_um", "along_seen_um", "along_error_um", one->along);
-      add("across_um", "across_seen_um", "across_error_um", one->across);
+      add("along_um", "along_seen_um", "along_error_um", "along_within_um", one->along);
+      add("across_um", "across_seen_um", "across_error_um", "across_within_um", one->across);
     }
     return json;
   };

@@ -26,23 +26,37 @@ void cover_box(Sheet& sheet, const PrintedBox& box) {
   }
 }
 
-/// What a run of one row of the image becomes, by lines and places of the scan (data/program.h).
+/// What the dots of a line that lie one behind the other become, by lines and places of the scan (data/program.h): one box, for
+/// two that overlap would darken the edges of each other.
 template <class Visit>
 void for_each_dot_line(const HeadGrid& grid, const RunsView& layer, const Visit& visit) {
   const std::uint32_t columns = layer.columns, rows = layer.rows();
+  if (grid.scan_axis == ScanAxis::kX) {
+    for (std::uint32_t r = 0; r < rows; ++r) {
+      const auto row = layer.row(r);
+      for (std::size_t i = 0; i + 1 < row.size(); i += 2)
+        visit(grid.lines_from_end ? rows - 1 - r : r, row[i], r, row[i + 1], r + 1);
+    }
+    return;
+  }
+  std::vector<std::uint32_t> begin(columns, 0), end(columns, 0);
+  const auto close = [&](std::uint32_t c) {
+    if (begin[c] < end[c]) visit(grid.lines_from_end ? columns - 1 - c : c, c, begin[c], c + 1, end[c]);
+  };
   for (std::uint32_t r = 0; r < rows; ++r) {
     const auto row = layer.row(r);
     for (std::size_t i = 0; i + 1 < row.size(); i += 2) {
-      if (grid.scan_axis == ScanAxis::kX) {
-        visit(grid.lines_from_end ? rows - 1 - r : r, row[i], r, row[i + 1], r + 1);
-        continue;
+      for (std::uint32_t c = row[i]; c < row[i + 1]; ++c) {
+        if (end[c] != r || begin[c] == end[c]) close(c), begin[c] = r;
+        end[c] = r + 1;
       }
-      for (std::uint32_t c = row[i]; c < row[i + 1]; ++c) visit(grid.lines_from_end ? columns - 1 - c : c, c, r, c + 1, r + 1);
     }
   }
+  for (std::uint32_t c = 0; c < columns; ++c) close(c);
 }
 
 void blur(std::vector<float>& light, int width, int height, double sigma) {
+  if (!(sigma > 0)) return;
   const int reach = static_cast<int>(std::ceil(3 * sigma));
   std::vector<float> weight;
   float sum = 0;
