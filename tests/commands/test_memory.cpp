@@ -43,7 +43,8 @@ TEST_F(Memory, RunningOutOfItIsOneLineWithItsOwnCode) {
     for (const rlim_t megabytes : {16, 22, 27, 40, 78, 1000}) {
       const Outcome outcome = run(writes ? command + "out" : command, megabytes);
       const std::string what = command + std::to_string(megabytes) + " MB: " + outcome.err;
-      if (outcome.code == 127) continue;  // no room for the program's libraries
+      // No room for the program's libraries, or for what one of them, muParser's OpenMP, wants before main() begins.
+      if (outcome.code == 127 || outcome.err.starts_with("\nlibgomp: ")) continue;
       ++(outcome.code == 0 ? done : short_of_memory);
       if (outcome.code != 0) {
         EXPECT_EQ(outcome.code, 6) << what;
