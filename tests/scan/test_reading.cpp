@@ -303,11 +303,14 @@ TEST(ScannedChart, BlockedNozzlesAreFoundNoneIsAccusedAndOffsetsHold) {
   EXPECT_EQ(errors.accused, 0u);
   EXPECT_LE(share_of(errors.nozzle, 1), 0.1);
   EXPECT_LE(share_of(errors.swath, 1), 0.1);
-  for (const Beyond& kind : {errors.nozzles, errors.swaths, errors.rows})
+  for (const Beyond& kind : {errors.nozzles, errors.swaths, errors.rows}) {
+    EXPECT_GT(kind.all, 0u);
     EXPECT_LE(static_cast<double>(kind.beyond), kind.most()) << kind.all;
+  }
   EXPECT_LE(errors.nozzles_untold * 50, errors.nozzle.size());
   EXPECT_LE(errors.swaths_untold * 20, errors.swath.size());
-  EXPECT_FALSE(errors.joint_along.empty());
+  for (const auto* some : {&errors.joint_along, &errors.joint_across, &errors.gain_um, &errors.ragged_um})
+    EXPECT_FALSE(some->empty());
   EXPECT_LE(share_of(errors.joint_along, 0.99), 0.15);
   EXPECT_LE(share_of(errors.joint_across, 0.99), 1);
   EXPECT_LE(share_of(errors.gain_um, 0.99), 12);
