@@ -4,9 +4,9 @@
 #include <filesystem>
 
 #include "bench/named_parts.h"
-#include "stages/read/image.h"
-#include "stages/write/file.h"
-#include "stages/write/image_format.h"
+#include "stages/formats/image_format.h"
+#include "stages/formats/images/image.h"
+#include "stages/support/io/file.h"
 
 namespace lamina::bench {
 namespace {

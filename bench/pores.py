@@ -83,7 +83,7 @@ def predict(toolpaths, voxel, options):
 
 def other_machine(folder, lag, acceleration):
     """A profile that differs in these alone."""
-    with open(os.path.join(ROOT, "stages/write/machines/extrusion/anet-a8.toml"), encoding="utf-8") as file:
+    with open(os.path.join(ROOT, "pipeline/machine/shipped/extruders/anet-a8.toml"), encoding="utf-8") as file:
         text = file.read()
     for key, value in (("lag_s", lag), ("acceleration_mm_s2", acceleration)):
         text, count = re.subn(rf"^{key} = .*$", f"{key} = {value}", text, flags=re.M)

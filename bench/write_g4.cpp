@@ -12,13 +12,13 @@
 #include <string>
 
 #include "bench/named_parts.h"
-#include "stages/data/handles/tiff.h"
+#include "stages/formats/g4/decode.h"
+#include "stages/formats/g4/encode.h"
+#include "stages/formats/image_format.h"
+#include "stages/formats/images/image.h"
 #include "stages/geometry/bits.h"
-#include "stages/read/g4.h"
-#include "stages/read/image.h"
-#include "stages/write/file.h"
-#include "stages/write/g4/encode.h"
-#include "stages/write/image_format.h"
+#include "stages/support/io/file.h"
+#include "stages/support/late/tiff.h"
 
 namespace lamina::bench {
 namespace {

@@ -9,11 +9,9 @@ endif()
 get_property(others DIRECTORY PROPERTY BUILDSYSTEM_TARGETS)
 set_target_properties(${others} PROPERTIES EXCLUDE_FROM_ALL ON)
 
-lamina_sources(fuzzed "stages/data/*.cpp" "stages/geometry/*.cpp" "stages/load/*.cpp" "stages/read/*.cpp"
+lamina_sources(fuzzed "stages/data/*.cpp" "stages/support/*.cpp" "stages/geometry/*.cpp" "stages/load/*.cpp"
                "stages/replay/*.cpp" "stages/program/*.cpp" "stages/heights/*.cpp" "stages/segment/*.cpp"
-               "stages/infill/*.cpp" "stages/write/*.cpp" "pipeline/job/*.cpp" "pipeline/machine/*.cpp")
-list(FILTER fuzzed EXCLUDE REGEX "/stages/write/(picture|report)/")
-list(APPEND fuzzed ${PROJECT_SOURCE_DIR}/stages/write/report/run_code.cpp)  # SVG holds pictures in it
+               "stages/infill/*.cpp" "stages/formats/*.cpp" "pipeline/manifest/*.cpp" "pipeline/job/*.cpp" "pipeline/machine/*.cpp")
 lamina_add_included(fuzzed)
 add_library(lamina_fuzzed STATIC ${fuzzed} ${PROJECT_BINARY_DIR}/shipped_machines.cpp ${PROJECT_BINARY_DIR}/shipped_presets.cpp
                                  ${PROJECT_BINARY_DIR}/shipped_extruders.cpp tests/fuzz/target.cpp tests/fuzz/laws.cpp)
@@ -24,7 +22,7 @@ target_link_libraries(lamina_fuzzed PUBLIC TBB::tbb Eigen3::Eigen fmt::fmt PNG::
 target_include_directories(lamina_fuzzed SYSTEM PUBLIC ${lamina_late_headers})
 target_compile_options(lamina_fuzzed PUBLIC -fsanitize=fuzzer-no-link -fno-sanitize-recover=all)
 if(LAMINA_UNITE STREQUAL "all")
-  list(FILTER fuzzed EXCLUDE REGEX "/(load/stl_ascii|load/stl_binary|read/profiles/printer|job/extrude)\\.cpp$")  # names of their own
+  list(FILTER fuzzed EXCLUDE REGEX "/(load/stl_ascii|load/stl_binary|job/profiles/printer|job/extrude)\\.cpp$")  # names of their own
   lamina_unite(lamina_fuzzed ${fuzzed})
 endif()
 target_precompile_headers(lamina_fuzzed PRIVATE cmake/precompiled.h)

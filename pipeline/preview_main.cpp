@@ -6,11 +6,11 @@
 #include "pipeline/cli/command.h"
 #include "pipeline/cli/console.h"
 #include "pipeline/show/sheet.h"
-#include "stages/data/input/file_reader.h"
-#include "stages/data/text/number_text.h"
-#include "stages/write/file.h"
-#include "stages/write/picture/plot.h"
-#include "stages/write/plot.h"
+#include "stages/formats/plot/plot.h"
+#include "stages/support/io/file.h"
+#include "stages/support/io/file_reader.h"
+#include "stages/support/text/number_text.h"
+#include "stages/view/picture/plot.h"
 
 namespace lamina::pipeline {
 namespace {

@@ -8,9 +8,9 @@
 #include <map>
 #include <set>
 
-#include "stages/data/text/version.h"
 #include "stages/load/load.h"
-#include "stages/write/replaceable.h"
+#include "stages/support/io/replaceable.h"
+#include "stages/support/text/version.h"
 
 namespace lamina::pipeline {
 namespace {

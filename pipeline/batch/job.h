@@ -8,11 +8,11 @@
 #include <string>
 #include <vector>
 
+#include "pipeline/job/lists/batch_list.h"
 #include "pipeline/plan/progress.h"
-#include "stages/data/input/hash.h"
 #include "stages/data/status.h"
-#include "stages/data/text/json.h"
-#include "stages/read/jobs/batch_list.h"
+#include "stages/support/hash/hash.h"
+#include "stages/support/text/json.h"
 
 namespace lamina::pipeline {
 

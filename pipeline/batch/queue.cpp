@@ -12,7 +12,7 @@
 #include <mutex>
 #include <thread>
 
-#include "stages/data/text/readable.h"
+#include "stages/support/text/readable.h"
 
 namespace lamina::pipeline {
 namespace {

@@ -6,8 +6,8 @@
 #include <filesystem>
 #include <utility>
 
-#include "stages/data/input/text_shape.h"
-#include "stages/data/text/json.h"
+#include "stages/support/text/json.h"
+#include "stages/support/text/text_shape.h"
 
 namespace lamina::pipeline {
 namespace {

@@ -1,6 +1,6 @@
 // pipeline/batch/record.h: the progress of a batch, in a file that survives a kill at any moment.
 //
-// batch.jsonl is a journal of JSON objects (stages/write/journal.h): {"begun":ID,...} when a job starts, {"ended":ID,...}
+// batch.jsonl is a journal of JSON objects (stages/support/io/journal.h): {"begun":ID,...} when a job starts, {"ended":ID,...}
 // with its result when it ends. A line torn by a kill or a full disk is skipped, and its job runs again.
 #pragma once
 
@@ -8,10 +8,10 @@
 #include <string>
 
 #include "pipeline/batch/job.h"
-#include "stages/data/input/hash.h"
 #include "stages/data/status.h"
-#include "stages/data/text/json.h"
-#include "stages/write/journal.h"
+#include "stages/support/hash/hash.h"
+#include "stages/support/io/journal.h"
+#include "stages/support/text/json.h"
 
 namespace lamina::pipeline {
 

@@ -6,9 +6,9 @@
 #include <cmath>
 
 #include "pipeline/plan/progress.h"
-#include "stages/data/text/json_text.h"
-#include "stages/data/text/readable.h"
-#include "stages/data/text/version.h"
+#include "stages/support/text/json_text.h"
+#include "stages/support/text/readable.h"
+#include "stages/support/text/version.h"
 
 namespace lamina::pipeline {
 namespace {

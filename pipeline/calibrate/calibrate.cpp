@@ -7,11 +7,11 @@
 
 #include "pipeline/job/file.h"
 #include "pipeline/run/run.h"
-#include "stages/data/text/readable.h"
+#include "stages/formats/stl/block.h"
 #include "stages/segment/widths_table.h"
-#include "stages/write/file.h"
-#include "stages/write/leftovers.h"
-#include "stages/write/stl/block.h"
+#include "stages/support/io/file.h"
+#include "stages/support/io/leftovers.h"
+#include "stages/support/text/readable.h"
 
 namespace lamina::pipeline {
 namespace {

@@ -8,12 +8,12 @@
 
 #include "pipeline/machine/profiles.h"
 #include "pipeline/run/run.h"
-#include "stages/chart/draw.h"
-#include "stages/chart/layout.h"
-#include "stages/data/text/readable.h"
-#include "stages/write/file.h"
-#include "stages/write/image_format.h"
-#include "stages/write/leftovers.h"
+#include "stages/calibration/chart/draw.h"
+#include "stages/calibration/chart/layout.h"
+#include "stages/formats/image_format.h"
+#include "stages/support/io/file.h"
+#include "stages/support/io/leftovers.h"
+#include "stages/support/text/readable.h"
 
 namespace lamina::pipeline {
 namespace {

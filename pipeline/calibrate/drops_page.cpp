@@ -2,7 +2,7 @@
 
 #include <fmt/format.h>
 
-#include "stages/data/text/json.h"
+#include "stages/support/text/json.h"
 
 namespace lamina::pipeline {
 namespace {

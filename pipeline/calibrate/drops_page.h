@@ -4,7 +4,7 @@
 #include <nlohmann/json_fwd.hpp>
 #include <string>
 
-#include "stages/data/picture/plot.h"
+#include "stages/data/plot.h"
 #include "stages/segment/samples.h"
 
 namespace lamina::pipeline {

@@ -7,8 +7,8 @@
 
 #include "pipeline/check/job_files.h"
 #include "pipeline/job/job.h"
+#include "pipeline/manifest/manifest.h"
 #include "stages/data/machine.h"
-#include "stages/write/manifest/manifest.h"
 
 namespace lamina::pipeline {
 

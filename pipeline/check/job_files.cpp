@@ -8,11 +8,11 @@
 
 #include "pipeline/machine/profiles.h"
 #include "pipeline/output/print_program.h"
-#include "stages/data/input/file_reader.h"
 #include "stages/data/levels.h"
 #include "stages/program/explain.h"
 #include "stages/program/head_grid.h"
 #include "stages/raster/materials.h"
+#include "stages/support/io/file_reader.h"
 
 namespace lamina::pipeline {
 namespace {

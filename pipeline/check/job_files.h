@@ -4,13 +4,13 @@
 #include <string>
 #include <vector>
 
+#include "pipeline/manifest/compare.h"
 #include "pipeline/output/print_program.h"
 #include "stages/data/runs.h"
 #include "stages/data/status.h"
+#include "stages/formats/images/image.h"
 #include "stages/raster/materials.h"
-#include "stages/read/image.h"
 #include "stages/replay/machine.h"
-#include "stages/write/manifest/compare.h"
 
 namespace lamina::pipeline {
 

@@ -11,16 +11,16 @@
 
 #include "pipeline/check/doses.h"
 #include "pipeline/check/job_files.h"
+#include "pipeline/manifest/compare.h"
+#include "pipeline/manifest/manifest.h"
 #include "pipeline/output/directory.h"
 #include "pipeline/output/print_program.h"
 #include "pipeline/run/job_cost.h"
-#include "stages/data/input/file_reader.h"
 #include "stages/data/levels.h"
-#include "stages/read/image.h"
+#include "stages/formats/images/image.h"
 #include "stages/replay/feeding.h"
 #include "stages/replay/frame/frame.h"
-#include "stages/write/manifest/compare.h"
-#include "stages/write/manifest/manifest.h"
+#include "stages/support/io/file_reader.h"
 
 namespace lamina::pipeline {
 namespace {

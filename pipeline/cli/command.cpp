@@ -1,6 +1,6 @@
 #include "pipeline/cli/command.h"
-#include "stages/data/text/readable.h"
-#include "stages/data/text/version.h"
+#include "stages/support/text/readable.h"
+#include "stages/support/text/version.h"
 
 #include <fmt/format.h>
 #include <malloc.h>
@@ -13,10 +13,10 @@
 #include "pipeline/cli/console.h"
 #include "pipeline/cli/outputs.h"
 #include "stages/data/shortage.h"
-#include "stages/data/text/json_text.h"
-#include "stages/data/text/names.h"
-#include "stages/write/file.h"
-#include "stages/write/leftovers.h"
+#include "stages/support/io/file.h"
+#include "stages/support/io/leftovers.h"
+#include "stages/support/text/json_text.h"
+#include "stages/support/text/names.h"
 
 namespace lamina::pipeline {
 namespace {

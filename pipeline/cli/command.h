@@ -10,9 +10,9 @@
 #include <string_view>
 #include <vector>
 
+#include "pipeline/cli/terminal/arguments.h"
 #include "pipeline/plan/progress.h"
 #include "stages/data/status.h"
-#include "stages/terminal/arguments.h"
 
 namespace lamina::pipeline {
 

@@ -8,11 +8,11 @@
 #include <cstring>
 #include <ctime>
 
-#include "stages/data/text/json.h"
-#include "stages/data/text/json_text.h"
-#include "stages/data/text/terminal.h"
-#include "stages/write/file.h"
-#include "stages/write/leftovers.h"
+#include "stages/support/io/file.h"
+#include "stages/support/io/leftovers.h"
+#include "stages/support/text/json.h"
+#include "stages/support/text/json_text.h"
+#include "stages/support/text/terminal.h"
 
 namespace lamina::pipeline {
 namespace {

@@ -5,8 +5,8 @@
 #include <string_view>
 
 #include "pipeline/cli/command.h"
+#include "pipeline/cli/terminal/progress.h"
 #include "stages/data/status.h"
-#include "stages/terminal/progress.h"
 
 namespace lamina::pipeline {
 

@@ -4,11 +4,11 @@
 #include <string>
 #include <vector>
 
+#include "pipeline/cli/terminal/arguments.h"
 #include "pipeline/job/job.h"
 #include "stages/data/choices.h"
 #include "stages/data/extruder.h"
 #include "stages/data/status.h"
-#include "stages/terminal/arguments.h"
 
 namespace lamina::pipeline {
 

@@ -8,12 +8,12 @@
 #include <optional>
 #include <vector>
 
+#include "pipeline/manifest/layer_files.h"
 #include "stages/cost/quote_table.h"
-#include "stages/data/text/readable.h"
-#include "stages/write/file.h"
-#include "stages/write/manifest/layer_files.h"
-#include "stages/write/replaceable.h"
-#include "stages/write/voxels/image.h"
+#include "stages/formats/voxels/image.h"
+#include "stages/support/io/file.h"
+#include "stages/support/io/replaceable.h"
+#include "stages/support/text/readable.h"
 
 namespace lamina::pipeline {
 namespace {

@@ -5,9 +5,9 @@
 #include <filesystem>
 
 #include "pipeline/cli/outputs.h"
-#include "stages/write/file.h"
-#include "stages/write/other_program.h"
-#include "stages/write/plot.h"
+#include "stages/formats/plot/plot.h"
+#include "stages/support/io/file.h"
+#include "stages/support/io/other_program.h"
 
 namespace lamina::pipeline {
 

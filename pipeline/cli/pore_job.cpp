@@ -9,13 +9,13 @@
 #include "pipeline/cli/keys.h"
 #include "pipeline/cli/outputs.h"
 #include "pipeline/job/job.h"
+#include "pipeline/job/lists/job_command.h"
 #include "pipeline/machine/profiles.h"
 #include "pipeline/output/temporary_folder.h"
 #include "pipeline/run/run_resolved.h"
-#include "stages/data/input/file_reader.h"
-#include "stages/data/text/json.h"
-#include "stages/data/text/readable.h"
-#include "stages/read/jobs/job_command.h"
+#include "stages/support/io/file_reader.h"
+#include "stages/support/text/json.h"
+#include "stages/support/text/readable.h"
 
 namespace lamina::pipeline {
 namespace {

@@ -4,15 +4,15 @@
 
 #include <vector>
 
-#include "pipeline/calibrate/bead_rules.h"
-#include "pipeline/calibrate/laid_look.h"
-#include "pipeline/calibrate/pore_drawing.h"
-#include "pipeline/calibrate/pore_page.h"
-#include "pipeline/calibrate/predict_inertia.h"
 #include "pipeline/cli/pore_stack.h"
 #include "pipeline/cli/window_files.h"
-#include "stages/data/text/json.h"
-#include "stages/data/text/readable.h"
+#include "pipeline/pores/bead_rules.h"
+#include "pipeline/pores/laid_look.h"
+#include "pipeline/pores/pore_drawing.h"
+#include "pipeline/pores/pore_page.h"
+#include "pipeline/pores/predict_inertia.h"
+#include "stages/support/text/json.h"
+#include "stages/support/text/readable.h"
 
 namespace lamina::pipeline {
 namespace {

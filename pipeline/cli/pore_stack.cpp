@@ -2,13 +2,13 @@
 
 #include <fmt/format.h>
 
-#include "pipeline/calibrate/pore_drawing.h"
-#include "pipeline/calibrate/pore_page.h"
-#include "pipeline/calibrate/scan_compare.h"
 #include "pipeline/cli/window_files.h"
-#include "stages/data/text/json.h"
-#include "stages/data/text/number_text.h"
-#include "stages/data/text/readable.h"
+#include "pipeline/pores/pore_drawing.h"
+#include "pipeline/pores/pore_page.h"
+#include "pipeline/pores/scan_compare.h"
+#include "stages/support/text/json.h"
+#include "stages/support/text/number_text.h"
+#include "stages/support/text/readable.h"
 
 namespace lamina::pipeline {
 namespace {

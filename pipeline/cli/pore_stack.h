@@ -3,8 +3,8 @@
 
 #include <vector>
 
-#include "pipeline/calibrate/image_stack.h"
 #include "pipeline/cli/command.h"
+#include "pipeline/pores/image_stack.h"
 
 namespace lamina::pipeline {
 

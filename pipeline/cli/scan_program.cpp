@@ -1,7 +1,7 @@
 #include "pipeline/cli/scan_program.h"
 
-#include "stages/write/file.h"
-#include "stages/write/other_program.h"
+#include "stages/support/io/file.h"
+#include "stages/support/io/other_program.h"
 
 namespace lamina::pipeline {
 

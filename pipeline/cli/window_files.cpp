@@ -6,11 +6,11 @@
 
 #include "pipeline/cli/outputs.h"
 #include "pipeline/cli/plot_file.h"
-#include "stages/data/text/json.h"
-#include "stages/data/text/readable.h"
-#include "stages/data/text/version.h"
-#include "stages/write/voxels/image.h"
-#include "stages/write/voxels/surface_stl.h"
+#include "stages/formats/voxels/image.h"
+#include "stages/formats/voxels/surface_stl.h"
+#include "stages/support/text/json.h"
+#include "stages/support/text/readable.h"
+#include "stages/support/text/version.h"
 
 namespace lamina::pipeline {
 namespace {

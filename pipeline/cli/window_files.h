@@ -7,11 +7,11 @@
 #include <string>
 #include <vector>
 
-#include "pipeline/calibrate/predict_flow.h"
-#include "stages/data/picture/plot.h"
+#include "pipeline/cli/terminal/arguments.h"
+#include "pipeline/pores/predict_flow.h"
+#include "stages/data/plot.h"
 #include "stages/data/status.h"
 #include "stages/data/voxels.h"
-#include "stages/terminal/arguments.h"
 
 namespace lamina::pipeline {
 

@@ -10,7 +10,7 @@
 #include <set>
 
 #include "pipeline/flow/budget.h"
-#include "stages/data/handles/clocks.h"
+#include "stages/support/clocks.h"
 
 namespace lamina::pipeline {
 namespace {

@@ -2,7 +2,7 @@
 #include "pipeline/job/job.h"
 
 #include "pipeline/job/keys.h"
-#include "stages/read/profiles/changes.h"
+#include "pipeline/job/profiles/changes.h"
 
 namespace lamina::pipeline {
 namespace {

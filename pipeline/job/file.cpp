@@ -8,13 +8,13 @@
 #include <vector>
 
 #include "pipeline/job/keys.h"
-#include "stages/data/input/file_reader.h"
-#include "stages/data/text/json_text.h"
-#include "stages/read/jobs/job_command.h"
-#include "stages/read/jobs/named_files.h"
-#include "stages/read/jobs/old_forms.h"
-#include "stages/write/file.h"
-#include "stages/write/replaceable.h"
+#include "pipeline/job/lists/job_command.h"
+#include "pipeline/job/lists/named_files.h"
+#include "pipeline/job/lists/old_forms.h"
+#include "stages/support/io/file.h"
+#include "stages/support/io/file_reader.h"
+#include "stages/support/io/replaceable.h"
+#include "stages/support/text/json_text.h"
 
 namespace lamina::pipeline {
 namespace {

@@ -2,7 +2,7 @@
 #include "pipeline/job/fill.h"
 
 #include "pipeline/job/keys.h"
-#include "stages/data/text/ranges.h"
+#include "stages/support/text/ranges.h"
 
 namespace lamina::pipeline {
 namespace {

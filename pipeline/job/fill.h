@@ -4,8 +4,8 @@
 #include <string_view>
 #include <vector>
 
-#include "stages/data/text/changes.h"
 #include "stages/infill/settings.h"
+#include "stages/support/text/changes.h"
 
 namespace lamina::pipeline {
 

@@ -1,6 +1,6 @@
 // Section [image].
 #include "pipeline/job/keys.h"
-#include "stages/write/levels/level_format.h"
+#include "stages/formats/level_format.h"
 
 namespace lamina::pipeline {
 namespace {

@@ -13,9 +13,9 @@
 #include "stages/data/choices.h"
 #include "stages/data/grid.h"
 #include "stages/data/status.h"
-#include "stages/data/text/changes.h"
 #include "stages/heights/settings.h"
 #include "stages/segment/settings.h"
+#include "stages/support/text/changes.h"
 
 namespace lamina {
 enum class VatRule : std::uint8_t;  // stages/data/machine.h

@@ -8,7 +8,7 @@
 
 #include "pipeline/job/job.h"
 #include "stages/data/choices.h"
-#include "stages/data/text/key.h"
+#include "stages/support/text/key.h"
 
 namespace lamina::pipeline {
 

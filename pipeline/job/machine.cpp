@@ -1,6 +1,6 @@
 // Sections [machine] and [dose].
 #include "pipeline/job/keys.h"
-#include "stages/read/profiles/printer.h"
+#include "pipeline/job/profiles/printer.h"
 
 namespace lamina::pipeline {
 namespace {

@@ -6,9 +6,9 @@
 
 #include "pipeline/job/job.h"
 #include "pipeline/job/keys.h"
-#include "stages/data/text/key.h"
-#include "stages/data/text/ranges.h"
-#include "stages/read/profiles/printer.h"
+#include "pipeline/job/profiles/printer.h"
+#include "stages/support/text/key.h"
+#include "stages/support/text/ranges.h"
 
 namespace lamina::pipeline {
 namespace {

@@ -6,8 +6,8 @@
 #include "pipeline/job/fill.h"
 #include "pipeline/job/job.h"
 #include "pipeline/job/keys.h"
-#include "stages/data/text/readable.h"
-#include "stages/read/profiles/printer.h"
+#include "pipeline/job/profiles/printer.h"
+#include "stages/support/text/readable.h"
 
 namespace lamina::pipeline {
 namespace {

@@ -4,9 +4,9 @@
 #include <optional>
 
 #include "pipeline/job/keys.h"
-#include "stages/data/text/number_text.h"
-#include "stages/data/text/ranges.h"
 #include "stages/dose/field.h"
+#include "stages/support/text/number_text.h"
+#include "stages/support/text/ranges.h"
 
 namespace lamina::pipeline {
 namespace {

@@ -1,6 +1,6 @@
 // Section [segment].
 #include "pipeline/job/keys.h"
-#include "stages/data/text/ranges.h"
+#include "stages/support/text/ranges.h"
 
 namespace lamina::pipeline {
 namespace {

@@ -2,7 +2,7 @@
 #include <vector>
 
 #include "pipeline/job/keys.h"
-#include "stages/write/slice_format.h"
+#include "stages/formats/slice_format.h"
 
 namespace lamina::pipeline {
 namespace {

@@ -7,14 +7,14 @@
 #include <iterator>
 #include <vector>
 
+#include "pipeline/job/lists/named_files.h"
 #include "pipeline/machine/profiles.h"
 #include "stages/bead/predicted_tables.h"
-#include "stages/data/text/json_text.h"
-#include "stages/data/text/key.h"
-#include "stages/data/text/names.h"
-#include "stages/data/text/readable.h"
 #include "stages/geometry/bead_section.h"
-#include "stages/read/jobs/named_files.h"
+#include "stages/support/text/json_text.h"
+#include "stages/support/text/key.h"
+#include "stages/support/text/names.h"
+#include "stages/support/text/readable.h"
 
 namespace lamina::pipeline {
 

@@ -4,9 +4,9 @@
 
 #include <algorithm>
 
-#include "stages/data/text/readable.h"
-#include "stages/data/text/value.h"
-#include "stages/read/profiles/printer.h"
+#include "pipeline/job/profiles/printer.h"
+#include "stages/support/text/readable.h"
+#include "stages/support/text/value.h"
 
 namespace lamina::pipeline {
 namespace {

@@ -2,10 +2,10 @@
 
 #include <fmt/format.h>
 
+#include "pipeline/job/lists/named_files.h"
 #include "pipeline/machine/profiles.h"
+#include "stages/program/dialect.h"
 #include "stages/program/head_grid.h"
-#include "stages/read/jobs/named_files.h"
-#include "stages/write/program/dialect.h"
 
 namespace lamina::pipeline {
 namespace {

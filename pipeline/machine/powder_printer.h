@@ -9,7 +9,7 @@
 #include "stages/data/machine.h"
 #include "stages/data/program.h"
 #include "stages/data/status.h"
-#include "stages/data/text/value.h"  // kMostMm
+#include "stages/support/text/value.h"  // kMostMm
 
 namespace lamina::pipeline {
 

@@ -6,11 +6,11 @@
 #include <vector>
 
 #include "pipeline/job/decisions.h"
-#include "stages/data/text/json_text.h"
-#include "stages/data/text/names.h"
-#include "stages/data/text/readable.h"
+#include "stages/program/dialect.h"
 #include "stages/segment/calibration.h"
-#include "stages/write/program/dialect.h"
+#include "stages/support/text/json_text.h"
+#include "stages/support/text/names.h"
+#include "stages/support/text/readable.h"
 
 namespace lamina::pipeline {
 namespace {

@@ -6,20 +6,20 @@
 #include <string_view>
 #include <vector>
 
+#include "pipeline/job/profiles/extruder.h"
+#include "pipeline/job/profiles/library.h"
+#include "pipeline/job/profiles/printer.h"
 #include "stages/data/extruder.h"
 #include "stages/data/machine.h"
 #include "stages/data/status.h"
-#include "stages/read/profiles/extruder.h"
-#include "stages/read/profiles/library.h"
-#include "stages/read/profiles/printer.h"
 
 namespace lamina::pipeline {
 
 using read::names_of;
 using read::ShippedProfile;
-std::span<const ShippedProfile> shipped_machines();   // powder printers, stages/write/machines/*.toml
+std::span<const ShippedProfile> shipped_machines();   // powder printers, pipeline/machine/shipped/printers/*.toml
 std::span<const ShippedProfile> shipped_presets();    // powder, binder and process for them, presets/*.toml there
-std::span<const ShippedProfile> shipped_extruders();  // stages/write/machines/extrusion/*.toml
+std::span<const ShippedProfile> shipped_extruders();  // pipeline/machine/shipped/extruders/*.toml
 
 /// All of them, and the user's own.
 read::Library profile_library();

@@ -9,8 +9,8 @@
 #include <filesystem>
 
 #include "pipeline/job/decisions.h"
-#include "stages/write/leftovers.h"
-#include "stages/write/manifest/manifest.h"
+#include "pipeline/manifest/manifest.h"
+#include "stages/support/io/leftovers.h"
 
 namespace lamina::pipeline {
 namespace {

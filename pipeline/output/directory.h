@@ -6,12 +6,12 @@
 #include <vector>
 
 #include "pipeline/job/job.h"
+#include "pipeline/manifest/layer_files.h"
+#include "pipeline/manifest/manifest.h"
 #include "stages/data/status.h"
-#include "stages/write/file.h"
-#include "stages/write/leftovers.h"
-#include "stages/write/manifest/layer_files.h"
-#include "stages/write/manifest/manifest.h"
-#include "stages/write/temporary.h"
+#include "stages/support/io/file.h"
+#include "stages/support/io/leftovers.h"
+#include "stages/support/io/temporary.h"
 
 namespace lamina::pipeline {
 

@@ -8,12 +8,12 @@
 #include "pipeline/job/file.h"
 #include "pipeline/job/keys.h"
 #include "pipeline/machine/profiles.h"
+#include "pipeline/manifest/compare.h"
 #include "pipeline/output/directory.h"
 #include "pipeline/output/resume.h"
-#include "stages/data/text/version.h"
-#include "stages/write/file.h"
-#include "stages/write/manifest/compare.h"
-#include "stages/write/program/dialect.h"
+#include "stages/program/dialect.h"
+#include "stages/support/io/file.h"
+#include "stages/support/text/version.h"
 
 namespace lamina::pipeline {
 namespace {

@@ -9,16 +9,16 @@
 #include <string>
 #include <vector>
 
+#include "pipeline/manifest/manifest.h"
 #include "pipeline/output/plan_head.h"
 #include "pipeline/output/print_program.h"
 #include "pipeline/plan/plan.h"
 #include "stages/data/levels.h"
 #include "stages/data/runs.h"
 #include "stages/data/status.h"
-#include "stages/write/leftovers.h"
-#include "stages/write/levels/level_format.h"
-#include "stages/write/manifest/manifest.h"
-#include "stages/write/sync.h"
+#include "stages/formats/level_format.h"
+#include "stages/support/io/leftovers.h"
+#include "stages/support/io/sync.h"
 
 namespace lamina::pipeline {
 

@@ -8,13 +8,13 @@
 #include <span>
 
 #include "pipeline/job/file.h"
+#include "pipeline/manifest/manifest.h"
 #include "pipeline/output/directory.h"
 #include "pipeline/output/print_program.h"
-#include "stages/sanity/records.h"
-#include "stages/write/bring.h"
-#include "stages/write/manifest/manifest.h"
-#include "stages/write/replaceable.h"
-#include "stages/write/sync.h"
+#include "stages/checks/records.h"
+#include "stages/support/io/bring.h"
+#include "stages/support/io/replaceable.h"
+#include "stages/support/io/sync.h"
 
 namespace lamina::pipeline {
 namespace {

@@ -3,7 +3,7 @@
 #include <filesystem>
 
 #include "pipeline/job/file.h"
-#include "stages/data/text/version.h"
+#include "stages/support/text/version.h"
 
 namespace lamina::pipeline {
 

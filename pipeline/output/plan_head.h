@@ -1,8 +1,8 @@
 // pipeline/output/plan_head.h: the manifest keys common to all products.
 #pragma once
 
+#include "pipeline/manifest/manifest.h"
 #include "pipeline/plan/plan.h"
-#include "stages/write/manifest/manifest.h"
 
 namespace lamina::pipeline {
 

@@ -5,8 +5,8 @@
 #include <algorithm>
 
 #include "pipeline/machine/profiles.h"
-#include "stages/write/file.h"
-#include "stages/write/program/binary_program.h"
+#include "stages/program/binary_program.h"
+#include "stages/support/io/file.h"
 
 namespace lamina::pipeline {
 

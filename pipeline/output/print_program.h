@@ -16,14 +16,14 @@
 
 #include "pipeline/job/job.h"
 #include "pipeline/machine/powder_printer.h"
+#include "pipeline/manifest/manifest.h"
 #include "stages/data/layer.h"
 #include "stages/data/runs.h"
 #include "stages/data/status.h"
 #include "stages/program/compile.h"
+#include "stages/program/dialect.h"
 #include "stages/replay/time/timer.h"
-#include "stages/write/file.h"
-#include "stages/write/manifest/manifest.h"
-#include "stages/write/program/dialect.h"
+#include "stages/support/io/file.h"
 
 namespace lamina::pipeline {
 

@@ -7,7 +7,7 @@
 #include <algorithm>
 
 #include "pipeline/output/print_program.h"
-#include "stages/data/input/hash.h"
+#include "stages/support/hash/hash.h"
 
 namespace lamina::pipeline {
 

@@ -4,8 +4,8 @@
 #include <string>
 #include <vector>
 
+#include "pipeline/manifest/manifest.h"
 #include "stages/data/status.h"
-#include "stages/write/manifest/manifest.h"
 
 namespace lamina::pipeline {
 

@@ -8,11 +8,11 @@
 #include <vector>
 
 #include "pipeline/job/decisions.h"
+#include "pipeline/manifest/kept.h"
 #include "pipeline/output/directory.h"
-#include "stages/write/leftovers.h"
-#include "stages/write/manifest/kept.h"
-#include "stages/write/replaceable.h"
-#include "stages/write/slice_format.h"
+#include "stages/formats/slice_format.h"
+#include "stages/support/io/leftovers.h"
+#include "stages/support/io/replaceable.h"
 
 namespace lamina::pipeline {
 namespace {

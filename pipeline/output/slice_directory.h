@@ -33,7 +33,7 @@ std::vector<std::filesystem::path> earlier_slices(const Job& job);
 /// Call when the job is complete: removes earlier files in their order, and renames the waiting layers. errors  kOutput
 Status replace_slices(const Job& job, const std::vector<std::filesystem::path>& earlier);
 
-/// Of a job that has failed; what cannot be removed is noted (stages/write/leftovers.h).
+/// Of a job that has failed; what cannot be removed is noted (stages/support/io/leftovers.h).
 void remove_waiting_layers(const Job& job);
 
 }  // namespace lamina::pipeline

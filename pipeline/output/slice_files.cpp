@@ -8,9 +8,9 @@
 #include "pipeline/output/directory.h"
 #include "pipeline/output/plan_head.h"
 #include "pipeline/output/slice_directory.h"
-#include "stages/data/text/version.h"
-#include "stages/write/file.h"
-#include "stages/write/file_target.h"
+#include "stages/support/io/file.h"
+#include "stages/support/io/file_target.h"
+#include "stages/support/text/version.h"
 
 namespace lamina::pipeline {
 

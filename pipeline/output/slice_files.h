@@ -7,16 +7,16 @@
 #include <optional>
 #include <string>
 
+#include "pipeline/manifest/kept.h"
+#include "pipeline/manifest/layered_file.h"
 #include "pipeline/plan/plan.h"
 #include "stages/data/buffer.h"
 #include "stages/data/status.h"
-#include "stages/write/file.h"
-#include "stages/write/leftovers.h"
-#include "stages/write/manifest/kept.h"
-#include "stages/write/manifest/layered_file.h"
-#include "stages/write/slice3mf/slice3mf.h"
-#include "stages/write/slice_format.h"
-#include "stages/write/sync.h"
+#include "stages/formats/slice_format.h"
+#include "stages/formats/threemf/slice3mf.h"
+#include "stages/support/io/file.h"
+#include "stages/support/io/leftovers.h"
+#include "stages/support/io/sync.h"
 
 namespace lamina::pipeline {
 

@@ -9,16 +9,16 @@
 
 #include "pipeline/job/decisions.h"
 #include "pipeline/job/heights.h"
+#include "pipeline/job/profiles/extruder.h"
 #include "pipeline/output/plan_head.h"
 #include "pipeline/plan/heights.h"
-#include "stages/data/text/json_text.h"
-#include "stages/data/text/readable.h"
-#include "stages/data/text/version.h"
+#include "stages/formats/rp3/rp3.h"
 #include "stages/heights/evaluate.h"
-#include "stages/read/profiles/extruder.h"
-#include "stages/write/file.h"
-#include "stages/write/replaceable.h"
-#include "stages/write/rp3/rp3.h"
+#include "stages/support/io/file.h"
+#include "stages/support/io/replaceable.h"
+#include "stages/support/text/json_text.h"
+#include "stages/support/text/readable.h"
+#include "stages/support/text/version.h"
 
 namespace lamina::pipeline {
 namespace {

@@ -7,11 +7,11 @@
 #include <optional>
 #include <string_view>
 
+#include "pipeline/manifest/layered_file.h"
 #include "pipeline/plan/plan.h"
 #include "stages/data/buffer.h"
 #include "stages/data/status.h"
-#include "stages/write/extrusion_format.h"
-#include "stages/write/manifest/layered_file.h"
+#include "stages/formats/extrusion_format.h"
 
 namespace lamina::pipeline {
 

@@ -7,9 +7,9 @@
 #include <utility>
 
 #include "stages/dose/saturate.h"
+#include "stages/formats/level_format.h"
+#include "stages/program/care/care_check.h"
 #include "stages/program/head_grid.h"
-#include "stages/write/levels/level_format.h"
-#include "stages/write/program/care_check.h"
 
 namespace lamina::pipeline {
 

@@ -6,8 +6,8 @@
 #include "pipeline/job/job.h"
 #include "pipeline/job/keys.h"
 #include "pipeline/plan/fill.h"
-#include "stages/data/text/ranges.h"
 #include "stages/infill/fill.h"
+#include "stages/support/text/ranges.h"
 
 namespace lamina::pipeline {
 namespace {

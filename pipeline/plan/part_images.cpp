@@ -6,9 +6,9 @@
 #include <cmath>
 #include <filesystem>
 
-#include "stages/data/text/number_text.h"
-#include "stages/data/text/readable.h"
-#include "stages/write/manifest/images_on_record.h"
+#include "pipeline/manifest/images_on_record.h"
+#include "stages/support/text/number_text.h"
+#include "stages/support/text/readable.h"
 
 namespace lamina::pipeline {
 namespace {

@@ -8,7 +8,7 @@
 #include "pipeline/plan/scene.h"
 #include "stages/arrange/placement.h"
 #include "stages/data/status.h"
-#include "stages/read/layer_images.h"
+#include "stages/formats/images/layer_images.h"
 
 namespace lamina::pipeline {
 

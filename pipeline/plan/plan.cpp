@@ -16,16 +16,16 @@
 #include "pipeline/plan/layers.h"
 #include "pipeline/plan/part_images.h"
 #include "pipeline/plan/reach.h"
-#include "stages/data/handles/clocks.h"
-#include "stages/data/text/number_text.h"
-#include "stages/data/text/readable.h"
+#include "stages/checks/records.h"
+#include "stages/formats/extrusion_format.h"
+#include "stages/formats/level_format.h"
+#include "stages/formats/slice_format.h"
 #include "stages/geometry/blocks/mesh_blocks.h"
 #include "stages/heights/build_steps.h"
 #include "stages/raster/beams.h"
-#include "stages/sanity/records.h"
-#include "stages/write/extrusion_format.h"
-#include "stages/write/levels/level_format.h"
-#include "stages/write/slice_format.h"
+#include "stages/support/clocks.h"
+#include "stages/support/text/number_text.h"
+#include "stages/support/text/readable.h"
 
 namespace lamina::pipeline {
 namespace {

@@ -11,9 +11,9 @@
 #include "pipeline/machine/powder_printer.h"
 #include "stages/data/mesh.h"
 #include "stages/data/status.h"
+#include "stages/formats/images/layer_images.h"
+#include "stages/formats/images/placed.h"
 #include "stages/load/load.h"
-#include "stages/read/layer_images.h"
-#include "stages/read/placed.h"
 
 namespace lamina::pipeline {
 

@@ -5,9 +5,9 @@
 #include "pipeline/job/keys.h"
 #include "pipeline/machine/extruder.h"
 #include "pipeline/plan/segment.h"
-#include "stages/data/text/number_text.h"
-#include "stages/data/text/ranges.h"
 #include "stages/segment/resolve.h"
+#include "stages/support/text/number_text.h"
+#include "stages/support/text/ranges.h"
 
 namespace lamina::pipeline {
 namespace {

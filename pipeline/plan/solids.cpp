@@ -6,8 +6,8 @@
 #include <string_view>
 #include <utility>
 
+#include "stages/formats/level_format.h"
 #include "stages/geometry/blocks/block_maker.h"
-#include "stages/write/levels/level_format.h"
 
 namespace lamina::pipeline {
 namespace {

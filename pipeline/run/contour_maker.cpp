@@ -7,9 +7,9 @@
 
 #include "pipeline/output/slice_files.h"
 #include "pipeline/run/path_layer.h"
-#include "stages/data/text/number_text.h"
-#include "stages/data/text/readable.h"
-#include "stages/sanity/paths.h"
+#include "stages/checks/paths.h"
+#include "stages/support/text/number_text.h"
+#include "stages/support/text/readable.h"
 
 namespace lamina::pipeline {
 namespace {

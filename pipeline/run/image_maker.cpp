@@ -10,16 +10,16 @@
 #include "pipeline/run/inspector.h"
 #include "pipeline/run/job_cost.h"
 #include "pipeline/run/powders.h"
+#include "stages/checks/records.h"
+#include "stages/checks/rows.h"
 #include "stages/cost/powder_drops.h"
-#include "stages/data/text/number_text.h"
-#include "stages/data/text/readable.h"
 #include "stages/dose/share_count.h"
 #include "stages/geometry/isa.h"
 #include "stages/program/explain.h"
 #include "stages/program/vats.h"
 #include "stages/replay/time/totals.h"
-#include "stages/sanity/records.h"
-#include "stages/sanity/rows.h"
+#include "stages/support/text/number_text.h"
+#include "stages/support/text/readable.h"
 
 namespace lamina::pipeline {
 namespace {

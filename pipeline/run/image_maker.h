@@ -10,9 +10,9 @@
 #include "pipeline/plan/plan.h"
 #include "pipeline/run/maker.h"
 #include "pipeline/run/sanity.h"
+#include "stages/checks/vanished.h"
 #include "stages/coverage/coverage.h"
 #include "stages/data/runs.h"
-#include "stages/inspect/vanished.h"
 #include "stages/raster/materials.h"
 #include "stages/raster/raster.h"
 

@@ -5,8 +5,8 @@
 #include <nlohmann/json.hpp>
 #include <numbers>
 
-#include "stages/data/text/readable.h"
-#include "stages/write/manifest/inspection_file.h"
+#include "pipeline/manifest/inspection_file.h"
+#include "stages/support/text/readable.h"
 
 namespace lamina::pipeline {
 namespace {

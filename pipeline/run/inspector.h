@@ -1,14 +1,14 @@
-// pipeline/run/inspector.h: looks through the layers of a powder job on request (stages/inspect/).
+// pipeline/run/inspector.h: looks through the layers of a powder job on request (stages/checks/).
 #pragma once
 
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "pipeline/manifest/manifest.h"
 #include "pipeline/plan/plan.h"
 #include "pipeline/run/summary.h"
-#include "stages/inspect/inspect.h"
-#include "stages/write/manifest/manifest.h"
+#include "stages/checks/inspect.h"
 
 namespace lamina::pipeline {
 

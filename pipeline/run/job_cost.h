@@ -3,11 +3,11 @@
 
 #include <optional>
 
+#include "pipeline/manifest/manifest.h"
 #include "pipeline/plan/plan.h"
 #include "stages/cost/account.h"
 #include "stages/cost/part_pixels.h"
 #include "stages/cost/powder_drops.h"
-#include "stages/write/manifest/manifest.h"
 
 namespace lamina::pipeline {
 

@@ -6,9 +6,9 @@
 
 #include "pipeline/run/image_maker.h"
 #include "stages/dose/edges/dilate.h"
+#include "stages/formats/level_format.h"
 #include "stages/geometry/combine.h"
 #include "stages/program/reach.h"
-#include "stages/write/levels/level_format.h"
 
 namespace lamina::pipeline {
 

@@ -4,10 +4,10 @@
 #include <algorithm>
 
 #include "pipeline/run/image_maker.h"
+#include "stages/formats/images/placed.h"
 #include "stages/geometry/combine.h"
 #include "stages/program/reach.h"
 #include "stages/raster/mirror.h"
-#include "stages/read/placed.h"
 
 namespace lamina::pipeline {
 namespace {

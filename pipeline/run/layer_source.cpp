@@ -10,7 +10,7 @@
 #include "pipeline/plan/layers.h"
 #include "pipeline/run/image_maker.h"
 #include "stages/load/load.h"
-#include "stages/write/file.h"
+#include "stages/support/io/file.h"
 
 namespace lamina::pipeline {
 namespace {

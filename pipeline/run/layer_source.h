@@ -16,7 +16,7 @@
 #include "stages/data/mesh.h"
 #include "stages/data/runs.h"
 #include "stages/data/status.h"
-#include "stages/write/image_format.h"
+#include "stages/formats/image_format.h"
 
 namespace lamina::pipeline {
 

@@ -10,9 +10,9 @@
 #include <vector>
 
 #include "pipeline/flow/layers.h"
+#include "pipeline/manifest/record.h"
 #include "pipeline/run/summary.h"
 #include "stages/data/status.h"
-#include "stages/write/manifest/record.h"
 
 namespace lamina::pipeline {
 

@@ -7,11 +7,11 @@
 
 #include "pipeline/output/toolpath_file.h"
 #include "pipeline/run/path_layer.h"
-#include "stages/data/text/number_text.h"
-#include "stages/data/text/readable.h"
-#include "stages/sanity/paths.h"
+#include "stages/checks/paths.h"
+#include "stages/formats/gcode/write_gcode.h"
 #include "stages/segment/laid/told.h"
-#include "stages/write/gcode/gcode.h"
+#include "stages/support/text/number_text.h"
+#include "stages/support/text/readable.h"
 
 namespace lamina::pipeline {
 namespace {

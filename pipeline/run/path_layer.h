@@ -5,12 +5,12 @@
 #include <functional>
 #include <string>
 
+#include "pipeline/manifest/record.h"
 #include "pipeline/plan/plan.h"
 #include "pipeline/run/summary.h"
 #include "stages/data/buffer.h"
 #include "stages/data/status.h"
-#include "stages/write/extrusion_format.h"
-#include "stages/write/manifest/record.h"
+#include "stages/formats/extrusion_format.h"
 
 namespace lamina::pipeline {
 

@@ -8,8 +8,8 @@
 #include <atomic>
 
 #include "pipeline/plan/heights.h"
+#include "stages/checks/mixed.h"
 #include "stages/program/vats.h"
-#include "stages/sanity/mixed.h"
 
 namespace lamina::pipeline {
 namespace {

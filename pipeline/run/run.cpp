@@ -19,7 +19,7 @@
 #include "pipeline/run/run_resolved.h"
 #include "pipeline/run/sanity.h"
 #include "pipeline/run/timing.h"
-#include "stages/sanity/records.h"
+#include "stages/checks/records.h"
 
 namespace lamina::pipeline {
 namespace {

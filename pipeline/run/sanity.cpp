@@ -5,11 +5,11 @@
 #include <algorithm>
 
 #include "pipeline/plan/heights.h"
-#include "stages/data/text/readable.h"
+#include "stages/checks/crossed.h"
 #include "stages/load/info/planned.h"
-#include "stages/sanity/crossed.h"
 #include "stages/slice/bodies.h"
 #include "stages/slice/surplus.h"
+#include "stages/support/text/readable.h"
 
 namespace lamina::pipeline {
 namespace {

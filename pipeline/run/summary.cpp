@@ -5,8 +5,8 @@
 #include <nlohmann/json.hpp>
 
 #include "pipeline/run/timing.h"
-#include "stages/data/text/json_text.h"
-#include "stages/data/text/readable.h"
+#include "stages/support/text/json_text.h"
+#include "stages/support/text/readable.h"
 
 namespace lamina::pipeline {
 namespace {

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
-#include "stages/data/text/readable.h"
+#include "stages/support/text/readable.h"
 
 namespace lamina::pipeline {
 Elapsed Timing::whole() const {

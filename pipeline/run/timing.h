@@ -8,8 +8,8 @@
 #include <utility>
 #include <vector>
 
-#include "stages/data/handles/clocks.h"
-#include "stages/write/null/floor.h"
+#include "stages/formats/null/floor.h"
+#include "stages/support/clocks.h"
 
 namespace lamina::pipeline {
 

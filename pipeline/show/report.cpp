@@ -13,14 +13,14 @@
 #include "pipeline/run/job_cost.h"
 #include "pipeline/show/report_cast.h"
 #include "pipeline/show/report_doubts.h"
+#include "pipeline/show/report_head.h"
+#include "pipeline/show/report_places.h"
 #include "pipeline/show/report_source.h"
-#include "stages/data/input/hash.h"
 #include "stages/geometry/coverage.h"
+#include "stages/support/hash/hash.h"
 #include "stages/view/depth.h"
-#include "stages/write/report/head.h"
-#include "stages/write/report/page.h"
-#include "stages/write/report/places.h"
-#include "stages/write/report/run_code.h"
+#include "stages/view/report/page.h"
+#include "stages/view/report/run_code.h"
 
 namespace lamina::pipeline {
 namespace {

@@ -6,9 +6,9 @@
 #include <memory>
 #include <vector>
 
+#include "pipeline/manifest/manifest.h"
 #include "pipeline/plan/plan.h"
 #include "pipeline/run/image_maker.h"
-#include "stages/write/manifest/manifest.h"
 
 namespace lamina::pipeline {
 

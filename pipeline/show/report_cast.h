@@ -7,10 +7,10 @@
 #include <vector>
 
 #include "pipeline/job/job.h"
+#include "pipeline/manifest/manifest.h"
 #include "pipeline/plan/scene.h"
 #include "stages/data/status.h"
 #include "stages/view/cast.h"
-#include "stages/write/manifest/manifest.h"
 
 namespace lamina::pipeline {
 

@@ -5,11 +5,11 @@
 #include "pipeline/plan/dose.h"
 #include "pipeline/plan/heights.h"
 #include "pipeline/run/sanity.h"
+#include "stages/checks/crossed.h"
+#include "stages/checks/paths.h"
+#include "stages/checks/records.h"
 #include "stages/heights/build_steps.h"
 #include "stages/program/head_grid.h"
-#include "stages/sanity/crossed.h"
-#include "stages/sanity/paths.h"
-#include "stages/sanity/records.h"
 
 namespace lamina::pipeline {
 namespace {

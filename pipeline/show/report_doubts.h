@@ -7,12 +7,12 @@
 #include <vector>
 
 #include "pipeline/job/job.h"
+#include "pipeline/manifest/manifest.h"
 #include "pipeline/plan/scene.h"
 #include "pipeline/show/report_bleed.h"
+#include "stages/checks/tally.h"
 #include "stages/data/runs.h"
 #include "stages/data/status.h"
-#include "stages/sanity/tally.h"
-#include "stages/write/manifest/manifest.h"
 
 namespace lamina::pipeline {
 

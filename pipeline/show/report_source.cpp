@@ -8,9 +8,9 @@
 #include <span>
 
 #include "pipeline/check/job_files.h"
-#include "stages/data/input/hash.h"
+#include "stages/formats/gcode/read_gcode.h"
 #include "stages/raster/beads.h"
-#include "stages/read/gcode.h"
+#include "stages/support/hash/hash.h"
 
 namespace lamina::pipeline {
 namespace {

@@ -6,11 +6,11 @@
 #include <optional>
 #include <string>
 
+#include "pipeline/manifest/manifest.h"
 #include "stages/data/grid.h"
 #include "stages/data/machine.h"
 #include "stages/data/runs.h"
 #include "stages/data/status.h"
-#include "stages/write/manifest/manifest.h"
 
 namespace lamina::pipeline {
 

@@ -6,10 +6,10 @@
 #include <memory>
 
 #include "pipeline/job/file.h"
+#include "pipeline/manifest/manifest.h"
 #include "pipeline/plan/plan.h"
 #include "stages/geometry/clipping.h"
 #include "stages/view/bead_shapes.h"
-#include "stages/write/manifest/manifest.h"
 
 namespace lamina::pipeline {
 namespace {

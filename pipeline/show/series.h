@@ -4,7 +4,7 @@
 #include <string>
 
 #include "stages/data/status.h"
-#include "stages/read/gcode.h"
+#include "stages/formats/gcode/read_gcode.h"
 #include "stages/view/shapes.h"
 
 namespace lamina::pipeline {

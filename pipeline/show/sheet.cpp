@@ -6,15 +6,15 @@
 #include <filesystem>
 #include <numeric>
 
+#include "pipeline/manifest/manifest.h"
 #include "pipeline/show/series.h"
 #include "pipeline/show/swath.h"
-#include "stages/data/text/readable.h"
-#include "stages/read/image.h"
-#include "stages/write/manifest/manifest.h"
-#include "stages/write/picture/canvas.h"  // have_font
-#include "stages/write/picture/contact_sheet.h"
-#include "stages/write/picture/plan_view.h"
-#include "stages/write/svg/drawing.h"
+#include "stages/formats/images/image.h"
+#include "stages/formats/svg/drawing.h"
+#include "stages/support/text/readable.h"
+#include "stages/view/picture/canvas.h"  // have_font
+#include "stages/view/picture/contact_sheet.h"
+#include "stages/view/picture/plan_view.h"
 
 namespace lamina::pipeline {
 namespace {

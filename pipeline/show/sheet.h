@@ -8,7 +8,7 @@
 
 #include "stages/data/buffer.h"
 #include "stages/data/status.h"
-#include "stages/read/gcode.h"
+#include "stages/formats/gcode/read_gcode.h"
 #include "stages/view/choice.h"
 
 namespace lamina::pipeline {

@@ -7,7 +7,7 @@
 
 #include "pipeline/check/job_files.h"
 #include "stages/geometry/combine.h"
-#include "stages/write/picture/swath_view.h"
+#include "stages/view/picture/swath_view.h"
 
 namespace lamina::pipeline {
 

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <string_view>
 
-#include "stages/data/text/readable.h"
+#include "stages/support/text/readable.h"
 
 namespace lamina::cost {
 namespace {

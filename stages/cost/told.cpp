@@ -4,7 +4,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "stages/data/text/readable.h"
+#include "stages/support/text/readable.h"
 
 namespace lamina::cost {
 namespace {

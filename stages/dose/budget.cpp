@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <iterator>
 
-#include "stages/data/text/number_text.h"
-#include "stages/data/text/readable.h"
+#include "stages/support/text/number_text.h"
+#include "stages/support/text/readable.h"
 
 namespace lamina::dose {
 namespace {

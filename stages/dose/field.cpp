@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "stages/data/text/number_text.h"
+#include "stages/support/text/number_text.h"
 
 namespace lamina::dose {
 namespace {

@@ -15,9 +15,9 @@
 #include "stages/data/grid.h"
 #include "stages/data/layer.h"
 #include "stages/data/status.h"
-#include "stages/data/text/formula.h"
 #include "stages/dose/saturation.h"
 #include "stages/dose/stretches.h"
+#include "stages/support/text/formula.h"
 
 namespace lamina::dose {
 

@@ -2,10 +2,10 @@
 
 #include <fmt/format.h>
 
-#include "stages/data/text/number_text.h"
 #include "stages/heights/greedy.h"
 #include "stages/heights/ladder.h"
 #include "stages/heights/optimal.h"
+#include "stages/support/text/number_text.h"
 
 namespace lamina::heights {
 

@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "stages/data/text/number_text.h"
-#include "stages/data/text/value.h"
+#include "stages/support/text/number_text.h"
+#include "stages/support/text/value.h"
 
 namespace lamina::heights {
 namespace {

@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "stages/data/status.h"
-#include "stages/data/text/formula.h"
+#include "stages/support/text/formula.h"
 
 namespace lamina::infill {
 
@@ -16,7 +16,7 @@ namespace lamina::infill {
 ///   i  number of the line before the gap                    s  mm, its distance from the part's side, across the lines
 ///   u  the same as a share of the part's extent, 0 .. 1
 /// (s and u of what lies outside of the part are those of its nearer side)
-/// with what a Formula has (stages/data/text/formula.h). Not shared between threads.
+/// with what a Formula has (stages/support/text/formula.h). Not shared between threads.
 class Expression {
  public:
   struct Variables {

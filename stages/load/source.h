@@ -6,8 +6,8 @@
 #include <string>
 
 #include "stages/data/buffer.h"
-#include "stages/data/input/file_reader.h"
 #include "stages/data/status.h"
+#include "stages/support/io/file_reader.h"
 
 namespace lamina::load {
 

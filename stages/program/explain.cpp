@@ -4,8 +4,8 @@
 
 #include <cmath>
 
-#include "stages/data/text/readable.h"
 #include "stages/data/units.h"
+#include "stages/support/text/readable.h"
 
 namespace lamina::program {
 namespace {

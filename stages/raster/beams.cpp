@@ -7,8 +7,8 @@
 #include <limits>
 #include <vector>
 
-#include "stages/data/handles/embree.h"
 #include "stages/raster/height_runs.h"
+#include "stages/support/late/embree.h"
 
 namespace lamina::raster {
 namespace {

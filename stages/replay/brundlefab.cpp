@@ -1,5 +1,5 @@
 // A layer's program as the BrundleFab's firmware carries it out (github.com/ezrec/BrundleFab-firmware at 96cc39e), with its
-// printhead's (BrundleFab-printhead at a2da357). stages/write/program/brundlefab/README.md tells the format.
+// printhead's (BrundleFab-printhead at a2da357). stages/program/brundlefab/README.md tells the format.
 //
 // Commands of motion and tools wait until all axes and the bar stand (GCode::update), so that each is carried out alone;
 // within one command all axes move at a time (CNC::target_set).

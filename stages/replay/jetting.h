@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "stages/data/grid.h"
+#include "stages/data/jetting.h"
 #include "stages/data/levels.h"
-#include "stages/data/picture/jetting.h"
 #include "stages/data/status.h"
 #include "stages/replay/machine.h"
 

@@ -1,4 +1,4 @@
-// stages/write/program/nuferbj/README.md tells the format.
+// stages/program/nuferbj/README.md tells the format.
 #include <fmt/format.h>
 
 #include <algorithm>

@@ -1,4 +1,4 @@
-// stages/write/program/planes/README.md tells the format.
+// stages/program/planes/README.md tells the format.
 #include <array>
 #include <optional>
 #include <vector>

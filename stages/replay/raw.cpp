@@ -1,4 +1,4 @@
-// stages/write/program/raw/README.md tells the format.
+// stages/program/raw/README.md tells the format.
 #include "stages/replay/bytes.h"
 #include "stages/replay/care/records.h"
 #include "stages/replay/dialects.h"

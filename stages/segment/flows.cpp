@@ -4,10 +4,10 @@
 
 #include <algorithm>
 
-#include "stages/data/input/file_reader.h"
-#include "stages/data/picture/ticks.h"
-#include "stages/data/text/number_text.h"
-#include "stages/data/text/table.h"
+#include "stages/data/ticks.h"
+#include "stages/support/io/file_reader.h"
+#include "stages/support/text/number_text.h"
+#include "stages/support/text/table.h"
 
 namespace lamina::segment {
 namespace {

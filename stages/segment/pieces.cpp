@@ -4,8 +4,8 @@
 
 #include <cmath>
 
-#include "stages/data/text/number_text.h"
 #include "stages/segment/measured.h"
+#include "stages/support/text/number_text.h"
 
 namespace lamina::segment {
 namespace {

@@ -4,11 +4,11 @@
 
 #include <algorithm>
 
-#include "stages/data/input/file_reader.h"
-#include "stages/data/text/names.h"
-#include "stages/data/text/readable.h"
-#include "stages/data/text/table.h"
-#include "stages/data/text/value.h"
+#include "stages/support/io/file_reader.h"
+#include "stages/support/text/names.h"
+#include "stages/support/text/readable.h"
+#include "stages/support/text/table.h"
+#include "stages/support/text/value.h"
 
 namespace lamina::segment {
 namespace {

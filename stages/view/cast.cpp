@@ -8,7 +8,7 @@
 #include <cmath>
 #include <limits>
 
-#include "stages/data/handles/embree.h"
+#include "stages/support/late/embree.h"
 
 namespace lamina::view {
 namespace {

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "stages/data/picture/ticks.h"
+#include "stages/data/ticks.h"
 #include "stages/view/colour_scale.h"
 
 namespace lamina::view {

@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "stages/data/contours.h"  // points
-#include "stages/data/picture/plane.h"
-#include "stages/data/picture/plot.h"
+#include "stages/data/plane.h"
+#include "stages/data/plot.h"
 #include "stages/data/voxels.h"
 
 namespace lamina::view {

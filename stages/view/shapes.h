@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "stages/data/picture/layer_shapes.h"
+#include "stages/data/layer_shapes.h"
 #include "stages/data/status.h"
 #include "stages/data/toolpaths.h"
 

@@ -8,9 +8,9 @@
 #include <sstream>
 
 #include "pipeline/cli/command.h"
+#include "pipeline/cli/terminal/pages.h"
 #include "pipeline/machine/profiles.h"
-#include "stages/data/text/number_text.h"
-#include "stages/terminal/pages.h"
+#include "stages/support/text/number_text.h"
 #include "tests/commands/program.h"
 
 namespace lamina::test {

@@ -4,7 +4,7 @@
 
 #include <functional>
 
-#include "stages/write/manifest/manifest.h"
+#include "pipeline/manifest/manifest.h"
 #include "tests/commands/program.h"
 
 namespace lamina::test {

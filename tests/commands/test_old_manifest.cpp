@@ -3,7 +3,7 @@
 // 418be7f and this version, without the keys that came after it: they go on.
 #include <gtest/gtest.h>
 
-#include "stages/data/text/version.h"
+#include "stages/support/text/version.h"
 #include "tests/commands/program.h"
 
 namespace lamina::test {

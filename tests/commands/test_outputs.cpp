@@ -44,7 +44,7 @@ TEST_F(Outputs, WhatACallReadsIsNeverReplaced) {
   // A toolpath file of SML has its layer table beside it, under its own name but for the ending.
   fs::create_directory(directory_ / "sml");
   fs::copy(directory_ / "part.stl", directory_ / "sml/part.rp3");
-  fs::copy(fs::path(LAMINA_TEST_DIR) / "../stages/write/machines/extrusion/fdm-2000.toml", directory_ / "sml/printer.rp3");
+  fs::copy(fs::path(LAMINA_TEST_DIR) / "../pipeline/machine/shipped/extruders/fdm-2000.toml", directory_ / "sml/printer.rp3");
   write_text(directory_ / "sml/job.rp3", "[layers]\nthickness_mm = 0.254\n[[part]]\npath = \"../part.stl\"\n");
   write_text(directory_ / "sml/named.toml", "[machine]\nprofile = \"printer.rp3\"\n[[part]]\npath = \"../part.stl\"\n");
   fs::create_directory(directory_ / "farm");

@@ -10,8 +10,9 @@
 #include <numbers>
 #include <random>
 
-#include "stages/read/image.h"
-#include "stages/write/report/run_code.h"
+#include "stages/formats/images/image.h"
+#include "stages/support/text/base64.h"
+#include "stages/view/report/run_code.h"
 #include "tests/commands/program.h"
 #include "tests/commands/unpack_runs.h"
 
@@ -72,7 +73,7 @@ TEST(RunCode, GivesTheRunsBackAndRefusesWhatIsNone) {
 }
 
 TEST(RunCode, Base64IsThatOfRfc4648) {
-  const auto text = [](std::string_view bytes) { return write::report::base64(std::as_bytes(std::span(bytes))); };
+  const auto text = [](std::string_view bytes) { return lamina::base64(std::as_bytes(std::span(bytes))); };
   EXPECT_EQ(text(""), "");
   EXPECT_EQ(text("f"), "Zg==");
   EXPECT_EQ(text("fo"), "Zm8=");

@@ -8,7 +8,6 @@
 #include <string>
 #include <vector>
 
-#include "stages/data/input/hash.h"
 #include "stages/dose/blue_noise.h"
 #include "stages/dose/budget.h"
 #include "stages/dose/dither.h"
@@ -16,6 +15,7 @@
 #include "stages/dose/shares.h"
 #include "stages/dose/stretches.h"
 #include "stages/dose/wish.h"
+#include "stages/support/hash/hash.h"
 #include "tests/program/machines.h"
 
 namespace lamina::dose {

@@ -1,5 +1,5 @@
 // Charts of powder printers, as lamina calibrate writes them.
-#include "stages/data/picture/chart.h"
+#include "stages/calibration/chart/chart.h"
 
 #include <algorithm>
 
@@ -76,7 +76,8 @@ std::vector<std::string> chart_seeds() {
   return seeds;
 }
 
-const Registered kChart({"chart", read_one, chart_seeds, "stages/data/picture/chart stages/data/text", "", "chart.dict", 4096});
+const Registered kChart({"chart", read_one, chart_seeds, "stages/calibration/chart/chart stages/support/text", "", "chart.dict",
+                         4096});
 
 }  // namespace
 }  // namespace lamina::fuzz

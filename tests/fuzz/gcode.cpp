@@ -1,5 +1,5 @@
 // G-code of extrusion printers, by whatever slicer.
-#include "stages/read/gcode.h"
+#include "stages/formats/gcode/read_gcode.h"
 
 #include "tests/fuzz/laws.h"
 
@@ -47,7 +47,8 @@ std::vector<std::string> gcode_seeds() {
       "G3 X9 Y9 I5 J5 E3\n;CURA_PROFILE_STRING:eJzLSaxMLYrPSM1MzyixNdAz5ChPzMmJL8nITM7OSy0uBgpZcOTll8SnZeYk5qbmlcSnZALpktQiW0sOTDEjPQtTTGEjWwOexBwgIy+xJLMsFQB98Sn4\n"};
 }
 
-const Registered kGcode({"gcode", read_gcode, gcode_seeds, "stages/read/gcode stages/data/text", ".gcode", "gcode.dict", 2048});
+const Registered kGcode({"gcode", read_gcode, gcode_seeds, "stages/formats/gcode/read_gcode stages/support/text", ".gcode",
+                         "gcode.dict", 2048});
 
 }  // namespace
 }  // namespace lamina::fuzz

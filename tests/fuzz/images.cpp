@@ -1,5 +1,5 @@
 // Layer images: TIFF, PNG, BMP, PBM, PGM, of 1 bit and grey, and Group 4 alone.
-#include "stages/read/image.h"
+#include "stages/formats/images/image.h"
 
 #include <unistd.h>
 #include <zlib.h>
@@ -8,12 +8,12 @@
 #include <cstdio>
 #include <cstring>
 
-#include "stages/data/handles/tiff.h"
+#include "stages/formats/g4/decode.h"
+#include "stages/formats/image_format.h"
+#include "stages/formats/images/stack_info.h"
+#include "stages/formats/level_format.h"
 #include "stages/geometry/bits.h"
-#include "stages/read/g4.h"
-#include "stages/read/stack_info.h"
-#include "stages/write/image_format.h"
-#include "stages/write/levels/level_format.h"
+#include "stages/support/late/tiff.h"
 #include "tests/fuzz/laws.h"
 #include "tests/program/machines.h"
 
@@ -249,13 +249,13 @@ std::size_t mutate_png(std::uint8_t* bytes, std::size_t size, std::size_t, std::
 }
 
 constexpr std::string_view kImageSources =
-    "stages/read/image stages/read/tiff stages/read/g4 stages/read/png stages/read/pbm stages/read/bmp stages/geometry/bits";
+    "stages/formats/images/image stages/formats/tiff/read_tiff stages/formats/g4/decode stages/formats/png/read_png stages/formats/pbm/read_pbm stages/formats/bmp/read_bmp stages/geometry/bits";
 constexpr std::string_view kGreySources =
-    "stages/read/image stages/read/grey stages/read/tiff stages/read/png stages/read/pbm stages/read/bmp stages/geometry/bits";
+    "stages/formats/images/image stages/formats/images/grey stages/formats/tiff/read_tiff stages/formats/png/read_png stages/formats/pbm/read_pbm stages/formats/bmp/read_bmp stages/geometry/bits";
 const Registered kTiff({"image_tiff", read_image, tiff_seeds, kImageSources, ".tif", "tiff.dict", 1024});
 const Registered kPng({"image_png", read_image, png_seeds, kImageSources, ".png", "png.dict", 1024, mutate_png});
 const Registered kGrey({"image_grey", read_grey, grey_seeds, kGreySources, ".tif .png .bmp .pgm", "tiff.dict", 1024});
-const Registered kG4({"image_g4", read_g4, g4_seeds, "stages/read/g4 stages/geometry/t6", {}, {}, 512});
+const Registered kG4({"image_g4", read_g4, g4_seeds, "stages/formats/g4/decode stages/geometry/t6", {}, {}, 512});
 const Registered kBmp({"image_bmp", read_image, bmp_seeds, kImageSources, ".bmp", {}, 512});
 const Registered kPbm({"image_pbm", read_image, pbm_seeds, kImageSources, ".pbm", {}, 512});
 

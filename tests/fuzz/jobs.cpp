@@ -81,7 +81,7 @@ std::vector<std::string> key_seeds() {
       "heights.thickness_mm=0.05..0.3:0.01\nrun.memory=1.5G\nrun.layers=2:10"};
 }
 
-constexpr std::string_view kJobSources = "pipeline/job stages/data/text stages/read/profiles";
+constexpr std::string_view kJobSources = "pipeline/job stages/support/text pipeline/job/profiles";
 const Registered kJob({"job", read_job, job_seeds, kJobSources, ".toml", "toml.dict", 4096});
 const Registered kKeys({"keys", set_keys, key_seeds, kJobSources, "", "toml.dict", 1024});
 

@@ -3,8 +3,8 @@
 
 #include <cstring>
 
+#include "stages/formats/stl/block.h"
 #include "stages/load/load.h"
-#include "stages/write/stl/block.h"
 #include "tests/fuzz/laws.h"
 #include "tests/load/archives.h"
 

@@ -1,7 +1,7 @@
 // Profiles of powder printers and of extrusion printers.
 #include "pipeline/machine/profiles.h"
+#include "pipeline/job/profiles/changes.h"
 #include "pipeline/machine/powder_printer.h"
-#include "stages/read/profiles/changes.h"
 #include "tests/fuzz/laws.h"
 
 namespace lamina::fuzz {
@@ -59,7 +59,8 @@ std::vector<std::string> extruder_seeds() {
 
 std::vector<std::string> change_seeds() { return {"fan.from_layer=2; bed.corner_mm=-110,-110", "material.flow=0.85"}; }
 
-constexpr std::string_view kProfileSources = "stages/read/profiles stages/data/text pipeline/machine stages/program/head_grid";
+constexpr std::string_view kProfileSources =
+    "pipeline/job/profiles stages/support/text pipeline/machine stages/program/head_grid";
 const Registered kMachine({"machine", read_machine, machine_seeds, kProfileSources, ".toml", "toml.dict", 8192});
 const Registered kExtruder({"extruder", read_extruder, extruder_seeds, kProfileSources, ".toml", "toml.dict", 8192});
 const Registered kChanges({"profile_changes", read_changes, change_seeds, kProfileSources, "", "toml.dict", 512});

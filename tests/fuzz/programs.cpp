@@ -4,8 +4,8 @@
 #include "pipeline/machine/powder_printer.h"
 #include "pipeline/machine/profiles.h"
 #include "stages/program/compile.h"
+#include "stages/program/dialect.h"
 #include "stages/replay/machine.h"
-#include "stages/write/program/dialect.h"
 #include "tests/fuzz/laws.h"
 #include "tests/program/machines.h"
 

@@ -92,11 +92,13 @@ std::vector<std::string> flow_seeds() {
           "velocity_m_s\tdrop_kpa\n0.1\t1\n0.2\t2.5\n0.3\t4.5\n"};
 }
 
-const Registered kHeights({"table_heights", read_heights, height_seeds, "stages/heights/study stages/data/text", "", {}, 512});
+const Registered kHeights(
+    {"table_heights", read_heights, height_seeds, "stages/heights/study stages/support/text", "", {}, 512});
 const Registered kWidths({"table_widths", read_widths, width_seeds,
-                          "stages/segment/widths_table stages/segment/measured stages/data/text", ".csv", "tables.dict", 1024});
+                          "stages/segment/widths_table stages/segment/measured stages/support/text", ".csv", "tables.dict",
+                          1024});
 const Registered kFlows({"table_flows", read_flows, flow_seeds,
-                         "stages/segment/flows stages/segment/permeability stages/segment/samples stages/data/text", ".csv",
+                         "stages/segment/flows stages/segment/permeability stages/segment/samples stages/support/text", ".csv",
                          "tables.dict", 1024});
 
 }  // namespace

@@ -2,13 +2,13 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "stages/data/text/json_text.h"
-#include "stages/data/text/number_text.h"
-#include "stages/data/text/readable.h"
-#include "stages/data/text/shell_words.h"
-#include "stages/data/text/toml.h"
 #include "stages/heights/thickness_set.h"
 #include "stages/infill/expression.h"
+#include "stages/support/text/json_text.h"
+#include "stages/support/text/number_text.h"
+#include "stages/support/text/readable.h"
+#include "stages/support/text/shell_words.h"
+#include "stages/support/text/toml.h"
 #include "tests/fuzz/laws.h"
 
 namespace lamina::fuzz {
@@ -93,8 +93,8 @@ std::vector<std::string> tree_seeds() {
 }
 
 const Registered kFormula({"formula", evaluate, formula_seeds, "stages/infill/expression", "", "formula.dict", 256});
-const Registered kTexts({"texts", read_texts, text_seeds, "stages/data/text stages/heights/thickness_set", "", {}, 256});
-const Registered kTree({"toml", read_tree, tree_seeds, "stages/data/text/toml", ".toml", "toml.dict", 2048});
+const Registered kTexts({"texts", read_texts, text_seeds, "stages/support/text stages/heights/thickness_set", "", {}, 256});
+const Registered kTree({"toml", read_tree, tree_seeds, "stages/support/text/toml", ".toml", "toml.dict", 2048});
 
 }  // namespace
 }  // namespace lamina::fuzz

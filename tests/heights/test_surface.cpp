@@ -7,10 +7,10 @@
 #include <random>
 #include <sstream>
 
+#include "stages/formats/rp3/rp3.h"
 #include "stages/heights/ladder.h"
 #include "stages/heights/per_part.h"
 #include "stages/heights/steepest.h"
-#include "stages/write/rp3/rp3.h"
 #include "tests/heights/surfaces.h"
 
 namespace lamina::heights {

@@ -7,8 +7,8 @@
 #include <random>
 
 #include "stages/data/levels.h"
-#include "stages/write/levels/level_format.h"
-#include "tests/write/images.h"
+#include "stages/formats/level_format.h"
+#include "tests/formats/images.h"
 
 namespace lamina::write {
 namespace {

@@ -4,8 +4,8 @@
 #include <numeric>
 
 #include "stages/program/compile.h"
+#include "stages/program/dialect.h"
 #include "stages/program/explain.h"
-#include "stages/write/program/dialect.h"
 #include "tests/program/machines.h"
 
 namespace lamina::program {

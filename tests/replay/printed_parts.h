@@ -12,9 +12,9 @@
 #include "pipeline/machine/profiles.h"
 #include "stages/load/load.h"
 #include "stages/program/compile.h"
+#include "stages/program/dialect.h"
 #include "stages/raster/raster.h"
 #include "stages/replay/machine.h"
-#include "stages/write/program/dialect.h"
 
 namespace lamina::printed_parts {
 

@@ -7,16 +7,16 @@
 #include <string>
 #include <vector>
 
+#include "pipeline/job/profiles/printer.h"
 #include "pipeline/machine/powder_printer.h"
 #include "pipeline/machine/profiles.h"
 #include "stages/data/layer.h"
 #include "stages/data/machine.h"
 #include "stages/data/program.h"
 #include "stages/data/runs.h"
-#include "stages/read/profiles/printer.h"
+#include "stages/program/dialect.h"
 #include "stages/replay/feeding.h"
 #include "stages/replay/machine.h"
-#include "stages/write/program/dialect.h"
 #include "tests/program/machines.h"
 #include "tests/replay/care_bench.h"
 #include "tests/replay/printed_parts.h"

@@ -4,7 +4,7 @@
 
 #include <functional>
 
-#include "stages/write/program/program_text.h"
+#include "stages/program/program_text.h"
 #include "tests/program/machines.h"
 #include "tests/replay/printed_parts.h"
 

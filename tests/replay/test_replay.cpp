@@ -13,8 +13,8 @@
 #include "pipeline/machine/profiles.h"
 #include "stages/load/load.h"
 #include "stages/program/compile.h"
+#include "stages/program/dialect.h"
 #include "stages/raster/raster.h"
-#include "stages/write/program/dialect.h"
 #include "tests/program/machines.h"
 #include "tests/replay/printed_parts.h"
 

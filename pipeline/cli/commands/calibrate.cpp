@@ -5,9 +5,9 @@
 #include "pipeline/cli/command.h"
 #include "pipeline/cli/commands/calibrate_powder.h"
 #include "pipeline/cli/console.h"
-#include "stages/data/text/json.h"
-#include "stages/data/text/readable.h"
-#include "stages/write/file.h"
+#include "stages/support/io/file.h"
+#include "stages/support/text/json.h"
+#include "stages/support/text/readable.h"
 
 namespace lamina::pipeline {
 namespace {

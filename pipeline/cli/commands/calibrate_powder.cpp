@@ -6,13 +6,13 @@
 #include "pipeline/cli/console.h"
 #include "pipeline/cli/scan_program.h"
 #include "pipeline/machine/profiles.h"
-#include "stages/chart/draw.h"
-#include "stages/chart/measured.h"
-#include "stages/data/input/file_reader.h"
-#include "stages/data/text/json.h"
-#include "stages/data/text/readable.h"
-#include "stages/write/file.h"
-#include "stages/write/replaceable.h"
+#include "stages/calibration/chart/draw.h"
+#include "stages/calibration/chart/measured.h"
+#include "stages/support/io/file.h"
+#include "stages/support/io/file_reader.h"
+#include "stages/support/io/replaceable.h"
+#include "stages/support/text/json.h"
+#include "stages/support/text/readable.h"
 
 namespace lamina::pipeline {
 namespace {

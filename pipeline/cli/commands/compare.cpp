@@ -4,10 +4,10 @@
 #include "pipeline/cli/command.h"
 #include "pipeline/cli/scan_program.h"
 #include "pipeline/machine/profiles.h"
-#include "stages/data/text/json.h"
+#include "pipeline/manifest/images_on_record.h"
 #include "stages/data/units.h"
-#include "stages/read/image.h"
-#include "stages/write/manifest/images_on_record.h"
+#include "stages/formats/images/image.h"
+#include "stages/support/text/json.h"
 
 namespace lamina::pipeline {
 namespace {

@@ -7,18 +7,18 @@
 #include <optional>
 
 #include "pipeline/cli/command.h"
-#include "stages/data/input/file_reader.h"
-#include "stages/data/text/json.h"
-#include "stages/data/text/readable.h"
-#include "stages/data/text/value.h"
+#include "pipeline/manifest/images_on_record.h"
 #include "stages/dose/shares.h"
+#include "stages/formats/image_format.h"
+#include "stages/formats/images/layer_images.h"
+#include "stages/formats/level_format.h"
 #include "stages/raster/mirror.h"
-#include "stages/read/layer_images.h"
-#include "stages/write/file.h"
-#include "stages/write/image_format.h"
-#include "stages/write/levels/level_format.h"
-#include "stages/write/manifest/images_on_record.h"
-#include "stages/write/temporary.h"
+#include "stages/support/io/file.h"
+#include "stages/support/io/file_reader.h"
+#include "stages/support/io/temporary.h"
+#include "stages/support/text/json.h"
+#include "stages/support/text/readable.h"
+#include "stages/support/text/value.h"
 
 namespace lamina::pipeline {
 namespace {

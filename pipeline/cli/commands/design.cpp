@@ -6,14 +6,14 @@
 #include "pipeline/cli/command.h"
 #include "pipeline/cli/console.h"
 #include "pipeline/cli/outputs.h"
-#include "pipeline/design/gradient.h"
 #include "pipeline/machine/profiles.h"
-#include "stages/data/text/json.h"
-#include "stages/data/text/number_text.h"
-#include "stages/data/text/readable.h"
+#include "pipeline/pores/gradient.h"
 #include "stages/segment/design/design_page.h"
 #include "stages/segment/permeability.h"  // the unit
-#include "stages/write/file.h"
+#include "stages/support/io/file.h"
+#include "stages/support/text/json.h"
+#include "stages/support/text/number_text.h"
+#include "stages/support/text/readable.h"
 
 namespace lamina::pipeline {
 namespace {

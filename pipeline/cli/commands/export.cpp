@@ -8,13 +8,13 @@
 #include "pipeline/job/file.h"
 #include "pipeline/plan/plan.h"
 #include "pipeline/run/summary.h"
-#include "stages/data/text/json.h"
-#include "stages/data/text/readable.h"
-#include "stages/data/text/version.h"
-#include "stages/write/mesh3mf/mesh3mf.h"
-#include "stages/write/package/threemf_package.h"
-#include "stages/write/replaceable.h"
-#include "stages/write/stl/mesh_stl.h"
+#include "stages/formats/stl/mesh_stl.h"
+#include "stages/formats/threemf/mesh3mf.h"
+#include "stages/formats/threemf/threemf_package.h"
+#include "stages/support/io/replaceable.h"
+#include "stages/support/text/json.h"
+#include "stages/support/text/readable.h"
+#include "stages/support/text/version.h"
 
 namespace lamina::pipeline {
 namespace {

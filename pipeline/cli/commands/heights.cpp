@@ -8,13 +8,13 @@
 #include "pipeline/cli/plot_file.h"
 #include "pipeline/job/file.h"
 #include "pipeline/job/heights.h"
+#include "pipeline/manifest/manifest.h"  // title_of
 #include "pipeline/plan/heights.h"
-#include "stages/data/text/value.h"
+#include "stages/formats/rp3/rp3.h"
 #include "stages/heights/study/study_plot.h"
 #include "stages/heights/study/study_text.h"
-#include "stages/write/file.h"
-#include "stages/write/manifest/manifest.h"  // title_of
-#include "stages/write/rp3/rp3.h"
+#include "stages/support/io/file.h"
+#include "stages/support/text/value.h"
 
 namespace lamina::pipeline {
 namespace {

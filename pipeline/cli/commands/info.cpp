@@ -2,19 +2,19 @@
 
 #include <algorithm>
 
-#include "pipeline/calibrate/laid_look.h"
 #include "pipeline/cli/command.h"
 #include "pipeline/cli/keys.h"
 #include "pipeline/cli/needs.h"
+#include "pipeline/manifest/images_on_record.h"
 #include "pipeline/plan/scene.h"
-#include "stages/data/text/json.h"
-#include "stages/data/text/number_text.h"
-#include "stages/data/text/readable.h"
+#include "pipeline/pores/laid_look.h"
+#include "stages/formats/images/layer_images.h"
+#include "stages/formats/images/stack_info.h"
 #include "stages/load/info/info.h"
-#include "stages/read/layer_images.h"
-#include "stages/read/stack_info.h"
 #include "stages/slice/surplus.h"
-#include "stages/write/manifest/images_on_record.h"
+#include "stages/support/text/json.h"
+#include "stages/support/text/number_text.h"
+#include "stages/support/text/readable.h"
 
 namespace lamina::pipeline {
 namespace {

@@ -10,12 +10,12 @@
 #include "pipeline/machine/powder_printer.h"
 #include "pipeline/machine/profiles.h"
 #include "pipeline/output/print_program.h"
-#include "stages/data/text/readable.h"
+#include "stages/program/dialect.h"
 #include "stages/program/explain.h"
 #include "stages/program/image_of_bed.h"
 #include "stages/program/orientation_target.h"
-#include "stages/write/file.h"
-#include "stages/write/program/dialect.h"
+#include "stages/support/io/file.h"
+#include "stages/support/text/readable.h"
 
 namespace lamina::pipeline {
 namespace {

@@ -9,10 +9,10 @@
 
 #include "pipeline/cli/command.h"
 #include "pipeline/cli/outputs.h"
-#include "stages/data/text/readable.h"
-#include "stages/terminal/completion.h"
-#include "stages/terminal/pages.h"
-#include "stages/write/file.h"
+#include "pipeline/cli/terminal/completion.h"
+#include "pipeline/cli/terminal/pages.h"
+#include "stages/support/io/file.h"
+#include "stages/support/text/readable.h"
 
 namespace lamina::pipeline {
 namespace {

@@ -4,8 +4,8 @@
 #include "pipeline/cli/command.h"
 #include "pipeline/output/merge.h"
 #include "pipeline/run/summary.h"
-#include "stages/data/text/json.h"
-#include "stages/data/text/readable.h"
+#include "stages/support/text/json.h"
+#include "stages/support/text/readable.h"
 
 namespace lamina::pipeline {
 namespace {

@@ -5,15 +5,15 @@
 #include <numbers>
 
 #include "pipeline/calibrate/drops_page.h"
-#include "pipeline/calibrate/laid_look.h"
 #include "pipeline/cli/command.h"
 #include "pipeline/cli/plot_file.h"
 #include "pipeline/cli/pore_job.h"
 #include "pipeline/cli/pore_print.h"
 #include "pipeline/cli/pore_stack.h"
 #include "pipeline/cli/window_files.h"
-#include "stages/data/text/json.h"
-#include "stages/data/text/readable.h"
+#include "pipeline/pores/laid_look.h"
+#include "stages/support/text/json.h"
+#include "stages/support/text/readable.h"
 
 namespace lamina::pipeline {
 namespace {

@@ -6,7 +6,6 @@
 #include <optional>
 #include <span>
 
-#include "pipeline/calibrate/laid_look.h"
 #include "pipeline/cli/command.h"
 #include "pipeline/cli/keys.h"
 #include "pipeline/cli/needs.h"
@@ -15,10 +14,11 @@
 #include "pipeline/job/job.h"
 #include "pipeline/machine/extruder.h"
 #include "pipeline/machine/profiles.h"
+#include "pipeline/pores/laid_look.h"
 #include "pipeline/run/run_resolved.h"
-#include "stages/data/text/json.h"
-#include "stages/write/file.h"
-#include "stages/write/levels/level_format.h"
+#include "stages/formats/level_format.h"
+#include "stages/support/io/file.h"
+#include "stages/support/text/json.h"
 
 namespace lamina::pipeline {
 namespace {

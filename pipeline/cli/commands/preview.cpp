@@ -1,5 +1,5 @@
 #include "pipeline/cli/command.h"
-#include "stages/write/other_program.h"
+#include "stages/support/io/other_program.h"
 
 namespace lamina::pipeline {
 namespace {

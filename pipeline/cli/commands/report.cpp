@@ -2,11 +2,11 @@
 
 #include <filesystem>
 
-#include "pipeline/calibrate/laid_look.h"
 #include "pipeline/cli/command.h"
+#include "pipeline/pores/laid_look.h"
 #include "pipeline/show/report.h"
-#include "stages/data/text/readable.h"
-#include "stages/write/file.h"
+#include "stages/support/io/file.h"
+#include "stages/support/text/readable.h"
 
 namespace lamina::pipeline {
 namespace {

@@ -5,11 +5,11 @@
 #include "pipeline/check/verify.h"
 #include "pipeline/cli/command.h"
 #include "pipeline/cli/outputs.h"
-#include "stages/data/text/json.h"
-#include "stages/data/text/json_text.h"
-#include "stages/data/text/readable.h"
+#include "stages/checks/records.h"
 #include "stages/replay/time/totals.h"
-#include "stages/sanity/records.h"
+#include "stages/support/text/json.h"
+#include "stages/support/text/json_text.h"
+#include "stages/support/text/readable.h"
 
 namespace lamina::pipeline {
 namespace {

@@ -5,9 +5,9 @@
 #include <chrono>
 #include <utility>
 
-#include "stages/data/input/file_reader.h"
-#include "stages/data/text/number_text.h"
 #include "stages/heights/per_part.h"
+#include "stages/support/io/file_reader.h"
+#include "stages/support/text/number_text.h"
 
 namespace lamina::heights {
 namespace {

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <utility>
 
-#include "stages/data/picture/ticks.h"
+#include "stages/data/ticks.h"
 
 namespace lamina::heights {
 namespace {

@@ -5,7 +5,7 @@
 #include <string>
 
 #include "stages/data/mesh.h"
-#include "stages/data/picture/plot.h"
+#include "stages/data/plot.h"
 #include "stages/heights/study/study.h"
 
 namespace lamina::heights {

@@ -7,8 +7,8 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
-#include "stages/data/text/number_text.h"
-#include "stages/data/text/readable.h"
+#include "stages/support/text/number_text.h"
+#include "stages/support/text/readable.h"
 
 namespace lamina::heights {
 namespace {

@@ -9,11 +9,11 @@
 #include <utility>
 #include <vector>
 
-#include "stages/data/text/json_text.h"
-#include "stages/data/text/readable.h"
 #include "stages/load/diagnosis/collector.h"
 #include "stages/load/reader.h"
 #include "stages/load/repair/diagnose.h"
+#include "stages/support/text/json_text.h"
+#include "stages/support/text/readable.h"
 
 namespace lamina::load {
 namespace {

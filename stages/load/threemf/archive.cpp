@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "stages/data/buffer.h"
-#include "stages/data/handles/zip.h"
 #include "stages/load/text.h"
+#include "stages/support/late/zip.h"
 
 namespace lamina::load {
 namespace {

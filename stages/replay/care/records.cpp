@@ -1,4 +1,4 @@
-// stages/write/program/raw/README.md and planes/README.md tell the format.
+// stages/program/raw/README.md and planes/README.md tell the format.
 #include "stages/replay/care/records.h"
 
 #include <fmt/format.h>

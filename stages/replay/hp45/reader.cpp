@@ -1,4 +1,4 @@
-// Programs of the dialects hp45 and oasis (stages/write/program/): a host sends G-code to the motion controller and the rest
+// Programs of the dialects hp45 and oasis (stages/program/): a host sends G-code to the motion controller and the rest
 // to the HP45 controller, and waits at G4.
 #include <fmt/format.h>
 

@@ -2,9 +2,9 @@
 
 #include <fmt/format.h>
 
-#include "stages/data/text/json.h"
 #include "stages/segment/design/job_text.h"
 #include "stages/segment/permeability.h"  // the unit
+#include "stages/support/text/json.h"
 
 namespace lamina::segment {
 namespace {

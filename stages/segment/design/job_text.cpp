@@ -4,8 +4,8 @@
 
 #include <filesystem>
 
-#include "stages/data/text/number_text.h"
-#include "stages/data/text/toml.h"
+#include "stages/support/text/number_text.h"
+#include "stages/support/text/toml.h"
 
 namespace lamina::segment {
 namespace {

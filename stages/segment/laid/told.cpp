@@ -6,7 +6,7 @@
 #include <nlohmann/json.hpp>
 #include <string_view>
 
-#include "stages/data/text/readable.h"
+#include "stages/support/text/readable.h"
 
 namespace lamina::segment {
 namespace {

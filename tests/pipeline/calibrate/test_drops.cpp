@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "pipeline/calibrate/drops_page.h"
-#include "stages/data/text/json.h"
+#include "stages/support/text/json.h"
 #include "tests/commands/program.h"
 
 namespace lamina::pipeline {

@@ -7,8 +7,8 @@
 
 #include "pipeline/cli/console.h"
 #include "pipeline/run/summary.h"
-#include "stages/data/text/json_text.h"
-#include "stages/data/text/readable.h"
+#include "stages/support/text/json_text.h"
+#include "stages/support/text/readable.h"
 #include "tests/commands/program.h"
 
 namespace lamina::pipeline {

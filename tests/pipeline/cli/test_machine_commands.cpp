@@ -10,7 +10,7 @@
 #include <fstream>
 #include <iterator>
 
-#include "stages/read/image.h"
+#include "stages/formats/images/image.h"
 
 namespace lamina::pipeline {
 namespace {

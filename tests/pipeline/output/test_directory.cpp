@@ -4,8 +4,8 @@
 #include <filesystem>
 
 #include "pipeline/output/directory.h"
-#include "stages/write/file.h"
-#include "stages/write/temporary.h"
+#include "stages/support/io/file.h"
+#include "stages/support/io/temporary.h"
 #include "tests/commands/program.h"
 
 namespace lamina::pipeline {

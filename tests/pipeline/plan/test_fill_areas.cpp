@@ -8,8 +8,8 @@
 #include <random>
 
 #include "pipeline/job/file.h"
+#include "stages/formats/slice_format.h"
 #include "stages/geometry/clipping.h"
-#include "stages/write/slice_format.h"
 #include "tests/commands/program.h"
 #include "tests/pipeline/plan/plan_of.h"
 #include "tests/slice/contour_laws.h"

@@ -6,7 +6,7 @@
 
 #include "pipeline/job/keys.h"
 #include "pipeline/plan/fill.h"
-#include "stages/data/text/toml.h"
+#include "stages/support/text/toml.h"
 
 namespace lamina::test {
 namespace {

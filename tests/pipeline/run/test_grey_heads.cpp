@@ -7,9 +7,9 @@
 #include <string>
 #include <vector>
 
+#include "pipeline/manifest/manifest.h"
 #include "stages/data/levels.h"
-#include "stages/read/image.h"
-#include "stages/write/manifest/manifest.h"
+#include "stages/formats/images/image.h"
 #include "tests/commands/job_folder.h"
 
 namespace lamina::pipeline {

@@ -68,7 +68,7 @@ class InspectedJobs : public testing::Test {
   }
   /// A profile of nuferbj with more lines, which stand within [powder], or begin with [mounting] and stand there.
   std::string profile(const std::string& lines) const {
-    std::ifstream shipped(fs::path(LAMINA_TEST_DIR).parent_path() / "stages/write/machines/nuferbj.toml");
+    std::ifstream shipped(fs::path(LAMINA_TEST_DIR).parent_path() / "pipeline/machine/shipped/printers/nuferbj.toml");
     std::string text{std::istreambuf_iterator<char>(shipped), std::istreambuf_iterator<char>()};
     const std::string mounting = "[mounting]\n";
     if (lines.starts_with(mounting)) {

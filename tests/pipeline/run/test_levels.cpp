@@ -6,10 +6,10 @@
 #include <string>
 #include <vector>
 
+#include "pipeline/manifest/manifest.h"
 #include "pipeline/run/image_maker.h"
 #include "stages/data/levels.h"
-#include "stages/read/image.h"
-#include "stages/write/manifest/manifest.h"
+#include "stages/formats/images/image.h"
 #include "tests/commands/job_folder.h"
 
 namespace lamina::pipeline {

@@ -11,8 +11,8 @@
 #include "pipeline/run/run.h"
 #include "stages/data/machine.h"
 #include "stages/data/runs.h"
+#include "stages/formats/images/image.h"
 #include "stages/geometry/combine.h"
-#include "stages/read/image.h"
 #include "tests/commands/program.h"
 
 namespace lamina::pipeline {

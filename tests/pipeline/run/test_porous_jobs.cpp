@@ -10,9 +10,9 @@
 
 #include "pipeline/plan/layer_cut.h"
 #include "stages/dose/edges/erode.h"
+#include "stages/formats/images/image.h"
 #include "stages/geometry/combine.h"
 #include "stages/raster/raster.h"
-#include "stages/read/image.h"
 #include "stages/segment/expand.h"
 #include "tests/commands/program.h"
 #include "tests/pipeline/plan/plan_of.h"

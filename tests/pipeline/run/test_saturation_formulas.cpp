@@ -9,11 +9,11 @@
 #include <vector>
 
 #include "pipeline/check/verify.h"
+#include "pipeline/manifest/manifest.h"
 #include "pipeline/run/run.h"
 #include "stages/data/runs.h"
+#include "stages/formats/images/image.h"
 #include "stages/geometry/combine.h"
-#include "stages/read/image.h"
-#include "stages/write/manifest/manifest.h"
 #include "tests/commands/job_folder.h"
 
 namespace lamina::pipeline {
@@ -108,7 +108,7 @@ TEST_F(FormulaJobs, ThatGiveNoNumberOrDoNotBindAreRefused) {
   test::expect_refused(job + "1,2", 2, "gives 2 numbers", folder_);
   test::expect_refused(job + "x-14", 2, "% in layer 0 at x 9.948", folder_);
   test::expect_refused(job + "60/(z-z)", 2, "is inf % in layer 0", folder_);
-  const std::string shipped = test::read_text(LAMINA_TEST_DIR "/../stages/write/machines/nuferbj.toml");
+  const std::string shipped = test::read_text(LAMINA_TEST_DIR "/../pipeline/machine/shipped/printers/nuferbj.toml");
   test::write_text(folder_ / "binds.toml", shipped + "least_saturation_percent = 30\n");
   const std::string binds = "jet box.stl --machine binds.toml --at 40,40 --layer 0.1 --quiet -o out --saturation ";
   test::expect_refused(binds + "x-15", 2, "binds from 30 % on", folder_);

@@ -12,7 +12,7 @@
 namespace lamina::test {
 namespace {
 
-// The hosts' readers are those of tests/write/test_slice_hosts.cpp; here the areas are compared.
+// The hosts' readers are those of tests/formats/test_slice_hosts.cpp; here the areas are compared.
 TEST(SliceContours, PolygonsAndShortCommandsHoldTheAreasOfTheOthers) {
   const Directory directory;
   std::map<std::string, std::string> files;

@@ -14,8 +14,8 @@
 
 #include "pipeline/cli/console.h"
 #include "pipeline/run/timing.h"
-#include "stages/write/file.h"
-#include "stages/write/temporary.h"
+#include "stages/support/io/file.h"
+#include "stages/support/io/temporary.h"
 #include "tests/commands/program.h"
 
 namespace lamina::pipeline {

@@ -15,15 +15,15 @@
 
 #include "pipeline/check/verify.h"
 #include "pipeline/job/keys.h"
+#include "pipeline/job/profiles/printer.h"
 #include "pipeline/machine/materials.h"
+#include "pipeline/manifest/manifest.h"
 #include "pipeline/output/merge.h"
 #include "pipeline/run/run.h"
-#include "stages/data/text/readable.h"
-#include "stages/data/text/toml.h"
+#include "stages/formats/images/image.h"
 #include "stages/raster/materials.h"
-#include "stages/read/image.h"
-#include "stages/read/profiles/printer.h"
-#include "stages/write/manifest/manifest.h"
+#include "stages/support/text/readable.h"
+#include "stages/support/text/toml.h"
 
 namespace lamina::pipeline {
 namespace {
@@ -61,7 +61,7 @@ class TwoPowders : public ::testing::Test {
   }
   /// A profile like a shipped one with other lines in [powder].
   std::string profile(const std::string& powder) const {
-    std::ifstream shipped(fs::path(LAMINA_TEST_DIR).parent_path() / "stages/write/machines/nuferbj.toml");
+    std::ifstream shipped(fs::path(LAMINA_TEST_DIR).parent_path() / "pipeline/machine/shipped/printers/nuferbj.toml");
     std::string text{std::istreambuf_iterator<char>(shipped), std::istreambuf_iterator<char>()};
     const std::string path = (directory_ / "mine.toml").string();
     std::ofstream(path) << text << powder << "\n";
@@ -265,7 +265,7 @@ TEST_F(TwoPowders, EveryDialectSaysWhichVatFeeds) {
     std::vector<PartRequest> parts = {part("parameter_quality_nut.stl", 0.5, "steel"), part("dental_crown.stl", 2, "bronze")};
     Job made = job(parts, machine);
     // Shipped machines of one vat, with a second one.
-    std::ifstream shipped(fs::path(LAMINA_TEST_DIR).parent_path() / ("stages/write/machines/" + machine + ".toml"));
+    std::ifstream shipped(fs::path(LAMINA_TEST_DIR).parent_path() / ("pipeline/machine/shipped/printers/" + machine + ".toml"));
     std::string profile{std::istreambuf_iterator<char>(shipped), std::istreambuf_iterator<char>()};
     if (profile.find("vats = 2") == std::string::npos) {
       if (profile.find("[powder]") == std::string::npos) profile += "\n[powder]\n";

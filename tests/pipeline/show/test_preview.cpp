@@ -6,9 +6,9 @@
 #include <cstdlib>
 #include <fstream>
 
-#include "stages/write/file.h"
-#include "stages/write/manifest/manifest.h"
-#include "tests/write/images.h"
+#include "pipeline/manifest/manifest.h"
+#include "stages/support/io/file.h"
+#include "tests/formats/images.h"
 
 namespace lamina::write {
 namespace {

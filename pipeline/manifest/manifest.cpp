@@ -1,0 +1,290 @@
+// pipeline/manifest/manifest.cpp: the head of a manifest, and the file that grows while a job runs.
+#include "pipeline/manifest/manifest.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <filesystem>
+#include <map>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "pipeline/manifest/manifest_head.h"
+#include "pipeline/manifest/manifest_line.h"
+#include "stages/formats/level_format.h"
+#include "stages/support/io/file.h"
+#include "stages/support/io/file_reader.h"
+#include "stages/support/text/number_text.h"
+
+namespace lamina {
+
+Hash128 ManifestHead::id() const {
+  const std::string text = lasting_text(*this);
+  return hash_bytes(std::as_bytes(std::span(text)));
+}
+
+std::string title_of(const std::vector<PartSummary>& parts) {
+  if (parts.empty()) return {};
+  const std::string name = std::filesystem::path(parts.front().path).filename().string();
+  return parts.size() == 1 ? name : name + " and " + std::to_string(parts.size() - 1) + " more";
+}
+
+namespace {
+
+constexpr std::string_view kOtherBuild = "another build of lamina wrote it";
+
+/// The keys of a job's text, "section.name", with their values; those of part n begin with "part.n.".
+std::vector<std::array<std::string, 2>> said_by(std::string_view job) {
+  std::vector<std::array<std::string, 2>> said;
+  std::string section;
+  std::size_t parts = 0;
+  for (const std::string_view line : split(job, "\n")) {
+    const std::size_t equals = std::min(line.find(" = "), line.size());
+    if (line.starts_with("[[")) {
+      section = fmt::format("part.{}", ++parts);
+    } else if (line.starts_with('[')) {
+      section = line.substr(1, line.find(']') - 1);
+    } else if (!line.empty()) {
+      said.push_back(
+          {fmt::format("{}.{}", section, line.substr(0, equals)), std::string(line.substr(std::min(equals + 3, line.size())))});
+    }
+  }
+  return said;
+}
+
+/// The first key that differs; "" if none does.
+std::string difference_of_jobs(std::string_view now, std::string_view earlier) {
+  std::map<std::string, std::string> said;
+  for (const auto& [key, value] : said_by(earlier)) said[key] = value;
+  for (const auto& [key, value] : said_by(now)) {
+    const auto before = said.find(key);
+    if (before == said.end()) {
+      return fmt::format("{} = {}, of which it says nothing: it was not set, or {}", key, value, kOtherBuild);
+    }
+    if (value != before->second) return fmt::format("{} = {}, was {}", key, value, before->second);
+    said.erase(before);
+  }
+  return said.empty() ? "" : fmt::format("{} is set no more, or {}", said.begin()->first, kOtherBuild);
+}
+
+/// The head with profiles and presets by their files' names.
+ManifestHead by_file_names(ManifestHead head) {
+  std::string text, section;
+  for (const std::string_view line : split(head.job_toml, "\n")) {
+    if (line.starts_with('[')) section = line;
+    const bool names = section == "[machine]" && (line.starts_with("profile = ") || line.starts_with("presets = "));
+    bool quoted = false;
+    std::size_t begin = 0;  // of the string at hand
+    for (std::size_t i = 0; i < line.size(); ++i) {
+      text += line[i];
+      if (line[i] == '\\' && i + 1 < line.size()) {
+        text += line[++i];
+      } else if (line[i] == '"') {
+        quoted = !quoted;
+        begin = text.size();
+      } else if (names && quoted && line[i] == '/') {
+        text.resize(begin);
+      }
+    }
+    text += '\n';
+  }
+  head.job_toml = std::move(text);
+  return head;
+}
+
+}  // namespace
+
+bool same_job(const ManifestHead& one, const ManifestHead& other) {
+  return one.id() == other.id() || by_file_names(one).id() == by_file_names(other).id();
+}
+
+std::string difference(const ManifestHead& now, const ManifestHead& earlier) {
+  if (same_job(now, earlier)) return {};
+  if (now.version != earlier.version) return fmt::format("lamina is {}, was {}", now.version, earlier.version);
+  if (std::string what = difference_of_jobs(by_file_names(now).job_toml, by_file_names(earlier).job_toml); !what.empty()) {
+    return what.starts_with("part.") && now.parts.size() != earlier.parts.size() ? "the parts are others" : what;
+  }
+  for (std::size_t i = 0; i < std::min(now.parts.size(), earlier.parts.size()); ++i) {
+    if (now.parts[i].fingerprint != earlier.parts[i].fingerprint) {
+      return fmt::format("the geometry of {} has changed", now.parts[i].path);
+    }
+  }
+  if (now.machine != earlier.machine) return fmt::format("machine {}, was {}", now.machine, earlier.machine);
+  if (now.machine_profile != earlier.machine_profile) {
+    return fmt::format("the machine's profile has changed, or {}", kOtherBuild);
+  }
+  if (now.program_start != earlier.program_start || now.program_end != earlier.program_end) {
+    return fmt::format("{}, with other print programs", kOtherBuild);
+  }
+  return "the parts have changed";
+}
+
+bool has_record(const std::string& path) {
+  std::error_code error;
+  return std::filesystem::exists(path, error) || has_manifest_head(write::part_of(path));
+}
+
+Status check_begun_manifest(const std::string& part) {
+  const auto file = FileReader::open(part, {});
+  char first = 0;  // stays 0 where a power cut has kept the size alone
+  if (!file || !file->read_at(0, {&first, 1}) || first == '{' || first == 0) return {};
+  return Error{Fault::kUsage,
+               fmt::format("{}: is there already, and is no record of lamina; remove it, or name another output", part)};
+}
+
+std::uint8_t grey_level_of(std::uint32_t most_drops) {
+  return most_drops <= 1 ? 1 : most_drops <= 3 ? 3 : most_drops <= 15 ? 15 : 255;
+}
+
+bool ManifestHead::grey_drops() const { return most_drops > 0 && write::find_level_format(format) != nullptr; }
+
+std::uint8_t ManifestHead::full_level() const {
+  if (grey_drops()) return grey_level_of(most_drops);
+  return static_cast<std::uint8_t>(levels > 0 && most_drops == 0 ? levels - 1 : 0);
+}
+
+std::uint8_t ManifestHead::most_of_pixel() const {
+  return std::max<std::uint8_t>(1, most_drops > 0 ? static_cast<std::uint8_t>(most_drops) : full_level());
+}
+
+std::string ManifestHead::image_name(std::size_t number) const {
+  const std::uint32_t drops = drop_images();
+  const std::string material = materials.empty() ? "" : materials[number / drops].name;
+  if (drops == 1) return material;
+  return fmt::format("{}{}drop{}", material, material.empty() ? "" : "-", number % drops + 1);
+}
+
+std::string layer_file_name(std::uint32_t index, std::string_view extension, std::string_view image) {
+  if (extension.empty()) return {};
+  return fmt::format("layers/{:06}{}{}{}", index, image.empty() ? "" : "-", image, extension);
+}
+
+std::vector<LayerImageFile> layer_images(const ManifestHead& head, const LayerRecord& record) {
+  std::vector<LayerImageFile> files;
+  const std::size_t named = head.named_images();
+  if (named == 0) {
+    files.push_back(
+        {layer_file_name(record.layer.index, head.extension), {record.bytes, record.set_pixels, 0, 0, record.hash}});
+  }
+  for (std::size_t m = 0; m < named; ++m) {
+    files.push_back({layer_file_name(record.layer.index, head.extension, head.image_name(m)),
+                     m < record.images.size() ? record.images[m] : ImageRecord()});
+  }
+  return files;
+}
+
+namespace {
+
+void add_line(const LayerRecord& record, const ManifestHead& head, bool first, std::string& text) {
+  static const PathFacts kNone;
+  text += first ? "\n" : ",\n";
+  LineWriter io(text);
+  describe_line(io, head, record, record.paths ? *record.paths : kNone);
+}
+
+}  // namespace
+
+struct ManifestWriter::State {
+  write::File file;
+  ManifestHead head;
+  Options options;
+  std::string buffer;
+  std::uint32_t next_layer = 0;
+  bool first_line = true;
+
+  State(write::File opened, const ManifestHead& of, Options chosen)
+      : file(std::move(opened)), head(of), options(std::move(chosen)), next_layer(of.first_layer) {}
+
+  void add(const LayerRecord& record) {
+    add_line(record, head, std::exchange(first_line, false), buffer);
+    ++next_layer;
+  }
+
+  Status flush() {
+    const bool syncs = options.sync == Sync::kLayer && !buffer.empty();
+    if (syncs && options.sync_layers) {
+      if (Status status = options.sync_layers(); !status) return status;
+    }
+    if (Status status = file.append(buffer); !status) return status;
+    buffer.clear();
+    if (Status status = file.flush(); !status) return status;
+    return syncs ? file.sync() : Status();
+  }
+};
+
+ManifestWriter::ManifestWriter() = default;
+ManifestWriter::ManifestWriter(ManifestWriter&&) noexcept = default;
+ManifestWriter& ManifestWriter::operator=(ManifestWriter&&) noexcept = default;
+ManifestWriter::~ManifestWriter() = default;
+
+namespace {
+
+/// Appends head and kept records.
+Status begin(write::File& file, const ManifestHead& head, const std::vector<LayerRecord>& kept) {
+  std::string text = head_text(head);
+  std::uint32_t next = head.first_layer;
+  for (const LayerRecord& record : kept) {
+    if (record.layer.index != next++) {
+      return Error{Fault::kInternal, fmt::format("manifest: layer {} kept where {} is next", record.layer.index, next - 1)};
+    }
+    add_line(record, head, &record == &kept.front(), text);
+    if (text.size() < (1u << 20)) continue;
+    if (Status status = file.append(std::string_view(text)); !status) return status;
+    text.clear();
+  }
+  return file.append(std::string_view(text));
+}
+
+}  // namespace
+
+Result<ManifestWriter> ManifestWriter::open(const std::string& path, const ManifestHead& head,
+                                            const std::vector<LayerRecord>& kept_prefix, Options options,
+                                            std::optional<write::Claim> claim) {
+  if (!claim) {
+    auto taken = write::Claim::take(path, path);
+    if (!taken) return taken.error();
+    claim.emplace(std::move(*taken));
+  }
+  write::FileOptions how{.lock = false, .follow = false};
+  if (options.sync == Sync::kOff) how.durable = write::Durable::kNo;
+  auto file = write::File::open(path, how);
+  if (!file) return file.error();
+  if (Status status = begin(*file, head, kept_prefix); !status) return status.error();
+  claim->hand_over();
+  if (Status status = file->become_part(options.sync_head); !status) return status.error();
+  ManifestWriter writer;
+  writer.state_ = std::make_unique<State>(std::move(*file), head, std::move(options));
+  writer.state_->next_layer = head.first_layer + static_cast<std::uint32_t>(kept_prefix.size());
+  writer.state_->first_line = kept_prefix.empty();
+  return writer;
+}
+
+Status ManifestWriter::append(const LayerRecord& record) {
+  State& state = *state_;
+  if (record.layer.index != state.next_layer || record.layer.index >= state.head.last_layer) {
+    return Error{Fault::kInternal, fmt::format("manifest: layer {} appended where {} of {} is next", record.layer.index,
+                                               state.next_layer, state.head.last_layer)};
+  }
+  state.add(record);
+  return state.flush();
+}
+
+Status ManifestWriter::flush() { return state_->flush(); }
+
+Status ManifestWriter::finish(const FileDigest& file, const std::function<Status()>& names) {
+  State& state = *state_;
+  if (state.next_layer != state.head.last_layer) {
+    return Error{Fault::kInternal, fmt::format("manifest: closed at layer {} of {}", state.next_layer, state.head.last_layer)};
+  }
+  state.buffer += tail_text(state.head, file);
+  if (Status status = state.flush(); !status) return status;
+  if (Status status = names ? names() : Status(); !status) return status;
+  const auto whole = state.file.finish();
+  return whole ? Status() : Status(whole.error());
+}
+
+void ManifestWriter::discard() { state_->file.discard(); }
+
+}  // namespace lamina

@@ -1,0 +1,85 @@
+#include "pipeline/show/report_places.h"
+
+#include <array>
+#include <nlohmann/json.hpp>
+#include <stdexcept>
+#include <utility>
+
+#include "pipeline/manifest/inspection_file.h"
+
+namespace lamina::write::report {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+struct Shown {
+  const PixelGrid& grid;
+  bool mirrored_x, mirrored_y;
+  std::uint32_t layers;  // of the job
+
+  /// Throws for one that the job has not.
+  std::uint32_t layer(const Json& json) const {
+    const auto number = json.get<std::int64_t>();
+    if (number < 0 || number >= layers) throw std::out_of_range("layer");
+    return static_cast<std::uint32_t>(number);
+  }
+
+  /// Throws where something is missing or of another type.
+  SeenPlace place(const std::string& code, const std::string& unit, const Json& json) const {
+    SeenPlace place;
+    place.code = code;
+    place.x_mm = json.at("x_mm"), place.y_mm = json.at("y_mm"), place.z_mm = json.at("z_mm");
+    place.layer = place.last_layer = layer(json.at("layer"));
+    std::array<double, 4> box{place.x_mm, place.y_mm, place.x_mm, place.y_mm};
+    if (json.contains("last_layer")) place.last_layer = layer(json.at("last_layer"));
+    if (json.contains("box_mm")) box = json.at("box_mm");
+    if (!unit.empty()) {
+      place.amount = json.at(unit);
+      place.unit = unit;
+    }
+    const auto side = [](const PixelAxis& axis) { return static_cast<double>(axis.count) / axis.pixels_per_nm() / kNmPerMm; };
+    const double x = (box[0] + box[2]) / 2, y = (box[1] + box[3]) / 2;
+    place.width_mm = box[2] - box[0];
+    place.depth_mm = box[3] - box[1];
+    place.column_mm = mirrored_x ? side(grid.x) - x : x;
+    place.row_mm = mirrored_y ? y : side(grid.y) - y;
+    return place;
+  }
+};
+
+void add(const Json& json, const Shown& shown, LayersSeen& seen) {
+  for (const Json& warning : json.at("warnings")) {
+    Warning& told = seen.warnings.emplace_back(Warning{warning.at("code"), warning.at("text")});
+    if (warning.contains("layer")) told.layer = shown.layer(warning.at("layer"));
+  }
+  const Json& found = json.at("inspection");
+  constexpr std::array<std::pair<const char*, const char*>, 4> kKinds = {
+      {{"islands", "mm2"}, {"loose", "mm3"}, {"hollows", "mm3"}, {"thin", "mm2"}}};
+  for (const auto& [code, unit] : kKinds) {
+    if (!found.at(code).contains("places")) continue;
+    for (const Json& place : found.at(code).at("places")) seen.places.push_back(shown.place(code, unit, place));
+  }
+  for (const Json& pair : found.at("touching")) seen.places.push_back(shown.place("touching", "", pair.at("at")));
+  if (found.contains("bed_edge")) seen.places.push_back(shown.place("bed-edge", "", found.at("bed_edge")));
+}
+
+}  // namespace
+
+void add_inspection(const std::string& directory, const ManifestHead& head, bool mirrored_x, bool mirrored_y,
+                    LayersSeen& seen) {
+  if (head.product != Product::kImages) return;
+  const auto json = read_inspection(directory, head);
+  if (!json) return;
+  LayersSeen with = {};
+  const Shown shown{head.grid, mirrored_x, mirrored_y, head.layer_count};
+  try {
+    add(*json, shown, with);
+  } catch (const std::exception&) {
+    seen.warnings.push_back({"inspection", "inspection.json is not as lamina wrote it; plan the job again with --inspect"});
+    return;
+  }
+  seen.warnings.insert(seen.warnings.end(), with.warnings.begin(), with.warnings.end());
+  seen.places = std::move(with.places);
+}
+
+}  // namespace lamina::write::report

@@ -1,0 +1,390 @@
+#include "stages/calibration/scan/compare.h"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+#include <opencv2/imgproc.hpp>
+
+#include "stages/calibration/scan/extra.h"
+
+namespace lamina::scan {
+namespace {
+
+constexpr double kMostTurnDeg = 6;
+constexpr double kLeastMissingMm = 0.2;
+
+/// The layer in cells as large as pixels of the photograph: the share of each that is set.
+struct Cells {
+  cv::Mat share;             // CV_32F
+  double left = 0, top = 0;  // mm
+  double side = 0;           // mm
+  Spot middle(int x, int y) const { return {left + (x + 0.5) * side, top + (y + 0.5) * side}; }
+};
+
+Cells cells_of(const ExpectedLayer& layer) {
+  Cells cells;
+  const double px = layer.pixel_x_nm * 1e-6, py = layer.pixel_y_nm * 1e-6, margin = 2;
+  std::uint32_t left = UINT32_MAX, right = 0, top = UINT32_MAX, bottom = 0;
+  for (std::uint32_t r = 0; r < layer.image.rows(); ++r) {
+    const auto row = layer.image.row(r);
+    if (row.empty()) continue;
+    left = std::min(left, row.front());
+    right = std::max(right, row.back());
+    top = std::min(top, r);
+    bottom = r + 1;
+  }
+  if (right <= left) return cells;
+  cells.side = layer.photo_um * 1e-3;
+  cells.left = left * px - margin;
+  cells.top = top * py - margin;
+  const int columns = static_cast<int>(((right - left) * px + 2 * margin) / cells.side) + 1;
+  const int rows = static_cast<int>(((bottom - top) * py + 2 * margin) / cells.side) + 1;
+  if (std::int64_t{columns} * rows > (1 << 26)) return cells;
+  cells.share = cv::Mat::zeros(rows, columns, CV_32F);
+  const auto overlap = [](double begin, double end, int cell) {
+    return std::max(0.0, std::min(end, cell + 1.0) - std::max(begin, static_cast<double>(cell)));
+  };
+  for (std::uint32_t r = top; r < bottom; ++r) {
+    const double t = (r * py - cells.top) / cells.side, b = ((r + 1) * py - cells.top) / cells.side;
+    const auto row = layer.image.row(r);
+    for (std::size_t i = 0; i + 1 < row.size(); i += 2) {
+      const double l = (row[i] * px - cells.left) / cells.side, e = (row[i + 1] * px - cells.left) / cells.side;
+      for (int y = static_cast<int>(t); y < b && y < rows; ++y) {
+        auto* to = cells.share.ptr<float>(y);
+        const double high = overlap(t, b, y);
+        for (int x = static_cast<int>(l); x < e && x < columns; ++x) to[x] += static_cast<float>(high * overlap(l, e, x));
+      }
+    }
+  }
+  return cells;
+}
+
+/// What is left without slow changes of the light. wide  of them, pixels
+cv::Mat without_shade(const cv::Mat& image, double wide) {
+  cv::Mat slow;
+  cv::GaussianBlur(image, slow, {}, wide, wide, cv::BORDER_REPLICATE);
+  return image - slow;
+}
+
+/// The best place of a picture in a larger one, and how alike they are there, by correlation.
+struct Match {
+  double likeness = -1, turn_deg = 0, scale = 1;
+  cv::Point2d at;  // of the middle of the cells, pixels of the photograph
+};
+
+Match best_match(const cv::Mat& photo, const cv::Mat& cells, const std::vector<double>& turns,
+                 const std::vector<double>& scales) {
+  const int side =
+      cv::getOptimalDFTSize(std::max({photo.cols, photo.rows, cells.cols, cells.rows}) + std::max(cells.cols, cells.rows) / 2);
+  cv::Mat padded = cv::Mat::zeros(side, side, CV_32F), photo_waves;
+  photo.copyTo(padded(cv::Rect(0, 0, photo.cols, photo.rows)));
+  cv::dft(padded, photo_waves);
+  const double photo_energy = cv::norm(photo);
+  Match best;
+  for (const double turn : turns) {
+    for (const double scale : scales) {
+      cv::Mat to = cv::getRotationMatrix2D(
+          {0.5f * static_cast<float>(cells.cols - 1), 0.5f * static_cast<float>(cells.rows - 1)}, -turn, scale);
+      to.at<double>(0, 2) += 0.5 * (side - cells.cols);
+      to.at<double>(1, 2) += 0.5 * (side - cells.rows);
+      cv::Mat turned, waves, product;
+      cv::warpAffine(cells, turned, to, {side, side}, cv::INTER_LINEAR, cv::BORDER_CONSTANT, 0);
+      const double energy = cv::norm(turned);
+      cv::dft(turned, waves);
+      cv::mulSpectrums(photo_waves, waves, product, 0, true);
+      cv::idft(product, product, cv::DFT_SCALE | cv::DFT_REAL_OUTPUT);
+      double most = 0;
+      cv::Point at;
+      cv::minMaxLoc(product, nullptr, &most, nullptr, &at);
+      const double likeness = most / std::max(photo_energy * energy, 1e-9);
+      if (likeness <= best.likeness) continue;
+      const auto wrapped = [&](int shift) { return shift > side / 2 ? shift - side : shift; };
+      best = {likeness, turn, scale, {wrapped(at.x) + 0.5 * (side - 1), wrapped(at.y) + 0.5 * (side - 1)}};
+    }
+  }
+  return best;
+}
+
+/// Turns and scales from coarse to fine, on small copies.
+View first_view(const cv::Mat& photo, const cv::Mat& cells, const Cells& layer, double& likeness) {
+  const double small = std::min(1.0, 220.0 / std::max({photo.cols, photo.rows, cells.cols, cells.rows}));
+  cv::Mat few, little;
+  cv::resize(photo, few, {}, small, small, cv::INTER_AREA);
+  cv::resize(cells, little, {}, small, small, cv::INTER_AREA);
+  std::vector<double> turns, scales;
+  for (double turn = -kMostTurnDeg; turn <= kMostTurnDeg; turn += 1) turns.push_back(turn);
+  Match match = best_match(few, little, turns, {0.97, 1.0, 1.03});
+  turns.clear();
+  for (double turn = -0.75; turn <= 0.75; turn += 0.25) turns.push_back(match.turn_deg + turn);
+  match = best_match(few, little, turns, {match.scale - 0.015, match.scale, match.scale + 0.015});
+  likeness = match.likeness;
+  // Pixel centres of small copies: (i + 0.5) / small - 0.5.
+  const Spot at{(match.at.x + 0.5) / small - 0.5, (match.at.y + 0.5) / small - 0.5};
+  const double c = std::cos(match.turn_deg * std::numbers::pi / 180) * match.scale / layer.side,
+               s = std::sin(match.turn_deg * std::numbers::pi / 180) * match.scale / layer.side;
+  View view;
+  view.middle = {layer.left + 0.5 * cells.cols * layer.side, layer.top + 0.5 * cells.rows * layer.side};
+  view.unit = 0.5 * std::max(cells.cols, cells.rows) * layer.side;
+  view.photo_middle = {0.5 * (photo.cols - 1), 0.5 * (photo.rows - 1)};
+  view.radius = std::hypot(photo.cols, photo.rows) / 2;
+  view.h = {c * view.unit, -s * view.unit, at.x, s * view.unit, c * view.unit, at.y, 0, 0};
+  return view;
+}
+
+/// Moves the view until edges lie on edges: least squares of photo(view(place)) - gain * layer(place), by Gauss and Newton.
+void refine(const cv::Mat& photo, const cv::Mat& cells, const Cells& layer, View& view) {
+  struct Sample {
+    Spot place;
+    double value;
+  };
+  cv::Mat dx, dy, slope_x, slope_y;
+  cv::Sobel(cells, dx, CV_32F, 1, 0);
+  cv::Sobel(cells, dy, CV_32F, 0, 1);
+  cv::Sobel(photo, slope_x, CV_32F, 1, 0, 3, 1.0 / 8);
+  cv::Sobel(photo, slope_y, CV_32F, 0, 1, 3, 1.0 / 8);
+  std::vector<Sample> samples;
+  double steepest = 0;
+  cv::Mat steep;
+  cv::magnitude(dx, dy, steep);
+  cv::minMaxLoc(steep, nullptr, &steepest);
+  for (int y = 0; y < cells.rows; ++y) {
+    for (int x = 0; x < cells.cols; ++x) {
+      if (static_cast<double>(steep.at<float>(y, x)) > 0.15 * steepest)
+        samples.push_back({layer.middle(x, y), static_cast<double>(cells.at<float>(y, x))});
+    }
+  }
+  const std::size_t step = samples.size() / 20'000 + 1;
+  for (int round = 0; round < 15; ++round) {
+    Eigen::Matrix<double, 9, 9> normal = Eigen::Matrix<double, 9, 9>::Zero();
+    Eigen::Matrix<double, 9, 1> right = Eigen::Matrix<double, 9, 1>::Zero();
+    double vv = 1e-9, pv = 0;
+    for (std::size_t i = 0; i < samples.size(); i += step) {
+      const Spot p = view.at(samples[i].place.x, samples[i].place.y);
+      pv += darkness_at(photo, p.x, p.y) * samples[i].value;
+      vv += samples[i].value * samples[i].value;
+    }
+    const double gain = pv / vv;
+    for (std::size_t i = 0; i < samples.size(); i += step) {
+      const Spot& m = samples[i].place;
+      const Spot p = view.at(m.x, m.y);
+      if (p.x < 1 || p.y < 1 || p.x > photo.cols - 2 || p.y > photo.rows - 2) continue;
+      const double gx = darkness_at(slope_x, p.x, p.y), gy = darkness_at(slope_y, p.x, p.y);
+      const double u = (m.x - view.middle.x) / view.unit, v = (m.y - view.middle.y) / view.unit,
+                   w = 1 + view.h[6] * u + view.h[7] * v;
+      const double g = -(gx * p.x + gy * p.y);
+      Eigen::Matrix<double, 9, 1> j;
+      j << gx * u, gx * v, gx, gy * u, gy * v, gy, g * u, g * v, -samples[i].value * w;
+      j /= w;
+      const double off = gain * samples[i].value - darkness_at(photo, p.x, p.y);
+      normal += j * j.transpose();
+      right += j * off;
+    }
+    normal.diagonal() *= 1 + 1e-9;
+    const Eigen::Matrix<double, 9, 1> change = normal.ldlt().solve(right);
+    if (!change.allFinite()) return;
+    for (std::size_t i = 0; i < 8; ++i) view.h[i] += change(static_cast<Eigen::Index>(i));
+    if (change.head<6>().cwiseAbs().maxCoeff() < 1e-4) return;
+  }
+}
+
+/// The photograph in the cells of the layer.
+cv::Mat in_cells(const cv::Mat& image, const Cells& layer, const View& view) {
+  cv::Mat seen(layer.share.size(), CV_32F);
+  for (int y = 0; y < seen.rows; ++y) {
+    for (int x = 0; x < seen.cols; ++x) {
+      const Spot m = layer.middle(x, y), p = view.at(m.x, m.y);
+      const bool inside = p.x >= 0 && p.y >= 0 && p.x < image.cols - 1 && p.y < image.rows - 1;
+      seen.at<float>(y, x) = inside ? static_cast<float>(darkness_at(image, p.x, p.y)) : -1.0f;
+    }
+  }
+  return seen;
+}
+
+/// Darkness of the cells against the light of blank ones, of which a surface of second degree is made.
+cv::Mat darkness_of(const cv::Mat& light, const cv::Mat& blank) {
+  using Terms = Eigen::Matrix<double, 6, 1>;
+  const auto terms = [&](int x, int y) {
+    const double u = 2.0 * x / light.cols - 1, v = 2.0 * y / light.rows - 1;
+    return Terms{{1, u, v, u * u, u * v, v * v}};
+  };
+  Eigen::Matrix<double, 6, 6> normal = Eigen::Matrix<double, 6, 6>::Identity() * 1e-9;
+  Terms right = Terms::Zero();
+  for (int y = 0; y < light.rows; y += 2) {
+    for (int x = 0; x < light.cols; x += 2) {
+      const double value = static_cast<double>(light.at<float>(y, x));
+      if (blank.at<std::uint8_t>(y, x) == 0 || value < 0) continue;
+      const Terms t = terms(x, y);
+      normal += t * t.transpose();
+      right += t * value;
+    }
+  }
+  const Terms surface = normal.ldlt().solve(right);
+  cv::Mat dark(light.size(), CV_32F);
+  for (int y = 0; y < light.rows; ++y) {
+    for (int x = 0; x < light.cols; ++x) {
+      const double value = static_cast<double>(light.at<float>(y, x));
+      dark.at<float>(y, x) = value < 0 ? 0.0f : static_cast<float>(1 - value / std::max(surface.dot(terms(x, y)), 1e-3));
+    }
+  }
+  return dark;
+}
+
+double median_of(std::vector<float>& values) {
+  if (values.empty()) return 0;
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return static_cast<double>(*middle);
+}
+
+/// Stripes of cells along the scan that are much brighter than ink. full  cells that are to be printed, away from edges
+std::vector<MissingBand> missing_bands(const cv::Mat& dark, const cv::Mat& full, const Cells& layer, bool along_x, double ink) {
+  constexpr int kLeastCells = 15;
+  const int count = along_x ? dark.rows : dark.cols, length = along_x ? dark.cols : dark.rows;
+  std::vector<double> ratio(static_cast<std::size_t>(count), 1);
+  for (int i = 0; i < count; ++i) {
+    double sum = 0;
+    int cells = 0;
+    for (int k = 0; k < length; ++k) {
+      const int x = along_x ? k : i, y = along_x ? i : k;
+      if (full.at<std::uint8_t>(y, x) == 0) continue;
+      sum += static_cast<double>(dark.at<float>(y, x));
+      ++cells;
+    }
+    if (cells >= kLeastCells) ratio[static_cast<std::size_t>(i)] = sum / cells / ink;
+  }
+  std::vector<MissingBand> bands;
+  const double start = along_x ? layer.top : layer.left;
+  for (int i = 0; i < count; ++i) {
+    if (ratio[static_cast<std::size_t>(i)] > 0.7) continue;
+    int first = i, last = i;
+    while (first > 0 && ratio[static_cast<std::size_t>(first - 1)] < 0.93) --first;
+    while (last + 1 < count && ratio[static_cast<std::size_t>(last + 1)] < 0.93) ++last;
+    double missing = 0;
+    for (int k = first; k <= last; ++k) missing += (1 - ratio[static_cast<std::size_t>(k)]) * layer.side;
+    if (missing >= kLeastMissingMm) bands.push_back({start + first * layer.side, start + (last + 1) * layer.side, missing});
+    i = last;
+  }
+  return bands;
+}
+
+std::vector<BodySeen> bodies_of(const cv::Mat& dark, const Cells& layer, double ink) {
+  cv::Mat labels, near, grown = layer.share > 0.5;
+  const int count = cv::connectedComponents(grown, labels, 8);
+  std::vector<BodySeen> bodies(static_cast<std::size_t>(std::max(count - 1, 0)));
+  std::vector<double> cells(bodies.size(), 0);
+  // Each body with what lies up to three cells around it and nearer to no other one.
+  for (int round = 0; round < 3; ++round) {
+    cv::Mat wider = labels.clone();
+    for (int y = 1; y + 1 < labels.rows; ++y) {
+      for (int x = 1; x + 1 < labels.cols; ++x) {
+        if (labels.at<int>(y, x) != 0) continue;
+        for (const auto& [i, j] : {std::pair(0, -1), {-1, 0}, {1, 0}, {0, 1}}) {
+          if (wider.at<int>(y, x) == 0) wider.at<int>(y, x) = labels.at<int>(y + j, x + i);
+        }
+      }
+    }
+    labels = wider;
+  }
+  for (int y = 0; y < labels.rows; ++y) {
+    for (int x = 0; x < labels.cols; ++x) {
+      const int label = labels.at<int>(y, x);
+      if (label == 0) continue;
+      BodySeen& body = bodies[static_cast<std::size_t>(label - 1)];
+      const double area = layer.side * layer.side, share = static_cast<double>(layer.share.at<float>(y, x));
+      const Spot m = layer.middle(x, y);
+      body.expected_mm2 += area * share;
+      body.seen_mm2 += area * std::clamp(static_cast<double>(dark.at<float>(y, x)) / ink, 0.0, 1.0);
+      body.x_mm += m.x;
+      body.y_mm += m.y;
+      ++cells[static_cast<std::size_t>(label - 1)];
+    }
+  }
+  for (std::size_t b = 0; b < bodies.size(); ++b) {
+    bodies[b].x_mm /= std::max(cells[b], 1.0);
+    bodies[b].y_mm /= std::max(cells[b], 1.0);
+  }
+  return bodies;
+}
+
+/// How alike the layer is when it is seen in a mirror, at its best.
+double mirrored_likeness(const cv::Mat& photo, const cv::Mat& cells, const Cells& layer) {
+  double best = -1;
+  for (const int axis : {0, 1}) {
+    cv::Mat mirrored;
+    cv::flip(cells, mirrored, axis);
+    double likeness = 0;
+    first_view(photo, mirrored, layer, likeness);
+    best = std::max(best, likeness);
+  }
+  return best;
+}
+
+}  // namespace
+
+Result<Comparison> compare_layer(const Photo& photo, const ExpectedLayer& layer) {
+  constexpr double kLeastLikeness = 0.25, kClearly = 0.05;
+  const Cells cells = cells_of(layer);
+  if (cells.share.empty())
+    return Error{Fault::kInput,
+                 "cannot be compared: the layer is empty, or too large for pixels of the size that --pixel says"};
+  const double wide = std::max(8.0, 0.08 * std::max(cells.share.cols, cells.share.rows));
+  const cv::Mat seen = without_shade(-photo.light, wide), wanted = without_shade(cells.share, wide);
+  Comparison comparison;
+  comparison.view = first_view(seen, wanted, cells, comparison.likeness);
+  if (const double mirrored = mirrored_likeness(seen, wanted, cells);
+      mirrored >= kLeastLikeness && mirrored > comparison.likeness + kClearly)
+    return Error{Fault::kInput,
+                 "is mirrored: the layer lies in it as in a mirror; turn the picture over, or photograph the layer "
+                 "from above"};
+  if (comparison.likeness < kLeastLikeness)
+    return Error{Fault::kInput,
+                 "does not show the layer: it has to lie upright, turned by at most 6 degrees, with pixels of about "
+                 "the size that --pixel says"};
+  for (const double blur : {4.0, 2.0, 1.0}) {
+    cv::Mat soft, soft_cells;
+    cv::GaussianBlur(seen, soft, {}, blur);
+    cv::GaussianBlur(wanted, soft_cells, {}, blur);
+    refine(soft, soft_cells, cells, comparison.view);
+  }
+  cv::Mat blank, full;
+  const auto disc = [](int side) { return cv::getStructuringElement(cv::MORPH_ELLIPSE, {side, side}); };
+  cv::dilate(cells.share > 0.01, blank, disc(9));
+  blank = blank == 0;
+  cv::erode(cells.share > 0.99, full, disc(5));
+  const cv::Mat dark = darkness_of(in_cells(photo.light, cells, comparison.view), blank);
+  std::vector<float> inked;
+  for (int y = 0; y < dark.rows; ++y) {
+    for (int x = 0; x < dark.cols; ++x) {
+      if (full.at<std::uint8_t>(y, x) != 0) inked.push_back(dark.at<float>(y, x));
+    }
+  }
+  if (inked.empty())
+    return Error{
+        Fault::kInput,
+        "cannot be compared: no place of the layer, several pixels of the photograph wide, is printed in full, to tell "
+        "the darkness of ink by; where drops are strewn, take the layer of a job without --saturation"};
+  const double ink = median_of(inked);
+  if (ink < 0.05)
+    return Error{Fault::kInput, "shows no ink where the layer has some: less than a twentieth darker than the blank sheet"};
+  comparison.bands = missing_bands(dark, full, cells, layer.scan_along_x, ink);
+  comparison.bodies = bodies_of(dark, cells, ink);
+  comparison.extra = extra_ink(photo, layer, comparison.view, ink);
+  return comparison;
+}
+
+Json comparison_json(const Comparison& comparison) {
+  Json json = {
+      {"likeness", comparison.likeness}, {"missing", Json::array()}, {"bodies", Json::array()}, {"extra", Json::array()}};
+  for (const MissingBand& band : comparison.bands)
+    json["missing"].push_back({{"from_mm", band.from_mm}, {"to_mm", band.to_mm}, {"missing_mm", band.missing_mm}});
+  for (const BodySeen& body : comparison.bodies)
+    json["bodies"].push_back(
+        {{"x_mm", body.x_mm}, {"y_mm", body.y_mm}, {"expected_mm2", body.expected_mm2}, {"seen_mm2", body.seen_mm2}});
+  for (const ExtraInk& ink : comparison.extra)
+    json["extra"].push_back({{"x_mm", ink.x_mm}, {"y_mm", ink.y_mm}, {"mm2", ink.mm2}});
+  return json;
+}
+
+}  // namespace lamina::scan

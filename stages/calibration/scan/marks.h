@@ -1,0 +1,22 @@
+// stages/calibration/scan/marks.h: the four marks of a chart in a photograph.
+#pragma once
+
+#include "stages/calibration/chart/chart.h"
+#include "stages/calibration/scan/photo.h"
+#include "stages/calibration/scan/view.h"
+#include "stages/data/status.h"
+
+namespace lamina::scan {
+
+/// The middle of a box, in mm of the image from its upper left corner.
+inline Spot middle_of(const ChartBox& box, const Chart& chart) {
+  return {(box.left + box.right) * 0.5e-6 * chart.pixel_x_nm, (box.top + box.bottom) * 0.5e-6 * chart.pixel_y_nm};
+}
+
+/// Finds discs and rings, however the sheet lies, and takes the view that puts the most dashes onto ink: of four marks, or of
+/// three, where the place of the fourth is searched.
+/// errors  kInput: fewer are there, or the photograph is mirrored
+/// cost    some passes over the photograph; with three marks some millions of samples for each guess
+Result<View> find_marks(const Photo& photo, const Chart& chart);
+
+}  // namespace lamina::scan

@@ -1,0 +1,49 @@
+// stages/calibration/scan/nozzles.h: what the dashes of a chart tell of nozzles and swaths, and how far it can be wrong.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "stages/calibration/chart/chart.h"
+#include "stages/calibration/scan/dashes.h"
+#include "stages/calibration/scan/sheet_fit.h"
+
+namespace lamina::scan {
+
+/// A length with its standard error. within_um  99 in 100 of them lie nearer to the truth (stages/calibration/within.h)
+/// told  four standard errors are at most a tenth of a pixel of the layer
+struct Measure {
+  double um = 0, error_um = 0, within_um = 0;
+  bool told = false;
+};
+
+/// A shift: along the scan, positive where places rise; across it, positive where lines rise.
+struct Offset {
+  Measure along, across;
+};
+
+struct HeadReading {
+  std::vector<std::uint32_t> blocked, weak;   // nozzles: never seen, seen by times
+  std::vector<std::uint32_t> untold;          // nozzles whose dashes are all hidden
+  std::vector<std::optional<Offset>> nozzle;  // against the head's line, of those that were seen
+  std::vector<std::optional<Offset>> swath;   // against the first one, along the head's line; absent: not printed
+};
+
+/// Whether a swath was printed at all: a fifth of its dashes are there.
+std::vector<bool> printed_swaths(const Chart& chart, const std::vector<DashSeen>& seen);
+
+/// Dashes that are there, of swaths that were printed, where `view` has them.
+std::vector<Sighting> sightings_of(const Chart& chart, const std::vector<DashSeen>& seen, const View& view,
+                                   const std::vector<bool>& printed);
+
+/// Decides each nozzle by all of its dashes in the swaths that were printed, and measures nozzles and swaths.
+///
+/// The head's line is the straight line through its nozzles' offsets (line_of), which cannot be told from the scale of the
+/// photograph. Errors of swaths follow from leaving out a ninth of all dashes at a time (jackknife). Those of nozzles are of
+/// two parts: the scatter of dashes, and the line's own error, which the middle nozzle brings to all: found by moving nozzles
+/// by their errors. fit      of these dashes printed  as printed_swaths() has it, one at least
+HeadReading judge_head(const Chart& chart, const std::vector<DashSeen>& seen, const std::vector<bool>& printed,
+                       const SheetFit& fit, bool lens);
+
+}  // namespace lamina::scan

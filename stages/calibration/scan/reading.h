@@ -1,0 +1,38 @@
+// stages/calibration/scan/reading.h: what a photograph of a chart tells of the head that printed it.
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "stages/calibration/chart/chart.h"
+#include "stages/calibration/scan/dashes.h"
+#include "stages/calibration/scan/inks.h"
+#include "stages/calibration/scan/joints.h"
+#include "stages/calibration/scan/nozzles.h"
+#include "stages/calibration/scan/sheet_fit.h"
+#include "stages/data/status.h"
+#include "stages/support/text/json.h"
+
+namespace lamina::scan {
+
+struct ChartReading {
+  SheetFit fit;
+  std::vector<DashSeen> dashes;  // in the order of the chart
+  double pixels_a_mm = 0;        // of the photograph
+  double scatter_um = 0;         // median distance of dashes from where the fit puts them
+  HeadReading head;
+  InkReading inks;
+  std::vector<JointReading> joints;
+};
+
+/// Reads a chart.
+/// errors  kInput: the chart is not found, or fewer than a tenth of its dashes
+/// cost    some seconds for a thousand nozzles
+Result<ChartReading> read_chart_photo(const Photo& photo, const Chart& chart);
+
+Json reading_json(const ChartReading& reading);
+
+/// The photograph with a sign on every dash: green seen, red not seen, orange hidden; the marks in blue.
+cv::Mat picture_of(const Photo& photo, const Chart& chart, const ChartReading& reading);
+
+}  // namespace lamina::scan

@@ -1,0 +1,49 @@
+// What an inspection found, for programs.
+#include <nlohmann/json.hpp>
+#include <string>
+
+#include "stages/checks/inspect.h"
+
+namespace lamina::inspect {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+Json json_of(const Spot& spot) {
+  return {{"x_mm", spot.x_mm}, {"y_mm", spot.y_mm}, {"z_mm", spot.z_mm}, {"layer", spot.layer}};
+}
+
+Json json_of(const Found& found, const std::string& amount) {
+  Json json{{"count", found.count}};
+  if (found.count == 0) return json;
+  json[amount] = found.amount;
+  json["largest_" + amount] = found.largest;
+  json["largest_at"] = json_of(found.spot);
+  for (const Place& place : found.places) {
+    Json& one = json["places"].emplace_back(json_of(place.spot));
+    one["last_layer"] = place.last_layer;
+    one["box_mm"] = place.box_mm;
+    one[amount] = place.amount;
+  }
+  return json;
+}
+
+}  // namespace
+
+Json json_of(const Findings& findings, double least_mm) {
+  Json json{{"layers", findings.layers},
+            {"least_wall_mm", least_mm},
+            {"islands", json_of(findings.islands, "mm2")},
+            {"loose", json_of(findings.loose, "mm3")},
+            {"hollows", json_of(findings.hollows, "mm3")},
+            {"thin", json_of(findings.thin, "mm2")},
+            {"touching", Json::array()}};
+  for (const auto& pair : findings.touching) {
+    json["touching"].push_back({{"part", pair.part}, {"other", pair.other}, {"at", json_of(pair.spot)}});
+  }
+  if (findings.bed_edge) json["bed_edge"] = json_of(*findings.bed_edge);
+  if (findings.stop) json["stopped"] = {{"layer", findings.stop->layer}, {"bytes", findings.stop->bytes}};
+  return json;
+}
+
+}  // namespace lamina::inspect

@@ -1,0 +1,261 @@
+#include "stages/checks/judge.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "stages/support/text/number_text.h"
+
+namespace lamina::sanity {
+namespace {
+
+/// Sound jobs stay well between these shares of a mesh. Shells that overlap within a mesh make less of it.
+constexpr double kLeast = 0.55, kMost = 1.2;
+/// A top that ends amid a layer adds or takes up to half of one; at most this much of a part's height is forgiven.
+constexpr double kMostOfTop = 0.2;
+/// A bleed that leaves less of a part is hardly meant.
+constexpr double kLeft = 0.7;
+/// Pixels and layers are coarse if fewer than these lie across a solid.
+constexpr double kAcross = 5;
+
+std::string volume_text(double mm3) {
+  return mm3 < 1000 ? fmt::format("{:.4g} mm3", mm3) : fmt::format("{:.4g} cm3", mm3 / 1000);
+}
+
+std::string size_text(const Box& box) {
+  return fmt::format("{:.4g} x {:.4g} x {:.4g} mm", mm(box.width()), mm(box.depth()), mm(box.height()));
+}
+
+/// What about the job is coarse for a solid, and what to do; "" if nothing is.
+std::string too_coarse(const Box& box, const Sampling& sampling) {
+  const auto [x, y] = sampling.pixel_mm;
+  if (x * kAcross > mm(box.width()) || y * kAcross > mm(box.depth())) {
+    return fmt::format("a pixel of {:.4g} x {:.4g} mm is coarse for {}: give a higher --dpi{}", x, y, size_text(box),
+                       mm(box.height()) < 1 ? ", or the right --unit" : "");
+  }
+  if (sampling.thickest_mm * kAcross > mm(box.height())) {
+    return fmt::format("layers of {} mm are coarse for {}: give a smaller --layer", number_text(sampling.thickest_mm),
+                       size_text(box));
+  }
+  if (sampling.tolerance_um * 1e-3 * kAcross > mm(std::min(box.width(), box.depth()))) {
+    return fmt::format("--tolerance {} um is coarse for {}: give a smaller one", number_text(sampling.tolerance_um),
+                       size_text(box));
+  }
+  return {};
+}
+
+/// The worst solid or group of each part.
+struct Worst {
+  double badness = 0;
+  std::uint32_t at = 0, count = 0;
+};
+using WorstOfParts = std::vector<Worst>;
+
+void note(WorstOfParts& worst, std::uint32_t part, std::uint32_t at, double badness) {
+  if (worst.size() <= part) worst.resize(part + 1);
+  ++worst[part].count;
+  if (worst[part].count == 1 || badness > worst[part].badness) worst[part].badness = badness, worst[part].at = at;
+}
+
+std::string and_more(const Worst& worst) {
+  return worst.count > 1 ? fmt::format(" ({} of its copies or objects alike)", worst.count) : "";
+}
+
+/// By how much planned and mesh differ beyond what sound jobs show; 1 or less: not at all.
+double badness_of(const Group& group, double planned_mm3, const Sampling& sampling) {
+  const double top = std::min(kMostOfTop, 0.5 * sampling.thickest_mm / std::max(1e-6, mm(group.box.height())));
+  if (group.most_mm3 <= 0) return 0;
+  if (sampling.offset_mm <= 0 && planned_mm3 > (kMost + top) * group.most_mm3) return planned_mm3 / group.most_mm3;
+  if (sampling.offset_mm >= 0 && planned_mm3 < (kLeast - top) * group.least_mm3) {
+    return group.least_mm3 / std::max(planned_mm3, 1e-9);
+  }
+  return 0;
+}
+
+/// The same, with what the group's solids hold together where their meshes speak against them. `group` is then that.
+Result<double> badness_as_united(std::uint32_t g, Group& group, double planned_mm3, const Sampling& sampling) {
+  const double badness = badness_of(group, planned_mm3, sampling);
+  if (badness <= 1 || !sampling.united_mm3) return badness;
+  const Result<double> united = sampling.united_mm3(g);
+  if (!united) {
+    const Fault fault = united.error().fault;
+    if (fault == Fault::kInterrupted || fault == Fault::kMemory) return united.error();
+    return 0.0;
+  }
+  if (*united <= 0) return badness;
+  group.least_mm3 = group.most_mm3 = *united;
+  return badness_of(group, planned_mm3, sampling);
+}
+
+Status judge_volumes(const Tally& tally, const Sampling& sampling, std::vector<Warning>& warnings) {
+  WorstOfParts worst;
+  std::vector<Group> groups(tally.groups().begin(), tally.groups().end());
+  for (std::uint32_t g = 0; g < groups.size(); ++g) {
+    Group& group = groups[g];
+    // What has vanished as a whole is told as such.
+    if (!group.closed || !tally.measured(g) || tally.planned_mm3(g) == 0) continue;
+    const Result<double> badness = badness_as_united(g, group, tally.planned_mm3(g), sampling);
+    if (!badness) return badness.error();
+    if (*badness > 1) note(worst, group.part, g, *badness);
+  }
+  for (std::uint32_t part = 0; part < worst.size(); ++part) {
+    if (worst[part].count == 0) continue;
+    const Group& group = groups[worst[part].at];
+    const double planned = tally.planned_mm3(worst[part].at);
+    std::string why = too_coarse(group.box, sampling);
+    if (why.empty()) why = "its walls are too thin, or its shells overlap, cancel or are inside out: look at `lamina info`";
+    const double mesh = planned > group.most_mm3 ? group.most_mm3 : group.least_mm3;
+    warnings.push_back({"volume",
+                        fmt::format("{}: {} are planned where the mesh holds {} ({:.0f} %){}; {}", sampling.part[part],
+                                    volume_text(planned), volume_text(mesh), 100 * planned / mesh, and_more(worst[part]), why),
+                        sampling.part[part]});
+  }
+  return {};
+}
+
+/// "a bleed of 40 um", or "its bleed" where parts or edges have several.
+std::string bleed_text(const Sampling& sampling, std::string_view of_several) {
+  const auto [x, y] = sampling.bleed_um;
+  if (x == 0 && y == 0) return std::string(of_several);
+  return fmt::format("a bleed of {} um", x == y ? number_text(x) : number_text(x) + " x " + number_text(y));
+}
+
+void warn_of_bleed(const Sampling& sampling, std::uint32_t part, double taken, const Worst& worst,
+                   std::vector<Warning>& warnings) {
+  warnings.push_back({"bleed",
+                      fmt::format("{}: {} takes away {:.0f} % of it{}; --bleed counts in um", sampling.part[part],
+                                  bleed_text(sampling, "its bleed"), 100 * taken, and_more(worst)),
+                      sampling.part[part]});
+}
+
+/// Whether bleed or dose took a solid of a finished job: it lies over pixels and is as high as a layer.
+bool was_taken(const Tally& tally, std::uint32_t solid, const Sampling& sampling) {
+  return sampling.finished && (sampling.bleeds || sampling.drops_none) && tally.has_pixels(solid) &&
+         mm(tally.solids()[solid].box.height()) >= sampling.thickest_mm;
+}
+
+void judge_lost(const Tally& tally, const Sampling& sampling, std::vector<Warning>& warnings) {
+  WorstOfParts worst, taken;  // taken: by bleed or dose
+  for (std::uint32_t s = 0; s < tally.solids().size(); ++s) {
+    const Solid& solid = tally.solids()[s];
+    if (tally.seen(s) || solid.box.empty()) continue;
+    note(was_taken(tally, s, sampling) ? taken : worst, solid.part, s, std::abs(solid.mesh_mm3));
+  }
+  for (std::uint32_t part = 0; part < taken.size() && sampling.bleeds; ++part) {
+    if (taken[part].count > 0) warn_of_bleed(sampling, part, 1, taken[part], warnings);
+  }
+  for (std::uint32_t part = 0; part < worst.size(); ++part) {
+    if (worst[part].count == 0) continue;
+    std::string why = too_coarse(tally.solids()[worst[part].at].box, sampling);
+    if (why.empty() && sampling.offset_mm < 0) why = fmt::format("--offset {} leaves none", number_text(sampling.offset_mm));
+    if (why.empty()) why = "its walls are too thin, or its shells cancel each other: look at `lamina info`";
+    warnings.push_back({"part-lost",
+                        fmt::format("{}: no layer has anything of it{}; {}", sampling.part[part], and_more(worst[part]), why),
+                        sampling.part[part]});
+  }
+}
+
+void judge_bleed(const Tally& tally, const Sampling& sampling, std::vector<Warning>& warnings) {
+  WorstOfParts worst;
+  for (std::uint32_t g = 0; g < tally.groups().size(); ++g) {
+    const Group& group = tally.groups()[g];
+    const double left = sampling.finished ? tally.planned_mm3(g) : tally.left_mm3(g);
+    const bool known = group.closed && !sampling.one_sided && too_coarse(group.box, sampling).empty();
+    const double planned = !sampling.finished ? tally.planned_mm3(g) : known ? group.least_mm3 : 0;
+    if (!tally.measured(g) || planned <= 0 || left >= kLeft * planned || (sampling.finished && left == 0)) continue;
+    note(worst, group.part, g, 1 - left / planned);
+  }
+  for (std::uint32_t part = 0; part < worst.size(); ++part) {
+    if (worst[part].count > 0) warn_of_bleed(sampling, part, worst[part].badness, worst[part], warnings);
+  }
+}
+
+}  // namespace
+
+Status judge_solids(const Tally& tally, const Sampling& sampling, std::vector<Warning>& warnings) {
+  judge_lost(tally, sampling, warnings);
+  if (!sampling.one_sided && !sampling.bleeds) {
+    if (Status status = judge_volumes(tally, sampling, warnings); !status) return status;
+  }
+  if (tally.looked_at_bleed() || sampling.bleeds) judge_bleed(tally, sampling, warnings);
+  return {};
+}
+
+void judge_layers(std::span<const Solid> solids, std::span<const std::uint8_t> filled,
+                  const std::function<Layer(std::uint32_t)>& layer, std::vector<Warning>& warnings) {
+  const auto first = std::ranges::find(filled, 1);
+  if (first == filled.end()) return;
+  const auto begin = static_cast<std::uint32_t>(first - filled.begin());
+  std::uint32_t end = static_cast<std::uint32_t>(filled.size()), empty = 0;
+  while (filled[end - 1] == 0) --end;
+  std::optional<Layer> lowest;
+  for (std::uint32_t i = begin; i < end; ++i) {
+    if (filled[i] != 0) continue;
+    const Layer at = layer(i);
+    const auto within = [&](const Solid& solid) {
+      return solid.box.lo.z < at.bottom && at.bottom + at.thickness < solid.box.hi.z;
+    };
+    if (!std::ranges::any_of(solids, within)) continue;
+    if (empty++ == 0) lowest = at;
+  }
+  if (empty == 0) return;
+  const double z = mm(lowest->plane());
+  warnings.push_back({"layers-empty",
+                      fmt::format("{} of {} layers are empty amid a part, first layer {} at z {:.3f} mm", empty, filled.size(),
+                                  lowest->index, z),
+                      "", lowest->index, z});
+}
+
+void judge_tolerance(std::span<const Solid> solids, const Sampling& sampling, std::vector<Warning>& warnings) {
+  const double tolerance = sampling.tolerance_um * 1e-3;
+  for (const Solid& solid : solids) {
+    const double most = std::clamp(0.02 * mm(std::min(solid.box.width(), solid.box.depth())), 0.05, 0.25);
+    if (solid.box.empty() || tolerance <= most * (1 + 1e-9)) continue;
+    warnings.push_back({"tolerance",
+                        fmt::format("{}: --tolerance {} moves contours by up to {:.3g} mm; it counts in um",
+                                    sampling.part[solid.part], number_text(sampling.tolerance_um), tolerance),
+                        sampling.part[solid.part]});
+    return;
+  }
+}
+
+void judge_footing(std::span<const Solid> solids, const Sampling& sampling, std::vector<Warning>& warnings) {
+  std::vector<std::int64_t> lowest(sampling.part.size(), std::numeric_limits<std::int64_t>::max());
+  for (const Solid& solid : solids) {
+    if (!solid.box.empty()) lowest[solid.part] = std::min<std::int64_t>(lowest[solid.part], solid.box.lo.z);
+  }
+  for (std::uint32_t part = 0; part < lowest.size(); ++part) {
+    const std::int64_t low = lowest[part];
+    if (low <= 0 || low == std::numeric_limits<std::int64_t>::max()) continue;
+    const auto own = std::ranges::find_if(solids, [&](const Solid& s) { return s.part == part && s.box.lo.z == low; });
+    const Box& box = own->box;
+    const auto carries = [&](const Solid& other) {
+      return other.part != part && other.box.lo.z < low && other.box.hi.z >= low && other.box.lo.x < box.hi.x &&
+             box.lo.x < other.box.hi.x && other.box.lo.y < box.hi.y && box.lo.y < other.box.hi.y;
+    };
+    if (std::ranges::any_of(solids, carries)) continue;
+    warnings.push_back({"above-bed",
+                        fmt::format("{}: begins {:.3f} mm above the bed, in the air; leave out --bottom, or put it on a part",
+                                    sampling.part[part], mm(low)),
+                        sampling.part[part], std::nullopt, mm(low)});
+  }
+}
+
+std::string why_nothing(const Tally& tally, const Sampling& sampling) {
+  const auto solids = tally.solids();
+  for (std::uint32_t s = 0; s < solids.size(); ++s) {
+    if (tally.seen(s)) {
+      const bool bleeds = tally.looked_at_bleed() && tally.left_mm3(solids[s].group) == 0;
+      return bleeds ? bleed_text(sampling, "the bleed") + " takes away all of the parts: --bleed counts in um" : std::string();
+    }
+  }
+  for (const Solid& solid : solids) {
+    if (std::string why = too_coarse(solid.box, sampling); !why.empty()) return why;
+  }
+  if (sampling.offset_mm < 0) return fmt::format("--offset {} leaves none of the parts", number_text(sampling.offset_mm));
+  return "the shells of the parts enclose nothing or cancel each other: look at `lamina info`";
+}
+
+}  // namespace lamina::sanity

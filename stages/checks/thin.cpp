@@ -1,0 +1,189 @@
+#include "stages/checks/thin.h"
+
+#include <algorithm>
+#include <tuple>
+
+#include "stages/geometry/combine.h"
+
+namespace lamina::inspect {
+namespace {
+
+/// Where the image has rows and columns that are set.
+PixelBox box_of(const RunsView& image) {
+  PixelBox box;
+  for (std::uint32_t r = 0; r < image.rows(); ++r) {
+    const auto row = image.row(r);
+    if (!row.empty()) box.add({row.front(), row.back(), r, r + 1});
+  }
+  return box;
+}
+
+/// Where the top left corner of a stencil may lie within a box; empty if it does not fit.
+PixelBox corners_in(const PixelBox& box, const Stencil& stencil) {
+  const auto rows = static_cast<std::uint32_t>(stencil.rows.size());
+  if (box.right - box.left < stencil.columns || box.bottom - box.top < rows) return {0, 0, 0, 0};
+  return {box.left, box.right - stencil.columns + 1, box.top, box.bottom - rows + 1};
+}
+
+enum class To { kPixels, kCorners };
+
+/// Of corners, all pixels of their stencils; of pixels, the corners of all stencils that hold one. Within the window.
+void spread(const RunsView& image, const Stencil& stencil, To to, const PixelBox& window, Buffer<std::uint64_t>& spans,
+            Runs& result) {
+  result.columns = image.columns;
+  result.row_offset.assign(1, 0);
+  result.change.clear();
+  const std::int64_t left = window.left, right = window.right;
+  for (std::uint32_t r = 0; r < image.rows(); ++r) {
+    const std::size_t row_begin = result.change.size();
+    const std::size_t rows = r >= window.top && r < window.bottom ? stencil.rows.size() : 0;
+    spans.clear();
+    for (std::size_t j = 0; j < rows; ++j) {
+      const std::int64_t from =
+          to == To::kPixels ? std::int64_t{r} - static_cast<std::int64_t>(j) : static_cast<std::int64_t>(r + j);
+      if (from < 0 || from >= image.rows()) continue;
+      const std::int64_t first = stencil.rows[j].first, last = stencil.rows[j].last;
+      const auto row = image.row(static_cast<std::uint32_t>(from));
+      for (std::size_t i = 0; i + 1 < row.size(); i += 2) {
+        const std::int64_t begin = std::max(left, row[i] + (to == To::kPixels ? first : -last));
+        const std::int64_t end = std::min(right, row[i + 1] + (to == To::kPixels ? last : -first));
+        if (begin < end) spans.push_back(static_cast<std::uint64_t>(begin) << 32 | static_cast<std::uint64_t>(end));
+      }
+    }
+    std::sort(spans.begin(), spans.end());
+    for (const std::uint64_t span : spans) {
+      const auto begin = static_cast<std::uint32_t>(span >> 32), end = static_cast<std::uint32_t>(span);
+      if (result.change.size() > row_begin && begin <= result.change.back()) {
+        result.change.back() = std::max(result.change.back(), end);
+      } else {
+        result.change.push_back(begin);
+        result.change.push_back(end);
+      }
+    }
+    result.row_offset.push_back(static_cast<std::uint32_t>(result.change.size()));
+  }
+}
+
+/// Pixels of `of`, all of which are set in the image, that the stencil covers nowhere.
+void uncovered(const RunsView& image, const PixelBox& box, const RunsView& of, const Stencil& stencil, ThinScratch& scratch) {
+  const PixelBox corners = corners_in(box, stencil);
+  auto& [outside, anchors, grown, fits, left, chosen, waiting, pending, spans, pieces] = scratch;
+  if (&of == &image) {
+    complement(image, box, outside);
+    spread(outside, stencil, To::kCorners, corners, spans, grown);
+    complement(grown, corners, fits);
+  } else {
+    spread(of, stencil, To::kCorners, corners, spans, anchors);
+    spread(anchors, stencil, To::kPixels, box, spans, grown);
+    combine(grown, image, SetOperation::kDifference, outside);
+    spread(outside, stencil, To::kCorners, corners, spans, grown);
+    combine(anchors, grown, SetOperation::kDifference, fits);
+  }
+  spread(fits, stencil, To::kPixels, box, spans, grown);
+  combine(of, grown, SetOperation::kDifference, left);
+}
+
+/// The pieces of an image, of more than `least` pixels and at most `most`. returns  the pixels of the largest
+std::uint64_t pick(const RunsView& image, const Pieces& pieces, std::uint64_t least, std::uint64_t most, Runs& result) {
+  std::uint64_t largest = 0;
+  result.columns = image.columns;
+  result.row_offset.assign(1, 0);
+  result.change.clear();
+  for (std::uint32_t r = 0; r < image.rows(); ++r) {
+    for (std::uint32_t i = image.row_offset[r] / 2; i < image.row_offset[r + 1] / 2; ++i) {
+      const std::uint64_t pixels = pieces.pixels[pieces.of_run[i]];
+      if (pixels <= least || pixels > most) continue;
+      largest = std::max(largest, pixels);
+      result.change.push_back(image.change[2 * i]);
+      result.change.push_back(image.change[2 * i + 1]);
+    }
+    result.row_offset.push_back(static_cast<std::uint32_t>(result.change.size()));
+  }
+  return largest;
+}
+
+/// Puts the largest in front, and no more than so many.
+void keep_largest(std::vector<ThinPlace>& places, std::size_t most) {
+  const auto order = [](const ThinPlace& place) { return std::tuple(~place.pixels, place.box.top, place.box.left); };
+  std::ranges::stable_sort(places, {}, order);
+  places.resize(std::min(places.size(), most));
+}
+
+/// Takes pieces of more pixels than `least` into the places.
+void take(const Pieces& pieces, std::uint64_t least, ThinPlaces& places) {
+  for (std::size_t p = 0; p < pieces.count(); ++p) {
+    const std::uint64_t pixels = pieces.pixels[p];
+    if (pixels <= least) continue;
+    ++places.count;
+    places.pixels += pixels;
+    places.largest.push_back({pixels, pieces.box[p]});
+    if (places.largest.size() >= 4 * ThinPlaces::kMost) keep_largest(places.largest, ThinPlaces::kMost);
+  }
+}
+
+}  // namespace
+
+void complement(const RunsView& image, const PixelBox& window, Runs& result) {
+  result.columns = image.columns;
+  result.row_offset.assign(1, 0);
+  result.change.clear();
+  result.change.reserve(image.change.size() + 2 * (window.bottom - window.top));
+  for (std::uint32_t r = 0; r < image.rows(); ++r) {
+    if (r >= window.top && r < window.bottom) {
+      std::uint32_t at = window.left;
+      const auto row = image.row(r);
+      for (std::size_t i = 0; i + 1 < row.size() && at < window.right; i += 2) {
+        if (at < row[i]) {
+          result.change.push_back(at);
+          result.change.push_back(std::min(row[i], window.right));
+        }
+        at = std::max(at, row[i + 1]);
+      }
+      if (at < window.right) {
+        result.change.push_back(at);
+        result.change.push_back(window.right);
+      }
+    }
+    result.row_offset.push_back(static_cast<std::uint32_t>(result.change.size()));
+  }
+}
+
+std::uint64_t ThinScratch::bytes() const {
+  std::uint64_t total = bytes_held(spans) + pieces.bytes();
+  for (const Runs* image : {&outside, &anchors, &grown, &fits, &left, &chosen, &waiting, &pending})
+    total += bytes_held(image->row_offset) + bytes_held(image->change);
+  return total;
+}
+
+// From wide to narrow. What a stencil covers is thin for none that is narrower, so that each looks at what those before it
+// left, and of that at pieces that are large enough for it: of corners few are.
+ThinPlaces thin_places(const RunsView& image, const Stencils& stencils, ThinScratch& scratch) {
+  ThinPlaces places;
+  if (stencils.count() < 2 || image.change.empty()) return places;
+  const PixelBox box = box_of(image);
+  auto& [outside, anchors, grown, fits, left, chosen, waiting, pending, spans, pieces] = scratch;
+  const std::uint64_t corner = stencils.two_squares(1);
+  std::uint32_t number = stencils.count() - 1;
+  uncovered(image, box, image, stencils.at(number), scratch);
+  pieces.find(left, true);
+  places.bytes = image.change.size_bytes() + 5 * image.row_offset.size_bytes() + pieces.count() * sizeof(ThinPlace);
+  for (const Runs* held : {&outside, &grown, &grown, &fits, &left}) places.bytes += held->view().change.size_bytes();
+  take(pieces, stencils.two_squares(number), places);
+  std::uint64_t most = pick(left, pieces, corner, stencils.two_squares(number), pending);
+  while (--number > 0) {
+    const std::uint64_t least = stencils.two_squares(number);
+    if (most <= least) continue;
+    pieces.find(pending, true);
+    pick(pending, pieces, least, UINT64_MAX, chosen);
+    most = pick(pending, pieces, corner, least, waiting);
+    uncovered(image, box, chosen, stencils.at(number), scratch);
+    pieces.find(left, true);
+    take(pieces, least, places);
+    most = std::max(most, pick(left, pieces, corner, least, chosen));
+    combine(waiting, chosen, SetOperation::kUnion, pending);
+  }
+  keep_largest(places.largest, ThinPlaces::kMost);
+  return places;
+}
+
+}  // namespace lamina::inspect

@@ -1,0 +1,271 @@
+#include "stages/formats/gcode/commands.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+
+#include "stages/support/text/readable.h"
+
+namespace lamina::read {
+namespace {
+
+constexpr double kFarthestMm = 2000;
+
+/// What a line says behind one of the tags; null if it has none of them. BambuStudio has tags of its own:
+/// bambulab/BambuStudio, src/libslic3r/GCode/GCodeProcessor.cpp, Reserved_Tags.
+std::optional<std::string_view> behind_tag(std::string_view line, std::string_view tag, std::string_view bambu) {
+  if (line.starts_with(tag)) return line.substr(tag.size());
+  if (line.starts_with(bambu)) return line.substr(bambu.size());
+  return std::nullopt;
+}
+
+/// CuraEngine's words: gcodeExport.cpp, GCodeExport::flavorToString().
+GcodeFile::Firmware firmware_of(std::string_view flavor) {
+  if (flavor.starts_with("Marlin")) return GcodeFile::Firmware::kMarlin;
+  return flavor.starts_with("RepRap") ? GcodeFile::Firmware::kRepRap : GcodeFile::Firmware::kUntold;
+}
+
+}  // namespace
+
+double RawBead::length() const { return std::hypot(to[0] - from[0], to[1] - from[1]); }
+
+bool GcodeCommands::next(std::optional<RawBead>& bead) {
+  bead.reset();
+  layer_tag = false;
+  while (!fault) {
+    if (chord_ > 0) {
+      if (next_chord(bead)) return true;
+    } else if (!read_line()) {
+      return false;
+    } else if (text_.starts_with(';') ? read_tag() : run_command(bead)) {
+      return true;
+    }
+  }
+  return false;
+}
+
+bool GcodeCommands::read_line() {
+  before_ = place_;
+  const bool read = file_.next(text_);
+  place_.line += read || !file_.status() ? 1 : 0;
+  place_.byte = file_.offset();
+  if (!file_.status()) return fail("is no text of G-code; name a file that lamina extrude or a slicer wrote"), false;
+  if (!read) return false;
+  while (!text_.empty() && (text_.front() == ' ' || text_.front() == '\t')) text_.remove_prefix(1);
+  if (text_.ends_with('\r')) text_.remove_suffix(1);
+  return true;
+}
+
+void GcodeCommands::fail(std::string_view what) { fault = fmt::format("{}: line {}: {}", path_, place_.line, what); }
+
+double GcodeCommands::tag_length(std::string_view text) {
+  text.remove_prefix(std::min(text.find_first_not_of(' '), text.size()));
+  double value = 0;
+  const auto [end, code] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (code != std::errc() || !(value >= 0 && value < kFarthestMm)) {
+    fail(fmt::format("'{}' is not a length", one_line(text.substr(0, 40))));
+    return 0;
+  }
+  return value;
+}
+
+void GcodeCommands::name_type(std::string_view text) {
+  const std::string name = one_line(text.substr(0, 40));
+  const auto known = std::ranges::find(types_, name);
+  place_.type = static_cast<std::uint32_t>(known - types_.begin());
+  if (known == types_.end() && types_.size() < 100) types_.push_back(name);
+  place_.type = std::min<std::uint32_t>(place_.type, static_cast<std::uint32_t>(types_.size() - 1));
+}
+
+bool GcodeCommands::read_tag() {
+  for (const std::string_view tag : {";LAYER_CHANGE", ";LAYER:", "; CHANGE_LAYER"}) {
+    if (text_.starts_with(tag)) return layer_tag = true;
+  }
+  if (const auto width = behind_tag(text_, ";WIDTH:", "; LINE_WIDTH:")) {
+    place_.width = tag_length(*width);
+  } else if (const auto height = behind_tag(text_, ";HEIGHT:", "; LAYER_HEIGHT:")) {
+    place_.height = tag_length(*height);
+  } else if (const auto type = behind_tag(text_, ";TYPE:", "; FEATURE: ")) {
+    name_type(*type);
+  } else {
+    if (text_.starts_with(";FLAVOR:")) place_.firmware = firmware_of(text_.substr(8));
+    facts.read(text_);
+  }
+  return false;
+}
+
+/// The number behind a letter; moves behind it.
+bool GcodeCommands::read_number(std::string_view& left, double& value) {
+  const std::string_view all = left;
+  if (left.starts_with('+')) left.remove_prefix(1);
+  const auto [end, code] = std::from_chars(left.data(), left.data() + left.size(), value);
+  if (code != std::errc() || !std::isfinite(value)) {
+    fail(fmt::format("'{}' is not a number", one_line(all.substr(0, std::min<std::size_t>(all.find(' '), 20)))));
+    return false;
+  }
+  left.remove_prefix(static_cast<std::size_t>(end - left.data()));
+  return true;
+}
+
+bool GcodeCommands::read_words(std::string_view left, Words& words) {
+  while (!left.empty()) {
+    const char letter = left.front();
+    left.remove_prefix(1);
+    if (letter == ' ' || letter == '\t') continue;
+    if (letter < 'A' || letter > 'Z') {
+      fail(fmt::format("'{}{}' is no word of a move", letter, one_line(left.substr(0, 20))));
+      return false;
+    }
+    if (left.empty() || left.front() == ' ') continue;  // a word without a number, as G92 X
+    if (!read_number(left, words.value[letter - 'A'])) return false;
+    words.given |= 1u << (letter - 'A');
+  }
+  return true;
+}
+
+/// Marlin's G90 and G91 replace what M82 and M83 said (MarlinFirmware/Marlin, GcodeSuite::set_relative_mode()).
+void GcodeCommands::set_relative(bool relative) {
+  place_.relative = relative;
+  if (place_.firmware == GcodeFile::Firmware::kMarlin) place_.relative_feed = relative;
+}
+
+/// Of E. G91 or M83 makes it relative in Klipper (klippy/extras/gcode_move.py, GCodeMove.cmd_G1) and in PrusaSlicer's view
+/// of its own files (GCodeProcessor::process_G1); in RepRapFirmware M83 alone does.
+bool GcodeCommands::feeds_relative() const {
+  return place_.relative_feed || (place_.relative && place_.firmware == GcodeFile::Firmware::kUntold);
+}
+
+/// Whether the line is no move.
+bool GcodeCommands::set_mode(char letter, double code, std::string_view left) {
+  if (letter == 'M') {
+    if (code == 82) place_.relative_feed = false;
+    if (code == 83) place_.relative_feed = true;
+    Words words;
+    if (code == 200 && read_words(left, words)) {  // Marlin: M200 D1.75 counts E in mm3, M200 D0 or S0 does not
+      if (words.has('D')) place_.volumetric = words['D'] > 0;
+      if (words.has('S')) place_.volumetric = words['S'] != 0;
+    }
+    return true;
+  }
+  if (code == 17 || code == 18 || code == 19) place_.plane = static_cast<std::uint8_t>(code);
+  if (code == 20) place_.unit = 25.4;
+  if (code == 21) place_.unit = 1;
+  if (code == 90 || code == 91) set_relative(code == 91);
+  if (code == 90.1) fail("G90.1: firmwares of printers take centres of arcs from the start; export them so");
+  if (code == 5) fail("splines (G5) are not drawn; export lines or arcs");
+  return code != 0 && code != 1 && code != 2 && code != 3 && code != 92;
+}
+
+/// Whether the line lays a bead.
+bool GcodeCommands::run_command(std::optional<RawBead>& bead) {
+  std::string_view left = text_.substr(0, text_.find_first_of(";(*"));
+  if (left.starts_with('N')) left.remove_prefix(std::min(left.find_first_of("GMT"), left.size()));  // a line's number
+  if (left.empty() || (left.front() != 'G' && left.front() != 'M')) return false;
+  const char letter = left.front();
+  if (left.size() < 2 || left[1] < '0' || left[1] > '9') return false;
+  left.remove_prefix(1);
+  double code = 0;
+  if (!read_number(left, code) || set_mode(letter, code, left)) return false;
+  Words words;
+  return read_words(left, words) && move(code, words, bead);
+}
+
+bool GcodeCommands::within_reach(const RawBead& bead) {
+  for (const double at : {bead.from[0], bead.from[1], bead.from[2], bead.to[0], bead.to[1], bead.to[2]}) {
+    if (std::abs(at) <= kFarthestMm) continue;
+    fail(fmt::format("a bead at {:g} mm; beds are at most {:g} mm wide", at, kFarthestMm));
+    return false;
+  }
+  return true;
+}
+
+bool GcodeCommands::move(double code, const Words& words, std::optional<RawBead>& bead) {
+  constexpr char kAxes[] = {'X', 'Y', 'Z', 'E'};
+  double to[4];
+  for (std::size_t k = 0; k < 4; ++k) {
+    const bool relative = code != 92 && (k == 3 ? feeds_relative() : place_.relative);
+    to[k] = place_.at[k];
+    if (words.has(kAxes[k])) to[k] = (relative ? place_.at[k] : 0) + words[kAxes[k]] * place_.unit;
+  }
+  const double fed = code != 92 ? to[3] - place_.at[3] : 0;
+  if (code != 92 && words.has('F')) place_.speed = std::max(words['F'] * place_.unit / 60, 0.0);
+  const bool joined = place_.lays;
+  if (code != 92) place_.lays = place_.lays && std::equal(std::begin(to), std::end(to), place_.at);
+  if (code == 2 || code == 3) {
+    if (!begin_arc(code == 2, words, to, fed)) return false;
+    whole_.joined = joined;
+    whole_.primed = place_.primed;
+    place_.lays = chord_ > 0;
+    place_.primed = chord_ > 0 ? 0 : place_.primed + fed;
+  } else if (fed > 0 && (to[0] != place_.at[0] || to[1] != place_.at[1])) {
+    const double* at = place_.at;
+    bead = RawBead{
+        {at[0], at[1], at[2]}, {to[0], to[1], to[2]}, fed, place_.volumetric, place_.speed, joined, place_.primed, true};
+    if (!within_reach(*bead)) return false;
+    place_.lays = true;
+    place_.primed = 0;
+  } else {
+    place_.primed += fed;
+  }
+  std::copy(std::begin(to), std::end(to), place_.at);
+  return bead.has_value() || (chord_ > 0 && next_chord(bead));
+}
+
+/// False if the printer does not move.
+bool GcodeCommands::begin_arc(bool clockwise, const Words& words, const double (&to)[4], double fed) {
+  const double* at = place_.at;
+  ArcWords given{clockwise, words['I'] * place_.unit, words['J'] * place_.unit, {}};
+  if (words.has('R')) given.radius = words['R'] * place_.unit;
+  const bool lays = fed > 0;
+  if (place_.plane != 17) {
+    // G18 leads Z to X in RepRapFirmware (GCodes::DoArcMove) and Marlin, X to Z in Klipper: the other way round.
+    if (lays)
+      fail(fmt::format("an arc in the plane of G{}: firmwares differ; export arcs in that of the bed (G17)", place_.plane));
+    return !lays;
+  }
+  if (!arc_.plan({at[0], at[1]}, {to[0], to[1]}, given)) {
+    left_out.add(place_.line);
+    return false;
+  }
+  if (!lays) return true;
+  if (words['P'] != 0) {
+    fail("an arc of several turns (P), which firmwares read by request only; export each turn");
+    return false;
+  }
+  if (arc_.miss() > 0.05) off_circle.add(place_.line);
+  if (arc_.radius_short()) short_radius.add(place_.line);
+  whole_ = {{at[0], at[1], at[2]}, {to[0], to[1], to[2]}, fed, place_.volumetric, place_.speed, false, 0, true};
+  chord_ = 1;
+  return true;
+}
+
+/// The chord whose number is chord_, if it is longer than nothing.
+bool GcodeCommands::next_chord(std::optional<RawBead>& bead) {
+  const auto z_of = [&](std::uint64_t chord) {
+    const double share = static_cast<double>(chord) / static_cast<double>(arc_.chords());
+    return chord == arc_.chords() ? whole_.to[2] : whole_.from[2] + share * (whole_.to[2] - whole_.from[2]);
+  };
+  const Arc::Place from = chord_ == 1 ? Arc::Place{whole_.from[0], whole_.from[1]} : arc_.end_of(chord_ - 1);
+  const Arc::Place to = arc_.end_of(chord_);
+  const double fed = whole_.fed / static_cast<double>(arc_.chords());
+  RawBead piece{{from.x, from.y, z_of(chord_ - 1)},
+                {to.x, to.y, z_of(chord_)},
+                fed,
+                whole_.volumetric,
+                whole_.speed,
+                whole_.joined,
+                whole_.primed,
+                whole_.first};
+  chord_ = chord_ < arc_.chords() ? chord_ + 1 : 0;
+  if (from.x == to.x && from.y == to.y) return false;
+  whole_.first = false;
+  whole_.joined = true;
+  whole_.primed = 0;
+  if (!within_reach(piece)) return false;
+  bead = piece;
+  return true;
+}
+
+}  // namespace lamina::read

@@ -1,0 +1,115 @@
+#include "stages/formats/zip/zip.h"
+
+#include <zlib.h>
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <chrono>
+
+namespace lamina::write {
+namespace {
+
+constexpr std::array<std::byte, 2> kLastBlock{std::byte{3}, std::byte{0}};  // of a deflate stream: final, fixed codes, empty
+
+void put_little(std::string& out, std::uint64_t number, int bytes) {
+  for (int i = 0; i < bytes; ++i) out += static_cast<char>(number >> (8 * i) & 0xff);
+}
+
+}  // namespace
+
+Result<ZipDate> zip_date(const char* text) {
+  const std::string_view digits = text == nullptr ? "" : text;
+  if (digits.empty()) return kFirstZipDate;
+  std::uint64_t seconds = 0;
+  const auto [end, status] = std::from_chars(digits.data(), digits.data() + digits.size(), seconds);
+  if (status != std::errc() || end != digits.data() + digits.size())
+    return Error{Fault::kUsage, "SOURCE_DATE_EPOCH is not a count of seconds since 1970, such as 1767225600; unset it"};
+  constexpr std::uint64_t kFirst = 315'532'800, kLast = 4'354'819'198;  // 1980-01-01 0:00:00, 2107-12-31 23:59:58
+  const std::chrono::sys_seconds time{std::chrono::seconds(std::clamp(seconds, kFirst, kLast))};
+  const auto day = std::chrono::floor<std::chrono::days>(time);
+  const std::chrono::year_month_day date(day);
+  const std::chrono::hh_mm_ss clock(time - day);
+  const auto years = static_cast<ZipDate>(static_cast<int>(date.year()) - 1980);
+  const ZipDate on = years << 9 | static_cast<unsigned>(date.month()) << 5 | static_cast<unsigned>(date.day());
+  const auto at =
+      static_cast<ZipDate>(clock.hours().count() << 11 | clock.minutes().count() << 5 | clock.seconds().count() / 2);
+  return on << 16 | at;
+}
+
+/// What stands before the data of an entry, and again in the directory, with the entry's place.
+std::string ZipWriter::record(const Entry& entry, bool in_directory) const {
+  const bool large_sizes = large(entry.packed) || large(entry.size), large_place = in_directory && large(entry.place);
+  const int version = large_sizes || large_place ? 45 : 20;
+  std::string extra;
+  if (large_sizes || large_place) {
+    put_little(extra, 1, 2);
+    put_little(extra, (large_sizes ? 16 : 0) + (large_place ? 8 : 0), 2);
+    if (large_sizes) put_little(extra, entry.size, 8), put_little(extra, entry.packed, 8);
+    if (large_place) put_little(extra, entry.place, 8);
+  }
+  std::string out = in_directory ? "PK\x01\x02" : "PK\x03\x04";
+  if (in_directory) put_little(out, version, 2);  // made by
+  put_little(out, version, 2);                    // needed to extract
+  put_little(out, 0, 2);
+  put_little(out, 8, 2);  // deflated
+  put_little(out, date_, 4);
+  put_little(out, entry.crc, 4);
+  put_little(out, large_sizes ? UINT32_MAX : entry.packed, 4);
+  put_little(out, large_sizes ? UINT32_MAX : entry.size, 4);
+  put_little(out, entry.name.size(), 2);
+  put_little(out, extra.size(), 2);
+  if (in_directory) {
+    out.append(10, '\0');  // no comment, the first disk, no attributes
+    put_little(out, large_place ? UINT32_MAX : entry.place, 4);
+  }
+  return out + entry.name + extra;
+}
+
+Status ZipWriter::add(std::string_view name, std::span<const Deflated> pieces) {
+  Entry entry{std::string(name), 0, kLastBlock.size(), 0, written_};
+  for (const Deflated& piece : pieces) {
+    entry.crc = static_cast<std::uint32_t>(crc32_combine(entry.crc, piece.crc, static_cast<z_off_t>(piece.size)));
+    entry.packed += piece.bytes.size();
+    entry.size += piece.size;
+  }
+  const std::string head = record(entry, false);
+  if (Status status = file_.append(head); !status) return status;
+  for (const Deflated& piece : pieces) {
+    if (Status status = file_.append(piece.bytes); !status) return status;
+  }
+  written_ += head.size() + entry.packed;
+  entries_.push_back(std::move(entry));
+  return file_.append(kLastBlock);
+}
+
+Status ZipWriter::finish() {
+  std::string directory;
+  for (const Entry& entry : entries_) directory += record(entry, true);
+  const std::uint64_t count = entries_.size(), place = written_, size = directory.size();
+  if (large(place) || large(size) || count >= UINT16_MAX) {
+    const std::uint64_t end = place + size;
+    directory += "PK\x06\x06";
+    put_little(directory, 44, 8);  // bytes that follow in this record
+    put_little(directory, 45, 2);
+    put_little(directory, 45, 2);
+    put_little(directory, 0, 8);  // the only disk
+    put_little(directory, count, 8);
+    put_little(directory, count, 8);
+    put_little(directory, size, 8);
+    put_little(directory, place, 8);
+    directory += "PK\x06\x07";
+    put_little(directory, 0, 4);
+    put_little(directory, end, 8);
+    put_little(directory, 1, 4);
+  }
+  directory += "PK\x05\x06";
+  put_little(directory, 0, 4);
+  for (int i = 0; i < 2; ++i) put_little(directory, std::min<std::uint64_t>(count, UINT16_MAX), 2);
+  put_little(directory, large(size) ? UINT32_MAX : size, 4);
+  put_little(directory, large(place) ? UINT32_MAX : place, 4);
+  put_little(directory, 0, 2);
+  return file_.append(directory);
+}
+
+}  // namespace lamina::write
