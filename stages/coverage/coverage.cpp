@@ -10,8 +10,8 @@
 #include "stages/coverage/edges.h"
 #include "stages/coverage/held_bound.h"
 #include "stages/coverage/meet/meetings.h"
-#include "stages/coverage/slab_index.h"
 #include "stages/geometry/blocks/block_maker.h"
+#include "stages/geometry/interval_table.h"
 #include "stages/geometry/isa.h"
 
 namespace lamina::cover {
@@ -20,7 +20,7 @@ namespace {
 /// A mesh, and what was found out about it once.
 struct CoveredMesh {
   std::shared_ptr<const MeshBlocks> blocks;
-  SlabIndex index;
+  IntervalTable<Nm> index;
   Suspects suspects;
   HeldBound held;
 };
@@ -123,7 +123,7 @@ Result<Coverage> Coverage::build(std::span<Mesh> meshes, std::span<const Instanc
   std::vector<std::shared_ptr<MeshBlocks>> blocks = take_blocks(meshes);
   for (std::size_t i = 0; i < blocks.size(); ++i) {
     meshes[i].blocks = blocks[i];
-    SlabIndex index(blocks[i]->bounds());
+    IntervalTable<Nm> index = heights_of(blocks[i]->bounds());
     Suspects suspects = find_suspects(*blocks[i], index, isa);
     HeldBound held(*blocks[i], suspects, grid, levels - 1);
     state.meshes.push_back({std::move(blocks[i]), std::move(index), std::move(suspects), std::move(held)});
@@ -143,7 +143,7 @@ void Coverage::State::gather(const Layer& layer, LayerScratch& scratch) const {
     const auto moved = [&](const Point3& p) {
       return Point3{static_cast<Nm>(p.x + by.x), static_cast<Nm>(p.y + by.y), static_cast<Nm>(p.z + by.z)};
     };
-    mesh.index.each(bottom - by.z, top - by.z, [&](std::uint32_t c) {
+    mesh.index.find(bottom - by.z, top - by.z - 1, [&](std::uint32_t c) {
       const Cluster& cluster = mesh.blocks->cluster(c, room);
       const unsigned suspects = copy.crowded ? ~0u : mesh.suspects[c];
       for (std::uint32_t lane = 0; lane < kClusterSize; ++lane) {

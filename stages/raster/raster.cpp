@@ -5,12 +5,12 @@
 #include <algorithm>
 #include <vector>
 
+#include "stages/geometry/interval_table.h"
 #include "stages/geometry/isa.h"
 #include "stages/raster/beams.h"
 #include "stages/raster/clusters.h"
 #include "stages/raster/crossed_planes.h"
 #include "stages/raster/cut_clusters.h"
-#include "stages/raster/height_buckets.h"
 #include "stages/raster/layer_bound.h"
 
 namespace lamina::raster {
@@ -50,7 +50,7 @@ struct Rasterizer::State {
   std::uint32_t first_row = 0, last_row = 0;  // geometry rows that any part can reach
   std::uint32_t band_rows = 1;                // rows a ray; they are equal shares of the rows above
   std::vector<BeamIndex> beams;               // one, or none
-  std::vector<HeightBuckets> buckets;         // one a mesh, or none
+  std::vector<IntervalTable<Nm>> heights;     // of clusters, one table a mesh, or none: engine `contours`
   std::vector<LayerBound> bound;              // one
 
   State(const PixelGrid& pixel_grid, FillRule fill_rule, Isa isa)
@@ -88,7 +88,7 @@ Result<Rasterizer> Rasterizer::build(std::span<Mesh> meshes, std::span<const Ins
     state.bound.emplace_back(state.placed, state.meshes, crossing_tables(state.meshes, *usable), grid);
   };
   const auto sort_by_height = [&] {
-    for (const ClusteredMesh& mesh : state.meshes) state.buckets.emplace_back(mesh);
+    for (const ClusteredMesh& mesh : state.meshes) state.heights.push_back(heights_of(mesh.bounds));
   };
   if (contours) {
     tbb::parallel_invoke(sum_up, sort_by_height);
@@ -142,8 +142,10 @@ LayerReport Rasterizer::layer(Engine engine, Nm plane, LayerScratch& scratch, Ru
   } else {
     for (std::uint32_t i = 0; i < state.placed.size(); ++i) {
       const PlacedMesh& placed = state.placed[i];
-      state.buckets[static_cast<std::size_t>(placed.mesh - state.meshes.data())].find_clusters(
-          std::int64_t{plane} - placed.offset.z, i, scratch.visits);
+      const std::int64_t z = std::int64_t{plane} - placed.offset.z;
+      state.heights[static_cast<std::size_t>(placed.mesh - state.meshes.data())].find(z, z, [&](std::uint32_t cluster) {
+        scratch.visits.push_back({cluster, i});
+      });
     }
     if (scratch.visits.size() <= kMostClusters) {
       append(scratch.visits, state.first_row, state.last_row);
@@ -199,7 +201,7 @@ std::uint64_t Rasterizer::index_bytes() const {
   std::uint64_t total = bytes_held(state_->sampling.row_centre) + state_->placed.capacity() * sizeof(PlacedMesh);
   total += state_->bound.front().bytes();
   for (const ClusteredMesh& mesh : state_->meshes) total += mesh.bounds_bytes();
-  for (const HeightBuckets& buckets : state_->buckets) total += buckets.bytes();
+  for (const IntervalTable<Nm>& heights : state_->heights) total += heights.bytes();
   for (const BeamIndex& beams : state_->beams) total += beams.bytes();
   return total;
 }

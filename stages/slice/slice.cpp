@@ -52,7 +52,7 @@ Result<Slicer> Slicer::build(std::span<const Mesh> meshes, std::span<const Insta
     const auto [found, is_new] = known.emplace(std::pair(instance.mesh, z), static_cast<std::uint32_t>(sources.size()));
     if (is_new) {
       std::ranges::transform(planes, own_planes.begin(), [&](Nm plane) { return std::int64_t{plane} - z; });
-      sources.push_back({instance.mesh, z, PlaneIndex(meshes[instance.mesh].triangles, own_planes)});
+      sources.push_back({instance.mesh, z, index_crossings(meshes[instance.mesh].triangles, own_planes)});
     }
     slicer.instances_.push_back({found->second, {instance.offset.x, instance.offset.y}});
   }
@@ -89,7 +89,7 @@ void Slicer::loops_of(const Source& source, std::uint32_t plane, LayerScratch& s
   const std::int64_t z = std::int64_t{planes_[plane]} - source.z;
   const std::span<const Triangle> triangles = meshes_[source.mesh].triangles;
   scratch.facets.clear();
-  source.index.find(plane, scratch.facets);
+  source.index.append(plane, scratch.facets);
   cut(triangles, scratch.facets, z, scratch.cuts);
   scratch.open.clear();
   chain(scratch.cuts, z, scratch.chain, closed, scratch.open);
@@ -166,10 +166,10 @@ std::uint64_t Slicer::layer_bytes_bound(std::uint32_t plane) const {
   std::vector<std::uint8_t> seen(sources_->size(), 0);
   for (const Placed& placed : placed_) seen[placed.source] = 1;
   for (std::size_t s = 0; s < seen.size(); ++s) {
-    if (seen[s] != 0) most += (*sources_)[s].index.most_facets(plane) * of_cut;
+    if (seen[s] != 0) most += (*sources_)[s].index.max_found(plane) * of_cut;
   }
   std::uint64_t points = 0;
-  for (const Placed& placed : placed_) points += (*sources_)[placed.source].index.most_facets(plane);
+  for (const Placed& placed : placed_) points += (*sources_)[placed.source].index.max_found(plane);
   return most + points * sizeof(Point2);
 }
 

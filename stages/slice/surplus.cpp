@@ -35,7 +35,7 @@ std::vector<Source> sources_of(std::span<const Mesh> meshes, std::span<const Ins
     if (is_new) {
       std::ranges::transform(planes, own_planes.begin(), [&](Nm plane) { return plane - z; });
       const std::span<const Triangle> triangles = meshes[instance.mesh].triangles;
-      sources.push_back({triangles, z, PlaneIndex(triangles, own_planes), {}});
+      sources.push_back({triangles, z, index_crossings(triangles, own_planes), {}});
     }
     sources[found->second].by.push_back({instance.offset.x, instance.offset.y});
   }
@@ -55,7 +55,7 @@ Result<double> surplus_area(std::span<const Source> sources, std::span<const Nm>
   scratch.all.clear();
   for (const Source& source : sources) {
     scratch.facets.clear(), scratch.own.clear(), scratch.open.clear();
-    source.index.find(plane, scratch.facets);
+    source.index.append(plane, scratch.facets);
     const std::int64_t z = planes[plane] - source.z;
     cut(source.triangles, scratch.facets, z, scratch.cuts);
     chain(scratch.cuts, z, scratch.chain, scratch.own, scratch.open);

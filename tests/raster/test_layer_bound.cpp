@@ -8,7 +8,6 @@
 #include <random>
 
 #include "stages/load/load.h"
-#include "stages/raster/height_buckets.h"
 #include "stages/raster/layer_bound.h"
 #include "stages/raster/raster.h"
 #include "tests/raster/shapes.h"

@@ -191,12 +191,12 @@ TEST(PlaneIndex, FindsExactlyTheFacetsThatAPlaneCrossesForAnyPlanes) {
     std::vector<std::int64_t> planes;
     for (std::int64_t z = -6000; z < 6000; z += 1 + static_cast<std::int64_t>(random() % static_cast<unsigned>(spread)))
       planes.push_back(z);
-    const slice::PlaneIndex index(triangles, planes);
+    const slice::PlaneIndex index = slice::index_crossings(triangles, planes);
     Buffer<std::uint32_t> found;
     for (std::uint32_t p = 0; p < planes.size(); p += static_cast<std::uint32_t>(1 + planes.size() / 200)) {
       found.clear();
-      index.find(p, found);
-      EXPECT_LE(found.size(), index.most_facets(p));
+      index.append(p, found);
+      EXPECT_LE(found.size(), index.max_found(p));
       std::vector<std::uint32_t> expected;
       for (std::uint32_t t = 0; t < triangles.size(); ++t) {
         const auto [low, high] = std::minmax({triangles[t].a.z, triangles[t].b.z, triangles[t].c.z});

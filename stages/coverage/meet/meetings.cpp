@@ -202,7 +202,7 @@ int compare(const Hit& a, const Hit& b) {
 }
 
 /// Whether the winding number in front of the facet is 0, for certain.
-bool has_nothing_before_it(const MeshBlocks& mesh, const SlabIndex& index, const Plane& facet, std::uint32_t number) {
+bool has_nothing_before_it(const MeshBlocks& mesh, const IntervalTable<Nm>& index, const Plane& facet, std::uint32_t number) {
   const Triangle& t = facet.facet;
   const auto middle = [](std::int64_t a, std::int64_t b, std::int64_t c) {
     return 2 * floor_div(a + b + c, std::int64_t{3}) + 1;
@@ -213,7 +213,8 @@ bool has_nothing_before_it(const MeshBlocks& mesh, const SlabIndex& index, const
   std::int64_t winding = facet.nx > 0 ? -1 : 0;  // in front of a facet that +x leaves through lies what is behind all others
   bool certain = true;
   Cluster room;
-  index.each(floor_div(z, std::int64_t{2}), floor_div(z, std::int64_t{2}) + 1, [&](std::uint32_t c) {
+  const std::int64_t below = floor_div(z, std::int64_t{2});
+  index.find(below, below, [&](std::uint32_t c) {
     const Box& box = mesh.bounds()[c];
     if (!certain || 2 * std::int64_t{box.lo.y} > y || 2 * std::int64_t{box.hi.y} < y ||
         2 * std::int64_t{box.lo.x} > own.whole + 1) {
@@ -241,7 +242,7 @@ bool has_nothing_before_it(const MeshBlocks& mesh, const SlabIndex& index, const
 }
 
 /// Shells of facets that are not suspect yet become suspect unless nothing is in front of them.
-void judge_shells(const MeshBlocks& mesh, const SlabIndex& index, const Neighbours& neighbours, Suspects& suspects) {
+void judge_shells(const MeshBlocks& mesh, const IntervalTable<Nm>& index, const Neighbours& neighbours, Suspects& suspects) {
   const auto is_suspect = [&](std::uint32_t f) { return (suspects[f / kClusterSize] >> f % kClusterSize & 1) != 0; };
   std::vector<bool> seen(neighbours.size());
   std::vector<std::uint32_t> shell;
@@ -273,7 +274,7 @@ void judge_shells(const MeshBlocks& mesh, const SlabIndex& index, const Neighbou
 
 }  // namespace
 
-Suspects find_suspects(const MeshBlocks& mesh, const SlabIndex& index, Isa isa) {
+Suspects find_suspects(const MeshBlocks& mesh, const IntervalTable<Nm>& index, Isa isa) {
   const std::uint32_t clusters = mesh.cluster_count();
   Suspects suspects;
   suspects.assign(clusters, 0);
